@@ -166,8 +166,11 @@ class Runner {
     dfm_equilibrium_info info = {};
     info.size = sizeof info;
     const double begin = wall_seconds();
-    const dfm_status status = dfm_world_equilibrium(world_, &def, &info);
+    stepping = world_;
+    const dfm_status status = interrupted ? DFM_DISCARD : dfm_world_equilibrium(world_, &def, &info);
+    stepping = 0;
     result_.times.add(wall_seconds() - begin);
+    if (interrupted && status == DFM_DISCARD) return false;  // the world is as before the search
     if (status != DFM_OK) {
       stop();
       return false;

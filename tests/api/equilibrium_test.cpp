@@ -177,9 +177,18 @@ TEST(Equilibrium, WhatItCannotDo_IsRefusedByName) {
   def = dfm_equilibrium_def_default();
   def.time = NAN;
   EXPECT_EQ(bar.find(def), DFM_E_ARG);
-  test::add_plane(bar.world, "floor", {0, 0, -1});
-  EXPECT_EQ(bar.find(), DFM_E_UNSUPPORTED);
-  test::says({"contact", "not available yet"});
+  dfm_world_def d = dfm_world_def_default();
+  d.method = DFM_METHOD_ROLLBACK;
+  dfm_world rollback = 0;
+  test::ok(dfm_world_create(bar.context, &d, &rollback));
+  test::add_plane(rollback, "floor", {0, 0, -1});
+  test::BodyOptions o;
+  o.model = "msm";
+  test::make_body(bar.context, rollback, "beam", {0.1, 0.1, 0.1}, 20, o);
+  def = dfm_equilibrium_def_default();
+  EXPECT_EQ(dfm_world_equilibrium(rollback, &def, nullptr), DFM_E_UNSUPPORTED);
+  test::says({"contact method", "rollback"});
+  dfm_world_destroy(rollback);
 }
 
 // A scene with "mode": "static": growing loads, nodes of the end, rows on the way.

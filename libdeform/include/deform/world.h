@@ -133,26 +133,31 @@ typedef struct dfm_equilibrium_def {
   uint32_t load_steps; /* 0: 1. Each starts from the one before; one without an answer is halved */
   /* share of gravity and of loads at the start and the end; those that have keys or a sine follow these */
   double load_from, load_to;
-  double time;             /* s that pass on the way: what has keys is at its end place after it; 0 */
-  double tolerance;        /* N left at a point per N of the largest load or reaction; 0: 1e-10 */
-  uint32_t max_iterations; /* of Newton's method per load step and body; 0: 200 */
+  double time; /* s that pass on the way: what has keys is at its end place after it; 0 */
+  /* N left at a point per N of the largest load or reaction; 0: 1e-10, with contact 1e-6 */
+  double tolerance;
+  /* of Newton's method per load step and body; 0: 200. With contact, steps from rest per load step; 0: 500 */
+  uint32_t max_iterations;
   uint32_t reserved;
 } dfm_equilibrium_def;
 typedef struct dfm_equilibrium_info {
   uint32_t size;
   uint32_t load_steps; /* that it took */
-  uint64_t iterations; /* linear solves, of all bodies and load steps */
+  uint64_t iterations; /* linear solves, of all bodies and load steps; with contact, steps from rest */
   double residual;     /* of the last load step: N left per N of the largest load or reaction, worst body */
 } dfm_equilibrium_info;
 /** One load step, from no load to all of it, no time passes. Threads: Any thread. Since 0.1. */
 DFM_API dfm_equilibrium_def dfm_equilibrium_def_default(void);
-/** Moves all bodies to where their inner forces balance gravity, loads and springs, with held points where
- * they are told to be; velocities are zero then (doc/concepts/static.md). What relaxes or flows has done so.
+/** Moves all bodies to where their inner forces, contact and friction balance gravity, loads and springs,
+ * with held points and obstacles where they are told to be; velocities are zero then
+ * (doc/concepts/static.md). What relaxes or flows has done so. dfm_world_interrupt stops a search with
+ * contact.
  * @param def   NULL: the default
  * @param info  out; may be NULL
- * @return DFM_OK; DFM_E_DIVERGED no equilibrium was found, or a body that nothing holds has loads that do not
- * sum to zero; DFM_E_UNSUPPORTED a model without stiffness, bodies that may touch, rigid bodies; DFM_E_ARG;
- * DFM_E_NOMEM; DFM_E_HANDLE; DFM_E_BUSY. On failure nothing has changed.
+ * @return DFM_OK; DFM_E_DIVERGED no equilibrium was found: a body that nothing holds has loads that do not
+ * sum to zero, slides on, or falls; DFM_E_UNSUPPORTED a model without stiffness, rigid bodies, contact in a
+ * world whose method is ROLLBACK; DFM_DISCARD interrupted; DFM_E_ARG; DFM_E_NOMEM; DFM_E_HANDLE; DFM_E_BUSY.
+ * On failure nothing has changed.
  * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_equilibrium(dfm_world world, const dfm_equilibrium_def *def,
                                          dfm_equilibrium_info *info);

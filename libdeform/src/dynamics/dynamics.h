@@ -58,6 +58,7 @@ struct ImplicitOptions {
   double tolerance = 1e-10;        // of an iterative solver, relative residual
   uint32_t solver_iterations = 0;  // of it at most; 0: as many as unknowns
   uint32_t newton = 20;            // at most; 1: one linear solve per sub-step, without a line search
+  double rest = 1e-8;              // m/s that Newton's method may leave of what does not move
   Tasks *tasks = nullptr;          // for the rows of a large body's matrix
 };
 
@@ -99,7 +100,7 @@ class Dynamics {
   virtual Revision revise(const SubStep &, const double *) { return Revision::none; }
   // [npoint,4] m/s without contact; null: free_motion() has written the surfels' own, surface.v.
   virtual const double *point_velocity() const { return nullptr; }
-  const double *contact_velocity() const;  // of the unknowns: [npoint,4], or [nsurfel,4]
+  virtual const double *contact_velocity() const;  // of the unknowns: [npoint,4], or [nsurfel,4]
 
   // By the impulses in points().impulse, or at the surfels [nsurfel,3] where points answer each other.
   // touched: there are any. False: the model cannot, or its end is not finite.

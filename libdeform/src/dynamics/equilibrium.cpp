@@ -9,8 +9,7 @@
 namespace dfm {
 namespace {
 
-constexpr double kForever = 1e9;  // s: longer than any relaxation
-constexpr uint32_t kCuts = 12;    // of a correction that leads too far
+constexpr uint32_t kCuts = 12;  // of a correction that leads too far
 // Share of its own diagonal that a matrix gets which is singular, at first; a hundred times as much where
 // that is not enough.
 constexpr double kLeastRegular = 1e-9, kMostRegular = 1e-1;
@@ -22,9 +21,12 @@ constexpr double kRounding = 8 * 2.220446049250313e-16;
 
 Equilibrium::Equilibrium(const Memory &memory, Phyxels &points, ModelInstance &model,
                          const ImplicitOptions &options)
-    : p_(points), model_(model), stiffness_(memory), solve_tolerance_(options.tolerance) {
-  use_memory(memory, zero_, residual_, way_, held_);
-  zero_.assign(size_t{kStride} * p_.n, 0.0);
+    : p_(points),
+      model_(model),
+      stiffness_(memory),
+      solve_tolerance_(options.tolerance),
+      rest_(memory, points, model) {
+  use_memory(memory, residual_, way_, held_);
   residual_.assign(size_t{3} * p_.n, 0.0);
   way_ = residual_;
   stiffness_.create(model, p_.n);
@@ -34,27 +36,12 @@ Equilibrium::Equilibrium(const Memory &memory, Phyxels &points, ModelInstance &m
   solver_->analyse(stiffness_.pattern());
 }
 
-dfm_kin Equilibrium::kin(double time) const {
-  dfm_kin k{};
-  k.size = sizeof k;
-  k.stride = kStride;
-  k.t = time;
-  k.dt = kForever;
-  k.x = p_.x.data();
-  k.v = zero_.data();
-  k.state = model_.state.data();
-  return k;
-}
-
 // What is not balanced at the present positions, and the largest load or reaction.
 bool Equilibrium::residual(double time, const Loads &loads) {
   loads(p_.f.data());
   scale_ = 0;
   for (const double f : p_.f) scale_ = std::max(scale_, std::fabs(f));
-  const dfm_kin k = kin(time);
-  if (model_.call("add_forces", [&] { return model_.ops->add_forces(model_.self, &k, p_.f.data()); }) !=
-      DFM_OK)
-    return false;
+  if (!rest_.add_forces(time)) return false;
   double poison = 0;
   for (uint32_t i = 0; i < p_.n; ++i)
     for (uint32_t c = 0; c < 3; ++c) {
@@ -82,7 +69,7 @@ bool Equilibrium::linearize(double time, const double *softness, bool free) {
   if (factored_ && stiffness_.constant() && held_ == p_.held) return true;
   for (double share = free ? kLeastRegular : 0; share <= kMostRegular;
        share = share > 0 ? 100 * share : kLeastRegular) {
-    if (!stiffness_.evaluate(model_, kin(time), -1, 0)) return false;
+    if (!stiffness_.evaluate(model_, rest_.kin(time), -1, 0)) return false;
     double stiffest = 0, far = 0;
     stiffness_.each_own([&](uint32_t i, double *block) {
       for (size_t c = 0; c < 9; c += 4) {
@@ -142,18 +129,6 @@ EquilibriumResult Equilibrium::find(const EquilibriumLimits &limits, double time
   }
   out.found = true;
   return out;
-}
-
-bool Equilibrium::relax(double time) {
-  if (model_.state.empty()) return false;
-  dfm_kin k = kin(time);
-  k.state_out = model_.state_out.data();
-  std::fill(p_.f.begin(), p_.f.end(), 0.0);
-  if (model_.call("add_forces", [&] { return model_.ops->add_forces(model_.self, &k, p_.f.data()); }) !=
-      DFM_OK)
-    return false;
-  model_.commit_state();
-  return true;
 }
 
 }  // namespace dfm

@@ -4,6 +4,7 @@
 #include <functional>
 #include <memory>
 
+#include "dynamics/at_rest.h"
 #include "dynamics/dynamics.h"
 #include "dynamics/stiffness.h"
 #include "math/linear_solver.h"
@@ -33,9 +34,6 @@ class Equilibrium {
   // found positions are anywhere; velocities are taken for zero.
   EquilibriumResult find(const EquilibriumLimits &limits, double time, const Loads &loads,
                          const double *softness, bool free);
-  // What relaxes or flows has done so: the model's next state in a time without end. False: there is none, or
-  // the model cannot.
-  bool relax(double time);
 
  private:
   Phyxels &p_;
@@ -43,14 +41,13 @@ class Equilibrium {
   ModelStiffness stiffness_;
   std::unique_ptr<LinearSolver> solver_;
   double solve_tolerance_;
-  Array<double> zero_;            // [npoint,4] velocities
+  AtRest rest_;
   Array<double> residual_, way_;  // [npoint,3] N; m
   Array<uint8_t> held_;           // as in the factor at hand
   double floor_ = 0;              // N, rounding of forces at the present positions
   double scale_ = 0;              // N, the largest load or reaction
   bool factored_ = false;
 
-  dfm_kin kin(double time) const;
   bool residual(double time, const Loads &loads);
   bool linearize(double time, const double *softness, bool free);
   bool factor(double share);

@@ -10,9 +10,9 @@
 namespace dfm {
 namespace {
 
-// What Newton's method may leave: this share of the largest change of velocity in the sub-step, and at rest
-// so much, m/s. Contact at rest is solved to 1e-6 m/s.
-constexpr double kShare = 1e-3, kRest = 1e-8;
+// What Newton's method may leave: this share of the largest change of velocity in the sub-step, and what
+// ImplicitOptions say. Contact at rest is solved to 1e-6 m/s.
+constexpr double kShare = 1e-3;
 // A correction that does not halve the one before needs a new matrix.
 constexpr double kContracts = 0.5;
 // The rest state's factor may fail to do so that often in a sub-step.
@@ -95,7 +95,7 @@ bool ImplicitPoints::residual_at(const SubStep &now, const double *v, const doub
       const size_t at = size_t{kStride} * i + c, own = size_t{3} * i + c;
       const double force = p_.f[at] + p_.mass[i] * now.gravity[int(c)];
       const double given = push ? push[own] : 0;
-      residual_[own] = p_.moves(at) ? p_.mass[i] * (v[at] - p_.v[at]) - now.h * force - given : 0;
+      residual_[own] = p_.moves(at) ? inertia(i, now.h) * (v[at] - p_.v[at]) - now.h * force - given : 0;
       poison += 0.0 * residual_[own];
     }
   return poison == 0;
@@ -126,7 +126,7 @@ bool ImplicitPoints::linearize(const SubStep &now) {
   stiffness_.each_own([&](uint32_t i, double *block) {
     for (size_t c = 0; c < 3; ++c) {
       double &diagonal = block[4 * c];
-      diagonal += p_.mass[i];
+      diagonal += inertia(i, now.h);
       const bool held = p_.held[i] & (1 << c);
       scale_[3 * size_t{i} + c] = held ? 0 : 1 / diagonal;
       weight_[3 * size_t{i} + c] = held ? 0 : diagonal;
@@ -170,7 +170,7 @@ bool ImplicitPoints::patient(double left) { return by_rest_ && (left <= kContrac
 double ImplicitPoints::allowed_error(const Array<double> &v) const {
   double most = 0;
   for (size_t j = 0; j < v.size(); ++j) most = std::max(most, std::fabs(v[j] - p_.v[j]));
-  return kRest + kShare * most;
+  return options_.rest + kShare * most;
 }
 
 // From v, whose residual is known, along the way in change_. The residual is then that of the new v.
@@ -184,17 +184,30 @@ bool ImplicitPoints::search(const SubStep &now, Array<double> &v) {
       });
 }
 
+// From the velocities at the start of the sub-step.
+bool ImplicitPoints::start(const SubStep &now) {
+  p_.v_free = p_.v;
+  error_ = 0;
+  least_error_ = HUGE_VAL;
+  revisions_ = 0;
+  ended_ = false;
+  return residual_at(now, p_.v_free.data(), nullptr);
+}
+
+double ImplicitPoints::largest_diagonal() const { return largest(weight_); }
+
+bool ImplicitPoints::take_first_way(const SubStep &now) {
+  if (!start(now) || !linearize(now) || !solve_way(residual_)) return false;
+  add(p_.v_free, 1);
+  return true;
+}
+
 // Newton's method. A factorization costs many solves, so that of the rest state serves while the residual
 // falls well, then one of A itself; the combination of the ways it leads to makes good what the matrix is
 // not.
 bool ImplicitPoints::free_motion(const SubStep &now, double &kinetic) {
+  if (!start(now)) return false;
   Array<double> &v = p_.v_free;
-  v = p_.v;
-  error_ = 0;
-  least_error_ = HUGE_VAL;
-  revisions_ = 0;
-  if (!residual_at(now, v.data(), nullptr)) return false;
-  ended_ = false;
   ways_.start(change_.size());
   bool fresh = !take_rest(now);
   for (uint32_t k = 0; k < options_.newton; ++k) {
@@ -275,17 +288,21 @@ bool ImplicitPoints::response(const SubStep &, uint32_t n, const uint32_t *surfe
   return true;
 }
 
-// v_end = v_free + A^-1 push.
-bool ImplicitPoints::linear_end(const double *surfel_impulse) {
-  std::fill(change_.begin(), change_.end(), 0.0);
-  for (uint32_t s = 0; surfel_impulse && s < surface_.nsurfel; ++s) {
+void ImplicitPoints::spread_impulses(const double *surfel_impulse, double scale, Array<double> &to) const {
+  for (uint32_t s = 0; s < surface_.nsurfel; ++s) {
     const Vec3 q = load3(&surfel_impulse[3 * size_t{s}]);
     if (q.x == 0 && q.y == 0 && q.z == 0) continue;
     surface_.each_phyxel(s, [&](uint32_t p, double w) {
       for (uint32_t c = 0; c < 3; ++c)
-        if (p_.moves(size_t{kStride} * p + c)) change_[size_t{3} * p + c] += w * q[int(c)];
+        if (p_.moves(size_t{kStride} * p + c)) to[size_t{3} * p + c] += scale * w * q[int(c)];
     });
   }
+}
+
+// v_end = v_free + A^-1 push.
+bool ImplicitPoints::linear_end(const double *surfel_impulse) {
+  std::fill(change_.begin(), change_.end(), 0.0);
+  if (surfel_impulse) spread_impulses(surfel_impulse, 1, change_);
   if (ended_ && change_ == push_) return true;
   push_.swap(change_);
   p_.v_end = p_.v_free;

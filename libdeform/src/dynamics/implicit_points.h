@@ -44,8 +44,19 @@ class ImplicitPoints : public Dynamics {
   double accurate_step(const SubStep &now) const override;
   void commit(const SubStep &now, double fraction) override;
 
- private:
+ protected:
   ImplicitOptions options_;
+  Array<double> softness_;  // [npoint] N/m of loads that give way as the points move; empty: none do
+
+  bool solve(const Array<double> &b, Array<double> &x);
+  double largest_diagonal() const;            // kg, of A
+  void drop_rest_factor() { rest_.reset(); }  // A itself stands for A
+  // v_free: Newton's first correction of the velocities at the start, as a whole
+  bool take_first_way(const SubStep &now);
+  // scale times the impulses at the surfels [nsurfel,3], added to the points that move [npoint,3]
+  void spread_impulses(const double *surfel_impulse, double scale, Array<double> &to) const;
+
+ private:
   ModelStiffness stiffness_;
   Memory memory_;
   std::unique_ptr<RestFactor> rest_;     // null: where the solver is not direct, or one solve has to do
@@ -69,13 +80,16 @@ class ImplicitPoints : public Dynamics {
   bool ended_ = false;               // v_end is v_free and what push_ makes of it
 
   std::unique_ptr<LinearSolver> new_solver() const;
+  bool start(const SubStep &now);
   bool ask(const SubStep &now, const double *v, bool commits);
   bool residual_at(const SubStep &now, const double *v, const double *push);
   bool take_rest(const SubStep &now);
   bool linearize(const SubStep &now);
   bool patient(double left);
-  bool solve(const Array<double> &b, Array<double> &x);
   bool restricted(uint32_t count, const uint32_t *points, double *w);
+  double inertia(uint32_t point, double h) const {  // kg
+    return softness_.empty() ? p_.mass[point] : p_.mass[point] + h * h * softness_[point];
+  }
   bool solve_way(const Array<double> &r);
   void accelerate(const Array<double> &v);
   void add(Array<double> &v, double share) const;

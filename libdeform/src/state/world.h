@@ -1,7 +1,9 @@
 // The world: what lasts. step/step.cpp is the table of contents of what happens to it in a step,
 // step/context.h has the buffers of that.
 #pragma once
+#include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <memory>
 #include <string>
 #include <vector>
@@ -45,6 +47,14 @@ struct Gravity {
   Vec3 now;  // m/s2
 };
 
+// What is prescribed, where an equilibrium is looked for.
+struct Prescribed {
+  double until = HUGE_VAL;  // s: what has keys or a sine stands still from then on
+  double share = 1;         // of loads that nothing varies
+  double at(double t) const { return std::min(t, until); }
+  bool stands() const { return until < HUGE_VAL; }
+};
+
 // A measurement of what creeps (dfm_world_hold_begin).
 struct Hold {
   bool on = false;
@@ -63,6 +73,7 @@ struct World {
   std::vector<std::string> asked_effects;
   ImplicitOptions implicit;  // of bodies whose integrator is implicit
   Gravity gravity;
+  Prescribed prescribed;
 
   std::vector<std::unique_ptr<Body>> bodies;         // in id order
   std::vector<std::unique_ptr<Obstacle>> obstacles;  // in id order

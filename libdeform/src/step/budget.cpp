@@ -161,17 +161,19 @@ void changed_at_once(Stream &s, World &w) {
   s.value(w.sizes);
 }
 
+void put_back_changing(PutBack &from, World &w) {
+  changing(from, w);
+  for (auto &b : w.bodies) {
+    ++b->x_version;
+    if (b->slumber.asleep) gather_surface(b->surface, b->p.x.data(), b->p.v.data());
+  }
+  gather_active(w);
+}
+
 void return_to_start(World &w, StepContext &step) {
   PutBack from{step.budget.start.data()};
   changed_at_once(from, w);
-  if (step.budget.kept) {
-    changing(from, w);
-    for (auto &b : w.bodies) {
-      ++b->x_version;
-      if (b->slumber.asleep) gather_surface(b->surface, b->p.x.data(), b->p.v.data());
-    }
-    gather_active(w);
-  }
+  if (step.budget.kept) put_back_changing(from, w);
   const uint64_t cheapened = w.stats.cheapened;
   w.stats = step.budget.stats;
   w.stats.cheapened = cheapened;
@@ -243,6 +245,23 @@ void keep_start(World &w, StepContext &step) {
   changing(to, w);
   reserve_others(w, step);
   b.kept = true;
+}
+
+void write_down(World &w, StepContext &step, std::vector<unsigned char> &out) {
+  out.clear();
+  Keep to{out};
+  to.value(w.stats);
+  changed_at_once(to, w);
+  changing(to, w);
+  reserve_others(w, step);
+}
+
+void put_back(World &w, StepContext &step, const std::vector<unsigned char> &from) {
+  PutBack at{from.data()};
+  at.value(w.stats);
+  changed_at_once(at, w);
+  put_back_changing(at, w);
+  step.guard.forget();
 }
 
 dfm_status step_within_budget(World &w, double dt, uint32_t *trouble) {

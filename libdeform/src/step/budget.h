@@ -41,6 +41,10 @@ uint64_t body_work(const World &w, const StepContext &step);
 uint64_t surface_work(const World &w, const StepContext &step);
 // Does the step go without this by now? Counts as used where it is so.
 bool spares(StepContext &step, Thrift what);
+// All that steps change, between two steps; what has been written down is put back as it was. The bodies are
+// the same and move as they did.
+void write_down(World &w, StepContext &step, std::vector<unsigned char> &out);
+void put_back(World &w, StepContext &step, const std::vector<unsigned char> &from);
 // The state before the step is written down, once, before anything of it changes.
 void keep_start(World &w, StepContext &step);
 

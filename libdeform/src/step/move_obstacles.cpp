@@ -8,7 +8,7 @@ namespace dfm {
 
 Pose Obstacle::end_pose(double t, double h, double left) const {
   if (rigid) return shape_pose(*this, rigid->next[rigid_body]);
-  if (!has_target) return moves() ? pose_at_time(t + h) : pose;
+  if (!has_target) return moves() ? pose_at_time(world->prescribed.at(t + h)) : pose;
   const double s = h / left;
   return {pose.position + s * (target.position - pose.position),
           slerp(pose.rotation, target.rotation, s < 1 ? s : 1)};
@@ -26,7 +26,7 @@ void view_obstacles(World &w, StepContext &step) {
       v.velocity = (1 / left) * (o.target.position - o.pose.position);
       v.spin = spin_between(o.pose.rotation, o.target.rotation, left);
     } else if (o.moves()) {
-      const Pose end = o.pose_at_time(t + h);
+      const Pose end = o.pose_at_time(w.prescribed.at(t + h));
       v.velocity = (1 / h) * (end.position - o.pose.position);
       v.spin = spin_between(o.pose.rotation, end.rotation, h);
     }

@@ -35,14 +35,18 @@ void each_held_place(const Body &b, double t, const std::function<void(uint32_t,
 void stage_motion(World &w, double h, Array<Driven> &driven) {
   // Held velocities are the one part of the state that changes before a sub-step is known to succeed; what
   // was there is kept.
-  if (!w.gravity.keys.empty()) change_gravity(w, vector_at(w.gravity.keys, w.time + h));
+  const double end = w.prescribed.at(w.time + h);
+  if (!w.gravity.keys.empty()) change_gravity(w, vector_at(w.gravity.keys, end));
   for (auto &b : w.bodies) {
     if (b->slumber.asleep) continue;
     if (b->loads_vary()) {
-      set_loads(*b, w.time + h, 1);
-      for (const Spring &spring : b->springs) add_spring_force(*b, spring, w.time, h);
+      set_loads(*b, end, w.prescribed.share);
+      for (const Spring &spring : b->springs) {
+        if (w.prescribed.stands()) add_spring_force(*b, spring, end, 0);
+        else add_spring_force(*b, spring, w.time, h);
+      }
     }
-    each_held_place(*b, w.time + h, [&](uint32_t point, Vec3 to) {
+    each_held_place(*b, end, [&](uint32_t point, Vec3 to) {
       const size_t at = size_t(point) * kStride;
       const Vec3 v = (1 / h) * (to - load3(&b->p.x[at]));
       for (int k = 0; k < 3; ++k)

@@ -7,10 +7,12 @@
 
 #include "core/error.h"
 #include "dynamics/equilibrium.h"
-#include "state/spring.h"
 #include "state/world.h"
 #include "step/energy_watch.h"
+#include "step/method.h"
 #include "step/stages.h"
+#include "world/rest_loads.h"
+#include "world/settle.h"
 
 namespace dfm {
 namespace {
@@ -57,6 +59,7 @@ class Search {
   struct One {
     Body *body;
     std::unique_ptr<Equilibrium> solver;
+    std::unique_ptr<AtRest> rest;
     std::vector<double> softness;  // [npoint] N/m of the body's springs
     bool free;                     // neither held nor on springs
   };
@@ -66,12 +69,8 @@ class Search {
   };
 
   One make(Body &b, const ImplicitOptions &options) const {
-    One one{&b, std::make_unique<Equilibrium>(w_.memory(), b.p, b.model, options), {}, b.springs.empty()};
-    one.softness.assign(b.p.n, 0.0);
-    std::vector<double> damping(b.p.n, 0.0);
-    for (const Spring &s : b.springs) add_spring_bound(s, one.softness.data(), damping.data());
-    one.free = one.free && std::all_of(b.p.held.begin(), b.p.held.end(), [](uint8_t h) { return h == 0; });
-    return one;
+    return {&b, std::make_unique<Equilibrium>(w_.memory(), b.p, b.model, options),
+            std::make_unique<AtRest>(w_.memory(), b.p, b.model), softness_of(b), is_free(b)};
   }
 
   Station between(double part) const {
@@ -126,40 +125,19 @@ class Search {
       check_balance(one);
       for (uint32_t round = 0;; ++round) {
         result = one.solver->find(
-            limits_, to.time, [&](double *f) { loads(b, f); }, one.softness.data(), one.free);
+            limits_, to.time, [&](double *f) { loads_at_rest(w_, b, f); }, one.softness.data(), one.free);
         info_.iterations += result.iterations;
         if (!result.found) {
           failed = &one;
           return false;
         }
         // done once what has relaxed changes nothing
-        if ((round > 0 && result.iterations <= 1) || round == kRelaxations || !one.solver->relax(to.time))
+        if ((round > 0 && result.iterations <= 1) || round == kRelaxations || !one.rest->relax(to.time))
           break;
       }
       info_.residual = std::max(info_.residual, result.scale > 0 ? result.left / result.scale : 0);
     }
     return true;
-  }
-
-  // At the present positions, weight and springs included.
-  void loads(Body &b, double *f) const {
-    const Phyxels &p = b.p;
-    for (size_t i = 0; i < p.n; ++i)
-      for (size_t k = 0; k < 3; ++k)
-        f[i * kStride + k] = p.load[i * kStride + k] + p.mass[i] * w_.gravity.now[int(k)];
-    for (const Spring &s : b.springs) {
-      const Vec3 pull = s.stiffness * (spring_end(s, w_.time) - mean_of(b, s));
-      for (size_t i = 0; i < s.points.size(); ++i) {
-        double *const at = f + size_t(s.points[i]) * kStride;
-        store3(at, load3(at) + s.weights[i] * pull);
-      }
-    }
-  }
-  static Vec3 mean_of(const Body &b, const Spring &s) {
-    Vec3 x;
-    for (size_t i = 0; i < s.points.size(); ++i)
-      x += s.weights[i] * load3(&b.p.x[size_t(s.points[i]) * kStride]);
-    return x;
   }
 
   void check_balance(const One &one) const {
@@ -206,10 +184,10 @@ void check(const World &w) {
            "body '%s': model '%s' steps itself and tells no stiffness, which an equilibrium needs; choose "
            "another model",
            b->name.c_str(), b->model.type->id);
-  if (w.plan.touches())
+  if (w.plan.touches() && w.method != &velocity_method())
     fail(DFM_E_UNSUPPORTED,
-         "an equilibrium with contact is not available yet; keep what may touch apart by the collision "
-         "filter, or run the world in time with damping");
+         "an equilibrium is not looked for in a world whose contact method is %s; use the method auto",
+         w.method->name);
 }
 
 }  // namespace
@@ -217,6 +195,7 @@ void check(const World &w) {
 void find_equilibrium(World &w, const dfm_equilibrium_def &def, dfm_equilibrium_info &info) {
   prepare(w);
   check(w);
+  if (w.plan.touches()) return settle(w, def, info);
   wake_all(w);
   {
     Search search(w, def, info);

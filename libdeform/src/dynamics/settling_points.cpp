@@ -1,0 +1,81 @@
+#include "dynamics/settling_points.h"
+
+#include <algorithm>
+
+namespace dfm {
+
+SettlingPoints::SettlingPoints(const Memory &memory, Phyxels &points, Surface &surface, ModelInstance &model,
+                               const ImplicitOptions &options, const std::vector<double> &softness,
+                               double error)
+    : ImplicitPoints(memory, points, surface, model, options), error_allowed_(error) {
+  use_memory(memory, softness_, last_, next_, guess_, surfels_, load_, impulse_, taken_);
+  for (Array<double> *a : {&last_, &next_, &impulse_, &taken_}) a->assign(size_t{3} * points.n, 0.0);
+  guess_.assign(size_t{kStride} * points.n, 0.0);
+  surfels_.assign(size_t{kStride} * surface.nsurfel, 0.0);
+  softness_.assign(softness.begin(), softness.end());
+  drop_rest_factor();
+}
+
+void SettlingPoints::start_from(const double *surfel_impulse, double h) {
+  std::fill(last_.begin(), last_.end(), 0.0);
+  if (h > 0) spread_impulses(surfel_impulse, 1 / h, last_);
+}
+
+// The scheme is stable at any step, with loads that give way too.
+bool SettlingPoints::bound(double, const AddRowSums &, StepBound &out) {
+  out = {};
+  return true;
+}
+
+// One linear correction: under forces that do not turn with it a body that stands on them has nowhere to go
+// back to, and Newton's method would look for that without end.
+bool SettlingPoints::free_motion(const SubStep &now, double &) {
+  load_ = p_.load;
+  for (uint32_t i = 0; i < p_.n; ++i)
+    for (uint32_t c = 0; c < 3; ++c) {
+      p_.load[size_t{kStride} * i + c] += last_[size_t{3} * i + c];
+      impulse_[size_t{3} * i + c] = now.h * last_[size_t{3} * i + c];
+    }
+  options_.rest = error_allowed_ / now.h;
+  const bool found = take_first_way(now);
+  p_.load.swap(load_);
+  guess_ = p_.v_free;
+  if (!found || !solve(impulse_, taken_)) return false;
+  stiffest_ = largest_diagonal() / (now.h * now.h);
+  double poison = 0;
+  for (uint32_t i = 0; i < p_.n; ++i)
+    for (uint32_t c = 0; c < 3; ++c) {
+      const size_t at = size_t{kStride} * i + c;
+      p_.v_free[at] -= taken_[size_t{3} * i + c];
+      poison += 0.0 * p_.v_free[at];
+    }
+  gather();
+  return poison == 0;
+}
+
+void SettlingPoints::gather() {
+  for (uint32_t s = 0; s < surface_.nsurfel; ++s) {
+    Vec3 v;
+    surface_.each_phyxel(s, [&](uint32_t p, double w) { v += w * load3(&p_.v_free[size_t{kStride} * p]); });
+    store3(&surfels_[size_t{kStride} * s], v);
+  }
+}
+
+Revision SettlingPoints::revise(const SubStep &now, const double *surfel_impulse) {
+  const Revision found = ImplicitPoints::revise(now, surfel_impulse);
+  if (found == Revision::velocity || found == Revision::response) gather();
+  return found;
+}
+
+bool SettlingPoints::end_state(const SubStep &now, const double *surfel_impulse, bool touched) {
+  std::fill(next_.begin(), next_.end(), 0.0);
+  if (touched) spread_impulses(surfel_impulse, 1 / now.h, next_);
+  return ImplicitPoints::end_state(now, surfel_impulse, touched);
+}
+
+void SettlingPoints::commit(const SubStep &now, double fraction) {
+  last_.swap(next_);
+  ImplicitPoints::commit(now, fraction);
+}
+
+}  // namespace dfm

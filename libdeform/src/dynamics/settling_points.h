@@ -1,0 +1,46 @@
+// Points on their way to an equilibrium with contact, in steps of backward Euler from rest:
+//
+//   f(x) + loads + M g + contact = (M / h^2 + S) (x - x0)        S: of loads that give way, N/m
+//
+// which is what an equilibrium asks for once x stops changing. M / h^2 decides how far a step goes and not
+// where steps end: it keeps what nothing holds from going without end (the proximal point method, Rockafellar
+// 1976). The step starts with the contact forces of the one before. Without them everything would fall freely
+// by h^2 g before contact is looked for, which is meters in a step of a second.
+#pragma once
+#include "dynamics/implicit_points.h"
+
+namespace dfm {
+
+class SettlingPoints : public ImplicitPoints {
+ public:
+  // softness: [npoint] N/m, S. error: m, what Newton's method may leave of the positions of points at rest.
+  SettlingPoints(const Memory &memory, Phyxels &points, Surface &surface, ModelInstance &model,
+                 const ImplicitOptions &options, const std::vector<double> &softness, double error);
+
+  // The contact forces to start with: impulses at the surfels [nsurfel,3] over h seconds; h 0: none.
+  void start_from(const double *surfel_impulse, double h);
+  const double *contact_force() const { return last_.data(); }  // [npoint,3] N, of the last step
+  double stiffest() const { return stiffest_; }                 // N/m, of a point, in the last step
+
+  bool bound(double time, const AddRowSums &outside, StepBound &out) override;
+  bool free_motion(const SubStep &now, double &kinetic) override;
+  // with the last contact forces: where contact is looked for
+  const double *point_velocity() const override { return guess_.data(); }
+  const double *contact_velocity() const override { return surfels_.data(); }  // without
+  Revision revise(const SubStep &now, const double *surfel_impulse) override;
+  bool end_state(const SubStep &now, const double *surfel_impulse, bool touched) override;
+  double accurate_step(const SubStep &) const override { return std::numeric_limits<double>::infinity(); }
+  void commit(const SubStep &now, double fraction) override;
+
+ private:
+  double error_allowed_, stiffest_ = 0;
+  Array<double> last_, next_;      // [npoint,3] N, contact forces of the last step and at the end of this one
+  Array<double> guess_;            // [npoint,4] m/s
+  Array<double> surfels_;          // [nsurfel,4] m/s without contact
+  Array<double> load_;             // [npoint,4] N, loads alone
+  Array<double> impulse_, taken_;  // [npoint,3] N s, m/s: the last contact forces, and what they change
+
+  void gather();
+};
+
+}  // namespace dfm

@@ -1,0 +1,399 @@
+// Each step is one of the world, from rest: contact, friction and guard are those of every other step. What
+// differs is how bodies move in it (dynamics/settling_points.h) and that what is prescribed stands still at
+// the end of the load step (World::prescribed).
+//
+//   load step   gravity and loads at its share; keys and sines go on to its time
+//     rounds    what relaxes has done so, until that changes nothing
+//       steps   until forces are balanced and nothing has moved
+#include "world/settle.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <vector>
+
+#include "core/error.h"
+#include "dynamics/at_rest.h"
+#include "dynamics/settling_points.h"
+#include "state/bounds.h"
+#include "state/world.h"
+#include "step/budget.h"
+#include "step/context.h"
+#include "step/energy_watch.h"
+#include "step/stages.h"
+#include "step/step_impulses.h"
+#include "world/rest_loads.h"
+
+namespace dfm {
+namespace {
+
+// s, a step. The longer it is, the more the stiffness of a body decides where it ends and not its mass.
+constexpr double kLongest = 1, kShortest = 1e-4;
+// The longer a step, the more a body answers impulses as a whole, and the more sweeps they take: steps grow
+// below the first, and shrink above the second number of sweeps. What a solve may take of them, and passes.
+constexpr uint32_t kEasy = 600, kHard = 1800, kMostSweeps = 300, kMostPasses = 100;
+// What Newton's method and contact may leave in a step, over the median edge of a body; what a body may move
+// by in the last step, over its size; N left at a point per N of the largest load, reaction or contact force,
+// or what rounding of positions makes of them; what contacts and friction may be off by, over the rest
+// distance.
+constexpr double kGap = 0.01, kError = 1e-7, kContact = 1e-8, kMoves = 1e-6, kLeft = 1e-6;
+constexpr double kRounding = 8 * 2.220446049250313e-16;
+// How far a body that nothing holds up may go in a step: the median edge at first, less where steps are cut,
+// down to the first share of it; more where they are easy, up to the second share of its size.
+constexpr double kNear = 0.1, kFar = 0.25;
+constexpr double kNet = 0.1;           // of the tolerance: for the sum of all that acts on a body
+constexpr uint32_t kSteps = 500;       // of a round
+constexpr uint32_t kRounds = 4;        // of relaxation
+constexpr uint32_t kRefused = 8;       // steps in a row that could not be taken
+constexpr double kAway = 10;           // of its size: who touches something and has gone so far slides on
+constexpr uint32_t kFactored = 30000;  // points: up to so many a factorization is the better solver
+
+struct Station { double time, share; };
+
+class Settling {
+ public:
+  Settling(World &w, const dfm_equilibrium_def &def, dfm_equilibrium_info &info)
+      : w_(w),
+        step_(*w.steps),
+        info_(info),
+        start_{w.time, def.load_from},
+        end_{w.time + def.time, def.load_to} {
+    if (def.tolerance > 0) tolerance_ = def.tolerance;
+    if (def.max_iterations) most_ = def.max_iterations;
+    for (auto &b : w.bodies) bodies_.push_back(make(*b));
+    write_down(w_, step_, before_);
+    stats_ = w.stats;
+    steps_ = w.step_count;
+    sizes_ = w.sizes;
+    events_ = w.events.size();
+    def_ = w.def;
+    exchange();
+    wake_all(w_);
+    w.def.sleep = 0;
+    w.changed = true;
+  }
+  Settling(const Settling &) = delete;
+  Settling &operator=(const Settling &) = delete;
+  ~Settling() {
+    exchange();
+    w_.def.sleep = def_.sleep;
+    w_.def.contact_tolerance = def_.contact_tolerance;
+    w_.def.max_sweeps = def_.max_sweeps;
+    w_.def.max_passes = def_.max_passes;
+    w_.prescribed = {};
+    w_.changed = true;
+    try {
+      set_gravity_now(w_);
+      prepare(w_);
+    } catch (...) {  // no memory for the tables: they are made when next needed
+    }
+    if (done_) return;
+    put_back(w_, step_, before_);
+    for (auto &b : w_.bodies) set_loads(*b, w_.time, 1);
+  }
+
+  void run(uint32_t load_steps) {
+    prepare(w_);
+    for (uint32_t k = 1; k <= load_steps; ++k) {
+      reach(k == load_steps ? end_ : between(double(k) / load_steps));
+      ++info_.load_steps;
+    }
+    keep();
+  }
+
+ private:
+  struct One {
+    Body *body;
+    std::unique_ptr<Dynamics> other;  // how it moves else; meanwhile the other way round
+    SettlingPoints *points;
+    std::unique_ptr<AtRest> rest;
+    double size, edge;           // m
+    Vec3 contact_impulse;        // N s, before the search
+    double reach = 0;            // m that it may move by without contact in the next step
+    double slid = 0;             // m since it touches something
+    std::vector<double> last{};  // [npoint,4] m, at the start of the step
+    double left = 0, scale = 0;  // N, the largest component of what nothing balances; of what acts
+    double moved = 0;            // m, in the last step
+    double net = 0, all = 0;     // N, sum of what acts from outside, of its sizes
+    double pull = 0;             // m/s2, what this sum would do to it as it is
+    bool touches = false;
+  };
+
+  One make(Body &b) const {
+    ImplicitOptions options = w_.implicit;
+    if (options.solver == "auto" && b.p.n <= kFactored) options.solver = "ldlt";
+    options.newton = std::max(options.newton, ImplicitOptions{}.newton);
+    auto points = std::make_unique<SettlingPoints>(w_.memory(), b.p, b.surface, b.model, options,
+                                                   softness_of(b), kError * b.surface.median_edge);
+    points->start_from(b.surfel_impulse.data(), b.impulse_time());
+    SettlingPoints *const own = points.get();
+    return {.body = &b,
+            .other = std::move(points),
+            .points = own,
+            .rest = std::make_unique<AtRest>(w_.memory(), b.p, b.model),
+            .size = size_of(b),
+            .edge = b.surface.median_edge,
+            .contact_impulse = b.contact_impulse};
+  }
+
+  static double size_of(const Body &b) {
+    double size = 0;
+    for (size_t k = 0; k < 3; ++k) {
+      double least = HUGE_VAL, most = -HUGE_VAL;
+      for (size_t i = 0; i < b.p.n; ++i) {
+        least = std::min(least, b.p.x[kStride * i + k]);
+        most = std::max(most, b.p.x[kStride * i + k]);
+      }
+      size = std::max(size, most - least);
+    }
+    return size;
+  }
+
+  void exchange() {
+    for (One &one : bodies_) one.body->dynamics.swap(one.other);
+  }
+
+  Station between(double part) const {
+    return {start_.time + part * (end_.time - start_.time),
+            start_.share + part * (end_.share - start_.share)};
+  }
+
+  void reach(const Station &to) {
+    w_.prescribed = {to.time, to.share};
+    if (w_.gravity.keys.empty()) w_.gravity.now = to.share * load3(w_.def.gravity);
+    for (One &one : bodies_) {
+      set_loads(*one.body, w_.prescribed.at(w_.time), to.share);
+      one.reach = one.edge;
+      one.slid = 0;
+    }
+    for (uint32_t round = 0;; ++round) {
+      const uint32_t steps = come_to_rest(to);
+      if ((round > 0 && steps <= 1) || round == kRounds || !relax()) return;
+    }
+  }
+
+  bool relax() {
+    bool any = false;
+    for (One &one : bodies_) any = one.rest->relax(w_.time) || any;
+    return any;
+  }
+
+  // How many steps it took with all that is prescribed at its place.
+  uint32_t come_to_rest(const Station &to) {
+    stand_still();
+    weigh_all(kLongest);
+    double longest = kLongest;
+    uint32_t refused = 0;
+    for (uint32_t steps = 0;;) {
+      const double h = length(longest);
+      const uint64_t pieces = w_.stats.substeps;
+      const bool taken = step(h);
+      const bool whole = taken && w_.stats.substeps == pieces + 1, there = w_.time >= to.time;
+      const bool easy = whole && w_.stats.sweeps < kEasy;
+      w_.time = w_.prescribed.at(w_.time);
+      stand_still();
+      ++info_.iterations;
+      if (there) ++steps;
+      if (taken) refused = 0;
+      else if (++refused == kRefused) fail(DFM_E_DIVERGED, "no equilibrium was found: %s", dfm_last_error());
+      weigh_all(h);
+      bool rests = taken && there && h * w_.stats.residual <= kGap * w_.offset;
+      for (One &one : bodies_) {
+        one.reach = easy ? std::min(1.5 * one.reach, std::max(one.edge, kFar * one.size))
+                         : std::max(0.5 * one.reach, kNear * one.edge);
+        one.slid = one.touches ? one.slid + one.moved : 0;
+        rests = rests && one.moved <= kMoves * one.size && balanced(one);
+      }
+      if (rests) return steps;
+      longest = easy ? std::min(kLongest, 2 * h) : whole && w_.stats.sweeps <= kHard ? h : 0.5 * h;
+      if (there) check_progress(steps, h);
+    }
+  }
+
+  // False: it could not be taken; the world stands where its last part has ended.
+  bool step(double h) {
+    double edge = HUGE_VAL;
+    for (One &one : bodies_) {
+      one.last.assign(one.body->p.x.begin(), one.body->p.x.end());
+      edge = std::min(edge, one.edge);
+    }
+    w_.def.contact_tolerance = kContact * edge / h;
+    w_.def.max_sweeps = kMostSweeps;
+    w_.def.max_passes = kMostPasses;
+    uint32_t trouble = 0;
+    const dfm_status status = step_within_budget(w_, h, &trouble);
+    if (trouble & DFM_TROUBLE_INTERRUPTED)
+      fail(DFM_DISCARD, "the search for an equilibrium was asked to stop; the world is as before it");
+    return status == DFM_OK;
+  }
+
+  bool balanced(const One &one) const {
+    return one.net <= kNet * tolerance_ * one.all &&
+           one.left <= std::max(tolerance_ * one.scale,
+                                kRounding * one.points->stiffest() *
+                                    largest_coordinate(one.body->p.x.data(), one.body->p.n, kStride));
+  }
+
+  void stand_still() {
+    for (auto &b : w_.bodies) std::fill(b->p.v.begin(), b->p.v.end(), 0.0);
+  }
+
+  void weigh_all(double h) {
+    for (One &one : bodies_) {
+      set_loads(*one.body, w_.time, w_.prescribed.share);  // springs apart
+      weigh(one, h);
+    }
+  }
+
+  // What is left at the present positions, with the contact forces of the last step, which took h seconds.
+  void weigh(One &one, double h) {
+    sum_loads(one);
+    const Phyxels &p = one.body->p;
+    if (!one.rest->add_forces(w_.time, h)) one.left = HUGE_VAL;
+    for (size_t at = 0; at < p.x.size(); ++at) {
+      double &most = p.moves(at) || at % kStride == 3 ? one.left : one.scale;
+      most = std::max(most, std::fabs(p.f[at]));
+      if (!one.last.empty()) one.moved = std::max(one.moved, std::fabs(p.x[at] - one.last[at]));
+    }
+  }
+
+  // Loads and contact forces, into points().f and as a whole. Components that are held somewhere count for
+  // nothing: there the body is held up.
+  void sum_loads(One &one) const {
+    Body &b = *one.body;
+    Phyxels &p = b.p;
+    const double *const contact = one.points->contact_force();
+    loads_at_rest(w_, b, p.f.data());
+    one.scale = one.moved = one.left = one.all = 0;
+    one.touches = false;
+    uint8_t held = 0;
+    for (const uint8_t bits : p.held) held = uint8_t(held | bits);
+    Vec3 force, center, torque;
+    for (uint32_t i = 0; i < p.n; ++i) center += (p.mass[i] / b.mass) * load3(&p.x[size_t{kStride} * i]);
+    double inertia = 0, far = 0;
+    for (uint32_t i = 0; i < p.n; ++i) {
+      double *const f = &p.f[size_t{kStride} * i];
+      Vec3 free;
+      for (uint32_t c = 0; c < 3; ++c) {
+        const double push = contact[3 * size_t{i} + c];
+        one.scale = std::max({one.scale, std::fabs(f[c]), std::fabs(push)});
+        one.all += std::fabs(f[c]) + std::fabs(push);
+        one.touches = one.touches || push != 0;
+        f[c] += push;
+        if (!(held & (1 << c))) free[int(c)] = f[c];
+      }
+      const Vec3 arm = load3(&p.x[size_t{kStride} * i]) - center;
+      force += free;
+      torque += cross(arm, free);
+      inertia += p.mass[i] * norm2(arm);
+      far = std::max(far, norm2(arm));
+    }
+    one.net = norm(force);
+    one.pull = one.net / b.mass + norm(torque) / inertia * std::sqrt(far);
+  }
+
+  // Of the next step: who is not held up goes no farther than it may reach.
+  double length(double longest) const {
+    double h = longest, reach = HUGE_VAL;
+    for (const One &one : bodies_) {
+      reach = std::min(reach, one.reach);
+      const Array<uint8_t> &held = one.body->p.held;
+      const bool hangs = std::any_of(held.begin(), held.end(), [](uint8_t bits) { return bits == 7; });
+      if (!hangs && one.pull > 0) h = std::min(h, std::sqrt(one.reach / one.pull));
+    }
+    while (h > kShortest && prescribed_way(h) > reach) h *= 0.5;
+    return std::max(h, kShortest);
+  }
+
+  // m, the farthest that anything is told to go in the next h seconds; what comes back on the way counts too.
+  double prescribed_way(double h) const {
+    double most = 0;
+    for (const double part : {1.0, 0.5, 0.25, 0.125})
+      most = std::max(most, prescribed_distance(w_.prescribed.at(w_.time + part * h)));
+    return most;
+  }
+  double prescribed_distance(double t) const {
+    double most = 0, size = 0;
+    for (const One &one : bodies_) {
+      size = std::max(size, one.size);
+      each_held_place(*one.body, t, [&](uint32_t point, Vec3 x) {
+        most = std::max(most, norm(x - load3(&one.body->p.x[size_t(point) * kStride])));
+      });
+    }
+    for (const auto &o : w_.obstacles) {
+      if (!o->moves()) continue;
+      const Pose to = o->pose_at_time(t);
+      const double turn = norm(spin_between(o->pose.rotation, to.rotation, 1));
+      most = std::max(most, norm(to.position - o->pose.position) + turn * size);
+    }
+    return most;
+  }
+
+  void check_progress(uint32_t steps, double h) const {
+    for (const One &one : bodies_)
+      if (one.slid > kAway * one.size) refuse(one, steps, h);
+    if (steps < most_) return;
+    const auto worse = [](const One &a, const One &b) { return a.left * b.scale < b.left * a.scale; };
+    refuse(*std::max_element(bodies_.begin(), bodies_.end(), worse), steps, h);
+  }
+
+  [[noreturn]] void refuse(const One &one, uint32_t steps, double h) const {
+    fail(DFM_E_DIVERGED,
+         "body '%s' finds no rest at %g of the loads: the last of %u steps from rest (%g s) has moved it by "
+         "%g m, and %g N at a point are not balanced (the largest load or reaction is %g N); hold it (fix), "
+         "raise the friction, or run the world in time",
+         one.body->name.c_str(), w_.prescribed.share, steps, h, one.moved, one.left, one.scale);
+  }
+
+  // What is found becomes the present; the steps on the way have not been.
+  void keep() {
+    info_.residual = 0;
+    for (One &one : bodies_) {
+      info_.residual = std::max(info_.residual, one.scale > 0 ? one.left / one.scale : 0);
+      one.body->contact_impulse = one.contact_impulse;
+      if (def_.sleep) one.body->anchor = one.body->p.x;
+      ++one.body->x_version;
+      set_loads(*one.body, w_.time, 1);
+    }
+    const dfm_world_stats now = w_.stats;
+    w_.stats = stats_;
+    w_.stats.contacts = now.contacts;
+    w_.stats.sticking = now.sticking;
+    w_.stats.contacts_max = std::max(w_.stats.contacts_max, now.contacts);
+    w_.stats.time = w_.time;
+    w_.step_count = steps_;
+    w_.sizes = sizes_;
+    begin_impulses(w_.step_impulses);
+    for (size_t i = events_; i < w_.events.size(); ++i) w_.events[i].t = w_.time;
+    done_ = true;
+  }
+
+  World &w_;
+  StepContext &step_;
+  dfm_equilibrium_info &info_;
+  Station start_, end_;
+  double tolerance_ = kLeft;
+  uint32_t most_ = kSteps;
+  std::vector<One> bodies_;
+  std::vector<unsigned char> before_;
+  dfm_world_stats stats_{};
+  uint64_t steps_ = 0;
+  StepSizes sizes_;
+  size_t events_ = 0;
+  dfm_world_def def_{};
+  bool done_ = false;
+};
+
+}  // namespace
+
+void settle(World &w, const dfm_equilibrium_def &def, dfm_equilibrium_info &info) {
+  {
+    Settling search(w, def, info);
+    search.run(def.load_steps ? def.load_steps : 1);
+  }
+  forget_energy(w);
+  w.bound.age = kNone;
+  ++w.placements;
+}
+
+}  // namespace dfm
