@@ -93,7 +93,7 @@ double Body::direct_energy(const dfm_kin &k, size_t place) const {
   const uint32_t c = cell_id[place], lane = uint32_t(place % kGroup);
   const Group &own = group[place / kGroup];
   const double *x[4];
-  for (int m = 0; m < 4; ++m) x[m] = k.x + size_t(k.stride) * cells[4 * size_t(c) + size_t(m)];
+  corners(k, c, x);
   double grad[9], n = 0;
   gradient_of(own, lane, x, grad);
   for (const double entry : grad) n += entry * entry;

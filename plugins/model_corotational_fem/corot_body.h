@@ -117,6 +117,10 @@ struct Body : model::Blocks<Block> {
   double flow_at(const dfm_kin &k) const;    // share of the flow that comes about in its step
   bool nodal() const { return choice(kLocking) == kNodal; }
   void dilate(const dfm_kin &k);  // before all that uses the volume change of the points
+  // Positions of the corners of a cell.
+  void corners(const dfm_kin &k, uint32_t c, const double **x) const {
+    for (size_t m = 0; m < 4; ++m) x[m] = k.x + size_t(k.stride) * cells[4 * size_t(c) + m];
+  }
   // dilate() has filled point_change
   double mean_change(uint32_t c) const {
     const uint32_t *q = cells.data() + 4 * size_t(c);
@@ -154,8 +158,9 @@ struct Body : model::Blocks<Block> {
   model::Fibre fibre_at(uint32_t c) const;
   double direct_energy(const dfm_kin &k, size_t place) const;
   void cell_elasticity(size_t place, double (*d)[6]) const;  // times the volume
-  bool soften_cell(const dfm_kin &k, uint32_t c, const double (*s)[3], double (*d)[6]) const;
-  void add_cell_stiffness(const dfm_kin &k, uint32_t c, double a, double b, double *blk) const;
+  bool soften_cell(const dfm_kin &k, uint32_t c, const double (*s)[3], double (*d)[6], bool &flows) const;
+  void add_softening(const dfm_kin &k, uint32_t c, double a, double *blk) const;
+  void add_exact(const dfm_kin &k, uint32_t c, double a, double b, double *blk) const;
   void fill_material(Room &room);
   void fill_drag(Room &room);
   void find_effects();

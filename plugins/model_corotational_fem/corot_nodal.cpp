@@ -143,7 +143,7 @@ void Body::find_gradients(const dfm_kin &k, bool damped) {
     const Group &own = group[place / kGroup];
     const uint32_t *q = cells.data() + 4 * size_t(c);
     const double *x[4];
-    for (size_t m = 0; m < 4; ++m) x[m] = k.x + size_t(k.stride) * q[m];
+    corners(k, c, x);
     double grad[9], r[9], pull[4][3] = {};
     gradient_of(own, uint32_t(lane), x, grad);
     model::rotation::polar_of(grad, r);

@@ -63,19 +63,25 @@ struct Shape {
   }
 };
 
-void shape_at(const Group &group, uint32_t lane, const double *const *x, Shape &out) {
+// All but the axes of S and what comes of them.
+void frame_at(const Group &group, uint32_t lane, const double *const *x, Shape &out) {
   double f[9];
   for (int k = 0; k < 9; ++k) out.g[k / 3 + 1][k % 3] = group.g[k][lane];
   for (int k = 0; k < 3; ++k) out.g[0][k] = -((out.g[1][k] + out.g[2][k]) + out.g[3][k]);
   gradient_of(group, lane, x, f);
   model::rotation::polar_of(f, out.r);
-  double s[3][3];
   for (int k = 0; k < 3; ++k)
     for (int l = 0; l < 3; ++l) {
       const double kl = (out.r[k] * f[l] + out.r[3 + k] * f[3 + l]) + out.r[6 + k] * f[6 + l];
       const double lk = (out.r[l] * f[k] + out.r[3 + l] * f[3 + k]) + out.r[6 + l] * f[6 + k];
-      out.s[k][l] = s[k][l] = 0.5 * (kl + lk);
+      out.s[k][l] = 0.5 * (kl + lk);
     }
+}
+
+void shape_at(const Group &group, uint32_t lane, const double *const *x, Shape &out) {
+  frame_at(group, lane, x, out);
+  double s[3][3];
+  std::copy(&out.s[0][0], &out.s[0][0] + 9, &s[0][0]);
   model::jacobi(s, out.axis);
   for (int k = 0; k < 3; ++k) out.stretch[k] = s[k][k];
   out.trace = (s[0][0] + s[1][1]) + s[2][2];
@@ -144,6 +150,14 @@ void take_turned(const double *r, const double (*m)[3], double *out) {
   }
 }
 
+// add(m, n, its block) for each block of a cell.
+template <class Add>
+void each_block(const SlotGroup &at, uint32_t lane, double *blk, const Add &add) {
+  for (int m = 0; m < 4; ++m) add(m, m, blk + 9 * size_t(at.slot[m][lane]));
+  for (int e = 0; e < 6; ++e)
+    add(model::kEdgeOf[e][0], model::kEdgeOf[e][1], blk + 9 * size_t(at.slot[4 + e][lane]));
+}
+
 struct Single {
   using V = double;
   static double splat(double a) { return a; }
@@ -170,8 +184,9 @@ void Body::pattern(uint32_t *ij) const {
 
 // Takes from the elasticity d, times the volume, what the flow at the stretch s takes: the shear modulus
 // falls by the share of the way that flows, and along the way it becomes that of hardening. See
-// corot_plastic.h. False: no plastic strain.
-bool Body::soften_cell(const dfm_kin &k, uint32_t c, const double (*s)[3], double (*d)[6]) const {
+// corot_plastic.h. False: no plastic strain; `flows`: now.
+bool Body::soften_cell(const dfm_kin &k, uint32_t c, const double (*s)[3], double (*d)[6],
+                       bool &flows) const {
   const size_t place = place_of[c], lane = place % kGroup;
   const PlasticGroup &own = plastic_group[place / kGroup];
   const double part = flow_at(k), e[6] = {s[0][0] - 1, s[1][1] - 1, s[2][2] - 1, s[0][1], s[1][2], s[2][0]};
@@ -194,31 +209,32 @@ bool Body::soften_cell(const dfm_kin &k, uint32_t c, const double (*s)[3], doubl
         d[i][j] += law.mu2 * ((across - 1) * (deviator - dyad) + (along - 1) * dyad);
       }
   }
-  return flow.step > 0 || square_of<Single>(state.strain) > 0;
+  flows = flow.step > 0;
+  return flows || square_of<Single>(state.strain) > 0;
 }
 
 // Blocks of one cell: by the change of S, by R K_e R^T, by the turns.
-void Body::add_cell_stiffness(const dfm_kin &k, uint32_t c, double a, double b, double *blk) const {
+void Body::add_exact(const dfm_kin &k, uint32_t c, double a, double b, double *blk) const {
   const size_t place = place_of[c];
   const uint32_t lane = uint32_t(place % kGroup);
   const Group &own = group[place / kGroup];
   const double *x[4];
-  for (int m = 0; m < 4; ++m) x[m] = k.x + size_t(k.stride) * cells[4 * size_t(c) + m];
+  corners(k, c, x);
   Shape shape;
   shape_at(own, lane, x, shape);
   const double share = shape.share(), damping = damp.empty() ? 0 : b * damp[place] * (share * share);
-  const bool direct = choice(kEnergy) != kLinear, turns = choice(kTangent) == kExact;
+  const bool direct = choice(kEnergy) != kLinear;
   Modes modes{};
   double principal[4][3];
   if (direct) modes_of(choice(kEnergy), shape.stretch, own.mu2[lane], own.lambda[lane], modes);
   double d[6][6], soft[6][6], change[4][3][6], turned[3][4][3], twist[3] = {};
   cell_elasticity(place, d);
   std::copy(&d[0][0], &d[0][0] + 36, &soft[0][0]);
-  const bool flows = plastic() && soften_cell(k, c, shape.s, soft);
-  const bool by_fibre = turns && !fibre.empty() && share >= 1, by_flow = turns && flows && share >= 1;
-  const double change_by = (turns ? damping : 0) + (by_fibre ? a : 0), flow_by = by_flow ? a : 0;
+  bool now = false;
+  const bool flows = plastic() && soften_cell(k, c, shape.s, soft, now);
+  const bool by_fibre = !fibre.empty() && share >= 1, by_flow = flows && share >= 1;
+  const double change_by = damping + (by_fibre ? a : 0), flow_by = by_flow ? a : 0;
   const double frame_by = by_fibre || by_flow || direct ? 0 : a;
-  const double damped_by = turns || damp.empty() ? 0 : b * damp[place];
   const double bulk_here = own.lambda[lane] + own.mu2[lane] / 3;
   for (int i = 0; nodal() && i < 9; ++i) {
     d[i / 3][i % 3] -= bulk_here;
@@ -240,19 +256,17 @@ void Body::add_cell_stiffness(const dfm_kin &k, uint32_t c, double a, double b, 
   const double pressure =
       nodal() ? bulk_here * mean_change(c) - own.mu2[lane] / 3 * more : own.lambda[lane] * more;
   const double pull = pressure - own.mu2[lane];
-  for (int m = 0; turns && fibre.empty() && !flows && !direct && m < 3; ++m) {
+  for (int m = 0; fibre.empty() && !flows && !direct && m < 3; ++m) {
     const double pair =
         std::max(shape.stretch[(m + 1) % 3] + shape.stretch[(m + 2) % 3], kLeast * shape.trace);
     if (pair > 0) twist[m] = 0.5 * a * std::max(0.0, own.mu2[lane] + 2 * pull / pair);
   }
   const auto add_block = [&](int m, int n, double *out) {
-    double frame[9], damped[9] = {}, in_frame[3][3];
+    double frame[9], in_frame[3][3];
     model::stiffness_block(rest, soft, m, n, frame);
-    if (damped_by > 0) model::stiffness_block(rest, d, m, n, damped);
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) {
         double sum = frame_by * frame[3 * i + j];
-        if (damped_by > 0) sum += damped_by * damped[3 * i + j];
         for (int e = 0; direct && e < 3; ++e)
           for (int l = 0; l < 3; ++l)
             sum +=
@@ -266,10 +280,31 @@ void Body::add_cell_stiffness(const dfm_kin &k, uint32_t c, double a, double b, 
       }
     take_turned(shape.r, in_frame, out);
   };
-  const SlotGroup &at_slots = slots[place / kGroup];
-  for (int m = 0; m < 4; ++m) add_block(m, m, blk + 9 * size_t(at_slots.slot[m][lane]));
-  for (int e = 0; e < 6; ++e)
-    add_block(model::kEdgeOf[e][0], model::kEdgeOf[e][1], blk + 9 * size_t(at_slots.slot[4 + e][lane]));
+  each_block(slots[place / kGroup], lane, blk, add_block);
+}
+
+// What the flow of a cell takes from its blocks of the usual tangent.
+void Body::add_softening(const dfm_kin &k, uint32_t c, double a, double *blk) const {
+  const size_t place = place_of[c];
+  const uint32_t lane = uint32_t(place % kGroup);
+  const Group &own = group[place / kGroup];
+  Shape shape;
+  const double *x[4];
+  corners(k, c, x);
+  frame_at(own, lane, x, shape);
+  double less[6][6] = {};
+  bool flows = false;
+  soften_cell(k, c, shape.s, less, flows);
+  if (!flows) return;
+  model::Tetrahedron rest{1, {}};  // the constants hold the volume
+  for (int m = 0; m < 4; ++m) std::copy(shape.g[m], shape.g[m] + 3, rest.g[m]);
+  const auto add_block = [&](int m, int n, double *out) {
+    double frame[9], in_frame[3][3];
+    model::stiffness_block(rest, less, m, n, frame);
+    for (int i = 0; i < 9; ++i) in_frame[i / 3][i % 3] = a * frame[i];
+    take_turned(shape.r, in_frame, out);
+  };
+  each_block(slots[place / kGroup], lane, blk, add_block);
 }
 
 void Body::add_stiffness(const dfm_kin &k, double a, double b, double *blk) {
@@ -277,14 +312,16 @@ void Body::add_stiffness(const dfm_kin &k, double a, double b, double *blk) {
     dilate(k);
     add_nodal(k, a, b, blk);
   }
-  if (choice(kTangent) == kExact || plastic()) {
+  if (choice(kTangent) == kExact) {
     for (uint32_t c = 0; c < ncell; ++c)
-      if (volume[c] > 0) add_cell_stiffness(k, c, a, b, blk);
+      if (volume[c] > 0) add_exact(k, c, a, b, blk);
   } else {
     for (uint32_t n = 0; n < nblock; ++n) {
       Call call(this, &k, nullptr);
       kernels->tangents(load_block(call, n, 0, false), a, b, blk);
     }
+    for (uint32_t c = 0; plastic() && c < ncell; ++c)
+      if (volume[c] > 0) add_softening(k, c, a, blk);
   }
   for (uint32_t i = 0; !point_drag.empty() && i < npoint; ++i)
     for (int n = 0; n < 9; n += 4) blk[9 * size_t(i) + size_t(n)] -= b * point_drag[i];
