@@ -225,6 +225,7 @@ struct Scene {
     for (int i = 0; i < int(c.level); ++i) {
       const double turn = 7 * kDegree * i, x = std::cos(turn), y = std::sin(turn);
       BodyOptions o;
+      o.model = model;
       o.young = 1e5;
       o.damping_stiffness = 1e-3;
       o.damping_mass = 8;
