@@ -102,7 +102,7 @@ TEST(StaticContact, CubeOnPlane_SinksByItsStaticSagUnderItsWeight) {
       dfm_equilibrium_info info{};
       info.size = sizeof info;
       test::ok(find(w, 0, 1, &info));
-      EXPECT_NEAR((start + kOffset - height(b)) / (start - height(still)), 1, 0.002)
+      EXPECT_NEAR((start + kOffset - height(b)) / (start - height(still)), 1, 0.005)
           << model << ", " << young << " Pa";
       const dfm_pair_report p = pair_of(w, b, floor);
       EXPECT_NEAR(p.force[2] / weight(b), 1, 1e-6);
@@ -110,10 +110,10 @@ TEST(StaticContact, CubeOnPlane_SinksByItsStaticSagUnderItsWeight) {
       EXPECT_LE(info.residual, 1e-6);
       EXPECT_EQ(dfm_world_time(w), 0);
       EXPECT_EQ(test::measure(b).speed_max, 0);
-      // and an ordinary step leaves it there
+      // and steps in time leave it there, as closely as they solve contact
       const double found = height(b);
       test::run(w, 0.01, 1e-3);
-      EXPECT_NEAR(height(b), found, 1e-3 * (start - height(still)));
+      EXPECT_NEAR(height(b), found, 0.005 * kOffset + 1e-3 * (start - height(still)));
       dfm_world_destroy(held);
       dfm_world_destroy(w);
     }

@@ -31,12 +31,12 @@ namespace {
 constexpr double kLongest = 1, kShortest = 1e-4;
 // The longer a step, the more a body answers impulses as a whole, and the more sweeps they take: steps grow
 // below the first, and shrink above the second number of sweeps. What a solve may take of them, and passes.
-constexpr uint32_t kEasy = 600, kHard = 1800, kMostSweeps = 300, kMostPasses = 100;
+constexpr uint32_t kEasy = 300, kHard = 900, kMostSweeps = 100, kMostPasses = 100;
 // What Newton's method and contact may leave in a step, over the median edge of a body; what a body may move
 // by in the last step, over its size; N left at a point per N of the largest load, reaction or contact force,
 // or what rounding of positions makes of them; what contacts and friction may be off by, over the rest
 // distance.
-constexpr double kGap = 0.01, kError = 1e-7, kContact = 1e-8, kMoves = 1e-6, kLeft = 1e-6;
+constexpr double kGap = 0.01, kError = 1e-7, kContact = 2e-8, kMoves = 1e-6, kLeft = 1e-6;
 constexpr double kRounding = 8 * 2.220446049250313e-16;
 // How far a body that nothing holds up may go in a step: the median edge at first, less where steps are cut,
 // down to the first share of it; more where they are easy, up to the second share of its size.
@@ -189,7 +189,8 @@ class Settling {
       const uint64_t pieces = w_.stats.substeps;
       const bool taken = step(h);
       const bool whole = taken && w_.stats.substeps == pieces + 1, there = w_.time >= to.time;
-      const bool easy = whole && w_.stats.sweeps < kEasy;
+      const double off = h * w_.stats.residual / w_.offset;  // contacts, over the rest distance
+      const bool easy = whole && (w_.stats.sweeps < kEasy || off < 0.1 * kGap);
       w_.time = w_.prescribed.at(w_.time);
       stand_still();
       ++info_.iterations;
@@ -197,7 +198,7 @@ class Settling {
       if (taken) refused = 0;
       else if (++refused == kRefused) fail(DFM_E_DIVERGED, "no equilibrium was found: %s", dfm_last_error());
       weigh_all(h);
-      bool rests = taken && there && h * w_.stats.residual <= kGap * w_.offset;
+      bool rests = taken && there && off <= kGap;
       for (One &one : bodies_) {
         one.reach = easy ? std::min(1.5 * one.reach, std::max(one.edge, kFar * one.size))
                          : std::max(0.5 * one.reach, kNear * one.edge);
