@@ -265,6 +265,18 @@ TEST(StaticContact, WhereNoRestIsFound_NothingHasChanged) {
   dfm_world_destroy(w);
 }
 
+TEST(StaticContact, Interrupted_EndsWithTheWorldAsItWas) {
+  test::Context context;
+  const test::Stack s = test::make_stack(context);
+  test::run(s.world, 1e-3, 1e-3);
+  const std::string before = test::snapshot(s.world);
+  test::ok(dfm_world_interrupt(s.world));
+  EXPECT_EQ(find(s.world), DFM_DISCARD);
+  test::says({"asked to stop"});
+  EXPECT_TRUE(test::snapshot(s.world) == before);
+  dfm_world_destroy(s.world);
+}
+
 // Explicit bodies are moved implicitly for the search alone, and the same on any number of threads.
 TEST(StaticContact, Stack_StaysWhereItWasFoundOnAnyNumberOfThreads) {
   uint64_t hash[2];
