@@ -1,11 +1,11 @@
 // Bodies that move by backward Euler, and their contact by the same matrix: rest, order, energy, momentum,
-// friction. Sources: doc/concepts/implicit.md; ../shared/reference/contact (incline_block).
+// friction. Those of TR-BDF2, which takes backward Euler where bodies touch. Sources: doc/concepts/implicit.md; ../shared/reference/contact (incline_block).
 #include "stack.h"
 
 namespace {
 
 constexpr double kG = 9.81, kFrame = 1.0 / 60, kOffset = 5e-5;
-constexpr int32_t kImplicit = DFM_INTEGRATOR_IMPLICIT_EULER;
+constexpr int32_t kImplicit = DFM_INTEGRATOR_IMPLICIT_EULER, kSecond = DFM_INTEGRATOR_TR_BDF2;
 
 test::BodyOptions cube(const char *name, double young, double z) {
   test::BodyOptions o;
@@ -42,12 +42,17 @@ double sag_of_held_cube(double young) {
 
 // The static answer comes from the same mesh with its bottom held along z, without any contact.
 TEST(ImplicitContact, CubeOnPlane_SinksByItsStaticSag) {
+  struct Way {
+    double h;
+    int32_t integrator;
+  };
   for (const double young : {1e4, 1e5, 1e7}) {
     const double expected = sag_of_held_cube(young);
-    for (const double h : {1e-3, kFrame}) {
+    for (const auto [h, integrator] : {Way{1e-3, kImplicit}, {kFrame, kImplicit}, {kFrame, kSecond}}) {
       test::Context context;
       dfm_world_def d = dfm_world_def_default();
       d.method = DFM_METHOD_IMPLICIT;
+      d.integrator = integrator;
       d.contact_offset = kOffset;
       dfm_world w = 0;
       test::ok(dfm_world_create(context, &d, &w));
@@ -60,7 +65,7 @@ TEST(ImplicitContact, CubeOnPlane_SinksByItsStaticSag) {
       const std::vector<dfm_contact> contacts = test::contacts(w);
       for (const dfm_contact &c : contacts) rest += c.gap / double(contacts.size());
       EXPECT_NEAR(before + kOffset + rest - test::measure(b).com[2], expected, 0.01 * expected)
-          << "E " << young << " Pa, step " << h << " s";
+          << "E " << young << " Pa, step " << h << " s, integrator " << integrator;
       EXPECT_LT(test::measure(b).speed_max, 1e-4);
     }
   }
@@ -70,14 +75,16 @@ TEST(ImplicitContact, SlopeOf26Point5Degrees_SlidesAt049AndHoldsAt05) {
   struct Way {
     const char *model;
     double h, mu;
+    int32_t integrator = kImplicit;
   };
   std::vector<Way> ways;
   for (const char *model : {"msm", "corotational_fem"})
     for (const double h : {1e-3, kFrame})
       for (const double mu : {0.49, 0.5}) ways.push_back({model, h, mu});
-  for (const auto [model, h, mu] : ways) {
+  ways.push_back({"msm", kFrame, 0.5, kSecond});
+  for (const auto [model, h, mu, integrator] : ways) {
     test::Context context;
-    const dfm_world w = test::make_world(context, {0, 0, -kG}, kImplicit);
+    const dfm_world w = test::make_world(context, {0, 0, -kG}, integrator);
     test::BodyOptions o = cube("block", 1e6, 2e-5);
     o.model = model;
     const dfm_body b = test::make_body(context, w, "beam", {0.1, 0.1, 0.1}, 60, o);
@@ -100,31 +107,37 @@ TEST(ImplicitContact, SlopeOf26Point5Degrees_SlidesAt049AndHoldsAt05) {
 }
 
 TEST(ImplicitContact, TwoCubesThatCollide_KeepTheirMomentum) {
-  test::Context context;
-  const dfm_world w = test::make_world(context, {0, 0, 0}, kImplicit);
-  test::set_friction(w, 0.4);
-  test::BodyOptions o = cube("lower", 1e5, 0);
-  o.velocity = {0.3, 0, 1};
-  const dfm_body lower = test::make_body(context, w, "beam", {0.1, 0.1, 0.1}, 60, o);
-  o = cube("upper", 2e4, 0.1005);
-  o.position[0] = 0.02;
-  o.spin = {1, 2, 3};
-  const dfm_body upper = test::make_body(context, w, "beam", {0.1, 0.1, 0.1}, 60, o);
-  const auto momentum = [&] {
-    std::array<double, 3> p{};
-    for (const dfm_body b : {lower, upper})
-      for (int k = 0; k < 3; ++k) p[size_t(k)] += test::measure(b).mass * test::measure(b).velocity[k];
-    return p;
-  };
-  const auto before = momentum();
-  uint32_t most = 0;
-  for (int step = 0; step < 60; ++step) {
-    test::run(w, 2e-3, 2e-3);
-    most = std::max<uint32_t>(most, uint32_t(test::contacts(w).size()));
+  for (const auto &[one, other] : {std::pair(kImplicit, kImplicit),
+                                   {kSecond, kSecond},
+                                   {kSecond, kImplicit},
+                                   {kSecond, DFM_INTEGRATOR_SYMPLECTIC_EULER}}) {
+    test::Context context;
+    const dfm_world w = test::make_world(context, {0, 0, 0}, one);
+    test::set_friction(w, 0.4);
+    test::BodyOptions o = cube("lower", 1e5, 0);
+    o.velocity = {0.3, 0, 1};
+    const dfm_body lower = test::make_body(context, w, "beam", {0.1, 0.1, 0.1}, 60, o);
+    o = cube("upper", 2e4, 0.1005);
+    o.position[0] = 0.02;
+    o.spin = {1, 2, 3};
+    o.integrator = other;
+    const dfm_body upper = test::make_body(context, w, "beam", {0.1, 0.1, 0.1}, 60, o);
+    const auto momentum = [&] {
+      std::array<double, 3> p{};
+      for (const dfm_body b : {lower, upper})
+        for (int k = 0; k < 3; ++k) p[size_t(k)] += test::measure(b).mass * test::measure(b).velocity[k];
+      return p;
+    };
+    const auto before = momentum();
+    uint32_t most = 0;
+    for (int step = 0; step < 60; ++step) {
+      test::run(w, 2e-3, 2e-3);
+      most = std::max<uint32_t>(most, uint32_t(test::contacts(w).size()));
+    }
+    EXPECT_GT(most, 3u);
+    for (size_t k = 0; k < 3; ++k) EXPECT_NEAR(momentum()[k], before[k], 1e-11) << one << other << k;
+    EXPECT_GT(test::measure(upper).velocity[2], 0.1);
   }
-  EXPECT_GT(most, 3u);
-  for (size_t k = 0; k < 3; ++k) EXPECT_NEAR(momentum()[k], before[k], 1e-11) << k;
-  EXPECT_GT(test::measure(upper).velocity[2], 0.1);
 }
 
 // A stiff implicit cube on a soft explicit one on a plane, and a self-contained pair in free flight.
@@ -240,40 +253,44 @@ TEST(ImplicitEuler, FreeBar_GainsNoEnergy) {
 
 // Several bodies on several threads; a world that is restored goes on with the same bits.
 TEST(ImplicitContact, StackOnThreads_KeepsItsBits) {
-  std::array<uint64_t, 2> hash{};
-  for (const uint32_t threads : {1u, 4u}) {
-    test::Context context(threads);
-    const test::Stack s = test::make_stack(context, 1e-3, 0.5, kImplicit);
-    test::run(s.world, 0.1, 5e-3);
-    const auto kept = test::snapshot(s.world);
-    test::run(s.world, 0.1, 5e-3);
-    const uint64_t end = dfm_world_hash(s.world);
-    test::ok(dfm_world_restore(s.world, kept.data(), kept.size()));
-    test::run(s.world, 0.1, 5e-3);
-    EXPECT_EQ(dfm_world_hash(s.world), end);
-    hash[threads > 1] = end;
+  for (const int32_t integrator : {kImplicit, kSecond}) {
+    std::array<uint64_t, 2> hash{};
+    for (const uint32_t threads : {1u, 4u}) {
+      test::Context context(threads);
+      const test::Stack s = test::make_stack(context, 1e-3, 0.5, integrator);
+      test::run(s.world, 0.1, 5e-3);
+      const auto kept = test::snapshot(s.world);
+      test::run(s.world, 0.1, 5e-3);
+      const uint64_t end = dfm_world_hash(s.world);
+      test::ok(dfm_world_restore(s.world, kept.data(), kept.size()));
+      test::run(s.world, 0.1, 5e-3);
+      EXPECT_EQ(dfm_world_hash(s.world), end);
+      hash[threads > 1] = end;
+    }
+    EXPECT_EQ(hash[0], hash[1]) << "integrator " << integrator;
   }
-  EXPECT_EQ(hash[0], hash[1]);
 }
 
 // No bound holds an implicit step. What is offered follows the error: short steps while the body swings, the
 // longest when it rests.
 TEST(ImplicitEuler, OfferedStep_GrowsAsTheBodyComesToRest) {
-  test::Context context;
-  const dfm_world w = test::make_world(context, {0, 0, -kG}, kImplicit);
-  const dfm_body b = test::make_body(context, w, "beam", {0.1, 0.1, 0.1}, 60, cube("cube", 1e4, 0));
-  hold_bottom(b, 0);
-  double shortest = 1, step = 0;
-  for (int k = 0; k < 400 && dfm_world_time(w) < 5; ++k) {
-    test::ok(dfm_world_stable_step(w, &step, nullptr, nullptr));
-    shortest = std::min(shortest, step);
-    uint32_t trouble = 0;
-    test::ok(dfm_world_step(w, step, &trouble));
-    EXPECT_EQ(trouble, 0u);
+  for (const int32_t integrator : {kImplicit, kSecond}) {
+    test::Context context;
+    const dfm_world w = test::make_world(context, {0, 0, -kG}, integrator);
+    const dfm_body b = test::make_body(context, w, "beam", {0.1, 0.1, 0.1}, 60, cube("cube", 1e4, 0));
+    hold_bottom(b, 0);
+    double shortest = 1, step = 0;
+    for (int k = 0; k < 400 && dfm_world_time(w) < 5; ++k) {
+      test::ok(dfm_world_stable_step(w, &step, nullptr, nullptr));
+      shortest = std::min(shortest, step);
+      uint32_t trouble = 0;
+      test::ok(dfm_world_step(w, step, &trouble));
+      EXPECT_EQ(trouble, 0u);
+    }
+    EXPECT_LT(shortest, 8e-3);
+    EXPECT_GT(step, 0.025);
+    EXPECT_LT(test::measure(b).speed_max, 1e-4);
   }
-  EXPECT_LT(shortest, 8e-3);
-  EXPECT_GT(step, 0.025);
-  EXPECT_LT(test::measure(b).speed_max, 1e-4);
 }
 
 TEST(ImplicitEuler, MethodOfAnotherIntegrator_IsRefused) {
@@ -288,11 +305,25 @@ TEST(ImplicitEuler, MethodOfAnotherIntegrator_IsRefused) {
   d.method = DFM_METHOD_IMPLICIT;
   EXPECT_EQ(dfm_world_create(context, &d, &w), DFM_E_UNSUPPORTED);
   test::says({"implicit_euler", "velocity"});
-  d.integrator = DFM_INTEGRATOR_AUTO;
-  d.solver = "nonsense";
+  d.method = DFM_METHOD_ROLLBACK;
+  d.integrator = kSecond;
+  EXPECT_EQ(dfm_world_create(context, &d, &w), DFM_E_UNSUPPORTED);
+  test::says({"rollback", "tr_bdf2"});
+  d.integrator = kSecond + 1;
+  EXPECT_EQ(dfm_world_create(context, &d, &w), DFM_E_UNSUPPORTED);
+  test::says({"DFM_INTEGRATOR_TR_BDF2"});
+  d.method = DFM_METHOD_AUTO;
+  d.integrator = kSecond;
+  d.newton_iterations = 1;
   ASSERT_EQ(dfm_world_create(context, &d, &w), DFM_OK);
   test::Tet tet("one");
   dfm_body body = 0;
+  EXPECT_EQ(dfm_body_create(w, &tet.def, &body), DFM_E_UNSUPPORTED);
+  test::says({"tr_bdf2", "solver.newton"});
+  d.method = DFM_METHOD_IMPLICIT;
+  d.integrator = DFM_INTEGRATOR_AUTO;
+  d.solver = "nonsense";
+  ASSERT_EQ(dfm_world_create(context, &d, &w), DFM_OK);
   EXPECT_NE(dfm_body_create(w, &tet.def, &body), DFM_OK);
   test::says({"nonsense", "ldlt", "pcg"});
 }

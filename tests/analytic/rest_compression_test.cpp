@@ -12,9 +12,12 @@ class Rest : public testing::TestWithParam<const char *> {};
 
 TEST_P(Rest, BlockOnAPlaneAndOnABlock_AreCompressedAsTheStaticSolutionSays) {
   for (const char *scene : {"plane", "column", "pair"})
-    for (const int32_t integrator : {DFM_INTEGRATOR_SYMPLECTIC_EULER, DFM_INTEGRATOR_IMPLICIT_EULER})
+    for (const int32_t integrator :
+         {DFM_INTEGRATOR_SYMPLECTIC_EULER, DFM_INTEGRATOR_IMPLICIT_EULER, DFM_INTEGRATOR_TR_BDF2})
       for (const double step : {1e-4, 1.0 / 60})
         for (const double young : {1e4, 1e7}) {
+          // TR-BDF2 rests by backward Euler
+          if (integrator == DFM_INTEGRATOR_TR_BDF2 && (step < 1e-3 || scene == std::string("pair"))) continue;
           if (scene == std::string("pair") && step < 1e-3 && young < 1e5) continue;  // the costliest
           const Result r = run_case({scene, GetParam(), integrator, DFM_METHOD_AUTO, step, young});
           const std::string what = std::string(scene) + ", integrator " + std::to_string(integrator) +

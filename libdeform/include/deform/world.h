@@ -8,14 +8,20 @@
 extern "C" {
 #endif
 /* How contacts are solved: with the inverse masses of the points (VELOCITY, for the integrator
- * SYMPLECTIC_EULER), or with the inverse of the matrix of the implicit step (IMPLICIT, for IMPLICIT_EULER).
- * AUTO is the one that belongs to the integrator. ROLLBACK is the scheme of Zerbato (2010, 4.2), to compare
- * only: it freezes what slides and loses momentum (doc/concepts/rollback.md); what it cannot do is refused
- * with DFM_E_UNSUPPORTED where it is made. Since 0.1. */
+ * SYMPLECTIC_EULER), or with the inverse of the matrix of the implicit step (IMPLICIT, for IMPLICIT_EULER
+ * and TR_BDF2). AUTO is the one that belongs to the integrator. ROLLBACK is the scheme of Zerbato (2010, 4.2),
+ * to compare only: it freezes what slides and loses momentum (doc/concepts/rollback.md); what it cannot do is
+ * refused with DFM_E_UNSUPPORTED where it is made. Since 0.1. */
 enum { DFM_METHOD_AUTO = 0, DFM_METHOD_VELOCITY = 1, DFM_METHOD_IMPLICIT = 2, DFM_METHOD_ROLLBACK = 3 };
-/* AUTO is SYMPLECTIC_EULER, or IMPLICIT_EULER where the method is IMPLICIT. IMPLICIT_EULER needs models that
- * give their stiffness, and is stable at every step (doc/concepts/implicit.md). */
-enum { DFM_INTEGRATOR_AUTO = 0, DFM_INTEGRATOR_SYMPLECTIC_EULER = 1, DFM_INTEGRATOR_IMPLICIT_EULER = 2 };
+/* AUTO is SYMPLECTIC_EULER, or IMPLICIT_EULER where the method is IMPLICIT. IMPLICIT_EULER and TR_BDF2 need
+ * models that give their stiffness, and are stable at every step (doc/concepts/implicit.md). TR_BDF2 is of
+ * second order and damps little; where a body touches, it moves by IMPLICIT_EULER. */
+enum {
+  DFM_INTEGRATOR_AUTO = 0,
+  DFM_INTEGRATOR_SYMPLECTIC_EULER = 1,
+  DFM_INTEGRATOR_IMPLICIT_EULER = 2,
+  DFM_INTEGRATOR_TR_BDF2 = 3
+};
 
 /* dfm_world_def.flags: without the guard against crossing (concepts/guard.md), to see what it does */
 enum {
@@ -215,8 +221,8 @@ DFM_API dfm_status dfm_world_untangle(dfm_world world, uint32_t *left);
 /** A step that is not cut into sub-steps: (4, 5, 6, 7) 2^k s, at most 0.9 of the proven bound; +INFINITY if
  * nothing bounds it. It may be fed back at each step: it follows the bound down at once and up with delay, so
  * that steps change rarely (doc/concepts/step.md). dfm_world_stats.stable_step has the bound itself. With the
- * integrator IMPLICIT_EULER, which no bound holds, it follows the error of the last step instead, up to
- * 1/30 s (doc/concepts/implicit.md).
+ * integrators IMPLICIT_EULER and TR_BDF2, which no bound holds, it follows the error of the last step
+ * instead, up to 1/30 s (doc/concepts/implicit.md).
  * @param dt          out, s
  * @param body,point  out, the element that bounds it; may be NULL
  * @return DFM_OK; DFM_E_HANDLE; DFM_E_FATAL a plugin gave no step bound. Threads: Not during

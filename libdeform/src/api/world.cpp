@@ -9,6 +9,7 @@
 #include "step/method.h"
 #include "step/stages.h"
 #include "step/step_bound.h"
+#include "world/create.h"
 #include "world/equilibrium.h"
 #include "world/explain.h"
 #include "world/snapshot.h"
@@ -69,26 +70,27 @@ const ContactMethod &method_of(int32_t number) {
 // Contact takes the operator of the integrator: with another one bodies at rest stand where they should not.
 void choose_integrator(World &w) {
   const dfm_world_def &d = w.def;
-  if (d.integrator < DFM_INTEGRATOR_AUTO || d.integrator > DFM_INTEGRATOR_IMPLICIT_EULER)
+  if (d.integrator < DFM_INTEGRATOR_AUTO || d.integrator > DFM_INTEGRATOR_TR_BDF2)
     fail(DFM_E_UNSUPPORTED,
-         "integrator %d is not available; use DFM_INTEGRATOR_AUTO, DFM_INTEGRATOR_SYMPLECTIC_EULER or "
-         "DFM_INTEGRATOR_IMPLICIT_EULER",
+         "integrator %d is not available; use DFM_INTEGRATOR_AUTO, DFM_INTEGRATOR_SYMPLECTIC_EULER, "
+         "DFM_INTEGRATOR_IMPLICIT_EULER or DFM_INTEGRATOR_TR_BDF2",
          d.integrator);
-  const bool implicit = d.integrator == DFM_INTEGRATOR_IMPLICIT_EULER ||
-                        (d.integrator == DFM_INTEGRATOR_AUTO && d.method == DFM_METHOD_IMPLICIT);
+  if (d.integrator == DFM_INTEGRATOR_AUTO)
+    w.def.integrator =
+        d.method == DFM_METHOD_IMPLICIT ? DFM_INTEGRATOR_IMPLICIT_EULER : DFM_INTEGRATOR_SYMPLECTIC_EULER;
+  const bool implicit = d.integrator != DFM_INTEGRATOR_SYMPLECTIC_EULER;
   if (!implicit && d.method == DFM_METHOD_IMPLICIT)
     fail(DFM_E_UNSUPPORTED,
-         "contact method implicit belongs to the integrator implicit_euler; choose that, or "
-         "the contact method velocity for symplectic_euler");
+         "contact method implicit belongs to the integrators implicit_euler and tr_bdf2; choose one of "
+         "these, or the contact method velocity for symplectic_euler");
   if (implicit && (d.method == DFM_METHOD_VELOCITY || d.method == DFM_METHOD_ROLLBACK))
     fail(DFM_E_UNSUPPORTED,
          "contact method %s takes the inverse masses of points, which with the integrator "
-         "implicit_euler puts bodies at rest in the wrong place; choose the contact method implicit or auto",
-         d.method == DFM_METHOD_VELOCITY ? "velocity" : "rollback");
+         "%s puts bodies at rest in the wrong place; choose the contact method implicit or auto",
+         d.method == DFM_METHOD_VELOCITY ? "velocity" : "rollback", integrator_name(d.integrator));
   if (!(d.solver_tolerance >= 0 && d.solver_tolerance < 1))
     fail(DFM_E_ARG, "solver_tolerance is %g; it must be 0 (the default) or a relative residual below 1",
          d.solver_tolerance);
-  w.def.integrator = implicit ? DFM_INTEGRATOR_IMPLICIT_EULER : DFM_INTEGRATOR_SYMPLECTIC_EULER;
   if (d.solver) w.implicit.solver = d.solver;
   if (d.solver_tolerance > 0) w.implicit.tolerance = d.solver_tolerance;
   if (d.newton_iterations) w.implicit.newton = d.newton_iterations;

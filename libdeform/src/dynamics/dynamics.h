@@ -2,8 +2,10 @@
 // alone; what moves it is known in this folder only.
 //
 //   bound         between sub-steps: the largest stable one at the present state
+//   begin         of a sub-step: whether contacts are expected
 //   add_forces    forces that follow from the state
 //   free_motion   the mean velocity over the sub-step without contact
+//   take_contact  contacts are known: is the free motion one that goes with them?
 //   diagonal      what an impulse changes of that velocity, where points do not answer each other's impulses;
 //   response      else, between the touched surfels
 //   revise        the impulses of a solve are known: where both of these are not what they were taken for
@@ -29,6 +31,7 @@ struct SubStep {
   double time = 0, h = 0;     // s: its start, its length
   Vec3 gravity;               // m/s2
   double fastest = HUGE_VAL;  // m/s: no component of a velocity may be above it
+  Vec3 gravity_before;        // m/s2: at its start; `gravity` is that of its end
 };
 
 struct StepBound {
@@ -60,6 +63,7 @@ struct ImplicitOptions {
   uint32_t newton = 20;            // at most; 1: one linear solve per sub-step, without a line search
   double rest = 1e-8;              // m/s that Newton's method may leave of what does not move
   Tasks *tasks = nullptr;          // for the rows of a large body's matrix
+  bool second_order = false;       // TR-BDF2 without contact; else backward Euler always
 };
 
 // What may be done to a body beside moving it.
@@ -70,6 +74,7 @@ struct Abilities {
   bool revises = false;   // revise() does something
   bool accurate = false;  // accurate_step() is known
   bool energy = false;    // the energy that its scheme keeps is known (step/energy_watch.h)
+  bool parts = false;     // its free motion is another one where contacts are: begin(), take_contact()
 };
 
 class Dynamics {
@@ -85,6 +90,13 @@ class Dynamics {
 
   // False: the model gives none.
   virtual bool bound(double time, const AddRowSums &outside, StepBound &out) = 0;
+  // touched: the last sub-step ended with contacts. Asked once for a sub-step and its repetitions.
+  virtual void begin(bool) {}
+  // The present loads are those of the start of the sub-step; those of its end come next. Not asked where loads
+  // do not vary.
+  virtual void loads_before() {}
+  // There are contacts. False: the sub-step has to be taken anew, now with what goes with them.
+  virtual bool take_contact() { return true; }
   // False: the model cannot, or (free_motion) a velocity is not finite or above `fastest`. kinetic: J, of the
   // free motion; left as it is where it is not known.
   virtual bool add_forces(const SubStep &) { return true; }

@@ -70,7 +70,7 @@ bool ExplicitPoints::end_state(const SubStep &now, const double *, bool touched)
 }
 
 void ExplicitPoints::commit(const SubStep &now, double fraction) {
-  if (fraction < 1) shorten(p_, now.h * fraction);
+  if (fraction < 1) shorten(p_, p_.v_end.data(), now.h * fraction);
   p_.x.swap(p_.x_end);
   p_.v.swap(p_.v_end);
   model_.commit_state();

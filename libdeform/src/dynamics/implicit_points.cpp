@@ -3,16 +3,19 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/error.h"
 #include "dynamics/line_search.h"
 #include "dynamics/symplectic_euler.h"
+#include "math/elementary.h"
 #include "plugin/plugin_solver.h"
 
 namespace dfm {
 namespace {
 
 // What Newton's method may leave: this share of the largest change of velocity in the sub-step, and what
-// ImplicitOptions say. Contact at rest is solved to 1e-6 m/s.
-constexpr double kShare = 1e-3;
+// ImplicitOptions say. Contact at rest is solved to 1e-6 m/s. What is left is an error of the first order: where
+// the second is wanted, it has to be small beside that.
+constexpr double kShare = 1e-3, kStagedShare = 1e-6;
 // A correction that does not halve the one before needs a new matrix.
 constexpr double kContracts = 0.5;
 // The rest state's factor may fail to do so that often in a sub-step.
@@ -24,6 +27,15 @@ constexpr double kTolerated = 100, kDiverges = 100;
 constexpr uint32_t kCuts = 8;  // of a correction that leads too far
 // What a sub-step may err by, over the median edge of the surface; how much longer the next one may be.
 constexpr double kErrs = 0.005, kGrows = 2;
+
+// TR-BDF2: the trapezoidal rule to kMiddle of the sub-step, then the second backward difference formula over
+// both parts. With kMiddle = 2 - sqrt 2 both have the matrix of backward Euler over kPart of the sub-step.
+// An end is kAhead times what the middle has beyond the start, plus kPart times the derivative there.
+constexpr double kMiddle = 0.585786437626904951, kPart = kMiddle / 2;
+constexpr double kAhead = 1 / (kMiddle * (2 - kMiddle));
+// Of h^3 times the third derivative (Hosea and Shampine 1996, Analysis and implementation of TR-BDF2,
+// section 2).
+constexpr double kError = (3 * kMiddle * kMiddle - 4 * kMiddle + 2) / (12 * (2 - kMiddle));
 
 double largest(const Array<double> &a) {
   double most = 0;
@@ -40,14 +52,22 @@ ImplicitPoints::ImplicitPoints(const Memory &memory, Phyxels &points, Surface &s
       stiffness_(memory),
       memory_(memory),
       ways_(memory) {
+  use_memory(memory, stage_x_, stage_v_, middle_, load_before_);
   use_memory(memory, x_, v_, before_, residual_, push_, change_, springs_, dampers_, scale_, weight_, held_,
              column_, points_, between_);
   x_.assign(size_t{kStride} * points.n, 0.0);
   v_ = before_ = x_;
+  if (options_.second_order) stage_x_ = stage_v_ = middle_ = load_before_ = x_;
   for (Array<double> *a : {&residual_, &push_, &change_, &scale_, &weight_})
     a->assign(size_t{3} * points.n, 0.0);
   held_.assign(points.n, 0);
   stiffness_.create(model, points.n);
+  if (options_.second_order && options_.newton == 1 && !stiffness_.constant())
+    fail(
+        DFM_E_UNSUPPORTED,
+        "the integrator tr_bdf2 needs solutions of the equations of model '%s', which one iteration does not "
+        "give; choose implicit_euler, or solver.newton above 1",
+        model.type->id);
   std::unique_ptr<LinearSolver> solver = new_solver();
   if (solver->direct() && (options_.newton > 1 || stiffness_.constant()))
     rest_ = std::make_unique<RestFactor>(memory, points, model, stiffness_, std::move(solver));
@@ -76,12 +96,19 @@ bool ImplicitPoints::bound(double, const AddRowSums &outside, StepBound &out) {
 bool ImplicitPoints::ask(const SubStep &now, const double *v, bool commits) {
   for (size_t j = 0; j < x_.size(); ++j) {
     v_[j] = v[j];
-    x_[j] = p_.x[j] + now.h * v[j];
+    x_[j] = stage_.x[j] + stage_.h * v[j];
   }
-  std::copy(p_.load.begin(), p_.load.end(), p_.f.begin());
-  dfm_kin k = kin(now.time + now.h, now.h, commits);
+  dfm_kin k = kin(now.time + stage_.elapsed, stage_.elapsed, commits);
   k.x = x_.data();
   k.v = v_.data();
+  return ask_here(k, stage_.share);
+}
+
+// share: of the way from the loads at the start of the sub-step to those at its end.
+bool ImplicitPoints::ask_here(const dfm_kin &k, double share) {
+  if (share == 1) std::copy(p_.load.begin(), p_.load.end(), p_.f.begin());
+  else
+    for (size_t j = 0; j < x_.size(); ++j) p_.f[j] = load_before_[j] + share * (p_.load[j] - load_before_[j]);
   return model_.call("add_forces", [&] { return model_.ops->add_forces(model_.self, &k, p_.f.data()); }) ==
          DFM_OK;
 }
@@ -93,17 +120,18 @@ bool ImplicitPoints::residual_at(const SubStep &now, const double *v, const doub
   for (uint32_t i = 0; i < p_.n; ++i)
     for (uint32_t c = 0; c < 3; ++c) {
       const size_t at = size_t{kStride} * i + c, own = size_t{3} * i + c;
-      const double force = p_.f[at] + p_.mass[i] * now.gravity[int(c)];
+      const double force = p_.f[at] + p_.mass[i] * stage_.gravity[int(c)];
       const double given = push ? push[own] : 0;
-      residual_[own] = p_.moves(at) ? inertia(i, now.h) * (v[at] - p_.v[at]) - now.h * force - given : 0;
+      const double change = v[at] - stage_.v[at];
+      residual_[own] = p_.moves(at) ? inertia(i, stage_.h) * change - stage_.h * force - given : 0;
       poison += 0.0 * residual_[own];
     }
   return poison == 0;
 }
 
 // The rest state's factor in place of A, turned to where forces were asked last. False: there is none.
-bool ImplicitPoints::take_rest(const SubStep &now) {
-  by_rest_ = rest_ && rest_->prepare(now.h);
+bool ImplicitPoints::take_rest() {
+  by_rest_ = rest_ && rest_->prepare(stage_.h);
   if (!by_rest_) return false;
   rest_->turn(x_.data());
   slow_ = 0;
@@ -114,19 +142,19 @@ bool ImplicitPoints::take_rest(const SubStep &now) {
 
 // A at the state where forces were asked last.
 bool ImplicitPoints::linearize(const SubStep &now) {
-  const bool known = stiffness_.constant() && factor_h_ == now.h && held_ == p_.held;
+  const bool known = stiffness_.constant() && factor_h_ == stage_.h && held_ == p_.held;
   if (known) return true;
   factor_h_ = 0;
   by_rest_ = false;
   if (!exact_) exact_ = new_solver();
-  dfm_kin k = kin(now.time + now.h, now.h);
+  dfm_kin k = kin(now.time + stage_.elapsed, stage_.elapsed);
   k.x = x_.data();
   k.v = v_.data();
-  if (!stiffness_.evaluate(model_, k, -now.h * now.h, -now.h)) return false;
+  if (!stiffness_.evaluate(model_, k, -stage_.h * stage_.h, -stage_.h)) return false;
   stiffness_.each_own([&](uint32_t i, double *block) {
     for (size_t c = 0; c < 3; ++c) {
       double &diagonal = block[4 * c];
-      diagonal += inertia(i, now.h);
+      diagonal += inertia(i, stage_.h);
       const bool held = p_.held[i] & (1 << c);
       scale_[3 * size_t{i} + c] = held ? 0 : 1 / diagonal;
       weight_[3 * size_t{i} + c] = held ? 0 : diagonal;
@@ -136,7 +164,7 @@ bool ImplicitPoints::linearize(const SubStep &now) {
   hold_components(stiffness_.pattern(), p_.held.data(), blocks.data());
   exact_->place(x_.data(), kStride);
   if (!exact_->factor(blocks.data())) return false;
-  factor_h_ = now.h;
+  factor_h_ = stage_.h;
   held_ = p_.held;
   return true;
 }
@@ -167,10 +195,10 @@ bool ImplicitPoints::restricted(uint32_t count, const uint32_t *points, double *
 // Whether the rest state's factor serves on, where it left that share of what there was.
 bool ImplicitPoints::patient(double left) { return by_rest_ && (left <= kContracts || ++slow_ <= kPatience); }
 
-double ImplicitPoints::allowed_error(const Array<double> &v) const {
+double ImplicitPoints::allowed_error(const Array<double> &v, double share) const {
   double most = 0;
   for (size_t j = 0; j < v.size(); ++j) most = std::max(most, std::fabs(v[j] - p_.v[j]));
-  return options_.rest + kShare * most;
+  return options_.rest + share * most;
 }
 
 // From v, whose residual is known, along the way in change_. The residual is then that of the new v.
@@ -186,6 +214,7 @@ bool ImplicitPoints::search(const SubStep &now, Array<double> &v) {
 
 // From the velocities at the start of the sub-step.
 bool ImplicitPoints::start(const SubStep &now) {
+  stage_ = {now.h, now.h, p_.x.data(), p_.v.data(), 1, now.gravity};
   p_.v_free = p_.v;
   error_ = 0;
   least_error_ = HUGE_VAL;
@@ -204,12 +233,11 @@ bool ImplicitPoints::take_first_way(const SubStep &now) {
 
 // Newton's method. A factorization costs many solves, so that of the rest state serves while the residual
 // falls well, then one of A itself; the combination of the ways it leads to makes good what the matrix is
-// not.
-bool ImplicitPoints::free_motion(const SubStep &now, double &kinetic) {
-  if (!start(now)) return false;
-  Array<double> &v = p_.v_free;
+// not. v: its start, whose residual is known, and its end. False: forces are not known, or a stage of TR-BDF2
+// is not solved.
+bool ImplicitPoints::newton(const SubStep &now, Array<double> &v) {
   ways_.start(change_.size());
-  bool fresh = !take_rest(now);
+  bool fresh = !take_rest();
   for (uint32_t k = 0; k < options_.newton; ++k) {
     if (fresh) {
       if (!linearize(now)) return false;
@@ -219,19 +247,71 @@ bool ImplicitPoints::free_motion(const SubStep &now, double &kinetic) {
     const double step = largest(change_), before = scaled_square(residual_);
     accelerate(v);
     if (!search(now, v)) return false;
-    if (stiffness_.constant()) break;
+    if (stiffness_.constant()) return true;
     const double left = before > 0 ? std::sqrt(scaled_square(residual_) / before) : 0;
-    if (step * std::min(1.0, left) <= allowed_error(v)) break;
+    if (step * std::min(1.0, left) <= allowed_error(v, staged_ ? kStagedShare : kShare)) return true;
     fresh = by_rest_ ? !patient(left) : !exact_->direct() || left > kContracts;
   }
+  return !staged_;
+}
+
+bool ImplicitPoints::free_motion(const SubStep &now, double &kinetic) {
+  staged_ = staged_ && two_stages(now);
+  if (!staged_ && (!start(now) || !newton(now, p_.v_free))) return false;
   kinetic = 0;
   bool good = true;
   for (uint32_t i = 0; i < p_.n; ++i) {
-    const Vec3 u = load3(&v[size_t{kStride} * i]);
+    const Vec3 u = load3(&p_.v_free[size_t{kStride} * i]);
     kinetic += 0.5 * p_.mass[i] * norm2(u);
     for (int c = 0; c < 3; ++c) good = good && std::fabs(u[c]) <= now.fastest;
   }
   return good;
+}
+
+// False: a stage has no solution that is near enough. Energy would come out of what is left; backward Euler
+// loses it. The end is left in v_end, the mean velocity in v_free: from the velocities at the three times, which
+// give it without the digits that a difference of positions would lose.
+bool ImplicitPoints::two_stages(const SubStep &now) {
+  const double part = kPart * now.h;
+  if (!ask_here(kin(now.time, 0), 0)) return false;
+  for (uint32_t i = 0; i < p_.n; ++i)
+    for (uint32_t c = 0; c < 3; ++c) {
+      const size_t at = size_t{kStride} * i + c;
+      stage_x_[at] = p_.x[at] + part * p_.v[at];
+      stage_v_[at] = p_.v[at] + part * (p_.inv_mass[at] * p_.f[at]);
+      if (p_.moves(at)) stage_v_[at] += part * now.gravity_before[int(c)];
+    }
+  const Vec3 change = now.gravity - now.gravity_before;
+  stage_ = {part,
+            kMiddle * now.h,
+            stage_x_.data(),
+            stage_v_.data(),
+            kMiddle,
+            now.gravity_before + kMiddle * change};
+  middle_ = p_.v;
+  if (!solve_stage(now, middle_)) return false;
+  for (size_t j = 0; j < x_.size(); ++j) {
+    stage_x_[j] = p_.x[j] + kAhead * (part * (p_.v[j] + middle_[j]));
+    stage_v_[j] = p_.v[j] + kAhead * (middle_[j] - p_.v[j]);
+  }
+  stage_.elapsed = now.h;
+  stage_.share = 1;
+  stage_.gravity = now.gravity;
+  p_.v_end = middle_;
+  if (!solve_stage(now, p_.v_end)) return false;
+  for (size_t j = 0; j < x_.size(); ++j)
+    p_.v_free[j] = kPart * (kAhead * (p_.v[j] + middle_[j]) + p_.v_end[j]);
+  return true;
+}
+
+void ImplicitPoints::begin(bool touched) {
+  staged_ = options_.second_order && !touched;
+  if (options_.second_order) load_before_ = p_.load;
+}
+
+bool ImplicitPoints::solve_stage(const SubStep &now, Array<double> &v) {
+  return residual_at(now, v.data(), nullptr) && newton(now, v) &&
+         std::all_of(v.begin(), v.end(), [&](double value) { return std::fabs(value) <= now.fastest; });
 }
 
 // change_ = -A^-1 r
@@ -322,7 +402,7 @@ Revision ImplicitPoints::revise(const SubStep &now, const double *surfel_impulse
   const bool known = residual_at(now, p_.v_end.data(), push_.data());
   if (known && !solve_way(residual_)) return Revision::failed;
   error_ = known ? largest(change_) : HUGE_VAL;
-  const double allowed = allowed_error(p_.v_end);
+  const double allowed = allowed_error(p_.v_end, kShare);
   if (error_ <= allowed || (revisions_ >= kRevisions && error_ <= kTolerated * allowed)) {
     revisions_ = 0;
     return Revision::none;
@@ -351,27 +431,31 @@ Revision ImplicitPoints::revise(const SubStep &now, const double *surfel_impulse
 
 // Forces are asked once more where the model has a state, whose next value they write.
 bool ImplicitPoints::end_state(const SubStep &now, const double *surfel_impulse, bool touched) {
-  if (!linear_end(touched ? surfel_impulse : nullptr)) return false;
+  if (!staged_ && !linear_end(touched ? surfel_impulse : nullptr)) return false;
   const Array<double> &v = p_.v_end;
   if (!model_.state.empty() && !ask(now, v.data(), true)) return false;
   double poison = 0;
   for (size_t j = 0; j < v.size(); ++j) {
     poison += 0.0 * v[j];
-    p_.x_end[j] = p_.x[j] + now.h * v[j];
+    p_.x_end[j] = p_.x[j] + now.h * mean()[j];
   }
   return poison == 0;
 }
 
 // An impulse moves all points, touched or not.
 void ImplicitPoints::bound_ends(double &speed, double &change) const {
-  bound_surfel_ends(p_.v_end.data(), speed, change);
+  bound_surfel_ends(mean(), speed, change);
 }
 
-// Backward Euler errs by h^2 a / 2 in the position, a the acceleration; what all points have in common bends
-// nothing.
+// Backward Euler errs by h^2 a / 2 in the position, a the acceleration, and TR-BDF2 by what the velocities at
+// its three times tell (Hosea and Shampine 1996); what all points have in common bends nothing.
 double ImplicitPoints::accurate_step(const SubStep &now) const {
   const auto gained = [&](uint32_t i) {
-    return load3(&p_.v_end[size_t{kStride} * i]) - load3(&p_.v[size_t{kStride} * i]);
+    const size_t at = size_t{kStride} * i;
+    const Vec3 v = load3(&p_.v[at]), end = load3(&p_.v_end[at]);
+    if (!staged_) return end - v;
+    const Vec3 middle = load3(&middle_[at]);
+    return (1 / (1 - kMiddle)) * (end - middle) - (1 / kMiddle) * (middle - v);
   };
   Vec3 mean;
   double mass = 0, most = 0;
@@ -381,12 +465,14 @@ double ImplicitPoints::accurate_step(const SubStep &now) const {
   }
   mean = (1 / mass) * mean;
   for (uint32_t i = 0; i < p_.n; ++i) most = std::max(most, norm2(gained(i) - mean));
-  const double error = 0.5 * now.h * std::sqrt(most);
-  return now.h * std::min(kGrows, std::sqrt(kErrs * surface_.median_edge / error));
+  const double allowed = kErrs * surface_.median_edge, change = now.h * std::sqrt(most);
+  if (!staged_) return now.h * std::min(kGrows, std::sqrt(allowed / (0.5 * change)));
+  const double share = allowed / (2 * kError * change);
+  return now.h * (share < kGrows * kGrows * kGrows ? dfm_pow(share, 1.0 / 3) : kGrows);
 }
 
 void ImplicitPoints::commit(const SubStep &now, double fraction) {
-  if (fraction < 1) shorten(p_, fraction * now.h);
+  if (fraction < 1) shorten(p_, mean(), fraction * now.h);
   p_.x.swap(p_.x_end);
   p_.v.swap(p_.v_end);
   model_.commit_state();

@@ -1,7 +1,11 @@
-// Points that the library moves by backward Euler under the forces of a model that gives their stiffness:
+// Points that the library moves implicitly under the forces of a model that gives their stiffness:
 //
 //   r(v) = M (v - v0) - h (f(x0 + h v, v) + loads + M g) = p        p: contact impulses at the points, N s
 //   A    = dr/dv = M - h df/dv - h^2 df/dx
+//
+// Backward Euler is this with x0, v0 at the start of the sub-step and h its length. TR-BDF2 (Bank et al.
+// 1985, Transient simulation of silicon devices and circuits, section III) is this twice with a part of h and
+// other x0, v0. Contact is solved for with backward Euler alone: doc/decisions/0140-tr-bdf2.md.
 //
 // free_motion() solves r(v) = 0 by Newton's method with a line search, with the rest state's factor in place
 // of A (rest_factor.h) or with A as it was last. Contact sees A^-1, never M^-1: a prediction with A and
@@ -12,6 +16,7 @@
 // motions apart. Source: Baraff and Witkin 1998, Large steps in cloth simulation, section 3.
 #pragma once
 #include <memory>
+#include <utility>
 
 #include "dynamics/dynamics.h"
 #include "dynamics/rest_factor.h"
@@ -30,16 +35,21 @@ class ImplicitPoints : public Dynamics {
     return {.springs = true,
             .placed = true,
             .revises = options_.newton > 1 && !stiffness_.constant(),
-            .accurate = true};
+            .accurate = true,
+            .parts = options_.second_order};
   }
-  uint32_t relative_work() const override { return 50; }  // 30 at 700 points, 60 at 4,300
+  // of a stage: 30 at 700 points, 60 at 4,300
+  uint32_t relative_work() const override { return options_.second_order ? 100 : 50; }
   bool bound(double time, const AddRowSums &outside, StepBound &out) override;
+  void begin(bool touched) override;
+  void loads_before() override { load_before_ = p_.load; }
+  bool take_contact() override { return !std::exchange(staged_, false); }
   bool free_motion(const SubStep &now, double &kinetic) override;
   const double *point_velocity() const override { return p_.v_free.data(); }
   bool response(const SubStep &now, uint32_t n, const uint32_t *surfel, double *matrix) override;
   Revision revise(const SubStep &now, const double *surfel_impulse) override;
   bool end_state(const SubStep &now, const double *surfel_impulse, bool touched) override;
-  EndState end() const override { return {p_.v_end.data(), p_.v_end.data()}; }
+  EndState end() const override { return {p_.v_end.data(), mean()}; }
   void bound_ends(double &speed, double &change) const override;
   double accurate_step(const SubStep &now) const override;
   void commit(const SubStep &now, double fraction) override;
@@ -64,6 +74,19 @@ class ImplicitPoints : public Dynamics {
   bool by_rest_ = false;                 // which of the two stands for A
   uint32_t slow_ = 0;                    // iterations with rest_ that did not halve what was left
   Anderson ways_;
+  // What is solved for now: s, its h; from the start of the sub-step to its end; [npoint,4] m, m/s: x0, v0.
+  // Loads and gravity in between are on the line from the start to the end.
+  struct Stage {
+    double h, elapsed;
+    const double *x, *v;
+    double share;
+    Vec3 gravity;
+  };
+  Stage stage_{};
+  bool staged_ = false;              // this sub-step is taken by TR-BDF2
+  Array<double> stage_x_, stage_v_;  // [npoint,4] m, m/s: x0, v0 of its stages
+  Array<double> middle_;             // [npoint,4] m/s, the end of its first stage
+  Array<double> load_before_;        // [npoint,4] N, at the start of the sub-step
   Array<double> x_, v_;              // [npoint,4] m, m/s: where forces are asked
   Array<double> before_;             // [npoint,4] m/s, the end before the last revision
   Array<double> residual_;           // [npoint,3] N s
@@ -81,9 +104,14 @@ class ImplicitPoints : public Dynamics {
 
   std::unique_ptr<LinearSolver> new_solver() const;
   bool start(const SubStep &now);
+  const double *mean() const { return staged_ ? p_.v_free.data() : p_.v_end.data(); }
   bool ask(const SubStep &now, const double *v, bool commits);
+  bool ask_here(const dfm_kin &k, double share);
+  bool newton(const SubStep &now, Array<double> &v);
+  bool two_stages(const SubStep &now);
+  bool solve_stage(const SubStep &now, Array<double> &v);
   bool residual_at(const SubStep &now, const double *v, const double *push);
-  bool take_rest(const SubStep &now);
+  bool take_rest();
   bool linearize(const SubStep &now);
   bool patient(double left);
   bool restricted(uint32_t count, const uint32_t *points, double *w);
@@ -96,7 +124,7 @@ class ImplicitPoints : public Dynamics {
   bool search(const SubStep &now, Array<double> &v);
   bool linear_end(const double *surfel_impulse);
   double scaled_square(const Array<double> &r) const;
-  double allowed_error(const Array<double> &v) const;
+  double allowed_error(const Array<double> &v, double share) const;
 };
 
 }  // namespace dfm

@@ -44,10 +44,10 @@ void find_end(Phyxels &p, bool touched, double h) {
   }
 }
 
-void shorten(Phyxels &p, double h) {
+void shorten(Phyxels &p, const double *mean, double h) {
   Point *const x_end = points(p.x_end);
-  const Point *const x = points(p.x), *const v_end = points(p.v_end);
-  for (uint32_t i = 0; i < p.n; ++i) x_end[i] = x[i] + h * v_end[i];
+  const Point *const x = points(p.x), *const u = reinterpret_cast<const Point *>(mean);
+  for (uint32_t i = 0; i < p.n; ++i) x_end[i] = x[i] + h * u[i];
 }
 
 double stable_step(const Phyxels &p, const double *ksum, const double *csum, uint32_t *worst) {

@@ -139,7 +139,11 @@ const Table &words() {
   static const Table table = {
       {"mode", {{"dynamic", true}, {"static", true}}},
       {"integrator",
-       {{"auto", true}, {"symplectic_euler", true}, {"verlet", false}, {"implicit_euler", true}}},
+       {{"auto", true},
+        {"symplectic_euler", true},
+        {"verlet", false},
+        {"implicit_euler", true},
+        {"tr_bdf2", true}}},
       {"method", {{"auto", true}, {"velocity", true}, {"implicit", true}, {"rollback", true}}},
       {"shape",
        {{"plane", true},

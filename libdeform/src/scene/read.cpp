@@ -195,6 +195,7 @@ int32_t integrator_of(const Node &holder) {
   const std::string word = holder.word("integrator", "auto", "integrator");
   return word == "symplectic_euler" ? DFM_INTEGRATOR_SYMPLECTIC_EULER
          : word == "implicit_euler" ? DFM_INTEGRATOR_IMPLICIT_EULER
+         : word == "tr_bdf2"        ? DFM_INTEGRATOR_TR_BDF2
                                     : DFM_INTEGRATOR_AUTO;
 }
 

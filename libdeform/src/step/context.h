@@ -68,6 +68,8 @@ struct StepContext {
   Array<uint32_t> match;
   Array<uint32_t> block_surfels;    // responses of bodies whose points answer each other
   bool bodies_revise = false;       // some body looks again at what the solve has made of it
+  bool bodies_part = false;         // some body moves otherwise where contacts are
+  Array<uint8_t> near;              // [bodies] had contacts in the last sub-step
   const Body *unsettled = nullptr;  // that has found no state with its contacts
   // a host has answered, and the solve goes on from its last impulses
   bool rigid_again = false;

@@ -13,7 +13,19 @@
 namespace dfm {
 
 SubStep sub_step_of(const World &w, const StepContext &step) {
-  return {w.time, step.h, w.gravity.now, kLight};
+  const Vec3 before =
+      w.gravity.keys.empty() ? w.gravity.now : vector_at(w.gravity.keys, w.prescribed.at(w.time));
+  return {w.time, step.h, w.gravity.now, kLight, before};
+}
+
+// By the contacts that are kept, so that a restored world does the same.
+void begin_bodies(World &w, StepContext &step) {
+  if (!step.bodies_part) return;
+  step.near.assign(w.bodies.size(), 0);
+  for (uint32_t m = 0; m < w.store.n; ++m)
+    for (const uint64_t id : {w.store.id_a[m], w.store.id_b[m]})
+      if (const uint32_t i = slot_of(w, id); i != kNone) step.near[i] = 1;
+  for (size_t i = 0; i < w.bodies.size(); ++i) w.bodies[i]->dynamics->begin(step.near[i]);
 }
 
 bool stage_model(World &w, Active active, const SubStep &now, uint32_t *trouble) {

@@ -40,11 +40,18 @@ void stage_motion(World &w, double h, Array<Driven> &driven) {
   for (auto &b : w.bodies) {
     if (b->slumber.asleep) continue;
     if (b->loads_vary()) {
-      set_loads(*b, end, w.prescribed.share);
-      for (const Spring &spring : b->springs) {
-        if (w.prescribed.stands()) add_spring_force(*b, spring, end, 0);
-        else add_spring_force(*b, spring, w.time, h);
+      const auto set = [&](double t) {
+        set_loads(*b, t, w.prescribed.share);
+        for (const Spring &spring : b->springs) {
+          if (w.prescribed.stands()) add_spring_force(*b, spring, end, 0);
+          else add_spring_force(*b, spring, w.time, h);
+        }
+      };
+      if (b->dynamics->abilities().parts) {
+        set(w.prescribed.at(w.time));
+        b->dynamics->loads_before();
       }
+      set(end);
     }
     each_held_place(*b, end, [&](uint32_t point, Vec3 to) {
       const size_t at = size_t(point) * kStride;

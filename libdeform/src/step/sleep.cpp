@@ -52,19 +52,19 @@ double settled_from(const Body &b) {
   return t;
 }
 
-// Ids rise with the slots; slots themselves are renewed by prepare() only.
-uint32_t slot_of(const World &w, uint64_t id) {
-  const auto at = std::lower_bound(w.bodies.begin(), w.bodies.end(), id,
-                                   [](const auto &b, uint64_t value) { return b->id < value; });
-  return at != w.bodies.end() && (*at)->id == id ? static_cast<uint32_t>(at - w.bodies.begin()) : kNone;
-}
-
 bool asleep(const World &w, uint64_t id) {
   const uint32_t i = slot_of(w, id);
   return i != kNone && w.bodies[i]->slumber.asleep;
 }
 
 }  // namespace
+
+// Ids rise with the slots; slots themselves are renewed by prepare() only.
+uint32_t slot_of(const World &w, uint64_t id) {
+  const auto at = std::lower_bound(w.bodies.begin(), w.bodies.end(), id,
+                                   [](const auto &b, uint64_t value) { return b->id < value; });
+  return at != w.bodies.end() && (*at)->id == id ? static_cast<uint32_t>(at - w.bodies.begin()) : kNone;
+}
 
 // Which bodies the stages of a sub-step work on, and whom contact impulses go to.
 void gather_active(World &w) {

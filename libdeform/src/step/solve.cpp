@@ -254,6 +254,17 @@ const LawInstance *solve_revised(World &w, StepContext &step, Revised &revised) 
   return bad;
 }
 
+// Else the sub-step is to be taken anew, with the motion that goes with contacts.
+bool contacts_taken(World &w, StepContext &step) {
+  bool all = true;
+  for (const ContactPoint &c : step.contacts) {
+    if (!w.bodies[c.slot_a]->dynamics->take_contact()) all = false;
+    if (!c.obstacle && !w.bodies[c.slot_b]->dynamics->take_contact()) all = false;
+  }
+  step.guard.again = step.guard.again || !all;
+  return all;
+}
+
 // Shorter, a body moves less far from where its forces are known.
 bool retry_shorter(World &w, StepContext &step, uint32_t *trouble) {
   if (step.h > kLeastPiece * step.guard.planned) {
@@ -273,6 +284,7 @@ bool retry_shorter(World &w, StepContext &step, uint32_t *trouble) {
 }  // namespace
 
 bool stage_solve(World &w, StepContext &step, uint32_t *trouble) {
+  if (!contacts_taken(w, step)) return false;
   step.passes = step.sweeps = 0;
   step.residual = {};
   make_rows(w, step);

@@ -75,6 +75,7 @@ bool stage_commit(World &w, StepContext &step, uint32_t *trouble);
 void stage_sleep(World &w, StepContext &step);  // sleep.cpp
 
 SubStep sub_step_of(const World &w, const StepContext &step);
+void begin_bodies(World &w, StepContext &step);  // before a sub-step and its repetitions
 // Where all active bodies end with the impulses that have been distributed, beside their present states.
 bool find_ends(World &w, StepContext &step, uint32_t *trouble);
 void keep_rigids(World &w, StepContext &step);  // once the sub-step is known to succeed
@@ -93,6 +94,7 @@ void reserve_events(World &w, size_t more);
 void add_event(World &w, uint32_t kind, uint64_t a, uint64_t b, uint64_t key, double t);  // a, b: ids
 
 // sleep.cpp
+uint32_t slot_of(const World &w, uint64_t id);  // of a body, or kNone
 void gather_active(World &w);
 // waking and falling asleep allocate nothing, and cannot fail
 void reserve_sleep(World &w, StepContext &step, uint32_t n);

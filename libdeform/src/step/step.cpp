@@ -208,11 +208,12 @@ bool advance(World &w, StepContext &step, double end, double goal, bool last, ui
   return true;
 }
 
-// Shortens h until the guard has nothing against it.
+// Until bodies move as their contacts ask, and with h so short that the guard has nothing against it.
 bool piece(World &w, StepContext &step, uint32_t *trouble) {
   const uint32_t before = *trouble;
   const uint64_t unconverged = w.stats.unconverged;
   step.guard.acted = false;
+  begin_bodies(w, step);
   while (!sub_step(w, step, trouble)) {
     if (!step.guard.again) return false;
     step.h *= step.guard.cut;

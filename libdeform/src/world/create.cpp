@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "core/error.h"
 #include "core/handle.h"
@@ -91,23 +92,23 @@ std::vector<double> rest_for(const dfm_type &type, const Body &b) {
 
 namespace {
 
-// Null: its points move explicitly.
-const ImplicitOptions *implicit_of(const World &w, const std::string &name, const dfm_body_def &def) {
-  if (def.integrator < DFM_INTEGRATOR_AUTO || def.integrator > DFM_INTEGRATOR_IMPLICIT_EULER)
-    fail(
-        DFM_E_UNSUPPORTED,
-        "body '%s': integrator %d is not available; use DFM_INTEGRATOR_AUTO, DFM_INTEGRATOR_SYMPLECTIC_EULER "
-        "or DFM_INTEGRATOR_IMPLICIT_EULER",
-        name.c_str(), def.integrator);
+// None: its points move explicitly.
+std::optional<ImplicitOptions> implicit_of(const World &w, const std::string &name, const dfm_body_def &def) {
+  if (def.integrator < DFM_INTEGRATOR_AUTO || def.integrator > DFM_INTEGRATOR_TR_BDF2)
+    fail(DFM_E_UNSUPPORTED,
+         "body '%s': integrator %d is not available; use DFM_INTEGRATOR_AUTO, "
+         "DFM_INTEGRATOR_SYMPLECTIC_EULER, DFM_INTEGRATOR_IMPLICIT_EULER or DFM_INTEGRATOR_TR_BDF2",
+         name.c_str(), def.integrator);
   const int32_t which = def.integrator == DFM_INTEGRATOR_AUTO ? w.def.integrator : def.integrator;
-  if (which != DFM_INTEGRATOR_IMPLICIT_EULER) return nullptr;
+  if (which == DFM_INTEGRATOR_SYMPLECTIC_EULER) return std::nullopt;
   if (w.def.method == DFM_METHOD_VELOCITY || w.def.method == DFM_METHOD_ROLLBACK)
     fail(DFM_E_UNSUPPORTED,
-         "body '%s': the integrator implicit_euler cannot be in a world whose contact method is %s, which "
-         "takes "
+         "body '%s': the integrator %s cannot be in a world whose contact method is %s, which takes "
          "inverse masses; use the method auto or implicit",
-         name.c_str(), w.method->name);
-  return &w.implicit;
+         name.c_str(), integrator_name(which), w.method->name);
+  ImplicitOptions options = w.implicit;
+  options.second_order = which == DFM_INTEGRATOR_TR_BDF2;
+  return options;
 }
 
 }  // namespace
@@ -188,7 +189,8 @@ Body &create_body(World &w, const dfm_body_def &def) {
   mesh.fixed = p.held.data();
   coupling.tell(mesh);
   b.model.create(type, w.context->host, mesh, m, std::move(values));
-  b.dynamics = make_dynamics(m, p, b.surface, b.model, b.edges, implicit_of(w, b.name, def));
+  const auto implicit = implicit_of(w, b.name, def);
+  b.dynamics = make_dynamics(m, p, b.surface, b.model, b.edges, implicit ? &*implicit : nullptr);
   if (!b.dynamics->abilities().placed) need_ability(w, Ability::self_stepping, "body", b.name);
   if (!b.surface.identity()) need_ability(w, Ability::own_surface, "body", b.name);
   if (w.method->point_values) make(b.method_values, size_t(kStride) * p.n);
