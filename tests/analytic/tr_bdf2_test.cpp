@@ -20,7 +20,7 @@ State state_of(dfm_body b) {
   return s;
 }
 
-// Of y' = z y over a step of one: the trapezoidal rule to g = 2 - sqrt 2, then the second backward difference.
+// Of y' = i hw y over a step of one: the trapezoidal rule to 2 - sqrt 2, then the second backward difference.
 double amplification(double hw) {
   const double g = 2 - std::sqrt(2.0), d = g / 2, ahead = 1 / (g * (2 - g));
   const std::complex<double> z(0, hw), middle = (1.0 + d * z) / (1.0 - d * z);

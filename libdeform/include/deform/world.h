@@ -9,9 +9,9 @@ extern "C" {
 #endif
 /* How contacts are solved: with the inverse masses of the points (VELOCITY, for the integrator
  * SYMPLECTIC_EULER), or with the inverse of the matrix of the implicit step (IMPLICIT, for IMPLICIT_EULER
- * and TR_BDF2). AUTO is the one that belongs to the integrator. ROLLBACK is the scheme of Zerbato (2010, 4.2),
- * to compare only: it freezes what slides and loses momentum (doc/concepts/rollback.md); what it cannot do is
- * refused with DFM_E_UNSUPPORTED where it is made. Since 0.1. */
+ * and TR_BDF2). AUTO is the one that belongs to the integrator. ROLLBACK is the scheme of Zerbato
+ * (2010, 4.2), to compare only: it freezes what slides and loses momentum (doc/concepts/rollback.md); what it
+ * cannot do is refused with DFM_E_UNSUPPORTED where it is made. Since 0.1. */
 enum { DFM_METHOD_AUTO = 0, DFM_METHOD_VELOCITY = 1, DFM_METHOD_IMPLICIT = 2, DFM_METHOD_ROLLBACK = 3 };
 /* AUTO is SYMPLECTIC_EULER, or IMPLICIT_EULER where the method is IMPLICIT. IMPLICIT_EULER and TR_BDF2 need
  * models that give their stiffness, and are stable at every step (doc/concepts/implicit.md). TR_BDF2 is of

@@ -92,8 +92,8 @@ class Dynamics {
   virtual bool bound(double time, const AddRowSums &outside, StepBound &out) = 0;
   // touched: the last sub-step ended with contacts. Asked once for a sub-step and its repetitions.
   virtual void begin(bool) {}
-  // The present loads are those of the start of the sub-step; those of its end come next. Not asked where loads
-  // do not vary.
+  // The present loads are those of the start of the sub-step; those of its end come next. Not asked where
+  // loads do not vary.
   virtual void loads_before() {}
   // There are contacts. False: the sub-step has to be taken anew, now with what goes with them.
   virtual bool take_contact() { return true; }

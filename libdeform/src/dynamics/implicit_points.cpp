@@ -13,8 +13,8 @@ namespace dfm {
 namespace {
 
 // What Newton's method may leave: this share of the largest change of velocity in the sub-step, and what
-// ImplicitOptions say. Contact at rest is solved to 1e-6 m/s. What is left is an error of the first order: where
-// the second is wanted, it has to be small beside that.
+// ImplicitOptions say. Contact at rest is solved to 1e-6 m/s. What is left is an error of the first order:
+// where the second is wanted, it has to be small beside that.
 constexpr double kShare = 1e-3, kStagedShare = 1e-6;
 // A correction that does not halve the one before needs a new matrix.
 constexpr double kContracts = 0.5;
@@ -269,8 +269,8 @@ bool ImplicitPoints::free_motion(const SubStep &now, double &kinetic) {
 }
 
 // False: a stage has no solution that is near enough. Energy would come out of what is left; backward Euler
-// loses it. The end is left in v_end, the mean velocity in v_free: from the velocities at the three times, which
-// give it without the digits that a difference of positions would lose.
+// loses it. The end is left in v_end, the mean velocity in v_free: from the velocities at the three times,
+// because a difference of positions would lose digits.
 bool ImplicitPoints::two_stages(const SubStep &now) {
   const double part = kPart * now.h;
   if (!ask_here(kin(now.time, 0), 0)) return false;

@@ -146,7 +146,7 @@ TEST(ImplicitPoints, HeldPoints_AnswerNoImpulse) {
     body.p.held[0] = 7;
     update_inverse_mass(body.p);
     double kinetic = 0;
-    const dfm::SubStep now{0, kStep, {}, 1e9};
+    const dfm::SubStep now{0, kStep, {}, 1e9, {}};
     ASSERT_TRUE(body.dynamics->free_motion(now, kinetic));
     const uint32_t touched[] = {0, 1};
     double w[36];
