@@ -257,7 +257,7 @@ inline dfm_world remembered(dfm_context *c) {
   return w;
 }
 
-// The same by backward Euler.
+// The same by backward Euler, and by TR-BDF2.
 template <dfm_world (*build)(dfm_context *, Kind)>
 dfm_world msm(dfm_context *c) {
   return build(c, {"msm", DFM_INTEGRATOR_IMPLICIT_EULER});
@@ -269,6 +269,10 @@ dfm_world linear(dfm_context *c) {
 template <dfm_world (*build)(dfm_context *, Kind)>
 dfm_world corotational(dfm_context *c) {
   return build(c, {"corotational_fem", DFM_INTEGRATOR_IMPLICIT_EULER});
+}
+template <dfm_world (*build)(dfm_context *, Kind)>
+dfm_world second_order(dfm_context *c) {
+  return build(c, {"corotational_fem", DFM_INTEGRATOR_TR_BDF2});
 }
 
 struct Scene {
@@ -294,7 +298,8 @@ inline const Scene all[] = {{"ball_on_floor", [](dfm_context *c) { return ball_o
                             {"implicit_corotational_beams", corotational<crossing_beams>, 40},
                             {"implicit_msm_skins", msm<coupled_pair>, 15},
                             {"implicit_corotational_skins", corotational<coupled_pair>, 15},
-                            {"implicit_corotational_ten", corotational<ten_in_a_box>, 40}};
+                            {"implicit_corotational_ten", corotational<ten_in_a_box>, 40},
+                            {"second_order_ten", second_order<ten_in_a_box>, 40}};
 
 inline void advance(dfm_world w, int steps) {
   for (int i = 0; i < steps; ++i) ASSERT_EQ(dfm_world_step(w, 1e-3, nullptr), DFM_OK) << dfm_last_error();
