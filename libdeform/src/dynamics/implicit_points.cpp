@@ -405,6 +405,8 @@ Revision ImplicitPoints::revise(const SubStep &now, const double *surfel_impulse
   const double allowed = allowed_error(p_.v_end, kShare);
   if (error_ <= allowed || (revisions_ >= kRevisions && error_ <= kTolerated * allowed)) {
     revisions_ = 0;
+    error_ = 0;
+    least_error_ = HUGE_VAL;
     return Revision::none;
   }
   if (++revisions_ > kRevisions || !(error_ <= kDiverges * least_error_)) return Revision::diverged;

@@ -51,6 +51,9 @@ void apply_last(ContactRows &rows) {
 }
 
 constexpr uint32_t kMostRevisions = 6;  // of what rigid hosts take for granted, within a sub-step
+// Revisions of bodies by the last impulses before the first solve; further solves at most, once bodies are
+// content, of what the cap on sweeps has cut off.
+constexpr uint32_t kWarmRevisions = 8, kMostAgain = 6;
 // A sub-step in which a body does not come to a state with its contacts is taken anew, half as long, down to
 // this share of the planned one.
 constexpr double kLeastPiece = 1.0 / 256;
@@ -191,6 +194,14 @@ void finish_rows(World &w, StepContext &step) {
   if (!step.guard.kept.empty()) guard_rates(step);
 }
 
+// The body's velocities without contact, anew.
+void take_velocities(Body &b, StepContext &step, const ContactRows::Block &block) {
+  gather_surface(b.surface, b.p.x.data(), b.dynamics->point_velocity());
+  for (uint32_t k = 0; k < block.count; ++k)
+    std::copy_n(b.dynamics->contact_velocity() + size_t{kStride} * step.rows.point[block.first + k], kStride,
+                &step.rows.y_free[size_t{kStride} * (block.first + k)]);
+}
+
 enum class Revised { nothing, something, diverged, failed };
 
 // Bodies whose forces are not linear in the velocity look at what the impulses have made of them. What they
@@ -216,10 +227,7 @@ Revised revise_bodies(World &w, StepContext &step) {
     }
     if (found == Revision::none) continue;
     velocities = true;
-    gather_surface(b.surface, b.p.x.data(), b.dynamics->point_velocity());
-    for (uint32_t k = 0; k < block.count; ++k)
-      std::copy_n(b.dynamics->contact_velocity() + size_t{kStride} * step.rows.point[block.first + k],
-                  kStride, &step.rows.y_free[size_t{kStride} * (block.first + k)]);
+    take_velocities(b, step, block);
     if (found != Revision::response) continue;
     responses = true;
     fill_response(w, step, block);
@@ -230,12 +238,31 @@ Revised revise_bodies(World &w, StepContext &step) {
   return Revised::something;
 }
 
+// Back to the free motion, where the last impulses lead to no state: they need not hold together any more.
+void forget_revisions(World &w, StepContext &step) {
+  for (const ContactRows::Block &block : step.rows.blocks) {
+    if (block.group != kNone) continue;
+    Body &b = *w.bodies[block.source];
+    double kinetic = 0;
+    if (!b.dynamics->abilities().revises || !b.dynamics->free_motion(sub_step_of(w, step), kinetic)) continue;
+    take_velocities(b, step, block);
+    fill_response(w, step, block);
+  }
+  finish_rows(w, step);
+  step.rows.restore();
+}
+
 // With what rigid hosts and bodies answer differently by the impulses that are found: the same problem again,
-// from these impulses.
+// from these impulses. At first they are those of the last sub-step. A body at rest is linear enough around
+// the state that these hold it in; around its free motion the first solve would let it fall, and friction
+// with memory slide, from where the sweeps do not find back.
 const LawInstance *solve_revised(World &w, StepContext &step, Revised &revised) {
   uint32_t passes = 0, sweeps = 0;
   const LawInstance *bad = nullptr;
-  for (uint32_t hosts = 0;;) {
+  Revised warm = Revised::something;
+  for (uint32_t k = 0; k < kWarmRevisions && warm == Revised::something; ++k) warm = revise_bodies(w, step);
+  if (warm == Revised::diverged || warm == Revised::failed) forget_revisions(w, step);
+  for (uint32_t hosts = 0, again = 0;;) {
     bad = solve_rows(w, step);
     passes += std::exchange(step.passes, 0);
     sweeps += std::exchange(step.sweeps, 0);
@@ -247,6 +274,8 @@ const LawInstance *solve_revised(World &w, StepContext &step, Revised &revised) 
       continue;
     }
     revised = revise_bodies(w, step);
+    if (revised == Revised::nothing && step.bodies_revise && step.residual.due > 1 && again++ < kMostAgain)
+      continue;
     if (revised != Revised::something) break;
   }
   step.passes = passes;

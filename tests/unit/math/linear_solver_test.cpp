@@ -311,8 +311,8 @@ TEST(LinearSolver, RefusedMemory_IsToldAndNothingLeaks) {
 
 TEST(SolverChoice, AutomaticChoice_FactorsSmallAndConstantMatrices) {
   EXPECT_STREQ(dfm::solver_name({"auto", 300, false, 0}), "ldlt");
-  EXPECT_STREQ(dfm::solver_name({"auto", 20000, false, 0}), "pcg");
-  EXPECT_STREQ(dfm::solver_name({"auto", 20000, true, 0}), "ldlt");
+  EXPECT_STREQ(dfm::solver_name({"auto", 20001, false, 0}), "pcg");
+  EXPECT_STREQ(dfm::solver_name({"auto", 20001, true, 0}), "ldlt");
   EXPECT_STREQ(dfm::solver_name({"pcg", 300, true, 0}), "pcg");
   for (const char *name : {"ldlt", "pcg"})
     EXPECT_STREQ(dfm::own_solver({name, 1, false, 0}, dfm::Memory::standard(), nullptr)->name(), name);
