@@ -75,7 +75,12 @@ int explain(const Options &options, const Globals &globals) {
   print_list(plan, "bodies", "bodies", {"model", "surface", "cells", "points", "surfels"});
   print_fields(plan);
   print_idle(plan);
-  if (const JsonValue *step = plan.find("step")) {
+  const JsonValue *const step = plan.find("step");
+  if (scene.value("/time/mode") == "\"static\"") {
+    std::printf("step\n  none: equilibria of the loads are looked for\n");
+  } else if (step && step->get("stable_s").empty()) {
+    std::printf("step\n  nothing bounds the step\n");
+  } else if (step) {
     std::printf("step\n  stable %s s", step->get("stable_s").c_str());
     if (const std::string body = step->get("worst_body"); !body.empty())
       std::printf(", bounded by point %s of \"%s\"", step->get("worst_point").c_str(), body.c_str());

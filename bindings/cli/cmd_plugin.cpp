@@ -128,7 +128,9 @@ std::vector<std::string> capabilities(const dfm_type &type) {
   } names[] = {{DFM_CAP_ENERGY, "energy"},
                {DFM_CAP_DAMPING, "damping"},
                {DFM_CAP_ROTATION_INVARIANT, "rotation_invariant"},
-               {DFM_CAP_PLAUSIBLE, "plausible"}};
+               {DFM_CAP_PLAUSIBLE, "plausible"},
+               {DFM_CAP_STIFFNESS, "stiffness"},
+               {DFM_CAP_CONSTANT_STIFFNESS, "constant_stiffness"}};
   for (const auto &cap : names)
     if (caps & cap.bit) out.push_back(cap.name);
   return out;

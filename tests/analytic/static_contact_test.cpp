@@ -182,6 +182,7 @@ TEST(StaticContact, LoadAlongThePlane_IsCarriedByFrictionBelowItsLimit) {
     load_all(b, {0, load, 0});
     if (share > 1) {
       EXPECT_EQ(find(w), DFM_E_DIVERGED);
+      dfm_world_destroy(w);
       continue;
     }
     test::ok(find(w));
@@ -323,12 +324,40 @@ TEST(StaticContact, SpringAndFloor_ShareTheWeight) {
   dfm_world_destroy(w);
 }
 
+// What moves carries what rests on it, however fast: only the way counts.
+TEST(StaticContact, TrayThatMoves_CarriesTheCube) {
+  for (const uint32_t load_steps : {1u, 4u}) {
+    test::Context context;
+    const dfm_world w = offset_world(context, {0, 0, -kG});
+    const dfm_body b = make_cube(context, w, cube("cube", 1e5, kOffset));
+    dfm_pose_key keys[2] = {};
+    for (dfm_pose_key &key : keys) key.pose = {{0, 0, -0.1}, {0, 0, 0, 1}};
+    keys[1].t = 1;
+    keys[1].pose.position[0] = 1.5;
+    dfm_obstacle_def d = dfm_obstacle_def_default();
+    d.shape = DFM_SHAPE_BOX;
+    d.half_size[0] = d.half_size[1] = 0.5;
+    d.half_size[2] = 0.1;
+    d.nkey = 2;
+    d.keys = keys;
+    dfm_obstacle tray = 0;
+    test::ok(dfm_obstacle_create(w, &d, &tray));
+    test::set_friction(w, 0.8);
+    const double before = test::measure(b).com[0];
+    test::ok(find(w, 1, load_steps));
+    EXPECT_NEAR(test::measure(b).com[0] - before, 1.5, 2e-4) << load_steps << " load steps";
+    dfm_world_destroy(w);
+  }
+}
+
 // Rows of squeezed_ball_fe, which are a converged linear solution with contact.
 TEST(StaticContact, BallBetweenPlates_TakesTheForceOfTheReference) {
   if (test::shared_dir().empty()) GTEST_SKIP() << "../shared is absent";
+  int rows = 0;
   for (const auto &row :
        test::read_csv(test::shared_dir() + "/reference/contact/tables/squeezed_ball_fe.csv")) {
     if (row[0] != "sphere" || row[3] != "1" || row[2] != "0.04") continue;
+    ++rows;
     const double nu = std::stod(row[1]), depth = 0.04, young = 1e5, offset = 2e-5;
     test::Context context;
     dfm_world_def wd = dfm_world_def_default();
@@ -378,4 +407,5 @@ TEST(StaticContact, BallBetweenPlates_TakesTheForceOfTheReference) {
         << "nu " << nu << ", middle down by " << -came;
     dfm_world_destroy(w);
   }
+  EXPECT_EQ(rows, 2);
 }

@@ -6,6 +6,10 @@
 namespace dfm {
 
 inline constexpr double kForever = 1e9;  // s: longer than any relaxation
+// Up to so many points a factorization beats conjugate gradients on a matrix without the mass of a step.
+inline constexpr uint32_t kFactoredAtRest = 30000;
+// Of the largest stiffness times coordinate: what forces are rounded by.
+inline constexpr double kForceRounding = 8 * 2.220446049250313e-16;
 
 class AtRest {
  public:

@@ -62,6 +62,7 @@ struct ImplicitOptions {
   uint32_t solver_iterations = 0;  // of it at most; 0: as many as unknowns
   uint32_t newton = 20;            // at most; 1: one linear solve per sub-step, without a line search
   double rest = 1e-8;              // m/s that Newton's method may leave of what does not move
+  bool rest_factor = true;         // may stand for the matrix
   Tasks *tasks = nullptr;          // for the rows of a large body's matrix
   bool second_order = false;       // TR-BDF2 without contact; else backward Euler always
 };

@@ -13,9 +13,6 @@ constexpr uint32_t kCuts = 12;  // of a correction that leads too far
 // Share of its own diagonal that a matrix gets which is singular, at first; a hundred times as much where
 // that is not enough.
 constexpr double kLeastRegular = 1e-9, kMostRegular = 1e-1;
-// Up to so many points a factorization beats conjugate gradients on a matrix without the mass of a step.
-constexpr uint32_t kFactored = 30000;
-constexpr double kRounding = 8 * 2.220446049250313e-16;
 
 }  // namespace
 
@@ -30,9 +27,9 @@ Equilibrium::Equilibrium(const Memory &memory, Phyxels &points, ModelInstance &m
   residual_.assign(size_t{3} * p_.n, 0.0);
   way_ = residual_;
   stiffness_.create(model, p_.n);
-  solver_ = make_solver(
-      {options.solver.c_str(), p_.n, stiffness_.constant() || p_.n <= kFactored, options.solver_iterations},
-      *static_cast<const dfm_context *>(model.host->ctx), memory, options.tasks);
+  solver_ = make_solver({options.solver.c_str(), p_.n, stiffness_.constant() || p_.n <= kFactoredAtRest,
+                         options.solver_iterations},
+                        *static_cast<const dfm_context *>(model.host->ctx), memory, options.tasks);
   solver_->analyse(stiffness_.pattern());
 }
 
@@ -78,7 +75,7 @@ bool Equilibrium::linearize(double time, const double *softness, bool free) {
       }
     });
     for (const double x : p_.x) far = std::max(far, std::fabs(x));
-    floor_ = kRounding * (stiffest * far);
+    floor_ = kForceRounding * (stiffest * far);
     factored_ = factor(share);
     held_ = p_.held;
     if (factored_) return true;

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
+#include <new>
 
 #include "core/error.h"
 #include "dynamics/line_search.h"
@@ -69,9 +71,13 @@ ImplicitPoints::ImplicitPoints(const Memory &memory, Phyxels &points, Surface &s
         "give; choose implicit_euler, or solver.newton above 1",
         model.type->id);
   std::unique_ptr<LinearSolver> solver = new_solver();
-  if (solver->direct() && (options_.newton > 1 || stiffness_.constant()))
+  if (options_.rest_factor && solver->direct() && (options_.newton > 1 || stiffness_.constant()))
     rest_ = std::make_unique<RestFactor>(memory, points, model, stiffness_, std::move(solver));
   else exact_ = std::move(solver);
+  // a plugin's solver is made and analyzes between steps
+  const SolverChoice choice{options_.solver.c_str(), p_.n, stiffness_.constant(), 0};
+  if (rest_ && std::strcmp(solver_name(choice), "ldlt") != 0) exact_ = new_solver();
+  ways_.start(change_.size());
 }
 
 std::unique_ptr<LinearSolver> ImplicitPoints::new_solver() const {
@@ -142,11 +148,16 @@ bool ImplicitPoints::take_rest() {
 
 // A at the state where forces were asked last.
 bool ImplicitPoints::linearize(const SubStep &now) {
-  const bool known = stiffness_.constant() && factor_h_ == stage_.h && held_ == p_.held;
+  const bool known =
+      stiffness_.constant() && factor_h_ == stage_.h && held_ == p_.held && factor_params_ == model_.params;
   if (known) return true;
   factor_h_ = 0;
   by_rest_ = false;
-  if (!exact_) exact_ = new_solver();
+  try {
+    if (!exact_) exact_ = new_solver();
+  } catch (const std::bad_alloc &) {  // on whichever thread this body moves
+    return false;
+  }
   dfm_kin k = kin(now.time + stage_.elapsed, stage_.elapsed);
   k.x = x_.data();
   k.v = v_.data();
@@ -162,10 +173,13 @@ bool ImplicitPoints::linearize(const SubStep &now) {
   });
   Array<double> &blocks = stiffness_.blocks();
   hold_components(stiffness_.pattern(), p_.held.data(), blocks.data());
-  exact_->place(x_.data(), kStride);
+  // a matrix that stays may not depend on where the points were when it was made
+  if (stiffness_.constant()) exact_->place(p_.rest.data(), 3);
+  else exact_->place(x_.data(), kStride);
   if (!exact_->factor(blocks.data())) return false;
   factor_h_ = stage_.h;
   held_ = p_.held;
+  if (stiffness_.constant()) factor_params_ = model_.params;
   return true;
 }
 
@@ -402,6 +416,8 @@ Revision ImplicitPoints::revise(const SubStep &now, const double *surfel_impulse
   const bool known = residual_at(now, p_.v_end.data(), push_.data());
   if (known && !solve_way(residual_)) return Revision::failed;
   error_ = known ? largest(change_) : HUGE_VAL;
+  // without forces there is no correction, and with no revision before nothing to go half way back to
+  if (!known && !(before > 0 && before < HUGE_VAL)) return Revision::diverged;
   const double allowed = allowed_error(p_.v_end, kShare);
   if (error_ <= allowed || (revisions_ >= kRevisions && error_ <= kTolerated * allowed)) {
     revisions_ = 0;

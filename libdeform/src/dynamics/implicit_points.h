@@ -59,8 +59,7 @@ class ImplicitPoints : public Dynamics {
   Array<double> softness_;  // [npoint] N/m of loads that give way as the points move; empty: none do
 
   bool solve(const Array<double> &b, Array<double> &x);
-  double largest_diagonal() const;            // kg, of A
-  void drop_rest_factor() { rest_.reset(); }  // A itself stands for A
+  double largest_diagonal() const;  // kg, of A
   // v_free: Newton's first correction of the velocities at the start, as a whole
   bool take_first_way(const SubStep &now);
   // scale times the impulses at the surfels [nsurfel,3], added to the points that move [npoint,3]
@@ -83,24 +82,25 @@ class ImplicitPoints : public Dynamics {
     Vec3 gravity;
   };
   Stage stage_{};
-  bool staged_ = false;              // this sub-step is taken by TR-BDF2
-  Array<double> stage_x_, stage_v_;  // [npoint,4] m, m/s: x0, v0 of its stages
-  Array<double> middle_;             // [npoint,4] m/s, the end of its first stage
-  Array<double> load_before_;        // [npoint,4] N, at the start of the sub-step
-  Array<double> x_, v_;              // [npoint,4] m, m/s: where forces are asked
-  Array<double> before_;             // [npoint,4] m/s, the end before the last revision
-  Array<double> residual_;           // [npoint,3] N s
-  Array<double> push_, change_;      // [npoint,3] N s of contact; m/s, a solution
-  Array<double> springs_, dampers_;  // [npoint] N/m, N s/m of loads
-  Array<double> weight_, scale_;     // [npoint,3] kg, diagonal of A; 1/kg, its inverse; zero where held
-  Array<uint8_t> held_;              // [npoint] as in the factor at hand
-  Array<uint32_t> column_, points_;  // [npoint] place among the points that touched surfels hang on; these
-  Array<double> between_;            // [3m,3m] 1/kg, response between these points
-  double factor_h_ = 0;              // s, of the factor at hand; 0: none
-  double error_ = 0;                 // m/s, the correction that the last revision found; 0: none yet
-  double least_error_ = 0;           // m/s, of all revisions in the sub-step
-  uint32_t revisions_ = 0;           // since one found nothing to change
-  bool ended_ = false;               // v_end is v_free and what push_ makes of it
+  bool staged_ = false;                // this sub-step is taken by TR-BDF2
+  Array<double> stage_x_, stage_v_;    // [npoint,4] m, m/s: x0, v0 of its stages
+  Array<double> middle_;               // [npoint,4] m/s, the end of its first stage
+  Array<double> load_before_;          // [npoint,4] N, at the start of the sub-step
+  Array<double> x_, v_;                // [npoint,4] m, m/s: where forces are asked
+  Array<double> before_;               // [npoint,4] m/s, the end before the last revision
+  Array<double> residual_;             // [npoint,3] N s
+  Array<double> push_, change_;        // [npoint,3] N s of contact; m/s, a solution
+  Array<double> springs_, dampers_;    // [npoint] N/m, N s/m of loads
+  Array<double> weight_, scale_;       // [npoint,3] kg, diagonal of A; 1/kg, its inverse; zero where held
+  Array<uint8_t> held_;                // [npoint] as in the factor at hand
+  Array<uint32_t> column_, points_;    // [npoint] place among the points that touched surfels hang on; these
+  Array<double> between_;              // [3m,3m] 1/kg, response between these points
+  double factor_h_ = 0;                // s, of the factor at hand; 0: none
+  std::vector<double> factor_params_;  // of the model then, where its stiffness is constant
+  double error_ = 0;                   // m/s, the correction that the last revision found; 0: none yet
+  double least_error_ = 0;             // m/s, of all revisions in the sub-step
+  uint32_t revisions_ = 0;             // since one found nothing to change
+  bool ended_ = false;                 // v_end is v_free and what push_ makes of it
 
   std::unique_ptr<LinearSolver> new_solver() const;
   bool start(const SubStep &now);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <new>
 
 #include "math/block3.h"
 #include "math/polar.h"
@@ -29,7 +30,6 @@ RestFactor::RestFactor(const Memory &memory, const Phyxels &points, ModelInstanc
     : p_(points), model_(model), stiffness_(stiffness), solver_(std::move(solver)) {
   use_memory(memory, rest_, state_, stiff_, damp_, diagonal_, turned_, b_, y_, arm_, moved_, asked_);
   use_memory(memory, left_, right_, held_);
-  solver_->analyse(stiffness_.pattern());
   turns_ = !stiffness_.constant();
   rest_ = p_.x;
   if (model_.ops->caps & DFM_CAP_ROTATION_INVARIANT)
@@ -38,11 +38,14 @@ RestFactor::RestFactor(const Memory &memory, const Phyxels &points, ModelInstanc
   for (Array<double> *a : {&diagonal_, &b_, &y_, &arm_}) a->assign(size_t{3} * p_.n, 0.0);
   turned_.assign(size_t{9} * p_.n, 0.0);
   for (size_t k = 0; k < turned_.size(); ++k) turned_[k] = k % 9 % 4 == 0;
+  ask_model();  // a step is on any thread, where memory may not be asked for
 }
 
 // A model gives its stiffness where it was asked for forces.
 bool RestFactor::ask_model() {
   if (!stiff_.empty() && params_ == model_.params) return true;
+  stiff_.clear();
+  h_ = 0;
   const Array<double> still(rest_.size(), 0.0, rest_.get_allocator());
   Array<double> force(still);
   dfm_kin k{};
@@ -53,20 +56,23 @@ bool RestFactor::ask_model() {
   k.state = state_.data();
   if (model_.call("add_forces", [&] { return model_.ops->add_forces(model_.self, &k, force.data()); }) !=
           DFM_OK ||
-      !stiffness_.evaluate(model_, k, 1, 0))
+      !stiffness_.evaluate(model_, k, 0, 1))
     return false;
-  stiff_ = stiffness_.blocks();
-  if (!stiffness_.evaluate(model_, k, 0, 1)) return false;
   damp_ = stiffness_.blocks();
+  if (!stiffness_.evaluate(model_, k, 1, 0)) return false;
   params_ = model_.params;
-  h_ = 0;
+  stiff_ = stiffness_.blocks();
   return true;
 }
 
 bool RestFactor::prepare(double h) {
   if (h_ == h && held_ == p_.held && params_ == model_.params) return serves_;
   serves_ = false;
-  if (!ask_model()) return false;
+  try {
+    if (!ask_model()) return false;
+  } catch (const std::bad_alloc &) {  // new parameters, on whichever thread this body moves
+    return false;
+  }
   h_ = h;
   held_ = p_.held;
   loose_ = std::all_of(held_.begin(), held_.end(), [](uint8_t held) { return held == 0; });
@@ -93,9 +99,9 @@ void RestFactor::find_turns(const double *x) {
   for (uint32_t b = 0; b < pattern.nb; ++b) {
     const size_t i = pattern.ij[2 * size_t{b}], j = pattern.ij[2 * size_t{b} + 1];
     const Vec3 rest = load3(&rest_[kStride * j]) - load3(&rest_[kStride * i]);
-    const double length = norm2(rest);
-    if (!(length > 0)) continue;
-    const Vec3 now = (1 / length) * (load3(x + kStride * j) - load3(x + kStride * i));
+    const double square = norm2(rest);
+    if (!(square > 0)) continue;
+    const Vec3 now = (1 / square) * (load3(x + kStride * j) - load3(x + kStride * i));
     for (int r = 0; r < 3; ++r)
       for (int c = 0; c < 3; ++c) {
         const double term = now[r] * rest[c];

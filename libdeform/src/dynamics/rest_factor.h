@@ -20,7 +20,7 @@ namespace dfm {
 
 class RestFactor {
  public:
-  // solver: direct, its pattern is that of the stiffness
+  // solver: direct, has analyzed the pattern of the stiffness
   RestFactor(const Memory &memory, const Phyxels &points, ModelInstance &model, ModelStiffness &stiffness,
              std::unique_ptr<LinearSolver> solver);
 

@@ -13,7 +13,6 @@ SettlingPoints::SettlingPoints(const Memory &memory, Phyxels &points, Surface &s
   guess_.assign(size_t{kStride} * points.n, 0.0);
   surfels_.assign(size_t{kStride} * surface.nsurfel, 0.0);
   softness_.assign(softness.begin(), softness.end());
-  drop_rest_factor();
 }
 
 void SettlingPoints::start_from(const double *surfel_impulse, double h) {

@@ -14,8 +14,8 @@ void ModelStiffness::create(const ModelInstance &model, uint32_t npoint) {
   const char *const id = model.type->id;
   if (!offered(model))
     fail(DFM_E_UNSUPPORTED,
-         "model '%s' has no stiffness, which an implicit step needs; choose the integrator "
-         "symplectic_euler or another model",
+         "model '%s' has no stiffness, which implicit steps and equilibria need; choose another model, "
+         "or for steps the integrator symplectic_euler",
          id);
   if (!ops.pattern || !ops.stiffness)
     fail(DFM_E_UNSUPPORTED,

@@ -319,6 +319,8 @@ bool stage_solve(World &w, StepContext &step, uint32_t *trouble) {
   make_rows(w, step);
   apply_last(step.rows);
   if (step.rows.n == 0) {
+    w.stats.passes = w.stats.sweeps = 0;
+    w.stats.residual = 0;
     reserve_contacts(w, step);
     return true;
   }

@@ -196,11 +196,11 @@ void find_equilibrium(World &w, const dfm_equilibrium_def &def, dfm_equilibrium_
   prepare(w);
   check(w);
   if (w.plan.touches()) return settle(w, def, info);
-  wake_all(w);
   {
     Search search(w, def, info);
     search.run(def.load_steps ? def.load_steps : 1);
   }
+  wake_all(w);
   for (auto &b : w.bodies) {
     forget_energy(*b);
     ++b->x_version;

@@ -68,9 +68,9 @@ const void *extension_of(const Body &b, const char *id) {
 
 // What a model gives by cell, at the present positions.
 template <class Give>
-void ask_by_cell(Body &b, const char *what, const Give &give) {
+void ask_by_cell(Body &b, const char *entry, const char *what, const Give &give) {
   const dfm_kin k = b.dynamics->kin(b.world->time, 0);
-  if (b.model.call(what, [&] { return give(&k); }) != DFM_OK)
+  if (b.model.call(entry, [&] { return give(&k); }) != DFM_OK)
     fail(DFM_E_FATAL, "model '%s' could not give its %s", b.model.type->id, what);
 }
 
@@ -83,7 +83,8 @@ void energy_density(Body &b, double *out) {
   if (!e)
     fail(DFM_E_UNSUPPORTED, "model '%s' of body '%s' offers no energy per cell", b.model.type->id,
          b.name.c_str());
-  ask_by_cell(b, "energy per cell", [&](const dfm_kin *k) { return e->cell_energy(b.model.self, k, out); });
+  ask_by_cell(b, "cell_energy", "energy per cell",
+              [&](const dfm_kin *k) { return e->cell_energy(b.model.self, k, out); });
 }
 
 void cell_stress(Body &b, double *out) {
@@ -91,7 +92,8 @@ void cell_stress(Body &b, double *out) {
   if (!e)
     fail(DFM_E_UNSUPPORTED, "model '%s' of body '%s' offers no stress per cell", b.model.type->id,
          b.name.c_str());
-  ask_by_cell(b, "stress per cell", [&](const dfm_kin *k) { return e->cell_stress(b.model.self, k, out); });
+  ask_by_cell(b, "cell_stress", "stress per cell",
+              [&](const dfm_kin *k) { return e->cell_stress(b.model.self, k, out); });
 }
 
 namespace {

@@ -37,16 +37,15 @@ constexpr uint32_t kEasy = 300, kHard = 900, kMostSweeps = 100, kMostPasses = 10
 // or what rounding of positions makes of them; what contacts and friction may be off by, over the rest
 // distance.
 constexpr double kGap = 0.01, kError = 1e-7, kContact = 2e-8, kMoves = 1e-6, kLeft = 1e-6;
-constexpr double kRounding = 8 * 2.220446049250313e-16;
 // How far a body that nothing holds up may go in a step: the median edge at first, less where steps are cut,
 // down to the first share of it; more where they are easy, up to the second share of its size.
 constexpr double kNear = 0.1, kFar = 0.25;
-constexpr double kNet = 0.1;           // of the tolerance: for the sum of all that acts on a body
-constexpr uint32_t kSteps = 500;       // of a round
-constexpr uint32_t kRounds = 4;        // of relaxation
-constexpr uint32_t kRefused = 8;       // steps in a row that could not be taken
-constexpr double kAway = 10;           // of its size: who touches something and has gone so far slides on
-constexpr uint32_t kFactored = 30000;  // points: up to so many a factorization is the better solver
+constexpr double kNet = 0.1;      // of the tolerance: for the sum of all that acts on a body
+constexpr uint32_t kSteps = 500;  // of a round
+constexpr uint32_t kWaits = 50;   // for a rest before keys go on
+constexpr uint32_t kRounds = 4;   // of relaxation
+constexpr uint32_t kRefused = 8;  // steps in a row that could not be taken
+constexpr double kAway = 10;      // of its size: who touches something and has gone so far slides on
 
 struct Station { double time, share; };
 
@@ -61,14 +60,16 @@ class Settling {
     if (def.tolerance > 0) tolerance_ = def.tolerance;
     if (def.max_iterations) most_ = def.max_iterations;
     for (auto &b : w.bodies) bodies_.push_back(make(*b));
+    earlier_.swap(w.events);  // a long search has more of them than a world keeps
     write_down(w_, step_, before_);
     stats_ = w.stats;
     steps_ = w.step_count;
     sizes_ = w.sizes;
-    events_ = w.events.size();
+    aside_ = w.overlaps.aside;
     def_ = w.def;
     exchange();
-    wake_all(w_);
+    wake_all(w_);  // adds what contact has carried in the meantime
+    for (One &one : bodies_) one.contact_impulse = one.body->contact_impulse;
     w.def.sleep = 0;
     w.changed = true;
   }
@@ -82,6 +83,7 @@ class Settling {
     w_.def.max_passes = def_.max_passes;
     w_.prescribed = {};
     w_.changed = true;
+    if (!done_) w_.overlaps.aside.swap(aside_);
     try {
       set_gravity_now(w_);
       prepare(w_);
@@ -89,6 +91,7 @@ class Settling {
     }
     if (done_) return;
     put_back(w_, step_, before_);
+    w_.events.swap(earlier_);
     for (auto &b : w_.bodies) set_loads(*b, w_.time, 1);
   }
 
@@ -121,7 +124,8 @@ class Settling {
 
   One make(Body &b) const {
     ImplicitOptions options = w_.implicit;
-    if (options.solver == "auto" && b.p.n <= kFactored) options.solver = "ldlt";
+    options.rest_factor = false;
+    if (options.solver == "auto" && b.p.n <= kFactoredAtRest) options.solver = "ldlt";
     options.newton = std::max(options.newton, ImplicitOptions{}.newton);
     auto points = std::make_unique<SettlingPoints>(w_.memory(), b.p, b.surface, b.model, options,
                                                    softness_of(b), kError * b.surface.median_edge);
@@ -133,7 +137,7 @@ class Settling {
             .rest = std::make_unique<AtRest>(w_.memory(), b.p, b.model),
             .size = size_of(b),
             .edge = b.surface.median_edge,
-            .contact_impulse = b.contact_impulse};
+            .contact_impulse = {}};
   }
 
   static double size_of(const Body &b) {
@@ -183,29 +187,38 @@ class Settling {
     stand_still();
     weigh_all(kLongest);
     double longest = kLongest;
-    uint32_t refused = 0;
+    uint32_t refused = 0, before = 0;
+    // Keys go on once bodies rest under the new loads: what nothing presses on is not carried along.
+    bool goes_on = w_.time >= to.time;
     for (uint32_t steps = 0;;) {
       const double h = length(longest);
+      w_.prescribed.until = goes_on ? std::min(to.time, w_.time + way_on(to)) : w_.time;
       const uint64_t pieces = w_.stats.substeps;
       const bool taken = step(h);
-      const bool whole = taken && w_.stats.substeps == pieces + 1, there = w_.time >= to.time;
+      const bool whole = taken && w_.stats.substeps == pieces + 1;
       const double off = h * w_.stats.residual / w_.offset;  // contacts, over the rest distance
       const bool easy = whole && (w_.stats.sweeps < kEasy || off < 0.1 * kGap);
       w_.time = w_.prescribed.at(w_.time);
+      const bool there = w_.time >= to.time;
       stand_still();
       ++info_.iterations;
       if (there) ++steps;
       if (taken) refused = 0;
-      else if (++refused == kRefused) fail(DFM_E_DIVERGED, "no equilibrium was found: %s", dfm_last_error());
+      else if (++refused == kRefused)
+        fail(DFM_E_DIVERGED,
+             "no equilibrium was found, for steps from rest fail (%s); use more load_steps, hold what moves "
+             "freely, or raise max_time and max_work",
+             dfm_last_error());
       weigh_all(h);
-      bool rests = taken && there && off <= kGap;
+      bool rests = taken && off <= kGap;
       for (One &one : bodies_) {
         one.reach = easy ? std::min(1.5 * one.reach, std::max(one.edge, kFar * one.size))
                          : std::max(0.5 * one.reach, kNear * one.edge);
-        one.slid = one.touches ? one.slid + one.moved : 0;
+        one.slid = there && one.touches ? one.slid + one.moved : 0;
         rests = rests && one.moved <= kMoves * one.size && balanced(one);
       }
-      if (rests) return steps;
+      if (rests && there) return steps;
+      goes_on = goes_on || rests || ++before == kWaits;
       longest = easy ? std::min(kLongest, 2 * h) : whole && w_.stats.sweeps <= kHard ? h : 0.5 * h;
       if (there) check_progress(steps, h);
     }
@@ -231,7 +244,7 @@ class Settling {
   bool balanced(const One &one) const {
     return one.net <= kNet * tolerance_ * one.all &&
            one.left <= std::max(tolerance_ * one.scale,
-                                kRounding * one.points->stiffest() *
+                                kForceRounding * one.points->stiffest() *
                                     largest_coordinate(one.body->p.x.data(), one.body->p.n, kStride));
   }
 
@@ -251,11 +264,14 @@ class Settling {
     sum_loads(one);
     const Phyxels &p = one.body->p;
     if (!one.rest->add_forces(w_.time, h)) one.left = HUGE_VAL;
+    double poison = 0;
     for (size_t at = 0; at < p.x.size(); ++at) {
       double &most = p.moves(at) || at % kStride == 3 ? one.left : one.scale;
       most = std::max(most, std::fabs(p.f[at]));
       if (!one.last.empty()) one.moved = std::max(one.moved, std::fabs(p.x[at] - one.last[at]));
+      poison += 0.0 * p.f[at];
     }
+    if (poison != 0) one.left = HUGE_VAL;
   }
 
   // Loads and contact forces, into points().f and as a whole. Components that are held somewhere count for
@@ -295,22 +311,30 @@ class Settling {
 
   // Of the next step: who is not held up goes no farther than it may reach.
   double length(double longest) const {
-    double h = longest, reach = HUGE_VAL;
+    double h = longest;
     for (const One &one : bodies_) {
-      reach = std::min(reach, one.reach);
       const Array<uint8_t> &held = one.body->p.held;
       const bool hangs = std::any_of(held.begin(), held.end(), [](uint8_t bits) { return bits == 7; });
       if (!hangs && one.pull > 0) h = std::min(h, std::sqrt(one.reach / one.pull));
     }
-    while (h > kShortest && prescribed_way(h) > reach) h *= 0.5;
     return std::max(h, kShortest);
+  }
+
+  // s, by which keys go on in the next step, so that nothing is told to go farther than a body may reach. The
+  // step itself is as long as ever: with a short one, what moves a body by friction would have to accelerate
+  // it.
+  double way_on(const Station &to) const {
+    double part = to.time - w_.time, reach = HUGE_VAL;
+    for (const One &one : bodies_) reach = std::min(reach, one.reach);
+    while (part > kShortest && prescribed_way(part) > reach) part *= 0.5;
+    return std::max(part, kShortest);
   }
 
   // m, the farthest that anything is told to go in the next h seconds; what comes back on the way counts too.
   double prescribed_way(double h) const {
     double most = 0;
     for (const double part : {1.0, 0.5, 0.25, 0.125})
-      most = std::max(most, prescribed_distance(w_.prescribed.at(w_.time + part * h)));
+      most = std::max(most, prescribed_distance(w_.time + part * h));
     return most;
   }
   double prescribed_distance(double t) const {
@@ -365,7 +389,8 @@ class Settling {
     w_.step_count = steps_;
     w_.sizes = sizes_;
     begin_impulses(w_.step_impulses);
-    for (size_t i = events_; i < w_.events.size(); ++i) w_.events[i].t = w_.time;
+    for (dfm_contact_event &event : w_.events) event.t = w_.time;
+    w_.events.insert(w_.events.begin(), earlier_.begin(), earlier_.end());
     done_ = true;
   }
 
@@ -380,7 +405,8 @@ class Settling {
   dfm_world_stats stats_{};
   uint64_t steps_ = 0;
   StepSizes sizes_;
-  size_t events_ = 0;
+  std::vector<dfm_contact_event> earlier_;  // before the search
+  decltype(Overlaps::aside) aside_;
   dfm_world_def def_{};
   bool done_ = false;
 };

@@ -34,11 +34,12 @@ struct Beam {
   Beam()
       : body(dfm::resolve<dfm::Body>(dfm::Kind::body, test::make_body(context, world, "beam", {0.1, 0.1, 0.4},
                                                                       300, options("corotational_fem")))),
-        factor(dfm::Memory::standard(), body.p, body.model, patterned(),
-               std::make_unique<dfm::LdltSolver>(dfm::Memory::standard())) {}
-  dfm::ModelStiffness &patterned() {
+        factor(dfm::Memory::standard(), body.p, body.model, stiffness, solver()) {}
+  std::unique_ptr<dfm::LinearSolver> solver() {
     stiffness.create(body.model, body.p.n);
-    return stiffness;
+    auto out = std::make_unique<dfm::LdltSolver>(dfm::Memory::standard());
+    out->analyse(stiffness.pattern());
+    return out;
   }
   // Turned about x by `turn`, and about y by `bend` times the height.
   std::vector<double> placed(double turn, double bend) const {
