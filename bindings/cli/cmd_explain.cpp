@@ -45,6 +45,21 @@ void print_idle(const JsonValue &plan) {
   }
 }
 
+// Which integrator moves each body, and how many explicit sub-steps would be in a step.
+void print_integrators(const JsonValue &plan) {
+  const JsonValue *bodies = plan.find("bodies");
+  for (size_t i = 0; bodies && i < bodies->items.size(); ++i) {
+    const JsonValue *own = bodies->items[i].find("integrator");
+    if (!own) continue;
+    std::printf("  %-20s  moves by: %s  %s", bodies->items[i].get("name").c_str(), own->get("used").c_str(),
+                own->get("why").c_str());
+    if (const std::string n = own->get("substeps"); !n.empty())
+      std::printf(" (explicit: %s sub-step%s of %s s in a step, bounded by point %s)", n.c_str(),
+                  n == "1" ? "" : "s", own->get("explicit_s").c_str(), own->get("worst_point").c_str());
+    std::printf("\n");
+  }
+}
+
 // What differs from cell to cell, and who says so.
 void print_fields(const JsonValue &plan) {
   const JsonValue *bodies = plan.find("bodies");
@@ -72,7 +87,8 @@ int explain(const Options &options, const Globals &globals) {
   print_list(plan, "effects", "effects", {"asked_by", "provided_by"});
   print_list(plan, "stages", "stages of a step, in order", {"why", "cost"});
   print_list(plan, "absent", "left out", {"why"});
-  print_list(plan, "bodies", "bodies", {"model", "surface", "cells", "points", "surfels"});
+  print_list(plan, "bodies", "bodies", {"model", "kind", "surface", "cells", "points", "surfels"});
+  if (scene.value("/time/mode") != "\"static\"") print_integrators(plan);
   print_fields(plan);
   print_idle(plan);
   const JsonValue *const step = plan.find("step");

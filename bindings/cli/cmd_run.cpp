@@ -106,6 +106,7 @@ class Runner {
     if (result_.hold_begun) end_hold();
     outputs_.write_nodes();
     result_.impulses = impulses_.json();
+    if (!static_) result_.contacts_mean = world_stats(scene_).contacts_mean;
   }
 
   const RunResult &result() const { return result_; }
@@ -132,6 +133,11 @@ class Runner {
       out.push_back("up to " + std::to_string(stats.limited_max) +
                     " cells at once were stretched so far that their model limited their stiffness: refine "
                     "the mesh or soften the load");
+    const auto refused = [](const dfm_swap &s) { return (s.flags & DFM_SWAP_REFUSED) != 0; };
+    if (const auto n = std::count_if(result_.swaps.begin(), result_.swaps.end(), refused))
+      out.push_back(
+          std::string(n == 1 ? "a change of model was" : std::to_string(n) + " changes of models were") +
+          " refused, because energy or surface would jump: swaps lists what was refused");
     const auto pairs = [](auto most) { return "up to " + std::to_string(most) + " triangle pairs"; };
     if (checks().between_max > 0)
       out.push_back("surfaces cross: " + pairs(checks().between_max) + " of two surfaces in one state");
@@ -170,6 +176,7 @@ class Runner {
     const dfm_status status = interrupted ? DFM_DISCARD : dfm_world_equilibrium(world_, &def, &info);
     stepping = 0;
     result_.times.add(wall_seconds() - begin);
+    take_swaps();
     if (interrupted && status == DFM_DISCARD) return false;  // the world is as before the search
     if (status != DFM_OK) {
       stop();
@@ -179,6 +186,7 @@ class Runner {
     result_.load_steps += info.load_steps;
     result_.iterations += info.iterations;
     result_.residual = info.residual;
+    result_.contacts_mean += (world_stats(scene_).contacts - result_.contacts_mean) / double(result_.steps);
     result_.simulated = dfm_world_time(world_);
     return true;
   }
@@ -205,6 +213,7 @@ class Runner {
     const dfm_status status = interrupted ? DFM_DISCARD : dfm_world_step(world_, step, &trouble);
     stepping = 0;
     result_.times.add(wall_seconds() - begin);
+    take_swaps();
     if (interrupted && status == DFM_DISCARD) return false;  // the world is as before the step
     if (status != DFM_OK) {
       stop();
@@ -215,6 +224,15 @@ class Runner {
     impulses_.add_step();
     result_.simulated = dfm_world_time(world_);
     return true;
+  }
+
+  void take_swaps() {
+    uint32_t n = 0;
+    need(dfm_world_swaps(world_, 0, nullptr, &n));
+    if (n == 0) return;
+    const size_t before = result_.swaps.size();
+    result_.swaps.resize(before + n);
+    need(dfm_world_swaps(world_, n, result_.swaps.data() + before, &n));
   }
 
   void stop() {

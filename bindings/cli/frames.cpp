@@ -10,6 +10,7 @@
 #include <limits>
 
 #include "render/render.h"
+#include "surface_stress.h"
 
 namespace cli {
 namespace {
@@ -31,6 +32,10 @@ class OffScreen : public Frames {
       uint32_t n = 0;
       need(dfm_surface_positions(body.handle, body.nsurfel, b.xyz.data(), &n));
       b.start = b.xyz;
+      if (color_ == "stress") b.stress.emplace(body, b.xyz);
+      if (b.stress && !b.stress->read(b.scalar))
+        warn("body '" + body.name + "': model '" + body.model +
+             "' tells no stress, so pictures show it in its own color");
       buffers_.push_back(std::move(b));
     }
     placed_.resize(scene.obstacles().size());
@@ -69,12 +74,15 @@ class OffScreen : public Frames {
   struct Buffers {
     std::vector<double> xyz, start, vectors;
     std::vector<float> scalar;
+    std::optional<SurfaceStress> stress;
+    bool colored = false;
   };
 
   // Fills the scalars of one body in their own unit; false where the scene colors by body.
   bool fill_values(const BodyView &body, Buffers &b) {
     uint32_t n = 0;
     if (color_ == "body") return false;
+    if (b.stress) return b.stress->read(b.scalar);
     if (color_ == "speed") need(dfm_surface_velocities(body.handle, body.nsurfel, b.vectors.data(), &n));
     else if (color_ == "contact") need(dfm_surface_forces(body.handle, body.nsurfel, b.vectors.data(), &n));
     else
@@ -88,12 +96,11 @@ class OffScreen : public Frames {
 
   void add_bodies(render::Scene &out) {
     float top = 0;
-    bool colored = false;
     for (size_t i = 0; i < buffers_.size(); ++i) {
       const BodyView &body = scene_.bodies()[i];
       uint32_t n = 0;
       need(dfm_surface_positions(body.handle, body.nsurfel, buffers_[i].xyz.data(), &n));
-      colored = fill_values(body, buffers_[i]);
+      buffers_[i].colored = fill_values(body, buffers_[i]);
       for (float x : buffers_[i].scalar) top = std::max(top, x);
     }
     // The scale of a film only grows, so colors of neighboring frames can be compared.
@@ -109,7 +116,7 @@ class OffScreen : public Frames {
       s.rgb[0] = own.r;
       s.rgb[1] = own.g;
       s.rgb[2] = own.b;
-      if (colored) {
+      if (b.colored) {
         // Where nothing touches the body keeps its own color.
         for (float &x : b.scalar)
           x = color_ == "contact" && x == 0 ? std::numeric_limits<float>::quiet_NaN()
@@ -180,6 +187,7 @@ class OffScreen : public Frames {
     if (color_ == "speed") render::legend(image, map, 0, scale_, "speed", "m/s");
     if (color_ == "contact") render::legend(image, map, 0, scale_, "contact force", "N");
     if (color_ == "displacement") render::legend(image, map, 0, scale_, "displacement", "m");
+    if (color_ == "stress") render::legend(image, map, 0, scale_, "von Mises stress", "Pa");
   }
 
   const SceneFile &scene_;

@@ -165,6 +165,24 @@ std::string bodies_json(const SceneFile &scene) {
   return out.text();
 }
 
+std::string swaps_json(const SceneFile &scene, const RunResult &run) {
+  std::vector<std::string> rows;
+  for (const dfm_swap &s : run.swaps) {
+    const bool refused = s.flags & DFM_SWAP_REFUSED;
+    JsonObject row;
+    row.add("t", number(s.t))
+        .add("body", quoted(scene.name_of(s.body)))
+        .add("from", quoted(s.from))
+        .add("to", quoted(s.to))
+        .add("refused", refused ? "true" : "false");
+    row.add("elastic_before_J", number(s.elastic_before))
+        .add("elastic_after_J", number(s.elastic_after))
+        .add("jump_J", number(s.elastic_after - s.elastic_before));
+    rows.push_back(row.text());
+  }
+  return json_array(rows);
+}
+
 std::string stopped_json(const RunResult &run) {
   if (!run.stopped && !run.interrupted) return "null";
   JsonObject row;
@@ -204,7 +222,7 @@ std::string summary_json(const SceneFile &scene, const RunOptions &options, cons
   energy.add("start_J", number(stats.energy_start))
       .add("max_J", number(stats.energy_max))
       .add("gain_J", number(stats.energy_gain));
-  contacts.add("max", std::to_string(stats.contacts_max)).add("mean", number(stats.contacts_mean));
+  contacts.add("max", std::to_string(stats.contacts_max)).add("mean", number(run.contacts_mean));
   out.add("format", "\"deform-summary\"")
       .add("version", "1")
       .add("library", quoted(dfm_version(nullptr, nullptr, nullptr)));
@@ -242,11 +260,38 @@ std::string summary_json(const SceneFile &scene, const RunOptions &options, cons
   out.add("bodies", bodies_json(scene))
       .add("contacts", contacts.text())
       .add("impulse", run.impulses)
-      .add("swaps", "[]")
+      .add("swaps", swaps_json(scene, run))
       .add("state_hash", hash);
   out.add("stopped", stopped_json(run)).add("warnings", json_array(warning_texts));
   return indented(out.text());
 }
+
+namespace {
+
+std::string joules(double energy) {
+  if (std::isnan(energy)) return "what the model does not give";
+  char text[40];
+  std::snprintf(text, sizeof text, "%.4g J", energy);
+  return text;
+}
+
+void print_swaps(const SceneFile &scene, const RunResult &run) {
+  constexpr size_t kMost = 20;
+  for (size_t i = 0; i < run.swaps.size() && i < kMost; ++i) {
+    const dfm_swap &s = run.swaps[i];
+    const std::string &body = scene.name_of(s.body);
+    if (s.flags & DFM_SWAP_REFUSED)
+      std::printf("t = %g s: %s stays %s: a change to %s is refused, because energy or surface would jump\n",
+                  s.t, body.c_str(), s.from, s.to);
+    else
+      std::printf("t = %g s: %s changes from %s to %s: elastic energy from %s to %s\n", s.t, body.c_str(),
+                  s.from, s.to, joules(s.elastic_before).c_str(), joules(s.elastic_after).c_str());
+  }
+  if (run.swaps.size() > kMost)
+    std::printf("and %zu more changes of models, which summary.json lists\n", run.swaps.size() - kMost);
+}
+
+}  // namespace
 
 void print_table(const SceneFile &scene, const RunResult &run, const Checks &checks) {
   const dfm_world_stats stats = world_stats(scene);
@@ -265,8 +310,9 @@ void print_table(const SceneFile &scene, const RunResult &run, const Checks &che
   std::printf(
       "contacts: %u at most, %.3g on average; states checked: %llu, crossing triangle pairs: %zu (%zu of a "
       "body with itself), inverted cells: %u\n",
-      stats.contacts_max, stats.contacts_mean, static_cast<unsigned long long>(checks.states),
+      stats.contacts_max, run.contacts_mean, static_cast<unsigned long long>(checks.states),
       checks.intersections_max, checks.self_max, std::max(checks.inverted_max, stats.inverted_max));
+  print_swaps(scene, run);
 }
 
 void print_profile(const SceneFile &scene, const RunResult &run) {

@@ -38,12 +38,14 @@ struct RunResult {
   // s; wall and cpu are of the steps, without outputs and checks
   double start = 0, simulated = 0, wall = 0, cpu = 0;
   StepTimes times;
+  std::vector<dfm_swap> swaps;
   std::string impulses = "{}";  // JSON, Impulses::json()
   bool interrupted = false, stopped = false;
   std::string stop_reason, stop_body;
   // of equilibria: those found, linear solves, share of the forces that the last one leaves
   uint64_t load_steps = 0, iterations = 0;
   double residual = 0;
+  double contacts_mean = 0;  // of sub-steps; static: of equilibria
   bool hold_begun = false;
   double creep = 0;  // m/s, NAN if no pair qualifies
   uint32_t hold_count = 0;

@@ -22,12 +22,16 @@ class Buffer {
     data_ = nullptr;
   }
   void create(const dfm_host *host, size_t n) {
+    create_raw(host, n);
+    std::memset(static_cast<void *>(data_), 0, size_ * sizeof(T));
+  }
+  // Not cleared.
+  void create_raw(const dfm_host *host, size_t n) {
     drop();
     host_ = host;
     size_ = n ? n : 1;
     data_ = static_cast<T *>(host->alloc(host->ctx, size_ * sizeof(T), 64));
     if (!data_) throw std::bad_alloc();
-    std::memset(static_cast<void *>(data_), 0, size_ * sizeof(T));
   }
   void swap(Buffer &other) {
     std::swap(host_, other.host_);

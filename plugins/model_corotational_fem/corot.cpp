@@ -5,6 +5,7 @@
 
 #include "../model_common/entry.h"
 #include "corot_body.h"
+#include "deform/plugin_draft.h"
 
 namespace corot {
 
@@ -93,7 +94,19 @@ dfm_status state_init(const void *self, double *state) {
 const dfm_slot kPlasticSlot = {DFM_PER_CELL, kPlasticState, DFM_SLOT_SCALAR, 0};
 const dfm_slots kNoSlots = {sizeof(dfm_slots), 0, nullptr}, kSlots = {sizeof(dfm_slots), 1, &kPlasticSlot};
 
+constexpr uint32_t kCaps = DFM_CAP_ENERGY | DFM_CAP_STIFFNESS | DFM_CAP_DAMPING | DFM_CAP_ROTATION_INVARIANT;
+
+// A frame by Gram-Schmidt is not the one in which the energy is stationary, so forces are no gradient and
+// have a moment.
+uint32_t caps_of(const void *self) {
+  const bool gradient = uint32_t(static_cast<const Body *>(self)->params[kRotation]) != kQr;
+  return gradient ? kCaps : kCaps & ~uint32_t(DFM_CAP_ENERGY | DFM_CAP_ROTATION_INVARIANT);
+}
+
+const dfm_caps kOwnCaps = {sizeof(dfm_caps), 0, caps_of};
+
 const void *extension(const void *self, const char *id) {
+  if (!strcmp(id, DFM_EXT_CAPS)) return &kOwnCaps;
   if (!strcmp(id, DFM_EXT_CELL_ENERGY)) return &Ops::kCellEnergy;
   if (!strcmp(id, DFM_EXT_CELL_STRESS)) return &Ops::kCellStress;
   if (!strcmp(id, DFM_EXT_SLOTS)) return static_cast<const Body *>(self)->plastic() ? &kSlots : &kNoSlots;
@@ -106,7 +119,7 @@ const char *const kEffects[] = {"volume",     "damping",           "large_rotati
                                 "anisotropy", "deform.plasticity", nullptr};
 
 const dfm_model kModel = {sizeof(dfm_model),
-                          DFM_CAP_ENERGY | DFM_CAP_STIFFNESS | DFM_CAP_DAMPING | DFM_CAP_ROTATION_INVARIANT,
+                          kCaps,
                           DFM_CELL_TET,
                           0,
                           nullptr,

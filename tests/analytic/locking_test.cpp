@@ -19,6 +19,12 @@ TEST(Locking, ThickSphereNearlyIncompressible_FollowsLameWithNodalVolume) {
   EXPECT_LT(test::lame(true, 2, 0.499, 0), 0.5);
 }
 
+TEST(Locking, BentBarNearlyIncompressible_BendsWithNodalVolume) {
+  EXPECT_NEAR(test::bent_made_bar(0.3, 0), 0.9, 0.1);
+  EXPECT_LT(test::bent_made_bar(0.499, 0), 0.55);
+  EXPECT_NEAR(test::bent_made_bar(0.499, 1), 0.9, 0.1);
+}
+
 TEST(Locking, CooksMembraneInPlaneStrain_RisesAsTheReferenceWithNodalVolume) {
   SKIP_WITHOUT_SHARED();
   EXPECT_NEAR(test::cooks_membrane(3, 1), 1, 0.05);

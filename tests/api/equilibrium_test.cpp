@@ -1,5 +1,8 @@
 // dfm_world_equilibrium: closed forms, what time passes on the way, what it refuses and leaves alone; and
 // scenes that ask for it.
+#include <algorithm>
+#include <filesystem>
+
 #include "support.h"
 #include "world.h"
 
@@ -223,6 +226,57 @@ TEST(Equilibrium, StaticSceneWithoutOne_StopsWithTheReason) {
   const test::CommandResult r = test::deform({"run", scene, "--out", folder + "/out", "--quiet"});
   EXPECT_EQ(r.exit_code, 3);
   EXPECT_NE(r.err.find("'stone' has no equilibrium"), std::string::npos) << r.err;
+}
+
+std::string block_scene(const std::string &folder, const std::string &more) {
+  const std::string scene = folder + "/block.json";
+  test::write_file(scene, R"({"format": "deform-scene", "version": 1,
+    "time": {"mode": "static", "duration": 1, "step": 0.5},
+    "bodies": [{"name": "block", "mesh": {"make": "beam", "size": [0.1, 0.1, 0.1], "cells": 24}}],
+    "obstacles": [{"name": "floor", "shape": "plane"}])" +
+                              more + "}");
+  return scene;
+}
+
+TEST(Equilibrium, StaticSceneWithContact_ReportsContactsOfItsEquilibria) {
+  const std::string folder = test::scratch("static_contacts");
+  const test::CommandResult r =
+      test::deform({"run", block_scene(folder, ""), "--out", folder + "/out", "--quiet"});
+  ASSERT_EQ(r.exit_code, 0) << r.err;
+  const std::string summary = test::read_file(folder + "/out/summary.json");
+  const size_t at = summary.find("\"mean\": ", summary.find("\"contacts\": {"));
+  ASSERT_NE(at, std::string::npos) << summary;
+  EXPECT_GE(std::strtod(summary.c_str() + at + 8, nullptr), 4) << "corners of the block: " << summary;
+}
+
+// What is refused is refused as bad input, before a folder is made.
+TEST(Equilibrium, StaticSceneThatCannotBe_IsRefusedWhenItIsRead) {
+  const std::string folder = test::scratch("static_refused");
+  const char *const rigid = R"(, "rigid": {"host": "builtin", "bodies": [{"name": "stone", "shape": "sphere",
+    "radius": 0.1, "mass": 1, "pose": {"position": [0, 0, 1]}}]})";
+  const std::pair<const char *, const char *> cases[] = {
+      {rigid, "where rigid bodies move"},
+      {R"(, "contact": {"method": "rollback"})", "contact method is rollback"}};
+  for (const auto &[more, word] : cases) {
+    const test::CommandResult r =
+        test::deform({"run", block_scene(folder, more), "--out", folder + "/out", "--quiet"});
+    EXPECT_EQ(r.exit_code, 2) << r.err;
+    for (const char *part : {"/time/mode: ", word})
+      EXPECT_NE(r.err.find(part), std::string::npos) << part << ": " << r.err;
+    EXPECT_EQ(std::count(r.err.begin(), r.err.end(), '\n'), 1) << r.err;
+    EXPECT_FALSE(std::filesystem::exists(folder + "/out"));
+  }
+}
+
+TEST(Equilibrium, ModelThatRefusesABody_IsOneSentence) {
+  const std::string folder = test::scratch("model_refuses");
+  const test::CommandResult r = test::deform(
+      {"run", block_scene(folder, ""), "--out", folder + "/out", "--quiet", "--set",
+       R"(/bodies/0/model={"type": "corotational_fem", "params": {"locking": "nodal", "energy": "stvk"}})"});
+  EXPECT_EQ(r.exit_code, 2) << r.err;
+  EXPECT_EQ(std::count(r.err.begin(), r.err.end(), '\n'), 1) << r.err;
+  for (const char *part : {"/bodies/0: ", "refused the body: ", "locking nodal"})
+    EXPECT_NE(r.err.find(part), std::string::npos) << part << ": " << r.err;
 }
 
 }  // namespace

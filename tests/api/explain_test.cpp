@@ -59,7 +59,8 @@ TEST(Explain, Step_SaysWhetherStiffnessOrDampingBoundsIt) {
   const auto damped = [](const std::string &name, const std::string &damping) {
     const std::string path =
         scene(name, R"("materials": {"m": {"young": 1e5, "damping": {)" + damping +
-                        R"(}}}, "bodies": [{"name": "lone", "mesh": "block.msh", "material": "m"}])");
+                        R"(}}}, "bodies": [{"name": "lone", "mesh": "block.msh", "material": "m",
+                                 "integrator": "symplectic_euler"}])");
     return test::deform({"explain", path}).out;
   };
   const std::string stiff = damped("stiff", R"("stiffness": 1e-5)");
@@ -89,4 +90,153 @@ TEST(Explain, Set_ChangesThePlan) {
   const test::CommandResult moving = test::deform({"explain", path, "--set", varying});
   EXPECT_EQ(running(still.out).find("motion"), std::string::npos) << still.out;
   EXPECT_NE(running(moving.out).find("motion"), std::string::npos) << moving.out;
+}
+
+namespace {
+
+// A stiff block and a soft one side by side; h: the step, s or "auto".
+std::string stiff_and_soft(const std::string &name, const std::string &model, const std::string &soft) {
+  return scene(name, R"("materials": {"stiff": {"young": 1e9}, "soft": {"young": )" + soft + R"(}},
+    "bodies": [{"name": "bone", "mesh": "block.msh", "material": "stiff", "model": {"type": ")" +
+                         model + R"("}},
+               {"name": "gel", "mesh": "block.msh", "material": "soft", "pose": {"position": [1, 0, 0]}}])");
+}
+
+struct Moves { std::string bone, gel; };  // the lines of `deform explain`
+Moves moves(const std::string &path, const std::vector<std::string> &set) {
+  std::vector<std::string> args = {"explain", path};
+  for (const std::string &s : set) args.insert(args.end(), {"--set", s});
+  const test::CommandResult result = test::deform(args);
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  const auto line = [&](const std::string &body) {
+    for (size_t at = 0, end = 0; (end = result.out.find('\n', at)) != std::string::npos; at = end + 1)
+      if (const std::string text = result.out.substr(at, end - at);
+          text.rfind("  " + body + " ", 0) == 0 && text.find("moves by: ") != std::string::npos)
+        return text.substr(text.find("moves by: ") + 10);
+    return std::string();
+  };
+  return {line("bone"), line("gel")};
+}
+
+}  // namespace
+
+TEST(Explain, IntegratorAuto_IsImplicitWhereExplicitTimeCostsFourTimesAsMuch) {
+  const std::string path = stiff_and_soft("auto", "corotational_fem", "2e4");
+  for (const char *step : {"/time/step=0.016667", "/time/step=auto"}) {
+    const Moves long_step = moves(path, {step});
+    EXPECT_EQ(long_step.bone.find("implicit_euler  auto"), 0u) << long_step.bone;
+    EXPECT_EQ(long_step.gel.find("symplectic_euler  auto"), 0u) << long_step.gel;
+    for (const char *part : {"(explicit: ", " sub-steps of ", " s in a step, bounded by point "})
+      EXPECT_NE(long_step.bone.find(part), std::string::npos) << long_step.bone;
+  }
+  const Moves short_step = moves(path, {"/time/step=0.0002"});
+  EXPECT_EQ(short_step.bone.find("symplectic_euler  auto"), 0u) << short_step.bone;
+}
+
+// All bodies take the same sub-steps: one that is named explicit and bounds them leaves nothing to be gained.
+TEST(Explain, IntegratorNamed_Stays) {
+  const std::string path = stiff_and_soft("named", "corotational_fem", "2e4"), step = "/time/step=0.016667";
+  const Moves named = moves(path, {step, "/bodies/0/integrator=symplectic_euler"});
+  EXPECT_EQ(named.bone.find("symplectic_euler  named"), 0u) << named.bone;
+  EXPECT_EQ(named.gel.find("symplectic_euler  auto"), 0u) << named.gel;
+  EXPECT_EQ(moves(path, {step, "/time/integrator=symplectic_euler"}).bone.find("symplectic_euler  named"),
+            0u);
+  EXPECT_EQ(moves(path, {step, "/contact/method=velocity"}).bone.find("symplectic_euler  named"), 0u);
+  EXPECT_EQ(moves(path, {step, "/contact/method=rollback"}).bone.find("symplectic_euler  named"), 0u);
+  EXPECT_EQ(moves(path, {step, "/contact/method=implicit"}).gel.find("implicit_euler  named"), 0u);
+}
+
+// An implicit body takes each of the 130 sub-steps that an explicit neighbor has.
+TEST(Explain, IntegratorAuto_IsOneChoiceForAllBodies) {
+  const std::string path = stiff_and_soft("neighbors", "corotational_fem", "2e7");
+  const Moves both = moves(path, {"/time/step=0.016667"});
+  EXPECT_EQ(both.bone.find("implicit_euler"), 0u) << both.bone;
+  EXPECT_EQ(both.gel.find("implicit_euler"), 0u) << both.gel;
+  const Moves alone = moves(path, {"/time/step=0.016667", "/bodies/0/material=soft"});
+  EXPECT_EQ(alone.gel.find("symplectic_euler"), 0u) << "alone it is cheap enough: " << alone.gel;
+}
+
+TEST(Run, StiffBodyWithoutAnIntegrator_TakesFewSubSteps) {
+  const std::string path = stiff_and_soft("run", "corotational_fem", "2e4");
+  test::Context context;
+  const char *set[] = {"/time/step=0.016667"};
+  const dfm_scene_options options = {sizeof options, 1, set, 0};
+  dfm_scene s = 0;
+  dfm_world w = 0;
+  test::ok(dfm_scene_open(context, path.c_str(), &options, &s));
+  test::ok(dfm_scene_world(s, &w));
+  for (int i = 0; i < 3; ++i) test::ok(dfm_world_step(w, 0.016667, nullptr));
+  dfm_world_stats stats = {};
+  stats.size = sizeof stats;
+  test::ok(dfm_world_get_stats(w, &stats));
+  EXPECT_LT(stats.substeps, 3 * 20u) << "the soft body's";
+  test::ok(dfm_scene_close(s));
+}
+
+TEST(World, StepOfTheDef_IsWhatAutoGoesBy) {
+  test::Context context;
+  const auto moves = [&](double step, int32_t method) {
+    dfm_world_def d = dfm_world_def_default();
+    d.step = step;
+    d.method = method;
+    dfm_world w = 0;
+    test::ok(dfm_world_create(context, &d, &w));
+    dfm_material_def m = dfm_material_def_default();
+    m.name = "stiff";
+    m.young = 1e9;
+    dfm_material stiff = 0;
+    test::ok(dfm_material_create(w, &m, &stiff));
+    test::Tet t;
+    t.def.material = stiff;
+    dfm_body b = 0;
+    test::ok(dfm_body_create(w, &t.def, &b));
+    double stable = 0;
+    test::ok(dfm_world_stable_step(w, &stable, nullptr, nullptr));
+    test::ok(dfm_world_destroy(w));
+    return stable < 1e-4 ? "explicit" : "implicit";
+  };
+  EXPECT_STREQ(moves(0.1, DFM_METHOD_AUTO), "implicit");
+  EXPECT_STREQ(moves(0.1, DFM_METHOD_VELOCITY), "explicit");
+  EXPECT_STREQ(moves(0, DFM_METHOD_AUTO), "explicit");
+  for (const double wrong : {-1.0, double(NAN), HUGE_VAL}) {
+    dfm_world_def d = dfm_world_def_default();
+    d.step = wrong;
+    dfm_world w = 0;
+    EXPECT_EQ(dfm_world_create(context, &d, &w), DFM_E_ARG);
+    test::says({"step is"});
+  }
+}
+
+// What is asked between two bodies does not close the choice for the first one: it is one choice for all of
+// them before the first step.
+TEST(World, QueriesBetweenBodies_DoNotChangeTheChoice) {
+  test::Context context;
+  const auto substeps = [&](bool asks) {
+    dfm_world_def d = dfm_world_def_default();
+    d.step = 1.0 / 60;
+    d.gravity[2] = 0;
+    dfm_world w = 0;
+    test::ok(dfm_world_create(context, &d, &w));
+    for (const double young : {1e6, 1e10}) {
+      dfm_material_def m = dfm_material_def_default();
+      m.name = young > 1e7 ? "stiff" : "soft";
+      m.young = young;
+      dfm_material material = 0;
+      test::ok(dfm_material_create(w, &m, &material));
+      test::Tet t;
+      t.def.material = material;
+      t.def.pose.position[0] = young > 1e7 ? 10 : 0;
+      dfm_body b = 0;
+      test::ok(dfm_body_create(w, &t.def, &b));
+      double stable = 0;
+      if (asks) test::ok(dfm_world_stable_step(w, &stable, nullptr, nullptr));
+    }
+    test::ok(dfm_world_step(w, 1.0 / 60, nullptr));
+    dfm_world_stats stats = {};
+    stats.size = sizeof stats;
+    test::ok(dfm_world_get_stats(w, &stats));
+    test::ok(dfm_world_destroy(w));
+    return stats.substeps;
+  };
+  EXPECT_EQ(substeps(true), substeps(false));
 }

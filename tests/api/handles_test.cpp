@@ -85,6 +85,8 @@ std::vector<Call> world_calls() {
        [](uint64_t h) { return dfm_world_pair_wrench(h, 1, 2, zero3, nullptr, nullptr); }},
       {"world_events", [](uint64_t h) { return dfm_world_events(h, 0, nullptr, &count); }},
       {"world_events_sized", [](uint64_t h) { return dfm_world_events_sized(h, 40, 0, nullptr, &count); }},
+      {"world_swaps", [](uint64_t h) { return dfm_world_swaps(h, 0, nullptr, &count); }},
+      {"world_swaps_sized", [](uint64_t h) { return dfm_world_swaps_sized(h, 72, 0, nullptr, &count); }},
       {"world_equilibrium", [](uint64_t h) { return dfm_world_equilibrium(h, nullptr, nullptr); }},
       {"world_set_budget", [](uint64_t h) { return dfm_world_set_budget(h, 0, 0); }},
       {"world_set_sleep", [](uint64_t h) { return dfm_world_set_sleep(h, true); }},
@@ -164,6 +166,10 @@ std::vector<Call> body_calls() {
          const dfm_params p{sizeof p, 0, nullptr};
          return dfm_body_set_params(h, &p);
        }},
+      {"body_set_model", [](uint64_t h) { return dfm_body_set_model(h, "msm", nullptr); }},
+      {"body_set_switch_rule", [](uint64_t h) { return dfm_body_set_switch_rule(h, nullptr); }},
+      {"body_set_interest", [](uint64_t h) { return dfm_body_set_interest(h, zero3); }},
+      {"body_set_switches", [](uint64_t h) { return dfm_body_set_switches(h, 0, nullptr); }},
       {"body_wake", [](uint64_t h) { return dfm_body_wake(h); }},
       {"body_is_asleep",
        [](uint64_t h) {

@@ -203,6 +203,7 @@ Calls world_calls(Scene &s, bool step_only) {
          f.law = "none";
          return dfm_world_add_friction(s.w, &f);
        }},
+      {"world_swaps", [&] { return dfm_world_swaps(s.w, 0, nullptr, &n); }},
       {"world_events", [&] { return dfm_world_events(s.w, 0, nullptr, &n); }},
       {"world_hold_begin", [&] { return dfm_world_hold_begin(s.w); }},
       {"body_create",
@@ -244,6 +245,10 @@ Calls world_calls(Scene &s, bool step_only) {
          const dfm_params p{sizeof p, 0, nullptr};
          return dfm_body_set_params(s.body, &p);
        }},
+      {"body_set_model", [&] { return dfm_body_set_model(s.body, "msm", nullptr); }},
+      {"body_set_switch_rule", [&] { return dfm_body_set_switch_rule(s.body, nullptr); }},
+      {"body_set_interest", [&] { return dfm_body_set_interest(s.body, up); }},
+      {"body_set_switches", [&] { return dfm_body_set_switches(s.body, 0, nullptr); }},
       {"body_wake", [&] { return dfm_body_wake(s.body); }},
       {"obstacle_create",
        [&] {

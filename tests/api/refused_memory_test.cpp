@@ -104,6 +104,20 @@ dfm_world bristles(dfm_context *c) {
   return w;
 }
 
+// A body of it gets another model in the middle of the walk.
+dfm_world changing(dfm_context *c) {
+  const dfm_world w = bristles(c);
+  std::vector<dfm_body> bodies = test::listed(dfm_world_bodies, w);
+  const dfm_switch to{sizeof(dfm_switch),
+                      DFM_INTEGRATOR_AUTO,
+                      4 * kStep,
+                      "corotational_fem",
+                      {sizeof(dfm_params), 0, nullptr},
+                      0};
+  test::ok(dfm_body_set_switches(bodies[0], 1, &to));
+  return w;
+}
+
 // Steps with the n-th allocation from here on refused; what failed is tried again with memory back. Whether
 // the n-th was reached.
 bool walk(const Build &build, int64_t n, uint64_t expected, int *refused) {
@@ -164,11 +178,14 @@ TEST(RefusedMemory, InAStepThatFallsAsleepAndWakes_LeavesTheWorldAsItWas) { walk
 TEST(RefusedMemory, InAStepWithARigidHost_LeavesTheWorldAsItWas) { walk_all(rigid_host, 40); }
 TEST(RefusedMemory, InAStepOfALawThatRemembers_LeavesTheWorldAsItWas) { walk_all(bristles, 40); }
 
-// A restore that finds no memory, wherever it misses it, leaves the world that was there; with
-// memory it is done.
-TEST(RefusedMemory, InARestore_LeavesTheWorldAsItWas) {
+TEST(RefusedMemory, InAStepThatChangesAModel_LeavesTheWorldAsItWas) { walk_all(changing, 40); }
+
+namespace {
+
+// Back to the fourth step of a world.
+void restore_all(const Build &build) {
   dfm_context *const c = make_context();
-  const dfm_world w = sleepers(c);
+  const dfm_world w = build(c);
   for (int i = 0; i < 4; ++i) test::ok(dfm_world_step(w, kStep, nullptr));
   const std::string then = test::snapshot(w);
   const uint64_t hash_then = dfm_world_hash(w);
@@ -191,11 +208,18 @@ TEST(RefusedMemory, InARestore_LeavesTheWorldAsItWas) {
   dfm_context_destroy(c);
 }
 
+}  // namespace
+
+// A restore that finds no memory, wherever it misses it, leaves the world that was there; with
+// memory it is done.
+TEST(RefusedMemory, InARestore_LeavesTheWorldAsItWas) { restore_all(sleepers); }
+TEST(RefusedMemory, InARestoreThatBringsAModelBack_LeavesTheWorldAsItWas) { restore_all(changing); }
+
 // Context, world and bodies: what was refused is not there, and nothing is left of it.
 TEST(RefusedMemory, InTheSetUp_EndsInAnErrorAndLeaksNothing) {
   int refused = 0;
   bool through = false;
-  for (int64_t n = 0; !through && n < 100000; n += n < 400 ? 1 : 7) {
+  for (int64_t n = 0; !through && n < 100000; n += n < 600 ? 1 : 7) {
     const int64_t live = Refusal::live;
     {
       dfm_context_def d = test::refusing_context();
@@ -215,7 +239,7 @@ TEST(RefusedMemory, InTheSetUp_EndsInAnErrorAndLeaksNothing) {
       }
       dfm_context_destroy(c);
     }
-    if (n > 400) {  // tables of the process have their size by then
+    if (n > 600) {  // tables of the process have their size by then
       EXPECT_EQ(Refusal::live, live) << "allocation " << n;
     }
   }

@@ -287,7 +287,8 @@ TEST(Run, Profile_NamesTheStages) {
 
 TEST(Run, StepFarTooLong_StopsWithTheLastGoodState) {
   // A step of 1e6 seconds needs more sub-steps than allowed.
-  const Outcome r = run("stopped", {"--set", "/time/step=1e6", "--time", "1e9"});
+  const Outcome r = run(
+      "stopped", {"--set", "/time/step=1e6", "--set", "/time/integrator=symplectic_euler", "--time", "1e9"});
   EXPECT_EQ(r.result.exit_code, 3);
   EXPECT_NE(r.result.err.find("stopped at step 0"), std::string::npos) << r.result.err;
   EXPECT_NE(r.result.err.find("body '"), std::string::npos) << r.result.err;
@@ -347,6 +348,27 @@ TEST(Run, Frames_AreDrawnAtTheirRate) {
   for (const char *file : {"frame_000000.png", "frame_000001.png", "frame_000002.png"})
     EXPECT_GT(fs::file_size(r.out + "/frames/" + file), 1000u);
   EXPECT_FALSE(fs::exists(r.out + "/frames/frame_000003.png"));
+}
+
+// A block pressed on the floor is stressed, so its picture is another one than by body. Springs tell no
+// stress.
+TEST(Run, FramesByStress_ShowIt) {
+  const auto picture = [&](const char *name, const char *color, const char *model) {
+    const Outcome r = run(name, {"--frames", "100", "--time", "0.02", "--set", color, "--set", model});
+    EXPECT_EQ(r.result.exit_code, 0) << r.result.err;
+    if (r.result.err.find("no pictures") != std::string::npos) return std::string();
+    const bool told = value(r.summary, "warnings").find("body 'low': model") != std::string::npos;
+    EXPECT_EQ(told, std::string(name) == "by_no_stress") << r.summary;
+    return test::read_file(r.out + "/frames/frame_000002.png");
+  };
+  const char *const fem = R"(/bodies/0/model={"type": "corotational_fem"})";
+  const std::string by_body = picture("by_body", "/output/color=body", fem);
+  const std::string by_stress = picture("by_stress", "/output/color=stress", fem);
+  const std::string none =
+      picture("by_no_stress", "/output/color=stress", R"(/bodies/0/model={"type": "msm"})");
+  if (by_body.empty()) GTEST_SKIP() << "no pictures here";
+  EXPECT_NE(by_body, by_stress);
+  EXPECT_GT(none.size(), 1000u);
 }
 
 TEST(Run, Frames_WithoutABackendAreAWarning) {

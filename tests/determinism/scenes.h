@@ -271,6 +271,26 @@ dfm_world corotational(dfm_context *c) {
   return build(c, {"corotational_fem", DFM_INTEGRATOR_IMPLICIT_EULER});
 }
 template <dfm_world (*build)(dfm_context *, Kind)>
+dfm_world matched(dfm_context *c) {
+  return build(c, {"shape_matching"});
+}
+template <dfm_world (*build)(dfm_context *, Kind)>
+dfm_world modal(dfm_context *c) {
+  return build(c, {"modal"});
+}
+template <dfm_world (*build)(dfm_context *, Kind)>
+dfm_world condensed(dfm_context *c) {
+  return build(c, {"condensed"});
+}
+template <dfm_world (*build)(dfm_context *, Kind)>
+dfm_world scattered_explicit(dfm_context *c) {
+  return build(c, {"meshless", DFM_INTEGRATOR_SYMPLECTIC_EULER});
+}
+template <dfm_world (*build)(dfm_context *, Kind)>
+dfm_world scattered(dfm_context *c) {
+  return build(c, {"meshless", DFM_INTEGRATOR_IMPLICIT_EULER});
+}
+template <dfm_world (*build)(dfm_context *, Kind)>
 dfm_world second_order(dfm_context *c) {
   return build(c, {"corotational_fem", DFM_INTEGRATOR_TR_BDF2});
 }
@@ -298,6 +318,11 @@ inline const Scene all[] = {{"ball_on_floor", [](dfm_context *c) { return ball_o
                             {"implicit_corotational_beams", corotational<crossing_beams>, 40},
                             {"implicit_msm_skins", msm<coupled_pair>, 15},
                             {"implicit_corotational_skins", corotational<coupled_pair>, 15},
+                            {"shape_matching_ball", matched<ball_on_floor>, 100},
+                            {"modal_ten", modal<ten_in_a_box>, 40},
+                            {"condensed_ball", condensed<ball_on_floor>, 60},
+                            {"meshless_ball", scattered_explicit<ball_on_floor>, 60},
+                            {"implicit_meshless_ball", scattered<ball_on_floor>, 20},
                             {"implicit_corotational_ten", corotational<ten_in_a_box>, 40},
                             {"second_order_ten", second_order<ten_in_a_box>, 40}};
 

@@ -77,14 +77,14 @@ struct Host {
   }
 };
 
-// The one type of a model's module.
-inline const dfm_type &type_of(const char *module) {
+// A type of a model's module: the one, or the n-th.
+inline const dfm_type &type_of(const char *module, uint32_t n = 0) {
   static Host host;
   const std::string path = std::string(DEFORM_PLUGIN_DIR "/") + module + ".so";
   void *opened = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
   EXPECT_NE(opened, nullptr) << dlerror();
   auto entry = reinterpret_cast<dfm_plugin_fn>(dlsym(opened, "dfm_plugin_entry"));
-  return *entry(&host.table, DFM_ABI, DFM_ABI)->types[0];
+  return *entry(&host.table, DFM_ABI, DFM_ABI)->types[n];
 }
 
 struct Mesh {
@@ -112,6 +112,21 @@ struct Mesh {
     }
   }
 };
+
+// As a host describes it; fields, coupling and what is held are left out.
+inline dfm_mesh described(const Mesh &m) {
+  dfm_mesh d{};
+  d.size = sizeof d;
+  d.npoint = m.npoint();
+  d.ncell = m.ncell();
+  d.cell = DFM_CELL_TET;
+  d.rest = m.rest.data();
+  d.cells = m.cells.data();
+  d.mass = m.mass.data();
+  d.nedge = uint32_t(m.edges.size() / 2);
+  d.edges = m.edges.data();
+  return d;
+}
 
 // One tetrahedron of unit edges, or an irregular one.
 inline Mesh regular_tet() {
@@ -246,7 +261,7 @@ struct ModelInstance {
   double dt = 1e-3;
 
   ModelInstance(Host &h, const dfm_type &type, const Mesh &m, const std::vector<double> &params,
-                uint32_t s = 4, const Fields &by_cell = {})
+                uint32_t s = 4, const Fields &by_cell = {}, const std::vector<uint8_t> &fixed = {})
       : host(h), mesh(m), stride(s), ops(static_cast<const dfm_model *>(type.ops)) {
     std::vector<const char *> keys;
     std::vector<const double *> fields;
@@ -255,19 +270,19 @@ struct ModelInstance {
       fields.push_back(values.data());
     }
     keys.push_back(nullptr);
-    dfm_mesh d{};
-    d.size = sizeof d;
-    d.npoint = m.npoint();
-    d.ncell = m.ncell();
-    d.cell = DFM_CELL_TET;
-    d.rest = m.rest.data();
-    d.cells = m.cells.data();
-    d.mass = m.mass.data();
-    d.nedge = uint32_t(m.edges.size() / 2);
-    d.edges = m.edges.data();
+    dfm_mesh d = described(m);
     d.field_keys = keys.data();
     d.fields = fields.data();
     d.params = params.data();
+    // every point is a surfel
+    std::vector<uint32_t> row(m.npoint() + 1), col(m.npoint());
+    for (uint32_t i = 0; i < m.npoint(); ++i) row[i + 1] = (col[i] = i) + 1;
+    const std::vector<double> weight(m.npoint(), 1);
+    d.nsurfel = m.npoint();
+    d.row = row.data();
+    d.col = col.data();
+    d.weight = weight.data();
+    d.fixed = fixed.empty() ? nullptr : fixed.data();
     status = ops->create(&h.table, &d, &self);
     double **to[] = {&x, &v, &f};
     for (int n = 0; n < 3; ++n) {

@@ -2,6 +2,7 @@
 // those of a point mass, so every figure has a closed form.
 #define DFM_STATIC_PLUGIN toy_stepper
 #include "coupled.h"
+#include "under_ball.h"
 
 namespace {
 
@@ -12,7 +13,10 @@ struct Toy {
   double total = 0;
 };
 
+uint32_t created = 0;
+
 dfm_status create(const dfm_host *, const dfm_mesh *m, void **self) {
+  ++created;
   Toy *t = new Toy{m->npoint, m->nsurfel, std::vector<double>(m->mass, m->mass + m->npoint),
                    std::vector<uint32_t>(m->row, m->row + m->nsurfel + 1),
                    std::vector<uint32_t>(m->col, m->col + m->row[m->nsurfel])};
@@ -31,6 +35,9 @@ void mean_velocity(const Toy &t, const dfm_kin *k, const double *f, double v[3])
     v[c] = p / t.total;
   }
 }
+
+bool snaps = false;  // knows its first shape alone, and takes it at once
+std::vector<double> first_shape;
 
 struct Pending { double v[3]; };
 Pending pending;  // predict and commit see the same external forces; one body in these tests
@@ -80,6 +87,8 @@ dfm_status commit(void *self, const dfm_kin *k, const double *p, double *x, doub
       x[size_t(i) * k->stride + c] = k->x[size_t(i) * k->stride + c] + k->dt * u;
     }
   }
+  for (size_t i = 0; snaps && i < t.npoint; ++i)
+    for (size_t c = 0; c < 3; ++c) x[i * k->stride + c] = first_shape[3 * i + c];
   for (uint32_t i = 0; i < t.npoint; ++i) v[size_t(i) * k->stride + 3] = x[size_t(i) * k->stride + 3] = 0;
   return DFM_OK;
 }
@@ -97,6 +106,7 @@ extern "C" const dfm_plugin *dfm_plugin_entry_toy_stepper(const dfm_host *host, 
   if (!DFM_ABI_OK(host)) return nullptr;
   static dfm_model ops{};
   ops.size = sizeof ops;
+  ops.caps = DFM_CAP_ROTATION_INVARIANT;
   ops.cells = DFM_CELL_TET;
   ops.create = create;
   ops.destroy = destroy;
@@ -235,22 +245,117 @@ TEST(Stepper, OnASlopeBelowTheLimit_Holds) {
 // The seam meets the other kind of body: a soft ball on top of the toy.
 TEST(Stepper, UnderASoftBall_BothRest) {
   World w(0.5, {0, 0, -9.81}, 1e-4);
-  test::BodyOptions o;
-  o.name = "ball";
-  o.young = 5e4;
-  o.damping_stiffness = 2e-3;
-  o.position = {0.05, 0.05, 0.152};
-  const dfm_body ball = test::make_body(w.context, w.world, "ball", {0.05, 0, 0}, 300, o);
-  test::run(w.world, 2.0, 1e-3);
-  dfm_pair_report pair[4];
-  uint32_t n = 0;
-  ASSERT_EQ(dfm_world_pairs(w.world, 4, pair, &n), DFM_OK) << dfm_last_error();
-  ASSERT_EQ(n, 2u);
-  const double toy = test::measure(w.body).mass * 9.81, top = test::measure(ball).mass * 9.81;
-  double floor_force = 0, between = 0;
-  for (uint32_t i = 0; i < n; ++i)
-    (pair[i].a == w.body && pair[i].b != ball ? floor_force : between) = pair[i].normal;
-  EXPECT_NEAR(floor_force, toy + top, 0.02 * (toy + top));
-  EXPECT_NEAR(between, top, 0.05 * top);
-  EXPECT_GT(test::measure(ball).com[2], 0.13);
+  test::expect_block_carries_ball(w.context, w.world, w.body, 2.0);
+}
+
+namespace {
+
+dfm_status to_model(dfm_body body, const char *type) { return dfm_body_set_model(body, type, nullptr); }
+
+// A soft block on the floor, with the toy at hand.
+struct Block {
+  test::Context context;
+  dfm_world world;
+  dfm_body body;
+  Block() {
+    test::ok(dfm_plugin_register_static(context, dfm_plugin_entry_toy_stepper, "toy_stepper"));
+    world = test::make_world(context);
+    test::BodyOptions o;
+    o.name = "block";
+    o.young = 5e4;
+    o.damping_stiffness = 2e-3;
+    o.position = {0, 0, 1e-4};
+    body = test::make_body(context, world, "beam", {0.1, 0.1, 0.1}, 60, o);
+    test::add_plane(world, "floor");
+    test::set_friction(world, 0.5);
+    test::run(world, 0.5, 1e-3);
+  }
+  std::vector<double> points() const {
+    uint32_t n = 0;
+    test::ok(dfm_body_get_state(body, 0, nullptr, nullptr, &n));
+    std::vector<double> x(size_t(3) * n);
+    test::ok(dfm_body_get_state(body, n, x.data(), nullptr, &n));
+    return x;
+  }
+};
+
+}  // namespace
+
+// From a force model to one that steps itself and back, in contact: the block rests on all the time, and what
+// gives no energy tells none.
+TEST(Stepper, TakesABodyOverInContact_AndGivesItBack) {
+  Block b;
+  const double z = test::measure(b.body).com[2];
+  const std::vector<double> before = b.points();
+  for (const char *model : {"toy_stepper", "corotational_fem", "toy_stepper", "msm"}) {
+    test::ok(to_model(b.body, model));
+    test::run(b.world, 0.3, 1e-3);
+    EXPECT_NEAR(test::measure(b.body).com[2], z, 1e-4) << model;
+    dfm_pair_report pair{};
+    uint32_t n = 0;
+    test::ok(dfm_world_pairs(b.world, 1, &pair, &n));
+    EXPECT_NEAR(pair.normal, test::measure(b.body).mass * 9.81, 0.05) << model;
+  }
+  std::vector<dfm_swap> rows = test::listed(dfm_world_swaps, b.world);
+  ASSERT_EQ(rows.size(), 4u);
+  EXPECT_FALSE(std::isnan(rows[0].elastic_before));
+  EXPECT_TRUE(std::isnan(rows[0].elastic_after));
+  EXPECT_TRUE(std::isnan(rows[1].elastic_before));
+  EXPECT_FALSE(std::isnan(rows[3].elastic_after));
+}
+
+TEST(Stepper, ThatWouldMoveTheSurfaceAtOnce_IsRefused) {
+  Block b;
+  const uint64_t hash = dfm_world_hash(b.world);
+  first_shape = b.points();
+  snaps = true;
+  EXPECT_EQ(to_model(b.body, "toy_stepper"), DFM_OK)
+      << "it stands where the model puts it: " << dfm_last_error();
+  test::ok(to_model(b.body, "msm"));
+  EXPECT_EQ(dfm_world_hash(b.world), hash);
+  first_shape[2] += 1e-6;
+  EXPECT_EQ(to_model(b.body, "toy_stepper"), DFM_DISCARD);
+  test::says({"body 'block'", "test.toy_stepper", "would put the surface", "nothing was changed"});
+  EXPECT_EQ(dfm_world_hash(b.world), hash);
+  snaps = false;
+}
+
+TEST(Stepper, WhereLimitsCannotBeKnown_IsRefused) {
+  Block b;
+  const double limit = 1;
+  const dfm_param_value v{"max_jump", &limit, 1};
+  const dfm_params params{sizeof params, 1, &v};
+  EXPECT_EQ(dfm_body_set_model(b.body, "toy_stepper", &params), DFM_DISCARD);
+  test::says({"gives no energy", "max_jump"});
+  const uint32_t point = 0;
+  const dfm_spring_def spring{sizeof spring, 1, &point, nullptr, {0, 0, 0}, nullptr, 0, 0, 1, 0};
+  test::ok(dfm_body_add_spring(b.body, &spring, nullptr));
+  EXPECT_EQ(to_model(b.body, "toy_stepper"), DFM_E_UNSUPPORTED);
+  test::says({"spring", "test.toy_stepper"});
+}
+
+// What a model has made of the mesh is not made again, until something that it was told has changed.
+TEST(Stepper, ThatARuleComesBackTo_IsMadeOnce) {
+  Block b;
+  dfm_switch_rule rule = dfm_switch_rule_default();
+  rule.otherwise.type = "toy_stepper";
+  rule.near_by.type = "corotational_fem";
+  rule.distance = 1;
+  rule.wait = 0;
+  test::ok(dfm_body_set_switch_rule(b.body, &rule));
+  const double here[3] = {0, 0, 0}, away[3] = {9, 0, 0};
+  const auto to_and_fro = [&] {
+    for (const double *point : {away, here}) {
+      test::ok(dfm_body_set_interest(b.body, point));
+      test::ok(dfm_world_step(b.world, 1e-3, nullptr));
+    }
+  };
+  created = 0;
+  for (int i = 0; i < 5; ++i) to_and_fro();
+  EXPECT_GE(test::listed(dfm_world_swaps, b.world).size(), 10u);
+  EXPECT_EQ(created, 1u);
+  const uint32_t point = 0;
+  test::ok(dfm_body_hold(b.body, 1, &point, 7));
+  to_and_fro();
+  EXPECT_EQ(created, 2u) << "it is told what is held";
 }

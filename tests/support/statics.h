@@ -55,9 +55,10 @@ struct Statics {
     test::ok(dfm_tetmesh_destroy(mesh));
   }
   Statics(const std::vector<double> &points, const std::vector<uint32_t> &tets, const char *model,
-          double young, double poisson) {
+          double young, double poisson, const std::vector<dfm_param_value> &choices = {}) {
     world = test::make_world(context, {0, 0, 0});
     dfm_body_def d = dfm_body_def_default();
+    d.model_params = {sizeof d.model_params, uint32_t(choices.size()), choices.data()};
     d.points = points.data();
     d.tets = tets.data();
     d.npoint = uint32_t(points.size() / 3);

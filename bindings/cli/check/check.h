@@ -39,12 +39,17 @@ struct Subject {
 
 struct Rule {
   const char *id, *title;
-  bool by_type;                           // runs once for each type, else once for the file
-  std::string (*law)(const Subject &);    // also what runs for the file
-  std::string (*model)(const Subject &);  // null: comes with the rules for models
+  bool by_type;  // runs once for each type, else once for the file
+  // null: not asked of that kind of type
+  std::string (*law)(const Subject &);  // also what runs for the file
+  std::string (*model)(const Subject &);
+  std::string (*solver)(const Subject &);
 };
 const std::vector<Rule> &rules();
 const Rule *find_rule(const std::string &id);
+
+// What runs for a type of this kind, DFM_KIND_*; null: nothing.
+std::string (*asked_of(const Rule &rule, uint32_t kind))(const Subject &);
 
 // Runs one rule here and now.
 Verdict run_here(const Rule &rule, const Subject &subject);

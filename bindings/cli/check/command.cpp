@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "check/groups.h"
 #include "check/plugin.h"
 #include "check/runner.h"
 #include "json_text.h"
@@ -72,7 +73,9 @@ std::string digest_text(const Request &request) {
   subject.plugin = &plugin;
   subject.index = static_cast<uint32_t>(request.digest);
   subject.type = plugin.types().at(subject.index);
-  return text("%016llx", static_cast<unsigned long long>(digest(subject)));
+  return text("%016llx",
+              static_cast<unsigned long long>(subject.type->kind == DFM_KIND_MODEL ? digest_of_model(subject)
+                                                                                   : digest(subject)));
 }
 
 // "1 org.example.law" by lines: what the file offers.
@@ -167,14 +170,11 @@ class Rules {
     if (report_.types.empty() && !loads) one(report_.file, *find_rule("V02"), -1);
     for (size_t t = 0; t < report_.types.size(); ++t) {
       report_.by_type.emplace_back();
-      const bool law = report_.types[t].kind == DFM_KIND_FRICTION;
       if (!globals_.json)
         std::printf("%s %s\n", kind_name(report_.types[t].kind), report_.types[t].id.c_str());
       for (const Rule *rule : wanted_)
-        if (rule->by_type && (law || rule->id[0] == 'V'))
+        if (rule->by_type && asked_of(*rule, report_.types[t].kind))
           one(report_.by_type.back(), *rule, static_cast<int>(t));
-      if (!globals_.json && report_.types[t].kind == DFM_KIND_MODEL)
-        std::printf("  M01 to M15, the rules for models, are not available yet\n");
       if (!globals_.json && report_.types[t].kind == DFM_KIND_SOLVER)
         std::printf("  rules for solvers are not available yet\n");
     }
@@ -272,7 +272,8 @@ int run(const Globals &globals, const Request &request) {
   std::vector<const Rule *> wanted;
   for (const std::string &id : request.only) {
     const Rule *rule = find_rule(id);
-    if (!rule) return fail("--only: there is no rule \"" + id + "\"; rules are V01 to V14 and F01 to F17");
+    if (!rule)
+      return fail("--only: there is no rule \"" + id + "\"; rules are V01 to V14, F01 to F17 and M01 to M21");
     wanted.push_back(rule);
   }
   for (const Rule &rule : rules())

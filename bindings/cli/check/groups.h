@@ -12,6 +12,8 @@ std::string refuses_unknown_abi(const Subject &);
 std::string metadata_complete(const Subject &);
 std::string parameters_sane(const Subject &);
 // rules_process.cpp: what it does to the process it runs in
+std::string spelt(const std::string &name);  // a function as its author wrote it
+bool sanitized();                            // this program
 std::string eval_keeps_to_itself(const Subject &);
 std::string stays_in_its_arrays(const Subject &);
 std::string unloads_without_leak(const Subject &);
@@ -44,5 +46,35 @@ std::string presliding_is_displacement(const Subject &);
 std::string loop_has_area(const Subject &);
 std::string breaks_away(const Subject &);
 std::string does_not_drift(const Subject &);
+// rules_model_process.cpp: what a model does to the process it runs in
+std::string model_parameters_sane(const Subject &);
+std::string step_keeps_to_itself(const Subject &);
+std::string model_stays_in_its_arrays(const Subject &);
+std::string model_same_bits(const Subject &);
+std::string bad_point_returns(const Subject &);
+std::string instances_share_nothing(const Subject &);
+std::string step_writes_no_static(const Subject &);
+// all that a world asks of a model
+void use_model(const Subject &);
+// rules_model.cpp: its forces at one state
+std::string rest_pose_is_free(const Subject &);
+std::string rigid_motion_is_free(const Subject &);
+std::string forces_sum_to_zero(const Subject &);
+std::string forces_are_the_gradient(const Subject &);
+std::string stiffness_is_the_derivative(const Subject &);
+std::string constant_stiffness_is_constant(const Subject &);
+std::string dampers_take_energy(const Subject &);
+std::string numbering_does_not_matter(const Subject &);
+std::string collapsed_cells_stay_finite(const Subject &);
+std::string cell_energy_sums(const Subject &);
+// rules_stepper.cpp: how it goes on, and bodies that step themselves
+uint64_t digest_of_model(const Subject &);
+std::string state_is_the_hosts(const Subject &);
+std::string cost_grows_with_cells(const Subject &);
+std::string bound_is_honest(const Subject &);
+std::string commit_is_predict_and_respond(const Subject &);
+std::string response_is_an_operator(const Subject &);
+std::string diagonal_bounds_response(const Subject &);
+std::string cut_does_not_matter(const Subject &);
 
 }  // namespace cli::check

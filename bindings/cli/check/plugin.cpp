@@ -69,11 +69,27 @@ Host::Host() {
     if (utf8 && said.size() < 4096)
       said += (said.empty() ? "" : "; ") + std::string(utf8, strnlen(utf8, 512));
   };
-  table_.parallel_for = [](void *, uint32_t n, uint32_t grain, void (*fn)(void *, uint32_t, uint32_t),
+  table_.parallel_for = [](void *ctx, uint32_t n, uint32_t grain, void (*fn)(void *, uint32_t, uint32_t),
                            void *user) {
-    if (Watch::watching()) Watch::stop("dfm_host.parallel_for");
-    for (uint32_t begin = 0; begin < n; begin += std::max(grain, 1u))
-      fn(user, begin, std::min(n, begin + std::max(grain, 1u)));
+    Host &host = *static_cast<Host *>(ctx);
+    if (Watch::watching() && !host.parallel_in_watch) Watch::stop("dfm_host.parallel_for");
+    ++host.parallel_calls;
+    const uint32_t piece = std::max(grain, 1u);
+    if (host.cut == Cut::whole) {
+      if (n) fn(user, 0, n);
+      return;
+    }
+    if (host.cut == Cut::grains) {
+      for (uint32_t begin = 0; begin < n; begin += piece) fn(user, begin, std::min(n, begin + piece));
+      return;
+    }
+    // from the end, one to three grains at a time
+    const uint32_t pieces = (n + piece - 1) / piece;
+    for (uint32_t end = pieces; end > 0;) {
+      const uint32_t take = std::min(end, 1 + end % 3);
+      fn(user, (end - take) * piece, std::min(n, end * piece));
+      end -= take;
+    }
   };
   table_.extension = [](void *, const char *) -> const void * { return nullptr; };
 }

@@ -1,6 +1,7 @@
 // A plugin opened by the validator itself, not by the library: what the library would refuse at once must
 // stay open to be looked at, and the host it meets counts what it lends.
 #pragma once
+#include <atomic>
 #include <map>
 #include <memory>
 #include <string>
@@ -21,6 +22,10 @@ class Host {
   size_t pieces() const { return lent_.size(); }  // not yet released
   const std::string &said() const { return said_; }
   void give_back_scratch();  // of this thread
+  // How parallel_for cuts its work: by grains in order, not at all, by some grains in another order.
+  enum class Cut { grains, whole, shuffled } cut = Cut::grains;
+  std::atomic<uint64_t> parallel_calls{0};
+  bool parallel_in_watch = false;  // a model's step may hand out work; eval may not
 
  private:
   dfm_host table_{};

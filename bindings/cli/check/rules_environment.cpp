@@ -31,6 +31,7 @@ void use(const Subject &subject) {
 
 std::string keeps_rounding(const Subject &subject) {
   if (subject.type->kind == DFM_KIND_FRICTION) use(subject);
+  if (subject.type->kind == DFM_KIND_MODEL) use_model(subject);
   if (const std::string &left = left_changed(); !left.empty())
     broken(
         "%s: the host would compute everything after it with other bits, and read numbers of files "
@@ -53,13 +54,13 @@ std::string keeps_process(const Subject &subject) {
       Plugin plugin(subject.file);
       look("loading it");
       for (uint32_t i = 0; i < plugin.types().size() && changed.empty(); ++i) {
-        if (plugin.types()[i]->kind != DFM_KIND_FRICTION) continue;
+        if (plugin.types()[i]->kind == DFM_KIND_SOLVER) continue;
         Subject one = subject;
         one.plugin = &plugin;
         one.index = i;
         one.type = plugin.types()[i];
         stage("its type #%u is used", i);
-        use(one);
+        one.type->kind == DFM_KIND_MODEL ? use_model(one) : use(one);
         look("using it");
       }
       stage("it is unloaded");

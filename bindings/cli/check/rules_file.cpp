@@ -16,6 +16,7 @@
 #include "check/groups.h"
 #include "check/law.h"
 #include "check/runner.h"
+#include "deform/plugin_draft.h"
 #include "file.h"
 #include "messages.h"
 
@@ -214,6 +215,31 @@ void law_sound(const dfm_type &type, const dfm_friction &law) {
   slots_sound(own->slots, own->nslot, true);
 }
 
+// Claims that name functions.
+void model_sound(const dfm_model &model) {
+  constexpr uint32_t kKnown = DFM_CAP_ENERGY | DFM_CAP_STIFFNESS | DFM_CAP_DAMPING | DFM_CAP_TOPOLOGY |
+                              DFM_CAP_ROTATION_INVARIANT | DFM_CAP_PLAUSIBLE | DFM_CAP_CONSTANT_STIFFNESS;
+  if (model.caps & ~kKnown)
+    broken("caps has bits that this ABI does not know (%#x), which no host honors; use DFM_CAP_*",
+           model.caps & ~kKnown);
+  const struct {
+    uint32_t bit;
+    bool there;
+    const char *cap, *function;
+  } claims[] = {
+      {DFM_CAP_ENERGY, model.energy != nullptr, "DFM_CAP_ENERGY", "energy"},
+      {DFM_CAP_STIFFNESS, model.pattern && model.stiffness, "DFM_CAP_STIFFNESS", "pattern and stiffness"}};
+  for (const auto &c : claims)
+    if ((model.caps & c.bit) && !c.there)
+      broken(
+          "it claims %s without %s, so the host calls what is not there; set the function, or drop the claim",
+          c.cap, c.function);
+  if ((model.caps & DFM_CAP_CONSTANT_STIFFNESS) && !(model.caps & DFM_CAP_STIFFNESS))
+    broken(
+        "it claims DFM_CAP_CONSTANT_STIFFNESS without DFM_CAP_STIFFNESS, so there is nothing to be constant; "
+        "claim both or none");
+}
+
 }  // namespace
 
 std::string metadata_complete(const Subject &subject) {
@@ -254,6 +280,7 @@ std::string metadata_complete(const Subject &subject) {
     if (model.cells == 0)
       broken("a model that accepts no kind of cell fits no mesh; set cells to DFM_CELL_*");
     slots_sound(model.slots, model.nslot, false);
+    model_sound(model);
   }
   return text("%s %s, %s", type.id, type.version, type.licence);
 }

@@ -49,16 +49,12 @@ void vary(Lanes &b, Random &random, double scale) {
 
 // ---- V05 --------------------------------------------------------------------------------------------------
 
-namespace {
-
-// As its author wrote it.
 std::string spelt(const std::string &name) {
   if (name.rfind("_Zn", 0) == 0) return "operator new";
   if (name.rfind("_Zd", 0) == 0) return "operator delete";
   return name == "__cxa_allocate_exception" ? "throw" : name;
 }
-
-}  // namespace
+bool sanitized() { return DEFORM_SANITIZED; }
 
 std::string eval_keeps_to_itself(const Subject &subject) {
   const Law law(subject, lively_params(subject));
@@ -284,10 +280,14 @@ long files_open() {
 void load_and_unload(const Subject &subject) {
   Plugin plugin(subject.file);
   for (const dfm_type *type : plugin.types()) {
-    if (type->kind != DFM_KIND_FRICTION) continue;
+    if (type->kind == DFM_KIND_SOLVER) continue;
     Subject one = subject;
     one.plugin = &plugin;
     one.type = type;
+    if (type->kind == DFM_KIND_MODEL) {
+      use_model(one);
+      continue;
+    }
     const Law law(one, default_params(*type));
     Lanes b(law, 8);
     for (uint32_t i = 0; i < b.n && law.needs(DFM_NEED_FN); ++i) b.fn[i] = 1;

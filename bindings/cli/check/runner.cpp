@@ -167,9 +167,8 @@ void fail_now(const char *sentence) {
 Verdict run_here(const Rule &rule, const Subject &subject) {
   try {
     const uint32_t kind = subject.type ? subject.type->kind : uint32_t(DFM_KIND_FRICTION);
-    const auto run = kind == DFM_KIND_FRICTION ? rule.law : rule.model;
-    if (!run)
-      return {Result::skip, "comes with the rules for models and solvers, which are not available yet"};
+    const auto run = asked_of(rule, kind);
+    if (!run) return {Result::skip, "not asked of this kind of plugin"};
     return {Result::pass, run(subject)};
   } catch (const Broken &b) {
     return {Result::fail, b.what()};

@@ -111,7 +111,9 @@ DFM_API dfm_status dfm_body_get_rest(dfm_body body, uint32_t capacity_points, do
                                      uint32_t capacity_tets, uint32_t *tets);
 
 /** Holds (bits 1 x, 2 y, 4 z) or releases (0) components of points. A point that is released loses its motion
- * (dfm_body_move_held); one that stays held keeps it. Threads: Not during step. Since 0.1. */
+ * (dfm_body_move_held); one that stays held keeps it.
+ * @return DFM_OK; DFM_E_ARG axes or a point does not exist; DFM_E_UNSUPPORTED the model steps itself and is
+ * told at the start (dfm_body_def.fixed); DFM_E_HANDLE. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_hold(dfm_body body, uint32_t n, const uint32_t *points, uint8_t axes);
 /** Moves held points together: their start positions carried by the keys' pose (relative to key 0) and, on
  * top, the sine offset.

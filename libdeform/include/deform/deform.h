@@ -10,6 +10,7 @@
 #include "deform/material.h"
 #include "deform/math.h"
 #include "deform/mesh.h"
+#include "deform/model.h"
 #include "deform/obstacle.h"
 #include "deform/plugin.h"
 #include "deform/rigid.h"

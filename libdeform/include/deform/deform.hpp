@@ -31,6 +31,7 @@
 
 #include "deform/defs.hpp"
 #include "deform/deform.h"
+#include "deform/models.hpp"
 #include "deform/result.hpp"
 
 namespace deform {
@@ -219,7 +220,7 @@ struct AnyMesh {
 
 // ---- bodies -----------------------------------------------------------------------------------------------
 template <class E>
-class Body : public Handle<dfm_body, struct BodyKind> {
+class Body : public Handle<dfm_body, struct BodyKind>, public BodyModels<E, Body<E>> {
  public:
   using Handle::Handle;
   static void end(dfm_body body) noexcept { dfm_body_destroy(body); }
@@ -520,6 +521,8 @@ class World : public Handle<dfm_world, struct WorldKind> {
   }
   auto pair_impulses() const { return collect_rows<E>(dfm_world_pair_impulses_sized, raw_); }
   auto events() const { return collect_rows<E>(dfm_world_events_sized, raw_); }
+  auto swaps(std::span<dfm_swap> out) const { return fill_rows<E>(dfm_world_swaps_sized, raw_, out); }
+  auto swaps() const { return collect_rows<E>(dfm_world_swaps_sized, raw_); }
   auto profile() const { return collect_rows<E>(dfm_world_profile_sized, raw_); }
   auto overlaps() const { return collect_rows<E>(dfm_world_overlaps_sized, raw_); }
   // pairs that overlap still

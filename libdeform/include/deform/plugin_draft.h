@@ -14,6 +14,14 @@ enum { DFM_CAP_TOPOLOGY = 8 /* extension "dfm.topology/1" */ };
 /* ---- self-stepping models: state that lives off the host ---------------------------------------------- */
 /* Type of dfm_stepper.fetch: copies what lives off the host. [step] */
 typedef dfm_status (*dfm_fetch_fn)(void *self, uint32_t what, double *dst);
+/* ---- models: claims by instance ----------------------------------------------------------------------- */
+/* Extension "dfm.caps/1" of a model: those of dfm_model.caps that hold with the instance's present
+ * parameters, where some choice of them takes one away. Asked by `deform plugin check`. */
+#define DFM_EXT_CAPS "dfm.caps/1"
+typedef struct dfm_caps {
+  uint32_t size, reserved;
+  uint32_t (*active)(const void *self); /* [setup] DFM_CAP_*, until the next call of set_params */
+} dfm_caps;
 /* ---- models: springs switched off --------------------------------------------------------------------- */
 /* Extension "dfm.spring_mask/1" of a model: springs by edge of the mesh, switched off and on. Like a
  * parameter, the mask is the host's to keep: it is no state. Off gives a spring's energy away; on again may

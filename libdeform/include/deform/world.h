@@ -13,7 +13,8 @@ extern "C" {
  * (2010, 4.2), to compare only: it freezes what slides and loses momentum (doc/concepts/rollback.md); what it
  * cannot do is refused with DFM_E_UNSUPPORTED where it is made. Since 0.1. */
 enum { DFM_METHOD_AUTO = 0, DFM_METHOD_VELOCITY = 1, DFM_METHOD_IMPLICIT = 2, DFM_METHOD_ROLLBACK = 3 };
-/* AUTO is SYMPLECTIC_EULER, or IMPLICIT_EULER where the method is IMPLICIT. IMPLICIT_EULER and TR_BDF2 need
+/* AUTO is SYMPLECTIC_EULER, or IMPLICIT_EULER where the method is IMPLICIT; with dfm_world_def.step it is
+ * what costs less, chosen for each body before the first step that it takes. IMPLICIT_EULER and TR_BDF2 need
  * models that give their stiffness, and are stable at every step (doc/concepts/implicit.md). TR_BDF2 is of
  * second order and damps little; where a body touches, it moves by IMPLICIT_EULER. */
 enum {
@@ -76,6 +77,11 @@ typedef struct dfm_world_def {
   /* iterations of Newton's method per sub-step, at most; 0: 20. 1 is one linear solve without a line search,
    * for an interactive scene */
   uint32_t newton_iterations;
+  uint32_t reserved2;
+  /* s, how long steps are to be, for integrators AUTO to be chosen by: a body whose explicit sub-steps would
+   * cost four times what implicit ones do moves by IMPLICIT_EULER (doc/concepts/implicit.md); 0: not told,
+   * AUTO as it is without */
+  double step;
 } dfm_world_def;
 
 /** Gravity (0,0,-9.81), everything automatic. Threads: Any thread. Since 0.1. */
@@ -126,10 +132,11 @@ enum {
  *                 one): rounding of positions rules below
  * @param trouble  out, DFM_TROUBLE_* bits; may be NULL
  * @return DFM_OK; DFM_DISCARD too many sub-steps, its budget used up (max_time, max_work) or
- * dfm_world_interrupt: nothing changed;
+ * dfm_world_interrupt: nothing changed but models whose time had come (model.h);
  *         DFM_E_DIVERGED a sub-step could not be taken (a value that is not finite, a plugin that failed,
  *         energy out of nothing): the world stays at its last good sub-step, and may step again once the
- *         cause is gone; DFM_E_NOMEM likewise; DFM_E_FATAL a plugin gave no step bound; DFM_E_ARG;
+ *         cause is gone; DFM_E_NOMEM likewise; DFM_E_FATAL a plugin gave no step bound; DFM_E_UNSUPPORTED a
+ *         change of model that was due and cannot be made (model.h), told until it is taken back; DFM_E_ARG;
  *         DFM_E_HANDLE; DFM_E_BUSY called from inside a step
  * Threads: One thread at a time per world. Since 0.1. */
 DFM_API dfm_status dfm_world_step(dfm_world world, double dt, uint32_t *trouble);
@@ -163,7 +170,7 @@ DFM_API dfm_equilibrium_def dfm_equilibrium_def_default(void);
  * @return DFM_OK; DFM_E_DIVERGED no equilibrium was found: a body that nothing holds has loads that do not
  * sum to zero, slides on, or falls; DFM_E_UNSUPPORTED a model without stiffness, rigid bodies, contact in a
  * world whose method is ROLLBACK; DFM_DISCARD interrupted; DFM_E_ARG; DFM_E_NOMEM; DFM_E_HANDLE; DFM_E_BUSY.
- * On failure nothing has changed.
+ * On failure nothing has changed but models whose time had come (model.h).
  * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_equilibrium(dfm_world world, const dfm_equilibrium_def *def,
                                          dfm_equilibrium_info *info);
@@ -239,11 +246,11 @@ DFM_API uint64_t dfm_world_hash(dfm_world world);
  * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_snapshot(dfm_world world, void *buffer, size_t *bytes);
 /** Restores into a world with the same bodies and obstacles (a scene loaded anew, in another process too):
- * state, contacts, loads, holds, motions, gravity, filters, friction rules, runtime parameters. The next
- * steps give the same bits; events not yet read are dropped.
+ * state, contacts, loads, holds, motions, gravity, filters, friction rules, models with their parameters. The
+ * next steps give the same bits; events not yet read are dropped.
  * @return DFM_OK; DFM_E_FORMAT damaged, of another version or not of such a world; DFM_E_UNSUPPORTED a
- * law that is not loaded; DFM_E_NOMEM; DFM_E_HANDLE. On failure nothing has changed. Threads: Not during
- * step. Since 0.1. */
+ * law or a model that is not loaded; DFM_E_NOMEM; DFM_E_HANDLE. On failure nothing has changed. Threads: Not
+ * during step. Since 0.1. */
 DFM_API dfm_status dfm_world_restore(dfm_world world, const void *buffer, size_t bytes);
 
 /** @return DFM_OK; DFM_E_ARG no body of that name (nearest one). Threads: Any thread. Not during

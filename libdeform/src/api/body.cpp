@@ -223,6 +223,11 @@ dfm_status dfm_body_hold(dfm_body body, uint32_t n, const uint32_t *points, uint
     exclusive(*b.world);
     check_points(b, n, points);
     if (axes > 7) fail(DFM_E_ARG, "axes is %u; it is a sum of 1 (x), 2 (y) and 4 (z)", unsigned(axes));
+    if (b.model.stepper)
+      fail(DFM_E_UNSUPPORTED,
+           "body '%s': model '%s' steps itself and learns which points are held when the body is made; give "
+           "dfm_body_def.fixed",
+           b.name.c_str(), b.model.type->id);
     if (axes == 0) drop_motions(b, {points, n});
     for (uint32_t i = 0; i < n; ++i) b.p.held[points[i]] = axes;
     update_inverse_mass(b.p);

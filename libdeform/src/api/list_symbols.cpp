@@ -8,7 +8,9 @@
 #define dfm_world_events events_inline
 #define dfm_world_overlaps overlaps_inline
 #define dfm_world_profile profile_inline
+#define dfm_world_swaps swaps_inline
 #include "deform/contact.h"
+#include "deform/model.h"
 #include "deform/world.h"
 #undef dfm_world_contacts
 #undef dfm_world_pairs
@@ -16,6 +18,7 @@
 #undef dfm_world_events
 #undef dfm_world_overlaps
 #undef dfm_world_profile
+#undef dfm_world_swaps
 
 // bytes: of a row in 0.1.
 #define DFM_LIST_SYMBOL(name, row, bytes)                                                         \
@@ -28,3 +31,4 @@ DFM_LIST_SYMBOL(dfm_world_pair_impulses, dfm_pair_impulse, 104)
 DFM_LIST_SYMBOL(dfm_world_events, dfm_contact_event, 40)
 DFM_LIST_SYMBOL(dfm_world_overlaps, dfm_overlap, 40)
 DFM_LIST_SYMBOL(dfm_world_profile, dfm_stage_time, 24)
+DFM_LIST_SYMBOL(dfm_world_swaps, dfm_swap, 64)

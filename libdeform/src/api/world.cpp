@@ -12,6 +12,7 @@
 #include "world/create.h"
 #include "world/equilibrium.h"
 #include "world/explain.h"
+#include "world/model_change.h"
 #include "world/snapshot.h"
 
 using namespace dfm;
@@ -75,10 +76,14 @@ void choose_integrator(World &w) {
          "integrator %d is not available; use DFM_INTEGRATOR_AUTO, DFM_INTEGRATOR_SYMPLECTIC_EULER, "
          "DFM_INTEGRATOR_IMPLICIT_EULER or DFM_INTEGRATOR_TR_BDF2",
          d.integrator);
-  if (d.integrator == DFM_INTEGRATOR_AUTO)
-    w.def.integrator =
-        d.method == DFM_METHOD_IMPLICIT ? DFM_INTEGRATOR_IMPLICIT_EULER : DFM_INTEGRATOR_SYMPLECTIC_EULER;
-  const bool implicit = d.integrator != DFM_INTEGRATOR_SYMPLECTIC_EULER;
+  if (!(d.step >= 0 && std::isfinite(d.step)))
+    fail(DFM_E_ARG, "step is %g; give the length of the steps in s, or 0 (not told)", d.step);
+  if (d.integrator == DFM_INTEGRATOR_AUTO && d.method == DFM_METHOD_IMPLICIT)
+    w.def.integrator = DFM_INTEGRATOR_IMPLICIT_EULER;
+  if (d.integrator == DFM_INTEGRATOR_AUTO && (d.step == 0 || d.method != DFM_METHOD_AUTO))
+    w.def.integrator = DFM_INTEGRATOR_SYMPLECTIC_EULER;
+  const bool implicit =
+      d.integrator != DFM_INTEGRATOR_AUTO && d.integrator != DFM_INTEGRATOR_SYMPLECTIC_EULER;
   if (!implicit && d.method == DFM_METHOD_IMPLICIT)
     fail(DFM_E_UNSUPPORTED,
          "contact method implicit belongs to the integrators implicit_euler and tr_bdf2; choose one of "
@@ -223,6 +228,7 @@ dfm_status dfm_world_step(dfm_world world, double dt, uint32_t *trouble) {
     if (const double floor = shortest_step(w, dt); dt < floor)
       fail(DFM_E_ARG, "%s", short_step(dt, floor).c_str());
     uint32_t bits = 0;
+    make_switches(w, dt);
     const dfm_status s = step_within_budget(w, dt, &bits);
     if (trouble) *trouble = bits;
     return s;
@@ -248,6 +254,7 @@ dfm_status dfm_world_equilibrium(dfm_world world, const dfm_equilibrium_def *def
              value);
     dfm_equilibrium_info found{};
     found.size = sizeof found;
+    make_switches(w, 0);
     find_equilibrium(w, d, found);
     if (info) give(info, found);
   });

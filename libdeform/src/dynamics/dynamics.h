@@ -75,6 +75,7 @@ struct Abilities {
   bool revises = false;   // revise() does something
   bool accurate = false;  // accurate_step() is known
   bool energy = false;    // the energy that its scheme keeps is known (step/energy_watch.h)
+  bool damps = false;     // its scheme keeps none: it lowers the energy itself
   bool parts = false;     // its free motion is another one where contacts are: begin(), take_contact()
 };
 
@@ -125,6 +126,9 @@ class Dynamics {
   // s, the sub-step whose error would be what is wanted, by that of this one; infinite: not known. After
   // end_state().
   virtual double accurate_step(const SubStep &) const { return std::numeric_limits<double>::infinity(); }
+  // Of a body whose scheme damps: forces at the end into points().f, loads of the sub-step included. False:
+  // the model cannot. After end_state().
+  virtual bool end_forces(const SubStep &) { return false; }
   // fraction: of the way to the end that is taken; velocities are the end's.
   virtual void commit(const SubStep &now, double fraction) = 0;
 

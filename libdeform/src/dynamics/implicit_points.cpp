@@ -26,6 +26,9 @@ constexpr uint32_t kPatience = 4;
 // correction one may lie before the iteration counts as lost.
 constexpr uint32_t kRevisions = 20;
 constexpr double kTolerated = 100, kDiverges = 100;
+// An end that moves by more than this times the last correction has new impulses: what earlier corrections
+// have taught does not hold there.
+constexpr double kElsewhere = 3;
 constexpr uint32_t kCuts = 8;  // of a correction that leads too far
 // What a sub-step may err by, over the median edge of the surface; how much longer the next one may be.
 constexpr double kErrs = 0.005, kGrows = 2;
@@ -38,6 +41,12 @@ constexpr double kAhead = 1 / (kMiddle * (2 - kMiddle));
 // Of h^3 times the third derivative (Hosea and Shampine 1996, Analysis and implementation of TR-BDF2,
 // section 2).
 constexpr double kError = (3 * kMiddle * kMiddle - 4 * kMiddle + 2) / (12 * (2 - kMiddle));
+
+double largest_change(const Array<double> &a, const Array<double> &b) {
+  double most = 0;
+  for (size_t k = 0; k < a.size(); ++k) most = std::max(most, std::fabs(a[k] - b[k]));
+  return most;
+}
 
 double largest(const Array<double> &a) {
   double most = 0;
@@ -425,24 +434,32 @@ Revision ImplicitPoints::revise(const SubStep &now, const double *surfel_impulse
     least_error_ = HUGE_VAL;
     return Revision::none;
   }
-  if (++revisions_ > kRevisions || !(error_ <= kDiverges * least_error_)) return Revision::diverged;
+  // The error is compared with how far the end has moved, because new impulses move it too.
+  const double moved = before > 0 ? largest_change(p_.v_end, before_) : HUGE_VAL;
+  if (moved > kElsewhere * corrected_) {
+    ways_.start(change_.size());
+    least_error_ = HUGE_VAL;
+    slow_ = 0;
+  }
+  if (++revisions_ > kRevisions || (error_ > moved && !(error_ <= kDiverges * least_error_)))
+    return Revision::diverged;
   least_error_ = std::min(least_error_, error_);
-  // The first correction is tried with the matrix at hand, and so is each that halves the one before.
+  // The first correction is tried with the matrix at hand, and so is each that leaves half of what it moved.
   Array<double> &v = p_.v_free;
   ended_ = false;
-  if (before == 0 || error_ <= kContracts * before ||
-      (error_ <= kDiverges * before && patient(error_ / before))) {
-    if (before == 0) ways_.start(change_.size());
+  if (error_ <= kContracts * moved || (error_ <= kDiverges * moved && patient(error_ / moved))) {
     accelerate(v);
+    corrected_ = largest(change_);
     add(v, 1);
     return Revision::velocity;
   }
   // What leads away from the solution is taken half way.
-  const double share = error_ <= before ? 1 : 0.5;
+  const double share = error_ <= moved ? 1 : 0.5;
   for (size_t j = 0; j < v.size(); ++j) v[j] = before_[j] + share * (p_.v_end[j] - before_[j]);
   if (!residual_at(now, v.data(), nullptr) || !linearize(now) || !solve_way(residual_))
     return Revision::failed;
   add(v, 1);
+  corrected_ = largest(change_);
   ways_.start(change_.size());
   return Revision::response;
 }

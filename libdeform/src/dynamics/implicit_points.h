@@ -19,6 +19,7 @@
 #include <utility>
 
 #include "dynamics/dynamics.h"
+#include "dynamics/relative_work.h"
 #include "dynamics/rest_factor.h"
 #include "dynamics/stiffness.h"
 #include "math/anderson.h"
@@ -36,10 +37,11 @@ class ImplicitPoints : public Dynamics {
             .placed = true,
             .revises = options_.newton > 1 && !stiffness_.constant(),
             .accurate = true,
+            .damps = true,
             .parts = options_.second_order};
   }
   // of a stage: 30 at 700 points, 60 at 4,300
-  uint32_t relative_work() const override { return options_.second_order ? 100 : 50; }
+  uint32_t relative_work() const override { return (options_.second_order ? 2 : 1) * kImplicitWork; }
   bool bound(double time, const AddRowSums &outside, StepBound &out) override;
   void begin(bool touched) override;
   void loads_before() override { load_before_ = p_.load; }
@@ -52,6 +54,7 @@ class ImplicitPoints : public Dynamics {
   EndState end() const override { return {p_.v_end.data(), mean()}; }
   void bound_ends(double &speed, double &change) const override;
   double accurate_step(const SubStep &now) const override;
+  bool end_forces(const SubStep &now) override { return !staged_ && ask(now, p_.v_end.data(), false); }
   void commit(const SubStep &now, double fraction) override;
 
  protected:
@@ -99,6 +102,7 @@ class ImplicitPoints : public Dynamics {
   std::vector<double> factor_params_;  // of the model then, where its stiffness is constant
   double error_ = 0;                   // m/s, the correction that the last revision found; 0: none yet
   double least_error_ = 0;             // m/s, of all revisions in the sub-step
+  double corrected_ = 0;               // m/s, the last correction
   uint32_t revisions_ = 0;             // since one found nothing to change
   bool ended_ = false;                 // v_end is v_free and what push_ makes of it
 

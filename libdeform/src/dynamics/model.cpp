@@ -1,5 +1,8 @@
 #include "dynamics/model.h"
 
+#include <algorithm>
+#include <utility>
+
 #include "core/error.h"
 #include "plugin/registry.h"
 
@@ -27,10 +30,17 @@ void ModelInstance::create(const dfm_type &t, const dfm_host &h, const dfm_mesh 
   params = std::move(values);
   if (!(ops->cells & DFM_CELL_TET))
     fail(DFM_E_UNSUPPORTED, "model '%s' takes no tetrahedra; choose another model for this mesh", t.id);
-  const dfm_status s = call("create", [&] { return ops->create(host, &mesh, &self); });
-  if (s != DFM_OK || !self) {
-    self = nullptr;
-    fail(s < 0 ? s : DFM_E_FATAL, "model '%s' refused the body (status %d); the log says why", t.id, int(s));
+  {
+    const Overheard why;
+    const dfm_status s = call("create", [&] { return ops->create(host, &mesh, &self); });
+    if (s != DFM_OK || !self) {
+      self = nullptr;
+      fail(s < 0 ? s : DFM_E_FATAL, "model '%s' refused the body: %s", t.id,
+           *why.text() ? why.text()
+           : s < 0     ? dfm_status_name(s)
+                       : "it made none, and does not say why");
+    }
+    if (*why.text()) static_cast<const dfm_context *>(h.ctx)->log(DFM_LOG_ERROR, why.text());
   }
   const dfm_slots *own = nullptr;
   if (ops->extension)
@@ -49,9 +59,28 @@ void ModelInstance::create(const dfm_type &t, const dfm_host &h, const dfm_mesh 
                                          mesh.npoint, mesh.ncell, mesh.nedge);
   state = Array<double>(nstate, 0.0, HookAllocator<double>(memory));
   state_out = state;
-  if (nstate && ops->state_init &&
+  start();
+}
+
+void ModelInstance::start() {
+  std::fill(state.begin(), state.end(), 0.0);
+  if (!state.empty() && ops->state_init &&
       call("state_init", [&] { return ops->state_init(self, state.data()); }) != DFM_OK)
-    fail(DFM_E_FATAL, "model '%s' could not initialize its state", t.id);
+    fail(DFM_E_FATAL, "model '%s' could not initialize its state", type->id);
+}
+
+void ModelInstance::swap(ModelInstance &other) noexcept {
+  std::swap(type, other.type);
+  std::swap(ops, other.ops);
+  std::swap(host, other.host);
+  std::swap(stepper, other.stepper);
+  std::swap(effects, other.effects);
+  std::swap(idle, other.idle);
+  std::swap(limited, other.limited);
+  std::swap(self, other.self);
+  params.swap(other.params);
+  state.swap(other.state);
+  state_out.swap(other.state_out);
 }
 
 bool ModelInstance::works(const std::string &effect) const {

@@ -46,6 +46,8 @@ struct ModelInstance {
   // Why the parameter of this row does nothing now; empty where it does what it says.
   std::string idle_reason(uint32_t row) const;
   uint32_t limited_cells() const;  // at the last bound
+  void swap(ModelInstance &other) noexcept;
+  void start();  // its state as at first; throws Error
   void commit_state() {
     if (!state.empty()) state.swap(state_out);
   }

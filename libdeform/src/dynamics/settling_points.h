@@ -22,6 +22,11 @@ class SettlingPoints : public ImplicitPoints {
   const double *contact_force() const { return last_.data(); }  // [npoint,3] N, of the last step
   double stiffest() const { return stiffest_; }                 // N/m, of a point, in the last step
 
+  Abilities abilities() const override {
+    Abilities a = ImplicitPoints::abilities();
+    a.damps = false;  // its steps are none in time
+    return a;
+  }
   bool bound(double time, const AddRowSums &outside, StepBound &out) override;
   bool free_motion(const SubStep &now, double &kinetic) override;
   // with the last contact forces: where contact is looked for

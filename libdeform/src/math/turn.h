@@ -12,6 +12,18 @@ inline Quat unit(Quat q) {
 }
 inline Quat conjugate(Quat q) { return {-q.x, -q.y, -q.z, q.w}; }
 
+// Of a rotation matrix, row-major: from its largest component, so that nothing cancels (Shepperd 1978).
+inline Quat quat_of(const double *r) {
+  const double trace = r[0] + r[4] + r[8];
+  Quat q{r[7] - r[5], r[2] - r[6], r[3] - r[1], 1 + trace};
+  if (trace < r[0] && r[0] >= r[4] && r[0] >= r[8])
+    q = {1 + (r[0] - r[4] - r[8]), r[1] + r[3], r[2] + r[6], r[7] - r[5]};
+  else if (trace < r[4] && r[4] >= r[8])
+    q = {r[1] + r[3], 1 + (r[4] - r[0] - r[8]), r[5] + r[7], r[2] - r[6]};
+  else if (trace < r[8]) q = {r[2] + r[6], r[5] + r[7], 1 + (r[8] - r[0] - r[4]), r[3] - r[1]};
+  return unit(q);
+}
+
 // From a to b along the shorter arc, s in [0,1]. Halving the arc needs square roots only: the midpoint of two
 // unit quaternions is their normalized sum. 52 halvings follow the bits of s.
 inline Quat slerp(Quat a, Quat b, double s) {

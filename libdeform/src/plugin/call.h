@@ -27,7 +27,7 @@ dfm_status call_plugin(const dfm_host &host, const dfm_type &type, const char *w
     context.logf(DFM_LOG_ERROR,
                  "%s: %s threw an exception; a plugin must not (wrap its entries in dfm::plugin::guarded)",
                  type.id, what);
-  else if (status < 0)
+  else if (status < 0 && !Overheard::active())
     context.logf(DFM_LOG_ERROR, "%s: %s returned %s", type.id, what, dfm_status_name(status));
   return status;
 }

@@ -2,6 +2,7 @@
 
 #include <cstdarg>
 #include <cstdio>
+#include <cstring>
 
 #include "core/error.h"
 
@@ -30,6 +31,7 @@ void *host_scratch(void *ctx, size_t bytes) {
 
 void host_log(void *ctx, int32_t level, uint32_t code, const char *utf8) {
   dfm::Loader::note_log(utf8);
+  if (level >= DFM_LOG_ERROR && dfm::Overheard::take(utf8)) return;
   if (code) self(ctx).logf(level, "[%u] %s", code, utf8 ? utf8 : "");
   else self(ctx).log(level, utf8 ? utf8 : "");
 }
@@ -122,3 +124,18 @@ void dfm_context::remove_live(uint64_t handle) noexcept {
       return;
     }
 }
+
+namespace dfm {
+
+thread_local Overheard *Overheard::now_ = nullptr;
+
+bool Overheard::take(const char *text) noexcept {
+  if (!now_) return false;
+  if (now_->text_[0] || !text) return true;
+  std::snprintf(now_->text_, sizeof now_->text_, "%s", text);
+  const size_t n = std::strlen(now_->text_);
+  if (n > 0 && now_->text_[n - 1] == '.') now_->text_[n - 1] = 0;
+  return true;
+}
+
+}  // namespace dfm

@@ -54,6 +54,25 @@ struct dfm_context {
 
 namespace dfm {
 
+// While it stands, an error that a plugin logs on this thread is kept here instead: who has called the plugin
+// says it in its own sentence. The first one counts; allocates nothing.
+class Overheard {
+ public:
+  Overheard() noexcept : outer_(now_) { now_ = this; }
+  ~Overheard() { now_ = outer_; }
+  Overheard(const Overheard &) = delete;
+  Overheard &operator=(const Overheard &) = delete;
+  const char *text() const { return text_; }  // without a full stop; empty: nothing was said
+
+  static bool active() noexcept { return now_; }
+  static bool take(const char *text) noexcept;  // false: nobody listens
+
+ private:
+  static thread_local Overheard *now_;
+  Overheard *outer_;
+  char text_[512] = {};
+};
+
 // A zone of the host's tracer for the life of the object.
 class TraceZone {
  public:

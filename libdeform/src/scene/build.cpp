@@ -4,13 +4,18 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/handle.h"
 #include "dynamics/rigid/host.h"
 #include "scene/jitter.h"
 #include "scene/load.h"
 #include "scene/start.h"
+#include "state/world.h"
+#include "world/equilibrium.h"
 
 namespace dfm::scene {
 namespace {
+
+constexpr double kFrame = 1.0 / 60;  // s, that a step is taken for where the scene names none
 
 class Builder {
  public:
@@ -35,6 +40,7 @@ class Builder {
     // its first step.
     double step = 0;
     check(dfm_world_stable_step(world_, &step, nullptr, nullptr), def_.effects_auto ? "/bodies" : "/effects");
+    if (def_.equilibrium) check_static();
     return {std::exchange(world_, 0), std::move(probes_)};
   }
 
@@ -48,6 +54,7 @@ class Builder {
     std::copy_n(def_.gravity, 3, w.gravity);
     w.method = def_.method;
     w.integrator = def_.integrator;
+    if (!def_.equilibrium) w.step = std::min(def_.step > 0 ? def_.step : kFrame, def_.duration);
     w.solver = def_.solver.c_str();
     w.solver_tolerance = def_.solver_tolerance;
     w.solver_iterations = def_.solver_iterations;
@@ -95,6 +102,14 @@ class Builder {
     } catch (const Error &e) {
       fail(e.status, "%s: %s: %s", def_.file.c_str(), pointer.c_str(), e.what());
     }
+  }
+
+  // Before anything is written.
+  void check_static() const {
+    with_pointer("/time/mode", [&] {
+      check_equilibrium(resolve<World>(Kind::world, world_));
+      return 0;
+    });
   }
 
   // Material of each cell; empty where no group has its own.
@@ -203,8 +218,25 @@ class Builder {
     for (size_t i = 0; i < b.fixes.size(); ++i) move_held(body, b.fixes[i], held[i]);
     add_loads(body, b, mesh, nodal);
     for (const Spring &s : b.springs) add_spring(body, s, b.name, mesh);
+    add_switches(body, b);
     for (const Probe &p : def_.probes)
       if (p.body == b.name) add_probe(body, p, mesh);
+  }
+
+  void add_switches(dfm_body body, Body &b) const {
+    std::vector<dfm_switch> switches;
+    for (Switch &s : b.switches)
+      switches.push_back({sizeof(dfm_switch), s.model.integrator, s.t, s.model.type.c_str(),
+                          s.model.params.view(), s.max_jump});
+    const std::string pointer = b.pointer + "/switch";
+    if (!switches.empty())
+      check(dfm_body_set_switches(body, uint32_t(switches.size()), switches.data()), pointer);
+    if (b.rule.far.type.empty()) return;
+    dfm_switch_rule rule = b.rule.values;
+    rule.touching = b.rule.touching.view();
+    rule.near_by = b.rule.near.view();
+    rule.otherwise = b.rule.far.view();
+    check(dfm_body_set_switch_rule(body, &rule), pointer);
   }
 
   void move_held(dfm_body body, const Fix &f, const std::vector<uint32_t> &points) const {

@@ -76,6 +76,27 @@ struct MadeMesh {
   uint32_t cells = 0;
 };
 
+// A model that the body is to have; type empty: none is named.
+struct ModelWords {
+  std::string type;
+  Params params;
+  int32_t integrator = DFM_INTEGRATOR_AUTO;
+  dfm_model_choice view() {
+    return {sizeof(dfm_model_choice), integrator, type.empty() ? nullptr : type.c_str(), params.view()};
+  }
+};
+// A change of the body's model, by time.
+struct Switch {
+  std::string pointer;
+  ModelWords model;
+  double t = 0, max_jump = 0;
+};
+// By what it does and where it is; far empty: there is no rule.
+struct SwitchRule {
+  ModelWords touching, near, far;
+  dfm_switch_rule values = dfm_switch_rule_default();
+};
+
 // How a body's points stand at the start.
 enum class StartKind { rest, scramble, plane, line, point, invert };
 struct Start {
@@ -99,6 +120,8 @@ struct Body {
   std::vector<Fix> fixes;
   std::vector<Force> forces;
   std::vector<Spring> springs;
+  std::vector<Switch> switches;
+  SwitchRule rule;
 };
 
 struct Obstacle {
@@ -168,6 +191,7 @@ struct Definition {
   std::vector<Probe> probes;
   // what only a runner needs
   double duration = 0, step = 0, every = 0, frame_rate = 0;
+  bool equilibrium = false;  // mode static
   bool frames = false, states = false, nodes = false, contacts = true, check = false, has_camera = false;
   double eye[3] = {}, look_at[3] = {};
   std::string color;

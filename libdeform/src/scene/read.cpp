@@ -248,7 +248,7 @@ void read_time(const Node &scene, Definition &def) {
     if (def.duration / def.step > 1e12)
       step.fail("%g s at %g s a step are more than 1e12 steps", def.duration, def.step);
   }
-  time.word("mode", "dynamic", "mode");
+  def.equilibrium = time.word("mode", "dynamic", "mode") == "static";
   def.integrator = integrator_of(time);
 }
 

@@ -206,6 +206,67 @@ Start read_start(const Node &node) {
   return out;
 }
 
+ModelWords read_model(const Node &node, const Types &types) {
+  ModelWords out;
+  const dfm_type *const type = read_type(node.at("type"), DFM_KIND_MODEL, types);
+  out.type = type->id;
+  if (node.has("params")) out.params = read_params(node.member("params"), type);
+  if (!node.has("integrator")) return out;
+  out.integrator = integrator_of(node);
+  if (out.integrator == DFM_INTEGRATOR_AUTO)
+    node.member("integrator")
+        .fail(
+            "a change of model names symplectic_euler, implicit_euler or tr_bdf2, or leaves the body's own");
+  return out;
+}
+
+void read_switches(const Node &list, const Types &types, Body &b) {
+  for (const Node &entry : list.items()) {
+    Switch s;
+    entry.object("switch");
+    s.pointer = entry.pointer();
+    s.t = entry.at("t").number();
+    s.model = read_model(entry, types);
+    if (entry.has("max_jump")) s.max_jump = entry.member("max_jump").number(kPositive);
+    if (!b.switches.empty() && s.t < b.switches.back().t)
+      entry.at("t").fail("times of switches do not fall; found %g s after %g s", s.t, b.switches.back().t);
+    b.switches.push_back(std::move(s));
+  }
+}
+
+// A model by its name alone, or with what it is made with.
+ModelWords read_word(const Node &rule, const char *key, const Types &types) {
+  if (!rule.has(key)) return {};
+  const Node node = rule.member(key);
+  if (node.value().is_object()) {
+    node.object("switch_model");
+    return read_model(node, types);
+  }
+  ModelWords out;
+  out.type = read_type(node, DFM_KIND_MODEL, types)->id;
+  return out;
+}
+
+void read_rule(const Node &rule, const Types &types, SwitchRule &out) {
+  rule.object("switch_rule");
+  out.touching = read_word(rule, "touching", types);
+  out.near = read_word(rule, "near", types);
+  rule.at("far");
+  out.far = read_word(rule, "far", types);
+  if (out.touching.type.empty() && out.near.type.empty())
+    rule.fail("expected \"touching\" or \"near\" beside \"far\"");
+  if (!out.near.type.empty()) {
+    rule.at("point").vector(out.values.point);
+    out.values.distance = rule.at("distance").number(kPositive);
+    out.values.hysteresis = rule.number("hysteresis", out.values.hysteresis, kNotNegative);
+  } else {
+    for (const char *key : {"point", "distance", "hysteresis"})
+      if (rule.has(key)) rule.member(key).fail("this is for \"near\", which names no model here");
+  }
+  out.values.wait = rule.number("wait", out.values.wait, kNotNegative);
+  if (rule.has("max_jump")) out.values.max_jump = rule.member("max_jump").number(kPositive);
+}
+
 Body read_body(const Node &node, ReadContext &context) {
   Body b;
   node.object("body");
@@ -232,6 +293,11 @@ Body read_body(const Node &node, ReadContext &context) {
   for (const Node &entry : node.items("forces")) b.forces.push_back(read_force(entry));
   for (const Node &entry : node.items("springs")) b.springs.push_back(read_spring(entry));
   read_carriers(node, type, context, b);
+  if (node.has("switch")) {
+    const Node change = node.member("switch");
+    if (change.value().is_object()) read_rule(change, context.types, b.rule);
+    else read_switches(change, context.types, b);
+  }
   if (node.has("start")) b.start = read_start(node.member("start"));
   if (node.has("nodal_bc")) b.nodal_bc = node.member("nodal_bc").text();
   return b;

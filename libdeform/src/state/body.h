@@ -8,6 +8,7 @@
 #include "deform/deform.h"
 #include "dynamics/dynamics.h"
 #include "state/energy_book.h"
+#include "state/model_choice.h"
 #include "state/motion.h"
 #include "state/search_tree.h"
 #include "state/sleep.h"
@@ -16,14 +17,8 @@ namespace dfm {
 
 struct World;
 
-// An entry of a material that the body's model has no parameter for.
+// An entry of a material, or a field (material empty), that the body's model has no parameter for.
 struct Unused { std::string key, material; };
-// A model parameter that differs from cell to cell, and who said so ("field", "materials", "share").
-struct CellField {
-  std::string key, from;
-  uint32_t width;
-  Array<double> values;
-};
 
 // A lasting load: force[i] on points[i], times the keyed scale, times 1 + sine.
 struct Load {
@@ -52,6 +47,21 @@ struct HeldMotion {
 
 inline constexpr int32_t kNoCoupling = -1;
 
+// By which integrator a body moves. step: s, the longest explicit sub-step of the body as its model was made;
+// infinite: none, or not asked for.
+struct Integrator {
+  uint32_t used = DFM_INTEGRATOR_SYMPLECTIC_EULER;
+  bool open = false;    // prepare() is to choose it
+  bool chosen = false;  // and has
+  double step = std::numeric_limits<double>::infinity();
+  uint32_t point = 0;  // that bounds it
+};
+
+struct SpareModel {
+  std::unique_ptr<ModelInstance> instance;
+  ModelOrigin origin;
+};
+
 struct Body {
   World *world = nullptr;
   uint64_t id = 0, handle = 0;
@@ -68,6 +78,13 @@ struct Body {
   int32_t coupling = kNoCoupling;  // DFM_COUPLING_* of a surface of its own
   ModelInstance model;
   std::unique_ptr<Dynamics> dynamics;  // how it moves
+  Integrator integrator;
+  Makeup makeup;
+  ModelOrigin origin;
+  std::vector<Switch> switches;  // to come, by time
+  std::vector<SwitchRule> rule;  // one or none
+  // instances that the rule has left and may come back to: what they have made of the mesh is theirs still
+  std::vector<SpareModel> spares;
   double mass = 0, rest_volume = 0;
   Array<double> share;  // [ntet] how much of each cell is material; empty: all
   std::vector<CellField> fields;

@@ -98,6 +98,22 @@ std::vector<std::string> keys_by_cell(const dfm_type &type) {
        has.c_str());
 }
 
+void check_field_values(const dfm_param &row, const dfm_cell_field &f, uint32_t ntet,
+                        const std::string &body) {
+  if (f.width != row.width)
+    fail(DFM_E_ARG, "body '%s': field '%s' has %u value%s per cell, %u expected", body.c_str(), f.key,
+         f.width, f.width == 1 ? "" : "s", row.width);
+  const bool whole = row.flags & (DFM_PARAM_INTEGER | DFM_PARAM_ENUM);
+  for (size_t i = 0; i < size_t(ntet) * row.width; ++i)
+    if (!(f.values[i] >= row.min && f.values[i] <= row.max) ||
+        (whole && f.values[i] != std::floor(f.values[i])))
+      fail(DFM_E_ARG, "body '%s': field '%s': cell %zu is %g; expected a %s in [%g, %g]%s%s", body.c_str(),
+           f.key, i / row.width, f.values[i], whole ? "whole number" : "number", row.min, row.max,
+           std::strcmp(row.unit, "1") == 0 ? "" : " ", std::strcmp(row.unit, "1") == 0 ? "" : row.unit);
+}
+
+}  // namespace
+
 void check_fields(const dfm_type &type, const dfm_body_def &def, const std::string &body) {
   if (def.nfield && !def.fields)
     fail(DFM_E_ARG, "body '%s': %u fields are announced, but fields is NULL", body.c_str(), def.nfield);
@@ -114,22 +130,12 @@ void check_fields(const dfm_type &type, const dfm_body_def &def, const std::stri
       if (def.model_params.values[k].key && std::strcmp(def.model_params.values[k].key, f.key) == 0)
         fail(DFM_E_ARG, "body '%s': '%s' is given both as one value and as a field; keep one", body.c_str(),
              f.key);
+    for (uint32_t i = 0; i < type.nparam; ++i)
+      if (std::strcmp(type.params[i].key, f.key) == 0) check_field_values(type.params[i], f, def.ntet, body);
   }
 }
 
-void check_field_values(const dfm_param &row, const dfm_cell_field &f, uint32_t ntet,
-                        const std::string &body) {
-  if (f.width != row.width)
-    fail(DFM_E_ARG, "body '%s': field '%s' has %u value%s per cell, %u expected", body.c_str(), f.key,
-         f.width, f.width == 1 ? "" : "s", row.width);
-  const bool whole = row.flags & (DFM_PARAM_INTEGER | DFM_PARAM_ENUM);
-  for (size_t i = 0; i < size_t(ntet) * row.width; ++i)
-    if (!(f.values[i] >= row.min && f.values[i] <= row.max) ||
-        (whole && f.values[i] != std::floor(f.values[i])))
-      fail(DFM_E_ARG, "body '%s': field '%s': cell %zu is %g; expected a %s in [%g, %g]%s%s", body.c_str(),
-           f.key, i / row.width, f.values[i], whole ? "whole number" : "number", row.min, row.max,
-           std::strcmp(row.unit, "1") == 0 ? "" : " ", std::strcmp(row.unit, "1") == 0 ? "" : row.unit);
-}
+namespace {
 
 // One parameter of the table: where its values stand in the packed ones, and what they are for each material.
 struct Row {
@@ -147,14 +153,15 @@ struct Row {
   }
 };
 
-CellField *add_field(Body &b, const World &w, const dfm_param &row, const char *from, uint32_t ntet) {
-  b.fields.push_back({row.key, from, row.width,
-                      Array<double>(size_t(ntet) * row.width, 0.0, HookAllocator<double>(w.memory()))});
-  return &b.fields.back();
+CellField *add_field(std::vector<CellField> &fields, const World &w, const dfm_param &row, const char *from,
+                     uint32_t ntet) {
+  fields.push_back({row.key, from, row.width,
+                    Array<double>(size_t(ntet) * row.width, 0.0, HookAllocator<double>(w.memory()))});
+  return &fields.back();
 }
 
-void scale_young(Body &b, const World &w, const char *model, const Row &row, CellField *field,
-                 uint32_t ntet) {
+void scale_young(const Body &b, const World &w, const char *model, const Row &row,
+                 std::vector<CellField> &fields, CellField *field, uint32_t ntet) {
   if (!(row.param.flags & DFM_PARAM_PER_CELL)) {
     w.context->logf(DFM_LOG_WARNING,
                     "body '%s': %s takes one Young's modulus for all cells, so cells that are filled in part "
@@ -163,7 +170,7 @@ void scale_young(Body &b, const World &w, const char *model, const Row &row, Cel
     return;
   }
   if (!field) {
-    field = add_field(b, w, row.param, "share", ntet);
+    field = add_field(fields, w, row.param, "share", ntet);
     std::fill(field->values.begin(), field->values.end(), *row.of(0));
   } else {
     field->from += " and share";
@@ -174,8 +181,13 @@ void scale_young(Body &b, const World &w, const char *model, const Row &row, Cel
 
 }  // namespace
 
-std::vector<double> model_values(const World &w, Body &b, const dfm_type &type, const dfm_body_def &def,
-                                 const CellMaterials &cells) {
+bool by_cell(const dfm_type &type, const std::string &key) {
+  const std::vector<std::string> keys = keys_by_cell(type);
+  return std::find(keys.begin(), keys.end(), key) != keys.end();
+}
+
+std::vector<double> model_values(const World &w, const Body &b, const dfm_type &type, const dfm_body_def &def,
+                                 const CellMaterials &cells, std::vector<CellField> &fields) {
   check_fields(type, def, b.name);
   std::vector<std::vector<double>> packed;
   for (const Material *m : cells.list) packed.push_back(values_of(type, def.model_params, *m));
@@ -189,8 +201,7 @@ std::vector<double> model_values(const World &w, Body &b, const dfm_type &type, 
       if (std::strcmp(def.fields[n].key, p.key) == 0) given = &def.fields[n];
     size_t other = 0;
     if (given) {
-      check_field_values(p, *given, def.ntet, b.name);
-      field = add_field(b, w, p, "field", def.ntet);
+      field = add_field(fields, w, p, "field", def.ntet);
       std::copy_n(given->values, field->values.size(), field->values.begin());
     } else if (row.differs(&other)) {
       if (!(p.flags & DFM_PARAM_PER_CELL))
@@ -199,12 +210,12 @@ std::vector<double> model_values(const World &w, Body &b, const dfm_type &type, 
              "and %g); give it in the model's parameters",
              b.name.c_str(), type.id, p.key, cells.list[0]->name.c_str(), cells.list[other]->name.c_str(),
              *row.of(0), *row.of(other));
-      field = add_field(b, w, p, "materials", def.ntet);
+      field = add_field(fields, w, p, "materials", def.ntet);
       for (uint32_t t = 0; t < def.ntet; ++t)
         std::copy_n(row.of(cells.of[t]), p.width, &field->values[size_t(t) * p.width]);
     }
     if (!b.share.empty() && std::strcmp(p.key, "young") == 0 && p.width == 1)
-      scale_young(b, w, type.id, row, field, def.ntet);
+      scale_young(b, w, type.id, row, fields, field, def.ntet);
   }
   return std::move(packed[0]);
 }

@@ -9,6 +9,7 @@
 namespace dfm {
 
 struct Body;
+struct CellField;
 struct World;
 
 struct Material {
@@ -36,10 +37,16 @@ void check_share(const dfm_body_def &def, const std::string &body);
 // Lumped mass of all points into b.p.mass; b.mass and b.rest_volume.
 void lump_body(Body &b, const dfm_body_def &def, const CellMaterials &cells);
 
+// Throws Error(ARG) for fields of the def that the model does not take, or that are none.
+void check_fields(const dfm_type &type, const dfm_body_def &def, const std::string &body);
+
 // Values of the model's parameters for the whole body, as its table orders them; those that differ by cell go
-// to b.fields. A parameter comes from the def's fields, else from its model_params, else from the cells'
-// materials, else it is the default; a share then scales "young".
-std::vector<double> model_values(const World &w, Body &b, const dfm_type &type, const dfm_body_def &def,
-                                 const CellMaterials &cells);
+// to `fields`. Of the def only model_params, ntet and fields count. A parameter comes from the def's fields,
+// else from its model_params, else from the cells' materials, else it is the default; a share then scales
+// "young".
+std::vector<double> model_values(const World &w, const Body &b, const dfm_type &type, const dfm_body_def &def,
+                                 const CellMaterials &cells, std::vector<CellField> &fields);
+// May the parameter of this key differ by cell?
+bool by_cell(const dfm_type &type, const std::string &key);
 
 }  // namespace dfm

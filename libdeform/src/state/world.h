@@ -109,6 +109,7 @@ struct World {
   Report report;
   std::vector<PairWork> work;  // sorted by (a, b)
   std::vector<dfm_contact_event> events;
+  std::vector<Swap> swaps;  // that the host has not read yet
   StepImpulses step_impulses;
   Hold hold;
   uint32_t sleepers = 0;

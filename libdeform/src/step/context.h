@@ -70,6 +70,7 @@ struct StepContext {
   bool bodies_revise = false;       // some body looks again at what the solve has made of it
   bool bodies_part = false;         // some body moves otherwise where contacts are
   Array<uint8_t> near;              // [bodies] had contacts in the last sub-step
+  Array<uint8_t> touching;          // [bodies] touch something, between steps
   const Body *unsettled = nullptr;  // that has found no state with its contacts
   // a host has answered, and the solve goes on from its last impulses
   bool rigid_again = false;

@@ -23,18 +23,26 @@ constexpr double kGivesBack = 0.5;
 constexpr uint32_t kSettles = 8;     // sub-steps
 constexpr double kRounding = 1e-12;  // of the sums that a balance is the difference of
 constexpr double kPositionDigits = 8 * 2.3e-16;
+// An implicit sub-step costs that much more, so the same shares of the time allow as many more looks.
+constexpr uint32_t kAges = 32;
 
 // Booked is the work of impulses: contacts that act on bodies in another way leave nothing to balance
 // the energy with.
 bool watching(const World &w) {
   return w.def.energy_watch > 0 && w.plan.has(StageRole::gives_impulses) == w.plan.touches();
 }
-bool books(const Body &b) { return b.dynamics->abilities().energy; }
+// By backward Euler, whose balance is that of the true energy.
+bool damps(const Body &b) { return b.dynamics->abilities().damps; }
+bool books(const Body &b) { return b.dynamics->abilities().energy || damps(b); }
 bool watched(const Body &b) {
   return books(b) && (b.model.ops->caps & DFM_CAP_ENERGY) && b.model.ops->energy;
 }
 // Loads that change from sub-step to sub-step have no potential: their work is booked as it is done.
 bool books_loads(const Body &b) { return b.loads_vary(); }
+// TR-BDF2 does the work of what varies along the sub-step, not at its end as it is booked.
+bool unbooked(const World &w, const Body &b) {
+  return b.dynamics->abilities().parts && (books_loads(b) || !b.motions.empty() || !w.gravity.keys.empty());
+}
 
 struct Look {
   double kinetic = 0, elastic = 0, balance = 0, gives_back = 0, rounding = 0;  // J
@@ -72,7 +80,7 @@ double work_of_new_size(const World &w, const StepContext &step, const Body &b) 
 // it may rise as stiff modes calm down.
 bool look(World &w, StepContext &step, Body &b, Look &out) {
   const Phyxels &p = b.p;
-  const bool load_booked = books_loads(b);
+  const bool load_booked = books_loads(b), ends = damps(b);
   double kinetic = 0, cross = 0, kick = 0, potential = 0, reach = 0;
   for (uint32_t i = 0; i < p.n; ++i) {
     const size_t at = size_t(i) * kStride;
@@ -82,8 +90,9 @@ bool look(World &w, StepContext &step, Body &b, Look &out) {
       reach = std::max(reach, std::fabs(x));
       potential -= (m * w.gravity.now[int(k)] + (load_booked ? 0 : load)) * x;
       if (!p.moves(at + k)) continue;
-      const double change = p.v_free[at + k] - v;
       kinetic += 0.5 * (m * v * v);
+      if (ends) continue;
+      const double change = p.v_free[at + k] - v;
       kick += 0.5 * (m * change * change);
       cross += 0.5 * v * (m * p.v_free[at + k] - (load_booked ? step.h * load : 0));
     }
@@ -93,9 +102,8 @@ bool look(World &w, StepContext &step, Body &b, Look &out) {
   if (b.model.call("energy", [&] { return b.model.ops->energy(b.model.self, &kin, &elastic); }) != DFM_OK)
     return false;
   const double drift = kPositionDigits * reach / step.h;
-  out = {kinetic, elastic,
-         elastic + potential + cross -
-             (b.energy.work + work_of_holders(w, step, b, false) + work_of_new_size(w, step, b)),
+  const double half_done = ends ? 0 : work_of_holders(w, step, b, false) + work_of_new_size(w, step, b);
+  out = {kinetic, elastic, elastic + potential + (ends ? kinetic : cross) - (b.energy.work + half_done),
          kGivesBack * kick,
          kRounding * (std::fabs(b.energy.work) + std::fabs(potential) + kinetic + elastic) +
              b.mass * drift * drift};
@@ -106,7 +114,7 @@ void book_contact(World &w, StepContext &step) {
   for (uint32_t d = 0; d < step.rows.ndof; ++d) {
     if (step.rows.source[d] == kNone) continue;
     Body &b = *w.bodies[step.rows.source[d]];
-    if (!books(b)) continue;
+    if (!b.dynamics->abilities().energy) continue;
     const size_t at = size_t(step.rows.point[d]) * kStride;
     const double *const end = b.dynamics->end().v;
     double sum = 0;
@@ -115,6 +123,41 @@ void book_contact(World &w, StepContext &step) {
     }
     b.energy.work += sum;
   }
+}
+
+// Of a sub-step of backward Euler, r the residual that Newton's method leaves:
+//
+//   M (v' - v) = h (f' + loads + m g) + p + r,  x' = x + h v'
+//
+// times v': kinetic energy rises by what f', loads, weight, contact and r do at v', less
+// |v' - v|^2 M / 2. The elastic energy rises by no more than -f'.(x' - x) where it is convex. Where the guard
+// takes a fraction of the way only, the potentials change by that fraction at most.
+void book_end(World &w, StepContext &step, Body &b, double motion) {
+  const Phyxels &p = b.p;
+  const bool load_booked = books_loads(b), driven = !step.driven.empty() && !b.motions.empty();
+  const double *const end = b.dynamics->end().v;
+  double contact = 0, loads = 0, gained = 0, held = 0;
+  if (w.plan.touches())
+    for (uint32_t s = 0; s < b.surface.nsurfel; ++s) {
+      const double *const q = &b.surfel_impulse[3 * size_t(s)];
+      if (q[0] == 0 && q[1] == 0 && q[2] == 0) continue;
+      b.surface.each_phyxel(s, [&](uint32_t point, double weight) {
+        for (size_t k = 0, at = size_t(point) * kStride; k < 3; ++k, ++at)
+          if (p.moves(at)) contact += weight * q[k] * end[at];
+      });
+    }
+  const bool forces = driven && b.dynamics->end_forces(sub_step_of(w, step));
+  for (uint32_t i = 0; i < p.n; ++i)
+    for (size_t k = 0, at = size_t(i) * kStride; k < 3; ++k, ++at) {
+      const double load = load_booked ? p.load[at] : 0;
+      if (p.moves(at)) {
+        loads += step.h * load * end[at];
+        gained += p.mass[i] * (end[at] - p.v[at]) * end[at];
+      } else if (forces) {
+        held -= motion * step.h * p.v[at] * (p.f[at] - load + p.mass[i] * w.gravity.now[int(k)]);
+      }
+    }
+  b.energy.work += contact + loads + held + (1 - motion) * (gained - loads - contact);
 }
 
 // Loads without a potential; and, where the guard left out a part of the way, what the inner forces would
@@ -138,8 +181,8 @@ void book_body(World &w, StepContext &step, Body &b, double motion) {
 }  // namespace
 
 // Of G = U(x) - m g.x + v.M v* / 2 with v* = v + h g + ..: a weight that changes does work at the places x -
-// h v / 2, whatever the motion. The sub-step may fail after this and be tried again with another gravity,
-// from the same state: then the rest is booked.
+// h v / 2, whatever the motion; at x where G is the true energy. The sub-step may fail after this and be
+// tried again with another gravity, from the same state: then the rest is booked.
 void change_gravity(World &w, Vec3 gravity) {
   const Vec3 by = gravity - w.gravity.now;
   w.gravity.now = gravity;
@@ -147,10 +190,10 @@ void change_gravity(World &w, Vec3 gravity) {
   for (auto &b : w.bodies) {
     if (!watched(*b)) continue;
     const Phyxels &p = b->p;
+    const double behind = damps(*b) ? 0 : 0.5 * w.watch.last_h;
     for (uint32_t i = 0; i < p.n; ++i)
       for (size_t k = 0, at = size_t(i) * kStride; k < 3; ++k, ++at)
-        b->energy.work -=
-            p.mass[i] * by[int(k)] * (p.x[at] - (p.moves(at) ? 0.5 * w.watch.last_h * p.v[at] : 0));
+        b->energy.work -= p.mass[i] * by[int(k)] * (p.x[at] - (p.moves(at) ? behind * p.v[at] : 0));
   }
 }
 
@@ -182,6 +225,7 @@ bool watch_energy(World &w, StepContext &step, uint32_t *trouble) {
     if (!watched(b) || !look(w, step, b, now)) continue;
     EnergyBook &e = b.energy;
     total += now.kinetic + now.elastic;
+    if (unbooked(w, b)) continue;
     const double rise = now.balance - e.base - now.rounding, level = now.balance + now.gives_back;
     const bool settled = e.known == kSettles;
     if (settled && rise > 0) gain += rise;
@@ -217,16 +261,22 @@ void book_energy(World &w, StepContext &step, double motion) {
   if (!watching(w)) return;
   const bool touched = w.plan.touches() && step.rows.n > 0;
   if (touched) book_contact(w, step);
+  uint32_t ages = 1;
   for (const uint32_t i : step.active) {
     Body &b = *w.bodies[i];
+    if (damps(b)) {
+      book_end(w, step, b, motion);
+      ages = kAges;
+      continue;
+    }
     if (!step.driven.empty()) b.energy.work += work_of_holders(w, step, b, true);
     if (books(b) && step.guard.planned == step.h) b.energy.work += work_of_new_size(w, step, b);
     if (books(b) && (motion < 1 || books_loads(b))) book_body(w, step, b, motion);
   }
   w.watch.last_h = motion * step.h;
   w.watch.new_size = w.watch.new_size && step.guard.planned != step.h;
-  w.watch.age += w.watch.age < kEvery;
-  w.watch.credit += w.watch.credit < kMostCredit;
+  if (w.watch.age <= kEvery) w.watch.age = std::min(w.watch.age + ages, kEvery);
+  w.watch.credit = std::min(w.watch.credit + ages, kMostCredit);
 }
 
 void forget_energy(Body &b) { b.energy = {}; }

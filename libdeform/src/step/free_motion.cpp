@@ -5,6 +5,7 @@
 
 #include "body/make_surface.h"
 #include "core/error.h"
+#include "plugin/context.h"
 #include "state/bounds.h"
 #include "step/context.h"
 #include "step/first_failure.h"
@@ -44,6 +45,20 @@ bool stage_model(World &w, Active active, const SubStep &now, uint32_t *trouble)
   return false;
 }
 
+namespace {
+// A model that steps itself and refused to: asked again where it is heard, so that its reason is the error.
+bool tells_why(const World &w, const Body &b, const SubStep &now) {
+  if (!b.model.stepper) return false;
+  const Overheard why;
+  double kinetic = 0;
+  if (b.dynamics->free_motion(now, kinetic) || !*why.text()) return false;
+  set_last_error(format("step %llu, body '%s': %s", static_cast<unsigned long long>(w.step_count),
+                        b.name.c_str(), why.text())
+                     .c_str());
+  return true;
+}
+}  // namespace
+
 bool stage_predict(World &w, Active active, const SubStep &now, Array<double> &kinetic, uint32_t *trouble) {
   const bool touches = w.plan.touches();
   FirstFailure failed;
@@ -57,6 +72,10 @@ bool stage_predict(World &w, Active active, const SubStep &now, Array<double> &k
   });
   if (failed.body == kNone) return true;
   const Body &b = *w.bodies[failed.body];
+  if (tells_why(w, b, now)) {
+    *trouble |= DFM_TROUBLE_PLUGIN;
+    return false;
+  }
   *trouble |= DFM_TROUBLE_NONFINITE;
   const size_t n = b.dynamics->point_velocity() ? b.p.n : b.surface.nsurfel;
   const double speed = largest_coordinate(b.dynamics->contact_velocity(), n, kStride);

@@ -8,7 +8,9 @@
 #include <algorithm>
 
 #include "core/error.h"
+#include "dynamics/relative_work.h"
 #include "friction/pair_rules.h"
+#include "plan/integrators.h"
 #include "state/bounds.h"
 #include "step/energy_watch.h"
 #include "step/overlap.h"
@@ -211,6 +213,49 @@ void make_pair_tables(World &w, StepContext &step, SceneFacts &facts) {
   for (auto &l : w.laws) w.pairs.laws.push_back(l.get());
 }
 
+// As many sub-steps as the step has without the others, for who may choose; nothing else is known of them.
+IntegratorOption option_of(const World &w, const Body &b) {
+  IntegratorOption o;
+  o.substeps = std::max(1.0, w.def.step / b.integrator.step);
+  o.work = double(b.p.n) + double(b.tets.size() / 4);
+  const uint32_t caps = b.model.ops->caps;
+  if (!b.model.stepper && (caps & DFM_CAP_STIFFNESS))
+    o.implicit_work = caps & DFM_CAP_CONSTANT_STIFFNESS ? kConstantWork : kImplicitWork;
+  o.open = b.integrator.open;
+  o.implicit = b.integrator.used != DFM_INTEGRATOR_SYMPLECTIC_EULER;
+  return o;
+}
+
+// Of bodies that have come since the last step and leave it to the library. Before the first step it is one
+// choice for all of them, in whatever order they came and whatever was asked in between.
+void choose_integrators(World &w) {
+  const auto open = [](const auto &b) { return b->integrator.open; };
+  if (std::none_of(w.bodies.begin(), w.bodies.end(), open)) return;
+  if (w.step_count == 0) reopen_integrators(w);
+  std::vector<IntegratorOption> options;
+  for (const auto &b : w.bodies) options.push_back(option_of(w, *b));
+  choose_integrators(options);
+  for (size_t i = 0; i < options.size(); ++i) {
+    Body &b = *w.bodies[i];
+    if (!b.integrator.open) continue;
+    const bool was = b.integrator.used == DFM_INTEGRATOR_IMPLICIT_EULER;
+    if (options[i].implicit != was) {
+      b.dynamics = make_dynamics(w.memory(), b.p, b.surface, b.model, b.edges,
+                                 options[i].implicit ? &w.implicit : nullptr);
+      b.integrator.used =
+          options[i].implicit ? DFM_INTEGRATOR_IMPLICIT_EULER : DFM_INTEGRATOR_SYMPLECTIC_EULER;
+    }
+    if (options[i].implicit && !was) {
+      w.context->logf(DFM_LOG_WARNING,
+                      "body '%s' moves by implicit_euler, which damps motion, for explicit time would take "
+                      "%.0f sub-steps of %.3g s in a step; an integrator that is named stays",
+                      b.name.c_str(), std::ceil(options[i].substeps), b.integrator.step);
+    }
+    b.integrator.open = false;
+    b.integrator.chosen = true;
+  }
+}
+
 void choose_plan(World &w, StepContext &step, SceneFacts &facts) {
   for (const dfm_type *t : w.context->registry.list()) offer(*t, facts.available);
   facts.unguarded = w.def.flags & DFM_WORLD_UNGUARDED;
@@ -231,6 +276,10 @@ double choose_offset(const World &w) {
 
 }  // namespace
 
+void reopen_integrators(World &w) {
+  for (const auto &b : w.bodies) b->integrator.open = b->integrator.open || b->integrator.chosen;
+}
+
 void values_changed(World &w) {
   w.revalued = true;
   w.bound.age = kNone;
@@ -247,6 +296,7 @@ void prepare(World &w, const RestoredChoice *restored) {
     if (w.revalued) look_at_plan(w, step);
     return settle_overlaps(w);
   }
+  choose_integrators(w);
   const uint32_t nb = static_cast<uint32_t>(w.bodies.size());
   SceneFacts &facts = step.facts;
   facts = {};

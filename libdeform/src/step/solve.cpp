@@ -51,9 +51,10 @@ void apply_last(ContactRows &rows) {
 }
 
 constexpr uint32_t kMostRevisions = 6;  // of what rigid hosts take for granted, within a sub-step
-// Revisions of bodies by the last impulses before the first solve; further solves at most, once bodies are
-// content, of what the cap on sweeps has cut off.
-constexpr uint32_t kWarmRevisions = 8, kMostAgain = 6;
+// Revisions of bodies by the last impulses before the first solve: a few, because the solve moves bodies
+// anyway where they do not rest. Further solves at most, once bodies are content, of what the cap on sweeps
+// has cut off.
+constexpr uint32_t kWarmRevisions = 4, kMostAgain = 6;
 // A sub-step in which a body does not come to a state with its contacts is taken anew, half as long, down to
 // this share of the planned one.
 constexpr double kLeastPiece = 1.0 / 256;

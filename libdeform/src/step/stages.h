@@ -33,6 +33,8 @@ void prepare(World &w, const RestoredChoice *restored = nullptr);
 // a law. The step bound is asked for anew and the energy books begin anew; the plan is looked at in the
 // next prepare().
 void values_changed(World &w);
+// The library chooses the integrators that were left to it anew, in the next prepare().
+void reopen_integrators(World &w);
 void set_gravity_now(World &w);  // from what is prescribed, at the present time
 dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble);
 

@@ -15,7 +15,7 @@ namespace {
 // it is used, which pays for what a shape changes by about a twentieth of its lengths; so it is asked for
 // again after 16 sub-steps, sooner where the edges stretch faster.
 constexpr uint32_t kBoundEvery = 16;
-constexpr double kBoundShare = 0.9, kBoundStrain = 0.05;
+constexpr double kBoundStrain = 0.05;
 
 uint32_t inverted_cells(const Body &b) {
   uint32_t n = 0;

@@ -6,6 +6,8 @@ namespace dfm {
 
 struct World;
 
+inline constexpr double kBoundShare = 0.9;  // of the bound, that is used
+
 bool bound_due(const World &w);  // does the next sub-step ask for it?
 void update_bound(World &w);     // w.bound
 

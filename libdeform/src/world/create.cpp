@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 #include "core/error.h"
 #include "core/handle.h"
@@ -15,6 +14,7 @@
 #include "step/context.h"
 #include "step/method.h"
 #include "step/stages.h"
+#include "world/body_model.h"
 #include "world/body_surface.h"
 #include "world/body_zones.h"
 #include "world/idle.h"
@@ -78,37 +78,16 @@ void place_phyxels(Body &b, const dfm_body_def &def) {
   }
 }
 
-// [n,3] the rest positions where the pose has put them, for a model whose forces do not turn with the body;
-// empty for the others.
-std::vector<double> rest_for(const dfm_type &type, const Body &b) {
-  std::vector<double> placed;
-  if (static_cast<const dfm_model *>(type.ops)->caps & DFM_CAP_ROTATION_INVARIANT) return placed;
-  for (size_t i = 0; i < b.p.n; ++i)
-    placed.insert(placed.end(), &b.p.x[i * kStride], &b.p.x[i * kStride] + 3);
-  return placed;
-}
-
-}  // namespace
-
-namespace {
-
-// None: its points move explicitly.
-std::optional<ImplicitOptions> implicit_of(const World &w, const std::string &name, const dfm_body_def &def) {
-  if (def.integrator < DFM_INTEGRATOR_AUTO || def.integrator > DFM_INTEGRATOR_TR_BDF2)
-    fail(DFM_E_UNSUPPORTED,
-         "body '%s': integrator %d is not available; use DFM_INTEGRATOR_AUTO, "
-         "DFM_INTEGRATOR_SYMPLECTIC_EULER, DFM_INTEGRATOR_IMPLICIT_EULER or DFM_INTEGRATOR_TR_BDF2",
-         name.c_str(), def.integrator);
-  const int32_t which = def.integrator == DFM_INTEGRATOR_AUTO ? w.def.integrator : def.integrator;
-  if (which == DFM_INTEGRATOR_SYMPLECTIC_EULER) return std::nullopt;
-  if (w.def.method == DFM_METHOD_VELOCITY || w.def.method == DFM_METHOD_ROLLBACK)
-    fail(DFM_E_UNSUPPORTED,
-         "body '%s': the integrator %s cannot be in a world whose contact method is %s, which takes "
-         "inverse masses; use the method auto or implicit",
-         name.c_str(), integrator_name(which), w.method->name);
-  ImplicitOptions options = w.implicit;
-  options.second_order = which == DFM_INTEGRATOR_TR_BDF2;
-  return options;
+// Copies, which outlive the def and its materials.
+void keep_makeup(World &w, Body &b, const dfm_body_def &def, const CellMaterials &cells) {
+  for (const Material *m : cells.list) b.makeup.materials.push_back(*m);
+  b.makeup.of = cells.of;
+  for (uint32_t i = 0; i < def.nfield; ++i) {
+    const dfm_cell_field &f = def.fields[i];
+    b.makeup.given.push_back(
+        {f.key, "field", f.width,
+         Array<double>(f.values, f.values + size_t(f.width) * def.ntet, HookAllocator<double>(w.memory()))});
+  }
 }
 
 }  // namespace
@@ -162,36 +141,14 @@ Body &create_body(World &w, const dfm_body_def &def) {
   make(b.surfel_impulse, size_t(3) * b.surface.nsurfel);
 
   const dfm_type &type = w.context->registry.find(DFM_KIND_MODEL, def.model ? def.model : "msm");
-  const MeshCoupling coupling(m, b.surface);
-  std::vector<double> values = model_values(w, b, type, def, materials);
-  find_unused(b, type, materials);
-  std::vector<const char *> field_keys;
-  std::vector<const double *> fields;
-  for (const CellField &f : b.fields) {
-    field_keys.push_back(f.key.c_str());
-    fields.push_back(f.values.data());
-  }
-  field_keys.push_back(nullptr);
-  dfm_mesh mesh{};
-  mesh.size = sizeof mesh;
-  mesh.npoint = p.n;
-  mesh.ncell = def.ntet;
-  mesh.cell = DFM_CELL_TET;
-  const std::vector<double> placed = rest_for(type, b);
-  mesh.rest = placed.empty() ? p.rest.data() : placed.data();
-  mesh.cells = b.tets.data();
-  mesh.mass = p.mass.data();
-  mesh.params = values.data();
-  mesh.field_keys = field_keys.data();
-  mesh.fields = fields.data();
-  mesh.nedge = static_cast<uint32_t>(b.edges.size() / 2);
-  mesh.edges = b.edges.data();
-  mesh.fixed = p.held.data();
-  coupling.tell(mesh);
-  b.model.create(type, w.context->host, mesh, m, std::move(values));
-  const auto implicit = implicit_of(w, b.name, def);
-  b.dynamics = make_dynamics(m, p, b.surface, b.model, b.edges, implicit ? &*implicit : nullptr);
-  if (!b.dynamics->abilities().placed) need_ability(w, Ability::self_stepping, "body", b.name);
+  check_fields(type, def, b.name);
+  keep_makeup(w, b, def, materials);
+  ModelOrigin origin{keep_params(type, def.model_params),
+                     to_pose(def.pose),
+                     static_cast<uint32_t>(def.integrator),
+                     {p.held.begin(), p.held.end()}};
+  const std::unique_ptr<BodyModel> made = make_body_model(w, b, type, std::move(origin), def.integrator);
+  exchange(b, *made);
   if (!b.surface.identity()) need_ability(w, Ability::own_surface, "body", b.name);
   if (w.method->point_values) make(b.method_values, size_t(kStride) * p.n);
 

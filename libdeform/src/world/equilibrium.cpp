@@ -174,7 +174,9 @@ class Search {
   bool done_ = false;
 };
 
-void check(const World &w) {
+}  // namespace
+
+void check_equilibrium(const World &w) {
   if (!w.rigid_sets.empty())
     fail(DFM_E_UNSUPPORTED,
          "an equilibrium is not looked for where rigid bodies move; take them out, or run the world in time");
@@ -190,11 +192,9 @@ void check(const World &w) {
          w.method->name);
 }
 
-}  // namespace
-
 void find_equilibrium(World &w, const dfm_equilibrium_def &def, dfm_equilibrium_info &info) {
   prepare(w);
-  check(w);
+  check_equilibrium(w);
   if (w.plan.touches()) return settle(w, def, info);
   {
     Search search(w, def, info);

@@ -6,6 +6,7 @@
 #include "core/error.h"
 #include "step/context.h"
 #include "step/method.h"
+#include "world/create.h"
 #include "world/idle.h"
 
 namespace dfm {
@@ -23,9 +24,35 @@ std::string quote(const std::string &s) {
   return out + "\"";
 }
 
+const char *word_of(const Body &b) {
+  if (b.model.stepper) return "its own";
+  return b.integrator.used == DFM_INTEGRATOR_SYMPLECTIC_EULER ? "symplectic_euler"
+                                                              : integrator_name(int32_t(b.integrator.used));
+}
+
+// How it moves, and what explicit time would take.
+std::string integrator(const Body &b) {
+  const auto &i = b.integrator;
+  const double step = b.world->def.step, n = std::max(1.0, std::ceil(step / i.step));
+  std::string why;
+  if (b.model.stepper) why = "the model steps itself";
+  else if (!i.chosen) why = "named, or the world's";
+  else if (i.used != DFM_INTEGRATOR_SYMPLECTIC_EULER)
+    why = "auto: explicit time costs more than four times as much";
+  else if (!(b.model.ops->caps & DFM_CAP_STIFFNESS))
+    why = "auto: the model gives no stiffness, which implicit time needs";
+  else why = "auto: implicit time, which damps motion, would not be four times cheaper";
+  std::string out = std::string("\"integrator\":{\"used\":") + quote(word_of(b)) + ",\"why\":" + quote(why);
+  if (step > 0 && std::isfinite(i.step))
+    out += format(",\"explicit_s\":%.9g,\"substeps\":%.0f,\"worst_point\":%u", i.step, n, i.point);
+  return out + "}";
+}
+
 // Where a body's numbers come from: its cells, its surface, and the parameters that differ by cell.
 std::string body(const Body &b) {
   std::string out = "{\"name\":" + quote(b.name) + ",\"model\":" + quote(b.model.type->id);
+  out += std::string(",\"kind\":") +
+         quote(b.model.ops->caps & DFM_CAP_PLAUSIBLE ? "plausible, not physical" : "physical");
   out += format(",\"cells\":%zu,\"points\":%u,\"surfels\":%u", b.tets.size() / 4, b.p.n, b.surface.nsurfel);
   const char *const surface = b.coupling == kNoCoupling           ? "boundary"
                               : b.coupling == DFM_COUPLING_MLS    ? "own, mls"
@@ -39,7 +66,7 @@ std::string body(const Body &b) {
     out += (i ? "," : "") + ("{\"name\":" + quote(f.key) + ",\"from\":" + quote(f.from) +
                              format(",\"min\":%.9g,\"max\":%.9g}", *lo, *hi));
   }
-  out += "],\"idle\":[";
+  out += "]," + integrator(b) + ",\"idle\":[";
   bool first = true;
   for (const IdleParam &p : idle_params(b)) {
     out += (first ? "" : ",") + ("{\"name\":" + quote(p.key) + ",\"why\":" + quote(p.why) + "}");

@@ -30,12 +30,12 @@ const CellField *field_of(const Body &b, const char *key) {
 
 }  // namespace
 
-void find_unused(Body &b, const dfm_type &type, const CellMaterials &cells) {
+std::vector<Unused> find_unused(const dfm_type &type, const CellMaterials &cells) {
+  std::vector<Unused> out;
   const dfm_material_def plain = dfm_material_def_default();
   const auto note = [&](const std::string &key, const std::string &material) {
     const auto same = [&](const Unused &u) { return u.key == key; };
-    if (!has_row(type, key) && std::none_of(b.unused.begin(), b.unused.end(), same))
-      b.unused.push_back({key, material});
+    if (!has_row(type, key) && std::none_of(out.begin(), out.end(), same)) out.push_back({key, material});
   };
   for (const Material *m : cells.list) {
     const dfm_material_def &d = m->def;
@@ -46,6 +46,7 @@ void find_unused(Body &b, const dfm_type &type, const CellMaterials &cells) {
     for (const std::string &key : m->extra_keys)
       if (key != "friction") note(key, m->name);
   }
+  return out;
 }
 
 std::vector<IdleParam> idle_params(const Body &b) {
@@ -53,7 +54,9 @@ std::vector<IdleParam> idle_params(const Body &b) {
   const dfm_type &type = *b.model.type;
   for (const Unused &u : b.unused)
     out.push_back({u.key,
-                   format("%s has no such parameter (material '%s' gives it)", type.id, u.material.c_str()),
+                   u.material.empty() ? format("%s has no such parameter by cell (a field gives it)", type.id)
+                                      : format("%s has no such parameter (material '%s' gives it)", type.id,
+                                               u.material.c_str()),
                    true});
   size_t at = 0;
   for (uint32_t i = 0; i < type.nparam; at += type.params[i++].width) {

@@ -14,9 +14,9 @@ struct IdleParam {
   bool chosen;  // not the default: somebody set it and expects something of it
 };
 
-// Entries of the materials that the model has no parameter for and that are not at their default, into
-// b.unused. Friction is the pairs' to use.
-void find_unused(Body &b, const dfm_type &type, const CellMaterials &cells);
+// Entries of the materials that the model has no parameter for and that are not at their default. Friction is
+// the pairs' to use.
+std::vector<Unused> find_unused(const dfm_type &type, const CellMaterials &cells);
 
 // b.unused, then what the model's extension "dfm.idle/1" says about the present parameters, in the order of
 // its table; those at their default only where a material has them.

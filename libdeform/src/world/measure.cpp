@@ -11,6 +11,14 @@
 
 namespace dfm {
 
+double elastic_energy(Body &b) {
+  if (!(b.model.ops->caps & DFM_CAP_ENERGY) || !b.model.ops->energy) return NAN;
+  double joule = 0;
+  const dfm_kin k = b.dynamics->kin(b.world->time, 0);
+  const auto ask = [&] { return b.model.ops->energy(b.model.self, &k, &joule); };
+  return b.model.call("energy", ask) == DFM_OK ? joule : NAN;
+}
+
 dfm_body_measure measure(Body &b) {
   dfm_body_measure m{};
   m.mass = b.mass;
@@ -44,13 +52,7 @@ dfm_body_measure measure(Body &b) {
          b.contact_impulse + (b.slumber.asleep ? b.world->time - b.slumber.since : 0) * b.slumber.force);
   m.kinetic = kinetic;
   m.speed_max = std::sqrt(fastest);
-  m.elastic = NAN;
-  if ((b.model.ops->caps & DFM_CAP_ENERGY) && b.model.ops->energy) {
-    double joule = 0;
-    const dfm_kin k = b.dynamics->kin(b.world->time, 0);
-    if (b.model.call("energy", [&] { return b.model.ops->energy(b.model.self, &k, &joule); }) == DFM_OK)
-      m.elastic = joule;
-  }
+  m.elastic = elastic_energy(b);
   return m;
 }
 

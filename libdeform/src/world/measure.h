@@ -5,6 +5,7 @@
 namespace dfm {
 
 dfm_body_measure measure(Body &b);
+double elastic_energy(Body &b);  // J; NaN where the model gives none
 // [ntet] J/m3; throws where the model offers none
 void energy_density(Body &b, double *out);
 // [ntet,6] Pa; throws where the model offers none

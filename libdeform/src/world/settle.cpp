@@ -219,7 +219,9 @@ class Settling {
       }
       if (rests && there) return steps;
       goes_on = goes_on || rests || ++before == kWaits;
-      longest = easy ? std::min(kLongest, 2 * h) : whole && w_.stats.sweeps <= kHard ? h : 0.5 * h;
+      // sweeps of the guard's further solves count too: many of them that lead to a solution are no reason
+      const bool fair = whole && (w_.stats.sweeps <= kHard || off <= kGap);
+      longest = easy ? std::min(kLongest, 2 * h) : fair ? h : 0.5 * h;
       if (there) check_progress(steps, h);
     }
   }

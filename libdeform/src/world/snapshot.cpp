@@ -21,86 +21,14 @@
 #include "step/context.h"
 #include "step/method.h"
 #include "step/stages.h"
+#include "world/body_model.h"
 #include "world/measure.h"
+#include "world/snapshot_models.h"
 #include "world/snapshot_stream.h"
+#include "world/snapshot_structure.h"
 
 namespace dfm {
 namespace {
-
-void zone(Hash &h, const SurfaceZones::Zone &z) {
-  h.add(z.group.data(), z.group.size());
-  h.add(z.material.data(), z.material.size());
-  h.add(z.friction);
-}
-
-// What must be the same in the world that a snapshot is restored into.
-uint64_t structure(const World &w) {
-  Hash h;
-  for (auto &b : w.bodies) {
-    h.add(b->id);
-    h.add(b->p.n);
-    h.add(b->surface.nsurfel);
-    h.add(uint64_t(b->model.state.size()));
-    h.add(b->model.type->id, std::strlen(b->model.type->id));
-    h.add(b->name.data(), b->name.size());
-    h.add(b->material.data(), b->material.size());
-    h.add(b->tets.data(), b->tets.size() * sizeof(uint32_t));
-    h.add(b->p.rest.data(), b->p.rest.size() * sizeof(double));
-    h.add(b->p.mass.data(), b->p.mass.size() * sizeof(double));
-    for (const CellField &f : b->fields) {
-      h.add(f.key.data(), f.key.size());
-      h.add(f.values.data(), f.values.size() * sizeof(double));
-    }
-    const Surface &s = b->surface;
-    h.add(s.row.data(), s.row.size() * sizeof(uint32_t));
-    h.add(s.col.data(), s.col.size() * sizeof(uint32_t));
-    h.add(s.weight.data(), s.weight.size() * sizeof(double));
-    h.add(s.rest.data(), s.rest.size() * sizeof(double));
-    if (!s.identity()) h.add(s.tri.data(), s.tri.size() * sizeof(uint32_t));
-    zone(h, b->zones.list[0]);
-    if (b->zones.of.empty()) continue;
-    for (const auto &z : b->zones.list) zone(h, z);
-    h.add(b->zones.of.data(), b->zones.of.size() * sizeof(uint32_t));
-  }
-  for (auto &o : w.obstacles) {
-    const dfm_obstacle_def &d = o->def;
-    h.add(o->id);
-    h.add(d.shape);
-    h.add(d.pose);
-    h.add(d.half_size);
-    h.add(d.radius);
-    h.add(d.half_length);
-    h.add(d.velocity_surface);
-    if (!o->points.empty()) {
-      h.add(o->points.data(), o->points.size() * sizeof(double));
-      h.add(o->triangles.data(), o->triangles.size() * sizeof(uint32_t));
-      h.add(d.cells);
-    }
-    h.add(d.category);
-    h.add(d.collides_with);
-    h.add(o->name.data(), o->name.size());
-    h.add(o->material.data(), o->material.size());
-    h.add(o->zone.friction);
-    if (o->added) {
-      h.add(o->rigid_body);
-      h.add(o->local.position);
-      h.add(o->local.rotation);
-    }
-  }
-  for (auto &set : w.rigid_sets) {
-    h.add(set->host_name.data(), set->host_name.size());
-    h.add(set->njoint);
-    h.add(uint64_t(set->extra.size()));
-    h.add(set->group.data(), set->group.size() * sizeof(uint32_t));
-    for (const dfm_rigid_def &d : set->defs) {
-      h.add(d.mass);
-      h.add(d.inertia);
-    }
-  }
-  if (w.method->point_values) h.add(w.def.method);
-  if (const uint8_t asked = asks_self_contact(w)) h.add(asked);
-  return h.value;
-}
 
 // A world's changing part, read in full before anything of it is put in place. Members are named as in World,
 // Body and Obstacle, so that the lists of fields serve both.
@@ -110,9 +38,15 @@ struct StagedBody {
     Array<uint8_t> held;
   } p;
   struct {
+    std::string id;
     Array<double> state;
     std::vector<double> params;
   } model;
+  ModelOrigin origin;
+  Integrator integrator;
+  std::vector<Switch> switches;
+  std::vector<SwitchRule> rule;
+  std::unique_ptr<BodyModel> made;  // where the world's body has another model than the snapshot's
   Vec3 contact_impulse;
   EnergyBook energy;
   std::vector<Load> loads;
@@ -159,6 +93,7 @@ struct Staged {
   std::vector<PairWork> work;
   Report report;
   std::vector<dfm_contact_event> events;  // none
+  std::vector<Swap> swaps;                // none
   explicit Staged(const World &w) : store(w.memory()), report(w.memory()) {
     const Memory &m = w.memory();
     def.method = w.def.method;
@@ -183,6 +118,8 @@ T &object(const std::unique_ptr<T> &x) {
 
 std::string id_of(const LawInstance &law) { return law.type->id; }
 std::string &id_of(StagedLaw &law) { return law.id; }
+std::string id_of(const ModelInstance &model) { return model.type->id; }
+std::string &id_of(decltype(StagedBody::model) &model) { return model.id; }
 
 // ---- what values must be ----------------------------------------------------------------------------------
 
@@ -269,8 +206,7 @@ void prescribed_fields(Stream &s, B &b, const Body &like) {
     s.value("spring stiffness", p.stiffness, must::not_negative);
     s.value("spring damping", p.damping, must::not_negative);
     s.must_hold("spring keys", "finite keys at rising times", [&] { return rise(p.keys); });
-    s.must_hold("spring number", "a number below the next one, on a body that is no self-stepping one",
-                [&] { return p.number < b.next_load && like.dynamics->abilities().springs; });
+    s.must_hold("spring number", "a number below the next one", [&] { return p.number < b.next_load; });
     s.must_hold("spring weights", "weights that sum to one", [&] {
       return std::fabs(std::accumulate(p.weights.begin(), p.weights.end(), 0.0) - 1) < 1e-9;
     });
@@ -284,6 +220,33 @@ void prescribed_fields(Stream &s, B &b, const Body &like) {
   });
 }
 
+// Does the world's body have the model that the snapshot's had, made with the same?
+template <class B>
+bool made_alike(B &b, const Body &like) {
+  const ModelOrigin &mine = b.origin, &other = like.origin;
+  const auto bits = [](const Pose &a, const Pose &c) { return std::memcmp(&a, &c, sizeof a) == 0; };
+  return id_of(b.model) == like.model.type->id && mine.params == other.params &&
+         bits(mine.frame, other.frame) && mine.integrator == other.integrator && mine.held == other.held &&
+         b.integrator.used == like.integrator.used;
+}
+
+template <class Stream, class B>
+void model_fields(Stream &s, B &b, const Body &like) {
+  s.array("model", id_of(b.model), kAnyCount, must::any);
+  param_fields(s, b.origin.params);
+  s.value("model's frame", b.origin.frame, must::pose);
+  s.value("model's integrator", b.origin.integrator, must::at_most(DFM_INTEGRATOR_TR_BDF2));
+  s.array("model's held", b.origin.held, like.origin.held.size(), must::at_most(7));
+  s.value("integrator used", b.integrator.used,
+          must::Be{[](uint32_t x) { return x - 1 < DFM_INTEGRATOR_TR_BDF2; }, "an integrator"});
+  const bool alike = made_alike(b, like);
+  s.array("model state", b.model.state, alike ? like.model.state.size() : kAnyCount, must::finite);
+  s.array("model parameters", b.model.params, alike ? like.model.params.size() : kAnyCount, must::finite);
+  s.must_hold("model parameters", "values in the range of the model's table",
+              [&] { return !alike || in_range(*like.model.type, b.model.params); });
+  switch_fields(s, b);
+}
+
 template <class Stream, class W, class B>
 void body_fields(Stream &s, W &w, B &b, const Body &like) {
   s.where("body", like.name);
@@ -293,10 +256,7 @@ void body_fields(Stream &s, W &w, B &b, const Body &like) {
   s.array("load sum", b.p.load, like.p.load.size(), must::finite);
   s.must_hold("position", "a fourth component of zero",
               [&] { return padded(b.p.x) && padded(b.p.v) && padded(b.p.load); });
-  s.array("model state", b.model.state, like.model.state.size(), must::finite);
-  s.array("model parameters", b.model.params, like.model.params.size(), must::finite);
-  s.must_hold("model parameters", "values in the range of the model's table",
-              [&] { return in_range(*like.model.type, b.model.params); });
+  model_fields(s, b, like);
   s.value("contact_impulse", b.contact_impulse, must::finite);
   s.value("energy known", b.energy.known, must::at_most(8));
   s.value("least energy", b.energy.base, must::finite);
@@ -570,34 +530,70 @@ void order_contacts(ContactStore &c) {
             [&](uint32_t i, uint32_t j) { return c.key[i] != c.key[j] ? c.key[i] < c.key[j] : i < j; });
 }
 
+// Models that the world's bodies do not have are made, with what the snapshot's had.
+void make_models(const SnapshotReader &s, World &w, Staged &t) {
+  for (size_t i = 0; i < w.bodies.size(); ++i) {
+    Body &b = *w.bodies[i];
+    StagedBody &other = t.bodies[i];
+    for (const Switch &x : other.switches) w.context->registry.find(DFM_KIND_MODEL, x.to.type);
+    for (const SwitchRule &r : other.rule)
+      for (const ModelChoice *c : {&r.touching, &r.near, &r.far})
+        if (!c->type.empty()) w.context->registry.find(DFM_KIND_MODEL, c->type);
+    if (!made_alike(other, b)) {
+      const dfm_type &type = w.context->registry.find(DFM_KIND_MODEL, other.model.id);
+      try {
+        other.made = make_body_model(w, b, type, other.origin, static_cast<int32_t>(other.integrator.used));
+      } catch (const Error &e) {
+        if (e.status == DFM_E_NOMEM) throw;
+        fail(DFM_E_FORMAT, "the snapshot's model does not fit this world: %s; nothing was restored",
+             e.what());
+      }
+      ModelInstance &made = other.made->instance;
+      if (made.state.size() != other.model.state.size()) s.refuse("model state", "as many as the model has");
+      if (made.params.size() != other.model.params.size() || !in_range(type, other.model.params))
+        s.refuse("model parameters", "values in the range of the model's table");
+      made.state.swap(other.model.state);
+    }
+    const Dynamics &moves = other.made ? *other.made->dynamics : *b.dynamics;
+    if (!other.springs.empty() && !moves.abilities().springs)
+      s.refuse("spring number", "no spring on a body that steps itself");
+  }
+}
+
 // ---- into the world ---------------------------------------------------------------------------------------
 
-void put_parameters(Body &b, const std::vector<double> &values) {
-  if (values == b.model.params) return;
-  if (!b.model.ops->set_params || b.model.call("set_params", [&] {
-        return b.model.ops->set_params(b.model.self, values.data());
-      }) != DFM_OK)
+void put_parameters(const Body &b, const ModelInstance &model, const std::vector<double> &values) {
+  if (values == model.params) return;
+  if (!model.ops->set_params ||
+      model.call("set_params", [&] { return model.ops->set_params(model.self, values.data()); }) != DFM_OK)
     fail(DFM_E_FORMAT,
          "the snapshot has other parameters for model '%s' of body '%s', which cannot take them while it "
          "runs; nothing was restored",
-         b.model.type->id, b.name.c_str());
+         model.type->id, b.name.c_str());
 }
 
 // Of the first `n` bodies, back to what they were.
 void take_parameters_back(World &w, const Staged &t, size_t n) noexcept {
   while (n-- > 0) {
     Body &b = *w.bodies[n];
-    if (t.bodies[n].model.params != b.model.params)
+    if (!t.bodies[n].made && t.bodies[n].model.params != b.model.params)
       b.model.call("set_params",
                    [&] { return b.model.ops->set_params(b.model.self, b.model.params.data()); });
   }
 }
 
 // All parameters of all models, or none.
-void put_parameters(World &w, const Staged &t) {
+void put_parameters(World &w, Staged &t) {
+  for (size_t i = 0; i < w.bodies.size(); ++i)
+    if (StagedBody &other = t.bodies[i]; other.made) {
+      put_parameters(*w.bodies[i], other.made->instance, other.model.params);
+      other.made->instance.params.swap(other.model.params);
+    }
   size_t done = 0;
   try {
-    for (; done < w.bodies.size(); ++done) put_parameters(*w.bodies[done], t.bodies[done].model.params);
+    for (; done < w.bodies.size(); ++done)
+      if (!t.bodies[done].made)
+        put_parameters(*w.bodies[done], w.bodies[done]->model, t.bodies[done].model.params);
   } catch (...) {
     take_parameters_back(w, t, done);
     throw;
@@ -614,8 +610,14 @@ void exchange(World &w, Staged &t) noexcept {
     b.p.v.swap(other.p.v);
     b.p.load.swap(other.p.load);
     b.p.held.swap(other.p.held);
-    b.model.state.swap(other.model.state);
-    b.model.params.swap(other.model.params);
+    if (other.made) {
+      exchange(b, *other.made);
+    } else {
+      b.model.state.swap(other.model.state);
+      b.model.params.swap(other.model.params);
+    }
+    b.switches.swap(other.switches);
+    b.rule.swap(other.rule);
     b.loads.swap(other.loads);
     b.springs.swap(other.springs);
     b.motions.swap(other.motions);
@@ -655,6 +657,7 @@ void exchange(World &w, Staged &t) noexcept {
   w.gravity.keys.swap(t.gravity.keys);
   w.work.swap(t.work);
   w.events.swap(t.events);
+  w.swaps.swap(t.swaps);
   std::swap(w.def.gravity, t.def.gravity);
   std::swap(w.def.sleep, t.def.sleep);
   std::swap(w.store, t.store);
@@ -702,7 +705,7 @@ void world_snapshot(const World &w, std::vector<unsigned char> &out, std::vector
   out.resize(sizeof(SnapshotHead));
   SnapshotWriter s(out, map);
   fields(s, w, w);
-  SnapshotHead head{{}, kSnapshotVersion, 0, out.size(), structure(w), 0};
+  SnapshotHead head{{}, kSnapshotVersion, 0, out.size(), snapshot_structure(w), 0};
   std::memcpy(head.magic, kSnapshotMagic, sizeof head.magic);
   std::memcpy(out.data(), &head, sizeof head);
   head.checksum = snapshot_checksum(out.data(), out.size());
@@ -731,9 +734,10 @@ void check_head(const World &w, const unsigned char *data, size_t bytes) {
          static_cast<unsigned long long>(head.length), bytes);
   if (head.checksum != snapshot_checksum(data, bytes))
     fail(DFM_E_FORMAT, "the snapshot is damaged (checksum); nothing was restored");
-  if (head.structure != structure(w))
+  if (head.structure != snapshot_structure(w))
     fail(DFM_E_FORMAT,
-         "the snapshot belongs to another world: names, meshes, masses, models, fields and obstacles must be "
+         "the snapshot belongs to another world: names, meshes, masses, materials, fields and obstacles must "
+         "be "
          "the same; nothing was restored");
 }
 
@@ -746,6 +750,7 @@ void world_restore(World &w, const void *data, size_t bytes) {
   Staged staged(w);
   fields(s, staged, w);
   check(s, staged, w);
+  make_models(s, w, staged);
   order_contacts(staged.store);
   std::vector<std::unique_ptr<LawInstance>> laws = make_laws(s, w, staged);
   const double offset = w.offset;

@@ -99,7 +99,9 @@ void use(dfm_world w) {
   test::contacts(w);
   dfm_world_hash(w);
   const dfm_status s = dfm_world_step(w, 1e-4, &trouble);
-  EXPECT_TRUE(s == DFM_OK || s == DFM_E_DIVERGED || s == DFM_DISCARD)
+  // a target that the host might have set too, and farther away than an obstacle may go in this step
+  const bool far = s == DFM_E_ARG && std::strstr(dfm_last_error(), "would move at");
+  EXPECT_TRUE(s == DFM_OK || s == DFM_E_DIVERGED || s == DFM_DISCARD || far)
       << dfm_status_name(s) << ": " << dfm_last_error();
   test::contacts(w);
 }

@@ -1,0 +1,138 @@
+// A model under test: bodies of tetrahedra for it, what it answers at a state, and steps.
+#pragma once
+#include <cstdint>
+#include <new>
+#include <string>
+#include <vector>
+
+#include "check/environment.h"
+#include "check/law.h"
+#include "check/plugin.h"
+#include "check/runner.h"
+
+namespace cli::check {
+
+template <class T>
+struct Aligned64 {
+  using value_type = T;
+  Aligned64() = default;
+  template <class U>
+  Aligned64(const Aligned64<U> &) {}
+  T *allocate(size_t n) { return static_cast<T *>(::operator new(n * sizeof(T), std::align_val_t(64))); }
+  void deallocate(T *p, size_t) { ::operator delete(p, std::align_val_t(64)); }
+  bool operator==(const Aligned64 &) const { return true; }
+};
+using Numbers = std::vector<double, Aligned64<double>>;
+
+// Tetrahedra of a block of cubes with edges of `kCube`, its points shifted at random. Surfels are some of its
+// points, and as many blends of three.
+constexpr double kCube = 0.1;  // m
+struct Solid {
+  std::vector<double> rest, mass, weight;
+  std::vector<uint32_t> cells, edges, row, col;
+  std::vector<uint8_t> fixed;
+  uint32_t npoint() const { return static_cast<uint32_t>(mass.size()); }
+  uint32_t ncell() const { return static_cast<uint32_t>(cells.size() / 4); }
+  uint32_t nedge() const { return static_cast<uint32_t>(edges.size() / 2); }
+  uint32_t nsurfel() const { return static_cast<uint32_t>(row.size() - 1); }
+  double volume(uint32_t cell) const;
+  void find_edges();
+};
+enum class Held { nothing, one_side };
+Solid block(uint32_t x, uint32_t y, uint32_t z, Held held = Held::nothing);
+Solid small_block(Held held = Held::nothing);  // 48 points: arrays of 64-byte lines at every stride
+
+// Parameters that rules are asked with: the defaults, the defaults with damping, each word of each
+// enumeration. What create refuses is left out.
+struct Variant {
+  std::string name;  // "the defaults", "energy = stvk"
+  std::vector<double> params;
+};
+std::vector<Variant> variants(const Subject &subject);
+
+const dfm_model &model_of(const Subject &subject);
+
+class Body {
+ public:
+  // Where create refuses: Broken, or made() is false.
+  enum class Refusal { is_broken, is_told };
+  Body(const Subject &subject, const Solid &solid, const Variant &variant, uint32_t stride = 4,
+       Refusal refusal = Refusal::is_broken);
+  ~Body();
+  Body(const Body &) = delete;
+  Body &operator=(const Body &) = delete;
+
+  // why() is what create logged.
+  bool made() const { return self != nullptr; }
+  const std::string &why() const { return why_; }
+  bool steps_itself() const { return stepper != nullptr; }
+  bool can(uint32_t cap) const { return (caps & cap) != 0; }
+  const void *extension(const char *id) const;
+  uint32_t points() const { return solid.npoint(); }
+  double *at(Numbers &of, uint32_t point) const { return of.data() + size_t(stride) * point; }
+
+  dfm_kin kin() const;
+  // The status of a call, under Kept and with the scratch given back.
+  template <class F>
+  dfm_status call(const char *name, F &&f) const {
+    const Kept kept(name);
+    const dfm_status status = f();
+    subject.plugin->host().give_back_scratch();
+    return status;
+  }
+  // The same, and Broken where it is not DFM_OK.
+  template <class F>
+  void must(const char *name, F &&f) const {
+    if (const dfm_status status = call(name, f); status != DFM_OK) refused(name, status);
+  }
+  Numbers forces() const;                                   // [npoint,stride]
+  double energy() const;                                    // J
+  std::vector<double> stiffness(double a, double b) const;  // [3 npoint, 3 npoint]
+  // Where the host lets a step be h, h^2 ksum + 2 h csum <= 4 m holds in every row; 0: none asks for it.
+  double longest_step() const;
+  void shake(double amount, double speed, Random &random);
+  void turn(const double *axis, double angle, const double *shift);
+
+  std::vector<double> predict(const Numbers &load);
+  std::vector<double> respond(const std::vector<uint32_t> &surfels, const std::vector<double> &p) const;
+  // p [nsurfel,3]; the state at t + dt becomes the state.
+  void commit(const std::vector<double> &p);
+  // One step without loads: of its own, or of symplectic Euler.
+  void advance(double h);
+
+  const Subject &subject;
+  const Solid solid;
+  const std::vector<double> params;
+  const dfm_model &ops;
+  const uint32_t stride;
+  uint32_t caps = 0;  // of the model, less what the parameters take away
+  void *self = nullptr;
+  const dfm_stepper *stepper = nullptr;
+  Numbers x, v;
+  std::vector<double> state;
+  double t = 0, dt = 1e-3;
+
+ private:
+  [[noreturn]] void refused(const char *name, dfm_status status) const;
+  std::string why_;
+};
+
+// Of a rule that asks several variants: named in its sentences.
+std::string with(const Variant &variant);
+double length(const double *a);
+double largest(const Numbers &f);
+// Does Cholesky's factorization of shift I - m, [width,width], exist? Only half of m is looked at.
+bool below(const std::vector<double> &m, size_t width, double shift);
+
+// Asks a rule for each variant; what it says where all keep it.
+template <class F>
+std::string for_variants(const Subject &subject, const F &rule) {
+  const std::vector<Variant> all = variants(subject);
+  for (const Variant &v : all) {
+    stage("%s", with(v).c_str());
+    rule(v);
+  }
+  return text("%zu set%s of parameters", all.size(), all.size() == 1 ? "" : "s");
+}
+
+}  // namespace cli::check

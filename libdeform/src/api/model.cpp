@@ -1,0 +1,142 @@
+#include "deform/model.h"
+
+#include <cmath>
+
+#include "api/objects.h"
+#include "core/error.h"
+#include "world/idle.h"
+#include "world/model_change.h"
+
+using namespace dfm;
+
+namespace {
+
+dfm_params params_of(const dfm_params *given) {
+  dfm_params none{};
+  none.size = sizeof none;
+  return given ? *given : none;
+}
+
+// Of one entry.
+Switch make_switch(const Body &b, const dfm_switch &s, double after) {
+  need(s.type, "type");
+  if (!std::isfinite(s.t) || s.t < after)
+    fail(DFM_E_ARG, "body '%s': a switch at %g s; times are finite and do not fall from one to the next",
+         b.name.c_str(), s.t);
+  Switch out{s.t, choose_model(b, s.type, s.params, s.integrator)};
+  if (!(s.max_jump >= 0))
+    fail(DFM_E_ARG, "body '%s': max_jump is %g J; it must be above 0, or 0 for any jump", b.name.c_str(),
+         s.max_jump);
+  if (s.max_jump > 0) out.to.max_jump = s.max_jump;
+  return out;
+}
+
+ModelChoice make_choice(const Body &b, const dfm_model_choice &c, double max_jump) {
+  if (!c.type) return {};
+  ModelChoice out = choose_model(b, c.type, c.params, c.integrator);
+  if (out.integrator == kSameIntegrator) out.integrator = b.origin.integrator;  // before another model's
+  if (max_jump > 0) out.max_jump = max_jump;
+  return out;
+}
+
+SwitchRule make_rule(const Body &b, const dfm_switch_rule &r) {
+  const char *const name = b.name.c_str();
+  if (!r.otherwise.type || (!r.touching.type && !r.near_by.type))
+    fail(DFM_E_ARG,
+         "body '%s': a rule names the model for otherwise (far) and one for touching, near_by (near) or both",
+         name);
+  if (!(r.max_jump >= 0)) fail(DFM_E_ARG, "body '%s': max_jump is %g J; 0 is any jump", name, r.max_jump);
+  for (const double x : {r.hysteresis, r.wait})
+    if (!(x >= 0 && std::isfinite(x)))
+      fail(DFM_E_ARG, "body '%s': hysteresis and wait (s) are finite and not negative; found %g", name, x);
+  SwitchRule out;
+  out.touching = make_choice(b, r.touching, r.max_jump);
+  out.near = make_choice(b, r.near_by, r.max_jump);
+  out.far = make_choice(b, r.otherwise, r.max_jump);
+  out.hysteresis = r.hysteresis;
+  out.wait = r.wait;
+  if (!r.near_by.type) return out;
+  for (const double x : r.point)
+    if (!std::isfinite(x)) fail(DFM_E_ARG, "body '%s': the point of a rule is not finite", name);
+  if (!(r.distance > 0 && std::isfinite(r.distance)))
+    fail(DFM_E_ARG, "body '%s': the distance of a rule is %g m; it must be positive and finite", name,
+         r.distance);
+  out.point = load3(r.point);
+  out.distance = r.distance;
+  return out;
+}
+
+}  // namespace
+
+dfm_status dfm_body_set_model(dfm_body body, const char *type, const dfm_params *params) {
+  return as_status([&] {
+    Body &b = body_of(body);
+    World &w = exclusive(*b.world);
+    need(type, "type");
+    const ModelChoice to = choose_model(b, type, params_of(params), DFM_INTEGRATOR_AUTO);
+    w.swaps.reserve(w.swaps.size() + 1);
+    Swap swap;
+    change_model(b, to, swap);
+    keep_swap(w, swap);
+    warn_of_idle(b);
+  });
+}
+
+dfm_status dfm_body_set_switches(dfm_body body, uint32_t n, const dfm_switch *switches) {
+  return as_status([&] {
+    Body &b = body_of(body);
+    exclusive(*b.world);
+    if (n) need(switches, "switches");
+    std::vector<Switch> made;
+    for (const dfm_switch &s : take_defs(switches, n, dfm_switch{}, "switch", "set it to sizeof(dfm_switch)"))
+      made.push_back(make_switch(b, s, made.empty() ? -HUGE_VAL : made.back().t));
+    b.switches.swap(made);
+  });
+}
+
+dfm_switch_rule dfm_switch_rule_default(void) {
+  dfm_switch_rule r{};
+  r.size = sizeof r;
+  for (dfm_model_choice *c : {&r.touching, &r.near_by, &r.otherwise}) c->size = sizeof *c;
+  r.hysteresis = 0.1;
+  r.wait = 0.1;
+  return r;
+}
+
+dfm_status dfm_body_set_switch_rule(dfm_body body, const dfm_switch_rule *rule) {
+  return as_status([&] {
+    Body &b = body_of(body);
+    exclusive(*b.world);
+    std::vector<SwitchRule> made;
+    if (rule) made.push_back(make_rule(b, take_def(rule, dfm_switch_rule_default())));
+    b.rule.swap(made);
+    b.spares.clear();
+  });
+}
+
+dfm_status dfm_body_set_interest(dfm_body body, const double point[3]) {
+  return as_status([&] {
+    Body &b = body_of(body);
+    exclusive(*b.world);
+    need(point, "point");
+    for (int k = 0; k < 3; ++k)
+      if (!std::isfinite(point[k])) fail(DFM_E_ARG, "body '%s': the point is not finite", b.name.c_str());
+    if (b.rule.empty() || b.rule[0].near.type.empty())
+      fail(DFM_E_ARG, "body '%s' has no rule that asks for a place; call dfm_body_set_switch_rule first",
+           b.name.c_str());
+    b.rule[0].point = load3(point);
+  });
+}
+
+dfm_status dfm_world_swaps_sized(dfm_world world, uint32_t row_size, uint32_t capacity, dfm_swap *out,
+                                 uint32_t *n) {
+  return as_status([&] {
+    Rows<dfm_swap> rows(out, row_size, "dfm_swap");
+    World &w = exclusive(world_of(world));
+    if (!room(static_cast<uint32_t>(w.swaps.size()), capacity, out, n)) return;
+    for (const Swap &s : w.swaps)
+      rows.add({0, s.refused ? uint32_t{DFM_SWAP_REFUSED} : 0, s.body, s.t, s.from->id, s.to->id, s.before,
+                s.after, s.max_jump});
+    w.swaps.clear();
+  });
+}

@@ -1,0 +1,196 @@
+#include "world/body_model.h"
+
+#include <algorithm>
+#include <cstring>
+#include <optional>
+#include <span>
+#include <utility>
+
+#include "core/error.h"
+#include "plugin/params.h"
+#include "plugin/registry.h"
+#include "state/world.h"
+#include "step/method.h"
+#include "step/step_bound.h"
+#include "world/body_surface.h"
+#include "world/create.h"
+#include "world/idle.h"
+
+namespace dfm {
+namespace {
+
+// None: its points move explicitly, or what moves them is to be chosen (out.open).
+std::optional<ImplicitOptions> implicit_of(const World &w, const std::string &name, int32_t asked,
+                                           Integrator &out) {
+  if (asked < DFM_INTEGRATOR_AUTO || asked > DFM_INTEGRATOR_TR_BDF2)
+    fail(DFM_E_UNSUPPORTED,
+         "body '%s': integrator %d is not available; use DFM_INTEGRATOR_AUTO, "
+         "DFM_INTEGRATOR_SYMPLECTIC_EULER, DFM_INTEGRATOR_IMPLICIT_EULER or DFM_INTEGRATOR_TR_BDF2",
+         name.c_str(), asked);
+  const int32_t which = asked == DFM_INTEGRATOR_AUTO ? w.def.integrator : asked;
+  out.open = which == DFM_INTEGRATOR_AUTO;
+  if (out.open || which == DFM_INTEGRATOR_SYMPLECTIC_EULER) return std::nullopt;
+  if (w.def.method == DFM_METHOD_VELOCITY || w.def.method == DFM_METHOD_ROLLBACK)
+    fail(DFM_E_UNSUPPORTED,
+         "body '%s': the integrator %s cannot be in a world whose contact method is %s, which takes "
+         "inverse masses; use the method auto or implicit",
+         name.c_str(), integrator_name(which), w.method->name);
+  ImplicitOptions options = w.implicit;
+  options.second_order = which == DFM_INTEGRATOR_TR_BDF2;
+  out.used = static_cast<uint32_t>(which);
+  return options;
+}
+
+// What an explicit sub-step of the body may be, for integrators to be chosen by.
+void ask_explicit_bound(const World &w, Dynamics &dynamics, Integrator &out) {
+  StepBound bound;
+  if (w.def.step == 0 || !dynamics.bound(w.time, [](double *, double *) {}, bound)) return;
+  out.step = kBoundShare * bound.step;
+  out.point = bound.point;
+}
+
+// [n,3] the rest positions where the frame puts them, for a model whose forces do not turn with the body;
+// empty for the others.
+std::vector<double> rest_for(const dfm_type &type, const Body &b, const Pose &frame) {
+  std::vector<double> placed;
+  if (static_cast<const dfm_model *>(type.ops)->caps & DFM_CAP_ROTATION_INVARIANT) return placed;
+  placed.resize(b.p.rest.size());
+  for (size_t i = 0; i < b.p.rest.size(); i += 3) store3(&placed[i], place(frame, load3(&b.p.rest[i])));
+  return placed;
+}
+
+// Fields that the type has no parameter for stay with the mesh, and are told.
+std::vector<dfm_cell_field> fields_for(const dfm_type &type, const Body &b, std::vector<Unused> &unused) {
+  std::vector<dfm_cell_field> out;
+  for (const CellField &f : b.makeup.given) {
+    if (by_cell(type, f.key)) out.push_back({f.key.c_str(), f.values.data(), f.width});
+    else unused.push_back({f.key, ""});
+  }
+  return out;
+}
+
+// And what follows with them: fields, entries without use.
+std::vector<double> values_for(const World &w, const Body &b, const dfm_type &type, const ModelParams &params,
+                               BodyModel &out) {
+  CellMaterials cells;
+  for (const Material &m : b.makeup.materials) cells.list.push_back(&m);
+  cells.of = b.makeup.of;
+  out.unused = find_unused(type, cells);
+  const std::vector<dfm_cell_field> given = fields_for(type, b, out.unused);
+  std::string keys = params.keys;
+  std::replace(keys.begin(), keys.end(), '\n', '\0');
+  std::vector<dfm_param_value> rows;
+  const char *key = keys.c_str();
+  const double *value = params.values.data();
+  for (const uint32_t width : params.widths) {
+    rows.push_back({key, value, width});
+    key += std::strlen(key) + 1;
+    value += width;
+  }
+  dfm_body_def def = dfm_body_def_default();
+  def.ntet = static_cast<uint32_t>(b.tets.size() / 4);
+  def.model_params = {sizeof(dfm_params), static_cast<uint32_t>(rows.size()), rows.data()};
+  def.nfield = static_cast<uint32_t>(given.size());
+  def.fields = given.data();
+  return model_values(w, b, type, def, cells, out.fields);
+}
+
+// One that the body has had before, for the same; or none.
+bool take_spare(Body &b, const dfm_type &type, const std::vector<double> &values, const ModelOrigin &origin,
+                ModelInstance &out) {
+  const bool turns = model_of(type).caps & DFM_CAP_ROTATION_INVARIANT;
+  const auto fits = [&](const SpareModel &s) {
+    return s.instance->type == &type && s.instance->params == values && s.origin.params == origin.params &&
+           s.origin.held == origin.held &&
+           (turns || std::memcmp(&s.origin.frame, &origin.frame, sizeof origin.frame) == 0);
+  };
+  const auto found = std::find_if(b.spares.begin(), b.spares.end(), fits);
+  if (found == b.spares.end()) return false;
+  found->instance->start();
+  out.swap(*found->instance);
+  b.spares.erase(found);
+  return true;
+}
+
+void make_instance(World &w, Body &b, const dfm_type &type, std::vector<double> values, int32_t integrator,
+                   BodyModel &out) {
+  const Memory &m = w.memory();
+  const auto implicit = implicit_of(w, b.name, integrator, out.integrator);
+  const MeshCoupling coupling(m, b.surface);
+  std::vector<const char *> field_keys;
+  std::vector<const double *> fields;
+  for (const CellField &f : out.fields) {
+    field_keys.push_back(f.key.c_str());
+    fields.push_back(f.values.data());
+  }
+  field_keys.push_back(nullptr);
+  dfm_mesh mesh{};
+  mesh.size = sizeof mesh;
+  mesh.npoint = b.p.n;
+  mesh.ncell = static_cast<uint32_t>(b.tets.size() / 4);
+  mesh.cell = DFM_CELL_TET;
+  const std::vector<double> placed = rest_for(type, b, out.origin.frame);
+  mesh.rest = placed.empty() ? b.p.rest.data() : placed.data();
+  mesh.cells = b.tets.data();
+  mesh.mass = b.p.mass.data();
+  mesh.params = values.data();
+  mesh.field_keys = field_keys.data();
+  mesh.fields = fields.data();
+  mesh.nedge = static_cast<uint32_t>(b.edges.size() / 2);
+  mesh.edges = b.edges.data();
+  mesh.fixed = out.origin.held.data();
+  coupling.tell(mesh);
+  if (!take_spare(b, type, values, out.origin, out.instance))
+    out.instance.create(type, w.context->host, mesh, m, std::move(values));
+  // a body's dynamics hold to its own instance, which is the new one meanwhile
+  struct Lent {
+    ModelInstance &a, &b;
+    Lent(ModelInstance &x, ModelInstance &y) : a(x), b(y) { a.swap(b); }
+    Lent(const Lent &) = delete;
+    Lent &operator=(const Lent &) = delete;
+    ~Lent() { a.swap(b); }
+  } lent(b.model, out.instance);
+  out.dynamics = make_dynamics(m, b.p, b.surface, b.model, b.edges, implicit ? &*implicit : nullptr);
+  if (!implicit) ask_explicit_bound(w, *out.dynamics, out.integrator);
+  if (!out.dynamics->abilities().placed) need_ability(w, Ability::self_stepping, "body", b.name);
+}
+
+}  // namespace
+
+ModelParams keep_params(const dfm_type &type, const dfm_params &given) {
+  const std::span<const dfm_param_value> rows(given.values, given.values ? given.n : 0);
+  pack_params(type, rows);
+  ModelParams out;
+  for (const dfm_param_value &row : rows) {
+    out.keys += row.key;
+    out.keys += '\n';
+    out.widths.push_back(row.width);
+    out.values.insert(out.values.end(), row.value, row.value + row.width);
+  }
+  return out;
+}
+
+void check_params(const World &w, const Body &b, const dfm_type &type, const ModelParams &params) {
+  BodyModel unused;
+  values_for(w, b, type, params, unused);
+}
+
+std::unique_ptr<BodyModel> make_body_model(World &w, Body &b, const dfm_type &type, ModelOrigin origin,
+                                           int32_t integrator) {
+  auto out = std::make_unique<BodyModel>();
+  out->origin = std::move(origin);
+  make_instance(w, b, type, values_for(w, b, type, out->origin.params, *out), integrator, *out);
+  return out;
+}
+
+void exchange(Body &b, BodyModel &other) noexcept {
+  b.model.swap(other.instance);
+  b.dynamics.swap(other.dynamics);
+  b.fields.swap(other.fields);
+  b.unused.swap(other.unused);
+  std::swap(b.origin, other.origin);
+  std::swap(b.integrator, other.integrator);
+  b.bound.known = false;
+}
+
+}  // namespace dfm

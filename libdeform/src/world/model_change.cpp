@@ -1,0 +1,330 @@
+// A change of model changes no position and no velocity: surface, momentum, angular momentum and kinetic
+// energy stay to the bit. What jumps is the elastic energy, because two models see different energies in one
+// shape; the jump is measured before the change stands (doc/decisions/0180-a-swap-moves-nothing.md).
+#include "world/model_change.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "body/make_surface.h"
+#include "core/error.h"
+#include "math/polar.h"
+#include "math/turn.h"
+#include "plugin/registry.h"
+#include "state/world.h"
+#include "step/context.h"
+#include "step/stages.h"
+#include "world/body_model.h"
+#include "world/idle.h"
+#include "world/measure.h"
+
+namespace dfm {
+namespace {
+
+constexpr char kMaxJump[] = "max_jump";
+// m of the surface, over the body's size, that a model which steps itself may put it elsewhere.
+constexpr double kSurfaceStays = 1e-6;
+constexpr double kInstant = 1e-9;    // s, in which nothing moves far
+constexpr double kSlender = 1e-3;    // of the longest arm: shorter ones give no direction
+constexpr double kOnTime = 1e-6;     // of a step, by which a switch may be early
+constexpr double kSmallJump = 1e-9;  // J
+constexpr size_t kMostSwaps = 4096;
+constexpr size_t kSpares = 2;  // a rule has three models
+
+// ---- where the body is, as a rigid whole ------------------------------------------------------------------
+
+Vec3 rest_of(const Body &b, uint32_t i) { return load3(&b.p.rest[size_t{3} * i]); }
+Vec3 now_of(const Body &b, uint32_t i) { return load3(&b.p.x[size_t{kStride} * i]); }
+
+// Unit axes whose first is along a, the second in the plane of a and b; row-major, by rows. False: no plane.
+bool axes_of(Vec3 a, Vec3 b, double *out) {
+  if (!(norm(a) > 0)) return false;
+  const Vec3 x = (1 / norm(a)) * a, aside = b - dot(b, x) * x;
+  if (!(norm(aside) > kSlender * norm(a))) return false;
+  const Vec3 y = (1 / norm(aside)) * aside;
+  store3(out, x);
+  store3(out + 3, y);
+  store3(out + 6, cross(x, y));
+  return true;
+}
+
+// The held point that lies farthest from `from` and, where `line` is not zero, from the line along it.
+uint32_t farthest_held(const Body &b, Vec3 from, Vec3 line) {
+  uint32_t found = kNone;
+  double most = 0;
+  for (uint32_t i = 0; i < b.p.n; ++i) {
+    if (b.p.held[i] != 7) continue;
+    const Vec3 arm = rest_of(b, i) - from;
+    const double d = norm2(line) > 0 ? norm2(cross(line, arm)) : norm2(arm);
+    if (d > most) {
+      most = d;
+      found = i;
+    }
+  }
+  return found;
+}
+
+// How held points are turned, where they are not on a line: the shape that they hold keeps its direction.
+bool turn_of_held(const Body &b, double *r) {
+  const auto first = std::find(b.p.held.begin(), b.p.held.end(), uint8_t{7});
+  if (first == b.p.held.end()) return false;
+  const uint32_t o = static_cast<uint32_t>(first - b.p.held.begin());
+  const uint32_t i = farthest_held(b, rest_of(b, o), {});
+  if (i == kNone) return false;
+  const uint32_t j = farthest_held(b, rest_of(b, o), rest_of(b, i) - rest_of(b, o));
+  if (j == kNone) return false;
+  double rest[9], now[9];
+  if (!axes_of(rest_of(b, i) - rest_of(b, o), rest_of(b, j) - rest_of(b, o), rest)) return false;
+  if (!axes_of(now_of(b, i) - now_of(b, o), now_of(b, j) - now_of(b, o), now)) return false;
+  for (int row = 0; row < 3; ++row)
+    for (int col = 0; col < 3; ++col)
+      r[3 * row + col] = (now[row] * rest[col] + now[3 + row] * rest[3 + col]) + now[6 + row] * rest[6 + col];
+  return true;
+}
+
+// The rotation of the linear map that takes the rest shape to the present one with the least squares of the
+// masses. False: there is none.
+bool turn_of_all(const Body &b, Vec3 rest_center, Vec3 center, double *r) {
+  double a[9] = {}, s[9] = {};  // sums of m x X^T, m X X^T
+  for (uint32_t i = 0; i < b.p.n; ++i) {
+    const Vec3 x = now_of(b, i) - center, rest = rest_of(b, i) - rest_center;
+    for (int row = 0; row < 3; ++row)
+      for (int col = 0; col < 3; ++col) {
+        a[3 * row + col] += b.p.mass[i] * x[row] * rest[col];
+        s[3 * row + col] += b.p.mass[i] * rest[row] * rest[col];
+      }
+  }
+  const Vec3 columns[3] = {{s[0], s[3], s[6]}, {s[1], s[4], s[7]}, {s[2], s[5], s[8]}};
+  const Vec3 rows[3] = {cross(columns[1], columns[2]), cross(columns[2], columns[0]),
+                        cross(columns[0], columns[1])};  // of the inverse, times the determinant
+  double f[9] = {};
+  for (int row = 0; row < 3; ++row)
+    for (int col = 0; col < 3; ++col)
+      for (int k = 0; k < 3; ++k) f[3 * row + col] += a[3 * row + k] * rows[k][col];
+  return polar_rotation(f, r);
+}
+
+// Where a model whose forces do not turn with the body has to take its rest shape to be: turned as the body
+// is now. It knows small rotations only, and counts them from there.
+Pose frame_of(const Body &b) {
+  Vec3 rest_center, center;
+  for (uint32_t i = 0; i < b.p.n; ++i) {
+    rest_center += (b.p.mass[i] / b.mass) * rest_of(b, i);
+    center += (b.p.mass[i] / b.mass) * now_of(b, i);
+  }
+  double r[9];
+  Pose frame = b.origin.frame;
+  if (turn_of_held(b, r) || turn_of_all(b, rest_center, center, r)) frame.rotation = quat_of(r);
+  frame.position = center - rotate(frame.rotation, rest_center);
+  return frame;
+}
+
+// ---- is the new model one to go on with? ------------------------------------------------------------------
+
+double size_of(const Body &b) {
+  double size = 0;
+  for (size_t k = 0; k < 3; ++k) {
+    double least = HUGE_VAL, most = -HUGE_VAL;
+    for (size_t i = 0; i < b.p.n; ++i) {
+      least = std::min(least, b.p.rest[3 * i + k]);
+      most = std::max(most, b.p.rest[3 * i + k]);
+    }
+    size = std::max(size, most - least);
+  }
+  return size;
+}
+
+// A model that steps itself may know only some shapes. Where it would put the surface at once is asked with a
+// sub-step in which nothing can move, under the forces of the last one; nothing of it is kept.
+void check_surface(World &w, Body &b) {
+  if (!b.model.stepper) return;
+  const SubStep now{w.time, kInstant, w.gravity.now, HUGE_VAL, w.gravity.now};
+  const double share = b.impulse_time() > 0 ? kInstant / b.impulse_time() : 0;
+  std::vector<double> impulse(b.surfel_impulse.begin(), b.surfel_impulse.end());
+  for (double &p : impulse) p *= share;
+  double kinetic = 0, most = 0;
+  const bool knows =
+      b.dynamics->free_motion(now, kinetic) && b.dynamics->end_state(now, impulse.data(), true);
+  if (knows)
+    for (uint32_t s = 0; s < b.surface.nsurfel; ++s) {
+      Vec3 jump;
+      b.surface.each_phyxel(s, [&](uint32_t i, double weight) {
+        const size_t at = size_t{kStride} * i;
+        jump += weight * (load3(&b.p.x_end[at]) - load3(&b.p.x[at]) - kInstant * load3(&b.p.v[at]));
+      });
+      most = std::max(most, norm(jump));
+    }
+  if (b.slumber.asleep) gather_surface(b.surface, b.p.x.data(), b.p.v.data());
+  if (!knows)
+    fail(DFM_DISCARD,
+         "body '%s': model '%s' cannot go on from the present shape; change the model where the body is "
+         "nearer to its rest shape; nothing was changed",
+         b.name.c_str(), b.model.type->id);
+  if (most > kSurfaceStays * size_of(b))
+    fail(DFM_DISCARD,
+         "body '%s': model '%s' would put the surface %g m aside at once, and %g m may be; change the model "
+         "where the body is nearer to its rest shape; nothing was changed",
+         b.name.c_str(), b.model.type->id, most, kSurfaceStays * size_of(b));
+}
+
+// Effects that the scene lists, and that the old model alone provides.
+void check_effects(const World &w, const Body &b, const ModelInstance &old) {
+  if (!w.def.effects) return;
+  const std::vector<std::string> now = effects(*b.model.type);
+  for (const std::string &effect : effects(*old.type)) {
+    const bool stays = std::find(now.begin(), now.end(), effect) != now.end() && b.model.works(effect);
+    const auto &asked = w.asked_effects;
+    if (stays || !old.works(effect) || std::find(asked.begin(), asked.end(), effect) == asked.end()) continue;
+    const auto &offered = w.steps->facts.offered;
+    const auto is = [&](const SceneFacts::Provider &p) { return p.effect == effect; };
+    if (std::count_if(offered.begin(), offered.end(), is) > 1) continue;
+    fail(DFM_E_ARG,
+         "body '%s': effect '%s' is asked for, and with model '%s' nothing in the scene would provide it; "
+         "take it from the list of effects, or choose a model that has it; nothing was changed",
+         b.name.c_str(), effect.c_str(), b.model.type->id);
+  }
+}
+
+void check_jump(const Body &b, const Swap &swap) {
+  if (std::isinf(swap.max_jump)) return;
+  const double jump = std::fabs(swap.after - swap.before);
+  if (std::isnan(jump))
+    fail(DFM_DISCARD,
+         "body '%s': '%s' or '%s' gives no energy, so the jump from one to the other cannot be held to "
+         "max_jump (%g J); leave max_jump out; nothing was changed",
+         b.name.c_str(), swap.from->id, swap.to->id, swap.max_jump);
+  if (jump > swap.max_jump)
+    fail(
+        DFM_DISCARD,
+        "body '%s': from '%s' to '%s' its elastic energy would jump from %g J to %g J, by more than "
+        "max_jump (%g J); raise it, or change the model where the body is less deformed; nothing was changed",
+        b.name.c_str(), swap.from->id, swap.to->id, swap.before, swap.after, swap.max_jump);
+}
+
+// A model that does not turn with the body sees strain where the body has turned.
+void warn_of_jump(const World &w, const Body &b, const Swap &swap) {
+  double kinetic = 0;
+  for (uint32_t i = 0; i < b.p.n; ++i)
+    kinetic += 0.5 * b.p.mass[i] * norm2(load3(&b.p.v[size_t{kStride} * i]));
+  const double jump = std::fabs(swap.after - swap.before);
+  if (!std::isinf(swap.max_jump) || !(jump > std::min(swap.before, swap.after) + kinetic + kSmallJump))
+    return;
+  w.context->logf(
+      DFM_LOG_WARNING,
+      "t = %g s, body '%s': from '%s' to '%s' its elastic energy jumps from %g J to %g J, by more "
+      "than all the energy it has; change the model where it is less deformed and has turned less, or "
+      "give max_jump",
+      w.time, b.name.c_str(), swap.from->id, swap.to->id, swap.before, swap.after);
+}
+
+// With the new model in place.
+void judge(World &w, Body &b, const ModelInstance &old, Swap &swap) {
+  if (!b.springs.empty() && !b.dynamics->abilities().springs)
+    fail(
+        DFM_E_UNSUPPORTED,
+        "body '%s': a spring is explicit, and model '%s' has no step bound to hold it to; remove its springs "
+        "first; nothing was changed",
+        b.name.c_str(), b.model.type->id);
+  check_effects(w, b, old);
+  swap.after = elastic_energy(b);
+  check_jump(b, swap);
+  check_surface(w, b);
+}
+
+// What a change leaves that a rule may take back. There is room.
+void keep_spare(Body &b, BodyModel &left, std::unique_ptr<ModelInstance> place) {
+  if (b.spares.size() == kSpares) b.spares.erase(b.spares.begin());
+  place->swap(left.instance);
+  b.spares.push_back({std::move(place), std::move(left.origin)});
+}
+
+}  // namespace
+
+ModelChoice choose_model(const Body &b, const char *type, const dfm_params &params, int32_t integrator) {
+  const dfm_type &found = b.world->context->registry.find(DFM_KIND_MODEL, type);
+  if (params.n && !params.values)
+    fail(DFM_E_ARG, "body '%s': %u parameters are announced, but params.values is NULL", b.name.c_str(),
+         params.n);
+  if (integrator < DFM_INTEGRATOR_AUTO || integrator > DFM_INTEGRATOR_TR_BDF2)
+    fail(DFM_E_UNSUPPORTED,
+         "body '%s': integrator %d is not available; use DFM_INTEGRATOR_AUTO, "
+         "DFM_INTEGRATOR_SYMPLECTIC_EULER, DFM_INTEGRATOR_IMPLICIT_EULER or DFM_INTEGRATOR_TR_BDF2",
+         b.name.c_str(), integrator);
+  ModelChoice out;
+  out.type = found.id;
+  if (integrator != DFM_INTEGRATOR_AUTO) out.integrator = static_cast<uint32_t>(integrator);
+  std::vector<dfm_param_value> own(params.values, params.values + params.n);
+  const auto limit = [](const dfm_param_value &v) { return v.key && std::strcmp(v.key, kMaxJump) == 0; };
+  for (const dfm_param_value &v : own) {
+    if (!limit(v)) continue;
+    if (!v.value || v.width != 1 || !(*v.value > 0) || out.max_jump < HUGE_VAL)
+      fail(DFM_E_ARG, "body '%s': max_jump is one number of joules above 0, given once", b.name.c_str());
+    out.max_jump = *v.value;
+  }
+  std::erase_if(own, limit);
+  out.params = keep_params(found, {sizeof(dfm_params), static_cast<uint32_t>(own.size()), own.data()});
+  check_params(*b.world, b, found, out.params);
+  return out;
+}
+
+void change_model(Body &b, const ModelChoice &to, Swap &swap) {
+  World &w = *b.world;
+  const dfm_type &type = w.context->registry.find(DFM_KIND_MODEL, to.type);
+  prepare(w);
+  ModelOrigin origin{to.params,
+                     b.origin.frame,
+                     to.integrator == kSameIntegrator ? b.origin.integrator : to.integrator,
+                     {b.p.held.begin(), b.p.held.end()}};
+  if (!(model_of(type).caps & DFM_CAP_ROTATION_INVARIANT)) origin.frame = frame_of(b);
+  swap = {b.handle, w.time, b.model.type, &type, elastic_energy(b), NAN, to.max_jump, false};
+  const int32_t integrator = static_cast<int32_t>(origin.integrator);
+  auto place = std::make_unique<ModelInstance>();
+  b.spares.reserve(kSpares);
+  const std::unique_ptr<BodyModel> made = make_body_model(w, b, type, std::move(origin), integrator);
+  exchange(b, *made);
+  try {
+    judge(w, b, made->instance, swap);
+    warn_of_jump(w, b, swap);
+    w.changed = true;
+    reopen_integrators(w);  // what the others do may not fit any more
+    prepare(w);
+  } catch (...) {
+    exchange(b, *made);
+    throw;
+  }
+  if (!b.rule.empty()) keep_spare(b, *made, std::move(place));
+  wake(w, b);
+  w.sizes = {};  // another bound, and other errors
+}
+
+void keep_swap(World &w, const Swap &swap) {
+  if (w.swaps.size() == kMostSwaps) w.swaps.erase(w.swaps.begin());
+  w.swaps.push_back(swap);
+}
+
+bool try_change(World &w, Body &b, const ModelChoice &to, bool tell) {
+  w.swaps.reserve(w.swaps.size() + 1);
+  Swap swap;
+  try {
+    change_model(b, to, swap);
+  } catch (const Error &e) {
+    if (e.status != DFM_DISCARD) throw;
+    swap.refused = true;
+    if (tell) w.context->logf(DFM_LOG_WARNING, "t = %g s: %s", w.time, e.what());
+  }
+  if (tell || !swap.refused) keep_swap(w, swap);
+  return !swap.refused;
+}
+
+void make_switches(World &w, double dt) {
+  for (auto &b : w.bodies)
+    while (!b->switches.empty() && b->switches.front().t <= w.time + kOnTime * dt) {
+      const ModelChoice to = b->switches.front().to;
+      if (try_change(w, *b, to, true)) warn_of_idle(*b);
+      b->switches.erase(b->switches.begin());
+    }
+  follow_rules(w);
+}
+
+}  // namespace dfm

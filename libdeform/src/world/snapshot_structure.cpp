@@ -1,0 +1,103 @@
+#include "world/snapshot_structure.h"
+
+#include <cstring>
+
+#include "core/hash.h"
+#include "state/world.h"
+#include "step/method.h"
+#include "step/stages.h"
+#include "step/context.h"
+
+namespace dfm {
+namespace {
+
+void zone(Hash &h, const SurfaceZones::Zone &z) {
+  h.add(z.group.data(), z.group.size());
+  h.add(z.material.data(), z.material.size());
+  h.add(z.friction);
+}
+
+void makeup(Hash &h, const Makeup &m) {
+  for (const Material &x : m.materials) {
+    h.add(x.def.young);
+    h.add(x.def.poisson);
+    h.add(x.def.damping_mass);
+    h.add(x.def.damping_stiffness);
+    for (size_t i = 0; i < x.extra_keys.size(); ++i) {
+      h.add(x.extra_keys[i].data(), x.extra_keys[i].size());
+      h.add(x.extra_values[i].data(), x.extra_values[i].size() * sizeof(double));
+    }
+  }
+  h.add(m.of.data(), m.of.size() * sizeof(uint32_t));
+  for (const CellField &f : m.given) {
+    h.add(f.key.data(), f.key.size());
+    h.add(f.values.data(), f.values.size() * sizeof(double));
+  }
+}
+
+}  // namespace
+
+uint64_t snapshot_structure(const World &w) {
+  Hash h;
+  for (auto &b : w.bodies) {
+    h.add(b->id);
+    h.add(b->p.n);
+    h.add(b->surface.nsurfel);
+    h.add(b->name.data(), b->name.size());
+    h.add(b->material.data(), b->material.size());
+    h.add(b->tets.data(), b->tets.size() * sizeof(uint32_t));
+    h.add(b->p.rest.data(), b->p.rest.size() * sizeof(double));
+    h.add(b->p.mass.data(), b->p.mass.size() * sizeof(double));
+    makeup(h, b->makeup);
+    const Surface &s = b->surface;
+    h.add(s.row.data(), s.row.size() * sizeof(uint32_t));
+    h.add(s.col.data(), s.col.size() * sizeof(uint32_t));
+    h.add(s.weight.data(), s.weight.size() * sizeof(double));
+    h.add(s.rest.data(), s.rest.size() * sizeof(double));
+    if (!s.identity()) h.add(s.tri.data(), s.tri.size() * sizeof(uint32_t));
+    zone(h, b->zones.list[0]);
+    if (b->zones.of.empty()) continue;
+    for (const auto &z : b->zones.list) zone(h, z);
+    h.add(b->zones.of.data(), b->zones.of.size() * sizeof(uint32_t));
+  }
+  for (auto &o : w.obstacles) {
+    const dfm_obstacle_def &d = o->def;
+    h.add(o->id);
+    h.add(d.shape);
+    h.add(d.pose);
+    h.add(d.half_size);
+    h.add(d.radius);
+    h.add(d.half_length);
+    h.add(d.velocity_surface);
+    if (!o->points.empty()) {
+      h.add(o->points.data(), o->points.size() * sizeof(double));
+      h.add(o->triangles.data(), o->triangles.size() * sizeof(uint32_t));
+      h.add(d.cells);
+    }
+    h.add(d.category);
+    h.add(d.collides_with);
+    h.add(o->name.data(), o->name.size());
+    h.add(o->material.data(), o->material.size());
+    h.add(o->zone.friction);
+    if (o->added) {
+      h.add(o->rigid_body);
+      h.add(o->local.position);
+      h.add(o->local.rotation);
+    }
+  }
+  for (auto &set : w.rigid_sets) {
+    h.add(set->host_name.data(), set->host_name.size());
+    h.add(set->njoint);
+    h.add(uint64_t(set->extra.size()));
+    h.add(set->group.data(), set->group.size() * sizeof(uint32_t));
+    for (const dfm_rigid_def &d : set->defs) {
+      h.add(d.mass);
+      h.add(d.inertia);
+    }
+  }
+  if (w.method->point_values) h.add(w.def.method);
+  if (const uint8_t asked = asks_self_contact(w)) h.add(asked);
+  return h.value;
+}
+
+}  // namespace dfm

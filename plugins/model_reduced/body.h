@@ -1,0 +1,153 @@
+// A body whose displacements in a moving frame are small, and sums of few modes:
+//
+//   x_i = c + R (X_i + u_i),   u_i = sum_k W_ik q_k
+//
+// A step:  where    c, R, q and their rates, from x and v alone
+//          advance  the frame as a rigid body (or as what is held has it), each mode by itself
+//          place    the points where that leads without contact; what an impulse changes is added to it
+// A condensed body has a fourth part, the displacement at rest of what its modes leave out: it has no mass
+// and follows forces and impulses at once. Equations, limits and cost: doc/models/modal.md, condensed.md.
+#pragma once
+#include "modes.h"
+#include "oscillator.h"
+
+namespace reduced {
+
+// Displacement gradient in the frame up to which small displacements are taken for the true ones.
+constexpr double kLargestGradient = 0.1;
+constexpr const char *kModalId = "org.deform.modal", *kCondensedId = "org.deform.condensed";
+
+struct Frame {
+  double c[3] = {};                           // m, of its origin
+  double r[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};  // frame to world
+};
+
+class Body {
+ public:
+  Body(const char *id, bool condensed) : id_(id), condensed_(condensed) {}
+  using Row = Param;
+  const dfm_host *host = nullptr;
+  const char *active_effects[3] = {};  // NULL-terminated
+
+  void create(const dfm_host *h, const dfm_mesh &m);
+  void apply_params(const double *values);
+  const char *name() const { return id_; }
+  const char *idle(Param row) const { return row == kModes && note_[0] ? note_ : nullptr; }
+  bool lacks_state(const dfm_kin &k) const;
+
+  dfm_status predict(const dfm_kin &k, const double *f, double *u_s);
+  void respond(const dfm_kin &k, uint32_t n, const uint32_t *surfel, uint32_t nrhs, const double *p,
+               double *du);
+  void diagonal(const dfm_kin &k, uint32_t n, const uint32_t *surfel, double *w);
+  void commit(const dfm_kin &k, const double *p_s, double *x, double *v);
+  double energy(const dfm_kin &k);
+  void cell_energy(const dfm_kin &k, double *density);
+  void cell_stress(const dfm_kin &k, double *stress);
+
+ private:
+  const char *id_;
+  const bool condensed_;
+  double params_[kParamCount] = {};
+  char note_[128] = {};
+  Elastic elastic_;
+  Modes modes_;
+  uint32_t nsurfel_ = 0;
+  Buffer<uint32_t> row_, col_;  // coupling
+  Buffer<double> weight_;
+  Buffer<double> surface_;   // [nsurfel,3,modes]
+  Buffer<double> pull_;      // [modes,3] sum m W: what a uniform acceleration does to a mode
+  Buffer<double> swing_;     // [modes,9] sum m W X^T
+  Buffer<double> twist_;     // [3,modes,modes] sum m W_k x W_l; floating
+  Buffer<double> gradient_;  // [modes] the largest displacement gradient of a cell, per unit
+  // Condensed: C_rest is the response at rest of what the modes leave out.
+  Buffer<double> columns_;  // [3 nsurfel, 3 npoint] of it to unit forces at surfels, as they are touched
+  Buffer<uint8_t> known_;   // [3 nsurfel]
+  Buffer<double> eight_;    // [3 npoint,8]
+  Buffer<double> weight_at_rest_;  // [3, 3 npoint] of it to unit accelerations; held
+
+  // Of the step at hand, from predict on. Points are in the frame of its start where not said otherwise,
+  // [padded 3 npoint]; modes [modes].
+  double h_ = 0;
+  bool soft_ = false;    // backward Euler: the body was touched
+  bool moving_ = false;  // held points move
+  bool led_ = false;     // and displace the body
+  bool has_rest_ = false;
+  bool even_ = false;       // the forces are the masses times pull_of_
+  double pull_of_[3] = {};  // m/s2 in the frame
+  Frame at_, to_;
+  Buffer<double> u_, w_, f_;           // displacement, velocity beside the frame's, force
+  Buffer<double> mu_, mw_;             // times the masses
+  Buffer<double> follow_, follow_to_;  // what held points displace, at start and end; held
+  Buffer<double> given_[2];            // [3 npoint] the held displacements of which the last two were found
+  Buffer<double> rest_;                // what the modes do not hold of u
+  Buffer<double> u_to_, w_to_;         // at the end, in its frame
+  Buffer<double> x_to_, v_to_;         // the same in the world
+  Buffer<double> q_, qd_, load_, q_to_, qd_to_, answer_;
+  Buffer<double> coupling_;                // [3,modes] sum m r x W; floating
+  Buffer<double> under_, under_of_;        // condensed: displacement at rest by which uneven forces
+  Buffer<double> rows_, lanes_, answers_;  // of respond
+  Buffer<Transition> step_;
+  double step_h_ = -1;
+  bool step_soft_ = false;
+  Buffer<double> softened_;                                       // [modes] what an impulse leaves
+  double left_ = 0;                                               // of rest_ after the step
+  double rigid_ = 1;                                              // the same of the rigid motion
+  Transition drift_{};                                            // of what no stiffness acts on
+  double velocity_[3] = {}, spin_[3] = {}, velocity_to_[3] = {};  // floating; the spin in the frame
+  double inertia_[9] = {}, moment_[3] = {}, moment_to_[3] = {};   // in the frame; in the world
+  double turning_[9] = {};                                        // inverse inertia in the world
+  double force_sum_[3] = {}, torque_[3] = {};
+  bool warned_ = false, named_ = false, checked_ = false;
+  uint32_t since_look_ = 0;
+
+  size_t size() const { return 3 * size_t(elastic_.npoint); }
+  void take_surface(const dfm_mesh &m);
+  void take_integrals();
+  void check_size(const dfm_mesh &m) const;
+  void reserve();
+  void describe();
+  void set_steps();
+  void name_aliases();
+
+  Frame frame_of(const double *x, size_t stride, const double *v, double h) const;
+  bool stands_turned(const dfm_kin &k) const;
+  void displacement(const dfm_kin &k, const Frame &f, double *u) const;
+  bool held_displacement(const dfm_kin &k, const Frame &f, double h, double *u) const;
+  void follow(const dfm_kin &k, const Frame &f, double h, int which, double *out);
+  void where_floating(const dfm_kin &k, const double *f);
+  void where_held(const dfm_kin &k);
+  bool uniform(const dfm_kin &k, const double *f, double *a) const;
+  void project(const dfm_kin &k, const double *f);
+  void find_spin();
+  void keep_rest();
+  void advance_frame();
+  void advance_modes();
+  void place_floating();
+  void place_held(const dfm_kin &k);
+  void arm(const dfm_kin &k, uint32_t s, double *r) const;
+  void take_impulses(const dfm_kin &k, const double *p, double *sum, double *moment);
+  size_t row_width() const { return modes_.count + (elastic_.floating ? 6 : 0); }
+  void gather(const dfm_kin &k, uint32_t n, const uint32_t *surfel);
+  void weigh(uint32_t n, uint32_t nrhs, const double *p);
+  void find_columns(uint32_t n, const uint32_t *surfel);
+  void make_columns(size_t many, const size_t *wanted);
+  void add_response_at_rest(uint32_t n, const uint32_t *surfel, uint32_t nrhs, const double *p,
+                            double *du) const;
+  void add_displacement_at_rest(const double *p, double *out);
+  void find_weight_at_rest();
+  void rest_under(const double *f, const double *load, double *out);
+  const double *rest_of_forces();
+  void match_moment(const double *wanted, const double *c, const double *velocity, const double *x, double *v,
+                    size_t stride) const;
+  void look_at_gradient(const double *x, size_t stride);
+  void whole_displacement(const dfm_kin &k, Frame &f);
+};
+
+struct Modal : Body {
+  Modal() : Body(kModalId, false) {}
+};
+struct Condensed : Body {
+  Condensed() : Body(kCondensedId, true) {}
+};
+
+}  // namespace reduced

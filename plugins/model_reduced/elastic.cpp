@@ -1,0 +1,399 @@
+#include "elastic.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "../model_common/edges.h"
+#include "../model_common/params.h"
+#include "../model_common/width.h"
+#include "small.h"
+
+namespace reduced {
+
+using model::Tetrahedron;
+
+namespace {
+
+// Rows of the rigid motions about the origin, at x: three translations, three rotations.
+void rigid_rows(const double *x, double (*g)[6]) {
+  for (int r = 0; r < 3; ++r)
+    for (int c = 0; c < 6; ++c) g[r][c] = c == r;
+  g[0][4] = x[2];
+  g[0][5] = -x[1];
+  g[1][3] = -x[2];
+  g[1][5] = x[0];
+  g[2][3] = x[1];
+  g[2][4] = -x[0];
+}
+
+// Six rows that span the rigid motions best, by repeated choice of what is longest beside the rows before.
+// The number of them whose rest is longer than 1e-6 of the first's.
+int independent_rows(std::vector<std::array<double, 6>> rows, std::vector<uint32_t> &chosen) {
+  double first = 0;
+  for (int k = 0; k < 6; ++k) {
+    size_t best = 0;
+    double most = -1;
+    for (size_t r = 0; r < rows.size(); ++r) {
+      double square = 0;
+      for (const double a : rows[r]) square += a * a;
+      if (square > most) {
+        most = square;
+        best = r;
+      }
+    }
+    if (k == 0) first = most;
+    if (!(most > 1e-12 * first)) return k;
+    chosen.push_back(uint32_t(best));
+    const std::array<double, 6> unit = rows[best];
+    for (std::array<double, 6> &row : rows) {
+      double along = 0;
+      for (size_t a = 0; a < 6; ++a) along += row[a] * unit[a];
+      for (size_t a = 0; a < 6; ++a) row[a] -= along / most * unit[a];
+    }
+  }
+  return 6;
+}
+
+// The rows of points' components, lengths in `extent`.
+void add_rows(const double *x, double extent, uint8_t bits, uint32_t point,
+              std::vector<std::array<double, 6>> &rows, std::vector<uint32_t> &which) {
+  double scaled[3], g[3][6];
+  for (int a = 0; a < 3; ++a) scaled[a] = x[a] / extent;
+  rigid_rows(scaled, g);
+  for (uint32_t a = 0; a < 3; ++a) {
+    if (!(bits >> a & 1)) continue;
+    rows.emplace_back();
+    std::copy(g[a], g[a] + 6, rows.back().begin());
+    which.push_back(3 * point + a);
+  }
+}
+
+const Kernels *choose_kernels(const dfm_host *host, const char *id) {
+  const model::Width width = model::choose_width(host, id);
+  return width == model::kAvx512 ? kernels_avx512() : width == model::kAvx2 ? kernels_avx2() : kernels_sse2();
+}
+
+}  // namespace
+
+model::Lame Elastic::lame(uint32_t c) const {
+  return model::lame_of(field_[kYoung].empty() ? young_ : field_[kYoung][c],
+                        field_[kPoisson].empty() ? poisson_ : field_[kPoisson][c]);
+}
+
+bool Elastic::cell(uint32_t c, Tetrahedron &out) const {
+  const uint32_t *const q = cells_.data() + 4 * size_t(c);
+  const auto x = [&](int a) { return rest.data() + 3 * size_t(q[a]); };
+  return model::make_tetrahedron(x(0), x(1), x(2), x(3), out) && out.volume > 0;
+}
+
+double Elastic::volume(uint32_t c) const {
+  Tetrahedron t;
+  return cell(c, t) ? t.volume : 0;
+}
+
+void Elastic::take(const dfm_mesh &m, const char *id) {
+  npoint = m.npoint;
+  ncell = m.ncell;
+  if (npoint > kMostPoints) {
+    char text[200];
+    std::snprintf(text, sizeof text,
+                  "%u points; more than %u are refused, because their factor and modes take about a minute; "
+                  "take a coarser "
+                  "mesh, which a fine surface may hang on, or corotational_fem",
+                  npoint, kMostPoints);
+    model::complain(host_, id, text);
+    throw model::Refused{};
+  }
+  young_ = m.params[kYoung];
+  poisson_ = m.params[kPoisson];
+  model::take_fields(host_, id, kParams, kParamCount, m, field_, [](uint32_t, double) { return true; });
+  rest.create(host_, 3 * size_t(npoint));
+  mass.create(host_, npoint);
+  held.create(host_, npoint);
+  work_.create(host_, 3 * size_t(npoint));
+  cells_.create(host_, 4 * size_t(ncell));
+  edges_.create(host_, 2 * size_t(m.nedge));
+  std::copy(m.mass, m.mass + npoint, mass.data());
+  std::copy(m.cells, m.cells + 4 * size_t(ncell), cells_.data());
+  std::copy(m.edges, m.edges + 2 * size_t(m.nedge), edges_.data());
+  turns = true;
+  for (uint32_t i = 0; i < npoint; ++i) {
+    if (!(mass[i] > 0)) throw "a point has no mass; every point must belong to a cell";
+    total += mass[i];
+    held[i] = m.fixed ? m.fixed[i] & 7 : 0;
+    if (!held[i]) continue;
+    holders.push_back(i);
+    turns = turns && held[i] == 7;
+  }
+  floating = holders.empty();
+  turns = turns && !floating;
+  if (holders.size() == npoint && turns) throw "all points are held: nothing is left to move";
+}
+
+// The center of mass; of points held in all components; else that of the mesh's coordinates.
+void Elastic::place_origin(const dfm_mesh &m) {
+  double sum = 0;
+  const auto add = [&](uint32_t i, double weight) {
+    for (size_t a = 0; a < 3; ++a) origin[a] += weight * m.rest[3 * size_t(i) + a];
+    sum += weight;
+  };
+  if (floating)
+    for (uint32_t i = 0; i < npoint; ++i) add(i, mass[i]);
+  else if (turns)
+    for (const uint32_t i : holders) add(i, 1);
+  for (size_t a = 0; a < 3 && sum > 0; ++a) origin[a] /= sum;
+  for (size_t i = 0; i < npoint; ++i)
+    for (size_t a = 0; a < 3; ++a) {
+      rest[3 * i + a] = m.rest[3 * i + a] - origin[a];
+      extent = std::max(extent, std::fabs(rest[3 * i + a] - rest[a]));
+    }
+}
+
+void Elastic::assemble() {
+  for (uint32_t c = 0; c < ncell; ++c) {
+    Tetrahedron t;
+    if (!cell(c, t)) continue;
+    const model::Lame m = lame(c);
+    const uint32_t *const q = cells_.data() + 4 * size_t(c);
+    for (int a = 0; a < 4; ++a)
+      for (int b = 0; b < 4; ++b) {
+        if (q[a] > q[b]) continue;
+        const size_t at =
+            a == b ? q[a] : npoint + size_t(model::find_edge(edges_.data(), nedge_, q[a], q[b]));
+        double across = 0;
+        for (int k = 0; k < 3; ++k) across += t.g[a][k] * t.g[b][k];
+        for (int r = 0; r < 3; ++r)
+          for (int s = 0; s < 3; ++s)
+            block_[9 * at + size_t(3 * r + s)] +=
+                t.volume * ((m.lambda * t.g[a][r] * t.g[b][s] + m.mu * t.g[b][r] * t.g[a][s]) +
+                            (r == s ? m.mu * across : 0));
+      }
+  }
+}
+
+// Gram and Schmidt's method, twice, by mass.
+void Elastic::find_rigid() {
+  const size_t size = 3 * size_t(npoint);
+  rigid.create(host_, 6 * size);
+  for (size_t i = 0; i < npoint; ++i) {
+    double g[3][6];
+    rigid_rows(rest.data() + 3 * i, g);
+    for (size_t k = 0; k < 6; ++k)
+      for (size_t a = 0; a < 3; ++a) rigid[k * size + 3 * i + a] = g[a][k];
+  }
+  const auto product_of = [&](const double *a, const double *b) {
+    double sum = 0;
+    for (size_t j = 0; j < size; ++j) sum += mass[j / 3] * a[j] * b[j];
+    return sum;
+  };
+  for (size_t k = 0; k < 6; ++k) {
+    double *const own = rigid.data() + k * size;
+    for (int twice = 0; twice < 2; ++twice)
+      for (size_t n = 0; n < k; ++n) {
+        const double *const before = rigid.data() + n * size, along = product_of(own, before);
+        for (size_t j = 0; j < size; ++j) own[j] -= along * before[j];
+      }
+    const double scale = 1 / std::sqrt(product_of(own, own));
+    for (size_t j = 0; j < size; ++j) own[j] *= scale;
+  }
+}
+
+// Of three points far from each other.
+void Elastic::find_pins() {
+  const auto farthest = [&](const auto &measure) {
+    uint32_t best = 0;
+    double most = -1;
+    for (uint32_t i = 0; i < npoint; ++i) {
+      const double d = measure(rest.data() + 3 * size_t(i));
+      if (d > most) {
+        most = d;
+        best = i;
+      }
+    }
+    return best;
+  };
+  const auto square = [](const double *x, const double *y) {
+    double sum = 0;
+    for (int a = 0; a < 3; ++a) sum += (x[a] - y[a]) * (x[a] - y[a]);
+    return sum;
+  };
+  const double zero[3] = {};
+  const uint32_t first = farthest([&](const double *x) { return square(x, zero); });
+  const double *const a = rest.data() + 3 * size_t(first);
+  const uint32_t second = farthest([&](const double *x) { return square(x, a); });
+  const double *const b = rest.data() + 3 * size_t(second);
+  const uint32_t third = farthest([&](const double *x) {
+    double d[3] = {}, e[3], f[3];
+    for (int n = 0; n < 3; ++n) {
+      e[n] = b[n] - a[n];
+      f[n] = x[n] - a[n];
+    }
+    cross_add(e, f, 1, d);
+    return square(d, zero);
+  });
+  std::vector<std::array<double, 6>> rows;
+  std::vector<uint32_t> which, chosen;
+  for (const uint32_t i : {first, second, third})
+    add_rows(rest.data() + 3 * size_t(i), extent, 7, i, rows, which);
+  if (independent_rows(std::move(rows), chosen) < 6) throw "the mesh has no volume";
+  for (const uint32_t r : chosen) pins_.push_back(which[r]);
+}
+
+void Elastic::check_holding() const {
+  std::vector<std::array<double, 6>> rows;
+  std::vector<uint32_t> which, chosen;
+  for (const uint32_t i : holders) add_rows(rest.data() + 3 * size_t(i), extent, held[i], i, rows, which);
+  if (independent_rows(std::move(rows), chosen) < 6)
+    throw "what is held leaves the body a rigid motion; hold three points that are not in a line, hold "
+          "nothing, or use corotational_fem";
+}
+
+// Held and pinned displacements have a row and a column of their own.
+void Elastic::factorize() {
+  std::vector<uint8_t> out(3 * size_t(npoint));
+  for (size_t j = 0; j < out.size(); ++j) out[j] = held[j / 3] >> (j % 3) & 1;
+  for (const uint32_t pin : pins_) out[pin] = 1;
+  double mean = 0;
+  for (size_t i = 0; i < npoint; ++i) mean += (block_[9 * i] + block_[9 * i + 4]) + block_[9 * i + 8];
+  mean /= double(3 * size_t(npoint));
+  std::vector<uint32_t> ij;
+  for (uint32_t i = 0; i < npoint; ++i) ij.insert(ij.end(), {i, i});
+  ij.insert(ij.end(), edges_.data(), edges_.data() + 2 * size_t(nedge_));
+  std::vector<double> blk(block_.data(), block_.data() + 9 * (size_t(npoint) + nedge_));
+  for (size_t b = 0; 2 * b < ij.size(); ++b)
+    for (size_t r = 0; r < 3; ++r)
+      for (size_t s = 0; s < 3; ++s)
+        if (out[3 * size_t(ij[2 * b]) + r] || out[3 * size_t(ij[2 * b + 1]) + s])
+          blk[9 * b + 3 * r + s] = b < npoint && r == s ? mean : 0;
+  factor_.create(host_, npoint, ij, blk);
+}
+
+void Elastic::create(const dfm_host *host, const char *id, const dfm_mesh &m) {
+  host_ = host;
+  kernels = choose_kernels(host, id);
+  take(m, id);
+  place_origin(m);
+  nedge_ = m.nedge;
+  block_.create(host, 9 * (size_t(npoint) + nedge_));
+  assemble();
+  if (floating) {
+    find_rigid();
+    find_pins();
+  } else {
+    check_holding();
+  }
+  factorize();
+  if (floating) block_.drop();
+}
+
+void Elastic::compliance(const double *f, double *u) const { respond<1>(f, u); }
+
+void Elastic::compliance_of_eight(const double *f, double *u) const { respond<kLanes>(f, u); }
+
+// Floating: to the force less the inertia forces of the rigid acceleration that it calls for, and without a
+// rigid motion.
+template <size_t kWide>
+void Elastic::respond(const double *f, double *u) const {
+  const size_t size = 3 * size_t(npoint);
+  const auto solve = [&] {
+    if constexpr (kWide == 1) factor_.solve(u, u);
+    else factor_.solve_eight(*kernels, u, u);
+  };
+  if (!floating) {
+    for (size_t j = 0; j < size; ++j)
+      for (size_t w = 0; w < kWide; ++w) u[kWide * j + w] = held[j / 3] >> (j % 3) & 1 ? 0 : f[kWide * j + w];
+    return solve();
+  }
+  double along[6][kWide] = {};
+  for (size_t k = 0; k < 6; ++k)
+    for (size_t j = 0; j < size; ++j)
+      for (size_t w = 0; w < kWide; ++w) along[k][w] += rigid[k * size + j] * f[kWide * j + w];
+  std::copy(f, f + kWide * size, u);
+  for (size_t k = 0; k < 6; ++k)
+    for (size_t j = 0; j < size; ++j)
+      for (size_t w = 0; w < kWide; ++w) u[kWide * j + w] -= mass[j / 3] * along[k][w] * rigid[k * size + j];
+  for (const uint32_t pin : pins_)
+    for (size_t w = 0; w < kWide; ++w) u[kWide * pin + w] = 0;
+  solve();
+  for (size_t k = 0; k < 6; ++k)
+    for (size_t w = 0; w < kWide; ++w) along[k][w] = 0;
+  for (size_t k = 0; k < 6; ++k)
+    for (size_t j = 0; j < size; ++j)
+      for (size_t w = 0; w < kWide; ++w) along[k][w] += mass[j / 3] * rigid[k * size + j] * u[kWide * j + w];
+  for (size_t k = 0; k < 6; ++k)
+    for (size_t j = 0; j < size; ++j)
+      for (size_t w = 0; w < kWide; ++w) u[kWide * j + w] -= along[k][w] * rigid[k * size + j];
+}
+
+void Elastic::follow(double *u) const {
+  double *const f = work_.data();
+  const size_t size = 3 * size_t(npoint);
+  std::fill(f, f + size, 0.0);
+  const auto take = [&](size_t i, size_t j, const double *k, bool transposed) {
+    const size_t row = transposed ? 1 : 3, column = transposed ? 3 : 1;
+    for (size_t r = 0; r < 3; ++r)
+      for (size_t s = 0; s < 3; ++s) f[3 * i + r] -= k[row * r + column * s] * u[3 * j + s];
+  };
+  for (size_t i = 0; i < npoint; ++i) take(i, i, block_.data() + 9 * i, false);
+  for (size_t e = 0; e < nedge_; ++e) {
+    const size_t i = edges_[2 * e], j = edges_[2 * e + 1];
+    take(i, j, block_.data() + 9 * (npoint + e), false);
+    take(j, i, block_.data() + 9 * (npoint + e), true);
+  }
+  for (size_t j = 0; j < size; ++j)
+    if (held[j / 3] >> (j % 3) & 1) f[j] = 0;
+  factor_.solve(f, f);
+  for (size_t j = 0; j < size; ++j)
+    if (!(held[j / 3] >> (j % 3) & 1)) u[j] = f[j];
+}
+
+// h = sum u_a g_a^T
+void Elastic::gradient(uint32_t c, const Tetrahedron &t, const double *u, double *h) const {
+  const uint32_t *const q = cells_.data() + 4 * size_t(c);
+  std::fill(h, h + 9, 0.0);
+  for (size_t a = 1; a < 4; ++a)
+    for (size_t r = 0; r < 3; ++r)
+      for (size_t s = 0; s < 3; ++s)
+        h[3 * r + s] += (u[3 * size_t(q[a]) + r] - u[3 * size_t(q[0]) + r]) * t.g[a][s];
+}
+
+double Elastic::largest_gradient(const double *u, uint32_t *where) const {
+  double most = 0, h[9];
+  Tetrahedron t;
+  for (uint32_t c = 0; c < ncell; ++c) {
+    if (!cell(c, t)) continue;
+    gradient(c, t, u, h);
+    double square = 0;
+    for (const double x : h) square += x * x;
+    if (!(square > most)) continue;
+    most = square;
+    if (where) *where = c;
+  }
+  return std::sqrt(most);
+}
+
+void Elastic::stress(uint32_t c, const double *u, double *out) const {
+  Tetrahedron t;
+  std::fill(out, out + 9, 0.0);
+  if (!cell(c, t)) return;
+  double h[9];
+  gradient(c, t, u, h);
+  const model::Lame m = lame(c);
+  const double pressure = m.lambda * ((h[0] + h[4]) + h[8]);
+  for (size_t r = 0; r < 3; ++r)
+    for (size_t s = 0; s < 3; ++s)
+      out[3 * r + s] = m.mu * (h[3 * r + s] + h[3 * s + r]) + (r == s ? pressure : 0);
+}
+
+double Elastic::density(uint32_t c, const double *u) const {
+  Tetrahedron t;
+  if (!cell(c, t)) return 0;
+  double h[9], s[9], sum = 0;
+  gradient(c, t, u, h);
+  stress(c, u, s);
+  for (size_t n = 0; n < 9; ++n) sum += s[n] * h[n];
+  return 0.5 * sum;
+}
+
+}  // namespace reduced

@@ -1,0 +1,74 @@
+// Linear elasticity of a mesh in its frame: stiffness, what is held, and the displacements that forces call
+// for. A body of which nothing is held has no displacement of its own under a force that moves it: its
+// compliance is that of the force less the inertia forces it raises, and moves neither the center of mass
+// nor turns the body (displacements orthogonal, by mass, to the rigid motions).
+#pragma once
+#include <deform/plugin.h>
+
+#include <array>
+#include <vector>
+
+#include "../model_common/material.h"
+#include "../model_common/tetrahedron.h"
+#include "params.h"
+#include "sparse.h"
+
+namespace reduced {
+
+// A factor of more points takes minutes.
+constexpr uint32_t kMostPoints = 10000;
+
+class Elastic {
+ public:
+  // Throws model::Refused after the reason was logged, or a sentence.
+  void create(const dfm_host *host, const char *id, const dfm_mesh &m);
+
+  const Kernels *kernels = nullptr;  // of this processor
+  uint32_t npoint = 0, ncell = 0;
+  bool floating = false;          // nothing is held
+  bool turns = false;             // held points are held in all components: the frame turns with them
+  double total = 0, extent = 0;   // kg, m
+  double origin[3] = {};          // of the rest positions below, in those of the mesh
+  Buffer<double> rest, mass;      // [npoint,3] m from the origin, [npoint] kg
+  Buffer<uint8_t> held;           // [npoint] bits
+  std::vector<uint32_t> holders;  // points with held components
+  Buffer<double> rigid;           // floating: [6, 3 npoint], orthonormal by mass; translations first
+
+  // u = C f in the frame, held components zero; [3 npoint], not the same
+  void compliance(const double *f, double *u) const;
+  // the same for eight forces side by side, [3 npoint, 8]; u may be f
+  void compliance_of_eight(const double *f, double *u) const;
+  // u: held components given, all others zero; becomes the displacement at rest under no force
+  void follow(double *u) const;
+  // [ncell] cells, by the displacement u [3 npoint] in the frame
+  double largest_gradient(const double *u, uint32_t *where) const;
+  double density(uint32_t c, const double *u) const;            // J/m3
+  void stress(uint32_t c, const double *u, double *out) const;  // 3 x 3
+  double volume(uint32_t c) const;
+
+ private:
+  const dfm_host *host_ = nullptr;
+  double young_ = 0, poisson_ = 0;
+  Buffer<double> field_[kParamCount];
+  Buffer<uint32_t> cells_, edges_;
+  uint32_t nedge_ = 0;
+  Buffer<double> block_;        // [npoint + nedge, 9]; dropped where nothing is held
+  std::vector<uint32_t> pins_;  // floating: six displacements that keep the body in place
+  Factor factor_;
+  mutable Buffer<double> work_;  // [3 npoint]
+
+  bool cell(uint32_t c, model::Tetrahedron &out) const;
+  model::Lame lame(uint32_t c) const;
+  void gradient(uint32_t c, const model::Tetrahedron &t, const double *u, double *h) const;
+  void take(const dfm_mesh &m, const char *id);
+  void place_origin(const dfm_mesh &m);
+  void assemble();
+  void find_rigid();
+  void find_pins();
+  void check_holding() const;
+  void factorize();
+  template <size_t kWide>
+  void respond(const double *f, double *u) const;
+};
+
+}  // namespace reduced

@@ -1,0 +1,136 @@
+// org.deform.modal and org.deform.condensed: linear elasticity by few modes in a floating frame, and what
+// they leave out at rest; the bodies step themselves (doc/models/modal.md, doc/models/condensed.md).
+#include <cstring>
+
+#include "../model_common/entry.h"
+#include "body.h"
+
+namespace reduced {
+
+namespace {
+constexpr uint32_t kElastic = DFM_PARAM_PER_CELL;
+}
+const dfm_param kParams[kParamCount] = {
+    {"young", "Young's modulus", "Pa", 1e-3, 1e13, 1e5, kElastic | DFM_PARAM_LOG_SCALE, 1, nullptr},
+    {"poisson", "Poisson's ratio", "1", -0.99, 0.4999, 0.3, kElastic, 1, nullptr},
+    {"damping_stiffness", "Rayleigh damping: damping over stiffness", "s", 0, 1e3, 0, DFM_PARAM_RUNTIME, 1,
+     nullptr},
+    {"damping_mass", "Rayleigh damping: drag over mass", "1/s", 0, 1e6, 0, DFM_PARAM_RUNTIME, 1, nullptr},
+    {"modes", "number of modes; 0, auto: by frequency or share, else 40", "1", 0, kMostModes, 0,
+     DFM_PARAM_INTEGER | DFM_PARAM_AUTO, 1, nullptr},
+    {"frequency", "all modes up to this frequency; 0: not asked", "Hz", 0, 1e9, 0, 0, 1, nullptr},
+    {"share", "modes that hold this share of the static response at the surface; 0: not asked", "1", 0, 0.999,
+     0, 0, 1, nullptr},
+};
+
+namespace {
+
+// Ops and extensions of a type whose instances are of the class B.
+template <class B>
+struct Entry {
+  using Ops = model::Ops<B>;
+
+  static dfm_status create(const dfm_host *h, const dfm_mesh *m, void **self) {
+    return model::create<B>(h, m, B().name(), self);
+  }
+  static dfm_status set_params(void *self, const double *params) {
+    B *body = static_cast<B *>(self);
+    if (!model::in_range(body->host, body->name(), kParams, kParamCount, params)) return DFM_E_ARG;
+    return model::change(*body, params);
+  }
+  static dfm_status state_init(const void *, double *state) {
+    *state = 0;
+    return DFM_OK;
+  }
+  static dfm_status predict(void *self, const dfm_kin *k, const double *f, double *u) {
+    dfm_status status = DFM_OK;
+    const dfm_status given = Ops::with_state(self, k, [&](B &body) { status = body.predict(*k, f, u); });
+    return given == DFM_OK ? status : given;
+  }
+  static dfm_status respond_many(void *self, const dfm_kin *k, uint32_t n, const uint32_t *surfel,
+                                 uint32_t nrhs, const double *p, double *du) {
+    return Ops::with_state(self, k, [&](B &body) { body.respond(*k, n, surfel, nrhs, p, du); });
+  }
+  static dfm_status respond(void *self, const dfm_kin *k, uint32_t n, const uint32_t *surfel, const double *p,
+                            double *du) {
+    return respond_many(self, k, n, surfel, 1, p, du);
+  }
+  static dfm_status diagonal(void *self, const dfm_kin *k, uint32_t n, const uint32_t *surfel, double *w) {
+    return Ops::with_state(self, k, [&](B &body) { body.diagonal(*k, n, surfel, w); });
+  }
+  static dfm_status commit(void *self, const dfm_kin *k, const double *p, double *x, double *v) {
+    return Ops::with_state(self, k, [&](B &body) { body.commit(*k, p, x, v); });
+  }
+  static constexpr dfm_stepper kStepper = {
+      sizeof(dfm_stepper), 0, predict, respond, diagonal, commit, nullptr, respond_many};
+
+  static const void *extension(const void *, const char *id) {
+    if (!strcmp(id, "dfm.stepper/1")) return &kStepper;
+    if (!strcmp(id, DFM_EXT_CELL_ENERGY)) return &Ops::kCellEnergy;
+    if (!strcmp(id, DFM_EXT_CELL_STRESS)) return &Ops::kCellStress;
+    if (!strcmp(id, DFM_EXT_EFFECTS)) return &Ops::kActiveEffects;
+    if (!strcmp(id, DFM_EXT_IDLE)) return &Ops::kIdle;
+    return nullptr;
+  }
+
+  // Was the body touched in the last step? Everything else follows from the points.
+  static constexpr dfm_slot kSlots[] = {{DFM_PER_INSTANCE, 1, DFM_SLOT_SCALAR, 0}};
+
+  static constexpr dfm_model kModel = {sizeof(dfm_model),
+                                       DFM_CAP_ENERGY | DFM_CAP_DAMPING | DFM_CAP_ROTATION_INVARIANT,
+                                       DFM_CELL_TET,
+                                       1,
+                                       kSlots,
+                                       create,
+                                       model::destroy<B>,
+                                       set_params,
+                                       state_init,
+                                       nullptr,
+                                       nullptr,
+                                       Ops::energy,
+                                       nullptr,
+                                       nullptr,
+                                       extension};
+};
+
+const char *const kEffects[] = {"large_rotation", "damping", nullptr};
+
+const dfm_type kModal = {
+    sizeof(dfm_type),
+    DFM_KIND_MODEL,
+    kModalId,
+    "modes of linear elasticity",
+    "0.1.0",
+    "MIT",
+    "modes of first-order tetrahedra (Pentland, Williams 1989, Good Vibrations, SIGGRAPH) "
+    "in a floating frame (Shabana 2020, Dynamics of Multibody Systems, ch. 5)",
+    kParams,
+    kParamCount,
+    sizeof(dfm_param),
+    kEffects,
+    &Entry<Modal>::kModel};
+
+const dfm_type kCondensed = {
+    sizeof(dfm_type),
+    DFM_KIND_MODEL,
+    kCondensedId,
+    "linear elasticity condensed to the surface",
+    "0.1.0",
+    "MIT",
+    "static condensation (Guyan 1965, AIAA Journal 3) with modes for the inertia and a "
+    "residual flexibility (MacNeal 1971, Computers & Structures 1)",
+    kParams,
+    kParamCount,
+    sizeof(dfm_param),
+    kEffects,
+    &Entry<Condensed>::kModel};
+
+const dfm_type *const kTypes[] = {&kModal, &kCondensed};
+const dfm_plugin kPlugin = {sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 2, kTypes, nullptr};
+
+}  // namespace
+}  // namespace reduced
+
+extern "C" DFM_EXPORT const dfm_plugin *dfm_plugin_entry(const dfm_host *host, uint32_t, uint32_t) {
+  return model::enter(host, reduced::kModalId, reduced::kPlugin);
+}

@@ -1,0 +1,37 @@
+// Loops over many numbers, chosen at run time by instruction set. All of them do the same IEEE operations in
+// the same order, kLanes numbers side by side, so that the instruction set never shows in a result. Plain
+// data only: kernel files see no STL and nothing with external inline code.
+#pragma once
+#include <stddef.h>
+#include <stdint.h>
+
+namespace reduced {
+
+constexpr size_t kLanes = 8;
+constexpr size_t kPiece = 32;  // numbers of a mode side by side in a basis
+
+// The lower triangle of a factor by block columns; see sparse.h.
+struct FactorView {
+  uint32_t n;
+  const uint32_t *begin, *row;
+  const double *block;
+};
+
+struct Kernels {
+  // sums[v][k][lane] += over the pieces, in[v] of n right-hand sides, n at most 3
+  void (*project)(const double *w, size_t pieces, size_t nmode, uint32_t n, const double *const *in,
+                  double *sums);
+  // out[v] = sum_k W_k in[v][k], n 1 or 2
+  void (*expand)(const double *w, size_t pieces, size_t nmode, uint32_t n, const double *const *in,
+                 double *const *out);
+  // out[row][lane] = sum_m rows[row][m] y[m][lane]
+  void (*rows)(const double *rows, size_t nrow, size_t width, const double *y, double *out);
+  // L L^T y = b for kLanes right-hand sides side by side, y [n,3,kLanes] in the factor's order
+  void (*solve)(const FactorView &l, double *y);
+};
+
+const Kernels *kernels_sse2();
+const Kernels *kernels_avx2();
+const Kernels *kernels_avx512();
+
+}  // namespace reduced

@@ -1,0 +1,61 @@
+// Vectors of three and matrices of nine numbers, row-major.
+#pragma once
+#include <deform/elementary.h>
+
+#include <cmath>
+#include <cstddef>
+
+namespace reduced {
+
+inline void cross_add(const double *a, const double *b, double scale, double *out) {
+  out[0] += scale * (a[1] * b[2] - a[2] * b[1]);
+  out[1] += scale * (a[2] * b[0] - a[0] * b[2]);
+  out[2] += scale * (a[0] * b[1] - a[1] * b[0]);
+}
+inline void product(const double *m, const double *x, double *out) {
+  for (int i = 0; i < 3; ++i) out[i] = (m[3 * i] * x[0] + m[3 * i + 1] * x[1]) + m[3 * i + 2] * x[2];
+}
+inline void transposed_product(const double *m, const double *x, double *out) {
+  for (int i = 0; i < 3; ++i) out[i] = (m[i] * x[0] + m[3 + i] * x[1]) + m[6 + i] * x[2];
+}
+inline void matrix_product(const double *a, const double *b, double *out) {
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      out[3 * i + j] = (a[3 * i] * b[j] + a[3 * i + 1] * b[3 + j]) + a[3 * i + 2] * b[6 + j];
+}
+
+// Of a symmetric positive definite matrix.
+inline void inverse(const double *a, double *out) {
+  const double c0 = a[4] * a[8] - a[5] * a[7], c1 = a[5] * a[6] - a[3] * a[8], c2 = a[3] * a[7] - a[4] * a[6];
+  const double d = 1 / ((a[0] * c0 + a[1] * c1) + a[2] * c2);
+  out[0] = c0 * d;
+  out[1] = out[3] = c1 * d;
+  out[2] = out[6] = c2 * d;
+  out[4] = (a[0] * a[8] - a[2] * a[6]) * d;
+  out[5] = out[7] = (a[2] * a[3] - a[0] * a[5]) * d;
+  out[8] = (a[0] * a[4] - a[1] * a[3]) * d;
+}
+
+// out = exp([w]) r, Rodrigues' formula; w is the rotation's axis times its angle.
+inline void turned(const double *w, const double *r, double *out) {
+  const double square = (w[0] * w[0] + w[1] * w[1]) + w[2] * w[2], angle = std::sqrt(square);
+  constexpr double kPi = 0x1.921fb54442d18p+1;
+  double s = 1 - square / 6, c = 0.5 - square / 24;  // sin a / a, (1 - cos a) / a^2
+  if (angle > 1e-3) {
+    const double half = dfm_sinpi(0.5 * angle / kPi);
+    s = dfm_sinpi(angle / kPi) / angle;
+    c = 2 * half * half / square;
+  }
+  double e[9];
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) e[3 * i + j] = c * w[i] * w[j] + (i == j ? 1 - c * square : 0);
+  e[1] -= s * w[2];
+  e[2] += s * w[1];
+  e[3] += s * w[2];
+  e[5] -= s * w[0];
+  e[6] -= s * w[1];
+  e[7] += s * w[0];
+  matrix_product(e, r, out);
+}
+
+}  // namespace reduced

@@ -1,0 +1,149 @@
+// org.deform.shape_matching: points are drawn to goals, the rest shape fitted to where they are (Mueller,
+// Heidelberger, Teschner, Gross 2005). It steps itself and is plausible, not physical: no constant of it is
+// one of a material (doc/models/shape_matching.md).
+#include <cstring>
+
+#include "shape_body.h"
+
+namespace shape {
+
+namespace {
+using Ops = model::Ops<Body>;
+constexpr uint32_t kRun = DFM_PARAM_RUNTIME;
+const char *const kModes[] = {"rigid", "linear", "quadratic", nullptr};
+}  // namespace
+
+const dfm_param kParams[kParamCount] = {
+    {"mode", "what goals may be of the rest shape: turned, also stretched and sheared, also bent and twisted",
+     "1", 0, 2, kLinear, DFM_PARAM_ENUM, 1, kModes},
+    {"stiffness", "a0: share of a deviation from the goal that is gone after reference_step", "1", 1e-6,
+     0.999999, 0.9999, kRun, 1, nullptr},
+    {"reference_step", "h0, the time that stiffness is meant for", "s", 1e-6, 1e3, 0.01,
+     kRun | DFM_PARAM_LOG_SCALE, 1, nullptr},
+    {"damping_ratio", "of the motion about the goals, over the critical one", "1", 0, 1, 0.5, kRun, 1,
+     nullptr},
+    {"linearity", "how far goals follow the fit of their mode; 0: goals are rigid", "1", 0, 0.99, 0.5, kRun,
+     1, nullptr},
+    {"clusters", "pieces with goals of their own", "1", 1, 4096, 1, DFM_PARAM_INTEGER, 1, nullptr},
+    {"overlap", "how far clusters reach into each other, over their radius", "1", 0, 4, 0.5, 0, 1, nullptr},
+    {"plastic_creep", "rate of plastic flow; 0: elastic", "1/s", 0, 1e6, 0, kRun, 1, nullptr},
+    {"plastic_yield", "strain above which the rest shape flows", "1", 0, 10, 0.05, kRun, 1, nullptr},
+    {"plastic_max", "largest plastic strain", "1", 0, 0.9, 0.5, kRun, 1, nullptr},
+    {"damping_mass", "drag over mass of each point", "1/s", 0, 1e6, 0, kRun, 1, nullptr},
+};
+
+namespace {
+
+dfm_status create(const dfm_host *h, const dfm_mesh *m, void **self) {
+  return model::create<Body>(h, m, kId, self);
+}
+
+dfm_status set_params(void *self, const double *params) {
+  Body *body = static_cast<Body *>(self);
+  if (!model::in_range(body->host, kId, kParams, kParamCount, params)) return DFM_E_ARG;
+  return model::change(*body, params);
+}
+
+dfm_status state_init(const void *self, double *state) {
+  static_cast<const Body *>(self)->init_state(state);
+  return DFM_OK;
+}
+
+bool lacks_state(const Body &body, const dfm_kin &k) {
+  if (!k.state) model::complain(body.host, kId, "the host gives no state; every cluster has one");
+  return !k.state;
+}
+
+dfm_status predict(void *self, const dfm_kin *k, const double *f, double *u) {
+  Body &body = *static_cast<Body *>(self);
+  if (lacks_state(body, *k)) return DFM_E_STATE;
+  body.predict(*k, f, u);
+  return DFM_OK;
+}
+
+// Frames are those of the last predict(), which has to be of the same step.
+dfm_status of_step(const Body &body, const dfm_kin &k) {
+  if (body.predicted(k)) return DFM_OK;
+  model::complain(body.host, kId, "asked for answers in a step that was not predicted");
+  return DFM_E_STATE;
+}
+
+dfm_status respond_many(void *self, const dfm_kin *k, uint32_t n, const uint32_t *surfel, uint32_t nrhs,
+                        const double *p, double *du) {
+  Body &body = *static_cast<Body *>(self);
+  const dfm_status status = of_step(body, *k);
+  if (status == DFM_OK) body.respond(n, surfel, nrhs, p, du);
+  return status;
+}
+
+dfm_status respond(void *self, const dfm_kin *k, uint32_t n, const uint32_t *surfel, const double *p,
+                   double *du) {
+  return respond_many(self, k, n, surfel, 1, p, du);
+}
+
+dfm_status diagonal(void *self, const dfm_kin *k, uint32_t n, const uint32_t *surfel, double *w) {
+  const Body &body = *static_cast<const Body *>(self);
+  const dfm_status status = of_step(body, *k);
+  if (status == DFM_OK) body.diagonal(n, surfel, w);
+  return status;
+}
+
+dfm_status commit(void *self, const dfm_kin *k, const double *p, double *x, double *v) {
+  Body &body = *static_cast<Body *>(self);
+  const dfm_status status = of_step(body, *k);
+  if (status == DFM_OK) body.commit(*k, p, x, v);
+  return status;
+}
+
+const dfm_stepper kStepper = {sizeof(dfm_stepper), 0, predict, respond, diagonal, commit, nullptr,
+                              respond_many};
+
+const void *extension(const void *self, const char *id) {
+  if (!strcmp(id, "dfm.stepper/1")) return &kStepper;
+  if (!strcmp(id, DFM_EXT_SLOTS)) return &static_cast<const Body *>(self)->slots;
+  if (!strcmp(id, DFM_EXT_EFFECTS)) return &Ops::kActiveEffects;
+  if (!strcmp(id, DFM_EXT_IDLE)) return &Ops::kIdle;
+  return nullptr;
+}
+
+const char *const kEffects[] = {"large_rotation", "damping", "plasticity", nullptr};
+
+const dfm_model kModel = {sizeof(dfm_model),
+                          DFM_CAP_DAMPING | DFM_CAP_ROTATION_INVARIANT | DFM_CAP_PLAUSIBLE,
+                          DFM_CELL_TET,
+                          0,
+                          nullptr,
+                          create,
+                          model::destroy<Body>,
+                          set_params,
+                          state_init,
+                          nullptr,
+                          nullptr,
+                          nullptr,
+                          nullptr,
+                          nullptr,
+                          extension};
+
+const dfm_type kType = {sizeof(dfm_type),
+                        DFM_KIND_MODEL,
+                        kId,
+                        "shape matching (plausible)",
+                        "0.1.0",
+                        "MIT",
+                        "Mueller, Heidelberger, Teschner, Gross 2005, Meshless deformations based on shape "
+                        "matching, (7), (9)-(14); Zerbato 2010, (2.45)-(2.47) corrected",
+                        kParams,
+                        kParamCount,
+                        sizeof(dfm_param),
+                        kEffects,
+                        &kModel};
+
+const dfm_type *const kTypes[] = {&kType};
+const dfm_plugin kPlugin = {sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 1, kTypes, nullptr};
+
+}  // namespace
+}  // namespace shape
+
+extern "C" DFM_EXPORT const dfm_plugin *dfm_plugin_entry(const dfm_host *host, uint32_t, uint32_t) {
+  return model::enter(host, shape::kId, shape::kPlugin);
+}

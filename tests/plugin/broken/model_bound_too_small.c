@@ -1,0 +1,3 @@
+/* M13: forgets one end of each spring. */
+#define BOUND(k) (0.15 * (k))
+#include "net.h"

@@ -1,0 +1,3 @@
+/* M19: a diagonal below the response. */
+#define DIAGONAL 0.9
+#include "stepper.h"

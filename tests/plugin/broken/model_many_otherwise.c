@@ -1,0 +1,3 @@
+/* M18: many impulses at once have other answers. */
+#define MANY 1.001
+#include "stepper.h"

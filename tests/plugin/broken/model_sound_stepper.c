@@ -1,0 +1,2 @@
+/* Nothing is wrong with it, as with sound.c. */
+#include "stepper.h"

@@ -1,0 +1,25 @@
+/* The type of a broken model, after its functions. */
+static const dfm_model model = {sizeof(dfm_model), CAPS,     DFM_CELL_TET, 0,           NULL,         create,
+                                destroy,           NULL,     NULL,         ADDS_FORCES, ASKED_ENERGY, pattern,
+                                stiffness,         extension};
+static const char *const effects[] = {"damping", NULL};
+static const dfm_type type = {sizeof(dfm_type),
+                              DFM_KIND_MODEL,
+                              "org.broken.model",
+                              "a model of the tests",
+                              "1.0",
+                              "MIT",
+                              "test",
+                              rows,
+                              2,
+                              sizeof(dfm_param),
+                              effects,
+                              &model};
+static const dfm_type *const types[] = {&type};
+static const dfm_plugin plugin = {sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 1, types, NULL};
+
+const dfm_plugin *dfm_plugin_entry(const dfm_host *host, uint32_t host_abi, uint32_t host_abi_min) {
+  (void)host_abi;
+  (void)host_abi_min;
+  return DFM_ABI_OK(host) ? &plugin : NULL;
+}

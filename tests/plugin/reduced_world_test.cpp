@@ -1,0 +1,187 @@
+// The models modal and condensed in a world: dropped, sliding, holding, saved; with every law of friction.
+#include "under_ball.h"
+
+namespace {
+
+struct World {
+  test::Context context;
+  dfm_world world;
+  dfm_body body;
+  World(const std::string &model, const char *law, double mu, std::array<double, 3> gravity, double z,
+        uint32_t threads = 1, double young = 2e5)
+      : context(threads) {
+    world = test::make_world(context, gravity);
+    test::BodyOptions o;
+    o.name = "block";
+    o.model = model;
+    o.young = young;
+    o.damping_stiffness = 2e-3;
+    o.position = {0, 0, z};
+    body = test::make_body(context, world, "beam", {0.1, 0.1, 0.1}, 60, o);
+    test::add_plane(world, "floor");
+    test::set_friction(world, mu, law);
+  }
+  ~World() { dfm_world_destroy(world); }
+};
+
+double normal_force(dfm_world world) {
+  dfm_pair_report pair{};
+  uint32_t n = 0;
+  EXPECT_EQ(dfm_world_pairs(world, 1, &pair, &n), DFM_OK) << dfm_last_error();
+  return n ? pair.normal : 0;
+}
+
+class ReducedWorld : public testing::TestWithParam<const char *> {};
+
+TEST_P(ReducedWorld, BlockDropped_ComesToRestUnderItsWeight) {
+  World w(GetParam(), "coulomb", 0.5, {0, 0, -9.81}, 0.02);
+  test::run(w.world, 2.0, 1e-3);
+  const dfm_body_measure m = test::measure(w.body);
+  EXPECT_LT(m.speed_max, 1e-6);
+  EXPECT_NEAR(normal_force(w.world), m.mass * 9.81, 1e-3 * m.mass * 9.81);
+}
+
+// The rest does not depend on the step; friction would keep what the landing has left.
+TEST_P(ReducedWorld, SagOnAFloor_IsTheSameAtAnyStep) {
+  double height[2];
+  int n = 0;
+  for (const double h : {1e-3, 1.0 / 120}) {
+    World w(GetParam(), "none", 0, {0, 0, -9.81}, 1e-4);
+    test::run(w.world, 3.0, h);
+    height[n++] = test::measure(w.body).com[2];
+  }
+  EXPECT_NEAR(height[0], height[1], 1e-7);
+}
+
+TEST_P(ReducedWorld, OnASlope_SlidesWithCoulombsAcceleration) {
+  const double theta = 0.5, mu = 0.3;
+  World w(GetParam(), "coulomb", mu, {9.81 * std::sin(theta), 0, -9.81 * std::cos(theta)}, 1e-4, 1, 1e6);
+  test::run(w.world, 0.2, 1e-3);
+  const double before = test::measure(w.body).velocity[0];
+  test::run(w.world, 0.4, 1e-3);
+  EXPECT_NEAR((test::measure(w.body).velocity[0] - before) / 0.4,
+              9.81 * (std::sin(theta) - mu * std::cos(theta)), 0.01);
+}
+
+TEST_P(ReducedWorld, WithAnyLaw_HoldsOnASlopeOrKeepsTogether) {
+  for (const char *law : {"coulomb", "karnopp", "dahl", "lugre", "elastoplastic", "gms"}) {
+    World w(GetParam(), law, 0.6, {9.81 * std::sin(0.4), 0, -9.81 * std::cos(0.4)}, 1e-4);
+    test::run(w.world, 0.5, 1e-3);
+    const dfm_body_measure m = test::measure(w.body);
+    EXPECT_LT(std::fabs(m.com[0] - 0.05), 5e-3) << law;
+    EXPECT_NEAR(normal_force(w.world), m.mass * 9.81 * std::cos(0.4), 0.02 * m.mass * 9.81) << law;
+  }
+}
+
+// The seam meets the other kind of body: a soft ball on top.
+TEST_P(ReducedWorld, UnderASoftBall_CarriesBothWeights) {
+  World w(GetParam(), "coulomb", 0.5, {0, 0, -9.81}, 1e-4, 1, 1e6);
+  test::expect_block_carries_ball(w.context, w.world, w.body, 1.5);
+}
+
+TEST_P(ReducedWorld, SavedInContact_GoesOnWithTheSameBits) {
+  World a(GetParam(), "lugre", 0.5, {1, 0, -9.81}, 0.005), b(GetParam(), "lugre", 0.5, {1, 0, -9.81}, 0.005);
+  test::run(a.world, 0.1, 1e-3);
+  ASSERT_GT(normal_force(a.world), 0);
+  const std::string saved = test::snapshot(a.world);
+  test::run(a.world, 0.1, 1e-3);
+  test::run(b.world, 0.03, 1e-3);
+  test::ok(dfm_world_restore(b.world, saved.data(), saved.size()));
+  test::run(b.world, 0.1, 1e-3);
+  EXPECT_EQ(dfm_world_hash(a.world), dfm_world_hash(b.world));
+}
+
+TEST_P(ReducedWorld, OnAnyNumberOfThreads_HasTheSameBits) {
+  World a(GetParam(), "lugre", 0.5, {1, 0, -9.81}, 0.005),
+      b(GetParam(), "lugre", 0.5, {1, 0, -9.81}, 0.005, 3);
+  test::run(a.world, 0.1, 1e-3);
+  test::run(b.world, 0.1, 1e-3);
+  EXPECT_EQ(dfm_world_hash(a.world), dfm_world_hash(b.world));
+}
+
+// What is held is known from creation on.
+TEST_P(ReducedWorld, HeldLater_IsRefused) {
+  World w(GetParam(), "coulomb", 0.5, {0, 0, -9.81}, 0.1);
+  const uint32_t points[] = {0, 1};
+  EXPECT_EQ(dfm_body_hold(w.body, 2, points, 7), DFM_E_UNSUPPORTED);
+  test::says({"body 'block'", "steps itself", "dfm_body_def.fixed"});
+}
+
+// Neither modes that the spin drives nor a rotation from one axis to another gain energy.
+TEST_P(ReducedWorld, FreeSpinningPlate_KeepsItsEnergy) {
+  const struct {
+    double young;
+    std::array<double, 3> spin;
+    double step;
+    int steps;
+  } cases[] = {{1e5, {0, 0, 10}, 1.0 / 240, 1920},
+               {1e9, {0.1, 30, 0.1}, 1.0 / 60, 480},
+               {1e9, {10, 10, 10}, 1.0 / 60, 480}};
+  for (const auto &c : cases) {
+    test::Context context(1);
+    const dfm_world world = test::make_world(context, {});
+    test::BodyOptions o;
+    o.model = GetParam();
+    o.young = c.young;
+    o.spin = c.spin;
+    const dfm_body body = test::make_body(context, world, "beam", {0.3, 0.1, 0.05}, 400, o);
+    const auto energy = [&] {
+      const dfm_body_measure m = test::measure(body);
+      return m.kinetic + m.elastic;
+    };
+    test::run(world, c.step, c.step);
+    const double first = energy();
+    double least = first, most = first;
+    for (int n = 0; n < c.steps; n += 4) {
+      test::run(world, 4 * c.step, c.step);
+      least = std::min(least, energy());
+      most = std::max(most, energy());
+    }
+    EXPECT_LT(most, 1.02 * first) << c.young << ' ' << c.spin[0];
+    EXPECT_GT(least, 0.98 * first) << c.young << ' ' << c.spin[0];
+    dfm_world_destroy(world);
+  }
+}
+
+// The error is the model's own reason.
+TEST_P(ReducedWorld, PartlyHeldAndTurnedByItsPose_IsRefusedWithTheReason) {
+  test::Context context(1);
+  const dfm_world world = test::make_world(context, {});
+  dfm_tetmesh mesh = 0;
+  const double size[] = {0.1, 0.1, 0.1};
+  test::ok(dfm_tetmesh_make(context, "beam", size, 60, &mesh));
+  test::BodyOptions o;
+  dfm_body_def d = dfm_body_def_default();
+  d.name = "block";
+  d.model = GetParam();
+  test::lend(mesh, d);
+  d.material = test::make_material(world, o);
+  std::vector<uint8_t> fixed(d.npoint, 0);
+  for (uint32_t i = 0, corner = 0; i < d.npoint; ++i)
+    if (d.points[3 * i] < d.points[0] + 1e-9) fixed[i] = corner++ ? 3 : 7;
+  d.fixed = fixed.data();
+  d.pose.rotation[2] = std::sin(0.025);
+  d.pose.rotation[3] = std::cos(0.025);
+  dfm_body body = 0;
+  test::ok(dfm_body_create(world, &d, &body));
+  EXPECT_NE(dfm_world_step(world, 1e-3, nullptr), DFM_OK);
+  test::says({"body 'block'", "the pose has turned the body; turn the mesh instead, or hold whole points"});
+  dfm_world_destroy(world);
+}
+
+INSTANTIATE_TEST_SUITE_P(Of, ReducedWorld, testing::Values("modal", "condensed"),
+                         [](const auto &of) { return std::string(of.param); });
+
+// All of the weight is carried by the surface: at rest a condensed body has the shape of the full solution.
+TEST(CondensedWorld, BlockAtRest_HasTheSagOfTheFullSolution) {
+  double height[2];
+  int n = 0;
+  for (const char *model : {"condensed", "linear_fem"}) {
+    World w(model, "none", 0, {0, 0, -9.81}, 1e-4);
+    test::run(w.world, 2.0, 1e-3);
+    height[n++] = test::measure(w.body).com[2];
+  }
+  EXPECT_NEAR(height[0], height[1], 1e-11);
+}
+
+}  // namespace

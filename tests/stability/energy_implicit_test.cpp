@@ -1,0 +1,109 @@
+// The energy watch on bodies that move implicitly, whose scheme lowers the energy itself: what a model gains
+// out of nothing is seen all the same.
+#define DFM_STATIC_PLUGIN pumped_points
+#include <vector>
+
+#include "support.h"
+#include "world.h"
+
+namespace {
+
+constexpr double kRate = 1;  // 1/s, by which velocities grow
+
+// Points that nothing but their own velocity pushes.
+struct Points { std::vector<double> mass; };
+dfm_status create(const dfm_host *, const dfm_mesh *m, void **self) {
+  *self = new Points{{m->mass, m->mass + m->npoint}};
+  return DFM_OK;
+}
+void destroy(void *self) { delete static_cast<Points *>(self); }
+dfm_status push(void *self, const dfm_kin *k, double *f) {
+  const std::vector<double> &mass = static_cast<Points *>(self)->mass;
+  for (size_t i = 0; i < mass.size(); ++i)
+    for (size_t c = 0; c < 3; ++c) f[i * k->stride + c] += kRate * mass[i] * k->v[i * k->stride + c];
+  return DFM_OK;
+}
+dfm_status no_energy(void *, const dfm_kin *, double *joule) {
+  *joule = 0;
+  return DFM_OK;
+}
+dfm_status pattern(const void *self, uint32_t *nb, uint32_t *ij) {
+  *nb = uint32_t(static_cast<const Points *>(self)->mass.size());
+  for (uint32_t i = 0; ij && i < *nb; ++i) ij[2 * i] = ij[2 * i + 1] = i;
+  return DFM_OK;
+}
+dfm_status no_stiffness(void *, const dfm_kin *, double, double, double *) { return DFM_OK; }
+
+}  // namespace
+
+extern "C" const dfm_plugin *dfm_plugin_entry_pumped_points(const dfm_host *host, uint32_t, uint32_t) {
+  if (!DFM_ABI_OK(host)) return nullptr;
+  static const char *const effects[] = {nullptr};
+  static dfm_model ops{};
+  ops.size = sizeof ops;
+  ops.caps = DFM_CAP_ENERGY | DFM_CAP_STIFFNESS;
+  ops.cells = DFM_CELL_TET;
+  ops.create = create;
+  ops.destroy = destroy;
+  ops.add_forces = push;
+  ops.energy = no_energy;
+  ops.pattern = pattern;
+  ops.stiffness = no_stiffness;
+  static dfm_type type{};
+  type.size = sizeof type;
+  type.kind = DFM_KIND_MODEL;
+  type.id = "test.pumped_points";
+  type.name = "points";
+  type.version = "1";
+  type.licence = "MIT";
+  type.source = "test";
+  type.param_size = sizeof(dfm_param);
+  type.effects = effects;
+  type.ops = &ops;
+  static const dfm_type *const types[] = {&type};
+  static const dfm_plugin plugin{sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 1, types, nullptr};
+  return &plugin;
+}
+
+TEST(EnergyImplicit, ModelThatPumps_IsStopped) {
+  test::Context context;
+  test::ok(dfm_plugin_register_static(context, dfm_plugin_entry_pumped_points, "pumped_points"));
+  for (const int32_t integrator : {DFM_INTEGRATOR_IMPLICIT_EULER, DFM_INTEGRATOR_TR_BDF2}) {
+    const dfm_world w = test::make_world(context, {0, 0, 0}, integrator);
+    test::Tet t("pumped");
+    t.def.model = "test.pumped_points";
+    t.def.velocity[0] = 1;
+    dfm_body b = 0;
+    test::ok(dfm_body_create(w, &t.def, &b));
+    uint32_t trouble = 0;
+    dfm_status status = DFM_OK;
+    for (int i = 0; i < 60 && status == DFM_OK; ++i) status = dfm_world_step(w, 1.0 / 60, &trouble);
+    EXPECT_EQ(status, DFM_E_DIVERGED) << "energy grows by e^2 in this second";
+    EXPECT_TRUE(trouble & DFM_TROUBLE_ENERGY);
+    test::says({"'pumped'", "energy has grown by"});
+    test::ok(dfm_world_destroy(w));
+  }
+}
+
+// It falls by itself; who looks at it learns how high it was.
+TEST(EnergyImplicit, BodyThatBounces_HasALargestEnergyAndNoGain) {
+  for (const char *model : {"msm", "corotational_fem"}) {
+    test::Context context;
+    const dfm_world w = test::make_world(context, {0, 0, -9.81}, DFM_INTEGRATOR_IMPLICIT_EULER);
+    test::add_plane(w, "floor");
+    test::BodyOptions o;
+    o.model = model;
+    o.position = {0, 0, 0.05};
+    o.spin = {3, 0, 9};
+    const dfm_body b = test::make_body(context, w, "beam", {0.3, 0.06, 0.06}, 150, o);
+    double most = 0;
+    for (int i = 0; i < 300; ++i) {
+      ASSERT_EQ(dfm_world_step(w, 2e-3, nullptr), DFM_OK) << dfm_last_error();
+      const dfm_body_measure m = test::measure(b);
+      most = std::max(most, m.kinetic + m.elastic);
+    }
+    const dfm_world_stats s = test::stats(w);
+    EXPECT_NEAR(s.energy_max, most, 0.05 * most) << model;
+    EXPECT_LT(s.energy_gain, 1e-3 * most) << model;
+  }
+}
