@@ -32,8 +32,10 @@ void choose_integrators(std::vector<IntegratorOption> &bodies) {
     if (stays(bodies[i])) add(rest, bodies[i], bodies[i].implicit);
     else order.push_back(i);
   }
-  std::stable_sort(order.begin(), order.end(),
-                   [&](size_t i, size_t j) { return bodies[i].substeps > bodies[j].substeps; });
+  std::sort(order.begin(), order.end(), [&](size_t i, size_t j) {
+    const double a = bodies[i].substeps, b = bodies[j].substeps;
+    return a > b || (a == b && i < j);
+  });
   // of those from k on explicitly, by suffix
   std::vector<Cost> after(order.size() + 1);
   for (size_t k = order.size(); k-- > 0;) {
