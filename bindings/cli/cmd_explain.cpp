@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <memory>
 
+#include "effect_costs.h"
 #include "json_text.h"
 #include "messages.h"
 #include "scene_file.h"
@@ -16,6 +17,7 @@ namespace {
 struct Options {
   std::string scene;
   std::vector<std::string> set;
+  bool costs = false;
 };
 
 void print_list(const JsonValue &plan, const char *key, const char *title,
@@ -42,6 +44,20 @@ void print_idle(const JsonValue &plan) {
       std::printf("  %-20s  %s has no effect, or not the one it names: %s\n",
                   bodies->items[i].get("name").c_str(), idle->items[k].get("name").c_str(),
                   idle->items[k].get("why").c_str());
+  }
+}
+
+// What models found when they made their bodies: how many modes, how much they hold.
+void print_facts(const JsonValue &plan) {
+  const JsonValue *bodies = plan.find("bodies");
+  for (size_t i = 0; bodies && i < bodies->items.size(); ++i) {
+    const JsonValue *facts = bodies->items[i].find("facts");
+    for (size_t k = 0; facts && k < facts->items.size(); ++k) {
+      const JsonValue &f = facts->items[k];
+      const std::string unit = f.get("unit") == "1" ? "" : " " + f.get("unit");
+      std::printf("  %-20s  %s: %.4g%s  (%s)\n", bodies->items[i].get("name").c_str(), f.get("key").c_str(),
+                  std::strtod(f.get("value").c_str(), nullptr), unit.c_str(), f.get("label").c_str());
+    }
   }
 }
 
@@ -74,14 +90,17 @@ void print_fields(const JsonValue &plan) {
   }
 }
 
-int explain(const Options &options, const Globals &globals) {
+int explain(const Options &options, Globals &globals) {
   SceneFile scene(globals, options.scene, options.set, 0);
   const std::string text = scene.explain();
   JsonValue plan;
   if (!parse_json(text, plan))
     throw Failure(kBadInput, "the library's plan is not JSON: " + text.substr(0, 200));
+  std::vector<EffectCost> costs;
+  if (options.costs) costs = measure_effects(globals, scene, options.set, plan);
   if (globals.json) {
-    std::printf("%s\n", text.c_str());
+    const std::string more = options.costs ? ",\"costs\":" + costs_json(costs) + "}" : "}";
+    std::printf("%s%s\n", text.substr(0, text.rfind('}')).c_str(), more.c_str());
     return kDone;
   }
   print_list(plan, "effects", "effects", {"asked_by", "provided_by"});
@@ -91,6 +110,8 @@ int explain(const Options &options, const Globals &globals) {
   if (scene.value("/time/mode") != "\"static\"") print_integrators(plan);
   print_fields(plan);
   print_idle(plan);
+  print_facts(plan);
+  print_effects(plan, options.costs ? &costs : nullptr);
   const JsonValue *const step = plan.find("step");
   if (scene.value("/time/mode") == "\"static\"") {
     std::printf("step\n  none: equilibria of the loads are looked for\n");
@@ -122,6 +143,8 @@ void add_explain(CLI::App &app, Globals &globals, int *exit_code) {
       ->type_name("/json/pointer=value")
       ->take_all()
       ->allow_extra_args(false);
+  sub->add_flag("--costs", options->costs,
+                "also measure, by steps with and without it, what each effect of a body costs here");
   sub->callback([=, &globals] { *exit_code = explain(*options, globals); });
 }
 

@@ -149,19 +149,36 @@ std::string plugins_json(const SceneFile &scene) {
   return json_array(rows);
 }
 
-std::string body_json(const dfm_body_measure &m, uint64_t dofs, uint32_t cells) {
+// "facts" of a body in the library's plan, by key; "" where its model tells none.
+std::string facts_json(const JsonValue &plan, const std::string &body) {
+  const JsonValue *const bodies = plan.find("bodies");
+  for (size_t b = 0; bodies && b < bodies->items.size(); ++b) {
+    const JsonValue *const facts = bodies->items[b].find("facts");
+    if (bodies->items[b].get("name") != body || !facts || facts->items.empty()) continue;
+    JsonObject out;
+    for (const JsonValue &f : facts->items) out.add(f.get("key"), f.get("value"));
+    return out.text();
+  }
+  return "";
+}
+
+std::string body_json(const dfm_body_measure &m, uint64_t dofs, uint32_t cells, const std::string &facts) {
   JsonObject row;
   row.add("com", json_vector(m.com)).add("velocity", json_vector(m.velocity));
   row.add("kinetic_J", number(m.kinetic)).add("elastic_J", number(m.elastic));
   row.add("volume_ratio", number(m.volume / m.rest_volume)).add("speed_max", number(m.speed_max));
-  return row.add("dofs", std::to_string(dofs)).add("cells", std::to_string(cells)).text();
+  row.add("dofs", std::to_string(dofs)).add("cells", std::to_string(cells));
+  if (!facts.empty()) row.add("facts", facts);
+  return row.text();
 }
 
-std::string bodies_json(const SceneFile &scene) {
+std::string bodies_json(const SceneFile &scene, const JsonValue &plan) {
   JsonObject out;
   for (const BodyView &body : scene.bodies())
-    out.add(body.name, body_json(body_measure(body), 3 * uint64_t(body.npoint), body.ntet));
-  for (const RigidView &rigid : scene.rigids()) out.add(rigid.name, body_json(rigid_measure(rigid), 6, 0));
+    out.add(body.name,
+            body_json(body_measure(body), 3 * uint64_t(body.npoint), body.ntet, facts_json(plan, body.name)));
+  for (const RigidView &rigid : scene.rigids())
+    out.add(rigid.name, body_json(rigid_measure(rigid), 6, 0, ""));
   return out.text();
 }
 
@@ -257,7 +274,7 @@ std::string summary_json(const SceneFile &scene, const RunOptions &options, cons
         .add("residual", number(run.residual));
     out.add("equilibrium", equilibrium.text());
   }
-  out.add("bodies", bodies_json(scene))
+  out.add("bodies", bodies_json(scene, plan))
       .add("contacts", contacts.text())
       .add("impulse", run.impulses)
       .add("swaps", swaps_json(scene, run))

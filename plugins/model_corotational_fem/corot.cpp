@@ -105,12 +105,19 @@ uint32_t caps_of(const void *self) {
 
 const dfm_caps kOwnCaps = {sizeof(dfm_caps), 0, caps_of};
 
+const dfm_effect_row kOff[] = {{"damping", kDampingStiffness, 0, 0},  {"damping", kDampingMass, 0, 0},
+                               {"anisotropy", kYoungAlong, 0, kAuto}, {"anisotropy", kPoissonAlong, 0, kAuto},
+                               {"anisotropy", kShearAlong, 0, kAuto}, {"deform.plasticity", kYield, 0, 0}};
+const dfm_effect_rows kEffectRows = {sizeof(dfm_effect_rows), sizeof(dfm_effect_row),
+                                     sizeof kOff / sizeof *kOff, 0, kOff};
+
 const void *extension(const void *self, const char *id) {
   if (!strcmp(id, DFM_EXT_CAPS)) return &kOwnCaps;
   if (!strcmp(id, DFM_EXT_CELL_ENERGY)) return &Ops::kCellEnergy;
   if (!strcmp(id, DFM_EXT_CELL_STRESS)) return &Ops::kCellStress;
   if (!strcmp(id, DFM_EXT_SLOTS)) return static_cast<const Body *>(self)->plastic() ? &kSlots : &kNoSlots;
   if (!strcmp(id, DFM_EXT_EFFECTS)) return &Ops::kActiveEffects;
+  if (!strcmp(id, DFM_EXT_EFFECT_ROWS)) return &kEffectRows;
   if (!strcmp(id, DFM_EXT_IDLE)) return &Ops::kIdle;
   return nullptr;
 }

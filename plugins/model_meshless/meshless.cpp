@@ -4,6 +4,7 @@
 // (doc/models/meshless.md).
 #include <cstring>
 
+#include "deform/plugin_draft.h"
 #include "meshless_body.h"
 
 namespace meshless {
@@ -42,9 +43,14 @@ dfm_status set_params(void *self, const double *params) {
   return model::change(*body, params);
 }
 
+const dfm_effect_row kOff[] = {{"damping", kDampingStiffness, 0, 0}, {"damping", kDampingMass, 0, 0}};
+const dfm_effect_rows kEffectRows = {sizeof(dfm_effect_rows), sizeof(dfm_effect_row),
+                                     sizeof kOff / sizeof *kOff, 0, kOff};
+
 const void *extension(const void *, const char *id) {
   if (!strcmp(id, DFM_EXT_CELL_ENERGY)) return &Ops::kCellEnergy;
   if (!strcmp(id, DFM_EXT_EFFECTS)) return &Ops::kActiveEffects;
+  if (!strcmp(id, DFM_EXT_EFFECT_ROWS)) return &kEffectRows;
   return nullptr;
 }
 

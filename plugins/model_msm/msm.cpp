@@ -120,10 +120,17 @@ const dfm_slots kNoSlots = {sizeof(dfm_slots), 0, nullptr}, kSlots = {sizeof(dfm
 const dfm_limited kLimited = {sizeof(dfm_limited), 0, limited};
 const dfm_spring_mask kSpringMask = {sizeof(dfm_spring_mask), 0, set_mask, get_mask};
 
+const dfm_effect_row kOff[] = {{"volume", kVolume, 0, 0},       {"damping", kDampingStiffness, 0, 0},
+                               {"damping", kDampingMass, 0, 0}, {"damping", kDamper, 0, kVoigt},
+                               {"anisotropy", kSlope, 0, 0},    {"deform.relaxation", kDamper, 0, kVoigt}};
+const dfm_effect_rows kEffectRows = {sizeof(dfm_effect_rows), sizeof(dfm_effect_row),
+                                     sizeof kOff / sizeof *kOff, 0, kOff};
+
 const void *extension(const void *self, const char *id) {
   if (!strcmp(id, DFM_EXT_CELL_ENERGY)) return &Ops::kCellEnergy;
   if (!strcmp(id, DFM_EXT_SLOTS)) return static_cast<const Body *>(self)->has_branch() ? &kSlots : &kNoSlots;
   if (!strcmp(id, DFM_EXT_EFFECTS)) return &Ops::kActiveEffects;
+  if (!strcmp(id, DFM_EXT_EFFECT_ROWS)) return &kEffectRows;
   if (!strcmp(id, DFM_EXT_IDLE)) return &Ops::kIdle;
   if (!strcmp(id, DFM_EXT_LIMITED)) return &kLimited;
   if (!strcmp(id, DFM_EXT_SPRING_MASK)) return &kSpringMask;

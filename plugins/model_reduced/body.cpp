@@ -123,10 +123,15 @@ void Body::describe() {
                   modes_.count, modes_.available, kMostModes);
   char text[200];
   constexpr double kTurn = 6.283185307179586;
+  const double lowest = std::sqrt(modes_.lambda[0]) / kTurn,
+               highest = std::sqrt(modes_.lambda[modes_.count - 1]) / kTurn;
   std::snprintf(text, sizeof text,
                 "%s: %u modes, %.4g to %.4g Hz, %.0f %% of the static response at the surface.", id_,
-                modes_.count, std::sqrt(modes_.lambda[0]) / kTurn,
-                std::sqrt(modes_.lambda[modes_.count - 1]) / kTurn, 100 * modes_.share);
+                modes_.count, lowest, highest, 100 * modes_.share);
+  facts_[0] = {"modes", "modes that the body has", "1", double(modes_.count)};
+  facts_[1] = {"lowest", "frequency of the lowest mode", "Hz", lowest};
+  facts_[2] = {"highest", "frequency of the highest mode", "Hz", highest};
+  facts_[3] = {"share", "share of the static response at the surface that its modes hold", "1", modes_.share};
   host->log(host->ctx, 1, 0, text);
 }
 

@@ -8,6 +8,8 @@
 // A condensed body has a fourth part, the displacement at rest of what its modes leave out: it has no mass
 // and follows forces and impulses at once. Equations, limits and cost: doc/models/modal.md, condensed.md.
 #pragma once
+#include <deform/plugin_draft.h>
+
 #include "modes.h"
 #include "oscillator.h"
 
@@ -32,6 +34,8 @@ class Body {
   void create(const dfm_host *h, const dfm_mesh &m);
   void apply_params(const double *values);
   const char *name() const { return id_; }
+  static constexpr uint32_t kFactCount = 4;
+  const dfm_fact *facts() const { return facts_; }
   const char *idle(Param row) const { return row == kModes && note_[0] ? note_ : nullptr; }
   bool lacks_state(const dfm_kin &k) const;
 
@@ -49,6 +53,7 @@ class Body {
   const bool condensed_;
   double params_[kParamCount] = {};
   char note_[128] = {};
+  dfm_fact facts_[kFactCount] = {};
   Elastic elastic_;
   Modes modes_;
   uint32_t nsurfel_ = 0;

@@ -64,11 +64,23 @@ struct Entry {
   static constexpr dfm_stepper kStepper = {
       sizeof(dfm_stepper), 0, predict, respond, diagonal, commit, nullptr, respond_many};
 
+  static const dfm_fact *facts(const void *self, uint32_t *n) {
+    *n = B::kFactCount;
+    return static_cast<const B *>(self)->facts();
+  }
+  static constexpr dfm_effect_row kOff[] = {{"damping", kDampingStiffness, 0, 0},
+                                            {"damping", kDampingMass, 0, 0}};
+  static constexpr dfm_effect_rows kEffectRows = {sizeof(dfm_effect_rows), sizeof(dfm_effect_row), 2, 0,
+                                                  kOff};
+  static constexpr dfm_facts kFacts = {sizeof(dfm_facts), sizeof(dfm_fact), facts};
+
   static const void *extension(const void *, const char *id) {
     if (!strcmp(id, "dfm.stepper/1")) return &kStepper;
     if (!strcmp(id, DFM_EXT_CELL_ENERGY)) return &Ops::kCellEnergy;
     if (!strcmp(id, DFM_EXT_CELL_STRESS)) return &Ops::kCellStress;
     if (!strcmp(id, DFM_EXT_EFFECTS)) return &Ops::kActiveEffects;
+    if (!strcmp(id, DFM_EXT_EFFECT_ROWS)) return &kEffectRows;
+    if (!strcmp(id, DFM_EXT_FACTS)) return &kFacts;
     if (!strcmp(id, DFM_EXT_IDLE)) return &Ops::kIdle;
     return nullptr;
   }

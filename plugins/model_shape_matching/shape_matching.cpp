@@ -3,6 +3,7 @@
 // one of a material (doc/models/shape_matching.md).
 #include <cstring>
 
+#include "deform/plugin_draft.h"
 #include "shape_body.h"
 
 namespace shape {
@@ -98,10 +99,16 @@ dfm_status commit(void *self, const dfm_kin *k, const double *p, double *x, doub
 const dfm_stepper kStepper = {sizeof(dfm_stepper), 0, predict, respond, diagonal, commit, nullptr,
                               respond_many};
 
+const dfm_effect_row kOff[] = {
+    {"damping", kDamping, 0, 0}, {"damping", kDampingMass, 0, 0}, {"plasticity", kCreep, 0, 0}};
+const dfm_effect_rows kEffectRows = {sizeof(dfm_effect_rows), sizeof(dfm_effect_row),
+                                     sizeof kOff / sizeof *kOff, 0, kOff};
+
 const void *extension(const void *self, const char *id) {
   if (!strcmp(id, "dfm.stepper/1")) return &kStepper;
   if (!strcmp(id, DFM_EXT_SLOTS)) return &static_cast<const Body *>(self)->slots;
   if (!strcmp(id, DFM_EXT_EFFECTS)) return &Ops::kActiveEffects;
+  if (!strcmp(id, DFM_EXT_EFFECT_ROWS)) return &kEffectRows;
   if (!strcmp(id, DFM_EXT_IDLE)) return &Ops::kIdle;
   return nullptr;
 }

@@ -240,3 +240,128 @@ TEST(World, QueriesBetweenBodies_DoNotChangeTheChoice) {
   };
   EXPECT_EQ(substeps(true), substeps(false));
 }
+
+namespace {
+
+std::string one_model(const std::string &name, const std::string &model, const std::string &more = "") {
+  return scene(name, R"("bodies": [{"name": "lone", "mesh": "block.msh", "model": )" + model + "}]" + more);
+}
+
+std::string line_of(const std::string &text, const std::string &effect) {
+  for (size_t at = 0, end = 0; (end = text.find('\n', at)) != std::string::npos; at = end + 1)
+    if (const std::string line = text.substr(at, end - at);
+        line.rfind("  lone ", 0) == 0 && line.find("  " + effect + " ") != std::string::npos)
+      return line;
+  return "";
+}
+
+}  // namespace
+
+TEST(Explain, EffectsOfABody_AreUsedIdleOrTheModelsOwn) {
+  const std::string path = one_model("effects", R"({"type": "msm", "params": {"damping_mass": 2}})");
+  const test::CommandResult result = test::deform({"explain", path});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const std::string &out = result.out;
+  EXPECT_NE(line_of(out, "damping").find("used; off with damping_stiffness 0, damping_mass 0, damper voigt"),
+            std::string::npos)
+      << out;
+  EXPECT_NE(line_of(out, "anisotropy").find("idle: anisotropy_slope 0"), std::string::npos) << out;
+  EXPECT_NE(line_of(out, "large_rotation").find("the model's own"), std::string::npos) << out;
+  EXPECT_NE(out.find("--costs measures"), std::string::npos) << out;
+  const test::CommandResult listed = test::deform({"explain", path, "--set", R"(/effects=["damping"])"});
+  EXPECT_NE(line_of(listed.out, "volume").find("on, not asked for"), std::string::npos) << listed.out;
+  EXPECT_NE(line_of(listed.out, "damping").find("used"), std::string::npos) << listed.out;
+}
+
+// The values that a model names for "off" do switch the effect off, for every model and effect that has some.
+TEST(Explain, SwitchesOfAnEffect_SwitchItOff) {
+  struct Case {
+    const char *model, *effect, *on;
+    std::vector<const char *> off;
+  };
+  const std::vector<Case> cases = {
+      {"msm", "volume", R"({"volume": 1})", {"volume=0"}},
+      {"msm",
+       "damping",
+       R"({"damping_stiffness": 0.01, "damper": "sls"})",
+       {"damping_stiffness=0", "damping_mass=0", "damper=voigt"}},
+      {"msm", "anisotropy", R"({"anisotropy_slope": 1})", {"anisotropy_slope=0"}},
+      {"msm", "deform.relaxation", R"({"damper": "maxwell"})", {"damper=voigt"}},
+      {"corotational_fem", "damping", R"({"damping_mass": 1})", {"damping_stiffness=0", "damping_mass=0"}},
+      {"corotational_fem",
+       "anisotropy",
+       R"({"anisotropy_young": 2e5})",
+       {"anisotropy_young=auto", "anisotropy_poisson=auto", "anisotropy_shear=auto"}},
+      {"corotational_fem", "deform.plasticity", R"({"yield": 1e3})", {"yield=0"}},
+      {"linear_fem", "damping", R"({"damping_stiffness": 0.01})", {"damping_stiffness=0", "damping_mass=0"}},
+      {"meshless", "damping", R"({"damping_mass": 1})", {"damping_stiffness=0", "damping_mass=0"}},
+      {"shape_matching", "damping", "{}", {"damping_ratio=0", "damping_mass=0"}},
+      {"shape_matching", "plasticity", R"({"plastic_creep": 1})", {"plastic_creep=0"}},
+      {"modal", "damping", R"({"damping_mass": 1, "modes": 4})", {"damping_stiffness=0", "damping_mass=0"}},
+      {"condensed",
+       "damping",
+       R"({"damping_mass": 1, "modes": 4})",
+       {"damping_stiffness=0", "damping_mass=0"}},
+  };
+  for (const Case &c : cases) {
+    const std::string path =
+        one_model("off", std::string(R"({"type": ")") + c.model + R"(", "params": )" + c.on + "}");
+    const std::string on = line_of(test::deform({"explain", path}).out, c.effect);
+    std::string wanted = "used; off with";
+    std::vector<std::string> args = {"explain", path};
+    for (const char *assignment : c.off) {
+      std::string told = assignment;
+      told[told.find('=')] = ' ';
+      wanted += (wanted.back() == 'h' ? " " : ", ") + told;
+      args.insert(args.end(), {"--set", std::string("/bodies/0/model/params/") + assignment});
+    }
+    EXPECT_NE(on.find(wanted), std::string::npos) << c.model << ": " << on << "\nwanted: " << wanted;
+    const test::CommandResult without = test::deform(args);
+    EXPECT_NE(line_of(without.out, c.effect).find("idle"), std::string::npos)
+        << c.model << " " << c.effect << ": " << without.out << without.err;
+  }
+}
+
+TEST(Explain, Costs_AreMeasuredWhereAskedFor) {
+  const std::string path =
+      one_model("costs", R"({"type": "msm", "params": {"damping_stiffness": 1e-4, "volume": 0}})",
+                R"(, "effects": ["damping"])");
+  const std::vector<std::string> args = {"explain", path, "--costs", "--set", "/time/step=0.001"};
+  const test::CommandResult text = test::deform(args);
+  ASSERT_EQ(text.exit_code, 0) << text.err;
+  for (const char *part : {"us per step", "11 pairs of"})
+    EXPECT_NE(line_of(text.out, "damping").find(part), std::string::npos) << text.out;
+  EXPECT_EQ(line_of(text.out, "volume").find("us per step"), std::string::npos) << "idle: " << text.out;
+  EXPECT_EQ(line_of(text.out, "large_rotation").find("us per step"), std::string::npos) << text.out;
+  std::vector<std::string> json_args = args;
+  json_args.push_back("--json");
+  const test::CommandResult json = test::deform(json_args);
+  EXPECT_NE(json.out.find(R"("costs":[{"body": "lone", "effect": "damping", "us_per_step": )"),
+            std::string::npos)
+      << json.out;
+  EXPECT_EQ(json.out.find("why_not"), std::string::npos) << json.out;
+}
+
+TEST(Explain, CostsOfASceneWithoutSteps_AreRefused) {
+  const std::string path = one_model("still", R"({"type": "corotational_fem"})");
+  const test::CommandResult result =
+      test::deform({"explain", path, "--costs", "--set", "/time/mode=static", "--set",
+                    R"(/bodies/0/fix=[{"box": [[-1, -1, -1], [0.001, 1, 1]]}])"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_NE(result.err.find("static mode has none"), std::string::npos) << result.err;
+}
+
+// How much of a body its modes hold is shown before a run and after it.
+TEST(Explain, ModesAndTheirShare_AreTold) {
+  const std::string path = one_model("modes", R"({"type": "modal", "params": {"modes": 7}})");
+  const test::CommandResult plan = test::deform({"explain", path});
+  EXPECT_NE(plan.out.find("  modes: 7  ("), std::string::npos) << plan.out;
+  EXPECT_NE(plan.out.find("  share: 0."), std::string::npos) << plan.out;
+  const std::string folder = test::scratch("explain_modes_" + std::to_string(getpid()));
+  const test::CommandResult run =
+      test::deform({"run", path, "--out", folder + "/out", "--quiet", "--set", "/time/duration=0.1"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const std::string summary = test::read_file(folder + "/out/summary.json");
+  EXPECT_NE(summary.find(R"("facts": {"modes": 7,)"), std::string::npos) << summary;
+  EXPECT_NE(summary.find(R"("share": 0.)"), std::string::npos) << summary;
+}

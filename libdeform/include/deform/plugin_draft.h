@@ -33,6 +33,32 @@ typedef struct dfm_spring_mask {
   dfm_status (*set)(void *self, uint32_t n, const uint32_t *edges, uint8_t on);
   dfm_status (*get)(const void *self, uint8_t *on); /* [any] on[nedge] 1, 0 */
 } dfm_spring_mask;
+/* ---- models: what explains a body to its user ---------------------------------------------------------- */
+/* Extension "dfm.effect_rows/1" of a model: the parameters that switch its effects off. An effect without a
+ * row is the model's own, or the body's. Told, and switched to measure costs, by `deform explain`; no step
+ * asks. */
+#define DFM_EXT_EFFECT_ROWS "dfm.effect_rows/1"
+typedef struct dfm_effect_row {
+  const char *effect;       /* one of dfm_type.effects */
+  uint32_t param, reserved; /* row of dfm_type.params, one wide */
+  double off;               /* the effect is off where each of its rows has this value */
+} dfm_effect_row;
+typedef struct dfm_effect_rows {
+  uint32_t size, row_size, n, reserved;
+  const dfm_effect_row *rows; /* [n] rows of row_size bytes; constant */
+} dfm_effect_rows;
+/* Extension "dfm.facts/1" of a model: numbers that the instance found when it was made and that its user
+ * should know. Told by `deform explain` and the summary of a run. */
+#define DFM_EXT_FACTS "dfm.facts/1"
+typedef struct dfm_fact {
+  const char *key, *label, *unit; /* "modes", "modes that the body has", "1" */
+  double value;
+} dfm_fact;
+typedef struct dfm_facts {
+  uint32_t size, row_size;
+  /* [setup] *n rows of row_size bytes; valid until the next call of set_params */
+  const dfm_fact *(*list)(const void *self, uint32_t *n);
+} dfm_facts;
 #ifdef __cplusplus
 }
 #endif

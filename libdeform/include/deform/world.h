@@ -325,10 +325,13 @@ static inline dfm_status dfm_world_profile(dfm_world world, uint32_t capacity, d
 /** The plan as JSON text (UTF-8, NUL-terminated): {"effects":[{"name","asked_by","provided_by"}],
  * "stages":[{"name","why","cost"}], "absent":[{"name","why"}],
  * "bodies":[{"name","model","cells","points","surfels","surface","filled",
- * "fields":[{"name","from","min","max"}], "idle":[{"name","why"}]}],
+ * "fields":[{"name","from","min","max"}], "idle":[{"name","why"}],
+ * "effects":[{"name","works","used","switches":[{"key","now","off","off_value"}]}],
+ * "facts":[{"key","label","unit","value"}]}],
  * "step":{"stable_s","worst_body","worst_point","reason"}}. surface: "boundary" of the cells, or
  * "own, COUPLING"; from: who says what differs by cell (field, materials, share); idle: parameters that do
- * nothing, or not what they name.
+ * nothing, or not what they name; effects: what the model brings, whether it is at work and the world uses
+ * it, and the parameters that together switch it off; facts: what the model found when it was made.
  * @param text NULL: *bytes gets the size needed, in bytes. @return DFM_OK; DFM_E_ARG; DFM_E_HANDLE.
  * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_explain(dfm_world world, char *text, size_t *bytes);

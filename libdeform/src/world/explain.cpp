@@ -6,6 +6,7 @@
 #include "core/error.h"
 #include "step/context.h"
 #include "step/method.h"
+#include "world/body_effects.h"
 #include "world/create.h"
 #include "world/idle.h"
 
@@ -48,6 +49,44 @@ std::string integrator(const Body &b) {
   return out + "}";
 }
 
+bool planned(const World &w, const std::string &effect) {
+  const auto same = [&](const PlannedEffect &e) { return e.name == effect; };
+  return std::any_of(w.plan.effects.begin(), w.plan.effects.end(), same);
+}
+
+// What the model brings, which of it the scene uses, and what would switch it off.
+std::string effects(const Body &b) {
+  std::string out = "\"effects\":[";
+  bool first = true;
+  for (const BodyEffect &e : body_effects(b)) {
+    out += std::string(first ? "" : ",") + "{\"name\":" + quote(e.name) +
+           ",\"works\":" + (e.works ? "true" : "false") +
+           ",\"used\":" + (e.works && planned(*b.world, e.name) ? "true" : "false") + ",\"switches\":[";
+    first = false;
+    for (size_t i = 0; i < e.switches.size(); ++i) {
+      const EffectSwitch &s = e.switches[i];
+      out += (i ? "," : "") +
+             ("{\"key\":" + quote(s.row->key) + ",\"now\":" + param_text(*s.row, s.now) +
+              ",\"off\":" + param_text(*s.row, s.off) + ",\"off_value\":" + format("%.17g", s.off) + "}");
+    }
+    out += "]}";
+  }
+  return out + "]";
+}
+
+// What the model found when it was made.
+std::string facts(const Body &b) {
+  std::string out = "\"facts\":[";
+  bool first = true;
+  for (const BodyFact &f : body_facts(b)) {
+    out += (first ? "" : ",") +
+           ("{\"key\":" + quote(f.key) + ",\"label\":" + quote(f.label) + ",\"unit\":" + quote(f.unit) +
+            ",\"value\":" + (std::isfinite(f.value) ? format("%.9g", f.value) : "null") + "}");
+    first = false;
+  }
+  return out + "]";
+}
+
 // Where a body's numbers come from: its cells, its surface, and the parameters that differ by cell.
 std::string body(const Body &b) {
   std::string out = "{\"name\":" + quote(b.name) + ",\"model\":" + quote(b.model.type->id);
@@ -66,7 +105,7 @@ std::string body(const Body &b) {
     out += (i ? "," : "") + ("{\"name\":" + quote(f.key) + ",\"from\":" + quote(f.from) +
                              format(",\"min\":%.9g,\"max\":%.9g}", *lo, *hi));
   }
-  out += "]," + integrator(b) + ",\"idle\":[";
+  out += "]," + effects(b) + "," + facts(b) + "," + integrator(b) + ",\"idle\":[";
   bool first = true;
   for (const IdleParam &p : idle_params(b)) {
     out += (first ? "" : ",") + ("{\"name\":" + quote(p.key) + ",\"why\":" + quote(p.why) + "}");

@@ -1,0 +1,80 @@
+#include "world/body_effects.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "core/error.h"
+#include "deform/plugin_draft.h"
+
+namespace dfm {
+namespace {
+
+template <class Table>
+const Table *ask(const Body &b, const char *id) {
+  const void *table = nullptr;
+  if (b.model.ops->extension)
+    b.model.call("extension", [&] {
+      table = b.model.ops->extension(b.model.self, id);
+      return DFM_OK;
+    });
+  const Table *const out = static_cast<const Table *>(table);
+  return out && out->size >= sizeof(Table) ? out : nullptr;
+}
+
+// Row i of a list whose rows may be longer than this library's.
+template <class Row>
+const Row &row_at(const Row *rows, uint32_t row_size, uint32_t i) {
+  return *reinterpret_cast<const Row *>(reinterpret_cast<const char *>(rows) + size_t(row_size) * i);
+}
+
+}  // namespace
+
+std::vector<BodyEffect> body_effects(const Body &b) {
+  const dfm_type &type = *b.model.type;
+  std::vector<size_t> first;  // value of each row
+  size_t values = 0;
+  for (uint32_t i = 0; i < type.nparam; values += type.params[i++].width) first.push_back(values);
+  const auto *const table = ask<dfm_effect_rows>(b, DFM_EXT_EFFECT_ROWS);
+  const bool readable = table && table->rows && table->row_size >= sizeof(dfm_effect_row);
+  std::vector<BodyEffect> out;
+  for (const char *const *name = type.effects; name && *name; ++name) {
+    BodyEffect effect;
+    effect.name = *name;
+    effect.works = b.model.works(effect.name);
+    for (uint32_t i = 0; readable && i < table->n; ++i) {
+      const dfm_effect_row &row = row_at(table->rows, table->row_size, i);
+      if (!row.effect || effect.name != row.effect || row.param >= type.nparam) continue;
+      effect.switches.push_back({&type.params[row.param], row.off, b.model.params[first[row.param]]});
+    }
+    out.push_back(std::move(effect));
+  }
+  return out;
+}
+
+std::vector<BodyFact> body_facts(const Body &b) {
+  std::vector<BodyFact> out;
+  const auto *const table = ask<dfm_facts>(b, DFM_EXT_FACTS);
+  if (!table || !table->list || table->row_size < sizeof(dfm_fact)) return out;
+  uint32_t n = 0;
+  const dfm_fact *facts = nullptr;
+  b.model.call("facts", [&] {
+    facts = table->list(b.model.self, &n);
+    return DFM_OK;
+  });
+  for (uint32_t i = 0; facts && i < n; ++i) {
+    const dfm_fact &f = row_at(facts, table->row_size, i);
+    if (f.key && f.label && f.unit) out.push_back({f.key, f.label, f.unit, f.value});
+  }
+  return out;
+}
+
+std::string param_text(const dfm_param &row, double value) {
+  if ((row.flags & DFM_PARAM_AUTO) && value == row.def) return "\"auto\"";
+  if (row.flags & DFM_PARAM_ENUM)
+    for (uint32_t k = 0; row.names && row.names[k]; ++k)
+      if (value == k) return std::string("\"") + row.names[k] + "\"";
+  return std::isfinite(value) ? format("%.9g", value) : "null";
+}
+
+}  // namespace dfm

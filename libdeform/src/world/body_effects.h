@@ -1,0 +1,34 @@
+// What a body's model brings beyond forces, as users are told it: its effects, what would switch them off,
+// and numbers that the model found when it was made.
+#pragma once
+#include <string>
+#include <vector>
+
+#include "state/body.h"
+
+namespace dfm {
+
+struct EffectSwitch {
+  const dfm_param *row;
+  double off, now;
+};
+struct BodyEffect {
+  std::string name;
+  bool works = false;                  // with the present parameters
+  std::vector<EffectSwitch> switches;  // all of them together switch it off; none: no parameter does
+};
+
+// In the order of the type's table; the model's extensions "dfm.effects/1" and "dfm.effect_rows/1".
+std::vector<BodyEffect> body_effects(const Body &b);
+
+struct BodyFact {
+  std::string key, label, unit;
+  double value;
+};
+// By the model's extension "dfm.facts/1".
+std::vector<BodyFact> body_facts(const Body &b);
+
+// A parameter's value as scenes give it, JSON.
+std::string param_text(const dfm_param &row, double value);
+
+}  // namespace dfm
