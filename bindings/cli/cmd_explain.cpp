@@ -61,6 +61,33 @@ void print_facts(const JsonValue &plan) {
   }
 }
 
+// Whose energy nobody compares with the work that is done on it.
+void print_unwatched(const JsonValue &plan) {
+  const JsonValue *bodies = plan.find("bodies");
+  for (size_t i = 0; bodies && i < bodies->items.size(); ++i)
+    if (const std::string why = bodies->items[i].get("unwatched"); !why.empty())
+      std::printf("  %-20s  not seen by the energy watch: %s\n", bodies->items[i].get("name").c_str(),
+                  why.c_str());
+}
+
+// Models that bodies are to have later.
+void print_changes(const JsonValue &plan) {
+  const JsonValue *bodies = plan.find("bodies");
+  for (size_t i = 0; bodies && i < bodies->items.size(); ++i) {
+    const JsonValue *changes = bodies->items[i].find("changes");
+    for (size_t k = 0; changes && k < changes->items.size(); ++k) {
+      const JsonValue &c = changes->items[k];
+      std::printf("  %-20s  changes to %s  %s", bodies->items[i].get("name").c_str(), c.get("name").c_str(),
+                  c.get("when").c_str());
+      if (const std::string own = c.get("integrator"); !own.empty())
+        std::printf(", moved by %s", own.c_str());
+      if (const std::string most = c.get("max_jump_J"); !most.empty())
+        std::printf(", unless its elastic energy would jump by more than %s J", most.c_str());
+      std::printf("\n");
+    }
+  }
+}
+
 // Which integrator moves each body, and how many explicit sub-steps would be in a step.
 void print_integrators(const JsonValue &plan) {
   const JsonValue *bodies = plan.find("bodies");
@@ -108,6 +135,8 @@ int explain(const Options &options, Globals &globals) {
   print_list(plan, "absent", "left out", {"why"});
   print_list(plan, "bodies", "bodies", {"model", "kind", "surface", "cells", "points", "surfels"});
   if (scene.value("/time/mode") != "\"static\"") print_integrators(plan);
+  print_changes(plan);
+  if (scene.value("/time/mode") != "\"static\"") print_unwatched(plan);
   print_fields(plan);
   print_idle(plan);
   print_facts(plan);

@@ -89,6 +89,7 @@ class Runner {
   void run() {
     result_.start = result_.simulated = dfm_world_time(world_);
     count_overlaps();
+    add_unwatched(scene_, result_);
     outputs(true);
     mark_ = {wall_seconds(), cpu_seconds()};
     while (!interrupted && !result_.stopped && advance()) outputs(false);
@@ -106,6 +107,7 @@ class Runner {
     if (result_.hold_begun) end_hold();
     outputs_.write_nodes();
     result_.impulses = impulses_.json();
+    add_unwatched(scene_, result_);  // models may have changed
     if (!static_) result_.contacts_mean = world_stats(scene_).contacts_mean;
   }
 

@@ -52,6 +52,15 @@ dfm_body_measure rigid_measure(const RigidView &rigid) {
   return m;
 }
 
+void add_unwatched(const SceneFile &scene, RunResult &run) {
+  JsonValue plan;
+  parse_json(scene.explain(), plan);
+  const JsonValue *const bodies = plan.find("bodies");
+  for (size_t i = 0; bodies && i < bodies->items.size(); ++i)
+    if (const std::string why = bodies->items[i].get("unwatched"); !why.empty())
+      run.unwatched.emplace(bodies->items[i].get("name"), why);
+}
+
 Checker::Checker(const SceneFile &scene) : scene_(scene), positions_(scene.bodies().size()) {
   for (const ObstacleView &obstacle : scene.obstacles()) {
     if (obstacle.def.shape != DFM_SHAPE_MESH && obstacle.def.shape != DFM_SHAPE_VOXELS) continue;
@@ -200,6 +209,19 @@ std::string swaps_json(const SceneFile &scene, const RunResult &run) {
   return json_array(rows);
 }
 
+// What is not known is null: no body that was looked at all along.
+std::string energy_json(const SceneFile &scene, const RunResult &run, const dfm_world_stats &stats) {
+  const bool known = scene.value("/time/mode") != "\"static\"" &&
+                     (run.unwatched.empty() || run.unwatched.size() < scene.bodies().size());
+  JsonObject unwatched, out;
+  for (const auto &[name, why] : run.unwatched) unwatched.add(name, quoted(why));
+  const auto joules = [&](double value) { return known ? number(value) : std::string("null"); };
+  out.add("start_J", joules(stats.energy_start))
+      .add("max_J", joules(stats.energy_max))
+      .add("gain_J", joules(stats.energy_gain));
+  return out.add("unwatched", unwatched.text()).text();
+}
+
 std::string stopped_json(const RunResult &run) {
   if (!run.stopped && !run.interrupted) return "null";
   JsonObject row;
@@ -223,7 +245,7 @@ std::string summary_json(const SceneFile &scene, const RunOptions &options, cons
                 static_cast<unsigned long long>(dfm_world_hash(scene.world())));
   std::vector<std::string> warning_texts;
   for (const std::string &w : warnings()) warning_texts.push_back(quoted(w));
-  JsonObject ms, solver, hold, effects, contacts, guard, budget, energy, out;
+  JsonObject ms, solver, hold, effects, contacts, guard, budget, out;
   ms.add("median", number(1e3 * run.times.quantile(0.5))).add("p99", number(1e3 * run.times.quantile(0.99)));
   ms.add("max", number(1e3 * run.times.longest()));
   solver.add("passes", std::to_string(stats.passes_max)).add("sweeps", std::to_string(stats.sweeps_max));
@@ -236,9 +258,6 @@ std::string summary_json(const SceneFile &scene, const RunOptions &options, cons
   budget.add("work_max", std::to_string(stats.work_max))
       .add("cheapened", std::to_string(stats.cheapened))
       .add("discarded", std::to_string(stats.discarded));
-  energy.add("start_J", number(stats.energy_start))
-      .add("max_J", number(stats.energy_max))
-      .add("gain_J", number(stats.energy_gain));
   contacts.add("max", std::to_string(stats.contacts_max)).add("mean", number(run.contacts_mean));
   out.add("format", "\"deform-summary\"")
       .add("version", "1")
@@ -262,7 +281,7 @@ std::string summary_json(const SceneFile &scene, const RunOptions &options, cons
       .add("guard", guard.text())
       .add("unconverged_steps", std::to_string(stats.unconverged));
   out.add("budget", budget.text());
-  out.add("energy", energy.text());
+  out.add("energy", energy_json(scene, run, stats));
   out.add("solver", solver.text())
       .add("hold", hold.text())
       .add("effects", effects.text())

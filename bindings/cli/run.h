@@ -1,6 +1,7 @@
 // What the parts of `deform run` share: options, and what a run has measured so far.
 #pragma once
 #include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -39,7 +40,8 @@ struct RunResult {
   double start = 0, simulated = 0, wall = 0, cpu = 0;
   StepTimes times;
   std::vector<dfm_swap> swaps;
-  std::string impulses = "{}";  // JSON, Impulses::json()
+  std::map<std::string, std::string> unwatched;  // bodies that the energy watch did not look at, and why
+  std::string impulses = "{}";                   // JSON, Impulses::json()
   bool interrupted = false, stopped = false;
   std::string stop_reason, stop_body;
   // of equilibria: those found, linear solves, share of the forces that the last one leaves
@@ -50,6 +52,9 @@ struct RunResult {
   double creep = 0;  // m/s, NAN if no pair qualifies
   uint32_t hold_count = 0;
 };
+
+// Adds those that it does not look at as the world is now.
+void add_unwatched(const SceneFile &scene, RunResult &run);
 
 // What recorded states showed. "Recorded" is every state written to bodies.csv, and with --check every step.
 struct Checks {

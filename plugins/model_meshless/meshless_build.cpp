@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "../model_common/index.h"
 #include "../model_common/material.h"
 #include "../model_common/params.h"
 #include "../model_common/rotation.h"
@@ -204,7 +205,10 @@ void Body::find_neighbors() {
     }
     grid.near(i, reach[i], [&](uint32_t, double) { ++begin[i + 1]; });
   }
-  for (uint32_t i = 0; i < npoint; ++i) begin[i + 1] += begin[i];
+  for (uint32_t i = 0; i < npoint; ++i)
+    begin[i + 1] = model::after(begin[i], begin[i + 1],
+                                "the points have more than 4 billion neighbors; take a smaller support, or "
+                                "fewer points");
   neighbor.create(host, begin[npoint]);
   slope.create(host, 3 * size_t(begin[npoint]));
   weight.create(host, begin[npoint]);

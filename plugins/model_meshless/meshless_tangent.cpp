@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "../model_common/index.h"
 #include "../model_common/rotation.h"
 #include "meshless_body.h"
 
@@ -167,7 +168,7 @@ void Body::make_pattern() const {
       for (uint32_t b = back_begin[p]; b < back_begin[p + 1]; ++b) stencil(back_point[b]);
       for (uint32_t m = 0; m < n; ++m) seen[row[m]] = 0;
       if (!fill) {
-        first[p + 1] = first[p] + n;
+        first[p + 1] = model::after(first[p], n, "more than 4 billion pairs of points");
         continue;
       }
       std::sort(row.data(), row.data() + n);

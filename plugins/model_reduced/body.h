@@ -102,7 +102,9 @@ class Body {
   double inertia_[9] = {}, moment_[3] = {}, moment_to_[3] = {};   // in the frame; in the world
   double turning_[9] = {};                                        // inverse inertia in the world
   double force_sum_[3] = {}, torque_[3] = {};
-  bool warned_ = false, named_ = false, checked_ = false;
+  bool named_ = false, checked_ = false;
+  double told_ = 0;     // the displacement gradient that was told; 0: none, or long ago
+  double outside_ = 0;  // s, when it was last out of its range
   uint32_t since_look_ = 0;
 
   size_t size() const { return 3 * size_t(elastic_.npoint); }
@@ -144,7 +146,7 @@ class Body {
   const double *rest_of_forces();
   void match_moment(const double *wanted, const double *c, const double *velocity, const double *x, double *v,
                     size_t stride) const;
-  void look_at_gradient(const double *x, size_t stride);
+  void look_at_gradient(double time, const double *x, size_t stride);
   void whole_displacement(const dfm_kin &k, Frame &f);
 };
 

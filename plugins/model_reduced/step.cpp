@@ -12,6 +12,7 @@ namespace {
 
 constexpr double kPi = 0x1.921fb54442d18p+1;
 constexpr int kMidpointPasses = 8;
+constexpr double kForgotten = 1;  // s in the range of small displacements
 
 }  // namespace
 
@@ -263,16 +264,17 @@ void Body::commit(const dfm_kin &k, const double *p_s, double *x, double *v) {
     match_moment(wanted, c, velocity, x, v, k.stride);
   }
   if (k.state_out) k.state_out[0] = touched;
-  look_at_gradient(x, k.stride);
+  look_at_gradient(k.t, x, k.stride);
 }
 
 // The displacement gradient is at most the sum of the modes' own: a look at the cells only where that is
-// large, and no more once it was told.
-void Body::look_at_gradient(const double *x, size_t stride) {
+// large. It is told when it leaves the range, again where it has become twice as large since, and anew once
+// it has been back for a while: a body that swings out and back tells it once and not in each period.
+void Body::look_at_gradient(double time, const double *x, size_t stride) {
   double bound = 0;
   for (uint32_t k = 0; k < modes_.count; ++k) bound += std::fabs(q_to_[k]) * gradient_[k];
-  if (warned_ || !(bound > kLargestGradient || led_ || has_rest_ || condensed_) || since_look_++ % 16 != 0)
-    return;
+  if (told_ > 0 && time - outside_ > kForgotten) told_ = 0;
+  if (!(bound > kLargestGradient || led_ || has_rest_ || condensed_) || since_look_++ % 16 != 0) return;
   dfm_kin k{};
   k.stride = uint32_t(stride);
   k.x = x;
@@ -281,7 +283,9 @@ void Body::look_at_gradient(const double *x, size_t stride) {
   uint32_t cell = 0;
   const double most = elastic_.largest_gradient(u_.data(), &cell);
   if (!(most > kLargestGradient)) return;
-  warned_ = true;
+  outside_ = time;
+  if (!(most > 2 * told_)) return;
+  told_ = most;
   char text[240];
   std::snprintf(
       text, sizeof text,

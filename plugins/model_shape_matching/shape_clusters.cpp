@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "../model_common/index.h"
 #include "../model_common/rotation.h"
 #include "shape_fit.h"
 
@@ -169,7 +170,10 @@ void Body::list_members(const uint32_t *center, const double *near, double reach
     ++point_begin[i + 1];
     ++cluster_begin[c + 1];
   });
-  for (uint32_t i = 0; i < npoint; ++i) point_begin[i + 1] += point_begin[i];
+  for (uint32_t i = 0; i < npoint; ++i)
+    point_begin[i + 1] = model::after(point_begin[i], point_begin[i + 1],
+                                      "the clusters have more than 4 billion points; take fewer clusters, or "
+                                      "a smaller overlap");
   for (uint32_t c = 0; c < ncluster; ++c) cluster_begin[c + 1] += cluster_begin[c];
   const size_t members = point_begin[npoint];
   for (Buffer<uint32_t> *b : {&cluster_point, &point_cluster, &point_place}) b->create(host, members);

@@ -258,7 +258,7 @@ struct ModelInstance {
   std::vector<double> storage[3];
   double *x, *v, *f;
   std::vector<double> state, state_out;
-  double dt = 1e-3;
+  double dt = 1e-3, t = 0;
 
   ModelInstance(Host &h, const dfm_type &type, const Mesh &m, const std::vector<double> &params,
                 uint32_t s = 4, const Fields &by_cell = {}, const std::vector<uint8_t> &fixed = {})
@@ -321,6 +321,7 @@ struct ModelInstance {
     k.stride = stride;
     k.x = x;
     k.v = v;
+    k.t = t;
     k.dt = dt;
     k.state = state.empty() ? nullptr : state.data();
     return k;

@@ -32,12 +32,16 @@ typedef struct dfm_switch {
   double max_jump;    /* J, as in dfm_body_set_model; 0: any jump */
 } dfm_switch;
 /** The changes to come, in place of those that were to come. They are made before the step (or the
- * equilibrium) that begins at their time, and stay made where that step is discarded. One that would
- * jump too far (DFM_DISCARD in dfm_body_set_model) is told by dfm_world_swaps and the log, and the body goes
- * on with the model it has; any other failure is that of the step, which is not taken.
+ * equilibrium) that begins at their time, and stay made where that step is discarded. Their models are made
+ * now, and two of them kept: what could never be made is refused now, and a change costs no more than the
+ * next step. One that would jump too far (DFM_DISCARD in dfm_body_set_model) is told by dfm_world_swaps and
+ * the log, and the body goes on with the model it has; any other failure, as of a spring that was added
+ * since, is that of the step, which is not taken.
  * @param switches  [n], times do not fall; n 0: none
- * @return DFM_OK; DFM_E_UNSUPPORTED no such model; DFM_E_ARG parameters, times (nothing changed);
- * DFM_E_HANDLE. Threads: Not during step. Since 0.1. */
+ * @return DFM_OK; DFM_E_UNSUPPORTED no such model, or one that cannot move this body in this world (contact
+ * method, integrator, springs); DFM_E_ARG parameters, times, cells that a model does not take, an effect that
+ * would be lost; DFM_E_NOMEM; DFM_E_HANDLE. On failure what was to come stays. Threads: Not during step.
+ * Since 0.1. */
 DFM_API dfm_status dfm_body_set_switches(dfm_body body, uint32_t n, const dfm_switch *switches);
 
 /** A model by its name, and what it is made with. */
@@ -63,9 +67,10 @@ DFM_API dfm_switch_rule dfm_switch_rule_default(void);
 /** Has the model of the body follow a rule, which is looked at before each step, after the changes by time: a
  * model further up in dfm_switch_rule is taken at once, one further down after `wait`. A change that is
  * refused is told once and tried again after `wait`; a body that sleeps keeps its model. What the rule has
- * come to is part of a snapshot.
- * @param rule  NULL: none from now on. @return DFM_OK; DFM_E_ARG values, parameters, one model alone;
- * DFM_E_UNSUPPORTED no such model; DFM_E_HANDLE. Threads: Not during step. Since 0.1. */
+ * come to is part of a snapshot. Its models are made now, as those of dfm_body_set_switches.
+ * @param rule  NULL: none from now on. @return DFM_OK; DFM_E_ARG values, parameters, one model alone, and
+ * with DFM_E_UNSUPPORTED, DFM_E_NOMEM as dfm_body_set_switches; DFM_E_HANDLE. On failure the rule that there
+ * was stays. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_set_switch_rule(dfm_body body, const dfm_switch_rule *rule);
 /** Moves the point of the body's rule. @return DFM_OK; DFM_E_ARG it has no rule with near_by, or the point is
  * not finite; DFM_E_HANDLE. Threads: Not during step. Since 0.1. */

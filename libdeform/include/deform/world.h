@@ -238,7 +238,8 @@ DFM_API dfm_status dfm_world_stable_step(dfm_world world, double *dt, dfm_body *
 /** Simulated time, s; NAN for a stale handle. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API double dfm_world_time(dfm_world world);
 
-/** FNV-1a 64 of x, v, model state, contact keys and bristles, in id order; 0 for a stale handle.
+/** FNV-1a 64 of x, v, model state, contact keys and bristles, in id order, and of the model with its
+ * parameters where a body has another one than at the first step; 0 for a stale handle.
  * Threads: Any thread. Not during step. Since 0.1. */
 DFM_API uint64_t dfm_world_hash(dfm_world world);
 /** Writes what a later result depends on. buffer NULL: *bytes gets the size needed. Too small:
@@ -293,8 +294,8 @@ typedef struct dfm_world_stats {
   /* cells at once that were so far from their shape that their model limited their stiffness, bodies at once
    * whose self contact was on: since creation */
   uint32_t limited_max, self_max;
-  /* J, kinetic and elastic of the bodies that the energy watch looks at: at the first step; the
-   * largest seen */
+  /* J, kinetic and elastic of the bodies that the energy watch looks at (the plan says which): at the first
+   * step; the largest seen, between two looks the kinetic energy of the motion without contact */
   double energy_start, energy_max;
   /* J, the largest gain seen beyond what loads, motions and contact have put in */
   double energy_gain;
@@ -327,11 +328,13 @@ static inline dfm_status dfm_world_profile(dfm_world world, uint32_t capacity, d
  * "bodies":[{"name","model","cells","points","surfels","surface","filled",
  * "fields":[{"name","from","min","max"}], "idle":[{"name","why"}],
  * "effects":[{"name","works","used","switches":[{"key","now","off","off_value"}]}],
- * "facts":[{"key","label","unit","value"}]}],
- * "step":{"stable_s","worst_body","worst_point","reason"}}. surface: "boundary" of the cells, or
- * "own, COUPLING"; from: who says what differs by cell (field, materials, share); idle: parameters that do
+ * "facts":[{"key","label","unit","value"}], "changes":[{"name","when","integrator","max_jump_J"}],
+ * "unwatched"}], "step":{"stable_s","worst_body","worst_point","reason"}}. surface: "boundary" of the cells,
+ * or "own, COUPLING"; from: who says what differs by cell (field, materials, share); idle: parameters that do
  * nothing, or not what they name; effects: what the model brings, whether it is at work and the world uses
- * it, and the parameters that together switch it off; facts: what the model found when it was made.
+ * it, and the parameters that together switch it off; facts: what the model found when it was made; changes:
+ * models that the body is to have, the last two where given; unwatched: why the energy watch does not look at
+ * the body, "" where it does.
  * @param text NULL: *bytes gets the size needed, in bytes. @return DFM_OK; DFM_E_ARG; DFM_E_HANDLE.
  * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_explain(dfm_world world, char *text, size_t *bytes);

@@ -90,6 +90,7 @@ dfm_status dfm_body_set_switches(dfm_body body, uint32_t n, const dfm_switch *sw
     std::vector<Switch> made;
     for (const dfm_switch &s : take_defs(switches, n, dfm_switch{}, "switch", "set it to sizeof(dfm_switch)"))
       made.push_back(make_switch(b, s, made.empty() ? -HUGE_VAL : made.back().t));
+    rehearse(b, made, b.rule, false);
     b.switches.swap(made);
   });
 }
@@ -109,8 +110,8 @@ dfm_status dfm_body_set_switch_rule(dfm_body body, const dfm_switch_rule *rule) 
     exclusive(*b.world);
     std::vector<SwitchRule> made;
     if (rule) made.push_back(make_rule(b, take_def(rule, dfm_switch_rule_default())));
+    rehearse(b, b.switches, made, false);
     b.rule.swap(made);
-    b.spares.clear();
   });
 }
 

@@ -1,6 +1,7 @@
 #include "scene/build.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "core/error.h"
@@ -11,6 +12,7 @@
 #include "scene/start.h"
 #include "state/world.h"
 #include "world/equilibrium.h"
+#include "world/model_change.h"
 
 namespace dfm::scene {
 namespace {
@@ -41,6 +43,7 @@ class Builder {
     double step = 0;
     check(dfm_world_stable_step(world_, &step, nullptr, nullptr), def_.effects_auto ? "/bodies" : "/effects");
     if (def_.equilibrium) check_static();
+    for (Body &b : def_.bodies) add_switches(b);
     return {std::exchange(world_, 0), std::move(probes_)};
   }
 
@@ -218,25 +221,49 @@ class Builder {
     for (size_t i = 0; i < b.fixes.size(); ++i) move_held(body, b.fixes[i], held[i]);
     add_loads(body, b, mesh, nodal);
     for (const Spring &s : b.springs) add_spring(body, s, b.name, mesh);
-    add_switches(body, b);
     for (const Probe &p : def_.probes)
       if (p.body == b.name) add_probe(body, p, mesh);
   }
 
-  void add_switches(dfm_body body, Body &b) const {
+  // Of a world that is whole, so that one which could never be made is an error of the scene.
+  void add_switches(Body &b) const {
+    if (b.switches.empty() && b.rule.far.type.empty()) return;
+    const std::string pointer = b.pointer + "/switch";
+    dfm_body body = 0;
+    check(dfm_world_find_body(world_, b.name.c_str(), &body), pointer);
     std::vector<dfm_switch> switches;
-    for (Switch &s : b.switches)
+    for (Switch &s : b.switches) {
       switches.push_back({sizeof(dfm_switch), s.model.integrator, s.t, s.model.type.c_str(),
                           s.model.params.view(), s.max_jump});
-    const std::string pointer = b.pointer + "/switch";
+      if (s.t > 0 && s.t >= end_of_changes())
+        context_->logf(DFM_LOG_WARNING,
+                       "body '%s': its change to '%s' at %g s (%s/t) is never made, because no step begins "
+                       "then or later; give an earlier time, or a longer /time/duration",
+                       b.name.c_str(), s.model.type.c_str(), s.t, s.pointer.c_str());
+    }
     if (!switches.empty())
       check(dfm_body_set_switches(body, uint32_t(switches.size()), switches.data()), pointer);
-    if (b.rule.far.type.empty()) return;
-    dfm_switch_rule rule = b.rule.values;
-    rule.touching = b.rule.touching.view();
-    rule.near_by = b.rule.near.view();
-    rule.otherwise = b.rule.far.view();
-    check(dfm_body_set_switch_rule(body, &rule), pointer);
+    if (!b.rule.far.type.empty()) {
+      dfm_switch_rule rule = b.rule.values;
+      rule.touching = b.rule.touching.view();
+      rule.near_by = b.rule.near.view();
+      rule.otherwise = b.rule.far.view();
+      check(dfm_body_set_switch_rule(body, &rule), pointer);
+    }
+    if (!def_.equilibrium) return;
+    with_pointer(pointer, [&] {
+      dfm::Body &made = resolve<dfm::Body>(Kind::body, body);
+      rehearse(made, made.switches, made.rule, true);
+      return 0;
+    });
+  }
+
+  // s: no step of the scene's duration, or search for an equilibrium, begins then or later.
+  double end_of_changes() const {
+    const double step = def_.equilibrium && !(def_.step > 0) ? def_.duration : def_.step;
+    if (!(step > 0)) return def_.duration;
+    const double steps = std::max(1.0, std::ceil(def_.duration / step - 1e-3));
+    return (steps - 1) * step + 2e-6 * step;
   }
 
   void move_held(dfm_body body, const Fix &f, const std::vector<uint32_t> &points) const {

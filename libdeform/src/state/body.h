@@ -83,8 +83,9 @@ struct Body {
   ModelOrigin origin;
   std::vector<Switch> switches;  // to come, by time
   std::vector<SwitchRule> rule;  // one or none
-  // instances that the rule has left and may come back to: what they have made of the mesh is theirs still
+  // instances that a change to come may take: what they have made of the mesh is theirs still
   std::vector<SpareModel> spares;
+  bool another_model = false;  // than it had when the world took its first step
   double mass = 0, rest_volume = 0;
   Array<double> share;  // [ntet] how much of each cell is material; empty: all
   std::vector<CellField> fields;

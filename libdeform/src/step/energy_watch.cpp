@@ -180,6 +180,14 @@ void book_body(World &w, StepContext &step, Body &b, double motion) {
 
 }  // namespace
 
+const char *unwatched(const World &w, const Body &b) {
+  if (!(w.def.energy_watch > 0)) return "energy_watch is 0";
+  if (!watching(w)) return "the contact method gives no impulses to book";
+  if (!(b.model.ops->caps & DFM_CAP_ENERGY) || !b.model.ops->energy) return "its model gives no energy";
+  if (b.model.stepper) return "its model steps itself";
+  return unbooked(w, b) ? "tr_bdf2 takes loads, held points or gravity that vary along the sub-step" : "";
+}
+
 // Of G = U(x) - m g.x + v.M v* / 2 with v* = v + h g + ..: a weight that changes does work at the places x -
 // h v / 2, whatever the motion; at x where G is the true energy. The sub-step may fail after this and be
 // tried again with another gravity, from the same state: then the rest is booked.

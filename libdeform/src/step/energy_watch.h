@@ -15,6 +15,8 @@ struct Body;
 
 // Gravity that varies: sets the present one, and books what that does to the potentials.
 void change_gravity(World &w, Vec3 gravity);
+// Why the watch does not look at the body; empty where it does.
+const char *unwatched(const World &w, const Body &b);
 // After predict. False: a body has gained too much; the sentence says which.
 bool watch_energy(World &w, StepContext &step, uint32_t *trouble);
 // Before commit: what this sub-step puts into the bodies.

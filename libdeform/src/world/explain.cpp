@@ -5,6 +5,7 @@
 
 #include "core/error.h"
 #include "step/context.h"
+#include "step/energy_watch.h"
 #include "step/method.h"
 #include "world/body_effects.h"
 #include "world/create.h"
@@ -25,11 +26,11 @@ std::string quote(const std::string &s) {
   return out + "\"";
 }
 
-const char *word_of(const Body &b) {
-  if (b.model.stepper) return "its own";
-  return b.integrator.used == DFM_INTEGRATOR_SYMPLECTIC_EULER ? "symplectic_euler"
-                                                              : integrator_name(int32_t(b.integrator.used));
+const char *word_of(uint32_t integrator) {
+  return integrator == DFM_INTEGRATOR_SYMPLECTIC_EULER ? "symplectic_euler"
+                                                       : integrator_name(int32_t(integrator));
 }
+const char *word_of(const Body &b) { return b.model.stepper ? "its own" : word_of(b.integrator.used); }
 
 // How it moves, and what explicit time would take.
 std::string integrator(const Body &b) {
@@ -87,6 +88,28 @@ std::string facts(const Body &b) {
   return out + "]";
 }
 
+std::string change(const ModelChoice &c, const std::string &when) {
+  std::string out = "{\"name\":" + quote(c.type) + ",\"when\":" + quote(when);
+  if (c.integrator != kSameIntegrator && c.integrator != uint32_t{DFM_INTEGRATOR_AUTO})
+    out += ",\"integrator\":" + quote(word_of(c.integrator));
+  if (c.max_jump < HUGE_VAL) out += format(",\"max_jump_J\":%.9g", c.max_jump);
+  return out + "}";
+}
+
+// Models that it is to have.
+std::string changes(const Body &b) {
+  std::vector<std::string> rows;
+  for (const Switch &s : b.switches) rows.push_back(change(s.to, format("at %g s", s.t)));
+  for (const SwitchRule &r : b.rule) {
+    if (!r.touching.type.empty()) rows.push_back(change(r.touching, "while it touches something"));
+    if (!r.near.type.empty())
+      rows.push_back(change(r.near, format("while its surface is within %g m of (%g, %g, %g)", r.distance,
+                                           r.point.x, r.point.y, r.point.z)));
+    rows.push_back(change(r.far, "else"));
+  }
+  return ",\"changes\":[" + join(rows, ",") + "]";
+}
+
 // Where a body's numbers come from: its cells, its surface, and the parameters that differ by cell.
 std::string body(const Body &b) {
   std::string out = "{\"name\":" + quote(b.name) + ",\"model\":" + quote(b.model.type->id);
@@ -111,7 +134,7 @@ std::string body(const Body &b) {
     out += (first ? "" : ",") + ("{\"name\":" + quote(p.key) + ",\"why\":" + quote(p.why) + "}");
     first = false;
   }
-  return out + "]}";
+  return out + "]" + changes(b) + ",\"unwatched\":" + quote(unwatched(*b.world, b)) + "}";
 }
 
 std::string seconds(double s) { return std::isfinite(s) ? format("%.3g s", s) : "any step"; }

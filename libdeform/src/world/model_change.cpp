@@ -169,11 +169,11 @@ void check_surface(World &w, Body &b) {
 }
 
 // Effects that the scene lists, and that the old model alone provides.
-void check_effects(const World &w, const Body &b, const ModelInstance &old) {
+void check_effects(const World &w, const Body &b, const ModelInstance &old, const ModelInstance &fresh) {
   if (!w.def.effects) return;
-  const std::vector<std::string> now = effects(*b.model.type);
+  const std::vector<std::string> now = effects(*fresh.type);
   for (const std::string &effect : effects(*old.type)) {
-    const bool stays = std::find(now.begin(), now.end(), effect) != now.end() && b.model.works(effect);
+    const bool stays = std::find(now.begin(), now.end(), effect) != now.end() && fresh.works(effect);
     const auto &asked = w.asked_effects;
     if (stays || !old.works(effect) || std::find(asked.begin(), asked.end(), effect) == asked.end()) continue;
     const auto &offered = w.steps->facts.offered;
@@ -182,8 +182,16 @@ void check_effects(const World &w, const Body &b, const ModelInstance &old) {
     fail(DFM_E_ARG,
          "body '%s': effect '%s' is asked for, and with model '%s' nothing in the scene would provide it; "
          "take it from the list of effects, or choose a model that has it; nothing was changed",
-         b.name.c_str(), effect.c_str(), b.model.type->id);
+         b.name.c_str(), effect.c_str(), fresh.type->id);
   }
+}
+
+void check_springs(const Body &b, const dfm_type &type, const Dynamics &moves) {
+  if (b.springs.empty() || moves.abilities().springs) return;
+  fail(DFM_E_UNSUPPORTED,
+       "body '%s': a spring is explicit, and model '%s' has no step bound to hold it to; remove its springs "
+       "first; nothing was changed",
+       b.name.c_str(), type.id);
 }
 
 void check_jump(const Body &b, const Swap &swap) {
@@ -220,26 +228,67 @@ void warn_of_jump(const World &w, const Body &b, const Swap &swap) {
 
 // With the new model in place.
 void judge(World &w, Body &b, const ModelInstance &old, Swap &swap) {
-  if (!b.springs.empty() && !b.dynamics->abilities().springs)
-    fail(
-        DFM_E_UNSUPPORTED,
-        "body '%s': a spring is explicit, and model '%s' has no step bound to hold it to; remove its springs "
-        "first; nothing was changed",
-        b.name.c_str(), b.model.type->id);
-  check_effects(w, b, old);
+  check_springs(b, *b.model.type, *b.dynamics);
+  check_effects(w, b, old, b.model);
   swap.after = elastic_energy(b);
   check_jump(b, swap);
   check_surface(w, b);
 }
 
-// What a change leaves that a rule may take back. There is room.
-void keep_spare(Body &b, BodyModel &left, std::unique_ptr<ModelInstance> place) {
-  if (b.spares.size() == kSpares) b.spares.erase(b.spares.begin());
+// What a later change may take back, in place of an older one made with the same. There is room.
+void keep_spare(std::vector<SpareModel> &spares, BodyModel &left, std::unique_ptr<ModelInstance> place) {
+  const auto same = [&](const SpareModel &s) {
+    return s.instance->type == left.instance.type && s.origin.params == left.origin.params;
+  };
+  std::erase_if(spares, same);
+  if (spares.size() == kSpares) spares.erase(spares.begin());
   place->swap(left.instance);
-  b.spares.push_back({std::move(place), std::move(left.origin)});
+  spares.push_back({std::move(place), std::move(left.origin)});
+}
+
+// What an instance of this type is to be made with, as the body is now.
+ModelOrigin origin_for(const Body &b, const dfm_type &type, const ModelChoice &to) {
+  ModelOrigin origin{to.params,
+                     b.origin.frame,
+                     to.integrator == kSameIntegrator ? b.origin.integrator : to.integrator,
+                     {b.p.held.begin(), b.p.held.end()}};
+  if (!(model_of(type).caps & DFM_CAP_ROTATION_INVARIANT)) origin.frame = frame_of(b);
+  return origin;
+}
+
+bool differ(const ModelOrigin &a, const ModelOrigin &b) {
+  return a.params != b.params || std::memcmp(&a.frame, &b.frame, sizeof a.frame) != 0 || a.held != b.held;
+}
+
+// A change that is to come, of a body which will have this integrator until then.
+void rehearse(Body &b, const ModelChoice &to, uint32_t &integrator, bool at_rest,
+              std::vector<SpareModel> &spares) {
+  World &w = *b.world;
+  if (to.integrator != kSameIntegrator) integrator = to.integrator;
+  const dfm_type &type = w.context->registry.find(DFM_KIND_MODEL, to.type);
+  ModelOrigin origin = origin_for(b, type, to);
+  origin.integrator = integrator;
+  auto place = std::make_unique<ModelInstance>();
+  const std::unique_ptr<BodyModel> made =
+      make_body_model(w, b, type, std::move(origin), static_cast<int32_t>(integrator));
+  check_springs(b, type, *made->dynamics);
+  if (!w.changed) check_effects(w, b, b.model, made->instance);
+  if (at_rest && made->instance.stepper)
+    fail(DFM_E_UNSUPPORTED,
+         "body '%s': model '%s' steps itself and tells no stiffness, which an equilibrium needs; choose "
+         "another model",
+         b.name.c_str(), type.id);
+  // one whose forces do not turn with the body is of the present place only
+  const bool lasts = model_of(type).caps & DFM_CAP_ROTATION_INVARIANT;
+  if (lasts && spares.size() < kSpares) keep_spare(spares, *made, std::move(place));
 }
 
 }  // namespace
+
+bool is_made_so(const Body &b, const ModelChoice &c) {
+  return c.type == b.model.type->id && c.params == b.origin.params &&
+         (c.integrator == kSameIntegrator || c.integrator == b.origin.integrator);
+}
 
 ModelChoice choose_model(const Body &b, const char *type, const dfm_params &params, int32_t integrator) {
   const dfm_type &found = b.world->context->registry.find(DFM_KIND_MODEL, type);
@@ -272,11 +321,7 @@ void change_model(Body &b, const ModelChoice &to, Swap &swap) {
   World &w = *b.world;
   const dfm_type &type = w.context->registry.find(DFM_KIND_MODEL, to.type);
   prepare(w);
-  ModelOrigin origin{to.params,
-                     b.origin.frame,
-                     to.integrator == kSameIntegrator ? b.origin.integrator : to.integrator,
-                     {b.p.held.begin(), b.p.held.end()}};
-  if (!(model_of(type).caps & DFM_CAP_ROTATION_INVARIANT)) origin.frame = frame_of(b);
+  ModelOrigin origin = origin_for(b, type, to);
   swap = {b.handle, w.time, b.model.type, &type, elastic_energy(b), NAN, to.max_jump, false};
   const int32_t integrator = static_cast<int32_t>(origin.integrator);
   auto place = std::make_unique<ModelInstance>();
@@ -291,11 +336,41 @@ void change_model(Body &b, const ModelChoice &to, Swap &swap) {
     prepare(w);
   } catch (...) {
     exchange(b, *made);
+    if (!b.rule.empty()) keep_spare(b.spares, *made, std::move(place));  // the rule will ask for it again
     throw;
   }
-  if (!b.rule.empty()) keep_spare(b, *made, std::move(place));
+  const bool another = b.model.type != made->instance.type || b.model.params != made->instance.params ||
+                       b.integrator.used != made->integrator.used || differ(b.origin, made->origin);
+  b.another_model = b.another_model || (w.step_count > 0 && another);
+  if (!b.rule.empty()) keep_spare(b.spares, *made, std::move(place));
   wake(w, b);
   w.sizes = {};  // another bound, and other errors
+}
+
+void rehearse(Body &b, const std::vector<Switch> &switches, const std::vector<SwitchRule> &rule,
+              bool at_rest) {
+  std::vector<SpareModel> spares;
+  spares.reserve(kSpares);
+  uint32_t integrator = b.origin.integrator;
+  const auto one = [&](const ModelChoice &to, const std::string &when) {
+    if (to.type.empty() || (!at_rest && is_made_so(b, to))) return;
+    try {
+      rehearse(b, to, integrator, at_rest, spares);
+    } catch (const Error &e) {
+      if (e.status == DFM_E_NOMEM) throw;
+      const std::string whose = format("body '%s': ", b.name.c_str());
+      const char *const why = e.what() + (e.sentence.rfind(whose, 0) == 0 ? whose.size() : 0);
+      fail(e.status, "%sits change to '%s' %s cannot be made: %s", whose.c_str(), to.type.c_str(),
+           when.c_str(), why);
+    }
+  };
+  for (const Switch &s : switches) one(s.to, format("at %g s", s.t));
+  for (const SwitchRule &r : rule) {
+    one(r.touching, "by the rule (touching)");
+    one(r.near, "by the rule (near)");
+    one(r.far, "by the rule (far)");
+  }
+  b.spares.swap(spares);
 }
 
 void keep_swap(World &w, const Swap &swap) {

@@ -46,11 +46,6 @@ SwitchLevel called_for(const Body &b, const SwitchRule &r, bool touches) {
   return !r.near.type.empty() && is_near(b, r) ? SwitchLevel::near : SwitchLevel::far;
 }
 
-bool has(const Body &b, const ModelChoice &c) {
-  return c.type == b.model.type->id && c.params == b.origin.params &&
-         (c.integrator == kSameIntegrator || c.integrator == b.origin.integrator);
-}
-
 void follow(World &w, Body &b, SwitchRule &r, bool touches) {
   const SwitchLevel wanted = called_for(b, r, touches);
   if (uint32_t(wanted) == r.level) {
@@ -62,7 +57,7 @@ void follow(World &w, Body &b, SwitchRule &r, bool touches) {
   const bool again = r.refused >= 0;
   if (again && w.time - r.refused < r.wait) return;
   const ModelChoice &to = choice_of(r, wanted);
-  if (!has(b, to) && !try_change(w, b, to, !again)) {
+  if (!is_made_so(b, to) && !try_change(w, b, to, !again)) {
     r.refused = w.time;
     return;
   }

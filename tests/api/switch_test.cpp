@@ -1,0 +1,238 @@
+// Changes of models that are to come: what could never be made is an error of the scene, not of a later step.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "support.h"
+#include "world.h"
+
+namespace {
+
+const std::string &folder() {
+  static const std::string dir = [] {
+    const std::string d = test::scratch("switch_" + std::to_string(getpid()));
+    test::Context context;
+    dfm_tetmesh mesh = 0;
+    const double size[3] = {0.1, 0.1, 0.1};
+    test::ok(dfm_tetmesh_make(context, "beam", size, 60, &mesh));
+    test::ok(dfm_tetmesh_write(mesh, (d + "/block.msh").c_str()));
+    return d;
+  }();
+  return dir;
+}
+
+// A scene of one block: keys of the time, of the body, of the scene.
+std::string scene(const std::string &time, const std::string &body, const std::string &rest = "") {
+  static int n = 0;
+  const std::string path = folder() + "/scene" + std::to_string(n++) + ".json";
+  test::write_file(path, R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.01)" + time +
+                             R"(}, "bodies": [{"name": "block", "mesh": "block.msh", )" + body + "}]" + rest +
+                             "}");
+  return path;
+}
+
+test::CommandResult run(const std::string &path) {
+  return test::deform({"run", path, "--out", folder() + "/out"});
+}
+
+// Refused as it is read, by run and by explain, in one sentence.
+void expect_refused(const std::string &path, const std::vector<std::string> &parts) {
+  for (const test::CommandResult &r : {run(path), test::deform({"explain", path})}) {
+    EXPECT_EQ(r.exit_code, 2) << r.err;
+    for (const std::string &part : parts)
+      EXPECT_NE(r.err.find(part), std::string::npos) << part << "\n" << r.err;
+  }
+}
+
+const std::string kStep = R"(, "step": 0.001)";
+const std::string kToModal = R"("switch": [{"t": 0.005, "type": "modal"}])";
+const std::string kRuleToModal = R"("switch": {"far": "modal", "touching": "corotational_fem"})";
+
+}  // namespace
+
+TEST(SwitchOfAScene, ThatTheContactMethodExcludes_IsRefusedAsItIsRead) {
+  const std::string contact = R"(, "contact": {"method": ")";
+  for (const std::string &change : {kToModal, kRuleToModal})
+    expect_refused(scene(kStep, change, contact + R"(rollback"})"),
+                   {"/bodies/0/switch", "org.deform.modal", "rollback", "use the method velocity"});
+  for (const char *method : {"rollback", "velocity"})
+    expect_refused(
+        scene(kStep, R"("switch": [{"t": 0.005, "type": "corotational_fem", "integrator": "tr_bdf2"}])",
+              contact + method + R"("})"),
+        {"/bodies/0/switch", "'block'", "at 0.005 s", "tr_bdf2", method, "use the method auto"});
+}
+
+TEST(SwitchOfAScene, ThatSpringsExclude_IsRefusedAsItIsRead) {
+  const std::string spring = R"(, "springs": [{"point": [0, 0, 0], "to": [0, 0, 0], "stiffness": 10}])";
+  for (const std::string &change : {kToModal, kRuleToModal})
+    expect_refused(scene(kStep, change + spring), {"/bodies/0/switch", "'block'", "spring", "remove"});
+}
+
+TEST(SwitchOfAScene, ThatStaticModeExcludes_IsRefusedAsItIsRead) {
+  for (const std::string &change : {kToModal, kRuleToModal})
+    expect_refused(
+        scene(R"(, "mode": "static")", change + R"(, "fix": [{"box": [[-1, -1, -1], [1, 1, 0.001]]}])"),
+        {"/bodies/0/switch", "'block'", "org.deform.modal", "equilibrium", "choose another model"});
+}
+
+TEST(SwitchOfAScene, ThatLosesAnEffectOfTheList_IsRefusedAsItIsRead) {
+  const std::string plastic = R"(, "model": {"type": "corotational_fem", "params": {"yield": 0.1}})";
+  const std::string listed = R"(, "effects": ["deform.plasticity"])";
+  for (const std::string &change : {kToModal, kRuleToModal}) {
+    expect_refused(scene(kStep, change + plastic, listed),
+                   {"/bodies/0/switch", "'block'", "deform.plasticity", "list of effects"});
+    EXPECT_EQ(run(scene(kStep, change + plastic)).exit_code, 0) << "not asked for, it may go";
+  }
+}
+
+TEST(SwitchOfAScene, ToAModelThatDoesNotTakeTheBody_IsRefusedAsItIsRead) {
+  expect_refused(scene(kStep, kToModal + R"(, "fix": [{"box": [[-1, -1, -1], [1, 1, 0.001]], "axes": "z"}])"),
+                 {"/bodies/0/switch", "'block'", "org.deform.modal"});
+}
+
+TEST(SwitchOfAScene, AfterTheLastStep_IsToldAndListed) {
+  const auto change = [](const char *t) {
+    return std::string(R"("switch": [{"t": )") + t + R"(, "type": "corotational_fem", "max_jump": 2}])";
+  };
+  const std::string told = "is never made";
+  for (const char *late : {"0.02", "0.01", "0.0095"}) {
+    const test::CommandResult r = run(scene(kStep, change(late)));
+    EXPECT_EQ(r.exit_code, 0);
+    EXPECT_NE(r.err.find(told), std::string::npos) << late << "\n" << r.err;
+    EXPECT_NE(r.err.find("/bodies/0/switch/0"), std::string::npos) << r.err;
+  }
+  EXPECT_EQ(run(scene(kStep, change("0.009"))).err.find(told), std::string::npos);
+  EXPECT_EQ(run(scene("", change("0.009"))).err.find(told), std::string::npos);
+  EXPECT_NE(run(scene("", change("0.01"))).err.find(told), std::string::npos);
+  const std::string held = R"(, "fix": [{"box": [[-1, -1, -1], [1, 1, 0.001]]}])";
+  EXPECT_NE(run(scene(R"(, "mode": "static")", change("0.001") + held)).err.find(told), std::string::npos);
+  EXPECT_EQ(run(scene(R"(, "mode": "static")", change("0") + held)).err.find(told), std::string::npos);
+}
+
+TEST(SwitchOfAScene, Explain_ListsIt) {
+  const std::string by_time = test::deform({"explain", scene(kStep, kToModal)}).out;
+  EXPECT_NE(by_time.find("changes to org.deform.modal  at 0.005 s"), std::string::npos) << by_time;
+  const std::string rule =
+      test::deform({"explain", scene(kStep, R"("switch": {"far": "msm", "near": {"type": "corotational_fem",
+                                  "integrator": "implicit_euler"}, "point": [1, 2, 3], "distance": 0.5,
+                                  "max_jump": 4})")})
+          .out;
+  for (const char *part :
+       {"changes to org.deform.corotational_fem  while its surface is within 0.5 m of (1, 2, 3), moved by "
+        "implicit_euler, unless its elastic energy would jump by more than 4 J",
+        "changes to org.deform.msm  else"})
+    EXPECT_NE(rule.find(part), std::string::npos) << part << "\n" << rule;
+}
+
+namespace {
+
+// Who counts how often a modal model is made, by the line that each of them logs.
+struct Counted {
+  int made = 0;
+  dfm_context *c = nullptr;
+  Counted() {
+    dfm_context_def def = dfm_context_def_default();
+    def.plugin_dir = DEFORM_PLUGIN_DIR;
+    def.user = this;
+    def.log = [](void *user, int32_t, const char *line) {
+      static_cast<Counted *>(user)->made +=
+          std::string(line).find("of the static response") != std::string::npos;
+    };
+    EXPECT_EQ(dfm_context_create(&def, &c), DFM_OK) << dfm_last_error();
+  }
+  ~Counted() { dfm_context_destroy(c); }
+};
+
+}  // namespace
+
+// A rule whose change is refused tries again after each wait, with the model that it has made the first time.
+TEST(SwitchRule, Refused_MakesTheModelOnce) {
+  Counted counted;
+  const dfm_world w = test::make_world(counted.c);
+  test::add_plane(w, "floor");
+  test::BodyOptions o;
+  o.young = 2e4;
+  o.model = "corotational_fem";
+  o.position = {0, 0, 0.051};
+  const dfm_body ball = test::make_body(counted.c, w, "ball", {0.05}, 100, o);
+  test::run(w, 0.1, 1e-3);  // it lies and is deformed
+  dfm_switch_rule rule = dfm_switch_rule_default();
+  rule.touching.type = "modal";
+  rule.otherwise.type = "corotational_fem";
+  rule.max_jump = 1e-12;
+  rule.wait = 0.01;
+  test::ok(dfm_body_set_switch_rule(ball, &rule));
+  EXPECT_EQ(counted.made, 1) << "at once, so that what never works is refused at once";
+  test::run(w, 0.2, 1e-3);
+  const std::vector<dfm_swap> rows = test::listed(dfm_world_swaps, w);
+  ASSERT_FALSE(rows.empty());
+  for (const dfm_swap &row : rows) EXPECT_EQ(row.flags, uint32_t{DFM_SWAP_REFUSED});
+  EXPECT_EQ(counted.made, 1);
+}
+
+TEST(Switches, ThatCome_MakeTheModelOnce) {
+  Counted counted;
+  const dfm_world w = test::make_world(counted.c);
+  const dfm_body ball = test::make_body(counted.c, w, "ball", {0.05}, 100, {});
+  dfm_switch list[1] = {
+      {sizeof(dfm_switch), DFM_INTEGRATOR_AUTO, 0.01, "modal", {sizeof(dfm_params), 0, nullptr}, 0}};
+  test::ok(dfm_body_set_switches(ball, 1, list));
+  test::run(w, 0.02, 1e-3);
+  EXPECT_EQ(test::listed(dfm_world_swaps, w).size(), 1u);
+  EXPECT_EQ(counted.made, 1);
+}
+
+// What could never be made is refused at once by the library too, and what was to come stays.
+TEST(Switches, ThatCanNeverBeMade_AreRefusedWhole) {
+  test::Context c;
+  const dfm_world w = test::make_world(c);
+  const dfm_body ball = test::make_body(c, w, "ball", {0.05}, 100, {});
+  const dfm_params none{sizeof none, 0, nullptr};
+  const dfm_switch good = {sizeof good, DFM_INTEGRATOR_AUTO, 1, "corotational_fem", none, 0};
+  test::ok(dfm_body_set_switches(ball, 1, &good));
+  const uint32_t point = 0;
+  dfm_spring_def spring{};
+  spring.size = sizeof spring;
+  spring.npoint = 1;
+  spring.points = &point;
+  spring.stiffness = 10;
+  test::ok(dfm_body_add_spring(ball, &spring, nullptr));
+  const std::string before = test::snapshot(w);
+  const dfm_switch list[2] = {good, {sizeof good, DFM_INTEGRATOR_AUTO, 2, "modal", none, 0}};
+  EXPECT_EQ(dfm_body_set_switches(ball, 2, list), DFM_E_UNSUPPORTED);
+  test::says({"org.deform.modal", "at 2 s", "spring"});
+  dfm_switch_rule rule = dfm_switch_rule_default();
+  rule.touching.type = "modal";
+  rule.otherwise.type = "msm";
+  EXPECT_EQ(dfm_body_set_switch_rule(ball, &rule), DFM_E_UNSUPPORTED);
+  test::says({"org.deform.modal", "touching", "spring"});
+  EXPECT_EQ(before, test::snapshot(w));
+}
+
+// Two worlds that differ in a body's model alone differ in their hashes, and a snapshot carries that over.
+TEST(SetModel, Hash_TellsWhichModelABodyHasGot) {
+  test::Context c;
+  uint64_t hash[3];
+  std::string taken;
+  const char *const models[] = {nullptr, "corotational_fem", "linear_fem"};
+  for (int k = 0; k < 3; ++k) {
+    const dfm_world w = test::make_world(c);
+    const dfm_body ball = test::make_body(c, w, "ball", {0.05}, 100, {});
+    test::run(w, 0.01, 1e-3);
+    if (k > 0) {
+      EXPECT_EQ(dfm_world_hash(w), hash[0]);
+    }
+    if (models[k]) test::ok(dfm_body_set_model(ball, models[k], nullptr));
+    hash[k] = dfm_world_hash(w);
+    taken = test::snapshot(w);
+    if (k > 0) continue;
+    test::ok(dfm_body_set_model(ball, "msm", nullptr));
+    EXPECT_EQ(dfm_world_hash(w), hash[0]) << "the same model anew is no other";
+  }
+  EXPECT_NE(hash[0], hash[1]);
+  EXPECT_NE(hash[0], hash[2]);
+  EXPECT_NE(hash[1], hash[2]);
+  const dfm_world fresh = test::make_world(c);
+  test::make_body(c, fresh, "ball", {0.05}, 100, {});
+  test::ok(dfm_world_restore(fresh, taken.data(), taken.size()));
+  EXPECT_EQ(dfm_world_hash(fresh), hash[2]);
+}
