@@ -279,6 +279,25 @@ TEST(Run, Json_IsTheSummary) {
   EXPECT_EQ(r.result.out, r.summary);
 }
 
+// What nobody has measured is not 0.
+TEST(Run, BodiesThatTheEnergyWatchDoesNotLookAt_AreNamed) {
+  const Outcome all = run("watched", {"--quiet", "--time", "0.005"});
+  EXPECT_EQ(value(all.summary, "unwatched"), "{}");
+  EXPECT_GT(std::stod(value(all.summary, "max_J")), 0);
+  const std::string modal = R"(/bodies/1/model={"type": "modal"})";
+  const Outcome one = run("one_unwatched", {"--quiet", "--time", "0.005", "--set", modal});
+  EXPECT_NE(value(one.summary, "unwatched").find("\"top\": \"its model steps itself\""), std::string::npos)
+      << value(one.summary, "unwatched");
+  EXPECT_NE(value(one.summary, "max_J"), "null");
+  const Outcome none = run("unwatched", {"--quiet", "--time", "0.005", "--set", modal, "--set",
+                                         R"(/bodies/0/model={"type": "shape_matching"})"});
+  for (const char *key : {"start_J", "max_J", "gain_J"}) EXPECT_EQ(value(none.summary, key), "null") << key;
+  EXPECT_NE(value(none.summary, "unwatched").find("gives no energy"), std::string::npos);
+  const Outcome changed = run("changed", {"--quiet", "--time", "0.005", "--set", modal, "--set",
+                                          R"(/bodies/1/switch=[{"t": 0.001, "type": "corotational_fem"}])"});
+  EXPECT_NE(value(changed.summary, "unwatched").find("top"), std::string::npos) << "it was not, for a while";
+}
+
 TEST(Run, Profile_NamesTheStages) {
   const Outcome r = run("profile", {"--profile", "--time", "0.005"});
   for (const char *stage : {"model", "predict", "narrow", "commit"})

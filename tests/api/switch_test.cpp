@@ -89,6 +89,21 @@ TEST(SwitchOfAScene, ToAModelThatDoesNotTakeTheBody_IsRefusedAsItIsRead) {
                  {"/bodies/0/switch", "'block'", "org.deform.modal"});
 }
 
+// Components are held along the axes of the world, where a turned pose leaves the model no frame.
+TEST(ModelOfAScene, ThatItsPoseExcludes_IsRefusedAsItIsRead) {
+  const std::string fix = R"("fix": [{"box": [[-1, -1, -1], [1, 1, 0.001]], "axes": "xz"},
+                                    {"box": [[-1, -1, 0.099], [1, 1, 1]], "axes": "xyz"}])";
+  const std::string whole = R"("fix": [{"box": [[-1, -1, -1], [1, 1, 0.001]]}])";
+  const std::string turned = R"(, "pose": {"rotation": {"axis": [0, 1, 0], "angle_deg": 30}})";
+  for (const char *type : {"modal", "condensed"}) {
+    const std::string model = std::string(R"(, "model": {"type": ")") + type + R"("})";
+    expect_refused(scene(kStep, fix + model + turned),
+                   {"/bodies/0/model", "'block'", "the pose has turned the body", "hold whole points"});
+    EXPECT_EQ(run(scene(kStep, whole + model + turned)).exit_code, 0);
+    EXPECT_EQ(run(scene(kStep, fix + model)).exit_code, 0);
+  }
+}
+
 TEST(SwitchOfAScene, AfterTheLastStep_IsToldAndListed) {
   const auto change = [](const char *t) {
     return std::string(R"("switch": [{"t": )") + t + R"(, "type": "corotational_fem", "max_jump": 2}])";

@@ -143,6 +143,42 @@ TEST_P(ReducedWorld, FreeSpinningPlate_KeepsItsEnergy) {
   }
 }
 
+// About each principal axis and a generic one, over as many steps as leave nothing to chance.
+TEST_P(ReducedWorld, FreeSpinningPlate_StaysBoundedForTenThousandSteps) {
+  const struct {
+    double young, step, low, high;
+  } cases[] = {{1e4, 1e-3, 0.98, 1.01}, {1e9, 1.0 / 60, 0.98, 1.01}};
+  const std::array<double, 3> axes[] = {{1, 1e-3, 1e-3}, {1e-3, 1, 1e-3}, {1e-3, 1e-3, 1}, {0.3, 0.5, 0.8}};
+  for (const auto &c : cases)
+    for (const auto &axis : axes) {
+      test::Context context(1);
+      const dfm_world world = test::make_world(context, {});
+      test::BodyOptions o;
+      o.model = GetParam();
+      o.young = c.young;
+      for (size_t k = 0; k < 3; ++k) o.spin[k] = (c.young < 1e5 ? 5 : 20) * axis[k];
+      const dfm_body body = test::make_body(context, world, "beam", {0.3, 0.1, 0.05}, 120, o);
+      test::run(world, c.step, c.step);
+      const dfm_body_measure first = test::measure(body);
+      double least = HUGE_VAL, most = 0, turned = 0, size = 0;
+      for (int n = 0; n < 100; ++n) {
+        test::run(world, 100 * c.step, c.step);
+        const dfm_body_measure m = test::measure(body);
+        const double energy = (m.kinetic + m.elastic) / (first.kinetic + first.elastic);
+        least = std::min(least, energy);
+        most = std::max(most, energy);
+        for (size_t k = 0; k < 3; ++k) {
+          turned = std::max(turned, std::abs(m.angular[k] - first.angular[k]));
+          size = std::max(size, std::abs(first.angular[k]));
+        }
+      }
+      EXPECT_GT(least, c.low) << c.young << ' ' << axis[0] << ' ' << axis[1];
+      EXPECT_LT(most, c.high) << c.young << ' ' << axis[0] << ' ' << axis[1];
+      EXPECT_LT(turned, 1e-11 * size) << c.young << ' ' << axis[0] << ' ' << axis[1];
+      dfm_world_destroy(world);
+    }
+}
+
 // The error is the model's own reason.
 TEST_P(ReducedWorld, PartlyHeldAndTurnedByItsPose_IsRefusedWithTheReason) {
   test::Context context(1);

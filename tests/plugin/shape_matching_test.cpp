@@ -1,5 +1,6 @@
 // Shape matching as a plugin: goals of the reference clouds, momenta, the answer to impulses, what does not
 // depend on the step, recovery from every shape, plastic flow, held points.
+#include "../../plugins/model_common/index.h"
 #include "stepper_rig.h"
 
 namespace model_test {
@@ -494,6 +495,13 @@ TEST(ShapeMatching, RefusedMemory_LeavesNothingBehind) {
     EXPECT_EQ(host.live, 0u);
     if (made) break;
   }
+}
+
+// What 32 bits do not name is refused before anything is written there.
+TEST(Model, ListsBeyondAllIndices_AreRefusedInOneSentence) {
+  EXPECT_EQ(model::after(4000000000u, 294967295u, "too many"), UINT32_MAX);
+  for (const uint64_t n : {uint64_t{294967296u}, uint64_t{1} << 32, UINT64_MAX})
+    EXPECT_THROW(model::after(4000000000u, n, "too many"), const char *);
 }
 
 }  // namespace

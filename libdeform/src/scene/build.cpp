@@ -43,6 +43,7 @@ class Builder {
     double step = 0;
     check(dfm_world_stable_step(world_, &step, nullptr, nullptr), def_.effects_auto ? "/bodies" : "/effects");
     if (def_.equilibrium) check_static();
+    for (Body &b : def_.bodies) check_model(b);
     for (Body &b : def_.bodies) add_switches(b);
     return {std::exchange(world_, 0), std::move(probes_)};
   }
@@ -111,6 +112,15 @@ class Builder {
   void check_static() const {
     with_pointer("/time/mode", [&] {
       check_equilibrium(resolve<World>(Kind::world, world_));
+      return 0;
+    });
+  }
+
+  // What a model that steps itself would refuse in the first step.
+  void check_model(const Body &b) const {
+    with_pointer(b.pointer + "/model", [&] {
+      World &w = resolve<World>(Kind::world, world_);
+      check_first_step(w, *w.find_body(b.name));
       return 0;
     });
   }

@@ -11,6 +11,7 @@
 #include "core/error.h"
 #include "math/polar.h"
 #include "math/turn.h"
+#include "plugin/context.h"
 #include "plugin/registry.h"
 #include "state/world.h"
 #include "step/context.h"
@@ -371,6 +372,15 @@ void rehearse(Body &b, const std::vector<Switch> &switches, const std::vector<Sw
     one(r.far, "by the rule (far)");
   }
   b.spares.swap(spares);
+}
+
+void check_first_step(World &w, Body &b) {
+  if (!b.model.stepper) return;
+  const Overheard why;
+  double kinetic = 0;
+  const SubStep now{w.time, kInstant, w.gravity.now, HUGE_VAL, w.gravity.now};
+  if (b.dynamics->free_motion(now, kinetic) || !*why.text()) return;
+  fail(DFM_E_UNSUPPORTED, "body '%s': %s", b.name.c_str(), why.text());
 }
 
 void keep_swap(World &w, const Swap &swap) {

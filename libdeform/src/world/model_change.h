@@ -18,6 +18,9 @@ bool is_made_so(const Body &b, const ModelChoice &c);
 // Error.
 void rehearse(Body &b, const std::vector<Switch> &switches, const std::vector<SwitchRule> &rule,
               bool at_rest);
+// Asks a model that steps itself for a sub-step of a nanosecond, of which nothing is kept: what it would
+// refuse in the first step. Throws Error with its reason.
+void check_first_step(World &w, Body &b);
 // Changes the model and keeps the row. False: refused for what would jump, and the row says so where `tell`.
 bool try_change(World &w, Body &b, const ModelChoice &to, bool tell);
 // What is due in the step of dt seconds that begins now: by time, then by rules (model_rule.cpp).
