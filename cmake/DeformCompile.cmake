@@ -20,7 +20,12 @@ set(CMAKE_C_FLAGS_RELEASE "-O2 -g1")
 set(CMAKE_CXX_FLAGS_SANITIZE "-O1 -g1")
 set(CMAKE_C_FLAGS_SANITIZE "-O1 -g1")
 
-set(DFM_ABI_DIR plugins-0)
+# Plugins of one ABI lie in a folder of their own; the header says which ABI that is.
+set(deform_plugin_header ${CMAKE_CURRENT_LIST_DIR}/../libdeform/include/deform/plugin.h)
+file(STRINGS ${deform_plugin_header} deform_abi REGEX "^#define DFM_ABI ")
+string(REGEX MATCH "[0-9]+" deform_abi "${deform_abi}")
+set(DFM_ABI_DIR plugins-${deform_abi})
+set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${deform_plugin_header})
 
 add_library(deform_flags INTERFACE)
 target_compile_options(deform_flags INTERFACE -ffp-contract=off -Wall -Wextra -Wshadow -Wno-unused-parameter)

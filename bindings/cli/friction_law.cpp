@@ -151,9 +151,9 @@ RigLaw::RigLaw(const Globals &globals, const FrictionCase &rig, const std::strin
                   rig.file + ": /input/F0 is " + number(fn_) + " N, expected a normal force above 0");
   fill_params(rig);
   uint32_t nstate = 0;
-  const dfm_slots *own = ops().state ? ops().state(params_.data()) : nullptr;
-  slots_ = own ? *own : dfm_slots{sizeof(dfm_slots), ops().nslot, ops().slots};
-  for (uint32_t i = 0; i < slots_.nslot; ++i) nstate += slots_.slots[i].width;
+  const auto own = slot_rows(ops().state ? ops().state(params_.data()) : nullptr);
+  slots_ = own ? *own : slot_rows(ops().slots, ops().nslot, ops().slot_size);
+  for (const dfm_slot &slot : slots_) nstate += slot.width;
   state_.resize(nstate);
   trial_.resize(nstate);
   reset(rig);
@@ -205,8 +205,7 @@ double RigLaw::param(const std::string &key, double otherwise, uint32_t at) cons
 
 int RigLaw::tangent(uint32_t k) const {
   int at = 0;
-  for (uint32_t i = 0; i < slots_.nslot; ++i) {
-    const dfm_slot &slot = slots_.slots[i];
+  for (const dfm_slot &slot : slots_) {
     if (slot.kind == DFM_SLOT_TANGENT) {
       if (2 * k < slot.width) return at + int(2 * k);
       k -= slot.width / 2;
@@ -225,10 +224,10 @@ void RigLaw::reset(const FrictionCase &rig) {
 
 bool RigLaw::differs(const std::vector<Column> &other) const {
   size_t at = 0;
-  for (uint32_t i = 0; i < slots_.nslot; at += slots_.slots[i].width, ++i)
-    for (size_t k = at; k < at + slots_.slots[i].width; ++k) {
+  for (size_t i = 0; i < slots_.size(); at += slots_[i].width, ++i)
+    for (size_t k = at; k < at + slots_[i].width; ++k) {
       const double a = state_[k].lane[0], b = other[k].lane[0];
-      if (slots_.slots[i].kind != DFM_SLOT_TANGENT && a != b && a == std::floor(a) && b == std::floor(b))
+      if (slots_[i].kind != DFM_SLOT_TANGENT && a != b && a == std::floor(a) && b == std::floor(b))
         return true;
     }
   return false;
@@ -236,9 +235,9 @@ bool RigLaw::differs(const std::vector<Column> &other) const {
 
 void RigLaw::extrapolate(const std::vector<Column> &whole, double share) {
   size_t at = 0;
-  for (uint32_t i = 0; i < slots_.nslot; at += slots_.slots[i].width, ++i) {
-    if (slots_.slots[i].kind != DFM_SLOT_TANGENT) continue;
-    for (size_t k = at; k < at + slots_.slots[i].width; ++k)
+  for (size_t i = 0; i < slots_.size(); at += slots_[i].width, ++i) {
+    if (slots_[i].kind != DFM_SLOT_TANGENT) continue;
+    for (size_t k = at; k < at + slots_[i].width; ++k)
       state_[k].lane[0] += share * (state_[k].lane[0] - whole[k].lane[0]);
   }
 }

@@ -7,6 +7,7 @@
 
 #include "cli.h"
 #include "friction_case.h"
+#include "slots.h"
 
 namespace cli {
 
@@ -61,7 +62,7 @@ class RigLaw {
   const dfm_type *type_ = nullptr;
   double fn_ = 1;
   std::vector<double> params_;
-  dfm_slots slots_ = {};  // what its parameters call for
+  std::vector<dfm_slot> slots_;  // what its parameters call for
   std::vector<Column> state_, trial_;
   uint64_t evaluations_ = 0;
 };

@@ -342,7 +342,7 @@ dfm_status check(const double *p, char *why, size_t cap) {
 const dfm_slots *state(const double *params) {
   static constexpr std::array<dfm_slots, kMost> tables = [] {
     std::array<dfm_slots, kMost> out{};
-    for (uint32_t n = 1; n <= kMost; ++n) out[n - 1] = {sizeof(dfm_slots), n + 1, kSlots[n - 1].slot};
+    for (uint32_t n = 1; n <= kMost; ++n) out[n - 1] = {sizeof(dfm_slots), n + 1, kSlots[n - 1].slot, 0, 0};
     return out;
   }();
   return &tables[elements(params) - 1];

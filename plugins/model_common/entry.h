@@ -144,7 +144,7 @@ struct Ops {
 // What the plugin's entry answers.
 inline const dfm_plugin *enter(const dfm_host *host, const char *who, const dfm_plugin &plugin) {
   if (DFM_ABI_OK(host)) return &plugin;
-  complain(host, who, "built for another draft of the plugin ABI: build it against this library's header");
+  complain(host, who, "built for another plugin ABI: build it against this library's header");
   return nullptr;
 }
 

@@ -5,7 +5,7 @@
 
 #include "../model_common/entry.h"
 #include "corot_body.h"
-#include "deform/plugin_draft.h"
+#include "deform/plugin.h"
 
 namespace corot {
 
@@ -92,7 +92,8 @@ dfm_status state_init(const void *self, double *state) {
 }
 
 const dfm_slot kPlasticSlot = {DFM_PER_CELL, kPlasticState, DFM_SLOT_SCALAR, 0};
-const dfm_slots kNoSlots = {sizeof(dfm_slots), 0, nullptr}, kSlots = {sizeof(dfm_slots), 1, &kPlasticSlot};
+const dfm_slots kNoSlots = {sizeof(dfm_slots), 0, nullptr, 0, 0},
+                kSlots = {sizeof(dfm_slots), 1, &kPlasticSlot, 0, 0};
 
 constexpr uint32_t kCaps = DFM_CAP_ENERGY | DFM_CAP_STIFFNESS | DFM_CAP_DAMPING | DFM_CAP_ROTATION_INVARIANT;
 
@@ -139,7 +140,9 @@ const dfm_model kModel = {sizeof(dfm_model),
                           Ops::energy,
                           Ops::pattern,
                           Ops::stiffness,
-                          extension};
+                          extension,
+                          0,
+                          0};
 
 const dfm_type kType = {sizeof(dfm_type),
                         DFM_KIND_MODEL,

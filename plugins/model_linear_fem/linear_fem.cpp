@@ -3,7 +3,7 @@
 // (doc/models/linear_fem.md).
 #include <cstring>
 
-#include "deform/plugin_draft.h"
+#include "deform/plugin.h"
 #include "linear_body.h"
 
 namespace linear {
@@ -59,7 +59,9 @@ const dfm_model kModel = {sizeof(dfm_model),
                           Ops::energy,
                           Ops::pattern,
                           Ops::stiffness,
-                          extension};
+                          extension,
+                          0,
+                          0};
 
 const dfm_type kType = {
     sizeof(dfm_type),

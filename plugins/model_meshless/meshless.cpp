@@ -4,7 +4,7 @@
 // (doc/models/meshless.md).
 #include <cstring>
 
-#include "deform/plugin_draft.h"
+#include "deform/plugin.h"
 #include "meshless_body.h"
 
 namespace meshless {
@@ -70,7 +70,9 @@ const dfm_model kModel = {sizeof(dfm_model),
                           Ops::energy,
                           Ops::pattern,
                           Ops::stiffness,
-                          extension};
+                          extension,
+                          0,
+                          0};
 
 const dfm_type kType = {sizeof(dfm_type),
                         DFM_KIND_MODEL,

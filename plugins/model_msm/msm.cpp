@@ -116,7 +116,8 @@ dfm_status get_mask(const void *self, uint8_t *on) {
 
 const dfm_slot kBranchSlots[] = {{DFM_PER_EDGE, 1, DFM_SLOT_SCALAR, 0},
                                  {DFM_PER_INSTANCE, 1, DFM_SLOT_SCALAR, 0}};
-const dfm_slots kNoSlots = {sizeof(dfm_slots), 0, nullptr}, kSlots = {sizeof(dfm_slots), 2, kBranchSlots};
+const dfm_slots kNoSlots = {sizeof(dfm_slots), 0, nullptr, 0, 0},
+                kSlots = {sizeof(dfm_slots), 2, kBranchSlots, 0, 0};
 const dfm_limited kLimited = {sizeof(dfm_limited), 0, limited};
 const dfm_spring_mask kSpringMask = {sizeof(dfm_spring_mask), 0, set_mask, get_mask};
 
@@ -155,7 +156,9 @@ const dfm_model kModel = {
     Ops::energy,
     Ops::pattern,
     Ops::stiffness,
-    extension};
+    extension,
+    0,
+    0};
 
 const dfm_type kType = {sizeof(dfm_type),
                         DFM_KIND_MODEL,

@@ -8,7 +8,7 @@
 // A condensed body has a fourth part, the displacement at rest of what its modes leave out: it has no mass
 // and follows forces and impulses at once. Equations, limits and cost: doc/models/modal.md, condensed.md.
 #pragma once
-#include <deform/plugin_draft.h>
+#include <deform/plugin.h>
 
 #include "modes.h"
 #include "oscillator.h"

@@ -102,7 +102,9 @@ struct Entry {
                                        Ops::energy,
                                        nullptr,
                                        nullptr,
-                                       extension};
+                                       extension,
+                                       0,
+                                       0};
 };
 
 const char *const kEffects[] = {"large_rotation", "damping", nullptr};

@@ -64,7 +64,7 @@ void Body::create(const dfm_host *h, const dfm_mesh &m) {
   is_met.create(h, ncluster);
   slot.create(h, ncluster);
   for (uint32_t c = 0; c < ncluster; ++c) slot[c] = {DFM_PER_INSTANCE, kPlastic, DFM_SLOT_SCALAR, 0};
-  slots = {sizeof(dfm_slots), ncluster, slot.data()};
+  slots = {sizeof(dfm_slots), ncluster, slot.data(), 0, 0};
   apply_params(m.params);
 }
 

@@ -3,7 +3,7 @@
 // one of a material (doc/models/shape_matching.md).
 #include <cstring>
 
-#include "deform/plugin_draft.h"
+#include "deform/plugin.h"
 #include "shape_body.h"
 
 namespace shape {
@@ -129,7 +129,9 @@ const dfm_model kModel = {sizeof(dfm_model),
                           nullptr,
                           nullptr,
                           nullptr,
-                          extension};
+                          extension,
+                          0,
+                          0};
 
 const dfm_type kType = {sizeof(dfm_type),
                         DFM_KIND_MODEL,

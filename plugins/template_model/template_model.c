@@ -137,14 +137,23 @@ static dfm_status stiffness(void *self, const dfm_kin *kin, double alpha, double
 }
 
 enum { CLAIMS = DFM_CAP_ENERGY | DFM_CAP_STIFFNESS | DFM_CAP_DAMPING | DFM_CAP_ROTATION_INVARIANT };
-static const dfm_model model = {sizeof model, CLAIMS | DFM_CAP_PLAUSIBLE,
-                                DFM_CELL_TET, 0,
-                                NULL,         create,
-                                destroy,      NULL,
-                                NULL,         add_forces,
-                                bound,        energy,
-                                pattern,      stiffness,
-                                NULL};
+static const dfm_model model = {sizeof model,
+                                CLAIMS | DFM_CAP_PLAUSIBLE,
+                                DFM_CELL_TET,
+                                0,
+                                NULL,
+                                create,
+                                destroy,
+                                NULL,
+                                NULL,
+                                add_forces,
+                                bound,
+                                energy,
+                                pattern,
+                                stiffness,
+                                NULL,
+                                0,
+                                0};
 static const char *const effects[] = {"large_rotation", "damping", NULL};
 #define ID "org.deform.template_model"
 #define SOURCE "Provot 1995, Deformation constraints in a mass-spring model"

@@ -68,9 +68,11 @@ const dfm_friction with = {sizeof(dfm_friction),
                            nullptr,
                            nullptr,
                            nullptr,
-                           nullptr};
+                           nullptr,
+                           0,
+                           0};
 const dfm_friction without = {
-    sizeof(dfm_friction), kNeeds, kPlain, 0, nullptr, viscous, nullptr, nullptr, nullptr, nullptr};
+    sizeof(dfm_friction), kNeeds, kPlain, 0, nullptr, viscous, nullptr, nullptr, nullptr, nullptr, 0, 0};
 const dfm_friction smooth = {sizeof(dfm_friction),
                              kNeeds,
                              kPlain | DFM_FRIC_JACOBIAN,
@@ -80,7 +82,9 @@ const dfm_friction smooth = {sizeof(dfm_friction),
                              nullptr,
                              nullptr,
                              nullptr,
-                             nullptr};
+                             nullptr,
+                             0,
+                             0};
 
 dfm_type type(const char *id, const dfm_friction *ops) {
   dfm_type t{};

@@ -100,9 +100,9 @@ TEST_P(BrokenLaw, FailsTheRuleThatIsMeantForItAndNoOther) {
 INSTANTIATE_TEST_SUITE_P(
     Plugin, BrokenLaw,
     testing::Values(
-        Case{"second_symbol", "V01", "broken_helper"}, Case{"wrong_abi", "V02", "draft 8"},
+        Case{"second_symbol", "V01", "broken_helper"}, Case{"wrong_abi", "V02", "draft 7"},
         Case{"deaf_to_abi", "V02", "cannot know"}, Case{"no_source", "V03", "\"source\""},
-        Case{"misspelt_promise", "V03", "\"stiction\""},
+        Case{"fills_reserved", "V03", "9 in reserved"}, Case{"misspelt_promise", "V03", "\"stiction\""},
         Case{"refuses_its_defaults", "V04", "must be above 0.9"},
         Case{"not_finite_at_the_end_of_a_range", "V04", "\"mu\" = 0"},
         Case{"allocates", "V05", "calls malloc"}, Case{"reads_the_environment", "V05", "calls getenv"},
@@ -139,6 +139,8 @@ INSTANTIATE_TEST_SUITE_P(
     Models, BrokenLaw,
     testing::Values(
         Case{"model_claims_too_much", "V03", "without energy"},
+        Case{"model_fills_the_free_place", "V03", "fetch"},
+        Case{"model_answers_any_id", "V03", "cannot know"},
         Case{"model_refuses_in_silence", "V04", "without a sentence"},
         Case{"model_allocates", "V05", "calls malloc"}, Case{"model_writes_between", "V06", "stride"},
         Case{"model_asks_who_it_is", "V07", "in another process"},

@@ -23,7 +23,7 @@ struct Law {
 };
 
 inline void read_slots(Law &law) {
-  const dfm_slots all{sizeof(dfm_slots), law.ops->nslot, law.ops->slots};
+  const dfm_slots all{sizeof(dfm_slots), law.ops->nslot, law.ops->slots, 0, 0};
   const dfm_slots own = law.ops->state ? *law.ops->state(law.params.data()) : all;
   for (uint32_t s = 0; s < own.nslot; ++s) {
     const dfm_slot &slot = own.slots[s];

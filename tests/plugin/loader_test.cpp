@@ -68,16 +68,47 @@ TEST(Loader, SymbolicLink_IsFollowed) {
 TEST(Loader, ForeignAbi_IsRefusedByTheLibrary) {
   Context c;
   EXPECT_EQ(load(c, plugin("tiny_foreign")), DFM_E_UNSUPPORTED);
-  EXPECT_TRUE(says("ABI 7 draft 3") && says("speaks ABI 0 draft 1") && says("rebuild")) << dfm_last_error();
+  EXPECT_TRUE(says("ABI 7 draft 3") && says("speaks ABI 1 draft 0") && says("rebuild")) << dfm_last_error();
   EXPECT_TRUE(c.ids().empty());
 }
 
 TEST(Loader, ForeignHost_IsRefusedByThePluginWithItsOwnWords) {
   Context c;
   EXPECT_EQ(load(c, plugin("tiny_refuse")), DFM_E_UNSUPPORTED);
-  EXPECT_TRUE(says("refuses this library") && says("built for ABI 0 draft 99")) << dfm_last_error();
+  EXPECT_TRUE(says("refuses this library") && says("built for ABI 1 draft 99")) << dfm_last_error();
   EXPECT_EQ(load(c, plugin("tiny_silent")), DFM_E_UNSUPPORTED);
-  EXPECT_TRUE(says("gave no reason")) << dfm_last_error();
+  EXPECT_TRUE(says("speaks plugin ABI 1") && says("gave no reason") && says("is to be built again"))
+      << dfm_last_error();
+}
+
+TEST(Loader, PluginOfADraft_IsRefusedInOneSentenceThatSaysWhatToDo) {
+  Context c;
+  EXPECT_EQ(load(c, plugin("tiny_draft")), DFM_E_UNSUPPORTED);
+  EXPECT_EQ(std::string(dfm_last_error()),
+            plugin("tiny_draft") +
+                ": built for a draft of the plugin ABI (ABI 0 draft 1), which no library takes "
+                "since ABI 1; rebuild it against this library's deform/plugin.h");
+}
+
+// One that asks in the words of the draft's header sees that this host is none of a draft.
+TEST(Loader, HostOfTheLibrary_SaysWhichAbisItSpeaks) {
+  Context c;
+  ASSERT_EQ(load(c, plugin("tiny_host")), DFM_OK);
+  dfm_host future{};
+  const auto ok = [&](uint32_t abi, uint32_t draft, uint32_t min) {
+    future.abi = abi;
+    future.abi_draft = draft;
+    future.abi_min = min;
+    return DFM_ABI_OK(&future);
+  };
+  EXPECT_TRUE(ok(1, 0, 1));
+  EXPECT_TRUE(ok(1, 0, 0)) << "abi_min was not filled in";
+  EXPECT_TRUE(ok(2, 0, 1));
+  EXPECT_TRUE(ok(3, 4, 1)) << "its newest ABI is a draft, ours is not";
+  EXPECT_FALSE(ok(0, 1, 0)) << "a host of a draft";
+  EXPECT_FALSE(ok(1, 5, 1));
+  EXPECT_FALSE(ok(2, 0, 2));
+  EXPECT_FALSE(ok(2, 0, 0));
 }
 
 TEST(Loader, LibraryWithoutEntry_IsRefusedBeforeItsConstructorsRun) {

@@ -38,6 +38,26 @@ TEST(Registry, NewStructs_LoseWhatThisLibraryDoesNotKnow) {
   ASSERT_EQ(type->nparam, 2u);
   EXPECT_STREQ(type->params[1].key, "second");
   EXPECT_EQ(type->params[1].max, 10);
+  const auto *law = static_cast<const dfm_friction *>(type->ops);
+  ASSERT_EQ(law->nslot, 2u);
+  EXPECT_EQ(law->slot_size, sizeof(dfm_slot));
+  EXPECT_EQ(law->slots[1].width, 3u);
+  EXPECT_EQ(law->slots[1].kind, uint32_t(DFM_SLOT_SCALAR));
+}
+
+// Rows of slots that are longer, from the table of the type (5 values) and from dfm_friction.state, whose
+// parameters ask for the first slot alone.
+TEST(Registry, LongerRowsOfSlots_AreCountedByTheirOwnSize) {
+  Context c;
+  ASSERT_EQ(dfm_plugin_load(c.c, plugin("tiny_new").c_str()), DFM_OK) << dfm_last_error();
+  const dfm_law law = c.open("new");
+  for (const auto &[second, states] : {std::pair{2.0, 5u}, std::pair{0.0, 2u}}) {
+    tiny::Batch b(3, {1, second}, states);
+    for (uint32_t i = 0; i < states * b.stride; ++i) b.state_out[i] = -1;
+    ASSERT_EQ(dfm_law_eval(law, &b.in, &b.out), DFM_OK) << dfm_last_error();
+    for (uint32_t column = 0; column < states; ++column)
+      EXPECT_EQ(b.state_out[column * b.stride + 2], column) << states;
+  }
 }
 
 TEST(Registry, OldAndNewLaws_AreEvaluatedWithTheirParameters) {
@@ -63,6 +83,8 @@ TEST(Registry, BadSelfDescriptions_AreRefusedWithASentence) {
                                                          {"bad_bad_range", "\"first\": the range [0, 10]"},
                                                          {"bad_double_key", "\"first\" stands twice"},
                                                          {"bad_foreign_slot", "slot 0"},
+                                                         {"bad_foreign_need", "bits 0x40 of needs"},
+                                                         {"bad_short_slot", "rows of 12 bytes, at least 16"},
                                                          {"bad_no_eval", "eval"},
                                                          {"bad_unknown_kind", "kind 4 is unknown"}};
   for (const auto &[file, part] : cases) {

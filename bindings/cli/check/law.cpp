@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "check/environment.h"
+#include "slots.h"
 
 namespace cli::check {
 namespace {
@@ -14,13 +15,13 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 uint32_t width_of_state(const dfm_friction &law, const double *params) {
   const Kept kept("state");
-  const dfm_slots *own = law.state ? law.state(params) : nullptr;
-  if (law.state && (!own || own->size < sizeof *own || !own->slots || own->nslot > 4096))
+  const auto own = slot_rows(law.state ? law.state(params) : nullptr);
+  if (law.state && !own)
     broken(
         "its function state names no slots for parameters that check accepts, so the host cannot keep its "
         "state; return constant tables");
   uint32_t n = 0;
-  for (uint32_t i = 0; i < (own ? own->nslot : law.nslot); ++i) n += (own ? own->slots : law.slots)[i].width;
+  for (const dfm_slot &s : own ? *own : slot_rows(law.slots, law.nslot, law.slot_size)) n += s.width;
   return n;
 }
 

@@ -7,7 +7,7 @@
 #include <map>
 #include <set>
 
-#include "deform/plugin_draft.h"
+#include "slots.h"
 
 namespace cli::check {
 namespace {
@@ -18,15 +18,15 @@ void cross(const double *a, const double *b, double *out) {
   for (int k = 0; k < 3; ++k) out[k] = a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
 }
 
-size_t state_size(const dfm_slot *slots, uint32_t n, const Solid &solid) {
+size_t state_size(const std::vector<dfm_slot> &slots, const Solid &solid) {
   const std::map<uint32_t, size_t> count = {{DFM_PER_POINT, solid.npoint()},
                                             {DFM_PER_CELL, solid.ncell()},
                                             {DFM_PER_EDGE, solid.nedge()},
                                             {DFM_PER_INSTANCE, 1}};
   size_t total = 0;
-  for (uint32_t s = 0; s < n; ++s) {
-    const auto unit = count.find(slots[s].unit);
-    total += unit == count.end() ? 0 : unit->second * slots[s].width;
+  for (const dfm_slot &slot : slots) {
+    const auto unit = count.find(slot.unit);
+    total += unit == count.end() ? 0 : unit->second * slot.width;
   }
   return total;
 }
@@ -190,14 +190,14 @@ Body::Body(const Subject &s, const Solid &of, const Variant &variant, uint32_t w
         solid.ncell(), variant.name.c_str(), why_.empty() ? "without a reason" : why_.c_str());
   if (!self) return;
   stepper = static_cast<const dfm_stepper *>(extension("dfm.stepper/1"));
+  if (stepper && stepper->size < offsetof(dfm_stepper, commit) + sizeof(void *)) stepper = nullptr;  // V03
   caps = ops.caps;  // V03 says which of them lack their functions
   if (!ops.energy) caps &= ~uint32_t(DFM_CAP_ENERGY);
   if (!ops.pattern || !ops.stiffness) caps &= ~uint32_t(DFM_CAP_STIFFNESS | DFM_CAP_CONSTANT_STIFFNESS);
   if (const auto *claims = static_cast<const dfm_caps *>(extension(DFM_EXT_CAPS)); claims && claims->active)
     caps &= claims->active(self);
-  const auto *own = static_cast<const dfm_slots *>(extension(DFM_EXT_SLOTS));
-  state.assign(own ? state_size(own->slots, own->nslot, solid) : state_size(ops.slots, ops.nslot, solid),
-               0.0);
+  const auto own = slot_rows(static_cast<const dfm_slots *>(extension(DFM_EXT_SLOTS)));
+  state.assign(state_size(own ? *own : slot_rows(ops.slots, ops.nslot, ops.slot_size), solid), 0.0);
   if (!state.empty() && ops.state_init)
     must("state_init", [&] { return ops.state_init(self, state.data()); });
   x.assign(size_t(stride) * points(), 0.0);

@@ -43,6 +43,7 @@ Host::Host() {
   table_.size = sizeof table_;
   table_.abi = DFM_ABI;
   table_.abi_draft = DFM_ABI_DRAFT;
+  table_.abi_min = DFM_ABI_MIN;
   table_.ctx = this;
   table_.alloc = [](void *ctx, size_t bytes, size_t align) {
     if (Watch::watching()) Watch::stop("dfm_host.alloc");
@@ -118,7 +119,7 @@ Plugin::Plugin(const std::string &file) {
         "define the entry of deform/plugin.h");
   const dfm_plugin *given = nullptr;
   try {
-    given = entry(&host_.table(), DFM_ABI, DFM_ABI);
+    given = entry(&host_.table(), DFM_ABI, DFM_ABI_MIN);
   } catch (...) {
     broken(
         "its entry threw an exception, which ends a host written in C; catch it in the entry, log why, and "
@@ -129,7 +130,7 @@ Plugin::Plugin(const std::string &file) {
         "it refuses a host of ABI %u draft %u (%s), so no world can use it; rebuild it against this "
         "library's deform/plugin.h",
         DFM_ABI, DFM_ABI_DRAFT, host_.said().empty() ? "without a reason" : host_.said().c_str());
-  if (given->abi != DFM_ABI || given->abi_draft != DFM_ABI_DRAFT)
+  if (given->abi < DFM_ABI_MIN || given->abi > DFM_ABI || given->abi_draft != DFM_ABI_DRAFT)
     broken(
         "it was built for ABI %u draft %u and hands itself to a host of ABI %u draft %u, where its structs "
         "would be misread; rebuild it against this library's deform/plugin.h and refuse other hosts with "

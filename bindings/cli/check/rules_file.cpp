@@ -15,10 +15,12 @@
 #include "check/environment.h"
 #include "check/groups.h"
 #include "check/law.h"
+#include "check/model.h"
 #include "check/runner.h"
 #include "deform/plugin_draft.h"
 #include "file.h"
 #include "messages.h"
+#include "slots.h"
 
 namespace cli::check {
 namespace {
@@ -113,6 +115,20 @@ std::string exports_one_symbol(const Subject &subject) {
   return "dfm_plugin_entry";
 }
 
+namespace {
+
+// What the entry answers a host of that ABI.
+const dfm_plugin *given_to(dfm_plugin_fn entry, uint32_t abi, uint32_t draft, uint32_t min) {
+  Host host;
+  const Kept kept("its entry");
+  host.table().abi = abi;
+  host.table().abi_draft = draft;
+  host.table().abi_min = min;
+  return entry(&host.table(), abi, min);
+}
+
+}  // namespace
+
 std::string refuses_unknown_abi(const Subject &subject) {
   if (!subject.plugin) {
     const Kept kept("loading it");
@@ -123,21 +139,24 @@ std::string refuses_unknown_abi(const Subject &subject) {
   }
   const dfm_plugin_fn entry = entry_of(subject.plugin->image());
   const struct {
-    uint32_t abi, draft;
-  } strangers[] = {{DFM_ABI + 1, DFM_ABI_DRAFT}, {DFM_ABI, DFM_ABI_DRAFT + 1}, {77, 77}};
+    uint32_t abi, draft, min;
+  } strangers[] = {
+      {DFM_ABI + 1, 0, DFM_ABI + 1}, {DFM_ABI, DFM_ABI_DRAFT + 1, DFM_ABI}, {0, 1, 0}, {77, 77, 77}};
   for (const auto &stranger : strangers) {
     stage("the entry is called by a host of ABI %u draft %u", stranger.abi, stranger.draft);
-    Host host;
-    const Kept kept("its entry");
-    host.table().abi = stranger.abi;
-    host.table().abi_draft = stranger.draft;
-    if (entry(&host.table(), stranger.abi, stranger.abi))
+    if (given_to(entry, stranger.abi, stranger.draft, stranger.min))
       broken(
           "its entry hands itself to a host of ABI %u draft %u, which it cannot know, and would be called "
           "with structs of another shape; return NULL unless DFM_ABI_OK(host)",
           stranger.abi, stranger.draft);
   }
-  return text("ABI %u draft %u", DFM_ABI, DFM_ABI_DRAFT);
+  stage("the entry is called by a host of ABI %u that still speaks %u", DFM_ABI + 1, DFM_ABI);
+  if (!given_to(entry, DFM_ABI + 1, 3, DFM_ABI))
+    broken(
+        "its entry refuses a host of ABI %u that still speaks ABI %u, so every later library would be closed "
+        "to it; ask DFM_ABI_OK(host), which reads abi_min",
+        DFM_ABI + 1, DFM_ABI);
+  return text("ABI %u", DFM_ABI);
 }
 
 // ---- V03 --------------------------------------------------------------------------------------------------
@@ -171,10 +190,8 @@ void effects_known(const dfm_type &type) {
   }
 }
 
-void slots_sound(const dfm_slot *slots, uint32_t n, bool law) {
-  if (n && !slots)
-    broken("it has %u state slots but slots is NULL, so the host cannot keep its state; name them", n);
-  for (uint32_t i = 0; i < n; ++i) {
+void slots_sound(const std::vector<dfm_slot> &slots, bool law) {
+  for (uint32_t i = 0; i < slots.size(); ++i) {
     const dfm_slot &s = slots[i];
     const uint32_t width = s.kind == DFM_SLOT_TANGENT    ? 2
                            : s.kind == DFM_SLOT_VECTOR   ? 3
@@ -189,7 +206,25 @@ void slots_sound(const dfm_slot *slots, uint32_t n, bool law) {
       broken(
           "state slot %u has unit %u, which the host does not keep for it; a law's state is DFM_PER_CONTACT",
           i, s.unit);
+    if (s.reserved)
+      broken("state slot %u has %u in reserved, which a later host may read as a wish; set it to 0", i,
+             s.reserved);
   }
+}
+
+// slots, nslot, slot_size and reserved of the operations of a law or a model
+template <class Ops>
+void slot_table_sound(const Ops &ops, bool law) {
+  if (ops.nslot && !ops.slots)
+    broken("it has %u state slots but slots is NULL, so the host cannot keep its state; name them",
+           ops.nslot);
+  if (ops.reserved)
+    broken("reserved beside slot_size is %u, which a later host may read as a wish; set it to 0",
+           ops.reserved);
+  if (!slot_size_sound(ops.slot_size))
+    broken("slot_size is %u, so its state slots cannot be told apart; set it to 0 or to sizeof(dfm_slot)",
+           ops.slot_size);
+  slots_sound(slot_rows(ops.slots, ops.nslot, ops.slot_size), law);
 }
 
 void law_sound(const dfm_type &type, const dfm_friction &law) {
@@ -203,16 +238,16 @@ void law_sound(const dfm_type &type, const dfm_friction &law) {
   if (law.flags & ~15u) broken("flags has bits that this ABI does not know (%#x); use DFM_FRIC_*", law.flags);
   if ((law.flags & DFM_FRIC_SET_VALUED) && !(law.needs & DFM_NEED_FT_STOP))
     broken("a set-valued law that does not need FT_STOP cannot hold at rest; add DFM_NEED_FT_STOP to needs");
-  slots_sound(law.slots, law.nslot, true);
+  slot_table_sound(law, true);
   if (!law.state) return;
   const Kept kept("state");
   const std::vector<double> params = default_params(type);
-  const dfm_slots *own = law.state(params.data());
-  if (!own || own->size < sizeof *own)
+  const auto own = slot_rows(law.state(params.data()));
+  if (!own)
     broken(
         "its function state names no slots for its defaults, so the host cannot keep its state; return "
         "constant tables");
-  slots_sound(own->slots, own->nslot, true);
+  slots_sound(*own, true);
 }
 
 // Claims that name functions.
@@ -238,6 +273,57 @@ void model_sound(const dfm_model &model) {
     broken(
         "it claims DFM_CAP_CONSTANT_STIFFNESS without DFM_CAP_STIFFNESS, so there is nothing to be constant; "
         "claim both or none");
+}
+
+// What an instance answers to extension(): tables that begin with their size, nothing where it has none.
+void tables_sound(const Subject &subject) {
+  const dfm_model &model = model_of(subject);
+  if (!model.extension || !(model.cells & DFM_CELL_TET)) return;
+  const Solid solid = small_block();
+  const Variant defaults = {"the defaults", default_params(*subject.type)};
+  const Body body(subject, solid, defaults, 4, Body::Refusal::is_told);
+  if (!body.made()) return;
+  constexpr size_t one = 2 * sizeof(uint32_t) + sizeof(void *);
+  const struct {
+    const char *id, *name;
+    size_t head;
+  } known[] = {{"dfm.stepper/1", "dfm_stepper", offsetof(dfm_stepper, commit) + sizeof(void *)},
+               {DFM_EXT_CELL_ENERGY, "dfm_cell_energy", one},
+               {DFM_EXT_CELL_STRESS, "dfm_cell_stress", one},
+               {DFM_EXT_EFFECTS, "dfm_effects", one},
+               {DFM_EXT_IDLE, "dfm_idle", one},
+               {DFM_EXT_LIMITED, "dfm_limited", one},
+               {DFM_EXT_CAPS, "dfm_caps", one}};
+  for (const auto &k : known) {
+    const void *table = body.extension(k.id);
+    if (!table) continue;
+    uint32_t head[2];
+    std::memcpy(head, table, sizeof head);
+    if (head[0] < k.head || head[0] > 65536)
+      broken("the table of its extension \"%s\" has size %u, so the library refuses it; set it to sizeof(%s)",
+             k.id, head[0], k.name);
+    if (head[1])
+      broken(
+          "the table of its extension \"%s\" has %u in reserved, which a later host may read as a wish; "
+          "set it to 0",
+          k.id, head[1]);
+  }
+  if (const auto *stepper = static_cast<const dfm_stepper *>(body.extension("dfm.stepper/1"));
+      stepper && stepper->size >= offsetof(dfm_stepper, fetch) + sizeof(void *) && stepper->fetch)
+    broken("dfm_stepper.fetch is set, a place that is kept for a later use; leave it NULL");
+  if (const auto *own = static_cast<const dfm_slots *>(body.extension(DFM_EXT_SLOTS)); own) {
+    const auto rows = slot_rows(own);
+    if (!rows)
+      broken(
+          "the table of its extension \"%s\" cannot be read, so the host cannot keep its state; set size "
+          "to sizeof(dfm_slots) and slot_size to 0 or sizeof(dfm_slot)",
+          DFM_EXT_SLOTS);
+    slots_sound(*rows, false);
+  }
+  if (body.extension("dfm.unheard-of/1"))
+    broken(
+        "extension answers an id that it cannot know with a table, which a host would read as another "
+        "one; return NULL for all but the ids that it compares");
 }
 
 }  // namespace
@@ -279,8 +365,9 @@ std::string metadata_complete(const Subject &subject) {
       broken("a model without add_forces and without the extension \"dfm.stepper/1\" cannot move; give one");
     if (model.cells == 0)
       broken("a model that accepts no kind of cell fits no mesh; set cells to DFM_CELL_*");
-    slots_sound(model.slots, model.nslot, false);
+    slot_table_sound(model, false);
     model_sound(model);
+    tables_sound(subject);
   }
   return text("%s %s, %s", type.id, type.version, type.licence);
 }

@@ -1,6 +1,8 @@
-/* deform/plugin.h -- ABI draft. Stand-alone: needs only the two headers below. SI units, binary64, C calling
- * convention. Structs start with their size (rows: see param_size), grow at the end only, missing tail == 0.
- * What the library does not call yet stands in plugin_draft.h.
+/* deform/plugin.h -- plugin ABI 1. Stand-alone: needs only the two headers below. SI units, binary64, C
+ * calling convention. Structs start with their size and grow at the end only; who reads one looks at its
+ * size before what ABI 1 did not begin with, and a missing tail is zero. Rows of tables have their size
+ * beside them (param_size, slot_size). What stays and what may be added: doc/reference/abi.md. What the
+ * library does not call yet stands in plugin_draft.h and is no part of the ABI.
  * Threads: [setup] no step running; [step] one call at a time per instance, instances run
  * concurrently; [batch] re-entrant, many workers at once; [any] from anywhere. No C++ exception, exit
  * or longjmp crosses. */
@@ -11,9 +13,10 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-/* 0 = draft: host and plugin must agree on DFM_ABI_DRAFT; from 1 on only breaks bump it */
-#define DFM_ABI 0u
-#define DFM_ABI_DRAFT 1u
+/* Raised by breaks alone. 0 were the drafts, which no host takes any more. */
+#define DFM_ABI 1u
+#define DFM_ABI_MIN 1u   /* oldest that this version's host speaks */
+#define DFM_ABI_DRAFT 0u /* of an ABI that is not frozen yet; else 0 */
 /* 0 ok, > 0 try again, < 0 failed; never renumbered; base.h includes this header */
 typedef int32_t dfm_status;
 enum {
@@ -32,8 +35,9 @@ enum {
 };
 /* ---- services the host lends to a plugin; valid from entry until the last destroy ---------------- */
 typedef struct dfm_host {
-  uint32_t size, abi, abi_draft, reserved; /* sizeof this struct in the host; ABI the host speaks */
-  void *ctx;                               /* pass back as the first argument of every call below */
+  uint32_t size, abi;          /* sizeof this struct in the host; newest ABI that it speaks */
+  uint32_t abi_draft, abi_min; /* DFM_ABI_DRAFT of the host; oldest ABI that it speaks */
+  void *ctx;                   /* pass back as the first argument of every call below */
   void *(*alloc)(void *ctx, size_t bytes, size_t align);           /* [any] NULL on failure */
   void (*release)(void *ctx, void *p, size_t bytes, size_t align); /* [any] */
   void *(*scratch)(void *ctx, size_t bytes); /* [batch] thread-local, valid until the call returns */
@@ -42,7 +46,8 @@ typedef struct dfm_host {
    * begin/grain and add them in slot order; a call from inside a worker runs serially in the caller. */
   void (*parallel_for)(void *ctx, uint32_t n, uint32_t grain,
                        void (*fn)(void *user, uint32_t begin, uint32_t end), void *user);
-  const void *(*extension)(void *ctx, const char *id); /* [any] e.g. "dfm.trace/1" */
+  /* [any] a table of further services that begins with its size; NULL: this host has none of that id */
+  const void *(*extension)(void *ctx, const char *id);
 } dfm_host;
 /* ---- self-description ---------------------------------------------------------------------------- */
 typedef struct dfm_param { /* a row; values of all rows lie end to end, width doubles each */
@@ -62,7 +67,8 @@ enum {
       32 /* def is no value but a sign, read and shown as "auto": the plugin takes one from the others */,
   DFM_PARAM_LIST = 64 /* 1 to width values may be given, the rest read 0 */
 };
-typedef struct dfm_slot { uint32_t unit, width, kind, reserved; } dfm_slot; /* one block of state */
+/* a row: one block of state */
+typedef struct dfm_slot { uint32_t unit, width, kind, reserved; /* 0 */ } dfm_slot;
 enum { DFM_PER_CONTACT = 1, DFM_PER_POINT = 2, DFM_PER_CELL = 3, DFM_PER_EDGE = 4, DFM_PER_INSTANCE = 5 };
 enum {
   DFM_SLOT_SCALAR = 1,
@@ -73,7 +79,9 @@ enum {
 /* all of an instance */
 typedef struct dfm_slots {
   uint32_t size, nslot;
-  const dfm_slot *slots;
+  const dfm_slot *slots; /* [nslot] rows of slot_size bytes */
+  uint32_t slot_size;    /* 0: 16, the row that ABI 1 began with */
+  uint32_t reserved;     /* 0 */
 } dfm_slots;
 typedef struct dfm_type {
   uint32_t size, kind;                                /* DFM_KIND_* tells what ops points to */
@@ -91,11 +99,11 @@ enum { DFM_NEED_FN = 1, DFM_NEED_VT = 2, DFM_NEED_FT_STOP = 4, DFM_NEED_AREA = 8
 enum { DFM_FRIC_ISOTROPIC = 1, DFM_FRIC_PASSIVE = 2, DFM_FRIC_JACOBIAN = 4, DFM_FRIC_SET_VALUED = 8 };
 typedef struct dfm_friction_in { /* SoA; column c of contact i is at [c*stride + i]; 64-byte aligned */
   /* stride % 8 == 0; lanes up to n rounded to 8 may be touched, ignored */
-  uint32_t size, n, stride, flags;
-  double dt;            /* s */
-  const double *params; /* shared by the batch (host groups contacts by law and params) */
-  const void *data;     /* what prepare() made from params; NULL without prepare */
-  const double *fn;     /* [n]   normal force, >= 0 (N) */
+  uint32_t size, n, stride, flags; /* flags: 0 */
+  double dt;                       /* s */
+  const double *params;            /* shared by the batch (host groups contacts by law and params) */
+  const void *data;                /* what prepare() made from params; NULL without prepare */
+  const double *fn;                /* [n]   normal force, >= 0 (N) */
   /* [2,n] trial slip, mean over the step = slip path / dt, of the surfel's owner against the other side, in
    * the contact frame (m/s) */
   const double *vt;
@@ -104,7 +112,7 @@ typedef struct dfm_friction_in { /* SoA; column c of contact i is at [c*stride +
   const double *state;        /* [nstate,n] at t */
 } dfm_friction_in;
 typedef struct dfm_friction_out { /* each pointer may be NULL: not wanted */
-  uint32_t size, flags;
+  uint32_t size, flags;           /* flags: 0 */
   /* [2,n] force ON the moving side (N); opposes slip; ft_stop while stuck */
   double *ft;
   /* [nstate,n] trial at t+dt, inside the cone of fn; host commits or drops it */
@@ -127,6 +135,7 @@ typedef struct dfm_friction {
    * is; it stands in the place of slots, which then is the most that any parameters call for. Constant data,
    * the same for the same parameters. */
   const dfm_slots *(*state)(const double *params);
+  uint32_t slot_size, reserved; /* of slots, as in dfm_slots */
 } dfm_friction;
 /* ---- deformable model: host owns x, v, f and all state; plugin owns only rebuildable caches -------- */
 enum {
@@ -186,12 +195,15 @@ typedef struct dfm_model {           /* self is void*: one shared struct tag wou
    * block (j, i) is the transpose of (i, j). f is what add_forces adds at the same k; state_out is NULL.
    * For a, b >= 0 the sum is to be negative semidefinite: what would make it indefinite is left out. */
   dfm_status (*stiffness)(void *self, const dfm_kin *k, double a, double b, double *blk);
-  const void *(*extension)(const void *self, const char *id); /* "dfm.stepper/1" ... */
+  /* [setup] optional; "dfm.stepper/1" ...: a table that begins with its size and stays as it is while the
+   * instance lives; NULL to every id that the model does not know */
+  const void *(*extension)(const void *self, const char *id);
+  uint32_t slot_size, reserved; /* of slots, as in dfm_slots */
 } dfm_model;
 /* Self-stepping model, extension "dfm.stepper/1". Contact, friction, report and pictures see surfels only.
  * Velocities here are means over the step: (x_s(t+dt) - x_s(t)) / dt. */
 typedef struct dfm_stepper {
-  uint32_t size, reserved;
+  uint32_t size, reserved; /* reserved: 0, here and in the tables below */
   /* [step] without contact. f_ext [npoint,stride] N: gravity, loads, springs. u_s [nsurfel,3]. Held
    * components of k->v carry their given mean velocity. */
   dfm_status (*predict)(void *self, const dfm_kin *k, const double *f_ext, double *u_s);
@@ -204,13 +216,13 @@ typedef struct dfm_stepper {
   /* [step] equals predict + respond. p_s [nsurfel,3] total impulses; x, v [npoint,stride] out at t+dt,
    * not aliasing k */
   dfm_status (*commit)(void *self, const dfm_kin *k, const double *p_s, double *x, double *v);
-  void (*fetch)(void); /* draft: dfm_fetch_fn of plugin_draft.h; not called */
+  void (*fetch)(void); /* NULL: a place kept for dfm_fetch_fn of plugin_draft.h */
   /* [step] optional (NULL, or a smaller size): respond for nrhs right-hand sides at once, p, du_s [nrhs,n,3].
    * Without it respond is called nrhs times. */
   dfm_status (*respond_many)(void *self, const dfm_kin *k, uint32_t n, const uint32_t *surfel, uint32_t nrhs,
                              const double *p, double *du_s);
 } dfm_stepper;
-/* Extension "dfm.cell_energy/1" of a model (draft): elastic energy per rest volume, for pictures
+/* Extension "dfm.cell_energy/1" of a model: elastic energy per rest volume, for pictures
  * and probes. */
 #define DFM_EXT_CELL_ENERGY "dfm.cell_energy/1"
 typedef struct dfm_cell_energy {
@@ -218,7 +230,7 @@ typedef struct dfm_cell_energy {
   /* [step] density[ncell] = J/m^3 */
   dfm_status (*cell_energy)(void *self, const dfm_kin *k, double *density);
 } dfm_cell_energy;
-/* Extension "dfm.cell_stress/1" of a model (draft): stress of the elastic forces, for pictures and probes.
+/* Extension "dfm.cell_stress/1" of a model: stress of the elastic forces, for pictures and probes.
  */
 #define DFM_EXT_CELL_STRESS "dfm.cell_stress/1"
 typedef struct dfm_cell_stress {
@@ -226,11 +238,11 @@ typedef struct dfm_cell_stress {
   /* [step] stress[ncell,6] = Pa, Cauchy stress as xx yy zz xy yz zx in the axes of the world; tension > 0 */
   dfm_status (*cell_stress)(void *self, const dfm_kin *k, double *stress);
 } dfm_cell_stress;
-/* Extension "dfm.slots/1" of a model (draft): state of this instance, where its parameters decide how much
+/* Extension "dfm.slots/1" of a model: state of this instance, where its parameters decide how much
  * there is. It stands in the place of dfm_model.slots, is asked for once after create() and stays as it is
  * while the instance lives. */
 #define DFM_EXT_SLOTS "dfm.slots/1"
-/* Extension "dfm.effects/1" of a model (draft): those of dfm_type.effects that the instance's present
+/* Extension "dfm.effects/1" of a model: those of dfm_type.effects that the instance's present
  * parameters call for, NULL-terminated. Without it all of them are taken to be at work. */
 #define DFM_EXT_EFFECTS "dfm.effects/1"
 typedef struct dfm_effects {
@@ -238,7 +250,7 @@ typedef struct dfm_effects {
   /* [setup] valid until the next call of set_params */
   const char *const *(*active)(const void *self);
 } dfm_effects;
-/* Extension "dfm.idle/1" of a model (draft): parameters that do nothing beside the present others, or not
+/* Extension "dfm.idle/1" of a model: parameters that do nothing beside the present others, or not
  * what their row says, and why: part of a sentence without a full stop. Hosts tell it to the user. NULL where
  * the parameter does what it says. */
 #define DFM_EXT_IDLE "dfm.idle/1"
@@ -247,7 +259,7 @@ typedef struct dfm_idle {
   /* [setup] row of dfm_type.params; valid until the next call of set_params */
   const char *(*why)(const void *self, uint32_t row);
 } dfm_idle;
-/* Extension "dfm.limited/1" of a model (draft): cells so far from their shape that the model limits their
+/* Extension "dfm.limited/1" of a model: cells so far from their shape that the model limits their
  * stiffness there. */
 #define DFM_EXT_LIMITED "dfm.limited/1"
 typedef struct dfm_limited {
@@ -255,6 +267,38 @@ typedef struct dfm_limited {
   /* [step] as counted by the last call of bound */
   uint32_t (*count)(const void *self);
 } dfm_limited;
+/* Extension "dfm.caps/1" of a model: those of dfm_model.caps that hold with the instance's present
+ * parameters, where some choice of them takes one away. Asked by `deform plugin check`. */
+#define DFM_EXT_CAPS "dfm.caps/1"
+typedef struct dfm_caps {
+  uint32_t size, reserved;
+  uint32_t (*active)(const void *self); /* [setup] DFM_CAP_*, until the next call of set_params */
+} dfm_caps;
+/* Extension "dfm.effect_rows/1" of a model: the parameters that switch its effects off. An effect without a
+ * row is the model's own, or the body's. Told, and switched to measure costs, by `deform explain`; no step
+ * asks. */
+#define DFM_EXT_EFFECT_ROWS "dfm.effect_rows/1"
+typedef struct dfm_effect_row {
+  const char *effect;       /* one of dfm_type.effects */
+  uint32_t param, reserved; /* row of dfm_type.params, one wide */
+  double off;               /* the effect is off where each of its rows has this value */
+} dfm_effect_row;
+typedef struct dfm_effect_rows {
+  uint32_t size, row_size, n, reserved;
+  const dfm_effect_row *rows; /* [n] rows of row_size bytes; constant */
+} dfm_effect_rows;
+/* Extension "dfm.facts/1" of a model: numbers that the instance found when it was made and that its user
+ * should know. Told by `deform explain` and the summary of a run. */
+#define DFM_EXT_FACTS "dfm.facts/1"
+typedef struct dfm_fact {
+  const char *key, *label, *unit; /* "modes", "modes that the body has", "1" */
+  double value;
+} dfm_fact;
+typedef struct dfm_facts {
+  uint32_t size, row_size;
+  /* [setup] *n rows of row_size bytes; valid until the next call of set_params */
+  const dfm_fact *(*list)(const void *self, uint32_t *n);
+} dfm_facts;
 /* ---- linear solver for the implicit system: symmetric positive definite, 3x3 blocks --------------- */
 enum { DFM_SOLVER_DIRECT = 1 /* exact up to rounding, whatever x holds and the tolerance is */ };
 typedef struct dfm_solver {
@@ -272,12 +316,15 @@ typedef struct dfm_solver {
   void (*release)(void *self);
 } dfm_solver;
 /* ---- entry: the one symbol a plugin exports ------------------------------------------------------- */
-/* until ABI 1 */
-#define DFM_ABI_OK(h) ((h)->abi == DFM_ABI && (DFM_ABI != 0u || (h)->abi_draft == DFM_ABI_DRAFT))
+/* Does this host speak the ABI that the plugin is compiled for? Its entry returns NULL where it does not.
+ * Nothing of dfm_host behind log may be read before that is known. */
+#define DFM_ABI_OK(h)                                    \
+  ((h)->abi == DFM_ABI ? (h)->abi_draft == DFM_ABI_DRAFT \
+                       : (h)->abi > DFM_ABI && (h)->abi_min != 0u && (h)->abi_min <= DFM_ABI)
 typedef struct dfm_plugin {
-  uint32_t size, abi, abi_draft, ntype;
-  const dfm_type *const *types; /* [ntype] array of pointers, so dfm_type may grow */
-  void (*shutdown)(void);       /* optional */
+  uint32_t size, abi, abi_draft, ntype; /* DFM_ABI, DFM_ABI_DRAFT */
+  const dfm_type *const *types;         /* [ntype] array of pointers, so dfm_type may grow */
+  void (*shutdown)(void);               /* optional */
 } dfm_plugin;
 typedef const dfm_plugin *(*dfm_plugin_fn)(const dfm_host *host, uint32_t host_abi, uint32_t host_abi_min);
 #ifdef DFM_STATIC_PLUGIN /* -DDFM_STATIC_PLUGIN=lugre -> dfm_plugin_entry_lugre, no dlopen */

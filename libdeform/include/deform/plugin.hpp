@@ -79,7 +79,7 @@ constexpr dfm_type type(uint32_t kind, const char *id, const char *name, const c
 using Eval = dfm_status (*)(const dfm_friction_in *, dfm_friction_out *);
 using Check = dfm_status (*)(const double *, char *, size_t);
 constexpr dfm_friction friction(uint32_t needs, uint32_t flags, Eval eval, Check check = nullptr) {
-  return {sizeof(dfm_friction), needs, flags, 0, nullptr, eval, check, nullptr, nullptr, nullptr};
+  return {sizeof(dfm_friction), needs, flags, 0, nullptr, eval, check, nullptr, nullptr, nullptr, 0, 0};
 }
 
 // ---- batches: columns of a structure of arrays ------------------------------------------------------------
@@ -94,14 +94,14 @@ constexpr T *column(T *p, uint32_t stride, uint32_t c) {
 // before that is known.
 inline const dfm_plugin *publish(const dfm_host *host, uint32_t host_abi, uint32_t host_abi_min,
                                  const dfm_plugin *plugin) noexcept {
-  if (host && host_abi_min <= DFM_ABI && DFM_ABI_OK(host)) return plugin;
-  // A host of another ABI still has log in this place or none of it: within the draft the head of dfm_host
-  // has not moved.
+  if (host && DFM_ABI_OK(host)) return plugin;
+  // the head of dfm_host up to log is the same in every ABI
   if (host && host->size >= offsetof(dfm_host, log) + sizeof(host->log) && host->log) {
-    char text[160];
+    char text[192];
     std::snprintf(text, sizeof text,
-                  "plugin built for ABI %u draft %u, the host speaks ABI %u (from %u) draft %u", DFM_ABI,
-                  DFM_ABI_DRAFT, host_abi, host_abi_min, host->abi_draft);
+                  "plugin built for ABI %u draft %u, the host speaks ABI %u (from %u) draft %u; rebuild the "
+                  "plugin against the deform/plugin.h of the host",
+                  DFM_ABI, DFM_ABI_DRAFT, host_abi, host_abi_min, host->abi_draft);
     host->log(host->ctx, 2, 0, text);
   }
   return nullptr;

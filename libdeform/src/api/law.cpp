@@ -71,8 +71,13 @@ Law &law_at(dfm_law handle) {
 }
 
 uint32_t state_width(const Law &law, const double *params) {
+  const dfm_friction &ops = law_of(law.type);
   uint32_t n = 0;
-  for (const dfm_slot &slot : law_slots(law.type, law.context.host, params)) n += slot.width;
+  const auto add = [&n](std::span<const dfm_slot> slots) {
+    for (const dfm_slot &slot : slots) n += slot.width;
+  };
+  if (ops.state) add(law_slots(law.type, law.context.host, params));
+  else add({ops.slots, ops.nslot});  // takes no memory
   return n;
 }
 

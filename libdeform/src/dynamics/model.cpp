@@ -1,18 +1,25 @@
 #include "dynamics/model.h"
 
 #include <algorithm>
+#include <cstddef>
+#include <iterator>
 #include <utility>
 
 #include "core/error.h"
-#include "plugin/registry.h"
+#include "plugin/tables.h"
 
 namespace dfm {
+namespace {
 
-size_t model_state_size(const dfm_slot *slots, uint32_t nslot, uint32_t npoint, uint32_t ncell,
-                        uint32_t nedge) {
+// What every version of these tables has had.
+constexpr size_t kStepperHead = offsetof(dfm_stepper, commit) + sizeof(void *);
+constexpr size_t kOneFunction = 2 * sizeof(uint32_t) + sizeof(void *);
+
+}  // namespace
+
+size_t model_state_size(std::span<const dfm_slot> slots, uint32_t npoint, uint32_t ncell, uint32_t nedge) {
   size_t total = 0;
-  for (uint32_t s = 0; s < nslot; ++s) {
-    const dfm_slot &slot = slots[s];
+  for (const dfm_slot &slot : slots) {
     const size_t count = slot.unit == DFM_PER_POINT  ? npoint
                          : slot.unit == DFM_PER_CELL ? ncell
                          : slot.unit == DFM_PER_EDGE ? nedge
@@ -42,24 +49,33 @@ void ModelInstance::create(const dfm_type &t, const dfm_host &h, const dfm_mesh 
     }
     if (*why.text()) static_cast<const dfm_context *>(h.ctx)->log(DFM_LOG_ERROR, why.text());
   }
-  const dfm_slots *own = nullptr;
-  if (ops->extension)
-    call("extension", [&] {
-      stepper = static_cast<const dfm_stepper *>(ops->extension(self, "dfm.stepper/1"));
-      own = static_cast<const dfm_slots *>(ops->extension(self, DFM_EXT_SLOTS));
-      effects = static_cast<const dfm_effects *>(ops->extension(self, DFM_EXT_EFFECTS));
-      idle = static_cast<const dfm_idle *>(ops->extension(self, DFM_EXT_IDLE));
-      limited = static_cast<const dfm_limited *>(ops->extension(self, DFM_EXT_LIMITED));
-      return DFM_OK;
-    });
+  const std::optional<std::vector<dfm_slot>> own = ask_extensions();
   if (!stepper && !ops->add_forces)
     fail(DFM_E_UNSUPPORTED, "model '%s' neither adds forces nor steps itself; report it to its author", t.id);
-  if (own) check_slots(t.id, own->slots, own->nslot, false);
-  const size_t nstate = model_state_size(own ? own->slots : ops->slots, own ? own->nslot : ops->nslot,
-                                         mesh.npoint, mesh.ncell, mesh.nedge);
+  const size_t nstate =
+      model_state_size(own ? std::span<const dfm_slot>(*own) : std::span(ops->slots, ops->nslot), mesh.npoint,
+                       mesh.ncell, mesh.nedge);
   state = Array<double>(nstate, 0.0, HookAllocator<double>(memory));
   state_out = state;
   start();
+}
+
+std::optional<std::vector<dfm_slot>> ModelInstance::ask_extensions() {
+  const void *tables[5] = {};
+  const char *const ids[] = {"dfm.stepper/1", DFM_EXT_SLOTS, DFM_EXT_EFFECTS, DFM_EXT_IDLE, DFM_EXT_LIMITED};
+  if (ops->extension)
+    call("extension", [&] {
+      for (size_t i = 0; i < std::size(ids); ++i) tables[i] = ops->extension(self, ids[i]);
+      return DFM_OK;
+    });
+  stepper = copy_table<dfm_stepper>(tables[0], kStepperHead, type->id, "dfm_stepper");
+  if (stepper && !(stepper->predict && stepper->respond && stepper->commit))
+    fail(DFM_E_UNSUPPORTED,
+         "model '%s' steps itself without predict, respond and commit; report it to its author", type->id);
+  effects = copy_table<dfm_effects>(tables[2], kOneFunction, type->id, "dfm_effects");
+  idle = copy_table<dfm_idle>(tables[3], kOneFunction, type->id, "dfm_idle");
+  limited = copy_table<dfm_limited>(tables[4], kOneFunction, type->id, "dfm_limited");
+  return copy_slots(type->id, static_cast<const dfm_slots *>(tables[1]), false);
 }
 
 void ModelInstance::start() {

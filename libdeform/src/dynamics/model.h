@@ -1,6 +1,8 @@
 // One body's model: the plugin instance, its parameters and its state. Everything else in the library calls
 // models through here.
 #pragma once
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -14,10 +16,11 @@ struct ModelInstance {
   const dfm_type *type = nullptr;
   const dfm_model *ops = nullptr;
   const dfm_host *host = nullptr;
-  const dfm_stepper *stepper = nullptr;  // null: a force model, the host integrates
-  const dfm_effects *effects = nullptr;  // null: whatever the type promises is at work
-  const dfm_idle *idle = nullptr;        // null: every parameter does what its row says
-  const dfm_limited *limited = nullptr;  // null: the model limits nothing, or does not say
+  // What the instance's extensions answer, of this library's size.
+  std::optional<dfm_stepper> stepper;  // none: a force model, the host integrates
+  std::optional<dfm_effects> effects;  // none: whatever the type promises is at work
+  std::optional<dfm_idle> idle;        // none: every parameter does what its row says
+  std::optional<dfm_limited> limited;  // none: the model limits nothing, or does not say
   void *self = nullptr;
   std::vector<double> params;
   Array<double> state, state_out;  // slots end to end
@@ -51,10 +54,12 @@ struct ModelInstance {
   void commit_state() {
     if (!state.empty()) state.swap(state_out);
   }
+
+ private:
+  std::optional<std::vector<dfm_slot>> ask_extensions();  // and its own state slots; throws Error
 };
 
 // Number of state values that slots need on a mesh of these counts.
-size_t model_state_size(const dfm_slot *slots, uint32_t nslot, uint32_t npoint, uint32_t ncell,
-                        uint32_t nedge);
+size_t model_state_size(std::span<const dfm_slot> slots, uint32_t npoint, uint32_t ncell, uint32_t nedge);
 
 }  // namespace dfm

@@ -2,16 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
 
 namespace dfm {
-namespace {
-
-bool offers_many(const dfm_stepper &ops) {
-  return ops.size >= offsetof(dfm_stepper, respond_many) + sizeof ops.respond_many && ops.respond_many;
-}
-
-}  // namespace
 
 SelfStepping::SelfStepping(const Memory &memory, Phyxels &points, Surface &surface, ModelInstance &model)
     : Dynamics(points, surface, model),
@@ -42,7 +34,7 @@ bool SelfStepping::respond(const SubStep &now, uint32_t n, const uint32_t *surfe
   const dfm_stepper &ops = *model_.stepper;
   const double *const p = unit_.data();
   double *const du = answer_.data();
-  if (offers_many(ops)) {
+  if (ops.respond_many) {
     const auto many = [&] { return ops.respond_many(model_.self, &k, n, surfel, nrhs, p, du); };
     return model_.call("respond_many", many) == DFM_OK;
   }

@@ -66,6 +66,7 @@ dfm_context::dfm_context(const dfm_context_def &def)
   host.size = sizeof host;
   host.abi = DFM_ABI;
   host.abi_draft = DFM_ABI_DRAFT;
+  host.abi_min = DFM_ABI_MIN;
   host.ctx = this;
   host.alloc = host_alloc;
   host.release = host_release;

@@ -137,7 +137,7 @@ void Loader::enter(dfm_plugin_fn entry, const std::string &file, dfm_plugin &plu
   bool threw = false;
   entry_log = &said;
   try {
-    given = entry(&host_, DFM_ABI, DFM_ABI);
+    given = entry(&host_, DFM_ABI, DFM_ABI_MIN);
   } catch (...) {
     threw = true;
   }
@@ -146,12 +146,20 @@ void Loader::enter(dfm_plugin_fn entry, const std::string &file, dfm_plugin &plu
     fail(DFM_E_UNSUPPORTED, "%s: its entry threw an exception%s%s", file.c_str(),
          said.empty() ? "" : " after it said: ", said.c_str());
   if (!given)
-    fail(DFM_E_UNSUPPORTED, "%s: the plugin refuses this library (ABI %u draft %u)%s%s", file.c_str(),
-         DFM_ABI, DFM_ABI_DRAFT, said.empty() ? " and gave no reason" : ": ", said.c_str());
-  if (given->abi != DFM_ABI || given->abi_draft != DFM_ABI_DRAFT)
+    fail(
+        DFM_E_UNSUPPORTED,
+        "%s: the plugin refuses this library, which speaks plugin ABI %u%s%s; one that was built for a draft "
+        "or another ABI is to be built again against this library's deform/plugin.h",
+        file.c_str(), DFM_ABI, said.empty() ? ", and gave no reason" : ": ", said.c_str());
+  if (given->abi == 0)
+    fail(DFM_E_UNSUPPORTED,
+         "%s: built for a draft of the plugin ABI (ABI 0 draft %u), which no library takes since ABI 1; "
+         "rebuild it against this library's deform/plugin.h",
+         file.c_str(), given->abi_draft);
+  if (given->abi < DFM_ABI_MIN || given->abi > DFM_ABI || given->abi_draft != DFM_ABI_DRAFT)
     fail(DFM_E_UNSUPPORTED,
          "%s: built for plugin ABI %u draft %u, this library speaks ABI %u draft %u; rebuild it against this "
-         "library's deform/plugin.h",
+         "library's deform/plugin.h, or take a library that speaks that ABI",
          file.c_str(), given->abi, given->abi_draft, DFM_ABI, DFM_ABI_DRAFT);
   constexpr uint32_t head = offsetof(dfm_plugin, types) + sizeof(void *);
   if (given->size < head || given->size > 65536)

@@ -7,6 +7,7 @@
 
 #include "core/error.h"
 #include "plugin/call.h"
+#include "plugin/tables.h"
 
 namespace dfm {
 namespace {
@@ -17,25 +18,12 @@ constexpr uint32_t kParamHead = offsetof(dfm_param, names);
 constexpr uint32_t kLawHead = offsetof(dfm_friction, eval) + sizeof(void *);
 constexpr uint32_t kModelHead = offsetof(dfm_model, destroy) + sizeof(void *);
 constexpr uint32_t kSolverHead = offsetof(dfm_solver, release) + sizeof(void *);
-// no struct of this ABI will ever be larger: what claims more is not one
-constexpr uint32_t kLargest = 1u << 16;
-
-[[noreturn]] void bad(const std::string &id, const std::string &what) {
-  fail(DFM_E_UNSUPPORTED, "type \"%s\" is not usable: %s", id.c_str(), what.c_str());
-}
-
-// Copies what both sides know; the rest of the full struct stays zero. The first field of every
-// struct is its size.
-template <class T>
-void copy_struct(T &full, const void *from, uint32_t head, const std::string &id, const char *name) {
-  uint32_t size;
-  std::memcpy(&size, from, sizeof size);
-  if (size < head || size > kLargest)
-    bad(id, format("%s.size is %u, at least %u expected; set it to sizeof(%s)", name, size, head, name));
-  std::memcpy(&full, from, std::min<size_t>(size, sizeof(T)));
-  full.size = sizeof(T);
-}
-
+constexpr uint32_t kSlotsHead = offsetof(dfm_slots, slots) + sizeof(void *);
+constexpr uint32_t kSlotHead = 16;
+// An input that is not there cannot be done without, so a law that asks for one of a later ABI is refused;
+// flags and claims of a later one are passed over.
+constexpr uint32_t kKnownNeeds =
+    DFM_NEED_FN | DFM_NEED_VT | DFM_NEED_FT_STOP | DFM_NEED_AREA | DFM_NEED_DWELL;
 bool reverse_dns(const char *id) {
   bool dot = false;
   char last = '.';
@@ -49,41 +37,42 @@ bool reverse_dns(const char *id) {
 
 void check_head(const dfm_type &type) {
   const std::string id = type.id ? type.id : "";
-  if (id.empty()) bad("", "it has no id; give one in reverse-DNS form such as \"org.example.mylaw\"");
-  if (!reverse_dns(type.id)) bad(id, "its id is not in reverse-DNS form such as \"org.example.mylaw\"");
+  if (id.empty()) bad_type("", "it has no id; give one in reverse-DNS form such as \"org.example.mylaw\"");
+  if (!reverse_dns(type.id)) bad_type(id, "its id is not in reverse-DNS form such as \"org.example.mylaw\"");
   const struct {
     const char *key, *text;
   } fields[] = {
       {"name", type.name}, {"version", type.version}, {"licence", type.licence}, {"source", type.source}};
   for (const auto &field : fields)
-    if (!field.text || !*field.text) bad(id, format("its metadata lacks \"%s\"", field.key));
+    if (!field.text || !*field.text) bad_type(id, format("its metadata lacks \"%s\"", field.key));
   if (type.kind < DFM_KIND_FRICTION || type.kind > DFM_KIND_SOLVER)
-    bad(id, format("its kind %u is unknown to this library", type.kind));
-  if (!type.ops) bad(id, "it has no operations (ops is NULL)");
+    bad_type(id, format("its kind %u is unknown to this library", type.kind));
+  if (!type.ops) bad_type(id, "it has no operations (ops is NULL)");
 }
 
 void check_row(const std::string &id, const dfm_param &row, const std::vector<dfm_param> &before) {
   const std::string key = row.key ? row.key : "";
-  if (key.empty()) bad(id, "a parameter row has no key");
+  if (key.empty()) bad_type(id, "a parameter row has no key");
   for (const auto &other : before)
-    if (key == other.key) bad(id, format("parameter \"%s\" stands twice in the table", key.c_str()));
+    if (key == other.key) bad_type(id, format("parameter \"%s\" stands twice in the table", key.c_str()));
   if (!row.label || !row.unit)
-    bad(id, format("parameter \"%s\" lacks a label or a unit (\"1\" if dimensionless)", key.c_str()));
+    bad_type(id, format("parameter \"%s\" lacks a label or a unit (\"1\" if dimensionless)", key.c_str()));
   if (!std::isfinite(row.min) || !std::isfinite(row.max) || !(row.min <= row.def && row.def <= row.max))
-    bad(id, format("parameter \"%s\": the range [%g, %g] must be finite and hold the default %g", key.c_str(),
-                   row.min, row.max, row.def));
+    bad_type(id, format("parameter \"%s\": the range [%g, %g] must be finite and hold the default %g",
+                        key.c_str(), row.min, row.max, row.def));
   if (row.width < 1 || row.width > 16)
-    bad(id, format("parameter \"%s\": width %u is not in 1..16", key.c_str(), row.width));
+    bad_type(id, format("parameter \"%s\": width %u is not in 1..16", key.c_str(), row.width));
   if ((row.flags & DFM_PARAM_LIST) && !(row.min <= 0 && 0 <= row.max))
-    bad(id, format("parameter \"%s\" is a list, whose values that are not given read 0, which its range [%g, "
+    bad_type(
+        id, format("parameter \"%s\" is a list, whose values that are not given read 0, which its range [%g, "
                    "%g] excludes",
                    key.c_str(), row.min, row.max));
   if (row.flags & DFM_PARAM_ENUM) {
     uint32_t n = 0;
-    while (row.names && n < kLargest && row.names[n]) ++n;
+    while (row.names && n < kLargestStruct && row.names[n]) ++n;
     if (n == 0 || row.min != 0 || row.max != n - 1)
-      bad(id, format("parameter \"%s\": an enumeration of %u names needs the range [0, %g]", key.c_str(), n,
-                     n - 1.0));
+      bad_type(id, format("parameter \"%s\": an enumeration of %u names needs the range [0, %g]", key.c_str(),
+                          n, n - 1.0));
   }
 }
 
@@ -91,10 +80,10 @@ void copy_rows(RegisteredType &out) {
   const dfm_type &type = out.type;
   const std::string id = type.id;
   if (type.nparam == 0) return;
-  if (!type.params) bad(id, "nparam is not 0 but params is NULL");
-  if (type.nparam > 4096 || type.param_size < kParamHead || type.param_size > kLargest)
-    bad(id, format("its parameter table has %u rows of %u bytes; at least %u bytes a row expected",
-                   type.nparam, type.param_size, kParamHead));
+  if (!type.params) bad_type(id, "nparam is not 0 but params is NULL");
+  if (type.nparam > 4096 || type.param_size < kParamHead || type.param_size > kLargestStruct)
+    bad_type(id, format("its parameter table has %u rows of %u bytes; at least %u bytes a row expected",
+                        type.nparam, type.param_size, kParamHead));
   for (uint32_t i = 0; i < type.nparam; ++i) {
     dfm_param row{};
     std::memcpy(&row, reinterpret_cast<const char *>(type.params) + size_t(i) * type.param_size,
@@ -106,62 +95,88 @@ void copy_rows(RegisteredType &out) {
   out.type.param_size = sizeof(dfm_param);
 }
 
+// The table's rows are ours from then on, of our size.
+template <class Ops>
+void own_slots(RegisteredType &out, Ops &ops, bool law) {
+  out.slots = copy_slots(out.type.id, ops.slots, ops.nslot, ops.slot_size, law);
+  ops.slots = out.slots.empty() ? nullptr : out.slots.data();
+  ops.slot_size = sizeof(dfm_slot);
+}
+
 void copy_ops(RegisteredType &out) {
   const std::string id = out.type.id;
   const void *ops = out.type.ops;
   if (out.type.kind == DFM_KIND_FRICTION) {
     copy_struct(out.friction, ops, kLawHead, id, "dfm_friction");
-    if (!out.friction.eval) bad(id, "a law needs eval");
-    if (!out.friction.prepare != !out.friction.release) bad(id, "prepare and release go together");
-    check_slots(id, out.friction.slots, out.friction.nslot, true);
+    if (!out.friction.eval) bad_type(id, "a law needs eval");
+    if (!out.friction.prepare != !out.friction.release) bad_type(id, "prepare and release go together");
+    if (out.friction.needs & ~kKnownNeeds)
+      bad_type(id, format("it needs inputs that this library does not have (bits %#x of needs); take a newer "
+                          "library, or ask for DFM_NEED_* of its deform/plugin.h alone",
+                          out.friction.needs & ~kKnownNeeds));
+    own_slots(out, out.friction, true);
     out.type.ops = &out.friction;
   } else if (out.type.kind == DFM_KIND_SOLVER) {
     copy_struct(out.solver, ops, kSolverHead, id, "dfm_solver");
     const dfm_solver &s = out.solver;
     if (!s.analyse || !s.factor || !s.solve || !s.release)
-      bad(id, "a solver needs analyse, factor, solve and release");
+      bad_type(id, "a solver needs analyse, factor, solve and release");
     out.type.ops = &out.solver;
   } else {
     copy_struct(out.model, ops, kModelHead, id, "dfm_model");
-    if (!out.model.create || !out.model.destroy) bad(id, "a model needs create and destroy");
+    if (!out.model.create || !out.model.destroy) bad_type(id, "a model needs create and destroy");
     if (!out.model.add_forces && !out.model.extension)
-      bad(id, "a model needs add_forces, or the extension \"dfm.stepper/1\"");
-    if (out.model.cells == 0) bad(id, "a model must accept a kind of cell");
-    check_slots(id, out.model.slots, out.model.nslot, false);
+      bad_type(id, "a model needs add_forces, or the extension \"dfm.stepper/1\"");
+    if (out.model.cells == 0) bad_type(id, "a model must accept a kind of cell");
+    own_slots(out, out.model, false);
     out.type.ops = &out.model;
   }
 }
 
 }  // namespace
 
-void check_slots(const std::string &id, const dfm_slot *slots, uint32_t n, bool law) {
-  if (n > 4096 || (n && !slots)) bad(id, "its state slots are missing");
+std::vector<dfm_slot> copy_slots(const std::string &id, const dfm_slot *slots, uint32_t n, uint32_t slot_size,
+                                 bool law) {
+  if (n > 4096 || (n && !slots)) bad_type(id, "its state slots are missing");
+  const uint32_t row = slot_size ? slot_size : kSlotHead;
+  if (row < kSlotHead || row > kLargestStruct)
+    bad_type(id, format("its state slots have rows of %u bytes, at least %u expected; set slot_size to "
+                        "sizeof(dfm_slot)",
+                        row, kSlotHead));
+  std::vector<dfm_slot> out(n);
   for (uint32_t i = 0; i < n; ++i) {
-    const dfm_slot &s = slots[i];
+    dfm_slot &s = out[i];
+    std::memcpy(&s, reinterpret_cast<const char *>(slots) + size_t(i) * row, std::min<size_t>(row, sizeof s));
     const uint32_t width = s.kind == DFM_SLOT_TANGENT    ? 2
                            : s.kind == DFM_SLOT_VECTOR   ? 3
                            : s.kind == DFM_SLOT_ROTATION ? 4
                                                          : s.width;
     if (s.kind < DFM_SLOT_SCALAR || s.kind > DFM_SLOT_ROTATION || s.width == 0 || s.width > 4096 ||
         s.width != width)
-      bad(id, format("state slot %u has kind %u and width %u, which do not agree", i, s.kind, s.width));
+      bad_type(id, format("state slot %u has kind %u and width %u, which do not agree", i, s.kind, s.width));
     if (law ? s.unit != DFM_PER_CONTACT : s.unit < DFM_PER_POINT || s.unit > DFM_PER_INSTANCE)
-      bad(id, format("state slot %u has unit %u, which a %s cannot have", i, s.unit, law ? "law" : "model"));
+      bad_type(id,
+               format("state slot %u has unit %u, which a %s cannot have", i, s.unit, law ? "law" : "model"));
   }
+  return out;
 }
 
-std::span<const dfm_slot> law_slots(const dfm_type &type, const dfm_host &host, const double *params) {
+std::optional<std::vector<dfm_slot>> copy_slots(const std::string &id, const dfm_slots *own, bool law) {
+  const std::optional<dfm_slots> full = copy_table<dfm_slots>(own, kSlotsHead, id, "dfm_slots");
+  if (!full) return std::nullopt;
+  return copy_slots(id, full->slots, full->nslot, full->slot_size, law);
+}
+
+std::vector<dfm_slot> law_slots(const dfm_type &type, const dfm_host &host, const double *params) {
   const dfm_friction &law = law_of(type);
-  if (!law.state) return {law.slots, law.nslot};
+  if (!law.state) return {law.slots, law.slots + law.nslot};
   const dfm_slots *own = nullptr;
   call_plugin(host, type, "state", [&] {
     own = law.state(params);
     return DFM_OK;
   });
-  if (!own || own->size < sizeof(dfm_slots))
-    bad(type.id, "it does not say what state its parameters call for");
-  check_slots(type.id, own->slots, own->nslot, true);
-  return {own->slots, own->nslot};
+  if (!own) bad_type(type.id, "it does not say what state its parameters call for");
+  return *copy_slots(type.id, own, true);
 }
 
 const char *kind_name(uint32_t kind) {

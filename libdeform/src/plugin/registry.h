@@ -19,6 +19,7 @@ struct RegisteredType {
   dfm_model model{};
   dfm_solver solver{};
   std::vector<dfm_param> rows;
+  std::vector<dfm_slot> slots;
   std::string file;  // "static:NAME" for a registered one
 };
 
@@ -54,10 +55,8 @@ class Registry {
 const char *kind_name(uint32_t kind);  // "law", "model", "solver"
 std::string short_name(const dfm_type &type);
 std::vector<std::string> effects(const dfm_type &type);
-// Throws Error naming the type where a slot's unit, kind and width do not agree.
-void check_slots(const std::string &id, const dfm_slot *slots, uint32_t n, bool law);
 // The state slots of a law with these parameters; throws Error where what it answers is none.
-std::span<const dfm_slot> law_slots(const dfm_type &type, const dfm_host &host, const double *params);
+std::vector<dfm_slot> law_slots(const dfm_type &type, const dfm_host &host, const double *params);
 inline const dfm_friction &law_of(const dfm_type &type) {
   return *static_cast<const dfm_friction *>(type.ops);
 }

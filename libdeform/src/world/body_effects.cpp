@@ -2,31 +2,39 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstring>
 
 #include "core/error.h"
-#include "deform/plugin_draft.h"
+#include "plugin/tables.h"
 
 namespace dfm {
 namespace {
 
+// The table of an extension; head: what every version of it has had.
 template <class Table>
-const Table *ask(const Body &b, const char *id) {
+std::optional<Table> ask(const Body &b, const char *id, size_t head, const char *name) {
   const void *table = nullptr;
   if (b.model.ops->extension)
     b.model.call("extension", [&] {
       table = b.model.ops->extension(b.model.self, id);
       return DFM_OK;
     });
-  const Table *const out = static_cast<const Table *>(table);
-  return out && out->size >= sizeof(Table) ? out : nullptr;
+  return copy_table<Table>(table, head, b.model.type->id, name);
 }
 
-// Row i of a list whose rows may be longer than this library's.
+// Row i of a list whose rows may be longer or shorter than this library's.
 template <class Row>
-const Row &row_at(const Row *rows, uint32_t row_size, uint32_t i) {
-  return *reinterpret_cast<const Row *>(reinterpret_cast<const char *>(rows) + size_t(row_size) * i);
+Row row_at(const Row *rows, uint32_t row_size, uint32_t i) {
+  Row row{};
+  std::memcpy(&row, reinterpret_cast<const char *>(rows) + size_t(row_size) * i,
+              std::min<size_t>(row_size, sizeof row));
+  return row;
 }
+
+// What the rows of ABI 1 began with.
+constexpr uint32_t kEffectRowHead = offsetof(dfm_effect_row, off) + sizeof(double);
+constexpr uint32_t kFactHead = offsetof(dfm_fact, value) + sizeof(double);
 
 }  // namespace
 
@@ -35,15 +43,16 @@ std::vector<BodyEffect> body_effects(const Body &b) {
   std::vector<size_t> first;  // value of each row
   size_t values = 0;
   for (uint32_t i = 0; i < type.nparam; values += type.params[i++].width) first.push_back(values);
-  const auto *const table = ask<dfm_effect_rows>(b, DFM_EXT_EFFECT_ROWS);
-  const bool readable = table && table->rows && table->row_size >= sizeof(dfm_effect_row);
+  const auto table = ask<dfm_effect_rows>(
+      b, DFM_EXT_EFFECT_ROWS, offsetof(dfm_effect_rows, rows) + sizeof(void *), "dfm_effect_rows");
+  const bool readable = table && table->rows && table->row_size >= kEffectRowHead;
   std::vector<BodyEffect> out;
   for (const char *const *name = type.effects; name && *name; ++name) {
     BodyEffect effect;
     effect.name = *name;
     effect.works = b.model.works(effect.name);
     for (uint32_t i = 0; readable && i < table->n; ++i) {
-      const dfm_effect_row &row = row_at(table->rows, table->row_size, i);
+      const dfm_effect_row row = row_at(table->rows, table->row_size, i);
       if (!row.effect || effect.name != row.effect || row.param >= type.nparam) continue;
       effect.switches.push_back({&type.params[row.param], row.off, b.model.params[first[row.param]]});
     }
@@ -54,8 +63,9 @@ std::vector<BodyEffect> body_effects(const Body &b) {
 
 std::vector<BodyFact> body_facts(const Body &b) {
   std::vector<BodyFact> out;
-  const auto *const table = ask<dfm_facts>(b, DFM_EXT_FACTS);
-  if (!table || !table->list || table->row_size < sizeof(dfm_fact)) return out;
+  const auto table =
+      ask<dfm_facts>(b, DFM_EXT_FACTS, offsetof(dfm_facts, list) + sizeof(void *), "dfm_facts");
+  if (!table || !table->list || table->row_size < kFactHead) return out;
   uint32_t n = 0;
   const dfm_fact *facts = nullptr;
   b.model.call("facts", [&] {
@@ -63,7 +73,7 @@ std::vector<BodyFact> body_facts(const Body &b) {
     return DFM_OK;
   });
   for (uint32_t i = 0; facts && i < n; ++i) {
-    const dfm_fact &f = row_at(facts, table->row_size, i);
+    const dfm_fact f = row_at(facts, table->row_size, i);
     if (f.key && f.label && f.unit) out.push_back({f.key, f.label, f.unit, f.value});
   }
   return out;

@@ -6,6 +6,7 @@
 #include "core/error.h"
 #include "plugin/params.h"
 #include "plugin/registry.h"
+#include "plugin/tables.h"
 #include "state/world.h"
 #include "step/stages.h"
 
@@ -76,13 +77,19 @@ void ask_by_cell(Body &b, const char *entry, const char *what, const Give &give)
     fail(DFM_E_FATAL, "model '%s' could not give its %s", b.model.type->id, what);
 }
 
+// The table of an extension that has one function.
+template <class T>
+std::optional<T> table_of(const Body &b, const char *id, const char *name) {
+  return copy_table<T>(extension_of(b, id), 2 * sizeof(uint32_t) + sizeof(void *), b.model.type->id, name);
+}
+
 }  // namespace
 
 bool offers(const Body &b, const char *extension) { return extension_of(b, extension) != nullptr; }
 
 void energy_density(Body &b, double *out) {
-  const auto *e = static_cast<const dfm_cell_energy *>(extension_of(b, DFM_EXT_CELL_ENERGY));
-  if (!e)
+  const auto e = table_of<dfm_cell_energy>(b, DFM_EXT_CELL_ENERGY, "dfm_cell_energy");
+  if (!e || !e->cell_energy)
     fail(DFM_E_UNSUPPORTED, "model '%s' of body '%s' offers no energy per cell", b.model.type->id,
          b.name.c_str());
   ask_by_cell(b, "cell_energy", "energy per cell",
@@ -90,8 +97,8 @@ void energy_density(Body &b, double *out) {
 }
 
 void cell_stress(Body &b, double *out) {
-  const auto *e = static_cast<const dfm_cell_stress *>(extension_of(b, DFM_EXT_CELL_STRESS));
-  if (!e)
+  const auto e = table_of<dfm_cell_stress>(b, DFM_EXT_CELL_STRESS, "dfm_cell_stress");
+  if (!e || !e->cell_stress)
     fail(DFM_E_UNSUPPORTED, "model '%s' of body '%s' offers no stress per cell", b.model.type->id,
          b.name.c_str());
   ask_by_cell(b, "cell_stress", "stress per cell",

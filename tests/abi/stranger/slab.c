@@ -39,7 +39,9 @@ static const dfm_friction ops = {sizeof(dfm_friction),
                                  NULL,
                                  NULL,
                                  NULL,
-                                 NULL};
+                                 NULL,
+                                 0,
+                                 0};
 static const dfm_type type = {sizeof(dfm_type),
                               DFM_KIND_FRICTION,
                               "com.example.slab",

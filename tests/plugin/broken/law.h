@@ -79,7 +79,9 @@ static const dfm_friction ops = {sizeof(dfm_friction),
                                  CHECK,
                                  NULL,
                                  NULL,
-                                 NULL};
+                                 NULL,
+                                 0,
+                                 0};
 static const char *const effects[] = {EFFECTS, NULL};
 static const dfm_type type = {sizeof(dfm_type),
                               DFM_KIND_FRICTION,

@@ -19,6 +19,12 @@
 #ifndef MANY
 #define MANY 1
 #endif
+#ifndef FREE_PLACE /* dfm_stepper.fetch */
+#define FREE_PLACE NULL
+#endif
+#ifndef OTHER_ID /* what it answers to an id that nobody has given a meaning */
+#define OTHER_ID NULL
+#endif
 
 /* Forces, then velocities at the end of the step, in net->spread. Held points have an infinite mass. */
 static dfm_status predict(void *self, const dfm_kin *kin, const double *load, double *u) {
@@ -102,12 +108,13 @@ static dfm_status commit(void *self, const dfm_kin *kin, const double *p, double
   return DFM_OK;
 }
 
-static const dfm_stepper steps = {sizeof(dfm_stepper), 0, predict, respond, diagonal, commit, NULL,
-                                  respond_many};
+static const dfm_stepper steps = {sizeof(dfm_stepper), 0,           predict, respond, diagonal, commit,
+                                  FREE_PLACE,          respond_many};
 
 static const void *extension(const void *self, const char *id) {
   (void)self;
   if (!strcmp(id, "dfm.stepper/1")) return &steps;
+  if (!strncmp(id, "dfm.unheard-of", 14)) return OTHER_ID;
   return strcmp(id, DFM_EXT_CELL_ENERGY) ? NULL : &by_cell;
 }
 #define ADDS_FORCES NULL, NULL

@@ -26,6 +26,16 @@
 #else
 #define UNIT DFM_PER_CONTACT
 #endif
+#ifdef BAD_FOREIGN_NEED
+#define NEEDS 64
+#else
+#define NEEDS 0
+#endif
+#ifdef BAD_SHORT_SLOT
+#define SLOT_SIZE 12
+#else
+#define SLOT_SIZE 0
+#endif
 #ifdef BAD_UNKNOWN_KIND
 #define KIND 4
 #else
@@ -45,7 +55,8 @@ static dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
 static const dfm_param rows[] = {{"first", "first", "N", 0.0, 10.0, DEFAULT, 0, 1, NULL},
                                  {SECOND, "second", "N", 0.0, 10.0, 2.0, 0, 1, NULL}};
 static const dfm_slot slots[] = {{UNIT, 2, DFM_SLOT_TANGENT, 0}};
-static const dfm_friction law = {sizeof(dfm_friction), 0, 0, 1, slots, EVAL, NULL, NULL, NULL, NULL};
+static const dfm_friction law = {
+    sizeof(dfm_friction), NEEDS, 0, 1, slots, EVAL, NULL, NULL, NULL, NULL, SLOT_SIZE, 0};
 static const dfm_type type = {sizeof(dfm_type),  KIND, ID,  "bad", "1.0", "MIT", SOURCE, rows, 2,
                               sizeof(dfm_param), NULL, &law};
 static const dfm_type *const types[] = {&type};

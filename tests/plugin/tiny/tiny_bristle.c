@@ -45,7 +45,9 @@ static const dfm_friction law = {sizeof(dfm_friction),
                                  NULL,
                                  NULL,
                                  NULL,
-                                 NULL};
+                                 NULL,
+                                 0,
+                                 0};
 static const char *const effects[] = {"presliding", NULL};
 static const dfm_type type = {sizeof(dfm_type),
                               DFM_KIND_FRICTION,

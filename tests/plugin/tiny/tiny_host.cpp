@@ -64,8 +64,18 @@ dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
   return host->extension(host->ctx, "dfm.unheard-of/1") ? DFM_E_FATAL : DFM_OK;
 }
 
-const dfm_friction law = {sizeof(dfm_friction), DFM_NEED_FN, 0,       0,       nullptr,
-                          dp::guarded<eval>,    nullptr,     prepare, release, nullptr};
+const dfm_friction law = {sizeof(dfm_friction),
+                          DFM_NEED_FN,
+                          0,
+                          0,
+                          nullptr,
+                          dp::guarded<eval>,
+                          nullptr,
+                          prepare,
+                          release,
+                          nullptr,
+                          0,
+                          0};
 const dfm_type type =
     dp::type(DFM_KIND_FRICTION, "org.tiny.host", "host services", "1.0", "MIT", "test", rows, nullptr, &law);
 }  // namespace

@@ -5,6 +5,14 @@ struct new_param {
   dfm_param known;
   double added[3];
 };
+struct new_slot {
+  dfm_slot known;
+  uint64_t added[2];
+};
+struct new_slots {
+  dfm_slots known;
+  uint64_t added[2];
+};
 struct new_friction {
   dfm_friction known;
   void *added[4];
@@ -23,17 +31,28 @@ static const struct new_param rows[] = {
     {{"second", "second", "N", 0.0, 10.0, 2.0, 0, 1, NULL}, {7, 7, 7}},
 };
 
+static const struct new_slot slots[] = {{{DFM_PER_CONTACT, 2, DFM_SLOT_TANGENT, 0}, {7, 7}},
+                                        {{DFM_PER_CONTACT, 3, DFM_SLOT_SCALAR, 0}, {7, 7}}};
+static const struct new_slots all = {{sizeof(struct new_slots), 2, &slots[0].known, sizeof slots[0], 0},
+                                     {7, 7}};
+static const struct new_slots first = {{sizeof(struct new_slots), 1, &slots[0].known, sizeof slots[0], 0},
+                                       {7, 7}};
+static const dfm_slots *state(const double *params) { return params[1] > 0 ? &all.known : &first.known; }
+
 static dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
-  uint32_t i;
+  uint32_t i, column;
   for (i = 0; i < in->n; ++i) {
     out->ft[i] = in->params[0];
     out->ft[in->stride + i] = in->params[1];
+    for (column = 0; out->state && column < (in->params[1] > 0 ? 5u : 2u); ++column)
+      out->state[column * in->stride + i] = column;
   }
   return DFM_OK;
 }
 
-static const struct new_friction law = {
-    {sizeof(struct new_friction), 0, 0, 0, NULL, eval, NULL, NULL, NULL, NULL}, {NULL, NULL, NULL, NULL}};
+static const struct new_friction law = {{sizeof(struct new_friction), 0, 0, 2, &slots[0].known, eval, NULL,
+                                         NULL, NULL, state, sizeof slots[0], 0},
+                                        {NULL, NULL, NULL, NULL}};
 static const struct new_type type = {
     {sizeof(struct new_type), DFM_KIND_FRICTION, "org.tiny.new", "new", "1.0", "MIT", "test",
      (const dfm_param *)rows, 2, sizeof(struct new_param), NULL, &law},

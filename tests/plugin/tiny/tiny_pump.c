@@ -114,7 +114,9 @@ static const dfm_model model = {sizeof(dfm_model),
                                 energy,
                                 NULL,
                                 NULL,
-                                NULL};
+                                NULL,
+                                0,
+                                0};
 static const char *const effects[] = {"damping", NULL};
 static const dfm_type type = {
     sizeof(dfm_type),  DFM_KIND_MODEL, "org.tiny.pump", "pump", "1.0", "MIT", "test", rows, 2,

@@ -47,7 +47,9 @@ static const dfm_friction law = {sizeof law,
                                  NULL,
                                  NULL,
                                  NULL,
-                                 NULL};
+                                 NULL,
+                                 0,
+                                 0};
 static const char *const effects[] = {"presliding", "hysteresis", NULL};
 static const dfm_type type = {sizeof type,
                               DFM_KIND_FRICTION,

@@ -1,0 +1,3 @@
+/* V03: answers an id that it cannot know. */
+#define OTHER_ID &steps
+#include "stepper.h"
