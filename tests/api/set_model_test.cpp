@@ -430,7 +430,12 @@ namespace {
 
 dfm_switch switch_at(double t, const char *type, double max_jump = 0,
                      int32_t integrator = DFM_INTEGRATOR_AUTO) {
-  return {sizeof(dfm_switch), integrator, t, type, {sizeof(dfm_params), 0, nullptr}, max_jump};
+  dfm_switch s = dfm_switch_default();
+  s.integrator = integrator;
+  s.t = t;
+  s.type = type;
+  s.max_jump = max_jump;
+  return s;
 }
 
 }  // namespace
@@ -530,6 +535,32 @@ TEST(Switches, ThatAreNone_AreRefusedWhole) {
   test::ok(dfm_body_set_switches(s.block, 0, nullptr));
   test::run(s.world, 0.01, 1e-3);
   EXPECT_TRUE(swaps(s.world).empty());
+}
+
+TEST(Switches, BeginWithADefault_AndMayBeLongerThanThisHeader) {
+  const dfm_switch d = dfm_switch_default();
+  EXPECT_EQ(d.size, sizeof(dfm_switch));
+  EXPECT_EQ(d.params.size, sizeof(dfm_params));
+  EXPECT_EQ(d.integrator, DFM_INTEGRATOR_AUTO);
+  EXPECT_EQ(d.type, nullptr);
+  EXPECT_EQ(d.max_jump, 0);
+  Slope s;
+  dfm_switch none = d;
+  none.size = 0;
+  none.type = "msm";
+  EXPECT_EQ(dfm_body_set_switches(s.block, 1, &none), DFM_E_ARG);
+  test::says({"switch 0: size is 0", "dfm_switch_default()"});
+  struct Later {
+    dfm_switch known;
+    double added[2];
+  } list[2] = {{d, {7, 7}}, {d, {7, 7}}};
+  for (Later &l : list) l.known.size = sizeof l;
+  list[0].known.type = "corotational_fem";
+  list[1].known.type = "linear_fem";
+  list[1].known.t = 5e-3;
+  test::ok(dfm_body_set_switches(s.block, 2, &list[0].known));
+  test::run(s.world, 0.02, 1e-3);
+  EXPECT_EQ(model_of(s.block), "org.deform.linear_fem");
 }
 
 TEST(Switches, WithAnyNumberOfThreads_GiveTheSameBits) {
@@ -747,6 +778,16 @@ TEST(SwitchRule, ThatIsNone_IsRefused) {
   refused([](auto &r) { r.hysteresis = -1; }, {"hysteresis"});
   refused([](auto &r) { r.wait = NAN; }, {"wait"});
   refused([](auto &r) { r.max_jump = -1; }, {"max_jump"});
+  // a rule, or a choice in it, that was not made by the default
+  refused([](auto &r) { r.size = 0; }, {"size is 0", "_default()"});
+  refused([](auto &r) { r.otherwise.size = 0; },
+          {"body 'ball'", "'otherwise' is 0", "dfm_switch_rule_default()"});
+  refused([](auto &r) { r.near_by.size = 8; }, {"'near_by' is 8, expected 32"});
+  refused([](auto &r) { r.touching = {12, 0, nullptr, {}}; }, {"'touching' is 12"});
+  dfm_switch_rule r = b.rule;  // one that is not asked for may be all zero
+  r.touching.type = "corotational_fem";
+  r.near_by = {};
+  test::ok(dfm_body_set_switch_rule(b.body, &r));
   test::ok(dfm_body_set_switch_rule(b.body, nullptr));
   const double here[3] = {0, 0, 0};
   EXPECT_EQ(dfm_body_set_interest(b.body, here), DFM_E_ARG);

@@ -20,6 +20,9 @@ struct WorldDef : dfm_world_def {
 struct EquilibriumDef : dfm_equilibrium_def {
   EquilibriumDef() noexcept : dfm_equilibrium_def(dfm_equilibrium_def_default()) {}
 };
+struct Switch : dfm_switch {
+  Switch() noexcept : dfm_switch(dfm_switch_default()) {}
+};
 struct SwitchRule : dfm_switch_rule {
   SwitchRule() noexcept : dfm_switch_rule(dfm_switch_rule_default()) {}
 };

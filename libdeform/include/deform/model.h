@@ -24,13 +24,16 @@ DFM_API dfm_status dfm_body_set_model(dfm_body body, const char *type, const dfm
 
 /** A change of model that is to come. */
 typedef struct dfm_switch {
-  uint32_t size;
+  uint32_t size;      /* dfm_switch_default sets it */
   int32_t integrator; /* DFM_INTEGRATOR_* from then on; AUTO: the one it was made with */
   double t;           /* s: made by the first step that begins at t or later (to 1e-6 of the step) */
   const char *type;   /* short name or full id */
   dfm_params params;  /* copied */
   double max_jump;    /* J, as in dfm_body_set_model; 0: any jump */
 } dfm_switch;
+/** At t = 0, to no model, any jump, the integrator that the body was made with. Threads: Any thread.
+ * Since 0.1. */
+DFM_API dfm_switch dfm_switch_default(void);
 /** The changes to come, in place of those that were to come. They are made before the step (or the
  * equilibrium) that begins at their time, and stay made where that step is discarded. Their models are made
  * now, and two of them kept: what could never be made is refused now, and a change costs no more than the
@@ -44,7 +47,8 @@ typedef struct dfm_switch {
  * Since 0.1. */
 DFM_API dfm_status dfm_body_set_switches(dfm_body body, uint32_t n, const dfm_switch *switches);
 
-/** A model by its name, and what it is made with. */
+/** A model by its name, and what it is made with. It stands in dfm_switch_rule and is the same in every
+ * version; dfm_switch_rule_default sets its size. */
 typedef struct dfm_model_choice {
   uint32_t size;
   int32_t integrator; /* DFM_INTEGRATOR_* with this model; AUTO: the body's own */

@@ -31,7 +31,11 @@ Switch make_switch(const Body &b, const dfm_switch &s, double after) {
   return out;
 }
 
-ModelChoice make_choice(const Body &b, const dfm_model_choice &c, double max_jump) {
+// It stands inside dfm_switch_rule, so its size is the same in every version.
+ModelChoice make_choice(const Body &b, const char *name, const dfm_model_choice &c, double max_jump) {
+  if (c.size != sizeof c && (c.type || c.size))
+    fail(DFM_E_ARG, "body '%s': the size of '%s' is %u, expected %zu; start from dfm_switch_rule_default()",
+         b.name.c_str(), name, c.size, sizeof c);
   if (!c.type) return {};
   ModelChoice out = choose_model(b, c.type, c.params, c.integrator);
   if (out.integrator == kSameIntegrator) out.integrator = b.origin.integrator;  // before another model's
@@ -50,9 +54,9 @@ SwitchRule make_rule(const Body &b, const dfm_switch_rule &r) {
     if (!(x >= 0 && std::isfinite(x)))
       fail(DFM_E_ARG, "body '%s': hysteresis and wait (s) are finite and not negative; found %g", name, x);
   SwitchRule out;
-  out.touching = make_choice(b, r.touching, r.max_jump);
-  out.near = make_choice(b, r.near_by, r.max_jump);
-  out.far = make_choice(b, r.otherwise, r.max_jump);
+  out.touching = make_choice(b, "touching", r.touching, r.max_jump);
+  out.near = make_choice(b, "near_by", r.near_by, r.max_jump);
+  out.far = make_choice(b, "otherwise", r.otherwise, r.max_jump);
   out.hysteresis = r.hysteresis;
   out.wait = r.wait;
   if (!r.near_by.type) return out;
@@ -88,17 +92,29 @@ dfm_status dfm_body_set_switches(dfm_body body, uint32_t n, const dfm_switch *sw
     exclusive(*b.world);
     if (n) need(switches, "switches");
     std::vector<Switch> made;
-    for (const dfm_switch &s : take_defs(switches, n, dfm_switch{}, "switch", "set it to sizeof(dfm_switch)"))
+    const char *const from = "start from dfm_switch_default()";
+    for (const dfm_switch &s : take_defs(switches, n, dfm_switch_default(), "switch", from))
       made.push_back(make_switch(b, s, made.empty() ? -HUGE_VAL : made.back().t));
     rehearse(b, made, b.rule, false);
     b.switches.swap(made);
   });
 }
 
+dfm_switch dfm_switch_default(void) {
+  dfm_switch s{};
+  s.size = sizeof s;
+  s.integrator = DFM_INTEGRATOR_AUTO;
+  s.params.size = sizeof s.params;
+  return s;
+}
+
 dfm_switch_rule dfm_switch_rule_default(void) {
   dfm_switch_rule r{};
   r.size = sizeof r;
-  for (dfm_model_choice *c : {&r.touching, &r.near_by, &r.otherwise}) c->size = sizeof *c;
+  for (dfm_model_choice *c : {&r.touching, &r.near_by, &r.otherwise}) {
+    c->size = sizeof *c;
+    c->params.size = sizeof c->params;
+  }
   r.hysteresis = 0.1;
   r.wait = 0.1;
   return r;
