@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 """Every guide of doc/howto that has a folder of files is followed as a stranger would: the folder is copied
 away from the source tree, and each sh block of the guide runs in it against an installed and moved tree. A
-guide that begins with <!-- needs FILE --> is passed over where the installed tree has no such file. So are
-examples/05_cpp.cpp and, where there is libdeform_ode, examples/ode.
+guide that begins with <!-- needs FILE --> is passed over where the installed tree has no such file; one that
+begins with <!-- compilers C C++ --> may ask for both. So are examples/05_cpp.cpp and, where there is
+libdeform_ode, examples/ode.
 
 guides.py BUILD_DIR SOURCE_DIR SCRATCH_DIR CXX_COMPILER
 """
@@ -23,7 +24,8 @@ def follow(guide, prefix, libdir, scratch):
     env = {**clean_environment(), "CMAKE_PREFIX_PATH": str(prefix),
            "PKG_CONFIG_PATH": str(prefix / libdir / "pkgconfig"),
            "PATH": f"{prefix / 'bin'}:{os.environ['PATH']}"}
-    if not any("CXX" in path.read_text() for path in folder.rglob("CMakeLists.txt")):
+    if not (guide.read_text().startswith("<!-- compilers C C++ -->") or
+            any("CXX" in path.read_text() for path in folder.rglob("CMakeLists.txt"))):
         env["CXX"] = "/bin/false"  # a guide whose project is in C asks for no other compiler
     blocks = re.findall(r"^```sh\n(.*?)^```", guide.read_text(), re.M | re.S)
     tools = " ".join(blocks)
@@ -52,6 +54,16 @@ def judge_law(folder):
         sys.exit("the rig of the guide drew no picture")
 
 
+def judge_model(folder):
+    """What the guide of models leaves behind: a model that a block falls and rests with."""
+    summary = json.loads((folder / "out" / "summary.json").read_text())
+    used = [p["file"] for p in summary["plugins"] if p["id"] == "com.example.mymodel"]
+    speed, creep = summary["bodies"]["block"]["speed_max"], summary["hold"]["creep_max_um_per_s"]
+    if used != ["build/mymodel.so"] or not summary["finite"] or not speed < 1e-3 or creep is None:
+        sys.exit(f"the scene of the guide: model from {used}, finite {summary['finite']}, speed {speed} m/s, "
+                 f"creep {creep} um/s")
+
+
 def main():
     build, source, scratch, compiler = sys.argv[1:]
     scratch = without_spaces(scratch)
@@ -67,9 +79,12 @@ def main():
         folder = follow(guide, prefix, libdir, scratch)
         if guide.stem == "write-a-law":
             judge_law(folder)
+        if guide.stem == "write-a-model":
+            judge_model(folder)
         followed.append(guide.name)
-    if not {"own_engine.md", "write-a-law.md"} <= set(followed):
-        sys.exit(f"own_engine.md and write-a-law.md must be followed, not only {followed}")
+    must = {"own_engine.md", "write-a-law.md", "write-a-model.md"}
+    if not must <= set(followed):
+        sys.exit(f"{sorted(must)} must be followed, not only {followed}")
 
     # The C++ header, as installed.
     env = clean_environment()

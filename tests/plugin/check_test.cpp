@@ -261,10 +261,12 @@ TEST(PluginCheck, Template_KeepsEveryRuleInUnderSixtyLinesAndIsNotShipped) {
   EXPECT_FALSE(std::filesystem::exists(shipped("template_friction")));
 }
 
-TEST(PluginCheck, TemplateOfModels_KeepsEveryRuleAndIsNotShipped) {
-  const test::CommandResult r = check(std::string(DEFORM_BINARY_DIR) + "/lib/template/template_model.so");
-  EXPECT_EQ(r.exit_code, 0) << r.out << r.err;
-  EXPECT_GE(rules_that("pass", r.out).size(), 20u) << r.out;
+TEST(PluginCheck, TemplatesOfModels_KeepEveryRuleAndAreNotShipped) {
+  for (const char *name : {"template_model", "template_model_cpp"}) {
+    const test::CommandResult r = check(std::string(DEFORM_BINARY_DIR) + "/lib/template/" + name + ".so");
+    EXPECT_EQ(r.exit_code, 0) << r.out << r.err;
+    EXPECT_GE(rules_that("pass", r.out).size(), 20u) << r.out;
+  }
   EXPECT_FALSE(std::filesystem::exists(shipped("template_model")));
 }
 

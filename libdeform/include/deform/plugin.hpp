@@ -15,7 +15,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
+#include <exception>
 #include <new>
+#include <type_traits>
 
 #include "deform/elementary.h"
 #include "deform/plugin.h"
@@ -81,6 +83,74 @@ using Check = dfm_status (*)(const double *, char *, size_t);
 constexpr dfm_friction friction(uint32_t needs, uint32_t flags, Eval eval, Check check = nullptr) {
   return {sizeof(dfm_friction), needs, flags, 0, nullptr, eval, check, nullptr, nullptr, nullptr, 0, 0};
 }
+
+// ---- models: an instance is an object ---------------------------------------------------------------------
+// create and destroy of a class with the constructor Body(const dfm_host &, const dfm_mesh &). What it throws
+// refuses the body; the text of a std::exception says why.
+template <class Body>
+dfm_status make(const dfm_host *host, const dfm_mesh *mesh, void **self) noexcept {
+  try {
+    *self = new Body(*host, *mesh);
+    return DFM_OK;
+  } catch (const std::bad_alloc &) {
+    return DFM_E_NOMEM;
+  } catch (const std::exception &e) {
+    host->log(host->ctx, 3, 0, e.what());
+    return DFM_E_ARG;
+  } catch (...) {
+    return DFM_E_FATAL;
+  }
+}
+template <class Body>
+void unmake(void *self) noexcept {
+  delete static_cast<Body *>(self);
+}
+
+// method<&Body::f> goes into a table where f's arguments stand behind self. f gives a dfm_status, or nothing:
+// then it is DFM_OK unless it throws.
+template <class Body, auto F, class... A>
+dfm_status call_method(Body *body, A... a) noexcept {
+  try {
+    if constexpr (std::is_void_v<decltype((body->*F)(a...))>) {
+      (body->*F)(a...);
+      return DFM_OK;
+    } else {
+      return (body->*F)(a...);
+    }
+  } catch (const std::bad_alloc &) {
+    return DFM_E_NOMEM;
+  } catch (...) {
+    return DFM_E_FATAL;
+  }
+}
+template <auto F>
+struct Method;
+template <class Body, class R, class... A, R (Body::*F)(A...)>
+struct Method<F> {
+  using Call = dfm_status (*)(void *, A...);
+  constexpr operator Call() const noexcept {
+    return [](void *self, A... a) noexcept -> dfm_status {
+      return call_method<Body, F>(static_cast<Body *>(self), a...);
+    };
+  }
+};
+template <class Body, class R, class... A, R (Body::*F)(A...) const>
+struct Method<F> {
+  using Call = dfm_status (*)(void *, A...);
+  using ConstCall = dfm_status (*)(const void *, A...);
+  constexpr operator Call() const noexcept {
+    return [](void *self, A... a) noexcept -> dfm_status {
+      return call_method<const Body, F>(static_cast<const Body *>(self), a...);
+    };
+  }
+  constexpr operator ConstCall() const noexcept {
+    return [](const void *self, A... a) noexcept -> dfm_status {
+      return call_method<const Body, F>(static_cast<const Body *>(self), a...);
+    };
+  }
+};
+template <auto F>
+inline constexpr Method<F> method{};
 
 // ---- batches: columns of a structure of arrays ------------------------------------------------------------
 // Column c of p, or null where the caller does not want it.
