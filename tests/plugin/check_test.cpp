@@ -141,6 +141,7 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"model_claims_too_much", "V03", "without energy"},
         Case{"model_fills_the_free_place", "V03", "fetch"},
         Case{"model_answers_any_id", "V03", "cannot know"},
+        Case{"model_rows_without_size", "V03", "row_size 0"},
         Case{"model_refuses_in_silence", "V04", "without a sentence"},
         Case{"model_allocates", "V05", "calls malloc"}, Case{"model_writes_between", "V06", "stride"},
         Case{"model_asks_who_it_is", "V07", "in another process"},

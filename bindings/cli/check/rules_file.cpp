@@ -287,13 +287,17 @@ void tables_sound(const Subject &subject) {
   const struct {
     const char *id, *name;
     size_t head;
-  } known[] = {{"dfm.stepper/1", "dfm_stepper", offsetof(dfm_stepper, commit) + sizeof(void *)},
-               {DFM_EXT_CELL_ENERGY, "dfm_cell_energy", one},
-               {DFM_EXT_CELL_STRESS, "dfm_cell_stress", one},
-               {DFM_EXT_EFFECTS, "dfm_effects", one},
-               {DFM_EXT_IDLE, "dfm_idle", one},
-               {DFM_EXT_LIMITED, "dfm_limited", one},
-               {DFM_EXT_CAPS, "dfm_caps", one}};
+    uint32_t row;  // least size of its rows, which stands where others have reserved
+  } known[] = {{"dfm.stepper/1", "dfm_stepper", offsetof(dfm_stepper, commit) + sizeof(void *), 0},
+               {DFM_EXT_CELL_ENERGY, "dfm_cell_energy", one, 0},
+               {DFM_EXT_CELL_STRESS, "dfm_cell_stress", one, 0},
+               {DFM_EXT_EFFECTS, "dfm_effects", one, 0},
+               {DFM_EXT_IDLE, "dfm_idle", one, 0},
+               {DFM_EXT_LIMITED, "dfm_limited", one, 0},
+               {DFM_EXT_CAPS, "dfm_caps", one, 0},
+               {DFM_EXT_FACTS, "dfm_facts", one, offsetof(dfm_fact, value) + sizeof(double)},
+               {DFM_EXT_EFFECT_ROWS, "dfm_effect_rows", offsetof(dfm_effect_rows, rows) + sizeof(void *),
+                offsetof(dfm_effect_row, off) + sizeof(double)}};
   for (const auto &k : known) {
     const void *table = body.extension(k.id);
     if (!table) continue;
@@ -302,7 +306,10 @@ void tables_sound(const Subject &subject) {
     if (head[0] < k.head || head[0] > 65536)
       broken("the table of its extension \"%s\" has size %u, so the library refuses it; set it to sizeof(%s)",
              k.id, head[0], k.name);
-    if (head[1])
+    if (k.row && (head[1] < k.row || head[1] > 65536))
+      broken("the rows of its extension \"%s\" have row_size %u, so none is read; set it to their sizeof",
+             k.id, head[1]);
+    if (!k.row && head[1])
       broken(
           "the table of its extension \"%s\" has %u in reserved, which a later host may read as a wish; "
           "set it to 0",
