@@ -70,11 +70,14 @@ void Body::weigh(uint32_t n, uint32_t nrhs, const double *p) {
   double *const y = lanes_.data();
   std::fill(y, y + kLanes * width, 0.0);
   for (size_t l = 0; l < nrhs; ++l)
-    for (size_t j = 0; j < 3 * size_t(n); ++j) {
-      const double impulse = p[3 * size_t(n) * l + j];
-      if (impulse == 0) continue;
-      const double *const row = rows_.data() + width * j;
-      for (size_t m = 0; m < width; ++m) y[kLanes * m + l] += impulse * row[m];
+    for (size_t c = 0; c < n; ++c) {
+      const double *const at = p + 3 * (n * l + c);
+      if (at[0] == 0 && at[1] == 0 && at[2] == 0) continue;
+      for (size_t a = 0; a < 3; ++a) {
+        if (at[a] == 0) continue;
+        const double *const row = rows_.data() + width * (3 * c + a);
+        for (size_t m = 0; m < width; ++m) y[kLanes * m + l] += at[a] * row[m];
+      }
     }
   for (size_t m = 0; m < count; ++m)
     for (size_t l = 0; l < kLanes; ++l) y[kLanes * m + l] *= softened_[m];
@@ -152,8 +155,36 @@ void Body::make_columns(size_t many, const size_t *wanted) {
   }
 }
 
+// By surfel that is pushed: its columns, of the pushed ones alone, serve all right-hand sides.
 void Body::add_response_at_rest(uint32_t n, const uint32_t *surfel, uint32_t nrhs, const double *p,
-                                double *du) const {
+                                double *du) {
+  if (!own_points_) return add_coupled_response_at_rest(n, surfel, nrhs, p, du);
+  const double scale = (1 - left_) / (h_ * h_);
+  const size_t padded = (size_t(n) + kLanes - 1) / kLanes * kLanes;
+  double *const blocks = between_.data(), *const out = blocks + 9 * padded;
+  for (uint32_t from = 0; from < n; ++from) {
+    bool gathered = false;
+    for (size_t rhs = 0; rhs < nrhs; ++rhs) {
+      const double *const impulse = p + 3 * (n * rhs + from);
+      if (impulse[0] == 0 && impulse[1] == 0 && impulse[2] == 0) continue;
+      const double *const column = columns_.data() + 3 * size() * surfel[from];
+      for (size_t to = 0; !gathered && to < n; ++to)
+        for (size_t a = 0; a < 3; ++a)
+          for (size_t b = 0; b < 3; ++b)
+            blocks[(3 * a + b) * padded + to] = column[b * size() + 3 * size_t(col_[row_[surfel[to]]]) + a];
+      gathered = true;
+      double local[3];
+      transposed_product(at_.r, impulse, local);
+      elastic_.kernels->turned(blocks, padded, at_.r, local, scale, out);
+      double *const own = du + 3 * n * rhs;
+      for (size_t to = 0; to < n; ++to)
+        for (size_t a = 0; a < 3; ++a) own[3 * to + a] += out[a * padded + to];
+    }
+  }
+}
+
+void Body::add_coupled_response_at_rest(uint32_t n, const uint32_t *surfel, uint32_t nrhs, const double *p,
+                                        double *du) const {
   const double scale = (1 - left_) / (h_ * h_);
   for (size_t rhs = 0; rhs < nrhs; ++rhs)
     for (uint32_t from = 0; from < n; ++from) {

@@ -45,6 +45,8 @@ void Body::take_surface(const dfm_mesh &m) {
   std::copy(m.col, m.col + entries, col_.data());
   std::copy(m.weight, m.weight + entries, weight_.data());
   for (size_t s = 0; s < nsurfel_; ++s)
+    own_points_ = own_points_ && row_[s + 1] == row_[s] + 1 && weight_[row_[s]] == 1;
+  for (size_t s = 0; s < nsurfel_; ++s)
     for (size_t a = 0; a < 3; ++a)
       for (uint32_t e = row_[s]; e < row_[s + 1]; ++e)
         for (uint32_t k = 0; k < modes_.count; ++k)
@@ -113,6 +115,7 @@ void Body::reserve() {
   columns_.create_raw(host, 3 * size_t(nsurfel_) * size());  // memory that is not written costs nothing
   known_.create(host, 3 * size_t(nsurfel_));
   eight_.create(host, kLanes * size());
+  between_.create(host, 12 * (size_t(nsurfel_) + kLanes));
   under_.create(host, size());
   under_of_.create(host, size());
 }

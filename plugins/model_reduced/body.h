@@ -57,6 +57,7 @@ class Body {
   Elastic elastic_;
   Modes modes_;
   uint32_t nsurfel_ = 0;
+  bool own_points_ = true;      // each surfel is a point of the body
   Buffer<uint32_t> row_, col_;  // coupling
   Buffer<double> weight_;
   Buffer<double> surface_;   // [nsurfel,3,modes]
@@ -68,6 +69,7 @@ class Body {
   Buffer<double> columns_;  // [3 nsurfel, 3 npoint] of it to unit forces at surfels, as they are touched
   Buffer<uint8_t> known_;   // [3 nsurfel]
   Buffer<double> eight_;    // [3 npoint,8]
+  Buffer<double> between_;  // [9,n] blocks of C_rest from one surfel to n; [3,n] what it answers
   Buffer<double> weight_at_rest_;  // [3, 3 npoint] of it to unit accelerations; held
 
   // Of the step at hand, from predict on. Points are in the frame of its start where not said otherwise,
@@ -138,8 +140,9 @@ class Body {
   void weigh(uint32_t n, uint32_t nrhs, const double *p);
   void find_columns(uint32_t n, const uint32_t *surfel);
   void make_columns(size_t many, const size_t *wanted);
-  void add_response_at_rest(uint32_t n, const uint32_t *surfel, uint32_t nrhs, const double *p,
-                            double *du) const;
+  void add_response_at_rest(uint32_t n, const uint32_t *surfel, uint32_t nrhs, const double *p, double *du);
+  void add_coupled_response_at_rest(uint32_t n, const uint32_t *surfel, uint32_t nrhs, const double *p,
+                                    double *du) const;
   void add_displacement_at_rest(const double *p, double *out);
   void find_weight_at_rest();
   void rest_under(const double *f, const double *load, double *out);

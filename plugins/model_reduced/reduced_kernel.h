@@ -26,6 +26,8 @@ struct Kernels {
                  double *const *out);
   // out[row][lane] = sum_m rows[row][m] y[m][lane]
   void (*rows)(const double *rows, size_t nrow, size_t width, const double *y, double *out);
+  // out[3,n] = scale r (C f), C [9,n] the blocks of n points, r [9] row-major; n a multiple of kLanes
+  void (*turned)(const double *blocks, size_t n, const double *r, const double *f, double scale, double *out);
   // L L^T y = b for kLanes right-hand sides side by side, y [n,3,kLanes] in the factor's order
   void (*solve)(const FactorView &l, double *y);
 };

@@ -1,109 +1,157 @@
-// The kernels, compiled once for each instruction set: a V is as many registers as its eight numbers take.
+// The kernels, compiled once for each instruction set; the including file says how many doubles a register
+// has (kWidth). No more accumulators are open at a time than registers: what spills costs more than it saves.
 #pragma once
 #include "reduced_kernel.h"
+
+#define DEFORM_INLINE static inline __attribute__((always_inline))
+// Arrays of registers stay in registers only where no loop over them is left.
+#if defined(__clang__)
+#define DEFORM_UNROLL _Pragma("unroll")
+#else
+#define DEFORM_UNROLL _Pragma("GCC unroll 16")
+#endif
 
 namespace reduced {
 namespace {
 
-typedef double V __attribute__((vector_size(64), aligned(8), may_alias));
+typedef double V __attribute__((vector_size(8 * kWidth)));
+typedef double Anywhere __attribute__((vector_size(8 * kWidth), aligned(8), may_alias));
 
-const V &load(const double *p) { return *reinterpret_cast<const V *>(p); }
-void store(double *p, const V &v) { *reinterpret_cast<V *>(p) = v; }
+DEFORM_INLINE V load(const double *p) { return *(const Anywhere *)p; }
+DEFORM_INLINE void store(double *p, V v) { *(Anywhere *)p = v; }
+
+constexpr size_t kMostOpen = 4;  // registers of numbers that one pass over the modes makes
+constexpr size_t kOpen = kPiece / kWidth < kMostOpen ? kPiece / kWidth : kMostOpen;
+// Registers of lanes that one pass over a row makes, for kRowsAtOnce rows.
+constexpr size_t kSide = kLanes / kWidth < 2 ? kLanes / kWidth : 2;
+constexpr size_t kRowsAtOnce = 6;
 
 void project(const double *w, size_t pieces, size_t nmode, uint32_t n, const double *const *in,
              double *sums) {
   for (size_t p = 0; p < pieces; ++p)
-    for (uint32_t v = 0; v < n; ++v) {
-      const double *const u = in[v] + p * kPiece;
-      const V u0 = load(u), u1 = load(u + kLanes), u2 = load(u + 2 * kLanes), u3 = load(u + 3 * kLanes);
-      for (size_t k = 0; k < nmode; ++k) {
-        const double *const at = w + (p * nmode + k) * kPiece;
-        double *const sum = sums + (v * nmode + k) * kLanes;
-        store(sum, load(sum) + ((load(at) * u0 + load(at + kLanes) * u1) +
-                                (load(at + 2 * kLanes) * u2 + load(at + 3 * kLanes) * u3)));
+    for (uint32_t v = 0; v < n; ++v)
+      for (size_t part = 0; part < kLanes; part += kWidth) {
+        const double *const u = in[v] + p * kPiece + part;
+        const V u0 = load(u), u1 = load(u + kLanes), u2 = load(u + 2 * kLanes), u3 = load(u + 3 * kLanes);
+        for (size_t k = 0; k < nmode; ++k) {
+          const double *const at = w + (p * nmode + k) * kPiece + part;
+          double *const sum = sums + (v * nmode + k) * kLanes + part;
+          store(sum, load(sum) + ((load(at) * u0 + load(at + kLanes) * u1) +
+                                  (load(at + 2 * kLanes) * u2 + load(at + 3 * kLanes) * u3)));
+        }
       }
+}
+
+// kOpen registers of each of N right-hand sides.
+template <uint32_t N>
+DEFORM_INLINE void expand_part(const double *w, size_t nmode, const double *const *in, double *const *out) {
+  V sum[N][kOpen] = {};
+  for (size_t k = 0; k < nmode; ++k) {
+    const double *const at = w + k * kPiece;
+    DEFORM_UNROLL for (size_t r = 0; r < kOpen; ++r) {
+      const V own = load(at + r * kWidth);
+      DEFORM_UNROLL for (uint32_t v = 0; v < N; ++v) sum[v][r] += in[v][k] * own;
+    }
+  }
+  DEFORM_UNROLL for (uint32_t v = 0; v < N; ++v) DEFORM_UNROLL for (size_t r = 0; r < kOpen; ++r)
+      store(out[v] + r * kWidth, sum[v][r]);
+}
+
+template <uint32_t N>
+DEFORM_INLINE void expand_all(const double *w, size_t pieces, size_t nmode, const double *const *in,
+                              double *const *out) {
+  for (size_t p = 0; p < pieces; ++p)
+    for (size_t part = 0; part < kPiece; part += kOpen * kWidth) {
+      double *to[N];
+      for (uint32_t v = 0; v < N; ++v) to[v] = out[v] + p * kPiece + part;
+      expand_part<N>(w + p * nmode * kPiece + part, nmode, in, to);
     }
 }
 
 void expand(const double *w, size_t pieces, size_t nmode, uint32_t n, const double *const *in,
             double *const *out) {
-  const double *const second = in[n - 1];
-  for (size_t p = 0; p < pieces; ++p)
-    for (size_t part = 0; part < kPiece; part += 2 * kLanes) {
-      V a0 = {}, a1 = {}, b0 = {}, b1 = {};
-      for (size_t k = 0; k < nmode; ++k) {
-        const double *const at = w + (p * nmode + k) * kPiece + part;
-        const V w0 = load(at), w1 = load(at + kLanes);
-        a0 += in[0][k] * w0;
-        a1 += in[0][k] * w1;
-        if (n == 1) continue;
-        b0 += second[k] * w0;
-        b1 += second[k] * w1;
-      }
-      store(out[0] + p * kPiece + part, a0);
-      store(out[0] + p * kPiece + part + kLanes, a1);
-      if (n == 1) continue;
-      store(out[1] + p * kPiece + part, b0);
-      store(out[1] + p * kPiece + part + kLanes, b1);
-    }
+  if (n == 1) expand_all<1>(w, pieces, nmode, in, out);
+  else expand_all<2>(w, pieces, nmode, in, out);
 }
 
-// Three rows at a time: those of a surfel.
-void rows(const double *rows, size_t nrow, size_t width, const double *y, double *out) {
-  for (size_t j = 0; j < nrow; j += 3) {
-    const double *const row = rows + width * j;
-    V a = {}, b = {}, c = {};
+template <size_t R>
+DEFORM_INLINE void some_rows(const double *row, size_t width, const double *y, double *out) {
+  for (size_t part = 0; part < kLanes; part += kSide * kWidth) {
+    V sum[R][kSide] = {};
     for (size_t m = 0; m < width; ++m) {
-      const V at = load(y + kLanes * m);
-      a += row[m] * at;
-      b += row[width + m] * at;
-      c += row[2 * width + m] * at;
+      V at[kSide];
+      DEFORM_UNROLL for (size_t s = 0; s < kSide; ++s) at[s] = load(y + kLanes * m + part + s * kWidth);
+      DEFORM_UNROLL for (size_t r = 0; r < R; ++r) DEFORM_UNROLL for (size_t s = 0; s < kSide; ++s)
+          sum[r][s] += row[width * r + m] * at[s];
     }
-    store(out + kLanes * j, a);
-    store(out + kLanes * (j + 1), b);
-    store(out + kLanes * (j + 2), c);
+    DEFORM_UNROLL for (size_t r = 0; r < R; ++r) DEFORM_UNROLL for (size_t s = 0; s < kSide; ++s)
+        store(out + kLanes * r + part + s * kWidth, sum[r][s]);
   }
 }
 
+// nrow is a multiple of three: a surfel has as many.
+void rows(const double *rows, size_t nrow, size_t width, const double *y, double *out) {
+  size_t j = 0;
+  for (; j + kRowsAtOnce <= nrow; j += kRowsAtOnce)
+    some_rows<kRowsAtOnce>(rows + width * j, width, y, out + kLanes * j);
+  for (; j < nrow; j += 3) some_rows<3>(rows + width * j, width, y, out + kLanes * j);
+}
+
+void turned(const double *blocks, size_t n, const double *r, const double *f, double scale, double *out) {
+  for (size_t i = 0; i < n; i += kWidth) {
+    V u[3];
+    DEFORM_UNROLL for (size_t a = 0; a < 3; ++a) {
+      const double *const c = blocks + 3 * a * n + i;
+      u[a] = (load(c) * f[0] + load(c + n) * f[1]) + load(c + 2 * n) * f[2];
+    }
+    DEFORM_UNROLL for (size_t a = 0; a < 3; ++a)
+        store(out + a * n + i, scale * ((r[3 * a] * u[0] + r[3 * a + 1] * u[1]) + r[3 * a + 2] * u[2]));
+  }
+}
+
+// Each register of lanes goes through the factor by itself as far as the three numbers of a point.
 void solve(const FactorView &f, double *y) {
   constexpr size_t kPoint = 3 * kLanes;
   for (size_t j = 0; j < f.n; ++j) {
     const double *const d = f.block + 9 * size_t(f.begin[j]);
-    double *const own = y + kPoint * j;
-    const V y0 = load(own) / d[0], y1 = (load(own + kLanes) - d[3] * y0) / d[4],
-            y2 = ((load(own + 2 * kLanes) - d[6] * y0) - d[7] * y1) / d[8];
-    store(own, y0);
-    store(own + kLanes, y1);
-    store(own + 2 * kLanes, y2);
-    for (uint32_t s = f.begin[j] + 1; s < f.begin[j + 1]; ++s) {
-      const double *const l = f.block + 9 * size_t(s);
-      double *const to = y + kPoint * f.row[s];
-      for (size_t r = 0; r < 3; ++r)
-        store(to + r * kLanes,
-              load(to + r * kLanes) - ((l[3 * r] * y0 + l[3 * r + 1] * y1) + l[3 * r + 2] * y2));
+    for (size_t part = 0; part < kLanes; part += kWidth) {
+      double *const own = y + kPoint * j + part;
+      const V y0 = load(own) / d[0], y1 = (load(own + kLanes) - d[3] * y0) / d[4],
+              y2 = ((load(own + 2 * kLanes) - d[6] * y0) - d[7] * y1) / d[8];
+      store(own, y0);
+      store(own + kLanes, y1);
+      store(own + 2 * kLanes, y2);
+      for (uint32_t s = f.begin[j] + 1; s < f.begin[j + 1]; ++s) {
+        const double *const l = f.block + 9 * size_t(s);
+        double *const to = y + kPoint * f.row[s] + part;
+        DEFORM_UNROLL for (size_t r = 0; r < 3; ++r)
+            store(to + r * kLanes,
+                  load(to + r * kLanes) - ((l[3 * r] * y0 + l[3 * r + 1] * y1) + l[3 * r + 2] * y2));
+      }
     }
   }
-  for (size_t j = f.n; j-- > 0;) {
-    double *const own = y + kPoint * j;
-    V y0 = load(own), y1 = load(own + kLanes), y2 = load(own + 2 * kLanes);
-    for (uint32_t s = f.begin[j] + 1; s < f.begin[j + 1]; ++s) {
-      const double *const l = f.block + 9 * size_t(s);
-      const double *const from = y + kPoint * f.row[s];
-      const V x0 = load(from), x1 = load(from + kLanes), x2 = load(from + 2 * kLanes);
-      y0 -= (l[0] * x0 + l[3] * x1) + l[6] * x2;
-      y1 -= (l[1] * x0 + l[4] * x1) + l[7] * x2;
-      y2 -= (l[2] * x0 + l[5] * x1) + l[8] * x2;
+  for (size_t j = f.n; j-- > 0;)
+    for (size_t part = 0; part < kLanes; part += kWidth) {
+      double *const own = y + kPoint * j + part;
+      V y0 = load(own), y1 = load(own + kLanes), y2 = load(own + 2 * kLanes);
+      for (uint32_t s = f.begin[j] + 1; s < f.begin[j + 1]; ++s) {
+        const double *const l = f.block + 9 * size_t(s);
+        const double *const from = y + kPoint * f.row[s] + part;
+        const V x0 = load(from), x1 = load(from + kLanes), x2 = load(from + 2 * kLanes);
+        y0 -= (l[0] * x0 + l[3] * x1) + l[6] * x2;
+        y1 -= (l[1] * x0 + l[4] * x1) + l[7] * x2;
+        y2 -= (l[2] * x0 + l[5] * x1) + l[8] * x2;
+      }
+      const double *const d = f.block + 9 * size_t(f.begin[j]);
+      y2 = y2 / d[8];
+      y1 = (y1 - d[7] * y2) / d[4];
+      store(own, ((y0 - d[3] * y1) - d[6] * y2) / d[0]);
+      store(own + kLanes, y1);
+      store(own + 2 * kLanes, y2);
     }
-    const double *const d = f.block + 9 * size_t(f.begin[j]);
-    y2 = y2 / d[8];
-    y1 = (y1 - d[7] * y2) / d[4];
-    store(own, ((y0 - d[3] * y1) - d[6] * y2) / d[0]);
-    store(own + kLanes, y1);
-    store(own + 2 * kLanes, y2);
-  }
 }
 
-constexpr Kernels kKernels = {project, expand, rows, solve};
+constexpr Kernels kKernels = {project, expand, rows, turned, solve};
 
 }  // namespace
 }  // namespace reduced

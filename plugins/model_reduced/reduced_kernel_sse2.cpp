@@ -1,3 +1,11 @@
+#include <stddef.h>
+
+namespace reduced {
+namespace {
+constexpr size_t kWidth = 2;  // doubles in a register
+}  // namespace
+}  // namespace reduced
+
 #include "reduced_kernel_lanes.h"
 
 namespace reduced {

@@ -24,6 +24,22 @@ inline void matrix_product(const double *a, const double *b, double *out) {
       out[3 * i + j] = (a[3 * i] * b[j] + a[3 * i + 1] * b[3 + j]) + a[3 * i + 2] * b[6 + j];
 }
 
+// The upper triangle of the moment of inertia of a mass m at r is added to out.
+inline void inertia_add(const double *r, double m, double *out) {
+  const double square = (r[0] * r[0] + r[1] * r[1]) + r[2] * r[2];
+  out[0] += m * (square - r[0] * r[0]);
+  out[1] += m * (0 - r[0] * r[1]);
+  out[2] += m * (0 - r[0] * r[2]);
+  out[4] += m * (square - r[1] * r[1]);
+  out[5] += m * (0 - r[1] * r[2]);
+  out[8] += m * (square - r[2] * r[2]);
+}
+inline void mirror_upper(double *a) {
+  a[3] = a[1];
+  a[6] = a[2];
+  a[7] = a[5];
+}
+
 // Of a symmetric positive definite matrix.
 inline void inverse(const double *a, double *out) {
   const double c0 = a[4] * a[8] - a[5] * a[7], c1 = a[5] * a[6] - a[3] * a[8], c2 = a[3] * a[7] - a[4] * a[6];

@@ -182,10 +182,9 @@ void Body::match_moment(const double *wanted, const double *c, const double *vel
       d[a] = v[i * stride + a] - velocity[a];
     }
     cross_add(r, d, m, moment);
-    const double square = (r[0] * r[0] + r[1] * r[1]) + r[2] * r[2];
-    for (size_t a = 0; a < 3; ++a)
-      for (size_t b = 0; b < 3; ++b) inertia[3 * a + b] += m * ((a == b ? square : 0) - r[a] * r[b]);
+    inertia_add(r, m, inertia);
   }
+  mirror_upper(inertia);
   for (size_t a = 0; a < 3; ++a) moment[a] = wanted[a] - moment[a];
   inverse(inertia, inverted);
   product(inverted, moment, spin);
@@ -238,6 +237,7 @@ void Body::commit(const dfm_kin &k, const double *p_s, double *x, double *v) {
   }
   for (size_t i = 0; i < elastic_.npoint; ++i) {
     double change[3] = {}, at_rest[3] = {}, r[3];
+    double *const xi = x + i * k.stride, *const vi = v + i * k.stride;
     if (touched) {
       product(at_.r, w_.data() + 3 * i, change);
       if (condensed_) product(at_.r, rest_.data() + 3 * i, at_rest);
@@ -249,10 +249,11 @@ void Body::commit(const dfm_kin &k, const double *p_s, double *x, double *v) {
         cross_add(turn, r, rigid_, change);
       }
     }
-    for (size_t a = 0; a < k.stride; ++a) {
-      x[i * k.stride + a] = a < 3 ? x_to_[3 * i + a] + h_ * (change[a] + at_rest[a]) : 0;
-      v[i * k.stride + a] = a < 3 ? v_to_[3 * i + a] + change[a] : 0;
+    for (size_t a = 0; a < 3; ++a) {
+      xi[a] = touched ? x_to_[3 * i + a] + h_ * (change[a] + at_rest[a]) : x_to_[3 * i + a];
+      vi[a] = touched ? v_to_[3 * i + a] + change[a] : v_to_[3 * i + a];
     }
+    for (size_t a = 3; a < k.stride; ++a) xi[a] = vi[a] = 0;
   }
   if (touched && elastic_.floating) {
     double wanted[3], c[3], velocity[3];

@@ -152,10 +152,9 @@ void Body::where_floating(const dfm_kin &k, const double *f) {
     cross_add(b, d, m, moment_);
     cross_add(b, f + i * k.stride, 1, torque_);
     transposed_product(at_.r, d, w_.data() + 3 * i);
-    const double square = (r[0] * r[0] + r[1] * r[1]) + r[2] * r[2];
-    for (size_t a = 0; a < 3; ++a)
-      for (size_t c = 0; c < 3; ++c) inertia_[3 * a + c] += m * ((a == c ? square : 0) - r[a] * r[c]);
+    inertia_add(r, m, inertia_);
   }
+  mirror_upper(inertia_);
 }
 
 void Body::where_held(const dfm_kin &k) {

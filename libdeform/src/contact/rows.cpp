@@ -294,6 +294,18 @@ void ContactRows::take_response(const Block &b) {
     }
 }
 
+void ContactRows::take_answers(const Block &b) {
+  const size_t points = size_t(3) * b.count * b.count;
+  const double *from = given_.data();
+  double *to = &response_[b.response];
+  for (size_t k = 0; k < points; ++k, from += 3, to += 4) {
+    to[0] = from[0];
+    to[1] = from[1];
+    to[2] = from[2];
+    to[3] = 0;
+  }
+}
+
 void ContactRows::response_apply(const Block &b, uint32_t d, Vec3 p) {
   const size_t width = size_t(4) * b.count;
   kernels_.add_three(width, &response_[b.response + 3 * size_t(d - b.first) * width], &p.x,

@@ -88,6 +88,13 @@ struct ContactRows {
     fill(given_.data());
     take_response(b);
   }
+  // The same where fill(answers) writes what unit impulses change one after another, [3 count, 3 count].
+  template <class Fill>
+  void set_answers(const Block &b, const Fill &fill) {
+    given_.resize(size_t(9) * b.count * b.count);
+    fill(given_.data());
+    take_answers(b);
+  }
   // Frames from normals and tangents [n,3], W diagonals, rates. planned: s, time in which a depth closes;
   // longer than h where the guard has cut it, or depths would turn into speed.
   void finish(std::span<const ContactPoint> contacts, const double *tangents, double h, double planned,
@@ -112,6 +119,7 @@ struct ContactRows {
   Array<double> given_;  // scratch
   void add_block(uint32_t from, uint32_t first, uint32_t group);
   void take_response(const Block &b);
+  void take_answers(const Block &b);
   // Of block b, at dof k's component `row`, by a unit impulse of that column.
   double response(const Block &b, size_t column, size_t k, size_t row) const {
     return response_[b.response + (column * b.count + k) * 4 + row];

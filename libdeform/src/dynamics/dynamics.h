@@ -107,8 +107,8 @@ class Dynamics {
   // [npoint,4] 1/kg, what an impulse changes of its own point; null: the unknowns of contact are the touched
   // surfels, which answer each other.
   virtual const double *diagonal() const { return nullptr; }
-  // Where diagonal() is null: what impulses at n distinct surfels change of their velocities, [3n,3n] 1/kg,
-  // row-major, symmetric. False: the model cannot.
+  // Where diagonal() is null: what impulses at n distinct surfels change of their velocities, [3n,3n] 1/kg:
+  // the answers to unit impulses one after another; symmetric but for rounding. False: the model cannot.
   virtual bool response(const SubStep &, uint32_t, const uint32_t *, double *) { return false; }
   // By the impulses at the surfels [nsurfel,3]; point_velocity() and response() then give what has changed.
   virtual Revision revise(const SubStep &, const double *) { return Revision::none; }

@@ -364,7 +364,7 @@ double ImplicitPoints::scaled_square(const Array<double> &r) const {
 }
 
 // W = N_c A^-1 N_c^T of the touched surfels.
-bool ImplicitPoints::response(const SubStep &, uint32_t n, const uint32_t *surfel, double *matrix) {
+bool ImplicitPoints::response(const SubStep &, uint32_t n, const uint32_t *surfel, double *answers) {
   column_.assign(p_.n, kNone);
   points_.clear();
   for (uint32_t s = 0; s < n; ++s)
@@ -374,17 +374,17 @@ bool ImplicitPoints::response(const SubStep &, uint32_t n, const uint32_t *surfe
       points_.push_back(p);
     });
   const uint32_t m = static_cast<uint32_t>(points_.size());
-  if (surface_.identity()) return restricted(m, points_.data(), matrix);
+  if (surface_.identity()) return restricted(m, points_.data(), answers);
   between_.resize(size_t{9} * m * m);
   if (!restricted(m, points_.data(), between_.data())) return false;
-  std::fill_n(matrix, size_t{9} * n * n, 0.0);
+  std::fill_n(answers, size_t{9} * n * n, 0.0);
   for (uint32_t s = 0; s < n; ++s)
     for (uint32_t t = 0; t < n; ++t)
       surface_.each_phyxel(surfel[s], [&](uint32_t p, double ws) {
         surface_.each_phyxel(surfel[t], [&](uint32_t q, double wt) {
           for (size_t a = 0; a < 3; ++a)
             for (size_t b = 0; b < 3; ++b)
-              matrix[(3 * size_t{s} + a) * 3 * n + 3 * size_t{t} + b] +=
+              answers[(3 * size_t{t} + b) * 3 * n + 3 * size_t{s} + a] +=
                   ws * wt * between_[(3 * size_t{column_[p]} + a) * 3 * m + 3 * size_t{column_[q]} + b];
         });
       });

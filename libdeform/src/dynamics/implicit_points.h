@@ -48,7 +48,7 @@ class ImplicitPoints : public Dynamics {
   bool take_contact() override { return !std::exchange(staged_, false); }
   bool free_motion(const SubStep &now, double &kinetic) override;
   const double *point_velocity() const override { return p_.v_free.data(); }
-  bool response(const SubStep &now, uint32_t n, const uint32_t *surfel, double *matrix) override;
+  bool response(const SubStep &now, uint32_t n, const uint32_t *surfel, double *answers) override;
   Revision revise(const SubStep &now, const double *surfel_impulse) override;
   bool end_state(const SubStep &now, const double *surfel_impulse, bool touched) override;
   EndState end() const override { return {p_.v_end.data(), mean()}; }

@@ -9,7 +9,7 @@ SelfStepping::SelfStepping(const Memory &memory, Phyxels &points, Surface &surfa
     : Dynamics(points, surface, model),
       mean_(size_t(kStride) * points.n, 0.0, HookAllocator<double>(memory)),
       surfels_(size_t(3) * surface.nsurfel, 0.0, HookAllocator<double>(memory)) {
-  use_memory(memory, unit_, answer_);
+  use_memory(memory, unit_);
 }
 
 // Loads and gravity are external forces of the model, which answers the surfels' mean velocities.
@@ -29,11 +29,10 @@ bool SelfStepping::free_motion(const SubStep &now, double &) {
   return good;
 }
 
-bool SelfStepping::respond(const SubStep &now, uint32_t n, const uint32_t *surfel, uint32_t nrhs) {
+bool SelfStepping::respond(const SubStep &now, uint32_t n, const uint32_t *surfel, uint32_t nrhs,
+                           const double *p, double *du) const {
   const dfm_kin k = kin(now.time, now.h);
   const dfm_stepper &ops = *model_.stepper;
-  const double *const p = unit_.data();
-  double *const du = answer_.data();
   if (ops.respond_many) {
     const auto many = [&] { return ops.respond_many(model_.self, &k, n, surfel, nrhs, p, du); };
     return model_.call("respond_many", many) == DFM_OK;
@@ -46,16 +45,15 @@ bool SelfStepping::respond(const SubStep &now, uint32_t n, const uint32_t *surfe
   return true;
 }
 
-// The columns are the answers to unit impulses.
-bool SelfStepping::response(const SubStep &now, uint32_t n, const uint32_t *surfel, double *matrix) {
+// As many unit impulses as in the last sub-step are the same ones.
+bool SelfStepping::response(const SubStep &now, uint32_t n, const uint32_t *surfel, double *answers) {
   const uint32_t width = 3 * n;
-  unit_.assign(size_t(width) * width, 0.0);
-  answer_.assign(size_t(width) * width, 0.0);
-  for (uint32_t c = 0; c < width; ++c) unit_[size_t(c) * width + c] = 1;
-  if (!respond(now, n, surfel, width)) return false;
-  for (uint32_t r = 0; r < width; ++r)
-    for (uint32_t c = 0; c < width; ++c) matrix[size_t(r) * width + c] = answer_[size_t(c) * width + r];
-  return true;
+  if (unit_.size() != size_t(width) * width) {
+    unit_.assign(size_t(width) * width, 0.0);
+    for (uint32_t c = 0; c < width; ++c) unit_[size_t(c) * width + c] = 1;
+  }
+  std::fill_n(answers, unit_.size(), 0.0);
+  return respond(now, n, surfel, width, unit_.data(), answers);
 }
 
 bool SelfStepping::end_state(const SubStep &now, const double *surfel_impulse, bool touched) {

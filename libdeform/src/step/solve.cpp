@@ -27,8 +27,8 @@ void fill_response(World &w, StepContext &step, const ContactRows::Block &block)
   const Body &b = *w.bodies[block.source];
   step.block_surfels.resize(block.count);
   for (uint32_t k = 0; k < block.count; ++k) step.block_surfels[k] = step.rows.point[block.first + k];
-  step.rows.set_response(block, [&](double *matrix) {
-    if (!b.dynamics->response(sub_step_of(w, step), block.count, step.block_surfels.data(), matrix))
+  step.rows.set_answers(block, [&](double *answers) {
+    if (!b.dynamics->response(sub_step_of(w, step), block.count, step.block_surfels.data(), answers))
       fail(DFM_E_FATAL, "model '%s' of body '%s' does not answer impulses; change the model",
            b.model.type->id, b.name.c_str());
   });

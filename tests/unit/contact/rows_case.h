@@ -184,12 +184,20 @@ class RowsCase {
         {2 * kSurfels, kSurfels, 2 * kPoints, kSurfels, &c_, nullptr, c_.v.data()}};
     const uint32_t group_size[1] = {kRigids};
     rows.build(contacts, sources, {places_, group_size});
-    for (const ContactRows::Block &block : rows.blocks)
-      rows.set_response(block, [&](double *matrix) {
+    for (const ContactRows::Block &block : rows.blocks) {
+      const auto by_rows = [&](double *matrix) {
         for (size_t r = 0; r < 3 * block.count; ++r)
           for (size_t c = 0; c < 3 * block.count; ++c)
             *matrix++ = response_(unknown_of(block, r), unknown_of(block, c));
-      });
+      };
+      const auto by_columns = [&](double *answers) {
+        for (size_t c = 0; c < 3 * block.count; ++c)
+          for (size_t r = 0; r < 3 * block.count; ++r)
+            *answers++ = response_(unknown_of(block, r), unknown_of(block, c));
+      };
+      if (block.group == kNone) rows.set_answers(block, by_columns);
+      else rows.set_response(block, by_rows);
+    }
     std::vector<double> tangents(3 * contacts.size());
     for (size_t i = 0; i < contacts.size(); ++i) store3(&tangents[3 * i], frame(i, 1));
     rows.finish(contacts, tangents.data(), kStep, kStep, kOffset);
