@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include "logged_context.h"
 #include "support.h"
 #include "world.h"
 
@@ -158,6 +159,25 @@ struct Counted {
 };
 
 }  // namespace
+
+// What a model has to say names the body that it is said of.
+TEST(ModelOfABody, WhatItLogs_NamesTheBody) {
+  test::LoggedContext logged;
+  const dfm_world w = test::make_world(logged.context);
+  for (const char *name : {"left", "right"}) {
+    test::BodyOptions o;
+    o.name = name;
+    o.model = "modal";
+    o.position = {*name == 'l' ? 0.0 : 1.0, 0, 0};
+    test::make_body(logged.context, w, "ball", {0.05}, 100, o);
+  }
+  test::ok(dfm_world_step(w, 0.1, nullptr));
+  for (const char *part : {"body 'left': org.deform.modal: ", "body 'right': org.deform.modal: "}) {
+    const size_t made = logged.log.find(part), stepped = logged.log.find(part, made + 1);
+    EXPECT_NE(made, std::string::npos) << logged.log;
+    EXPECT_NE(stepped, std::string::npos) << "its modes above the Nyquist frequency\n" << logged.log;
+  }
+}
 
 // A rule whose change is refused tries again after each wait, with the model that it has made the first time.
 TEST(SwitchRule, Refused_MakesTheModelOnce) {

@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "core/error.h"
+#include "plugin/on_behalf.h"
 
 namespace {
 
@@ -32,8 +33,12 @@ void *host_scratch(void *ctx, size_t bytes) {
 void host_log(void *ctx, int32_t level, uint32_t code, const char *utf8) {
   dfm::Loader::note_log(utf8);
   if (level >= DFM_LOG_ERROR && dfm::Overheard::take(utf8)) return;
-  if (code) self(ctx).logf(level, "[%u] %s", code, utf8 ? utf8 : "");
-  else self(ctx).log(level, utf8 ? utf8 : "");
+  const char *const text = utf8 ? utf8 : "";
+  const std::string *const body = dfm::OnBehalf::body();
+  if (body && code) self(ctx).logf(level, "body '%s': [%u] %s", body->c_str(), code, text);
+  else if (body) self(ctx).logf(level, "body '%s': %s", body->c_str(), text);
+  else if (code) self(ctx).logf(level, "[%u] %s", code, text);
+  else self(ctx).log(level, text);
 }
 
 void host_parallel_for(void *ctx, uint32_t n, uint32_t grain, void (*fn)(void *, uint32_t, uint32_t),
@@ -129,6 +134,7 @@ void dfm_context::remove_live(uint64_t handle) noexcept {
 namespace dfm {
 
 thread_local Overheard *Overheard::now_ = nullptr;
+thread_local const std::string *OnBehalf::now_ = nullptr;
 
 bool Overheard::take(const char *text) noexcept {
   if (!now_) return false;

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "core/error.h"
+#include "plugin/on_behalf.h"
 #include "step/context.h"
 #include "step/energy_watch.h"
 #include "step/first_failure.h"
@@ -20,6 +21,7 @@ bool find_ends(World &w, StepContext &step, uint32_t *trouble) {
       static_cast<uint32_t>(step.active.size()), 1, [&](uint32_t begin, uint32_t end) {
         for (const uint32_t i : std::span(step.active).subspan(begin, end - begin)) {
           Body &b = *w.bodies[i];
+          const OnBehalf speaks(b.name);
           if (!b.dynamics->end_state(now, b.surfel_impulse.data(), touched)) failed.note(i);
         }
       });

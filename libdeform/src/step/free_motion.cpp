@@ -6,6 +6,7 @@
 #include "body/make_surface.h"
 #include "core/error.h"
 #include "plugin/context.h"
+#include "plugin/on_behalf.h"
 #include "state/bounds.h"
 #include "step/context.h"
 #include "step/first_failure.h"
@@ -32,8 +33,10 @@ void begin_bodies(World &w, StepContext &step) {
 bool stage_model(World &w, Active active, const SubStep &now, uint32_t *trouble) {
   FirstFailure failed;
   w.context->tasks.parallel_for(static_cast<uint32_t>(active.size()), 1, [&](uint32_t begin, uint32_t end) {
-    for (const uint32_t i : active.subspan(begin, end - begin))
+    for (const uint32_t i : active.subspan(begin, end - begin)) {
+      const OnBehalf speaks(w.bodies[i]->name);
       if (!w.bodies[i]->dynamics->add_forces(now)) failed.note(i);
+    }
   });
   if (failed.body == kNone) return true;
   *trouble |= DFM_TROUBLE_PLUGIN;
@@ -65,6 +68,7 @@ bool stage_predict(World &w, Active active, const SubStep &now, Array<double> &k
   w.context->tasks.parallel_for(static_cast<uint32_t>(active.size()), 1, [&](uint32_t begin, uint32_t end) {
     for (const uint32_t i : active.subspan(begin, end - begin)) {
       Body &b = *w.bodies[i];
+      const OnBehalf speaks(b.name);
       if (!b.dynamics->free_motion(now, kinetic[i])) failed.note(i);
       if (touches && b.surface.identity())
         gather_surface(b.surface, b.p.x.data(), b.dynamics->point_velocity());

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "plugin/on_behalf.h"
 #include "plugin/params.h"
 #include "plugin/registry.h"
 #include "state/world.h"
@@ -140,6 +141,7 @@ void make_instance(World &w, Body &b, const dfm_type &type, std::vector<double> 
   mesh.edges = b.edges.data();
   mesh.fixed = out.origin.held.data();
   coupling.tell(mesh);
+  const OnBehalf speaks(b.name);
   if (!take_spare(b, type, values, out.origin, out.instance))
     out.instance.create(type, w.context->host, mesh, m, std::move(values));
   // a body's dynamics hold to its own instance, which is the new one meanwhile
