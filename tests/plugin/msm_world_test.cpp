@@ -55,8 +55,10 @@ struct Scene {
   }
 };
 
+// Among the effects of the plan; bodies, which come later, list what their models could do.
 bool lists(const std::string &plan, const char *effect) {
-  return plan.find("\"name\":\"" + std::string(effect) + "\"") != std::string::npos;
+  return plan.substr(0, plan.find("\"stages\"")).find("\"name\":\"" + std::string(effect) + "\"") !=
+         std::string::npos;
 }
 
 using Values = std::vector<std::pair<const char *, std::vector<double>>>;

@@ -342,6 +342,7 @@ TEST(Stepper, ThatARuleComesBackTo_IsMadeOnce) {
   rule.near_by.type = "corotational_fem";
   rule.distance = 1;
   rule.wait = 0;
+  created = 0;
   test::ok(dfm_body_set_switch_rule(b.body, &rule));
   const double here[3] = {0, 0, 0}, away[3] = {9, 0, 0};
   const auto to_and_fro = [&] {
@@ -350,7 +351,6 @@ TEST(Stepper, ThatARuleComesBackTo_IsMadeOnce) {
       test::ok(dfm_world_step(b.world, 1e-3, nullptr));
     }
   };
-  created = 0;
   for (int i = 0; i < 5; ++i) to_and_fro();
   EXPECT_GE(test::listed(dfm_world_swaps, b.world).size(), 10u);
   EXPECT_EQ(created, 1u);

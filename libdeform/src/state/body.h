@@ -85,7 +85,7 @@ struct Body {
   std::vector<SwitchRule> rule;  // one or none
   // instances that a change to come may take: what they have made of the mesh is theirs still
   std::vector<SpareModel> spares;
-  bool another_model = false;  // than it had when the world took its first step
+  uint64_t first_model = 0;  // hash of what its model was made with as the world took its first step
   double mass = 0, rest_volume = 0;
   Array<double> share;  // [ntet] how much of each cell is material; empty: all
   std::vector<CellField> fields;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/hash.h"
 #include "plugin/on_behalf.h"
 #include "plugin/params.h"
 #include "plugin/registry.h"
@@ -183,6 +184,17 @@ std::unique_ptr<BodyModel> make_body_model(World &w, Body &b, const dfm_type &ty
   out->origin = std::move(origin);
   make_instance(w, b, type, values_for(w, b, type, out->origin.params, *out), integrator, *out);
   return out;
+}
+
+uint64_t model_hash(const Body &b) {
+  Hash h;
+  const ModelParams &p = b.origin.params;
+  h.add(b.model.type->id, std::strlen(b.model.type->id));
+  h.add(p.keys.data(), p.keys.size());
+  h.add(p.values.data(), p.values.size() * sizeof(double));
+  h.add(b.origin.frame);
+  h.add(b.origin.integrator);
+  return h.value;
 }
 
 void exchange(Body &b, BodyModel &other) noexcept {

@@ -149,6 +149,7 @@ Body &create_body(World &w, const dfm_body_def &def) {
                      {p.held.begin(), p.held.end()}};
   const std::unique_ptr<BodyModel> made = make_body_model(w, b, type, std::move(origin), def.integrator);
   exchange(b, *made);
+  b.first_model = model_hash(b);
   if (!b.surface.identity()) need_ability(w, Ability::own_surface, "body", b.name);
   if (w.method->point_values) make(b.method_values, size_t(kStride) * p.n);
 

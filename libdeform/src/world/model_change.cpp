@@ -257,10 +257,6 @@ ModelOrigin origin_for(const Body &b, const dfm_type &type, const ModelChoice &t
   return origin;
 }
 
-bool differ(const ModelOrigin &a, const ModelOrigin &b) {
-  return a.params != b.params || std::memcmp(&a.frame, &b.frame, sizeof a.frame) != 0 || a.held != b.held;
-}
-
 // A change that is to come, of a body which will have this integrator until then.
 void rehearse(Body &b, const ModelChoice &to, uint32_t &integrator, bool at_rest,
               std::vector<SpareModel> &spares) {
@@ -340,9 +336,7 @@ void change_model(Body &b, const ModelChoice &to, Swap &swap) {
     if (!b.rule.empty()) keep_spare(b.spares, *made, std::move(place));  // the rule will ask for it again
     throw;
   }
-  const bool another = b.model.type != made->instance.type || b.model.params != made->instance.params ||
-                       b.integrator.used != made->integrator.used || differ(b.origin, made->origin);
-  b.another_model = b.another_model || (w.step_count > 0 && another);
+  if (w.step_count == 0) b.first_model = model_hash(b);
   if (!b.rule.empty()) keep_spare(b.spares, *made, std::move(place));
   wake(w, b);
   w.sizes = {};  // another bound, and other errors

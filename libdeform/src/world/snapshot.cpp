@@ -46,7 +46,7 @@ struct StagedBody {
   Integrator integrator;
   std::vector<Switch> switches;
   std::vector<SwitchRule> rule;
-  bool another_model = false;
+  uint64_t first_model = 0;
   std::unique_ptr<BodyModel> made;  // where the world's body has another model than the snapshot's
   Vec3 contact_impulse;
   EnergyBook energy;
@@ -245,7 +245,7 @@ void model_fields(Stream &s, B &b, const Body &like) {
   s.array("model parameters", b.model.params, alike ? like.model.params.size() : kAnyCount, must::finite);
   s.must_hold("model parameters", "values in the range of the model's table",
               [&] { return !alike || in_range(*like.model.type, b.model.params); });
-  s.value("another model", b.another_model, must::flag);
+  s.value("first model", b.first_model, must::any);
   switch_fields(s, b);
 }
 
@@ -620,7 +620,7 @@ void exchange(World &w, Staged &t) noexcept {
     }
     b.switches.swap(other.switches);
     b.rule.swap(other.rule);
-    std::swap(b.another_model, other.another_model);
+    std::swap(b.first_model, other.first_model);
     b.loads.swap(other.loads);
     b.springs.swap(other.springs);
     b.motions.swap(other.motions);
@@ -677,17 +677,6 @@ void exchange(World &w, Staged &t) noexcept {
   ++w.placements;
 }
 
-// Which model moves the body, where that has changed since the first step: until then it follows from how the
-// world was made.
-void add_model(Hash &h, const Body &b) {
-  if (!b.another_model) return;
-  h.add(b.id);
-  h.add(b.model.type->id, std::strlen(b.model.type->id));
-  h.add(b.model.params.data(), b.model.params.size() * sizeof(double));
-  h.add(b.origin.frame);
-  h.add(b.integrator.used);
-}
-
 }  // namespace
 
 uint64_t world_hash(const World &w) {
@@ -712,7 +701,12 @@ uint64_t world_hash(const World &w) {
       h.add(b->slumber.calm);
       h.add(b->slumber.since);
     }
-  for (auto &b : w.bodies) add_model(h, *b);
+  // where it is another one than at the first step: until then it follows from how the world was made
+  for (auto &b : w.bodies)
+    if (const uint64_t model = model_hash(*b); model != b->first_model) {
+      h.add(b->id);
+      h.add(model);
+    }
   return h.value;
 }
 
