@@ -125,6 +125,50 @@ void book_contact(World &w, StepContext &step) {
   }
 }
 
+// How a body turns in a sub-step that takes its points along chords.
+struct Turning {
+  Vec3 velocity, spin;  // m/s of the center of mass, rad/s
+  double half = 0;      // s, of the sub-step
+  // What a point's velocity at the end of its arc has beyond the mean one, which is that of the chord. m/s
+  Vec3 arc(Vec3 v) const { return half * cross(spin, v - velocity); }
+};
+
+// The rotation that has the angular momentum of the mean velocities at the middle of the chords.
+Turning turning_of(const Body &b, double h) {
+  const Phyxels &p = b.p;
+  const double *const end = b.dynamics->end().v;
+  double mass = 0;
+  Vec3 center{}, velocity{}, momentum{};
+  double s[6] = {};
+  const auto middle = [&](uint32_t i) {
+    return load3(&p.x[size_t(i) * kStride]) + 0.5 * h * load3(end + size_t(i) * kStride);
+  };
+  for (uint32_t i = 0; i < p.n; ++i) {
+    mass += p.mass[i];
+    center += p.mass[i] * middle(i);
+    velocity += p.mass[i] * load3(end + size_t(i) * kStride);
+  }
+  center = (1 / mass) * center;
+  velocity = (1 / mass) * velocity;
+  for (uint32_t i = 0; i < p.n; ++i) {
+    const Vec3 r = middle(i) - center;
+    momentum += p.mass[i] * cross(r, load3(end + size_t(i) * kStride) - velocity);
+    const double all = dot(r, r);
+    s[0] += p.mass[i] * (all - r.x * r.x);
+    s[1] += p.mass[i] * (all - r.y * r.y);
+    s[2] += p.mass[i] * (all - r.z * r.z);
+    s[3] -= p.mass[i] * r.y * r.z;
+    s[4] -= p.mass[i] * r.z * r.x;
+    s[5] -= p.mass[i] * r.x * r.y;
+  }
+  const Vec3 a{s[0], s[5], s[4]}, c{s[5], s[1], s[3]}, e{s[4], s[3], s[2]};
+  const double det = dot(a, cross(c, e));
+  // points on a line have no spin about it
+  if (!(det > 0)) return {velocity, {}, 0.5 * h};
+  const Vec3 spin = momentum.x * cross(c, e) + momentum.y * cross(e, a) + momentum.z * cross(a, c);
+  return {velocity, (1 / det) * spin, 0.5 * h};
+}
+
 // Of a sub-step of backward Euler, r the residual that Newton's method leaves:
 //
 //   M (v' - v) = h (f' + loads + m g) + p + r,  x' = x + h v'
@@ -132,20 +176,27 @@ void book_contact(World &w, StepContext &step) {
 // times v': kinetic energy rises by what f', loads, weight, contact and r do at v', less
 // |v' - v|^2 M / 2. The elastic energy rises by no more than -f'.(x' - x) where it is convex. Where the guard
 // takes a fraction of the way only, the potentials change by that fraction at most.
+//
+// A rotation is not convex: between its ends a chord leads through a body that is smaller, so inner forces
+// that carry a contact's force through the body do work on x' - x and no elastic energy pays for it. With the
+// contact's work at the end of the arc, v' + h/2 spin x (v' - v_center), the balance holds to that order.
 void book_end(World &w, StepContext &step, Body &b, double motion) {
   const Phyxels &p = b.p;
   const bool load_booked = books_loads(b), driven = !step.driven.empty() && !b.motions.empty();
   const double *const end = b.dynamics->end().v;
   double contact = 0, loads = 0, gained = 0, held = 0;
-  if (w.plan.touches())
+  if (w.plan.touches()) {
+    const Turning turning = turning_of(b, step.h);
     for (uint32_t s = 0; s < b.surface.nsurfel; ++s) {
       const double *const q = &b.surfel_impulse[3 * size_t(s)];
       if (q[0] == 0 && q[1] == 0 && q[2] == 0) continue;
       b.surface.each_phyxel(s, [&](uint32_t point, double weight) {
+        const Vec3 arc = turning.arc(load3(end + size_t(point) * kStride));
         for (size_t k = 0, at = size_t(point) * kStride; k < 3; ++k, ++at)
-          if (p.moves(at)) contact += weight * q[k] * end[at];
+          if (p.moves(at)) contact += weight * q[k] * (end[at] + arc[int(k)]);
       });
     }
+  }
   const bool forces = driven && b.dynamics->end_forces(sub_step_of(w, step));
   for (uint32_t i = 0; i < p.n; ++i)
     for (size_t k = 0, at = size_t(i) * kStride; k < 3; ++k, ++at) {
