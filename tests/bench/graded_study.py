@@ -2,8 +2,8 @@
 """What a mesh that is fine where it is touched costs and gives, beside one that is fine or coarse everywhere.
 
 A ball of 20 mm goes 3 mm into the middle of the top of a block of 100 mm and rests there. The block is held
-at its foot; lattices of n^3 boxes of six tetrahedra each, with equal spacing, or with spacings that grow by one
-factor from the touched place. The force in the end is compared with that of the finest.
+at its foot. Meshes are lattices of boxes of six tetrahedra each, with equal spacing, or with spacings that
+grow by one factor from the touched place. The force in the end is compared with that of the finest.
 
 usage: graded_study.py DEFORM_COMMAND [--integrator implicit_euler] [--model corotational_fem]
 writes a table: mesh, points, cells, least and largest spacing, force, error, processor s
