@@ -255,6 +255,20 @@ TEST(Hpp, Meshes_LendTheirArrays) {
   EXPECT_EQ(read.surface.info().ntriangle, 12u);
 }
 
+TEST(Hpp, Switches_BeginWithTheLibrarysDefaults) {
+  const Scene s;
+  deform::Switch to;
+  EXPECT_EQ(to.size, sizeof(dfm_switch));
+  EXPECT_EQ(to.integrator, DFM_INTEGRATOR_AUTO);
+  to.type = "corotational_fem";
+  const dfm_switch list[] = {to};
+  s.ball.set_switches(list);
+  deform::SwitchRule rule;
+  rule.otherwise.type = "msm";
+  EXPECT_THROW(s.ball.set_switch_rule(rule), deform::Error) << "one model alone";
+  s.ball.set_switches({});
+}
+
 TEST(Hpp, RigidBodies_GoByTheirSet) {
   const Scene s;
   deform::RigidDef box;
