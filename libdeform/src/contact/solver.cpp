@@ -75,7 +75,7 @@ double normal_impulse(const ContactRows &rows, uint32_t i, double un) {
 
 }  // namespace
 
-void set_trial(const ContactRows &rows, double h, ContactState &s) {
+void set_trial(const ContactRows &rows, double h, const double *response, ContactState &s) {
   for (uint32_t i = 0; i < rows.n; ++i) {
     const Vec3 u = rows.velocity(i);
     const double *const l = &rows.impulse[size_t(i) * 3];
@@ -86,7 +86,7 @@ void set_trial(const ContactRows &rows, double h, ContactState &s) {
         rows.wn[i] > 0 ? std::max(l[0] > 0 ? l[0] : normal_impulse(rows, i, u.x), 1e-6 / rows.wn[i]) / h : 0;
     s.vt[i] = u.y;
     s.vt[s.stride + i] = u.z;
-    const double wt = rows.wt[i];
+    const double wt = response[i];
     s.ft_stop[i] = wt > 0 ? (l[1] - u.y / wt) / h : 0;
     s.ft_stop[s.stride + i] = wt > 0 ? (l[2] - u.z / wt) / h : 0;
   }

@@ -8,8 +8,9 @@
 
 namespace dfm {
 
-// Sets the trial of every contact from the rows' present state: fn, vt, ft_stop.
-void set_trial(const ContactRows &rows, double h, ContactState &state);
+// Sets the trial of every contact from the rows' present state: fn, vt, ft_stop. response: change of slip per
+// friction impulse by which ft_stop is found, the contact's own (rows.wt) or more.
+void set_trial(const ContactRows &rows, double h, const double *response, ContactState &state);
 // The slips that were solved for, where the laws were asked beside them.
 void set_slips(const ContactRows &rows, ContactState &state);
 

@@ -14,8 +14,8 @@ StepContext::StepContext(const Memory &m)
       last_report(m),
       islands(m) {
   use_memory(m, driven, free_kinetic, lent, contacts, tolerance.normal, tolerance.tangent, disturbance,
-             best_impulse, tangents, match, sharing, aim, stands, ways, renewed, block_surfels, near,
-             touching, active, woken, stirred);
+             best_impulse, trial_response, tangents, match, sharing, aim, stands, ways, renewed,
+             block_surfels, near, touching, active, woken, stirred);
   use_memory(m, state.law, state.fn, state.vt, state.ft_stop, state.area, state.dwell, state.bristle,
              state.ft, state.dft_dvt, state.dft_dfn, state.limit, state.bristle_out, state.mode,
              state.set_valued);

@@ -61,7 +61,7 @@ struct StepContext {
   Tolerance tolerance;
   Residual residual;
   uint32_t passes = 0, sweeps = 0;
-  Array<double> disturbance, best_impulse;
+  Array<double> disturbance, best_impulse, trial_response;
   LawBatches batches;
   Array<double> tangents;
   // [contacts] place in the store that the contact goes on from, or kNone

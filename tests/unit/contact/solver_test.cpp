@@ -95,7 +95,7 @@ struct Problem : RowsCase {
     return delassus() * std::vector<double>(rows.impulse.begin(), rows.impulse.end());
   }
   void ask() {
-    set_trial(rows, kStep, state);
+    set_trial(rows, kStep, rows.wt.data(), state);
     ask_coulomb(mu, state);
   }
   // One answer of the law, and `sweeps` on it.
