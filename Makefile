@@ -13,7 +13,7 @@ help:
 	@echo "make demo             two soft cylinders with and without friction: table, picture, out/demo/"
 	@echo "make test             the whole test suite"
 	@echo "make bench            the figures: kernels and full steps"
-	@echo "make soak             all jittered starts, the stability suite, what holds: hours; can be stopped"
+	@echo "make soak             jittered starts, the suite, combinations, what holds: hours; can be stopped"
 	@echo "make lint             layout, includes, headers, text"
 	@echo "make format           clang-format on all C and C++ files, one version everywhere"
 	@echo "make tidy             clang-tidy on the library, where it is installed"
@@ -64,7 +64,8 @@ bench: setup-bench build/bench/build.ninja
 soak: setup-bench build/bench/build.ninja build/release/build.ninja
 	$(BUILD) release
 	DEFORM_SOAK=1 nice -n 19 ctest --preset release -j $(JOBS) -L stability -R Jittered
-	$(BUILD) bench --target hold_soak suite_soak
+	$(BUILD) bench --target hold_soak suite_soak cover_soak
+	nice -n 19 build/bench/bin/cover_soak tests/bench/results/cover_soak.csv
 	nice -n 19 build/bench/bin/suite_soak tests/bench/results/suite_soak.csv
 	nice -n 19 build/bench/bin/hold_soak tests/bench/results/hold_soak.csv
 

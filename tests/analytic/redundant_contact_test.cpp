@@ -14,8 +14,8 @@ class Redundant : public testing::TestWithParam<const char *> {};
 
 }  // namespace
 
-// A block of 16 points below, with 36 surfels, slides onto rest: v^2 / (2 mu g), give or take a step's way and
-// what its bristles give way. Backward Euler stops in whole steps.
+// A block of 16 points below, with 36 surfels, slides onto rest: v^2 / (2 mu g), give or take the way of a
+// step. Backward Euler stops in whole steps.
 TEST_P(Redundant, SlidingBlock_StopsWhereItsLawSays) {
   for (const char *model : {"modal", "corotational_fem"}) {
     Context context;
