@@ -1,6 +1,6 @@
 // More surfels than points carry the body, and laws that are no projection: forces of single contacts are not
 // unique, their sum is. Before laws were asked again beyond the cap on sweeps, such a block turned round
-// instead of stopping and walked on at 7 mm/s, pushed by friction that no law gives (doc/decisions/0200).
+// instead of stopping and walked on at 7 mm/s, pushed by friction that no law gives (doc/decisions/0201).
 #include "coupled.h"
 #include "hold.h"
 

@@ -92,7 +92,7 @@ constexpr double kRunsAway = 1e6;
 // A law that is no projection is known by its tangent, so what is solved is only as right as the slip is near
 // at which the law was asked. Where nearly redundant normal forces take all sweeps of the first pass, that
 // slip is the one before contact: bodies would be left with friction that no law gives, and pushed by it.
-// Beyond the cap laws are asked again, with so many sweeps each time (doc/decisions/0200).
+// Beyond the cap laws are asked again, with so many sweeps each time (doc/decisions/0201).
 constexpr uint32_t kPassSweeps = 20;
 bool asks_beyond(const World &w, const StepContext &step) {
   return step.sweeps >= w.def.max_sweeps && step.batches.remembers();
