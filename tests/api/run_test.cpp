@@ -360,6 +360,20 @@ TEST(Run, EarlierNumberedFiles_AreRemoved) {
   EXPECT_TRUE(fs::exists(out + "/states/notes.txt"));
 }
 
+// A change to a stiffer material in a body that is pressed has its energy from nowhere.
+TEST(Run, ChangesThatPutEnergyIn_AreToldWithTheirSum) {
+  for (const bool stiffer : {false, true}) {
+    const std::string young = stiffer ? "1e8" : "1e5";
+    const Outcome r = run("put_in", {"--time", "0.02", "--set",
+                                     "/bodies/0/switch=[{\"t\": 0.01, \"type\": \"corotational_fem\", "
+                                     "\"params\": {\"young\": " +
+                                         young + "}}]"});
+    ASSERT_EQ(r.result.exit_code, 0) << r.result.err;
+    const bool told = value(r.summary, "warnings").find("changes of model have put") != std::string::npos;
+    EXPECT_EQ(told, stiffer) << r.summary;
+  }
+}
+
 TEST(Run, Frames_AreDrawnAtTheirRate) {
   const Outcome r = run("frames", {"--frames", "100", "--time", "0.02", "--set", "/output/color=speed"});
   ASSERT_EQ(r.result.exit_code, 0) << r.result.err;

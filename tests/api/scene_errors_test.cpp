@@ -137,6 +137,7 @@ TEST(SceneErrors, Switches_SayWhatTheyLack) {
   check(
       {{"/bodies/0/switch=[{\"t\":1}]", {at + "/0", "type"}},
        {"/bodies/0/switch=[{\"type\":\"msm\"}]", {at + "/0", "\"t\""}},
+       {"/bodies/0/switch=[{\"t\":-1,\"type\":\"msm\"}]", {at + "/0/t", "-1"}},
        {"/bodies/0/switch=[{\"t\":1,\"type\":\"msm\",\"integrator\":\"auto\"}]",
         {at + "/0/integrator", "or leaves the body's own"}},
        {"/bodies/0/switch=[{\"t\":1,\"type\":\"mms\"}]", {at + "/0/type", "did you mean \"msm\"?"}},

@@ -84,6 +84,8 @@ TEST(Registry, BadSelfDescriptions_AreRefusedWithASentence) {
                                                          {"bad_double_key", "\"first\" stands twice"},
                                                          {"bad_foreign_slot", "slot 0"},
                                                          {"bad_foreign_need", "bits 0x40 of needs"},
+                                                         {"bad_foreign_claim", "(bits 0x10000)"},
+                                                         {"bad_foreign_flag", "parameter \"first\""},
                                                          {"bad_short_slot", "rows of 12 bytes, at least 16"},
                                                          {"bad_no_eval", "eval"},
                                                          {"bad_unknown_kind", "kind 4 is unknown"}};

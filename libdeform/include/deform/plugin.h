@@ -3,9 +3,11 @@
  * size before what ABI 1 did not begin with, and a missing tail is zero. Rows of tables have their size
  * beside them (param_size, slot_size). What stays and what may be added: doc/reference/abi.md. What the
  * library does not call yet stands in plugin_draft.h and is no part of the ABI.
- * Threads: [setup] no step running; [step] one call at a time per instance, instances run
- * concurrently; [batch] re-entrant, many workers at once; [any] from anywhere. No C++ exception, exit
- * or longjmp crosses. */
+ * Threads: [setup] no other call on this instance, while others, of other worlds too, are set up and step;
+ * [step] one call at a time per instance, instances run concurrently; [batch] re-entrant, many workers at
+ * once; [any] from anywhere. No C++ exception, exit or longjmp crosses. Text is UTF-8.
+ * Bits 16 to 31 of flags and caps are for what a host must know: one that does not refuses the type. It
+ * passes over lower bits that it does not know. */
 #ifndef DEFORM_PLUGIN_H
 #define DEFORM_PLUGIN_H
 #include <stddef.h>
@@ -40,8 +42,11 @@ typedef struct dfm_host {
   void *ctx;                   /* pass back as the first argument of every call below */
   void *(*alloc)(void *ctx, size_t bytes, size_t align);           /* [any] NULL on failure */
   void (*release)(void *ctx, void *p, size_t bytes, size_t align); /* [any] */
-  void *(*scratch)(void *ctx, size_t bytes); /* [batch] thread-local, valid until the call returns */
-  void (*log)(void *ctx, int32_t level, uint32_t code, const char *utf8); /* [any] */
+  /* [batch] thread-local, aligned to 64 bytes, NULL on failure; valid until the call, or the block of
+   * parallel_for, returns */
+  void *(*scratch)(void *ctx, size_t bytes);
+  /* [any] level 0 details, 1 information, 2 warning, 3 error: the reason of what fails next; code: yours */
+  void (*log)(void *ctx, int32_t level, uint32_t code, const char *utf8);
   /* [setup][step] blocking. fn may be called with any cut at multiples of grain; put partial sums into slot
    * begin/grain and add them in slot order; a call from inside a worker runs serially in the caller. */
   void (*parallel_for)(void *ctx, uint32_t n, uint32_t grain,
@@ -80,7 +85,7 @@ enum {
 typedef struct dfm_slots {
   uint32_t size, nslot;
   const dfm_slot *slots; /* [nslot] rows of slot_size bytes */
-  uint32_t slot_size;    /* 0: 16, the row that ABI 1 began with */
+  uint32_t slot_size;    /* sizeof(dfm_slot); 0: 16, the row that ABI 1 began with */
   uint32_t reserved;     /* 0 */
 } dfm_slots;
 typedef struct dfm_type {
@@ -129,8 +134,9 @@ typedef struct dfm_friction {
   const dfm_slot *slots; /* [nslot], unit DFM_PER_CONTACT; nstate = sum of widths; zero = rest */
   dfm_status (*eval)(const dfm_friction_in *in, dfm_friction_out *out); /* [batch] no alloc, no I/O */
   dfm_status (*check)(const double *params, char *why, size_t cap);     /* [any] optional cross-field rules */
-  dfm_status (*prepare)(const dfm_host *h, const double *params, void **data); /* [setup] optional tables */
-  void (*release)(const dfm_host *h, void *data);                              /* [setup] iff prepare */
+  /* [setup] optional tables; not DFM_OK: data is not read, what was made is freed */
+  dfm_status (*prepare)(const dfm_host *h, const double *params, void **data);
+  void (*release)(const dfm_host *h, void *data); /* [setup] iff prepare */
   /* [any] optional (NULL: slots): the state that these parameters call for, where they decide how much there
    * is; it stands in the place of slots, which then is the most that any parameters call for. Constant data,
    * the same for the same parameters. */
@@ -178,9 +184,10 @@ typedef struct dfm_model {           /* self is void*: one shared struct tag wou
   uint32_t size, caps, cells, nslot; /* DFM_CAP_*, accepted DFM_CELL_* */
   /* what can change one bit of a later result is state, warm starts included */
   const dfm_slot *slots;
-  dfm_status (*create)(const dfm_host *h, const dfm_mesh *m, void **self); /* [setup] */
-  void (*destroy)(void *self);                                             /* [setup] */
-  /* [setup] optional: RUNTIME rows only */
+  /* [setup] not DFM_OK: self is not read, what was made is freed */
+  dfm_status (*create)(const dfm_host *h, const dfm_mesh *m, void **self);
+  void (*destroy)(void *self); /* [setup] */
+  /* [setup] optional: RUNTIME rows only; not DFM_OK: nothing has changed */
   dfm_status (*set_params)(void *self, const double *params);
   dfm_status (*state_init)(const void *self, double *state);         /* [setup] */
   dfm_status (*add_forces)(void *self, const dfm_kin *k, double *f); /* [step] f[npoint,stride] += N */
@@ -304,7 +311,7 @@ enum { DFM_SOLVER_DIRECT = 1 /* exact up to rounding, whatever x holds and the t
 typedef struct dfm_solver {
   uint32_t size, flags; /* DFM_SOLVER_* */
   /* [setup] a matrix of n points: pairs ij[nb,2], i <= j, each pair once, each point with itself, in any
-   * order; borrowed during the call */
+   * order; borrowed during the call. Not DFM_OK: self is not read, what was made is freed */
   dfm_status (*analyse)(const dfm_host *h, uint32_t n, uint32_t nb, const uint32_t *ij, void **self);
   /* [step] values blk[nb,9], row-major, in that order; block (j, i) is the transpose of (i, j); borrowed
    * during the call. DFM_DISCARD: the matrix is not positive definite. */
@@ -321,6 +328,10 @@ typedef struct dfm_solver {
 #define DFM_ABI_OK(h)                                    \
   ((h)->abi == DFM_ABI ? (h)->abi_draft == DFM_ABI_DRAFT \
                        : (h)->abi > DFM_ABI && (h)->abi_min != 0u && (h)->abi_min <= DFM_ABI)
+/* The entry is called once for each context that loads the file, maybe at once on several threads, and
+ * shutdown once for each entry that gave a plugin, maybe while other contexts go on. So what the entry
+ * returns is constant and stays as long as the file is loaded, and no host is kept in a static: each instance
+ * has its own, which is valid until that shutdown has returned. */
 typedef struct dfm_plugin {
   uint32_t size, abi, abi_draft, ntype; /* DFM_ABI, DFM_ABI_DRAFT */
   const dfm_type *const *types;         /* [ntype] array of pointers, so dfm_type may grow */

@@ -114,8 +114,7 @@ void check_input(const Law &law, const dfm_friction_in &in) {
                  {in.vt, bool(ops.needs & DFM_NEED_VT), "vt"},
                  {in.ft_stop, bool(ops.needs & DFM_NEED_FT_STOP), "ft_stop"},
                  {in.area, bool(ops.needs & DFM_NEED_AREA), "area"},
-                 {in.dwell, bool(ops.needs & DFM_NEED_DWELL), "dwell"},
-                 {in.state, ops.nslot != 0, "state"}};
+                 {in.dwell, bool(ops.needs & DFM_NEED_DWELL), "dwell"}};
   for (const auto &column : columns)
     if (column.needed && !column.given)
       fail(DFM_E_ARG, "dfm_law_eval (%s): the law needs %s, which is NULL", id, column.name);
@@ -240,6 +239,8 @@ dfm_status evaluate(Law &law, const dfm_friction_in *given_in, dfm_friction_out 
   in.data = prepared ? prepared->data : nullptr;
   const PluginCall scratch(law.context.scratch);
   const uint32_t nstate = state_width(law, in.params);
+  if (nstate && !in.state)
+    fail(DFM_E_ARG, "dfm_law_eval (%s): the law needs state, which is NULL", law.type.id);
   Aligned batch(law.context, in, out, nstate);
   const dfm_status status =
       call_plugin(law.context.host, law.type, "eval", [&] { return ops.eval(batch.in(), batch.out()); });

@@ -225,7 +225,7 @@ void read_switches(const Node &list, const Types &types, Body &b) {
     Switch s;
     entry.object("switch");
     s.pointer = entry.pointer();
-    s.t = entry.at("t").number();
+    s.t = entry.at("t").number(Range{0, HUGE_VAL, false, true});
     s.model = read_model(entry, types);
     if (entry.has("max_jump")) s.max_jump = entry.member("max_jump").number(kPositive);
     if (!b.switches.empty() && s.t < b.switches.back().t)

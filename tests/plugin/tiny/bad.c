@@ -31,6 +31,16 @@
 #else
 #define NEEDS 0
 #endif
+#ifdef BAD_FOREIGN_CLAIM
+#define FLAGS 0x10000
+#else
+#define FLAGS 0x8000 /* of a later header too, to be passed over */
+#endif
+#ifdef BAD_FOREIGN_FLAG
+#define ROW_FLAGS 0x80000000u
+#else
+#define ROW_FLAGS 0x8000u
+#endif
 #ifdef BAD_SHORT_SLOT
 #define SLOT_SIZE 12
 #else
@@ -52,11 +62,11 @@ static dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
 }
 #endif
 
-static const dfm_param rows[] = {{"first", "first", "N", 0.0, 10.0, DEFAULT, 0, 1, NULL},
+static const dfm_param rows[] = {{"first", "first", "N", 0.0, 10.0, DEFAULT, ROW_FLAGS, 1, NULL},
                                  {SECOND, "second", "N", 0.0, 10.0, 2.0, 0, 1, NULL}};
 static const dfm_slot slots[] = {{UNIT, 2, DFM_SLOT_TANGENT, 0}};
 static const dfm_friction law = {
-    sizeof(dfm_friction), NEEDS, 0, 1, slots, EVAL, NULL, NULL, NULL, NULL, SLOT_SIZE, 0};
+    sizeof(dfm_friction), NEEDS, FLAGS, 1, slots, EVAL, NULL, NULL, NULL, NULL, SLOT_SIZE, 0};
 static const dfm_type type = {sizeof(dfm_type),  KIND, ID,  "bad", "1.0", "MIT", SOURCE, rows, 2,
                               sizeof(dfm_param), NULL, &law};
 static const dfm_type *const types[] = {&type};
