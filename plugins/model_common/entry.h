@@ -32,6 +32,12 @@ inline bool in_range(const dfm_host *h, const char *who, const dfm_param *rows, 
   return true;
 }
 
+// The table of extension "dfm.effect_rows/1".
+template <uint32_t N>
+constexpr dfm_effect_rows rows_of(const dfm_effect_row (&rows)[N]) {
+  return {sizeof(dfm_effect_rows), sizeof(dfm_effect_row), N, 0, rows};
+}
+
 // What keeps a model on tetrahedra with edges from taking the mesh; NULL: nothing.
 inline const char *wrong_with(const dfm_mesh &m) {
   if (m.cell != DFM_CELL_TET) return "the cells must be tetrahedra";

@@ -109,8 +109,7 @@ const dfm_caps kOwnCaps = {sizeof(dfm_caps), 0, caps_of};
 const dfm_effect_row kOff[] = {{"damping", kDampingStiffness, 0, 0},  {"damping", kDampingMass, 0, 0},
                                {"anisotropy", kYoungAlong, 0, kAuto}, {"anisotropy", kPoissonAlong, 0, kAuto},
                                {"anisotropy", kShearAlong, 0, kAuto}, {"deform.plasticity", kYield, 0, 0}};
-const dfm_effect_rows kEffectRows = {sizeof(dfm_effect_rows), sizeof(dfm_effect_row),
-                                     sizeof kOff / sizeof *kOff, 0, kOff};
+const dfm_effect_rows kEffectRows = model::rows_of(kOff);
 
 const void *extension(const void *self, const char *id) {
   if (!strcmp(id, DFM_EXT_CAPS)) return &kOwnCaps;

@@ -44,8 +44,7 @@ dfm_status set_params(void *self, const double *params) {
 }
 
 const dfm_effect_row kOff[] = {{"damping", kDampingStiffness, 0, 0}, {"damping", kDampingMass, 0, 0}};
-const dfm_effect_rows kEffectRows = {sizeof(dfm_effect_rows), sizeof(dfm_effect_row),
-                                     sizeof kOff / sizeof *kOff, 0, kOff};
+const dfm_effect_rows kEffectRows = model::rows_of(kOff);
 
 const void *extension(const void *, const char *id) {
   if (!strcmp(id, DFM_EXT_CELL_ENERGY)) return &Ops::kCellEnergy;

@@ -124,8 +124,7 @@ const dfm_spring_mask kSpringMask = {sizeof(dfm_spring_mask), 0, set_mask, get_m
 const dfm_effect_row kOff[] = {{"volume", kVolume, 0, 0},       {"damping", kDampingStiffness, 0, 0},
                                {"damping", kDampingMass, 0, 0}, {"damping", kDamper, 0, kVoigt},
                                {"anisotropy", kSlope, 0, 0},    {"deform.relaxation", kDamper, 0, kVoigt}};
-const dfm_effect_rows kEffectRows = {sizeof(dfm_effect_rows), sizeof(dfm_effect_row),
-                                     sizeof kOff / sizeof *kOff, 0, kOff};
+const dfm_effect_rows kEffectRows = model::rows_of(kOff);
 
 const void *extension(const void *self, const char *id) {
   if (!strcmp(id, DFM_EXT_CELL_ENERGY)) return &Ops::kCellEnergy;

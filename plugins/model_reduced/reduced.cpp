@@ -70,8 +70,7 @@ struct Entry {
   }
   static constexpr dfm_effect_row kOff[] = {{"damping", kDampingStiffness, 0, 0},
                                             {"damping", kDampingMass, 0, 0}};
-  static constexpr dfm_effect_rows kEffectRows = {sizeof(dfm_effect_rows), sizeof(dfm_effect_row), 2, 0,
-                                                  kOff};
+  static constexpr dfm_effect_rows kEffectRows = model::rows_of(kOff);
   static constexpr dfm_facts kFacts = {sizeof(dfm_facts), sizeof(dfm_fact), facts};
 
   static const void *extension(const void *, const char *id) {

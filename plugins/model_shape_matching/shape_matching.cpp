@@ -101,8 +101,7 @@ const dfm_stepper kStepper = {sizeof(dfm_stepper), 0, predict, respond, diagonal
 
 const dfm_effect_row kOff[] = {
     {"damping", kDamping, 0, 0}, {"damping", kDampingMass, 0, 0}, {"plasticity", kCreep, 0, 0}};
-const dfm_effect_rows kEffectRows = {sizeof(dfm_effect_rows), sizeof(dfm_effect_row),
-                                     sizeof kOff / sizeof *kOff, 0, kOff};
+const dfm_effect_rows kEffectRows = model::rows_of(kOff);
 
 const void *extension(const void *self, const char *id) {
   if (!strcmp(id, "dfm.stepper/1")) return &kStepper;
