@@ -49,7 +49,8 @@ struct Pair {
     return at != crossings.end() && at->edge_a == edge_a;
   }
   bool bears(uint32_t edge_a, uint32_t edge_b) const {
-    return std::binary_search(crossings.begin(), crossings.end(), Crossing{a.id, b->id, edge_a, edge_b});
+    const uint64_t id_b = b ? b->id : shape->view().id;
+    return std::binary_search(crossings.begin(), crossings.end(), Crossing{a.id, id_b, edge_a, edge_b});
   }
 };
 

@@ -101,8 +101,10 @@ void edge_round(Edge &e, Array<ContactPoint> &out) {
   edge_point(e, q.s, c, radius, 2, slack, any, out);
 }
 
-// Numbers of box features: edges 0 to 11, corners 12 to 19.
-void edge_box(Edge &e, Array<ContactPoint> &out) {
+// Numbers of box features: edges 0 to 11, corners 12 to 19. As between two bodies (edge_edge.cpp), edges that
+// bore each other in the last sub-step count on when the load has pressed the body's flat: a box would else
+// shake on the rim of its dent for ever, and lose friction with each of them.
+void edge_box(Edge &e, bool convex, Array<ContactPoint> &out) {
   const Pair &pair = e.pair;
   const ObstacleShape &shape = *pair.shape;
   const double depth = recovery_depth(*pair.a.surface), uu = norm2(e.u);
@@ -116,7 +118,7 @@ void edge_box(Edge &e, Array<ContactPoint> &out) {
     if (!(nn > kParallel * kParallel * uu * ww) || !(s > 0 && s < nn && t > 0 && t < nn)) continue;
     const Vec3 o = q + (t / nn) * w;
     const double reach = reach_of(pair, e.ends, o), nr = dot(n, r), allowed = std::max(reach, depth);
-    if (!(nr * nr < allowed * allowed * nn)) continue;
+    if (!(nr * nr < allowed * allowed * nn) || !(convex || pair.bears(e.number, k))) continue;
     const EdgeFaces &f = e.sides();
     const Vec3 m0 = shape.face_normal(face[0]), m1 = shape.face_normal(face[1]);
     Vec3 normal = (1 / std::sqrt(nn)) * n;
@@ -128,7 +130,7 @@ void edge_box(Edge &e, Array<ContactPoint> &out) {
       continue;
     e.emit(s / nn, o, normal, distance, k, out);
   }
-  for (uint32_t k = 0; k < 8; ++k) {
+  for (uint32_t k = 0; convex && k < 8; ++k) {
     const Vec3 corner = shape.corner(k);
     const auto cone = [&](Vec3 n) {
       for (int i = 0; i < 3; ++i)
@@ -169,11 +171,12 @@ void edge_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out) {
   const bool box = pair.shape->view().shape == Shape::box;
   for (const Candidate &candidate : run) {
     const uint32_t number = candidate.feature_a;
-    if (box ? !edge_becomes_convex(surface, number, pair.h)
+    const bool convex = box && edge_becomes_convex(surface, number, pair.h);
+    if (box ? !convex && !pair.bears(number)
             : edge_hollow(surface, number) && edge_hollow(surface, number, 2 * pair.h))
       continue;
     Edge e(pair, number);
-    if (box) edge_box(e, out);
+    if (box) edge_box(e, convex, out);
     else edge_round(e, out);
   }
 }

@@ -191,6 +191,44 @@ TEST(Box, CornerInFaceAndEdgeOnEdge_AreFound) {
   }
 }
 
+// As EdgeEdge.FlatButBoreInTheLastSubStep_CountsOnWithinItsCone: the rim of a box across a face's diagonal.
+TEST(Box, FlatEdgeThatBoreInTheLastSubStep_CountsOnWithinItsCone) {
+  for (const double rise : {0.0, 0.02, 0.06}) {
+    Scene scene;
+    Mesh lower = box_mesh({1, 1, 1}, 1, 1, 1);
+    for (uint32_t i = 0; i < lower.npoint(); ++i)
+      // beside the diagonal of the upper face: it is a valley
+      if (const Vec3 p = lower.at(i); p.z > 0 && p.x * p.y < 0) lower.x[3 * i + 2] += rise;
+    const Surface &body = scene.add(lower);
+    ObstacleView &o = scene.add(Shape::box, {0.05, 0, 1.0005});
+    o.half_size = {0.1, 0.1, 0.5};  // its rim crosses the diagonal at two places
+    const auto edges = [&](std::span<const Crossing> bore) {
+      std::vector<Crossing> found;
+      const auto c = scene.contacts(scene.all(), bore);
+      EXPECT_EQ(flaw(scene, c), "");
+      for (const ContactPoint &k : c)
+        if (k.type_a == 1 && k.normal[2] < -0.9)
+          found.push_back({scene.bodies[0].id, scene.obstacles[0].id, k.feature_a, k.feature_b});
+      return found;
+    };
+    EXPECT_TRUE(edges({}).empty());
+    std::vector<Crossing> any;
+    for (uint32_t i = 0; i < body.nedge; ++i)
+      for (uint32_t k = 0; k < 20; ++k) any.push_back({scene.bodies[0].id, scene.obstacles[0].id, i, k});
+    const std::vector<Crossing> found = edges(any);
+    if (rise > 0.05) {
+      EXPECT_TRUE(found.empty());
+      continue;
+    }
+    ASSERT_EQ(found.size(), 2u) << rise;
+    EXPECT_EQ(edges(found), found);
+    EXPECT_EQ(edges({&found[1], 1}).size(), 1u);
+    Crossing other = found[0];
+    other.edge_b = (other.edge_b + 1) % 12;
+    EXPECT_TRUE(edges({&other, 1}).empty());
+  }
+}
+
 TEST(Box, BodyOnItsTop_UsesSurfelsAlone) {
   Scene scene;
   scene.add(moved(box_mesh({1, 1, 1}, 4, 4, 4), {}, {0, 0, 0.5005}));
