@@ -11,7 +11,6 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
-#include <map>
 #include <memory>
 
 #include "frames.h"
@@ -142,12 +141,6 @@ class Runner {
       out.push_back(
           std::string(n == 1 ? "a change of model was" : std::to_string(n) + " changes of models were") +
           " refused, because energy or surface would jump: swaps lists what was refused");
-    for (const auto &[body, joules] : put_in_by_swaps())
-      if (joules > kMuch * stats.energy_max)
-        out.push_back("changes of model have put " + number(joules) + " J of elastic energy into body '" +
-                      scene_.name_of(body) + "' in sum, where its largest energy was " +
-                      number(stats.energy_max) +
-                      " J: give max_jump, or change where the body is less deformed and has turned less");
     const auto pairs = [](auto most) { return "up to " + std::to_string(most) + " triangle pairs"; };
     if (checks().between_max > 0)
       out.push_back("surfaces cross: " + pairs(checks().between_max) + " of two surfaces in one state");
@@ -235,17 +228,6 @@ class Runner {
     result_.simulated = dfm_world_time(world_);
     return true;
   }
-
-  // J of elastic energy, jumps down taken off.
-  std::map<dfm_body, double> put_in_by_swaps() const {
-    std::map<dfm_body, double> out;
-    for (const dfm_swap &s : result_.swaps)
-      if (const double jump = s.elastic_after - s.elastic_before;
-          !(s.flags & DFM_SWAP_REFUSED) && std::isfinite(jump))
-        out[s.body] += jump;
-    return out;
-  }
-  static constexpr double kMuch = 0.1;  // of the largest energy
 
   void take_swaps() {
     uint32_t n = 0;

@@ -360,18 +360,23 @@ TEST(Run, EarlierNumberedFiles_AreRemoved) {
   EXPECT_TRUE(fs::exists(out + "/states/notes.txt"));
 }
 
-// A change to a stiffer material in a body that is pressed has its energy from nowhere.
-TEST(Run, ChangesThatPutEnergyIn_AreToldWithTheirSum) {
-  for (const bool stiffer : {false, true}) {
-    const std::string young = stiffer ? "1e8" : "1e5";
-    const Outcome r = run("put_in", {"--time", "0.02", "--set",
-                                     "/bodies/0/switch=[{\"t\": 0.01, \"type\": \"corotational_fem\", "
-                                     "\"params\": {\"young\": " +
-                                         young + "}}]"});
+// A change to a stiffer material in a body that is pressed would have its energy from nowhere.
+TEST(Run, ChangeThatPutsEnergyIn_IsRefusedUnlessAllowed) {
+  const auto change = [](const std::string &to) {
+    return run("put_in", {"--time", "0.02", "--set",
+                          "/bodies/0/switch=[{\"t\": 0.01, \"type\": \"corotational_fem\", " + to + "}]"});
+  };
+  const std::string stiffer = R"("params": {"young": 1e8})";
+  for (const std::string &good :
+       {std::string(R"("params": {"young": 1e5})"), stiffer + R"(, "max_jump": 1e6)"}) {
+    const Outcome r = change(good);
     ASSERT_EQ(r.result.exit_code, 0) << r.result.err;
-    const bool told = value(r.summary, "warnings").find("changes of model have put") != std::string::npos;
-    EXPECT_EQ(told, stiffer) << r.summary;
+    EXPECT_NE(value(r.summary, "swaps").find("\"refused\": false"), std::string::npos) << r.summary;
   }
+  const Outcome r = change(stiffer);
+  ASSERT_EQ(r.result.exit_code, 0) << r.result.err;
+  EXPECT_NE(value(r.summary, "swaps").find("\"refused\": true"), std::string::npos) << r.summary;
+  EXPECT_NE(value(r.summary, "warnings").find("its elastic energy would rise by"), std::string::npos);
 }
 
 TEST(Run, Frames_AreDrawnAtTheirRate) {

@@ -239,7 +239,7 @@ TEST(SetModel, WhatDoesNotFit_IsRefusedAndChangesNothing) {
   refused(dfm_body_set_model(f.body, "msm", &lost), DFM_E_ARG, {"2 parameters", "NULL"});
 }
 
-// Swapped round and round in free vibration: each change is passive, and the energy does not run away.
+// In free vibration, which nothing damps: energy rises by no more than the jumps, whose sum is limited.
 TEST(SetModel, RoundAndRound_NeverGainsMoreThanTheJumps) {
   for (const int32_t integrator : {DFM_INTEGRATOR_SYMPLECTIC_EULER, DFM_INTEGRATOR_IMPLICIT_EULER}) {
     Flying f(integrator);
@@ -248,14 +248,19 @@ TEST(SetModel, RoundAndRound_NeverGainsMoreThanTheJumps) {
       return m.kinetic + m.elastic;
     };
     const dfm_body_measure start = test::measure(f.body);
-    double given = energy();
-    for (int k = 0; k < 12; ++k) {
+    double given = energy(), first = given, made = 0;
+    for (int k = 0; k < 40; ++k) {
       test::run(f.world, 0.02, 5e-4);
-      test::ok(set_model(f.body, kModels[(k + 1) % 3]));
-      const dfm_swap s = swaps(f.world)[0];
-      given += std::max(0.0, s.elastic_after - s.elastic_before);
-      EXPECT_LT(energy(), 1.02 * given) << k;
+      if (set_model(f.body, kModels[(k + 1) % 3]) == DFM_OK) {
+        const dfm_swap s = swaps(f.world)[0];
+        given += std::max(0.0, s.elastic_after - s.elastic_before);
+        ++made;
+      } else {
+        test::says({"body 'bar'", "would rise by", "earlier changes have put in", "set max_jump"});
+      }
+      EXPECT_LT(energy(), std::min(1.02 * given, 1.11 * first)) << k;
     }
+    EXPECT_TRUE(made < 40 || integrator != DFM_INTEGRATOR_SYMPLECTIC_EULER);
     const dfm_body_measure end = test::measure(f.body);
     const double p = std::sqrt(start.momentum[0] * start.momentum[0] + start.momentum[1] * start.momentum[1] +
                                start.momentum[2] * start.momentum[2]);

@@ -179,6 +179,69 @@ TEST(ModelOfABody, WhatItLogs_NamesTheBody) {
   }
 }
 
+// A ball that nothing damps rolls in a model of small rotations, which makes it swell, and touches with one
+// that sees that as strain: each bounce would put in more than the last one.
+TEST(SwitchRule, ToAndFro_PumpsNoEnergyIntoAnUndampedBall) {
+  for (const double spin : {0.0, 5.0}) {
+    test::LoggedContext logged;
+    const dfm_world w = test::make_world(logged.context);
+    test::add_plane(w, "floor");
+    test::set_friction(w, 0.5);
+    test::BodyOptions o;
+    o.name = "ball";
+    o.young = 1e5;
+    o.position = {0, 0, 0.4};
+    o.spin = {0, spin, 0};
+    const dfm_body ball = test::make_body(logged.context, w, "ball", {0.1}, 500, o);
+    dfm_switch_rule rule = dfm_switch_rule_default();
+    rule.touching.type = "corotational_fem";
+    rule.otherwise.type = "linear_fem";
+    test::ok(dfm_body_set_switch_rule(ball, &rule));
+    dfm_body_measure m = test::measure(ball);
+    const auto energy = [&] { return m.kinetic + m.elastic + m.mass * 9.81 * (m.com[2] - 0.1); };
+    const double start = energy();
+    double most = 0;
+    for (int k = 0; k < 50; ++k) {
+      test::run(w, 0.1, 1e-3);
+      m = test::measure(ball);
+      most = std::max(most, energy());
+    }
+    EXPECT_LT(most, 1.1 * start);
+    uint32_t refused = 0, rises = 0;
+    for (const dfm_swap &s : test::listed(dfm_world_swaps, w)) {
+      refused += s.flags & DFM_SWAP_REFUSED;
+      rises += !(s.flags & DFM_SWAP_REFUSED) && s.elastic_after > s.elastic_before;
+    }
+    EXPECT_GT(rises, 0u) << "changes that add little are made";
+    EXPECT_GT(refused, 0u);
+    const size_t told = logged.log.find("earlier changes have put in");
+    ASSERT_NE(told, std::string::npos) << logged.log;
+    EXPECT_NE(logged.log.find("body 'ball': from 'org.deform."), std::string::npos);
+    EXPECT_EQ(logged.log.find("earlier changes have put in", told + 1), std::string::npos) << "once";
+  }
+}
+
+// What a body has lost since pays for what changes have put in: under its weight it may change for ever.
+TEST(SetModel, ToAndFroOfADampedBody_GoesOn) {
+  for (const int32_t integrator : {DFM_INTEGRATOR_SYMPLECTIC_EULER, DFM_INTEGRATOR_IMPLICIT_EULER}) {
+    test::Context c;
+    const dfm_world w = test::make_world(c, {0, 0, -9.81}, integrator);
+    test::add_plane(w, "floor");
+    test::BodyOptions o;
+    o.young = 2e4;
+    o.damping_stiffness = 5e-3;
+    const dfm_body block = test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 200, o);
+    test::run(w, 0.5, 1e-3);
+    for (int k = 0; k < 12; ++k) {
+      test::ok(dfm_body_set_model(block, k % 2 ? "msm" : "corotational_fem", nullptr));
+      test::run(w, 0.2, 1e-3);
+    }
+    double sum = 0;
+    for (const dfm_swap &s : test::listed(dfm_world_swaps, w)) sum += s.elastic_after - s.elastic_before;
+    EXPECT_GT(sum, 0.2 * test::measure(block).elastic) << "more than is let in without a loss";
+  }
+}
+
 // A rule whose change is refused tries again after each wait, with the model that it has made the first time.
 TEST(SwitchRule, Refused_MakesTheModelOnce) {
   Counted counted;

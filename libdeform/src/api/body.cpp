@@ -10,6 +10,7 @@
 #include "step/energy_watch.h"
 #include "step/method.h"
 #include "step/stages.h"
+#include "world/change_energy.h"
 #include "world/create.h"
 #include "world/measure.h"
 #include "world/queries.h"
@@ -193,6 +194,7 @@ dfm_status dfm_body_set_state(dfm_body body, uint32_t n, const double *x, const 
       check_resolved(b.name.c_str(), far, b.surface.median_edge);
       check_place(*b.world, "body", b.name.c_str(), far);
     }
+    const HostWork work(b);
     for (uint32_t i = 0; i < n; ++i)
       for (int k = 0; k < 3; ++k) {
         if (b.p.held[i] & (1 << k)) continue;
@@ -228,6 +230,7 @@ dfm_status dfm_body_hold(dfm_body body, uint32_t n, const uint32_t *points, uint
            "body '%s': model '%s' steps itself and learns which points are held when the body is made; give "
            "dfm_body_def.fixed",
            b.name.c_str(), b.model.type->id);
+    const HostWork work(b);
     if (axes == 0) drop_motions(b, {points, n});
     for (uint32_t i = 0; i < n; ++i) b.p.held[points[i]] = axes;
     update_inverse_mass(b.p);
@@ -355,6 +358,7 @@ dfm_status dfm_body_apply_impulse(dfm_body body, const double point[3], const do
         fail(DFM_E_ARG, "body '%s': point and impulse must be finite", b.name.c_str());
     const TriangleNearPoint near = closest_on_body(b, load3(point));
     disturb(b);
+    const HostWork work(b);
     // dv = M^-1 N^T p: of all changes that give the point its new velocity the one of least kinetic energy
     for (int k = 0; k < 3; ++k)
       b.surface.each_phyxel(
@@ -368,6 +372,7 @@ dfm_status dfm_body_set_params(dfm_body body, const dfm_params *params) {
     Body &b = body_of(body);
     exclusive(*b.world);
     need(params, "params");
+    const HostWork work(b);
     set_model_params(b, *params);
     disturb(b);
   });

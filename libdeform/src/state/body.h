@@ -7,6 +7,7 @@
 #include "body/zones.h"
 #include "deform/deform.h"
 #include "dynamics/dynamics.h"
+#include "state/change_book.h"
 #include "state/energy_book.h"
 #include "state/model_choice.h"
 #include "state/motion.h"
@@ -96,6 +97,7 @@ struct Body {
   uint32_t next_load = 1;  // number of the next load or spring
   Vec3 contact_impulse;    // N s since creation
   EnergyBook energy;
+  ChangeBook changes;
   Array<double> surfel_impulse;  // [nsurfel,3] N s of the last sub-step
   // [n,4] what the contact method keeps of each point; empty where it keeps nothing
   Array<double> method_values;

@@ -88,6 +88,7 @@ struct Swap {
   double before = 0, after = 0;  // J, elastic; NaN where the model gives none
   double max_jump = 0;           // J
   bool refused = false;
+  bool unpaid = false;  // refused, because changes have put in too much
 };
 
 }  // namespace dfm

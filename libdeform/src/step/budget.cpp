@@ -119,6 +119,7 @@ void changing(Stream &s, World &w) {
     s.array(b->anchor);
     s.value(b->contact_impulse);
     s.value(b->energy);
+    s.value(b->changes);
     s.value(b->slumber);
     s.value(b->bound);
   }

@@ -5,6 +5,7 @@
 
 #include "core/error.h"
 #include "plugin/on_behalf.h"
+#include "step/change_work.h"
 #include "step/context.h"
 #include "step/energy_watch.h"
 #include "step/first_failure.h"
@@ -48,8 +49,10 @@ bool stage_commit(World &w, StepContext &step, uint32_t *trouble) {
       static_cast<uint32_t>(step.active.size()), 1, [&](uint32_t begin, uint32_t end) {
         for (const uint32_t i : std::span(step.active).subspan(begin, end - begin)) {
           Body &b = *w.bodies[i];
+          ready_change_work(b, now);
           b.dynamics->commit(now, step.guard.motion);  // the guard may leave out some of the way
           ++b.x_version;
+          book_change_work(w, b, now.h);
           if (!w.plan.touches()) continue;
           Vec3 sum;
           for (uint32_t s = 0; s < b.surface.nsurfel; ++s) sum += load3(&b.surfel_impulse[3 * size_t(s)]);

@@ -11,6 +11,7 @@
 #include "step/energy_watch.h"
 #include "step/method.h"
 #include "step/stages.h"
+#include "world/change_energy.h"
 #include "world/rest_loads.h"
 #include "world/settle.h"
 
@@ -203,6 +204,7 @@ void find_equilibrium(World &w, const dfm_equilibrium_def &def, dfm_equilibrium_
   wake_all(w);
   for (auto &b : w.bodies) {
     forget_energy(*b);
+    settle_changes(*b);
     ++b->x_version;
     w.overlaps.place(b->id);
   }

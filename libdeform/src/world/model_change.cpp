@@ -17,6 +17,7 @@
 #include "step/context.h"
 #include "step/stages.h"
 #include "world/body_model.h"
+#include "world/change_energy.h"
 #include "world/idle.h"
 #include "world/measure.h"
 
@@ -228,11 +229,12 @@ void warn_of_jump(const World &w, const Body &b, const Swap &swap) {
 }
 
 // With the new model in place.
-void judge(World &w, Body &b, const ModelInstance &old, Swap &swap) {
+void judge(World &w, Body &b, const ModelInstance &old, const ChangeBook &book, Swap &swap) {
   check_springs(b, *b.model.type, *b.dynamics);
   check_effects(w, b, old, b.model);
   swap.after = elastic_energy(b);
   check_jump(b, swap);
+  check_unpaid(b, book, swap);
   check_surface(w, b);
 }
 
@@ -319,14 +321,15 @@ void change_model(Body &b, const ModelChoice &to, Swap &swap) {
   const dfm_type &type = w.context->registry.find(DFM_KIND_MODEL, to.type);
   prepare(w);
   ModelOrigin origin = origin_for(b, type, to);
-  swap = {b.handle, w.time, b.model.type, &type, elastic_energy(b), NAN, to.max_jump, false};
+  swap = {b.handle, w.time, b.model.type, &type, elastic_energy(b), NAN, to.max_jump};
+  ChangeBook book = look_at_changes(b, swap.before);
   const int32_t integrator = static_cast<int32_t>(origin.integrator);
   auto place = std::make_unique<ModelInstance>();
   b.spares.reserve(kSpares);
   const std::unique_ptr<BodyModel> made = make_body_model(w, b, type, std::move(origin), integrator);
   exchange(b, *made);
   try {
-    judge(w, b, made->instance, swap);
+    judge(w, b, made->instance, book, swap);
     warn_of_jump(w, b, swap);
     w.changed = true;
     reopen_integrators(w);  // what the others do may not fit any more
@@ -336,6 +339,8 @@ void change_model(Body &b, const ModelChoice &to, Swap &swap) {
     if (!b.rule.empty()) keep_spare(b.spares, *made, std::move(place));  // the rule will ask for it again
     throw;
   }
+  book_change(b, book, swap);
+  b.changes = book;
   if (w.step_count == 0) b.first_model = model_hash(b);
   if (!b.rule.empty()) keep_spare(b.spares, *made, std::move(place));
   wake(w, b);
@@ -390,8 +395,10 @@ bool try_change(World &w, Body &b, const ModelChoice &to, bool tell) {
   } catch (const Error &e) {
     if (e.status != DFM_DISCARD) throw;
     swap.refused = true;
-    if (tell) w.context->logf(DFM_LOG_WARNING, "t = %g s: %s", w.time, e.what());
+    if (tell && !(swap.unpaid && b.changes.told))
+      w.context->logf(DFM_LOG_WARNING, "t = %g s: %s", w.time, e.what());
   }
+  b.changes.told = b.changes.told || swap.unpaid;
   if (tell || !swap.refused) keep_swap(w, swap);
   return !swap.refused;
 }

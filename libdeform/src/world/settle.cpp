@@ -22,6 +22,7 @@
 #include "step/energy_watch.h"
 #include "step/stages.h"
 #include "step/step_impulses.h"
+#include "world/change_energy.h"
 #include "world/rest_loads.h"
 
 namespace dfm {
@@ -421,6 +422,7 @@ void settle(World &w, const dfm_equilibrium_def &def, dfm_equilibrium_info &info
     search.run(def.load_steps ? def.load_steps : 1);
   }
   forget_energy(w);
+  for (auto &b : w.bodies) settle_changes(*b);
   w.bound.age = kNone;
   ++w.placements;
 }

@@ -50,6 +50,7 @@ struct StagedBody {
   std::unique_ptr<BodyModel> made;  // where the world's body has another model than the snapshot's
   Vec3 contact_impulse;
   EnergyBook energy;
+  ChangeBook changes;
   std::vector<Load> loads;
   std::vector<Spring> springs;
   std::vector<HeldMotion> motions;
@@ -265,6 +266,11 @@ void body_fields(Stream &s, W &w, B &b, const Body &like) {
   s.value("booked work", b.energy.work, must::finite);
   s.value("kinetic energy", b.energy.kinetic, must::finite);
   s.must_hold("energy known", "what the energy watch writes", [&] { return sound(b.energy); });
+  s.value("model has changed", b.changes.open, must::flag);
+  s.value("refusal told", b.changes.told, must::flag);
+  s.value("largest energy", b.changes.largest, must::not_negative);
+  for (auto *x : {&b.changes.unpaid, &b.changes.level, &b.changes.work})
+    s.value("energy of changes", *x, must::finite);
   s.value("category", b.category, must::any);
   s.value("collides_with", b.collides_with, must::any);
   s.value("asleep", b.slumber.asleep, must::flag);
@@ -626,6 +632,7 @@ void exchange(World &w, Staged &t) noexcept {
     b.motions.swap(other.motions);
     std::swap(b.contact_impulse, other.contact_impulse);
     std::swap(b.energy, other.energy);
+    std::swap(b.changes, other.changes);
     std::swap(b.next_load, other.next_load);
     std::swap(b.category, other.category);
     std::swap(b.collides_with, other.collides_with);

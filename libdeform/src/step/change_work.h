@@ -1,0 +1,17 @@
+// Work that is done from outside on a body whose model has changed: what its energy does beyond that is its
+// own loss, which pays for what changes have put in (world/change_energy.h).
+#pragma once
+#include "dynamics/dynamics.h"
+
+namespace dfm {
+
+struct Body;
+struct World;
+
+double moving_energy(const Body &b);  // J, kinetic, of the components that nothing holds
+// Before the commit: forces at the end, where the holders of driven points have to be asked for their work.
+void ready_change_work(Body &b, const SubStep &now);
+// After it: forces times the way that their points went.
+void book_change_work(const World &w, Body &b, double h);
+
+}  // namespace dfm

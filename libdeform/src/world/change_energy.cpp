@@ -1,0 +1,82 @@
+#include "world/change_energy.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "state/world.h"
+#include "step/change_work.h"
+#include "world/measure.h"
+
+namespace dfm {
+namespace {
+
+// Of the largest energy that the body has had: what changes may have put in and it has not lost; and how
+// little of it counts as none.
+constexpr double kMost = 0.1, kLittle = 0.01;
+// Of its elastic energy, where the body has lost what earlier changes put in.
+constexpr double kAnother = 4;
+constexpr double kSmallJump = 1e-9;  // J, that counts as none
+
+double finite_or_none(double joule) { return std::isfinite(joule) ? joule : 0; }
+double energy_now(Body &b) { return moving_energy(b) + finite_or_none(elastic_energy(b)); }
+double jump_of(const Swap &s) { return finite_or_none(s.after) - finite_or_none(s.before); }
+
+}  // namespace
+
+ChangeBook look_at_changes(const Body &b, double elastic) {
+  ChangeBook out = b.changes;
+  const double now = moving_energy(b) + finite_or_none(elastic);
+  // what changes have taken out stays to be given back
+  if (out.open) out.unpaid = std::max(std::min(0.0, out.unpaid), out.unpaid - (out.level + out.work - now));
+  out.largest = std::max(out.largest, now - std::max(0.0, out.unpaid));
+  out.level = now;
+  out.work = 0;
+  return out;
+}
+
+// Beyond the share, a body that has lost what earlier changes put in may take a multiple of its elastic
+// energy: so far are models and materials from each other that bear the same load. No sequence of such
+// changes grows, since the body has to lose each jump before the next. Of an old model without energy nobody
+// knows what the new one adds.
+void check_unpaid(const Body &b, const ChangeBook &before, Swap &swap) {
+  const double jump = jump_of(swap), share = kMost * before.largest;
+  const bool paid = before.unpaid <= kLittle * before.largest;
+  if (!(jump > kSmallJump) || (paid && std::isnan(swap.before))) return;
+  double limit = std::max(share, paid ? kAnother * swap.before : 0);
+  if (std::isfinite(swap.max_jump)) limit = std::max(limit, swap.max_jump);
+  if (before.unpaid + jump <= limit) return;
+  swap.unpaid = true;
+  fail(
+      DFM_DISCARD,
+      "body '%s': from '%s' to '%s' its elastic energy would rise by %.3g J, and earlier changes have put in "
+      "%.3g J that it has not lost since; together that is more than the %.3g J that changes may put in by "
+      "default (a tenth of its largest energy; its elastic energy, where nothing is left of earlier "
+      "changes); change the model where the body is less deformed and has turned less, give its material "
+      "damping, or set max_jump, which counts instead where it is larger; nothing was changed",
+      b.name.c_str(), swap.from->id, swap.to->id, jump, std::max(0.0, before.unpaid), limit);
+}
+
+void book_change(const Body &b, ChangeBook &book, const Swap &swap) {
+  book.open = true;
+  book.unpaid = std::max(-book.largest, book.unpaid + jump_of(swap));
+  book.level = moving_energy(b) + finite_or_none(swap.after);
+  book.work = 0;
+}
+
+void settle_changes(Body &b) {
+  if (!b.changes.open) return;
+  b.changes.unpaid = std::min(0.0, b.changes.unpaid);
+  b.changes.work = 0;
+  b.changes.level = energy_now(b);
+}
+
+HostWork::HostWork(Body &b) : b_(b) {
+  if (b.changes.open) before_ = energy_now(b);
+}
+
+HostWork::~HostWork() {
+  if (b_.changes.open) b_.changes.work += energy_now(b_) - before_;
+}
+
+}  // namespace dfm
