@@ -79,6 +79,7 @@ class Body {
   bool moving_ = false;  // held points move
   bool led_ = false;     // and displace the body
   bool has_rest_ = false;
+  bool beside_ = false;     // the modes do not hold all of the displacements
   bool even_ = false;       // the forces are the masses times pull_of_
   double pull_of_[3] = {};  // m/s2 in the frame
   Frame at_, to_;
@@ -127,6 +128,7 @@ class Body {
   void where_held(const dfm_kin &k);
   bool uniform(const dfm_kin &k, const double *f, double *a) const;
   void project(const dfm_kin &k, const double *f);
+  void couple_rest();
   void find_spin();
   void keep_rest();
   void advance_frame();

@@ -212,17 +212,37 @@ void Body::project(const dfm_kin &k, const double *f) {
   }
 }
 
+// What the displacements s beside the modes have of C = sum m r x W, into coupling_: by rows a,
+// sum m (s x W)_a = sum m (e_a x s) . W.
+void Body::couple_rest() {
+  double *const turned[] = {mu_.data(), u_to_.data(), w_to_.data()};  // free until the modes have advanced
+  for (size_t i = 0; i < elastic_.npoint; ++i)
+    for (size_t a = 0; a < 3; ++a) {
+      const size_t b = (a + 1) % 3, c = (a + 2) % 3;
+      double *const at = turned[a] + 3 * i;
+      at[a] = 0;
+      at[b] = -elastic_.mass[i] * rest_[3 * i + c];
+      at[c] = elastic_.mass[i] * rest_[3 * i + b];
+    }
+  double *const c = coupling_.data();
+  double *const rows[] = {c, c + modes_.count, c + 2 * size_t(modes_.count)};
+  modes_.shape.project(3, turned, rows);
+}
+
 // The velocity beside the center's is w_i = s x r_i + sum W_ik q'_k, found as the nearest by mass. With
 // C = sum m r x W, not zero where the body is deformed:  I s + C q' = L,  C^T s + q' = W^T M w.
+// C has to be that of all displacements: what it leaves out of C^T s is taken for rates of the modes, and
+// what it leaves out of C q' for spin, in each step anew, however short: energy without bound.
 void Body::find_spin() {
   const uint32_t count = modes_.count;
   double left[9], right[3], inverted[9];
   const double *row[3];
   transposed_product(at_.r, moment_, right);
   std::copy(inertia_, inertia_ + 9, left);
+  if (beside_) couple_rest();
+  else std::fill(coupling_.data(), coupling_.data() + 3 * size_t(count), 0.0);
   for (size_t a = 0; a < 3; ++a) {
     double *const c = coupling_.data() + a * count;
-    std::fill(c, c + count, 0.0);
     for (size_t k = 0; k < count; ++k)
       for (size_t l = 0; l < count; ++l) c[l] += q_[k] * twist_[(a * count + k) * count + l];
     for (size_t l = 0; l < count; ++l) right[a] -= c[l] * qd_[l];
@@ -244,7 +264,8 @@ void Body::keep_rest() {
   for (size_t j = 0; j < size(); ++j) all += mu_[j] * u_[j];
   for (uint32_t k = 0; k < modes_.count; ++k) held += q_[k] * q_[k];
   const double small = 1e-12 * elastic_.extent;
-  has_rest_ = condensed_ || all - held > 1e-12 * all + elastic_.total * small * small;
+  beside_ = all - held > 1e-12 * all + elastic_.total * small * small;
+  has_rest_ = condensed_ || beside_;
   if (!has_rest_) return;
   const double *const in[] = {q_.data()};
   double *const out[] = {rest_.data()};

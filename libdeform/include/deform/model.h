@@ -13,14 +13,12 @@ extern "C" {
  * for the model before are not taken over, not even to the same type. A sleeping body wakes.
  * @param type    short name or full id of a loaded model
  * @param params  of the model; NULL: none. Beside them "max_jump", J: the change is refused where the elastic
- *                energy would rise or fall by more. Energy that changes have put in and that the body has not
- *                lost since is limited too: to a tenth of its largest energy, to max_jump where that is more,
- *                to four times its elastic energy where it has lost what earlier ones put in
- * @return DFM_OK; DFM_DISCARD the energy would jump by more than max_jump, changes would have put in too
- * much, or the surface would jump by more than 1e-6 of the size; DFM_E_UNSUPPORTED no such model is loaded
- * (lists those that are), or it cannot move this body: it has no stiffness for an implicit step, it steps
- * itself and the body has springs; DFM_E_ARG a parameter, or an effect that the scene asks for and only the
- * old model has; DFM_E_NOMEM; DFM_E_HANDLE; DFM_E_BUSY from inside a step. On failure nothing has changed.
+ *                energy would rise or fall by more, and what changes put in may come to as much
+ * @return DFM_OK; DFM_DISCARD the energy would jump by more than max_jump, changes would put in too much, or
+ * the surface would jump by more than 1e-6 of the size; DFM_E_UNSUPPORTED no such model is loaded (lists
+ * those that are), or it cannot move this body: it has no stiffness for an implicit step, it steps itself and
+ * the body has springs; DFM_E_ARG a parameter, or an effect that the scene asks for and only the old model
+ * has; DFM_E_NOMEM; DFM_E_HANDLE; DFM_E_BUSY from inside a step. On failure nothing has changed.
  * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_set_model(dfm_body body, const char *type, const dfm_params *params);
 
