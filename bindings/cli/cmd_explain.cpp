@@ -9,6 +9,7 @@
 #include "effect_costs.h"
 #include "json_text.h"
 #include "messages.h"
+#include "planned.h"
 #include "scene_file.h"
 
 namespace cli {
@@ -125,11 +126,14 @@ int explain(const Options &options, Globals &globals) {
     throw Failure(kBadInput, "the library's plan is not JSON: " + text.substr(0, 200));
   std::vector<EffectCost> costs;
   if (options.costs) costs = measure_effects(globals, scene, options.set, plan);
+  const std::string planned = planned_json(scene);
   if (globals.json) {
-    const std::string more = options.costs ? ",\"costs\":" + costs_json(costs) + "}" : "}";
+    const std::string more = (options.costs ? ",\"costs\":" + costs_json(costs) : "") +
+                             (planned.empty() ? "" : ",\"planner\":" + planned) + "}";
     std::printf("%s%s\n", text.substr(0, text.rfind('}')).c_str(), more.c_str());
     return kDone;
   }
+  print_planned(planned);
   print_list(plan, "effects", "effects", {"asked_by", "provided_by"});
   print_list(plan, "stages", "stages of a step, in order", {"why", "cost"});
   print_list(plan, "absent", "left out", {"why"});

@@ -19,6 +19,7 @@
 #include "leaving.h"
 #include "messages.h"
 #include "output.h"
+#include "planned.h"
 #include "progress.h"
 
 namespace cli {
@@ -308,6 +309,7 @@ class Runner {
 int run(RunOptions options, const Globals &globals) {
   if (options.out.empty()) options.out = "out/" + std::filesystem::path(options.scene).stem().string();
   const SceneFile scene(globals, options.scene, options.set, options.jitter);
+  if (const std::string short_of = planned_sentence(planned_json(scene)); !short_of.empty()) warn(short_of);
   RunResult result;
   Checks checks;
   results_lie_in(options.out);

@@ -24,19 +24,6 @@ constexpr unsigned kOutside = 1;
 constexpr double kChunk = 0.03;  // s of processor time; shorter ones are told apart badly
 constexpr unsigned kMostSteps = 20000;
 
-// What the scenes without an effect warn of is not the user's doing.
-class Quiet {
- public:
-  explicit Quiet(Globals &globals) : globals_(globals), before_(globals.quiet) { globals_.quiet = true; }
-  ~Quiet() { globals_.quiet = before_; }
-  Quiet(const Quiet &) = delete;
-  Quiet &operator=(const Quiet &) = delete;
-
- private:
-  Globals &globals_;
-  bool before_;
-};
-
 double processor_time() { return double(std::clock()) / CLOCKS_PER_SEC; }
 
 // A world that starts again and again from where it was.

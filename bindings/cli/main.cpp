@@ -177,6 +177,7 @@ int run(int argc, char **argv) {
   app.require_subcommand(1);
   cli::add_run(app, cli::globals, &exit_code);
   cli::add_explain(app, cli::globals, &exit_code);
+  cli::add_calibrate(app, cli::globals, &exit_code);
   cli::add_mesh(app, cli::globals, &exit_code);
   cli::add_plugin(app, cli::globals, &exit_code);
   cli::add_ccd(app, cli::globals, &exit_code);

@@ -23,6 +23,20 @@ inline void need(dfm_status status) {
 void warn(const std::string &sentence);          // to stderr, and kept for the summary
 void keep_warning(const std::string &sentence);  // for the summary only
 const std::vector<std::string> &warnings();
+// While it lives nothing but errors is said: what scenes that the command makes itself warn of is not the
+// user's doing.
+class Quiet {
+ public:
+  explicit Quiet(Globals &globals) : globals_(globals), before_(globals.quiet) { globals_.quiet = true; }
+  ~Quiet() { globals_.quiet = before_; }
+  Quiet(const Quiet &) = delete;
+  Quiet &operator=(const Quiet &) = delete;
+
+ private:
+  Globals &globals_;
+  bool before_;
+};
+
 // Of a type of a plugin: "law", "model", "solver".
 const char *kind_name(uint32_t kind);
 // The valid name nearest to a wrong one, for "did you mean"; empty when nothing is near.

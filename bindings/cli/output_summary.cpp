@@ -6,6 +6,7 @@
 
 #include "json_text.h"
 #include "messages.h"
+#include "planned.h"
 #include "run.h"
 #include "voxel_core.h"
 
@@ -298,6 +299,7 @@ std::string summary_json(const SceneFile &scene, const RunOptions &options, cons
       .add("impulse", run.impulses)
       .add("swaps", swaps_json(scene, run))
       .add("state_hash", hash);
+  if (const std::string planned = planned_json(scene); !planned.empty()) out.add("planner", planned);
   out.add("stopped", stopped_json(run)).add("warnings", json_array(warning_texts));
   return indented(out.text());
 }

@@ -1,5 +1,6 @@
 #include "scene_file.h"
 
+#include "costs_file.h"
 #include "messages.h"
 #include "progress.h"
 
@@ -39,6 +40,7 @@ SceneFile::SceneFile(const Globals &globals, const std::string &path, const std:
   options.nset = uint32_t(assignments.size());
   options.set = assignments.data();
   options.jitter_seed = jitter_seed;
+  offer_costs();
   {
     // surfaces are filled, grids are made
     const Patience patience(!globals.quiet && !globals.json, "reading " + path);

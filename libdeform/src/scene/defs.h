@@ -107,6 +107,7 @@ struct Start {
 
 struct Body {
   std::string pointer, name, mesh, material, model, nodal_bc;
+  bool model_open = false;  // the planner chooses; `model` holds what stands in for it
   int32_t integrator = DFM_INTEGRATOR_AUTO;
   MadeMesh made;
   OwnSurface surface;
@@ -168,6 +169,14 @@ struct Probe {
   double point[3] = {};
 };
 
+// What the planner is to reach (planner.h): an error or a time, one of the two.
+struct Wanted {
+  double target = 0;       // relative error, 0: none
+  double weight = 1;       // errors of the quantity over those of positions
+  double ms_per_step = 0;  // milliseconds of processor time, 0: none
+  bool any() const { return target > 0 || ms_per_step > 0; }
+};
+
 struct Definition {
   std::string file, folder;
   double gravity[3] = {0, 0, -9.81};
@@ -189,6 +198,7 @@ struct Definition {
   std::vector<Friction> friction;
   std::vector<Filter> filters;
   std::vector<Probe> probes;
+  Wanted wanted;
   // what only a runner needs
   double duration = 0, step = 0, every = 0, frame_rate = 0;
   bool equilibrium = false;  // mode static

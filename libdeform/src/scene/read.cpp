@@ -252,6 +252,30 @@ void read_time(const Node &scene, Definition &def) {
   def.integrator = integrator_of(time);
 }
 
+// How many times the relative error of positions that of a quantity is: energies go with squares, and forces
+// of contact and the work of friction follow them.
+double weight_of(const std::string &quantity) {
+  return quantity == "position" || quantity == "volume" || quantity == "event" ? 1 : 2;
+}
+
+void read_wanted(const Node &scene, Definition &def) {
+  if (scene.has("accuracy") && scene.has("budget"))
+    scene.member("budget").fail(
+        "\"accuracy\" is given too; the planner reaches an error or a time, keep one");
+  const char *const key = scene.has("accuracy") ? "accuracy" : "budget";
+  if (!scene.has(key)) return;
+  const Node wanted = scene.member(key);
+  if (def.equilibrium)
+    wanted.fail("a static scene has no step to choose; take \"%s\" or /time/mode away", key);
+  wanted.object(key);
+  if (scene.has("accuracy")) {
+    def.wanted.target = wanted.at("target").number(Range{0, 1, true, true});
+    def.wanted.weight = weight_of(wanted.word("quantity", "position", "quantity"));
+  } else {
+    def.wanted.ms_per_step = wanted.at("ms_per_step").number(kPositive);
+  }
+}
+
 void read_solver(const Node &scene, Definition &def) {
   if (!scene.has("solver")) return;
   const Node solver = scene.member("solver");
@@ -474,6 +498,8 @@ Definition read_scene(json &tree, const std::string &file, const Types &types) {
   ReadContext context{types, {}, {}};
   read_gravity(scene, def);
   read_time(scene, def);
+  read_wanted(scene, def);
+  context.planned = def.wanted.any();
   read_effects(scene, def);
   read_solver(scene, def);
   read_materials(scene, def, context);

@@ -8,6 +8,7 @@ namespace dfm::scene {
 struct ReadContext {
   const Types &types;
   std::vector<std::string> materials, sides;  // names so far; sides: bodies and obstacles
+  bool planned = false;                       // the planner chooses models that are not named
 };
 
 Definition read_scene(json &tree, const std::string &file, const Types &types);

@@ -267,6 +267,15 @@ void read_rule(const Node &rule, const Types &types, SwitchRule &out) {
   if (rule.has("max_jump")) out.values.max_jump = rule.member("max_jump").number(kPositive);
 }
 
+// Keys that belong to one model leave nothing to choose.
+void check_open(const Node &body, const Node &model) {
+  const char *const sentence =
+      "this goes with one model, which the planner would choose; name it in /model/type";
+  if (model.has("params")) model.member("params").fail("%s", sentence);
+  for (const char *key : {"fields", "anisotropy", "switch"})
+    if (body.has(key)) body.member(key).fail("%s", sentence);
+}
+
 Body read_body(const Node &node, ReadContext &context) {
   Body b;
   node.object("body");
@@ -281,7 +290,9 @@ Body read_body(const Node &node, ReadContext &context) {
   if (!node.has("model")) node.value()["model"] = json::object();
   const Node model = node.member("model");
   model.object("model");
-  if (!model.has("type")) model.value()["type"] = "msm";
+  if (context.planned) b.model_open = !model.has("type") || model.value()["type"] == "auto";
+  if (b.model_open) check_open(node, model);
+  if (!model.has("type") || b.model_open) model.value()["type"] = "msm";
   const dfm_type *type = read_type(model.member("type"), DFM_KIND_MODEL, context.types);
   b.model = type->id;
   b.integrator = integrator_of(node);

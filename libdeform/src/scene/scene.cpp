@@ -3,6 +3,7 @@
 #include "core/error.h"
 #include "scene/build.h"
 #include "scene/node.h"
+#include "scene/planner.h"
 #include "scene/read.h"
 
 namespace dfm::scene {
@@ -32,7 +33,14 @@ Scene::Scene(dfm_context *context, const std::string &path, const dfm_scene_opti
       fail(DFM_E_ARG, "scene options: set[%u] is NULL, expected \"/json/pointer=value\"", i);
     apply_set(tree_->root, options->set[i], path);
   }
-  definition_ = read_scene(tree_->root, path, Types(context));
+  const Types types(context);
+  definition_ = read_scene(tree_->root, path, types);
+  if (definition_.wanted.any()) {
+    // The scene then says what was chosen, and is read as if its file had said so.
+    json chosen = plan_scene(context, definition_, types, tree_->root);
+    definition_ = read_scene(tree_->root, path, types);
+    tree_->root[definition_.wanted.target > 0 ? "accuracy" : "budget"]["chosen"] = std::move(chosen);
+  }
   Built built = build(context, definition_, options ? options->jitter_seed : 0);
   world_ = built.world;
   probes_ = std::move(built.probes);

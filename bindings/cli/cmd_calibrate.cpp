@@ -1,0 +1,358 @@
+// deform calibrate: what the loaded models cost on this machine, and what they leave out, for the planner.
+#include <CLI/CLI.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <ctime>
+#include <functional>
+#include <memory>
+
+#include "costs_file.h"
+#include "file.h"
+#include "json_text.h"
+#include "messages.h"
+#include "progress.h"
+#include "run_folder.h"
+
+namespace cli {
+namespace {
+
+constexpr double kFrame = 1.0 / 60;  // s
+constexpr double kYoung = 1e5, kPoisson = 0.3, kDensity = 1000, kGravity = 9.81;
+constexpr double kShare = 0.2;  // s of processor time for one figure
+
+double processor_time() { return double(std::clock()) / CLOCKS_PER_SEC; }
+
+struct Setting {
+  std::string model;
+  int32_t integrator = DFM_INTEGRATOR_AUTO;
+  double size[3] = {0.4, 0.1, 0.1};  // m
+  uint32_t cells = 1000;
+  double young = kYoung, damping_mass = 0, damping_stiffness = 1e-3, gravity = kGravity, spin = 0;
+  bool held = false, floor = false;
+};
+
+// One bar, of one model.
+class Bar {
+ public:
+  Bar(dfm_context *context, const Setting &s) : context_(context) {
+    try {
+      make(s);
+    } catch (...) {
+      close();
+      throw;
+    }
+  }
+  ~Bar() { close(); }
+  Bar(const Bar &) = delete;
+  Bar &operator=(const Bar &) = delete;
+
+  dfm_world world() const { return world_; }
+  uint32_t points() const { return info_.npoint; }
+  // s, +infinity where nothing bounds the step
+  double stable_step() const {
+    double h = 0;
+    need(dfm_world_stable_step(world_, &h, nullptr, nullptr));
+    return h;
+  }
+  // s, in which a pressure wave goes by the size that the planner takes for that of cells
+  double wave_time() const {
+    const double modulus = kYoung * (1 - kPoisson) / ((1 + kPoisson) * (1 - 2 * kPoisson));
+    return info_.edge_min * info_.quality_min / std::sqrt(modulus / kDensity);
+  }
+  void step(double h) const {
+    const dfm_status status = dfm_world_step(world_, h, nullptr);
+    need(status);
+    if (status != DFM_OK) throw Failure(kBadInput, "a step is discarded");
+  }
+  void run(double h, double seconds) const {
+    for (double t = 0; t < seconds; t += h) step(h);
+  }
+  std::vector<double> displacements() const {
+    std::vector<double> x(3 * size_t(info_.npoint));
+    uint32_t n = 0;
+    need(dfm_body_get_state(body_, info_.npoint, x.data(), nullptr, &n));
+    for (size_t i = 0; i < x.size(); ++i) x[i] -= start_[i];
+    return x;
+  }
+
+ private:
+  void make(const Setting &s) {
+    dfm_world_def w = dfm_world_def_default();
+    w.gravity[2] = -s.gravity;
+    w.integrator = s.integrator;
+    w.step = kFrame;
+    need(dfm_world_create(context_, &w, &world_));
+    need(dfm_tetmesh_make(context_, "beam", s.size, s.cells, &mesh_));
+    info_.size = sizeof info_;
+    need(dfm_tetmesh_get_info(mesh_, &info_));
+    dfm_material_def m = dfm_material_def_default();
+    m.density = kDensity;
+    m.young = s.young;
+    m.poisson = kPoisson;
+    m.damping_mass = s.damping_mass;
+    m.damping_stiffness = s.damping_stiffness;
+    dfm_body_def b = dfm_body_def_default();
+    need(dfm_material_create(world_, &m, &b.material));
+    const double *points = nullptr;
+    need(dfm_tetmesh_data(mesh_, &points, &b.tets, nullptr));
+    std::vector<uint8_t> fixed(info_.npoint, 0);
+    for (uint32_t i = 0; s.held && i < info_.npoint; ++i)
+      if (points[3 * size_t(i)] < 1e-9) fixed[i] = 7;
+    b.npoint = info_.npoint;
+    b.ntet = info_.ntet;
+    b.points = points;
+    b.fixed = fixed.data();
+    b.model = s.model.c_str();
+    b.spin[1] = s.spin;
+    need(dfm_body_create(world_, &b, &body_));
+    if (s.floor) {
+      dfm_obstacle_def floor = dfm_obstacle_def_default();
+      dfm_obstacle made = 0;
+      need(dfm_obstacle_create(world_, &floor, &made));
+    }
+    start_.resize(3 * size_t(info_.npoint));
+    uint32_t n = 0;
+    need(dfm_body_get_state(body_, info_.npoint, start_.data(), nullptr, &n));
+  }
+  void close() {
+    if (mesh_) dfm_tetmesh_destroy(mesh_);
+    if (world_) dfm_world_destroy(world_);
+  }
+
+  dfm_context *context_;
+  dfm_world world_ = 0;
+  dfm_tetmesh mesh_ = 0;
+  dfm_tetmesh_info info_ = {};
+  dfm_body body_ = 0;
+  std::vector<double> start_;
+};
+
+// Mean distance over the mean displacement of the reference.
+double difference(const std::vector<double> &a, const std::vector<double> &reference) {
+  double away = 0, scale = 0;
+  for (size_t i = 0; i < a.size(); i += 3) {
+    away += std::hypot(a[i] - reference[i], a[i + 1] - reference[i + 1], a[i + 2] - reference[i + 2]);
+    scale += std::hypot(reference[i], reference[i + 1], reference[i + 2]);
+  }
+  return away / scale;
+}
+
+// Young's modulus at which a bar of 1 m x 0.1 m x 0.1 m sags by this share of its length, by linear theory.
+double young_for(double sag) { return 1.5 * kDensity * kGravity * 100 / sag; }
+
+// The four cases in which models differ; each gives displacements at rest, or at the end of a turn.
+std::vector<double> bent(dfm_context *context, const std::string &model, int32_t integrator, double sag) {
+  Setting s;
+  s.model = model;
+  s.integrator = integrator;
+  const double size[3] = {1, 0.1, 0.1};
+  std::copy_n(size, 3, s.size);
+  s.cells = 1500;
+  s.young = young_for(sag);
+  const double lowest = 3.516 * 0.1 / std::sqrt(12.0) * std::sqrt(s.young / kDensity);  // rad/s
+  s.damping_mass = 2 * lowest;
+  s.held = true;
+  const Bar bar(context, s);
+  bar.run(kFrame, 12 / lowest);
+  return bar.displacements();
+}
+
+std::vector<double> turned(dfm_context *context, const std::string &model) {
+  constexpr double kTime = 0.25;  // s
+  Setting s;
+  s.model = model;
+  s.gravity = 0;
+  s.young = 1e6;
+  s.spin = 1.5707963 / kTime;
+  const Bar bar(context, s);
+  bar.run(1.0 / 960, kTime);
+  return bar.displacements();
+}
+
+std::vector<double> lying(dfm_context *context, const std::string &model, int32_t integrator) {
+  Setting s;
+  s.model = model;
+  s.integrator = integrator;
+  const double size[3] = {0.1, 0.1, 0.1};
+  std::copy_n(size, 3, s.size);
+  s.young = 0.5 * kDensity * kGravity * 0.1 / 0.02;  // sags by 2 %
+  s.damping_mass = 50;
+  s.floor = true;
+  const Bar bar(context, s);
+  bar.run(kFrame, 1);
+  return bar.displacements();
+}
+
+class Calibration {
+ public:
+  // wanted: a terminal is told how far it is
+  Calibration(dfm_context *context, bool wanted, const std::vector<std::string> &only)
+      : context_(context), wanted_(wanted) {
+    need(dfm_plugin_visit(
+        context,
+        [](void *user, const dfm_type *type, const char *) {
+          if (type->kind == DFM_KIND_MODEL)
+            static_cast<std::vector<std::string> *>(user)->push_back(type->id);
+        },
+        &models_));
+    if (only.empty()) return;
+    for (const std::string &name : only)
+      if (std::none_of(models_.begin(), models_.end(), [&](auto &id) { return named(id, name); }))
+        throw Failure(kBadInput,
+                      "--model: no loaded plugin offers the model \"" + name + "\"; see: deform plugin list");
+    std::erase_if(models_, [&](const std::string &id) {
+      return std::none_of(only.begin(), only.end(), [&](auto &name) { return named(id, name); });
+    });
+  }
+
+  std::vector<std::string> left_out;  // sentences
+
+  std::string run(const std::string &machine) {
+    reference_ = {bent(context_, kReference, DFM_INTEGRATOR_IMPLICIT_EULER, kLittle),
+                  bent(context_, kReference, DFM_INTEGRATOR_IMPLICIT_EULER, kFar),
+                  turned(context_, kReference), lying(context_, kReference, DFM_INTEGRATOR_IMPLICIT_EULER)};
+    std::vector<std::string> rows;
+    for (const std::string &id : models_) {
+      const Patience patience(wanted_, "measuring " + id);
+      try {
+        rows.push_back(model_row(id));
+      } catch (const Failure &why) {
+        left_out.push_back("the model " + id + " is left out of the costs: " + why.what());
+      }
+    }
+    return JsonObject()
+        .add("format", quoted("deform-costs"))
+        .add("version", "1")
+        .add("machine", quoted(machine))
+        .add("models", json_array(rows))
+        .text();
+  }
+
+ private:
+  static constexpr const char *kReference = "org.deform.corotational_fem";
+  static constexpr double kLittle = 0.02, kFar = 0.8;  // sag over length of the linear bar
+
+  static std::string short_name(const std::string &id) { return id.substr(id.rfind('.') + 1); }
+  static bool named(const std::string &id, const std::string &name) {
+    return id == name || short_name(id) == name;
+  }
+
+  struct Reference { std::vector<double> little, far, turned, lying; };
+
+  std::string model_row(const std::string &id) {
+    Setting s;
+    s.model = id;
+    s.integrator = DFM_INTEGRATOR_SYMPLECTIC_EULER;
+    s.damping_stiffness = 0;
+    const Bar bar(context_, s);
+    const double stable = bar.stable_step();
+    const bool itself = !std::isfinite(stable);
+    const int32_t still = itself ? DFM_INTEGRATOR_AUTO : DFM_INTEGRATOR_IMPLICIT_EULER;
+    JsonObject errors;
+    errors.add("bends_little", number(difference(bent(context_, id, still, kLittle), reference_.little)))
+        .add("bends_far", number(difference(bent(context_, id, still, kFar), reference_.far)))
+        .add("turns", number(difference(turned(context_, id), reference_.turned)))
+        .add("lies", number(difference(lying(context_, id, still), reference_.lying)));
+    JsonObject costs;
+    costs.add("symplectic_euler", sizes(id, DFM_INTEGRATOR_SYMPLECTIC_EULER, itself));
+    if (!itself) {
+      costs.add("implicit_euler", sizes(id, DFM_INTEGRATOR_IMPLICIT_EULER, false));
+      costs.add("tr_bdf2", sizes(id, DFM_INTEGRATOR_TR_BDF2, false));
+    }
+    return JsonObject()
+        .add("model", quoted(short_name(id)))
+        .add("steps_itself", itself ? "true" : "false")
+        .add("step_factor", number(itself ? 0 : stable / bar.wave_time()))
+        .add("errors", errors.text())
+        .add("costs", costs.text())
+        .text();
+  }
+
+  std::string sizes(const std::string &id, int32_t integrator, bool itself) {
+    JsonObject out;
+    for (const bool touching : {false, true}) {
+      std::vector<std::string> rows;
+      for (const uint32_t cells : {400u, 2000u, 8000u}) {
+        Setting s;
+        s.model = id;
+        s.integrator = integrator;
+        s.cells = cells;
+        s.held = !touching;
+        s.floor = touching;
+        const Bar bar(context_, s);
+        const bool explicit_time = integrator == DFM_INTEGRATOR_SYMPLECTIC_EULER && !itself;
+        rows.push_back(JsonObject()
+                           .add("points", std::to_string(bar.points()))
+                           .add("ns_per_point", number(cost(bar, explicit_time ? bar.stable_step() : kFrame)))
+                           .text());
+      }
+      out.add(touching ? "touching" : "free", json_array(rows));
+    }
+    return out.text();
+  }
+
+  // ns of a sub-step per point: of the first steps, since what moves costs more than what rests, but for what
+  // is made once
+  static double cost(const Bar &bar, double h) {
+    for (int i = 0; i < 2; ++i) bar.step(h);
+    const double begin = processor_time();
+    double spent = 0;
+    unsigned n = 0;
+    for (; spent < kShare || n < 4; ++n) {
+      bar.step(h);
+      spent = processor_time() - begin;
+    }
+    return 1e9 * spent / n / bar.points();
+  }
+
+  dfm_context *context_;
+  bool wanted_;
+  std::vector<std::string> models_;
+  Reference reference_;
+};
+
+int calibrate(std::string out, const std::vector<std::string> &models, Globals &globals) {
+  if (out.empty()) out = costs_file();
+  if (out.empty()) throw Failure(kBadInput, "there is no home folder to write to; name a file with --out");
+  std::unique_ptr<dfm_context, decltype(&dfm_context_destroy)> context(make_context(globals),
+                                                                       &dfm_context_destroy);
+  Calibration calibration(context.get(), !globals.quiet && !globals.json, models);
+  std::string text;
+  {
+    const Quiet quiet(globals);
+    text = calibration.run(machine_name());
+  }
+  for (const std::string &sentence : calibration.left_out) warn(sentence);
+  const size_t slash = out.rfind('/');
+  if (slash != std::string::npos && slash > 0) make_folder(out.substr(0, slash));
+  write_whole(out, indented(text) + "\n");
+  if (globals.json) std::printf("%s\n", text.c_str());
+  else std::printf("costs of this machine: %s\n", out.c_str());
+  return kDone;
+}
+
+}  // namespace
+
+void add_calibrate(CLI::App &app, Globals &globals, int *exit_code) {
+  struct Options {
+    std::string out;
+    std::vector<std::string> models;
+  };
+  auto options = std::make_shared<Options>();
+  CLI::App *sub = app.add_subcommand(
+      "calibrate", "measures what models cost on this machine and what they leave out, for the planner");
+  sub->add_option("--out", options->out,
+                  "file to write (default: $XDG_CONFIG_HOME/deform/costs.json, which the command then takes "
+                  "for every scene with an accuracy or a budget)")
+      ->type_name("FILE");
+  sub->add_option("--model", options->models,
+                  "measure this model alone; may be repeated (default: all loaded)")
+      ->type_name("ID")
+      ->take_all()
+      ->allow_extra_args(false);
+  sub->callback([=, &globals] { *exit_code = calibrate(options->out, options->models, globals); });
+}
+
+}  // namespace cli

@@ -1,0 +1,42 @@
+#include "costs_file.h"
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+
+#include "messages.h"
+
+namespace cli {
+namespace fs = std::filesystem;
+
+std::string costs_file() {
+  const char *const config = std::getenv("XDG_CONFIG_HOME"), *const home = std::getenv("HOME");
+  if (config && *config) return std::string(config) + "/deform/costs.json";
+  if (home && *home) return std::string(home) + "/.config/deform/costs.json";
+  return "";
+}
+
+void offer_costs() {
+  const std::string path = costs_file();
+  std::error_code ignored;
+  if (!path.empty() && fs::is_regular_file(path, ignored)) setenv("DEFORM_COSTS", path.c_str(), 0);
+}
+
+std::string machine_name() {
+  std::ifstream info("/proc/cpuinfo");
+  std::string line, name = "unknown processor";
+  while (std::getline(info, line))
+    if (line.rfind("model name", 0) == 0) {
+      name = line.substr(line.find(':') + 2);
+      break;
+    }
+  return name + ", " +
+#ifdef __clang__
+         "clang " __clang_version__
+#else
+         "gcc " __VERSION__
+#endif
+         + ", deform " + dfm_version(nullptr, nullptr, nullptr);
+}
+
+}  // namespace cli

@@ -1,0 +1,73 @@
+#include "planned.h"
+
+#include <cstdio>
+#include <cstdlib>
+
+#include "json_text.h"
+
+namespace cli {
+namespace {
+
+std::string percent(const JsonValue &row, const char *key) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.2g %%", 100 * std::strtod(row.get(key).c_str(), nullptr));
+  return text;
+}
+double value(const JsonValue &row, const char *key) { return std::strtod(row.get(key).c_str(), nullptr); }
+
+void print_way(const JsonValue &way, const char *begin) {
+  const JsonValue *const bodies = way.find("bodies");
+  std::string models;
+  for (size_t i = 0; bodies && i < bodies->items.size() && i < 4; ++i)
+    models += (i ? ", " : "") + bodies->items[i].get("model");
+  if (bodies && bodies->items.size() > 4) models += ", ...";
+  const std::string scheme = bodies && !bodies->items.empty() ? bodies->items[0].get("integrator") : "";
+  std::printf("%s%-38s  %-16s  step %-9.9s  error %-8s  %.3g s per s, %.3g ms per step\n", begin,
+              models.c_str(), scheme.c_str(), way.get("step").c_str(), percent(way, "error").c_str(),
+              value(way, "cpu_s_per_s"), value(way, "ms_per_step"));
+}
+
+}  // namespace
+
+std::string planned_json(const SceneFile &scene) {
+  const std::string accuracy = scene.value("/accuracy/chosen");
+  return accuracy.empty() ? scene.value("/budget/chosen") : accuracy;
+}
+
+void print_planned(const std::string &json) {
+  JsonValue plan;
+  if (json.empty() || !parse_json(json, plan)) return;
+  std::printf("planner (predicted, not measured; deform cost measures)\n  by costs of: %s\n",
+              plan.get("costs").c_str());
+  const JsonValue *const assumed = plan.find("assumed"), *const set = plan.find("set"),
+                         *const way = plan.find("predicted"), *const ways = plan.find("considered");
+  for (size_t i = 0; assumed && i < assumed->items.size(); ++i)
+    std::printf("  assumed: %s\n", assumed->items[i].text.c_str());
+  for (size_t i = 0; ways && i < ways->items.size(); ++i) print_way(ways->items[i], "  possible: ");
+  if (way) {
+    print_way(*way, plan.get("meets") == "true" ? "  chosen:   " : "  nearest:  ");
+    const JsonValue *const bodies = way->find("bodies");
+    for (size_t i = 0; bodies && i < bodies->items.size(); ++i) {
+      const JsonValue &b = bodies->items[i];
+      std::printf("  %-20s  %s: error of the model %s, of time %s, of the mesh %s\n", b.get("name").c_str(),
+                  b.get("model").c_str(), percent(b, "model_error").c_str(), percent(b, "time_error").c_str(),
+                  percent(b, "mesh_error").c_str());
+    }
+  }
+  for (size_t i = 0; set && i < set->members.size(); ++i)
+    std::printf("  to fix it in the scene: --set %s=%s\n", set->members[i].name.c_str(),
+                set->members[i].value.text.c_str());
+}
+
+std::string planned_sentence(const std::string &json) {
+  JsonValue plan;
+  if (json.empty() || !parse_json(json, plan) || plan.get("meets") == "true") return "";
+  const JsonValue *const way = plan.find("predicted");
+  return "the planner finds no way that meets what the scene asks for; it takes the nearest, with a "
+         "predicted "
+         "error of " +
+         (way ? percent(*way, "error") + " and " + way->get("ms_per_step") + " ms per step" : "?") +
+         " (see: deform explain)";
+}
+
+}  // namespace cli

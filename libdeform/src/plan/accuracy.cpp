@@ -1,0 +1,278 @@
+#include "plan/accuracy.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+
+namespace dfm {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+constexpr double kFrame = 1.0 / 60;  // s
+
+double at_most(double x, double most) { return x < most ? x : most; }
+
+// Between measured sizes along a power law, beyond them along the last one.
+double ns_per_point(const std::vector<CostAt> &costs, double points) {
+  if (costs.size() == 1) return costs[0].ns;
+  size_t k = 1;
+  while (k + 1 < costs.size() && costs[k].points < points) ++k;
+  const CostAt &a = costs[k - 1], &b = costs[k];
+  const double slope = std::log(b.ns / a.ns) / std::log(b.points / a.points);
+  // below the least size cost per point stays, for what is small fits the caches all the same
+  return a.ns * std::pow(std::max(points, costs[0].points) / a.points, slope);
+}
+
+const std::vector<CostAt> &costs_of(const MeasuredModel &m, Scheme scheme, bool touches) {
+  return m.costs[static_cast<size_t>(scheme)][touches ? 1 : 0];
+}
+
+// Of bending: along the power law through the two bars that were measured, by the angles that `estimate`
+// gives for them.
+double bending_error(const MeasuredModel &m, double rotation) {
+  constexpr double kLittle = 4.0 / 3 * 0.02, kFar = 4.0 / 3 * 0.8;  // rad
+  if (m.bends_little <= 0 || m.bends_far <= 0) return std::max(m.bends_little, m.bends_far);
+  const double power = std::log(m.bends_far / m.bends_little) / std::log(kFar / kLittle);
+  return m.bends_little * std::pow(std::max(rotation, 1e-6) / kLittle, std::max(power, 0.0));
+}
+
+double model_error(const MeasuredModel &m, const BodyRegime &b, const Estimate &e) {
+  double error = bending_error(m, e.rotation);
+  if (b.touches && !b.held) error = std::max(error, m.lies);
+  if (b.turns) error = std::max(error, m.turns);
+  return at_most(error, 1);
+}
+
+// Linear tetrahedra: second order in edge over thickness. The factor of bending is that of a bar of 0.1 m
+// with edges of 0.019 m (doc/models/compared.md: 1.7 %).
+double mesh_error(const BodyRegime &b) {
+  constexpr double kBending = 0.45, kElse = 0.1;
+  const double cells = b.thickness / b.edge;
+  return at_most((b.held ? kBending : kElse) / (cells * cells), 1);
+}
+
+// What the scheme does to the lowest mode until damping has ended it; how far a body goes between two looks
+// at what it may touch; and how much of a rebound backward Euler takes away, which all that follows lacks.
+double time_error(Scheme scheme, bool steps_itself, double h, const BodyRegime &b, const Estimate &e) {
+  const double wh = e.frequency * h, turns = e.frequency * e.lasts;
+  double oscillation = 0;
+  if (steps_itself && !b.touches) oscillation = 0;  // exact by mode
+  else if (scheme == Scheme::explicit_euler && !steps_itself) oscillation = wh * wh / 24 * turns;
+  else if (scheme == Scheme::tr_bdf2 && !b.touches) oscillation = 0.0404 * wh * wh * turns;  // Bank 1985
+  else oscillation = -std::expm1(-0.5 * wh * turns);  // backward Euler: the amplitude that it takes away
+  const double scale = std::max({e.sag, b.travel, 1e-12});
+  const double share = e.sag / scale;  // of what moves, that oscillates
+  const double event = b.touches ? b.speed * h / scale : 0;
+  const bool damps = steps_itself || scheme != Scheme::explicit_euler;
+  const double rebound = b.touches && !b.held && damps ? -std::expm1(-0.5 * kPi * wh) * b.after : 0;
+  return at_most(std::max(share * at_most(oscillation, 1), rebound) + event, 1);
+}
+
+// s. With h0 = 2/w the step of the stiffest mode without damping, h^2 w^2 + 2 h beta w^2 <= 4
+// (doc/concepts/step.md) leaves h = sqrt(h0^2 + beta^2) - beta.
+double explicit_step(const MeasuredModel &m, const BodyRegime &b) {
+  const double nu = std::min(std::max(b.poisson, 0.0), 0.49);
+  const double pressure = std::sqrt(b.young * (1 - nu) / ((1 + nu) * (1 - 2 * nu)) / b.density);
+  const double h0 = m.step_factor * b.cell_size / pressure, beta = b.damping_stiffness;
+  return h0 * h0 / (std::hypot(h0, beta) + beta);
+}
+
+struct Try {
+  const BodyRegime *body;
+  Estimate e;
+};
+
+bool may(const BodyRegime &b, const MeasuredModel &m, Scheme scheme) {
+  if (!b.model.empty() && b.model != m.id) return false;
+  if (b.model.empty() && std::find(b.models.begin(), b.models.end(), m.id) == b.models.end()) return false;
+  if (m.steps_itself) return !costs_of(m, Scheme::explicit_euler, b.touches).empty();
+  if (b.scheme >= 0 && static_cast<Scheme>(b.scheme) != scheme) return false;
+  return !costs_of(m, scheme, b.touches).empty();
+}
+
+BodyWay way_of(const MeasuredModel &m, Scheme scheme, double h, const Try &t, const Wish &wish) {
+  const Scheme own = m.steps_itself ? Scheme::explicit_euler : scheme;
+  BodyWay w;
+  w.model = m.id;
+  w.scheme = own;
+  w.model_error = at_most(wish.weight * model_error(m, *t.body, t.e), 1);
+  w.time_error = at_most(wish.weight * time_error(own, m.steps_itself, h, *t.body, t.e), 1);
+  w.mesh_error = at_most(wish.weight * mesh_error(*t.body), 1);
+  w.cpu_s_per_s = 1e-9 * ns_per_point(costs_of(m, own, t.body->touches), t.body->points) * t.body->points / h;
+  return w;
+}
+
+double sum(const BodyWay &w) { return w.model_error + w.time_error; }
+
+// Less is better. With a target: whoever meets it by cost, the others by error. With a budget the other way
+// round.
+bool better(const BodyWay &a, const BodyWay &b, const Wish &wish, double budget) {
+  const bool errs = wish.target > 0;
+  const bool am = errs ? sum(a) <= wish.target : a.cpu_s_per_s <= budget;
+  const bool bm = errs ? sum(b) <= wish.target : b.cpu_s_per_s <= budget;
+  if (am != bm) return am;
+  return am == errs ? a.cpu_s_per_s < b.cpu_s_per_s : sum(a) < sum(b);
+}
+
+class Planner {
+ public:
+  Planner(const std::vector<BodyRegime> &bodies, const Measured &measured, const Wish &wish)
+      : measured_(measured), wish_(wish) {
+    for (const BodyRegime &b : bodies) tries_.push_back({&b, estimate(b, wish.duration)});
+  }
+
+  PlannedWay run() {
+    for (size_t s = 0; s < kSchemes; ++s) {
+      const Scheme scheme = static_cast<Scheme>(s);
+      if (scheme == Scheme::explicit_euler) try_scheme(scheme, wish_.step);
+      else if (wish_.step > 0) try_scheme(scheme, wish_.step);
+      else
+        for (int k = 0; k < 6; ++k) try_scheme(scheme, kFrame / (1 << k));
+    }
+    std::sort(out_.considered.begin(), out_.considered.end(),
+              [](const Way &a, const Way &b) { return a.cpu_s_per_s < b.cpu_s_per_s; });
+    for (const Way &w : out_.considered) {
+      const bool first = !out_.found;
+      out_.found = true;
+      if (first || wins(w, out_.way)) out_.way = w;
+    }
+    // who is dearer than another and errs as much is not worth a line
+    double least = 2;
+    std::erase_if(out_.considered, [&](const Way &w) {
+      const bool behind = reach(w) >= least;
+      least = std::min(least, reach(w));
+      return behind;
+    });
+    if (out_.found) out_.meets = meets(out_.way);
+    say();
+    return out_;
+  }
+
+ private:
+  double reach(const Way &w) const {
+    double most = 0;
+    for (const BodyWay &b : w.bodies) most = std::max(most, sum(b));
+    return most;
+  }
+  bool meets(const Way &w) const {
+    return wish_.target > 0 ? reach(w) <= wish_.target : ms_per_step(w) <= wish_.ms_per_step;
+  }
+  bool wins(const Way &a, const Way &b) const {
+    const bool am = meets(a), bm = meets(b);
+    if (am != bm) return am;
+    return am == (wish_.target > 0) ? a.cpu_s_per_s < b.cpu_s_per_s : reach(a) < reach(b);
+  }
+
+  // step 0: as long as explicit time allows
+  void try_scheme(Scheme scheme, double step) {
+    std::vector<const MeasuredModel *> models;
+    double h = step > 0 ? step : kFrame;
+    const double budget = wish_.ms_per_step * 1e-3 / (wish_.step > 0 ? wish_.step : kFrame) / tries_.size();
+    bool bounded = false;
+    for (const Try &t : tries_) {
+      const MeasuredModel *best = nullptr;
+      BodyWay best_way;
+      for (const MeasuredModel &m : measured_.models) {
+        if (!may(*t.body, m, scheme)) continue;
+        const bool explicit_time = scheme == Scheme::explicit_euler && !m.steps_itself;
+        const double own = explicit_time ? std::min(h_of(step), explicit_step(m, *t.body)) : h_of(step);
+        const BodyWay way = way_of(m, scheme, own, t, wish_);
+        if (!best || better(way, best_way, wish_, budget)) {
+          best = &m;
+          best_way = way;
+        }
+      }
+      if (!best) return;
+      models.push_back(best);
+      if (scheme == Scheme::explicit_euler && !best->steps_itself) {
+        h = std::min(h, explicit_step(*best, *t.body));
+        bounded = true;
+      }
+    }
+    const bool used = std::any_of(models.begin(), models.end(), [](auto *m) { return !m->steps_itself; });
+    if (!used && scheme == Scheme::tr_bdf2) return;  // the same as with implicit_euler: all step themselves
+    Way way;
+    way.step = scheme == Scheme::explicit_euler && bounded ? step : h_of(step);
+    // sub-steps are equal parts of the step
+    way.substep = step > 0 ? step / std::ceil(step / h - 1e-9) : h;
+    for (size_t i = 0; i < tries_.size(); ++i) {
+      way.bodies.push_back(way_of(*models[i], scheme, way.substep, tries_[i], wish_));
+      const BodyWay &b = way.bodies.back();
+      way.error = std::max(way.error, at_most(sum(b) + b.mesh_error, 1));
+      way.cpu_s_per_s += b.cpu_s_per_s;
+    }
+    out_.considered.push_back(way);
+  }
+  static double h_of(double step) { return step > 0 ? step : kFrame; }
+
+  void say() {
+    for (size_t i = 0; i < tries_.size(); ++i) {
+      const BodyRegime &b = *tries_[i].body;
+      const Estimate &e = tries_[i].e;
+      out_.assumed.push_back(format(
+          "body '%s': %u points, %.2g cells across its thinnest side; load %.3g m/s2 and speed %.3g m/s make "
+          "a "
+          "strain of about %.2g and turn parts by %.2g rad; lowest mode at %.3g Hz, which lasts %.3g s%s%s",
+          b.name.c_str(), b.points, b.thickness / b.edge, b.load, b.speed, e.strain, e.rotation,
+          e.frequency / (2 * kPi), e.lasts, b.held ? "; held" : "; free",
+          b.touches ? ", may touch something" : ", touches nothing"));
+      const double mesh = mesh_error(b) * wish_.weight, limit = wish_.target > 0 ? wish_.target : 1;
+      if (mesh > limit)
+        out_.assumed.push_back(
+            format("body '%s': its mesh alone makes an error of about %.2g; about %.1f times as many cells "
+                   "would make %.2g",
+                   b.name.c_str(), mesh, std::pow(mesh / limit, 1.5), limit));
+    }
+  }
+
+  const Measured &measured_;
+  Wish wish_;
+  std::vector<Try> tries_;
+  PlannedWay out_;
+};
+
+}  // namespace
+
+const char *scheme_name(Scheme scheme) {
+  constexpr const char *kNames[kSchemes] = {"symplectic_euler", "implicit_euler", "tr_bdf2"};
+  return kNames[static_cast<size_t>(scheme)];
+}
+
+// A beam of the body's box. Held: a cantilever (Euler, Bernoulli; first root 1.875); free: both ends free
+// (4.730); a block that is as long as thick moves along its length (pi c / L, or half of it where held).
+Estimate estimate(const BodyRegime &b, double duration) {
+  Estimate e;
+  const double c = e.wave_speed = std::sqrt(b.young / b.density);
+  const double slender = b.length / b.thickness, gyration = b.thickness / std::sqrt(12.0);
+  const double root = b.held ? 1.875 : 4.730;
+  const double bending = root * root * gyration * c / (b.length * b.length);
+  const double along = (b.held ? 0.5 : 1.0) * kPi * c / b.length;
+  e.frequency = std::min(bending, along);
+  const double rate = 0.5 * (b.damping_mass + b.damping_stiffness * e.frequency * e.frequency);
+  const double weight = b.load * b.length / (c * c);  // rho a L / E
+  double deflection = 0;                              // over the length
+  if (b.held) {
+    // a load that comes at once swings beyond its rest
+    const double swing = 1 + std::exp(-kPi * at_most(rate / e.frequency, 10));
+    deflection = at_most(swing * 1.5 * weight * slender * slender, 1);
+    e.strain = at_most(swing * std::max(weight, 3 * weight * slender), 1);
+  } else if (b.touches) {
+    e.strain = at_most(weight, 1);
+    deflection = 0.5 * e.strain;
+  }
+  const double blow = b.touches ? b.speed / c : 0;
+  e.strain = at_most(std::max(e.strain, blow), 1);
+  e.rotation = at_most(std::max(b.held ? 4.0 / 3 * deflection : e.strain, blow), kPi / 2);
+  e.sag = std::max(deflection, blow) * b.length;
+  e.lasts = rate > 0 ? std::min(duration, 3 / rate) : duration;
+  return e;
+}
+
+double ms_per_step(const Way &way) { return 1e3 * way.cpu_s_per_s * (way.step > 0 ? way.step : kFrame); }
+
+PlannedWay plan_accuracy(const std::vector<BodyRegime> &bodies, const Measured &measured, const Wish &wish) {
+  return Planner(bodies, measured, wish).run();
+}
+
+}  // namespace dfm

@@ -1,0 +1,107 @@
+// The planner: which model, integrator and step reach an accuracy for the least processor time, or the best
+// accuracy for a given time. It predicts, before anything moves, from a few numbers of each body and from
+// what models were measured to cost and to leave out (`deform calibrate`); it may be wrong, so it says what
+// it assumed. Rules and their sources: doc/concepts/planner.md.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace dfm {
+
+// ---- what was measured -----------------------------------------------------------------------------------
+
+// Ways to advance a body. A model that steps itself has only the first.
+enum class Scheme { explicit_euler, implicit_euler, tr_bdf2 };
+inline constexpr size_t kSchemes = 3;
+const char *scheme_name(Scheme scheme);  // as a scene names it
+
+struct CostAt {
+  double points = 0, ns = 0;  // of a body; processor time of one sub-step per point
+};
+
+struct MeasuredModel {
+  std::string id;  // short name
+  bool steps_itself = false;
+  // Relative errors of positions against corotational_fem on the same mesh: a bar that bends by 2 % and by
+  // half of its length, a bar that turns, a block that lies on a plane.
+  double bends_little = 0, bends_far = 0, turns = 0, lies = 0;
+  // The largest explicit step over the time in which a pressure wave goes by `cell_size`.
+  double step_factor = 0;
+  // by scheme, free and touching; empty: the model has no such scheme
+  std::array<std::array<std::vector<CostAt>, 2>, kSchemes> costs;
+};
+
+struct Measured {
+  std::string machine;  // where, with which compiler and version of the library
+  std::vector<MeasuredModel> models;
+};
+
+// ---- what is to be planned -------------------------------------------------------------------------------
+
+struct BodyRegime {
+  std::string name;
+  uint32_t points = 0;
+  double length = 0, thickness = 0;  // m, longest and shortest side of the box around the body at rest
+  double edge = 0;                   // m, median edge of the cells
+  double cell_size = 0;              // m, least edge times least quality (mean ratio) of the cells
+  double young = 0, poisson = 0, density = 0;      // Pa, 1, kg/m3
+  double damping_mass = 0, damping_stiffness = 0;  // 1/s, s
+  double load = 0;                                 // m/s2: of gravity and of forces
+  double speed = 0;   // m/s, at the start and by falling until it meets something
+  double travel = 0;  // m, that it moves as a whole
+  double after = 0;   // share of the time after it first meets something by falling or flying
+  bool held = false, touches = false, turns = false;
+  std::string model;                // that the scene names; empty: to be chosen
+  int scheme = -1;                  // that the scene names; -1: to be chosen
+  std::vector<std::string> models;  // that may be chosen
+};
+
+struct Wish {
+  double target = 0;       // relative error, 0: none
+  double ms_per_step = 0;  // milliseconds of processor time, 0: none
+  double weight = 1;       // how many times the error of positions the error of the quantity is
+  double duration = 0;     // s
+  double step = 0;         // s, that the scene names; 0: to be chosen
+};
+
+// ---- what comes out --------------------------------------------------------------------------------------
+
+// What decides the behavior of one body, from its numbers.
+struct Estimate {
+  double wave_speed = 0;  // m/s
+  double frequency = 0;   // rad/s of the lowest mode
+  double strain = 0, rotation = 0;
+  double sag = 0;    // m, of the shape
+  double lasts = 0;  // s, until damping has ended what moves
+};
+Estimate estimate(const BodyRegime &body, double duration);
+
+struct BodyWay {
+  std::string model;
+  Scheme scheme = Scheme::explicit_euler;
+  double model_error = 0, time_error = 0, mesh_error = 0;  // of the quantity
+  double cpu_s_per_s = 0;
+};
+struct Way {
+  double step = 0;  // s, of the scene; for an explicit scheme 0: "auto"
+  double substep = 0;
+  std::vector<BodyWay> bodies;
+  double error = 0;  // largest sum of the three over the bodies
+  double cpu_s_per_s = 0;
+};
+
+struct PlannedWay {
+  bool found = false;  // else no model can be chosen: nothing measured fits
+  bool meets = false;  // target or budget
+  Way way;
+  std::vector<Way> considered;       // the front: by cost, each with less error than all that cost less
+  std::vector<std::string> assumed;  // sentences
+};
+PlannedWay plan_accuracy(const std::vector<BodyRegime> &bodies, const Measured &measured, const Wish &wish);
+
+// Milliseconds of a step of the scene, or of 1/60 s where the step follows stability.
+double ms_per_step(const Way &way);
+
+}  // namespace dfm

@@ -1,0 +1,288 @@
+#include "scene/planner.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "scene/load.h"
+#include "scene/rotation.h"
+
+namespace dfm::scene {
+namespace {
+
+constexpr double kDefaultTolerance = 1e-6, kLeastTolerance = 1e-9;  // m/s
+
+double length(const double v[3]) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
+
+struct Box {
+  double lo[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, hi[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
+  void add(const double p[3]) {
+    for (int k = 0; k < 3; ++k) {
+      lo[k] = std::min(lo[k], p[k]);
+      hi[k] = std::max(hi[k], p[k]);
+    }
+  }
+};
+
+Quaternion quaternion(const dfm_pose &pose) {
+  const double *q = pose.rotation;
+  if (q[0] == 0 && q[1] == 0 && q[2] == 0 && q[3] == 0) return {};
+  return {q[0], q[1], q[2], q[3]};
+}
+
+// The box around a box that is placed.
+Box place(const double lo[3], const double hi[3], const dfm_pose &pose) {
+  Box out;
+  for (int corner = 0; corner < 8; ++corner) {
+    const double p[3] = {corner & 1 ? hi[0] : lo[0], corner & 2 ? hi[1] : lo[1], corner & 4 ? hi[2] : lo[2]};
+    double q[3];
+    rotate(quaternion(pose), p, q);
+    for (int k = 0; k < 3; ++k) q[k] += pose.position[k];
+    out.add(q);
+  }
+  return out;
+}
+
+// m, how far a box may fall along `down` until it meets a plane; infinite: never.
+double fall_to_plane(const Box &box, const double down[3], const dfm_pose &plane) {
+  const double z[3] = {0, 0, 1};
+  double n[3];
+  rotate(quaternion(plane), z, n);
+  const double toward = -(down[0] * n[0] + down[1] * n[1] + down[2] * n[2]);
+  double least = HUGE_VAL;
+  for (int corner = 0; corner < 8; ++corner) {
+    double above = 0;
+    for (int k = 0; k < 3; ++k)
+      above += ((corner >> k & 1 ? box.hi[k] : box.lo[k]) - plane.position[k]) * n[k];
+    least = std::min(least, above);
+  }
+  if (least <= 0) return 0;
+  return toward > 1e-9 ? least / toward : HUGE_VAL;
+}
+
+// The same to a box: along the axis that `down` follows most, where they stand over each other.
+double fall_to_box(const Box &box, const double down[3], const Box &other) {
+  int axis = 0;
+  for (int k = 1; k < 3; ++k)
+    if (std::fabs(down[k]) > std::fabs(down[axis])) axis = k;
+  for (int k = 0; k < 3; ++k)
+    if (k != axis && (box.lo[k] > other.hi[k] || other.lo[k] > box.hi[k])) return HUGE_VAL;
+  const double gap = down[axis] < 0 ? box.lo[axis] - other.hi[axis] : other.lo[axis] - box.hi[axis];
+  const double through = down[axis] < 0 ? other.lo[axis] - box.hi[axis] : box.lo[axis] - other.hi[axis];
+  if (through > 0) return HUGE_VAL;  // it lies behind
+  return std::max(gap, 0.0);
+}
+
+Box box_of(const Obstacle &o, const std::vector<double> &scaled) {
+  double lo[3], hi[3];
+  const double r = o.def.radius;
+  for (int k = 0; k < 3; ++k) {
+    const double half = o.def.shape == DFM_SHAPE_BOX                 ? o.def.half_size[k]
+                        : o.def.shape == DFM_SHAPE_CAPSULE && k == 2 ? r + o.def.half_length
+                                                                     : r;
+    lo[k] = -half;
+    hi[k] = half;
+  }
+  if (o.def.npoint) {
+    const double *points = scaled.empty() ? o.def.points : scaled.data();
+    Box own;
+    for (uint32_t i = 0; i < o.def.npoint; ++i) own.add(points + 3 * size_t(i));
+    std::copy_n(own.lo, 3, lo);
+    std::copy_n(own.hi, 3, hi);
+  }
+  return place(lo, hi, o.def.pose);
+}
+
+std::string short_id(const std::string &id) {
+  const size_t dot = id.rfind('.');
+  return dot == std::string::npos ? id : id.substr(dot + 1);
+}
+
+class Reader {
+ public:
+  Reader(dfm_context *context, const Definition &def, const Types &types)
+      : def_(def), types_(types), files_(context, def) {
+    g_ = length(def.gravity);
+    for (int k = 0; k < 3; ++k) down_[k] = g_ > 0 ? def.gravity[k] / g_ : 0;
+  }
+
+  std::vector<BodyRegime> run(const Measured &measured) {
+    for (const Body &b : def_.bodies) meshes_.push_back(files_.load(b));
+    for (size_t i = 0; i < meshes_.size(); ++i)
+      boxes_.push_back(place(meshes_[i].lo, meshes_[i].hi, def_.bodies[i].pose));
+    std::vector<BodyRegime> out;
+    for (size_t i = 0; i < meshes_.size(); ++i) out.push_back(regime(i, measured));
+    return out;
+  }
+
+ private:
+  const Material &material(const Body &b) const {
+    static const Material kNone = {};
+    for (const Material &m : def_.materials)
+      if (m.name == b.material) return m;
+    return kNone;
+  }
+
+  // m, until it meets something; infinite: never
+  double fall(size_t i) {
+    double least = HUGE_VAL;
+    for (const Obstacle &o : def_.obstacles) {
+      std::vector<double> scaled;
+      Obstacle copy = o;
+      if (!copy.mesh.empty()) files_.load(copy, scaled);
+      const bool plane = copy.def.shape == DFM_SHAPE_PLANE;
+      least = std::min(least, plane ? fall_to_plane(boxes_[i], down_, copy.def.pose)
+                                    : fall_to_box(boxes_[i], down_, box_of(copy, scaled)));
+    }
+    for (size_t k = 0; k < boxes_.size(); ++k)
+      if (k != i) least = std::min(least, fall_to_box(boxes_[i], down_, boxes_[k]));
+    return least;
+  }
+
+  // Something comes to it, whatever gravity does.
+  bool something_moves() const {
+    const auto moving = [](const Obstacle &o) { return !o.keys.empty() || o.def.sine.frequency > 0; };
+    const auto thrown = [](const Body &b) { return length(b.velocity) > 0 || length(b.spin) > 0; };
+    return std::any_of(def_.obstacles.begin(), def_.obstacles.end(), moving) || !def_.rigid.bodies.empty() ||
+           (def_.bodies.size() + def_.obstacles.size() > 1 &&
+            std::any_of(def_.bodies.begin(), def_.bodies.end(), thrown));
+  }
+
+  std::vector<std::string> candidates(const Measured &measured) const {
+    std::vector<std::string> out;
+    for (const MeasuredModel &m : measured.models)
+      if (types_.find(DFM_KIND_MODEL, m.id)) out.push_back(m.id);
+    return out;
+  }
+
+  BodyRegime regime(size_t i, const Measured &measured) {
+    const Body &b = def_.bodies[i];
+    const BodyMesh &mesh = meshes_[i];
+    const Material &m = material(b);
+    dfm_tetmesh_info info = {};
+    info.size = sizeof info;
+    if (const dfm_status status = dfm_tetmesh_get_info(mesh.handle, &info); status < 0)
+      fail(status, "%s: %s/mesh: %s", def_.file.c_str(), b.pointer.c_str(), dfm_last_error());
+    BodyRegime r;
+    r.name = b.name;
+    r.points = mesh.npoint;
+    double side[3];
+    for (int k = 0; k < 3; ++k) side[k] = mesh.hi[k] - mesh.lo[k];
+    r.length = *std::max_element(side, side + 3);
+    r.thickness = *std::min_element(side, side + 3);
+    r.edge = info.edge_median * b.scale;
+    r.cell_size = info.edge_min * info.quality_min * b.scale;
+    r.young = m.young;
+    r.poisson = m.poisson;
+    r.density = m.density;
+    r.damping_mass = m.damping_mass;
+    r.damping_stiffness = m.damping_stiffness;
+    r.load = g_;
+    for (const Force &f : b.forces)
+      r.load += length(f.total) / (m.density * info.volume * std::pow(b.scale, 3));
+    r.held = !b.fixes.empty() || !b.nodal_bc.empty();
+    const double s = r.held ? HUGE_VAL : fall(i), thrown = length(b.velocity);
+    const double falls = g_ > 0 ? 0.5 * g_ * def_.duration * def_.duration : 0;
+    r.touches = s <= falls || something_moves();
+    r.speed = thrown + 0.5 * length(b.spin) * r.length;
+    if (!r.held) {
+      const double way = std::min(s, falls);
+      r.travel = thrown * def_.duration + way;
+      const double meets = g_ > 0 ? std::sqrt(2 * way / g_) : 0;
+      if (r.touches && r.speed + g_ * meets > 0) r.after = std::max(0.0, 1 - meets / def_.duration);
+      r.speed = std::sqrt(r.speed * r.speed + 2 * g_ * way);
+    }
+    r.turns = !r.held && (r.touches || length(b.spin) > 0);
+    if (!b.model_open) r.model = short_id(b.model);
+    const int32_t named = b.integrator != DFM_INTEGRATOR_AUTO ? b.integrator : def_.integrator;
+    if (named != DFM_INTEGRATOR_AUTO) r.scheme = named - DFM_INTEGRATOR_SYMPLECTIC_EULER;
+    r.models = candidates(measured);
+    return r;
+  }
+
+  const Definition &def_;
+  const Types &types_;
+  MeshFiles files_;
+  double g_ = 0, down_[3] = {};
+  std::vector<BodyMesh> meshes_;
+  std::vector<Box> boxes_;
+};
+
+json way_json(const Way &way, const Definition &def) {
+  json bodies = json::array();
+  for (size_t i = 0; i < way.bodies.size(); ++i) {
+    const BodyWay &b = way.bodies[i];
+    bodies.push_back({{"name", def.bodies[i].name},
+                      {"model", b.model},
+                      {"integrator", scheme_name(b.scheme)},
+                      {"model_error", b.model_error},
+                      {"time_error", b.time_error},
+                      {"mesh_error", b.mesh_error},
+                      {"cpu_s_per_s", b.cpu_s_per_s}});
+  }
+  return {{"step", way.step > 0 ? json(way.step) : json("auto")},
+          {"substep_s", way.substep},
+          {"error", way.error},
+          {"cpu_s_per_s", way.cpu_s_per_s},
+          {"ms_per_step", ms_per_step(way)},
+          {"bodies", bodies}};
+}
+
+}  // namespace
+
+json plan_scene(dfm_context *context, const Definition &def, const Types &types, json &tree) {
+  const Wanted &wanted = def.wanted;
+  const Measured measured = read_costs();
+  const std::vector<BodyRegime> bodies = Reader(context, def, types).run(measured);
+  Wish wish;
+  wish.target = wanted.target;
+  wish.ms_per_step = wanted.ms_per_step;
+  wish.weight = wanted.weight;
+  wish.duration = def.duration;
+  wish.step = def.step;
+  PlannedWay plan = plan_accuracy(bodies, measured, wish);
+  const char *const key = wanted.target > 0 ? "accuracy" : "budget";
+  if (!plan.found)
+    fail(DFM_E_UNSUPPORTED,
+         "%s: /%s: no costs of the models and integrators that this scene names were measured; deform "
+         "calibrate measures all that are loaded, or name model, integrator and step and take \"%s\" away",
+         def.file.c_str(), key, key);
+  json set = json::object();
+  const auto write = [&](const std::string &pointer, const json &value) {
+    tree[json::json_pointer(pointer)] = value;
+    set[pointer] = value;
+  };
+  bool implicit = false;
+  for (size_t i = 0; i < bodies.size(); ++i) {
+    const BodyWay &way = plan.way.bodies[i];
+    if (def.bodies[i].model_open) write(def.bodies[i].pointer + "/model/type", way.model);
+    if (way.scheme != Scheme::explicit_euler && def.integrator == DFM_INTEGRATOR_AUTO && !implicit) {
+      write("/time/integrator", scheme_name(way.scheme));
+      implicit = true;
+    }
+  }
+  if (!implicit && def.integrator == DFM_INTEGRATOR_AUTO)
+    write("/time/integrator", scheme_name(Scheme::explicit_euler));
+  if (!(def.step > 0) && plan.way.step > 0) write("/time/step", plan.way.step);
+  // What a contact at rest may creep in the whole time shall be a tenth of the error.
+  double scale = HUGE_VAL;
+  for (const BodyRegime &b : bodies)
+    if (b.touches) scale = std::min(scale, std::max(estimate(b, def.duration).sag, b.travel));
+  const double creep = 0.1 * wanted.target * scale / def.duration;
+  if (wanted.target > 0 && !(def.tolerance > 0) && creep < kDefaultTolerance) {
+    const double tolerance = std::max(creep, kLeastTolerance);
+    write("/contact/tolerance", tolerance);
+    plan.assumed.push_back(
+        format("contact tolerance %.2g m/s: in %g s that is a tenth of the error, at %.3g m", tolerance,
+               def.duration, scale));
+  }
+  json considered = json::array();
+  for (const Way &w : plan.considered) considered.push_back(way_json(w, def));
+  return {{"costs", measured.machine},
+          {"meets", plan.meets},
+          {"set", set},
+          {"predicted", way_json(plan.way, def)},
+          {"assumed", plan.assumed},
+          {"considered", considered}};
+}
+
+}  // namespace dfm::scene

@@ -1,0 +1,20 @@
+// The planner of a scene that names an accuracy or a budget: reads what each body is and what it meets from
+// the definition and its meshes, lets plan/accuracy.h choose, and gives back what the scene would have to
+// say.
+#pragma once
+#include "plan/accuracy.h"
+#include "scene/defs.h"
+#include "scene/node.h"
+
+namespace dfm::scene {
+
+// The measured costs: of the file that the environment's DEFORM_COSTS names, else those that the library
+// ships. Throws Error (which file, where, what was expected).
+Measured read_costs();
+
+// Chooses what the scene leaves open (model of a body, integrator, step, contact tolerance), writes it into
+// the tree and returns what stands at /accuracy/chosen or /budget/chosen afterwards. What the scene names
+// stays.
+json plan_scene(dfm_context *context, const Definition &def, const Types &types, json &tree);
+
+}  // namespace dfm::scene

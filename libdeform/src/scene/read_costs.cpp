@@ -1,0 +1,58 @@
+// The measured costs that the planner reads: JSON as `deform calibrate` writes it (doc/reference/outputs.md).
+#include <cstdlib>
+
+#include "scene/planner.h"
+#include "shipped_costs.h"
+
+namespace dfm::scene {
+namespace {
+
+constexpr const char *kTouching[2] = {"free", "touching"};
+
+std::vector<CostAt> read_sizes(const Node &sizes) {
+  std::vector<CostAt> out;
+  for (const Node &size : sizes.items()) {
+    const double points = size.at("points").number(kPositive);
+    if (!out.empty() && !(points > out.back().points)) size.at("points").fail("sizes rise strictly");
+    out.push_back({points, size.at("ns_per_point").number(kPositive)});
+  }
+  if (out.empty()) sizes.fail("expected at least one size");
+  return out;
+}
+
+MeasuredModel read_model(const Node &node) {
+  MeasuredModel m;
+  m.id = node.at("model").text();
+  m.steps_itself = node.at("steps_itself").boolean();
+  m.step_factor = node.at("step_factor").number(kNotNegative);
+  const Node errors = node.at("errors");
+  m.bends_little = errors.at("bends_little").number(kNotNegative);
+  m.bends_far = errors.at("bends_far").number(kNotNegative);
+  m.turns = errors.at("turns").number(kNotNegative);
+  m.lies = errors.at("lies").number(kNotNegative);
+  const Node costs = node.at("costs");
+  for (size_t s = 0; s < kSchemes; ++s) {
+    const char *const scheme = scheme_name(static_cast<Scheme>(s));
+    if (!costs.has(scheme)) continue;
+    for (size_t k = 0; k < 2; ++k) m.costs[s][k] = read_sizes(costs.member(scheme).at(kTouching[k]));
+  }
+  return m;
+}
+
+}  // namespace
+
+Measured read_costs() {
+  const char *const named = std::getenv("DEFORM_COSTS");
+  const std::string file = named && *named ? named : "(costs that the library ships)";
+  json tree = named && *named ? parse_file(file) : parse_text(kShippedCosts, file);
+  const Node root(&tree, "", &file);
+  if (root.at("format").text() != "deform-costs")
+    root.at("format").fail("expected \"deform-costs\", a file of deform calibrate");
+  if (root.at("version").number() != 1) root.at("version").fail("this reader knows version 1");
+  Measured out;
+  out.machine = root.at("machine").text();
+  for (const Node &model : root.at("models").items()) out.models.push_back(read_model(model));
+  return out;
+}
+
+}  // namespace dfm::scene

@@ -1,0 +1,109 @@
+// Scenes with an accuracy or a budget: what the planner chooses is in the scene, in explain and in the
+// summary, and what cannot be planned is one sentence.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+
+#include "support.h"
+
+namespace {
+
+std::string folder() { return test::scratch("planner"); }
+
+// A bar that is held at one end; `wish` and `model` are members with their commas.
+std::string bar(const std::string &wish, const std::string &model = "", const std::string &time = "") {
+  const std::string path = folder() + "/bar.json";
+  test::write_file(path, R"({"format": "deform-scene", "version": 1, )" + wish + R"(
+ "time": {"duration": 0.1)" + time +
+                             R"(},
+ "materials": {"gel": {"young": 5e6, "damping": {"stiffness": 2e-4}}},
+ "bodies": [{"name": "bar", )" +
+                             model + R"("material": "gel",
+   "mesh": {"make": "beam", "size": [0.4, 0.1, 0.1], "cells": 300},
+   "fix": [{"box": [[-1, -1, -1], [1e-6, 1, 1]]}]}]})");
+  return path;
+}
+
+bool has(const std::string &text, const std::string &word) { return text.find(word) != std::string::npos; }
+
+void expect_refused(const std::string &scene, const std::vector<std::string> &words) {
+  const test::CommandResult r = test::deform({"explain", scene});
+  EXPECT_EQ(r.exit_code, 2) << r.out;
+  EXPECT_EQ(std::count(r.err.begin(), r.err.end(), '\n'), 1) << r.err;
+  for (const std::string &word : words) EXPECT_TRUE(has(r.err, word)) << "no '" << word << "' in: " << r.err;
+}
+
+// What is measured on whoever runs the tests shall not decide them.
+class PlannerScene : public testing::Test {
+ protected:
+  void SetUp() override { setenv("XDG_CONFIG_HOME", folder().c_str(), 1); }
+};
+
+}  // namespace
+
+TEST_F(PlannerScene, Accuracy_ChoosesAndSaysWhy) {
+  const test::CommandResult r = test::deform({"explain", bar(R"("accuracy": {"target": 0.2},)")});
+  ASSERT_EQ(r.exit_code, 0) << r.err;
+  for (const char *word : {"planner (predicted, not measured",
+                           "by costs of: ", "assumed: body 'bar': ", "chosen: ", "error of the model ",
+                           "--set /bodies/0/model/type=", "--set /time/integrator="})
+    EXPECT_TRUE(has(r.out, word)) << "no '" << word << "' in: " << r.out;
+  const test::CommandResult run =
+      test::deform({"run", bar(R"("accuracy": {"target": 0.2},)"), "--out", folder() + "/out", "--quiet"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_TRUE(has(test::read_file(folder() + "/out/summary.json"), "\"planner\""));
+}
+
+// The lines that explain prints make the same scene without a planner: the same bits.
+TEST_F(PlannerScene, ChoiceWrittenIntoTheScene_IsTheSameRun) {
+  const std::string wish = R"("accuracy": {"target": 0.05},)";
+  const test::CommandResult planned = test::deform({"explain", bar(wish)});
+  std::vector<std::string> fixed = {"run", bar(""), "--out", folder() + "/b", "--quiet"};
+  for (size_t at = 0; (at = planned.out.find("--set ", at)) != std::string::npos; ++at) {
+    const size_t end = planned.out.find('\n', at);
+    fixed.push_back("--set");
+    fixed.push_back(planned.out.substr(at + 6, end - at - 6));
+  }
+  ASSERT_GT(fixed.size(), 5u);
+  ASSERT_EQ(test::deform(fixed).exit_code, 0);
+  ASSERT_EQ(test::deform({"run", bar(wish), "--out", folder() + "/a", "--quiet"}).exit_code, 0);
+  const auto hash = [](const std::string &run) {
+    const std::string text = test::read_file(folder() + "/" + run + "/summary.json");
+    return text.substr(text.find("state_hash"), sizeof "state_hash\": \"0123456789abcdef" - 1);
+  };
+  EXPECT_EQ(hash("a"), hash("b"));
+}
+
+TEST_F(PlannerScene, BudgetThatCannotBeMet_IsSaidByTheRun) {
+  const test::CommandResult r =
+      test::deform({"run", bar(R"("budget": {"ms_per_step": 1e-6},)"), "--out", folder() + "/out"});
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_TRUE(has(r.err, "the planner finds no way that meets what the scene asks for")) << r.err;
+}
+
+TEST_F(PlannerScene, WhatCannotBePlanned_IsOneSentence) {
+  const std::string target = R"("accuracy": {"target": 0.1},)";
+  expect_refused(bar(target + R"("budget": {"ms_per_step": 1},)"), {"/budget", "keep one"});
+  expect_refused(bar(R"("accuracy": {"target": 2},)"), {"/accuracy/target"});
+  expect_refused(bar(R"("accuracy": {"target": 0.1, "quantity": "color"},)"),
+                 {"/accuracy/quantity", "position"});
+  expect_refused(bar(target, "", R"(, "mode": "static")"), {"/accuracy", "a static scene has no step"});
+  expect_refused(bar(target, R"("model": {"params": {"volume": 0}}, )"),
+                 {"/bodies/0/model/params", "name it in"});
+}
+
+TEST_F(PlannerScene, Calibrate_WritesWhatScenesTake) {
+  const test::CommandResult r = test::deform({"calibrate", "--model", "modal", "--quiet"});
+  ASSERT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_TRUE(has(r.out, folder() + "/deform/costs.json")) << r.out;
+  const test::CommandResult planned = test::deform({"explain", bar(R"("accuracy": {"target": 0.2},)")});
+  EXPECT_TRUE(has(planned.out, "--set /bodies/0/model/type=modal")) << planned.out;
+  // costs of one model: a scene that names another cannot be planned by them
+  expect_refused(bar(R"("accuracy": {"target": 0.2},)", R"("model": {"type": "msm"}, )"),
+                 {"/accuracy", "deform calibrate"});
+  test::write_file(folder() + "/deform/costs.json",
+                   R"({"format": "deform-costs", "version": 1, "machine": 3})");
+  expect_refused(bar(R"("accuracy": {"target": 0.2},)"), {"costs.json", "/machine"});
+  std::remove((folder() + "/deform/costs.json").c_str());
+}

@@ -1,0 +1,134 @@
+// The planner's rules on numbers alone: what it takes where every cost and error is given.
+#include "plan/accuracy.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace {
+
+using dfm::BodyRegime;
+using dfm::Measured;
+using dfm::MeasuredModel;
+using dfm::PlannedWay;
+using dfm::Scheme;
+using dfm::Wish;
+
+MeasuredModel model(const char *id, double error, double explicit_ns, double implicit_ns) {
+  MeasuredModel m;
+  m.id = id;
+  m.bends_little = m.bends_far = m.lies = error;
+  m.step_factor = 0.5;
+  m.costs[0][0] = m.costs[0][1] = {{100, explicit_ns}, {1000, explicit_ns}};
+  if (implicit_ns > 0) m.costs[1][0] = m.costs[1][1] = {{100, implicit_ns}, {1000, implicit_ns}};
+  return m;
+}
+
+// A held bar of 500 points.
+BodyRegime bar() {
+  BodyRegime b;
+  b.name = "bar";
+  b.points = 500;
+  b.length = 0.4;
+  b.thickness = 0.1;
+  b.edge = 0.02;
+  b.cell_size = 0.01;
+  b.young = 1e5;
+  b.poisson = 0.3;
+  b.density = 1000;
+  b.load = 9.81;
+  b.held = true;
+  b.models = {"springs", "elements", "cartoon"};
+  return b;
+}
+
+Measured measured() {
+  return {"test",
+          {model("springs", 0.05, 100, 0), model("elements", 0, 300, 5000), model("cartoon", 1, 10, 0)}};
+}
+
+Wish accuracy(double target) {
+  Wish w;
+  w.target = target;
+  w.duration = 1;
+  return w;
+}
+
+Wish budget(double ms) {
+  Wish w;
+  w.ms_per_step = ms;
+  w.duration = 1;
+  return w;
+}
+
+}  // namespace
+
+TEST(Planner, Target_TakesTheCheapestThatMeetsIt) {
+  const PlannedWay coarse = plan_accuracy({bar()}, measured(), accuracy(0.1));
+  ASSERT_TRUE(coarse.found && coarse.meets);
+  EXPECT_EQ(coarse.way.bodies[0].model, "springs");
+  const PlannedWay fine = plan_accuracy({bar()}, measured(), accuracy(0.01));
+  ASSERT_TRUE(fine.meets);
+  EXPECT_EQ(fine.way.bodies[0].model, "elements");
+  EXPECT_GT(fine.way.cpu_s_per_s, coarse.way.cpu_s_per_s);
+}
+
+TEST(Planner, Budget_TakesTheBestThatIsWithinIt) {
+  const double springs = ms_per_step(plan_accuracy({bar()}, measured(), accuracy(0.1)).way);
+  const double elements = ms_per_step(plan_accuracy({bar()}, measured(), accuracy(0.01)).way);
+  EXPECT_EQ(plan_accuracy({bar()}, measured(), budget(1.01 * elements)).way.bodies[0].model, "elements");
+  EXPECT_EQ(plan_accuracy({bar()}, measured(), budget(1.01 * springs)).way.bodies[0].model, "springs");
+  const PlannedWay none = plan_accuracy({bar()}, measured(), budget(1e-9));
+  EXPECT_FALSE(none.meets);
+  EXPECT_EQ(none.way.bodies[0].model, "cartoon");  // the cheapest
+}
+
+TEST(Planner, WhatTheSceneNames_Stays) {
+  BodyRegime b = bar();
+  b.model = "cartoon";
+  const PlannedWay plan = plan_accuracy({b}, measured(), accuracy(0.01));
+  EXPECT_FALSE(plan.meets);
+  EXPECT_EQ(plan.way.bodies[0].model, "cartoon");
+  b = bar();
+  b.scheme = static_cast<int>(Scheme::implicit_euler);
+  EXPECT_EQ(plan_accuracy({b}, measured(), accuracy(0.1)).way.bodies[0].scheme, Scheme::implicit_euler);
+  b.model = "nobody";
+  EXPECT_FALSE(plan_accuracy({b}, measured(), accuracy(0.1)).found);
+}
+
+TEST(Planner, StiffBody_MovesImplicitly) {
+  BodyRegime b = bar();
+  b.young = 1e9;
+  b.damping_mass = 1e6;  // no oscillation that backward Euler could take away
+  b.models = {"elements"};
+  const PlannedWay plan = plan_accuracy({b}, measured(), accuracy(0.2));
+  EXPECT_EQ(plan.way.bodies[0].scheme, Scheme::implicit_euler);
+}
+
+// The bound of doc/concepts/step.md for the stiffest mode: h^2 w^2 + 2 h beta w^2 = 4.
+TEST(Planner, DampingShortensTheExplicitStep) {
+  BodyRegime b = bar();
+  b.models = {"elements"};
+  b.scheme = static_cast<int>(Scheme::explicit_euler);
+  const double free = plan_accuracy({b}, measured(), accuracy(0.1)).way.substep;
+  b.damping_stiffness = free;
+  const double damped = plan_accuracy({b}, measured(), accuracy(0.1)).way.substep;
+  const double w2 = 4 / (free * free);
+  EXPECT_NEAR(damped * damped * w2 + 2 * damped * free * w2, 4, 1e-9);
+}
+
+TEST(Planner, CoarseMesh_IsSaid) {
+  BodyRegime b = bar();
+  b.edge = 0.1;
+  const PlannedWay plan = plan_accuracy({b}, measured(), accuracy(0.1));
+  ASSERT_EQ(plan.assumed.size(), 2u);
+  EXPECT_NE(plan.assumed[1].find("its mesh alone makes an error of about 0.45"), std::string::npos);
+}
+
+// Euler and Bernoulli: w = 1.875^2 sqrt(E I / (rho A L^4)).
+TEST(Planner, LowestMode_IsTheBeams) {
+  BodyRegime b = bar();
+  const double inertia = std::pow(b.thickness, 4) / 12, area = b.thickness * b.thickness;
+  const double w = 1.875 * 1.875 * std::sqrt(b.young * inertia / (b.density * area * std::pow(b.length, 4)));
+  EXPECT_NEAR(dfm::estimate(b, 1).frequency, w, 1e-9 * w);
+}
