@@ -31,7 +31,7 @@ endif()
 install(DIRECTORY ${CMAKE_SOURCE_DIR}/libdeform/include/deform DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
   FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp")
 install(FILES ${CMAKE_SOURCE_DIR}/libdeform/schema/deform-scene.schema.json
-  DESTINATION ${CMAKE_INSTALL_DATADIR}/deform)
+  ${CMAKE_SOURCE_DIR}/libdeform/schema/deform-cost.schema.json DESTINATION ${CMAKE_INSTALL_DATADIR}/deform)
 # Plugins to copy and edit, as source.
 file(GLOB deform_templates ${CMAKE_SOURCE_DIR}/plugins/template_*)
 install(DIRECTORY ${deform_templates} DESTINATION ${CMAKE_INSTALL_DATADIR}/deform)

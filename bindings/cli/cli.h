@@ -36,7 +36,6 @@ void add_plugin(CLI::App &app, Globals &globals, int *exit_code);
 void add_plugin_check(CLI::App &plugin, Globals &globals, int *exit_code);
 void add_ccd(CLI::App &app, Globals &globals, int *exit_code);
 void add_friction(CLI::App &app, Globals &globals, int *exit_code);
-// Subcommands that interfaces name and later work delivers: they exit 2 and say so.
-void add_later(CLI::App &app, Globals &globals, int *exit_code);
+void add_cost(CLI::App &app, Globals &globals, int *exit_code);
 
 }  // namespace cli

@@ -211,6 +211,57 @@ class Reader {
 
 }  // namespace
 
+std::string json_text(const JsonValue &value) {
+  if (value.kind == JsonValue::null) return "null";
+  if (value.kind == JsonValue::string) return quoted(value.text);
+  if (value.kind == JsonValue::literal) return value.text;
+  std::vector<std::string> items;
+  if (value.kind == JsonValue::array) {
+    for (const JsonValue &item : value.items) items.push_back(json_text(item));
+    return json_array(items);
+  }
+  JsonObject out;
+  for (const auto &[name, member] : value.members) out.add(name, json_text(member));
+  return out.text();
+}
+
+namespace {
+
+void lines(const JsonValue &value, size_t width, size_t depth, size_t before, std::string &out) {
+  const std::string whole = json_text(value);
+  const bool list = value.kind == JsonValue::array;
+  if ((!list && value.kind != JsonValue::object) || before + whole.size() < width || whole.size() < 3) {
+    out += whole;
+    return;
+  }
+  const std::string indent(2 * depth + 2, ' ');
+  const char *separator = "\n";
+  out += list ? '[' : '{';
+  const auto begin = [&] {
+    out += separator + indent;
+    separator = ",\n";
+  };
+  for (const JsonValue &item : value.items) {
+    begin();
+    lines(item, width, depth + 1, indent.size(), out);
+  }
+  for (const auto &[name, member] : value.members) {
+    begin();
+    const std::string key = quoted(name) + ": ";
+    out += key;
+    lines(member, width, depth + 1, indent.size() + key.size(), out);
+  }
+  out += "\n" + std::string(2 * depth, ' ') + (list ? ']' : '}');
+}
+
+}  // namespace
+
+std::string json_lines(const JsonValue &value, size_t width) {
+  std::string out;
+  lines(value, width, 0, 0, out);
+  return out + "\n";
+}
+
 bool parse_json(const std::string &text, JsonValue &out, size_t *where, std::string *why) {
   Reader reader(text);
   const bool good = reader.value(out, 0) && reader.end();

@@ -39,5 +39,8 @@ struct JsonMember {
 // where: out, the byte at which it stopped to be JSON; why: out, what is wrong there. A key that is given
 // twice is wrong.
 bool parse_json(const std::string &text, JsonValue &out, size_t *where = nullptr, std::string *why = nullptr);
+std::string json_text(const JsonValue &value);  // on one line
+// On as many lines as it takes for none to be longer than `width` columns where that can be.
+std::string json_lines(const JsonValue &value, size_t width = 110);
 
 }  // namespace cli

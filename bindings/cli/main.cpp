@@ -182,7 +182,7 @@ int run(int argc, char **argv) {
   cli::add_plugin(app, cli::globals, &exit_code);
   cli::add_ccd(app, cli::globals, &exit_code);
   cli::add_friction(app, cli::globals, &exit_code);
-  cli::add_later(app, cli::globals, &exit_code);
+  cli::add_cost(app, cli::globals, &exit_code);
   cli::add_montage(app, &exit_code);
   cli::add_common(&app);
   try {

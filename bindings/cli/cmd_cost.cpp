@@ -1,0 +1,119 @@
+// deform cost SCENE: what accuracy costs on this scene.
+#include <CLI/CLI.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <thread>
+
+#include "cost/meshes.h"
+#include "cost/patch.h"
+#include "cost/report.h"
+#include "file.h"
+#include "messages.h"
+#include "run_folder.h"
+
+namespace cli {
+namespace {
+
+struct CostOptions {
+  std::string scene, out, apply;
+  cost::StudyOptions study;
+  unsigned parallel = 0;
+};
+
+std::vector<std::string> split(const std::vector<std::string> &lists) {
+  std::vector<std::string> out;
+  for (const std::string &list : lists)
+    for (size_t i = 0; i <= list.size();) {
+      const size_t end = std::min(list.find(',', i), list.size());
+      if (end > i) out.push_back(list.substr(i, end - i));
+      i = end + 1;
+    }
+  return out;
+}
+
+int cost_of(CostOptions options, const Globals &globals) {
+  if (options.out.empty())
+    options.out = "out/" + std::filesystem::path(options.scene).stem().string() + "_cost";
+  options.study.axes = split(options.study.axes);
+  const cost::Subject subject = cost::read_subject(options.scene);
+  make_folder(options.out);
+  const std::string cells_stay = cost::why_cells_stay(subject);
+  const cost::Surfaces surfaces = cells_stay.empty()
+                                      ? cost::write_surfaces(subject, options.out + "/surfaces")
+                                      : cost::Surfaces(subject.bodies.size());
+  cost::Study study;
+  {
+    cost::Runs runs(subject, options.out, options.parallel, options.study.budget,
+                    !globals.quiet && !globals.json);
+    study = cost::make_study(subject, surfaces, cells_stay, options.study, runs);
+  }
+  const std::string report = cost::json_report(subject, study, cost::scene_patch(subject, study));
+  write_whole(options.out + "/cost.csv", cost::csv_text(subject, study));
+  write_whole(options.out + "/cost.json", report);
+  if (globals.json) {
+    std::fputs(report.c_str(), stdout);
+  } else {
+    if (!globals.quiet) {
+      std::fputs(cost::table_text(subject, study).c_str(), stdout);
+      std::printf("written: %s\n", shown(options.out).c_str());
+    }
+  }
+  if (options.apply.empty()) return kDone;
+  if (study.pick < 0)
+    return fail(
+        "--apply: no choice stays within the target, so there is nothing to apply; give more with "
+        "--budget or a larger --target");
+  cost::write_applied(subject, study, options.apply);
+  return kDone;
+}
+
+}  // namespace
+
+void add_cost(CLI::App &app, Globals &globals, int *exit_code) {
+  auto options = std::make_shared<CostOptions>();
+  const auto positive = [](const std::string &text) {
+    char *end = nullptr;
+    const double x = std::strtod(text.c_str(), &end);
+    return *end == 0 && x > 0 && std::isfinite(x) ? std::string()
+                                                  : "expected a finite number above 0, found " + text;
+  };
+  CLI::App *sub = app.add_subcommand(
+      "cost", "what accuracy costs on a scene: models, steps, meshes, contact against a fine reference");
+  sub->add_option("SCENE", options->scene, "scene file (JSON)")->required();
+  sub->add_option("--budget", options->study.budget,
+                  "seconds for all runs in DIR; a larger one goes on where a smaller one has ended")
+      ->check(positive)
+      ->capture_default_str()
+      ->type_name("SECONDS");
+  sub->add_option("--target", options->study.target, "relative error for which the cheapest choice is sought")
+      ->check(positive)
+      ->capture_default_str()
+      ->type_name("ERROR");
+  sub->add_option(
+         "--quantity", options->study.quantities,
+         "what is compared: a probe, or com, force, work, volume, energy, touch, slip, liftoff, rest "
+         "(all of them are in the files); may be repeated (all probes)")
+      ->type_name("NAME")
+      ->take_all()
+      ->allow_extra_args(false);
+  sub->add_option("--axes", options->study.axes,
+                  "what varies, with commas: model, time, mesh, volume, contact, law, self, guard (all)")
+      ->type_name("LIST")
+      ->take_all()
+      ->allow_extra_args(false);
+  sub->add_option("--out", options->out, "folder for the results (out/SCENE_cost)")->type_name("DIR");
+  sub->add_option("--apply", options->apply, "writes the scene with the cheapest choice within the target")
+      ->type_name("FILE");
+  sub->callback([=, &globals] {
+    // Runs are processes of one thread each; without the option as many at a time as there are processors.
+    const unsigned all = std::max(1u, std::thread::hardware_concurrency());
+    options->parallel = sub->count("--threads") && globals.threads ? globals.threads : all;
+    *exit_code = cost_of(*options, globals);
+  });
+}
+
+}  // namespace cli

@@ -1,0 +1,290 @@
+#include "axes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "messages.h"
+
+namespace cli::cost {
+namespace {
+
+// Effects that a model may do without: they make it a better or worse model of the same body. One that a
+// scene asks for beyond these (fibers, relaxation, plastic flow) is another body without it.
+const char *const kOwnMeans[] = {"volume", "damping", "large_rotation"};
+
+// What the bodies ask for and the model does not offer; "" where it offers all.
+std::string lacks(const Subject &subject, const Offered &model) {
+  for (const SubjectBody &body : subject.bodies)
+    for (const std::string &effect : body.effects) {
+      const auto is = [&](const std::string &name) { return name == effect; };
+      if (std::none_of(std::begin(kOwnMeans), std::end(kOwnMeans), is) &&
+          std::none_of(model.effects.begin(), model.effects.end(), is))
+        return effect;
+    }
+  return "";
+}
+
+std::string seconds(double h) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.6g", h);
+  return text;
+}
+
+class Finder {
+ public:
+  Finder(const Subject &subject, const std::vector<std::string> &wanted) : s_(subject), wanted_(wanted) {}
+
+  Axes find(const std::string &mesh_left_out) {
+    add({}, "scene");
+    choose_reference();
+    axis("model", {"model"}, model_reason(), [&] { models(); });
+    out_.steps = axis("time", {"time"}, time_reason(), [&] { steps(); });
+    out_.meshes = axis("mesh", {"space"}, mesh_left_out, [&] { meshes(); });
+    axis("volume", {"model"}, volume_reason(), [&] { volumes(); });
+    axis("contact", {"contact"}, contact_reason(), [&] { contacts(); });
+    axis("law", {"contact"}, law_reason(), [&] { laws(); });
+    axis("self", {"contact"}, contact_reason(), [&] { selves(); });
+    axis("guard", {"contact"}, contact_reason(), [&] { guards(); });
+    axis("precision", {"precision"}, "this build computes in double precision alone", [] {});
+    fronts();
+    return out_;
+  }
+
+ private:
+  void add(const Knobs &knobs, const std::string &axis) {
+    for (Candidate &c : out_.candidates)
+      if (c.knobs == knobs) {
+        c.axes.push_back(axis);
+        return;
+      }
+    out_.candidates.push_back({knobs, {axis}});
+  }
+
+  template <class Fill>
+  bool axis(const std::string &name, std::vector<std::string> kinds, std::string reason, Fill fill) {
+    if (!wanted_.empty() && std::find(wanted_.begin(), wanted_.end(), name) == wanted_.end())
+      reason = "not asked for (--axes)";
+    if (reason.empty()) fill();
+    out_.axes.push_back({name, reason, std::move(kinds)});
+    return reason.empty();
+  }
+
+  std::string model_reason() const {
+    for (size_t i = 0; i < s_.bodies.size(); ++i) {
+      const std::string body = "/bodies/" + std::to_string(i);
+      if (s_.find(body + "/switch"))
+        return "body '" + s_.bodies[i].name + "' changes its model itself (switch)";
+      if (s_.find(body + "/fields"))
+        return "body '" + s_.bodies[i].name + "' has fields, which belong to its model";
+    }
+    return "";
+  }
+
+  std::string time_reason() const {
+    for (size_t i = 0; i < s_.bodies.size(); ++i)
+      if (s_.find("/bodies/" + std::to_string(i) + "/integrator"))
+        return "body '" + s_.bodies[i].name + "' names an integrator of its own";
+    return "";
+  }
+
+  std::string volume_reason() const {
+    for (const SubjectBody &body : s_.bodies)
+      if (body.model == "msm") return "";
+    return "no body is of the model msm, which has this term";
+  }
+
+  std::string contact_reason() const { return s_.contact ? "" : "nothing can touch anything"; }
+  std::string law_reason() const {
+    if (!s_.contact) return contact_reason();
+    return s_.friction ? "" : "the scene names no law of friction";
+  }
+
+  void choose_reference() {
+    const Offered *const corot = s_.model("corotational_fem");
+    const std::string own = models_of(s_);
+    if (own == "corotational_fem") {
+      out_.reference_why = "the scene's own model";
+    } else if (!model_reason().empty()) {
+      out_.reference_why = "the scene's own models: " + model_reason();
+    } else if (!corot) {
+      out_.reference_why = "the scene's own models: corotational_fem is not loaded";
+    } else if (const std::string effect = lacks(s_, *corot); !effect.empty()) {
+      out_.reference_why = "the scene's own models: corotational_fem does not offer " + effect;
+    } else if (!wanted_.empty() && std::find(wanted_.begin(), wanted_.end(), "model") == wanted_.end()) {
+      out_.reference_why = "the scene's own models: the axis model is not asked for";
+    } else {
+      out_.reference_model = "corotational_fem";
+      out_.reference_why = "corotational_fem: linear elasticity that turns with the material";
+    }
+  }
+
+  void models() {
+    for (const Offered &m : s_.models)
+      if (lacks(s_, m).empty()) add(model_knobs(m.name), "model");
+  }
+
+  // Of a body that is of this model already nothing is changed.
+  Knobs model_knobs(const std::string &model) const {
+    Knobs k;
+    if (models_of(s_) != model) k.model = model;
+    return k;
+  }
+
+  // Steps of implicit schemes that are shorter than the motion and longer than explicit ones.
+  std::vector<double> long_steps() const {
+    std::vector<double> out;
+    for (const double h : {1.0 / 30, 1.0 / 60, 0.01, 0.005, 0.0025, 0.001})
+      if (h <= s_.duration / 10 && h > 4 * s_.stable) out.push_back(h);
+    if (out.size() > 4) out.resize(4);
+    return out;
+  }
+
+  void steps() {
+    Knobs k;
+    k.integrator = "symplectic_euler";
+    k.step = "\"auto\"";
+    add(k, "time");
+    for (const double part : {0.5, 0.25}) {
+      if (s_.stable <= 0) break;
+      k.step = seconds(part * (s_.step > 0 ? std::min(s_.step, s_.stable) : s_.stable));
+      add(k, "time");
+    }
+    for (const char *integrator : {"implicit_euler", "tr_bdf2"})
+      for (const double h : long_steps()) {
+        k.integrator = integrator;
+        k.step = seconds(h);
+        add(k, "time");
+      }
+  }
+
+  void meshes() {
+    for (const double times : kCells) {
+      Knobs k;
+      k.cells = times;
+      add(k, "mesh");
+    }
+  }
+
+  void volumes() {
+    for (const char *value : {"0", "1"}) {
+      Knobs k;
+      k.volume = value;
+      bool same = true;
+      for (size_t i = 0; i < s_.bodies.size(); ++i) {
+        const JsonValue *const v = s_.find("/bodies/" + std::to_string(i) + "/model/params/volume");
+        same &= v && std::strtod(v->text.c_str(), nullptr) == std::strtod(value, nullptr);
+      }
+      if (!same) add(k, "volume");
+    }
+  }
+
+  void contacts() {
+    Knobs k;
+    for (const char *tolerance : {"1e-2", "1e-4", "1e-6"}) {
+      k.tolerance = tolerance;
+      add(k, "contact");
+    }
+    k.tolerance.clear();
+    for (const char *method : {"velocity", "rollback"}) {
+      if (s_.implicit || s_.word("/contact/method", "auto") == method) continue;
+      if (s_.word("/contact/method", "auto") == "auto" && std::string(method) == "velocity") continue;
+      k.method = method;
+      add(k, "contact");
+    }
+  }
+
+  void laws() {
+    const std::string own = laws_of(s_);
+    for (const Offered &law : s_.laws) {
+      if (law.name == own) continue;
+      Knobs k;
+      k.law = law.name;
+      add(k, "law");
+    }
+  }
+
+  void selves() {
+    const JsonValue *const own = s_.find("/contact/self");
+    const std::string now = own ? own->text : "false";
+    for (const char *value : {"false", "true", "auto"}) {
+      if (now == value) continue;
+      Knobs k;
+      k.self = std::string(value) == "auto" ? "\"auto\"" : value;
+      add(k, "self");
+    }
+  }
+
+  void guards() {
+    const JsonValue *const own = s_.find("/contact/guard");
+    Knobs k;
+    k.guard = own && own->text == "false" ? "true" : "false";
+    add(k, "guard");
+  }
+
+  // What a person would try: each model on fewer cells and with long steps.
+  void fronts() {
+    const bool models = out_.axes[0].left_out.empty();
+    std::vector<std::string> names;
+    if (models)
+      for (const Offered &m : s_.models)
+        if (lacks(s_, m).empty()) names.push_back(model_knobs(m.name).model);
+    if (!models) names.push_back("");
+    for (const std::string &name : names) {
+      Knobs k;
+      k.model = name;
+      if (out_.steps) {
+        k.integrator = "symplectic_euler";
+        k.step = "\"auto\"";
+        add(k, "front");
+        for (const double times : {0.5, 0.25, 0.125}) {
+          if (!out_.meshes) break;
+          k.cells = times;
+          add(k, "front");
+        }
+        const std::vector<double> steps = long_steps();
+        if (steps.empty()) continue;
+        k.integrator = "implicit_euler";
+        k.step = seconds(steps[std::min<size_t>(1, steps.size() - 1)]);
+        for (const double times : {1.0, 0.5, 0.25}) {
+          if (times != 1 && !out_.meshes) break;
+          k.cells = times;
+          add(k, "front");
+        }
+      } else if (out_.meshes) {
+        for (const double times : {0.5, 0.25}) {
+          k.cells = times;
+          add(k, "front");
+        }
+      }
+    }
+  }
+
+  static constexpr double kCells[] = {0.125, 0.25, 0.5, 2};
+  const Subject &s_;
+  const std::vector<std::string> &wanted_;
+  Axes out_;
+};
+
+}  // namespace
+
+const std::vector<std::string> &axis_names() {
+  static const std::vector<std::string> names = {"model", "time", "mesh",  "volume",   "contact",
+                                                 "law",   "self", "guard", "precision"};
+  return names;
+}
+
+Axes find_axes(const Subject &subject, const std::string &mesh_left_out,
+               const std::vector<std::string> &wanted) {
+  for (const std::string &name : wanted)
+    if (std::find(axis_names().begin(), axis_names().end(), name) == axis_names().end()) {
+      std::string all;
+      for (const std::string &n : axis_names()) all += (all.empty() ? "" : ", ") + n;
+      const std::string near = nearest(name, axis_names());
+      throw Failure(kBadInput, "--axes: there is no axis \"" + name + "\", expected " + all +
+                                   (near.empty() ? "" : "; did you mean \"" + near + "\"?"));
+    }
+  return Finder(subject, wanted).find(mesh_left_out);
+}
+
+}  // namespace cli::cost

@@ -1,0 +1,134 @@
+#include "choice.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <set>
+
+namespace cli::cost {
+namespace {
+
+// Friction keys that every law understands; others belong to the law that the scene names.
+const char *const kSharedLawKeys[] = {"mu", "mu_C", "mu_S", "v_s", "delta", "sigma2"};
+
+std::string law_params(const JsonValue &rule, const std::string &law) {
+  const JsonValue *const params = rule.find("params");
+  JsonObject out;
+  for (const JsonMember &m : params ? params->members : std::vector<JsonMember>()) {
+    const bool shared = std::any_of(std::begin(kSharedLawKeys), std::end(kSharedLawKeys),
+                                    [&](const char *key) { return m.name == key; });
+    // dahl has neither a static coefficient nor a viscous part
+    const bool dahl = law == "dahl" && m.name != "mu" && m.name != "mu_C";
+    if (law != "none" && shared && !dahl) out.add(m.name, json_text(m.value));
+  }
+  return out.text();
+}
+
+void set_model(const Subject &subject, const std::string &body, size_t i, const Knobs &knobs, Settings &out) {
+  const std::string own = subject.bodies[i].model;
+  const std::string model = knobs.model.empty() ? own : knobs.model;
+  JsonValue value;
+  if (const JsonValue *const given = subject.find(body + "/model"); given && model == own) value = *given;
+  JsonValue type;
+  type.kind = JsonValue::string;
+  type.text = model;
+  set_pointer(value, "/type", type);
+  if (!knobs.volume.empty() && model == "msm") {
+    JsonValue volume;
+    volume.kind = JsonValue::literal;
+    volume.text = knobs.volume;
+    set_pointer(value, "/params/volume", volume);
+  }
+  if (model != own || !knobs.volume.empty()) out.emplace_back(body + "/model", json_text(value));
+}
+
+void set_cells(const Subject &subject, const std::string &body, size_t i, const std::string &surface,
+               double times, Settings &out) {
+  const auto scaled = [&](double n) { return std::to_string(std::max(1L, std::lround(n * times))); };
+  const JsonValue *const mesh = subject.find(body + "/mesh");
+  if (mesh && mesh->kind == JsonValue::object) {
+    const std::string cells = mesh->get("cells");
+    out.emplace_back(body + "/mesh/cells",
+                     scaled(cells.empty() ? 1000 : std::strtod(cells.c_str(), nullptr)));
+  } else if (surface.empty()) {
+    const JsonValue *const cells = subject.find(body + "/fill/cells");
+    out.emplace_back(body + "/fill/cells", scaled(cells ? std::strtod(cells->text.c_str(), nullptr) : 5000));
+  } else {
+    out.emplace_back(body + "/mesh", quoted(surface));
+    out.emplace_back(body + "/fill/cells", scaled(subject.bodies[i].cells));
+  }
+}
+
+}  // namespace
+
+Settings settings_of(const Subject &subject, const Surfaces &surfaces, const Knobs &knobs) {
+  Settings out;
+  for (size_t i = 0; i < subject.bodies.size(); ++i) {
+    const std::string body = "/bodies/" + std::to_string(i);
+    set_model(subject, body, i, knobs, out);
+    if (knobs.cells != 1) set_cells(subject, body, i, surfaces[i], knobs.cells, out);
+  }
+  if (!knobs.integrator.empty()) {
+    out.emplace_back("/time/integrator", quoted(knobs.integrator));
+    // a method that the scene names goes with the integrator that it names
+    if (knobs.method.empty() && subject.find("/contact/method"))
+      out.emplace_back("/contact/method", quoted("auto"));
+  }
+  if (!knobs.step.empty()) out.emplace_back("/time/step", knobs.step);
+  if (!knobs.method.empty()) out.emplace_back("/contact/method", quoted(knobs.method));
+  if (!knobs.tolerance.empty()) out.emplace_back("/contact/tolerance", knobs.tolerance);
+  if (!knobs.self.empty()) out.emplace_back("/contact/self", knobs.self);
+  if (!knobs.guard.empty()) out.emplace_back("/contact/guard", knobs.guard);
+  const JsonValue *const rules = subject.find("/contact/friction");
+  for (size_t i = 0; rules && !knobs.law.empty() && i < rules->items.size(); ++i) {
+    const std::string rule = "/contact/friction/" + std::to_string(i);
+    out.emplace_back(rule + "/law", quoted(knobs.law));
+    out.emplace_back(rule + "/params", law_params(rules->items[i], knobs.law));
+  }
+  return out;
+}
+
+std::string label_of(const Knobs &knobs) {
+  std::string out;
+  const auto add = [&](const std::string &part) { out += (out.empty() ? "" : ", ") + part; };
+  if (!knobs.model.empty()) add(knobs.model);
+  if (!knobs.volume.empty()) add("volume " + knobs.volume);
+  const std::string step = knobs.step == "\"auto\"" ? "auto step" : knobs.step + " s";
+  if (!knobs.integrator.empty()) add(knobs.integrator + (knobs.step.empty() ? "" : " " + step));
+  else if (!knobs.step.empty()) add(step);
+  if (knobs.cells != 1) {
+    char text[40];
+    std::snprintf(text, sizeof text, "cells x%.3g", knobs.cells);
+    add(text);
+  }
+  if (!knobs.method.empty()) add("method " + knobs.method);
+  if (!knobs.tolerance.empty()) add("tolerance " + knobs.tolerance + " m/s");
+  if (!knobs.law.empty()) add("law " + knobs.law);
+  if (!knobs.self.empty()) add("self " + knobs.self);
+  if (!knobs.guard.empty()) add("guard " + knobs.guard);
+  return out.empty() ? "the scene as it is" : out;
+}
+
+namespace {
+std::string joined(const std::set<std::string> &words) {
+  std::string out;
+  for (const std::string &w : words) out += (out.empty() ? "" : "+") + w;
+  return out;
+}
+}  // namespace
+
+std::string models_of(const Subject &subject) {
+  std::set<std::string> names;
+  for (const SubjectBody &body : subject.bodies) names.insert(body.model);
+  return joined(names);
+}
+
+std::string laws_of(const Subject &subject) {
+  std::set<std::string> names;
+  const JsonValue *const rules = subject.find("/contact/friction");
+  for (size_t i = 0; rules && i < rules->items.size(); ++i) names.insert(rules->items[i].get("law"));
+  return names.empty() ? "default" : joined(names);
+}
+
+}  // namespace cli::cost

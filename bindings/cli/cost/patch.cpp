@@ -1,0 +1,75 @@
+#include "patch.h"
+
+#include <algorithm>
+#include <filesystem>
+
+#include "cli.h"
+#include "file.h"
+#include "messages.h"
+
+namespace fs = std::filesystem;
+
+namespace cli::cost {
+namespace {
+
+// The pick's own settings, without what every run records.
+Settings settings_of_pick(const Study &study) {
+  Settings out;
+  for (const auto &setting : study.rows[size_t(study.pick)].job.set)
+    if (setting.first.rfind("/output/", 0) != 0 && setting.first != "/probes") out.push_back(setting);
+  return out;
+}
+
+JsonValue patched(const Subject &subject, const Study &study) {
+  JsonValue scene = subject.scene;
+  for (const auto &[pointer, text] : settings_of_pick(study)) {
+    JsonValue value;
+    if (parse_json(text, value)) set_pointer(scene, pointer, value);
+  }
+  return scene;
+}
+
+JsonValue difference(const JsonValue &from, const JsonValue &to) {
+  JsonValue out;
+  out.kind = JsonValue::object;
+  for (const JsonMember &m : to.members) {
+    const JsonValue *const before = from.find(m.name);
+    if (before && json_text(*before) == json_text(m.value)) continue;
+    const bool objects = before && before->kind == JsonValue::object && m.value.kind == JsonValue::object;
+    out.members.push_back({m.name, objects ? difference(*before, m.value) : m.value});
+  }
+  return out;
+}
+
+}  // namespace
+
+JsonValue scene_patch(const Subject &subject, const Study &study) {
+  if (study.pick < 0) return {};
+  return difference(subject.scene, patched(subject, study));
+}
+
+void write_applied(const Subject &subject, const Study &study, const std::string &path) {
+  JsonValue scene = patched(subject, study);
+  const fs::path folder = fs::absolute(path).parent_path();
+  std::error_code error;
+  fs::create_directories(folder, error);
+  const Settings changes = settings_of_pick(study);
+  for (const std::string &pointer : file_pointers(scene)) {
+    JsonValue name = *at_pointer(scene, pointer);
+    const bool ours = std::any_of(changes.begin(), changes.end(),
+                                  [&](const auto &setting) { return setting.first == pointer; });
+    fs::path file = fs::absolute(fs::path(subject.folder) / name.text).lexically_normal();
+    if (ours) {
+      const fs::path copy = folder / (fs::path(path).stem().string() + "_" + file.filename().string());
+      fs::copy_file(file, copy, fs::copy_options::overwrite_existing, error);
+      if (error) throw Failure(kBadInput, copy.string() + ": cannot be written: " + error.message());
+      file = copy;
+    }
+    if (fs::path(name.text).is_absolute() && !ours) continue;
+    name.text = file.lexically_relative(folder.lexically_normal()).generic_string();
+    set_pointer(scene, pointer, name);
+  }
+  write_whole(path, json_lines(scene));
+}
+
+}  // namespace cli::cost

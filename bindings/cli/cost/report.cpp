@@ -1,0 +1,255 @@
+#include "report.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "messages.h"
+
+namespace cli::cost {
+namespace {
+
+std::string formatted(const char *format, double x) {
+  char text[64];
+  std::snprintf(text, sizeof text, format, x);
+  return text;
+}
+
+std::string error_json(const std::map<std::string, double> &error) {
+  JsonObject out;
+  for (const auto &[name, e] : error) out.add(name, number(e));
+  return out.text();
+}
+
+std::string words_json(const std::vector<std::string> &words) {
+  std::vector<std::string> out;
+  for (const std::string &w : words) out.push_back(quoted(w));
+  return json_array(out);
+}
+
+std::string choice_json(const Subject &subject, const Study &study, size_t i) {
+  const Row &row = study.rows[i];
+  const Outcome &o = row.job.outcome;
+  const Described d = describe(subject, row);
+  const char *const states[] = {"not run", "done", "unstable", "refused", "cut"};
+  JsonObject out;
+  out.add("model", quoted(d.model)).add("integrator", quoted(d.integrator)).add("step", number(d.step));
+  out.add("cells", number(o.cells)).add("method", quoted(d.method)).add("law", quoted(d.law));
+  out.add("precision", quoted("double")).add("error", error_json(row.error));
+  out.add("cpu_s_per_s", row.cpu_per_s > 0 ? number(row.cpu_per_s) : "null");
+  out.add("unstable", o.state == Outcome::unstable ? "true" : "false");
+  out.add("label", quoted(row.job.label))
+      .add("state", quoted(states[o.state]))
+      .add("why", quoted(o.sentence));
+  out.add("axes", words_json(row.candidate.axes)).add("headline", number(row.headline));
+  out.add("timed_alone", row.alone ? "true" : "false");
+  out.add("steps", number(o.steps)).add("took_s", number(o.took));
+  const double predicted = o.predicted(subject.duration);
+  out.add("predicted_s", o.state == Outcome::cut && std::isfinite(predicted) ? number(predicted) : "null");
+  JsonObject set;
+  for (const auto &[pointer, value] : row.job.set)
+    if (pointer.rfind("/output/", 0) != 0 && pointer != "/probes") set.add(pointer, value);
+  out.add("set", set.text()).add("folder", quoted(row.job.folder));
+  return out.text();
+}
+
+std::string reference_json(const Study &study) {
+  JsonObject out;
+  out.add("choice", std::to_string(study.reference)).add("converged", study.converged ? "true" : "false");
+  out.add("error", number(study.reference_headline)).add("errors", error_json(study.reference_error));
+  out.add("check", study.check >= 0 ? std::to_string(study.check) : "null");
+  out.add("best_error_shown", number(study.best)).add("why", quoted(study.axes.reference_why));
+  return out.text();
+}
+
+std::string separated_json(const Study &study) {
+  std::vector<std::string> parts;
+  for (const Separated &part : study.separated) {
+    std::vector<std::string> rows;
+    for (const auto &[i, e] : part.rows)
+      rows.push_back("{\"choice\": " + std::to_string(i) + ", \"error\": " + number(e) + "}");
+    JsonObject out;
+    out.add("axis", quoted(part.axis)).add("kind", quoted(part.kind));
+    out.add("anchor", std::to_string(part.anchor)).add("rows", json_array(rows));
+    parts.push_back(out.text());
+  }
+  return json_array(parts);
+}
+
+// Rows that are not compared, by reason.
+void list_left_out(const Subject &subject, const Study &study, std::string &out) {
+  for (const Row &row : study.rows) {
+    const Outcome &o = row.job.outcome;
+    if (o.state == Outcome::unstable) out += "  unstable   " + row.job.label + ": " + o.sentence + "\n";
+    if (o.state == Outcome::refused) out += "  refused    " + row.job.label + ": " + o.sentence + "\n";
+  }
+  std::string cut;
+  size_t n = 0;
+  double least = 1e300;
+  for (const Row &row : study.rows) {
+    const Outcome &o = row.job.outcome;
+    if (o.state != Outcome::cut && o.state != Outcome::none) continue;
+    ++n;
+    if (o.state == Outcome::cut) least = std::min(least, o.predicted(subject.duration));
+    if (n <= 6) cut += (cut.empty() ? "" : "; ") + row.job.label;
+  }
+  if (n == 0) return;
+  out += "  too long   " + std::to_string(n) + " choices do not fit into the budget" +
+         (least < 1e300 ? " (each would take " + formatted("%.3g", least) + " s or more)" : "") + ": " + cut +
+         (n > 6 ? "; ..." : "") + "\n";
+}
+
+void list_axes(const Study &study, std::string &out) {
+  out +=
+      "\none change at a time, from the scene as it is (difference from the axis' own finest; cpu s per s)\n";
+  for (const Separated &part : study.separated) {
+    out += "  " + part.axis + (part.axis == part.kind ? "" : " (" + part.kind + ")") + ": against " +
+           study.rows[part.anchor].job.label + "\n";
+    for (const auto &[i, e] : part.rows) {
+      if (i == part.anchor) continue;
+      char line[200];
+      std::snprintf(line, sizeof line, "    %8s  %9.3g  %s\n", percent(e).c_str(), study.rows[i].cpu_per_s,
+                    study.rows[i].job.label.c_str());
+      out += line;
+    }
+  }
+  for (const Axis &axis : study.axes.axes)
+    if (!axis.left_out.empty()) out += "  " + axis.name + ": left out, " + axis.left_out + "\n";
+}
+
+std::string pick_text(const Study &study) {
+  const std::string target = percent(study.options.target);
+  if (study.pick < 0) return "no choice that was run stays within " + target + "; give more with --budget\n";
+  const Row &row = study.rows[size_t(study.pick)];
+  std::string out = "cheapest within " + target + ": " + row.job.label + " (" + percent(row.headline) + ", " +
+                    formatted("%.3g", row.cpu_per_s) + " cpu s per s)\n";
+  if (!study.proven)
+    out += "  not proven: with the reference's own error of " + percent(study.reference_headline) +
+           " it may be above the target; a larger --budget makes the reference finer\n";
+  bool any = false;
+  for (const auto &[pointer, value] : row.job.set) {
+    if (pointer.rfind("/output/", 0) == 0 || pointer == "/probes") continue;
+    out += "  --set '" + pointer + "=" + value + "'\n";
+    any = true;
+  }
+  if (!any) out += "  nothing has to be changed\n";
+  return out;
+}
+
+}  // namespace
+
+std::string percent(double part) {
+  if (!std::isfinite(part)) return "-";
+  const double p = 100 * part;
+  return formatted(p >= 100 ? "%.0f %%" : p >= 9.95 ? "%.1f %%" : p >= 0.0995 ? "%.2f %%" : "%.1g %%", p);
+}
+
+Described describe(const Subject &subject, const Row &row) {
+  const Knobs &k = row.candidate.knobs;
+  const Outcome &o = row.job.outcome;
+  Described d;
+  d.model = k.model.empty() ? models_of(subject) : k.model;
+  d.integrator = k.integrator.empty() ? subject.word("/time/integrator", "auto") : k.integrator;
+  const JsonValue *const step = subject.find("/time/step");
+  d.step_asked = !k.step.empty() ? k.step : step ? step->text : "auto";
+  d.step = o.steps > 0 ? o.simulated / o.steps : 0;
+  d.method = k.method.empty() ? subject.word("/contact/method", "auto") : k.method;
+  d.law = k.law.empty() ? laws_of(subject) : k.law;
+  return d;
+}
+
+std::string reference_text(const Study &study) {
+  const Row &row = study.rows[size_t(study.reference)];
+  std::string out = "reference: " + row.job.label + " (" + study.axes.reference_why + "; " +
+                    formatted("%.0f", row.job.outcome.cells) + " cells, " + formatted("%.3g", row.cpu_per_s) +
+                    " cpu s per s)";
+  if (study.check < 0) return out + "; NOT CONVERGED: no second run to check it with fits into the budget";
+  out += "; its own error " + percent(study.reference_headline) + " (against " +
+         study.rows[size_t(study.check)].job.label + ")";
+  if (study.converged) return out + ", at most a third of the best error shown";
+  return out + "; NOT CONVERGED: more than a third of the best error shown, " + percent(study.best) +
+         ", so errors below " + percent(3 * study.reference_headline) + " are not told apart";
+}
+
+std::string table_text(const Subject &subject, const Study &study) {
+  std::string out = shown(subject.path) + ": what accuracy costs\n";
+  std::string names;
+  for (size_t i = 0; i < study.headline.size() && i < 6; ++i)
+    names += (names.empty() ? "" : ", ") + study.headline[i];
+  if (study.headline.size() > 6) names += ", ...";
+  out += "error of " + names + (study.headline.size() > 1 ? " (the largest)" : "") +
+         ": root mean square over time, relative to how far the reference moves\n";
+  out += reference_text(study) + "\n";
+  list_axes(study, out);
+  out += "\nfront: nothing cheaper is as accurate\n     error   cpu s/s  choice\n";
+  for (const size_t i : study.front) {
+    const Row &row = study.rows[i];
+    char line[240];
+    std::snprintf(line, sizeof line, "  %8s %9.3g%s %s\n", percent(row.headline).c_str(), row.cpu_per_s,
+                  row.alone ? " " : "~", row.job.label.c_str());
+    out += line;
+  }
+  const Row &own = study.rows[0];
+  if (own.compared)
+    out +=
+        "  the scene as it is: " + percent(own.headline) + " at " + formatted("%.3g", own.cpu_per_s) + "\n";
+  list_left_out(subject, study, out);
+  return out + "\n" + pick_text(study);
+}
+
+std::string csv_text(const Subject &subject, const Study &study) {
+  std::string out =
+      "index,label,axes,model,integrator,step,cells,method,law,precision,cpu_s_per_s,state,headline";
+  for (const std::string &name : study.quantities) out += "," + name;
+  out += "\n";
+  const auto cell = [](double x) { return std::isfinite(x) ? number(x) : std::string(); };
+  const char *const states[] = {"not run", "done", "unstable", "refused", "cut"};
+  for (size_t i = 0; i < study.rows.size(); ++i) {
+    const Row &row = study.rows[i];
+    const Described d = describe(subject, row);
+    std::string axes;
+    for (const std::string &axis : row.candidate.axes) axes += (axes.empty() ? "" : "+") + axis;
+    out += std::to_string(i) + ",\"" + row.job.label + "\"," + axes + "," + d.model + "," + d.integrator +
+           "," + cell(d.step) + "," + cell(row.job.outcome.cells) + "," + d.method + "," + d.law +
+           ",double," + cell(row.cpu_per_s) + "," + states[row.job.outcome.state] + "," + cell(row.headline);
+    for (const std::string &name : study.quantities) {
+      const auto found = row.error.find(name);
+      out += "," + (found == row.error.end() ? "" : cell(found->second));
+    }
+    out += "\n";
+  }
+  return out;
+}
+
+std::string json_report(const Subject &subject, const Study &study, const JsonValue &patch) {
+  std::vector<std::string> choices, front, left_out;
+  for (size_t i = 0; i < study.rows.size(); ++i) choices.push_back(choice_json(subject, study, i));
+  for (const size_t i : study.front) front.push_back(std::to_string(i));
+  for (const Axis &axis : study.axes.axes)
+    if (!axis.left_out.empty())
+      left_out.push_back("{\"axis\": " + quoted(axis.name) + ", \"why\": " + quoted(axis.left_out) + "}");
+  JsonObject scales;
+  for (const auto &[name, scale] : study.scales)
+    scales.add(name, "{\"scale\": " + number(scale) + ", \"unit\": " + quoted(study.units.at(name)) + "}");
+  JsonObject out;
+  out.add("format", quoted("deform-cost")).add("version", "1").add("scene", quoted(subject.path));
+  out.add("quantities", words_json(study.quantities)).add("headline", words_json(study.headline));
+  out.add("scales", scales.text()).add("reference", reference_json(study));
+  out.add("choices", json_array(choices)).add("front", json_array(front));
+  if (study.pick < 0) {
+    out.add("pick", "null");
+  } else {
+    JsonObject pick;
+    pick.add("index", std::to_string(study.pick)).add("scene_patch", json_text(patch));
+    pick.add("target", number(study.options.target)).add("proven", study.proven ? "true" : "false");
+    out.add("pick", pick.text());
+  }
+  out.add("separated", separated_json(study)).add("left_out", json_array(left_out));
+  out.add("budget_s", number(study.options.budget)).add("used_s", number(study.used));
+  out.add("runs_started", std::to_string(study.started));
+  JsonValue whole;
+  parse_json(out.text(), whole);
+  return json_lines(whole);
+}
+
+}  // namespace cli::cost

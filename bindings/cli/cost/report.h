@@ -1,0 +1,24 @@
+// The study in words and numbers: table for a terminal, cost.csv, cost.json.
+#pragma once
+#include <string>
+
+#include "study.h"
+
+namespace cli::cost {
+
+std::string table_text(const Subject &subject, const Study &study);
+std::string csv_text(const Subject &subject, const Study &study);
+std::string json_report(const Subject &subject, const Study &study, const JsonValue &patch);
+
+// "3.2 %"; below a tenth of the resolution "0.0 %"; "-" where there is none.
+std::string percent(double part);
+// What a choice is in full, with what the scene says where it leaves it.
+struct Described {
+  std::string model, integrator, step_asked, method, law;
+  double step = 0;  // s, mean of those taken
+};
+Described describe(const Subject &subject, const Row &row);
+// Sentences on the reference that table and page share.
+std::string reference_text(const Study &study);
+
+}  // namespace cli::cost

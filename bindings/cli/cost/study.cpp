@@ -1,0 +1,400 @@
+// How the budget is spent:
+//
+//   slices     every choice, each for a short time          -> done, or stopped: how long it would take
+//   reference  the finest pair of a ladder that fits        -> the two finest runs, and their distance
+//   the rest   by rising predicted time                     -> errors against the reference
+//   alone      members of the front, one after the other    -> processor times that nothing disturbs
+#include "study.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <limits>
+
+#include "messages.h"
+
+namespace cli::cost {
+namespace {
+
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+// Of the budget: all slices, on the processors together; the scene as it is. Of what is left after slices:
+// the reference.
+constexpr double kSliceShare = 0.15, kReferenceShare = 0.6, kOwnShare = 0.4;
+// Of the budget: when no more slices are begun, on a machine that has others to serve.
+constexpr double kSlicesEnd = 0.35;
+
+class Student {
+ public:
+  Student(const Subject &subject, const Surfaces &surfaces, Runs &runs, Study &study)
+      : s_(subject), surfaces_(surfaces), runs_(runs), out_(study) {}
+
+  void study() {
+    for (const Candidate &c : out_.axes.candidates) add(c);
+    make_ladder();
+    slices();
+    choose_pair();
+    run_rest();
+    if (out_.reference < 0) fall_back();
+    compare();
+    separate();
+    find_front();
+    time_alone();
+    find_front();
+    choose();
+    out_.started = runs_.started();
+    out_.used = out_.options.budget - runs_.left();
+  }
+
+ private:
+  double predicted(int row) const { return out_.rows[size_t(row)].job.outcome.predicted(s_.duration); }
+  bool done(int row) const { return row >= 0 && out_.rows[size_t(row)].job.outcome.state == Outcome::done; }
+
+  int add(const Candidate &candidate) {
+    for (size_t i = 0; i < out_.rows.size(); ++i)
+      if (out_.rows[i].candidate.knobs == candidate.knobs) {
+        auto &axes = out_.rows[i].candidate.axes;
+        for (const std::string &axis : candidate.axes)
+          if (std::find(axes.begin(), axes.end(), axis) == axes.end()) axes.push_back(axis);
+        return int(i);
+      }
+    Row row;
+    row.candidate = candidate;
+    row.job.label = label_of(candidate.knobs);
+    row.job.set = settings_of(s_, surfaces_, candidate.knobs);
+    for (auto &setting : observe()) row.job.set.push_back(std::move(setting));
+    runs_.prepare(row.job);
+    out_.rows.push_back(std::move(row));
+    return int(out_.rows.size()) - 1;
+  }
+
+  // What every run records, whatever the scene writes otherwise.
+  Settings observe() const {
+    Settings out = {{"/output/every", number(std::min(s_.every, s_.duration / 100))},
+                    {"/output/states", "false"},
+                    {"/output/nodes", "false"},
+                    {"/output/contacts", "true"},
+                    {"/output/check", "false"},
+                    {"/output/frames", "false"}};
+    if (s_.probes) return out;
+    std::vector<std::string> probes;
+    for (const SubjectBody &body : s_.bodies)
+      for (size_t k = 0; k < body.ends.size(); ++k) {
+        JsonObject probe;
+        probe.add("name", quoted(body.name + "_end" + std::to_string(k + 1))).add("body", quoted(body.name));
+        probe.add("point", json_vector(body.ends[k].data()));
+        probes.push_back(probe.text());
+      }
+    out.emplace_back("/probes", json_array(probes));
+    return out;
+  }
+
+  // Pairs from the finest down: a run and the one that it is checked against, coarser in all that varies.
+  void make_ladder() {
+    Knobs k;
+    k.model = out_.axes.reference_model;
+    const auto row = [&](double cells, const std::string &integrator, const std::string &step) {
+      k.cells = cells;
+      k.integrator = integrator;
+      k.step = step;
+      return add({k, {"reference"}});
+    };
+    const std::string own, automatic = "\"auto\"", explicit_time = "symplectic_euler";
+    if (out_.axes.meshes) {
+      const std::string integrator = out_.axes.steps ? explicit_time : own;
+      const std::string step = out_.axes.steps ? automatic : own;
+      const int x4 = row(4, integrator, step), x2 = row(2, integrator, step), x1 = row(1, integrator, step),
+                half = row(0.5, integrator, step), quarter = row(0.25, integrator, step);
+      ladder_ = {{x4, x2}, {x2, x1}, {x1, half}, {half, quarter}};
+    } else if (out_.axes.steps && s_.stable > 0) {
+      char text[40];
+      std::snprintf(text, sizeof text, "%.6g", 0.5 * s_.stable);
+      const int half = row(1, explicit_time, text), whole = row(1, explicit_time, automatic);
+      ladder_ = {{half, whole}};
+    }
+    if (out_.axes.steps) {
+      const double h = std::min(1.0 / 200, s_.duration / 100);
+      char fine[40], finer[40];
+      std::snprintf(fine, sizeof fine, "%.6g", h);
+      std::snprintf(finer, sizeof finer, "%.6g", h / 2);
+      const int twice = row(1, "tr_bdf2", finer), once = row(out_.axes.meshes ? 0.5 : 1, "tr_bdf2", fine);
+      ladder_.push_back({twice, once});
+    }
+  }
+
+  std::vector<Job *> jobs_of(const std::vector<int> &rows, double limit) {
+    std::vector<Job *> out;
+    for (const int i : rows) {
+      out_.rows[size_t(i)].job.limit = limit;
+      out.push_back(&out_.rows[size_t(i)].job);
+    }
+    return out;
+  }
+
+  void slices() {
+    std::vector<int> order;
+    for (size_t i = 0; i < out_.rows.size(); ++i) order.push_back(int(i));
+    // the ladder first: what it would take decides the rest
+    std::stable_sort(order.begin() + 1, order.end(),
+                     [&](int a, int b) { return on_ladder(a) > on_ladder(b); });
+    const double each = kSliceShare * out_.options.budget * runs_.parallel() / double(order.size());
+    runs_.expect(order.size());
+    std::vector<Job *> jobs = jobs_of(order, std::numeric_limits<double>::max());
+    for (Job *job : jobs) job->work = std::max(each, 0.3);
+    jobs[0]->work = kOwnShare * out_.options.budget;  // the scene as it is: the least to be shown
+    runs_.run(jobs, runs_.parallel(), (1 - kSlicesEnd) * out_.options.budget);
+    for (Job *job : jobs) job->work = std::numeric_limits<double>::max();
+  }
+
+  bool on_ladder(int row) const {
+    return std::any_of(ladder_.begin(), ladder_.end(),
+                       [&](const auto &pair) { return pair.first == row || pair.second == row; });
+  }
+
+  bool failed(int row) const {
+    const Outcome::State state = out_.rows[size_t(row)].job.outcome.state;
+    return state == Outcome::unstable || state == Outcome::refused || state == Outcome::none;
+  }
+
+  void choose_pair() {
+    for (const auto &[fine, coarse] : ladder_) {
+      if (failed(fine) || failed(coarse)) continue;
+      const double most = kReferenceShare * runs_.left();
+      const auto fits = [&](int row) { return done(row) || predicted(row) <= most; };
+      if (!fits(fine) || !fits(coarse)) continue;
+      out_.reference = fine;
+      out_.check = coarse;
+      return;
+    }
+  }
+
+  void run_rest() {
+    std::vector<int> order;
+    for (size_t i = 0; i < out_.rows.size(); ++i)
+      if (int(i) != out_.reference && int(i) != out_.check &&
+          (!on_ladder(int(i)) || i == 0 || out_.rows[i].candidate.axes.size() > 1))
+        order.push_back(int(i));
+    std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return predicted(a) < predicted(b); });
+    if (out_.reference >= 0) order.insert(order.begin(), {out_.reference, out_.check});
+    runs_.run(jobs_of(order, std::numeric_limits<double>::max()), runs_.parallel());
+    if (out_.reference >= 0 && !done(out_.reference)) out_.reference = out_.check = -1;
+    if (out_.check >= 0 && !done(out_.check)) out_.check = -1;
+  }
+
+  // The longest run of the reference's model that came to its end is the best that there is.
+  void fall_back() {
+    double most = -1;
+    for (size_t i = 0; i < out_.rows.size(); ++i) {
+      const Row &row = out_.rows[i];
+      const Knobs &k = row.candidate.knobs;
+      const bool physics = k.law.empty() && k.self.empty() && k.guard.empty() && k.volume.empty();
+      const double rank = row.job.outcome.cpu + (k.model == out_.axes.reference_model ? 1e9 : 0);
+      if (!done(int(i)) || !physics || rank <= most) continue;
+      most = rank;
+      out_.reference = int(i);
+    }
+    if (out_.reference >= 0) return;
+    for (const Row &row : out_.rows)
+      if (row.job.outcome.state == Outcome::unstable || row.job.outcome.state == Outcome::refused)
+        throw Failure(kBadInput, s_.path + ": no run came to its end; \"" + row.job.label +
+                                     "\": " + row.job.outcome.sentence);
+    char text[80];
+    std::snprintf(text, sizeof text, "%.3g", out_.rows[0].job.outcome.predicted(s_.duration));
+    throw Failure(kBadInput, s_.path +
+                                 ": no run came to its end within the budget, the scene as it is would "
+                                 "take about " +
+                                 text + " s; give more with --budget");
+  }
+
+  void compare() {
+    figures_.resize(out_.rows.size());
+    double size = 0;
+    for (const SubjectBody &body : s_.bodies) size = std::max(size, body.size);
+    for (size_t i = 0; i < out_.rows.size(); ++i) {
+      Row &row = out_.rows[i];
+      row.cpu_per_s = row.job.outcome.cpu_per_s();
+      row.compared = done(int(i));
+      if (row.compared) figures_[i] = read_quantities(row.job.folder);
+    }
+    const Quantities &truth = figures_[size_t(out_.reference)];
+    for (const auto &[name, q] : truth) {
+      out_.quantities.push_back(name);
+      out_.scales[name] = scale_of(q, 1e-3 * size, s_.duration);
+      out_.units[name] = q.unit;
+    }
+    name_headline(truth);
+    for (size_t i = 0; i < out_.rows.size(); ++i) {
+      Row &row = out_.rows[i];
+      row.headline = kNone;
+      if (!row.compared) continue;
+      row.error = errors(i, size_t(out_.reference));
+      row.headline = largest(row.error);
+    }
+    if (out_.check >= 0) {
+      out_.reference_error = out_.rows[size_t(out_.check)].error;
+      out_.reference_headline = out_.rows[size_t(out_.check)].headline;
+    } else {
+      out_.reference_headline = kNone;
+    }
+    out_.best = std::numeric_limits<double>::infinity();
+    for (size_t i = 0; i < out_.rows.size(); ++i)
+      if (eligible(i)) out_.best = std::min(out_.best, out_.rows[i].headline);
+    out_.converged = std::isfinite(out_.best) && out_.reference_headline <= out_.best / 3;
+  }
+
+  void name_headline(const Quantities &truth) {
+    std::vector<std::string> words = out_.options.quantities;
+    if (words.empty()) words = {"probe"};
+    for (const std::string &word : words) {
+      const std::vector<std::string> names = named(truth, word);
+      if (names.empty()) {
+        std::string all;
+        for (const std::string &name : out_.quantities) all += (all.empty() ? "" : ", ") + name;
+        const std::string near = nearest(word, out_.quantities);
+        throw Failure(kBadInput, "--quantity: there is no \"" + word + "\" in this scene, expected one of " +
+                                     all + (near.empty() ? "" : "; did you mean \"" + near + "\"?"));
+      }
+      out_.headline.insert(out_.headline.end(), names.begin(), names.end());
+    }
+  }
+
+  // Of a row against another, by quantity.
+  std::map<std::string, double> errors(size_t row, size_t against) const {
+    std::map<std::string, double> out;
+    for (const auto &[name, q] : figures_[against]) {
+      const auto found = figures_[row].find(name);
+      const auto scale = out_.scales.find(name);
+      if (scale == out_.scales.end()) continue;
+      // a pair that never touches has no rows: its events did not happen
+      out[name] =
+          found == figures_[row].end() ? (q.event ? 1.0 : kNone) : error_of(found->second, q, scale->second);
+    }
+    return out;
+  }
+
+  double largest(const std::map<std::string, double> &error) const {
+    double most = 0;
+    for (const std::string &name : out_.headline) {
+      const auto found = error.find(name);
+      if (found == error.end() || std::isnan(found->second)) return kNone;
+      most = std::max(most, found->second);
+    }
+    return most;
+  }
+
+  bool eligible(size_t i) const {
+    return out_.rows[i].compared && int(i) != out_.reference && int(i) != out_.check &&
+           std::isfinite(out_.rows[i].headline);
+  }
+
+  // Steps and cells have a finest choice of their own; of switches the scene as it is stands for it.
+  size_t anchor_of(const std::string &axis) const {
+    size_t best = 0;
+    double most = -1;
+    for (size_t i = 0; i < out_.rows.size(); ++i) {
+      const Row &row = out_.rows[i];
+      const auto &axes = row.candidate.axes;
+      const bool member = i == 0 || std::find(axes.begin(), axes.end(), axis) != axes.end();
+      if (!member || !row.compared) continue;
+      const Knobs &k = row.candidate.knobs;
+      double rank = i == 0 ? 0 : -1;
+      if (axis == "time") rank = k.integrator == "symplectic_euler" ? row.job.outcome.steps : 0;
+      else if (axis == "mesh") rank = row.job.outcome.cells;
+      else if (axis == "model") rank = k.model == out_.axes.reference_model ? 1 : 0;
+      else if (axis == "contact" && !k.tolerance.empty())
+        rank = 1 / std::strtod(k.tolerance.c_str(), nullptr);
+      if (rank <= most) continue;
+      most = rank;
+      best = i;
+    }
+    return best;
+  }
+
+  void separate() {
+    for (const Axis &axis : out_.axes.axes) {
+      if (!axis.left_out.empty()) continue;
+      Separated part{axis.name, axis.kinds[0], anchor_of(axis.name), {}};
+      if (!out_.rows[part.anchor].compared) continue;
+      for (size_t i = 0; i < out_.rows.size(); ++i) {
+        const auto &axes = out_.rows[i].candidate.axes;
+        const bool member = i == 0 || std::find(axes.begin(), axes.end(), axis.name) != axes.end();
+        if (member && out_.rows[i].compared) part.rows.emplace_back(i, largest(errors(i, part.anchor)));
+      }
+      if (part.rows.size() > 1) out_.separated.push_back(std::move(part));
+    }
+  }
+
+  void find_front() {
+    std::vector<size_t> order;
+    for (size_t i = 0; i < out_.rows.size(); ++i)
+      if (eligible(i)) order.push_back(i);
+    std::stable_sort(order.begin(), order.end(),
+                     [&](size_t a, size_t b) { return out_.rows[a].cpu_per_s < out_.rows[b].cpu_per_s; });
+    out_.front.clear();
+    double least = std::numeric_limits<double>::infinity();
+    for (const size_t i : order)
+      if (out_.rows[i].headline < least) {
+        least = out_.rows[i].headline;
+        out_.front.push_back(i);
+      }
+  }
+
+  void time_alone() {
+    std::vector<Job> again;
+    std::vector<size_t> of;
+    double sum = 0;
+    for (const size_t i : out_.front) {
+      Job job;
+      job.label = out_.rows[i].job.label;
+      job.set = out_.rows[i].job.set;
+      job.limit = std::numeric_limits<double>::max();
+      runs_.prepare(job, "alone");
+      if (!job.outcome.settled()) sum += out_.rows[i].job.outcome.took;
+      again.push_back(std::move(job));
+      of.push_back(i);
+    }
+    if (sum <= runs_.left()) {
+      std::vector<Job *> jobs;
+      for (Job &job : again) jobs.push_back(&job);
+      runs_.run(jobs, 1);
+    }
+    for (size_t k = 0; k < again.size(); ++k)
+      if (again[k].outcome.state == Outcome::done) {
+        out_.rows[of[k]].cpu_per_s = again[k].outcome.cpu_per_s();
+        out_.rows[of[k]].alone = true;
+      }
+  }
+
+  void choose() {
+    const double target = out_.options.target;
+    for (const size_t i : out_.front) {
+      if (out_.rows[i].headline + out_.reference_headline > target || !(out_.reference_headline >= 0))
+        continue;
+      out_.pick = int(i);
+      out_.proven = true;
+      return;
+    }
+    for (const size_t i : out_.front)
+      if (out_.pick < 0 && out_.rows[i].headline <= target) out_.pick = int(i);
+  }
+
+  const Subject &s_;
+  const Surfaces &surfaces_;
+  Runs &runs_;
+  Study &out_;
+  std::vector<std::pair<int, int>> ladder_;
+  std::vector<Quantities> figures_;  // by row
+};
+
+}  // namespace
+
+Study make_study(const Subject &subject, const Surfaces &surfaces, const std::string &mesh_left_out,
+                 const StudyOptions &options, Runs &runs) {
+  Study out;
+  out.options = options;
+  out.axes = find_axes(subject, mesh_left_out, options.axes);
+  Student(subject, surfaces, runs, out).study();
+  return out;
+}
+
+}  // namespace cli::cost

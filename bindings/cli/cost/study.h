@@ -1,0 +1,59 @@
+// The study of one scene: which choices are run within the budget, what they are compared with, and what
+// follows: errors by axis, the front of time against error, and the cheapest choice that is good enough.
+#pragma once
+#include <map>
+#include <string>
+#include <vector>
+
+#include "axes.h"
+#include "quantities.h"
+#include "runs.h"
+
+namespace cli::cost {
+
+struct StudyOptions {
+  std::vector<std::string> quantities, axes;  // as asked for; empty: probes, all axes
+  double target = 0.05, budget = 60;
+};
+
+struct Row {
+  Candidate candidate;
+  Job job;
+  std::map<std::string, double> error;  // by quantity, relative; NaN where it cannot be said
+  double headline = 0;                  // the largest of the quantities asked for; NaN: none
+  double cpu_per_s = 0;                 // s of processor time for a simulated one
+  bool alone = false;                   // timed with nothing beside it
+  bool compared = false;                // done, with figures
+};
+
+// One change at a time from the scene as it is: how far a choice is from the axis' own finest one.
+struct Separated {
+  std::string axis, kind;
+  size_t anchor = 0;
+  std::vector<std::pair<size_t, double>> rows;
+};
+
+struct Study {
+  StudyOptions options;
+  Axes axes;
+  std::vector<Row> rows;  // the scene as it is comes first
+  std::map<std::string, double> scales;
+  std::map<std::string, std::string> units;
+  std::vector<std::string> quantities, headline;  // all; those asked for
+  int reference = -1, check = -1;                 // rows
+  std::map<std::string, double> reference_error;  // of the two finest against each other
+  double reference_headline = 0, best = 0;        // best: least error of the other choices
+  bool converged = false;
+  std::vector<Separated> separated;
+  std::vector<size_t> front;  // by rising cost
+  int pick = -1;
+  bool proven = false;  // the pick meets the target even if the reference is as far off as it may be
+  double used = 0;      // s of the budget
+  unsigned started = 0;
+};
+
+// Throws Failure where nothing can be compared within the budget.
+Study make_study(const Subject &subject, const Surfaces &surfaces, const std::string &mesh_left_out,
+                 const StudyOptions &options, Runs &runs);
+
+}  // namespace cli::cost

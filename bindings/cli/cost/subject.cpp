@@ -1,0 +1,305 @@
+#include "subject.h"
+
+#include <dlfcn.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+
+#include "cli.h"
+#ifdef DEFORM_HAVE_ODE
+#include "deform/ode_host.h"
+#endif
+#include "file.h"
+#include "messages.h"
+
+namespace fs = std::filesystem;
+
+namespace cli::cost {
+namespace {
+
+using Context = std::unique_ptr<dfm_context, decltype(&dfm_context_destroy)>;
+
+// Says nothing: each run of a choice says for itself what it has to say.
+Context silent_context() {
+  dfm_context_def def = dfm_context_def_default();
+  def.threads = 1;
+  def.log = [](void *, int32_t, const char *) {};
+  dfm_context *context = nullptr;
+  need(dfm_context_create(&def, &context));
+#ifdef DEFORM_HAVE_ODE
+  dfm_ode_register();
+#endif
+  return Context(context, dfm_context_destroy);
+}
+
+std::string short_name(const std::string &id) {
+  const std::string own = "org.deform.";
+  return id.rfind(own, 0) == 0 ? id.substr(own.size()) : id;
+}
+
+void read_offers(dfm_context *context, Subject &out, std::vector<std::string> &files) {
+  struct Found {
+    Subject &subject;
+    std::vector<std::string> &files;
+  } found{out, files};
+  dfm_plugin_visit(
+      context,
+      [](void *user, const dfm_type *type, const char *file) {
+        Found &f = *static_cast<Found *>(user);
+        Offered offered{short_name(type->id), type->id, {}};
+        for (const char *const *e = type->effects; e && *e; ++e) offered.effects.push_back(*e);
+        if (type->kind == DFM_KIND_SOLVER) return;
+        (type->kind == DFM_KIND_FRICTION ? f.subject.laws : f.subject.models).push_back(offered);
+        if (file && *file) f.files.push_back(file);
+      },
+      &found);
+}
+
+std::string explained(dfm_world world) {
+  size_t bytes = 0;
+  need(dfm_world_explain(world, nullptr, &bytes));
+  std::string text(bytes, '\0');
+  need(dfm_world_explain(world, text.data(), &bytes));
+  text.resize(text.find('\0') == std::string::npos ? text.size() : text.find('\0'));
+  return text;
+}
+
+// The rotation of a body's pose by Rodrigues, rows.
+std::array<double, 9> rotation_of(const JsonValue *pose) {
+  std::array<double, 9> r{1, 0, 0, 0, 1, 0, 0, 0, 1};
+  const JsonValue *rotation = pose ? pose->find("rotation") : nullptr;
+  const JsonValue *axis = rotation ? rotation->find("axis") : nullptr;
+  if (!axis || axis->items.size() != 3) return r;
+  double a[3], n = 0;
+  for (size_t k = 0; k < 3; ++k) a[k] = std::strtod(axis->items[k].text.c_str(), nullptr);
+  for (const double x : a) n += x * x;
+  if (!(n > 0)) return r;
+  for (double &x : a) x /= std::sqrt(n);
+  const double angle = std::strtod(rotation->get("angle_deg").c_str(), nullptr) * std::acos(-1.0) / 180;
+  const double c = std::cos(angle), s = std::sin(angle);
+  const double cross[9] = {0, -a[2], a[1], a[2], 0, -a[0], -a[1], a[0], 0};
+  for (size_t i = 0; i < 3; ++i)
+    for (size_t j = 0; j < 3; ++j)
+      r[3 * i + j] = (i == j ? c : 0) + (1 - c) * a[i] * a[j] + s * cross[3 * i + j];
+  return r;
+}
+
+// Two points of the surface that lie far from each other: the farthest one from the center of mass, and
+// the farthest one from it. They stand in for probes where the scene has none.
+void find_ends(dfm_body body, const JsonValue *pose, SubjectBody &out) {
+  uint32_t n = 0;
+  need(dfm_surface_positions(body, 0, nullptr, &n));
+  std::vector<double> x(3 * size_t(n));
+  need(dfm_surface_positions(body, n, x.data(), &n));
+  if (n == 0) return;
+  double from[3] = {0, 0, 0}, lo[3], hi[3];
+  for (size_t k = 0; k < 3; ++k) lo[k] = hi[k] = x[k];
+  for (size_t i = 0; i < x.size(); ++i) {
+    from[i % 3] += x[i] / n;
+    lo[i % 3] = std::min(lo[i % 3], x[i]);
+    hi[i % 3] = std::max(hi[i % 3], x[i]);
+  }
+  out.size = std::sqrt((hi[0] - lo[0]) * (hi[0] - lo[0]) + (hi[1] - lo[1]) * (hi[1] - lo[1]) +
+                       (hi[2] - lo[2]) * (hi[2] - lo[2]));
+  const std::array<double, 9> r = rotation_of(pose);
+  double at[3] = {0, 0, 0};
+  const JsonValue *position = pose ? pose->find("position") : nullptr;
+  for (size_t k = 0; k < 3 && position && position->items.size() == 3; ++k)
+    at[k] = std::strtod(position->items[k].text.c_str(), nullptr);
+  for (int end = 0; end < 2; ++end) {
+    size_t best = 0;
+    double most = -1;
+    for (size_t i = 0; i < x.size(); i += 3) {
+      double d = 0;
+      for (size_t k = 0; k < 3; ++k) d += (x[i + k] - from[k]) * (x[i + k] - from[k]);
+      if (d > most * (1 + 1e-9)) {
+        most = d;
+        best = i;
+      }
+    }
+    std::array<double, 3> rest{};
+    for (size_t k = 0; k < 3; ++k) from[k] = x[best + k];
+    for (size_t j = 0; j < 3; ++j)
+      for (size_t k = 0; k < 3; ++k) rest[j] += r[3 * k + j] * (from[k] - at[k]);
+    out.ends.push_back(rest);
+  }
+}
+
+void read_bodies(dfm_world world, const JsonValue &plan, Subject &out) {
+  uint32_t n = 0;
+  need(dfm_world_bodies(world, 0, nullptr, &n));
+  std::vector<dfm_body> handles(n);
+  need(dfm_world_bodies(world, n, handles.data(), &n));
+  const JsonValue *rows = plan.find("bodies");
+  for (size_t i = 0; i < handles.size(); ++i) {
+    SubjectBody body;
+    dfm_body_info info = {};
+    info.size = sizeof info;
+    need(dfm_body_get_info(handles[i], &info));
+    body.name = info.name;
+    body.cells = info.ntet;
+    const JsonValue *const row = rows && i < rows->items.size() ? &rows->items[i] : nullptr;
+    body.model = row ? short_name(row->get("model")) : "";
+    const JsonValue *const effects = row ? row->find("effects") : nullptr;
+    for (size_t e = 0; effects && e < effects->items.size(); ++e)
+      if (effects->items[e].get("works") == "true") body.effects.push_back(effects->items[e].get("name"));
+    const JsonValue *const integrator = row ? row->find("integrator") : nullptr;
+    out.implicit |= integrator && integrator->get("used") != "symplectic_euler" &&
+                    integrator->get("used").find("euler") != std::string::npos;
+    find_ends(handles[i], out.find("/bodies/" + std::to_string(i) + "/pose"), body);
+    out.bodies.push_back(std::move(body));
+  }
+}
+
+}  // namespace
+
+Hash &Hash::add(const std::string &text) {
+  for (const char c : text) h_ = (h_ ^ static_cast<unsigned char>(c)) * 1099511628211ull;
+  h_ = (h_ ^ 0xff) * 1099511628211ull;
+  return *this;
+}
+
+Hash &Hash::add_file(const std::string &path) {
+  struct stat info = {};
+  add(path);
+  if (stat(path.c_str(), &info) == 0)
+    add(std::to_string(info.st_size) + " " + std::to_string(info.st_mtim.tv_sec) + " " +
+        std::to_string(info.st_mtim.tv_nsec));
+  return *this;
+}
+
+std::string Hash::hex() const {
+  char text[20];
+  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(h_));
+  return text;
+}
+
+const JsonValue *at_pointer(const JsonValue &value, const std::string &pointer) {
+  const JsonValue *at = &value;
+  for (size_t i = 0; i < pointer.size() && at;) {
+    const size_t end = std::min(pointer.find('/', i + 1), pointer.size());
+    const std::string key = pointer.substr(i + 1, end - i - 1);
+    i = end;
+    if (at->kind == JsonValue::array) {
+      const size_t k = size_t(std::strtoul(key.c_str(), nullptr, 10));
+      at = k < at->items.size() ? &at->items[k] : nullptr;
+    } else {
+      at = at->find(key);
+    }
+  }
+  return at;
+}
+
+void set_pointer(JsonValue &value, const std::string &pointer, const JsonValue &to) {
+  JsonValue *at = &value;
+  for (size_t i = 0; i < pointer.size();) {
+    const size_t end = std::min(pointer.find('/', i + 1), pointer.size());
+    const std::string key = pointer.substr(i + 1, end - i - 1);
+    i = end;
+    if (at->kind == JsonValue::array) {
+      const size_t k = size_t(std::strtoul(key.c_str(), nullptr, 10));
+      if (k >= at->items.size()) return;
+      at = &at->items[k];
+      continue;
+    }
+    at->kind = JsonValue::object;
+    const auto found = std::find_if(at->members.begin(), at->members.end(),
+                                    [&](const JsonMember &m) { return m.name == key; });
+    if (found == at->members.end()) {
+      at->members.push_back({key, {}});
+      at = &at->members.back().value;
+    } else {
+      at = &found->value;
+    }
+  }
+  *at = to;
+}
+
+std::vector<std::string> file_pointers(const JsonValue &scene) {
+  std::vector<std::string> out;
+  const auto add = [&](const std::string &pointer) {
+    const JsonValue *const v = at_pointer(scene, pointer);
+    if (v && v->kind == JsonValue::string) out.push_back(pointer);
+  };
+  const JsonValue *const bodies = scene.find("bodies");
+  for (size_t i = 0; bodies && i < bodies->items.size(); ++i) {
+    const std::string body = "/bodies/" + std::to_string(i);
+    for (const char *key : {"/mesh", "/surface/mesh", "/nodal_bc", "/anisotropy/field", "/start/state"})
+      add(body + key);
+    if (const JsonValue *const fields = bodies->items[i].find("fields"))
+      for (const JsonMember &field : fields->members) add(body + "/fields/" + field.name);
+  }
+  const JsonValue *const obstacles = scene.find("obstacles");
+  for (size_t i = 0; obstacles && i < obstacles->items.size(); ++i)
+    add("/obstacles/" + std::to_string(i) + "/mesh");
+  return out;
+}
+
+const Offered *Subject::model(const std::string &name) const {
+  for (const Offered &m : models)
+    if (m.name == name || m.id == name) return &m;
+  return nullptr;
+}
+
+const JsonValue *Subject::find(const std::string &pointer) const { return at_pointer(scene, pointer); }
+
+std::string Subject::word(const std::string &pointer, const std::string &otherwise) const {
+  const JsonValue *const v = find(pointer);
+  return v && v->kind == JsonValue::string ? v->text : otherwise;
+}
+
+Subject read_subject(const std::string &path) {
+  Subject out;
+  out.path = path;
+  out.folder = fs::path(path).parent_path().string();
+  const Context context = silent_context();
+  dfm_scene scene = 0;
+  need(dfm_scene_open(context.get(), path.c_str(), nullptr, &scene));
+  const std::string text = read_file(path, 64u << 20, "a scene");
+  if (!parse_json(text, out.scene)) throw Failure(kBadInput, path + ": this is not JSON");
+  if (out.word("/time/mode", "dynamic") == "static")
+    throw Failure(kBadInput, path +
+                                 ": \"time\": {\"mode\": \"static\"} has no steps whose cost could be "
+                                 "shown; deform cost is for dynamic scenes");
+  dfm_scene_settings settings = {};
+  settings.size = sizeof settings;
+  need(dfm_scene_get_settings(scene, &settings));
+  out.duration = settings.duration;
+  out.step = settings.step;
+  out.every = settings.every;
+  out.probes = settings.nprobe > 0;
+  dfm_world world = 0;
+  need(dfm_scene_world(scene, &world));
+  JsonValue plan;
+  if (!parse_json(explained(world), plan)) throw Failure(kBadInput, path + ": its plan cannot be read");
+  read_bodies(world, plan, out);
+  if (out.bodies.empty())
+    throw Failure(kBadInput, path + ": has no deformable body whose cost could be shown");
+  if (const JsonValue *const stages = plan.find("stages"))
+    for (const JsonValue &stage : stages->items) out.contact |= stage.get("name") == "narrow";
+  if (const JsonValue *const step = plan.find("step"))
+    out.stable = std::strtod(step->get("stable_s").c_str(), nullptr);
+  if (!std::isfinite(out.stable)) out.stable = 0;
+  const JsonValue *const rules = out.find("/contact/friction");
+  out.friction = out.contact && rules && !rules->items.empty();
+  std::vector<std::string> files;
+  read_offers(context.get(), out, files);
+  Hash hash;
+  hash.add(text);
+  for (const std::string &pointer : file_pointers(out.scene))
+    hash.add_file((fs::path(out.folder) / out.find(pointer)->text).string());
+  Dl_info library = {};
+  if (dladdr(reinterpret_cast<void *>(&dfm_scene_open), &library) != 0 && library.dli_fname)
+    hash.add_file(library.dli_fname);
+  hash.add_file("/proc/self/exe").add(dfm_version(nullptr, nullptr, nullptr));
+  for (const std::string &file : files) hash.add_file(file);
+  out.fingerprint = hash.value();
+  return out;
+}
+
+}  // namespace cli::cost

@@ -1,0 +1,272 @@
+// `deform cost`: what it writes, what it keeps, what it says, and that its choice holds.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+
+#include "json_text.h"
+#include "support.h"
+
+namespace fs = std::filesystem;
+using cli::JsonMember;
+using cli::JsonValue;
+
+namespace {
+
+// A clamped bar that bends under its weight.
+std::string bar(const std::string &time, const std::string &body = "", const std::string &more = "") {
+  return R"({"format": "deform-scene", "version": 1, "time": {)" + time + R"(},
+    "materials": {"gel": {"density": 1000, "young": 5e4, "poisson": 0.3,
+      "damping": {"mass": 2, "stiffness": 0.001}}},
+    "bodies": [{"name": "bar", "mesh": {"make": "beam", "size": [0.3, 0.1, 0.1], "cells": 90},
+                "material": "gel", "fix": [{"box": [[-1, -1, -1], [1e-6, 1, 1]]}])" +
+         body + R"(}], "probes": [{"name": "tip", "body": "bar", "point": [0.3, 0.05, 0.05]}])" + more + "}";
+}
+
+struct Study {
+  std::string folder, scene, out;
+  test::CommandResult result;
+  JsonValue report;
+};
+
+Study study(const std::string &name, const std::string &scene, std::vector<std::string> words) {
+  Study s;
+  s.folder = test::scratch("cost_" + name);
+  s.scene = s.folder + "/scene.json";
+  s.out = s.folder + "/out";
+  test::write_file(s.scene, scene);
+  std::vector<std::string> argv = {"cost", s.scene, "--out", s.out, "--quiet"};
+  argv.insert(argv.end(), words.begin(), words.end());
+  s.result = test::deform(argv);
+  if (fs::exists(s.out + "/cost.json")) {
+    EXPECT_TRUE(cli::parse_json(test::read_file(s.out + "/cost.json"), s.report));
+  }
+  return s;
+}
+
+double number(const JsonValue &object, const char *key) {
+  return std::strtod(object.get(key).c_str(), nullptr);
+}
+
+const JsonValue &row(const JsonValue &report, const std::string &index) {
+  return report.find("choices")->items[std::strtoul(index.c_str(), nullptr, 10)];
+}
+
+// The part of JSON schema that the shipped schemas use. Returns where and how the value differs; "" where it
+// does not.
+class Schema {
+ public:
+  explicit Schema(const JsonValue &root) : root_(root) {}
+  std::string check(const JsonValue &value, const JsonValue &rule, const std::string &at) const {
+    if (const JsonValue *ref = rule.find("$ref"))
+      if (const std::string e = check(value, *root_.find("$defs")->find(ref->text.substr(8)), at); !e.empty())
+        return e;
+    if (const JsonValue *any = rule.find("anyOf")) {
+      std::string first;
+      for (const JsonValue &one : any->items) {
+        const std::string e = check(value, one, at);
+        if (e.empty()) return "";
+        if (first.empty()) first = e;
+      }
+      return first;
+    }
+    const std::string type = rule.get("type");
+    if (!type.empty() && !is(value, type)) return at + ": not " + type + ": " + cli::json_text(value);
+    if (const JsonValue *one = rule.find("const"); one && one->text != value.text)
+      return at + ": not " + one->text;
+    if (const JsonValue *words = rule.find("enum"))
+      if (std::none_of(words->items.begin(), words->items.end(),
+                       [&](const JsonValue &w) { return w.text == value.text; }))
+        return at + ": not in enum: " + value.text;
+    for (size_t i = 0; i < value.items.size(); ++i)
+      if (const JsonValue *items = rule.find("items"))
+        if (const std::string e = check(value.items[i], *items, at + "/" + std::to_string(i)); !e.empty())
+          return e;
+    return value.kind == JsonValue::object ? members(value, rule, at) : "";
+  }
+
+ private:
+  static bool is(const JsonValue &value, const std::string &type) {
+    if (type == "object") return value.kind == JsonValue::object;
+    if (type == "array") return value.kind == JsonValue::array;
+    if (type == "string") return value.kind == JsonValue::string;
+    if (type == "null") return value.kind == JsonValue::null;
+    if (value.kind != JsonValue::literal) return false;
+    const bool word = value.text == "true" || value.text == "false";
+    if (type == "boolean") return word;
+    return !word && (type == "number" || value.text.find_first_not_of("-0123456789") == std::string::npos);
+  }
+  std::string members(const JsonValue &value, const JsonValue &rule, const std::string &at) const {
+    if (const JsonValue *required = rule.find("required"))
+      for (const JsonValue &key : required->items)
+        if (!value.find(key.text)) return at + ": " + key.text + " is missing";
+    const JsonValue *const properties = rule.find("properties"), *const other =
+                                                                     rule.find("additionalProperties");
+    for (const JsonMember &m : value.members) {
+      const JsonValue *const known = properties ? properties->find(m.name) : nullptr;
+      if (!known && other && other->text == "false") return at + ": unknown key " + m.name;
+      const JsonValue *const own = known                                       ? known
+                                   : other && other->kind == JsonValue::object ? other
+                                                                               : nullptr;
+      if (!own) continue;
+      if (const std::string e = check(m.value, *own, at + "/" + m.name); !e.empty()) return e;
+    }
+    return "";
+  }
+  const JsonValue &root_;
+};
+
+// x, y, z of a probe by record time.
+std::vector<std::array<double, 4>> path(const std::string &folder) {
+  std::vector<std::array<double, 4>> out;
+  for (const auto &cells : test::read_csv(folder + "/probes.csv"))
+    if (cells.size() >= 5 && cells[0] != "t")
+      out.push_back({std::stod(cells[0]), std::stod(cells[2]), std::stod(cells[3]), std::stod(cells[4])});
+  return out;
+}
+
+}  // namespace
+
+TEST(Cost, Report_HoldsToSchemaAndOrdersTheFront) {
+  const Study s = study("report", bar(R"("duration": 0.2, "step": 0.001)"),
+                        {"--axes", "model,time,mesh,contact", "--budget", "300", "--target", "0.1"});
+  ASSERT_EQ(s.result.exit_code, 0) << s.result.err;
+  JsonValue schema;
+  ASSERT_TRUE(cli::parse_json(
+      test::read_file(std::string(DEFORM_SOURCE_DIR) + "/libdeform/schema/deform-cost.schema.json"), schema));
+  EXPECT_EQ(Schema(schema).check(s.report, schema, ""), "");
+  JsonValue wrong = s.report;
+  wrong.members.push_back({"unheard_of", {}});
+  EXPECT_NE(Schema(schema).check(wrong, schema, ""), "");
+
+  const JsonValue &reference = *s.report.find("reference");
+  EXPECT_EQ(row(s.report, reference.get("choice")).get("model"), "corotational_fem");
+  EXPECT_EQ(number(*row(s.report, reference.get("choice")).find("error"), "tip"), 0);
+  EXPECT_GT(number(reference, "error"), 0);
+  EXPECT_LT(number(reference, "error"), 0.1) << "twice the cells bend a bar by this much more";
+  EXPECT_EQ(reference.get("converged") == "true",
+            number(reference, "error") <= number(reference, "best_error_shown") / 3);
+  double cost = 0, error = 1e300;
+  const auto &front = s.report.find("front")->items;
+  ASSERT_GE(front.size(), 2u);
+  for (const JsonValue &index : front) {
+    const JsonValue &choice = row(s.report, index.text);
+    EXPECT_EQ(choice.get("state"), "done");
+    EXPECT_GE(number(choice, "cpu_s_per_s"), cost);
+    EXPECT_LT(number(choice, "headline"), error);
+    cost = number(choice, "cpu_s_per_s");
+    error = number(choice, "headline");
+  }
+  // an axis on which nothing happens is named with its reason, and so is what is not built
+  std::string why;
+  for (const JsonValue &axis : s.report.find("left_out")->items)
+    why += axis.get("axis") + ": " + axis.get("why") + "\n";
+  EXPECT_NE(why.find("contact: nothing can touch anything"), std::string::npos) << why;
+  EXPECT_NE(why.find("guard: not asked for"), std::string::npos) << why;
+  // each model was tried, and halving the step or doubling the cells moves the tip less than the model does
+  for (const char *model : {"msm", "linear_fem", "corotational_fem", "shape_matching", "meshless", "modal"}) {
+    const auto &choices = s.report.find("choices")->items;
+    EXPECT_TRUE(std::any_of(choices.begin(), choices.end(), [&](const JsonValue &c) {
+      return c.get("model") == model && c.get("state") == "done" && number(c, "headline") < 2;
+    })) << model;
+  }
+  EXPECT_EQ(test::read_csv(s.out + "/cost.csv").size(), s.report.find("choices")->items.size() + 1);
+}
+
+TEST(Cost, SecondCall_RunsNothingAndSaysTheSame) {
+  Study s = study("again", bar(R"("duration": 0.1, "step": 0.001)"), {"--axes", "time", "--budget", "300"});
+  ASSERT_EQ(s.result.exit_code, 0) << s.result.err;
+  EXPECT_GT(number(s.report, "runs_started"), 3);
+  const test::CommandResult again =
+      test::deform({"cost", s.scene, "--out", s.out, "--axes", "time", "--budget", "300", "--json"});
+  ASSERT_EQ(again.exit_code, 0) << again.err;
+  JsonValue report;
+  ASSERT_TRUE(cli::parse_json(again.out, report));
+  EXPECT_EQ(report.get("runs_started"), "0");
+  for (const char *same : {"choices", "front", "pick", "reference"})
+    EXPECT_EQ(cli::json_text(*report.find(same)), cli::json_text(*s.report.find(same))) << same;
+}
+
+TEST(Cost, Apply_WritesASceneThatMeetsTheTarget) {
+  const double target = 0.2;
+  const Study s = study("apply", bar(R"("duration": 0.2, "step": 0.0002)"),
+                        {"--axes", "model,mesh", "--budget", "300", "--target", std::to_string(target),
+                         "--apply", test::scratch("cost_applied") + "/deeper/faster.json"});
+  ASSERT_EQ(s.result.exit_code, 0) << s.result.err;
+  const std::string scene = test::scratch("cost_applied_run") + "/../cost_applied/deeper/faster.json";
+  const JsonValue &pick = *s.report.find("pick");
+  const JsonValue &chosen = row(s.report, pick.get("index"));
+  const std::string out = s.folder + "/applied";
+  const test::CommandResult run =
+      test::deform({"run", scene, "--out", out, "--set", "/output/every=0.002", "--quiet"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  // compared here by other code than the command's
+  const auto mine = path(out);
+  const auto truth = path(row(s.report, s.report.find("reference")->get("choice")).get("folder"));
+  ASSERT_GT(mine.size(), 90u);
+  double off = 0, moved = 0;
+  for (const auto &now : mine) {
+    const auto near = std::min_element(truth.begin(), truth.end(), [&](const auto &a, const auto &b) {
+      return std::fabs(a[0] - now[0]) < std::fabs(b[0] - now[0]);
+    });
+    for (size_t k = 1; k < 4; ++k) {
+      off += ((*near)[k] - now[k]) * ((*near)[k] - now[k]);
+      moved += ((*near)[k] - truth[0][k]) * ((*near)[k] - truth[0][k]);
+    }
+  }
+  const double error = std::sqrt(off / moved);
+  EXPECT_LE(error, target);
+  EXPECT_NEAR(error, number(chosen, "headline"), 0.02);
+  EXPECT_LE(number(chosen, "cpu_s_per_s"), number(row(s.report, "0"), "cpu_s_per_s"));
+}
+
+// A model of somebody else, whose dampers push instead of braking, is a choice like all that are loaded.
+TEST(Cost, UnstableChoice_IsNamedAndNotChosen) {
+  const std::string plugins = test::scratch("cost_plugins");
+  fs::create_directories(plugins);
+  fs::copy_file(std::string(DEFORM_BINARY_DIR) + "/lib/tiny/tiny_pump.so", plugins + "/tiny_pump.so",
+                fs::copy_options::overwrite_existing);
+  setenv("DEFORM_PLUGIN_PATH", plugins.c_str(), 1);
+  const Study s = study("unstable", bar(R"("duration": 30, "step": "auto")", R"(, "spin": [0, 0, 9])"),
+                        {"--axes", "model", "--budget", "300", "--target", "10"});
+  unsetenv("DEFORM_PLUGIN_PATH");
+  ASSERT_EQ(s.result.exit_code, 0) << s.result.err;
+  size_t unstable = 0;
+  const auto &choices = s.report.find("choices")->items;
+  for (size_t i = 0; i < choices.size(); ++i) {
+    if (choices[i].get("unstable") != "true") continue;
+    ++unstable;
+    EXPECT_EQ(choices[i].get("model"), "org.tiny.pump");
+    EXPECT_NE(choices[i].get("why").find("body 'bar'"), std::string::npos) << choices[i].get("why");
+    for (const JsonValue &index : s.report.find("front")->items) EXPECT_NE(index.text, std::to_string(i));
+  }
+  EXPECT_EQ(unstable, 1u);
+}
+
+TEST(Cost, Budget_EndsRunsThatWouldTakeHours) {
+  const Study s = study("budget", bar(R"("duration": 1e5, "step": 0.001)"), {"--budget", "2"});
+  EXPECT_EQ(s.result.exit_code, 2);
+  EXPECT_NE(s.result.err.find("no run came to its end within the budget"), std::string::npos) << s.result.err;
+  EXPECT_NE(s.result.err.find("--budget"), std::string::npos) << s.result.err;
+}
+
+TEST(Cost, WhatCannotBeStudied_IsOneSentence) {
+  const auto refused = [](const std::string &name, const std::string &scene, std::vector<std::string> words,
+                          const std::string &part) {
+    const Study s = study(name, scene, std::move(words));
+    EXPECT_EQ(s.result.exit_code, 2) << name;
+    EXPECT_NE(s.result.err.find(part), std::string::npos) << s.result.err;
+    EXPECT_EQ(std::count(s.result.err.begin(), s.result.err.end(), '\n'), 1) << s.result.err;
+  };
+  refused("static", bar(R"("duration": 1, "mode": "static")"), {}, "deform cost is for dynamic scenes");
+  refused("axis", bar(R"("duration": 0.1)"), {"--axes", "tyme"}, "did you mean \"time\"?");
+  refused("quantity", bar(R"("duration": 0.02)"), {"--axes", "guard", "--quantity", "tipp"},
+          "did you mean \"tip\"?");
+  refused("apply", bar(R"("duration": 0.02)"), {"--axes", "time", "--target", "1e-30", "--apply", "x.json"},
+          "nothing to apply");
+  refused("budget_sign", bar(R"("duration": 0.02)"), {"--budget", "-1"}, "expected a finite number above 0");
+}
