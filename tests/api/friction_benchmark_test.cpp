@@ -90,6 +90,45 @@ class Entry:
   EXPECT_NE(unknown.err.find("bullet, deform, mujoco, sled"), std::string::npos) << unknown.err;
 }
 
+// The walk along the coordinates: each key at its best with those before it, a row for every trial, none run
+// twice, a trial that fails counted as the worst.
+TEST(FrictionBenchmark, Search_FindsTheBestSettingsAndWritesThem) {
+  const std::string folder = test::scratch("friction_benchmark_search");
+  test::write_file(folder + "/entry_tunable.py", R"(class Entry:
+    name, version, settings = "tunable", "1", {"plain": {"a": 1, "b": 1}}
+    SEARCH, SEARCH_FROM = {"a": [2, 3], "b": [2, 3]}, "plain"
+    def __init__(self, command, work):
+        pass
+    def run(self, case, configuration):
+        s = self.settings[configuration]
+        if s["b"] == 3:
+            raise RuntimeError("it fell apart")
+        error = 0.01 * abs(s["a"] - 2) + 0.02 / s["b"]
+        return {"acceleration": case["answer"]["acceleration"][0] + error}, 0.5
+)");
+  const std::string out = folder + "/trials.csv", best = folder + "/best.csv";
+  std::remove(out.c_str());
+  std::remove(best.c_str());
+  const auto call = [&] {
+    return test::run({DEFORM_TEST_PYTHON, script("search.py"), "tunable", "--entries", folder, "--command",
+                      DEFORM_COMMAND, "--case", "slope_slide", "--parameters", "mu=0.2", "--out", out,
+                      "--best", best});
+  };
+  const test::CommandResult first = call();
+  ASSERT_EQ(first.exit_code, 0) << first.err;
+  const auto trials = test::read_csv(out);
+  EXPECT_EQ(trials.size(), 6u);  // header, the start, two values of each key
+  const auto winner = test::read_csv(best);
+  ASSERT_EQ(winner.size(), 2u);
+  EXPECT_EQ(winner[1][2], "tuned");
+  EXPECT_EQ(winner[1][10], "pass");
+  EXPECT_EQ(winner[1].back(), "a 2; b 2");
+  const test::CommandResult again = call();
+  EXPECT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_EQ(test::read_csv(out).size(), 6u);
+  EXPECT_EQ(test::read_csv(best).size(), 2u);
+}
+
 // From a folder that has no build/ of its own.
 TEST(FrictionBenchmark, CommandThatIsNotThere_IsOneSentence) {
   const test::CommandResult r =

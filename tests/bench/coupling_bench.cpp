@@ -2,7 +2,7 @@
 // per weight and surfel, weights per row.
 #include <benchmark/benchmark.h>
 
-#include "../unit/surfel/detect_scene.h"
+#include "../unit/narrow/detect_scene.h"
 #include "contact/distribute.h"
 #include "mesh/mesh.h"
 

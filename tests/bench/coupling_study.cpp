@@ -14,7 +14,7 @@
 #include <fstream>
 
 #include "../support/coupled.h"
-#include "../unit/surfel/detect_scene.h"
+#include "../unit/narrow/detect_scene.h"
 #include "core/error.h"
 #include "mesh/mesh.h"
 

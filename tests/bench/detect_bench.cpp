@@ -7,7 +7,7 @@
 #include <cmath>
 #include <filesystem>
 
-#include "../unit/surfel/detect_scene.h"
+#include "../unit/narrow/detect_scene.h"
 #include "body/obstacle_mesh.h"
 #include "geometry/voxel_grid.h"
 #include "mesh/mesh.h"

@@ -10,7 +10,7 @@
 #include <cstring>
 #include <random>
 
-#include "../unit/surfel/detect_scene.h"
+#include "../unit/narrow/detect_scene.h"
 #include "core/handle.h"
 #include "coupled.h"
 #include "machine.h"

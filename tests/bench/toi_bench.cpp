@@ -14,9 +14,9 @@
 #include <cstring>
 #include <numeric>
 
-#include "../unit/narrow/guard_scene.h"
-#include "../unit/narrow/toi_support.h"
-#include "../unit/surfel/detect_scene.h"
+#include "../unit/ccd/guard_scene.h"
+#include "../unit/ccd/toi_support.h"
+#include "../unit/narrow/detect_scene.h"
 #include "ccd/toi_finders.h"
 #include "machine.h"
 

@@ -52,9 +52,9 @@ struct Scene {
     info.m_gravity = btVector3(0, 0, 0);
     info.m_sparsesdf.setDefaultVoxelsz(2.5f);
     info.m_sparsesdf.Initialize();
-    world.getSolverInfo().m_deformable_erp = 0.06f;
+    world.getSolverInfo().m_deformable_erp = btScalar(v.at("erp"));
     world.getSolverInfo().m_friction = 1;
-    world.getSolverInfo().m_numIterations = 100;
+    world.getSolverInfo().m_numIterations = int(v.at("iterations"));
   }
 
   void load(const std::string &path, const Values &v, double lift) {
@@ -119,6 +119,16 @@ struct Scene {
         btTransform(btQuaternion::getIdentity(), btVector3(btScalar(x), 0, btScalar(z))));
   }
 
+  double speed(int axis) const {
+    double sum = 0, mass = 0;
+    for (int i = 0; i < soft->m_nodes.size(); ++i) {
+      const double m = 1 / soft->m_nodes[i].m_im;
+      sum += m * soft->m_nodes[i].m_v[axis];
+      mass += m;
+    }
+    return sum / mass;
+  }
+
   double center(int axis) const {
     double sum = 0;
     for (int i = 0; i < soft->m_nodes.size(); ++i) sum += soft->m_nodes[i].m_x[axis];
@@ -176,6 +186,7 @@ int run(const std::string &name, const std::string &mesh, const Values &v) {
     btRigidBody *const left = s.wall(jaw, btVector3(btScalar(-apart), 0, 0));
     btRigidBody *const right = s.wall(jaw, btVector3(btScalar(apart), 0, 0));
     Line line;
+    double started = NAN, first = NAN;
     while (s.time < v.at("end")) {
       s.advance([&](double t) {
         const double x = apart - (kLength * v.at("depth") + lift) * ramp(t, 0, shut);
@@ -183,8 +194,15 @@ int run(const std::string &name, const std::string &mesh, const Values &v) {
         Scene::move(right, x, 0);
         s.gravity->m_gravity = btVector3(0, 0, btScalar(-kG * ramp(t, v.at("close"), v.at("load"))));
       });
-      if (s.time >= v.at("begin")) line.add(s.time, s.center(2));
+      if (s.time < v.at("begin")) continue;
+      line.add(s.time, s.center(2));
+      if (std::isnan(first)) {
+        started = s.time;
+        first = s.speed(2);
+      }
     }
+    // what the walls carry: weight and the change of momentum
+    std::printf("lift_share=%.9g\n", 1 + (s.speed(2) - first) / (s.time - started) / kG);
     print("creep_um_per_s", 1e6 / kLength * std::fabs(line.slope()), s.time);
     return 0;
   }

@@ -1,7 +1,8 @@
 """The benchmark's cases as scenes of `deform run`. One function per case: scene in, measured quantities out.
 
-Laws: every case that asks for one coefficient runs with each law given to `laws`; the others with the law
-that the case names.
+Laws: every case runs with every law that has its effect; coulomb and karnopp run the presliding loop too, to
+show what a law without bristles answers. `defaults` is a scene that names neither model nor step: what a
+newcomer gets.
 """
 import csv
 import json
@@ -14,7 +15,14 @@ import cases
 import mesh_file
 
 G = 9.81
-COULOMB_LIKE = ["coulomb", "karnopp", "lugre", "elastoplastic"]
+DEFAULTS = "defaults"
+LAWS = {"coulomb": ["coulomb", "karnopp", "dahl", "lugre", "elastoplastic", "gms", DEFAULTS],
+        "static_kinetic": ["coulomb", "karnopp", "lugre", "elastoplastic", "gms", DEFAULTS],
+        "dahl": ["dahl", "lugre", "elastoplastic", "gms", "coulomb", "karnopp", DEFAULTS]}
+# bristles that give a thousandth of a millimeter at the limit of 1 kPa
+STIFF = {"dahl": {"sigma0": 1e9}, "lugre": {"sigma0": 1e9, "sigma1": 1e5},
+         "elastoplastic": {"sigma0": 1e9, "sigma1": 1e5},
+         "gms": {"k": [4e8, 3e8, 2e8, 1e8], "nu": [0.2, 0.3, 0.3, 0.2], "C": 1e7}}
 GAP = 2e-5  # m, start distance: settles without a blow
 
 
@@ -28,8 +36,10 @@ class Entry:
         self.version = version[-1] if version else "unknown"
 
     def configurations(self, case):
-        return (COULOMB_LIKE if case["law"] == "coulomb" else ["coulomb"] if case["law"] == "static_kinetic"
-                else ["dahl"])
+        return LAWS[case["law"]]
+
+    def lacks(self, case):
+        return {"dahl": "no law with a static level"} if case["law"] == "static_kinetic" else {}
 
     def mesh(self, body):
         key = json.dumps(body, sort_keys=True)
@@ -62,21 +72,40 @@ class Entry:
     # What all scenes share. `low`: lowest point of the mesh in its own frame.
     def base(self, case, law, duration, every, gravity):
         m = case["body"]["material"]
-        params = {"mu": case["mu"]} if "mu" in case else {"mu_S": case["mu_S"], "mu_C": case["mu_C"],
-                                                          "v_s": case["v_s"]}
-        if law == "dahl":
-            params = {"mu_C": case["mu"], "sigma0": case["sigma0"]}
-        # bristles that give a thousandth of a millimeter at the limit of 1 kPa
-        elif law in ("lugre", "elastoplastic"):
-            params.update({"sigma0": 1e9, "sigma1": 1e5})
+        plain = law == DEFAULTS
+        law = "coulomb" if plain else law
+        params = ({"mu_S": case["mu_S"], "mu_C": case["mu_C"], "v_s": case["v_s"]} if "mu_S" in case
+                  else {"mu_C" if law == "dahl" else "mu": case["mu"]})
+        params.update(self.bristles(case, law) if "sigma0" in case else STIFF.get(law, {}))
+        time = {"duration": duration} if plain else {"duration": duration, "step": case["step"]}
+        model = {} if plain else {"model": {"type": "msm"}}
         return {"format": "deform-scene", "version": 1, "gravity": gravity,
-                "time": {"duration": duration, "step": case["step"]},
+                "time": time,
                 "materials": {"gel": {"density": m["density"], "young": m["young"], "poisson": m["poisson"],
                                       "damping": {"mass": 0, "stiffness": m["damping_stiffness"]}}},
                 "bodies": [{"name": "soft", "mesh": self.mesh(case["body"]), "material": "gel",
-                            "model": {"type": "msm"}}],
+                            **model}],
                 "contact": {"friction": [{"between": ["*", "*"], "law": law, "params": params}]},
                 "output": {"every": every}}
+
+    @staticmethod
+    def bristles(case, law):
+        """What brings a law to the case's bristles, which are Dahl's."""
+        if law in ("dahl", "elastoplastic"):
+            return {"sigma0": case["sigma0"]}
+        if law == "lugre":  # without micro-damping it is Dahl's law
+            return {"sigma0": case["sigma0"], "sigma1": 0}
+        if law != "gms":
+            return {}
+        # Chords of Dahl's first loading p = 1 - exp(-u), u = sigma0 x / limit, at 12 points: the elements'
+        # shares and stiffnesses follow from its slopes, the last chord ends level.
+        n, last = 12, 5.0
+        u = [last * (i + 1) / n for i in range(n)]
+        p = [0.0] + [1 - math.exp(-x) for x in u]
+        slopes = [(b - a) / (x - y) for a, b, x, y in zip(p, p[1:], u, [0.0] + u)] + [0.0]
+        k = [a - b for a, b in zip(slopes, slopes[1:])]
+        nu = [a * x for a, x in zip(k, u)]
+        return {"k": [case["sigma0"] * a for a in k], "nu": [a / sum(nu) for a in nu], "C": 1e7}
 
     def floor(self, scene, **more):
         scene["obstacles"] = [{"name": "floor", "shape": "plane", "point": [0, 0, 0], "normal": [0, 0, 1],

@@ -10,6 +10,8 @@ where a flex is elastic, with steps of 1 to 4 ms; its no-slip iterations are not
   hard          what made the pinch creep least here: impratio 1000, contacts as stiff as the step allows
                 (solref of two steps, its own clamp) and the exact diagonal (diagexact), without which
                 vertices of a few milligrams get contacts that the ball pushes in by 4 of its 6 mm
+
+search.py goes on from `hard`, case by case.
 """
 import math
 import os
@@ -19,14 +21,19 @@ import cases
 import mesh_file
 
 G = 9.81
-OPTIONS = {"default": ("", False), "recommended": ('cone="elliptic" impratio="10"', False),
-           "hard": ('cone="elliptic" impratio="1000"', True)}
+# `solref` in steps: the time constant of a contact; `step` in s, without it the case's own
+SETTINGS = {"default": {}, "recommended": {"cone": "elliptic", "impratio": 10},
+            "hard": {"cone": "elliptic", "impratio": 1000, "diagexact": "enable", "solref": 2}}
+SEARCH = {"impratio": [100, 10000, 100000], "step": [2.5e-4, 5e-4, 1e-3, 4e-3], "solref": [1, 4, 10],
+          "solimp": ["0.99 0.99 1e-5", "0.9999 0.9999 1e-5"], "diagexact": ["disable"],
+          "tolerance": [1e-12], "iterations": [1000], "solver": ["CG"]}
+OPTION_KEYS = ("cone", "impratio", "tolerance", "iterations", "solver")
 # nothing in them is faster, and at the cases' own step they take four times as long
 LEAST_STEP = {"pinch_hold": 2e-3, "rotating_pad": 2e-3}
 
 
 class Entry:
-    name = "mujoco"
+    name, settings, SEARCH, SEARCH_FROM = "mujoco", SETTINGS, SEARCH, "hard"
 
     def __init__(self, command, work):
         import mujoco
@@ -36,7 +43,7 @@ class Entry:
         os.chdir(work)  # where it writes its log
 
     def configurations(self, case):
-        return list(OPTIONS) if case["law"] == "coulomb" else []
+        return list(self.settings) if case["law"] == "coulomb" else []
 
     def mesh(self, body):
         key = str(sorted(body.items(), key=str))
@@ -47,7 +54,8 @@ class Entry:
         return self.meshes[key]
 
     def run(self, case, configuration):
-        case = {**case, "step": max(case["step"], LEAST_STEP.get(case["name"], 0.0))}
+        step = max(case["step"], LEAST_STEP.get(case["name"], 0.0))
+        case = {**case, "step": self.settings[configuration].get("step", step)}
         started = time.process_time()
         values, simulated = getattr(self, "run_" + case["name"])(case, configuration)
         return values, (time.process_time() - started) / simulated
@@ -64,14 +72,18 @@ class Entry:
             " ".join(str(i) for t in tets for i in t)))
         flex += ('<elasticity young="%g" poisson="%g" damping="%g"/><edge equality="false"/>' %
                  (m["young"], m["poisson"], m["damping_stiffness"]))
-        option, hard = OPTIONS[configuration]
-        touch = 'friction="%g 0.005 0.0001"' % case["mu"] + (' solref="%g 1"' % (2 * case["step"]) if hard
-                                                             else "")
+        given = self.settings[configuration]
+        option = " ".join('%s="%s"' % (key, given[key]) for key in OPTION_KEYS if key in given)
+        touch = 'friction="%g 0.005 0.0001"' % case["mu"]
+        if "solref" in given:
+            touch += ' solref="%g 1"' % (given["solref"] * case["step"])
+        if "solimp" in given:
+            touch += ' solimp="%s"' % given["solimp"]
         flex += '<contact selfcollide="none" condim="3" %s/>%s</flexcomp>' % (touch, pin)
         xml = ('<mujoco><size memory="1G"/><option timestep="%g" integrator="discrete" %s><flag '
                'diagexact="%s"/></option>'
                '<default><geom %s/></default><worldbody>%s%s</worldbody></mujoco>') % (
-            case["step"], option, "enable" if hard else "disable", touch, walls, holder % flex if holder
+            case["step"], option, given.get("diagexact", "disable"), touch, walls, holder % flex if holder
             else flex)
         try:
             model = self.mj.MjModel.from_xml_string(xml)

@@ -48,20 +48,9 @@ def main():
     parser.add_argument("--out", help="CSV to write or to go on with; without it the rows are printed")
     given = parser.parse_args()
     make = entry_of(given.engine, given.entries)
-    given.command = os.path.abspath(given.command)
-    if not os.access(given.command, os.X_OK):
-        sys.exit("%s: no such command; build it with `make demo`, or name another with --command" %
-                 given.command)
-    done, file = set(), None
-    if given.out:
-        fresh = not os.path.exists(given.out)
-        if not fresh:
-            with open(given.out) as f:
-                done = {tuple(r[c] for c in COLUMNS[:5]) for r in csv.DictReader(f)}
-        file = open(given.out, "a", newline="")
-        writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
-        if fresh:
-            writer.writeheader()
+    given.command = command_of(given.command)
+    given.out = given.out and os.path.abspath(given.out)
+    done = {tuple(r[c] for c in COLUMNS[:5]) for r in rows_of(given.out)}
     with tempfile.TemporaryDirectory() as work:
         try:
             entry = make(given.command, work)
@@ -70,18 +59,19 @@ def main():
         for case in cases.cases():
             if given.only and case["name"] != given.only:
                 continue
-            for configuration in entry.configurations(case) or ["none"]:
+            lacks = getattr(entry, "lacks", lambda _: {})(case)
+            for configuration in [*entry.configurations(case), *lacks] or ["none"]:
                 head = dict(zip(COLUMNS, [entry.name, entry.version, configuration, case["name"],
                                           parameters(case)]))
                 if tuple(head.values()) in done or (given.configuration
                                                     and configuration != given.configuration):
                     continue
-                rows = measured_rows(entry, case, configuration)
+                rows = ([{"verdict": "not_run", "note": lacks[configuration]}] if configuration in lacks
+                        else measured_rows(entry, case, configuration))
                 for row in rows:
                     row = {**head, **row}
-                    if file:
-                        writer.writerow(row)
-                        file.flush()
+                    if given.out:
+                        append(given.out, COLUMNS, row)
                     shown = ("engine", "configuration", "case", "parameters", "quantity", "measured", "low",
                              "high", "verdict", "note")
                     print("%-8s %-14s %-16s %-14s %-16s %12s  [%s, %s]  %s %s" %
@@ -113,6 +103,10 @@ def measured_rows(entry, case, configuration):
         return [{"verdict": "too_slow", "note": str(error)}]
     except RuntimeError as error:
         return [{"verdict": "error", "note": str(error).replace("\n", " ")[:200]}]
+    return judged(case, values, cost)
+
+
+def judged(case, values, cost):
     rows = []
     for quantity, (expected, low, high) in case["answer"].items():
         if quantity not in values:
@@ -123,6 +117,30 @@ def measured_rows(entry, case, configuration):
                      "low": "%.6g" % low, "high": "%.6g" % high,
                      "verdict": verdict(value, low, high), "cost": "%.3g" % cost})
     return rows
+
+
+def command_of(path):
+    path = os.path.abspath(path)
+    if not os.access(path, os.X_OK):
+        sys.exit("%s: no such command; build it with `make demo`, or name another with --command" % path)
+    return path
+
+
+def rows_of(path):
+    if not path or not os.path.exists(path):
+        return []
+    with open(path) as f:
+        return list(csv.DictReader(f))
+
+
+def append(path, columns, row):
+    """One row at the end of a table that may not be there yet."""
+    fresh = not os.path.exists(path) or os.path.getsize(path) == 0
+    with open(path, "a", newline="") as f:
+        writer = csv.DictWriter(f, columns, lineterminator="\n")
+        if fresh:
+            writer.writeheader()
+        writer.writerow(row)
 
 
 if __name__ == "__main__":

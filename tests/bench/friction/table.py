@@ -1,31 +1,35 @@
 #!/usr/bin/env python3
-"""The benchmark's rows side by side, as a table of Markdown: table.py FILE.csv... (each as run.py writes it).
-A value outside its band is in bold."""
+"""The benchmark's rows side by side, as a table of Markdown: table.py FILE.csv [--page PAGE], rows as run.py
+writes them. A value outside its band is in bold. With --page the table takes the place of what stands
+between the lines `<!-- table -->` and `<!-- end of table -->`."""
+import argparse
 import csv
 import sys
 
+BEGIN, END = "<!-- table -->\n", "<!-- end of table -->\n"
+
 
 def shown(row):
-    if row["verdict"] in ("error", "too_slow"):
+    if row["verdict"] == "too_slow":
+        return "**too slow**"
+    if row["verdict"] == "error":
         return "**" + row["note"].split(" for ")[0] + "**"
     if row["verdict"] == "not_run":
-        return "-"
+        return "no law" if "no law" in row["note"] else "not told"
     text = "%.3g" % float(row["measured"]) if abs(float(row["measured"])) >= 1e-3 else "0"
     return text if row["verdict"] == "pass" else "**" + text + "**"
 
 
-def main():
-    rows = [row for name in sys.argv[1:] for row in csv.DictReader(open(name))]
-    if not rows:
-        sys.exit(__doc__)
-    entries, cases, cells = [], [], {}
+def table(rows):
+    entries, cases, cells, absent = [], [], {}, {}
     for row in rows:
-        entry = row["engine"] + " " + row["version"] + ", " + row["configuration"]
+        key = (row["case"], row["parameters"], row["quantity"])
         if row["configuration"] == "none":
+            absent[row["engine"], key[:2]] = shown(row)
             continue
+        entry = (row["engine"], row["version"], row["configuration"])
         if entry not in entries:
             entries.append(entry)
-        key = (row["case"], row["parameters"], row["quantity"])
         if key[2] and key not in cases:
             cases.append(key)
         cells[entry, key] = row
@@ -33,14 +37,38 @@ def main():
     for (_, key), row in cells.items():
         if row["expected"]:
             band[key] = "%.4g to %.4g" % (float(row["low"]), float(row["high"]))
-    print("| case | quantity | passes from | " + " | ".join(entries) + " |")
-    print("|" + "---|" * (3 + len(entries)))
+    head = " | ".join("%s %s, %s" % entry for entry in entries)
+    lines = ["| case | quantity | passes from | " + head + " |", "|" + "---|" * (3 + len(entries))]
     for key in cases:
         values = []
         for entry in entries:
             row = cells.get((entry, key)) or cells.get((entry, (key[0], key[1], "")))
-            values.append(shown(row) if row else "-")
-        print("| %s %s | %s | %s | %s |" % (key[0], key[1], key[2], band.get(key, ""), " | ".join(values)))
+            values.append(shown(row) if row else absent.get((entry[0], key[:2]), "-"))
+        lines.append("| %s %s | %s | %s | %s |" % (key[0], key[1], key[2], band.get(key, ""),
+                                                   " | ".join(values)))
+    return "\n".join(lines) + "\n"
+
+
+def into_page(path, text):
+    with open(path) as f:
+        page = f.read()
+    if page.count(BEGIN) != 1 or page.count(END) != 1:
+        sys.exit("%s: there is no place for the table between its two marks" % path)
+    begin, end = page.index(BEGIN) + len(BEGIN), page.index(END)
+    with open(path, "w") as f:
+        f.write(page[:begin] + "\n" + text + "\n" + page[end:])
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("files", nargs="+")
+    parser.add_argument("--page")
+    given = parser.parse_args()
+    rows = [row for name in given.files for row in csv.DictReader(open(name))]
+    if given.page:
+        into_page(given.page, table(rows))
+    else:
+        print(table(rows), end="")
 
 
 if __name__ == "__main__":
