@@ -87,7 +87,7 @@ TEST_F(PlannerScene, WhatCannotBePlanned_IsOneSentence) {
   expect_refused(bar(target + R"("budget": {"ms_per_step": 1},)"), {"/budget", "keep one"});
   expect_refused(bar(R"("accuracy": {"target": 2},)"), {"/accuracy/target"});
   expect_refused(bar(R"("accuracy": {"target": 0.1, "quantity": "color"},)"),
-                 {"/accuracy/quantity", "position"});
+                 {"/accuracy/quantity", "force"});
   expect_refused(bar(target, "", R"(, "mode": "static")"), {"/accuracy", "a static scene has no step"});
   expect_refused(bar(target, R"("model": {"params": {"volume": 0}}, )"),
                  {"/bodies/0/model/params", "name it in"});

@@ -253,9 +253,22 @@ void read_time(const Node &scene, Definition &def) {
 }
 
 // How many times the relative error of positions that of a quantity is: energies go with squares, and forces
-// of contact and the work of friction follow them.
-double weight_of(const std::string &quantity) {
-  return quantity == "position" || quantity == "volume" || quantity == "event" ? 1 : 2;
+// of contact and the work of friction follow them. Names are those of `deform cost`: a probe, or a family with
+// or without whose it is.
+double weight_of(const Node &quantity, const std::vector<Probe> &probes) {
+  static const std::vector<std::string> once = {"com", "volume", "touch", "slip", "liftoff", "rest"},
+                                        twice = {"energy", "force", "work"};
+  const std::string name = quantity.text(), family = name.substr(0, name.find('.'));
+  std::vector<std::string> valid;
+  for (const Probe &p : probes) valid.push_back(p.name);
+  valid.insert(valid.end(), once.begin(), once.end());
+  valid.insert(valid.end(), twice.begin(), twice.end());
+  const bool probe =
+      std::any_of(probes.begin(), probes.end(), [&](const Probe &p) { return p.name == name; });
+  if (probe) return 1;
+  json stem = family;
+  known(Node(&stem, quantity.pointer(), &quantity.file()), valid, "quantity");
+  return std::find(twice.begin(), twice.end(), family) == twice.end() ? 1 : 2;
 }
 
 void read_wanted(const Node &scene, Definition &def) {
@@ -270,7 +283,6 @@ void read_wanted(const Node &scene, Definition &def) {
   wanted.object(key);
   if (scene.has("accuracy")) {
     def.wanted.target = wanted.at("target").number(Range{0, 1, true, true});
-    def.wanted.weight = weight_of(wanted.word("quantity", "position", "quantity"));
   } else {
     def.wanted.ms_per_step = wanted.at("ms_per_step").number(kPositive);
   }
@@ -508,6 +520,8 @@ Definition read_scene(json &tree, const std::string &file, const Types &types) {
   def.rigid = read_rigid(scene, context);
   read_contact(scene, def, context);
   read_probes(scene, def);
+  if (scene.has("accuracy") && scene.member("accuracy").has("quantity"))
+    def.wanted.weight = weight_of(scene.member("accuracy").member("quantity"), def.probes);
   read_output(scene, def);
   return def;
 }
