@@ -253,8 +253,8 @@ void read_time(const Node &scene, Definition &def) {
 }
 
 // How many times the relative error of positions that of a quantity is: energies go with squares, and forces
-// of contact and the work of friction follow them. Names are those of `deform cost`: a probe, or a family with
-// or without whose it is.
+// of contact and the work of friction follow them. Names are those of `deform cost`: a probe, or a family,
+// with or without whose it is.
 double weight_of(const Node &quantity, const std::vector<Probe> &probes) {
   static const std::vector<std::string> once = {"com", "volume", "touch", "slip", "liftoff", "rest"},
                                         twice = {"energy", "force", "work"};
