@@ -121,9 +121,30 @@ DEFORM_PASS inline void trial(const bristle::Batch &p, const Block &b, double ka
   }
 }
 
+// 1 where a lane yields, else 0.
+DEFORM_PASS inline bool yields(const Return &t, double *active) {
+  uint64_t some = 0;
+  EACH_LANE (k) {
+    active[k] = t.top[k] > t.lambda[k] && t.p[k] > 0 ? 1.0 : 0.0;
+    some |= active[k] > 0 ? uint64_t(1) : uint64_t(0);
+  }
+  return some != 0;
+}
+
+// Nobody yields: what rates() gives for f = 0 or M = 0, by the associated multiplier.
+DEFORM_PASS inline void hold(Block &b) {
+  EACH_LANE (k) {
+    const double plastic = b.g[k] > 1e-30 * b.fn[k] ? 1.0 : 0.0;
+    b.m[k] = plastic > 0 ? 0.0 : b.w[k];
+    b.mx[k] = plastic > 0 ? 0.0 : b.ex[k];
+    b.my[k] = plastic > 0 ? 0.0 : b.ey[k];
+    b.mn[k] = 0.0;
+  }
+}
+
 template <bool kPlain>
-DEFORM_PASS inline void solve(Return &t, const Exponent &e) {
-  double low[kLanes], high[kLanes], active[kLanes], flows = 0;
+DEFORM_PASS inline void solve(Return &t, double *active, const Exponent &e) {
+  double low[kLanes], high[kLanes], flows = 1;
   EACH_LANE (k) {
     const double lambda = t.lambda[k];
     const double elastic = t.top[k] < lambda ? t.top[k] : lambda;
@@ -135,10 +156,8 @@ DEFORM_PASS inline void solve(Return &t, const Exponent &e) {
     const double middle = lambda + 0.6 * (1.0 - lambda);
     const double start = full >= 1.0 ? full : t.p[k] < 0.3 ? high[k] : full > middle ? full : middle;
     t.rho[k] = start > low[k] ? (start < high[k] ? start : high[k]) : low[k];
-    active[k] = t.top[k] > lambda && t.p[k] > 0 ? 1.0 : 0.0;
     t.rho[k] = active[k] > 0 ? t.rho[k] : t.top[k];
   }
-  EACH_LANE (k) flows += active[k];
   for (int pass = 0; pass < 100 && flows > 0; ++pass) {
     flows = 0;
     EACH_LANE (k) {
@@ -164,6 +183,8 @@ DEFORM_PASS inline void solve(Return &t, const Exponent &e) {
 template <bool kPlain>
 DEFORM_PASS inline void rates(const bristle::Batch &p, const Exponent &exponent, int multiplier,
                               const Return &t, Block &b) {
+  const double whole = multiplier == kCosine ? 0.5 : 0.0;
+  // no choice by `multiplier` in the loop, or the compiler would not use vectors
   EACH_LANE (k) {
     const double plastic = b.g[k] > 1e-30 * b.fn[k] ? 1.0 : 0.0;
     const double level = plastic > 0 ? b.g[k] : 1.0;
@@ -182,8 +203,7 @@ DEFORM_PASS inline void rates(const bristle::Batch &p, const Exponent &exponent,
     const double ly = ty + turn * (b.vy[k] - load * ty);
     const double ox = b.cut[k] * b.zx[k], oy = b.cut[k] * b.zy[k], along = tx * ox + ty * oy;
     const double ln = t.by_r[k] * ((ox - along * tx) * b.vx[k] + (oy - along * ty) * b.vy[k]);
-    const double on = multiplier == kCosine ? 0.5 : mult > 0 ? 1.0 : 0.0;
-    const double whole = multiplier == kCosine ? 0.5 : 0.0;
+    const double on = whole + (1.0 - 2.0 * whole) * (mult > 0 ? 1.0 : 0.0);
     const double dx = whole * b.ex[k] + on * lx, dy = whole * b.ey[k] + on * ly, dn = on * ln;
     const double fx = b.fall[k] * b.by_w[k] * by_level * b.ex[k];
     const double fy = b.fall[k] * b.by_w[k] * by_level * b.ey[k];  // dg/g
@@ -212,11 +232,15 @@ struct Elastoplastic : bristle::Run<Elastoplastic> {
     const Exponent e(i);
     Return t;
     trial(p, b, params[kKappa], multiplier, t);
-    if (i == 1) {
-      solve<true>(t, e);
+    double active[kLanes];
+    const bool flows = yields(t, active);
+    if (!flows && multiplier == kAssociated) {
+      hold(b);
+    } else if (i == 1) {
+      solve<true>(t, active, e);
       rates<true>(p, e, multiplier, t, b);
     } else {
-      solve<false>(t, e);
+      solve<false>(t, active, e);
       rates<false>(p, e, multiplier, t, b);
     }
     return true;

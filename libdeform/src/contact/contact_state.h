@@ -9,6 +9,10 @@
 
 namespace dfm {
 
+// The part of a law's dft/dvt that dissipates: its symmetric part without the positive eigenvalue. [a b; b
+// c], N s/m, negative semidefinite.
+struct Slope { double a, b, c; };
+
 struct ContactState {
   uint32_t n = 0, stride = 0, nstate = 0;
   Array<uint32_t> law;  // [n] index into the world's law table
@@ -16,6 +20,7 @@ struct ContactState {
   Array<double> fn;           // N
   Array<double> vt;           // [2,stride] m/s, mean slip of side a against side b
   Array<double> ft_stop;      // [2,stride] N, force that makes the mean slip zero
+  Array<double> slip;         // [2,stride] m/s, that of the state in which the laws were asked
   Array<double> area, dwell;  // m2, s
   // [nstate,stride] law state at the start of the sub-step, nstate = most that any law has
   Array<double> bristle;
@@ -27,25 +32,40 @@ struct ContactState {
   Array<double> bristle_out;  // [nstate,stride]
   Array<uint8_t> mode;        // 0 open, 1 stick, 2 slip
   Array<uint8_t> set_valued;  // 1: the law is solved by projection on the disc of radius limit
+  // [n] of smooth laws, by linearize(): slope D, and 1 - h w_t D as [m11 m12; m12 m22] with its determinant
+  struct Linear {
+    Slope slope;
+    double m11, m12, m22, det;
+  };
+  Array<Linear> linear;
 
   void resize(uint32_t count, uint32_t states) {
     n = count;
     nstate = states;
     stride = (count + 7) & ~7u;
     for (Array<double> *a : {&fn, &area, &dwell, &limit}) a->resize(stride);
-    for (Array<double> *a : {&vt, &ft_stop, &ft, &dft_dfn}) a->resize(size_t(2) * stride);
+    for (Array<double> *a : {&vt, &ft_stop, &slip, &ft, &dft_dfn}) a->resize(size_t(2) * stride);
     dft_dvt.resize(size_t(4) * stride);
     bristle.resize(size_t(nstate) * stride);
     bristle_out.resize(size_t(nstate) * stride);
     law.resize(stride);
     mode.resize(stride);
     set_valued.resize(stride);
+    linear.resize(n);
+    clear_padding();
+  }
+
+  // Laws may be asked in these columns, and touch the places beyond n: as where nothing is in contact.
+  void clear_padding() {
+    const auto clear = [&](Array<double> &a) {
+      for (size_t end = stride; end <= a.size(); end += stride)
+        for (size_t k = end - (stride - n); k < end; ++k) a[k] = 0;
+    };
+    if (n == stride) return;
+    for (Array<double> *a : {&fn, &area, &dwell, &vt, &ft_stop, &bristle}) clear(*a);
   }
 };
 
-// The part of a law's dft/dvt that dissipates: its symmetric part without the positive eigenvalue. [a b; b
-// c], N s/m, negative semidefinite.
-struct Slope { double a, b, c; };
 inline Slope dissipative_slope(const ContactState &s, uint32_t i) {
   const uint32_t n = s.stride;
   const double a = s.dft_dvt[i];

@@ -8,17 +8,21 @@
 namespace dfm {
 
 AreaExchange::AreaExchange(const Memory &m) {
-  use_memory(m, corners_, last_, fresh_, triangles_, area_, pressure_);
+  use_memory(m, corners_, last_, fresh_, triangles_, area_, part_, pressure_);
 }
 
 void AreaExchange::list(std::span<const ContactPoint> contacts, std::span<const DofSource> sources,
                         const uint32_t *law, const double *area) {
   const size_t n = contacts.size();
   area_.assign(area, area + n);
+  part_.resize(n);
   pressure_.resize(n);
   fresh_.clear();
   for (uint32_t i = 0; i < n; ++i) {
     const ContactPoint &c = contacts[i];
+    // A contact may stand for less than its triangles, of which detection gives it half between two meshes,
+    // and for none where the guard added it: of each of them for the same share.
+    part_[i] = c.area > 0 ? std::min(1.0, area[i] / ((c.obstacle ? 1 : 2) * c.area)) : 0;
     if (c.type_a == 0 && law[i] != kNone && area[i] > 0)
       fresh_.push_back({c.node[0], c.slot_b | (c.obstacle ? 0x80000000u : 0u), i, law[i]});
   }
@@ -27,21 +31,6 @@ void AreaExchange::list(std::span<const ContactPoint> contacts, std::span<const 
         return l.node == r.node && l.other == r.other && l.contact == r.contact && l.law == r.law;
       });
   if (!same) list_triangles(contacts, sources);
-  for (Triangle &t : triangles_) {
-    const Surface &s = *sources[t.slot].surface;
-    const uint32_t *const c = &s.tri[3 * size_t{t.number}];
-    const Vec3 x0 = load3(&s.x[4 * size_t{c[0]}]);
-    const Vec3 twice = cross(load3(&s.x[4 * size_t{c[1]}]) - x0, load3(&s.x[4 * size_t{c[2]}]) - x0);
-    for (int j = 0; j < 3; ++j) {
-      if (t.contact[j] == kNone) continue;
-      const ContactPoint &p = contacts[t.contact[j]];
-      // A contact may stand for less than its triangles, of which detection gives it half between two meshes,
-      // and for none where the guard added it: of each of them for the same share.
-      const double part =
-          p.area > 0 ? std::min(1.0, area_[t.contact[j]] / ((p.obstacle ? 1 : 2) * p.area)) : 0;
-      t.area[j] = part * std::max(0.0, -0.5 * dot(load3(p.normal), twice));
-    }
-  }
 }
 
 const AreaExchange::Corner *AreaExchange::find(uint32_t node, uint32_t other) const {
@@ -91,31 +80,38 @@ void AreaExchange::list_triangles(std::span<const ContactPoint> contacts,
   last_.assign(fresh_.begin(), fresh_.end());
 }
 
-// What a corner takes from the next one of its triangle: a term of (1).
-double AreaExchange::taken(const Triangle &t, int corner) const {
-  const int next = (corner + 1) % 3;
-  if (t.contact[corner] == kNone || t.contact[next] == kNone) return 0;
-  double sum = 0;
-  for (const uint32_t i : t.contact) sum += i != kNone ? pressure_[i] : 0;
-  const double mine = pressure_[t.contact[corner]];
-  const double its = pressure_[t.contact[next]];
-  const double low = std::min(mine, its);
-  const double high = std::max(mine, its);
-  return low > 0 ? std::min(t.area[corner], t.area[next]) * (mine - its) / (3 * sum) *
-                       std::min(1.0, 2 * low / high)
-                 : 0;
+// What each corner sees of its triangles.
+void AreaExchange::measure(std::span<const ContactPoint> contacts, std::span<const DofSource> sources) {
+  for (Triangle &t : triangles_) {
+    const Surface &s = *sources[t.slot].surface;
+    const uint32_t *const c = &s.tri[3 * size_t{t.number}];
+    const Vec3 x0 = load3(&s.x[4 * size_t{c[0]}]);
+    const Vec3 twice = cross(load3(&s.x[4 * size_t{c[1]}]) - x0, load3(&s.x[4 * size_t{c[2]}]) - x0);
+    for (int j = 0; j < 3; ++j) {
+      if (t.contact[j] == kNone) continue;
+      const Vec3 normal = load3(contacts[t.contact[j]].normal);
+      t.area[j] = part_[t.contact[j]] * std::max(0.0, -0.5 * dot(normal, twice));
+    }
+  }
 }
 
-void AreaExchange::pass(const double *impulse, double *area) {
+void AreaExchange::pass(std::span<const ContactPoint> contacts, std::span<const DofSource> sources,
+                        const double *impulse, double *area) {
+  measure(contacts, sources);
   for (const Corner &c : corners_) pressure_[c.contact] = impulse[3 * size_t{c.contact}] / area_[c.contact];
-  for (const Triangle &t : triangles_)
-    for (int j = 0; j < 3; ++j) {
-      const double moved = taken(t, j);
-      if (moved != 0) {
-        area[t.contact[j]] += moved;
-        area[t.contact[(j + 1) % 3]] -= moved;
-      }
+  for (const Triangle &t : triangles_) {
+    double p[3], sum = 0;
+    for (int j = 0; j < 3; ++j) sum += p[j] = t.contact[j] != kNone ? pressure_[t.contact[j]] : 0;
+    for (int j = 0, next = 1; j < 3; ++j, next = next == 2 ? 0 : next + 1) {
+      // what the corner takes from the next one: a term of (1)
+      const double low = std::min(p[j], p[next]), high = std::max(p[j], p[next]);
+      if (!(low > 0)) continue;
+      const double moved =
+          std::min(t.area[j], t.area[next]) * (p[j] - p[next]) / (3 * sum) * std::min(1.0, 2 * low / high);
+      area[t.contact[j]] += moved;
+      area[t.contact[next]] -= moved;
     }
+  }
 }
 
 }  // namespace dfm

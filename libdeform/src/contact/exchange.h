@@ -43,9 +43,10 @@ class AreaExchange {
     last_.clear();
     corners_.clear();
   }
-  // area: [n] m2, as listed; becomes A* for the contacts that take part. impulse: [n,3], normal part first.
-  // Allocates nothing.
-  void pass(const double *impulse, double *area);
+  // contacts, sources: as listed; surfaces still where contacts were found. area: [n] m2, as listed; becomes
+  // A* for the contacts that take part. impulse: [n,3], normal part first. Allocates nothing.
+  void pass(std::span<const ContactPoint> contacts, std::span<const DofSource> sources, const double *impulse,
+            double *area);
 
  private:
   struct Corner { uint32_t node, other, contact, law; };
@@ -59,10 +60,11 @@ class AreaExchange {
   Array<Corner> corners_, last_;
   Array<Corner> fresh_;
   Array<Triangle> triangles_;
-  Array<double> area_, pressure_;  // [n] as listed; fn/A
+  // [n] as listed; share of its triangles that a contact stands for; fn/A
+  Array<double> area_, part_, pressure_;
   const Corner *find(uint32_t node, uint32_t other) const;
+  void measure(std::span<const ContactPoint> contacts, std::span<const DofSource> sources);
   void list_triangles(std::span<const ContactPoint> contacts, std::span<const DofSource> sources);
-  double taken(const Triangle &t, int corner) const;
 };
 
 }  // namespace dfm

@@ -18,19 +18,21 @@ Renewal::Renewal(const Memory &m) { use_memory(m, patches_, patch_of_); }
 
 void Renewal::list(std::span<const ContactPoint> contacts, const double *impulse) {
   patches_.clear();
-  patch_of_.clear();
+  patch_of_.resize(contacts.size());
   for (const ContactPoint &c : contacts)
-    if (patches_.empty() || patches_.back().sides != sides_of(c))
-      patches_.push_back({sides_of(c), 0, 0, 0, 0, 0, 0, 0});
+    if (const uint64_t sides = sides_of(c); patches_.empty() || patches_.back().sides != sides)
+      patches_.push_back({sides, 0, 0, 0, 0, 0, 0, 0});
   std::sort(patches_.begin(), patches_.end(),
             [](const Patch &l, const Patch &r) { return l.sides < r.sides; });
   patches_.erase(std::unique(patches_.begin(), patches_.end(),
                              [](const Patch &l, const Patch &r) { return l.sides == r.sides; }),
                  patches_.end());
+  auto at = patches_.begin();
   for (size_t i = 0; i < contacts.size(); ++i) {
-    const auto at = std::lower_bound(patches_.begin(), patches_.end(), sides_of(contacts[i]),
-                                     [](const Patch &p, uint64_t sides) { return p.sides < sides; });
-    patch_of_.push_back(static_cast<uint32_t>(at - patches_.begin()));
+    if (const uint64_t sides = sides_of(contacts[i]); at->sides != sides)
+      at = std::lower_bound(patches_.begin(), patches_.end(), sides,
+                            [](const Patch &p, uint64_t value) { return p.sides < value; });
+    patch_of_[i] = static_cast<uint32_t>(at - patches_.begin());
     at->before += impulse[3 * i];
   }
 }

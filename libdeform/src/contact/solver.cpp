@@ -53,15 +53,12 @@ Pair friction_impulse(const ContactRows &rows, const ContactState &s, uint32_t i
     if (size <= radius) return {a, b};
     return {radius / size * a, radius / size * b};
   }
-  const auto [d11, d12, d22] = dissipative_slope(s, i);
+  const auto &[slope, m11, m12, m22, det] = s.linear[i];
+  const auto [d11, d12, d22] = slope;
   const double dfn = ln / h - fn;
   const double v1 = u1 - wt * l1 - s.vt[i], v2 = u2 - wt * l2 - s.vt[n + i];
   const double r1 = h * (s.ft[i] + d11 * v1 + d12 * v2 + s.dft_dfn[i] * dfn);
   const double r2 = h * (s.ft[n + i] + d12 * v1 + d22 * v2 + s.dft_dfn[n + i] * dfn);
-  const double m11 = 1 - h * wt * d11;
-  const double m22 = 1 - h * wt * d22;
-  const double m12 = -h * wt * d12;
-  const double det = m11 * m22 - m12 * m12;
   Pair l{(m22 * r1 - m12 * r2) / det, (m11 * r2 - m12 * r1) / det};
   const double size = std::sqrt(l.a * l.a + l.b * l.b), radius = fn > 0 ? s.limit[i] / fn * ln : 0;
   const double most = s.mode[i] == 1 ? radius : std::max(radius, h * s.limit[i]);
@@ -84,19 +81,24 @@ void set_trial(const ContactRows &rows, double h, const double *response, Contac
     // opens and closes would lose its friction in every other pass.
     s.fn[i] =
         rows.wn[i] > 0 ? std::max(l[0] > 0 ? l[0] : normal_impulse(rows, i, u.x), 1e-6 / rows.wn[i]) / h : 0;
-    s.vt[i] = u.y;
-    s.vt[s.stride + i] = u.z;
+    s.vt[i] = s.slip[i] = u.y;
+    s.vt[s.stride + i] = s.slip[s.stride + i] = u.z;
     const double wt = response[i];
     s.ft_stop[i] = wt > 0 ? (l[1] - u.y / wt) / h : 0;
     s.ft_stop[s.stride + i] = wt > 0 ? (l[2] - u.z / wt) / h : 0;
   }
 }
 
-void set_slips(const ContactRows &rows, ContactState &s) {
+void linearize(const ContactRows &rows, double h, ContactState &s) {
   for (uint32_t i = 0; i < rows.n; ++i) {
-    const Vec3 u = rows.velocity(i);
-    s.vt[i] = u.y;
-    s.vt[s.stride + i] = u.z;
+    if (s.set_valued[i]) continue;
+    const double wt = rows.wt[i];
+    ContactState::Linear &l = s.linear[i];
+    l.slope = dissipative_slope(s, i);
+    l.m11 = 1 - h * wt * l.slope.a;
+    l.m22 = 1 - h * wt * l.slope.c;
+    l.m12 = -h * wt * l.slope.b;
+    l.det = l.m11 * l.m22 - l.m12 * l.m12;
   }
 }
 

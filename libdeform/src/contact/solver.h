@@ -8,11 +8,11 @@
 
 namespace dfm {
 
-// Sets the trial of every contact from the rows' present state: fn, vt, ft_stop. response: change of slip per
-// friction impulse by which ft_stop is found, the contact's own (rows.wt) or more.
+// Sets the trial of every contact from the rows' present state: fn, vt, slip, ft_stop. response: change of
+// slip per friction impulse by which ft_stop is found, the contact's own (rows.wt) or more.
 void set_trial(const ContactRows &rows, double h, const double *response, ContactState &state);
-// The slips that were solved for, where the laws were asked beside them.
-void set_slips(const ContactRows &rows, ContactState &state);
+// Of smooth laws what sweeps and residuals need of dft_dvt; after each answer, and after new slopes.
+void linearize(const ContactRows &rows, double h, ContactState &state);
 
 // One sweep in contact order. Every contact first gets its normal impulse, then its friction impulse with
 // that new normal impulse.

@@ -50,7 +50,7 @@ void LawBatches::gather(const std::vector<LawInstance *> &laws, ContactState &st
   batches_.clear();
   order_.clear();
   origin_.assign(state.n, {});
-  smooth_ = remembers_ = false;
+  smooth_ = remembers_ = differences_ = false;
   for (uint32_t l = 0; l < laws.size(); ++l) {
     const uint32_t begin = static_cast<uint32_t>(order_.size());
     for (uint32_t i = 0; i < state.n; ++i)
@@ -61,6 +61,7 @@ void LawBatches::gather(const std::vector<LawInstance *> &laws, ContactState &st
     if (order_.size() == begin) continue;
     smooth_ |= !(laws[l]->ops->flags & DFM_FRIC_SET_VALUED);
     remembers_ |= laws[l]->nstate > 0;
+    differences_ |= !(laws[l]->ops->flags & DFM_FRIC_JACOBIAN);
     batches_.push_back({laws[l], begin, static_cast<uint32_t>(order_.size()) - begin});
   }
 }
@@ -152,6 +153,7 @@ dfm_friction_in LawBatches::inputs(const LawInstance &law, std::span<const uint3
 
 const LawInstance *LawBatches::evaluate(const LawInstance &law, std::span<const uint32_t> index, double h,
                                         ContactState &state) {
+  if (index.size() == state.n) return evaluate_all(law, h, state);
   const dfm_friction_in in = inputs(law, index, h, state);
   const uint32_t n = in.n, S = law.nstate;
   const size_t column = in.stride;
@@ -197,6 +199,76 @@ const LawInstance *LawBatches::evaluate(const LawInstance &law, std::span<const 
     }
     // poison of NaN or infinite: not equal to zero; a limit of +inf is an answer: none
     if (failed_ == kNone && !(poison == 0 && limit[k] >= 0)) failed_ = i;
+  }
+  return failed_ == kNone ? nullptr : &law;
+}
+
+namespace {
+
+// 0 where all of a column, padded to fours, is finite; else NaN.
+using Four = double __attribute__((vector_size(32)));
+void add_poison(const double *column, size_t n, Four &sum) {
+  const Four *const x = reinterpret_cast<const Four *>(column);
+  for (size_t k = 0; k < n / 4; ++k) sum += 0.0 * x[k];
+}
+
+}  // namespace
+
+const LawInstance *LawBatches::evaluate_all(const LawInstance &law, double h, ContactState &s) {
+  const uint32_t n = s.n, needs = law.ops->needs;
+  const size_t column = s.stride, S = law.nstate;
+  const bool given = law.ops->flags & DFM_FRIC_JACOBIAN;
+  dfm_friction_in in{};
+  in.size = sizeof in;
+  in.n = n;
+  in.stride = s.stride;
+  in.dt = h;
+  in.params = law.params.data();
+  in.data = law.data;
+  in.fn = s.fn.data();
+  in.vt = s.vt.data();
+  in.ft_stop = s.ft_stop.data();
+  in.area = needs & DFM_NEED_AREA ? s.area.data() : nullptr;
+  in.dwell = needs & DFM_NEED_DWELL ? s.dwell.data() : nullptr;
+  in.state = s.bristle.data();
+  dfm_friction_out out{};
+  out.size = sizeof out;
+  out.ft = s.ft.data();
+  out.state = s.bristle_out.data();
+  out.dft_dvt = given ? s.dft_dvt.data() : nullptr;
+  out.dft_dfn = given ? s.dft_dfn.data() : nullptr;
+  out.limit = s.limit.data();
+  out.mode = s.mode.data();
+  failed_ = kNone;
+  if (call_plugin(*law.host, *law.type, "eval", [&] { return law.ops->eval(&in, &out); }) != DFM_OK)
+    return &law;
+  if (!given)
+    for (uint32_t i = 0; i < n; ++i) look_back(i, s);
+
+  Four poison{0, 0, 0, 0};
+  add_poison(s.ft.data(), 2 * column, poison);
+  add_poison(s.bristle_out.data(), S * column, poison);
+  if (given) {
+    add_poison(s.dft_dvt.data(), 4 * column, poison);
+    add_poison(s.dft_dfn.data(), 2 * column, poison);
+  }
+  bool good = (poison[0] + poison[1]) + (poison[2] + poison[3]) == 0;
+  for (uint32_t i = 0; i < n; ++i) good &= s.limit[i] >= 0;
+  if (good) return nullptr;
+  // which one it was; none where only the padding is not finite, which a law may leave as it likes
+  for (uint32_t i = 0; i < n && failed_ == kNone; ++i) {
+    double bad = 0;
+    const auto add = [&](const Array<double> &a, size_t width) {
+      for (size_t c = 0; c < width; ++c) bad += 0.0 * a[c * column + i];
+    };
+    add(s.ft, 2);
+    add(s.bristle_out, S);
+    if (given) {
+      add(s.dft_dvt, 4);
+      add(s.dft_dfn, 2);
+    }
+    // a limit of +inf is an answer: none
+    if (!(bad == 0 && s.limit[i] >= 0)) failed_ = i;
   }
   return failed_ == kNone ? nullptr : &law;
 }

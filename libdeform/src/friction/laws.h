@@ -50,8 +50,9 @@ class LawBatches {
   //          that others leave
   //   least, relative   m/s, 1: a contact's slip need not be known closer than least + relative of it
   const LawInstance *answer(double h, const double *wt, double least, double relative, ContactState &state);
-  bool smooth() const { return smooth_; }        // is any law of this sub-step not set-valued?
-  bool remembers() const { return remembers_; }  // has any a state?
+  bool smooth() const { return smooth_; }            // is any law of this sub-step not set-valued?
+  bool differences() const { return differences_; }  // has any no slopes of its own?
+  bool remembers() const { return remembers_; }      // has any a state?
   // After a law has failed: the contact whose answer is not to be used; kNone: it refused the whole batch.
   uint32_t failed() const { return failed_; }
 
@@ -82,13 +83,15 @@ class LawBatches {
   Array<uint8_t> mode_;
   Array<Local> local_;
   Array<uint32_t> asked_;  // contacts of local_ that are asked together
-  bool smooth_ = false, remembers_ = false;
+  bool smooth_ = false, remembers_ = false, differences_ = false;
   uint32_t failed_ = kNone;
   // in in_
   dfm_friction_in inputs(const LawInstance &law, std::span<const uint32_t> contacts, double h,
                          const ContactState &state);
   const LawInstance *evaluate(const LawInstance &law, std::span<const uint32_t> contacts, double h,
                               ContactState &state);
+  // The same for all contacts of the sub-step, in state's own columns.
+  const LawInstance *evaluate_all(const LawInstance &law, double h, ContactState &state);
   const LawInstance *settle(const Batch &batch, double h, const double *wt, double least, double relative,
                             ContactState &state);
   // Slopes by differences at the present answer. The law where it fails.

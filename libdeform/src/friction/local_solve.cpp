@@ -31,12 +31,19 @@ constexpr uint32_t kMostAsked = 24;
 // + h m sigma0 A, which may be 1e12.
 constexpr double kCut = 1.0 / 16, kLeastFraction = 1e-15;  // of a Newton step that leads away
 
-struct Residue { double a, b, size; };
-Residue residue(const ContactState &s, uint32_t i, double m) {
+struct Residue { double a, b, square; };
+inline Residue residue(const ContactState &s, uint32_t i, double m) {
   const uint32_t n = s.stride;
   const double a = s.vt[i] - m * (s.ft[i] - s.ft_stop[i]);
   const double b = s.vt[n + i] - m * (s.ft[n + i] - s.ft_stop[n + i]);
-  return {a, b, std::sqrt(a * a + b * b)};
+  return {a, b, a * a + b * b};
+}
+
+// Is the slip at which the law was asked close enough to that at which the contact comes to rest?
+inline bool answers(const ContactState &s, uint32_t i, double m, double least, double relative) {
+  const Residue g = residue(s, i, m);
+  const double v1 = s.vt[i], v2 = s.vt[s.stride + i];
+  return g.square <= least * least || std::sqrt(g.square) <= least + relative * std::sqrt(v1 * v1 + v2 * v2);
 }
 
 // From the present slip, which becomes v.
@@ -68,7 +75,7 @@ const LawInstance *LawBatches::settle(const Batch &batch, double h, const double
   const uint32_t n = s.stride;
   local_.clear();
   for (uint32_t k = 0; k < batch.n; ++k)
-    if (const uint32_t i = order_[batch.begin + k]; wt[i] > 0)
+    if (const uint32_t i = order_[batch.begin + k]; wt[i] > 0 && !answers(s, i, h * wt[i], least, relative))
       local_.push_back({i, false, false, false, {0, 0}, INFINITY, {0, 0}, 0});
   const bool gives_slopes = batch.law->ops->flags & DFM_FRIC_JACOBIAN;
   for (uint32_t asked = 1; !local_.empty(); ++asked) {
@@ -78,17 +85,17 @@ const LawInstance *LawBatches::settle(const Batch &batch, double h, const double
       const uint32_t i = c.contact;
       const double m = h * wt[i];
       const Residue g = residue(s, i, m);
-      const double size = std::sqrt(s.vt[i] * s.vt[i] + s.vt[n + i] * s.vt[n + i]);
-      if (g.size <= least + relative * size) continue;
+      if (answers(s, i, m, least, relative)) continue;
+      const double size = std::sqrt(g.square);
       // Beyond the crossing, g points along the step: deep in stick it is nearly as large there as it was, so
       // less does not tell.
       const bool nearer =
-          g.size < 0.5 * c.left || (c.from_zero && g.size < c.left && g.a * c.step[0] + g.b * c.step[1] < 0);
+          size < 0.5 * c.left || (c.from_zero && size < c.left && g.a * c.step[0] + g.b * c.step[1] < 0);
       c.fresh = false;
       if (std::isinf(c.left) || nearer) {
         if (asked == kMostAsked) continue;
         c.fresh = true;
-        c.left = g.size;
+        c.left = size;
         c.fraction = 1;
         if (!gives_slopes && !(origin_[i].hold & kByVt)) asked_.push_back(i);
       } else if (!c.from_zero && asked < kMostAsked) {  // tangents from where it slips lead nowhere

@@ -198,6 +198,7 @@ const LawInstance *solve_rows(World &w, StepContext &step) {
     // ten-thousandth.
     if (const LawInstance *bad = step.batches.answer(step.h, response, 0.1 * least, 1e-2, step.state))
       return bad;
+    if (step.batches.smooth()) linearize(step.rows, step.h, step.state);
     ++step.passes;
     if (step.sweeps) {
       step.residual = true_residual(step.rows, step.state, step.h, step.tolerance);
@@ -206,6 +207,7 @@ const LawInstance *solve_rows(World &w, StepContext &step) {
         return nullptr;
     }
     if (const LawInstance *bad = step.batches.slopes(step.h, step.state)) return bad;
+    if (step.batches.differences()) linearize(step.rows, step.h, step.state);
     if (!step.sweeps)
       set_tolerance(step.rows, step.state, step.contacts, step.h, bounds,
                     static_cast<uint32_t>(w.bodies.size()), step.disturbance, step.tolerance);
@@ -365,7 +367,8 @@ bool stage_solve(World &w, StepContext &step, uint32_t *trouble) {
     *trouble |= tell_failed_solve(w, step, bad);
     return false;
   }
-  if (step.batches.smooth()) set_slips(step.rows, step.state);
+  // laws may have been asked beside the slips that were solved for
+  std::swap(step.state.vt, step.state.slip);
   if (step.residual.due > 1) {
     *trouble |= DFM_TROUBLE_UNCONVERGED;
     ++w.stats.unconverged;

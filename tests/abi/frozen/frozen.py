@@ -70,15 +70,18 @@ def counted(text):
     return total
 
 
-def instructions(command, scene, assignments=()):
+def instructions(command, scene, assignments=(), simd="sse2", time=None):
+    """Counted of a whole run, or of its first `time` s. simd: DEFORM_SIMD."""
     with tempfile.TemporaryDirectory() as folder:
         out = pathlib.Path(folder) / "callgrind.out"
         line = ["valgrind", "--tool=callgrind", "--toggle-collect=dfm_world_step",
                 f"--callgrind-out-file={out}", command, "run", str(HERE / f"{scene}.json"), "--out",
                 str(pathlib.Path(folder) / "run"), "--quiet", "--threads", "1"]
+        if time is not None:
+            line += ["--time", str(time)]
         for assignment in assignments:
             line += ["--set", assignment]
-        done = subprocess.run(line, env={**os.environ, "DEFORM_SIMD": "sse2"}, capture_output=True, text=True)
+        done = subprocess.run(line, env={**os.environ, "DEFORM_SIMD": simd}, capture_output=True, text=True)
         if done.returncode != 0:
             sys.exit(f"frozen.py: {' '.join(line)} failed:\n{done.stderr}")
         count = counted(out.read_text())

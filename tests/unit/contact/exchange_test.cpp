@@ -61,7 +61,7 @@ struct Sheet {
     for (uint32_t s = 0; s < kCount; ++s) impulse[3 * s] = load(s);
     exchange.list(contacts, {&source, 1}, law.data(), area.data());
     passed = area;
-    exchange.pass(impulse.data(), passed.data());
+    exchange.pass(contacts, {&source, 1}, impulse.data(), passed.data());
   }
   double sum() const {
     double a = 0;

@@ -52,6 +52,7 @@ struct Groove {
       law.dft_dfn[i] = steep;
       law.dft_dfn[law.stride + i] = 0;
     }
+    linearize(rows, 1e-3, law);
   }
   double friction(uint32_t i) const { return std::hypot(rows.impulse[3 * i + 1], rows.impulse[3 * i + 2]); }
 };
