@@ -84,9 +84,24 @@ void print_changes(const JsonValue &plan) {
         std::printf(", moved by %s", own.c_str());
       if (const std::string most = c.get("max_jump_J"); !most.empty())
         std::printf(", unless its elastic energy would jump by more than %s J", most.c_str());
+      if (const JsonValue *const stable = c.find("stable_s"))
+        std::printf("; %s", stable->kind == JsonValue::null
+                                ? "nothing bounds its step"
+                                : ("explicit time is stable up to " + c.get("stable_s") + " s").c_str());
       std::printf("\n");
     }
   }
+}
+
+// Does one of them bound the step?
+bool changes_bound(const JsonValue &plan) {
+  const JsonValue *bodies = plan.find("bodies");
+  for (size_t i = 0; bodies && i < bodies->items.size(); ++i) {
+    const JsonValue *changes = bodies->items[i].find("changes");
+    for (size_t k = 0; changes && k < changes->items.size(); ++k)
+      if (std::strtod(changes->items[k].get("stable_s").c_str(), nullptr) > 0) return true;
+  }
+  return false;
 }
 
 // Which integrator moves each body, and how many explicit sub-steps would be in a step.
@@ -149,7 +164,10 @@ int explain(const Options &options, Globals &globals) {
   if (scene.value("/time/mode") == "\"static\"") {
     std::printf("step\n  none: equilibria of the loads are looked for\n");
   } else if (step && step->get("stable_s").empty()) {
-    std::printf("step\n  nothing bounds the step\n");
+    std::printf("step\n  nothing bounds the step%s\n",
+                changes_bound(plan) ? " with the models that bodies have now; \"changes to\" above says what "
+                                      "bounds it with those that they get"
+                                    : "");
   } else if (step) {
     std::printf("step\n  stable %s s", step->get("stable_s").c_str());
     if (const std::string body = step->get("worst_body"); !body.empty())

@@ -70,14 +70,21 @@ class Schedule {
   uint64_t next_ = 0;
 };
 
+bool asks_for_spoiled_start(const SceneFile &scene) {
+  for (size_t b = 0; b < scene.bodies().size(); ++b)
+    if (!scene.value("/bodies/" + std::to_string(b) + "/start").empty()) return true;
+  return false;
+}
+
 class Runner {
  public:
   Runner(const SceneFile &scene, const RunOptions &options, const Globals &globals)
       : scene_(scene),
         options_(options),
         world_(scene.world()),
-        duration_(options.time > 0 ? options.time : scene.settings().duration),
+        duration_(scene.settings().duration),
         static_(scene.value("/time/mode") == "\"static\""),
+        spoiled_(asks_for_spoiled_start(scene)),
         check_every_step_(options.check || scene.settings().check),
         progress_(!globals.quiet && !globals.json),
         outputs_(scene, options.out),
@@ -131,7 +138,12 @@ class Runner {
                     "pieces (max_work, max_time)");
     if (stats.unconverged > 0)
       out.push_back("the contact solve met its cap in " + std::to_string(stats.unconverged) + " sub-steps");
-    if (trouble_ & DFM_TROUBLE_INVERTED)
+    // a start that is asked for may be inside out and cross itself; what is left of it at the end is told
+    if (spoiled_ && checks().inverted_last > 0)
+      out.push_back(std::to_string(checks().inverted_last) +
+                    " cells are inside out still at the end, as \"start\" asked for: give it more time, or a "
+                    "model that finds back from there (corotational_fem, shape_matching)");
+    else if (!spoiled_ && trouble_ & DFM_TROUBLE_INVERTED)
       out.push_back("cells turned inside out: refine the mesh or soften the load");
     if (stats.limited_max > 0)
       out.push_back("up to " + std::to_string(stats.limited_max) +
@@ -142,12 +154,14 @@ class Runner {
       out.push_back(
           std::string(n == 1 ? "a change of model was" : std::to_string(n) + " changes of models were") +
           " refused, because energy or surface would jump: swaps lists what was refused");
+    const size_t between = spoiled_ ? checks().between_last : checks().between_max;
+    const size_t within = spoiled_ ? checks().self_last : checks().self_max;
+    const std::string when = spoiled_ ? " in the last state" : " in one state";
     const auto pairs = [](auto most) { return "up to " + std::to_string(most) + " triangle pairs"; };
-    if (checks().between_max > 0)
-      out.push_back("surfaces cross: " + pairs(checks().between_max) + " of two surfaces in one state");
-    if (checks().self_max > 0)
-      out.push_back("a surface crosses itself: " + pairs(checks().self_max) +
-                    " in one state; \"contact\": {\"self\": \"auto\"} keeps it from that");
+    if (between > 0) out.push_back("surfaces cross: " + pairs(between) + " of two surfaces" + when);
+    if (within > 0)
+      out.push_back("a surface crosses itself: " + pairs(within) + when +
+                    "; \"contact\": {\"self\": \"auto\"} keeps it from that");
     return out;
   }
 
@@ -293,7 +307,8 @@ class Runner {
   const RunOptions &options_;
   dfm_world world_;
   double duration_;
-  bool static_;  // equilibria under growing loads instead of steps in time
+  bool static_;   // equilibria under growing loads instead of steps in time
+  bool spoiled_;  // a body starts scrambled, flattened or inverted, as the scene asks
   bool check_every_step_, at_record_ = false, held_nothing_ = false;
   uint32_t trouble_ = 0;
   Progress progress_;
@@ -308,6 +323,11 @@ class Runner {
 
 int run(RunOptions options, const Globals &globals) {
   if (options.out.empty()) options.out = "out/" + std::filesystem::path(options.scene).stem().string();
+  if (options.time > 0) {  // the scene is read for that long: it tells what comes after its end
+    char text[64];
+    std::snprintf(text, sizeof text, "/time/duration=%.17g", options.time);
+    options.set.push_back(text);
+  }
   const SceneFile scene(globals, options.scene, options.set, options.jitter);
   if (const std::string short_of = planned_sentence(planned_json(scene)); !short_of.empty()) warn(short_of);
   RunResult result;

@@ -75,6 +75,8 @@ Checker::Checker(const SceneFile &scene) : scene_(scene), positions_(scene.bodie
 
 void Checker::check(bool start_state) {
   ++checks_.states;
+  checks_.inverted_last = 0;
+  checks_.between_last = checks_.self_last = 0;
   surfaces_.clear();
   double reach = 0;
   bool finite = true;
@@ -88,7 +90,9 @@ void Checker::check(bool start_state) {
     positions_[b].resize(3 * size_t(body.nsurfel));
     need(dfm_surface_positions(body.handle, body.nsurfel, positions_[b].data(), &n));
     for (double x : positions_[b]) reach = std::max(reach, std::fabs(x));
-    checks_.inverted_max = std::max(checks_.inverted_max, body_measure(body).inverted);
+    const uint32_t inverted = body_measure(body).inverted;
+    checks_.inverted_max = std::max(checks_.inverted_max, inverted);
+    checks_.inverted_last += inverted;
     surfaces_.push_back(
         {positions_[b].data(), n, body.triangles.data(), uint32_t(body.triangles.size() / 3)});
   }
@@ -118,6 +122,8 @@ void Checker::check(bool start_state) {
   checks_.intersections_max = std::max(checks_.intersections_max, found.all());
   checks_.between_max = std::max(checks_.between_max, found.between);
   checks_.self_max = std::max(checks_.self_max, found.within);
+  checks_.between_last = found.between;
+  checks_.self_last = found.within;
 }
 
 namespace {

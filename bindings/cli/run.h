@@ -63,6 +63,8 @@ struct Checks {
   size_t intersections_max = 0;
   size_t between_max = 0, self_max = 0;
   uint32_t inverted_max = 0;
+  size_t between_last = 0, self_last = 0;  // of the last state
+  uint32_t inverted_last = 0;
   bool finite = true, too_far = false;
 };
 

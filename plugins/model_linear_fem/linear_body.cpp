@@ -5,6 +5,8 @@
 // of the neighbors: bits do not depend on the cut of the work.
 
 #include <algorithm>
+#include <cmath>
+#include <cstdio>
 
 #include "../model_common/edges.h"
 #include "../model_common/params.h"
@@ -18,6 +20,14 @@ namespace {
 
 // From this size on rows go through the host's parallel_for, in pieces of this many points.
 constexpr uint32_t kParallelCells = 10000, kGrain = 512;
+// Up to which small displacements are taken for the true ones: tangent of the turn, largest strain.
+constexpr double kLargestTurn = 0.27, kLargestStrain = 0.3;
+
+// The angle of a tangent to half a degree, for a sentence.
+double degrees_of(double tangent) {
+  if (tangent > 1) return 90 - degrees_of(1 / tangent);
+  return 57.3 * tangent / (1 + 0.28 * tangent * tangent);
+}
 
 double dot(const double *u, const double *w) { return (u[0] * w[0] + u[1] * w[1]) + u[2] * w[2]; }
 
@@ -192,16 +202,22 @@ void Body::bound(const dfm_kin &, double *k, double *c) const {
   }
 }
 
-// sym(sum u_a g_a^T): xx yy zz xy yz zx.
-void Body::strain_of(uint32_t c, const dfm_kin &k, const Tetrahedron &t, double *e) const {
+// sum u_a g_a^T
+void Body::gradient_of(uint32_t c, const dfm_kin &k, const Tetrahedron &t, double (&h)[3][3]) const {
   const uint32_t *const q = cells.data() + 4 * size_t(c);
-  double h[3][3] = {}, u0[3], u[3];
+  double u0[3], u[3];
   displacement(k, q[0], u0);
   for (size_t a = 1; a < 4; ++a) {
     displacement(k, q[a], u);
     for (size_t r = 0; r < 3; ++r)
       for (size_t s = 0; s < 3; ++s) h[r][s] += (u[r] - u0[r]) * t.g[a][s];
   }
+}
+
+// sym(sum u_a g_a^T): xx yy zz xy yz zx.
+void Body::strain_of(uint32_t c, const dfm_kin &k, const Tetrahedron &t, double *e) const {
+  double h[3][3] = {};
+  gradient_of(c, k, t, h);
   for (size_t r = 0; r < 3; ++r) {
     e[r] = h[r][r];
     e[3 + r] = 0.5 * (h[r][(r + 1) % 3] + h[(r + 1) % 3][r]);
@@ -220,12 +236,48 @@ double Body::density_of(uint32_t c, const dfm_kin &k, const Tetrahedron &t) cons
   return 0.5 * m.lambda * (trace * trace) + m.mu * square;
 }
 
-double Body::energy(const dfm_kin &k) const {
+double Body::energy(const dfm_kin &k) {
   double sum = 0;
   Tetrahedron t;
-  for (uint32_t c = 0; c < ncell; ++c)
-    if (cell(c, t)) sum += t.volume * density_of(c, k, t);
+  Farthest most;
+  for (uint32_t c = 0; c < ncell; ++c) {
+    if (!cell(c, t)) continue;
+    sum += t.volume * density_of(c, k, t);
+    look_at(c, k, t, most);
+  }
+  tell(most);
   return sum;
+}
+
+// Energies are asked for now and then and not in each step, which makes them the place to look at turns and
+// strains. Of a turn by theta about an axis n the forces are zero with u = tan(theta) n x X, so the
+// antisymmetric part of the gradient is its tangent.
+void Body::look_at(uint32_t c, const dfm_kin &k, const Tetrahedron &t, Farthest &most) const {
+  double h[3][3] = {}, turn = 0, strain = 0;
+  gradient_of(c, k, t, h);
+  for (size_t r = 0; r < 3; ++r) {
+    const size_t s = (r + 1) % 3;
+    const double half = 0.5 * (h[s][r] - h[r][s]);
+    turn += half * half;
+    strain = std::max({strain, std::fabs(h[r][r]), std::fabs(0.5 * (h[s][r] + h[r][s]))});
+  }
+  const double beyond = std::max(std::sqrt(turn) / kLargestTurn, strain / kLargestStrain);
+  if (beyond > most.beyond) most = {beyond, std::sqrt(turn), strain, c};
+}
+
+// When a cell leaves the range, and again where it has gone twice as far since.
+void Body::tell(const Farthest &most) {
+  if (!(most.beyond > 1) || !(most.beyond > 2 * told)) return;
+  told = most.beyond;
+  char text[320];
+  std::snprintf(
+      text, sizeof text,
+      "%s: cell %u is turned by %.0f degrees and strained by %.0f %% against the rest shape: beyond "
+      "%.0f degrees or %.0f %% this model takes turns for strain, so that the body swells, and its "
+      "forces are not those of the body; corotational_fem has no such limit.",
+      kId, most.cell, degrees_of(most.turn), 100 * most.strain, degrees_of(kLargestTurn),
+      100 * kLargestStrain);
+  host->log(host->ctx, 2, 0, text);
 }
 
 void Body::cell_energy(const dfm_kin &k, double *density) const {

@@ -29,7 +29,7 @@ struct Body {
   void add_forces(const dfm_kin &k, double *f) const;
   bool lacks_state(const dfm_kin &) const { return false; }
   void bound(const dfm_kin &k, double *ksum, double *csum) const;
-  double energy(const dfm_kin &k) const;
+  double energy(const dfm_kin &k);
   void cell_energy(const dfm_kin &k, double *density) const;
   void cell_stress(const dfm_kin &k, double *stress) const;
   // Blocks of the tangent: the points by themselves, then the edges of the mesh.
@@ -54,7 +54,13 @@ struct Body {
   Buffer<double> drag, volume;  // [npoint] kg/s; m3, four times its own
   Buffer<double> ksum, csum;    // [npoint] of the bound
   bool damping_on = false, drag_on = false;
+  double told = 0;  // how far beyond its range the model was when it said so last
 
+  // The cell that is farthest from small displacements: of the limits, tangent of its turn, strain.
+  struct Farthest {
+    double beyond = 0, turn = 0, strain = 0;
+    uint32_t cell = 0;
+  };
   double at(Param which, uint32_t c) const { return field[which].empty() ? params[which] : field[which][c]; }
   void take_mesh(const dfm_mesh &m);
   void take_fields(const dfm_mesh &m);
@@ -62,7 +68,10 @@ struct Body {
   bool cell(uint32_t c, Tetrahedron &out) const;  // false: flat at rest, it has no stiffness
   void add_cell(uint32_t c, const Tetrahedron &t, const model::Lame &m, double damp);
   void displacement(const dfm_kin &k, uint32_t point, double *u) const;
+  void gradient_of(uint32_t c, const dfm_kin &k, const Tetrahedron &t, double (&h)[3][3]) const;
   void strain_of(uint32_t c, const dfm_kin &k, const Tetrahedron &t, double *e) const;
+  void look_at(uint32_t c, const dfm_kin &k, const Tetrahedron &t, Farthest &most) const;
+  void tell(const Farthest &most);
   double density_of(uint32_t c, const dfm_kin &k, const Tetrahedron &t) const;
 };
 

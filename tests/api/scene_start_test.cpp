@@ -155,3 +155,24 @@ TEST(SceneStart, Mistakes_AreRefusedWithTheirPlace) {
     for (const char *part : parts) test::says({part});
   }
 }
+
+// What was asked for in the start is no fault; what is left of it at the end is.
+TEST(SceneStart, InsideOut_IsWarnedOfWhereItLasts) {
+  const std::string folder = test::scratch("scene_start_run_" + std::to_string(getpid()));
+  test::write_file(folder + "/scene.json",
+                   R"({"format": "deform-scene", "version": 1, "gravity": [0, 0, 0],
+    "time": {"duration": 0.1, "step": 0.005, "integrator": "implicit_euler"},
+    "bodies": [{"name": "block", "mesh": {"make": "beam", "size": [0.2, 0.1, 0.1], "cells": 60},
+                "model": {"type": "corotational_fem"}, "start": {"invert": true}}]})");
+  const auto log = [&](const char *step, const char *end) {
+    const test::CommandResult r =
+        test::deform({"run", folder + "/scene.json", "--set", std::string("/time/step=") + step, "--time",
+                      end, "--out", folder + "/out"});
+    EXPECT_EQ(r.exit_code, 0) << r.err;
+    return test::read_file(folder + "/out/summary.json");
+  };
+  const std::string soon = log("1e-6", "1e-5"), late = log("0.005", "0.1");
+  EXPECT_NE(soon.find("72 cells are inside out still at the end"), std::string::npos) << soon;
+  EXPECT_EQ(late.find("cells are inside out"), std::string::npos) << late;
+  EXPECT_EQ(late.find("crosses itself"), std::string::npos) << late;
+}

@@ -124,6 +124,46 @@ TEST(SwitchOfAScene, AfterTheLastStep_IsToldAndListed) {
   EXPECT_EQ(run(scene(R"(, "mode": "static")", change("0") + held)).err.find(told), std::string::npos);
 }
 
+// --time is the duration of that run.
+TEST(SwitchOfAScene, AfterTheEndOfAShorterRun_IsTold) {
+  const std::string path = scene(kStep, R"("switch": [{"t": 0.005, "type": "corotational_fem"}])");
+  EXPECT_EQ(run(path).err.find("is never made"), std::string::npos);
+  const test::CommandResult r = test::deform({"run", path, "--time", "0.004", "--out", folder() + "/out"});
+  EXPECT_EQ(r.exit_code, 0);
+  EXPECT_NE(r.err.find("/bodies/0/switch/0/t) is never made"), std::string::npos) << r.err;
+}
+
+TEST(SwitchOfAScene, ToTheModelThatTheBodyHas_IsTold) {
+  const auto told = [](const std::string &change, const char *what) {
+    const std::string log = run(scene(kStep, "\"switch\": " + change)).err;
+    EXPECT_EQ(log.find("the same parameters") != std::string::npos, *what != 0) << change << log;
+    EXPECT_NE(log.find(what), std::string::npos) << log;
+  };
+  told(R"([{"t": 0.005, "type": "msm"}])", "/bodies/0/switch/0) is to the model that it has by then");
+  told(R"([{"t": 0.005, "type": "msm", "params": {"young": 2e5}}])", "");
+  told(R"([{"t": 0.004, "type": "modal"}, {"t": 0.005, "type": "modal"}])", "/bodies/0/switch/1) is to");
+  told(R"([{"t": 0.004, "type": "modal"}, {"t": 0.005, "type": "msm"}])", "");
+  told(R"({"far": "msm", "touching": "msm"})", "so it changes nothing between them");
+}
+
+TEST(SwitchOfAScene, OfAnotherKind_IsRefusedWithBothForms) {
+  expect_refused(scene(kStep, R"("switch": "msm")"),
+                 {"/bodies/0/switch", "an array of changes", "or a rule"});
+}
+
+// A model that steps itself has no bound; the ones that the body gets may have.
+TEST(SwitchOfAScene, Explain_TellsWhatBoundsTheStepLater) {
+  const std::string out =
+      test::deform({"explain", scene(kStep, R"("model": {"type": "modal"}, )" + kRuleToModal)}).out;
+  for (const char *part :
+       {"while it touches something; explicit time is stable up to 0.0", "what bounds it with"})
+    EXPECT_NE(out.find(part), std::string::npos) << part << out;
+  const std::string free =
+      test::deform({"explain", scene(kStep, R"("switch": {"far": "modal", "touching": "shape_matching"})")})
+          .out;
+  EXPECT_NE(free.find("while it touches something; nothing bounds its step"), std::string::npos) << free;
+}
+
 TEST(SwitchOfAScene, Explain_ListsIt) {
   const std::string by_time = test::deform({"explain", scene(kStep, kToModal)}).out;
   EXPECT_NE(by_time.find("changes to org.deform.modal  at 0.005 s"), std::string::npos) << by_time;

@@ -1,4 +1,5 @@
 // The model linear_fem in a world: by its short name, at rest under any pose, swinging alike in every frame.
+#include "logged_context.h"
 #include "world.h"
 
 namespace {
@@ -54,6 +55,40 @@ TEST(LinearFemWorld, SwingTurnedWithGravity_IsTheTurnedSwing) {
   EXPECT_GT(a.elastic, 1e-3);
   EXPECT_NEAR(a.elastic / b.elastic, 1, 1e-10);
   EXPECT_NEAR(a.velocity[1], -b.velocity[0], 1e-10 * std::abs(a.velocity[1]));
+}
+
+// What turns swells: told with body, cell and turn when its energy is asked for, and again where it has
+// doubled.
+TEST(LinearFemWorld, BodyThatTurns_TellsThatItLeavesItsRange) {
+  test::LoggedContext logged;
+  const dfm_world world = test::make_world(logged.context, {0, 0, 0});
+  test::BodyOptions o;
+  o.name = "top";
+  o.model = "linear_fem";
+  o.young = 1e4;
+  const dfm_body top = test::make_body(logged.context, world, "ball", {0.1}, 100, o);
+  uint32_t n = 0;
+  test::ok(dfm_body_get_state(top, 0, nullptr, nullptr, &n));
+  std::vector<double> rest(size_t(3) * n);
+  test::ok(dfm_body_get_state(top, n, rest.data(), nullptr, &n));
+  const auto told = [&](double tangent) {
+    std::vector<double> x = rest;
+    for (size_t i = 0; i < x.size(); i += 3) {
+      x[i] -= tangent * rest[i + 1];
+      x[i + 1] += tangent * rest[i];
+    }
+    test::ok(dfm_body_set_state(top, n, x.data(), nullptr));
+    logged.log.clear();
+    test::measure(top);
+    return logged.log;
+  };
+  EXPECT_EQ(told(0.2), "");
+  const std::string first = told(0.3057);
+  for (const char *part : {"body 'top': org.deform.linear_fem: cell ", "turned by 17 degrees",
+                           "strained by 0 %", "swells", "corotational_fem"})
+    EXPECT_NE(first.find(part), std::string::npos) << part << "\n" << first;
+  EXPECT_EQ(told(0.4), "") << "told already";
+  EXPECT_NE(told(1).find("turned by 45 degrees"), std::string::npos);
 }
 
 }  // namespace

@@ -328,7 +328,7 @@ static inline dfm_status dfm_world_profile(dfm_world world, uint32_t capacity, d
  * "bodies":[{"name","model","cells","points","surfels","surface","filled",
  * "fields":[{"name","from","min","max"}], "idle":[{"name","why"}],
  * "effects":[{"name","works","used","switches":[{"key","now","off","off_value"}]}],
- * "facts":[{"key","label","unit","value"}], "changes":[{"name","when","integrator","max_jump_J"}],
+ * "facts":[{"key","label","unit","value"}], "changes":[{"name","when","integrator","stable_s","max_jump_J"}],
  * "unwatched"}], "step":{"stable_s","worst_body","worst_point","reason"}}. surface: "boundary" of the cells,
  * or "own, COUPLING"; from: who says what differs by cell (field, materials, share); idle: parameters that do
  * nothing, or not what they name; effects: what the model brings, whether it is at work and the world uses

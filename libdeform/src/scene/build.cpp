@@ -260,12 +260,40 @@ class Builder {
       rule.otherwise = b.rule.far.view();
       check(dfm_body_set_switch_rule(body, &rule), pointer);
     }
+    tell_idle_changes(resolve<dfm::Body>(Kind::body, body), pointer);
     if (!def_.equilibrium) return;
     with_pointer(pointer, [&] {
       dfm::Body &made = resolve<dfm::Body>(Kind::body, body);
       rehearse(made, made.switches, made.rule, true);
       return 0;
     });
+  }
+
+  // Changes to the model that the body has anyway.
+  void tell_idle_changes(const dfm::Body &b, const std::string &pointer) const {
+    const ModelChoice *last = nullptr;
+    for (size_t i = 0; i < b.switches.size(); ++i) {
+      const ModelChoice &to = b.switches[i].to;
+      if (last ? alike(*last, to) : is_made_so(b, to))
+        context_->logf(
+            DFM_LOG_WARNING,
+            "body '%s': its change at %g s (%s/%zu) is to the model that it has by then, '%s' with the "
+            "same parameters: nothing but what that remembers (plastic strain, say) is changed",
+            b.name.c_str(), b.switches[i].t, pointer.c_str(), i, to.type.c_str());
+      last = &to;
+    }
+    for (const dfm::SwitchRule &r : b.rule)
+      for (const ModelChoice *other : {&r.touching, &r.near})
+        if (!other->type.empty() && alike(*other, r.far))
+          context_->logf(DFM_LOG_WARNING,
+                         "body '%s': the rule at %s names '%s' with the same parameters for \"far\" and for "
+                         "\"%s\", so it changes nothing between them",
+                         b.name.c_str(), pointer.c_str(), r.far.type.c_str(),
+                         other == &r.near ? "near" : "touching");
+  }
+  static bool alike(const ModelChoice &a, const ModelChoice &b) {
+    return a.type == b.type && a.params == b.params &&
+           (a.integrator == b.integrator || b.integrator == kSameIntegrator);
   }
 
   // s: no step of the scene's duration, or search for an equilibrium, begins then or later.

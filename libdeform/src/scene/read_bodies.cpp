@@ -306,6 +306,10 @@ Body read_body(const Node &node, ReadContext &context) {
   read_carriers(node, type, context, b);
   if (node.has("switch")) {
     const Node change = node.member("switch");
+    if (!change.value().is_object() && !change.value().is_array())
+      change.fail(
+          "expected an array of changes by time, as [{\"t\": 1.0, \"type\": \"msm\"}], or a rule, as "
+          "{\"far\": \"msm\", \"touching\": \"corotational_fem\"}");
     if (change.value().is_object()) read_rule(change, context.types, b.rule);
     else read_switches(change, context.types, b);
   }

@@ -59,6 +59,7 @@ struct ModelChoice {
   ModelParams params;
   uint32_t integrator = kSameIntegrator;
   double max_jump = HUGE_VAL;  // J
+  double stable = -1;  // s, explicit sub-step when it was made beforehand; infinite: any; negative: not known
 };
 // From the step on that begins at t or after it.
 struct Switch {

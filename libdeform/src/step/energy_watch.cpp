@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "plugin/on_behalf.h"
 #include "state/world.h"
 #include "step/context.h"
 #include "step/stages.h"
@@ -99,6 +100,7 @@ bool look(World &w, StepContext &step, Body &b, Look &out) {
   }
   double elastic = 0;
   const dfm_kin kin = b.dynamics->kin(w.time, 0);
+  const OnBehalf speaks(b.name);
   if (b.model.call("energy", [&] { return b.model.ops->energy(b.model.self, &kin, &elastic); }) != DFM_OK)
     return false;
   const double drift = kPositionDigits * reach / step.h;

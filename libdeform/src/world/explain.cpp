@@ -92,6 +92,8 @@ std::string change(const ModelChoice &c, const std::string &when) {
   std::string out = "{\"name\":" + quote(c.type) + ",\"when\":" + quote(when);
   if (c.integrator != kSameIntegrator && c.integrator != uint32_t{DFM_INTEGRATOR_AUTO})
     out += ",\"integrator\":" + quote(word_of(c.integrator));
+  if (c.stable >= 0)
+    out += std::isfinite(c.stable) ? format(",\"stable_s\":%.9g", c.stable) : ",\"stable_s\":null";
   if (c.max_jump < HUGE_VAL) out += format(",\"max_jump_J\":%.9g", c.max_jump);
   return out + "}";
 }

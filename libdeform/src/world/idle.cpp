@@ -53,11 +53,14 @@ std::vector<IdleParam> idle_params(const Body &b) {
   std::vector<IdleParam> out;
   const dfm_type &type = *b.model.type;
   for (const Unused &u : b.unused)
-    out.push_back({u.key,
-                   u.material.empty() ? format("%s has no such parameter by cell (a field gives it)", type.id)
-                                      : format("%s has no such parameter (material '%s' gives it)", type.id,
-                                               u.material.c_str()),
-                   true});
+    out.push_back(
+        {u.key,
+         u.material.empty()
+             ? format("a field of the body gives it, and %s has no such parameter that "
+                      "may differ by cell",
+                      type.id)
+             : format("material '%s' gives it, and %s has no such parameter", u.material.c_str(), type.id),
+         true});
   size_t at = 0;
   for (uint32_t i = 0; i < type.nparam; at += type.params[i++].width) {
     const dfm_param &row = type.params[i];

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "plugin/on_behalf.h"
 #include "plugin/params.h"
 #include "plugin/registry.h"
 #include "plugin/tables.h"
@@ -16,6 +17,7 @@ double elastic_energy(Body &b) {
   if (!(b.model.ops->caps & DFM_CAP_ENERGY) || !b.model.ops->energy) return NAN;
   double joule = 0;
   const dfm_kin k = b.dynamics->kin(b.world->time, 0);
+  const OnBehalf speaks(b.name);
   const auto ask = [&] { return b.model.ops->energy(b.model.self, &k, &joule); };
   return b.model.call("energy", ask) == DFM_OK ? joule : NAN;
 }

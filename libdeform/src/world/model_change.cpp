@@ -12,10 +12,12 @@
 #include "math/polar.h"
 #include "math/turn.h"
 #include "plugin/context.h"
+#include "plugin/on_behalf.h"
 #include "plugin/registry.h"
 #include "state/world.h"
 #include "step/context.h"
 #include "step/stages.h"
+#include "step/step_bound.h"
 #include "world/body_model.h"
 #include "world/change_energy.h"
 #include "world/idle.h"
@@ -259,9 +261,17 @@ ModelOrigin origin_for(const Body &b, const dfm_type &type, const ModelChoice &t
   return origin;
 }
 
+// s, the sub-step that the body may take with it.
+double stable_with(Body &b, BodyModel &made) {
+  StepBound bound;
+  exchange(b, made);
+  const bool known = b.dynamics->bound(b.world->time, [](double *, double *) {}, bound);
+  exchange(b, made);
+  return known ? kBoundShare * bound.step : -1;
+}
+
 // A change that is to come, of a body which will have this integrator until then.
-void rehearse(Body &b, const ModelChoice &to, uint32_t &integrator, bool at_rest,
-              std::vector<SpareModel> &spares) {
+void rehearse(Body &b, ModelChoice &to, uint32_t &integrator, bool at_rest, std::vector<SpareModel> &spares) {
   World &w = *b.world;
   if (to.integrator != kSameIntegrator) integrator = to.integrator;
   const dfm_type &type = w.context->registry.find(DFM_KIND_MODEL, to.type);
@@ -271,6 +281,7 @@ void rehearse(Body &b, const ModelChoice &to, uint32_t &integrator, bool at_rest
   const std::unique_ptr<BodyModel> made =
       make_body_model(w, b, type, std::move(origin), static_cast<int32_t>(integrator));
   check_springs(b, type, *made->dynamics);
+  to.stable = stable_with(b, *made);
   if (!w.changed) check_effects(w, b, b.model, made->instance);
   if (at_rest && made->instance.stepper)
     fail(DFM_E_UNSUPPORTED,
@@ -318,6 +329,7 @@ ModelChoice choose_model(const Body &b, const char *type, const dfm_params &para
 
 void change_model(Body &b, const ModelChoice &to, Swap &swap) {
   World &w = *b.world;
+  const OnBehalf speaks(b.name);
   const dfm_type &type = w.context->registry.find(DFM_KIND_MODEL, to.type);
   prepare(w);
   ModelOrigin origin = origin_for(b, type, to);
@@ -347,12 +359,11 @@ void change_model(Body &b, const ModelChoice &to, Swap &swap) {
   w.sizes = {};  // another bound, and other errors
 }
 
-void rehearse(Body &b, const std::vector<Switch> &switches, const std::vector<SwitchRule> &rule,
-              bool at_rest) {
+void rehearse(Body &b, std::vector<Switch> &switches, std::vector<SwitchRule> &rule, bool at_rest) {
   std::vector<SpareModel> spares;
   spares.reserve(kSpares);
   uint32_t integrator = b.origin.integrator;
-  const auto one = [&](const ModelChoice &to, const std::string &when) {
+  const auto one = [&](ModelChoice &to, const std::string &when) {
     if (to.type.empty() || (!at_rest && is_made_so(b, to))) return;
     try {
       rehearse(b, to, integrator, at_rest, spares);
@@ -364,8 +375,8 @@ void rehearse(Body &b, const std::vector<Switch> &switches, const std::vector<Sw
            when.c_str(), why);
     }
   };
-  for (const Switch &s : switches) one(s.to, format("at %g s", s.t));
-  for (const SwitchRule &r : rule) {
+  for (Switch &s : switches) one(s.to, format("at %g s", s.t));
+  for (SwitchRule &r : rule) {
     one(r.touching, "by the rule (touching)");
     one(r.near, "by the rule (near)");
     one(r.far, "by the rule (far)");

@@ -14,10 +14,9 @@ void change_model(Body &b, const ModelChoice &to, Swap &swap);
 bool is_made_so(const Body &b, const ModelChoice &c);
 // Makes the models of changes that are to come, to know now what no state of the body would mend: the contact
 // method, the integrator, springs, cells that a model does not take, effects (where the world has its plan).
-// What was made of the mesh is kept as the body's spares. at_rest: equilibria will be looked for. Throws
-// Error.
-void rehearse(Body &b, const std::vector<Switch> &switches, const std::vector<SwitchRule> &rule,
-              bool at_rest);
+// What was made of the mesh is kept as the body's spares. at_rest: equilibria will be looked for.
+// What is known of each then is kept with it. Throws Error.
+void rehearse(Body &b, std::vector<Switch> &switches, std::vector<SwitchRule> &rule, bool at_rest);
 // Asks a model that steps itself for a sub-step of a nanosecond, of which nothing is kept: what it would
 // refuse in the first step. Throws Error with its reason.
 void check_first_step(World &w, Body &b);
