@@ -8,7 +8,9 @@
 #include <memory>
 #include <thread>
 
+#include "cost/chart.h"
 #include "cost/meshes.h"
+#include "cost/page.h"
 #include "cost/patch.h"
 #include "cost/report.h"
 #include "file.h"
@@ -54,6 +56,9 @@ int cost_of(CostOptions options, const Globals &globals) {
   const std::string report = cost::json_report(subject, study, cost::scene_patch(subject, study));
   write_whole(options.out + "/cost.csv", cost::csv_text(subject, study));
   write_whole(options.out + "/cost.json", report);
+  write_whole(options.out + "/cost.html", cost::page_html(subject, study));
+  if (!cost::draw_file(subject, study, options.out + "/cost.png"))
+    warn("no cost.png: this deform was built without the renderer; cost.html holds the same chart");
   if (globals.json) {
     std::fputs(report.c_str(), stdout);
   } else {

@@ -33,15 +33,20 @@ struct Study {
   JsonValue report;
 };
 
-Study study(const std::string &name, const std::string &scene, std::vector<std::string> words) {
+// Without pictures, which take longer than the runs here, unless they are asked for.
+Study study(const std::string &name, const std::string &scene, std::vector<std::string> words,
+            bool pictures = false) {
   Study s;
   s.folder = test::scratch("cost_" + name);
   s.scene = s.folder + "/scene.json";
   s.out = s.folder + "/out";
   test::write_file(s.scene, scene);
+  fs::remove_all(s.out);
   std::vector<std::string> argv = {"cost", s.scene, "--out", s.out, "--quiet"};
   argv.insert(argv.end(), words.begin(), words.end());
+  if (!pictures) setenv("DEFORM_RENDER_BACKEND", "none", 1);
   s.result = test::deform(argv);
+  unsetenv("DEFORM_RENDER_BACKEND");
   if (fs::exists(s.out + "/cost.json")) {
     EXPECT_TRUE(cli::parse_json(test::read_file(s.out + "/cost.json"), s.report));
   }
@@ -175,6 +180,26 @@ TEST(Cost, Report_HoldsToSchemaAndOrdersTheFront) {
     })) << model;
   }
   EXPECT_EQ(test::read_csv(s.out + "/cost.csv").size(), s.report.find("choices")->items.size() + 1);
+}
+
+TEST(Cost, Page_HoldsChartAndPicturesInOneFile) {
+  const Study s =
+      study("page", bar(R"("duration": 0.02, "step": 0.001)"), {"--axes", "time", "--budget", "300"}, true);
+  ASSERT_EQ(s.result.exit_code, 0) << s.result.err;
+  const std::string page = test::read_file(s.out + "/cost.html");
+  EXPECT_NE(page.find("<svg "), std::string::npos);
+  EXPECT_NE(page.find("What to take"), std::string::npos);
+  for (const char *outside : {"src=\"http", "href=", "<script"})
+    EXPECT_EQ(page.find(outside), std::string::npos) << outside;
+  size_t drawn = 0, held = 0;
+  for (const auto &entry : fs::recursive_directory_iterator(s.out + "/alone"))
+    drawn += entry.path().filename() == "frame_000001.png";
+  for (size_t at = 0; (at = page.find("data:image/png;base64,iVBORw0KGgo", at)) != std::string::npos; ++at)
+    ++held;
+  EXPECT_EQ(held, drawn);
+#ifdef DEFORM_HAS_RENDER
+  EXPECT_EQ(test::read_file(s.out + "/cost.png").substr(1, 3), "PNG");
+#endif
 }
 
 TEST(Cost, SecondCall_RunsNothingAndSaysTheSame) {

@@ -117,25 +117,6 @@ void list_axes(const Study &study, std::string &out) {
     if (!axis.left_out.empty()) out += "  " + axis.name + ": left out, " + axis.left_out + "\n";
 }
 
-std::string pick_text(const Study &study) {
-  const std::string target = percent(study.options.target);
-  if (study.pick < 0) return "no choice that was run stays within " + target + "; give more with --budget\n";
-  const Row &row = study.rows[size_t(study.pick)];
-  std::string out = "cheapest within " + target + ": " + row.job.label + " (" + percent(row.headline) + ", " +
-                    formatted("%.3g", row.cpu_per_s) + " cpu s per s)\n";
-  if (!study.proven)
-    out += "  not proven: with the reference's own error of " + percent(study.reference_headline) +
-           " it may be above the target; a larger --budget makes the reference finer\n";
-  bool any = false;
-  for (const auto &[pointer, value] : row.job.set) {
-    if (pointer.rfind("/output/", 0) == 0 || pointer == "/probes") continue;
-    out += "  --set '" + pointer + "=" + value + "'\n";
-    any = true;
-  }
-  if (!any) out += "  nothing has to be changed\n";
-  return out;
-}
-
 }  // namespace
 
 std::string percent(double part) {
@@ -169,6 +150,28 @@ std::string reference_text(const Study &study) {
   if (study.converged) return out + ", at most a third of the best error shown";
   return out + "; NOT CONVERGED: more than a third of the best error shown, " + percent(study.best) +
          ", so errors below " + percent(3 * study.reference_headline) + " are not told apart";
+}
+
+std::string pick_text(const Study &study) {
+  const std::string target = percent(study.options.target);
+  if (study.pick < 0 && !(study.reference_headline <= study.options.target))
+    return "nothing can be said about " + target +
+           ": the reference's own error is above it; a larger --budget makes the reference finer\n";
+  if (study.pick < 0) return "no choice that was run stays within " + target + "; give more with --budget\n";
+  const Row &row = study.rows[size_t(study.pick)];
+  std::string out = "cheapest within " + target + ": " + row.job.label + " (" + percent(row.headline) + ", " +
+                    formatted("%.3g", row.cpu_per_s) + " cpu s per s)\n";
+  if (!study.proven)
+    out += "  likely, not proven: with the reference's own error of " + percent(study.reference_headline) +
+           " it may be above the target; a larger --budget makes the reference finer\n";
+  bool any = false;
+  for (const auto &[pointer, value] : row.job.set) {
+    if (pointer.rfind("/output/", 0) == 0 || pointer == "/probes") continue;
+    out += "  --set '" + pointer + "=" + value + "'\n";
+    any = true;
+  }
+  if (!any) out += "  nothing has to be changed\n";
+  return out;
 }
 
 std::string table_text(const Subject &subject, const Study &study) {

@@ -20,5 +20,6 @@ struct Described {
 Described describe(const Subject &subject, const Row &row);
 // Sentences on the reference that table and page share.
 std::string reference_text(const Study &study);
+std::string pick_text(const Study &study);
 
 }  // namespace cli::cost

@@ -26,6 +26,7 @@ namespace fs = std::filesystem;
 namespace cli::cost {
 namespace {
 
+constexpr double kLeast = 0.02;        // s of the budget with which a run is worth beginning
 constexpr double kMemoryShare = 0.25;  // of the machine's memory, for runs that wait
 volatile std::sig_atomic_t interrupted = 0;
 
@@ -226,8 +227,7 @@ bool Runs::pause(Child &child) {
   o = {};
   o.state = Outcome::cut;
   o.took = child.before;
-  o.limit = child.job->work;
-  o.cpu = work_of(child.pid);
+  o.limit = o.cpu = work_of(child.pid);
   o.simulated = recorded_time(child.job->folder + "/bodies.csv");
   store(*child.job);
   paused_.push_back(child);
@@ -241,9 +241,8 @@ bool Runs::ended(Child &child) {
   if (waitpid(child.pid, &status, WNOHANG) == 0) {
     if (now > job.limit + 10) kill(child.pid, SIGKILL);
     if (child.told) return false;
-    const bool sliced = work_of(child.pid) > job.work;
-    if (sliced && now <= job.limit && pause(child)) return true;
-    if (!sliced && now <= job.limit) return false;
+    if (work_of(child.pid) <= job.work && now <= job.limit) return false;
+    if (left() > kLeast && pause(child)) return true;
     kill(child.pid, SIGTERM);
     child.told = true;
     return false;
@@ -298,7 +297,7 @@ void Runs::stop_all(std::vector<Child> &children) {
 }
 
 bool Runs::waits(Job &job) const {
-  if (job.limit < 0.02 || job.outcome.settled()) return true;
+  if (job.limit < kLeast || job.outcome.settled()) return true;
   if (job.outcome.state != Outcome::cut) return false;
   const auto same = [&](const Child &c) { return c.job == &job; };
   const bool goes_on = std::any_of(paused_.begin(), paused_.end(), same);
@@ -324,10 +323,9 @@ void Runs::run(const std::vector<Job *> &jobs, unsigned parallel, double keep) {
       if (interrupted)
         throw Failure(kInterrupted, "interrupted; the runs that are done are kept in " + out_ +
                                         ", and the same call goes on from there");
-      if (left() < keep) next = jobs.size();
       while (next < jobs.size() && children.size() < parallel) {
         Job &job = *jobs[next++];
-        job.limit = std::min(job.limit, left());
+        job.limit = std::min(job.limit, left() - keep);
         if (waits(job)) continue;
         children.emplace_back();
         start(job, children.back());

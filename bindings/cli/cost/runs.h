@@ -46,8 +46,8 @@ class Runs {
 
   // Folder and outcome of an earlier call; kind: what the folder is named after, "runs" or "alone".
   void prepare(Job &job, const std::string &kind = "runs") const;
-  // In this order, at most `parallel` at a time, none beyond the budget, none begun where less than `keep` s
-  // of it are left. Throws Failure after a signal.
+  // In this order, at most `parallel` at a time, until `keep` s of the budget are left. Throws Failure after
+  // a signal.
   void run(const std::vector<Job *> &jobs, unsigned parallel, double keep = 0);
   double left() const;  // s of the budget
   unsigned started() const { return started_; }

@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <filesystem>
 #include <limits>
 
 #include "messages.h"
@@ -23,6 +24,9 @@ constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr double kSliceShare = 0.15, kReferenceShare = 0.6, kOwnShare = 0.4;
 // Of the budget: when no more slices are begun, on a machine that has others to serve.
 constexpr double kSlicesEnd = 0.35;
+constexpr double kAloneShare = 0.15;  // of the budget: the front once more, alone and with pictures
+constexpr double kPictureTime = 0.5;  // s that pictures may take beside a run
+constexpr size_t kPictures = 6;
 
 class Student {
  public:
@@ -39,6 +43,7 @@ class Student {
     compare();
     separate();
     find_front();
+    choose();
     time_alone();
     find_front();
     choose();
@@ -146,6 +151,15 @@ class Student {
     for (Job *job : jobs) job->work = std::numeric_limits<double>::max();
   }
 
+  // Whether the row computes what the scene asks for in another way. Another law, self contact and guard ask
+  // for something else: what they change is shown, and they are not chosen.
+  bool same_physics(int row) const {
+    const Knobs &k = out_.rows[size_t(row)].candidate.knobs;
+    return k.law.empty() && k.self.empty() && k.guard.empty();
+  }
+
+  int turn(int row) const { return on_ladder(row) ? 0 : same_physics(row) ? 1 : 2; }
+
   bool on_ladder(int row) const {
     return std::any_of(ladder_.begin(), ladder_.end(),
                        [&](const auto &pair) { return pair.first == row || pair.second == row; });
@@ -174,9 +188,13 @@ class Student {
       if (int(i) != out_.reference && int(i) != out_.check &&
           (!on_ladder(int(i)) || i == 0 || out_.rows[i].candidate.axes.size() > 1))
         order.push_back(int(i));
-    std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return predicted(a) < predicted(b); });
+    std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
+      const int first = turn(a) / 2, second = turn(b) / 2;  // the ladder counts as the rest here
+      return first != second ? first < second : predicted(a) < predicted(b);
+    });
     if (out_.reference >= 0) order.insert(order.begin(), {out_.reference, out_.check});
-    runs_.run(jobs_of(order, std::numeric_limits<double>::max()), runs_.parallel());
+    runs_.run(jobs_of(order, std::numeric_limits<double>::max()), runs_.parallel(),
+              kAloneShare * out_.options.budget);
     if (out_.reference >= 0 && !done(out_.reference)) out_.reference = out_.check = -1;
     if (out_.check >= 0 && !done(out_.check)) out_.check = -1;
   }
@@ -187,7 +205,7 @@ class Student {
     for (size_t i = 0; i < out_.rows.size(); ++i) {
       const Row &row = out_.rows[i];
       const Knobs &k = row.candidate.knobs;
-      const bool physics = k.law.empty() && k.self.empty() && k.guard.empty() && k.volume.empty();
+      const bool physics = same_physics(int(i)) && k.volume.empty();
       const double rank = row.job.outcome.cpu + (k.model == out_.axes.reference_model ? 1e9 : 0);
       if (!done(int(i)) || !physics || rank <= most) continue;
       most = rank;
@@ -284,7 +302,7 @@ class Student {
 
   bool eligible(size_t i) const {
     return out_.rows[i].compared && int(i) != out_.reference && int(i) != out_.check &&
-           std::isfinite(out_.rows[i].headline);
+           same_physics(int(i)) && std::isfinite(out_.rows[i].headline);
   }
 
   // Steps and cells have a finest choice of their own; of switches the scene as it is stands for it.
@@ -339,43 +357,57 @@ class Student {
       }
   }
 
-  void time_alone() {
-    std::vector<Job> again;
-    std::vector<size_t> of;
-    double sum = 0;
-    for (const size_t i : out_.front) {
-      Job job;
-      job.label = out_.rows[i].job.label;
-      job.set = out_.rows[i].job.set;
-      job.limit = std::numeric_limits<double>::max();
-      runs_.prepare(job, "alone");
-      if (!job.outcome.settled()) sum += out_.rows[i].job.outcome.took;
-      again.push_back(std::move(job));
-      of.push_back(i);
+  // The row once more, with two pictures, at its start and its end, where it is to be shown; not where the
+  // budget does not hold it.
+  void run_again(size_t i, bool picture) {
+    Row &row = out_.rows[i];
+    Job job;
+    job.label = row.job.label;
+    job.set = row.job.set;
+    for (auto &[pointer, value] : job.set)
+      if (picture && pointer == "/output/frames") value = number(1 / s_.duration);
+    runs_.prepare(job, "alone");
+    if (!job.outcome.settled()) {
+      if (row.job.outcome.took + (picture ? kPictureTime : 0) > runs_.left()) return;
+      job.limit = runs_.left();
+      runs_.run({&job}, 1);
     }
-    if (sum <= runs_.left()) {
-      std::vector<Job *> jobs;
-      for (Job &job : again) jobs.push_back(&job);
-      runs_.run(jobs, 1);
-    }
-    for (size_t k = 0; k < again.size(); ++k)
-      if (again[k].outcome.state == Outcome::done) {
-        out_.rows[of[k]].cpu_per_s = again[k].outcome.cpu_per_s();
-        out_.rows[of[k]].alone = true;
-      }
+    if (job.outcome.state != Outcome::done) return;
+    row.cpu_per_s = job.outcome.cpu_per_s();
+    row.alone = true;
+    const std::string file = job.folder + "/frames/frame_000001.png";
+    std::error_code error;
+    if (std::filesystem::exists(file, error)) row.picture = file;
   }
 
+  // The choice, the scene as it is and the reference are shown, then members of the front from its ends.
+  void time_alone() {
+    std::vector<size_t> order = {0, size_t(out_.reference)};
+    if (out_.pick >= 0) order.insert(order.begin(), size_t(out_.pick));
+    for (size_t k = 0; 2 * k < out_.front.size(); ++k) {
+      order.push_back(out_.front[out_.front.size() - 1 - k]);
+      order.push_back(out_.front[k]);
+    }
+    size_t shown = 0;
+    for (const size_t i : order) {
+      if (!out_.rows[i].compared || out_.rows[i].alone) continue;
+      const bool picture = shown < kPictures;
+      run_again(i, picture);
+      shown += picture;
+    }
+  }
+
+  // The cheapest that is within the target if its error and the reference's have nothing to do with each
+  // other. Proven: even if they add up. Where the reference itself is farther off nothing is known.
   void choose() {
-    const double target = out_.options.target;
+    const double target = out_.options.target, own = out_.reference_headline;
+    out_.pick = -1;
     for (const size_t i : out_.front) {
-      if (out_.rows[i].headline + out_.reference_headline > target || !(out_.reference_headline >= 0))
-        continue;
+      if (!(std::hypot(out_.rows[i].headline, own) <= target)) continue;
       out_.pick = int(i);
-      out_.proven = true;
+      out_.proven = out_.rows[i].headline + own <= target;
       return;
     }
-    for (const size_t i : out_.front)
-      if (out_.pick < 0 && out_.rows[i].headline <= target) out_.pick = int(i);
   }
 
   const Subject &s_;

@@ -23,6 +23,7 @@ struct Row {
   double headline = 0;                  // the largest of the quantities asked for; NaN: none
   double cpu_per_s = 0;                 // s of processor time for a simulated one
   bool alone = false;                   // timed with nothing beside it
+  std::string picture;                  // file: the scene at its end; "" where there is none
   bool compared = false;                // done, with figures
 };
 
