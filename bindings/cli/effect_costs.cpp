@@ -197,10 +197,11 @@ void print_cost(const EffectCost &c) {
     std::printf("; not measured: %s", c.why_not.c_str());
     return;
   }
-  const char *const unit = c.clear() ? "costs" : "costs less than the noise:";
-  std::printf("; %s %+.3g us per step, %+.2g %% (%+.3g to %+.3g us; %u pairs of %u steps)", unit,
-              1e6 * c.median, c.with > 0 ? 100 * c.median / c.with : 0.0, 1e6 * c.low, 1e6 * c.high, c.pairs,
-              c.steps);
+  const bool saves = c.clear() && c.median < 0;
+  const char *const unit = saves ? "saves" : c.clear() ? "costs" : "costs less than the noise:";
+  std::printf("; %s %.3g us per step, %+.2g %% (%+.3g to %+.3g us; %u pairs of %u steps)", unit,
+              saves ? -1e6 * c.median : 1e6 * c.median, c.with > 0 ? 100 * c.median / c.with : 0.0,
+              1e6 * c.low, 1e6 * c.high, c.pairs, c.steps);
 }
 
 const EffectCost *cost_of(const std::vector<EffectCost> *costs, const std::string &body,

@@ -45,7 +45,8 @@ class OffScreen : public Frames {
     render::Scene picture_scene;
     add_bodies(picture_scene);
     add_obstacles(picture_scene);
-    // One camera and one extent for the whole film: what the first picture needs.
+    // One extent for the whole film, and the camera that the first picture needs; where none is given, it
+    // goes with bodies that would leave the frame.
     if (!extent_) {
       extent_ = render::bounds(picture_scene);
       const dfm_scene_settings &s = scene_.settings();
@@ -56,6 +57,11 @@ class OffScreen : public Frames {
           camera.look_at[i] = s.look_at[i];
         }
       camera_ = camera;
+      double square = 0;
+      for (int i = 0; i < 3; ++i) square += std::pow(camera.eye[i] - camera.look_at[i], 2);
+      distance_ = std::sqrt(square);
+    } else if (!scene_.settings().has_camera) {
+      camera_ = render::follow(*camera_, distance_, place_of_bodies(), double(kWidth) / kHeight);
     }
     picture_scene.extent = extent_;
     picture_scene.camera = camera_;
@@ -92,6 +98,13 @@ class OffScreen : public Frames {
       b.scalar[i] = float(std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]));
     }
     return true;
+  }
+
+  render::Bounds place_of_bodies() const {
+    render::Bounds out;
+    for (const Buffers &b : buffers_)
+      for (size_t i = 0; i < b.xyz.size(); i += 3) out.add(&b.xyz[i]);
+    return out;
   }
 
   void add_bodies(render::Scene &out) {
@@ -198,6 +211,7 @@ class OffScreen : public Frames {
   std::vector<std::vector<double>> placed_;  // of obstacles of triangles
   std::optional<render::Bounds> extent_;
   std::optional<render::Camera> camera_;
+  double distance_ = 0;  // m, from the camera to what it looked at first
   float scale_ = 0;
   uint32_t drawn_ = 0;
 };

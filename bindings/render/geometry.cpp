@@ -375,4 +375,39 @@ Camera auto_camera(const Scene &scene, double aspect) {
   return auto_camera(shown, aspect, scene.up);
 }
 
+Camera follow(const Camera &camera, double distance, const Bounds &box, double aspect) {
+  if (box.empty()) return camera;
+  constexpr double kInside = 0.92, kNear = 0.8, kFar = 1.25;  // of half the frame; of the distance
+  const View v = view_of(camera);
+  const double wide = kInside * v.tan_half * aspect, high = kInside * v.tan_half;
+  const Vec lo = vec(box.lo), hi = vec(box.hi);
+  const double middle = dot(v.eye - (lo + hi) * 0.5, v.back);
+  const double ahead =
+      std::clamp(middle, kNear * distance, kFar * distance) - middle;  // how far back it goes
+  // Corners lie inside where |sideways - shift| <= wide depth: bounds of the shift. Where the lower one is
+  // above the upper one the camera goes back, which moves both by wide.
+  double left = -1e300, right = 1e300, down = -1e300, top = 1e300, nearest = 1e300;
+  for (int i = 0; i < 8; ++i) {
+    const Vec d = Vec{i & 1 ? hi.x : lo.x, i & 2 ? hi.y : lo.y, i & 4 ? hi.z : lo.z} - v.eye;
+    const double depth = ahead - dot(d, v.back), x = dot(d, v.right), y = dot(d, v.up);
+    left = std::max(left, x - wide * depth);
+    right = std::min(right, x + wide * depth);
+    down = std::max(down, y - high * depth);
+    top = std::min(top, y + high * depth);
+    nearest = std::min(nearest, depth);
+  }
+  const double more =
+      std::max({0.0, (left - right) / (2 * wide), (down - top) / (2 * high), 0.1 * distance - nearest});
+  const auto shift = [](double low, double up) { return low > 0 ? low : up < 0 ? up : 0; };
+  const Vec by = v.right * shift(left - wide * more, right + wide * more) +
+                 v.up * shift(down - high * more, top + high * more) + v.back * (ahead + more);
+  Camera out = camera;
+  for (int k = 0; k < 3; ++k) {
+    const double d = k == 0 ? by.x : k == 1 ? by.y : by.z;
+    out.eye[k] += d;
+    out.look_at[k] += d;
+  }
+  return out;
+}
+
 }  // namespace render

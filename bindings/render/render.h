@@ -109,6 +109,11 @@ Camera auto_camera(const Bounds &bounds, double aspect, const double up[3]);
 // scene has no camera.
 Camera auto_camera(const Scene &scene, double aspect);
 
+// The camera moved, in the same direction of view and by as little as it takes, so that the box lies inside
+// the frame and about as far away as what the camera looked at first (`distance`); farther only where the box
+// is too large. It moves as smoothly as the box does.
+Camera follow(const Camera &camera, double distance, const Bounds &box, double aspect);
+
 enum class Backend { automatic, egl, osmesa };
 
 class Renderer {

@@ -105,7 +105,12 @@ Batch solid(const Look &look) {
 }
 
 void add_planes(const Scene &scene, Frame &frame, const Bounds &extent) {
-  const Bounds room = room_of(scene, frame.up, extent);
+  Bounds reached = extent;  // slabs go on under what has left it
+  if (const Bounds now = bounds(scene); !now.empty()) {
+    reached.add(now.lo);
+    reached.add(now.hi);
+  }
+  const Bounds room = room_of(scene, frame.up, reached);
   const Vec middle = (vec(extent.lo) + vec(extent.hi)) * 0.5;
   const Plane *floor = nullptr;
   for (const Plane &p : scene.planes) {
@@ -124,13 +129,18 @@ void add_planes(const Scene &scene, Frame &frame, const Bounds &extent) {
   if (!floor) return;
   Ground &g = frame.ground;
   g.present = true;
-  g.radius = 6 * frame.extent;
+  // It lies where the line of sight meets it, and reaches far beyond that, wherever the camera has gone.
+  const Vec eye = frame.view.eye + frame.shape.origin;
+  const double above = dot(eye - vec(floor->point), frame.up), falls = dot(frame.view.back, frame.up);
+  const double way = std::min(above / std::max(falls, 0.05), 20 * frame.extent + above);
+  g.radius = std::max(6 * frame.extent, 6 * way);
   g.spacing = nice(0.45 * frame.extent);
   g.x = square_to(frame.up);
   g.y = cross(frame.up, g.x);
   // The pattern hangs on the world, not on the scene's middle, so that it rests from frame to frame.
   const Vec level = vec(floor->point) + frame.up * 1e-9;
-  const Vec foot = middle + frame.up * dot(frame.up, level - middle);
+  const Vec sight = scene.camera ? eye - frame.view.back * way : middle;
+  const Vec foot = sight + frame.up * dot(frame.up, level - sight);
   const double two = 2 * g.spacing;
   const auto beyond = [&](const Vec &axis) {
     return axis * (dot(foot, axis) - two * std::round(dot(foot, axis) / two));
@@ -177,9 +187,13 @@ void fit_casters(Frame &frame, const Bounds &box) {
 Frame compose(const Scene &scene, double aspect, double pixels_high) {
   Frame frame;
   const Bounds extent = extent_of(scene);
-  const Vec middle = (vec(extent.lo) + vec(extent.hi)) * 0.5;
+  Vec middle = (vec(extent.lo) + vec(extent.hi)) * 0.5;
   frame.extent = std::max(0.5 * norm(vec(extent.hi) - vec(extent.lo)), 1e-6);
   frame.up = unit(vec(scene.up));
+  // Single precision holds what is near: where all has left the extent, the origin goes with it.
+  const Bounds now = bounds(scene);
+  const Vec place = now.empty() ? middle : (vec(now.lo) + vec(now.hi)) * 0.5;
+  if (norm(place - middle) > 2 * frame.extent) middle = place;
   frame.shape.origin = middle;
   frame.view = view_of(scene.camera ? *scene.camera : auto_camera(scene, aspect));
   frame.view.eye = frame.view.eye - middle;
@@ -201,7 +215,6 @@ Frame compose(const Scene &scene, double aspect, double pixels_high) {
   for (const Sphere &s : scene.spheres) batch(frame, solid(s.look), [&] { frame.shape.sphere(s); });
   for (const Capsule &c : scene.capsules) batch(frame, solid(c.look), [&] { frame.shape.capsule(c); });
   add_planes(scene, frame, extent);
-  const Bounds now = bounds(scene);
   fit_casters(frame, now.empty() ? extent : now);
   View world = frame.view;
   world.eye = world.eye + middle;

@@ -387,6 +387,72 @@ TEST(Renderer, ImpossibleSize_IsRefusedWithASentence) {
   }
 }
 
+namespace {
+
+// Where a point lies in the picture, -1 to 1 from edge to edge, and how far ahead of the camera it is.
+std::array<double, 3> seen(const Camera &c, const double *p, double aspect) {
+  const std::array<double, 3> b{c.eye[0] - c.look_at[0], c.eye[1] - c.look_at[1], c.eye[2] - c.look_at[2]};
+  const double n = std::sqrt(b[0] * b[0] + b[1] * b[1] + b[2] * b[2]),
+               m = std::sqrt(b[0] * b[0] + b[1] * b[1]);
+  const double back[3] = {b[0] / n, b[1] / n, b[2] / n}, right[3] = {-b[1] / m, b[0] / m, 0};
+  const double above[3] = {-back[2] * right[1], back[2] * right[0], back[0] * right[1] - back[1] * right[0]};
+  double x = 0, y = 0, z = 0;
+  for (int k = 0; k < 3; ++k) {
+    const double d = p[k] - c.eye[k];
+    x += d * right[k];
+    y += d * above[k];
+    z -= d * back[k];
+  }
+  const double half = std::tan(15 * 3.14159265358979 / 180);
+  return {x / (z * half * aspect), y / (z * half), z};
+}
+
+}  // namespace
+
+// What stays in the frame moves no camera; what leaves it in any direction is kept inside, at about the
+// distance of the first picture, by moves as small as its own.
+TEST(Camera, Follow_KeepsABoxInside) {
+  const double aspect = 4.0 / 3, up[3] = {0, 0, 1};
+  const Bounds start{{-0.1, -0.1, 0}, {0.1, 0.1, 0.2}};
+  const Camera first = auto_camera(start, aspect, up);
+  double square = 0;
+  for (int k = 0; k < 3; ++k) square += std::pow(first.eye[k] - first.look_at[k], 2);
+  const double distance = std::sqrt(square);
+  Bounds near = start;
+  near.hi[0] += 0.001;
+  const Camera still = render::follow(first, distance, near, aspect);
+  for (int k = 0; k < 3; ++k) EXPECT_EQ(still.eye[k], first.eye[k]);
+  for (const auto &way :
+       {std::array{1.0, 0.0, 0.0}, std::array{-1.0, 0.0, 0.0}, std::array{0.0, 1.0, 0.0},
+        std::array{0.0, -1.0, 0.0}, std::array{0.0, 0.0, -1.0}, std::array{0.5, 0.5, 1.0}}) {
+    Camera c = first;
+    for (int step = 1; step <= 100; ++step) {
+      Bounds box = start;
+      for (int k = 0; k < 3; ++k) {
+        box.lo[k] += 0.05 * step * way[size_t(k)];
+        box.hi[k] += 0.05 * step * way[size_t(k)];
+      }
+      const Camera next = render::follow(c, distance, box, aspect);
+      double moved = 0;
+      for (int k = 0; k < 3; ++k) moved += std::pow(next.eye[k] - c.eye[k], 2);
+      EXPECT_LT(std::sqrt(moved), 0.25) << "smoothly";
+      c = next;
+      for (const double *corner : {box.lo, box.hi}) {
+        const auto [x, y, z] = seen(c, corner, aspect);
+        EXPECT_LT(std::max(std::fabs(x), std::fabs(y)), 0.93);
+        EXPECT_GT(z, 0.5 * distance);
+        EXPECT_LT(z, 1.6 * distance);
+      }
+    }
+  }
+  Bounds wide = start;
+  wide.hi[0] = 50;
+  const Camera back = render::follow(first, distance, wide, aspect);
+  for (const double *corner : {wide.lo, wide.hi})
+    EXPECT_LT(std::max(std::fabs(seen(back, corner, aspect)[0]), std::fabs(seen(back, corner, aspect)[1])),
+              0.93);
+}
+
 TEST(Camera, AutoCamera_HoldsTheBox) {
   for (const double aspect : {0.5, 1.0, 2.0})
     for (const auto &size :

@@ -146,6 +146,17 @@ TEST(SwitchOfAScene, ToTheModelThatTheBodyHas_IsTold) {
   told(R"({"far": "msm", "touching": "msm"})", "so it changes nothing between them");
 }
 
+TEST(SwitchOfAScene, IntegratorOfAModelThatStepsItself_IsToldToBeUnused) {
+  const auto told = [](const std::string &body) {
+    return run(scene(kStep, body)).err.find("implicit_euler, is not used") != std::string::npos;
+  };
+  EXPECT_TRUE(told(R"("model": {"type": "modal"}, "integrator": "implicit_euler")"));
+  EXPECT_FALSE(told(R"("model": {"type": "modal"})"));
+  EXPECT_FALSE(told(R"("integrator": "implicit_euler")"));
+  EXPECT_TRUE(told(R"("switch": [{"t": 0.005, "type": "modal", "integrator": "implicit_euler"}])"));
+  EXPECT_FALSE(told(R"("integrator": "implicit_euler", )" + kRuleToModal));
+}
+
 TEST(SwitchOfAScene, OfAnotherKind_IsRefusedWithBothForms) {
   expect_refused(scene(kStep, R"("switch": "msm")"),
                  {"/bodies/0/switch", "an array of changes", "or a rule"});

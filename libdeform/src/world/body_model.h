@@ -22,6 +22,9 @@ ModelParams keep_params(const dfm_type &type, const dfm_params &given);
 // Throws Error.
 std::unique_ptr<BodyModel> make_body_model(World &w, Body &b, const dfm_type &type, ModelOrigin origin,
                                            int32_t integrator);
+// Where an integrator is named for a body whose model steps itself.
+void warn_of_own_steps(const World &w, const std::string &body, const ModelInstance &model,
+                       int32_t integrator);
 // Of type and origin, for two bodies that differ in nothing else.
 uint64_t model_hash(const Body &b);
 // Throws what make_body_model() throws about parameters.

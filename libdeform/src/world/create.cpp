@@ -162,6 +162,7 @@ Body &create_body(World &w, const dfm_body_def &def) {
   w.bodies.push_back(std::move(owned));
   w.changed = true;
   warn_of_idle(b);
+  warn_of_own_steps(w, b.name, b.model, def.integrator);
   return b;
 }
 

@@ -271,7 +271,9 @@ double stable_with(Body &b, BodyModel &made) {
 }
 
 // A change that is to come, of a body which will have this integrator until then.
-void rehearse(Body &b, ModelChoice &to, uint32_t &integrator, bool at_rest, std::vector<SpareModel> &spares) {
+// named: its integrator was, for this change.
+void rehearse(Body &b, ModelChoice &to, uint32_t &integrator, bool at_rest, bool named,
+              std::vector<SpareModel> &spares) {
   World &w = *b.world;
   if (to.integrator != kSameIntegrator) integrator = to.integrator;
   const dfm_type &type = w.context->registry.find(DFM_KIND_MODEL, to.type);
@@ -282,6 +284,7 @@ void rehearse(Body &b, ModelChoice &to, uint32_t &integrator, bool at_rest, std:
       make_body_model(w, b, type, std::move(origin), static_cast<int32_t>(integrator));
   check_springs(b, type, *made->dynamics);
   to.stable = stable_with(b, *made);
+  if (named) warn_of_own_steps(w, b.name, made->instance, static_cast<int32_t>(to.integrator));
   if (!w.changed) check_effects(w, b, b.model, made->instance);
   if (at_rest && made->instance.stepper)
     fail(DFM_E_UNSUPPORTED,
@@ -363,10 +366,10 @@ void rehearse(Body &b, std::vector<Switch> &switches, std::vector<SwitchRule> &r
   std::vector<SpareModel> spares;
   spares.reserve(kSpares);
   uint32_t integrator = b.origin.integrator;
-  const auto one = [&](ModelChoice &to, const std::string &when) {
+  const auto one = [&](ModelChoice &to, const std::string &when, bool named = false) {
     if (to.type.empty() || (!at_rest && is_made_so(b, to))) return;
     try {
-      rehearse(b, to, integrator, at_rest, spares);
+      rehearse(b, to, integrator, at_rest, named, spares);
     } catch (const Error &e) {
       if (e.status == DFM_E_NOMEM) throw;
       const std::string whose = format("body '%s': ", b.name.c_str());
@@ -375,7 +378,7 @@ void rehearse(Body &b, std::vector<Switch> &switches, std::vector<SwitchRule> &r
            when.c_str(), why);
     }
   };
-  for (Switch &s : switches) one(s.to, format("at %g s", s.t));
+  for (Switch &s : switches) one(s.to, format("at %g s", s.t), s.to.integrator != kSameIntegrator);
   for (SwitchRule &r : rule) {
     one(r.touching, "by the rule (touching)");
     one(r.near, "by the rule (near)");
