@@ -87,6 +87,8 @@ class Dynamics {
   virtual ~Dynamics() = default;
 
   virtual Abilities abilities() const = 0;
+  // DFM_CAP_* that its model must keep, whatever parameters it is given: what this was made for.
+  virtual uint32_t claims() const { return 0; }
   // of a sub-step, over that of an explicit one: a rough number for the budget of a step
   virtual uint32_t relative_work() const { return 1; }
 

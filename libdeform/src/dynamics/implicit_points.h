@@ -40,6 +40,9 @@ class ImplicitPoints : public Dynamics {
             .damps = true,
             .parts = options_.second_order};
   }
+  uint32_t claims() const override {
+    return DFM_CAP_STIFFNESS | (stiffness_.constant() ? uint32_t{DFM_CAP_CONSTANT_STIFFNESS} : 0);
+  }
   // of a stage: 30 at 700 points, 60 at 4,300
   uint32_t relative_work() const override { return (options_.second_order ? 2 : 1) * kImplicitWork; }
   bool bound(double time, const AddRowSums &outside, StepBound &out) override;

@@ -61,8 +61,9 @@ void ModelInstance::create(const dfm_type &t, const dfm_host &h, const dfm_mesh 
 }
 
 std::optional<std::vector<dfm_slot>> ModelInstance::ask_extensions() {
-  const void *tables[5] = {};
-  const char *const ids[] = {"dfm.stepper/1", DFM_EXT_SLOTS, DFM_EXT_EFFECTS, DFM_EXT_IDLE, DFM_EXT_LIMITED};
+  const void *tables[6] = {};
+  const char *const ids[] = {"dfm.stepper/1", DFM_EXT_SLOTS,   DFM_EXT_EFFECTS,
+                             DFM_EXT_IDLE,    DFM_EXT_LIMITED, DFM_EXT_CAPS};
   if (ops->extension)
     call("extension", [&] {
       for (size_t i = 0; i < std::size(ids); ++i) tables[i] = ops->extension(self, ids[i]);
@@ -75,7 +76,37 @@ std::optional<std::vector<dfm_slot>> ModelInstance::ask_extensions() {
   effects = copy_table<dfm_effects>(tables[2], kOneFunction, type->id, "dfm_effects");
   idle = copy_table<dfm_idle>(tables[3], kOneFunction, type->id, "dfm_idle");
   limited = copy_table<dfm_limited>(tables[4], kOneFunction, type->id, "dfm_limited");
+  claims = copy_table<dfm_caps>(tables[5], kOneFunction, type->id, "dfm_caps");
+  if (ask_caps() != DFM_OK)
+    fail(DFM_E_FATAL, "model '%s' failed when it was asked what it can; the log says why", type->id);
   return copy_slots(type->id, static_cast<const dfm_slots *>(tables[1]), false);
+}
+
+dfm_status ModelInstance::ask_caps() noexcept {
+  uint32_t hold = ~uint32_t{0};
+  if (claims && claims->active) {
+    const auto ask = [&] {
+      hold = claims->active(self);
+      return DFM_OK;
+    };
+    if (const dfm_status s = call("caps", ask); s != DFM_OK) return s;
+  }
+  caps_ = ops->caps & hold;
+  if (!ops->energy) caps_ &= ~uint32_t{DFM_CAP_ENERGY};
+  return DFM_OK;
+}
+
+dfm_status ModelInstance::put_params(const std::vector<double> &values, uint32_t needed) noexcept {
+  if (!ops->set_params) return DFM_E_UNSUPPORTED;
+  const auto put = [&](const std::vector<double> &v) {
+    return call("set_params", [&] { return ops->set_params(self, v.data()); });
+  };
+  if (const dfm_status s = put(values); s != DFM_OK) return s;
+  const dfm_status s = ask_caps();
+  if (s == DFM_OK && can(needed)) return DFM_OK;
+  put(params);
+  ask_caps();
+  return s == DFM_OK ? DFM_E_UNSUPPORTED : s;
 }
 
 void ModelInstance::start() {
@@ -93,6 +124,8 @@ void ModelInstance::swap(ModelInstance &other) noexcept {
   std::swap(effects, other.effects);
   std::swap(idle, other.idle);
   std::swap(limited, other.limited);
+  std::swap(claims, other.claims);
+  std::swap(caps_, other.caps_);
   std::swap(self, other.self);
   params.swap(other.params);
   state.swap(other.state);

@@ -21,6 +21,7 @@ struct ModelInstance {
   std::optional<dfm_effects> effects;  // none: whatever the type promises is at work
   std::optional<dfm_idle> idle;        // none: every parameter does what its row says
   std::optional<dfm_limited> limited;  // none: the model limits nothing, or does not say
+  std::optional<dfm_caps> claims;      // none: what the type claims holds with all parameters
   void *self = nullptr;
   std::vector<double> params;
   Array<double> state, state_out;  // slots end to end
@@ -44,6 +45,13 @@ struct ModelInstance {
   dfm_status call(const char *what, F &&f) const noexcept {
     return call_plugin(*host, *type, what, f);
   }
+  // DFM_CAP_* that hold with the present parameters. Whoever asks what this model can asks here: what
+  // dfm_model.caps says holds with some parameters of the type.
+  uint32_t caps() const { return caps_; }
+  bool can(uint32_t cap) const { return (caps_ & cap) == cap; }
+  // Other values, of RUNTIME rows alone; `params` is the caller's to set. Not DFM_OK: nothing has changed.
+  // DFM_E_UNSUPPORTED: with them it could not do what is `needed` (DFM_CAP_*), or it takes none.
+  dfm_status put_params(const std::vector<double> &values, uint32_t needed) noexcept;
   // Is this effect of the type called for by the present parameters?
   bool works(const std::string &effect) const;
   // Why the parameter of this row does nothing now; empty where it does what it says.
@@ -57,7 +65,15 @@ struct ModelInstance {
 
  private:
   std::optional<std::vector<dfm_slot>> ask_extensions();  // and its own state slots; throws Error
+  dfm_status ask_caps() noexcept;                         // not DFM_OK: it failed, and caps_ is as before
+  uint32_t caps_ = 0;
 };
+
+// Is a model of this type made with the rest positions as they are before the body's pose? Asked before there
+// is an instance, so what the type claims decides (dfm_mesh.rest), whatever its parameters take away.
+inline bool rests_unplaced(const dfm_type &type) {
+  return static_cast<const dfm_model *>(type.ops)->caps & DFM_CAP_ROTATION_INVARIANT;
+}
 
 // Number of state values that slots need on a mesh of these counts.
 size_t model_state_size(std::span<const dfm_slot> slots, uint32_t npoint, uint32_t ncell, uint32_t nedge);

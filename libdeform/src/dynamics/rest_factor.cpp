@@ -32,7 +32,7 @@ RestFactor::RestFactor(const Memory &memory, const Phyxels &points, ModelInstanc
   use_memory(memory, left_, right_, held_);
   turns_ = !stiffness_.constant();
   rest_ = p_.x;
-  if (model_.ops->caps & DFM_CAP_ROTATION_INVARIANT)
+  if (rests_unplaced(*model_.type))
     for (uint32_t i = 0; i < p_.n; ++i) store3(&rest_[size_t{kStride} * i], load3(&p_.rest[size_t{3} * i]));
   state_.assign(model_.state.begin(), model_.state.end());
   for (Array<double> *a : {&diagonal_, &b_, &y_, &arm_}) a->assign(size_t{3} * p_.n, 0.0);

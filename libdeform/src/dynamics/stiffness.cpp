@@ -49,7 +49,7 @@ void ModelStiffness::create(const ModelInstance &model, uint32_t npoint) {
          "model '%s' lists a block of its stiffness twice, or lacks that of a point with itself; "
          "report it to its author",
          id);
-  constant_ = ops.caps & DFM_CAP_CONSTANT_STIFFNESS;
+  constant_ = model.can(DFM_CAP_CONSTANT_STIFFNESS);
 }
 
 bool ModelStiffness::evaluate(const ModelInstance &model, const dfm_kin &k, double a, double b) {

@@ -9,7 +9,7 @@ class ModelStiffness {
  public:
   explicit ModelStiffness(const Memory &memory);
 
-  static bool offered(const ModelInstance &model) { return model.ops->caps & DFM_CAP_STIFFNESS; }
+  static bool offered(const ModelInstance &model) { return model.can(DFM_CAP_STIFFNESS); }
   // Asks the model for its pairs; throws Error naming the plugin where they are not what plugin.h asks for.
   void create(const ModelInstance &model, uint32_t npoint);
   bool constant() const { return constant_; }  // for the same parameters

@@ -35,9 +35,7 @@ bool watching(const World &w) {
 // By backward Euler, whose balance is that of the true energy.
 bool damps(const Body &b) { return b.dynamics->abilities().damps; }
 bool books(const Body &b) { return b.dynamics->abilities().energy || damps(b); }
-bool watched(const Body &b) {
-  return books(b) && (b.model.ops->caps & DFM_CAP_ENERGY) && b.model.ops->energy;
-}
+bool watched(const Body &b) { return books(b) && b.model.can(DFM_CAP_ENERGY); }
 // Loads that change from sub-step to sub-step have no potential: their work is booked as it is done.
 bool books_loads(const Body &b) { return b.loads_vary(); }
 // TR-BDF2 does the work of what varies along the sub-step, not at its end as it is booked.
@@ -236,7 +234,7 @@ void book_body(World &w, StepContext &step, Body &b, double motion) {
 const char *unwatched(const World &w, const Body &b) {
   if (!(w.def.energy_watch > 0)) return "energy_watch is 0";
   if (!watching(w)) return "the contact method gives no impulses to book";
-  if (!(b.model.ops->caps & DFM_CAP_ENERGY) || !b.model.ops->energy) return "its model gives no energy";
+  if (!b.model.can(DFM_CAP_ENERGY)) return "its model gives no energy, or not with these parameters";
   if (b.model.stepper) return "its model steps itself";
   return unbooked(w, b) ? "tr_bdf2 takes loads, held points or gravity that vary along the sub-step" : "";
 }

@@ -218,9 +218,8 @@ IntegratorOption option_of(const World &w, const Body &b) {
   IntegratorOption o;
   o.substeps = std::max(1.0, w.def.step / b.integrator.step);
   o.work = double(b.p.n) + double(b.tets.size() / 4);
-  const uint32_t caps = b.model.ops->caps;
-  if (!b.model.stepper && (caps & DFM_CAP_STIFFNESS))
-    o.implicit_work = caps & DFM_CAP_CONSTANT_STIFFNESS ? kConstantWork : kImplicitWork;
+  if (!b.model.stepper && b.model.can(DFM_CAP_STIFFNESS))
+    o.implicit_work = b.model.can(DFM_CAP_CONSTANT_STIFFNESS) ? kConstantWork : kImplicitWork;
   o.open = b.integrator.open;
   o.implicit = b.integrator.used != DFM_INTEGRATOR_SYMPLECTIC_EULER;
   return o;

@@ -55,7 +55,7 @@ void ask_explicit_bound(const World &w, Dynamics &dynamics, Integrator &out) {
 // empty for the others.
 std::vector<double> rest_for(const dfm_type &type, const Body &b, const Pose &frame) {
   std::vector<double> placed;
-  if (static_cast<const dfm_model *>(type.ops)->caps & DFM_CAP_ROTATION_INVARIANT) return placed;
+  if (rests_unplaced(type)) return placed;
   placed.resize(b.p.rest.size());
   for (size_t i = 0; i < b.p.rest.size(); i += 3) store3(&placed[i], place(frame, load3(&b.p.rest[i])));
   return placed;
@@ -100,7 +100,7 @@ std::vector<double> values_for(const World &w, const Body &b, const dfm_type &ty
 // One that the body has had before, for the same; or none.
 bool take_spare(Body &b, const dfm_type &type, const std::vector<double> &values, const ModelOrigin &origin,
                 ModelInstance &out) {
-  const bool turns = model_of(type).caps & DFM_CAP_ROTATION_INVARIANT;
+  const bool turns = rests_unplaced(type);
   const auto fits = [&](const SpareModel &s) {
     return s.instance->type == &type && s.instance->params == values && s.origin.params == origin.params &&
            s.origin.held == origin.held &&

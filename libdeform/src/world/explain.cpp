@@ -41,7 +41,7 @@ std::string integrator(const Body &b) {
   else if (!i.chosen) why = "named, or the world's";
   else if (i.used != DFM_INTEGRATOR_SYMPLECTIC_EULER)
     why = "auto: explicit time costs more than four times as much";
-  else if (!(b.model.ops->caps & DFM_CAP_STIFFNESS))
+  else if (!b.model.can(DFM_CAP_STIFFNESS))
     why = "auto: the model gives no stiffness, which implicit time needs";
   else why = "auto: implicit time, which damps motion, would not be four times cheaper";
   std::string out = std::string("\"integrator\":{\"used\":") + quote(word_of(b)) + ",\"why\":" + quote(why);
@@ -116,7 +116,7 @@ std::string changes(const Body &b) {
 std::string body(const Body &b) {
   std::string out = "{\"name\":" + quote(b.name) + ",\"model\":" + quote(b.model.type->id);
   out += std::string(",\"kind\":") +
-         quote(b.model.ops->caps & DFM_CAP_PLAUSIBLE ? "plausible, not physical" : "physical");
+         quote(b.model.can(DFM_CAP_PLAUSIBLE) ? "plausible, not physical" : "physical");
   out += format(",\"cells\":%zu,\"points\":%u,\"surfels\":%u", b.tets.size() / 4, b.p.n, b.surface.nsurfel);
   const char *const surface = b.coupling == kNoCoupling           ? "boundary"
                               : b.coupling == DFM_COUPLING_MLS    ? "own, mls"

@@ -14,7 +14,7 @@
 namespace dfm {
 
 double elastic_energy(Body &b) {
-  if (!(b.model.ops->caps & DFM_CAP_ENERGY) || !b.model.ops->energy) return NAN;
+  if (!b.model.can(DFM_CAP_ENERGY)) return NAN;
   double joule = 0;
   const dfm_kin k = b.dynamics->kin(b.world->time, 0);
   const OnBehalf speaks(b.name);
@@ -152,10 +152,14 @@ void set_model_params(Body &b, const dfm_params &params) {
   if (!b.model.ops->set_params)
     fail(DFM_E_UNSUPPORTED, "model '%s' takes no parameters while it runs", type.id);
   const EffectsAtWork before(b.model);
-  const dfm_status status =
-      b.model.call("set_params", [&] { return b.model.ops->set_params(b.model.self, values.data()); });
+  const dfm_status status = b.model.put_params(values, b.dynamics->claims());
   if (status == DFM_E_NOMEM)
     fail(DFM_E_NOMEM, "body '%s': model '%s' found no memory for these parameters; nothing was changed",
+         b.name.c_str(), type.id);
+  if (status == DFM_E_UNSUPPORTED && b.dynamics->claims())
+    fail(DFM_E_UNSUPPORTED,
+         "body '%s': model '%s' does not take these parameters, or has no stiffness of the same kind with "
+         "them, which the body moves by; give it the model anew with them (dfm_body_set_model)",
          b.name.c_str(), type.id);
   if (status != DFM_OK)
     fail(DFM_E_ARG, "body '%s': model '%s' refuses these parameters; the log says why", b.name.c_str(),

@@ -257,7 +257,7 @@ ModelOrigin origin_for(const Body &b, const dfm_type &type, const ModelChoice &t
                      b.origin.frame,
                      to.integrator == kSameIntegrator ? b.origin.integrator : to.integrator,
                      {b.p.held.begin(), b.p.held.end()}};
-  if (!(model_of(type).caps & DFM_CAP_ROTATION_INVARIANT)) origin.frame = frame_of(b);
+  if (!rests_unplaced(type)) origin.frame = frame_of(b);
   return origin;
 }
 
@@ -292,7 +292,7 @@ void rehearse(Body &b, ModelChoice &to, uint32_t &integrator, bool at_rest, bool
          "another model",
          b.name.c_str(), type.id);
   // one whose forces do not turn with the body is of the present place only
-  const bool lasts = model_of(type).caps & DFM_CAP_ROTATION_INVARIANT;
+  const bool lasts = rests_unplaced(type);
   if (lasts && spares.size() < kSpares) keep_spare(spares, *made, std::move(place));
 }
 

@@ -570,10 +570,10 @@ void make_models(const SnapshotReader &s, World &w, Staged &t) {
 
 // ---- into the world ---------------------------------------------------------------------------------------
 
-void put_parameters(const Body &b, const ModelInstance &model, const std::vector<double> &values) {
+void put_parameters(const Body &b, ModelInstance &model, const Dynamics &moves,
+                    const std::vector<double> &values) {
   if (values == model.params) return;
-  if (!model.ops->set_params ||
-      model.call("set_params", [&] { return model.ops->set_params(model.self, values.data()); }) != DFM_OK)
+  if (model.put_params(values, moves.claims()) != DFM_OK)
     fail(DFM_E_FORMAT,
          "the snapshot has other parameters for model '%s' of body '%s', which cannot take them while it "
          "runs; nothing was restored",
@@ -585,8 +585,7 @@ void take_parameters_back(World &w, const Staged &t, size_t n) noexcept {
   while (n-- > 0) {
     Body &b = *w.bodies[n];
     if (!t.bodies[n].made && t.bodies[n].model.params != b.model.params)
-      b.model.call("set_params",
-                   [&] { return b.model.ops->set_params(b.model.self, b.model.params.data()); });
+      b.model.put_params(b.model.params, 0);
   }
 }
 
@@ -594,14 +593,15 @@ void take_parameters_back(World &w, const Staged &t, size_t n) noexcept {
 void put_parameters(World &w, Staged &t) {
   for (size_t i = 0; i < w.bodies.size(); ++i)
     if (StagedBody &other = t.bodies[i]; other.made) {
-      put_parameters(*w.bodies[i], other.made->instance, other.model.params);
+      put_parameters(*w.bodies[i], other.made->instance, *other.made->dynamics, other.model.params);
       other.made->instance.params.swap(other.model.params);
     }
   size_t done = 0;
   try {
     for (; done < w.bodies.size(); ++done)
       if (!t.bodies[done].made)
-        put_parameters(*w.bodies[done], w.bodies[done]->model, t.bodies[done].model.params);
+        put_parameters(*w.bodies[done], w.bodies[done]->model, *w.bodies[done]->dynamics,
+                       t.bodies[done].model.params);
   } catch (...) {
     take_parameters_back(w, t, done);
     throw;
