@@ -1,4 +1,6 @@
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstring>
 #include <mutex>
 #include <new>
@@ -46,10 +48,14 @@ dfm_status with(dfm_ode handle, F &&f) noexcept {
 
 dfm_status missing(const char *what) { return failed(DFM_E_ARG, "argument '%s' is NULL", what); }
 
+// Ends of structs in 0.1: what a caller has that says no more (deform/base.h, "structs of another version").
+constexpr uint32_t kFirstDef = offsetof(dfm_ode_def, version) + sizeof(const char *);
+constexpr uint32_t kFirstStats = offsetof(dfm_ode_stats, ode_seconds) + sizeof(double);
+
 bool same_version(const char *a, const char *b) { return a && std::strncmp(a, b, 5) == 0; }  // "0.16."
 
 dfm_status check_def(const dfm_ode_def &d) {
-  if (d.size < sizeof d)
+  if (d.size < kFirstDef)
     return failed(DFM_E_ARG, "dfm_ode_def: size is %u, expected %zu; start from dfm_ode_def_default()",
                   d.size, sizeof d);
   if (d.real_bytes != sizeof(dReal) || !same_version(d.version, dODE_VERSION))
@@ -71,14 +77,16 @@ dfm_status check_def(const dfm_ode_def &d) {
 
 }  // namespace
 
-dfm_ode_def dfm_ode_def_for(uint32_t real_bytes, const char *version) {
+void dfm_ode_def_default_sized(uint32_t real_bytes, const char *version, uint32_t size, dfm_ode_def *out) {
+  if (!out) return;
   dfm_ode_def d{};
-  d.size = sizeof d;
+  d.size = size;
   d.friction = 0.5;
   d.most_contacts = 8;
   d.real_bytes = real_bytes;
   d.version = version;
-  return d;
+  std::memset(static_cast<void *>(out), 0, size);
+  std::memcpy(static_cast<void *>(out), &d, std::min<size_t>(size, sizeof d));
 }
 
 dfm_status dfm_ode_register(void) {
@@ -140,7 +148,9 @@ dfm_status dfm_ode_trouble(dfm_ode ode, uint32_t *trouble) {
 dfm_status dfm_ode_get_stats(dfm_ode ode, dfm_ode_stats *out) {
   return with(ode, [&](Adapter &a) {
     if (!out) return missing("out");
-    *out = a.stats();
+    dfm_ode_stats s = a.stats();
+    s.size = std::min<uint32_t>(out->size ? out->size : kFirstStats, sizeof s);
+    std::memcpy(static_cast<void *>(out), &s, s.size);
     return dfm_status{DFM_OK};
   });
 }

@@ -56,7 +56,7 @@ def program(text):
     out = [text]
     for declaration in re.findall(r"^DFM_API\b[^;{]*?\bdfm_\w+\s*\([^;{]*\)(?=;)", text, re.M):
         out.append(declaration + " { __builtin_trap(); }")
-    for name in re.findall(r"^static inline dfm_status (dfm_\w+)\s*\(", text, re.M):
+    for name in re.findall(r"^static inline dfm_\w+ (dfm_\w+)\s*\(", text, re.M):
         out.append(f"__typeof__(&{name}) abi_{name} = {name};")
     for name in re.findall(r"^(?:\}|typedef struct \w+ \{[^{}]*\}) (dfm_\w+);", text, re.M):
         out.append(f"const {name} *abi_{name};")

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""What the shared objects export: the library exactly the functions of the public headers, also the inline
-lists, a plugin its entry alone.
+"""What the shared objects export: the library exactly the functions of the public headers, also those that
+are inline because they take sizeof, a plugin its entry alone.
 
 exports.py NM INCLUDE_DIR LIBRARY PLUGIN...
 """
@@ -23,6 +23,7 @@ def declared(include):
         text = re.sub(r"/\*.*?\*/", "", path.read_text(), flags=re.S)
         names |= set(re.findall(r"^DFM_API\b[^;{]*?\b(dfm_\w+)\s*\(", text, re.M))
         names |= set(re.findall(r"^static inline dfm_status (dfm_world_\w+)\s*\(", text, re.M))
+        names |= set(re.findall(r"^static inline dfm_\w+ (dfm_\w+_default)\s*\(", text, re.M))
     return names
 
 

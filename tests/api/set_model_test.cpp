@@ -558,7 +558,7 @@ TEST(Switches, BeginWithADefault_AndMayBeLongerThanThisHeader) {
   struct Later {
     dfm_switch known;
     double added[2];
-  } list[2] = {{d, {7, 7}}, {d, {7, 7}}};
+  } list[2] = {{d, {0, 0}}, {d, {0, 0}}};
   for (Later &l : list) l.known.size = sizeof l;
   list[0].known.type = "corotational_fem";
   list[1].known.type = "linear_fem";

@@ -94,7 +94,8 @@ def threads(tree):
 
 def cpp_complete(tree):
     """deform.hpp (with defs.hpp, models.hpp and result.hpp) calls every function that the public headers
-    declare, ode.hpp those of the binding."""
+    declare, ode.hpp those of the binding. Of a function that is inline because it hands over a sizeof, either
+    name will do."""
     parts_of = ["defs.hpp", "models.hpp", "result.hpp"]
     for folder, name, more in (PUBLIC, "deform.hpp", parts_of), (ODE, "ode.hpp", []):
         wrapper, functions = folder + name, list(declared(tree, folder))
@@ -104,7 +105,7 @@ def cpp_complete(tree):
         parts = [path for path in [wrapper, *(folder + other for other in more)] if path in tree.paths]
         used = set(re.findall(r"\bdfm_\w+", "".join(without_comments(tree.text(path)) for path in parts)))
         for path, line, function in functions:
-            if function not in used:
+            if not {function, function.removesuffix("_sized")} & used:
                 yield wrapper, 1, f"does not reach {function} ({path}:{line}); give it a member"
 
 

@@ -66,6 +66,22 @@ DFM_API dfm_status dfm_file_write(const char *path, const void *bytes, size_t n)
 
 enum { DFM_LOG_DEBUG = 0, DFM_LOG_INFO = 1, DFM_LOG_WARNING = 2, DFM_LOG_ERROR = 3 };
 
+/* ---- structs of another version ---------------------------------------------------------------------------
+ * Structs that start with `size` grow at their end in later versions (but those of which it is said that they
+ * do not: dfm_params, dfm_model_choice). A program goes on with every later library as it was built, and with
+ * an older one as long as it asks for nothing that this does not have:
+ * - What a caller fills in (defs, options): `size` is sizeof in the caller's header. Members that this lacks
+ *   have their defaults. Where it is larger than the library's struct, what the library does not know must
+ *   be zero; else DFM_E_UNSUPPORTED.
+ * - Defaults: dfm_X_default is inline and hands sizeof the caller's struct to dfm_X_default_sized, which
+ *   writes that many bytes and no more: the defaults that the library knows, zero behind them, `size` as
+ *   given. out NULL: nothing.
+ * - What the library fills in: the caller sets `size` to sizeof; the library writes so many bytes at most and
+ *   leaves in `size` how many it has filled in. 0 is the size that the struct had in 0.1.
+ * - Lists: further down.
+ * The library also has a symbol for each of the inline functions, for callers that look functions up by name
+ * without a C compiler: it answers structs as they are in 0.1, in every later version too. */
+
 typedef struct dfm_context dfm_context; /* the only pointer of the API: hooks, loaded plugins, worlds */
 
 /** What a host may lend to the library. Every hook may be NULL: then the library's own is used. */
@@ -87,8 +103,14 @@ typedef struct dfm_context_def {
   const char *plugin_dir; /* NULL: DEFORM_PLUGIN_PATH, then the installed or build directory */
 } dfm_context_def;
 
+/** dfm_context_def_default into a def of any size (base.h). Threads: Any thread. Since 0.1. */
+DFM_API void dfm_context_def_default_sized(uint32_t size, dfm_context_def *out);
 /** Defaults: no hooks, one thread. Threads: Any thread. Since 0.1. */
-DFM_API dfm_context_def dfm_context_def_default(void);
+static inline dfm_context_def dfm_context_def_default(void) {
+  dfm_context_def out;
+  dfm_context_def_default_sized((uint32_t)sizeof out, &out);
+  return out;
+}
 
 /** Creates a context and scans its plugin directories (nothing is opened twice, nothing runs but
  * plugin entries).
@@ -147,9 +169,7 @@ DFM_API const char *dfm_plugin_running(const char **what);
  * - a caller with an older header than the library gets rows of its own size, without the newer members;
  * - a caller with a newer header gets the members that the library knows, and zero in those behind.
  * Where a row starts with `size`, that is the number of bytes that the library has filled in.
- * row_size is a multiple of 8, at least 8; else DFM_E_ARG. The library also has a symbol for each inline
- * function, for callers that look functions up by name without a C compiler: it fills rows as they are in
- * 0.1, in every later version too. */
+ * row_size is a multiple of 8, at least 8; else DFM_E_ARG. */
 
 /* ---- parameters by key --------------------------------------------------------------------------------- */
 typedef struct {
@@ -157,6 +177,7 @@ typedef struct {
   const double *value;
   uint32_t width;
 } dfm_param_value;
+/* Stands in defs, and is the same in every version. */
 typedef struct {
   uint32_t size, n;
   const dfm_param_value *values;

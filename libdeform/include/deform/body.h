@@ -68,8 +68,14 @@ typedef struct dfm_body_def {
   uint32_t reserved;
 } dfm_body_def;
 
+/** dfm_body_def_default into a def of any size (base.h). Threads: Any thread. Since 0.1. */
+DFM_API void dfm_body_def_default_sized(uint32_t size, dfm_body_def *out);
 /** No mesh, model msm, category 1, collides with all. Threads: Any thread. Since 0.1. */
-DFM_API dfm_body_def dfm_body_def_default(void);
+static inline dfm_body_def dfm_body_def_default(void) {
+  dfm_body_def out;
+  dfm_body_def_default_sized((uint32_t)sizeof out, &out);
+  return out;
+}
 /** @return DFM_OK; DFM_E_ARG (which entry, why); DFM_E_UNSUPPORTED no plugin offers the model (lists those
  * that do); DFM_E_NOMEM;
  *          DFM_E_HANDLE. Threads: Not during step. Since 0.1. */

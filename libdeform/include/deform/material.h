@@ -17,8 +17,14 @@ typedef struct dfm_material_def {
   dfm_params extra;
 } dfm_material_def;
 
+/** dfm_material_def_default into a def of any size (base.h). Threads: Any thread. Since 0.1. */
+DFM_API void dfm_material_def_default_sized(uint32_t size, dfm_material_def *out);
 /** 1000 kg/m3, 1e5 Pa, 0.3, undamped. Threads: Any thread. Since 0.1. */
-DFM_API dfm_material_def dfm_material_def_default(void);
+static inline dfm_material_def dfm_material_def_default(void) {
+  dfm_material_def out;
+  dfm_material_def_default_sized((uint32_t)sizeof out, &out);
+  return out;
+}
 /** @return DFM_OK; DFM_E_ARG a value out of range or the name is taken; DFM_E_HANDLE. Threads: Not during
  * step. Since 0.1. */
 DFM_API dfm_status dfm_material_create(dfm_world world, const dfm_material_def *def, dfm_material *out);

@@ -31,9 +31,15 @@ typedef struct dfm_switch {
   dfm_params params;  /* copied */
   double max_jump;    /* J, as in dfm_body_set_model; 0: any jump */
 } dfm_switch;
+/** dfm_switch_default into a def of any size (base.h). Threads: Any thread. Since 0.1. */
+DFM_API void dfm_switch_default_sized(uint32_t size, dfm_switch *out);
 /** At t = 0, to no model, any jump, the integrator that the body was made with. Threads: Any thread.
  * Since 0.1. */
-DFM_API dfm_switch dfm_switch_default(void);
+static inline dfm_switch dfm_switch_default(void) {
+  dfm_switch out;
+  dfm_switch_default_sized((uint32_t)sizeof out, &out);
+  return out;
+}
 /** The changes to come, in place of those that were to come. They are made before the step (or the
  * equilibrium) that begins at their time, and stay made where that step is discarded. Their models are made
  * now, and two of them kept: what could never be made is refused now, and a change costs no more than the
@@ -66,8 +72,14 @@ typedef struct dfm_switch_rule {
   double wait;     /* s for which nothing calls for a model before the next one in this list; 0.1 */
   double max_jump; /* J, as in dfm_body_set_model; 0: any jump */
 } dfm_switch_rule;
+/** dfm_switch_rule_default into a def of any size (base.h). Threads: Any thread. Since 0.1. */
+DFM_API void dfm_switch_rule_default_sized(uint32_t size, dfm_switch_rule *out);
 /** No models, the values said above. Threads: Any thread. Since 0.1. */
-DFM_API dfm_switch_rule dfm_switch_rule_default(void);
+static inline dfm_switch_rule dfm_switch_rule_default(void) {
+  dfm_switch_rule out;
+  dfm_switch_rule_default_sized((uint32_t)sizeof out, &out);
+  return out;
+}
 /** Has the model of the body follow a rule, which is looked at before each step, after the changes by time: a
  * model further up in dfm_switch_rule is taken at once, one further down after `wait`. A change that is
  * refused is told once and tried again after `wait`; a body that sleeps keeps its model. What the rule has

@@ -43,8 +43,14 @@ typedef struct dfm_obstacle_def {
   uint32_t cells;
   uint32_t reserved2;
 } dfm_obstacle_def;
+/** dfm_obstacle_def_default into a def of any size (base.h). Threads: Any thread. Since 0.1. */
+DFM_API void dfm_obstacle_def_default_sized(uint32_t size, dfm_obstacle_def *out);
 /** A plane z = 0 that looks up, at rest, category 1, collides with all. Threads: Any thread. Since 0.1. */
-DFM_API dfm_obstacle_def dfm_obstacle_def_default(void);
+static inline dfm_obstacle_def dfm_obstacle_def_default(void) {
+  dfm_obstacle_def out;
+  dfm_obstacle_def_default_sized((uint32_t)sizeof out, &out);
+  return out;
+}
 /** @return DFM_OK; DFM_E_ARG (which entry, why); DFM_E_NOMEM; DFM_E_HANDLE. Threads: Not during
  * step. Since 0.1. */
 DFM_API dfm_status dfm_obstacle_create(dfm_world world, const dfm_obstacle_def *def, dfm_obstacle *out);

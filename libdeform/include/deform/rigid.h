@@ -147,9 +147,15 @@ DFM_API dfm_status dfm_rigid_host_register(const char *name, const dfm_rigid_hos
 
 /* ---- bodies -------------------------------------------------------------------------------------------- */
 
+/** dfm_rigid_def_default into a def of any size (base.h). Threads: Any thread. Since 0.1. */
+DFM_API void dfm_rigid_def_default_sized(uint32_t size, dfm_rigid_def *out);
 /** A ball of 1 kg and radius 0.5 m at the origin, category 1, collides with all. Threads: Any
  * thread. Since 0.1. */
-DFM_API dfm_rigid_def dfm_rigid_def_default(void);
+static inline dfm_rigid_def dfm_rigid_def_default(void) {
+  dfm_rigid_def out;
+  dfm_rigid_def_default_sized((uint32_t)sizeof out, &out);
+  return out;
+}
 /** Makes a set of bodies. A dfm_rigid is a dfm_obstacle too: poses, defs, rays, pair rules and reports take
  * it; it moves by itself only.
  * @param host  "builtin" or a registered name; NULL: "builtin"

@@ -84,8 +84,14 @@ typedef struct dfm_world_def {
   double step;
 } dfm_world_def;
 
+/** dfm_world_def_default into a def of any size (base.h). Threads: Any thread. Since 0.1. */
+DFM_API void dfm_world_def_default_sized(uint32_t size, dfm_world_def *out);
 /** Gravity (0,0,-9.81), everything automatic. Threads: Any thread. Since 0.1. */
-DFM_API dfm_world_def dfm_world_def_default(void);
+static inline dfm_world_def dfm_world_def_default(void) {
+  dfm_world_def out;
+  dfm_world_def_default_sized((uint32_t)sizeof out, &out);
+  return out;
+}
 /** @return DFM_OK; DFM_E_ARG a value out of range or an effect that nothing loaded provides; DFM_E_NOMEM.
  * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_create(dfm_context *context, const dfm_world_def *def, dfm_world *out);
@@ -159,8 +165,14 @@ typedef struct dfm_equilibrium_info {
   uint64_t iterations; /* linear solves, of all bodies and load steps; with contact, steps from rest */
   double residual;     /* of the last load step: N left per N of the largest load or reaction, worst body */
 } dfm_equilibrium_info;
+/** dfm_equilibrium_def_default into a def of any size (base.h). Threads: Any thread. Since 0.1. */
+DFM_API void dfm_equilibrium_def_default_sized(uint32_t size, dfm_equilibrium_def *out);
 /** One load step, from no load to all of it, no time passes. Threads: Any thread. Since 0.1. */
-DFM_API dfm_equilibrium_def dfm_equilibrium_def_default(void);
+static inline dfm_equilibrium_def dfm_equilibrium_def_default(void) {
+  dfm_equilibrium_def out;
+  dfm_equilibrium_def_default_sized((uint32_t)sizeof out, &out);
+  return out;
+}
 /** Moves all bodies to where their inner forces, contact and friction balance gravity, loads and springs,
  * with held points and obstacles where they are told to be; velocities are zero then
  * (doc/concepts/static.md). What relaxes or flows has done so. dfm_world_interrupt stops a search with

@@ -15,13 +15,9 @@ using dfm::used;
 namespace {
 
 dfm_context_def checked(const dfm_context_def *given) {
-  dfm_context_def def = dfm_context_def_default();
-  if (!given) return def;
-  if (given->size < offsetof(dfm_context_def, alloc))
+  if (given && given->size < offsetof(dfm_context_def, alloc))
     fail(DFM_E_ARG, "dfm_context_def.size is %u; start from dfm_context_def_default()", given->size);
-  std::memset(&def, 0, sizeof def);
-  std::memcpy(&def, given, std::min<size_t>(given->size, sizeof def));
-  def.size = sizeof def;
+  const dfm_context_def def = dfm::take_def(given, dfm_context_def_default());
   if (!def.alloc != !def.release)
     fail(DFM_E_ARG, "the hooks alloc and release go together; %s is missing",
          def.alloc ? "release" : "alloc");
@@ -92,11 +88,11 @@ dfm_status dfm_file_write(const char *path, const void *bytes, size_t n) {
   });
 }
 
-dfm_context_def dfm_context_def_default(void) {
+void dfm_context_def_default_sized(uint32_t size, dfm_context_def *out) {
   dfm_context_def def{};
   def.size = sizeof def;
   def.threads = 1;
-  return def;
+  dfm::give_default(size, out, def);
 }
 
 dfm_status dfm_context_create(const dfm_context_def *def, dfm_context **out) {

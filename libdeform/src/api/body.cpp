@@ -109,19 +109,24 @@ Spring make_spring(const Body &b, const dfm_spring_def &d) {
 
 }  // namespace
 
-dfm_body_def dfm_body_def_default(void) {
+void dfm_body_def_default_sized(uint32_t size, dfm_body_def *out) {
   dfm_body_def d{};
   d.size = sizeof d;
   d.category = 1;
   d.collides_with = ~0u;
-  return d;
+  dfm::give_default(size, out, d);
 }
 
 dfm_status dfm_body_create(dfm_world world, const dfm_body_def *def, dfm_body *out) {
   return as_status([&] {
     World &w = exclusive(world_of(world));
     need(out, "out");
-    *out = create_body(w, take_def(def, dfm_body_def_default())).handle;
+    dfm_body_def own = take_def(def, dfm_body_def_default());
+    dfm_surface_def surface;
+    dfm_surface_groups groups;
+    take_pointed(own.surface, surface);
+    take_pointed(own.groups, groups);
+    *out = create_body(w, own).handle;
   });
 }
 

@@ -9,13 +9,13 @@
 
 using namespace dfm;
 
-dfm_material_def dfm_material_def_default(void) {
+void dfm_material_def_default_sized(uint32_t size, dfm_material_def *out) {
   dfm_material_def d{};
   d.size = sizeof d;
   d.density = 1000;
   d.young = 1e5;
   d.poisson = 0.3;
-  return d;
+  dfm::give_default(size, out, d);
 }
 
 dfm_status dfm_material_create(dfm_world world, const dfm_material_def *def, dfm_material *out) {

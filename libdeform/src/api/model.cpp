@@ -100,15 +100,15 @@ dfm_status dfm_body_set_switches(dfm_body body, uint32_t n, const dfm_switch *sw
   });
 }
 
-dfm_switch dfm_switch_default(void) {
+void dfm_switch_default_sized(uint32_t size, dfm_switch *out) {
   dfm_switch s{};
   s.size = sizeof s;
   s.integrator = DFM_INTEGRATOR_AUTO;
   s.params.size = sizeof s.params;
-  return s;
+  dfm::give_default(size, out, s);
 }
 
-dfm_switch_rule dfm_switch_rule_default(void) {
+void dfm_switch_rule_default_sized(uint32_t size, dfm_switch_rule *out) {
   dfm_switch_rule r{};
   r.size = sizeof r;
   for (dfm_model_choice *c : {&r.touching, &r.near_by, &r.otherwise}) {
@@ -117,7 +117,7 @@ dfm_switch_rule dfm_switch_rule_default(void) {
   }
   r.hysteresis = 0.1;
   r.wait = 0.1;
-  return r;
+  dfm::give_default(size, out, r);
 }
 
 dfm_status dfm_body_set_switch_rule(dfm_body body, const dfm_switch_rule *rule) {

@@ -1,9 +1,7 @@
 // Handles to objects for the files of api/: each throws Error(DFM_E_HANDLE).
 #pragma once
-#include <cstring>
-#include <vector>
-
 #include "api/as_status.h"
+#include "api/structs.h"
 #include "core/handle.h"
 #include "state/world.h"
 
@@ -51,48 +49,6 @@ inline dfm_context &used(dfm_context &context) {
 inline dfm_context &exclusive(dfm_context &context) {
   Call::now().need_alone(&context, "context");
   return used(context);
-}
-
-// The part of a def that the caller's version of the struct has; the rest keeps its default.
-template <class T>
-T take_def(const T *given, const T &defaults) {
-  T def = defaults;
-  if (!given) return def;
-  if (given->size < 2 * sizeof(uint32_t))
-    fail(DFM_E_ARG, "a def's size is %u; start from its _default() function", given->size);
-  std::memcpy(static_cast<void *>(&def), given, given->size < sizeof(T) ? given->size : sizeof(T));
-  def.size = sizeof(T);
-  return def;
-}
-
-// Defs that lie side by side, as far apart as the first one's size says: the caller's header may be
-// older or newer.
-template <class T>
-std::vector<T> take_defs(const T *given, uint32_t n, const T &defaults, const char *what, const char *from) {
-  constexpr uint32_t kMost = 4096;  // no header has such a def: a size that nobody has set
-  std::vector<T> defs;
-  if (!given || n == 0) return defs;
-  const uint32_t step = given->size;
-  if (step < 2 * sizeof(uint32_t) || step % alignof(T) != 0 || step > kMost)
-    fail(DFM_E_ARG, "%s 0: size is %u, expected %zu; %s", what, step, sizeof(T), from);
-  defs.reserve(n);
-  for (uint32_t i = 0; i < n; ++i) {
-    const T *const at =
-        reinterpret_cast<const T *>(reinterpret_cast<const unsigned char *>(given) + size_t{step} * i);
-    if (at->size != step)
-      fail(DFM_E_ARG, "%s %u: size is %u, that of the first is %u; %s", what, i, at->size, step, from);
-    defs.push_back(take_def(at, defaults));
-  }
-  return defs;
-}
-
-// Fills the part of an out struct that the caller's version has. size 0: taken as today's size.
-template <class T>
-void give(T *out, T value) {
-  if (!out) fail(DFM_E_ARG, "the out argument is NULL");
-  const uint32_t size = out->size && out->size < sizeof(T) ? out->size : static_cast<uint32_t>(sizeof(T));
-  value.size = size;
-  std::memcpy(static_cast<void *>(out), &value, size);
 }
 
 inline void need(const void *p, const char *name) {

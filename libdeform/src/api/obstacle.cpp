@@ -11,7 +11,7 @@
 
 using namespace dfm;
 
-dfm_obstacle_def dfm_obstacle_def_default(void) {
+void dfm_obstacle_def_default_sized(uint32_t size, dfm_obstacle_def *out) {
   dfm_obstacle_def d{};
   d.size = sizeof d;
   d.half_size[0] = d.half_size[1] = d.half_size[2] = 0.5;
@@ -19,7 +19,7 @@ dfm_obstacle_def dfm_obstacle_def_default(void) {
   d.half_length = 0.5;
   d.category = 1;
   d.collides_with = ~0u;
-  return d;
+  dfm::give_default(size, out, d);
 }
 
 dfm_status dfm_obstacle_create(dfm_world world, const dfm_obstacle_def *def, dfm_obstacle *out) {

@@ -26,11 +26,11 @@ dfm_status dfm_rigid_host_register(const char *name, const dfm_rigid_host *table
   return as_status([&] {
     need(name, "name");
     need(table, "table");
-    register_host(name, take_def(table, dfm_rigid_host{}));
+    register_host(name, take_known(table, dfm_rigid_host{}));
   });
 }
 
-dfm_rigid_def dfm_rigid_def_default(void) {
+void dfm_rigid_def_default_sized(uint32_t size, dfm_rigid_def *out) {
   dfm_rigid_def d{};
   d.size = sizeof d;
   d.shape = 1;  // DFM_SHAPE_SPHERE
@@ -40,7 +40,7 @@ dfm_rigid_def dfm_rigid_def_default(void) {
   d.mass = 1;
   d.category = 1;
   d.collides_with = ~0u;
-  return d;
+  dfm::give_default(size, out, d);
 }
 
 dfm_status dfm_rigid_create(dfm_world world, const char *host, const dfm_rigid_set_def *set, dfm_rigid *out) {

@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "api/as_status.h"
+#include "api/structs.h"
 #include "ccd/toi.h"
 
 namespace dfm {
@@ -16,9 +17,10 @@ dfm_toi_options checked(const char *function, const dfm_toi_options *given) {
   o.method = DFM_TOI_CONSERVATIVE;
   if (!given) return o;
   const uint32_t least = offsetof(dfm_toi_options, tolerance);
-  if (given->size < least)
+  if (given->size < least || given->size > kMostDef)
     fail(DFM_E_ARG, "%s: options.size is %u, at least %u expected; set it to sizeof", function, given->size,
          least);
+  refuse_unknown(given);
   std::memcpy(&o, given, std::min<size_t>(given->size, sizeof o));
   if (o.method < DFM_TOI_BISECTION || o.method > DFM_TOI_CONSERVATIVE)
     fail(DFM_E_ARG, "%s: options.method is %d, expected DFM_TOI_BISECTION (0) to DFM_TOI_CONSERVATIVE (3)",

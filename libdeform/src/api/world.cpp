@@ -105,7 +105,7 @@ void choose_integrator(World &w) {
 
 }  // namespace
 
-dfm_world_def dfm_world_def_default(void) {
+void dfm_world_def_default_sized(uint32_t size, dfm_world_def *out) {
   dfm_world_def d{};
   d.size = sizeof d;
   d.gravity[2] = -9.81;
@@ -115,7 +115,7 @@ dfm_world_def dfm_world_def_default(void) {
   d.sleep_speed = 0.01;
   d.sleep_time = 0.5;
   d.energy_watch = 0.01;
-  return d;
+  dfm::give_default(size, out, d);
 }
 
 dfm_status dfm_world_create(dfm_context *context, const dfm_world_def *def, dfm_world *out) {
@@ -235,12 +235,12 @@ dfm_status dfm_world_step(dfm_world world, double dt, uint32_t *trouble) {
   });
 }
 
-dfm_equilibrium_def dfm_equilibrium_def_default(void) {
+void dfm_equilibrium_def_default_sized(uint32_t size, dfm_equilibrium_def *out) {
   dfm_equilibrium_def d{};
   d.size = sizeof d;
   d.load_steps = 1;
   d.load_to = 1;
-  return d;
+  dfm::give_default(size, out, d);
 }
 
 dfm_status dfm_world_equilibrium(dfm_world world, const dfm_equilibrium_def *def,

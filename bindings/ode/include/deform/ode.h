@@ -48,10 +48,15 @@ typedef struct dfm_ode_stats {
   double sync_seconds, ode_seconds;
 } dfm_ode_stats;
 
+/** dfm_ode_def_default into a def of any size (base.h). @param real_bytes, version  of the caller's ODE.
+ * Threads: Any thread. Since 0.1. */
+DFM_API void dfm_ode_def_default_sized(uint32_t real_bytes, const char *version, uint32_t size,
+                                       dfm_ode_def *out);
 /** World and space NULL, no callback, friction 0.5. Threads: Any thread. Since 0.1. */
-DFM_API dfm_ode_def dfm_ode_def_for(uint32_t real_bytes, const char *version);
 static inline dfm_ode_def dfm_ode_def_default(void) {
-  return dfm_ode_def_for((uint32_t)sizeof(dReal), dODE_VERSION);
+  dfm_ode_def out;
+  dfm_ode_def_default_sized((uint32_t)sizeof(dReal), dODE_VERSION, (uint32_t)sizeof out, &out);
+  return out;
 }
 /** @return DFM_OK; DFM_E_ARG; DFM_E_STATE world or space has an adapter already; DFM_E_UNSUPPORTED this ODE
  * is of single precision or of another version than the one that libdeform_ode was built with; DFM_E_HANDLE;

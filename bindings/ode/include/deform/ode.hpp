@@ -14,7 +14,7 @@ namespace deform {
 
 // dfm_ode_def_default().
 struct OdeDef : dfm_ode_def {
-  OdeDef() noexcept : dfm_ode_def(dfm_ode_def_for(sizeof(dReal), dODE_VERSION)) {}
+  OdeDef() noexcept : dfm_ode_def(dfm_ode_def_default()) {}
 };
 struct OdeGeom : dfm_ode_geom {
   OdeGeom() noexcept : dfm_ode_geom(sized<dfm_ode_geom>()) {}

@@ -1,0 +1,42 @@
+// What the structs of the C API were in 0.1. It stands here by name, since sizeof grows with the structs: a
+// caller that says no size has these, and so do the symbols for callers without a C compiler.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+
+#include "deform/deform.h"
+
+namespace dfm {
+
+template <class T>
+inline constexpr uint32_t kFirstSize = 0;
+
+// last: the member with which the struct ended in 0.1; never another one.
+#define DFM_ENDED_WITH(type, last)                                                              \
+  template <>                                                                                   \
+  inline constexpr uint32_t kFirstSize<type> =                                                  \
+      (offsetof(type, last) + sizeof(static_cast<type *>(nullptr)->last) + alignof(type) - 1) / \
+      alignof(type) * alignof(type);
+DFM_ENDED_WITH(dfm_context_def, plugin_dir)
+DFM_ENDED_WITH(dfm_world_def, step)
+DFM_ENDED_WITH(dfm_equilibrium_def, reserved)
+DFM_ENDED_WITH(dfm_material_def, extra)
+DFM_ENDED_WITH(dfm_obstacle_def, reserved2)
+DFM_ENDED_WITH(dfm_rigid_def, user)
+DFM_ENDED_WITH(dfm_body_def, reserved)
+DFM_ENDED_WITH(dfm_surface_def, support)
+DFM_ENDED_WITH(dfm_surface_groups, group)
+DFM_ENDED_WITH(dfm_switch, max_jump)
+DFM_ENDED_WITH(dfm_switch_rule, max_jump)
+DFM_ENDED_WITH(dfm_body_info, user)
+DFM_ENDED_WITH(dfm_law_info, params)
+DFM_ENDED_WITH(dfm_equilibrium_info, residual)
+DFM_ENDED_WITH(dfm_body_measure, contact_impulse)
+DFM_ENDED_WITH(dfm_world_stats, energy_gain)
+DFM_ENDED_WITH(dfm_tetmesh_info, warnings)
+DFM_ENDED_WITH(dfm_trimesh_info, warnings)
+DFM_ENDED_WITH(dfm_ray_hit, normal)
+DFM_ENDED_WITH(dfm_scene_settings, has_camera)
+#undef DFM_ENDED_WITH
+
+}  // namespace dfm

@@ -1,0 +1,76 @@
+// What is inline in the headers because it takes sizeof of the caller's structs, lists and defaults, as
+// symbols of the library: for callers that look functions up by name without a C compiler and so have no
+// sizeof. Structs are those of 0.1 and stay so.
+//
+// In this file the headers' inline functions have other names.
+#define dfm_world_contacts contacts_inline
+#define dfm_world_pairs pairs_inline
+#define dfm_world_pair_impulses pair_impulses_inline
+#define dfm_world_events events_inline
+#define dfm_world_overlaps overlaps_inline
+#define dfm_world_profile profile_inline
+#define dfm_world_swaps swaps_inline
+#define dfm_context_def_default context_def_inline
+#define dfm_world_def_default world_def_inline
+#define dfm_equilibrium_def_default equilibrium_def_inline
+#define dfm_material_def_default material_def_inline
+#define dfm_obstacle_def_default obstacle_def_inline
+#define dfm_rigid_def_default rigid_def_inline
+#define dfm_body_def_default body_def_inline
+#define dfm_switch_default switch_inline
+#define dfm_switch_rule_default switch_rule_inline
+#include "api/first_size.h"
+#undef dfm_world_contacts
+#undef dfm_world_pairs
+#undef dfm_world_pair_impulses
+#undef dfm_world_events
+#undef dfm_world_overlaps
+#undef dfm_world_profile
+#undef dfm_world_swaps
+#undef dfm_context_def_default
+#undef dfm_world_def_default
+#undef dfm_equilibrium_def_default
+#undef dfm_material_def_default
+#undef dfm_obstacle_def_default
+#undef dfm_rigid_def_default
+#undef dfm_body_def_default
+#undef dfm_switch_default
+#undef dfm_switch_rule_default
+
+// bytes: of a row in 0.1.
+#define DFM_LIST_SYMBOL(name, row, bytes)                                                         \
+  extern "C" DFM_API dfm_status name(dfm_world world, uint32_t capacity, row *out, uint32_t *n) { \
+    return name##_sized(world, bytes, capacity, out, n);                                          \
+  }
+DFM_LIST_SYMBOL(dfm_world_contacts, dfm_contact, 192)
+DFM_LIST_SYMBOL(dfm_world_pairs, dfm_pair_report, 128)
+DFM_LIST_SYMBOL(dfm_world_pair_impulses, dfm_pair_impulse, 104)
+DFM_LIST_SYMBOL(dfm_world_events, dfm_contact_event, 40)
+DFM_LIST_SYMBOL(dfm_world_overlaps, dfm_overlap, 40)
+DFM_LIST_SYMBOL(dfm_world_profile, dfm_stage_time, 24)
+DFM_LIST_SYMBOL(dfm_world_swaps, dfm_swap, 64)
+
+namespace {
+// As many bytes come back in memory, as the struct of 0.1 does, and no more where the struct has grown.
+template <class T>
+struct First {
+  alignas(T) unsigned char bytes[dfm::kFirstSize<T>];
+};
+}  // namespace
+
+#define DFM_DEFAULT_SYMBOL(type)                                           \
+  extern "C" DFM_API First<type> type##_default(void) {                    \
+    First<type> out;                                                       \
+    static_assert(sizeof out == dfm::kFirstSize<type> && sizeof out > 16); \
+    type##_default_sized(sizeof out, reinterpret_cast<type *>(out.bytes)); \
+    return out;                                                            \
+  }
+DFM_DEFAULT_SYMBOL(dfm_context_def)
+DFM_DEFAULT_SYMBOL(dfm_world_def)
+DFM_DEFAULT_SYMBOL(dfm_equilibrium_def)
+DFM_DEFAULT_SYMBOL(dfm_material_def)
+DFM_DEFAULT_SYMBOL(dfm_obstacle_def)
+DFM_DEFAULT_SYMBOL(dfm_rigid_def)
+DFM_DEFAULT_SYMBOL(dfm_body_def)
+DFM_DEFAULT_SYMBOL(dfm_switch)
+DFM_DEFAULT_SYMBOL(dfm_switch_rule)

@@ -1,0 +1,97 @@
+// Structs of callers whose header may be older or newer than the library (base.h, "structs of another
+// version").
+#pragma once
+#include <algorithm>
+#include <cstring>
+#include <vector>
+
+#include "api/first_size.h"
+#include "core/error.h"
+
+namespace dfm {
+
+// No header has such a def: a size that nobody has set.
+constexpr uint32_t kMostDef = 4096;
+
+// A caller with a newer header may not ask for what this library would pass over in silence.
+template <class T>
+void refuse_unknown(const T *given) {
+  const unsigned char *const bytes = reinterpret_cast<const unsigned char *>(given);
+  for (size_t i = sizeof(T); i < given->size; ++i)
+    if (bytes[i])
+      fail(DFM_E_UNSUPPORTED,
+           "a def has %u bytes, of which this library (%d.%d.%d) knows %zu, and byte %zu is set: the program "
+           "was "
+           "compiled for a newer library; run it with that one, or leave the def's newer members zero",
+           given->size, DFM_VERSION_MAJOR, DFM_VERSION_MINOR, DFM_VERSION_PATCH, sizeof(T), i);
+}
+
+// The part of a def that the caller's version of the struct has; the rest keeps its default.
+template <class T>
+T take_known(const T *given, const T &defaults) {
+  T def = defaults;
+  if (!given) return def;
+  if (given->size < 2 * sizeof(uint32_t) || given->size > kMostDef)
+    fail(DFM_E_ARG, "a def's size is %u; start from its _default() function", given->size);
+  std::memcpy(static_cast<void *>(&def), given, given->size < sizeof(T) ? given->size : sizeof(T));
+  def.size = sizeof(T);
+  return def;
+}
+// And nothing beyond it.
+template <class T>
+T take_def(const T *given, const T &defaults) {
+  const T def = take_known(given, defaults);
+  if (given) refuse_unknown(given);
+  return def;
+}
+
+// Defs that lie side by side, as far apart as the first one's size says: the caller's header may be
+// older or newer.
+template <class T>
+std::vector<T> take_defs(const T *given, uint32_t n, const T &defaults, const char *what, const char *from) {
+  std::vector<T> defs;
+  if (!given || n == 0) return defs;
+  const uint32_t step = given->size;
+  if (step < 2 * sizeof(uint32_t) || step % alignof(T) != 0 || step > kMostDef)
+    fail(DFM_E_ARG, "%s 0: size is %u, expected %zu; %s", what, step, sizeof(T), from);
+  defs.reserve(n);
+  for (uint32_t i = 0; i < n; ++i) {
+    const T *const at =
+        reinterpret_cast<const T *>(reinterpret_cast<const unsigned char *>(given) + size_t{step} * i);
+    if (at->size != step)
+      fail(DFM_E_ARG, "%s %u: size is %u, that of the first is %u; %s", what, i, at->size, step, from);
+    defs.push_back(take_def(at, defaults));
+  }
+  return defs;
+}
+
+// One that a def points to: of this library's size too, in `own`. What was never so short is left as it is,
+// for who reads it to refuse by its name.
+template <class T>
+void take_pointed(const T *&given, T &own) {
+  if (!given || given->size < kFirstSize<T>) return;
+  own = take_def(given, T{});
+  given = &own;
+}
+
+// A def's defaults, as long as the caller's version of the struct is: zero behind what this one knows.
+template <class T>
+void give_default(uint32_t size, T *out, const T &value) noexcept {
+  if (!out) return;
+  std::memset(static_cast<void *>(out), 0, size);
+  std::memcpy(static_cast<void *>(out), &value, std::min<size_t>(size, sizeof(T)));
+  if (size >= sizeof out->size) out->size = size;
+}
+
+// Fills the part of an out struct that the caller's version has. size 0: that of 0.1.
+template <class T>
+void give(T *out, T value) {
+  static_assert(kFirstSize<T> != 0 && kFirstSize<T> <= sizeof(T));
+  if (!out) fail(DFM_E_ARG, "the out argument is NULL");
+  const uint32_t asked = out->size ? out->size : kFirstSize<T>;
+  const uint32_t size = std::min(asked, static_cast<uint32_t>(sizeof(T)));
+  value.size = size;
+  std::memcpy(static_cast<void *>(out), &value, size);
+}
+
+}  // namespace dfm

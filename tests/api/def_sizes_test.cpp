@@ -1,0 +1,171 @@
+// Structs of callers whose header is older or newer than the library: defaults, defs, reports (base.h,
+// "structs of another version"). Lists are in list_rows_test.
+#include <cmath>
+#include <cstring>
+
+#include "world.h"
+
+// The symbols, past the inline functions of the headers.
+extern "C" {
+dfm_context_def context_symbol(void) __asm__("dfm_context_def_default");
+dfm_world_def world_symbol(void) __asm__("dfm_world_def_default");
+dfm_equilibrium_def equilibrium_symbol(void) __asm__("dfm_equilibrium_def_default");
+dfm_material_def material_symbol(void) __asm__("dfm_material_def_default");
+dfm_obstacle_def obstacle_symbol(void) __asm__("dfm_obstacle_def_default");
+dfm_rigid_def rigid_symbol(void) __asm__("dfm_rigid_def_default");
+dfm_body_def body_symbol(void) __asm__("dfm_body_def_default");
+dfm_switch switch_symbol(void) __asm__("dfm_switch_default");
+dfm_switch_rule rule_symbol(void) __asm__("dfm_switch_rule_default");
+}
+
+namespace {
+
+constexpr unsigned char kUntouched = 0xa5;
+using Bytes = std::vector<unsigned char>;
+
+// Each def with the bytes that it had in 0.1.
+template <class F>
+void each_default(F f) {
+  f(dfm_context_def_default(), dfm_context_def_default_sized, context_symbol, 72, "context");
+  f(dfm_world_def_default(), dfm_world_def_default_sized, world_symbol, 184, "world");
+  f(dfm_equilibrium_def_default(), dfm_equilibrium_def_default_sized, equilibrium_symbol, 48, "equilibrium");
+  f(dfm_material_def_default(), dfm_material_def_default_sized, material_symbol, 72, "material");
+  f(dfm_obstacle_def_default(), dfm_obstacle_def_default_sized, obstacle_symbol, 248, "obstacle");
+  f(dfm_rigid_def_default(), dfm_rigid_def_default_sized, rigid_symbol, 224, "rigid");
+  f(dfm_body_def_default(), dfm_body_def_default_sized, body_symbol, 256, "body");
+  f(dfm_switch_default(), dfm_switch_default_sized, switch_symbol, 48, "switch");
+  f(dfm_switch_rule_default(), dfm_switch_rule_default_sized, rule_symbol, 160, "switch rule");
+}
+
+template <class T>
+Bytes bytes_of(const T &def) {
+  Bytes out(sizeof def);
+  std::memcpy(out.data(), &def, sizeof def);
+  return out;
+}
+
+// What a caller with a struct of that size must find in it.
+Bytes expected_of(Bytes defaults, uint32_t size) {
+  defaults.resize(size, 0);
+  std::memcpy(defaults.data(), &size, std::min<size_t>(size, sizeof size));
+  return defaults;
+}
+
+// A def as a caller with another header has it, size included.
+template <class T>
+struct Aged {
+  Bytes bytes;
+  Aged(const T &def, uint32_t size) : bytes(expected_of(bytes_of(def), size)) {}
+  const T *get() const { return reinterpret_cast<const T *>(bytes.data()); }
+};
+
+TEST(DefSizes, DefaultsOfAnOlderOrANewerHeader_FillItsStructAndNothingBehind) {
+  each_default([](const auto &defaults, auto sized, auto, uint32_t first, const char *name) {
+    SCOPED_TRACE(name);
+    using T = std::remove_cvref_t<decltype(defaults)>;
+    const uint32_t known = sizeof(T);
+    EXPECT_EQ(first, known) << "it has grown: this number stays, and the next line takes the new size";
+    EXPECT_EQ(defaults.size, known);
+    for (const uint32_t size : {0u, 4u, 8u, first - 8, first, known + 8, known + 256}) {
+      SCOPED_TRACE(size);
+      Bytes out(size_t{size} + 64, kUntouched);
+      sized(size, reinterpret_cast<T *>(out.data()));
+      for (size_t i = size; i < out.size(); ++i) ASSERT_EQ(out[i], kUntouched) << "byte " << i;
+      out.resize(size);
+      EXPECT_EQ(out, expected_of(bytes_of(defaults), size));
+    }
+    sized(known, nullptr);
+  });
+}
+
+TEST(DefSizes, DefaultsBySymbolAlone_AreThoseOfTheFirstVersion) {
+  each_default([](const auto &defaults, auto, auto symbol, uint32_t first, const char *name) {
+    SCOPED_TRACE(name);
+    const auto found = symbol();
+    EXPECT_EQ(found.size, first);
+    EXPECT_EQ(std::memcmp(&found, &defaults, first), 0);
+  });
+}
+
+// In place of members that it does not have, a program that is older than the library has their defaults: a
+// world of a def that ends before max_sweeps does not solve contact with none.
+TEST(DefSizes, DefOfAnOlderHeader_HasTheDefaultsOfWhatItLacks) {
+  test::Context c;
+  const auto falls = [&](const dfm_world_def *def) {
+    dfm_world w = 0;
+    EXPECT_EQ(dfm_world_create(c, def, &w), DFM_OK) << dfm_last_error();
+    test::add_plane(w, "floor", {0, 0, 0});
+    const dfm_body b = test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 30, {});
+    test::run(w, 0.2, 1e-3);
+    return test::measure(b).com[2];
+  };
+  const dfm_world_def whole = dfm_world_def_default();
+  const Aged<dfm_world_def> older(whole, offsetof(dfm_world_def, max_sweeps)),
+      newer(whole, sizeof whole + 64);
+  const double expected = falls(&whole);
+  EXPECT_EQ(falls(older.get()), expected);
+  EXPECT_EQ(falls(newer.get()), expected);
+}
+
+// What a newer program asks for and this library does not know is not passed over in silence.
+TEST(DefSizes, WishOfANewerHeader_IsRefused) {
+  test::Context c;
+  const dfm_world_def whole = dfm_world_def_default();
+  Aged<dfm_world_def> newer(whole, sizeof whole + 16);
+  newer.bytes[sizeof whole + 11] = 1;
+  dfm_world w = 0;
+  EXPECT_EQ(dfm_world_create(c, newer.get(), &w), DFM_E_UNSUPPORTED);
+  test::says({"200 bytes", "knows 184", "byte 195 is set", "newer"});
+  EXPECT_EQ(w, 0u);
+  newer = Aged<dfm_world_def>(whole, 4096 + 8);
+  EXPECT_EQ(dfm_world_create(c, newer.get(), &w), DFM_E_ARG) << "no def is so long: a size that nobody set";
+  const double point[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
+  const uint32_t cell[] = {0, 1, 2, 3}, skin[] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
+  const dfm_surface_def surface = {sizeof surface, DFM_COUPLING_BARYCENTRIC, 4, 4, point, skin, 0};
+  dfm_body_def def = dfm_body_def_default();
+  def.npoint = 4;
+  def.points = point;
+  def.ntet = 1;
+  def.tets = cell;
+  Aged<dfm_surface_def> own(surface, sizeof surface + 8);
+  def.surface = own.get();
+  dfm_body b = 0;
+  const dfm_world made = test::make_world(c);
+  EXPECT_EQ(dfm_body_create(made, &def, &b), DFM_OK) << dfm_last_error();
+  own.bytes.back() = 1;
+  EXPECT_EQ(dfm_body_create(made, &def, &b), DFM_E_UNSUPPORTED);
+  test::says({"byte 47 is set"});
+}
+
+template <class T, class F>
+void check_report(F ask, uint32_t first, const char *name) {
+  SCOPED_TRACE(name);
+  EXPECT_EQ(first, sizeof(T)) << "it has grown: this number stays, and the next line takes the new size";
+  for (const uint32_t asked : {0u, 8u, first - 8, first, uint32_t(sizeof(T)) + 32}) {
+    SCOPED_TRACE(asked);
+    Bytes out(sizeof(T) + 128, kUntouched);
+    std::memcpy(out.data(), &asked, sizeof asked);
+    test::ok(ask(reinterpret_cast<T *>(out.data())));
+    uint32_t filled = 0;
+    std::memcpy(&filled, out.data(), sizeof filled);
+    EXPECT_EQ(filled, asked == 0 ? first : std::min<uint32_t>(asked, sizeof(T)));
+    for (size_t i = filled; i < out.size(); ++i) ASSERT_EQ(out[i], kUntouched) << "byte " << i;
+  }
+}
+
+// A caller that says no size has a struct of 0.1, however long the library's own has become.
+TEST(DefSizes, ReportsOfAnOlderOrANewerHeader_SayWhatIsFilled) {
+  test::Context c;
+  const dfm_world w = test::make_world(c);
+  const dfm_body b = test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 30, {});
+  const dfm_obstacle floor = test::add_plane(w, "floor", {0, 0, -1});
+  check_report<dfm_body_measure>([&](auto *out) { return dfm_body_get_measure(b, out); }, 176, "measure");
+  check_report<dfm_body_info>([&](auto *out) { return dfm_body_get_info(b, out); }, 72, "info");
+  check_report<dfm_world_stats>([&](auto *out) { return dfm_world_get_stats(w, out); }, 280, "stats");
+  check_report<dfm_obstacle_def>([&](auto *out) { return dfm_obstacle_get_def(floor, out); }, 248,
+                                 "obstacle");
+  const double from[] = {0, 0, 1}, down[] = {0, 0, -1};
+  check_report<dfm_ray_hit>([&](auto *out) { return dfm_world_ray(w, from, down, 10, out); }, 80, "ray");
+}
+
+}  // namespace
