@@ -10,11 +10,14 @@
 
 namespace cli {
 
-// The row that ABI 1 began with; a smaller one is a plugin's mistake.
+// dfm_slot is 16 bytes in all of ABI 1; longer rows are of another type and say so, smaller ones are a
+// mistake.
 constexpr uint32_t kSlotHead = 16;
+static_assert(sizeof(dfm_slot) == kSlotHead);
 
 inline bool slot_size_sound(uint32_t slot_size) {
-  return slot_size == 0 || (slot_size >= kSlotHead && slot_size <= 65536);
+  return slot_size == 0 ||
+         (slot_size >= kSlotHead && slot_size <= 65536 && slot_size % sizeof(uint32_t) == 0);
 }
 
 // slot_size is sound.

@@ -1,5 +1,8 @@
 // Discovery: what is loaded, from where, and the reason for everything that is not.
+#include <atomic>
+#include <chrono>
 #include <fstream>
+#include <thread>
 
 #include "tiny_support.h"
 
@@ -24,6 +27,72 @@ struct Environment {
   }
   ~Environment() { had ? setenv(name.c_str(), before.c_str(), 1) : unsetenv(name.c_str()); }
 };
+
+// A plugin that fills statics of its own when it is let in, and counts.
+std::atomic<uint32_t> inside{0}, together{0};
+uint32_t entered = 0, left = 0;  // without a lock: who runs two of these at once spoils them
+void pass(uint32_t &count) {
+  if (inside.fetch_add(1) != 0) ++together;
+  const uint32_t before = count;
+  std::this_thread::sleep_for(std::chrono::microseconds(200));
+  count = before + 1;
+  inside.fetch_sub(1);
+}
+const dfm_plugin *counted_entry(const dfm_host *host, uint32_t, uint32_t) {
+  if (!DFM_ABI_OK(host)) return nullptr;
+  static const dfm_friction ops = {
+      sizeof(dfm_friction),
+      0,
+      0,
+      0,
+      nullptr,
+      [](const dfm_friction_in *, dfm_friction_out *) { return dfm_status{DFM_OK}; },
+      nullptr,
+      nullptr,
+      nullptr,
+      nullptr,
+      0,
+      0};
+  static const dfm_type type = {sizeof(dfm_type),
+                                DFM_KIND_FRICTION,
+                                "test.counted",
+                                "counted",
+                                "1",
+                                "MIT",
+                                "none",
+                                nullptr,
+                                0,
+                                sizeof(dfm_param),
+                                nullptr,
+                                &ops};
+  static const dfm_type *const types[] = {&type};
+  static const dfm_plugin plugin = {sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 1, types, [] { pass(left); }};
+  pass(entered);
+  return &plugin;
+}
+
+TEST(Loader, ContextsOnSeveralThreads_LetPluginsInAndOutOneAtATime) {
+  constexpr uint32_t kThreads = 4, kContexts = 20;
+  entered = left = 0;
+  const std::string empty = folder("none_for_threads");
+  std::vector<std::thread> threads;
+  for (uint32_t k = 0; k < kThreads; ++k)
+    threads.emplace_back([&] {
+      for (uint32_t i = 0; i < kContexts; ++i) {
+        dfm_context_def def = dfm_context_def_default();
+        def.plugin_dir = empty.c_str();
+        dfm_context *c = nullptr;
+        EXPECT_EQ(dfm_context_create(&def, &c), DFM_OK);
+        EXPECT_EQ(dfm_plugin_register_static(c, counted_entry, "counted"), DFM_OK);
+        EXPECT_EQ(dfm_plugin_load(c, plugin("tiny_law").c_str()), DFM_OK);
+        dfm_context_destroy(c);
+      }
+    });
+  for (std::thread &t : threads) t.join();
+  EXPECT_EQ(together, 0u);
+  EXPECT_EQ(entered, kThreads * kContexts);
+  EXPECT_EQ(left, kThreads * kContexts);
+}
 
 TEST(Loader, ExplicitPath_LoadsTheFile) {
   Context c;

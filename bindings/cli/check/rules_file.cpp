@@ -190,6 +190,10 @@ void effects_known(const dfm_type &type) {
   }
 }
 
+void reserved_free(const char *what, uint32_t found) {
+  if (found) broken("%s has %u in reserved, which a later host may read as a wish; set it to 0", what, found);
+}
+
 void slots_sound(const std::vector<dfm_slot> &slots, bool law) {
   for (uint32_t i = 0; i < slots.size(); ++i) {
     const dfm_slot &s = slots[i];
@@ -206,9 +210,7 @@ void slots_sound(const std::vector<dfm_slot> &slots, bool law) {
       broken(
           "state slot %u has unit %u, which the host does not keep for it; a law's state is DFM_PER_CONTACT",
           i, s.unit);
-    if (s.reserved)
-      broken("state slot %u has %u in reserved, which a later host may read as a wish; set it to 0", i,
-             s.reserved);
+    reserved_free(text("state slot %u", i).c_str(), s.reserved);
   }
 }
 
@@ -218,13 +220,24 @@ void slot_table_sound(const Ops &ops, bool law) {
   if (ops.nslot && !ops.slots)
     broken("it has %u state slots but slots is NULL, so the host cannot keep its state; name them",
            ops.nslot);
-  if (ops.reserved)
-    broken("reserved beside slot_size is %u, which a later host may read as a wish; set it to 0",
-           ops.reserved);
+  reserved_free(law ? "dfm_friction" : "dfm_model", ops.reserved);
   if (!slot_size_sound(ops.slot_size))
-    broken("slot_size is %u, so its state slots cannot be told apart; set it to 0 or to sizeof(dfm_slot)",
-           ops.slot_size);
+    broken(
+        "slot_size is %u, so its state slots cannot be told apart; set it to sizeof(dfm_slot), or to 0, "
+        "which "
+        "says the same in all of ABI 1",
+        ops.slot_size);
   slots_sound(slot_rows(ops.slots, ops.nslot, ops.slot_size), law);
+}
+
+// Of dfm_friction.state and of DFM_EXT_SLOTS.
+void own_slots_sound(const dfm_slots *own, bool law, const char *from, const char *remedy) {
+  const auto rows = slot_rows(own);
+  if (!rows) broken("%s, so the host cannot keep its state; %s", from, remedy);
+  dfm_slots full{};
+  std::memcpy(&full, own, std::min<size_t>(own->size, sizeof full));
+  reserved_free("its dfm_slots", full.reserved);
+  slots_sound(*rows, law);
 }
 
 void law_sound(const dfm_type &type, const dfm_friction &law) {
@@ -242,16 +255,27 @@ void law_sound(const dfm_type &type, const dfm_friction &law) {
   if (!law.state) return;
   const Kept kept("state");
   const std::vector<double> params = default_params(type);
-  const auto own = slot_rows(law.state(params.data()));
-  if (!own)
-    broken(
-        "its function state names no slots for its defaults, so the host cannot keep its state; return "
-        "constant tables");
-  slots_sound(*own, true);
+  own_slots_sound(law.state(params.data()), true, "its function state names no slots for its defaults",
+                  "return constant tables");
 }
 
-// Claims that name functions.
-void model_sound(const dfm_model &model) {
+// Functions that are required, and claims that name functions.
+void model_sound(const dfm_type &type, const dfm_model &model) {
+  constexpr uint32_t kCells = DFM_CELL_POINT | DFM_CELL_EDGE | DFM_CELL_TRI | DFM_CELL_TET | DFM_CELL_HEX;
+  if (model.cells & ~kCells)
+    broken("cells has bits that this ABI does not know (%#x), which no host gives; use DFM_CELL_*",
+           model.cells & ~kCells);
+  if (model.add_forces && !model.bound)
+    broken(
+        "it adds forces without bound, so the host takes steps of any length and the body flies apart; set "
+        "dfm_model.bound");
+  for (uint32_t i = 0; i < type.nparam && !model.set_params; ++i)
+    if (type.params[i].flags & DFM_PARAM_RUNTIME)
+      broken(
+          "parameter \"%s\" may change while it runs, but there is no set_params, so every change fails; set "
+          "the function, or drop DFM_PARAM_RUNTIME",
+          type.params[i].key ? type.params[i].key : "");
+
   constexpr uint32_t kKnown = DFM_CAP_ENERGY | DFM_CAP_STIFFNESS | DFM_CAP_DAMPING | DFM_CAP_TOPOLOGY |
                               DFM_CAP_ROTATION_INVARIANT | DFM_CAP_PLAUSIBLE | DFM_CAP_CONSTANT_STIFFNESS;
   if (model.caps & ~kKnown)
@@ -275,6 +299,30 @@ void model_sound(const dfm_model &model) {
         "claim both or none");
 }
 
+// A table of one function: what stands behind size and reserved.
+bool lacks_its_function(const void *table) {
+  void (*function)(void) = nullptr;
+  std::memcpy(&function, static_cast<const char *>(table) + 2 * sizeof(uint32_t), sizeof function);
+  return !function;
+}
+
+void effect_rows_sound(const dfm_type &type, const dfm_effect_rows &table) {
+  reserved_free("its dfm_effect_rows", table.reserved);
+  if (table.n > 4096 || (table.n && !table.rows))
+    broken("its dfm_effect_rows announces %u rows and rows is NULL or too long, so none is read; name them",
+           table.n);
+  for (uint32_t i = 0; i < table.n; ++i) {
+    dfm_effect_row row;
+    std::memcpy(&row, reinterpret_cast<const char *>(table.rows) + size_t(i) * table.row_size, sizeof row);
+    reserved_free(text("row %u of its dfm_effect_rows", i).c_str(), row.reserved);
+    if (row.param >= type.nparam || type.params[row.param].width != 1)
+      broken(
+          "row %u of its dfm_effect_rows names parameter %u of %u, or one that is not one wide, so nothing "
+          "can switch the effect off; name a row of dfm_type.params",
+          i, row.param, type.nparam);
+  }
+}
+
 // What an instance answers to extension(): tables that begin with their size, nothing where it has none.
 void tables_sound(const Subject &subject) {
   const dfm_model &model = model_of(subject);
@@ -288,16 +336,17 @@ void tables_sound(const Subject &subject) {
     const char *id, *name;
     size_t head;
     uint32_t row;  // least size of its rows, which stands where others have reserved
-  } known[] = {{"dfm.stepper/1", "dfm_stepper", offsetof(dfm_stepper, commit) + sizeof(void *), 0},
-               {DFM_EXT_CELL_ENERGY, "dfm_cell_energy", one, 0},
-               {DFM_EXT_CELL_STRESS, "dfm_cell_stress", one, 0},
-               {DFM_EXT_EFFECTS, "dfm_effects", one, 0},
-               {DFM_EXT_IDLE, "dfm_idle", one, 0},
-               {DFM_EXT_LIMITED, "dfm_limited", one, 0},
-               {DFM_EXT_CAPS, "dfm_caps", one, 0},
-               {DFM_EXT_FACTS, "dfm_facts", one, offsetof(dfm_fact, value) + sizeof(double)},
+    bool one;      // function, and nothing else
+  } known[] = {{"dfm.stepper/1", "dfm_stepper", offsetof(dfm_stepper, commit) + sizeof(void *), 0, false},
+               {DFM_EXT_CELL_ENERGY, "dfm_cell_energy", one, 0, true},
+               {DFM_EXT_CELL_STRESS, "dfm_cell_stress", one, 0, true},
+               {DFM_EXT_EFFECTS, "dfm_effects", one, 0, true},
+               {DFM_EXT_IDLE, "dfm_idle", one, 0, true},
+               {DFM_EXT_LIMITED, "dfm_limited", one, 0, true},
+               {DFM_EXT_CAPS, "dfm_caps", one, 0, true},
+               {DFM_EXT_FACTS, "dfm_facts", one, offsetof(dfm_fact, value) + sizeof(double), true},
                {DFM_EXT_EFFECT_ROWS, "dfm_effect_rows", offsetof(dfm_effect_rows, rows) + sizeof(void *),
-                offsetof(dfm_effect_row, off) + sizeof(double)}};
+                offsetof(dfm_effect_row, off) + sizeof(double), false}};
   for (const auto &k : known) {
     const void *table = body.extension(k.id);
     if (!table) continue;
@@ -309,24 +358,28 @@ void tables_sound(const Subject &subject) {
     if (k.row && (head[1] < k.row || head[1] > 65536))
       broken("the rows of its extension \"%s\" have row_size %u, so none is read; set it to their sizeof",
              k.id, head[1]);
-    if (!k.row && head[1])
+    if (!k.row) reserved_free(text("the table of its extension \"%s\"", k.id).c_str(), head[1]);
+    if (k.one && lacks_its_function(table))
       broken(
-          "the table of its extension \"%s\" has %u in reserved, which a later host may read as a wish; "
-          "set it to 0",
-          k.id, head[1]);
+          "the table of its extension \"%s\" has no function, so it says nothing; set it, or answer NULL to "
+          "the id",
+          k.id);
   }
-  if (const auto *stepper = static_cast<const dfm_stepper *>(body.extension("dfm.stepper/1"));
-      stepper && stepper->size >= offsetof(dfm_stepper, fetch) + sizeof(void *) && stepper->fetch)
+  const auto *stepper = static_cast<const dfm_stepper *>(body.extension("dfm.stepper/1"));
+  if (!stepper && !model.add_forces)
+    broken(
+        "it has no add_forces and does not answer \"dfm.stepper/1\", so nothing moves it; set one of them");
+  if (stepper && !(stepper->predict && stepper->respond && stepper->commit))
+    broken(
+        "dfm_stepper lacks predict, respond or commit, so the library refuses every body of it; set the "
+        "three");
+  if (stepper && stepper->size >= offsetof(dfm_stepper, fetch) + sizeof(void *) && stepper->fetch)
     broken("dfm_stepper.fetch is set, a place that is kept for a later use; leave it NULL");
-  if (const auto *own = static_cast<const dfm_slots *>(body.extension(DFM_EXT_SLOTS)); own) {
-    const auto rows = slot_rows(own);
-    if (!rows)
-      broken(
-          "the table of its extension \"%s\" cannot be read, so the host cannot keep its state; set size "
-          "to sizeof(dfm_slots) and slot_size to 0 or sizeof(dfm_slot)",
-          DFM_EXT_SLOTS);
-    slots_sound(*rows, false);
-  }
+  if (const auto *rows = static_cast<const dfm_effect_rows *>(body.extension(DFM_EXT_EFFECT_ROWS)); rows)
+    effect_rows_sound(*subject.type, *rows);
+  if (const auto *own = static_cast<const dfm_slots *>(body.extension(DFM_EXT_SLOTS)); own)
+    own_slots_sound(own, false, "the table of its extension \"" DFM_EXT_SLOTS "\" cannot be read",
+                    "set size to sizeof(dfm_slots) and slot_size to sizeof(dfm_slot)");
   if (body.extension("dfm.unheard-of/1"))
     broken(
         "extension answers an id that it cannot know with a table, which a host would read as another "
@@ -364,6 +417,9 @@ std::string metadata_complete(const Subject &subject) {
     const auto &solver = *static_cast<const dfm_solver *>(type.ops);
     if (!solver.analyse || !solver.factor || !solver.solve || !solver.release)
       broken("a solver without analyse, factor, solve and release cannot be used; set all four");
+    if (solver.flags & ~uint32_t(DFM_SOLVER_DIRECT))
+      broken("flags has bits that this ABI does not know (%#x); use DFM_SOLVER_*",
+             solver.flags & ~uint32_t(DFM_SOLVER_DIRECT));
   } else {
     const auto &model = *static_cast<const dfm_model *>(type.ops);
     if (!model.create || !model.destroy)
@@ -373,7 +429,7 @@ std::string metadata_complete(const Subject &subject) {
     if (model.cells == 0)
       broken("a model that accepts no kind of cell fits no mesh; set cells to DFM_CELL_*");
     slot_table_sound(model, false);
-    model_sound(model);
+    model_sound(type, model);
     tables_sound(subject);
   }
   return text("%s %s, %s", type.id, type.version, type.licence);

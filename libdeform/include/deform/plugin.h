@@ -7,7 +7,10 @@
  * [step] one call at a time per instance, instances run concurrently; [batch] re-entrant, many workers at
  * once; [any] from anywhere. No C++ exception, exit or longjmp crosses. Text is UTF-8.
  * Bits 16 to 31 of flags and caps are for what a host must know: one that does not refuses the type. It
- * passes over lower bits that it does not know. */
+ * passes over lower bits that it does not know.
+ * Functions: (required) is never NULL, (required: ..) is not NULL where that is so, (optional) may be NULL.
+ * Members called reserved, and bits without a name, are 0. `deform plugin check` (V03) refuses a plugin that
+ * leaves out what is required or fills what is reserved. */
 #ifndef DEFORM_PLUGIN_H
 #define DEFORM_PLUGIN_H
 #include <stddef.h>
@@ -72,7 +75,9 @@ enum {
       32 /* def is no value but a sign, read and shown as "auto": the plugin takes one from the others */,
   DFM_PARAM_LIST = 64 /* 1 to width values may be given, the rest read 0 */
 };
-/* a row: one block of state */
+/* A row: one block of state. It does not grow in ABI 1, so rows of this type are 16 bytes apart with every
+ * header, and slot_size 0 or sizeof(dfm_slot) say the same. Longer rows will be of another type, whose size
+ * slot_size must be. */
 typedef struct dfm_slot { uint32_t unit, width, kind, reserved; /* 0 */ } dfm_slot;
 enum { DFM_PER_CONTACT = 1, DFM_PER_POINT = 2, DFM_PER_CELL = 3, DFM_PER_EDGE = 4, DFM_PER_INSTANCE = 5 };
 enum {
@@ -85,7 +90,7 @@ enum {
 typedef struct dfm_slots {
   uint32_t size, nslot;
   const dfm_slot *slots; /* [nslot] rows of slot_size bytes */
-  uint32_t slot_size;    /* sizeof(dfm_slot); 0: 16, the row that ABI 1 began with */
+  uint32_t slot_size;    /* from row to row: sizeof(dfm_slot), or 0, which is 16 for ever */
   uint32_t reserved;     /* 0 */
 } dfm_slots;
 typedef struct dfm_type {
@@ -132,12 +137,13 @@ typedef struct dfm_friction_out { /* each pointer may be NULL: not wanted */
 typedef struct dfm_friction {
   uint32_t size, needs, flags, nslot;
   const dfm_slot *slots; /* [nslot], unit DFM_PER_CONTACT; nstate = sum of widths; zero = rest */
-  dfm_status (*eval)(const dfm_friction_in *in, dfm_friction_out *out); /* [batch] no alloc, no I/O */
-  dfm_status (*check)(const double *params, char *why, size_t cap);     /* [any] optional cross-field rules */
-  /* [setup] optional tables; not DFM_OK: data is not read, what was made is freed */
+  /* [batch] (required) no alloc, no I/O */
+  dfm_status (*eval)(const dfm_friction_in *in, dfm_friction_out *out);
+  dfm_status (*check)(const double *params, char *why, size_t cap); /* [any] (optional) cross-field rules */
+  /* [setup] (optional) tables; not DFM_OK: data is not read, what was made is freed */
   dfm_status (*prepare)(const dfm_host *h, const double *params, void **data);
-  void (*release)(const dfm_host *h, void *data); /* [setup] iff prepare */
-  /* [any] optional (NULL: slots): the state that these parameters call for, where they decide how much there
+  void (*release)(const dfm_host *h, void *data); /* [setup] (required: with prepare, and not without) */
+  /* [any] (optional; NULL: slots) the state that these parameters call for, where they decide how much there
    * is; it stands in the place of slots, which then is the most that any parameters call for. Constant data,
    * the same for the same parameters. */
   const dfm_slots *(*state)(const double *params);
@@ -184,31 +190,33 @@ typedef struct dfm_model {           /* self is void*: one shared struct tag wou
   uint32_t size, caps, cells, nslot; /* DFM_CAP_*, accepted DFM_CELL_* */
   /* what can change one bit of a later result is state, warm starts included */
   const dfm_slot *slots;
-  /* [setup] not DFM_OK: self is not read, what was made is freed */
+  /* [setup] (required) not DFM_OK: self is not read, what was made is freed */
   dfm_status (*create)(const dfm_host *h, const dfm_mesh *m, void **self);
-  void (*destroy)(void *self); /* [setup] */
-  /* [setup] optional: RUNTIME rows only; not DFM_OK: nothing has changed */
+  void (*destroy)(void *self); /* [setup] (required) */
+  /* [setup] (required: with RUNTIME rows) these alone differ; not DFM_OK: nothing has changed */
   dfm_status (*set_params)(void *self, const double *params);
-  dfm_status (*state_init)(const void *self, double *state);         /* [setup] */
-  dfm_status (*add_forces)(void *self, const dfm_kin *k, double *f); /* [step] f[npoint,stride] += N */
+  dfm_status (*state_init)(const void *self, double *state); /* [setup] (optional; NULL: all 0) */
+  /* [step] (required: without "dfm.stepper/1") f[npoint,stride] += N */
+  dfm_status (*add_forces)(void *self, const dfm_kin *k, double *f);
+  /* [step] (required: with add_forces) row sums += N/m, N s/m per point; *dt = min(*dt, cell bound) */
   dfm_status (*bound)(void *self, const dfm_kin *k, double *ksum, double *csum, double *dt);
-  /* [step] row sums += N/m, N s/m per point; *dt = min(*dt,
-                                       * cell bound) */
-  dfm_status (*energy)(void *self, const dfm_kin *k, double *joule); /* CAP_ENERGY; f = -dE/dx */
-  /* [setup] CAP_STIFFNESS: pairs of points that answer each other, ij[nb,2], i <= j, each pair once, each
-   * point with itself. ij NULL: only counts. */
+  /* [step] (required: CAP_ENERGY) f = -dE/dx */
+  dfm_status (*energy)(void *self, const dfm_kin *k, double *joule);
+  /* [setup] (required: CAP_STIFFNESS) pairs of points that answer each other, ij[nb,2], i <= j, each pair
+   * once, each point with itself. ij NULL: only counts. */
   dfm_status (*pattern)(const void *self, uint32_t *nb, uint32_t *ij);
-  /* [step] CAP_STIFFNESS: blk[nb,9] += a*df_i/dx_j + b*df_i/dv_j, row-major, in the order of the pattern;
-   * block (j, i) is the transpose of (i, j). f is what add_forces adds at the same k; state_out is NULL.
-   * For a, b >= 0 the sum is to be negative semidefinite: what would make it indefinite is left out. */
+  /* [step] (required: CAP_STIFFNESS) blk[nb,9] += a*df_i/dx_j + b*df_i/dv_j, row-major, in the order of the
+   * pattern; block (j, i) is the transpose of (i, j). f is what add_forces adds at the same k; state_out is
+   * NULL. For a, b >= 0 the sum is to be negative semidefinite: what would make it indefinite is left out. */
   dfm_status (*stiffness)(void *self, const dfm_kin *k, double a, double b, double *blk);
-  /* [setup] optional; "dfm.stepper/1" ...: a table that begins with its size and stays as it is while the
+  /* [setup] (optional) "dfm.stepper/1" ...: a table that begins with its size and stays as it is while the
    * instance lives; NULL to every id that the model does not know */
   const void *(*extension)(const void *self, const char *id);
   uint32_t slot_size, reserved; /* of slots, as in dfm_slots */
 } dfm_model;
 /* Self-stepping model, extension "dfm.stepper/1". Contact, friction, report and pictures see surfels only.
- * Velocities here are means over the step: (x_s(t+dt) - x_s(t)) / dt. */
+ * Velocities here are means over the step: (x_s(t+dt) - x_s(t)) / dt. The functions of this table and of the
+ * ones below are required where nothing else is said: a model without them does not answer the table's id. */
 typedef struct dfm_stepper {
   uint32_t size, reserved; /* reserved: 0, here and in the tables below */
   /* [step] without contact. f_ext [npoint,stride] N: gravity, loads, springs. u_s [nsurfel,3]. Held
@@ -218,13 +226,13 @@ typedef struct dfm_stepper {
    * for the whole step */
   dfm_status (*respond)(void *self, const dfm_kin *k, uint32_t n, const uint32_t *surfel, const double *p,
                         double *du_s);
-  /* [n,9] 1/kg, or a bound */
+  /* [step] (optional) [n,9] 1/kg, or a bound */
   dfm_status (*diagonal)(void *self, const dfm_kin *k, uint32_t n, const uint32_t *surfel, double *w);
   /* [step] equals predict + respond. p_s [nsurfel,3] total impulses; x, v [npoint,stride] out at t+dt,
    * not aliasing k */
   dfm_status (*commit)(void *self, const dfm_kin *k, const double *p_s, double *x, double *v);
   void (*fetch)(void); /* NULL: a place kept for dfm_fetch_fn of plugin_draft.h */
-  /* [step] optional (NULL, or a smaller size): respond for nrhs right-hand sides at once, p, du_s [nrhs,n,3].
+  /* [step] (optional; NULL, or a smaller size) respond for nrhs right-hand sides at once, p, du_s [nrhs,n,3].
    * Without it respond is called nrhs times. */
   dfm_status (*respond_many)(void *self, const dfm_kin *k, uint32_t n, const uint32_t *surfel, uint32_t nrhs,
                              const double *p, double *du_s);
@@ -275,7 +283,10 @@ typedef struct dfm_limited {
   uint32_t (*count)(const void *self);
 } dfm_limited;
 /* Extension "dfm.caps/1" of a model: those of dfm_model.caps that hold with the instance's present
- * parameters, where some choice of them takes one away. Asked by `deform plugin check`. */
+ * parameters, where some choice of them takes one away. A host asks after create and after set_params, and
+ * goes by the answer: without CAP_ENERGY the body's energy is neither told nor watched. set_params is refused
+ * and taken back where an implicit step needs what it would take away. dfm_mesh.rest goes by dfm_model.caps,
+ * since there is no instance yet. */
 #define DFM_EXT_CAPS "dfm.caps/1"
 typedef struct dfm_caps {
   uint32_t size, reserved;
@@ -308,8 +319,8 @@ typedef struct dfm_facts {
 } dfm_facts;
 /* ---- linear solver for the implicit system: symmetric positive definite, 3x3 blocks --------------- */
 enum { DFM_SOLVER_DIRECT = 1 /* exact up to rounding, whatever x holds and the tolerance is */ };
-typedef struct dfm_solver {
-  uint32_t size, flags; /* DFM_SOLVER_* */
+typedef struct dfm_solver { /* all functions are required */
+  uint32_t size, flags;     /* DFM_SOLVER_* */
   /* [setup] a matrix of n points: pairs ij[nb,2], i <= j, each pair once, each point with itself, in any
    * order; borrowed during the call. Not DFM_OK: self is not read, what was made is freed */
   dfm_status (*analyse)(const dfm_host *h, uint32_t n, uint32_t nb, const uint32_t *ij, void **self);
@@ -328,14 +339,15 @@ typedef struct dfm_solver {
 #define DFM_ABI_OK(h)                                    \
   ((h)->abi == DFM_ABI ? (h)->abi_draft == DFM_ABI_DRAFT \
                        : (h)->abi > DFM_ABI && (h)->abi_min != 0u && (h)->abi_min <= DFM_ABI)
-/* The entry is called once for each context that loads the file, maybe at once on several threads, and
- * shutdown once for each entry that gave a plugin, maybe while other contexts go on. So what the entry
- * returns is constant and stays as long as the file is loaded, and no host is kept in a static: each instance
- * has its own, which is valid until that shutdown has returned. */
+/* The entry is called once for each context that loads the file, and shutdown once for each entry that gave
+ * a plugin, while other contexts go on. A process runs one of these calls at a time, whatever its threads do,
+ * so none of them may wait for another thread that loads or unloads. What the entry returns is constant and
+ * stays as long as the file is loaded, and no host is kept in a static: each instance has its own, which is
+ * valid until that shutdown has returned. */
 typedef struct dfm_plugin {
   uint32_t size, abi, abi_draft, ntype; /* DFM_ABI, DFM_ABI_DRAFT */
   const dfm_type *const *types;         /* [ntype] array of pointers, so dfm_type may grow */
-  void (*shutdown)(void);               /* optional */
+  void (*shutdown)(void);               /* (optional) */
 } dfm_plugin;
 typedef const dfm_plugin *(*dfm_plugin_fn)(const dfm_host *host, uint32_t host_abi, uint32_t host_abi_min);
 #ifdef DFM_STATIC_PLUGIN /* -DDFM_STATIC_PLUGIN=lugre -> dfm_plugin_entry_lugre, no dlopen */

@@ -11,6 +11,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <memory>
+#include <mutex>
 
 #include "core/error.h"
 #include "deform/base.h"
@@ -23,6 +24,11 @@ namespace dfm {
 namespace {
 
 thread_local std::string *entry_log = nullptr;
+
+// Plugins are let in and out one at a time in the whole process: two contexts may load one file at once,
+// whose entry may fill statics of its own, and the locale that a Visit puts back is everybody's. Recursive,
+// since an entry may make a context.
+std::recursive_mutex door;
 
 std::string real_path(const std::string &path) {
   // dlopen searches the system's libraries for a name without a slash
@@ -117,6 +123,7 @@ Loader::~Loader() {
   while (!modules_.empty()) {
     const Module module = std::move(modules_.back());
     modules_.pop_back();
+    const std::lock_guard one_at_a_time(door);
     const Boundary boundary(module.file.c_str(), "shutdown");
     try {
       if (module.shutdown) module.shutdown();
@@ -178,6 +185,7 @@ bool Loader::load(const std::string &path) {
   for (const Module &module : modules_)
     if (module.image && module.device == st.st_dev && module.inode == st.st_ino) return false;
 
+  const std::lock_guard one_at_a_time(door);
   Visit visit(host_, path);
   SharedObject library(file, path);
   const dfm_plugin_fn entry = library.entry();
@@ -227,6 +235,7 @@ void Loader::add_static(dfm_plugin_fn entry, const std::string &name) {
     if (module.entry == entry) return;
   const std::string file = "static:" + name;
   dfm_plugin plugin;
+  const std::lock_guard one_at_a_time(door);
   Visit visit(host_, file);
   enter(entry, file, plugin);
   visit.end();

@@ -7,5 +7,6 @@ static const dfm_fact *list_facts(const void *self, uint32_t *n) {
   return &one;
 }
 static const dfm_facts facts = {sizeof(dfm_facts), 0, list_facts};
-#define FACTS &facts
+#define TABLE_ID DFM_EXT_FACTS
+#define TABLE &facts
 #include "stepper.h"

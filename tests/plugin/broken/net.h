@@ -59,7 +59,10 @@
 #define ON_DESTROY free(net->rest);
 #endif
 
-static const dfm_param rows[] = {{"stiffness", "of each edge", "N/m", 1.0, 1e4, 500.0, 0, 1, NULL},
+#ifndef ROW_FLAGS
+#define ROW_FLAGS 0
+#endif
+static const dfm_param rows[] = {{"stiffness", "of each edge", "N/m", 1.0, 1e4, 500.0, ROW_FLAGS, 1, NULL},
                                  {"damper", "of each edge", "N s/m", 0.0, 10.0, DAMPER, 0, 1, NULL}};
 
 typedef struct Net {
@@ -251,7 +254,10 @@ static const void *extension(const void *self, const char *id) {
   (void)self;
   return strcmp(id, DFM_EXT_CELL_ENERGY) ? NULL : &by_cell;
 }
-#define ADDS_FORCES add_forces, bound
+#ifndef ASKED_BOUND
+#define ASKED_BOUND bound
+#endif
+#define ADDS_FORCES add_forces, ASKED_BOUND
 #ifndef ASKED_ENERGY
 #define ASKED_ENERGY energy
 #endif

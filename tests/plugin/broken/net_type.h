@@ -1,7 +1,10 @@
 /* The type of a broken model, after its functions. */
+#ifndef CELLS
+#define CELLS DFM_CELL_TET
+#endif
 static const dfm_model model = {
-    sizeof(dfm_model), CAPS,         DFM_CELL_TET, 0,         NULL,      create, destroy, NULL, NULL,
-    ADDS_FORCES,       ASKED_ENERGY, pattern,      stiffness, extension, 0,      0};
+    sizeof(dfm_model), CAPS,         CELLS,   0,         NULL,      create, destroy, NULL, NULL,
+    ADDS_FORCES,       ASKED_ENERGY, pattern, stiffness, extension, 0,      0};
 static const char *const effects[] = {"damping", NULL};
 static const dfm_type type = {sizeof(dfm_type),
                               DFM_KIND_MODEL,

@@ -22,8 +22,9 @@
 #ifndef FREE_PLACE /* dfm_stepper.fetch */
 #define FREE_PLACE NULL
 #endif
-#ifndef FACTS /* its table of DFM_EXT_FACTS */
-#define FACTS NULL
+#ifndef TABLE /* its table of one more extension */
+#define TABLE_ID DFM_EXT_FACTS
+#define TABLE NULL
 #endif
 #ifndef OTHER_ID /* what it answers to an id that nobody has given a meaning */
 #define OTHER_ID NULL
@@ -118,7 +119,7 @@ static const void *extension(const void *self, const char *id) {
   (void)self;
   if (!strcmp(id, "dfm.stepper/1")) return &steps;
   if (!strncmp(id, "dfm.unheard-of", 14)) return OTHER_ID;
-  if (!strcmp(id, DFM_EXT_FACTS)) return FACTS;
+  if (!strcmp(id, TABLE_ID)) return TABLE;
   return strcmp(id, DFM_EXT_CELL_ENERGY) ? NULL : &by_cell;
 }
 #define ADDS_FORCES NULL, NULL

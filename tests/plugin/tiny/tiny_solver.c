@@ -3,6 +3,9 @@
 
 #include "deform/plugin.h"
 
+#ifndef KIND
+#define KIND DFM_SOLVER_DIRECT
+#endif
 enum { kMost = 40 };
 
 typedef struct Cholesky {
@@ -86,7 +89,7 @@ static dfm_status solve(void *self, uint32_t nrhs, const double *b, double *x, d
   return DFM_OK;
 }
 
-static const dfm_solver solver = {sizeof(dfm_solver), DFM_SOLVER_DIRECT, analyse, factor, solve, release};
+static const dfm_solver solver = {sizeof(dfm_solver), KIND, analyse, factor, solve, release};
 static const dfm_type type = {sizeof(dfm_type),
                               DFM_KIND_SOLVER,
                               "org.tiny.cholesky",

@@ -1,0 +1,3 @@
+/* V03: takes a kind of cell that has no name. */
+#define CELLS (DFM_CELL_TET | 64)
+#include "net.h"
