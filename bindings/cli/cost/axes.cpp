@@ -75,6 +75,8 @@ class Finder {
       const std::string body = "/bodies/" + std::to_string(i);
       if (s_.find(body + "/switch"))
         return "body '" + s_.bodies[i].name + "' changes its model itself (switch)";
+      if (s_.find(body + "/anisotropy"))
+        return "body '" + s_.bodies[i].name + "' has an anisotropy, whose parameters belong to its model";
       if (s_.find(body + "/fields"))
         return "body '" + s_.bodies[i].name + "' has fields, which belong to its model";
     }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <map>
 
 #include "messages.h"
 
@@ -78,11 +79,17 @@ std::string separated_json(const Study &study) {
 
 // Rows that are not compared, by reason.
 void list_left_out(const Subject &subject, const Study &study, std::string &out) {
+  std::map<std::string, std::pair<std::string, size_t>>
+      said;  // by sentence: the first that said it, how many
   for (const Row &row : study.rows) {
     const Outcome &o = row.job.outcome;
-    if (o.state == Outcome::unstable) out += "  unstable   " + row.job.label + ": " + o.sentence + "\n";
-    if (o.state == Outcome::refused) out += "  refused    " + row.job.label + ": " + o.sentence + "\n";
+    if (o.state != Outcome::unstable && o.state != Outcome::refused) continue;
+    const char *const what = o.state == Outcome::unstable ? "unstable   " : "refused    ";
+    ++said.try_emplace(o.sentence, what + row.job.label, 0).first->second.second;
   }
+  for (const auto &[sentence, who] : said)
+    out += "  " + who.first + (who.second > 1 ? " and " + std::to_string(who.second - 1) + " more" : "") +
+           ": " + sentence + "\n";
   std::string cut;
   size_t n = 0;
   double least = 1e300;

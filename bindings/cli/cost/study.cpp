@@ -397,17 +397,18 @@ class Student {
     }
   }
 
-  // The cheapest that is within the target if its error and the reference's have nothing to do with each
-  // other. Proven: even if they add up. Where the reference itself is farther off nothing is known.
+  // The cheapest that is within the target even if its error and the reference's add up (proven). Where there
+  // is none: if they have nothing to do with each other. Where the reference is farther off: none.
   void choose() {
     const double target = out_.options.target, own = out_.reference_headline;
-    out_.pick = -1;
-    for (const size_t i : out_.front) {
-      if (!(std::hypot(out_.rows[i].headline, own) <= target)) continue;
-      out_.pick = int(i);
-      out_.proven = out_.rows[i].headline + own <= target;
-      return;
-    }
+    const auto first = [&](auto &&good) {
+      for (const size_t i : out_.front)
+        if (good(out_.rows[i].headline)) return int(i);
+      return -1;
+    };
+    out_.pick = first([&](double e) { return e + own <= target; });
+    out_.proven = out_.pick >= 0;
+    if (!out_.proven) out_.pick = first([&](double e) { return std::hypot(e, own) <= target; });
   }
 
   const Subject &s_;
