@@ -149,3 +149,34 @@ TEST(FrictionBenchmark, CalledFromAnotherFolder_FindsTheCommandOfItsCheckout) {
       test::run({"/usr/bin/env", "-C", folder, DEFORM_TEST_PYTHON, script("run.py"), "nobody"});
   EXPECT_NE(unknown.err.find("there is no entry_nobody.py"), std::string::npos) << unknown.err;
 }
+
+// Speed at equal error: the cheapest that passes in all its quantities, per engine; the page keeps what
+// stands around the marks.
+TEST(FrictionBenchmark, SpeedAtEqualError_IsOfTheCheapestThatPasses) {
+  const std::string folder = test::scratch("friction_benchmark_speed");
+  std::string rows =
+      "engine,version,configuration,case,parameters,quantity,measured,expected,low,high,verdict,cost,note\n";
+  for (const char *row :
+       {"one,1,quick,lift,,force,2,1,0.9,1.1,fail,0.5,", "one,1,good,lift,,force,1,1,0.9,1.1,pass,3,",
+        "one,1,better,lift,,force,1,1,0.9,1.1,pass,2,", "one,1,better,lift,,creep,5,0,0,1,fail,2,",
+        "one,1,good,lift,,creep,0.5,0,0,1,pass,3,", "two,1,only,lift,,,,,,,error,,fell apart",
+        "three,1,none,lift,,,,,,,not_run,,no law with lift"})
+    rows += std::string(row) + "\n";
+  test::write_file(folder + "/rows.csv", rows);
+  test::write_file(folder + "/page", "before\n<!-- table -->\nold\n<!-- end of table -->\nafter\n");
+  const std::string speed = script("../peers/speed.py");
+  const test::CommandResult r =
+      test::run({DEFORM_TEST_PYTHON, speed, folder + "/rows.csv", "--page", folder + "/page"});
+  ASSERT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_EQ(test::read_file(folder + "/page"),
+            "before\n<!-- table -->\n\n| case | one | two | fastest |\n|---|---|---|---|\n"
+            "| lift  | 3 s (good) | not at any setting run | one |\n\n<!-- end of table -->\nafter\n");
+}
+
+TEST(FrictionBenchmark, BenchPeersWithoutBullet_IsOneSentence) {
+  const test::CommandResult r =
+      test::run({"/usr/bin/env", "PATH=/nowhere", DEFORM_TEST_PYTHON, script("../peers/bench_peers.py"),
+                 DEFORM_COMMAND, test::scratch("bench_peers")});
+  EXPECT_EQ(r.exit_code, 1);
+  EXPECT_EQ(r.err, "bench-peers: pkg-config does not find Bullet; install pkg-config and libbullet-dev\n");
+}

@@ -9,6 +9,7 @@ turning pad is not run. It has one coefficient of friction and no bristles.
   default    as the world is constructed: explicit, 10 iterations, erp 0.06
   explicit   100 iterations, as in its demonstrations, which are what it has for a manual of this part
   implicit   the same with the implicit integrator
+  ... 4 ms   with steps of 1/240 s, as in its demonstrations
 
 search.py has what else was tried.
 """
@@ -21,7 +22,9 @@ import mesh_file
 
 SETTINGS = {"default": {"implicit": 0, "iterations": 10, "erp": 0.06},
             "explicit": {"implicit": 0, "iterations": 100, "erp": 0.06},
-            "implicit": {"implicit": 1, "iterations": 100, "erp": 0.06}}
+            "implicit": {"implicit": 1, "iterations": 100, "erp": 0.06},
+            "explicit 4 ms": {"implicit": 0, "iterations": 100, "erp": 0.06, "step": 1 / 240},
+            "implicit 4 ms": {"implicit": 1, "iterations": 100, "erp": 0.06, "step": 1 / 240}}
 SEARCH = {"implicit": [1], "step": [2.5e-4, 5e-4, 1e-3, 2e-3], "erp": [0.02, 0.2, 0.5],
           "iterations": [10, 30, 300]}
 
