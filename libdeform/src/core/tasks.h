@@ -14,6 +14,8 @@ class Tasks {
   Tasks(uint32_t threads, HostFor host_for, void *host_user);
   ~Tasks();
   uint32_t threads() const { return threads_; }
+  // may run() use more than the caller's thread?
+  bool parallel() const { return host_for_ || pool_; }
 
   // fn(begin, end) over [0,n), cut at multiples of grain; blocks. A call from inside a worker runs serially
   // in the caller.

@@ -118,50 +118,95 @@ class Areas {
 
 }  // namespace
 
+namespace {
+
+// Contacts of one run, or of a part of it that ends between two features of body a.
+struct Finder {
+  std::span<const BodyView> bodies;
+  std::span<const ObstacleView> obstacles;
+  double h, offset;
+  std::span<const Crossing> crossings;
+  uint32_t nnode = 0;  // of all bodies
+
+  bool skips(const Candidate &c) const {
+    return find_slot(bodies, c.slot_a)->asleep &&
+           !(c.obstacle ? find_slot(obstacles, c.slot_b)->moves() : !find_slot(bodies, c.slot_b)->asleep);
+  }
+
+  // speed: m/s, bound over body b's surfels
+  void operator()(narrow::Run run, double speed, Array<ContactPoint> &out) const {
+    const Candidate &c = run.front();
+    const BodyView &a = *find_slot(bodies, c.slot_a);
+    if (!c.obstacle) {
+      const BodyView *const b = find_slot(bodies, c.slot_b);
+      const narrow::Pair pair{a, b, nullptr, h, offset, speed, of_pair(crossings, a.id, b->id)};
+      return (c.kind == 0 ? narrow::vertex_face : narrow::edge_edge)(pair, run, out);
+    }
+    const ObstacleView &view = *find_slot(obstacles, c.slot_b);
+    if (view.shape == Shape::mesh) {
+      const BodyView mesh{view.slot, nnode, view.category, view.collides_with, view.id, view.surface};
+      const double fastest = norm(view.velocity) + norm(view.spin) * view.extent;
+      return narrow::mesh_obstacle({a, &mesh, nullptr, h, offset, fastest, of_pair(crossings, a.id, view.id)},
+                                   view, c.kind, run, out);
+    }
+    const ObstacleShape shape(view);
+    const narrow::Pair pair{a, nullptr, &shape, h, offset, 0};
+    const auto triangle = view.shape == Shape::voxels ? narrow::voxel_triangle : narrow::triangle_obstacle;
+    (c.kind == 0 ? narrow::surfel_obstacle : c.kind == 1 ? narrow::edge_obstacle : triangle)(pair, run, out);
+  }
+};
+
+bool same_run(const Candidate &l, const Candidate &r) {
+  return l.slot_a == r.slot_a && l.slot_b == r.slot_b && l.obstacle == r.obstacle && l.kind == r.kind;
+}
+
+// Candidates that are worth a block of their own: some ten microseconds.
+constexpr size_t kBlock = 192;
+
+}  // namespace
+
+NarrowBlocks::NarrowBlocks(const Memory &m) : memory_(&m), pieces_(HookAllocator<Piece>(m)) {}
+
+void NarrowBlocks::add(const Array<Candidate> &list, size_t begin, size_t end, double speed) {
+  const Candidate &first = list[begin];
+  // contacts of two surfaces are told apart by what is at one feature of body a; others by the whole run
+  if (!first.obstacle)
+    for (size_t at = begin + kBlock; at < end; ++at)
+      if (list[at].feature_a != list[at - 1].feature_a) {
+        pieces_.push_back({begin, at, speed});
+        begin = at;
+        at += kBlock - 1;
+      }
+  pieces_.push_back({begin, end, speed});
+}
+
 void find_contacts(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
                    const Array<Candidate> &candidates, double h, double offset,
-                   std::span<const Crossing> crossings, Array<uint8_t> &lent, Array<ContactPoint> &out) {
+                   std::span<const Crossing> crossings, Array<uint8_t> &lent, Array<ContactPoint> &out,
+                   NarrowBlocks *blocks, Tasks *tasks) {
   out.clear();
-  uint32_t nnode = 0;
-  for (const BodyView &b : bodies) nnode = std::max(nnode, b.first_node + b.surface->nsurfel);
+  Finder find{bodies, obstacles, h, offset, crossings};
+  for (const BodyView &b : bodies) find.nnode = std::max(find.nnode, b.first_node + b.surface->nsurfel);
+  const bool parts = blocks && tasks && tasks->parallel() && candidates.size() > 2 * kBlock;
+  if (parts) blocks->start();
   const BodyView *fast = nullptr;
   double speed = 0;
   for (size_t i = 0; i < candidates.size();) {
     const Candidate &c = candidates[i];
     size_t end = i + 1;
-    while (end < candidates.size() && candidates[end].slot_a == c.slot_a &&
-           candidates[end].slot_b == c.slot_b && candidates[end].obstacle == c.obstacle &&
-           candidates[end].kind == c.kind)
-      ++end;
-    const narrow::Run run(&c, end - i);
+    while (end < candidates.size() && same_run(candidates[end], c)) ++end;
+    const size_t begin = i;
     i = end;
-    const BodyView &a = *find_slot(bodies, c.slot_a);
-    if (a.asleep &&
-        !(c.obstacle ? find_slot(obstacles, c.slot_b)->moves() : !find_slot(bodies, c.slot_b)->asleep))
-      continue;
-    if (c.obstacle) {
-      const ObstacleView &view = *find_slot(obstacles, c.slot_b);
-      if (view.shape == Shape::mesh) {
-        const BodyView mesh{view.slot, nnode, view.category, view.collides_with, view.id, view.surface};
-        const double fastest = norm(view.velocity) + norm(view.spin) * view.extent;
-        narrow::mesh_obstacle({a, &mesh, nullptr, h, offset, fastest, of_pair(crossings, a.id, view.id)},
-                              view, c.kind, run, out);
-        continue;
-      }
-      const ObstacleShape shape(view);
-      const narrow::Pair pair{a, nullptr, &shape, h, offset, 0, of_pair(crossings, a.id, view.id)};
-      const auto triangle = view.shape == Shape::voxels ? narrow::voxel_triangle : narrow::triangle_obstacle;
-      (c.kind == 0   ? narrow::surfel_obstacle
-       : c.kind == 1 ? narrow::edge_obstacle
-                     : triangle)(pair, run, out);
-      continue;
+    if (find.skips(c)) continue;
+    if (!c.obstacle) {
+      const BodyView *const b = find_slot(bodies, c.slot_b);
+      if (b != fast) speed = largest_speed(*b->surface);
+      fast = b;
     }
-    const BodyView *b = find_slot(bodies, c.slot_b);
-    if (b != fast) speed = largest_speed(*b->surface);
-    fast = b;
-    const narrow::Pair pair{a, b, nullptr, h, offset, speed, of_pair(crossings, a.id, b->id)};
-    (c.kind == 0 ? narrow::vertex_face : narrow::edge_edge)(pair, run, out);
+    if (parts) blocks->add(candidates, begin, end, speed);
+    else find(narrow::Run(&c, end - begin), speed, out);
   }
+  if (parts) blocks->run(*tasks, candidates, find, out);
   Areas(bodies, obstacles, out, lent).share();
 }
 

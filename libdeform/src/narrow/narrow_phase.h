@@ -10,14 +10,56 @@
 // that bore each other in the last sub-step count on, convex or not. All decisions use this and the geometry
 // of the sub-step alone: more candidates never change the result.
 #pragma once
+#include <atomic>
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "contact/contact_set.h"
 #include "core/memory.h"
+#include "core/tasks.h"
 #include "geometry/views.h"
 
 namespace dfm {
+
+// The list of candidates cut into blocks that workers take, and what each has found. Cuts depend on the list
+// alone, contacts are put together in its order, and no block sees another: the bits are those of one thread.
+class NarrowBlocks {
+ public:
+  explicit NarrowBlocks(const Memory &memory);
+  void start() { pieces_.clear(); }
+  // A run of the list: all candidates of one pair and kind.
+  void add(const Array<Candidate> &list, size_t begin, size_t end, double speed);
+  // find(candidates, speed, contacts) for each block, re-entrant. Throws std::bad_alloc where one has no
+  // memory.
+  template <class Find>
+  void run(Tasks &tasks, const Array<Candidate> &list, const Find &find, Array<ContactPoint> &out) {
+    while (found_.size() < pieces_.size()) found_.emplace_back(HookAllocator<ContactPoint>(*memory_));
+    std::atomic<bool> failed{false};
+    tasks.parallel_for(static_cast<uint32_t>(pieces_.size()), 1, [&](uint32_t begin, uint32_t end) {
+      for (uint32_t k = begin; k < end; ++k) {
+        found_[k].clear();
+        try {
+          const Piece &p = pieces_[k];
+          find(std::span(&list[p.begin], p.end - p.begin), p.speed, found_[k]);
+        } catch (const std::bad_alloc &) {
+          failed = true;  // an exception must not leave a worker
+        }
+      }
+    });
+    if (failed) throw std::bad_alloc();
+    for (size_t k = 0; k < pieces_.size(); ++k) out.insert(out.end(), found_[k].begin(), found_[k].end());
+  }
+
+ private:
+  struct Piece {
+    size_t begin, end;
+    double speed;  // m/s, bound over body b's surfels
+  };
+  const Memory *memory_;
+  Array<Piece> pieces_;
+  std::vector<Array<ContactPoint>> found_;  // by piece
+};
 
 // candidates: in the order of BroadPhase::candidates(). out is cleared; contacts come sorted by (body a, body
 // before obstacle, body or obstacle b, kind, type_a, feature a, feature b), keys are unique. Does not
@@ -26,9 +68,11 @@ namespace dfm {
 //   offset     m, rest distance d_c
 //   crossings  ascending: what edges bore in the last sub-step
 //   lent       scratch that the caller keeps
+//   blocks, tasks   the same for work on several threads; null: none
 // Numbers that are not finite make no contact.
 void find_contacts(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
                    const Array<Candidate> &candidates, double h, double offset,
-                   std::span<const Crossing> crossings, Array<uint8_t> &lent, Array<ContactPoint> &out);
+                   std::span<const Crossing> crossings, Array<uint8_t> &lent, Array<ContactPoint> &out,
+                   NarrowBlocks *blocks = nullptr, Tasks *tasks = nullptr);
 
 }  // namespace dfm

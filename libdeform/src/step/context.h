@@ -13,6 +13,7 @@
 #include "contact/store.h"
 #include "friction/laws.h"
 #include "geometry/views.h"
+#include "narrow/narrow_phase.h"
 #include "state/world.h"
 #include "step/budget.h"
 #include "step/guard.h"
@@ -53,6 +54,7 @@ struct StepContext {
   BroadPhase broad;
   Array<ContactPoint> contacts;
   Array<uint8_t> lent;  // scratch of the narrow phase
+  NarrowBlocks narrow;
 
   // contact <-> friction
   ContactRows rows;

@@ -16,7 +16,7 @@ bool stage_narrow(World &w, StepContext &step, uint32_t *trouble) {
   };
   for (;;) {
     find_contacts(step.body_views, step.obstacle_views, step.broad.candidates(), step.h, w.offset,
-                  w.store.crossings, step.lent, step.contacts);
+                  w.store.crossings, step.lent, step.contacts, &step.narrow, &w.context->tasks);
     step.woken.clear();
     if (w.sleepers == 0) return true;
     for (const ContactPoint &c : step.contacts) {

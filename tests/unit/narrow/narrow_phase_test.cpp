@@ -571,6 +571,49 @@ TEST(FindContacts, CallOrderOfViews_DoesNotMatter) {
   EXPECT_TRUE(same_bits(a, scene.contacts(c)));
 }
 
+TEST(FindContacts, BlocksOnSeveralThreads_GiveTheBitsOfOne) {
+  Scene scene;
+  const Mesh cylinder = cylinder_mesh(0.2, 1, 48, 40);
+  scene.add(cylinder, {0, 0, -0.3});
+  scene.add(moved(cylinder, turn({0, 0, 1}, 0.02), {0.4005, 0.01, 0.003}));
+  scene.add(Shape::plane, {0, 0, -0.2004});
+  BroadPhase broad(Memory::standard());
+  broad.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset);
+  const Array<Candidate> &list = broad.candidates();
+  ASSERT_GT(list.size(), 1000u) << "too few for blocks";
+  const Array<ContactPoint> one = scene.contacts(list);
+  ASSERT_GT(one.size(), 20u);
+  NarrowBlocks blocks(Memory::standard());
+  for (const uint32_t threads : {2u, 3u, 8u}) {
+    Tasks tasks(threads, nullptr, nullptr);
+    for (int again = 0; again < 20; ++again) {
+      Array<ContactPoint> out;
+      Array<uint8_t> lent;
+      find_contacts(scene.bodies, scene.obstacles, list, scene.h, scene.offset, {}, lent, out, &blocks,
+                    &tasks);
+      ASSERT_TRUE(same_bits(out, one)) << threads << " threads";
+    }
+  }
+}
+
+TEST(FindContacts, BlockWithoutMemory_ThrowsInTheCaller) {
+  Scene scene;
+  const Mesh cylinder = cylinder_mesh(0.2, 1, 48, 40);
+  scene.add(cylinder);
+  scene.add(moved(cylinder, turn({0, 0, 1}, 0.02), {0.4005, 0.01, 0.003}));
+  BroadPhase broad(Memory::standard());
+  broad.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset);
+  Memory refusing = Memory::standard();
+  refusing.alloc = [](void *, size_t, size_t) -> void * { return nullptr; };
+  NarrowBlocks blocks(refusing);
+  Tasks tasks(2, nullptr, nullptr);
+  Array<ContactPoint> out;
+  Array<uint8_t> lent;
+  EXPECT_THROW(find_contacts(scene.bodies, scene.obstacles, broad.candidates(), scene.h, scene.offset, {},
+                             lent, out, &blocks, &tasks),
+               std::bad_alloc);
+}
+
 TEST(FindContacts, DegenerateShapes_StayFinite) {
   const Mesh box = box_mesh({1, 1, 1}, 2, 2, 2);
   for (int kind = 0; kind < 5; ++kind) {
