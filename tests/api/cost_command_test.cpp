@@ -256,7 +256,7 @@ TEST(Cost, UnstableChoice_IsNamedAndNotChosen) {
   fs::copy_file(std::string(DEFORM_BINARY_DIR) + "/lib/tiny/tiny_pump.so", plugins + "/tiny_pump.so",
                 fs::copy_options::overwrite_existing);
   setenv("DEFORM_PLUGIN_PATH", plugins.c_str(), 1);
-  const Study s = study("unstable", bar(R"("duration": 30, "step": "auto")", R"(, "spin": [0, 0, 9])"),
+  const Study s = study("unstable", bar(R"("duration": 3, "step": "auto")", R"(, "spin": [0, 0, 9])"),
                         {"--axes", "model", "--budget", "300", "--target", "10"});
   unsetenv("DEFORM_PLUGIN_PATH");
   ASSERT_EQ(s.result.exit_code, 0) << s.result.err;
