@@ -63,7 +63,7 @@ TEST(Structs, OfANewerCaller_AreRead) {
   struct {
     dfm_world_def known;
     double added[4];
-  } wd{dfm_world_def_default(), {7, 7, 7, 7}};
+  } wd{dfm_world_def_default(), {0, 0, 0, 0}};
   wd.known.size = sizeof wd;
   dfm_world w = 0;
   ASSERT_EQ(dfm_world_create(c, &wd.known, &w), DFM_OK) << dfm_last_error();
