@@ -164,7 +164,10 @@ std::string pick_text(const Study &study) {
   if (study.pick < 0 && !(study.reference_headline <= study.options.target))
     return "nothing can be said about " + target +
            ": the reference's own error is above it; a larger --budget makes the reference finer\n";
-  if (study.pick < 0) return "no choice that was run stays within " + target + "; give more with --budget\n";
+  if (study.pick < 0) {
+    return "no choice stays within " + target + " together with the reference's own error of " +
+           percent(study.reference_headline) + "; a larger --budget makes the reference finer\n";
+  }
   const Row &row = study.rows[size_t(study.pick)];
   std::string out = "cheapest within " + target + ": " + row.job.label + " (" + percent(row.headline) + ", " +
                     formatted("%.3g", row.cpu_per_s) + " cpu s per s)\n";
