@@ -9,7 +9,6 @@ namespace test::cover {
 inline std::string known_failure(const Row &row) {
   struct Known { const char *row, *why; };
   static constexpr const char *kFeet = "stands on the few surfels that thesis does not shrink, and wobbles";
-  static constexpr const char *kNear = "contacts at nearly one place pass load on too slowly (decision 0122)";
   static constexpr const char *kProngs = "prongs are not at rest yet";
   static constexpr Known kKnown[] = {
       {"msm,thesis,voxels,dahl,symplectic_euler", kFeet},
@@ -20,9 +19,6 @@ inline std::string known_failure(const Row &row) {
        "its feet plough the slab's mesh"},
       {"linear_fem,thesis,self,karnopp,symplectic_euler", "what thesis shrinks does not meet"},
       {"corotational_fem,mls,soft:msm,gms,symplectic_euler", "gms soft on soft (doc/laws/gms.md, limits)"},
-      {"linear_fem,identity,soft:linear_fem,coulomb,tr_bdf2", kNear},
-      {"modal,mls,soft:condensed,coulomb,tr_bdf2", kNear},
-      {"modal,barycentric,self,dahl,symplectic_euler", kProngs},
       {"shape_matching,mls,self,coulomb,symplectic_euler", kProngs},
       {"msm,identity,self,gms,implicit_euler", kProngs},
   };

@@ -1,6 +1,7 @@
 #include "contact/rows.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "math/width.h"
 
@@ -9,7 +10,7 @@ namespace dfm {
 ContactRows::ContactRows(const Memory &m) : kernels_(dense_kernels()) {
   use_memory(m, begin, dof, weight, y, y_free, alone, source, point, block, blocks, response_, given_, frame,
              drive, rate, wn, wt, cross, impulse, dof_of_point_, dof_of_node_, place_, rigid, arm,
-             dof_of_group_);
+             dof_of_group_, columns_, left_, first_column_, column_count_, first_value_);
 }
 
 // Of the dofs from `first` on.
@@ -339,6 +340,17 @@ void ContactRows::restore() {
   }
 }
 
+void ContactRows::restore(std::span<const uint32_t> contacts, std::span<const uint32_t> of_blocks) {
+  for (const uint32_t number : of_blocks) {
+    const size_t first = size_t(4) * blocks[number].first;
+    std::copy_n(&y_free[first], size_t(4) * blocks[number].count, &y[first]);
+  }
+  for (const uint32_t i : contacts) {
+    const Vec3 l = load3(&impulse[size_t(i) * 3]);
+    if (l.x != 0 || l.y != 0 || l.z != 0) apply(i, l);
+  }
+}
+
 void ContactRows::push_rigid(const Block &b) {
   for (uint32_t i = 0; i < n; ++i) {
     if (rigid[i] == kNone || rigid[i] < b.first || rigid[i] >= b.first + b.count) continue;
@@ -347,6 +359,75 @@ void ContactRows::push_rigid(const Block &b) {
     response_apply(b, rigid[i], -p);
     response_apply(b, rigid[i] + 1, -dfm::cross(load3(&arm[size_t(3) * i]), p));
   }
+}
+
+namespace {
+
+// What is left of a response when the largest diagonal is this share of what it was is rounding.
+constexpr double kRounding = 1e-13;
+
+}  // namespace
+
+// Each block's response is R = L L^T, by Cholesky's method that takes the largest diagonal next (Higham 1990)
+// and stops where nothing is left: the columns of L are motions that answer unit impulses.
+bool ContactRows::motions(std::span<const uint32_t> contacts, std::span<const uint32_t> of_blocks,
+                          uint32_t most, Array<double> &g, uint32_t &rank) {
+  columns_.clear();
+  for (Array<size_t> *a : {&first_column_, &column_count_, &first_value_}) a->assign(blocks.size(), 0);
+  size_t found = 0;
+  for (const uint32_t number : of_blocks) {
+    const Block &b = blocks[number];
+    const size_t size = size_t(3) * b.count, start = columns_.size();
+    const auto value = [&](size_t row, size_t column) { return response(b, column, row / 3, row % 3); };
+    first_column_[number] = found;
+    first_value_[number] = start;
+    left_.resize(size);
+    double top = 0;
+    for (size_t k = 0; k < size; ++k) top = std::max(top, left_[k] = value(k, k));
+    for (size_t own = 0; own < size; ++own) {
+      const size_t pivot = size_t(std::max_element(left_.begin(), left_.end()) - left_.begin());
+      if (!(left_[pivot] > kRounding * top)) break;
+      if (++found > most) return false;
+      const size_t at = columns_.size();
+      columns_.resize(at + size);
+      const double *const before = &columns_[start];
+      const double root = std::sqrt(left_[pivot]);
+      for (size_t k = 0; k < size; ++k) {
+        double sum = value(k, pivot);
+        for (size_t c = 0; c < own; ++c) sum -= before[c * size + k] * before[c * size + pivot];
+        columns_[at + k] = sum / root;
+        left_[k] = std::max(0.0, left_[k] - columns_[at + k] * columns_[at + k]);
+      }
+      left_[pivot] = 0;
+    }
+    column_count_[number] = found - first_column_[number];
+  }
+  rank = static_cast<uint32_t>(found);
+  const size_t width = (found + 3) & ~size_t{3};
+  g.assign(size_t(3) * contacts.size() * width, 0.0);
+  for (size_t k = 0; k < contacts.size(); ++k) {
+    const uint32_t i = contacts[k];
+    const double *const f = &frame[size_t(9) * i];
+    double *const to = &g[3 * k * width];
+    // what each motion of its block makes of the contact's velocity
+    const auto put = [&](uint32_t d, auto &&change) {
+      const uint32_t number = block[d];
+      const Block &b = blocks[number];
+      for (size_t c = 0; c < column_count_[number]; ++c) {
+        const size_t at = first_value_[number] + c * 3 * b.count + size_t(3) * (d - b.first);
+        const Vec3 u = change(&columns_[at]);
+        for (size_t row = 0; row < 3; ++row)
+          to[row * width + first_column_[number] + c] += dot(load3(f + 3 * row), u);
+      }
+    };
+    for (uint32_t j = begin[i]; j < begin[i + 1]; ++j)
+      put(dof[j], [&](const double *at) { return weight[j] * load3(at); });
+    if (!rigid.empty() && rigid[i] != kNone)
+      put(rigid[i], [&](const double *at) {
+        return -(load3(at) + dfm::cross(load3(at + 3), load3(&arm[size_t(3) * i])));
+      });
+  }
+  return true;
 }
 
 }  // namespace dfm

@@ -104,6 +104,13 @@ struct ContactRows {
   void apply(uint32_t i, Vec3 impulse_frame);  // changes y by an impulse given in the frame
   // y from the impulses alone: sweeps have left it not finite, or with their rounding
   void restore();
+  // The same for blocks that these contacts alone act on.
+  void restore(std::span<const uint32_t> contacts, std::span<const uint32_t> of_blocks);
+  // G [3 contacts, padded] with velocity = velocity without impulses + G G^T impulse for contacts that act on
+  // these blocks alone, padded: rank rounded up to fours, with zeros. False: they move in more ways than
+  // `most`.
+  bool motions(std::span<const uint32_t> contacts, std::span<const uint32_t> of_blocks, uint32_t most,
+               Array<double> &g, uint32_t &rank);
   // changes y of a rigid group by all impulses that act on it: its response has been renewed
   void push_rigid(const Block &group);
 
@@ -117,6 +124,10 @@ struct ContactRows {
   // per block [3 count columns, 4 count], 1/kg: what an impulse at one dof changes of all, as y has them
   Array<double> response_;
   Array<double> given_;  // scratch
+  // of motions(): columns of its blocks, what is left of a diagonal; [blocks] first column, columns, and
+  // place of their first value
+  Array<double> columns_, left_;
+  Array<size_t> first_column_, column_count_, first_value_;
   void add_block(uint32_t from, uint32_t first, uint32_t group);
   void take_response(const Block &b);
   void take_answers(const Block &b);

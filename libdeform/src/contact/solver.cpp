@@ -1,6 +1,7 @@
 #include "contact/solver.h"
 
 #include <algorithm>
+#include <functional>
 #include <limits>
 
 namespace dfm {
@@ -225,12 +226,13 @@ Pair answered(const ContactRows &rows, const ContactState &s, uint32_t i, double
   return friction_impulse(rows, s, i, h, rows.impulse[size_t(i) * 3], u.y, u.z);
 }
 
-// law(i, u) gives the friction impulse that contact i should carry.
-template <class Law>
-Residual residual(const ContactRows &rows, const Tolerance &tolerance, Law law) {
+// Of the contacts which(0) to which(n - 1); law(i, u) gives the friction impulse that contact i should carry.
+template <class Which, class Law>
+Residual residual(const ContactRows &rows, const Tolerance &tolerance, uint32_t n, Which which, Law law) {
   Residual r;
   double poison = 0;
-  for (uint32_t i = 0; i < rows.n; ++i) {
+  for (uint32_t k = 0; k < n; ++k) {
+    const uint32_t i = which(k);
     if (!(rows.wn[i] > 0)) continue;
     const double *const l = &rows.impulse[size_t(i) * 3];
     const Vec3 u = rows.velocity(i);
@@ -257,14 +259,24 @@ Residual residual(const ContactRows &rows, const Tolerance &tolerance, Law law) 
 
 Residual inner_residual(const ContactRows &rows, const ContactState &law, double h,
                         const Tolerance &tolerance) {
-  return residual(rows, tolerance, [&](uint32_t i, Vec3 u) {
+  return residual(rows, tolerance, rows.n, std::identity(), [&](uint32_t i, Vec3 u) {
     return friction_impulse(rows, law, i, h, rows.impulse[size_t(i) * 3], u.y, u.z);
   });
 }
 
+Residual inner_residual(const ContactRows &rows, const ContactState &law, double h,
+                        const Tolerance &tolerance, std::span<const uint32_t> contacts) {
+  return residual(
+      rows, tolerance, static_cast<uint32_t>(contacts.size()), [&](uint32_t k) { return contacts[k]; },
+      [&](uint32_t i, Vec3 u) {
+        return friction_impulse(rows, law, i, h, rows.impulse[size_t(i) * 3], u.y, u.z);
+      });
+}
+
 Residual true_residual(const ContactRows &rows, const ContactState &answer, double h,
                        const Tolerance &tolerance) {
-  return residual(rows, tolerance, [&](uint32_t i, Vec3 u) { return answered(rows, answer, i, h, u); });
+  return residual(rows, tolerance, rows.n, std::identity(),
+                  [&](uint32_t i, Vec3 u) { return answered(rows, answer, i, h, u); });
 }
 
 void set_tolerance(const ContactRows &rows, const ContactState &answer,

@@ -61,6 +61,9 @@ struct Residual { double relative = 0, due = 0, speed = 0, normal = 0; };
 // of the linearized laws
 Residual inner_residual(const ContactRows &rows, const ContactState &law, double h,
                         const Tolerance &tolerance);
+// the same of some contacts
+Residual inner_residual(const ContactRows &rows, const ContactState &law, double h,
+                        const Tolerance &tolerance, std::span<const uint32_t> contacts);
 // laws asked at this state
 Residual true_residual(const ContactRows &rows, const ContactState &answer, double h,
                        const Tolerance &tolerance);

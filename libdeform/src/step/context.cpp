@@ -7,6 +7,7 @@ StepContext::StepContext(const Memory &m)
       narrow(m),
       rows(m),
       acceleration(m),
+      proximal(m),
       batches(m),
       areas(m),
       exchange(m),

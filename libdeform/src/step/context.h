@@ -8,6 +8,7 @@
 #include "contact/areas.h"
 #include "contact/distribute.h"
 #include "contact/exchange.h"
+#include "contact/proximal.h"
 #include "contact/renewal.h"
 #include "contact/solver.h"
 #include "contact/store.h"
@@ -60,10 +61,12 @@ struct StepContext {
   ContactRows rows;
   ContactState state;
   Acceleration acceleration;
+  Proximal proximal;
   Tolerance tolerance;
   Residual residual;
   uint32_t passes = 0, sweeps = 0;
   Array<double> disturbance, best_impulse, trial_response;
+  Array<uint8_t> revised;  // [blocks of rows] the body answers otherwise by its impulses
   LawBatches batches;
   Array<double> tangents;
   // [contacts] place in the store that the contact goes on from, or kNone

@@ -115,6 +115,48 @@ const double *trial_response(const World &w, StepContext &step) {
   return step.trial_response.data();
 }
 
+// Of bodies that move in few ways sweeps hand loads over too slowly: what they have left at the cap goes on
+// in long strides. rho is 1000 over a contact's own response; less where a stride is not found so. The
+// strides of a part cost no more than so many times its sweeps up to the cap; what is left then is left to
+// the next sub-step, which begins there. Not of bodies that revise what they answer: impulses that move far
+// move them.
+constexpr uint32_t kMostStrides = 12, kStridesOverCap = 32;
+constexpr double kRho = 1e3, kLeastRho = 10;
+void stride_on(World &w, StepContext &step, const Tolerance &tolerance, uint32_t part) {
+  Proximal &proximal = step.proximal;
+  const std::span<const uint32_t> contacts = proximal.contacts(part);
+  const auto left = [&] { return inner_residual(step.rows, step.state, step.h, tolerance, contacts); };
+  double best = left().due, rho = kRho;
+  if (best <= 1 || !proximal.take(step.rows, part)) return;
+  const uint64_t most = uint64_t{kStridesOverCap} * w.def.max_sweeps * contacts.size();
+  uint64_t work = 0;
+  for (uint32_t k = 0; k < kMostStrides && rho >= kLeastRho && work < most; ++k) {
+    const bool found = proximal.stride(step.rows, step.state, step.h, rho);
+    work += proximal.work();
+    charge(w, step, proximal.work());
+    if (!found) {
+      rho *= 0.1;
+      continue;
+    }
+    const Residual now = left();
+    if (now.due < best) {
+      best = now.due;
+      for (const uint32_t i : contacts)
+        std::copy_n(&step.rows.impulse[size_t(3) * i], 3, &step.best_impulse[size_t(3) * i]);
+    }
+    if (good(step, now, 0.5)) break;
+  }
+  proximal.put(step.rows, step.best_impulse.data());
+}
+void stride_on(World &w, StepContext &step, const Tolerance &tolerance) {
+  if (spares(step, Thrift::sweeps)) return;
+  step.revised.clear();
+  for (const ContactRows::Block &b : step.rows.blocks)
+    step.revised.push_back(b.group == kNone && w.bodies[b.source]->dynamics->abilities().revises);
+  const uint32_t parts = step.proximal.find_parts(step.rows, step.revised);
+  for (uint32_t part = 0; part < parts; ++part) stride_on(w, step, tolerance, part);
+}
+
 // Sweeps on the laws as they were last answered. At the cap the best state seen is taken, not the last one.
 void sweep_until_good(World &w, StepContext &step, Acceleration &acceleration, const Tolerance &tolerance) {
   const uint32_t cap = asks_beyond(w, step) ? step.sweeps + kPassSweeps : w.def.max_sweeps;
@@ -146,6 +188,7 @@ void sweep_until_good(World &w, StepContext &step, Acceleration &acceleration, c
     step.rows.apply(i, change);
     store3(l, load3(&step.best_impulse[size_t(i) * 3]));
   }
+  if (best > 1) stride_on(w, step, tolerance);
 }
 
 }  // namespace

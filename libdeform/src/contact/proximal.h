@@ -1,0 +1,70 @@
+// Contacts of bodies that move in few ways: more contacts than motions to hold them by.
+//
+// With r motions (modes, a rigid body) and n contacts, W = G G^T with G [3n, r], and impulses that change no
+// motion lie in its null space. They are not told by the motion, but complementarity decides on them: a
+// contact that carries load at a gap has to hand it to others. A sweep moves such loads by u / w at most,
+// the same each time, so what has to be handed over takes thousands of sweeps, at a rate that no acceleration
+// of them knows, because nothing else changes (doc/decisions/0225).
+//
+// The proximal point method takes the same way in long strides (Rockafellar 1976). With l0 the impulses so
+// far, it solves the contact problem in which each contact gives way to its change of impulse by 1/rho beside
+// what the bodies do,
+//     l = P(l0 - rho (u(l) + b)),       P: laws of normal contact and friction,
+// and begins again from there; its fixed points are those of the sweeps. Where rho is 1000 / w a stride is
+// worth about as many sweeps. Each is found by Newton's method in the r rates z of the motions alone,
+//     F(z) = z - G^T l(u0 + G z),
+// whose matrix I - G^T (dl/du) G is of size r and regular, with a line search on |F|.
+//
+// What does not touch, directly or by others, is solved apart: a part is the contacts that share motions.
+#pragma once
+#include <span>
+
+#include "contact/contact_state.h"
+#include "contact/rows.h"
+
+namespace dfm {
+
+class Proximal {
+ public:
+  explicit Proximal(const Memory &memory);
+  // The parts of these rows. leave: [blocks] 1: a part with this block is none of them; nor is one with
+  // points that answer their own impulses alone.
+  uint32_t find_parts(const ContactRows &rows, std::span<const uint8_t> leave);
+  std::span<const uint32_t> contacts(uint32_t part) const;
+  // False: its bodies move in too many ways.
+  bool take(ContactRows &rows, uint32_t part);
+  // One stride of the part taken from the rows' impulses, which change; rho: over each contact's own 1 /
+  // response. False: it was not found, and nothing has changed.
+  bool stride(ContactRows &rows, const ContactState &law, double h, double rho);
+  // The part taken, as it is with these impulses [3 rows.n].
+  void put(ContactRows &rows, const double *impulse) const;
+  // Work of the last stride in contacts swept.
+  uint64_t work() const { return work_; }
+
+ private:
+  // l, and its derivative by u, [3,3] row-major
+  struct Answer { double l[3], slope[9]; };
+  struct Part { uint32_t root, contact, block; };  // first of its contacts, of its blocks
+  Array<Part> parts_;                              // and one behind the last
+  Array<uint32_t> root_;                           // [blocks] the part's lowest block
+  Array<uint8_t> alone_;                           // [blocks] of a root: the part is left alone
+  Array<uint32_t> contact_, block_;                // by part
+  std::span<const uint32_t> contacts_, blocks_;    // of the part taken
+  uint32_t n_ = 0, r_ = 0, width_ = 0;             // width: r, padded with zeros to whole fours
+  uint64_t work_ = 0;
+  Array<double> g_;                   // [3n, width]
+  Array<double> from_;                // [3n] m/s without impulses
+  Array<double> start_;               // [3n] l0
+  Array<double> z_, try_, f_, down_;  // [width]
+  Array<double> u_, l_;               // [3n]
+  Array<double> slope_;               // [n,9]
+  Array<double> matrix_;              // [r, width]
+  uint32_t root_of(uint32_t block) const;
+  bool answer(const ContactRows &rows, const ContactState &law, uint32_t k, double h, double rho,
+              Answer &out) const;
+  double residual(const ContactRows &rows, const ContactState &law, double h, double rho, const double *z,
+                  double *f);
+  bool newton();
+};
+
+}  // namespace dfm

@@ -1,0 +1,101 @@
+// Long strides for contacts of bodies that move in few ways: the operator by its motions, which contacts
+// belong together, and loads that sweeps hand over too slowly.
+#include "contact/proximal.h"
+
+#include <cmath>
+
+#include "contact/solver.h"
+#include "near.h"
+#include "rows_case.h"
+
+namespace {
+
+using namespace dfm;
+using test::RowsCase;
+
+constexpr uint8_t kNobody[2] = {0, 0};
+
+std::vector<uint32_t> first(uint32_t n) {
+  std::vector<uint32_t> out;
+  for (uint32_t i = 0; i < n; ++i) out.push_back(i);
+  return out;
+}
+
+}  // namespace
+
+// W = G G^T, of a body that steps itself against jointed rigid ones.
+TEST(Rows, Motions_GiveTheOperator) {
+  RowsCase c({2, 2, 2});
+  Array<double> g;
+  uint32_t rank = 0;
+  ASSERT_TRUE(c.rows.motions(first(3), first(2), 15, g, rank));
+  EXPECT_EQ(rank, 15u);
+  const test::Dense w = c.delassus();
+  for (size_t i = 0; i < 9; ++i)
+    for (size_t j = 0; j < 9; ++j) {
+      double sum = 0;
+      for (size_t k = 0; k < 16; ++k) sum += g[16 * i + k] * g[16 * j + k];
+      EXPECT_NEAR(sum, w(i, j), 1e-12);
+    }
+  EXPECT_FALSE(c.rows.motions(first(3), first(2), 14, g, rank));
+}
+
+TEST(Proximal, Parts_AreWhatSharesMotionsAndHasNoPointsOfItsOwn) {
+  Proximal p{Memory::standard()};
+  const RowsCase apart({0, 2, 4, 2});
+  ASSERT_EQ(p.find_parts(apart.rows, kNobody), 1u);
+  EXPECT_EQ(std::vector<uint32_t>(p.contacts(0).begin(), p.contacts(0).end()), (std::vector<uint32_t>{1, 3}));
+  const uint8_t second[2] = {0, 1};
+  EXPECT_EQ(p.find_parts(apart.rows, second), 0u) << "a block that is to be left";
+  const RowsCase tied({1, 2});
+  EXPECT_EQ(p.find_parts(tied.rows, kNobody), 0u) << "the first contact has points too";
+}
+
+// Three contacts in one place, a hair's breadth apart: the nearest has to carry all, and the farthest does. A
+// sweep moves no more of it than rate / w_n, so that hundreds of them are not enough; a stride moves a
+// thousand times as much.
+TEST(Proximal, LoadOnTheFartherOfEqualContacts_IsHandedOver) {
+  constexpr double kMu = 0.5;
+  RowsCase c({2, 2, 2});
+  ContactRows &rows = c.rows;
+  rows.y.assign(rows.y.size(), 0.0);
+  rows.drive.assign(rows.drive.size(), 0.0);
+  rows.rate = {0, 1e-3, 2e-3};
+  const Vec3 taken{1, 0.2, -0.1};
+  rows.apply(0, -taken);
+  rows.y_free.assign(rows.y.begin(), rows.y.end());
+  rows.impulse.assign(9, 0.0);
+  store3(&rows.impulse[6], taken);
+  rows.restore();
+  ContactState law;
+  law.resize(3, 0);
+  for (uint32_t i = 0; i < 3; ++i) {
+    law.set_valued[i] = 1;
+    law.mode[i] = 1;
+    law.fn[i] = 1;
+    law.limit[i] = kMu;
+  }
+  Tolerance t;
+  t.normal.assign(3, 1e-9);
+  t.tangent.assign(3, 1e-9);
+  t.most_normal = 1e-9;
+  const auto left = [&] { return inner_residual(rows, law, RowsCase::kStep, t).speed; };
+  const Array<double> impulse(rows.impulse), y(rows.y);
+  for (int k = 0; k < 200; ++k) sweep(rows, law, RowsCase::kStep);
+  EXPECT_GT(left(), 1e-4);
+  rows.impulse = impulse;
+  rows.y = y;
+
+  Proximal p{Memory::standard()};
+  ASSERT_EQ(p.find_parts(rows, kNobody), 1u);
+  ASSERT_TRUE(p.take(rows, 0));
+  for (int k = 0; k < 10; ++k) ASSERT_TRUE(p.stride(rows, law, RowsCase::kStep, 1e3)) << k;
+  EXPECT_GT(p.work(), 0u);
+  EXPECT_LT(left(), 1e-9);
+  EXPECT_LT(inner_residual(rows, law, RowsCase::kStep, t, first(1)).speed, 1e-9);
+  test::expect_near(load3(&rows.impulse[0]), taken, 1e-6);
+  EXPECT_EQ(rows.impulse[6], 0);
+  p.put(rows, impulse.data());
+  EXPECT_EQ(rows.impulse, impulse);
+  test::expect_near(rows.velocity(2), {0, 0, 0}, 1e-12);
+}
