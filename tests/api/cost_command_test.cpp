@@ -291,7 +291,7 @@ TEST(Cost, WhatCannotBeStudied_IsOneSentence) {
   refused("axis", bar(R"("duration": 0.1)"), {"--axes", "tyme"}, "did you mean \"time\"?");
   refused("quantity", bar(R"("duration": 0.02)"), {"--axes", "guard", "--quantity", "tipp"},
           "did you mean \"tip\"?");
-  refused("apply", bar(R"("duration": 0.02)"), {"--axes", "time", "--target", "1e-30", "--apply", "x.json"},
-          "nothing to apply");
+  refused("nothing_to_apply", bar(R"("duration": 0.02)"),
+          {"--axes", "time", "--target", "1e-30", "--apply", "x.json"}, "nothing to apply");
   refused("budget_sign", bar(R"("duration": 0.02)"), {"--budget", "-1"}, "expected a finite number above 0");
 }
