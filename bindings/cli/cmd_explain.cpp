@@ -36,6 +36,16 @@ void print_list(const JsonValue &plan, const char *key, const char *title,
   }
 }
 
+// What parameters call for, and the list of effects does not have.
+void print_left_out(const JsonValue &plan) {
+  const JsonValue *list = plan.find("left_out");
+  for (size_t i = 0; list && i < list->items.size(); ++i) {
+    const JsonValue &row = list->items[i];
+    std::printf("  %-20s  off: not in the list of effects; %s calls for it: %s\n", row.get("name").c_str(),
+                row.get("of").c_str(), row.get("by").c_str());
+  }
+}
+
 // Parameters that do nothing, or not what they name.
 void print_idle(const JsonValue &plan) {
   const JsonValue *bodies = plan.find("bodies");
@@ -149,7 +159,8 @@ int explain(const Options &options, Globals &globals) {
     return kDone;
   }
   print_planned(planned);
-  print_list(plan, "effects", "effects", {"asked_by", "provided_by"});
+  print_list(plan, "effects", "effects", {"state", "asked_by", "provided_by"});
+  print_left_out(plan);
   print_list(plan, "stages", "stages of a step, in order", {"why", "cost"});
   print_list(plan, "absent", "left out", {"why"});
   print_list(plan, "bodies", "bodies", {"model", "kind", "surface", "cells", "points", "surfels"});

@@ -176,12 +176,43 @@ std::string params_of(const SceneFile &scene, const std::string &body) {
   }
 }
 
-// A list of effects would ask for the one that is left out.
-void without_list(const SceneFile &scene, std::vector<std::string> &set) {
-  const std::string listed = scene.value("/effects");
-  if (listed.empty() || listed[0] != '[') return;
-  set.push_back("/effects=auto");
-  if (listed.find("\"self_contact\"") != std::string::npos) set.push_back("/contact/self=true");
+std::vector<std::string> names_of(const JsonValue &plan, const char *list) {
+  std::vector<std::string> out;
+  const JsonValue *const rows = plan.find(list);
+  for (size_t i = 0; rows && i < rows->items.size(); ++i) out.push_back(rows->items[i].get("name"));
+  return out;
+}
+
+bool is_in(const std::vector<std::string> &names, const std::string &name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+// The plan's effects as a list that leaves some out.
+std::string list_without(const JsonValue &plan, const std::vector<std::string> &gone) {
+  std::vector<std::string> names;
+  for (const std::string &name : names_of(plan, "effects"))
+    if (!is_in(gone, name)) names.push_back(quoted(name));
+  return "/effects=" + json_array(names);
+}
+
+bool is_listed(const SceneFile &scene) { return scene.value("/effects").rfind('[', 0) == 0; }
+
+// What bodies or laws of the plan bring.
+std::vector<std::string> brought(const JsonValue &plan, const char *by) {
+  std::vector<std::string> out;
+  const JsonValue *const things = plan.find(by);
+  for (size_t i = 0; things && i < things->items.size(); ++i)
+    for (std::string &name : names_of(things->items[i], "effects")) out.push_back(std::move(name));
+  return out;
+}
+
+bool law_has(const JsonValue &plan, const std::string &effect) {
+  const JsonValue *const laws = plan.find("laws");
+  for (size_t l = 0; laws && l < laws->items.size(); ++l)
+    if (const JsonValue *const effects = laws->items[l].find("effects"))
+      for (const JsonValue &e : effects->items)
+        if (e.get("name") == effect && e.get("works") == "true") return true;
+  return false;
 }
 
 std::string switches_text(const JsonValue &effect, const char *which) {
@@ -202,6 +233,27 @@ void print_cost(const EffectCost &c) {
   std::printf("; %s %.3g us per step, %+.2g %% (%+.3g to %+.3g us; %u pairs of %u steps)", unit,
               saves ? -1e6 * c.median : 1e6 * c.median, c.with > 0 ? 100 * c.median / c.with : 0.0,
               1e6 * c.low, 1e6 * c.high, c.pairs, c.steps);
+}
+
+// The effects of each law: used, idle, or its own.
+void print_laws(const JsonValue &plan) {
+  const JsonValue *const laws = plan.find("laws");
+  if (laws && !laws->items.empty()) std::printf("effects of each law\n");
+  for (size_t l = 0; laws && l < laws->items.size(); ++l) {
+    const JsonValue &law = laws->items[l];
+    const std::string name = law.get("name"), asked = law.get("asked");
+    if (asked != name) std::printf("  %-20s  in place of %s\n", name.c_str(), asked.c_str());
+    const JsonValue *const effects = law.find("effects");
+    for (size_t e = 0; effects && e < effects->items.size(); ++e) {
+      const JsonValue &effect = effects->items[e];
+      const bool works = effect.get("works") == "true";
+      const char *const word = effect.get("used") == "true" ? "used" : works ? "on, not asked for" : "idle";
+      std::printf("  %-20s  %-18s  %s%s\n", name.c_str(), effect.get("name").c_str(), word,
+                  works && effect.get("switchable") != "true"
+                      ? "; no parameter switches it off: it is the law's own"
+                      : "");
+    }
+  }
 }
 
 const EffectCost *cost_of(const std::vector<EffectCost> *costs, const std::string &body,
@@ -233,21 +285,30 @@ std::vector<EffectCost> measure_effects(Globals &globals, SceneFile &scene,
       const JsonValue *const switches = effect.find("switches");
       if (effect.get("works") != "true" || !switches || switches->items.empty()) continue;
       Off off;
-      for (const JsonValue &s : switches->items) {
-        off.params.push_back(params_of(scene, body) + s.get("key") + "=" + text_of(*s.find("off")));
-        off.values.emplace_back(s.get("key"), std::strtod(s.get("off_value").c_str(), nullptr));
+      if (is_listed(scene)) {
+        off.set.push_back(list_without(plan, {name}));
+      } else {
+        for (const JsonValue &s : switches->items) {
+          off.params.push_back(params_of(scene, body) + s.get("key") + "=" + text_of(*s.find("off")));
+          off.values.emplace_back(s.get("key"), std::strtod(s.get("off_value").c_str(), nullptr));
+        }
       }
-      without_list(scene, off.set);
       out.push_back(
           meter.measure(body, name, off, [&](const JsonValue &other) { return works(other, body, name); }));
     }
   }
-  if (planned(plan, "self_contact")) {
+  // those of the laws and of contact
+  const std::vector<std::string> of_bodies = brought(plan, "bodies"), of_laws = brought(plan, "laws");
+  for (const std::string &name : names_of(plan, "effects")) {
+    if (is_in(of_bodies, name)) continue;
+    std::vector<std::string> gone = {name};
+    if (name == "friction") gone.insert(gone.end(), of_laws.begin(), of_laws.end());
     Off off;
-    without_list(scene, off.set);
-    off.set.push_back("/contact/self=false");
-    out.push_back(meter.measure("", "self_contact", off,
-                                [](const JsonValue &other) { return planned(other, "self_contact"); }));
+    off.set.push_back(list_without(plan, gone));
+    out.push_back(meter.measure("", name, off, [&](const JsonValue &other) {
+      if (law_has(other, name)) throw Failure(kBadInput, "it is the law's own");
+      return planned(other, name);
+    }));
   }
   return out;
 }
@@ -271,6 +332,7 @@ std::string costs_json(const std::vector<EffectCost> &costs) {
 
 void print_effects(const JsonValue &plan, const std::vector<EffectCost> *costs) {
   const JsonValue *const bodies = plan.find("bodies");
+  print_laws(plan);
   bool measurable = false;
   std::printf("effects of each body%s\n",
               costs ? ", and the processor time that each adds to a step, by pairs with and without it" : "");
@@ -292,9 +354,12 @@ void print_effects(const JsonValue &plan, const std::vector<EffectCost> *costs) 
       std::printf("\n");
     }
   }
-  if (const EffectCost *const self = cost_of(costs, "", "self_contact")) {
-    std::printf("  %-20s  %-18s  used; off with contact.self false", "(scene)", "self_contact");
-    print_cost(*self);
+  for (size_t i = 0; costs && i < costs->size(); ++i) {
+    const EffectCost &c = (*costs)[i];
+    if (!c.body.empty()) continue;
+    std::printf("  %-20s  %-18s  used; off where the list of effects does not have it", "(scene)",
+                c.effect.c_str());
+    print_cost(c);
     std::printf("\n");
   }
   if (!costs && measurable) std::printf("  --costs measures on this machine what each of them costs\n");

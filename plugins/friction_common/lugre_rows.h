@@ -2,6 +2,7 @@
 // micro-damping that can push.
 #pragma once
 #include "bristle.h"
+#include "without.h"
 
 namespace lugre {
 
@@ -66,5 +67,12 @@ inline dfm_status prepare(const dfm_host *host, const double *p, void **data) {
 }
 
 inline void release(const dfm_host *, void *) {}
+
+template <class Law>
+constexpr dfm_friction ops() {
+  dfm_friction f = bristle::ops<Law>();
+  f.without = without::level<kMuC, kMuS, kSigma2>;
+  return f;
+}
 
 }  // namespace lugre

@@ -14,6 +14,7 @@
 // every vector width.
 #pragma once
 #include "curve.h"
+#include "without.h"
 
 namespace stribeck {
 
@@ -236,5 +237,11 @@ inline dfm_status check(const double *p, char *why, size_t cap) {
 
 constexpr uint32_t kNeeds = DFM_NEED_FN | DFM_NEED_VT | DFM_NEED_FT_STOP | DFM_NEED_AREA;
 constexpr uint32_t kFlags = DFM_FRIC_SET_VALUED | DFM_FRIC_ISOTROPIC | DFM_FRIC_PASSIVE | DFM_FRIC_JACOBIAN;
+
+constexpr dfm_friction ops(dfm::plugin::Eval eval) {
+  dfm_friction f = dfm::plugin::friction(kNeeds, kFlags, eval, check);
+  f.without = without::level<kMuC, kMuS, kSigma2>;
+  return f;
+}
 
 }  // namespace stribeck

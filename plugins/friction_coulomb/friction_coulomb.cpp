@@ -10,8 +10,7 @@ struct Coulomb : stribeck::Run<Coulomb> {
   static double band(const double *) { return 0; }
 };
 
-const dfm_friction law =
-    dfm::plugin::friction(stribeck::kNeeds, stribeck::kFlags, lanes::eval<Coulomb>, stribeck::check);
+const dfm_friction law = stribeck::ops(lanes::eval<Coulomb>);
 const char *const effects[] = {"stiction", "stribeck", "viscous", nullptr};
 const dfm_type coulomb = dfm::plugin::type(
     DFM_KIND_FRICTION, "org.deform.coulomb",

@@ -261,7 +261,7 @@ struct Elastoplastic : bristle::Run<Elastoplastic> {
   static constexpr auto release = lugre::release;
 };
 
-const dfm_friction law = bristle::ops<Elastoplastic>();
+const dfm_friction law = lugre::ops<Elastoplastic>();
 const char *const effects[] = {"stiction",   "stribeck",  "viscous", "presliding",
                                "hysteresis", "breakaway", nullptr};
 const dfm_type elastoplastic = dfm::plugin::type(

@@ -25,6 +25,7 @@
 #include <utility>
 
 #include "../friction_common/curve.h"
+#include "../friction_common/without.h"
 
 namespace {
 
@@ -355,6 +356,7 @@ constexpr dfm_friction make() {
   f.nslot = kMost + 1;
   f.slots = kSlots[kMost - 1].slot;
   f.state = state;
+  f.without = without::level<kMuC, kMuS, kSigma2>;
   return f;
 }
 

@@ -23,8 +23,7 @@ struct Karnopp : stribeck::Run<Karnopp> {
   static double band(const double *params) { return params[kDv]; }
 };
 
-const dfm_friction law =
-    dfm::plugin::friction(stribeck::kNeeds, stribeck::kFlags, lanes::eval<Karnopp>, stribeck::check);
+const dfm_friction law = stribeck::ops(lanes::eval<Karnopp>);
 const char *const effects[] = {"stiction", "stribeck", "viscous", nullptr};
 const dfm_type karnopp = dfm::plugin::type(
     DFM_KIND_FRICTION, "org.deform.karnopp", "Karnopp friction: a band of rest around zero speed", "0.1.0",

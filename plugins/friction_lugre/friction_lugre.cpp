@@ -21,7 +21,7 @@ struct Lugre : bristle::Run<Lugre> {
   static constexpr auto release = lugre::release;
 };
 
-const dfm_friction law = bristle::ops<Lugre>();
+const dfm_friction law = lugre::ops<Lugre>();
 const char *const effects[] = {"stribeck", "viscous", "presliding", "hysteresis", "breakaway", nullptr};
 const dfm_type type = dfm::plugin::type(
     DFM_KIND_FRICTION, "org.deform.lugre", "LuGre friction: a bristle with Stribeck level and micro-damping",

@@ -26,8 +26,8 @@ dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
   return DFM_OK;
 }
 
-const dfm_friction law =
-    dfm::plugin::friction(DFM_NEED_FN, DFM_FRIC_ISOTROPIC | DFM_FRIC_PASSIVE | DFM_FRIC_JACOBIAN, eval);
+const dfm_friction law = dfm::plugin::friction(
+    DFM_NEED_FN, DFM_FRIC_ISOTROPIC | DFM_FRIC_PASSIVE | DFM_FRIC_JACOBIAN | DFM_FRIC_NONE, eval);
 const char *const effects[] = {nullptr};
 const dfm_type none = dfm::plugin::type(DFM_KIND_FRICTION, "org.deform.none", "no friction", "0.1.0", "MIT",
                                         "zero tangential force", effects, &law);

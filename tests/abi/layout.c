@@ -101,6 +101,7 @@ static const Row rows[] = {
     M(dfm_friction, state),
     M(dfm_friction, slot_size),
     M(dfm_friction, reserved),
+    M(dfm_friction, without),
     S(dfm_mesh),
     M(dfm_mesh, size),
     M(dfm_mesh, npoint),

@@ -70,7 +70,8 @@ const dfm_friction with = {sizeof(dfm_friction),
                            nullptr,
                            nullptr,
                            0,
-                           0};
+                           0,
+                           nullptr};
 const dfm_friction without = {
     sizeof(dfm_friction), kNeeds, kPlain, 0, nullptr, viscous, nullptr, nullptr, nullptr, nullptr, 0, 0};
 const dfm_friction smooth = {sizeof(dfm_friction),
@@ -84,7 +85,8 @@ const dfm_friction smooth = {sizeof(dfm_friction),
                              nullptr,
                              nullptr,
                              0,
-                             0};
+                             0,
+                             nullptr};
 
 dfm_type type(const char *id, const dfm_friction *ops) {
   dfm_type t{};

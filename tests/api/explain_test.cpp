@@ -269,7 +269,13 @@ TEST(Explain, EffectsOfABody_AreUsedIdleOrTheModelsOwn) {
   EXPECT_NE(line_of(out, "large_rotation").find("the model's own"), std::string::npos) << out;
   EXPECT_NE(out.find("--costs measures"), std::string::npos) << out;
   const test::CommandResult listed = test::deform({"explain", path, "--set", R"(/effects=["damping"])"});
-  EXPECT_NE(line_of(listed.out, "volume").find("on, not asked for"), std::string::npos) << listed.out;
+  EXPECT_NE(line_of(listed.out, "volume").find("idle: volume 0"), std::string::npos) << listed.out;
+  EXPECT_NE(listed.out.find("off: not in the list of effects; body 'lone' calls for it: volume \"auto\""),
+            std::string::npos)
+      << listed.out;
+  EXPECT_NE(line_of(listed.out, "large_rotation").find("on, not asked for; no parameter switches it off"),
+            std::string::npos)
+      << listed.out;
   EXPECT_NE(line_of(listed.out, "damping").find("used"), std::string::npos) << listed.out;
 }
 

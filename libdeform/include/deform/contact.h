@@ -25,10 +25,10 @@ typedef struct dfm_friction_def {
  * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_add_friction(dfm_world world, const dfm_friction_def *def);
 /** Changes parameters of a rule while the world runs: the coefficient behind a slider. Those that are not
- * given keep their values. No table and no plan is made anew, and memory does not grow, however often it is
- * called. Touching contacts keep their state: a bristle is a displacement in m and stays, its stiffness
- * changes. The state starts anew only where the parameters change which values the law keeps. Sleeping bodies
- * wake, except where all values stay as they are.
+ * given keep their values. Tables and plan are made anew only where an effect comes or goes (mu_S at mu_C,
+ * sigma2 at 0); memory does not grow. Touching contacts keep their state (a bristle is a displacement in m),
+ * which starts anew only where the parameters change which values the law keeps. Sleeping bodies wake, except
+ * where all values stay as they are.
  * @param a, b    the two sides as the rule has them, in either order
  * @param params  keys and values of the rule's law
  * @return DFM_OK; DFM_E_ARG no rule for these sides (lists the rules), unknown key (nearest valid one), value

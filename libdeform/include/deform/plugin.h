@@ -106,7 +106,13 @@ typedef struct dfm_type {
 enum { DFM_KIND_FRICTION = 1, DFM_KIND_MODEL = 2, DFM_KIND_SOLVER = 3 };
 /* ---- friction law: a pure function of a batch; all memory belongs to the host --------------------- */
 enum { DFM_NEED_FN = 1, DFM_NEED_VT = 2, DFM_NEED_FT_STOP = 4, DFM_NEED_AREA = 8, DFM_NEED_DWELL = 16 };
-enum { DFM_FRIC_ISOTROPIC = 1, DFM_FRIC_PASSIVE = 2, DFM_FRIC_JACOBIAN = 4, DFM_FRIC_SET_VALUED = 8 };
+enum {
+  DFM_FRIC_ISOTROPIC = 1,
+  DFM_FRIC_PASSIVE = 2,
+  DFM_FRIC_JACOBIAN = 4,
+  DFM_FRIC_SET_VALUED = 8,
+  DFM_FRIC_NONE = 16 /* no force at any slip, and no state: hosts do not ask */
+};
 typedef struct dfm_friction_in { /* SoA; column c of contact i is at [c*stride + i]; 64-byte aligned */
   /* stride % 8 == 0; lanes up to n rounded to 8 may be touched, ignored */
   uint32_t size, n, stride, flags; /* flags: 0 */
@@ -148,6 +154,10 @@ typedef struct dfm_friction {
    * the same for the same parameters. */
   const dfm_slots *(*state)(const double *params);
   uint32_t slot_size, reserved; /* of slots, as in dfm_slots */
+  /* [any] optional (NULL: no parameter switches one off): changes params, all values end to end, so that the
+   * effect, one of dfm_type.effects, is off, and nothing else; changes nothing where it is off already. What
+   * check() takes it takes afterwards. DFM_E_UNSUPPORTED: no parameter switches it off. */
+  dfm_status (*without)(const char *effect, double *params);
 } dfm_friction;
 /* ---- deformable model: host owns x, v, f and all state; plugin owns only rebuildable caches -------- */
 enum {
@@ -293,8 +303,8 @@ typedef struct dfm_caps {
   uint32_t (*active)(const void *self); /* [setup] DFM_CAP_*, until the next call of set_params */
 } dfm_caps;
 /* Extension "dfm.effect_rows/1" of a model: the parameters that switch its effects off. An effect without a
- * row is the model's own, or the body's. Told, and switched to measure costs, by `deform explain`; no step
- * asks. */
+ * row is the model's own, or the body's. A world whose list of effects lacks one makes the model with these
+ * values. */
 #define DFM_EXT_EFFECT_ROWS "dfm.effect_rows/1"
 typedef struct dfm_effect_row {
   const char *effect;       /* one of dfm_type.effects */

@@ -81,7 +81,8 @@ constexpr dfm_type type(uint32_t kind, const char *id, const char *name, const c
 using Eval = dfm_status (*)(const dfm_friction_in *, dfm_friction_out *);
 using Check = dfm_status (*)(const double *, char *, size_t);
 constexpr dfm_friction friction(uint32_t needs, uint32_t flags, Eval eval, Check check = nullptr) {
-  return {sizeof(dfm_friction), needs, flags, 0, nullptr, eval, check, nullptr, nullptr, nullptr, 0, 0};
+  return {
+      sizeof(dfm_friction), needs, flags, 0, nullptr, eval, check, nullptr, nullptr, nullptr, 0, 0, nullptr};
 }
 
 // ---- models: an instance is an object ---------------------------------------------------------------------

@@ -46,7 +46,8 @@ typedef struct dfm_world_def {
   uint32_t max_substeps; /* a step that needs more returns DFM_DISCARD; 10000 */
   /* 1: islands of bodies at rest sleep until something reaches them (doc/concepts/sleeping.md); 0 */
   uint32_t sleep;
-  /* NULL-terminated list the scene asks for; NULL: what its content calls for */
+  /* NULL-terminated list, which selects: what is not in it is not simulated, and dfm_world_explain says what
+   * that leaves out (doc/concepts/effects.md); NULL: what parameters call for */
   const char *const *effects;
   /* m/s, 0.01: what falls asleep has been slower in every point, and has stayed within half of d_c, */
   double sleep_speed;
@@ -335,16 +336,19 @@ static inline dfm_status dfm_world_profile(dfm_world world, uint32_t capacity, d
   return dfm_world_profile_sized(world, (uint32_t)sizeof(dfm_stage_time), capacity, out, n);
 }
 
-/** The plan as JSON text (UTF-8, NUL-terminated): {"effects":[{"name","asked_by","provided_by"}],
- * "stages":[{"name","why","cost"}], "absent":[{"name","why"}],
+/** The plan as JSON text (UTF-8, NUL-terminated): {"effects":[{"name","asked_by","provided_by","state"}],
+ * "left_out":[{"name","of","by"}], "stages":[{"name","why","cost"}], "absent":[{"name","why"}],
+ * "laws":[{"name","asked","effects":[{"name","works","used","switchable"}]}],
  * "bodies":[{"name","model","cells","points","surfels","surface","filled",
  * "fields":[{"name","from","min","max"}], "idle":[{"name","why"}],
  * "effects":[{"name","works","used","switches":[{"key","now","off","off_value"}]}],
  * "facts":[{"key","label","unit","value"}], "changes":[{"name","when","integrator","stable_s","max_jump_J"}],
- * "unwatched"}], "step":{"stable_s","worst_body","worst_point","reason"}}. surface: "boundary" of the cells,
- * or "own, COUPLING"; from: who says what differs by cell (field, materials, share); idle: parameters that do
- * nothing, or not what they name; effects: what the model brings, whether it is at work and the world uses
- * it, and the parameters that together switch it off; facts: what the model found when it was made; changes:
+ * "unwatched"}], "step":{"stable_s","worst_body","worst_point","reason"}}. state: "asked" by the list of
+ * effects, or "called for" by parameters; left_out: called for, but not in the list; laws: asked is the one
+ * that the rules name. surface: "boundary" of the cells, or "own, COUPLING"; from: who says what differs by
+ * cell (field, materials, share); idle: parameters that do nothing, or not what they name; effects: what the
+ * model brings, whether it is at work and the world uses it, and the parameters that together switch it off
+ * (switchable: one of a law can be); facts: what the model found when it was made; changes:
  * models that the body is to have, the last two where given; unwatched: why the energy watch does not look at
  * the body, "" where it does.
  * @param text NULL: *bytes gets the size needed, in bytes. @return DFM_OK; DFM_E_ARG; DFM_E_HANDLE.

@@ -103,6 +103,25 @@ void choose_integrator(World &w) {
   w.implicit.tasks = &w.context->tasks;
 }
 
+// What the list leaves out of the world itself; bodies and laws follow as they come.
+void select_effects(World &w) {
+  w.selection = Selection(w.def.effects, w.context->registry);
+  const bool unguarded = w.def.flags & DFM_WORLD_UNGUARDED;
+  if (unguarded && w.selection.lists(kGuard))
+    fail(DFM_E_ARG,
+         "effect 'guard' is asked for, but DFM_WORLD_UNGUARDED (contact.guard false) leaves it out; "
+         "take one of the two away");
+  if (!w.selection.wants(kGuard) && !unguarded && guards(*w.method)) {
+    w.def.flags |= DFM_WORLD_UNGUARDED;
+    w.left_out.push_back({kGuard, "contact", "contact.guard"});
+  }
+  if (!w.selection.wants(kSelfContact) && w.def.self_contact != DFM_SELF_OFF) {
+    w.def.self_contact = DFM_SELF_OFF;
+    w.left_out.push_back({kSelfContact, "contact", "contact.self"});
+  }
+  for (const LeftOut &o : w.left_out) warn_of(*w.context, o);
+}
+
 }  // namespace
 
 void dfm_world_def_default_sized(uint32_t size, dfm_world_def *out) {
@@ -161,7 +180,7 @@ dfm_status dfm_world_create(dfm_context *context, const dfm_world_def *def, dfm_
     use_method(*w, method_of(w->def.method));
     if (w->def.sleep) need_ability(*w, Ability::sleep);
     choose_integrator(*w);
-    for (const char *const *e = w->def.effects; e && *e; ++e) w->asked_effects.push_back(*e);
+    select_effects(*w);
     prepare(*w);
     w->changed = true;
     w->handle = handle_create(Kind::world, w.get());

@@ -12,6 +12,8 @@ namespace dfm {
 // The part of a law's dft/dvt that dissipates: its symmetric part without the positive eigenvalue. [a b; b
 // c], N s/m, negative semidefinite.
 struct Slope { double a, b, c; };
+// How a law is solved: by its slopes, by projection on the disc of radius limit, or not at all: no force.
+enum LawForm : uint8_t { kSmoothLaw, kSetValuedLaw, kNoFriction };
 
 struct ContactState {
   uint32_t n = 0, stride = 0, nstate = 0;
@@ -31,7 +33,7 @@ struct ContactState {
   Array<double> limit;        // N
   Array<double> bristle_out;  // [nstate,stride]
   Array<uint8_t> mode;        // 0 open, 1 stick, 2 slip
-  Array<uint8_t> set_valued;  // 1: the law is solved by projection on the disc of radius limit
+  Array<uint8_t> form;        // LawForm
   // [n] of smooth laws, by linearize(): slope D, and 1 - h w_t D as [m11 m12; m12 m22] with its determinant
   struct Linear {
     Slope slope;
@@ -50,7 +52,7 @@ struct ContactState {
     bristle_out.resize(size_t(nstate) * stride);
     law.resize(stride);
     mode.resize(stride);
-    set_valued.resize(stride);
+    form.resize(stride);
     linear.resize(n);
     clear_padding();
   }

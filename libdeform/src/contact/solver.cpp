@@ -34,7 +34,7 @@ Pair friction_impulse(const ContactRows &rows, const ContactState &s, uint32_t i
   const double wt = rows.wt[i], l1 = rows.impulse[size_t(i) * 3 + 1], l2 = rows.impulse[size_t(i) * 3 + 2];
   const uint32_t n = s.stride;
   const double fn = s.fn[i];
-  if (s.set_valued[i]) {
+  if (s.form[i] == kSetValuedLaw) {
     const double ratio = fn > 0 ? ln / (h * fn) : 0;
     const double a = l1 - u1 / wt, b = l2 - u2 / wt, size = std::sqrt(a * a + b * b);
     double radius = h * s.limit[i] * ratio;
@@ -54,6 +54,7 @@ Pair friction_impulse(const ContactRows &rows, const ContactState &s, uint32_t i
     if (size <= radius) return {a, b};
     return {radius / size * a, radius / size * b};
   }
+  if (s.form[i] == kNoFriction) return {0, 0};
   const auto &[slope, m11, m12, m22, det] = s.linear[i];
   const auto [d11, d12, d22] = slope;
   const double dfn = ln / h - fn;
@@ -92,7 +93,7 @@ void set_trial(const ContactRows &rows, double h, const double *response, Contac
 
 void linearize(const ContactRows &rows, double h, ContactState &s) {
   for (uint32_t i = 0; i < rows.n; ++i) {
-    if (s.set_valued[i]) continue;
+    if (s.form[i] != kSmoothLaw) continue;
     const double wt = rows.wt[i];
     ContactState::Linear &l = s.linear[i];
     l.slope = dissipative_slope(s, i);

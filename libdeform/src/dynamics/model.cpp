@@ -144,6 +144,16 @@ bool ModelInstance::works(const std::string &effect) const {
   return false;
 }
 
+std::vector<EffectRow> ModelInstance::effect_rows() const {
+  const void *table = nullptr;
+  if (ops->extension)
+    call("extension", [&] {
+      table = ops->extension(self, DFM_EXT_EFFECT_ROWS);
+      return DFM_OK;
+    });
+  return copy_effect_rows(*type, table);
+}
+
 uint32_t ModelInstance::limited_cells() const {
   uint32_t n = 0;
   if (limited && limited->count)

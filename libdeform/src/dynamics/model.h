@@ -9,6 +9,7 @@
 #include "core/memory.h"
 #include "deform/plugin.h"
 #include "plugin/call.h"
+#include "plugin/selection.h"
 
 namespace dfm {
 
@@ -54,6 +55,7 @@ struct ModelInstance {
   dfm_status put_params(const std::vector<double> &values, uint32_t needed) noexcept;
   // Is this effect of the type called for by the present parameters?
   bool works(const std::string &effect) const;
+  std::vector<EffectRow> effect_rows() const;  // the model's extension "dfm.effect_rows/1"
   // Why the parameter of this row does nothing now; empty where it does what it says.
   std::string idle_reason(uint32_t row) const;
   uint32_t limited_cells() const;  // at the last bound

@@ -16,6 +16,8 @@ LawInstance::LawInstance(const dfm_type &t, const dfm_host &h, std::vector<doubl
       params(std::move(values)),
       by_key(param_rows(t, params)),
       host(&h) {
+  asked_type = &t;
+  asked = params;
   for (const dfm_slot &slot : law_slots(t, h, params.data())) {
     nstate += slot.width;
     tangent.resize(nstate, slot.kind == DFM_SLOT_TANGENT);
@@ -25,6 +27,29 @@ LawInstance::LawInstance(const dfm_type &t, const dfm_host &h, std::vector<doubl
   if (ops->prepare &&
       call_plugin(h, t, "prepare", [&] { return ops->prepare(host, params.data(), &data); }) != DFM_OK)
     fail(DFM_E_FATAL, "law '%s' could not prepare its tables; the log says why", t.id);
+}
+
+std::vector<LeftOut> left_out_of(const LawInstance &law) {
+  std::vector<LeftOut> out;
+  const dfm_type &asked = *law.asked_type;
+  const bool other = law.type != &asked;
+  if (!other && law.params == law.asked) return out;
+  const std::string of = std::string("friction law ") + asked.id,
+                    instead = other ? format("%s stands in its place", law.type->id) : std::string();
+  if (other && is_frictionless(*law.ops)) return {{kFriction, of, instead}};
+  const std::vector<LawEffect> left = law_effects(*law.type, *law.host, law.params);
+  for (const LawEffect &e : law_effects(asked, *law.host, law.asked)) {
+    if (!e.works || std::any_of(left.begin(), left.end(),
+                                [&](const LawEffect &l) { return l.works && l.name == e.name; }))
+      continue;
+    std::vector<std::string> by;
+    for (const dfm_param_value &row : param_rows(asked, law.asked))
+      if (const size_t at = size_t(row.value - law.asked.data()); e.off[at] != law.asked[at])
+        by.push_back(format("%s %g", row.key, *row.value));
+    if (other) by.push_back(instead);
+    out.push_back({e.name, of, join(by)});
+  }
+  return out;
 }
 
 LawInstance::~LawInstance() {
@@ -56,25 +81,36 @@ void LawBatches::gather(const std::vector<LawInstance *> &laws, ContactState &st
     for (uint32_t i = 0; i < state.n; ++i)
       if (state.law[i] == l) {
         order_.push_back(i);
-        state.set_valued[i] = (laws[l]->ops->flags & DFM_FRIC_SET_VALUED) != 0;
+        state.form[i] = laws[l]->form();
       }
     if (order_.size() == begin) continue;
-    smooth_ |= !(laws[l]->ops->flags & DFM_FRIC_SET_VALUED);
+    smooth_ |= laws[l]->form() != kSetValuedLaw;
     remembers_ |= laws[l]->nstate > 0;
     differences_ |= !(laws[l]->ops->flags & DFM_FRIC_JACOBIAN);
     batches_.push_back({laws[l], begin, static_cast<uint32_t>(order_.size()) - begin});
   }
 }
 
+void LawBatches::leave_free(std::span<const uint32_t> index, ContactState &state) {
+  for (const uint32_t i : index) {
+    state.ft[i] = state.ft[state.stride + i] = state.limit[i] = 0;
+    state.dft_dfn[i] = state.dft_dfn[state.stride + i] = 0;
+    for (uint32_t j = 0; j < 4; ++j) state.dft_dvt[size_t(j) * state.stride + i] = 0;
+    state.mode[i] = state.fn[i] > 0 ? 2 : 0;
+  }
+}
+
 const LawInstance *LawBatches::evaluate(double h, ContactState &state) {
   for (const Batch &batch : batches_)
-    if (const LawInstance *bad = evaluate(*batch.law, {&order_[batch.begin], batch.n}, h, state)) return bad;
+    if (batch.law->form() == kNoFriction) leave_free({&order_[batch.begin], batch.n}, state);
+    else if (const LawInstance *bad = evaluate(*batch.law, {&order_[batch.begin], batch.n}, h, state))
+      return bad;
   return nullptr;
 }
 
 const LawInstance *LawBatches::slopes(double h, ContactState &state) {
   for (const Batch &batch : batches_) {
-    if (batch.law->ops->flags & DFM_FRIC_JACOBIAN) continue;
+    if ((batch.law->ops->flags & DFM_FRIC_JACOBIAN) || batch.law->form() == kNoFriction) continue;
     for (const Slopes which : {kByVt, kByFn}) {
       asked_.clear();
       for (uint32_t k = 0; k < batch.n; ++k) {

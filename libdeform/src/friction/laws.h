@@ -9,6 +9,7 @@
 #include "core/memory.h"
 #include "deform/base.h"
 #include "geometry/surface.h"
+#include "plugin/selection.h"
 
 namespace dfm {
 
@@ -24,18 +25,29 @@ struct LawInstance {
   std::vector<uint8_t> tangent;  // [nstate] 1: a component of a vector in the tangent plane
   bool turns = false;            // any
   bool by_default = false;       // pairs without a rule have it
+  // What was asked for, of which the list of effects has left this.
+  const dfm_type *asked_type = nullptr;
+  std::vector<double> asked;
 
   // throws where check() or prepare() refuses
   LawInstance(const dfm_type &t, const dfm_host &h, std::vector<double> values);
+  LawForm form() const {
+    return is_frictionless(*ops)              ? kNoFriction
+           : ops->flags & DFM_FRIC_SET_VALUED ? kSetValuedLaw
+                                              : kSmoothLaw;
+  }
   LawInstance(const LawInstance &) = delete;
   LawInstance &operator=(const LawInstance &) = delete;
   ~LawInstance();
 };
 
+// What the list of effects has left out of it.
+std::vector<LeftOut> left_out_of(const LawInstance &law);
+
 class LawBatches {
  public:
   explicit LawBatches(const Memory &memory);
-  // Sorts the contacts into batches by state.law and sets state.set_valued. Call once per sub-step.
+  // Sorts the contacts into batches by state.law and sets state.form. Call once per sub-step.
   void gather(const std::vector<LawInstance *> &laws, ContactState &state);
   // Asks every batch at the trial in state: force, limit, mode, trial state, and the slopes dft_dvt and
   // dft_dfn of laws that give them. nullptr, or the law that failed or answered with something not finite.
@@ -97,6 +109,8 @@ class LawBatches {
   // Slopes by differences at the present answer. The law where it fails.
   const LawInstance *difference(const LawInstance &law, std::span<const uint32_t> contacts, double h,
                                 Slopes which, ContactState &state);
+  // The answer of contacts without friction, whose law nobody asks.
+  static void leave_free(std::span<const uint32_t> contacts, ContactState &state);
   // do earlier slopes hold at the answer just given?
   void look_back(uint32_t contact, const ContactState &state);
 };

@@ -62,6 +62,10 @@ void newton_step(const ContactState &s, uint32_t i, double m, double v[2], doubl
 const LawInstance *LawBatches::answer(double h, const double *wt, double least, double relative,
                                       ContactState &state) {
   for (const Batch &batch : batches_) {
+    if (batch.law->form() == kNoFriction) {
+      leave_free({&order_[batch.begin], batch.n}, state);
+      continue;
+    }
     if (const LawInstance *bad = evaluate(*batch.law, {&order_[batch.begin], batch.n}, h, state)) return bad;
     if (batch.law->ops->flags & DFM_FRIC_SET_VALUED) continue;
     if (const LawInstance *bad = settle(batch, h, wt, least, relative, state)) return bad;

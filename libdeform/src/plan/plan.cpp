@@ -5,13 +5,6 @@
 #include "core/error.h"
 
 namespace dfm {
-namespace {
-
-// Effects that cannot keep their promise without it: what is cut lies on itself, what folds comes to
-// lie on itself.
-constexpr const char *kNeedSelf[] = {"cutting", "folding"};
-
-}  // namespace
 
 void plan_effects(const SceneFacts &f, Plan &plan) {
   auto provider = [](const std::vector<SceneFacts::Provider> &list, const std::string &effect) {
@@ -33,7 +26,7 @@ void plan_effects(const SceneFacts &f, Plan &plan) {
     const std::string by = provider(f.offered, name);
     if (const std::string idle = provider(f.idle, name); by.empty() && !idle.empty())
       fail(DFM_E_ARG,
-           "effect '%s' is asked for, and %s provides it, but the parameters of every body leave it off; set "
+           "effect '%s' is asked for, and %s provides it, but the parameters leave it off everywhere; set "
            "them ('deform plugin info %s' lists them) or take the effect from the list",
            name.c_str(), idle.c_str(), idle.c_str());
     if (by.empty()) {

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "plugin/selection.h"
+
 namespace dfm {
 
 // What a stage does that other stages ask the plan about; most stages are asked for by nobody.
@@ -30,7 +32,7 @@ struct SceneFacts {
   struct Provider { std::string effect, plugin; };
   // by models and laws that the scene uses, as their parameters stand
   std::vector<Provider> offered;
-  // by models that the scene uses, if their parameters called for it
+  // by models and laws that the scene uses, if their parameters called for it
   std::vector<Provider> idle;
   std::vector<Provider> available;  // by every loaded plugin
   bool effects_listed = false;
@@ -78,7 +80,6 @@ struct Plan {
   bool touches() const;  // has stages of contact
 };
 
-inline constexpr char kSelfContact[] = "self_contact";
 inline constexpr char kSelfAuto[] = "contact.self auto";
 // Who calls for self contact: "contact.self", "effects", the effect that needs it; "" where nobody does.
 std::string self_asked_by(const SceneFacts &facts);

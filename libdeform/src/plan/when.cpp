@@ -88,6 +88,9 @@ StageChoice distribute(const SceneFacts &f) { return of_contact(f); }
 
 StageChoice guard(const SceneFacts &f) {
   if (!touches(f)) return left_out(nobody(f));
+  if (f.unguarded && f.effects_listed)
+    return left_out(
+        "not in the list of effects: what moves further than contacts reach in one sub-step may cross");
   if (f.unguarded)
     return left_out(
         "switched off (contact.guard): what moves further than contacts reach in one sub-step may cross");

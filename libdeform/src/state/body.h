@@ -58,9 +58,23 @@ struct Integrator {
   uint32_t point = 0;  // that bounds it
 };
 
+// What the list of effects has left out of a model: the values asked for, all rows end to end (empty: nothing
+// is left out), and, [nparam], the rows whose differences by cell are.
+struct Withheld {
+  std::vector<double> asked;
+  std::vector<uint8_t> by_cell;
+};
+
+// [nparam] 1: there is a field of that row.
+std::vector<uint8_t> differs_by_cell(const dfm_type &type, const std::vector<CellField> &fields);
+
 struct SpareModel {
   std::unique_ptr<ModelInstance> instance;
   ModelOrigin origin;
+  Withheld withheld;
+  const std::vector<double> &asked() const {
+    return withheld.asked.empty() ? instance->params : withheld.asked;
+  }
 };
 
 struct Body {
@@ -82,6 +96,7 @@ struct Body {
   Integrator integrator;
   Makeup makeup;
   ModelOrigin origin;
+  Withheld withheld;
   std::vector<Switch> switches;  // to come, by time
   std::vector<SwitchRule> rule;  // one or none
   // instances that a change to come may take: what they have made of the mesh is theirs still

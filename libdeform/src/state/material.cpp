@@ -186,6 +186,14 @@ bool by_cell(const dfm_type &type, const std::string &key) {
   return std::find(keys.begin(), keys.end(), key) != keys.end();
 }
 
+std::vector<uint8_t> differs_by_cell(const dfm_type &type, const std::vector<CellField> &fields) {
+  std::vector<uint8_t> out(type.nparam);
+  for (uint32_t row = 0; row < type.nparam; ++row)
+    out[row] = std::any_of(fields.begin(), fields.end(),
+                           [&](const CellField &f) { return f.key == type.params[row].key; });
+  return out;
+}
+
 std::vector<double> model_values(const World &w, const Body &b, const dfm_type &type, const dfm_body_def &def,
                                  const CellMaterials &cells, std::vector<CellField> &fields) {
   check_fields(type, def, b.name);

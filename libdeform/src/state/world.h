@@ -14,6 +14,7 @@
 #include "friction/laws.h"
 #include "plan/plan.h"
 #include "plugin/context.h"
+#include "plugin/selection.h"
 #include "state/body.h"
 #include "state/energy_book.h"
 #include "state/impulses.h"
@@ -70,8 +71,9 @@ struct World {
   dfm_context *context;
   uint64_t handle = 0;
   dfm_world_def def{};
-  std::vector<std::string> asked_effects;
-  ImplicitOptions implicit;  // of bodies whose integrator is implicit
+  Selection selection;            // by its list of effects
+  std::vector<LeftOut> left_out;  // of the world itself
+  ImplicitOptions implicit;       // of bodies whose integrator is implicit
   Gravity gravity;
   Prescribed prescribed;
 

@@ -19,8 +19,8 @@ StepContext::StepContext(const Memory &m)
              best_impulse, trial_response, tangents, match, sharing, aim, stands, ways, renewed,
              block_surfels, near, touching, active, woken, stirred);
   use_memory(m, state.law, state.fn, state.vt, state.ft_stop, state.area, state.dwell, state.bristle,
-             state.ft, state.dft_dvt, state.dft_dfn, state.limit, state.bristle_out, state.mode,
-             state.set_valued, state.slip, state.linear);
+             state.ft, state.dft_dvt, state.dft_dfn, state.limit, state.bristle_out, state.mode, state.form,
+             state.slip, state.linear);
   use_memory(m, guard.joined, guard.near, guard.hits, guard.speed, guard.change, guard.kept);
   GuardMemory &known = guard.memory;
   use_memory(m, known.runs, known.old_runs, known.features, known.old_features, known.rest, known.old_rest,

@@ -25,6 +25,11 @@ void use_method(World &w, const ContactMethod &method) {
   w.steps->method = std::move(buffers);
 }
 
+bool guards(const ContactMethod &method) {
+  return std::any_of(method.table.begin(), method.table.end(),
+                     [](const Stage &s) { return s.role == StageRole::guards; });
+}
+
 bool lacks(const ContactMethod &method, Ability what) { return find(method, what) != nullptr; }
 
 void need_ability(const World &w, Ability what, const char *kind, const std::string &name) {

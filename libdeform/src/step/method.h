@@ -58,6 +58,7 @@ struct ContactMethod {
 const ContactMethod &velocity_method();  // step.cpp
 // For a world without bodies.
 void use_method(World &w, const ContactMethod &method);
+bool guards(const ContactMethod &method);  // has it a guard?
 bool lacks(const ContactMethod &method, Ability what);
 // Throws Error(DFM_E_UNSUPPORTED) where the world's method lacks it. kind and name: whose; empty where it is
 // nobody's.

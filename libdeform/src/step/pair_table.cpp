@@ -80,10 +80,19 @@ uint32_t add_law(World &w, const char *name, std::span<const dfm_param_value> va
   const dfm_type &type = w.context->registry.find(DFM_KIND_FRICTION, name);
   std::vector<double> packed = pack_params(type, values);
   for (uint32_t i = 0; i < w.laws.size(); ++i)
-    if (w.laws[i]->type == &type && w.laws[i]->params == packed) return i;
-  auto law = std::make_unique<LawInstance>(type, w.context->host, std::move(packed));
-  if (law->nstate) need_ability(w, Ability::law_memory, "friction law", name);
+    if (w.laws[i]->asked_type == &type && w.laws[i]->asked == packed) return i;
+  auto law = make_law(w, type, std::move(packed));
+  for (const LeftOut &o : left_out_of(*law)) warn_of(*w.context, o);
   return place_law(w, std::move(law), free);
+}
+
+std::unique_ptr<LawInstance> make_law(const World &w, const dfm_type &type, std::vector<double> asked) {
+  SelectedLaw made = select_law(w.context->registry, w.context->host, w.selection, type, asked);
+  auto law = std::make_unique<LawInstance>(*made.type, w.context->host, std::move(made.values));
+  if (law->nstate) need_ability(w, Ability::law_memory, "friction law", made.type->id);
+  law->asked_type = &type;
+  law->asked = std::move(asked);
+  return law;
 }
 
 uint32_t place_law(World &w, std::unique_ptr<LawInstance> law, std::span<const uint8_t> free) {
@@ -96,6 +105,13 @@ uint32_t place_law(World &w, std::unique_ptr<LawInstance> law, std::span<const u
   w.laws[place] = std::move(law);
   w.changed = true;
   return place;
+}
+
+void offer_law(const LawInstance &law, SceneFacts &facts) {
+  const std::string id = law.type->id;
+  if (!is_frictionless(*law.ops)) facts.offered.push_back({kFriction, id});
+  for (const LawEffect &e : law_effects(*law.type, *law.host, law.params))
+    (e.works ? facts.offered : facts.idle).push_back({e.name, id});
 }
 
 uint32_t pair_law(const World &w, uint32_t slot_a, bool obstacle, uint32_t slot_b) {

@@ -12,12 +12,15 @@
 namespace dfm {
 
 struct FrictionRule;
+struct SceneFacts;
 struct World;
 
 // Index of the law with these values: one that is there, else a new one, in a place that `free` marks or
 // behind the others.
 uint32_t add_law(World &w, const char *name, std::span<const dfm_param_value> values,
                  std::span<const uint8_t> free = {});
+// Of what the list of effects leaves of the law that is asked for.
+std::unique_ptr<LawInstance> make_law(const World &w, const dfm_type &type, std::vector<double> asked);
 uint32_t place_law(World &w, std::unique_ptr<LawInstance> law, std::span<const uint8_t> free);
 
 // Fills the tables for things a and b (bodies by slot, then obstacles). used: their laws, out.
@@ -25,6 +28,8 @@ void find_law(World &w, uint32_t a, uint32_t b, std::vector<uint32_t> &used);
 uint32_t pair_law(const World &w, uint32_t slot_a, bool obstacle, uint32_t slot_b);
 // law: of contacts between pairs that have a table of zones.
 void set_zone_laws(const World &w, std::span<const ContactPoint> contacts, Array<uint32_t> &law);
+// What the law brings as its parameters stand, and what it would with others.
+void offer_law(const LawInstance &law, SceneFacts &facts);
 void rename_law(World &w, const FrictionRule &rule, uint32_t to);  // in the store, of contacts it holds for
 
 }  // namespace dfm

@@ -202,12 +202,12 @@ void make_pair_tables(World &w, StepContext &step, SceneFacts &facts) {
       if (is_body) facts.body_pairs += i < j;
       else ++facts.obstacle_pairs;
       find_law(w, i, j, used);
-      for (uint32_t law : used) offer(*w.laws[law]->type, facts.offered);
+      for (uint32_t law : used) offer_law(*w.laws[law], facts);
     }
   }
   keep_overlaps_aside(w);
-  facts.effects_listed = w.def.effects != nullptr;
-  facts.asked = w.asked_effects;
+  facts.effects_listed = w.selection.listed();
+  facts.asked = w.selection.names();
   choose_self_bodies(w, step, facts, used);
   w.pairs.laws.clear();
   for (auto &l : w.laws) w.pairs.laws.push_back(l.get());
@@ -257,9 +257,19 @@ void choose_integrators(World &w) {
 
 void choose_plan(World &w, StepContext &step, SceneFacts &facts) {
   for (const dfm_type *t : w.context->registry.list()) offer(*t, facts.available);
+  for (const dfm_type *t : w.context->registry.list(DFM_KIND_FRICTION)) {
+    if (!is_frictionless(law_of(*t))) facts.available.push_back({kFriction, t->id});
+    if (law_of(*t).nslot) facts.available.push_back({kMemory, t->id});
+  }
   facts.unguarded = w.def.flags & DFM_WORLD_UNGUARDED;
-  facts.available.push_back({kSelfContact, "contact"});
-  if (facts.bodies && facts.effects_listed) facts.offered.push_back({kSelfContact, "contact"});
+  const bool touch = facts.body_pairs + facts.obstacle_pairs + facts.self_bodies > 0;
+  for (const char *own : {kSelfContact, kGuard}) facts.available.push_back({own, "contact"});
+  if (facts.bodies && facts.effects_listed) {
+    facts.offered.push_back({kSelfContact, "contact"});
+    if (!touch) facts.offered.push_back({kFriction, "contact"});
+  }
+  if (guards(*w.method) && !facts.unguarded && (touch || (facts.bodies && facts.effects_listed)))
+    facts.offered.push_back({kGuard, "contact"});
   if (facts.self_bodies) need_ability(w, Ability::self_contact);
   w.plan = make_plan(w.method->table, facts);
   ++step.made.plans;

@@ -81,9 +81,7 @@ SelfBody::SelfBody(const Memory &m, const Body &b) : id(b.id), body(&b), list(m,
 }
 
 uint8_t asks_self_contact(const World &w) {
-  const bool listed =
-      std::find(w.asked_effects.begin(), w.asked_effects.end(), kSelfContact) != w.asked_effects.end();
-  return listed ? uint8_t{DFM_SELF_ON} : static_cast<uint8_t>(w.def.self_contact);
+  return w.selection.lists(kSelfContact) ? uint8_t{DFM_SELF_ON} : static_cast<uint8_t>(w.def.self_contact);
 }
 
 void choose_self_bodies(World &w, StepContext &step, SceneFacts &facts, std::vector<uint32_t> &used) {
@@ -94,7 +92,7 @@ void choose_self_bodies(World &w, StepContext &step, SceneFacts &facts, std::vec
   std::vector<std::unique_ptr<SelfBody>> before;
   before.swap(step.self_bodies);
   for (auto &b : w.bodies) {
-    const uint8_t when = rule_of(w, *b, asked);
+    const uint8_t when = w.selection.wants(kSelfContact) ? rule_of(w, *b, asked) : uint8_t{DFM_SELF_OFF};
     if (promises(*b) || when == DFM_SELF_OFF) continue;
     const auto same =
         std::find_if(before.begin(), before.end(), [&](auto &s) { return s && s->id == b->id; });
@@ -105,9 +103,7 @@ void choose_self_bodies(World &w, StepContext &step, SceneFacts &facts, std::vec
     else if (!self.watch)
       self.watch = std::make_unique<SelfWatch>(w.memory(), b->surface, self.rest, self.list);
     find_law(w, b->slot, b->slot, used);
-    for (const uint32_t law : used)
-      for (const std::string &e : effects(*w.laws[law]->type))
-        facts.offered.push_back({e, w.laws[law]->type->id});
+    for (const uint32_t law : used) offer_law(*w.laws[law], facts);
   }
   facts.self_bodies = static_cast<unsigned>(step.self_bodies.size());
 }

@@ -7,6 +7,7 @@
 
 #include "core/error.h"
 #include "plugin/tables.h"
+#include "state/world.h"
 
 namespace dfm {
 namespace {
@@ -32,8 +33,7 @@ Row row_at(const Row *rows, uint32_t row_size, uint32_t i) {
   return row;
 }
 
-// What the rows of ABI 1 began with.
-constexpr uint32_t kEffectRowHead = offsetof(dfm_effect_row, off) + sizeof(double);
+// What a row of ABI 1 began with.
 constexpr uint32_t kFactHead = offsetof(dfm_fact, value) + sizeof(double);
 
 }  // namespace
@@ -43,21 +43,34 @@ std::vector<BodyEffect> body_effects(const Body &b) {
   std::vector<size_t> first;  // value of each row
   size_t values = 0;
   for (uint32_t i = 0; i < type.nparam; values += type.params[i++].width) first.push_back(values);
-  const auto table = ask<dfm_effect_rows>(
-      b, DFM_EXT_EFFECT_ROWS, offsetof(dfm_effect_rows, rows) + sizeof(void *), "dfm_effect_rows");
-  const bool readable = table && table->rows && table->row_size >= kEffectRowHead;
+  const std::vector<EffectRow> rows = b.model.effect_rows();
+  const Withheld &held = b.withheld;
   std::vector<BodyEffect> out;
-  for (const char *const *name = type.effects; name && *name; ++name) {
+  for (const std::string &name : effects(type)) {
     BodyEffect effect;
-    effect.name = *name;
-    effect.works = b.model.works(effect.name);
-    for (uint32_t i = 0; readable && i < table->n; ++i) {
-      const dfm_effect_row row = row_at(table->rows, table->row_size, i);
-      if (!row.effect || effect.name != row.effect || row.param >= type.nparam) continue;
-      effect.switches.push_back({&type.params[row.param], row.off, b.model.params[first[row.param]]});
+    effect.name = name;
+    effect.works = b.model.works(name);
+    for (const EffectRow &row : rows) {
+      if (row.effect != name) continue;
+      const double now = b.model.params[first[row.param]];
+      effect.switches.push_back({&type.params[row.param], row.off, now});
+      if (held.asked.empty() || b.world->selection.wants(name) || now != row.off) continue;
+      const double asked = held.asked[first[row.param]];
+      const std::string key = type.params[row.param].key;
+      if (held.by_cell[row.param]) effect.would.push_back(key + " by cell");
+      else if (asked != row.off)
+        effect.would.push_back(key + " " + param_text(type.params[row.param], asked));
     }
     out.push_back(std::move(effect));
   }
+  return out;
+}
+
+std::vector<LeftOut> left_out_of(const Body &b) {
+  std::vector<LeftOut> out;
+  if (b.withheld.asked.empty()) return out;
+  for (const BodyEffect &e : body_effects(b))
+    if (!e.would.empty() && !e.works) out.push_back({e.name, "body '" + b.name + "'", join(e.would)});
   return out;
 }
 

@@ -16,10 +16,14 @@ struct BodyEffect {
   std::string name;
   bool works = false;                  // with the present parameters
   std::vector<EffectSwitch> switches;  // all of them together switch it off; none: no parameter does
+  // where the list of effects leaves it out: the parameters that called for it, "volume 1"
+  std::vector<std::string> would;
 };
 
 // In the order of the type's table; the model's extensions "dfm.effects/1" and "dfm.effect_rows/1".
 std::vector<BodyEffect> body_effects(const Body &b);
+
+std::vector<LeftOut> left_out_of(const Body &b);  // by the list of effects
 
 struct BodyFact {
   std::string key, label, unit;

@@ -98,26 +98,25 @@ std::vector<double> values_for(const World &w, const Body &b, const dfm_type &ty
 }
 
 // One that the body has had before, for the same; or none.
-bool take_spare(Body &b, const dfm_type &type, const std::vector<double> &values, const ModelOrigin &origin,
-                ModelInstance &out) {
+bool take_spare(Body &b, const dfm_type &type, const std::vector<double> &values, BodyModel &out) {
+  const ModelOrigin &origin = out.origin;
   const bool turns = rests_unplaced(type);
   const auto fits = [&](const SpareModel &s) {
-    return s.instance->type == &type && s.instance->params == values && s.origin.params == origin.params &&
+    return s.instance->type == &type && s.asked() == values && s.origin.params == origin.params &&
            s.origin.held == origin.held &&
            (turns || std::memcmp(&s.origin.frame, &origin.frame, sizeof origin.frame) == 0);
   };
   const auto found = std::find_if(b.spares.begin(), b.spares.end(), fits);
   if (found == b.spares.end()) return false;
   found->instance->start();
-  out.swap(*found->instance);
+  out.instance.swap(*found->instance);
+  out.withheld = std::move(found->withheld);
   b.spares.erase(found);
   return true;
 }
 
-void make_instance(World &w, Body &b, const dfm_type &type, std::vector<double> values, int32_t integrator,
-                   BodyModel &out) {
+void make_instance(World &w, Body &b, const dfm_type &type, std::vector<double> values, BodyModel &out) {
   const Memory &m = w.memory();
-  const auto implicit = implicit_of(w, b.name, integrator, out.integrator);
   const MeshCoupling coupling(m, b.surface);
   std::vector<const char *> field_keys;
   std::vector<const double *> fields;
@@ -143,8 +142,41 @@ void make_instance(World &w, Body &b, const dfm_type &type, std::vector<double> 
   mesh.fixed = out.origin.held.data();
   coupling.tell(mesh);
   const OnBehalf speaks(b.name);
-  if (!take_spare(b, type, values, out.origin, out.instance))
+  if (!take_spare(b, type, values, out))
     out.instance.create(type, w.context->host, mesh, m, std::move(values));
+}
+
+void drop_fields(const dfm_type &type, const Withheld &withheld, std::vector<CellField> &fields) {
+  std::erase_if(fields, [&](const CellField &f) {
+    for (uint32_t row = 0; row < type.nparam; ++row)
+      if (f.key == type.params[row].key) return withheld.by_cell[row] != 0;
+    return false;
+  });
+}
+
+// Without what the list of effects does not have. An instance with all that is asked for comes first: it
+// knows which effects are at work and what switches them off.
+void make_selected(World &w, Body &b, const dfm_type &type, std::vector<double> values, BodyModel &out) {
+  make_instance(w, b, type, values, out);
+  if (!w.selection.listed()) return;
+  if (!out.withheld.asked.empty()) return drop_fields(type, out.withheld, out.fields);  // a spare
+  Withheld withheld{values, differs_by_cell(type, out.fields)};
+  std::vector<uint8_t> left = withheld.by_cell;
+  const auto works = [&](const std::string &effect) { return out.instance.works(effect); };
+  if (!leave_out(type, out.instance.effect_rows(), w.selection, works, values, left)) return;
+  for (uint32_t row = 0; row < type.nparam; ++row)
+    withheld.by_cell[row] = withheld.by_cell[row] && !left[row];
+  drop_fields(type, withheld, out.fields);
+  ModelInstance().swap(out.instance);
+  make_instance(w, b, type, std::move(values), out);
+  out.withheld = std::move(withheld);
+}
+
+void make_model(World &w, Body &b, const dfm_type &type, std::vector<double> values, int32_t integrator,
+                BodyModel &out) {
+  const Memory &m = w.memory();
+  const auto implicit = implicit_of(w, b.name, integrator, out.integrator);
+  make_selected(w, b, type, std::move(values), out);
   // a body's dynamics hold to its own instance, which is the new one meanwhile
   struct Lent {
     ModelInstance &a, &b;
@@ -182,7 +214,7 @@ std::unique_ptr<BodyModel> make_body_model(World &w, Body &b, const dfm_type &ty
                                            int32_t integrator) {
   auto out = std::make_unique<BodyModel>();
   out->origin = std::move(origin);
-  make_instance(w, b, type, values_for(w, b, type, out->origin.params, *out), integrator, *out);
+  make_model(w, b, type, values_for(w, b, type, out->origin.params, *out), integrator, *out);
   return out;
 }
 
@@ -213,6 +245,7 @@ void exchange(Body &b, BodyModel &other) noexcept {
   b.dynamics.swap(other.dynamics);
   b.fields.swap(other.fields);
   b.unused.swap(other.unused);
+  std::swap(b.withheld, other.withheld);
   std::swap(b.origin, other.origin);
   std::swap(b.integrator, other.integrator);
   b.bound.known = false;

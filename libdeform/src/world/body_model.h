@@ -12,6 +12,7 @@ struct BodyModel {
   std::vector<CellField> fields;
   std::vector<Unused> unused;
   ModelOrigin origin;
+  Withheld withheld;
   Integrator integrator;
 };
 

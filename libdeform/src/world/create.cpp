@@ -14,6 +14,7 @@
 #include "step/context.h"
 #include "step/method.h"
 #include "step/stages.h"
+#include "world/body_effects.h"
 #include "world/body_model.h"
 #include "world/body_surface.h"
 #include "world/body_zones.h"
@@ -163,6 +164,7 @@ Body &create_body(World &w, const dfm_body_def &def) {
   w.changed = true;
   warn_of_idle(b);
   warn_of_own_steps(w, b.name, b.model, def.integrator);
+  for (const LeftOut &o : left_out_of(b)) warn_of(*w.context, o);
   return b;
 }
 

@@ -55,6 +55,40 @@ bool planned(const World &w, const std::string &effect) {
   return std::any_of(w.plan.effects.begin(), w.plan.effects.end(), same);
 }
 
+bool used(const World &w, const std::string &effect) {
+  return w.selection.wants(effect) && planned(w, effect);
+}
+
+// Laws of pairs, and what they bring.
+std::string laws(const World &w) {
+  std::vector<std::string> rows;
+  for (const auto &law : w.laws) {
+    std::vector<std::string> effects;
+    for (const LawEffect &e : law_effects(*law->type, *law->host, law->params))
+      effects.push_back("{\"name\":" + quote(e.name) + ",\"works\":" + (e.works ? "true" : "false") +
+                        ",\"used\":" + (e.works && used(w, e.name) ? "true" : "false") +
+                        ",\"switchable\":" + (e.switchable ? "true" : "false") + "}");
+    rows.push_back("{\"name\":" + quote(law->type->id) + ",\"asked\":" + quote(law->asked_type->id) +
+                   ",\"effects\":[" + join(effects, ",") + "]}");
+  }
+  return "\"laws\":[" + join(rows, ",") + "]";
+}
+
+// What parameters call for, and the list of effects does not have.
+std::string left_out(const World &w) {
+  std::vector<LeftOut> all = w.left_out;
+  const auto take = [&](const std::vector<LeftOut> &some) {
+    all.insert(all.end(), some.begin(), some.end());
+  };
+  for (const auto &b : w.bodies) take(left_out_of(*b));
+  for (const auto &law : w.laws) take(left_out_of(*law));
+  std::vector<std::string> rows;
+  for (const LeftOut &o : all)
+    rows.push_back("{\"name\":" + quote(o.effect) + ",\"of\":" + quote(o.of) + ",\"by\":" + quote(o.by) +
+                   "}");
+  return "\"left_out\":[" + join(rows, ",") + "]";
+}
+
 // What the model brings, which of it the scene uses, and what would switch it off.
 std::string effects(const Body &b) {
   std::string out = "\"effects\":[";
@@ -62,7 +96,7 @@ std::string effects(const Body &b) {
   for (const BodyEffect &e : body_effects(b)) {
     out += std::string(first ? "" : ",") + "{\"name\":" + quote(e.name) +
            ",\"works\":" + (e.works ? "true" : "false") +
-           ",\"used\":" + (e.works && planned(*b.world, e.name) ? "true" : "false") + ",\"switches\":[";
+           ",\"used\":" + (e.works && used(*b.world, e.name) ? "true" : "false") + ",\"switches\":[";
     first = false;
     for (size_t i = 0; i < e.switches.size(); ++i) {
       const EffectSwitch &s = e.switches[i];
@@ -168,9 +202,10 @@ std::string explain(const World &w) {
   for (size_t i = 0; i < w.plan.effects.size(); ++i) {
     const PlannedEffect &e = w.plan.effects[i];
     out += (i ? "," : "") + ("{\"name\":" + quote(e.name) + ",\"asked_by\":" + quote(e.asked_by) +
-                             ",\"provided_by\":" + quote(e.provided_by) + "}");
+                             ",\"provided_by\":" + quote(e.provided_by) + ",\"state\":" +
+                             (w.selection.lists(e.name) ? "\"asked\"" : "\"called for\"") + "}");
   }
-  out += "],\"stages\":[";
+  out += "]," + left_out(w) + "," + laws(w) + ",\"stages\":[";
   for (size_t i = 0; i < w.plan.stages.size(); ++i) {
     const PlannedStage &s = w.plan.stages[i];
     const Stage &stage = w.method->table[s.row];

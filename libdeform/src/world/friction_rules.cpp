@@ -56,12 +56,20 @@ bool same_memory(const LawInstance &a, const LawInstance &b) {
   return a.type == b.type && a.tangent == b.tangent;
 }
 
+bool bring_the_same(const LawInstance &a, const LawInstance &b) {
+  const std::vector<LawEffect> x = law_effects(*a.type, *a.host, a.params),
+                               y = law_effects(*b.type, *b.host, b.params);
+  return std::equal(x.begin(), x.end(), y.begin(), y.end(), [](const LawEffect &e, const LawEffect &f) {
+    return e.name == f.name && e.works == f.works;
+  });
+}
+
 // The rule's law, with other values of its parameters.
 void put_params(World &w, FrictionRule &rule, std::vector<double> values) {
   std::unique_ptr<LawInstance> &law = w.laws[rule.law];
-  auto fresh = std::make_unique<LawInstance>(*law->type, w.context->host, std::move(values));
-  if (fresh->nstate) need_ability(w, Ability::law_memory, "friction law", law->type->id);
+  auto fresh = make_law(w, *law->asked_type, std::move(values));
   const bool remembers = same_memory(*law, *fresh);
+  if (!bring_the_same(*law, *fresh)) w.changed = true;  // the plan names what the parameters call for
   if (remembers && !shared(w, rule)) {
     law.swap(fresh);
     if (rule.law < w.pairs.laws.size()) w.pairs.laws[rule.law] = law.get();
@@ -96,7 +104,7 @@ void add_friction_rule(World &w, std::string a, std::string b, const char *law,
   w.friction.reserve(w.friction.size() + 1);
   FrictionRule *const before = find_rule(w, rule.between);
   const dfm_type &type = w.context->registry.find(DFM_KIND_FRICTION, law);
-  if (before && w.laws[before->law]->type == &type) {
+  if (before && w.laws[before->law]->asked_type == &type) {
     put_params(w, *before, pack_params(type, given));
     move_to_end(w, before);
   } else {
@@ -111,8 +119,8 @@ void add_friction_rule(World &w, std::string a, std::string b, const char *law,
 void set_friction_rule(World &w, const char *a, const char *b, std::span<const dfm_param_value> given) {
   FrictionRule &rule = need_rule(w, a, b);
   const LawInstance &law = *w.laws[rule.law];
-  std::vector<double> values = changed_params(*law.type, given, law.params);
-  if (values == law.params) return;
+  std::vector<double> values = changed_params(*law.asked_type, given, law.asked);
+  if (values == law.asked) return;
   put_params(w, rule, std::move(values));
   wake_all(w);
   values_changed(w);

@@ -127,6 +127,23 @@ class EffectsAtWork {
   std::vector<bool> at_work_;
 };
 
+// In the model and its values.
+void give_params(Body &b, const std::vector<double> &values) {
+  const char *const type = b.model.type->id;
+  const dfm_status status = b.model.put_params(values, b.dynamics->claims());
+  if (status == DFM_E_NOMEM)
+    fail(DFM_E_NOMEM, "body '%s': model '%s' found no memory for these parameters; nothing was changed",
+         b.name.c_str(), type);
+  if (status == DFM_E_UNSUPPORTED && b.dynamics->claims())
+    fail(DFM_E_UNSUPPORTED,
+         "body '%s': model '%s' does not take these parameters, or has no stiffness of the same kind with "
+         "them, which the body moves by; give it the model anew with them (dfm_body_set_model)",
+         b.name.c_str(), type);
+  if (status != DFM_OK)
+    fail(DFM_E_ARG, "body '%s': model '%s' refuses these parameters; the log says why", b.name.c_str(), type);
+  b.model.params = values;
+}
+
 }  // namespace
 
 void set_model_params(Body &b, const dfm_params &params) {
@@ -142,7 +159,11 @@ void set_model_params(Body &b, const dfm_params &params) {
              "body '%s': parameter '%s' differs by cell (from %s), so one value cannot replace it while it "
              "runs; make the body anew",
              b.name.c_str(), f.key.c_str(), f.from.c_str());
-  std::vector<double> values = changed_params(type, given, b.model.params);
+  const std::vector<double> &before_asked = b.withheld.asked.empty() ? b.model.params : b.withheld.asked;
+  const std::vector<double> asked = changed_params(type, given, before_asked);
+  std::vector<double> values = asked;
+  for (size_t k = 0; k < values.size(); ++k)  // what is left out stays so
+    if (before_asked[k] != b.model.params[k]) values[k] = b.model.params[k];
   size_t at = 0;
   for (uint32_t i = 0; i < type.nparam; at += type.params[i++].width)
     if (!(type.params[i].flags & DFM_PARAM_RUNTIME) &&
@@ -152,19 +173,16 @@ void set_model_params(Body &b, const dfm_params &params) {
   if (!b.model.ops->set_params)
     fail(DFM_E_UNSUPPORTED, "model '%s' takes no parameters while it runs", type.id);
   const EffectsAtWork before(b.model);
-  const dfm_status status = b.model.put_params(values, b.dynamics->claims());
-  if (status == DFM_E_NOMEM)
-    fail(DFM_E_NOMEM, "body '%s': model '%s' found no memory for these parameters; nothing was changed",
-         b.name.c_str(), type.id);
-  if (status == DFM_E_UNSUPPORTED && b.dynamics->claims())
-    fail(DFM_E_UNSUPPORTED,
-         "body '%s': model '%s' does not take these parameters, or has no stiffness of the same kind with "
-         "them, which the body moves by; give it the model anew with them (dfm_body_set_model)",
-         b.name.c_str(), type.id);
-  if (status != DFM_OK)
-    fail(DFM_E_ARG, "body '%s': model '%s' refuses these parameters; the log says why", b.name.c_str(),
-         type.id);
-  b.model.params = std::move(values);
+  give_params(b, values);
+  std::vector<uint8_t> by_cell = differs_by_cell(type, b.fields);
+  const auto works = [&](const std::string &effect) { return b.model.works(effect); };
+  if (b.world->selection.listed() &&
+      leave_out(type, b.model.effect_rows(), b.world->selection, works, values, by_cell)) {
+    give_params(b, values);
+  }
+  b.withheld.by_cell.resize(type.nparam);
+  const bool cells = std::count(b.withheld.by_cell.begin(), b.withheld.by_cell.end(), 1) > 0;
+  b.withheld.asked = asked == values && !cells ? std::vector<double>() : asked;
   values_changed(*b.world);
   if (before.changed()) b.world->changed = true;  // the plan names the effects that parameters call for
 }

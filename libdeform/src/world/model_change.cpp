@@ -174,12 +174,11 @@ void check_surface(World &w, Body &b) {
 
 // Effects that the scene lists, and that the old model alone provides.
 void check_effects(const World &w, const Body &b, const ModelInstance &old, const ModelInstance &fresh) {
-  if (!w.def.effects) return;
+  if (!w.selection.listed()) return;
   const std::vector<std::string> now = effects(*fresh.type);
   for (const std::string &effect : effects(*old.type)) {
     const bool stays = std::find(now.begin(), now.end(), effect) != now.end() && fresh.works(effect);
-    const auto &asked = w.asked_effects;
-    if (stays || !old.works(effect) || std::find(asked.begin(), asked.end(), effect) == asked.end()) continue;
+    if (stays || !old.works(effect) || !w.selection.lists(effect)) continue;
     const auto &offered = w.steps->facts.offered;
     const auto is = [&](const SceneFacts::Provider &p) { return p.effect == effect; };
     if (std::count_if(offered.begin(), offered.end(), is) > 1) continue;
@@ -248,7 +247,7 @@ void keep_spare(std::vector<SpareModel> &spares, BodyModel &left, std::unique_pt
   std::erase_if(spares, same);
   if (spares.size() == kSpares) spares.erase(spares.begin());
   place->swap(left.instance);
-  spares.push_back({std::move(place), std::move(left.origin)});
+  spares.push_back({std::move(place), std::move(left.origin), std::move(left.withheld)});
 }
 
 // What an instance of this type is to be made with, as the body is now.

@@ -524,6 +524,11 @@ std::vector<std::unique_ptr<LawInstance>> make_laws(const SnapshotReader &s, con
            type.id);
     if (!in_range(type, l.params)) s.refuse("law parameters", "values in the range of the law's table");
     laws.push_back(std::make_unique<LawInstance>(type, w.context->host, l.params));
+    for (const auto &own : w.laws)
+      if (own->type == &type && own->params == l.params) {
+        laws.back()->asked_type = own->asked_type;
+        laws.back()->asked = own->asked;
+      }
     most = std::max(most, laws.back()->nstate);
   }
   if (t.store.nstate > most) s.refuse("contact states", "no more than a law has");

@@ -66,7 +66,7 @@ static const dfm_param rows[] = {{"first", "first", "N", 0.0, 10.0, DEFAULT, ROW
                                  {SECOND, "second", "N", 0.0, 10.0, 2.0, 0, 1, NULL}};
 static const dfm_slot slots[] = {{UNIT, 2, DFM_SLOT_TANGENT, 0}};
 static const dfm_friction law = {
-    sizeof(dfm_friction), NEEDS, FLAGS, 1, slots, EVAL, NULL, NULL, NULL, NULL, SLOT_SIZE, 0};
+    sizeof(dfm_friction), NEEDS, FLAGS, 1, slots, EVAL, NULL, NULL, NULL, NULL, SLOT_SIZE, 0, NULL};
 static const dfm_type type = {sizeof(dfm_type),  KIND, ID,  "bad", "1.0", "MIT", SOURCE, rows, 2,
                               sizeof(dfm_param), NULL, &law};
 static const dfm_type *const types[] = {&type};

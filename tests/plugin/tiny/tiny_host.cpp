@@ -75,7 +75,8 @@ const dfm_friction law = {sizeof(dfm_friction),
                           release,
                           nullptr,
                           0,
-                          0};
+                          0,
+                          nullptr};
 const dfm_type type =
     dp::type(DFM_KIND_FRICTION, "org.tiny.host", "host services", "1.0", "MIT", "test", rows, nullptr, &law);
 }  // namespace

@@ -23,8 +23,19 @@ dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
   return DFM_OK;
 }
 
-const dfm_friction law = {
-    sizeof(dfm_friction), 0, 0, 1, slots, dp::guarded<eval>, nullptr, nullptr, nullptr, nullptr, 0, 0};
+const dfm_friction law = {sizeof(dfm_friction),
+                          0,
+                          0,
+                          1,
+                          slots,
+                          dp::guarded<eval>,
+                          nullptr,
+                          nullptr,
+                          nullptr,
+                          nullptr,
+                          0,
+                          0,
+                          nullptr};
 const dfm_type type =
     dp::type(DFM_KIND_FRICTION, "org.tiny.nan", "nan", "1.0", "MIT", "test", rows, nullptr, &law);
 }  // namespace

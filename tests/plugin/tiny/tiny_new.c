@@ -51,7 +51,7 @@ static dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
 }
 
 static const struct new_friction law = {{sizeof(struct new_friction), 0, 0, 2, &slots[0].known, eval, NULL,
-                                         NULL, NULL, state, sizeof slots[0], 0},
+                                         NULL, NULL, state, sizeof slots[0], 0, NULL},
                                         {NULL, NULL, NULL, NULL}};
 static const struct new_type type = {
     {sizeof(struct new_type), DFM_KIND_FRICTION, "org.tiny.new", "new", "1.0", "MIT", "test",

@@ -32,7 +32,8 @@ static const dfm_friction law = {sizeof(dfm_friction),
                                  NULL,
                                  NULL,
                                  0,
-                                 0};
+                                 0,
+                                 NULL};
 static const char *const effects[] = {NULL};
 static const dfm_type type = {sizeof(dfm_type),
                               DFM_KIND_FRICTION,

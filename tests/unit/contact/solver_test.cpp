@@ -48,7 +48,7 @@ struct Groove {
       law.fn[i] = 1e-6;
       law.limit[i] = mu * 1e-6;
       law.mode[i] = mode;
-      law.set_valued[i] = 0;
+      law.form[i] = dfm::kSmoothLaw;
       law.dft_dfn[i] = steep;
       law.dft_dfn[law.stride + i] = 0;
     }
@@ -62,7 +62,7 @@ void ask_coulomb(double mu, ContactState &s) {
   for (uint32_t i = 0; i < s.n; ++i) {
     const uint32_t second = s.stride + i;
     const double size = std::hypot(s.ft_stop[i], s.ft_stop[second]);
-    s.set_valued[i] = 1;
+    s.form[i] = dfm::kSetValuedLaw;
     s.limit[i] = mu * s.fn[i];
     s.mode[i] = size > s.limit[i] ? 2 : 1;
     const double share = size > s.limit[i] ? s.limit[i] / size : 1;

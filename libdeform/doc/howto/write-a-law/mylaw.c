@@ -49,7 +49,8 @@ static const dfm_friction law = {sizeof law,
                                  NULL,
                                  NULL,
                                  0,
-                                 0};
+                                 0,
+                                 NULL};
 static const char *const effects[] = {"presliding", "hysteresis", NULL};
 static const dfm_type type = {sizeof type,
                               DFM_KIND_FRICTION,
