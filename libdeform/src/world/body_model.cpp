@@ -141,7 +141,6 @@ void make_instance(World &w, Body &b, const dfm_type &type, std::vector<double> 
   mesh.edges = b.edges.data();
   mesh.fixed = out.origin.held.data();
   coupling.tell(mesh);
-  const OnBehalf speaks(b.name);
   if (!take_spare(b, type, values, out))
     out.instance.create(type, w.context->host, mesh, m, std::move(values));
 }
@@ -176,6 +175,7 @@ void make_model(World &w, Body &b, const dfm_type &type, std::vector<double> val
                 BodyModel &out) {
   const Memory &m = w.memory();
   const auto implicit = implicit_of(w, b.name, integrator, out.integrator);
+  const OnBehalf speaks(b.name);
   make_selected(w, b, type, std::move(values), out);
   // a body's dynamics hold to its own instance, which is the new one meanwhile
   struct Lent {
