@@ -31,7 +31,7 @@ struct Disc { double radius, growth; };
 Disc disc_of(const ContactState &s, uint32_t i, double h, double ln) {
   const uint32_t n = s.stride;
   const double fn = s.fn[i], share = fn > 0 ? s.limit[i] / fn : 0;
-  if (!s.set_valued[i]) {
+  if (s.form[i] != kSetValuedLaw) {
     if (s.mode[i] == 1 || share * ln > h * s.limit[i]) return {share * ln, share};
     return {h * s.limit[i], 0};
   }
@@ -135,8 +135,8 @@ bool Proximal::answer(const ContactRows &rows, const ContactState &s, uint32_t k
   if (!(pressed > 0)) return false;
   l[0] = pressed;
   d[0] = -rn;
-  if (!(rows.wt[i] > 0)) return true;
-  if (s.set_valued[i]) {
+  if (!(rows.wt[i] > 0) || s.form[i] == kNoFriction) return true;
+  if (s.form[i] == kSetValuedLaw) {
     const double rt = rho / rows.wt[i];
     for (int c = 1; c < 3; ++c) {
       l[c] = l0[c] - rt * u[c];

@@ -70,7 +70,7 @@ TEST(Proximal, LoadOnTheFartherOfEqualContacts_IsHandedOver) {
   ContactState law;
   law.resize(3, 0);
   for (uint32_t i = 0; i < 3; ++i) {
-    law.set_valued[i] = 1;
+    law.form[i] = dfm::kSetValuedLaw;
     law.mode[i] = 1;
     law.fn[i] = 1;
     law.limit[i] = kMu;
