@@ -73,7 +73,7 @@ const dfm_friction with = {sizeof(dfm_friction),
                            0,
                            nullptr};
 const dfm_friction without = {
-    sizeof(dfm_friction), kNeeds, kPlain, 0, nullptr, viscous, nullptr, nullptr, nullptr, nullptr, 0, 0};
+    sizeof(dfm_friction), kNeeds, kPlain, 0, nullptr, viscous, nullptr, nullptr, nullptr, nullptr, 0, 0, nullptr};
 const dfm_friction smooth = {sizeof(dfm_friction),
                              kNeeds,
                              kPlain | DFM_FRIC_JACOBIAN,

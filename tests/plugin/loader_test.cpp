@@ -52,7 +52,8 @@ const dfm_plugin *counted_entry(const dfm_host *host, uint32_t, uint32_t) {
       nullptr,
       nullptr,
       0,
-      0};
+      0,
+      nullptr};
   static const dfm_type type = {sizeof(dfm_type),
                                 DFM_KIND_FRICTION,
                                 "test.counted",
