@@ -43,8 +43,8 @@ static const dfm_slot state[] = {{DFM_PER_CONTACT, 2, DFM_SLOT_TANGENT, 0}}; /* 
 static const char *const effects[] = {"stiction", "presliding", "hysteresis", NULL};
 enum { NEEDS = DFM_NEED_FN | DFM_NEED_VT | DFM_NEED_AREA };
 enum { FLAGS = DFM_FRIC_ISOTROPIC | DFM_FRIC_PASSIVE | DFM_FRIC_JACOBIAN };
-static const dfm_friction law = {sizeof law, NEEDS, FLAGS, 1, state, eval, NULL,
-                                 NULL,       NULL,  NULL,  0, 0,     NULL};
+static const dfm_friction law = {
+    .size = sizeof law, .needs = NEEDS, .flags = FLAGS, .nslot = 1, .slots = state, .eval = eval};
 #define ID "org.deform.template_friction"
 #define SOURCE "Simo and Hughes 1998, box 1.4"
 static const dfm_type type = {

@@ -72,8 +72,19 @@ const dfm_friction with = {sizeof(dfm_friction),
                            0,
                            0,
                            nullptr};
-const dfm_friction without = {
-    sizeof(dfm_friction), kNeeds, kPlain, 0, nullptr, viscous, nullptr, nullptr, nullptr, nullptr, 0, 0, nullptr};
+const dfm_friction without = {sizeof(dfm_friction),
+                              kNeeds,
+                              kPlain,
+                              0,
+                              nullptr,
+                              viscous,
+                              nullptr,
+                              nullptr,
+                              nullptr,
+                              nullptr,
+                              0,
+                              0,
+                              nullptr};
 const dfm_friction smooth = {sizeof(dfm_friction),
                              kNeeds,
                              kPlain | DFM_FRIC_JACOBIAN,

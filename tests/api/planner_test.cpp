@@ -9,7 +9,11 @@
 
 namespace {
 
-std::string folder() { return test::scratch("planner"); }
+// Tests run side by side: a folder for each.
+std::string folder() {
+  return test::scratch(std::string("planner_") +
+                       testing::UnitTest::GetInstance()->current_test_info()->name());
+}
 
 // A bar that is held at one end; `wish` and `model` are members with their commas.
 std::string bar(const std::string &wish, const std::string &model = "", const std::string &time = "") {

@@ -217,33 +217,40 @@ void restore_all(const Build &build) {
 TEST(RefusedMemory, InARestore_LeavesTheWorldAsItWas) { restore_all(sleepers); }
 TEST(RefusedMemory, InARestoreThatBringsAModelBack_LeavesTheWorldAsItWas) { restore_all(changing); }
 
+namespace {
+
+// Without the n-th allocation; true: it was not reached.
+bool set_up_without(int64_t n, int &refused) {
+  dfm_context_def d = test::refusing_context();
+  dfm_context *c = nullptr;
+  dfm_world w = 0;
+  dfm_tetmesh mesh = 0;
+  const double size[3] = {0.1, 0.1, 0.1};
+  Refusal::arm(n);
+  dfm_status status = dfm_context_create(&d, &c);
+  if (status == DFM_OK) status = dfm_world_create(c, nullptr, &w);
+  if (status == DFM_OK) status = dfm_tetmesh_make(c, "beam", size, 10, &mesh);
+  const bool through = !Refusal::disarm();
+  if (status != DFM_OK) {
+    ++refused;
+    EXPECT_TRUE(status == DFM_E_NOMEM || status == DFM_E_IO)
+        << "allocation " << n << ": " << dfm_status_name(status) << ": " << dfm_last_error();
+  }
+  dfm_context_destroy(c);
+  return through;
+}
+
+}  // namespace
+
 // Context, world and bodies: what was refused is not there, and nothing is left of it.
 TEST(RefusedMemory, InTheSetUp_EndsInAnErrorAndLeaksNothing) {
   int refused = 0;
+  ASSERT_TRUE(set_up_without(INT64_MAX, refused));  // tables of the process have their size from then on
   bool through = false;
   for (int64_t n = 0; !through && n < 100000; n += n < 600 ? 1 : 7) {
     const int64_t live = Refusal::live;
-    {
-      dfm_context_def d = test::refusing_context();
-      dfm_context *c = nullptr;
-      dfm_world w = 0;
-      dfm_tetmesh mesh = 0;
-      const double size[3] = {0.1, 0.1, 0.1};
-      Refusal::arm(n);
-      dfm_status status = dfm_context_create(&d, &c);
-      if (status == DFM_OK) status = dfm_world_create(c, nullptr, &w);
-      if (status == DFM_OK) status = dfm_tetmesh_make(c, "beam", size, 10, &mesh);
-      through = !Refusal::disarm();
-      if (status != DFM_OK) {
-        ++refused;
-        EXPECT_TRUE(status == DFM_E_NOMEM || status == DFM_E_IO)
-            << "allocation " << n << ": " << dfm_status_name(status) << ": " << dfm_last_error();
-      }
-      dfm_context_destroy(c);
-    }
-    if (n > 600) {  // tables of the process have their size by then
-      EXPECT_EQ(Refusal::live, live) << "allocation " << n;
-    }
+    through = set_up_without(n, refused);
+    EXPECT_EQ(Refusal::live, live) << "allocation " << n;
   }
   EXPECT_GT(refused, 100);
 }

@@ -244,7 +244,7 @@ TEST(SceneErrors, Arguments_AreRefused) {
       {{"run", scene(), "--set", "time=1"}, {"--set", "/json/pointer=value"}},
       {{"run", scene(), "--set", "/bodies/7/mesh=x"}, {"--set /bodies/7/mesh", "1 entries"}},
       {{"explain", folder() + "/nothing.json"}, {"nothing.json"}},
-      {{"cost", "scene.json", "--budget", "1"}, {"not available yet"}},
+      {{"cost", "scene.json", "--budget", "1"}, {"scene.json", "cannot be opened"}},
       {{"ccd", "q.csv"}, {"q.csv"}}};
   for (const auto &[arguments, parts] : calls) {
     std::string what;

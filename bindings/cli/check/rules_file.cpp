@@ -248,7 +248,7 @@ void law_sound(const dfm_type &type, const dfm_friction &law) {
   if (law.needs & ~31u)
     broken("needs has bits that this ABI does not know (%#x), which no host fills; use DFM_NEED_*",
            law.needs);
-  if (law.flags & ~15u) broken("flags has bits that this ABI does not know (%#x); use DFM_FRIC_*", law.flags);
+  if (law.flags & ~31u) broken("flags has bits that this ABI does not know (%#x); use DFM_FRIC_*", law.flags);
   if ((law.flags & DFM_FRIC_SET_VALUED) && !(law.needs & DFM_NEED_FT_STOP))
     broken("a set-valued law that does not need FT_STOP cannot hold at rest; add DFM_NEED_FT_STOP to needs");
   slot_table_sound(law, true);

@@ -36,8 +36,7 @@ Disc disc_of(const ContactState &s, uint32_t i, double h, double ln) {
     return {h * s.limit[i], 0};
   }
   if (s.mode[i] != 2) return {share * ln, share};
-  const double growth =
-      std::sqrt(s.dft_dfn[i] * s.dft_dfn[i] + s.dft_dfn[n + i] * s.dft_dfn[n + i]);
+  const double growth = std::sqrt(s.dft_dfn[i] * s.dft_dfn[i] + s.dft_dfn[n + i] * s.dft_dfn[n + i]);
   const double radius = h * s.limit[i] + growth * (ln - h * fn);
   return radius > 0 ? Disc{radius, growth} : Disc{0, 0};
 }

@@ -150,7 +150,7 @@ struct Finder {
                                    view, c.kind, run, out);
     }
     const ObstacleShape shape(view);
-    const narrow::Pair pair{a, nullptr, &shape, h, offset, 0};
+    const narrow::Pair pair{a, nullptr, &shape, h, offset, 0, of_pair(crossings, a.id, view.id)};
     const auto triangle = view.shape == Shape::voxels ? narrow::voxel_triangle : narrow::triangle_obstacle;
     (c.kind == 0 ? narrow::surfel_obstacle : c.kind == 1 ? narrow::edge_obstacle : triangle)(pair, run, out);
   }

@@ -1,0 +1,117 @@
+#!/usr/bin/env python3
+"""Undamped bodies at "step": "auto": every model at its defaults, but without damping, in a free spin, as a
+cantilever and dropped on a floor, and what the energy watch says. A row each; rows that the table has are
+left alone, so that the run may be stopped and taken up again.
+
+auto_study.py DEFORM_COMMAND TABLE.csv [--steps N] [--seconds N] [--only TEXT]
+    N steps of each row (100000), the row being left out that takes more than N seconds (300)
+"""
+import argparse
+import csv
+import json
+import pathlib
+import subprocess
+import tempfile
+
+DATA = pathlib.Path(__file__).resolve().parents[2] / "examples/data"
+UNDAMPED = {"damping_mass": 0, "damping_stiffness": 0}
+# shape_matching calls the damping of its shape by another name
+MODELS = {"msm": {}, "linear_fem": {}, "corotational_fem": {}, "meshless": {}, "modal": {}, "condensed": {},
+          "shape_matching": {"damping_ratio": 0}}
+CASES = ("spin", "cantilever", "drop")
+COLUMNS = ("row", "step_s", "simulated_s", "steps", "substeps", "exit", "start_J", "max_J", "end_J", "gain_J",
+           "says")
+
+
+def scene(mesh, low, case, model, params):
+    body = {"name": "body", "mesh": str(DATA / f"{mesh}.msh"), "material": "rubber",
+            "model": {"type": model, "params": params}}
+    out = {"format": "deform-scene", "version": 1, "time": {"duration": 1, "step": "auto"},
+           "gravity": [0, 0, 0],
+           "materials": {"rubber": {"density": 1000, "young": 1e5, "poisson": 0.3,
+                                    "damping": {"mass": 0, "stiffness": 0}}},
+           "bodies": [body], "output": {"every": 1}}
+    if case == "spin":
+        body["spin"] = [2, 10, 20]
+    elif case == "cantilever":
+        body["fix"] = [{"box": [[-9, -9, low[2] - 1e-6], [9, 9, low[2] + 1e-6]]}]
+        out["gravity"] = [1, 0, 0]
+    else:
+        body["pose"] = {"position": [0, 0, 0.02 - low[2]]}
+        out["gravity"] = [0, 0, -9.81]
+        out["obstacles"] = [{"name": "floor", "shape": "plane", "point": [0, 0, 0], "normal": [0, 0, 1]}]
+    return out
+
+
+def deform(command, *arguments, seconds=None):
+    return subprocess.run([command, *arguments], capture_output=True, text=True, timeout=seconds)
+
+
+def step_of(command, path):
+    plan = json.loads(deform(command, "explain", path, "--json").stdout)
+    return plan["step"]["stable_s"]
+
+
+def run(command, definition, steps, seconds):
+    with tempfile.TemporaryDirectory() as folder:
+        path, out = f"{folder}/scene.json", f"{folder}/run"
+        pathlib.Path(path).write_text(json.dumps(definition))
+        bound = step_of(command, path)
+        # a model that nothing bounds takes the display's step
+        step = 0.8 * bound if bound else 1 / 60
+        definition["time"]["duration"] = steps * step
+        definition["output"]["every"] = steps * step / 1000
+        pathlib.Path(path).write_text(json.dumps(definition))
+        done = deform(command, "run", path, "--out", out, "--quiet", "--threads", "1", seconds=seconds)
+        summary = pathlib.Path(out) / "summary.json"
+        found = json.loads(summary.read_text()) if summary.exists() else {}
+        rows = pathlib.Path(out) / "bodies.csv"
+        # of what has no elastic energy (shape_matching), kinetic alone
+        energies = []
+        if rows.exists():
+            for row in csv.DictReader(rows.open()):
+                elastic = float(row["elastic_J"] or 0)
+                energies.append(float(row["kinetic_J"]) + (elastic if elastic == elastic else 0))
+        energy = found.get("energy", {})
+        return {"step_s": step, "simulated_s": found.get("simulated_s"), "steps": found.get("steps"),
+                "substeps": found.get("substeps"), "exit": done.returncode,
+                "start_J": energies[0] if energies else None, "max_J": max(energies, default=None),
+                "end_J": energies[-1] if energies else None, "gain_J": energy.get("gain_J"),
+                "says": " ".join(done.stderr.split())[:300]}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("command")
+    parser.add_argument("table", type=pathlib.Path)
+    parser.add_argument("--steps", type=int, default=100000)
+    parser.add_argument("--seconds", type=float, default=300)
+    parser.add_argument("--only", default="")
+    options = parser.parse_args()
+    done = {row["row"] for row in csv.DictReader(options.table.open())} if options.table.exists() else set()
+    for mesh in ("block", "cylinder_slim"):
+        info = deform(options.command, "mesh", "info", str(DATA / f"{mesh}.msh"), "--json").stdout
+        low = json.loads(info)["lo"]
+        for model, own in MODELS.items():
+            for case in CASES:
+                for volume in ([None, 0] if model == "msm" else [None]):
+                    name = f"{mesh} {model} {case}" + (" volume 0" if volume == 0 else "")
+                    if name in done or options.only not in name:
+                        continue
+                    params = {**own, **({"volume": 0} if volume == 0 else {})}
+                    try:
+                        row = run(options.command, scene(mesh, low, case, model, params), options.steps,
+                                  options.seconds)
+                    except subprocess.TimeoutExpired:
+                        row = {"says": f"takes more than {options.seconds:g} s"}
+                    new = not options.table.exists()
+                    with options.table.open("a", newline="") as file:
+                        writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
+                        if new:
+                            writer.writeheader()
+                        writer.writerow({"row": name, **row})
+                    print(name, row, flush=True)
+
+
+if __name__ == "__main__":
+    main()
