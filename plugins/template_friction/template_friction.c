@@ -9,7 +9,6 @@ static const dfm_param params[] = {
     {"sigma0", "bristle stiffness per area", "N/m^3", 1e3, 1e12, 1e8, DFM_PARAM_LOG_SCALE, 1, NULL}};
 
 static double length(const double *a) { return sqrt(a[0] * a[0] + a[1] * a[1]); }
-
 static dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
   /* column c of contact i is at [c * s + i]; outputs that are NULL are not wanted */
   const size_t s = in->stride;
