@@ -249,6 +249,27 @@ TEST(Cost, Apply_WritesASceneThatMeetsTheTarget) {
   EXPECT_LE(number(chosen, "cpu_s_per_s"), number(row(s.report, "0"), "cpu_s_per_s"));
 }
 
+// As the planner has made it, not planned anew beside each change; what is applied asks the planner no more.
+TEST(Cost, SceneWithAnAccuracy_IsStudiedAsPlanned) {
+  const std::string more = R"(, "accuracy": {"target": 0.2})";
+  const Study s = study("planned", bar(R"("duration": 0.1)", "", more),
+                        {"--axes", "time", "--budget", "300", "--target", "0.2", "--apply",
+                         test::scratch("cost_planned") + "/applied.json"});
+  ASSERT_EQ(s.result.exit_code, 0) << s.result.err;
+  JsonValue plan;
+  const test::CommandResult explained = test::deform({"explain", s.scene, "--json", "--quiet"});
+  ASSERT_TRUE(cli::parse_json(explained.out, plan)) << explained.out;
+  const std::string model = plan.find("planner")->find("predicted")->find("bodies")->items[0].get("model");
+  for (const JsonValue &choice : s.report.find("choices")->items)
+    if (choice.get("axis") == "time") {
+      EXPECT_EQ(choice.get("model"), model) << choice.get("label");
+    }
+  EXPECT_EQ(row(s.report, "0").get("model"), model);
+  const std::string applied = test::read_file(s.folder + "/applied.json");
+  EXPECT_EQ(applied.find("accuracy"), std::string::npos) << applied;
+  EXPECT_EQ(test::deform({"explain", s.folder + "/applied.json"}).exit_code, 0);
+}
+
 // A model of somebody else, whose dampers push instead of braking, is a choice like all that are loaded.
 TEST(Cost, UnstableChoice_IsNamedAndNotChosen) {
   const std::string plugins = test::scratch("cost_plugins");

@@ -38,6 +38,8 @@ JsonValue difference(const JsonValue &from, const JsonValue &to) {
     const bool objects = before && before->kind == JsonValue::object && m.value.kind == JsonValue::object;
     out.members.push_back({m.name, objects ? difference(*before, m.value) : m.value});
   }
+  for (const JsonMember &m : from.members)  // null: is taken away
+    if (!to.find(m.name)) out.members.push_back({m.name, {}});
   return out;
 }
 
@@ -45,7 +47,7 @@ JsonValue difference(const JsonValue &from, const JsonValue &to) {
 
 JsonValue scene_patch(const Subject &subject, const Study &study) {
   if (study.pick < 0) return {};
-  return difference(subject.scene, patched(subject, study));
+  return difference(subject.given, patched(subject, study));
 }
 
 void write_applied(const Subject &subject, const Study &study, const std::string &path) {

@@ -15,6 +15,7 @@
 #include <filesystem>
 #include <limits>
 #include <thread>
+#include <utility>
 
 #include "cli.h"
 #include "file.h"
@@ -189,10 +190,11 @@ void Runs::start(Job &job, Child &out) {
   make_folder(job.folder);
   std::remove((job.folder + "/outcome.json").c_str());
   std::vector<std::string> words = {command_path(), "run", subject_.path, "--out", job.folder, "--quiet"};
-  for (const auto &[pointer, value] : job.set) {
-    words.push_back("--set");
-    words.push_back(pointer + "=" + value);
-  }
+  for (const auto *const settings : {&subject_.planned, &std::as_const(job.set)})
+    for (const auto &[pointer, value] : *settings) {
+      words.push_back("--set");
+      words.push_back(pointer + "=" + value);
+    }
   std::vector<char *> argv;
   for (std::string &w : words) argv.push_back(w.data());
   argv.push_back(nullptr);

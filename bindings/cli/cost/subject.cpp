@@ -130,6 +130,27 @@ void find_ends(dfm_body body, const JsonValue *pose, SubjectBody &out) {
   }
 }
 
+// A scene with an accuracy or a budget is studied as the planner has made it: beside a wish every change
+// would be planned anew.
+void fix_plan(dfm_scene scene, Subject &out) {
+  for (const char *const wish : {"accuracy", "budget"}) {
+    if (!out.find(std::string("/") + wish)) continue;
+    const std::string pointer = std::string("/") + wish + "/chosen/set";
+    size_t bytes = 0;
+    need(dfm_scene_value(scene, pointer.c_str(), nullptr, &bytes));
+    std::string text(bytes, '\0');
+    need(dfm_scene_value(scene, pointer.c_str(), text.data(), &bytes));
+    JsonValue set;
+    if (!parse_json(text.substr(0, text.find('\0')), set)) throw Failure(kBadInput, "the plan is not JSON");
+    std::erase_if(out.scene.members, [&](const JsonMember &m) { return m.name == wish; });
+    out.planned.push_back({std::string("/") + wish, "null"});
+    for (const JsonMember &m : set.members) {
+      set_pointer(out.scene, m.name, m.value);
+      out.planned.push_back({m.name, json_text(m.value)});
+    }
+  }
+}
+
 void read_bodies(dfm_world world, const JsonValue &plan, Subject &out) {
   uint32_t n = 0;
   need(dfm_world_bodies(world, 0, nullptr, &n));
@@ -262,6 +283,8 @@ Subject read_subject(const std::string &path) {
   need(dfm_scene_open(context.get(), path.c_str(), nullptr, &scene));
   const std::string text = read_file(path, 64u << 20, "a scene");
   if (!parse_json(text, out.scene)) throw Failure(kBadInput, path + ": this is not JSON");
+  out.given = out.scene;
+  fix_plan(scene, out);
   if (out.word("/time/mode", "dynamic") == "static")
     throw Failure(kBadInput, path +
                                  ": \"time\": {\"mode\": \"static\"} has no steps whose cost could be "
@@ -298,6 +321,7 @@ Subject read_subject(const std::string &path) {
     hash.add_file(library.dli_fname);
   hash.add_file("/proc/self/exe").add(dfm_version(nullptr, nullptr, nullptr));
   for (const std::string &file : files) hash.add_file(file);
+  for (const auto &[pointer, value] : out.planned) hash.add(pointer).add(value);
   out.fingerprint = hash.value();
   return out;
 }

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "json_text.h"
@@ -25,7 +26,9 @@ struct SubjectBody {
 
 struct Subject {
   std::string path, folder;  // of the scene file
-  JsonValue scene;
+  JsonValue given, scene;    // the file's; the same with what the planner chose in place of its wish
+  // What makes the one of the other: pointers and JSON text, for --set.
+  std::vector<std::pair<std::string, std::string>> planned;
   double duration = 0, step = 0, every = 0;  // s; step 0: "auto"
   double stable = 0;                         // s, explicit, as the scene is; 0: nothing bounds it
   bool implicit = false;                     // any body as the scene is

@@ -50,20 +50,14 @@ DFM_LIST_SYMBOL(dfm_world_overlaps, dfm_overlap, 40)
 DFM_LIST_SYMBOL(dfm_world_profile, dfm_stage_time, 24)
 DFM_LIST_SYMBOL(dfm_world_swaps, dfm_swap, 64)
 
-namespace {
 // As many bytes come back in memory, as the struct of 0.1 does, and no more where the struct has grown.
-template <class T>
-struct First {
-  alignas(T) unsigned char bytes[dfm::kFirstSize<T>];
-};
-}  // namespace
-
-#define DFM_DEFAULT_SYMBOL(type)                                           \
-  extern "C" DFM_API First<type> type##_default(void) {                    \
-    First<type> out;                                                       \
-    static_assert(sizeof out == dfm::kFirstSize<type> && sizeof out > 16); \
-    type##_default_sized(sizeof out, reinterpret_cast<type *>(out.bytes)); \
-    return out;                                                            \
+#define DFM_DEFAULT_SYMBOL(type)                                                     \
+  struct first_##type { alignas(type) unsigned char bytes[dfm::kFirstSize<type>]; }; \
+  extern "C" DFM_API first_##type type##_default(void) {                             \
+    first_##type out;                                                                \
+    static_assert(sizeof out == dfm::kFirstSize<type> && sizeof out > 16);           \
+    type##_default_sized(sizeof out, reinterpret_cast<type *>(out.bytes));           \
+    return out;                                                                      \
   }
 DFM_DEFAULT_SYMBOL(dfm_context_def)
 DFM_DEFAULT_SYMBOL(dfm_world_def)

@@ -272,6 +272,9 @@ double weight_of(const Node &quantity, const std::vector<Probe> &probes) {
 }
 
 void read_wanted(const Node &scene, Definition &def) {
+  // null: none, as --set takes it away
+  for (const char *const key : {"accuracy", "budget"})
+    if (scene.has(key) && scene.member(key).value().is_null()) scene.value().erase(key);
   if (scene.has("accuracy") && scene.has("budget"))
     scene.member("budget").fail(
         "\"accuracy\" is given too; the planner reaches an error or a time, keep one");
