@@ -108,7 +108,8 @@ double recorded_time(const std::string &path) {
 
 double Outcome::predicted(double duration) const {
   if (state != cut) return took;
-  return simulated > 0 ? took * duration / simulated : std::numeric_limits<double>::infinity();
+  return simulated > 0 ? made + (took - made) * duration / simulated
+                       : std::numeric_limits<double>::infinity();
 }
 
 Runs::Runs(const Subject &subject, const std::string &out, unsigned parallel, double budget, bool progress)
@@ -161,6 +162,7 @@ void Runs::prepare(Job &job, const std::string &kind) const {
   o.cpu = number_in(kept, "cpu_s");
   o.simulated = number_in(kept, "simulated_s");
   o.took = number_in(kept, "took_s");
+  o.made = number_in(kept, "made_s");
   o.limit = number_in(kept, "limit_s");
   o.steps = number_in(kept, "steps");
   o.cells = number_in(kept, "cells");
@@ -173,7 +175,7 @@ void Runs::store(const Job &job) const {
   out.add("label", quoted(job.label)).add("state", std::to_string(int(o.state)));
   out.add("sentence", quoted(o.sentence)).add("cpu_s", number(o.cpu)).add("simulated_s", number(o.simulated));
   out.add("took_s", number(o.took)).add("limit_s", number(o.limit)).add("steps", number(o.steps));
-  out.add("cells", number(o.cells));
+  out.add("cells", number(o.cells)).add("made_s", number(o.made));
   write_whole(job.folder + "/outcome.json", out.text() + "\n");
 }
 
@@ -229,6 +231,7 @@ bool Runs::pause(Child &child) {
   o = {};
   o.state = Outcome::cut;
   o.took = child.before;
+  o.made = child.made;
   o.limit = o.cpu = work_of(child.pid);
   o.simulated = recorded_time(child.job->folder + "/bodies.csv");
   store(*child.job);
@@ -240,6 +243,8 @@ bool Runs::ended(Child &child) {
   Job &job = *child.job;
   const double now = std::chrono::duration<double>(Clock::now() - child.begin).count();
   int status = 0;
+  if (child.made == 0 && access((job.folder + "/bodies.csv").c_str(), F_OK) == 0)
+    child.made = child.before + now;
   if (waitpid(child.pid, &status, WNOHANG) == 0) {
     if (now > job.limit + 10) kill(child.pid, SIGKILL);
     if (child.told) return false;
@@ -259,6 +264,7 @@ void Runs::take_result(Child &child, int status) {
   Outcome &o = job.outcome;
   o = {};
   o.took = child.before;
+  o.made = child.made;
   o.limit = std::min(job.limit, job.work);
   const int code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   JsonValue summary;
@@ -304,7 +310,8 @@ bool Runs::waits(Job &job) const {
   const auto same = [&](const Child &c) { return c.job == &job; };
   const bool goes_on = std::any_of(paused_.begin(), paused_.end(), same);
   const double need = job.outcome.predicted(subject_.duration) - (goes_on ? job.outcome.took : 0);
-  return job.work <= job.outcome.limit || need > job.limit;
+  const bool slice = job.work < std::numeric_limits<double>::max();  // need not come to its end
+  return job.work <= job.outcome.limit || (!slice && need > job.limit);
 }
 
 void Runs::show(size_t running, size_t waiting) {

@@ -17,6 +17,7 @@ struct Outcome {
   std::string sentence;           // of a run that is not done
   double cpu = 0, simulated = 0;  // s of processor time in steps, and of the scene
   double took = 0;                // s on the clock, outputs included
+  double made = 0;                // s of them until the scene was read and its steps began
   double limit = 0;               // the least of both limits that ended it
   double steps = 0, cells = 0;
   bool kept = false;  // from an earlier call
@@ -61,6 +62,7 @@ class Runs {
     Job *job = nullptr;
     Clock::time_point begin;
     double before = 0;  // s at work until it was stopped
+    double made = 0;    // of its outcome
     bool told = false;  // to end
   };
   void start(Job &job, Child &out);

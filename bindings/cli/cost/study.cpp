@@ -22,8 +22,10 @@ constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 // Of the budget: all slices, on the processors together; the scene as it is. Of what is left after slices:
 // the reference.
 constexpr double kSliceShare = 0.15, kReferenceShare = 0.6, kOwnShare = 0.4;
-// Of the budget: when no more slices are begun, on a machine that has others to serve.
-constexpr double kSlicesEnd = 0.35;
+// Of the budget: processor time that a run of the reference may take to its first record.
+constexpr double kKnowShare = 0.2;
+// Of the budget: when no more slices are begun, on a machine that has others to serve, and no more of those.
+constexpr double kSlicesEnd = 0.35, kKnownEnd = 0.45;
 constexpr double kAloneShare = 0.15;  // of the budget: the front once more, alone and with pictures
 constexpr double kPictureTime = 0.5;  // s that pictures may take beside a run
 constexpr size_t kPictures = 6;
@@ -148,7 +150,22 @@ class Student {
     for (Job *job : jobs) job->work = std::max(each, 0.3);
     jobs[0]->work = kOwnShare * out_.options.budget;  // the scene as it is: the least to be shown
     runs_.run(jobs, runs_.parallel(), (1 - kSlicesEnd) * out_.options.budget);
+    know_ladder(std::max(each, 0.3));
     for (Job *job : jobs) job->work = std::numeric_limits<double>::max();
+  }
+
+  // The finest meshes may have been made in their slice and no more: without a first record nobody knows what
+  // they would take, and the reference would be coarse for no reason.
+  void know_ladder(double slice) {
+    for (double work = 4 * slice; work <= kKnowShare * out_.options.budget; work *= 4) {
+      std::vector<int> unknown;
+      for (size_t i = 0; i < out_.rows.size(); ++i)
+        if (on_ladder(int(i)) && !failed(int(i)) && std::isinf(predicted(int(i)))) unknown.push_back(int(i));
+      if (unknown.empty()) return;
+      std::vector<Job *> jobs = jobs_of(unknown, std::numeric_limits<double>::max());
+      for (Job *job : jobs) job->work = work;
+      runs_.run(jobs, runs_.parallel(), (1 - kKnownEnd) * out_.options.budget);
+    }
   }
 
   // Whether the row computes what the scene asks for in another way. Another law, self contact and guard ask
