@@ -104,7 +104,7 @@ TEST(FileAccess, MissingFiles_AreRefusedByEveryReader) { try_all(folder() + "/ab
 TEST(FileAccess, PluginFiles_AreRefusedWithoutWaiting) {
   for (const std::string &file : {std::string("/dev/zero"), folder() + "/pipe"}) {
     expect_refused(
-        {"friction", test::scratch("..") + "/../../../examples/friction/circle.json", "--law", file}, {});
+        {"friction", std::string(DEFORM_SOURCE_DIR) + "/examples/friction/circle.json", "--law", file}, {});
     EXPECT_NE(run({"plugin", "check", file}).exit_code, 124) << file;
     EXPECT_NE(run({"plugin", "check", file}).exit_code, 0) << file;
   }

@@ -5,6 +5,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -72,8 +73,12 @@ std::string shared_dir() {
   return std::filesystem::exists(beside + "/meshes") ? beside : std::string();
 }
 
+// Tests are processes that run side by side, so each has a folder of its own.
 std::string scratch(const std::string &name) {
-  const std::string dir = std::string(DEFORM_BINARY_DIR) + "/test-scratch/" + name;
+  const testing::TestInfo *const test = testing::UnitTest::GetInstance()->current_test_info();
+  std::string own = test ? std::string(test->test_suite_name()) + "." + test->name() : "no test";
+  std::replace(own.begin(), own.end(), '/', '_');
+  const std::string dir = std::string(DEFORM_BINARY_DIR) + "/test-scratch/" + own + "/" + name;
   std::filesystem::create_directories(dir);
   return dir;
 }
