@@ -54,8 +54,8 @@ struct Flat {
     const Mesh &m = mesh();
     npoint = (m.npoint() + 3) / 4 * 4;
     order.resize(m.npoint());
-    begin.resize(msm::partition_capacity(m.npoint()));
-    msm::partition_points(m.rest.data(), m.npoint(), order.data(), begin.data());
+    begin.resize(model::partition_capacity(m.npoint()));
+    model::partition_points(m.rest.data(), m.npoint(), order.data(), begin.data());
     std::vector<uint32_t> rank(m.npoint());
     for (uint32_t r = 0; r < m.npoint(); ++r) rank[order[r]] = r;
     std::vector<std::vector<uint32_t>> of(npoint);
