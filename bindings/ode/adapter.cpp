@@ -7,34 +7,7 @@
 namespace dfm_ode_detail {
 namespace {
 
-#define TRY(call)                                                             \
-  do {                                                                        \
-    if (const dfm_status status_ = (call); status_ != DFM_OK) return status_; \
-  } while (0)
-
-bool same(const dfm_rigid_state &a, const dfm_rigid_state &b) { return std::memcmp(&a, &b, sizeof a) == 0; }
 bool same(const dMass &a, const dMass &b) { return a.mass == b.mass && std::equal(a.I, a.I + 12, b.I); }
-
-dfm_pose to_pose(const Pose &p) {
-  const Quat q = p.rotation;
-  return {{p.position.x, p.position.y, p.position.z}, {q.x, q.y, q.z, q.w}};
-}
-
-// ODE's bodies are the engine's while the dfm_world steps, however that ends.
-class Stepping {
- public:
-  Stepping(Engine &engine, dfm_world world, const std::vector<dBodyID> &hidden)
-      : engine_(engine), world_(world) {
-    engine.begin(hidden, dfm_world_time(world));
-  }
-  ~Stepping() { engine_.end(dfm_world_time(world_)); }
-  Stepping(const Stepping &) = delete;
-  Stepping &operator=(const Stepping &) = delete;
-
- private:
-  Engine &engine_;
-  dfm_world world_;
-};
 
 }  // namespace
 
@@ -55,7 +28,7 @@ Adapter::Adapter(dfm_world world, const dfm_ode_def &def)
 Adapter::~Adapter() {
   for (auto &g : geoms_)
     if (g->obstacle) dfm_obstacle_destroy(g->obstacle);
-  for (auto &b : bodies_) release(*b);
+  for (auto &b : bodies_) b->release();
   if (own_group_) dJointGroupDestroy(engine_.contacts);
 }
 
@@ -102,16 +75,6 @@ dfm_status Adapter::check(const std::vector<Signature> &signatures) const {
   return DFM_OK;
 }
 
-dfm_status Adapter::ask_restored(bool &restored) {
-  dfm_world_stats now{};
-  now.size = sizeof now;
-  TRY(dfm_world_get_stats(world_, &now));
-  restored = now.time != time_ || now.steps != world_steps_;
-  time_ = now.time;
-  world_steps_ = now.steps;
-  return DFM_OK;
-}
-
 // Nothing that ODE has destroyed is touched: geoms are known alive because the space lists them, bodies
 // because a geom names them.
 dfm_status Adapter::look() {
@@ -143,40 +106,27 @@ dfm_status Adapter::look() {
   std::erase_if(props_, [&](const auto &p) { return !by_geom_.count(p.first); });
   for (auto &g : geoms_) TRY(follow(*g));
   bool restored = false;
-  TRY(ask_restored(restored));
+  TRY(clock_.ask(world_, restored));
   if (restored && !keeps_friction_) near_.forget();
   if (restored) keeps_friction_ = false;
-  for (auto &b : bodies_) TRY(agree(*b, restored));
+  for (auto &b : bodies_) TRY(b->agree(restored));
   return DFM_OK;
 }
 
 dfm_status Adapter::drop() {
   for (auto &g : geoms_) {
     if (g->found) continue;
-    TRY(unbind(*g));
+    TRY(unbind(g->obstacle));
     by_geom_.erase(g->id);
   }
   std::erase_if(geoms_, [](const auto &g) { return !g->found; });
   for (auto &b : bodies_) {
     if (b->found) continue;
-    TRY(release(*b));
-    engine_.forget(&b->seat->member);
+    TRY(b->release());
+    engine_.forget(&b->member);
     by_body_.erase(b->id);
   }
   std::erase_if(bodies_, [](const auto &b) { return !b->found; });
-  return DFM_OK;
-}
-
-dfm_status Adapter::release(Body &b) {
-  b.seat->leaves = true;
-  return dfm_rigid_destroy(b.rigid);
-}
-
-// The caller may have destroyed what stands for a geom: then the geom takes no further part.
-dfm_status Adapter::unbind(Geom &g) {
-  const dfm_status status = g.obstacle ? dfm_obstacle_destroy(g.obstacle) : dfm_status{DFM_OK};
-  if (status != DFM_OK && status != DFM_E_HANDLE) return status;
-  g.obstacle = 0;
   return DFM_OK;
 }
 
@@ -188,30 +138,19 @@ dfm_status Adapter::bind_body(dBodyID id, Body *&out) {
   }
   auto body = std::make_unique<Body>();
   body->id = id;
-  body->seat = std::make_unique<Seat>();
-  body->found = true;
   dBodyGetMass(id, &body->mass);
-  Member &m = body->seat->member;
+  OdeMember &m = body->member;
   m.engine = &engine_;
   m.body = id;
   m.inertia = inertia_of(id);
-  dfm_rigid_def def = dfm_rigid_def_default();
-  const dfm_rigid_state s = m.state();
-  def.shape = DFM_SHAPE_NONE;
-  def.mass = m.inertia.mass;
-  store(def.inertia, m.inertia.moments);
-  std::copy(s.position, s.position + 3, def.pose.position);
-  std::copy(s.rotation, s.rotation + 4, def.pose.rotation);
-  std::copy(s.velocity, s.velocity + 3, def.velocity);
-  std::copy(s.spin, s.spin + 3, def.spin);
-  dfm_rigid_set_def set{};
-  set.size = sizeof set;
-  set.nbody = 1;
-  set.bodies = &def;
-  set.data = body->seat.get();
-  TRY(dfm_rigid_create(world_, "ode", &set, &body->rigid));
-  body->ode = s;
-  TRY(dfm_rigid_get_state(body->rigid, &body->world));
+  body->seat.refuse = [id] {
+    return failed(DFM_E_STATE,
+                  "the rigid body stands for ODE's body %p, which owns it, and dfm_rigid_destroy would leave "
+                  "the adapter without it; call dBodyDestroy, or take its geoms out of the adapter's space, "
+                  "and the next dfm_ode_step lets it go; dfm_ode_detach takes all of them away",
+                  static_cast<void *>(id));
+  };
+  TRY(body->create(world_, "ode", m));
   engine_.members.push_back(&m);
   out = body.get();
   by_body_[id] = body.get();
@@ -240,9 +179,7 @@ dfm_status Adapter::bind(dGeomID id, const Signature &s) {
     if (s.body) {
       Body *body = nullptr;
       TRY(bind_body(s.body, body));
-      const Quat axes = body->seat->member.inertia.axes;
-      def.pose =
-          to_pose({rotate(conjugate(axes), s.local.position), unit(conjugate(axes) * s.local.rotation)});
+      def.pose = to_pose(in_principal_frame(body->member.inertia, s.local));
       TRY(dfm_rigid_add_shape(body->rigid, &def, &geom->obstacle));
     } else {
       geom->pose = pose_of(id);
@@ -255,36 +192,9 @@ dfm_status Adapter::bind(dGeomID id, const Signature &s) {
   return DFM_OK;
 }
 
-// A geom without a body that the caller has moved: its surface comes along within the next step.
 dfm_status Adapter::follow(Geom &g) {
-  if (!g.obstacle || g.signature.body) return DFM_OK;
-  const Pose now = pose_of(g.id);
-  const Vec p = now.position - g.pose.position;
-  const Quat q = now.rotation, r = g.pose.rotation;
-  if (dot(p, p) == 0 && q.x == r.x && q.y == r.y && q.z == r.z && q.w == r.w) return DFM_OK;
-  g.pose = now;
-  const dfm_pose pose = to_pose(now);
-  const dfm_status status = dfm_obstacle_move_to(g.obstacle, &pose);
-  if (status != DFM_E_HANDLE) return status;
-  g.obstacle = 0;  // as in unbind
-  return DFM_OK;
-}
-
-// Who has moved a body since both worlds agreed: the caller in ODE, or a restore in the dfm_world, which
-// counts for all bodies that were there.
-dfm_status Adapter::agree(Body &b, bool restored) {
-  Member &m = b.seat->member;
-  dfm_rigid_state world;
-  TRY(dfm_rigid_get_state(b.rigid, &world));
-  const dfm_rigid_state ode = m.state();
-  restored &= !b.fresh;
-  b.fresh = false;
-  m.restored |= restored;
-  if (same(ode, b.ode) && same(world, b.world)) return DFM_OK;
-  if (restored || same(ode, b.ode)) m.put(world);
-  else TRY(dfm_rigid_set_state(b.rigid, &ode));
-  b.ode = m.state();
-  return dfm_rigid_get_state(b.rigid, &b.world);
+  return !g.obstacle || g.signature.body ? dfm_status{DFM_OK}
+                                         : dfm_rigid_detail::follow(g.obstacle, g.pose, pose_of(g.id));
 }
 
 // Bodies that move with the known ones because joints lead to them.
@@ -319,7 +229,8 @@ dfm_status Adapter::step(double dt) {
   TRY(sync());
   dfm_status status = DFM_OK;
   {
-    const Stepping stepping(engine_, world_, hidden_bodies());
+    engine_.gather(hidden_bodies());
+    const Stepping stepping(engine_, world_);
     status = dfm_world_step(world_, dt, &trouble);
   }
   ++steps_;
@@ -327,14 +238,11 @@ dfm_status Adapter::step(double dt) {
   // it from the next
   dfm_status told = DFM_OK;
   for (auto &b : bodies_) {
-    Member &m = b->seat->member;
-    const dfm_status of_body = dfm_rigid_get_state(b->rigid, &b->world);
+    const dfm_status of_body = b->after(status);
     if (told == DFM_OK) told = of_body;
-    if (status != DFM_OK && of_body == DFM_OK && !same(b->world, m.state())) m.put(b->world);
-    b->ode = m.state();
   }
   bool restored = false;
-  TRY(ask_restored(restored));
+  TRY(clock_.ask(world_, restored));
   return status != DFM_OK ? status : told;
 }
 
@@ -370,7 +278,7 @@ bool Adapter::in_space(dGeomID geom) const {
 dfm_status Adapter::rebind(dGeomID geom) {
   const auto known = by_geom_.find(geom);
   if (known == by_geom_.end()) return DFM_OK;
-  TRY(unbind(*known->second));
+  TRY(unbind(known->second->obstacle));
   by_geom_.erase(known);
   std::erase_if(geoms_, [&](const auto &g) { return g->id == geom; });
   return DFM_OK;
@@ -426,7 +334,7 @@ dfm_ode_stats Adapter::stats() const {
   s.residual = engine_.residual;
   s.residual_max = engine_.residual_max;
   s.sync_seconds = sync_seconds_;
-  s.ode_seconds = engine_.ode_seconds;
+  s.ode_seconds = engine_.engine_seconds;
   return s;
 }
 

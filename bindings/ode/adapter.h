@@ -6,8 +6,9 @@
 #include <unordered_map>
 #include <vector>
 
-#include "host.h"
 #include "near.h"
+#include "own_world.h"
+#include "rigid_host/seated.h"
 #include "shapes.h"
 
 namespace dfm_ode_detail {
@@ -35,14 +36,10 @@ class Adapter {
   dSpaceID ode_space() const { return space_; }
 
  private:
-  struct Body {
+  struct Body : Seated {
     dBodyID id;
-    std::unique_ptr<Seat> seat;
-    dfm_rigid rigid = 0;
+    OdeMember member;
     dMass mass;
-    dfm_rigid_state ode{}, world{};  // what both worlds had when they agreed last
-    // fresh: ODE's state counts, whatever the dfm_world has been restored to
-    bool found = false, fresh = true;
   };
   struct Geom {
     dGeomID id;
@@ -60,7 +57,7 @@ class Adapter {
   };
   dfm_world world_;
   dSpaceID space_;
-  Engine engine_;
+  OdeEngine engine_;
   RigidFriction near_;
   bool own_group_, own_near_;
   std::vector<std::unique_ptr<Geom>> geoms_;  // in the order they came
@@ -71,9 +68,7 @@ class Adapter {
   std::vector<dGeomID> seen_;  // of this sync, in the space's order
   std::vector<Signature> signatures_;
   uint64_t steps_ = 0;
-  // s, the dfm_world's when both worlds agreed last: another one tells that it has been restored
-  double time_ = 0;
-  uint64_t world_steps_ = 0;
+  Clock clock_;
   bool keeps_friction_ = false;  // restored with the states of the rigid contacts
   double sync_seconds_ = 0;
 
@@ -83,12 +78,8 @@ class Adapter {
   dfm_status check(const std::vector<Signature> &signatures) const;
   dfm_status drop();
   dfm_status bind(dGeomID geom, const Signature &s);
-  dfm_status unbind(Geom &g);
-  static dfm_status release(Body &b);
   dfm_status bind_body(dBodyID body, Body *&out);
   dfm_status follow(Geom &g);
-  dfm_status agree(Body &b, bool restored);
-  dfm_status ask_restored(bool &restored);
   dfm_status rebind(dGeomID geom);
   std::vector<dBodyID> hidden_bodies() const;
 };

@@ -2,7 +2,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstring>
-#include <mutex>
 #include <new>
 
 #include "adapter.h"
@@ -11,42 +10,10 @@ using namespace dfm_ode_detail;
 
 namespace {
 
-// Handles count up and are never used twice. Never destroyed: an adapter that nobody has detached stands in
-// worlds of the dfm_world and of ODE, which at the program's end may be gone before it or stay longer than
-// it, and what detaches as late as that must still find it.
-struct Adapters {
-  std::mutex mutex;
-  std::unordered_map<dfm_ode, std::unique_ptr<Adapter>> all;
-  dfm_ode next = 1;
-};
-Adapters &adapters() {
-  static Adapters *const a = new Adapters;
-  return *a;
-}
-
-Adapter *find(dfm_ode handle) {
-  Adapters &a = adapters();
-  std::lock_guard lock(a.mutex);
-  const auto at = a.all.find(handle);
-  return at == a.all.end() ? nullptr : at->second.get();
-}
-
 template <class F>
 dfm_status with(dfm_ode handle, F &&f) noexcept {
-  try {
-    Adapter *const a = find(handle);
-    if (!a)
-      return failed(DFM_E_HANDLE, "ODE adapter %llu does not exist; it has been detached, or never was",
-                    static_cast<unsigned long long>(handle));
-    return f(*a);
-  } catch (const std::bad_alloc &) {
-    return dfm_fail(DFM_E_NOMEM, "ode: out of memory");
-  } catch (...) {
-    return dfm_fail(DFM_E_FATAL, "ode: an exception that should not be");
-  }
+  return dfm_rigid_detail::with<Adapter>(ode_kind(), handle, f);
 }
-
-dfm_status missing(const char *what) { return failed(DFM_E_ARG, "argument '%s' is NULL", what); }
 
 // Ends of structs in 0.1: what a caller has that says no more (deform/base.h, "structs of another version").
 constexpr uint32_t kFirstDef = offsetof(dfm_ode_def, version) + sizeof(const char *);
@@ -77,6 +44,29 @@ dfm_status check_def(const dfm_ode_def &d) {
 
 }  // namespace
 
+namespace dfm_ode_detail {
+
+const EngineKind &ode_kind() {
+  static const EngineKind kind{"ode", "dfm_ode_step", create_own_world};
+  return kind;
+}
+
+dfm_status check_ode() {
+  if (sizeof(dReal) != 8 || !dCheckConfiguration("ODE_double_precision"))
+    return failed(DFM_E_UNSUPPORTED,
+                  "the ODE that is loaded is not of double precision (%s); libdeform_ode needs libode-dev "
+                  "0.16 as Debian builds it",
+                  dGetConfiguration());
+  if (!dCheckConfiguration("ODE_EXT_trimesh"))
+    return failed(DFM_E_UNSUPPORTED,
+                  "the ODE that is loaded has no triangle meshes (%s); libdeform_ode needs libode-dev 0.16 "
+                  "as Debian builds it",
+                  dGetConfiguration());
+  return DFM_OK;
+}
+
+}  // namespace dfm_ode_detail
+
 void dfm_ode_def_default_sized(uint32_t real_bytes, const char *version, uint32_t size, dfm_ode_def *out) {
   if (!out) return;
   dfm_ode_def d{};
@@ -91,7 +81,7 @@ void dfm_ode_def_default_sized(uint32_t real_bytes, const char *version, uint32_
 
 dfm_status dfm_ode_register(void) {
   if (const dfm_status s = check_ode(); s != DFM_OK) return s;
-  return register_host();
+  return register_host(ode_kind());
 }
 
 dfm_status dfm_ode_attach(dfm_world world, const dfm_ode_def *def, dfm_ode *out) {
@@ -99,20 +89,18 @@ dfm_status dfm_ode_attach(dfm_world world, const dfm_ode_def *def, dfm_ode *out)
     if (!def) return missing("def");
     if (!out) return missing("out");
     if (const dfm_status s = check_def(*def); s != DFM_OK) return s;
-    if (const dfm_status s = register_host(); s != DFM_OK) return s;
+    if (const dfm_status s = register_host(ode_kind()); s != DFM_OK) return s;
     uint32_t n = 0;
     if (const dfm_status s = dfm_world_bodies(world, 0, nullptr, &n); s != DFM_OK) return s;
-    Adapters &a = adapters();
-    std::lock_guard lock(a.mutex);
-    for (auto &[handle, other] : a.all) {
-      if (other->ode_world() == def->world)
-        return dfm_fail(DFM_E_STATE, "this dWorldID has an adapter already; dfm_ode_detach it first");
-      if (other->ode_space() == def->space)
-        return dfm_fail(DFM_E_STATE, "this dSpaceID has an adapter already; dfm_ode_detach it first");
-    }
-    a.all.emplace(a.next, std::make_unique<Adapter>(world, *def));
-    *out = a.next++;
-    return DFM_OK;
+    return Registry<Adapter>::get().add(
+        [&](const Adapter &other) {
+          if (other.ode_world() == def->world)
+            return dfm_fail(DFM_E_STATE, "this dWorldID has an adapter already; dfm_ode_detach it first");
+          if (other.ode_space() == def->space)
+            return dfm_fail(DFM_E_STATE, "this dSpaceID has an adapter already; dfm_ode_detach it first");
+          return dfm_status{DFM_OK};
+        },
+        [&] { return std::make_shared<Adapter>(world, *def); }, out);
   } catch (const std::bad_alloc &) {
     return dfm_fail(DFM_E_NOMEM, "ode: out of memory");
   }
@@ -120,11 +108,7 @@ dfm_status dfm_ode_attach(dfm_world world, const dfm_ode_def *def, dfm_ode *out)
 
 dfm_status dfm_ode_detach(dfm_ode ode) {
   return with(ode, [&](Adapter &) {
-    std::unique_ptr<Adapter> gone;
-    Adapters &a = adapters();
-    std::lock_guard lock(a.mutex);
-    gone = std::move(a.all[ode]);
-    a.all.erase(ode);
+    Registry<Adapter>::get().remove(ode);
     return dfm_status{DFM_OK};
   });
 }

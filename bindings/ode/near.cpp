@@ -2,7 +2,8 @@
 
 #include <algorithm>
 
-#include "host.h"
+#include "engine.h"
+#include "rigid_host/host.h"
 
 namespace dfm_ode_detail {
 namespace {

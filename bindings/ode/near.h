@@ -15,9 +15,11 @@
 #include <vector>
 
 #include "deform/ode.h"
-#include "rigid_math.h"
+#include "rigid_host/rigid_math.h"
 
 namespace dfm_ode_detail {
+
+using namespace dfm_rigid_detail;
 
 class RigidFriction {
  public:

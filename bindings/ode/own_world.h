@@ -1,10 +1,16 @@
-// The host "ode" for a set that brings nothing but its defs (scenes): a dWorldID of its own with these
-// bodies and joints.
+// The host "ode" (rigid_host/host.h): its table, and sets that bring nothing but their defs (scenes), each a
+// dWorldID of its own with these bodies and joints.
 #pragma once
-#include "host.h"
+#include <ode/ode.h>
+
+#include "rigid_host/host.h"
 
 namespace dfm_ode_detail {
 
+using namespace dfm_rigid_detail;
+
 dfm_status create_own_world(const dfm_rigid_set_def &set, void **self, uint32_t *group, uint32_t *nextra);
+const EngineKind &ode_kind();
+dfm_status check_ode();  // precision and version at run time, with its sentence
 
 }  // namespace dfm_ode_detail

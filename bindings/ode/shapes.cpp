@@ -1,19 +1,11 @@
-// Spheres, boxes, capsules and planes are the library's own. Cylinders have flat ends and a rim that the
-// library's primitives have not: they become closed meshes of 64 sides, as wide as to hold the cylinder's
-// volume, so that the side is off by 0.08 % of the radius at most. Trimeshes are read once, triangle by
-// triangle, when they come in; ODE has no getter for the arrays of convexes and heightfields.
+// Spheres, boxes, capsules and planes are the library's own, cylinders meshes. Trimeshes are read once,
+// triangle by triangle, when they come in; ODE has no getter for the arrays of convexes and heightfields.
 #include "shapes.h"
 
 #include <algorithm>
-#include <array>
-#include <cstring>
-#include <map>
 
 namespace dfm_ode_detail {
 namespace {
-
-constexpr uint32_t kSides = 64;
-constexpr double kPi = 3.14159265358979323846;
 
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wdeprecated-declarations"
@@ -50,43 +42,22 @@ void sizes(dGeomID g, Signature &s) {
   }
 }
 
-// Corners of one place are one point: ODE moves each by the same operations, so they are equal to the bit.
+// ODE moves each corner by the same operations, so those of one place are equal to the bit.
 Triangles read_trimesh(dGeomID g) {
-  Triangles t;
+  Welder welder;
   const Pose back = inverse(ode_pose(g));
-  std::map<std::array<double, 3>, uint32_t> known;
   const int n = dGeomTriMeshGetTriangleCount(g);
   for (int i = 0; i < n; ++i) {
     dVector3 v[3];
     dGeomTriMeshGetTriangle(g, i, &v[0], &v[1], &v[2]);
-    uint32_t c[3];
+    std::array<double, 3> corner[3];
     for (int k = 0; k < 3; ++k) {
-      const auto [at, fresh] =
-          known.try_emplace({v[k][0], v[k][1], v[k][2]}, static_cast<uint32_t>(known.size()));
-      c[k] = at->second;
-      if (!fresh) continue;
       const Vec p = back.position + rotate(back.rotation, load(v[k]));
-      t.points.insert(t.points.end(), {p.x, p.y, p.z});
+      corner[k] = {p.x, p.y, p.z};
     }
-    if (c[0] != c[1] && c[1] != c[2] && c[2] != c[0]) t.corners.insert(t.corners.end(), c, c + 3);
+    welder.add(corner);
   }
-  return t;
-}
-
-// Along local z, as ODE's.
-Triangles cylinder(double radius, double length) {
-  Triangles t;
-  const double turn = 2 * kPi / kSides, r = radius * std::sqrt(turn / std::sin(turn));
-  for (uint32_t i = 0; i < kSides; ++i)
-    for (const double z : {-0.5 * length, 0.5 * length})
-      t.points.insert(t.points.end(), {r * std::cos(turn * i), r * std::sin(turn * i), z});
-  t.points.insert(t.points.end(), {0, 0, -0.5 * length, 0, 0, 0.5 * length});
-  for (uint32_t i = 0; i < kSides; ++i) {
-    const uint32_t low = 2 * i, high = low + 1, next_low = 2 * ((i + 1) % kSides), next_high = next_low + 1;
-    t.corners.insert(t.corners.end(), {low, next_low, next_high, low, next_high, high});
-    t.corners.insert(t.corners.end(), {2 * kSides, next_low, low, 2 * kSides + 1, high, next_high});
-  }
-  return t;
+  return welder.take();
 }
 
 }  // namespace
@@ -126,9 +97,7 @@ Pose pose_of(dGeomID geom) {
   if (dGeomGetClass(shape) == dPlaneClass) {
     dVector4 p;
     dGeomPlaneGetParams(shape, p);
-    const Vec n = load(p), v = cross({0, 0, 1}, n);
-    const Quat q = n.z > -1 + 1e-12 ? unit({v.x, v.y, v.z, 1 + n.z}) : Quat{1, 0, 0, 0};
-    return {p[3] * n, q};
+    return plane_pose(load(p), p[3]);
   }
   return shape == geom ? ode_pose(geom) : ode_pose(geom) * ode_pose(shape);
 }
@@ -160,13 +129,6 @@ const char *class_name(int c) {
 
 void describe(dGeomID geom, const Signature &s, const Triangles *own, dfm_obstacle_def &def,
               Triangles &made) {
-  const auto mesh = [&](const Triangles &t) {
-    def.shape = DFM_SHAPE_MESH;
-    def.npoint = static_cast<uint32_t>(t.points.size() / 3);
-    def.ntriangle = static_cast<uint32_t>(t.corners.size() / 3);
-    def.points = t.points.data();
-    def.triangles = t.corners.data();
-  };
   switch (s.inner_class) {
     case dSphereClass:
       def.shape = DFM_SHAPE_SPHERE;
@@ -183,14 +145,14 @@ void describe(dGeomID geom, const Signature &s, const Triangles *own, dfm_obstac
       break;
     case dPlaneClass: def.shape = DFM_SHAPE_PLANE; break;
     case dCylinderClass:
-      made = cylinder(s.size[0], s.size[1]);
-      mesh(made);
+      made = cylinder(s.size[0], s.size[1], 2);
+      made.fill(def);
       break;
     case dTriMeshClass:
       made = read_trimesh(shape_of(geom));
-      mesh(made);
+      made.fill(def);
       break;
-    default: mesh(*own); break;
+    default: own->fill(def); break;
   }
 }
 
@@ -214,17 +176,10 @@ Triangles convex_triangles(uint32_t npoint, const double *points, uint32_t npoly
 }
 
 Triangles height_triangles(double width, double depth, uint32_t nx, uint32_t nz, const double *heights) {
-  Triangles t;
-  for (uint32_t z = 0; z < nz; ++z)
-    for (uint32_t x = 0; x < nx; ++x)
-      t.points.insert(t.points.end(), {width * (double(x) / (nx - 1) - 0.5), heights[size_t{z} * nx + x],
-                                       depth * (double(z) / (nz - 1) - 0.5)});
-  for (uint32_t z = 0; z + 1 < nz; ++z)
-    for (uint32_t x = 0; x + 1 < nx; ++x) {
-      const uint32_t a = z * nx + x, b = a + 1, c = a + nx, d = c + 1;
-      t.corners.insert(t.corners.end(), {a, c, b, b, c, d});  // up is local y
-    }
-  return t;
+  return grid(nx, nz, [&](uint32_t x, uint32_t z) {  // up is local y
+    return Vec{width * (double(x) / (nx - 1) - 0.5), heights[size_t{z} * nx + x],
+               depth * (double(z) / (nz - 1) - 0.5)};
+  });
 }
 
 }  // namespace dfm_ode_detail

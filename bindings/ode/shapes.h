@@ -5,16 +5,10 @@
 #include <vector>
 
 #include "deform/ode.h"
-#include "rigid_math.h"
+#include "engine.h"
+#include "rigid_host/triangles.h"
 
 namespace dfm_ode_detail {
-
-// Triangles in the geom's frame.
-struct Triangles {
-  std::vector<double> points;
-  std::vector<uint32_t> corners;
-  bool empty() const { return corners.empty(); }
-};
 
 // All that makes a geom's obstacle what it is, beside where it stands: compared in each step, so it is cheap
 // and holds no arrays.

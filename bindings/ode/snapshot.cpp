@@ -17,11 +17,6 @@
 namespace dfm_ode_detail {
 namespace {
 
-#define TRY(call)                                                             \
-  do {                                                                        \
-    if (const dfm_status status_ = (call); status_ != DFM_OK) return status_; \
-  } while (0)
-
 constexpr uint64_t kMagic = 0x0065646f5f6d6664ull, kVersion = 2;  // "dfm_ode" 0
 constexpr size_t kPerBody = 16;
 // seed: of dWorldQuickStep's order of constraints
@@ -46,7 +41,7 @@ bool good_body(const double *p) {
   return poison == 0 && std::fabs(q - 1) < 1e-3 && flag(p[13]) && p[14] >= 0 && p[15] >= 0;
 }
 
-void save(dBodyID b, const Engine::Idle &idle, std::vector<double> &out) {
+void save(dBodyID b, const OdeEngine::Idle &idle, std::vector<double> &out) {
   const dReal *const x = dBodyGetPosition(b);
   const dReal *const q = dBodyGetQuaternion(b);
   const dReal *const v = dBodyGetLinearVel(b);
@@ -167,7 +162,7 @@ dfm_status Adapter::restore(const void *buffer, size_t bytes) {
   near_.take(std::move(friction));
   dRandSetSeed(static_cast<unsigned long>(head.seed));
   keeps_friction_ = true;
-  time_ = -1;  // no world's time: the next look takes it for restored
+  clock_.time = -1;  // no world's time: the next look takes it for restored
   return sync();
 }
 

@@ -6,12 +6,9 @@
 #pragma once
 #include <string>
 
-#include "deform/plugin.h"
-
 namespace dfm_ode_detail {
 
 struct Assertion { std::string message; };  // thrown through ODE's frames
-struct Refused { dfm_status status; };      // the sentence is set; ends a call of the host
 
 class Trap {
  public:

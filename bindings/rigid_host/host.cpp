@@ -1,16 +1,12 @@
 #include "host.h"
 
-#include <chrono>
 #include <cstdarg>
 #include <cstdio>
-#include <cstring>
 #include <mutex>
 #include <new>
+#include <vector>
 
-#include "own_world.h"
-#include "trap.h"
-
-namespace dfm_ode_detail {
+namespace dfm_rigid_detail {
 namespace {
 
 template <class F>
@@ -18,7 +14,7 @@ dfm_status shielded(F &&f) noexcept {
   try {
     return f();
   } catch (const std::bad_alloc &) {
-    return dfm_fail(DFM_E_NOMEM, "ode: out of memory");
+    return dfm_fail(DFM_E_NOMEM, "rigid host: out of memory");
   } catch (const Refused &refused) {
     return refused.status;
   } catch (...) {
@@ -31,11 +27,12 @@ Host &host_of(void *self) { return *static_cast<Host *>(self); }
 // One body of the caller's world.
 class SeatHost : public Host {
  public:
-  explicit SeatHost(Seat &seat) : seat_(seat), member_(seat.member) {}
+  SeatHost(const EngineKind &kind, Seat &seat) : kind_(kind), seat_(seat), member_(*seat.member) {}
   dfm_status predict(const dfm_rigid_step &step, double *velocity) override {
     if (!member_.engine->in_step)
-      return dfm_fail(DFM_E_STATE,
-                      "a world with an ODE adapter is stepped by dfm_ode_step, not by dfm_world_step");
+      return failed(DFM_E_STATE,
+                    "a world with an adapter of host \"%s\" is stepped by %s, not by dfm_world_step",
+                    kind_.host, kind_.call);
     member_.engine->predict(member_, step, 0, velocity);
     return DFM_OK;
   }
@@ -48,28 +45,22 @@ class SeatHost : public Host {
   bool commit(const dfm_rigid_step &step, dfm_rigid_state *state, double *extra) override {
     return member_.engine->commit(member_, 0, state, extra, step.h);
   }
-
-  dfm_status may_destroy() override {
-    if (seat_.leaves) return DFM_OK;
-    return failed(DFM_E_STATE,
-                  "the rigid body stands for ODE's body %p, which owns it, and dfm_rigid_destroy would leave "
-                  "the adapter without it; call dBodyDestroy, or take its geoms out of the adapter's space, "
-                  "and the next dfm_ode_step lets it go; dfm_ode_detach takes all of them away",
-                  static_cast<void *>(member_.body));
-  }
+  dfm_status may_destroy() override { return seat_.leaves ? dfm_status{DFM_OK} : seat_.refuse(); }
 
  private:
+  const EngineKind &kind_;
   Seat &seat_;
   Member &member_;
 };
 
-dfm_status create(void *, const dfm_rigid_set_def *set, void **self, uint32_t *group, uint32_t *nextra) {
+dfm_status create(void *user, const dfm_rigid_set_def *set, void **self, uint32_t *group, uint32_t *nextra) {
   return shielded([&] {
-    if (!set->data) return create_own_world(*set, self, group, nextra);
+    const EngineKind &kind = *static_cast<const EngineKind *>(user);
+    if (!set->data) return kind.own_world(*set, self, group, nextra);
     Seat &seat = *static_cast<Seat *>(set->data);
     if (seat.magic != Seat::kMagic)
-      return dfm_fail(DFM_E_ARG, "host \"ode\": the set's data is not an adapter's; leave it NULL");
-    *self = static_cast<Host *>(new SeatHost(seat));
+      return failed(DFM_E_ARG, "host \"%s\": the set's data is not an adapter's; leave it NULL", kind.host);
+    *self = static_cast<Host *>(new SeatHost(kind, seat));
     group[0] = 0;
     *nextra = Member::kExtra;
     return dfm_status{DFM_OK};
@@ -119,27 +110,18 @@ dfm_status failed(dfm_status status, const char *format, ...) {
   return dfm_fail(status, text);
 }
 
-dfm_status check_ode() {
-  if (sizeof(dReal) != 8 || !dCheckConfiguration("ODE_double_precision"))
-    return failed(DFM_E_UNSUPPORTED,
-                  "the ODE that is loaded is not of double precision (%s); libdeform_ode needs libode-dev "
-                  "0.16 as Debian builds it",
-                  dGetConfiguration());
-  if (!dCheckConfiguration("ODE_EXT_trimesh"))
-    return failed(DFM_E_UNSUPPORTED,
-                  "the ODE that is loaded has no triangle meshes (%s); libdeform_ode needs libode-dev 0.16 "
-                  "as Debian builds it",
-                  dGetConfiguration());
-  return DFM_OK;
-}
+dfm_status missing(const char *what) { return failed(DFM_E_ARG, "argument '%s' is NULL", what); }
 
-dfm_status register_host() {
+dfm_status register_host(const EngineKind &kind) {
   static std::mutex mutex;
-  static bool done = false;
+  static std::vector<const EngineKind *> done;
   std::lock_guard lock(mutex);
-  if (done) return DFM_OK;
+  for (const EngineKind *each : done)
+    if (each == &kind) return DFM_OK;
+  done.reserve(done.size() + 1);
   dfm_rigid_host table{};
   table.size = sizeof table;
+  table.user = const_cast<EngineKind *>(&kind);
   table.create = create;
   table.destroy = destroy;
   table.predict = predict;
@@ -149,9 +131,9 @@ dfm_status register_host() {
   table.set_motor = set_motor;
   table.joint = joint;
   table.may_destroy = may_destroy;
-  const dfm_status status = dfm_rigid_host_register("ode", &table);
-  done = status == DFM_OK;
+  const dfm_status status = dfm_rigid_host_register(kind.host, &table);
+  if (status == DFM_OK) done.push_back(&kind);
   return status;
 }
 
-}  // namespace dfm_ode_detail
+}  // namespace dfm_rigid_detail

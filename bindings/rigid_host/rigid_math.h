@@ -1,10 +1,8 @@
-// Vectors and quaternions of the adapter: public headers have none, and ODE's order is w x y z.
+// Vectors and quaternions of the adapters: public headers have none.
 #pragma once
-#include <ode/ode.h>
-
 #include <cmath>
 
-namespace dfm_ode_detail {
+namespace dfm_rigid_detail {
 
 struct Vec { double x = 0, y = 0, z = 0; };
 inline Vec operator+(Vec a, Vec b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
@@ -36,13 +34,6 @@ inline Vec rotate(Quat q, Vec v) {
   const Vec u{q.x, q.y, q.z}, t = 2.0 * cross(u, v);
   return v + q.w * t + cross(u, t);
 }
-inline Quat from_ode(const dReal *q) { return {q[1], q[2], q[3], q[0]}; }
-inline void to_ode(Quat q, dQuaternion out) {
-  out[0] = q.w;
-  out[1] = q.x;
-  out[2] = q.y;
-  out[3] = q.z;
-}
 
 // sin(a)/a and cos(a) for the small turns of one sub-step, by series to rounding below 0.5, else by halving
 // the angle: + - * / only, so that a run has the same bits whatever libm offers.
@@ -72,6 +63,9 @@ inline Vec turn_of(Quat q) {
   return (scale * (1 + s * (1.0 / 6 + s * (3.0 / 40 + s * (15.0 / 336 + s * (105.0 / 3456)))))) * v;
 }
 
+inline Vec inverse(Vec a) { return {1 / a.x, 1 / a.y, 1 / a.z}; }
+inline Vec each(Vec a, Vec b) { return {a.x * b.x, a.y * b.y, a.z * b.z}; }
+
 struct Pose {
   Vec position;
   Quat rotation;
@@ -89,4 +83,4 @@ inline Vec in_axes(Quat q, Vec d, Vec v) {
   return rotate(q, {d.x * b.x, d.y * b.y, d.z * b.z});
 }
 
-}  // namespace dfm_ode_detail
+}  // namespace dfm_rigid_detail

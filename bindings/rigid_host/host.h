@@ -1,16 +1,21 @@
-// The tables by which ODE's bodies take part: one for bodies of a world that the caller attached, one for
-// sets that bring nothing but their defs.
+// The table by which an engine's bodies take part, shared by adapters: for bodies of a world that the caller
+// attached, and for sets that bring nothing but their defs.
 #pragma once
+#include <functional>
+
 #include "engine.h"
 
-namespace dfm_ode_detail {
+namespace dfm_rigid_detail {
+
+struct Refused { dfm_status status; };  // thrown; the sentence is set; ends a call of the host
 
 // dfm_rigid_set_def.data of a set that stands for one body of an attached world.
 struct Seat {
   static constexpr uint64_t kMagic = 0x6465666f726d6f64ull;
   uint64_t magic = kMagic;
-  Member member;
-  bool leaves = false;  // its adapter takes it away
+  Member *member = nullptr;
+  bool leaves = false;                 // its adapter takes it away
+  std::function<dfm_status()> refuse;  // dfm_rigid_destroy: the sentence that says what to call instead
 };
 
 // What the table calls.
@@ -29,8 +34,15 @@ class Host {
   }
 };
 
-dfm_status register_host();  // "ode"; a second call does nothing
-dfm_status check_ode();      // precision and version at run time, with its sentence
-dfm_status failed(dfm_status status, const char *format, ...) __attribute__((format(printf, 2, 3)));
+// One engine of physics, for the length of the program.
+struct EngineKind {
+  const char *host;  // name of the rigid host
+  const char *call;  // what steps a world with an adapter
+  dfm_status (*own_world)(const dfm_rigid_set_def &set, void **self, uint32_t *group, uint32_t *nextra);
+};
 
-}  // namespace dfm_ode_detail
+dfm_status register_host(const EngineKind &kind);  // a second call does nothing
+dfm_status failed(dfm_status status, const char *format, ...) __attribute__((format(printf, 2, 3)));
+dfm_status missing(const char *argument);
+
+}  // namespace dfm_rigid_detail

@@ -1,0 +1,104 @@
+// What adapters of attached worlds share: bodies and obstacles that stand for the engine's, and the handles
+// by which callers name an adapter.
+#pragma once
+#include <memory>
+#include <mutex>
+#include <new>
+#include <unordered_map>
+
+#include "host.h"
+
+namespace dfm_rigid_detail {
+
+#define TRY(call)                                                             \
+  do {                                                                        \
+    if (const dfm_status status_ = (call); status_ != DFM_OK) return status_; \
+  } while (0)
+
+dfm_pose to_pose(const Pose &p);
+
+// A body of an attached world and what stands for it.
+struct Seated {
+  Seat seat;
+  dfm_rigid rigid = 0;
+  dfm_rigid_state engine{}, world{};  // what both worlds had when they agreed last
+  // fresh: the engine's state counts, whatever the dfm_world has been restored to
+  bool found = true, fresh = true;
+
+  // member: with its engine and inertia
+  dfm_status create(dfm_world in, const char *host, Member &member);
+  // Who has moved the body since both worlds agreed: the caller in the engine, or a restore in the dfm_world,
+  // which counts for all bodies that were there.
+  dfm_status agree(bool restored);
+  dfm_status release();
+  // after a step of the dfm_world that ended with `of_step`
+  dfm_status after(dfm_status of_step);
+};
+
+// The dfm_world's time and steps when both worlds agreed last: others tell that it has been restored.
+struct Clock {
+  double time = 0;
+  uint64_t steps = 0;
+  dfm_status ask(dfm_world world, bool &restored);
+};
+
+// The caller may have destroyed what stands for a shape: then the shape takes no further part.
+dfm_status unbind(dfm_obstacle &obstacle);
+// A shape without a body that the caller has moved: its surface comes along within the next step.
+dfm_status follow(dfm_obstacle &obstacle, Pose &known, const Pose &now);
+
+// Adapters by handle. Handles count up and are never used twice. Never destroyed: an adapter that nobody has
+// detached stands in worlds of the dfm_world and of the engine, which at the program's end may be gone before
+// it or stay longer than it, and what detaches as late as that must still find it.
+template <class Adapter>
+class Registry {
+ public:
+  static Registry &get() {
+    static Registry *const registry = new Registry;
+    return *registry;
+  }
+  std::shared_ptr<Adapter> find(uint64_t handle) {
+    std::lock_guard lock(mutex_);
+    const auto at = all_.find(handle);
+    return at == all_.end() ? nullptr : at->second;
+  }
+  // make: after `clash` has found nothing wrong with the others
+  template <class Clash, class Make>
+  dfm_status add(Clash &&clash, Make &&make, uint64_t *out) {
+    std::lock_guard lock(mutex_);
+    for (auto &[handle, other] : all_) TRY(clash(*other));
+    all_.emplace(next_, make());
+    *out = next_++;
+    return DFM_OK;
+  }
+  void remove(uint64_t handle) {
+    std::shared_ptr<Adapter> gone;
+    std::lock_guard lock(mutex_);
+    gone = std::move(all_[handle]);
+    all_.erase(handle);
+  }
+
+ private:
+  std::mutex mutex_;
+  std::unordered_map<uint64_t, std::shared_ptr<Adapter>> all_;
+  uint64_t next_ = 1;
+};
+
+// Runs f on an adapter; no exception leaves.
+template <class Adapter, class F>
+dfm_status with(const EngineKind &kind, uint64_t handle, F &&f) noexcept {
+  try {
+    const std::shared_ptr<Adapter> a = Registry<Adapter>::get().find(handle);
+    if (!a)
+      return failed(DFM_E_HANDLE,
+                    "adapter %llu of host \"%s\" does not exist; it has been detached, or never was",
+                    static_cast<unsigned long long>(handle), kind.host);
+    return f(*a);
+  } catch (const std::bad_alloc &) {
+    return failed(DFM_E_NOMEM, "%s: out of memory", kind.host);
+  } catch (...) {
+    return failed(DFM_E_FATAL, "%s: an exception that should not be", kind.host);
+  }
+}
+
+}  // namespace dfm_rigid_detail
