@@ -5,7 +5,7 @@ from tree import CODE, line_of
 
 TOP = {"CMakeLists.txt", "libdeform", "plugins", "bindings", "examples", "tests", "cmake",
        "README.md", "CONTRIBUTING.md", "SECURITY.md", "LICENSE", "CHANGELOG.md", "CMakePresets.json",
-       "Makefile"}
+       "Makefile", "pyproject.toml"}
 BELOW = {
     "libdeform": {"CMakeLists.txt", "include", "src", "schema", "doc"},
     "libdeform/include": {"deform"},
@@ -14,7 +14,7 @@ BELOW = {
     "libdeform/doc": {"README.md", "concepts", "reference", "models", "laws", "howto", "decisions", "images"},
     "bindings": {"CMakeLists.txt", "cli", "render", "rigid_host", "ode", "bullet", "python"},
     "tests": {"CMakeLists.txt", "README.md", "support", "data", "unit", "analytic", "stability", "api",
-              "plugin", "determinism", "adapters", "fuzz", "lint", "bench", "abi", "render"},
+              "plugin", "determinism", "adapters", "fuzz", "lint", "bench", "abi", "render", "python"},
 }
 PLUGIN_FOLDER = re.compile(r"plugins/(CMakeLists\.txt|(model|friction|solver|template)_[a-z0-9_]+)$")
 MAX_LINES = 800

@@ -1,0 +1,673 @@
+"""The C interface of libdeform for ctypes. Written by make_abi.py from the public headers: change
+those."""
+from ctypes import (Structure as _Structure, c_bool as flag, c_char_p as text,
+                    c_double as f64, c_float as f32, c_int as cint, c_int32 as i32, c_size_t as usize,
+                    c_uint8 as u8, c_uint32 as u32, c_uint64 as u64, c_void_p as ptr)
+
+DFM_OK = 0
+DFM_DISCARD = 1
+DFM_E_ARG = -1
+DFM_E_NOMEM = -2
+DFM_E_UNSUPPORTED = -3
+DFM_E_STATE = -4
+DFM_E_FATAL = -5
+DFM_E_HANDLE = -6
+DFM_E_IO = -7
+DFM_E_FORMAT = -8
+DFM_E_DIVERGED = -9
+DFM_E_BUSY = -10
+DFM_PARAM_INTEGER = 1
+DFM_PARAM_LOG_SCALE = 2
+DFM_PARAM_RUNTIME = 4
+DFM_PARAM_ENUM = 8
+DFM_PARAM_PER_CELL = 16
+DFM_PARAM_AUTO = 32
+DFM_PARAM_LIST = 64
+DFM_PER_CONTACT = 1
+DFM_PER_POINT = 2
+DFM_PER_CELL = 3
+DFM_PER_EDGE = 4
+DFM_PER_INSTANCE = 5
+DFM_SLOT_SCALAR = 1
+DFM_SLOT_TANGENT = 2
+DFM_SLOT_VECTOR = 3
+DFM_SLOT_ROTATION = 4
+DFM_KIND_FRICTION = 1
+DFM_KIND_MODEL = 2
+DFM_KIND_SOLVER = 3
+DFM_NEED_FN = 1
+DFM_NEED_VT = 2
+DFM_NEED_FT_STOP = 4
+DFM_NEED_AREA = 8
+DFM_NEED_DWELL = 16
+DFM_FRIC_ISOTROPIC = 1
+DFM_FRIC_PASSIVE = 2
+DFM_FRIC_JACOBIAN = 4
+DFM_FRIC_SET_VALUED = 8
+DFM_FRIC_NONE = 16
+DFM_CAP_ENERGY = 1
+DFM_CAP_STIFFNESS = 2
+DFM_CAP_DAMPING = 4
+DFM_CAP_ROTATION_INVARIANT = 16
+DFM_CAP_PLAUSIBLE = 32
+DFM_CAP_CONSTANT_STIFFNESS = 64
+DFM_CELL_TET = 8
+DFM_SOLVER_DIRECT = 1
+DFM_LOG_DEBUG = 0
+DFM_LOG_INFO = 1
+DFM_LOG_WARNING = 2
+DFM_LOG_ERROR = 3
+DFM_HANDLE_NONE = 0
+DFM_HANDLE_WORLD = 1
+DFM_HANDLE_BODY = 2
+DFM_HANDLE_OBSTACLE = 3
+DFM_HANDLE_MATERIAL = 4
+DFM_HANDLE_LAW = 5
+DFM_HANDLE_SCENE = 6
+DFM_HANDLE_TETMESH = 7
+DFM_HANDLE_TRIMESH = 8
+DFM_HANDLE_RIGID = 9
+DFM_METHOD_AUTO = 0
+DFM_METHOD_VELOCITY = 1
+DFM_METHOD_IMPLICIT = 2
+DFM_METHOD_ROLLBACK = 3
+DFM_INTEGRATOR_AUTO = 0
+DFM_INTEGRATOR_SYMPLECTIC_EULER = 1
+DFM_INTEGRATOR_IMPLICIT_EULER = 2
+DFM_INTEGRATOR_TR_BDF2 = 3
+DFM_WORLD_UNGUARDED = 1
+DFM_WORLD_UNTANGLE = 2
+DFM_SELF_OFF = 0
+DFM_SELF_ON = 1
+DFM_SELF_AUTO = 2
+DFM_TROUBLE_SUBSTEPS = 1
+DFM_TROUBLE_UNCONVERGED = 2
+DFM_TROUBLE_NONFINITE = 4
+DFM_TROUBLE_INVERTED = 8
+DFM_TROUBLE_PLUGIN = 16
+DFM_TROUBLE_OVERLAP = 32
+DFM_TROUBLE_ENERGY = 64
+DFM_TROUBLE_BUDGET = 256
+DFM_TROUBLE_INTERRUPTED = 512
+DFM_OVERLAP_OBSTACLE = 1
+DFM_OVERLAP_ASIDE = 2
+DFM_OVERLAP_SEPARATED = 4
+DFM_COUPLING_BARYCENTRIC = 0
+DFM_COUPLING_MLS = 1
+DFM_COUPLING_THESIS = 2
+DFM_CONTACT_VERTEX_FACE = 0
+DFM_CONTACT_EDGE_EDGE = 1
+DFM_CONTACT_PRIMITIVE = 2
+DFM_CONTACT_STICKING = 1
+DFM_CONTACT_BEGAN = 2
+DFM_CONTACT_EDGE_A = 4
+DFM_CONTACT_TRIANGLE_A = 8
+DFM_EVENT_BEGIN = 1
+DFM_EVENT_END = 2
+DFM_MESH_TETS = 1
+DFM_MESH_SURFACE = 2
+DFM_SHAPE_PLANE = 0
+DFM_SHAPE_SPHERE = 1
+DFM_SHAPE_BOX = 2
+DFM_SHAPE_CAPSULE = 3
+DFM_SHAPE_MESH = 4
+DFM_SHAPE_VOXELS = 5
+DFM_SHAPE_NONE = 6
+DFM_SWAP_REFUSED = 1
+DFM_JOINT_HINGE = 0
+DFM_JOINT_SLIDER = 1
+DFM_JOINT_BALL = 2
+DFM_JOINT_FIXED = 3
+DFM_RIGID_AGAIN = 2
+DFM_RIGID_MOST_AGAIN = 4
+DFM_TOI_BISECTION = 0
+DFM_TOI_REGULA_FALSI = 1
+DFM_TOI_BRENT = 2
+DFM_TOI_CONSERVATIVE = 3
+DFM_DRAW_CONTACTS = 1
+DFM_DRAW_FORCES = 2
+DFM_DRAW_BOXES = 4
+
+
+class dfm_host(_Structure):
+    _fields_ = [("size", u32), ("abi", u32), ("abi_draft", u32), ("abi_min", u32), ("ctx", ptr),
+                ("alloc", ptr), ("release", ptr), ("scratch", ptr), ("log", ptr), ("parallel_for", ptr),
+                ("extension", ptr)]
+
+
+class dfm_param(_Structure):
+    _fields_ = [("key", text), ("label", text), ("unit", text), ("min", f64), ("max", f64), ("def", f64),
+                ("flags", u32), ("width", u32), ("names", ptr)]
+
+
+class dfm_slot(_Structure):
+    _fields_ = [("unit", u32), ("width", u32), ("kind", u32), ("reserved", u32)]
+
+
+class dfm_slots(_Structure):
+    _fields_ = [("size", u32), ("nslot", u32), ("slots", ptr), ("slot_size", u32), ("reserved", u32)]
+
+
+class dfm_type(_Structure):
+    _fields_ = [("size", u32), ("kind", u32), ("id", text), ("name", text), ("version", text),
+                ("licence", text), ("source", text), ("params", ptr), ("nparam", u32),
+                ("param_size", u32), ("effects", ptr), ("ops", ptr)]
+
+
+class dfm_friction_in(_Structure):
+    _fields_ = [("size", u32), ("n", u32), ("stride", u32), ("flags", u32), ("dt", f64), ("params", ptr),
+                ("data", ptr), ("fn", ptr), ("vt", ptr), ("ft_stop", ptr), ("area", ptr), ("dwell", ptr),
+                ("state", ptr)]
+
+
+class dfm_friction_out(_Structure):
+    _fields_ = [("size", u32), ("flags", u32), ("ft", ptr), ("state", ptr), ("dft_dvt", ptr),
+                ("dft_dfn", ptr), ("limit", ptr), ("mode", ptr), ("stored", ptr)]
+
+
+class dfm_friction(_Structure):
+    _fields_ = [("size", u32), ("needs", u32), ("flags", u32), ("nslot", u32), ("slots", ptr),
+                ("eval", ptr), ("check", ptr), ("prepare", ptr), ("release", ptr), ("state", ptr),
+                ("slot_size", u32), ("reserved", u32), ("without", ptr)]
+
+
+class dfm_mesh(_Structure):
+    _fields_ = [("size", u32), ("npoint", u32), ("ncell", u32), ("cell", u32), ("rest", ptr),
+                ("cells", ptr), ("mass", ptr), ("params", ptr), ("field_keys", ptr), ("fields", ptr),
+                ("nedge", u32), ("nsurfel", u32), ("edges", ptr), ("row", ptr), ("col", ptr),
+                ("weight", ptr), ("fixed", ptr)]
+
+
+class dfm_kin(_Structure):
+    _fields_ = [("size", u32), ("stride", u32), ("t", f64), ("dt", f64), ("x", ptr), ("v", ptr),
+                ("state", ptr), ("state_out", ptr)]
+
+
+class dfm_model(_Structure):
+    _fields_ = [("size", u32), ("caps", u32), ("cells", u32), ("nslot", u32), ("slots", ptr),
+                ("create", ptr), ("destroy", ptr), ("set_params", ptr), ("state_init", ptr),
+                ("add_forces", ptr), ("bound", ptr), ("energy", ptr), ("pattern", ptr),
+                ("stiffness", ptr), ("extension", ptr), ("slot_size", u32), ("reserved", u32)]
+
+
+class dfm_stepper(_Structure):
+    _fields_ = [("size", u32), ("reserved", u32), ("predict", ptr), ("respond", ptr), ("diagonal", ptr),
+                ("commit", ptr), ("fetch", ptr), ("respond_many", ptr)]
+
+
+class dfm_cell_energy(_Structure):
+    _fields_ = [("size", u32), ("reserved", u32), ("cell_energy", ptr)]
+
+
+class dfm_cell_stress(_Structure):
+    _fields_ = [("size", u32), ("reserved", u32), ("cell_stress", ptr)]
+
+
+class dfm_effects(_Structure):
+    _fields_ = [("size", u32), ("reserved", u32), ("active", ptr)]
+
+
+class dfm_idle(_Structure):
+    _fields_ = [("size", u32), ("reserved", u32), ("why", ptr)]
+
+
+class dfm_limited(_Structure):
+    _fields_ = [("size", u32), ("reserved", u32), ("count", ptr)]
+
+
+class dfm_caps(_Structure):
+    _fields_ = [("size", u32), ("reserved", u32), ("active", ptr)]
+
+
+class dfm_effect_row(_Structure):
+    _fields_ = [("effect", text), ("param", u32), ("reserved", u32), ("off", f64)]
+
+
+class dfm_effect_rows(_Structure):
+    _fields_ = [("size", u32), ("row_size", u32), ("n", u32), ("reserved", u32), ("rows", ptr)]
+
+
+class dfm_fact(_Structure):
+    _fields_ = [("key", text), ("label", text), ("unit", text), ("value", f64)]
+
+
+class dfm_facts(_Structure):
+    _fields_ = [("size", u32), ("row_size", u32), ("list", ptr)]
+
+
+class dfm_solver(_Structure):
+    _fields_ = [("size", u32), ("flags", u32), ("analyse", ptr), ("factor", ptr), ("solve", ptr),
+                ("release", ptr)]
+
+
+class dfm_plugin(_Structure):
+    _fields_ = [("size", u32), ("abi", u32), ("abi_draft", u32), ("ntype", u32), ("types", ptr),
+                ("shutdown", ptr)]
+
+
+class dfm_context_def(_Structure):
+    _fields_ = [("size", u32), ("threads", u32), ("user", ptr), ("alloc", ptr), ("release", ptr),
+                ("log", ptr), ("parallel_for", ptr), ("trace_begin", ptr), ("trace_end", ptr),
+                ("plugin_dir", text)]
+
+
+class dfm_param_value(_Structure):
+    _fields_ = [("key", text), ("value", ptr), ("width", u32)]
+
+
+class dfm_params(_Structure):
+    _fields_ = [("size", u32), ("n", u32), ("values", ptr)]
+
+
+class dfm_pose(_Structure):
+    _fields_ = [("position", f64 * 3), ("rotation", f64 * 4)]
+
+
+class dfm_aabb(_Structure):
+    _fields_ = [("lo", f64 * 3), ("hi", f64 * 3)]
+
+
+class dfm_pose_key(_Structure):
+    _fields_ = [("t", f64), ("pose", dfm_pose)]
+
+
+class dfm_vector_key(_Structure):
+    _fields_ = [("t", f64), ("value", f64 * 3)]
+
+
+class dfm_scale_key(_Structure):
+    _fields_ = [("t", f64), ("value", f64)]
+
+
+class dfm_sine(_Structure):
+    _fields_ = [("amplitude", f64 * 3), ("frequency", f64), ("phase", f64)]
+
+
+class dfm_world_def(_Structure):
+    _fields_ = [("size", u32), ("flags", u32), ("gravity", f64 * 3), ("method", i32),
+                ("integrator", i32), ("contact_offset", f64), ("contact_tolerance", f64),
+                ("max_sweeps", u32), ("max_passes", u32), ("max_substeps", u32), ("sleep", u32),
+                ("effects", ptr), ("sleep_speed", f64), ("sleep_time", f64), ("self_contact", u32),
+                ("reserved", u32), ("max_time", f64), ("max_work", u64), ("energy_watch", f64),
+                ("recovery_speed", f64), ("obstacle_speed", f64), ("solver", text),
+                ("solver_tolerance", f64), ("solver_iterations", u32), ("newton_iterations", u32),
+                ("reserved2", u32), ("step", f64)]
+
+
+class dfm_equilibrium_def(_Structure):
+    _fields_ = [("size", u32), ("load_steps", u32), ("load_from", f64), ("load_to", f64), ("time", f64),
+                ("tolerance", f64), ("max_iterations", u32), ("reserved", u32)]
+
+
+class dfm_equilibrium_info(_Structure):
+    _fields_ = [("size", u32), ("load_steps", u32), ("iterations", u64), ("residual", f64)]
+
+
+class dfm_overlap(_Structure):
+    _fields_ = [("size", u32), ("flags", u32), ("a", u64), ("b", u64), ("crossings", u32),
+                ("enclosed", u32), ("depth", f64)]
+
+
+class dfm_world_stats(_Structure):
+    _fields_ = [("size", u32), ("threads", u32), ("steps", u64), ("substeps", u64), ("time", f64),
+                ("last_substeps", u32), ("contacts", u32), ("sticking", u32), ("passes", u32),
+                ("sweeps", u32), ("pairs_tested", u32), ("residual", f64), ("contacts_max", u32),
+                ("passes_max", u32), ("sweeps_max", u32), ("contacts_mean", f64), ("residual_max", f64),
+                ("unconverged", u64), ("guard_steps", u64), ("rebuilds", u64), ("refits", u64),
+                ("inverted_max", u32), ("substeps_max", u32), ("stable_step", f64), ("asleep", u32),
+                ("self_bodies", u32), ("sleep_energy", f64), ("sleep_momentum", f64 * 3),
+                ("guard_solves", u64), ("guard_cuts", u64), ("guard_lost", f64), ("rigid_again", u64),
+                ("work", u64), ("work_max", u64), ("cheapened", u64), ("discarded", u64),
+                ("limited_max", u32), ("self_max", u32), ("energy_start", f64), ("energy_max", f64),
+                ("energy_gain", f64)]
+
+
+class dfm_stage_time(_Structure):
+    _fields_ = [("name", text), ("seconds", f64), ("calls", u64)]
+
+
+class dfm_surface_def(_Structure):
+    _fields_ = [("size", u32), ("coupling", i32), ("npoint", u32), ("ntriangle", u32), ("points", ptr),
+                ("triangles", ptr), ("support", f64)]
+
+
+class dfm_surface_groups(_Structure):
+    _fields_ = [("size", u32), ("ngroup", u32), ("names", ptr), ("ntriangle", u32), ("reserved", u32),
+                ("triangles", ptr), ("group", ptr)]
+
+
+class dfm_cell_field(_Structure):
+    _fields_ = [("key", text), ("values", ptr), ("width", u32)]
+
+
+class dfm_body_def(_Structure):
+    _fields_ = [("size", u32), ("flags", u32), ("name", text), ("npoint", u32), ("ntet", u32),
+                ("points", ptr), ("tets", ptr), ("material", u64), ("model", text),
+                ("model_params", dfm_params), ("pose", dfm_pose), ("velocity", f64 * 3),
+                ("spin", f64 * 3), ("fixed", ptr), ("category", u32), ("collides_with", u32),
+                ("user", ptr), ("surface", ptr), ("nfield", u32), ("fields", ptr),
+                ("cell_materials", ptr), ("cell_share", ptr), ("groups", ptr), ("integrator", i32),
+                ("reserved", u32)]
+
+
+class dfm_body_info(_Structure):
+    _fields_ = [("size", u32), ("npoint", u32), ("ntet", u32), ("nsurfel", u32), ("ntriangle", u32),
+                ("nedge", u32), ("world", u64), ("name", text), ("model", text), ("mass", f64),
+                ("rest_volume", f64), ("user", ptr)]
+
+
+class dfm_spring_def(_Structure):
+    _fields_ = [("size", u32), ("npoint", u32), ("points", ptr), ("weights", ptr), ("to", f64 * 3),
+                ("keys", ptr), ("nkey", u32), ("reserved", u32), ("stiffness", f64), ("damping", f64)]
+
+
+class dfm_body_measure(_Structure):
+    _fields_ = [("size", u32), ("inverted", u32), ("mass", f64), ("com", f64 * 3), ("velocity", f64 * 3),
+                ("momentum", f64 * 3), ("angular", f64 * 3), ("kinetic", f64), ("elastic", f64),
+                ("volume", f64), ("rest_volume", f64), ("speed_max", f64), ("contact_impulse", f64 * 3)]
+
+
+class dfm_friction_def(_Structure):
+    _fields_ = [("size", u32), ("flags", u32), ("between", text * 2), ("law", text),
+                ("params", dfm_params)]
+
+
+class dfm_contact(_Structure):
+    _fields_ = [("size", u32), ("flags", u32), ("body_a", u64), ("body_b", u64), ("key", u64),
+                ("feature_a", u32), ("feature_b", u32), ("kind", u32), ("law", u32), ("point", f64 * 3),
+                ("normal", f64 * 3), ("tangent", f64 * 3), ("gap", f64), ("area", f64), ("fn", f64),
+                ("ft", f64 * 2), ("slip", f64 * 2), ("bristle", f64 * 2)]
+
+
+class dfm_law_info(_Structure):
+    _fields_ = [("size", u32), ("reserved", u32), ("id", text), ("name", text), ("type", ptr),
+                ("params", dfm_params)]
+
+
+class dfm_pair_report(_Structure):
+    _fields_ = [("size", u32), ("count", u32), ("sticking", u32), ("law", u32), ("a", u64), ("b", u64),
+                ("normal", f64), ("force", f64 * 3), ("friction", f64 * 3), ("moment", f64 * 3),
+                ("slip_max", f64), ("friction_work", f64)]
+
+
+class dfm_pair_impulse(_Structure):
+    _fields_ = [("size", u32), ("reserved", u32), ("a", u64), ("b", u64), ("impulse", f64 * 3),
+                ("normal_impulse", f64), ("peak_normal", f64), ("peak_force", f64), ("point", f64 * 3),
+                ("touching", f64)]
+
+
+class dfm_contact_event(_Structure):
+    _fields_ = [("size", u32), ("kind", u32), ("a", u64), ("b", u64), ("key", u64), ("t", f64)]
+
+
+class dfm_ray_hit(_Structure):
+    _fields_ = [("size", u32), ("triangle", u32), ("body", u64), ("obstacle", u64), ("distance", f64),
+                ("point", f64 * 3), ("normal", f64 * 3)]
+
+
+class dfm_tetmesh_info(_Structure):
+    _fields_ = [("size", u32), ("npoint", u32), ("ntet", u32), ("ntriangle", u32), ("nedge", u32),
+                ("npiece", u32), ("turned", u32), ("dropped_points", u32), ("dropped_cells", u32),
+                ("flat_cells", u32), ("duplicate_points", u32), ("nonmanifold_edges", u32),
+                ("overlapping_faces", u32), ("ngroup", u32), ("volume", f64), ("edge_min", f64),
+                ("edge_median", f64), ("edge_max", f64), ("quality_min", f64), ("quality_mean", f64),
+                ("quality_histogram", u32 * 10), ("lo", f64 * 3), ("hi", f64 * 3), ("warnings", text)]
+
+
+class dfm_trimesh_info(_Structure):
+    _fields_ = [("size", u32), ("npoint", u32), ("ntriangle", u32), ("nedge", u32), ("npiece", u32),
+                ("ngroup", u32), ("merged_points", u32), ("dropped_points", u32),
+                ("dropped_triangles", u32), ("turned", u32), ("open_edges", u32), ("holes", u32),
+                ("nonmanifold_edges", u32), ("closed", u32), ("area", f64), ("volume", f64),
+                ("edge_min", f64), ("edge_median", f64), ("edge_max", f64), ("quality_min", f64),
+                ("quality_mean", f64), ("quality_histogram", u32 * 10), ("lo", f64 * 3),
+                ("hi", f64 * 3), ("warnings", text)]
+
+
+class dfm_scene_options(_Structure):
+    _fields_ = [("size", u32), ("nset", u32), ("set", ptr), ("jitter_seed", u64)]
+
+
+class dfm_scene_settings(_Structure):
+    _fields_ = [("size", u32), ("nprobe", u32), ("duration", f64), ("step", f64), ("every", f64),
+                ("frames", flag), ("states", flag), ("nodes", flag), ("contacts", flag), ("check", flag),
+                ("color", text), ("eye", f64 * 3), ("look_at", f64 * 3), ("has_camera", flag)]
+
+
+class dfm_obstacle_def(_Structure):
+    _fields_ = [("size", u32), ("shape", u32), ("name", text), ("pose", dfm_pose),
+                ("half_size", f64 * 3), ("radius", f64), ("half_length", f64), ("nkey", u32),
+                ("reserved", u32), ("keys", ptr), ("sine", dfm_sine), ("velocity_surface", f64 * 3),
+                ("material", u64), ("category", u32), ("collides_with", u32), ("user", ptr),
+                ("npoint", u32), ("ntriangle", u32), ("points", ptr), ("triangles", ptr), ("cells", u32),
+                ("reserved2", u32)]
+
+
+class dfm_material_def(_Structure):
+    _fields_ = [("size", u32), ("flags", u32), ("name", text), ("density", f64), ("young", f64),
+                ("poisson", f64), ("damping_mass", f64), ("damping_stiffness", f64),
+                ("extra", dfm_params)]
+
+
+class dfm_switch(_Structure):
+    _fields_ = [("size", u32), ("integrator", i32), ("t", f64), ("type", text), ("params", dfm_params),
+                ("max_jump", f64)]
+
+
+class dfm_model_choice(_Structure):
+    _fields_ = [("size", u32), ("integrator", i32), ("type", text), ("params", dfm_params)]
+
+
+class dfm_switch_rule(_Structure):
+    _fields_ = [("size", u32), ("reserved", u32), ("touching", dfm_model_choice),
+                ("near_by", dfm_model_choice), ("otherwise", dfm_model_choice), ("point", f64 * 3),
+                ("distance", f64), ("hysteresis", f64), ("wait", f64), ("max_jump", f64)]
+
+
+class dfm_swap(_Structure):
+    _fields_ = [("size", u32), ("flags", u32), ("body", u64), ("t", f64), ("from", text), ("to", text),
+                ("elastic_before", f64), ("elastic_after", f64), ("max_jump", f64)]
+
+
+class dfm_rigid_state(_Structure):
+    _fields_ = [("position", f64 * 3), ("rotation", f64 * 4), ("velocity", f64 * 3), ("spin", f64 * 3)]
+
+
+class dfm_rigid_def(_Structure):
+    _fields_ = [("size", u32), ("shape", u32), ("name", text), ("pose", dfm_pose),
+                ("half_size", f64 * 3), ("radius", f64), ("half_length", f64), ("mass", f64),
+                ("inertia", f64 * 3), ("velocity", f64 * 3), ("spin", f64 * 3), ("fixed", u32),
+                ("category", u32), ("collides_with", u32), ("reserved", u32), ("material", u64),
+                ("user", ptr)]
+
+
+class dfm_joint_def(_Structure):
+    _fields_ = [("size", u32), ("type", u32), ("body", u32), ("with", u32), ("anchor", f64 * 3),
+                ("axis", f64 * 3), ("motor", u32), ("reserved", u32), ("velocity", f64), ("max", f64)]
+
+
+class dfm_rigid_set_def(_Structure):
+    _fields_ = [("size", u32), ("nbody", u32), ("njoint", u32), ("reserved", u32), ("bodies", ptr),
+                ("joints", ptr), ("data", ptr)]
+
+
+class dfm_rigid_step(_Structure):
+    _fields_ = [("size", u32), ("nbody", u32), ("t", f64), ("h", f64), ("gravity", f64 * 3),
+                ("state", ptr), ("extra", ptr)]
+
+
+class dfm_rigid_host(_Structure):
+    _fields_ = [("size", u32), ("flags", u32), ("user", ptr), ("create", ptr), ("destroy", ptr),
+                ("predict", ptr), ("respond", ptr), ("commit", ptr), ("set_motor", ptr), ("joint", ptr),
+                ("revise", ptr), ("push", ptr), ("may_destroy", ptr)]
+
+
+class dfm_motion(_Structure):
+    _fields_ = [("p0", f64 * 3), ("p1", f64 * 3)]
+
+
+class dfm_toi_options(_Structure):
+    _fields_ = [("size", u32), ("method", i32), ("tolerance", f64), ("min_separation", f64),
+                ("max_iterations", i32)]
+
+
+# name: (result, arguments)
+FUNCTIONS = {
+    "dfm_version": (text, [ptr, ptr, ptr]),
+    "dfm_status_name": (text, [i32]),
+    "dfm_last_error": (text, []),
+    "dfm_fail": (i32, [i32, text]),
+    "dfm_file_read": (i32, [text, u64, text, ptr, ptr]),
+    "dfm_file_write": (i32, [text, ptr, usize]),
+    "dfm_context_def_default_sized": (None, [u32, ptr]),
+    "dfm_context_create": (i32, [ptr, ptr]),
+    "dfm_context_destroy": (None, [ptr]),
+    "dfm_plugin_load": (i32, [ptr, text]),
+    "dfm_plugin_scan": (i32, [ptr, text, ptr]),
+    "dfm_plugin_register_static": (i32, [ptr, ptr, text]),
+    "dfm_plugin_visit": (i32, [ptr, ptr, ptr]),
+    "dfm_plugin_visit_passed": (i32, [ptr, ptr, ptr]),
+    "dfm_plugin_running": (text, [ptr]),
+    "dfm_handle_kind": (u32, [u64]),
+    "dfm_world_def_default_sized": (None, [u32, ptr]),
+    "dfm_world_create": (i32, [ptr, ptr, ptr]),
+    "dfm_world_destroy": (i32, [u64]),
+    "dfm_world_set_gravity": (i32, [u64, ptr]),
+    "dfm_world_set_gravity_keys": (i32, [u64, u32, ptr]),
+    "dfm_world_set_sleep": (i32, [u64, flag]),
+    "dfm_world_step": (i32, [u64, f64, ptr]),
+    "dfm_equilibrium_def_default_sized": (None, [u32, ptr]),
+    "dfm_world_equilibrium": (i32, [u64, ptr, ptr]),
+    "dfm_world_set_budget": (i32, [u64, f64, u64]),
+    "dfm_world_interrupt": (i32, [u64]),
+    "dfm_world_overlaps_sized": (i32, [u64, u32, u32, ptr, ptr]),
+    "dfm_world_find_overlaps": (i32, [u64, ptr]),
+    "dfm_world_untangle": (i32, [u64, ptr]),
+    "dfm_world_stable_step": (i32, [u64, ptr, ptr, ptr]),
+    "dfm_world_time": (f64, [u64]),
+    "dfm_world_hash": (u64, [u64]),
+    "dfm_world_snapshot": (i32, [u64, ptr, ptr]),
+    "dfm_world_restore": (i32, [u64, ptr, usize]),
+    "dfm_world_find_body": (i32, [u64, text, ptr]),
+    "dfm_world_bodies": (i32, [u64, u32, ptr, ptr]),
+    "dfm_world_obstacles": (i32, [u64, u32, ptr, ptr]),
+    "dfm_world_get_stats": (i32, [u64, ptr]),
+    "dfm_world_profile_sized": (i32, [u64, u32, u32, ptr, ptr]),
+    "dfm_world_explain": (i32, [u64, ptr, ptr]),
+    "dfm_body_def_default_sized": (None, [u32, ptr]),
+    "dfm_body_create": (i32, [u64, ptr, ptr]),
+    "dfm_body_destroy": (i32, [u64]),
+    "dfm_body_get_info": (i32, [u64, ptr]),
+    "dfm_body_set_user": (i32, [u64, ptr]),
+    "dfm_body_set_filter": (i32, [u64, u32, u32]),
+    "dfm_body_get_state": (i32, [u64, u32, ptr, ptr, ptr]),
+    "dfm_body_set_state": (i32, [u64, u32, ptr, ptr]),
+    "dfm_body_get_rest": (i32, [u64, u32, ptr, u32, ptr]),
+    "dfm_body_hold": (i32, [u64, u32, ptr, u8]),
+    "dfm_body_move_held": (i32, [u64, u32, ptr, u32, ptr, ptr]),
+    "dfm_body_add_load": (i32, [u64, u32, ptr, ptr, u32, ptr, ptr, ptr]),
+    "dfm_body_remove_load": (i32, [u64, u32]),
+    "dfm_body_add_spring": (i32, [u64, ptr, ptr]),
+    "dfm_body_set_spring_target": (i32, [u64, u32, ptr]),
+    "dfm_body_get_spring_force": (i32, [u64, u32, ptr]),
+    "dfm_body_remove_spring": (i32, [u64, u32]),
+    "dfm_body_apply_impulse": (i32, [u64, ptr, ptr]),
+    "dfm_body_set_params": (i32, [u64, ptr]),
+    "dfm_body_wake": (i32, [u64]),
+    "dfm_body_is_asleep": (i32, [u64, ptr]),
+    "dfm_body_get_measure": (i32, [u64, ptr]),
+    "dfm_body_energy_density": (i32, [u64, u32, ptr]),
+    "dfm_body_stress": (i32, [u64, u32, ptr]),
+    "dfm_world_add_friction": (i32, [u64, ptr]),
+    "dfm_world_set_friction": (i32, [u64, text, text, ptr]),
+    "dfm_world_remove_friction": (i32, [u64, text, text]),
+    "dfm_world_filter_pair": (i32, [u64, text, text, flag]),
+    "dfm_world_remove_filter": (i32, [u64, text, text]),
+    "dfm_world_contacts_sized": (i32, [u64, u32, u32, ptr, ptr]),
+    "dfm_world_law_info": (i32, [u64, u32, ptr]),
+    "dfm_world_pairs_sized": (i32, [u64, u32, u32, ptr, ptr]),
+    "dfm_world_pair_wrench": (i32, [u64, u64, u64, ptr, ptr, ptr]),
+    "dfm_world_pair_impulses_sized": (i32, [u64, u32, u32, ptr, ptr]),
+    "dfm_world_events_sized": (i32, [u64, u32, u32, ptr, ptr]),
+    "dfm_world_hold_begin": (i32, [u64]),
+    "dfm_world_hold": (i32, [u64, ptr, ptr]),
+    "dfm_surface_positions": (i32, [u64, u32, ptr, ptr]),
+    "dfm_surface_velocities": (i32, [u64, u32, ptr, ptr]),
+    "dfm_surface_normals": (i32, [u64, u32, ptr, ptr]),
+    "dfm_surface_forces": (i32, [u64, u32, ptr, ptr]),
+    "dfm_surface_triangles": (i32, [u64, u32, ptr, ptr]),
+    "dfm_surface_points": (i32, [u64, u32, ptr, ptr]),
+    "dfm_world_ray": (i32, [u64, ptr, ptr, f64, ptr]),
+    "dfm_world_closest": (i32, [u64, ptr, f64, ptr]),
+    "dfm_tetmesh_read": (i32, [ptr, text, ptr]),
+    "dfm_tetmesh_make": (i32, [ptr, text, ptr, u32, ptr]),
+    "dfm_tetmesh_destroy": (i32, [u64]),
+    "dfm_tetmesh_get_info": (i32, [u64, ptr]),
+    "dfm_tetmesh_data": (i32, [u64, ptr, ptr, ptr]),
+    "dfm_tetmesh_groups": (i32, [u64, ptr, ptr]),
+    "dfm_tetmesh_triangles": (i32, [u64, ptr, ptr, ptr]),
+    "dfm_tetmesh_group_points": (i32, [u64, u32, ptr, ptr, ptr]),
+    "dfm_tetmesh_write": (i32, [u64, text]),
+    "dfm_tetmesh_file_cells": (i32, [u64, ptr]),
+    "dfm_mesh_file_kind": (i32, [ptr, text, ptr]),
+    "dfm_mesh_read": (i32, [ptr, text, ptr, ptr]),
+    "dfm_trimesh_read": (i32, [ptr, text, ptr]),
+    "dfm_trimesh_create": (i32, [ptr, u32, ptr, u32, ptr, ptr]),
+    "dfm_trimesh_make": (i32, [ptr, text, ptr, u32, ptr]),
+    "dfm_trimesh_destroy": (i32, [u64]),
+    "dfm_trimesh_get_info": (i32, [u64, ptr]),
+    "dfm_trimesh_data": (i32, [u64, ptr, ptr, ptr]),
+    "dfm_trimesh_groups": (i32, [u64, ptr, ptr]),
+    "dfm_trimesh_write": (i32, [u64, text]),
+    "dfm_tetmesh_fill": (i32, [u64, u32, ptr]),
+    "dfm_tetmesh_share": (i32, [u64, ptr]),
+    "dfm_scene_load": (i32, [ptr, text, ptr]),
+    "dfm_scene_open": (i32, [ptr, text, ptr, ptr]),
+    "dfm_scene_close": (i32, [u64]),
+    "dfm_scene_world": (i32, [u64, ptr]),
+    "dfm_scene_value": (i32, [u64, text, ptr, ptr]),
+    "dfm_scene_get_settings": (i32, [u64, ptr]),
+    "dfm_scene_probe": (i32, [u64, u32, ptr, ptr, ptr]),
+    "dfm_obstacle_def_default_sized": (None, [u32, ptr]),
+    "dfm_obstacle_create": (i32, [u64, ptr, ptr]),
+    "dfm_obstacle_destroy": (i32, [u64]),
+    "dfm_obstacle_get_pose": (i32, [u64, ptr]),
+    "dfm_obstacle_get_def": (i32, [u64, ptr]),
+    "dfm_obstacle_move_to": (i32, [u64, ptr]),
+    "dfm_obstacle_teleport": (i32, [u64, ptr]),
+    "dfm_law_open": (i32, [ptr, text, ptr]),
+    "dfm_law_close": (i32, [u64]),
+    "dfm_law_type": (i32, [u64, ptr]),
+    "dfm_law_eval": (i32, [u64, ptr, ptr]),
+    "dfm_law_pack": (i32, [u64, ptr, u32, ptr, ptr]),
+    "dfm_material_def_default_sized": (None, [u32, ptr]),
+    "dfm_material_create": (i32, [u64, ptr, ptr]),
+    "dfm_material_destroy": (i32, [u64]),
+    "dfm_body_set_model": (i32, [u64, text, ptr]),
+    "dfm_switch_default_sized": (None, [u32, ptr]),
+    "dfm_body_set_switches": (i32, [u64, u32, ptr]),
+    "dfm_switch_rule_default_sized": (None, [u32, ptr]),
+    "dfm_body_set_switch_rule": (i32, [u64, ptr]),
+    "dfm_body_set_interest": (i32, [u64, ptr]),
+    "dfm_world_swaps_sized": (i32, [u64, u32, u32, ptr, ptr]),
+    "dfm_rigid_host_register": (i32, [text, ptr]),
+    "dfm_rigid_def_default_sized": (None, [u32, ptr]),
+    "dfm_rigid_create": (i32, [u64, text, ptr, ptr]),
+    "dfm_rigid_add_shape": (i32, [u64, ptr, ptr]),
+    "dfm_rigid_destroy": (i32, [u64]),
+    "dfm_world_rigids": (i32, [u64, u32, ptr, ptr]),
+    "dfm_world_find_rigid": (i32, [u64, text, ptr]),
+    "dfm_rigid_get_def": (i32, [u64, ptr]),
+    "dfm_rigid_get_state": (i32, [u64, ptr]),
+    "dfm_rigid_set_state": (i32, [u64, ptr]),
+    "dfm_rigid_get_measure": (i32, [u64, ptr]),
+    "dfm_rigid_contact_wrench": (i32, [u64, ptr, ptr]),
+    "dfm_rigid_set_motor": (i32, [u64, u32, f64, f64]),
+    "dfm_rigid_joint": (i32, [u64, u32, ptr, ptr, ptr]),
+    "dfm_toi_point_triangle": (i32, [ptr, ptr, ptr, ptr, ptr]),
+    "dfm_toi_edge_edge": (i32, [ptr, ptr, ptr, ptr, ptr]),
+    "dfm_toi_evaluations": (u32, []),
+    "dfm_debug_write_body": (i32, [u64, text]),
+    "dfm_debug_write_surface": (i32, [u64, text]),
+    "dfm_debug_draw": (i32, [u64, u32, ptr, ptr]),
+}

@@ -1,0 +1,159 @@
+"""The shared library: found, loaded, and called with its errors as exceptions.
+
+What takes time (`lib`) releases the interpreter's lock. What only reads (`quick`) keeps it: such a call is
+shorter than a switch of threads, and no step can begin beneath it.
+"""
+from __future__ import annotations
+
+import ctypes
+import os
+import pathlib
+from typing import Any
+
+from . import _abi
+
+ROOT = pathlib.Path(__file__).resolve().parent
+NATIVE = ROOT / "native"  # what the wheel carries: lib/, bin/, share/
+
+
+class Error(Exception):
+    """What the library refuses, with its own sentence: what was wrong, where, and what to do.
+
+    `status` is the name of the C status, as "DFM_E_ARG".
+    """
+
+    status = "DFM_E_FATAL"
+
+    def __init__(self, sentence: str, status: str | None = None):
+        super().__init__(sentence)
+        if status:
+            self.status = status
+
+
+class ArgumentError(Error, ValueError):
+    """A value, name or shape that is not allowed."""
+
+
+class OutOfMemory(Error, MemoryError):
+    """No memory; nothing has changed."""
+
+
+class UnsupportedError(Error, NotImplementedError):
+    """What this model, law or scene cannot do, or a plugin that is not there."""
+
+
+class StateError(Error):
+    """Not now: the name is taken, or what it works on is in use."""
+
+
+class HandleError(Error, ReferenceError):
+    """The world, body or mesh is gone."""
+
+
+class FileError(Error, OSError):
+    """A file that cannot be read or written."""
+
+
+class FormatError(Error, ValueError):
+    """A file that is not what it should be; names line, byte or key."""
+
+
+class Diverged(Error, ArithmeticError):
+    """A step that could not be taken: the world is back at its last good sub-step."""
+
+
+class BusyError(Error, RuntimeError):
+    """Called while a step of the same world runs."""
+
+
+class Discarded(Error):
+    """A step that was given up and changed nothing: too many sub-steps, its budget, or an interruption.
+
+    `trouble` tells which.
+    """
+
+    trouble: int = 0
+
+
+_CLASSES = {_abi.DFM_DISCARD: Discarded, _abi.DFM_E_ARG: ArgumentError, _abi.DFM_E_NOMEM: OutOfMemory,
+            _abi.DFM_E_UNSUPPORTED: UnsupportedError, _abi.DFM_E_STATE: StateError,
+            _abi.DFM_E_FATAL: Error, _abi.DFM_E_HANDLE: HandleError, _abi.DFM_E_IO: FileError,
+            _abi.DFM_E_FORMAT: FormatError, _abi.DFM_E_DIVERGED: Diverged, _abi.DFM_E_BUSY: BusyError}
+
+
+def _path() -> pathlib.Path:
+    given = os.environ.get("DEFORM_LIBRARY")
+    path = pathlib.Path(given) if given else NATIVE / "lib" / "libdeform.so.0"
+    if not path.exists():
+        raise ImportError(f"{path} is not there: install the package (pip install .), or name a libdeform.so "
+                          f"in the environment variable DEFORM_LIBRARY")
+    return path
+
+
+def _declare(library: ctypes.CDLL) -> ctypes.CDLL:
+    for name, (result, arguments) in _abi.FUNCTIONS.items():
+        function = getattr(library, name)
+        function.restype = result
+        function.argtypes = arguments
+    return library
+
+
+PATH = _path()
+lib = _declare(ctypes.CDLL(str(PATH)))
+quick = _declare(ctypes.PyDLL(str(PATH)))
+
+
+def command_path() -> pathlib.Path:
+    """The `deform` command that belongs to the library: the wheel's own, or the one beside a build's
+    library."""
+    given = os.environ.get("DEFORM_COMMAND")
+    for path in ([pathlib.Path(given)] if given else [NATIVE / "bin" / "deform",
+                                                      PATH.resolve().parent.parent / "bin" / "deform"]):
+        if path.exists():
+            return path
+    raise FileError(f"no deform command beside {PATH}; name one in the environment variable DEFORM_COMMAND",
+                    "DFM_E_IO")
+
+
+def error(status: int, sentence: str | None = None) -> Error:
+    """The exception that belongs to a status, with the library's last sentence."""
+    if sentence is None:
+        sentence = (quick.dfm_last_error() or b"").decode("utf-8", "replace")
+    name = quick.dfm_status_name(status).decode()
+    return _CLASSES.get(status, Error)(sentence or name, name)
+
+
+def check(status: int) -> int:
+    """Raises what a negative status means."""
+    if status < 0:
+        raise error(status)
+    return status
+
+
+def default(kind: type) -> Any:
+    """A def with the library's defaults."""
+    out = kind()
+    out.size = ctypes.sizeof(kind)
+    getattr(quick, f"{kind.__name__}_default_sized")(out.size, ctypes.byref(out))
+    return out
+
+
+def sized(kind: type) -> Any:
+    """A struct for the library to fill in."""
+    out = kind()
+    out.size = ctypes.sizeof(kind)
+    return out
+
+
+def encoded(text: Any) -> bytes | None:
+    return None if text is None else os.fspath(text).encode() if not isinstance(text, bytes) else text
+
+
+def read_text(function: Any, *arguments: Any) -> str:
+    """The two-call convention of texts: asks for the size, then for the text."""
+    size = ctypes.c_size_t(0)
+    check(function(*arguments, None, ctypes.byref(size)))
+    buffer = ctypes.create_string_buffer(size.value + 1)
+    size.value += 1
+    check(function(*arguments, buffer, ctypes.byref(size)))
+    return buffer.value.decode("utf-8")

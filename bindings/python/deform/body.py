@@ -1,0 +1,340 @@
+"""Deformable bodies, obstacles and rigid bodies of a world."""
+from __future__ import annotations
+
+import ctypes
+from typing import TYPE_CHECKING, Any, Mapping, Sequence
+
+import numpy as np
+
+from . import _abi
+from ._arrays import Column, Report
+from ._library import ArgumentError, check, lib, quick, sized
+from .mesh import points_of
+
+if TYPE_CHECKING:
+    from .world import World
+
+EVERYTHING = 0xFFFFFFFF
+
+
+def vector(values: Any, what: str, width: int = 3) -> Any:
+    """`width` numbers as a C array."""
+    array = np.asarray(values, dtype=np.float64).ravel()
+    if array.size != width:
+        raise ArgumentError(f"{what} has {array.size} numbers; expected {width}", "DFM_E_ARG")
+    return (ctypes.c_double * width)(*array)
+
+
+def pose_of(position: Any, rotation: Any) -> _abi.dfm_pose:
+    """position [3] m, rotation a quaternion x, y, z, w."""
+    return _abi.dfm_pose(vector(position, "position"), vector(rotation, "rotation", 4))
+
+
+def numbers_of(points: Any) -> np.ndarray:
+    """Numbers of points as the library takes them."""
+    return np.ascontiguousarray(np.atleast_1d(np.asarray(points)), dtype=np.uint32)
+
+
+class _Part:
+    """What lives in a world under a handle."""
+
+    def __init__(self, world: World, handle: int, name: str):
+        self.world = world
+        self.handle = handle
+        self.name = name
+        self._columns: dict[str, Any] = {}
+
+    def _look(self, key: str, make: Any) -> Any:
+        self.world.free()
+        column = self._columns.get(key)
+        if column is None:
+            column = self._columns[key] = make()
+        return column.look()
+
+    def __repr__(self) -> str:
+        return f"<deform.{type(self).__name__} '{self.name}'>"
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Part) and other.handle == self.handle
+
+    def __hash__(self) -> int:
+        return hash(self.handle)
+
+
+class Body(_Part):
+    """A deformable body. Made by World.add_body.
+
+    Its arrays are views that the next look at the same property fills anew (`a = body.positions.copy()`
+    keeps a state). They are read-only, are never freed beneath you, and keep their last values when the
+    world is gone; a new look at a world that is gone raises HandleError, one during a step BusyError.
+    """
+
+    def __init__(self, world: World, handle: int):
+        info = sized(_abi.dfm_body_info)
+        check(quick.dfm_body_get_info(handle, ctypes.byref(info)))
+        super().__init__(world, handle, info.name.decode())
+        self.npoint, self.ntet, self.nsurfel = info.npoint, info.ntet, info.nsurfel
+        self.ntriangle = info.ntriangle
+        self._triangles: np.ndarray | None = None
+
+    def _surface(self, key: str, function: Any) -> np.ndarray:
+        return self._look(key, lambda: Column(function, self.handle, self.nsurfel, 3))
+
+    @property
+    def positions(self) -> np.ndarray:
+        """Surface points now, [nsurfel,3] m; a view."""
+        return self._surface("positions", quick.dfm_surface_positions)
+
+    @property
+    def velocities(self) -> np.ndarray:
+        """Of the surface points, [nsurfel,3] m/s; a view."""
+        return self._surface("velocities", quick.dfm_surface_velocities)
+
+    @property
+    def normals(self) -> np.ndarray:
+        """Outward unit normals of the surface points, [nsurfel,3]; a view."""
+        return self._surface("normals", quick.dfm_surface_normals)
+
+    @property
+    def forces(self) -> np.ndarray:
+        """Contact force on each surface point in the last sub-step, [nsurfel,3] N; a view."""
+        return self._surface("forces", quick.dfm_surface_forces)
+
+    @property
+    def triangles(self) -> np.ndarray:
+        """Surface triangles, [ntriangle,3] numbers of surface points, counter-clockwise from outside."""
+        if self._triangles is None:
+            self.world.free()
+            column = Column(quick.dfm_surface_triangles, self.handle, self.ntriangle, 3, np.uint32)
+            self._triangles = column.look()
+        return self._triangles
+
+    def _state(self, which: int) -> np.ndarray:
+        def fill(handle: int, rows: int, address: int, count: Any) -> int:
+            pair = (address, None) if which == 0 else (None, address)
+            return quick.dfm_body_get_state(handle, rows, *pair, count)
+        return self._look(f"state{which}", lambda: Column(fill, self.handle, self.npoint, 3))
+
+    @property
+    def points(self) -> np.ndarray:
+        """All points of the body now, [npoint,3] m; a view."""
+        return self._state(0)
+
+    @property
+    def point_velocities(self) -> np.ndarray:
+        """Of all points, [npoint,3] m/s; a view."""
+        return self._state(1)
+
+    def set_state(self, points: Any = None, velocities: Any = None) -> None:
+        """Sets all points [npoint,3] m, or their velocities [npoint,3] m/s, or both."""
+        self.world.free()
+        x = None if points is None else points_of(points)
+        v = None if velocities is None else points_of(velocities, "velocities")
+        given = {len(a) for a in (x, v) if a is not None}
+        if not given or len(given) > 1:
+            raise ArgumentError("set_state takes points, velocities or both, of one length", "DFM_E_ARG")
+        check(quick.dfm_body_set_state(self.handle, given.pop(), None if x is None else x.ctypes.data,
+                                       None if v is None else v.ctypes.data))
+
+    @property
+    def rest_points(self) -> np.ndarray:
+        """[npoint,3] m at rest, before the body's pose."""
+        out = np.empty((self.npoint, 3))
+        check(quick.dfm_body_get_rest(self.handle, self.npoint, out.ctypes.data, 0, None))
+        return out
+
+    @property
+    def tets(self) -> np.ndarray:
+        """[ntet,4] numbers of points."""
+        out = np.empty((self.ntet, 4), dtype=np.uint32)
+        check(quick.dfm_body_get_rest(self.handle, 0, None, self.ntet, out.ctypes.data))
+        return out
+
+    @property
+    def measure(self) -> Any:
+        """Sums over the body as a record, a view: mass kg, com [3] m, velocity [3] m/s, momentum, angular,
+        kinetic and elastic J, volume m3, speed_max m/s, contact_impulse [3] N s, inverted cells."""
+        return self._look("measure", lambda: Report(quick.dfm_body_get_measure, self.handle,
+                                                    _abi.dfm_body_measure))
+
+    @property
+    def energy_density(self) -> np.ndarray:
+        """Of each cell, [ntet] J/m3; a view."""
+        def fill(handle: int, rows: int, address: int, _count: Any) -> int:
+            return quick.dfm_body_energy_density(handle, rows, address)
+        return self._look("energy_density", lambda: Column(fill, self.handle, self.ntet, 0))
+
+    @property
+    def stress(self) -> np.ndarray:
+        """Cauchy stress of each cell, [ntet,6] Pa: xx yy zz xy yz zx, world axes, tension > 0; a view."""
+        def fill(handle: int, rows: int, address: int, _count: Any) -> int:
+            return quick.dfm_body_stress(handle, rows, address)
+        return self._look("stress", lambda: Column(fill, self.handle, self.ntet, 6))
+
+    def hold(self, points: Any, axes: str = "xyz") -> None:
+        """Holds components ("xyz", "z", "": none, which releases) of points, given by their numbers."""
+        bits = sum(1 << "xyz".index(a) for a in axes)
+        numbers = numbers_of(points)
+        self.world.free()
+        check(quick.dfm_body_hold(self.handle, numbers.size, numbers.ctypes.data, bits))
+
+    def move_held(self, points: Any, times: Sequence[float], positions: Any) -> None:
+        """Moves held points together along positions [n,3] m at times [n] s, relative to the first."""
+        numbers, path = numbers_of(points), points_of(positions, "positions")
+        if len(times) != len(path):
+            raise ArgumentError(f"{len(times)} times for {len(path)} positions", "DFM_E_ARG")
+        keys = (_abi.dfm_pose_key * len(path))()
+        for key, t, p in zip(keys, times, path):
+            key.t = t
+            key.pose.position[:] = p
+        self.world.free()
+        check(quick.dfm_body_move_held(self.handle, numbers.size, numbers.ctypes.data, len(path),
+                                       ctypes.byref(keys), None))
+
+    def add_load(self, points: Any, force: Any) -> int:
+        """A lasting force [3] N on each of the points, or [n,3] N on each its own. Returns its number."""
+        numbers, out = numbers_of(points), ctypes.c_uint32()
+        forces = np.ascontiguousarray(np.broadcast_to(np.asarray(force, np.float64), (numbers.size, 3)))
+        self.world.free()
+        check(quick.dfm_body_add_load(self.handle, numbers.size, numbers.ctypes.data, forces.ctypes.data, 0,
+                                      None, None, ctypes.byref(out)))
+        return out.value
+
+    def remove_load(self, load: int) -> None:
+        self.world.free()
+        check(quick.dfm_body_remove_load(self.handle, load))
+
+    def apply_impulse(self, point: Any, impulse: Any) -> None:
+        """An impulse [3] N s at a point [3] m, on the nearest surface triangle."""
+        self.world.free()
+        check(quick.dfm_body_apply_impulse(self.handle, vector(point, "point"), vector(impulse, "impulse")))
+
+    def set_params(self, **params: Any) -> None:
+        """Changes run-time parameters of the body's model by key."""
+        self.world.free()
+        values = self.world.context.params("model", self.model, params)
+        check(lib.dfm_body_set_params(self.handle, ctypes.byref(values.struct)))
+
+    def set_model(self, model: str, params: Mapping[str, Any] | None = None) -> None:
+        """Gives the body another model between two steps; positions and velocities stay."""
+        values = self.world.context.params("model", model, params or {})
+        with self.world.alone():
+            status = lib.dfm_body_set_model(self.handle, model.encode(), ctypes.byref(values.struct))
+        self.world.accept(status)
+
+    @property
+    def model(self) -> str:
+        """The id of its model."""
+        info = sized(_abi.dfm_body_info)
+        check(quick.dfm_body_get_info(self.handle, ctypes.byref(info)))
+        return (info.model or b"").decode()
+
+    def set_filter(self, category: int = 1, collides_with: int = EVERYTHING) -> None:
+        """A pair touches if each one's category is among the bits that the other collides with."""
+        self.world.free()
+        check(quick.dfm_body_set_filter(self.handle, category, collides_with))
+
+    def wake(self) -> None:
+        self.world.free()
+        check(quick.dfm_body_wake(self.handle))
+
+    @property
+    def asleep(self) -> bool:
+        out = ctypes.c_bool()
+        self.world.free()
+        check(quick.dfm_body_is_asleep(self.handle, ctypes.byref(out)))
+        return out.value
+
+    def write(self, path: Any) -> None:
+        """Its points and cells as *.vtu."""
+        self.world.free()
+        check(lib.dfm_debug_write_body(self.handle, str(path).encode()))
+
+    def remove(self) -> None:
+        """Takes the body out of its world; its contacts end. Arrays keep their last values."""
+        self.world.free()
+        check(lib.dfm_body_destroy(self.handle))
+
+    def to_meshio(self) -> Any:
+        """Its present state as a `meshio.Mesh`, with the velocity of each point."""
+        import meshio
+        return meshio.Mesh(self.points.copy(), [("tetra", self.tets.astype(np.int64))],
+                           point_data={"velocity": self.point_velocities.copy()})
+
+
+class Obstacle(_Part):
+    """A rigid thing that feels nothing: plane, sphere, box, capsule, mesh. Made by World.add_obstacle."""
+
+    @property
+    def pose(self) -> tuple[np.ndarray, np.ndarray]:
+        """position [3] m, rotation [4], a quaternion x, y, z, w."""
+        out = _abi.dfm_pose()
+        self.world.free()
+        check(quick.dfm_obstacle_get_pose(self.handle, ctypes.byref(out)))
+        return np.array(out.position), np.array(out.rotation)
+
+    def move_to(self, position: Any, rotation: Any = (0, 0, 0, 1)) -> None:
+        """Where it is at the end of the next step; it moves there at constant speed."""
+        self.world.free()
+        check(quick.dfm_obstacle_move_to(self.handle, ctypes.byref(pose_of(position, rotation))))
+
+    def teleport(self, position: Any, rotation: Any = (0, 0, 0, 1)) -> None:
+        """Puts it there at once, without a motion."""
+        self.world.free()
+        check(quick.dfm_obstacle_teleport(self.handle, ctypes.byref(pose_of(position, rotation))))
+
+    def definition(self) -> _abi.dfm_obstacle_def:
+        """Its def as created, as the C struct."""
+        out = sized(_abi.dfm_obstacle_def)
+        self.world.free()
+        check(quick.dfm_obstacle_get_def(self.handle, ctypes.byref(out)))
+        return out
+
+    def remove(self) -> None:
+        self.world.free()
+        check(lib.dfm_obstacle_destroy(self.handle))
+
+
+class Rigid(Obstacle):
+    """A rigid body that soft bodies push. Made by World.add_rigid."""
+
+    def _state(self) -> _abi.dfm_rigid_state:
+        out = _abi.dfm_rigid_state()
+        self.world.free()
+        check(quick.dfm_rigid_get_state(self.handle, ctypes.byref(out)))
+        return out
+
+    @property
+    def position(self) -> np.ndarray:
+        """Center of mass, [3] m."""
+        return np.array(self._state().position)
+
+    @property
+    def rotation(self) -> np.ndarray:
+        """Quaternion x, y, z, w."""
+        return np.array(self._state().rotation)
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """Of the center of mass, [3] m/s."""
+        return np.array(self._state().velocity)
+
+    @property
+    def spin(self) -> np.ndarray:
+        """[3] rad/s."""
+        return np.array(self._state().spin)
+
+    def set_state(self, position: Any = None, rotation: Any = None, velocity: Any = None,
+                  spin: Any = None) -> None:
+        """Puts it somewhere, at once; what is not given stays."""
+        state = self._state()
+        for name, value in (("position", position), ("rotation", rotation), ("velocity", velocity),
+                            ("spin", spin)):
+            if value is not None:
+                setattr(state, name, vector(value, name, 4 if name == "rotation" else 3))
+        check(quick.dfm_rigid_set_state(self.handle, ctypes.byref(state)))
+
+    def remove(self) -> None:
+        """Takes the whole set that it came with out of the world."""
+        self.world.free()
+        check(lib.dfm_rigid_destroy(self.handle))

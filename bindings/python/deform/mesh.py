@@ -1,0 +1,308 @@
+"""Meshes before they become bodies: read, made, filled, from arrays, from meshio."""
+from __future__ import annotations
+
+import ctypes
+import pathlib
+import tempfile
+import weakref
+from typing import Any, Sequence
+
+import numpy as np
+
+from . import _abi
+from ._context import Context, default_context
+from ._library import ArgumentError, check, encoded, lib, quick, sized
+
+
+def points_of(points: Any, what: str = "points") -> np.ndarray:
+    """[n,3] m, contiguous float64."""
+    array = np.ascontiguousarray(points, dtype=np.float64)
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise ArgumentError(f"{what} has the shape {array.shape}; expected (n, 3), in m", "DFM_E_ARG")
+    return array
+
+
+def cells_of(cells: Any, width: int, what: str) -> np.ndarray:
+    """[n,width] point numbers, contiguous uint32."""
+    given = np.asarray(cells)
+    if given.ndim != 2 or given.shape[1] != width:
+        raise ArgumentError(f"{what} has the shape {given.shape}; expected (n, {width}), numbers of points",
+                            "DFM_E_ARG")
+    if given.size and (given.dtype.kind not in "iu" or given.min() < 0 or given.max() >= 2**32):
+        raise ArgumentError(f"{what} must hold whole numbers from 0 on, numbers of points", "DFM_E_ARG")
+    return np.ascontiguousarray(given, dtype=np.uint32)
+
+
+class _Keeper:
+    """Owns a mesh of the library as long as anything looks at its arrays."""
+
+    def __init__(self, handle: int, destroy: Any, context: Context):
+        self.handle = handle
+        self._finalize = weakref.finalize(self, lambda h, _context: destroy(h), handle, context)
+
+
+def _borrowed(keeper: Any, address: int | None, shape: tuple[int, ...], kind: Any) -> np.ndarray:
+    """A read-only array over the library's own memory; the mesh lives as long as the array does."""
+    count = int(np.prod(shape))
+    if not address or not count:
+        return np.zeros(shape, dtype=np.dtype(kind))
+    memory = (kind * count).from_address(address)
+    memory.keeper = keeper
+    array = np.frombuffer(memory, dtype=np.dtype(kind)).reshape(shape)
+    array.flags.writeable = False
+    return array
+
+
+def _size(values: Sequence[float]) -> Any:
+    return (ctypes.c_double * 3)(*values, *([0.0] * (3 - len(values))))
+
+
+def _groups(names: int | None, count: int) -> list[str]:
+    return [ctypes.c_char_p.from_address((names or 0) + 8 * i).value.decode() for i in range(count)]
+
+
+class _Mesh:
+    _info_kind: Any
+    _get_info: Any
+    _cell_width: int
+
+    def __init__(self, handle: int, destroy: Any, context: Context):
+        self._keeper = _Keeper(handle, destroy, context)
+        self._context = context
+
+    @property
+    def handle(self) -> int:
+        return self._keeper.handle
+
+    @property
+    def info(self) -> Any:
+        """Counts, sizes (m, m2, m3), quality (1: regular) and what reading repaired, as the C struct."""
+        out = sized(self._info_kind)
+        check(self._get_info(self.handle, ctypes.byref(out)))
+        return out
+
+    @property
+    def warnings(self) -> list[str]:
+        """What reading repaired, a sentence each."""
+        return (self.info.warnings or b"").decode().splitlines()
+
+    @property
+    def volume(self) -> float:
+        """m3."""
+        return float(self.info.volume)
+
+
+class TetMesh(_Mesh):
+    """Tetrahedra: what a body is made of.
+
+    Arrays look at the library's memory, without a copy; they stay valid when the mesh is out of scope.
+    """
+
+    _info_kind = _abi.dfm_tetmesh_info
+    _get_info = staticmethod(quick.dfm_tetmesh_get_info)
+
+    def __init__(self, handle: int, context: Context):
+        super().__init__(handle, lib.dfm_tetmesh_destroy, context)
+
+    @classmethod
+    def _made(cls, kind: str, size: Sequence[float], cells: int) -> TetMesh:
+        context, out = default_context(), ctypes.c_uint64()
+        check(lib.dfm_tetmesh_make(context.address, kind.encode(), _size(size), cells, ctypes.byref(out)))
+        return cls(out.value, context)
+
+    @classmethod
+    def read(cls, path: Any) -> TetMesh:
+        """Reads MSH, VTK, VTU or Medit; what was repaired is in `warnings`."""
+        context, out = default_context(), ctypes.c_uint64()
+        check(lib.dfm_tetmesh_read(context.address, encoded(path), ctypes.byref(out)))
+        return cls(out.value, context)
+
+    @classmethod
+    def ball(cls, radius: float, cells: int = 1000) -> TetMesh:
+        """A ball about the origin; radius in m, about `cells` tetrahedra."""
+        return cls._made("ball", [radius], cells)
+
+    @classmethod
+    def beam(cls, size: Sequence[float], cells: int = 1000) -> TetMesh:
+        """A beam of edges [x, y, z] in m, one corner at the origin."""
+        return cls._made("beam", size, cells)
+
+    @classmethod
+    def cylinder(cls, radius: float, length: float, cells: int = 1000) -> TetMesh:
+        """A cylinder along z from 0 to `length`, m."""
+        return cls._made("cylinder", [radius, length], cells)
+
+    @classmethod
+    def tube(cls, inner: float, radius: float, length: float, cells: int = 1000) -> TetMesh:
+        """A tube along z from 0 to `length`, m."""
+        return cls._made("tube", [inner, radius, length], cells)
+
+    @classmethod
+    def fill(cls, surface: TriMesh | Any, cells: int = 5000) -> TetMesh:
+        """Tetrahedra inside of a closed surface, given as a TriMesh or the path of its file."""
+        if not isinstance(surface, TriMesh):
+            surface = TriMesh.read(surface)
+        out = ctypes.c_uint64()
+        check(lib.dfm_tetmesh_fill(surface.handle, cells, ctypes.byref(out)))
+        return cls(out.value, surface._context)
+
+    def write(self, path: Any) -> None:
+        """Writes *.msh, *.msh2, *.vtk, *.vtu or *.mesh."""
+        check(lib.dfm_tetmesh_write(self.handle, encoded(path)))
+
+    def _arrays(self) -> tuple[int | None, int | None]:
+        points, tets = ctypes.c_void_p(), ctypes.c_void_p()
+        check(quick.dfm_tetmesh_data(self.handle, ctypes.byref(points), ctypes.byref(tets), None))
+        return points.value, tets.value
+
+    @property
+    def points(self) -> np.ndarray:
+        """[npoint,3] m."""
+        return _borrowed(self._keeper, self._arrays()[0], (self.info.npoint, 3), ctypes.c_double)
+
+    @property
+    def tets(self) -> np.ndarray:
+        """[ntet,4] numbers of points."""
+        return _borrowed(self._keeper, self._arrays()[1], (self.info.ntet, 4), ctypes.c_uint32)
+
+    @property
+    def share(self) -> np.ndarray | None:
+        """[ntet] how much of each cell is material, of a mesh that was filled; else None."""
+        out = ctypes.c_void_p()
+        check(quick.dfm_tetmesh_share(self.handle, ctypes.byref(out)))
+        return _borrowed(self._keeper, out.value, (self.info.ntet,), ctypes.c_double) if out.value else None
+
+    @property
+    def groups(self) -> dict[str, np.ndarray]:
+        """Points of each physical group, [n] numbers, ascending: a named surface is held or loaded by
+        them."""
+        names = ctypes.c_void_p()
+        check(quick.dfm_tetmesh_groups(self.handle, ctypes.byref(names), None))
+        out = {}
+        for i, name in enumerate(_groups(names.value, self.info.ngroup)):
+            points, n = ctypes.c_void_p(), ctypes.c_uint32()
+            check(quick.dfm_tetmesh_group_points(self.handle, i, None, ctypes.byref(points), ctypes.byref(n)))
+            out[name] = _borrowed(self._keeper, points.value, (n.value,), ctypes.c_uint32)
+        return out
+
+    def surface_groups(self) -> Any:
+        """The named triangles as a body's def takes them, or None where the file has none."""
+        names, triangles, group = ctypes.c_void_p(), ctypes.c_void_p(), ctypes.c_void_p()
+        n = ctypes.c_uint32()
+        check(quick.dfm_tetmesh_groups(self.handle, ctypes.byref(names), None))
+        check(quick.dfm_tetmesh_triangles(self.handle, ctypes.byref(triangles), ctypes.byref(group),
+                                          ctypes.byref(n)))
+        if not n.value:
+            return None
+        return _abi.dfm_surface_groups(ctypes.sizeof(_abi.dfm_surface_groups), self.info.ngroup, names.value,
+                                       n.value, 0, triangles.value, group.value)
+
+    @classmethod
+    def from_arrays(cls, points: Any, tets: Any) -> TetMesh:
+        """points [n,3] m, tets [m,4]; repaired as a file is: cells turned, unused points and doubles
+        dropped."""
+        p, t = points_of(points), cells_of(tets, 4, "tets")
+        if t.size and int(t.max()) >= len(p):
+            raise ArgumentError(f"tets name point {t.max()}, but there are {len(p)} points", "DFM_E_ARG")
+        rows = np.empty((len(t), 5), dtype=">i4")
+        rows[:, 0], rows[:, 1:] = 4, t
+        with tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder) / "arrays.vtk"
+            file.write_bytes(b"# vtk DataFile Version 3.0\narrays\nBINARY\nDATASET UNSTRUCTURED_GRID\n"
+                             + f"POINTS {len(p)} double\n".encode() + p.astype(">f8").tobytes()
+                             + f"\nCELLS {len(t)} {rows.size}\n".encode() + rows.tobytes()
+                             + f"\nCELL_TYPES {len(t)}\n".encode() + np.full(len(t), 10, ">i4").tobytes())
+            return cls.read(file)
+
+    @classmethod
+    def from_meshio(cls, mesh: Any) -> TetMesh:
+        """From a `meshio.Mesh` (or the path of a file that meshio reads): its tetrahedra."""
+        return cls.from_arrays(*_meshio_cells(mesh, "tetra"))
+
+    def to_meshio(self) -> Any:
+        """The same as a `meshio.Mesh`."""
+        import meshio
+        return meshio.Mesh(np.array(self.points), [("tetra", self.tets.astype(np.int64))])
+
+    def __repr__(self) -> str:
+        info = self.info
+        return f"<deform.TetMesh: {info.npoint} points, {info.ntet} tetrahedra, {info.volume:.6g} m3>"
+
+
+def _meshio_cells(mesh: Any, kind: str) -> tuple[np.ndarray, np.ndarray]:
+    if not hasattr(mesh, "cells_dict"):
+        import meshio
+        mesh = meshio.read(mesh)
+    if kind not in mesh.cells_dict:
+        raise ArgumentError(f"the mesh holds no cells of kind '{kind}'; it has "
+                            f"{', '.join(mesh.cells_dict) or 'none'}", "DFM_E_ARG")
+    points = np.zeros((len(mesh.points), 3))
+    points[:, :np.shape(mesh.points)[1]] = mesh.points
+    return points, mesh.cells_dict[kind]
+
+
+class TriMesh(_Mesh):
+    """Triangles: a surface to fill, to hang on coarse cells, or an obstacle. Arrays as those of TetMesh."""
+
+    _info_kind = _abi.dfm_trimesh_info
+    _get_info = staticmethod(quick.dfm_trimesh_get_info)
+
+    def __init__(self, handle: int, context: Context):
+        super().__init__(handle, lib.dfm_trimesh_destroy, context)
+
+    @classmethod
+    def read(cls, path: Any) -> TriMesh:
+        """Reads OBJ, PLY, STL, OFF, MSH, VTK, VTU or Medit; what was repaired is in `warnings`."""
+        context, out = default_context(), ctypes.c_uint64()
+        check(lib.dfm_trimesh_read(context.address, encoded(path), ctypes.byref(out)))
+        return cls(out.value, context)
+
+    @classmethod
+    def from_arrays(cls, points: Any, triangles: Any) -> TriMesh:
+        """points [n,3] m, triangles [m,3] counter-clockwise seen from outside; repaired as a file is."""
+        context, out = default_context(), ctypes.c_uint64()
+        p, t = points_of(points), cells_of(triangles, 3, "triangles")
+        check(lib.dfm_trimesh_create(context.address, len(p), p.ctypes.data, len(t), t.ctypes.data,
+                                     ctypes.byref(out)))
+        return cls(out.value, context)
+
+    @classmethod
+    def make(cls, kind: str, size: Sequence[float], triangles: int = 1000) -> TriMesh:
+        """A closed surface: "ball" [radius], "cylinder" [radius, length], "beam" [x, y, z], "tube" [inner,
+        outer, length] or "torus" [ring radius, tube radius]; m."""
+        context, out = default_context(), ctypes.c_uint64()
+        check(lib.dfm_trimesh_make(context.address, kind.encode(), _size(size), triangles, ctypes.byref(out)))
+        return cls(out.value, context)
+
+    def write(self, path: Any) -> None:
+        """Writes *.obj, *.ply, *.stl, *.off, *.vtk or *.vtu."""
+        check(lib.dfm_trimesh_write(self.handle, encoded(path)))
+
+    def _arrays(self) -> tuple[int | None, int | None]:
+        points, triangles = ctypes.c_void_p(), ctypes.c_void_p()
+        check(quick.dfm_trimesh_data(self.handle, ctypes.byref(points), ctypes.byref(triangles), None))
+        return points.value, triangles.value
+
+    @property
+    def points(self) -> np.ndarray:
+        """[npoint,3] m."""
+        return _borrowed(self._keeper, self._arrays()[0], (self.info.npoint, 3), ctypes.c_double)
+
+    @property
+    def triangles(self) -> np.ndarray:
+        """[ntriangle,3] numbers of points, counter-clockwise seen from outside."""
+        return _borrowed(self._keeper, self._arrays()[1], (self.info.ntriangle, 3), ctypes.c_uint32)
+
+    @classmethod
+    def from_meshio(cls, mesh: Any) -> TriMesh:
+        """From a `meshio.Mesh` (or the path of a file that meshio reads): its triangles."""
+        return cls.from_arrays(*_meshio_cells(mesh, "triangle"))
+
+    def to_meshio(self) -> Any:
+        """The same as a `meshio.Mesh`."""
+        import meshio
+        return meshio.Mesh(np.array(self.points), [("triangle", self.triangles.astype(np.int64))])
+
+    def __repr__(self) -> str:
+        info = self.info
+        return f"<deform.TriMesh: {info.npoint} points, {info.ntriangle} triangles, {info.area:.6g} m2>"

@@ -1,0 +1,259 @@
+"""Scenes from JSON files, and runs: a scene from its start to its end, with what was recorded on the way."""
+from __future__ import annotations
+
+import ctypes
+import json
+import math
+import weakref
+from dataclasses import dataclass
+from typing import Any, Callable, Mapping
+
+import numpy as np
+
+from . import _abi
+from ._arrays import row_type
+from ._context import Context, default_context
+from ._library import check, encoded, lib, quick, read_text, sized
+from .picture import Picture, Solid, body_values, draw, palette, scaled, solids
+from .world import Trouble, World
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What a scene says of its run: duration, step (0: the stable one) and every (between records), s;
+    static: a search for equilibria instead of steps in time; color of pictures; camera (eye, look_at), [3] m
+    each, or None."""
+
+    duration: float
+    step: float
+    every: float
+    static: bool
+    color: str
+    camera: tuple[np.ndarray, np.ndarray] | None
+
+
+def _close(handle: int, _context: Context) -> None:
+    quick.dfm_scene_close(handle)
+
+
+class Scene:
+    """A scene file (JSON), loaded: its `world`, `settings` and `probes`.
+
+    set: values to change, by JSON pointer: {"/contact/friction/0/params/mu": 0.4}. jitter: a number above 0
+    changes the start a little, the same number always by the same. threads: on which a step may run.
+    """
+
+    def __init__(self, path: Any, set: Mapping[str, Any] | None = None, jitter: int = 0, threads: int = 1,
+                 context: Context | None = None):
+        if context is None:
+            context = default_context() if threads == 1 else Context(threads)
+        words = [encoded(f"{pointer}={json.dumps(value)}") for pointer, value in (set or {}).items()]
+        pointers = (ctypes.c_char_p * max(len(words), 1))(*words)
+        options = _abi.dfm_scene_options(ctypes.sizeof(_abi.dfm_scene_options), len(words),
+                                         ctypes.addressof(pointers), jitter)
+        out, world = ctypes.c_uint64(), ctypes.c_uint64()
+        check(lib.dfm_scene_open(context.address, encoded(path), ctypes.byref(options), ctypes.byref(out)))
+        self.handle, self.path = out.value, str(path)
+        self._finalize = weakref.finalize(self, _close, self.handle, context)
+        check(quick.dfm_scene_world(self.handle, ctypes.byref(world)))
+        self.world = World.of_scene(context, world.value, _Closer(self._finalize))
+
+    def close(self) -> None:
+        """Closes the scene and destroys its world. Twice is allowed."""
+        self.world.free()
+        self._finalize()
+
+    def __enter__(self) -> Scene:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def value(self, pointer: str = "") -> Any:
+        """Any value of the scene, after defaults and `set`: value("/materials/rubber/young")."""
+        return json.loads(read_text(quick.dfm_scene_value, self.handle, encoded(pointer)))
+
+    @property
+    def settings(self) -> Settings:
+        out = sized(_abi.dfm_scene_settings)
+        check(quick.dfm_scene_get_settings(self.handle, ctypes.byref(out)))
+        camera = (np.array(out.eye), np.array(out.look_at)) if out.has_camera else None
+        time = self.value("/time")
+        return Settings(out.duration, out.step, out.every, time.get("mode") == "static",
+                        (out.color or b"body").decode(), camera)
+
+    @property
+    def probes(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """Position [3] m and velocity [3] m/s of each probe, by name."""
+        out = sized(_abi.dfm_scene_settings)
+        check(quick.dfm_scene_get_settings(self.handle, ctypes.byref(out)))
+        found = {}
+        for i in range(out.nprobe):
+            name, x, v = ctypes.c_char_p(), (ctypes.c_double * 3)(), (ctypes.c_double * 3)()
+            check(quick.dfm_scene_probe(self.handle, i, ctypes.byref(name), x, v))
+            found[(name.value or b"").decode()] = (np.array(x), np.array(v))
+        return found
+
+    def run(self, duration: float | None = None, every: float | None = None,
+            watch: Callable[[World], Any] | None = None) -> Run:
+        """Steps to the end as `deform run` does, bit by bit, and records a frame every `every` s.
+
+        duration, every: s, instead of the scene's. watch: called after each step; it may look at the
+        world."""
+        return _Runner(self, duration, every, watch).run()
+
+
+class _Closer:
+    """What a scene's world closes: the scene, without keeping it."""
+
+    def __init__(self, finalize: Any):
+        self.close = finalize
+
+
+@dataclass
+class Frame:
+    """A recorded state. positions: of each body, [nsurfel,3] m, float32; values: what its surface is colored
+    by; obstacles: where they were; probes: [3] m by name; contacts: how many, of which sticking."""
+
+    t: float
+    positions: dict[str, np.ndarray]
+    values: dict[str, np.ndarray | None]
+    obstacles: list[Solid]
+    probes: dict[str, np.ndarray]
+    contacts: int
+    sticking: int
+
+
+class Run:
+    """What a run recorded: `frames`, and at its end `stats` (dfm_world_stats) and `hash`. A notebook shows
+    it as a view that can be turned and played (html()); picture(i) draws one frame."""
+
+    def __init__(self, color: str, camera: Any):
+        self.color, self.camera = color, camera
+        self.frames: list[Frame] = []
+        self.triangles: dict[str, np.ndarray] = {}
+        self.steps = 0
+        self.trouble = Trouble(0)
+        self.stats: Any = None
+        self.hash = 0
+
+    @property
+    def times(self) -> np.ndarray:
+        """Of the frames, [n] s."""
+        return np.array([frame.t for frame in self.frames])
+
+    def probe(self, name: str) -> np.ndarray:
+        """Its path, [n,3] m."""
+        return np.array([frame.probes[name] for frame in self.frames])
+
+    def positions(self, body: str) -> np.ndarray:
+        """Surface of a body in all frames, [n,nsurfel,3] m, float32."""
+        return np.stack([frame.positions[body] for frame in self.frames])
+
+    def top(self) -> float:
+        """The largest value by which anything is colored, of all frames."""
+        return max((float(v.max(initial=0)) for f in self.frames for v in f.values.values() if v is not None),
+                   default=0.0)
+
+    def picture(self, frame: int = -1, *, size: tuple[int, int] = (960, 720), eye: Any = None,
+                look_at: Any = None) -> Picture:
+        """A frame, drawn; negative numbers count from the end."""
+        shown, top = self.frames[frame], self.top()
+        if eye is None and self.camera is not None:
+            eye, look_at = self.camera
+        surfaces = [(shown.positions[name], self.triangles[name], palette(i),
+                     scaled(shown.values[name], top, self.color)) for i, name in enumerate(self.triangles)]
+        return draw(surfaces, shown.obstacles, size=size, eye=eye, look_at=look_at,
+                    texts=[f"t = {shown.t:.3f} s"])
+
+    def html(self, height: int = 480) -> str:
+        """The run as one piece of HTML with WebGL in it: no server, no other file, nothing from the
+        network."""
+        from .webgl import html
+        return html(self, height)
+
+    def _repr_html_(self) -> str:
+        return self.html()
+
+    def __repr__(self) -> str:
+        end = self.frames[-1].t if self.frames else 0.0
+        return f"<deform.Run: {self.steps} steps, {len(self.frames)} frames, {end:.6g} s>"
+
+
+class _Runner:
+    def __init__(self, scene: Scene, duration: float | None, every: float | None,
+                 watch: Callable[[World], Any] | None):
+        self.scene, self.world, self.watch = scene, scene.world, watch
+        self.settings = scene.settings
+        self.duration = self.settings.duration if duration is None else duration
+        self.every = self.settings.every if every is None else every
+        self.start = self.world.time
+        color = self.settings.color if self.settings.color in ("speed", "contact") else "body"
+        self.run_ = Run(color, self.settings.camera)
+        self.next = 0
+        self.bodies = {body.name: body for body in self.world.bodies}
+        self.run_.triangles = {name: body.triangles for name, body in self.bodies.items()}
+
+    def run(self) -> Run:
+        out = self.run_
+        self.record()
+        while self.advance():
+            out.steps += 1
+            if self.watch is not None:
+                self.watch(self.world)
+            self.record()
+        if out.frames[-1].t != self.world.time:
+            self.record(always=True)
+        memory = _abi.dfm_world_stats.from_buffer_copy(self.world.stats.tobytes())
+        out.stats = np.frombuffer(memory, dtype=np.dtype((np.record, row_type(_abi.dfm_world_stats))))[0]
+        out.hash = self.world.hash
+        return out
+
+    def record(self, always: bool = False) -> None:
+        t = self.world.time - self.start
+        if not always:
+            if self.every > 0 and t < self.next * self.every - 1e-9 * self.every:
+                return
+            self.next = math.floor(t / self.every + 1e-9) + 1 if self.every > 0 else 0
+        stats = self.world.stats
+        self.run_.frames.append(Frame(
+            self.world.time, {n: b.positions.astype(np.float32) for n, b in self.bodies.items()},
+            {n: body_values(b, self.run_.color) for n, b in self.bodies.items()}, solids(self.world),
+            {n: x for n, (x, _) in self.scene.probes.items()}, int(stats.contacts), int(stats.sticking)))
+
+    def advance(self) -> bool:
+        """One step toward the end, of the length that `deform run` takes; False when there."""
+        if self.settings.static:
+            return self.advance_load()
+        left = self.start + self.duration - self.world.time
+        step, automatic = self.settings.step, self.settings.step <= 0
+        if automatic:
+            step = self.world.stable_step
+            if not math.isfinite(step):
+                step = 1e-3
+            if step < left < 2 * step:
+                step = left / 2
+        if left <= 1e-6 * min(step, self.duration):
+            return False
+        longer = 1 + (1e-6 if automatic else 1e-3)
+        if left < step * longer and (automatic or abs(left - step) > 1e-6 * step):
+            step = left
+        self.run_.trouble |= self.world.step(step)
+        return True
+
+    def advance_load(self) -> bool:
+        n = math.ceil(self.duration / self.settings.step - 1e-6) if self.settings.step > 0 else 1
+        if self.run_.steps == n:
+            return False
+        self.world.equilibrium(load_from=self.run_.steps / n, load_to=(self.run_.steps + 1) / n,
+                               time=self.start + self.duration * (self.run_.steps + 1) / n - self.world.time)
+        return True
+
+
+def run(path: Any, *, duration: float | None = None, every: float | None = None,
+        set: Mapping[str, Any] | None = None, threads: int = 1,
+        watch: Callable[[World], Any] | None = None) -> Run:
+    """Runs a scene file to its end and returns what was recorded: run("scene.json", set={"/gravity": [0, 0,
+    -1.6]})."""
+    with Scene(path, set=set, threads=threads) as scene:
+        return scene.run(duration, every, watch)

@@ -1,0 +1,551 @@
+"""Worlds: bodies and obstacles, friction between them, steps, and what a step did."""
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import enum
+import json
+import weakref
+from typing import Any, Iterable, Iterator, Mapping, Sequence
+
+import numpy as np
+
+from . import _abi
+from ._arrays import Report, Rows
+from ._context import Context, Params, choice, default_context, number_of, strings
+from ._library import (ArgumentError, BusyError, check, default, encoded, error, lib, quick, read_text, sized)
+from .body import EVERYTHING, Body, Obstacle, Rigid, pose_of, vector
+from .mesh import TetMesh, TriMesh, cells_of, points_of
+
+METHODS = {"auto": 0, "velocity": 1, "implicit": 2, "rollback": 3}
+INTEGRATORS = {"auto": 0, "symplectic_euler": 1, "implicit_euler": 2, "tr_bdf2": 3}
+SELF_CONTACT = {"off": 0, "on": 1, "auto": 2}
+SHAPES = {"plane": 0, "sphere": 1, "box": 2, "capsule": 3, "mesh": 4, "voxels": 5}
+COUPLINGS = {"barycentric": 0, "mls": 1}
+
+
+class Trouble(enum.IntFlag):
+    """Bits that a step answers; none: all is well. Remedies: libdeform/doc and deform/world.h."""
+
+    SUBSTEPS = _abi.DFM_TROUBLE_SUBSTEPS
+    UNCONVERGED = _abi.DFM_TROUBLE_UNCONVERGED
+    NONFINITE = _abi.DFM_TROUBLE_NONFINITE
+    INVERTED = _abi.DFM_TROUBLE_INVERTED
+    PLUGIN = _abi.DFM_TROUBLE_PLUGIN
+    OVERLAP = _abi.DFM_TROUBLE_OVERLAP
+    ENERGY = _abi.DFM_TROUBLE_ENERGY
+    BUDGET = _abi.DFM_TROUBLE_BUDGET
+    INTERRUPTED = _abi.DFM_TROUBLE_INTERRUPTED
+
+
+class Material:
+    """A named parameter set of a world. Made by World.add_material."""
+
+    def __init__(self, world: World, handle: int, name: str | None):
+        self.world, self.handle, self.name = world, handle, name
+
+
+def _word(what: str, given: str, table: Mapping[str, int]) -> int:
+    return table[choice(what, given, table)]
+
+
+def _turn(normal: Any) -> list[float]:
+    """The quaternion that turns z to the normal."""
+    n = np.asarray(normal, dtype=np.float64)
+    length = float(np.linalg.norm(n))
+    if n.shape != (3,) or not length > 0:
+        raise ArgumentError("normal needs three numbers that are not all zero", "DFM_E_ARG")
+    x, y, z = n / length
+    if z < -1 + 1e-12:
+        return [1.0, 0.0, 0.0, 0.0]
+    w = np.sqrt((1 + z) / 2)
+    return [-y / (2 * w), x / (2 * w), 0.0, w]
+
+
+def _destroy(handle: int, _keep: Any) -> None:
+    quick.dfm_world_destroy(handle)
+
+
+_NO_TROUBLE = Trouble(0)
+_step = lib.dfm_world_step
+
+
+class World:
+    """A world of soft bodies: build it, step it, look at it. SI units.
+
+        with deform.World() as world:
+            world.add_obstacle("plane")
+            ball = world.add_body(deform.TetMesh.ball(0.1, cells=500), position=(0, 0, 0.15))
+            for _ in range(500):
+                world.step(1e-3)
+            print(world.contacts["fn"].sum(), "N")
+
+    gravity: [3] m/s2. integrator: "auto", "symplectic_euler", "implicit_euler", "tr_bdf2"; step: s, how long
+    steps are to be, for "auto" to choose by. sleep: islands at rest sleep. self_contact: "off", "on",
+    "auto". effects: names that select what is simulated, None: what parameters call for. contact_offset: m,
+    rest distance of surfaces, 0: from the meshes. threads: on which a step may run. context: loaded plugins
+    to share; by default one for all worlds of one thread.
+
+    A world may be stepped in any thread, one at a time; two worlds step at once in two threads, since a step
+    releases the interpreter's lock. At the end of a `with` block, or by close(), the world is gone: its
+    arrays keep their last values, and everything else raises HandleError.
+    """
+
+    def __init__(self, gravity: Sequence[float] = (0, 0, -9.81), *, integrator: str = "auto",
+                 method: str = "auto", step: float = 0, sleep: bool = False, self_contact: str = "off",
+                 effects: Iterable[str] | None = None, contact_offset: float = 0, max_substeps: int = 10000,
+                 max_time: float = 0, untangle: bool = False, solver: str | None = None,
+                 threads: int = 1, context: Context | None = None):
+        if context is None:
+            context = default_context() if threads == 1 else Context(threads)
+        definition = default(_abi.dfm_world_def)
+        definition.gravity = vector(gravity, "gravity")
+        definition.integrator = _word("integrator", integrator, INTEGRATORS)
+        definition.method = _word("method", method, METHODS)
+        definition.step, definition.sleep = step, int(sleep)
+        definition.self_contact = _word("self_contact", self_contact, SELF_CONTACT)
+        words = None if effects is None else strings(effects)
+        definition.effects = None if words is None else ctypes.addressof(words)
+        definition.contact_offset, definition.max_substeps = contact_offset, max_substeps
+        definition.max_time = max_time
+        definition.flags = _abi.DFM_WORLD_UNTANGLE if untangle else 0
+        definition.solver = encoded(solver)
+        out = ctypes.c_uint64()
+        check(lib.dfm_world_create(context.address, ctypes.byref(definition), ctypes.byref(out)))
+        self._begin(context, out.value)
+        self._finalize = weakref.finalize(self, _destroy, self.handle, context)
+
+    def _begin(self, context: Context, handle: int, owner: Any = None) -> None:
+        self.context, self.handle = context, handle
+        self._owner = owner
+        self._busy = False
+        self._bits = ctypes.c_uint32(0)
+        self._bits_at = ctypes.byref(self._bits)
+        self._lists: dict[str, Any] = {}
+        self._finalize: Any = None
+
+    @classmethod
+    def of_scene(cls, context: Context, handle: int, owner: Any) -> World:
+        """The world of a scene, which owns it."""
+        world = cls.__new__(cls)
+        world._begin(context, handle, owner)
+        return world
+
+    # ---- life ------------------------------------------------------------------------------------------
+
+    def close(self) -> None:
+        """Destroys the world with all that is in it. Twice is allowed."""
+        self.free()
+        if self._owner is not None:
+            self._owner.close()
+        elif self._finalize is not None:
+            self._finalize()
+
+    @property
+    def closed(self) -> bool:
+        return quick.dfm_handle_kind(self.handle) != _abi.DFM_HANDLE_WORLD
+
+    def __enter__(self) -> World:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        if self.closed:
+            return "<deform.World, closed>"
+        return f"<deform.World: {len(self.bodies)} bodies, t = {self.time:.6g} s>"
+
+    def free(self) -> None:
+        """Raises BusyError while another thread is inside a step."""
+        if self._busy:
+            raise BusyError("the world is inside a step of another thread; look when that has returned",
+                            "DFM_E_BUSY")
+
+    @contextlib.contextmanager
+    def alone(self) -> Iterator[None]:
+        """For calls that release the interpreter's lock while they change the world."""
+        self.free()
+        self._busy = True
+        try:
+            yield
+        finally:
+            self._busy = False
+
+    def accept(self, status: int) -> int:
+        """Raises what a status means, a discarded call included; what a Python law has raised is its
+        cause."""
+        if status == _abi.DFM_OK:
+            return status
+        raised = error(status)
+        if status == _abi.DFM_DISCARD:
+            raised.trouble = Trouble(self._bits.value)  # type: ignore[attr-defined]
+        raise raised from self.context.raise_of_law()
+
+    # ---- contents --------------------------------------------------------------------------------------
+
+    def add_material(self, name: str | None = None, *, density: float = 1000, young: float = 1e5,
+                     poisson: float = 0.3, damping_mass: float = 0, damping_stiffness: float = 0,
+                     **extra: float) -> Material:
+        """density kg/m3, young Pa, poisson 1, damping_mass 1/s, damping_stiffness s; `extra`: further
+        entries that models take by key, and friction=..., the coefficient where no rule names the pair."""
+        definition = default(_abi.dfm_material_def)
+        values = Params(extra)
+        definition.name = encoded(name)
+        definition.density, definition.young, definition.poisson = density, young, poisson
+        definition.damping_mass, definition.damping_stiffness = damping_mass, damping_stiffness
+        definition.extra = values.struct
+        out = ctypes.c_uint64()
+        self.free()
+        check(lib.dfm_material_create(self.handle, ctypes.byref(definition), ctypes.byref(out)))
+        return Material(self, out.value, name)
+
+    def add_body(self, mesh: TetMesh | str | None = None, *, points: Any = None, tets: Any = None,
+                 name: str | None = None, model: str | None = None, params: Mapping[str, Any] | None = None,
+                 material: Material | Mapping[str, Any] | None = None,
+                 position: Sequence[float] = (0, 0, 0), rotation: Sequence[float] = (0, 0, 0, 1),
+                 velocity: Sequence[float] = (0, 0, 0), spin: Sequence[float] = (0, 0, 0), fixed: Any = None,
+                 surface: TriMesh | None = None, coupling: str = "barycentric",
+                 fields: Mapping[str, Any] | None = None, integrator: str = "auto", category: int = 1,
+                 collides_with: int = EVERYTHING) -> Body:
+        """A body of a mesh (a TetMesh or the path of its file), or of points [n,3] m and tets [m,4].
+
+        model: "msm" (default), "corotational_fem", ...; params: of the model, by key. material: of
+        add_material, or its entries as a dict. position [3] m, rotation [4] (a quaternion x, y, z, w),
+        velocity [3] m/s, spin [3] rad/s. fixed: [n] held components of each point, bits 1 x, 2 y, 4 z.
+        surface: a finer one that hangs on the cells. fields: model parameters that differ by cell, [m] or
+        [m,width] by key.
+        """
+        if isinstance(mesh, (str, bytes)) or hasattr(mesh, "__fspath__"):
+            mesh = TetMesh.read(mesh)
+        definition = default(_abi.dfm_body_def)
+        keep: list[Any] = [mesh]
+        if mesh is not None:
+            if points is not None or tets is not None:
+                raise ArgumentError("add_body takes a mesh, or points and tets, not both", "DFM_E_ARG")
+            points, tets = mesh.points, mesh.tets
+            share, groups = mesh.share, mesh.surface_groups()
+            if share is not None:
+                definition.cell_share = share.ctypes.data
+            if groups is not None:
+                definition.groups = ctypes.addressof(groups)
+            keep += [share, groups]
+        elif points is None or tets is None:
+            raise ArgumentError("add_body needs a mesh, or points and tets", "DFM_E_ARG")
+        x, cells = points_of(points), cells_of(tets, 4, "tets")
+        keep += [x, cells]
+        definition.npoint, definition.ntet = len(x), len(cells)
+        definition.points, definition.tets = x.ctypes.data, cells.ctypes.data
+        values = self.context.params("model", model or "msm", params or {})
+        definition.name, definition.model = encoded(name), encoded(model)
+        definition.model_params = values.struct
+        if isinstance(material, Mapping):
+            material = self.add_material(**material)
+        definition.material = material.handle if material is not None else 0
+        definition.pose = pose_of(position, rotation)
+        definition.velocity, definition.spin = vector(velocity, "velocity"), vector(spin, "spin")
+        if fixed is not None:
+            held = np.ascontiguousarray(fixed, dtype=np.uint8)
+            if held.shape != (len(x),):
+                raise ArgumentError(f"fixed has the shape {held.shape}; expected ({len(x)},)", "DFM_E_ARG")
+            definition.fixed = held.ctypes.data
+            keep.append(held)
+        if surface is not None:
+            hung = _abi.dfm_surface_def(ctypes.sizeof(_abi.dfm_surface_def),
+                                        _word("coupling", coupling, COUPLINGS))
+            sp, st = surface.points, surface.triangles
+            hung.npoint, hung.ntriangle, hung.points = len(sp), len(st), sp.ctypes.data
+            hung.triangles = st.ctypes.data
+            definition.surface = ctypes.addressof(hung)
+            keep += [hung, sp, st]
+        rows = (_abi.dfm_cell_field * max(len(fields or {}), 1))()
+        for row, (key, given) in zip(rows, (fields or {}).items()):
+            field = np.ascontiguousarray(given, dtype=np.float64).reshape(len(cells), -1)
+            row.key, row.values, row.width = key.encode(), field.ctypes.data, field.shape[1]
+            keep.append(field)
+        definition.nfield, definition.fields = len(fields or {}), ctypes.addressof(rows)
+        definition.integrator = _word("integrator", integrator, INTEGRATORS)
+        definition.category, definition.collides_with = category, collides_with
+        out = ctypes.c_uint64()
+        with self.alone():
+            status = lib.dfm_body_create(self.handle, ctypes.byref(definition), ctypes.byref(out))
+        check(status)
+        return Body(self, out.value)
+
+    def add_obstacle(self, shape: str = "plane", *, name: str | None = None,
+                     position: Sequence[float] = (0, 0, 0), rotation: Sequence[float] | None = None,
+                     normal: Sequence[float] | None = None, radius: float = 0,
+                     half_size: Sequence[float] = (0, 0, 0), half_length: float = 0,
+                     mesh: TriMesh | None = None, cells: int = 0,
+                     velocity_surface: Sequence[float] = (0, 0, 0), material: Material | None = None,
+                     category: int = 1, collides_with: int = EVERYTHING) -> Obstacle:
+        """A "plane" (through position, with a normal), "sphere" (radius), "box" (half_size [3]), "capsule"
+        (radius, half_length, along z), "mesh" or "voxels" (mesh). m. velocity_surface: of a belt, [3]
+        m/s."""
+        definition = default(_abi.dfm_obstacle_def)
+        definition.shape = _word("shape", shape, SHAPES)
+        definition.name = encoded(name)
+        if rotation is not None and normal is not None:
+            raise ArgumentError("an obstacle is turned by rotation or by normal, not by both", "DFM_E_ARG")
+        turned = _turn(normal) if normal is not None else rotation if rotation is not None else (0, 0, 0, 1)
+        definition.pose = pose_of(position, turned)
+        definition.radius, definition.half_length = radius, half_length
+        definition.half_size = vector(half_size, "half_size")
+        definition.velocity_surface = vector(velocity_surface, "velocity_surface")
+        definition.category, definition.collides_with = category, collides_with
+        definition.material = material.handle if material is not None else 0
+        if mesh is not None:
+            p, t = mesh.points, mesh.triangles
+            definition.npoint, definition.ntriangle = len(p), len(t)
+            definition.points, definition.triangles, definition.cells = p.ctypes.data, t.ctypes.data, cells
+        out = ctypes.c_uint64()
+        with self.alone():
+            status = lib.dfm_obstacle_create(self.handle, ctypes.byref(definition), ctypes.byref(out))
+        check(status)
+        return self._obstacle(out.value)
+
+    def add_rigid(self, shape: str = "sphere", *, mass: float, name: str | None = None,
+                  position: Sequence[float] = (0, 0, 0), rotation: Sequence[float] = (0, 0, 0, 1),
+                  radius: float = 0.5, half_size: Sequence[float] = (0, 0, 0), half_length: float = 0,
+                  inertia: Sequence[float] = (0, 0, 0), velocity: Sequence[float] = (0, 0, 0),
+                  spin: Sequence[float] = (0, 0, 0), material: Material | None = None) -> Rigid:
+        """A rigid "sphere", "box" or "capsule" that soft bodies push: mass kg, inertia [3] kg m2 (all zero:
+        solid)."""
+        definition = default(_abi.dfm_rigid_def)
+        definition.shape = _word("shape", shape, {k: SHAPES[k] for k in ("sphere", "box", "capsule")})
+        definition.name, definition.mass = encoded(name), mass
+        definition.pose = pose_of(position, rotation)
+        definition.radius, definition.half_length = radius, half_length
+        definition.half_size, definition.inertia = vector(half_size, "half_size"), vector(inertia, "inertia")
+        definition.velocity, definition.spin = vector(velocity, "velocity"), vector(spin, "spin")
+        definition.material = material.handle if material is not None else 0
+        group = sized(_abi.dfm_rigid_set_def)
+        group.nbody, group.bodies = 1, ctypes.addressof(definition)
+        out = ctypes.c_uint64()
+        self.free()
+        check(lib.dfm_rigid_create(self.handle, None, ctypes.byref(group), ctypes.byref(out)))
+        return self._obstacle(out.value)  # type: ignore[return-value]
+
+    def _obstacle(self, handle: int) -> Obstacle:
+        out = sized(_abi.dfm_obstacle_def)
+        check(quick.dfm_obstacle_get_def(handle, ctypes.byref(out)))
+        kind = Rigid if quick.dfm_handle_kind(handle) == _abi.DFM_HANDLE_RIGID else Obstacle
+        return kind(self, handle, (out.name or b"").decode())
+
+    def _handles(self, function: Any) -> list[int]:
+        self.free()
+        n = number_of(function, self.handle)
+        out = (ctypes.c_uint64 * max(n, 1))()
+        check(function(self.handle, n, ctypes.byref(out), None) if n else 0)
+        return list(out[:n])
+
+    @property
+    def bodies(self) -> list[Body]:
+        """In order of creation."""
+        return [Body(self, h) for h in self._handles(quick.dfm_world_bodies)]
+
+    @property
+    def obstacles(self) -> list[Obstacle]:
+        """In order of creation, rigid bodies among them."""
+        return [self._obstacle(h) for h in self._handles(quick.dfm_world_obstacles)]
+
+    def find_body(self, name: str) -> Body:
+        """The body of that name; ArgumentError names the nearest one."""
+        out = ctypes.c_uint64()
+        self.free()
+        check(quick.dfm_world_find_body(self.handle, name.encode(), ctypes.byref(out)))
+        return Body(self, out.value)
+
+    def owner(self, handle: int) -> Body | Obstacle:
+        """What a handle of a report (contacts["body_a"], pairs["b"]) stands for."""
+        if quick.dfm_handle_kind(int(handle)) == _abi.DFM_HANDLE_BODY:
+            return Body(self, int(handle))
+        return self._obstacle(int(handle))
+
+    # ---- friction --------------------------------------------------------------------------------------
+
+    def add_friction(self, a: str = "*", b: str = "*", law: Any = "coulomb", **params: Any) -> None:
+        """A law between two sides: "*", "material=NAME", the name of a body or an obstacle, or "body:GROUP".
+
+        law: a name, or a deform.PythonLaw; params: of the law, by key ("mu" stands for mu_C and mu_S)."""
+        name = self.context.use_law(law)
+        values = self.context.params("friction", name, params)
+        sides = [encoded(a), encoded(b)]
+        definition = sized(_abi.dfm_friction_def)
+        between = (ctypes.c_char_p * 2)(*sides)
+        definition.between[:] = (ctypes.c_void_p * 2).from_buffer(between)[:]
+        definition.law, definition.params = name.encode(), values.struct
+        self.free()
+        check(lib.dfm_world_add_friction(self.handle, ctypes.byref(definition)))
+
+    def set_friction(self, a: str, b: str, **params: Any) -> None:
+        """Changes parameters of a rule while the world runs; those that are not given keep their values."""
+        self.free()
+        values = Params(params)
+        check(lib.dfm_world_set_friction(self.handle, a.encode(), b.encode(), ctypes.byref(values.struct)))
+
+    def remove_friction(self, a: str, b: str) -> None:
+        self.free()
+        check(lib.dfm_world_remove_friction(self.handle, a.encode(), b.encode()))
+
+    def filter_pair(self, a: str, b: str, collide: bool) -> None:
+        """Lets two named sides pass (False) or touch (True)."""
+        self.free()
+        check(lib.dfm_world_filter_pair(self.handle, a.encode(), b.encode(), collide))
+
+    # ---- time ------------------------------------------------------------------------------------------
+
+    def step(self, dt: float) -> Trouble:
+        """Advances the world by dt (s). Returns bits of Trouble, none where all is well.
+
+        Raises Diverged where a sub-step could not be taken (the world stays at the last good one) and
+        Discarded where the step was given up and nothing has changed. Releases the interpreter's lock."""
+        if self._busy:
+            self.free()
+        self._busy = True
+        status = _step(self.handle, dt, self._bits_at)
+        self._busy = False
+        if status:
+            self.accept(status)
+        return Trouble(self._bits.value) if self._bits.value else _NO_TROUBLE
+
+    def run(self, duration: float, dt: float | None = None) -> Trouble:
+        """Steps until `duration` s have passed, by dt or, where none is given, by the stable step."""
+        seen, end = _NO_TROUBLE, self.time + duration
+        while True:
+            left, step = end - self.time, dt or self.stable_step
+            if not np.isfinite(step):
+                step = 1e-3  # nothing bounds it
+            if left <= 1e-6 * min(step, duration):
+                return seen
+            seen |= self.step(left if left < step * 1.001 else step)
+
+    def equilibrium(self, load_steps: int = 1, *, load_from: float = 0, load_to: float = 1,
+                    time: float = 0) -> None:
+        """Moves all bodies to where forces balance. Diverged where there is no such place.
+
+        load_steps: on the way from load_from to load_to, shares of gravity and loads; time: s that pass."""
+        definition = default(_abi.dfm_equilibrium_def)
+        definition.load_steps, definition.time = load_steps, time
+        definition.load_from, definition.load_to = load_from, load_to
+        with self.alone():
+            status = lib.dfm_world_equilibrium(self.handle, ctypes.byref(definition), None)
+        self.accept(status)
+
+    def interrupt(self) -> None:
+        """Asks the step that runs in another thread to stop; it raises Discarded there. Any thread."""
+        check(quick.dfm_world_interrupt(self.handle))
+
+    @property
+    def time(self) -> float:
+        """Simulated, s."""
+        self.free()
+        return float(quick.dfm_world_time(self.handle))
+
+    @property
+    def stable_step(self) -> float:
+        """s, a step that is not cut into sub-steps; inf if nothing bounds it."""
+        out = ctypes.c_double()
+        self.free()
+        check(quick.dfm_world_stable_step(self.handle, ctypes.byref(out), None, None))
+        return out.value
+
+    def set_gravity(self, gravity: Sequence[float]) -> None:
+        """[3] m/s2 from now on."""
+        self.free()
+        check(quick.dfm_world_set_gravity(self.handle, vector(gravity, "gravity")))
+
+    # ---- reports ---------------------------------------------------------------------------------------
+
+    def _list(self, key: str, make: Any) -> Any:
+        if self._busy:
+            self.free()
+        found = self._lists.get(key)
+        if found is None:
+            found = self._lists[key] = make()
+        return found.look()
+
+    @property
+    def contacts(self) -> np.ndarray:
+        """All contacts of the last sub-step, a structured array [n], a view: body_a, body_b, point [3] m,
+        normal [3], tangent [3], gap m, area m2, fn N, ft [2] N, slip [2] m/s, bristle [2] m, flags, key,
+        kind, law."""
+        return self._list("contacts", lambda: Rows(quick.dfm_world_contacts_sized, self.handle,
+                                                   _abi.dfm_contact))
+
+    @property
+    def pairs(self) -> np.ndarray:
+        """Resultants of each touching pair, a structured array [n], a view: a, b, count, sticking, normal N,
+        force [3] N, friction [3] N, moment [3] N m, slip_max m/s, friction_work J."""
+        return self._list("pairs", lambda: Rows(quick.dfm_world_pairs_sized, self.handle,
+                                                _abi.dfm_pair_report))
+
+    @property
+    def impulses(self) -> np.ndarray:
+        """What contact did to each pair over the whole last step, a structured array [n], a view: a, b,
+        impulse [3] N s, normal_impulse N s, peak_normal N, peak_force N, point [3] m, touching s."""
+        return self._list("impulses", lambda: Rows(quick.dfm_world_pair_impulses_sized, self.handle,
+                                                   _abi.dfm_pair_impulse))
+
+    @property
+    def events(self) -> np.ndarray:
+        """Begin (kind 1) and end (2) of contacts since the last look: kind, a, b, key, t s; a view."""
+        return self._list("events", lambda: Rows(quick.dfm_world_events_sized, self.handle,
+                                                 _abi.dfm_contact_event))
+
+    @property
+    def stats(self) -> Any:
+        """The step report as a record, a view: steps, substeps, contacts, sticking, passes, sweeps, residual
+        m/s, stable_step s, asleep, energy_start J, ... (dfm_world_stats)."""
+        return self._list("stats", lambda: Report(quick.dfm_world_get_stats, self.handle,
+                                                  _abi.dfm_world_stats))
+
+    @property
+    def hash(self) -> int:
+        """Of the whole state: equal for equal bits."""
+        self.free()
+        return int(quick.dfm_world_hash(self.handle))
+
+    def explain(self) -> dict[str, Any]:
+        """The plan: effects, stages and why, laws, bodies, what bounds the step."""
+        self.free()
+        return json.loads(read_text(quick.dfm_world_explain, self.handle))
+
+    def ray(self, origin: Sequence[float], direction: Sequence[float],
+            max_distance: float = np.inf) -> dict[str, Any] | None:
+        """The first surface that a ray meets: owner, triangle, distance m, point [3] m, normal [3]; or
+        None."""
+        self.free()
+        out = sized(_abi.dfm_ray_hit)
+        check(quick.dfm_world_ray(self.handle, vector(origin, "origin"), vector(direction, "direction"),
+                                  max_distance, ctypes.byref(out)))
+        if not (out.body or out.obstacle):
+            return None
+        return {"owner": self.owner(out.body or out.obstacle), "triangle": out.triangle,
+                "distance": out.distance, "point": np.array(out.point), "normal": np.array(out.normal)}
+
+    def snapshot(self) -> bytes:
+        """All that a later result depends on; restore() takes it, in another process too."""
+        self.free()
+        size = ctypes.c_size_t(0)
+        check(quick.dfm_world_snapshot(self.handle, None, ctypes.byref(size)))
+        buffer = ctypes.create_string_buffer(size.value)
+        check(quick.dfm_world_snapshot(self.handle, buffer, ctypes.byref(size)))
+        return buffer.raw[:size.value]
+
+    def restore(self, snapshot: bytes) -> None:
+        """Back to a snapshot of this world, or of one with the same contents: the next steps give the same
+        bits."""
+        self.free()
+        check(quick.dfm_world_restore(self.handle, snapshot, len(snapshot)))
+
+    # ---- pictures --------------------------------------------------------------------------------------
+
+    def picture(self, **options: Any) -> Any:
+        """The present state as a Picture (deform.picture has the options); a notebook shows it."""
+        from .picture import picture
+        return picture(self, **options)
+
+    def _repr_png_(self) -> bytes | None:
+        from .picture import png_or_none
+        return png_or_none(self)

@@ -1,0 +1,149 @@
+// Pictures for the Python package: the renderer behind plain C functions that ctypes calls. What is added
+// stays until it is drawn. One thread at a time for each picture; the package sees to that.
+#include <cstdio>
+#include <cstring>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "render/render.h"
+
+#define PICTURE_API extern "C" __attribute__((visibility("default")))
+
+namespace {
+
+struct Surface {
+  std::vector<double> xyz;
+  std::vector<uint32_t> tri;
+  std::vector<float> scalar;
+  render::Color color;
+};
+
+struct Picture {
+  std::unique_ptr<render::Renderer> renderer;
+  std::vector<Surface> surfaces;
+  render::Scene scene;
+  std::vector<std::pair<std::string, double>> texts;  // and the height of their base line
+};
+
+int refuse(const std::string &sentence, char *why, size_t capacity) {
+  std::snprintf(why, capacity, "%s", sentence.c_str());
+  return 0;
+}
+
+template <size_t N>
+void copy(double (&to)[N], const double *from) {
+  std::copy(from, from + N, to);
+}
+
+}  // namespace
+
+/** @param why out, [capacity] one sentence where no picture can be made here. @return NULL then. */
+PICTURE_API void *deform_picture_create(uint32_t width, uint32_t height, char *why, size_t capacity) {
+  auto picture = std::make_unique<Picture>();
+  std::string reason;
+  picture->renderer = render::Renderer::create(render::Backend::automatic, width, height, &reason);
+  if (picture->renderer) return picture.release();
+  refuse(reason, why, capacity);
+  return nullptr;
+}
+
+PICTURE_API void deform_picture_destroy(void *picture) { delete static_cast<Picture *>(picture); }
+
+/** A body's color, repeating after ten. @param rgb out, [3] 0..1 */
+PICTURE_API void deform_picture_palette(uint32_t i, double *rgb) {
+  const render::Color color = render::palette(i);
+  rgb[0] = color.r;
+  rgb[1] = color.g;
+  rgb[2] = color.b;
+}
+
+/** @param xyz [n,3] m; tri [ntri,3]; rgb [3] 0..1; scalar [n] 0..1, NaN: rgb; NULL: rgb everywhere.
+ * Copied. */
+PICTURE_API void deform_picture_surface(void *picture, uint32_t n, const double *xyz, uint32_t ntri,
+                                        const uint32_t *tri, const double *rgb, const float *scalar) {
+  Surface s;
+  s.xyz.assign(xyz, xyz + size_t(3) * n);
+  s.tri.assign(tri, tri + size_t(3) * ntri);
+  if (scalar) s.scalar.assign(scalar, scalar + n);
+  s.color = {float(rgb[0]), float(rgb[1]), float(rgb[2])};
+  static_cast<Picture *>(picture)->surfaces.push_back(std::move(s));
+}
+
+/** @param pose [7] position m, rotation x y z w; size [3] m: box half_size; sphere radius; capsule radius,
+ * half of its axis. shape as DFM_SHAPE_*. */
+PICTURE_API void deform_picture_shape(void *picture, uint32_t shape, const double *pose, const double *axis,
+                                      const double *size) {
+  render::Scene &scene = static_cast<Picture *>(picture)->scene;
+  if (shape == 0) {
+    render::Plane plane = {};
+    copy(plane.point, pose);
+    copy(plane.normal, axis);
+    plane.look = {};
+    scene.planes.push_back(plane);
+  } else if (shape == 1) {
+    scene.spheres.push_back({{pose[0], pose[1], pose[2]}, size[0], {}});
+  } else if (shape == 2) {
+    render::Box box = {};
+    copy(box.pose.position, pose);
+    copy(box.pose.rotation, pose + 3);
+    copy(box.half, size);
+    box.look = {};
+    scene.boxes.push_back(box);
+  } else if (shape == 3) {
+    render::Capsule capsule = {};
+    for (int i = 0; i < 3; ++i) {
+      capsule.a[i] = pose[i] - size[1] * axis[i];
+      capsule.b[i] = pose[i] + size[1] * axis[i];
+    }
+    capsule.radius = size[0];
+    capsule.look = {};
+    scene.capsules.push_back(capsule);
+  }
+}
+
+/** @param eye, look_at [3] m, world. Without it the camera finds its place by itself. */
+PICTURE_API void deform_picture_camera(void *picture, const double *eye, const double *look_at) {
+  render::Camera camera = {};
+  copy(camera.eye, eye);
+  copy(camera.look_at, look_at);
+  camera.up[2] = 1;
+  camera.fov_deg = 30;
+  static_cast<Picture *>(picture)->scene.camera = camera;
+}
+
+/** A line of text (ASCII) from the upper left corner downward. */
+PICTURE_API void deform_picture_text(void *picture, const char *text) {
+  auto &texts = static_cast<Picture *>(picture)->texts;
+  texts.emplace_back(text, 28 + 22.0 * double(texts.size()));
+}
+
+/** Draws what was added and forgets it. @param rgb out, [height,width,3], rows from the top
+ * @return 1; 0: why says what was refused */
+PICTURE_API int deform_picture_draw(void *handle, uint8_t *rgb, char *why, size_t capacity) {
+  Picture &picture = *static_cast<Picture *>(handle);
+  for (const Surface &s : picture.surfaces) {
+    render::Surface surface;
+    surface.xyz = s.xyz.data();
+    surface.n = uint32_t(s.xyz.size() / 3);
+    surface.tri = s.tri.data();
+    surface.ntri = uint32_t(s.tri.size() / 3);
+    surface.rgb[0] = s.color.r;
+    surface.rgb[1] = s.color.g;
+    surface.rgb[2] = s.color.b;
+    if (!s.scalar.empty()) surface.scalar = s.scalar.data();
+    picture.scene.surfaces.push_back(surface);
+  }
+  render::Image image;
+  std::string reason;
+  const bool drawn = picture.renderer->draw(picture.scene, image, &reason);
+  if (drawn)
+    for (const auto &[text, y] : picture.texts)
+      render::draw_text(image, 16, y, 14, text, {0.15f, 0.17f, 0.2f});
+  picture.scene = {};
+  picture.surfaces.clear();
+  picture.texts.clear();
+  if (!drawn) return refuse(reason, why, capacity);
+  std::copy(image.rgb.begin(), image.rgb.end(), rgb);
+  return 1;
+}

@@ -1,0 +1,154 @@
+"""Builds the wheel (PEP 517): the package's Python files, and beneath deform/native what `cmake --install`
+of this tree writes: the library, the plugins, the command. It needs CMake, Ninja and a compiler, and nothing
+from a registry, so that `pip install .` works wherever the library builds.
+
+The wheel is for any Python 3 on the platform (py3-none-PLATFORM): nothing in it is compiled against an
+interpreter. Settings (pip: --config-settings NAME=VALUE):
+  prebuilt  a build folder of this tree whose target deform_command is built; nothing is compiled then
+  cmake     further arguments for configuring, in one text
+"""
+import base64
+import hashlib
+import io
+import os
+import pathlib
+import re
+import shlex
+import shutil
+import subprocess
+import sysconfig
+import tarfile
+import tempfile
+import zipfile
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+LIBRARIES = re.compile(r"libdeform(_\w+)?\.so\.\d+|libdeform_python\.so|deform/plugins-\d+/.*")
+PACKAGE = ROOT / "bindings" / "python" / "deform"
+
+
+def _project():
+    """The table [project] of pyproject.toml, as far as the metadata of a wheel goes (Python 3.10 has no
+    reader)."""
+    text = (ROOT / "pyproject.toml").read_text()
+    project = dict(re.findall(r'^([\w-]+) = "([^"]*)"$', text.split("[project]")[1].split("\n[")[0], re.M))
+    project["dependencies"] = re.findall(r'"([^"]+)"', re.search(r"^dependencies = \[(.*)\]$", text, re.M)[1])
+    project["extras"] = {name: re.findall(r'"([^"]+)"', value) for name, value in re.findall(
+        r"^(\w+) = \[(.*)\]$", text.split("[project.optional-dependencies]")[1].split("\n[")[0], re.M)}
+    project["scripts"] = re.findall(r'^(\w+) = "([^"]+)"$', text.split("[project.scripts]")[1], re.M)
+    return project
+
+
+def _metadata(project):
+    lines = ["Metadata-Version: 2.1", f"Name: {project['name']}", f"Version: {project['version']}",
+             f"Summary: {project['description']}", "License: MIT",
+             f"Requires-Python: {project['requires-python']}"]
+    lines += [f"Requires-Dist: {need}" for need in project["dependencies"]]
+    for extra, needs in project["extras"].items():
+        lines.append(f"Provides-Extra: {extra}")
+        lines += [f'Requires-Dist: {need}; extra == "{extra}"' for need in needs]
+    lines += ["Description-Content-Type: text/markdown", "", (ROOT / "README.md").read_text()]
+    return "\n".join(lines)
+
+
+def _platform():
+    return sysconfig.get_platform().replace("-", "_").replace(".", "_")
+
+
+def _run(*command):
+    print("+", shlex.join(str(c) for c in command), flush=True)
+    subprocess.run([str(c) for c in command], check=True)
+
+
+def _installed(prefix, settings):
+    """What the tree installs, beneath prefix."""
+    build = settings.get("prebuilt")
+    if build:
+        build = pathlib.Path(build).absolute()
+    else:
+        build = ROOT / "build" / "wheel"
+        generator = ["-G", "Ninja"] if shutil.which("ninja") else []
+        _run("cmake", "-S", ROOT, "-B", build, *generator, "-DCMAKE_BUILD_TYPE=Release", "-DDEFORM_TESTS=OFF",
+             "-DDEFORM_EXAMPLES=OFF", "-DDEFORM_ODE=OFF", "-DDEFORM_ASSIMP=OFF",
+             "-DCMAKE_INSTALL_LIBDIR=lib", *shlex.split(settings.get("cmake", "")))
+        _run("cmake", "--build", build, "--target", "deform_command", "--target", "deform_python_native",
+             "--parallel", os.environ.get("CMAKE_BUILD_PARALLEL_LEVEL") or len(os.sched_getaffinity(0)))
+    _run("cmake", "--install", build, "--strip", "--prefix", prefix)
+    _run("cmake", "--install", build, "--strip", "--prefix", prefix, "--component", "python")
+
+
+def native_files(prefix):
+    """(path below deform/native, file) of what the wheel takes: the library under the name that the loader
+    asks for."""
+    for libdir in sorted(p for p in prefix.glob("lib*") if p.is_dir()):
+        for path in sorted(libdir.rglob("*")):
+            inside = path.relative_to(libdir).as_posix()
+            if path.is_file() and LIBRARIES.fullmatch(inside):
+                yield f"lib/{inside}", path
+    yield "bin/deform", prefix / "bin" / "deform"
+    for folder in ("share/deform", "include/deform"):
+        for path in sorted((prefix / folder).rglob("*")):
+            if path.is_file():
+                yield path.relative_to(prefix).as_posix(), path
+
+
+class _Wheel:
+    def __init__(self, path):
+        self.zip = zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED)
+        self.record = []
+
+    def add(self, name, data, mode=0o644):
+        info = zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0))  # the same bytes whenever it is built
+        info.external_attr = (0o100000 | mode) << 16
+        info.compress_type = zipfile.ZIP_DEFLATED
+        self.zip.writestr(info, data)
+        digest = base64.urlsafe_b64encode(hashlib.sha256(data).digest()).rstrip(b"=").decode()
+        self.record.append(f"{name},sha256={digest},{len(data)}")
+
+    def close(self, info):
+        self.record.append(f"{info}/RECORD,,")
+        self.zip.writestr(f"{info}/RECORD", "\n".join(self.record) + "\n")
+        self.zip.close()
+
+
+def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
+    settings = dict(config_settings or {})
+    project = _project()
+    name = f"{project['name']}-{project['version']}"
+    tag = f"py3-none-{_platform()}"
+    wheel = _Wheel(pathlib.Path(wheel_directory) / f"{name}-{tag}.whl")
+    for path in sorted(PACKAGE.rglob("*")):
+        if path.is_file() and path.suffix in (".py", ".pyi", ".js", ".html", ".typed"):
+            wheel.add(f"deform/{path.relative_to(PACKAGE).as_posix()}", path.read_bytes())
+    with tempfile.TemporaryDirectory() as folder:
+        prefix = pathlib.Path(folder) / "prefix"
+        _installed(prefix, settings)
+        for inside, path in native_files(prefix):
+            mode = 0o755 if inside.startswith(("bin/", "lib/")) else 0o644
+            wheel.add(f"deform/native/{inside}", path.read_bytes(), mode)
+    info = f"{name}.dist-info"
+    wheel.add(f"{info}/METADATA", _metadata(project).encode())
+    lines = ["Wheel-Version: 1.0", "Generator: deform", "Root-Is-Purelib: false", f"Tag: {tag}", ""]
+    wheel.add(f"{info}/WHEEL", "\n".join(lines).encode())
+    scripts = "".join(f"{script} = {target}\n" for script, target in project["scripts"])
+    wheel.add(f"{info}/entry_points.txt", f"[console_scripts]\n{scripts}".encode())
+    wheel.add(f"{info}/LICENSE", (ROOT / "LICENSE").read_bytes())
+    wheel.close(info)
+    return f"{name}-{tag}.whl"
+
+
+def build_sdist(sdist_directory, config_settings=None):
+    """The tree as git has it."""
+    project = _project()
+    name = f"{project['name']}-{project['version']}"
+    git = ["git", "-C", str(ROOT), "ls-files", "-z"]
+    listed = subprocess.run(git, check=True, capture_output=True).stdout
+    target = pathlib.Path(sdist_directory) / f"{name}.tar.gz"
+    with tarfile.open(target, "w:gz", format=tarfile.PAX_FORMAT) as tar:
+        for path in filter(None, listed.decode().split("\0")):
+            if (ROOT / path).is_file():
+                tar.add(ROOT / path, f"{name}/{path}")
+        data = _metadata(project).encode()
+        info = tarfile.TarInfo(f"{name}/PKG-INFO")
+        info.size = len(data)
+        tar.addfile(info, io.BytesIO(data))
+    return target.name

@@ -1,0 +1,64 @@
+"""The wheel from this build, installed into a fresh environment, used in another folder: ten lines, plugins,
+command, picture. No registry is asked: NumPy is the system's."""
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+import zipfile
+
+SOURCE = pathlib.Path(os.environ["DEFORM_SOURCE"])
+GUIDE = SOURCE / "libdeform" / "doc" / "howto" / "python.md"
+
+
+def clean():
+    """Nothing of this build or of its caller's Python."""
+    drop = re.compile(r"DEFORM_|PYTHON|LD_LIBRARY_PATH|VIRTUAL_ENV|PIP_")
+    return {k: v for k, v in os.environ.items() if not drop.match(k)}
+
+
+class Wheel(unittest.TestCase):
+    def test_installed_elsewhere(self):
+        began = time.monotonic()
+        with tempfile.TemporaryDirectory(suffix=" with space") as name:
+            folder = pathlib.Path(name)
+            make = [sys.executable, "-m", "venv", "--system-site-packages", folder / "venv"]
+            subprocess.run(make, check=True, env=clean())
+            python = folder / "venv" / "bin" / "python"
+            pip = [python, "-m", "pip", "--disable-pip-version-check", "-q"]
+            subprocess.run([*pip, "wheel", SOURCE, "--no-deps", "--no-index", "-w", folder / "dist",
+                            "--config-settings", f"prebuilt={os.environ['DEFORM_BUILD']}"], check=True,
+                           env=clean())
+            wheel, = (folder / "dist").iterdir()
+            self.assertRegex(wheel.name, r"^deform-\d+\.\d+\.\d+-py3-none-linux_\w+\.whl$")
+            subprocess.run([*pip, "install", "--no-index", wheel], check=True, env=clean())
+            (folder / "other").mkdir()
+            first = re.search(r"^```python\n(.*?)^```", GUIDE.read_text(), re.M | re.S).group(1)
+            program = folder / "other" / "ten lines.py"
+            program.write_text(first + "import numpy\nprint(deform.__file__, len(world.context.types))\n")
+            done = subprocess.run([python, program], cwd=folder / "other", capture_output=True, text=True,
+                                  env=clean())
+            self.assertEqual(done.returncode, 0, done.stderr)
+            last = done.stdout.splitlines()[-1]
+            self.assertIn(str(folder / "venv"), last)
+            self.assertGreater(int(last.split()[-1]), 10)  # laws and models, loaded from the package's folder
+            self.assertEqual((folder / "other" / "ball.png").read_bytes()[:4], b"\x89PNG")
+            print(f"environment, wheel, install and first picture: {time.monotonic() - began:.1f} s")
+            version = subprocess.run([folder / "venv" / "bin" / "deform", "--version"], capture_output=True,
+                                     text=True, env=clean(), check=True).stdout
+            self.assertIn(re.search(r"-([\d.]+)-py3", wheel.name).group(1), version)
+            with zipfile.ZipFile(wheel) as zipped:
+                files = zipped.namelist()
+            for needed in ("deform/py.typed", "deform/native/lib/libdeform.so.0",
+                           "deform/native/include/deform/plugin.h"):
+                self.assertIn(needed, files)
+            subprocess.run([*pip, "uninstall", "-y", "deform"], check=True, env=clean())
+            left = [p for p in (folder / "venv").rglob("deform*") if p.suffix != ".pyc"]
+            self.assertEqual([p for p in left if "site-packages" in str(p)], [])
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,203 @@
+"""Worlds from arrays, steps, errors, ends, threads."""
+import threading
+import time
+import unittest
+
+import numpy as np
+
+import deform
+
+
+def ball(world, z=0.1001, **options):
+    return world.add_body(deform.TetMesh.ball(0.1, cells=300), position=(0, 0, z), **options)
+
+
+class Building(unittest.TestCase):
+    def test_ball_on_floor_carries_its_weight(self):
+        with deform.World(integrator="implicit_euler") as world:
+            world.add_obstacle("plane", name="floor")
+            body = ball(world, name="ball", material={"young": 2e5, "damping_stiffness": 0.005})
+            world.add_friction("ball", "floor", law="coulomb", mu=0.4)
+            world.run(1.0, dt=1 / 120)
+            weight = 9.81 * body.measure.mass
+            self.assertAlmostEqual(world.contacts["fn"].sum() / weight, 1, delta=0.02)
+            self.assertAlmostEqual(world.pairs["normal"][0] / weight, 1, delta=0.02)
+            self.assertEqual(world.owner(world.pairs["a"][0]), body)
+            self.assertEqual(world.owner(world.pairs["b"][0]).name, "floor")
+            self.assertAlmostEqual(world.time, 1.0)
+            self.assertEqual(world.stats.steps, 120)
+
+    def test_body_from_arrays(self):
+        points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=np.float32)
+        with deform.World(gravity=(0, 0, 0)) as world:
+            body = world.add_body(points=points, tets=[[0, 1, 2, 3]], position=(0, 0, 2),
+                                  velocity=(1, 0, 0), model="corotational_fem", fixed=[0, 0, 0, 7])
+            self.assertAlmostEqual(body.measure.rest_volume, 1 / 6)
+            np.testing.assert_allclose(body.points, points + [0, 0, 2])
+            np.testing.assert_array_equal(body.tets, [[0, 1, 2, 3]])
+            world.step(1e-4)
+            np.testing.assert_allclose(body.points[3], [0, 0, 3])
+            body.set_state(points=body.points + [0, 0, 0.5], velocities=np.zeros((4, 3)))
+            np.testing.assert_allclose(body.points[:3, 2], [2.5, 2.5, 2.5])  # what is held stays
+            np.testing.assert_allclose(body.points[3], [0, 0, 3])
+            np.testing.assert_allclose(body.point_velocities, 0)
+
+    def test_enumerated_parameter_by_name(self):
+        with deform.World() as world:
+            ball(world, model="corotational_fem", params={"rotation": "qr"})
+            with self.assertRaisesRegex(deform.ArgumentError, "did you mean 'qr'"):
+                ball(world, model="corotational_fem", params={"rotation": "qrr"})
+
+    def test_rigid_body_falls_on_soft_one(self):
+        with deform.World() as world:
+            world.add_obstacle("plane")
+            body = ball(world, material={"young": 1e5, "damping_stiffness": 0.002})
+            rigid = world.add_rigid("sphere", mass=0.5, radius=0.04, position=(0, 0, 0.3), name="stone")
+            world.run(0.25, dt=1e-3)
+            self.assertLess(rigid.position[2], 0.26)
+            self.assertLess(rigid.velocity[2], 0.5)
+            met = {(world.owner(e["a"]), world.owner(e["b"])) for e in world.events}
+            self.assertIn((body, rigid), met)
+
+    def test_snapshot_gives_the_same_bits_again(self):
+        with deform.World() as world:
+            world.add_obstacle("plane")
+            body = ball(world, z=0.12)
+            world.run(0.05, dt=1e-3)
+            kept = world.snapshot()
+            world.run(0.05, dt=1e-3)
+            first = world.hash, body.points.copy()
+            world.restore(kept)
+            world.run(0.05, dt=1e-3)
+            self.assertEqual(world.hash, first[0])
+            np.testing.assert_array_equal(body.points, first[1])
+
+    def test_loads_holds_rays_and_plan(self):
+        with deform.World(gravity=(0, 0, 0)) as world:
+            body = ball(world, z=0)
+            top = np.flatnonzero(body.points[:, 2] > 0.09)
+            body.hold(np.flatnonzero(body.points[:, 2] < -0.09))
+            load = body.add_load(top, (0, 0, 0.5))
+            world.equilibrium()
+            self.assertGreater(body.points[top, 2].mean(), 0.09)
+            body.remove_load(load)
+            hit = world.ray((0, 0, 1), (0, 0, -1))
+            self.assertEqual(hit["owner"], body)
+            self.assertAlmostEqual(hit["distance"], 0.9, delta=0.02)
+            self.assertIsNone(world.ray((0, 0, 1), (0, 0, 1)))
+            self.assertEqual(world.explain()["bodies"][0]["points"], body.npoint)
+            self.assertIn("coulomb", [t.short_name for t in world.context.types])
+
+
+class Errors(unittest.TestCase):
+    def test_library_sentence_is_the_exception(self):
+        with deform.World() as world:
+            world.add_obstacle("plane", name="floor")
+            for wrong, kind, sentence in (
+                    (lambda: world.add_friction("flor", "*"), deform.ArgumentError, "did you mean 'floor'"),
+                    (lambda: world.add_friction(law="coulom"), deform.UnsupportedError, 'mean "coulomb"'),
+                    (lambda: world.add_friction(mue=1), deform.ArgumentError, 'did you mean "mu_C"'),
+                    (lambda: world.add_body("none.msh"), deform.FileError, "none.msh: cannot be opened"),
+                    (lambda: world.add_body(points=[[0, 0]], tets=[[0, 1, 2, 3]]), deform.ArgumentError,
+                     r"shape \(1, 2\); expected \(n, 3\)"),
+                    (lambda: world.add_body(points=np.eye(3), tets=[[0, 1, 2, 2.5]]), deform.ArgumentError,
+                     "whole numbers"),
+                    (lambda: world.add_body(), deform.ArgumentError, "needs a mesh"),
+                    (lambda: world.add_obstacle("spere"), deform.ArgumentError, "did you mean 'sphere'"),
+                    (lambda: world.step(-1), deform.ArgumentError, "positive"),
+                    (lambda: world.find_body("x"), deform.ArgumentError, "x")):
+                with self.subTest(sentence), self.assertRaisesRegex(kind, sentence) as caught:
+                    wrong()
+                self.assertTrue(caught.exception.status.startswith("DFM_E_"))
+
+    def test_discarded_step_changes_nothing(self):
+        with deform.World(max_substeps=1) as world:
+            body = ball(world, material={"young": 1e8})
+            before = body.points.copy()
+            with self.assertRaises(deform.Discarded) as caught:
+                world.step(0.1)
+            self.assertIn(deform.Trouble.SUBSTEPS, caught.exception.trouble)
+            np.testing.assert_array_equal(body.points, before)
+
+
+class Threads(unittest.TestCase):
+    def test_step_releases_the_lock_and_can_be_interrupted(self):
+        world = deform.World()
+        world.add_obstacle("plane")
+        body = world.add_body(deform.TetMesh.ball(0.1, cells=4000), position=(0, 0, 0.11),
+                              material={"young": 1e7})
+        ended = []
+
+        def work():
+            try:
+                while True:
+                    world.step(0.5)  # thousands of sub-steps: it does not end by itself
+            except deform.Discarded as discarded:
+                ended.append(discarded.trouble)
+
+        thread = threading.Thread(target=work)
+        thread.start()
+        refused = 0
+        while not refused:
+            time.sleep(0.001)
+            try:
+                body.positions
+            except deform.BusyError:
+                refused += 1
+        with self.assertRaises(deform.BusyError):
+            world.close()
+        world.interrupt()
+        thread.join()
+        self.assertIn(deform.Trouble.INTERRUPTED, ended[0])
+        self.assertEqual(body.positions.shape, (body.nsurfel, 3))
+        world.close()
+
+    def test_two_worlds_in_two_threads(self):
+        hashes = {}
+
+        def work(number):
+            with deform.World() as world:
+                world.add_obstacle("plane")
+                ball(world, z=0.12)
+                world.run(0.1, dt=1e-3)
+                hashes[number] = world.hash
+
+        threads = [threading.Thread(target=work, args=(i,)) for i in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        work(4)
+        self.assertEqual(len(hashes), 5)
+        self.assertEqual(len(set(hashes.values())), 1)
+
+    def test_threads_of_a_world_do_not_change_its_bits(self):
+        hashes = set()
+        for threads in (1, 2):
+            with deform.World(threads=threads) as world:
+                world.add_obstacle("plane")
+                ball(world)
+                world.run(0.05, dt=1e-3)
+                hashes.add(world.hash)
+        self.assertEqual(len(hashes), 1)
+
+
+class Ends(unittest.TestCase):
+    def test_closed_world_refuses(self):
+        with deform.World() as world:
+            body = ball(world)
+        self.assertTrue(world.closed)
+        world.close()
+        for use in (lambda: world.step(1e-3), lambda: body.positions, lambda: world.contacts,
+                    lambda: body.measure, lambda: body.set_state(velocities=np.zeros((body.npoint, 3)))):
+            with self.assertRaises(deform.HandleError):
+                use()
+
+    def test_body_keeps_its_world(self):
+        body = ball(deform.World())
+        body.world.step(1e-3)
+        self.assertEqual(body.points.shape, (body.npoint, 3))
+
+
+if __name__ == "__main__":
+    unittest.main()
