@@ -207,6 +207,7 @@ dfm_status dfm_body_set_state(dfm_body body, uint32_t n, const double *x, const 
         if (v) b.p.v[size_t(i) * kStride + size_t(k)] = v[size_t(3) * i + size_t(k)];
       }
     disturb(b);
+    if (x) lose_energy(b);
     b.world->bound.age = kNone;
     ++b.world->placements;
     ++b.x_version;

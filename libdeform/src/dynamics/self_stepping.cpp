@@ -13,11 +13,15 @@ SelfStepping::SelfStepping(const Memory &memory, Phyxels &points, Surface &surfa
 }
 
 // Loads and gravity are external forces of the model, which answers the surfels' mean velocities.
-bool SelfStepping::free_motion(const SubStep &now, double &) {
+// The kinetic energy is that of its start: points are not told how they end without contact.
+bool SelfStepping::free_motion(const SubStep &now, double &kinetic) {
+  double sum = 0;
   for (uint32_t i = 0; i < p_.n; ++i) {
     const size_t at = size_t(i) * kStride;
     store3(&p_.f[at], load3(&p_.load[at]) + p_.mass[i] * now.gravity);
+    sum += p_.mass[i] * norm2(load3(&p_.v[at]));
   }
+  kinetic = 0.5 * sum;
   const dfm_kin k = kin(now.time, now.h);
   const auto predict = [&] { return model_.stepper->predict(model_.self, &k, p_.f.data(), surfels_.data()); };
   bool good = model_.call("predict", predict) == DFM_OK;

@@ -24,6 +24,12 @@ constexpr double kGivesBack = 0.5;
 constexpr uint32_t kSettles = 8;     // sub-steps
 constexpr double kRounding = 1e-12;  // of the sums that a balance is the difference of
 constexpr double kPositionDigits = 8 * 2.3e-16;
+// Of the largest energy so far: what a body that steps itself may have beyond what it has had and was given.
+// What such a model leaves out of the motion, so that its step is cheap, is energy that comes and goes. Where
+// nobody knows its elastic energy: its velocities are means over steps, and of an oscillation that a step
+// takes far, their energy comes and goes with the phase.
+constexpr double kOwnSteps = 0.25, kHidden = 1;
+constexpr double kNoLimit = 1e300;  // J, of a base: its energy may be anything
 // An implicit sub-step costs that much more, so the same shares of the time allow as many more looks.
 constexpr uint32_t kAges = 32;
 
@@ -32,14 +38,22 @@ constexpr uint32_t kAges = 32;
 bool watching(const World &w) {
   return w.def.energy_watch > 0 && w.plan.has(StageRole::gives_impulses) == w.plan.touches();
 }
-// By backward Euler, whose balance is that of the true energy.
-bool damps(const Body &b) { return b.dynamics->abilities().damps; }
-bool books(const Body &b) { return b.dynamics->abilities().energy || damps(b); }
-bool watched(const Body &b) { return books(b) && b.model.can(DFM_CAP_ENERGY); }
+bool steps_itself(const Body &b) { return b.model.stepper.has_value(); }
+// By backward Euler, or by the model itself: the balance is that of the true energy, and what is done counts
+// at the end of the sub-step.
+bool at_end(const Body &b) { return b.dynamics->abilities().damps || steps_itself(b); }
+bool books(const Body &b) { return b.dynamics->abilities().energy || at_end(b); }
+// Its elastic energy is not known, but that there is none below zero: what moves has come from what moved at
+// first and from what was put in.
+bool hides(const Body &b) { return steps_itself(b) && !b.model.can(DFM_CAP_ENERGY); }
+double allowed(const Body &b) { return hides(b) ? kHidden : steps_itself(b) ? kOwnSteps : 0; }
+bool watched(const Body &b) { return books(b) && (b.model.can(DFM_CAP_ENERGY) || hides(b)); }
 // Loads that change from sub-step to sub-step have no potential: their work is booked as it is done.
 bool books_loads(const Body &b) { return b.loads_vary(); }
 // TR-BDF2 does the work of what varies along the sub-step, not at its end as it is booked.
+// A model that steps itself does not say with what force it is held.
 bool unbooked(const World &w, const Body &b) {
+  if (steps_itself(b)) return !b.motions.empty();
   return b.dynamics->abilities().parts && (books_loads(b) || !b.motions.empty() || !w.gravity.keys.empty());
 }
 
@@ -79,7 +93,7 @@ double work_of_new_size(const World &w, const StepContext &step, const Body &b) 
 // it may rise as stiff modes calm down.
 bool look(World &w, StepContext &step, Body &b, Look &out) {
   const Phyxels &p = b.p;
-  const bool load_booked = books_loads(b), ends = damps(b);
+  const bool load_booked = books_loads(b), ends = at_end(b);
   double kinetic = 0, cross = 0, kick = 0, potential = 0, reach = 0;
   for (uint32_t i = 0; i < p.n; ++i) {
     const size_t at = size_t(i) * kStride;
@@ -99,8 +113,11 @@ bool look(World &w, StepContext &step, Body &b, Look &out) {
   double elastic = 0;
   const dfm_kin kin = b.dynamics->kin(w.time, 0);
   const OnBehalf speaks(b.name);
-  if (b.model.call("energy", [&] { return b.model.ops->energy(b.model.self, &kin, &elastic); }) != DFM_OK)
-    return false;
+  const auto ask = [&] { return b.model.ops->energy(b.model.self, &kin, &elastic); };
+  if (!hides(b) && b.model.call("energy", ask) != DFM_OK) return false;
+  // it was asked between its prediction and its commit, which may share memory with the answer
+  double again = 0;
+  if (steps_itself(b) && !hides(b) && !b.dynamics->free_motion(sub_step_of(w, step), again)) return false;
   const double drift = kPositionDigits * reach / step.h;
   const double half_done = ends ? 0 : work_of_holders(w, step, b, false) + work_of_new_size(w, step, b);
   out = {kinetic, elastic, elastic + potential + (ends ? kinetic : cross) - (b.energy.work + half_done),
@@ -180,29 +197,34 @@ Turning turning_of(const Body &b, double h) {
 // A rotation is not convex: between its ends a chord leads through a body that is smaller, so inner forces
 // that carry a contact's force through the body do work on x' - x and no elastic energy pays for it. With the
 // contact's work at the end of the arc, v' + h/2 spin x (v' - v_center), the balance holds to that order.
+//
+// A model that steps itself says where its points end: contact and loads do their work on that way, arcs
+// included, whatever velocity the points have at its end.
 void book_end(World &w, StepContext &step, Body &b, double motion) {
   const Phyxels &p = b.p;
   const bool load_booked = books_loads(b), driven = !step.driven.empty() && !b.motions.empty();
   const double *const end = b.dynamics->end().v;
+  const double *const way = steps_itself(b) ? b.dynamics->end().mean : end;
   double contact = 0, loads = 0, gained = 0, held = 0;
   if (w.plan.touches()) {
-    const Turning turning = turning_of(b, step.h);
+    const Turning turning = steps_itself(b) ? Turning{} : turning_of(b, step.h);
     for (uint32_t s = 0; s < b.surface.nsurfel; ++s) {
       const double *const q = &b.surfel_impulse[3 * size_t(s)];
       if (q[0] == 0 && q[1] == 0 && q[2] == 0) continue;
       b.surface.each_phyxel(s, [&](uint32_t point, double weight) {
-        const Vec3 arc = turning.arc(load3(end + size_t(point) * kStride));
+        const Vec3 arc = turning.arc(load3(way + size_t(point) * kStride));
         for (size_t k = 0, at = size_t(point) * kStride; k < 3; ++k, ++at)
-          if (p.moves(at)) contact += weight * q[k] * (end[at] + arc[int(k)]);
+          if (p.moves(at)) contact += weight * q[k] * (way[at] + arc[int(k)]);
       });
     }
   }
   const bool forces = driven && b.dynamics->end_forces(sub_step_of(w, step));
-  for (uint32_t i = 0; i < p.n; ++i)
+  const bool by_point = load_booked || driven || motion < 1;
+  for (uint32_t i = 0; by_point && i < p.n; ++i)
     for (size_t k = 0, at = size_t(i) * kStride; k < 3; ++k, ++at) {
       const double load = load_booked ? p.load[at] : 0;
       if (p.moves(at)) {
-        loads += step.h * load * end[at];
+        loads += step.h * load * way[at];
         gained += p.mass[i] * (end[at] - p.v[at]) * end[at];
       } else if (forces) {
         held -= motion * step.h * p.v[at] * (p.f[at] - load + p.mass[i] * w.gravity.now[int(k)]);
@@ -234,8 +256,8 @@ void book_body(World &w, StepContext &step, Body &b, double motion) {
 const char *unwatched(const World &w, const Body &b) {
   if (!(w.def.energy_watch > 0)) return "energy_watch is 0";
   if (!watching(w)) return "the contact method gives no impulses to book";
-  if (!b.model.can(DFM_CAP_ENERGY)) return "its model gives no energy, or not with these parameters";
-  if (b.model.stepper) return "its model steps itself";
+  if (!watched(b)) return "its model gives no energy, or not with these parameters";
+  if (steps_itself(b)) return unbooked(w, b) ? "its held points move, and its model steps itself" : "";
   return unbooked(w, b) ? "tr_bdf2 takes loads, held points or gravity that vary along the sub-step" : "";
 }
 
@@ -249,7 +271,7 @@ void change_gravity(World &w, Vec3 gravity) {
   for (auto &b : w.bodies) {
     if (!watched(*b)) continue;
     const Phyxels &p = b->p;
-    const double behind = damps(*b) ? 0 : 0.5 * w.watch.last_h;
+    const double behind = at_end(*b) ? 0 : 0.5 * w.watch.last_h;
     for (uint32_t i = 0; i < p.n; ++i)
       for (size_t k = 0, at = size_t(i) * kStride; k < 3; ++k, ++at)
         b->energy.work -= p.mass[i] * by[int(k)] * (p.x[at] - (p.moves(at) ? behind * p.v[at] : 0));
@@ -276,8 +298,11 @@ bool watch_energy(World &w, StepContext &step, uint32_t *trouble) {
     return true;
   }
   w.watch.credit -= std::min(w.watch.credit, kLookCosts);
-  double total = 0, gain = 0, most = 0;
-  const Body *worst = nullptr;
+  double total = 0, gain = 0;
+  struct {
+    const Body *body = nullptr;
+    double rise = 0, share = 0;
+  } worst;
   for (const uint32_t i : step.active) {
     Body &b = *w.bodies[i];
     Look now;
@@ -285,20 +310,21 @@ bool watch_energy(World &w, StepContext &step, uint32_t *trouble) {
     EnergyBook &e = b.energy;
     total += now.kinetic + now.elastic;
     if (unbooked(w, b)) continue;
-    const double rise = now.balance - e.base - now.rounding, level = now.balance + now.gives_back;
-    const bool settled = e.known == kSettles;
+    const bool settled = e.known == kSettles, hidden = hides(b);
+    const double rise = now.balance - e.base - now.rounding, share = w.def.energy_watch + allowed(b);
+    // before the first look `base` is what a hidden energy may be
+    const double level = now.balance + now.gives_back + (hidden && !e.known ? e.base : 0);
     if (settled && rise > 0) gain += rise;
-    if (settled && rise > most) {
-      most = rise;
-      worst = &b;
-    }
-    e.base = settled ? std::min(e.base, level) : e.known ? std::max(e.base, level) : level;
+    if (settled && rise > share * s.energy_max && rise > worst.rise) worst = {&b, rise, share};
+    // what a hidden energy takes it may give back
+    if (!settled) e.base = e.known ? std::max(e.base, level) : level;
+    else if (!hidden) e.base = std::min(e.base, level);
     e.known += !settled;
     e.kinetic = now.kinetic;
   }
   if (w.watch.age == ~0u) s.energy_start = total;
   w.watch.age = 0;
-  if (worst && most > w.def.energy_watch * std::max(s.energy_max, total - most)) {
+  if (worst.rise > worst.share * std::max(s.energy_max, total - worst.rise)) {
     s.energy_gain = std::max(s.energy_gain, gain);
     *trouble |= DFM_TROUBLE_ENERGY;
     w.watch.age = kEvery;  // the next step is asked again
@@ -306,8 +332,8 @@ bool watch_energy(World &w, StepContext &step, uint32_t *trouble) {
         format("step %llu, body '%s': its energy has grown by %.3g J beyond what loads, motions and contact "
                "have put in (limit: %g %% of %.3g J, the largest energy so far); take a shorter step, or "
                "give the material stiffness damping (energy_watch sets the limit, 0 switches the watch off)",
-               static_cast<unsigned long long>(w.step_count), worst->name.c_str(), most,
-               100 * w.def.energy_watch, s.energy_max)
+               static_cast<unsigned long long>(w.step_count), worst.body->name.c_str(), worst.rise,
+               100 * worst.share, s.energy_max)
             .c_str());
     return false;
   }
@@ -323,9 +349,9 @@ void book_energy(World &w, StepContext &step, double motion) {
   uint32_t ages = 1;
   for (const uint32_t i : step.active) {
     Body &b = *w.bodies[i];
-    if (damps(b)) {
+    if (at_end(b)) {
       book_end(w, step, b, motion);
-      ages = kAges;
+      if (!steps_itself(b)) ages = kAges;
       continue;
     }
     if (!step.driven.empty()) b.energy.work += work_of_holders(w, step, b, true);
@@ -338,7 +364,30 @@ void book_energy(World &w, StepContext &step, double motion) {
   w.watch.credit = std::min(w.watch.credit + ages, kMostCredit);
 }
 
-void forget_energy(Body &b) { b.energy = {}; }
+// Of a hidden elastic energy as much is left as was there: at most what the body had and was given, less what
+// its place in gravity and in lasting loads has taken.
+void forget_energy(Body &b) {
+  EnergyBook &e = b.energy;
+  double hidden = 0;
+  if (hides(b)) {
+    hidden = e.base;
+    if (e.known > 0) {
+      for (uint32_t i = 0; i < b.p.n; ++i)
+        for (size_t k = 0, at = size_t(i) * kStride; k < 3; ++k, ++at)
+          hidden +=
+              (b.p.mass[i] * b.world->gravity.now[int(k)] + (books_loads(b) ? 0 : b.p.load[at])) * b.p.x[at];
+      hidden = std::max(0.0, hidden + e.work);
+    }
+    hidden = std::min(hidden, kNoLimit);
+  }
+  e = {};
+  e.base = hidden;
+}
+
+void lose_energy(Body &b) {
+  b.energy = {};
+  if (hides(b)) b.energy.base = kNoLimit;
+}
 
 void forget_energy(World &w) {
   for (auto &b : w.bodies) forget_energy(*b);

@@ -23,6 +23,9 @@ bool watch_energy(World &w, StepContext &step, uint32_t *trouble);
 void book_energy(World &w, StepContext &step, double motion);
 // The host changes what only it can: the next look takes a new base.
 void forget_energy(Body &b);
+// The same where the host gives the body another shape: what energy it then has is not known where its model
+// gives none, and nothing is said about it any more.
+void lose_energy(Body &b);
 void forget_energy(World &w);
 
 }  // namespace dfm
