@@ -113,7 +113,7 @@ class Dynamics {
   // the answers to unit impulses one after another; symmetric but for rounding. False: the model cannot.
   virtual bool response(const SubStep &, uint32_t, const uint32_t *, double *) { return false; }
   // By the impulses at the surfels [nsurfel,3]; point_velocity() and response() then give what has changed.
-  virtual Revision revise(const SubStep &, const double *) { return Revision::none; }
+  virtual Revision revise(const SubStep &, const double *, bool /*last*/) { return Revision::none; }
   // [npoint,4] m/s without contact; null: free_motion() has written the surfels' own, surface.v.
   virtual const double *point_velocity() const { return nullptr; }
   virtual const double *contact_velocity() const;  // of the unknowns: [npoint,4], or [nsurfel,4]

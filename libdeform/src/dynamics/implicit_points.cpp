@@ -416,7 +416,7 @@ bool ImplicitPoints::linear_end(const double *surfel_impulse) {
   return ended_ = true;
 }
 
-Revision ImplicitPoints::revise(const SubStep &now, const double *surfel_impulse) {
+Revision ImplicitPoints::revise(const SubStep &now, const double *surfel_impulse, bool last) {
   if (!abilities().revises) return Revision::none;
   const double before = error_;
   before_.swap(p_.v_end);
@@ -428,7 +428,7 @@ Revision ImplicitPoints::revise(const SubStep &now, const double *surfel_impulse
   // without forces there is no correction, and with no revision before nothing to go half way back to
   if (!known && !(before > 0 && before < HUGE_VAL)) return Revision::diverged;
   const double allowed = allowed_error(p_.v_end, kShare);
-  if (error_ <= allowed || (revisions_ >= kRevisions && error_ <= kTolerated * allowed)) {
+  if (error_ <= allowed || ((last || revisions_ >= kRevisions) && error_ <= kTolerated * allowed)) {
     revisions_ = 0;
     error_ = 0;
     least_error_ = HUGE_VAL;

@@ -52,7 +52,7 @@ class ImplicitPoints : public Dynamics {
   bool free_motion(const SubStep &now, double &kinetic) override;
   const double *point_velocity() const override { return p_.v_free.data(); }
   bool response(const SubStep &now, uint32_t n, const uint32_t *surfel, double *answers) override;
-  Revision revise(const SubStep &now, const double *surfel_impulse) override;
+  Revision revise(const SubStep &now, const double *surfel_impulse, bool last) override;
   bool end_state(const SubStep &now, const double *surfel_impulse, bool touched) override;
   EndState end() const override { return {p_.v_end.data(), mean()}; }
   void bound_ends(double &speed, double &change) const override;

@@ -60,8 +60,8 @@ void SettlingPoints::gather() {
   }
 }
 
-Revision SettlingPoints::revise(const SubStep &now, const double *surfel_impulse) {
-  const Revision found = ImplicitPoints::revise(now, surfel_impulse);
+Revision SettlingPoints::revise(const SubStep &now, const double *surfel_impulse, bool last) {
+  const Revision found = ImplicitPoints::revise(now, surfel_impulse, last);
   if (found == Revision::velocity || found == Revision::response) gather();
   return found;
 }

@@ -32,7 +32,7 @@ class SettlingPoints : public ImplicitPoints {
   // with the last contact forces: where contact is looked for
   const double *point_velocity() const override { return guess_.data(); }
   const double *contact_velocity() const override { return surfels_.data(); }  // without
-  Revision revise(const SubStep &now, const double *surfel_impulse) override;
+  Revision revise(const SubStep &now, const double *surfel_impulse, bool last) override;
   bool end_state(const SubStep &now, const double *surfel_impulse, bool touched) override;
   double accurate_step(const SubStep &) const override { return std::numeric_limits<double>::infinity(); }
   void commit(const SubStep &now, double fraction) override;

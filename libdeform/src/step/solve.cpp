@@ -55,6 +55,10 @@ constexpr uint32_t kMostRevisions = 6;  // of what rigid hosts take for granted,
 // anyway where they do not rest. Further solves at most, once bodies are content, of what the cap on sweeps
 // has cut off.
 constexpr uint32_t kWarmRevisions = 4, kMostAgain = 6;
+// A solve that ends at its cap leaves impulses that drift, and bodies follow them: each finds something to
+// change after the other, and none of it is an error that falls. After so many such solves a body is as right
+// as it will be where it lies within what it tolerates.
+constexpr uint32_t kMostCapped = 20;
 // A sub-step in which a body does not come to a state with its contacts is taken anew, half as long, down to
 // this share of the planned one.
 constexpr double kLeastPiece = 1.0 / 256;
@@ -279,14 +283,14 @@ enum class Revised { nothing, something, diverged, failed };
 
 // Bodies whose forces are not linear in the velocity look at what the impulses have made of them. What they
 // answer then is put in the place of what they answered before; impulses stay.
-Revised revise_bodies(World &w, StepContext &step) {
+Revised revise_bodies(World &w, StepContext &step, bool last = false) {
   if (!step.bodies_revise) return Revised::nothing;
   dfm::distribute(step.contacts, step.rows.frame.data(), step.rows.impulse.data(), step.sinks);
   bool velocities = false, responses = false;
   for (const ContactRows::Block &block : step.rows.blocks) {
     if (block.group != kNone) continue;
     Body &b = *w.bodies[block.source];
-    const Revision found = b.dynamics->revise(sub_step_of(w, step), b.surfel_impulse.data());
+    const Revision found = b.dynamics->revise(sub_step_of(w, step), b.surfel_impulse.data(), last);
     if (found == Revision::failed) {
       set_last_error(format("step %llu, body '%s': model '%s' could not answer at the state that contact "
                             "leads to; take a smaller step or change the model",
@@ -335,7 +339,7 @@ const LawInstance *solve_revised(World &w, StepContext &step, Revised &revised) 
   Revised warm = Revised::something;
   for (uint32_t k = 0; k < kWarmRevisions && warm == Revised::something; ++k) warm = revise_bodies(w, step);
   if (warm == Revised::diverged || warm == Revised::failed) forget_revisions(w, step);
-  for (uint32_t hosts = 0, again = 0;;) {
+  for (uint32_t hosts = 0, again = 0, capped = 0;;) {
     bad = solve_rows(w, step);
     passes += std::exchange(step.passes, 0);
     sweeps += std::exchange(step.sweeps, 0);
@@ -346,7 +350,8 @@ const LawInstance *solve_revised(World &w, StepContext &step, Revised &revised) 
       ++hosts;
       continue;
     }
-    revised = revise_bodies(w, step);
+    capped += step.residual.due > 1;
+    revised = revise_bodies(w, step, capped >= kMostCapped);
     if (revised == Revised::nothing && step.bodies_revise && step.residual.due > 1 && again++ < kMostAgain)
       continue;
     if (revised != Revised::something) break;
