@@ -35,7 +35,10 @@ class Interface:
         self.types = dict(SCALARS)
         self.constants, self.structs, self.functions = [], [], []
         for name in HEADERS:
-            self.read(plain((include / "deform" / f"{name}.h").read_text()))
+            source = (include / "deform" / f"{name}.h").read_text()
+            for constant, value in re.findall(r"^#define (DFM_\w+) (\d+)u?\b", source, re.M):
+                self.constants.append((constant, int(value)))
+            self.read(plain(source))
 
     def read(self, source):
         # inline functions: the library has a symbol that ctypes calls instead

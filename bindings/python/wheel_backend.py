@@ -22,7 +22,7 @@ import tempfile
 import zipfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-LIBRARIES = re.compile(r"libdeform(_\w+)?\.so\.\d+|libdeform_python\.so|deform/plugins-\d+/.*")
+LIBRARIES = re.compile(r"libdeform(_\w+)?\.so\.\d+|libdeform_python(_law)?\.so|deform/plugins-\d+/.*")
 PACKAGE = ROOT / "bindings" / "python" / "deform"
 
 

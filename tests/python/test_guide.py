@@ -5,8 +5,6 @@ import re
 import tempfile
 import unittest
 
-import deform
-
 HOWTO = pathlib.Path(os.environ["DEFORM_SOURCE"]) / "libdeform" / "doc" / "howto"
 
 
@@ -33,8 +31,15 @@ class Guides(unittest.TestCase):
         self.assertLess(abs(names["path"][-1] - names["path"][20]).max(), 1e-5)
         self.assertEqual(int((names["touching"]["flags"] & 1).sum()), len(names["touching"]))
         self.assertEqual(len(names["run"].frames), 21)
+        self.assertIn("implicit_euler", str(names["table"]))
         for picture in ("ball.png", "end.png"):
             self.assertEqual(pathlib.Path(picture).read_bytes()[:4], b"\x89PNG")
+
+    def test_law_in_python_then_in_c(self):
+        names, _ = follow(HOWTO / "python-law.md")
+        self.assertLess(abs(names["ours"]["ft"] - names["compiled"]["ft"]).max(), 1e-12)
+        self.assertEqual(len(names["rules"]), 4)
+        self.assertEqual(pathlib.Path("bristle.png").read_bytes()[:4], b"\x89PNG")
 
 
 if __name__ == "__main__":

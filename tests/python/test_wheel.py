@@ -55,9 +55,6 @@ class Wheel(unittest.TestCase):
             for needed in ("deform/py.typed", "deform/native/lib/libdeform.so.0",
                            "deform/native/include/deform/plugin.h"):
                 self.assertIn(needed, files)
-            subprocess.run([*pip, "uninstall", "-y", "deform"], check=True, env=clean())
-            left = [p for p in (folder / "venv").rglob("deform*") if p.suffix != ".pyc"]
-            self.assertEqual([p for p in left if "site-packages" in str(p)], [])
 
 
 if __name__ == "__main__":

@@ -11,8 +11,12 @@ SI units throughout; arrays are NumPy's, float64.
 """
 from ._context import Context, Parameter, PluginType, default_context
 from ._library import (ArgumentError, BusyError, Discarded, Diverged, Error, FileError, FormatError,
-                       HandleError, OutOfMemory, StateError, UnsupportedError, quick as _quick)
+                       HandleError, OutOfMemory, StateError, UnsupportedError, include_dir, quick as _quick,
+                       template_dir)
 from .body import Body, Obstacle, Rigid
+from ._command import command, cost, explain
+from .rig import friction, plot_friction
+from .law import Law, PythonLaw
 from .mesh import TetMesh, TriMesh
 from .picture import Picture
 from .scene import Run, Scene, run
@@ -21,6 +25,8 @@ from .world import Material, Trouble, World
 __version__: str = _quick.dfm_version(None, None, None).decode()
 
 __all__ = ["ArgumentError", "Body", "BusyError", "Context", "Discarded", "Diverged", "Error",
-           "FileError", "FormatError", "HandleError", "Material", "Obstacle", "OutOfMemory", "Parameter",
-           "Picture", "PluginType", "Rigid", "Run", "Scene", "StateError", "TetMesh", "TriMesh",
-           "Trouble", "UnsupportedError", "World", "default_context", "run"]
+           "FileError", "FormatError", "HandleError", "Law", "Material", "Obstacle", "OutOfMemory",
+           "Parameter", "Picture", "PluginType", "PythonLaw", "Rigid", "Run", "Scene", "StateError",
+           "TetMesh", "TriMesh", "Trouble", "UnsupportedError", "World", "command", "cost",
+           "default_context", "explain", "friction", "include_dir", "plot_friction", "run",
+           "template_dir"]

@@ -4,6 +4,9 @@ from ctypes import (Structure as _Structure, c_bool as flag, c_char_p as text,
                     c_double as f64, c_float as f32, c_int as cint, c_int32 as i32, c_size_t as usize,
                     c_uint8 as u8, c_uint32 as u32, c_uint64 as u64, c_void_p as ptr)
 
+DFM_ABI = 1
+DFM_ABI_MIN = 1
+DFM_ABI_DRAFT = 0
 DFM_OK = 0
 DFM_DISCARD = 1
 DFM_E_ARG = -1
@@ -53,6 +56,9 @@ DFM_CAP_PLAUSIBLE = 32
 DFM_CAP_CONSTANT_STIFFNESS = 64
 DFM_CELL_TET = 8
 DFM_SOLVER_DIRECT = 1
+DFM_VERSION_MAJOR = 0
+DFM_VERSION_MINOR = 1
+DFM_VERSION_PATCH = 0
 DFM_LOG_DEBUG = 0
 DFM_LOG_INFO = 1
 DFM_LOG_WARNING = 2

@@ -115,6 +115,23 @@ def command_path() -> pathlib.Path:
                     "DFM_E_IO")
 
 
+def _shipped(inside: str, of_tree: str) -> pathlib.Path:
+    for path in (NATIVE / inside, ROOT.parents[2] / of_tree):
+        if path.is_dir():
+            return path
+    raise FileError(f"{NATIVE / inside} is not there", "DFM_E_IO")
+
+
+def include_dir() -> pathlib.Path:
+    """Where the C headers are: `cc -I` takes it, for plugins and programs in C."""
+    return _shipped("include", "libdeform/include")
+
+
+def template_dir(kind: str = "friction") -> pathlib.Path:
+    """A plugin in C to copy and edit: "friction" or "model"."""
+    return _shipped(f"share/deform/template_{kind}", f"plugins/template_{kind}")
+
+
 def error(status: int, sentence: str | None = None) -> Error:
     """The exception that belongs to a status, with the library's last sentence."""
     if sentence is None:

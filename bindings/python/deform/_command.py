@@ -1,0 +1,97 @@
+"""The `deform` command that the package carries: run it, and read what it says."""
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from typing import Any, Mapping, Sequence
+
+from ._library import ArgumentError, Diverged, Error, command_path
+
+
+def main() -> None:
+    """Becomes the command: `deform run SCENE`, `deform cost SCENE`, ... (the console script)."""
+    path = str(command_path())
+    os.execv(path, [path, *sys.argv[1:]])
+
+
+def command(*arguments: Any, environment: Mapping[str, str] | None = None) -> str:
+    """Runs `deform ARGUMENTS...` and returns what it prints; raises its sentence where it fails."""
+    done = subprocess.run([str(command_path()), *map(str, arguments)], capture_output=True, text=True,
+                          env={**os.environ, **(environment or {})})
+    if done.returncode == 0:
+        return done.stdout
+    said = done.stderr.strip() or f"deform {arguments[0]} ended with {done.returncode}"
+    raise {2: ArgumentError, 3: Diverged}.get(done.returncode, Error)(said.removeprefix("deform: "))
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.3g}"
+    return "" if value is None else str(value)
+
+
+class Table(list):
+    """Rows as dicts; prints as a table, and a notebook shows it as one."""
+
+    def __init__(self, rows: Sequence[dict[str, Any]], columns: Sequence[str]):
+        super().__init__(rows)
+        self.columns = list(columns)
+
+    def column(self, name: str) -> list[Any]:
+        """One column, a value for each row."""
+        return [row.get(name) for row in self]
+
+    def __str__(self) -> str:
+        cells = [self.columns] + [[_shown(row.get(c)) for c in self.columns] for row in self]
+        widths = [max(len(line[i]) for line in cells) for i in range(len(self.columns))]
+        return "\n".join("  ".join(c.ljust(w) for c, w in zip(line, widths)).rstrip() for line in cells)
+
+    def _repr_html_(self) -> str:
+        from html import escape
+        head = "".join(f"<th>{escape(c)}</th>" for c in self.columns)
+        cells = [[f"<td>{escape(_shown(row.get(c)))}</td>" for c in self.columns] for row in self]
+        rows = "".join(f"<tr>{''.join(line)}</tr>" for line in cells)
+        return f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
+
+
+class Cost(Table):
+    """What cost() found: a row for each choice (label, model, integrator, step s, cells, law, error,
+    cpu_s_per_s, state).
+
+    front: the choices of which none is both faster and closer; pick: the cheapest one within the target, or
+    None; report: all that cost.json holds."""
+
+    def __init__(self, report: dict[str, Any]):
+        columns = ["label", "model", "integrator", "step", "cells", "law", "error", "cpu_s_per_s", "state"]
+        super().__init__([{**row, "error": row["headline"]} for row in report["choices"]], columns)
+        self.report = report
+        self.front = [self[i] for i in report["front"]]
+        self.pick = None if report["pick"] is None else self[report["pick"]]
+
+
+def cost(scene: Any, *, budget: float = 120, target: float | None = None, axes: Sequence[str] | None = None,
+         quantities: Sequence[str] = (), out: Any = None, apply: Any = None) -> Cost:
+    """What accuracy costs on a scene: `deform cost SCENE` as a table. Takes minutes.
+
+    budget: s for all runs; target: relative error for which the cheapest choice is sought; axes: what varies
+    (model, time, mesh, volume, contact, law, self, guard; all); quantities: what is compared (all probes);
+    out: a folder that keeps the runs, so that a larger budget goes on; apply: a file for the scene with the
+    cheapest choice."""
+    with tempfile.TemporaryDirectory() as folder:
+        arguments = ["cost", scene, "--json", "--budget", budget, "--out", out or folder]
+        for option, value in (("--target", target), ("--axes", ",".join(axes) if axes else None),
+                              ("--apply", apply)):
+            if value is not None:
+                arguments += [option, value]
+        for quantity in quantities:
+            arguments += ["--quantity", quantity]
+        return Cost(json.loads(command(*arguments)))
+
+
+def explain(scene: Any) -> str:
+    """What `deform explain SCENE` prints: the stages of a step, those left out and why, what bounds the
+    step."""
+    return command("explain", scene)

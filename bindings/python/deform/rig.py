@@ -1,0 +1,102 @@
+"""A friction law on the rig of the command: rows as arrays, and plots of them."""
+from __future__ import annotations
+
+import csv
+import json
+import os
+import pathlib
+import tempfile
+from contextlib import nullcontext
+from typing import Any, Mapping
+
+import numpy as np
+
+from ._context import choice
+from ._library import ArgumentError
+from ._command import command
+from .law import Law, PythonLaw
+
+INPUTS: dict[str, dict[str, Any]] = {
+    "sine_velocity": {"V": 0.02, "freq": 1.0, "T": 2.0, "dt": 0.002},
+    "bias_sine_force": {"bias": 0.2, "amp": 3.0, "freq": 1.0, "T": 3.0, "dt": 0.005},
+    "spring_pull": {"k": 1000.0, "V": 0.01, "T": 3.0, "dt": 0.002},
+    "force_ramps": {"rates": [1, 10, 100]},
+    "displacement_path": {"path": [0, 2e-4, 5e-5, 2e-4, -2e-4, 2e-4]},
+    "circle_velocity": {"V": 0.01, "R": 0.01, "T": 6.0, "dt": 0.01},
+    "sine_velocity_sine_load": {"F0": 10.0, "a_open": 1.2, "freq": 1.0, "V": 0.01, "vfreq": 0.2, "T": 5.0,
+                                "dt": 0.005},
+}
+_PANELS = {"sine_velocity": [("t", "F"), ("v", "F")], "displacement_path": [("x", "F")],
+           "bias_sine_force": [("t", "x"), ("t", "F"), ("x", "F")],
+           "spring_pull": [("t", "x"), ("t", "v"), ("t", "F")], "force_ramps": [("rate", "F_ba")],
+           "circle_velocity": [("t", "Fx"), ("Fx", "Fy")],
+           "sine_velocity_sine_load": [("t", "F_elastic"), ("Fn", "F_elastic")]}
+_UNITS = {"t": "time (s)", "x": "displacement (m)", "v": "velocity (m/s)", "F": "friction force (N)",
+          "Fn": "normal force (N)", "F_elastic": "elastic force (N)", "rate": "force rate (N/s)",
+          "F_ba": "break-away force (N)", "Fx": "Fx (N)", "Fy": "Fy (N)"}
+
+
+def friction(law: Any, kind: str = "sine_velocity", *, normal: float = 1.0,
+             input: Mapping[str, Any] | None = None, case: Any = None, step: float | None = None,
+             **params: Any) -> dict[str, np.ndarray]:
+    """Drives one contact of 1 m2 by a law and returns its rows, an array for each column (t, x, v, F, z,
+    ...; SI).
+
+    law: a name, a plugin file, or a PythonLaw. kind: what drives it: "sine_velocity", "bias_sine_force",
+    "spring_pull", "force_ramps", "displacement_path", "circle_velocity", "sine_velocity_sine_load"; input:
+    its numbers, where others than the usual ones are wanted. normal: N. case: a whole case instead, as a
+    dict or the path of a JSON file. params: of the law, by key. step: s, the longest; not given: 1e-4, of a
+    Python law 1e-3, on a displacement path, which is slow, 1e-2."""
+    if isinstance(law, type) and issubclass(law, PythonLaw):
+        law = law()
+    if case is None:
+        choice("input", kind, INPUTS)
+        known = law.parameters if isinstance(law, PythonLaw) else Law(law).type.parameters
+        usual = {row.key: row.default for row in known if row.width == 1 and not row.names}
+        if "mu" in params:
+            usual = {key: value for key, value in usual.items() if key not in ("mu_C", "mu_S")}
+        case = {"mass": normal / 9.81, "gravity": 9.81, "params": {**usual, **params},
+                "input": {"kind": kind, **{**INPUTS[kind], **(input or {})}}}
+    elif params or input:
+        raise ArgumentError("a case holds its own input and params", "DFM_E_ARG")
+    elif not isinstance(case, Mapping):
+        case = json.loads(pathlib.Path(case).read_text())
+    if step is None:
+        slow = case.get("input", {}).get("kind") == "displacement_path"
+        step = 1e-2 if slow else 1e-3 if isinstance(law, PythonLaw) else 1e-4
+    served = law.served() if isinstance(law, PythonLaw) else nullcontext((law, {}))
+    with tempfile.TemporaryDirectory() as name, served as (file, environment):
+        folder = pathlib.Path(name)
+        (folder / "case.json").write_text(json.dumps(case))
+        command("friction", folder / "case.json", "--law", os.fspath(file), "--step", step, "--csv",
+                folder / "rows.csv", environment=environment)
+        with open(folder / "rows.csv", newline="") as rows:
+            table = list(csv.DictReader(rows))
+    return {column: np.array([float(row[column]) for row in table]) for column in (table[0] if table else [])}
+
+
+def plot_friction(law: Any, kind: str = "sine_velocity", *, path: Any = None, **options: Any) -> Any:
+    """What friction() gives, as a matplotlib Figure (matplotlib is needed); path: where to write it, too."""
+    try:
+        from matplotlib.figure import Figure
+    except ImportError as missing:
+        raise ImportError("plot_friction needs matplotlib: pip install matplotlib") from missing
+    rows = friction(law, kind, **options)
+    panels = [pair for pair in _PANELS.get(kind, []) if pair[0] in rows and pair[1] in rows]
+    if not panels:
+        names = list(rows)
+        panels = [(names[0], other) for other in names[1:4]]
+    figure = Figure(figsize=(4.2 * len(panels), 3.3), dpi=100)
+    for axis, (across, up) in zip(np.atleast_1d(figure.subplots(1, len(panels))), panels):
+        axis.plot(rows[across], rows[up], "o-" if kind == "force_ramps" else "-", linewidth=1.2, markersize=4)
+        if kind == "force_ramps":
+            axis.set_xscale("log")
+        axis.set_xlabel(_UNITS.get(across, across))
+        axis.set_ylabel(_UNITS.get(up, up))
+        axis.grid(True, alpha=0.25)
+    name = law if isinstance(law, str) else getattr(law, "id", None) or str(law)
+    figure.suptitle(f"{name}, {kind}", fontsize=10)
+    figure.tight_layout()
+    if path is not None:
+        figure.savefig(path)
+    return figure

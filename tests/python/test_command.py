@@ -1,0 +1,44 @@
+"""The command from Python: its sentences as exceptions, its tables as rows."""
+import json
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import deform
+
+SCENES = pathlib.Path(os.environ["DEFORM_SOURCE"]) / "examples" / "scenes"
+
+
+class Command(unittest.TestCase):
+    def test_cost_gives_a_table(self):
+        with tempfile.TemporaryDirectory(suffix=" with space") as folder:
+            table = deform.cost(SCENES / "slope_block.json", budget=2, axes=["time"], out=folder)
+            self.assertEqual(json.loads((pathlib.Path(folder) / "cost.json").read_text()), table.report)
+        self.assertIn("integrator", table.columns)
+        self.assertEqual(len(table.column("error")), len(table))
+        self.assertTrue(all(row["state"] == "done" for row in table.front))
+        self.assertEqual(len(str(table).splitlines()), 1 + len(table))
+        self.assertEqual(table._repr_html_().count("<tr>"), 1 + len(table))
+
+    def test_sentences_are_exceptions(self):
+        with self.assertRaisesRegex(deform.ArgumentError, "^none.json: cannot be opened"):
+            deform.cost("none.json")
+        with self.assertRaisesRegex(deform.ArgumentError, "--axes|axis"):
+            deform.cost(SCENES / "slope_block.json", axes=["tyme"], budget=1)
+        with self.assertRaisesRegex(deform.Error, "rnu"):
+            deform.command("rnu")
+
+    def test_explain(self):
+        self.assertIn("stable", deform.explain(SCENES / "slope_block.json"))
+
+    def test_console_script_becomes_the_command(self):
+        done = subprocess.run([sys.executable, "-B", "-c", "from deform._command import main; main()",
+                               "plugin", "list"], capture_output=True, text=True, check=True)
+        self.assertIn("org.deform.lugre", done.stdout)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,176 @@
+"""Friction laws from Python: those that are loaded, and laws as Python classes, by themselves, in a world,
+on the rig and before the validator."""
+import gc
+import unittest
+
+import numpy as np
+
+import deform
+
+
+class Tanh(deform.PythonLaw):
+    id = "com.example.tanh"
+    source = "regularized Coulomb"
+    parameters = [deform.Parameter("mu", "friction coefficient", "1", 0, 10, 0.5),
+                  deform.Parameter("v_s", "speed of transition", "m/s", 1e-6, 1, 1e-3)]
+
+    def evaluate(self, x, out):
+        speed = np.sqrt(x.vt[0] ** 2 + x.vt[1] ** 2)
+        out.limit[:] = x.mu * x.fn
+        out.ft[:] = -out.limit * np.tanh(speed / x.v_s) * x.vt / np.where(speed == 0, 1, speed)
+
+
+def on_cone(z, k, cone):
+    held = k * np.sqrt(z[0] ** 2 + z[1] ** 2)
+    return np.where(held <= cone, 1.0, cone / held)
+
+
+class Bristle(deform.PythonLaw):
+    """plugins/template_friction in Python."""
+
+    id = "com.example.bristle"
+    source = "Simo and Hughes 1998, box 1.4"
+    parameters = [deform.Parameter("mu", "friction coefficient", "1", 0, 10, 0.5, runtime=True),
+                  deform.Parameter("sigma0", "bristle stiffness per area", "N/m^3", 1e3, 1e12, 1e8)]
+    effects = ["stiction", "presliding", "hysteresis"]
+    state = ["tangent"]
+    needs = ["fn", "vt", "area"]
+
+    def evaluate(self, x, out):
+        k, cone = x.sigma0 * x.area, np.where(x.fn < 0, 0.0, x.mu * x.fn)
+        t = on_cone(x.state, k, cone) * x.state + x.dt * x.vt
+        share = on_cone(t, k, cone)
+        out.state[:] = share * t
+        out.ft[:] = -k * out.state
+        out.limit[:] = cone
+        out.mode[:] = np.where(x.fn > 0, np.where(share < 1, 2, 1), 0)
+        out.stored[:] = 0.5 * k * (out.state ** 2).sum(axis=0)
+
+    def refuse(self, params):
+        return "mu of 7 is not liked" if params["mu"] == 7 else None
+
+
+class Pushes(Bristle):
+    id = "com.example.pushes"
+    effects = []
+
+    def evaluate(self, x, out):
+        super().evaluate(x, out)
+        out.ft *= -1
+
+
+class Raises(Tanh):
+    id = "com.example.raises"
+
+    def evaluate(self, x, out):
+        raise RuntimeError("out of ideas")
+
+
+class Shapes(Tanh):
+    id = "com.example.shapes"
+
+    def evaluate(self, x, out):
+        out.ft = np.zeros(3)
+
+
+def slide(law, time=0.2, **params):
+    """Velocity of a block on a slope of tan 0.4 after some time, m/s."""
+    with deform.World(integrator="implicit_euler") as world:
+        world.add_obstacle("plane", name="slope", normal=(-0.4, 0, 1))
+        block = world.add_body(deform.TetMesh.beam([0.2, 0.2, 0.1], cells=200), position=(0, 0, 0.06),
+                               rotation=(0, -0.189, 0, 0.982), name="block", material={"young": 1e6})
+        world.add_friction("block", "slope", law=law, **params)
+        world.run(time, dt=1 / 120)
+        return float(np.linalg.norm(block.measure.velocity))
+
+
+class Loaded(unittest.TestCase):
+    def test_law_on_its_own(self):
+        law = deform.Law("coulomb")
+        out = law(fn=[10, 10, 0], vt=[[0.1, 0, 0.1], [0, -0.2, 0]], dt=1e-3, mu=0.3)
+        np.testing.assert_allclose(out["ft"], [[-3, 0, 0], [0, 3, 0]], atol=1e-12)
+        np.testing.assert_allclose(out["limit"][:2], 3)
+        self.assertEqual([p.key for p in law.type.parameters][:2], ["mu_C", "mu_S"])
+        with self.assertRaisesRegex(deform.ArgumentError, "did you mean"):
+            law(fn=[1], vt=[[0], [0]], dt=1e-3, mue=1)
+
+    def test_state_goes_round(self):
+        law, state = deform.Law("lugre"), None
+        for _ in range(200):
+            out = law(fn=[10.0], vt=[[0.01], [0]], dt=1e-3, state=state, mu=0.5)
+            state = out["state"]
+        self.assertAlmostEqual(out["ft"][0, 0], -5, delta=0.05)
+
+
+class InPython(unittest.TestCase):
+    def test_batch_by_batch(self):
+        rng = np.random.default_rng(1)
+        vt, state = rng.normal(size=(2, 50)) * 1e-4, np.zeros((2, 50))
+        for _ in range(5):
+            out = deform.Law(Bristle)(fn=np.linspace(0, 10, 50), vt=vt, dt=1e-3, state=state, sigma0=1e7)
+            np.testing.assert_allclose(np.linalg.norm(out["ft"], axis=0)[out["mode"] == 2],
+                                       out["limit"][out["mode"] == 2])
+            state = out["state"]
+        self.assertEqual(set(out["mode"]), {0, 1, 2})
+
+    def test_block_slides_and_holds_as_with_coulomb(self):
+        coulomb = slide("coulomb", mu=0.3)
+        for law in (Tanh, Bristle):
+            self.assertAlmostEqual(slide(law, mu=0.3), coulomb, delta=0.01 * coulomb)
+        gc.collect()
+        self.assertLess(slide(Bristle(), mu=0.6, time=0.5), 1e-4)
+
+    def test_parameter_changes_while_it_runs(self):
+        with deform.World() as world:
+            world.add_friction(law=Bristle, mu=0.5)
+            world.set_friction("*", "*", mu=0.4)
+            with self.assertRaisesRegex(deform.ArgumentError, "mu of 7 is not liked"):
+                world.set_friction("*", "*", mu=7)
+            with self.assertRaisesRegex(deform.ArgumentError, "sigma"):
+                world.add_friction(law=Bristle, sigma=1)
+
+    def test_what_a_law_raises_is_the_cause(self):
+        for law, sentence in ((Raises, "out of ideas"), (Shapes, r"shape \(3,\); expected \(2, ")):
+            with self.subTest(law.id), self.assertRaises(deform.Diverged) as caught:
+                slide(law)
+            self.assertRegex(str(caught.exception.__cause__), sentence)
+        with self.assertRaises(deform.Error) as caught:
+            deform.Law(Raises)(fn=[1], vt=[[0], [0]], dt=1e-3)
+        self.assertIsInstance(caught.exception.__cause__, RuntimeError)
+
+    def test_descriptions_that_cannot_be(self):
+        for wrong in ({"id": "bristle"}, {"id": "com.example.a", "state": ["vector"]},
+                      {"id": "com.example.b", "needs": ["speed"]},
+                      {"id": "com.example.c", "parameters": [deform.Parameter("mu", "", "1", 1, 0, 2)]}):
+            with self.subTest(wrong), self.assertRaises(deform.Error):
+                deform.Law(type("Wrong", (Bristle,), wrong))
+
+    def test_on_the_rig(self):
+        rows = deform.friction(Bristle, "sine_velocity", normal=10, mu=0.3, sigma0=1e6)
+        self.assertAlmostEqual(rows["F"].max(), 3, delta=1e-9)
+        figure = deform.plot_friction("lugre", "displacement_path", normal=10)
+        self.assertEqual(len(figure.axes), 1)
+        with self.assertRaisesRegex(deform.ArgumentError, "did you mean 'spring_pull'"):
+            deform.friction("lugre", "spring_pul")
+
+
+class Validator(unittest.TestCase):
+    def test_rules_that_pass(self):
+        rules = Bristle().check(only=["V03", "V04", "V05", "V07", "V08", "F01", "F02", "F10", "F16"])
+        self.assertEqual({row["id"]: row["result"] for row in rules},
+                         {"V03": "pass", "V04": "pass", "V05": "skip", "V07": "pass", "V08": "pass",
+                          "F01": "pass", "F02": "pass", "F10": "pass", "F16": "pass"}, str(rules))
+
+    def test_rules_that_are_broken(self):
+        rules = Pushes().check(only=["F01", "F03"])
+        self.assertEqual([row["result"] for row in rules], ["pass", "fail"], str(rules))
+        promised = type("Promised", (Tanh,), {"effects": ["stiction"]})
+        row, = promised().check(only=["F06"])
+        self.assertEqual(row["result"], "fail")
+        self.assertIn("stiction", row["title"])
+        with self.assertRaisesRegex(RuntimeError, "out of ideas"):
+            Raises().check(only=["F01"])
+
+
+if __name__ == "__main__":
+    unittest.main()

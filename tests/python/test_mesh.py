@@ -1,0 +1,67 @@
+"""Meshes: made, read, filled, written, from arrays, through meshio."""
+import pathlib
+import tempfile
+import unittest
+
+import meshio
+import numpy as np
+
+import deform
+
+
+class Meshes(unittest.TestCase):
+    def test_generators_and_files(self):
+        for mesh, volume in ((deform.TetMesh.ball(0.1, 2000), 4 / 3 * np.pi * 1e-3),
+                             (deform.TetMesh.cylinder(0.1, 0.5, 2000), 0.005 * np.pi),
+                             (deform.TetMesh.tube(0.05, 0.1, 0.5, 4000), 0.00375 * np.pi),
+                             (deform.TetMesh.beam([1, 0.1, 0.1], 500), 0.01)):
+            self.assertAlmostEqual(mesh.volume / volume, 1, delta=0.06)
+            with tempfile.TemporaryDirectory(suffix=" with space") as folder:
+                for ending in ("msh", "vtk", "vtu", "mesh"):
+                    path = pathlib.Path(folder) / f"mesh.{ending}"
+                    mesh.write(path)
+                    again = deform.TetMesh.read(path)
+                    np.testing.assert_array_equal(again.tets, mesh.tets)
+
+    def test_from_arrays_repairs(self):
+        points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [9, 9, 9]]
+        mesh = deform.TetMesh.from_arrays(points, [[0, 2, 1, 3]])
+        self.assertAlmostEqual(mesh.volume, 1 / 6)
+        self.assertEqual((mesh.info.turned, mesh.info.dropped_points), (1, 1))
+        self.assertEqual(len(mesh.warnings), 2)
+        with self.assertRaisesRegex(deform.ArgumentError, "name point 7"):
+            deform.TetMesh.from_arrays(points, [[0, 1, 2, 7]])
+
+    def test_surface_filled_and_hung(self):
+        surface = deform.TriMesh.make("torus", [0.2, 0.06], triangles=1500)
+        mesh = deform.TetMesh.fill(surface, cells=800)
+        self.assertIsNotNone(mesh.share)
+        with deform.World(gravity=(0, 0, 0)) as world:
+            body = world.add_body(mesh, surface=surface, coupling="mls")
+            self.assertEqual(body.nsurfel, surface.info.npoint)
+            np.testing.assert_allclose(body.positions, surface.points, atol=1e-9)
+            self.assertAlmostEqual(body.measure.mass / (1000 * surface.volume), 1, delta=0.02)
+
+    def test_through_meshio(self):
+        mesh = deform.TetMesh.ball(0.1, 300)
+        there = mesh.to_meshio()
+        self.assertIsInstance(there, meshio.Mesh)
+        back = deform.TetMesh.from_meshio(there)
+        np.testing.assert_array_equal(back.tets, mesh.tets)
+        np.testing.assert_array_equal(back.points, mesh.points)
+        surface = deform.TriMesh.make("ball", [0.1], 200)
+        again = deform.TriMesh.from_meshio(surface.to_meshio())
+        np.testing.assert_array_equal(again.triangles, surface.triangles)
+        with self.assertRaisesRegex(deform.ArgumentError, "no cells of kind 'tetra'; it has triangle"):
+            deform.TetMesh.from_meshio(surface.to_meshio())
+        with tempfile.TemporaryDirectory() as folder:
+            file = str(pathlib.Path(folder) / "ball.inp")  # which meshio reads, and the library does not
+            meshio.write(file, there)
+            self.assertAlmostEqual(deform.TetMesh.from_meshio(file).volume, mesh.volume)
+        with deform.World() as world:
+            state = world.add_body(mesh, velocity=(1, 0, 0)).to_meshio()
+            np.testing.assert_array_equal(state.point_data["velocity"][:, 0], 1)
+
+
+if __name__ == "__main__":
+    unittest.main()

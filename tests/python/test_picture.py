@@ -1,0 +1,123 @@
+"""Pictures and the view of a run: what is drawn is where it should be, and nothing comes from outside."""
+import base64
+import html
+import html.parser
+import json
+import os
+import pathlib
+import re
+import struct
+import tempfile
+import unittest
+import zlib
+
+import numpy as np
+
+import deform
+from deform import webgl
+
+SCENES = pathlib.Path(os.environ["DEFORM_SOURCE"]) / "examples" / "scenes"
+DROP = {"format": "deform-scene", "version": 1, "time": {"duration": 0.06, "step": 0.002},
+        "bodies": [{"name": "ball", "mesh": {"make": "ball", "radius": 0.1, "cells": 300},
+                    "pose": {"position": [0, 0, 0.12]}}],
+        "obstacles": [{"name": "floor", "shape": "plane"},
+                      {"name": "box", "shape": "box", "half_size": [0.05, 0.1, 0.02],
+                       "pose": {"position": [0.3, 0, 0.02]}},
+                      {"name": "ball2", "shape": "sphere", "radius": 0.05, "pose": {"position": [-0.3, 0, 0]},
+                       "motion": {"keyframes": [{"t": 0, "position": [-0.3, 0, 0.1]},
+                                           {"t": 1, "position": [-0.3, 0.5, 0.1]}]}}],
+        "output": {"color": "speed"}}
+
+
+def dropped(every=0.02):
+    with tempfile.TemporaryDirectory() as folder:
+        path = pathlib.Path(folder) / "drop.json"
+        path.write_text(json.dumps(DROP))
+        return deform.run(path, every=every)
+
+
+def decoded(png):
+    """[height,width,3] of a PNG as png_bytes writes it."""
+    at, data, size = 8, b"", None
+    while at < len(png):
+        length, kind = struct.unpack(">I4s", png[at:at + 8])
+        body = png[at + 8:at + 8 + length]
+        assert struct.unpack(">I", png[at + 8 + length:at + 12 + length])[0] == zlib.crc32(kind + body)
+        if kind == b"IHDR":
+            size = struct.unpack(">II", body[:8])
+        data += body if kind == b"IDAT" else b""
+        at += 12 + length
+    rows = np.frombuffer(zlib.decompress(data), np.uint8).reshape(size[1], 1 + 3 * size[0])
+    return rows[:, 1:].reshape(size[1], size[0], 3)
+
+
+class Pictures(unittest.TestCase):
+    def test_body_is_drawn_where_it_is(self):
+        with deform.World() as world:
+            world.add_obstacle("plane")
+            world.add_body(deform.TetMesh.ball(0.1, 300), position=(0, 0, 0.3))
+            camera = {"eye": (0, -2, 0.3), "look_at": (0, 0, 0.3), "size": (160, 120)}
+            picture = world.picture(label=False, **camera)
+            red, blue = picture.rgb[60, 80].astype(int)[[0, 2]]
+            self.assertGreater(red, blue + 40)  # the first body's color, in the middle
+            self.assertLess(np.ptp(picture.rgb[5, 5].astype(int)), 30)
+            np.testing.assert_array_equal(decoded(picture._repr_png_()), picture.rgb)
+            away = world.picture(eye=(0, -2, 0.3), look_at=(3, 0, 0.3), size=(160, 120), label=False)
+            self.assertLess(abs(int(away.rgb[60, 80, 2]) - int(away.rgb[60, 80, 0])), 40)
+            self.assertEqual(world._repr_png_()[:4], b"\x89PNG")
+            for wrong in ({"color": "colour"}, {"eye": (0, 0, 1)}, {"size": (0, 10)}):
+                with self.assertRaises(deform.ArgumentError):
+                    world.picture(**wrong)
+        self.assertIsNone(world._repr_png_())
+
+    def test_frames_of_a_run(self):
+        run = dropped()
+        first, last = run.picture(0, size=(160, 120)), run.picture(-1, size=(160, 120))
+        self.assertFalse(np.array_equal(first.rgb, last.rgb))
+        with tempfile.TemporaryDirectory(suffix=" with space") as folder:
+            path = last.save(pathlib.Path(folder) / "last.png")
+            np.testing.assert_array_equal(decoded(path.read_bytes()), last.rgb)
+
+
+class View(unittest.TestCase):
+    def test_positions_travel(self):
+        run = dropped()
+        data = webgl.data_of(run)
+        self.assertEqual(data["times"], [0, 0.02, 0.04, 0.06])
+        ball, floor, box, sphere = data["surfaces"]
+        points = np.frombuffer(base64.b64decode(ball["points"]), "<u2").reshape(4, ball["n"], 3)
+        world = np.array(data["low"]) + data["span"] * points / 65535
+        np.testing.assert_allclose(world, run.positions("ball"), atol=data["span"] / 65535)
+        values = np.frombuffer(base64.b64decode(ball["values"]), np.uint8).reshape(4, ball["n"])
+        self.assertEqual(values.max(), 255)
+        self.assertEqual((floor["frames"], box["frames"], sphere["frames"]), (1, 1, 4))
+        for surface in data["surfaces"]:
+            triangles = np.frombuffer(base64.b64decode(surface["triangles"]), "<u4")
+            self.assertLess(triangles.max(), surface["n"])
+
+    def test_solids_are_closed_and_face_outward(self):
+        run = dropped()
+        volumes = []
+        for solid in run.frames[0].obstacles[1:]:
+            points, triangles = webgl.mesh_of(solid, 1)
+            a, b, c = (points[triangles[:, k]] for k in range(3))
+            volumes.append(float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6))
+        np.testing.assert_allclose(volumes, [8 * 0.05 * 0.1 * 0.02, 4 / 3 * np.pi * 0.05**3], rtol=0.05)
+
+    def test_document_stands_alone(self):
+        run = deform.run(SCENES / "slope_block.json", duration=0.01)
+        document = webgl.document(run)
+        self.assertNotRegex(document, r"https?:|src=|@import|<link|import\(|fetch\(|XMLHttpRequest|WebSocket")
+        frame = run._repr_html_()
+        self.assertEqual(html.unescape(re.search(r'srcdoc="([^"]*)"', frame).group(1)), document)
+        seen = []
+        parser = html.parser.HTMLParser()
+        parser.handle_starttag = lambda tag, attributes: seen.append((tag, dict(attributes).get("id")))
+        parser.feed(document)
+        for part in (("canvas", "view"), ("button", "play"), ("input", "at"), ("span", "time")):
+            self.assertIn(part, seen)
+        self.assertEqual(document.count("</script>"), 1)
+
+
+if __name__ == "__main__":
+    unittest.main()
