@@ -1,7 +1,10 @@
 #include "broad/broad_phase.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <new>
+#include <utility>
 
 #include "geometry/closest.h"
 #include "geometry/obstacle_shape.h"
@@ -46,6 +49,26 @@ struct Features {  // corners of a surface as listed
   Vec3 edge(uint32_t e, int k) const { return point(surface.edge[2 * size_t{e} + k]); }
 };
 
+constexpr size_t kLook = 2000;  // surfels that are worth a block of their own
+
+// f(i) for all i < n on the threads of tasks. An exception must not leave a worker.
+template <class F>
+void each(size_t n, size_t grain, Tasks *tasks, F &&f) {
+  if (!tasks || !tasks->parallel() || n <= grain) {
+    for (size_t i = 0; i < n; ++i) f(i);
+    return;
+  }
+  std::atomic<bool> failed{false};
+  tasks->parallel_for(uint32_t(n), uint32_t(grain), [&](uint32_t begin, uint32_t end) {
+    try {
+      for (uint32_t i = begin; i < end; ++i) f(i);
+    } catch (const std::bad_alloc &) {
+      failed = true;
+    }
+  });
+  if (failed) throw std::bad_alloc();
+}
+
 bool finite_positions(const Surface &s) {
   double sum = 0;
   for (const double x : s.x) sum += x - x;
@@ -63,11 +86,19 @@ BroadPhase::BroadPhase(const Memory &memory)
       candidates_(HookAllocator<Candidate>(memory_)),
       next_(HookAllocator<Candidate>(memory_)),
       fresh_(HookAllocator<uint64_t>(memory_)),
-      vf_(HookAllocator<uint64_t>(memory_)),
-      fv_(HookAllocator<uint64_t>(memory_)),
-      ee_(HookAllocator<uint64_t>(memory_)),
       order_(HookAllocator<uint32_t>(memory_)),
-      stack_(HookAllocator<PairOfTriangles>(memory_)) {}
+      pairs_(HookAllocator<Pair>(memory_)),
+      stack_(HookAllocator<PairOfTriangles>(memory_)) {
+  found_.emplace_back(memory_);
+}
+
+BroadPhase::Found::Found(const Memory &m) { use_memory(m, vf, fv, ee, stack); }
+
+void BroadPhase::Found::clear() {
+  vf.clear();
+  fv.clear();
+  ee.clear();
+}
 
 void BroadPhase::clear() {
   bodies_.clear();
@@ -77,16 +108,17 @@ void BroadPhase::clear() {
 }
 
 bool BroadPhase::update(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
-                        const PairFilter &filter, double h, double offset) {
+                        const PairFilter &filter, double h, double offset, Tasks *tasks) {
   ++stats_.updates;
   match(bodies, obstacles, filter);
-  if (!find_dirty(bodies, obstacles, h, offset)) return false;
-  renew(bodies, obstacles, filter, h, offset);
+  if (!find_dirty(bodies, obstacles, h, offset, tasks)) return false;
+  renew(bodies, obstacles, filter, h, offset, tasks);
   return true;
 }
 
 bool BroadPhase::cover(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
-                       const PairFilter &filter, double h, double offset, std::span<const double> speed) {
+                       const PairFilter &filter, double h, double offset, std::span<const double> speed,
+                       Tasks *tasks) {
   bool any = false;
   for (size_t i = 0; i < bodies_.size(); ++i) {
     Body &b = bodies_[i];
@@ -96,15 +128,16 @@ bool BroadPhase::cover(std::span<const BodyView> bodies, std::span<const Obstacl
   }
   for (size_t o = 0; o < things_.size(); ++o)
     if (!holds(things_[o], obstacles[o], h, offset, 1)) things_[o].dirty = any = true;
-  if (any) renew(bodies, obstacles, filter, h, offset);
+  if (any) renew(bodies, obstacles, filter, h, offset, tasks);
   return any;
 }
 
 void BroadPhase::renew(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
-                       const PairFilter &filter, double h, double offset) {
+                       const PairFilter &filter, double h, double offset, Tasks *tasks) {
   ++stats_.renewals;
-  for (Body &b : bodies_)
-    if (b.dirty) renew_body(b, h, offset);
+  each(bodies_.size(), 1, tasks, [&](size_t i) {
+    if (bodies_[i].dirty) renew_body(bodies_[i], h, offset);
+  });
   bound_bodies();
   for (size_t o = 0; o < things_.size(); ++o) {
     Thing &t = things_[o];
@@ -112,10 +145,20 @@ void BroadPhase::renew(std::span<const BodyView> bodies, std::span<const Obstacl
     if (!t.dirty && t.view.shape == Shape::plane) t.dirty = !holds(t, obstacles[o], h, offset);
     if (t.dirty) renew_thing(t, obstacles[o], h, offset);
   }
-  find_pairs(bodies, obstacles, filter);
+  find_pairs(bodies, obstacles, filter, tasks);
   assemble();
-  for (Body &b : bodies_) b.dirty = !b.usable;
-  for (Thing &t : things_) t.dirty = false;
+  const auto count = [this](Side &side) {
+    stats_.refits += std::exchange(side.refits, 0);
+    stats_.rebuilds += std::exchange(side.rebuilds, 0);
+  };
+  for (Body &b : bodies_) {
+    b.dirty = !b.usable;
+    count(b);
+  }
+  for (Thing &t : things_) {
+    t.dirty = false;
+    count(t);
+  }
 }
 
 // Brings bodies_ and things_ in line with the views; what is new, gone or changed in kind loses its lists.
@@ -154,21 +197,24 @@ void BroadPhase::match(std::span<const BodyView> bodies, std::span<const Obstacl
   }
 }
 
+void BroadPhase::look(Body &b, bool asleep, double h, double offset) {
+  const bool stays = b.asleep && asleep;
+  b.asleep = asleep;
+  b.expected = 0;
+  if (b.dirty || stays) return;
+  b.moved = largest_norm(b.surface->nsurfel, b.surface->x.data(), b.x.data());
+  b.speed = largest_speed(*b.surface);
+  b.dirty = !(kRounding * (b.moved + reach_share(h, offset, b.speed)) <= b.margin);
+}
+
 bool BroadPhase::find_dirty(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
-                            double h, double offset) {
+                            double h, double offset, Tasks *tasks) {
   bool any = false;
-  for (size_t i = 0; i < bodies_.size(); ++i) {
-    Body &b = bodies_[i];
-    const bool stays = b.asleep && bodies[i].asleep;
-    b.asleep = bodies[i].asleep;
-    b.expected = 0;
-    if (!b.dirty && !stays) {
-      b.moved = largest_norm(b.surface->nsurfel, b.surface->x.data(), b.x.data());
-      b.speed = largest_speed(*b.surface);
-      b.dirty = !(kRounding * (b.moved + reach_share(h, offset, b.speed)) <= b.margin);
-    }
-    any |= b.dirty;
-  }
+  size_t surfels = 1;
+  for (const BodyView &b : bodies) surfels += b.surface->nsurfel;
+  each(bodies.size(), 1 + kLook * bodies.size() / surfels, tasks,
+       [&](size_t i) { look(bodies_[i], bodies[i].asleep, h, offset); });
+  for (const Body &b : bodies_) any |= b.dirty;
   for (size_t o = 0; o < things_.size(); ++o) {
     things_[o].dirty = things_[o].dirty || !holds(things_[o], obstacles[o], h, offset);
     any |= things_[o].dirty;
@@ -200,8 +246,8 @@ bool BroadPhase::renew_tree(Side &side) {
   side.usable = s.ntri > 0 && finite_positions(s);
   if (!side.usable) return false;
   std::copy(s.x.begin(), s.x.end(), side.x.begin());
-  stats_.refits += !side.tree.empty();
-  stats_.rebuilds += side.tree.renew(s.tri, side.x.data());
+  side.refits += !side.tree.empty();
+  side.rebuilds += side.tree.renew(s.tri, side.x.data());
   return true;
 }
 
@@ -247,8 +293,9 @@ void BroadPhase::bound_bodies() {
 // Pairs of which neither side has changed keep their runs; the others are listed again. Bodies are
 // swept along x.
 void BroadPhase::find_pairs(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
-                            const PairFilter &filter) {
+                            const PairFilter &filter, Tasks *tasks) {
   fresh_.clear();
+  pairs_.clear();
   next_segments_.clear();
   for (const Segment &s : segments_)
     if (!bodies_[s.a].dirty && !(s.obstacle ? things_[s.b].dirty : bodies_[s.b].dirty))
@@ -267,16 +314,47 @@ void BroadPhase::find_pairs(std::span<const BodyView> bodies, std::span<const Ob
     for (size_t q = p + 1; q < order_.size() && low(order_[q]) <= high; ++q)
       if ((a.dirty || bodies_[order_[q]].dirty) && filter.may_touch(bodies[order_[p]], bodies[order_[q]])) {
         const bool ordered = a.id < bodies_[order_[q]].id;
-        list_bodies(order_[ordered ? p : q], order_[ordered ? q : p]);
+        pairs_.push_back({order_[ordered ? p : q], order_[ordered ? q : p], false});
       }
     for (uint32_t o = 0; o < things_.size(); ++o)
       if ((a.dirty || things_[o].dirty) && filter.may_touch(bodies[order_[p]], obstacles[o]))
-        list_thing(order_[p], o);
+        pairs_.push_back({order_[p], o, true});
   }
+  list_pairs(tasks);
 }
 
-// Into vf_, ee_ and fv_; false where the two are too far apart for any.
-bool BroadPhase::list_surfaces(const Side &a, const Side &b) {
+void BroadPhase::list_pairs(Tasks *tasks) {
+  const size_t n = pairs_.size();
+  if (n < 2 || !tasks || !tasks->parallel()) {
+    for (const Pair &pair : pairs_) {
+      list(pair, found_[0]);
+      add_segments(pair, found_[0]);
+    }
+    return;
+  }
+  while (found_.size() < n) found_.emplace_back(memory_);
+  each(n, 1, tasks, [&](size_t i) { list(pairs_[i], found_[i]); });
+  for (size_t i = 0; i < n; ++i) add_segments(pairs_[i], found_[i]);
+}
+
+void BroadPhase::list(const Pair &pair, Found &found) const {
+  found.clear();
+  const Body &a = bodies_[pair.a];
+  if (!pair.obstacle) {
+    found.near = list_surfaces(a, bodies_[pair.b], found);
+  } else {
+    const Thing &thing = things_[pair.b];
+    switch (thing.view.shape) {
+      case Shape::mesh: found.near = thing.usable && list_surfaces(a, thing, found); break;
+      case Shape::voxels: found.near = list_voxels(a, thing, found); break;
+      default: found.near = list_obstacle(a, thing, found);
+    }
+  }
+  for (Array<uint64_t> *list : {&found.vf, &found.fv, &found.ee}) std::sort(list->begin(), list->end());
+}
+
+// False where the two are too far apart for any.
+bool BroadPhase::list_surfaces(const Side &a, const Side &b, Found &found) const {
   const Features fa{*a.surface, a.x.data()}, fb{*b.surface, b.x.data()};
   const double near = kRounding * (a.margin + b.margin);
   const double edges = near + edge_recovery_depth(*a.surface, *b.surface);
@@ -285,91 +363,61 @@ bool BroadPhase::list_surfaces(const Side &a, const Side &b) {
   const double deep_b = near + recovery_depth(*b.surface);
   const double wide = std::max(deep_a, deep_b);
   if (!(box_distance2(a.tree.root(), b.tree.root()) <= wide * wide)) return false;
-  vf_.clear();
-  fv_.clear();
-  ee_.clear();
   // Surfels of one side against a triangle of the other: those that the triangle owns, so that no
   // pair comes twice.
   const auto vertices = [](const Features &from, uint32_t t, const Features &to, uint32_t face, double limit,
-                           Array<uint64_t> &found) {
+                           Array<uint64_t> &list) {
     const uint32_t owns = from.surface.tri_owns[t] & 7;
     for (int k = 0; owns >> k; ++k)
       if (owns >> k & 1 && triangle_within(from.corner(t, k), to.corner(face, 0), to.corner(face, 1),
                                            to.corner(face, 2), limit))
-        found.push_back(features(from.surface.tri[3 * size_t{t} + k], face));
+        list.push_back(features(from.surface.tri[3 * size_t{t} + k], face));
   };
-  near_pairs(a.tree, b.tree, wide, stack_, [&](uint32_t place_a, uint32_t place_b, double distance2) {
+  near_pairs(a.tree, b.tree, wide, found.stack, [&](uint32_t place_a, uint32_t place_b, double distance2) {
     const uint32_t s = a.tree.triangles()[place_a], t = b.tree.triangles()[place_b];
-    vertices(fa, s, fb, t, deep_b, vf_);
-    vertices(fb, t, fa, s, deep_a, fv_);
+    vertices(fa, s, fb, t, deep_b, found.vf);
+    vertices(fb, t, fa, s, deep_a, found.fv);
     const uint32_t own_s = fa.surface.tri_owns[s] >> 3, own_t = fb.surface.tri_owns[t] >> 3;
     if (!own_s || !own_t || !(distance2 <= edges2)) return;
     for (int k = 0; own_s >> k; ++k)
       for (int l = 0; own_t >> l; ++l)
         if (own_s >> k & own_t >> l & 1 && segments_within(fa.corner(s, k), fa.corner(s, (k + 1) % 3),
                                                            fb.corner(t, l), fb.corner(t, (l + 1) % 3), edges))
-          ee_.push_back(
+          found.ee.push_back(
               features(fa.surface.tri_edge[3 * size_t{s} + k], fb.surface.tri_edge[3 * size_t{t} + l]));
   });
   return true;
 }
 
-void BroadPhase::list_bodies(uint32_t i, uint32_t j) {
-  if (!list_surfaces(bodies_[i], bodies_[j])) return;
-  add_segment(i, j, false, 0, vf_);
-  add_segment(i, j, false, 1, ee_);
-  add_segment(j, i, false, 0, fv_);
-}
-
-void BroadPhase::list_mesh(uint32_t i, uint32_t o) {
-  if (!things_[o].usable || !list_surfaces(bodies_[i], things_[o])) return;
-  add_segment(i, o, true, 0, vf_);
-  add_segment(i, o, true, 1, ee_);
-  add_segment(i, o, true, 2, fv_);
-}
-
-void BroadPhase::list_voxels(uint32_t i, uint32_t o) {
-  const Body &a = bodies_[i];
-  const ObstacleShape shape(things_[o].view);
+bool BroadPhase::list_voxels(const Body &a, const Thing &thing, Found &found) const {
+  const ObstacleShape shape(thing.view);
   const Features fa{*a.surface, a.x.data()};
-  const double near = kRounding * (a.margin + things_[o].margin);
+  const double near = kRounding * (a.margin + thing.margin);
   Box bounds{{0, 0, 0, 0}, {0, 0, 0, 0}};
   shape.bounds(bounds.lo, bounds.hi);
-  vf_.clear();
-  fv_.clear();
   near_triangles(
-      a.tree, stack_, [&](const Box &b) { return box_distance2(b, bounds) <= near * near; },
+      a.tree, found.stack, [&](const Box &b) { return box_distance2(b, bounds) <= near * near; },
       [&](uint32_t t) {
         const Vec3 x[3] = {fa.corner(t, 0), fa.corner(t, 1), fa.corner(t, 2)};
         const Vec3 center = (1.0 / 3) * (x[0] + x[1] + x[2]);
         double size2 = 0;
         for (int k = 0; k < 3; ++k) {
           if (fa.surface.tri_owns[t] >> k & 1 && shape.voxels_near(x[k], near))
-            vf_.push_back(uint64_t{fa.surface.tri[3 * size_t{t} + k]} << 32);
+            found.vf.push_back(uint64_t{fa.surface.tri[3 * size_t{t} + k]} << 32);
           size2 = std::max(size2, norm2(x[k] - center));
         }
-        if (shape.voxels_near(center, near + std::sqrt(size2))) fv_.push_back(uint64_t{t} << 32);
+        if (shape.voxels_near(center, near + std::sqrt(size2))) found.fv.push_back(uint64_t{t} << 32);
       });
-  add_segment(i, o, true, 0, vf_);
-  add_segment(i, o, true, 2, fv_);
-}
-
-void BroadPhase::list_thing(uint32_t i, uint32_t o) {
-  switch (things_[o].view.shape) {
-    case Shape::mesh: return list_mesh(i, o);
-    case Shape::voxels: return list_voxels(i, o);
-    default: return list_obstacle(i, o);
-  }
+  return true;
 }
 
 // Edges and triangles count only where a surfel alone would let the obstacle through: edges at a round shape
 // or at a box's edges, triangles at a round shape or at a box's corners.
-void BroadPhase::list_obstacle(uint32_t i, uint32_t o) {
-  const Body &a = bodies_[i];
-  const ObstacleShape shape(things_[o].view);
+bool BroadPhase::list_obstacle(const Body &a, const Thing &thing, Found &found) const {
+  const ObstacleShape shape(thing.view);
   const Features fa{*a.surface, a.x.data()};
   const Shape kind = shape.view().shape;
-  const double near = kRounding * (a.margin + things_[o].margin + recovery_depth(*a.surface));
+  const double near = kRounding * (a.margin + thing.margin + recovery_depth(*a.surface));
   const double round = kind == Shape::sphere || kind == Shape::capsule ? shape.view().radius : 0;
   const double limit = near + round, limit2 = limit * limit;
   Box bounds{{0, 0, 0, 0}, {0, 0, 0, 0}};
@@ -400,30 +448,35 @@ void BroadPhase::list_obstacle(uint32_t i, uint32_t o) {
     }
     return false;
   };
-  vf_.clear();
-  ee_.clear();
-  fv_.clear();
-  near_triangles(a.tree, stack_, box_near, [&](uint32_t t) {
+  near_triangles(a.tree, found.stack, box_near, [&](uint32_t t) {
     const uint32_t owns = fa.surface.tri_owns[t];
     for (int k = 0; k < 3; ++k) {
       if (owns >> k & 1 && shape.closest(fa.corner(t, k)).distance <= near)
-        vf_.push_back(fa.surface.tri[3 * size_t{t} + k]);
+        found.vf.push_back(fa.surface.tri[3 * size_t{t} + k]);
       if (kind != Shape::plane && owns >> (3 + k) & 1 &&
           edge_near(fa.corner(t, k), fa.corner(t, (k + 1) % 3)))
-        ee_.push_back(fa.surface.tri_edge[3 * size_t{t} + k]);
+        found.ee.push_back(fa.surface.tri_edge[3 * size_t{t} + k]);
     }
-    if (kind != Shape::plane && triangle_near(t)) fv_.push_back(t);
+    if (kind != Shape::plane && triangle_near(t)) found.fv.push_back(t);
   });
-  for (Array<uint64_t> *found : {&vf_, &ee_, &fv_})
-    for (uint64_t &f : *found) f <<= 32;
-  add_segment(i, o, true, 0, vf_);
-  if (kind == Shape::plane) return;
-  add_segment(i, o, true, 1, ee_);
-  add_segment(i, o, true, 2, fv_);
+  for (Array<uint64_t> *list : {&found.vf, &found.ee, &found.fv})
+    for (uint64_t &f : *list) f <<= 32;
+  return true;
 }
 
-void BroadPhase::add_segment(uint32_t a, uint32_t b, bool obstacle, uint8_t kind, Array<uint64_t> &found) {
-  std::sort(found.begin(), found.end());
+void BroadPhase::add_segments(const Pair &pair, const Found &found) {
+  if (!found.near) return;
+  const auto [a, b, obstacle] = pair;
+  const Shape shape = obstacle ? things_[b].view.shape : Shape::none;
+  add_segment(a, b, obstacle, 0, found.vf);
+  if (shape == Shape::plane) return;
+  if (shape != Shape::voxels) add_segment(a, b, obstacle, 1, found.ee);
+  if (obstacle) add_segment(a, b, true, 2, found.fv);
+  else add_segment(b, a, false, 0, found.fv);
+}
+
+void BroadPhase::add_segment(uint32_t a, uint32_t b, bool obstacle, uint8_t kind,
+                             const Array<uint64_t> &found) {
   const uint64_t id_b = obstacle ? things_[b].view.id : bodies_[b].id;
   next_segments_.push_back(
       {bodies_[a].id, id_b, a, b, uint32_t(fresh_.size()), uint32_t(found.size()), obstacle, kind, true});

@@ -7,13 +7,18 @@
 // and two features whose boxes were further apart than m_a + m_b (+ recovery depth) cannot be within the
 // reach of a contact then. Lists hold a superset of the contacts and narrow/ decides by the geometry of the
 // sub-step alone, so results never depend on when lists were made.
+//
+// On several threads bodies are looked at one by one and pairs are listed one by one, each into memory of its
+// own; runs are put together in the order of one thread.
 #pragma once
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "broad/pair_filter.h"
 #include "contact/reach.h"
 #include "core/memory.h"
+#include "core/tasks.h"
 #include "geometry/box_tree.h"
 #include "geometry/views.h"
 
@@ -24,15 +29,16 @@ class BroadPhase {
   explicit BroadPhase(const Memory &memory);
 
   // Renews what is out of date; true if candidates() changed. h in s; offset d_c in m. Views may
-  // come in any order.
+  // come in any order. tasks: null: on this thread alone.
   bool update(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
-              const PairFilter &filter, double h, double offset);
+              const PairFilter &filter, double h, double offset, Tasks *tasks = nullptr);
 
   // The same lists, made anew where they do not cover the way that the sub-step takes after its solve:
   // speed[i] bounds that of the surfels of body i; the obstacles' views hold theirs.
   // After update(), on the same views.
   bool cover(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
-             const PairFilter &filter, double h, double offset, std::span<const double> speed);
+             const PairFilter &filter, double h, double offset, std::span<const double> speed,
+             Tasks *tasks = nullptr);
   // f(triangle of a, triangle of b) for pairs that may meet now; slots of bodies, or of a mesh obstacle.
   template <class F>
   void near_triangles_of(uint32_t slot_a, uint32_t slot_b, bool obstacle, F &&f) {
@@ -78,6 +84,7 @@ class BroadPhase {
     double expected = 0;                // speed that cover() asks the lists to hold for
     bool dirty = true, usable = false;  // usable: all positions finite
     bool asleep = false;                // at the last update: nothing has moved if it still is
+    uint32_t refits = 0, rebuilds = 0;  // of the tree, not in stats_ yet
     BoxTree tree;
     Array<double> x;  // [nsurfel,4] when the lists were made
     explicit Side(const Memory &m) : tree(m), x(HookAllocator<double>(m)) {}
@@ -99,26 +106,39 @@ class BroadPhase {
     bool fresh;  // lies in fresh_, not in candidates_
   };
 
+  struct Pair {
+    uint32_t a, b;  // indices of the views; listed bodies in the order of ids
+    bool obstacle;
+  };
+  struct Found {        // {feature a, feature b} of one pair, each sorted
+    bool near = false;  // not too far apart for any
+    Array<uint64_t> vf, fv, ee;
+    Array<PairOfTriangles> stack;
+    explicit Found(const Memory &memory);
+    void clear();
+  };
+
   void match(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
              const PairFilter &filter);
   bool find_dirty(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, double h,
-                  double offset);
+                  double offset, Tasks *tasks);
+  void look(Body &body, bool asleep, double h, double offset);
   bool holds(const Thing &thing, const ObstacleView &now, double h, double offset, double times = 2) const;
   bool renew_tree(Side &side);
   void renew(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
-             const PairFilter &filter, double h, double offset);
+             const PairFilter &filter, double h, double offset, Tasks *tasks);
   void renew_body(Body &body, double h, double offset);
   void renew_thing(Thing &thing, const ObstacleView &now, double h, double offset);
   void bound_bodies();
   void find_pairs(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
-                  const PairFilter &filter);
-  bool list_surfaces(const Side &a, const Side &b);
-  void list_bodies(uint32_t i, uint32_t j);
-  void list_mesh(uint32_t i, uint32_t o);
-  void list_voxels(uint32_t i, uint32_t o);
-  void list_obstacle(uint32_t i, uint32_t o);
-  void list_thing(uint32_t i, uint32_t o);
-  void add_segment(uint32_t a, uint32_t b, bool obstacle, uint8_t kind, Array<uint64_t> &found);
+                  const PairFilter &filter, Tasks *tasks);
+  void list_pairs(Tasks *tasks);
+  void list(const Pair &pair, Found &found) const;
+  bool list_surfaces(const Side &a, const Side &b, Found &found) const;
+  bool list_voxels(const Body &a, const Thing &thing, Found &found) const;
+  bool list_obstacle(const Body &a, const Thing &thing, Found &found) const;
+  void add_segments(const Pair &pair, const Found &found);
+  void add_segment(uint32_t a, uint32_t b, bool obstacle, uint8_t kind, const Array<uint64_t> &found);
   void assemble();
 
   Memory memory_;
@@ -131,8 +151,10 @@ class BroadPhase {
   double radius_ = 0;
   Array<Segment> segments_, next_segments_;
   Array<Candidate> candidates_, next_;
-  Array<uint64_t> fresh_, vf_, fv_, ee_;  // {feature a, feature b}
+  Array<uint64_t> fresh_;  // {feature a, feature b}
   Array<uint32_t> order_;
+  Array<Pair> pairs_;         // to be listed
+  std::vector<Found> found_;  // by number in pairs_; of one thread the first
   Array<PairOfTriangles> stack_;
   Stats stats_;
 };

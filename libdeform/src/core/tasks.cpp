@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <mutex>
 #include <thread>
@@ -31,31 +32,48 @@ void run_host_block(void *task, uint32_t begin, uint32_t end) {
 
 }  // namespace
 
-// Waits for `ready` without sleeping, for about as long as a step spends between two of its jobs (some 100
-// microseconds): waking a thread costs tens of microseconds, more than the work of a small body. False: not
-// ready yet, sleep.
-template <class Ready>
-bool spin(Ready ready) {
-  for (int i = 0; i < 4000; ++i) {
-    if (ready()) return true;
+// Waits for `ready` without sleeping, until `most` has passed: to wake a thread takes 50 microseconds, as
+// long as the work of a small body. After a first moment it yields: threads that share its core go on.
+// False: not ready yet, sleep.
+template <class Ready, class Most>
+bool spin(Ready ready, Most most) {
+  using Clock = std::chrono::steady_clock;
+  constexpr auto kMoment = std::chrono::microseconds(20);
+  constexpr int kLooks = 32;  // between two looks at the clock
+  const Clock::time_point start = Clock::now();
+  for (;;) {
+    for (int i = 0; i < kLooks; ++i) {
+      if (ready()) return true;
 #if defined(__x86_64__)
-    __builtin_ia32_pause();
+      __builtin_ia32_pause();
 #endif
+    }
+    const auto passed = Clock::now() - start;
+    if (passed > most()) return ready();
+    if (passed > kMoment) std::this_thread::yield();
   }
-  return false;
 }
 
-// Blocks of `grain` are handed out by an atomic counter; workers spin for a moment between jobs, then sleep.
+constexpr std::chrono::microseconds kWithinStep{2000}, kBetweenSteps{200}, kCrowded{2};
+
+// Blocks of `grain` are handed out by an atomic counter. Only workers that have entered a job are waited for:
+// one that sleeps, or whose core does something else, costs its help and nothing more. So that it does not
+// sleep, a worker spins between the jobs of a step.
 struct Tasks::Pool {
+  static constexpr uint64_t kOpen = uint64_t{1} << 31, kInside = kOpen - 1;
+  static constexpr int kNumber = 32;  // bits below a job's number
+
   std::mutex taken;  // held by the thread whose job runs: worlds of one context may step on several threads
   std::mutex mutex;
   std::condition_variable start, done;
   std::vector<std::thread> workers;
-  std::atomic<uint64_t> job{0};   // rises with each job; what the job is was written before
-  std::atomic<uint32_t> busy{0};  // workers that have not finished it
+  // number of the job, may it be entered, workers inside; what the job is was written before it opened
+  std::atomic<uint64_t> gate{0};
   std::atomic<bool> stop{false};
-  uint32_t asleep = 0;   // workers in start, under mutex
-  bool waiting = false;  // the owner is in done, under mutex
+  std::atomic<uint32_t> asleep{0};    // workers in start
+  std::atomic<bool> waiting{false};   // the owner is in done
+  std::atomic<uint32_t> stepping{0};  // worlds in a step
+  bool crowded = false;               // more threads than processors: who spins keeps others from working
 
   uint32_t n = 0, grain = 1;
   std::atomic<uint32_t> next{0};
@@ -85,30 +103,47 @@ struct Tasks::Pool {
   void work() {
     uint64_t seen = 0;
     const auto ready = [&] {
-      return stop.load(std::memory_order_acquire) || job.load(std::memory_order_acquire) != seen;
+      const uint64_t now = gate.load();
+      return stop.load() || ((now & kOpen) && now >> kNumber != seen);
+    };
+    const auto most = [&] {
+      return crowded ? kCrowded : stepping.load(std::memory_order_relaxed) ? kWithinStep : kBetweenSteps;
     };
     for (;;) {
-      if (!spin(ready)) {
+      if (!spin(ready, most)) {
         std::unique_lock lock(mutex);
         ++asleep;
         start.wait(lock, ready);
         --asleep;
       }
-      if (stop.load(std::memory_order_acquire)) return;
-      seen = job.load(std::memory_order_acquire);
+      if (stop.load()) return;
+      uint64_t now = gate.load();
+      if (!(now & kOpen) || now >> kNumber == seen || !gate.compare_exchange_strong(now, now + 1)) continue;
+      seen = now >> kNumber;
       drain();
-      if (busy.fetch_sub(1, std::memory_order_acq_rel) != 1) continue;
+      if (((gate.fetch_sub(1) - 1) & (kOpen | kInside)) != 0 || !waiting.load()) continue;
       const std::lock_guard lock(mutex);
-      if (waiting) done.notify_one();
+      done.notify_one();
     }
   }
 
-  void wait() {
-    const auto finished = [&] { return busy.load(std::memory_order_acquire) == 0; };
-    if (spin(finished)) return;
+  // Nobody is inside. blocks: of the job that was written.
+  void open(uint32_t blocks) {
+    gate.store(((gate.load() >> kNumber) + 1) << kNumber | kOpen);
+    const uint32_t sleepers = asleep.load(), all = static_cast<uint32_t>(workers.size());
+    const uint32_t wanted = std::min(blocks - 1, all), awake = all - std::min(sleepers, all);
+    if (wanted <= awake) return;
+    { const std::lock_guard lock(mutex); }  // who has counted himself in is in start now
+    for (uint32_t k = awake; k < wanted; ++k) start.notify_one();
+  }
+
+  void close() {
+    const auto empty = [&] { return (gate.load() & kInside) == 0; };
+    if ((gate.fetch_and(~kOpen) & kInside) == 0) return;
+    if (spin(empty, [&] { return crowded ? kCrowded : kWithinStep; })) return;
     std::unique_lock lock(mutex);
     waiting = true;
-    done.wait(lock, finished);
+    done.wait(lock, empty);
     waiting = false;
   }
 };
@@ -119,6 +154,8 @@ Tasks::Tasks(uint32_t threads, HostFor host_for, void *host_user)
       host_user_(host_user) {
   if (host_for_ || threads_ == 1) return;
   pool_ = std::make_unique<Pool>();
+  const uint32_t processors = std::thread::hardware_concurrency();
+  pool_->crowded = processors > 0 && threads_ > processors;
   pool_->workers.reserve(threads_ - 1);
   for (uint32_t i = 1; i < threads_; ++i) pool_->workers.emplace_back([pool = pool_.get()] { pool->work(); });
 }
@@ -148,16 +185,16 @@ void Tasks::run(uint32_t n, uint32_t grain, void (*fn)(void *, uint32_t, uint32_
   pool.fn = fn;
   pool.task = task;
   pool.next.store(0, std::memory_order_relaxed);
-  pool.busy.store(static_cast<uint32_t>(pool.workers.size()), std::memory_order_relaxed);
-  bool wake;
-  {
-    const std::lock_guard lock(pool.mutex);
-    pool.job.fetch_add(1, std::memory_order_release);
-    wake = pool.asleep > 0;
-  }
-  if (wake) pool.start.notify_all();
+  pool.open(1 + (n - 1) / grain);
   pool.drain();
-  pool.wait();
+  pool.close();
+}
+
+Tasks::Step::Step(Tasks &tasks) : pool_(tasks.pool_.get()) {
+  if (pool_) ++pool_->stepping;
+}
+Tasks::Step::~Step() {
+  if (pool_) --pool_->stepping;
 }
 
 }  // namespace dfm

@@ -7,6 +7,8 @@
 namespace dfm {
 
 class Tasks {
+  struct Pool;
+
  public:
   using HostFor = void (*)(void *user, uint32_t n, uint32_t grain, void (*fn)(void *, uint32_t, uint32_t),
                            void *task);
@@ -27,8 +29,19 @@ class Tasks {
         &f);
   }
 
+  // While one stands workers that have had a job stay awake for the next one.
+  class Step {
+   public:
+    explicit Step(Tasks &tasks);
+    ~Step();
+    Step(const Step &) = delete;
+    Step &operator=(const Step &) = delete;
+
+   private:
+    Pool *pool_;
+  };
+
  private:
-  struct Pool;
   std::unique_ptr<Pool> pool_;
   uint32_t threads_;
   HostFor host_for_;

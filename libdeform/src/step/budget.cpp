@@ -278,6 +278,7 @@ dfm_status step_within_budget(World &w, double dt, uint32_t *trouble) {
   Keep to{b.start};
   changed_at_once(to, w);
   dfm_status status = DFM_DISCARD;
+  const Tasks::Step awake(w.context->tasks);
   try {
     status = run_step(w, step, dt, trouble);
   } catch (const StepStopped &stopped) {

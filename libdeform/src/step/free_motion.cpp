@@ -108,9 +108,9 @@ void stage_gather(World &w, Active active) {
 }
 
 void stage_broad(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
-                 const PairFilter &filter, double h, double offset, BroadPhase &out) {
+                 const PairFilter &filter, double h, double offset, Tasks &tasks, BroadPhase &out) {
   try {
-    out.update(bodies, obstacles, filter, h, offset);
+    out.update(bodies, obstacles, filter, h, offset, &tasks);
   } catch (...) {
     out.clear();  // out of memory half way through its lists: they are made anew next time
     throw;

@@ -75,7 +75,8 @@ void follow_lists(World &w, StepContext &step) {
   Guard &g = step.guard;
   const bool pairs = w.plan.has(StageRole::lists_pairs);
   if (pairs)
-    step.broad.cover(step.body_views, step.obstacle_views, w.pairs.filter, step.h, w.offset, g.speed);
+    step.broad.cover(step.body_views, step.obstacle_views, w.pairs.filter, step.h, w.offset, g.speed,
+                     &w.context->tasks);
   const bool fresh = cover_self(w, step);
   if (std::exchange(g.placements, w.placements) != w.placements) g.forget();
   const uint64_t renewals = step.broad.stats().renewals;

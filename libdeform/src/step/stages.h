@@ -66,7 +66,7 @@ bool stage_predict(World &w, Active active, const SubStep &now, Array<double> &k
 bool stage_rigid_predict(World &w, StepContext &step, uint32_t *trouble);  // rigid.cpp
 void stage_gather(World &w, Active active);
 void stage_broad(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
-                 const PairFilter &filter, double h, double offset, BroadPhase &out);
+                 const PairFilter &filter, double h, double offset, Tasks &tasks, BroadPhase &out);
 bool stage_narrow(World &w, StepContext &step, uint32_t *trouble);  // narrow.cpp
 void stage_self(World &w, StepContext &step);                       // self_contact.cpp
 bool stage_solve(World &w, StepContext &step, uint32_t *trouble);   // solve.cpp

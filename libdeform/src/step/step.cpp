@@ -93,7 +93,8 @@ bool gather(World &w, StepContext &step, uint32_t *) {
   return true;
 }
 bool broad(World &w, StepContext &step, uint32_t *) {
-  stage_broad(step.body_views, step.obstacle_views, w.pairs.filter, step.h, w.offset, step.broad);
+  stage_broad(step.body_views, step.obstacle_views, w.pairs.filter, step.h, w.offset, w.context->tasks,
+              step.broad);
   return true;
 }
 bool self(World &w, StepContext &step, uint32_t *) {

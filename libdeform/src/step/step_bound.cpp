@@ -5,8 +5,11 @@
 #include <limits>
 
 #include "core/error.h"
+#include "plugin/context.h"
+#include "plugin/on_behalf.h"
 #include "state/spring.h"
 #include "state/world.h"
+#include "step/first_failure.h"
 
 namespace dfm {
 namespace {
@@ -23,15 +26,29 @@ uint32_t inverted_cells(const Body &b) {
   return n;
 }
 
-// 1/s, of the edge that stretches fastest.
-double ask_bound(World &w, Body &b) {
+// False: its model gives none.
+bool ask_bound(const World &w, Body &b) {
   b.bound = {true, {}, inverted_cells(b)};
   const auto springs = [&b](double *stiffness, double *damping) {
     for (const Spring &spring : b.springs) add_spring_bound(spring, stiffness, damping);
   };
-  if (!b.dynamics->bound(w.time, springs, b.bound.found))
-    fail(DFM_E_FATAL, "model '%s' of body '%s' gives no step bound", b.model.type->id, b.name.c_str());
-  return b.bound.found.strain_rate;
+  return b.dynamics->bound(w.time, springs, b.bound.found);
+}
+
+// Each body by itself.
+void ask_bounds(World &w) {
+  FirstFailure failed;
+  w.context->tasks.parallel_for(static_cast<uint32_t>(w.bodies.size()), 1, [&](uint32_t begin, uint32_t end) {
+    for (uint32_t i = begin; i < end; ++i) {
+      Body &b = *w.bodies[i];
+      if (b.slumber.asleep && b.bound.known) continue;  // it stays what it was
+      const OnBehalf speaks(b.name);
+      if (!ask_bound(w, b)) failed.note(i);
+    }
+  });
+  if (failed.body == kNone) return;
+  const Body &b = *w.bodies[failed.body];
+  fail(DFM_E_FATAL, "model '%s' of body '%s' gives no step bound", b.model.type->id, b.name.c_str());
 }
 
 }  // namespace
@@ -45,10 +62,10 @@ void update_bound(World &w) {
   w.bound.inverted = 0;
   uint32_t limited = 0;
   double fastest = 0;
+  ask_bounds(w);
   for (auto &b : w.bodies) {
-    const bool stays = b->slumber.asleep && b->bound.known;
-    // who sleeps counts too: the step must not change when it wakes
-    if (!stays) fastest = std::max(fastest, ask_bound(w, *b));
+    // who sleeps has a step too, which must not change when it wakes, and stretches no edge
+    if (!b->slumber.asleep) fastest = std::max(fastest, b->bound.found.strain_rate);
     w.bound.inverted += b->bound.inverted;
     limited += b->model.limited_cells();
     const StepBound &found = b->bound.found;

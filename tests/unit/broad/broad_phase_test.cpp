@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <atomic>
+
 #include "../narrow/detect_scene.h"
 #include "geometry/closest.h"
 
@@ -170,6 +172,54 @@ TEST(BroadPhase, TwoSkinHistories_GiveTheSameBits) {
     advance(scene, random, 0.02);
   }
   EXPECT_NE(one.stats().renewals, two.stats().renewals);
+}
+
+TEST(BroadPhase, PairsOnSeveralThreads_AreThoseOfOne) {
+  for (const uint32_t threads : {2u, 3u, 8u}) {
+    Tasks tasks(threads, nullptr, nullptr);
+    Scene scene = random_scene(11, 1);
+    scene.h = 2e-4;
+    std::mt19937 random(11);
+    BroadPhase one(Memory::standard()), many(Memory::standard());
+    size_t found = 0;
+    for (int step = 0; step < 60; ++step) {
+      EXPECT_EQ(one.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset),
+                many.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset, &tasks));
+      const auto &a = one.candidates(), &b = many.candidates();
+      ASSERT_TRUE(std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                             [](const Candidate &l, const Candidate &r) {
+                               return l.slot_a == r.slot_a && l.slot_b == r.slot_b &&
+                                      l.feature_a == r.feature_a && l.feature_b == r.feature_b &&
+                                      l.kind == r.kind && l.obstacle == r.obstacle;
+                             }))
+          << threads << " threads, step " << step;
+      found += a.size();
+      advance(scene, random, 0.02);
+    }
+    EXPECT_GT(found, 1000u);
+    EXPECT_EQ(one.stats().renewals, many.stats().renewals);
+    EXPECT_EQ(one.stats().refits, many.stats().refits);
+    EXPECT_EQ(one.stats().rebuilds, many.stats().rebuilds);
+  }
+}
+
+TEST(BroadPhase, PairWithoutMemoryOnTwoThreads_ThrowsInTheCaller) {
+  Scene scene = random_scene(12, 1);
+  static std::atomic<bool> refuses;
+  refuses = false;
+  Memory memory = Memory::standard();
+  memory.alloc = [](void *user, size_t bytes, size_t align) -> void * {
+    return refuses ? nullptr : Memory::standard().alloc(user, bytes, align);
+  };
+  BroadPhase broad(memory);
+  Tasks tasks(2, nullptr, nullptr);
+  broad.update({}, {}, scene.filter, scene.h, scene.offset, &tasks);
+  refuses = true;
+  EXPECT_THROW(broad.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset, &tasks),
+               std::bad_alloc);
+  refuses = false;
+  broad.clear();
+  EXPECT_TRUE(broad.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset, &tasks));
 }
 
 // Pairs come in the order of ids at every step, whether a list is kept or made anew, and whatever order the

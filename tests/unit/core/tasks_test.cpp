@@ -1,0 +1,81 @@
+#include "core/tasks.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <random>
+#include <thread>
+#include <vector>
+
+namespace {
+
+using namespace dfm;
+
+// Every number of [0,n) once, in blocks that begin at multiples of grain.
+void expect_once(Tasks &tasks, uint32_t n, uint32_t grain, const char *what) {
+  std::vector<std::atomic<int>> hit(n);
+  std::atomic<int> crooked{0};
+  tasks.parallel_for(n, grain, [&](uint32_t begin, uint32_t end) {
+    crooked += begin % std::max(1u, grain) != 0 || end > n;
+    for (uint32_t i = begin; i < end; ++i) ++hit[i];
+  });
+  EXPECT_TRUE(std::all_of(hit.begin(), hit.end(), [](const auto &h) { return h == 1; })) << what;
+  EXPECT_EQ(crooked, 0) << what;
+}
+
+TEST(Tasks, JobsOnOneToEightThreads_RunEachBlockOnce) {
+  std::mt19937 random(1);
+  for (uint32_t threads = 1; threads <= 8; ++threads) {
+    Tasks tasks(threads, nullptr, nullptr);
+    for (int job = 0; job < 400; ++job) expect_once(tasks, random() % 50, random() % 8, "in turn");
+  }
+}
+
+// Workers sleep between the jobs, or between the worlds' steps, or wake while one opens.
+TEST(Tasks, JobsAfterPausesOnThreeThreads_RunEachBlockOnce) {
+  Tasks tasks(3, nullptr, nullptr);
+  for (int pause = 0; pause < 40; ++pause) {
+    std::this_thread::sleep_for(std::chrono::microseconds(60 * (pause % 8)));
+    const Tasks::Step awake(tasks);
+    for (int job = 0; job < 5; ++job) expect_once(tasks, 9, 1, "after a pause");
+  }
+}
+
+TEST(Tasks, AJobWithinAJobOnFourThreads_RunsWhereItIsAskedFor) {
+  Tasks tasks(4, nullptr, nullptr);
+  std::atomic<int> other{0};
+  tasks.parallel_for(16, 1, [&](uint32_t, uint32_t) {
+    const auto here = std::this_thread::get_id();
+    tasks.parallel_for(8, 1, [&](uint32_t, uint32_t) { other += std::this_thread::get_id() != here; });
+  });
+  EXPECT_EQ(other, 0);
+}
+
+TEST(Tasks, TwoOwnersOnTwoThreads_DoNotDisturbEachOther) {
+  Tasks tasks(3, nullptr, nullptr);
+  const auto work = [&] {
+    for (int job = 0; job < 300; ++job) expect_once(tasks, 7, 1, "beside another owner");
+  };
+  std::thread beside(work);
+  work();
+  beside.join();
+}
+
+// A job does not end before its last block has, also where that takes so long that the owner sleeps.
+TEST(Tasks, ALongBlockOnTwoThreads_IsWaitedFor) {
+  Tasks tasks(2, nullptr, nullptr);
+  for (int job = 0; job < 4; ++job) {
+    std::atomic<int> done{0};
+    const auto owner = std::this_thread::get_id();
+    tasks.parallel_for(2, 1, [&](uint32_t, uint32_t) {
+      if (std::this_thread::get_id() != owner) std::this_thread::sleep_for(std::chrono::milliseconds(6));
+      else std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      ++done;
+    });
+    EXPECT_EQ(done, 2);
+  }
+}
+
+}  // namespace
