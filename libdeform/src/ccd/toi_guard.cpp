@@ -1,7 +1,9 @@
 #include "ccd/toi_guard.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <new>
 
 #include "ccd/toi_guard_motion.h"
 #include "contact/contact_set.h"
@@ -43,17 +45,22 @@ Vec3 apart(const Features &f) {
   return x[0] - c.weight[0] * x[1] - c.weight[1] * x[2] - c.weight[2] * x[3];
 }
 
-// Two surfaces.
+// Candidates that are worth a block of their own, most of which end at the first comparison.
+constexpr uint32_t kBlock = 512;
+constexpr uint32_t kTogether = 4;  // pieces of a block: most runs are short
+
+// Two surfaces. Shared: several of them look at blocks of the list at the same time.
+template <bool Shared>
 class NearPairs {
  public:
   NearPairs(GuardScene &scene, const Array<Candidate> &list, GuardMemory &memory, Array<uint32_t> &near)
       : scene_(scene), list_(list), memory_(memory), near_(near), floor_(clear_of(scene)) {}
 
-  void look(const GuardMemory::Run &run) {
+  void look(const GuardMemory::Run &run, uint32_t begin, uint32_t end) {
     const double now = kRounding * (run.way + run.travel), *const rest = memory_.rest.data();
     a_ = &scene_.side(list_[run.begin], false);
     b_ = &scene_.side(list_[run.begin], true);
-    for (uint32_t i = run.begin; i < run.end; ++i)
+    for (uint32_t i = begin; i < end; ++i)
       if (!(now < rest[i])) look(i, run.way, now);
   }
 
@@ -80,8 +87,14 @@ class NearPairs {
   }
   bool stays_apart(Features &f, Vec3 n, double start) {
     if (!(start > floor_)) return false;
-    f.find_ends(scene_);
-    return height(f.end, f.split, n) > floor_;
+    if constexpr (Shared) {
+      double own[4][4];
+      f.find_ends(scene_, own);
+      return height(f.end, f.split, n) > floor_;
+    } else {
+      f.find_ends(scene_);
+      return height(f.end, f.split, n) > floor_;
+    }
   }
 
   GuardScene &scene_;
@@ -93,18 +106,19 @@ class NearPairs {
 };
 
 // A surface and a closed-form shape or voxels, in the frame of the obstacle.
+template <bool Shared>
 class NearObstacle {
  public:
   NearObstacle(GuardScene &scene, const Array<Candidate> &list, GuardMemory &memory, Array<uint32_t> &near)
       : scene_(scene), list_(list), memory_(memory), near_(near), floor_(clear_of(scene)) {}
 
-  void look(const GuardMemory::Run &run) {
+  void look(const GuardMemory::Run &run, uint32_t begin, uint32_t end) {
     const Candidate &first = list_[run.begin];
     const ObstacleView &view = scene_.obstacles[first.slot_b];
     const double now = kRounding * (run.way + run.travel);
     const narrow::ObstacleFrame frame(view, scene_.poses[first.slot_b]);
     GuardSide &body = scene_.side(first, false);
-    for (uint32_t i = run.begin; i < run.end; ++i) {
+    for (uint32_t i = begin; i < end; ++i) {
       if (now < memory_.rest[i]) continue;
       if (view.shape == Shape::voxels) {
         if (list_[i].kind != 0 || !far(frame, body, i, run.way, now)) near_.push_back(i);
@@ -152,8 +166,12 @@ class NearObstacle {
     if (!(start > floor_)) return false;
     double end = HUGE_VAL;
     for (int k = 0; k <= c.kind; ++k)
-      end = std::min(end, dot(normal, frame.at_end(load3(scene_.end(body, corner[k]))) - on));
+      end = std::min(end, dot(normal, frame.at_end(end_of(body, corner[k])) - on));
     return end > floor_;
+  }
+  Vec3 end_of(GuardSide &body, uint32_t surfel) {
+    if constexpr (Shared) return scene_.end_of(body, surfel);
+    else return load3(scene_.end(body, surfel));
   }
   bool far(const narrow::ObstacleFrame &frame, GuardSide &body, uint32_t i, double way, double now) {
     const Vec3 x = frame.at_start(load3(&body.surface->x[4 * size_t{list_[i].feature_a}]));
@@ -170,21 +188,23 @@ class NearObstacle {
 
 }  // namespace
 
-void GuardScene::find_end(GuardSide &s, uint32_t surfel) {
-  s.stamp[surfel] = round;
-  double *const out = &s.end[4 * size_t{surfel}];
+Vec3 GuardScene::end_of(const GuardSide &s, uint32_t surfel) const {
   const Vec3 x = load3(&s.surface->x[4 * size_t{surfel}]);
-  if (s.still) return store3(out, x);
+  if (s.still) return x;
   // its pose is at the fraction already
-  if (s.local)
-    return store3(out, s.pose.position + rotate(s.pose.rotation, load3(&s.local[3 * size_t{surfel}])));
+  if (s.local) return s.pose.position + rotate(s.pose.rotation, load3(&s.local[3 * size_t{surfel}]));
   Vec3 way;
   s.surface->each_phyxel(
       surfel, [&](uint32_t p, double weight) { way += (weight * h) * load3(&s.mean[4 * size_t{p}]); });
-  store3(out, x + fraction * way);
+  return x + fraction * way;
 }
 
-void GuardMemory::follow(const Array<Candidate> &list) {
+void GuardScene::find_end(GuardSide &s, uint32_t surfel) {
+  s.stamp[surfel] = round;
+  store3(&s.end[4 * size_t{surfel}], end_of(s, surfel));
+}
+
+void GuardMemory::follow(const Array<Candidate> &list, Tasks *tasks) {
   old_runs.swap(runs);
   old_features.swap(features);
   old_rest.swap(rest);
@@ -205,41 +225,102 @@ void GuardMemory::follow(const Array<Candidate> &list) {
   }
   // Runs come in one order in all lists, pairs in a run by their features.
   size_t next = 0;
-  for (Run &run : runs) {
+  before.assign(runs.size(), kNone);
+  for (size_t r = 0; r < runs.size(); ++r) {
+    const Run &run = runs[r];
     const auto same = [&](const Run &o) {
       return o.slot_a == run.slot_a && o.slot_b == run.slot_b && o.obstacle == run.obstacle &&
              o.kind == run.kind;
     };
     const auto found = std::find_if(old_runs.begin() + std::ptrdiff_t(next), old_runs.end(), same);
-    uint32_t j = 0, last = 0;
-    if (found != old_runs.end()) {
-      run.way = found->way;
-      j = found->begin;
-      last = found->end;
-      next = size_t(found - old_runs.begin()) + 1;
-    }
-    for (uint32_t i = run.begin; i < run.end; ++i) {
-      while (j < last && old_features[j] < features[i]) ++j;
-      const bool known = j < last && old_features[j] == features[i];
-      rest[i] = known ? old_rest[j] : -1;
-      for (size_t k = 0; k < 3; ++k) normal[3 * size_t{i} + k] = known ? old_normal[3 * size_t{j} + k] : 0;
-    }
+    if (found == old_runs.end()) continue;
+    before[r] = static_cast<uint32_t>(found - old_runs.begin());
+    next = size_t{before[r]} + 1;
+  }
+  const auto carry = [&](uint32_t begin, uint32_t end) {
+    for (uint32_t r = begin; r < end; ++r) carry_over(runs[r], before[r]);
+  };
+  const uint32_t all = static_cast<uint32_t>(runs.size());
+  if (tasks && n > 2 * kBlock)
+    tasks->parallel_for(all, kTogether, [&](uint32_t begin, uint32_t end) { carry(begin, end); });
+  else carry(0, all);
+}
+
+void GuardMemory::carry_over(Run &run, uint32_t from) {
+  uint32_t j = 0, last = 0;
+  if (from != kNone) {
+    run.way = old_runs[from].way;
+    j = old_runs[from].begin;
+    last = old_runs[from].end;
+  }
+  for (uint32_t i = run.begin; i < run.end; ++i) {
+    while (j < last && old_features[j] < features[i]) ++j;
+    const bool known = j < last && old_features[j] == features[i];
+    rest[i] = known ? old_rest[j] : -1;
+    for (size_t k = 0; k < 3; ++k) normal[3 * size_t{i} + k] = known ? old_normal[3 * size_t{j} + k] : 0;
   }
 }
 
-void guard_near(GuardScene &scene, const Array<Candidate> &list, GuardMemory &memory, Array<uint32_t> &near) {
+namespace {
+
+// Of both kinds of sides.
+template <bool Shared>
+struct Near {
+  GuardScene &scene;
+  const Array<Candidate> &list;
+  NearPairs<Shared> pairs;
+  NearObstacle<Shared> obstacles;
+  Near(GuardScene &s, const Array<Candidate> &all, GuardMemory &memory, Array<uint32_t> &near)
+      : scene(s), list(all), pairs(s, all, memory, near), obstacles(s, all, memory, near) {}
+  void look(const GuardMemory::Run &run, uint32_t begin, uint32_t end) {
+    const Candidate &c = list[run.begin];
+    if (c.obstacle && scene.obstacles[c.slot_b].shape != Shape::mesh) obstacles.look(run, begin, end);
+    else pairs.look(run, begin, end);
+  }
+};
+
+void near_in_blocks(GuardScene &scene, const Array<Candidate> &list, GuardMemory &memory,
+                    Array<uint32_t> &near, GuardBlocks &blocks, Tasks &tasks) {
+  while (blocks.near.size() < blocks.pieces.size()) blocks.near.emplace_back(near.get_allocator());
+  std::atomic<bool> failed{false};
+  tasks.parallel_for(
+      static_cast<uint32_t>(blocks.pieces.size()), kTogether, [&](uint32_t begin, uint32_t end) {
+        for (uint32_t k = begin; k < end; ++k) {
+          const GuardBlocks::Piece &p = blocks.pieces[k];
+          blocks.near[k].clear();
+          try {
+            Near<true>(scene, list, memory, blocks.near[k]).look(memory.runs[p.run], p.begin, p.end);
+          } catch (const std::bad_alloc &) {
+            failed = true;  // an exception must not leave a worker
+          }
+        }
+      });
+  if (failed) throw std::bad_alloc();
+  for (size_t k = 0; k < blocks.pieces.size(); ++k)
+    near.insert(near.end(), blocks.near[k].begin(), blocks.near[k].end());
+}
+
+}  // namespace
+
+void guard_near(GuardScene &scene, const Array<Candidate> &list, GuardMemory &memory, Array<uint32_t> &near,
+                GuardBlocks *blocks, Tasks *tasks) {
   near.clear();
-  NearPairs pairs(scene, list, memory, near);
-  NearObstacle obstacles(scene, list, memory, near);
-  for (GuardMemory::Run &run : memory.runs) {
+  const bool parts = blocks && tasks && tasks->parallel() && list.size() > 2 * kBlock;
+  if (parts) blocks->pieces.clear();
+  Near<false> alone(scene, list, memory, near);
+  for (uint32_t r = 0; r < memory.runs.size(); ++r) {
+    GuardMemory::Run &run = memory.runs[r];
     const Candidate &c = list[run.begin];
     const GuardSide &a = scene.side(c, false), &b = scene.side(c, true);
     run.travel = &a == &b ? 2 * a.deform
                           : std::min(a.travel + b.travel, norm(a.drift - b.drift) + a.spread + b.spread);
     if (a.still && b.still) continue;
-    if (c.obstacle && scene.obstacles[c.slot_b].shape != Shape::mesh) obstacles.look(run);
-    else pairs.look(run);
+    if (!parts) alone.look(run, run.begin, run.end);
+    else
+      for (uint32_t from = run.begin; from < run.end; from += kBlock)
+        blocks->pieces.push_back({r, from, std::min(run.end, from + kBlock)});
   }
+  if (parts) near_in_blocks(scene, list, memory, near, *blocks, *tasks);
 }
 
 double guard_pairs(GuardScene &scene, const Array<Candidate> &list, std::span<const uint32_t> which,

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "core/memory.h"
+#include "core/tasks.h"
 #include "geometry/views.h"
 
 namespace dfm {
@@ -69,6 +70,7 @@ struct GuardScene {
     return &s.end[4 * size_t{surfel}];
   }
   void find_end(GuardSide &s, uint32_t surfel);
+  Vec3 end_of(const GuardSide &s, uint32_t surfel) const;  // the same, kept nowhere
 };
 
 // What is known of the listed pairs; saves work and changes nothing. Holds as long as d_c and the bodies
@@ -86,19 +88,32 @@ struct GuardMemory {
   Array<double> rest, old_rest;            // m, `way` up to which it stays clear of the floor
   // [n,3] direction along which it was last found to be apart; zero: none
   Array<double> normal, old_normal;
+  Array<uint32_t> before;  // by run: its place in old_runs, or kNone
 
-  void follow(const Array<Candidate> &list);
+  // tasks: null: on this thread alone
+  void follow(const Array<Candidate> &list, Tasks *tasks = nullptr);
   void forget() { runs.clear(); }
   // the sub-step has been taken
   void keep() {
     for (Run &r : runs) r.way += r.travel;
   }
+  void carry_over(Run &run, uint32_t from);  // place in old_runs, or kNone
+};
+
+// The list cut into blocks that workers take, and what each has found. Cuts depend on the list alone.
+struct GuardBlocks {
+  struct Piece { uint32_t run, begin, end; };  // of the list, within a run
+  Array<Piece> pieces;
+  std::vector<Array<uint32_t>> near;  // by piece
 };
 
 // The candidates that may come to the floor, ascending: all that the other functions need to be asked about.
 // Nearly all of a list ends at the first comparison (way + travel < rest), nearly all others at a plane that
 // keeps the two features apart at the start and at the end. memory follows the list.
-void guard_near(GuardScene &scene, const Array<Candidate> &list, GuardMemory &memory, Array<uint32_t> &near);
+//   blocks, tasks   the same for work on several threads; null: none. Throws std::bad_alloc where a block
+//                   has no memory
+void guard_near(GuardScene &scene, const Array<Candidate> &list, GuardMemory &memory, Array<uint32_t> &near,
+                GuardBlocks *blocks = nullptr, Tasks *tasks = nullptr);
 
 // Of the candidates that `which` names, those between two surfaces; those that touch at the start are
 // passed over: what is through already cannot be kept out. out is cleared; hits come in the order of the

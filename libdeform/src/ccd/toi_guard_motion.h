@@ -43,6 +43,13 @@ struct Features {
   void find_ends(GuardScene &scene) {
     for (int k = 0; k < 4; ++k) end[k] = scene.end(*side[k >= split], surfel(k));
   }
+  // On several threads: the sides keep no ends that two would write.
+  void find_ends(const GuardScene &scene, double own[4][4]) {
+    for (int k = 0; k < 4; ++k) {
+      store3(own[k], scene.end_of(*side[k >= split], surfel(k)));
+      end[k] = own[k];
+    }
+  }
 };
 
 // An obstacle in its own frame, where it stands still.

@@ -127,14 +127,46 @@ Acceleration::Acceleration(const Memory &m) { use_memory(m, metric_, from_, f_, 
 
 namespace {
 
-// Columns are padded with zeros to whole fours; a sum has four partial sums at every vector width.
-using Four = double __attribute__((vector_size(32)));
+// Columns are padded with zeros to whole fours; a sum has four partial sums at every vector width. They are
+// held as two pairs, which every x86-64 keeps in registers.
+using Two = double __attribute__((vector_size(16)));
+
+struct Sum {
+  Two low = {0, 0}, high = {0, 0};
+  double all() const { return (low[0] + low[1]) + (high[0] + high[1]); }
+};
+
+const Two *pairs(const double *a) { return reinterpret_cast<const Two *>(a); }
 
 double dot(const double *a, const double *b, uint32_t n) {
-  const Four *const x = reinterpret_cast<const Four *>(a), *const y = reinterpret_cast<const Four *>(b);
-  Four sum{0, 0, 0, 0};
-  for (uint32_t k = 0; k < n / 4; ++k) sum += x[k] * y[k];
-  return (sum[0] + sum[1]) + (sum[2] + sum[3]);
+  const Two *const x = pairs(a), *const y = pairs(b);
+  Sum sum;
+  for (uint32_t k = 0; k < n / 2; k += 2) {
+    sum.low += x[k] * y[k];
+    sum.high += x[k + 1] * y[k + 1];
+  }
+  return sum.all();
+}
+
+// a.y, a.z, b.y and b.z, each as dot() has it: one sum waits for itself at every addition, four go on side
+// by side.
+void dots(const double *a, const double *b, const double *y, const double *z, uint32_t n, double out[4]) {
+  const Two *const p = pairs(a), *const q = pairs(b), *const u = pairs(y), *const v = pairs(z);
+  Sum ay, az, by, bz;
+  for (uint32_t k = 0; k < n / 2; k += 2) {
+    ay.low += p[k] * u[k];
+    az.low += p[k] * v[k];
+    by.low += q[k] * u[k];
+    bz.low += q[k] * v[k];
+    ay.high += p[k + 1] * u[k + 1];
+    az.high += p[k + 1] * v[k + 1];
+    by.high += q[k + 1] * u[k + 1];
+    bz.high += q[k + 1] * v[k + 1];
+  }
+  out[0] = ay.all();
+  out[1] = az.all();
+  out[2] = by.all();
+  out[3] = bz.all();
 }
 
 }  // namespace
@@ -164,37 +196,43 @@ void Acceleration::follow(ContactRows &rows) {
   std::fill(now_.begin(), now_.end(), 0.0);
   std::copy(rows.impulse.begin(), rows.impulse.end(), now_.begin());
   double *const df = &df_[size_t(next_) * n_], *const dg = &dg_[size_t(next_) * n_];
-  for (uint32_t k = 0; k < n_; ++k) {
-    const double f = metric_[k] * (now_[k] - from_[k]);
+  const auto pair = [](double *a, uint32_t k) -> Two & { return reinterpret_cast<Two *>(a)[k]; };
+  for (uint32_t k = 0; k < n_ / 2; ++k) {
+    const Two g = pair(now_.data(), k);
+    const Two f = pair(metric_.data(), k) * (g - pair(from_.data(), k));
     if (!first_) {
-      df[k] = f - f_[k];
-      dg[k] = now_[k] - g_[k];
+      pair(df, k) = f - pair(f_.data(), k);
+      pair(dg, k) = g - pair(g_.data(), k);
     }
-    f_[k] = f;
-    g_[k] = now_[k];
+    pair(f_.data(), k) = f;
+    pair(g_.data(), k) = g;
   }
   const double size = dot(f_.data(), f_.data(), n_);
+  double y[kWindow], gamma[kWindow] = {};
   // the map has changed under us (contacts opened or began to slip): what was learned is void
   if (!first_ && size > 4 * last_) {
     count_ = next_ = 0;
   } else if (!first_) {
     count_ = std::max(count_, next_ + 1);
-    for (uint32_t j = 0; j < count_; ++j)
-      gram_[j][next_] = gram_[next_][j] = dot(&df_[size_t(j) * n_], df, n_);
+    for (uint32_t j = 0; j < count_; j += 2) {
+      const uint32_t other = std::min(j + 1, count_ - 1);
+      double both[4];
+      dots(&df_[size_t(j) * n_], &df_[size_t(other) * n_], df, f_.data(), n_, both);
+      gram_[j][next_] = gram_[next_][j] = both[0];
+      gram_[other][next_] = gram_[next_][other] = both[2];
+      y[j] = both[1];
+      y[other] = both[3];
+    }
     next_ = (next_ + 1) % kWindow;
   }
   first_ = false;
   last_ = size;
 
-  double y[kWindow], gamma[kWindow] = {};
-  for (uint32_t j = 0; j < count_; ++j) y[j] = dot(&df_[size_t(j) * n_], f_.data(), n_);
   if (count_ > 0 && least_combination(count_, gram_, y, gamma)) {
-    Four *const jumps = reinterpret_cast<Four *>(now_.data());
-    for (uint32_t k = 0; k < n_ / 4; ++k) {
-      Four sum{0, 0, 0, 0};
-      for (uint32_t j = 0; j < count_; ++j)
-        sum -= gamma[j] * reinterpret_cast<const Four *>(&dg_[size_t(j) * n_])[k];
-      jumps[k] = sum;
+    for (uint32_t k = 0; k < n_ / 2; ++k) {
+      Two sum{0, 0};
+      for (uint32_t j = 0; j < count_; ++j) sum -= gamma[j] * pair(&dg_[size_t(j) * n_], k);
+      pair(now_.data(), k) = sum;
     }
     for (uint32_t i = 0; i < rows.n; ++i) {
       Vec3 jump = load3(&now_[size_t(3) * i]);

@@ -165,7 +165,13 @@ constexpr size_t kBlock = 192;
 
 }  // namespace
 
-NarrowBlocks::NarrowBlocks(const Memory &m) : memory_(&m), pieces_(HookAllocator<Piece>(m)) {}
+NarrowBlocks::NarrowBlocks(const Memory &m)
+    : memory_(&m), pieces_(HookAllocator<Piece>(m)), speed_(HookAllocator<double>(m)) {}
+
+double NarrowBlocks::speed(std::span<const BodyView> bodies, size_t i) {
+  if (speed_[i] < 0) speed_[i] = largest_speed(*bodies[i].surface);
+  return speed_[i];
+}
 
 void NarrowBlocks::add(const Array<Candidate> &list, size_t begin, size_t end, double speed) {
   const Candidate &first = list[begin];
@@ -189,6 +195,7 @@ void find_contacts(std::span<const BodyView> bodies, std::span<const ObstacleVie
   for (const BodyView &b : bodies) find.nnode = std::max(find.nnode, b.first_node + b.surface->nsurfel);
   const bool parts = blocks && tasks && tasks->parallel() && candidates.size() > 2 * kBlock;
   if (parts) blocks->start();
+  if (blocks) blocks->forget_speeds(bodies.size());
   const BodyView *fast = nullptr;
   double speed = 0;
   for (size_t i = 0; i < candidates.size();) {
@@ -200,7 +207,8 @@ void find_contacts(std::span<const BodyView> bodies, std::span<const ObstacleVie
     if (find.skips(c)) continue;
     if (!c.obstacle) {
       const BodyView *const b = find_slot(bodies, c.slot_b);
-      if (b != fast) speed = largest_speed(*b->surface);
+      if (b != fast)
+        speed = blocks ? blocks->speed(bodies, size_t(b - bodies.data())) : largest_speed(*b->surface);
       fast = b;
     }
     if (parts) blocks->add(candidates, begin, end, speed);

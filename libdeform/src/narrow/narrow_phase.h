@@ -28,6 +28,9 @@ class NarrowBlocks {
  public:
   explicit NarrowBlocks(const Memory &memory);
   void start() { pieces_.clear(); }
+  // m/s, bound over the surfels of body view i; found once between two calls of forget_speeds(n).
+  void forget_speeds(size_t n) { speed_.assign(n, -1.0); }
+  double speed(std::span<const BodyView> bodies, size_t i);
   // A run of the list: all candidates of one pair and kind.
   void add(const Array<Candidate> &list, size_t begin, size_t end, double speed);
   // find(candidates, speed, contacts) for each block, re-entrant. Throws std::bad_alloc where one has no
@@ -58,6 +61,7 @@ class NarrowBlocks {
   };
   const Memory *memory_;
   Array<Piece> pieces_;
+  Array<double> speed_;
   std::vector<Array<ContactPoint>> found_;  // by piece
 };
 

@@ -17,6 +17,7 @@
 #include "narrow/narrow_phase.h"
 #include "state/world.h"
 #include "step/budget.h"
+#include "step/energy_watch.h"
 #include "step/guard.h"
 #include "step/islands.h"
 #include "step/method.h"
@@ -51,6 +52,7 @@ struct StepContext {
   Array<Driven> driven;
   // predict
   Array<double> free_kinetic;  // [bodies] J, without contact; of this sub-step
+  Array<EnergyLook> looks;     // [active]
   // broad, narrow, self
   BroadPhase broad;
   Array<ContactPoint> contacts;

@@ -57,10 +57,6 @@ bool unbooked(const World &w, const Body &b) {
   return b.dynamics->abilities().parts && (books_loads(b) || !b.motions.empty() || !w.gravity.keys.empty());
 }
 
-struct Look {
-  double kinetic = 0, elastic = 0, balance = 0, gives_back = 0, rounding = 0;  // J
-};
-
 // What holders of driven points do, by the trapezoid of the force: the force at the start of this sub-step
 // counts for half of the way of the one before, and, where `now`, for half of this one's.
 double work_of_holders(const World &w, const StepContext &step, const Body &b, bool now) {
@@ -91,7 +87,7 @@ double work_of_new_size(const World &w, const StepContext &step, const Body &b) 
 
 // The energy that the scheme keeps, U(x) - F.x + v.M v_free / 2, and half of the energy of the kick, by which
 // it may rise as stiff modes calm down.
-bool look(World &w, StepContext &step, Body &b, Look &out) {
+bool look(World &w, const StepContext &step, Body &b, EnergyLook &out) {
   const Phyxels &p = b.p;
   const bool load_booked = books_loads(b), ends = at_end(b);
   double kinetic = 0, cross = 0, kick = 0, potential = 0, reach = 0;
@@ -120,11 +116,26 @@ bool look(World &w, StepContext &step, Body &b, Look &out) {
   if (steps_itself(b) && !hides(b) && !b.dynamics->free_motion(sub_step_of(w, step), again)) return false;
   const double drift = kPositionDigits * reach / step.h;
   const double half_done = ends ? 0 : work_of_holders(w, step, b, false) + work_of_new_size(w, step, b);
-  out = {kinetic, elastic, elastic + potential + (ends ? kinetic : cross) - (b.energy.work + half_done),
+  out = {kinetic,
+         elastic,
+         elastic + potential + (ends ? kinetic : cross) - (b.energy.work + half_done),
          kGivesBack * kick,
          kRounding * (std::fabs(b.energy.work) + std::fabs(potential) + kinetic + elastic) +
-             b.mass * drift * drift};
+             b.mass * drift * drift,
+         true};
   return true;
+}
+
+// Each body by itself.
+void look_at_all(World &w, StepContext &step) {
+  const uint32_t n = static_cast<uint32_t>(step.active.size());
+  step.looks.resize(n);
+  w.context->tasks.parallel_for(n, 1, [&](uint32_t begin, uint32_t end) {
+    for (uint32_t k = begin; k < end; ++k) {
+      Body &b = *w.bodies[step.active[k]];
+      step.looks[k].known = watched(b) && look(w, step, b, step.looks[k]);
+    }
+  });
 }
 
 void book_contact(World &w, StepContext &step) {
@@ -303,10 +314,11 @@ bool watch_energy(World &w, StepContext &step, uint32_t *trouble) {
     const Body *body = nullptr;
     double rise = 0, share = 0;
   } worst;
-  for (const uint32_t i : step.active) {
-    Body &b = *w.bodies[i];
-    Look now;
-    if (!watched(b) || !look(w, step, b, now)) continue;
+  look_at_all(w, step);
+  for (size_t k = 0; k < step.active.size(); ++k) {
+    Body &b = *w.bodies[step.active[k]];
+    const EnergyLook &now = step.looks[k];
+    if (!now.known) continue;
     EnergyBook &e = b.energy;
     total += now.kinetic + now.elastic;
     if (unbooked(w, b)) continue;

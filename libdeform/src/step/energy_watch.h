@@ -13,6 +13,12 @@ struct StepContext;
 struct World;
 struct Body;
 
+// A body as it stands, J.
+struct EnergyLook {
+  double kinetic = 0, elastic = 0, balance = 0, gives_back = 0, rounding = 0;
+  bool known = false;  // else it is not watched, or its model did not answer
+};
+
 // Gravity that varies: sets the present one, and books what that does to the potentials.
 void change_gravity(World &w, Vec3 gravity);
 // Why the watch does not look at the body; empty where it does.

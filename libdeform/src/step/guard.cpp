@@ -84,7 +84,7 @@ void follow_lists(World &w, StepContext &step) {
   g.lists = renewals;
   g.list = join_self(step, pairs ? &step.broad.candidates() : nullptr, g.joined) ? &g.joined
                                                                                  : &step.broad.candidates();
-  g.memory.follow(*g.list);
+  g.memory.follow(*g.list, &w.context->tasks);
 }
 
 void make_room(GuardSide &s, const Surface &surface) {
@@ -244,7 +244,8 @@ bool stage_guard(World &w, StepContext &step, uint32_t *trouble) {
     follow_lists(w, step);
     set_sides(w, step);
     set_fraction(w, step, 1);
-    guard_near(step.guard.scene, *step.guard.list, step.guard.memory, step.guard.near);
+    guard_near(step.guard.scene, *step.guard.list, step.guard.memory, step.guard.near, &step.guard.blocks,
+               &w.context->tasks);
     safe = find_hits(w, step);
     if (step.guard.hits.empty()) return true;
     step.guard.acted = true;

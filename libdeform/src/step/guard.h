@@ -17,6 +17,7 @@ struct Guard {
   Array<Candidate> joined;  // where bodies may touch themselves: candidates of pairs and theirs
   const Array<Candidate> *list = nullptr;  // what `memory` follows: `joined`, or those of pairs as they are
   Array<uint32_t> near;                    // candidates that may reach the floor
+  GuardBlocks blocks;
   Array<GuardHit> hits;
   // m/s by body slot: bounds of the surfels' speeds after the solve; of what the solve has
   // changed of a phyxel's

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <numeric>
+#include <random>
 
 #include "../narrow/detect_scene.h"
 #include "guard_scene.h"
@@ -159,4 +160,64 @@ TEST(ToiGuard, TumblingBodies_KeepTheFloorOnTheWholeWay) {
     EXPECT_NEAR(g.least(safe), kFloor + kMargin, 0.01 * kMargin) << n;
   }
   EXPECT_GT(stopped, 20);
+}
+
+// What may come to the floor, and what is remembered of the rest, while surfaces roll over each other and a
+// plane, their lists are renewed, and a body turns its ends.
+TEST(ToiGuard, NearPairsOnSeveralThreads_AreThoseOfOne) {
+  for (const uint32_t threads : {2u, 3u, 8u}) {
+    dfm::Tasks tasks(threads, nullptr, nullptr);
+    Scene scene;
+    scene.offset = 1e-3;
+    const test::Mesh cylinder = test::cylinder_mesh(0.2, 1, 48, 40);
+    scene.add(cylinder);
+    scene.add(test::moved(cylinder, test::turn({0, 0, 1}, 0.02), {0.4012, 0.01, 0.003}));
+    scene.add(dfm::Shape::plane, {0, 0, -0.0005});
+    dfm::GuardMemory memory[2];
+    dfm::GuardBlocks blocks;
+    dfm::Array<uint32_t> near[2];
+    std::mt19937 random(5);
+    std::normal_distribution<double> normal;
+    std::vector<std::vector<double>> mean;
+    for (const auto &s : scene.surfaces) mean.push_back(std::vector<double>(s->x.size()));
+    size_t found = 0;
+    for (int step = 0; step < 25; ++step) {
+      dfm::BroadPhase broad(dfm::Memory::standard());
+      broad.set_skin_steps(double(1 + step % 7));
+      broad.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset);
+      const dfm::Array<dfm::Candidate> &list = broad.candidates();
+      ASSERT_GT(list.size(), 2000u) << "too few for blocks";
+      for (size_t b = 0; b < mean.size(); ++b)
+        for (double &v : mean[b]) v = (step % 3) * 0.4 * normal(random);
+      for (int k = 0; k < 2; ++k) {
+        dfm::GuardScene asked;
+        asked.bodies = scene.bodies;
+        asked.obstacles = scene.obstacles;
+        asked.poses = {{scene.obstacles[0].position, scene.obstacles[0].rotation}};
+        asked.h = scene.h;
+        asked.floor = kFloor;
+        asked.margin = kMargin;
+        asked.round = 1;
+        for (size_t b = 0; b < mean.size(); ++b) {
+          dfm::GuardSide side;
+          side.surface = scene.bodies[b].surface;
+          side.mean = mean[b].data();
+          side.travel = side.spread = 3 * scene.h;
+          side.stamp.assign(side.surface->nsurfel, 0);
+          side.end.assign(size_t{4} * side.surface->nsurfel, 0.0);
+          asked.sides.push_back(side);
+        }
+        asked.sides.emplace_back().still = true;
+        memory[k].follow(list, k ? &tasks : nullptr);
+        if (k) dfm::guard_near(asked, list, memory[k], near[k], &blocks, &tasks);
+        else dfm::guard_near(asked, list, memory[k], near[k]);
+        memory[k].keep();
+      }
+      ASSERT_EQ(near[0], near[1]) << threads << " threads, step " << step;
+      ASSERT_EQ(memory[0].rest, memory[1].rest) << threads << " threads, step " << step;
+      ASSERT_EQ(memory[0].normal, memory[1].normal) << threads << " threads, step " << step;
+      found += near[0].size();
+    }
+    EXPECT_GT(found, 100u);
+  }
 }
