@@ -46,7 +46,7 @@ Vec3 apart(const Features &f) {
 }
 
 // Candidates that are worth a block of their own, most of which end at the first comparison.
-constexpr uint32_t kBlock = 512;
+constexpr uint32_t kBlock = 192;
 constexpr uint32_t kTogether = 4;  // pieces of a block: most runs are short
 
 // Two surfaces. Shared: several of them look at blocks of the list at the same time.

@@ -56,9 +56,10 @@ bool spin(Ready ready, Most most) {
 
 constexpr std::chrono::microseconds kWithinStep{2000}, kBetweenSteps{200}, kCrowded{2};
 
-// Blocks of `grain` are handed out by an atomic counter. Only workers that have entered a job are waited for:
-// one that sleeps, or whose core does something else, costs its help and nothing more. So that it does not
-// sleep, a worker spins between the jobs of a step.
+// Blocks of `grain` lie in as many runs as there are threads. Each thread takes those of its own run, in job
+// after job the same bodies, which its core still has in its cache; then what is left of the others'. Only
+// workers that have entered a job are waited for: one that sleeps, or whose core does something else, costs
+// its help and nothing more. So that it does not sleep, a worker spins between the jobs of a step.
 struct Tasks::Pool {
   static constexpr uint64_t kOpen = uint64_t{1} << 31, kInside = kOpen - 1;
   static constexpr int kNumber = 32;  // bits below a job's number
@@ -75,8 +76,12 @@ struct Tasks::Pool {
   std::atomic<uint32_t> stepping{0};  // worlds in a step
   bool crowded = false;               // more threads than processors: who spins keeps others from working
 
-  uint32_t n = 0, grain = 1;
-  std::atomic<uint32_t> next{0};
+  struct alignas(64) Run {  // of blocks; a line of the cache for each
+    std::atomic<uint32_t> next{0};
+    uint32_t end = 0;
+  };
+  uint32_t n = 0, grain = 1, runs = 0;
+  std::vector<Run> run;  // by thread, the owner's first
   void (*fn)(void *, uint32_t, uint32_t) = nullptr;
   void *task = nullptr;
 
@@ -90,17 +95,20 @@ struct Tasks::Pool {
     for (auto &worker : workers) worker.join();
   }
 
-  void drain() {
+  void drain(uint32_t own) {
     const Inside inside;
-    for (;;) {
-      const uint32_t block = next.fetch_add(1, std::memory_order_relaxed);
-      const uint64_t begin = uint64_t(block) * grain;
-      if (begin >= n) break;
-      fn(task, static_cast<uint32_t>(begin), static_cast<uint32_t>(std::min<uint64_t>(n, begin + grain)));
+    for (uint32_t k = 0; k < runs; ++k) {
+      Run &r = run[(own + k) % runs];
+      while (r.next.load(std::memory_order_relaxed) < r.end) {
+        const uint32_t block = r.next.fetch_add(1, std::memory_order_relaxed);
+        if (block >= r.end) break;
+        const uint64_t begin = uint64_t(block) * grain;
+        fn(task, static_cast<uint32_t>(begin), static_cast<uint32_t>(std::min<uint64_t>(n, begin + grain)));
+      }
     }
   }
 
-  void work() {
+  void work(uint32_t own) {
     uint64_t seen = 0;
     const auto ready = [&] {
       const uint64_t now = gate.load();
@@ -120,15 +128,21 @@ struct Tasks::Pool {
       uint64_t now = gate.load();
       if (!(now & kOpen) || now >> kNumber == seen || !gate.compare_exchange_strong(now, now + 1)) continue;
       seen = now >> kNumber;
-      drain();
+      drain(own);
       if (((gate.fetch_sub(1) - 1) & (kOpen | kInside)) != 0 || !waiting.load()) continue;
       const std::lock_guard lock(mutex);
       done.notify_one();
     }
   }
 
-  // Nobody is inside. blocks: of the job that was written.
-  void open(uint32_t blocks) {
+  // Nobody is inside, and the job is written.
+  void open() {
+    const uint32_t blocks = 1 + (n - 1) / grain;
+    runs = std::min(blocks, static_cast<uint32_t>(run.size()));
+    for (uint64_t k = 0; k < runs; ++k) {
+      run[k].next.store(static_cast<uint32_t>(k * blocks / runs), std::memory_order_relaxed);
+      run[k].end = static_cast<uint32_t>((k + 1) * blocks / runs);
+    }
     gate.store(((gate.load() >> kNumber) + 1) << kNumber | kOpen);
     const uint32_t sleepers = asleep.load(), all = static_cast<uint32_t>(workers.size());
     const uint32_t wanted = std::min(blocks - 1, all), awake = all - std::min(sleepers, all);
@@ -156,8 +170,10 @@ Tasks::Tasks(uint32_t threads, HostFor host_for, void *host_user)
   pool_ = std::make_unique<Pool>();
   const uint32_t processors = std::thread::hardware_concurrency();
   pool_->crowded = processors > 0 && threads_ > processors;
+  pool_->run = std::vector<Pool::Run>(threads_);
   pool_->workers.reserve(threads_ - 1);
-  for (uint32_t i = 1; i < threads_; ++i) pool_->workers.emplace_back([pool = pool_.get()] { pool->work(); });
+  for (uint32_t i = 1; i < threads_; ++i)
+    pool_->workers.emplace_back([pool = pool_.get(), i] { pool->work(i); });
 }
 
 Tasks::~Tasks() = default;
@@ -184,9 +200,8 @@ void Tasks::run(uint32_t n, uint32_t grain, void (*fn)(void *, uint32_t, uint32_
   pool.grain = grain;
   pool.fn = fn;
   pool.task = task;
-  pool.next.store(0, std::memory_order_relaxed);
-  pool.open(1 + (n - 1) / grain);
-  pool.drain();
+  pool.open();
+  pool.drain(0);
   pool.close();
 }
 

@@ -30,14 +30,26 @@ void begin_bodies(World &w, StepContext &step) {
   for (size_t i = 0; i < w.bodies.size(); ++i) w.bodies[i]->dynamics->begin(step.near[i]);
 }
 
+namespace {
+// From so many cells on models cut their work themselves, among all threads.
+constexpr size_t kLargeBody = 10000;
+bool fewer_than_threads_and_large(const World &w, Active active) {
+  return active.size() < w.context->tasks.threads() &&
+         std::ranges::all_of(active, [&](uint32_t i) { return w.bodies[i]->tets.size() >= 4 * kLargeBody; });
+}
+}  // namespace
+
 bool stage_model(World &w, Active active, const SubStep &now, uint32_t *trouble) {
   FirstFailure failed;
-  w.context->tasks.parallel_for(static_cast<uint32_t>(active.size()), 1, [&](uint32_t begin, uint32_t end) {
+  const auto forces = [&](uint32_t begin, uint32_t end) {
     for (const uint32_t i : active.subspan(begin, end - begin)) {
       const OnBehalf speaks(w.bodies[i]->name);
       if (!w.bodies[i]->dynamics->add_forces(now)) failed.note(i);
     }
-  });
+  };
+  const uint32_t n = static_cast<uint32_t>(active.size());
+  if (fewer_than_threads_and_large(w, active)) forces(0, n);
+  else w.context->tasks.parallel_for(n, 1, [&](uint32_t begin, uint32_t end) { forces(begin, end); });
   if (failed.body == kNone) return true;
   *trouble |= DFM_TROUBLE_PLUGIN;
   const Body &b = *w.bodies[failed.body];
