@@ -20,8 +20,8 @@ MOST_SECONDS = 300  # of processor time, for one case
 class TooSlow(RuntimeError):
     """Raised by an entry that has used its time up: a result like any other."""
 
-    def __init__(self, done, end):
-        super().__init__("too slow: > %d s for %.3g of %.3g s" % (MOST_SECONDS, done, end))
+    def __init__(self, done, end, most=MOST_SECONDS):
+        super().__init__("too slow: > %d s for %.3g of %.3g s" % (most, done, end))
 
 
 def band(value, share):

@@ -3,8 +3,9 @@ the same tetrahedra.
 
 Its explicit integrator with its implicit damping, and its implicit one. Contacts of nodes only (its default,
 and that of its demonstrations): with contacts of faces (SDF_RDF) the implicit world does not move at all,
-without friction neither. It tells no contact forces: what carries the ball follows from its momentum, and the
-turning pad is not run. It has one coefficient of friction and no bristles.
+without friction neither. It tells no contact forces: what carries the ball follows from its momentum, what
+the floor does to the turning pad from what holds the pad's top. It has one coefficient of friction and no
+bristles.
 
   default    as the world is constructed: explicit, 10 iterations, erp 0.06
   explicit   100 iterations, as in its demonstrations, which are what it has for a manual of this part
@@ -25,12 +26,14 @@ SETTINGS = {"default": {"implicit": 0, "iterations": 10, "erp": 0.06},
             "implicit": {"implicit": 1, "iterations": 100, "erp": 0.06},
             "explicit 4 ms": {"implicit": 0, "iterations": 100, "erp": 0.06, "step": 1 / 240},
             "implicit 4 ms": {"implicit": 1, "iterations": 100, "erp": 0.06, "step": 1 / 240}}
+MARGIN = 1e-3  # m, bullet_world.h: a soft body stands off by it
 SEARCH = {"implicit": [1], "step": [2.5e-4, 5e-4, 1e-3, 2e-3], "erp": [0.02, 0.2, 0.5],
           "iterations": [10, 30, 300]}
 
 
 class Entry:
     name, settings, SEARCH, SEARCH_FROM = "bullet", SETTINGS, SEARCH, "explicit"
+    source = os.path.join(os.path.dirname(os.path.abspath(__file__)), "bullet_entry.cpp")
 
     def __init__(self, command, work):
         self.command, self.work, self.meshes = command, work, {}
@@ -45,34 +48,35 @@ class Entry:
         self.version = subprocess.run(["pkg-config", "--modversion", "bullet"], capture_output=True,
                                       text=True).stdout.strip()
         self.program = os.path.join(work, "bullet_entry")
-        source = os.path.join(os.path.dirname(os.path.abspath(__file__)), "bullet_entry.cpp")
-        subprocess.run(["c++", "-O2", "-std=c++17", source, "-o", self.program, *flags.stdout.split()],
+        subprocess.run(["c++", "-O2", "-std=c++17", self.source, "-o", self.program, *flags.stdout.split()],
                        check=True)
 
     def configurations(self, case):
-        plain = case["law"] == "coulomb" and case["name"] != "rotating_pad"
-        return list(self.settings) if plain else []
+        return list(self.settings) if case["law"] == "coulomb" else []
 
     def why_not(self, case):
-        return "it tells no contact forces" if case["law"] == "coulomb" else "no law with " + case["law"]
+        return "no law with " + case["law"]
 
-    def run(self, case, configuration):
-        key = str(sorted(case["body"].items(), key=str))
+    def mesh(self, body):
+        """Its file for the program and its volume; `points` are those of the last that was asked for."""
+        key = str(sorted(body.items(), key=str))
         if key not in self.meshes:
             path = os.path.join(self.work, "mesh_%d" % len(self.meshes))
-            mesh_file.make(self.command, case["body"], path + ".msh2")
+            mesh_file.make(self.command, body, path + ".msh2")
             points, tets = mesh_file.read(path + ".msh2")
-            with open(path, "w") as f:
-                f.write("%d %d\n" % (len(points), len(tets)))
-                f.writelines("%.9g %.9g %.9g\n" % tuple(p) for p in points)
-                f.writelines("%d %d %d %d\n" % tuple(t) for t in tets)
-            self.meshes[key] = (path, mesh_file.volume(points, tets))
-        path, volume = self.meshes[key]
+            mesh_file.write_text(path, points, tets)
+            self.meshes[key] = (path, mesh_file.volume(points, tets), points)
+        path, volume, self.points = self.meshes[key]
+        return path, volume
+
+    def run(self, case, configuration):
+        path, volume = self.mesh(case["body"])
         m = case["body"]["material"]
         given = {k: v for k, v in case.items() if isinstance(v, float)}
         given.update(mass=m["density"] * volume, young=m["young"], poisson=m["poisson"],
                      damping=m["damping_stiffness"], begin=case.get("span", [0, 0])[0],
-                     end=case.get("span", [0, 0])[1], radius=case["body"].get("radius", 0.0))
+                     end=case.get("span", [0, 0])[1], radius=case["body"].get("radius", 0.0),
+                     height=case["body"].get("height", 0.0), touch=MARGIN)
         given.update(self.settings[configuration])
         most = cases.MOST_SECONDS
         before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime

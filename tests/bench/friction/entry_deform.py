@@ -91,21 +91,26 @@ class Entry:
     @staticmethod
     def bristles(case, law):
         """What brings a law to the case's bristles, which are Dahl's."""
-        if law in ("dahl", "elastoplastic"):
+        if law == "dahl":
             return {"sigma0": case["sigma0"]}
-        if law == "lugre":  # without micro-damping it is Dahl's law
+        if law in ("lugre", "elastoplastic"):  # lugre without micro-damping is Dahl's law
             return {"sigma0": case["sigma0"], "sigma1": 0}
         if law != "gms":
             return {}
-        # Chords of Dahl's first loading p = 1 - exp(-u), u = sigma0 x / limit, at 12 points: the elements'
-        # shares and stiffnesses follow from its slopes, the last chord ends level.
-        n, last = 12, 5.0
+        # Springs that slip obey Masing's rule, Dahl's bristle does not: with the first loading b(u) =
+        # (1 + p) (1 - exp(-2 u)) / 2, u = sigma0 x / limit, p = tanh(a) at the amplitude a, their loop is
+        # Dahl's closed loop. Chords of b up to a: the elements' stiffnesses are the differences of their
+        # slopes; the last one does not slip and has what is left of the limit.
+        n = 12
+        limit = case["mu"] * case["normal"]
+        area = case["body"]["size"][0] * case["body"]["size"][1]
+        last = case["sigma0"] * area * case["amplitude"] / limit
         u = [last * (i + 1) / n for i in range(n)]
-        p = [0.0] + [1 - math.exp(-x) for x in u]
-        slopes = [(b - a) / (x - y) for a, b, x, y in zip(p, p[1:], u, [0.0] + u)] + [0.0]
-        k = [a - b for a, b in zip(slopes, slopes[1:])]
-        nu = [a * x for a, x in zip(k, u)]
-        return {"k": [case["sigma0"] * a for a in k], "nu": [a / sum(nu) for a in nu], "C": 1e7}
+        b = [0.0] + [(1 + math.tanh(last)) * (1 - math.exp(-2 * x)) / 2 for x in u]
+        slopes = [(y - x) * n / last for x, y in zip(b, b[1:])]
+        k = [x - y for x, y in zip(slopes, slopes[1:])] + slopes[-1:]
+        nu = [a * x for a, x in zip(k[:-1], u)]
+        return {"k": [case["sigma0"] * a for a in k], "nu": [*nu, 1 - sum(nu)], "C": 1e7}
 
     def floor(self, scene, **more):
         scene["obstacles"] = [{"name": "floor", "shape": "plane", "point": [0, 0, 0], "normal": [0, 0, 1],

@@ -38,6 +38,14 @@ def read(path):
     return points, tets
 
 
+def write_text(path, points, tets):
+    """Counts, points, tetrahedra from 0, as text."""
+    with open(path, "w") as f:
+        f.write("%d %d\n" % (len(points), len(tets)))
+        f.writelines("%.9g %.9g %.9g\n" % tuple(p) for p in points)
+        f.writelines("%d %d %d %d\n" % tuple(t) for t in tets)
+
+
 def volume(points, tets):
     total = 0.0
     for a, b, c, d in tets:
@@ -45,3 +53,25 @@ def volume(points, tets):
         total += (u[0] * (v[1] * w[2] - v[2] * w[1]) - u[1] * (v[0] * w[2] - v[2] * w[0]) +
                   u[2] * (v[0] * w[1] - v[1] * w[0])) / 6
     return abs(total)
+
+
+def weights(points, tets):
+    """Share of the volume that each point has: a quarter of its tetrahedra."""
+    out = [0.0] * len(points)
+    for t in tets:
+        for i in t:
+            out[i] += volume(points, [t]) / 4
+    total = sum(out)
+    return [w / total for w in out]
+
+
+def turned(points, axis):
+    """A body made along z, turned so that z becomes x or y."""
+    return [[z, y, -x] if axis == "x" else [x, z, -y] for x, y, z in points]
+
+
+def shortening(points, uz, height):
+    """How much less the means of top and foot of a block lie apart, of displacements in the points' order."""
+    top = [u for p, u in zip(points, uz) if p[2] > height - 1e-6]
+    foot = [u for p, u in zip(points, uz) if p[2] < 1e-6]
+    return sum(foot) / len(foot) - sum(top) / len(top)

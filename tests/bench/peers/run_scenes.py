@@ -1,0 +1,75 @@
+#!/usr/bin/env python3
+"""Runs the scenes of scenes.py with one engine and writes a row per case, configuration and quantity.
+
+  run_scenes.py ENGINE --out FILE.csv [--command build/release/bin/deform] [--only CASE] [--cells N]
+                [--configuration NAME]
+
+ENGINE: NAME of a scenes_NAME.py here. Rows have the columns of friction/run.py; those that FILE holds are not
+run again. `cost`: seconds of processor time of the steps alone (without reading the mesh) per simulated
+second, the least of up to three runs where they are short.
+"""
+import argparse
+import importlib
+import os
+import sys
+import tempfile
+
+import scenes
+import run  # of the friction benchmark
+
+SHORT = 3.0  # s of processor time: what takes less is timed again
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("engine", metavar="ENGINE")
+    parser.add_argument("--command", default=os.path.join(run.ROOT, "build", "release", "bin", "deform"))
+    parser.add_argument("--only")
+    parser.add_argument("--cells", type=int)
+    parser.add_argument("--configuration")
+    parser.add_argument("--out", required=True)
+    given = parser.parse_args()
+    given.command, given.out = run.command_of(given.command), os.path.abspath(given.out)
+    try:
+        make = importlib.import_module("scenes_" + given.engine).Entry
+    except ModuleNotFoundError as error:
+        sys.exit(run.MISSING % (given.engine, error.name))
+    done = {tuple(r[c] for c in run.COLUMNS[:5]) for r in run.rows_of(given.out)}
+    slow = {(r["configuration"], r["case"]) for r in run.rows_of(given.out) if r["verdict"] == "too_slow"
+            and r["engine"] == given.engine}
+    with tempfile.TemporaryDirectory() as work:
+        try:
+            entry = make(given.command, work)
+        except ModuleNotFoundError as error:
+            sys.exit(run.MISSING % (given.engine, error.name))
+        for case in scenes.cases():
+            if given.only not in (None, case["name"]) or given.cells not in (None, case["cells"]):
+                continue
+            for configuration in entry.configurations(case) or ["none"]:
+                head = dict(zip(run.COLUMNS, [entry.name, entry.version, configuration, case["name"],
+                                              "cells=%d" % case["cells"]]))
+                if tuple(head.values()) in done or given.configuration not in (None, configuration):
+                    continue
+                if (configuration, case["name"]) in slow:
+                    rows = [{"verdict": "too_slow", "note": "too slow: on the coarse mesh already"}]
+                else:
+                    rows = run.measured_rows(entry, case, configuration)
+                if rows[0]["verdict"] == "too_slow":
+                    slow.add((configuration, case["name"]))
+                for _ in range(2):
+                    cost = float(rows[0].get("cost") or "inf")
+                    if cost * case["span"][1] > SHORT:
+                        break
+                    again = run.measured_rows(entry, case, configuration)
+                    rows = again if float(again[0].get("cost") or "inf") < cost else rows
+                for row in rows:
+                    run.append(given.out, run.COLUMNS, {**head, **row})
+                    shown = (entry.name, configuration, case["name"], case["cells"], row.get("quantity", ""),
+                             row.get("measured", ""), row.get("expected", ""), row["verdict"],
+                             row.get("cost", ""), row.get("note", ""))
+                    print("%-7s %-18s %-11s %5d %-15s %12s (%s) %s %s %s" % shown, flush=True)
+
+
+if __name__ == "__main__":
+    main()
