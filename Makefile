@@ -8,13 +8,13 @@ BUILD = @cmake --build --preset
 PYTHON ?= $(firstword $(wildcard /usr/bin/python3) python3)
 
 .PHONY: help demo test bench soak lint format tidy asan tsan fuzz install clean setup setup-bench setup-fuzz
-.PHONY: bench-peers
+.PHONY: bench-peers setup-peers
 
 help:
 	@echo "make demo             two soft cylinders with and without friction: table, picture, out/demo/"
 	@echo "make test             the whole test suite"
 	@echo "make bench            the figures: kernels and full steps"
-	@echo "make bench-peers      beside MuJoCo and Bullet: friction, speed at equal error, build/peers/"
+	@echo "make bench-peers      beside MuJoCo, Bullet and Jolt: speed at equal error, build/peers/"
 	@echo "make soak             jittered starts, the suite, combinations, what holds: hours; can be stopped"
 	@echo "make lint             layout, includes, headers, text"
 	@echo "make format           clang-format on all C and C++ files, one version everywhere"
@@ -28,6 +28,8 @@ setup:
 	$(SETUP) doors
 setup-bench:
 	$(SETUP) doors bench
+setup-peers:
+	$(SETUP) doors peers
 setup-fuzz:
 	$(SETUP) doors clang
 
@@ -62,7 +64,7 @@ bench: setup-bench build/bench/build.ninja
 	$(BUILD) bench
 	$(BUILD) bench --target run_bench
 
-bench-peers: setup build/release/build.ninja
+bench-peers: setup-peers build/release/build.ninja
 	$(BUILD) release --target deform_command
 	@$(PYTHON) -B tests/bench/peers/bench_peers.py build/release/bin/deform build/peers
 

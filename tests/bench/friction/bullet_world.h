@@ -62,9 +62,9 @@ struct Scene {
     world.getSolverInfo().m_numIterations = int(v.at("iterations"));
   }
 
-  // `place` turns a point of the file (m) and moves it. `matched`: moduli that give the law, which is that of
-  // Smith, De Goes and Kim (ACM TOG 37, 2018), the material's E and nu at small strain; as it stands, 3/4 of its
-  // mu counts there.
+  // `place` turns a point of the file (m) and moves it. `matched`: moduli that give the law, which is that
+  // of Smith, De Goes and Kim (ACM TOG 37, 2018), the material's E and nu at small strain; as it stands, 3/4
+  // of its mu counts there.
   using Place = std::function<btVector3(double, double, double)>;
   void load(const std::string &path, const Values &v, const Place &place, bool matched = false) {
     std::ifstream in(path);
@@ -138,8 +138,8 @@ struct Scene {
         btTransform(btQuaternion::getIdentity(), btVector3(btScalar(x), 0, btScalar(z))));
   }
 
-  // A heavy body that moves on at even speed and spin. A kinematic one would lose its spin: Bullet takes it from
-  // the cosine of half the step's turn, which is 1 in single precision below 7e-4 rad.
+  // A heavy body that moves on at even speed and spin. A kinematic one would lose its spin: Bullet takes it
+  // from the cosine of half the step's turn, which is 1 in single precision below 7e-4 rad.
   btRigidBody *heavy(btVector3 half, btVector3 at, btVector3 velocity, btVector3 spin) {
     auto *const shape = new btBoxShape(half);
     shape->setMargin(kMargin);
@@ -172,8 +172,8 @@ struct Scene {
     for (const int i : held) body->m_nodes[i].m_v = velocity;
   }
 
-  // Force of the tetrahedra on held points, and its moment about the z axis through `axis`: what holds them, the
-  // other way round. In the units of this file.
+  // Force of the tetrahedra on held points, and its moment about the z axis through `axis`: what holds them,
+  // the other way round. In the units of this file.
   std::pair<btVector3, double> reaction(const std::vector<int> &held, const btVector3 &axis) {
     btAlignedObjectArray<btVector3> force;
     force.resize(elastic->getNumNodes());
