@@ -7,8 +7,8 @@ The error of a run is the largest of its quantities': percent of what is expecte
 Two tables: the least processor time per simulated second with which each engine stays within an error, over
 its meshes and settings; the least error that each has within a processor time. Others have every run. The
 picture has all runs with each engine's front. With --page the tables take the place of what stands between
-the marks `<!-- scenes -->` and `<!-- end of scenes -->`. What an engine was calibrated with does not count: the
-coarse beam of Jolt.
+the marks `<!-- scenes -->` and `<!-- end of scenes -->`. What an engine was calibrated with does not count:
+the coarse beam of Jolt.
 """
 import argparse
 import csv
