@@ -50,8 +50,8 @@ def _metadata(project):
     return "\n".join(lines)
 
 
-def _platform():
-    return sysconfig.get_platform().replace("-", "_").replace(".", "_")
+def _tag():
+    return "py3-none-" + sysconfig.get_platform().replace("-", "_").replace(".", "_")
 
 
 def _run(*command):
@@ -91,6 +91,24 @@ def native_files(prefix):
                 yield path.relative_to(prefix).as_posix(), path
 
 
+def _information(project):
+    """Files of the wheel's .dist-info folder, RECORD left out."""
+    lines = ["Wheel-Version: 1.0", "Generator: deform", "Root-Is-Purelib: false", f"Tag: {_tag()}", ""]
+    scripts = "".join(f"{script} = {target}\n" for script, target in project["scripts"])
+    return {"METADATA": _metadata(project), "WHEEL": "\n".join(lines),
+            "entry_points.txt": f"[console_scripts]\n{scripts}", "LICENSE": (ROOT / "LICENSE").read_text()}
+
+
+def prepare_metadata_for_build_wheel(metadata_directory, config_settings=None):
+    """What pip asks first, so that it need not build the wheel to learn what it requires."""
+    project = _project()
+    info = pathlib.Path(metadata_directory) / f"{project['name']}-{project['version']}.dist-info"
+    info.mkdir()
+    for name, text in _information(project).items():
+        (info / name).write_text(text)
+    return info.name
+
+
 class _Wheel:
     def __init__(self, path):
         self.zip = zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED)
@@ -114,8 +132,7 @@ def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
     settings = dict(config_settings or {})
     project = _project()
     name = f"{project['name']}-{project['version']}"
-    tag = f"py3-none-{_platform()}"
-    wheel = _Wheel(pathlib.Path(wheel_directory) / f"{name}-{tag}.whl")
+    wheel = _Wheel(pathlib.Path(wheel_directory) / f"{name}-{_tag()}.whl")
     for path in sorted(PACKAGE.rglob("*")):
         if path.is_file() and path.suffix in (".py", ".pyi", ".js", ".html", ".typed"):
             wheel.add(f"deform/{path.relative_to(PACKAGE).as_posix()}", path.read_bytes())
@@ -126,14 +143,10 @@ def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
             mode = 0o755 if inside.startswith(("bin/", "lib/")) else 0o644
             wheel.add(f"deform/native/{inside}", path.read_bytes(), mode)
     info = f"{name}.dist-info"
-    wheel.add(f"{info}/METADATA", _metadata(project).encode())
-    lines = ["Wheel-Version: 1.0", "Generator: deform", "Root-Is-Purelib: false", f"Tag: {tag}", ""]
-    wheel.add(f"{info}/WHEEL", "\n".join(lines).encode())
-    scripts = "".join(f"{script} = {target}\n" for script, target in project["scripts"])
-    wheel.add(f"{info}/entry_points.txt", f"[console_scripts]\n{scripts}".encode())
-    wheel.add(f"{info}/LICENSE", (ROOT / "LICENSE").read_bytes())
+    for file, text in _information(project).items():
+        wheel.add(f"{info}/{file}", text.encode())
     wheel.close(info)
-    return f"{name}-{tag}.whl"
+    return f"{name}-{_tag()}.whl"
 
 
 def build_sdist(sdist_directory, config_settings=None):

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """What a step, and a look at an array, costs from Python beyond what it costs in C: an empty world stepped
-by a C program and by the package in turn, the least of several rounds each.
+by a C program and by the package in turn; processor time of the thread, the least of several rounds each.
 
-python_overhead.py BUILD_DIR [SOURCE_DIR]    prints a line for results/python_overhead.csv
+python_overhead.py BUILD_DIR [SOURCE_DIR]    prints head and row of results/python_overhead.csv
 """
 import ctypes
 import os
@@ -19,7 +19,7 @@ PROGRAM = r"""
 #include <time.h>
 static double now(void) {
   struct timespec t;
-  clock_gettime(CLOCK_MONOTONIC, &t);
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
   return 1e6 * (double)t.tv_sec + 1e-3 * (double)t.tv_nsec;
 }
 int main(void) {
@@ -54,11 +54,23 @@ def least(function):
     """us per call, of the least round."""
     best = float("inf")
     for _ in range(ROUNDS):
-        begin = time.perf_counter()
+        begin = time.thread_time()
         for _ in range(STEPS // 4):
             function()
-        best = min(best, (time.perf_counter() - begin) / (STEPS // 4) * 1e6)
+        best = min(best, (time.thread_time() - begin) / (STEPS // 4) * 1e6)
     return best
+
+
+def machine():
+    """The processor's name."""
+    with open("/proc/cpuinfo") as info:
+        names = (line.split(": ")[1].strip() for line in info if line.startswith("model name"))
+        return next(names, "unknown")
+
+
+def commit(source):
+    done = subprocess.run(["git", "-C", source, "rev-parse", "--short", "HEAD"], capture_output=True)
+    return done.stdout.decode().strip() or "unknown"
 
 
 def main():
@@ -79,9 +91,10 @@ def main():
     look = least(lambda: body.positions)
     raw_memory = (ctypes.c_double * (3 * body.nsurfel))()
     raw = least(lambda: _library.quick.dfm_surface_positions(body.handle, body.nsurfel, raw_memory, None))
-    print("c_step_us,python_step_us,step_overhead_us,look_us,look_beyond_raw_call_us,python")
-    print(f"{c:.3f},{step - empty:.3f},{step - empty - c:.3f},{look - empty:.3f},{look - raw:.3f},"
-          f"{sys.version.split()[0]}")
+    print("machine,commit,python,c_step_us,python_step_us,step_beyond_c_us,look_us,"
+          "look_beyond_raw_call_us")
+    print(f"{machine()},{commit(source)},{sys.version.split()[0]},{c:.3f},{step - empty:.3f},"
+          f"{step - empty - c:.3f},{look - empty:.3f},{look - raw:.3f}")
 
 
 if __name__ == "__main__":

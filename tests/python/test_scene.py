@@ -1,4 +1,5 @@
 """Scenes and runs: the same bits as the command, values, probes, errors with their place."""
+import gc
 import json
 import os
 import pathlib
@@ -43,6 +44,14 @@ class Scenes(unittest.TestCase):
         with self.assertRaises(deform.HandleError):
             scene.world.step(1e-3)
         scene.close()
+
+    def test_world_keeps_its_scene(self):
+        world = deform.Scene(SCENES / "slope_block.json").world
+        gc.collect()
+        world.step(1e-3)
+        self.assertEqual(world.stats.steps, 1)
+        world.close()
+        self.assertTrue(world.closed)
 
     def test_probes(self):
         with deform.Scene(SCENES / "gravity_beams.json") as scene:

@@ -47,6 +47,7 @@ class Views(unittest.TestCase):
         kept = view.copy()
         world.step(1 / 120)
         self.assertIs(body.positions, view)
+        self.assertIs(world.bodies[0].positions, view)
         self.assertFalse(np.array_equal(view, kept))
         contacts = world.contacts
         self.assertEqual(len(contacts), world.stats.contacts)

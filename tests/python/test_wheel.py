@@ -3,6 +3,7 @@ command, picture. No registry is asked: NumPy is the system's."""
 import os
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -47,6 +48,11 @@ class Wheel(unittest.TestCase):
             self.assertGreater(int(last.split()[-1]), 10)  # laws and models, loaded from the package's folder
             self.assertEqual((folder / "other" / "ball.png").read_bytes()[:4], b"\x89PNG")
             print(f"environment, wheel, install and first picture: {time.monotonic() - began:.1f} s")
+            shutil.copy(SOURCE / "tests" / "python" / "test_law.py", folder / "other")
+            law = "import test_law; print(test_law.Bristle().check(only=['F01', 'F02']).column('result'))"
+            said = subprocess.run([python, "-c", law], cwd=folder / "other", capture_output=True, text=True,
+                                  env=clean())
+            self.assertEqual(said.stdout.strip(), "['pass', 'pass']", said.stderr)
             version = subprocess.run([folder / "venv" / "bin" / "deform", "--version"], capture_output=True,
                                      text=True, env=clean(), check=True).stdout
             self.assertIn(re.search(r"-([\d.]+)-py3", wheel.name).group(1), version)

@@ -110,6 +110,17 @@ class Errors(unittest.TestCase):
                     wrong()
                 self.assertTrue(caught.exception.status.startswith("DFM_E_"))
 
+    def test_wrong_kinds_say_what_is_expected(self):
+        with deform.World() as world:
+            mesh = deform.TetMesh.ball(0.1, 300)
+            for wrong, sentence in ((lambda: world.add_body(mesh, material="rubber"), "given as a dict"),
+                                    (lambda: world.add_body(deform.TriMesh.make("ball", [1])), "TetMesh"),
+                                    (lambda: world.add_friction(law=3), "a law is a name"),
+                                    (lambda: world.step("soon"), "float")):
+                with self.subTest(sentence), self.assertRaisesRegex((TypeError, ValueError), sentence):
+                    wrong()
+            world.step(np.float32(1e-3))
+
     def test_discarded_step_changes_nothing(self):
         with deform.World(max_substeps=1) as world:
             body = ball(world, material={"young": 1e8})

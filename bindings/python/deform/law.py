@@ -37,7 +37,8 @@ _RULES = ([f"V{i:02}" for i in range(1, 15)] + [f"F{i:02}" for i in range(1, 18)
 def _columns(address: int, columns: int, stride: int, n: int) -> np.ndarray:
     """[columns, n] over the library's memory."""
     memory = (ctypes.c_double * (columns * stride)).from_address(address)
-    return np.frombuffer(memory, dtype=np.float64).reshape(columns, stride)[:, :n]
+    whole: np.ndarray = np.frombuffer(memory, dtype=np.float64)  # type: ignore[call-overload]
+    return whole.reshape(columns, stride)[:, :n]
 
 
 class PythonLaw:
@@ -181,7 +182,8 @@ class _Bridge:
     """C tables of a Python law, and the functions that the library calls."""
 
     def __init__(self, law: PythonLaw):
-        self.law, self.error = law, None
+        self.law = law
+        self.error: BaseException | None = None
         if not law.id or "." not in law.id:
             raise ArgumentError(f"a law needs an id in reverse-DNS form, such as 'com.example.tanh', not "
                                 f"'{law.id}'", "DFM_E_ARG")
@@ -340,8 +342,8 @@ class _Server:
             self.bridge.error = self.bridge.error or raised
             return struct.pack("i", _abi.DFM_E_FATAL)
         doubles = (out.ft, out.state, out.dft_dvt, out.dft_dfn, out.limit, out.stored)
-        columns = b"".join(np.asarray(a, np.float64).tobytes() for a in doubles)
-        return struct.pack("i", _abi.DFM_OK) + columns + np.asarray(out.mode, np.uint8).tobytes()
+        told = b"".join(np.asarray(a, np.float64).tobytes() for a in doubles)
+        return struct.pack("i", _abi.DFM_OK) + told + np.asarray(out.mode, np.uint8).tobytes()
 
     def _checked(self, stream: Any) -> bytes:
         params = self._doubles(stream, self.law.width())

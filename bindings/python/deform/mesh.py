@@ -58,7 +58,8 @@ def _size(values: Sequence[float]) -> Any:
 
 
 def _groups(names: int | None, count: int) -> list[str]:
-    return [ctypes.c_char_p.from_address((names or 0) + 8 * i).value.decode() for i in range(count)]
+    words = (ctypes.c_char_p.from_address((names or 0) + 8 * i).value for i in range(count))
+    return [(word or b"").decode() for word in words]
 
 
 class _Mesh:

@@ -64,7 +64,7 @@ def friction(law: Any, kind: str = "sine_velocity", *, normal: float = 1.0,
     if step is None:
         slow = case.get("input", {}).get("kind") == "displacement_path"
         step = 1e-2 if slow else 1e-3 if isinstance(law, PythonLaw) else 1e-4
-    served = law.served() if isinstance(law, PythonLaw) else nullcontext((law, {}))
+    served: Any = law.served() if isinstance(law, PythonLaw) else nullcontext((law, {}))
     with tempfile.TemporaryDirectory() as name, served as (file, environment):
         folder = pathlib.Path(name)
         (folder / "case.json").write_text(json.dumps(case))

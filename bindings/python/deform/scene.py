@@ -56,7 +56,8 @@ class Scene:
         self.handle, self.path = out.value, str(path)
         self._finalize = weakref.finalize(self, _close, self.handle, context)
         check(quick.dfm_scene_world(self.handle, ctypes.byref(world)))
-        self.world = World.of_scene(context, world.value, _Closer(self._finalize))
+        # each keeps the other: `Scene(path).world` is a world to use
+        self.world = World.of_scene(context, world.value, self)
 
     def close(self) -> None:
         """Closes the scene and destroys its world. Twice is allowed."""
@@ -101,13 +102,6 @@ class Scene:
         duration, every: s, instead of the scene's. watch: called after each step; it may look at the
         world."""
         return _Runner(self, duration, every, watch).run()
-
-
-class _Closer:
-    """What a scene's world closes: the scene, without keeping it."""
-
-    def __init__(self, finalize: Any):
-        self.close = finalize
 
 
 @dataclass
@@ -205,7 +199,8 @@ class _Runner:
         if out.frames[-1].t != self.world.time:
             self.record(always=True)
         memory = _abi.dfm_world_stats.from_buffer_copy(self.world.stats.tobytes())
-        out.stats = np.frombuffer(memory, dtype=np.dtype((np.record, row_type(_abi.dfm_world_stats))))[0]
+        kind = np.dtype((np.record, row_type(_abi.dfm_world_stats)))
+        out.stats = np.frombuffer(memory, dtype=kind)[0]  # type: ignore[call-overload]
         out.hash = self.world.hash
         return out
 

@@ -91,6 +91,8 @@ class World:
     arrays keep their last values, and everything else raises HandleError.
     """
 
+    _finalize: Any
+
     def __init__(self, gravity: Sequence[float] = (0, 0, -9.81), *, integrator: str = "auto",
                  method: str = "auto", step: float = 0, sleep: bool = False, self_contact: str = "off",
                  effects: Iterable[str] | None = None, contact_offset: float = 0, max_substeps: int = 10000,
@@ -113,16 +115,17 @@ class World:
         out = ctypes.c_uint64()
         check(lib.dfm_world_create(context.address, ctypes.byref(definition), ctypes.byref(out)))
         self._begin(context, out.value)
-        self._finalize = weakref.finalize(self, _destroy, self.handle, context)
+        self._finalize = weakref.finalize(self, _destroy, out.value, context)
 
     def _begin(self, context: Context, handle: int, owner: Any = None) -> None:
+        self._finalize = None
         self.context, self.handle = context, handle
         self._owner = owner
         self._busy = False
         self._bits = ctypes.c_uint32(0)
         self._bits_at = ctypes.byref(self._bits)
         self._lists: dict[str, Any] = {}
-        self._finalize: Any = None
+        self._bodies: weakref.WeakValueDictionary[int, Body] = weakref.WeakValueDictionary()
 
     @classmethod
     def of_scene(cls, context: Context, handle: int, owner: Any) -> World:
@@ -220,6 +223,9 @@ class World:
             mesh = TetMesh.read(mesh)
         definition = default(_abi.dfm_body_def)
         keep: list[Any] = [mesh]
+        if mesh is not None and not isinstance(mesh, TetMesh):
+            raise TypeError(f"a body is made of a deform.TetMesh, of a file, or of points and tets; not "
+                            f"{mesh!r}")
         if mesh is not None:
             if points is not None or tets is not None:
                 raise ArgumentError("add_body takes a mesh, or points and tets, not both", "DFM_E_ARG")
@@ -241,6 +247,9 @@ class World:
         definition.model_params = values.struct
         if isinstance(material, Mapping):
             material = self.add_material(**material)
+        if material is not None and not isinstance(material, Material):
+            raise TypeError(f"a material is made by add_material or given as a dict of its entries, as "
+                            f"{{'young': 2e5}}; not {material!r}")
         definition.material = material.handle if material is not None else 0
         definition.pose = pose_of(position, rotation)
         definition.velocity, definition.spin = vector(velocity, "velocity"), vector(spin, "spin")
@@ -270,7 +279,7 @@ class World:
         with self.alone():
             status = lib.dfm_body_create(self.handle, ctypes.byref(definition), ctypes.byref(out))
         check(status)
-        return Body(self, out.value)
+        return self._body(out.value)
 
     def add_obstacle(self, shape: str = "plane", *, name: str | None = None,
                      position: Sequence[float] = (0, 0, 0), rotation: Sequence[float] | None = None,
@@ -332,6 +341,13 @@ class World:
         kind = Rigid if quick.dfm_handle_kind(handle) == _abi.DFM_HANDLE_RIGID else Obstacle
         return kind(self, handle, (out.name or b"").decode())
 
+    def _body(self, handle: int) -> Body:
+        """One object for a body as long as anybody has it, so that its arrays are the same ones."""
+        body = self._bodies.get(handle)
+        if body is None:
+            body = self._bodies[handle] = Body(self, handle)
+        return body
+
     def _handles(self, function: Any) -> list[int]:
         self.free()
         n = number_of(function, self.handle)
@@ -342,7 +358,7 @@ class World:
     @property
     def bodies(self) -> list[Body]:
         """In order of creation."""
-        return [Body(self, h) for h in self._handles(quick.dfm_world_bodies)]
+        return [self._body(h) for h in self._handles(quick.dfm_world_bodies)]
 
     @property
     def obstacles(self) -> list[Obstacle]:
@@ -354,12 +370,12 @@ class World:
         out = ctypes.c_uint64()
         self.free()
         check(quick.dfm_world_find_body(self.handle, name.encode(), ctypes.byref(out)))
-        return Body(self, out.value)
+        return self._body(out.value)
 
     def owner(self, handle: int) -> Body | Obstacle:
         """What a handle of a report (contacts["body_a"], pairs["b"]) stands for."""
         if quick.dfm_handle_kind(int(handle)) == _abi.DFM_HANDLE_BODY:
-            return Body(self, int(handle))
+            return self._body(int(handle))
         return self._obstacle(int(handle))
 
     # ---- friction --------------------------------------------------------------------------------------
@@ -400,11 +416,14 @@ class World:
 
         Raises Diverged where a sub-step could not be taken (the world stays at the last good one) and
         Discarded where the step was given up and nothing has changed. Releases the interpreter's lock."""
+        seconds = float(dt)
         if self._busy:
             self.free()
         self._busy = True
-        status = _step(self.handle, dt, self._bits_at)
-        self._busy = False
+        try:
+            status = _step(self.handle, seconds, self._bits_at)
+        finally:
+            self._busy = False
         if status:
             self.accept(status)
         return Trouble(self._bits.value) if self._bits.value else _NO_TROUBLE
