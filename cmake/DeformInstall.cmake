@@ -38,16 +38,21 @@ install(DIRECTORY ${deform_templates} DESTINATION ${CMAKE_INSTALL_DATADIR}/defor
 install(FILES ${CMAKE_SOURCE_DIR}/LICENSE ${CMAKE_SOURCE_DIR}/README.md ${CMAKE_SOURCE_DIR}/CHANGELOG.md
   DESTINATION ${CMAKE_INSTALL_DOCDIR})
 
-# libdeform_ode has an export of its own, so that who does not ask for it (find_package(deform COMPONENTS
-# ode)) needs no ODE.
-if(TARGET deform_ode)
-  install(TARGETS deform_ode EXPORT deformOdeTargets LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}
-    ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
-  set_target_properties(deform_ode PROPERTIES INSTALL_RPATH "$ORIGIN" BUILD_WITH_INSTALL_RPATH ON)
-  install(DIRECTORY ${CMAKE_SOURCE_DIR}/bindings/ode/include/deform DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
-    FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp")
-  install(EXPORT deformOdeTargets NAMESPACE deform:: DESTINATION ${deform_cmake_dir})
-endif()
+# The adapters of rigid engines have exports of their own, so that who does not ask for one
+# (find_package(deform COMPONENTS ode)) needs no engine.
+set(deform_adapters "")
+foreach(adapter ode bullet bullet64)
+  if(TARGET deform_${adapter})
+    list(APPEND deform_adapters ${adapter})
+    string(REGEX REPLACE "64$" "" folder ${adapter})
+    install(TARGETS deform_${adapter} EXPORT deform_${adapter}Targets
+      LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+    set_target_properties(deform_${adapter} PROPERTIES INSTALL_RPATH "$ORIGIN" BUILD_WITH_INSTALL_RPATH ON)
+    install(DIRECTORY ${CMAKE_SOURCE_DIR}/bindings/${folder}/include/deform
+      DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp")
+    install(EXPORT deform_${adapter}Targets NAMESPACE deform:: DESTINATION ${deform_cmake_dir})
+  endif()
+endforeach()
 
 install(EXPORT deformTargets NAMESPACE deform:: DESTINATION ${deform_cmake_dir})
 configure_package_config_file(${CMAKE_SOURCE_DIR}/cmake/deformConfig.cmake.in
@@ -73,11 +78,12 @@ if(DEFORM_PLUGINS_STATIC)
 endif()
 configure_file(${CMAKE_SOURCE_DIR}/cmake/deform.pc.in ${CMAKE_BINARY_DIR}/cmake/deform.pc @ONLY)
 install(FILES ${CMAKE_BINARY_DIR}/cmake/deform.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
-if(TARGET deform_ode)
-  set(deform_ode_pc_private "")
-  if(NOT DEFORM_SHARED)
-    set(deform_ode_pc_private "-lstdc++ -lm")
-  endif()
-  configure_file(${CMAKE_SOURCE_DIR}/cmake/deform_ode.pc.in ${CMAKE_BINARY_DIR}/cmake/deform_ode.pc @ONLY)
-  install(FILES ${CMAKE_BINARY_DIR}/cmake/deform_ode.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+set(deform_adapter_pc_private "")
+if(NOT DEFORM_SHARED)
+  set(deform_adapter_pc_private "-lstdc++ -lm")
 endif()
+foreach(adapter IN LISTS deform_adapters)
+  configure_file(${CMAKE_SOURCE_DIR}/cmake/deform_${adapter}.pc.in
+    ${CMAKE_BINARY_DIR}/cmake/deform_${adapter}.pc @ONLY)
+  install(FILES ${CMAKE_BINARY_DIR}/cmake/deform_${adapter}.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+endforeach()

@@ -9,6 +9,9 @@
 #include <new>
 
 #include "cli.h"
+#ifdef DEFORM_HAVE_BULLET
+#include "bullet_host.h"
+#endif
 #ifdef DEFORM_HAVE_ODE
 #include "deform/ode_host.h"
 #endif
@@ -150,6 +153,9 @@ dfm_context *make_context(const Globals &g) {
   def.log = on_log;
   dfm_context *context = nullptr;
   if (dfm_context_create(&def, &context) < 0) std::exit(leave(fail(dfm_last_error())));
+#ifdef DEFORM_HAVE_BULLET
+  register_bullet();
+#endif
 #ifdef DEFORM_HAVE_ODE
   if (dfm_ode_register() != DFM_OK) on_log(nullptr, DFM_LOG_WARNING, dfm_last_error());
 #endif

@@ -21,7 +21,7 @@ class OdeWorld : public OwnWorld {
   Member *make_body(const dfm_rigid_def &def, uint32_t number) override;
   void make_joint(const Joint &joint, size_t number) override;
   void set_gravity(const double g[3]) override { dWorldSetGravity(engine_.world, g[0], g[1], g[2]); }
-  void drive(size_t joint, double velocity, double max) override;
+  void drive(size_t joint, double velocity, double max, double h) override;
   Wrench wrench(size_t joint) const override {
     return {load(ties_[joint].feedback.f1), load(ties_[joint].feedback.t1)};
   }
@@ -157,7 +157,7 @@ OdeWorld::~OdeWorld() {
   dWorldDestroy(engine_.world);
 }
 
-void OdeWorld::drive(size_t number, double velocity, double max) {
+void OdeWorld::drive(size_t number, double velocity, double max, double) {
   const dJointID id = ties_[number].id;
   if (joints()[number].type == DFM_JOINT_HINGE) {
     dJointSetHingeParam(id, dParamVel, velocity);

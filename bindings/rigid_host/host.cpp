@@ -112,13 +112,7 @@ dfm_status failed(dfm_status status, const char *format, ...) {
 
 dfm_status missing(const char *what) { return failed(DFM_E_ARG, "argument '%s' is NULL", what); }
 
-dfm_status register_host(const EngineKind &kind) {
-  static std::mutex mutex;
-  static std::vector<const EngineKind *> done;
-  std::lock_guard lock(mutex);
-  for (const EngineKind *each : done)
-    if (each == &kind) return DFM_OK;
-  done.reserve(done.size() + 1);
+dfm_rigid_host table_of(const EngineKind &kind) {
   dfm_rigid_host table{};
   table.size = sizeof table;
   table.user = const_cast<EngineKind *>(&kind);
@@ -131,6 +125,17 @@ dfm_status register_host(const EngineKind &kind) {
   table.set_motor = set_motor;
   table.joint = joint;
   table.may_destroy = may_destroy;
+  return table;
+}
+
+dfm_status register_host(const EngineKind &kind) {
+  static std::mutex mutex;
+  static std::vector<const EngineKind *> done;
+  std::lock_guard lock(mutex);
+  for (const EngineKind *each : done)
+    if (each == &kind) return DFM_OK;
+  done.reserve(done.size() + 1);
+  const dfm_rigid_host table = table_of(kind);
   const dfm_status status = dfm_rigid_host_register(kind.host, &table);
   if (status == DFM_OK) done.push_back(&kind);
   return status;

@@ -41,6 +41,7 @@ struct EngineKind {
   dfm_status (*own_world)(const dfm_rigid_set_def &set, void **self, uint32_t *group, uint32_t *nextra);
 };
 
+dfm_rigid_host table_of(const EngineKind &kind);
 dfm_status register_host(const EngineKind &kind);  // a second call does nothing
 dfm_status failed(dfm_status status, const char *format, ...) __attribute__((format(printf, 2, 3)));
 dfm_status missing(const char *argument);

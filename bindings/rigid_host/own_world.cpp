@@ -116,15 +116,17 @@ void OwnWorld::predict_all(const dfm_rigid_step &step, double *velocity) {
   for (size_t k = 0; k < joints_.size(); ++k) {
     const Joint &j = joints_[k];
     const double *const motor = step.extra + first_joint() + kMotor * k;
-    if (j.made && j.type <= DFM_JOINT_SLIDER) drive(k, j.sign() * motor[0], motor[1]);
+    if (j.made && j.type <= DFM_JOINT_SLIDER) drive(k, j.sign() * motor[0], motor[1], step.h);
   }
-  for (const uint32_t i : moving_)
-    if (std::memcmp(&given_[i], &step.state[i], sizeof given_[i]) != 0) engine_.reopen();
+  bool put = false;
+  for (const uint32_t i : moving_) put |= !same(given_[i], step.state[i]);
+  if (put) engine_.reopen();
   if (!engine_.is_open())
     for (const uint32_t i : moving_) {
       members_[i]->put(step.state[i]);
       given_[i] = step.state[i];
     }
+  if (put) forget();
   for (const uint32_t i : moving_) engine_.predict(*members_[i], step, i, velocity + 6 * size_t{i});
 }
 

@@ -46,8 +46,11 @@ class OwnWorld : public Host {
   virtual Member *make_body(const dfm_rigid_def &def, uint32_t number) = 0;  // null: fixed
   virtual void make_joint(const Joint &joint, size_t number) = 0;
   virtual void set_gravity(const double gravity[3]) = 0;
-  virtual void drive(size_t joint, double velocity, double max) = 0;  // of the first body against the second
+  // Of the first body against the second, in a sub-step of h.
+  virtual void drive(size_t joint, double velocity, double max, double h) = 0;
   virtual Wrench wrench(size_t joint) const = 0;
+  // What the engine remembers of earlier sub-steps goes: the bodies have been put somewhere else.
+  virtual void forget() {}
   // Runs what calls the engine, which may refuse.
   virtual void call(const std::function<void()> &f) { f(); }
 

@@ -1,6 +1,6 @@
-// Rigid bodies of ODE in scenes: a box lands on a bed, fingers lift a ball, a cart drives over a bump on its
-// tyres, a chain drags a ring, weights tip a seesaw. Rigid bodies do not touch each other there, so the
-// builtin host must bring the same.
+// Rigid bodies of an engine in scenes: a box lands on a bed, fingers lift a ball, a cart drives over a bump
+// on its tyres, a chain drags a ring, weights tip a seesaw. Rigid bodies do not touch each other there, so
+// the builtin host must bring the same as ODE and both builds of Bullet.
 #include "scenes.h"
 
 namespace {
@@ -24,16 +24,24 @@ std::vector<std::string> lasting(double time, std::vector<std::string> settings 
   return arguments;
 }
 
-// 1 % of what the scene measures: `size`.
-void expect_the_same_on_both_hosts(const char *scene, std::vector<std::string> arguments,
-                                   const std::vector<std::string> &bodies, double size) {
-  if (!test::kHasOde) GTEST_SKIP() << kNotBuilt;
-  const SceneRun ode(scene, arguments);
-  arguments.insert(arguments.end(), {"--set", "/rigid/host=builtin"});
-  const SceneRun builtin(scene, arguments);
-  for (const std::string &b : bodies) EXPECT_LT(apart(builtin.last(b), ode.last(b)), 0.01 * size) << b;
-  EXPECT_NE(ode.hash(), builtin.hash());
-}
+class EngineScenes : public ::testing::TestWithParam<const char *> {
+ protected:
+  void SetUp() override {
+    if (!test::has_host(GetParam())) GTEST_SKIP() << "built without host " << GetParam();
+  }
+  static std::string host() { return std::string("/rigid/host=") + GetParam(); }
+  // 1 % of what the scene measures: `size`.
+  static void expect_as_builtin(const char *scene, std::vector<std::string> arguments,
+                                const std::vector<std::string> &bodies, double size) {
+    arguments.insert(arguments.end(), {"--set", host()});
+    const SceneRun engine(scene, arguments);
+    arguments.back() = "/rigid/host=builtin";
+    const SceneRun builtin(scene, arguments);
+    for (const std::string &b : bodies) EXPECT_LT(apart(builtin.last(b), engine.last(b)), 0.01 * size) << b;
+    EXPECT_NE(engine.hash(), builtin.hash());
+    engine.expect_sound(1, GetParam());
+  }
+};
 
 // The box, of 15 kg, lies flat and still on the bed of 0.16 m and in it by no more than a tenth.
 bool landed(const SceneRun &run) {
@@ -82,8 +90,8 @@ bool tipped(const SceneRun &run) {
 
 }  // namespace
 
-TEST(OdeBed, Box_RestsAsWithTheBuiltinHost) {
-  expect_the_same_on_both_hosts("ode_bed", {}, {"bed", "box"}, 0.16);
+TEST_P(EngineScenes, Box_RestsOnItsBedAsWithTheBuiltinHost) {
+  expect_as_builtin("ode_bed", {}, {"bed", "box"}, 0.16);
 }
 TEST(OdeBed, JitteredRuns_AllLand) {
   if (!test::kHasOde) GTEST_SKIP() << kNotBuilt;
@@ -91,16 +99,15 @@ TEST(OdeBed, JitteredRuns_AllLand) {
   EXPECT_FALSE(landed(SceneRun("ode_bed", lasting(1.3, {"/rigid/bodies/0/velocity=[2,0,0]"}))));
 }
 
-TEST(OdeGripper, Ball_IsWhereTheBuiltinHostHasIt) {
-  expect_the_same_on_both_hosts("ode_gripper", lifting(), {"ball", "left", "right"}, 0.1);
+TEST_P(EngineScenes, GrippedBall_IsWhereTheBuiltinHostHasIt) {
+  expect_as_builtin("ode_gripper", lifting(), {"ball", "left", "right"}, 0.1);
 }
 // What ODE's joints and motors hold is as still as what the builtin host's hold: motion of the ball against a
 // finger over the last of four seconds.
-TEST(OdeGripper, LiftedBall_DoesNotSlip) {
-  if (!test::kHasOde) GTEST_SKIP() << kNotBuilt;
+TEST_P(EngineScenes, LiftedBall_DoesNotSlip) {
   for (const char *step : {"0.001", "0.00416666666666667"}) {
     const SceneRun run("ode_gripper", lasting(4, {"/rigid/bodies/0/joints/0/motor/velocity=0.05",
-                                                  std::string("/time/step=") + step}));
+                                                  std::string("/time/step=") + step, host()}));
     run.expect_sound(20, step);
     const auto ball = run.rows("ball"), finger = run.rows("left");
     const size_t end = ball.size() - 1, start = end - 2;  // every half second
@@ -119,14 +126,14 @@ TEST(OdeGripper, JitteredRuns_AllLift) {
                                                        "/rigid/bodies/2/joints/0/motor/max=12"}))));
 }
 
-TEST(OdeCart, Braked_RestsOnItsTyresAsWithTheBuiltinHost) {
+TEST_P(EngineScenes, BrakedCart_RestsOnItsTyresAsWithTheBuiltinHost) {
   const std::vector<std::string> brakes = {"/rigid/bodies/3/joints/0/motor/velocity=0",
                                            "/rigid/bodies/4/joints/0/motor/velocity=0"};
-  expect_the_same_on_both_hosts("ode_cart", lasting(1, brakes),
-                                {"chassis", "tyre_front_left", "tyre_rear_right", "hub_rear_left"}, 0.15);
+  expect_as_builtin("ode_cart", lasting(1, brakes),
+                    {"chassis", "tyre_front_left", "tyre_rear_right", "hub_rear_left"}, 0.15);
 }
-TEST(OdeCart, Driven_ComesAsFarAsWithTheBuiltinHost) {
-  expect_the_same_on_both_hosts("ode_cart", lasting(1), {"chassis", "tyre_front_left"}, 0.5);
+TEST_P(EngineScenes, DrivenCart_ComesAsFarAsWithTheBuiltinHost) {
+  expect_as_builtin("ode_cart", lasting(0.5), {"chassis", "tyre_front_left"}, 0.5);
 }
 TEST(OdeCart, JitteredRuns_AllDriveUpTheBump) {
   if (!test::kHasOde) GTEST_SKIP() << kNotBuilt;
@@ -141,8 +148,8 @@ TEST(OdeCart, WithoutGripOrBump_DoesNotDriveUpIt) {
       "ode_cart", lasting(0.5, {R"(/contact/filter=[{"between": ["*", "bump"], "collide": false}])"}))));
 }
 
-TEST(OdeChain, Ring_IsDraggedWhereTheBuiltinHostDragsIt) {
-  expect_the_same_on_both_hosts("ode_chain", {}, {"bag", "link2", "peg"}, 0.15);
+TEST_P(EngineScenes, Ring_IsDraggedWhereTheBuiltinHostDragsIt) {
+  expect_as_builtin("ode_chain", {}, {"bag", "link2", "peg"}, 0.15);
 }
 TEST(OdeChain, JitteredRuns_AllFollowTheTractrix) {
   if (!test::kHasOde) GTEST_SKIP() << kNotBuilt;
@@ -168,8 +175,8 @@ TEST(OdeChain, Joints_ConvergeWithTheStep) {
   }
 }
 
-TEST(OdeSeesaw, Weights_RestAsWithTheBuiltinHost) {
-  expect_the_same_on_both_hosts("ode_seesaw", {}, {"light", "heavy", "pad", "plank"}, 0.1);
+TEST_P(EngineScenes, WeightsOfTheSeesaw_RestAsWithTheBuiltinHost) {
+  expect_as_builtin("ode_seesaw", {}, {"light", "heavy", "pad", "plank"}, 0.1);
 }
 TEST(OdeSeesaw, JitteredRuns_AllTip) {
   if (!test::kHasOde) GTEST_SKIP() << kNotBuilt;
@@ -177,3 +184,6 @@ TEST(OdeSeesaw, JitteredRuns_AllTip) {
   EXPECT_FALSE(tipped(SceneRun("ode_seesaw", lasting(0.8, {test::kFrictionless}))));
   EXPECT_FALSE(tipped(SceneRun("ode_seesaw", lasting(0.8, {"/materials/light/density=1200"}))));
 }
+
+INSTANTIATE_TEST_SUITE_P(Hosts, EngineScenes, ::testing::Values("ode", "bullet_float", "bullet_double"),
+                         [](const auto &p) { return std::string(p.param); });

@@ -23,6 +23,16 @@ constexpr bool kHasOde = true;
 #else
 constexpr bool kHasOde = false;
 #endif
+// Is this rigid host built?
+inline bool has_host(const std::string &host) {
+#ifdef DEFORM_HAS_BULLET
+  if (host == "bullet_float") return true;
+#endif
+#ifdef DEFORM_HAS_BULLET64
+  if (host == "bullet_double") return true;
+#endif
+  return host == "builtin" || (host == "ode" && kHasOde);
+}
 constexpr const char *kFrictionless = R"(/contact/friction=[{"between": ["*", "*"], "law": "none"}])";
 
 // One row of bodies.csv.

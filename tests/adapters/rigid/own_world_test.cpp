@@ -1,14 +1,14 @@
-// Sets on the host "ode" that bring nothing but their defs: their joints mean and say what those of the
-// builtin host do.
+// Sets on an engine's host that bring nothing but their defs: their joints mean and say what those of the
+// builtin host do. Built once for each engine (engine.h).
 #include <gtest/gtest.h>
 
-#include "ode.h"
+#include "engine.h"
 
 namespace {
 
 using namespace test;
 
-// Without a shape: rigid bodies of ODE touch each other, the builtin host's do not.
+// Without a shape: rigid bodies of an engine touch each other, the builtin host's do not.
 dfm_rigid_def part(const char *name, double mass, Vec inertia, Vec position) {
   dfm_rigid_def d = dfm_rigid_def_default();
   d.name = name;
@@ -75,25 +75,29 @@ struct Rig {
   JointReading read() const { return reading(bodies[0], 0); }
 };
 
+// Of an effort, N and N m: joints' errors of four roundings of the arm's place, 0.3 m, of which an engine
+// takes back a share of 0.2 in each step of 1 ms, by moving 2 kg.
+constexpr double kNoise = 4 * kRounding * 0.3 * 0.2 / 1e-6 * 2;
 constexpr Vec kAcross = {0, 1, 0}, kSkew = {1, 2, -2};
 
-class OdeOwnWorld : public ::testing::TestWithParam<With> {
+class OwnWorld : public ::testing::TestWithParam<With> {
  protected:
-  OdeOwnWorld() { ok(dfm_ode_register()); }
+  OwnWorld() { ok(register_engine()); }
   Context c;
 };
 
 // Runs both hosts side by side and compares what the joint says; the bounds hold over `seconds`.
 void compare(dfm_context *c, With with, uint32_t type, Vec axis, double velocity, double max, double seconds,
              JointReading within) {
-  const Rig ode(c, "ode", with, type, axis, velocity, max), own(c, nullptr, with, type, axis, velocity, max);
+  const Rig engine(c, kEngine, with, type, axis, velocity, max),
+      own(c, nullptr, with, type, axis, velocity, max);
   for (double t = 0; t < seconds; t += 0.02) {
-    run(ode.world, 0.02, 1e-3);
+    run(engine.world, 0.02, 1e-3);
     run(own.world, 0.02, 1e-3);
-    const JointReading a = ode.read(), b = own.read();
+    const JointReading a = engine.read(), b = own.read();
     ASSERT_NEAR(a.position, b.position, within.position) << t;
     ASSERT_NEAR(a.rate, b.rate, within.rate) << t;
-    ASSERT_NEAR(a.effort, b.effort, within.effort) << t;
+    ASSERT_NEAR(a.effort, b.effort, within.effort + kNoise) << t;
   }
 }
 
@@ -102,72 +106,72 @@ void compare(dfm_context *c, With with, uint32_t type, Vec axis, double velocity
 // A motor that holds an arm still carries its weight at its lever, 0.3 m: about the axis, not about the arm's
 // center, where the hinge's own force turns too. `body` against `with`: where the arm is the second body, the
 // motor turns the other way round to carry it.
-TEST_P(OdeOwnWorld, HingeThatHoldsAnArm_SaysItsMomentAboutTheHinge) {
-  for (const char *host : {"ode", "builtin"}) {
+TEST_P(OwnWorld, HingeThatHoldsAnArm_SaysItsMomentAboutTheHinge) {
+  for (const char *host : {kEngine, "builtin"}) {
     const Rig rig(c, host, GetParam(), DFM_JOINT_HINGE, kAcross, 0, 50);
     run(rig.world, 0.05, 1e-3);
     const double sign = GetParam() == With::still_first ? 1 : -1;
-    EXPECT_NEAR(rig.read().effort, sign * 2 * 9.81 * 0.3, 1e-6) << host;
+    EXPECT_NEAR(rig.read().effort, sign * 2 * 9.81 * 0.3, 1e-6 + kNoise) << host;
     EXPECT_NEAR(rig.read().rate, 0, 1e-7) << host;
   }
 }
 
-TEST_P(OdeOwnWorld, SliderThatHoldsAnArm_SaysItsForceAlongTheAxis) {
-  for (const char *host : {"ode", "builtin"}) {
+TEST_P(OwnWorld, SliderThatHoldsAnArm_SaysItsForceAlongTheAxis) {
+  for (const char *host : {kEngine, "builtin"}) {
     const Rig rig(c, host, GetParam(), DFM_JOINT_SLIDER, kSkew, 0, 50);
     run(rig.world, 0.05, 1e-3);
     const double sign = GetParam() == With::still_first ? 1 : -1;
-    EXPECT_NEAR(rig.read().effort, sign * 2 * 9.81 * 2 / 3, 1e-6) << host;
+    EXPECT_NEAR(rig.read().effort, sign * 2 * 9.81 * 2 / 3, 1e-6 + kNoise) << host;
   }
 }
 
 // The motor's direction: body against with, about the axis as the def has it in the world, however the bodies
 // stand or which of them is fixed.
-TEST_P(OdeOwnWorld, HingeMotor_TurnsAsOnTheBuiltinHost) {
+TEST_P(OwnWorld, HingeMotor_TurnsAsOnTheBuiltinHost) {
   for (const double sign : {1.0, -1.0}) {
     // moments to 8 N m
     compare(c, GetParam(), DFM_JOINT_HINGE, kSkew, 2 * sign, 50, 0.4, {0.005, 0.01, 0.05});
-    const Rig rig(c, "ode", GetParam(), DFM_JOINT_HINGE, kSkew, 2 * sign, 50);
+    const Rig rig(c, kEngine, GetParam(), DFM_JOINT_HINGE, kSkew, 2 * sign, 50);
     run(rig.world, 0.4, 1e-3);
     EXPECT_NEAR(rig.read().position, 0.8 * sign, 0.01);
   }
 }
-TEST_P(OdeOwnWorld, SliderMotor_MovesAsOnTheBuiltinHost) {
+TEST_P(OwnWorld, SliderMotor_MovesAsOnTheBuiltinHost) {
   for (const double sign : {1.0, -1.0}) {
     compare(c, GetParam(), DFM_JOINT_SLIDER, kSkew, 0.5 * sign, 5000, 0.4, {1e-6, 1e-6, 1e-4});
-    const Rig rig(c, "ode", GetParam(), DFM_JOINT_SLIDER, kSkew, 0.5 * sign, 5000);
+    const Rig rig(c, kEngine, GetParam(), DFM_JOINT_SLIDER, kSkew, 0.5 * sign, 5000);
     run(rig.world, 0.4, 1e-3);
     EXPECT_NEAR(rig.read().position, 0.2 * sign, 1e-6);
   }
 }
 
 // One that cannot hold its speed does what it can, and says so with its sign.
-TEST_P(OdeOwnWorld, MotorAtItsLimit_SaysItsLimit) {
+TEST_P(OwnWorld, MotorAtItsLimit_SaysItsLimit) {
   for (const double sign : {1.0, -1.0}) {
     compare(c, GetParam(), DFM_JOINT_HINGE, kAcross, 100 * sign, 1.5, 0.4, {0.02, 0.05, 1e-6});
     compare(c, GetParam(), DFM_JOINT_SLIDER, kSkew, 100 * sign, 3, 0.4, {2e-3, 1e-3, 1e-6});
-    const Rig rig(c, "ode", GetParam(), DFM_JOINT_HINGE, kAcross, 100 * sign, 1.5);
+    const Rig rig(c, kEngine, GetParam(), DFM_JOINT_HINGE, kAcross, 100 * sign, 1.5);
     run(rig.world, 0.02, 1e-3);
-    EXPECT_NEAR(rig.read().effort, 1.5 * sign, 1e-9);
+    EXPECT_NEAR(rig.read().effort, 1.5 * sign, 1e-9 + 8 * kRounding * 6);  // of its parts, 6 N m
   }
 }
 
 // Past half a turn the angle goes on from the other side.
-TEST_P(OdeOwnWorld, HingeAngle_IsWithinHalfATurn) {
-  const Rig ode(c, "ode", GetParam(), DFM_JOINT_HINGE, kSkew, 5, 200),
+TEST_P(OwnWorld, HingeAngle_IsWithinHalfATurn) {
+  const Rig engine(c, kEngine, GetParam(), DFM_JOINT_HINGE, kSkew, 5, 200),
       own(c, nullptr, GetParam(), DFM_JOINT_HINGE, kSkew, 5, 200);
   bool below = false;
   for (int i = 0; i < 40; ++i) {
-    run(ode.world, 0.04, 1e-3);
+    run(engine.world, 0.04, 1e-3);
     run(own.world, 0.04, 1e-3);
-    const double a = ode.read().position, b = own.read().position;
+    const double a = engine.read().position, b = own.read().position;
     ASSERT_NEAR(std::remainder(a - b, 2 * 3.141592653589793), 0, 0.02) << i;
     ASSERT_LE(std::fabs(a), 3.1416);
     below |= a < -2;
   }
   EXPECT_TRUE(below);
 }
-INSTANTIATE_TEST_SUITE_P(All, OdeOwnWorld, ::testing::ValuesIn(kAll),
+INSTANTIATE_TEST_SUITE_P(All, OwnWorld, ::testing::ValuesIn(kAll),
                          [](const auto &p) { return kNames[int(p.param)]; });
 
 // Two arms on driven hinges, on a fixed body that stands askew; a soft ball under one of them, on it a pile
@@ -179,7 +183,7 @@ struct Machine {
   dfm_world world;
   std::vector<dfm_rigid> bodies;
   Machine() {
-    ok(dfm_ode_register());
+    ok(register_engine());
     world = make_world(c);
     set_friction(world, 0.5);
     add_plane(world, "floor", {0, 0, -0.25});
@@ -202,7 +206,7 @@ struct Machine {
                      box("end", {0.03, 0.03, 0.03}, 0.2, {0.6, 0, 0.0505})},
                     {driven(joint(DFM_JOINT_HINGE, 1, 0, {0, 0, 0}, {0, 1, 0}), 0, 12),
                      driven(joint(DFM_JOINT_HINGE, 2, 0, {0.375, 0, 0}, {0, 1, 0}), -0.5, 4)},
-                    "ode");
+                    kEngine);
   }
   std::vector<JointReading> read() const { return {reading(bodies[0], 0), reading(bodies[0], 1)}; }
 };
@@ -210,8 +214,8 @@ struct Machine {
 }  // namespace
 
 // After a restore joints say what they said then, before any step, in this world and in another one; and both
-// go on with the same bits.
-TEST(OdeOwnWorldSnapshot, Restored_SaysWhatTheJointsSaidAndGoesOnBitByBit) {
+// go on with the same bits: those of the first run, where the engine has no contacts of its own to remember.
+TEST(OwnWorldSnapshot, Restored_SaysWhatTheJointsSaidAndGoesOnBitByBit) {
   Machine m;
   run(m.world, 0.15, 1e-3);
   ASSERT_GT(stats(m.world).contacts, 0u);
@@ -219,7 +223,7 @@ TEST(OdeOwnWorldSnapshot, Restored_SaysWhatTheJointsSaidAndGoesOnBitByBit) {
   const std::string shot = snapshot(m.world);
   const std::vector<JointReading> then = m.read();
   run(m.world, 0.15, 1e-3);
-  const uint64_t hash = dfm_world_hash(m.world);
+  uint64_t hash = dfm_world_hash(m.world);
   const std::vector<JointReading> later = m.read();
   EXPECT_GT(std::fabs(later[1].position - then[1].position), 1e-2);
 
@@ -228,16 +232,21 @@ TEST(OdeOwnWorldSnapshot, Restored_SaysWhatTheJointsSaidAndGoesOnBitByBit) {
     ok(dfm_world_restore(to->world, shot.data(), shot.size()));
     EXPECT_EQ(to->read(), then) << (to == &fresh);
     run(to->world, 0.15, 1e-3);
-    EXPECT_EQ(to->read(), later) << (to == &fresh);
+    if (kKeepsContacts) {
+      if (to == &m) hash = dfm_world_hash(to->world);
+      EXPECT_NEAR(to->read()[1].position, later[1].position, 2e-3);
+    } else {
+      EXPECT_EQ(to->read(), later) << (to == &fresh);
+    }
     EXPECT_EQ(dfm_world_hash(to->world), hash) << (to == &fresh);
   }
 }
 
 // A state that is set counts at once.
-TEST(OdeOwnWorldSnapshot, SetState_IsWhatTheJointSays) {
+TEST(OwnWorldSnapshot, SetState_IsWhatTheJointSays) {
   Context c;
-  ok(dfm_ode_register());
-  const Rig rig(c, "ode", With::still, DFM_JOINT_SLIDER, {1, 0, 0}, 0, 50, {0, 0, 0});
+  ok(register_engine());
+  const Rig rig(c, kEngine, With::still, DFM_JOINT_SLIDER, {1, 0, 0}, 0, 50, {0, 0, 0});
   run(rig.world, 0.01, 1e-3);
   dfm_rigid_state s = state(rig.bodies[0]);
   s.position[0] += 0.25;

@@ -1,0 +1,284 @@
+#include "engine.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <unordered_set>
+
+namespace dfm_bullet_detail {
+namespace {
+
+constexpr double kIdleSpeed = 0.01, kIdleSpin = 0.05;  // m/s, rad/s
+// of an axis about which a body does not turn, per kg: its inverse is none beside others
+constexpr double kHuge = 1e12;  // m2
+// roundings of btScalar below which a motion beside the velocity is none
+constexpr double kRoundings = 8, kEpsilon = std::numeric_limits<btScalar>::epsilon();
+constexpr int kGyroscopic = BT_ENABLE_GYROSCOPIC_FORCE_EXPLICIT | BT_ENABLE_GYROSCOPIC_FORCE_IMPLICIT_WORLD |
+                            BT_ENABLE_GYROSCOPIC_FORCE_IMPLICIT_BODY;
+
+bool all_ones(const btVector3 &f) { return f.x() == 1 && f.y() == 1 && f.z() == 1; }
+
+bool may_sleep(const btRigidBody *b) {
+  const int state = b->getActivationState();
+  return state != DISABLE_DEACTIVATION && state != DISABLE_SIMULATION;
+}
+
+void put_in(btRigidBody *b, const btTransform &t, const btVector3 &v, const btVector3 &w) {
+  b->setLinearVelocity(v);
+  b->setAngularVelocity(w);
+  b->setCenterOfMassTransform(t);  // and its inertia, and what motion states go on from
+}
+
+// The rest of the motion from a to b in h beside velocities v and w: 0 within rounding.
+Motion beside(const btTransform &a, const btTransform &b, const Motion &m, double h) {
+  const Pose from = from_bullet(a), to = from_bullet(b);
+  Motion out{to.position - from.position - h * m.v,
+             turn_of(to.rotation * conjugate(turn_by(h * m.w) * from.rotation))};
+  if (norm(out.v) <= kRoundings * kEpsilon * (norm(from.position) + h * norm(m.v))) out.v = {};
+  if (norm(out.w) <= kRoundings * kEpsilon * (1 + h * norm(m.w))) out.w = {};
+  return out;
+}
+
+}  // namespace
+
+dfm_rigid_state BulletMember::state() const {
+  dfm_rigid_state s{};
+  const Pose p = from_bullet(body->getWorldTransform());
+  store(s.position, p.position);
+  const Quat q = p.rotation;
+  const double rotation[4] = {q.x, q.y, q.z, q.w};
+  std::copy(rotation, rotation + 4, s.rotation);
+  store(s.velocity, from_bullet(body->getLinearVelocity()));
+  store(s.spin, from_bullet(body->getAngularVelocity()));
+  return s;
+}
+
+void BulletMember::put(const dfm_rigid_state &s) {
+  put_in(body, to_bullet(Pose{load(s.position), rotation_of(s)}), to_bullet(load(s.velocity)),
+         to_bullet(load(s.spin)));
+}
+
+// Bullet's inertia is diagonal in the body's own frame; an axis of none is one that does not turn.
+void BulletMember::read() {
+  inertia.mass = 1.0 / body->getInvMass();
+  const Vec inverse_moments = from_bullet(body->getInvInertiaDiagLocal());
+  const auto moment = [&](double inverse) { return inverse > 0 ? 1 / inverse : kHuge * inertia.mass; };
+  inertia.moments = {moment(inverse_moments.x), moment(inverse_moments.y), moment(inverse_moments.z)};
+  moves_along = from_bullet(body->getLinearFactor());
+  turns_about = from_bullet(body->getAngularFactor());
+}
+
+Facts BulletMember::facts() const {
+  Facts f;
+  const BulletEngine &of = *static_cast<BulletEngine *>(engine);
+  f.enabled = body->isActive();
+  f.plain = !touched && body->getLinearDamping() == 0 && body->getAngularDamping() == 0 &&
+            body->getCcdSquareMotionThreshold() == 0 && all_ones(body->getLinearFactor()) &&
+            all_ones(body->getAngularFactor());
+  f.turns = (body->getFlags() & kGyroscopic) != 0;
+  f.torque = from_bullet(body->getTotalTorque());
+  if (of.falls) f.gravity = of.gravity;
+  else f.force = from_bullet(body->getTotalForce());
+  return f;
+}
+
+std::array<double, 2> BulletMember::idle_limits() const {
+  return {std::min<double>(body->getLinearSleepingThreshold(), kIdleSpeed),
+          std::min<double>(body->getAngularSleepingThreshold(), kIdleSpin)};
+}
+
+void BulletEngine::gather() {
+  saved_.clear();
+  number_.clear();
+  const auto add = [&](btRigidBody *b, BulletMember *m) {
+    number_[b] = saved_.size();
+    saved_.push_back(
+        {b, b->getWorldTransform(), b->getLinearVelocity(), b->getAngularVelocity(), 0, 0, 0, m, false});
+  };
+  for (size_t i = 0; i < members.size(); ++i) {
+    member(i).saved = i;
+    add(member(i).body, &member(i));
+  }
+  const btAlignedObjectArray<btRigidBody *> &all = world->getNonStaticRigidBodies();
+  for (int i = 0; i < all.size(); ++i)
+    if (!all[i]->isStaticOrKinematicObject() && !number_.count(all[i])) add(all[i], nullptr);
+}
+
+void BulletEngine::prepare(const dfm_rigid_step &step) {
+  for (Saved &s : saved_) {
+    s.transform = s.body->getWorldTransform();
+    s.v = s.body->getLinearVelocity();
+    s.w = s.body->getAngularVelocity();
+    s.activation = s.given = s.body->getActivationState();
+    s.idle = s.body->getDeactivationTime();
+  }
+  const btScalar h = static_cast<btScalar>(step.h);
+  btDispatcherInfo &info = world->getDispatchInfo();
+  info.m_timeStep = h;
+  info.m_stepCount = 0;
+  info.m_debugDraw = world->getDebugDrawer();
+  (world->*Opened::predict())(h);
+  (world->*Opened::find_predictive())(h);
+  world->performDiscreteCollisionDetection();
+  (world->*Opened::find_islands())();
+  for (Saved &s : saved_) put_in(s.body, s.transform, s.v, s.w);  // damping is predict's too
+  find_touched();
+  pull_awake();
+}
+
+// Who has a contact or a constraint, and whom something kinematic wakes by touching it.
+void BulletEngine::find_touched() {
+  for (Saved &s : saved_) s.touched = false;
+  const auto touch = [&](const btCollisionObject *a, const btCollisionObject *b) {
+    const auto at = number_.find(a);
+    if (at == number_.end()) return;
+    Saved &s = saved_[at->second];
+    s.touched = true;
+    if (b->isKinematicObject() && b->getActivationState() != ISLAND_SLEEPING && b->hasContactResponse())
+      s.body->activate();
+  };
+  btDispatcher *const dispatcher = world->getDispatcher();
+  for (int i = 0; i < dispatcher->getNumManifolds(); ++i) {
+    const btPersistentManifold *const m = dispatcher->getManifoldByIndexInternal(i);
+    if (m->getNumContacts() == 0) continue;
+    touch(m->getBody0(), m->getBody1());
+    touch(m->getBody1(), m->getBody0());
+  }
+  for (int i = 0; i < world->getNumConstraints(); ++i) {
+    const btTypedConstraint *const c = world->getConstraint(i);
+    if (!c->isEnabled()) continue;
+    touch(&c->getRigidBodyA(), &c->getRigidBodyB());
+    touch(&c->getRigidBodyB(), &c->getRigidBodyA());
+  }
+  for (Saved &s : saved_)
+    if (s.member) s.member->touched = s.touched;
+}
+
+// Whatever is in one island with something awake is awake, as Bullet has it when it builds its islands.
+void BulletEngine::pull_awake() {
+  std::unordered_set<int> awake;
+  bool sleepers = false;
+  for (const Saved &s : saved_) {
+    const int state = s.body->getActivationState();
+    if (state == ACTIVE_TAG || state == DISABLE_DEACTIVATION) awake.insert(s.body->getIslandTag());
+    sleepers |= state == ISLAND_SLEEPING;
+    if (s.member) s.member->pulled = false;
+  }
+  if (sleepers)
+    for (Saved &s : saved_) {
+      if (s.body->getActivationState() != ISLAND_SLEEPING || !awake.count(s.body->getIslandTag())) continue;
+      s.body->setActivationState(WANTS_DEACTIVATION);
+      s.body->setDeactivationTime(0);
+      if (s.member) s.member->pulled = true;
+    }
+  for (Saved &s : saved_) s.activation = s.body->getActivationState();
+}
+
+void BulletEngine::restore(bool given) {
+  for (Saved &s : saved_) {
+    put_in(s.body, s.transform, s.v, s.w);
+    s.body->forceActivationState(given ? s.given : s.activation);
+    s.body->setDeactivationTime(s.idle);
+  }
+}
+
+void BulletEngine::take(Member &any, const dfm_rigid_state &given, const double *extra) {
+  BulletMember &m = of(any);
+  Saved &s = saved_[m.saved];
+  if (m.restored && may_sleep(m.body)) {
+    m.body->forceActivationState(extra[12] != 0 ? ISLAND_SLEEPING : ACTIVE_TAG);
+    m.body->setDeactivationTime(btScalar(extra[14]));
+    s.activation = s.given = m.body->getActivationState();
+    s.idle = m.body->getDeactivationTime();
+  }
+  m.restored = false;
+  m.put(given);
+  s.transform = m.body->getWorldTransform();
+  s.v = m.body->getLinearVelocity();
+  s.w = m.body->getAngularVelocity();
+  m.start = m.ended = given;
+}
+
+void BulletEngine::put_forces(double) {
+  for (size_t i = 0; i < members.size(); ++i)
+    if (member(i).wakes) member(i).body->activate(true);
+}
+
+void BulletEngine::run(double h) {
+  const btScalar step = static_cast<btScalar>(h);
+  (world->*Opened::predict())(step);
+  std::vector<int> flags;
+  for (Saved &s : saved_) {
+    flags.push_back(s.body->getFlags());
+    s.body->setFlags(flags.back() & ~kGyroscopic);
+    if (!s.member || s.member->kind == Member::still) continue;
+    const Motion change = s.member->answer(s.member->impulse);
+    s.body->setLinearVelocity(s.body->getLinearVelocity() + to_bullet(change.v));
+    s.body->setAngularVelocity(s.body->getAngularVelocity() + to_bullet(change.w));
+  }
+  (world->*Opened::find_islands())();
+  world->getSolverInfo().m_timeStep = step;
+  world->solveConstraints(world->getSolverInfo());
+  (world->*Opened::integrate())(step);
+  for (size_t i = 0; i < saved_.size(); ++i) saved_[i].body->setFlags(flags[i]);
+  for (size_t i = 0; i < members.size(); ++i) finish(member(i), h);
+}
+
+void BulletEngine::finish(BulletMember &m, double h) {
+  m.ended = m.start;
+  if (!m.body->isActive()) {
+    store(m.ended.velocity, {});
+    store(m.ended.spin, {});
+    return;
+  }
+  const Vec x = load(m.start.position), own = m.answer(m.impulse).v;
+  if (m.kind == Member::free) {
+    const Vec v = m.plain.v + own;
+    store(m.ended.velocity, v);
+    store(m.ended.position, x + h * v);
+    return;
+  }
+  const Saved &s = saved_[m.saved];
+  const Motion got{from_bullet(m.body->getLinearVelocity()), from_bullet(m.body->getAngularVelocity())};
+  const Vec v = load(m.start.velocity) + (got.v - from_bullet(s.v));
+  const Vec w = load(m.start.spin) + (got.w - from_bullet(s.w));
+  const Motion more = beside(s.transform, m.body->getWorldTransform(), got, h);
+  const Quat from = rotation_of(m.start), to = unit(turn_by(more.w) * turn_by(h * w) * from);
+  store(m.ended.velocity, v);
+  store(m.ended.position, x + h * v + more.v);
+  const Vec L = in_axes(from, m.inertia.moments, w);
+  turned(m, to, m.body->getFlags() & kGyroscopic ? in_axes(to, inverse(m.inertia.moments), L) : w);
+}
+
+void BulletEngine::turned(Member &any, Quat to, Vec spin) {
+  BulletMember &m = of(any);
+  const double rotation[4] = {to.x, to.y, to.z, to.w};
+  std::copy(rotation, rotation + 4, m.ended.rotation);
+  store(m.ended.spin, spin);
+}
+
+void BulletEngine::rest(double h) {
+  for (size_t i = 0; i < members.size(); ++i) member(i).put(member(i).ended);
+  std::vector<std::pair<btVector3, btVector3>> before;
+  for (const Saved &s : saved_)
+    before.emplace_back(s.body->getLinearVelocity(), s.body->getAngularVelocity());
+  (world->*Opened::act())(static_cast<btScalar>(h));
+  for (size_t i = 0; i < members.size(); ++i) {
+    BulletMember &m = member(i);
+    const auto &[v, w] = before[i];
+    const Vec dv = from_bullet(m.body->getLinearVelocity()) - from_bullet(v);
+    const Vec dw = from_bullet(m.body->getAngularVelocity()) - from_bullet(w);
+    store(m.ended.velocity, load(m.ended.velocity) + dv);
+    store(m.ended.spin, load(m.ended.spin) + dw);
+    const auto [speed, spin] = m.idle_limits();
+    const bool pushed = dot(m.impulse.v, m.impulse.v) > 0;
+    if (pushed && may_sleep(m.body) &&
+        (norm(load(m.ended.velocity)) > speed || norm(load(m.ended.spin)) > spin))
+      m.body->activate(true);
+  }
+  (world->*Opened::idle())(static_cast<btScalar>(h));
+  for (size_t i = 0; i < members.size(); ++i)
+    member(i).next_idle = {0, member(i).body->getDeactivationTime()};
+}
+
+}  // namespace dfm_bullet_detail

@@ -1,0 +1,77 @@
+// A btDiscreteDynamicsWorld inside the contact solve (rigid_host/engine.h). A sub-step is one tick of Bullet,
+// run by its stages: collision once, constraints and integration as often as contact is solved.
+//
+// Bodies move in double precision whatever btScalar is: the dfm_world has their states, Bullet gets them
+// rounded, and what its constraints change of a velocity is added to the unrounded one. A body without
+// constraints ends where the solve has it, to the bit. What Bullet moves beside its velocities (split
+// impulses, continuous collision) is seen as the rest of its motion, where that is above rounding.
+//
+// Sleep is Bullet's, by islands and gDeactivationTime. Its thresholds (0.8 m/s) are those of heaps of rigid
+// bodies: here a sleeper wakes at kIdleSpeed and kIdleSpin, and what soft bodies touch and is faster than
+// that does not fall asleep.
+//
+// Gyroscopic terms are out of Bullet's solve where the body has them on; see ode/engine.h.
+#pragma once
+#include <unordered_map>
+
+#include "opened.h"
+
+namespace dfm_bullet_detail {
+
+class BulletEngine;
+
+struct BulletMember : Member {
+  btRigidBody *body = nullptr;
+  bool touched = false;  // by a constraint or contact of Bullet's in this sub-step
+  size_t saved = 0;      // where the engine keeps it
+  dfm_rigid_state ended{};
+
+  dfm_rigid_state state() const override;
+  void put(const dfm_rigid_state &s) override;
+  dfm_rigid_state end() const override { return ended; }
+  bool enabled() const override { return body->isActive(); }
+  Facts facts() const override;
+  std::array<double, 2> idle_limits() const override;
+  void read();  // mass, moments, axes that are free
+};
+
+class BulletEngine : public Engine {
+ public:
+  btDiscreteDynamicsWorld *world = nullptr;
+  bool falls = false;  // every body under `gravity`, which is not in its forces
+  Vec gravity;
+
+  void gather();  // before begin()
+
+ protected:
+  void prepare(const dfm_rigid_step &step) override;
+  void restore(bool given) override;
+  void take(Member &m, const dfm_rigid_state &given, const double *extra) override;
+  void put_forces(double h) override;
+  void run(double h) override;
+  void turned(Member &m, Quat to, Vec spin) override;
+  void rest(double h) override;
+  void give_back() override {}  // they have never been taken
+  void close() override {}
+
+ private:
+  struct Saved {
+    btRigidBody *body;
+    btTransform transform;
+    btVector3 v, w;
+    int activation, given;  // for this sub-step; as it was given
+    btScalar idle;          // s
+    BulletMember *member;   // null: soft bodies do not touch it
+    bool touched;
+  };
+  std::unordered_map<const btCollisionObject *, size_t> number_;  // in saved_
+  std::vector<Saved> saved_;                                      // every body that may move, members first
+
+  static BulletMember &of(Member &m) { return static_cast<BulletMember &>(m); }
+  BulletMember &member(size_t i) const { return of(*members[i]); }
+  void find_touched();
+  void pull_awake();
+  void finish(BulletMember &m, double h);
+};
+
+}  // namespace dfm_bullet_detail
