@@ -1,7 +1,11 @@
 #include <dlfcn.h>
 
-#include "deform/bullet_host.h"
-#include "own_world.h"
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstring>
+
+#include "adapter.h"
 
 namespace dfm_bullet_detail {
 
@@ -24,6 +28,130 @@ dfm_status check_bullet() {
 }  // namespace dfm_bullet_detail
 
 using namespace dfm_bullet_detail;
+
+namespace {
+
+template <class F>
+dfm_status with(dfm_bullet handle, F &&f) noexcept {
+  return dfm_rigid_detail::with<Adapter>(bullet_kind(), handle, f);
+}
+
+// Ends of structs in 0.1: what a caller has that says no more (deform/base.h, "structs of another version").
+constexpr uint32_t kFirstDef = offsetof(dfm_bullet_def, version) + sizeof(uint32_t);
+constexpr uint32_t kFirstStats = offsetof(dfm_bullet_stats, bullet_seconds) + sizeof(double);
+
+dfm_status check_def(const dfm_bullet_def &d) {
+  if (d.size < kFirstDef)
+    return failed(DFM_E_ARG, "dfm_bullet_def: size is %u, expected %zu; start from dfm_bullet_def_default()",
+                  d.size, sizeof d);
+  if (d.real_bytes != sizeof(btScalar) || d.version != BT_BULLET_VERSION)
+    return failed(
+        DFM_E_UNSUPPORTED,
+        "this program was compiled against Bullet %u with a btScalar of %u bytes, the library against "
+        "Bullet %d with %zu; single precision is libdeform_bullet, double libdeform_bullet64",
+        d.version, d.real_bytes, BT_BULLET_VERSION, sizeof(btScalar));
+  if (const dfm_status s = check_bullet(); s != DFM_OK) return s;
+  if (!d.world) return missing("world");
+  if (d.flags) return failed(DFM_E_ARG, "dfm_bullet_def: flags %u; none is known", d.flags);
+  return DFM_OK;
+}
+
+}  // namespace
+
+void dfm_bullet_def_default_sized(uint32_t real_bytes, uint32_t version, uint32_t size, dfm_bullet_def *out) {
+  if (!out) return;
+  dfm_bullet_def d{};
+  d.size = size;
+  d.real_bytes = real_bytes;
+  d.version = version;
+  std::memset(static_cast<void *>(out), 0, size);
+  std::memcpy(static_cast<void *>(out), &d, std::min<size_t>(size, sizeof d));
+}
+
+dfm_status dfm_bullet_attach(dfm_world world, const dfm_bullet_def *def, dfm_bullet *out) {
+  try {
+    if (!def) return missing("def");
+    if (!out) return missing("out");
+    if (const dfm_status s = check_def(*def); s != DFM_OK) return s;
+    auto *const bullet = dynamic_cast<btDiscreteDynamicsWorld *>(def->world);
+    if (!bullet || def->world->getWorldType() != BT_DISCRETE_DYNAMICS_WORLD)
+      return failed(
+          DFM_E_UNSUPPORTED,
+          "the world is of btDynamicsWorldType %d; an adapter takes a btDiscreteDynamicsWorld, whose "
+          "ticks it can run (btSimpleDynamicsWorld has none, and Bullet's own soft bodies move in "
+          "ticks of theirs: make them bodies of the dfm_world)",
+          static_cast<int>(def->world->getWorldType()));
+    if (const dfm_status s = register_host(bullet_kind()); s != DFM_OK) return s;
+    uint32_t n = 0;
+    if (const dfm_status s = dfm_world_bodies(world, 0, nullptr, &n); s != DFM_OK) return s;
+    return Registry<Adapter>::get().add(
+        [&](const Adapter &other) {
+          if (other.bullet() != bullet) return dfm_status{DFM_OK};
+          return dfm_fail(DFM_E_STATE, "this world has an adapter already; dfm_bullet_detach it first");
+        },
+        [&] { return std::make_shared<Adapter>(world, *bullet); }, out);
+  } catch (const std::bad_alloc &) {
+    return dfm_fail(DFM_E_NOMEM, "bullet: out of memory");
+  }
+}
+
+dfm_status dfm_bullet_detach(dfm_bullet bullet) {
+  return with(bullet, [&](Adapter &) {
+    Registry<Adapter>::get().remove(bullet);
+    return dfm_status{DFM_OK};
+  });
+}
+
+dfm_status dfm_bullet_step(dfm_bullet bullet, double dt, int max_sub_steps, double fixed, int *ticks) {
+  return with(bullet, [&](Adapter &a) {
+    if (!(dt > 0 && std::isfinite(dt) && max_sub_steps >= 0 && (fixed > 0 || max_sub_steps == 0)))
+      return failed(DFM_E_ARG, "dt %g s in at most %d steps of %g s; they must be positive and finite", dt,
+                    max_sub_steps, fixed);
+    return a.step(dt, max_sub_steps, fixed, ticks);
+  });
+}
+
+dfm_status dfm_bullet_last_tick(dfm_bullet bullet, uint32_t *trouble) {
+  return with(bullet, [&](Adapter &a) { return a.last_tick(trouble); });
+}
+
+dfm_status dfm_bullet_get_stats(dfm_bullet bullet, dfm_bullet_stats *out) {
+  return with(bullet, [&](Adapter &a) {
+    if (!out) return missing("out");
+    dfm_bullet_stats s = a.stats();
+    s.size = std::min<uint32_t>(out->size ? out->size : kFirstStats, sizeof s);
+    std::memcpy(static_cast<void *>(out), &s, s.size);
+    return dfm_status{DFM_OK};
+  });
+}
+
+dfm_status dfm_bullet_obstacle(dfm_bullet bullet, const btCollisionObject *object, uint32_t leaf,
+                               dfm_obstacle *out) {
+  return with(bullet, [&](Adapter &a) {
+    return !object ? missing("object") : !out ? missing("out") : a.obstacle(object, leaf, out);
+  });
+}
+
+dfm_status dfm_bullet_rigid(dfm_bullet bullet, const btRigidBody *body, dfm_rigid *out) {
+  return with(bullet, [&](Adapter &a) {
+    return !body ? missing("body") : !out ? missing("out") : a.rigid(body, out);
+  });
+}
+
+dfm_status dfm_bullet_set_object(dfm_bullet bullet, const btCollisionObject *object,
+                                 const dfm_bullet_object *props) {
+  return with(bullet, [&](Adapter &a) {
+    return !object ? missing("object") : !props ? missing("props") : a.set_object(object, *props);
+  });
+}
+
+dfm_status dfm_bullet_refresh(dfm_bullet bullet, const btCollisionObject *object) {
+  return with(bullet, [&](Adapter &a) { return !object ? missing("object") : a.refresh(object); });
+}
+
+dfm_status dfm_bullet_debug_draw(dfm_bullet bullet, uint32_t what) {
+  return with(bullet, [&](Adapter &a) { return a.debug_draw(what); });
+}
 
 dfm_status dfm_bullet_register(void) {
   if (const dfm_status s = check_bullet(); s != DFM_OK) return s;

@@ -112,6 +112,7 @@ void BulletEngine::prepare(const dfm_rigid_step &step) {
     s.activation = s.given = s.body->getActivationState();
     s.idle = s.body->getDeactivationTime();
   }
+  multi_.keep(*world);
   const btScalar h = static_cast<btScalar>(step.h);
   btDispatcherInfo &info = world->getDispatchInfo();
   info.m_timeStep = h;
@@ -122,6 +123,7 @@ void BulletEngine::prepare(const dfm_rigid_step &step) {
   world->performDiscreteCollisionDetection();
   (world->*Opened::find_islands())();
   for (Saved &s : saved_) put_in(s.body, s.transform, s.v, s.w);  // damping is predict's too
+  multi_.restore();
   find_touched();
   pull_awake();
 }
@@ -175,6 +177,7 @@ void BulletEngine::pull_awake() {
 }
 
 void BulletEngine::restore(bool given) {
+  multi_.restore();
   for (Saved &s : saved_) {
     put_in(s.body, s.transform, s.v, s.w);
     s.body->forceActivationState(given ? s.given : s.activation);

@@ -14,7 +14,7 @@
 #pragma once
 #include <unordered_map>
 
-#include "opened.h"
+#include "multi_state.h"
 
 namespace dfm_bullet_detail {
 
@@ -65,7 +65,8 @@ class BulletEngine : public Engine {
     bool touched;
   };
   std::unordered_map<const btCollisionObject *, size_t> number_;  // in saved_
-  std::vector<Saved> saved_;                                      // every body that may move, members first
+  MultiState multi_;
+  std::vector<Saved> saved_;  // every body that may move, members first
 
   static BulletMember &of(Member &m) { return static_cast<BulletMember &>(m); }
   BulletMember &member(size_t i) const { return of(*members[i]); }

@@ -1,5 +1,7 @@
 // Bullet as the adapter's parts see it: its vectors, and what btDiscreteDynamicsWorld keeps to its own class.
 #pragma once
+#include <BulletDynamics/Featherstone/btMultiBody.h>
+#include <BulletDynamics/Featherstone/btMultiBodyDynamicsWorld.h>
 #include <btBulletDynamicsCommon.h>
 
 #include "rigid_host/engine.h"
@@ -40,6 +42,12 @@ struct Opened : btDiscreteDynamicsWorld {
   static auto broadphase() { return &Opened::m_broadphasePairCache; }
   static auto pre_tick() { return &Opened::m_internalPreTickCallback; }
   static auto tick() { return &Opened::m_internalTickCallback; }
+};
+
+// The same of a world with multibodies.
+struct OpenedMulti : btMultiBodyDynamicsWorld {
+  static auto bodies() { return &OpenedMulti::m_multiBodies; }
+  static auto constraints() { return &OpenedMulti::m_multiBodyConstraints; }
 };
 
 }  // namespace dfm_bullet_detail

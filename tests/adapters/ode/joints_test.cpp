@@ -169,3 +169,25 @@ TEST(OdeJoints, Feedback_HasTheLoadOfTheSoftBody) {
   EXPECT_NEAR(moment, -weight * measure(ball).com[0], 0.02 * weight * 0.05);
   EXPECT_EQ(dJointGetFeedback(hold), &feedback);
 }
+
+// A body's own frame may stand askew to its principal axes.
+TEST(OdeJoints, SkewInertia_IsTheMatrixThatOdeHas) {
+  Ode ode({0, 0, 0});
+  const dfm_body ball = soft_ball(ode, {0.08, 0.03, 0.25}, {0, 0, -2});
+  const dBodyID b = dBodyCreate(ode.world);
+  dMass m;
+  dMassSetParameters(&m, 1, 0, 0, 0, 0.010, 0.012, 0.014, 0.002, -0.001, 0.003);
+  dBodySetMass(b, &m);
+  dBodySetPosition(b, 0, 0, 0.09);
+  dBodySetAngularVel(b, 0.3, -0.5, 0.2);
+  dGeomSetBody(dCreateBox(ode.space, 0.2, 0.2, 0.1), b);
+  Momenta start, end;
+  add(start, ball);
+  add(start, b);
+  ode.run(0.15);
+  add(end, ball);
+  add(end, b);
+  EXPECT_GT(apart(velocity(b), {}), 0.1);
+  EXPECT_LT(apart(start.linear, end.linear), 1e-12 * start.size);
+  EXPECT_LT(apart(start.angular, end.angular), 1e-12 * start.size);
+}

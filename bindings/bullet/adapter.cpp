@@ -1,0 +1,369 @@
+#include "adapter.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace dfm_bullet_detail {
+namespace {
+
+// Which adapter a world has: its callbacks are handed the world alone, and the user's info is the user's.
+struct Worlds {
+  std::mutex mutex;
+  std::unordered_map<const btDynamicsWorld *, Adapter *> all;
+};
+Worlds &worlds() {
+  static Worlds *const w = new Worlds;
+  return *w;
+}
+Adapter *adapter_of(const btDynamicsWorld *world) {
+  Worlds &w = worlds();
+  const std::lock_guard lock(w.mutex);
+  const auto at = w.all.find(world);
+  return at == w.all.end() ? nullptr : at->second;
+}
+
+bool same(Vec a, Vec b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
+
+const void *address(const btCollisionObject *o) { return o; }
+
+// Where something that moves as told is to be at the end of h: with the velocity that Bullet has made of what
+// it was told for a whole stepSimulation, and where it was put, where that is nearer.
+Pose towards(const Pose &from, const Pose &to, Vec v, Vec w, double h) {
+  const Vec way = to.position - from.position, turn = turn_of(to.rotation * conjugate(from.rotation));
+  Pose out = to;
+  constexpr double kAll = 1 - 1e-3;
+  if (h * norm(v) < kAll * norm(way) && norm(v) > 0) out.position = from.position + h * v;
+  if (h * norm(w) < kAll * norm(turn) && norm(w) > 0) out.rotation = unit(turn_by(h * w) * from.rotation);
+  return out;
+}
+
+}  // namespace
+
+Adapter::Adapter(dfm_world world, btDiscreteDynamicsWorld &bullet)
+    : world_(world), theirs_before_(bullet.*Opened::pre_tick()), theirs_after_(bullet.*Opened::tick()) {
+  engine_.world = &bullet;
+  bullet.*Opened::pre_tick() = before_tick;
+  bullet.*Opened::tick() = after_tick;
+  Worlds &w = worlds();
+  const std::lock_guard lock(w.mutex);
+  w.all[&bullet] = this;
+}
+
+Adapter::~Adapter() {
+  for (auto &o : objects_) {
+    for (dfm_obstacle &each : o->obstacles) unbind(each);
+    if (o->body) o->body->release();
+  }
+  btDiscreteDynamicsWorld &bullet = *engine_.world;
+  bullet.*Opened::pre_tick() = theirs_before_;
+  bullet.*Opened::tick() = theirs_after_;
+  Worlds &w = worlds();
+  const std::lock_guard lock(w.mutex);
+  w.all.erase(&bullet);
+}
+
+void Adapter::before_tick(btDynamicsWorld *world, btScalar h) {
+  Adapter *const a = adapter_of(world);
+  if (!a) return;
+  if (a->theirs_before_) a->theirs_before_(world, h);
+  try {
+    a->of_tick_ = a->tick(h);
+  } catch (const std::bad_alloc &) {
+    a->of_tick_ = dfm_fail(DFM_E_NOMEM, "bullet: out of memory");
+  } catch (...) {
+    a->of_tick_ = dfm_fail(DFM_E_FATAL, "bullet: an exception that should not be");
+  }
+  if (a->of_tick_ < 0) a->sentence_ = dfm_last_error();
+  if (a->of_tick_ < 0 && a->of_call_ == DFM_OK) {
+    a->of_call_ = a->of_tick_;
+    a->call_sentence_ = a->sentence_;
+  }
+  // without bodies that take part nobody has stepped Bullet: the tick is its own
+  if (a->of_tick_ < 0 || !a->engine_.members.empty())
+    a->vacated_ = std::make_unique<Vacated>(*a->engine_.world);
+}
+
+void Adapter::after_tick(btDynamicsWorld *world, btScalar h) {
+  Adapter *const a = adapter_of(world);
+  if (!a) return;
+  a->vacated_.reset();
+  if (a->theirs_after_) a->theirs_after_(world, h);
+}
+
+bool Adapter::Traits::operator==(const Traits &o) const {
+  return handle == o.handle && group == o.group && mask == o.mask && moves == o.moves &&
+         takes_part == o.takes_part && mass == o.mass && same(moments, o.moments) && same(along, o.along) &&
+         same(about, o.about);
+}
+
+const Adapter::Props *Adapter::props_of(const btCollisionObject *object) const {
+  const auto known = props_.find(object);
+  return known == props_.end() ? nullptr : &known->second;
+}
+
+Adapter::Traits Adapter::traits_of(const btCollisionObject *object) const {
+  Traits t;
+  if (const btBroadphaseProxy *const proxy = object->getBroadphaseHandle()) {
+    t.handle = proxy->m_uniqueId;
+    t.group = proxy->m_collisionFilterGroup;
+    t.mask = proxy->m_collisionFilterMask;
+  }
+  const Props *const props = props_of(object);
+  t.takes_part = object->hasContactResponse() && !(props && props->ignore);
+  const btRigidBody *const body = btRigidBody::upcast(object);
+  t.moves = body && !body->isStaticOrKinematicObject() && body->getInvMass() > 0;
+  if (!t.moves) return t;
+  t.mass = body->getInvMass();
+  t.moments = from_bullet(body->getInvInertiaDiagLocal());
+  t.along = from_bullet(body->getLinearFactor());
+  t.about = from_bullet(body->getAngularFactor());
+  return t;
+}
+
+dfm_status Adapter::sync() { return look(0); }
+
+// Refuses before anything has changed.
+dfm_status Adapter::check() const {
+  const btCollisionObjectArray &all = engine_.world->getCollisionObjectArray();
+  std::vector<Part> parts;
+  for (int i = 0; i < all.size(); ++i) {
+    const btCollisionShape *unknown = nullptr;
+    if (by_id_.count(all[i]) || !traits_of(all[i]).takes_part) continue;
+    if (!parts_of(all[i]->getCollisionShape(), {}, parts, unknown))
+      return failed(
+          DFM_E_UNSUPPORTED,
+          "collision object %p has a %s, which soft bodies cannot touch; call dfm_bullet_set_object "
+          "with ignore = 1, or stand a triangle mesh for it",
+          address(all[i]), unknown->getName());
+  }
+  return DFM_OK;
+}
+
+// Nothing that is out of the world is touched: objects are known alive because the world lists them.
+dfm_status Adapter::look(double h) {
+  const Timer timer(sync_seconds_);
+  TRY(check());
+  const btCollisionObjectArray &all = engine_.world->getCollisionObjectArray();
+  for (auto &o : objects_) o->found = false;
+  for (int i = 0; i < all.size(); ++i) {
+    const auto known = by_id_.find(all[i]);
+    if (known == by_id_.end()) continue;
+    Object &o = *known->second;
+    const btCollisionShape *unknown = nullptr;
+    seen_.clear();
+    const bool readable = !o.traits.takes_part || parts_of(all[i]->getCollisionShape(), {}, seen_, unknown);
+    o.found = readable && !o.stale && o.traits == traits_of(all[i]) && o.parts == seen_;
+  }
+  TRY(drop());
+  if (objects_.size() != static_cast<size_t>(all.size()))
+    for (int i = 0; i < all.size(); ++i)
+      if (!by_id_.count(all[i])) TRY(bind(all[i]));
+  std::erase_if(props_, [&](const auto &p) { return !by_id_.count(p.first); });
+  for (auto &o : objects_) TRY(follow(*o, h));
+  bool restored = false;
+  TRY(clock_.ask(world_, restored));
+  for (auto &o : objects_)
+    if (o->body) TRY(o->body->agree(restored));
+  return DFM_OK;
+}
+
+dfm_status Adapter::drop() {
+  for (auto &o : objects_) {
+    if (o->found) continue;
+    for (dfm_obstacle &each : o->obstacles) TRY(unbind(each));
+    if (o->body) {
+      TRY(o->body->release());
+      engine_.forget(&o->body->member);
+    }
+    by_id_.erase(o->id);
+  }
+  std::erase_if(objects_, [](const auto &o) { return !o->found; });
+  return DFM_OK;
+}
+
+dfm_status Adapter::bind_body(Object &o) {
+  btRigidBody *const body = const_cast<btRigidBody *>(btRigidBody::upcast(o.id));
+  o.body = std::make_unique<Body>();
+  BulletMember &m = o.body->member;
+  m.engine = &engine_;
+  m.body = body;
+  m.read();
+  o.body->seat.refuse = [body] {
+    return failed(DFM_E_STATE,
+                  "the rigid body stands for Bullet's body %p, which owns it, and dfm_rigid_destroy would "
+                  "leave the adapter without it; call removeRigidBody, and the next tick lets it go; "
+                  "dfm_bullet_detach takes all of them away",
+                  address(body));
+  };
+  TRY(o.body->create(world_, bullet_kind().host, m));
+  engine_.members.push_back(&m);
+  return DFM_OK;
+}
+
+dfm_status Adapter::bind_leaf(Object &o, size_t leaf) {
+  dfm_obstacle_def def = dfm_obstacle_def_default();
+  Triangles made;
+  Pose local;
+  describe(o.parts[leaf], def, local, made);
+  def.category = static_cast<uint32_t>(o.traits.group);
+  def.collides_with = static_cast<uint32_t>(o.traits.mask);
+  std::string name;
+  if (const Props *const props = props_of(o.id)) {
+    name = props->name;
+    if (leaf > 0 && !name.empty()) name += "." + std::to_string(leaf);
+    def.name = name.empty() ? nullptr : name.c_str();
+    def.material = props->material;
+  }
+  dfm_obstacle &out = o.obstacles.emplace_back();
+  o.local.push_back(local);
+  if (o.body) {
+    def.pose = to_pose(in_principal_frame(o.body->member.inertia, local));
+    return dfm_rigid_add_shape(o.body->rigid, &def, &out);
+  }
+  o.sent.push_back(o.pose * local);
+  def.pose = to_pose(o.sent.back());
+  return dfm_obstacle_create(world_, &def, &out);
+}
+
+dfm_status Adapter::bind(const btCollisionObject *id) {
+  auto made = std::make_unique<Object>();
+  Object &o = *made;
+  o.id = id;
+  o.traits = traits_of(id);
+  o.pose = from_bullet(id->getWorldTransform());
+  const btCollisionShape *unknown = nullptr;
+  if (o.traits.takes_part) parts_of(id->getCollisionShape(), {}, o.parts, unknown);
+  objects_.push_back(std::move(made));  // so that what follows is dropped again where it ends halfway
+  by_id_[id] = &o;
+  o.found = o.stale = true;
+  if (o.traits.moves && !o.parts.empty()) TRY(bind_body(o));
+  for (size_t i = 0; i < o.parts.size(); ++i) TRY(bind_leaf(o, i));
+  o.stale = false;
+  return DFM_OK;
+}
+
+// What no force moves, moved by the caller: its surface comes along within the next step.
+dfm_status Adapter::follow(Object &o, double h) {
+  if (o.body || o.obstacles.empty() || h == 0) return DFM_OK;
+  const Pose target = from_bullet(o.id->getWorldTransform());
+  const btRigidBody *const body = btRigidBody::upcast(o.id);
+  const bool told = body && body->isKinematicObject();
+  o.pose = told ? towards(o.pose, target, from_bullet(body->getLinearVelocity()),
+                          from_bullet(body->getAngularVelocity()), h)
+                : target;
+  for (size_t i = 0; i < o.obstacles.size(); ++i)
+    if (o.obstacles[i]) TRY(dfm_rigid_detail::follow(o.obstacles[i], o.sent[i], o.pose * o.local[i]));
+  return DFM_OK;
+}
+
+dfm_status Adapter::tick(double h) {
+  trouble_ = 0;
+  TRY(look(h));
+  dfm_status status = DFM_OK;
+  {
+    engine_.gather();
+    const Stepping stepping(engine_, world_);
+    status = dfm_world_step(world_, h, &trouble_);
+  }
+  ++ticks_;
+  dfm_status told = DFM_OK;
+  for (auto &o : objects_) {
+    const dfm_status of_body = o->body ? o->body->after(status) : dfm_status{DFM_OK};
+    if (told == DFM_OK) told = of_body;
+  }
+  bool restored = false;
+  TRY(clock_.ask(world_, restored));
+  return status != DFM_OK ? status : told;
+}
+
+dfm_status Adapter::step(double dt, int max_sub_steps, double fixed, int *ticks) {
+  of_call_ = DFM_OK;
+  const int n = engine_.world->stepSimulation(btScalar(dt), max_sub_steps, btScalar(fixed));
+  if (ticks) *ticks = n;
+  return of_call_ < 0 ? dfm_fail(of_call_, call_sentence_.c_str()) : dfm_status{DFM_OK};
+}
+
+dfm_status Adapter::last_tick(uint32_t *trouble) const {
+  if (trouble) *trouble = trouble_;
+  return of_tick_ < 0 ? dfm_fail(of_tick_, sentence_.c_str()) : of_tick_;
+}
+
+bool Adapter::in_world(const btCollisionObject *object) const {
+  const btCollisionObjectArray &all = engine_.world->getCollisionObjectArray();
+  for (int i = 0; i < all.size(); ++i)
+    if (all[i] == object) return true;
+  return false;
+}
+
+dfm_status Adapter::not_in_world(const btCollisionObject *object) const {
+  return failed(DFM_E_ARG,
+                "collision object %p is not in the adapter's world; addRigidBody or "
+                "addCollisionObject puts it there",
+                address(object));
+}
+
+dfm_status Adapter::obstacle(const btCollisionObject *object, uint32_t leaf, dfm_obstacle *out) {
+  TRY(sync());
+  const auto known = by_id_.find(object);
+  if (known == by_id_.end()) return not_in_world(object);
+  const Object &o = *known->second;
+  if (leaf >= o.obstacles.size())
+    return failed(
+        DFM_E_ARG,
+        "collision object %p has %zu leaves that take part, and no leaf %u; it has none where it is "
+        "ignored (dfm_bullet_set_object), empty or without contact response",
+        address(object), o.obstacles.size(), leaf);
+  *out = o.obstacles[leaf];
+  return DFM_OK;
+}
+
+dfm_status Adapter::rigid(const btRigidBody *body, dfm_rigid *out) {
+  TRY(sync());
+  const auto known = by_id_.find(body);
+  if (known == by_id_.end()) return not_in_world(body);
+  if (!known->second->body)
+    return failed(DFM_E_ARG,
+                  "body %p does not take part as one that forces move: it is static, kinematic, "
+                  "ignored or empty",
+                  address(body));
+  *out = known->second->body->rigid;
+  return DFM_OK;
+}
+
+dfm_status Adapter::set_object(const btCollisionObject *object, const dfm_bullet_object &props) {
+  if (!in_world(object)) return not_in_world(object);
+  Props &p = props_[object];
+  p.ignore = props.ignore;
+  p.name = props.name ? props.name : "";
+  p.material = props.material;
+  const auto known = by_id_.find(object);
+  if (known != by_id_.end()) known->second->stale = true;
+  return DFM_OK;
+}
+
+dfm_status Adapter::refresh(const btCollisionObject *object) {
+  const auto known = by_id_.find(object);
+  if (known == by_id_.end() || !in_world(object)) return not_in_world(object);
+  known->second->stale = true;
+  return DFM_OK;
+}
+
+dfm_bullet_stats Adapter::stats() const {
+  dfm_bullet_stats s{};
+  s.size = sizeof s;
+  for (auto &o : objects_) {
+    s.bodies += o->body != nullptr;
+    s.shapes += static_cast<uint32_t>(o->obstacles.size());
+    s.refused += o->obstacles.empty();
+  }
+  s.ticks = ticks_;
+  s.bullet_steps = engine_.steps;
+  s.corrections = engine_.corrections;
+  s.residual = engine_.residual;
+  s.residual_max = engine_.residual_max;
+  s.sync_seconds = sync_seconds_;
+  s.bullet_seconds = engine_.engine_seconds;
+  return s;
+}
+
+}  // namespace dfm_bullet_detail

@@ -1,0 +1,119 @@
+// A world of Bullet joined to a dfm_world: each tick looks at its objects first, and what it finds changed
+// there is changed here.
+//
+// A tick of stepSimulation calls back before and after it. Before it the adapter steps the dfm_world, and
+// with it Bullet, by the engine. What the tick does between the two callbacks is done already: it finds an
+// empty world, whose content the second callback puts back (Vacated).
+#pragma once
+#include <memory>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "deform/bullet.h"
+#include "engine.h"
+#include "own_world.h"
+#include "rigid_host/seated.h"
+#include "shapes.h"
+
+namespace dfm_bullet_detail {
+
+// A world without content, as long as this lives.
+class Vacated {
+ public:
+  explicit Vacated(btDiscreteDynamicsWorld &world);
+  ~Vacated();
+  Vacated(const Vacated &) = delete;
+  Vacated &operator=(const Vacated &) = delete;
+
+ private:
+  btDiscreteDynamicsWorld &world_;
+  btAlignedObjectArray<btRigidBody *> bodies_;
+  btAlignedObjectArray<btTypedConstraint *> constraints_;
+  btAlignedObjectArray<btActionInterface *> actions_;
+  btAlignedObjectArray<btPersistentManifold *> predictive_;
+  btAlignedObjectArray<btCollisionObject *> objects_;
+  btMultiBodyDynamicsWorld *multi_;  // null: it is none
+  btAlignedObjectArray<btMultiBody *> multi_bodies_;
+  btAlignedObjectArray<btMultiBodyConstraint *> multi_constraints_;
+  btDispatcher *dispatcher_;
+  btBroadphaseInterface *broadphase_;
+};
+
+class Adapter {
+ public:
+  Adapter(dfm_world world, btDiscreteDynamicsWorld &bullet);
+  ~Adapter();
+  Adapter(const Adapter &) = delete;
+  Adapter &operator=(const Adapter &) = delete;
+
+  dfm_status sync();  // the objects as they are now, before a tick
+  dfm_status step(double dt, int max_sub_steps, double fixed, int *ticks);
+  dfm_status obstacle(const btCollisionObject *object, uint32_t leaf, dfm_obstacle *out);
+  dfm_status rigid(const btRigidBody *body, dfm_rigid *out);
+  dfm_status set_object(const btCollisionObject *object, const dfm_bullet_object &props);
+  dfm_status refresh(const btCollisionObject *object);
+  dfm_status debug_draw(uint32_t what) const;
+  dfm_bullet_stats stats() const;
+  dfm_status last_tick(uint32_t *trouble) const;
+  const btDynamicsWorld *bullet() const { return engine_.world; }
+
+ private:
+  // All that makes an object's obstacles what they are, beside where it stands.
+  struct Traits {
+    int handle = 0;  // the broadphase's: another one after the object has been out of the world
+    int group = 0, mask = 0;
+    bool moves = false, takes_part = false;
+    double mass = 0;
+    Vec moments, along, about;
+    bool operator==(const Traits &o) const;
+  };
+  struct Body : Seated { BulletMember member; };
+  struct Object {
+    const btCollisionObject *id;
+    Traits traits;
+    std::vector<Part> parts;
+    std::vector<dfm_obstacle> obstacles;  // empty: takes no part
+    Pose pose;                            // of one that forces do not move: where its obstacles were sent
+    std::vector<Pose> local;              // of its leaves
+    std::vector<Pose> sent;
+    std::unique_ptr<Body> body;
+    bool found = false, stale = false;
+  };
+  struct Props {  // what the caller has said; kept while the object is in the world
+    bool ignore = false;
+    std::string name;
+    dfm_material material = 0;
+  };
+  dfm_world world_;
+  BulletEngine engine_;
+  btInternalTickCallback theirs_before_, theirs_after_;
+  std::vector<std::unique_ptr<Object>> objects_;  // in the order they came
+  std::unordered_map<const btCollisionObject *, Object *> by_id_;
+  std::unordered_map<const btCollisionObject *, Props> props_;
+  std::vector<Part> seen_;  // of the object that is looked at
+  Clock clock_;
+  std::unique_ptr<Vacated> vacated_;
+  uint64_t ticks_ = 0;
+  double sync_seconds_ = 0;
+  dfm_status of_tick_ = DFM_OK, of_call_ = DFM_OK;
+  uint32_t trouble_ = 0;
+  std::string sentence_, call_sentence_;
+
+  static void before_tick(btDynamicsWorld *world, btScalar h);
+  static void after_tick(btDynamicsWorld *world, btScalar h);
+  dfm_status tick(double h);
+  dfm_status look(double h);
+  dfm_status check() const;
+  Traits traits_of(const btCollisionObject *object) const;
+  const Props *props_of(const btCollisionObject *object) const;
+  bool in_world(const btCollisionObject *object) const;
+  dfm_status not_in_world(const btCollisionObject *object) const;
+  dfm_status drop();
+  dfm_status bind(const btCollisionObject *object);
+  dfm_status bind_leaf(Object &o, size_t leaf);
+  dfm_status bind_body(Object &o);
+  dfm_status follow(Object &o, double h);
+};
+
+}  // namespace dfm_bullet_detail

@@ -1,0 +1,194 @@
+// Spheres, boxes, capsules and planes are the library's own, cylinders meshes of 64 sides. Every other convex
+// shape is the hull of its corners, without Bullet's margin around them, or of its farthest points in
+// kDirections directions where it is round. Concave shapes tell their triangles.
+#include "shapes.h"
+
+#include <BulletCollision/CollisionShapes/btConcaveShape.h>
+#include <BulletCollision/CollisionShapes/btHeightfieldTerrainShape.h>
+#include <BulletCollision/CollisionShapes/btPolyhedralConvexShape.h>
+#include <LinearMath/btConvexHullComputer.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace dfm_bullet_detail {
+namespace {
+
+constexpr int kDirections = 400;
+
+class Collector : public btTriangleCallback {
+ public:
+  void processTriangle(btVector3 *corner, int, int) override {
+    std::array<double, 3> c[3];
+    for (int k = 0; k < 3; ++k) c[k] = {corner[k].x(), corner[k].y(), corner[k].z()};
+    welder.add(c);
+  }
+  Welder welder;
+};
+
+// Bullet's contact has two sides, the library's that to which triangles face: of heights it is up.
+void face_up(Triangles &t, int up) {
+  for (size_t i = 0; i < t.corners.size(); i += 3) {
+    const auto at = [&](size_t k) { return load(&t.points[size_t{3} * t.corners[i + k]]); };
+    double normal[3];
+    store(normal, cross(at(1) - at(0), at(2) - at(0)));
+    if (normal[up] < 0) std::swap(t.corners[i + 1], t.corners[i + 2]);
+  }
+}
+
+Triangles of_concave(const btConcaveShape &shape) {
+  Collector collector;
+  btVector3 low, high;  // its own: a heightfield counts in them, and larger ones overflow there
+  shape.getAabb(btTransform::getIdentity(), low, high);
+  shape.processAllTriangles(&collector, low, high);
+  Triangles t = collector.welder.take();
+  if (shape.getShapeType() == TERRAIN_SHAPE_PROXYTYPE)
+    face_up(t, static_cast<const btHeightfieldTerrainShape &>(shape).getUpAxis());
+  return t;
+}
+
+// Directions spread evenly (Fibonacci's lattice on the sphere).
+std::vector<btVector3> corners_of(const btConvexShape &shape) {
+  std::vector<btVector3> out;
+  if (shape.isPolyhedral()) {
+    const auto &p = static_cast<const btPolyhedralConvexShape &>(shape);
+    out.resize(static_cast<size_t>(p.getNumVertices()));
+    for (int i = 0; i < p.getNumVertices(); ++i) p.getVertex(i, out[static_cast<size_t>(i)]);
+    return out;
+  }
+  for (int i = 0; i < kDirections; ++i) {
+    const double z = 1 - (2 * i + 1.0) / kDirections, r = std::sqrt(1 - z * z), a = 2.399963229728653 * i;
+    const btVector3 direction = to_bullet(Vec{r * std::cos(a), r * std::sin(a), z});
+    // of a cone the margin is no part of its sizes
+    out.push_back(shape.getShapeType() == CONE_SHAPE_PROXYTYPE
+                      ? shape.localGetSupportingVertexWithoutMargin(direction)
+                      : shape.localGetSupportingVertex(direction));
+  }
+  return out;
+}
+
+Triangles of_convex(const btConvexShape &shape) {
+  const std::vector<btVector3> corners = corners_of(shape);
+  btConvexHullComputer hull;
+  Triangles t;
+  if (corners.size() < 4) return t;
+  hull.compute(&corners[0].m_floats[0], sizeof(btVector3), static_cast<int>(corners.size()), 0, 0);
+  for (int i = 0; i < hull.vertices.size(); ++i) {
+    const Vec p = from_bullet(hull.vertices[i]);
+    t.points.insert(t.points.end(), {p.x, p.y, p.z});
+  }
+  for (int f = 0; f < hull.faces.size(); ++f) {  // a fan from each face's first corner
+    const btConvexHullComputer::Edge *const first = &hull.edges[hull.faces[f]];
+    const uint32_t at = static_cast<uint32_t>(first->getSourceVertex());
+    const btConvexHullComputer::Edge *e = first->getNextEdgeOfFace();
+    for (; static_cast<uint32_t>(e->getTargetVertex()) != at; e = e->getNextEdgeOfFace())
+      t.corners.insert(t.corners.end(), {at, static_cast<uint32_t>(e->getSourceVertex()),
+                                         static_cast<uint32_t>(e->getTargetVertex())});
+  }
+  return t;
+}
+
+// From z to the axis that the shape is along.
+Quat along(int axis) {
+  const double h = std::sqrt(0.5);
+  return axis == 0 ? Quat{0, h, 0, h} : axis == 1 ? Quat{-h, 0, 0, h} : Quat{};
+}
+
+void sizes(Part &p) {
+  const btCollisionShape *const s = p.shape;
+  Vec size;
+  switch (p.type) {
+    case BOX_SHAPE_PROXYTYPE:
+      size = from_bullet(static_cast<const btBoxShape *>(s)->getHalfExtentsWithMargin());
+      break;
+    case SPHERE_SHAPE_PROXYTYPE: size.x = static_cast<const btSphereShape *>(s)->getRadius(); break;
+    case CAPSULE_SHAPE_PROXYTYPE: {
+      const auto &c = *static_cast<const btCapsuleShape *>(s);
+      size = {c.getRadius(), c.getHalfHeight(), double(c.getUpAxis())};
+      break;
+    }
+    case CYLINDER_SHAPE_PROXYTYPE: {
+      const auto &c = *static_cast<const btCylinderShape *>(s);
+      size = {c.getRadius(), double(c.getHalfExtentsWithMargin()[c.getUpAxis()]), double(c.getUpAxis())};
+      break;
+    }
+    case STATIC_PLANE_PROXYTYPE: {
+      const auto &plane = *static_cast<const btStaticPlaneShape *>(s);
+      size = from_bullet(plane.getPlaneNormal());
+      p.local = p.local * plane_pose(size, plane.getPlaneConstant());
+      break;
+    }
+    case CONVEX_HULL_SHAPE_PROXYTYPE:
+      p.revision = static_cast<const btConvexHullShape *>(s)->getNumPoints();
+      break;
+    default: break;
+  }
+  store(p.size, size);
+  store(p.scaling, from_bullet(s->getLocalScaling()));
+}
+
+bool same(const Pose &a, const Pose &b) {
+  const Vec p = a.position - b.position;
+  const Quat q = a.rotation, r = b.rotation;
+  return dot(p, p) == 0 && q.x == r.x && q.y == r.y && q.z == r.z && q.w == r.w;
+}
+
+}  // namespace
+
+bool Part::operator==(const Part &o) const {
+  return shape == o.shape && type == o.type && revision == o.revision && std::equal(size, size + 3, o.size) &&
+         std::equal(scaling, scaling + 3, o.scaling) && same(local, o.local);
+}
+
+bool parts_of(const btCollisionShape *shape, const Pose &local, std::vector<Part> &out,
+              const btCollisionShape *&unknown) {
+  if (shape->isCompound()) {
+    const auto &compound = *static_cast<const btCompoundShape *>(shape);
+    for (int i = 0; i < compound.getNumChildShapes(); ++i)
+      if (!parts_of(compound.getChildShape(i), local * from_bullet(compound.getChildTransform(i)), out,
+                    unknown))
+        return false;
+    return true;
+  }
+  if (shape->getShapeType() == EMPTY_SHAPE_PROXYTYPE) return true;
+  if (!shape->isConvex() && !shape->isConcave()) {
+    unknown = shape;
+    return false;
+  }
+  Part &p = out.emplace_back();
+  p.shape = shape;
+  p.type = shape->getShapeType();
+  p.local = local;
+  sizes(p);
+  return true;
+}
+
+void describe(const Part &part, dfm_obstacle_def &def, Pose &local, Triangles &made) {
+  local = part.local;
+  switch (part.type) {
+    case SPHERE_SHAPE_PROXYTYPE:
+      def.shape = DFM_SHAPE_SPHERE;
+      def.radius = part.size[0];
+      break;
+    case BOX_SHAPE_PROXYTYPE:
+      def.shape = DFM_SHAPE_BOX;
+      std::copy(part.size, part.size + 3, def.half_size);
+      break;
+    case CAPSULE_SHAPE_PROXYTYPE:
+      def.shape = DFM_SHAPE_CAPSULE;
+      def.radius = part.size[0];
+      def.half_length = part.size[1];
+      local.rotation = unit(local.rotation * along(static_cast<int>(part.size[2])));
+      break;
+    case STATIC_PLANE_PROXYTYPE: def.shape = DFM_SHAPE_PLANE; break;
+    default:
+      if (part.type == CYLINDER_SHAPE_PROXYTYPE)
+        made = cylinder(part.size[0], 2 * part.size[1], static_cast<int>(part.size[2]));
+      else if (part.shape->isConcave()) made = of_concave(*static_cast<const btConcaveShape *>(part.shape));
+      else made = of_convex(*static_cast<const btConvexShape *>(part.shape));
+      made.fill(def);
+      break;
+  }
+}
+
+}  // namespace dfm_bullet_detail
