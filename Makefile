@@ -8,7 +8,7 @@ BUILD = @cmake --build --preset
 PYTHON ?= $(firstword $(wildcard /usr/bin/python3) python3)
 
 .PHONY: help demo test bench soak lint format tidy asan tsan fuzz install clean setup setup-bench setup-fuzz
-.PHONY: bench-peers setup-peers
+.PHONY: bench-peers setup-peers wheel
 
 help:
 	@echo "make demo             two soft cylinders with and without friction: table, picture, out/demo/"
@@ -22,6 +22,7 @@ help:
 	@echo "make asan, make tsan  the suite under the sanitizers; tsan: what runs on several threads"
 	@echo "make fuzz             the readers under libFuzzer"
 	@echo "make install PREFIX=  library, headers, plugins, command (default $(PREFIX))"
+	@echo "make wheel            the Python package for any Python 3 on this system: build/dist/"
 	@echo "make clean            removes build/ and out/"
 
 setup:
@@ -83,6 +84,11 @@ fuzz: setup-fuzz build/fuzz/build.ninja
 install: setup build/release/build.ninja
 	$(BUILD) release --target deform_command
 	@cmake --install build/release --strip --prefix "$$(realpath -m -- "$(PREFIX)")"
+
+wheel: setup build/release/build.ninja
+	$(BUILD) release --target deform_command deform_python_native
+	@mkdir -p build/dist && cd bindings/python && $(PYTHON) -B -c "import wheel_backend as b; print( \
+	  b.build_wheel('$(CURDIR)/build/dist', {'prebuilt': '$(CURDIR)/build/release'}))"
 
 clean:
 	rm -rf build out

@@ -104,6 +104,23 @@ class View(unittest.TestCase):
             volumes.append(float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6))
         np.testing.assert_allclose(volumes, [8 * 0.05 * 0.1 * 0.02, 4 / 3 * np.pi * 0.05**3], rtol=0.05)
 
+    def test_film_of_a_world_stepped_by_hand(self):
+        with deform.World() as world:
+            world.add_obstacle("plane")
+            body = world.add_body(deform.TetMesh.ball(0.1, 300), position=(0, 0, 0.12), name="ball")
+            film = world.film(color="contact")
+            for _ in range(10):
+                world.run(0.01, dt=1e-3)
+                film.add()
+            np.testing.assert_allclose(film.times, np.arange(11) / 100, atol=1e-9)
+            np.testing.assert_allclose(film.positions("ball")[-1], body.positions, atol=1e-7)
+            self.assertGreater(film.top(), 0)
+            self.assertEqual((film.steps, film.frames[-1].contacts), (100, int(world.stats.contacts)))
+            body.remove()
+            with self.assertRaisesRegex(deform.ArgumentError, "body 'ball' is gone"):
+                film.add()
+        self.assertIn("canvas", webgl.document(film))
+
     def test_document_stands_alone(self):
         run = deform.run(SCENES / "slope_block.json", duration=0.01)
         document = webgl.document(run)

@@ -13,7 +13,7 @@ import numpy as np
 from . import _abi
 from ._arrays import row_type
 from ._context import Context, default_context
-from ._library import check, encoded, lib, quick, read_text, sized
+from ._library import ArgumentError, check, encoded, lib, quick, read_text, sized
 from .picture import Picture, Solid, body_values, draw, palette, scaled, solids
 from .world import Trouble, World
 
@@ -130,6 +130,30 @@ class Run:
         self.trouble = Trouble(0)
         self.stats: Any = None
         self.hash = 0
+        self.world: Any = None
+
+    @classmethod
+    def of(cls, world: World, color: str = "body", camera: Any = None) -> Run:
+        """An empty one for a world that is stepped by hand; add() records a frame (World.film)."""
+        run = cls(color, camera)
+        run.world = world
+        run.triangles = {body.name: body.triangles for body in world.bodies}
+        run.add()
+        return run
+
+    def add(self, probes: Mapping[str, np.ndarray] | None = None) -> None:
+        """Records the world as it is now. Bodies that were made since are left out."""
+        world = self.world
+        bodies = {body.name: body for body in world.bodies if body.name in self.triangles}
+        missing = [name for name in self.triangles if name not in bodies]
+        if missing:
+            raise ArgumentError(f"body '{missing[0]}' is gone: begin another film", "DFM_E_ARG")
+        stats = world.stats
+        self.steps = int(stats.steps)
+        self.frames.append(Frame(
+            world.time, {name: bodies[name].positions.astype(np.float32) for name in self.triangles},
+            {name: body_values(bodies[name], self.color) for name in self.triangles}, solids(world),
+            dict(probes or {}), int(stats.contacts), int(stats.sticking)))
 
     @property
     def times(self) -> np.ndarray:
@@ -182,17 +206,16 @@ class _Runner:
         self.duration = self.settings.duration if duration is None else duration
         self.every = self.settings.every if every is None else every
         self.start = self.world.time
-        color = self.settings.color if self.settings.color in ("speed", "contact") else "body"
-        self.run_ = Run(color, self.settings.camera)
-        self.next = 0
-        self.bodies = {body.name: body for body in self.world.bodies}
-        self.run_.triangles = {name: body.triangles for name, body in self.bodies.items()}
+        self.next = self.steps = 0
 
     def run(self) -> Run:
-        out = self.run_
+        color = self.settings.color if self.settings.color in ("speed", "contact") else "body"
+        out = self.run_ = Run(color, self.settings.camera)
+        out.world = self.world
+        out.triangles = {body.name: body.triangles for body in self.world.bodies}
         self.record()
         while self.advance():
-            out.steps += 1
+            self.steps += 1
             if self.watch is not None:
                 self.watch(self.world)
             self.record()
@@ -201,7 +224,7 @@ class _Runner:
         memory = _abi.dfm_world_stats.from_buffer_copy(self.world.stats.tobytes())
         kind = np.dtype((np.record, row_type(_abi.dfm_world_stats)))
         out.stats = np.frombuffer(memory, dtype=kind)[0]  # type: ignore[call-overload]
-        out.hash = self.world.hash
+        out.hash, out.steps, out.world = self.world.hash, self.steps, None
         return out
 
     def record(self, always: bool = False) -> None:
@@ -210,11 +233,7 @@ class _Runner:
             if self.every > 0 and t < self.next * self.every - 1e-9 * self.every:
                 return
             self.next = math.floor(t / self.every + 1e-9) + 1 if self.every > 0 else 0
-        stats = self.world.stats
-        self.run_.frames.append(Frame(
-            self.world.time, {n: b.positions.astype(np.float32) for n, b in self.bodies.items()},
-            {n: body_values(b, self.run_.color) for n, b in self.bodies.items()}, solids(self.world),
-            {n: x for n, (x, _) in self.scene.probes.items()}, int(stats.contacts), int(stats.sticking)))
+        self.run_.add({name: position for name, (position, _) in self.scene.probes.items()})
 
     def advance(self) -> bool:
         """One step toward the end, of the length that `deform run` takes; False when there."""
@@ -238,10 +257,11 @@ class _Runner:
 
     def advance_load(self) -> bool:
         n = math.ceil(self.duration / self.settings.step - 1e-6) if self.settings.step > 0 else 1
-        if self.run_.steps == n:
+        if self.steps == n:
             return False
-        self.world.equilibrium(load_from=self.run_.steps / n, load_to=(self.run_.steps + 1) / n,
-                               time=self.start + self.duration * (self.run_.steps + 1) / n - self.world.time)
+        share = (self.steps + 1) / n
+        self.world.equilibrium(load_from=self.steps / n, load_to=share,
+                               time=self.start + self.duration * share - self.world.time)
         return True
 
 

@@ -565,6 +565,13 @@ class World:
         from .picture import picture
         return picture(self, **options)
 
+    def film(self, color: str = "body", camera: Any = None) -> Any:
+        """A Run that records this world while it is stepped by hand: `film.add()` after a step adds a frame,
+        and a notebook shows it. color: "body", "speed" or "contact"; camera: (eye [3], look_at [3]) m, of
+        its pictures."""
+        from .scene import Run
+        return Run.of(self, color, camera)
+
     def _repr_png_(self) -> bytes | None:
         from .picture import png_or_none
         return png_or_none(self)
