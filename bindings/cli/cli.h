@@ -29,6 +29,7 @@ dfm_context *make_context(const Globals &globals);
 
 // Each adds its subcommand; the callback stores its exit code in *exit_code.
 void add_run(CLI::App &app, Globals &globals, int *exit_code);
+void add_replay(CLI::App &app, Globals &globals, int *exit_code);
 void add_explain(CLI::App &app, Globals &globals, int *exit_code);
 void add_calibrate(CLI::App &app, Globals &globals, int *exit_code);
 void add_mesh(CLI::App &app, Globals &globals, int *exit_code);

@@ -1,5 +1,6 @@
 // deform run SCENE.json: simulates and writes what interfaces promise.
 #include <CLI/CLI.hpp>
+#include <unistd.h>
 
 #include <csignal>
 #include <ctime>
@@ -7,11 +8,14 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <memory>
+#include <optional>
 
 #include "frames.h"
 #include "impulses.h"
@@ -21,6 +25,8 @@
 #include "output.h"
 #include "planned.h"
 #include "progress.h"
+#include "recording.h"
+#include "state_file.h"
 
 namespace cli {
 namespace {
@@ -42,6 +48,12 @@ void catch_signals() {
   action.sa_flags = static_cast<int>(SA_RESETHAND);
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
+}
+
+std::string seconds(double t) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%g s", t);
+  return text;
 }
 
 double cpu_seconds() {
@@ -78,7 +90,7 @@ bool asks_for_spoiled_start(const SceneFile &scene) {
 
 class Runner {
  public:
-  Runner(const SceneFile &scene, const RunOptions &options, const Globals &globals)
+  Runner(const SceneFile &scene, const RunOptions &options, const Globals &globals, Comparison *comparison)
       : scene_(scene),
         options_(options),
         world_(scene.world()),
@@ -91,12 +103,17 @@ class Runner {
         checker_(scene),
         impulses_(scene),
         record_(scene.settings().every),
-        frame_(frame_interval()) {
+        frame_(frame_interval()),
+        comparison_(comparison) {
+    if (options.record) recorder_.emplace(scene, options);
     if (frame_interval() > 0) frames_ = Frames::create(scene, options.out + "/frames");
   }
 
   void run() {
-    result_.start = result_.simulated = dfm_world_time(world_);
+    result_.start = dfm_world_time(world_);
+    check_saves();
+    if (!options_.from.empty()) go_on_from(options_.from);
+    result_.begun = result_.simulated = dfm_world_time(world_);
     count_overlaps();
     add_unwatched(scene_, result_);
     outputs(true);
@@ -109,10 +126,12 @@ class Runner {
       result_.stop_reason = "interrupted by a signal";
     }
     if (!at_record_) {  // after a stop, too: the world is back at its last good state
-      outputs_.record();
+      record();
       if (!check_every_step_) check(false);
     }
     if (result_.interrupted || result_.stopped) outputs_.write_last();
+    for (; saved_ < options_.saves.size(); ++saved_)
+      warn("--save " + options_.saves[saved_].path + ": not written, the run ended before its time");
     if (result_.hold_begun) end_hold();
     outputs_.write_nodes();
     result_.impulses = impulses_.json();
@@ -176,6 +195,37 @@ class Runner {
       if (rate <= 0) return scene_.settings().every;
     }
     return rate > 0 ? 1 / rate : 0;
+  }
+
+  // Before the first step, so that nothing is simulated for a file that cannot be written.
+  void check_saves() const {
+    if (!options_.saves.empty()) refuse_static(scene_, "--save");
+    if (options_.record) refuse_static(scene_, "--record");
+    for (const RunOptions::Save &save : options_.saves) {
+      const std::filesystem::path folder = std::filesystem::path(save.path).parent_path();
+      if (access(folder.empty() ? "." : folder.c_str(), W_OK) != 0)
+        throw Failure(kBadInput,
+                      "--save " + save.path + ": cannot be written there: " + std::strerror(errno));
+      if (save.at > duration_ * (1 + 1e-9))
+        throw Failure(kBadInput, "--save " + save.path + ": the run ends at " + seconds(duration_) +
+                                     ", before " + seconds(save.at) +
+                                     "; give an earlier time, or a longer --time");
+    }
+  }
+
+  void go_on_from(const std::string &path) {
+    refuse_static(scene_, "--from");
+    read_state(scene_, path);
+    const double t = dfm_world_time(world_) - result_.start;
+    if (t >= duration_ * (1 - 1e-9))
+      throw Failure(kBadInput, path + ": a state at " + seconds(t) + ", and the run ends at " +
+                                   seconds(duration_) +
+                                   "; give a longer --time, counted from the scene's start");
+  }
+
+  void record() {
+    outputs_.record();
+    if (recorder_) recorder_->add();
   }
 
   // The equilibrium under the next share of the loads; false when it has all of them.
@@ -269,9 +319,13 @@ class Runner {
       result_.hold_begun = dfm_world_hold_begin(world_) == DFM_OK;
     at_record_ = record_.due(t - result_.start);
     const bool frame_due = frames_ && frame_.due(t - result_.start);
+    if (comparison_) comparison_->look(scene_);
+    for (; saved_ < options_.saves.size() && t - result_.start >= options_.saves[saved_].at * (1 - 1e-9);
+         ++saved_)
+      write_state(scene_, options_.saves[saved_].path);
     if (at_record_ || frame_due || check_every_step_) {
       if (!start_state) count_time();
-      if (at_record_) outputs_.record();
+      if (at_record_) record();
       if (at_record_ || check_every_step_) check(start_state);
       if (frame_due) frames_->draw(t);
       mark_ = {wall_seconds(), cpu_seconds()};
@@ -317,11 +371,16 @@ class Runner {
   Impulses impulses_;
   Schedule record_, frame_;
   std::unique_ptr<Frames> frames_;
+  std::optional<Recorder> recorder_;
+  Comparison *comparison_;
+  size_t saved_ = 0;  // of options_.saves, which are in order of time
   RunResult result_;
   Mark mark_ = {};
 };
 
-int run(RunOptions options, const Globals &globals) {
+}  // namespace
+
+int run_scene(RunOptions options, const Globals &globals, Comparison *comparison) {
   if (options.out.empty()) options.out = "out/" + std::filesystem::path(options.scene).stem().string();
   if (options.time > 0) {  // the scene is read for that long: it tells what comes after its end
     char text[64];
@@ -335,7 +394,7 @@ int run(RunOptions options, const Globals &globals) {
   results_lie_in(options.out);
   catch_signals();
   {
-    Runner runner(scene, options, globals);
+    Runner runner(scene, options, globals, comparison);
     runner.run();
     for (const std::string &remark : runner.remarks()) keep_warning(remark);
     result = runner.result();
@@ -359,8 +418,6 @@ int run(RunOptions options, const Globals &globals) {
   }
   return result.interrupted ? int(kInterrupted) : int(kDone);
 }
-
-}  // namespace
 
 void add_run(CLI::App &app, Globals &globals, int *exit_code) {
   auto options = std::make_shared<RunOptions>();
@@ -389,7 +446,24 @@ void add_run(CLI::App &app, Globals &globals, int *exit_code) {
       ->type_name("SEED");
   sub->add_flag("--check", options->check,
                 "count crossing triangles in every step, not only in recorded states");
-  sub->callback([=, &globals] { *exit_code = run(*options, globals); });
+  auto saves = std::make_shared<std::vector<std::pair<double, std::string>>>();
+  sub->add_option("--save", *saves,
+                  "write the state of the first step that reaches T to FILE; may be repeated")
+      ->type_name("T FILE");
+  sub->add_option("--from", options->from,
+                  "go on from a state that --save or --record wrote, to the end of the scene or of --time")
+      ->type_name("FILE");
+  sub->add_flag("--record", options->record, "keep every recorded state, for `deform replay`");
+  sub->callback([=, &globals] {
+    for (const auto &[at, path] : *saves) {
+      if (!(at >= 0) || !std::isfinite(at))
+        throw Failure(kBadInput, "--save: expected a finite time of 0 s or more, found " + number(at));
+      options->saves.push_back({at, path});
+    }
+    std::stable_sort(options->saves.begin(), options->saves.end(),
+                     [](const auto &a, const auto &b) { return a.at < b.at; });
+    *exit_code = run_scene(*options, globals);
+  });
 }
 
 }  // namespace cli

@@ -182,6 +182,7 @@ int run(int argc, char **argv) {
   app.set_version_flag("--version", dfm_version(nullptr, nullptr, nullptr));
   app.require_subcommand(1);
   cli::add_run(app, cli::globals, &exit_code);
+  cli::add_replay(app, cli::globals, &exit_code);
   cli::add_explain(app, cli::globals, &exit_code);
   cli::add_calibrate(app, cli::globals, &exit_code);
   cli::add_mesh(app, cli::globals, &exit_code);

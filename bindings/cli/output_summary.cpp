@@ -8,6 +8,7 @@
 #include "messages.h"
 #include "planned.h"
 #include "run.h"
+#include "state_file.h"
 #include "voxel_core.h"
 
 namespace cli {
@@ -247,9 +248,6 @@ std::string summary_json(const SceneFile &scene, const RunOptions &options, cons
   const dfm_world_stats stats = world_stats(scene);
   JsonValue plan;
   parse_json(scene.explain(), plan);
-  char hash[24];
-  std::snprintf(hash, sizeof hash, "\"%016llx\"",
-                static_cast<unsigned long long>(dfm_world_hash(scene.world())));
   std::vector<std::string> warning_texts;
   for (const std::string &w : warnings()) warning_texts.push_back(quoted(w));
   JsonObject ms, solver, hold, effects, contacts, guard, budget, out;
@@ -304,7 +302,7 @@ std::string summary_json(const SceneFile &scene, const RunOptions &options, cons
       .add("contacts", contacts.text())
       .add("impulse", run.impulses)
       .add("swaps", swaps_json(scene, run))
-      .add("state_hash", hash);
+      .add("state_hash", quoted(hash_text(dfm_world_hash(scene.world()))));
   if (const std::string planned = planned_json(scene); !planned.empty()) out.add("planner", planned);
   out.add("stopped", stopped_json(run)).add("warnings", json_array(warning_texts));
   return indented(out.text());
@@ -349,8 +347,8 @@ void print_table(const SceneFile &scene, const RunResult &run, const Checks &che
                 m.speed_max, 100 * m.volume / m.rest_volume);
   }
   std::printf("%llu steps, %g s simulated in %.3g s: %.4g steps/s, %.3g x real time\n",
-              static_cast<unsigned long long>(run.steps), run.simulated, run.wall,
-              double(run.steps) / run.wall, (run.simulated - run.start) / run.wall);
+              static_cast<unsigned long long>(run.steps), run.simulated - run.begun, run.wall,
+              double(run.steps) / run.wall, (run.simulated - run.begun) / run.wall);
   std::printf(
       "contacts: %u at most, %.3g on average; states checked: %llu, crossing triangle pairs: %zu (%zu of a "
       "body with itself), inverted cells: %u\n",

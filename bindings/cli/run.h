@@ -17,7 +17,19 @@ struct RunOptions {
   std::vector<std::string> set;
   bool profile = false, check = false;
   uint64_t jitter = 0;
+  struct Save {
+    double at;  // s since the start of the scene
+    std::string path;
+  };
+  std::vector<Save> saves;
+  std::string from;     // a state to go on from; empty: the scene's start
+  bool record = false;  // every recorded state, as a state file
 };
+
+class Comparison;
+// The run of `deform run`, and that of `deform replay`, which asks after each step whether the state is the
+// recorded one. Returns the exit code.
+int run_scene(RunOptions options, const Globals &globals, Comparison *comparison = nullptr);
 
 // Wall time of every step, thinned evenly once there are very many; the longest is kept exactly.
 class StepTimes {
@@ -36,8 +48,9 @@ struct RunResult {
   uint64_t steps = 0;
   // pairs that were through each other at the start; those that were put apart
   uint32_t overlaps = 0, untangled = 0;
-  // s; wall and cpu are of the steps, without outputs and checks
-  double start = 0, simulated = 0, wall = 0, cpu = 0;
+  // s; start: of the scene, begun: where this run began; wall and cpu are of the steps, without outputs and
+  // checks
+  double start = 0, begun = 0, simulated = 0, wall = 0, cpu = 0;
   StepTimes times;
   std::vector<dfm_swap> swaps;
   std::map<std::string, std::string> unwatched;  // bodies that the energy watch did not look at, and why

@@ -38,7 +38,7 @@ void remove_matching(const std::string &folder, const char *pattern) {
 // What a link leads to may hold files of the same names that are no run's. A folder is not replaced as a file
 // is: the link may be meant.
 void refuse_linked_folders(const std::string &folder) {
-  for (const char *name : {"/states", "/nodes", "/frames"}) {
+  for (const char *name : {"/states", "/nodes", "/frames", "/recording"}) {
     std::error_code error;
     if (fs::is_symlink(folder + name, error))
       throw Failure(kBadInput, folder + name +
@@ -55,6 +55,8 @@ void remove_earlier(const std::string &folder) {
   remove_matching(folder + "/states",
                   "(.*_[0-9]{6}|last_.*)\\.vtu|index\\.csv|.*\\.(vtu|csv)\\.part[0-9]*(-[0-9]+)?");
   remove_matching(folder + "/nodes", ".*\\.csv(\\.part[0-9]*(-[0-9]+)?)?");
+  remove_matching(folder + "/recording",
+                  "(run\\.json|states\\.csv|[0-9]{6}\\.state)(\\.part[0-9]*(-[0-9]+)?)?");
   remove_matching(folder + "/frames", "frame_.*\\.png(\\.part[0-9]*(-[0-9]+)?)?");
 }
 

@@ -1,0 +1,100 @@
+// deform replay DIR: the run that `deform run --record` recorded, simulated again or shown again.
+#include <CLI/CLI.hpp>
+
+#include <cstdio>
+#include <memory>
+
+#include "frames.h"
+#include "messages.h"
+#include "recording.h"
+#include "run.h"
+#include "state_file.h"
+
+namespace cli {
+namespace {
+
+struct ReplayOptions {
+  std::string folder, out;
+  double frame_rate = 0;  // 1/s, 0: as the scene says
+  std::vector<std::string> set;
+  bool shown_only = false;
+};
+
+void only_outputs(const std::vector<std::string> &set) {
+  for (const std::string &s : set)
+    if (s.rfind("/output", 0) != 0)
+      throw Failure(kBadInput, "--set " + s +
+                                   ": a replay is the run that was recorded; only values under /output "
+                                   "may be others, such as /output/camera/eye=[1,-2,1]");
+}
+
+// The recorded states one after another: what they look like, not how they came about.
+int show(const Recording &recording, const ReplayOptions &options, const Globals &globals,
+         const std::vector<std::string> &set) {
+  if (options.frame_rate > 0)
+    throw Failure(kBadInput,
+                  "--states: there is a picture of each recorded state; leave --frames out, or "
+                  "--states, to have the run simulated again");
+  const SceneFile scene(globals, recording.scene, set, recording.jitter);
+  const RunFolder held(options.out);
+  const std::unique_ptr<Frames> frames = Frames::create(scene, options.out + "/frames");
+  if (!frames) return kBadInput;  // the reason is among the warnings
+  for (const RecordedState &state : recording.states) {
+    read_state(scene, state.path);
+    frames->draw(state.t);
+  }
+  if (!globals.quiet)
+    std::printf("%zu pictures of recorded states: %s\n", recording.states.size(),
+                shown(options.out + "/frames").c_str());
+  return kDone;
+}
+
+int simulate(const Recording &recording, const ReplayOptions &options, const Globals &globals,
+             const std::vector<std::string> &set) {
+  RunOptions again;
+  again.scene = recording.scene;
+  again.out = options.out;
+  again.set = set;
+  again.jitter = recording.jitter;
+  again.frame_rate = options.frame_rate;
+  again.from = recording.states.front().path;
+  Comparison comparison(recording);
+  const int code = run_scene(again, globals, &comparison);
+  if (code != kDone) return code;
+  const std::string differs = comparison.sentence();
+  if (!differs.empty())
+    throw Failure(kFound, options.folder + ": the replay is not the run that was recorded: " + differs);
+  if (!globals.quiet && !globals.json)
+    std::printf("the same bits in all %zu recorded states\n", comparison.same());
+  return kDone;
+}
+
+int replay(ReplayOptions options, const Globals &globals) {
+  const Recording recording = read_recording(options.folder);
+  only_outputs(options.set);
+  if (options.out.empty()) options.out = options.folder + "/replay";
+  std::vector<std::string> set = recording.set;
+  set.insert(set.end(), options.set.begin(), options.set.end());
+  return (options.shown_only ? show : simulate)(recording, options, globals, set);
+}
+
+}  // namespace
+
+void add_replay(CLI::App &app, Globals &globals, int *exit_code) {
+  auto options = std::make_shared<ReplayOptions>();
+  CLI::App *sub =
+      app.add_subcommand("replay", "simulates a recorded run again, to the same bits, or shows it again");
+  sub->add_option("DIR", options->folder, "results of `deform run --record`")->required();
+  sub->add_option("--out", options->out, "folder for the results (DIR/replay)")->type_name("DIR");
+  sub->add_option("--frames", options->frame_rate, "pictures per simulated second")
+      ->check(CLI::PositiveNumber)
+      ->type_name("FPS");
+  sub->add_option("--set", options->set, "change a value under /output, such as the camera")
+      ->type_name("/json/pointer=value")
+      ->take_all()
+      ->allow_extra_args(false);
+  sub->add_flag("--states", options->shown_only, "pictures of the recorded states, nothing is simulated");
+  sub->callback([=, &globals] { *exit_code = replay(*options, globals); });
+}
+
+}  // namespace cli

@@ -1,0 +1,99 @@
+#include "recording.h"
+
+#include <cstdlib>
+#include <filesystem>
+#include <sstream>
+
+#include "json_text.h"
+#include "messages.h"
+#include "state_file.h"
+
+namespace fs = std::filesystem;
+
+namespace cli {
+namespace {
+
+constexpr const char *kFormat = "deform-recording", *kVersion = "1", *kHead = "t,file,state_hash";
+constexpr uint64_t kMostIndex = uint64_t{1} << 28;  // bytes
+
+std::string run_file(const SceneFile &scene, const RunOptions &options) {
+  std::vector<std::string> set;
+  for (const std::string &s : options.set) set.push_back(quoted(s));
+  JsonObject out;
+  out.add("format", quoted(kFormat))
+      .add("version", kVersion)
+      .add("scene", quoted(fs::absolute(scene.path()).string()))
+      .add("set", json_array(set))
+      .add("jitter", std::to_string(options.jitter));
+  return indented(out.text());
+}
+
+std::string made(const std::string &folder) {
+  make_folder(folder);
+  return folder;
+}
+
+}  // namespace
+
+Recorder::Recorder(const SceneFile &scene, const RunOptions &options)
+    : scene_(scene), folder_(made(options.out + "/recording")), index_(folder_ + "/states.csv", kHead) {
+  write_whole(folder_ + "/run.json", run_file(scene, options));
+}
+
+void Recorder::add() {
+  char name[32];
+  std::snprintf(name, sizeof name, "%06u.state", count_++);
+  write_state(scene_, folder_ + "/" + name);
+  index_.cell(dfm_world_time(scene_.world())).cell(name).cell(hash_text(dfm_world_hash(scene_.world())));
+  index_.end_row();
+  index_.flush();
+}
+
+Recording read_recording(const std::string &run) {
+  const std::string folder = run + "/recording", file = folder + "/run.json", index = folder + "/states.csv";
+  if (!fs::exists(file))
+    throw Failure(kBadInput, run +
+                                 ": no recording in this folder; make one with `deform run SCENE --record "
+                                 "--out " +
+                                 run + "`");
+  JsonValue text;
+  if (!parse_json(read_file(file, kMostIndex, "a recording's run.json"), text) ||
+      text.get("format") != kFormat || text.get("version") != kVersion)
+    throw Failure(kBadInput, file + ": not of a recording that this command reads; record the run anew");
+  Recording out;
+  out.scene = text.get("scene");
+  out.jitter = std::strtoull(text.get("jitter").c_str(), nullptr, 10);
+  if (const JsonValue *const set = text.find("set"))
+    for (const JsonValue &s : set->items) out.set.push_back(s.text);
+  std::istringstream rows(read_file(index, kMostIndex, "a recording's states.csv"));
+  std::string row;
+  for (std::getline(rows, row); std::getline(rows, row);) {
+    const size_t first = row.find(','), second = row.find(',', first + 1);
+    if (first == std::string::npos || second == std::string::npos) break;  // a row that was being written
+    out.states.push_back({std::strtod(row.c_str(), nullptr),
+                          folder + "/" + row.substr(first + 1, second - first - 1), row.substr(second + 1)});
+  }
+  if (out.states.empty()) throw Failure(kBadInput, index + ": no state in it; record the run anew");
+  return out;
+}
+
+void Comparison::look(const SceneFile &scene) {
+  const double t = dfm_world_time(scene.world());
+  while (next_ < recording_.states.size() && recording_.states[next_].t < t)
+    ++next_;  // never came: sentence()
+  if (next_ == recording_.states.size() || recording_.states[next_].t != t) return;
+  const std::string hash = hash_text(dfm_world_hash(scene.world())), then = recording_.states[next_++].hash;
+  if (hash == then) ++same_;
+  else if (first_.empty())
+    first_ = "at t = " + number(t) + " s the state has the hash " + hash + ", and had " + then;
+}
+
+std::string Comparison::sentence() const {
+  if (!first_.empty()) return first_;
+  if (same_ == recording_.states.size()) return "";
+  return std::to_string(recording_.states.size() - same_) + " of " +
+         std::to_string(recording_.states.size()) +
+         " recorded states did not come: the steps fell elsewhere, or the run ended before";
+}
+
+}  // namespace cli

@@ -1,0 +1,149 @@
+// A line of JSON that says what the state belongs to, then the bytes of dfm_world_snapshot.
+#include "state_file.h"
+
+#include <algorithm>
+#include <map>
+
+#include "file.h"
+#include "json_text.h"
+#include "messages.h"
+
+namespace cli {
+namespace {
+
+constexpr uint64_t kMostPlugin = uint64_t{1} << 30, kMostState = uint64_t{1} << 33;  // bytes
+constexpr const char *kFormat = "deform-state", *kVersion = "1";
+
+// FNV-1a, 64 bit: against a mistaken file, not against forgery.
+uint64_t hash_of(const std::string &bytes) {
+  uint64_t hash = 14695981039346656037u;
+  for (const char c : bytes) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211u;
+  return hash;
+}
+
+struct Plugin { std::string version, hash; };
+
+// Those that came from files; what is linked into the library is of the library's version.
+std::map<std::string, Plugin> plugins_of(const SceneFile &scene) {
+  std::map<std::string, Plugin> out;
+  std::map<std::string, std::string> hashes;  // of a file, which may hold several types
+  struct Seen {
+    std::map<std::string, Plugin> &out;
+    std::map<std::string, std::string> &files;
+  } seen{out, hashes};
+  need(dfm_plugin_visit(
+      scene.context(),
+      [](void *user, const dfm_type *type, const char *file) {
+        Seen &to = *static_cast<Seen *>(user);
+        if (!file || !*file) return;
+        to.out[type->id] = {type->version ? type->version : "", file};
+        to.files[file];
+      },
+      &seen));
+  for (auto &[file, hash] : hashes) hash = hash_text(hash_of(read_file(file, kMostPlugin, "a plugin")));
+  for (auto &[id, plugin] : out) plugin.hash = hashes[plugin.hash];
+  return out;
+}
+
+std::string head_of(const SceneFile &scene, size_t bytes) {
+  std::vector<std::string> plugins;
+  for (const auto &[id, plugin] : plugins_of(scene)) {
+    JsonObject row;
+    row.add("id", quoted(id)).add("version", quoted(plugin.version)).add("hash", quoted(plugin.hash));
+    plugins.push_back(row.text());
+  }
+  JsonObject head;
+  head.add("format", quoted(kFormat))
+      .add("version", kVersion)
+      .add("library", quoted(dfm_version(nullptr, nullptr, nullptr)))
+      .add("scene", quoted(hash_text(scene_hash(scene))))
+      .add("t", number(dfm_world_time(scene.world())))
+      .add("state_hash", quoted(hash_text(dfm_world_hash(scene.world()))))
+      .add("plugins", json_array(plugins))
+      .add("bytes", std::to_string(bytes));
+  return head.text() + "\n";
+}
+
+[[noreturn]] void refuse(const std::string &path, const std::string &why) {
+  throw Failure(kBadInput, path + ": " + why);
+}
+
+void check_plugins(const SceneFile &scene, const std::string &path, const JsonValue &head) {
+  const JsonValue *const rows = head.find("plugins");
+  const std::map<std::string, Plugin> here = plugins_of(scene);
+  for (size_t i = 0; rows && i < rows->items.size(); ++i) {
+    const JsonValue &then = rows->items[i];
+    const auto now = here.find(then.get("id"));
+    if (now == here.end()) continue;  // where it is needed the restore says so
+    if (now->second.version != then.get("version"))
+      refuse(path, "written with '" + now->first + "' " + then.get("version") + ", and " +
+                       now->second.version + " is loaded here; run the scene anew, or load that plugin");
+    if (now->second.hash != then.get("hash"))
+      refuse(path, "written with another build of '" + now->first + "' " + now->second.version +
+                       " than the one that is loaded here; run the scene anew, or load that build");
+  }
+}
+
+}  // namespace
+
+std::string hash_text(uint64_t hash) {
+  char text[24];
+  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(hash));
+  return text;
+}
+
+uint64_t scene_hash(const SceneFile &scene) {
+  JsonValue text;
+  if (!parse_json(scene.value(""), text)) throw Failure(kBadInput, scene.path() + ": no scene to hash");
+  const auto leave_out = [](JsonValue &from, const char *name) {
+    std::erase_if(from.members, [&](const JsonMember &m) { return m.name == name; });
+  };
+  leave_out(text, "output");
+  for (JsonMember &m : text.members)
+    if (m.name == "time") leave_out(m.value, "duration");
+  return hash_of(json_text(text));
+}
+
+void refuse_static(const SceneFile &scene, const std::string &option) {
+  if (scene.value("/time/mode") == "\"static\"")
+    throw Failure(kBadInput, option + ": " + scene.path() +
+                                 " looks for equilibria (\"mode\": \"static\"), which have no state to go on "
+                                 "from; leave the option out");
+}
+
+void write_state(const SceneFile &scene, const std::string &path) {
+  size_t bytes = 0;
+  need(dfm_world_snapshot(scene.world(), nullptr, &bytes));
+  std::string snapshot(bytes, '\0');
+  need(dfm_world_snapshot(scene.world(), snapshot.data(), &bytes));
+  write_whole(path, head_of(scene, bytes) + snapshot);
+}
+
+void read_state(const SceneFile &scene, const std::string &path) {
+  const std::string text = read_file(path, kMostState, "a state that `deform run --save` wrote");
+  const size_t line = text.find('\n');
+  JsonValue head;
+  if (line == std::string::npos || line > 1 << 20 || !parse_json(text.substr(0, line), head) ||
+      head.get("format") != kFormat)
+    refuse(path, "no state that `deform run --save` or --record wrote");
+  if (head.get("version") != kVersion)
+    refuse(path, "state format " + head.get("version") + ", and this command reads " + kVersion +
+                     "; run the scene anew");
+  if (head.get("scene") != hash_text(scene_hash(scene)))
+    refuse(
+        path,
+        "of another scene than " + scene.path() +
+            " as it is now; give the same scene and --set values (\"output\" and the duration may differ)");
+  check_plugins(scene, path, head);
+  const size_t bytes = text.size() - line - 1;
+  if (head.get("bytes") != std::to_string(bytes))
+    refuse(path, "cut short or damaged: it says that " + head.get("bytes") + " bytes of state follow, " +
+                     std::to_string(bytes) + " do");
+  if (dfm_world_restore(scene.world(), text.data() + line + 1, bytes) < 0) refuse(path, dfm_last_error());
+  if (head.get("state_hash") != hash_text(dfm_world_hash(scene.world())))
+    throw Failure(kStopped, path +
+                                ": the state that it gives has another hash than the one it was written "
+                                "with; please report this with the file");
+}
+
+}  // namespace cli

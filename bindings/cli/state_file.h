@@ -1,0 +1,24 @@
+// The state of a world as a file: what `deform run --save` and `--record` write, `--from` and `deform replay`
+// read.
+#pragma once
+#include <string>
+
+#include "scene_file.h"
+
+namespace cli {
+
+// Sixteen hexadecimal digits, as in summary.json.
+std::string hash_text(uint64_t hash);
+// Of the scene with its --set values, but for "output" and "time/duration": a run may go on for longer.
+uint64_t scene_hash(const SceneFile &scene);
+
+// Throw Failure: the file cannot be written; equilibria have no state to go on from.
+void refuse_static(const SceneFile &scene, const std::string &option);
+void write_state(const SceneFile &scene, const std::string &path);
+
+// Puts the scene's world into the state of the file. Throws Failure where the file is damaged, of another
+// format or scene, or was written with another build of a plugin that is loaded here; the world is then as
+// before.
+void read_state(const SceneFile &scene, const std::string &path);
+
+}  // namespace cli

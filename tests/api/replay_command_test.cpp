@@ -1,0 +1,128 @@
+// `deform run --save`, `--from`, `--record` and `deform replay`: the same bits after a break, from a file and
+// in another process, and a sentence for what does not fit.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "support.h"
+
+namespace fs = std::filesystem;
+
+namespace {
+
+// A block that lands on a slope with friction that remembers, and changes its model on the way.
+const char *kScene = R"({
+  "format": "deform-scene", "version": 1,
+  "time": {"duration": 0.12, "step": 0.0005},
+  "materials": {"gel": {"density": 1000, "young": 50000, "poisson": 0.3,
+    "damping": {"mass": 2, "stiffness": 0.002}}},
+  "bodies": [{"name": "block", "mesh": {"make": "beam", "size": [0.1, 0.1, 0.1], "cells": 60},
+              "material": "gel", "pose": {"position": [0, 0, 0.005]}, "model": {"type": "msm"},
+              "switch": [{"t": 0.09, "type": "corotational_fem"}]}],
+  "obstacles": [{"name": "slope", "shape": "plane", "normal": [-0.2, 0, 1]}],
+  "contact": {"friction": [{"between": ["*", "*"], "law": "lugre", "params": {"mu_C": 0.4, "mu_S": 0.4}}]},
+  "output": {"every": 0.02}
+})";
+
+struct Folder {
+  std::string path = test::scratch("replay"), scene = path + "/scene.json";
+  Folder() { test::write_file(scene, kScene); }
+  test::CommandResult run(std::vector<std::string> more) const {
+    more.insert(more.begin(), {"run", scene, "--quiet"});
+    return test::deform(more);
+  }
+  std::string hash(const std::string &out) const {
+    const std::string text = test::read_file(path + "/" + out + "/summary.json");
+    const size_t at = text.find("\"state_hash\"");
+    return at == std::string::npos ? "" : text.substr(at, 33);
+  }
+};
+
+}  // namespace
+
+TEST(Replay, RunThatGoesOnFromASavedState_EndsWithTheBitsOfOneThatNeverStopped) {
+  const Folder f;
+  // before the contact, in it, and after the change of model
+  for (const char *at : {"0.01", "0.05", "0.1"}) {
+    const std::string state = f.path + "/at" + at + ".state";
+    const test::CommandResult whole = f.run({"--out", f.path + "/whole", "--save", at, state});
+    ASSERT_EQ(whole.exit_code, 0) << whole.err;
+    const test::CommandResult rest = f.run({"--out", f.path + "/rest", "--from", state});
+    ASSERT_EQ(rest.exit_code, 0) << rest.err;
+    EXPECT_FALSE(f.hash("whole").empty());
+    EXPECT_EQ(f.hash("rest"), f.hash("whole")) << at;
+  }
+}
+
+TEST(Replay, RecordedRun_PassesThroughTheSameBitsInEveryState) {
+  const Folder f;
+  const std::string out = f.path + "/run";
+  ASSERT_EQ(f.run({"--out", out, "--record", "--jitter", "7", "--set", "/materials/gel/young=4e4"}).exit_code,
+            0);
+  const test::CommandResult again = test::deform({"replay", out, "--threads", "2"});
+  EXPECT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_NE(again.out.find("the same bits in all 7 recorded states"), std::string::npos) << again.out;
+  EXPECT_TRUE(fs::exists(out + "/replay/summary.json"));
+}
+
+TEST(Replay, StateThatIsNotTheRecordedOne_IsToldWithItsTimeAndExitsWith1) {
+  const Folder f;
+  const std::string out = f.path + "/run", index = out + "/recording/states.csv";
+  ASSERT_EQ(f.run({"--out", out, "--record"}).exit_code, 0);
+  std::string rows = test::read_file(index);
+  const size_t third = rows.find("000002.state,") + 13;
+  rows[third] = rows[third] == '0' ? '1' : '0';
+  test::write_file(index, rows);
+  const test::CommandResult again = test::deform({"replay", out});
+  EXPECT_EQ(again.exit_code, 1);
+  EXPECT_NE(again.err.find("at t = 0.04"), std::string::npos) << again.err;
+}
+
+TEST(Replay, WhatDoesNotFit_IsASentenceAndNothingIsLost) {
+  const Folder f;
+  const std::string state = f.path + "/mid.state", out = f.path + "/run";
+  ASSERT_EQ(f.run({"--out", out, "--record", "--save", "0.05", state}).exit_code, 0);
+  const std::string kept = test::read_file(state);
+  const auto says = [](const test::CommandResult &r, const std::string &words) {
+    EXPECT_EQ(r.exit_code, 2) << r.out;
+    EXPECT_NE(r.err.find(words), std::string::npos) << r.err;
+  };
+  const std::string other = f.path + "/other";
+  says(f.run({"--out", other, "--from", state, "--set", "/materials/gel/young=4e4"}), "of another scene");
+  says(f.run({"--out", other, "--from", state, "--time", "0.04"}), "give a longer --time");
+  says(f.run({"--out", other, "--from", f.scene}), "no state that");
+  says(f.run({"--out", other, "--from", f.path + "/none"}), "cannot be opened");
+  says(f.run({"--out", other, "--save", "0.05", f.path + "/none/x.state"}), "cannot be written there");
+  says(f.run({"--out", other, "--save", "0.5", f.path + "/x.state"}), "the run ends at 0.12 s");
+  says(f.run({"--out", other, "--save", "soon", f.path + "/x.state"}), "--save");
+  test::write_file(f.path + "/cut.state", kept.substr(0, kept.size() - 9));
+  says(f.run({"--out", other, "--from", f.path + "/cut.state"}), "cut short");
+  std::string changed = kept;
+  changed[kept.size() - 200] ^= 1;
+  test::write_file(f.path + "/changed.state", changed);
+  says(f.run({"--out", other, "--from", f.path + "/changed.state"}), "changed.state");
+  std::string rebuilt = kept;
+  const size_t at = rebuilt.find("\"hash\"", rebuilt.find("org.deform.msm")) + 9;
+  rebuilt[at] = rebuilt[at] == '0' ? '1' : '0';
+  test::write_file(f.path + "/rebuilt.state", rebuilt);
+  says(f.run({"--out", other, "--from", f.path + "/rebuilt.state"}), "another build of 'org.deform.msm'");
+  says(test::deform({"replay", f.path}), "no recording in this folder");
+  says(test::deform({"replay", out, "--set", "/time/step=1e-3"}), "only values under /output");
+  EXPECT_EQ(test::read_file(state), kept);
+  says(test::deform({"run", f.scene, "--set", "/time/mode=\"static\"", "--set", "/bodies/0/switch=[]",
+                     "--out", other, "--save", "0.05", f.path + "/x.state"}),
+       "equilibria");
+}
+
+TEST(Replay, StateOfALaterVersion_IsRefused) {
+  const Folder f;
+  const std::string state = f.path + "/mid.state";
+  ASSERT_EQ(f.run({"--out", f.path + "/run", "--save", "0.02", state}).exit_code, 0);
+  std::string text = test::read_file(state);
+  const size_t at = text.find("\"version\"");
+  text[text.find('1', at)] = '2';
+  test::write_file(state, text);
+  const test::CommandResult r = f.run({"--out", f.path + "/run", "--from", state});
+  EXPECT_EQ(r.exit_code, 2);
+  EXPECT_NE(r.err.find("state format 2"), std::string::npos) << r.err;
+}
