@@ -12,6 +12,7 @@
 
 #include "deform/bullet_host.h"
 #include "deform/deform.h"
+class btSoftBody;
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -101,6 +102,17 @@ DFM_API dfm_status dfm_bullet_refresh(dfm_bullet bullet, const btCollisionObject
  * drawer. Call it beside debugDrawWorld. @return DFM_OK; DFM_E_STATE the world has no drawer. Threads: Not
  * during step. Since 0.1. */
 DFM_API dfm_status dfm_bullet_debug_draw(dfm_bullet bullet, uint32_t what);
+
+/** A body of the dfm_world from one of Bullet's soft bodies, which stays as it is: its nodes where they are
+ * now, as the rest shape, moving at their mean velocity. Its tetrahedra, and nodes of infinite mass held;
+ * where it has none, its faces, which must close, filled with about `cells` cells (dfm_tetmesh_fill).
+ * Stiffness and mass are those of `like`'s material: Bullet's coefficients have no units to go by. (A .vtk
+ * file of Bullet's is read by dfm_tetmesh_read.)
+ * @param like  name, material, model, filter and so on; mesh, pose and velocity are not looked at
+ * @return DFM_OK; DFM_E_ARG neither tetrahedra nor faces; as dfm_trimesh_create, dfm_tetmesh_fill,
+ * dfm_body_create. Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_bullet_take_soft_body(dfm_context *context, dfm_world world, const btSoftBody *body,
+                                             const dfm_body_def *like, uint32_t cells, dfm_body *out);
 #ifdef __cplusplus
 }
 #endif

@@ -1,0 +1,103 @@
+#include <BulletSoftBody/btSoftBody.h>
+
+#include <algorithm>
+#include <cstring>
+#include <vector>
+
+#include "deform/bullet.h"
+#include "opened.h"
+#include "rigid_host/seated.h"
+
+namespace dfm_bullet_detail {
+namespace {
+
+struct Arrays {
+  std::vector<double> points;
+  std::vector<uint32_t> tets, faces, held;
+  Vec velocity;
+};
+
+Arrays arrays_of(const btSoftBody &body) {
+  Arrays a;
+  const btSoftBody::Node *const first = body.m_nodes.size() ? &body.m_nodes[0] : nullptr;
+  const auto number = [&](const btSoftBody::Node *n) { return static_cast<uint32_t>(n - first); };
+  for (int i = 0; i < body.m_nodes.size(); ++i) {
+    const btSoftBody::Node &n = body.m_nodes[i];
+    const Vec x = from_bullet(n.m_x);
+    a.points.insert(a.points.end(), {x.x, x.y, x.z});
+    a.velocity = a.velocity + (1.0 / body.m_nodes.size()) * from_bullet(n.m_v);
+    if (n.m_im == 0) a.held.push_back(static_cast<uint32_t>(i));
+  }
+  for (int i = 0; i < body.m_tetras.size(); ++i)
+    for (const btSoftBody::Node *n : body.m_tetras[i].m_n) a.tets.push_back(number(n));
+  for (int i = 0; i < body.m_faces.size(); ++i)
+    for (const btSoftBody::Node *n : body.m_faces[i].m_n) a.faces.push_back(number(n));
+  return a;
+}
+
+// Ends the meshes of a filled surface.
+struct Filled {
+  dfm_trimesh surface = 0;
+  dfm_tetmesh cells = 0;
+  ~Filled() {
+    if (cells) dfm_tetmesh_destroy(cells);
+    if (surface) dfm_trimesh_destroy(surface);
+  }
+};
+
+dfm_status take(dfm_context *context, dfm_world world, const btSoftBody &body, const dfm_body_def &like,
+                uint32_t cells, dfm_body *out) {
+  const Arrays a = arrays_of(body);
+  dfm_body_def def = dfm_body_def_default();
+  std::memcpy(static_cast<void *>(&def), &like, std::min<size_t>(sizeof def, like.size));
+  store(def.velocity, a.velocity);
+  Filled filled;
+  dfm_surface_def skin{};
+  skin.size = sizeof skin;
+  if (!a.tets.empty()) {
+    def.points = a.points.data();
+    def.tets = a.tets.data();
+    def.npoint = static_cast<uint32_t>(a.points.size() / 3);
+    def.ntet = static_cast<uint32_t>(a.tets.size() / 4);
+  } else if (!a.faces.empty()) {
+    TRY(dfm_trimesh_create(context, static_cast<uint32_t>(a.points.size() / 3), a.points.data(),
+                           static_cast<uint32_t>(a.faces.size() / 3), a.faces.data(), &filled.surface));
+    TRY(dfm_tetmesh_fill(filled.surface, cells, &filled.cells));
+    dfm_tetmesh_info info{};
+    info.size = sizeof info;
+    TRY(dfm_tetmesh_get_info(filled.cells, &info));
+    TRY(dfm_tetmesh_data(filled.cells, &def.points, &def.tets, nullptr));
+    TRY(dfm_tetmesh_share(filled.cells, &def.cell_share));
+    skin.npoint = static_cast<uint32_t>(a.points.size() / 3);
+    skin.ntriangle = static_cast<uint32_t>(a.faces.size() / 3);
+    skin.points = a.points.data();
+    skin.triangles = a.faces.data();
+    skin.coupling = DFM_COUPLING_BARYCENTRIC;
+    def.surface = &skin;
+    def.npoint = info.npoint;
+    def.ntet = info.ntet;
+  } else {
+    return failed(DFM_E_ARG,
+                  "the btSoftBody has neither tetrahedra nor faces; ropes and bodies of links alone have no "
+                  "volume that the library could fill");
+  }
+  TRY(dfm_body_create(world, &def, out));
+  if (a.tets.empty() || a.held.empty()) return DFM_OK;
+  return dfm_body_hold(*out, static_cast<uint32_t>(a.held.size()), a.held.data(), 7);
+}
+
+}  // namespace
+}  // namespace dfm_bullet_detail
+
+using namespace dfm_bullet_detail;
+
+dfm_status dfm_bullet_take_soft_body(dfm_context *context, dfm_world world, const btSoftBody *body,
+                                     const dfm_body_def *like, uint32_t cells, dfm_body *out) {
+  try {
+    if (!context || !body || !like || !out)
+      return missing(!context ? "context" : !body ? "body" : !like ? "like" : "out");
+    return take(context, world, *body, *like, cells, out);
+  } catch (const std::bad_alloc &) {
+    return dfm_fail(DFM_E_NOMEM, "bullet: out of memory");
+  }
+}
