@@ -120,6 +120,20 @@ class InPython(unittest.TestCase):
         gc.collect()
         self.assertLess(slide(Bristle(), mu=0.6, time=0.5), 1e-4)
 
+    def test_threads_give_the_same_bits(self):
+        hashes = set()
+        for threads in (1, 3):
+            with deform.World(threads=threads, integrator="implicit_euler") as world:
+                world.add_obstacle("plane")
+                for i in range(3):
+                    world.add_body(deform.TetMesh.beam([0.4, 0.4, 0.05], cells=500),
+                                   position=(0.5 * i, 0, 1e-3), velocity=(0.3, 0, 0))
+                world.add_friction(law=Bristle, mu=0.4)
+                world.run(0.05, dt=1 / 60)
+                self.assertGreater(len(world.contacts), 0)
+                hashes.add(world.hash)
+        self.assertEqual(len(hashes), 1)
+
     def test_parameter_changes_while_it_runs(self):
         with deform.World() as world:
             world.add_friction(law=Bristle, mu=0.5)

@@ -59,6 +59,23 @@ class Building(unittest.TestCase):
             met = {(world.owner(e["a"]), world.owner(e["b"])) for e in world.events}
             self.assertIn((body, rigid), met)
 
+    def test_hinge_with_a_motor(self):
+        with deform.World(gravity=(0, 0, 0)) as world:
+            arm, = world.add_rigids([deform.RigidDef("box", mass=2, half_size=(0.5, 0.05, 0.05), name="arm",
+                                                     position=(0.5, 0, 0))],
+                                    [deform.JointDef("hinge", 0, axis=(0, 0, 1), motor=(1.0, 100.0))])
+            world.run(0.5, dt=1e-3)
+            angle, rate, _ = arm.joint()
+            self.assertAlmostEqual(rate, 1, delta=1e-6)
+            inertia = 2 / 3 * (0.5**2 + 0.05**2) + 2 * 0.5**2
+            self.assertAlmostEqual(angle, 0.5 - inertia / 200, delta=1e-3)  # less while 100 N m speed it up
+            np.testing.assert_allclose(arm.position, [0.5 * np.cos(angle), 0.5 * np.sin(angle), 0], atol=1e-3)
+            arm.set_motor(0, 100.0)
+            world.run(0.1, dt=1e-3)
+            self.assertAlmostEqual(arm.joint()[1], 0, delta=1e-6)
+            with self.assertRaisesRegex(deform.ArgumentError, "did you mean 'hinge'"):
+                world.add_rigids([deform.RigidDef()], [deform.JointDef("hing", 0)])
+
     def test_snapshot_gives_the_same_bits_again(self):
         with deform.World() as world:
             world.add_obstacle("plane")

@@ -20,13 +20,13 @@ from .law import Law, PythonLaw
 from .mesh import TetMesh, TriMesh
 from .picture import Picture
 from .scene import Run, Scene, run
-from .world import Material, Trouble, World
+from .world import JointDef, Material, RigidDef, Trouble, World
 
 __version__: str = _quick.dfm_version(None, None, None).decode()
 
 __all__ = ["ArgumentError", "Body", "BusyError", "Context", "Discarded", "Diverged", "Error",
-           "FileError", "FormatError", "HandleError", "Law", "Material", "Obstacle", "OutOfMemory",
-           "Parameter", "Picture", "PluginType", "PythonLaw", "Rigid", "Run", "Scene", "StateError",
-           "TetMesh", "TriMesh", "Trouble", "UnsupportedError", "World", "command", "cost",
-           "default_context", "explain", "friction", "include_dir", "plot_friction", "run",
-           "template_dir"]
+           "FileError", "FormatError", "HandleError", "JointDef", "Law", "Material", "Obstacle",
+           "OutOfMemory", "Parameter", "Picture", "PluginType", "PythonLaw", "Rigid", "RigidDef", "Run",
+           "Scene", "StateError", "TetMesh", "TriMesh", "Trouble", "UnsupportedError", "World",
+           "command", "cost", "default_context", "explain", "friction", "include_dir", "plot_friction",
+           "run", "template_dir"]

@@ -334,6 +334,19 @@ class Rigid(Obstacle):
                 setattr(state, name, vector(value, name, 4 if name == "rotation" else 3))
         check(quick.dfm_rigid_set_state(self.handle, ctypes.byref(state)))
 
+    def joint(self, number: int = 0) -> tuple[float, float, float]:
+        """Of a hinge or slider of its set: position (rad or m since creation), rate (rad/s or m/s), and the
+        motor's effort (N m or N)."""
+        out = [ctypes.c_double() for _ in range(3)]
+        self.world.free()
+        check(quick.dfm_rigid_joint(self.handle, number, *map(ctypes.byref, out)))
+        return out[0].value, out[1].value, out[2].value
+
+    def set_motor(self, velocity: float, max: float, number: int = 0) -> None:
+        """Motor of a joint of its set: rad/s and N m, or m/s and N; max 0: off."""
+        self.world.free()
+        check(quick.dfm_rigid_set_motor(self.handle, number, velocity, max))
+
     def remove(self) -> None:
         """Takes the whole set that it came with out of the world."""
         self.world.free()

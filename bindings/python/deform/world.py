@@ -6,6 +6,7 @@ import ctypes
 import enum
 import json
 import weakref
+from dataclasses import dataclass
 from typing import Any, Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
@@ -21,6 +22,7 @@ METHODS = {"auto": 0, "velocity": 1, "implicit": 2, "rollback": 3}
 INTEGRATORS = {"auto": 0, "symplectic_euler": 1, "implicit_euler": 2, "tr_bdf2": 3}
 SELF_CONTACT = {"off": 0, "on": 1, "auto": 2}
 SHAPES = {"plane": 0, "sphere": 1, "box": 2, "capsule": 3, "mesh": 4, "voxels": 5}
+JOINTS = {"hinge": 0, "slider": 1, "ball": 2, "fixed": 3}
 COUPLINGS = {"barycentric": 0, "mls": 1}
 
 
@@ -68,6 +70,61 @@ def _destroy(handle: int, _keep: Any) -> None:
 
 _NO_TROUBLE = Trouble(0)
 _step = lib.dfm_world_step
+
+
+@dataclass
+class RigidDef:
+    """A rigid "sphere" (radius), "box" (half_size [3]) or "capsule" (radius, half_length, along z), m; mass
+    kg; inertia [3] kg m2 (all zero: solid); position [3] m, rotation [4] (x, y, z, w), velocity [3] m/s,
+    spin [3] rad/s. fixed: it never moves."""
+
+    shape: str = "sphere"
+    mass: float = 1.0
+    name: str | None = None
+    position: Sequence[float] = (0, 0, 0)
+    rotation: Sequence[float] = (0, 0, 0, 1)
+    radius: float = 0.5
+    half_size: Sequence[float] = (0, 0, 0)
+    half_length: float = 0
+    inertia: Sequence[float] = (0, 0, 0)
+    velocity: Sequence[float] = (0, 0, 0)
+    spin: Sequence[float] = (0, 0, 0)
+    material: Material | None = None
+    fixed: bool = False
+
+    def struct(self) -> _abi.dfm_rigid_def:
+        out = default(_abi.dfm_rigid_def)
+        out.shape = _word("shape", self.shape, {k: SHAPES[k] for k in ("sphere", "box", "capsule")})
+        out.name, out.mass, out.fixed = encoded(self.name), self.mass, self.fixed
+        out.pose = pose_of(self.position, self.rotation)
+        out.radius, out.half_length = self.radius, self.half_length
+        for key in ("half_size", "inertia", "velocity", "spin"):
+            setattr(out, key, vector(getattr(self, key), key))
+        out.material = self.material.handle if self.material is not None else 0
+        return out
+
+
+@dataclass
+class JointDef:
+    """A "hinge", "slider", "ball" or "fixed" joint of body number `body` of a set with number `to`, or with
+    the world (None). anchor [3] m and axis [3], world frame. motor: (velocity rad/s or m/s, max N m or N),
+    of hinge and slider."""
+
+    type: str
+    body: int
+    to: int | None = None
+    anchor: Sequence[float] = (0, 0, 0)
+    axis: Sequence[float] = (0, 0, 1)
+    motor: tuple[float, float] | None = None
+
+    def struct(self) -> _abi.dfm_joint_def:
+        out = sized(_abi.dfm_joint_def)
+        out.type, out.body = _word("joint", self.type, JOINTS), self.body
+        setattr(out, "with", 0xFFFFFFFF if self.to is None else self.to)
+        out.anchor, out.axis = vector(self.anchor, "anchor"), vector(self.axis, "axis")
+        if self.motor is not None:
+            out.motor, (out.velocity, out.max) = 1, self.motor
+        return out
 
 
 class World:
@@ -313,27 +370,24 @@ class World:
         check(status)
         return self._obstacle(out.value)
 
-    def add_rigid(self, shape: str = "sphere", *, mass: float, name: str | None = None,
-                  position: Sequence[float] = (0, 0, 0), rotation: Sequence[float] = (0, 0, 0, 1),
-                  radius: float = 0.5, half_size: Sequence[float] = (0, 0, 0), half_length: float = 0,
-                  inertia: Sequence[float] = (0, 0, 0), velocity: Sequence[float] = (0, 0, 0),
-                  spin: Sequence[float] = (0, 0, 0), material: Material | None = None) -> Rigid:
-        """A rigid "sphere", "box" or "capsule" that soft bodies push: mass kg, inertia [3] kg m2 (all zero:
-        solid)."""
-        definition = default(_abi.dfm_rigid_def)
-        definition.shape = _word("shape", shape, {k: SHAPES[k] for k in ("sphere", "box", "capsule")})
-        definition.name, definition.mass = encoded(name), mass
-        definition.pose = pose_of(position, rotation)
-        definition.radius, definition.half_length = radius, half_length
-        definition.half_size, definition.inertia = vector(half_size, "half_size"), vector(inertia, "inertia")
-        definition.velocity, definition.spin = vector(velocity, "velocity"), vector(spin, "spin")
-        definition.material = material.handle if material is not None else 0
+    def add_rigid(self, shape: str = "sphere", **options: Any) -> Rigid:
+        """A rigid body that soft bodies push; options: those of RigidDef."""
+        return self.add_rigids([RigidDef(shape, **options)])[0]
+
+    def add_rigids(self, bodies: Sequence[RigidDef], joints: Sequence[JointDef] = (),
+                   host: str | None = None) -> list[Rigid]:
+        """A set of rigid bodies and the joints between them. host: what moves them; None: the library's own
+        solver."""
+        rows = (_abi.dfm_rigid_def * max(len(bodies), 1))(*(body.struct() for body in bodies))
+        links = (_abi.dfm_joint_def * max(len(joints), 1))(*(joint.struct() for joint in joints))
         group = sized(_abi.dfm_rigid_set_def)
-        group.nbody, group.bodies = 1, ctypes.addressof(definition)
-        out = ctypes.c_uint64()
-        self.free()
-        check(lib.dfm_rigid_create(self.handle, None, ctypes.byref(group), ctypes.byref(out)))
-        return self._obstacle(out.value)  # type: ignore[return-value]
+        group.nbody, group.bodies = len(bodies), ctypes.addressof(rows)
+        group.njoint, group.joints = len(joints), ctypes.addressof(links)
+        out = (ctypes.c_uint64 * max(len(bodies), 1))()
+        with self.alone():
+            status = lib.dfm_rigid_create(self.handle, encoded(host), ctypes.byref(group), ctypes.byref(out))
+        check(status)
+        return [self._obstacle(handle) for handle in out[:len(bodies)]]  # type: ignore[misc]
 
     def _obstacle(self, handle: int) -> Obstacle:
         out = sized(_abi.dfm_obstacle_def)
