@@ -61,7 +61,13 @@ def _run(*command):
 
 def _installed(prefix, settings):
     """What the tree installs, beneath prefix."""
+    if not shutil.which("cmake"):
+        raise SystemExit("deform: there is no cmake; building the library needs CMake 3.22, Ninja or make, a "
+                         "C++20 compiler and some headers: `cmake/setup.sh doors` installs them on Debian")
     build = settings.get("prebuilt")
+    if build and not (pathlib.Path(build) / "cmake_install.cmake").exists():
+        raise SystemExit(f"deform: prebuilt={build} is no build folder of this tree; configure and build it "
+                         f"first (cmake --preset release; cmake --build --preset release)")
     if build:
         build = pathlib.Path(build).absolute()
     else:

@@ -120,6 +120,23 @@ class InPython(unittest.TestCase):
         gc.collect()
         self.assertLess(slide(Bristle(), mu=0.6, time=0.5), 1e-4)
 
+    def test_class_written_anew_is_another_law(self):
+        def written(share):
+            class Half(Tanh):
+                id = "com.example.half"
+
+                def evaluate(self, x, out):
+                    super().evaluate(x, out)
+                    out.ft *= share
+            return Half
+
+        first, second = written(0.5), written(0.25)
+        for law, force in ((first, 5), (second, 2.5), (first, 5)):
+            out = deform.Law(law)(fn=[10], vt=[[1], [0]], dt=1e-3, mu=1)
+            self.assertAlmostEqual(-out["ft"][0, 0], force)
+        self.assertEqual(deform.Law(second).type.id, "com.example.half.2")
+        self.assertEqual(deform.Law(first).type.id, "com.example.half")
+
     def test_threads_give_the_same_bits(self):
         hashes = set()
         for threads in (1, 3):

@@ -145,7 +145,8 @@ class Context:
         check(lib.dfm_context_create(ctypes.byref(definition), ctypes.byref(out)))
         self.address: int = out.value or 0
         self.keep: list[Any] = [definition]
-        self._laws: dict[str, Any] = {}
+        self._laws: list[Any] = []
+        self._of_class: dict[type, Any] = {}
         self._finalize = weakref.finalize(self, _destroy, self.address, self.keep)
 
     def load(self, path: Any) -> None:
@@ -170,29 +171,33 @@ class Context:
         return Params(values, self.type(kind, name) if asks else None)
 
     def use_law(self, law: Any) -> str:
-        """The id of a law given by name, as a PythonLaw or as its class; a Python law is made known here."""
+        """The id of a law given by name, as a PythonLaw or as its class; a Python law is made known here. A
+        class that is written anew under its old id, as in a notebook, is another law: its id here ends in
+        .2, .3, ..."""
         if isinstance(law, str):
             return law
-        from .law import PythonLaw
+        from .law import Bridge, PythonLaw
         if isinstance(law, type) and issubclass(law, PythonLaw):
-            law = law()
+            if law not in self._of_class:
+                self._of_class[law] = law()
+            law = self._of_class[law]
         if not isinstance(law, PythonLaw):
             raise TypeError(f"a law is a name or a deform.PythonLaw, not {type(law).__name__}")
-        known = self._laws.get(law.id)
-        if known is None:
-            entry = law.bridge().entry
-            check(lib.dfm_plugin_register_static(self.address, ctypes.cast(entry, ctypes.c_void_p),
-                                                 encoded(law.id.replace(".", "_"))))
-            self._laws[law.id] = law
-            self.keep.append(law)
-        elif known is not law and type(known) is not type(law):
-            raise ArgumentError(f"another law with the id '{law.id}' is in use here", "DFM_E_STATE")
-        return law.id
+        for known in self._laws:
+            if known.law is law:
+                return known.id
+        same = sum(known.law.id == law.id for known in self._laws)
+        bridge = Bridge(law, law.id if same == 0 else f"{law.id}.{same + 1}")
+        check(lib.dfm_plugin_register_static(self.address, ctypes.cast(bridge.entry, ctypes.c_void_p),
+                                             encoded(bridge.id.replace(".", "_"))))
+        self._laws.append(bridge)
+        self.keep.append(bridge)
+        return bridge.id
 
     def raise_of_law(self) -> BaseException | None:
         """What a Python law has raised since the last look."""
-        for law in self._laws.values():
-            raised = law.bridge().take_error()
+        for bridge in self._laws:
+            raised = bridge.take_error()
             if raised is not None:
                 return raised
         return None

@@ -94,13 +94,6 @@ class PythonLaw:
 
     # ---- how the library sees it -----------------------------------------------------------------------
 
-    def bridge(self) -> _Bridge:
-        """Its tables for the library; made once."""
-        made = self.__dict__.get("_bridge")
-        if made is None:
-            made = self.__dict__["_bridge"] = _Bridge(self)
-        return made
-
     def answer(self, n: int, dt: float, params: np.ndarray, inputs: dict[str, Any],
                state: np.ndarray) -> SimpleNamespace:
         """evaluate() with its arguments made and its answer's shapes checked."""
@@ -150,9 +143,15 @@ class PythonLaw:
 
     @contextmanager
     def served(self) -> Iterator[tuple[pathlib.Path, dict[str, str]]]:
-        """While it lasts, a plugin file that is this law, for another process with that environment."""
+        """While it lasts, a plugin file that is this law, for another process with that environment. At its
+        end what evaluate has raised meanwhile is raised."""
         with _Server(self) as server:
-            yield server.file, server.environment
+            try:
+                yield server.file, server.environment
+            finally:
+                raised = server.bridge.take_error()
+                if raised is not None:
+                    raise raised
 
     def check(self, only: Sequence[str] | None = None, seed: int = 1) -> Table:
         """Holds the law to the rules of `deform plugin check`, each in a process of its own: rows id, title,
@@ -171,18 +170,15 @@ class PythonLaw:
         rows = said["rules"] + [row for kind in said["types"] for row in kind["rules"]]
         rows += [{"id": rule, "title": "", "result": "skip", "detail": "of a compiled file"}
                  for rule in _OF_THE_FILE if rule in (only or _RULES)]
-        raised = self.bridge().take_error()
-        if raised is not None:
-            raise raised
         return Table(sorted(rows, key=lambda row: (row["id"][0] != "V", row["id"])),
                      ["id", "result", "title", "detail"])
 
 
-class _Bridge:
+class Bridge:
     """C tables of a Python law, and the functions that the library calls."""
 
-    def __init__(self, law: PythonLaw):
-        self.law = law
+    def __init__(self, law: PythonLaw, name: str):
+        self.law, self.id = law, name
         self.error: BaseException | None = None
         if not law.id or "." not in law.id:
             raise ArgumentError(f"a law needs an id in reverse-DNS form, such as 'com.example.tanh', not "
@@ -204,10 +200,10 @@ class _Bridge:
         self.ops = _abi.dfm_friction(ctypes.sizeof(_abi.dfm_friction), needs, flags, len(slots),
                                      ctypes.addressof(table), ctypes.cast(self._eval, ctypes.c_void_p).value,
                                      ctypes.cast(self._check, ctypes.c_void_p).value)
-        name = law.name or type(law).__name__
+        title = law.name or type(law).__name__
         self.type = _abi.dfm_type(
-            ctypes.sizeof(_abi.dfm_type), _abi.DFM_KIND_FRICTION, encoded(law.id), encoded(name),
-            encoded(law.version), encoded(law.licence), encoded(law.source or name), ctypes.addressof(rows),
+            ctypes.sizeof(_abi.dfm_type), _abi.DFM_KIND_FRICTION, encoded(self.id), encoded(title),
+            encoded(law.version), encoded(law.licence), encoded(law.source or title), ctypes.addressof(rows),
             len(law.parameters), ctypes.sizeof(_abi.dfm_param), ctypes.addressof(effects),
             ctypes.addressof(self.ops))
         types = (ctypes.c_void_p * 1)(ctypes.addressof(self.type))
@@ -266,7 +262,7 @@ class _Server:
     """Answers law_bridge.c, which is this law in another process; a thread for each connection."""
 
     def __init__(self, law: PythonLaw):
-        self.law, self.bridge = law, law.bridge()
+        self.law, self.bridge = law, Bridge(law, law.id)
         self.file = PATH.resolve().parent / "libdeform_python_law.so"
         if not self.file.exists():
             raise Error(f"{self.file} is not there: this library was built without it")
