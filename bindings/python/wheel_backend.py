@@ -59,6 +59,14 @@ def _run(*command):
     subprocess.run([str(c) for c in command], check=True)
 
 
+def configure(build, settings):
+    """What the wheel is built from, where nothing is built already."""
+    generator = ["-G", "Ninja"] if shutil.which("ninja") else []
+    _run("cmake", "-S", ROOT, "-B", build, *generator, "-DCMAKE_BUILD_TYPE=Release", "-DDEFORM_TESTS=OFF",
+         "-DDEFORM_EXAMPLES=OFF", "-DDEFORM_ODE=OFF", "-DDEFORM_ASSIMP=OFF", "-DCMAKE_INSTALL_LIBDIR=lib",
+         *shlex.split(settings.get("cmake", "")))
+
+
 def _installed(prefix, settings):
     """What the tree installs, beneath prefix."""
     if not shutil.which("cmake"):
@@ -72,10 +80,7 @@ def _installed(prefix, settings):
         build = pathlib.Path(build).absolute()
     else:
         build = ROOT / "build" / "wheel"
-        generator = ["-G", "Ninja"] if shutil.which("ninja") else []
-        _run("cmake", "-S", ROOT, "-B", build, *generator, "-DCMAKE_BUILD_TYPE=Release", "-DDEFORM_TESTS=OFF",
-             "-DDEFORM_EXAMPLES=OFF", "-DDEFORM_ODE=OFF", "-DDEFORM_ASSIMP=OFF",
-             "-DCMAKE_INSTALL_LIBDIR=lib", *shlex.split(settings.get("cmake", "")))
+        configure(build, settings)
         _run("cmake", "--build", build, "--target", "deform_command", "--target", "deform_python_native",
              "--parallel", os.environ.get("CMAKE_BUILD_PARALLEL_LEVEL") or len(os.sched_getaffinity(0)))
     _run("cmake", "--install", build, "--strip", "--prefix", prefix)

@@ -38,7 +38,7 @@ class Guides(unittest.TestCase):
     def test_law_in_python_then_in_c(self):
         names, _ = follow(HOWTO / "python-law.md")
         self.assertLess(abs(names["ours"]["ft"] - names["compiled"]["ft"]).max(), 1e-12)
-        self.assertEqual(len(names["rules"]), 4)
+        self.assertEqual(len(names["rules"]), 3)
         self.assertEqual(pathlib.Path("bristle.png").read_bytes()[:4], b"\x89PNG")
 
 

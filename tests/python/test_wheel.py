@@ -62,6 +62,24 @@ class Wheel(unittest.TestCase):
                            "deform/native/include/deform/plugin.h"):
                 self.assertIn(needed, files)
 
+    def test_without_a_build_it_configures_one(self):
+        sys.path.insert(0, str(SOURCE / "bindings" / "python"))
+        self.addCleanup(sys.path.pop, 0)
+        import wheel_backend
+        with tempfile.TemporaryDirectory(suffix=" with space") as name:
+            build = pathlib.Path(name) / "build"
+            wheel_backend.configure(build, {"cmake": "-DDEFORM_RENDER=OFF"})
+            cache = (build / "CMakeCache.txt").read_text()
+            for entry in ("DEFORM_RENDER:BOOL=OFF", "DEFORM_TESTS:BOOL=OFF", "DEFORM_ODE:STRING=OFF",
+                          "CMAKE_INSTALL_LIBDIR:PATH=lib"):
+                self.assertIn(entry, cache.replace(":UNINITIALIZED=", ":PATH="))
+            targets = subprocess.run(["cmake", "--build", build, "--target", "help"], check=True,
+                                     capture_output=True, text=True).stdout
+            for target in ("deform_command", "deform_python_native"):
+                self.assertIn(target, targets)
+            with self.assertRaisesRegex(SystemExit, "is no build folder of this tree"):
+                wheel_backend.build_wheel(name, {"prebuilt": name})
+
 
 if __name__ == "__main__":
     unittest.main()

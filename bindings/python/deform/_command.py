@@ -68,7 +68,7 @@ class Cost(Table):
         columns = ["label", "model", "integrator", "step", "cells", "law", "error", "cpu_s_per_s", "state"]
         super().__init__([{**row, "error": row["headline"]} for row in report["choices"]], columns)
         self.report = report
-        self.front = [self[i] for i in report["front"]]
+        self.front = Table([self[i] for i in report["front"]], columns)
         self.pick = None if report["pick"] is None else self[report["pick"]]
 
 
