@@ -8,7 +8,7 @@ BUILD = @cmake --build --preset
 PYTHON ?= $(firstword $(wildcard /usr/bin/python3) python3)
 
 .PHONY: help demo test bench soak lint format tidy asan tsan fuzz install clean setup setup-bench setup-fuzz
-.PHONY: bench-peers setup-peers wheel
+.PHONY: bench-peers deb setup-peers wheel
 
 help:
 	@echo "make demo             two soft cylinders with and without friction: table, picture, out/demo/"
@@ -23,6 +23,7 @@ help:
 	@echo "make fuzz             the readers under libFuzzer"
 	@echo "make install PREFIX=  library, headers, plugins, command (default $(PREFIX))"
 	@echo "make wheel            the Python package for any Python 3 on this system: build/dist/"
+	@echo "make deb              Debian packages of the same, build/release/packages/"
 	@echo "make clean            removes build/ and out/"
 
 setup:
@@ -89,6 +90,12 @@ wheel: setup build/release/build.ninja
 	$(BUILD) release --target deform_command deform_python_native
 	@mkdir -p build/dist && cd bindings/python && $(PYTHON) -B -c "import wheel_backend as b; print( \
 	  b.build_wheel('$(CURDIR)/build/dist', {'prebuilt': '$(CURDIR)/build/release'}))"
+
+# Debian packages of the release build.
+deb: setup build/release/build.ninja
+	$(BUILD) release --target deform_command deform_python_native
+	@cpack --config build/release/CPackConfig.cmake -B build/release/packages
+	@rm -rf build/release/packages/_CPack_Packages && ls build/release/packages/*.deb
 
 clean:
 	rm -rf build out

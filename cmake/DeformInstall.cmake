@@ -17,26 +17,28 @@ if(NOT deform_bin_to_lib STREQUAL "../lib")
   list(APPEND deform_cli_rpath "$ORIGIN/../lib")   # where the build tree has it
 endif()
 set_target_properties(deform_cli PROPERTIES INSTALL_RPATH "${deform_cli_rpath}" BUILD_WITH_INSTALL_RPATH ON)
-install(TARGETS deform_cli RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+install(TARGETS deform_cli RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT command)
 install(TARGETS deform deform_headers EXPORT deformTargets
-  LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+  LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library NAMELINK_COMPONENT dev
+  ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT dev)
 get_property(deform_plugins GLOBAL PROPERTY DEFORM_PLUGINS)
 if(deform_plugins)
-  install(TARGETS ${deform_plugins} LIBRARY DESTINATION ${deform_plugin_dir})
+  install(TARGETS ${deform_plugins} LIBRARY DESTINATION ${deform_plugin_dir} COMPONENT library)
 endif()
 # Under the GPL: no part of what is installed unless it is asked for by name.
 if(TARGET solver_cholmod)
   install(TARGETS solver_cholmod LIBRARY DESTINATION ${deform_plugin_dir} COMPONENT cholmod EXCLUDE_FROM_ALL)
 endif()
 install(DIRECTORY ${CMAKE_SOURCE_DIR}/libdeform/include/deform DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
-  FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp")
+  COMPONENT dev FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp")
 install(FILES ${CMAKE_SOURCE_DIR}/libdeform/schema/deform-scene.schema.json
-  ${CMAKE_SOURCE_DIR}/libdeform/schema/deform-cost.schema.json DESTINATION ${CMAKE_INSTALL_DATADIR}/deform)
+  ${CMAKE_SOURCE_DIR}/libdeform/schema/deform-cost.schema.json DESTINATION ${CMAKE_INSTALL_DATADIR}/deform
+  COMPONENT command)
 # Plugins to copy and edit, as source.
 file(GLOB deform_templates ${CMAKE_SOURCE_DIR}/plugins/template_*)
-install(DIRECTORY ${deform_templates} DESTINATION ${CMAKE_INSTALL_DATADIR}/deform)
+install(DIRECTORY ${deform_templates} DESTINATION ${CMAKE_INSTALL_DATADIR}/deform COMPONENT dev)
 install(FILES ${CMAKE_SOURCE_DIR}/LICENSE ${CMAKE_SOURCE_DIR}/README.md ${CMAKE_SOURCE_DIR}/CHANGELOG.md
-  DESTINATION ${CMAKE_INSTALL_DOCDIR})
+  DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT library)
 
 # The adapters of rigid engines have exports of their own, so that who does not ask for one
 # (find_package(deform COMPONENTS ode)) needs no engine.
@@ -46,15 +48,18 @@ foreach(adapter ode bullet bullet64)
     list(APPEND deform_adapters ${adapter})
     string(REGEX REPLACE "64$" "" folder ${adapter})
     install(TARGETS deform_${adapter} EXPORT deform_${adapter}Targets
-      LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+      LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT ${adapter}
+      ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT ${adapter})
     set_target_properties(deform_${adapter} PROPERTIES INSTALL_RPATH "$ORIGIN" BUILD_WITH_INSTALL_RPATH ON)
     install(DIRECTORY ${CMAKE_SOURCE_DIR}/bindings/${folder}/include/deform
-      DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp")
-    install(EXPORT deform_${adapter}Targets NAMESPACE deform:: DESTINATION ${deform_cmake_dir})
+      DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT ${folder}
+      FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp")
+    install(EXPORT deform_${adapter}Targets NAMESPACE deform:: DESTINATION ${deform_cmake_dir}
+      COMPONENT ${adapter})
   endif()
 endforeach()
 
-install(EXPORT deformTargets NAMESPACE deform:: DESTINATION ${deform_cmake_dir})
+install(EXPORT deformTargets NAMESPACE deform:: DESTINATION ${deform_cmake_dir} COMPONENT dev)
 configure_package_config_file(${CMAKE_SOURCE_DIR}/cmake/deformConfig.cmake.in
   ${CMAKE_BINARY_DIR}/cmake/deformConfig.cmake
   INSTALL_DESTINATION ${deform_cmake_dir} PATH_VARS deform_plugin_dir)
@@ -62,7 +67,7 @@ write_basic_package_version_file(${CMAKE_BINARY_DIR}/cmake/deformConfigVersion.c
   COMPATIBILITY SameMinorVersion)
 install(FILES ${CMAKE_BINARY_DIR}/cmake/deformConfig.cmake ${CMAKE_BINARY_DIR}/cmake/deformConfigVersion.cmake
   ${CMAKE_SOURCE_DIR}/cmake/DeformPlugin.cmake ${CMAKE_SOURCE_DIR}/cmake/deform_plugin.map
-  DESTINATION ${deform_cmake_dir})
+  DESTINATION ${deform_cmake_dir} COMPONENT dev)
 
 # An archive is all there is to link then, so `pkg-config --libs` names what it needs even without --static.
 set(deform_pc_needs "")
@@ -77,13 +82,16 @@ if(DEFORM_PLUGINS_STATIC)
   set(deform_pc_plugin_dir "")
 endif()
 configure_file(${CMAKE_SOURCE_DIR}/cmake/deform.pc.in ${CMAKE_BINARY_DIR}/cmake/deform.pc @ONLY)
-install(FILES ${CMAKE_BINARY_DIR}/cmake/deform.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+install(FILES ${CMAKE_BINARY_DIR}/cmake/deform.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT dev)
 set(deform_adapter_pc_private "")
 if(NOT DEFORM_SHARED)
   set(deform_adapter_pc_private "-lstdc++ -lm")
 endif()
 foreach(adapter IN LISTS deform_adapters)
+  string(REGEX REPLACE "64$" "" folder ${adapter})
   configure_file(${CMAKE_SOURCE_DIR}/cmake/deform_${adapter}.pc.in
     ${CMAKE_BINARY_DIR}/cmake/deform_${adapter}.pc @ONLY)
-  install(FILES ${CMAKE_BINARY_DIR}/cmake/deform_${adapter}.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+  install(FILES ${CMAKE_BINARY_DIR}/cmake/deform_${adapter}.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig
+    COMPONENT ${adapter})
 endforeach()
+include(DeformPackage)
