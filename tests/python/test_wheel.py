@@ -71,7 +71,7 @@ class Wheel(unittest.TestCase):
             wheel_backend.configure(build, {"cmake": "-DDEFORM_RENDER=OFF"})
             cache = (build / "CMakeCache.txt").read_text()
             for entry in ("DEFORM_RENDER:BOOL=OFF", "DEFORM_TESTS:BOOL=OFF", "DEFORM_ODE:STRING=OFF",
-                          "CMAKE_INSTALL_LIBDIR:PATH=lib"):
+                          "DEFORM_BULLET:STRING=OFF", "CMAKE_INSTALL_LIBDIR:PATH=lib"):
                 self.assertIn(entry, cache.replace(":UNINITIALIZED=", ":PATH="))
             targets = subprocess.run(["cmake", "--build", build, "--target", "help"], check=True,
                                      capture_output=True, text=True).stdout
