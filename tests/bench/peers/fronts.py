@@ -24,7 +24,7 @@ QUESTIONS = [("beam", ("sag",), "%", (30, 10, 3)), ("beam", ("sag", "period"), "
              ("beam", ("sag", "period", "kept"), "%", (30, 10)),
              ("slope_hold", ("creep_um_per_s",), "um/s", (100, 1)), ("pair", ("dip",), "%", (20, 5)),
              ("pair", ("dip", "drag"), "%", (20, 10)), ("stack", ("shortening",), "%", (20, 5)),
-             ("stack", ("creep_um_per_s",), "um/s", (100, 1)), ("gripper", ("rise",), "%", (2, 1)),
+             ("stack", ("creep_um_per_s",), "um/s", (1000, 100)), ("gripper", ("rise",), "%", (2, 1)),
              ("gripper", ("rise", "creep_um_per_s"), "% and um/s", (2, 1))]
 CALIBRATED = ("beam", 400)  # scenes_jolt.py
 BUDGETS = (0.03, 0.1, 0.3, 1, 3, 10)
@@ -106,6 +106,16 @@ def tables(rows):
     return text + "\n" + all_runs(rows)
 
 
+def shown(row):
+    """What was measured, bold outside its band; a motion without oscillation has no period."""
+    if row["verdict"] not in ("pass", "fail"):
+        return speed.table.shown(row)
+    value = float(row["measured"])
+    nothing = row["expected"] == "0" and abs(value) < 1e-3
+    text = "none" if math.isinf(value) else "0" if nothing else "%.3g" % value
+    return text if row["verdict"] == "pass" else "**%s**" % text
+
+
 def all_runs(rows):
     """Every run: cost and what it measured, bold outside the band."""
     by, order = {}, {}
@@ -126,7 +136,7 @@ def all_runs(rows):
             cells = []
             for quantity in quantities:
                 row = next((r for r in told if r["quantity"] in (quantity, "")), None)
-                cells.append(speed.table.shown(row) if row else "-")
+                cells.append(shown(row) if row else "-")
             text += "| %s, %s | %s | %s | %s |\n" % (engine, configuration, parameters.split("=")[1],
                                                     told[0]["cost"], " | ".join(cells))
     return text
