@@ -18,6 +18,8 @@ constexpr bool kKeepsContacts = true;                 // from step to step, in n
 inline dfm_status register_engine() { return dfm_bullet_register(); }
 struct Engine : Bullet {
   using Bullet::Bullet;
+  double engine_seconds() const { return stats().bullet_seconds; }
+  void ground() { body(shape<btStaticPlaneShape>(btVector3(0, 0, 1), btScalar(0)), 0); }
   // three balls of 0.05 m in a row along x, 0.15 m apart
   btRigidBody *bar(double mass, Vec moments, Vec place) {
     auto *const row = shape<btCompoundShape>();
@@ -35,6 +37,8 @@ inline Vec spin(dBodyID b) { return vec(dBodyGetAngularVel(b)); }
 inline void set_spin(dBodyID b, Vec w) { dBodySetAngularVel(b, w[0], w[1], w[2]); }
 struct Engine : Ode {
   using Ode::Ode;
+  double engine_seconds() const { return stats().ode_seconds; }
+  void ground() { dCreatePlane(space, 0, 0, 1, 0); }
   dBodyID bar(double mass, Vec moments, Vec place) {
     const dBodyID b = body(mass, moments, place);
     for (const double x : {-0.15, 0.0, 0.15}) {
