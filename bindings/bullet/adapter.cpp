@@ -1,5 +1,7 @@
 #include "adapter.h"
 
+#include <BulletDynamics/Featherstone/btMultiBodyLinkCollider.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -110,6 +112,12 @@ Adapter::Traits Adapter::traits_of(const btCollisionObject *object) const {
   }
   const Props *const props = props_of(object);
   t.takes_part = object->hasContactResponse() && !(props && props->ignore);
+  if (const btMultiBodyLinkCollider *const link = btMultiBodyLinkCollider::upcast(object)) {
+    const btMultiBody &multi = *link->m_multiBody;
+    t.mass = link->m_link < 0 ? multi.getBaseMass() : multi.getLinkMass(link->m_link);
+    t.moves = t.mass > 0 && !(link->m_link < 0 && multi.hasFixedBase());
+    return t;
+  }
   const btRigidBody *const body = btRigidBody::upcast(object);
   t.moves = body && !body->isStaticOrKinematicObject() && body->getInvMass() > 0;
   if (!t.moves) return t;
@@ -173,7 +181,7 @@ dfm_status Adapter::drop() {
     for (dfm_obstacle &each : o->obstacles) TRY(unbind(each));
     if (o->body) {
       TRY(o->body->release());
-      engine_.forget(&o->body->member);
+      engine_.forget(o->body->member.get());
     }
     by_id_.erase(o->id);
   }
@@ -182,12 +190,23 @@ dfm_status Adapter::drop() {
 }
 
 dfm_status Adapter::bind_body(Object &o) {
-  btRigidBody *const body = const_cast<btRigidBody *>(btRigidBody::upcast(o.id));
   o.body = std::make_unique<Body>();
-  BulletMember &m = o.body->member;
+  if (const btMultiBodyLinkCollider *const link = btMultiBodyLinkCollider::upcast(o.id)) {
+    auto made = std::make_unique<LinkMember>();
+    made->body = link->m_multiBody;
+    made->link = link->m_link;
+    made->gravity = from_bullet(engine_.world->getGravity());
+    made->read();
+    o.body->member = std::move(made);
+  } else {
+    auto made = std::make_unique<BulletMember>();
+    made->body = const_cast<btRigidBody *>(btRigidBody::upcast(o.id));
+    made->read();
+    o.body->member = std::move(made);
+  }
+  Member &m = *o.body->member;
   m.engine = &engine_;
-  m.body = body;
-  m.read();
+  const btCollisionObject *const body = o.id;
   o.body->seat.refuse = [body] {
     return failed(DFM_E_STATE,
                   "the rigid body stands for Bullet's body %p, which owns it, and dfm_rigid_destroy would "
@@ -217,7 +236,7 @@ dfm_status Adapter::bind_leaf(Object &o, size_t leaf) {
   dfm_obstacle &out = o.obstacles.emplace_back();
   o.local.push_back(local);
   if (o.body) {
-    def.pose = to_pose(in_principal_frame(o.body->member.inertia, local));
+    def.pose = to_pose(in_principal_frame(o.body->member->inertia, local));
     return dfm_rigid_add_shape(o.body->rigid, &def, &out);
   }
   o.sent.push_back(o.pose * local);
@@ -317,7 +336,7 @@ dfm_status Adapter::obstacle(const btCollisionObject *object, uint32_t leaf, dfm
   return DFM_OK;
 }
 
-dfm_status Adapter::rigid(const btRigidBody *body, dfm_rigid *out) {
+dfm_status Adapter::rigid(const btCollisionObject *body, dfm_rigid *out) {
   TRY(sync());
   const auto known = by_id_.find(body);
   if (known == by_id_.end()) return not_in_world(body);

@@ -50,7 +50,7 @@ class Adapter {
   dfm_status sync();  // the objects as they are now, before a tick
   dfm_status step(double dt, int max_sub_steps, double fixed, int *ticks);
   dfm_status obstacle(const btCollisionObject *object, uint32_t leaf, dfm_obstacle *out);
-  dfm_status rigid(const btRigidBody *body, dfm_rigid *out);
+  dfm_status rigid(const btCollisionObject *body, dfm_rigid *out);
   dfm_status set_object(const btCollisionObject *object, const dfm_bullet_object &props);
   dfm_status refresh(const btCollisionObject *object);
   dfm_status debug_draw(uint32_t what) const;
@@ -68,7 +68,7 @@ class Adapter {
     Vec moments, along, about;
     bool operator==(const Traits &o) const;
   };
-  struct Body : Seated { BulletMember member; };
+  struct Body : Seated { std::unique_ptr<Member> member; };
   struct Object {
     const btCollisionObject *id;
     Traits traits;

@@ -132,7 +132,7 @@ dfm_status dfm_bullet_obstacle(dfm_bullet bullet, const btCollisionObject *objec
   });
 }
 
-dfm_status dfm_bullet_rigid(dfm_bullet bullet, const btRigidBody *body, dfm_rigid *out) {
+dfm_status dfm_bullet_rigid(dfm_bullet bullet, const btCollisionObject *body, dfm_rigid *out) {
   return with(bullet, [&](Adapter &a) {
     return !body ? missing("body") : !out ? missing("out") : a.rigid(body, out);
   });

@@ -1,5 +1,7 @@
 #include "engine.h"
 
+#include <BulletDynamics/Featherstone/btMultiBodyLinkCollider.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -39,18 +41,21 @@ Motion beside(const btTransform &a, const btTransform &b, const Motion &m, doubl
   return out;
 }
 
+dfm_rigid_state state_of(const Pose &p, Vec v, Vec w) {
+  dfm_rigid_state s{};
+  const double rotation[4] = {p.rotation.x, p.rotation.y, p.rotation.z, p.rotation.w};
+  std::copy(rotation, rotation + 4, s.rotation);
+  store(s.position, p.position);
+  store(s.velocity, v);
+  store(s.spin, w);
+  return s;
+}
+
 }  // namespace
 
 dfm_rigid_state BulletMember::state() const {
-  dfm_rigid_state s{};
-  const Pose p = from_bullet(body->getWorldTransform());
-  store(s.position, p.position);
-  const Quat q = p.rotation;
-  const double rotation[4] = {q.x, q.y, q.z, q.w};
-  std::copy(rotation, rotation + 4, s.rotation);
-  store(s.velocity, from_bullet(body->getLinearVelocity()));
-  store(s.spin, from_bullet(body->getAngularVelocity()));
-  return s;
+  return state_of(from_bullet(body->getWorldTransform()), from_bullet(body->getLinearVelocity()),
+                  from_bullet(body->getAngularVelocity()));
 }
 
 void BulletMember::put(const dfm_rigid_state &s) {
@@ -87,6 +92,42 @@ std::array<double, 2> BulletMember::idle_limits() const {
           std::min<double>(body->getAngularSleepingThreshold(), kIdleSpin)};
 }
 
+dfm_rigid_state LinkMember::state() const {
+  std::vector<btVector3> w(static_cast<size_t>(body->getNumLinks()) + 1), v(w.size());
+  body->compTreeLinkVelocities(w.data(), v.data());  // in the links' own frames, the base first
+  const btMultiBodyLinkCollider *const collider =
+      link < 0 ? body->getBaseCollider() : body->getLinkCollider(link);
+  const auto at = static_cast<size_t>(link + 1);
+  return state_of(from_bullet(collider->getWorldTransform()), from_bullet(body->localDirToWorld(link, v[at])),
+                  from_bullet(body->localDirToWorld(link, w[at])));
+}
+
+void LinkMember::read() {
+  inertia.mass = link < 0 ? body->getBaseMass() : body->getLinkMass(link);
+  inertia.moments = from_bullet(link < 0 ? body->getBaseInertia() : body->getLinkInertia(link));
+}
+
+// Weight and forces of the caller reach it through its joints: all but gravity is in what these did last.
+Facts LinkMember::facts() const {
+  Facts f;
+  f.enabled = body->isAwake();
+  f.plain = f.turns = false;
+  f.gravity = gravity;
+  return f;
+}
+
+std::array<double, 2> LinkMember::idle_limits() const { return {kIdleSpeed, kIdleSpin}; }
+
+void LinkMember::push(Vec force, Vec torque) {
+  if (link < 0) {
+    body->addBaseForce(to_bullet(force));
+    body->addBaseTorque(to_bullet(torque));
+  } else {
+    body->addLinkForce(link, to_bullet(force));
+    body->addLinkTorque(link, to_bullet(torque));
+  }
+}
+
 void BulletEngine::gather() {
   saved_.clear();
   number_.clear();
@@ -95,9 +136,15 @@ void BulletEngine::gather() {
     saved_.push_back(
         {b, b->getWorldTransform(), b->getLinearVelocity(), b->getAngularVelocity(), 0, 0, 0, m, false});
   };
-  for (size_t i = 0; i < members.size(); ++i) {
-    member(i).saved = i;
-    add(member(i).body, &member(i));
+  bodies_.clear();
+  links_.clear();
+  for (Member *m : members) {
+    if (auto *const link = dynamic_cast<LinkMember *>(m)) links_.push_back(link);
+    else bodies_.push_back(static_cast<BulletMember *>(m));
+  }
+  for (BulletMember *m : bodies_) {
+    m->saved = saved_.size();
+    add(m->body, m);
   }
   const btAlignedObjectArray<btRigidBody *> &all = world->getNonStaticRigidBodies();
   for (int i = 0; i < all.size(); ++i)
@@ -186,7 +233,13 @@ void BulletEngine::restore(bool given) {
 }
 
 void BulletEngine::take(Member &any, const dfm_rigid_state &given, const double *extra) {
-  BulletMember &m = of(any);
+  any.start = given;
+  if (auto *const link = dynamic_cast<LinkMember *>(&any)) {
+    link->ended = given;
+    link->restored = false;
+    return;
+  }
+  BulletMember &m = static_cast<BulletMember &>(any);
   Saved &s = saved_[m.saved];
   if (m.restored && may_sleep(m.body)) {
     m.body->forceActivationState(extra[12] != 0 ? ISLAND_SLEEPING : ACTIVE_TAG);
@@ -199,12 +252,14 @@ void BulletEngine::take(Member &any, const dfm_rigid_state &given, const double 
   s.transform = m.body->getWorldTransform();
   s.v = m.body->getLinearVelocity();
   s.w = m.body->getAngularVelocity();
-  m.start = m.ended = given;
+  m.ended = given;
 }
 
 void BulletEngine::put_forces(double) {
-  for (size_t i = 0; i < members.size(); ++i)
-    if (member(i).wakes) member(i).body->activate(true);
+  for (BulletMember *m : bodies_)
+    if (m->wakes) m->body->activate(true);
+  for (LinkMember *m : links_)
+    if (m->wakes) m->body->wakeUp();
 }
 
 void BulletEngine::run(double h) {
@@ -219,12 +274,17 @@ void BulletEngine::run(double h) {
     s.body->setLinearVelocity(s.body->getLinearVelocity() + to_bullet(change.v));
     s.body->setAngularVelocity(s.body->getAngularVelocity() + to_bullet(change.w));
   }
+  for (LinkMember *m : links_) m->push((1 / h) * m->impulse.v, (1 / h) * m->impulse.w);
   (world->*Opened::find_islands())();
   world->getSolverInfo().m_timeStep = step;
   world->solveConstraints(world->getSolverInfo());
   (world->*Opened::integrate())(step);
   for (size_t i = 0; i < saved_.size(); ++i) saved_[i].body->setFlags(flags[i]);
-  for (size_t i = 0; i < members.size(); ++i) finish(member(i), h);
+  for (BulletMember *m : bodies_) finish(*m, h);
+  for (LinkMember *m : links_) {
+    m->push((-1 / h) * m->impulse.v, (-1 / h) * m->impulse.w);
+    m->ended = m->state();
+  }
 }
 
 void BulletEngine::finish(BulletMember &m, double h) {
@@ -254,20 +314,20 @@ void BulletEngine::finish(BulletMember &m, double h) {
 }
 
 void BulletEngine::turned(Member &any, Quat to, Vec spin) {
-  BulletMember &m = of(any);
+  BulletMember &m = static_cast<BulletMember &>(any);  // links are turned by Bullet
   const double rotation[4] = {to.x, to.y, to.z, to.w};
   std::copy(rotation, rotation + 4, m.ended.rotation);
   store(m.ended.spin, spin);
 }
 
 void BulletEngine::rest(double h) {
-  for (size_t i = 0; i < members.size(); ++i) member(i).put(member(i).ended);
+  for (BulletMember *m : bodies_) m->put(m->ended);
   std::vector<std::pair<btVector3, btVector3>> before;
   for (const Saved &s : saved_)
     before.emplace_back(s.body->getLinearVelocity(), s.body->getAngularVelocity());
   (world->*Opened::act())(static_cast<btScalar>(h));
-  for (size_t i = 0; i < members.size(); ++i) {
-    BulletMember &m = member(i);
+  for (size_t i = 0; i < bodies_.size(); ++i) {
+    BulletMember &m = *bodies_[i];
     const auto &[v, w] = before[i];
     const Vec dv = from_bullet(m.body->getLinearVelocity()) - from_bullet(v);
     const Vec dw = from_bullet(m.body->getAngularVelocity()) - from_bullet(w);
@@ -280,8 +340,7 @@ void BulletEngine::rest(double h) {
       m.body->activate(true);
   }
   (world->*Opened::idle())(static_cast<btScalar>(h));
-  for (size_t i = 0; i < members.size(); ++i)
-    member(i).next_idle = {0, member(i).body->getDeactivationTime()};
+  for (BulletMember *m : bodies_) m->next_idle = {0, m->body->getDeactivationTime()};
 }
 
 }  // namespace dfm_bullet_detail

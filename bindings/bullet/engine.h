@@ -35,6 +35,24 @@ struct BulletMember : Member {
   void read();  // mass, moments, axes that are free
 };
 
+// A link of a multibody, or its base (-1): jointed to the others like bodies by constraints, and like those
+// in the solve with its own mass and what the joints did last.
+struct LinkMember : Member {
+  btMultiBody *body = nullptr;
+  int link = -1;
+  Vec gravity;
+  dfm_rigid_state ended{};
+
+  dfm_rigid_state state() const override;
+  void put(const dfm_rigid_state &) override {}  // its joints say where it is
+  dfm_rigid_state end() const override { return ended; }
+  bool enabled() const override { return body->isAwake(); }
+  Facts facts() const override;
+  std::array<double, 2> idle_limits() const override;
+  void read();
+  void push(Vec force, Vec torque);  // N, N m
+};
+
 class BulletEngine : public Engine {
  public:
   btDiscreteDynamicsWorld *world = nullptr;
@@ -68,8 +86,8 @@ class BulletEngine : public Engine {
   MultiState multi_;
   std::vector<Saved> saved_;  // every body that may move, members first
 
-  static BulletMember &of(Member &m) { return static_cast<BulletMember &>(m); }
-  BulletMember &member(size_t i) const { return of(*members[i]); }
+  std::vector<BulletMember *> bodies_;  // of members
+  std::vector<LinkMember *> links_;
   void find_touched();
   void pull_awake();
   void finish(BulletMember &m, double h);

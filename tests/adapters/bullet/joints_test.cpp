@@ -92,6 +92,71 @@ TEST(BulletJoints, Chain_ConvergesWithTheStep) {
   EXPECT_LT(c, 0.4 * a);
 }
 
+// A hanging chain of three links, struck by a soft ball at its last one: as a multibody, and as rigid bodies
+// on hinges, which are Bullet's two ways to have it.
+TEST(BulletJoints, MultibodyStruckByASoftBall_SwingsAsRigidBodiesOnHinges) {
+  const auto struck = [](bool multi) {
+    Context context;
+    Pendulum p;
+    p.body.setJointPos(0, 0);
+    btSphereShape shape(btScalar(0.08));
+    std::vector<std::unique_ptr<btMultiBodyLinkCollider>> colliders;
+    std::vector<std::unique_ptr<btRigidBody>> links;
+    std::vector<std::unique_ptr<btHingeConstraint>> hinges;
+    const btVector3 half = bt({0, 0, 0.15}), axis(0, 1, 0);
+    if (!multi) p.world.removeMultiBody(&p.body);
+    p.world.getSolverInfo().m_numIterations = 200;
+    p.body.setCanSleep(false);
+    for (int i = 0; i < 3; ++i) {
+      if (multi) {
+        colliders.push_back(std::make_unique<btMultiBodyLinkCollider>(&p.body, i));
+        colliders.back()->setCollisionShape(&shape);
+        p.body.getLink(i).m_collider = colliders.back().get();
+        p.world.addCollisionObject(colliders.back().get(), 1, 1);
+        continue;
+      }
+      links.push_back(std::make_unique<btRigidBody>(1, nullptr, &shape, bt({0.01, 0.01, 0.001})));
+      links.back()->setCenterOfMassTransform(at({0, 0, -0.15 - 0.3 * i}));
+      links.back()->setActivationState(DISABLE_DEACTIVATION);
+      p.world.addRigidBody(links.back().get());
+      hinges.push_back(i == 0 ? std::make_unique<btHingeConstraint>(*links[0], half, axis)
+                              : std::make_unique<btHingeConstraint>(*links[size_t(i) - 1], *links[size_t(i)],
+                                                                    -half, half, axis, axis));
+      p.world.addConstraint(hinges.back().get(), true);
+    }
+    btAlignedObjectArray<btQuaternion> turns;
+    btAlignedObjectArray<btVector3> places;
+    p.body.forwardKinematics(turns, places);
+    p.body.updateCollisionObjectWorldTransforms(turns, places);
+    const dfm_world soft = make_world(context, {0, 0, -9.81});
+    dfm_bullet_def d = dfm_bullet_def_default();
+    d.world = &p.world;
+    dfm_bullet adapter = 0;
+    ok(dfm_bullet_attach(soft, &d, &adapter));
+    const dfm_body ball = soft_ball(context, soft, {-0.185, 0, -0.75}, {2, 0, 0});
+    for (int i = 0; i < 200; ++i) {
+      p.world.stepSimulation(btScalar(1e-3), 0);
+      ok(dfm_bullet_last_tick(adapter, nullptr));
+    }
+    const Vec end =
+        multi ? vec(colliders[2]->getWorldTransform().getOrigin()) : vec(links[2]->getCenterOfMassPosition());
+    const Vec out = {end[0], end[2], measure(ball).velocity[0]};
+    ok(dfm_bullet_detach(adapter));
+    for (auto &h : hinges) p.world.removeConstraint(h.get());
+    for (auto &l : links) p.world.removeRigidBody(l.get());
+    for (auto &c : colliders) p.world.removeCollisionObject(c.get());
+    if (!multi) p.world.addMultiBody(&p.body);
+    return out;
+  };
+  const Vec multi = struck(true), rigid = struck(false);
+  std::printf("  end %.4f %.4f m against %.4f %.4f, ball at %.4f against %.4f m/s\n", multi[0], multi[1],
+              rigid[0], rigid[1], multi[2], rigid[2]);
+  EXPECT_GT(multi[0], 0.1);
+  EXPECT_NEAR(multi[0], rigid[0], 0.005);
+  EXPECT_NEAR(multi[1], rigid[1], 0.005);
+  EXPECT_NEAR(multi[2], rigid[2], 0.05);
+}
+
 // A multibody swings in a world with an adapter as it does without one.
 TEST(BulletJoints, Multibody_SwingsAsWithoutAnAdapter) {
   const auto angles = [](bool attached, bool beside) {

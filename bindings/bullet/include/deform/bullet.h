@@ -80,9 +80,9 @@ DFM_API dfm_status dfm_bullet_get_stats(dfm_bullet bullet, dfm_bullet_stats *out
  * DFM_E_UNSUPPORTED as dfm_bullet_step. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_bullet_obstacle(dfm_bullet bullet, const btCollisionObject *object, uint32_t leaf,
                                        dfm_obstacle *out);
-/** What stands for a body that moves by forces. Its dfm_rigid_state is not rounded to btScalar.
- * Threads: Not during step. Since 0.1. */
-DFM_API dfm_status dfm_bullet_rigid(dfm_bullet bullet, const btRigidBody *body, dfm_rigid *out);
+/** What stands for a body that moves by forces: a btRigidBody, whose dfm_rigid_state is not rounded to
+ * btScalar, or a btMultiBodyLinkCollider. Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_bullet_rigid(dfm_bullet bullet, const btCollisionObject *body, dfm_rigid *out);
 
 /** What Bullet does not know of an object. Its obstacles are made anew: their contacts end. Objects nobody
  * names are called "obstacleN". */
