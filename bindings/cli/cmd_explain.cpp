@@ -129,6 +129,17 @@ void print_integrators(const JsonValue &plan) {
   }
 }
 
+// Bodies whose forces are asked for in single precision.
+void print_precision(const JsonValue &plan) {
+  const JsonValue *bodies = plan.find("bodies");
+  for (size_t i = 0; bodies && i < bodies->items.size(); ++i) {
+    const JsonValue *own = bodies->items[i].find("precision");
+    if (own && own->get("why") != "the default")
+      std::printf("  %-20s  forces in %s precision: %s\n", bodies->items[i].get("name").c_str(),
+                  own->get("used").c_str(), own->get("why").c_str());
+  }
+}
+
 // What differs from cell to cell, and who says so.
 void print_fields(const JsonValue &plan) {
   const JsonValue *bodies = plan.find("bodies");
@@ -165,6 +176,7 @@ int explain(const Options &options, Globals &globals) {
   print_list(plan, "absent", "left out", {"why"});
   print_list(plan, "bodies", "bodies", {"model", "kind", "surface", "cells", "points", "surfels"});
   if (scene.value("/time/mode") != "\"static\"") print_integrators(plan);
+  print_precision(plan);
   print_changes(plan);
   if (scene.value("/time/mode") != "\"static\"") print_unwatched(plan);
   print_fields(plan);

@@ -19,6 +19,12 @@ DEFORM_INLINE v4 load4(const double *p) { return _mm256_load_pd(p); }
 DEFORM_INLINE void store4(double *p, v4 a) { _mm256_store_pd(p, a); }
 DEFORM_INLINE v4 load4_anywhere(const double *p) { return _mm256_loadu_pd(p); }
 DEFORM_INLINE void store4_anywhere(double *p, v4 a) { _mm256_storeu_pd(p, a); }
+DEFORM_INLINE v4 load4_single(const float *p) { return _mm256_cvtps_pd(_mm_load_ps(p)); }
+DEFORM_INLINE void store4_single(float *p, v4 a) { _mm_store_ps(p, _mm256_cvtpd_ps(a)); }
+// to the nearest, of two the even one
+DEFORM_INLINE void store4_whole(int32_t *p, v4 a) {
+  _mm_store_si128(reinterpret_cast<__m128i *>(p), _mm256_cvtpd_epi32(a));
+}
 // masked: never read
 DEFORM_INLINE v4 load_xyz(const double *p) {
   return _mm256_maskload_pd(p, _mm256_setr_epi64x(-1, -1, -1, 0));

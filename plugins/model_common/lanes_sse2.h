@@ -24,6 +24,18 @@ DEFORM_INLINE void store4_anywhere(double *p, v4 a) {
   _mm_storeu_pd(p, a.lo);
   _mm_storeu_pd(p + 2, a.hi);
 }
+DEFORM_INLINE v4 load4_single(const float *p) {
+  const __m128 a = _mm_load_ps(p);
+  return {_mm_cvtps_pd(a), _mm_cvtps_pd(_mm_movehl_ps(a, a))};
+}
+DEFORM_INLINE void store4_single(float *p, v4 a) {
+  _mm_store_ps(p, _mm_movelh_ps(_mm_cvtpd_ps(a.lo), _mm_cvtpd_ps(a.hi)));
+}
+// to the nearest, of two the even one
+DEFORM_INLINE void store4_whole(int32_t *p, v4 a) {
+  _mm_store_si128(reinterpret_cast<__m128i *>(p),
+                  _mm_unpacklo_epi64(_mm_cvtpd_epi32(a.lo), _mm_cvtpd_epi32(a.hi)));
+}
 DEFORM_INLINE v4 load_xyz(const double *p) { return {_mm_loadu_pd(p), _mm_load_sd(p + 2)}; }
 DEFORM_INLINE v4 splat(double a) { return {_mm_set1_pd(a), _mm_set1_pd(a)}; }
 DEFORM_INLINE v4 set4(double a, double b, double c, double d) {

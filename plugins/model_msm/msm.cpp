@@ -118,6 +118,28 @@ const dfm_slot kBranchSlots[] = {{DFM_PER_EDGE, 1, DFM_SLOT_SCALAR, 0},
                                  {DFM_PER_INSTANCE, 1, DFM_SLOT_SCALAR, 0}};
 const dfm_slots kNoSlots = {sizeof(dfm_slots), 0, nullptr, 0, 0},
                 kSlots = {sizeof(dfm_slots), 2, kBranchSlots, 0, 0};
+dfm_status prepare_single(void *self) {
+  Body &body = *static_cast<Body *>(self);
+  if (const char *why = body.keeps_double()) {
+    complain(body.host, why);
+    return DFM_E_UNSUPPORTED;
+  }
+  try {
+    body.prepare_single();
+  } catch (...) {
+    return DFM_E_NOMEM;
+  }
+  return DFM_OK;
+}
+
+dfm_status add_single_forces(void *self, const dfm_kin *k, double *f) {
+  Body &body = *static_cast<Body *>(self);
+  if (!body.has_single()) return DFM_E_STATE;
+  body.add_single_forces(*k, f);
+  return DFM_OK;
+}
+
+const dfm_f32 kSingle = {sizeof(dfm_f32), 0, prepare_single, add_single_forces};
 const dfm_limited kLimited = {sizeof(dfm_limited), 0, limited};
 const dfm_spring_mask kSpringMask = {sizeof(dfm_spring_mask), 0, set_mask, get_mask};
 
@@ -134,6 +156,7 @@ const void *extension(const void *self, const char *id) {
   if (!strcmp(id, DFM_EXT_IDLE)) return &Ops::kIdle;
   if (!strcmp(id, DFM_EXT_LIMITED)) return &kLimited;
   if (!strcmp(id, DFM_EXT_SPRING_MASK)) return &kSpringMask;
+  if (!strcmp(id, DFM_EXT_F32)) return &kSingle;
   return nullptr;
 }
 

@@ -23,6 +23,21 @@ void force_pass(void *user, uint32_t begin, uint32_t end) {
   }
 }
 
+void single_pass(void *user, uint32_t begin, uint32_t end) {
+  const Call &call = *static_cast<const Call *>(user);
+  Body &body = *call.body;
+  const SingleKernels &kernels = *body.kernels->single;
+  const Damping damping = body.damping();
+  const float damp = float(body.damp_scale() * body.params[kDampingStiffness]);
+  for (uint32_t n = begin; n < end; ++n) {
+    SingleBlock b = body.single.block[n];
+    b.at = reinterpret_cast<SinglePoint *>(body.lend(n, begin).p);
+    const float unit = kernels.load(b, call.k->x, damping != kUndamped ? call.k->v : nullptr, call.k->stride);
+    kernels.springs[body.form() != kPlain][damping](b, unit, damp);
+    if (body.cells_on) kernels.cells(b, unit);
+  }
+}
+
 void merge_pass(void *user, uint32_t begin, uint32_t end) {
   const Call &call = *static_cast<const Call *>(user);
   Body &body = *call.body;
@@ -85,6 +100,12 @@ void Body::add_forces(const dfm_kin &k, double *f_out) {
   Call call{this, &k, f_out, has_branch() ? &branch : nullptr};
   if (has_branch() && k.state_out) k.state_out[nedge] = branch.next;
   for_each_block(ncell >= kParallelCells, force_pass, &call);
+  for_each_block(ncell >= kParallelMergeCells, merge_pass, &call);
+}
+
+void Body::add_single_forces(const dfm_kin &k, double *f_out) {
+  Call call{this, &k, f_out, nullptr};
+  for_each_block(ncell >= kParallelCells, single_pass, &call);
   for_each_block(ncell >= kParallelMergeCells, merge_pass, &call);
 }
 

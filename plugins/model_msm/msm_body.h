@@ -47,6 +47,28 @@ bool valid(const dfm_host *h, const double *values);  // of all parameters; fals
 // negative gives less.
 inline double volume_for(double nu) { return nu > 0.25 ? 3 * (4 * nu - 1) / (2 * (1 + nu)) : 0; }
 
+// What single precision reads beside the points, in block order, filled up to whole registers.
+struct Single {
+  Buffer<SingleBlock> block;
+  Buffer<SingleQuad> quad;
+  Buffer<SingleCell> cell;
+  Buffer<float> stiffness, rest, rest_square, tilt, damp, bulk, volume6, collapse, limit;
+  void swap(Single &o) {
+    block.swap(o.block);
+    quad.swap(o.quad);
+    cell.swap(o.cell);
+    stiffness.swap(o.stiffness);
+    rest.swap(o.rest);
+    rest_square.swap(o.rest_square);
+    tilt.swap(o.tilt);
+    damp.swap(o.damp);
+    bulk.swap(o.bulk);
+    volume6.swap(o.volume6);
+    collapse.swap(o.collapse);
+    limit.swap(o.limit);
+  }
+};
+
 struct Body : model::Blocks<Block> {
   using Row = Param;
   // From this size on the blocks go through the host's parallel_for; below it waking a worker costs more than
@@ -86,6 +108,10 @@ struct Body : model::Blocks<Block> {
   Buffer<uint32_t> limited;  // [nblock] cells beyond their limit at the last bound
   Buffer<Quad> quad;
   Buffer<Cell> cell;
+  Single single;  // empty until somebody asks for it
+  bool has_single() const { return !single.block.empty(); }
+  const char *keeps_double() const;  // why there are no forces in single precision; NULL: there are
+  void prepare_single();
 
   // why a parameter does nothing beside the present others; NULL where it does
   const char *idle(Param which) const;
@@ -137,6 +163,7 @@ struct Body : model::Blocks<Block> {
   void apply_params(const double *values);
 
   void add_forces(const dfm_kin &k, double *f_out);
+  void add_single_forces(const dfm_kin &k, double *f_out);  // after prepare_single()
   void bound(const dfm_kin &k, double *ksum, double *csum);
   bool lacks_state(const dfm_kin &k) const;
   double energy(const dfm_kin &k) const;
@@ -175,6 +202,7 @@ struct Body : model::Blocks<Block> {
   void find_dampers(Room &room);
   void find_effects();
   void fill_stiffness();
+  void fill_single();
   void find_weights(Room &room);
   double spring_energy(uint32_t e, const dfm_kin &k, const Branch &branch) const;
   struct SpringTangent { double along, across; };  // N/m

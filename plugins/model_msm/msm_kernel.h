@@ -61,8 +61,34 @@ struct Branch {
 enum Form : uint32_t { kPlain, kTilted, kTurned, kForms };
 enum Damping : uint32_t { kUndamped, kUniform, kPerSpring, kDampings };
 
+// The same in single precision. A point: its place in units of 2^n m from the first point of its block, and
+// its velocity less that point's.
+struct SinglePoint {
+  int32_t x[4];
+  float v[4];
+};
+// Numbers of points times 4.
+struct SingleQuad { uint16_t i, j[4]; };
+struct SingleCell { uint16_t p[4]; };
+struct SingleBlock : model::BlockPoints {
+  SinglePoint *at;  // [local]
+  uint32_t quads, cells;
+  // as in Block, but for the square of the rest length beside it
+  const SingleQuad *quad;
+  const float *stiffness, *rest, *rest_square, *tilt, *damp;
+  const SingleCell *cell;
+  const float *bulk, *volume6, *collapse, *limit;
+};
+struct SingleKernels {
+  // Clears f; returns the unit of the places, m: NaN where one is not finite.
+  float (*load)(const SingleBlock &b, const double *x, const double *v, uint32_t stride);
+  void (*springs[2][kDampings])(const SingleBlock &b, float unit, float damp);  // plain, tilted
+  void (*cells)(const SingleBlock &b, float unit);
+};
+
 struct Kernels {
   const char *name;
+  const SingleKernels *single;
   // As merge and store those of model_common/block_lanes.h.
   void (*load)(const model::BlockPoints &b, const double *x, const double *v, uint32_t stride);
   // damp: seconds, of kUniform
@@ -93,6 +119,7 @@ constexpr double kFade1 = 0.1287, kFade2 = 4.655;
 // Springs shorter than this carry no force: their direction is rounding. The square root of the
 // smallest safe square.
 constexpr double kShortestSquared = 1e-200;
+constexpr float kShortestSingle = 1e-30f;
 
 const Kernels *kernels_sse2();
 const Kernels *kernels_avx2();

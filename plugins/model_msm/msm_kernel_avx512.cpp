@@ -3,7 +3,8 @@
 // cell after cell.
 #include "../model_common/lanes_avx.h"
 
-#include "msm_kernel_quad.h"
+#define DEFORM_LANES 8  // registers of 16 take longer: the sums per point, in double, have half their ports
+#include "msm_kernel_single.h"
 
 namespace msm {
 namespace {
@@ -235,9 +236,9 @@ static void volume_cells8(const Block &b) {
   }
 }
 
-constexpr Kernels kKernels = {"avx512",     load_block,    {MSM_SPRINGS(springs8)},
-                              MSM_BRANCHES, volume_cells8, MSM_ROWS,
-                              merge_halo,   merge_rows,    add_to_host};
+constexpr Kernels kKernels = {"avx512",     &single::kKernels, load_block, {MSM_SPRINGS(springs8)},
+                              MSM_BRANCHES, volume_cells8,     MSM_ROWS,   merge_halo,
+                              merge_rows,   add_to_host};
 
 }  // namespace
 

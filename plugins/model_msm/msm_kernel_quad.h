@@ -12,7 +12,7 @@ namespace {
 
 using namespace lanes;
 
-DEFORM_INLINE void take_from(const Block &b, uint32_t n, v4 a) {
+DEFORM_INLINE void take_from(const model::BlockPoints &b, uint32_t n, v4 a) {
   double *f = b.f + 4 * size_t(n);
   store4(f, load4(f) - a);
 }

@@ -272,6 +272,7 @@ void Body::apply_params(const double *values) {
   }
   find_effects();
   if (!edge_off.empty()) fill_stiffness();
+  fill_single();
 }
 
 // The rows of the step bound keep counting a spring that is off: a bound it stays, and a cut need not look
@@ -280,6 +281,7 @@ void Body::mask_springs(uint32_t n, const uint32_t *which, bool on) {
   if (edge_off.empty()) edge_off.create(host, nedge);
   for (uint32_t k = 0; k < n; ++k) edge_off[which[k]] = !on;
   fill_stiffness();
+  fill_single();
 }
 
 }  // namespace msm

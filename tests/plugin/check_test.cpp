@@ -173,7 +173,11 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"model_low_diagonal", "M19", "below what respond answers"},
         Case{"model_constant_claim", "M20", "DFM_CAP_CONSTANT_STIFFNESS"},
         Case{"model_pumps", "M21", "dampers that push"},
-        Case{"model_hides_dampers", "M21", "does not claim DFM_CAP_DAMPING"}),
+        Case{"model_hides_dampers", "M21", "does not claim DFM_CAP_DAMPING"},
+        Case{"model_single_without_forces", "V03", "lacks prepare or add_forces"},
+        Case{"model_single_otherwise", "M22", "off those in double"},
+        Case{"model_single_rounds", "M22", "sum to"},
+        Case{"model_single_refuses_in_silence", "M22", "without a sentence"}),
     [](const auto &one) { return std::string(one.param.law); });
 
 TEST(BrokenLaw, EveryLawOfTheFolder_IsInTheTable) {
@@ -201,8 +205,8 @@ TEST(BrokenLaw, WhatTheyAreMadeFrom_KeepsEveryRule) {
   EXPECT_EQ(forces.exit_code, 0) << forces.out << forces.err;
   EXPECT_EQ(steps.exit_code, 0) << steps.out << steps.err;
   EXPECT_EQ(rules_that("skip", forces.out),
-            SANITIZED ? (std::vector<std::string>{"M14", "M18", "M19", "M20"})
-                      : (std::vector<std::string>{"V10", "M14", "M18", "M19", "M20"}))
+            SANITIZED ? (std::vector<std::string>{"M14", "M18", "M19", "M20", "M22"})
+                      : (std::vector<std::string>{"V10", "M14", "M18", "M19", "M20", "M22"}))
       << forces.out;
   for (const char *rule : {"M03", "M10", "M14", "M16", "M18", "M19"})
     EXPECT_NE(steps.out.find(std::string(rule) + " pass"), std::string::npos) << steps.out;

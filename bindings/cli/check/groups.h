@@ -67,6 +67,8 @@ std::string dampers_take_energy(const Subject &);
 std::string numbering_does_not_matter(const Subject &);
 std::string collapsed_cells_stay_finite(const Subject &);
 std::string cell_energy_sums(const Subject &);
+// rules_single.cpp
+std::string single_is_close(const Subject &);
 // rules_stepper.cpp: how it goes on, and bodies that step themselves
 uint64_t digest_of_model(const Subject &);
 std::string state_is_the_hosts(const Subject &);

@@ -344,6 +344,7 @@ void tables_sound(const Subject &subject) {
                {DFM_EXT_IDLE, "dfm_idle", one, 0, true},
                {DFM_EXT_LIMITED, "dfm_limited", one, 0, true},
                {DFM_EXT_CAPS, "dfm_caps", one, 0, true},
+               {DFM_EXT_F32, "dfm_f32", one + sizeof(void *), 0, false},
                {DFM_EXT_FACTS, "dfm_facts", one, offsetof(dfm_fact, value) + sizeof(double), true},
                {DFM_EXT_EFFECT_ROWS, "dfm_effect_rows", offsetof(dfm_effect_rows, rows) + sizeof(void *),
                 offsetof(dfm_effect_row, off) + sizeof(double), false}};
@@ -369,6 +370,9 @@ void tables_sound(const Subject &subject) {
   if (!stepper && !model.add_forces)
     broken(
         "it has no add_forces and does not answer \"dfm.stepper/1\", so nothing moves it; set one of them");
+  const auto *single = static_cast<const dfm_f32 *>(body.extension(DFM_EXT_F32));
+  if (single && !(single->prepare && single->add_forces))
+    broken("dfm_f32 lacks prepare or add_forces, so no body has single precision; set both, or answer NULL");
   if (stepper && !(stepper->predict && stepper->respond && stepper->commit))
     broken(
         "dfm_stepper lacks predict, respond or commit, so the library refuses every body of it; set the "

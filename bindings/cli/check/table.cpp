@@ -77,6 +77,7 @@ const std::vector<Rule> &rules() {
       {"M19", "diagonal is that of respond, or above", true, none, diagonal_bounds_response, none},
       {"M20", "constant stiffness is constant", true, none, constant_stiffness_is_constant, none},
       {"M21", "dampers take energy, and are claimed", true, none, dampers_take_energy, none},
+      {"M22", "forces in single precision are those in double, nearly", true, none, single_is_close, none},
   };
   return table;
 }

@@ -49,6 +49,7 @@ typedef struct dfm_body_def {
   const uint32_t *tets;  /* [ntet,4] positive volume; copied */
   dfm_material material; /* 0: dfm_material_def_default() */
   const char *model;     /* short name or full id; NULL: "msm" */
+  /* the model's; beside them "precision", 0 double or 1 single, of its forces in explicit steps */
   dfm_params model_params;
   dfm_pose pose;
   double velocity[3], spin[3]; /* m/s of the center of mass; rad/s about it */

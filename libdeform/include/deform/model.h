@@ -12,8 +12,9 @@ extern "C" {
  * how much. Parameters that are not given follow from the body's materials and fields; those that were given
  * for the model before are not taken over, not even to the same type. A sleeping body wakes.
  * @param type    short name or full id of a loaded model
- * @param params  of the model; NULL: none. Beside them "max_jump", J: the change is refused where the elastic
- *                energy would rise or fall by more, and what changes put in may come to as much
+ * @param params  of the model; NULL: none. Beside them "precision" (dfm_body_def) and "max_jump", J: the
+ * change is refused where the elastic energy would rise or fall by more, and what changes put in may come to
+ * as much
  * @return DFM_OK; DFM_DISCARD the energy would jump by more than max_jump, changes would put in too much, or
  * the surface would jump by more than 1e-6 of the size; DFM_E_UNSUPPORTED no such model is loaded (lists
  * those that are), or it cannot move this body: it has no stiffness for an implicit step, it steps itself and

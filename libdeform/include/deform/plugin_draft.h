@@ -15,6 +15,23 @@ enum { DFM_CAP_TOPOLOGY = 8 /* extension "dfm.topology/1" */ };
 /* ---- self-stepping models: state that lives off the host ---------------------------------------------- */
 /* Type of dfm_stepper.fetch: copies what lives off the host. [step] */
 typedef dfm_status (*dfm_fetch_fn)(void *self, uint32_t what, double *dst);
+/* ---- models: forces in single precision ------------------------------------------------------------- */
+/* Extension "dfm.f32/1" of a model: the forces of add_forces once more, computed in single precision inside
+ * the model. Positions, velocities, forces and state stay binary64 here; bound, energy and stiffness have one
+ * precision. The library asks for it where a body's parameters hold "precision" 1. It stays a draft until a
+ * second model has it. */
+#define DFM_EXT_F32 "dfm.f32/1"
+typedef struct dfm_f32 {
+  uint32_t size, reserved;
+  /* [setup] once, before add_forces of this table; takes the memory for it. DFM_E_UNSUPPORTED, after the
+   * reason was logged: the instance's parameters or its mesh have no such forces. From then on set_params
+   * keeps both alike, and refuses what would take these forces away. */
+  dfm_status (*prepare)(void *self);
+  /* [step] f[npoint,stride] += N. Forces between points sum to zero up to the rounding of binary64; a force
+   * is that of dfm_model.add_forces up to a small number of units in the 24th bit of what the model adds up;
+   * the same bits for the same k. Writes k->state_out as dfm_model.add_forces does. */
+  dfm_status (*add_forces)(void *self, const dfm_kin *k, double *f);
+} dfm_f32;
 /* ---- models: springs switched off --------------------------------------------------------------------- */
 /* Extension "dfm.spring_mask/1" of a model: springs by edge of the mesh, switched off and on. Like a
  * parameter, the mask is the host's to keep: it is no state. Off gives a spring's energy away; on again may

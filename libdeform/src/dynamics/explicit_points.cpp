@@ -51,8 +51,7 @@ bool ExplicitPoints::bound(double time, const AddRowSums &outside, StepBound &ou
 bool ExplicitPoints::add_forces(const SubStep &now) {
   std::copy(p_.load.begin(), p_.load.end(), p_.f.begin());
   const dfm_kin k = kin(now.time, now.h, true);
-  return model_.call("add_forces", [&] { return model_.ops->add_forces(model_.self, &k, p_.f.data()); }) ==
-         DFM_OK;
+  return model_.add_forces(k, p_.f.data()) == DFM_OK;
 }
 
 bool ExplicitPoints::free_motion(const SubStep &now, double &kinetic) {

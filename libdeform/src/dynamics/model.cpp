@@ -14,6 +14,7 @@ namespace {
 // What every version of these tables has had.
 constexpr size_t kStepperHead = offsetof(dfm_stepper, commit) + sizeof(void *);
 constexpr size_t kOneFunction = 2 * sizeof(uint32_t) + sizeof(void *);
+constexpr size_t kF32Head = offsetof(dfm_f32, add_forces) + sizeof(void *);
 
 }  // namespace
 
@@ -61,9 +62,9 @@ void ModelInstance::create(const dfm_type &t, const dfm_host &h, const dfm_mesh 
 }
 
 std::optional<std::vector<dfm_slot>> ModelInstance::ask_extensions() {
-  const void *tables[6] = {};
-  const char *const ids[] = {"dfm.stepper/1", DFM_EXT_SLOTS,   DFM_EXT_EFFECTS,
-                             DFM_EXT_IDLE,    DFM_EXT_LIMITED, DFM_EXT_CAPS};
+  const void *tables[7] = {};
+  const char *const ids[] = {"dfm.stepper/1", DFM_EXT_SLOTS, DFM_EXT_EFFECTS, DFM_EXT_IDLE,
+                             DFM_EXT_LIMITED, DFM_EXT_CAPS,  DFM_EXT_F32};
   if (ops->extension)
     call("extension", [&] {
       for (size_t i = 0; i < std::size(ids); ++i) tables[i] = ops->extension(self, ids[i]);
@@ -77,9 +78,25 @@ std::optional<std::vector<dfm_slot>> ModelInstance::ask_extensions() {
   idle = copy_table<dfm_idle>(tables[3], kOneFunction, type->id, "dfm_idle");
   limited = copy_table<dfm_limited>(tables[4], kOneFunction, type->id, "dfm_limited");
   claims = copy_table<dfm_caps>(tables[5], kOneFunction, type->id, "dfm_caps");
+  f32 = copy_table<dfm_f32>(tables[6], kF32Head, type->id, "dfm_f32");
   if (ask_caps() != DFM_OK)
     fail(DFM_E_FATAL, "model '%s' failed when it was asked what it can; the log says why", type->id);
   return copy_slots(type->id, static_cast<const dfm_slots *>(tables[1]), false);
+}
+
+void ModelInstance::use_single() {
+  if (!f32 || !f32->prepare || !f32->add_forces)
+    fail(
+        DFM_E_UNSUPPORTED,
+        "model '%s' computes in double precision alone; leave precision out, or take a model that has single "
+        "precision, such as msm",
+        type->id);
+  const Overheard why;
+  const dfm_status s = call("prepare", [&] { return f32->prepare(self); });
+  if (s != DFM_OK)
+    fail(s < 0 ? s : DFM_E_FATAL, "model '%s' has no single precision for this body: %s", type->id,
+         *why.text() ? why.text() : dfm_status_name(s));
+  single = true;
 }
 
 dfm_status ModelInstance::ask_caps() noexcept {
@@ -125,6 +142,8 @@ void ModelInstance::swap(ModelInstance &other) noexcept {
   std::swap(idle, other.idle);
   std::swap(limited, other.limited);
   std::swap(claims, other.claims);
+  std::swap(f32, other.f32);
+  std::swap(single, other.single);
   std::swap(caps_, other.caps_);
   std::swap(self, other.self);
   params.swap(other.params);

@@ -8,6 +8,7 @@
 
 #include "core/memory.h"
 #include "deform/plugin.h"
+#include "deform/plugin_draft.h"
 #include "plugin/call.h"
 #include "plugin/selection.h"
 
@@ -23,6 +24,8 @@ struct ModelInstance {
   std::optional<dfm_idle> idle;        // none: every parameter does what its row says
   std::optional<dfm_limited> limited;  // none: the model limits nothing, or does not say
   std::optional<dfm_caps> claims;      // none: what the type claims holds with all parameters
+  std::optional<dfm_f32> f32;          // none: it computes in double precision alone
+  bool single = false;                 // add_forces() computes in single precision
   void *self = nullptr;
   std::vector<double> params;
   Array<double> state, state_out;  // slots end to end
@@ -50,6 +53,12 @@ struct ModelInstance {
   // dfm_model.caps says holds with some parameters of the type.
   uint32_t caps() const { return caps_; }
   bool can(uint32_t cap) const { return (caps_ & cap) == cap; }
+  // From now on add_forces() computes in single precision; throws Error where the model cannot.
+  void use_single();
+  dfm_status add_forces(const dfm_kin &k, double *f) const noexcept {
+    return call("add_forces",
+                [&] { return single ? f32->add_forces(self, &k, f) : ops->add_forces(self, &k, f); });
+  }
   // Other values, of RUNTIME rows alone; `params` is the caller's to set. Not DFM_OK: nothing has changed.
   // DFM_E_UNSUPPORTED: with them it could not do what is `needed` (DFM_CAP_*), or it takes none.
   dfm_status put_params(const std::vector<double> &values, uint32_t needed) noexcept;

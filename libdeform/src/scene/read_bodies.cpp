@@ -206,11 +206,19 @@ Start read_start(const Node &node) {
   return out;
 }
 
+// The library's own key beside the model's parameters.
+void read_precision(const Node &model, Params &params) {
+  if (!model.has("precision") || model.member("precision").word("precision") == "double") return;
+  params.keys.push_back("precision");
+  params.values.push_back({1});
+}
+
 ModelWords read_model(const Node &node, const Types &types) {
   ModelWords out;
   const dfm_type *const type = read_type(node.at("type"), DFM_KIND_MODEL, types);
   out.type = type->id;
   if (node.has("params")) out.params = read_params(node.member("params"), type);
+  read_precision(node, out.params);
   if (!node.has("integrator")) return out;
   out.integrator = integrator_of(node);
   if (out.integrator == DFM_INTEGRATOR_AUTO)
@@ -271,7 +279,8 @@ void read_rule(const Node &rule, const Types &types, SwitchRule &out) {
 void check_open(const Node &body, const Node &model) {
   const char *const sentence =
       "this goes with one model, which the planner would choose; name it in /model/type";
-  if (model.has("params")) model.member("params").fail("%s", sentence);
+  for (const char *key : {"params", "precision"})
+    if (model.has(key)) model.member(key).fail("%s", sentence);
   for (const char *key : {"fields", "anisotropy", "switch"})
     if (body.has(key)) body.member(key).fail("%s", sentence);
 }
@@ -297,6 +306,7 @@ Body read_body(const Node &node, ReadContext &context) {
   b.model = type->id;
   b.integrator = integrator_of(node);
   if (model.has("params")) b.params = read_params(model.member("params"), type);
+  read_precision(model, b.params);
   b.pose = read_pose(node, "pose", &b.scale);
   node.vector("velocity", b.velocity, 0, 0, 0);
   node.vector("spin", b.spin, 0, 0, 0);

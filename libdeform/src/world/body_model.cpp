@@ -21,6 +21,40 @@
 namespace dfm {
 namespace {
 
+// Beside the parameters of a model that has none of that name: 0 double, 1 single.
+constexpr char kPrecision[] = "precision";
+
+bool is_precision(const dfm_type &type, const char *key) {
+  if (!key || std::strcmp(key, kPrecision) != 0) return false;
+  return std::none_of(type.params, type.params + type.nparam,
+                      [](const dfm_param &row) { return std::strcmp(row.key, kPrecision) == 0; });
+}
+
+// Calls use(key, value, width) for each; keys end in a zero.
+template <class Use>
+void for_each_param(const std::string &keys, const ModelParams &params, const Use &use) {
+  const char *key = keys.c_str();
+  const double *value = params.values.data();
+  for (const uint32_t width : params.widths) {
+    use(key, value, width);
+    key += std::strlen(key) + 1;
+    value += width;
+  }
+}
+std::string ended(const ModelParams &params) {
+  std::string keys = params.keys;
+  std::replace(keys.begin(), keys.end(), '\n', '\0');
+  return keys;
+}
+
+bool asks_single(const dfm_type &type, const ModelParams &params) {
+  bool single = false;
+  for_each_param(ended(params), params, [&](const char *key, const double *value, uint32_t) {
+    if (is_precision(type, key)) single = *value == 1;
+  });
+  return single;
+}
+
 // None: its points move explicitly, or what moves them is to be chosen (out.open).
 std::optional<ImplicitOptions> implicit_of(const World &w, const std::string &name, int32_t asked,
                                            Integrator &out) {
@@ -79,16 +113,11 @@ std::vector<double> values_for(const World &w, const Body &b, const dfm_type &ty
   cells.of = b.makeup.of;
   out.unused = find_unused(type, cells);
   const std::vector<dfm_cell_field> given = fields_for(type, b, out.unused);
-  std::string keys = params.keys;
-  std::replace(keys.begin(), keys.end(), '\n', '\0');
+  const std::string keys = ended(params);
   std::vector<dfm_param_value> rows;
-  const char *key = keys.c_str();
-  const double *value = params.values.data();
-  for (const uint32_t width : params.widths) {
-    rows.push_back({key, value, width});
-    key += std::strlen(key) + 1;
-    value += width;
-  }
+  for_each_param(keys, params, [&](const char *key, const double *value, uint32_t width) {
+    if (!is_precision(type, key)) rows.push_back({key, value, width});
+  });
   dfm_body_def def = dfm_body_def_default();
   def.ntet = static_cast<uint32_t>(b.tets.size() / 4);
   def.model_params = {sizeof(dfm_params), static_cast<uint32_t>(rows.size()), rows.data()};
@@ -143,6 +172,7 @@ void make_instance(World &w, Body &b, const dfm_type &type, std::vector<double> 
   coupling.tell(mesh);
   if (!take_spare(b, type, values, out))
     out.instance.create(type, w.context->host, mesh, m, std::move(values));
+  if (asks_single(type, out.origin.params)) out.instance.use_single();
 }
 
 void drop_fields(const dfm_type &type, const Withheld &withheld, std::vector<CellField> &fields) {
@@ -194,7 +224,18 @@ void make_model(World &w, Body &b, const dfm_type &type, std::vector<double> val
 
 ModelParams keep_params(const dfm_type &type, const dfm_params &given) {
   const std::span<const dfm_param_value> rows(given.values, given.values ? given.n : 0);
-  pack_params(type, rows);
+  std::vector<dfm_param_value> own;
+  bool named = false;
+  for (const dfm_param_value &row : rows) {
+    if (!is_precision(type, row.key)) {
+      own.push_back(row);
+      continue;
+    }
+    if (named || !row.value || row.width != 1 || (*row.value != 0 && *row.value != 1))
+      fail(DFM_E_ARG, "%s: precision is 0 (double) or 1 (single), given once", type.id);
+    named = true;
+  }
+  pack_params(type, own);
   ModelParams out;
   for (const dfm_param_value &row : rows) {
     out.keys += row.key;

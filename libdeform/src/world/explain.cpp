@@ -50,6 +50,16 @@ std::string integrator(const Body &b) {
   return out + "}";
 }
 
+// Of the forces that move the body.
+std::string precision(const Body &b) {
+  const bool moves = b.dynamics->abilities().placed && b.integrator.used == DFM_INTEGRATOR_SYMPLECTIC_EULER;
+  const char *const why = !b.model.single ? "the default"
+                          : moves         ? "named; positions, contacts and the step's bound stay double"
+                                          : "single is named, and implicit steps take forces in double";
+  return std::string("\"precision\":{\"used\":") + quote(b.model.single && moves ? "single" : "double") +
+         ",\"why\":" + quote(why) + "}";
+}
+
 bool planned(const World &w, const std::string &effect) {
   const auto same = [&](const PlannedEffect &e) { return e.name == effect; };
   return std::any_of(w.plan.effects.begin(), w.plan.effects.end(), same);
@@ -164,7 +174,7 @@ std::string body(const Body &b) {
     out += (i ? "," : "") + ("{\"name\":" + quote(f.key) + ",\"from\":" + quote(f.from) +
                              format(",\"min\":%.9g,\"max\":%.9g}", *lo, *hi));
   }
-  out += "]," + effects(b) + "," + facts(b) + "," + integrator(b) + ",\"idle\":[";
+  out += "]," + effects(b) + "," + facts(b) + "," + integrator(b) + "," + precision(b) + ",\"idle\":[";
   bool first = true;
   for (const IdleParam &p : idle_params(b)) {
     out += (first ? "" : ",") + ("{\"name\":" + quote(p.key) + ",\"why\":" + quote(p.why) + "}");
