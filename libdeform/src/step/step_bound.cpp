@@ -35,13 +35,17 @@ bool ask_bound(const World &w, Body &b) {
   return b.dynamics->bound(w.time, springs, b.bound.found);
 }
 
-// Each body by itself.
+// Who sleeps keeps what it had.
+bool keeps(const Body &b) { return b.slumber.asleep && b.bound.known; }
+
+// Each body by itself; no worker is woken for a world that sleeps.
 void ask_bounds(World &w) {
+  if (std::ranges::all_of(w.bodies, [](const auto &b) { return keeps(*b); })) return;
   FirstFailure failed;
   w.context->tasks.parallel_for(static_cast<uint32_t>(w.bodies.size()), 1, [&](uint32_t begin, uint32_t end) {
     for (uint32_t i = begin; i < end; ++i) {
       Body &b = *w.bodies[i];
-      if (b.slumber.asleep && b.bound.known) continue;  // it stays what it was
+      if (keeps(b)) continue;
       const OnBehalf speaks(b.name);
       if (!ask_bound(w, b)) failed.note(i);
     }
