@@ -182,6 +182,20 @@ TEST(Cost, Report_HoldsToSchemaAndOrdersTheFront) {
   EXPECT_EQ(test::read_csv(s.out + "/cost.csv").size(), s.report.find("choices")->items.size() + 1);
 }
 
+TEST(Cost, Precision_IsAnAxisOfBodiesThatHaveSingle) {
+  const Study s = study("precision", bar(R"("duration": 0.02, "step": 0.001)"),
+                        {"--axes", "time,precision", "--budget", "300"});
+  ASSERT_EQ(s.result.exit_code, 0) << s.result.err;
+  size_t single = 0;
+  for (const JsonValue &c : s.report.find("choices")->items) {
+    if (c.get("precision") != "single") continue;
+    ++single;
+    EXPECT_EQ(c.get("state"), "done") << c.get("why");
+    EXPECT_EQ(c.get("label"), "single precision");
+  }
+  EXPECT_EQ(single, 1u);
+}
+
 TEST(Cost, Page_HoldsChartAndPicturesInOneFile) {
   const Study s =
       study("page", bar(R"("duration": 0.02, "step": 0.001)"), {"--axes", "time", "--budget", "300"}, true);

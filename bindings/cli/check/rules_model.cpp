@@ -1,4 +1,4 @@
-// M01 to M05, M09, M11, M16, M21, M22: what the forces of a model are at one state.
+// M01 to M05, M09, M11, M16, M20, M21: what the forces of a model are at one state.
 #include <algorithm>
 #include <cmath>
 #include <cstring>

@@ -46,7 +46,7 @@ class Finder {
     axis("law", {"contact"}, law_reason(), [&] { laws(); });
     axis("self", {"contact"}, contact_reason(), [&] { selves(); });
     axis("guard", {"contact"}, contact_reason(), [&] { guards(); });
-    axis("precision", {"precision"}, "this build computes in double precision alone", [] {});
+    axis("precision", {"precision"}, precision_reason(), [&] { precisions(); });
     fronts();
     return out_;
   }
@@ -94,6 +94,12 @@ class Finder {
     for (const SubjectBody &body : s_.bodies)
       if (body.model == "msm") return "";
     return "no body is of the model msm, which has this term";
+  }
+
+  std::string precision_reason() const {
+    for (const SubjectBody &body : s_.bodies)
+      if (body.model == "msm") return "";
+    return "no body is of the model msm, which alone has single precision";
   }
 
   std::string contact_reason() const { return s_.contact ? "" : "nothing can touch anything"; }
@@ -166,6 +172,12 @@ class Finder {
       k.cells = times;
       add(k, "mesh");
     }
+  }
+
+  void precisions() {
+    Knobs k;
+    k.precision = precision_of(s_) == "single" ? "double" : "single";
+    add(k, "precision");
   }
 
   void volumes() {

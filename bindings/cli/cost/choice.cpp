@@ -40,7 +40,12 @@ void set_model(const Subject &subject, const std::string &body, size_t i, const 
     volume.text = knobs.volume;
     set_pointer(value, "/params/volume", volume);
   }
-  if (model != own || !knobs.volume.empty()) out.emplace_back(body + "/model", json_text(value));
+  const bool precision = !knobs.precision.empty() && model == "msm";
+  if (precision) {
+    type.text = knobs.precision;
+    set_pointer(value, "/precision", type);
+  }
+  if (model != own || !knobs.volume.empty() || precision) out.emplace_back(body + "/model", json_text(value));
 }
 
 void set_cells(const Subject &subject, const std::string &body, size_t i, const std::string &surface,
@@ -89,11 +94,19 @@ Settings settings_of(const Subject &subject, const Surfaces &surfaces, const Kno
   return out;
 }
 
+std::string precision_of(const Subject &subject) {
+  for (size_t i = 0; i < subject.bodies.size(); ++i)
+    if (subject.word("/bodies/" + std::to_string(i) + "/model/precision", "double") == "single")
+      return "single";
+  return "double";
+}
+
 std::string label_of(const Knobs &knobs) {
   std::string out;
   const auto add = [&](const std::string &part) { out += (out.empty() ? "" : ", ") + part; };
   if (!knobs.model.empty()) add(knobs.model);
   if (!knobs.volume.empty()) add("volume " + knobs.volume);
+  if (!knobs.precision.empty()) add(knobs.precision + " precision");
   const std::string step = knobs.step == "\"auto\"" ? "auto step" : knobs.step + " s";
   if (!knobs.integrator.empty()) add(knobs.integrator + (knobs.step.empty() ? "" : " " + step));
   else if (!knobs.step.empty()) add(step);

@@ -10,7 +10,7 @@ namespace cli::cost {
 
 // What may be chosen. A word that is empty leaves the scene as it is; others are JSON text.
 struct Knobs {
-  std::string model, integrator, step, method, tolerance, law, self, guard, volume;
+  std::string model, integrator, step, method, tolerance, law, self, guard, volume, precision;
   double cells = 1;  // times the scene's
   bool operator==(const Knobs &) const = default;
 };
@@ -26,5 +26,6 @@ std::string label_of(const Knobs &knobs);
 // What the scene says, in words for a table; of several, all.
 std::string models_of(const Subject &subject);
 std::string laws_of(const Subject &subject);
+std::string precision_of(const Subject &subject);  // single where any body asks for it
 
 }  // namespace cli::cost

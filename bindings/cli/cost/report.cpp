@@ -36,7 +36,7 @@ std::string choice_json(const Subject &subject, const Study &study, size_t i) {
   JsonObject out;
   out.add("model", quoted(d.model)).add("integrator", quoted(d.integrator)).add("step", number(d.step));
   out.add("cells", number(o.cells)).add("method", quoted(d.method)).add("law", quoted(d.law));
-  out.add("precision", quoted("double")).add("error", error_json(row.error));
+  out.add("precision", quoted(d.precision)).add("error", error_json(row.error));
   out.add("cpu_s_per_s", row.cpu_per_s > 0 ? number(row.cpu_per_s) : "null");
   out.add("unstable", o.state == Outcome::unstable ? "true" : "false");
   out.add("label", quoted(row.job.label))
@@ -143,6 +143,7 @@ Described describe(const Subject &subject, const Row &row) {
   d.step = o.steps > 0 ? o.simulated / o.steps : 0;
   d.method = k.method.empty() ? subject.word("/contact/method", "auto") : k.method;
   d.law = k.law.empty() ? laws_of(subject) : k.law;
+  d.precision = k.precision.empty() ? precision_of(subject) : k.precision;
   return d;
 }
 
@@ -223,8 +224,9 @@ std::string csv_text(const Subject &subject, const Study &study) {
     std::string axes;
     for (const std::string &axis : row.candidate.axes) axes += (axes.empty() ? "" : "+") + axis;
     out += std::to_string(i) + ",\"" + row.job.label + "\"," + axes + "," + d.model + "," + d.integrator +
-           "," + cell(d.step) + "," + cell(row.job.outcome.cells) + "," + d.method + "," + d.law +
-           ",double," + cell(row.cpu_per_s) + "," + states[row.job.outcome.state] + "," + cell(row.headline);
+           "," + cell(d.step) + "," + cell(row.job.outcome.cells) + "," + d.method + "," + d.law + "," +
+           d.precision + "," + cell(row.cpu_per_s) + "," + states[row.job.outcome.state] + "," +
+           cell(row.headline);
     for (const std::string &name : study.quantities) {
       const auto found = row.error.find(name);
       out += "," + (found == row.error.end() ? "" : cell(found->second));

@@ -222,7 +222,7 @@ class Student {
     for (size_t i = 0; i < out_.rows.size(); ++i) {
       const Row &row = out_.rows[i];
       const Knobs &k = row.candidate.knobs;
-      const bool physics = same_physics(int(i)) && k.volume.empty();
+      const bool physics = same_physics(int(i)) && k.volume.empty() && k.precision != "single";
       const double rank = row.job.outcome.cpu + (k.model == out_.axes.reference_model ? 1e9 : 0);
       if (!done(int(i)) || !physics || rank <= most) continue;
       most = rank;
