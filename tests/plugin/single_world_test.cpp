@@ -208,6 +208,16 @@ TEST(Single, BlockOnASlope_DoesNotCreep) {
   for (int a = 0; a < 3; ++a) EXPECT_NEAR(begin[a], end[a], 2e-9);
 }
 
+TEST(Single, BlockOnASlope_FallsAsleep) {
+  Scene s(kSlope, {"/bodies/0/model/precision=single", "/contact/sleep=true"});
+  ASSERT_EQ(s.status, DFM_OK) << dfm_last_error();
+  for (int k = 0; k < 3000; ++k) test::ok(dfm_world_step(s.world, 1e-3, nullptr));
+  dfm_world_stats stats{};
+  stats.size = sizeof stats;
+  test::ok(dfm_world_get_stats(s.world, &stats));
+  EXPECT_EQ(stats.asleep, 1u);
+}
+
 TEST(Single, Scene_TakesTheWordAndNoOther) {
   Scene wrong(kSlope, {"/bodies/0/model/precision=half"});
   EXPECT_EQ(wrong.status, DFM_E_ARG);
