@@ -8,7 +8,7 @@ BUILD = @cmake --build --preset
 PYTHON ?= $(firstword $(wildcard /usr/bin/python3) python3)
 
 .PHONY: help demo test bench soak lint format tidy asan tsan fuzz install clean setup setup-bench setup-fuzz
-.PHONY: bench-peers deb setup-peers wheel
+.PHONY: bench-peers deb docs setup-docs setup-peers wheel
 
 help:
 	@echo "make demo             two soft cylinders with and without friction: table, picture, out/demo/"
@@ -24,6 +24,7 @@ help:
 	@echo "make install PREFIX=  library, headers, plugins, command (default $(PREFIX))"
 	@echo "make wheel            the Python package for any Python 3 on this system: build/dist/"
 	@echo "make deb              Debian packages of the same, build/release/packages/"
+	@echo "make docs             the pages, the API and search as a site: build/site/index.html"
 	@echo "make clean            removes build/ and out/"
 
 setup:
@@ -32,6 +33,8 @@ setup-bench:
 	$(SETUP) doors bench
 setup-peers:
 	$(SETUP) doors peers
+setup-docs:
+	$(SETUP) docs
 setup-fuzz:
 	$(SETUP) doors clang
 
@@ -96,6 +99,9 @@ deb: setup build/release/build.ninja
 	$(BUILD) release --target deform_command deform_python_native
 	@cpack --config build/release/CPackConfig.cmake -B build/release/packages
 	@rm -rf build/release/packages/_CPack_Packages && ls build/release/packages/*.deb
+
+docs: setup-docs
+	@$(PYTHON) -B cmake/docs/make_site.py
 
 clean:
 	rm -rf build out

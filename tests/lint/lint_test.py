@@ -68,8 +68,10 @@ GOOD = {
     "libdeform/doc/howto/cpp.md": "```c\nint nowhere;\n```\n",
     "libdeform/doc/README.md": "# Pages\n\n`dfm_hello`, `tree.cpp`, `core/error.h` "
                                "[engine](howto/engine.md#engine), [c++](howto/cpp.md), [top](#pages), "
-                               "[out](https://example.org/a.md)\n",
+                               "[gallery](reference/gallery.md), [out](https://example.org/a.md)\n",
     "libdeform/doc/decisions/0001-handles.md": "# Handles\n",
+    "libdeform/doc/reference/gallery.md": "![b](../images/b.png)\n\n`libdeform/doc/images/b.py`\n",
+    "libdeform/doc/images/b.png": "b\n", "libdeform/doc/images/b.py": "", "libdeform/doc/images/d.py": "",
     "libdeform/src/core/page.h": "#pragma once\n// doc/howto/cpp.md, howto/engine.md, decision 0001\n",
     "tests/unit/tree_test.cpp": '#include "broad/tree.h"\n',
     "tests/api/hello_test.cpp": '#include "deform/deform.h"\n#include "support.h"\n',
@@ -111,6 +113,10 @@ BAD = {
                   ("libdeform/src/core/error.h", "// doc/decisions/0002\n")],
     "names": [("README.md", "`dfm_gone()`\n"), ("README.md", "in `broad/gone.cpp`\n"),
               ("libdeform/doc/howto/cpp.md", "`DFM_GONE`\n")],
+    "pictures": [("libdeform/doc/images/c.png", "=c\n"),
+                 ("libdeform/doc/reference/gallery.md", "=![b](../images/b.png)\n\n`b.py`\n"),
+                 ("libdeform/doc/reference/gallery.md",
+                  "=![b](../images/b.png)\n\n`libdeform/doc/images/d.py`\n")],
     "reading_order": [("libdeform/doc/concepts/new.md", "=# New\n")],
     "layers": [("libdeform/src/core/error.h", '#include "math/vec3.h"\n'),
                ("libdeform/src/broad/tree.cpp", '#include "narrow/pair.h"\n'),

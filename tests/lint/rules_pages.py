@@ -63,6 +63,28 @@ def reading_order(tree):
             yield path, 1, f"is not in {order}; say there in a line what it answers"
 
 
+def pictures(tree):
+    """Every picture is in the gallery, followed by what makes it: a script or a scene of the repository."""
+    gallery = PAGES + "reference/gallery.md"
+    content = tree.text(gallery) if gallery in tree.paths else ""
+    parts = re.split(r"!\[[^\]]*\]\(\.\./images/([\w.]+)\)", content)
+    shown = dict(zip(parts[1::2], parts[2::2]))
+    for path in tree.paths:
+        if not path.startswith(PAGES + "images/") or not path.endswith(".png"):
+            continue
+        name = path.rpartition("/")[2]
+        makers = [m for m in re.findall(r"(?<![\w./])[\w./-]+\.(?:py|json)\b", shown.get(name, ""))
+                  if m in tree.paths]
+        if name not in shown:
+            yield path, 1, f"is not in {gallery}; show it there and say what makes it"
+        elif not makers:
+            yield gallery, 1, f"names nothing in the repository that makes {name}: a script or a scene"
+        for maker in makers:
+            stem = name[:-len(".png")]
+            if maker.startswith(PAGES) and not maker.endswith(f"/{stem}.py") and name not in tree.text(maker):
+                yield gallery, 1, f"{maker} does not make {name}"
+
+
 def names(tree):
     """A source file or public name that a page writes as code is there, so that pages follow when files
     move."""
@@ -99,4 +121,4 @@ def walks(tree):
 
 
 RULES = {"walks": walks, "names": names, "links": links, "citations": citations,
-         "reading_order": reading_order}
+         "reading_order": reading_order, "pictures": pictures}

@@ -1,0 +1,109 @@
+#!/usr/bin/env python3
+"""What `make docs` gives its generator, which is not needed here: docs_test.py SOURCE"""
+import pathlib
+import posixpath
+import re
+import sys
+import unittest
+
+ROOT = pathlib.Path(sys.argv.pop() if len(sys.argv) > 1 else pathlib.Path(__file__).resolve().parents[2])
+sys.path.insert(0, str(ROOT / "cmake/docs"))
+import headers  # noqa: E402
+import stage  # noqa: E402
+
+HEADER = """/* deform/a.h -- things. More. */
+#ifndef DEFORM_A_H
+#define DEFORM_A_H
+/* ---- of one kind ---------------- */
+/** Says a_b * c. @param n,m how many
+ * of them
+ * @return dfm_kind; DFM_A_ONE.
+ * Threads: Any thread. */
+DFM_API int dfm_say(int n, void (*f)(int k), int m);
+
+/* A remark. */
+
+enum { DFM_A_ONE = 1, DFM_A_TWO = 2 }; /* behind */
+typedef struct dfm_kind {
+  int a; /* "; }" */
+} dfm_kind;
+static inline int dfm_sum(int a) {
+  if (a) { return 1; }
+  return 0;
+}
+#define DFM_LIMIT 3u /* most */
+#define DFM_HIDDEN_ 4
+#endif
+"""
+
+
+class Headers(unittest.TestCase):
+    def test_each_declaration_has_its_comment_and_code(self):
+        intro, entries = headers.parse(HEADER)
+        self.assertEqual(intro, "deform/a.h -- things. More.")
+        self.assertEqual([e.name for e in entries],
+                         [None, "dfm_say", None, "DFM_A_*", "dfm_kind", "dfm_sum", "DFM_LIMIT"])
+        self.assertEqual(entries[1].code, "DFM_API int dfm_say(int n, void (*f)(int k), int m);")
+        self.assertEqual(entries[3].code, "enum { DFM_A_ONE = 1, DFM_A_TWO = 2 };  /* behind */")
+        self.assertIn('/* "; }" */', entries[4].code)
+        self.assertEqual(entries[5].code, "static inline int dfm_sum(int a);")
+
+    def test_comment_becomes_markdown(self):
+        page = headers.Reference({"a.h": HEADER}).pages()["api/a_h.md"]
+        for part in ("**Of one kind**", r"Says a\_b \* c.", "\n- `n,m`: how many of them\n",
+                     "**Returns**: [`dfm_kind`](a_h.md#dfm_kind); [`DFM_A_ONE`](a_h.md#dfm_a_).",
+                     "**Threads**: Any thread."):
+            self.assertIn(part, page)
+
+
+class Pages(unittest.TestCase):
+    def test_list_has_an_empty_line_before_it_and_four_columns_inside(self):
+        self.assertEqual(stage.dialect("Text:\n- a\n  b\n  1. c\n\n     d\n\nEnd\n"),
+                         "Text:\n\n- a\n    b\n    1. c\n\n        d\n\nEnd\n")
+
+    def test_code_stays_as_it_is(self):
+        text = "Text:\n\n```\nx:\n- https://a.b\n```\n\n    - c\n"
+        self.assertEqual(stage.dialect(text), text)
+
+    def test_bare_address_becomes_a_link(self):
+        self.assertEqual(stage.dialect("See https://a.b/c."), "See <https://a.b/c>.")
+
+
+class Site(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.stage = stage.Stage(ROOT)
+
+    def test_every_public_function_is_described(self):
+        for path in [p for folder in stage.HEADERS for p in (ROOT / folder).glob("*.h")]:
+            text = headers.TOKEN.sub(" ", path.read_text())
+            for name in re.findall(r"DFM_API[^;{]*?\b(dfm_\w+)\s*\(", text):
+                self.assertIn(name, self.stage.reference.places)
+
+    def test_every_page_is_there(self):
+        pages = {p.relative_to(ROOT).as_posix() for p in (ROOT / "libdeform/doc").rglob("*.md")}
+        self.assertEqual(pages - set(self.stage.files), set())
+
+    def test_every_link_leads_to_a_file(self):
+        for path, text in self.stage.files.items():
+            if isinstance(text, bytes):
+                continue
+            targets = []
+            stage.prose(text, lambda part: targets.extend(m[2] for m in stage.LINK.finditer(part)) or part)
+            for target in targets:
+                target = target.partition("#")[0]
+                if target and not re.match(r"[a-z]+:", target):
+                    there = posixpath.normpath(posixpath.join(posixpath.dirname(path), target))
+                    self.assertIn(there, self.stage.files, f"{path}: {target}")
+
+    def test_contents_follow_the_reading_order(self):
+        sections = [next(iter(entry)) for entry in self.stage.nav]
+        self.assertEqual(sections[:3], ["Reading order", "What it is", "Ten minutes"])
+        for entry in self.stage.nav:
+            pages = next(iter(entry.values()))
+            for page in [pages] if isinstance(pages, str) else [next(iter(p.values())) for p in pages]:
+                self.assertIn(page, self.stage.files)
+
+
+if __name__ == "__main__":
+    unittest.main()
