@@ -151,7 +151,10 @@ void Body::make_columns(size_t many, const size_t *wanted) {
     double *const out[] = {w_.data()};
     modes_.shape.expand(1, in, out);
     double *const column = columns_.data() + size() * wanted[l];
-    for (size_t j = 0; j < size(); ++j) column[j] = f[kLanes * j + l] - w_[j];
+    for (size_t j = 0; j < size(); ++j) w_[j] = f[kLanes * j + l] - w_[j];
+    if (can_be_late()) column_gradient_[wanted[l]] = elastic_.largest_gradient(w_.data(), nullptr);
+    for (size_t i = 0; i < elastic_.npoint; ++i)
+      for (size_t a = 0; a < 3; ++a) column[3 * size_t(place_[i]) + a] = w_[3 * i + a];
   }
 }
 
@@ -171,7 +174,8 @@ void Body::add_response_at_rest(uint32_t n, const uint32_t *surfel, uint32_t nrh
       for (size_t to = 0; !gathered && to < n; ++to)
         for (size_t a = 0; a < 3; ++a)
           for (size_t b = 0; b < 3; ++b)
-            blocks[(3 * a + b) * padded + to] = column[b * size() + 3 * size_t(col_[row_[surfel[to]]]) + a];
+            blocks[(3 * a + b) * padded + to] =
+                column[b * size() + 3 * size_t(place_[col_[row_[surfel[to]]]]) + a];
       gathered = true;
       double local[3];
       transposed_product(at_.r, impulse, local);
@@ -197,7 +201,7 @@ void Body::add_coupled_response_at_rest(uint32_t n, const uint32_t *surfel, uint
         double u[3] = {};
         for (uint32_t e = row_[surfel[to]]; e < row_[surfel[to] + 1]; ++e)
           for (size_t a = 0; a < 3; ++a) {
-            const double *const at = column + 3 * size_t(col_[e]) + a;
+            const double *const at = column + 3 * size_t(place_[col_[e]]) + a;
             u[a] += weight_[e] * ((at[0] * local[0] + at[size()] * local[1]) + at[2 * size()] * local[2]);
           }
         product(at_.r, u, world);
@@ -218,7 +222,8 @@ void Body::add_displacement_at_rest(const double *p, double *out) {
     for (size_t a = 0; a < 3; ++a) {
       const double *const column = columns_.data() + size() * (3 * size_t(s) + a);
       const double times = scale * local[a];
-      for (size_t j = 0; j < size(); ++j) out[j] += times * column[j];
+      for (size_t i = 0; i < elastic_.npoint; ++i)
+        for (size_t b = 0; b < 3; ++b) out[3 * i + b] += times * column[3 * size_t(place_[i]) + b];
     }
   }
 }

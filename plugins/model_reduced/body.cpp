@@ -17,6 +17,7 @@ void Body::create(const dfm_host *h, const dfm_mesh &m) {
   elastic_.create(h, id_, m);
   modes_.create(h, id_, m, elastic_, m.params);
   take_surface(m);
+  take_near();
   take_integrals();
   reserve();
   if (condensed_) find_weight_at_rest();

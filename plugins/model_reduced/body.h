@@ -17,6 +17,10 @@ namespace reduced {
 
 // Displacement gradient in the frame up to which small displacements are taken for the true ones.
 constexpr double kLargestGradient = 0.1;
+constexpr double kForgotten = 1;       // s in the range of small displacements
+constexpr double kAnotherLook = 1.25;  // times the bound of the last one
+// Who tells where the body is: the points; they do, to a host that can see them later; the state.
+enum class Lead { points, points_for_now, state };
 constexpr const char *kModalId = "org.deform.modal", *kCondensedId = "org.deform.condensed";
 
 struct Frame {
@@ -44,6 +48,12 @@ class Body {
                double *du);
   void diagonal(const dfm_kin &k, uint32_t n, const uint32_t *surfel, double *w);
   void commit(const dfm_kin &k, const double *p_s, double *x, double *v);
+  // Held bodies alone: dfm_late_points, and state of this instance.
+  bool can_be_late() const { return !elastic_.floating; }
+  void commit_near(const dfm_kin &k, const double *p_s, double *x, double *v);
+  void points(const dfm_kin &k, double *x, double *v);
+  static void look(double *state);
+  const dfm_slots *slots() const { return can_be_late() ? &slots_ : nullptr; }
   double energy(const dfm_kin &k);
   void cell_energy(const dfm_kin &k, double *density);
   void cell_stress(const dfm_kin &k, double *stress);
@@ -71,6 +81,34 @@ class Body {
   Buffer<double> eight_;    // [3 npoint,8]
   Buffer<double> between_;  // [9,n] blocks of C_rest from one surfel to n; [3,n] what it answers
   Buffer<double> weight_at_rest_;  // [3, 3 npoint] of it to unit accelerations; held
+
+  // Late points. State: touched in the last step, Lead, q, q'; of a condensed body what follows at rest: of
+  // accelerations [3] m/s2, its displacements at the near points [nnear,3] m, of impulses [nsurfel,3] N.
+  Buffer<dfm_slot> slot_;
+  dfm_slots slots_{};
+  size_t nstate_ = 0;
+  static constexpr size_t kTouched = 0, kLead = 1, kCoordinates = 2;
+  size_t at_pull() const { return kCoordinates + 2 * size_t(modes_.count); }
+  size_t at_near() const { return at_pull() + 3; }
+  size_t at_impulse() const { return at_near() + 3 * size_t(nnear_); }
+  uint32_t nnear_ = 0;              // points that a surfel hangs on, or that are held
+  Buffer<uint32_t> place_, point_;  // [npoint] of points in columns_, the near ones first; and back
+  Basis near_shape_;                // of the near points
+  Buffer<double> near_x_, near_v_;  // [padded 3 nnear] m, m/s at the end without contact, in the frame
+  Buffer<double> near_change_;      // what impulses change
+  Buffer<double> near_rest_;        // of it, what the modes leave out
+  Buffer<double> near_given_;       // condensed: what impulses add to that
+  Buffer<double> end_x_, end_v_;    // [3 nnear] m, m/s in the world, at the end without contact
+  Buffer<double> now_x_, now_v_;    // [npoint,now_stride_], of a step that needs all points
+  uint32_t now_stride_ = 0;
+  Buffer<double> column_gradient_;  // [3 nsurfel] the largest displacement gradient of a cell, per unit
+  double weight_gradient_[3] = {};  // the same of weight_at_rest_
+  Buffer<double> holders_;          // [holders,3] m, where they were as nothing was led
+  Frame holders_frame_;
+  bool holders_known_ = false;
+  bool near_only_ = false;      // this step
+  bool rest_is_known_ = false;  // the state holds what the modes leave out
+  double looked_ = 0;           // bound of the displacement gradient as it was looked at last
 
   // Of the step at hand, from predict on. Points are in the frame of its start where not said otherwise,
   // [padded 3 npoint]; modes [modes].
@@ -132,6 +170,7 @@ class Body {
   void find_spin();
   void keep_rest();
   void advance_frame();
+  void advance_coordinates();
   void advance_modes();
   void place_floating();
   void place_held(const dfm_kin &k);
@@ -146,12 +185,24 @@ class Body {
   void add_coupled_response_at_rest(uint32_t n, const uint32_t *surfel, uint32_t nrhs, const double *p,
                                     double *du) const;
   void add_displacement_at_rest(const double *p, double *out);
+  bool commit_all(const dfm_kin &k, const double *p_s, double *x, double *v);
   void find_weight_at_rest();
   void rest_under(const double *f, const double *load, double *out);
   const double *rest_of_forces();
   void match_moment(const double *wanted, const double *c, const double *velocity, const double *x, double *v,
                     size_t stride) const;
   void look_at_gradient(double time, const double *x, size_t stride);
+  void tell_gradient(double time, double most, uint32_t cell);
+  void take_near();
+  bool stays_near(const dfm_kin &k, const double *f);
+  void all_points(const dfm_kin &k, dfm_kin &all);
+  dfm_status predict_near(const dfm_kin &k, double *u_s);
+  dfm_status predict_all(const dfm_kin &k, const double *f, double *u_s);
+  void displacement_of(const double *state, double *u, double *w);
+  void add_rest_of(const double *state, double *u);
+  bool holds_rest(const double *state);
+  void end_state(const dfm_kin &k, const double *p_s, bool touched, Lead lead);
+  void watch_near(const dfm_kin &k, const double *state);
   void whole_displacement(const dfm_kin &k, Frame &f);
 };
 

@@ -61,6 +61,18 @@ struct Entry {
   static dfm_status commit(void *self, const dfm_kin *k, const double *p, double *x, double *v) {
     return Ops::with_state(self, k, [&](B &body) { body.commit(*k, p, x, v); });
   }
+  static dfm_status commit_near(void *self, const dfm_kin *k, const double *p, double *x, double *v) {
+    return Ops::with_state(self, k, [&](B &body) { body.commit_near(*k, p, x, v); });
+  }
+  static dfm_status points(void *self, const dfm_kin *k, double *x, double *v) {
+    return Ops::with_state(self, k, [&](B &body) { body.points(*k, x, v); });
+  }
+  static dfm_status look(const void *, double *state) {
+    B::look(state);
+    return DFM_OK;
+  }
+  static constexpr dfm_late_points kLate = {sizeof(dfm_late_points), 0, commit_near, points, look};
+
   static constexpr dfm_stepper kStepper = {
       sizeof(dfm_stepper), 0, predict, respond, diagonal, commit, nullptr, respond_many};
 
@@ -73,8 +85,11 @@ struct Entry {
   static constexpr dfm_effect_rows kEffectRows = model::rows_of(kOff);
   static constexpr dfm_facts kFacts = {sizeof(dfm_facts), sizeof(dfm_fact), facts};
 
-  static const void *extension(const void *, const char *id) {
+  static const void *extension(const void *self, const char *id) {
+    const B &body = *static_cast<const B *>(self);
     if (!strcmp(id, "dfm.stepper/1")) return &kStepper;
+    if (!strcmp(id, DFM_EXT_LATE_POINTS)) return body.can_be_late() ? &kLate : nullptr;
+    if (!strcmp(id, DFM_EXT_SLOTS)) return body.slots();
     if (!strcmp(id, DFM_EXT_CELL_ENERGY)) return &Ops::kCellEnergy;
     if (!strcmp(id, DFM_EXT_CELL_STRESS)) return &Ops::kCellStress;
     if (!strcmp(id, DFM_EXT_EFFECTS)) return &Ops::kActiveEffects;
@@ -84,7 +99,8 @@ struct Entry {
     return nullptr;
   }
 
-  // Was the body touched in the last step? Everything else follows from the points.
+  // Was the body touched in the last step? Everything else follows from the points, but where they may be
+  // late: Body::slots.
   static constexpr dfm_slot kSlots[] = {{DFM_PER_INSTANCE, 1, DFM_SLOT_SCALAR, 0}};
 
   static constexpr dfm_model kModel = {sizeof(dfm_model),

@@ -12,7 +12,6 @@ namespace {
 
 constexpr double kPi = 0x1.921fb54442d18p+1;
 constexpr int kMidpointPasses = 8;
-constexpr double kForgotten = 1;  // s in the range of small displacements
 
 }  // namespace
 
@@ -60,12 +59,24 @@ dfm_status Body::predict(const dfm_kin &k, const double *f, double *u_s) {
   }
   checked_ = true;
   h_ = k.dt;
-  soft_ = k.state[0] != 0;
+  soft_ = k.state[kTouched] != 0;
   set_steps();
+  const Lead lead = elastic_.floating ? Lead::points : Lead(int(k.state[kLead]));
+  near_only_ = lead == Lead::state && stays_near(k, f);
+  if (near_only_) return predict_near(k, u_s);
+  if (lead != Lead::state) return predict_all(k, f, u_s);
+  dfm_kin all;
+  all_points(k, all);
+  return predict_all(all, f, u_s);
+}
+
+dfm_status Body::predict_all(const dfm_kin &k, const double *f, double *u_s) {
   if (elastic_.floating) where_floating(k, f);
   else where_held(k);
   project(k, f);
   keep_rest();
+  rest_is_known_ = !elastic_.floating && k.state[kLead] != double(Lead::points) && even_ && !moving_ &&
+                   !led_ && holds_rest(k.state);
   if (elastic_.floating) {
     find_spin();
     advance_frame();
@@ -129,9 +140,7 @@ void Body::advance_frame() {
 // step, as the loads are, it would be a spring that answers late, and the map of (q, q') would have the
 // determinant 1 + k (1 - cos(w h)) / w^2: energy without bound. As a kick before the free motion it has
 // determinant 1, whatever the force is as long as it follows from q. In a damped step both are the same.
-// What the modes do not hold of the displacements goes to where the forces have it at rest; of a modal
-// body, to zero.
-void Body::advance_modes() {
+void Body::advance_coordinates() {
   double square = 0;
   for (const double a : spin_) square += a * a;
   for (uint32_t k = 0; k < modes_.count; ++k) {
@@ -147,6 +156,12 @@ void Body::advance_modes() {
     q_to_[k] = (t.qq * q_[k] + t.qv * (qd_[k] + kick)) + t.qf * f;
     qd_to_[k] = (t.vq * q_[k] + t.vv * (qd_[k] + kick)) + t.vf * f;
   }
+}
+
+// What the modes do not hold of the displacements goes to where the forces have it at rest; of a modal
+// body, to zero.
+void Body::advance_modes() {
+  advance_coordinates();
   const double *const in[] = {q_to_.data(), qd_to_.data()};
   double *const out[] = {u_to_.data(), w_to_.data()};
   modes_.shape.expand(2, in, out);
@@ -223,6 +238,19 @@ void Body::place_held(const dfm_kin &k) {
 }
 
 void Body::commit(const dfm_kin &k, const double *p_s, double *x, double *v) {
+  if (near_only_) {
+    commit_near(k, p_s, x, v);
+    dfm_kin end = k;
+    end.x = x;
+    end.state = k.state_out;
+    points(end, x, v);
+    if (k.state_out) look(k.state_out);
+    return;
+  }
+  end_state(k, p_s, commit_all(k, p_s, x, v), Lead::points);
+}
+
+bool Body::commit_all(const dfm_kin &k, const double *p_s, double *x, double *v) {
   const bool touched = std::any_of(p_s, p_s + 3 * size_t(nsurfel_), [](double p) { return p != 0; });
   double sum[3] = {}, moment[3] = {}, turn[3] = {};
   if (touched) {
@@ -264,8 +292,8 @@ void Body::commit(const dfm_kin &k, const double *p_s, double *x, double *v) {
     }
     match_moment(wanted, c, velocity, x, v, k.stride);
   }
-  if (k.state_out) k.state_out[0] = touched;
   look_at_gradient(k.t, x, k.stride);
+  return touched;
 }
 
 // The displacement gradient is at most the sum of the modes' own: a look at the cells only where that is
@@ -283,6 +311,10 @@ void Body::look_at_gradient(double time, const double *x, size_t stride) {
   whole_displacement(k, f);
   uint32_t cell = 0;
   const double most = elastic_.largest_gradient(u_.data(), &cell);
+  tell_gradient(time, most, cell);
+}
+
+void Body::tell_gradient(double time, double most, uint32_t cell) {
   if (!(most > kLargestGradient)) return;
   outside_ = time;
   if (!(most > 2 * told_)) return;

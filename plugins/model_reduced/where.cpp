@@ -282,6 +282,7 @@ void Body::find_weight_at_rest() {
     for (size_t i = 0; i < elastic_.npoint; ++i) f_[3 * i + a] = elastic_.mass[i];
     for (size_t k = 0; k < modes_.count; ++k) load_[k] = pull_[3 * k + a];
     rest_under(f_.data(), load_.data(), weight_at_rest_.data() + a * size());
+    weight_gradient_[a] = elastic_.largest_gradient(weight_at_rest_.data() + a * size(), nullptr);
   }
 }
 

@@ -39,23 +39,42 @@ struct Field {
 };
 
 struct Times { double median, p99, p999, mean; };
-Times steps(dfm_world w, int n, double h) {
+
+Times shares_of(std::vector<double> t) {
+  double sum = 0;
+  for (double x : t) sum += x;
+  std::sort(t.begin(), t.end());
+  return {t[t.size() / 2], t[t.size() * 99 / 100], t[t.size() * 999 / 1000], sum / double(t.size())};
+}
+
+// What a busy machine does not change: sub-steps, outer iterations and sweeps of a step.
+struct Counts { std::vector<double> substeps, passes, sweeps; };
+
+Times steps(dfm_world w, int n, double h, Counts *counts = nullptr) {
   std::vector<double> t;
   t.reserve(size_t(n));
   for (int i = 0; i < n; ++i) {
     const double at = cpu_seconds();
     test::ok(dfm_world_step(w, h, nullptr));
     t.push_back(cpu_seconds() - at);
+    if (!counts) continue;
+    const dfm_world_stats s = test::stats(w);
+    counts->substeps.push_back(s.last_substeps);
+    counts->passes.push_back(s.passes);
+    counts->sweeps.push_back(s.sweeps);
   }
-  double sum = 0;
-  for (double x : t) sum += x;
-  std::sort(t.begin(), t.end());
-  return {t[t.size() / 2], t[t.size() * 99 / 100], t[t.size() * 999 / 1000], sum / n};
+  return shares_of(t);
 }
 
 void row(const char *name, const Times &t) {
   std::printf("%-44s median %9.2f us   mean %9.2f   99 %% %9.2f   99.9 %% %9.2f (%.2f of the median)\n", name,
               1e6 * t.median, 1e6 * t.mean, 1e6 * t.p99, 1e6 * t.p999, t.p999 / t.median);
+}
+
+void count_row(const char *name, const std::vector<double> &counts) {
+  const Times t = shares_of(counts);
+  std::printf("    %-18s median %4.0f   mean %7.2f   99 %% %4.0f   99.9 %% %4.0f   most %4.0f\n", name,
+              t.median, t.mean, t.p99, t.p999, *std::max_element(counts.begin(), counts.end()));
 }
 
 }  // namespace
@@ -93,7 +112,11 @@ int main() {
     o.position = {0.013, 0.007, 0.1003};
     test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 1000, o);
     steps(w, 2000, 1e-3);
-    row("resting stack of two, awake, 1 kHz", steps(w, 4000, 1e-3));
+    Counts counts;
+    row("resting stack of two, awake, 1 kHz", steps(w, 4000, 1e-3, &counts));
+    count_row("sub-steps", counts.substeps);
+    count_row("outer iterations", counts.passes);
+    count_row("sweeps", counts.sweeps);
   }
   return 0;
 }

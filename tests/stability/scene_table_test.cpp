@@ -19,20 +19,35 @@ struct Row {
 };
 void PrintTo(const Row &row, std::ostream *out) { *out << row.scene; }
 constexpr Row kRows[] = {
-    {"ball_incline", 3, 0.3, false},        {"basin", 8, 0.8, false},
-    {"changing_models", 12, 0.2, false},    {"fill_drop", 30, 0.4, false},
-    {"fill_drop_organs", 20, 0.2, true},    {"gravity_anisotropy", 0, 0, false},
-    {"gravity_beams", 0, 0, false},         {"guard_shot", 20, 0.02, false},
-    {"pinched_tube", 8, 0.45, false},       {"ode_bed", 30, 0.4, false, true},
-    {"ode_cart", 60, 0.3, false, true},     {"ode_chain", 30, 0.2, false, true},
-    {"ode_gripper", 20, 0.5, false, true},  {"ode_seesaw", 40, 0.6, false, true},
-    {"pressed_ring", 20, 0.2, false},       {"rabbits_slope", 5, 0.6, false},
-    {"reduced_models", 30, 0.2, false},     {"rigid_on_ball", 10, 0.4, false},
-    {"rigid_on_bed", 5, 0.3, false},        {"rigid_pinch", 20, 0.6, false},
-    {"rollback_compare", 15, 0.2, false},   {"slope_block", 10, 0.2, false},
-    {"ten_bodies", 60, 0.9, false},         {"terrain", 12, 0.6, false},
-    {"two_cylinders", 12, 0.5, false},      {"two_cylinders_coarse", 20, 0.4, false},
-    {"two_cylinders_fine", 40, 0.3, false}, {"two_materials", 0, 0, false},
+    {"ball_incline", 3, 0.3, false},
+    {"basin", 8, 0.8, false},
+    {"changing_models", 12, 0.2, false},
+    {"fill_drop", 30, 0.4, false},
+    {"fill_drop_organs", 20, 0.2, true},
+    {"gravity_anisotropy", 0, 0, false},
+    {"gravity_beams", 0, 0, false},
+    {"guard_shot", 20, 0.02, false},
+    {"pinched_tube", 8, 0.45, false},
+    {"ode_bed", 30, 0.4, false, true},
+    {"ode_cart", 60, 0.3, false, true},
+    {"ode_chain", 30, 0.2, false, true},
+    {"ode_gripper", 20, 0.5, false, true},
+    {"ode_seesaw", 40, 0.6, false, true},
+    {"pressed_ring", 20, 0.2, false},
+    {"rabbits_slope", 5, 0.6, false},
+    {"probe_block", 2, 0.2, false},
+    {"reduced_models", 30, 0.2, false},
+    {"rigid_on_ball", 10, 0.4, false},
+    {"rigid_on_bed", 5, 0.3, false},
+    {"rigid_pinch", 20, 0.6, false},
+    {"rollback_compare", 15, 0.2, false},
+    {"slope_block", 10, 0.2, false},
+    {"ten_bodies", 60, 0.9, false},
+    {"terrain", 12, 0.6, false},
+    {"two_cylinders", 12, 0.5, false},
+    {"two_cylinders_coarse", 20, 0.4, false},
+    {"two_cylinders_fine", 40, 0.3, false},
+    {"two_materials", 0, 0, false},
     {"viscoelastic_bars", 0, 0, false},
 };
 
@@ -116,6 +131,21 @@ INSTANTIATE_TEST_SUITE_P(Shipped, ContactScene, testing::ValuesIn(contact_rows()
 TEST(GuardShot, JitteredRuns_DoNotCross) {
   test::expect_jittered("guard_shot", 1, 10, {}, row_of("guard_shot").least_contacts,
                         [](const test::SceneRun &run) { return run.number("guard_steps") > 0; });
+}
+// A probe that slides with friction drags the block along, on the mean over its swings.
+TEST(ProbeBlock, JitteredRuns_AreDraggedByTheProbe) {
+  const auto dragged = [](const test::SceneRun &run) {
+    double sum = 0, n = 0;
+    const std::vector<test::BodyRow> rows = run.rows("block");
+    for (const test::BodyRow &row : rows)
+      if (row.t > 0.3) {
+        sum += row.com[0];
+        ++n;
+      }
+    return sum / n - rows[0].com[0] > 3e-4;
+  };
+  test::expect_jittered("probe_block", 1, 10, {}, row_of("probe_block").least_contacts, dragged);
+  EXPECT_FALSE(dragged(test::SceneRun("probe_block", {"--set", test::kFrictionless})));
 }
 TEST(RabbitsSlope, JitteredRuns_DoNotCross) {
   test::expect_jittered("rabbits_slope", 1, 10, {}, row_of("rabbits_slope").least_contacts,

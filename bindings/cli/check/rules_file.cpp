@@ -337,17 +337,18 @@ void tables_sound(const Subject &subject) {
     size_t head;
     uint32_t row;  // least size of its rows, which stands where others have reserved
     bool one;      // function, and nothing else
-  } known[] = {{"dfm.stepper/1", "dfm_stepper", offsetof(dfm_stepper, commit) + sizeof(void *), 0, false},
-               {DFM_EXT_CELL_ENERGY, "dfm_cell_energy", one, 0, true},
-               {DFM_EXT_CELL_STRESS, "dfm_cell_stress", one, 0, true},
-               {DFM_EXT_EFFECTS, "dfm_effects", one, 0, true},
-               {DFM_EXT_IDLE, "dfm_idle", one, 0, true},
-               {DFM_EXT_LIMITED, "dfm_limited", one, 0, true},
-               {DFM_EXT_CAPS, "dfm_caps", one, 0, true},
-               {DFM_EXT_F32, "dfm_f32", one + sizeof(void *), 0, false},
-               {DFM_EXT_FACTS, "dfm_facts", one, offsetof(dfm_fact, value) + sizeof(double), true},
-               {DFM_EXT_EFFECT_ROWS, "dfm_effect_rows", offsetof(dfm_effect_rows, rows) + sizeof(void *),
-                offsetof(dfm_effect_row, off) + sizeof(double), false}};
+  } known[] = {
+      {"dfm.stepper/1", "dfm_stepper", offsetof(dfm_stepper, commit) + sizeof(void *), 0, false},
+      {DFM_EXT_LATE_POINTS, "dfm_late_points", offsetof(dfm_late_points, look) + sizeof(void *), 0, false},
+      {DFM_EXT_CELL_ENERGY, "dfm_cell_energy", one, 0, true},
+      {DFM_EXT_CELL_STRESS, "dfm_cell_stress", one, 0, true},
+      {DFM_EXT_EFFECTS, "dfm_effects", one, 0, true},
+      {DFM_EXT_IDLE, "dfm_idle", one, 0, true},
+      {DFM_EXT_LIMITED, "dfm_limited", one, 0, true},
+      {DFM_EXT_CAPS, "dfm_caps", one, 0, true},
+      {DFM_EXT_FACTS, "dfm_facts", one, offsetof(dfm_fact, value) + sizeof(double), true},
+      {DFM_EXT_EFFECT_ROWS, "dfm_effect_rows", offsetof(dfm_effect_rows, rows) + sizeof(void *),
+       offsetof(dfm_effect_row, off) + sizeof(double), false}};
   for (const auto &k : known) {
     const void *table = body.extension(k.id);
     if (!table) continue;

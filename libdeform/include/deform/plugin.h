@@ -247,6 +247,21 @@ typedef struct dfm_stepper {
   dfm_status (*respond_many)(void *self, const dfm_kin *k, uint32_t n, const uint32_t *surfel, uint32_t nrhs,
                              const double *p, double *du_s);
 } dfm_stepper;
+/* Extension "dfm.late_points/1" of a self-stepping model: its state tells where its points are, so that a
+ * step moves those alone that a surfel hangs on or that are held, and the others when somebody asks. A host
+ * that knows the table ends steps by its commit; the others are in k->x and k->v as they last were seen. It
+ * calls `points` before anybody else reads them, `look` after somebody else wrote points. */
+#define DFM_EXT_LATE_POINTS "dfm.late_points/1"
+typedef struct dfm_late_points {
+  uint32_t size, reserved;
+  /* [step] as dfm_stepper.commit, but may leave out what no surfel hangs on and nothing holds */
+  dfm_status (*commit)(void *self, const dfm_kin *k, const double *p_s, double *x, double *v);
+  /* [step] x, v [npoint,stride]: those left out, of k->state; k->x and k->v may be the same arrays. Never
+   * between predict and commit of a step. */
+  dfm_status (*points)(void *self, const dfm_kin *k, double *x, double *v);
+  /* [step] state: in the next step the points tell where the body is, all of them */
+  dfm_status (*look)(const void *self, double *state);
+} dfm_late_points;
 /* Extension "dfm.cell_energy/1" of a model: elastic energy per rest volume, for pictures
  * and probes. */
 #define DFM_EXT_CELL_ENERGY "dfm.cell_energy/1"

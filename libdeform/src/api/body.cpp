@@ -140,7 +140,7 @@ dfm_status dfm_body_destroy(dfm_body body) {
 
 dfm_status dfm_body_get_info(dfm_body body, dfm_body_info *out) {
   return as_status([&] {
-    const Body &b = body_of(body);
+    const Body &b = shown_body_of(body);
     dfm_body_info i{};
     i.npoint = b.p.n;
     i.ntet = static_cast<uint32_t>(b.tets.size() / 4);
@@ -158,7 +158,7 @@ dfm_status dfm_body_get_info(dfm_body body, dfm_body_info *out) {
 }
 
 dfm_status dfm_body_set_user(dfm_body body, void *user) {
-  return as_status([&] { body_of(body).user = user; });
+  return as_status([&] { shown_body_of(body).user = user; });
 }
 
 dfm_status dfm_body_set_filter(dfm_body body, uint32_t category, uint32_t collides_with) {
@@ -206,6 +206,7 @@ dfm_status dfm_body_set_state(dfm_body body, uint32_t n, const double *x, const 
         if (x) b.p.x[size_t(i) * kStride + size_t(k)] = x[size_t(3) * i + size_t(k)];
         if (v) b.p.v[size_t(i) * kStride + size_t(k)] = v[size_t(3) * i + size_t(k)];
       }
+    b.dynamics->points_changed();
     disturb(b);
     if (x) lose_energy(b);
     b.world->bound.age = kNone;
@@ -218,7 +219,7 @@ dfm_status dfm_body_set_state(dfm_body body, uint32_t n, const double *x, const 
 dfm_status dfm_body_get_rest(dfm_body body, uint32_t capacity_points, double *x, uint32_t capacity_tets,
                              uint32_t *tets) {
   return as_status([&] {
-    const Body &b = body_of(body);
+    const Body &b = shown_body_of(body);
     if (x && room(b.p.n, capacity_points, x, nullptr)) std::copy(b.p.rest.begin(), b.p.rest.end(), x);
     if (tets && room(static_cast<uint32_t>(b.tets.size() / 4), capacity_tets, tets, nullptr))
       std::copy(b.tets.begin(), b.tets.end(), tets);
@@ -393,7 +394,7 @@ dfm_status dfm_body_wake(dfm_body body) {
 
 dfm_status dfm_body_is_asleep(dfm_body body, bool *asleep) {
   return as_status([&] {
-    const Body &b = body_of(body);
+    const Body &b = shown_body_of(body);
     need(asleep, "asleep");
     *asleep = b.slumber.asleep;
   });

@@ -20,7 +20,18 @@ Part &part_of(Kind kind, uint64_t h) {
   held(*part.world);
   return part;
 }
-inline Body &body_of(dfm_body h) { return part_of<Body>(Kind::body, h); }
+// Points may be late (Dynamics::see_points): calls that read no points but those of the surface take these.
+inline Body &shown_body_of(dfm_body h) { return part_of<Body>(Kind::body, h); }
+inline Body &body_of(dfm_body h) {
+  Body &b = shown_body_of(h);
+  if (!b.world->busy) b.dynamics->see_points();
+  return b;
+}
+// For calls that read all points of all bodies.
+inline World &whole(World &w) {
+  for (auto &b : w.bodies) b->dynamics->see_points();
+  return w;
+}
 inline Obstacle &obstacle_of(dfm_obstacle h) { return part_of<Obstacle>(Kind::obstacle, h); }
 inline Material &material_of(dfm_material h) { return part_of<Material>(Kind::material, h); }
 

@@ -13,7 +13,7 @@ namespace {
 template <class Get>
 dfm_status column(dfm_body body, uint32_t capacity, double *xyz, uint32_t *n, Get get) {
   return as_status([&] {
-    const Body &b = body_of(body);
+    const Body &b = shown_body_of(body);
     if (!room(b.surface.nsurfel, capacity, xyz, n)) return;
     for (uint32_t s = 0; s < b.surface.nsurfel; ++s) store3(xyz + size_t(3) * s, get(b, s));
   });
@@ -38,7 +38,7 @@ dfm_status dfm_surface_forces(dfm_body body, uint32_t capacity, double *xyz, uin
 
 dfm_status dfm_surface_normals(dfm_body body, uint32_t capacity, double *xyz, uint32_t *n) {
   return as_status([&] {
-    const Body &b = body_of(body);
+    const Body &b = shown_body_of(body);
     if (!room(b.surface.nsurfel, capacity, xyz, n)) return;
     surface_normals(b, xyz);
   });
@@ -46,14 +46,14 @@ dfm_status dfm_surface_normals(dfm_body body, uint32_t capacity, double *xyz, ui
 
 dfm_status dfm_surface_triangles(dfm_body body, uint32_t capacity, uint32_t *tri, uint32_t *n) {
   return as_status([&] {
-    const Surface &s = body_of(body).surface;
+    const Surface &s = shown_body_of(body).surface;
     if (room(s.ntri, capacity, tri, n)) std::copy(s.tri.begin(), s.tri.begin() + size_t(3) * s.ntri, tri);
   });
 }
 
 dfm_status dfm_surface_points(dfm_body body, uint32_t capacity, uint32_t *point, uint32_t *n) {
   return as_status([&] {
-    const Body &b = body_of(body);
+    const Body &b = shown_body_of(body);
     if (!b.surface.identity())
       fail(DFM_E_UNSUPPORTED,
            "body '%s': its surfels hang on several points each; there is no one point per surfel",

@@ -232,7 +232,7 @@ dfm_status dfm_world_set_gravity_keys(dfm_world world, uint32_t n, const dfm_vec
 
 dfm_status dfm_world_set_sleep(dfm_world world, bool sleep) {
   return as_status([&] {
-    World &w = exclusive(world_of(world));
+    World &w = whole(exclusive(world_of(world)));
     if (sleep) need_ability(w, Ability::sleep);
     wake_all(w);
     w.def.sleep = sleep;
@@ -265,7 +265,7 @@ void dfm_equilibrium_def_default_sized(uint32_t size, dfm_equilibrium_def *out) 
 dfm_status dfm_world_equilibrium(dfm_world world, const dfm_equilibrium_def *def,
                                  dfm_equilibrium_info *info) {
   return as_status([&] {
-    World &w = exclusive(world_of(world));
+    World &w = whole(exclusive(world_of(world)));
     const dfm_equilibrium_def d = take_def(def, dfm_equilibrium_def_default());
     for (const double value : {d.load_from, d.load_to, d.time, d.tolerance})
       if (!std::isfinite(value) || value < 0)
@@ -303,7 +303,7 @@ dfm_status dfm_world_interrupt(dfm_world world) {
 
 dfm_status dfm_world_stable_step(dfm_world world, double *dt, dfm_body *body, uint32_t *point) {
   return as_status([&] {
-    World &w = exclusive(world_of(world));
+    World &w = whole(exclusive(world_of(world)));
     need(dt, "dt");
     prepare(w);
     // The bound that the next step uses: asked anew only when it would ask, so that reading it
@@ -335,7 +335,7 @@ dfm_status dfm_world_overlaps_sized(dfm_world world, uint32_t row_size, uint32_t
 
 dfm_status dfm_world_find_overlaps(dfm_world world, uint32_t *n) {
   return as_status([&] {
-    World &w = exclusive(world_of(world));
+    World &w = whole(exclusive(world_of(world)));
     prepare(w);
     const bool told = w.overlaps.told;
     w.overlaps.all = w.overlaps.look_only = true;
@@ -347,7 +347,7 @@ dfm_status dfm_world_find_overlaps(dfm_world world, uint32_t *n) {
 
 dfm_status dfm_world_untangle(dfm_world world, uint32_t *left) {
   return as_status([&] {
-    World &w = exclusive(world_of(world));
+    World &w = whole(exclusive(world_of(world)));
     w.overlaps.all = w.overlaps.untangle = true;
     prepare(w);
     const auto &found = w.overlaps.found;
@@ -363,13 +363,13 @@ double dfm_world_time(dfm_world world) {
 }
 
 uint64_t dfm_world_hash(dfm_world world) {
-  const World *const w = static_cast<World *>(handle_find(Kind::world, world));
-  return w ? world_hash(*w) : 0;
+  World *const w = static_cast<World *>(handle_find(Kind::world, world));
+  return w ? world_hash(whole(*w)) : 0;
 }
 
 dfm_status dfm_world_snapshot(dfm_world world, void *buffer, size_t *bytes) {
   return as_status([&] {
-    World &w = exclusive(world_of(world));
+    World &w = whole(exclusive(world_of(world)));
     prepare(w);
     std::vector<unsigned char> data;
     world_snapshot(w, data);
@@ -379,7 +379,7 @@ dfm_status dfm_world_snapshot(dfm_world world, void *buffer, size_t *bytes) {
 
 dfm_status dfm_world_restore(dfm_world world, const void *buffer, size_t bytes) {
   return as_status([&] {
-    World &w = exclusive(world_of(world));
+    World &w = whole(exclusive(world_of(world)));
     need(buffer, "buffer");
     world_restore(w, buffer, bytes);
   });

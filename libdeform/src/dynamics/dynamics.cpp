@@ -44,6 +44,7 @@ void Dynamics::bound_surfel_ends(const double *mean, double &speed, double &chan
 void Dynamics::push(uint32_t point, double weight, const double *impulse) {
   const size_t at = size_t(point) * kStride;
   for (size_t k = 0; k < 3; ++k) p_.v[at + k] += weight * p_.inv_mass[at + k] * impulse[k];
+  points_changed();
 }
 
 std::unique_ptr<Dynamics> make_dynamics(const Memory &memory, Phyxels &points, Surface &surface,

@@ -134,6 +134,15 @@ class Dynamics {
   // fraction: of the way to the end that is taken; velocities are the end's.
   virtual void commit(const SubStep &now, double fraction) = 0;
 
+  // Steps may leave out points that no surfel hangs on: before anybody reads them. Between steps, any thread.
+  virtual void see_points() {}
+  // The same of the ends that end_state() has found, where only a part of the way to them is taken.
+  virtual void see_ends() {}
+  // After somebody has written points, all of which had been seen.
+  virtual void points_changed() {}
+  // Whether steps leave out points.
+  virtual bool late() const { return false; }
+
   // trial: with room for the model's next state
   dfm_kin kin(double time, double h, bool trial = false) const;
   void push(uint32_t point, double weight, const double *impulse);  // N s, between sub-steps

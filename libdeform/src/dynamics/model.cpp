@@ -13,6 +13,7 @@ namespace {
 
 // What every version of these tables has had.
 constexpr size_t kStepperHead = offsetof(dfm_stepper, commit) + sizeof(void *);
+constexpr size_t kLatePoints = offsetof(dfm_late_points, look) + sizeof(void *);
 constexpr size_t kOneFunction = 2 * sizeof(uint32_t) + sizeof(void *);
 constexpr size_t kF32Head = offsetof(dfm_f32, add_forces) + sizeof(void *);
 
@@ -62,9 +63,9 @@ void ModelInstance::create(const dfm_type &t, const dfm_host &h, const dfm_mesh 
 }
 
 std::optional<std::vector<dfm_slot>> ModelInstance::ask_extensions() {
-  const void *tables[7] = {};
+  const void *tables[8] = {};
   const char *const ids[] = {"dfm.stepper/1", DFM_EXT_SLOTS, DFM_EXT_EFFECTS, DFM_EXT_IDLE,
-                             DFM_EXT_LIMITED, DFM_EXT_CAPS,  DFM_EXT_F32};
+                             DFM_EXT_LIMITED, DFM_EXT_CAPS,  DFM_EXT_F32,     DFM_EXT_LATE_POINTS};
   if (ops->extension)
     call("extension", [&] {
       for (size_t i = 0; i < std::size(ids); ++i) tables[i] = ops->extension(self, ids[i]);
@@ -79,6 +80,8 @@ std::optional<std::vector<dfm_slot>> ModelInstance::ask_extensions() {
   limited = copy_table<dfm_limited>(tables[4], kOneFunction, type->id, "dfm_limited");
   claims = copy_table<dfm_caps>(tables[5], kOneFunction, type->id, "dfm_caps");
   f32 = copy_table<dfm_f32>(tables[6], kF32Head, type->id, "dfm_f32");
+  late = copy_table<dfm_late_points>(tables[7], kLatePoints, type->id, "dfm_late_points");
+  if (late && !(stepper && late->commit && late->points && late->look)) late.reset();
   if (ask_caps() != DFM_OK)
     fail(DFM_E_FATAL, "model '%s' failed when it was asked what it can; the log says why", type->id);
   return copy_slots(type->id, static_cast<const dfm_slots *>(tables[1]), false);
@@ -138,6 +141,7 @@ void ModelInstance::swap(ModelInstance &other) noexcept {
   std::swap(ops, other.ops);
   std::swap(host, other.host);
   std::swap(stepper, other.stepper);
+  std::swap(late, other.late);
   std::swap(effects, other.effects);
   std::swap(idle, other.idle);
   std::swap(limited, other.limited);

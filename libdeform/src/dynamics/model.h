@@ -19,13 +19,14 @@ struct ModelInstance {
   const dfm_model *ops = nullptr;
   const dfm_host *host = nullptr;
   // What the instance's extensions answer, of this library's size.
-  std::optional<dfm_stepper> stepper;  // none: a force model, the host integrates
-  std::optional<dfm_effects> effects;  // none: whatever the type promises is at work
-  std::optional<dfm_idle> idle;        // none: every parameter does what its row says
-  std::optional<dfm_limited> limited;  // none: the model limits nothing, or does not say
-  std::optional<dfm_caps> claims;      // none: what the type claims holds with all parameters
-  std::optional<dfm_f32> f32;          // none: it computes in double precision alone
-  bool single = false;                 // add_forces() computes in single precision
+  std::optional<dfm_stepper> stepper;   // none: a force model, the host integrates
+  std::optional<dfm_late_points> late;  // none: a step moves all points
+  std::optional<dfm_effects> effects;   // none: whatever the type promises is at work
+  std::optional<dfm_idle> idle;         // none: every parameter does what its row says
+  std::optional<dfm_limited> limited;   // none: the model limits nothing, or does not say
+  std::optional<dfm_caps> claims;       // none: what the type claims holds with all parameters
+  std::optional<dfm_f32> f32;           // none: it computes in double precision alone
+  bool single = false;                  // add_forces() computes in single precision
   void *self = nullptr;
   std::vector<double> params;
   Array<double> state, state_out;  // slots end to end

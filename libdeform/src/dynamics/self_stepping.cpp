@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 namespace dfm {
 
@@ -9,7 +10,23 @@ SelfStepping::SelfStepping(const Memory &memory, Phyxels &points, Surface &surfa
     : Dynamics(points, surface, model),
       mean_(size_t(kStride) * points.n, 0.0, HookAllocator<double>(memory)),
       surfels_(size_t(3) * surface.nsurfel, 0.0, HookAllocator<double>(memory)) {
-  use_memory(memory, unit_);
+  use_memory(memory, unit_, near_);
+  if (!model.late) return;
+  std::vector<uint8_t> near(points.n, 0);
+  for (uint32_t s = 0; s < surface.nsurfel; ++s)
+    surface.each_phyxel(s, [&](uint32_t point, double) { near[point] = 1; });
+  for (uint32_t i = 0; i < points.n; ++i)
+    if (near[i] || points.held[i]) near_.push_back(i);
+}
+
+template <class F>
+void SelfStepping::each_moved(F &&f) const {
+  if (!model_.late) {
+    for (size_t j = 0; j < size_t(p_.n) * kStride; ++j) f(j);
+    return;
+  }
+  for (const uint32_t i : near_)
+    for (size_t j = size_t(i) * kStride; j < size_t(i + 1) * kStride; ++j) f(j);
 }
 
 // Loads and gravity are external forces of the model, which answers the surfels' mean velocities.
@@ -19,7 +36,12 @@ bool SelfStepping::free_motion(const SubStep &now, double &kinetic) {
   for (uint32_t i = 0; i < p_.n; ++i) {
     const size_t at = size_t(i) * kStride;
     store3(&p_.f[at], load3(&p_.load[at]) + p_.mass[i] * now.gravity);
-    sum += p_.mass[i] * norm2(load3(&p_.v[at]));
+  }
+  // of late points: of those that every sub-step moves, whether somebody has seen the others or not
+  const uint32_t count = model_.late ? uint32_t(near_.size()) : p_.n;
+  for (uint32_t n = 0; n < count; ++n) {
+    const uint32_t i = model_.late ? near_[n] : n;
+    sum += p_.mass[i] * norm2(load3(&p_.v[size_t(i) * kStride]));
   }
   kinetic = 0.5 * sum;
   const dfm_kin k = kin(now.time, now.h);
@@ -67,13 +89,14 @@ bool SelfStepping::end_state(const SubStep &now, const double *surfel_impulse, b
   }
   const dfm_kin k = kin(now.time, now.h, true);
   double *const x = p_.x_end.data(), *const v = p_.v_end.data();
-  const auto end = [&] { return model_.stepper->commit(model_.self, &k, surfel_impulse, x, v); };
+  const auto ends = model_.late ? model_.late->commit : model_.stepper->commit;
+  const auto end = [&] { return ends(model_.self, &k, surfel_impulse, x, v); };
   if (model_.call("commit", end) != DFM_OK) return false;
   double poison = 0;
-  for (size_t j = 0; j < size_t(p_.n) * kStride; ++j) {
+  each_moved([&](size_t j) {
     poison += 0.0 * x[j] + 0.0 * v[j];
     mean_[j] = (x[j] - p_.x[j]) / now.h;
-  }
+  });
   return poison == 0;
 }
 
@@ -87,6 +110,34 @@ void SelfStepping::commit(const SubStep &, double fraction) {
   p_.x.swap(p_.x_end);
   p_.v.swap(p_.v_end);
   model_.commit_state();
+  unseen_ = model_.late.has_value();
+}
+
+// Part of the way is no state that the model knows: from there on all points tell it.
+void SelfStepping::see_ends() {
+  if (!model_.late) return;
+  see_points();
+  dfm_kin k = kin(0, 0);
+  k.x = p_.x_end.data();
+  k.v = p_.v_end.data();
+  k.state = model_.state_out.data();
+  model_.call(
+      "points", [&] { return model_.late->points(model_.self, &k, p_.x_end.data(), p_.v_end.data()); });
+  model_.call("look", [&] { return model_.late->look(model_.self, model_.state_out.data()); });
+}
+
+void SelfStepping::see_points() {
+  if (!unseen_.load(std::memory_order_acquire)) return;
+  const std::lock_guard<std::mutex> one(seeing_);
+  if (!unseen_.load(std::memory_order_relaxed)) return;
+  const dfm_kin k = kin(0, 0);
+  model_.call("points", [&] { return model_.late->points(model_.self, &k, p_.x.data(), p_.v.data()); });
+  unseen_.store(false, std::memory_order_release);
+}
+
+void SelfStepping::points_changed() {
+  if (!model_.late) return;
+  model_.call("look", [&] { return model_.late->look(model_.self, model_.state.data()); });
 }
 
 }  // namespace dfm

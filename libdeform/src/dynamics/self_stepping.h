@@ -1,6 +1,10 @@
 // A model that moves its body itself (dfm.stepper/1): it predicts, answers impulses at its surfels, and
-// ends the sub-step.
+// ends the sub-step. Where it can tell later where its points are (dfm.late_points/1), a sub-step moves those
+// alone that surfels hang on or that are held: what a probe costs then does not grow with what lies beneath.
 #pragma once
+#include <atomic>
+#include <mutex>
+
 #include "dynamics/dynamics.h"
 
 namespace dfm {
@@ -17,14 +21,23 @@ class SelfStepping : public Dynamics {
   EndState end() const override { return {p_.v_end.data(), mean_.data()}; }
   void bound_ends(double &speed, double &change) const override;
   void commit(const SubStep &now, double fraction) override;
+  void see_points() override;
+  void see_ends() override;
+  void points_changed() override;
+  bool late() const override { return model_.late.has_value(); }
 
  private:
   Array<double> mean_;     // [npoint,4] m/s
   Array<double> surfels_;  // [nsurfel,3] m/s as the model writes them; N s, zero, where nothing touches
   Array<double> unit_;     // [3n,n,3] N s: unit impulses at the touched surfels
+  Array<uint32_t> near_;   // late points: those that every sub-step moves
+  std::atomic<bool> unseen_ = false;
+  std::mutex seeing_;
 
   bool respond(const SubStep &now, uint32_t n, const uint32_t *surfel, uint32_t nrhs, const double *p,
                double *du) const;
+  template <class F>
+  void each_moved(F &&f) const;  // f(component) of [npoint,4]
 };
 
 }  // namespace dfm

@@ -14,6 +14,13 @@
 
 namespace dfm {
 
+namespace {
+// Between this sub-step and the next.
+bool reads_points(const World &w, const Body &b) {
+  return w.def.sleep || b.changes.open || !b.switches.empty() || !b.rule.empty() || !w.overlaps.found.empty();
+}
+}  // namespace
+
 bool find_ends(World &w, StepContext &step, uint32_t *trouble) {
   const SubStep now = sub_step_of(w, step);
   const bool touched = w.plan.has(StageRole::gives_impulses) && step.rows.n > 0;
@@ -39,6 +46,8 @@ bool find_ends(World &w, StepContext &step, uint32_t *trouble) {
 
 bool stage_commit(World &w, StepContext &step, uint32_t *trouble) {
   if (!step.ended && !find_ends(w, step, trouble)) return false;
+  if (step.guard.motion < 1)
+    for (const uint32_t i : step.active) w.bodies[i]->dynamics->see_ends();
   book_energy(w, step, step.guard.motion);
   const SubStep now = sub_step_of(w, step);
   double accurate = std::numeric_limits<double>::infinity();
@@ -51,6 +60,7 @@ bool stage_commit(World &w, StepContext &step, uint32_t *trouble) {
           Body &b = *w.bodies[i];
           ready_change_work(b, now);
           b.dynamics->commit(now, step.guard.motion);  // the guard may leave out some of the way
+          if (reads_points(w, b)) b.dynamics->see_points();
           ++b.x_version;
           book_change_work(w, b, now.h);
           if (!w.plan.touches()) continue;

@@ -89,6 +89,7 @@ double work_of_new_size(const World &w, const StepContext &step, const Body &b) 
 // it may rise as stiff modes calm down.
 bool look(World &w, const StepContext &step, Body &b, EnergyLook &out) {
   const Phyxels &p = b.p;
+  b.dynamics->see_points();
   const bool load_booked = books_loads(b), ends = at_end(b);
   double kinetic = 0, cross = 0, kick = 0, potential = 0, reach = 0;
   for (uint32_t i = 0; i < p.n; ++i) {
@@ -281,6 +282,7 @@ void change_gravity(World &w, Vec3 gravity) {
   if (!watching(w) || norm2(by) == 0) return;
   for (auto &b : w.bodies) {
     if (!watched(*b)) continue;
+    b->dynamics->see_points();
     const Phyxels &p = b->p;
     const double behind = at_end(*b) ? 0 : 0.5 * w.watch.last_h;
     for (uint32_t i = 0; i < p.n; ++i)

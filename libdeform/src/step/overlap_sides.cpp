@@ -98,6 +98,7 @@ OverlapSkin::OverlapSkin(const Memory &memory, const Body &b)
   }
   closed_ = std::find(s.edge_tri.begin(), s.edge_tri.end(), kNone) == s.edge_tri.end();
   const size_t cells = b.tets.size() / 4;
+  b.dynamics->see_points();
   for (size_t t = 0, n = stride_of(cells, kInner); t < cells; t += n) {
     Vec3 sum;
     for (size_t k = 0; k < 4; ++k) sum += load3(&b.p.x[size_t(b.tets[4 * t + k]) * kStride]);

@@ -305,6 +305,7 @@ void prepare(World &w, const RestoredChoice *restored) {
     if (w.revalued) look_at_plan(w, step);
     return settle_overlaps(w);
   }
+  for (auto &b : w.bodies) b->dynamics->see_points();
   choose_integrators(w);
   const uint32_t nb = static_cast<uint32_t>(w.bodies.size());
   SceneFacts &facts = step.facts;

@@ -215,6 +215,7 @@ void fall_asleep(World &w, StepContext &step, Body &b, double end) {
   store3(w.stats.sleep_momentum, load3(w.stats.sleep_momentum) + momentum);
   std::fill(p.v.begin(), p.v.end(), 0.0);
   std::fill(p.v_free.begin(), p.v_free.end(), 0.0);
+  b.dynamics->points_changed();
   gather_surface(b.surface, p.x.data(), p.v.data());  // detection goes on seeing it, where it stays
   if (w.plan.touches())
     for (uint32_t s = 0; s < b.surface.nsurfel; ++s) impulse += load3(&b.surfel_impulse[3 * size_t(s)]);

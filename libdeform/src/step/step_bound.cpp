@@ -28,7 +28,8 @@ uint32_t inverted_cells(const Body &b) {
 
 // False: its model gives none.
 bool ask_bound(const World &w, Body &b) {
-  b.bound = {true, {}, inverted_cells(b)};
+  // of points that are late nobody knows until they are asked for
+  b.bound = {true, {}, b.dynamics->late() ? 0 : inverted_cells(b)};
   const auto springs = [&b](double *stiffness, double *damping) {
     for (const Spring &spring : b.springs) add_spring_bound(spring, stiffness, damping);
   };

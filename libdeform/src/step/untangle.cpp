@@ -231,6 +231,7 @@ class Untangler {
                        b.name.c_str(), by.x, by.y, by.z, potential(b, by));
       for (uint32_t k = 0; k < b.p.n; ++k)
         store3(&b.p.x[size_t(k) * kStride], load3(&b.p.x[size_t(k) * kStride]) + by);
+      b.dynamics->points_changed();
       wake(w_, b);
       forget_energy(b);  // the change of potential is nobody's work
       ++w_.placements;

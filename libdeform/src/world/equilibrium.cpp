@@ -203,6 +203,7 @@ void find_equilibrium(World &w, const dfm_equilibrium_def &def, dfm_equilibrium_
   }
   wake_all(w);
   for (auto &b : w.bodies) {
+    b->dynamics->points_changed();
     forget_energy(*b);
     settle_changes(*b);
     ++b->x_version;

@@ -252,7 +252,10 @@ class Settling {
   }
 
   void stand_still() {
-    for (auto &b : w_.bodies) std::fill(b->p.v.begin(), b->p.v.end(), 0.0);
+    for (auto &b : w_.bodies) {
+      std::fill(b->p.v.begin(), b->p.v.end(), 0.0);
+      b->dynamics->points_changed();
+    }
   }
 
   void weigh_all(double h) {

@@ -1,0 +1,205 @@
+// Whether a scene keeps up with its own clock: processor time of each step on one thread, median and the
+// largest of a thousand, and what a probe feels. The scene is run twice: a model may find something when it
+// is first asked (columns of a response), and a host that must not wait asks before. The second run is timed.
+//
+// real_time_bench SCENE [--model NAME] [--integrator NAME] [--cells N] [--time S] [--step S]
+//                 [--series FILE] [--against FILE] [--csv FILE --commit HASH]
+//
+// --series writes t, the force on the first body (N) and the place of the first probe (m) at each
+// millisecond; --against compares with such a file: the largest difference over the largest value.
+#include <time.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "deform/deform.h"
+#include "machine.h"
+
+namespace {
+
+double cpu_seconds() {
+  timespec t{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return double(t.tv_sec) + 1e-9 * double(t.tv_nsec);
+}
+
+void ok(dfm_status status) {
+  if (status == DFM_OK) return;
+  std::fprintf(stderr, "real_time_bench: %s\n", dfm_last_error());
+  std::exit(2);
+}
+
+struct Sample { double t, force[3], place[3]; };
+
+struct Run {
+  std::vector<double> seconds;
+  std::vector<Sample> series;
+  double contacts = 0;
+};
+
+Run run(dfm_scene scene, dfm_world world, double duration, double step) {
+  Run out;
+  const long steps = std::lround(duration / step), every = std::max(1L, std::lround(1e-3 / step));
+  double force[3] = {};
+  for (long n = 0; n < steps; ++n) {
+    const double at = cpu_seconds();
+    ok(dfm_world_step(world, step, nullptr));
+    out.seconds.push_back(cpu_seconds() - at);
+    dfm_pair_impulse pair{};
+    uint32_t pairs = 0;
+    ok(dfm_world_pair_impulses(world, 1, &pair, &pairs));
+    for (int a = 0; pairs && a < 3; ++a) force[a] += pair.impulse[a] / (step * double(every));
+    dfm_world_stats stats{};
+    stats.size = sizeof stats;
+    ok(dfm_world_get_stats(world, &stats));
+    out.contacts += double(stats.contacts) / double(steps);
+    if ((n + 1) % every != 0) continue;
+    Sample s{double(n + 1) * step, {force[0], force[1], force[2]}, {}};
+    if (every == 1 && (n + 1) % 10 != 0 && !out.series.empty())
+      std::copy(out.series.back().place, out.series.back().place + 3, s.place);
+    else ok(dfm_scene_probe(scene, 0, nullptr, s.place, nullptr));
+    out.series.push_back(s);
+    std::fill(force, force + 3, 0.0);
+  }
+  return out;
+}
+
+// Of the ten-millisecond means of the force, and of the place at the ends of these: the largest difference
+// over the largest value, the place counted from where it began.
+void compare(const std::vector<Sample> &now, const std::vector<Sample> &with, double error[2]) {
+  double most[2] = {}, apart[2] = {};
+  for (size_t n = 9; n < std::min(now.size(), with.size()); n += 10) {
+    double value[2] = {}, other[2] = {};
+    for (int a = 0; a < 3; ++a) {
+      double f = 0, g = 0;
+      for (size_t k = n - 9; k <= n; ++k) {
+        f += now[k].force[a] / 10;
+        g += with[k].force[a] / 10;
+      }
+      value[0] += g * g;
+      other[0] += (f - g) * (f - g);
+      const double u = with[n].place[a] - with[9].place[a], d = now[n].place[a] - with[n].place[a];
+      value[1] += u * u;
+      other[1] += d * d;
+    }
+    for (int i = 0; i < 2; ++i) {
+      most[i] = std::max(most[i], value[i]);
+      apart[i] = std::max(apart[i], other[i]);
+    }
+  }
+  for (int i = 0; i < 2; ++i) error[i] = std::sqrt(apart[i] / most[i]);
+}
+
+std::vector<Sample> read(const char *path) {
+  std::vector<Sample> out;
+  std::ifstream in(path);
+  Sample s{};
+  while (in >> s.t >> s.force[0] >> s.force[1] >> s.force[2] >> s.place[0] >> s.place[1] >> s.place[2])
+    out.push_back(s);
+  return out;
+}
+
+}  // namespace
+
+int main(int argc, char **argv) {
+  std::vector<std::string> set;
+  std::string name = "scene", integrator = "explicit", model = "scene";
+  const char *series = nullptr, *against = nullptr, *csv_file = nullptr, *commit = "unknown";
+  double duration = 0, step = 0;
+  for (int i = 2; i + 1 < argc; i += 2) {
+    const std::string key = argv[i], value = argv[i + 1];
+    if (key == "--model") set.push_back("/bodies/0/model/type=\"" + (model = value) + '"');
+    if (key == "--integrator") set.push_back("/time/integrator=\"" + (integrator = value) + '"');
+    if (key == "--cells") set.push_back("/bodies/0/mesh/cells=" + value);
+    if (key == "--set") set.push_back(value);
+    if (key == "--time") duration = std::atof(argv[i + 1]);
+    if (key == "--step") step = std::atof(argv[i + 1]);
+    if (key == "--series") series = argv[i + 1];
+    if (key == "--against") against = argv[i + 1];
+    if (key == "--csv") csv_file = argv[i + 1];
+    if (key == "--commit") commit = argv[i + 1];
+  }
+  if (argc < 2) return 2;
+  std::vector<const char *> texts;
+  for (const std::string &s : set) texts.push_back(s.c_str());
+  dfm_context_def def = dfm_context_def_default();
+  def.plugin_dir = DEFORM_PLUGIN_DIR;
+  def.threads = 1;
+  dfm_context *context = nullptr;
+  ok(dfm_context_create(&def, &context));
+  dfm_scene_options options{};
+  options.size = sizeof options;
+  options.nset = uint32_t(texts.size());
+  options.set = texts.data();
+  dfm_scene scene = 0;
+  dfm_world world = 0;
+  const double start = cpu_seconds();
+  ok(dfm_scene_open(context, argv[1], &options, &scene));
+  ok(dfm_scene_world(scene, &world));
+  const double made = cpu_seconds() - start;
+  dfm_scene_settings settings{};
+  settings.size = sizeof settings;
+  ok(dfm_scene_get_settings(scene, &settings));
+  if (!(step > 0)) step = settings.step;
+  if (!(duration > 0)) duration = settings.duration;
+  dfm_body body = 0;
+  uint32_t bodies = 0;
+  ok(dfm_world_bodies(world, 1, &body, &bodies));
+  dfm_body_info info{};
+  info.size = sizeof info;
+  ok(dfm_body_get_info(body, &info));
+
+  size_t bytes = 0;
+  ok(dfm_world_snapshot(world, nullptr, &bytes));
+  std::vector<char> snapshot(bytes);
+  ok(dfm_world_snapshot(world, snapshot.data(), &bytes));
+  if (model == "modal" || model == "condensed" || model == "scene") {
+    run(scene, world, duration, step);
+    ok(dfm_world_restore(world, snapshot.data(), bytes));
+  }
+  dfm_stage_time before[32], after[32];
+  uint32_t stages = 0;
+  ok(dfm_world_profile(world, 32, before, &stages));
+  Run found = run(scene, world, duration, step);
+  ok(dfm_world_profile(world, 32, after, &stages));
+  if (series) {
+    std::FILE *out = std::fopen(series, "w");
+    for (const Sample &s : found.series)
+      std::fprintf(out, "%.6f %.9g %.9g %.9g %.9g %.9g %.9g\n", s.t, s.force[0], s.force[1], s.force[2],
+                   s.place[0], s.place[1], s.place[2]);
+    std::fclose(out);
+  }
+  double error[2] = {NAN, NAN};
+  if (against) compare(found.series, read(against), error);
+  std::vector<double> sorted = found.seconds;
+  std::sort(sorted.begin(), sorted.end());
+  const double median = 1e3 * sorted[sorted.size() / 2], worst = 1e3 * sorted[sorted.size() * 999 / 1000];
+  std::printf(
+      "%s %s %g ms: %u points, %.1f contacts, made in %.1f s; ms per step: median %.3f, 99.9 %% %.3f; "
+      "error of force %.3g, of tip %.3g\n",
+      model.c_str(), integrator.c_str(), 1e3 * step, info.npoint, found.contacts, made, median, worst,
+      error[0], error[1]);
+  for (uint32_t i = 0; i < stages; ++i)
+    std::printf("    %-18s %8.4f ms\n", after[i].name,
+                1e3 * (after[i].seconds - before[i].seconds) / double(found.seconds.size()));
+  if (csv_file) {
+    std::FILE *csv = std::fopen(csv_file, "a");
+    if (std::ftell(csv) == 0)
+      std::fprintf(csv,
+                   "machine,compiler,commit,model,integrator,step_ms,points,contacts,made_s,median_ms,"
+                   "p999_ms,force_error,tip_error\n");
+    std::fprintf(csv, "%s,%s,%s,%s,%s,%g,%u,%.1f,%.1f,%.3f,%.3f,%.3g,%.3g\n", bench::machine().c_str(),
+                 bench::compiler(), commit, model.c_str(), integrator.c_str(), 1e3 * step, info.npoint,
+                 found.contacts, made, median, worst, error[0], error[1]);
+    std::fclose(csv);
+  }
+  ok(dfm_scene_close(scene));
+  dfm_context_destroy(context);
+  return 0;
+}

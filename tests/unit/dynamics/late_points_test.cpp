@@ -1,0 +1,183 @@
+// Held bodies of the models modal and condensed: a step moves the points that a surfel hangs on or that are
+// held, and looks at no other one; who asks for the others sees them where a host that moves all of them has
+// them.
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include "../world/inside.h"
+#include "support.h"
+#include "world.h"
+
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+// The shipped block under its probe, coarser.
+struct Probed {
+  test::Context context;
+  dfm_scene scene = 0;
+  dfm_world world = 0;
+  dfm_body body = 0;
+  explicit Probed(const char *model, std::vector<std::string> more = {}) {
+    std::vector<std::string> set{std::string("/bodies/0/model/type=\"") + model + '"',
+                                 "/bodies/0/mesh/cells=1500", "/contact/tolerance=1e-12",
+                                 "/materials/tissue/damping/stiffness=0.001"};
+    set.insert(set.end(), more.begin(), more.end());
+    std::vector<const char *> texts;
+    for (const std::string &s : set) texts.push_back(s.c_str());
+    dfm_scene_options options{};
+    options.size = sizeof options;
+    options.nset = uint32_t(texts.size());
+    options.set = texts.data();
+    const std::string path = std::string(DEFORM_SOURCE_DIR) + "/examples/scenes/probe_block.json";
+    test::ok(dfm_scene_open(context, path.c_str(), &options, &scene));
+    test::ok(dfm_scene_world(scene, &world));
+    uint32_t n = 0;
+    test::ok(dfm_world_bodies(world, 1, &body, &n));
+  }
+  ~Probed() { dfm_scene_close(scene); }
+  dfm::Body &inside() const { return *test::inside(world).bodies[0]; }
+
+  struct State { std::vector<double> x, v; };
+  State state() const {
+    State s{std::vector<double>(3 * inside().p.n), std::vector<double>(3 * inside().p.n)};
+    test::ok(dfm_body_get_state(body, inside().p.n, s.x.data(), s.v.data(), nullptr));
+    return s;
+  }
+  // A blow without a force: the points lead in the next step.
+  void touch() const {
+    const double point[3] = {}, none[3] = {};
+    test::ok(dfm_body_apply_impulse(body, point, none));
+  }
+  uint32_t contacts() const { return test::stats(world).contacts; }
+};
+
+// Largest component of the difference over that of the way since the start.
+double apart(const Probed &a, const Probed &b) {
+  const auto at = a.state(), with = b.state();
+  double most = 0, way = 0;
+  for (size_t j = 0; j < at.x.size(); ++j) {
+    most = std::max(most, std::fabs(at.x[j] - with.x[j]));
+    way = std::max(way, std::fabs(at.x[j] - a.inside().p.rest[j]));
+  }
+  return most / way;
+}
+
+class LatePoints : public testing::TestWithParam<const char *> {};
+
+// Numbers that are not finite in all points that a step has no need of: it reads none and writes none.
+TEST_P(LatePoints, StepWithContact_LeavesInnerPointsAlone) {
+  const Probed w(GetParam()), whole(GetParam());
+  test::run(w.world, 0.05, 1e-3);
+  test::run(whole.world, 0.05, 1e-3);
+  dfm::Body &b = w.inside();
+  std::vector<uint8_t> near(b.p.n, 0);
+  for (uint32_t s = 0; s < b.surface.nsurfel; ++s) near[b.surface.point[s]] = 1;
+  uint32_t inner = 0;
+  for (uint32_t i = 0; i < b.p.n; ++i) {
+    if (near[i] || b.p.held[i]) continue;
+    ++inner;
+    for (dfm::Array<double> *a : {&b.p.x, &b.p.v, &b.p.x_end, &b.p.v_end})
+      for (size_t k = 0; k < 3; ++k) (*a)[4 * size_t(i) + k] = kNan;
+  }
+  ASSERT_GT(inner, 100u);
+  test::run(w.world, 0.1, 1e-3);
+  test::run(whole.world, 0.1, 1e-3);
+  ASSERT_GT(w.contacts(), 0u);
+  uint32_t untouched = 0;
+  for (uint32_t i = 0; i < b.p.n; ++i) untouched += std::isnan(b.p.x[4 * size_t(i)]);
+  EXPECT_EQ(untouched, inner);
+  EXPECT_EQ(dfm_world_hash(w.world), dfm_world_hash(whole.world));
+  for (const double x : w.state().x) ASSERT_TRUE(std::isfinite(x));
+}
+
+TEST_P(LatePoints, SeenAfterEachStepOrNever_AreTheSame) {
+  const Probed a(GetParam()), b(GetParam());
+  for (int n = 0; n < 200; ++n) {
+    test::run(a.world, 1e-3, 1e-3);
+    a.state();
+  }
+  for (int n = 0; n < 200; ++n) test::run(b.world, 1e-3, 1e-3);
+  ASSERT_GT(b.contacts(), 0u);
+  EXPECT_EQ(dfm_world_hash(a.world), dfm_world_hash(b.world));
+}
+
+// The same body where the points lead in each step, so that all of them are moved. Few modes are so hard that
+// the probe comes to its first contact with blows, each of which sticks or slips by the last digits: without
+// friction none does.
+TEST_P(LatePoints, OfASlidingProbe_AreThoseOfAStepThatMovesAll) {
+  std::vector<std::string> more;
+  if (!std::strcmp(GetParam(), "modal")) more.push_back("/contact/friction/0/params/mu=0");
+  const Probed late(GetParam(), more), whole(GetParam(), more);
+  for (int n = 0; n < 300; ++n) {
+    test::run(late.world, 1e-3, 1e-3);
+    whole.touch();
+    test::run(whole.world, 1e-3, 1e-3);
+  }
+  ASSERT_GT(late.contacts(), 0u);
+  EXPECT_LT(apart(late, whole), 1e-8);
+}
+
+// What a step cannot do near the surface alone: held points that move, a load on some points.
+TEST_P(LatePoints, OfABodyThatIsMovedOrLoaded_AreThoseOfAStepThatMovesAll) {
+  const Probed late(GetParam()), whole(GetParam());
+  std::vector<uint32_t> held, top{late.inside().surface.point[late.inside().surface.nsurfel / 2]};
+  for (uint32_t i = 0; i < late.inside().p.n; ++i)
+    if (late.inside().p.held[i]) held.push_back(i);
+  dfm_pose_key keys[3]{};
+  for (int k = 0; k < 3; ++k) {
+    keys[k].t = 0.02 + 0.02 * k;
+    keys[k].pose.rotation[3] = 1;
+    keys[k].pose.position[0] = k ? 0.004 : 0;
+  }
+  const double force[] = {0, 0, 0.05};
+  for (const Probed *p : {&late, &whole}) {
+    const std::vector<double> x = p->state().x;
+    test::ok(dfm_body_move_held(p->body, uint32_t(held.size()), held.data(), 3, keys, nullptr));
+  }
+  for (int n = 0; n < 150; ++n) {
+    if (n == 80 || n == 120)
+      for (const Probed *p : {&late, &whole}) {
+        if (n == 80) test::ok(dfm_body_add_load(p->body, 1, top.data(), force, 0, nullptr, nullptr, nullptr));
+        else test::ok(dfm_body_remove_load(p->body, 1));
+      }
+    test::run(late.world, 1e-3, 1e-3);
+    whole.touch();
+    test::run(whole.world, 1e-3, 1e-3);
+  }
+  EXPECT_LT(apart(late, whole), 1e-8);
+}
+
+TEST_P(LatePoints, AfterABlowOfTheHost_MoveAsItSays) {
+  const Probed w(GetParam());
+  test::run(w.world, 0.05, 1e-3);
+  const double point[] = {0.15, 0.1, 0.1}, impulse[] = {0, 0, -0.02};
+  const dfm_body_measure before = test::measure(w.body);
+  test::ok(dfm_body_apply_impulse(w.body, point, impulse));
+  EXPECT_NEAR(test::measure(w.body).momentum[2] - before.momentum[2], -0.02, 1e-12);
+  const Probed none(GetParam());
+  test::run(none.world, 0.05, 1e-3);
+  test::run(w.world, 3e-3, 1e-3);
+  test::run(none.world, 3e-3, 1e-3);
+  EXPECT_LT(test::measure(w.body).momentum[2], test::measure(none.body).momentum[2] - 1e-3);
+  test::ok(dfm_body_set_state(w.body, w.inside().p.n, w.state().x.data(),
+                              std::vector<double>(3 * w.inside().p.n, 0.0).data()));
+  EXPECT_EQ(test::measure(w.body).speed_max, 0);
+}
+
+TEST_P(LatePoints, SavedAndRestored_GoOnWithTheSameBits) {
+  const Probed a(GetParam()), b(GetParam());
+  test::run(a.world, 0.12, 1e-3);
+  const std::string saved = test::snapshot(a.world);
+  test::run(a.world, 0.1, 1e-3);
+  test::run(b.world, 0.03, 1e-3);
+  test::ok(dfm_world_restore(b.world, saved.data(), saved.size()));
+  test::run(b.world, 0.1, 1e-3);
+  EXPECT_EQ(dfm_world_hash(a.world), dfm_world_hash(b.world));
+}
+
+INSTANTIATE_TEST_SUITE_P(Of, LatePoints, testing::Values("modal", "condensed"),
+                         [](const auto &one) { return std::string(one.param); });
+
+}  // namespace
