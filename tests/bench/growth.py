@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 """How the cost of a step grows: with the tetrahedra of a body, with the bodies of a pile.
 
-growth.py DEFORM_COMMAND OUT.csv [--commit ID] [--compiler NAME] [--repeats N] [--only body|pile|counted]
+growth.py DEFORM_COMMAND OUT.csv [--commit ID] [--compiler NAME] [--repeats N] [--only body|pile|counted|heap]
 
 body: a cantilever of 1e3 to 1e6 cells (msm, no contact) and the same body on a floor; per cell and sub-step.
+heap: largest resident memory of a pile of 160 to 1,000 balls beyond that of 10, kB per ball.
 pile: 10 to 1,000 balls that have fallen onto a floor in columns of up to ten; us per body, per contact.
 counted: the same by instructions (callgrind, up to 1e5 cells and 160 balls), which a busy machine does not
 change.
@@ -77,6 +78,20 @@ def run(command, content, repeats):
     return best
 
 
+def resident(command, content):
+    """Largest resident memory of the run, kB."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = pathlib.Path(folder) / "scene.json"
+        path.write_text(json.dumps(content))
+        child = subprocess.Popen([command, "run", str(path), "--out", str(pathlib.Path(folder) / "run"),
+                                  "--quiet", "--threads", "1"], stdout=subprocess.DEVNULL)
+        _, status, used = os.wait4(child.pid, 0)
+        child.returncode = status
+        if status != 0:
+            sys.exit("growth.py: the run for its memory failed")
+        return used.ru_maxrss
+
+
 def counted(command, content):
     """Instructions of dfm_world_step in libdeform and its plugins, and the run's summary."""
     with tempfile.TemporaryDirectory() as folder:
@@ -125,6 +140,12 @@ def main():
             early, late = (run(options.command, pile(count, steps), options.repeats) for steps in (200, 300))
             cost = (late["cpu_s"] - early["cpu_s"]) / (late["substeps"] - early["substeps"])
             note("pile", count, late, "per body and sub-step", 1e6 * cost / count, "us")
+    if options.only in ("", "heap"):
+        few = resident(options.command, pile(10, 40))
+        for count in (160, 640, 1000):
+            more = resident(options.command, pile(count, 40)) - few
+            note("pile resident", count, {"contacts": {"mean": 0}, "substeps": 40}, "per further body",
+                 more / (count - 10), "kB")
     if options.only in ("", "counted"):
         for cells, steps in ((1000, 40), (10000, 20), (100000, 10)):
             early, late = (counted(options.command, beam(cells, False, n * steps)) for n in (1, 2))

@@ -121,8 +121,8 @@ void SelfStepping::see_ends() {
   k.x = p_.x_end.data();
   k.v = p_.v_end.data();
   k.state = model_.state_out.data();
-  model_.call(
-      "points", [&] { return model_.late->points(model_.self, &k, p_.x_end.data(), p_.v_end.data()); });
+  model_.call("points",
+              [&] { return model_.late->points(model_.self, &k, p_.x_end.data(), p_.v_end.data()); });
   model_.call("look", [&] { return model_.late->look(model_.self, model_.state_out.data()); });
 }
 

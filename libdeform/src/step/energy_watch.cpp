@@ -114,7 +114,9 @@ bool look(World &w, const StepContext &step, Body &b, EnergyLook &out) {
   if (!hides(b) && b.model.call("energy", ask) != DFM_OK) return false;
   // it was asked between its prediction and its commit, which may share memory with the answer
   double again = 0;
-  if (steps_itself(b) && !hides(b) && !b.dynamics->free_motion(sub_step_of(w, step), again)) return false;
+  if (steps_itself(b) && (!hides(b) || b.dynamics->late()) &&
+      !b.dynamics->free_motion(sub_step_of(w, step), again))
+    return false;
   const double drift = kPositionDigits * reach / step.h;
   const double half_done = ends ? 0 : work_of_holders(w, step, b, false) + work_of_new_size(w, step, b);
   out = {kinetic,

@@ -6,6 +6,7 @@
 #include "step/stages.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "core/error.h"
 #include "dynamics/relative_work.h"
@@ -187,6 +188,7 @@ void make_pair_tables(World &w, StepContext &step, SceneFacts &facts) {
   w.pairs.zone_law.clear();
   for (auto &law : w.laws) law->by_default = false;
   std::vector<uint32_t> used;
+  std::vector<uint8_t> told;  // by law: what it offers is a fact of the scene, however many pairs have it
   for (uint32_t i = 0; i < nb; ++i) {
     const Partner a = partner_of(w, step, i);
     for (uint32_t j = 0; j < width; ++j) {
@@ -202,7 +204,9 @@ void make_pair_tables(World &w, StepContext &step, SceneFacts &facts) {
       if (is_body) facts.body_pairs += i < j;
       else ++facts.obstacle_pairs;
       find_law(w, i, j, used);
-      for (uint32_t law : used) offer_law(*w.laws[law], facts);
+      told.resize(w.laws.size());
+      for (uint32_t law : used)
+        if (!std::exchange(told[law], uint8_t{1})) offer_law(*w.laws[law], facts);
     }
   }
   keep_overlaps_aside(w);
