@@ -1,0 +1,101 @@
+#!/usr/bin/env python3
+"""Frames of scenes side by side: scenes.png, fill_drop.png, pressed_ring.png, rigid.png, ode_scenes.png,
+stability.png.
+
+scene_frames.py DEFORM_COMMAND [NAME.png...] [--out FOLDER]
+
+Without names all of them; ode_scenes.png simulates 40 s of the gripper.
+"""
+import argparse
+import math
+import pathlib
+import subprocess
+import tempfile
+
+import matplotlib.image
+import numpy as np
+
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+SUITE = "../../tests/stability/suite/"
+SLIDES = ("/contact/friction/0/params/mu=0",)
+EXPLICIT = ("/time/integrator=symplectic_euler",)
+# as tests/stability/suite/hand.expect.json has it moved
+FIST = (*EXPLICIT, '/obstacles/1={"name": "fist", "shape": "sphere", "radius": 0.04, "motion": {"keyframes":'
+        ' [{"t": 0.3, "position": [-0.3, 0.05, 0.06]}, {"t": 0.45, "position": [0.45, 0.05, 0.06]}]}}')
+SCRAMBLE = ('/bodies/0/start={"scramble": 1}', '/bodies/0/model={"type": "corotational_fem"}',
+            "/time/integrator=implicit_euler", "/contact/method=implicit", "/time/step=0.016666666666666666")
+# picture: rows of (label, [(scene, what is set, time in s)]); edge to edge where the label is None
+PICTURES = {
+    "scenes.png": [
+        ("ten bodies: 0, 1, 2 s", [("ten_bodies", (), t) for t in (0, 1, 2)]),
+        ("beams; a ball rolls; slides", [("gravity_beams", (), 2), ("ball_incline", (), 1),
+                                         ("ball_incline", SLIDES, 1)])],
+    "fill_drop.png": [("0, 0.4, 1.8 s", [("fill_drop", (), t) for t in (0, 0.4, 1.8)])],
+    "pressed_ring.png": [(None, [("pressed_ring", (), 0.5)])],
+    "rigid.png": [("rigid_on_ball", [("rigid_on_ball", (), t) for t in (0, 1, 2)]),
+                  ("rigid_on_bed", [("rigid_on_bed", (), t) for t in (0, 0.5, 2)]),
+                  ("rigid_pinch", [("rigid_pinch", (), t) for t in (0, 1.5, 3)])],
+    "stability.png": [("arch", [(SUITE + "arch", EXPLICIT, t) for t in (0, 0.3)]),
+                      ("card house", [(SUITE + "card_house", EXPLICIT, t) for t in (0, 0.3)]),
+                      ("hand", [(SUITE + "hand", FIST, t) for t in (0.35, 0.4)]),
+                      ("start: scramble", [(SUITE + "start_floor", SCRAMBLE, t) for t in (0, 0.4)])],
+    "ode_scenes.png": [(None, [("ode_cart", (), 0.625), ("ode_cart", (), 1.125)]),
+                       (None, [("ode_bed", (), 0.25), ("ode_gripper", (), 40)]),
+                       (None, [("ode_chain", (), 1.25), ("ode_seesaw", (), 1)])],
+}
+
+
+def frames(command, work, wanted):
+    """{(scene, what is set, time): file} of the frames wanted; each scene runs once."""
+    runs = {}
+    for scene, settings, time in wanted:
+        runs.setdefault((scene, settings), set()).add(time)
+    files = {}
+    for (scene, settings), times in runs.items():
+        period = max(times)
+        for time in times - {0}:
+            period = math.gcd(round(1000 * period), round(1000 * time)) / 1000
+        out = work / str(len(files))
+        file = ROOT / "examples/scenes" / f"{scene}.json"
+        subprocess.run([command, "run", str(file), "--quiet", "--out", str(out), "--frames",
+                        f"{1 / period:.9g}", "--time", str(max(times)),
+                        *(word for setting in settings for word in ("--set", setting))], check=True)
+        for time in times:
+            files[scene, settings, time] = out / f"frames/frame_{round(time / period):06d}.png"
+    return files
+
+
+def smaller(full, n):
+    """Each pixel the mean of n x n."""
+    rows, columns = (size // n for size in full.shape[:2])
+    return full[:rows * n, :columns * n].reshape(rows, n, columns, n, 3).mean(axis=(1, 3))
+
+
+def pixels(file):
+    return matplotlib.image.imread(file)[..., :3]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("command")
+    parser.add_argument("names", nargs="*", metavar="NAME.png", choices=[[], *PICTURES])
+    parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path(__file__).parent)
+    options = parser.parse_args()
+    for name in options.names or PICTURES:
+        rows = PICTURES[name]
+        with tempfile.TemporaryDirectory() as work:
+            files = frames(options.command, pathlib.Path(work), [f for _, row in rows for f in row])
+            found = [(label, [str(files[f]) for f in row]) for label, row in rows]
+            out = options.out / name
+            if found[0][0] is not None:
+                words = [word for label, row in found for word in ("--row", label, *row)]
+                subprocess.run([options.command, "montage", *words, "--out", str(out)], check=True)
+                picture = smaller(pixels(out), len(found[0][1]))
+            else:
+                picture = np.vstack([np.hstack([pixels(file) for file in row]) for _, row in found])
+                picture = smaller(picture, len(found[0][1]))
+            matplotlib.image.imsave(out, np.clip(picture, 0, 1))
+
+
+if __name__ == "__main__":
+    main()
