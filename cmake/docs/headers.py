@@ -209,7 +209,7 @@ class Reference:
         for header, (intro, entries) in self.parsed.items():
             said = re.sub(rf"^deform/{re.escape(header)}\s+--\s+", "", intro)
             said = said if "_" in said.split()[0] else said[:1].upper() + said[1:]
-            first = re.split(r"(?<=[.:])\s", said.replace("\n", " "), maxsplit=1)[0].rstrip(".:")
+            first = re.split(r"(?<=[.])\s", said.replace("\n", " "), maxsplit=1)[0].rstrip(".")
             rows.append(f"| [{header}]({page(header)}) | {self.marked(first)} |")
             text = [f"# {header}", self.comment(said), f"`#include <deform/{header}>`"]
             for entry in entries:
