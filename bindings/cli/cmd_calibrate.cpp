@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <ctime>
 #include <functional>
 #include <memory>
@@ -20,6 +21,7 @@ namespace {
 
 constexpr double kFrame = 1.0 / 60;  // s
 constexpr double kYoung = 1e5, kPoisson = 0.3, kDensity = 1000, kGravity = 9.81;
+constexpr double kUsed = 0.9;   // of the proven step
 constexpr double kShare = 0.2;  // s of processor time for one figure
 
 double processor_time() { return double(std::clock()) / CLOCKS_PER_SEC; }
@@ -56,10 +58,22 @@ class Bar {
     need(dfm_world_stable_step(world_, &h, nullptr, nullptr));
     return h;
   }
+  // s, what the step is proven for; the plan has the part that is used (doc/concepts/step.md)
+  double bound() const {
+    size_t bytes = 0;
+    need(dfm_world_explain(world_, nullptr, &bytes));
+    std::string text(bytes, '\0');
+    need(dfm_world_explain(world_, text.data(), &bytes));
+    JsonValue plan;
+    const bool good = parse_json(text.substr(0, text.find('\0')), plan);
+    const JsonValue *const step = good ? plan.find("step") : nullptr;
+    if (!step) throw Failure(kBadInput, "the plan of a bar has no step");
+    return std::strtod(step->get("stable_s").c_str(), nullptr) / kUsed;
+  }
   // s, in which a pressure wave goes by the size that the planner takes for that of cells
   double wave_time() const {
     const double modulus = kYoung * (1 - kPoisson) / ((1 + kPoisson) * (1 - 2 * kPoisson));
-    return info_.edge_min * info_.quality_min / std::sqrt(modulus / kDensity);
+    return info_.wave_path / std::sqrt(modulus / kDensity);
   }
   void step(double h) const {
     const dfm_status status = dfm_world_step(world_, h, nullptr);
@@ -224,7 +238,7 @@ class Calibration {
     }
     return JsonObject()
         .add("format", quoted("deform-costs"))
-        .add("version", "1")
+        .add("version", "2")
         .add("machine", quoted(machine))
         .add("models", json_array(rows))
         .text();
@@ -264,7 +278,7 @@ class Calibration {
     return JsonObject()
         .add("model", quoted(short_name(id)))
         .add("steps_itself", itself ? "true" : "false")
-        .add("step_factor", number(itself ? 0 : stable / bar.wave_time()))
+        .add("wave_steps", number(itself ? 0 : bar.bound() / bar.wave_time()))
         .add("errors", errors.text())
         .add("costs", costs.text())
         .text();

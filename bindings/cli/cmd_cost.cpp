@@ -37,11 +37,11 @@ std::vector<std::string> split(const std::vector<std::string> &lists) {
   return out;
 }
 
-int cost_of(CostOptions options, const Globals &globals) {
+int cost_of(CostOptions options, Globals &globals) {
   if (options.out.empty())
     options.out = "out/" + std::filesystem::path(options.scene).stem().string() + "_cost";
   options.study.axes = split(options.study.axes);
-  const cost::Subject subject = cost::read_subject(options.scene);
+  const cost::Subject subject = cost::read_subject(options.scene, globals);
   make_folder(options.out);
   const std::string cells_stay = cost::why_cells_stay(subject);
   const cost::Surfaces surfaces = cells_stay.empty()

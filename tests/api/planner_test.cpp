@@ -107,7 +107,7 @@ TEST_F(PlannerScene, Calibrate_WritesWhatScenesTake) {
   expect_refused(bar(R"("accuracy": {"target": 0.2},)", R"("model": {"type": "msm"}, )"),
                  {"/accuracy", "deform calibrate"});
   test::write_file(folder() + "/deform/costs.json",
-                   R"({"format": "deform-costs", "version": 1, "machine": 3})");
+                   R"({"format": "deform-costs", "version": 2, "machine": 3})");
   expect_refused(bar(R"("accuracy": {"target": 0.2},)"), {"costs.json", "/machine"});
   std::remove((folder() + "/deform/costs.json").c_str());
 }

@@ -3,8 +3,11 @@
 cantilever and dropped on a floor, and what the energy watch says. A row each; rows that the table has are
 left alone, so that the run may be stopped and taken up again.
 
-auto_study.py DEFORM_COMMAND TABLE.csv [--steps N] [--seconds N] [--only TEXT]
-    N steps of each row (100000), the row being left out that takes more than N seconds (300)
+auto_study.py DEFORM_COMMAND TABLE.csv [--steps N] [--seconds N] [--only TEXT] [--but TEXT]
+             [--meshes FOLDER]...
+    N steps of each row (100000), the row being left out that takes more than N seconds (300). Meshes are all
+    of tetrahedra in the folders (examples/data), the coarsest first; where a model does not take a mesh, the
+    row says so.
 """
 import argparse
 import csv
@@ -14,17 +17,18 @@ import subprocess
 import tempfile
 
 DATA = pathlib.Path(__file__).resolve().parents[2] / "examples/data"
+SUFFIXES = (".msh", ".vtk", ".vtu", ".mesh")
 UNDAMPED = {"damping_mass": 0, "damping_stiffness": 0}
 # shape_matching calls the damping of its shape by another name
 MODELS = {"msm": {}, "linear_fem": {}, "corotational_fem": {}, "meshless": {}, "modal": {}, "condensed": {},
           "shape_matching": {"damping_ratio": 0}}
 CASES = ("spin", "cantilever", "drop")
-COLUMNS = ("row", "step_s", "simulated_s", "steps", "substeps", "exit", "start_J", "max_J", "end_J", "gain_J",
-           "says")
+COLUMNS = ("row", "points", "step_s", "simulated_s", "steps", "substeps", "exit", "start_J", "max_J", "end_J",
+           "gain_J", "says")
 
 
 def scene(mesh, low, case, model, params):
-    body = {"name": "body", "mesh": str(DATA / f"{mesh}.msh"), "material": "rubber",
+    body = {"name": "body", "mesh": str(mesh), "material": "rubber",
             "model": {"type": model, "params": params}}
     out = {"format": "deform-scene", "version": 1, "time": {"duration": 1, "step": "auto"},
            "gravity": [0, 0, 0],
@@ -48,8 +52,10 @@ def deform(command, *arguments, seconds=None):
 
 
 def step_of(command, path):
-    plan = json.loads(deform(command, "explain", path, "--json").stdout)
-    return plan["step"]["stable_s"]
+    done = deform(command, "explain", path, "--json")
+    if done.returncode:
+        raise ValueError(" ".join(done.stderr.split()).replace(path, "scene")[:300])
+    return json.loads(done.stdout)["step"]["stable_s"]
 
 
 def run(command, definition, steps, seconds):
@@ -57,8 +63,8 @@ def run(command, definition, steps, seconds):
         path, out = f"{folder}/scene.json", f"{folder}/run"
         pathlib.Path(path).write_text(json.dumps(definition))
         bound = step_of(command, path)
-        # a model that nothing bounds takes the display's step
-        step = 0.8 * bound if bound else 1 / 60
+        # what nothing bounds takes the step of the command itself
+        step = 0.8 * bound if bound else 1e-3
         definition["time"]["duration"] = steps * step
         definition["output"]["every"] = steps * step / 1000
         pathlib.Path(path).write_text(json.dumps(definition))
@@ -87,30 +93,52 @@ def main():
     parser.add_argument("--steps", type=int, default=100000)
     parser.add_argument("--seconds", type=float, default=300)
     parser.add_argument("--only", default="")
+    parser.add_argument("--but", metavar="TEXT")
+    parser.add_argument("--meshes", action="append", metavar="FOLDER")
     options = parser.parse_args()
     done = {row["row"] for row in csv.DictReader(options.table.open())} if options.table.exists() else set()
-    for mesh in ("block", "cylinder_slim"):
-        info = deform(options.command, "mesh", "info", str(DATA / f"{mesh}.msh"), "--json").stdout
-        low = json.loads(info)["lo"]
-        for model, own in MODELS.items():
-            for case in CASES:
-                for volume in ([None, 0] if model == "msm" else [None]):
-                    name = f"{mesh} {model} {case}" + (" volume 0" if volume == 0 else "")
-                    if name in done or options.only not in name:
-                        continue
-                    params = {**own, **({"volume": 0} if volume == 0 else {})}
-                    try:
-                        row = run(options.command, scene(mesh, low, case, model, params), options.steps,
-                                  options.seconds)
-                    except subprocess.TimeoutExpired:
-                        row = {"says": f"takes more than {options.seconds:g} s"}
-                    new = not options.table.exists()
-                    with options.table.open("a", newline="") as file:
-                        writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
-                        if new:
-                            writer.writeheader()
-                        writer.writerow({"row": name, **row})
-                    print(name, row, flush=True)
+    for points, low, name, mesh in meshes(options.command, options.meshes or [DATA]):
+        for model, case, volume in kinds():
+            row = f"{name} {model} {case}" + (" volume 0" if volume == 0 else "")
+            if row in done or options.only not in row or (options.but and options.but in row):
+                continue
+            params = {**MODELS[model], **({"volume": 0} if volume == 0 else {})}
+            try:
+                found = run(options.command, scene(mesh, low, case, model, params), options.steps,
+                            options.seconds)
+            except subprocess.TimeoutExpired:
+                found = {"says": f"takes more than {options.seconds:g} s"}
+            except ValueError as refusal:
+                found = {"says": str(refusal)}
+            new = not options.table.exists()
+            with options.table.open("a", newline="") as file:
+                writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
+                if new:
+                    writer.writeheader()
+                writer.writerow({"row": row, "points": points, **found})
+            print(row, found, flush=True)
+
+
+def kinds():
+    for model in MODELS:
+        for case in CASES:
+            for volume in ([None, 0] if model == "msm" else [None]):
+                yield model, case, volume
+
+
+def meshes(command, folders):
+    """(points, least corner, name, file), the coarsest first."""
+    found = []
+    for folder in folders:
+        for path in sorted(pathlib.Path(folder).rglob("*")):
+            if path.suffix not in SUFFIXES:
+                continue
+            done = deform(command, "mesh", "info", str(path), "--json")
+            info = json.loads(done.stdout) if done.returncode == 0 else {}
+            if info.get("tets", 0) > 1:
+                name = str(path.relative_to(folder).with_suffix(""))
+                found.append((info["points"], info["lo"], name, path))
+    return sorted(found)
 
 
 if __name__ == "__main__":

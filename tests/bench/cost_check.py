@@ -1,13 +1,17 @@
-"""Checks what `deform cost` shows against a run of ten times the cells.
+"""Checks what `deform cost` shows against runs that are ten times finer.
 
-python3 tests/bench/cost_check.py [--command build/release/bin/deform] [--scene SCENE.json] [--budget 120]
-[--target 0.05] [--out out/cost_check]
+python3 tests/bench/cost_check.py TABLE.csv [--command build/release/bin/deform] [--scene SCENE.json]
+[--budget 120] [--target 0.05] [--quantity tip] [--times 10] [--out out/cost_check]
 
-The check run has the reference's model, explicit steps at the proven bound, which shrink with the cells, and
-ten times the cells of the choice (of the front's most accurate member where nothing was chosen). The scene
-has probes. Printed for the reference and each member of the front: the error as shown, and the error against
-the check run, both root mean squares over time relative to how far the probes move. Records are compared by
-code of its own."""
+Two runs, both of the reference's model in explicit steps; the scene has probes:
+  shorter  the scene's own mesh, steps ten times shorter than the longest stable ones: what is said of
+           model and step on this mesh
+  finer    ten times (--times) the scene's cells, which shortens the steps with them: what is said of all
+           meshes
+Written for the references and the members of both fronts: the error as shown, and against these runs, root
+mean square over time relative to how far the probes move. Records are compared by code of its own. A run that
+OUT has is not run again.
+"""
 import argparse
 import bisect
 import csv
@@ -47,10 +51,14 @@ def error(mine, truth):
     return worst
 
 
+def cells_of(choice):
+    with open(os.path.join(choice["folder"], "summary.json")) as file:
+        return {name: body["cells"] for name, body in json.load(file)["bodies"].items()}
+
+
 def finer(scene, out, choice, times):
     """Words of --set that give every body so many times the cells of the choice."""
-    with open(os.path.join(choice["folder"], "summary.json")) as file:
-        cells = {name: body["cells"] for name, body in json.load(file)["bodies"].items()}
+    cells = cells_of(choice)
     words = []
     for i, body in enumerate(scene["bodies"]):
         surface = os.path.join(out, "surfaces", body["name"] + ".obj")
@@ -65,41 +73,60 @@ def finer(scene, out, choice, times):
     return words
 
 
+def run(options, folder, words):
+    if not os.path.exists(os.path.join(folder, "summary.json")):
+        command = [options.command, "run", options.scene, "--out", folder, "--quiet", "--threads", "1"]
+        for word in words:
+            command += ["--set", word]
+        subprocess.run(command, check=True)
+    return probes(folder)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("table")
     parser.add_argument("--command", default="build/release/bin/deform")
     parser.add_argument("--scene", default="examples/scenes/two_cylinders.json")
     parser.add_argument("--budget", default="120")
     parser.add_argument("--target", default="0.05")
+    parser.add_argument("--quantity", default="tip")
+    parser.add_argument("--times", type=float, default=10)
     parser.add_argument("--out", default="out/cost_check")
     options = parser.parse_args()
     subprocess.run([options.command, "cost", options.scene, "--budget", options.budget, "--target",
-                    options.target, "--out", options.out], check=True)
+                    options.target, "--quantity", options.quantity, "--out", options.out], check=True)
     with open(os.path.join(options.out, "cost.json")) as file:
         report = json.load(file)
     with open(options.scene) as file:
         scene = json.load(file)
-    choices = report["choices"]
+    choices, here = report["choices"], report["this_mesh"]
     reference = choices[report["reference"]["choice"]]
-    chosen = report["pick"]["index"] if report["pick"] else report["front"][-1]
-    words = finer(scene, options.out, choices[chosen], 10)
-    words += ['/time/integrator="symplectic_euler"', '/time/step="auto"']
+    words = ['/time/integrator="symplectic_euler"']
     for i in range(len(scene["bodies"])):
         model = reference["set"].get(f"/bodies/{i}/model")
         words += [f"/bodies/{i}/model={json.dumps(model)}"] if model else []
-    fine = os.path.join(options.out, "ten_times_finer")
-    command = [options.command, "run", options.scene, "--out", fine, "--quiet"]
-    for word in words:
-        command += ["--set", word]
-    subprocess.run(command, check=True)
-    truth = probes(fine)
-    print(f"the reference's own error: shown {report['reference']['error']}, "
-          f"against the check {error(probes(reference['folder']), truth):.4f}")
-    for i in report["front"]:
-        choice = choices[i]
-        print(f"{'* ' if i == chosen else '  '}{choice['label']}: shown {choice['headline']:.4f}, "
-              f"against the check {error(probes(choice['folder']), truth):.4f}, "
-              f"{choice['cpu_s_per_s']:.3g} s per s")
+    truths = {"finer": run(options, os.path.join(options.out, "finer"), words + ['/time/step="auto"'] +
+                           finer(scene, options.out, choices[0], options.times))}
+    shown = {"finer": {i: choices[i]["headline"] for i in report["front"]}}
+    shown["finer"][report["reference"]["choice"]] = report["reference"]["error"]
+    if here:
+        step = choices[here["check"]]["step"] / 10
+        truths["shorter"] = run(options, os.path.join(options.out, "shorter"),
+                                words + [f"/time/step={step:.6g}"])
+        shown["shorter"] = {row["choice"]: row["error"] for row in here["front"]}
+        shown["shorter"][here["choice"]] = here["error"]
+    picked = report["pick"]["index"] if report["pick"] else None
+    with open(options.table, "w", newline="") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(("against", "choice", "cells", "shown", "found", "cpu_s_per_s", "picked"))
+        for against, truth in truths.items():
+            for i, error_shown in shown[against].items():
+                choice = choices[i]
+                found = error(probes(choice["folder"]), truth)
+                row = (against, choice["label"], sum(cells_of(choice).values()), f"{error_shown:.4f}",
+                       f"{found:.4f}", f"{choice['cpu_s_per_s']:.3g}", "yes" if i == picked else "")
+                table.writerow(row)
+                print(*row, sep=", ")
 
 
 main()

@@ -84,6 +84,7 @@ class Finder {
   }
 
   std::string time_reason() const {
+    if (s_.at_rest) return "the scene is static: nothing moves";
     for (size_t i = 0; i < s_.bodies.size(); ++i)
       if (s_.find("/bodies/" + std::to_string(i) + "/integrator"))
         return "body '" + s_.bodies[i].name + "' names an integrator of its own";

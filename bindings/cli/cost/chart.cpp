@@ -103,12 +103,12 @@ class Chart {
       }
     c_.line(kLeft, y_.from, x_.to, y_.from, 1.5, kText, false);
     c_.line(kLeft, kTop, kLeft, y_.from, 1.5, kText, false);
-    c_.text((kLeft + x_.to) / 2, kChartHeight - 20, 10, "processor seconds for a simulated second", kText,
-            0.5);
+    c_.text((kLeft + x_.to) / 2, kChartHeight - 20, 10,
+            s_.at_rest ? "processor seconds" : "processor seconds for a simulated second", kText, 0.5);
     std::string of = t_.headline[0];
     if (t_.headline.size() > 1) of = "the largest of " + std::to_string(t_.headline.size()) + " quantities";
     c_.text(kLeft - 8, kTop - 9, 9, "error of " + of, kText, 0);
-    if (x_.lo < 0 && x_.hi > 0) {
+    if (!s_.at_rest && x_.lo < 0 && x_.hi > 0) {
       c_.line(x_.at(1), kTop, x_.at(1), y_.from, 1.5, kGray, true);
       c_.text(x_.at(1) + 5, kTop + 12, 8, "real time on one core", kGray, 0);
     }
@@ -123,7 +123,7 @@ class Chart {
   std::string tip(size_t i) const {
     const Row &row = t_.rows[i];
     return row.job.label + ": " + percent(row.headline) + ", " +
-           plain(std::round(1e4 * row.cpu_per_s) / 1e4) + " s per s";
+           plain(std::round(1e4 * row.cpu_per_s) / 1e4) + " " + t_.cost_unit;
   }
 
   void points() {
@@ -149,6 +149,14 @@ class Chart {
       c_.disc(x, y, picked ? 8.5 : 6.5, kPaper, "");
       c_.disc(x, y, picked ? 7 : 5.5, ink_of(i), tip(i));
       c_.text(x + 11, y - 8, 9, std::to_string(k + 1), kText, 0);
+    }
+    if (t_.mesh_stays && shown(size_t(t_.pick))) {
+      const Row &row = t_.rows[size_t(t_.pick)];
+      const double x = x_.at(row.cpu_per_s), y = y_.at(row.headline);
+      c_.disc(x, y, 11, kTarget, "");
+      c_.disc(x, y, 8.5, kPaper, "");
+      c_.disc(x, y, 7, ink_of(size_t(t_.pick)), tip(size_t(t_.pick)));
+      c_.text(x + 13, y + 4, 8, "chosen on this mesh", kTarget, 0);
     }
     if (!shown(0)) return;
     const double x = x_.at(t_.rows[0].cpu_per_s), y = y_.at(t_.rows[0].headline);

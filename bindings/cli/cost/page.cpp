@@ -1,5 +1,6 @@
 #include "page.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -54,7 +55,8 @@ std::string cells(const std::string &label, double error, const Row &row) {
 }
 
 std::string front_table(const Study &study) {
-  std::string out = "<table><tr><th></th><th>error</th><th>s per s</th><th>choice</th></tr>\n";
+  std::string out =
+      std::string("<table><tr><th></th><th>error</th><th>") + study.cost_unit + "</th><th>choice</th></tr>\n";
   for (size_t k = 0; k < study.front.size(); ++k) {
     const size_t i = study.front[k];
     out += std::string("<tr") + (int(i) == study.pick ? " class=\"pick\"" : "") + "><td class=\"n\">" +
@@ -66,12 +68,31 @@ std::string front_table(const Study &study) {
   return out + "</table>\n";
 }
 
+std::string own_mesh(const Study &study) {
+  const OnThisMesh &own = study.own_mesh;
+  if (own.reference < 0) return "";
+  std::string out = "<h2>On this mesh: model and step alone</h2>\n<p>" + escaped(mesh_text(study)) +
+                    "</p>\n<table><tr><th>error</th><th>" + study.cost_unit + "</th><th>choice</th></tr>\n";
+  for (const size_t i : own.front)
+    out += std::string("<tr") + (int(i) == study.pick ? " class=\"pick\"" : "") + ">" +
+           cells(study.rows[i].job.label, own.error.at(i), study.rows[i]);
+  return out + "</table>\n";
+}
+
 std::string pictures(const Study &study) {
   std::vector<std::pair<size_t, std::string>> shown;
   shown.emplace_back(size_t(study.reference), "the reference");
   shown.emplace_back(0, "the scene as it is");
   for (size_t k = 0; k < study.front.size(); ++k)
     if (study.front[k] != 0) shown.emplace_back(study.front[k], "front " + std::to_string(k + 1));
+  const auto listed = [&](size_t i) {
+    return std::any_of(shown.begin(), shown.end(), [&](const auto &one) { return one.first == i; });
+  };
+  for (const size_t i : study.own_mesh.front)
+    if (!listed(i)) shown.emplace_back(i, "on this mesh");
+  // times taken alone may have moved a member off its front
+  for (size_t i = 0; i < study.rows.size(); ++i)
+    if (!study.rows[i].picture.empty() && !listed(i)) shown.emplace_back(i, "beside the front");
   std::string out;
   for (const auto &[i, what] : shown) {
     const Row &row = study.rows[i];
@@ -81,8 +102,8 @@ std::string pictures(const Study &study) {
            "><img alt=\"the scene at its end\" src=\"data:image/png;base64," +
            base64(read_file(row.picture, 64u << 20, "a picture")) + "\"><figcaption><b>" + what +
            "</b>: " + (own ? "" : escaped(row.job.label) + ", ") +
-           (int(i) == study.reference ? "" : percent(row.headline) + ", ") + figure_3(row.cpu_per_s) +
-           " s per s</figcaption></figure>\n";
+           (int(i) == study.reference ? "" : percent(row.headline) + ", ") + figure_3(row.cpu_per_s) + " " +
+           study.cost_unit + "</figcaption></figure>\n";
   }
   if (out.empty()) return "";
   return "<h2>Side by side, at the end of the scene</h2>\n<div class=\"pictures\">\n" + out + "</div>\n";
@@ -95,7 +116,7 @@ std::string separated(const Study &study) {
       "of time, space, model and contact do not mix.</p>\n";
   for (const Separated &part : study.separated) {
     out += "<h3>" + part.axis + "</h3>\n<p>against " + escaped(study.rows[part.anchor].job.label) +
-           "</p>\n<table><tr><th>difference</th><th>s per s</th><th>choice</th></tr>\n";
+           "</p>\n<table><tr><th>difference</th><th>" + study.cost_unit + "</th><th>choice</th></tr>\n";
     for (const auto &[i, e] : part.rows)
       if (i != part.anchor) out += "<tr>" + cells(study.rows[i].job.label, e, study.rows[i]);
     out += "</table>\n";
@@ -142,13 +163,16 @@ std::string page_html(const Subject &subject, const Study &study) {
          "content=\"width=device-width\"><title>What accuracy costs: " +
          name + "</title><style>" + kStyle + "</style></head>\n<body>\n<h1>What accuracy costs: " + name +
          "</h1>\n<p>Error of " + of +
-         ": root mean square over time of the difference from the reference, relative to how far the "
-         "reference moves. "
-         "Cost: seconds of processor time for a simulated second.</p>\n<p" +
+         (subject.at_rest
+              ? ": difference from the reference at the end, relative to how far the reference moves. "
+                "Cost: seconds of processor time.</p>\n<p"
+              : ": root mean square over time of the difference from the reference, relative to how "
+                "far the reference moves. Cost: seconds of processor time for a simulated second.</p>\n"
+                "<p") +
          (study.converged ? "" : " class=\"warn\"") + ">" + escaped(reference_text(study)) + "</p>\n" +
          svg_chart(subject, study) + "<h2>What to take</h2>\n<pre>" + escaped(pick_text(study)) + "</pre>\n" +
-         "<h2>The front: nothing cheaper is as accurate</h2>\n" + front_table(study) + pictures(study) +
-         separated(study) + not_run(study) + "</body></html>\n";
+         "<h2>The front: nothing cheaper is as accurate</h2>\n" + front_table(study) + own_mesh(study) +
+         pictures(study) + separated(study) + not_run(study) + "</body></html>\n";
 }
 
 }  // namespace cli::cost

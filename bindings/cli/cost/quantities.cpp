@@ -145,26 +145,6 @@ void read_contacts(const Table &contacts, const std::vector<double> &times, Quan
   }
 }
 
-// At a time between two records: cubic by values and rates where there are rates, else straight.
-void at_time(const Quantity &q, double t, double *out) {
-  const size_t n = q.t.size();
-  size_t i = size_t(std::upper_bound(q.t.begin(), q.t.end(), t) - q.t.begin());
-  i = std::clamp<size_t>(i, 1, n > 1 ? n - 1 : 1) - 1;
-  for (unsigned k = 0; k < q.width; ++k) {
-    const double a = q.values[i * q.width + k];
-    if (n < 2) {
-      out[k] = a;
-      continue;
-    }
-    const double b = q.values[(i + 1) * q.width + k];
-    const double h = q.t[i + 1] - q.t[i], s = std::clamp((t - q.t[i]) / h, 0.0, 1.0);
-    out[k] = a + s * (b - a);
-    if (q.rates.empty()) continue;
-    const double va = h * q.rates[i * q.width + k], vb = h * q.rates[(i + 1) * q.width + k];
-    out[k] = a + s * s * (3 - 2 * s) * (b - a) + s * (1 - s) * ((1 - s) * va - s * vb);
-  }
-}
-
 }  // namespace
 
 Quantities read_quantities(const std::string &folder) {
@@ -178,6 +158,25 @@ Quantities read_quantities(const std::string &folder) {
     if (const double t = bodies.number(row, "t"); times.empty() || t > times.back()) times.push_back(t);
   if (!times.empty()) read_contacts(read_table(folder + "/contacts.csv"), times, out);
   return out;
+}
+
+void value_at(const Quantity &q, double t, double *values, double *rates) {
+  const size_t n = q.t.size();
+  size_t i = size_t(std::upper_bound(q.t.begin(), q.t.end(), t) - q.t.begin());
+  i = std::clamp<size_t>(i, 1, n > 1 ? n - 1 : 1) - 1;
+  for (unsigned k = 0; k < q.width; ++k) {
+    const double a = q.values[i * q.width + k];
+    values[k] = a;
+    rates[k] = q.rates.empty() ? 0 : q.rates[i * q.width + k];
+    if (n < 2) continue;
+    const double b = q.values[(i + 1) * q.width + k];
+    const double h = q.t[i + 1] - q.t[i], s = std::clamp((t - q.t[i]) / h, 0.0, 1.0);
+    values[k] = a + s * (b - a);
+    if (q.rates.empty()) continue;
+    const double va = h * q.rates[i * q.width + k], vb = h * q.rates[(i + 1) * q.width + k];
+    values[k] = a + s * s * (3 - 2 * s) * (b - a) + s * (1 - s) * ((1 - s) * va - s * vb);
+    rates[k] = (va + s * (vb - va)) / h;
+  }
 }
 
 double scale_of(const Quantity &reference, double least, double duration) {
@@ -201,10 +200,10 @@ double error_of(const Quantity &q, const Quantity &reference, double scale) {
   }
   if (q.t.empty() || reference.t.empty() || !(scale > 0)) return kNever;
   // Weighted by time: records lie unevenly where steps are long.
-  double sum = 0, weight = 0, now[3];
+  double sum = 0, weight = 0, now[3], rates[3];
   for (size_t i = 0; i < q.t.size(); ++i) {
     const double before = i > 0 ? q.t[i - 1] : q.t[i], after = i + 1 < q.t.size() ? q.t[i + 1] : q.t[i];
-    at_time(reference, q.t[i], now);
+    value_at(reference, q.t[i], now, rates);
     for (unsigned k = 0; k < q.width; ++k) {
       const double d = q.values[i * q.width + k] - now[k];
       sum += (after - before) / 2 * d * d;

@@ -26,6 +26,10 @@ double scale_of(const Quantity &reference, double least, double duration);
 // Root mean square of the difference over time, divided by scale; NaN where it cannot be said.
 double error_of(const Quantity &q, const Quantity &reference, double scale);
 
+// [width], at a time between two records: cubic by values and rates where there are rates, else straight.
+// rates: 0 where there are none.
+void value_at(const Quantity &q, double t, double *values, double *rates);
+
 // Names of quantities that a word stands for: a quantity, or a family.
 std::vector<std::string> named(const Quantities &all, const std::string &word);
 

@@ -54,12 +54,36 @@ std::string choice_json(const Subject &subject, const Study &study, size_t i) {
   return out.text();
 }
 
+std::string limits_json(const Study &study) {
+  JsonObject out;
+  for (const auto &[name, limit] : study.limits) {
+    JsonObject one;
+    one.add("order", number(limit.order)).add("used", limit.used ? "true" : "false");
+    out.add(name, one.text());
+  }
+  return out.text();
+}
+
 std::string reference_json(const Study &study) {
   JsonObject out;
   out.add("choice", std::to_string(study.reference)).add("converged", study.converged ? "true" : "false");
   out.add("error", number(study.reference_headline)).add("errors", error_json(study.reference_error));
   out.add("check", study.check >= 0 ? std::to_string(study.check) : "null");
+  out.add("third", study.third >= 0 ? std::to_string(study.third) : "null").add("limits", limits_json(study));
   out.add("best_error_shown", number(study.best)).add("why", quoted(study.axes.reference_why));
+  return out.text();
+}
+
+std::string own_mesh_json(const Study &study) {
+  const OnThisMesh &own = study.own_mesh;
+  if (own.reference < 0) return "null";
+  std::vector<std::string> front;
+  for (const size_t i : own.front)
+    front.push_back("{\"choice\": " + std::to_string(i) + ", \"error\": " + number(own.error.at(i)) + "}");
+  JsonObject out;
+  out.add("choice", std::to_string(own.reference)).add("check", std::to_string(own.check));
+  out.add("error", number(own.own)).add("mesh_error", number(own.mesh)).add("front", json_array(front));
+  out.add("pick", own.pick < 0 ? "null" : std::to_string(own.pick));
   return out.text();
 }
 
@@ -108,7 +132,8 @@ void list_left_out(const Subject &subject, const Study &study, std::string &out)
 
 void list_axes(const Study &study, std::string &out) {
   out +=
-      "\none change at a time, from the scene as it is (difference from the axis' own finest; cpu s per s)\n";
+      std::string("\none change at a time, from the scene as it is (difference from the axis' own finest; ") +
+      "cpu " + study.cost_unit + ")\n";
   for (const Separated &part : study.separated) {
     out += "  " + part.axis + (part.axis == part.kind ? "" : " (" + part.kind + ")") + ": against " +
            study.rows[part.anchor].job.label + "\n";
@@ -147,14 +172,48 @@ Described describe(const Subject &subject, const Row &row) {
   return d;
 }
 
+namespace {
+std::string count_of(const Study &study, int row) {
+  return formatted("%.0f", study.rows[size_t(row)].job.outcome.cells);
+}
+
+// By what the reference's own error is known, of the quantity in which it is largest.
+std::string how_known(const Study &study) {
+  Limit worst;
+  for (const std::string &name : study.headline)
+    if (const auto found = study.limits.find(name);
+        found != study.limits.end() && !(found->second.error <= worst.error))
+      worst = found->second;
+  const std::string check = study.rows[size_t(study.check)].job.label;
+  const bool meshes = count_of(study, study.reference) != count_of(study, study.check);
+  if (worst.used)
+    return "taken on to cells without end from " + count_of(study, study.reference) + ", " +
+           count_of(study, study.check) + " and " + count_of(study, study.third) + " at the order " +
+           formatted("%.2g", worst.order) + " that they show";
+  std::string out = "against " + check;
+  if (!meshes) return out;
+  out += ", taken on at first order";
+  return study.third >= 0 ? out + ": with " + count_of(study, study.third) + " cells they show no order"
+                          : out;
+}
+}  // namespace
+
+std::string mesh_text(const Study &study) {
+  const OnThisMesh &own = study.own_mesh;
+  if (own.reference < 0) return "";
+  return "on the scene's own mesh, model and step alone: against " +
+         study.rows[size_t(own.reference)].job.label + ", own error " + percent(own.own) +
+         "; the mesh brings " + percent(own.mesh) + ", give or take the " +
+         percent(study.reference_headline) + " of the reference";
+}
+
 std::string reference_text(const Study &study) {
   const Row &row = study.rows[size_t(study.reference)];
   std::string out = "reference: " + row.job.label + " (" + study.axes.reference_why + "; " +
                     formatted("%.0f", row.job.outcome.cells) + " cells, " + formatted("%.3g", row.cpu_per_s) +
-                    " cpu s per s)";
+                    " cpu " + study.cost_unit + ")";
   if (study.check < 0) return out + "; NOT CONVERGED: no second run to check it with fits into the budget";
-  out += "; its own error " + percent(study.reference_headline) + " (against " +
-         study.rows[size_t(study.check)].job.label + ")";
+  out += "; its own error " + percent(study.reference_headline) + " (" + how_known(study) + ")";
   if (study.converged) return out + ", at most a third of the best error shown";
   return out + "; NOT CONVERGED: more than a third of the best error shown, " + percent(study.best) +
          ", so errors below " + percent(3 * study.reference_headline) + " are not told apart";
@@ -170,9 +229,15 @@ std::string pick_text(const Study &study) {
            percent(study.reference_headline) + "; a larger --budget makes the reference finer\n";
   }
   const Row &row = study.rows[size_t(study.pick)];
-  std::string out = "cheapest within " + target + ": " + row.job.label + " (" + percent(row.headline) + ", " +
-                    formatted("%.3g", row.cpu_per_s) + " cpu s per s)\n";
-  if (!study.proven)
+  std::string out = "cheapest within " + target + (study.mesh_stays ? " on this mesh: " : ": ");
+  out += row.job.label + " (" +
+         percent(study.mesh_stays ? study.own_mesh.error.at(size_t(study.pick)) : row.headline) + ", " +
+         formatted("%.3g", row.cpu_per_s) + " cpu " + study.cost_unit + ")\n";
+  if (study.mesh_stays)
+    out += "  proven for model and step; the mesh brings " + percent(study.own_mesh.mesh) +
+           ", give or take the " + percent(study.reference_headline) +
+           " of the reference: no mesh within this budget is fine enough to say more\n";
+  else if (!study.proven)
     out += "  likely, not proven: with the reference's own error of " + percent(study.reference_headline) +
            " it may be above the target; a larger --budget makes the reference finer\n";
   bool any = false;
@@ -192,16 +257,28 @@ std::string table_text(const Subject &subject, const Study &study) {
     names += (names.empty() ? "" : ", ") + study.headline[i];
   if (study.headline.size() > 6) names += ", ...";
   out += "error of " + names + (study.headline.size() > 1 ? " (the largest)" : "") +
-         ": root mean square over time, relative to how far the reference moves\n";
+         (subject.at_rest ? ": of the end, " : ": root mean square over time, ") +
+         "relative to how far the reference moves\n";
   out += reference_text(study) + "\n";
   list_axes(study, out);
-  out += "\nfront: nothing cheaper is as accurate\n     error   cpu s/s  choice\n";
+  out +=
+      "\nfront: nothing cheaper is as accurate (error, cpu " + std::string(study.cost_unit) + ", choice)\n";
   for (const size_t i : study.front) {
     const Row &row = study.rows[i];
     char line[240];
     std::snprintf(line, sizeof line, "  %8s %9.3g%s %s\n", percent(row.headline).c_str(), row.cpu_per_s,
                   row.alone ? " " : "~", row.job.label.c_str());
     out += line;
+  }
+  if (const std::string here = mesh_text(study); !here.empty()) {
+    out += here + "\n";
+    for (const size_t i : study.own_mesh.front) {
+      const Row &row = study.rows[i];
+      char line[240];
+      std::snprintf(line, sizeof line, "  %8s %9.3g%s %s\n", percent(study.own_mesh.error.at(i)).c_str(),
+                    row.cpu_per_s, row.alone ? " " : "~", row.job.label.c_str());
+      out += line;
+    }
   }
   const Row &own = study.rows[0];
   if (own.compared)
@@ -257,8 +334,10 @@ std::string json_report(const Subject &subject, const Study &study, const JsonVa
     JsonObject pick;
     pick.add("index", std::to_string(study.pick)).add("scene_patch", json_text(patch));
     pick.add("target", number(study.options.target)).add("proven", study.proven ? "true" : "false");
+    pick.add("this_mesh", study.mesh_stays ? "true" : "false");
     out.add("pick", pick.text());
   }
+  out.add("this_mesh", own_mesh_json(study));
   out.add("separated", separated_json(study)).add("left_out", json_array(left_out));
   out.add("budget_s", number(study.options.budget)).add("used_s", number(study.used));
   out.add("runs_started", std::to_string(study.started));

@@ -19,6 +19,7 @@ struct Described {
 };
 Described describe(const Subject &subject, const Row &row);
 // Sentences on the reference that table and page share.
+std::string mesh_text(const Study &study);  // of the scene's own mesh; "" where nothing is said
 std::string reference_text(const Study &study);
 std::string pick_text(const Study &study);
 

@@ -29,6 +29,7 @@ constexpr double kSlicesEnd = 0.35, kKnownEnd = 0.45;
 constexpr double kAloneShare = 0.15;  // of the budget: the front once more, alone and with pictures
 constexpr double kPictureTime = 0.5;  // s that pictures may take beside a run
 constexpr size_t kPictures = 6;
+constexpr double kMostCells = 4000;  // of a mesh that is tried beyond four times the scene's
 
 class Student {
  public:
@@ -43,18 +44,26 @@ class Student {
     run_rest();
     if (out_.reference < 0) fall_back();
     compare();
+    compare_on_this_mesh();
     separate();
-    find_front();
+    find_fronts();
     choose();
     time_alone();
-    find_front();
+    find_fronts();
     choose();
     out_.started = runs_.started();
     out_.used = out_.options.budget - runs_.left();
   }
 
  private:
+  // s of processor time for a simulated one; of a static scene for all of it
+  double cost_of(const Outcome &o) const { return s_.at_rest ? o.cpu : o.cpu_per_s(); }
   double predicted(int row) const { return out_.rows[size_t(row)].job.outcome.predicted(s_.duration); }
+  // s; who had no slice comes after those of whom something is known
+  double wait_for(int row) const {
+    const bool unknown = out_.rows[size_t(row)].job.outcome.state == Outcome::none;
+    return unknown ? std::numeric_limits<double>::infinity() : predicted(row);
+  }
   bool done(int row) const { return row >= 0 && out_.rows[size_t(row)].job.outcome.state == Outcome::done; }
 
   int add(const Candidate &candidate) {
@@ -110,9 +119,25 @@ class Student {
     if (out_.axes.meshes) {
       const std::string integrator = out_.axes.steps ? explicit_time : own;
       const std::string step = out_.axes.steps ? automatic : own;
-      const int x4 = row(4, integrator, step), x2 = row(2, integrator, step), x1 = row(1, integrator, step),
-                half = row(0.5, integrator, step), quarter = row(0.25, integrator, step);
-      ladder_ = {{x4, x2}, {x2, x1}, {x1, half}, {half, quarter}};
+      // all filled in one way; the scene's own mesh may be of another kind
+      double cells = 0;
+      for (const SubjectBody &body : s_.bodies) cells += body.cells;
+      for (const double times : {64.0, 16.0})  // what a small scene affords
+        if (times * cells <= kMostCells) {
+          const int fine = row(times, integrator, step), coarse = row(times / 4, integrator, step);
+          ladder_.emplace_back(fine, coarse);
+        }
+      const int x4 = row(4, integrator, step), x2 = row(2, integrator, step),
+                half = row(0.5, integrator, step), quarter = row(0.25, integrator, step),
+                eighth = row(0.125, integrator, step);
+      for (const auto &pair : {std::pair(x4, x2), {x2, half}, {half, quarter}, {quarter, eighth}})
+        ladder_.push_back(pair);
+      if (out_.axes.steps && s_.stable > 0) {
+        char text[40];
+        std::snprintf(text, sizeof text, "%.6g", 0.5 * s_.stable);
+        out_.own_mesh.reference = row(1, explicit_time, text);
+        out_.own_mesh.check = row(1, explicit_time, automatic);
+      }
     } else if (out_.axes.steps && s_.stable > 0) {
       char text[40];
       std::snprintf(text, sizeof text, "%.6g", 0.5 * s_.stable);
@@ -188,13 +213,15 @@ class Student {
   }
 
   void choose_pair() {
-    for (const auto &[fine, coarse] : ladder_) {
+    for (size_t i = 0; i < ladder_.size(); ++i) {
+      const auto [fine, coarse] = ladder_[i];
       if (failed(fine) || failed(coarse)) continue;
       const double most = kReferenceShare * runs_.left();
       const auto fits = [&](int row) { return done(row) || predicted(row) <= most; };
       if (!fits(fine) || !fits(coarse)) continue;
       out_.reference = fine;
       out_.check = coarse;
+      if (i + 1 < ladder_.size() && ladder_[i + 1].first == coarse) out_.third = ladder_[i + 1].second;
       return;
     }
   }
@@ -202,18 +229,24 @@ class Student {
   void run_rest() {
     std::vector<int> order;
     for (size_t i = 0; i < out_.rows.size(); ++i)
-      if (int(i) != out_.reference && int(i) != out_.check &&
+      if (int(i) != out_.reference && int(i) != out_.check && int(i) != out_.third &&
           (!on_ladder(int(i)) || i == 0 || out_.rows[i].candidate.axes.size() > 1))
         order.push_back(int(i));
     std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
       const int first = turn(a) / 2, second = turn(b) / 2;  // the ladder counts as the rest here
-      return first != second ? first < second : predicted(a) < predicted(b);
+      return first != second ? first < second : wait_for(a) < wait_for(b);
     });
-    if (out_.reference >= 0) order.insert(order.begin(), {out_.reference, out_.check});
+    // the scene's own mesh first: what is said of it is said in any case
+    for (const int i : {out_.third, out_.check, out_.reference, out_.own_mesh.check, out_.own_mesh.reference})
+      if (i >= 0) {
+        std::erase(order, i);
+        order.insert(order.begin(), i);
+      }
     runs_.run(jobs_of(order, std::numeric_limits<double>::max()), runs_.parallel(),
               kAloneShare * out_.options.budget);
     if (out_.reference >= 0 && !done(out_.reference)) out_.reference = out_.check = -1;
     if (out_.check >= 0 && !done(out_.check)) out_.check = -1;
+    if (!done(out_.third) || out_.check < 0) out_.third = -1;
   }
 
   // The longest run of the reference's model that came to its end is the best that there is.
@@ -247,34 +280,76 @@ class Student {
     for (const SubjectBody &body : s_.bodies) size = std::max(size, body.size);
     for (size_t i = 0; i < out_.rows.size(); ++i) {
       Row &row = out_.rows[i];
-      row.cpu_per_s = row.job.outcome.cpu_per_s();
+      row.cpu_per_s = cost_of(row.job.outcome);
       row.compared = done(int(i));
       if (row.compared) figures_[i] = read_quantities(row.job.folder);
     }
-    const Quantities &truth = figures_[size_t(out_.reference)];
-    for (const auto &[name, q] : truth) {
+    truth_ = figures_[size_t(out_.reference)];
+    for (const auto &[name, q] : truth_) {
       out_.quantities.push_back(name);
       out_.scales[name] = scale_of(q, 1e-3 * size, s_.duration);
       out_.units[name] = q.unit;
     }
-    name_headline(truth);
+    name_headline(truth_);
+    find_limits();
     for (size_t i = 0; i < out_.rows.size(); ++i) {
       Row &row = out_.rows[i];
       row.headline = kNone;
       if (!row.compared) continue;
-      row.error = errors(i, size_t(out_.reference));
+      row.error = errors(i, truth_);
       row.headline = largest(row.error);
     }
-    if (out_.check >= 0) {
-      out_.reference_error = out_.rows[size_t(out_.check)].error;
-      out_.reference_headline = out_.rows[size_t(out_.check)].headline;
-    } else {
-      out_.reference_headline = kNone;
-    }
+    for (const auto &[name, limit] : out_.limits) out_.reference_error[name] = limit.error;
+    out_.reference_headline = largest(out_.reference_error);
     out_.best = std::numeric_limits<double>::infinity();
     for (size_t i = 0; i < out_.rows.size(); ++i)
       if (eligible(i)) out_.best = std::min(out_.best, out_.rows[i].headline);
     out_.converged = std::isfinite(out_.best) && out_.reference_headline <= out_.best / 3;
+  }
+
+  double size_of_cells(int row) const {
+    const double cells = out_.rows[size_t(row)].job.outcome.cells;
+    return cells > 0 ? std::cbrt(1 / cells) : 1;
+  }
+
+  // What the finest run, the one that it is checked by and a third one say about the limit; without a check
+  // nothing is known.
+  void find_limits() {
+    if (out_.check < 0) return;
+    const Quantities fine = truth_, &middle = figures_[size_t(out_.check)];
+    const double h[3] = {size_of_cells(out_.reference), size_of_cells(out_.check),
+                         out_.third >= 0 ? size_of_cells(out_.third) : 0};
+    for (const auto &[name, q] : fine) {
+      const auto second = middle.find(name);
+      Limit limit;
+      if (second == middle.end()) {
+        limit.error = q.event ? 1.0 : kNone;
+      } else {
+        const Quantity *coarse = nullptr;
+        if (out_.third >= 0) {
+          const Quantities &third = figures_[size_t(out_.third)];
+          if (const auto found = third.find(name); found != third.end()) coarse = &found->second;
+        }
+        limit = find_limit(q, second->second, coarse, h, out_.scales[name], truth_[name]);
+      }
+      out_.limits[name] = limit;
+    }
+  }
+
+  // Model and step on the scene's own mesh: whether that mesh is fine enough is another question.
+  void compare_on_this_mesh() {
+    OnThisMesh &own = out_.own_mesh;
+    if (!done(own.reference) || !done(own.check)) {
+      own.reference = own.check = -1;
+      return;
+    }
+    own.mesh = out_.rows[size_t(own.reference)].headline;
+    for (size_t i = 0; i < out_.rows.size(); ++i) {
+      if (!out_.rows[i].compared || out_.rows[i].candidate.knobs.cells != 1 || !same_physics(int(i)))
+        continue;
+      own.error[i] = largest(errors(i, figures_[size_t(own.reference)]));
+    }
+    own.own = own.error[size_t(own.check)];
   }
 
   void name_headline(const Quantities &truth) {
@@ -294,9 +369,9 @@ class Student {
   }
 
   // Of a row against another, by quantity.
-  std::map<std::string, double> errors(size_t row, size_t against) const {
+  std::map<std::string, double> errors(size_t row, const Quantities &against) const {
     std::map<std::string, double> out;
-    for (const auto &[name, q] : figures_[against]) {
+    for (const auto &[name, q] : against) {
       const auto found = figures_[row].find(name);
       const auto scale = out_.scales.find(name);
       if (scale == out_.scales.end()) continue;
@@ -353,25 +428,36 @@ class Student {
       for (size_t i = 0; i < out_.rows.size(); ++i) {
         const auto &axes = out_.rows[i].candidate.axes;
         const bool member = i == 0 || std::find(axes.begin(), axes.end(), axis.name) != axes.end();
-        if (member && out_.rows[i].compared) part.rows.emplace_back(i, largest(errors(i, part.anchor)));
+        if (member && out_.rows[i].compared)
+          part.rows.emplace_back(i, largest(errors(i, figures_[part.anchor])));
       }
       if (part.rows.size() > 1) out_.separated.push_back(std::move(part));
     }
   }
 
-  void find_front() {
-    std::vector<size_t> order;
+  void find_fronts() {
+    std::vector<size_t> all, here;
     for (size_t i = 0; i < out_.rows.size(); ++i)
-      if (eligible(i)) order.push_back(i);
+      if (eligible(i)) all.push_back(i);
+    OnThisMesh &own = out_.own_mesh;
+    for (const auto &[i, error] : own.error)
+      if (std::isfinite(error) && int(i) != own.reference) here.push_back(i);
+    out_.front = front_of(std::move(all), [&](size_t i) { return out_.rows[i].headline; });
+    own.front = front_of(std::move(here), [&](size_t i) { return own.error.at(i); });
+  }
+
+  template <class Error>
+  std::vector<size_t> front_of(std::vector<size_t> order, Error error) const {
     std::stable_sort(order.begin(), order.end(),
                      [&](size_t a, size_t b) { return out_.rows[a].cpu_per_s < out_.rows[b].cpu_per_s; });
-    out_.front.clear();
+    std::vector<size_t> out;
     double least = std::numeric_limits<double>::infinity();
     for (const size_t i : order)
-      if (out_.rows[i].headline < least) {
-        least = out_.rows[i].headline;
-        out_.front.push_back(i);
+      if (error(i) < least) {
+        least = error(i);
+        out.push_back(i);
       }
+    return out;
   }
 
   // The row once more, with two pictures, at its start and its end, where it is to be shown; not where the
@@ -390,7 +476,7 @@ class Student {
       runs_.run({&job}, 1);
     }
     if (job.outcome.state != Outcome::done) return;
-    row.cpu_per_s = job.outcome.cpu_per_s();
+    row.cpu_per_s = cost_of(job.outcome);
     row.alone = true;
     const std::string file = job.folder + "/frames/frame_000001.png";
     std::error_code error;
@@ -401,6 +487,7 @@ class Student {
   void time_alone() {
     std::vector<size_t> order = {0, size_t(out_.reference)};
     if (out_.pick >= 0) order.insert(order.begin(), size_t(out_.pick));
+    order.insert(order.end(), out_.own_mesh.front.begin(), out_.own_mesh.front.end());
     for (size_t k = 0; 2 * k < out_.front.size(); ++k) {
       order.push_back(out_.front[out_.front.size() - 1 - k]);
       order.push_back(out_.front[k]);
@@ -415,7 +502,8 @@ class Student {
   }
 
   // The cheapest that is within the target even if its error and the reference's add up (proven). Where there
-  // is none: if they have nothing to do with each other. Where the reference is farther off: none.
+  // is none: if they have nothing to do with each other. Where there is none either, and where the reference
+  // is farther off: the cheapest that is so on the scene's own mesh.
   void choose() {
     const double target = out_.options.target, own = out_.reference_headline;
     const auto first = [&](auto &&good) {
@@ -426,6 +514,12 @@ class Student {
     out_.pick = first([&](double e) { return e + own <= target; });
     out_.proven = out_.pick >= 0;
     if (!out_.proven) out_.pick = first([&](double e) { return std::hypot(e, own) <= target; });
+    OnThisMesh &here = out_.own_mesh;
+    here.pick = -1;
+    for (const size_t i : here.front)
+      if (here.pick < 0 && here.error[i] + here.own <= target) here.pick = int(i);
+    out_.mesh_stays = out_.pick < 0 && here.pick >= 0;
+    if (out_.mesh_stays) out_.pick = here.pick;
   }
 
   const Subject &s_;
@@ -434,6 +528,7 @@ class Student {
   Study &out_;
   std::vector<std::pair<int, int>> ladder_;
   std::vector<Quantities> figures_;  // by row
+  Quantities truth_;                 // what all are compared with
 };
 
 }  // namespace
@@ -442,6 +537,7 @@ Study make_study(const Subject &subject, const Surfaces &surfaces, const std::st
                  const StudyOptions &options, Runs &runs) {
   Study out;
   out.options = options;
+  if (subject.at_rest) out.cost_unit = "s";
   out.axes = find_axes(subject, mesh_left_out, options.axes);
   Student(subject, surfaces, runs, out).study();
   return out;

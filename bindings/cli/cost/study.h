@@ -7,6 +7,7 @@
 
 #include "axes.h"
 #include "quantities.h"
+#include "richardson.h"
 #include "runs.h"
 
 namespace cli::cost {
@@ -21,7 +22,7 @@ struct Row {
   Job job;
   std::map<std::string, double> error;  // by quantity, relative; NaN where it cannot be said
   double headline = 0;                  // the largest of the quantities asked for; NaN: none
-  double cpu_per_s = 0;                 // s of processor time for a simulated one
+  double cpu_per_s = 0;                 // s of processor time for a simulated one, or for an equilibrium
   bool alone = false;                   // timed with nothing beside it
   std::string picture;                  // file: the scene at its end; "" where there is none
   bool compared = false;                // done, with figures
@@ -34,6 +35,17 @@ struct Separated {
   std::vector<std::pair<size_t, double>> rows;
 };
 
+// What is said about the scene's own mesh, where that is one of several: model and step, against the
+// reference's model on the same mesh in short steps.
+struct OnThisMesh {
+  int reference = -1, check = -1;  // rows: half the scene's explicit step, and as long ones as are stable
+  double own = 0;                  // error of the reference, by the other one
+  double mesh = 0;                 // of the reference from that of all meshes: what the mesh brings
+  std::map<size_t, double> error;  // by row
+  std::vector<size_t> front;
+  int pick = -1;
+};
+
 struct Study {
   StudyOptions options;
   Axes axes;
@@ -41,15 +53,19 @@ struct Study {
   std::map<std::string, double> scales;
   std::map<std::string, std::string> units;
   std::vector<std::string> quantities, headline;  // all; those asked for
-  int reference = -1, check = -1;                 // rows
-  std::map<std::string, double> reference_error;  // of the two finest against each other
+  int reference = -1, check = -1, third = -1;     // rows: the finest, and those that it is checked by
+  std::map<std::string, Limit> limits;            // by quantity: what the three say
+  std::map<std::string, double> reference_error;  // of the reference
   double reference_headline = 0, best = 0;        // best: least error of the other choices
   bool converged = false;
+  const char *cost_unit = "s per s";  // of cpu_per_s; "s" of a static scene, whose run costs that
   std::vector<Separated> separated;
   std::vector<size_t> front;  // by rising cost
+  OnThisMesh own_mesh;
   int pick = -1;
-  bool proven = false;  // the pick meets the target even if the reference is as far off as it may be
-  double used = 0;      // s of the budget
+  bool mesh_stays = false;  // the pick is that of own_mesh: nothing holds for all meshes
+  bool proven = false;      // the pick meets the target even if the reference is as far off as it may be
+  double used = 0;          // s of the budget
   unsigned started = 0;
 };
 

@@ -10,32 +10,14 @@
 #include <filesystem>
 #include <memory>
 
-#include "cli.h"
-#ifdef DEFORM_HAVE_ODE
-#include "deform/ode_host.h"
-#endif
 #include "file.h"
 #include "messages.h"
+#include "scene_file.h"
 
 namespace fs = std::filesystem;
 
 namespace cli::cost {
 namespace {
-
-using Context = std::unique_ptr<dfm_context, decltype(&dfm_context_destroy)>;
-
-// Says nothing: each run of a choice says for itself what it has to say.
-Context silent_context() {
-  dfm_context_def def = dfm_context_def_default();
-  def.threads = 1;
-  def.log = [](void *, int32_t, const char *) {};
-  dfm_context *context = nullptr;
-  need(dfm_context_create(&def, &context));
-#ifdef DEFORM_HAVE_ODE
-  dfm_ode_register();
-#endif
-  return Context(context, dfm_context_destroy);
-}
 
 std::string short_name(const std::string &id) {
   const std::string own = "org.deform.";
@@ -60,33 +42,20 @@ void read_offers(dfm_context *context, Subject &out, std::vector<std::string> &f
       &found);
 }
 
-std::string explained(dfm_world world) {
-  size_t bytes = 0;
-  need(dfm_world_explain(world, nullptr, &bytes));
-  std::string text(bytes, '\0');
-  need(dfm_world_explain(world, text.data(), &bytes));
-  text.resize(text.find('\0') == std::string::npos ? text.size() : text.find('\0'));
-  return text;
-}
-
-// The rotation of a body's pose by Rodrigues, rows.
-std::array<double, 9> rotation_of(const JsonValue *pose) {
-  std::array<double, 9> r{1, 0, 0, 0, 1, 0, 0, 0, 1};
+// Of a body's pose: x, y, z, w; the inverse rotation.
+std::array<double, 4> inverse_rotation(const JsonValue *pose) {
+  std::array<double, 4> q{0, 0, 0, 1};
   const JsonValue *rotation = pose ? pose->find("rotation") : nullptr;
   const JsonValue *axis = rotation ? rotation->find("axis") : nullptr;
-  if (!axis || axis->items.size() != 3) return r;
+  if (!axis || axis->items.size() != 3) return q;
   double a[3], n = 0;
   for (size_t k = 0; k < 3; ++k) a[k] = std::strtod(axis->items[k].text.c_str(), nullptr);
   for (const double x : a) n += x * x;
-  if (!(n > 0)) return r;
-  for (double &x : a) x /= std::sqrt(n);
-  const double angle = std::strtod(rotation->get("angle_deg").c_str(), nullptr) * std::acos(-1.0) / 180;
-  const double c = std::cos(angle), s = std::sin(angle);
-  const double cross[9] = {0, -a[2], a[1], a[2], 0, -a[0], -a[1], a[0], 0};
-  for (size_t i = 0; i < 3; ++i)
-    for (size_t j = 0; j < 3; ++j)
-      r[3 * i + j] = (i == j ? c : 0) + (1 - c) * a[i] * a[j] + s * cross[3 * i + j];
-  return r;
+  if (!(n > 0)) return q;
+  const double half = std::strtod(rotation->get("angle_deg").c_str(), nullptr) * std::acos(-1.0) / 360;
+  for (size_t k = 0; k < 3; ++k) q[k] = -std::sin(half) * a[k] / std::sqrt(n);
+  q[3] = std::cos(half);
+  return q;
 }
 
 // Two points of the surface that lie far from each other: the farthest one from the center of mass, and
@@ -106,7 +75,7 @@ void find_ends(dfm_body body, const JsonValue *pose, SubjectBody &out) {
   }
   out.size = std::sqrt((hi[0] - lo[0]) * (hi[0] - lo[0]) + (hi[1] - lo[1]) * (hi[1] - lo[1]) +
                        (hi[2] - lo[2]) * (hi[2] - lo[2]));
-  const std::array<double, 9> r = rotation_of(pose);
+  const std::array<double, 4> back = inverse_rotation(pose);
   double at[3] = {0, 0, 0};
   const JsonValue *position = pose ? pose->find("position") : nullptr;
   for (size_t k = 0; k < 3 && position && position->items.size() == 3; ++k)
@@ -122,26 +91,24 @@ void find_ends(dfm_body body, const JsonValue *pose, SubjectBody &out) {
         best = i;
       }
     }
-    std::array<double, 3> rest{};
-    for (size_t k = 0; k < 3; ++k) from[k] = x[best + k];
-    for (size_t j = 0; j < 3; ++j)
-      for (size_t k = 0; k < 3; ++k) rest[j] += r[3 * k + j] * (from[k] - at[k]);
-    out.ends.push_back(rest);
+    double placed[3], rest[3];
+    for (size_t k = 0; k < 3; ++k) {
+      from[k] = x[best + k];
+      placed[k] = from[k] - at[k];
+    }
+    rotate(back.data(), placed, rest);
+    out.ends.push_back({rest[0], rest[1], rest[2]});
   }
 }
 
 // A scene with an accuracy or a budget is studied as the planner has made it: beside a wish every change
 // would be planned anew.
-void fix_plan(dfm_scene scene, Subject &out) {
+void fix_plan(const SceneFile &scene, Subject &out) {
   for (const char *const wish : {"accuracy", "budget"}) {
     if (!out.find(std::string("/") + wish)) continue;
-    const std::string pointer = std::string("/") + wish + "/chosen/set";
-    size_t bytes = 0;
-    need(dfm_scene_value(scene, pointer.c_str(), nullptr, &bytes));
-    std::string text(bytes, '\0');
-    need(dfm_scene_value(scene, pointer.c_str(), text.data(), &bytes));
+    const std::string text = scene.value(std::string("/") + wish + "/chosen/set");
     JsonValue set;
-    if (!parse_json(text.substr(0, text.find('\0')), set)) throw Failure(kBadInput, "the plan is not JSON");
+    if (!parse_json(text, set)) throw Failure(kBadInput, "the plan is not JSON");
     std::erase_if(out.scene.members, [&](const JsonMember &m) { return m.name == wish; });
     out.planned.push_back({std::string("/") + wish, "null"});
     for (const JsonMember &m : set.members) {
@@ -151,19 +118,13 @@ void fix_plan(dfm_scene scene, Subject &out) {
   }
 }
 
-void read_bodies(dfm_world world, const JsonValue &plan, Subject &out) {
-  uint32_t n = 0;
-  need(dfm_world_bodies(world, 0, nullptr, &n));
-  std::vector<dfm_body> handles(n);
-  need(dfm_world_bodies(world, n, handles.data(), &n));
+void read_bodies(const SceneFile &scene, const JsonValue &plan, Subject &out) {
   const JsonValue *rows = plan.find("bodies");
-  for (size_t i = 0; i < handles.size(); ++i) {
+  for (size_t i = 0; i < scene.bodies().size(); ++i) {
+    const BodyView &view = scene.bodies()[i];
     SubjectBody body;
-    dfm_body_info info = {};
-    info.size = sizeof info;
-    need(dfm_body_get_info(handles[i], &info));
-    body.name = info.name;
-    body.cells = info.ntet;
+    body.name = view.name;
+    body.cells = view.ntet;
     const JsonValue *const row = rows && i < rows->items.size() ? &rows->items[i] : nullptr;
     body.model = row ? short_name(row->get("model")) : "";
     const JsonValue *const effects = row ? row->find("effects") : nullptr;
@@ -172,7 +133,7 @@ void read_bodies(dfm_world world, const JsonValue &plan, Subject &out) {
     const JsonValue *const integrator = row ? row->find("integrator") : nullptr;
     out.implicit |= integrator && integrator->get("used") != "symplectic_euler" &&
                     integrator->get("used").find("euler") != std::string::npos;
-    find_ends(handles[i], out.find("/bodies/" + std::to_string(i) + "/pose"), body);
+    find_ends(view.handle, out.find("/bodies/" + std::to_string(i) + "/pose"), body);
     out.bodies.push_back(std::move(body));
   }
 }
@@ -274,33 +235,25 @@ std::string Subject::word(const std::string &pointer, const std::string &otherwi
   return v && v->kind == JsonValue::string ? v->text : otherwise;
 }
 
-Subject read_subject(const std::string &path) {
+Subject read_subject(const std::string &path, Globals &globals) {
   Subject out;
   out.path = path;
   out.folder = fs::path(path).parent_path().string();
-  const Context context = silent_context();
-  dfm_scene scene = 0;
-  need(dfm_scene_open(context.get(), path.c_str(), nullptr, &scene));
+  const Quiet quiet(globals);  // each run of a choice says for itself what it has to say
+  const SceneFile scene(globals, path, {}, 0);
   const std::string text = read_file(path, 64u << 20, "a scene");
   if (!parse_json(text, out.scene)) throw Failure(kBadInput, path + ": this is not JSON");
   out.given = out.scene;
   fix_plan(scene, out);
-  if (out.word("/time/mode", "dynamic") == "static")
-    throw Failure(kBadInput, path +
-                                 ": \"time\": {\"mode\": \"static\"} has no steps whose cost could be "
-                                 "shown; deform cost is for dynamic scenes");
-  dfm_scene_settings settings = {};
-  settings.size = sizeof settings;
-  need(dfm_scene_get_settings(scene, &settings));
+  out.at_rest = out.word("/time/mode", "dynamic") == "static";
+  const dfm_scene_settings &settings = scene.settings();
   out.duration = settings.duration;
   out.step = settings.step;
   out.every = settings.every;
   out.probes = settings.nprobe > 0;
-  dfm_world world = 0;
-  need(dfm_scene_world(scene, &world));
   JsonValue plan;
-  if (!parse_json(explained(world), plan)) throw Failure(kBadInput, path + ": its plan cannot be read");
-  read_bodies(world, plan, out);
+  if (!parse_json(scene.explain(), plan)) throw Failure(kBadInput, path + ": its plan cannot be read");
+  read_bodies(scene, plan, out);
   if (out.bodies.empty())
     throw Failure(kBadInput, path + ": has no deformable body whose cost could be shown");
   if (const JsonValue *const stages = plan.find("stages"))
@@ -311,7 +264,7 @@ Subject read_subject(const std::string &path) {
   const JsonValue *const rules = out.find("/contact/friction");
   out.friction = out.contact && rules && !rules->items.empty();
   std::vector<std::string> files;
-  read_offers(context.get(), out, files);
+  read_offers(scene.context(), out, files);
   Hash hash;
   hash.add(text);
   for (const std::string &pointer : file_pointers(out.scene))

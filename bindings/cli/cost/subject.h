@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "cli.h"
 #include "json_text.h"
 
 namespace cli::cost {
@@ -31,6 +32,7 @@ struct Subject {
   std::vector<std::pair<std::string, std::string>> planned;
   double duration = 0, step = 0, every = 0;  // s; step 0: "auto"
   double stable = 0;                         // s, explicit, as the scene is; 0: nothing bounds it
+  bool at_rest = false;                      // static: an equilibrium is sought, nothing moves
   bool implicit = false;                     // any body as the scene is
   bool friction = false, contact = false, probes = false;
   std::vector<SubjectBody> bodies;
@@ -44,7 +46,7 @@ struct Subject {
 };
 
 // Throws Failure: the scene cannot be read, or it cannot be studied.
-Subject read_subject(const std::string &path);
+Subject read_subject(const std::string &path, Globals &globals);
 
 // Value at an RFC 6901 pointer; null where nothing is.
 const JsonValue *at_pointer(const JsonValue &value, const std::string &pointer);

@@ -38,6 +38,10 @@ typedef struct dfm_tetmesh_info {
   double lo[3], hi[3];
   /* one sentence a line; valid while the mesh lives */
   const char *warnings;
+  /* m: what a wave passes in the largest explicit step of its equation on these cells, by row sums: the
+   * least 2 sqrt(m/k) of the points, m a quarter of the cells' volumes, k = sum of V |g_i| |g_j| over cells
+   * and their corners, g the gradients of their shape functions */
+  double wave_path;
 } dfm_tetmesh_info;
 /** Counts, sizes and what reading repaired, as far as out->size goes. @return DFM_OK; DFM_E_ARG;
  * DFM_E_HANDLE. Threads: Any thread. Since 0.1. */

@@ -103,6 +103,7 @@ dfm_status dfm_tetmesh_get_info(dfm_tetmesh mesh, dfm_tetmesh_info *out) {
     std::copy_n(s.lo, 3, info.lo);
     std::copy_n(s.hi, 3, info.hi);
     info.warnings = object.warnings.c_str();
+    info.wave_path = s.wave_path;
     dfm::give(out, info);
   });
 }

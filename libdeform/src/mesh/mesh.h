@@ -97,7 +97,8 @@ struct MeshStatistics {
   uint32_t duplicate_points = 0;   // points that lie exactly on an earlier one
   uint32_t nonmanifold_edges = 0;  // boundary edges with more than two triangles
   uint32_t flat_cells = 0;         // mean ratio below 0.01
-  double volume = 0, edge_min = 0, edge_median = 0, edge_max = 0, quality_min = 0, quality_mean = 0;
+  double volume = 0, edge_min = 0, edge_median = 0, edge_max = 0, quality_min = 0, quality_mean = 0,
+         wave_path = 0;
   uint32_t histogram[10] = {};  // of the mean ratio, bins of 0.1
   double lo[3] = {}, hi[3] = {};
 };

@@ -141,6 +141,30 @@ uint32_t count_nonmanifold_edges(const Memory &memory, const Array<uint32_t> &tr
   return n;
 }
 
+// As in dfm_tetmesh_info. A corner's gradient is as long as its face's area over three volumes.
+double wave_path(const TetMesh &mesh) {
+  Array<double> volume(mesh.npoint(), 0.0, HookAllocator<double>(*mesh.memory));
+  Array<double> stiffness(mesh.npoint(), 0.0, HookAllocator<double>(*mesh.memory));
+  for (size_t t = 0; t < mesh.tets.size(); t += 4) {
+    Vec3 x[4];
+    for (size_t k = 0; k < 4; ++k) x[k] = load3(&mesh.points[3 * size_t(mesh.tets[t + k])]);
+    const double v = std::fabs(tet_volume(mesh.points.data(), &mesh.tets[t]));
+    double face[4], sum = 0;  // 6 v g
+    for (size_t k = 0; k < 4; ++k) {
+      const Vec3 &a = x[(k + 1) % 4], &b = x[(k + 2) % 4], &c = x[(k + 3) % 4];
+      sum += face[k] = norm(cross(b - a, c - a));
+    }
+    for (size_t k = 0; k < 4; ++k) {
+      volume[mesh.tets[t + k]] += v / 4;
+      stiffness[mesh.tets[t + k]] += v > 0 ? face[k] * sum / (36 * v) : HUGE_VAL;
+    }
+  }
+  double least = HUGE_VAL;
+  for (uint32_t i = 0; i < mesh.npoint(); ++i)
+    if (stiffness[i] > 0) least = std::min(least, volume[i] / stiffness[i]);
+  return 2 * std::sqrt(least);
+}
+
 }  // namespace
 
 MeshStatistics mesh_statistics(const TetMesh &mesh) {
@@ -180,6 +204,7 @@ MeshStatistics mesh_statistics(const TetMesh &mesh) {
     ++s.histogram[std::clamp(static_cast<int>(q * 10), 0, 9)];
   }
   s.quality_mean /= s.ntet;
+  s.wave_path = wave_path(mesh);
   for (int k = 0; k < 3; ++k) s.lo[k] = s.hi[k] = mesh.points[k];
   for (size_t i = 0; i < mesh.points.size(); ++i) {
     s.lo[i % 3] = std::min(s.lo[i % 3], mesh.points[i]);

@@ -27,8 +27,8 @@ struct MeasuredModel {
   // Relative errors of positions against corotational_fem on the same mesh: a bar that bends by 2 % and by
   // half of its length, a bar that turns, a block that lies on a plane.
   double bends_little = 0, bends_far = 0, turns = 0, lies = 0;
-  // The largest explicit step over the time in which a pressure wave goes by `cell_size`.
-  double step_factor = 0;
+  // The largest explicit step that is proven, over the time in which a pressure wave goes by `cell_size`.
+  double wave_steps = 0;
   // by scheme, free and touching; empty: the model has no such scheme
   std::array<std::array<std::vector<CostAt>, 2>, kSchemes> costs;
 };
@@ -45,7 +45,7 @@ struct BodyRegime {
   uint32_t points = 0;
   double length = 0, thickness = 0;  // m, longest and shortest side of the box around the body at rest
   double edge = 0;                   // m, median edge of the cells
-  double cell_size = 0;              // m, least edge times least quality (mean ratio) of the cells
+  double cell_size = 0;              // m, dfm_tetmesh_info.wave_path
   double young = 0, poisson = 0, density = 0;      // Pa, 1, kg/m3
   double damping_mass = 0, damping_stiffness = 0;  // 1/s, s
   double load = 0;                                 // m/s2: of gravity and of forces

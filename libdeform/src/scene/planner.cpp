@@ -170,7 +170,7 @@ class Reader {
     r.length = *std::max_element(side, side + 3);
     r.thickness = *std::min_element(side, side + 3);
     r.edge = info.edge_median * b.scale;
-    r.cell_size = info.edge_min * info.quality_min * b.scale;
+    r.cell_size = info.wave_path * b.scale;
     r.young = m.young;
     r.poisson = m.poisson;
     r.density = m.density;

@@ -24,7 +24,7 @@ MeasuredModel read_model(const Node &node) {
   MeasuredModel m;
   m.id = node.at("model").text();
   m.steps_itself = node.at("steps_itself").boolean();
-  m.step_factor = node.at("step_factor").number(kNotNegative);
+  m.wave_steps = node.at("wave_steps").number(kNotNegative);
   const Node errors = node.at("errors");
   m.bends_little = errors.at("bends_little").number(kNotNegative);
   m.bends_far = errors.at("bends_far").number(kNotNegative);
@@ -48,7 +48,8 @@ Measured read_costs() {
   const Node root(&tree, "", &file);
   if (root.at("format").text() != "deform-costs")
     root.at("format").fail("expected \"deform-costs\", a file of deform calibrate");
-  if (root.at("version").number() != 1) root.at("version").fail("this reader knows version 1");
+  if (root.at("version").number() != 2)
+    root.at("version").fail("this reader knows version 2: run deform calibrate again");
   Measured out;
   out.machine = root.at("machine").text();
   for (const Node &model : root.at("models").items()) out.models.push_back(read_model(model));

@@ -1,0 +1,90 @@
+// What meshes of several sizes say about a mesh without end, on figures whose limit is known.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "cost/richardson.h"
+
+using namespace cli::cost;
+
+namespace {
+
+// sin t + off(t), at times of its own.
+template <class Off>
+Quantity figure(int records, Off off) {
+  Quantity q;
+  q.family = "probe";
+  for (int i = 0; i <= records; ++i) {
+    const double t = double(i) / records;
+    q.t.push_back(t);
+    q.values.push_back(std::sin(t) + off(t));
+  }
+  return q;
+}
+
+const double kSizes[3] = {0.1, 0.15, 0.25};
+
+double from_truth(const Quantity &q) {
+  return error_of(q, figure(200, [](double) { return 0.0; }), 1);
+}
+
+}  // namespace
+
+TEST(CostLimit, RunsThatConverge_GiveOrderAndLimit) {
+  for (const double order : {1.0, 1.4, 2.0}) {
+    const auto on = [&](double h, int records) {
+      return figure(records, [=](double t) { return 3 * t * std::pow(h, order); });
+    };
+    const Quantity fine = on(kSizes[0], 200), middle = on(kSizes[1], 200), coarse = on(kSizes[2], 200);
+    Quantity limit;
+    const Limit found = find_limit(fine, middle, &coarse, kSizes, 1, limit);
+    EXPECT_TRUE(found.used);
+    EXPECT_NEAR(found.order, order, 1e-6);
+    EXPECT_LT(from_truth(limit), 1e-9);
+    EXPECT_LT(found.error, 1e-9) << "both extrapolations meet";
+    EXPECT_GT(from_truth(fine), 0.01);
+  }
+}
+
+// The error is said of the extrapolated figure, and holds.
+TEST(CostLimit, TwoTermsOfError_AreWithinWhatIsSaid) {
+  const auto on = [&](double h) { return figure(200, [=](double t) { return t * h * h * (3 + 4 * h); }); };
+  const Quantity fine = on(kSizes[0]), middle = on(kSizes[1]), coarse = on(kSizes[2]);
+  Quantity limit;
+  const Limit found = find_limit(fine, middle, &coarse, kSizes, 1, limit);
+  EXPECT_TRUE(found.used);
+  EXPECT_LT(from_truth(limit), found.error);
+  EXPECT_LT(found.error, from_truth(fine));
+}
+
+// Where differences do not point the same way, or their lengths have no order, the finest run stands.
+TEST(CostLimit, RunsWithoutAnOrder_AreNotTakenOn) {
+  const Quantity fine = figure(200, [](double t) { return 0.01 * t; });
+  const Quantity middle = figure(200, [](double t) { return -0.01 * t; });
+  const Quantity turned = figure(200, [](double t) { return 0.02 * t; });
+  const Quantity near = figure(200, [](double t) { return -0.0105 * t; });
+  for (const Quantity &coarse : {turned, near}) {
+    Quantity limit;
+    const Limit found = find_limit(fine, middle, &coarse, kSizes, 1, limit);
+    EXPECT_FALSE(found.used);
+    EXPECT_EQ(limit.values, fine.values);
+    EXPECT_NEAR(found.error, error_of(middle, fine, 1) * 0.1 / 0.05, 1e-12) << "first order";
+  }
+  Quantity limit;
+  EXPECT_FALSE(find_limit(fine, middle, nullptr, kSizes, 1, limit).used);
+  const double alike[3] = {1, 1, 0};
+  EXPECT_EQ(find_limit(fine, middle, nullptr, alike, 1, limit).error, error_of(middle, fine, 1));
+}
+
+TEST(CostLimit, Events_AreNotTakenOn) {
+  Quantity early, late, never;
+  for (Quantity *q : {&early, &late, &never}) q->event = true;
+  early.values = {0.4};
+  late.values = {0.42};
+  never.values = {NAN};
+  Quantity limit;
+  const Limit found = find_limit(early, late, &late, kSizes, 1, limit);
+  EXPECT_FALSE(found.used);
+  EXPECT_NEAR(found.error, 0.04, 1e-12);
+  EXPECT_EQ(find_limit(early, never, nullptr, kSizes, 1, limit).error, 1);
+}
