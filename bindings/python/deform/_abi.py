@@ -201,6 +201,10 @@ class dfm_stepper(_Structure):
                 ("commit", ptr), ("fetch", ptr), ("respond_many", ptr)]
 
 
+class dfm_late_points(_Structure):
+    _fields_ = [("size", u32), ("reserved", u32), ("commit", ptr), ("points", ptr), ("look", ptr)]
+
+
 class dfm_cell_energy(_Structure):
     _fields_ = [("size", u32), ("reserved", u32), ("cell_energy", ptr)]
 
@@ -417,7 +421,8 @@ class dfm_tetmesh_info(_Structure):
                 ("flat_cells", u32), ("duplicate_points", u32), ("nonmanifold_edges", u32),
                 ("overlapping_faces", u32), ("ngroup", u32), ("volume", f64), ("edge_min", f64),
                 ("edge_median", f64), ("edge_max", f64), ("quality_min", f64), ("quality_mean", f64),
-                ("quality_histogram", u32 * 10), ("lo", f64 * 3), ("hi", f64 * 3), ("warnings", text)]
+                ("quality_histogram", u32 * 10), ("lo", f64 * 3), ("hi", f64 * 3), ("warnings", text),
+                ("wave_path", f64)]
 
 
 class dfm_trimesh_info(_Structure):

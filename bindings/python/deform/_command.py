@@ -69,7 +69,7 @@ class Cost(Table):
         super().__init__([{**row, "error": row["headline"]} for row in report["choices"]], columns)
         self.report = report
         self.front = Table([self[i] for i in report["front"]], columns)
-        self.pick = None if report["pick"] is None else self[report["pick"]]
+        self.pick = None if report["pick"] is None else self[report["pick"]["index"]]
 
 
 def cost(scene: Any, *, budget: float = 120, target: float | None = None, axes: Sequence[str] | None = None,
