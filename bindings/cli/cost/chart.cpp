@@ -19,6 +19,9 @@ constexpr Ink kInks[] = {{0.243f, 0.510f, 0.796f}, {0.890f, 0.365f, 0.286f}, {0.
                          {0.957f, 0.706f, 0.243f}, {0.557f, 0.431f, 0.757f}, {0.510f, 0.690f, 0.310f},
                          {0.886f, 0.494f, 0.643f}, {0.388f, 0.471f, 0.573f}, {0.690f, 0.498f, 0.361f},
                          {0.376f, 0.741f, 0.847f}};
+// Errors above it say that a choice is wrong, not how wrong; to scale, one such point, as of a scene that
+// rests and then slides, would leave the others a line. The scene as it is and the front are always on scale.
+constexpr double kWrong = 10;
 constexpr double kLeft = 86, kRight = 372, kTop = 58, kBottom = 66;  // margins
 
 // A logarithmic axis over whole and half decades.
@@ -47,10 +50,13 @@ class Chart {
  public:
   Chart(const Subject &subject, const Study &study, Canvas &canvas) : s_(subject), t_(study), c_(canvas) {
     std::vector<double> costs, errors = {t_.options.target, t_.reference_headline};
+    most_ = std::max({kWrong, t_.options.target, t_.reference_headline, t_.rows[0].headline});
+    for (const size_t i : t_.front) most_ = std::max(most_, t_.rows[i].headline);
     for (size_t i = 0; i < t_.rows.size(); ++i)
       if (shown(i)) {
         costs.push_back(t_.rows[i].cpu_per_s);
-        errors.push_back(t_.rows[i].headline);
+        errors.push_back(std::min(t_.rows[i].headline, most_));
+        beyond_ += t_.rows[i].headline > most_;
       }
     x_ = scale_of(costs, kLeft, kChartWidth - kRight);
     y_ = scale_of(errors, kChartHeight - kBottom, kTop);
@@ -108,6 +114,9 @@ class Chart {
     std::string of = t_.headline[0];
     if (t_.headline.size() > 1) of = "the largest of " + std::to_string(t_.headline.size()) + " quantities";
     c_.text(kLeft - 8, kTop - 9, 9, "error of " + of, kText, 0);
+    if (beyond_ > 0)
+      c_.text(x_.to - 6, kTop - 9, 8,
+              std::to_string(beyond_) + " above " + percent(most_) + ", at the upper edge", kGray, 1);
     if (!s_.at_rest && x_.lo < 0 && x_.hi > 0) {
       c_.line(x_.at(1), kTop, x_.at(1), y_.from, 1.5, kGray, true);
       c_.text(x_.at(1) + 5, kTop + 12, 8, "real time on one core", kGray, 0);
@@ -202,6 +211,8 @@ class Chart {
   const Study &t_;
   Canvas &c_;
   Scale x_{}, y_{};
+  double most_ = kWrong;                // the largest error on the scale
+  size_t beyond_ = 0;                   // choices above it
   std::map<std::string, size_t> inks_;  // by model, in order of appearance
 };
 
