@@ -45,6 +45,11 @@ DEFORM_INLINE vf load(const float *p) { return *reinterpret_cast<const vf *>(p);
 DEFORM_INLINE vf larger(vf a, vf b) { return a > b ? a : b; }
 DEFORM_INLINE vf smaller(vf a, vf b) { return a < b ? a : b; }
 
+// Bits of to - from, of fixed-point places. One that is not finite is the least integer, and the difference
+// wraps: the force is no number then, whatever the bits.
+typedef uint32_t vu __attribute__((vector_size(4 * DEFORM_LANES)));
+DEFORM_INLINE vf between(vi from, vi to) { return (vf)((vu)to - (vu)from); }
+
 struct Three { vf x, y, z; };
 DEFORM_INLINE Three operator+(const Three &a, const Three &b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
 DEFORM_INLINE Three operator-(const Three &a, const Three &b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
@@ -144,8 +149,8 @@ static inline void springs(const SingleBlock &b, float unit, float damp) {
     };
     const auto at_place = [&](uint32_t p) __attribute__((always_inline)) { return place(b, p); };
     const vi own = starts(at_place);
-    const Three d = metres(columns((vf)(ends(at_place, 0) - own), (vf)(ends(at_place, 1) - own),
-                                   (vf)(ends(at_place, 2) - own), (vf)(ends(at_place, 3) - own)),
+    const Three d = metres(columns(between(own, ends(at_place, 0)), between(own, ends(at_place, 1)),
+                                   between(own, ends(at_place, 2)), between(own, ends(at_place, 3))),
                            unit);
     const vf dd = dot(d, d);
     const vf counted = kTilts ? dd + load(b.tilt + 4 * size_t(n)) : dd;
@@ -203,8 +208,8 @@ static inline void volume_cells(const SingleBlock &b, float unit) {
     };
     const vi o0 = corner(0, 0), o1 = corner(1, 0), o2 = corner(2, 0), o3 = corner(3, 0);
     const auto edge = [&](uint32_t n) __attribute__((always_inline)) {
-      return metres(columns((vf)(corner(0, n) - o0), (vf)(corner(1, n) - o1), (vf)(corner(2, n) - o2),
-                            (vf)(corner(3, n) - o3)),
+      return metres(columns(between(o0, corner(0, n)), between(o1, corner(1, n)), between(o2, corner(2, n)),
+                            between(o3, corner(3, n))),
                     unit);
     };
     const Three e1 = edge(1), e2 = edge(2), e3 = edge(3);
