@@ -181,10 +181,11 @@ int main(int argc, char **argv) {
   std::sort(sorted.begin(), sorted.end());
   const double median = 1e3 * sorted[sorted.size() / 2], worst = 1e3 * sorted[sorted.size() * 999 / 1000];
   std::printf(
-      "%s %s %g ms: %u points, %.1f contacts, made in %.1f s; ms per step: median %.3f, 99.9 %% %.3f; "
-      "error of force %.3g, of tip %.3g\n",
-      model.c_str(), integrator.c_str(), 1e3 * step, info.npoint, found.contacts, made, median, worst,
-      error[0], error[1]);
+      "%s %s %g ms: %u points, %.1f contacts, made in %.1f s; ms per step: median %.3f, "
+      "99.9 %% %.3f; ",
+      model.c_str(), integrator.c_str(), 1e3 * step, info.npoint, found.contacts, made, median, worst);
+  if (against) std::printf("error of force %.3g, of tip %.3g\n", error[0], error[1]);
+  else std::printf("errors: give a finer run's series with --against\n");
   for (uint32_t i = 0; i < stages; ++i)
     std::printf("    %-18s %8.4f ms\n", after[i].name,
                 1e3 * (after[i].seconds - before[i].seconds) / double(found.seconds.size()));
