@@ -49,12 +49,12 @@ def table(rows):
     return "\n".join(lines) + "\n"
 
 
-def into_page(path, text):
+def into_page(path, text, marks=(BEGIN, END)):
     with open(path) as f:
         page = f.read()
-    if page.count(BEGIN) != 1 or page.count(END) != 1:
+    if any(page.count(mark) != 1 for mark in marks):
         sys.exit("%s: there is no place for the table between its two marks" % path)
-    begin, end = page.index(BEGIN) + len(BEGIN), page.index(END)
+    begin, end = page.index(marks[0]) + len(marks[0]), page.index(marks[1])
     with open(path, "w") as f:
         f.write(page[:begin] + "\n" + text + "\n" + page[end:])
 

@@ -10,10 +10,7 @@ picture has all runs with each engine's front. With --page the tables take the p
 the marks `<!-- scenes -->` and `<!-- end of scenes -->`. What an engine was calibrated with does not count:
 the coarse beam of Jolt.
 """
-import argparse
-import csv
 import math
-import sys
 
 import speed
 
@@ -175,32 +172,5 @@ def picture(rows, path):
     figure.savefig(path)
 
 
-def into_page(path, text):
-    with open(path) as f:
-        page = f.read()
-    if page.count(BEGIN) != 1 or page.count(END) != 1:
-        sys.exit("%s: there is no place for the tables between the two marks" % path)
-    begin, end = page.index(BEGIN) + len(BEGIN), page.index(END)
-    with open(path, "w") as f:
-        f.write(page[:begin] + "\n" + text + "\n" + page[end:])
-
-
-def main():
-    parser = argparse.ArgumentParser(description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("file")
-    parser.add_argument("--page")
-    parser.add_argument("--picture")
-    given = parser.parse_args()
-    with open(given.file, newline="") as f:
-        rows = list(csv.DictReader(f))
-    if given.picture:
-        picture(rows, given.picture)
-    if given.page:
-        into_page(given.page, tables(rows))
-    else:
-        print(tables(rows), end="")
-
-
 if __name__ == "__main__":
-    main()
+    speed.report(__doc__, tables, picture, (BEGIN, END))

@@ -96,9 +96,9 @@ def picture(rows, path):
     figure.savefig(path)
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+def report(doc, tables, draw, marks):
+    """The command line of this script and of fronts.py: tables printed or put into a page, the picture."""
+    parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("file")
     parser.add_argument("--page")
     parser.add_argument("--picture")
@@ -106,12 +106,12 @@ def main():
     with open(given.file, newline="") as f:
         rows = list(csv.DictReader(f))
     if given.picture:
-        picture(rows, given.picture)
+        draw(rows, given.picture)
     if given.page:
-        table.into_page(given.page, speed_table(rows))
+        table.into_page(given.page, tables(rows), marks)
     else:
-        print(speed_table(rows), end="")
+        print(tables(rows), end="")
 
 
 if __name__ == "__main__":
-    main()
+    report(__doc__, speed_table, picture, (table.BEGIN, table.END))
