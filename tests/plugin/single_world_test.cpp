@@ -19,21 +19,8 @@ struct Beam {
       : context(threads) {
     const dfm_world_def w = dfm_world_def_default();
     test::ok(dfm_world_create(context, &w, &world));
-    dfm_tetmesh mesh = 0;
-    const double size[] = {0.5, 0.1, 0.1};
-    test::ok(dfm_tetmesh_make(context, "beam", size, cells, &mesh));
-    dfm_tetmesh_info info{};
-    info.size = sizeof info;
-    test::ok(dfm_tetmesh_get_info(mesh, &info));
-    dfm_body_def d = dfm_body_def_default();
-    test::ok(dfm_tetmesh_data(mesh, &d.points, &d.tets, nullptr));
-    d.npoint = info.npoint;
-    d.ntet = info.ntet;
-    std::vector<uint8_t> fixed(d.npoint, 0);
-    double least = 1e300;
-    for (uint32_t i = 0; i < d.npoint; ++i) least = std::min(least, d.points[3 * i]);
-    for (uint32_t i = 0; i < d.npoint; ++i) fixed[i] = d.points[3 * i] < least + 1e-9 ? 7 : 0;
-    d.fixed = fixed.data();
+    std::vector<uint8_t> fixed;
+    dfm_body_def d = test::clamped_beam(context, cells, fixed);
     d.model = model;
     d.integrator = integrator;
     const std::vector<dfm_param_value> rows = rows_of(params);

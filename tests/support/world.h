@@ -193,4 +193,24 @@ inline void run(dfm_world w, double seconds, double dt) {
   }
 }
 
+// A beam of 0.5 x 0.1 x 0.1 m whose end of least x is held; `fixed` must outlive the def.
+inline dfm_body_def clamped_beam(dfm_context *context, uint32_t cells, std::vector<uint8_t> &fixed) {
+  dfm_tetmesh mesh = 0;
+  const double size[] = {0.5, 0.1, 0.1};
+  ok(dfm_tetmesh_make(context, "beam", size, cells, &mesh));
+  dfm_tetmesh_info info{};
+  info.size = sizeof info;
+  ok(dfm_tetmesh_get_info(mesh, &info));
+  dfm_body_def d = dfm_body_def_default();
+  ok(dfm_tetmesh_data(mesh, &d.points, &d.tets, nullptr));
+  d.npoint = info.npoint;
+  d.ntet = info.ntet;
+  double least = 1e300;
+  for (uint32_t i = 0; i < d.npoint; ++i) least = std::min(least, d.points[3 * i]);
+  fixed.assign(d.npoint, 0);
+  for (uint32_t i = 0; i < d.npoint; ++i) fixed[i] = d.points[3 * i] < least + 1e-9 ? 7 : 0;
+  d.fixed = fixed.data();
+  return d;
+}
+
 }  // namespace test
