@@ -31,6 +31,14 @@ add_library(deform_flags INTERFACE)
 target_compile_options(deform_flags INTERFACE -ffp-contract=off -Wall -Wextra -Wshadow -Wno-unused-parameter)
 if(DEFORM_WERROR)
   target_compile_options(deform_flags INTERFACE -Werror)
+elseif(NOT PROJECT_IS_TOP_LEVEL)
+  # The host's flags come first and hold here too: its -Werror is not for our warnings.
+  target_compile_options(deform_flags INTERFACE -w)
+endif()
+if(NOT PROJECT_IS_TOP_LEVEL)
+  target_compile_options(deform_flags INTERFACE -fno-fast-math)
+  set(CMAKE_UNITY_BUILD OFF)                    # files have names of their own in anonymous namespaces
+  set(CMAKE_INTERPROCEDURAL_OPTIMIZATION OFF)   # wide kernels stay apart
 endif()
 if(DEFORM_SANITIZE)
   add_compile_options(-fsanitize=${DEFORM_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)

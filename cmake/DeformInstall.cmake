@@ -9,15 +9,17 @@ file(RELATIVE_PATH deform_bin_to_lib /${CMAKE_INSTALL_BINDIR} /${CMAKE_INSTALL_L
 file(RELATIVE_PATH deform_pc_to_prefix /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
 string(REGEX REPLACE "/$" "" deform_pc_to_prefix ${deform_pc_to_prefix})
 
-# The build tree has the same run paths as the installed one. With a run path of its own CMake would pad it
-# with empty entries to the length of the installed one, and the dynamic linker reads an empty entry as the
-# current folder: a library lying there would be loaded.
-set(deform_cli_rpath "$ORIGIN/${deform_bin_to_lib}")
-if(NOT deform_bin_to_lib STREQUAL "../lib")
-  list(APPEND deform_cli_rpath "$ORIGIN/../lib")   # where the build tree has it
+if(TARGET deform_cli)
+  # The build tree has the same run paths as the installed one. With a run path of its own CMake would pad it
+  # with empty entries to the length of the installed one, and the dynamic linker reads an empty entry as the
+  # current folder: a library lying there would be loaded.
+  set(deform_cli_rpath "$ORIGIN/${deform_bin_to_lib}")
+  if(NOT deform_bin_to_lib STREQUAL "../lib")
+    list(APPEND deform_cli_rpath "$ORIGIN/../lib")   # where the build tree has it
+  endif()
+  set_target_properties(deform_cli PROPERTIES INSTALL_RPATH "${deform_cli_rpath}" BUILD_WITH_INSTALL_RPATH ON)
+  install(TARGETS deform_cli RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT command)
 endif()
-set_target_properties(deform_cli PROPERTIES INSTALL_RPATH "${deform_cli_rpath}" BUILD_WITH_INSTALL_RPATH ON)
-install(TARGETS deform_cli RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT command)
 install(TARGETS deform deform_headers EXPORT deformTargets
   LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library NAMELINK_COMPONENT dev
   ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT dev)
@@ -29,15 +31,15 @@ endif()
 if(TARGET solver_cholmod)
   install(TARGETS solver_cholmod LIBRARY DESTINATION ${deform_plugin_dir} COMPONENT cholmod EXCLUDE_FROM_ALL)
 endif()
-install(DIRECTORY ${CMAKE_SOURCE_DIR}/libdeform/include/deform DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/libdeform/include/deform DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
   COMPONENT dev FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp")
-install(FILES ${CMAKE_SOURCE_DIR}/libdeform/schema/deform-scene.schema.json
-  ${CMAKE_SOURCE_DIR}/libdeform/schema/deform-cost.schema.json DESTINATION ${CMAKE_INSTALL_DATADIR}/deform
+install(FILES ${PROJECT_SOURCE_DIR}/libdeform/schema/deform-scene.schema.json
+  ${PROJECT_SOURCE_DIR}/libdeform/schema/deform-cost.schema.json DESTINATION ${CMAKE_INSTALL_DATADIR}/deform
   COMPONENT command)
 # Plugins to copy and edit, as source.
-file(GLOB deform_templates ${CMAKE_SOURCE_DIR}/plugins/template_*)
+file(GLOB deform_templates ${PROJECT_SOURCE_DIR}/plugins/template_*)
 install(DIRECTORY ${deform_templates} DESTINATION ${CMAKE_INSTALL_DATADIR}/deform COMPONENT dev)
-install(FILES ${CMAKE_SOURCE_DIR}/LICENSE ${CMAKE_SOURCE_DIR}/README.md ${CMAKE_SOURCE_DIR}/CHANGELOG.md
+install(FILES ${PROJECT_SOURCE_DIR}/LICENSE ${PROJECT_SOURCE_DIR}/README.md ${PROJECT_SOURCE_DIR}/CHANGELOG.md
   DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT library)
 
 # The adapters of rigid engines have exports of their own, so that who does not ask for one
@@ -51,7 +53,7 @@ foreach(adapter ode bullet bullet64)
       LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT ${adapter}
       ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT ${adapter})
     set_target_properties(deform_${adapter} PROPERTIES INSTALL_RPATH "$ORIGIN" BUILD_WITH_INSTALL_RPATH ON)
-    install(DIRECTORY ${CMAKE_SOURCE_DIR}/bindings/${folder}/include/deform
+    install(DIRECTORY ${PROJECT_SOURCE_DIR}/bindings/${folder}/include/deform
       DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT ${folder}
       FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp")
     install(EXPORT deform_${adapter}Targets NAMESPACE deform:: DESTINATION ${deform_cmake_dir}
@@ -60,13 +62,14 @@ foreach(adapter ode bullet bullet64)
 endforeach()
 
 install(EXPORT deformTargets NAMESPACE deform:: DESTINATION ${deform_cmake_dir} COMPONENT dev)
-configure_package_config_file(${CMAKE_SOURCE_DIR}/cmake/deformConfig.cmake.in
-  ${CMAKE_BINARY_DIR}/cmake/deformConfig.cmake
+configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/deformConfig.cmake.in
+  ${PROJECT_BINARY_DIR}/cmake/deformConfig.cmake
   INSTALL_DESTINATION ${deform_cmake_dir} PATH_VARS deform_plugin_dir)
-write_basic_package_version_file(${CMAKE_BINARY_DIR}/cmake/deformConfigVersion.cmake
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/cmake/deformConfigVersion.cmake
   COMPATIBILITY SameMinorVersion)
-install(FILES ${CMAKE_BINARY_DIR}/cmake/deformConfig.cmake ${CMAKE_BINARY_DIR}/cmake/deformConfigVersion.cmake
-  ${CMAKE_SOURCE_DIR}/cmake/DeformPlugin.cmake ${CMAKE_SOURCE_DIR}/cmake/deform_plugin.map
+install(FILES ${PROJECT_BINARY_DIR}/cmake/deformConfig.cmake
+  ${PROJECT_BINARY_DIR}/cmake/deformConfigVersion.cmake
+  ${PROJECT_SOURCE_DIR}/cmake/DeformPlugin.cmake ${PROJECT_SOURCE_DIR}/cmake/deform_plugin.map
   DESTINATION ${deform_cmake_dir} COMPONENT dev)
 
 # An archive is all there is to link then, so `pkg-config --libs` names what it needs even without --static.
@@ -81,17 +84,20 @@ set(deform_pc_plugin_dir "\${prefix}/${deform_plugin_dir}")
 if(DEFORM_PLUGINS_STATIC)
   set(deform_pc_plugin_dir "")
 endif()
-configure_file(${CMAKE_SOURCE_DIR}/cmake/deform.pc.in ${CMAKE_BINARY_DIR}/cmake/deform.pc @ONLY)
-install(FILES ${CMAKE_BINARY_DIR}/cmake/deform.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT dev)
+configure_file(${PROJECT_SOURCE_DIR}/cmake/deform.pc.in ${PROJECT_BINARY_DIR}/cmake/deform.pc @ONLY)
+install(FILES ${PROJECT_BINARY_DIR}/cmake/deform.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig
+  COMPONENT dev)
 set(deform_adapter_pc_private "")
 if(NOT DEFORM_SHARED)
   set(deform_adapter_pc_private "-lstdc++ -lm")
 endif()
 foreach(adapter IN LISTS deform_adapters)
   string(REGEX REPLACE "64$" "" folder ${adapter})
-  configure_file(${CMAKE_SOURCE_DIR}/cmake/deform_${adapter}.pc.in
-    ${CMAKE_BINARY_DIR}/cmake/deform_${adapter}.pc @ONLY)
-  install(FILES ${CMAKE_BINARY_DIR}/cmake/deform_${adapter}.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig
+  configure_file(${PROJECT_SOURCE_DIR}/cmake/deform_${adapter}.pc.in
+    ${PROJECT_BINARY_DIR}/cmake/deform_${adapter}.pc @ONLY)
+  install(FILES ${PROJECT_BINARY_DIR}/cmake/deform_${adapter}.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig
     COMPONENT ${adapter})
 endforeach()
-include(DeformPackage)
+if(PROJECT_IS_TOP_LEVEL AND DEFORM_CLI)
+  include(DeformPackage)
+endif()

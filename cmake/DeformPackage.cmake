@@ -13,10 +13,10 @@ if(NOT DEFORM_SHARED OR DEFORM_PLUGINS_STATIC)
 endif()
 # The Python package looks for its library in `native`, which is the prefix here.
 set(deform_python_dir lib/python3/dist-packages/deform)
-file(CREATE_LINK ../../../.. ${CMAKE_BINARY_DIR}/cmake/native SYMBOLIC)
-install(DIRECTORY ${CMAKE_SOURCE_DIR}/bindings/python/deform DESTINATION lib/python3/dist-packages
+file(CREATE_LINK ../../../.. ${PROJECT_BINARY_DIR}/cmake/native SYMBOLIC)
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/bindings/python/deform DESTINATION lib/python3/dist-packages
   COMPONENT python_package EXCLUDE_FROM_ALL PATTERN __pycache__ EXCLUDE)
-install(FILES ${CMAKE_BINARY_DIR}/cmake/native DESTINATION ${deform_python_dir} COMPONENT python_package
+install(FILES ${PROJECT_BINARY_DIR}/cmake/native DESTINATION ${deform_python_dir} COMPONENT python_package
   EXCLUDE_FROM_ALL)
 
 set(CPACK_GENERATOR DEB)
@@ -25,7 +25,7 @@ set(CPACK_PACKAGE_VERSION ${PROJECT_VERSION})
 set(CPACK_PACKAGE_CONTACT "the founders of deform <deform@localhost>")
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "soft bodies that touch each other with true friction")
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
-set(CPACK_PACKAGE_DIRECTORY ${CMAKE_BINARY_DIR}/packages)
+set(CPACK_PACKAGE_DIRECTORY ${PROJECT_BINARY_DIR}/packages)
 set(CPACK_OUTPUT_FILE_PREFIX ${CPACK_PACKAGE_DIRECTORY})
 set(CPACK_STRIP_FILES ON)
 set(CPACK_DEB_COMPONENT_INSTALL ON)

@@ -2,7 +2,6 @@
 # of the library. deform_add_static_plugin(NAME SOURCE...) builds the same sources as an archive to link into
 # a program; the entry is then called dfm_plugin_entry_NAME, and the program hands it to
 # dfm_plugin_register_static.
-set(DEFORM_PLUGIN_MAP ${CMAKE_CURRENT_LIST_DIR}/deform_plugin.map)
 function(deform_plugin_rules name)
   if(COMMAND deform_kernel_flags)
     deform_kernel_flags(${ARGN})
@@ -28,6 +27,7 @@ function(deform_add_plugin name)
   add_library(${name} MODULE ${ARGN})
   deform_plugin_rules(${name} ${ARGN})
   set_target_properties(${name} PROPERTIES PREFIX "")
-  target_link_options(${name} PRIVATE -Wl,--version-script=${DEFORM_PLUGIN_MAP})
-  set_target_properties(${name} PROPERTIES LINK_DEPENDS ${DEFORM_PLUGIN_MAP})
+  set(map ${CMAKE_CURRENT_FUNCTION_LIST_DIR}/deform_plugin.map)
+  target_link_options(${name} PRIVATE -Wl,--version-script=${map})
+  set_target_properties(${name} PROPERTIES LINK_DEPENDS ${map})
 endfunction()

@@ -1,4 +1,7 @@
 """Worlds from arrays, steps, errors, ends, threads."""
+import subprocess
+import sys
+import textwrap
 import threading
 import time
 import unittest
@@ -179,6 +182,45 @@ class Threads(unittest.TestCase):
         self.assertEqual(len(ended), 1)
         self.assertEqual(body.positions.shape, (body.nsurfel, 3))
         world.close()
+
+    def test_ctrl_c_ends_a_step_at_once(self):
+        """Of a fresh process: its main thread steps, and another one sends the signal until it is heard."""
+        program = textwrap.dedent("""
+            import os, signal, threading, time
+            import deform
+
+            def press():
+                while world._busy == 0:
+                    time.sleep(0.001)
+                time.sleep(0.02)
+                os.kill(os.getpid(), signal.SIGINT)
+
+            with deform.World(max_substeps=10**9) as world:
+                world.add_obstacle("plane")
+                world.add_body(deform.TetMesh.ball(0.1, cells=1000), position=(0, 0, 0.11),
+                               material={"young": 1e7})
+                before = world.hash
+                threading.Thread(target=press).start()
+                try:
+                    world.step(1e4)  # hours
+                except KeyboardInterrupt:
+                    print("interrupted", world.hash == before)
+                world.step(1e-3)
+                before = world.snapshot()
+                heard = []
+                world.step(0.1)
+                after = world.hash
+                world.restore(before)
+                signal.signal(signal.SIGINT, lambda *_: heard.append(1))
+                threading.Thread(target=press).start()
+                world.step(0.1)
+                while not heard:
+                    time.sleep(0.001)
+                print("went on", world.hash == after)
+                world.step(1e-3)
+        """)
+        done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=120)
+        self.assertEqual(done.stdout, "interrupted True\nwent on True\n", done.stderr)
 
     def test_two_worlds_in_two_threads(self):
         hashes = {}

@@ -7,6 +7,7 @@ import enum
 import json
 import weakref
 from dataclasses import dataclass
+from threading import get_ident
 from typing import Any, Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
@@ -15,6 +16,7 @@ from . import _abi
 from ._arrays import Report, Rows
 from ._context import Context, Params, choice, default_context, number_of, strings
 from ._library import (ArgumentError, BusyError, check, default, encoded, error, lib, quick, read_text, sized)
+from ._signals import watch
 from .body import EVERYTHING, Body, Obstacle, Rigid, pose_of, vector
 from .mesh import TetMesh, TriMesh, cells_of, points_of
 
@@ -178,11 +180,13 @@ class World:
         self._finalize = None
         self.context, self.handle = context, handle
         self._owner = owner
-        self._busy = False
+        self._busy = 0  # the thread that is inside a call
+        self._asked = False  # to stop, by a signal
         self._bits = ctypes.c_uint32(0)
         self._bits_at = ctypes.byref(self._bits)
         self._lists: dict[str, Any] = {}
         self._bodies: weakref.WeakValueDictionary[int, Body] = weakref.WeakValueDictionary()
+        watch(self)
 
     @classmethod
     def of_scene(cls, context: Context, handle: int, owner: Any) -> World:
@@ -226,11 +230,11 @@ class World:
     def alone(self) -> Iterator[None]:
         """For calls that release the interpreter's lock while they change the world."""
         self.free()
-        self._busy = True
+        self._busy = get_ident()
         try:
             yield
         finally:
-            self._busy = False
+            self._busy = 0
 
     def accept(self, status: int) -> int:
         """Raises what a status means, a discarded call included; what a Python law has raised is its
@@ -469,18 +473,30 @@ class World:
         """Advances the world by dt (s). Returns bits of Trouble, none where all is well.
 
         Raises Diverged where a sub-step could not be taken (the world stays at the last good one) and
-        Discarded where the step was given up and nothing has changed. Releases the interpreter's lock."""
+        Discarded where the step was given up and nothing has changed. Releases the interpreter's lock.
+        Ctrl-C in the main thread ends the step at once: KeyboardInterrupt, and nothing has changed."""
         seconds = float(dt)
         if self._busy:
             self.free()
-        self._busy = True
+        self._busy = get_ident()
         try:
             status = _step(self.handle, seconds, self._bits_at)
+        except BaseException:  # raised by the handler of a signal
+            self._by_signal()
+            raise
         finally:
-            self._busy = False
+            self._busy = 0
         if status:
+            if self._by_signal():  # whose handler has not raised
+                return self.step(seconds)
             self.accept(status)
         return Trouble(self._bits.value) if self._bits.value else _NO_TROUBLE
+
+    def _by_signal(self) -> bool:
+        """Did a signal end the last step?"""
+        ended = self._asked and bool(self._bits.value & _abi.DFM_TROUBLE_INTERRUPTED)
+        self._asked = self._asked and not ended
+        return ended
 
     def run(self, duration: float, dt: float | None = None) -> Trouble:
         """Steps until `duration` s have passed, by dt or, where none is given, by the stable step."""
@@ -503,6 +519,9 @@ class World:
         definition.load_from, definition.load_to = load_from, load_to
         with self.alone():
             status = lib.dfm_world_equilibrium(self.handle, ctypes.byref(definition), None)
+        if status == _abi.DFM_DISCARD and self._asked:  # by a signal whose handler has not raised
+            self._asked = False
+            return self.equilibrium(load_steps, load_from=load_from, load_to=load_to, time=time)
         self.accept(status)
 
     def interrupt(self) -> None:
