@@ -36,7 +36,7 @@ elseif(NOT PROJECT_IS_TOP_LEVEL)
   target_compile_options(deform_flags INTERFACE -w)
 endif()
 if(NOT PROJECT_IS_TOP_LEVEL)
-  target_compile_options(deform_flags INTERFACE -fno-fast-math)
+  add_compile_options(-fno-fast-math)           # behind the host's options and before those of targets
   set(CMAKE_UNITY_BUILD OFF)                    # files have names of their own in anonymous namespaces
   set(CMAKE_INTERPROCEDURAL_OPTIMIZATION OFF)   # wide kernels stay apart
 endif()

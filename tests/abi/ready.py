@@ -12,6 +12,7 @@ import sys
 
 # Warnings change no object, and 64 bits are what this compiler makes anyway.
 PASSED_OVER = ("-W", "-w", "-MD", "-m64", "-pipe", "-fdiagnostics")
+UNDONE = ("-ffast-math", "-fno-math-errno", "-fno-trapping-math")  # by -fno-fast-math, where it stands later
 # Where the library looks for plugins at last; one file is made of it.
 LAST_FOLDER = "-DDEFORM_INSTALL_PLUGIN_DIR="
 
@@ -32,7 +33,7 @@ def needs(command, source, build):
             other = next(words)
             flags += [word + other] if word == "-isystem" else []
         elif word == "-fno-fast-math":
-            flags = [flag for flag in flags if flag != "-ffast-math"]
+            flags = [flag for flag in flags if flag not in UNDONE]
         elif word.startswith("-") and not word.startswith(PASSED_OVER):
             flags.append(word)
     if not file or not target or not file.startswith(source + "/"):
