@@ -5,11 +5,13 @@ import pathlib
 import posixpath
 import re
 
-from headers import Reference
+from headers import Reference, page
+from wrappers import cpp_pages, python_pages
 
 ORDER = "libdeform/doc/README.md"
 FRONT = ["README.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md"]
 HEADERS = ["libdeform/include/deform", "bindings/ode/include/deform", "bindings/bullet/include/deform"]
+PYTHON = "bindings/python/deform"
 LANGUAGES = {".c": "c", ".h": "c", ".cpp": "cpp", ".hpp": "cpp", ".py": "python", ".json": "json",
              ".sh": "sh", ".txt": "cmake", ".cmake": "cmake", ".csv": "text", ".map": "text", ".in": "text"}
 LINK = re.compile(r"(\]\()([^)\s]+)(\))")
@@ -67,7 +69,10 @@ class Stage:
         headers = {path.name: path.read_text() for folder in HEADERS
                    for path in sorted((self.root / folder).glob("*.h"))}
         self.reference = Reference(headers)
-        self.files = {path: text for path, text in self.reference.pages().items()}
+        wrappers = {path.name: path.read_text() for folder in HEADERS
+                    for path in sorted((self.root / folder).glob("*.hpp"))}
+        python = python_pages(self.root / PYTHON, self.reference)
+        self.files = {**self.reference.pages(), **cpp_pages(wrappers, self.reference), **python}
         self.wanted = [*FRONT, ORDER]
         done = set()
         while self.wanted:
@@ -75,7 +80,7 @@ class Stage:
             if path not in done:
                 done.add(path)
                 self._take(path)
-        self.nav = self._nav(headers)
+        self.nav = self._nav(headers, wrappers, python)
 
     def _take(self, path):
         here = self.root / path
@@ -138,14 +143,17 @@ class Stage:
             rows.append(f"- [{title}]({to})")
         return f"# {path}\n\n" + "\n".join(rows) + "\n"
 
-    def _nav(self, headers):
+    def _nav(self, headers, wrappers, python):
         nav = [{"Reading order": ORDER}]
         base = posixpath.dirname(ORDER)
         for section, pages in order((self.root / ORDER).read_text()):
             nav.append({section: [{title: self._staged(posixpath.normpath(posixpath.join(base, target)))}
                                   for title, target in pages]})
         nav.insert(-1, {"Headers": [{"all headers": "api/index.md"},
-                                    *({name: "api/" + name.replace(".", "_") + ".md"} for name in headers)]})
+                                    *({name: "api/" + page(name)} for name in [*headers, *wrappers])]})
+        modules = sorted(set(python) - {"api/python.md"})
+        nav.insert(-1, {"Python": [{"all names": "api/python.md"},
+                                   *({re.sub(r".*python_|\.md$", "", path): path} for path in modules)]})
         nav.append({"Project": [{pathlib.Path(p).stem.capitalize(): p} for p in FRONT]})
         return nav
 

@@ -10,6 +10,7 @@ ROOT = pathlib.Path(sys.argv.pop() if len(sys.argv) > 1 else pathlib.Path(__file
 sys.path.insert(0, str(ROOT / "cmake/docs"))
 import headers  # noqa: E402
 import stage  # noqa: E402
+import wrappers  # noqa: E402
 
 HEADER = """/* deform/a.h -- things. More. */
 #ifndef DEFORM_A_H
@@ -54,6 +55,48 @@ class Headers(unittest.TestCase):
                      "**Returns**: [`dfm_kind`](a_h.md#dfm_kind); [`DFM_A_ONE`](a_h.md#dfm_a_).",
                      "**Threads**: Any thread."):
             self.assertIn(part, page)
+
+
+WRAPPER = """// deform/a.hpp -- more. Things.
+#include <span>
+namespace deform {
+// Says a_b.
+template <class E, class T = std::array<int, 2>>
+class Kind : public Handle<int> {
+ public:
+  Kind() = default;
+  // n: how many.
+  auto say(int n) const { if (n) { return E::done(dfm_say(n, nullptr, 0)); } return none(); }
+  int raw() const noexcept { return raw_; }  // as in C
+ private:
+  int hidden();
+  int raw_ = 0;
+};
+inline int sum(int a) { return dfm_sum(a); }
+}  // namespace deform
+"""
+
+
+class Wrappers(unittest.TestCase):
+    def setUp(self):
+        self.reference = headers.Reference({"a.h": HEADER})
+
+    def test_class_has_its_members_and_what_they_call(self):
+        page = wrappers.cpp_pages({"a.hpp": WRAPPER}, self.reference)["api/a_hpp.md"]
+        for part in ("# a.hpp\n\nMore. Things.", "## `Kind`\n\nSays a\\_b.",
+                     "| `auto say(int n) const;` | n: how many. Calls [`dfm_say`](a_h.md#dfm_say). |",
+                     "| `int raw() const noexcept;` | as in C |", "## `sum`"):
+            self.assertIn(part, page)
+        for part in ("hidden", "raw_ =", "Kind();"):
+            self.assertNotIn(part, page)
+
+    def test_every_name_of_the_python_package_is_described(self):
+        pages = "".join(wrappers.python_pages(ROOT / stage.PYTHON, self.reference).values())
+        names = re.search(r"__all__ = \[(.*?)\]", (ROOT / stage.PYTHON / "__init__.py").read_text(), re.S)
+        for name in re.findall(r'"(\w+)"', names.group(1)):
+            self.assertIn(f"## `{name}`", pages)
+        for part in ("### `World.step`", "World.step(dt: float) -> Trouble", "World.contacts: np.ndarray"):
+            self.assertIn(part, pages)
 
 
 class Pages(unittest.TestCase):
