@@ -2,8 +2,11 @@
 of this tree writes: the library, the plugins, the command. It needs CMake, Ninja and a compiler, and nothing
 from a registry, so that `pip install .` works wherever the library builds.
 
-The wheel is for any Python 3 on the platform (py3-none-PLATFORM): nothing in it is compiled against an
-interpreter. Settings (pip: --config-settings NAME=VALUE):
+The wheel is for any Python 3 (py3-none-PLATFORM): nothing in it is compiled against an interpreter. Its
+platform is manylinux_2_N where all that it needs from the system is what every Linux of that name has
+(PEP 600): a wheel built without ODE and Bullet, as `pip wheel .` builds it. libpng travels in it.
+
+Settings (pip: --config-settings NAME=VALUE):
   prebuilt  a build folder of this tree whose target deform_command is built; nothing is compiled then
   cmake     further arguments for configuring, in one text
 """
@@ -22,7 +25,8 @@ import tempfile
 import zipfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-LIBRARIES = re.compile(r"libdeform(_\w+)?\.so\.\d+|libdeform_python(_law)?\.so|deform/plugins-\d+/.*")
+LIBRARIES = re.compile(r"libdeform(_\w+)?\.so\.\d+|libdeform_python(_law)?\.so|deform/plugins-\d+/.*|"
+                       r"libpng\d+\.so\.\d+")
 PACKAGE = ROOT / "bindings" / "python" / "deform"
 
 
@@ -50,8 +54,42 @@ def _metadata(project):
     return "\n".join(lines)
 
 
-def _tag():
-    return "py3-none-" + sysconfig.get_platform().replace("-", "_").replace(".", "_")
+# Libraries of every manylinux system; of their versions the last number of the newest, and N of the first
+# manylinux_2_N that has it.
+EVERYWHERE = {"libc.so.6", "libm.so.6", "libgcc_s.so.1", "libstdc++.so.6", "libz.so.1",
+              "ld-linux-x86-64.so.2"}
+NEWEST = {"GLIBCXX_3.4": [(24, 28), (28, 31), (29, 34), (30, 35), (33, 39)],
+          "CXXABI_1.3": [(11, 28), (12, 31), (13, 34), (15, 39)], "GCC": [(7, 28), (12, 35), (14, 39)],
+          "ZLIB_1.2": [(9, 28), (12, 37)], "GLIBC_2": [(n, n) for n in range(28, 100)]}
+
+
+def _oldest(version):
+    """N of the first manylinux_2_N that has this version of a symbol, None where none is known."""
+    for name, rows in NEWEST.items():
+        found = re.fullmatch(re.escape(name) + r"(?:[._](\d+)(?:\.\d+)*)?", version)
+        if found:
+            return next((n for newest, n in rows if int(found[1] or 0) <= newest), None)
+    return None
+
+
+def _tag(files=()):
+    """The wheel's tag by what its files ask the system for."""
+    platform = sysconfig.get_platform().replace("-", "_").replace(".", "_")
+    machine = platform.removeprefix("linux_")
+    programs = {inside: path for inside, path in files if inside.startswith(("bin/", "lib/"))}
+    own, first = {pathlib.PurePath(inside).name for inside in programs}, 28
+    for path in programs.values():
+        asked = subprocess.run(["objdump", "-p", str(path)], capture_output=True, text=True,
+                               check=True).stdout
+        needed = set(re.findall(r"^ *NEEDED +(\S+)$", asked, re.M)) - own - EVERYWHERE
+        of = re.findall(r"^  required from (\S+):\n((?:    0x.*\n)+)", asked, re.M)
+        versions = {_oldest(line.split()[-1]) for library, lines in of if library in EVERYWHERE
+                    for line in lines.splitlines()}
+        if needed or None in versions:
+            return f"py3-none-{platform}"
+        first = max({first, *versions})
+    return f"py3-none-manylinux_2_{first}_{machine}" if programs and machine != platform else (
+        f"py3-none-{platform}")
 
 
 def _run(*command):
@@ -103,9 +141,9 @@ def native_files(prefix):
                 yield path.relative_to(prefix).as_posix(), path
 
 
-def _information(project):
+def _information(project, tag):
     """Files of the wheel's .dist-info folder, RECORD left out."""
-    lines = ["Wheel-Version: 1.0", "Generator: deform", "Root-Is-Purelib: false", f"Tag: {_tag()}", ""]
+    lines = ["Wheel-Version: 1.0", "Generator: deform", "Root-Is-Purelib: false", f"Tag: {tag}", ""]
     scripts = "".join(f"{script} = {target}\n" for script, target in project["scripts"])
     return {"METADATA": _metadata(project), "WHEEL": "\n".join(lines),
             "entry_points.txt": f"[console_scripts]\n{scripts}", "LICENSE": (ROOT / "LICENSE").read_text()}
@@ -116,7 +154,7 @@ def prepare_metadata_for_build_wheel(metadata_directory, config_settings=None):
     project = _project()
     info = pathlib.Path(metadata_directory) / f"{project['name']}-{project['version']}.dist-info"
     info.mkdir()
-    for name, text in _information(project).items():
+    for name, text in _information(project, _tag()).items():
         (info / name).write_text(text)
     return info.name
 
@@ -144,21 +182,23 @@ def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
     settings = dict(config_settings or {})
     project = _project()
     name = f"{project['name']}-{project['version']}"
-    wheel = _Wheel(pathlib.Path(wheel_directory) / f"{name}-{_tag()}.whl")
-    for path in sorted(PACKAGE.rglob("*")):
-        if path.is_file() and path.suffix in (".py", ".pyi", ".js", ".html", ".typed"):
-            wheel.add(f"deform/{path.relative_to(PACKAGE).as_posix()}", path.read_bytes())
     with tempfile.TemporaryDirectory() as folder:
         prefix = pathlib.Path(folder) / "prefix"
         _installed(prefix, settings)
-        for inside, path in native_files(prefix):
+        files = list(native_files(prefix))
+        tag = _tag(files)
+        wheel = _Wheel(pathlib.Path(wheel_directory) / f"{name}-{tag}.whl")
+        for path in sorted(PACKAGE.rglob("*")):
+            if path.is_file() and path.suffix in (".py", ".js", ".html", ".typed"):
+                wheel.add(f"deform/{path.relative_to(PACKAGE).as_posix()}", path.read_bytes())
+        for inside, path in files:
             mode = 0o755 if inside.startswith(("bin/", "lib/")) else 0o644
             wheel.add(f"deform/native/{inside}", path.read_bytes(), mode)
     info = f"{name}.dist-info"
-    for file, text in _information(project).items():
+    for file, text in _information(project, tag).items():
         wheel.add(f"{info}/{file}", text.encode())
     wheel.close(info)
-    return f"{name}-{_tag()}.whl"
+    return f"{name}-{tag}.whl"
 
 
 def build_sdist(sdist_directory, config_settings=None):

@@ -34,7 +34,7 @@ class Wheel(unittest.TestCase):
                             "--config-settings", f"prebuilt={os.environ['DEFORM_BUILD']}"], check=True,
                            env=clean())
             wheel, = (folder / "dist").iterdir()
-            self.assertRegex(wheel.name, r"^deform-\d+\.\d+\.\d+-py3-none-linux_\w+\.whl$")
+            self.assertRegex(wheel.name, r"^deform-\d+\.\d+\.\d+-py3-none-(many)?linux\w+\.whl$")
             subprocess.run([*pip, "install", "--no-index", wheel], check=True, env=clean())
             (folder / "other").mkdir()
             first = re.search(r"^```python\n(.*?)^```", GUIDE.read_text(), re.M | re.S).group(1)
@@ -61,6 +61,29 @@ class Wheel(unittest.TestCase):
             for needed in ("deform/py.typed", "deform/native/lib/libdeform.so.0",
                            "deform/native/include/deform/plugin.h"):
                 self.assertIn(needed, files)
+
+    def test_tag_names_the_oldest_system_that_has_what_is_asked_for(self):
+        sys.path.insert(0, str(SOURCE / "bindings" / "python"))
+        self.addCleanup(sys.path.pop, 0)
+        import wheel_backend
+        for version, first in (("GLIBC_2.2.5", 28), ("GLIBC_2.36", 36), ("GLIBCXX_3.4", 28),
+                               ("GLIBCXX_3.4.30", 35), ("GLIBCXX_3.4.999", None), ("CXXABI_1.3.13", 34),
+                               ("GCC_12.0.0", 35), ("ZLIB_1.2.9", 28), ("GLIBC_PRIVATE", None)):
+            self.assertEqual(wheel_backend._oldest(version), first, version)
+        library = pathlib.Path(os.environ["DEFORM_LIBRARY"])
+        self.assertRegex(wheel_backend._tag([("lib/libdeform.so.0", library)]),
+                         r"^py3-none-manylinux_2_\d\d_\w+$")
+        with tempfile.TemporaryDirectory() as name:  # what nobody else has
+            source, other = pathlib.Path(name) / "a.c", pathlib.Path(name) / "libother.so"
+            source.write_text("int a;")
+            subprocess.run([os.environ["CC"], "-shared", "-Wl,-soname,libother.so", source, "-o", other],
+                           check=True)
+            made = pathlib.Path(name) / "libb.so"
+            subprocess.run([os.environ["CC"], "-shared", "-Wl,--no-as-needed", source, other, "-o", made],
+                           check=True)
+            both = [("lib/libb.so", made), (f"lib/{other.name}", other)]
+            self.assertIn("manylinux", wheel_backend._tag(both))
+            self.assertRegex(wheel_backend._tag(both[:1]), r"^py3-none-linux_\w+$")
 
     def test_without_a_build_it_configures_one(self):
         sys.path.insert(0, str(SOURCE / "bindings" / "python"))
