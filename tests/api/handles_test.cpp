@@ -53,6 +53,7 @@ std::vector<Call> world_calls() {
       {"world_find_overlaps", [](uint64_t h) { return dfm_world_find_overlaps(h, &count); }},
       {"world_untangle", [](uint64_t h) { return dfm_world_untangle(h, &count); }},
       {"world_find_rigid", [](uint64_t h) { return dfm_world_find_rigid(h, "box", &made); }},
+      {"world_find_obstacle", [](uint64_t h) { return dfm_world_find_obstacle(h, "floor", &made); }},
       {"world_rigids", [](uint64_t h) { return dfm_world_rigids(h, 0, nullptr, &count); }},
       {"world_explain", [](uint64_t h) { return dfm_world_explain(h, nullptr, &bytes); }},
       {"world_add_friction",
@@ -205,6 +206,10 @@ std::vector<Call> obstacle_calls() {
        }},
       {"obstacle_move_to", [](uint64_t h) { return dfm_obstacle_move_to(h, &pose); }},
       {"obstacle_teleport", [](uint64_t h) { return dfm_obstacle_teleport(h, &pose); }},
+      {"obstacle_set_velocity_surface",
+       [](uint64_t h) { return dfm_obstacle_set_velocity_surface(h, zero3); }},
+      {"obstacle_set_filter", [](uint64_t h) { return dfm_obstacle_set_filter(h, 1, 1); }},
+      {"obstacle_set_material", [](uint64_t h) { return dfm_obstacle_set_material(h, 0); }},
   };
 }
 

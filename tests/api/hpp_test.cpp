@@ -282,6 +282,7 @@ TEST(Hpp, RigidBodies_GoByTheirSet) {
   EXPECT_TRUE(s.world.step(1e-3));
   EXPECT_LT(rigid.state().velocity[2], 0);
   EXPECT_EQ(s.world.find_rigid("box"), rigid);
+  EXPECT_EQ(s.world.find_obstacle("box"), deform::Obstacle(rigid));
   const deform::Obstacle as_obstacle = rigid;
   EXPECT_EQ(as_obstacle.pose().position[2], rigid.state().position[2]);
   EXPECT_EQ(s.world.pair_wrench(s.ball, as_obstacle, Vec3{}).force, Vec3{});

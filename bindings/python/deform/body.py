@@ -283,6 +283,22 @@ class Obstacle(_Part):
         self.world.free()
         check(quick.dfm_obstacle_teleport(self.handle, ctypes.byref(pose_of(position, rotation))))
 
+    def set_velocity_surface(self, velocity: Any) -> None:
+        """Velocity of its surface, a belt's, beside that of its pose: [3] m/s, in the world's axes."""
+        self.world.free()
+        check(quick.dfm_obstacle_set_velocity_surface(self.handle,
+                                                      vector(velocity, "velocity")))
+
+    def set_filter(self, category: int = 1, collides_with: int = EVERYTHING) -> None:
+        """A pair touches if each one's category is among the bits that the other collides with."""
+        self.world.free()
+        check(quick.dfm_obstacle_set_filter(self.handle, category, collides_with))
+
+    def set_material(self, material: Any = None) -> None:
+        """Its material, of World.add_material, for friction by material; None: no material."""
+        self.world.free()
+        check(quick.dfm_obstacle_set_material(self.handle, 0 if material is None else material.handle))
+
     def definition(self) -> _abi.dfm_obstacle_def:
         """Its def as created, as the C struct."""
         out = sized(_abi.dfm_obstacle_def)

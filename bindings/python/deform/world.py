@@ -430,6 +430,13 @@ class World:
         check(quick.dfm_world_find_body(self.handle, name.encode(), ctypes.byref(out)))
         return self._body(out.value)
 
+    def find_obstacle(self, name: str) -> Obstacle:
+        """The obstacle or rigid body of that name; ArgumentError names the nearest one."""
+        out = ctypes.c_uint64()
+        self.free()
+        check(quick.dfm_world_find_obstacle(self.handle, name.encode(), ctypes.byref(out)))
+        return self._obstacle(out.value)
+
     def owner(self, handle: int) -> Body | Obstacle:
         """What a handle of a report (contacts["body_a"], pairs["b"]) stands for."""
         if quick.dfm_handle_kind(int(handle)) == _abi.DFM_HANDLE_BODY:

@@ -32,6 +32,7 @@
 #include "deform/defs.hpp"
 #include "deform/deform.h"
 #include "deform/models.hpp"
+#include "deform/obstacles.hpp"
 #include "deform/result.hpp"
 
 namespace deform {
@@ -342,7 +343,7 @@ class Body : public Handle<dfm_body, struct BodyKind>, public BodyModels<E, Body
 
 // ---- obstacles and rigid bodies ---------------------------------------------------------------------------
 template <class E>
-class Obstacle : public Handle<dfm_obstacle, struct ObstacleKind> {
+class Obstacle : public Handle<dfm_obstacle, struct ObstacleKind>, public ObstacleChanges<E, Obstacle<E>> {
  public:
   using Handle::Handle;
   static void end(dfm_obstacle obstacle) noexcept { dfm_obstacle_destroy(obstacle); }
@@ -489,6 +490,10 @@ class World : public Handle<dfm_world, struct WorldKind> {
 
   auto find_body(Text name) const {
     return produce<E, Body<E>>([&](Body<E> &b) { return dfm_world_find_body(raw_, name.c_str, b.put()); });
+  }
+  auto find_obstacle(Text name) const {
+    return produce<E, Obstacle<E>>(
+        [&](Obstacle<E> &o) { return dfm_world_find_obstacle(raw_, name.c_str, o.put()); });
   }
   auto find_rigid(Text name) const {
     return produce<E, Rigid<E>>([&](Rigid<E> &r) { return dfm_world_find_rigid(raw_, name.c_str, r.put()); });

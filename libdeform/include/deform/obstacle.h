@@ -66,9 +66,30 @@ DFM_API dfm_status dfm_obstacle_get_def(dfm_obstacle obstacle, dfm_obstacle_def 
  * more steps, or teleport. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_obstacle_move_to(dfm_obstacle obstacle, const dfm_pose *pose);
 /** Puts it there now, without a motion: nothing is pushed or dragged on the way. Replaces keys, sine and
- * target. What it lies in then overlaps, and is found as after creation (dfm_world_overlaps). Threads: Not
- * during step. Since 0.1. */
+ * target. What it lies in then overlaps, and is found as after creation (dfm_world_overlaps). Contacts that
+ * it has there as well go on with their impulses and their friction memory, which belong to the body's
+ * surface; the others end in the next step. Sleeping bodies wake. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_obstacle_teleport(dfm_obstacle obstacle, const dfm_pose *pose);
+/** Changes the velocity of its surface, a belt's, beside that of its pose. Sleeping bodies wake; contacts
+ * keep their state. Cheap enough for each step.
+ * @param velocity  [3] m/s, world frame
+ * @return DFM_OK; DFM_E_ARG not finite, or too fast; DFM_E_STATE it is a rigid body; DFM_E_HANDLE. Threads:
+ * Not during step. Since 0.1. */
+DFM_API dfm_status dfm_obstacle_set_velocity_surface(dfm_obstacle obstacle, const double velocity[3]);
+/** Changes the collision filter that its def gave, also of a rigid body or of one of its shapes. Contacts of
+ * pairs that no longer touch end in the next step; a pair that touches from now on and overlaps is found as
+ * after creation. @return DFM_OK; DFM_E_HANDLE. Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_obstacle_set_filter(dfm_obstacle obstacle, uint32_t category, uint32_t collides_with);
+/** Changes its material, also of a rigid body or of one of its shapes: rules of friction by "material=NAME"
+ * and the material's entry "friction" hold for it from now on. Where that gives a contact another law, or the
+ * law other parameters, its friction memory starts anew; its impulses go on.
+ * @param material  of the same world; 0: none
+ * @return DFM_OK; DFM_E_HANDLE. Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_obstacle_set_material(dfm_obstacle obstacle, dfm_material material);
+/** Obstacle of that name; rigid bodies and their shapes are obstacles too (dfm_world_find_rigid finds rigid
+ * bodies alone). @return DFM_OK; DFM_E_ARG none of that name (nearest one); DFM_E_HANDLE. Threads: Any
+ * thread. Not during step. Since 0.1. */
+DFM_API dfm_status dfm_world_find_obstacle(dfm_world world, const char *name, dfm_obstacle *out);
 #ifdef __cplusplus
 }
 #endif

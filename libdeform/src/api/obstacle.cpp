@@ -8,6 +8,7 @@
 #include "step/method.h"
 #include "step/stages.h"
 #include "world/create.h"
+#include "world/obstacle_change.h"
 
 using namespace dfm;
 
@@ -99,5 +100,47 @@ dfm_status dfm_obstacle_teleport(dfm_obstacle obstacle, const dfm_pose *pose) {
     o.pose = to_pose(*pose);
     o.has_target = false;
     ++w.placements;
+  });
+}
+
+dfm_status dfm_obstacle_set_velocity_surface(dfm_obstacle obstacle, const double velocity[3]) {
+  return as_status([&] {
+    Obstacle &o = obstacle_of(obstacle);
+    exclusive(*o.world);
+    need(velocity, "velocity");
+    set_belt(o, load3(velocity));
+  });
+}
+
+dfm_status dfm_obstacle_set_filter(dfm_obstacle obstacle, uint32_t category, uint32_t collides_with) {
+  return as_status([&] {
+    Obstacle &o = obstacle_of(obstacle);
+    exclusive(*o.world);
+    set_filter(o, category, collides_with);
+  });
+}
+
+dfm_status dfm_obstacle_set_material(dfm_obstacle obstacle, dfm_material material) {
+  return as_status([&] {
+    Obstacle &o = obstacle_of(obstacle);
+    exclusive(*o.world);
+    set_material(o, material ? &material_of(material) : nullptr);
+  });
+}
+
+dfm_status dfm_world_find_obstacle(dfm_world world, const char *name, dfm_obstacle *out) {
+  return as_status([&] {
+    World &w = world_of(world);
+    need(name, "name");
+    need(out, "out");
+    const Obstacle *const o = w.find_obstacle(name);
+    if (!o) {
+      std::vector<std::string> names;
+      for (auto &x : w.obstacles) names.push_back(x->name);
+      const std::string near = nearest(name, names);
+      fail(DFM_E_ARG, "there is no obstacle '%s'%s", name,
+           near.empty() ? "" : ("; did you mean '" + near + "'?").c_str());
+    }
+    *out = o->handle;
   });
 }

@@ -23,91 +23,14 @@
 #include "step/stages.h"
 #include "world/body_model.h"
 #include "world/measure.h"
+#include "world/obstacle_change.h"
 #include "world/snapshot_models.h"
+#include "world/snapshot_staged.h"
 #include "world/snapshot_stream.h"
 #include "world/snapshot_structure.h"
 
 namespace dfm {
 namespace {
-
-// A world's changing part, read in full before anything of it is put in place. Members are named as in World,
-// Body and Obstacle, so that the lists of fields serve both.
-struct StagedBody {
-  struct {
-    Array<double> x, v, load;
-    Array<uint8_t> held;
-  } p;
-  struct {
-    std::string id;
-    Array<double> state;
-    std::vector<double> params;
-  } model;
-  ModelOrigin origin;
-  Integrator integrator;
-  std::vector<Switch> switches;
-  std::vector<SwitchRule> rule;
-  uint64_t first_model = 0;
-  std::unique_ptr<BodyModel> made;  // where the world's body has another model than the snapshot's
-  Vec3 contact_impulse;
-  EnergyBook energy;
-  ChangeBook changes;
-  std::vector<Load> loads;
-  std::vector<Spring> springs;
-  std::vector<HeldMotion> motions;
-  uint32_t next_load = 1, category = 1, collides_with = ~0u;
-  Slumber slumber;
-  Array<double> surfel_impulse, anchor, method_values;
-};
-struct StagedObstacle {
-  Pose pose, target;
-  bool has_target = false;
-  std::vector<dfm_pose_key> keys;
-  dfm_obstacle_def def{};
-};
-struct StagedRigids {
-  Array<dfm_rigid_state> state;
-  Array<double> extra, total;
-  double last_h = 0;
-};
-struct StagedLaw {
-  std::string id;
-  std::vector<double> params;
-};
-struct Staged {
-  double time = 0, offset = 0;
-  uint64_t step_count = 0, next_id = 0;
-  uint32_t sleepers = 0;
-  WorldBound bound;
-  Hold hold;
-  StepSizes sizes;
-  EnergyWatch watch;
-  dfm_world_stats stats{};
-  Gravity gravity;
-  dfm_world_def def{};
-  std::vector<StagedBody> bodies;
-  std::vector<StagedObstacle> obstacles;
-  std::vector<StagedRigids> rigid_sets;
-  std::vector<StagedLaw> laws;
-  std::vector<FrictionRule> friction;
-  std::vector<FilterRule> filters;
-  ContactStore store;
-  struct { std::vector<PairAside> aside; } overlaps;
-  std::vector<PairWork> work;
-  Report report;
-  std::vector<dfm_contact_event> events;  // none
-  std::vector<Swap> swaps;                // none
-  explicit Staged(const World &w) : store(w.memory()), report(w.memory()) {
-    const Memory &m = w.memory();
-    def.method = w.def.method;
-    bodies.resize(w.bodies.size());
-    obstacles.resize(w.obstacles.size());
-    rigid_sets.resize(w.rigid_sets.size());
-    for (StagedBody &b : bodies)
-      use_memory(m, b.p.x, b.p.v, b.p.load, b.p.held, b.model.state, b.surfel_impulse, b.anchor,
-                 b.method_values);
-    for (StagedRigids &r : rigid_sets) use_memory(m, r.state, r.extra, r.total);
-  }
-};
 
 template <class T>
 auto &object(T &x) {
@@ -178,6 +101,12 @@ constexpr uint64_t kMostIds = uint64_t{1} << 48;
 uint64_t last_id(const World &w) {
   return std::max(w.bodies.empty() ? 0 : w.bodies.back()->id,
                   w.obstacles.empty() ? 0 : w.obstacles.back()->id);
+}
+
+// One that has been destroyed lives on in what was made of it.
+bool knows_material(const World &w, const std::string &name) {
+  return std::any_of(w.materials.begin(), w.materials.end(), [&](auto &m) { return m->name == name; }) ||
+         std::any_of(w.obstacles.begin(), w.obstacles.end(), [&](auto &o) { return o->material == name; });
 }
 
 // s; no bound of a body in SI units lies below, and a smaller one would never let the world step again
@@ -384,6 +313,13 @@ void fields(Stream &s, W &w, const World &like) {
     s.array("keys", o.keys, kAnyCount, must::any);
     s.value("sine", o.def.sine, must::finite);
     s.must_hold("keys", "finite keys at rising times", [&] { return rise(o.keys); });
+    s.value("velocity_surface", o.def.velocity_surface, must::finite);
+    s.value("category", o.def.category, must::any);
+    s.value("collides_with", o.def.collides_with, must::any);
+    s.array("material", o.zone.material, kAnyCount, must::any);
+    s.value("material's friction", o.zone.friction, must::not_negative);
+    s.must_hold("material", "a material of this world",
+                [&] { return o.zone.material.empty() || knows_material(like, o.zone.material); });
   });
   at = 0;
   s.members("sets of rigid bodies", w.rigid_sets, like.rigid_sets.size(), [&](auto &entry) {
@@ -657,6 +593,13 @@ void exchange(World &w, Staged &t) noexcept {
     std::swap(o.has_target, other.has_target);
     std::swap(o.def.sine, other.def.sine);
     o.keys.swap(other.keys);
+    std::swap(o.def.velocity_surface, other.def.velocity_surface);
+    std::swap(o.def.category, other.def.category);
+    std::swap(o.def.collides_with, other.def.collides_with);
+    o.zone.material.swap(other.zone.material);
+    std::swap(o.zone.friction, other.zone.friction);
+    o.material.swap(other.material);
+    renew_defs(o);
   }
   for (size_t i = 0; i < w.rigid_sets.size(); ++i) {
     RigidSet &set = *w.rigid_sets[i];
@@ -770,6 +713,7 @@ void world_restore(World &w, const void *data, size_t bytes) {
   SnapshotReader s(p + sizeof(SnapshotHead), p + bytes);
   Staged staged(w);
   fields(s, staged, w);
+  for (StagedObstacle &o : staged.obstacles) o.material = o.zone.material;
   check(s, staged, w);
   make_models(s, w, staged);
   order_contacts(staged.store);

@@ -68,17 +68,12 @@ uint64_t snapshot_structure(const World &w) {
     h.add(d.half_size);
     h.add(d.radius);
     h.add(d.half_length);
-    h.add(d.velocity_surface);
     if (!o->points.empty()) {
       h.add(o->points.data(), o->points.size() * sizeof(double));
       h.add(o->triangles.data(), o->triangles.size() * sizeof(uint32_t));
       h.add(d.cells);
     }
-    h.add(d.category);
-    h.add(d.collides_with);
     h.add(o->name.data(), o->name.size());
-    h.add(o->material.data(), o->material.size());
-    h.add(o->zone.friction);
     if (o->added) {
       h.add(o->rigid_body);
       h.add(o->local.position);
