@@ -56,6 +56,7 @@ struct Group {
   bool repeated(const Near &n, Vec3 normal) const;
   uint32_t steepest(const Near &n) const;
   bool plane_weights(const Near &n, double weight[3]) const;
+  bool faces(const Near &n, Vec3 surface) const;
   bool reachable_across(const Near &n, double weight[3]) const;
   void emit(Near &n, Vec3 normal, double distance, const double weight[3], Array<ContactPoint> &out) const;
   void resolve(Array<ContactPoint> &out);
@@ -228,6 +229,14 @@ bool Group::plane_weights(const Near &n, double weight[3]) const {
   return true;
 }
 
+// Does the surface's point lie on the outer side of n's plane? A plane that is extended across a concave edge
+// bounds the free space over a point only there: where the surface has turned away behind the plane, a surfel
+// passes over that point.
+bool Group::faces(const Near &n, Vec3 surface) const {
+  const double tiny = 1e-9 * pair.b->surface->median_edge;
+  return dot(n.normal, surface - pair.xb(corners(n)[0])) >= -tiny;
+}
+
 // p projects beside the face, across concave edges only and no further than it can travel. Flat edges do not
 // count: sliding over them within the reach costs less than a tenth of the rest distance.
 bool Group::reachable_across(const Near &n, double weight[3]) const {
@@ -293,7 +302,8 @@ void Group::resolve(Array<ContactPoint> &out) {
       const bool first = n.distance <= tiny || vertex_cone_has(*pair.a.surface, surfel, -normal);
       if (rim && first && !repeated(n, normal)) emit(n, normal, n.distance, n.weight, out);
     }
-    if (!rim && std::fabs(n.plane) < n.reach && (inside || n.plane >= 0) && reachable_across(n, weight))
+    if (!rim && std::fabs(n.plane) < n.reach && (inside || n.plane >= 0) && faces(n, best.q) &&
+        reachable_across(n, weight))
       emit(n, n.normal, n.plane, weight, out);
   }
   if (!inside) return;

@@ -197,6 +197,39 @@ TEST(VertexFace, NearValley_PlaneAcrossIsExtrapolated) {
   EXPECT_EQ(of_tip(slow, 1, 0).size(), 1u);
 }
 
+// A block whose wall at x = 0 has a shallow valley along its diagonal. A surfel that flies over the block
+// passes the extended plane of the wall's lower triangle, which bounds nothing there.
+TEST(VertexFace, OverTheTopOfAFoldedWall_OnlyTheTopHolds) {
+  const Vec3 low0{0, -1, -1}, low1{-0.1, 1, -1}, high0{-0.1, -1, 0}, high1{0, 1, 0};
+  const Vec3 back0{3, -1, -1}, back1{3, 1, -1}, back2{3, -1, 0}, back3{3, 1, 0};
+  Welder w;
+  w.triangle(low0, high1, low1);
+  w.triangle(low0, high0, high1);
+  w.triangle(high0, back2, back3);
+  w.triangle(high0, back3, high1);
+  w.triangle(low0, back1, back0);
+  w.triangle(low0, low1, back1);
+  w.triangle(low0, back0, back2);
+  w.triangle(low0, back2, high0);
+  w.triangle(low1, high1, back3);
+  w.triangle(low1, back3, back1);
+  w.triangle(back0, back1, back3);
+  w.triangle(back0, back3, back2);
+  Scene scene;
+  scene.h = 0.2;
+  scene.add(w.mesh);
+  scene.add(probe({0.07, 0.5, 0.5}), {2, 0, 0});
+  const auto c = of_tip(scene, 1, 0);
+  ASSERT_EQ(c.size(), 1u);
+  EXPECT_GT(c[0].normal[2], 0.99);
+  // Lower, in front of the wall, the same plane is there in advance.
+  Scene before;
+  before.h = 0.2;
+  before.add(w.mesh);
+  before.add(probe({-0.06, -0.5, -0.55}), {2, 0, 0});
+  EXPECT_EQ(of_tip(before, 1, 0).size(), 2u);
+}
+
 TEST(VertexFace, SlightlyInside_IsPushedOutThroughTheNearestFace) {
   Scene scene;
   scene.add(box_mesh({1, 1, 1}, 4, 4, 4));
