@@ -2,6 +2,8 @@
 # and runs; a second call installs and rebuilds nothing. The rest is for those who work on the library.
 PREFIX ?= /usr/local
 JOBS ?= $(shell nproc)
+# What bench-peers runs: all or quick
+PEERS ?= all
 SETUP = @cmake/setup.sh
 BUILD = @cmake --build --preset
 # The set-up's own, as in cmake/DeformPython.cmake.
@@ -15,6 +17,7 @@ help:
 	@echo "make test             the whole test suite"
 	@echo "make bench            the figures: kernels and full steps"
 	@echo "make bench-peers      beside MuJoCo, Bullet and Jolt: speed at equal error, build/peers/"
+	@echo "                      PEERS=quick: coarse scenes and slopes only, some minutes"
 	@echo "make soak             jittered starts, the suite, combinations, what holds: hours; can be stopped"
 	@echo "make lint             layout, includes, headers, text"
 	@echo "make format           clang-format on all C and C++ files, one version everywhere"
@@ -71,7 +74,7 @@ bench: setup-bench build/bench/build.ninja
 
 bench-peers: setup-peers build/release/build.ninja
 	$(BUILD) release --target deform_command
-	@$(PYTHON) -B tests/bench/peers/bench_peers.py build/release/bin/deform build/peers
+	@$(PYTHON) -B tests/bench/peers/bench_peers.py build/release/bin/deform build/peers $(PEERS)
 
 # Rows that are in the table already are not run again.
 soak: setup-bench build/bench/build.ninja build/release/build.ninja

@@ -14,6 +14,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <ctime>
 #include <fstream>
 #include <functional>
 #include <map>
@@ -28,8 +29,14 @@ namespace bullet {
 // Centimeters and grams: its solvers stop at absolute tolerances that a small body in SI units does not
 // exceed. Values arrive in SI units.
 constexpr double kLength = 100, kMass = 1000, kStress = kMass / kLength, kG = 9.81 * kLength;
-constexpr btScalar kMargin = btScalar(1e-3 * kLength);
+constexpr btScalar kMargin = btScalar(1e-3 * kLength);  // where `margin` is not given
+constexpr int kHopeless = 3;                            // how a run ends that is foreseen to be too slow
 using Values = std::map<std::string, double>;
+
+inline double given(const Values &v, const char *key, double otherwise) {
+  const auto at = v.find(key);
+  return at == v.end() ? otherwise : at->second;
+}
 
 struct Scene {
   btSoftBodyRigidBodyCollisionConfiguration configuration;
@@ -42,8 +49,14 @@ struct Scene {
   std::vector<btSoftBody *> softs;
   btDeformableNeoHookeanForce *elastic = nullptr;
   btDeformableGravityForce *gravity = nullptr;
-  double time = 0, step, friction;
-  explicit Scene(const Values &v) : step(v.at("step")), friction(v.at("mu")) {
+  double time = 0, step, friction, end, most;
+  btScalar margin;
+  explicit Scene(const Values &v)
+      : step(v.at("step")),
+        friction(v.at("mu")),
+        end(v.at("end")),
+        most(given(v, "most", 0)),
+        margin(btScalar(kLength * given(v, "margin", 1e-3))) {
     solver.setDeformableSolver(&body_solver);
     // The implicit integrator needs contacts as projections: as Lagrange multipliers they are not part
     // of its system.
@@ -57,9 +70,14 @@ struct Scene {
     info.m_gravity = btVector3(0, 0, 0);
     info.m_sparsesdf.setDefaultVoxelsz(2.5f);
     info.m_sparsesdf.Initialize();
-    world.getSolverInfo().m_deformable_erp = btScalar(v.at("erp"));
-    world.getSolverInfo().m_friction = 1;
-    world.getSolverInfo().m_numIterations = int(v.at("iterations"));
+    btContactSolverInfo &how = world.getSolverInfo();
+    how.m_deformable_erp = btScalar(v.at("erp"));
+    how.m_deformable_cfm = btScalar(given(v, "cfm", how.m_deformable_cfm));
+    // speed of pushing out, in the length unit of this file
+    how.m_deformable_maxErrorReduction = btScalar(given(v, "reduction", how.m_deformable_maxErrorReduction));
+    how.m_splitImpulse = int(given(v, "split", how.m_splitImpulse));
+    how.m_friction = 1;
+    how.m_numIterations = int(v.at("iterations"));
   }
 
   // `place` turns a point of the file (m) and moves it. `matched`: moduli that give the law, which is that
@@ -90,14 +108,18 @@ struct Scene {
     soft->initializeDmInverse();
     soft->m_tetraScratches.resize(soft->m_tetras.size());
     soft->m_tetraScratchesTn.resize(soft->m_tetras.size());
-    soft->getCollisionShape()->setMargin(kMargin);
+    soft->getCollisionShape()->setMargin(margin);
     soft->setTotalMass(btScalar(kMass * v.at("mass")));
     soft->m_cfg.kKHR = 1;
-    soft->m_cfg.kCHR = 1;
+    soft->m_cfg.kCHR = btScalar(given(v, "chr", 1));
     soft->m_cfg.kDF = btScalar(friction);
     // Nodes against rigid bodies. With faces too (SDF_RDF) the implicit world stands still, without
     // friction neither.
-    soft->m_cfg.collisions = btSoftBody::fCollision::SDF_RD | btSoftBody::fCollision::SDF_RDN;
+    soft->m_cfg.collisions =
+        btSoftBody::fCollision::SDF_RD |
+        (given(v, "face", 0) != 0 ? btSoftBody::fCollision::SDF_RDF : btSoftBody::fCollision::SDF_RDN);
+    // of soft bodies that touch each other, in the units of this file
+    soft->setSpringStiffness(btScalar(given(v, "repulsion", soft->m_repulsionStiffness)));
     soft->m_sleepingThreshold = 0;
     soft->setActivationState(DISABLE_DEACTIVATION);
     world.addSoftBody(soft);
@@ -123,7 +145,7 @@ struct Scene {
 
   btRigidBody *wall(btVector3 half, btVector3 at) {
     auto *const shape = new btBoxShape(half);
-    shape->setMargin(kMargin);
+    shape->setMargin(margin);
     const btTransform pose(btQuaternion::getIdentity(), at);
     auto *const body = new btRigidBody(0, new btDefaultMotionState(pose), shape);
     body->setCollisionFlags(body->getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
@@ -142,7 +164,7 @@ struct Scene {
   // from the cosine of half the step's turn, which is 1 in single precision below 7e-4 rad.
   btRigidBody *heavy(btVector3 half, btVector3 at, btVector3 velocity, btVector3 spin) {
     auto *const shape = new btBoxShape(half);
-    shape->setMargin(kMargin);
+    shape->setMargin(margin);
     const btTransform pose(btQuaternion::getIdentity(), at);
     const btScalar mass = btScalar(1e9 * kMass);
     auto *const body =
@@ -213,6 +235,11 @@ struct Scene {
     time += step;
     // how far it came, should it be stopped
     if (std::floor(time / 0.1) > std::floor((time - step) / 0.1)) std::fprintf(stderr, "at %g\n", time);
+    // twice the time would not be enough
+    if (most > 0 && time < end / 4 && double(std::clock()) > most / 2 * CLOCKS_PER_SEC) {
+      std::fprintf(stderr, "at %g\n", time);
+      std::exit(kHopeless);
+    }
     if (!std::isfinite(center(0))) {
       std::fprintf(stderr, "not finite at %g s\n", time);
       std::exit(1);

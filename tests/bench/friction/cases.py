@@ -18,10 +18,22 @@ MOST_SECONDS = 300  # of processor time, for one case
 
 
 class TooSlow(RuntimeError):
-    """Raised by an entry that has used its time up: a result like any other."""
+    """Raised by an entry that has used its time up, or foresees that twice the time would not be enough
+    (`used`: what it had used then): a result like any other."""
 
-    def __init__(self, done, end, most=MOST_SECONDS):
-        super().__init__("too slow: > %d s for %.3g of %.3g s" % (most, done, end))
+    def __init__(self, done, end, most=None, used=None):
+        most = MOST_SECONDS if most is None else most
+        begun = "too slow: > %d s" % most if used is None else "too slow: %.3g s, at most %d," % (used, most)
+        super().__init__("%s for %.3g of %.3g s" % (begun, done, end))
+
+
+def check_time(done, end, used, most):
+    """For the steps of an entry: ends a run that is too slow, or after half the time has a quarter of the way
+    or less behind it."""
+    if used > most:
+        raise TooSlow(done, end, most)
+    if used > most / 2 and done < end / 4:
+        raise TooSlow(done, end, most, used)
 
 
 def band(value, share):

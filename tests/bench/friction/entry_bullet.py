@@ -12,7 +12,7 @@ bristles.
   implicit   the same with the implicit integrator
   ... 4 ms   with steps of 1/240 s, as in its demonstrations
 
-search.py has what else was tried.
+`found by search`: what search.py found for the case.
 """
 import os
 import resource
@@ -27,12 +27,16 @@ SETTINGS = {"default": {"implicit": 0, "iterations": 10, "erp": 0.06},
             "explicit 4 ms": {"implicit": 0, "iterations": 100, "erp": 0.06, "step": 1 / 240},
             "implicit 4 ms": {"implicit": 1, "iterations": 100, "erp": 0.06, "step": 1 / 240}}
 MARGIN = 1e-3  # m, bullet_world.h: a soft body stands off by it
-SEARCH = {"implicit": [1], "step": [2.5e-4, 5e-4, 1e-3, 2e-3], "erp": [0.02, 0.2, 0.5],
-          "iterations": [10, 30, 300]}
+HOPELESS = 3  # bullet_world.h, kHopeless
+# `reduction`: at what speed an overlap may be pushed out, cm/s; `chr`: hardness of contacts with rigid
+# bodies; `face`: contacts of faces too; None: as it comes
+SEARCH = {"implicit": [0, 1], "step": [2.5e-4, 5e-4, 1e-3, 2e-3, 1 / 240], "iterations": [10, 30, 100, 300],
+          "erp": [0.06, 0.02, 0.2, 0.5], "reduction": [None, 1, 10, 100], "cfm": [None, 0, 0.1],
+          "split": [None, 0], "chr": [None, 0.5], "margin": [None, 2e-4, 5e-4], "face": [None, 1]}
 
 
 class Entry:
-    name, settings, SEARCH, SEARCH_FROM = "bullet", SETTINGS, SEARCH, "explicit"
+    name, settings, SEARCH = "bullet", SETTINGS, SEARCH
     source = os.path.join(os.path.dirname(os.path.abspath(__file__)), "bullet_entry.cpp")
 
     def __init__(self, command, work):
@@ -69,6 +73,16 @@ class Entry:
         path, volume, self.points = self.meshes[key]
         return path, volume
 
+    @staticmethod
+    def check_time(done, used, end, most):
+        """Of a program that has ended: was it stopped, or did it stop itself, because of its time?"""
+        last = [line for line in done.stderr.splitlines() if line.startswith("at ")]
+        at = float(last[-1][3:]) if last else 0
+        if done.returncode == HOPELESS:
+            raise cases.TooSlow(at, end, most, used)
+        if done.returncode and used > most - 2:
+            raise cases.TooSlow(at, end, most)
+
     def run(self, case, configuration):
         path, volume = self.mesh(case["body"])
         m = case["body"]["material"]
@@ -76,17 +90,16 @@ class Entry:
         given.update(mass=m["density"] * volume, young=m["young"], poisson=m["poisson"],
                      damping=m["damping_stiffness"], begin=case.get("span", [0, 0])[0],
                      end=case.get("span", [0, 0])[1], radius=case["body"].get("radius", 0.0),
-                     height=case["body"].get("height", 0.0), touch=MARGIN)
+                     height=case["body"].get("height", 0.0))
         given.update(self.settings[configuration])
+        given.update(touch=given.get("margin", MARGIN), most=cases.MOST_SECONDS)
         most = cases.MOST_SECONDS
         before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
         arguments = ["%s=%.9g" % pair for pair in given.items()]
         done = subprocess.run([self.program, case["name"], path, *arguments], capture_output=True, text=True,
                               preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (most, most + 5)))
         used = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
-        if done.returncode and used > most - 2:
-            last = [line for line in done.stderr.splitlines() if line.startswith("at ")]
-            raise cases.TooSlow(float(last[-1][3:]) if last else 0, given["end"] or case["settle"])
+        self.check_time(done, used, given["end"] or case["settle"], most)
         if done.returncode:
             raise RuntimeError(done.stderr.strip().splitlines()[-1] if done.stderr.strip()
                                else "ended with %d" % done.returncode)

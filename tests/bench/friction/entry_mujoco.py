@@ -12,8 +12,9 @@ where a flex is elastic, with steps of 1 to 4 ms; its no-slip iterations are not
                 vertices of a few milligrams get contacts that the ball pushes in by 4 of its 6 mm
   hard 4 ms     the same at the longest step that the manual names
 
-search.py goes on from `hard`, case by case.
+`found by search`: what search.py found for the case.
 """
+import itertools
 import math
 import os
 import time
@@ -26,16 +27,53 @@ G = 9.81
 SETTINGS = {"default": {}, "recommended": {"cone": "elliptic", "impratio": 10},
             "hard": {"cone": "elliptic", "impratio": 1000, "diagexact": "enable", "solref": 2}}
 SETTINGS["hard 4 ms"] = {**SETTINGS["hard"], "step": 4e-3}
-SEARCH = {"impratio": [100, 10000, 100000], "step": [2.5e-4, 5e-4, 1e-3, 4e-3], "solref": [1, 4, 10],
-          "solimp": ["0.99 0.99 1e-5", "0.9999 0.9999 1e-5"], "diagexact": ["disable"],
-          "tolerance": [1e-12], "iterations": [1000], "solver": ["CG"]}
+# None: as it comes; `dof`, `cellcount`: the points of a grid of so many cells round the body move instead of
+# its own
+SEARCH = {"step": [5e-4, 1e-3, 2e-3, 4e-3], "cone": [None, "elliptic"],
+          "impratio": [None, 10, 100, 1000, 1e4],
+          "solref": [None, 2, 3, 5, 10], "solimp": [None, "0.95 0.99 1e-4", "0.99 0.99 1e-5",
+                                                    "0.9999 0.9999 1e-5"],
+          "diagexact": [None, "enable"], "solver": [None, "CG"], "iterations": [None, 20, 300],
+          "tolerance": [None, 1e-5, 1e-10], "dof": [None, "trilinear", "quadratic"], "margin": [None, 1e-4],
+          "cellcount": [None, "2 2 1", "2 2 2", "4 4 1"]}
 OPTION_KEYS = ("cone", "impratio", "tolerance", "iterations", "solver")
 # nothing in them is faster, and at the cases' own step they take four times as long
 LEAST_STEP = {"pinch_hold": 2e-3, "rotating_pad": 2e-3}
 
 
+def contact_of(case, given):
+    """What geoms and flexes have in common; `solref` in steps."""
+    touch = 'friction="%g 0.005 0.0001"' % case["mu"]
+    if "solref" in given:
+        touch += ' solref="%g 1"' % (given["solref"] * case["step"])
+    return touch + "".join(' %s="%s"' % (key, given[key]) for key in ("solimp", "margin") if key in given)
+
+
+def movers(points, given):
+    """The points that move: those of the mesh, or with `dof` those of a grid round it, x slowest."""
+    if "dof" not in given:
+        return points
+    order, axes = 2 if given["dof"] == "quadratic" else 1, []
+    for axis, cells in enumerate(int(n) for n in given.get("cellcount", "1 1 1").split()):
+        low, high = min(p[axis] for p in points), max(p[axis] for p in points)
+        axes.append([low + (high - low) * i / (order * cells) for i in range(order * cells + 1)])
+    return list(itertools.product(*axes))
+
+
+def grid_of(given):
+    """The same for a flex."""
+    keys = [key for key in ("dof", "cellcount") if key in given and "dof" in given]
+    return "".join(' %s="%s"' % (key, given[key]) for key in keys)
+
+
+def turned(given, axes):
+    """Settings for a body whose own axes `axes` have become x, y and z."""
+    cells = given.get("cellcount", "1 1 1").split()
+    return {**given, "cellcount": " ".join(cells[axis] for axis in axes)}
+
+
 class Entry:
-    name, settings, SEARCH, SEARCH_FROM = "mujoco", SETTINGS, SEARCH, "hard"
+    name, settings, SEARCH = "mujoco", SETTINGS, SEARCH
 
     def __init__(self, command, work):
         import mujoco
@@ -68,19 +106,15 @@ class Entry:
         points, tets = self.mesh(case["body"])
         m = case["body"]["material"]
         mass = m["density"] * mesh_file.volume(points, tets)
-        flex = ('<flexcomp name="soft" type="direct" dim="3" mass="%.9g" radius="1e-4" pos="0 0 %g" '
+        given = self.settings[configuration]
+        flex = ('<flexcomp name="soft" type="direct" dim="3" mass="%.9g" radius="1e-4" pos="0 0 %g"%s '
                 'point="%s" element="%s">' % (
-            mass, lift, " ".join("%.9g" % x for p in points for x in p),
+            mass, lift, grid_of(given), " ".join("%.9g" % x for p in points for x in p),
             " ".join(str(i) for t in tets for i in t)))
         flex += ('<elasticity young="%g" poisson="%g" damping="%g"/><edge equality="false"/>' %
                  (m["young"], m["poisson"], m["damping_stiffness"]))
-        given = self.settings[configuration]
         option = " ".join('%s="%s"' % (key, given[key]) for key in OPTION_KEYS if key in given)
-        touch = 'friction="%g 0.005 0.0001"' % case["mu"]
-        if "solref" in given:
-            touch += ' solref="%g 1"' % (given["solref"] * case["step"])
-        if "solimp" in given:
-            touch += ' solimp="%s"' % given["solimp"]
+        touch = contact_of(case, given)
         flex += '<contact selfcollide="none" condim="3" %s/>%s</flexcomp>' % (touch, pin)
         xml = ('<mujoco><size memory="1G"/><option timestep="%g" integrator="discrete" %s><flag '
                'diagexact="%s"/></option>'
@@ -91,7 +125,7 @@ class Entry:
             model = self.mj.MjModel.from_xml_string(xml)
         except ValueError as error:
             raise RuntimeError(str(error).splitlines()[0])
-        self.mass, self.limit = mass, time.process_time() + cases.MOST_SECONDS
+        self.mass, self.begun, self.most = mass, time.process_time(), cases.MOST_SECONDS
         return model, self.mj.MjData(model)
 
     def steps(self, model, data, end, before=None):
@@ -102,8 +136,7 @@ class Entry:
             self.mj.mj_step(model, data)
             if data.time < (i + 0.5) * model.opt.timestep:  # it begins anew where a value is not finite
                 raise RuntimeError("unstable at %g s" % ((i + 1) * model.opt.timestep))
-            if time.process_time() > self.limit:
-                raise cases.TooSlow(data.time, end)
+            cases.check_time(data.time, end, time.process_time() - self.begun, self.most)
             yield data.time
 
     FLOOR = '<geom name="floor" type="plane" size="2 2 1"/>'
@@ -225,7 +258,8 @@ class Entry:
     def run_rotating_pad(self, case, configuration):
         height, s, end = case["body"]["height"], case["ratio"], case["span"][1]
         points, _ = self.mesh(case["body"])
-        top = " ".join(str(i) for i, p in enumerate(points) if p[2] > height - 1e-6)
+        moving = movers(points, self.settings[configuration])
+        top = " ".join(str(i) for i, p in enumerate(moving) if p[2] > height - 1e-6)
         plate = ('<body name="plate" pos="0 0 -0.05"><joint name="slide" type="slide" axis="1 0 0"/><joint '
                  'name="turn" type="hinge" axis="0 0 1"/>'
                  '<geom name="plate" type="box" size="0.5 0.5 0.05" mass="1e6"/></body>')

@@ -5,6 +5,8 @@
   run.py mujoco | run.py bullet          other engines, by the scripts beside this one; any NAME with an
                                          entry_NAME.py here or in --entries
 
+Where search.py has found better settings than those that an entry names, they run as `found by search`.
+
 A row: engine, version, configuration, case, its parameters, quantity, measured, expected, low, high, verdict
 (pass, fail, too_slow, error, or not_run where an engine has no such law), cost (seconds of processor time per
 simulated second), note. A row is written as soon as its case is done; rows that FILE already holds are not
@@ -13,12 +15,14 @@ run again, so a run that was stopped goes on where it was.
 import argparse
 import csv
 import importlib
+import io
 import math
 import os
 import sys
 import tempfile
 
 import cases
+import found
 
 ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), *[os.pardir] * 3)
 COLUMNS = ["engine", "version", "configuration", "case", "parameters", "quantity", "measured", "expected",
@@ -43,10 +47,13 @@ def main():
     parser.add_argument("--command", default=os.path.join(ROOT, "build", "release", "bin", "deform"),
                         help="the deform command: runs our cases, makes the meshes of all entries (that of "
                              "this checkout, as `make demo` builds it)")
-    parser.add_argument("--only", help="one case by name")
+    parser.add_argument("--only", action="append", help="one case by name; may be given again")
+    parser.add_argument("--most", type=int, default=cases.MOST_SECONDS,
+                        help="seconds of processor time for a case")
     parser.add_argument("--configuration", help="one configuration of the engine (for deform: a law)")
     parser.add_argument("--out", help="CSV to write or to go on with; without it the rows are printed")
     given = parser.parse_args()
+    cases.MOST_SECONDS = given.most
     make = entry_of(given.engine, given.entries)
     given.command = command_of(given.command)
     given.out = given.out and os.path.abspath(given.out)
@@ -57,25 +64,31 @@ def main():
         except ModuleNotFoundError as error:
             sys.exit(MISSING % (given.engine, error.name))
         for case in cases.cases():
-            if given.only and case["name"] != given.only:
+            if given.only and case["name"] not in given.only:
                 continue
             lacks = getattr(entry, "lacks", lambda _: {})(case)
-            for configuration in [*entry.configurations(case), *lacks] or ["none"]:
+            for configuration in [*configurations_of(entry, case, parameters(case)), *lacks] or ["none"]:
                 head = dict(zip(COLUMNS, [entry.name, entry.version, configuration, case["name"],
                                           parameters(case)]))
                 if tuple(head.values()) in done or (given.configuration
                                                     and configuration != given.configuration):
                     continue
                 rows = ([{"verdict": "not_run", "note": lacks[configuration]}] if configuration in lacks
-                        else measured_rows(entry, case, configuration))
+                        else measured_rows(entry, case, configuration, parameters(case)))
+                rows = [{**head, **row} for row in rows]
+                if given.out:
+                    append(given.out, COLUMNS, *rows)
                 for row in rows:
-                    row = {**head, **row}
-                    if given.out:
-                        append(given.out, COLUMNS, row)
                     shown = ("engine", "configuration", "case", "parameters", "quantity", "measured", "low",
                              "high", "verdict", "note")
                     print("%-8s %-14s %-16s %-14s %-16s %12s  [%s, %s]  %s %s" %
                           tuple(row.get(k, "") for k in shown), flush=True)
+
+
+def configurations_of(entry, case, named):
+    """Those that an entry names, and `found by search` where there is something."""
+    names = [name for name in entry.configurations(case) if name != found.FOUND]
+    return [*names, found.FOUND] if names and found.settings(entry, case, named) else names
 
 
 def entry_of(engine, folder):
@@ -93,17 +106,21 @@ def entry_of(engine, folder):
                                                                    ", ".join(known)))
 
 
-def measured_rows(entry, case, configuration):
+def measured_rows(entry, case, configuration, named):
     if configuration == "none":
         why = getattr(entry, "why_not", lambda _: "no law with " + case["law"])(case)
         return [{"verdict": "not_run", "note": why}]
+    note = {}
+    if configuration == found.FOUND:
+        given = found.settings(entry, case, named)
+        entry.settings, note = {**type(entry).settings, found.FOUND: given}, {"note": found.told(given)}
     try:
         values, cost = entry.run(case, configuration)
     except cases.TooSlow as error:
         return [{"verdict": "too_slow", "note": str(error)}]
     except RuntimeError as error:
         return [{"verdict": "error", "note": str(error).replace("\n", " ")[:200]}]
-    return judged(case, values, cost)
+    return [{**row, **note} for row in judged(case, values, cost)]
 
 
 def judged(case, values, cost):
@@ -133,14 +150,17 @@ def rows_of(path):
         return list(csv.DictReader(f))
 
 
-def append(path, columns, row):
-    """One row at the end of a table that may not be there yet."""
+def append(path, columns, *rows):
+    """Rows at the end of a table that may not be there yet, in one write: a run that is stopped leaves all of
+    a case or nothing."""
     fresh = not os.path.exists(path) or os.path.getsize(path) == 0
+    text = io.StringIO()
+    writer = csv.DictWriter(text, columns, lineterminator="\n")
+    if fresh:
+        writer.writeheader()
+    writer.writerows(rows)
     with open(path, "a", newline="") as f:
-        writer = csv.DictWriter(f, columns, lineterminator="\n")
-        if fresh:
-            writer.writeheader()
-        writer.writerow(row)
+        f.write(text.getvalue())
 
 
 if __name__ == "__main__":

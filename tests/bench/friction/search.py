@@ -1,25 +1,34 @@
 #!/usr/bin/env python3
 """Looks for the settings with which an engine does best, case by case: a rival at its defaults says little.
 
-  search.py ENGINE --case NAME [--parameters "mu=0.5"] [--out FILE.csv] [--best FILE.csv]
+  search.py ENGINE --out FILE.csv [--scenes] [--only CASE] [--parameters "mu=0.5"] [--trials 40]
+            [--seconds 120] [--most 20]
 
-From the entry's best configuration (`SEARCH_FROM`) one key of its `SEARCH` after the other is tried at every
-value, with the best so far of the others: a walk along the coordinates. A row per trial goes to --out: case,
-settings, what was measured, and the score: how far the worst quantity lies from the middle of its band, in
-half bands (up to 1 passes). --best gets the winner as a row of the benchmark, configuration `tuned`, with its
-settings as note. Trials that --out holds are not run again.
+Tried for each case: the entry's named settings; then, in turns, a draw at random from its `SEARCH` (key to
+values, None: as it comes) and twice the best so far with one, two or three keys drawn anew. --scenes: the
+scenes of ../peers on their coarse meshes, else the cases of the friction benchmark. A row per trial goes to
+--out: settings, what was measured, score (how far the worst quantity lies from the middle of its band, in
+half bands: up to 1 passes), cost, processor time used. Of two trials within the bands the cheaper is better,
+else the nearer. A case ends after --trials, or when its trials have used --seconds; a trial ends after --most
+seconds, or earlier where it is hopeless. Draws depend on engine and case alone: a search that was stopped
+goes on, and more trials can be asked for later. run.py and run_scenes.py run the best as `found by search`.
 """
 import argparse
+import importlib
 import json
 import math
 import os
+import random
+import resource
 import sys
 import tempfile
+import time
 
 import cases
+import found
 import run
 
-COLUMNS = ["engine", "version", "case", "parameters", "settings", "measured", "score", "cost", "note"]
+COLUMNS = ["engine", "version", "case", "parameters", "settings", "measured", "score", "cost", "used", "note"]
 
 
 def score(case, values):
@@ -32,18 +41,67 @@ def score(case, values):
     return worst
 
 
-def trials(start, grid, judge):
-    """The best settings along the coordinates, and their score."""
-    best, least = dict(start), judge(start)
-    for key, values in grid.items():
-        for value in values:
-            given = {**best, key: value}
-            if given == best:
-                continue
-            found = judge(given)
-            if found < least:
-                best, least = given, found
-    return best, least
+def proposals(named, space, draw, best):
+    """Settings to try, without end: `best()` is the best so far."""
+    yield from named
+    turn = 0
+    while True:
+        turn += 1
+        if turn % 3 == 1:
+            given, keys = {}, list(space)
+        else:
+            given, keys = dict(best()), draw.sample(list(space), draw.choice((1, 1, 2, 3)))
+        for key in keys:
+            value = draw.choice(space[key])
+            given.pop(key, None)
+            if value is not None:
+                given[key] = value
+        yield given
+
+
+def used_now():
+    """Processor time of this process and of what it called, s."""
+    return time.process_time() + resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+
+
+def searched(entry, case, named, known, given):
+    """Runs the trials of a case that are not known yet."""
+    head = {"engine": entry.name, "version": entry.version, "case": case["name"], "parameters": named}
+    rows = {row["settings"]: row for row in known if all(row[k] == v for k, v in head.items())}
+    tried = {}
+    space = entry.space(case) if hasattr(entry, "space") else entry.SEARCH
+
+    def best():
+        row = found.best(tried.values())
+        return json.loads(row["settings"]) if row else {}
+
+    draw = random.Random("%s %s %s" % (entry.name, case["name"], named))
+    for number, settings in enumerate(proposals(type(entry).settings.values(), space, draw, best)):
+        spent = sum(float(row["used"]) for row in tried.values())
+        if len(tried) >= given.trials or spent >= given.seconds or number > 20 * given.trials:
+            break
+        key = json.dumps(settings, sort_keys=True)
+        if key in tried:
+            continue
+        if key not in rows:
+            entry.settings = {**type(entry).settings, found.FOUND: settings}
+            begun = used_now()
+            try:
+                values, cost = entry.run(case, found.FOUND)
+                row = {"measured": json.dumps(values), "score": "%.4g" % score(case, values),
+                       "cost": "%.3g" % cost}
+            except (RuntimeError, ValueError) as error:
+                row = {"score": "inf", "note": str(error).replace("\n", " ")[:120]}
+            rows[key] = {"measured": "", "cost": "", **head, "settings": key, **row,
+                         "used": "%.3g" % (used_now() - begun)}
+            run.append(given.out, COLUMNS, rows[key])
+            print("%-12s %-8s %4d %8s %s %s" % (case["name"], named, number, row["score"], key,
+                                                row.get("measured", row.get("note", ""))), flush=True)
+        tried[key] = rows[key]
+    row = found.best(tried.values())
+    if row:
+        print("best: %s %s, score %s, %s s per s: %s" % (case["name"], named, row["score"], row["cost"],
+                                                        found.told(json.loads(row["settings"]))), flush=True)
 
 
 def main():
@@ -52,55 +110,34 @@ def main():
     parser.add_argument("engine", metavar="ENGINE")
     parser.add_argument("--entries")
     parser.add_argument("--command", default=os.path.join(run.ROOT, "build", "release", "bin", "deform"))
-    parser.add_argument("--case", required=True)
+    parser.add_argument("--scenes", action="store_true")
+    parser.add_argument("--only", action="append", help="one case by name; may be given again")
     parser.add_argument("--parameters", help="as they stand in the rows; without it all of the case")
+    parser.add_argument("--trials", type=int, default=40)
+    parser.add_argument("--seconds", type=float, default=120)
+    parser.add_argument("--most", type=float, default=20)
     parser.add_argument("--out", required=True)
-    parser.add_argument("--best")
     given = parser.parse_args()
-    given.out, given.best = (path and os.path.abspath(path) for path in (given.out, given.best))
-    known = run.rows_of(given.out)
-    given.command = run.command_of(given.command)
+    given.out, given.command = os.path.abspath(given.out), run.command_of(given.command)
+    if given.scenes:
+        sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, "peers"))
+        import scenes
+        make = importlib.import_module("scenes_" + given.engine).Entry
+        todo = [(case, "cells=%d" % case["cells"]) for case in scenes.coarse_cases()]
+        scenes.MOST_SECONDS = given.most
+    else:
+        make = run.entry_of(given.engine, given.entries)
+        todo = [(case, run.parameters(case)) for case in cases.cases()]
+        cases.MOST_SECONDS = given.most
+    if not hasattr(make, "SEARCH"):
+        sys.exit("%s: its entry has no SEARCH" % given.engine)
     with tempfile.TemporaryDirectory() as work:
-        module = run.entry_of(given.engine, given.entries)
-        entry = module(given.command, work)
-        if not hasattr(entry, "SEARCH"):
-            sys.exit("%s: its entry has no SEARCH" % given.engine)
-        for case in cases.cases():
-            named = run.parameters(case)
-            if case["name"] != given.case or given.parameters not in (None, named):
+        entry = make(given.command, work)
+        for case, named in todo:
+            if (given.only and case["name"] not in given.only) or given.parameters not in (None, named) or (
+                    not entry.configurations(case)):
                 continue
-            results = {}
-
-            def judge(settings):
-                key = json.dumps(settings, sort_keys=True)
-                head = {"engine": entry.name, "version": entry.version, "case": case["name"],
-                        "parameters": named, "settings": key}
-                for row in known:
-                    if all(row[k] == v for k, v in head.items()):
-                        results[key] = row
-                        return float(row["score"])
-                entry.settings = {**entry.settings, "tuned": settings}
-                try:
-                    values, cost = entry.run(case, "tuned")
-                    row = {**head, "measured": json.dumps(values), "score": "%.4g" % score(case, values),
-                           "cost": "%.3g" % cost}
-                except RuntimeError as error:
-                    row = {**head, "score": "inf", "note": str(error).replace("\n", " ")[:120]}
-                results[key] = row
-                run.append(given.out, COLUMNS, row)
-                print(row["score"], key, row.get("measured", row.get("note", "")), flush=True)
-                return float(row["score"])
-
-            best, least = trials(entry.settings[entry.SEARCH_FROM], entry.SEARCH, judge)
-            row = results[json.dumps(best, sort_keys=True)]
-            print("best:", least, best, flush=True)
-            head = {"engine": entry.name, "version": entry.version, "configuration": "tuned",
-                    "case": case["name"], "parameters": named}
-            told = [all(old[k] == v for k, v in head.items()) for old in run.rows_of(given.best)]
-            if given.best and row.get("measured") and not any(told):
-                note = "; ".join("%s %s" % pair for pair in sorted(best.items()))
-                for line in run.judged(case, json.loads(row["measured"]), float(row["cost"])):
-                    run.append(given.best, run.COLUMNS, {**head, **line, "note": note})
+            searched(entry, case, named, run.rows_of(given.out), given)
 
 
 if __name__ == "__main__":

@@ -1,22 +1,33 @@
 #!/usr/bin/env python3
 """`make bench-peers`: deform beside MuJoCo, Bullet and Jolt: the friction benchmark and scenes.py.
 
-  bench_peers.py DEFORM FOLDER
+  bench_peers.py DEFORM FOLDER [all|quick]
+
+quick: the coarse meshes of the scenes and the slopes of the friction benchmark, at most 10 s of processor
+time for a run; into FOLDER/quick.
 
 MuJoCo goes into a virtual environment in FOLDER, Jolt into its node_modules; without npm Jolt is left out.
 Each engine runs in a process of its own, one thread each, side by side as the processors allow. Rows go to
-FOLDER/rows, tables and pictures beside; a run that was stopped goes on. What is missing ends it with one
-sentence.
+FOLDER/rows, tables and pictures beside; a run that was stopped goes on. A line tells which runs are under way
+and how long it will take. What is missing ends it with one sentence.
 """
 import concurrent.futures
 import os
 import shutil
 import subprocess
 import sys
+import threading
+
+import progress
+import scenes
+from scenes import friction_cases
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 FRICTION = os.path.join(HERE, os.pardir, "friction")
-JOLT = "jolt-physics@1.1.0"  # the version that scenes_jolt.py was written for
+# the versions that the entries were written for
+JOLT, MUJOCO = "jolt-physics@1.1.0", "mujoco==4.0.0"
+ENGINES = ["deform", "mujoco", "bullet", "jolt"]
+QUICK = {"most": {"scenes": 10, "friction": 10}, "friction": ("slope_slide", "slope_hold")}
 
 
 def stop(why):
@@ -32,7 +43,8 @@ def environment(folder):
         return python
     if subprocess.run([sys.executable, "-m", "venv", folder], capture_output=True).returncode:
         stop("no virtual environment can be made; install python3-venv")
-    pip = [python, "-m", "pip", "install", "--quiet", "mujoco", "numpy", "matplotlib"]
+    print("bench-peers: MuJoCo, numpy and matplotlib go into %s" % folder, flush=True)
+    pip = [python, "-m", "pip", "install", "--quiet", MUJOCO, "numpy", "matplotlib"]
     if subprocess.run(pip).returncode:
         stop("pip does not get mujoco, numpy and matplotlib; is there a network?")
     return python
@@ -51,7 +63,7 @@ def has_jolt(folder):
     return True
 
 
-def chain(python, command, folder, engine, environ):
+def chain(python, command, folder, engine, environ, quick):
     """All runs of one engine, scenes first."""
     for script, table in ((os.path.join(HERE, "run_scenes.py"), "scenes"),
                           (os.path.join(FRICTION, "run.py"), "friction")):
@@ -60,10 +72,24 @@ def chain(python, command, folder, engine, environ):
         rows = os.path.join(folder, "rows", "%s_%s.csv" % (table, engine))
         with open(os.path.join(folder, "rows", "%s_%s.log" % (table, engine)), "a") as log:
             call = [python, "-B", script, engine, "--command", command, "--out", rows]
+            if quick:
+                call += ["--most", str(QUICK["most"][table])]
+                call += ["--coarse"] if table == "scenes" else [
+                    part for case in QUICK["friction"] for part in ("--only", case)]
             if subprocess.run(call, env=environ, stdout=log, stderr=log).returncode:
                 return "%s did not end well; see %s" % (engine, log.name)
-        print("bench-peers: %s, %s: done" % (engine, table), flush=True)
     return ""
+
+
+def plans(engines, quick):
+    """{engine: its runs in their order}"""
+    whole = {"scenes": scenes.MOST_SECONDS, "friction": friction_cases.MOST_SECONDS}
+    most = QUICK["most"] if quick else whole
+    chosen = {"scenes": scenes.coarse_cases() if quick else scenes.cases(),
+              "friction": [case for case in friction_cases.cases()
+                           if not quick or case["name"] in QUICK["friction"]]}
+    return {engine: [run for table, cases in chosen.items() if (engine, table) != ("jolt", "friction")
+                     for run in progress.plan(table, engine, cases, most[table])] for engine in engines}
 
 
 def joined(folder, table, engines):
@@ -82,32 +108,56 @@ def joined(folder, table, engines):
 
 
 def main():
-    if len(sys.argv) != 3:
+    if len(sys.argv) not in (3, 4) or sys.argv[3:] not in ([], ["all"], ["quick"]):
         sys.exit(__doc__)
-    command, folder = (os.path.abspath(path) for path in sys.argv[1:])
+    command, folder = (os.path.abspath(path) for path in sys.argv[1:3])
+    quick = sys.argv[3:] == ["quick"]
     if not os.access(command, os.X_OK):
         stop("%s: no such command; build it with `make demo`" % command)
     if not shutil.which("pkg-config") or subprocess.run(["pkg-config", "--exists", "bullet"]).returncode:
         stop("pkg-config does not find Bullet; install pkg-config and libbullet-dev")
-    os.makedirs(os.path.join(folder, "rows"), exist_ok=True)
+    os.makedirs(folder, exist_ok=True)
     python = environment(os.path.join(folder, "venv"))
-    engines = ["deform", "mujoco", "bullet"] + (["jolt"] if has_jolt(folder) else [])
+    engines = [engine for engine in ENGINES if engine != "jolt" or has_jolt(folder)]
     environ = {**os.environ, "OMP_NUM_THREADS": "1", "JOLT": folder}
     workers = min(len(engines), max(1, (os.cpu_count() or 2) - 1))
+    folder = os.path.join(folder, "quick") if quick else folder
+    os.makedirs(os.path.join(folder, "rows"), exist_ok=True)
+    # the longest first: the others fill the rest
+    runs = plans(engines, quick)
+    engines.sort(key=lambda engine: -sum(run.seconds for run in runs[engine]))
+    watch, over, ended = progress.Progress(runs, folder, workers), threading.Event(), set()
+
+    def go(engine):
+        end = chain(python, command, folder, engine, environ, quick)
+        ended.add(engine)
+        return end
+
+    def tell():
+        while not over.wait(2):
+            watch.tell(ended)
+
+    print("bench-peers: %s (Ctrl-C stops; the same command goes on)" % watch.line(ended), flush=True)
+    teller = threading.Thread(target=tell, daemon=True)
+    teller.start()
     with concurrent.futures.ThreadPoolExecutor(workers) as pool:
-        ends = list(pool.map(lambda engine: chain(python, command, folder, engine, environ), engines))
+        ends = list(pool.map(go, engines))
+    over.set()
+    teller.join()
+    engines.sort(key=ENGINES.index)
     friction, scenes = (joined(folder, table, engines) for table in ("friction", "scenes"))
     for script, rows, out, more in (
             (os.path.join(FRICTION, "table.py"), friction, "friction.txt", []),
             (os.path.join(HERE, "speed.py"), friction, "speed.txt",
              ["--picture", os.path.join(folder, "speed.png")]),
             (os.path.join(HERE, "fronts.py"), scenes, "scenes.txt",
-             ["--picture", os.path.join(folder, "scenes.png")])):
+             ["--pictures", folder])):
         text = subprocess.run([python, "-B", script, rows, *more], check=True, capture_output=True,
                               text=True).stdout
         with open(os.path.join(folder, out), "w") as f:
             f.write(text)
-    print("%s: scenes.txt, scenes.png, friction.txt, speed.txt, speed.png; rows in the .csv" % folder)
+    print("\n%s: scenes.txt, a picture per scene, friction.txt, speed.txt, speed.png; rows in the .csv" %
+          folder)
     if any(ends):
         stop("; ".join(filter(None, ends)))
 

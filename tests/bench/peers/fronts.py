@@ -1,18 +1,22 @@
 #!/usr/bin/env python3
 """Speed at equal error and error at equal speed, from rows of run_scenes.py.
 
-  fronts.py FILE.csv [--page PAGE] [--picture PNG]
+  fronts.py FILE.csv [--page PAGE] [--runs PAGE] [--pictures FOLDER]
 
 The error of a run is the largest of its quantities': percent of what is expected; um/s where 0 is expected.
-Two tables: the least processor time per simulated second with which each engine stays within an error, over
-its meshes and settings; the least error that each has within a processor time. Others have every run. The
-picture has all runs with each engine's front. With --page the tables take the place of what stands between
-the marks `<!-- scenes -->` and `<!-- end of scenes -->`. What an engine was calibrated with does not count:
-the coarse beam of Jolt.
+The table of --page: the least processor time per simulated second with which each engine stays within an
+error, over its meshes and settings. Those of --runs: the least error that each has within a processor time,
+and every run. They take the place of what stands between the marks `<!-- scenes -->` and `<!-- end of
+scenes -->`; without a page they are printed. A picture per scene has all runs. What an engine was calibrated
+with does not count: the coarse beam of Jolt.
 """
+import argparse
+import csv
 import math
+import os
 
 import speed
+from found import FOUND
 
 BEGIN, END = "<!-- scenes -->\n", "<!-- end of scenes -->\n"
 COLORS = {**speed.COLORS, "jolt": "#8a63b8"}
@@ -64,10 +68,15 @@ def bold_least(cells):
     return ["**%s**" % t if v is not None and v == least else t for v, t in cells]
 
 
-def tables(rows):
+def heads(rows):
+    """Engines, what they cannot run, the rest of a table's head."""
     engines = list(dict.fromkeys(r["engine"] for r in rows))
     cannot = {(r["engine"], r["case"]): r["note"] for r in rows if r["configuration"] == "none"}
-    head = "| " + " | ".join(engines) + " |\n|" + "---|" * (2 + len(engines)) + "\n"
+    return engines, cannot, "| " + " | ".join(engines) + " |\n|" + "---|" * (2 + len(engines)) + "\n"
+
+
+def least_time(rows):
+    engines, cannot, head = heads(rows)
     text = "Least processor time (s per simulated s) within an error:\n\n| question | error at most " + head
     for case, quantities, unit, levels in QUESTIONS:
         found = runs(rows, case, quantities)
@@ -82,7 +91,12 @@ def tables(rows):
                     cells.append((None, "cannot" if (engine, case) in cannot else "never"))
             text += "| %s | %g %s | %s |\n" % (name_of(case, quantities), level, unit,
                                               " | ".join(bold_least(cells)))
-    text += "\nLeast error within a processor time:\n\n| question | s per simulated s " + head
+    return text
+
+
+def least_error(rows):
+    engines, cannot, head = heads(rows)
+    text = "Least error within a processor time:\n\n| question | s per simulated s " + head
     for case, quantities, unit, _ in QUESTIONS:
         if len(quantities) > 1 and "creep_um_per_s" in quantities:
             continue
@@ -100,7 +114,7 @@ def tables(rows):
             if any(v is not None for v, _ in cells):
                 text += "| %s | %g | %s |\n" % (name_of(case, quantities), budget,
                                                " | ".join(bold_least(cells)))
-    return text + "\n" + all_runs(rows)
+    return text
 
 
 def shown(row):
@@ -139,38 +153,56 @@ def all_runs(rows):
     return text
 
 
-def picture(rows, path):
+def pictures(rows, folder):
+    """peers_SCENE.png: error, that of the worst quantity in half bands, over processor time."""
     import matplotlib
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
-    shown = [q for q in QUESTIONS if q[:2] not in (("gripper", ("rise", "creep_um_per_s")),
-                                                   ("beam", ("sag", "period")), ("pair", ("dip",)))]
-    figure, axes = plt.subplots(2, math.ceil(len(shown) / 2), figsize=(13.5, 6.6), dpi=80, squeeze=False)
-    for axis, (case, quantities, unit, levels) in zip(axes.flat, shown):
-        found = [r for r in runs(rows, case, quantities) if math.isfinite(r[3]) and math.isfinite(r[4])]
-        for engine in COLORS:
-            mine = sorted((r[3], max(r[4], 1e-3)) for r in found if r[0] == engine)
-            axis.loglog([c for c, _ in mine], [e for _, e in mine], "o", ms=4, alpha=0.6,
-                        color=COLORS[engine], label=engine)
-            front, least = [], math.inf
-            for cost, e in mine:
-                if e < least:
-                    front, least = [*front, (cost, e)], e
-            axis.step([c for c, _ in front], [e for _, e in front], where="post", color=COLORS[engine],
-                      lw=1.4)
-        for level in levels:
-            axis.axhline(level, color="k", lw=0.6, ls=":")
-        axis.set_title(name_of(case, quantities), fontsize=10)
+    top, low = 300.0, 3e-3
+    by_scene = {}
+    for (case, named), by in speed.runs(rows).items():
+        for (engine, configuration), (error, cost) in by.items():
+            if math.isfinite(cost) and not (engine == "jolt" and (case, int(named[6:])) == CALIBRATED):
+                by_scene.setdefault(case, []).append((engine, configuration, named, error, cost))
+    for case, found in by_scene.items():
+        finest = max((r[2] for r in found), key=lambda named: int(named[6:]))
+        figure, axis = plt.subplots(figsize=(7.2, 3.8), dpi=80)
+        for engine, configuration, named, error, cost in found:
+            shape = "*" if configuration == FOUND else "x" if error > top else "o"
+            axis.plot(cost, min(max(error, low), top), shape, ms=11 if shape == "*" else 6, alpha=0.75,
+                      color=COLORS[engine], mfc=COLORS[engine] if named == finest else "none",
+                      label=engine)
+        axis.axhspan(low / 2, 1, color="k", alpha=0.06, lw=0)
+        axis.set(xscale="log", yscale="log", ylim=(low / 2, top * 2), title=case,
+                 xlabel="processor time per simulated second (s)", ylabel="error (half bands)")
         axis.grid(True, alpha=0.25)
-        axis.set_ylabel("error (%s)" % unit, fontsize=8)
-        axis.set_xlabel("processor time per simulated second (s)", fontsize=8)
-    for axis in axes.flat[len(shown):]:
-        axis.axis("off")
-    handles, labels = axes.flat[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="lower center", ncols=len(labels), fontsize=9)
-    figure.tight_layout(rect=(0, 0.05, 1, 1))
-    figure.savefig(path)
+        handles = dict(zip(*reversed(axis.get_legend_handles_labels())))
+        figure.legend(handles.values(), handles.keys(), loc="lower center", ncols=len(handles), fontsize=9)
+        figure.tight_layout(rect=(0, 0.07, 1, 1))
+        figure.savefig(os.path.join(folder, "peers_%s.png" % case))
+        plt.close(figure)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("file")
+    parser.add_argument("--page")
+    parser.add_argument("--runs")
+    parser.add_argument("--pictures", metavar="FOLDER")
+    given = parser.parse_args()
+    with open(given.file, newline="") as f:
+        rows = list(csv.DictReader(f))
+    if given.pictures:
+        pictures(rows, given.pictures)
+    short, long_ = least_time(rows), least_error(rows) + "\n" + all_runs(rows)
+    if given.page:
+        speed.table.into_page(given.page, short, (BEGIN, END))
+    if given.runs:
+        speed.table.into_page(given.runs, long_, (BEGIN, END))
+    if not given.page and not given.runs:
+        print(short + "\n" + long_, end="")
 
 
 if __name__ == "__main__":
-    speed.report(__doc__, tables, picture, (BEGIN, END))
+    main()

@@ -2,7 +2,7 @@
 """Runs the scenes of scenes.py with one engine and writes a row per case, configuration and quantity.
 
   run_scenes.py ENGINE --out FILE.csv [--command build/release/bin/deform] [--only CASE] [--cells N]
-                [--configuration NAME]
+                [--configuration NAME] [--coarse] [--most SECONDS]
   run_scenes.py judge --out FILE.csv        judges the rows of FILE anew, after an answer has changed
 
 ENGINE: NAME of a scenes_NAME.py here. Rows have the columns of friction/run.py; those that FILE holds are not
@@ -29,11 +29,15 @@ def main():
     parser.add_argument("--command", default=os.path.join(run.ROOT, "build", "release", "bin", "deform"))
     parser.add_argument("--only")
     parser.add_argument("--cells", type=int)
+    parser.add_argument("--coarse", action="store_true", help="only the coarse mesh of each scene")
+    parser.add_argument("--most", type=int, default=scenes.MOST_SECONDS,
+                        help="seconds of processor time for a run")
     parser.add_argument("--configuration")
     parser.add_argument("--out", required=True)
     given = parser.parse_args()
     if given.engine == "judge":
         return judge(given.out)
+    scenes.MOST_SECONDS = given.most
     given.command, given.out = run.command_of(given.command), os.path.abspath(given.out)
     try:
         make = importlib.import_module("scenes_" + given.engine).Entry
@@ -47,28 +51,28 @@ def main():
             entry = make(given.command, work)
         except ModuleNotFoundError as error:
             sys.exit(run.MISSING % (given.engine, error.name))
-        for case in scenes.cases():
+        for case in scenes.coarse_cases() if given.coarse else scenes.cases():
             if given.only not in (None, case["name"]) or given.cells not in (None, case["cells"]):
                 continue
-            for configuration in entry.configurations(case) or ["none"]:
-                head = dict(zip(run.COLUMNS, [entry.name, entry.version, configuration, case["name"],
-                                              "cells=%d" % case["cells"]]))
+            named = "cells=%d" % case["cells"]
+            for configuration in run.configurations_of(entry, case, named) or ["none"]:
+                head = dict(zip(run.COLUMNS, [entry.name, entry.version, configuration, case["name"], named]))
                 if tuple(head.values()) in done or given.configuration not in (None, configuration):
                     continue
                 if (configuration, case["name"]) in slow:
                     rows = [{"verdict": "too_slow", "note": "too slow: on the coarse mesh already"}]
                 else:
-                    rows = run.measured_rows(entry, case, configuration)
+                    rows = run.measured_rows(entry, case, configuration, named)
                 if rows[0]["verdict"] == "too_slow":
                     slow.add((configuration, case["name"]))
                 for _ in range(2):
                     cost = float(rows[0].get("cost") or "inf")
                     if cost * case["span"][1] > SHORT:
                         break
-                    again = run.measured_rows(entry, case, configuration)
+                    again = run.measured_rows(entry, case, configuration, named)
                     rows = again if float(again[0].get("cost") or "inf") < cost else rows
+                run.append(given.out, run.COLUMNS, *({**head, **row} for row in rows))
                 for row in rows:
-                    run.append(given.out, run.COLUMNS, {**head, **row})
                     shown = (entry.name, configuration, case["name"], case["cells"], row.get("quantity", ""),
                              row.get("measured", ""), row.get("expected", ""), row["verdict"],
                              row.get("cost", ""), row.get("note", ""))

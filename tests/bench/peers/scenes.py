@@ -67,6 +67,14 @@ def cases():
     return out
 
 
+def coarse_cases():
+    """The first mesh of each scene."""
+    first = {}
+    for case in cases():
+        first.setdefault(case["name"], case)
+    return list(first.values())
+
+
 def oscillation(time, z):
     """sag, period and what is kept of the amplitude in 4 periods of z = c + exp(-d t) (a cos w t + b sin w
     t), fitted; a motion that does not cross its mean has no period."""
@@ -86,10 +94,13 @@ def oscillation(time, z):
         return x, columns @ x - z
 
     for _ in range(40):
-        x, r = fit(w, d)
-        hw, hd = 1e-6 * w, 1e-6 * w
-        jacobian = numpy.stack([(fit(w + hw, d)[1] - r) / hw, (fit(w, d + hd)[1] - r) / hd], 1)
-        change = numpy.linalg.lstsq(jacobian, -r, rcond=None)[0]
+        try:
+            x, r = fit(w, d)
+            hw, hd = 1e-6 * w, 1e-6 * w
+            jacobian = numpy.stack([(fit(w + hw, d)[1] - r) / hw, (fit(w, d + hd)[1] - r) / hd], 1)
+            change = numpy.linalg.lstsq(jacobian, -r, rcond=None)[0]
+        except numpy.linalg.LinAlgError:
+            raise RuntimeError("unstable: not a damped oscillation")
         w, d = w + change[0], d + change[1]
         if abs(change).max() < 1e-9 * w:
             break

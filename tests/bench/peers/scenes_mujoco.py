@@ -17,18 +17,25 @@ import mesh_file
 HARD = entry_mujoco.SETTINGS["hard"]
 SETTINGS = {"default": {"step": 2e-3}, "default 1 ms": {},
             "hard 1 ms": HARD, "hard 4 ms": {**HARD, "step": 4e-3}}
+# `compensate`: the step is taken off the damping, because this integrator damps as much
+SEARCH = {**entry_mujoco.SEARCH, "step": [1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 4e-3, 8e-3],
+          "compensate": [None, 1],
+          "cellcount": [None, "2 1 1", "4 1 1", "4 2 2", "1 1 2", "1 1 4", "2 2 4"]}
+# what counts where nothing touches
+FREE = ("step", "compensate", "dof", "cellcount", "iterations", "tolerance")
 LIFT = 1.2e-4  # m: a flex's radius and a little
 RADIUS = 1e-4
 
 
 class Entry(entry_mujoco.Entry):
-    settings = SETTINGS
+    settings, SEARCH = SETTINGS, SEARCH
+
+    def space(self, case):
+        return {key: SEARCH[key] for key in FREE} if case["name"] == "beam" else SEARCH
 
     def steps(self, model, data, end, before=None):
-        try:
-            yield from super().steps(model, data, end, before)
-        except scenes.friction_cases.TooSlow:
-            raise scenes.friction_cases.TooSlow(data.time, end, scenes.MOST_SECONDS)
+        self.most = scenes.MOST_SECONDS
+        yield from super().steps(model, data, end, before)
 
     def run(self, case, configuration):
         case = {**case, "step": self.settings[configuration].get("step", case["step"])}
@@ -38,7 +45,7 @@ class Entry(entry_mujoco.Entry):
         if "tilt" in case:
             before = lambda t: self.tilt(model, case["angle"] * scenes.ramp(t, 0.2, case["tilt"]))
         started, rows = time.process_time(), []
-        self.limit = started + scenes.MOST_SECONDS
+        self.begun = started
         for t in self.steps(model, data, case["span"][1], before and (lambda t: before(t, data)
                                                                       if before.__code__.co_argcount == 2
                                                                       else before(t))):
@@ -47,28 +54,28 @@ class Entry(entry_mujoco.Entry):
         moved = self.positions(data)[:, 2] - self.first[:, 2]
         return scenes.measured(case, rows, self.mesh(case["body"])[0], moved), used / case["span"][1]
 
-    def flex(self, name, points, tets, pos, pin="", rest=None):
-        """A flex of `points` moved by `pos`."""
+    def flex(self, name, points, tets, pos, held=lambda p: False, axes=(0, 1, 2)):
+        """A flex of `points` moved by `pos`; `held(point)`: is it held? `axes`: what of the body's own axes
+        has become x, y and z."""
         m, given, case = self.case["body"]["material"], self.given, self.case
         mass = m["density"] * mesh_file.volume(points, tets)
-        touch = 'friction="%g 0.005 0.0001"' % case["mu"]
-        if "solref" in given:
-            touch += ' solref="%g 1"' % (given["solref"] * case["step"])
-        pin = '<pin id="%s"/>' % " ".join(map(str, pin)) if pin else ""
-        return ('<flexcomp name="%s" type="direct" dim="3" mass="%.9g" radius="%g" pos="%.9g %.9g %.9g" '
+        damping = max(0.0, m["damping_stiffness"] - (case["step"] if "compensate" in given else 0))
+        touch = entry_mujoco.contact_of(case, given)
+        given = entry_mujoco.turned(given, axes)
+        pin = " ".join(str(i) for i, p in enumerate(entry_mujoco.movers(points, given)) if held(p))
+        pin = '<pin id="%s"/>' % pin if pin else ""
+        return ('<flexcomp name="%s" type="direct" dim="3" mass="%.9g" radius="%g"%s pos="%.9g %.9g %.9g" '
                 'point="%s" element="%s"><elasticity young="%g" poisson="%g" damping="%g"/>'
                 '<edge equality="false"/>'
                 '<contact selfcollide="none" condim="3" %s/>%s</flexcomp>') % (
-            name, mass, RADIUS, *pos, " ".join("%.9g" % x for p in points for x in p),
-            " ".join(str(i) for t in tets for i in t), m["young"], m["poisson"], m["damping_stiffness"],
-            touch, pin)
+            name, mass, RADIUS, entry_mujoco.grid_of(given), *pos,
+            " ".join("%.9g" % x for p in points for x in p),
+            " ".join(str(i) for t in tets for i in t), m["young"], m["poisson"], damping, touch, pin)
 
     def world(self, content, gravity):
         given, case = self.given, self.case
         option = " ".join('%s="%s"' % (key, given[key]) for key in entry_mujoco.OPTION_KEYS if key in given)
-        touch = 'friction="%g 0.005 0.0001"' % case["mu"]
-        if "solref" in given:
-            touch += ' solref="%g 1"' % (given["solref"] * case["step"])
+        touch = entry_mujoco.contact_of(case, given)
         xml = ('<mujoco><size memory="2G"/><option timestep="%g" integrator="discrete" gravity="0 0 %g" %s>'
                '<flag diagexact="%s"/></option><default><geom %s/></default>'
                '<worldbody>%s</worldbody></mujoco>') % (
@@ -100,8 +107,7 @@ class Entry(entry_mujoco.Entry):
         size = case["body"]["size"]
         tip = min(range(len(points)), key=lambda i: sum((a - b) ** 2 for a, b in zip(
             points[i], (size[0], size[1] / 2, size[2] / 2))))
-        held = [i for i, p in enumerate(points) if p[0] < 1e-6]
-        model = self.world(self.flex("soft", points, tets, (0, 0, 0), held), scenes.G)
+        model = self.world(self.flex("soft", points, tets, (0, 0, 0), lambda p: p[0] < 1e-6), scenes.G)
         return model, None, lambda data: (float(data.flexvert_xpos[tip, 2] - self.first[tip, 2]),)
 
     def center_of(self, weight, begin):
@@ -140,10 +146,11 @@ class Entry(entry_mujoco.Entry):
     def scene_pair(self, case):
         points, tets = self.mesh(case["body"])
         half, r = case["body"]["height"] / 2, case["body"]["radius"]
-        held = [i for i, p in enumerate(points) if p[2] < 1e-6 or p[2] > 2 * half - 1e-6]
+        held = lambda axis: lambda p: p[axis] < 1e-6 or p[axis] > 2 * half - 1e-6
         lower, upper = mesh_file.turned(points, "y"), mesh_file.turned(points, "x")
-        content = self.flex("lower", lower, tets, (0, -half, 0), held) + self.driven(
-            "press", (-half, 0, 2 * r + 2 * LIFT), 1e3, self.flex("upper", upper, tets, (0, 0, 0), held))
+        content = self.flex("lower", lower, tets, (0, -half, 0), held(1), (0, 2, 1)) + self.driven(
+            "press", (-half, 0, 2 * r + 2 * LIFT), 1e3,
+            self.flex("upper", upper, tets, (0, 0, 0), held(0), (2, 1, 0)))
         model = self.world(content, 0)
         down = case["depth"] + 2 * LIFT - 2 * RADIUS
         place = lambda t: (case["travel"] * scenes.ramp(t, *case["slide"]),
