@@ -90,43 +90,56 @@ class Entry:
   EXPECT_NE(unknown.err.find("bullet, deform, mujoco, sled"), std::string::npos) << unknown.err;
 }
 
-// The walk along the coordinates: each key at its best with those before it, a row for every trial, none run
-// twice, a trial that fails counted as the worst.
-TEST(FrictionBenchmark, Search_FindsTheBestSettingsAndWritesThem) {
+// Within the bands the cheaper is better, outside them the nearer; a trial that fails is the worst. A row for
+// every trial, none run twice; the best runs as a configuration of its own.
+TEST(FrictionBenchmark, Search_FindsTheBestSettingsWhichRunThen) {
   const std::string folder = test::scratch("friction_benchmark_search");
   test::write_file(folder + "/entry_tunable.py", R"(class Entry:
-    name, version, settings = "tunable", "1", {"plain": {"a": 1, "b": 1}}
-    SEARCH, SEARCH_FROM = {"a": [2, 3], "b": [2, 3]}, "plain"
+    name, version, settings = "tunable", "1", {"plain": {"a": 1}}
+    SEARCH = {"a": [1, 2, 3], "b": [None, 2, 3]}
     def __init__(self, command, work):
         pass
+    def configurations(self, case):
+        return ["plain"] if case["name"] == "slope_slide" else []
     def run(self, case, configuration):
         s = self.settings[configuration]
-        if s["b"] == 3:
+        if s.get("b") == 3:
             raise RuntimeError("it fell apart")
-        error = 0.01 * abs(s["a"] - 2) + 0.02 / s["b"]
-        return {"acceleration": case["answer"]["acceleration"][0] + error}, 0.5
+        error = 0.1 * abs(s["a"] - 2)
+        return {"acceleration": case["answer"]["acceleration"][0] + error}, 1.0 / s.get("b", 1)
 )");
-  const std::string out = folder + "/trials.csv", best = folder + "/best.csv";
+  const std::string out = folder + "/trials.csv", rows = folder + "/rows.csv";
   std::remove(out.c_str());
-  std::remove(best.c_str());
-  const auto call = [&] {
-    return test::run({DEFORM_TEST_PYTHON, script("search.py"), "tunable", "--entries", folder, "--command",
-                      DEFORM_COMMAND, "--case", "slope_slide", "--parameters", "mu=0.2", "--out", out,
-                      "--best", best});
+  std::remove(rows.c_str());
+  const auto call = [&](const char *name, std::vector<std::string> more) {
+    std::vector<std::string> line = {DEFORM_TEST_PYTHON, script(name), "tunable", "--entries", folder,
+                                     "--command", DEFORM_COMMAND};
+    line.insert(line.end(), more.begin(), more.end());
+    return test::run(line);
   };
-  const test::CommandResult first = call();
-  ASSERT_EQ(first.exit_code, 0) << first.err;
-  const auto trials = test::read_csv(out);
-  EXPECT_EQ(trials.size(), 6u);  // header, the start, two values of each key
-  const auto winner = test::read_csv(best);
-  ASSERT_EQ(winner.size(), 2u);
-  EXPECT_EQ(winner[1][2], "tuned");
-  EXPECT_EQ(winner[1][10], "pass");
-  EXPECT_EQ(winner[1].back(), "a 2; b 2");
-  const test::CommandResult again = call();
-  EXPECT_EQ(again.exit_code, 0) << again.err;
-  EXPECT_EQ(test::read_csv(out).size(), 6u);
-  EXPECT_EQ(test::read_csv(best).size(), 2u);
+  const auto search = [&](const char *trials) {
+    return call("search.py",
+                {"--only", "slope_slide", "--parameters", "mu=0.2", "--trials", trials, "--out", out});
+  };
+  const test::CommandResult stopped = search("3");
+  ASSERT_EQ(stopped.exit_code, 0) << stopped.err;
+  EXPECT_EQ(test::read_csv(out).size(), 4u);  // header, three trials
+  const test::CommandResult all = search("20");
+  ASSERT_EQ(all.exit_code, 0) << all.err;
+  EXPECT_EQ(test::read_csv(out).size(), 10u);  // nine settings are there
+  EXPECT_NE(all.out.find("best: slope_slide mu=0.2, score 0, 0.5 s per s: a 2; b 2"), std::string::npos)
+      << all.out;
+  EXPECT_EQ(search("20").exit_code, 0);
+  EXPECT_EQ(test::read_csv(out).size(), 10u);
+
+  const test::CommandResult run = call("run.py", {"--only", "slope_slide", "--out", rows, "--found", out});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const auto told = test::read_csv(rows);
+  ASSERT_EQ(told.size(), 4u);  // header; mu 0.2 plain and found; mu 0.5, for which nothing was searched
+  EXPECT_EQ(told[1][10], "fail");
+  EXPECT_EQ(told[2][2], "found by search");
+  EXPECT_EQ(told[2][10], "pass");
+  EXPECT_EQ(told[2].back(), "a 2; b 2");
 }
 
 // From a folder that has no build/ of its own.

@@ -4,6 +4,7 @@ import json
 import os
 
 FOUND = "found by search"  # the configuration's name in the rows
+# run.py and run_scenes.py may name another
 TABLE = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, "results", "peers_search.csv")
 
 
@@ -28,11 +29,11 @@ def same(case, parameters, row):
                                             else row["parameters"] == parameters)
 
 
-def settings(entry, case, parameters, path=TABLE):
+def settings(entry, case, parameters):
     """The best settings, None where nothing was searched or one of the entry's own is best."""
-    if not hasattr(entry, "settings") or not os.path.exists(path):
+    if not hasattr(entry, "settings") or not os.path.exists(TABLE):
         return None
-    with open(path, newline="") as f:
+    with open(TABLE, newline="") as f:
         row = best([r for r in csv.DictReader(f) if r["engine"] == entry.name and same(case, parameters, r)])
     given = row and json.loads(row["settings"])
     return None if given in (None, *type(entry).settings.values()) else given

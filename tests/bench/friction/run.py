@@ -52,7 +52,9 @@ def main():
                         help="seconds of processor time for a case")
     parser.add_argument("--configuration", help="one configuration of the engine (for deform: a law)")
     parser.add_argument("--out", help="CSV to write or to go on with; without it the rows are printed")
+    parser.add_argument("--found", default=found.TABLE, help="table of search.py")
     given = parser.parse_args()
+    found.TABLE = given.found
     cases.MOST_SECONDS = given.most
     make = entry_of(given.engine, given.entries)
     given.command = command_of(given.command)

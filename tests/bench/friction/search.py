@@ -50,7 +50,7 @@ def proposals(named, space, draw, best):
         if turn % 3 == 1:
             given, keys = {}, list(space)
         else:
-            given, keys = dict(best()), draw.sample(list(space), draw.choice((1, 1, 2, 3)))
+            given, keys = dict(best()), draw.sample(list(space), min(len(space), draw.choice((1, 1, 2, 3))))
         for key in keys:
             value = draw.choice(space[key])
             given.pop(key, None)
@@ -132,7 +132,10 @@ def main():
     if not hasattr(make, "SEARCH"):
         sys.exit("%s: its entry has no SEARCH" % given.engine)
     with tempfile.TemporaryDirectory() as work:
-        entry = make(given.command, work)
+        try:
+            entry = make(given.command, work)
+        except ModuleNotFoundError as error:
+            sys.exit(run.MISSING % (given.engine, error.name))
         for case, named in todo:
             if (given.only and case["name"] not in given.only) or given.parameters not in (None, named) or (
                     not entry.configurations(case)):

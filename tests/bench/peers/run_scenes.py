@@ -34,7 +34,9 @@ def main():
                         help="seconds of processor time for a run")
     parser.add_argument("--configuration")
     parser.add_argument("--out", required=True)
+    parser.add_argument("--found", default=run.found.TABLE, help="table of search.py")
     given = parser.parse_args()
+    run.found.TABLE = given.found
     if given.engine == "judge":
         return judge(given.out)
     scenes.MOST_SECONDS = given.most
