@@ -74,7 +74,7 @@ bench: setup-bench build/bench/build.ninja
 
 bench-peers: setup-peers build/release/build.ninja
 	$(BUILD) release --target deform_command
-	@$(PYTHON) -B tests/bench/peers/bench_peers.py build/release/bin/deform build/peers $(PEERS)
+	@$(PYTHON) -B tests/bench/peers/bench_peers.py build/release/bin/deform build/peers $(PEERS) $(JOBS)
 
 # Rows that are in the table already are not run again.
 soak: setup-bench build/bench/build.ninja build/release/build.ninja

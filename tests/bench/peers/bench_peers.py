@@ -1,16 +1,17 @@
 #!/usr/bin/env python3
 """`make bench-peers`: deform beside MuJoCo, Bullet and Jolt: the friction benchmark and scenes.py.
 
-  bench_peers.py DEFORM FOLDER [all|quick]
+  bench_peers.py DEFORM FOLDER [all|quick [JOBS]]
 
 quick: the coarse meshes of the scenes and the slopes of the friction benchmark, at most 10 s of processor
 time for a run; into FOLDER/quick.
 
 MuJoCo goes into a virtual environment in FOLDER, Jolt into its node_modules; without npm Jolt is left out.
-Each engine runs in a process of its own, one thread each, side by side as the processors allow. Rows go to
+Each engine runs in a process of its own, one thread each, JOBS of them side by side. Rows go to
 FOLDER/rows, tables and pictures beside; a run that was stopped goes on. A line tells which runs are under way
 and how long it will take. What is missing ends it with one sentence.
 """
+import argparse
 import concurrent.futures
 import os
 import shutil
@@ -108,10 +109,15 @@ def joined(folder, table, engines):
 
 
 def main():
-    if len(sys.argv) not in (3, 4) or sys.argv[3:] not in ([], ["all"], ["quick"]):
-        sys.exit(__doc__)
-    command, folder = (os.path.abspath(path) for path in sys.argv[1:3])
-    quick = sys.argv[3:] == ["quick"]
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("command", metavar="DEFORM")
+    parser.add_argument("folder", metavar="FOLDER")
+    parser.add_argument("which", nargs="?", choices=["all", "quick"], default="all")
+    parser.add_argument("jobs", nargs="?", type=int, default=os.cpu_count() or 1)
+    given = parser.parse_args()
+    command, folder = os.path.abspath(given.command), os.path.abspath(given.folder)
+    quick = given.which == "quick"
     if not os.access(command, os.X_OK):
         stop("%s: no such command; build it with `make demo`" % command)
     if not shutil.which("pkg-config") or subprocess.run(["pkg-config", "--exists", "bullet"]).returncode:
@@ -120,7 +126,7 @@ def main():
     python = environment(os.path.join(folder, "venv"))
     engines = [engine for engine in ENGINES if engine != "jolt" or has_jolt(folder)]
     environ = {**os.environ, "OMP_NUM_THREADS": "1", "JOLT": folder}
-    workers = min(len(engines), max(1, (os.cpu_count() or 2) - 1))
+    workers = max(1, min(len(engines), given.jobs))
     folder = os.path.join(folder, "quick") if quick else folder
     os.makedirs(os.path.join(folder, "rows"), exist_ok=True)
     # the longest first: the others fill the rest
