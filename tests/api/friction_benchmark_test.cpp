@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <filesystem>
 #include <map>
 
 #include "support.h"
@@ -112,8 +113,8 @@ TEST(FrictionBenchmark, Search_FindsTheBestSettingsWhichRunThen) {
   std::remove(out.c_str());
   std::remove(rows.c_str());
   const auto call = [&](const char *name, std::vector<std::string> more) {
-    std::vector<std::string> line = {DEFORM_TEST_PYTHON, script(name), "tunable", "--entries", folder,
-                                     "--command", DEFORM_COMMAND};
+    std::vector<std::string> line = {DEFORM_TEST_PYTHON, script(name),  "tunable", "--entries", folder,
+                                     "--command",        DEFORM_COMMAND};
     line.insert(line.end(), more.begin(), more.end());
     return test::run(line);
   };
@@ -140,6 +141,26 @@ TEST(FrictionBenchmark, Search_FindsTheBestSettingsWhichRunThen) {
   EXPECT_EQ(told[2][2], "found by search");
   EXPECT_EQ(told[2][10], "pass");
   EXPECT_EQ(told[2].back(), "a 2; b 2");
+}
+
+// `make bench-peers` tells how far it is: from the rows alone, so that a run that goes on counts what was done.
+TEST(FrictionBenchmark, Progress_CountsRowsAndTellsWhatIsUnderWay) {
+  const std::string folder = test::scratch("friction_benchmark_progress");
+  std::filesystem::create_directories(folder + "/rows");
+  test::write_file(folder + "/rows/scenes_sled.csv",
+                   "engine,version,configuration,case,parameters,quantity,measured,expected,low,high,verdict,"
+                   "cost,note\nsled,1,good,beam,cells=400,sag,1,1,1,1,pass,1,\n");
+  const test::CommandResult r =
+      test::run({DEFORM_TEST_PYTHON, "-B", "-c",
+                 "import sys; sys.path.insert(0, sys.argv[1]); import progress\n"
+                 "runs = [progress.Run('scenes', 'sled', c, {'name': 'beam'}, "
+                 "'cells=400', 40) for c in ('good', 'bad')]\n"
+                 "p = progress.Progress({'sled': [run('good'), run('bad')]}, sys.argv[2], 1)\n"
+                 "print(p.line(()))\nprint(p.line(('sled',)))",
+                 std::string(DEFORM_SOURCE_DIR) + "/tests/bench/peers", folder});
+  ASSERT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_EQ(r.out,
+            "1 of 2 runs, about 1 min left\n1 of 2 runs, about 1 min left; sled: beam cells=400, bad\n");
 }
 
 // From a folder that has no build/ of its own.

@@ -132,18 +132,21 @@ def main():
     # the longest first: the others fill the rest
     runs = plans(engines, quick)
     engines.sort(key=lambda engine: -sum(run.seconds for run in runs[engine]))
-    watch, over, ended = progress.Progress(runs, folder, workers), threading.Event(), set()
+    watch, over = progress.Progress(runs, folder, workers), threading.Event()
+    under_way, ended = set(), set()
 
     def go(engine):
+        under_way.add(engine)
         end = chain(python, command, folder, engine, environ, quick)
+        under_way.discard(engine)
         ended.add(engine)
         return end
 
     def tell():
         while not over.wait(2):
-            watch.tell(ended)
+            watch.tell(set(under_way), set(ended))
 
-    print("bench-peers: %s (Ctrl-C stops; the same command goes on)" % watch.line(ended), flush=True)
+    print("bench-peers: %s (Ctrl-C stops it; the same command goes on)" % watch.line(()), flush=True)
     teller = threading.Thread(target=tell, daemon=True)
     teller.start()
     with concurrent.futures.ThreadPoolExecutor(workers) as pool:

@@ -74,8 +74,8 @@ class Progress:
                 found.update((table, *key_of(row)) for row in run.rows_of(path))
         return found
 
-    def line(self, ended):
-        """One line; `ended`: engines that are through."""
+    def line(self, under_way, ended=()):
+        """One line; engines under way and those that are through."""
         done = self.done()
         left, now, count, total, fresh = {}, [], 0, 0, 0.0
         for engine, chain in self.chains.items():
@@ -84,16 +84,16 @@ class Progress:
             fresh += sum(r.seconds for r in chain if (r.table, *r.key) in done - self.at_start)
             if engine not in ended and open_:
                 left[engine] = sum(r.seconds for r in open_)
+            if engine in under_way and open_:
                 now.append("%s: %s %s, %s" % (engine, open_[0].key[2], open_[0].key[3], open_[0].key[1]))
         took = time.time() - self.begun
         # how much longer than expected it takes here; at first nothing is known
         pace = max(0.2, took * min(self.workers, len(self.chains)) / fresh) if fresh > 20 else 1.5
         seconds = pace * max(max(left.values(), default=0), sum(left.values()) / self.workers)
-        return "%d of %d runs, about %d min left; now %s" % (
-            count, total, math.ceil(seconds / 60), "; ".join(now[:self.workers]) or "joining the tables")
+        return "; ".join(["%d of %d runs, about %d min left" % (count, total, math.ceil(seconds / 60)), *now])
 
-    def tell(self, ended):
-        text = self.line(ended)
+    def tell(self, under_way, ended):
+        text = self.line(under_way, ended)
         if sys.stdout.isatty():
             print("\r\033[Kbench-peers: " + text[:110], end="", flush=True)
         elif text != self.last and time.time() - self.told > EVERY:
