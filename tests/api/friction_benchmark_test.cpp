@@ -143,7 +143,7 @@ TEST(FrictionBenchmark, Search_FindsTheBestSettingsWhichRunThen) {
   EXPECT_EQ(told[2].back(), "a 2; b 2");
 }
 
-// `make bench-peers` tells how far it is: from the rows alone, so that a run that goes on counts what was done.
+// How far it is comes from the rows alone, so that a run that goes on counts what was done before.
 TEST(FrictionBenchmark, Progress_CountsRowsAndTellsWhatIsUnderWay) {
   const std::string folder = test::scratch("friction_benchmark_progress");
   std::filesystem::create_directories(folder + "/rows");
@@ -153,8 +153,7 @@ TEST(FrictionBenchmark, Progress_CountsRowsAndTellsWhatIsUnderWay) {
   const test::CommandResult r =
       test::run({DEFORM_TEST_PYTHON, "-B", "-c",
                  "import sys; sys.path.insert(0, sys.argv[1]); import progress\n"
-                 "runs = [progress.Run('scenes', 'sled', c, {'name': 'beam'}, "
-                 "'cells=400', 40) for c in ('good', 'bad')]\n"
+                 "run = lambda c: progress.Run('scenes', 'sled', c, {'name': 'beam'}, 'cells=400', 40)\n"
                  "p = progress.Progress({'sled': [run('good'), run('bad')]}, sys.argv[2], 1)\n"
                  "print(p.line(()))\nprint(p.line(('sled',)))",
                  std::string(DEFORM_SOURCE_DIR) + "/tests/bench/peers", folder});
