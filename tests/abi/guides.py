@@ -29,7 +29,8 @@ def follow(guide, prefix, libdir, scratch):
         env["CXX"] = "/bin/false"  # a guide whose project is in C asks for no other compiler
     blocks = re.findall(r"^```sh\n(.*?)^```", guide.read_text(), re.M | re.S)
     tools = " ".join(blocks)
-    if "cmake -S" not in tools or "pkg-config" not in tools:
+    builds = any(folder.rglob("CMakeLists.txt"))
+    if builds and ("cmake -S" not in tools or "pkg-config" not in tools):
         sys.exit(f"{guide} does not show both ways to build: CMake and pkg-config")
     here = os.getcwd()
     os.chdir(folder)
@@ -64,6 +65,15 @@ def judge_model(folder):
                  f"creep {creep} um/s")
 
 
+def judge_flex(folder):
+    """What the guide from MuJoCo leaves behind: a block that holds, and a beam that bends by 96 % of
+    MuJoCo's, whose points weigh more at the tip."""
+    creep = json.loads((folder / "out" / "summary.json").read_text())["hold"]["creep_max_um_per_s"]
+    tip = float((folder / "out" / "probes.csv").read_text().split()[-1].split(",")[4]) - 0.5
+    if creep is None or creep > 1e-3 or abs(tip / -37.2e-3 - 0.96) > 0.02:
+        sys.exit(f"the scene of the guide: creep {creep} um/s, tip {tip} m")
+
+
 def main():
     build, source, scratch, compiler = sys.argv[1:]
     scratch = without_spaces(scratch)
@@ -81,8 +91,10 @@ def main():
             judge_law(folder)
         if guide.stem == "write-a-model":
             judge_model(folder)
+        if guide.stem == "mujoco_flex":
+            judge_flex(folder)
         followed.append(guide.name)
-    must = {"own_engine.md", "write-a-law.md", "write-a-model.md"}
+    must = {"mujoco_flex.md", "own_engine.md", "write-a-law.md", "write-a-model.md"}
     if not must <= set(followed):
         sys.exit(f"{sorted(must)} must be followed, not only {followed}")
 

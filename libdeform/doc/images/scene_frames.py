@@ -78,9 +78,9 @@ def pixels(file):
 
 
 def save(picture, out):
-    """Writes a picture of 0 to 1 in at most 256 colors, without patterns of dots: half the file."""
-    image = PIL.Image.fromarray((255 * np.clip(picture, 0, 1) + 0.5).astype(np.uint8))
-    image.quantize(256, PIL.Image.Quantize.MEDIANCUT, dither=PIL.Image.Dither.NONE).save(out, optimize=True)
+    """Writes a picture of 0 to 1 in 128 levels of each color, which nobody sees and which make it smaller."""
+    levels = (127 * np.clip(picture, 0, 1) + 0.5).astype(np.uint8)
+    PIL.Image.fromarray(levels * 2 + levels // 64).save(out, optimize=True)
 
 
 def main():
