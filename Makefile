@@ -1,6 +1,7 @@
 # Two doors: `make demo` and `make test`. Each installs what is missing (cmake/deps.txt), configures, builds
 # and runs; a second call installs and rebuilds nothing. The rest is for those who work on the library.
 PREFIX ?= /usr/local
+SCENE ?= examples/scenes/two_cylinders.json
 JOBS ?= $(shell nproc)
 # What bench-peers runs: all or quick
 PEERS ?= all
@@ -10,10 +11,11 @@ BUILD = @cmake --build --preset
 PYTHON ?= $(firstword $(wildcard /usr/bin/python3) python3)
 
 .PHONY: help demo test bench soak lint format tidy asan tsan fuzz install clean setup setup-bench setup-fuzz
-.PHONY: bench-peers deb docs setup-docs setup-peers wheel
+.PHONY: view bench-peers deb docs setup-docs setup-peers wheel
 
 help:
 	@echo "make demo             two soft cylinders with and without friction: table, picture, out/demo/"
+	@echo "make view [SCENE=..]  the same scene in a window"
 	@echo "make test             the whole test suite"
 	@echo "make bench            the figures: kernels and full steps"
 	@echo "make bench-peers      beside MuJoCo, Bullet and Jolt: speed at equal error, build/peers/"
@@ -47,9 +49,14 @@ build/fuzz/build.ninja: | setup-fuzz
 build/%/build.ninja: | setup
 	cmake --preset $*
 
+# With a display the window is built too, for `deform view`.
 demo: setup build/release/build.ninja
-	$(BUILD) release --target deform_command
+	$(BUILD) release --target deform_command $(if $(DISPLAY)$(WAYLAND_DISPLAY),deform_viewer)
 	@$(PYTHON) cmake/demo.py build/release/bin/deform out/demo
+
+view: setup build/release/build.ninja
+	$(BUILD) release --target deform_viewer
+	@build/release/bin/deform view $(SCENE)
 
 test: setup build/release/build.ninja
 	$(BUILD) release
@@ -89,7 +96,7 @@ fuzz: setup-fuzz build/fuzz/build.ninja
 	$(BUILD) fuzz --target run_fuzz
 
 install: setup build/release/build.ninja
-	$(BUILD) release --target deform_command
+	$(BUILD) release --target deform_viewer
 	@cmake --install build/release --strip --prefix "$$(realpath -m -- "$(PREFIX)")"
 
 wheel: setup build/release/build.ninja
@@ -99,7 +106,7 @@ wheel: setup build/release/build.ninja
 
 # Debian packages of the release build.
 deb: setup build/release/build.ninja
-	$(BUILD) release --target deform_command deform_python_native
+	$(BUILD) release --target deform_viewer deform_python_native
 	@cpack --config build/release/CPackConfig.cmake -B build/release/packages
 	@rm -rf build/release/packages/_CPack_Packages && ls build/release/packages/*.deb
 

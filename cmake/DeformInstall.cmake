@@ -20,6 +20,12 @@ if(TARGET deform_cli)
   set_target_properties(deform_cli PROPERTIES INSTALL_RPATH "${deform_cli_rpath}" BUILD_WITH_INSTALL_RPATH ON)
   install(TARGETS deform_cli RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT command)
 endif()
+# Where it was built: `make install` and `make deb` build it, `make demo` may not.
+if(TARGET deform_view)
+  set_target_properties(deform_view PROPERTIES INSTALL_RPATH "${deform_cli_rpath}"
+    BUILD_WITH_INSTALL_RPATH ON)
+  install(TARGETS deform_view RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT viewer OPTIONAL)
+endif()
 install(TARGETS deform deform_headers EXPORT deformTargets
   LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library NAMELINK_COMPONENT dev
   ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT dev)

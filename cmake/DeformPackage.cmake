@@ -4,6 +4,7 @@
 #   libdeform0          library and plugins
 #   libdeform-dev       headers, CMake package, deform.pc, templates of plugins
 #   deform              the command
+#   deform-view         the window of `deform view`; where it was built
 #   libdeform-ode       adapter for ODE: library, header, CMake package, .pc
 #   libdeform-bullet    adapter for Bullet, for both of its precisions
 #   python3-deform      the Python package, on the library of libdeform0
@@ -66,6 +67,10 @@ if(TARGET deform_bullet OR TARGET deform_bullet64)
   set(CPACK_DEBIAN_COMMAND_PACKAGE_RECOMMENDS libdeform-bullet)
 endif()
 deform_package(command deform "soft bodies with true friction: the command" "${command_needs}" command)
+if(TARGET deform_view)
+  deform_package(viewer deform-view "soft bodies with true friction: the window of deform view"
+    "deform ${same}, libglfw3 | libglfw3-wayland" viewer)
+endif()
 if(CMAKE_INSTALL_LIBDIR STREQUAL "lib")  # where `native` finds the library
   deform_package(python python3-deform "soft bodies with true friction: the Python package"
     "libdeform0 ${same}, deform ${same}, python3 (>= 3.10), python3-numpy" python python_package)

@@ -21,6 +21,9 @@ struct Globals {
   unsigned threads = 1;
 };
 
+// The command line's own; what is logged follows them.
+Globals &session_globals();
+
 // Prints "deform: <sentence>" to stderr and returns kBadInput.
 int fail(const std::string &sentence);
 
@@ -38,5 +41,6 @@ void add_plugin_check(CLI::App &plugin, Globals &globals, int *exit_code);
 void add_ccd(CLI::App &app, Globals &globals, int *exit_code);
 void add_friction(CLI::App &app, Globals &globals, int *exit_code);
 void add_cost(CLI::App &app, Globals &globals, int *exit_code);
+void add_view(CLI::App &app, Globals &globals, int *exit_code);
 
 }  // namespace cli

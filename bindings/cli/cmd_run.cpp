@@ -27,6 +27,7 @@
 #include "progress.h"
 #include "recording.h"
 #include "state_file.h"
+#include "step_size.h"
 
 namespace cli {
 namespace {
@@ -262,19 +263,8 @@ class Runner {
   // One step toward the end; false when there.
   bool advance() {
     if (static_) return advance_load();
-    const double left = result_.start + duration_ - result_.simulated;
-    double step = scene_.settings().step;
-    const bool automatic = step <= 0;
-    if (automatic) {
-      need(dfm_world_stable_step(world_, &step, nullptr, nullptr));
-      if (!std::isfinite(step)) step = 1e-3;  // nothing bounds it: no springs, no contact
-      // Rather two halves at the end than one step and a sliver.
-      if (left < 2 * step && left > step) step = left / 2;
-    }
-    if (left <= 1e-6 * std::min(step, duration_)) return false;
-    // Rather a last step that is a thousandth longer than one more that is too short to be taken.
-    if (left < step * (1 + (automatic ? 1e-6 : 1e-3)) && (automatic || std::fabs(left - step) > 1e-6 * step))
-      step = left;
+    const double step = next_step(scene_, result_.start, result_.simulated);
+    if (step <= 0) return false;
     const double begin = wall_seconds();
     uint32_t trouble = 0;
     stepping = world_;

@@ -9,43 +9,13 @@
 #include <new>
 
 #include "cli.h"
-#ifdef DEFORM_HAVE_BULLET
-#include "bullet_host.h"
-#endif
-#ifdef DEFORM_HAVE_ODE
-#include "deform/ode_host.h"
-#endif
 #include "leaving.h"
 #include "messages.h"
 
 namespace cli {
 namespace {
 
-Globals globals;
-std::vector<std::string> kept_warnings;
-
-void on_log(void *, int32_t level, const char *utf8) {
-  if (level < DFM_LOG_WARNING) return;
-  if (level == DFM_LOG_WARNING) kept_warnings.push_back(utf8);
-  if (!globals.quiet || level > DFM_LOG_WARNING)
-    std::fprintf(stderr, "deform: %s: %s\n", level == DFM_LOG_WARNING ? "warning" : "error",
-                 shown(utf8).c_str());
-}
-
-size_t edit_distance(const std::string &a, const std::string &b) {
-  std::vector<size_t> row(b.size() + 1);
-  for (size_t j = 0; j <= b.size(); ++j) row[j] = j;
-  for (size_t i = 1; i <= a.size(); ++i) {
-    size_t diagonal = row[0];
-    row[0] = i;
-    for (size_t j = 1; j <= b.size(); ++j) {
-      const size_t above = row[j];
-      row[j] = std::min({above + 1, row[j - 1] + 1, diagonal + (a[i - 1] != b[j - 1])});
-      diagonal = above;
-    }
-  }
-  return row[b.size()];
-}
+Globals &globals = session_globals();
 
 std::vector<CLI::App *> children(CLI::App *app) {
   return app->get_subcommands([](CLI::App *sub) { return !sub->get_group().empty(); });
@@ -120,48 +90,6 @@ int bad_usage(CLI::App &app, const CLI::ParseError &error) {
 
 }  // namespace
 
-std::string nearest(const std::string &word, const std::vector<std::string> &valid) {
-  std::string best;
-  size_t least = std::max<size_t>(2, word.size() / 3) + 1;
-  for (const std::string &name : valid)
-    if (const size_t d = edit_distance(word, name); d < least) {
-      least = d;
-      best = name;
-    }
-  return best;
-}
-
-int fail(const std::string &sentence) {
-  std::fflush(stdout);
-  std::fprintf(stderr, "deform: %s\n", shown(sentence).c_str());
-  return kBadInput;
-}
-
-const std::vector<std::string> &warnings() { return kept_warnings; }
-
-void keep_warning(const std::string &sentence) { kept_warnings.push_back(sentence); }
-
-const char *kind_name(uint32_t kind) {
-  return kind == DFM_KIND_FRICTION ? "law" : kind == DFM_KIND_SOLVER ? "solver" : "model";
-}
-
-void warn(const std::string &sentence) { on_log(nullptr, DFM_LOG_WARNING, sentence.c_str()); }
-
-dfm_context *make_context(const Globals &g) {
-  dfm_context_def def = dfm_context_def_default();
-  def.threads = g.threads;
-  def.log = on_log;
-  dfm_context *context = nullptr;
-  if (dfm_context_create(&def, &context) < 0) std::exit(leave(fail(dfm_last_error())));
-#ifdef DEFORM_HAVE_BULLET
-  register_bullet();
-#endif
-#ifdef DEFORM_HAVE_ODE
-  if (dfm_ode_register() != DFM_OK) on_log(nullptr, DFM_LOG_WARNING, dfm_last_error());
-#endif
-  return context;
-}
-
 }  // namespace cli
 
 namespace {
@@ -190,6 +118,7 @@ int run(int argc, char **argv) {
   cli::add_ccd(app, cli::globals, &exit_code);
   cli::add_friction(app, cli::globals, &exit_code);
   cli::add_cost(app, cli::globals, &exit_code);
+  cli::add_view(app, cli::globals, &exit_code);
   cli::add_montage(app, &exit_code);
   cli::add_common(&app);
   try {

@@ -4,9 +4,9 @@
 #include <memory>
 #include <string>
 
-namespace render {
+#include "render.h"
 
-using Symbol = void (*)();
+namespace render {
 
 class Context {
  public:

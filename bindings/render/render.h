@@ -131,6 +131,24 @@ class Renderer {
   virtual const char *device() const = 0;   // what GL calls itself, e.g. "llvmpipe (LLVM 15.0.6, 256 bits)"
 };
 
+// How much light is traced: `full` is that of every off-screen picture; `fast` takes a quarter of the sky's
+// directions and no second samples, for windows on machines whose GL is software.
+enum class Detail { full, fast };
+using Symbol = void (*)();
+using SymbolOf = Symbol (*)(const char *name);
+
+// The same pictures in a window, whose GL context of 3.3 or later its owner has made current on this thread
+// and keeps so.
+class WindowRenderer : public Renderer {
+ public:
+  // As Renderer::create; symbol_of finds GL's functions. A window of another size needs another renderer.
+  static std::unique_ptr<WindowRenderer> create(SymbolOf symbol_of, Detail detail, uint32_t width,
+                                                uint32_t height, std::string *why_not);
+  // Draws into the window's back buffer; does not swap. What its owner draws afterwards lies above it.
+  virtual bool show(const Scene &scene, std::string *why_not = nullptr) = 0;
+  virtual void read_window(Image &picture) = 0;  // the back buffer as it is now
+};
+
 struct Color { float r, g, b; };
 // Distinct colors for bodies, repeating after ten.
 Color palette(uint32_t i);

@@ -237,23 +237,50 @@ Frame compose(const Scene &scene, double aspect, double pixels_high) {
 }
 
 // Directions of the sky: a sunflower over the upper half ball, kept 8 degrees clear of the horizon.
-std::array<Vec, kSkyLights> sky_directions(const Vec &up) {
-  std::array<Vec, kSkyLights> d;
+std::vector<Vec> sky_directions(const Vec &up, int lights) {
+  std::vector<Vec> d(static_cast<size_t>(lights));
   const Vec x = square_to(up), y = cross(up, x);
-  for (int i = 0; i < kSkyLights; ++i) {
-    const double z = 1 - (i + 0.5) / kSkyLights * 0.86, r = std::sqrt(1 - z * z), a = 2.399963229728653 * i;
+  for (int i = 0; i < lights; ++i) {
+    const double z = 1 - (i + 0.5) / lights * 0.86, r = std::sqrt(1 - z * z), a = 2.399963229728653 * i;
     d[size_t(i)] = up * z + x * (r * std::cos(a)) + y * (r * std::sin(a));
   }
   return d;
 }
 
-class GlRenderer final : public Renderer {
+// A window's GL: its owner keeps it current.
+class WindowContext final : public Context {
  public:
-  GlRenderer(std::unique_ptr<Context> context, uint32_t width, uint32_t height)
-      : context_(std::move(context)), width_(width), height_(height) {}
+  explicit WindowContext(SymbolOf symbol_of) : symbol_of_(symbol_of) {}
+  bool make_current() override { return true; }
+  void release() override {}
+  Symbol symbol(const char *name) const override { return symbol_of_(name); }
+  const char *name() const override { return "window"; }
+
+ private:
+  SymbolOf symbol_of_;
+};
+
+// The fragment shader with another number in one of its constants.
+std::string with(std::string text, const std::string &constant, int number) {
+  const size_t at = text.find(constant) + constant.rfind(' ') + 1;
+  return text.replace(at, text.find(';', at) - at, std::to_string(number));
+}
+
+constexpr int kKinds = 3;
+
+class GlRenderer final : public WindowRenderer {
+ public:
+  GlRenderer(std::unique_ptr<Context> context, Detail detail, uint32_t width, uint32_t height)
+      : context_(std::move(context)),
+        width_(width),
+        height_(height),
+        sky_lights_(detail == Detail::full ? kSkyLights : kSkyLights / 4),
+        samples_(detail == Detail::full ? kSamples : 0) {}
   ~GlRenderer() override;
   bool start(std::string *why_not);
   bool draw(const Scene &scene, Image &picture, std::string *why_not) override;
+  bool show(const Scene &scene, std::string *why_not) override;
+  void read_window(Image &picture) override;
   const char *backend() const override { return context_->name(); }
   const char *device() const override { return device_.c_str(); }
 
@@ -274,17 +301,24 @@ class GlRenderer final : public Renderer {
     gl_.UseProgram(program);
   }
   void upload(const Frame &frame, ColourMap map);
-  void draw_shadows(const Frame &frame, const Mat4 &key, const std::array<Mat4, kSkyLights> &sky);
-  void draw_colors(const Frame &frame, const Mat4 &key, const std::array<Mat4, kSkyLights> &sky,
-                   const std::array<Vec, kSkyLights> &directions);
+  // Into the sampled target. False: the sentence is in *why_not.
+  bool paint(const Scene &scene, std::string *why_not);
+  bool without_error(std::string *why_not) const;
+  void draw_shadows(const Frame &frame, const Mat4 &key, const std::vector<Mat4> &sky);
+  void draw_colors(const Frame &frame, const Mat4 &key, const std::vector<Mat4> &sky,
+                   const std::vector<Vec> &directions);
+  void light(const Frame &frame, const Mat4 &key, const std::vector<Mat4> &sky,
+             const std::vector<Vec> &directions) const;
+  void resolve();
   void read(Image &picture);
 
   std::unique_ptr<Context> context_;
   Gl gl_;
   std::string device_;
   uint32_t width_, height_;
+  int sky_lights_, samples_;
   bool started_ = false;
-  GLuint main_ = 0, depth_ = 0, background_ = 0, current_ = 0;
+  GLuint main_[kKinds] = {}, depth_ = 0, background_ = 0, current_ = 0;
   GLuint array_ = 0, buffer_ = 0, key_texture_ = 0, sky_texture_ = 0, map_texture_ = 0;
   GLuint shadow_target_ = 0, sampled_target_ = 0, resolved_target_ = 0, stores_[3] = {0, 0, 0};
   std::vector<uint8_t> rgba_;
@@ -294,7 +328,7 @@ GlRenderer::~GlRenderer() {
   if (!started_) return;
   Current current(*context_);
   if (!current.ok) return;
-  for (const GLuint p : {main_, depth_, background_}) gl_.DeleteProgram(p);
+  for (const GLuint p : {main_[0], main_[1], main_[2], depth_, background_}) gl_.DeleteProgram(p);
   for (const GLuint t : {key_texture_, sky_texture_, map_texture_}) gl_.DeleteTextures(1, &t);
   for (const GLuint f : {shadow_target_, sampled_target_, resolved_target_}) gl_.DeleteFramebuffers(1, &f);
   gl_.DeleteRenderbuffers(3, stores_);
@@ -354,7 +388,7 @@ bool GlRenderer::make_targets(std::string *why_not) {
   gl_.ActiveTexture(GL_TEXTURE0);
   key_texture_ = depth_map(GL_TEXTURE_2D, kKeySide, 1);
   gl_.ActiveTexture(GL_TEXTURE1);
-  sky_texture_ = depth_map(GL_TEXTURE_2D_ARRAY, kSkySide, kSkyLights);
+  sky_texture_ = depth_map(GL_TEXTURE_2D_ARRAY, kSkySide, sky_lights_);
   gl_.ActiveTexture(GL_TEXTURE2);
   gl_.GenTextures(1, &map_texture_);
   gl_.BindTexture(GL_TEXTURE_2D, map_texture_);
@@ -365,7 +399,7 @@ bool GlRenderer::make_targets(std::string *why_not) {
 
   GLint most = 0;
   gl_.GetIntegerv(GL_MAX_SAMPLES, &most);
-  const GLsizei samples = std::min<GLsizei>(kSamples, most), w = GLsizei(width_), h = GLsizei(height_);
+  const GLsizei samples = std::min<GLsizei>(samples_, most), w = GLsizei(width_), h = GLsizei(height_);
   gl_.GenFramebuffers(1, &shadow_target_);
   gl_.GenFramebuffers(1, &sampled_target_);
   gl_.GenFramebuffers(1, &resolved_target_);
@@ -417,8 +451,11 @@ bool GlRenderer::start(std::string *why_not) {
   const GLubyte *text = gl_.GetString(GL_RENDERER);
   device_ = text ? reinterpret_cast<const char *>(text) : "unnamed";
   started_ = true;
-  return (main_ = program(kVertexShader, kFragmentShader, why_not)) &&
-         (depth_ = program(kDepthVertexShader, kDepthFragmentShader, why_not)) &&
+  const std::string fragment = with(kFragmentShader, kSkyText, sky_lights_);
+  for (int kind = 0; kind < kKinds; ++kind)
+    if (!(main_[kind] = program(kVertexShader, with(fragment, kKindText, kind).c_str(), why_not)))
+      return false;
+  return (depth_ = program(kDepthVertexShader, kDepthFragmentShader, why_not)) &&
          (background_ = program(kBackgroundVertexShader, kBackgroundFragmentShader, why_not)) &&
          make_targets(why_not);
 }
@@ -444,7 +481,7 @@ void GlRenderer::upload(const Frame &frame, ColourMap map) {
   gl_.TexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, 257, 1, 0, GL_RGBA, GL_UNSIGNED_BYTE, table);
 }
 
-void GlRenderer::draw_shadows(const Frame &frame, const Mat4 &key, const std::array<Mat4, kSkyLights> &sky) {
+void GlRenderer::draw_shadows(const Frame &frame, const Mat4 &key, const std::vector<Mat4> &sky) {
   gl_.BindFramebuffer(GL_FRAMEBUFFER, shadow_target_);
   gl_.DrawBuffer(GL_NONE);
   gl_.ReadBuffer(GL_NONE);
@@ -465,7 +502,7 @@ void GlRenderer::draw_shadows(const Frame &frame, const Mat4 &key, const std::ar
   };
   gl_.FramebufferTexture2D(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_TEXTURE_2D, key_texture_, 0);
   draw(key, kKeySide);
-  for (int i = 0; i < kSkyLights; ++i) {
+  for (int i = 0; i < sky_lights_; ++i) {
     gl_.FramebufferTextureLayer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, sky_texture_, 0, i);
     draw(sky[size_t(i)], kSkySide);
   }
@@ -473,17 +510,9 @@ void GlRenderer::draw_shadows(const Frame &frame, const Mat4 &key, const std::ar
   gl_.Disable(GL_POLYGON_OFFSET_FILL);
 }
 
-void GlRenderer::draw_colors(const Frame &frame, const Mat4 &key, const std::array<Mat4, kSkyLights> &sky,
-                             const std::array<Vec, kSkyLights> &directions) {
-  gl_.BindFramebuffer(GL_FRAMEBUFFER, sampled_target_);
-  gl_.Viewport(0, 0, GLsizei(width_), GLsizei(height_));
-  gl_.ClearColor(1, 1, 1, 1);
-  gl_.Clear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
-  gl_.Disable(GL_DEPTH_TEST);
-  use(background_);
-  gl_.DrawArrays(GL_TRIANGLES, 0, 3);
-
-  use(main_);
+// What a program of the colors is told once a picture.
+void GlRenderer::light(const Frame &frame, const Mat4 &key, const std::vector<Mat4> &sky,
+                       const std::vector<Vec> &directions) const {
   const double distance = norm(frame.view.eye - frame.center);
   const double near = std::max(distance - 1.8 * frame.radius - frame.extent, 0.02 * distance + 1e-9);
   const double far =
@@ -498,7 +527,7 @@ void GlRenderer::draw_colors(const Frame &frame, const Mat4 &key, const std::arr
   set("casters", frame.center);
   set("casters_radius", frame.radius);
   double open = 0;
-  for (int i = 0; i < kSkyLights; ++i) {
+  for (int i = 0; i < sky_lights_; ++i) {
     char name[24];
     std::snprintf(name, sizeof name, "sky_map[%d]", i);
     set(name, to_texture(sky[size_t(i)]));
@@ -515,13 +544,29 @@ void GlRenderer::draw_colors(const Frame &frame, const Mat4 &key, const std::arr
   set("key_shadow", 0);
   set("sky_shadow", 1);
   set("map", 2);
+}
+
+void GlRenderer::draw_colors(const Frame &frame, const Mat4 &key, const std::vector<Mat4> &sky,
+                             const std::vector<Vec> &directions) {
+  gl_.BindFramebuffer(GL_FRAMEBUFFER, sampled_target_);
+  gl_.Viewport(0, 0, GLsizei(width_), GLsizei(height_));
+  gl_.ClearColor(1, 1, 1, 1);
+  gl_.Clear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+  gl_.Disable(GL_DEPTH_TEST);
+  use(background_);
+  gl_.DrawArrays(GL_TRIANGLES, 0, 3);
+
+  for (const GLuint p : main_) {
+    use(p);
+    light(frame, key, sky, directions);
+  }
   gl_.Enable(GL_BLEND);
   gl_.BlendFunc(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA);
   gl_.Enable(GL_DEPTH_TEST);
   for (const Batch &b : frame.batches) {
     gl_.DepthFunc(b.on_top ? GL_ALWAYS : GL_LEQUAL);
     gl_.DepthMask(b.alpha >= 1 && !b.on_top ? GL_TRUE : GL_FALSE);
-    set("kind", int(b.kind));
+    use(main_[int(b.kind)]);
     set("edges", int(b.edges));
     set("alpha", double(b.alpha));
     set("fade", double(b.fade));
@@ -530,12 +575,16 @@ void GlRenderer::draw_colors(const Frame &frame, const Mat4 &key, const std::arr
   gl_.DepthMask(GL_TRUE);
 }
 
-void GlRenderer::read(Image &picture) {
+void GlRenderer::resolve() {
   const GLint w = GLint(width_), h = GLint(height_);
   gl_.BindFramebuffer(GL_READ_FRAMEBUFFER, sampled_target_);
   gl_.BindFramebuffer(GL_DRAW_FRAMEBUFFER, resolved_target_);
   gl_.BlitFramebuffer(0, 0, w, h, 0, 0, w, h, GL_COLOR_BUFFER_BIT, GL_NEAREST);
-  gl_.BindFramebuffer(GL_FRAMEBUFFER, resolved_target_);
+}
+
+// Of the framebuffer that is bound for reading.
+void GlRenderer::read(Image &picture) {
+  const GLint w = GLint(width_), h = GLint(height_);
   gl_.PixelStorei(GL_PACK_ALIGNMENT, 4);
   rgba_.resize(size_t(width_) * height_ * 4);
   gl_.ReadPixels(0, 0, w, h, GL_RGBA, GL_UNSIGNED_BYTE, rgba_.data());
@@ -549,31 +598,72 @@ void GlRenderer::read(Image &picture) {
   }
 }
 
+bool GlRenderer::paint(const Scene &scene, std::string *why_not) {
+  *why_not = check(scene);
+  if (!why_not->empty()) return false;
+  const Frame frame = compose(scene, double(width_) / height_, height_);
+  const std::vector<Vec> directions = sky_directions(frame.up, sky_lights_);
+  const Mat4 key = orthographic(frame.key, frame.center, 1.02 * frame.radius);
+  std::vector<Mat4> sky(directions.size());
+  for (size_t i = 0; i < sky.size(); ++i)
+    sky[i] = orthographic(directions[i], frame.center, 1.02 * frame.radius);
+  upload(frame, scene.map);
+  draw_shadows(frame, key, sky);
+  draw_colors(frame, key, sky, directions);
+  resolve();
+  return true;
+}
+
+bool GlRenderer::without_error(std::string *why_not) const {
+  const GLenum error = gl_.GetError();
+  if (error == GL_NO_ERROR) return true;
+  *why_not = std::string(context_->name()) + ": " + device_ + " refuses the picture (GL error " +
+             std::to_string(error) + ")";
+  return false;
+}
+
 bool GlRenderer::draw(const Scene &scene, Image &picture, std::string *why_not) {
-  std::string sentence = check(scene);
-  if (sentence.empty()) {
-    const FloatingPoint keep;
-    const Frame frame = compose(scene, double(width_) / height_, height_);
-    const std::array<Vec, kSkyLights> directions = sky_directions(frame.up);
-    const Mat4 key = orthographic(frame.key, frame.center, 1.02 * frame.radius);
-    std::array<Mat4, kSkyLights> sky;
-    for (size_t i = 0; i < sky.size(); ++i)
-      sky[i] = orthographic(directions[i], frame.center, 1.02 * frame.radius);
-    Current current(*context_);
-    if (current.ok) {
-      upload(frame, scene.map);
-      draw_shadows(frame, key, sky);
-      draw_colors(frame, key, sky, directions);
-      read(picture);
-      const GLenum error = gl_.GetError();
-      if (error == GL_NO_ERROR) return true;
-      sentence = std::string(context_->name()) + ": " + device_ + " refuses the picture (GL error " +
-                 std::to_string(error) + ")";
-    } else {
-      sentence = std::string(context_->name()) + ": its context cannot be made current on this thread";
-    }
+  std::string sentence;
+  const FloatingPoint keep;
+  Current current(*context_);
+  if (!current.ok) {
+    sentence = std::string(context_->name()) + ": its context cannot be made current on this thread";
+  } else if (paint(scene, &sentence)) {
+    gl_.BindFramebuffer(GL_FRAMEBUFFER, resolved_target_);
+    read(picture);
+    if (without_error(&sentence)) return true;
   }
   if (why_not) *why_not = sentence;
+  return false;
+}
+
+bool GlRenderer::show(const Scene &scene, std::string *why_not) {
+  std::string sentence;
+  const FloatingPoint keep;
+  if (paint(scene, &sentence)) {
+    const GLint w = GLint(width_), h = GLint(height_);
+    // From one sample a pixel: what has several is copied only between targets of one format.
+    gl_.BindFramebuffer(GL_READ_FRAMEBUFFER, resolved_target_);
+    gl_.BindFramebuffer(GL_DRAW_FRAMEBUFFER, 0);
+    gl_.BlitFramebuffer(0, 0, w, h, 0, 0, w, h, GL_COLOR_BUFFER_BIT, GL_NEAREST);
+    gl_.BindFramebuffer(GL_FRAMEBUFFER, 0);
+    gl_.Viewport(0, 0, w, h);
+    if (without_error(&sentence)) return true;
+  }
+  if (why_not) *why_not = sentence;
+  return false;
+}
+
+void GlRenderer::read_window(Image &picture) {
+  gl_.BindFramebuffer(GL_FRAMEBUFFER, 0);
+  gl_.ReadBuffer(GL_BACK);
+  read(picture);
+}
+
+bool sized(uint32_t width, uint32_t height, std::string &why) {
+  if (width >= 1 && height >= 1 && width <= kLargest && height <= kLargest) return true;
+  why = "a picture of " + std::to_string(width) + " x " + std::to_string(height) +
+        " pixels: each side must be 1 to " + std::to_string(kLargest);
   return false;
 }
 
@@ -583,11 +673,7 @@ std::unique_ptr<Renderer> Renderer::create(Backend backend, uint32_t width, uint
                                            std::string *why_not) {
   std::string unused;
   std::string &why = why_not ? *why_not : unused;
-  if (width < 1 || height < 1 || width > kLargest || height > kLargest) {
-    why = "a picture of " + std::to_string(width) + " x " + std::to_string(height) +
-          " pixels: each side must be 1 to " + std::to_string(kLargest);
-    return nullptr;
-  }
+  if (!sized(width, height, why)) return nullptr;
   const char *wish = std::getenv("DEFORM_RENDER_BACKEND");
   if (backend == Backend::automatic && wish && *wish) {
     const std::string name = wish;
@@ -610,11 +696,23 @@ std::unique_ptr<Renderer> Renderer::create(Backend backend, uint32_t width, uint
     std::string &reason = reasons[b == Backend::osmesa];
     std::unique_ptr<Context> context = b == Backend::egl ? create_egl(&reason) : create_osmesa(&reason);
     if (!context) continue;
-    auto renderer = std::make_unique<GlRenderer>(std::move(context), width, height);
+    auto renderer = std::make_unique<GlRenderer>(std::move(context), Detail::full, width, height);
     if (renderer->start(&reason)) return renderer;
   }
   why = reasons[0] + (reasons[0].empty() || reasons[1].empty() ? "" : "; ") + reasons[1];
   return nullptr;
+}
+
+std::unique_ptr<WindowRenderer> WindowRenderer::create(SymbolOf symbol_of, Detail detail, uint32_t width,
+                                                       uint32_t height, std::string *why_not) {
+  std::string unused;
+  std::string &why = why_not ? *why_not : unused;
+  if (!sized(width, height, why)) return nullptr;
+  const FloatingPoint keep;
+  auto renderer =
+      std::make_unique<GlRenderer>(std::make_unique<WindowContext>(symbol_of), detail, width, height);
+  if (!renderer->start(&why)) return nullptr;
+  return renderer;
 }
 
 }  // namespace render

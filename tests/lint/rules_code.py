@@ -22,6 +22,8 @@ THIRD_PARTIES = [
     ("nlohmann JSON", r"nlohmann/", r"\bnlohmann::", "libdeform/src/scene/"),
     ("GL", r"(GL|GLES\d?|EGL|KHR)/", r"\b(egl[A-Z]\w+|OSMesa[A-Z]\w+)\s*\(", "bindings/render/"),
     ("PNG", r"png\.h", r"\bpng_\w+\s*\(", "bindings/render/"),
+    ("GLFW", r"GLFW/", r"\bglfw[A-Z]\w*\s*\(", "bindings/view/"),
+    ("Dear ImGui", r"(backends/)?imgui", r"\bImGui::", "bindings/view/"),
     ("CLI11", r"CLI/", r"\bCLI::", "bindings/cli/"),
     ("spdlog", r"spdlog/", r"\bspdlog::", "bindings/cli/"),
     ("ODE", r"ode/", r"\bd(World|Body|Geom|Space)Create\w*\s*\(", "bindings/ode/"),

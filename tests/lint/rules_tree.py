@@ -12,7 +12,7 @@ BELOW = {
     "libdeform/src": {"core", "math", "geometry", "mesh", "plugin", "body", "dynamics", "contact", "friction",
                       "broad", "narrow", "ccd", "plan", "state", "step", "world", "rollback", "scene", "api"},
     "libdeform/doc": {"README.md", "concepts", "reference", "models", "laws", "howto", "decisions", "images"},
-    "bindings": {"CMakeLists.txt", "cli", "render", "rigid_host", "ode", "bullet", "python"},
+    "bindings": {"CMakeLists.txt", "cli", "render", "rigid_host", "ode", "bullet", "python", "view"},
     "tests": {"CMakeLists.txt", "README.md", "support", "data", "unit", "analytic", "stability", "api",
               "plugin", "determinism", "adapters", "fuzz", "lint", "bench", "abi", "render", "python"},
 }

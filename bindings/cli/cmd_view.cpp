@@ -1,0 +1,81 @@
+// deform view SCENE.json: starts deform-view, the program with the window, which lies beside the command.
+#include <CLI/CLI.hpp>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <memory>
+
+#include "messages.h"
+
+namespace fs = std::filesystem;
+
+namespace cli {
+namespace {
+
+struct ViewOptions {
+  std::string scene, replay, script, from, out, size, detail;
+  std::vector<std::string> set;
+};
+
+// Becomes the viewer, or throws.
+[[noreturn]] void become_viewer(const ViewOptions &options, const Globals &globals) {
+  if (options.scene.empty() && options.replay.empty())
+    throw Failure(kBadInput, "view: SCENE is required, or --replay DIR (see: deform view --help)");
+  std::error_code unused;
+  const std::string program = fs::read_symlink("/proc/self/exe", unused).parent_path() / "deform-view";
+  if (access(program.c_str(), X_OK) != 0)
+    throw Failure(kBadInput,
+                  "view: there is no " + program +
+                      "; with Debian's libglfw3-dev and libimgui-dev installed, `make view` builds it");
+  std::vector<std::string> words{program};
+  const auto add = [&](const char *name, const std::string &value) {
+    if (value.empty()) return;
+    words.push_back(name);
+    words.push_back(value);
+  };
+  add("--scene", options.scene);
+  add("--replay", options.replay);
+  add("--script", options.script);
+  add("--from", options.from);
+  add("--out", options.out);
+  add("--size", options.size);
+  add("--detail", options.detail);
+  for (const std::string &s : options.set) add("--set", s);
+  add("--threads", std::to_string(globals.threads));
+  add("--quiet", globals.quiet ? "1" : "");
+  add("--json", globals.json ? "1" : "");
+  std::vector<char *> argv;
+  for (std::string &word : words) argv.push_back(word.data());
+  argv.push_back(nullptr);
+  execv(program.c_str(), argv.data());
+  throw Failure(kBadInput, "view: " + program + " cannot be started: " + std::strerror(errno));
+}
+
+}  // namespace
+
+void add_view(CLI::App &app, Globals &globals, int *) {
+  auto options = std::make_shared<ViewOptions>();
+  CLI::App *sub = app.add_subcommand("view", "a window on a scene, with mouse, sliders and plots");
+  sub->add_option("SCENE", options->scene, "scene file (JSON); not needed with --replay");
+  sub->add_option("--replay", options->replay, "show the states that `deform run --record` kept")
+      ->type_name("DIR");
+  sub->add_option("--script", options->script, "no hands: lines `t key|drag|slider|shot ARGS`")
+      ->type_name("FILE");
+  sub->add_option("--from", options->from, "begin with a state that `deform run --save` or the viewer wrote")
+      ->type_name("FILE");
+  sub->add_option("--out", options->out, "folder for pictures, states and recordings (out/SCENE_view)")
+      ->type_name("DIR");
+  sub->add_option("--set", options->set, "change a value of the scene")
+      ->type_name("/json/pointer=value")
+      ->take_all()
+      ->allow_extra_args(false);
+  sub->add_option("--size", options->size, "of the window in pixels (1280x720)")->type_name("WxH");
+  sub->add_option("--detail", options->detail,
+                  "light: full or fast (fast where OpenGL runs on the processor, else full)")
+      ->check(CLI::IsMember({"full", "fast"}));
+  sub->callback([=, &globals] { become_viewer(*options, globals); });
+}
+
+}  // namespace cli

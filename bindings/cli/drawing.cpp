@@ -1,0 +1,176 @@
+#include "drawing.h"
+
+#ifdef DEFORM_HAVE_RENDER
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "messages.h"
+
+namespace cli {
+
+Drawing::Drawing(const SceneFile &scene, const std::string &color) : scene_(scene) {
+  for (const BodyView &body : scene.bodies()) {
+    Buffers b;
+    b.xyz.resize(3 * size_t(body.nsurfel));
+    b.vectors.resize(3 * size_t(body.nsurfel));
+    b.scalar.resize(body.nsurfel);
+    uint32_t n = 0;
+    need(dfm_surface_positions(body.handle, body.nsurfel, b.xyz.data(), &n));
+    b.start = b.xyz;
+    buffers_.push_back(std::move(b));
+  }
+  placed_.resize(scene.obstacles().size());
+  set_color(color);
+}
+
+void Drawing::set_color(const std::string &color) {
+  color_ = color;
+  scale_ = 0;
+  for (Buffers &b : buffers_) std::fill(b.scalar.begin(), b.scalar.end(), 0.f);
+  if (color != "stress") return;
+  for (size_t i = 0; i < buffers_.size(); ++i) {
+    Buffers &b = buffers_[i];
+    const BodyView &body = scene_.bodies()[i];
+    if (!b.stress) b.stress.emplace(body, b.xyz);
+    if (!b.stress->read(b.scalar))
+      warn("body '" + body.name + "': model '" + body.model +
+           "' tells no stress, so pictures show it in its own color");
+  }
+}
+
+// Fills the scalars of one body in their own unit; false where the scene colors by body.
+bool Drawing::fill_values(const BodyView &body, Buffers &b) {
+  uint32_t n = 0;
+  if (color_ == "body") return false;
+  if (color_ == "stress") return b.stress->read(b.scalar);
+  if (color_ == "speed") need(dfm_surface_velocities(body.handle, body.nsurfel, b.vectors.data(), &n));
+  else if (color_ == "contact") need(dfm_surface_forces(body.handle, body.nsurfel, b.vectors.data(), &n));
+  else
+    for (size_t i = 0; i < b.xyz.size(); ++i) b.vectors[i] = b.xyz[i] - b.start[i];
+  for (size_t i = 0; i < b.scalar.size(); ++i) {
+    const double *v = &b.vectors[3 * i];
+    b.scalar[i] = float(std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]));
+  }
+  return true;
+}
+
+render::Bounds Drawing::place_of_bodies() const {
+  render::Bounds out;
+  for (const Buffers &b : buffers_)
+    for (size_t i = 0; i < b.xyz.size(); i += 3) out.add(&b.xyz[i]);
+  return out;
+}
+
+void Drawing::add_bodies(render::Scene &out) {
+  float top = 0;
+  for (size_t i = 0; i < buffers_.size(); ++i) {
+    const BodyView &body = scene_.bodies()[i];
+    uint32_t n = 0;
+    need(dfm_surface_positions(body.handle, body.nsurfel, buffers_[i].xyz.data(), &n));
+    buffers_[i].colored = fill_values(body, buffers_[i]);
+    for (float x : buffers_[i].scalar) top = std::max(top, x);
+  }
+  // The scale of a film only grows, so colors of neighboring frames can be compared.
+  scale_ = std::max(scale_, top);
+  for (size_t i = 0; i < buffers_.size(); ++i) {
+    Buffers &b = buffers_[i];
+    const render::Color own = render::palette(uint32_t(i));
+    render::Surface s;
+    s.xyz = b.xyz.data();
+    s.n = uint32_t(b.xyz.size() / 3);
+    s.tri = scene_.bodies()[i].triangles.data();
+    s.ntri = uint32_t(scene_.bodies()[i].triangles.size() / 3);
+    s.rgb[0] = own.r;
+    s.rgb[1] = own.g;
+    s.rgb[2] = own.b;
+    if (b.colored) {
+      // Where nothing touches the body keeps its own color.
+      for (float &x : b.scalar)
+        x = color_ == "contact" && x == 0 ? std::numeric_limits<float>::quiet_NaN()
+            : scale_ > 0                  ? x / scale_
+                                          : 0;
+      s.scalar = b.scalar.data();
+    }
+    out.surfaces.push_back(s);
+  }
+}
+
+void Drawing::add_obstacles(render::Scene &out) {
+  for (size_t at = 0; at < placed_.size(); ++at) {
+    const ObstacleView &o = scene_.obstacles()[at];
+    if (o.def.ntriangle) {
+      add_triangles(o, placed_[at], out);
+      continue;
+    }
+    dfm_pose pose = {};
+    need(dfm_obstacle_get_pose(o.handle, &pose));
+    const double up[3] = {0, 0, 1};
+    double axis[3];
+    rotate(pose.rotation, up, axis);
+    const double *p = pose.position;
+    if (o.def.shape == DFM_SHAPE_PLANE) {
+      out.planes.push_back({{p[0], p[1], p[2]}, {axis[0], axis[1], axis[2]}, {}});
+    } else if (o.def.shape == DFM_SHAPE_SPHERE) {
+      out.spheres.push_back({{p[0], p[1], p[2]}, o.def.radius, {}});
+    } else if (o.def.shape == DFM_SHAPE_BOX) {
+      render::Box box = {};
+      for (int i = 0; i < 3; ++i) {
+        box.pose.position[i] = p[i];
+        box.half[i] = o.def.half_size[i];
+      }
+      for (int i = 0; i < 4; ++i) box.pose.rotation[i] = pose.rotation[i];
+      box.look = {};
+      out.boxes.push_back(box);
+    } else if (o.def.shape == DFM_SHAPE_CAPSULE) {
+      render::Capsule capsule = {};
+      for (int i = 0; i < 3; ++i) {
+        capsule.a[i] = p[i] - o.def.half_length * axis[i];
+        capsule.b[i] = p[i] + o.def.half_length * axis[i];
+      }
+      capsule.radius = o.def.radius;
+      capsule.look = {};
+      out.capsules.push_back(capsule);
+    }
+  }
+}
+
+void Drawing::add_triangles(const ObstacleView &o, std::vector<double> &placed, render::Scene &out) const {
+  place_points(o, placed);
+  render::Surface s;
+  s.xyz = placed.data();
+  s.n = o.def.npoint;
+  s.tri = o.def.triangles;
+  s.ntri = o.def.ntriangle;
+  s.rgb[0] = 0.72f;
+  s.rgb[1] = 0.73f;
+  s.rgb[2] = 0.75f;  // no body's color
+  out.surfaces.push_back(s);
+}
+
+void Drawing::fill(render::Scene &out) {
+  add_bodies(out);
+  add_obstacles(out);
+  if (color_ == "displacement") out.map = render::ColourMap::lagoon;
+}
+
+bool Drawing::legend(Legend &out) const {
+  out.map = color_ == "displacement" ? render::ColourMap::lagoon : render::ColourMap::ember;
+  out.top = scale_;
+  static const struct {
+    const char *color, *title, *unit;
+  } kMeanings[] = {{"speed", "speed", "m/s"},
+                   {"contact", "contact force", "N"},
+                   {"displacement", "displacement", "m"},
+                   {"stress", "von Mises stress", "Pa"}};
+  for (const auto &meaning : kMeanings)
+    if (color_ == meaning.color) {
+      out.title = meaning.title;
+      out.unit = meaning.unit;
+      return true;
+    }
+  return false;
+}
+
+}  // namespace cli
+#endif

@@ -1,0 +1,50 @@
+// A scene as the renderer takes it: bodies colored as "output"/"color" says, obstacles as they are now.
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "render/render.h"
+#include "surface_stress.h"
+
+namespace cli {
+
+class Drawing {
+ public:
+  Drawing(const SceneFile &scene, const std::string &color);
+  // "body" "contact" "speed" "displacement" "stress"
+  void set_color(const std::string &color);
+  const std::string &color() const { return color_; }
+  // Surfaces and obstacles of the world as it is now; what they point to lives here until the next call.
+  void fill(render::Scene &out);
+  render::Bounds place_of_bodies() const;
+  // [n,3] m, of the last fill().
+  const std::vector<double> &positions(size_t body) const { return buffers_[body].xyz; }
+  // What the colors mean: false where each body has its own.
+  struct Legend {
+    render::ColourMap map = render::ColourMap::ember;
+    double top = 0;
+    std::string title, unit;
+  };
+  bool legend(Legend &out) const;
+
+ private:
+  struct Buffers {
+    std::vector<double> xyz, start, vectors;
+    std::vector<float> scalar;
+    std::optional<SurfaceStress> stress;
+    bool colored = false;
+  };
+  bool fill_values(const BodyView &body, Buffers &b);
+  void add_bodies(render::Scene &out);
+  void add_obstacles(render::Scene &out);
+  void add_triangles(const ObstacleView &o, std::vector<double> &placed, render::Scene &out) const;
+
+  const SceneFile &scene_;
+  std::string color_;
+  std::vector<Buffers> buffers_;
+  std::vector<std::vector<double>> placed_;  // of obstacles of triangles
+  float scale_ = 0;
+};
+
+}  // namespace cli

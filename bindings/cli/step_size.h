@@ -1,0 +1,13 @@
+// How long the next step of a run is, the same for `deform run` and for the viewer: the same bits.
+#pragma once
+#include "scene_file.h"
+
+namespace cli {
+
+// s, of the scene's step or, where that is "auto", of the stable one; the last step ends with the scene.
+// 0: the scene is at its end. start: when it began, now: simulated time, s.
+double next_step(const SceneFile &scene, double start, double now);
+// The same where no end is near.
+double full_step(const SceneFile &scene);
+
+}  // namespace cli

@@ -1,0 +1,175 @@
+// `deform view` by its scripts, under Xvfb: what it draws is looked at pixel by pixel, what it simulates by
+// state hashes. A machine without Xvfb passes these tests over.
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+#include "render/render.h"
+#include "support.h"
+
+namespace {
+
+// A soft block above a floor.
+const char *kScene = R"({
+  "format": "deform-scene", "version": 1,
+  "time": {"duration": 0.2, "step": 0.002},
+  "materials": {"gel": {"density": 1000, "young": 20000, "poisson": 0.3,
+    "damping": {"mass": 2, "stiffness": 0.005}}},
+  "bodies": [{"name": "block", "mesh": {"make": "beam", "size": [0.1, 0.1, 0.1], "cells": 60},
+              "material": "gel", "pose": {"position": [0, 0, 0.01]}}],
+  "obstacles": [{"name": "floor", "shape": "plane", "point": [0, 0, 0], "normal": [0, 0, 1]}],
+  "contact": {"friction": [{"between": ["block", "floor"], "law": "coulomb", "params": {"mu": 0.6}}]},
+  "probes": [{"name": "corner", "body": "block", "point": [0.1, 0.1, 0.1]}],
+  "output": {"every": 0.02, "camera": {"eye": [0.05, -0.6, 0.3], "look_at": [0.05, 0.05, 0.05]}}
+})";
+
+// A display of its own for each test, gone with it.
+class Display {
+ public:
+  Display() {
+    int ends[2];
+    if (pipe(ends) != 0) return;
+    child_ = fork();
+    if (child_ == 0) {
+      char fd[16];
+      std::snprintf(fd, sizeof fd, "%d", ends[1]);
+      execlp("Xvfb", "Xvfb", "-displayfd", fd, "-screen", "0", "640x480x24", "-nolisten", "tcp",
+             static_cast<char *>(nullptr));
+      _exit(127);
+    }
+    close(ends[1]);
+    std::string text;
+    for (char c = 0; read(ends[0], &c, 1) == 1 && c != '\n';) text += c;
+    close(ends[0]);
+    if (text.empty()) return;
+    number_ = std::atoi(text.c_str());
+    setenv("DISPLAY", (":" + std::to_string(number_)).c_str(), 1);
+  }
+  ~Display() {
+    if (child_ > 0) {
+      kill(child_, SIGTERM);
+      waitpid(child_, nullptr, 0);
+    }
+  }
+  bool there() const { return number_ >= 0; }
+
+ private:
+  pid_t child_ = -1;
+  int number_ = -1;
+};
+
+class Viewer : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (!display_.there()) GTEST_SKIP() << "no Xvfb on this machine: install Debian's xvfb";
+    test::write_file(scene_, kScene);
+  }
+  test::CommandResult view(const std::string &script, std::vector<std::string> more = {}) {
+    test::write_file(folder_ + "/script.txt", script);
+    more.insert(more.begin(), {"view", scene_, "--script", folder_ + "/script.txt", "--out", folder_,
+                               "--size", "320x240", "--json"});
+    return test::deform(more);
+  }
+  render::Image picture(const std::string &name) const {
+    render::Image image;
+    std::string why;
+    EXPECT_TRUE(render::read_png(folder_ + "/" + name, image, &why)) << why;
+    return image;
+  }
+  // Text of a value in the line that tells of a shot.
+  static std::string told(const test::CommandResult &result, const std::string &shot,
+                          const std::string &key) {
+    const size_t line = result.out.find("/" + shot + "\"");
+    const size_t at = result.out.find("\"" + key + "\": ", line);
+    if (line == std::string::npos || at == std::string::npos) return "";
+    const size_t begin = at + key.size() + 4;
+    const bool list = result.out[begin] == '[';
+    return result.out.substr(begin, result.out.find_first_of(list ? "]" : ",}\n", begin) - begin);
+  }
+  static double number(const test::CommandResult &result, const std::string &shot, const std::string &key) {
+    const std::string text = told(result, shot, key);
+    return text.empty() ? NAN : std::strtod(text.c_str() + (text[0] == '['), nullptr);
+  }
+
+  const std::string folder_ = test::scratch("view"), scene_ = folder_ + "/scene.json";
+  Display display_;
+};
+
+size_t different(const render::Image &a, const render::Image &b) {
+  size_t n = 0;
+  for (size_t i = 0; i + 2 < a.rgb.size() && a.rgb.size() == b.rgb.size(); i += 3)
+    n += !std::equal(&a.rgb[i], &a.rgb[i] + 3, &b.rgb[i]);
+  return a.rgb.size() == b.rgb.size() ? n : a.rgb.size();
+}
+
+// Pixels of the block, which is the only thing red.
+size_t red(const render::Image &image) {
+  size_t n = 0;
+  for (size_t i = 0; i + 2 < image.rgb.size(); i += 3) n += image.rgb[i] > image.rgb[i + 1] + 60;
+  return n;
+}
+
+}  // namespace
+
+TEST_F(Viewer, Pictures_ShowTheSceneAndChangeWhileItRunsOnly) {
+  const test::CommandResult done = view(
+      "0 shot start.png\n0.1 shot paused.png\n0.15 key space\n0.25 key space\n0.25 shot running.png\n"
+      "0.25 drag right 200 120 260 120 0.1\n0.45 shot turned.png\n");
+  ASSERT_EQ(done.exit_code, 0) << done.err;
+  const render::Image start = picture("start.png");
+  EXPECT_EQ(start.width, 320u);
+  EXPECT_EQ(start.height, 240u);
+  EXPECT_GT(red(start), 1000u);
+  EXPECT_EQ(different(start, picture("paused.png")), 0u);
+  EXPECT_GT(different(start, picture("running.png")), 100u);
+  EXPECT_EQ(told(done, "turned.png", "state_hash"), told(done, "running.png", "state_hash"));
+  EXPECT_GT(different(picture("running.png"), picture("turned.png")), 1000u);
+}
+
+TEST_F(Viewer, UntouchedRun_EndsWithTheBitsOfDeformRun) {
+  const test::CommandResult viewed = view("0 key space\n0.5 shot end.png\n");
+  ASSERT_EQ(viewed.exit_code, 0) << viewed.err;
+  const test::CommandResult run = test::deform({"run", scene_, "--out", folder_ + "/run", "--json"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const size_t at = run.out.find("\"state_hash\": ");
+  ASSERT_NE(at, std::string::npos);
+  EXPECT_EQ(told(viewed, "end.png", "state_hash"), run.out.substr(at + 14, 18));
+  EXPECT_NEAR(number(viewed, "end.png", "t"), 0.2, 1e-9);
+}
+
+TEST_F(Viewer, StepAndRestart_GoOnAndBackToTheFirstBits) {
+  const test::CommandResult done = view(
+      "0 shot a.png\n0.05 key s\n0.1 shot b.png\n0.15 key s\n0.2 shot c.png\n0.25 key r\n0.3 shot d.png\n");
+  ASSERT_EQ(done.exit_code, 0) << done.err;
+  EXPECT_NEAR(number(done, "b.png", "t"), 0.002, 1e-12);
+  EXPECT_NEAR(number(done, "c.png", "t"), 0.004, 1e-12);
+  EXPECT_EQ(told(done, "d.png", "state_hash"), told(done, "a.png", "state_hash"));
+  EXPECT_NE(told(done, "c.png", "state_hash"), told(done, "b.png", "state_hash"));
+}
+
+TEST_F(Viewer, WhatCannotBe_IsOneSentence) {
+  const struct {
+    const char *script, *sentence;
+  } cases[] = {
+      {"0 jump\n", "script.txt:1: expected key, drag, slider or shot, found \"jump\""},
+      {"\n0 key\n", "script.txt:2: expected the name of a key, found the end of the line"},
+      {"0 key x\n", "there is no key \"x\""},
+      {"0 slider nothing 1\n", "there is no slider \"nothing\""},
+  };
+  for (const auto &c : cases) {
+    const test::CommandResult done = view(c.script);
+    EXPECT_EQ(done.exit_code, 2);
+    EXPECT_NE(done.err.find(c.sentence), std::string::npos) << done.err;
+    EXPECT_EQ(std::count(done.err.begin(), done.err.end(), '\n'), 1) << done.err;
+  }
+  unsetenv("DISPLAY");
+  const test::CommandResult done = view("0 shot a.png\n");
+  EXPECT_EQ(done.exit_code, 2);
+  EXPECT_NE(done.err.find("view: no display: "), std::string::npos) << done.err;
+  EXPECT_EQ(std::count(done.err.begin(), done.err.end(), '\n'), 1) << done.err;
+}
