@@ -4,8 +4,8 @@ tree whose command is the one that has compiled it already is not compiled again
 there. Where the command is another one, the compiler runs. So such a test sees every command, every link and
 every installed file of its build, and costs no minutes.
 
-The environment says where: READY (a folder that prepare() has filled), READY_SOURCE and READY_BUILD (folders
-of the tree that is being built, as text that its commands contain).
+The environment says where: READY (a folder that prepare() has filled). Source and build folder of the tree
+that is being built are told from the command and the folder that it runs in, or by READY_BUILD.
 """
 import os
 import sys
@@ -15,6 +15,15 @@ PASSED_OVER = ("-W", "-w", "-MD", "-m64", "-pipe", "-fdiagnostics")
 UNDONE = ("-ffast-math", "-fno-math-errno", "-fno-trapping-math")  # by -fno-fast-math, where it stands later
 # Where the library looks for plugins at last; one file is made of it.
 LAST_FOLDER = "-DDEFORM_INSTALL_PLUGIN_DIR="
+
+
+def source_of(command):
+    """The tree that the compiled file belongs to."""
+    for word in reversed(command):
+        for room in ("/libdeform/src/", "/plugins/", "/bindings/"):
+            if room in word and word.startswith("/"):
+                return word[:word.rindex(room)]
+    return "-"
 
 
 def needs(command, source, build):
@@ -75,7 +84,7 @@ def prepare(folder, source, build):
 
 def main():
     command = sys.argv[1:]
-    found = needs(command, os.environ["READY_SOURCE"], os.environ["READY_BUILD"])
+    found = needs(command, source_of(command), os.environ.get("READY_BUILD") or os.getcwd())
     if found:
         file, text, target, depends = found
         try:

@@ -22,7 +22,7 @@ def main():
     scratch = without_spaces(scratch)
     shutil.rmtree(scratch, ignore_errors=True)
     here = pathlib.Path(__file__).resolve().parent / "within"
-    env = {**clean_environment(), **ready.prepare(scratch / "ready", source, build), "READY_SOURCE": source}
+    env = {**clean_environment(), **ready.prepare(scratch / "ready", source, build)}
     generator = ["-G", "Ninja"] if shutil.which("ninja") else []
     configure = ["cmake", "-S", here, f"-DDEFORM_SOURCE={source}", f"-DSTRICT={STRICT}",
                  *ready.settings(build), *generator]

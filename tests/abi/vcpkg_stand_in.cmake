@@ -1,0 +1,63 @@
+# What vcpkg does with a port, as far as deform's port asks for it, written after vcpkg's manual: the release
+# tree of one linkage, with the headers of the system. It shows that the port's options exist and that what
+# is installed can be moved to where vcpkg wants it; it is not vcpkg.
+#
+#   cmake -DPORT_DIR=... -DOUT=... -DVCPKG_LIBRARY_LINKAGE=dynamic [-DARGUMENTS=...] -P vcpkg_stand_in.cmake
+cmake_minimum_required(VERSION 3.22)
+set(PORT deform)
+set(FEATURES core)
+set(CURRENT_PACKAGES_DIR ${OUT}/installed)
+
+function(run)
+  execute_process(COMMAND ${ARGN} COMMAND_ERROR_IS_FATAL ANY)
+endfunction()
+function(vcpkg_check_features)
+  cmake_parse_arguments(PARSE_ARGV 0 arg "" "OUT_FEATURE_OPTIONS" "FEATURES")
+  set(options "")
+  while(arg_FEATURES)
+    list(POP_FRONT arg_FEATURES feature option)
+    if(feature IN_LIST FEATURES)
+      list(APPEND options -D${option}=ON)
+    else()
+      list(APPEND options -D${option}=OFF)
+    endif()
+  endwhile()
+  set(${arg_OUT_FEATURE_OPTIONS} ${options} PARENT_SCOPE)
+endfunction()
+function(vcpkg_cmake_configure)
+  cmake_parse_arguments(PARSE_ARGV 0 arg "" "SOURCE_PATH" "OPTIONS")
+  # --warn-unused-cli is on: an option that does not exist is told.
+  execute_process(COMMAND ${CMAKE_COMMAND} -G Ninja -S ${arg_SOURCE_PATH} -B ${OUT}/build
+      -DCMAKE_INSTALL_PREFIX=${CURRENT_PACKAGES_DIR} ${arg_OPTIONS} ${ARGUMENTS}
+    COMMAND_ERROR_IS_FATAL ANY ERROR_VARIABLE said)
+  if(said MATCHES "Manually-specified variables were not used")
+    message(FATAL_ERROR "${said}")
+  endif()
+endfunction()
+function(vcpkg_cmake_install)
+  run(${CMAKE_COMMAND} --build ${OUT}/build --target install --parallel 2)
+endfunction()
+function(vcpkg_cmake_config_fixup)
+  cmake_parse_arguments(PARSE_ARGV 0 arg "" "CONFIG_PATH" "")
+  set(share ${CURRENT_PACKAGES_DIR}/share/${PORT})
+  file(GLOB files ${CURRENT_PACKAGES_DIR}/${arg_CONFIG_PATH}/*)
+  file(COPY ${files} DESTINATION ${share})
+  file(REMOVE_RECURSE ${CURRENT_PACKAGES_DIR}/lib/cmake)
+  file(GLOB files ${share}/*.cmake)
+  foreach(file IN LISTS files)
+    file(READ ${file} text)
+    string(REGEX REPLACE "(PACKAGE_PREFIX_DIR \"\\\${CMAKE_CURRENT_LIST_DIR})/(\\.\\./)+(\\.\\.)?\" ABSOLUTE"
+      "\\1/../../\" ABSOLUTE" text "${text}")
+    # one folder less from share/deform than from lib/cmake/deform
+    set(up "[^\n]*_IMPORT_PREFIX[^\n]* PATH\\)\n")
+    string(REGEX REPLACE "(${up}${up}${up})${up}" "\\1" text "${text}")
+    file(WRITE ${file} "${text}")
+  endforeach()
+endfunction()
+function(vcpkg_fixup_pkgconfig)
+endfunction()
+function(vcpkg_install_copyright)
+  cmake_parse_arguments(PARSE_ARGV 0 arg "" "" "FILE_LIST")
+  configure_file(${arg_FILE_LIST} ${CURRENT_PACKAGES_DIR}/share/${PORT}/copyright COPYONLY)
+endfunction()
+include(${PORT_DIR}/portfile.cmake)
