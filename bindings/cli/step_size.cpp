@@ -11,7 +11,9 @@ double full_step(const SceneFile &scene) {
   double step = scene.settings().step;
   if (step > 0) return step;
   need(dfm_world_stable_step(scene.world(), &step, nullptr, nullptr));
-  return std::isfinite(step) ? step : 1e-3;  // nothing bounds it: no springs, no contact
+  if (!std::isfinite(step)) step = 1e-3;  // nothing bounds it: no springs, no contact
+  // Implicit steps may be longer than the time between two records that the scene asks for.
+  return scene.settings().every > 0 ? std::min(step, scene.settings().every) : step;
 }
 
 double next_step(const SceneFile &scene, double start, double now) {

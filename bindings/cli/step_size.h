@@ -4,7 +4,8 @@
 
 namespace cli {
 
-// s, of the scene's step or, where that is "auto", of the stable one; the last step ends with the scene.
+// s, of the scene's step or, where that is "auto", of the stable one, at most as long as a record; the last
+// step ends with the scene.
 // 0: the scene is at its end. start: when it began, now: simulated time, s.
 double next_step(const SceneFile &scene, double start, double now);
 // The same where no end is near.

@@ -274,6 +274,18 @@ TEST(Run, LastStep_LandsOnTheEnd) {
   EXPECT_NEAR(std::stod(value(automatic.summary, "simulated_s")), 0.0123, 1e-12);
 }
 
+// Implicit steps of a calm, stiff body may be as long as 1/30 s.
+TEST(Run, AutomaticStep_IsNoLongerThanARecord) {
+  const Outcome r = run("records", {"--time", "0.2", "--quiet", "--set", "/time/step=auto", "--set",
+                                    "/materials/gel/young=1e8", "--set", "/gravity=[0,0,0]", "--set",
+                                    "/time/integrator=implicit_euler", "--set", "/output={\"every\":0.004}"});
+  ASSERT_EQ(r.result.exit_code, 0) << r.result.err;
+  const auto rows = test::read_csv(r.out + "/probes.csv");
+  ASSERT_GT(rows.size(), 45u) << "0.2 s in records of 0.004 s";
+  for (size_t i = 2; i < rows.size(); ++i)
+    EXPECT_LT(std::stod(rows[i][0]) - std::stod(rows[i - 1][0]), 2 * 0.004 + 1e-12);
+}
+
 TEST(Run, Json_IsTheSummary) {
   const Outcome r = run("json", {"--json", "--time", "0.001"});
   EXPECT_EQ(r.result.out, r.summary);

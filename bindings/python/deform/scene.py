@@ -245,6 +245,8 @@ class _Runner:
             step = self.world.stable_step
             if not math.isfinite(step):
                 step = 1e-3
+            if self.settings.every > 0:
+                step = min(step, self.settings.every)
             if step < left < 2 * step:
                 step = left / 2
         if left <= 1e-6 * min(step, self.duration):
