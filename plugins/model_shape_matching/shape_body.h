@@ -41,6 +41,8 @@ struct Cluster {
   double size;                            // m, root mean square of |q| at rest
   double mean[6];                         // m, of the products
   double linear_inverse[9];               // of sum m q q^T, 1/(kg m2); zero along what the points do not span
+  double root_inverse[9];                 // its root; linear goals only
+  double content;                         // the root of the determinant of sum m q q^T; 0: flat
   double basis_inverse[kBasis * kBasis];  // of sum m b b^T; quadratic goals only
 };
 
@@ -121,7 +123,7 @@ struct Body {
   Rates rates_of(double h) const;
   void tell_softened(double h);
   void fit(uint32_t c, const dfm_kin &k);
-  void find_goal(const double *turn, const double *linear, const double *full, Frame &f) const;
+  void find_goal(const double *turn, const double *moments, const double *full, Frame &f) const;
   void to_goal(uint32_t point, double *d) const;
   // The mean over a point's clusters of their rigid velocities.
   void add_momentum(uint32_t point, const double *w);

@@ -1,5 +1,7 @@
 // The functions that goals are made of, and their moments over a cluster's points.
 #pragma once
+#include <cmath>
+
 #include "../model_common/rotation.h"
 #include "shape_body.h"
 
@@ -23,6 +25,24 @@ inline void inverse_of(const double *matrix, double least, double *out, double m
   }
 }
 constexpr double kFlat = 1e-10;  // of moments, least
+
+// The root of the inverse, and that of the determinant; what is flat has neither.
+inline void roots_of(const double *matrix, double *out, double *content) {
+  double a[3][3], v[3][3], most = 0;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) a[i][j] = matrix[3 * i + j];
+  model::jacobi(a, v);
+  for (int i = 0; i < 3; ++i) most = a[i][i] > most ? a[i][i] : most;
+  for (int i = 0; i < 9; ++i) out[i] = 0;
+  *content = 1;
+  for (int k = 0; k < 3; ++k) {
+    const bool flat = !(a[k][k] > kFlat * most);
+    const double root = flat ? 0 : std::sqrt(a[k][k]);
+    *content *= root;
+    for (int i = 0; i < 3 && !flat; ++i)
+      for (int j = 0; j < 3; ++j) out[3 * i + j] += v[i][k] * v[j][k] / root;
+  }
+}
 
 inline int width_of(Mode mode) { return mode == kQuadratic ? kBasis : 3; }
 
@@ -51,6 +71,7 @@ inline void measure(const At &at, const double *part, uint32_t n, Mode mode, Clu
     }
   }
   inverse_of<3>(linear, kFlat, c.linear_inverse);
+  if (mode == kLinear) roots_of(linear, c.root_inverse, &c.content);
   if (mode != kQuadratic) return;
   for (uint32_t k = 0; k < n; ++k) {
     basis_of(c, mode, at(k), b);

@@ -42,6 +42,74 @@ void cross(const double *a, const double *b, double *out) {
   for (int i = 0; i < 3; ++i) out[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
 }
 
+// A root of x (x - s) = m without cancellation: the greater one, or where `smaller` (s > 0 > m) the other.
+double side_of(double s, double m, bool smaller) {
+  const double root = std::sqrt(std::max(0.0, s * s + 4 * m));
+  if (smaller) return -2 * m / (root + s);
+  return s >= 0 ? 0.5 * (root + s) : 2 * m / (root - s);
+}
+
+// The three numbers next to s whose product is `volume`, by the multiplier m of that condition: each is a
+// root of x (x - s) = m. The product rises with m; where it is too large at the least m, the smallest number
+// takes its smaller root, with which the product falls to 0.
+void sides_of_volume(const double *s, double volume, double *x) {
+  int small = 0;
+  double least = HUGE_VAL, most = 0;
+  for (int i = 0; i < 3; ++i) {
+    most = std::max(most, std::fabs(s[i]));
+    if (std::fabs(s[i]) < least) {
+      least = std::fabs(s[i]);
+      small = i;
+    }
+  }
+  const double side = dfm_pow(volume, 1.0 / 3), end = -0.25 * least * least;
+  double sign = 1, lo = end, hi = side * (side + most);
+  const auto product = [&](double m) {
+    for (int i = 0; i < 3; ++i) x[i] = side_of(s[i], m, i == small && sign < 0);
+    return (x[0] * x[1]) * x[2];
+  };
+  if (product(lo) > volume) {
+    sign = -1;
+    hi = 0;
+  }
+  // Newton's method within bounds: at the left end the product is as steep as a root
+  double m = sign > 0 ? std::max(lo, std::min(0.0, hi)) : 0.5 * (lo + hi);
+  for (int k = 0; k < 100; ++k) {
+    const double p = product(m);
+    (sign * (p - volume) > 0 ? hi : lo) = m;
+    double slope = 0;  // of the logarithm: dx = dm / (2 x - s)
+    for (int i = 0; i < 3; ++i) slope += 1 / (x[i] * (2 * x[i] - s[i]));
+    const double next = p > 0 && std::isfinite(slope) && slope != 0 ? m - (p - volume) / (p * slope) : lo;
+    const double to = next > lo && next < hi ? next : 0.5 * (lo + hi);
+    if (std::fabs(to - m) <= 1e-15 * side * side) return;
+    m = to;
+  }
+}
+
+// The map of the points' places at rest that keeps their volume and takes them nearest to where the fit has
+// them, with masses as weights. Half of the distance squared is an energy, and the pull to this goal its
+// gradient. A fit that is only scaled to the volume pulls along no gradient: a body that is squeezed gains
+// energy from it.
+void nearest_of_volume(const double *moments, const Cluster &c, double *out) {
+  double b[9], turn[9], s[3][3], v[3][3], strain[9];
+  multiply(moments, c.root_inverse, b);
+  model::rotation::polar_of(b, turn);
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      strain[3 * i + j] = (turn[i] * b[j] + turn[3 + i] * b[3 + j]) + turn[6 + i] * b[6 + j];
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) s[i][j] = 0.5 * (strain[3 * i + j] + strain[3 * j + i]);
+  model::jacobi(s, v);
+  const double sides[3] = {s[0][0], s[1][1], s[2][2]};
+  double x[3], kept[9];
+  sides_of_volume(sides, c.content, x);
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      strain[3 * i + j] = (v[i][0] * x[0] * v[j][0] + v[i][1] * x[1] * v[j][1]) + v[i][2] * x[2] * v[j][2];
+  multiply(turn, strain, kept);
+  multiply(kept, c.root_inverse, out);
+}
+
 // From the center. What the center's rounding leaves out counts: a cluster that has fallen into one point is
 // not to take rounding for its shape.
 void arm_of(const Frame &f, const double *x, double *out) {
@@ -134,18 +202,19 @@ void Body::fit(uint32_t c, const dfm_kin &k) {
     for (int j = 0; j < 3; ++j)
       f.stretch[3 * i + j] =
           (turn[i] * stretched[j] + turn[3 + i] * stretched[3 + j]) + turn[6 + i] * stretched[6 + j];
-  find_goal(turn, stretched, full, f);
+  find_goal(turn, linear, full, f);
 }
 
 // goal = share of the fit + (1 - share) R. The linear fit keeps its volume.
-void Body::find_goal(const double *turn, const double *linear, const double *full, Frame &f) const {
+void Body::find_goal(const double *turn, const double *moments, const double *full, Frame &f) const {
   std::fill(f.goal, f.goal + 3 * kBasis, 0.0);
-  const double share =
-      mode() == kRigid ? 0 : params[kLinearity] * std::min(1.0, std::max(0.0, f.volume / kCrushed));
-  const double scale = mode() == kLinear ? share * dfm_pow(std::max(f.volume, kCrushed), -1.0 / 3) : 0;
+  double share = mode() == kRigid ? 0 : params[kLinearity], kept[9] = {};
+  if (mode() == kLinear && f.now.content > 0) nearest_of_volume(moments, f.now, kept);
+  else if (mode() == kLinear) share = 0;
+  else share *= std::min(1.0, std::max(0.0, f.volume / kCrushed));
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j)
-      f.goal[kBasis * i + j] = (1 - share) * turn[3 * i + j] + scale * linear[3 * i + j];
+      f.goal[kBasis * i + j] = (1 - share) * turn[3 * i + j] + share * kept[3 * i + j];
   if (mode() != kQuadratic) return;
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < kBasis; ++j) {

@@ -235,9 +235,11 @@ TEST(ShapeMatching, DecayingDeviation_IsLeftByTheSameShareAtAnyStep) {
 }
 
 // A pull along x that has neither a force nor a torque strains the body by f/(m w^2), w = -ln(1 - a0)/h0.
-// Linear goals follow the strain e by linearity times its deviator, so that with linearity 0.6, of
-//   (1 - 0.6) e_y + 0.2 tr e = 0 and (1 - 0.6) e_x + 0.2 tr e = f/(m w^2),
-// e_x is twice that, to first order.
+// Linear goals follow the strain e by linearity times what is left of it without a change of volume. That is
+// taken away along each axis in the share s of the inverse of its moment sum m q^2 in the sum of all three.
+// So with linearity b, of
+//   (1 - b) e_y + b s_y tr e = 0 and (1 - b) e_x + b s_x tr e = f/(m w^2),
+// e_x is (1 - b s_x)/(1 - b) times that, to first order.
 TEST(ShapeMatching, DeviationUnderALoad_IsTheSameAtAnyStep) {
   Mesh mesh = kuhn_bar(3, 2, 2, 0.1);
   mesh.mass.assign(mesh.npoint(), 0.1);  // the pull then turns nothing
@@ -267,9 +269,61 @@ TEST(ShapeMatching, DeviationUnderALoad_IsTheSameAtAnyStep) {
       EXPECT_NEAR(seen[0], 1, 1e-9);
     }
     if (mode == kLinear) {
-      EXPECT_NEAR(seen[0], 2, 0.01);
+      // 4 points along x have the moment 5/4 of their distance squared, 3 along y and z 2/3
+      const double share = 0.8 / (0.8 + 1.5 + 1.5);
+      EXPECT_NEAR(seen[0], (1 - 0.6 * share) / (1 - 0.6), 0.01);
     }
   }
+}
+
+// The pull to the goals is a gradient: what a place b changes of it at a, a changes of it at b. Squeezed
+// to a third and stretched, turned, and with places of their own; inside out too.
+TEST(ShapeMatching, PullToTheGoals_IsAGradient) {
+  const Mesh mesh = kuhn_bar(3, 2, 2, 0.1, 0.2);
+  constexpr double kStep = 1e-9, kBy = 1e-6;  // so short that the pull is m w^2 (g - x) h, of clusters too
+  for (const double squeezed : {1.0, 0.35, -0.4})
+    for (const Values &kind : {Values{{"mode", kRigid}}, Values{{"mode", kLinear}, {"linearity", 0.8}},
+                               Values{{"mode", kLinear}, {"clusters", 3}}}) {
+      Host host;
+      Stepper b(host, shape(), mesh, values(kind));
+      ASSERT_EQ(b.status, DFM_OK) << host.logged;
+      std::vector<Vec> at;
+      for (uint32_t i = 0; i < b.size(); ++i) {
+        const Vec q = mesh.at(i);
+        const double own = 0.003 * std::sin(7.0 * i);
+        at.push_back(rotate({1.3 * q[0] + own, 1.1 * q[1] - own, squeezed * q[2] + 0.1 * q[0] + 0.5 * own},
+                            {0.48, 0.6, 0.64}, 0.7));
+      }
+      const auto pull = [&](size_t moved, double by) {
+        for (uint32_t i = 0; i < b.size(); ++i) {
+          Vec x = at[i];
+          if (moved / 3 == i) x[moved % 3] += by;
+          b.set(b.x, i, x);
+          b.set(b.v, i, {});
+        }
+        b.predict(kStep);
+        b.advance(kStep);
+        std::vector<double> out;
+        for (uint32_t i = 0; i < b.size(); ++i)
+          for (int k = 0; k < 3; ++k) out.push_back(mesh.mass[i] * b.get(b.v, i)[size_t(k)]);
+        return out;
+      };
+      const size_t n = 3 * b.size();
+      std::vector<std::vector<double>> slope;
+      double most = 0;
+      for (size_t j = 0; j < n; ++j) {
+        const std::vector<double> more = pull(j, kBy), less = pull(j, -kBy);
+        slope.emplace_back();
+        for (size_t i = 0; i < n; ++i) {
+          slope[j].push_back((more[i] - less[i]) / (2 * kBy));
+          most = std::max(most, std::abs(slope[j][i]));
+        }
+      }
+      for (size_t j = 0; j < n; ++j)
+        for (size_t i = 0; i < j; ++i)
+          ASSERT_NEAR(slope[j][i], slope[i][j], 1e-6 * most)
+              << name_of(kind) << squeezed << " " << i << " " << j;
+    }
 }
 
 // With clusters that move against each other as well, as long as w h is at most 2.

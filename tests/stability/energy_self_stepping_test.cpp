@@ -214,3 +214,25 @@ TEST(EnergySelfStepping, OwnModelsWithoutDamping_AreWatchedAndGainNothing) {
     EXPECT_NE(summary.find("\"unwatched\": {}"), std::string::npos) << model << ": " << summary;
   }
 }
+
+// Two plates close on a cube until next to nothing is left between them: they alone give it energy.
+TEST(EnergySelfStepping, CubeSqueezedToNothing_GainsNothing) {
+  const std::string out = test::scratch("energy_self_squeezed"), scene = out + "/scene.json";
+  test::write_file(scene, R"({"format": "deform-scene", "version": 1,
+    "time": {"duration": 0.54, "step": 0.001},
+    "materials": {"gel": {"young": 1e5, "damping": {"mass": 2}}},
+    "bodies": [{"name": "cube", "mesh": {"make": "beam", "size": [0.1, 0.1, 0.1], "cells": 48},
+                "material": "gel", "pose": {"position": [-0.05, -0.05, 0.001]},
+                "model": {"type": "shape_matching"}}],
+    "obstacles": [{"name": "under", "shape": "box", "half_size": [0.3, 0.3, 0.05],
+                   "pose": {"position": [0, 0, -0.05]}},
+                  {"name": "over", "shape": "box", "half_size": [0.3, 0.3, 0.05],
+                   "motion": {"keyframes": [{"t": 0, "position": [0, 0, 0.16]},
+                                            {"t": 0.55, "position": [0, 0, 0.05]}]}}],
+    "contact": {"friction": [{"between": ["*", "*"], "law": "coulomb", "params": {"mu": 0.5}}]},
+    "output": {"every": 0.02}})");
+  const test::CommandResult r = test::deform({"run", scene, "--quiet", "--out", out + "/run"});
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  const std::string summary = test::read_file(out + "/run/summary.json");
+  EXPECT_NE(summary.find("\"gain_J\": 0,"), std::string::npos) << summary;
+}
