@@ -8,6 +8,7 @@
 #include <ctime>
 #include <functional>
 #include <memory>
+#include <utility>
 
 #include "costs_file.h"
 #include "file.h"
@@ -21,10 +22,19 @@ namespace {
 
 constexpr double kFrame = 1.0 / 60;  // s
 constexpr double kYoung = 1e5, kPoisson = 0.3, kDensity = 1000, kGravity = 9.81;
-constexpr double kUsed = 0.9;   // of the proven step
-constexpr double kShare = 0.2;  // s of processor time for one figure
+constexpr double kUsed = 0.9;                   // of the proven step
+constexpr double kShare = 0.2, kMostShare = 1;  // s of processor time for one figure
+// cells of a body in a stack, where contact takes most of the time
+constexpr uint32_t kMostStacked = 2000;
 
 double processor_time() { return double(std::clock()) / CLOCKS_PER_SEC; }
+
+// What the bar touches, as the planner calls it; stacked: a second bar lies across it.
+enum class Touch { free, touching, pressed, stacked };
+constexpr std::pair<Touch, const char *> kTouches[] = {{Touch::free, "free"},
+                                                       {Touch::touching, "touching"},
+                                                       {Touch::pressed, "pressed"},
+                                                       {Touch::stacked, "stacked"}};
 
 struct Setting {
   std::string model;
@@ -32,10 +42,14 @@ struct Setting {
   double size[3] = {0.4, 0.1, 0.1};  // m
   uint32_t cells = 1000;
   double young = kYoung, damping_mass = 0, damping_stiffness = 1e-3, gravity = kGravity, spin = 0;
-  bool held = false, floor = false;
+  bool held = false;  // at its end x = 0; where it is pressed, at its base z = 0
+  Touch touch = Touch::free;
 };
 
-// One bar, of one model.
+// A block that a sphere dents: held at its base, as thick as the sphere is.
+constexpr double kBlock[3] = {0.2, 0.2, 0.1}, kProbe = 0.05, kDent = 0.008;  // m
+
+// One bar of one model, or two.
 class Bar {
  public:
   Bar(dfm_context *context, const Setting &s) : context_(context) {
@@ -51,7 +65,8 @@ class Bar {
   Bar &operator=(const Bar &) = delete;
 
   dfm_world world() const { return world_; }
-  uint32_t points() const { return info_.npoint; }
+  uint32_t points() const { return info_.npoint; }  // of a body
+  uint32_t bodies() const { return nbody_; }
   // s, +infinity where nothing bounds the step
   double stable_step() const {
     double h = 0;
@@ -83,6 +98,24 @@ class Bar {
   void run(double h, double seconds) const {
     for (double t = 0; t < seconds; t += h) step(h);
   }
+  // The same with the sphere at a depth, m beside the block's middle.
+  void press(double h, double depth, double beside_x, double beside_y) const {
+    dfm_pose pose = {};
+    pose.rotation[3] = 1;
+    pose.position[0] = 0.5 * kBlock[0] + beside_x;
+    pose.position[1] = 0.5 * kBlock[1] + beside_y;
+    pose.position[2] = kBlock[2] + kProbe - depth;
+    need(dfm_obstacle_move_to(probe_, &pose));
+    step(h);
+  }
+  // N, mean over the last step
+  double force(double h) const {
+    dfm_pair_impulse pair = {};
+    pair.size = sizeof pair;
+    uint32_t n = 0;
+    need(dfm_world_pair_impulses(world_, 1, &pair, &n));
+    return n ? pair.normal_impulse / h : 0;
+  }
   std::vector<double> displacements() const {
     std::vector<double> x(3 * size_t(info_.npoint));
     uint32_t n = 0;
@@ -98,7 +131,8 @@ class Bar {
     w.integrator = s.integrator;
     w.step = kFrame;
     need(dfm_world_create(context_, &w, &world_));
-    need(dfm_tetmesh_make(context_, "beam", s.size, s.cells, &mesh_));
+    const bool pressed = s.touch == Touch::pressed;
+    need(dfm_tetmesh_make(context_, "beam", pressed ? kBlock : s.size, s.cells, &mesh_));
     info_.size = sizeof info_;
     need(dfm_tetmesh_get_info(mesh_, &info_));
     dfm_material_def m = dfm_material_def_default();
@@ -113,7 +147,7 @@ class Bar {
     need(dfm_tetmesh_data(mesh_, &points, &b.tets, nullptr));
     std::vector<uint8_t> fixed(info_.npoint, 0);
     for (uint32_t i = 0; s.held && i < info_.npoint; ++i)
-      if (points[3 * size_t(i)] < 1e-9) fixed[i] = 7;
+      if (points[3 * size_t(i) + (pressed ? 2 : 0)] < 1e-9) fixed[i] = 7;
     b.npoint = info_.npoint;
     b.ntet = info_.ntet;
     b.points = points;
@@ -121,25 +155,45 @@ class Bar {
     b.model = s.model.c_str();
     b.spin[1] = s.spin;
     need(dfm_body_create(world_, &b, &body_));
-    if (s.floor) {
-      dfm_obstacle_def floor = dfm_obstacle_def_default();
-      dfm_obstacle made = 0;
-      need(dfm_obstacle_create(world_, &floor, &made));
+    if (s.touch == Touch::stacked) {
+      dfm_body upper = 0;
+      // across the middle of the lower one
+      b.pose.rotation[2] = b.pose.rotation[3] = std::sqrt(0.5);
+      b.pose.position[0] = 0.5 * (s.size[0] + s.size[1]);
+      b.pose.position[1] = 0.5 * (s.size[1] - s.size[0]);
+      b.pose.position[2] = s.size[2] + kGap;
+      need(dfm_body_create(world_, &b, &upper));
+      nbody_ = 2;
     }
+    if (s.touch != Touch::free) add_obstacle(pressed);
     start_.resize(3 * size_t(info_.npoint));
     uint32_t n = 0;
     need(dfm_body_get_state(body_, info_.npoint, start_.data(), nullptr, &n));
+  }
+  void add_obstacle(bool pressed) {
+    dfm_obstacle_def d = dfm_obstacle_def_default();
+    if (pressed) {
+      d.shape = DFM_SHAPE_SPHERE;
+      d.radius = kProbe;
+      d.pose.position[0] = 0.5 * kBlock[0];
+      d.pose.position[1] = 0.5 * kBlock[1];
+      d.pose.position[2] = kBlock[2] + kProbe + kGap;
+    }
+    need(dfm_obstacle_create(world_, &d, &probe_));
   }
   void close() {
     if (mesh_) dfm_tetmesh_destroy(mesh_);
     if (world_) dfm_world_destroy(world_);
   }
 
+  static constexpr double kGap = 1e-5;  // m
   dfm_context *context_;
   dfm_world world_ = 0;
   dfm_tetmesh mesh_ = 0;
   dfm_tetmesh_info info_ = {};
   dfm_body body_ = 0;
+  uint32_t nbody_ = 1;
+  dfm_obstacle probe_ = 0;  // or the floor
   std::vector<double> start_;
 };
 
@@ -153,10 +207,20 @@ double difference(const std::vector<double> &a, const std::vector<double> &refer
   return away / scale;
 }
 
+// Root mean square over that of the reference.
+double force_difference(const std::vector<double> &a, const std::vector<double> &reference) {
+  double away = 0, scale = 0;
+  for (size_t i = 0; i < a.size(); ++i) {
+    away += (a[i] - reference[i]) * (a[i] - reference[i]);
+    scale += reference[i] * reference[i];
+  }
+  return std::sqrt(away / scale);
+}
+
 // Young's modulus at which a bar of 1 m x 0.1 m x 0.1 m sags by this share of its length, by linear theory.
 double young_for(double sag) { return 1.5 * kDensity * kGravity * 100 / sag; }
 
-// The four cases in which models differ; each gives displacements at rest, or at the end of a turn.
+// The cases in which models differ; each gives displacements at rest, or at the end of a turn.
 std::vector<double> bent(dfm_context *context, const std::string &model, int32_t integrator, double sag) {
   Setting s;
   s.model = model;
@@ -193,10 +257,34 @@ std::vector<double> lying(dfm_context *context, const std::string &model, int32_
   std::copy_n(size, 3, s.size);
   s.young = 0.5 * kDensity * kGravity * 0.1 / 0.02;  // sags by 2 %
   s.damping_mass = 50;
-  s.floor = true;
+  s.touch = Touch::touching;
   const Bar bar(context, s);
   bar.run(kFrame, 1);
   return bar.displacements();
+}
+
+// A sphere goes into the block in four strokes, each until all rests: forces then, and where points are after
+// the last.
+struct Dent { std::vector<double> force, displacements; };
+Dent dented(dfm_context *context, const std::string &model, int32_t integrator) {
+  constexpr int kStrokes = 4, kMoves = 2, kRests = 10;  // steps
+  Setting s;
+  s.model = model;
+  s.integrator = integrator;
+  s.cells = 1500;
+  s.gravity = 0;
+  s.damping_mass = 50;
+  s.held = true;
+  s.touch = Touch::pressed;
+  const Bar block(context, s);
+  Dent out;
+  for (int stroke = 0; stroke < kStrokes; ++stroke) {
+    for (int i = 1; i <= kMoves + kRests; ++i)
+      block.press(kFrame, kDent / kStrokes * (stroke + std::min(1.0, double(i) / kMoves)), 0, 0);
+    out.force.push_back(block.force(kFrame));
+  }
+  out.displacements = block.displacements();
+  return out;
 }
 
 class Calibration {
@@ -226,7 +314,8 @@ class Calibration {
   std::string run(const std::string &machine) {
     reference_ = {bent(context_, kReference, DFM_INTEGRATOR_IMPLICIT_EULER, kLittle),
                   bent(context_, kReference, DFM_INTEGRATOR_IMPLICIT_EULER, kFar),
-                  turned(context_, kReference), lying(context_, kReference, DFM_INTEGRATOR_IMPLICIT_EULER)};
+                  turned(context_, kReference), lying(context_, kReference, DFM_INTEGRATOR_IMPLICIT_EULER),
+                  dented(context_, kReference, DFM_INTEGRATOR_IMPLICIT_EULER)};
     std::vector<std::string> rows;
     for (const std::string &id : models_) {
       const Patience patience(wanted_, "measuring " + id);
@@ -238,7 +327,7 @@ class Calibration {
     }
     return JsonObject()
         .add("format", quoted("deform-costs"))
-        .add("version", "2")
+        .add("version", "3")
         .add("machine", quoted(machine))
         .add("models", json_array(rows))
         .text();
@@ -253,7 +342,10 @@ class Calibration {
     return id == name || short_name(id) == name;
   }
 
-  struct Reference { std::vector<double> little, far, turned, lying; };
+  struct Reference {
+    std::vector<double> little, far, turned, lying;
+    Dent dented;
+  };
 
   std::string model_row(const std::string &id) {
     Setting s;
@@ -269,6 +361,9 @@ class Calibration {
         .add("bends_far", number(difference(bent(context_, id, still, kFar), reference_.far)))
         .add("turns", number(difference(turned(context_, id), reference_.turned)))
         .add("lies", number(difference(lying(context_, id, still), reference_.lying)));
+    const Dent dent = dented(context_, id, still);
+    errors.add("dents", number(difference(dent.displacements, reference_.dented.displacements)))
+        .add("dent_force", number(force_difference(dent.force, reference_.dented.force)));
     JsonObject costs;
     costs.add("symplectic_euler", sizes(id, DFM_INTEGRATOR_SYMPLECTIC_EULER, itself));
     if (!itself) {
@@ -286,23 +381,26 @@ class Calibration {
 
   std::string sizes(const std::string &id, int32_t integrator, bool itself) {
     JsonObject out;
-    for (const bool touching : {false, true}) {
+    for (const auto &[touch, name] : kTouches) {
       std::vector<std::string> rows;
       for (const uint32_t cells : {400u, 2000u, 8000u}) {
+        if (touch == Touch::stacked && cells > kMostStacked) continue;
         Setting s;
         s.model = id;
         s.integrator = integrator;
         s.cells = cells;
-        s.held = !touching;
-        s.floor = touching;
+        s.held = touch == Touch::free || touch == Touch::pressed;
+        s.touch = touch;
         const Bar bar(context_, s);
         const bool explicit_time = integrator == DFM_INTEGRATOR_SYMPLECTIC_EULER && !itself;
-        rows.push_back(JsonObject()
-                           .add("points", std::to_string(bar.points()))
-                           .add("ns_per_point", number(cost(bar, explicit_time ? bar.stable_step() : kFrame)))
-                           .text());
+        const double h = explicit_time ? bar.stable_step() : kFrame;
+        rows.push_back(
+            JsonObject()
+                .add("points", std::to_string(bar.points()))
+                .add("ns_per_point", number(touch == Touch::pressed ? cost_pressed(bar, h) : cost(bar, h)))
+                .text());
       }
-      out.add(touching ? "touching" : "free", json_array(rows));
+      out.add(name, json_array(rows));
     }
     return out.text();
   }
@@ -311,14 +409,31 @@ class Calibration {
   // is made once
   static double cost(const Bar &bar, double h) {
     for (int i = 0; i < 2; ++i) bar.step(h);
+    return time_steps(bar, [&] { bar.step(h); });
+  }
+
+  // The same under a sphere that has gone in and then slides along a circle.
+  static double cost_pressed(const Bar &bar, double h) {
+    constexpr double kDepth = 0.004, kGoesIn = 0.05, kCircle = 0.01, kTurns = 5;  // m, s, m, rad/s
+    double t = 0;
+    const auto step = [&] {
+      t += h;
+      bar.press(h, kDepth * std::min(1.0, t / kGoesIn), kCircle * (std::cos(kTurns * t) - 1),
+                kCircle * std::sin(kTurns * t));
+    };
+    while (t < kGoesIn) step();
+    return time_steps(bar, step);
+  }
+
+  static double time_steps(const Bar &bar, const std::function<void()> &step) {
     const double begin = processor_time();
     double spent = 0;
     unsigned n = 0;
-    for (; spent < kShare || n < 4; ++n) {
-      bar.step(h);
+    for (; spent < kShare || (n < 4 && spent < kMostShare); ++n) {
+      step();
       spent = processor_time() - begin;
     }
-    return 1e9 * spent / n / bar.points();
+    return 1e9 * spent / n / bar.points() / bar.bodies();
   }
 
   dfm_context *context_;

@@ -79,6 +79,16 @@ TEST_F(PlannerScene, ChoiceWrittenIntoTheScene_IsTheSameRun) {
   EXPECT_EQ(hash("a"), hash("b"));
 }
 
+// A block under a small probe, in 1 ms: modes answer a dent with twice the force, and are not taken.
+TEST_F(PlannerScene, BlockUnderAProbe_TakesAModelThatDents) {
+  const test::CommandResult r =
+      test::deform({"explain", DEFORM_SOURCE_DIR "/examples/scenes/probe_block.json", "--set",
+                    R"(/bodies/0/model={"type": "auto"})", "--set", R"(/budget={"ms_per_step": 1})"});
+  ASSERT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_TRUE(has(r.out, "--set /bodies/0/model/type=condensed")) << r.out;
+  EXPECT_TRUE(has(r.out, "'probe' touches it over about 0.054 m")) << r.out;
+}
+
 TEST_F(PlannerScene, BudgetThatCannotBeMet_IsSaidByTheRun) {
   const test::CommandResult r =
       test::deform({"run", bar(R"("budget": {"ms_per_step": 1e-6},)"), "--out", folder() + "/out"});
@@ -107,7 +117,7 @@ TEST_F(PlannerScene, Calibrate_WritesWhatScenesTake) {
   expect_refused(bar(R"("accuracy": {"target": 0.2},)", R"("model": {"type": "msm"}, )"),
                  {"/accuracy", "deform calibrate"});
   test::write_file(folder() + "/deform/costs.json",
-                   R"({"format": "deform-costs", "version": 2, "machine": 3})");
+                   R"({"format": "deform-costs", "version": 3, "machine": 3})");
   expect_refused(bar(R"("accuracy": {"target": 0.2},)"), {"costs.json", "/machine"});
   std::remove((folder() + "/deform/costs.json").c_str());
 }

@@ -16,19 +16,20 @@ constexpr double kOffered = 0.9 * 0.9155;
 
 double at_most(double x, double most) { return x < most ? x : most; }
 
-// Between measured sizes along a power law, beyond them along the last one.
+// Between measured sizes along a power law, beyond them along the last one; a body of more points is not
+// cheaper as a whole.
 double ns_per_point(const std::vector<CostAt> &costs, double points) {
   if (costs.size() == 1) return costs[0].ns;
   size_t k = 1;
   while (k + 1 < costs.size() && costs[k].points < points) ++k;
   const CostAt &a = costs[k - 1], &b = costs[k];
-  const double slope = std::log(b.ns / a.ns) / std::log(b.points / a.points);
+  const double slope = std::max(std::log(b.ns / a.ns) / std::log(b.points / a.points), -1.0);
   // below the least size cost per point stays, for what is small fits the caches all the same
   return a.ns * std::pow(std::max(points, costs[0].points) / a.points, slope);
 }
 
-const std::vector<CostAt> &costs_of(const MeasuredModel &m, Scheme scheme, bool touches) {
-  return m.costs[static_cast<size_t>(scheme)][touches ? 1 : 0];
+const std::vector<CostAt> &costs_of(const MeasuredModel &m, Scheme scheme, const BodyRegime &b) {
+  return m.costs[static_cast<size_t>(scheme)][static_cast<size_t>(what_it_meets(b))];
 }
 
 // Of bending: along the power law through the two bars that were measured, by the angles that `estimate`
@@ -40,11 +41,15 @@ double bending_error(const MeasuredModel &m, double rotation) {
   return m.bends_little * std::pow(std::max(rotation, 1e-6) / kLittle, std::max(power, 0.0));
 }
 
-double model_error(const MeasuredModel &m, const BodyRegime &b, const Estimate &e) {
+// Of the quantity. A force of contact has its own error where the body is dented, and that may be many times
+// the force.
+double model_error(const MeasuredModel &m, const BodyRegime &b, const Estimate &e, const Wish &wish) {
   double error = bending_error(m, e.rotation);
   if (b.touches && !b.held) error = std::max(error, m.lies);
   if (b.turns) error = std::max(error, m.turns);
-  return at_most(error, 1);
+  if (dented(b)) error = std::max(error, m.dents);
+  error = at_most(wish.weight * at_most(error, 1), 1);
+  return dented(b) && wish.force ? std::max(error, m.dent_force) : error;
 }
 
 // Linear tetrahedra: second order in edge over thickness. The factor of bending is that of a bar of 0.1 m
@@ -89,9 +94,9 @@ struct Try {
 bool may(const BodyRegime &b, const MeasuredModel &m, Scheme scheme) {
   if (!b.model.empty() && b.model != m.id) return false;
   if (b.model.empty() && std::find(b.models.begin(), b.models.end(), m.id) == b.models.end()) return false;
-  if (m.steps_itself) return !costs_of(m, Scheme::explicit_euler, b.touches).empty();
+  if (m.steps_itself) return !costs_of(m, Scheme::explicit_euler, b).empty();
   if (b.scheme >= 0 && static_cast<Scheme>(b.scheme) != scheme) return false;
-  return !costs_of(m, scheme, b.touches).empty();
+  return !costs_of(m, scheme, b).empty();
 }
 
 BodyWay way_of(const MeasuredModel &m, Scheme scheme, double h, const Try &t, const Wish &wish) {
@@ -99,10 +104,10 @@ BodyWay way_of(const MeasuredModel &m, Scheme scheme, double h, const Try &t, co
   BodyWay w;
   w.model = m.id;
   w.scheme = own;
-  w.model_error = at_most(wish.weight * model_error(m, *t.body, t.e), 1);
+  w.model_error = model_error(m, *t.body, t.e, wish);
   w.time_error = at_most(wish.weight * time_error(own, m.steps_itself, h, *t.body, t.e), 1);
   w.mesh_error = at_most(wish.weight * mesh_error(*t.body), 1);
-  w.cpu_s_per_s = 1e-9 * ns_per_point(costs_of(m, own, t.body->touches), t.body->points) * t.body->points / h;
+  w.cpu_s_per_s = 1e-9 * ns_per_point(costs_of(m, own, *t.body), t.body->points) * t.body->points / h;
   return w;
 }
 
@@ -202,7 +207,7 @@ class Planner {
     for (size_t i = 0; i < tries_.size(); ++i) {
       way.bodies.push_back(way_of(*models[i], scheme, way.substep, tries_[i], wish_));
       const BodyWay &b = way.bodies.back();
-      way.error = std::max(way.error, at_most(sum(b) + b.mesh_error, 1));
+      way.error = std::max({way.error, at_most(sum(b) + b.mesh_error, 1), b.model_error});
       way.cpu_s_per_s += b.cpu_s_per_s;
     }
     out_.considered.push_back(way);
@@ -220,6 +225,7 @@ class Planner {
           b.name.c_str(), b.points, b.thickness / b.edge, b.load, b.speed, e.strain, e.rotation,
           e.frequency / (2 * kPi), e.lasts, b.held ? "; held" : "; free",
           b.touches ? ", may touch something" : ", touches nothing"));
+      if (dented(b)) out_.assumed.push_back(dent(b));
       const double mesh = mesh_error(b) * wish_.weight, limit = wish_.target > 0 ? wish_.target : 1;
       if (mesh > limit)
         out_.assumed.push_back(
@@ -227,6 +233,23 @@ class Planner {
                    "would make %.2g",
                    b.name.c_str(), mesh, std::pow(mesh / limit, 1.5), limit));
     }
+  }
+
+  // What each model that may be chosen leaves out of a dent.
+  std::string dent(const BodyRegime &b) const {
+    std::string errors;
+    for (const MeasuredModel &m : measured_.models) {
+      const bool named = b.model == m.id;
+      if (!named && (!b.model.empty() || std::find(b.models.begin(), b.models.end(), m.id) == b.models.end()))
+        continue;
+      errors +=
+          format("%s%s %.2g (places %.2g)", errors.empty() ? "" : ", ", m.id.c_str(), m.dent_force, m.dents);
+    }
+    return format(
+        "body '%s': %s touches it over about %.2g m, less than its thickness of %.2g m, and dents "
+        "it; relative errors of the force of such a contact, measured on one dent: %s%s",
+        b.name.c_str(), b.met.c_str(), b.contact, b.thickness, errors.c_str(),
+        wish_.force ? "" : "; the quantity asked for goes by places alone");
   }
 
   const Measured &measured_;
@@ -240,6 +263,19 @@ class Planner {
 const char *scheme_name(Scheme scheme) {
   constexpr const char *kNames[kSchemes] = {"symplectic_euler", "implicit_euler", "tr_bdf2"};
   return kNames[static_cast<size_t>(scheme)];
+}
+
+const char *meets_name(Meets meets) {
+  constexpr const char *kNames[kMeets] = {"free", "touching", "pressed", "stacked"};
+  return kNames[static_cast<size_t>(meets)];
+}
+
+bool dented(const BodyRegime &b) { return b.touches && b.contact < b.thickness; }
+
+Meets what_it_meets(const BodyRegime &b) {
+  if (!b.touches) return Meets::nothing;
+  if (b.meets_body) return Meets::body;
+  return b.held ? Meets::probe : Meets::ground;
 }
 
 // A beam of the body's box. Held: a cantilever (Euler, Bernoulli; first root 1.875); free: both ends free

@@ -4,6 +4,7 @@
 // it assumed. Rules and their sources: doc/concepts/planner.md.
 #pragma once
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -21,16 +22,24 @@ struct CostAt {
   double points = 0, ns = 0;  // of a body; processor time of one sub-step per point
 };
 
+// What a body meets, by what a sub-step costs: nothing; the ground that it lies on; a probe that presses
+// it while it is held; another deformable body.
+enum class Meets { nothing, ground, probe, body };
+inline constexpr size_t kMeets = 4;
+const char *meets_name(Meets meets);  // as a file of costs names it
+
 struct MeasuredModel {
   std::string id;  // short name
   bool steps_itself = false;
   // Relative errors of positions against corotational_fem on the same mesh: a bar that bends by 2 % and by
-  // half of its length, a bar that turns, a block that lies on a plane.
-  double bends_little = 0, bends_far = 0, turns = 0, lies = 0;
+  // half of its length, a bar that turns, a block that lies on a plane, a held block that a small sphere
+  // dents.
+  double bends_little = 0, bends_far = 0, turns = 0, lies = 0, dents = 0;
+  double dent_force = 0;  // relative error of the sphere's force at the same depths
   // The largest explicit step that is proven, over the time in which a pressure wave goes by `cell_size`.
   double wave_steps = 0;
-  // by scheme, free and touching; empty: the model has no such scheme
-  std::array<std::array<std::vector<CostAt>, 2>, kSchemes> costs;
+  // by scheme and by what is met; empty: the model has no such scheme
+  std::array<std::array<std::vector<CostAt>, kMeets>, kSchemes> costs;
 };
 
 struct Measured {
@@ -53,6 +62,9 @@ struct BodyRegime {
   double travel = 0;  // m, that it moves as a whole
   double after = 0;   // share of the time after it first meets something by falling or flying
   bool held = false, touches = false, turns = false;
+  bool meets_body = false;          // another deformable one
+  double contact = HUGE_VAL;        // m, across the narrowest contact that it may have
+  std::string met;                  // whose contact that is
   std::string model;                // that the scene names; empty: to be chosen
   int scheme = -1;                  // that the scene names; -1: to be chosen
   std::vector<std::string> models;  // that may be chosen
@@ -62,6 +74,7 @@ struct Wish {
   double target = 0;       // relative error, 0: none
   double ms_per_step = 0;  // milliseconds of processor time, 0: none
   double weight = 1;       // how many times the error of positions the error of the quantity is
+  bool force = false;      // a force of contact counts, with its own error
   double duration = 0;     // s
   double step = 0;         // s, that the scene names; 0: to be chosen
 };
@@ -77,6 +90,9 @@ struct Estimate {
   double lasts = 0;  // s, until damping has ended what moves
 };
 Estimate estimate(const BodyRegime &body, double duration);
+// Whether it is touched over less than its own thickness, which dents it where it is touched.
+bool dented(const BodyRegime &body);
+Meets what_it_meets(const BodyRegime &body);
 
 struct BodyWay {
   std::string model;

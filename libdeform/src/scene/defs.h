@@ -173,6 +173,7 @@ struct Probe {
 struct Wanted {
   double target = 0;       // relative error, 0: none
   double weight = 1;       // errors of the quantity over those of positions
+  bool force = false;      // a force of contact is asked for, or nothing but a time
   double ms_per_step = 0;  // milliseconds of processor time, 0: none
   bool any() const { return target > 0 || ms_per_step > 0; }
 };

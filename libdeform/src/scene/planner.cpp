@@ -72,6 +72,26 @@ double fall_to_box(const Box &box, const double down[3], const Box &other) {
   return std::max(gap, 0.0);
 }
 
+// m, across a contact with a round thing that enters a body by a depth: a circle on the face.
+double round_width(double radius, double depth) {
+  const double d = std::min(depth, radius);
+  return 2 * std::sqrt(d * (2 * radius - d));
+}
+// m, across a contact with a thing of these sides: the one in the middle, since a slab meets with its face.
+double flat_width(double a, double b, double c) {
+  return std::max(std::min(a, b), std::min(std::max(a, b), c));
+}
+// m, by which a round thing at a place enters a box; 0: not at all.
+double depth_in(const Box &box, const double center[3], double radius) {
+  double outside = 0, inside = HUGE_VAL;
+  for (int k = 0; k < 3; ++k) {
+    const double beyond = std::max(box.lo[k] - center[k], center[k] - box.hi[k]);
+    outside += std::max(beyond, 0.0) * std::max(beyond, 0.0);
+    inside = std::min(inside, -beyond);
+  }
+  return std::max(0.0, radius + (inside > 0 ? inside : -std::sqrt(outside)));
+}
+
 Box box_of(const Obstacle &o, const std::vector<double> &scaled) {
   double lo[3], hi[3];
   const double r = o.def.radius;
@@ -122,29 +142,66 @@ class Reader {
     return kNone;
   }
 
-  // m, until it meets something; infinite: never
-  double fall(size_t i) {
-    double least = HUGE_VAL;
+  static bool moves(const Obstacle &o) { return !o.keys.empty() || o.def.sine.frequency > 0; }
+  static bool thrown(const Body &b) { return length(b.velocity) > 0 || length(b.spin) > 0; }
+  static bool held(const Body &b) { return !b.fixes.empty() || !b.nodal_bc.empty(); }
+
+  // Something comes to it, whatever gravity does.
+  bool something_moves() const {
+    return std::any_of(def_.obstacles.begin(), def_.obstacles.end(), moves) || !def_.rigid.bodies.empty() ||
+           (def_.bodies.size() + def_.obstacles.size() > 1 && one_is_thrown());
+  }
+  bool one_is_thrown() const { return std::any_of(def_.bodies.begin(), def_.bodies.end(), thrown); }
+
+  // m, across the contact that a body has with an obstacle. Of a round one by how deep its poses enter the
+  // box around the body; where none does, as wide as its radius.
+  double width_of(size_t i, const Obstacle &o, const std::vector<double> &scaled) const {
+    if (o.def.shape == DFM_SHAPE_PLANE) return HUGE_VAL;
+    if (o.def.shape == DFM_SHAPE_SPHERE || o.def.shape == DFM_SHAPE_CAPSULE) {
+      double depth = 0;
+      for (const dfm_pose_key &key : o.keys)
+        depth = std::max(depth, depth_in(boxes_[i], key.pose.position, o.def.radius));
+      return depth > 0 ? round_width(o.def.radius, depth) : o.def.radius;
+    }
+    Obstacle straight = o;
+    straight.def.pose = {};
+    const Box box = box_of(straight, scaled);
+    return flat_width(box.hi[0] - box.lo[0], box.hi[1] - box.lo[1], box.hi[2] - box.lo[2]);
+  }
+
+  // How far a body falls until it meets something, and with what it has its narrowest contact.
+  void find_contacts(size_t i, double falls, double &fall, BodyRegime &r) {
+    const auto narrow = [&](double width, const std::string &name) {
+      if (!(width < r.contact)) return;
+      r.contact = width;
+      r.met = "'" + name + "'";
+    };
+    const bool flies = one_is_thrown();
     for (const Obstacle &o : def_.obstacles) {
       std::vector<double> scaled;
       Obstacle copy = o;
       if (!copy.mesh.empty()) files_.load(copy, scaled);
       const bool plane = copy.def.shape == DFM_SHAPE_PLANE;
-      least = std::min(least, plane ? fall_to_plane(boxes_[i], down_, copy.def.pose)
-                                    : fall_to_box(boxes_[i], down_, box_of(copy, scaled)));
+      const double least = plane ? fall_to_plane(boxes_[i], down_, copy.def.pose)
+                                 : fall_to_box(boxes_[i], down_, box_of(copy, scaled));
+      fall = std::min(fall, least);
+      if ((!r.held && least <= falls) || moves(o) || flies) narrow(width_of(i, copy, scaled), o.name);
     }
-    for (size_t k = 0; k < boxes_.size(); ++k)
-      if (k != i) least = std::min(least, fall_to_box(boxes_[i], down_, boxes_[k]));
-    return least;
-  }
-
-  // Something comes to it, whatever gravity does.
-  bool something_moves() const {
-    const auto moving = [](const Obstacle &o) { return !o.keys.empty() || o.def.sine.frequency > 0; };
-    const auto thrown = [](const Body &b) { return length(b.velocity) > 0 || length(b.spin) > 0; };
-    return std::any_of(def_.obstacles.begin(), def_.obstacles.end(), moving) || !def_.rigid.bodies.empty() ||
-           (def_.bodies.size() + def_.obstacles.size() > 1 &&
-            std::any_of(def_.bodies.begin(), def_.bodies.end(), thrown));
+    for (const RigidBody &body : def_.rigid.bodies) {
+      const dfm_rigid_def &d = body.def;
+      const bool round = d.shape == DFM_SHAPE_SPHERE || d.shape == DFM_SHAPE_CAPSULE;
+      if (round) narrow(d.radius, body.name);
+      if (d.shape == DFM_SHAPE_BOX)
+        narrow(flat_width(2 * d.half_size[0], 2 * d.half_size[1], 2 * d.half_size[2]), body.name);
+    }
+    for (size_t k = 0; k < boxes_.size(); ++k) {
+      if (k == i) continue;
+      const double down = fall_to_box(boxes_[i], down_, boxes_[k]),
+                   up = fall_to_box(boxes_[k], down_, boxes_[i]);
+      fall = std::min(fall, down);
+      r.meets_body =
+          r.meets_body || flies || (!r.held && down <= falls) || (!held(def_.bodies[k]) && up <= falls);
+    }
   }
 
   std::vector<std::string> candidates(const Measured &measured) const {
@@ -179,10 +236,13 @@ class Reader {
     r.load = g_;
     for (const Force &f : b.forces)
       r.load += length(f.total) / (m.density * info.volume * std::pow(b.scale, 3));
-    r.held = !b.fixes.empty() || !b.nodal_bc.empty();
-    const double s = r.held ? HUGE_VAL : fall(i), thrown = length(b.velocity);
+    r.held = held(b);
+    const double thrown = length(b.velocity);
     const double falls = g_ > 0 ? 0.5 * g_ * def_.duration * def_.duration : 0;
-    r.touches = s <= falls || something_moves();
+    double fall = HUGE_VAL;
+    find_contacts(i, falls, fall, r);
+    const double s = r.held ? HUGE_VAL : fall;
+    r.touches = s <= falls || r.meets_body || something_moves();
     r.speed = thrown + 0.5 * length(b.spin) * r.length;
     if (!r.held) {
       const double way = std::min(s, falls);
@@ -237,6 +297,7 @@ json plan_scene(dfm_context *context, const Definition &def, const Types &types,
   wish.target = wanted.target;
   wish.ms_per_step = wanted.ms_per_step;
   wish.weight = wanted.weight;
+  wish.force = wanted.force;
   wish.duration = def.duration;
   wish.step = def.step;
   PlannedWay plan = plan_accuracy(bodies, measured, wish);

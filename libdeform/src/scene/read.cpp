@@ -255,7 +255,8 @@ void read_time(const Node &scene, Definition &def) {
 // How many times the relative error of positions that of a quantity is: energies go with squares, and forces
 // of contact and the work of friction follow them. Names are those of `deform cost`: a probe, or a family,
 // with or without whose it is.
-double weight_of(const Node &quantity, const std::vector<Probe> &probes) {
+// force: whether a force of contact counts.
+double weight_of(const Node &quantity, const std::vector<Probe> &probes, bool &force) {
   static const std::vector<std::string> once = {"com", "volume", "touch", "slip", "liftoff", "rest"},
                                         twice = {"energy", "force", "work"};
   const std::string name = quantity.text(), family = name.substr(0, name.find('.'));
@@ -268,6 +269,7 @@ double weight_of(const Node &quantity, const std::vector<Probe> &probes) {
   if (probe) return 1;
   json stem = family;
   known(Node(&stem, quantity.pointer(), &quantity.file()), valid, "quantity");
+  force = family == "force" || family == "work";
   return std::find(twice.begin(), twice.end(), family) == twice.end() ? 1 : 2;
 }
 
@@ -288,6 +290,7 @@ void read_wanted(const Node &scene, Definition &def) {
     def.wanted.target = wanted.at("target").number(Range{0, 1, true, true});
   } else {
     def.wanted.ms_per_step = wanted.at("ms_per_step").number(kPositive);
+    def.wanted.force = true;  // nobody says what the error is to be of: a dent counts by both
   }
 }
 
@@ -524,7 +527,7 @@ Definition read_scene(json &tree, const std::string &file, const Types &types) {
   read_contact(scene, def, context);
   read_probes(scene, def);
   if (scene.has("accuracy") && scene.member("accuracy").has("quantity"))
-    def.wanted.weight = weight_of(scene.member("accuracy").member("quantity"), def.probes);
+    def.wanted.weight = weight_of(scene.member("accuracy").member("quantity"), def.probes, def.wanted.force);
   read_output(scene, def);
   return def;
 }

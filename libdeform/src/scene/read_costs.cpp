@@ -7,8 +7,6 @@
 namespace dfm::scene {
 namespace {
 
-constexpr const char *kTouching[2] = {"free", "touching"};
-
 std::vector<CostAt> read_sizes(const Node &sizes) {
   std::vector<CostAt> out;
   for (const Node &size : sizes.items()) {
@@ -30,11 +28,14 @@ MeasuredModel read_model(const Node &node) {
   m.bends_far = errors.at("bends_far").number(kNotNegative);
   m.turns = errors.at("turns").number(kNotNegative);
   m.lies = errors.at("lies").number(kNotNegative);
+  m.dents = errors.at("dents").number(kNotNegative);
+  m.dent_force = errors.at("dent_force").number(kNotNegative);
   const Node costs = node.at("costs");
   for (size_t s = 0; s < kSchemes; ++s) {
     const char *const scheme = scheme_name(static_cast<Scheme>(s));
     if (!costs.has(scheme)) continue;
-    for (size_t k = 0; k < 2; ++k) m.costs[s][k] = read_sizes(costs.member(scheme).at(kTouching[k]));
+    for (size_t k = 0; k < kMeets; ++k)
+      m.costs[s][k] = read_sizes(costs.member(scheme).at(meets_name(static_cast<Meets>(k))));
   }
   return m;
 }
@@ -48,8 +49,8 @@ Measured read_costs() {
   const Node root(&tree, "", &file);
   if (root.at("format").text() != "deform-costs")
     root.at("format").fail("expected \"deform-costs\", a file of deform calibrate");
-  if (root.at("version").number() != 2)
-    root.at("version").fail("this reader knows version 2: run deform calibrate again");
+  if (root.at("version").number() != 3)
+    root.at("version").fail("this reader knows version 3: run deform calibrate again");
   Measured out;
   out.machine = root.at("machine").text();
   for (const Node &model : root.at("models").items()) out.models.push_back(read_model(model));

@@ -19,8 +19,8 @@ MeasuredModel model(const char *id, double error, double explicit_ns, double imp
   m.id = id;
   m.bends_little = m.bends_far = m.lies = error;
   m.wave_steps = 0.5;
-  m.costs[0][0] = m.costs[0][1] = {{100, explicit_ns}, {1000, explicit_ns}};
-  if (implicit_ns > 0) m.costs[1][0] = m.costs[1][1] = {{100, implicit_ns}, {1000, implicit_ns}};
+  m.costs[0].fill({{100, explicit_ns}, {1000, explicit_ns}});
+  if (implicit_ns > 0) m.costs[1].fill({{100, implicit_ns}, {1000, implicit_ns}});
   return m;
 }
 
@@ -133,4 +133,51 @@ TEST(Planner, LowestMode_IsTheBeams) {
   const double inertia = std::pow(b.thickness, 4) / 12, area = b.thickness * b.thickness;
   const double w = 1.875 * 1.875 * std::sqrt(b.young * inertia / (b.density * area * std::pow(b.length, 4)));
   EXPECT_NEAR(dfm::estimate(b, 1).frequency, w, 1e-9 * w);
+}
+
+// A probe that is narrower than the body dents it: then errors of a dent count, of places where those are
+// asked for, of the force too where that is, and a force may be wrong by more than itself.
+TEST(Planner, DentUnderAProbe_CountsWithItsOwnErrors) {
+  BodyRegime b = bar();
+  b.touches = true;
+  b.contact = 0.02;
+  b.met = "'probe'";
+  b.models = {"springs", "elements"};
+  Measured costs = measured();
+  costs.models[0].dents = 0.09;
+  costs.models[0].dent_force = 3;
+  Wish wish = accuracy(0.1);
+  const PlannedWay places = plan_accuracy({b}, costs, wish);
+  EXPECT_EQ(places.way.bodies[0].model, "springs");
+  EXPECT_DOUBLE_EQ(places.way.bodies[0].model_error, 0.09);
+  ASSERT_EQ(places.assumed.size(), 2u);
+  for (const char *word : {"'probe' touches it over about 0.02 m", "springs 3 (places 0.09)", "places alone"})
+    EXPECT_NE(places.assumed[1].find(word), std::string::npos) << word << " in " << places.assumed[1];
+  wish.force = true;
+  EXPECT_EQ(plan_accuracy({b}, costs, wish).way.bodies[0].model, "elements");
+  b.models = {"springs"};
+  const PlannedWay alone = plan_accuracy({b}, costs, wish);
+  EXPECT_FALSE(alone.meets);
+  EXPECT_DOUBLE_EQ(alone.way.error, 3);
+  b.contact = b.thickness;
+  EXPECT_FALSE(dfm::dented(b));
+  EXPECT_TRUE(plan_accuracy({b}, costs, wish).meets);
+}
+
+// What a sub-step costs goes by what is met.
+TEST(Planner, WhatABodyMeets_DecidesItsCost) {
+  Measured costs = measured();
+  for (size_t k = 0; k < dfm::kMeets; ++k)
+    costs.models[0].costs[0][k] = {{100, 100.0 * double(k + 1)}, {1000, 100.0 * double(k + 1)}};
+  BodyRegime b = bar();
+  b.models = {"springs"};
+  const auto cost = [&] { return plan_accuracy({b}, costs, accuracy(0.1)).way.cpu_s_per_s; };
+  const double free = cost();
+  b.touches = true;
+  EXPECT_EQ(dfm::what_it_meets(b), dfm::Meets::probe);
+  EXPECT_DOUBLE_EQ(cost(), 3 * free);
+  b.meets_body = true;
+  EXPECT_DOUBLE_EQ(cost(), 4 * free);
+  b.held = b.meets_body = false;
+  EXPECT_EQ(dfm::what_it_meets(b), dfm::Meets::ground);
 }
