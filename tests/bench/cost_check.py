@@ -52,7 +52,11 @@ def error(mine, truth):
 
 
 def cells_of(choice):
-    with open(os.path.join(choice["folder"], "summary.json")) as file:
+    """{body: cells} of a choice that was run; None of one that did not come to its end"""
+    path = os.path.join(choice["folder"], "summary.json")
+    if choice["state"] != "done" or not os.path.exists(path):
+        return None
+    with open(path) as file:
         return {name: body["cells"] for name, body in json.load(file)["bodies"].items()}
 
 
@@ -101,6 +105,9 @@ def main():
         scene = json.load(file)
     choices, here = report["choices"], report["this_mesh"]
     reference = choices[report["reference"]["choice"]]
+    if cells_of(choices[0]) is None:
+        raise SystemExit(f"{options.scene}: the scene as it is does not come to its end within --budget "
+                         f"{options.budget}, so there is nothing to check; give more")
     words = ['/time/integrator="symplectic_euler"']
     for i in range(len(scene["bodies"])):
         model = reference["set"].get(f"/bodies/{i}/model")
@@ -108,7 +115,7 @@ def main():
     truths = {"finer": run(options, os.path.join(options.out, "finer"), words + ['/time/step="auto"'] +
                            finer(scene, options.out, choices[0], options.times))}
     shown = {"finer": {i: choices[i]["headline"] for i in report["front"]}}
-    shown["finer"][report["reference"]["choice"]] = report["reference"]["error"]
+    shown["finer"][report["reference"]["choice"]] = report["reference"]["error"]  # null: nothing checks it
     if here:
         step = choices[here["check"]]["step"] / 10
         truths["shorter"] = run(options, os.path.join(options.out, "shorter"),
@@ -122,6 +129,9 @@ def main():
         for against, truth in truths.items():
             for i, error_shown in shown[against].items():
                 choice = choices[i]
+                if cells_of(choice) is None or error_shown is None:
+                    print(against, choice["label"], "not compared: it did not come to its end", sep=", ")
+                    continue
                 found = error(probes(choice["folder"]), truth)
                 row = (against, choice["label"], sum(cells_of(choice).values()), f"{error_shown:.4f}",
                        f"{found:.4f}", f"{choice['cpu_s_per_s']:.3g}", "yes" if i == picked else "")

@@ -219,14 +219,23 @@ std::string reference_text(const Study &study) {
          ", so errors below " + percent(3 * study.reference_headline) + " are not told apart";
 }
 
+// Which budget says more, and what.
+std::string next_text(const Study &study) {
+  if (!(study.next_budget > 0)) return "  with a larger --budget the same call goes on from here\n";
+  return "  the same call with --budget " + formatted("%.0f", std::ceil(study.next_budget)) +
+         " goes on from here, until " + study.next + "\n";
+}
+
 std::string pick_text(const Study &study) {
   const std::string target = percent(study.options.target);
+  if (study.pick < 0 && study.check < 0)
+    return "nothing can be said about " + target + ": nothing checks the reference\n" + next_text(study);
   if (study.pick < 0 && !(study.reference_headline <= study.options.target))
-    return "nothing can be said about " + target +
-           ": the reference's own error is above it; a larger --budget makes the reference finer\n";
+    return "nothing can be said about " + target + ": the reference's own error, " +
+           percent(study.reference_headline) + ", is above it\n" + next_text(study);
   if (study.pick < 0) {
     return "no choice stays within " + target + " together with the reference's own error of " +
-           percent(study.reference_headline) + "; a larger --budget makes the reference finer\n";
+           percent(study.reference_headline) + "\n" + next_text(study);
   }
   const Row &row = study.rows[size_t(study.pick)];
   std::string out = "cheapest within " + target + (study.mesh_stays ? " on this mesh: " : ": ");
@@ -236,10 +245,10 @@ std::string pick_text(const Study &study) {
   if (study.mesh_stays)
     out += "  proven for model and step; the mesh brings " + percent(study.own_mesh.mesh) +
            ", give or take the " + percent(study.reference_headline) +
-           " of the reference: no mesh within this budget is fine enough to say more\n";
+           " of the reference: no mesh within this budget is fine enough to say more\n" + next_text(study);
   else if (!study.proven)
     out += "  likely, not proven: with the reference's own error of " + percent(study.reference_headline) +
-           " it may be above the target; a larger --budget makes the reference finer\n";
+           " it may be above the target\n" + next_text(study);
   bool any = false;
   for (const auto &[pointer, value] : row.job.set) {
     if (pointer.rfind("/output/", 0) == 0 || pointer == "/probes") continue;

@@ -42,6 +42,7 @@ class Student {
     slices();
     choose_pair();
     run_rest();
+    find_next();
     if (out_.reference < 0) fall_back();
     compare();
     compare_on_this_mesh();
@@ -249,6 +250,33 @@ class Student {
     if (!done(out_.third) || out_.check < 0) out_.third = -1;
   }
 
+  // What a larger budget would bring: model and step on the scene's own mesh, or a finer reference. Both runs
+  // of a pair go on at the same time where there are two processors.
+  void find_next() {
+    const double used = out_.options.budget - runs_.left();
+    const auto consider = [&](int fine, int coarse, double share, const std::string &what) {
+      double need = 0;
+      for (const int row : {fine, coarse}) {
+        if (done(row)) continue;
+        if (failed(row) || !std::isfinite(predicted(row))) return;
+        need = runs_.parallel() > 1 ? std::max(need, predicted(row)) : need + predicted(row);
+      }
+      const double budget = 1.1 * (used + need / share);  // forecasts are no better than that
+      if (need <= 0 || (out_.next_budget > 0 && budget >= out_.next_budget)) return;
+      out_.next = what;
+      out_.next_budget = std::max(budget, 1.1 * out_.options.budget);
+    };
+    const OnThisMesh &own = out_.own_mesh;
+    if (own.reference >= 0)
+      consider(own.reference, own.check, 1 - kAloneShare,
+               "model and step are judged on the scene's own mesh");
+    for (const auto &[fine, coarse] : ladder_) {
+      if (fine == out_.reference && out_.check >= 0) break;  // coarser ones say less
+      consider(fine, coarse, kReferenceShare,
+               "the reference is \"" + out_.rows[size_t(fine)].job.label + "\"");
+    }
+  }
+
   // The longest run of the reference's model that came to its end is the best that there is.
   void fall_back() {
     double most = -1;
@@ -266,12 +294,16 @@ class Student {
       if (row.job.outcome.state == Outcome::unstable || row.job.outcome.state == Outcome::refused)
         throw Failure(kBadInput, s_.path + ": no run came to its end; \"" + row.job.label +
                                      "\": " + row.job.outcome.sentence);
-    char text[80];
-    std::snprintf(text, sizeof text, "%.3g", out_.rows[0].job.outcome.predicted(s_.duration));
-    throw Failure(kBadInput, s_.path +
-                                 ": no run came to its end within the budget, the scene as it is would "
-                                 "take about " +
-                                 text + " s; give more with --budget");
+    double least = out_.next_budget;
+    if (!(least > 0)) {
+      const double own = predicted(0);
+      least = std::isfinite(own) ? own / kOwnShare : 10 * out_.options.budget;
+    }
+    char text[160];
+    std::snprintf(text, sizeof text,
+                  ": no run came to its end within the budget of %.3g s; take --budget %.0f or more",
+                  out_.options.budget, std::ceil(least));
+    throw Failure(kBadInput, s_.path + text);
   }
 
   void compare() {

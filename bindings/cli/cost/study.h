@@ -67,6 +67,10 @@ struct Study {
   bool proven = false;      // the pick meets the target even if the reference is as far off as it may be
   double used = 0;          // s of the budget
   unsigned started = 0;
+  // The cheapest thing that would say more, and the budget (s) with which the same call goes on to it; 0: not
+  // known.
+  std::string next;
+  double next_budget = 0;
 };
 
 // Throws Failure where nothing can be compared within the budget.
