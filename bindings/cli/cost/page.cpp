@@ -28,7 +28,7 @@ figure { margin: 0; }
 figure img { width: 100%; border: 1px solid #ddd; }
 figure.pick img { border: 3px solid #cc4033; }
 figcaption { font-size: .9em; }
-pre { background: #f4f5f7; padding: .8em 1em; overflow-x: auto; }
+pre { background: #f4f5f7; padding: .8em 1em; white-space: pre-wrap; overflow-wrap: anywhere; }
 svg { width: 100%; height: auto; }
 )";
 
@@ -127,17 +127,9 @@ std::string separated(const Study &study) {
   return out + (left.empty() ? "" : "<p>Left out:</p><ul>\n" + left + "</ul>\n");
 }
 
-std::string not_run(const Study &study) {
+std::string not_run(const Subject &subject, const Study &study) {
   std::string out;
-  size_t cut = 0;
-  for (const Row &row : study.rows) {
-    const Outcome &o = row.job.outcome;
-    if (o.state == Outcome::unstable || o.state == Outcome::refused)
-      out += "<li>" + std::string(o.state == Outcome::unstable ? "unstable" : "refused") + ", " +
-             escaped(row.job.label) + ": " + escaped(o.sentence) + "</li>\n";
-    cut += o.state == Outcome::cut || o.state == Outcome::none;
-  }
-  if (cut > 0) out += "<li>" + std::to_string(cut) + " choices did not fit into the budget</li>\n";
+  for (const std::string &line : left_out(subject, study)) out += "<li>" + escaped(line) + "</li>\n";
   return out.empty() ? "" : "<h2>Not compared</h2>\n<ul>\n" + out + "</ul>\n";
 }
 
@@ -165,14 +157,15 @@ std::string page_html(const Subject &subject, const Study &study) {
          "</h1>\n<p>Error of " + of +
          (subject.at_rest
               ? ": difference from the reference at the end, relative to how far the reference moves. "
-                "Cost: seconds of processor time.</p>\n<p"
+                "Cost: seconds of processor time; ~ while other runs ran beside.</p>\n<p"
               : ": root mean square over time of the difference from the reference, relative to how "
-                "far the reference moves. Cost: seconds of processor time for a simulated second.</p>\n"
+                "far the reference moves. Cost: seconds of processor time for a simulated second; ~ while "
+                "other runs ran beside.</p>\n"
                 "<p") +
          (study.converged ? "" : " class=\"warn\"") + ">" + escaped(reference_text(study)) + "</p>\n" +
          svg_chart(subject, study) + "<h2>What to take</h2>\n<pre>" + escaped(pick_text(study)) + "</pre>\n" +
          "<h2>The front: nothing cheaper is as accurate</h2>\n" + front_table(study) + own_mesh(study) +
-         pictures(study) + separated(study) + not_run(study) + "</body></html>\n";
+         pictures(study) + separated(study) + not_run(subject, study) + "</body></html>\n";
 }
 
 }  // namespace cli::cost

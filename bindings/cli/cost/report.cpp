@@ -3,12 +3,15 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstring>
 #include <map>
 
 #include "messages.h"
 
 namespace cli::cost {
 namespace {
+
+constexpr size_t kNamed = 6;  // choices in a line that lists them
 
 std::string formatted(const char *format, double x) {
   char text[64];
@@ -101,33 +104,12 @@ std::string separated_json(const Study &study) {
   return json_array(parts);
 }
 
-// Rows that are not compared, by reason.
-void list_left_out(const Subject &subject, const Study &study, std::string &out) {
-  std::map<std::string, std::pair<std::string, size_t>>
-      said;  // by sentence: the first that said it, how many
-  for (const Row &row : study.rows) {
-    const Outcome &o = row.job.outcome;
-    if (o.state != Outcome::unstable && o.state != Outcome::refused) continue;
-    const char *const what = o.state == Outcome::unstable ? "unstable   " : "refused    ";
-    ++said.try_emplace(o.sentence, what + row.job.label, 0).first->second.second;
-  }
-  for (const auto &[sentence, who] : said)
-    out += "  " + who.first + (who.second > 1 ? " and " + std::to_string(who.second - 1) + " more" : "") +
-           ": " + sentence + "\n";
-  std::string cut;
-  size_t n = 0;
-  double least = 1e300;
-  for (const Row &row : study.rows) {
-    const Outcome &o = row.job.outcome;
-    if (o.state != Outcome::cut && o.state != Outcome::none) continue;
-    ++n;
-    if (o.state == Outcome::cut) least = std::min(least, o.predicted(subject.duration));
-    if (n <= 6) cut += (cut.empty() ? "" : "; ") + row.job.label;
-  }
-  if (n == 0) return;
-  out += "  too long   " + std::to_string(n) + " choices do not fit into the budget" +
-         (least < 1e300 ? " (each would take " + formatted("%.3g", least) + " s or more)" : "") + ": " + cut +
-         (n > 6 ? "; ..." : "") + "\n";
+// A sentence without its figures: what differs in them alone is said once.
+std::string without_figures(const std::string &sentence) {
+  std::string out;
+  for (const char c : sentence)
+    if (!std::strchr("0123456789.+-", c)) out += c;
+  return out;
 }
 
 void list_axes(const Study &study, std::string &out) {
@@ -150,6 +132,41 @@ void list_axes(const Study &study, std::string &out) {
 }
 
 }  // namespace
+
+std::vector<std::string> left_out(const Subject &subject, const Study &study) {
+  struct Reason {
+    std::string sentence, labels;
+    size_t rows = 0;
+    bool unstable = false;
+  };
+  std::map<std::string, Reason> said;
+  std::string cut;
+  size_t n = 0;
+  double least = 1e300;
+  for (const Row &row : study.rows) {
+    const Outcome &o = row.job.outcome;
+    if (o.state == Outcome::cut || o.state == Outcome::none) {
+      if (o.state == Outcome::cut) least = std::min(least, o.predicted(subject.duration));
+      if (++n <= kNamed) cut += (n > 1 ? "; " : "") + row.job.label;
+    }
+    if (o.state != Outcome::unstable && o.state != Outcome::refused) continue;
+    const bool unstable = o.state == Outcome::unstable;
+    Reason &reason = said[(unstable ? "a" : "b") + without_figures(o.sentence)];
+    if (reason.rows == 0) reason.sentence = o.sentence;
+    reason.unstable = unstable;
+    if (++reason.rows <= kNamed) reason.labels += (reason.rows > 1 ? "; " : "") + row.job.label;
+  }
+  std::vector<std::string> out;
+  for (const auto &[key, reason] : said)
+    out.push_back((reason.unstable ? "unstable: " : "refused: ") + reason.labels +
+                  (reason.rows > kNamed ? "; and " + std::to_string(reason.rows - kNamed) + " more" : "") +
+                  (reason.rows > 1 ? ". The first says: " : ". It says: ") + reason.sentence);
+  if (n > 0)
+    out.push_back("too long for the budget: " + cut +
+                  (n > kNamed ? "; and " + std::to_string(n - kNamed) + " more" : "") +
+                  (least < 1e300 ? ". The shortest would take " + formatted("%.3g", least) + " s" : ""));
+  return out;
+}
 
 std::string percent(double part) {
   if (!std::isfinite(part)) return "-";
@@ -221,9 +238,11 @@ std::string reference_text(const Study &study) {
 
 // Which budget says more, and what.
 std::string next_text(const Study &study) {
+  if (study.finest && !(study.next_budget > 0))
+    return "  no finer reference is tried with a larger --budget; more cells in the scene make it finer\n";
   if (!(study.next_budget > 0)) return "  with a larger --budget the same call goes on from here\n";
   return "  the same call with --budget " + formatted("%.0f", std::ceil(study.next_budget)) +
-         " goes on from here, until " + study.next + "\n";
+         " goes on from here; that is enough to " + study.next + "\n";
 }
 
 std::string pick_text(const Study &study) {
@@ -268,6 +287,9 @@ std::string table_text(const Subject &subject, const Study &study) {
   out += "error of " + names + (study.headline.size() > 1 ? " (the largest)" : "") +
          (subject.at_rest ? ": of the end, " : ": root mean square over time, ") +
          "relative to how far the reference moves\n";
+  out += std::string("cost, cpu ") + study.cost_unit + ": seconds of processor time" +
+         (subject.at_rest ? " until the equilibrium" : " for a simulated second") +
+         "; ~ taken while other runs ran beside\n";
   out += reference_text(study) + "\n";
   list_axes(study, out);
   out +=
@@ -293,7 +315,10 @@ std::string table_text(const Subject &subject, const Study &study) {
   if (own.compared)
     out +=
         "  the scene as it is: " + percent(own.headline) + " at " + formatted("%.3g", own.cpu_per_s) + "\n";
-  list_left_out(subject, study, out);
+  else if (own.job.outcome.state == Outcome::unstable)
+    out += "  the scene as it is stops itself before its end, see \"unstable\"\n";
+  else out += "  the scene as it is does not fit into the budget\n";
+  for (const std::string &line : left_out(subject, study)) out += "  " + line + "\n";
   return out + "\n" + pick_text(study);
 }
 

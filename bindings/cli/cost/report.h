@@ -22,5 +22,7 @@ Described describe(const Subject &subject, const Row &row);
 std::string mesh_text(const Study &study);  // of the scene's own mesh; "" where nothing is said
 std::string reference_text(const Study &study);
 std::string pick_text(const Study &study);
+// Choices that are not compared: one sentence for each reason, with who and why.
+std::vector<std::string> left_out(const Subject &subject, const Study &study);
 
 }  // namespace cli::cost

@@ -29,7 +29,8 @@ constexpr double kSlicesEnd = 0.35, kKnownEnd = 0.45;
 constexpr double kAloneShare = 0.15;  // of the budget: the front once more, alone and with pictures
 constexpr double kPictureTime = 0.5;  // s that pictures may take beside a run
 constexpr size_t kPictures = 6;
-constexpr double kMostCells = 4000;  // of a mesh that is tried beyond four times the scene's
+// Beyond four times the scene's cells: 16 and 64 times, up to so many.
+constexpr struct { double times, most; } kBeyond[] = {{64, 4000}, {16, 40000}};
 
 class Student {
  public:
@@ -123,8 +124,8 @@ class Student {
       // all filled in one way; the scene's own mesh may be of another kind
       double cells = 0;
       for (const SubjectBody &body : s_.bodies) cells += body.cells;
-      for (const double times : {64.0, 16.0})  // what a small scene affords
-        if (times * cells <= kMostCells) {
+      for (const auto &[times, most] : kBeyond)  // what a small scene affords
+        if (times * cells <= most) {
           const int fine = row(times, integrator, step), coarse = row(times / 4, integrator, step);
           ladder_.emplace_back(fine, coarse);
         }
@@ -218,6 +219,7 @@ class Student {
       const auto [fine, coarse] = ladder_[i];
       if (failed(fine) || failed(coarse)) continue;
       const double most = kReferenceShare * runs_.left();
+      if (s_.at_rest) runs_.run(jobs_of({fine, coarse}, most), runs_.parallel());
       const auto fits = [&](int row) { return done(row) || predicted(row) <= most; };
       if (!fits(fine) || !fits(coarse)) continue;
       out_.reference = fine;
@@ -266,14 +268,14 @@ class Student {
       out_.next = what;
       out_.next_budget = std::max(budget, 1.1 * out_.options.budget);
     };
+    out_.finest = out_.check >= 0 && out_.reference == ladder_.front().first;
     const OnThisMesh &own = out_.own_mesh;
     if (own.reference >= 0)
-      consider(own.reference, own.check, 1 - kAloneShare,
-               "model and step are judged on the scene's own mesh");
+      consider(own.reference, own.check, 1 - kAloneShare, "judge model and step on the scene's own mesh");
     for (const auto &[fine, coarse] : ladder_) {
       if (fine == out_.reference && out_.check >= 0) break;  // coarser ones say less
       consider(fine, coarse, kReferenceShare,
-               "the reference is \"" + out_.rows[size_t(fine)].job.label + "\"");
+               "take \"" + out_.rows[size_t(fine)].job.label + "\" as the reference");
     }
   }
 

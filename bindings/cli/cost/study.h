@@ -71,6 +71,7 @@ struct Study {
   // known.
   std::string next;
   double next_budget = 0;
+  bool finest = false;  // no finer reference is tried, whatever the budget is
 };
 
 // Throws Failure where nothing can be compared within the budget.
