@@ -58,6 +58,8 @@ int simulate(const Recording &recording, const ReplayOptions &options, const Glo
   again.jitter = recording.jitter;
   again.frame_rate = options.frame_rate;
   again.from = recording.states.front().path;
+  // hands may go on beyond the scene's end
+  if (!recording.acts.empty()) again.time = recording.states.back().t + 1;
   Comparison comparison(recording);
   const int code = run_scene(again, globals, &comparison);
   if (code != kDone) return code;

@@ -263,7 +263,8 @@ class Runner {
   // One step toward the end; false when there.
   bool advance() {
     if (static_) return advance_load();
-    const double step = next_step(scene_, result_.start, result_.simulated);
+    double step = next_step(scene_, result_.start, result_.simulated);
+    if (comparison_) step = comparison_->prepare(scene_, step);
     if (step <= 0) return false;
     const double begin = wall_seconds();
     uint32_t trouble = 0;

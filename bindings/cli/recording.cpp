@@ -13,15 +13,16 @@ namespace fs = std::filesystem;
 namespace cli {
 namespace {
 
-constexpr const char *kFormat = "deform-recording", *kVersion = "1", *kHead = "t,file,state_hash";
+constexpr const char *kFormat = "deform-recording", *kVersion = "1", *kByHand = "2",
+                     *kHead = "t,file,state_hash";
 constexpr uint64_t kMostIndex = uint64_t{1} << 28;  // bytes
 
-std::string run_file(const SceneFile &scene, const RunOptions &options) {
+std::string run_file(const SceneFile &scene, const RunOptions &options, bool by_hand) {
   std::vector<std::string> set;
   for (const std::string &s : options.set) set.push_back(quoted(s));
   JsonObject out;
   out.add("format", quoted(kFormat))
-      .add("version", kVersion)
+      .add("version", by_hand ? kByHand : kVersion)
       .add("scene", quoted(fs::absolute(scene.path()).string()))
       .add("set", json_array(set))
       .add("jitter", std::to_string(options.jitter));
@@ -35,9 +36,19 @@ std::string made(const std::string &folder) {
 
 }  // namespace
 
-Recorder::Recorder(const SceneFile &scene, const RunOptions &options)
-    : scene_(scene), folder_(made(options.out + "/recording")), index_(folder_ + "/states.csv", kHead) {
-  write_whole(folder_ + "/run.json", run_file(scene, options));
+Recorder::Recorder(const SceneFile &scene, const RunOptions &options, bool by_hand)
+    : scene_(scene),
+      folder_(made(options.out + "/recording")),
+      index_(folder_ + "/states.csv", kHead),
+      acts_(nullptr, std::fclose) {
+  if (by_hand) acts_ = new_file(folder_ + "/acts.jsonl");
+  write_whole(folder_ + "/run.json", run_file(scene, options, by_hand));
+}
+
+void Recorder::act(const std::string &line) {
+  const std::string row = "{\"t\": " + number(dfm_world_time(scene_.world())) + ", " + line.substr(1) + "\n";
+  if (std::fwrite(row.data(), 1, row.size(), acts_.get()) != row.size() || std::fflush(acts_.get()) != 0)
+    cannot_write(folder_ + "/acts.jsonl");
 }
 
 void Recorder::add() {
@@ -58,7 +69,7 @@ Recording read_recording(const std::string &run) {
                                  run + "`");
   JsonValue text;
   if (!parse_json(read_file(file, kMostIndex, "a recording's run.json"), text) ||
-      text.get("format") != kFormat || text.get("version") != kVersion)
+      text.get("format") != kFormat || (text.get("version") != kVersion && text.get("version") != kByHand))
     throw Failure(kBadInput, file + ": not of a recording that this command reads; record the run anew");
   Recording out;
   out.scene = text.get("scene");
@@ -73,6 +84,16 @@ Recording read_recording(const std::string &run) {
     out.states.push_back({std::strtod(row.c_str(), nullptr),
                           folder + "/" + row.substr(first + 1, second - first - 1), row.substr(second + 1)});
   }
+  if (text.get("version") == kByHand) {
+    const std::string acts = folder + "/acts.jsonl";
+    std::istringstream lines(read_file(acts, kMostIndex, "a recording's acts.jsonl"));
+    while (std::getline(lines, row)) {
+      RecordedAct act;
+      if (!parse_json(row, act.line)) throw Failure(kBadInput, acts + ": damaged; record the run anew");
+      act.t = std::strtod(act.line.get("t").c_str(), nullptr);
+      out.acts.push_back(std::move(act));
+    }
+  }
   if (out.states.empty()) throw Failure(kBadInput, index + ": no state in it; record the run anew");
   return out;
 }
@@ -86,6 +107,16 @@ void Comparison::look(const SceneFile &scene) {
   if (hash == then) ++same_;
   else if (first_.empty())
     first_ = "at t = " + number(t) + " s the state has the hash " + hash + ", and had " + then;
+}
+
+double Comparison::prepare(const SceneFile &scene, double own) {
+  if (recording_.acts.empty()) return own;
+  if (next_ == recording_.states.size()) return 0;
+  if (!hand_) hand_.emplace(scene);
+  const double t = dfm_world_time(scene.world());
+  for (; act_ < recording_.acts.size() && recording_.acts[act_].t <= t; ++act_)
+    hand_->act(recording_.acts[act_].line);
+  return hand_->step() > 0 ? hand_->step() : own;
 }
 
 std::string Comparison::sentence() const {

@@ -1,16 +1,20 @@
 // The viewer: inputs in, steps, pictures with panels out.
 #pragma once
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "arrows.h"
 #include "camera.h"
 #include "cli.h"
 #include "drawing.h"
 #include "options.h"
+#include "plots.h"
+#include "pull.h"
 #include "script.h"
-#include "simulation.h"
+#include "sliders.h"
 #include "window.h"
 
 namespace view {
@@ -26,12 +30,24 @@ class App {
   void handle(const Input &input);
   void key(const std::string &name);
   void mouse(const Input &input);
+  void press(int button);
+  void pull_to_mouse();
   void set_slider(const std::string &name, double value);
   void advance(double seconds);
   void restart();
+  void save();
+  void load();
+  void record();
+  void show_state(size_t i);  // of the recording that is shown
+  // Tells the user what the library refuses, in place of ending.
+  void attempt(const std::function<void()> &what);
   bool draw();  // false: the window has no size
   void panels();
   void controls();
+  void files();
+  void slide(Slider &slider);
+  void sliders();
+  void plots();
   void numbers();
   void shot(const std::string &name);
   double aspect() const { return double(width_) / height_; }
@@ -42,8 +58,13 @@ class App {
   Options options_;
   cli::Globals globals_;
   std::optional<Script> script_;
+  std::optional<cli::Recording> replay_;
   cli::SceneFile scene_;
   Simulation simulation_;
+  Pull pull_;
+  Arrows arrows_;
+  Plots plots_;
+  std::vector<Slider> sliders_;
   std::unique_ptr<Window> window_;
   std::unique_ptr<render::WindowRenderer> renderer_;
   std::string device_;  // what GL calls itself
@@ -51,7 +72,8 @@ class App {
   Orbit orbit_;
   render::Bounds extent_;
   uint32_t width_ = 0, height_ = 0;  // pixels
-  bool running_ = false, quit_ = false, help_ = false;
+  bool running_ = false, quit_ = false, help_ = false, show_arrows_ = true, show_plots_ = true,
+       show_panels_ = true;
   double speed_ = 1;                // simulated seconds per second
   double wanted_ = 0;               // s of the scene, where the clock of the window stands
   double last_ = 0;                 // s, when the last frame began
@@ -60,6 +82,8 @@ class App {
   double mouse_[2] = {0, 0};
   int held_ = -1;        // the button that turns or shifts the camera; -1: none
   std::string message_;  // for the user, until the next one
+  uint32_t saved_ = 0;   // states
+  size_t shown_ = 0;     // state of the recording
 };
 
 }  // namespace view

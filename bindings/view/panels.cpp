@@ -1,6 +1,8 @@
 // What lies above the picture: buttons, numbers, help.
 #include <imgui.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 
 #include "app.h"
@@ -9,7 +11,10 @@
 namespace view {
 namespace {
 
-constexpr float kWide = 270, kGap = 12;  // pixels
+constexpr float kWide = 290, kGap = 12, kSlider = 110, kPlot = 270;  // pixels
+constexpr ImGuiWindowFlags kFixed = ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoResize |
+                                    ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoTitleBar |
+                                    ImGuiWindowFlags_AlwaysAutoResize;
 
 void pale() {
   ImGui::StyleColorsLight();
@@ -23,15 +28,17 @@ void pale() {
 }  // namespace
 
 void App::panels() {
+  if (!show_panels_) return;
   pale();
   ImGui::SetNextWindowPos({kGap, kGap}, ImGuiCond_Always);
   ImGui::SetNextWindowSize({kWide, 0}, ImGuiCond_Always);
-  ImGui::Begin("deform", nullptr,
-               ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoCollapse |
-                   ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_AlwaysAutoResize);
+  ImGui::Begin("deform", nullptr, kFixed);
   controls();
+  if (!replay_) files();
   numbers();
+  if (!replay_) sliders();
   ImGui::End();
+  if (show_plots_) plots();
 }
 
 void App::controls() {
@@ -43,14 +50,120 @@ void App::controls() {
   ImGui::SameLine();
   if (ImGui::Button("help")) key("h");
   float speed = float(speed_);
-  ImGui::SetNextItemWidth(150);
+  ImGui::SetNextItemWidth(kSlider);
   if (ImGui::SliderFloat("speed", &speed, 0.01f, 4, "%.2f x", ImGuiSliderFlags_Logarithmic)) speed_ = speed;
+  if (!replay_) return;
+  int at = int(shown_);
+  ImGui::SetNextItemWidth(kSlider);
+  char label[32];
+  std::snprintf(label, sizeof label, "%.3f s", simulation_.time());
+  if (ImGui::SliderInt("time", &at, 0, int(replay_->states.size()) - 1, label) && size_t(at) != shown_)
+    attempt([&] {
+      show_state(size_t(at));
+      wanted_ = simulation_.time();
+    });
+}
+
+void App::files() {
+  if (ImGui::Button("save", {60, 0})) key("f5");
+  ImGui::SameLine();
+  if (ImGui::Button("load")) key("f9");
+  ImGui::SameLine();
+  if (ImGui::Button(simulation_.recording() ? "end recording" : "record")) key("v");
+}
+
+void App::slide(Slider &s) {
+  float x = float(s.value);
+  ImGui::SetNextItemWidth(kSlider);
+  if (ImGui::SliderFloat(s.label.c_str(), &x, float(s.low), float(s.high), s.format,
+                         s.logarithmic ? ImGuiSliderFlags_Logarithmic : 0))
+    attempt([&] {
+      s.apply(x);
+      s.value = x;
+    });
+}
+
+void App::sliders() {
+  ImGui::Separator();
+  float stiffness = float(pull_.stiffness);
+  ImGui::SetNextItemWidth(kSlider);
+  if (ImGui::SliderFloat("pull", &stiffness, 0.1f, 1000, "%.3g x", ImGuiSliderFlags_Logarithmic))
+    pull_.stiffness = stiffness;
+  for (Slider &s : sliders_) slide(s);
+}
+
+namespace {
+
+const ImU32 kCurves[] = {IM_COL32(45, 105, 180, 255), IM_COL32(205, 80, 55, 255), IM_COL32(60, 140, 85, 255)};
+
+// Curves over simulated time in the rectangle below the cursor, with the ends of both axes.
+void draw_plot(const Plot &plot, const std::vector<double> &times) {
+  ImGui::TextUnformatted((plot.title + ", " + plot.unit).c_str());
+  for (size_t c = 0; c < plot.curves.size() && !plot.curves[c].name.empty(); ++c) {
+    ImGui::SameLine();
+    ImGui::TextColored(ImGui::ColorConvertU32ToFloat4(kCurves[c % 3]), "%s", plot.curves[c].name.c_str());
+  }
+  float low = 0, high = 0;
+  for (const Curve &c : plot.curves)
+    for (const float y : c.values) {
+      low = std::min(low, y);
+      high = std::max(high, y);
+    }
+  if (!(high > low)) high = low + 1e-12f;
+  const ImVec2 at = ImGui::GetCursorScreenPos(), size = {kPlot - 16, 64};
+  ImDrawList *const list = ImGui::GetWindowDrawList();
+  const ImU32 ink = IM_COL32(90, 95, 105, 255);
+  list->AddRectFilled(at, {at.x + size.x, at.y + size.y}, IM_COL32(255, 255, 255, 160));
+  const auto down = [&](float y) { return at.y + size.y * (1 - (y - low) / (high - low)); };
+  list->AddLine({at.x, down(0)}, {at.x + size.x, down(0)}, IM_COL32(170, 175, 185, 255));
+  const double first = times.front(), length = std::max(times.back() - first, 1e-12);
+  for (size_t c = 0; c < plot.curves.size(); ++c) {
+    std::vector<ImVec2> way;
+    for (size_t i = 0; i < times.size(); ++i)
+      way.push_back({at.x + size.x * float((times[i] - first) / length), down(plot.curves[c].values[i])});
+    list->AddPolyline(way.data(), int(way.size()), kCurves[c % 3], 0, 1.5f);
+  }
+  char text[32];
+  const auto write = [&](float x, float y, double value, const char *unit) {
+    std::snprintf(text, sizeof text, "%.3g%s", value, unit);
+    list->AddText({x, y}, ink, text);
+  };
+  write(at.x + 2, at.y, high, "");
+  write(at.x + 2, at.y + size.y - 16, low, "");
+  std::snprintf(text, sizeof text, "%.2f s", times.back());
+  list->AddText({at.x + size.x - ImGui::CalcTextSize(text).x - 2, at.y + size.y - 16}, ink, text);
+  ImGui::Dummy({size.x, size.y + 4});
+}
+
+}  // namespace
+
+void App::plots() {
+  if (plots_.times().size() < 2) return;
+  ImGui::SetNextWindowPos({float(width_) - kGap, kGap}, ImGuiCond_Always, {1, 0});
+  ImGui::SetNextWindowSize({kPlot, 0}, ImGuiCond_Always);
+  ImGui::Begin("plots", nullptr, kFixed);
+  for (const Plot &p : plots_.plots())
+    if (!(p.measured && (script_ || replay_))) draw_plot(p, plots_.times());
+  ImGui::End();
 }
 
 void App::numbers() {
   const dfm_world_stats stats = cli::world_stats(scene_);
   ImGui::Text("t = %.4f s", simulation_.time());
-  ImGui::Text("%u contacts, %u stick", stats.contacts, stats.sticking);
+  if (!replay_) {
+    ImGui::Text("%u contacts,", stats.contacts);
+    ImGui::SameLine();
+    ImGui::TextColored({kSticks[0], kSticks[1], kSticks[2], 1}, "%u stick", stats.sticking);
+    if (show_arrows_ && stats.contacts > 0) {
+      ImGui::SameLine();
+      ImGui::TextColored({0.8f, 0.5f, 0, 1}, "others slide");
+      ImGui::Text("longest arrow %.3g N", arrows_.longest());
+    }
+  }
+  if (pull_.holds()) ImGui::Text("pulled with %.3g N", pull_.force());
+  cli::Drawing::Legend legend;
+  if (drawing_.legend(legend))
+    ImGui::Text("color: %s, 0 to %.3g %s", legend.title.c_str(), legend.top, legend.unit.c_str());
   // What the machine needs differs from run to run, so that a script's pictures are without it.
   if (!script_) {
     ImGui::Text("%.3f ms a step, %.2f x real time", simulation_.step_ms(), running_ ? real_ : 0);
@@ -64,8 +177,11 @@ void App::numbers() {
   if (!help_) return;
   ImGui::Separator();
   ImGui::TextUnformatted(
-      "space  run or pause\ns  one step\nr  back to the start\nc  next coloring\nhome  first camera\n"
-      "left or right mouse  turn\nmiddle mouse  shift\nwheel  nearer, farther\nh  this help\nq  quit");
+      "left mouse  pull a body; beside bodies: turn\nright mouse  turn\nmiddle mouse  shift\n"
+      "wheel  nearer, farther\nspace  run or pause\ns  one step\nr  back to the start\n"
+      "c  next coloring\na  arrows of contact forces\np  plots\nt  no panels, for a picture\nf5, f9  save, "
+      "load\nv  begin or end a recording\n"
+      "home  first camera\nh  this help\nq  quit");
 }
 
 }  // namespace view

@@ -70,7 +70,7 @@ class Viewer : public testing::Test {
     test::write_file(scene_, kScene);
   }
   test::CommandResult view(const std::string &script, std::vector<std::string> more = {}) {
-    test::write_file(folder_ + "/script.txt", script);
+    test::write_file(folder_ + "/script.txt", "0 key t\n" + script);  // panels would cover so small a window
     more.insert(more.begin(), {"view", scene_, "--script", folder_ + "/script.txt", "--out", folder_,
                                "--size", "320x240", "--json"});
     return test::deform(more);
@@ -94,6 +94,12 @@ class Viewer : public testing::Test {
   static double number(const test::CommandResult &result, const std::string &shot, const std::string &key) {
     const std::string text = told(result, shot, key);
     return text.empty() ? NAN : std::strtod(text.c_str() + (text[0] == '['), nullptr);
+  }
+
+  // m, of the block's center of mass
+  static double height(const test::CommandResult &result, const std::string &shot) {
+    const std::string text = told(result, shot, "block");
+    return std::strtod(text.c_str() + std::min(text.rfind(',') + 1, text.size()), nullptr);
   }
 
   const std::string folder_ = test::scratch("view"), scene_ = folder_ + "/scene.json";
@@ -152,12 +158,81 @@ TEST_F(Viewer, StepAndRestart_GoOnAndBackToTheFirstBits) {
   EXPECT_NE(told(done, "c.png", "state_hash"), told(done, "b.png", "state_hash"));
 }
 
+// The block rests on the floor; the mouse takes it at its middle, pulls it to the right, and holds it there.
+TEST_F(Viewer, PulledBody_FollowsTheMouseAndStaysOnTheFloor) {
+  const std::string pull =
+      "0 key space\n0.3 shot rest.png\n0.3 drag 160 120 220 150 0.4 0.5\n1.1 shot held.png\n";
+  const std::vector<std::string> longer{"--set", "/time/duration=5"};
+  const test::CommandResult done = view(pull, longer);
+  ASSERT_EQ(done.exit_code, 0) << done.err;
+  const double before = number(done, "rest.png", "block"), after = number(done, "held.png", "block");
+  EXPECT_GT(after, before + 0.03) << done.out;
+  EXPECT_GT(height(done, "held.png"),
+            height(done, "rest.png") - 0.02);  // pulled down too, and the floor bears
+  EXPECT_GT(red(picture("held.png")), 1000u);
+  EXPECT_EQ(told(view(pull, longer), "held.png", "state_hash"), told(done, "held.png", "state_hash"));
+  // a thousand times as stiff: still stable, and nearer to the mouse
+  const test::CommandResult stiff = view("0 slider pull 1000\n" + pull, longer);
+  ASSERT_EQ(stiff.exit_code, 0) << stiff.err;
+  EXPECT_GT(number(stiff, "held.png", "block"), before + 0.03);
+  EXPECT_LT(number(stiff, "held.png", "block"), before + 0.2);
+}
+
+TEST_F(Viewer, Sliders_ChangeTheScene) {
+  // on a floor that leans: with friction it stays, without it slides off
+  const std::vector<std::string> leans{"--set", "/obstacles/0/normal=[-0.3, 0, 1]"};
+  const std::string run = "0 key space\n0.25 shot end.png\n";
+  const test::CommandResult stays = view(run, leans),
+                            slides = view("0 slider mu:block:floor 0.05\n" + run, leans);
+  ASSERT_EQ(slides.exit_code, 0) << slides.err;
+  EXPECT_GT(std::abs(number(slides, "end.png", "block") - number(stays, "end.png", "block")), 0.02);
+  // softer, it sinks in further; without gravity it does not fall
+  const test::CommandResult soft = view("0 slider young:block 2000\n" + run);
+  EXPECT_LT(height(soft, "end.png"), height(view(run), "end.png") - 0.002);
+  const test::CommandResult floats = view("0 slider gravity 0\n" + run);
+  EXPECT_NEAR(height(floats, "end.png"), 0.06, 1e-6);
+}
+
+TEST_F(Viewer, SavedState_IsLoadedWithItsBitsAndByDeformRun) {
+  const test::CommandResult done = view(
+      "0 key space\n0.1 key space\n0.1 key f5\n0.1 shot saved.png\n0.15 key space\n0.2 shot later.png\n"
+      "0.25 key f9\n0.25 key space\n0.25 shot loaded.png\n0.3 key space\n0.6 shot end.png\n");
+  ASSERT_EQ(done.exit_code, 0) << done.err;
+  EXPECT_EQ(told(done, "loaded.png", "state_hash"), told(done, "saved.png", "state_hash"));
+  EXPECT_NE(told(done, "later.png", "state_hash"), told(done, "saved.png", "state_hash"));
+  const test::CommandResult run =
+      test::deform({"run", scene_, "--from", folder_ + "/000.state", "--out", folder_ + "/run", "--json"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_NE(run.out.find(told(done, "end.png", "state_hash")), std::string::npos);
+}
+
+// With a pull, a slider and a pause in it, and beyond the end of the scene.
+TEST_F(Viewer, RecordedSession_IsReplayedToTheSameBitsAndShown) {
+  const test::CommandResult done = view(
+      "0 key space\n0.05 key v\n0.1 drag 160 120 220 90 0.2 0.1\n0.2 slider mu:block:floor 0.1\n"
+      "0.3 key space\n0.35 key space\n0.5 key v\n0.5 shot end.png\n");
+  ASSERT_EQ(done.exit_code, 0) << done.err;
+  const test::CommandResult again = test::deform({"replay", folder_, "--out", folder_ + "/again"});
+  EXPECT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_NE(again.out.find("the same bits in all "), std::string::npos) << again.out;
+  test::write_file(folder_ + "/look.txt",
+                   "0 key t\n0 shot first.png\n0.1 slider time 9\n0.1 shot last.png\n"
+                   "0.15 drag right 200 120 260 120 0.1\n0.4 shot turned.png\n");
+  const test::CommandResult looked =
+      test::deform({"view", "--replay", folder_, "--script", folder_ + "/look.txt", "--out", folder_,
+                    "--size", "320x240", "--json"});
+  ASSERT_EQ(looked.exit_code, 0) << looked.err;
+  EXPECT_EQ(told(looked, "last.png", "state_hash"), told(done, "end.png", "state_hash"));
+  EXPECT_GT(different(picture("first.png"), picture("last.png")), 300u);
+  EXPECT_GT(different(picture("last.png"), picture("turned.png")), 1000u);
+}
+
 TEST_F(Viewer, WhatCannotBe_IsOneSentence) {
   const struct {
     const char *script, *sentence;
   } cases[] = {
-      {"0 jump\n", "script.txt:1: expected key, drag, slider or shot, found \"jump\""},
-      {"\n0 key\n", "script.txt:2: expected the name of a key, found the end of the line"},
+      {"0 jump\n", "script.txt:2: expected key, drag, slider or shot, found \"jump\""},
+      {"\n0 key\n", "script.txt:3: expected the name of a key, found the end of the line"},
       {"0 key x\n", "there is no key \"x\""},
       {"0 slider nothing 1\n", "there is no slider \"nothing\""},
   };

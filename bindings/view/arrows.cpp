@@ -1,0 +1,62 @@
+#include "arrows.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "messages.h"
+#include "render/geometry.h"
+
+namespace view {
+
+using render::Vec;
+
+namespace {
+
+constexpr double kLength = 0.22;  // of an arrow of full length, of the size of what is shown
+
+void add(std::vector<double> &to, const Vec &a, const Vec &b) {
+  to.insert(to.end(), {a.x, a.y, a.z, b.x, b.y, b.z});
+}
+
+}  // namespace
+
+void Arrows::fill(const cli::SceneFile &scene, double size, const render::Camera &camera,
+                  render::Scene &out) {
+  uint32_t n = 0;
+  cli::need(dfm_world_contacts(scene.world(), 0, nullptr, &n));
+  contacts_.resize(n);
+  if (n > 0) cli::need(dfm_world_contacts(scene.world(), n, contacts_.data(), &n));
+  const auto force = [](const dfm_contact &c) {
+    const Vec normal = render::vec(c.normal), first = render::vec(c.tangent);
+    return normal * c.fn + first * c.ft[0] + cross(normal, first) * c.ft[1];
+  };
+  double top = 0;
+  for (const dfm_contact &c : contacts_) top = std::max(top, render::norm(force(c)));
+  // Follows a rise at once and a fall slowly, so that neighboring pictures can be compared.
+  scale_ = std::max(top, 0.98 * scale_);
+  for (std::vector<double> &xyz : xyz_) xyz.clear();
+  const Vec back = render::view_of(camera).back;
+  for (const dfm_contact &c : contacts_) {
+    const Vec f = force(c);
+    const double length = scale_ > 0 ? kLength * size * render::norm(f) / scale_ : 0;
+    if (!(length > 0)) continue;
+    std::vector<double> &to = xyz_[c.flags & DFM_CONTACT_STICKING ? 0 : 1];
+    const Vec along = render::unit(f), foot = render::vec(c.point), tip = foot + along * length;
+    const Vec side = render::unit(cross(along, back), {1, 0, 0});
+    const double head = std::min(0.3 * length, 0.02 * size);
+    add(to, foot, tip);
+    add(to, tip, tip - along * head + side * (0.5 * head));
+    add(to, tip, tip - along * head - side * (0.5 * head));
+  }
+  for (int i = 0; i < 2; ++i) {
+    render::Lines lines;
+    lines.xyz = xyz_[i].data();
+    lines.n = uint32_t(xyz_[i].size() / 6);
+    std::copy_n(i == 0 ? kSticks : kSlides, 3, lines.rgb);
+    lines.width = 2.5f;
+    lines.on_top = true;
+    if (lines.n > 0) out.lines.push_back(lines);
+  }
+}
+
+}  // namespace view

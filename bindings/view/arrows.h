@@ -1,0 +1,25 @@
+// Contact forces as arrows: one color where the contact sticks, another where it slides.
+#pragma once
+#include <vector>
+
+#include "render/render.h"
+#include "scene_file.h"
+
+namespace view {
+
+inline constexpr float kSticks[3] = {0.10f, 0.55f, 0.30f}, kSlides[3] = {0.95f, 0.62f, 0.05f};
+
+class Arrows {
+ public:
+  // Adds those of the last sub-step, each on the side that the contact is told for. size: m, of what is
+  // shown; what they point to lives here until the next call.
+  void fill(const cli::SceneFile &scene, double size, const render::Camera &camera, render::Scene &out);
+  double longest() const { return scale_; }  // N, of an arrow of full length
+
+ private:
+  std::vector<dfm_contact> contacts_;
+  std::vector<double> xyz_[2];
+  double scale_ = 0;
+};
+
+}  // namespace view

@@ -1,0 +1,63 @@
+#include "plots.h"
+
+#include <cmath>
+
+#include "messages.h"
+#include "run.h"
+
+namespace view {
+namespace {
+
+constexpr size_t kMost = 600;  // samples
+
+}  // namespace
+
+Plots::Plots(const Simulation &simulation) : simulation_(simulation) {
+  plots_.push_back({"energy", "J", {{"kinetic", {}}, {"elastic", {}}}, false});
+  const cli::SceneFile &scene = simulation.scene();
+  for (uint32_t i = 0; i < scene.settings().nprobe; ++i) {
+    const char *name = "";
+    double at[3];
+    cli::need(dfm_scene_probe(scene.scene(), i, &name, at, nullptr));
+    starts_.insert(starts_.end(), at, at + 3);
+    plots_.push_back(
+        {std::string("probe ") + name + ", from its start", "m", {{"x", {}}, {"y", {}}, {"z", {}}}, false});
+  }
+  plots_.push_back({"time of a step", "ms", {{"", {}}}, true});
+}
+
+void Plots::clear() {
+  times_.clear();
+  for (Plot &p : plots_)
+    for (Curve &c : p.curves) c.values.clear();
+}
+
+void Plots::sample() {
+  const double t = simulation_.time();
+  if (!times_.empty() && t <= times_.back()) return;
+  const cli::SceneFile &scene = simulation_.scene();
+  double kinetic = 0, elastic = 0;
+  for (const cli::BodyView &body : scene.bodies()) {
+    const dfm_body_measure m = cli::body_measure(body);
+    kinetic += m.kinetic;
+    if (std::isfinite(m.elastic)) elastic += m.elastic;
+  }
+  std::vector<double> row{kinetic, elastic};
+  for (uint32_t i = 0; i < scene.settings().nprobe; ++i) {
+    double at[3];
+    cli::need(dfm_scene_probe(scene.scene(), i, nullptr, at, nullptr));
+    for (size_t k = 0; k < 3; ++k) row.push_back(at[k] - starts_[3 * i + k]);
+  }
+  row.push_back(simulation_.step_ms());
+  const bool full = times_.size() == kMost;
+  if (full) times_.erase(times_.begin());
+  times_.push_back(t);
+  size_t next = 0;
+  for (Plot &p : plots_)
+    for (Curve &c : p.curves) {
+      if (full) c.values.erase(c.values.begin());
+      c.values.push_back(float(row[next++]));
+    }
+}
+
+}  // namespace view

@@ -1,0 +1,120 @@
+#include "pull.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "messages.h"
+
+namespace view {
+
+using render::Vec;
+
+namespace {
+
+std::string text_of(const Vec &v) {
+  const double x[3] = {v.x, v.y, v.z};
+  return cli::json_vector(x);
+}
+
+Vec at(const std::vector<double> &xyz, size_t i) { return render::vec(&xyz[3 * i]); }
+
+// The points near a place, the nearer the heavier: one point alone would tear its cells.
+struct Patch {
+  std::vector<std::string> points, weights;
+  Vec middle;
+};
+
+Patch patch_around(const std::vector<double> &x, const Vec &place) {
+  const size_t n = x.size() / 3, wanted = std::clamp<size_t>(n / 20, std::min<size_t>(n, 4), 64);
+  std::vector<std::pair<double, size_t>> near(n);
+  for (size_t i = 0; i < n; ++i) near[i] = {render::norm(at(x, i) - place), i};
+  std::sort(near.begin(), near.end());
+  const double reach = wanted < n ? near[wanted].first : 1.1 * near.back().first;
+  Patch out;
+  double sum = 0;
+  for (size_t k = 0; k < wanted; ++k) {
+    const double away = near[k].first / reach, w = 1 - away * away;
+    if (!(w > 0)) continue;
+    out.points.push_back(std::to_string(near[k].second));
+    out.weights.push_back(cli::number(w));
+    out.middle = out.middle + at(x, near[k].second) * w;
+    sum += w;
+  }
+  out.middle = out.middle * (1 / sum);
+  return out;
+}
+
+}  // namespace
+
+bool Pull::grab(const Vec &origin, const Vec &direction) {
+  const cli::SceneFile &scene = simulation_.scene();
+  dfm_ray_hit hit = {};
+  hit.size = sizeof hit;
+  const double from[3] = {origin.x, origin.y, origin.z}, along[3] = {direction.x, direction.y, direction.z};
+  cli::need(dfm_world_ray(scene.world(), from, along, std::numeric_limits<double>::infinity(), &hit));
+  if (!hit.body) return false;
+  for (body_ = 0; scene.bodies()[body_].handle != hit.body;) ++body_;
+  const cli::BodyView &body = scene.bodies()[body_];
+  for (int k = 0; k < 3; ++k) corners_[k] = body.triangles[3 * size_t(hit.triangle) + size_t(k)];
+  to_ = render::vec(hit.point);
+  std::vector<double> x(3 * size_t(std::max(body.npoint, body.nsurfel)));
+  uint32_t n = 0;
+  cli::need(dfm_surface_positions(body.handle, body.nsurfel, x.data(), &n));
+  const Vec a = at(x, corners_[0]), u = at(x, corners_[1]) - a, v = at(x, corners_[2]) - a, p = to_ - a;
+  const Vec normal = cross(u, v);
+  const double area = dot(normal, normal);
+  weights_[1] = area > 0 ? dot(cross(p, v), normal) / area : 0;
+  weights_[2] = area > 0 ? dot(cross(u, p), normal) / area : 0;
+  weights_[0] = 1 - weights_[1] - weights_[2];
+  x.resize(3 * size_t(body.npoint));
+  cli::need(dfm_body_get_state(body.handle, body.npoint, x.data(), nullptr, &n));
+  const Patch patch = patch_around(x, to_);
+  offset_ = patch.middle - to_;
+  dfm_body_info info = {};
+  info.size = sizeof info;
+  cli::need(dfm_body_get_info(body.handle, &info));
+  const double rate = 2 * std::numbers::pi * 4, k = stiffness * info.mass * rate * rate;
+  cli::JsonObject line;
+  line.add("do", "\"pull\"")
+      .add("body", cli::quoted(body.name))
+      .add("points", cli::json_array(patch.points))
+      .add("weights", cli::json_array(patch.weights))
+      .add("to", text_of(patch.middle))
+      .add("stiffness", cli::number(k))
+      .add("damping", cli::number(std::sqrt(k * info.mass)));  // half of the critical one
+  simulation_.act(line);
+  return true;
+}
+
+void Pull::move(const Vec &to) {
+  if (!holds() || (to.x == to_.x && to.y == to_.y && to.z == to_.z)) return;
+  to_ = to;
+  cli::JsonObject line;
+  simulation_.act(line.add("do", "\"move\"").add("to", text_of(to_ + offset_)));
+}
+
+void Pull::release() {
+  if (!holds()) return;
+  cli::JsonObject line;
+  simulation_.act(line.add("do", "\"release\""));
+}
+
+Vec Pull::place() const {
+  const cli::BodyView &body = simulation_.scene().bodies()[body_];
+  std::vector<double> x(3 * size_t(body.nsurfel));
+  uint32_t n = 0;
+  cli::need(dfm_surface_positions(body.handle, body.nsurfel, x.data(), &n));
+  Vec out;
+  for (int k = 0; k < 3; ++k) out = out + at(x, corners_[k]) * weights_[k];
+  return out;
+}
+
+double Pull::force() const {
+  double f[3];
+  simulation_.hand().force(f);
+  return render::norm(render::vec(f));
+}
+
+}  // namespace view

@@ -1,0 +1,34 @@
+// A body held by the mouse: a spring from the points around the picked place to where the mouse is. It is a
+// load like any other, inside the step: what is pulled still collides, sticks and slides.
+#pragma once
+#include <string>
+
+#include "render/geometry.h"
+#include "simulation.h"
+
+namespace view {
+
+class Pull {
+ public:
+  explicit Pull(Simulation &simulation) : simulation_(simulation) {}
+  // Takes hold of what the ray meets first. False: no body. Throws cli::Failure where the body's model takes
+  // no spring.
+  bool grab(const render::Vec &origin, const render::Vec &direction);
+  void move(const render::Vec &to);  // m, where the mouse is
+  void release();
+  bool holds() const { return simulation_.hand().pulls(); }
+  render::Vec place() const;                     // m, of the picked place of the surface, now
+  const render::Vec &to() const { return to_; }  // m
+  double force() const;                          // N
+  // Times a spring that swings the whole body four times a second.
+  double stiffness = 1;
+
+ private:
+  Simulation &simulation_;
+  size_t body_ = 0;
+  uint32_t corners_[3] = {0, 0, 0};  // surfels of the picked triangle
+  double weights_[3] = {0, 0, 0};
+  render::Vec to_, offset_;  // offset: from the picked place to the mean of the points that the spring holds
+};
+
+}  // namespace view

@@ -1,0 +1,130 @@
+#include "sliders.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+
+#include "deform/plugin.h"
+#include "messages.h"
+#include "render/geometry.h"
+
+namespace view {
+namespace {
+
+void add_gravity(Simulation &simulation, std::vector<Slider> &out) {
+  cli::JsonValue g;
+  if (!cli::parse_json(simulation.scene().value("/gravity"), g) || g.items.size() != 3) return;  // it varies
+  render::Vec way{std::strtod(g.items[0].text.c_str(), nullptr),
+                  std::strtod(g.items[1].text.c_str(), nullptr),
+                  std::strtod(g.items[2].text.c_str(), nullptr)};
+  Slider s;
+  s.name = "gravity";
+  s.label = "gravity, m/s2";
+  s.value = render::norm(way);
+  s.high = std::max(20.0, 2 * s.value);
+  way = render::unit(way, {0, 0, -1});
+  s.apply = [&simulation, way](double x) {
+    const double to[3] = {x * way.x, x * way.y, x * way.z};
+    cli::JsonObject line;
+    simulation.act(line.add("do", "\"gravity\"").add("to", cli::json_vector(to)));
+  };
+  out.push_back(s);
+}
+
+void add_coefficient(Simulation &simulation, const std::string &a, const std::string &b, const char *key,
+                     double value, std::vector<Slider> &out) {
+  Slider s;
+  s.name = std::string(key) + ":" + a + ":" + b;
+  s.label = std::string(key) + "  " + a + ", " + b;
+  s.value = value;
+  s.high = std::max(1.5, 2 * value);
+  s.apply = [&simulation, a, b, key](double x) {
+    cli::JsonObject line;
+    simulation.act(line.add("do", "\"friction\"")
+                       .add("between", cli::json_array({cli::quoted(a), cli::quoted(b)}))
+                       .add("key", cli::quoted(key))
+                       .add("value", cli::number(x)));
+  };
+  out.push_back(s);
+}
+
+void add_friction(Simulation &simulation, std::vector<Slider> &out) {
+  cli::JsonValue rules;
+  if (!cli::parse_json(simulation.scene().value("/contact/friction"), rules)) return;
+  for (const cli::JsonValue &rule : rules.items) {
+    const cli::JsonValue *const sides = rule.find("between"), *const params = rule.find("params");
+    if (!sides || sides->items.size() != 2 || rule.get("law") == "none") continue;
+    const std::string &a = sides->items[0].text, &b = sides->items[1].text;
+    const auto given = [&](const char *key) { return params ? params->get(key) : std::string(); };
+    const auto value = [&](const char *key) { return std::strtod(given(key).c_str(), nullptr); };
+    if (!given("mu_C").empty() && !given("mu_S").empty() && value("mu_C") != value("mu_S")) {
+      add_coefficient(simulation, a, b, "mu_C", value("mu_C"), out);
+      add_coefficient(simulation, a, b, "mu_S", value("mu_S"), out);
+    } else {
+      const char *const key = given("mu_C").empty() ? "mu" : "mu_C";
+      add_coefficient(simulation, a, b, "mu", given(key).empty() ? 0.5 : value(key), out);
+    }
+  }
+}
+
+// Whether the model of that id takes another Young's modulus while it runs.
+bool takes_young(const cli::SceneFile &scene, const std::string &model) {
+  struct Sought {
+    const std::string &model;
+    bool found;
+  } sought{model, false};
+  const auto look = [](void *user, const dfm_type *type, const char *) {
+    Sought &s = *static_cast<Sought *>(user);
+    if (s.model != type->id) return;
+    const char *const rows = reinterpret_cast<const char *>(type->params);
+    for (uint32_t i = 0; i < type->nparam; ++i) {
+      const auto *const row = reinterpret_cast<const dfm_param *>(rows + size_t(i) * type->param_size);
+      s.found |= std::strcmp(row->key, "young") == 0 && (row->flags & DFM_PARAM_RUNTIME) != 0;
+    }
+  };
+  cli::need(dfm_plugin_visit(scene.context(), look, &sought));
+  return sought.found;
+}
+
+void add_stiffness(Simulation &simulation, std::vector<Slider> &out) {
+  const cli::SceneFile &scene = simulation.scene();
+  for (size_t i = 0; i < scene.bodies().size(); ++i) {
+    const cli::BodyView &body = scene.bodies()[i];
+    const std::string at = "/bodies/" + std::to_string(i);
+    std::string text = scene.value(at + "/model/params/young");
+    const std::string material = scene.value(at + "/material");
+    if (text.empty() && material.size() > 2)
+      text = scene.value("/materials/" + material.substr(1, material.size() - 2) + "/young");
+    const double young = std::strtod(text.c_str(), nullptr);
+    if (!(young > 0) || !takes_young(scene, body.model)) continue;
+    Slider s;
+    s.name = "young:" + body.name;
+    s.label = "E  " + body.name + ", Pa";
+    s.value = young;
+    s.low = 0.1 * young;
+    s.high = 10 * young;
+    s.logarithmic = true;
+    s.apply = [&simulation, name = body.name](double x) {
+      cli::JsonObject line;
+      simulation.act(line.add("do", "\"param\"")
+                         .add("body", cli::quoted(name))
+                         .add("key", "\"young\"")
+                         .add("value", cli::number(x)));
+    };
+    out.push_back(s);
+  }
+}
+
+}  // namespace
+
+std::vector<Slider> make_sliders(Simulation &simulation) {
+  std::vector<Slider> out;
+  add_gravity(simulation, out);
+  add_friction(simulation, out);
+  add_stiffness(simulation, out);
+  for (Slider &s : out) s.first = s.value;
+  return out;
+}
+
+}  // namespace view
