@@ -19,7 +19,7 @@ help:
 	@echo "make test             the whole test suite"
 	@echo "make bench            the figures: kernels and full steps"
 	@echo "make bench-peers      beside MuJoCo, Bullet and Jolt: speed at equal error, build/peers/"
-	@echo "                      PEERS=quick: coarse scenes and slopes only, some minutes"
+	@echo "                      PEERS=quick: coarse scenes and the sliding block only, some minutes"
 	@echo "make soak             jittered starts, the suite, combinations, what holds: hours; can be stopped"
 	@echo "make lint             layout, includes, headers, text"
 	@echo "make format           clang-format on all C and C++ files, one version everywhere"

@@ -4,14 +4,15 @@
   search.py ENGINE --out FILE.csv [--scenes] [--only CASE] [--parameters "mu=0.5"] [--trials 40]
             [--seconds 120] [--most 20]
 
-Tried for each case: the entry's named settings; then, in turns, a draw at random from its `SEARCH` (key to
-values, None: as it comes) and twice the best so far with one, two or three keys drawn anew. --scenes: the
-scenes of ../peers on their coarse meshes, else the cases of the friction benchmark. A row per trial goes to
---out: settings, what was measured, score (how far the worst quantity lies from the middle of its band, in
-half bands: up to 1 passes), cost, processor time used. Of two trials within the bands the cheaper is better,
-else the nearer. A case ends after --trials, or when its trials have used --seconds; a trial ends after --most
-seconds, or earlier where it is hopeless. Draws depend on engine and case alone: a search that was stopped
-goes on, and more trials can be asked for later. run.py and run_scenes.py run the best as `found by search`.
+Tried for each case: the entry's named settings and those of its `BEGIN`; then, in turns, a draw at random
+from its `SEARCH` (key to values, None: as it comes) and twice the best so far with one, two or three keys
+drawn anew. --scenes: the scenes of ../peers on their coarse meshes, else the cases of the friction benchmark.
+
+A row per trial goes to --out: settings, what was measured, score (how far the worst quantity lies from the
+middle of its band, in half bands: up to 1 passes), cost, processor time used. Of two trials within the bands
+the cheaper is better, else the nearer. A case ends after --trials, or when its trials have used --seconds; a
+trial ends after --most seconds, or earlier where it is hopeless. A search that was stopped goes on, and more
+trials can be asked for later. run.py and run_scenes.py run the best as `found by search`.
 """
 import argparse
 import importlib
@@ -41,9 +42,9 @@ def score(case, values):
     return worst
 
 
-def proposals(named, space, draw, best):
+def proposals(begin, space, draw, best):
     """Settings to try, without end: `best()` is the best so far."""
-    yield from named
+    yield from begin
     turn = 0
     while True:
         turn += 1
@@ -67,8 +68,7 @@ def used_now():
 def searched(entry, case, named, known, given):
     """Runs the trials of a case that are not known yet."""
     head = {"engine": entry.name, "version": entry.version, "case": case["name"], "parameters": named}
-    rows = {row["settings"]: row for row in known if all(row[k] == v for k, v in head.items())}
-    tried = {}
+    tried = {row["settings"]: row for row in known if all(row[k] == v for k, v in head.items())}
     space = entry.space(case) if hasattr(entry, "space") else entry.SEARCH
 
     def best():
@@ -76,28 +76,27 @@ def searched(entry, case, named, known, given):
         return json.loads(row["settings"]) if row else {}
 
     draw = random.Random("%s %s %s" % (entry.name, case["name"], named))
-    for number, settings in enumerate(proposals(type(entry).settings.values(), space, draw, best)):
+    begin = [*type(entry).settings.values(), *getattr(entry, "BEGIN", [])]
+    for number, settings in enumerate(proposals(begin, space, draw, best)):
         spent = sum(float(row["used"]) for row in tried.values())
         if len(tried) >= given.trials or spent >= given.seconds or number > 20 * given.trials:
             break
         key = json.dumps(settings, sort_keys=True)
         if key in tried:
             continue
-        if key not in rows:
-            entry.settings = {**type(entry).settings, found.FOUND: settings}
-            begun = used_now()
-            try:
-                values, cost = entry.run(case, found.FOUND)
-                row = {"measured": json.dumps(values), "score": "%.4g" % score(case, values),
-                       "cost": "%.3g" % cost}
-            except (RuntimeError, ValueError) as error:
-                row = {"score": "inf", "note": str(error).replace("\n", " ")[:120]}
-            rows[key] = {"measured": "", "cost": "", **head, "settings": key, **row,
-                         "used": "%.3g" % (used_now() - begun)}
-            run.append(given.out, COLUMNS, rows[key])
-            print("%-12s %-8s %4d %8s %s %s" % (case["name"], named, number, row["score"], key,
-                                                row.get("measured", row.get("note", ""))), flush=True)
-        tried[key] = rows[key]
+        entry.settings = {**type(entry).settings, found.FOUND: settings}
+        begun = used_now()
+        try:
+            values, cost = entry.run(case, found.FOUND)
+            row = {"measured": json.dumps(values), "score": "%.4g" % score(case, values),
+                   "cost": "%.3g" % cost}
+        except (RuntimeError, ValueError) as error:
+            row = {"score": "inf", "note": str(error).replace("\n", " ")[:120]}
+        tried[key] = {"measured": "", "cost": "", **head, "settings": key, **row,
+                      "used": "%.3g" % (used_now() - begun)}
+        run.append(given.out, COLUMNS, tried[key])
+        print("%-12s %-8s %8s %s %s" % (case["name"], named, row["score"], key,
+                                        row.get("measured", row.get("note", ""))), flush=True)
     row = found.best(tried.values())
     if row:
         print("best: %s %s, score %s, %s s per s: %s" % (case["name"], named, row["score"], row["cost"],
