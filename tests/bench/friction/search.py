@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Looks for the settings with which an engine does best, case by case: a rival at its defaults says little.
 
-  search.py ENGINE --out FILE.csv [--scenes] [--only CASE] [--parameters "mu=0.5"] [--trials 40]
+  search.py ENGINE --out FILE.csv [--scenes [--fine]] [--only CASE] [--parameters "mu=0.5"] [--trials 40]
             [--seconds 120] [--most 20]
 
 Tried for each case: the entry's named settings and those of its `BEGIN`; then, in turns, a draw at random
@@ -110,11 +110,12 @@ def main():
     parser.add_argument("--entries")
     parser.add_argument("--command", default=os.path.join(run.ROOT, "build", "release", "bin", "deform"))
     parser.add_argument("--scenes", action="store_true")
+    parser.add_argument("--fine", action="store_true", help="the scenes on their fine meshes")
     parser.add_argument("--only", action="append", help="one case by name; may be given again")
     parser.add_argument("--parameters", help="as they stand in the rows; without it all of the case")
     parser.add_argument("--trials", type=int, default=40)
     parser.add_argument("--seconds", type=float, default=120)
-    parser.add_argument("--most", type=float, default=20)
+    parser.add_argument("--most", type=int, default=20)
     parser.add_argument("--out", required=True)
     given = parser.parse_args()
     given.out, given.command = os.path.abspath(given.out), run.command_of(given.command)
@@ -122,7 +123,9 @@ def main():
         sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, "peers"))
         import scenes
         make = importlib.import_module("scenes_" + given.engine).Entry
-        todo = [(case, "cells=%d" % case["cells"]) for case in scenes.coarse_cases()]
+        coarse = scenes.coarse_cases()
+        todo = [(case, "cells=%d" % case["cells"]) for case in scenes.cases()
+                if (case in coarse) != given.fine]
         scenes.MOST_SECONDS = given.most
     else:
         make = run.entry_of(given.engine, given.entries)
