@@ -4,7 +4,7 @@
   search.py ENGINE --out FILE.csv [--scenes [--fine]] [--only CASE] [--parameters "mu=0.5"] [--trials 40]
             [--seconds 120] [--most 20]
 
-Tried for each case: the entry's named settings and those of its `BEGIN`; then, in turns, a draw at random
+Tried for each case: the settings of the entry's `BEGIN`, those with names; then, in turns, a draw at random
 from its `SEARCH` (key to values, None: as it comes) and twice the best so far with one, two or three keys
 drawn anew. --scenes: the scenes of ../peers on their coarse meshes, else the cases of the friction benchmark.
 
@@ -76,7 +76,7 @@ def searched(entry, case, named, known, given):
         return json.loads(row["settings"]) if row else {}
 
     draw = random.Random("%s %s %s" % (entry.name, case["name"], named))
-    begin = [*type(entry).settings.values(), *getattr(entry, "BEGIN", [])]
+    begin = [*getattr(entry, "BEGIN", []), *type(entry).settings.values()]
     for number, settings in enumerate(proposals(begin, space, draw, best)):
         spent = sum(float(row["used"]) for row in tried.values())
         if len(tried) >= given.trials or spent >= given.seconds or number > 20 * given.trials:

@@ -153,6 +153,13 @@ def all_runs(rows):
     return text
 
 
+def settings_found(rows):
+    text = "Settings found by search:\n\n| scene | cells | engine | settings |\n|---|---|---|---|\n"
+    lines = ["| %s | %s | %s | %s |\n" % (r["case"], r["parameters"].split("=")[1], r["engine"], r["note"])
+             for r in rows if r["configuration"] == FOUND]
+    return text + "".join(dict.fromkeys(lines))
+
+
 def pictures(rows, folder):
     """peers_SCENE.png: error, that of the worst quantity in half bands, over processor time."""
     import matplotlib
@@ -195,7 +202,7 @@ def main():
         rows = list(csv.DictReader(f))
     if given.pictures:
         pictures(rows, given.pictures)
-    short, long_ = least_time(rows), least_error(rows) + "\n" + all_runs(rows)
+    short, long_ = least_time(rows), "\n".join([least_error(rows), all_runs(rows), settings_found(rows)])
     if given.page:
         speed.table.into_page(given.page, short, (BEGIN, END))
     if given.runs:
