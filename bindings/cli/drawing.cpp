@@ -1,6 +1,6 @@
+#ifdef DEFORM_HAVE_RENDER
 #include "drawing.h"
 
-#ifdef DEFORM_HAVE_RENDER
 #include <algorithm>
 #include <cmath>
 #include <limits>
