@@ -131,7 +131,7 @@ class Renderer {
   virtual const char *device() const = 0;   // what GL calls itself, e.g. "llvmpipe (LLVM 15.0.6, 256 bits)"
 };
 
-// How much light is traced: `full` is that of every off-screen picture; `fast` takes a quarter of the sky's
+// How much light is traced: `full` is that of every off-screen picture; `fast` takes an eighth of the sky's
 // directions and no second samples, for windows on machines whose GL is software.
 enum class Detail { full, fast };
 using Symbol = void (*)();

@@ -274,7 +274,7 @@ class GlRenderer final : public WindowRenderer {
       : context_(std::move(context)),
         width_(width),
         height_(height),
-        sky_lights_(detail == Detail::full ? kSkyLights : kSkyLights / 4),
+        sky_lights_(detail == Detail::full ? kSkyLights : kSkyLights / 8),
         samples_(detail == Detail::full ? kSamples : 0) {}
   ~GlRenderer() override;
   bool start(std::string *why_not);

@@ -26,9 +26,11 @@ void Arrows::fill(const cli::SceneFile &scene, double size, const render::Camera
   cli::need(dfm_world_contacts(scene.world(), 0, nullptr, &n));
   contacts_.resize(n);
   if (n > 0) cli::need(dfm_world_contacts(scene.world(), n, contacts_.data(), &n));
+  // On the body that was made first, whichever side the contact is told for.
   const auto force = [](const dfm_contact &c) {
     const Vec normal = render::vec(c.normal), first = render::vec(c.tangent);
-    return normal * c.fn + first * c.ft[0] + cross(normal, first) * c.ft[1];
+    const Vec on_a = normal * c.fn + first * c.ft[0] + cross(normal, first) * c.ft[1];
+    return on_a * (c.body_b && c.body_b < c.body_a ? -1.0 : 1.0);
   };
   double top = 0;
   for (const dfm_contact &c : contacts_) top = std::max(top, render::norm(force(c)));

@@ -248,3 +248,13 @@ TEST_F(Viewer, WhatCannotBe_IsOneSentence) {
   EXPECT_NE(done.err.find("view: no display: "), std::string::npos) << done.err;
   EXPECT_EQ(std::count(done.err.begin(), done.err.end(), '\n'), 1) << done.err;
 }
+
+TEST(ViewerPrograms, OfTheCommandAndTheWindow_LinkNoWindowSystem) {
+  for (const char *ending : {"", "-view"}) {
+    const std::string program = std::string(DEFORM_COMMAND) + ending;
+    const test::CommandResult needed = test::run({"/usr/bin/ldd", program});
+    EXPECT_NE(needed.out.find("libdeform.so"), std::string::npos) << needed.out << needed.err;
+    for (const char *library : {"libX11", "libGL", "libglfw", "libwayland"})
+      EXPECT_EQ(needed.out.find(library), std::string::npos) << program << " needs " << library;
+  }
+}
