@@ -104,6 +104,23 @@ void print_changes(const JsonValue &plan) {
 }
 
 // Does one of them bound the step?
+void print_attachments(const JsonValue &plan) {
+  const JsonValue *bodies = plan.find("bodies");
+  for (size_t i = 0; bodies && i < bodies->items.size(); ++i) {
+    const JsonValue *list = bodies->items[i].find("attached");
+    for (size_t k = 0; list && k < list->items.size(); ++k) {
+      const JsonValue &a = list->items[k];
+      const bool spring = std::strtod(a.get("stiffness").c_str(), nullptr) > 0 ||
+                          std::strtod(a.get("damping").c_str(), nullptr) > 0;
+      const bool releases = std::strtod(a.get("release").c_str(), nullptr) > 0;
+      std::printf("  %-20s  attached to %s by %s surfels, %s%s\n", bodies->items[i].get("name").c_str(),
+                  a.get("to").c_str(), a.get("surfels").c_str(),
+                  spring ? ("with " + a.get("stiffness") + " N/m").c_str() : "rigid",
+                  releases ? (", released above " + a.get("release") + " N").c_str() : "");
+    }
+  }
+}
+
 bool changes_bound(const JsonValue &plan) {
   const JsonValue *bodies = plan.find("bodies");
   for (size_t i = 0; bodies && i < bodies->items.size(); ++i) {
@@ -178,6 +195,7 @@ int explain(const Options &options, Globals &globals) {
   if (scene.value("/time/mode") != "\"static\"") print_integrators(plan);
   print_precision(plan);
   print_changes(plan);
+  print_attachments(plan);
   if (scene.value("/time/mode") != "\"static\"") print_unwatched(plan);
   print_fields(plan);
   print_idle(plan);

@@ -45,6 +45,11 @@ std::vector<Call> world_calls() {
          dfm_world_stats s{};
          return dfm_world_get_stats(h, &s);
        }},
+      {"world_memory",
+       [](uint64_t h) {
+         dfm_memory m{};
+         return dfm_world_memory(h, &m);
+       }},
       {"world_profile", [](uint64_t h) { return dfm_world_profile(h, 0, nullptr, &count); }},
       {"world_profile_sized", [](uint64_t h) { return dfm_world_profile_sized(h, 24, 0, nullptr, &count); }},
       {"world_overlaps", [](uint64_t h) { return dfm_world_overlaps(h, 0, nullptr, &count); }},
@@ -141,6 +146,18 @@ std::vector<Call> body_calls() {
        }},
       {"body_set_user", [](uint64_t h) { return dfm_body_set_user(h, nullptr); }},
       {"body_set_filter", [](uint64_t h) { return dfm_body_set_filter(h, 1, 1); }},
+      {"body_attach",
+       [](uint64_t h) {
+         const dfm_attach_def d = dfm_attach_def_default();
+         return dfm_body_attach(h, &d, nullptr);
+       }},
+      {"body_detach", [](uint64_t h) { return dfm_body_detach(h, 1); }},
+      {"body_attachments", [](uint64_t h) { return dfm_body_attachments(h, 0, nullptr, &count); }},
+      {"body_get_attachment",
+       [](uint64_t h) {
+         dfm_attachment a{};
+         return dfm_body_get_attachment(h, 1, &a);
+       }},
       {"body_get_state", [](uint64_t h) { return dfm_body_get_state(h, 0, nullptr, nullptr, &count); }},
       {"body_set_state", [](uint64_t h) { return dfm_body_set_state(h, 1, numbers, numbers); }},
       {"body_get_rest", [](uint64_t h) { return dfm_body_get_rest(h, 1, numbers, 0, nullptr); }},

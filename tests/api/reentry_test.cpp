@@ -219,6 +219,12 @@ Calls world_calls(Scene &s, bool step_only) {
        }},
       {"body_destroy", [&] { return dfm_body_destroy(s.body); }},
       {"body_set_filter", [&] { return dfm_body_set_filter(s.body, 1, 1); }},
+      {"body_attach",
+       [&] {
+         const dfm_attach_def d = dfm_attach_def_default();
+         return dfm_body_attach(s.body, &d, nullptr);
+       }},
+      {"body_detach", [&] { return dfm_body_detach(s.body, 1); }},
       {"body_set_state",
        [&] {
          const std::vector<double> x(300);

@@ -108,12 +108,9 @@ dfm_world bristles(dfm_context *c) {
 dfm_world changing(dfm_context *c) {
   const dfm_world w = bristles(c);
   std::vector<dfm_body> bodies = test::listed(dfm_world_bodies, w);
-  const dfm_switch to{sizeof(dfm_switch),
-                      DFM_INTEGRATOR_AUTO,
-                      4 * kStep,
-                      "corotational_fem",
-                      {sizeof(dfm_params), 0, nullptr},
-                      0};
+  dfm_switch to = dfm_switch_default();
+  to.t = 4 * kStep;
+  to.type = "corotational_fem";
   test::ok(dfm_body_set_switches(bodies[0], 1, &to));
   return w;
 }

@@ -322,8 +322,10 @@ TEST(Switches, ThatCome_MakeTheModelOnce) {
   Counted counted;
   const dfm_world w = test::make_world(counted.c);
   const dfm_body ball = test::make_body(counted.c, w, "ball", {0.05}, 100, {});
-  dfm_switch list[1] = {
-      {sizeof(dfm_switch), DFM_INTEGRATOR_AUTO, 0.01, "modal", {sizeof(dfm_params), 0, nullptr}, 0}};
+  dfm_switch list[1] = {dfm_switch_default()};
+  list[0].t = 0.01;
+  list[0].type = "modal";
+  list[0].params = {sizeof(dfm_params), 0, nullptr};
   test::ok(dfm_body_set_switches(ball, 1, list));
   test::run(w, 0.02, 1e-3);
   EXPECT_EQ(test::listed(dfm_world_swaps, w).size(), 1u);
@@ -336,7 +338,14 @@ TEST(Switches, ThatCanNeverBeMade_AreRefusedWhole) {
   const dfm_world w = test::make_world(c);
   const dfm_body ball = test::make_body(c, w, "ball", {0.05}, 100, {});
   const dfm_params none{sizeof none, 0, nullptr};
-  const dfm_switch good = {sizeof good, DFM_INTEGRATOR_AUTO, 1, "corotational_fem", none, 0};
+  const auto change = [&](double t, const char *type) {
+    dfm_switch s = dfm_switch_default();
+    s.t = t;
+    s.type = type;
+    s.params = none;
+    return s;
+  };
+  const dfm_switch good = change(1, "corotational_fem");
   test::ok(dfm_body_set_switches(ball, 1, &good));
   const uint32_t point = 0;
   dfm_spring_def spring{};
@@ -346,7 +355,7 @@ TEST(Switches, ThatCanNeverBeMade_AreRefusedWhole) {
   spring.stiffness = 10;
   test::ok(dfm_body_add_spring(ball, &spring, nullptr));
   const std::string before = test::snapshot(w);
-  const dfm_switch list[2] = {good, {sizeof good, DFM_INTEGRATOR_AUTO, 2, "modal", none, 0}};
+  const dfm_switch list[2] = {good, change(2, "modal")};
   EXPECT_EQ(dfm_body_set_switches(ball, 2, list), DFM_E_UNSUPPORTED);
   test::says({"org.deform.modal", "at 2 s", "spring"});
   dfm_switch_rule rule = dfm_switch_rule_default();

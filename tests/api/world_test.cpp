@@ -50,6 +50,7 @@ TEST(Structs, OfAnOlderCaller_KeepDefaultsForWhatTheyLack) {
   dfm_material_def md;
   std::memset(&md, 0xff, sizeof md);
   md.size = offsetof(dfm_material_def, young);
+  md.flags = 0;
   md.name = nullptr;
   md.density = 500;
   dfm_material m = 0;

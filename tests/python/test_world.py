@@ -62,6 +62,32 @@ class Building(unittest.TestCase):
             met = {(world.owner(e["a"]), world.owner(e["b"])) for e in world.events}
             self.assertIn((body, rigid), met)
 
+    def test_ball_hangs_on_a_hook_and_is_let_go(self):
+        with deform.World() as world:
+            hook = world.add_obstacle("box", name="hook", half_size=(0.1, 0.1, 0.02), position=(0, 0, 0.12))
+            body = ball(world, z=0, name="ball", material={"young": 2e5, "damping_mass": 20})
+            held = body.attach(hook, box=[[-1, -1, 0.08], [1, 1, 1]])
+            world.run(0.6, dt=1e-3)
+            weight = 9.81 * body.measure.mass
+            self.assertAlmostEqual(body.attachment(held).force[2] / weight, 1, delta=0.02)
+            self.assertEqual(world.find_obstacle("hook"), hook)
+            body.detach(held)
+            with self.assertRaises(deform.Error):
+                body.attachment(held)
+            hook.set_filter(0, 0)
+            world.run(0.2, dt=1e-3)
+            self.assertLess(body.measure.velocity[2], -1)
+
+    def test_belt_carries_a_ball(self):
+        with deform.World() as world:
+            belt = world.add_obstacle("plane", name="belt")
+            body = ball(world, name="ball", material={"young": 2e5, "damping_stiffness": 0.005})
+            world.run(0.2, dt=1e-3)
+            belt.set_velocity_surface((0.2, 0, 0))
+            belt.set_material(world.add_material("felt"))
+            world.run(0.3, dt=1e-3)
+            self.assertGreater(body.measure.velocity[0], 0.05)
+
     def test_hinge_with_a_motor(self):
         with deform.World(gravity=(0, 0, 0)) as world:
             arm, = world.add_rigids([deform.RigidDef("box", mass=2, half_size=(0.5, 0.05, 0.05), name="arm",

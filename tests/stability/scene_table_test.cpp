@@ -19,6 +19,7 @@ struct Row {
 };
 void PrintTo(const Row &row, std::ostream *out) { *out << row.scene; }
 constexpr Row kRows[] = {
+    {"attached", 0, 0, false},
     {"ball_incline", 3, 0.3, false},
     {"basin", 8, 0.8, false},
     {"changing_models", 12, 0.2, false},

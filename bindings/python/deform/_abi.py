@@ -110,6 +110,8 @@ DFM_CONTACT_EDGE_A = 4
 DFM_CONTACT_TRIANGLE_A = 8
 DFM_EVENT_BEGIN = 1
 DFM_EVENT_END = 2
+DFM_EVENT_RELEASE = 3
+DFM_ATTACH_TOUCH = 1
 DFM_MESH_TETS = 1
 DFM_MESH_SURFACE = 2
 DFM_SHAPE_PLANE = 0
@@ -258,7 +260,7 @@ class dfm_plugin(_Structure):
 class dfm_context_def(_Structure):
     _fields_ = [("size", u32), ("threads", u32), ("user", ptr), ("alloc", ptr), ("release", ptr),
                 ("log", ptr), ("parallel_for", ptr), ("trace_begin", ptr), ("trace_end", ptr),
-                ("plugin_dir", text)]
+                ("plugin_dir", text), ("cookie", u64)]
 
 
 class dfm_param_value(_Structure):
@@ -301,12 +303,12 @@ class dfm_world_def(_Structure):
                 ("reserved", u32), ("max_time", f64), ("max_work", u64), ("energy_watch", f64),
                 ("recovery_speed", f64), ("obstacle_speed", f64), ("solver", text),
                 ("solver_tolerance", f64), ("solver_iterations", u32), ("newton_iterations", u32),
-                ("reserved2", u32), ("step", f64)]
+                ("reserved2", u32), ("step", f64), ("cookie", u64)]
 
 
 class dfm_equilibrium_def(_Structure):
     _fields_ = [("size", u32), ("load_steps", u32), ("load_from", f64), ("load_to", f64), ("time", f64),
-                ("tolerance", f64), ("max_iterations", u32), ("reserved", u32)]
+                ("tolerance", f64), ("max_iterations", u32), ("reserved", u32), ("cookie", u64)]
 
 
 class dfm_equilibrium_info(_Structure):
@@ -330,6 +332,11 @@ class dfm_world_stats(_Structure):
                 ("work", u64), ("work_max", u64), ("cheapened", u64), ("discarded", u64),
                 ("limited_max", u32), ("self_max", u32), ("energy_start", f64), ("energy_max", f64),
                 ("energy_gain", f64)]
+
+
+class dfm_memory(_Structure):
+    _fields_ = [("size", u32), ("reserved", u32), ("bodies", u64), ("dynamics", u64), ("obstacles", u64),
+                ("detection", u64), ("contacts", u64), ("steps", u64), ("total", u64)]
 
 
 class dfm_stage_time(_Structure):
@@ -357,7 +364,7 @@ class dfm_body_def(_Structure):
                 ("spin", f64 * 3), ("fixed", ptr), ("category", u32), ("collides_with", u32),
                 ("user", ptr), ("surface", ptr), ("nfield", u32), ("fields", ptr),
                 ("cell_materials", ptr), ("cell_share", ptr), ("groups", ptr), ("integrator", i32),
-                ("reserved", u32)]
+                ("reserved", u32), ("cookie", u64)]
 
 
 class dfm_body_info(_Structure):
@@ -410,6 +417,18 @@ class dfm_contact_event(_Structure):
     _fields_ = [("size", u32), ("kind", u32), ("a", u64), ("b", u64), ("key", u64), ("t", f64)]
 
 
+class dfm_attach_def(_Structure):
+    _fields_ = [("size", u32), ("flags", u32), ("to", u64), ("npoint", u32), ("nsurfel", u32),
+                ("points", ptr), ("surfels", ptr), ("group", text), ("box", ptr), ("max_distance", f64),
+                ("stiffness", f64), ("damping", f64), ("release", f64), ("cookie", u64)]
+
+
+class dfm_attachment(_Structure):
+    _fields_ = [("size", u32), ("flags", u32), ("to", u64), ("nsurfel", u32), ("reserved", u32),
+                ("stiffness", f64), ("damping", f64), ("release", f64), ("point", f64 * 3),
+                ("force", f64 * 3), ("moment", f64 * 3), ("impulse", f64 * 3), ("stretch", f64)]
+
+
 class dfm_ray_hit(_Structure):
     _fields_ = [("size", u32), ("triangle", u32), ("body", u64), ("obstacle", u64), ("distance", f64),
                 ("point", f64 * 3), ("normal", f64 * 3)]
@@ -451,18 +470,18 @@ class dfm_obstacle_def(_Structure):
                 ("reserved", u32), ("keys", ptr), ("sine", dfm_sine), ("velocity_surface", f64 * 3),
                 ("material", u64), ("category", u32), ("collides_with", u32), ("user", ptr),
                 ("npoint", u32), ("ntriangle", u32), ("points", ptr), ("triangles", ptr), ("cells", u32),
-                ("reserved2", u32)]
+                ("reserved2", u32), ("cookie", u64)]
 
 
 class dfm_material_def(_Structure):
     _fields_ = [("size", u32), ("flags", u32), ("name", text), ("density", f64), ("young", f64),
                 ("poisson", f64), ("damping_mass", f64), ("damping_stiffness", f64),
-                ("extra", dfm_params)]
+                ("extra", dfm_params), ("cookie", u64)]
 
 
 class dfm_switch(_Structure):
     _fields_ = [("size", u32), ("integrator", i32), ("t", f64), ("type", text), ("params", dfm_params),
-                ("max_jump", f64)]
+                ("max_jump", f64), ("cookie", u64)]
 
 
 class dfm_model_choice(_Structure):
@@ -472,7 +491,8 @@ class dfm_model_choice(_Structure):
 class dfm_switch_rule(_Structure):
     _fields_ = [("size", u32), ("reserved", u32), ("touching", dfm_model_choice),
                 ("near_by", dfm_model_choice), ("otherwise", dfm_model_choice), ("point", f64 * 3),
-                ("distance", f64), ("hysteresis", f64), ("wait", f64), ("max_jump", f64)]
+                ("distance", f64), ("hysteresis", f64), ("wait", f64), ("max_jump", f64),
+                ("cookie", u64)]
 
 
 class dfm_swap(_Structure):
@@ -489,7 +509,7 @@ class dfm_rigid_def(_Structure):
                 ("half_size", f64 * 3), ("radius", f64), ("half_length", f64), ("mass", f64),
                 ("inertia", f64 * 3), ("velocity", f64 * 3), ("spin", f64 * 3), ("fixed", u32),
                 ("category", u32), ("collides_with", u32), ("reserved", u32), ("material", u64),
-                ("user", ptr)]
+                ("user", ptr), ("cookie", u64)]
 
 
 class dfm_joint_def(_Structure):
@@ -563,6 +583,7 @@ FUNCTIONS = {
     "dfm_world_bodies": (i32, [u64, u32, ptr, ptr]),
     "dfm_world_obstacles": (i32, [u64, u32, ptr, ptr]),
     "dfm_world_get_stats": (i32, [u64, ptr]),
+    "dfm_world_memory": (i32, [u64, ptr]),
     "dfm_world_profile_sized": (i32, [u64, u32, u32, ptr, ptr]),
     "dfm_world_explain": (i32, [u64, ptr, ptr]),
     "dfm_body_def_default_sized": (None, [u32, ptr]),
@@ -602,6 +623,11 @@ FUNCTIONS = {
     "dfm_world_events_sized": (i32, [u64, u32, u32, ptr, ptr]),
     "dfm_world_hold_begin": (i32, [u64]),
     "dfm_world_hold": (i32, [u64, ptr, ptr]),
+    "dfm_attach_def_default_sized": (None, [u32, ptr]),
+    "dfm_body_attach": (i32, [u64, ptr, ptr]),
+    "dfm_body_detach": (i32, [u64, u32]),
+    "dfm_body_attachments": (i32, [u64, u32, ptr, ptr]),
+    "dfm_body_get_attachment": (i32, [u64, u32, ptr]),
     "dfm_surface_positions": (i32, [u64, u32, ptr, ptr]),
     "dfm_surface_velocities": (i32, [u64, u32, ptr, ptr]),
     "dfm_surface_normals": (i32, [u64, u32, ptr, ptr]),

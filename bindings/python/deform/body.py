@@ -8,7 +8,7 @@ import numpy as np
 
 from . import _abi
 from ._arrays import Column, Report
-from ._library import ArgumentError, check, lib, quick, sized
+from ._library import ArgumentError, check, default, lib, quick, sized
 from .mesh import points_of
 
 if TYPE_CHECKING:
@@ -233,6 +233,51 @@ class Body(_Part):
         """A pair touches if each one's category is among the bits that the other collides with."""
         self.world.free()
         check(quick.dfm_body_set_filter(self.handle, category, collides_with))
+
+    def attach(self, to: Body | Obstacle, *, points: Any = None, surfels: Any = None,
+               group: str | None = None, box: Any = None, max_distance: float = 0, stiffness: float = 0,
+               damping: float = 0, release: float = 0, touch: bool = False) -> int:
+        """Holds a part of its surface where it is now by an obstacle, a rigid body or another body.
+
+        points: numbers of points [n]; surfels: numbers of surfels [n]; group: of its surface; box: [2, 3] m,
+        in the world. max_distance in m from another body's surface, 0 for any. stiffness in N/m and damping
+        in N s/m of the whole, 0 for rigid. release in N, 0 for never. touch: the two touch each other
+        meanwhile.
+        Returns the number of the attachment."""
+        definition = default(_abi.dfm_attach_def)
+        definition.to = to.handle
+        definition.flags = _abi.DFM_ATTACH_TOUCH if touch else 0
+        keep = []
+        for name, values in (("point", points), ("surfel", surfels)):
+            if values is None:
+                continue
+            numbers = numbers_of(values)
+            keep.append(numbers)
+            setattr(definition, f"n{name}", numbers.size)
+            setattr(definition, f"{name}s", numbers.ctypes.data)
+        if box is not None:
+            corners = vector(box, "box", 6)
+            keep.append(corners)
+            definition.box = ctypes.addressof(corners)
+        definition.group = group.encode() if group is not None else None
+        definition.max_distance, definition.release = max_distance, release
+        definition.stiffness, definition.damping = stiffness, damping
+        number = ctypes.c_uint32()
+        self.world.free()
+        check(lib.dfm_body_attach(self.handle, ctypes.byref(definition), ctypes.byref(number)))
+        return number.value
+
+    def detach(self, attachment: int) -> None:
+        """Ends an attachment."""
+        self.world.free()
+        check(lib.dfm_body_detach(self.handle, attachment))
+
+    def attachment(self, number: int) -> _abi.dfm_attachment:
+        """What it does, as the C struct: force and moment of the last sub-step, impulse, stretch, ..."""
+        out = sized(_abi.dfm_attachment)
+        self.world.free()
+        check(quick.dfm_body_get_attachment(self.handle, number, ctypes.byref(out)))
+        return out
 
     def wake(self) -> None:
         self.world.free()

@@ -72,7 +72,8 @@ enum { DFM_LOG_DEBUG = 0, DFM_LOG_INFO = 1, DFM_LOG_WARNING = 2, DFM_LOG_ERROR =
  * an older one as long as it asks for nothing that this does not have:
  * - What a caller fills in (defs, options): `size` is sizeof in the caller's header. Members that this lacks
  *   have their defaults. Where it is larger than the library's struct, what the library does not know must
- *   be zero; else DFM_E_UNSUPPORTED.
+ *   be zero; else DFM_E_UNSUPPORTED. A def that has a default function comes from it: it sets `cookie`, and a
+ *   def without that is DFM_E_ARG (as is one with flags that are not known).
  * - Defaults: dfm_X_default is inline and hands sizeof the caller's struct to dfm_X_default_sized, which
  *   writes that many bytes and no more: the defaults that the library knows, zero behind them, `size` as
  *   given. out NULL: nothing.
@@ -101,6 +102,7 @@ typedef struct dfm_context_def {
   void (*trace_begin)(void *user, const char *zone);
   void (*trace_end)(void *user, const char *zone);
   const char *plugin_dir; /* NULL: DEFORM_PLUGIN_PATH, then the installed or build directory */
+  uint64_t cookie;        /* set by the default function */
 } dfm_context_def;
 
 /** dfm_context_def_default into a def of any size (base.h). Threads: Any thread. Since 0.1. */

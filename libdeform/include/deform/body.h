@@ -67,6 +67,7 @@ typedef struct dfm_body_def {
   const dfm_surface_groups *groups; /* named parts of its surface; NULL: none. Copied */
   int32_t integrator;               /* DFM_INTEGRATOR_* of this body; AUTO: the world's */
   uint32_t reserved;
+  uint64_t cookie; /* set by the default function */
 } dfm_body_def;
 
 /** dfm_body_def_default into a def of any size (base.h). Threads: Any thread. Since 0.1. */

@@ -186,14 +186,16 @@ typedef struct dfm_contact_event {
   uint64_t a, b, key;  /* handles of body and body or obstacle; key of the contact */
   double t;            /* s, simulated time */
 } dfm_contact_event;
-enum { DFM_EVENT_BEGIN = 1, DFM_EVENT_END = 2 };
+/* RELEASE: an attachment has ended, by its release force or with one of its sides; key is its number
+ * (deform/attach.h) */
+enum { DFM_EVENT_BEGIN = 1, DFM_EVENT_END = 2, DFM_EVENT_RELEASE = 3 };
 /** dfm_world_events with rows of any size. @param row_size bytes from one row of out to the next
  * (base.h). Since 0.1.
  * Threads: Not during step. */
 DFM_API dfm_status dfm_world_events_sized(dfm_world world, uint32_t row_size, uint32_t capacity,
                                           dfm_contact_event *out, uint32_t *n);
-/** Begin and end of contacts since the last call; empties the list. Where more than 65,536 wait, the
- * oldest are left out.
+/** Begin and end of contacts, and ends of attachments, since the last call; empties the list. Where more
+ * than 65,536 wait, the oldest are left out.
  * Threads: Not during step. Since 0.1. */
 static inline dfm_status dfm_world_events(dfm_world world, uint32_t capacity, dfm_contact_event *out,
                                           uint32_t *n) {

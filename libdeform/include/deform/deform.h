@@ -1,6 +1,7 @@
 /* deform/deform.h -- the whole public surface. */
 #ifndef DEFORM_DEFORM_H
 #define DEFORM_DEFORM_H
+#include "deform/attach.h"
 #include "deform/base.h"
 #include "deform/body.h"
 #include "deform/contact.h"

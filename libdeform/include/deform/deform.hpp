@@ -29,6 +29,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "deform/attach.hpp"
 #include "deform/defs.hpp"
 #include "deform/deform.h"
 #include "deform/models.hpp"
@@ -221,7 +222,9 @@ struct AnyMesh {
 
 // ---- bodies -----------------------------------------------------------------------------------------------
 template <class E>
-class Body : public Handle<dfm_body, struct BodyKind>, public BodyModels<E, Body<E>> {
+class Body : public Handle<dfm_body, struct BodyKind>,
+             public BodyModels<E, Body<E>>,
+             public BodyAttachments<E, Body<E>> {
  public:
   using Handle::Handle;
   static void end(dfm_body body) noexcept { dfm_body_destroy(body); }
@@ -341,70 +344,6 @@ class Body : public Handle<dfm_body, struct BodyKind>, public BodyModels<E, Body
   auto write_surface(Text path) const { return E::done(dfm_debug_write_surface(raw_, path.c_str)); }
 };
 
-// ---- obstacles and rigid bodies ---------------------------------------------------------------------------
-template <class E>
-class Obstacle : public Handle<dfm_obstacle, struct ObstacleKind>, public ObstacleChanges<E, Obstacle<E>> {
- public:
-  using Handle::Handle;
-  static void end(dfm_obstacle obstacle) noexcept { dfm_obstacle_destroy(obstacle); }
-  auto destroy() const { return E::done(dfm_obstacle_destroy(raw_)); }
-  auto pose() const {
-    return produce<E, dfm_pose>([&](dfm_pose &p) { return dfm_obstacle_get_pose(raw_, &p); });
-  }
-  auto def() const {
-    return produce<E, dfm_obstacle_def>([&](dfm_obstacle_def &d) {
-      d.size = sizeof d;
-      return dfm_obstacle_get_def(raw_, &d);
-    });
-  }
-  auto move_to(const dfm_pose &pose) const { return E::done(dfm_obstacle_move_to(raw_, &pose)); }
-  auto teleport(const dfm_pose &pose) const { return E::done(dfm_obstacle_teleport(raw_, &pose)); }
-};
-
-// Converts to Obstacle: poses, pair rules and reports take it.
-template <class E>
-class Rigid : public Handle<dfm_rigid, struct RigidKind> {
- public:
-  using Handle::Handle;
-  // Of the whole set that the body came with.
-  static void end(dfm_rigid rigid) noexcept { dfm_rigid_destroy(rigid); }
-  auto destroy() const { return E::done(dfm_rigid_destroy(raw_)); }
-  static auto register_host(Text name, const dfm_rigid_host &table) {
-    return E::done(dfm_rigid_host_register(name.c_str, &table));
-  }
-  operator Obstacle<E>() const noexcept { return Obstacle<E>(raw_); }
-  auto def() const {
-    return produce<E, dfm_rigid_def>([&](dfm_rigid_def &d) {
-      d.size = sizeof d;
-      return dfm_rigid_get_def(raw_, &d);
-    });
-  }
-  auto state() const {
-    return produce<E, dfm_rigid_state>([&](dfm_rigid_state &s) { return dfm_rigid_get_state(raw_, &s); });
-  }
-  auto set_state(const dfm_rigid_state &state) const { return E::done(dfm_rigid_set_state(raw_, &state)); }
-  auto add_shape(const dfm_obstacle_def &def) const {
-    return produce<E, Obstacle<E>>([&](Obstacle<E> &o) { return dfm_rigid_add_shape(raw_, &def, o.put()); });
-  }
-  auto measure() const {
-    return produce<E, dfm_body_measure>([&](dfm_body_measure &m) {
-      m.size = sizeof m;
-      return dfm_rigid_get_measure(raw_, &m);
-    });
-  }
-  auto contact_wrench() const {
-    return produce<E, Wrench>(
-        [&](Wrench &w) { return dfm_rigid_contact_wrench(raw_, w.force.data(), w.moment.data()); });
-  }
-  auto set_motor(uint32_t joint, double velocity, double max) const {
-    return E::done(dfm_rigid_set_motor(raw_, joint, velocity, max));
-  }
-  auto joint(uint32_t joint) const {
-    return produce<E, JointState>(
-        [&](JointState &j) { return dfm_rigid_joint(raw_, joint, &j.position, &j.rate, &j.effort); });
-  }
-};
-
 // ---- the world --------------------------------------------------------------------------------------------
 template <class E>
 class World : public Handle<dfm_world, struct WorldKind> {
@@ -490,6 +429,12 @@ class World : public Handle<dfm_world, struct WorldKind> {
 
   auto find_body(Text name) const {
     return produce<E, Body<E>>([&](Body<E> &b) { return dfm_world_find_body(raw_, name.c_str, b.put()); });
+  }
+  auto memory() const {
+    return produce<E, dfm_memory>([&](dfm_memory &m) {
+      m.size = sizeof m;
+      return dfm_world_memory(raw_, &m);
+    });
   }
   auto find_obstacle(Text name) const {
     return produce<E, Obstacle<E>>(

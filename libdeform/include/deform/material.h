@@ -15,6 +15,7 @@ typedef struct dfm_material_def {
   const char *name; /* unique in its world; NULL: none */
   double density, young, poisson, damping_mass, damping_stiffness;
   dfm_params extra;
+  uint64_t cookie; /* set by the default function */
 } dfm_material_def;
 
 /** dfm_material_def_default into a def of any size (base.h). Threads: Any thread. Since 0.1. */

@@ -31,6 +31,7 @@ typedef struct dfm_switch {
   const char *type;   /* short name or full id */
   dfm_params params;  /* copied */
   double max_jump;    /* J, as in dfm_body_set_model; 0: any jump */
+  uint64_t cookie;    /* set by the default function */
 } dfm_switch;
 /** dfm_switch_default into a def of any size (base.h). Threads: Any thread. Since 0.1. */
 DFM_API void dfm_switch_default_sized(uint32_t size, dfm_switch *out);
@@ -72,6 +73,7 @@ typedef struct dfm_switch_rule {
   double hysteresis;          /* near_by ends at distance times 1 + hysteresis; 0.1 by default */
   double wait;     /* s for which nothing calls for a model before the next one in this list; 0.1 */
   double max_jump; /* J, as in dfm_body_set_model; 0: any jump */
+  uint64_t cookie; /* set by the default function */
 } dfm_switch_rule;
 /** dfm_switch_rule_default into a def of any size (base.h). Threads: Any thread. Since 0.1. */
 DFM_API void dfm_switch_rule_default_sized(uint32_t size, dfm_switch_rule *out);

@@ -42,6 +42,7 @@ typedef struct dfm_obstacle_def {
   /* voxels: cubic cells that fill the surface's box, about; 0: 262144 (64 x 64 x 64 of a cube) */
   uint32_t cells;
   uint32_t reserved2;
+  uint64_t cookie; /* set by the default function */
 } dfm_obstacle_def;
 /** dfm_obstacle_def_default into a def of any size (base.h). Threads: Any thread. Since 0.1. */
 DFM_API void dfm_obstacle_def_default_sized(uint32_t size, dfm_obstacle_def *out);

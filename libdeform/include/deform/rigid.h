@@ -37,6 +37,7 @@ typedef struct dfm_rigid_def {
   uint32_t collides_with, reserved;
   dfm_material material; /* for pair rules by material; 0: none */
   void *user;
+  uint64_t cookie; /* set by the default function */
 } dfm_rigid_def;
 
 typedef struct dfm_joint_def {

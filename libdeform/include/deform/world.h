@@ -83,6 +83,7 @@ typedef struct dfm_world_def {
    * cost four times what implicit ones do moves by IMPLICIT_EULER (doc/concepts/implicit.md); 0: not told,
    * AUTO as it is without */
   double step;
+  uint64_t cookie; /* set by the default function */
 } dfm_world_def;
 
 /** dfm_world_def_default into a def of any size (base.h). Threads: Any thread. Since 0.1. */
@@ -159,6 +160,7 @@ typedef struct dfm_equilibrium_def {
   /* of Newton's method per load step and body; 0: 200. With contact, steps from rest per load step; 0: 500 */
   uint32_t max_iterations;
   uint32_t reserved;
+  uint64_t cookie; /* set by the default function */
 } dfm_equilibrium_def;
 typedef struct dfm_equilibrium_info {
   uint32_t size;
@@ -316,6 +318,21 @@ typedef struct dfm_world_stats {
 /** @return DFM_OK; DFM_E_HANDLE. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_get_stats(dfm_world world, dfm_world_stats *out);
 
+/** Bytes that a world holds now, taken through the hooks of its context. Not in it: what plugins allocate for
+ * themselves (dfm_host.alloc), meshes that the context holds, names and lists of a few bytes. */
+typedef struct dfm_memory {
+  uint32_t size, reserved;
+  uint64_t bodies;    /* points, cells, surfaces, couplings, what models keep of each body */
+  uint64_t dynamics;  /* how bodies move: matrices and factors of implicit ones */
+  uint64_t obstacles; /* surfaces and voxels of obstacles */
+  uint64_t detection; /* trees and lists of pairs */
+  uint64_t contacts;  /* what is solved, kept and reported of contacts */
+  uint64_t steps;     /* other buffers of a step */
+  uint64_t total;     /* of all these */
+} dfm_memory;
+/** @return DFM_OK; DFM_E_HANDLE; DFM_E_ARG out is NULL. Threads: Any thread. Not during step. Since 0.1. */
+DFM_API dfm_status dfm_world_memory(dfm_world world, dfm_memory *out);
+
 /* name: static storage */
 typedef struct dfm_stage_time {
   const char *name;
@@ -343,14 +360,14 @@ static inline dfm_status dfm_world_profile(dfm_world world, uint32_t capacity, d
  * "fields":[{"name","from","min","max"}], "idle":[{"name","why"}],
  * "effects":[{"name","works","used","switches":[{"key","now","off","off_value"}]}],
  * "facts":[{"key","label","unit","value"}], "changes":[{"name","when","integrator","stable_s","max_jump_J"}],
- * "unwatched"}], "step":{"stable_s","worst_body","worst_point","reason"}}. state: "asked" by the list of
- * effects, or "called for" by parameters; left_out: called for, but not in the list; laws: asked is the one
- * that the rules name. surface: "boundary" of the cells, or "own, COUPLING"; from: who says what differs by
- * cell (field, materials, share); idle: parameters that do nothing, or not what they name; effects: what the
- * model brings, whether it is at work and the world uses it, and the parameters that together switch it off
- * (switchable: one of a law can be); facts: what the model found when it was made; changes:
- * models that the body is to have, the last two where given; unwatched: why the energy watch does not look at
- * the body, "" where it does.
+ * "attached":[{"to","surfels","stiffness","damping","release"}], "unwatched"}],
+ * "step":{"stable_s","worst_body","worst_point","reason"}}. state: "asked" by the list of effects, or
+ * "called for" by parameters; left_out: called for, but not in the list; laws: asked is the one that the
+ * rules name. surface: "boundary" of the cells, or "own, COUPLING"; from: who says what differs by cell
+ * (field, materials, share); idle: parameters that do nothing, or not what they name; effects: what the model
+ * brings, whether it is at work and used, and the parameters that together switch it off (switchable: one of
+ * a law can be); facts: what the model found when it was made; changes: models that the body is to have, the
+ * last two where given; unwatched: why the energy watch does not look at the body, "" where it does.
  * @param text NULL: *bytes gets the size needed, in bytes. @return DFM_OK; DFM_E_ARG; DFM_E_HANDLE.
  * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_explain(dfm_world world, char *text, size_t *bytes);

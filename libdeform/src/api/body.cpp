@@ -122,6 +122,7 @@ dfm_status dfm_body_create(dfm_world world, const dfm_body_def *def, dfm_body *o
     World &w = exclusive(world_of(world));
     need(out, "out");
     dfm_body_def own = take_def(def, dfm_body_def_default());
+    check_flags(own, 0, "dfm_body_def");
     dfm_surface_def surface;
     dfm_surface_groups groups;
     take_pointed(own.surface, surface);

@@ -10,13 +10,20 @@ namespace dfm {
 
 template <class T>
 inline constexpr uint32_t kFirstSize = 0;
+template <class T>
+inline constexpr const char *kStructName = "def";
 
 // last: the member with which the struct ended in 0.1; never another one.
 #define DFM_ENDED_WITH(type, last)                                                              \
   template <>                                                                                   \
   inline constexpr uint32_t kFirstSize<type> =                                                  \
       (offsetof(type, last) + sizeof(static_cast<type *>(nullptr)->last) + alignof(type) - 1) / \
-      alignof(type) * alignof(type);
+      alignof(type) * alignof(type);                                                            \
+  template <>                                                                                   \
+  inline constexpr const char *kStructName<type> = #type;
+DFM_ENDED_WITH(dfm_attach_def, cookie)
+DFM_ENDED_WITH(dfm_attachment, stretch)
+DFM_ENDED_WITH(dfm_memory, total)
 DFM_ENDED_WITH(dfm_context_def, plugin_dir)
 DFM_ENDED_WITH(dfm_world_def, step)
 DFM_ENDED_WITH(dfm_equilibrium_def, reserved)

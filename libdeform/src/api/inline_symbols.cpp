@@ -10,6 +10,7 @@
 #define dfm_world_overlaps overlaps_inline
 #define dfm_world_profile profile_inline
 #define dfm_world_swaps swaps_inline
+#define dfm_attach_def_default attach_def_inline
 #define dfm_context_def_default context_def_inline
 #define dfm_world_def_default world_def_inline
 #define dfm_equilibrium_def_default equilibrium_def_inline
@@ -27,6 +28,7 @@
 #undef dfm_world_overlaps
 #undef dfm_world_profile
 #undef dfm_world_swaps
+#undef dfm_attach_def_default
 #undef dfm_context_def_default
 #undef dfm_world_def_default
 #undef dfm_equilibrium_def_default
@@ -59,6 +61,7 @@ DFM_LIST_SYMBOL(dfm_world_swaps, dfm_swap, 64)
     type##_default_sized(sizeof out, reinterpret_cast<type *>(out.bytes));           \
     return out;                                                                      \
   }
+DFM_DEFAULT_SYMBOL(dfm_attach_def)
 DFM_DEFAULT_SYMBOL(dfm_context_def)
 DFM_DEFAULT_SYMBOL(dfm_world_def)
 DFM_DEFAULT_SYMBOL(dfm_equilibrium_def)

@@ -24,6 +24,7 @@ dfm_status dfm_material_create(dfm_world world, const dfm_material_def *def, dfm
     need(out, "out");
     auto m = std::make_unique<Material>();
     m->def = take_def(def, dfm_material_def_default());
+    check_flags(m->def, 0, "dfm_material_def");
     m->world = &w;
     m->name = m->def.name ? m->def.name : "";
     const char *const name = m->name.c_str();

@@ -37,11 +37,33 @@ T take_known(const T *given, const T &defaults) {
   def.size = sizeof(T);
   return def;
 }
+// What a default function leaves in a def. Headers of 0.1 have no place for it.
+constexpr uint64_t kCookie = 0x6d726f666564;
+
+template <class T>
+void check_cookie(const T *given) {
+  if constexpr (requires { given->cookie; }) {
+    if (given->size >= offsetof(T, cookie) + sizeof given->cookie && given->cookie != kCookie)
+      fail(DFM_E_ARG, "this %s was not made by %s_default(); start from that and set what differs",
+           kStructName<T>, kStructName<T>);
+  }
+}
+
+// Flags that the library does not know would be a wish passed over in silence.
+template <class T>
+void check_flags(const T &def, uint32_t known, const char *whose) {
+  if (const uint32_t other = def.flags & ~known)
+    fail(DFM_E_ARG, "%s: flags 0x%x: 0x%x is unknown; %s", whose, def.flags, other,
+         known ? "see its header for those that there are" : "leave them 0");
+}
+
 // And nothing beyond it.
 template <class T>
 T take_def(const T *given, const T &defaults) {
   const T def = take_known(given, defaults);
-  if (given) refuse_unknown(given);
+  if (!given) return def;
+  refuse_unknown(given);
+  check_cookie(given);
   return def;
 }
 
@@ -76,8 +98,9 @@ void take_pointed(const T *&given, T &own) {
 
 // A def's defaults, as long as the caller's version of the struct is: zero behind what this one knows.
 template <class T>
-void give_default(uint32_t size, T *out, const T &value) noexcept {
+void give_default(uint32_t size, T *out, T value) noexcept {
   if (!out) return;
+  if constexpr (requires { value.cookie; }) value.cookie = kCookie;
   std::memset(static_cast<void *>(out), 0, size);
   std::memcpy(static_cast<void *>(out), &value, std::min<size_t>(size, sizeof(T)));
   if (size >= sizeof out->size) out->size = size;

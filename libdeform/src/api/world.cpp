@@ -455,3 +455,18 @@ dfm_status dfm_world_explain(dfm_world world, char *text, size_t *bytes) {
     give_bytes(json.c_str(), json.size() + 1, text, bytes);
   });
 }
+
+dfm_status dfm_world_memory(dfm_world world, dfm_memory *out) {
+  return as_status([&] {
+    const Meters &m = world_of(world).meters;
+    dfm_memory all{};
+    all.bodies = m.bodies.bytes();
+    all.dynamics = m.dynamics.bytes();
+    all.obstacles = m.obstacles.bytes();
+    all.detection = m.detection.bytes();
+    all.contacts = m.contacts.bytes();
+    all.steps = m.steps.bytes();
+    all.total = all.bodies + all.dynamics + all.obstacles + all.detection + all.contacts + all.steps;
+    give(out, all);
+  });
+}

@@ -5,21 +5,25 @@
 namespace dfm {
 
 void distribute(std::span<const ContactPoint> contacts, const double *frame, const double *impulse,
-                std::span<const ImpulseSink> sinks) {
+                std::span<const ImpulseSink> sinks, std::span<const Bond> bonds, const double *bond_impulse) {
   for (const ImpulseSink &s : sinks) std::fill(s.surfel, s.surfel + size_t(3) * s.nnode, 0.0);
-  for (size_t i = 0; i < contacts.size(); ++i) {
-    const double *const f = frame + 9 * i, *const l = impulse + 3 * i;
-    if (l[0] == 0 && l[1] == 0 && l[2] == 0) continue;
-    const Vec3 p = l[0] * load3(f) + l[1] * load3(f + 3) + l[2] * load3(f + 6);
-    for (uint32_t k = 0; k < contacts[i].nnode; ++k) {
-      const uint32_t node = contacts[i].node[k];
+  const auto add = [&](const auto &c, Vec3 p) {
+    for (uint32_t k = 0; k < c.nnode; ++k) {
+      const uint32_t node = c.node[k];
       auto sink = std::upper_bound(sinks.begin(), sinks.end(), node,
                                    [](uint32_t value, const ImpulseSink &s) { return value < s.first_node; });
       --sink;
       double *const to = sink->surfel + size_t(3) * (node - sink->first_node);
-      store3(to, load3(to) + contacts[i].weight[k] * p);
+      store3(to, load3(to) + c.weight[k] * p);
     }
+  };
+  for (size_t i = 0; i < contacts.size(); ++i) {
+    const double *const f = frame + 9 * i, *const l = impulse + 3 * i;
+    if (l[0] == 0 && l[1] == 0 && l[2] == 0) continue;
+    const Vec3 p = l[0] * load3(f) + l[1] * load3(f + 3) + l[2] * load3(f + 6);
+    add(contacts[i], p);
   }
+  for (size_t k = 0; k < bonds.size(); ++k) add(bonds[k], load3(bond_impulse + 3 * k));
   for (const ImpulseSink &s : sinks) {
     if (!s.phyxel) continue;
     const Surface &surface = *s.surface;

@@ -4,6 +4,7 @@
 #pragma once
 #include <span>
 
+#include "contact/bond.h"
 #include "contact/contact_set.h"
 #include "geometry/surface.h"
 #include "math/vec3.h"
@@ -20,7 +21,8 @@ struct ImpulseSink {
 };
 
 void distribute(std::span<const ContactPoint> contacts, const double *frame, const double *impulse,
-                std::span<const ImpulseSink> sinks);
+                std::span<const ImpulseSink> sinks, std::span<const Bond> bonds = {},
+                const double *bond_impulse = nullptr);
 
 // f_p = N^T f_s of a coupled surface: surfel [nsurfel,3], phyxel [npoint,4] is overwritten. A surfel that
 // carries nothing costs one look.

@@ -76,6 +76,11 @@ uint32_t Proximal::find_parts(const ContactRows &rows, std::span<const uint8_t> 
     });
     if (points && seen != kNone) alone_[seen] = 1;
   }
+  // strides know contacts only: what bonds hold as well is left to the sweeps
+  for (uint32_t i = rows.n; i < rows.all(); ++i)
+    each_block(i, [&](uint32_t b) {
+      if (b != kNone) alone_[b] = 1;
+    });
   for (uint32_t b = count; b-- > 0;)
     if (alone_[b]) alone_[root_of(b)] = 1;
   parts_.clear();

@@ -9,7 +9,7 @@ namespace dfm {
 
 ContactRows::ContactRows(const Memory &m) : kernels_(dense_kernels()) {
   use_memory(m, begin, dof, weight, y, y_free, alone, source, point, block, blocks, response_, given_, frame,
-             drive, rate, wn, wt, cross, impulse, dof_of_point_, dof_of_node_, place_, rigid, arm,
+             drive, rate, wn, wt, cross, impulse, bond, dof_of_point_, dof_of_node_, place_, rigid, arm,
              dof_of_group_, columns_, left_, first_column_, column_count_, first_value_);
 }
 
@@ -21,13 +21,17 @@ void ContactRows::add_block(uint32_t from, uint32_t first, uint32_t group) {
 }
 
 // Blocks of the rigid groups that are touched, in their order.
-void ContactRows::build_rigid(std::span<const ContactPoint> contacts, const RigidPlaces &rigids) {
-  rigid.assign(n, kNone);
-  arm.resize(size_t(3) * n);
+void ContactRows::build_rigid(std::span<const ContactPoint> contacts, const RigidPlaces &rigids,
+                              std::span<const Bond> bonds) {
+  rigid.assign(all(), kNone);
+  arm.resize(size_t(3) * all());
   dof_of_group_.assign(rigids.group_size.size(), kNone);
-  for (const ContactPoint &c : contacts)
+  const auto touch = [&](const auto &c) {
     if (c.obstacle && rigids.of_obstacle[c.slot_b].group != kNone)
       dof_of_group_[rigids.of_obstacle[c.slot_b].group] = 0;
+  };
+  for (const ContactPoint &c : contacts) touch(c);
+  for (const Bond &b : bonds) touch(b);
   for (uint32_t g = 0; g < rigids.group_size.size(); ++g) {
     if (dof_of_group_[g] == kNone) continue;
     const uint32_t count = 2 * rigids.group_size[g];
@@ -45,11 +49,10 @@ void ContactRows::build_rigid(std::span<const ContactPoint> contacts, const Rigi
 // From the rigid body's center to where the impulse acts on the soft body: the same point on both sides, so
 // that angular momentum is kept to rounding.
 void ContactRows::set_arms(std::span<const ContactPoint> contacts, std::span<const DofSource> sources,
-                           const RigidPlaces &rigids) {
+                           const RigidPlaces &rigids, std::span<const Bond> bonds) {
   uint32_t s = 0;
-  for (uint32_t i = 0; i < n; ++i) {
-    const ContactPoint &c = contacts[i];
-    if (!c.obstacle || rigids.of_obstacle[c.slot_b].group == kNone) continue;
+  const auto set = [&](uint32_t i, const auto &c) {
+    if (!c.obstacle || rigids.of_obstacle[c.slot_b].group == kNone) return;
     const RigidPlace &r = rigids.of_obstacle[c.slot_b];
     rigid[i] = dof_of_group_[r.group] + 2 * r.place;
     Vec3 at;
@@ -59,14 +62,17 @@ void ContactRows::set_arms(std::span<const ContactPoint> contacts, std::span<con
       at += c.weight[k] * load3(&sources[s].surface->x[size_t(c.node[k] - sources[s].first_node) * 4]);
     }
     store3(&arm[size_t(3) * i], at - r.center);
-  }
+  };
+  for (uint32_t i = 0; i < n; ++i) set(i, contacts[i]);
+  for (uint32_t i = 0; i < nbond; ++i) set(n + i, bonds[i]);
 }
 
 void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const DofSource> sources,
-                        const RigidPlaces &rigids) {
+                        const RigidPlaces &rigids, std::span<const Bond> bonds) {
   // Dofs are numbered in order of first use, except that those of a self-stepping body follow each other (its
   // response is one block).
   n = static_cast<uint32_t>(contacts.size());
+  nbond = static_cast<uint32_t>(bonds.size());
   uint32_t nnode = 0, npoint = 0;
   for (const DofSource &s : sources) {
     nnode = std::max(nnode, s.first_node + s.nnode);
@@ -96,9 +102,12 @@ void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const 
   for (uint32_t s = 0; s < sources.size(); ++s) {
     if (sources[s].diagonal) continue;
     const uint32_t first = ndof;
-    for (const ContactPoint &c : contacts)
+    const auto touch = [&](const auto &c) {
       for (uint32_t k = 0; k < c.nnode; ++k)
         if (source_of(c.node[k]) == s) dof_of_node_[c.node[k]] = 0;
+    };
+    for (const ContactPoint &c : contacts) touch(c);
+    for (const Bond &b : bonds) touch(b);
     for (uint32_t node = sources[s].first_node; node < sources[s].first_node + sources[s].nnode; ++node) {
       if (dof_of_node_[node] == kNone) continue;
       dof_of_node_[node] = ndof++;
@@ -110,8 +119,8 @@ void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const 
   }
   rigid.clear();
   if (!rigids.of_obstacle.empty()) {
-    build_rigid(contacts, rigids);
-    set_arms(contacts, sources, rigids);
+    build_rigid(contacts, rigids, bonds);
+    set_arms(contacts, sources, rigids, bonds);
   }
   // Pass 2: contacts to dofs. A coupled surfel expands to its phyxels; a phyxel that comes twice in one
   // contact is merged.
@@ -126,7 +135,7 @@ void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const 
     }
     return d;
   };
-  for (const ContactPoint &c : contacts) {
+  const auto add_row = [&](const auto &c) {
     begin.push_back(static_cast<uint32_t>(dof.size()));
     const uint32_t row = begin.back();
     auto add = [&](uint32_t d, double w) {
@@ -163,7 +172,9 @@ void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const 
                             [&](uint32_t phyxel, double w) { add_far(dof_of(s, phyxel), c.weight[k] * w); });
       }
     }
-  }
+  };
+  for (const ContactPoint &c : contacts) add_row(c);
+  for (const Bond &b : bonds) add_row(b);
   begin.push_back(static_cast<uint32_t>(dof.size()));
   y.resize(size_t(ndof) * 4);
   alone.resize(size_t(ndof) * 4);
@@ -243,15 +254,72 @@ double bias_velocity(double distance, double offset, double h, double planned, d
 
 }  // namespace
 
+// (W + soft)^-1 of the components in which anything moves. A held point has a row of zeros; less than that
+// share of the largest is its rounding.
+namespace {
+constexpr double kMoves = 1e-12;
+
+void invert(const Vec3 (&w)[3], Vec3 (&out)[3]) {
+  double a[3][6] = {};
+  const double least = kMoves * std::max({w[0].x, w[1].y, w[2].z});
+  bool free[3];
+  for (int i = 0; i < 3; ++i) {
+    free[i] = w[i][i] > least;
+    for (int j = 0; j < 3; ++j) a[i][j] = 0.5 * (w[i][j] + w[j][i]);
+    a[i][3 + i] = 1;
+  }
+  for (int k = 0; k < 3; ++k) {
+    if (!free[k]) continue;
+    // of components that move as one, the first does
+    free[k] = a[k][k] > least;
+    if (!free[k]) continue;
+    const double pivot = 1 / a[k][k];
+    for (double &x : a[k]) x *= pivot;
+    for (int i = 0; i < 3; ++i) {
+      if (i == k) continue;
+      const double by = a[i][k];
+      for (int j = 0; j < 6; ++j) a[i][j] -= by * a[k][j];
+    }
+  }
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) out[i][j] = free[i] && free[j] ? a[i][3 + j] : 0;
+}
+}  // namespace
+
+void ContactRows::finish_bonds(std::span<const Bond> bonds) {
+  bond.resize(nbond);
+  for (uint32_t k = 0; k < nbond; ++k) {
+    const uint32_t i = n + k;
+    const Bond &b = bonds[k];
+    double *const f = &frame[size_t(i) * 9];
+    std::fill_n(f, 9, 0.0);
+    f[0] = f[4] = f[8] = 1;
+    store3(&drive[size_t(i) * 3], b.velocity);
+    Vec3 w[3];
+    for (int c = 0; c < 3; ++c) {
+      Vec3 along;
+      along[c] = 1;
+      w[c] = diagonal(i, along);
+    }
+    wn[i] = w[0].x;
+    wt[i] = std::max(w[1].y, w[2].z);
+    for (int c = 0; c < 3; ++c) w[c][c] += b.soft;
+    BondRow &row = bond[k];
+    row.rate = b.rate;
+    row.soft = b.soft;
+    invert(w, row.inverse);
+  }
+}
+
 void ContactRows::finish(std::span<const ContactPoint> contacts, const double *tangents, double h,
-                         double planned, double offset) {
-  frame.resize(size_t(n) * 9);
-  drive.resize(size_t(n) * 3);
+                         double planned, double offset, std::span<const Bond> bonds) {
+  frame.resize(size_t(all()) * 9);
+  drive.resize(size_t(all()) * 3);
   rate.resize(n);
-  wn.resize(n);
-  wt.resize(n);
+  wn.resize(all());
+  wt.resize(all());
   cross.resize(size_t(n) * 2);
-  impulse.resize(size_t(n) * 3);
+  impulse.resize(size_t(all()) * 3);
   const double most = recovery > 0 ? recovery * planned : kOpens * offset;
   for (uint32_t i = 0; i < n; ++i) {
     const Vec3 normal = load3(contacts[i].normal);
@@ -272,6 +340,7 @@ void ContactRows::finish(std::span<const ContactPoint> contacts, const double *t
     const double a = dot(t1, w1), c = dot(t2, w2), b = dot(t1, w2);
     wt[i] = 0.5 * (a + c) + std::sqrt(0.25 * (a - c) * (a - c) + b * b);
   }
+  if (nbond) finish_bonds(bonds);
 }
 
 Vec3 ContactRows::velocity(uint32_t i) const {
@@ -334,7 +403,7 @@ void ContactRows::apply(uint32_t i, Vec3 q) {
 
 void ContactRows::restore() {
   y.assign(y_free.begin(), y_free.end());
-  for (uint32_t i = 0; i < n; ++i) {
+  for (uint32_t i = 0; i < all(); ++i) {
     const Vec3 l = load3(&impulse[size_t(i) * 3]);
     if (l.x != 0 || l.y != 0 || l.z != 0) apply(i, l);
   }
@@ -352,7 +421,7 @@ void ContactRows::restore(std::span<const uint32_t> contacts, std::span<const ui
 }
 
 void ContactRows::push_rigid(const Block &b) {
-  for (uint32_t i = 0; i < n; ++i) {
+  for (uint32_t i = 0; i < all(); ++i) {
     if (rigid[i] == kNone || rigid[i] < b.first || rigid[i] >= b.first + b.count) continue;
     const double *const f = &frame[size_t(i) * 9], *const q = &impulse[size_t(i) * 3];
     const Vec3 p = q[0] * load3(f) + q[1] * load3(f + 3) + q[2] * load3(f + 6);

@@ -14,6 +14,7 @@
 #pragma once
 #include <span>
 
+#include "contact/bond.h"
 #include "contact/contact_set.h"
 #include "geometry/surface.h"
 #include "math/dense_kernel.h"
@@ -51,7 +52,9 @@ struct ContactRows {
   };
 
   uint32_t n = 0, ndof = 0;
-  Array<uint32_t> begin;  // [n+1] into dof, weight
+  uint32_t nbond = 0;  // rows behind the contacts: three to a bond
+  uint32_t all() const { return n + nbond; }
+  Array<uint32_t> begin;  // [all+1] into dof, weight
   Array<uint32_t> dof;
   Array<double> weight;
   // [ndof,4]; 1/kg, the diagonal response of a dof, zero for those of blocks
@@ -60,18 +63,26 @@ struct ContactRows {
   // [ndof] index of the DofSource (rigid: kNone), phyxel (or surfel of a block)
   Array<uint32_t> source, point;
   Array<uint32_t> block;  // [ndof] kNone or index into blocks
-  // [n] dof of the rigid body's velocity, its spin is the next one; kNone. Empty: no contact has any
+  // [all] dof of the rigid body's velocity, its spin is the next one; kNone. Empty: no contact has any
   Array<uint32_t> rigid;
-  Array<double> arm;  // [n,3] m, where there are any
+  Array<double> arm;  // [all,3] m, where there are any
   Array<Block> blocks;
 
-  Array<double> frame;   // [n,9] normal, tangent, normal x tangent
-  Array<double> drive;   // [n,3] obstacle velocity in the frame
+  Array<double> frame;   // [all,9] normal, tangent, normal x tangent; of a bond the world's axes
+  Array<double> drive;   // [all,3] obstacle velocity in the frame
   Array<double> rate;    // [n] m/s: gap / h; a depth 0.2 gap / h, at least -0.1 d_c / h
-  Array<double> wn, wt;  // [n] 1/kg: W_nn; largest eigenvalue of W_tt
+  Array<double> wn, wt;  // [all] 1/kg: W_nn; largest eigenvalue of W_tt, of a bond the larger of W_yy, W_zz
   // [n,2] 1/kg: W_tn, the slip that a unit normal impulse makes at its own contact
   Array<double> cross;
-  Array<double> impulse;  // [n,3] N s: normal, two tangents
+  Array<double> impulse;  // [all,3] N s: normal, two tangents; of a bond in the world's axes
+  // Of a bond beside that: what its impulse does not depend on the bodies by, and the inverse of its own
+  // W + soft, kg, zero in the components in which nothing moves.
+  struct BondRow {
+    Vec3 rate;
+    double soft;
+    Vec3 inverse[3];
+  };
+  Array<BondRow> bond;  // [nbond]
 
   // m/s, at most, at which a depth is opened; 0: a tenth of the rest distance per sub-step
   double recovery = 0;
@@ -80,7 +91,7 @@ struct ContactRows {
   // Expands contacts to dofs. Blocks get their dofs and counts; the caller gives their responses, then calls
   // finish().
   void build(std::span<const ContactPoint> contacts, std::span<const DofSource> sources,
-             const RigidPlaces &rigids = {});
+             const RigidPlaces &rigids = {}, std::span<const Bond> bonds = {});
   // fill(matrix) writes the block's response, [3 count, 3 count] row-major, 1/kg.
   template <class Fill>
   void set_response(const Block &b, const Fill &fill) {
@@ -98,7 +109,7 @@ struct ContactRows {
   // Frames from normals and tangents [n,3], W diagonals, rates. planned: s, time in which a depth closes;
   // longer than h where the guard has cut it, or depths would turn into speed.
   void finish(std::span<const ContactPoint> contacts, const double *tangents, double h, double planned,
-              double offset);
+              double offset, std::span<const Bond> bonds = {});
 
   Vec3 velocity(uint32_t i) const;             // relative velocity of contact i in its frame (normal, t1, t2)
   void apply(uint32_t i, Vec3 impulse_frame);  // changes y by an impulse given in the frame
@@ -135,9 +146,10 @@ struct ContactRows {
   double response(const Block &b, size_t column, size_t k, size_t row) const {
     return response_[b.response + (column * b.count + k) * 4 + row];
   }
-  void build_rigid(std::span<const ContactPoint> contacts, const RigidPlaces &rigids);
+  void build_rigid(std::span<const ContactPoint> contacts, const RigidPlaces &rigids,
+                   std::span<const Bond> bonds);
   void set_arms(std::span<const ContactPoint> contacts, std::span<const DofSource> sources,
-                const RigidPlaces &rigids);
+                const RigidPlaces &rigids, std::span<const Bond> bonds);
   Vec3 answer(uint32_t d, Vec3 p) const {  // of a dof that is in no block
     const double *const w = &alone[size_t(d) * 4];
     return {w[0] * p.x, w[1] * p.y, w[2] * p.z};
@@ -145,6 +157,7 @@ struct ContactRows {
   void response_apply(const Block &b, uint32_t k, Vec3 p);
   Vec3 rigid_diagonal(uint32_t i, Vec3 a) const;
   Vec3 diagonal(uint32_t i, Vec3 direction) const;
+  void finish_bonds(std::span<const Bond> bonds);
 };
 
 }  // namespace dfm

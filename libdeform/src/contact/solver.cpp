@@ -72,6 +72,27 @@ double normal_impulse(const ContactRows &rows, uint32_t i, double un) {
   return std::max(0.0, rows.impulse[size_t(i) * 3] - (un + rows.rate[i]) / rows.wn[i]);
 }
 
+// m/s, what the impulse of bond k leaves of its condition, in the components in which anything moves.
+Vec3 bond_residual(const ContactRows &rows, uint32_t k) {
+  const ContactRows::BondRow &b = rows.bond[k];
+  Vec3 r = rows.velocity(rows.n + k) + b.rate + b.soft * load3(&rows.impulse[size_t(3) * (rows.n + k)]);
+  for (int c = 0; c < 3; ++c)
+    if (b.inverse[c][c] == 0) r[c] = 0;
+  return r;
+}
+
+void sweep_bonds(ContactRows &rows) {
+  for (uint32_t k = 0; k < rows.nbond; ++k) {
+    const ContactRows::BondRow &b = rows.bond[k];
+    const Vec3 r = bond_residual(rows, k);
+    const Vec3 change{-dot(b.inverse[0], r), -dot(b.inverse[1], r), -dot(b.inverse[2], r)};
+    if (change.x == 0 && change.y == 0 && change.z == 0) continue;
+    rows.apply(rows.n + k, change);
+    double *const l = &rows.impulse[size_t(3) * (rows.n + k)];
+    store3(l, load3(l) + change);
+  }
+}
+
 }  // namespace
 
 void set_trial(const ContactRows &rows, double h, const double *response, ContactState &s) {
@@ -121,6 +142,7 @@ void sweep(ContactRows &rows, const ContactState &law, double h) {
     l[1] = t.a;
     l[2] = t.b;
   }
+  if (rows.nbond) sweep_bonds(rows);
 }
 
 Acceleration::Acceleration(const Memory &m) { use_memory(m, metric_, from_, f_, g_, now_, df_, dg_); }
@@ -172,7 +194,7 @@ void dots(const double *a, const double *b, const double *y, const double *z, ui
 }  // namespace
 
 void Acceleration::start(const ContactRows &rows) {
-  const uint32_t values = 3 * rows.n;
+  const uint32_t values = 3 * rows.all();
   n_ = (values + 3) & ~3u;
   count_ = next_ = 0;
   first_ = true;
@@ -183,7 +205,7 @@ void Acceleration::start(const ContactRows &rows) {
   now_.resize(n_);
   df_.resize(size_t(kWindow) * n_);
   dg_.resize(size_t(kWindow) * n_);
-  for (uint32_t i = 0; i < rows.n; ++i) {
+  for (uint32_t i = 0; i < rows.all(); ++i) {
     metric_[3 * i] = std::sqrt(rows.wn[i]);
     metric_[3 * i + 1] = metric_[3 * i + 2] = std::sqrt(rows.wt[i]);
   }
@@ -234,10 +256,10 @@ void Acceleration::follow(ContactRows &rows) {
       for (uint32_t j = 0; j < count_; ++j) sum -= gamma[j] * pair(&dg_[size_t(j) * n_], k);
       pair(now_.data(), k) = sum;
     }
-    for (uint32_t i = 0; i < rows.n; ++i) {
+    for (uint32_t i = 0; i < rows.all(); ++i) {
       Vec3 jump = load3(&now_[size_t(3) * i]);
       // a normal impulse never pulls, not in between either
-      jump.x = std::max(jump.x, -rows.impulse[3 * i]);
+      if (i < rows.n) jump.x = std::max(jump.x, -rows.impulse[3 * i]);
       if (jump.x == 0 && jump.y == 0 && jump.z == 0) continue;
       rows.apply(i, jump);
       for (uint32_t c = 0; c < 3; ++c) rows.impulse[3 * i + c] += jump[int(c)];
@@ -263,6 +285,19 @@ double tangent_residual(const ContactRows &rows, uint32_t i, Pair law) {
 // while that is tiny; a smooth law with a steep slope c would count it 1 + h w_t c times.
 Pair answered(const ContactRows &rows, const ContactState &s, uint32_t i, double h, Vec3 u) {
   return friction_impulse(rows, s, i, h, rows.impulse[size_t(i) * 3], u.y, u.z);
+}
+
+Residual with_bonds(const ContactRows &rows, const Tolerance &tolerance, Residual r) {
+  double poison = 0;
+  for (uint32_t k = 0; k < rows.nbond; ++k) {
+    const double left = norm(bond_residual(rows, k));
+    poison += 0.0 * left;
+    r.relative = std::max(r.relative, left / tolerance.bond);
+    r.due = std::max(r.due, left / tolerance.bond);
+    r.speed = std::max(r.speed, left);
+  }
+  if (poison != 0) r.relative = r.due = std::numeric_limits<double>::infinity();
+  return r;
 }
 
 // Of the contacts which(0) to which(n - 1); law(i, u) gives the friction impulse that contact i should carry.
@@ -298,9 +333,10 @@ Residual residual(const ContactRows &rows, const Tolerance &tolerance, uint32_t 
 
 Residual inner_residual(const ContactRows &rows, const ContactState &law, double h,
                         const Tolerance &tolerance) {
-  return residual(rows, tolerance, rows.n, std::identity(), [&](uint32_t i, Vec3 u) {
+  const Residual r = residual(rows, tolerance, rows.n, std::identity(), [&](uint32_t i, Vec3 u) {
     return friction_impulse(rows, law, i, h, rows.impulse[size_t(i) * 3], u.y, u.z);
   });
+  return rows.nbond ? with_bonds(rows, tolerance, r) : r;
 }
 
 Residual inner_residual(const ContactRows &rows, const ContactState &law, double h,
@@ -314,8 +350,9 @@ Residual inner_residual(const ContactRows &rows, const ContactState &law, double
 
 Residual true_residual(const ContactRows &rows, const ContactState &answer, double h,
                        const Tolerance &tolerance) {
-  return residual(rows, tolerance, rows.n, std::identity(),
-                  [&](uint32_t i, Vec3 u) { return answered(rows, answer, i, h, u); });
+  const Residual r = residual(rows, tolerance, rows.n, std::identity(),
+                              [&](uint32_t i, Vec3 u) { return answered(rows, answer, i, h, u); });
+  return rows.nbond ? with_bonds(rows, tolerance, r) : r;
 }
 
 void set_tolerance(const ContactRows &rows, const ContactState &answer,
@@ -351,6 +388,10 @@ void set_tolerance(const ContactRows &rows, const ContactState &answer,
     tolerance.normal[i] = std::min(normal, bounds.most_normal);
     tolerance.tangent[i] = tangent;
   }
+  // what a bond has left over is part of its gap in the next sub-step
+  double change = 0;
+  for (uint32_t k = 0; k < rows.nbond; ++k) change = std::max(change, norm(bond_residual(rows, k)));
+  tolerance.bond = std::max(bounds.tangent, 1e-3 * change);
 }
 
 }  // namespace dfm

@@ -52,6 +52,7 @@ class Acceleration {
 // (doc/decisions/0004-contact-tolerance.md).
 struct Tolerance {
   double most_normal = 0;
+  double bond = 0;  // of |u + rate + soft l|, all bonds
   Array<double> normal, tangent;
 };
 struct ToleranceBounds { double tangent, normal, most_normal; };  // m/s: at rest, at rest, ever
@@ -72,7 +73,8 @@ Residual true_residual(const ContactRows &rows, const ContactState &answer, doub
 // the two bodies. A contact at rest is warm started at its solution, so d vanishes and the bound at rest
 // rules; while bodies shake, a hundredth of what the sub-step changes is enough, and what is left is part of
 // the next sub-step's d. normal[i] = max(bounds.normal, 2e-2 d), d the largest of all r_n and r_t, up to
-// most_normal. disturbance: scratch, two entries per body slot.
+// most_normal. bond = max(bounds.tangent, 1e-3 of the largest that the warm start leaves). disturbance:
+// scratch, two entries per body slot.
 void set_tolerance(const ContactRows &rows, const ContactState &answer,
                    std::span<const ContactPoint> contacts, double h, const ToleranceBounds &bounds,
                    uint32_t bodies, Array<double> &disturbance, Tolerance &tolerance);

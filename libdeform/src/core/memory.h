@@ -1,6 +1,7 @@
 // Memory of a context: every array of ours is allocated through the host's hooks, so that a host can count,
 // pool or refuse it.
 #pragma once
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <new>
@@ -13,6 +14,32 @@ struct Memory {
   void *(*alloc)(void *user, size_t bytes, size_t align) = nullptr;  // never null after Memory::standard()
   void (*release)(void *user, void *p, size_t bytes, size_t align) = nullptr;
   static const Memory &standard();  // aligned malloc and free
+};
+
+// Memory that counts what is taken through it and not given back. Outlives what is taken.
+class Meter {
+ public:
+  explicit Meter(const Memory &under) : under_(under), memory_{this, take, give_back} {}
+  Meter(const Meter &) = delete;
+  Meter &operator=(const Meter &) = delete;
+  const Memory &memory() const { return memory_; }
+  uint64_t bytes() const { return bytes_.load(std::memory_order_relaxed); }
+
+ private:
+  static void *take(void *self, size_t bytes, size_t align) {
+    Meter &m = *static_cast<Meter *>(self);
+    void *const p = m.under_.alloc(m.under_.user, bytes, align);
+    if (p) m.bytes_.fetch_add(bytes, std::memory_order_relaxed);
+    return p;
+  }
+  static void give_back(void *self, void *p, size_t bytes, size_t align) {
+    Meter &m = *static_cast<Meter *>(self);
+    m.under_.release(m.under_.user, p, bytes, align);
+    if (p) m.bytes_.fetch_sub(bytes, std::memory_order_relaxed);
+  }
+  const Memory &under_;
+  Memory memory_;
+  std::atomic<uint64_t> bytes_{0};
 };
 
 // Throws Error(DFM_E_NOMEM) where work that is about to begin would need more memory than the machine, or the

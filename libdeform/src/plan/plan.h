@@ -27,6 +27,7 @@ struct SceneFacts {
   unsigned coupled = 0, coupled_surfels = 0;    // bodies with a surface of their own, and its surfels
   unsigned body_pairs = 0, obstacle_pairs = 0;  // pairs that may touch, filters applied
   unsigned rigid_bodies = 0, rigid_joints = 0;
+  unsigned attachments = 0;
   std::string rigid_hosts;  // names
   bool gravity_keys = false, loads_vary = false, held_move = false, obstacles_move = false, unguarded = false;
   struct Provider { std::string effect, plugin; };

@@ -26,9 +26,16 @@ std::string rigids(const SceneFacts &f) {
          count(f.rigid_joints, "joint", "joints") + " of host " + f.rigid_hosts;
 }
 
-StageChoice of_contact(const SceneFacts &f) { return touches(f) ? runs(who(f)) : left_out(nobody(f)); }
+// What acts on bodies through their surfaces.
+bool acts(const SceneFacts &f) { return touches(f) || f.attachments; }
+StageChoice of_contact(const SceneFacts &f) {
+  if (!f.attachments) return touches(f) ? runs(who(f)) : left_out(nobody(f));
+  const std::string attached = count(f.attachments, "attachment holds", "attachments hold");
+  return runs(touches(f) ? who(f) + ", " + attached : attached);
+}
 StageChoice of_pairs(const SceneFacts &f) {
-  return touches(f) && !pairs(f) ? left_out("no pair may touch") : of_contact(f);
+  if (!touches(f)) return left_out(nobody(f));
+  return pairs(f) ? runs(who(f)) : left_out("no pair may touch");
 }
 
 }  // namespace
@@ -57,7 +64,7 @@ StageChoice rigid_predict(const SceneFacts &f) {
 }
 
 StageChoice gather(const SceneFacts &f) {
-  if (!touches(f)) return left_out(nobody(f));
+  if (!acts(f)) return left_out(nobody(f));
   if (!f.coupled) return left_out("every surfel is a point of its body");
   return runs(count(f.coupled_surfels, "surfel", "surfels") + " of " + count(f.coupled, "body", "bodies") +
               " hang on several points each");

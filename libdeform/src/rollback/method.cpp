@@ -65,6 +65,7 @@ constexpr Inability kUnable[] = {
     {Ability::rigid_bodies, "rigid bodies, which a host moves,"},
     {Ability::sleep, "sleep (contact.sleep)"},
     {Ability::self_contact, "self contact"},
+    {Ability::attachments, "an attachment, which is a part of the contact solve,"},
 };
 
 constexpr ContactMethod kMethod{.name = "rollback",

@@ -38,6 +38,8 @@ class Builder {
     for (Friction &f : def_.friction) add_friction(f);
     for (const Filter &f : def_.filters)
       check(dfm_world_filter_pair(world_, f.between[0].c_str(), f.between[1].c_str(), f.collide), f.pointer);
+    for (const Body &b : def_.bodies)
+      for (const Attach &a : b.attach) add_attachment(b, a);
     // Makes the plan now, so that an effect that nothing provides is an error of the scene and not of
     // its first step.
     double step = 0;
@@ -231,6 +233,10 @@ class Builder {
     for (size_t i = 0; i < b.fixes.size(); ++i) move_held(body, b.fixes[i], held[i]);
     add_loads(body, b, mesh, nodal);
     for (const Spring &s : b.springs) add_spring(body, s, b.name, mesh);
+    for (Attach &a : b.attach) {
+      if (mesh.wears_skin) a.surfels = select_skin(a.where, mesh, def_.file);
+      else a.points = select(a.where, mesh, def_.file);
+    }
     for (const Probe &p : def_.probes)
       if (p.body == b.name) add_probe(body, p, mesh);
   }
@@ -243,8 +249,13 @@ class Builder {
     check(dfm_world_find_body(world_, b.name.c_str(), &body), pointer);
     std::vector<dfm_switch> switches;
     for (Switch &s : b.switches) {
-      switches.push_back({sizeof(dfm_switch), s.model.integrator, s.t, s.model.type.c_str(),
-                          s.model.params.view(), s.max_jump});
+      dfm_switch to = dfm_switch_default();
+      to.integrator = s.model.integrator;
+      to.t = s.t;
+      to.type = s.model.type.c_str();
+      to.params = s.model.params.view();
+      to.max_jump = s.max_jump;
+      switches.push_back(to);
       if (s.t > 0 && s.t >= end_of_changes())
         context_->logf(DFM_LOG_WARNING,
                        "body '%s': its change to '%s' at %g s (%s/t) is never made, because no step begins "
@@ -369,6 +380,40 @@ class Builder {
     d.stiffness = s.stiffness;
     d.damping = s.damping;
     check(dfm_body_add_spring(body, &d, nullptr), s.pointer);
+  }
+
+  // A body, an obstacle or a rigid body by its name.
+  uint64_t find_thing(const Attach &a) const {
+    const World &w = resolve<World>(Kind::world, world_);
+    std::vector<std::string> names;
+    for (const auto &b : w.bodies) {
+      if (b->name == a.to) return b->handle;
+      names.push_back(b->name);
+    }
+    for (const auto &o : w.obstacles) {
+      if (o->name == a.to) return o->handle;
+      names.push_back(o->name);
+    }
+    const std::string near = nearest(a.to, names);
+    fail(DFM_E_ARG, "%s: %s/to: there is no body, obstacle or rigid body \"%s\"%s", def_.file.c_str(),
+         a.pointer.c_str(), a.to.c_str(), near.empty() ? "" : ("; did you mean \"" + near + "\"?").c_str());
+  }
+
+  void add_attachment(const Body &b, const Attach &a) const {
+    dfm_body body = 0;
+    check(dfm_world_find_body(world_, b.name.c_str(), &body), b.pointer);
+    dfm_attach_def d = dfm_attach_def_default();
+    d.flags = a.touch ? DFM_ATTACH_TOUCH : 0;
+    d.to = find_thing(a);
+    d.points = a.points.data();
+    d.npoint = uint32_t(a.points.size());
+    d.surfels = a.surfels.data();
+    d.nsurfel = uint32_t(a.surfels.size());
+    d.max_distance = a.max_distance;
+    d.stiffness = a.stiffness;
+    d.damping = a.damping;
+    d.release = a.release;
+    check(dfm_body_attach(body, &d, nullptr), a.pointer);
   }
 
   void add_probe(dfm_body body, const Probe &p, const BodyMesh &mesh) {

@@ -60,6 +60,16 @@ struct FieldFile {
   bool directions = false;  // scaled to unit length, as an axis given in the scene is
 };
 
+// What of a body's surface is attached to what, made when all is there. Beside what the scene says: the
+// points of the body that `where` means, or the surfels of a surface of its own.
+struct Attach {
+  std::string pointer, to;
+  Selection where;
+  double max_distance = 0, stiffness = 0, damping = 0, release = 0;
+  bool touch = false;
+  std::vector<uint32_t> points, surfels;
+};
+
 struct GroupMaterial { std::string pointer, group, material; };
 
 struct OwnSurface {
@@ -121,6 +131,7 @@ struct Body {
   std::vector<Fix> fixes;
   std::vector<Force> forces;
   std::vector<Spring> springs;
+  std::vector<Attach> attach;
   std::vector<Switch> switches;
   SwitchRule rule;
 };

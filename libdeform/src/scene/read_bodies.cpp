@@ -160,6 +160,20 @@ Spring read_spring(const Node &entry) {
   return spring;
 }
 
+Attach read_attach(const Node &entry) {
+  Attach attach;
+  entry.object("attach");
+  attach.pointer = entry.pointer();
+  attach.to = entry.at("to").text();
+  attach.where = read_selection(entry);
+  attach.max_distance = entry.number("max_distance", 0.0, kNotNegative);
+  attach.stiffness = entry.number("stiffness", 0.0, kNotNegative);
+  attach.damping = entry.number("damping", 0.0, kNotNegative);
+  attach.release = entry.number("release", 0.0, kNotNegative);
+  attach.touch = entry.boolean("touch", false);
+  return attach;
+}
+
 constexpr double kLargestSeed = 4294967295.0;
 
 // {"make": "cylinder", "radius", "length", "cells"} and so on, with the keys of that shape and no others.
@@ -313,6 +327,7 @@ Body read_body(const Node &node, ReadContext &context) {
   for (const Node &entry : node.items("fix")) b.fixes.push_back(read_fix(entry));
   for (const Node &entry : node.items("forces")) b.forces.push_back(read_force(entry));
   for (const Node &entry : node.items("springs")) b.springs.push_back(read_spring(entry));
+  for (const Node &entry : node.items("attach")) b.attach.push_back(read_attach(entry));
   read_carriers(node, type, context, b);
   if (node.has("switch")) {
     const Node change = node.member("switch");

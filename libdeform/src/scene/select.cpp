@@ -153,6 +153,26 @@ std::vector<uint32_t> select(const Selection &where, const BodyMesh &mesh, const
   return out;
 }
 
+std::vector<uint32_t> select_skin(const Selection &where, const BodyMesh &mesh, const std::string &file) {
+  std::vector<uint8_t> marks(mesh.skin.npoint, 0);
+  if (!where.group.empty()) {
+    for (const uint32_t t : skin_triangles(where, mesh))
+      for (int k = 0; k < 3; ++k) marks[mesh.skin.triangles[3 * size_t(t) + size_t(k)]] = 1;
+  } else {
+    for (uint32_t s = 0; s < mesh.skin.npoint; ++s)
+      marks[s] = in_box(where, mesh, &mesh.skin.points[3 * size_t(s)]);
+  }
+  std::vector<uint32_t> out = marked(marks);
+  if (!out.empty()) return out;
+  if (!where.group.empty()) no_group(where, mesh, file);
+  fail(
+      DFM_E_ARG,
+      "%s: %s: no point of the body's surface lies in the box; at rest, scaled but before its pose, the body "
+      "spans [%g, %g, %g] to [%g, %g, %g]",
+      file.c_str(), where.pointer.c_str(), mesh.lo[0], mesh.lo[1], mesh.lo[2], mesh.hi[0], mesh.hi[1],
+      mesh.hi[2]);
+}
+
 std::vector<double> share_by_mass(const std::vector<uint32_t> &points, const BodyMesh &mesh) {
   const std::vector<uint32_t> rank = ranks(points, mesh.npoint);
   std::vector<double> weights(points.size(), 0.0);

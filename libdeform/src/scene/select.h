@@ -41,6 +41,9 @@ struct BodyMesh {
 // their cells: what is held then includes the given surface.
 std::vector<uint32_t> select(const Selection &where, const BodyMesh &mesh, const std::string &file);
 
+// Surfels of a body that wears its skin: the skin's points in a box, or the corners of a group's triangles.
+std::vector<uint32_t> select_skin(const Selection &where, const BodyMesh &mesh, const std::string &file);
+
 // Weights that sum to 1, one per selected point. triangles: boundary, point numbers.
 std::vector<double> share_by_mass(const std::vector<uint32_t> &points, const BodyMesh &mesh);
 // By boundary area: a third of each triangle whose three corners are selected. Empty if there is no

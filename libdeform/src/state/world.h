@@ -15,10 +15,12 @@
 #include "plan/plan.h"
 #include "plugin/context.h"
 #include "plugin/selection.h"
+#include "state/attachment.h"
 #include "state/body.h"
 #include "state/energy_book.h"
 #include "state/impulses.h"
 #include "state/material.h"
+#include "state/meters.h"
 #include "state/obstacle.h"
 #include "state/overlaps.h"
 #include "state/pair_tables.h"
@@ -69,6 +71,7 @@ inline constexpr size_t kEventsAtOnce = 1024;
 
 struct World {
   dfm_context *context;
+  Meters meters;  // before all that they count
   uint64_t handle = 0;
   dfm_world_def def{};
   Selection selection;            // by its list of effects
@@ -84,6 +87,7 @@ struct World {
   std::vector<std::unique_ptr<LawInstance>> laws;     // the first is the default law, made when first needed
   std::vector<FrictionRule> friction;
   std::vector<FilterRule> filters;
+  std::vector<Attachment> attachments;  // in order of creation
   Overlaps overlaps;
   // rises when positions or d_c change otherwise than by a step
   uint64_t placements = 0;
@@ -120,7 +124,7 @@ struct World {
 
   explicit World(dfm_context *c);
   ~World();
-  const Memory &memory() const { return context->memory; }
+  const Memory &memory() const { return meters.bodies.memory(); }
 
   // world.cpp
   Body *find_body(const std::string &name);

@@ -141,6 +141,12 @@ void changing(Stream &s, World &w) {
   s.value(w.report.n);
   s.value(w.report.h);
   each_report_column([&](size_t, auto &column) { s.array(column); }, w.report);
+  for (Attachment &a : w.attachments) {
+    s.array(a.impulse);
+    s.value(a.h);
+    s.value(a.total);
+    s.value(a.released);
+  }
   s.array(w.work);
   s.length(w.events);  // a step only adds to it, and it may wait for the host for many steps
 }

@@ -5,6 +5,7 @@
 
 #include "core/error.h"
 #include "plugin/on_behalf.h"
+#include "step/attach.h"
 #include "step/change_work.h"
 #include "step/context.h"
 #include "step/energy_watch.h"
@@ -23,7 +24,7 @@ bool reads_points(const World &w, const Body &b) {
 
 bool find_ends(World &w, StepContext &step, uint32_t *trouble) {
   const SubStep now = sub_step_of(w, step);
-  const bool touched = w.plan.has(StageRole::gives_impulses) && step.rows.n > 0;
+  const bool touched = w.plan.has(StageRole::gives_impulses) && step.rows.all() > 0;
   FirstFailure failed;
   w.context->tasks.parallel_for(
       static_cast<uint32_t>(step.active.size()), 1, [&](uint32_t begin, uint32_t end) {
@@ -71,6 +72,7 @@ bool stage_commit(World &w, StepContext &step, uint32_t *trouble) {
       });
   if (w.plan.touches()) {
     keep_contacts(w, step);
+    keep_bonds(w, step);
     add_impulses(w);
   }
   return true;

@@ -2,30 +2,32 @@
 
 namespace dfm {
 
-StepContext::StepContext(const Memory &m)
-    : broad(m),
-      narrow(m),
-      rows(m),
-      acceleration(m),
-      proximal(m),
-      batches(m),
-      areas(m),
-      exchange(m),
-      renewal(m),
-      next_store(m),
-      last_report(m),
-      islands(m) {
-  use_memory(m, driven, free_kinetic, looks, lent, contacts, tolerance.normal, tolerance.tangent, disturbance,
-             best_impulse, trial_response, tangents, match, sharing, aim, stands, ways, renewed,
-             block_surfels, near, touching, active, woken, stirred);
-  use_memory(m, state.law, state.fn, state.vt, state.ft_stop, state.area, state.dwell, state.bristle,
-             state.ft, state.dft_dvt, state.dft_dfn, state.limit, state.bristle_out, state.mode, state.form,
-             state.slip, state.linear);
-  use_memory(m, guard.joined, guard.near, guard.hits, guard.speed, guard.change, guard.kept,
-             guard.blocks.pieces);
+StepContext::StepContext(const Meters &meters)
+    : broad(meters.detection.memory()),
+      narrow(meters.detection.memory()),
+      rows(meters.contacts.memory()),
+      acceleration(meters.contacts.memory()),
+      proximal(meters.contacts.memory()),
+      batches(meters.contacts.memory()),
+      areas(meters.contacts.memory()),
+      exchange(meters.contacts.memory()),
+      renewal(meters.contacts.memory()),
+      next_store(meters.contacts.memory()),
+      last_report(meters.contacts.memory()),
+      islands(meters.steps.memory()) {
+  use_memory(meters.steps.memory(), driven, free_kinetic, looks, block_surfels, near, touching, active, woken,
+             stirred);
+  use_memory(meters.contacts.memory(), lent, contacts, tolerance.normal, tolerance.tangent, disturbance,
+             best_impulse, trial_response, tangents, match, sharing, aim, stands, ways, renewed, bonds,
+             bond_impulse);
+  use_memory(meters.contacts.memory(), state.law, state.fn, state.vt, state.ft_stop, state.area, state.dwell,
+             state.bristle, state.ft, state.dft_dvt, state.dft_dfn, state.limit, state.bristle_out,
+             state.mode, state.form, state.slip, state.linear);
+  use_memory(meters.detection.memory(), guard.joined, guard.near, guard.hits, guard.speed, guard.change,
+             guard.kept, guard.blocks.pieces);
   GuardMemory &known = guard.memory;
-  use_memory(m, known.runs, known.old_runs, known.features, known.old_features, known.rest, known.old_rest,
-             known.normal, known.old_normal, known.before);
+  use_memory(meters.detection.memory(), known.runs, known.old_runs, known.features, known.old_features,
+             known.rest, known.old_rest, known.normal, known.old_normal, known.before);
 }
 
 }  // namespace dfm

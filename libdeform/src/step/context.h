@@ -61,6 +61,8 @@ struct StepContext {
 
   // contact <-> friction
   ContactRows rows;
+  Array<Bond> bonds;
+  Array<double> bond_impulse;  // [bonds,3] N s, that the next solve of this sub-step starts from
   ContactState state;
   Acceleration acceleration;
   Proximal proximal;
@@ -106,7 +108,7 @@ struct StepContext {
   Array<uint32_t> active, woken;
   Array<uint8_t> stirred;  // [island]
 
-  explicit StepContext(const Memory &memory);
+  explicit StepContext(const Meters &meters);
 };
 
 }  // namespace dfm

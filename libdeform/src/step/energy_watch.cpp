@@ -360,7 +360,7 @@ bool watch_energy(World &w, StepContext &step, uint32_t *trouble) {
 
 void book_energy(World &w, StepContext &step, double motion) {
   if (!watching(w)) return;
-  const bool touched = w.plan.touches() && step.rows.n > 0;
+  const bool touched = w.plan.touches() && step.rows.all() > 0;
   if (touched) book_contact(w, step);
   uint32_t ages = 1;
   for (const uint32_t i : step.active) {

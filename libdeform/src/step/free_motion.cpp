@@ -27,6 +27,9 @@ void begin_bodies(World &w, StepContext &step) {
   for (uint32_t m = 0; m < w.store.n; ++m)
     for (const uint64_t id : {w.store.id_a[m], w.store.id_b[m]})
       if (const uint32_t i = slot_of(w, id); i != kNone) step.near[i] = 1;
+  for (const Attachment &a : w.attachments)
+    for (const uint64_t id : {a.body, a.to})
+      if (const uint32_t i = slot_of(w, id); i != kNone && !a.released) step.near[i] = 1;
   for (size_t i = 0; i < w.bodies.size(); ++i) w.bodies[i]->dynamics->begin(step.near[i]);
 }
 

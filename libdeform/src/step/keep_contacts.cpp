@@ -18,7 +18,7 @@ void reserve_contacts(World &w, StepContext &step) {
   each_column([&](const ContactColumn &column, auto &values) { values.reserve(column.entries(n, S)); }, to);
   each_report_column([&](size_t width, auto &column) { column.reserve(width * n); }, next);
   w.work.reserve(std::min(w.work.size() + n, w.bodies.size() * (w.bodies.size() + w.obstacles.size())));
-  reserve_events(w, size_t(n) + w.store.n);
+  reserve_events(w, size_t(n) + w.store.n + w.attachments.size());
   reserve_impulses(w, n);
 }
 
@@ -68,8 +68,8 @@ void keep_contacts(World &w, StepContext &step) {
   w.report.h = step.h;
   w.report.contacts.assign(step.contacts.begin(), step.contacts.end());
   for (uint32_t i = 0; i < n; ++i) w.report.contacts[i].area = step.state.area[i];
-  w.report.frame.assign(step.rows.frame.begin(), step.rows.frame.end());
-  w.report.impulse.assign(step.rows.impulse.begin(), step.rows.impulse.end());
+  w.report.frame.assign(step.rows.frame.begin(), step.rows.frame.begin() + std::ptrdiff_t{9} * n);
+  w.report.impulse.assign(step.rows.impulse.begin(), step.rows.impulse.begin() + std::ptrdiff_t{3} * n);
   w.report.slip.resize(size_t(2) * n);
   w.report.mode.resize(n);
 

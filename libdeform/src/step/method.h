@@ -36,6 +36,7 @@ enum class Ability {
   rigid_bodies,
   sleep,
   self_contact,
+  attachments,
 };
 
 struct Inability {

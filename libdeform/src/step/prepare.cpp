@@ -175,13 +175,30 @@ Partner partner_of(const World &w, const StepContext &step, uint32_t thing) {
           step.obstacle_views[o.slot].shape != Shape::none};
 }
 
+// Attached to each other two things do not touch, unless they are told to. A rigid body is meant with all of
+// its shapes.
+bool parted(const World &w, uint32_t i, uint32_t thing) {
+  const uint32_t nb = static_cast<uint32_t>(w.bodies.size());
+  const uint64_t a = w.bodies[i]->id;
+  return std::any_of(w.attachments.begin(), w.attachments.end(), [&](const Attachment &x) {
+    if (x.released || (x.flags & DFM_ATTACH_TOUCH)) return false;
+    if (thing < nb) {
+      const uint64_t b = w.bodies[thing]->id;
+      return !x.obstacle && ((x.body == a && x.to == b) || (x.body == b && x.to == a));
+    }
+    if (!x.obstacle || x.body != a) return false;
+    const Obstacle &o = *w.obstacles[thing - nb], &to = *w.obstacles[obstacle_slot_of(w, x.to)];
+    return o.id == x.to || (o.rigid && o.rigid == to.rigid && o.rigid_body == to.rigid_body);
+  });
+}
+
 // Filters, then laws. The default law is made only when a pair needs it.
 void make_pair_tables(World &w, StepContext &step, SceneFacts &facts) {
   const uint32_t nb = static_cast<uint32_t>(w.bodies.size());
   const uint32_t width = nb + static_cast<uint32_t>(w.obstacles.size());
   // rises, so that lists made under older rules are renewed
   const uint64_t filter_version = w.pairs.filter.version;
-  w.pairs.filter = PairFilter(w.memory());
+  w.pairs.filter = PairFilter(w.meters.detection.memory());
   w.pairs.filter.version = filter_version + 1;
   w.pairs.law.assign(size_t(nb) * width, 0);
   w.pairs.zone_table.clear();
@@ -199,6 +216,10 @@ void make_pair_tables(World &w, StepContext &step, SceneFacts &facts) {
       if (const FilterRule *rule = best_rule(w.filters, a.side, b.side)) {
         if (!is_body || i < j) w.pairs.filter.set(a.id, b.id, !is_body, rule->collide);
         touch = rule->collide;
+      }
+      if (touch && parted(w, i, j)) {
+        if (!is_body || i < j) w.pairs.filter.set(a.id, b.id, !is_body, false);
+        touch = false;
       }
       if (!touch || !b.has_shape) continue;
       if (is_body) facts.body_pairs += i < j;
@@ -243,7 +264,7 @@ void choose_integrators(World &w) {
     if (!b.integrator.open) continue;
     const bool was = b.integrator.used == DFM_INTEGRATOR_IMPLICIT_EULER;
     if (options[i].implicit != was) {
-      b.dynamics = make_dynamics(w.memory(), b.p, b.surface, b.model, b.edges,
+      b.dynamics = make_dynamics(w.meters.dynamics.memory(), b.p, b.surface, b.model, b.edges,
                                  options[i].implicit ? &w.implicit : nullptr);
       b.integrator.used =
           options[i].implicit ? DFM_INTEGRATOR_IMPLICIT_EULER : DFM_INTEGRATOR_SYMPLECTIC_EULER;
@@ -317,6 +338,7 @@ void prepare(World &w, const RestoredChoice *restored) {
   facts.bodies = nb;
   facts.obstacles = static_cast<unsigned>(w.obstacles.size());
   facts.sleep = w.def.sleep != 0;
+  facts.attachments = static_cast<unsigned>(w.attachments.size());
   put(prescribed(w), facts);
   step.exchange.clear();
   view_bodies(w, step, facts);
@@ -325,6 +347,7 @@ void prepare(World &w, const RestoredChoice *restored) {
   make_pair_tables(w, step, facts);
   choose_plan(w, step, facts);
   if (!restored && !w.plan.touches()) end_contacts(w);
+  if (!w.plan.has(StageRole::finds_contacts) && !facts.self_bodies) step.contacts.clear();
 
   const double before = w.offset;
   w.offset = restored ? restored->offset : choose_offset(w);

@@ -134,9 +134,9 @@ void sum_rigid_impulses(World &w, StepContext &step) {
   for (auto &set : w.rigid_sets) std::fill(set->impulse.begin(), set->impulse.end(), 0.0);
   const ContactRows &rows = step.rows;
   if (!w.plan.touches() || rows.rigid.empty()) return;
-  for (uint32_t i = 0; i < rows.n; ++i) {
+  for (uint32_t i = 0; i < rows.all(); ++i) {
     if (rows.rigid[i] == kNone) continue;
-    const Obstacle &o = *w.obstacles[step.contacts[i].slot_b];
+    const Obstacle &o = *w.obstacles[i < rows.n ? step.contacts[i].slot_b : step.bonds[i - rows.n].slot_b];
     const double *const f = &rows.frame[size_t(9) * i], *const l = &rows.impulse[size_t(3) * i];
     const Vec3 p = l[0] * load3(f) + l[1] * load3(f + 3) + l[2] * load3(f + 6);
     double *const to = &o.rigid->impulse[6 * size_t{o.rigid_body}];
@@ -196,7 +196,7 @@ bool stage_rigid_commit(World &w, StepContext &step, uint32_t *trouble) {
     sum_rigid_impulses(w, step);
     const int end = ask_rigid_ends(w, trouble);
     if (end == 0) return false;
-    if (end == 1 || round == DFM_RIGID_MOST_AGAIN || !w.plan.touches() || step.rows.n == 0) break;
+    if (end == 1 || round == DFM_RIGID_MOST_AGAIN || !w.plan.touches() || step.rows.all() == 0) break;
     step.rigid_again = true;
     ++w.stats.rigid_again;
     if (!ask_rigids(w, trouble) || !stage_solve(w, step, trouble)) return false;

@@ -96,12 +96,13 @@ void choose_self_bodies(World &w, StepContext &step, SceneFacts &facts, std::vec
     if (promises(*b) || when == DFM_SELF_OFF) continue;
     const auto same =
         std::find_if(before.begin(), before.end(), [&](auto &s) { return s && s->id == b->id; });
-    step.self_bodies.push_back(same != before.end() ? std::move(*same)
-                                                    : std::make_unique<SelfBody>(w.memory(), *b));
+    step.self_bodies.push_back(same != before.end()
+                                   ? std::move(*same)
+                                   : std::make_unique<SelfBody>(w.meters.detection.memory(), *b));
     SelfBody &self = *step.self_bodies.back();
     if (when == DFM_SELF_ON) self.watch.reset();
     else if (!self.watch)
-      self.watch = std::make_unique<SelfWatch>(w.memory(), b->surface, self.rest, self.list);
+      self.watch = std::make_unique<SelfWatch>(w.meters.detection.memory(), b->surface, self.rest, self.list);
     find_law(w, b->slot, b->slot, used);
     for (const uint32_t law : used) offer_law(*w.laws[law], facts);
   }

@@ -52,6 +52,16 @@ double settled_from(const Body &b) {
   return t;
 }
 
+// Bodies of which `counts` holds share an island with those that they are attached to.
+template <class Counts>
+void join_attached(World &w, Counts counts) {
+  for (const Attachment &a : w.attachments) {
+    const uint32_t i = slot_of(w, a.body), j = a.obstacle ? kNone : slot_of(w, a.to);
+    if (j != kNone && !a.released && counts(*w.bodies[i]) && counts(*w.bodies[j]))
+      w.steps->islands.join(i, j);
+  }
+}
+
 bool asleep(const World &w, uint64_t id) {
   const uint32_t i = slot_of(w, id);
   return i != kNone && w.bodies[i]->slumber.asleep;
@@ -64,6 +74,12 @@ uint32_t slot_of(const World &w, uint64_t id) {
   const auto at = std::lower_bound(w.bodies.begin(), w.bodies.end(), id,
                                    [](const auto &b, uint64_t value) { return b->id < value; });
   return at != w.bodies.end() && (*at)->id == id ? static_cast<uint32_t>(at - w.bodies.begin()) : kNone;
+}
+
+uint32_t obstacle_slot_of(const World &w, uint64_t id) {
+  const auto at = std::lower_bound(w.obstacles.begin(), w.obstacles.end(), id,
+                                   [](const auto &o, uint64_t value) { return o->id < value; });
+  return at != w.obstacles.end() && (*at)->id == id ? static_cast<uint32_t>(at - w.obstacles.begin()) : kNone;
 }
 
 // Which bodies the stages of a sub-step work on, and whom contact impulses go to.
@@ -104,6 +120,8 @@ void rouse(World &w, std::span<const uint32_t> slots) {
     Body &b = *w.bodies[i];
     if (b.slumber.asleep) {
       b.contact_impulse += (w.time - b.slumber.since) * b.slumber.force;
+      for (Attachment &a : w.attachments)
+        if (a.body == b.id && a.h > 0) a.total += ((w.time - b.slumber.since) / a.h) * a.sum();
       step.woken.push_back(i);
     }
     b.slumber = {};
@@ -122,6 +140,7 @@ void wake(World &w, Body &b) {
     if (i != kNone && j != kNone && w.bodies[i]->slumber.asleep && w.bodies[j]->slumber.asleep)
       step.islands.join(i, j);
   }
+  join_attached(w, [](const Body &x) { return x.slumber.asleep; });
   step.islands.finish();
   const uint32_t k = step.islands.of[slot_of(w, b.id)];
   rouse(w, {&step.islands.member[step.islands.begin[k]], step.islands.begin[k + 1] - step.islands.begin[k]});
@@ -175,6 +194,7 @@ void stage_sleep(World &w, StepContext &step) {
   step.islands.start(static_cast<uint32_t>(w.bodies.size()));
   for (size_t i = 0; i < n; ++i)
     if (!step.contacts[i].obstacle) step.islands.join(step.contacts[i].slot_a, step.contacts[i].slot_b);
+  join_attached(w, [](const Body &b) { return !b.slumber.asleep; });
   step.islands.finish();
   step.stirred.assign(step.islands.count, 0);
   const double creep = w.def.contact_tolerance > 0 ? w.def.contact_tolerance : 1e-6;
@@ -192,6 +212,12 @@ void stage_sleep(World &w, StepContext &step) {
         step.state.mode[i] != 1 && (l[1] != 0 || l[2] != 0) && s1 * s1 + s2 * s2 > creep * creep;
     const bool pushed = c.obstacle && (w.obstacles[c.slot_b]->rigid || step.obstacle_views[c.slot_b].moves());
     if (slides || pushed) step.stirred[step.islands.of[c.slot_a]] = 1;
+  }
+  for (const Attachment &a : w.attachments) {
+    if (!a.obstacle) continue;
+    const uint32_t slot = obstacle_slot_of(w, a.to);
+    if (w.obstacles[slot]->rigid || step.obstacle_views[slot].moves())
+      step.stirred[step.islands.of[slot_of(w, a.body)]] = 1;
   }
   bool any = false;
   for (const uint32_t i : step.active)

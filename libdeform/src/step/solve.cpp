@@ -13,6 +13,7 @@
 #include "contact/solver.h"
 #include "core/error.h"
 #include "state/world.h"
+#include "step/attach.h"
 #include "step/bristles.h"
 #include "step/context.h"
 #include "step/pair_table.h"
@@ -48,6 +49,7 @@ void apply_last(ContactRows &rows) {
     if (!(rows.wn[i] > 0)) l[0] = l[1] = l[2] = 0;
     else if (l[0] != 0) rows.apply(i, load3(l));
   }
+  for (uint32_t i = rows.n; i < rows.all(); ++i) rows.apply(i, load3(&rows.impulse[size_t(i) * 3]));
 }
 
 constexpr uint32_t kMostRevisions = 6;  // of what rigid hosts take for granted, within a sub-step
@@ -168,7 +170,7 @@ void sweep_until_good(World &w, StepContext &step, Acceleration &acceleration, c
   step.best_impulse.assign(step.rows.impulse.begin(), step.rows.impulse.end());
   acceleration.start(step.rows);
   for (;;) {
-    charge(w, step, step.rows.n);
+    charge(w, step, step.rows.all());
     sweep(step.rows, step.state, step.h);
     ++step.sweeps;
     const Residual left = inner_residual(step.rows, step.state, step.h, tolerance);
@@ -185,7 +187,7 @@ void sweep_until_good(World &w, StepContext &step, Acceleration &acceleration, c
     acceleration.follow(step.rows);
   }
   if (std::isinf(best)) return;
-  for (uint32_t i = 0; i < step.rows.n; ++i) {
+  for (uint32_t i = 0; i < step.rows.all(); ++i) {
     double *const l = &step.rows.impulse[size_t(i) * 3];
     const Vec3 change = load3(&step.best_impulse[size_t(i) * 3]) - load3(l);
     if (change.x == 0 && change.y == 0 && change.z == 0) continue;
@@ -210,7 +212,8 @@ void make_rows(World &w, StepContext &step) {
   }
   if (!w.pairs.zone_table.empty()) set_zone_laws(w, step.contacts, step.state.law);
   if (step.rigid_again) step.best_impulse.assign(step.rows.impulse.begin(), step.rows.impulse.end());
-  step.rows.build(step.contacts, step.sources, {step.rigid_places, step.rigid_groups});
+  make_bonds(w, step, step.rigid_again || step.guard.resolving);
+  step.rows.build(step.contacts, step.sources, {step.rigid_places, step.rigid_groups}, step.bonds);
   correct_rigids(w, step);
   fill_responses(w, step);
   step.tangents.resize(size_t(3) * n);
@@ -219,7 +222,9 @@ void make_rows(World &w, StepContext &step) {
   share_areas(w, step);
   fit_bristles(w, step);
   step.rows.recovery = w.def.recovery_speed;
-  step.rows.finish(step.contacts, step.tangents.data(), step.h, step.guard.planned, w.offset);
+  step.rows.finish(step.contacts, step.tangents.data(), step.h, step.guard.planned, w.offset, step.bonds);
+  std::copy(step.bond_impulse.begin(), step.bond_impulse.end(),
+            step.rows.impulse.begin() + std::ptrdiff_t{3} * step.rows.n);
   if (step.guard.resolving) guard_impulses(step);
   if (!step.guard.kept.empty()) guard_rates(step);
   if (step.rigid_again) step.rows.impulse.assign(step.best_impulse.begin(), step.best_impulse.end());
@@ -238,7 +243,7 @@ const LawInstance *solve_rows(World &w, StepContext &step) {
           : ToleranceBounds{least, memory || step.bodies_revise ? kRememberedRest * least : gap_margin,
                             memory ? kRememberedShare * gap_margin : gap_margin};
   for (;;) {
-    charge(w, step, 4 * uint64_t{step.rows.n});
+    charge(w, step, 4 * uint64_t{step.rows.all()});
     const double *const response = trial_response(w, step);
     set_trial(step.rows, step.h, response, step.state);
     // The sweeps take the next Newton step from there: what is asked a hundredth off is answered to a
@@ -267,7 +272,7 @@ namespace {
 
 // After the operator has changed.
 void finish_rows(World &w, StepContext &step) {
-  step.rows.finish(step.contacts, step.tangents.data(), step.h, step.guard.planned, w.offset);
+  step.rows.finish(step.contacts, step.tangents.data(), step.h, step.guard.planned, w.offset, step.bonds);
   if (!step.guard.kept.empty()) guard_rates(step);
 }
 
@@ -285,7 +290,7 @@ enum class Revised { nothing, something, diverged, failed };
 // answer then is put in the place of what they answered before; impulses stay.
 Revised revise_bodies(World &w, StepContext &step, bool last = false) {
   if (!step.bodies_revise) return Revised::nothing;
-  dfm::distribute(step.contacts, step.rows.frame.data(), step.rows.impulse.data(), step.sinks);
+  row::distribute(w, step, nullptr);
   bool velocities = false, responses = false;
   for (const ContactRows::Block &block : step.rows.blocks) {
     if (block.group != kNone) continue;
@@ -368,6 +373,13 @@ bool contacts_taken(World &w, StepContext &step) {
     if (!w.bodies[c.slot_a]->dynamics->take_contact()) all = false;
     if (!c.obstacle && !w.bodies[c.slot_b]->dynamics->take_contact()) all = false;
   }
+  for (const Attachment &a : w.attachments) {
+    if (a.released) continue;
+    for (const uint64_t id : {a.body, a.to})
+      if (const uint32_t slot = slot_of(w, id);
+          slot != kNone && !w.bodies[slot]->slumber.asleep && !w.bodies[slot]->dynamics->take_contact())
+        all = false;
+  }
   step.guard.again = step.guard.again || !all;
   return all;
 }
@@ -396,7 +408,7 @@ bool stage_solve(World &w, StepContext &step, uint32_t *trouble) {
   step.residual = {};
   make_rows(w, step);
   apply_last(step.rows);
-  if (step.rows.n == 0) {
+  if (step.rows.all() == 0) {
     w.stats.passes = w.stats.sweeps = 0;
     w.stats.residual = 0;
     reserve_contacts(w, step);
@@ -415,6 +427,8 @@ bool stage_solve(World &w, StepContext &step, uint32_t *trouble) {
     *trouble |= tell_failed_solve(w, step, bad);
     return false;
   }
+  step.bond_impulse.assign(step.rows.impulse.begin() + std::ptrdiff_t{3} * step.rows.n,
+                           step.rows.impulse.end());
   // laws may have been asked beside the slips that were solved for
   std::swap(step.state.vt, step.state.slip);
   if (step.residual.due > 1) {

@@ -96,7 +96,8 @@ void reserve_events(World &w, size_t more);
 void add_event(World &w, uint32_t kind, uint64_t a, uint64_t b, uint64_t key, double t);  // a, b: ids
 
 // sleep.cpp
-uint32_t slot_of(const World &w, uint64_t id);  // of a body, or kNone
+uint32_t slot_of(const World &w, uint64_t id);           // of a body, or kNone
+uint32_t obstacle_slot_of(const World &w, uint64_t id);  // of an obstacle, or kNone
 void gather_active(World &w);
 // waking and falling asleep allocate nothing, and cannot fail
 void reserve_sleep(World &w, StepContext &step, uint32_t n);

@@ -17,6 +17,7 @@
 #include "core/error.h"
 #include "state/bounds.h"
 #include "state/world.h"
+#include "step/attach.h"
 #include "step/context.h"
 #include "step/energy_watch.h"
 #include "step/method.h"
@@ -103,7 +104,9 @@ bool self(World &w, StepContext &step, uint32_t *) {
 }
 bool distribute(World &, StepContext &step, uint32_t *) {
   step.ended = false;
-  dfm::distribute(step.contacts, step.rows.frame.data(), step.rows.impulse.data(), step.sinks);
+  const ContactRows &rows = step.rows;
+  dfm::distribute(step.contacts, rows.frame.data(), rows.impulse.data(), step.sinks, step.bonds,
+                  rows.impulse.data() + size_t{3} * rows.n);
   return true;
 }
 bool sleep(World &w, StepContext &step, uint32_t *) {
@@ -114,6 +117,7 @@ bool sleep(World &w, StepContext &step, uint32_t *) {
 }  // namespace row
 
 dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
+  drop_released(w);
   prepare(w);
   check_target_speeds(w, dt);
   release_overlaps(w);
@@ -174,6 +178,7 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
   }
   w.stats.last_substeps = done;
   w.stats.substeps_max = std::max(w.stats.substeps_max, done);
+  drop_released(w);
   ++w.step_count;
   w.stats.steps = w.step_count;
   w.stats.time = w.time;
@@ -195,6 +200,7 @@ bool advance(World &w, StepContext &step, double end, double goal, bool last, ui
     if (step.h < step.left || (w.def.sleep && !all_idle(w, step))) keep_start(w, step);
     charge(w, step, 1);
     view_obstacles(w, step);
+    wake_attached(w, step);
     if (all_idle(w, step)) {
       w.stats.contacts_mean += (w.stats.contacts - w.stats.contacts_mean) / double(w.stats.substeps + 1);
       w.step_impulses.idle += step.h;

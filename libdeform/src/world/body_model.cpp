@@ -203,7 +203,6 @@ void make_selected(World &w, Body &b, const dfm_type &type, std::vector<double> 
 
 void make_model(World &w, Body &b, const dfm_type &type, std::vector<double> values, int32_t integrator,
                 BodyModel &out) {
-  const Memory &m = w.memory();
   const auto implicit = implicit_of(w, b.name, integrator, out.integrator);
   const OnBehalf speaks(b.name);
   make_selected(w, b, type, std::move(values), out);
@@ -215,7 +214,8 @@ void make_model(World &w, Body &b, const dfm_type &type, std::vector<double> val
     Lent &operator=(const Lent &) = delete;
     ~Lent() { a.swap(b); }
   } lent(b.model, out.instance);
-  out.dynamics = make_dynamics(m, b.p, b.surface, b.model, b.edges, implicit ? &*implicit : nullptr);
+  out.dynamics = make_dynamics(w.meters.dynamics.memory(), b.p, b.surface, b.model, b.edges,
+                               implicit ? &*implicit : nullptr);
   if (!implicit) ask_explicit_bound(w, *out.dynamics, out.integrator);
   if (!out.dynamics->abilities().placed) need_ability(w, Ability::self_stepping, "body", b.name);
 }

@@ -11,6 +11,7 @@
 #include "mesh/mesh.h"
 #include "state/bounds.h"
 #include "state/material.h"
+#include "step/attach.h"
 #include "step/context.h"
 #include "step/method.h"
 #include "step/stages.h"
@@ -192,7 +193,7 @@ void take_triangles(Obstacle &o, const dfm_obstacle_def &def) {
       fail(DFM_E_ARG, "obstacle '%s': triangle %u names a point twice; drop it (dfm_trimesh_create does)",
            name, t);
   }
-  const Memory &m = o.world->memory();
+  const Memory &m = o.world->meters.obstacles.memory();
   o.points = Array<double>(def.points, def.points + size_t(3) * def.npoint, HookAllocator<double>(m));
   o.triangles =
       Array<uint32_t>(def.triangles, def.triangles + size_t(3) * def.ntriangle, HookAllocator<uint32_t>(m));
@@ -247,7 +248,7 @@ Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def) {
   auto owned = std::make_unique<Obstacle>();
   Obstacle &o = *owned;
   o.world = &w;
-  o.search = std::make_unique<SearchTree>(w.memory());
+  o.search = std::make_unique<SearchTree>(w.meters.obstacles.memory());
   o.name = def.name ? def.name : "obstacle" + std::to_string(w.next_id);
   check_name(w, o.name, "obstacle");
   const char *const name = o.name.c_str();
@@ -286,9 +287,9 @@ Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def) {
   if (def.shape == DFM_SHAPE_MESH || def.shape == DFM_SHAPE_VOXELS) take_triangles(o, def);
   else o.def.npoint = o.def.ntriangle = 0;
   if (def.shape == DFM_SHAPE_MESH)
-    o.mesh = std::make_unique<ObstacleMesh>(w.memory(), def.npoint, o.points.data(), def.ntriangle,
-                                            o.triangles.data());
-  if (def.shape == DFM_SHAPE_VOXELS) make_voxels(o, w.memory());
+    o.mesh = std::make_unique<ObstacleMesh>(w.meters.obstacles.memory(), def.npoint, o.points.data(),
+                                            def.ntriangle, o.triangles.data());
+  if (def.shape == DFM_SHAPE_VOXELS) make_voxels(o, w.meters.obstacles.memory());
   o.pose = o.pose_at_time(w.time);
   check_motion_speed(w, o);
   check_velocity("obstacle", name, load3(def.velocity_surface));
@@ -311,6 +312,7 @@ namespace {
 // What remembers the removed thing: its contacts end with an event, its friction work leaves the books, and
 // rules that name it go with it.
 void forget(World &w, uint64_t id, bool obstacle, uint64_t handle, const std::string &name) {
+  drop_attachments(w, id);
   close_slot(w, id, obstacle);
   ContactStore &s = w.store;
   reserve_events(w, s.n);

@@ -156,6 +156,21 @@ std::string changes(const Body &b) {
   return ",\"changes\":[" + join(rows, ",") + "]";
 }
 
+// What of it is held by what.
+std::string attachments(const Body &b) {
+  std::vector<std::string> rows;
+  const auto name = [&](const Attachment &a) -> const std::string & {
+    const World &w = *b.world;
+    return a.obstacle ? w.obstacles[obstacle_slot_of(w, a.to)]->name : w.bodies[slot_of(w, a.to)]->name;
+  };
+  for (const Attachment &a : b.world->attachments)
+    if (a.body == b.id && !a.released)
+      rows.push_back("{\"to\":" + quote(name(a)) +
+                     format(",\"surfels\":%zu,\"stiffness\":%.9g,\"damping\":%.9g,\"release\":%.9g}",
+                            a.surfels.size(), a.stiffness, a.damping, a.release));
+  return ",\"attached\":[" + join(rows, ",") + "]";
+}
+
 // Where a body's numbers come from: its cells, its surface, and the parameters that differ by cell.
 std::string body(const Body &b) {
   std::string out = "{\"name\":" + quote(b.name) + ",\"model\":" + quote(b.model.type->id);
@@ -180,7 +195,7 @@ std::string body(const Body &b) {
     out += (first ? "" : ",") + ("{\"name\":" + quote(p.key) + ",\"why\":" + quote(p.why) + "}");
     first = false;
   }
-  return out + "]" + changes(b) + ",\"unwatched\":" + quote(unwatched(*b.world, b)) + "}";
+  return out + "]" + changes(b) + attachments(b) + ",\"unwatched\":" + quote(unwatched(*b.world, b)) + "}";
 }
 
 std::string seconds(double s) { return std::isfinite(s) ? format("%.3g s", s) : "any step"; }

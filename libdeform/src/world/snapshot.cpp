@@ -259,6 +259,27 @@ void rule_fields(Stream &s, W &w, uint64_t laws) {
 }
 
 template <class Stream, class W>
+void attachment_fields(Stream &s, W &w) {
+  s.list("attachments", w.attachments, [&](auto &a) {
+    s.value("attachment number", a.number, must::any);
+    s.value("attached body", a.body, must::any);
+    s.value("attached to", a.to, must::any);
+    s.value("attached to an obstacle", a.obstacle, must::flag);
+    s.value("attachment flags", a.flags, must::at_most(DFM_ATTACH_TOUCH));
+    for (auto *x : {&a.stiffness, &a.damping, &a.release, &a.h})
+      s.value("attachment values", *x, must::not_negative);
+    s.array("attached surfels", a.surfels, kAnyCount, must::any);
+    const uint64_t n = a.surfels.size(), anchors = a.obstacle ? 0 : kAnchors * n;
+    s.array("attached places", a.place, a.obstacle ? 3 * n : 0, must::finite);
+    s.array("attached nodes", a.node, anchors, must::any);
+    s.array("attached weights", a.weight, anchors, must::finite);
+    s.array("attachment impulse", a.impulse, 3 * n, must::finite);
+    s.value("attachment total", a.total, must::finite);
+    s.value("attachment released", a.released, must::flag);
+  });
+}
+
+template <class Stream, class W>
 void fields(Stream &s, W &w, const World &like) {
   s.list("laws", w.laws, [&](auto &entry) {
     auto &l = object(entry);
@@ -333,6 +354,7 @@ void fields(Stream &s, W &w, const World &like) {
     s.array("impulse", r.total, l.total.size(), must::finite);
   });
   s.where("", "");
+  attachment_fields(s, w);
   rule_fields(s, w, w.laws.size());
   contact_fields(s, w.store, w.laws.size());
   s.array("friction work", w.work, kAnyCount,
@@ -405,6 +427,15 @@ bool good_aside(const std::vector<PairAside> &pairs, const Things &things) {
   });
 }
 
+bool good_attachments(const std::vector<Attachment> &list, const Things &things) {
+  return std::all_of(list.begin(), list.end(), [&](const Attachment &a) {
+    const Body *const b = things.body(a.body), *const to = a.obstacle ? nullptr : things.body(a.to);
+    if (!b || b == to || !(a.obstacle ? things.obstacle(a.to) != nullptr : to != nullptr)) return false;
+    return !a.surfels.empty() && below(a.surfels, b->surface.nsurfel) &&
+           (!to || below(a.node, to->surface.nsurfel));
+  });
+}
+
 bool good_report(const Staged &t, const World &w) {
   const Report &r = t.report;
   if (r.n != t.store.n) return false;
@@ -435,6 +466,7 @@ void check(const SnapshotReader &s, const Staged &t, const World &w) {
   if (!good_work(t.work, {w})) s.refuse("friction work", "pairs that are there, in order");
   if (!good_aside(t.overlaps.aside, {w}))
     s.refuse("pairs that are set aside", "bodies and obstacles that are there");
+  if (!good_attachments(t.attachments, {w})) s.refuse("attachments", "surfels of bodies that are there");
   size_t sleepers = 0;
   for (const StagedBody &b : t.bodies) sleepers += b.slumber.asleep;
   if (sleepers != t.sleepers) s.refuse("sleepers", "as many as sleep");
@@ -611,6 +643,7 @@ void exchange(World &w, Staged &t) noexcept {
   }
   w.friction.swap(t.friction);
   w.filters.swap(t.filters);
+  w.attachments.swap(t.attachments);
   w.overlaps.aside.swap(t.overlaps.aside);
   w.gravity.keys.swap(t.gravity.keys);
   w.work.swap(t.work);

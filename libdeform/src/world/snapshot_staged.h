@@ -74,13 +74,14 @@ struct Staged {
   std::vector<StagedLaw> laws;
   std::vector<FrictionRule> friction;
   std::vector<FilterRule> filters;
+  std::vector<Attachment> attachments;
   ContactStore store;
   struct { std::vector<PairAside> aside; } overlaps;
   std::vector<PairWork> work;
   Report report;
   std::vector<dfm_contact_event> events;  // none
   std::vector<Swap> swaps;                // none
-  explicit Staged(const World &w) : store(w.memory()), report(w.memory()) {
+  explicit Staged(const World &w) : store(w.meters.contacts.memory()), report(w.meters.contacts.memory()) {
     const Memory &m = w.memory();
     def.method = w.def.method;
     bodies.resize(w.bodies.size());

@@ -32,8 +32,12 @@ Pose Obstacle::pose_at_time(double t) const {
 }
 
 World::World(dfm_context *c)
-    : context(c), steps(std::make_unique<StepContext>(c->memory)), store(c->memory), report(c->memory) {
-  use_memory(c->memory, step_impulses.pairs);
+    : context(c),
+      meters(c->memory),
+      steps(std::make_unique<StepContext>(meters)),
+      store(meters.contacts.memory()),
+      report(meters.contacts.memory()) {
+  use_memory(meters.contacts.memory(), step_impulses.pairs);
   stats.size = sizeof stats;
   use_method(*this, velocity_method());
 }

@@ -1,0 +1,55 @@
+#include "deform/attach.h"
+
+#include <algorithm>
+
+#include "api/objects.h"
+#include "world/attach.h"
+
+using namespace dfm;
+
+void dfm_attach_def_default_sized(uint32_t size, dfm_attach_def *out) {
+  dfm_attach_def d{};
+  d.size = sizeof d;
+  dfm::give_default(size, out, d);
+}
+
+dfm_status dfm_body_attach(dfm_body body, const dfm_attach_def *def, uint32_t *attachment) {
+  return as_status([&] {
+    Body &b = body_of(body);
+    exclusive(*b.world);
+    need(def, "def");
+    const dfm_attach_def own = take_def(def, dfm_attach_def_default());
+    check_flags(own, DFM_ATTACH_TOUCH, "dfm_attach_def");
+    const bool to_body = dfm_handle_kind(own.to) == DFM_HANDLE_BODY;
+    const uint32_t number =
+        to_body ? attach(b, own, &body_of(own.to), nullptr) : attach(b, own, nullptr, &obstacle_of(own.to));
+    if (attachment) *attachment = number;
+  });
+}
+
+dfm_status dfm_body_detach(dfm_body body, uint32_t attachment) {
+  return as_status([&] {
+    Body &b = body_of(body);
+    exclusive(*b.world);
+    detach(b, attachment);
+  });
+}
+
+dfm_status dfm_body_attachments(dfm_body body, uint32_t capacity, uint32_t *out, uint32_t *n) {
+  return as_status([&] {
+    const Body &b = shown_body_of(body);
+    const auto own = [&](const Attachment &a) { return a.body == b.id; };
+    const auto &list = b.world->attachments;
+    if (!room(static_cast<uint32_t>(std::count_if(list.begin(), list.end(), own)), capacity, out, n)) return;
+    for (const Attachment &a : list)
+      if (own(a)) *out++ = a.number;
+  });
+}
+
+dfm_status dfm_body_get_attachment(dfm_body body, uint32_t attachment, dfm_attachment *out) {
+  return as_status([&] {
+    const Body &b = body_of(body);
+    settled(*b.world);
+    give(out, attachment_report(b, attachment));
+  });
+}

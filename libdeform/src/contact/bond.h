@@ -1,0 +1,33 @@
+// A surfel of body a that is held at a place of something else: three rows of the contact solve, in the axes
+// of the world.
+//
+//     u + rate + soft l = 0      u: mean velocity of the surfel against the place; l: impulse on it, N s
+//
+// Rigid: rate = gap / h and soft = 0, so the surfel ends where it is held. With a stiffness k and a damping c
+// the force is -k (gap + h u) - c u, that of a spring and a damper at the end of the sub-step, which no
+// stiffness makes unstable: with s = h^2 k + h c, rate = h k gap / s and soft = 1 / s.
+//
+// What l does to the surfel, -l does to the place: to a body's surfels by the weights that also read their
+// velocity, to a rigid body at the surfel's own point. Both momenta are therefore kept whatever the solve has
+// left over.
+#pragma once
+#include <cstdint>
+
+#include "core/memory.h"
+#include "math/vec3.h"
+
+namespace dfm {
+
+// Nodes are world-wide surfel numbers (contact_set.h). The first is the surfel, of weight 1; those behind it
+// are of body b, and their weights sum to -1.
+struct Bond {
+  uint32_t slot_a, slot_b;  // slot_b: obstacle slot where obstacle != 0
+  uint8_t obstacle, nnode;
+  uint32_t node[5];
+  double weight[5];
+  Vec3 velocity;  // m/s of the place on an obstacle, mean over the sub-step; 0 for bodies
+  Vec3 rate;      // m/s
+  double soft;    // 1/kg
+};
+
+}  // namespace dfm

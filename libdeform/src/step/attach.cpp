@@ -1,0 +1,178 @@
+#include "step/attach.h"
+
+#include <algorithm>
+
+#include "core/error.h"
+#include "deform/attach.h"
+#include "state/world.h"
+#include "step/context.h"
+#include "step/rigid.h"
+#include "step/stages.h"
+
+namespace dfm {
+namespace {
+
+bool feels(const Obstacle &o) { return o.rigid && o.rigid->group[o.rigid_body] != DFM_RIGID_STILL; }
+
+// Mean velocity of a rigid body's point at this arm without contact: its way over the sub-step to third order
+// of the spin that the body starts with, as its shapes move (shape_velocity).
+Vec3 rigid_velocity(const Obstacle &o, Vec3 arm, double h) {
+  const double *const v = &o.rigid->first[6 * size_t{o.rigid_body}];
+  const Vec3 turn = load3(o.rigid->state[o.rigid_body].spin);
+  const Vec3 second = cross(turn, cross(turn, arm)), third = cross(turn, second);
+  return load3(v) + cross(load3(v + 3), arm) + (0.5 * h) * second + (h * h / 6) * third;
+}
+
+void set_nodes(const StepContext &step, const Attachment &a, size_t i, uint32_t slot_b, Bond &b) {
+  const BodyView &other = step.body_views[slot_b];
+  for (uint32_t k = 0; k < kAnchors; ++k) {
+    const double weight = a.weight[kAnchors * i + k];
+    if (weight == 0) continue;
+    b.node[b.nnode] = other.first_node + a.node[kAnchors * i + k];
+    b.weight[b.nnode] = -weight;
+    ++b.nnode;
+  }
+}
+
+// The gap is closed within the sub-step. One that a host has made, beyond d_c, closes by d_c at most, or at
+// recovery_speed: it would throw the body.
+Vec3 closing(const World &w, const StepContext &step, Vec3 gap) {
+  const double most = w.def.recovery_speed > 0 ? w.def.recovery_speed : w.offset / step.guard.planned;
+  const Vec3 rate = (1 / step.h) * gap;
+  const double speed = norm(rate);
+  return norm(gap) > w.offset && speed > most ? (most / speed) * rate : rate;
+}
+
+void add_bonds(World &w, StepContext &step, const Attachment &a) {
+  const uint32_t slot_a = slot_of(w, a.body);
+  const BodyView &body = step.body_views[slot_a];
+  const size_t n = a.surfels.size();
+  // the whole's, shared by its points
+  const double share = 1 / double(n), spring = step.h * (step.h * a.stiffness + a.damping) * share;
+  for (size_t i = 0; i < n; ++i) {
+    Bond b{};
+    b.slot_a = slot_a;
+    b.obstacle = static_cast<uint8_t>(a.obstacle);
+    b.nnode = 1;
+    b.node[0] = body.first_node + a.surfels[i];
+    b.weight[0] = 1;
+    const Vec3 x = load3(&body.surface->x[size_t{4} * a.surfels[i]]);
+    const Vec3 held = attached_place(w, a, i), gap = x - held;
+    if (a.obstacle) {
+      b.slot_b = obstacle_slot_of(w, a.to);
+      const Obstacle &o = *w.obstacles[b.slot_b];
+      if (feels(o)) {
+        b.velocity = rigid_velocity(o, x - step.rigid_places[b.slot_b].center, step.h);
+      } else if (step.obstacle_views[b.slot_b].moves()) {
+        const Pose end = o.end_pose(w.time, step.h, step.left);
+        b.velocity = (1 / step.h) * (place(end, load3(&a.place[3 * i])) - held);
+      }
+    } else {
+      b.slot_b = slot_of(w, a.to);
+      set_nodes(step, a, i, b.slot_b, b);
+    }
+    if (spring > 0) {
+      b.rate = (step.h * a.stiffness * share / spring) * gap;
+      b.soft = 1 / spring;
+    } else {
+      b.rate = closing(w, step, gap);
+    }
+    step.bonds.push_back(b);
+  }
+}
+
+bool holds(const World &w, const Attachment &a) {
+  return !a.released && !w.bodies[slot_of(w, a.body)]->slumber.asleep;
+}
+
+void add_release(World &w, const Attachment &a, double t) {
+  add_event(w, DFM_EVENT_RELEASE, a.body, a.to, a.number, t);
+}
+
+// They may touch from now on, where they stand in each other.
+void part(World &w, const Attachment &a) {
+  w.overlaps.place(a.body);
+  w.changed = true;
+}
+
+}  // namespace
+
+Pose attached_frame(const Obstacle &o) {
+  if (!o.rigid) return o.pose;
+  const dfm_rigid_state &s = o.rigid->state[o.rigid_body];
+  return {load3(s.position), {s.rotation[0], s.rotation[1], s.rotation[2], s.rotation[3]}};
+}
+
+Vec3 attached_place(const World &w, const Attachment &a, size_t i) {
+  if (a.obstacle)
+    return place(attached_frame(*w.obstacles[obstacle_slot_of(w, a.to)]), load3(&a.place[3 * i]));
+  const Body &b = *w.bodies[slot_of(w, a.to)];
+  Vec3 x;
+  for (size_t k = kAnchors * i; k < kAnchors * (i + 1); ++k)
+    b.surface.each_phyxel(a.node[k], [&](uint32_t phyxel, double weight) {
+      x += (a.weight[k] * weight) * load3(&b.p.x[size_t{kStride} * phyxel]);
+    });
+  return x;
+}
+
+void make_bonds(World &w, StepContext &step, bool again) {
+  step.bonds.clear();
+  if (!again) step.bond_impulse.clear();
+  for (const Attachment &a : w.attachments) {
+    if (!holds(w, a)) continue;
+    add_bonds(w, step, a);
+    if (again) continue;
+    const double scale = a.h > 0 ? step.h / a.h : 0;
+    for (const double l : a.impulse) step.bond_impulse.push_back(scale * l);
+  }
+}
+
+void keep_bonds(World &w, StepContext &step) {
+  const double *l = step.rows.impulse.data() + size_t{3} * step.rows.n;
+  for (Attachment &a : w.attachments) {
+    if (!holds(w, a)) continue;
+    std::copy_n(l, a.impulse.size(), a.impulse.begin());
+    l += a.impulse.size();
+    a.h = step.h;
+    const Vec3 p = a.sum();
+    a.total += p;
+    // an equilibrium is not reached by what happens on the way
+    if (!(a.release > 0 && norm(p) > a.release * step.h) || w.prescribed.stands()) continue;
+    a.released = true;
+    add_release(w, a, w.time + step.h);
+  }
+}
+
+void drop_released(World &w) {
+  const auto gone = [](const Attachment &a) { return a.released; };
+  if (std::none_of(w.attachments.begin(), w.attachments.end(), gone)) return;
+  for (const Attachment &a : w.attachments)
+    if (a.released) part(w, a);
+  std::erase_if(w.attachments, gone);
+}
+
+void drop_attachments(World &w, uint64_t id) {
+  reserve_events(w, w.attachments.size());
+  const auto of = [&](const Attachment &a) { return a.body == id || a.to == id; };
+  for (const Attachment &a : w.attachments) {
+    if (!of(a)) continue;
+    if (!a.released) add_release(w, a, w.time);
+    for (const uint64_t side : {a.body, a.to})
+      if (const uint32_t slot = slot_of(w, side); slot != kNone) wake(w, *w.bodies[slot]);
+    part(w, a);
+  }
+  std::erase_if(w.attachments, of);
+}
+
+void wake_attached(World &w, StepContext &step) {
+  if (w.sleepers == 0) return;
+  for (const Attachment &a : w.attachments) {
+    if (!a.obstacle || !step.obstacle_views[obstacle_slot_of(w, a.to)].moves()) continue;
+    Body &b = *w.bodies[slot_of(w, a.body)];
+    if (!b.slumber.asleep) continue;
+    keep_start(w, step);
+    wake(w, b);
+  }
+}
+
+}  // namespace dfm

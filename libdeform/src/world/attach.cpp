@@ -1,0 +1,229 @@
+#include "world/attach.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "state/world.h"
+#include "step/attach.h"
+#include "step/energy_watch.h"
+#include "step/method.h"
+#include "step/stages.h"
+#include "world/queries.h"
+
+namespace dfm {
+namespace {
+
+// [nsurfel] 1: meant
+std::vector<uint8_t> selected(const Body &b, const dfm_attach_def &def) {
+  const Surface &s = b.surface;
+  const char *const name = b.name.c_str();
+  std::vector<uint8_t> out(s.nsurfel);
+  if ((def.npoint && !def.points) || (def.nsurfel && !def.surfels))
+    fail(DFM_E_ARG, "body '%s': points or surfels to attach are announced, but the list is NULL", name);
+  if (def.npoint && !s.identity())
+    fail(DFM_E_ARG,
+         "body '%s' has a surface of its own, of which no surfel is a point; name surfels, a group or a box",
+         name);
+  if (def.npoint) {
+    std::vector<uint32_t> surfel(b.p.n, kNone);
+    for (uint32_t i = 0; i < s.nsurfel; ++i) surfel[s.point[i]] = i;
+    for (uint32_t k = 0; k < def.npoint; ++k) {
+      if (def.points[k] >= b.p.n)
+        fail(DFM_E_ARG, "body '%s' has no point %u to attach; it has %u", name, def.points[k], b.p.n);
+      if (const uint32_t i = surfel[def.points[k]]; i != kNone) out[i] = 1;
+    }
+  }
+  for (uint32_t k = 0; k < def.nsurfel; ++k) {
+    if (def.surfels[k] >= s.nsurfel)
+      fail(DFM_E_ARG, "body '%s' has no surfel %u to attach; it has %u", name, def.surfels[k], s.nsurfel);
+    out[def.surfels[k]] = 1;
+  }
+  if (def.group) {
+    bool known = false;
+    std::vector<std::string> groups;
+    for (uint32_t z = 0; z < b.zones.list.size(); ++z) {
+      const std::string &group = b.zones.list[z].group;
+      if (!group.empty()) groups.push_back(group);
+      if (group != def.group) continue;
+      known = true;
+      for (uint32_t t = 0; t < s.ntri; ++t)
+        if (b.zones.of.empty() || b.zones.of[t] == z)
+          for (size_t k = 0; k < 3; ++k) out[s.tri[3 * size_t{t} + k]] = 1;
+    }
+    if (!known) {
+      const std::string near = nearest(def.group, groups);
+      fail(DFM_E_ARG, "the surface of body '%s' has no group '%s'%s", name, def.group,
+           near.empty() ? "" : ("; did you mean '" + near + "'?").c_str());
+    }
+  }
+  for (uint32_t i = 0; def.box && i < s.nsurfel; ++i) {
+    const Vec3 x = surfel_vector(b, b.p.x, i);
+    bool in = true;
+    for (int k = 0; k < 3; ++k) in = in && x[k] >= def.box[k] && x[k] <= def.box[3 + k];
+    if (in) out[i] = 1;
+  }
+  return out;
+}
+
+// Weights on three corners of a triangle and one surfel off its plane that give the point x and every linear
+// field: what is attached at a small distance then turns with the surface, and forces on it keep the angular
+// momentum. corner[3] has the weight 0 where x lies in the plane.
+struct Place {
+  uint32_t node[kAnchors];
+  double weight[kAnchors];
+};
+Place place_on(const Body &b, const TriangleNearPoint &near, Vec3 x) {
+  const Surface &s = b.surface;
+  const auto at = [&](uint32_t i) { return surfel_vector(b, b.p.x, i); };
+  Place p{};
+  for (uint32_t k = 0; k < 3; ++k) {
+    p.node[k] = s.tri[3 * size_t{near.triangle} + k];
+    p.weight[k] = near.at.weight[k];
+  }
+  p.node[3] = p.node[0];
+  const Vec3 a = at(p.node[0]), e1 = at(p.node[1]) - a, e2 = at(p.node[2]) - a;
+  Vec3 off = x - a;
+  for (uint32_t k = 1; k < 3; ++k) off -= p.weight[k] * (k == 1 ? e1 : e2);
+  if (!(norm(off) > 1e-12 * s.median_edge)) return p;
+  const Vec3 normal = normalized(cross(e1, e2));
+  double farthest = 0;
+  for (uint32_t i = 0; i < s.nsurfel; ++i)
+    if (const double height = std::fabs(dot(normal, at(i) - a)); height > farthest) {
+      farthest = height;
+      p.node[3] = i;
+    }
+  if (!(farthest > 1e-6 * s.median_edge)) return p;
+  const Vec3 e3 = at(p.node[3]) - a;
+  p.weight[3] = dot(normal, x - a) / dot(normal, e3);
+  const Vec3 r = x - a - p.weight[3] * e3;  // in the plane
+  const double g11 = norm2(e1), g22 = norm2(e2), g12 = dot(e1, e2), det = g11 * g22 - g12 * g12;
+  p.weight[1] = (g22 * dot(e1, r) - g12 * dot(e2, r)) / det;
+  p.weight[2] = (g11 * dot(e2, r) - g12 * dot(e1, r)) / det;
+  p.weight[0] = 1 - p.weight[1] - p.weight[2] - p.weight[3];
+  return p;
+}
+
+void place_on_body(const Body &b, const dfm_attach_def &def, Body &other, Attachment &a) {
+  for (uint32_t i = 0, n = 0; i < a.surfels.size(); ++i) {
+    const Vec3 x = surfel_vector(b, b.p.x, a.surfels[i]);
+    const TriangleNearPoint near = closest_on_body(other, x);
+    if (def.max_distance > 0 && near.key > def.max_distance * def.max_distance) continue;
+    const Place p = place_on(other, near, x);
+    a.node.insert(a.node.end(), p.node, p.node + kAnchors);
+    a.weight.insert(a.weight.end(), p.weight, p.weight + kAnchors);
+    a.surfels[n++] = a.surfels[i];
+  }
+  a.surfels.resize(a.weight.size() / kAnchors);
+}
+
+void place_on_obstacle(const Body &b, const Obstacle &o, Attachment &a) {
+  const Pose frame = attached_frame(o);
+  a.place.resize(3 * a.surfels.size());
+  for (size_t i = 0; i < a.surfels.size(); ++i)
+    store3(&a.place[3 * i],
+           rotate_back(frame.rotation, surfel_vector(b, b.p.x, a.surfels[i]) - frame.position));
+}
+
+void check_values(const Body &b, const dfm_attach_def &def) {
+  for (const double x : {def.max_distance, def.stiffness, def.damping, def.release})
+    if (!(x >= 0 && std::isfinite(x)))
+      fail(DFM_E_ARG,
+           "body '%s': max_distance, stiffness, damping and release of an attachment are zero or positive, "
+           "and "
+           "finite",
+           b.name.c_str());
+  if (def.box && !std::all_of(def.box, def.box + 6, [](double x) { return !std::isnan(x); }))
+    fail(DFM_E_ARG, "body '%s': the box of an attachment is not a number", b.name.c_str());
+}
+
+const Attachment &attachment_of(const Body &b, uint32_t number) {
+  for (const Attachment &a : b.world->attachments)
+    if (a.body == b.id && a.number == number && !a.released) return a;
+  fail(DFM_E_ARG, "body '%s' has no attachment %u", b.name.c_str(), number);
+}
+
+}  // namespace
+
+uint32_t attach(Body &b, const dfm_attach_def &def, Body *other, const Obstacle *obstacle) {
+  World &w = *b.world;
+  need_ability(w, Ability::attachments, "body", b.name);
+  check_values(b, def);
+  if (other == &b) fail(DFM_E_ARG, "body '%s' cannot be attached to itself", b.name.c_str());
+  if ((other ? other->world : obstacle->world) != &w)
+    fail(DFM_E_HANDLE, "body '%s' is to be attached to something of another world", b.name.c_str());
+  Attachment a;
+  const std::vector<uint8_t> meant = selected(b, def);
+  for (uint32_t i = 0; i < meant.size(); ++i)
+    if (meant[i]) a.surfels.push_back(i);
+  if (other) place_on_body(b, def, *other, a);
+  else place_on_obstacle(b, *obstacle, a);
+  if (a.surfels.empty())
+    fail(DFM_E_ARG,
+         "body '%s': nothing of its surface is attached: the points, surfels, group and box of the def name "
+         "none "
+         "that is near enough",
+         b.name.c_str());
+  a.number = b.next_load;
+  a.body = b.id;
+  a.to = other ? other->id : obstacle->id;
+  a.obstacle = !other;
+  a.flags = def.flags;
+  a.stiffness = def.stiffness;
+  a.damping = def.damping;
+  a.release = def.release;
+  a.impulse.assign(3 * a.surfels.size(), 0.0);
+  w.attachments.push_back(std::move(a));
+  ++b.next_load;
+  for (Body *one : {&b, other}) {
+    if (!one) continue;
+    wake(w, *one);
+    forget_energy(*one);
+  }
+  w.changed = true;
+  return w.attachments.back().number;
+}
+
+void detach(Body &b, uint32_t number) {
+  World &w = *b.world;
+  const Attachment &a = attachment_of(b, number);
+  if (const uint32_t slot = a.obstacle ? kNone : slot_of(w, a.to); slot != kNone) wake(w, *w.bodies[slot]);
+  wake(w, b);
+  w.overlaps.place(b.id);
+  w.attachments.erase(w.attachments.begin() + (&a - w.attachments.data()));
+  w.changed = true;
+}
+
+dfm_attachment attachment_report(const Body &b, uint32_t number) {
+  const World &w = *b.world;
+  const Attachment &a = attachment_of(b, number);
+  const size_t n = a.surfels.size();
+  std::vector<Vec3> x(n);
+  Vec3 middle;
+  dfm_attachment out{};
+  for (size_t i = 0; i < n; ++i) {
+    x[i] = surfel_vector(b, b.p.x, a.surfels[i]);
+    middle += (1 / double(n)) * x[i];
+    out.stretch = std::max(out.stretch, norm(x[i] - attached_place(w, a, i)));
+  }
+  Vec3 force, moment;
+  for (size_t i = 0; i < n && a.h > 0; ++i) {
+    const Vec3 f = (1 / a.h) * load3(&a.impulse[3 * i]);
+    force += f;
+    moment += cross(x[i] - middle, f);
+  }
+  out.flags = a.flags;
+  out.to = w.handle_of(a.to);
+  out.nsurfel = static_cast<uint32_t>(n);
+  out.stiffness = a.stiffness;
+  out.damping = a.damping;
+  out.release = a.release;
+  store3(out.point, middle);
+  store3(out.force, force);
+  store3(out.moment, moment);
+  const double asleep = b.slumber.asleep ? w.time - b.slumber.since : 0;
+  store3(out.impulse, a.total + asleep * force);
+  return out;
+}
+
+}  // namespace dfm

@@ -1,0 +1,114 @@
+// The key `attach` of a scene's bodies.
+#include <unistd.h>
+
+#include "support.h"
+#include "world.h"
+
+namespace {
+
+std::string scene(const std::string &attach, const std::string &surface = "") {
+  return R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.3, "step": 0.001},
+    "materials": {"gel": {"young": 2e5, "damping": {"mass": 20, "stiffness": 0.001}}},
+    "bodies": [{"name": "rope", "mesh": {"make": "beam", "size": [0.04, 0.04, 0.1], "cells": 80},
+      "material": "gel", "pose": {"position": [0, 0, 0.5], "scale": 2})" +
+         surface + R"(, "attach": )" + attach + R"(}],
+    "obstacles": [{"name": "hook", "shape": "sphere", "radius": 0.01,
+      "pose": {"position": [0.04, 0.04, 0.7]}}],
+    "rigid": {"bodies": [{"name": "brick", "shape": "box", "half_size": [0.05, 0.05, 0.02], "mass": 0.5,
+      "pose": {"position": [0.04, 0.04, 0.48]}}]}})";
+}
+
+struct Opened {
+  test::Context context;
+  dfm_scene scene = 0;
+  dfm_world world = 0;
+  dfm_status status;
+  explicit Opened(const std::string &text) {
+    const std::string path = test::scratch("attach_scene_" + std::to_string(getpid())) + "/scene.json";
+    test::write_file(path, text);
+    status = dfm_scene_open(context, path.c_str(), nullptr, &scene);
+    if (scene) test::ok(dfm_scene_world(scene, &world));
+  }
+  ~Opened() {
+    if (scene) dfm_scene_close(scene);
+  }
+  Opened(const Opened &) = delete;
+  Opened &operator=(const Opened &) = delete;
+};
+
+}  // namespace
+
+// The box is told in the mesh's frame, before the pose. Rope and brick hang with their weight.
+TEST(AttachScene, RopeBetweenHookAndBrick_CarriesBoth) {
+  const Opened s(scene(R"([{"to": "hook", "box": [[-1, -1, 0.199], [1, 1, 1]]},
+                           {"to": "brick", "box": [[-1, -1, -1], [1, 1, 0.001]], "release": 500}])"));
+  ASSERT_EQ(s.status, DFM_OK) << dfm_last_error();
+  dfm_body rope = 0;
+  test::ok(dfm_world_find_body(s.world, "rope", &rope));
+  test::run(s.world, 0.8, 1e-3);
+  const std::vector<uint32_t> numbers = test::listed(dfm_body_attachments, rope);
+  ASSERT_EQ(numbers.size(), 2u);
+  const double weight = 9.81 * test::measure(rope).mass, brick = 9.81 * 0.5;
+  for (int i = 0; i < 2; ++i) {
+    dfm_attachment a{};
+    a.size = sizeof a;
+    test::ok(dfm_body_get_attachment(rope, numbers[size_t(i)], &a));
+    EXPECT_GE(a.nsurfel, 4u);
+    EXPECT_EQ(a.release, i ? 500 : 0);
+    EXPECT_NEAR(a.force[2], i ? -brick : weight + brick, 0.02 * (weight + brick));
+  }
+  size_t bytes = 0;
+  test::ok(dfm_world_explain(s.world, nullptr, &bytes));
+  std::string text(bytes, ' ');
+  test::ok(dfm_world_explain(s.world, text.data(), &bytes));
+  EXPECT_NE(text.find("\"attached\":[{\"to\":\"hook\","), std::string::npos);
+  EXPECT_NE(text.find("2 attachments hold"), std::string::npos);
+}
+
+// The shipped scene: the jerk of the hook releases the tail, and not where more is allowed.
+TEST(AttachScene, Attached_LosesItsTail) {
+  for (const bool strong : {false, true}) {
+    const test::Context context;
+    const char *const release = "/bodies/1/attach/0/release=20";
+    dfm_scene_options options{};
+    options.size = sizeof options;
+    options.nset = strong;
+    options.set = &release;
+    dfm_scene scene = 0;
+    test::ok(dfm_scene_open(context, DEFORM_SOURCE_DIR "/examples/scenes/attached.json", &options, &scene));
+    dfm_world world = 0;
+    test::ok(dfm_scene_world(scene, &world));
+    dfm_body rope = 0, tail = 0;
+    test::ok(dfm_world_find_body(world, "rope", &rope));
+    test::ok(dfm_world_find_body(world, "tail", &tail));
+    const auto holds = [](dfm_body b) { return test::listed(dfm_body_attachments, b).size(); };
+    test::run(world, 0.85, 1e-3);
+    EXPECT_EQ(holds(tail), 1u);
+    test::run(world, 0.25, 1e-3);
+    EXPECT_EQ(holds(tail), strong ? 1u : 0u);
+    EXPECT_EQ(holds(rope), 2u);
+    EXPECT_EQ(test::stats(world).guard_cuts, 0u);
+    test::ok(dfm_scene_close(scene));
+  }
+}
+
+TEST(AttachScene, AWrongName_IsToldWithItsPlace) {
+  const Opened s(scene(R"([{"to": "hok", "box": [[-1, -1, 0.199], [1, 1, 1]]}])"));
+  EXPECT_EQ(s.status, DFM_E_ARG);
+  test::says({"/bodies/0/attach/0/to", "\"hok\"", "\"hook\""});
+}
+
+TEST(AttachScene, WhatIsNoAttachment_IsToldWithItsPlace) {
+  for (const auto &[attach, said] : std::vector<std::pair<std::string, std::string>>{
+           {R"([{"box": [[-1, -1, 0], [1, 1, 1]]}])", "to"},
+           {R"([{"to": "hook"}])", "box"},
+           {R"([{"to": "hook", "group": "lid"}])", "lid"},
+           {R"([{"to": "hook", "box": [[5, 5, 5], [6, 6, 6]]}])", "box"},
+           {R"([{"to": "rope", "box": [[-1, -1, 0.199], [1, 1, 1]]}])", "itself"},
+           {R"([{"to": "hook", "box": [[-1, -1, 0.199], [1, 1, 1]], "stiffness": -2}])", "stiffness"},
+           {R"([{"to": "hook", "box": [[-1, -1, 0.199], [1, 1, 1]], "relase": 2}])", "release"}}) {
+    const Opened s(scene(attach));
+    EXPECT_EQ(s.status, DFM_E_ARG) << attach;
+    test::says({"/bodies/0/attach/0", said.c_str()});
+  }
+}

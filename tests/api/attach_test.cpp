@@ -1,0 +1,478 @@
+// Surfaces attached to obstacles, rigid bodies and other bodies: force, both momenta, release, ends, state.
+#include <cstring>
+#include <functional>
+
+#include "rigid.h"
+#include "stack.h"
+
+namespace {
+
+constexpr double kG = 9.81;
+
+struct World {
+  test::Context context;
+  dfm_world w;
+  explicit World(std::array<double, 3> gravity = {0, 0, -kG}) : w(test::make_world(context, gravity)) {}
+  void run(double seconds, double h = 1e-3) {
+    for (double t = 0; t < seconds - 1e-9; t += h) test::ok(dfm_world_step(w, h, nullptr));
+  }
+  // A beam of 1e-4 m3 whose top ends at the origin.
+  dfm_body beam(const char *model, int32_t integrator = DFM_INTEGRATOR_AUTO,
+                std::array<double, 3> position = {0, 0, -0.05}) {
+    test::BodyOptions o;
+    o.name = "beam";
+    o.model = model;
+    o.young = 2e5;
+    o.damping_mass = 20;
+    o.damping_stiffness = 1e-3;
+    o.position = position;
+    o.integrator = integrator;
+    return test::make_body(context, w, "beam", {0.05, 0.04, 0.05}, 60, o);
+  }
+  dfm_obstacle hook(std::array<double, 3> at = {0, 0, 0.05}) {
+    dfm_obstacle_def d = dfm_obstacle_def_default();
+    d.name = "hook";
+    d.shape = DFM_SHAPE_BOX;
+    d.half_size[0] = d.half_size[1] = 0.1;
+    d.half_size[2] = 0.05;
+    for (int k = 0; k < 3; ++k) d.pose.position[k] = at[k];
+    dfm_obstacle out = 0;
+    test::ok(dfm_obstacle_create(w, &d, &out));
+    return out;
+  }
+  dfm_rigid brick(std::array<double, 3> at, double mass, std::array<double, 3> spin = {0, 0, 0}) {
+    dfm_rigid_def d = test::box("brick", {0.1, 0.06, 0.04}, mass, at);
+    for (int k = 0; k < 3; ++k) d.spin[k] = spin[k];
+    const dfm_rigid_set_def set = {sizeof set, 1, 0, 0, &d, nullptr, nullptr};
+    dfm_rigid out = 0;
+    test::ok(dfm_rigid_create(w, nullptr, &set, &out));
+    return out;
+  }
+};
+
+// The top of a body, or its bottom.
+uint32_t attach(dfm_body body, uint64_t to, bool top = true,
+                const std::function<void(dfm_attach_def &)> &with = {}) {
+  std::vector<double> x = test::listed(dfm_surface_positions, body, 3);
+  double edge = top ? -INFINITY : INFINITY;
+  for (size_t i = 2; i < x.size(); i += 3) edge = top ? std::max(edge, x[i]) : std::min(edge, x[i]);
+  const double box[] = {-9, -9, edge - 1e-9, 9, 9, edge + 1e-9};
+  dfm_attach_def d = dfm_attach_def_default();
+  d.to = to;
+  d.box = box;
+  if (with) with(d);
+  uint32_t number = 0;
+  test::ok(dfm_body_attach(body, &d, &number));
+  return number;
+}
+
+dfm_attachment info(dfm_body body, uint32_t number) {
+  dfm_attachment a{};
+  a.size = sizeof a;
+  test::ok(dfm_body_get_attachment(body, number, &a));
+  return a;
+}
+
+std::vector<char> snapshot(dfm_world w) {
+  size_t bytes = 0;
+  test::ok(dfm_world_snapshot(w, nullptr, &bytes));
+  std::vector<char> out(bytes);
+  test::ok(dfm_world_snapshot(w, out.data(), &bytes));
+  return out;
+}
+
+struct Momenta {
+  std::array<double, 3> linear{}, angular{};
+  void add(const dfm_body_measure &m) {
+    for (int k = 0; k < 3; ++k) {
+      linear[size_t(k)] += m.momentum[k];
+      const int i = (k + 1) % 3, j = (k + 2) % 3;
+      angular[size_t(k)] += m.angular[k] + m.com[i] * m.momentum[j] - m.com[j] * m.momentum[i];
+    }
+  }
+};
+dfm_body_measure rigid_measure(dfm_rigid r) {
+  dfm_body_measure m{};
+  m.size = sizeof m;
+  test::ok(dfm_rigid_get_measure(r, &m));
+  return m;
+}
+
+struct Case {
+  const char *model;
+  int32_t integrator;
+};
+constexpr Case kCases[] = {{"msm", DFM_INTEGRATOR_SYMPLECTIC_EULER},
+                           {"corotational_fem", DFM_INTEGRATOR_SYMPLECTIC_EULER},
+                           {"corotational_fem", DFM_INTEGRATOR_IMPLICIT_EULER},
+                           {"linear_fem", DFM_INTEGRATOR_IMPLICIT_EULER},
+                           {"shape_matching", DFM_INTEGRATOR_AUTO}};
+
+}  // namespace
+
+// What hangs pulls with its weight, whatever moves it, and stays where it is held.
+TEST(Attach, WhatHangs_PullsWithItsWeight) {
+  for (const Case &c : kCases) {
+    SCOPED_TRACE(std::string(c.model) + " " + std::to_string(c.integrator));
+    World s;
+    const dfm_obstacle hook = s.hook();
+    const dfm_body beam = s.beam(c.model, c.integrator);
+    const uint32_t held = attach(beam, hook);
+    s.run(1.0);
+    const dfm_attachment a = info(beam, held);
+    const double weight = kG * test::measure(beam).mass;
+    EXPECT_EQ(a.to, hook);
+    EXPECT_GE(a.nsurfel, 4u);
+    EXPECT_NEAR(a.force[2], weight, 2e-3 * weight);
+    EXPECT_NEAR(a.force[0], 0, 2e-3 * weight);
+    EXPECT_NEAR(a.point[2], 0, 1e-9);
+    EXPECT_LT(a.stretch, 1e-9);
+    for (const double m : a.moment) EXPECT_NEAR(m, 0, 2e-3 * weight * 0.05);
+    EXPECT_NEAR(a.impulse[2], weight * 1.0, 5e-3 * weight);
+    EXPECT_TRUE(test::contacts(s.w).empty());
+    EXPECT_EQ(test::stats(s.w).unconverged, 0u);
+  }
+}
+
+// It goes where the obstacle goes, turned as well.
+TEST(Attach, AnObstacle_CarriesItAlong) {
+  World s;
+  const dfm_obstacle hook = s.hook();
+  const dfm_body beam = s.beam("msm");
+  const uint32_t held = attach(beam, hook);
+  const dfm_attachment before = info(beam, held);
+  for (int i = 1; i <= 200; ++i) {
+    const double angle = 2e-3 * i, t = 1e-3 * i;
+    const dfm_pose to = {{0.2 * t, 0.1 * t, 0.05 + 0.3 * t},
+                         {0, 0, std::sin(0.5 * angle), std::cos(0.5 * angle)}};
+    test::ok(dfm_obstacle_move_to(hook, &to));
+    s.run(1e-3);
+    ASSERT_LT(info(beam, held).stretch, 1e-8) << i;
+  }
+  const dfm_attachment a = info(beam, held);
+  const double c = std::cos(0.4), s1 = std::sin(0.4);
+  EXPECT_NEAR(a.point[0], 0.04 + c * before.point[0] - s1 * before.point[1], 1e-8);
+  EXPECT_NEAR(a.point[1], 0.02 + s1 * before.point[0] + c * before.point[1], 1e-8);
+  EXPECT_NEAR(a.point[2], before.point[2] + 0.06, 1e-8);
+}
+
+// A brick that turns tears a beam along, and the beam the brick: both momenta stay.
+TEST(Attach, ARigidBody_KeepsBothMomentaOfThePair) {
+  for (const Case &c : kCases) {
+    SCOPED_TRACE(std::string(c.model) + " " + std::to_string(c.integrator));
+    World s({0, 0, 0});
+    test::BodyOptions o;
+    o.model = c.model;
+    o.young = 2e5;
+    o.position = {0, 0, -0.05};
+    o.velocity = {0.3, -0.1, 0.2};
+    o.spin = {1, 2, 3};
+    o.integrator = c.integrator;
+    const dfm_body beam = test::make_body(s.context, s.w, "beam", {0.05, 0.04, 0.05}, 60, o);
+    const dfm_rigid brick = s.brick({0.01, 0, 0.02}, 0.2, {3, -2, 4});
+    const uint32_t held = attach(beam, brick);
+    const auto sum = [&] {
+      Momenta m;
+      m.add(test::measure(beam));
+      m.add(rigid_measure(brick));
+      return m;
+    };
+    const Momenta before = sum();
+    // backward Euler takes angular momentum from what turns, attached or not
+    const bool angular = c.integrator != DFM_INTEGRATOR_IMPLICIT_EULER;
+    for (int i = 0; i < 200; ++i) {
+      s.run(1e-3);
+      const Momenta now = sum();
+      for (size_t k = 0; k < 3; ++k) {
+        ASSERT_NEAR(now.linear[k], before.linear[k], 1e-12) << i;
+        if (angular) {
+          ASSERT_NEAR(now.angular[k], before.angular[k], 1e-12) << i;
+        }
+      }
+    }
+    EXPECT_LT(info(beam, held).stretch, 2e-6);
+    EXPECT_EQ(test::stats(s.w).unconverged, 0u);
+  }
+}
+
+// Not at the same points: the upper beam's bottom stands at a distance on the lower one's top.
+TEST(Attach, TwoBodies_KeepBothMomenta_AlsoAtADistance) {
+  for (const double apart : {0.0, 2e-3}) {
+    SCOPED_TRACE(apart);
+    World s({0, 0, 0});
+    test::BodyOptions o;
+    o.young = 2e5;
+    o.position = {0, 0, 0};
+    o.velocity = {0.2, 0, 0.1};
+    o.spin = {0, 3, 1};
+    const dfm_body lower = test::make_body(s.context, s.w, "beam", {0.05, 0.04, 0.05}, 60, o);
+    o.position = {0.004, 0.003, 0.05 + apart};
+    o.velocity = {0, 0, 0};
+    o.spin = {2, 0, 0};
+    const dfm_body upper = test::make_body(s.context, s.w, "beam", {0.05, 0.04, 0.05}, 90, o);
+    const uint32_t held = attach(upper, lower, false);
+    const auto sum = [&] {
+      Momenta m;
+      m.add(test::measure(upper));
+      m.add(test::measure(lower));
+      return m;
+    };
+    const Momenta before = sum();
+    for (int i = 0; i < 200; ++i) {
+      s.run(1e-3);
+      const Momenta now = sum();
+      for (size_t k = 0; k < 3; ++k) {
+        ASSERT_NEAR(now.linear[k], before.linear[k], 1e-13) << i;
+        ASSERT_NEAR(now.angular[k], before.angular[k], 1e-10) << i;  // stretch times force
+      }
+    }
+    EXPECT_LT(info(upper, held).stretch, 1e-7);
+    EXPECT_EQ(test::stats(s.w).unconverged, 0u);
+  }
+}
+
+TEST(Attach, AStiffness_IsThatOfTheWhole) {
+  for (const int32_t integrator : {DFM_INTEGRATOR_SYMPLECTIC_EULER, DFM_INTEGRATOR_IMPLICIT_EULER}) {
+    World s;
+    const dfm_obstacle hook = s.hook();
+    const dfm_body beam = s.beam("corotational_fem", integrator);
+    const uint32_t held = attach(beam, hook, true, [](dfm_attach_def &d) {
+      d.stiffness = 200;
+      d.damping = 2;
+    });
+    s.run(2.0);
+    const double weight = kG * test::measure(beam).mass;
+    EXPECT_NEAR(info(beam, held).force[2], weight, 2e-3 * weight);
+    EXPECT_NEAR(-info(beam, held).point[2], weight / 200, 3e-3 * weight / 200);
+  }
+}
+
+TEST(Attach, ReleaseForce_LetsGoAndTells) {
+  World s;
+  const dfm_obstacle hook = s.hook();
+  const dfm_body beam = s.beam("msm");
+  const double weight = kG * test::measure(beam).mass;
+  const uint32_t held = attach(beam, hook, true, [&](dfm_attach_def &d) { d.release = 1.5 * weight; });
+  s.run(0.3);
+  ASSERT_EQ(test::listed(dfm_body_attachments, beam), std::vector<uint32_t>{held});
+  EXPECT_TRUE(test::listed(dfm_world_events, s.w).empty());
+  const double down[3] = {0, 0, -2 * weight};
+  const uint32_t point = 0;
+  test::ok(dfm_body_add_load(beam, 1, &point, down, 0, nullptr, nullptr, nullptr));
+  s.run(0.3);
+  EXPECT_TRUE(test::listed(dfm_body_attachments, beam).empty());
+  std::vector<dfm_contact_event> events;
+  for (const dfm_contact_event &e : test::listed(dfm_world_events, s.w))
+    if (e.kind == uint32_t(DFM_EVENT_RELEASE)) events.push_back(e);
+  ASSERT_EQ(events.size(), 1u);
+  EXPECT_EQ(events[0].kind, uint32_t(DFM_EVENT_RELEASE));
+  EXPECT_EQ(events[0].a, beam);
+  EXPECT_EQ(events[0].b, hook);
+  EXPECT_EQ(events[0].key, held);
+  EXPECT_LT(test::measure(beam).velocity[2], -0.5);
+  dfm_attachment a{};
+  EXPECT_EQ(dfm_body_get_attachment(beam, held, &a), DFM_E_ARG);
+}
+
+TEST(Attach, Detach_LetsTheTwoTouchAgain) {
+  World s;
+  const dfm_obstacle hook = s.hook({0, 0, -0.15});
+  const dfm_body beam = s.beam("msm", DFM_INTEGRATOR_AUTO, {0, 0, -0.1});
+  const uint32_t held = attach(beam, hook, false);
+  s.run(0.3);
+  EXPECT_TRUE(test::contacts(s.w).empty());
+  const double z = test::measure(beam).com[2];
+  test::ok(dfm_body_detach(beam, held));
+  s.run(0.3);
+  EXPECT_FALSE(test::contacts(s.w).empty());
+  EXPECT_NEAR(test::measure(beam).com[2], z, 1e-3);
+  EXPECT_EQ(dfm_body_detach(beam, held), DFM_E_ARG);
+  const uint32_t again = attach(beam, hook, false, [](dfm_attach_def &d) { d.flags = DFM_ATTACH_TOUCH; });
+  s.run(0.1);
+  EXPECT_FALSE(test::contacts(s.w).empty());
+  EXPECT_LT(info(beam, again).stretch, 1e-8);
+}
+
+TEST(Attach, EitherSide_MayGo) {
+  for (const bool body_goes : {true, false}) {
+    World s;
+    const dfm_obstacle hook = s.hook();
+    const dfm_body beam = s.beam("msm");
+    test::BodyOptions o;
+    o.young = 2e5;
+    o.position = {0, 0, -0.1};
+    const dfm_body below = test::make_body(s.context, s.w, "beam", {0.05, 0.04, 0.05}, 60, o);
+    attach(beam, hook);
+    attach(below, beam);
+    s.run(0.1);
+    EXPECT_LT(std::fabs(test::measure(below).velocity[2]), 0.3);
+    if (body_goes) test::ok(dfm_body_destroy(beam));
+    else test::ok(dfm_obstacle_destroy(hook));
+    size_t released = 0;
+    for (const dfm_contact_event &e : test::listed(dfm_world_events, s.w))
+      released += e.kind == uint32_t(DFM_EVENT_RELEASE);
+    EXPECT_EQ(released, body_goes ? 2u : 1u);
+    s.run(0.2);
+    EXPECT_LT(test::measure(below).velocity[2], -0.6);  // it falls
+  }
+}
+
+// Restored in a world that has no attachment it goes on with the same bits, and again in its own.
+TEST(Attach, Snapshot_GoesOnWithTheSameBits) {
+  const auto make = [](World &s, bool with) {
+    const dfm_obstacle hook = s.hook();
+    const dfm_body beam = s.beam("msm");
+    const dfm_rigid brick = s.brick({0, 0, -0.15}, 0.3);
+    if (!with) return;
+    attach(beam, hook);
+    attach(beam, brick, false);
+  };
+  World a, b;
+  make(a, true);
+  make(b, false);
+  a.run(0.05);
+  const std::vector<char> kept = snapshot(a.w);
+  a.run(0.05);
+  const uint64_t hash = dfm_world_hash(a.w);
+  test::ok(dfm_world_restore(b.w, kept.data(), kept.size()));
+  b.run(0.05);
+  EXPECT_EQ(dfm_world_hash(b.w), hash);
+  test::ok(dfm_world_restore(a.w, kept.data(), kept.size()));
+  a.run(0.05);
+  EXPECT_EQ(dfm_world_hash(a.w), hash);
+}
+
+TEST(Attach, WhatHangs_SleepsAndWakesWithItsHook) {
+  World s;
+  const dfm_obstacle hook = s.hook();
+  const dfm_body beam = s.beam("msm");
+  const uint32_t held = attach(beam, hook);
+  test::ok(dfm_world_set_sleep(s.w, true));
+  const auto asleep = [&] {
+    bool is = false;
+    test::ok(dfm_body_is_asleep(beam, &is));
+    return is;
+  };
+  for (int i = 0; i < 400 && !asleep(); ++i) s.run(0.01);
+  ASSERT_TRUE(asleep());
+  const double weight = kG * test::measure(beam).mass;
+  const dfm_attachment before = info(beam, held);
+  s.run(0.5);
+  const dfm_attachment after = info(beam, held);
+  EXPECT_NEAR(after.force[2], weight, 1e-2 * weight);
+  EXPECT_NEAR(after.impulse[2] - before.impulse[2], 0.5 * weight, 1e-2 * weight);
+  const dfm_pose to = {{0.001, 0, 0.05}, {0, 0, 0, 1}};
+  test::ok(dfm_obstacle_move_to(hook, &to));
+  s.run(1e-3);
+  EXPECT_FALSE(asleep());
+  EXPECT_NEAR(info(beam, held).point[0] - after.point[0], 0.001, 1e-8);
+}
+
+// A step that is given up changes nothing of what is attached.
+TEST(Attach, ADiscardedStep_LeavesItAsItWas) {
+  const auto make = [](World &s) {
+    const dfm_obstacle hook = s.hook();
+    const dfm_body beam = s.beam("msm");
+    attach(beam, hook, true, [](dfm_attach_def &d) { d.release = 1e4; });
+    attach(beam, s.brick({0, 0, -0.15}, 0.3), false);
+    s.run(0.05);
+    return beam;
+  };
+  World a, b;
+  const dfm_body beam = make(a);
+  make(b);
+  const dfm_attachment before = info(beam, 1);
+  for (int i = 0; i < 3; ++i) {
+    test::ok(dfm_world_interrupt(a.w));
+    EXPECT_EQ(dfm_world_step(a.w, 1.0 / 60, nullptr), DFM_DISCARD);
+  }
+  const dfm_attachment after = info(beam, 1);
+  EXPECT_EQ(std::memcmp(&before, &after, sizeof before), 0);
+  a.run(0.05);
+  b.run(0.05);
+  EXPECT_EQ(dfm_world_hash(a.w), dfm_world_hash(b.w));
+}
+
+// What is held above and pressed on a floor below is one problem: both loads balance the weight.
+TEST(Attach, PressedOnAFloor_HolderAndFloorShareTheLoad) {
+  for (const Case &c : {kCases[0], kCases[2]}) {
+    SCOPED_TRACE(std::string(c.model) + " " + std::to_string(c.integrator));
+    World s;
+    const dfm_obstacle hook = s.hook();
+    test::add_plane(s.w, "floor", {0, 0, -0.0502});
+    const dfm_body beam = s.beam(c.model, c.integrator);
+    const uint32_t held = attach(beam, hook);
+    for (int i = 1; i <= 500; ++i) {
+      const dfm_pose to = {{0, 0, 0.05 - 0.002 * std::min(i, 200) / 200}, {0, 0, 0, 1}};
+      test::ok(dfm_obstacle_move_to(hook, &to));
+      s.run(1e-3);
+    }
+    s.run(0.5);
+    double floor = 0;
+    for (const dfm_contact &k : test::contacts(s.w)) floor += k.fn;
+    const double weight = kG * test::measure(beam).mass, pull = info(beam, held).force[2];
+    EXPECT_GT(floor, 2 * weight);  // 1.8 mm shorter: pressed
+    EXPECT_NEAR(pull + floor, weight, 5e-3 * floor);
+    EXPECT_LT(info(beam, held).stretch, 1e-7);
+    EXPECT_EQ(test::stats(s.w).guard_cuts, 0u);
+  }
+}
+
+// The balance is the one of the same body held by its points.
+TEST(Attach, Equilibrium_IsThatOfHeldPoints) {
+  World s, t;
+  const dfm_obstacle hook = s.hook();
+  const dfm_body beam = s.beam("corotational_fem"), fixed = t.beam("corotational_fem");
+  attach(beam, hook);
+  const double middle = test::measure(fixed).com[2];
+  const std::vector<double> x = test::listed(dfm_surface_positions, fixed, 3);
+  const std::vector<uint32_t> points = test::listed(dfm_surface_points, fixed);
+  double top = -1;
+  for (size_t i = 2; i < x.size(); i += 3) top = std::max(top, x[i]);
+  for (uint32_t i = 0; i < points.size(); ++i)
+    if (x[3 * i + 2] > top - 1e-9) test::ok(dfm_body_hold(fixed, 1, &points[i], 7));
+  test::ok(dfm_world_equilibrium(s.w, nullptr, nullptr));
+  test::ok(dfm_world_equilibrium(t.w, nullptr, nullptr));
+  const double sag = middle - test::measure(fixed).com[2];
+  EXPECT_GT(sag, 1e-5);
+  EXPECT_NEAR(middle - test::measure(beam).com[2], sag, 1e-4 * sag);
+}
+
+TEST(Attach, WhatDoesNotFit_IsRefused) {
+  World s, other;
+  const dfm_obstacle hook = s.hook(), theirs = other.hook();
+  const dfm_body beam = s.beam("msm");
+  const auto refuse = [&](dfm_status status, std::initializer_list<const char *> said, auto change) {
+    dfm_attach_def d = dfm_attach_def_default();
+    const uint32_t surfel = 0;
+    d.to = hook;
+    d.nsurfel = 1;
+    d.surfels = &surfel;
+    change(d);
+    EXPECT_EQ(dfm_body_attach(beam, &d, nullptr), status);
+    test::says(said);
+  };
+  const uint32_t far = 99999;
+  const double nowhere[] = {5, 5, 5, 6, 6, 6};
+  refuse(DFM_E_ARG, {"itself"}, [&](auto &d) { d.to = beam; });
+  refuse(DFM_E_HANDLE, {"another world"}, [&](auto &d) { d.to = theirs; });
+  refuse(DFM_E_HANDLE, {}, [&](auto &d) { d.to = 0; });
+  refuse(DFM_E_ARG, {"surfel 99999"}, [&](auto &d) { d.surfels = &far; });
+  refuse(DFM_E_ARG, {"point 99999"}, [&](auto &d) {
+    d.points = &far;
+    d.npoint = 1;
+  });
+  refuse(DFM_E_ARG, {"none"}, [&](auto &d) {
+    d.nsurfel = 0;
+    d.box = nowhere;
+  });
+  refuse(DFM_E_ARG, {"no group 'lid'"}, [&](auto &d) { d.group = "lid"; });
+  refuse(DFM_E_ARG, {"positive"}, [&](auto &d) { d.stiffness = -1; });
+  refuse(DFM_E_ARG, {"positive"}, [&](auto &d) { d.release = NAN; });
+  refuse(DFM_E_ARG, {"0x4"}, [&](auto &d) { d.flags = 4; });
+  refuse(DFM_E_ARG, {"dfm_attach_def_default"}, [&](auto &d) { d.cookie = 0; });
+  EXPECT_EQ(dfm_body_attach(beam, nullptr, nullptr), DFM_E_ARG);
+  uint32_t n = 1;
+  test::ok(dfm_body_attachments(beam, 0, nullptr, &n));
+  EXPECT_EQ(n, 0u);
+}
