@@ -11,7 +11,10 @@
 namespace view {
 namespace {
 
-constexpr float kWide = 290, kGap = 12, kSlider = 110, kPlot = 270;  // pixels
+constexpr float kWide = 290, kGap = 12, kSlider = 110, kPlot = 270, kHigh = 64, kLine = 16;
+
+// Of a size that is meant for letters of 14 pixels.
+float scaled(float size) { return size * ImGui::GetFontSize() / 14; }
 constexpr ImGuiWindowFlags kFixed = ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoResize |
                                     ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoTitleBar |
                                     ImGuiWindowFlags_AlwaysAutoResize;
@@ -30,8 +33,8 @@ void pale() {
 void App::panels() {
   if (!show_panels_) return;
   pale();
-  ImGui::SetNextWindowPos({kGap, kGap}, ImGuiCond_Always);
-  ImGui::SetNextWindowSize({kWide, 0}, ImGuiCond_Always);
+  ImGui::SetNextWindowPos({scaled(kGap), scaled(kGap)}, ImGuiCond_Always);
+  ImGui::SetNextWindowSize({scaled(kWide), 0}, ImGuiCond_Always);
   ImGui::Begin("deform", nullptr, kFixed);
   controls();
   if (!replay_) files();
@@ -42,7 +45,7 @@ void App::panels() {
 }
 
 void App::controls() {
-  if (ImGui::Button(running_ ? "pause" : "run", {60, 0})) key("space");
+  if (ImGui::Button(running_ ? "pause" : "run", {scaled(60), 0})) key("space");
   ImGui::SameLine();
   if (ImGui::Button("step")) key("s");
   ImGui::SameLine();
@@ -50,11 +53,11 @@ void App::controls() {
   ImGui::SameLine();
   if (ImGui::Button("help")) key("h");
   float speed = float(speed_);
-  ImGui::SetNextItemWidth(kSlider);
+  ImGui::SetNextItemWidth(scaled(kSlider));
   if (ImGui::SliderFloat("speed", &speed, 0.01f, 4, "%.2f x", ImGuiSliderFlags_Logarithmic)) speed_ = speed;
   if (!replay_) return;
   int at = int(shown_);
-  ImGui::SetNextItemWidth(kSlider);
+  ImGui::SetNextItemWidth(scaled(kSlider));
   char label[32];
   std::snprintf(label, sizeof label, "%.3f s", simulation_.time());
   if (ImGui::SliderInt("time", &at, 0, int(replay_->states.size()) - 1, label) && size_t(at) != shown_)
@@ -65,7 +68,7 @@ void App::controls() {
 }
 
 void App::files() {
-  if (ImGui::Button("save", {60, 0})) key("f5");
+  if (ImGui::Button("save", {scaled(60), 0})) key("f5");
   ImGui::SameLine();
   if (ImGui::Button("load")) key("f9");
   ImGui::SameLine();
@@ -74,7 +77,7 @@ void App::files() {
 
 void App::slide(Slider &s) {
   float x = float(s.value);
-  ImGui::SetNextItemWidth(kSlider);
+  ImGui::SetNextItemWidth(scaled(kSlider));
   if (ImGui::SliderFloat(s.label.c_str(), &x, float(s.low), float(s.high), s.format,
                          s.logarithmic ? ImGuiSliderFlags_Logarithmic : 0))
     attempt([&] {
@@ -86,7 +89,7 @@ void App::slide(Slider &s) {
 void App::sliders() {
   ImGui::Separator();
   float stiffness = float(pull_.stiffness);
-  ImGui::SetNextItemWidth(kSlider);
+  ImGui::SetNextItemWidth(scaled(kSlider));
   if (ImGui::SliderFloat("pull", &stiffness, 0.1f, 1000, "%.3g x", ImGuiSliderFlags_Logarithmic))
     pull_.stiffness = stiffness;
   for (Slider &s : sliders_) slide(s);
@@ -110,7 +113,7 @@ void draw_plot(const Plot &plot, const std::vector<double> &times) {
       high = std::max(high, y);
     }
   if (!(high > low)) high = low + 1e-12f;
-  const ImVec2 at = ImGui::GetCursorScreenPos(), size = {kPlot - 16, 64};
+  const ImVec2 at = ImGui::GetCursorScreenPos(), size = {scaled(kPlot) - 16, scaled(kHigh)};
   ImDrawList *const list = ImGui::GetWindowDrawList();
   const ImU32 ink = IM_COL32(90, 95, 105, 255);
   list->AddRectFilled(at, {at.x + size.x, at.y + size.y}, IM_COL32(255, 255, 255, 160));
@@ -129,9 +132,9 @@ void draw_plot(const Plot &plot, const std::vector<double> &times) {
     list->AddText({x, y}, ink, text);
   };
   write(at.x + 2, at.y, high, "");
-  write(at.x + 2, at.y + size.y - 16, low, "");
+  write(at.x + 2, at.y + size.y - scaled(kLine), low, "");
   std::snprintf(text, sizeof text, "%.2f s", times.back());
-  list->AddText({at.x + size.x - ImGui::CalcTextSize(text).x - 2, at.y + size.y - 16}, ink, text);
+  list->AddText({at.x + size.x - ImGui::CalcTextSize(text).x - 2, at.y + size.y - scaled(kLine)}, ink, text);
   ImGui::Dummy({size.x, size.y + 4});
 }
 
@@ -139,8 +142,8 @@ void draw_plot(const Plot &plot, const std::vector<double> &times) {
 
 void App::plots() {
   if (plots_.times().size() < 2) return;
-  ImGui::SetNextWindowPos({float(width_) - kGap, kGap}, ImGuiCond_Always, {1, 0});
-  ImGui::SetNextWindowSize({kPlot, 0}, ImGuiCond_Always);
+  ImGui::SetNextWindowPos({float(width_) - scaled(kGap), scaled(kGap)}, ImGuiCond_Always, {1, 0});
+  ImGui::SetNextWindowSize({scaled(kPlot), 0}, ImGuiCond_Always);
   ImGui::Begin("plots", nullptr, kFixed);
   for (const Plot &p : plots_.plots())
     if (!(p.measured && (script_ || replay_))) draw_plot(p, plots_.times());
@@ -170,7 +173,7 @@ void App::numbers() {
     ImGui::Text("%.0f frames a second", frame_ms_ > 0 ? 1e3 / frame_ms_ : 0);
   }
   if (!message_.empty()) {
-    ImGui::PushTextWrapPos(kWide - 12);
+    ImGui::PushTextWrapPos(scaled(kWide) - 12);
     ImGui::TextUnformatted(message_.c_str());
     ImGui::PopTextWrapPos();
   }

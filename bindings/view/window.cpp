@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cstdlib>
 
 #include "messages.h"
 
@@ -33,7 +34,8 @@ struct Glfw {
 }
 
 Glfw open_glfw() {
-  void *const library = dlopen("libglfw.so.3", RTLD_NOW | RTLD_LOCAL);
+  const char *const own = std::getenv("DEFORM_VIEW_GLFW");
+  void *const library = dlopen(own && *own ? own : "libglfw.so.3", RTLD_NOW | RTLD_LOCAL);
   if (!library) refuse("libglfw.so.3 cannot be loaded: install Debian's libglfw3");
   Glfw glfw;
   const auto get = [&]<class F>(F &f, const char *name) {

@@ -242,6 +242,11 @@ TEST_F(Viewer, WhatCannotBe_IsOneSentence) {
     EXPECT_NE(done.err.find(c.sentence), std::string::npos) << done.err;
     EXPECT_EQ(std::count(done.err.begin(), done.err.end(), '\n'), 1) << done.err;
   }
+  setenv("DEFORM_VIEW_GLFW", "/nothing/libglfw.so", 1);
+  const test::CommandResult bare = view("0 shot a.png\n");
+  unsetenv("DEFORM_VIEW_GLFW");
+  EXPECT_EQ(bare.exit_code, 2);
+  EXPECT_EQ(bare.err, "deform: view: libglfw.so.3 cannot be loaded: install Debian's libglfw3\n");
   unsetenv("DISPLAY");
   const test::CommandResult done = view("0 shot a.png\n");
   EXPECT_EQ(done.exit_code, 2);
