@@ -69,9 +69,9 @@ double time_error(Scheme scheme, bool steps_itself, double h, const BodyRegime &
   else if (scheme == Scheme::explicit_euler && !steps_itself) oscillation = wh * wh / 24 * turns;
   else if (scheme == Scheme::tr_bdf2 && !b.touches) oscillation = 0.0404 * wh * wh * turns;  // Bank 1985
   else oscillation = -std::expm1(-0.5 * wh * turns);  // backward Euler: the amplitude that it takes away
-  const double scale = std::max({e.sag, b.travel, 1e-12});
+  const double scale = std::max({e.sag, b.travel, b.depth, 1e-12});
   const double share = e.sag / scale;  // of what moves, that oscillates
-  const double event = b.touches ? b.speed * h / scale : 0;
+  const double event = b.touches ? std::max(b.speed, b.approach) * h / scale : 0;
   const bool damps = steps_itself || scheme != Scheme::explicit_euler;
   const double rebound = b.touches && !b.held && damps ? -std::expm1(-0.5 * kPi * wh) * b.after : 0;
   return at_most(std::max(share * at_most(oscillation, 1), rebound) + event, 1);

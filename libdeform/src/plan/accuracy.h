@@ -62,9 +62,11 @@ struct BodyRegime {
   double travel = 0;  // m, that it moves as a whole
   double after = 0;   // share of the time after it first meets something by falling or flying
   bool held = false, touches = false, turns = false;
-  bool meets_body = false;          // another deformable one
-  double contact = HUGE_VAL;        // m, across the narrowest contact that it may have
-  std::string met;                  // whose contact that is
+  bool meets_body = false;    // another deformable one
+  double contact = HUGE_VAL;  // m, across the narrowest contact that it may have
+  std::string met;            // whose contact that is
+  // m/s, of what comes to it, and m, how deep that goes in, or where that is not known, how far it moves
+  double approach = 0, depth = 0;
   std::string model;                // that the scene names; empty: to be chosen
   int scheme = -1;                  // that the scene names; -1: to be chosen
   std::vector<std::string> models;  // that may be chosen

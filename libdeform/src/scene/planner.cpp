@@ -9,6 +9,7 @@
 namespace dfm::scene {
 namespace {
 
+constexpr double kPi = 3.14159265358979323846;
 constexpr double kDefaultTolerance = 1e-6, kLeastTolerance = 1e-9;  // m/s
 
 double length(const double v[3]) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
@@ -169,6 +170,23 @@ class Reader {
     return flat_width(box.hi[0] - box.lo[0], box.hi[1] - box.lo[1], box.hi[2] - box.lo[2]);
   }
 
+  // What an obstacle that moves does to a body: how fast it comes, and how deep it goes in.
+  void add_approach(size_t i, const Obstacle &o, BodyRegime &r) const {
+    const bool round = o.def.shape == DFM_SHAPE_SPHERE || o.def.shape == DFM_SHAPE_CAPSULE;
+    double way = 0, depth = 0;
+    for (size_t k = 0; k < o.keys.size(); ++k) {
+      if (round) depth = std::max(depth, depth_in(boxes_[i], o.keys[k].pose.position, o.def.radius));
+      if (k == 0) continue;
+      double by[3];
+      for (int c = 0; c < 3; ++c) by[c] = o.keys[k].pose.position[c] - o.keys[k - 1].pose.position[c];
+      way += length(by);
+      r.approach = std::max(r.approach, length(by) / (o.keys[k].t - o.keys[k - 1].t));
+    }
+    const double swing = length(o.def.sine.amplitude);
+    r.approach = std::max(r.approach, 2 * kPi * o.def.sine.frequency * swing);
+    r.depth = std::max(r.depth, depth > 0 ? depth : way + swing);
+  }
+
   // How far a body falls until it meets something, and with what it has its narrowest contact.
   void find_contacts(size_t i, double falls, double &fall, BodyRegime &r) {
     const auto narrow = [&](double width, const std::string &name) {
@@ -186,6 +204,7 @@ class Reader {
                                  : fall_to_box(boxes_[i], down_, box_of(copy, scaled));
       fall = std::min(fall, least);
       if ((!r.held && least <= falls) || moves(o) || flies) narrow(width_of(i, copy, scaled), o.name);
+      if (moves(o)) add_approach(i, o, r);
     }
     for (const RigidBody &body : def_.rigid.bodies) {
       const dfm_rigid_def &d = body.def;

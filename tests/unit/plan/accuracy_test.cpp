@@ -181,3 +181,18 @@ TEST(Planner, WhatABodyMeets_DecidesItsCost) {
   b.held = b.meets_body = false;
   EXPECT_EQ(dfm::what_it_meets(b), dfm::Meets::ground);
 }
+
+// Where a probe is, is known to a sub-step, and so is its force.
+TEST(Planner, ProbeThatComes_IsKnownToASubStep) {
+  BodyRegime b = bar();
+  b.load = 0;
+  b.touches = true;
+  b.approach = 0.045;
+  b.depth = 0.008;
+  b.models = {"elements"};
+  b.scheme = static_cast<int>(Scheme::implicit_euler);
+  Measured costs = {"test", {model("elements", 0, 300, 5000)}};
+  Wish wish = accuracy(0.5);
+  wish.step = 1.0 / 60;
+  EXPECT_NEAR(plan_accuracy({b}, costs, wish).way.bodies[0].time_error, 0.045 / 60 / 0.008, 1e-12);
+}
