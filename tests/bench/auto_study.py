@@ -12,6 +12,7 @@ auto_study.py DEFORM_COMMAND TABLE.csv [--steps N] [--seconds N] [--only TEXT] [
 import argparse
 import csv
 import json
+import math
 import pathlib
 import subprocess
 import tempfile
@@ -23,20 +24,30 @@ UNDAMPED = {"damping_mass": 0, "damping_stiffness": 0}
 MODELS = {"msm": {}, "linear_fem": {}, "corotational_fem": {}, "meshless": {}, "modal": {}, "condensed": {},
           "shape_matching": {"damping_ratio": 0}}
 CASES = ("spin", "cantilever", "drop")
+YOUNG, DENSITY = 1e5, 1000
+AXIS = (2, 10, 20)
+RIM = 0.2  # of the wave speed, at the corner of the box that is farthest from its center
 COLUMNS = ("row", "points", "step_s", "simulated_s", "steps", "substeps", "exit", "start_J", "max_J", "end_J",
            "gain_J", "says")
 
 
-def scene(mesh, low, case, model, params):
+def spin_of(low, high):
+    """rad/s, about AXIS: how fast a body may turn depends on its size."""
+    radius = math.dist(low, high) / 2
+    return [RIM * math.sqrt(YOUNG / DENSITY) / radius * a / math.hypot(*AXIS) for a in AXIS]
+
+
+def scene(mesh, box, case, model, params):
+    low, high = box
     body = {"name": "body", "mesh": str(mesh), "material": "rubber",
             "model": {"type": model, "params": params}}
     out = {"format": "deform-scene", "version": 1, "time": {"duration": 1, "step": "auto"},
            "gravity": [0, 0, 0],
-           "materials": {"rubber": {"density": 1000, "young": 1e5, "poisson": 0.3,
+           "materials": {"rubber": {"density": DENSITY, "young": YOUNG, "poisson": 0.3,
                                     "damping": {"mass": 0, "stiffness": 0}}},
            "bodies": [body], "output": {"every": 1}}
     if case == "spin":
-        body["spin"] = [2, 10, 20]
+        body["spin"] = spin_of(low, high)
     elif case == "cantilever":
         body["fix"] = [{"box": [[-9, -9, low[2] - 1e-6], [9, 9, low[2] + 1e-6]]}]
         out["gravity"] = [1, 0, 0]
@@ -97,14 +108,14 @@ def main():
     parser.add_argument("--meshes", action="append", metavar="FOLDER")
     options = parser.parse_args()
     done = {row["row"] for row in csv.DictReader(options.table.open())} if options.table.exists() else set()
-    for points, low, name, mesh in meshes(options.command, options.meshes or [DATA]):
+    for points, box, name, mesh in meshes(options.command, options.meshes or [DATA]):
         for model, case, volume in kinds():
             row = f"{name} {model} {case}" + (" volume 0" if volume == 0 else "")
             if row in done or options.only not in row or (options.but and options.but in row):
                 continue
             params = {**MODELS[model], **({"volume": 0} if volume == 0 else {})}
             try:
-                found = run(options.command, scene(mesh, low, case, model, params), options.steps,
+                found = run(options.command, scene(mesh, box, case, model, params), options.steps,
                             options.seconds)
             except subprocess.TimeoutExpired:
                 found = {"says": f"takes more than {options.seconds:g} s"}
@@ -127,7 +138,7 @@ def kinds():
 
 
 def meshes(command, folders):
-    """(points, least corner, name, file), the coarsest first."""
+    """(points, corners of the box, name, file), the coarsest first."""
     found = []
     for folder in folders:
         for path in sorted(pathlib.Path(folder).rglob("*")):
@@ -137,7 +148,7 @@ def meshes(command, folders):
             info = json.loads(done.stdout) if done.returncode == 0 else {}
             if info.get("tets", 0) > 1:
                 name = str(path.relative_to(folder).with_suffix(""))
-                found.append((info["points"], info["lo"], name, path))
+                found.append((info["points"], (info["lo"], info["hi"]), name, path))
     return sorted(found)
 
 
