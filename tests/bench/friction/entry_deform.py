@@ -23,11 +23,17 @@ LAWS = {"coulomb": ["coulomb", "karnopp", "dahl", "lugre", "elastoplastic", "gms
 STIFF = {"dahl": {"sigma0": 1e9}, "lugre": {"sigma0": 1e9, "sigma1": 1e5},
          "elastoplastic": {"sigma0": 1e9, "sigma1": 1e5},
          "gms": {"k": [4e8, 3e8, 2e8, 1e8], "nu": [0.2, 0.3, 0.3, 0.2], "C": 1e7}}
+# for search.py: what a scene with the law coulomb leaves open; None: left open
+MODELS = ("corotational_fem", "linear_fem", "modal", "condensed")
+SEARCH = {"model": [None, *({"type": name} for name in MODELS)],
+          "step": [None, 5e-4, 1e-3, 2e-3, 4e-3, 8e-3, 1 / 60],
+          "integrator": [None, "implicit_euler", "tr_bdf2", "symplectic_euler"]}
+BEGIN = [{"model": {"type": name}} for name in MODELS]
 GAP = 2e-5  # m, start distance: settles without a blow
 
 
 class Entry:
-    name = "deform"
+    name, settings, SEARCH, BEGIN = "deform", {}, SEARCH, BEGIN
 
     def __init__(self, command, work):
         self.command, self.work = command, work
@@ -50,7 +56,13 @@ class Entry:
         return self.meshes[key]
 
     def run(self, case, law):
-        scene, measure = getattr(self, "scene_" + case["name"])(case, law)
+        given = self.settings.get(law)  # of what search.py tries or has found
+        scene, measure = getattr(self, "scene_" + case["name"])(case, law if given is None else DEFAULTS)
+        for key in ("step", "integrator"):
+            if given and key in given:
+                scene["time"][key] = given[key]
+        for body in scene["bodies"]:
+            body.update({"model": given["model"]} if given and "model" in given else {})
         folder = os.path.join(self.work, "run")
         path = os.path.join(self.work, "scene.json")
         with open(path, "w") as f:

@@ -15,21 +15,17 @@ import subprocess
 
 import mesh_file
 import scenes
+import entry_deform  # of the friction benchmark
 
 FEM = {"model": {"type": "corotational_fem"}}
 SETTINGS = {"defaults": {}, "defaults 1 ms": {"step": 1e-3}, "fem": FEM, "fem 1 ms": {**FEM, "step": 1e-3},
             "fem tr_bdf2 4 ms": {**FEM, "step": 4e-3, "integrator": "tr_bdf2"}}
-# the same search as for the others; None: left open
-MODELS = ("corotational_fem", "linear_fem", "modal", "condensed")
-SEARCH = {"model": [None, *({"type": name} for name in MODELS)],
-          "step": [None, 5e-4, 1e-3, 2e-3, 4e-3, 8e-3, 1 / 60],
-          "integrator": [None, "implicit_euler", "tr_bdf2", "symplectic_euler"]}
 TICK = 4e-3  # s: the processor's time is counted in ticks; what is shorter counts as one
 GAP = 2e-5  # m, start distance: settles without a blow
 
 
 class Entry:
-    name, settings, SEARCH = "deform", SETTINGS, SEARCH
+    name, settings, SEARCH = "deform", SETTINGS, entry_deform.SEARCH
 
     def __init__(self, command, work):
         self.command, self.work, self.meshes = command, work, {}
