@@ -62,10 +62,10 @@ def name_of(case, quantities):
     return "%s: %s" % (case, ", ".join(plain.get(q, q) for q in quantities))
 
 
-def bold_least(cells):
-    """Cells (value or None, text): the least in bold."""
+def bold_least(cells, level=1):
+    """Cells (value or None, text): the least in bold, and what is within a factor `level` of it."""
     least = min((v for v, _ in cells if v is not None), default=None)
-    return ["**%s**" % t if v is not None and v == least else t for v, t in cells]
+    return ["**%s**" % t if v is not None and v <= level * least else t for v, t in cells]
 
 
 def heads(rows):
@@ -90,7 +90,7 @@ def least_time(rows):
                 else:
                     cells.append((None, "cannot" if (engine, case) in cannot else "never"))
             text += "| %s | %g %s | %s |\n" % (name_of(case, quantities), level, unit,
-                                              " | ".join(bold_least(cells)))
+                                              " | ".join(bold_least(cells, speed.LEVEL)))
     return text
 
 

@@ -4,9 +4,9 @@
   speed.py FILE.csv [--page PAGE] [--picture PNG]
 
 A case is equally exact where every quantity lies in its band. The table has for each case and engine the
-configuration that gets there for the least processor time per simulated second, and those that do not get
-there at any; the picture has every configuration: its error in half bands over its cost. With --page the
-table takes the place of what stands between the page's marks.
+configuration that gets there for the least processor time per simulated second, those that do not get there
+at any, and which engines are fastest, within a factor of two. The picture has every configuration: its error
+in half bands over its cost. With --page the table takes the place of what stands between the page's marks.
 """
 import argparse
 import csv
@@ -17,6 +17,7 @@ import sys
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, "friction"))
 import table
 
+LEVEL = 2  # factor of two times that tells nothing
 COLORS = {"deform": "#2f6db3", "mujoco": "#c8553d", "bullet": "#3b8f5c"}
 
 
@@ -56,7 +57,8 @@ def speed_table(rows):
             else:
                 told.append("not run")
         passed = [(found[0], engine) for engine, found in best.items() if found]
-        fastest = min(passed)[1] if passed else "none"
+        near = [engine for cost, engine in passed if cost <= LEVEL * min(passed)[0]]
+        fastest = ", ".join(near) or "none"
         lines.append("| %s %s | %s | %s |" % (case, parameters, " | ".join(told), fastest))
     return "\n".join(lines) + "\n"
 
