@@ -101,7 +101,8 @@ def configure(build, settings):
     """What the wheel is built from, where nothing is built already."""
     generator = ["-G", "Ninja"] if shutil.which("ninja") else []
     _run("cmake", "-S", ROOT, "-B", build, *generator, "-DCMAKE_BUILD_TYPE=Release", "-DDEFORM_TESTS=OFF",
-         "-DDEFORM_EXAMPLES=OFF", "-DDEFORM_ODE=OFF", "-DDEFORM_BULLET=OFF", "-DDEFORM_ASSIMP=OFF",
+         "-DDEFORM_EXAMPLES=OFF", "-DDEFORM_VIEW=OFF", "-DDEFORM_ODE=OFF", "-DDEFORM_BULLET=OFF",
+         "-DDEFORM_ASSIMP=OFF",
          "-DCMAKE_INSTALL_LIBDIR=lib",
          *shlex.split(settings.get("cmake", "")))
 

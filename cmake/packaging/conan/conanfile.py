@@ -69,7 +69,8 @@ class Deform(ConanFile):
             "DEFORM_SHARED": bool(self.options.shared),
             "DEFORM_PLUGINS_STATIC": not self.options.shared,  # an archive has no folder beside it
             "DEFORM_CLI": bool(self.options.cli), "DEFORM_RENDER": False, "DEFORM_TESTS": False,
-            "DEFORM_EXAMPLES": False, "DEFORM_ODE": "OFF", "DEFORM_BULLET": "OFF", "DEFORM_ASSIMP": "OFF"})
+            "DEFORM_EXAMPLES": False, "DEFORM_VIEW": "OFF", "DEFORM_ODE": "OFF", "DEFORM_BULLET": "OFF",
+            "DEFORM_ASSIMP": "OFF"})
         toolchain.generate()
         CMakeDeps(self).generate()
 
