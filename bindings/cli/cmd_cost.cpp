@@ -106,7 +106,8 @@ void add_cost(CLI::App &app, Globals &globals, int *exit_code) {
       ->take_all()
       ->allow_extra_args(false);
   sub->add_option("--axes", options->study.axes,
-                  "what varies, with commas: model, time, mesh, volume, contact, law, self, guard (all)")
+                  "what varies, with commas: model, time, mesh, volume, contact, law, self, guard, "
+                  "precision (all)")
       ->type_name("LIST")
       ->take_all()
       ->allow_extra_args(false);
