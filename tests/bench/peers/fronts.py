@@ -156,7 +156,7 @@ def all_runs(rows):
 def settings_found(rows):
     text = "Settings found by search:\n\n| scene | cells | engine | settings |\n|---|---|---|---|\n"
     lines = ["| %s | %s | %s | %s |\n" % (r["case"], r["parameters"].split("=")[1], r["engine"], r["note"])
-             for r in rows if r["configuration"] == FOUND]
+             for r in rows if r["configuration"] == FOUND and r["quantity"]]
     return text + "".join(dict.fromkeys(lines))
 
 
