@@ -76,7 +76,7 @@ class Building(unittest.TestCase):
                 body.attachment(held)
             hook.set_filter(0, 0)
             world.run(0.2, dt=1e-3)
-            self.assertLess(body.measure.velocity[2], -1)
+            self.assertLess(body.measure.velocity[2], -0.3)  # it falls, against the damping of its mass
 
     def test_belt_carries_a_ball(self):
         with deform.World() as world:

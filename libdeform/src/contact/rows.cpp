@@ -135,7 +135,11 @@ void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const 
     }
     return d;
   };
-  const auto add_row = [&](const auto &c) {
+  for (uint32_t i = 0; i < all(); ++i) {
+    const bool contact = i < n;
+    const uint32_t nodes = contact ? contacts[i].nnode : bonds[i - n].nnode;
+    const uint32_t *const node = contact ? contacts[i].node : bonds[i - n].node;
+    const double *const share = contact ? contacts[i].weight : bonds[i - n].weight;
     begin.push_back(static_cast<uint32_t>(dof.size()));
     const uint32_t row = begin.back();
     auto add = [&](uint32_t d, double w) {
@@ -160,21 +164,19 @@ void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const 
       dof.push_back(d);
       weight.push_back(w);
     };
-    for (uint32_t k = 0; k < c.nnode; ++k) {
-      const uint32_t s = source_of(c.node[k]), surfel = c.node[k] - sources[s].first_node;
+    for (uint32_t k = 0; k < nodes; ++k) {
+      const uint32_t s = source_of(node[k]), surfel = node[k] - sources[s].first_node;
       const Surface &surface = *sources[s].surface;
       if (!sources[s].diagonal) {
-        add(dof_of_node_[c.node[k]], c.weight[k]);
+        add(dof_of_node_[node[k]], share[k]);
       } else if (surface.identity()) {
-        add(dof_of(s, surface.point[surfel]), c.weight[k]);
+        add(dof_of(s, surface.point[surfel]), share[k]);
       } else {
         surface.each_phyxel(surfel,
-                            [&](uint32_t phyxel, double w) { add_far(dof_of(s, phyxel), c.weight[k] * w); });
+                            [&](uint32_t phyxel, double w) { add_far(dof_of(s, phyxel), share[k] * w); });
       }
     }
-  };
-  for (const ContactPoint &c : contacts) add_row(c);
-  for (const Bond &b : bonds) add_row(b);
+  }
   begin.push_back(static_cast<uint32_t>(dof.size()));
   y.resize(size_t(ndof) * 4);
   alone.resize(size_t(ndof) * 4);

@@ -256,13 +256,19 @@ void Acceleration::follow(ContactRows &rows) {
       for (uint32_t j = 0; j < count_; ++j) sum -= gamma[j] * pair(&dg_[size_t(j) * n_], k);
       pair(now_.data(), k) = sum;
     }
-    for (uint32_t i = 0; i < rows.all(); ++i) {
+    for (uint32_t i = 0; i < rows.n; ++i) {
       Vec3 jump = load3(&now_[size_t(3) * i]);
       // a normal impulse never pulls, not in between either
-      if (i < rows.n) jump.x = std::max(jump.x, -rows.impulse[3 * i]);
+      jump.x = std::max(jump.x, -rows.impulse[3 * i]);
       if (jump.x == 0 && jump.y == 0 && jump.z == 0) continue;
       rows.apply(i, jump);
       for (uint32_t c = 0; c < 3; ++c) rows.impulse[3 * i + c] += jump[int(c)];
+    }
+    for (uint32_t i = rows.n; i < rows.all(); ++i) {
+      const Vec3 jump = load3(&now_[size_t(3) * i]);
+      rows.apply(i, jump);
+      double *const l = &rows.impulse[size_t(3) * i];
+      store3(l, load3(l) + jump);
     }
   }
   std::copy(rows.impulse.begin(), rows.impulse.end(), from_.begin());
