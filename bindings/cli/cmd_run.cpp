@@ -26,6 +26,7 @@
 #include "planned.h"
 #include "progress.h"
 #include "recording.h"
+#include "sensors.h"
 #include "state_file.h"
 #include "step_size.h"
 
@@ -103,6 +104,7 @@ class Runner {
         outputs_(scene, options.out),
         checker_(scene),
         impulses_(scene),
+        sensors_(scene, options.out),
         record_(scene.settings().every),
         frame_(frame_interval()),
         comparison_(comparison) {
@@ -136,6 +138,7 @@ class Runner {
     if (result_.hold_begun) end_hold();
     outputs_.write_nodes();
     result_.impulses = impulses_.json();
+    result_.sensors = sensors_.json();
     add_unwatched(scene_, result_);  // models may have changed
     if (!static_) result_.contacts_mean = world_stats(scene_).contacts_mean;
   }
@@ -281,6 +284,7 @@ class Runner {
     ++result_.steps;
     trouble_ |= trouble;
     impulses_.add_step();
+    sensors_.add_step();
     result_.simulated = dfm_world_time(world_);
     return true;
   }
@@ -360,6 +364,7 @@ class Runner {
   Outputs outputs_;
   Checker checker_;
   Impulses impulses_;
+  Sensors sensors_;
   Schedule record_, frame_;
   std::unique_ptr<Frames> frames_;
   std::optional<Recorder> recorder_;

@@ -303,6 +303,7 @@ std::string summary_json(const SceneFile &scene, const RunOptions &options, cons
       .add("impulse", run.impulses)
       .add("swaps", swaps_json(scene, run))
       .add("state_hash", quoted(hash_text(dfm_world_hash(scene.world()))));
+  if (!run.sensors.empty()) out.add("sensors", run.sensors);
   if (const std::string planned = planned_json(scene); !planned.empty()) out.add("planner", planned);
   out.add("stopped", stopped_json(run)).add("warnings", json_array(warning_texts));
   return indented(out.text());

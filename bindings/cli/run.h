@@ -55,6 +55,7 @@ struct RunResult {
   std::vector<dfm_swap> swaps;
   std::map<std::string, std::string> unwatched;  // bodies that the energy watch did not look at, and why
   std::string impulses = "{}";                   // JSON, Impulses::json()
+  std::string sensors;                           // JSON, Sensors::json(); empty: there are none
   bool interrupted = false, stopped = false;
   std::string stop_reason, stop_body;
   // of equilibria: those found, linear solves, share of the forces that the last one leaves

@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <fstream>
+#include <iterator>
 #include <sstream>
 
 #include "support.h"
@@ -66,6 +68,28 @@ TEST(CProgram, RigidHost_IsCarriedByTheBall) {
   const size_t at = r.out.find("carried with ");
   ASSERT_NE(at, std::string::npos) << r.out;
   EXPECT_NEAR(std::strtod(r.out.c_str() + at + 13, nullptr), 2 * 9.81, 0.02 * 2 * 9.81);
+}
+
+TEST(CProgram, Draw_FillsABufferAndDrawsFromIt) {
+  const std::string picture = test::scratch("c_program_draw") + "/draw.ppm";
+  const test::CommandResult r = example("07_draw", {picture});
+  ASSERT_EQ(r.exit_code, 0) << r.out << r.err;
+  unsigned vertices = 0, bytes = 0, triangles = 0, stuck = 0;
+  ASSERT_EQ(std::sscanf(r.out.c_str(), "%u vertices of %u bytes, %u triangles, %u vertices stick", &vertices,
+                        &bytes, &triangles, &stuck),
+            4)
+      << r.out;
+  EXPECT_EQ(bytes, 36u);
+  EXPECT_EQ(triangles, 2 * vertices - 4) << "a closed surface";
+  EXPECT_GT(stuck, 2u) << "it lies on the floor";
+  std::ifstream in(picture, std::ios::binary);
+  const std::string drawn((std::istreambuf_iterator<char>(in)), {});
+  ASSERT_EQ(drawn.size(), 15u + 256 * 256 * 3);
+  const auto pixel = [&](size_t x, size_t y) {
+    return static_cast<unsigned char>(drawn[15 + 3 * (256 * y + x)]);
+  };
+  EXPECT_EQ(pixel(5, 5), 40) << "nothing in the corner";
+  EXPECT_GT(pixel(128, 180), 60) << "the ball, lit from the front";
 }
 
 TEST(CppProgram, Cpp_TellsOfTheMissingLawAndOfTheBalls) {

@@ -17,6 +17,9 @@ dfm_rigid_def rigid_symbol(void) __asm__("dfm_rigid_def_default");
 dfm_body_def body_symbol(void) __asm__("dfm_body_def_default");
 dfm_switch switch_symbol(void) __asm__("dfm_switch_default");
 dfm_switch_rule rule_symbol(void) __asm__("dfm_switch_rule_default");
+dfm_query_shape shape_symbol(void) __asm__("dfm_query_shape_default");
+dfm_query_filter filter_symbol(void) __asm__("dfm_query_filter_default");
+dfm_vertex_layout layout_symbol(void) __asm__("dfm_vertex_layout_default");
 }
 
 namespace {
@@ -37,6 +40,9 @@ void each_default(F f) {
   f(dfm_body_def_default(), dfm_body_def_default_sized, body_symbol, 256, "body");
   f(dfm_switch_default(), dfm_switch_default_sized, switch_symbol, 48, "switch");
   f(dfm_switch_rule_default(), dfm_switch_rule_default_sized, rule_symbol, 160, "switch rule");
+  f(dfm_query_shape_default(), dfm_query_shape_default_sized, shape_symbol, 120, "query shape");
+  f(dfm_query_filter_default(), dfm_query_filter_default_sized, filter_symbol, 32, "query filter");
+  f(dfm_vertex_layout_default(), dfm_vertex_layout_default_sized, layout_symbol, 56, "vertex layout");
 }
 
 template <class T>
@@ -244,6 +250,8 @@ TEST(DefSizes, ReportsOfAnOlderOrANewerHeader_SayWhatIsFilled) {
                                  "obstacle");
   const double from[] = {0, 0, 1}, down[] = {0, 0, -1};
   check_report<dfm_ray_hit>([&](auto *out) { return dfm_world_ray(w, from, down, 10, out); }, 80, "ray");
+  check_report<dfm_query_hit>([&](auto *out) { return dfm_world_query_ray(w, from, down, 10, nullptr, out); },
+                              80, "query ray");
 }
 
 }  // namespace

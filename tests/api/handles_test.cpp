@@ -108,6 +108,41 @@ std::vector<Call> world_calls() {
          dfm_ray_hit r{};
          return dfm_world_closest(h, zero3, 1, &r);
        }},
+      {"world_query_ray",
+       [](uint64_t h) {
+         dfm_query_hit r{};
+         return dfm_world_query_ray(h, zero3, one3, 1, nullptr, &r);
+       }},
+      {"world_query_ray_all",
+       [](uint64_t h) { return dfm_world_query_ray_all(h, zero3, one3, 1, nullptr, 0, nullptr, &count); }},
+      {"world_query_ray_all_sized",
+       [](uint64_t h) {
+         return dfm_world_query_ray_all_sized(h, zero3, one3, 1, nullptr, 80, 0, nullptr, &count);
+       }},
+      {"world_query_closest",
+       [](uint64_t h) {
+         dfm_query_hit r{};
+         return dfm_world_query_closest(h, zero3, 1, nullptr, &r);
+       }},
+      {"world_query_overlap",
+       [](uint64_t h) {
+         const dfm_query_shape s = dfm_query_shape_default();
+         return dfm_world_query_overlap(h, &s, nullptr, 0, nullptr, &count);
+       }},
+      {"world_query_aabb",
+       [](uint64_t h) {
+         const dfm_aabb box{{0, 0, 0}, {1, 1, 1}};
+         return dfm_world_query_aabb(h, &box, nullptr, 0, nullptr, &count);
+       }},
+      {"world_query_cast",
+       [](uint64_t h) {
+         const dfm_query_shape s = dfm_query_shape_default();
+         dfm_query_hit r{};
+         return dfm_world_query_cast(h, &s, one3, nullptr, &r);
+       }},
+      {"world_set_may_touch", [](uint64_t h) { return dfm_world_set_may_touch(h, nullptr, nullptr); }},
+      {"world_ask_again", [](uint64_t h) { return dfm_world_ask_again(h, 0, 0); }},
+      {"world_set_pre_solve", [](uint64_t h) { return dfm_world_set_pre_solve(h, nullptr, nullptr); }},
       {"debug_draw",
        [](uint64_t h) {
          return dfm_debug_draw(
@@ -207,6 +242,13 @@ std::vector<Call> body_calls() {
       {"surface_forces", [](uint64_t h) { return dfm_surface_forces(h, 0, nullptr, &count); }},
       {"surface_triangles", [](uint64_t h) { return dfm_surface_triangles(h, 0, nullptr, &count); }},
       {"surface_points", [](uint64_t h) { return dfm_surface_points(h, 0, nullptr, &count); }},
+      {"surface_vertices", [](uint64_t h) { return dfm_surface_vertices(h, nullptr, 0, nullptr, &count); }},
+      {"body_query_triangles",
+       [](uint64_t h) {
+         const dfm_query_shape s = dfm_query_shape_default();
+         return dfm_body_query_triangles(h, &s, 0, nullptr, &count);
+       }},
+      {"body_set_sensor", [](uint64_t h) { return dfm_body_set_sensor(h, false); }},
       {"debug_write_body", [](uint64_t h) { return dfm_debug_write_body(h, "/nonexistent/x.vtu"); }},
       {"debug_write_surface", [](uint64_t h) { return dfm_debug_write_surface(h, "/nonexistent/x.vtu"); }},
   };
@@ -215,6 +257,7 @@ std::vector<Call> body_calls() {
 std::vector<Call> obstacle_calls() {
   return {
       {"obstacle_destroy", [](uint64_t h) { return dfm_obstacle_destroy(h); }},
+      {"obstacle_set_sensor", [](uint64_t h) { return dfm_obstacle_set_sensor(h, false); }},
       {"obstacle_get_pose", [](uint64_t h) { return dfm_obstacle_get_pose(h, &pose); }},
       {"obstacle_get_def",
        [](uint64_t h) {

@@ -206,6 +206,11 @@ Calls world_calls(Scene &s, bool step_only) {
       {"world_swaps", [&] { return dfm_world_swaps(s.w, 0, nullptr, &n); }},
       {"world_events", [&] { return dfm_world_events(s.w, 0, nullptr, &n); }},
       {"world_hold_begin", [&] { return dfm_world_hold_begin(s.w); }},
+      {"world_set_may_touch", [&] { return dfm_world_set_may_touch(s.w, nullptr, nullptr); }},
+      {"world_ask_again", [&] { return dfm_world_ask_again(s.w, 0, 0); }},
+      {"world_set_pre_solve", [&] { return dfm_world_set_pre_solve(s.w, nullptr, nullptr); }},
+      {"body_set_sensor", [&] { return dfm_body_set_sensor(s.body, true); }},
+      {"obstacle_set_sensor", [&] { return dfm_obstacle_set_sensor(s.floor, true); }},
       {"body_create",
        [&] {
          static const double x[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
@@ -288,22 +293,30 @@ Calls world_calls(Scene &s, bool step_only) {
       {"rigid_set_motor", [&] { return dfm_rigid_set_motor(s.rigid, 0, 0, 0); }},
   };
   if (step_only)
-    all.insert(all.end(), {{"world_contacts", [&] { return dfm_world_contacts(s.w, 0, nullptr, &n); }},
-                           {"world_pairs", [&] { return dfm_world_pairs(s.w, 0, nullptr, &n); }},
-                           {"world_law_info",
-                            [&] {
-                              dfm_law_info info{};
-                              return dfm_world_law_info(s.w, 0, &info);
-                            }},
-                           {"world_hold",
-                            [&] {
-                              double creep;
-                              return dfm_world_hold(s.w, &creep, &n);
-                            }},
-                           {"debug_draw", [&] {
-                              return dfm_debug_draw(
-                                  s.w, 7, [](void *, const double *, const double *, uint32_t) {}, nullptr);
-                            }}});
+    all.insert(all.end(),
+               {{"world_contacts", [&] { return dfm_world_contacts(s.w, 0, nullptr, &n); }},
+                {"world_pairs", [&] { return dfm_world_pairs(s.w, 0, nullptr, &n); }},
+                {"world_law_info",
+                 [&] {
+                   dfm_law_info info{};
+                   return dfm_world_law_info(s.w, 0, &info);
+                 }},
+                {"world_query_overlap",
+                 [&] {
+                   const dfm_query_shape q = dfm_query_shape_default();
+                   return dfm_world_query_overlap(s.w, &q, nullptr, 0, nullptr, &n);
+                 }},
+                {"surface_vertices", [&] { return dfm_surface_vertices(s.body, nullptr, 0, nullptr, &n); }},
+                {"sensor_things", [&] { return dfm_sensor_things(s.body, 0, nullptr, &n); }},
+                {"world_hold",
+                 [&] {
+                   double creep;
+                   return dfm_world_hold(s.w, &creep, &n);
+                 }},
+                {"debug_draw", [&] {
+                   return dfm_debug_draw(
+                       s.w, 7, [](void *, const double *, const double *, uint32_t) {}, nullptr);
+                 }}});
   return all;
 }
 

@@ -111,6 +111,8 @@ DFM_CONTACT_TRIANGLE_A = 8
 DFM_EVENT_BEGIN = 1
 DFM_EVENT_END = 2
 DFM_EVENT_RELEASE = 3
+DFM_EVENT_SENSOR_BEGIN = 4
+DFM_EVENT_SENSOR_END = 5
 DFM_ATTACH_TOUCH = 1
 DFM_MESH_TETS = 1
 DFM_MESH_SURFACE = 2
@@ -135,6 +137,13 @@ DFM_TOI_CONSERVATIVE = 3
 DFM_DRAW_CONTACTS = 1
 DFM_DRAW_FORCES = 2
 DFM_DRAW_BOXES = 4
+DFM_SHAPE_CONVEX = 7
+DFM_QUERY_BODIES = 1
+DFM_QUERY_OBSTACLES = 2
+DFM_QUERY_RIGIDS = 4
+DFM_QUERY_SENSORS = 8
+DFM_QUERY_INSIDE = 1
+DFM_CHOICE_TOUCHED = 1
 
 
 class dfm_host(_Structure):
@@ -429,6 +438,11 @@ class dfm_attachment(_Structure):
                 ("force", f64 * 3), ("moment", f64 * 3), ("impulse", f64 * 3), ("stretch", f64)]
 
 
+class dfm_vertex_layout(_Structure):
+    _fields_ = [("size", u32), ("stride", u32), ("position", u32), ("normal", u32), ("velocity", u32),
+                ("displacement", u32), ("stick", u32), ("reserved", u32), ("origin", f64 * 3)]
+
+
 class dfm_ray_hit(_Structure):
     _fields_ = [("size", u32), ("triangle", u32), ("body", u64), ("obstacle", u64), ("distance", f64),
                 ("point", f64 * 3), ("normal", f64 * 3)]
@@ -542,6 +556,29 @@ class dfm_toi_options(_Structure):
                 ("max_iterations", i32)]
 
 
+class dfm_query_shape(_Structure):
+    _fields_ = [("size", u32), ("shape", u32), ("pose", dfm_pose), ("half_size", f64 * 3),
+                ("radius", f64), ("half_length", f64), ("npoint", u32), ("reserved", u32),
+                ("points", ptr)]
+
+
+class dfm_query_filter(_Structure):
+    _fields_ = [("size", u32), ("what", u32), ("category", u32), ("collides_with", u32), ("accept", ptr),
+                ("user", ptr)]
+
+
+class dfm_query_hit(_Structure):
+    _fields_ = [("size", u32), ("flags", u32), ("thing", u64), ("triangle", u32), ("reserved", u32),
+                ("distance", f64), ("point", f64 * 3), ("normal", f64 * 3)]
+
+
+class dfm_contact_choice(_Structure):
+    _fields_ = [("size", u32), ("flags", u32), ("a", u64), ("b", u64), ("key", u64), ("kind", u32),
+                ("feature_a", u32), ("feature_b", u32), ("substep", u32), ("time", f64), ("dt", f64),
+                ("point", f64 * 3), ("normal", f64 * 3), ("gap", f64), ("velocity", f64 * 3),
+                ("enabled", u32), ("law", u32), ("friction_scale", f64), ("surface_velocity", f64 * 3)]
+
+
 # name: (result, arguments)
 FUNCTIONS = {
     "dfm_version": (text, [ptr, ptr, ptr]),
@@ -634,6 +671,8 @@ FUNCTIONS = {
     "dfm_surface_forces": (i32, [u64, u32, ptr, ptr]),
     "dfm_surface_triangles": (i32, [u64, u32, ptr, ptr]),
     "dfm_surface_points": (i32, [u64, u32, ptr, ptr]),
+    "dfm_vertex_layout_default_sized": (None, [u32, ptr]),
+    "dfm_surface_vertices": (i32, [u64, ptr, usize, ptr, ptr]),
     "dfm_world_ray": (i32, [u64, ptr, ptr, f64, ptr]),
     "dfm_world_closest": (i32, [u64, ptr, f64, ptr]),
     "dfm_tetmesh_read": (i32, [ptr, text, ptr]),
@@ -711,4 +750,20 @@ FUNCTIONS = {
     "dfm_debug_write_body": (i32, [u64, text]),
     "dfm_debug_write_surface": (i32, [u64, text]),
     "dfm_debug_draw": (i32, [u64, u32, ptr, ptr]),
+    "dfm_query_shape_default_sized": (None, [u32, ptr]),
+    "dfm_query_filter_default_sized": (None, [u32, ptr]),
+    "dfm_world_query_ray": (i32, [u64, ptr, ptr, f64, ptr, ptr]),
+    "dfm_world_query_ray_all_sized": (i32, [u64, ptr, ptr, f64, ptr, u32, u32, ptr, ptr]),
+    "dfm_world_query_closest": (i32, [u64, ptr, f64, ptr, ptr]),
+    "dfm_world_query_overlap": (i32, [u64, ptr, ptr, u32, ptr, ptr]),
+    "dfm_world_query_aabb": (i32, [u64, ptr, ptr, u32, ptr, ptr]),
+    "dfm_body_query_triangles": (i32, [u64, ptr, u32, ptr, ptr]),
+    "dfm_world_query_cast": (i32, [u64, ptr, ptr, ptr, ptr]),
+    "dfm_world_set_may_touch": (i32, [u64, ptr, ptr]),
+    "dfm_world_ask_again": (i32, [u64, u64, u64]),
+    "dfm_world_set_pre_solve": (i32, [u64, ptr, ptr]),
+    "dfm_body_set_sensor": (i32, [u64, flag]),
+    "dfm_obstacle_set_sensor": (i32, [u64, flag]),
+    "dfm_is_sensor": (i32, [u64, ptr]),
+    "dfm_sensor_things": (i32, [u64, u32, ptr, ptr]),
 }

@@ -183,19 +183,25 @@ static inline dfm_status dfm_world_pair_impulses(dfm_world world, uint32_t capac
 
 typedef struct dfm_contact_event {
   uint32_t size, kind; /* DFM_EVENT_* */
-  uint64_t a, b, key;  /* handles of body and body or obstacle; key of the contact */
+  uint64_t a, b, key;  /* handles of body and body or obstacle; key of the contact, 0 of a sensor */
   double t;            /* s, simulated time */
 } dfm_contact_event;
 /* RELEASE: an attachment has ended, by its release force or with one of its sides; key is its number
- * (deform/attach.h) */
-enum { DFM_EVENT_BEGIN = 1, DFM_EVENT_END = 2, DFM_EVENT_RELEASE = 3 };
+ * (deform/attach.h). SENSOR: a thing has come into a sensor or left it (deform/sensor.h) */
+enum {
+  DFM_EVENT_BEGIN = 1,
+  DFM_EVENT_END = 2,
+  DFM_EVENT_RELEASE = 3,
+  DFM_EVENT_SENSOR_BEGIN = 4,
+  DFM_EVENT_SENSOR_END = 5
+};
 /** dfm_world_events with rows of any size. @param row_size bytes from one row of out to the next
  * (base.h). Since 0.1.
  * Threads: Not during step. */
 DFM_API dfm_status dfm_world_events_sized(dfm_world world, uint32_t row_size, uint32_t capacity,
                                           dfm_contact_event *out, uint32_t *n);
-/** Begin and end of contacts, and ends of attachments, since the last call; empties the list. Where more
- * than 65,536 wait, the oldest are left out.
+/** Begin and end of contacts and of overlaps with sensors, and ends of attachments, since the last call;
+ * empties the list. Where more than 65,536 wait, the oldest are left out.
  * Threads: Not during step. Since 0.1. */
 static inline dfm_status dfm_world_events(dfm_world world, uint32_t capacity, dfm_contact_event *out,
                                           uint32_t *n) {

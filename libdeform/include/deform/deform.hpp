@@ -34,6 +34,7 @@
 #include "deform/deform.h"
 #include "deform/models.hpp"
 #include "deform/obstacles.hpp"
+#include "deform/queries.hpp"
 #include "deform/result.hpp"
 
 namespace deform {
@@ -224,7 +225,8 @@ struct AnyMesh {
 template <class E>
 class Body : public Handle<dfm_body, struct BodyKind>,
              public BodyModels<E, Body<E>>,
-             public BodyAttachments<E, Body<E>> {
+             public BodyAttachments<E, Body<E>>,
+             public BodyQueries<E, Body<E>> {
  public:
   using Handle::Handle;
   static void end(dfm_body body) noexcept { dfm_body_destroy(body); }
@@ -346,7 +348,7 @@ class Body : public Handle<dfm_body, struct BodyKind>,
 
 // ---- the world --------------------------------------------------------------------------------------------
 template <class E>
-class World : public Handle<dfm_world, struct WorldKind> {
+class World : public Handle<dfm_world, struct WorldKind>, public WorldQueries<E, World<E>> {
  public:
   using Handle::Handle;
   static void end(dfm_world world) noexcept { dfm_world_destroy(world); }
@@ -505,18 +507,6 @@ class World : public Handle<dfm_world, struct WorldKind> {
   auto hold_begin() const { return E::done(dfm_world_hold_begin(raw_)); }
   auto hold() const {
     return produce<E, HoldReport>([&](HoldReport &h) { return dfm_world_hold(raw_, &h.creep, &h.count); });
-  }
-  auto ray(In3 origin, In3 direction, double max_distance) const {
-    return produce<E, dfm_ray_hit>([&](dfm_ray_hit &h) {
-      h.size = sizeof h;
-      return dfm_world_ray(raw_, origin.data(), direction.data(), max_distance, &h);
-    });
-  }
-  auto closest(In3 point, double max_distance) const {
-    return produce<E, dfm_ray_hit>([&](dfm_ray_hit &h) {
-      h.size = sizeof h;
-      return dfm_world_closest(raw_, point.data(), max_distance, &h);
-    });
   }
   auto explain() const {
     return collect_text<E>([&](char *text, size_t *bytes) { return dfm_world_explain(raw_, text, bytes); });

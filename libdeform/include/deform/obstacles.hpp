@@ -6,13 +6,14 @@
 
 #include "deform/defs.hpp"
 #include "deform/obstacle.h"
+#include "deform/queries.hpp"
 #include "deform/result.hpp"
 #include "deform/rigid.h"
 
 namespace deform::basic {
 
 template <class E>
-class Obstacle : public Handle<dfm_obstacle, struct ObstacleKind> {
+class Obstacle : public Handle<dfm_obstacle, struct ObstacleKind>, public ObstacleQueries<E, Obstacle<E>> {
  public:
   using Handle::Handle;
   static void end(dfm_obstacle obstacle) noexcept { dfm_obstacle_destroy(obstacle); }
@@ -41,7 +42,7 @@ class Obstacle : public Handle<dfm_obstacle, struct ObstacleKind> {
 
 // Converts to Obstacle: poses, pair rules and reports take it.
 template <class E>
-class Rigid : public Handle<dfm_rigid, struct RigidKind> {
+class Rigid : public Handle<dfm_rigid, struct RigidKind>, public ObstacleQueries<E, Rigid<E>> {
  public:
   using Handle::Handle;
   // Of the whole set that the body came with.

@@ -33,6 +33,45 @@ DFM_API dfm_status dfm_surface_triangles(dfm_body body, uint32_t capacity, uint3
  * during step. Since 0.1. */
 DFM_API dfm_status dfm_surface_points(dfm_body body, uint32_t capacity, uint32_t *point, uint32_t *n);
 
+#define DFM_VERTEX_NONE UINT32_MAX /* dfm_vertex_layout: this member is not written */
+/** How single-precision vertices lie in the caller's memory: bytes from one vertex to the next, and bytes
+ * from the start of a vertex to each member, all multiples of 4. What lies between the members is left
+ * alone, so that texture coordinates stand beside them and are written once by the host. */
+typedef struct dfm_vertex_layout {
+  uint32_t size, stride;
+  uint32_t position; /* 3 floats, m: world, less origin */
+  uint32_t normal;   /* 3 floats: that of dfm_surface_normals */
+  uint32_t velocity; /* 3 floats, m/s */
+  /* 3 floats, m: from the rest position before pose, as dfm_debug_write_surface gives it */
+  uint32_t displacement;
+  /* 1 float: of the contacts of the last sub-step that carry load at this surfel, at an edge or a triangle
+   * of it: 1 one sticks, 0.5 all slide, 0 there is none */
+  uint32_t stick;
+  uint32_t reserved;
+  double origin[3]; /* m, subtracted before rounding: far from 0 floats are coarse */
+} dfm_vertex_layout;
+/** dfm_vertex_layout_default into a struct of any size (base.h). Threads: Any thread. Since 0.1. */
+DFM_API void dfm_vertex_layout_default_sized(uint32_t size, dfm_vertex_layout *out);
+/** Position and normal, 24 bytes a vertex, origin 0. Threads: Any thread. Since 0.1. */
+static inline dfm_vertex_layout dfm_vertex_layout_default(void) {
+  dfm_vertex_layout out;
+  dfm_vertex_layout_default_sized((uint32_t)sizeof out, &out);
+  return out;
+}
+/** Writes one vertex per surfel for drawing, each value the nearest float to that of the functions above; the
+ * triangles of dfm_surface_triangles are its index buffer. Memory is only written, in rising order but for
+ * `stick`, so it may be a mapped vertex buffer. A body whose surface is its own boundary needs no memory of
+ * the library; another one's first call makes what dfm_world_ray makes for it.
+ * @param layout  NULL: dfm_vertex_layout_default()
+ * @param bytes   that out has; 0 with out NULL only counts
+ * @param out     aligned to 4
+ * @param n       out, vertices, one per surfel; may be NULL
+ * @return DFM_OK; DFM_E_ARG members overlap, lie beyond the stride or are not aligned, or bytes is too small
+ * (out untouched, *n set); DFM_E_NOMEM; DFM_E_HANDLE; DFM_E_BUSY. Threads: Any thread. Not during
+ * step. Since 0.1. */
+DFM_API dfm_status dfm_surface_vertices(dfm_body body, const dfm_vertex_layout *layout, size_t bytes,
+                                        void *out, uint32_t *n);
+
 typedef struct dfm_ray_hit {
   uint32_t size, triangle;
   dfm_body body;

@@ -43,6 +43,10 @@ DFM_ENDED_WITH(dfm_world_stats, energy_gain)
 DFM_ENDED_WITH(dfm_tetmesh_info, warnings)
 DFM_ENDED_WITH(dfm_trimesh_info, warnings)
 DFM_ENDED_WITH(dfm_ray_hit, normal)
+DFM_ENDED_WITH(dfm_vertex_layout, origin)
+DFM_ENDED_WITH(dfm_query_shape, points)
+DFM_ENDED_WITH(dfm_query_filter, user)
+DFM_ENDED_WITH(dfm_query_hit, normal)
 DFM_ENDED_WITH(dfm_scene_settings, has_camera)
 #undef DFM_ENDED_WITH
 

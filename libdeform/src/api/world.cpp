@@ -13,6 +13,7 @@
 #include "world/equilibrium.h"
 #include "world/explain.h"
 #include "world/model_change.h"
+#include "world/sensors.h"
 #include "world/snapshot.h"
 
 using namespace dfm;
@@ -250,6 +251,7 @@ dfm_status dfm_world_step(dfm_world world, double dt, uint32_t *trouble) {
     make_switches(w, dt);
     const dfm_status s = step_within_budget(w, dt, &bits);
     if (trouble) *trouble = bits;
+    if (s == DFM_OK) look_at_sensors(w, true);
     return s;
   });
 }
@@ -382,6 +384,7 @@ dfm_status dfm_world_restore(dfm_world world, const void *buffer, size_t bytes) 
     World &w = whole(exclusive(world_of(world)));
     need(buffer, "buffer");
     world_restore(w, buffer, bytes);
+    look_at_sensors(w, false);
   });
 }
 

@@ -26,6 +26,8 @@ struct ContactState {
   Array<double> area, dwell;  // m2, s
   // [nstate,stride] law state at the start of the sub-step, nstate = most that any law has
   Array<double> bristle;
+  // [n] the law is asked at so many times the normal force, where the host scales friction; empty: 1
+  Array<double> scale;
   // Answer: the laws there.
   Array<double> ft;           // [2,stride] N, force on side a
   Array<double> dft_dvt;      // [4,stride] N s/m

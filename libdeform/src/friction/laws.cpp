@@ -170,6 +170,8 @@ dfm_friction_in LawBatches::inputs(const LawInstance &law, std::span<const uint3
     stop[column + k] = state.ft_stop[state.stride + i];
     for (uint32_t s = 0; s < S; ++s) bristle[s * column + k] = state.bristle[size_t(s) * state.stride + i];
   }
+  if (!state.scale.empty())
+    for (uint32_t k = 0; k < n; ++k) fn[k] *= state.scale[index[k]];
   const uint32_t needs = law.ops->needs;
   dfm_friction_in in{};
   in.size = sizeof in;
@@ -189,7 +191,7 @@ dfm_friction_in LawBatches::inputs(const LawInstance &law, std::span<const uint3
 
 const LawInstance *LawBatches::evaluate(const LawInstance &law, std::span<const uint32_t> index, double h,
                                         ContactState &state) {
-  if (index.size() == state.n) return evaluate_all(law, h, state);
+  if (index.size() == state.n && state.scale.empty()) return evaluate_all(law, h, state);
   const dfm_friction_in in = inputs(law, index, h, state);
   const uint32_t n = in.n, S = law.nstate;
   const size_t column = in.stride;
@@ -226,8 +228,9 @@ const LawInstance *LawBatches::evaluate(const LawInstance &law, std::span<const 
     poison += 0.0 * (ft[k] + ft[column + k]);
     if (given) {
       for (uint32_t j = 0; j < 4; ++j) state.dft_dvt[size_t(j) * state.stride + i] = dv[j * column + k];
-      state.dft_dfn[i] = dn[k];
-      state.dft_dfn[state.stride + i] = dn[column + k];
+      const double scale = state.scale.empty() ? 1 : state.scale[i];
+      state.dft_dfn[i] = scale * dn[k];
+      state.dft_dfn[state.stride + i] = scale * dn[column + k];
       poison += 0.0 * (dv[k] + dv[column + k] + dv[2 * column + k] + dv[3 * column + k]) +
                 0.0 * (dn[k] + dn[column + k]);
     } else {
@@ -345,6 +348,9 @@ const LawInstance *LawBatches::difference(const LawInstance &law, std::span<cons
   if (which & kByVt)
     answered = ask(vt, 2, 0, in.vt, 1e-7, state.dft_dvt, 2) && ask(vt, 2, 1, in.vt, 1e-7, state.dft_dvt, 2);
   if (answered && (which & kByFn)) answered = ask(fn, 1, 0, in.fn, 1e-9, state.dft_dfn, 1);
+  if ((which & kByFn) && !state.scale.empty())
+    for (const uint32_t i : index)
+      for (size_t r = 0; r < 2; ++r) state.dft_dfn[r * n + i] *= state.scale[i];
   for (const uint32_t i : index) {
     Origin &o = origin_[i];
     // what was made elsewhere belongs to another force

@@ -227,6 +227,7 @@ class Builder {
     std::copy_n(b.spin, 3, d.spin);
     dfm_body body = 0;
     check(dfm_body_create(world_, &d, &body), b.pointer);
+    if (b.sensor) check(dfm_body_set_sensor(body, true), b.pointer);
     if (b.start.kind != StartKind::rest)
       check(dfm_body_set_state(body, mesh.npoint, start_positions(b.start, mesh, b.pose).data(), nullptr),
             b.start.pointer);
@@ -435,6 +436,7 @@ class Builder {
     if (!o.mesh.empty()) files_.load(o, points);
     dfm_obstacle obstacle = 0;
     check(dfm_obstacle_create(world_, &o.def, &obstacle), o.pointer);
+    if (o.sensor) check(dfm_obstacle_set_sensor(obstacle, true), o.pointer);
   }
 
   void create_rigid(Rigid &rigid) {
@@ -475,6 +477,8 @@ class Builder {
                                    nullptr};
     std::vector<dfm_rigid> made(bodies.size());
     check(dfm_rigid_create(world_, rigid.host.c_str(), &set, made.data()), rigid.pointer);
+    for (size_t i = 0; i < made.size(); ++i)
+      if (rigid.bodies[i].sensor) check(dfm_obstacle_set_sensor(made[i], true), rigid.bodies[i].pointer);
   }
 
   void add_friction(Friction &f) {

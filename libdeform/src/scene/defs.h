@@ -117,6 +117,7 @@ struct Start {
 
 struct Body {
   std::string pointer, name, mesh, material, model, nodal_bc;
+  bool sensor = false;
   bool model_open = false;  // the planner chooses; `model` holds what stands in for it
   int32_t integrator = DFM_INTEGRATOR_AUTO;
   MadeMesh made;
@@ -139,6 +140,7 @@ struct Body {
 struct Obstacle {
   std::string pointer, name, material, mesh;
   double scale = 1;  // of the mesh
+  bool sensor = false;
   dfm_obstacle_def def = {};
   std::vector<dfm_pose_key> keys;
 };
@@ -150,6 +152,7 @@ struct Joint {
 
 struct RigidBody {
   std::string pointer, name, material;
+  bool sensor = false;
   dfm_rigid_def def = {};
   std::vector<Joint> joints;
 };

@@ -310,6 +310,7 @@ Body read_body(const Node &node, ReadContext &context) {
   if (mesh.value().is_object()) b.made = read_made(mesh);
   else b.mesh = mesh.text();
   if (node.has("material")) b.material = known(node.member("material"), context.materials, "material");
+  b.sensor = node.boolean("sensor", false);
   if (!node.has("model")) node.value()["model"] = json::object();
   const Node model = node.member("model");
   model.object("model");
@@ -435,6 +436,7 @@ Obstacle read_obstacle(const Node &node, ReadContext &context) {
   }
   node.vector("velocity_surface", o.def.velocity_surface, 0, 0, 0);
   if (node.has("material")) o.material = known(node.member("material"), context.materials, "material");
+  o.sensor = node.boolean("sensor", false);
   return o;
 }
 

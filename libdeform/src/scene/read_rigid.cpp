@@ -30,6 +30,7 @@ RigidBody read_rigid_body(const Node &node, ReadContext &context) {
   node.vector("velocity", b.def.velocity, 0, 0, 0);
   node.vector("spin", b.def.spin, 0, 0, 0);
   if (node.has("material")) b.material = known(node.member("material"), context.materials, "material");
+  b.sensor = node.boolean("sensor", false);
   return b;
 }
 

@@ -83,6 +83,7 @@ struct Body {
   uint32_t slot = 0;
   std::string name, material;
   uint32_t category = 1, collides_with = ~0u;
+  bool sensor = false;  // reports what overlaps it, and pushes nothing
   void *user = nullptr;
 
   Phyxels p;

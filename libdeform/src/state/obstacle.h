@@ -29,6 +29,7 @@ struct Obstacle {
   Pose pose;    // now
   Pose target;  // at the end of the next step, where move_to set it
   bool has_target = false;
+  bool sensor = false;        // reports what overlaps it, and pushes nothing
   RigidSet *rigid = nullptr;  // a body of a rigid host: where it stands in `rigid`
   uint32_t rigid_body = 0;
   bool added = false;  // a further shape of that body, at `local` in its frame

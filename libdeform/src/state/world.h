@@ -58,6 +58,27 @@ struct Prescribed {
   bool stands() const { return until < HUGE_VAL; }
 };
 
+// What the host answers about pairs (deform/callback.h); by ids, a body first, the older of two.
+struct PairAnswer {
+  uint64_t a, b;
+  bool touch;
+};
+struct MayTouch {
+  dfm_may_touch_fn call = nullptr;
+  void *user = nullptr;
+  std::vector<PairAnswer> answers;  // sorted by (a, b)
+};
+struct PreSolve {
+  dfm_pre_solve_fn call = nullptr;
+  void *user = nullptr;
+};
+
+// Things that overlap a sensor, by ids; sorted by (sensor, thing).
+struct Sensed {
+  uint64_t sensor, thing;
+  auto operator<=>(const Sensed &) const = default;
+};
+
 // A measurement of what creeps (dfm_world_hold_begin).
 struct Hold {
   bool on = false;
@@ -88,6 +109,10 @@ struct World {
   std::vector<FrictionRule> friction;
   std::vector<FilterRule> filters;
   std::vector<Attachment> attachments;  // in order of creation
+  MayTouch may_touch;
+  PreSolve pre_solve;
+  uint32_t sensors = 0;        // how many there are
+  std::vector<Sensed> sensed;  // at the end of the last step
   Overlaps overlaps;
   // rises when positions or d_c change otherwise than by a step
   uint64_t placements = 0;

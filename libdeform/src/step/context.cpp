@@ -19,10 +19,10 @@ StepContext::StepContext(const Meters &meters)
              stirred);
   use_memory(meters.contacts.memory(), lent, contacts, tolerance.normal, tolerance.tangent, disturbance,
              best_impulse, trial_response, tangents, match, sharing, aim, stands, ways, renewed, bonds,
-             bond_impulse);
+             bond_impulse, chosen);
   use_memory(meters.contacts.memory(), state.law, state.fn, state.vt, state.ft_stop, state.area, state.dwell,
              state.bristle, state.ft, state.dft_dvt, state.dft_dfn, state.limit, state.bristle_out,
-             state.mode, state.form, state.slip, state.linear);
+             state.mode, state.form, state.slip, state.scale, state.linear);
   use_memory(meters.detection.memory(), guard.joined, guard.near, guard.hits, guard.speed, guard.change,
              guard.kept, guard.blocks.pieces);
   GuardMemory &known = guard.memory;

@@ -75,9 +75,15 @@ struct StepContext {
   Array<double> tangents;
   // [contacts] place in the store that the contact goes on from, or kNone
   Array<uint32_t> match;
-  Array<uint32_t> block_surfels;    // responses of bodies whose points answer each other
-  bool bodies_revise = false;       // some body looks again at what the solve has made of it
-  bool bodies_part = false;         // some body moves otherwise where contacts are
+  Array<uint32_t> block_surfels;  // responses of bodies whose points answer each other
+  bool bodies_revise = false;     // some body looks again at what the solve has made of it
+  bool bodies_part = false;       // some body moves otherwise where contacts are
+  struct Chosen {
+    uint32_t law;
+    double scale;  // of friction
+    Vec3 belt;     // m/s
+  };
+  Array<Chosen> chosen;             // [contacts] by the host (PreSolve); empty where it is not asked
   Array<uint8_t> near;              // [bodies] had contacts in the last sub-step
   Array<uint8_t> touching;          // [bodies] touch something, between steps
   const Body *unsettled = nullptr;  // that has found no state with its contacts

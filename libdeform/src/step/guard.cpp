@@ -189,6 +189,7 @@ double find_hits(World &w, StepContext &step) {
     return of_one_body(c) ? !(guarded_apart(w, step, c) > 0) : cross_at_start(step, c);
   });
   guard_obstacles(g.scene, list, g.near, g.hits);
+  guard_ask_hits(w, step);
   double least = 1;
   for (const GuardHit &hit : g.hits) least = std::min(least, hit.safe);
   return least;

@@ -48,13 +48,15 @@ struct Guard {
   void start() {
     kept.clear();
     cut = motion = 1;
-    acted = again = false;
+    acted = again = resolving = false;
   }
   void forget() { memory.forget(); }  // positions or d_c have changed otherwise than by a step
 };
 
 // guard_hits.cpp: the earliest hits as contacts of the sub-step, among those that it has.
 void guard_add_hits(World &w, StepContext &step);
+// Leaves out the hits whose contacts the host does not want (PreSolve).
+void guard_ask_hits(World &w, StepContext &step);
 // In the middle of a solve's preparation, where guard.resolving: impulses, and rates of hits, of `kept`.
 void guard_impulses(StepContext &step);
 void guard_rates(StepContext &step);

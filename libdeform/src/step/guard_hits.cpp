@@ -9,6 +9,7 @@
 #include "state/world.h"
 #include "step/context.h"
 #include "step/guard.h"
+#include "step/pre_solve.h"
 #include "step/stages.h"
 
 namespace dfm {
@@ -199,6 +200,19 @@ void choose_hits(StepContext &step) {
 }
 
 }  // namespace
+
+void guard_ask_hits(World &w, StepContext &step) {
+  if (!w.pre_solve.call) return;
+  std::erase_if(step.guard.hits, [&](const GuardHit &hit) {
+    ContactPoint c;
+    double along;
+    if (!HitContact(w, step, hit).make(c, along)) return false;
+    for (const ContactPoint &o : step.contacts)
+      if (same_features(o, c)) return false;
+    c.key = free_key(w, step, c);
+    return !ask_host(w, step, c);
+  });
+}
 
 // Hits join the contacts of the sub-step, in their order; one that has a contact already turns it to how it
 // stands at the hit.

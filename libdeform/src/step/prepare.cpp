@@ -159,20 +159,48 @@ struct Partner {
   uint64_t id;
   uint32_t category, collides_with;
   PairSide side;
-  bool has_shape;
+  bool has_shape, sensor;
 };
 Partner partner_of(const World &w, const StepContext &step, uint32_t thing) {
   const uint32_t nb = static_cast<uint32_t>(w.bodies.size());
   if (thing < nb) {
     const Body &b = *w.bodies[thing];
-    return {b.id, b.category, b.collides_with, {b.name, {}, b.material}, true};
+    return {b.id, b.category, b.collides_with, {b.name, {}, b.material}, true, b.sensor};
   }
   const Obstacle &o = *w.obstacles[thing - nb];
   return {o.id,
           o.def.category,
           o.def.collides_with,
           {o.name, {}, o.material},
-          step.obstacle_views[o.slot].shape != Shape::none};
+          step.obstacle_views[o.slot].shape != Shape::none,
+          o.sensor};
+}
+
+bool before_pair(const PairAnswer &l, const PairAnswer &r) { return l.a != r.a ? l.a < r.a : l.b < r.b; }
+
+// Of a pair that masks and rules let touch: is one of them a sensor, or does the host say no? The host is
+// asked where it has not answered yet: things i < j.
+bool refused(const World &w, const StepContext &step, uint32_t i, uint32_t j, const Partner &a,
+             const Partner &b, std::vector<PairAnswer> &answers) {
+  if (a.sensor || b.sensor) return true;
+  if (!w.may_touch.call || !b.has_shape) return false;
+  if (j < i) return !w.pairs.filter.may_touch(step.body_views[j], step.body_views[i]);
+  const auto find = [](const std::vector<PairAnswer> &in, const PairAnswer &pair) {
+    const auto at = std::lower_bound(in.begin(), in.end(), pair, before_pair);
+    return at != in.end() && !before_pair(pair, *at) ? &*at : nullptr;
+  };
+  PairAnswer pair{a.id, b.id, false};
+  if (const PairAnswer *const known = find(w.may_touch.answers, pair)) {
+    pair.touch = known->touch;
+  } else {
+    const auto handle = [&](uint32_t thing) {
+      const size_t nb = w.bodies.size();
+      return thing < nb ? w.bodies[thing]->handle : w.obstacles[thing - nb]->handle;
+    };
+    pair.touch = w.may_touch.call(w.may_touch.user, handle(i), handle(j));
+  }
+  answers.push_back(pair);
+  return !pair.touch;
 }
 
 // Attached to each other two things do not touch, unless they are told to. A rigid body is meant with all of
@@ -204,6 +232,7 @@ void make_pair_tables(World &w, StepContext &step, SceneFacts &facts) {
   w.pairs.zone_table.clear();
   w.pairs.zone_law.clear();
   for (auto &law : w.laws) law->by_default = false;
+  std::vector<PairAnswer> answers;  // those that are kept or given now
   std::vector<uint32_t> used;
   std::vector<uint8_t> told;  // by law: what it offers is a fact of the scene, however many pairs have it
   for (uint32_t i = 0; i < nb; ++i) {
@@ -217,7 +246,7 @@ void make_pair_tables(World &w, StepContext &step, SceneFacts &facts) {
         if (!is_body || i < j) w.pairs.filter.set(a.id, b.id, !is_body, rule->collide);
         touch = rule->collide;
       }
-      if (touch && parted(w, i, j)) {
+      if (touch && (parted(w, i, j) || refused(w, step, i, j, a, b, answers))) {
         if (!is_body || i < j) w.pairs.filter.set(a.id, b.id, !is_body, false);
         touch = false;
       }
@@ -230,6 +259,8 @@ void make_pair_tables(World &w, StepContext &step, SceneFacts &facts) {
         if (!std::exchange(told[law], uint8_t{1})) offer_law(*w.laws[law], facts);
     }
   }
+  std::sort(answers.begin(), answers.end(), before_pair);
+  w.may_touch.answers.swap(answers);
   keep_overlaps_aside(w);
   facts.effects_listed = w.selection.listed();
   facts.asked = w.selection.names();

@@ -17,6 +17,7 @@
 #include "step/bristles.h"
 #include "step/context.h"
 #include "step/pair_table.h"
+#include "step/pre_solve.h"
 #include "step/rigid.h"
 #include "step/stages.h"
 
@@ -211,6 +212,7 @@ void make_rows(World &w, StepContext &step) {
     step.state.area[i] = c.area;
   }
   if (!w.pairs.zone_table.empty()) set_zone_laws(w, step.contacts, step.state.law);
+  take_choices(step);
   if (step.rigid_again) step.best_impulse.assign(step.rows.impulse.begin(), step.rows.impulse.end());
   make_bonds(w, step, step.rigid_again || step.guard.resolving);
   step.rows.build(step.contacts, step.sources, {step.rigid_places, step.rigid_groups}, step.bonds);
@@ -223,6 +225,7 @@ void make_rows(World &w, StepContext &step) {
   fit_bristles(w, step);
   step.rows.recovery = w.def.recovery_speed;
   step.rows.finish(step.contacts, step.tangents.data(), step.h, step.guard.planned, w.offset, step.bonds);
+  run_belts(step);
   std::copy(step.bond_impulse.begin(), step.bond_impulse.end(),
             step.rows.impulse.begin() + std::ptrdiff_t{3} * step.rows.n);
   if (step.guard.resolving) guard_impulses(step);
@@ -273,6 +276,7 @@ namespace {
 // After the operator has changed.
 void finish_rows(World &w, StepContext &step) {
   step.rows.finish(step.contacts, step.tangents.data(), step.h, step.guard.planned, w.offset, step.bonds);
+  run_belts(step);
   if (!step.guard.kept.empty()) guard_rates(step);
 }
 
@@ -403,6 +407,7 @@ bool retry_shorter(World &w, StepContext &step, uint32_t *trouble) {
 }  // namespace
 
 bool stage_solve(World &w, StepContext &step, uint32_t *trouble) {
+  ask_pre_solve(w, step);
   if (!contacts_taken(w, step)) return false;
   step.passes = step.sweeps = 0;
   step.residual = {};

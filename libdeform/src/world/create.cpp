@@ -20,6 +20,7 @@
 #include "world/body_surface.h"
 #include "world/body_zones.h"
 #include "world/idle.h"
+#include "world/sensors.h"
 
 namespace dfm {
 namespace {
@@ -314,6 +315,7 @@ namespace {
 void forget(World &w, uint64_t id, bool obstacle, uint64_t handle, const std::string &name) {
   drop_attachments(w, id);
   close_slot(w, id, obstacle);
+  leave_sensors(w, id);
   ContactStore &s = w.store;
   reserve_events(w, s.n);
   for (uint32_t i = 0; i < s.n; ++i)
@@ -336,6 +338,7 @@ void forget(World &w, uint64_t id, bool obstacle, uint64_t handle, const std::st
 
 void destroy_body(Body &b) {
   World &w = *b.world;
+  w.sensors -= b.sensor;
   forget(w, b.id, false, b.handle, b.name);
   std::erase_if(w.bodies, [&](auto &p) { return p.get() == &b; });
   w.bound.body = nullptr;
@@ -343,6 +346,7 @@ void destroy_body(Body &b) {
 
 void destroy_obstacle(Obstacle &o) {
   World &w = *o.world;
+  w.sensors -= o.sensor;
   forget(w, o.id, true, o.handle, o.name);
   std::erase_if(w.obstacles, [&](auto &p) { return p.get() == &o; });
 }

@@ -77,7 +77,8 @@ double ray_capsule(Vec3 o, Vec3 d, double r, double half, Vec3 *normal) {
   return best;
 }
 
-// Positions of a body's surfels.
+}  // namespace
+
 Triangles search(Body &b) {
   return b.search->at(b.x_version, b.surface.tri, b.surface.nsurfel, [&](double *x) {
     for (uint32_t s = 0; s < b.surface.nsurfel; ++s) {
@@ -87,8 +88,6 @@ Triangles search(Body &b) {
   });
 }
 
-// In the obstacle's frame, where its points never change. Voxels answer as the surface that they
-// are made from.
 Triangles search(Obstacle &ob) {
   const size_t n = ob.points.size() / 3;
   return ob.search->at(1, ob.triangles, n, [&](double *x) {
@@ -104,12 +103,16 @@ Vec3 normal_of(const Triangles &m, uint32_t t) {
   return normalized(cross(m.corner(t, 1) - a, m.corner(t, 2) - a));
 }
 
+namespace {
+
 double ray_triangles(Obstacle &ob, Vec3 o, Vec3 d, double limit, Vec3 *normal, SearchCount *count) {
   const Triangles m = search(ob);
   const TriangleOnRay hit = first_on_ray(m, o, d, limit, count);
   if (hit.triangle != kNone) *normal = normal_of(m, hit.triangle);
   return hit.distance;
 }
+
+}  // namespace
 
 double ray_obstacle(Obstacle &ob, Vec3 origin, Vec3 direction, double limit, Vec3 *normal,
                     SearchCount *count) {
@@ -134,6 +137,8 @@ double ray_obstacle(Obstacle &ob, Vec3 origin, Vec3 direction, double limit, Vec
   *normal = rotate(q, n);
   return t;
 }
+
+namespace {
 
 Vec3 triangle_normal(const Body &b, uint32_t t) {
   const uint32_t *const c = &b.surface.tri[size_t(3) * t];
@@ -173,6 +178,7 @@ void surface_normals(const Body &b, double *out) {
 dfm_ray_hit cast_ray(World &w, Vec3 o, Vec3 d, double max_distance, SearchCount *count) {
   dfm_ray_hit hit = nothing();
   for (auto &b : w.bodies) {
+    if (b->sensor) continue;
     const Triangles m = search(*b);
     const TriangleOnRay on = first_on_ray(m, o, d, std::min(max_distance, hit.distance), count);
     if (on.triangle == kNone || !(on.distance < hit.distance)) continue;
@@ -182,6 +188,7 @@ dfm_ray_hit cast_ray(World &w, Vec3 o, Vec3 d, double max_distance, SearchCount 
     store3(hit.normal, normal_of(m, on.triangle));
   }
   for (auto &ob : w.obstacles) {
+    if (ob->sensor) continue;
     Vec3 n;
     const double at = ray_obstacle(*ob, o, d, std::min(max_distance, hit.distance), &n, count);
     if (!(at <= max_distance && at < hit.distance)) continue;
@@ -198,6 +205,7 @@ dfm_ray_hit cast_ray(World &w, Vec3 o, Vec3 d, double max_distance, SearchCount 
 dfm_ray_hit closest_surface(World &w, Vec3 p, double max_distance, SearchCount *count) {
   dfm_ray_hit hit = nothing();
   for (auto &b : w.bodies) {
+    if (b->sensor) continue;
     const Triangles m = search(*b);
     const TriangleNearPoint near =
         closest_to(m, p, DistanceKey::root, std::min(max_distance, hit.distance), count);

@@ -6,6 +6,17 @@
 namespace dfm {
 
 struct World;
+struct Obstacle;
+
+// The tree of a body's surface, in the world; of an obstacle that is a mesh or voxels, in its frame, where
+// its points never change. Voxels answer as the surface that they are made from.
+Triangles search(Body &b);
+Triangles search(Obstacle &ob);
+Vec3 normal_of(const Triangles &triangles, uint32_t triangle);
+// Distance of an obstacle along a ray, or infinity, and the surface's normal there. From inside it is where
+// the ray leaves.
+double ray_obstacle(Obstacle &ob, Vec3 origin, Vec3 unit_direction, double limit, Vec3 *normal,
+                    SearchCount *count);
 
 // N times a column of the phyxels
 Vec3 surfel_vector(const Body &b, const Array<double> &phyxel_column, uint32_t surfel);

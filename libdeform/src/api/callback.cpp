@@ -1,0 +1,60 @@
+#include "deform/callback.h"
+
+#include "api/objects.h"
+#include "step/stages.h"
+
+using namespace dfm;
+
+namespace {
+
+// Of a body or obstacle of this world; 0 for 0.
+uint64_t id_of(const World &w, uint64_t handle, const char *name) {
+  if (handle == 0) return 0;
+  for (auto &b : w.bodies)
+    if (b->handle == handle) return b->id;
+  for (auto &o : w.obstacles)
+    if (o->handle == handle) return o->id;
+  fail(DFM_E_HANDLE, "'%s' is no body or obstacle of this world", name);
+}
+
+// Tables are made anew before the next step, with what may touch now.
+void ask_pairs_again(World &w) {
+  w.overlaps.all = true;
+  wake_all(w);
+  w.changed = true;
+}
+
+}  // namespace
+
+dfm_status dfm_world_set_may_touch(dfm_world world, dfm_may_touch_fn may_touch, void *user) {
+  return as_status([&] {
+    World &w = exclusive(world_of(world));
+    w.may_touch = {may_touch, user, {}};
+    ask_pairs_again(w);
+  });
+}
+
+dfm_status dfm_world_ask_again(dfm_world world, uint64_t a, uint64_t b) {
+  return as_status([&] {
+    World &w = exclusive(world_of(world));
+    uint64_t first = id_of(w, a, "a"), second = id_of(w, b, "b");
+    if (first == 0) std::swap(first, second);
+    std::erase_if(w.may_touch.answers, [&](const PairAnswer &p) {
+      const auto has = [&](uint64_t id) { return id == 0 || p.a == id || p.b == id; };
+      return has(first) && has(second);
+    });
+    ask_pairs_again(w);
+  });
+}
+
+dfm_status dfm_world_set_pre_solve(dfm_world world, dfm_pre_solve_fn pre_solve, void *user) {
+  return as_status([&] {
+    World &w = exclusive(world_of(world));
+    if (pre_solve && w.def.method == DFM_METHOD_ROLLBACK)
+      fail(DFM_E_UNSUPPORTED,
+           "a pre-solve function cannot be in a world whose contact method is ROLLBACK: it solves no contact "
+           "on its own; take DFM_METHOD_AUTO");
+    w.pre_solve = {pre_solve, user};
+    wake_all(w);
+  });
+}

@@ -1,0 +1,113 @@
+#include "geometry/convex_search.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace dfm {
+namespace {
+
+Convex triangle_of(const Triangles &m, uint32_t t) {
+  return convex_triangle(m.corner(t, 0), m.corner(t, 1), m.corner(t, 2));
+}
+
+// Wider than the shape by more than rounding.
+struct Bounds {
+  Vec3 lo, hi;
+  Bounds(const Triangles &m, const Convex &shape) {
+    shape.bounds(lo, hi);
+    const double slack = kRaySlack * length_scale(m.tree, shape.position);
+    for (int k = 0; k < 3; ++k) {
+      lo[k] -= slack;
+      hi[k] += slack;
+    }
+  }
+  bool meets(const Box &b) const {
+    for (int k = 0; k < 3; ++k)
+      if (!(b.lo[k] <= hi[k] && lo[k] <= b.hi[k])) return false;
+    return true;
+  }
+};
+
+}  // namespace
+
+TriangleOnPath first_on_path(const Triangles &m, const Convex &shape, Vec3 unit, double limit) {
+  TriangleOnPath best;
+  if (m.tree.empty()) return best;
+  const Bounds bounds(m, shape);
+  const RayBoxes boxes(0.5 * (bounds.lo + bounds.hi), unit, 0.5 * (bounds.hi - bounds.lo));
+  double most = limit;
+  uint64_t nodes = 0;
+  const auto bound = [&](const Box &b) { return boxes.first(b); };
+  const auto leaf = [&](uint32_t begin, uint32_t end) {
+    for (uint32_t i = begin; i < end; ++i) {
+      if (!(bound(m.tree.triangle_boxes()[i]) <= most)) continue;
+      const uint32_t t = m.tree.triangles()[i];
+      const ConvexHit hit = convex_cast(shape, triangle_of(m, t), unit, most);
+      if (!hit.hit || !(hit.way < most || (hit.way == most && t < best.triangle))) continue;
+      most = hit.way;
+      best = {hit, t};
+    }
+  };
+  nearest_first(m.tree, most, nodes, bound, leaf);
+  return best;
+}
+
+bool touches_any(const Triangles &m, const Convex &shape) {
+  if (m.tree.empty()) return false;
+  const Bounds bounds(m, shape);
+  return !walk(
+      m.tree, [&](const Box &b) { return bounds.meets(b); },
+      [&](uint32_t place) { return !convex_touch(shape, triangle_of(m, m.tree.triangles()[place])); });
+}
+
+uint32_t triangles_touched(const Triangles &m, const Convex &shape, uint32_t capacity, uint32_t *out) {
+  if (m.tree.empty()) return 0;
+  const Bounds bounds(m, shape);
+  Least<uint32_t> least(out, capacity);
+  walk(
+      m.tree, [&](const Box &b) { return bounds.meets(b); },
+      [&](uint32_t place) {
+        const uint32_t t = m.tree.triangles()[place];
+        if (convex_touch(shape, triangle_of(m, t))) least.offer(t);
+        return true;
+      });
+  return least.finish();
+}
+
+int winding_by_ray(const Triangles &m, Vec3 p) {
+  if (m.tree.empty()) return 0;
+  // along no axis, no diagonal and no edge of common meshes; the next one where a ray meets an edge
+  constexpr double directions[4][3] = {
+      {0.48, 0.36, 0.8}, {-0.352, 0.896, 0.27}, {0.672, -0.504, 0.542}, {0.154, 0.528, -0.835}};
+  int turns = 0;
+  for (const auto &direction : directions) {
+    const Vec3 d = load3(direction);
+    const double slack = kRaySlack * length_scale(m.tree, p);
+    const RayBoxes boxes(p, d, {slack, slack, slack});
+    turns = 0;
+    // The three products of neighbors are each other's negatives to the bit, so no ray slips between two
+    // triangles; only one that meets an edge exactly is not clear.
+    const bool clear = walk(
+        m.tree,
+        [&](const Box &b) {
+          const RayBoxes::Span s = boxes.meet(b);
+          return s.near <= s.far;
+        },
+        [&](uint32_t place) {
+          const uint32_t t = m.tree.triangles()[place];
+          const Vec3 a = m.corner(t, 0) - p, b = m.corner(t, 1) - p, c = m.corner(t, 2) - p;
+          const double u = dot(d, cross(b, c)), v = dot(d, cross(c, a)), w = dot(d, cross(a, b));
+          const bool inward = u >= 0 && v >= 0 && w >= 0, outward = u <= 0 && v <= 0 && w <= 0;
+          if (!inward && !outward) return true;
+          if (u == 0 || v == 0 || w == 0) return false;
+          const Vec3 n = cross(b - a, c - a);
+          const double along = dot(n, a);  // of the sign of d . n where the triangle lies ahead
+          if (dot(n, d) > 0 ? along > 0 : along < 0) turns += dot(n, d) > 0 ? 1 : -1;
+          return true;
+        });
+    if (clear) break;
+  }
+  return turns;
+}
+
+}  // namespace dfm

@@ -1,0 +1,325 @@
+#include "world/find.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "geometry/convex_search.h"
+#include "geometry/obstacle_shape.h"
+#include "world/queries.h"
+
+namespace dfm {
+namespace {
+
+dfm_query_hit nothing() {
+  dfm_query_hit hit{};
+  hit.size = sizeof hit;
+  hit.triangle = kNone;
+  hit.distance = kFar;
+  return hit;
+}
+
+dfm_query_hit hit_of(const Thing &thing, uint32_t triangle, double distance, Vec3 point, Vec3 normal) {
+  dfm_query_hit hit = nothing();
+  hit.thing = thing.handle();
+  hit.triangle = triangle;
+  hit.distance = distance;
+  store3(hit.point, point);
+  store3(hit.normal, normal);
+  return hit;
+}
+
+Shape shape_of(const Obstacle &o) { return Shape(o.def.shape); }
+bool of_triangles(const Obstacle &o) { return shape_of(o) == Shape::mesh || shape_of(o) == Shape::voxels; }
+
+Vec3 plane_normal(const Obstacle &o) { return rotate(o.pose.rotation, {0, 0, 1}); }
+// m, of the point of a shape that lies deepest; and that point
+double above_plane(const Convex &shape, const Obstacle &o, Vec3 *lowest = nullptr) {
+  const Vec3 n = plane_normal(o), p = shape.support(-n);
+  if (lowest) *lowest = p - shape.radius * n;
+  return dot(n, p - o.pose.position) - shape.radius;
+}
+
+// Closed forms but planes, in place.
+ObstacleShape closed_form(const Obstacle &o) {
+  ObstacleView v{};
+  v.shape = shape_of(o);
+  v.position = o.pose.position;
+  v.rotation = o.pose.rotation;
+  v.half_size = load3(o.def.half_size);
+  v.radius = o.def.radius;
+  v.half_length = o.def.half_length;
+  return ObstacleShape(v);
+}
+
+bool closed(const Surface &s) {
+  return std::find(s.edge_tri.begin(), s.edge_tri.end(), kNone) == s.edge_tri.end();
+}
+bool closed(const Thing &thing) {
+  if (thing.body) return closed(thing.body->surface);
+  return thing.obstacle->grid || (thing.obstacle->mesh && thing.obstacle->mesh->closed);
+}
+
+// The triangles of a thing, and a shape as they see it.
+Triangles triangles_of(const Thing &thing) {
+  return thing.body ? search(*thing.body) : search(*thing.obstacle);
+}
+Convex seen_by(const Thing &thing, const Convex &shape) {
+  return thing.body ? shape : shape.in_frame(thing.obstacle->pose.position, thing.obstacle->pose.rotation);
+}
+Vec3 seen_by(const Thing &thing, Vec3 p) {
+  return thing.body ? p : rotate_back(thing.obstacle->pose.rotation, p - thing.obstacle->pose.position);
+}
+Vec3 turned_by(const Thing &thing, Vec3 d) {
+  return thing.body ? d : rotate_back(thing.obstacle->pose.rotation, d);
+}
+Vec3 turned_back(const Thing &thing, Vec3 d) {
+  return thing.body ? d : rotate(thing.obstacle->pose.rotation, d);
+}
+Vec3 back(const Thing &thing, Vec3 p) { return thing.body ? p : place(thing.obstacle->pose, p); }
+
+// What a closed surface encloses; `p` as the triangles see it.
+bool encloses(const Thing &thing, const Triangles &m, Vec3 p) {
+  if (m.tree.empty()) return false;
+  const Box &root = m.tree.root();
+  for (int k = 0; k < 3; ++k)
+    if (!(p[k] >= root.lo[k] && p[k] <= root.hi[k])) return false;
+  return closed(thing) && winding_by_ray(m, p) > 0;
+}
+
+bool has_triangles(const Thing &thing) { return thing.body || of_triangles(*thing.obstacle); }
+
+// A thing with triangles, and one whose triangles are asked for one by one.
+bool surfaces_overlap(const Thing &a, const Thing &b) {
+  const Triangles of_a = triangles_of(a), of_b = triangles_of(b);
+  if (of_a.tree.empty() || of_b.tree.empty()) return false;
+  const auto moved = [&](Vec3 p) { return seen_by(b, back(a, p)); };
+  const Box &root = of_b.tree.root();
+  const uint32_t n = static_cast<uint32_t>(of_a.corners.size() / 3);
+  for (uint32_t t = 0; t < n; ++t) {
+    const Vec3 x[3] = {moved(of_a.corner(t, 0)), moved(of_a.corner(t, 1)), moved(of_a.corner(t, 2))};
+    bool near = true;
+    for (int k = 0; near && k < 3; ++k)
+      near = std::max({x[0][k], x[1][k], x[2][k]}) >= root.lo[k] &&
+             std::min({x[0][k], x[1][k], x[2][k]}) <= root.hi[k];
+    if (near && touches_any(of_b, convex_triangle(x[0], x[1], x[2]))) return true;
+  }
+  return encloses(b, of_b, moved(of_a.corner(0, 0))) ||
+         encloses(a, of_a, seen_by(a, back(b, of_b.corner(0, 0))));
+}
+
+// A plane and a thing that is no plane.
+bool plane_overlaps(const Obstacle &plane, const Thing &thing) {
+  if (!has_triangles(thing))
+    return is_convex(*thing.obstacle) && above_plane(convex_of(*thing.obstacle), plane) <= 0;
+  const Triangles m = triangles_of(thing);
+  const Vec3 n = turned_by(thing, plane_normal(plane)), at = seen_by(thing, plane.pose.position);
+  return !m.tree.empty() && !walk(
+                                m.tree,
+                                [&](const Box &b) {
+                                  double least = 0;
+                                  for (int k = 0; k < 3; ++k)
+                                    least += n[k] * ((n[k] > 0 ? b.lo[k] : b.hi[k]) - at[k]);
+                                  return least <= 1e-9 * (norm(at) + norm(load3(b.lo)) + norm(load3(b.hi)));
+                                },
+                                [&](uint32_t place) {
+                                  const uint32_t t = m.tree.triangles()[place];
+                                  for (uint32_t k = 0; k < 3; ++k)
+                                    if (dot(n, m.corner(t, k) - at) <= 0) return false;
+                                  return true;
+                                });
+}
+
+}  // namespace
+
+bool ThingFilter::passes(const Thing &thing) const {
+  if (!given_) return !thing.sensor();
+  const uint32_t kind = thing.body              ? DFM_QUERY_BODIES
+                        : thing.obstacle->rigid ? DFM_QUERY_RIGIDS
+                                                : DFM_QUERY_OBSTACLES;
+  if (!(given_->what & kind) || (thing.sensor() && !(given_->what & DFM_QUERY_SENSORS))) return false;
+  if (!(given_->category & thing.collides_with()) || !(thing.category() & given_->collides_with))
+    return false;
+  return !given_->accept || given_->accept(given_->user, thing.handle());
+}
+
+bool is_convex(const Obstacle &o) {
+  return shape_of(o) == Shape::sphere || shape_of(o) == Shape::box || shape_of(o) == Shape::capsule;
+}
+
+Convex convex_of(const Obstacle &o) {
+  Convex c;
+  c.position = o.pose.position;
+  c.rotation = o.pose.rotation;
+  c.turned = true;
+  if (shape_of(o) == Shape::box) {
+    c.box = true;
+    c.half = load3(o.def.half_size);
+    return c;
+  }
+  c.radius = o.def.radius;
+  if (shape_of(o) == Shape::capsule) {
+    c.npoint = 2;
+    c.own[2] = -o.def.half_length;
+    c.own[5] = o.def.half_length;
+  }
+  return c;
+}
+
+bool overlaps(const Convex &shape, const Thing &thing) {
+  if (has_triangles(thing)) {
+    const Triangles m = triangles_of(thing);
+    const Convex seen = seen_by(thing, shape);
+    return touches_any(m, seen) || encloses(thing, m, seen.any());
+  }
+  if (shape_of(*thing.obstacle) == Shape::plane) return above_plane(shape, *thing.obstacle) <= 0;
+  return is_convex(*thing.obstacle) && convex_touch(shape, convex_of(*thing.obstacle));
+}
+
+bool overlap(const Thing &a, const Thing &b) {
+  if (b.obstacle && shape_of(*b.obstacle) == Shape::plane) return overlap(b, a);
+  if (a.obstacle && shape_of(*a.obstacle) == Shape::plane) {
+    if (b.obstacle && shape_of(*b.obstacle) == Shape::plane) return false;
+    return plane_overlaps(*a.obstacle, b);
+  }
+  if (a.obstacle && is_convex(*a.obstacle)) return overlaps(convex_of(*a.obstacle), b);
+  if (b.obstacle && is_convex(*b.obstacle)) return overlaps(convex_of(*b.obstacle), a);
+  if (!has_triangles(a) || !has_triangles(b)) return false;  // a rigid body without shapes
+  // the one with fewer triangles is asked for one by one
+  return triangles_of(a).corners.size() <= triangles_of(b).corners.size() ? surfaces_overlap(a, b)
+                                                                          : surfaces_overlap(b, a);
+}
+
+dfm_query_hit find_first_on_ray(World &w, const ThingFilter &filter, Vec3 o, Vec3 d, double limit) {
+  dfm_query_hit hit = nothing();
+  each_thing(w, filter, [&](const Thing &thing) {
+    const double most = std::min(limit, hit.distance);
+    if (has_triangles(thing)) {
+      const Triangles m = triangles_of(thing);
+      const TriangleOnRay on = first_on_ray(m, seen_by(thing, o), turned_by(thing, d), most);
+      if (on.triangle != kNone && on.distance < hit.distance)
+        hit = hit_of(thing, on.triangle, on.distance, o + on.distance * d,
+                     turned_back(thing, normal_of(m, on.triangle)));
+      return true;
+    }
+    Vec3 n;
+    const double at = ray_obstacle(*thing.obstacle, o, d, most, &n, nullptr);
+    if (at <= limit && at < hit.distance) hit = hit_of(thing, kNone, at, o + at * d, n);
+    return true;
+  });
+  return hit;
+}
+
+dfm_query_hit find_closest(World &w, const ThingFilter &filter, Vec3 p, double limit) {
+  dfm_query_hit hit = nothing();
+  each_thing(w, filter, [&](const Thing &thing) {
+    const double most = std::min(limit, hit.distance);
+    if (has_triangles(thing)) {
+      const Triangles m = triangles_of(thing);
+      const TriangleNearPoint near = closest_to(m, seen_by(thing, p), DistanceKey::root, most);
+      if (near.triangle != kNone && near.key < hit.distance)
+        hit = hit_of(thing, near.triangle, near.key, back(thing, near.at.point),
+                     turned_back(thing, normal_of(m, near.triangle)));
+      return true;
+    }
+    const Obstacle &o = *thing.obstacle;
+    if (shape_of(o) == Shape::none) return true;
+    const ObstaclePoint near = closed_form(o).closest(p);
+    const double distance = std::fabs(near.distance);
+    if (distance <= most && distance < hit.distance)
+      hit = hit_of(thing, kNone, distance, near.point, near.normal);
+    return true;
+  });
+  return hit;
+}
+
+dfm_query_hit find_first_on_path(World &w, const ThingFilter &filter, const Convex &shape, Vec3 path) {
+  dfm_query_hit hit = nothing();
+  const double length = norm(path);
+  const Vec3 unit = normalized(path);
+  const auto take = [&](const Thing &thing, const ConvexHit &found, uint32_t triangle) {
+    if (!found.hit || !(found.way < hit.distance)) return;
+    hit = hit_of(thing, triangle, found.way, back(thing, found.point), turned_back(thing, found.normal));
+    if (found.inside) hit.flags = DFM_QUERY_INSIDE;
+  };
+  const ConvexHit inside{true, true, 0, -unit, shape.position};
+  each_thing(w, filter, [&](const Thing &thing) {
+    const double most = std::min(length, hit.distance);
+    if (has_triangles(thing)) {
+      const Triangles m = triangles_of(thing);
+      const Convex seen = seen_by(thing, shape);
+      const TriangleOnPath found = first_on_path(m, seen, turned_by(thing, unit), most);
+      take(thing, found.hit, found.triangle);
+      // a shape within a closed surface may meet it from within later on
+      if (hit.distance > 0 && encloses(thing, m, seen.any())) {
+        hit = hit_of(thing, kNone, 0, inside.point, inside.normal);
+        hit.flags = DFM_QUERY_INSIDE;
+      }
+      return hit.distance > 0;
+    }
+    const Obstacle &o = *thing.obstacle;
+    if (shape_of(o) == Shape::plane) {
+      Vec3 lowest;
+      const double above = above_plane(shape, o, &lowest), closing = -dot(unit, plane_normal(o));
+      const double way = above <= 0 ? 0 : closing > 0 ? above / closing : kFar;
+      if (!(way <= most && way < hit.distance)) return true;
+      hit = hit_of(thing, kNone, way, above <= 0 ? inside.point : lowest + way * unit,
+                   above <= 0 ? inside.normal : plane_normal(o));
+      if (above <= 0) hit.flags = DFM_QUERY_INSIDE;
+    } else if (is_convex(o)) {
+      const ConvexHit found = convex_cast(shape, convex_of(o), unit, most);
+      if (found.hit && found.way < hit.distance) {
+        hit = hit_of(thing, kNone, found.way, found.point, found.normal);
+        if (found.inside) hit.flags = DFM_QUERY_INSIDE;
+      }
+    }
+    return hit.distance > 0;
+  });
+  return hit;
+}
+
+bool HitRows::before(const dfm_query_hit &hit, uint32_t row) const {
+  dfm_query_hit other;
+  std::memcpy(&other, at_ + size_t{step_} * row, sizeof other);
+  if (hit.distance != other.distance) return hit.distance < other.distance;
+  // of equals what was offered first, but for triangles of one thing
+  return hit.thing == other.thing && hit.triangle < other.triangle;
+}
+
+void HitRows::offer(const dfm_query_hit &hit) {
+  const uint32_t held = std::min(count_++, capacity_);
+  if (held == capacity_ && (capacity_ == 0 || !before(hit, held - 1))) return;
+  uint32_t at = held == capacity_ ? held - 1 : held;
+  const uint32_t end = at;
+  while (at > 0 && before(hit, at - 1)) --at;
+  unsigned char *const row = at_ + size_t{step_} * at;
+  std::memmove(row + step_, row, size_t{step_} * (end - at));
+  std::memcpy(row, &hit, sizeof hit);
+  std::memset(row + sizeof hit, 0, step_ - sizeof hit);
+}
+
+void find_all_on_ray(World &w, const ThingFilter &filter, Vec3 origin, Vec3 unit, double limit,
+                     HitRows &rows) {
+  each_thing(w, filter, [&](const Thing &thing) {
+    if (has_triangles(thing)) {
+      const Triangles m = triangles_of(thing);
+      all_on_ray(m, seen_by(thing, origin), turned_by(thing, unit), limit, [&](double at, uint32_t t) {
+        rows.offer(hit_of(thing, t, at, origin + at * unit, turned_back(thing, normal_of(m, t))));
+      });
+      return true;
+    }
+    Obstacle &o = *thing.obstacle;
+    Vec3 n;
+    const double first = ray_obstacle(o, origin, unit, limit, &n, nullptr);
+    if (!(first < kFar)) return true;
+    if (first <= limit) rows.offer(hit_of(thing, kNone, first, origin + first * unit, n));
+    // What it enters it leaves where the same line, seen from behind, enters.
+    if (!is_convex(o) || !(dot(n, unit) < 0)) return true;
+    const double beyond = first + 2 * convex_of(o).reach() + 1;
+    const double last = beyond - ray_obstacle(o, origin + beyond * unit, -unit, beyond, &n, nullptr);
+    if (last >= first && last <= limit) rows.offer(hit_of(thing, kNone, last, origin + last * unit, n));
+    return true;
+  });
+}
+
+}  // namespace dfm
