@@ -73,14 +73,6 @@ dfm_attachment info(dfm_body body, uint32_t number) {
   return a;
 }
 
-std::vector<char> snapshot(dfm_world w) {
-  size_t bytes = 0;
-  test::ok(dfm_world_snapshot(w, nullptr, &bytes));
-  std::vector<char> out(bytes);
-  test::ok(dfm_world_snapshot(w, out.data(), &bytes));
-  return out;
-}
-
 struct Momenta {
   std::array<double, 3> linear{}, angular{};
   void add(const dfm_body_measure &m) {
@@ -331,7 +323,7 @@ TEST(Attach, Snapshot_GoesOnWithTheSameBits) {
   make(a, true);
   make(b, false);
   a.run(0.05);
-  const std::vector<char> kept = snapshot(a.w);
+  const std::string kept = test::snapshot(a.w);
   a.run(0.05);
   const uint64_t hash = dfm_world_hash(a.w);
   test::ok(dfm_world_restore(b.w, kept.data(), kept.size()));

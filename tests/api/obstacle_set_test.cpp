@@ -49,14 +49,6 @@ struct OnATable {
   }
 };
 
-std::vector<char> snapshot(dfm_world w) {
-  size_t bytes = 0;
-  test::ok(dfm_world_snapshot(w, nullptr, &bytes));
-  std::vector<char> out(bytes);
-  test::ok(dfm_world_snapshot(w, out.data(), &bytes));
-  return out;
-}
-
 }  // namespace
 
 TEST(ObstacleSet, Find_GivesTheHandleOrTheNearestName) {
@@ -211,7 +203,7 @@ TEST(ObstacleSet, Snapshot_HoldsBeltFilterAndMaterial) {
   test::ok(dfm_obstacle_set_velocity_surface(a.table, along));
   test::ok(dfm_obstacle_set_filter(a.table, 5, 3));
   test::ok(dfm_obstacle_set_material(a.table, felt));
-  const std::vector<char> kept = snapshot(a.world);
+  const std::string kept = test::snapshot(a.world);
   a.run(0.05);
   test::ok(dfm_world_restore(b.world, kept.data(), kept.size()));
   dfm_obstacle_def d{};
