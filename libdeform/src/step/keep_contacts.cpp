@@ -7,6 +7,7 @@
 #include "step/context.h"
 #include "step/stages.h"
 #include "step/step_impulses.h"
+#include "step/tolerance.h"
 
 namespace dfm {
 
@@ -52,6 +53,35 @@ void list_crossings(World &w, StepContext &step) {
   std::sort(list.begin(), list.end());
 }
 
+namespace {
+
+// Do all bodies of the contact keep the velocity that the solve has left them? Those that step themselves may
+// damp it within a sub-step.
+bool keeps_velocity(const ContactRows &rows, uint32_t i) {
+  for (uint32_t j = rows.begin[i]; j < rows.begin[i + 1]; ++j) {
+    const uint32_t block = rows.block[rows.dof[j]];
+    if (block != kNone && rows.blocks[block].group == kNone) return false;
+  }
+  return true;
+}
+
+// The impulse that the next sub-step starts from. A solve leaves a velocity within its tolerance. A later one
+// that stops it gives an impulse for that beside the force, once. Started from all of it, the next sub-step
+// would push as far the other way, within tolerance, and so on: what rests would shake at the tolerance for
+// ever. So where a contact sticks at rest half of a change is taken over, and such an impulse dies out
+// (doc/decisions/0326-half-of-a-change-at-rest.md).
+Vec3 next_start(const World &w, const StepContext &step, uint32_t i) {
+  const Vec3 l = load3(&step.rows.impulse[size_t(3) * i]);
+  const uint32_t m = step.match[i];
+  if (step.tolerance.tangent.empty() || m == kNone) return l;
+  if (step.tolerance.tangent[i] > tangent_at_rest(w, step.h) || !(l.x > 0) || step.state.mode[i] != 1)
+    return l;
+  const Vec3 before = (step.h / w.store.h) * load3(&w.store.impulse[size_t(3) * m]);
+  return before.x > 0 && keeps_velocity(step.rows, i) ? 0.5 * (before + l) : l;
+}
+
+}  // namespace
+
 void keep_contacts(World &w, StepContext &step) {
   const uint32_t n = step.rows.n, S = step.state.nstate;
   ContactStore &to = step.next_store;
@@ -93,7 +123,7 @@ void keep_contacts(World &w, StepContext &step) {
     to.by_key[i] = i;
     store3(&to.normal[size_t(3) * i], load3(&step.rows.frame[size_t(9) * i]));
     store3(&to.tangent[size_t(3) * i], load3(&step.rows.frame[size_t(9) * i + 3]));
-    store3(&to.impulse[size_t(3) * i], load3(l));
+    store3(&to.impulse[size_t(3) * i], next_start(w, step, i));
     // its law wrote no further: the rest of the columns is another contact's
     const uint32_t own = now ? w.pairs.laws[step.state.law[i]]->nstate : 0;
     for (uint32_t s = 0; s < S; ++s)

@@ -20,6 +20,7 @@
 #include "step/pre_solve.h"
 #include "step/rigid.h"
 #include "step/stages.h"
+#include "step/tolerance.h"
 
 namespace dfm {
 namespace {
@@ -236,8 +237,7 @@ void make_rows(World &w, StepContext &step) {
 
 // Passes until the true residual is good enough; a law that failed, or null.
 const LawInstance *solve_rows(World &w, StepContext &step) {
-  const double gap_margin = 0.01 * (0.5 * w.offset) / step.h;
-  const double least = w.def.contact_tolerance > 0 ? w.def.contact_tolerance : std::min(1e-6, gap_margin);
+  const double gap_margin = normal_at_rest(w, step.h), least = tangent_at_rest(w, step.h);
   const bool memory = step.batches.remembers();
   // an equilibrium is as good as its contacts: nothing is left to a next sub-step
   const ToleranceBounds bounds =
