@@ -228,9 +228,8 @@ const LawInstance *LawBatches::evaluate(const LawInstance &law, std::span<const 
     poison += 0.0 * (ft[k] + ft[column + k]);
     if (given) {
       for (uint32_t j = 0; j < 4; ++j) state.dft_dvt[size_t(j) * state.stride + i] = dv[j * column + k];
-      const double scale = state.scale.empty() ? 1 : state.scale[i];
-      state.dft_dfn[i] = scale * dn[k];
-      state.dft_dfn[state.stride + i] = scale * dn[column + k];
+      state.dft_dfn[i] = dn[k];
+      state.dft_dfn[state.stride + i] = dn[column + k];
       poison += 0.0 * (dv[k] + dv[column + k] + dv[2 * column + k] + dv[3 * column + k]) +
                 0.0 * (dn[k] + dn[column + k]);
     } else {
@@ -239,6 +238,9 @@ const LawInstance *LawBatches::evaluate(const LawInstance &law, std::span<const 
     // poison of NaN or infinite: not equal to zero; a limit of +inf is an answer: none
     if (failed_ == kNone && !(poison == 0 && limit[k] >= 0)) failed_ = i;
   }
+  if (given && !state.scale.empty())
+    for (const uint32_t i : index)
+      for (const uint32_t at : {i, state.stride + i}) state.dft_dfn[at] *= state.scale[i];
   return failed_ == kNone ? nullptr : &law;
 }
 
