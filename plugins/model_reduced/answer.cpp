@@ -105,7 +105,7 @@ void Body::respond(const dfm_kin &k, uint32_t n, const uint32_t *surfel, uint32_
       for (size_t j = 0; j < size; ++j) du[size * (first + l) + j] = answers_[kLanes * j + l];
   }
   if (!condensed_) return;
-  find_columns(n, surfel);
+  if (!can_be_late()) find_columns(n, surfel);
   add_response_at_rest(n, surfel, nrhs, p, du);
 }
 
@@ -120,7 +120,7 @@ void Body::diagonal(const dfm_kin &k, uint32_t n, const uint32_t *surfel, double
 }
 
 // Columns of C_rest for those surfels that have none yet, eight at a time. What was found stays: it
-// depends on the body alone.
+// depends on the body alone. A held body needs them only where impulses move all of its points.
 void Body::find_columns(uint32_t n, const uint32_t *surfel) {
   size_t wanted[kLanes], many = 0;
   for (uint32_t c = 0; c < n; ++c)
@@ -152,9 +152,60 @@ void Body::make_columns(size_t many, const size_t *wanted) {
     modes_.shape.expand(1, in, out);
     double *const column = columns_.data() + size() * wanted[l];
     for (size_t j = 0; j < size(); ++j) w_[j] = f[kLanes * j + l] - w_[j];
-    if (can_be_late()) column_gradient_[wanted[l]] = elastic_.largest_gradient(w_.data(), nullptr);
     for (size_t i = 0; i < elastic_.npoint; ++i)
       for (size_t a = 0; a < 3; ++a) column[3 * size_t(place_[i]) + a] = w_[3 * i + a];
+  }
+}
+
+// C_rest from a component of a surfel's force to one of a near point's displacement.
+inline double Body::between(uint32_t surfel, size_t component, uint32_t point, size_t other) const {
+  const size_t to = 3 * size_t(place_[point]) + other;
+  if (!can_be_late()) return columns_[size() * (3 * size_t(surfel) + component) + to];
+  const size_t rows = 3 * size_t(nfree_);
+  if (to >= rows) return 0;
+  double sum = 0;
+  for (uint32_t e = row_[surfel]; e < row_[surfel + 1]; ++e)
+    if (place_[col_[e]] < nfree_)
+      sum += weight_[e] * near_response_[rows * (3 * size_t(place_[col_[e]]) + component) + to];
+  return sum;
+}
+
+// Held: all of it that a step can ask for. It is the inverse at these points, which the forward half of a
+// solve gives (Factor::inverse_at), less what the modes hold.
+void Body::find_near_response() {
+  const size_t rows = 3 * size_t(nfree_), count = modes_.count;
+  check_size(nfree_, nfree_);
+  near_response_.create_raw(host, rows * rows);
+  elastic_.compliance_between(nfree_, point_.data(), near_response_.data());
+  const double *const in[] = {answer_.data()};
+  double *const out[] = {near_x_.data()};
+  for (size_t j = 0; j < rows; ++j) {
+    for (uint32_t k = 0; k < count; ++k) answer_[k] = near_shape_.at(j, k) / modes_.lambda[k];
+    near_shape_.expand(1, in, out);
+    for (size_t i = 0; i < rows; ++i) near_response_[rows * j + i] -= near_x_[i];
+  }
+}
+
+// near_given_ += of impulses at all surfels, over h^2 like rates.
+void Body::add_near_response(const double *p_s) {
+  const size_t rows = 3 * size_t(nfree_);
+  const double scale = (1 - left_) / (h_ * h_);
+  double *const force = near_force_.data(), *const given = near_given_.data();
+  std::fill(force, force + rows, 0.0);
+  for (uint32_t s = 0; s < nsurfel_; ++s) {
+    const double *const impulse = p_s + 3 * size_t(s);
+    if (impulse[0] == 0 && impulse[1] == 0 && impulse[2] == 0) continue;
+    double local[3];
+    transposed_product(at_.r, impulse, local);
+    for (uint32_t e = row_[s]; e < row_[s + 1]; ++e)
+      for (size_t a = 0; a < 3; ++a)
+        if (place_[col_[e]] < nfree_)
+          force[3 * size_t(place_[col_[e]]) + a] += weight_[e] * (scale * local[a]);
+  }
+  for (size_t i = 0; i < nfree_; ++i) {
+    const double *const f = force + 3 * i, *const c = near_response_.data() + 3 * i * rows;
+    if (f[0] == 0 && f[1] == 0 && f[2] == 0) continue;
+    for (size_t j = 0; j < rows; ++j) given[j] += (f[0] * c[j] + f[1] * c[rows + j]) + f[2] * c[2 * rows + j];
   }
 }
 
@@ -170,12 +221,10 @@ void Body::add_response_at_rest(uint32_t n, const uint32_t *surfel, uint32_t nrh
     for (size_t rhs = 0; rhs < nrhs; ++rhs) {
       const double *const impulse = p + 3 * (n * rhs + from);
       if (impulse[0] == 0 && impulse[1] == 0 && impulse[2] == 0) continue;
-      const double *const column = columns_.data() + 3 * size() * surfel[from];
       for (size_t to = 0; !gathered && to < n; ++to)
         for (size_t a = 0; a < 3; ++a)
           for (size_t b = 0; b < 3; ++b)
-            blocks[(3 * a + b) * padded + to] =
-                column[b * size() + 3 * size_t(place_[col_[row_[surfel[to]]]]) + a];
+            blocks[(3 * a + b) * padded + to] = between(surfel[from], b, col_[row_[surfel[to]]], a);
       gathered = true;
       double local[3];
       transposed_product(at_.r, impulse, local);
@@ -196,14 +245,13 @@ void Body::add_coupled_response_at_rest(uint32_t n, const uint32_t *surfel, uint
       if (impulse[0] == 0 && impulse[1] == 0 && impulse[2] == 0) continue;
       double local[3], world[3];
       transposed_product(at_.r, impulse, local);
-      const double *const column = columns_.data() + 3 * size() * surfel[from];
       for (uint32_t to = 0; to < n; ++to) {
         double u[3] = {};
         for (uint32_t e = row_[surfel[to]]; e < row_[surfel[to] + 1]; ++e)
-          for (size_t a = 0; a < 3; ++a) {
-            const double *const at = column + 3 * size_t(place_[col_[e]]) + a;
-            u[a] += weight_[e] * ((at[0] * local[0] + at[size()] * local[1]) + at[2 * size()] * local[2]);
-          }
+          for (size_t a = 0; a < 3; ++a)
+            u[a] += weight_[e] * ((between(surfel[from], 0, col_[e], a) * local[0] +
+                                   between(surfel[from], 1, col_[e], a) * local[1]) +
+                                  between(surfel[from], 2, col_[e], a) * local[2]);
         product(at_.r, u, world);
         for (size_t a = 0; a < 3; ++a) du[3 * (n * rhs + to) + a] += scale * world[a];
       }

@@ -13,14 +13,17 @@ namespace reduced {
 void Body::create(const dfm_host *h, const dfm_mesh &m) {
   host = h;
   if (!model::in_range(h, id_, kParams, kParamCount, m.params)) throw model::Refused{};
-  if (condensed_) check_size(m);
+  if (condensed_) check_size(m.nsurfel, m.npoint);
   elastic_.create(h, id_, m);
   modes_.create(h, id_, m, elastic_, m.params);
   take_surface(m);
-  take_near();
+  take_near(m);
   take_integrals();
   reserve();
-  if (condensed_) find_weight_at_rest();
+  if (condensed_ && can_be_late()) {
+    find_weight_at_rest();
+    find_near_response();
+  }
   apply_params(m.params);
   describe();
 }
@@ -86,8 +89,8 @@ void Body::take_integrals() {
 }
 
 // Room for the columns of C_rest.
-void Body::check_size(const dfm_mesh &m) const {
-  const double bytes = 8.0 * 9 * double(m.nsurfel) * m.npoint;
+void Body::check_size(uint32_t nsurfel, uint32_t npoint) const {
+  const double bytes = 8.0 * 9 * double(nsurfel) * npoint;
   constexpr double kMost = 2147483648.0;
   if (bytes <= kMost) return;
   char text[200];
@@ -95,7 +98,7 @@ void Body::check_size(const dfm_mesh &m) const {
       text, sizeof text,
       "the response at rest of %u surfels and %u points may take %.1f GB, more than 2; use the model modal, "
       "or a coarser mesh",
-      m.nsurfel, m.npoint, bytes / 1e9);
+      nsurfel, npoint, bytes / 1e9);
   model::complain(host, id_, text);
   throw model::Refused{};
 }

@@ -17,8 +17,7 @@ namespace reduced {
 
 // Displacement gradient in the frame up to which small displacements are taken for the true ones.
 constexpr double kLargestGradient = 0.1;
-constexpr double kForgotten = 1;       // s in the range of small displacements
-constexpr double kAnotherLook = 1.25;  // times the bound of the last one
+constexpr double kForgotten = 1;  // s in the range of small displacements
 // Who tells where the body is: the points; they do, to a host that can see them later; the state.
 enum class Lead { points, points_for_now, state };
 constexpr const char *kModalId = "org.deform.modal", *kCondensedId = "org.deform.condensed";
@@ -53,6 +52,7 @@ class Body {
   void commit_near(const dfm_kin &k, const double *p_s, double *x, double *v);
   void points(const dfm_kin &k, double *x, double *v);
   static void look(double *state);
+  bool sums(const dfm_kin &k, double *out) const;
   const dfm_slots *slots() const { return can_be_late() ? &slots_ : nullptr; }
   double energy(const dfm_kin &k);
   void cell_energy(const dfm_kin &k, double *density);
@@ -91,24 +91,32 @@ class Body {
   size_t at_pull() const { return kCoordinates + 2 * size_t(modes_.count); }
   size_t at_near() const { return at_pull() + 3; }
   size_t at_impulse() const { return at_near() + 3 * size_t(nnear_); }
-  uint32_t nnear_ = 0;              // points that a surfel hangs on, or that are held
-  Buffer<uint32_t> place_, point_;  // [npoint] of points in columns_, the near ones first; and back
-  Basis near_shape_;                // of the near points
-  Buffer<double> near_x_, near_v_;  // [padded 3 nnear] m, m/s at the end without contact, in the frame
-  Buffer<double> near_change_;      // what impulses change
-  Buffer<double> near_rest_;        // of it, what the modes leave out
-  Buffer<double> near_given_;       // condensed: what impulses add to that
-  Buffer<double> end_x_, end_v_;    // [3 nnear] m, m/s in the world, at the end without contact
-  Buffer<double> now_x_, now_v_;    // [npoint,now_stride_], of a step that needs all points
+  uint32_t nnear_ = 0;  // points that a surfel hangs on, or that are held
+  uint32_t nfree_ = 0;  // of these, that are not held in all components
+  // [npoint] of points in columns_, the free near ones first, then the other near ones; and back
+  Buffer<uint32_t> place_, point_;
+  Buffer<double> near_response_;     // condensed: C_rest between the free near points, [3 nfree,3 nfree]
+  Buffer<double> near_force_;        // [3 nfree]
+  double weight_of_weight_[9] = {};  // [b,c] kg m: sum m (weight_at_rest_ of c)_b
+  double rest_moment_[3] = {};       // kg m: sum m X
+  Basis near_shape_;                 // of the near points
+  Buffer<double> near_x_, near_v_;   // [padded 3 nnear] m, m/s at the end without contact, in the frame
+  Buffer<double> near_change_;       // what impulses change
+  Buffer<double> near_rest_;         // of it, what the modes leave out
+  Buffer<double> near_given_;        // condensed: what impulses add to that
+  Buffer<double> end_x_, end_v_;     // [3 nnear] m, m/s in the world, at the end without contact
+  Buffer<double> now_x_, now_v_;     // [npoint,now_stride_], of a step that needs all points
   uint32_t now_stride_ = 0;
-  Buffer<double> column_gradient_;  // [3 nsurfel] the largest displacement gradient of a cell, per unit
-  double weight_gradient_[3] = {};  // the same of weight_at_rest_
-  Buffer<double> holders_;          // [holders,3] m, where they were as nothing was led
+  Buffer<double> holders_;  // [holders,3] m, where they were as nothing was led
   Frame holders_frame_;
   bool holders_known_ = false;
   bool near_only_ = false;      // this step
   bool rest_is_known_ = false;  // the state holds what the modes leave out
-  double looked_ = 0;           // bound of the displacement gradient as it was looked at last
+  Buffer<uint32_t> near_edge_;  // [.,2] places: edges of the mesh between near points
+  size_t near_edges_ = 0, next_edge_ = 0;
+  double near_most_ = 0, sweep_most_ = 0;  // the largest stretch of one: of the last sweep, of this one
+  double looked_ = 0;                      // near_most_ at the last look at all cells
+  double near_time_ = 0;                   // s, at the last step's end
 
   // Of the step at hand, from predict on. Points are in the frame of its start where not said otherwise,
   // [padded 3 npoint]; modes [modes].
@@ -151,7 +159,7 @@ class Body {
   size_t size() const { return 3 * size_t(elastic_.npoint); }
   void take_surface(const dfm_mesh &m);
   void take_integrals();
-  void check_size(const dfm_mesh &m) const;
+  void check_size(uint32_t nsurfel, uint32_t npoint) const;
   void reserve();
   void describe();
   void set_steps();
@@ -185,6 +193,9 @@ class Body {
   void add_coupled_response_at_rest(uint32_t n, const uint32_t *surfel, uint32_t nrhs, const double *p,
                                     double *du) const;
   void add_displacement_at_rest(const double *p, double *out);
+  double between(uint32_t surfel, size_t component, uint32_t point, size_t other) const;
+  void find_near_response();
+  void add_near_response(const double *p_s);
   bool commit_all(const dfm_kin &k, const double *p_s, double *x, double *v);
   void find_weight_at_rest();
   void rest_under(const double *f, const double *load, double *out);
@@ -192,8 +203,8 @@ class Body {
   void match_moment(const double *wanted, const double *c, const double *velocity, const double *x, double *v,
                     size_t stride) const;
   void look_at_gradient(double time, const double *x, size_t stride);
-  void tell_gradient(double time, double most, uint32_t cell);
-  void take_near();
+  void tell_gradient(double time, double most, const char *where, uint32_t which);
+  void take_near(const dfm_mesh &m);
   bool stays_near(const dfm_kin &k, const double *f);
   void all_points(const dfm_kin &k, dfm_kin &all);
   dfm_status predict_near(const dfm_kin &k, double *u_s);
@@ -202,7 +213,8 @@ class Body {
   void add_rest_of(const double *state, double *u);
   bool holds_rest(const double *state);
   void end_state(const dfm_kin &k, const double *p_s, bool touched, Lead lead);
-  void watch_near(const dfm_kin &k, const double *state);
+  void watch_near(const dfm_kin &k, bool touched);
+  void look_at_cells();
   void whole_displacement(const dfm_kin &k, Frame &f);
 };
 

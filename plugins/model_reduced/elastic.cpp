@@ -266,7 +266,7 @@ void Elastic::factorize() {
       for (size_t s = 0; s < 3; ++s)
         if (out[3 * size_t(ij[2 * b]) + r] || out[3 * size_t(ij[2 * b + 1]) + s])
           blk[9 * b + 3 * r + s] = b < npoint && r == s ? mean : 0;
-  factor_.create(host_, npoint, ij, blk);
+  factor_.create(host_, npoint, ij, blk, rest.data());
 }
 
 void Elastic::create(const dfm_host *host, const char *id, const dfm_mesh &m) {
@@ -290,6 +290,16 @@ void Elastic::create(const dfm_host *host, const char *id, const dfm_mesh &m) {
 void Elastic::compliance(const double *f, double *u) const { respond<1>(f, u); }
 
 void Elastic::compliance_of_eight(const double *f, double *u) const { respond<kLanes>(f, u); }
+
+// Held bodies alone: of a floating one the inertia forces act at all points.
+void Elastic::compliance_between(uint32_t n, const uint32_t *points, double *w) const {
+  factor_.inverse_at(*kernels, n, points, w);
+  const size_t rows = 3 * size_t(n);
+  const auto is_held = [&](size_t j) { return held[points[j / 3]] >> (j % 3) & 1; };
+  for (size_t i = 0; i < rows; ++i)
+    for (size_t j = 0; j < rows; ++j)
+      if (is_held(i) || is_held(j)) w[i * rows + j] = 0;
+}
 
 // Floating: to the force less the inertia forces of the rigid acceleration that it calls for, and without a
 // rigid motion.

@@ -38,6 +38,8 @@ class Elastic {
   void compliance(const double *f, double *u) const;
   // the same for eight forces side by side, [3 npoint, 8]; u may be f
   void compliance_of_eight(const double *f, double *u) const;
+  // C between n points, each named once: w[3n,3n]
+  void compliance_between(uint32_t n, const uint32_t *points, double *w) const;
   // u: held components given, all others zero; becomes the displacement at rest under no force
   void follow(double *u) const;
   // [ncell] cells, by the displacement u [3 npoint] in the frame

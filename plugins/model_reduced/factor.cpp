@@ -1,10 +1,65 @@
 #include <algorithm>
+#include <new>
 
 #include "sparse.h"
 
 namespace reduced {
 
+Factor::~Factor() {
+  if (self_) direct_->solver->release(self_);
+}
+
+bool Factor::ask_host(const dfm_host *host, const std::vector<uint32_t> &ij, const std::vector<double> &blk,
+                      const double *places) {
+  if (!host->extension) return false;
+  const auto *const offered = static_cast<const dfm_direct *>(host->extension(host->ctx, DFM_HOST_DIRECT));
+  if (!offered || offered->size < sizeof(dfm_direct)) return false;
+  direct_ = offered;
+  if (direct_->analyse(host, n_, uint32_t(ij.size() / 2), ij.data(), places, &self_) != DFM_OK) {
+    self_ = nullptr;
+    throw std::bad_alloc();
+  }
+  const dfm_status status = direct_->solver->factor(self_, blk.data());
+  if (status == DFM_DISCARD) throw kIndefinite;
+  if (status != DFM_OK) throw std::bad_alloc();
+  wide_.create(host, 2 * kLanes * 3 * size_t(n_));
+  return true;
+}
+
+// The first [nrhs,n,3] of wide_, whose answers stand behind the room for kLanes of them.
+void Factor::solve_by_host(uint32_t nrhs) const {
+  double *const b = wide_.data();
+  if (direct_->solver->solve(self_, nrhs, b, b + kLanes * 3 * size_t(n_), 0) != DFM_OK)
+    throw "the host's solver failed";
+}
+
+void Factor::inverse_at(const Kernels &kernels, uint32_t nsel, const uint32_t *sel, double *w) const {
+  if (self_) {
+    if (direct_->inverse_at(self_, nsel, sel, w) != DFM_OK) throw std::bad_alloc();
+    return;
+  }
+  const size_t rows = 3 * size_t(nsel);
+  std::vector<double> eight(kLanes * 3 * size_t(n_));
+  for (size_t first = 0; first < rows; first += kLanes) {
+    const size_t many = std::min(kLanes, rows - first);
+    std::fill(eight.begin(), eight.end(), 0.0);
+    for (size_t l = 0; l < many; ++l)
+      eight[kLanes * (3 * size_t(sel[(first + l) / 3]) + (first + l) % 3) + l] = 1;
+    solve_eight(kernels, eight.data(), eight.data());
+    for (size_t l = 0; l < many; ++l)
+      for (size_t j = 0; j < rows; ++j)
+        w[(first + l) * rows + j] = eight[kLanes * (3 * size_t(sel[j / 3]) + j % 3) + l];
+  }
+}
+
 void Factor::solve(const double *b, double *x) const {
+  const size_t size = 3 * size_t(n_);
+  if (self_) {
+    std::copy(b, b + size, wide_.data());
+    solve_by_host(1);
+    std::copy(wide_.data() + kLanes * size, wide_.data() + (kLanes + 1) * size, x);
+    return;
+  }
   double *const y = ordered_.data();
   for (size_t i = 0; i < n_; ++i)
     for (size_t k = 0; k < 3; ++k) y[3 * size_t(place_[i]) + k] = b[3 * i + k];
@@ -47,6 +102,16 @@ void Factor::solve(const double *b, double *x) const {
 // Numbers of one entry lie side by side.
 void Factor::solve_eight(const Kernels &kernels, const double *b, double *x) const {
   constexpr size_t kPoint = 3 * kLanes;
+  if (self_) {
+    const size_t size = 3 * size_t(n_);
+    double *const side = wide_.data();
+    for (size_t j = 0; j < size; ++j)
+      for (size_t l = 0; l < kLanes; ++l) side[l * size + j] = b[kLanes * j + l];
+    solve_by_host(kLanes);
+    for (size_t j = 0; j < size; ++j)
+      for (size_t l = 0; l < kLanes; ++l) x[kLanes * j + l] = side[(kLanes + l) * size + j];
+    return;
+  }
   double *const y = ordered_.data();
   for (size_t i = 0; i < n_; ++i) std::copy(b + kPoint * i, b + kPoint * (i + 1), y + kPoint * place_[i]);
   kernels.solve({n_, begin_.data(), row_.data(), block_.data()}, y);

@@ -17,7 +17,10 @@ namespace {
 
 // Far below what any sum that they are part of can show; smaller numbers would become denormal as they decay.
 constexpr double kNothing = 1e-60, kNothingAtRest = 1e-30;
-constexpr size_t kWidest = 4096;  // numbers of a slot of state
+constexpr size_t kWidest = 4096;                  // numbers of a slot of state
+constexpr size_t kSweep = 16, kLeastEdges = 256;  // steps that look at all edges; edges in each at least
+constexpr double kEdgesSeeAtLeast = 0.25;         // of the gradient of a cell, as they lie
+constexpr double kAnotherLook = 1.25;             // times what the edges said at the last look
 
 double kept(double a, double nothing) { return std::fabs(a) > nothing ? a : 0; }
 
@@ -26,20 +29,24 @@ double kept(double a, double nothing) { return std::fabs(a) > nothing ? a : 0; }
 void Body::look(double *state) { state[kLead] = double(Lead::points_for_now); }
 
 // Order of the points: the near ones first. And the shape of the modes at these.
-void Body::take_near() {
+void Body::take_near(const dfm_mesh &m) {
   std::vector<uint8_t> near(elastic_.npoint, elastic_.floating);
   for (uint32_t e = 0; e < (nsurfel_ ? row_[nsurfel_] : 0); ++e) near[col_[e]] = 1;
   for (uint32_t i = 0; i < elastic_.npoint; ++i) near[i] = near[i] || elastic_.held[i];
   place_.create(host, elastic_.npoint);
   point_.create(host, elastic_.npoint);
   uint32_t next = 0;
-  for (const bool now : {true, false})
+  const auto take = [&](bool now, bool whole) {
     for (uint32_t i = 0; i < elastic_.npoint; ++i)
-      if (bool(near[i]) == now) {
+      if (bool(near[i]) == now && (elastic_.held[i] == 7) == whole) {
         point_[next] = i;
         place_[i] = next++;
-        nnear_ += now;
       }
+    return next;
+  };
+  nfree_ = take(true, false);
+  nnear_ = take(true, true);
+  take(false, false);
   if (!can_be_late()) return;
   nstate_ = condensed_ ? at_impulse() + 3 * size_t(nsurfel_) : at_pull();
   const size_t nslot = (nstate_ + kWidest - 1) / kWidest;
@@ -57,7 +64,15 @@ void Body::take_near() {
   for (Buffer<double> *b : {&near_x_, &near_v_, &near_change_, &near_rest_, &near_given_, &end_x_, &end_v_})
     b->create(host, padded);
   holders_.create(host, 3 * elastic_.holders.size());
-  if (condensed_) column_gradient_.create(host, 3 * size_t(nsurfel_));
+  for (size_t j = 0; j < size(); ++j) rest_moment_[j % 3] += elastic_.mass[j / 3] * elastic_.rest[j];
+  near_force_.create(host, 3 * size_t(nfree_));
+  near_edge_.create(host, 2 * size_t(m.nedge));
+  for (size_t e = 0; e < m.nedge; ++e) {
+    const uint32_t i = place_[m.edges[2 * e]], j = place_[m.edges[2 * e + 1]];
+    if (i >= nnear_ || j >= nnear_) continue;
+    near_edge_[2 * near_edges_] = i;
+    near_edge_[2 * near_edges_++ + 1] = j;
+  }
 }
 
 bool Body::stays_near(const dfm_kin &k, const double *f) {
@@ -150,19 +165,7 @@ void Body::commit_near(const dfm_kin &k, const double *p_s, double *x, double *v
     double *const out[] = {near_change_.data()};
     near_shape_.expand(1, in, out);
     std::fill(near_given_.data(), near_given_.data() + rows, 0.0);
-    const double scale = (1 - left_) / (h_ * h_);
-    for (uint32_t s = 0; condensed_ && s < nsurfel_; ++s) {
-      const double *const impulse = p_s + 3 * size_t(s);
-      if (impulse[0] == 0 && impulse[1] == 0 && impulse[2] == 0) continue;
-      find_columns(1, &s);
-      double local[3];
-      transposed_product(at_.r, impulse, local);
-      for (double &a : local) a *= scale;
-      const double *const c = columns_.data() + 3 * size() * s;
-      double *const given = near_given_.data();
-      for (size_t j = 0; j < rows; ++j)
-        given[j] += (local[0] * c[j] + local[1] * c[size() + j]) + local[2] * c[2 * size() + j];
-    }
+    if (condensed_) add_near_response(p_s);
   }
   for (size_t n = 0; n < nnear_; ++n) {
     const size_t i = point_[n];
@@ -179,7 +182,7 @@ void Body::commit_near(const dfm_kin &k, const double *p_s, double *x, double *v
     for (size_t a = 3; a < k.stride; ++a) xi[a] = vi[a] = 0;
   }
   end_state(k, p_s, touched, Lead::state);
-  if (k.state_out) watch_near(k, k.state_out);
+  watch_near(k, touched);
 }
 
 void Body::end_state(const dfm_kin &k, const double *p_s, bool touched, Lead lead) {
@@ -228,25 +231,31 @@ void Body::displacement_of(const double *state, double *u, double *w) {
   if (condensed_) add_rest_of(state, u);
 }
 
+// Of what the forces of the state call for at rest, what the modes leave out: one sparse solve.
 void Body::add_rest_of(const double *state, double *u) {
-  for (size_t j = 0; j < size(); ++j)
+  double *const f = f_.data();
+  const double *const force = state + at_impulse();
+  const bool pushed = std::any_of(force, force + 3 * size_t(nsurfel_), [](double a) { return a != 0; });
+  std::fill(f, f + size(), 0.0);
+  for (uint32_t s = 0; pushed && s < nsurfel_; ++s)
+    for (uint32_t e = row_[s]; e < row_[s + 1]; ++e)
+      for (size_t a = 0; a < 3; ++a) f[3 * size_t(col_[e]) + a] += weight_[e] * force[3 * size_t(s) + a];
+  const double *const in[] = {f};
+  double *const out[] = {answer_.data()};
+  if (pushed) {
+    modes_.shape.project(1, in, out);
+    rest_under(f, answer_.data(), mu_.data());
+  }
+  for (size_t j = 0; j < size(); ++j) {
+    if (pushed) u[j] += mu_[j];
     for (size_t a = 0; a < 3; ++a) u[j] += state[at_pull() + a] * weight_at_rest_[a * size() + j];
-  for (uint32_t s = 0; s < nsurfel_; ++s) {
-    const double *const f = state + at_impulse() + 3 * size_t(s);
-    if (f[0] == 0 && f[1] == 0 && f[2] == 0) continue;
-    find_columns(1, &s);
-    const double *const c = columns_.data() + 3 * size() * s;
-    for (size_t n = 0; n < elastic_.npoint; ++n)
-      for (size_t a = 0; a < 3; ++a) {
-        const size_t j = 3 * n + a;
-        u[3 * size_t(point_[n]) + a] += (f[0] * c[j] + f[1] * c[size() + j]) + f[2] * c[2 * size() + j];
-      }
   }
 }
 
 void Body::points(const dfm_kin &k, double *x, double *v) {
   if (k.state[kLead] != double(Lead::state)) return;
   displacement_of(k.state, u_.data(), w_.data());
+  look_at_cells();
   const Frame at = frame_of(k.x, k.stride, nullptr, 0);
   for (size_t n = nnear_; n < elastic_.npoint; ++n) {
     const size_t i = point_[n];
@@ -257,6 +266,46 @@ void Body::points(const dfm_kin &k, double *x, double *v) {
     for (size_t a = 0; a < 3; ++a) x[i * k.stride + a] += at.c[a];
     for (size_t a = 3; a < k.stride; ++a) x[i * k.stride + a] = v[i * k.stride + a] = 0;
   }
+}
+
+// Energies by coordinates: modes are orthonormal by mass, and what they leave out, r = C_rest g of the forces
+// and weights g, is orthogonal to them by K, and C_rest K C_rest = C_rest: its elastic energy is g.r / 2. It
+// has no velocity.
+bool Body::sums(const dfm_kin &k, double *out) const {
+  if (k.state[kLead] != double(Lead::state)) return false;
+  const size_t count = modes_.count;
+  const double *const q = k.state + kCoordinates, *const rate = q + count;
+  double kinetic = 0, elastic = 0, first[3] = {}, beside[3] = {}, turned[3];
+  for (size_t n = 0; n < count; ++n) {
+    kinetic += rate[n] * rate[n];
+    elastic += modes_.lambda[n] * q[n] * q[n];
+    for (size_t a = 0; a < 3; ++a) first[a] += pull_[3 * n + a] * q[n];
+  }
+  if (condensed_) {
+    const double *const pull = k.state + at_pull();
+    for (size_t s = 0; s < nsurfel_; ++s) {
+      const double *const f = k.state + at_impulse() + 3 * s;
+      if (f[0] == 0 && f[1] == 0 && f[2] == 0) continue;
+      for (uint32_t e = row_[s]; e < row_[s + 1]; ++e)
+        for (size_t a = 0; a < 3; ++a) {
+          const size_t j = 3 * size_t(col_[e]) + a;
+          elastic += weight_[e] * f[a] * k.state[at_near() + 3 * size_t(place_[col_[e]]) + a];
+          for (size_t b = 0; b < 3; ++b) beside[b] += weight_[e] * f[a] * weight_at_rest_[b * size() + j];
+        }
+    }
+    for (size_t b = 0; b < 3; ++b) {
+      for (size_t c = 0; c < 3; ++c) beside[b] += weight_of_weight_[3 * b + c] * pull[c];
+      elastic += pull[b] * beside[b];
+      first[b] += beside[b];
+    }
+  }
+  out[0] = 0.5 * kinetic;
+  out[1] = 0.5 * elastic;
+  const Frame at = frame_of(k.x, k.stride, nullptr, 0);
+  for (size_t a = 0; a < 3; ++a) first[a] += rest_moment_[a];
+  product(at.r, first, turned);
+  for (size_t a = 0; a < 3; ++a) out[2 + a] = elastic_.total * at.c[a] + turned[a];
+  return true;
 }
 
 // The step needs all points, and k has the near ones alone.
@@ -289,25 +338,52 @@ bool Body::holds_rest(const double *state) {
   return square <= elastic_.total * small * small;
 }
 
-// The displacement gradient is at most the sum of those of modes and columns. All cells are looked at where
-// that sum is above what was told of, or seen, by so much that they may have something new to tell.
-void Body::watch_near(const dfm_kin &k, const double *state) {
-  double bound = 0;
-  for (uint32_t n = 0; n < modes_.count; ++n) bound += std::fabs(state[kCoordinates + n]) * gradient_[n];
-  if (condensed_) {
-    for (size_t a = 0; a < 3; ++a) bound += std::fabs(state[at_pull() + a]) * weight_gradient_[a];
-    for (size_t j = 0; j < 3 * size_t(nsurfel_); ++j)
-      bound += std::fabs(state[at_impulse() + j]) * column_gradient_[j];
+// What an edge of the surface stretches and turns is at most the displacement gradient of the cells that
+// it belongs to. Some edges are looked at in each step, all of them in kSweep steps, and all cells when
+// somebody asks for points.
+void Body::watch_near(const dfm_kin &k, bool touched) {
+  near_time_ = k.t;
+  if (k.t - outside_ > kForgotten + kSweep * k.dt) told_ = looked_ = 0;
+  const size_t many = std::min(near_edges_, near_edges_ / kSweep + kLeastEdges);
+  const auto end = [&](uint32_t place, size_t a) {
+    const size_t j = 3 * size_t(place) + a;
+    if (!touched) return near_x_[j];
+    return near_x_[j] + h_ * (condensed_ ? near_change_[j] + near_given_[j] : near_change_[j]);
+  };
+  double most = 0;
+  uint32_t which = 0;
+  for (size_t n = 0; n < many; ++n) {
+    const uint32_t *const edge = near_edge_.data() + 2 * next_edge_;
+    const uint32_t i = point_[edge[0]], j = point_[edge[1]];
+    double along = 0, length = 0;
+    for (size_t a = 0; a < 3; ++a) {
+      const double u = end(edge[1], a) - end(edge[0], a);
+      const double x = elastic_.rest[3 * size_t(j) + a] - elastic_.rest[3 * size_t(i) + a];
+      along += u * u;
+      length += x * x;
+    }
+    if (along > most * length) {
+      most = along / length;
+      which = i;
+    }
+    if (++next_edge_ < near_edges_) continue;
+    next_edge_ = 0;
+    near_most_ = std::max(sweep_most_, std::sqrt(most));
+    sweep_most_ = 0;
   }
-  if (k.t - outside_ > kForgotten) told_ = looked_ = 0;
-  if (!(bound > kLargestGradient)) return;
-  outside_ = k.t;
-  if (bound <= 2 * told_ || bound <= kAnotherLook * looked_) return;
-  looked_ = bound;
-  displacement_of(state, u_.data(), nullptr);
+  most = std::sqrt(most);
+  sweep_most_ = std::max(sweep_most_, most);
+  tell_gradient(k.t, most, "along an edge of point", which);
+}
+
+// Of the displacement u_, where the edges say that it may be worth it.
+void Body::look_at_cells() {
+  const double most_of_edges = std::max(near_most_, sweep_most_);
+  if (kEdgesSeeAtLeast * kLargestGradient > most_of_edges || most_of_edges <= kAnotherLook * looked_) return;
+  looked_ = most_of_edges;
   uint32_t cell = 0;
   const double most = elastic_.largest_gradient(u_.data(), &cell);
-  tell_gradient(k.t, most, cell);
+  tell_gradient(near_time_, most, "in cell", cell);
 }
 
 }  // namespace reduced

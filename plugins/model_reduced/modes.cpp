@@ -22,22 +22,22 @@ struct Search {
   const Elastic &body;
   size_t size;
   std::vector<double> root;  // [size] square roots of the masses
-  std::vector<double> in;
+  std::vector<double> in;    // [size,kLanes]
   Pairs pairs;
   std::vector<std::vector<double>> loads;
   std::vector<double> energy;  // twice that of each load's response
 
-  explicit Search(const Elastic &b) : body(b), size(3 * size_t(b.npoint)), root(size), in(size) {
+  explicit Search(const Elastic &b) : body(b), size(3 * size_t(b.npoint)), root(size), in(kLanes * size) {
     for (size_t j = 0; j < size; ++j) root[j] = std::sqrt(body.mass[j / 3]);
   }
   // With y = M^1/2 w: M^1/2 C M^1/2 y = y / l.
   void find(size_t count) {
     pairs = largest_pairs(
-        size,
+        *body.kernels, size,
         [&](const double *x, double *y) {
-          for (size_t j = 0; j < size; ++j) in[j] = root[j] * x[j];
-          body.compliance(in.data(), y);
-          for (size_t j = 0; j < size; ++j) y[j] *= root[j];
+          for (size_t j = 0; j < kLanes * size; ++j) in[j] = root[j / kLanes] * x[j];
+          body.compliance_of_eight(in.data(), y);
+          for (size_t j = 0; j < kLanes * size; ++j) y[j] *= root[j / kLanes];
         },
         count);
     if (pairs.value.empty()) throw "the mesh has no elastic mode: it has too few points that move";

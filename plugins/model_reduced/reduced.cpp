@@ -71,7 +71,12 @@ struct Entry {
     B::look(state);
     return DFM_OK;
   }
-  static constexpr dfm_late_points kLate = {sizeof(dfm_late_points), 0, commit_near, points, look};
+  static dfm_status sums(void *self, const dfm_kin *k, double *out) {
+    bool known = false;
+    const dfm_status given = Ops::with_state(self, k, [&](B &body) { known = body.sums(*k, out); });
+    return given != DFM_OK || known ? given : DFM_DISCARD;
+  }
+  static constexpr dfm_late_points kLate = {sizeof(dfm_late_points), 0, commit_near, points, look, sums};
 
   static constexpr dfm_stepper kStepper = {
       sizeof(dfm_stepper), 0, predict, respond, diagonal, commit, nullptr, respond_many};

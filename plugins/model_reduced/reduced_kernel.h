@@ -30,6 +30,10 @@ struct Kernels {
   void (*turned)(const double *blocks, size_t n, const double *r, const double *f, double scale, double *out);
   // L L^T y = b for kLanes right-hand sides side by side, y [n,3,kLanes] in the factor's order
   void (*solve)(const FactorView &l, double *y);
+  // sum[kLanes,kLanes] += left^T right, both [n,kLanes]
+  void (*gram)(size_t n, const double *left, const double *right, double *sum);
+  // right -= left h, both [n,kLanes], h [kLanes,kLanes]
+  void (*take_off)(size_t n, const double *left, const double *h, double *right);
 };
 
 const Kernels *kernels_sse2();

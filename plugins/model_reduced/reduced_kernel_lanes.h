@@ -151,7 +151,31 @@ void solve(const FactorView &f, double *y) {
     }
 }
 
-constexpr Kernels kKernels = {project, expand, rows, turned, solve};
+void gram(size_t n, const double *left, const double *right, double *sum) {
+  for (size_t part = 0; part < kLanes; part += kWidth) {
+    V s[kLanes];
+    DEFORM_UNROLL for (size_t a = 0; a < kLanes; ++a) s[a] = load(sum + a * kLanes + part);
+    for (size_t i = 0; i < n; ++i) {
+      const V own = load(right + i * kLanes + part);
+      DEFORM_UNROLL for (size_t a = 0; a < kLanes; ++a) s[a] += left[i * kLanes + a] * own;
+    }
+    DEFORM_UNROLL for (size_t a = 0; a < kLanes; ++a) store(sum + a * kLanes + part, s[a]);
+  }
+}
+
+void take_off(size_t n, const double *left, const double *h, double *right) {
+  for (size_t part = 0; part < kLanes; part += kWidth) {
+    V s[kLanes];
+    DEFORM_UNROLL for (size_t a = 0; a < kLanes; ++a) s[a] = load(h + a * kLanes + part);
+    for (size_t i = 0; i < n; ++i) {
+      V sum = left[i * kLanes] * s[0];
+      DEFORM_UNROLL for (size_t a = 1; a < kLanes; ++a) sum += left[i * kLanes + a] * s[a];
+      store(right + i * kLanes + part, load(right + i * kLanes + part) - sum);
+    }
+  }
+}
+
+constexpr Kernels kKernels = {project, expand, rows, turned, solve, gram, take_off};
 
 }  // namespace
 }  // namespace reduced

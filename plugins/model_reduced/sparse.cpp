@@ -1,9 +1,7 @@
 #include "sparse.h"
 
-#include <Eigen/Dense>
 #include <Eigen/OrderingMethods>
 #include <Eigen/SparseCholesky>
-#include <Spectra/SymEigsSolver.h>
 
 #include <algorithm>
 #include <cmath>
@@ -53,15 +51,14 @@ Matrix lower_triangle(uint32_t n, const std::vector<uint32_t> &ij, const std::ve
 }  // namespace
 
 void Factor::create(const dfm_host *host, uint32_t n, const std::vector<uint32_t> &ij,
-                    const std::vector<double> &blk) {
+                    const std::vector<double> &blk, const double *places) {
+  n_ = n;
+  if (ask_host(host, ij, blk, places)) return;
   const std::vector<uint32_t> place = order_of(n, ij);
   Eigen::SimplicialLLT<Matrix, Eigen::Lower, Eigen::NaturalOrdering<int>> llt(
       lower_triangle(n, ij, blk, place));
-  if (llt.info() != Eigen::Success)
-    throw "the stiffness of the mesh is not positive definite: it has flat cells, or parts that hang on "
-          "nothing";
+  if (llt.info() != Eigen::Success) throw kIndefinite;
   const Matrix &l = llt.matrixL().nestedExpression();
-  n_ = n;
   place_.create(host, n);
   std::copy(place.begin(), place.end(), place_.data());
   begin_.create(host, size_t(n) + 1);
@@ -93,102 +90,6 @@ void Factor::create(const dfm_host *host, uint32_t n, const std::vector<uint32_t
       }
     }
   }
-}
-
-namespace {
-
-// C without what it does along the vectors found so far.
-struct Deflated {
-  using Scalar = double;
-  size_t size;
-  const Apply &c;
-  const Pairs &found;
-  mutable std::vector<double> in;  // Spectra asks a const operator
-
-  Eigen::Index rows() const { return Eigen::Index(size); }
-  Eigen::Index cols() const { return rows(); }
-  void remove(double *y) const {
-    for (const std::vector<double> &w : found.vector) {
-      double along = 0;
-      for (size_t i = 0; i < size; ++i) along += w[i] * y[i];
-      for (size_t i = 0; i < size; ++i) y[i] -= along * w[i];
-    }
-  }
-  void perform_op(const double *x, double *y) const {
-    in.assign(x, x + size);
-    remove(in.data());
-    c(in.data(), y);
-    remove(y);
-  }
-};
-
-// Below this share of the largest value a pair is one of C's kernel. Relative residual asked of Lanczos.
-constexpr double kKernel = 1e-13, kAccuracy = 1e-13;
-
-void keep(Pairs &pairs, const Eigen::VectorXd &values, const Eigen::MatrixXd &vectors, size_t count) {
-  for (Eigen::Index k = 0; k < values.size() && pairs.value.size() < count; ++k) {
-    const double largest = pairs.value.empty() ? values[0] : pairs.value[0];
-    if (!(values[k] > kKernel * largest)) return;
-    pairs.value.push_back(values[k]);
-    pairs.vector.emplace_back(vectors.col(k).data(), vectors.col(k).data() + vectors.rows());
-  }
-}
-
-Pairs all_pairs(size_t size, const Apply &c, size_t count) {
-  Eigen::MatrixXd full(size, size);
-  Eigen::VectorXd unit = Eigen::VectorXd::Zero(Eigen::Index(size));
-  for (Eigen::Index k = 0; k < Eigen::Index(size); ++k) {
-    unit[k] = 1;
-    c(unit.data(), full.col(k).data());
-    unit[k] = 0;
-  }
-  const Eigen::MatrixXd symmetric = 0.5 * (full + full.transpose());
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(symmetric);
-  if (solver.info() != Eigen::Success) throw "the modes of the mesh were not found: its cells are too flat";
-  const Eigen::VectorXd values = solver.eigenvalues().reverse();
-  const Eigen::MatrixXd vectors = solver.eigenvectors().rowwise().reverse();
-  Pairs out;
-  keep(out, values, vectors, count);
-  return out;
-}
-
-Pairs lanczos(Deflated &op, size_t count) {
-  const auto nev = Eigen::Index(count), ncv = Eigen::Index(std::min(op.size, 2 * count + 20));
-  Spectra::SymEigsSolver<Deflated> solver(op, nev, ncv);
-  solver.init();
-  const Eigen::Index got = solver.compute(Spectra::SortRule::LargestMagn, 1000, kAccuracy);
-  if (solver.info() != Spectra::CompInfo::Successful || got < nev)
-    throw "the modes of the mesh were not found: its cells are too flat, or fewer modes are needed";
-  Pairs out;
-  keep(out, solver.eigenvalues(), solver.eigenvectors(), count);
-  return out;
-}
-
-}  // namespace
-
-// Lanczos's method sees one vector of an eigenspace, and its copies by rounding alone. So it is asked again
-// for what is left beside the pairs found: where that has a value above the least of them, a copy lacked.
-Pairs largest_pairs(size_t size, const Apply &c, size_t count) {
-  if (size <= 600 || 4 * count + 20 >= size) return all_pairs(size, c, count);
-  Pairs pairs;
-  Deflated op{size, c, pairs, {}};
-  pairs = lanczos(op, count);
-  constexpr size_t kAgain = 2;
-  for (int round = 0; round < 20 && pairs.value.size() == count; ++round) {
-    const Pairs more = lanczos(op, kAgain);
-    const double least = pairs.value.back();
-    if (more.value.empty() || !(more.value[0] > least)) return pairs;
-    for (size_t k = 0; k < more.value.size(); ++k) {
-      const auto at = std::upper_bound(pairs.value.begin(), pairs.value.end(), more.value[k],
-                                       [](double a, double b) { return a > b; }) -
-                      pairs.value.begin();
-      pairs.value.insert(pairs.value.begin() + at, more.value[k]);
-      pairs.vector.insert(pairs.vector.begin() + at, more.vector[k]);
-    }
-    pairs.value.resize(count);
-    pairs.vector.resize(count);
-  }
-  return pairs;
 }
 
 }  // namespace reduced

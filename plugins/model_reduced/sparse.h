@@ -1,8 +1,10 @@
 // A sparse symmetric positive definite matrix of 3 x 3 blocks: its factor, and the lowest eigenpairs that a
-// solve with it gives. Eigen and Spectra stay inside sparse.cpp and work while a body is created; what a step
-// calls is in factor.cpp, in an order of operations that no library decides.
+// solve with it gives. Eigen stays inside sparse.cpp and lanczos.cpp and works while a body is created; what
+// a step calls is in factor.cpp, in an order of operations that no library decides. The factor is the host's
+// where it has one (dfm.direct/1), which is several times as fast.
 #pragma once
 #include <deform/plugin.h>
+#include <deform/plugin_draft.h>
 
 #include <functional>
 #include <vector>
@@ -14,26 +16,41 @@ namespace reduced {
 
 using model::Buffer;
 
+constexpr const char *kIndefinite =
+    "the stiffness of the mesh is not positive definite: it has flat cells, or parts that hang on nothing";
+
 // A = L L^T of the points in an order that keeps L sparse. Column block j of L holds that of its point with
 // itself (a triangle), then the blocks of the points below, in rising order.
 class Factor {
  public:
-  // ij [nb,2], i <= j, and blk [nb,9] row-major as in dfm_solver. Throws a sentence where the matrix is not
-  // positive definite.
+  Factor() = default;
+  Factor(const Factor &) = delete;
+  Factor &operator=(const Factor &) = delete;
+  ~Factor();
+  // ij [nb,2], i <= j, and blk [nb,9] row-major as in dfm_solver; places [n,3] m. Throws a sentence where
+  // the matrix is not positive definite.
   void create(const dfm_host *host, uint32_t n, const std::vector<uint32_t> &ij,
-              const std::vector<double> &blk);
+              const std::vector<double> &blk, const double *places);
   void solve(const double *b, double *x) const;                                // [n,3] each; may be the same
   void solve_eight(const Kernels &kernels, const double *b, double *x) const;  // [n,3,kLanes]
+  // w[3 nsel,3 nsel]: rows and columns of the inverse at these points, each named once
+  void inverse_at(const Kernels &kernels, uint32_t nsel, const uint32_t *sel, double *w) const;
 
  private:
   uint32_t n_ = 0;
+  const dfm_direct *direct_ = nullptr;  // the host's; else what follows is the factor
+  void *self_ = nullptr;
+  mutable Buffer<double> wide_;  // [2,kLanes,n,3] of the host's: right-hand sides and solutions
+  bool ask_host(const dfm_host *host, const std::vector<uint32_t> &ij, const std::vector<double> &blk,
+                const double *places);
+  void solve_by_host(uint32_t nrhs) const;
   Buffer<uint32_t> place_;          // [n] of a point in the order
   Buffer<uint32_t> begin_, row_;    // [n + 1], [entries / 9]
   Buffer<double> block_;            // [entries / 9, 9] row-major
   mutable Buffer<double> ordered_;  // [n,3,kLanes]
 };
 
-// y = C x for [3 n] numbers: C symmetric, >= 0.
+// y = C x for kLanes vectors side by side, [size,kLanes] each, not the same: C symmetric, >= 0.
 using Apply = std::function<void(const double *x, double *y)>;
 
 // Eigenpairs of C with the largest values, falling; vectors of length one, orthogonal.
@@ -44,6 +61,6 @@ struct Pairs {
 
 // The `count` pairs of the largest values (fewer where C has fewer above zero), copies of a multiple value
 // all among them. Throws a sentence where they are not found.
-Pairs largest_pairs(size_t size, const Apply &c, size_t count);
+Pairs largest_pairs(const Kernels &kernels, size_t size, const Apply &c, size_t count);
 
 }  // namespace reduced

@@ -311,20 +311,19 @@ void Body::look_at_gradient(double time, const double *x, size_t stride) {
   whole_displacement(k, f);
   uint32_t cell = 0;
   const double most = elastic_.largest_gradient(u_.data(), &cell);
-  tell_gradient(time, most, cell);
+  tell_gradient(time, most, "in cell", cell);
 }
 
-void Body::tell_gradient(double time, double most, uint32_t cell) {
+void Body::tell_gradient(double time, double most, const char *where, uint32_t which) {
   if (!(most > kLargestGradient)) return;
   outside_ = time;
   if (!(most > 2 * told_)) return;
   told_ = most;
   char text[240];
-  std::snprintf(
-      text, sizeof text,
-      "%s: the displacement gradient reaches %.2g in cell %u: above %g the strains of this model are "
-      "no longer those of the body; corotational_fem has no such limit.",
-      id_, most, cell, kLargestGradient);
+  std::snprintf(text, sizeof text,
+                "%s: the displacement gradient reaches %.2g %s %u: above %g the strains of this model are "
+                "no longer those of the body; corotational_fem has no such limit.",
+                id_, most, where, which, kLargestGradient);
   host->log(host->ctx, 2, 0, text);
 }
 

@@ -275,14 +275,14 @@ void Body::keep_rest() {
 
 // Condensed, held: of a uniform acceleration along each axis.
 void Body::find_weight_at_rest() {
-  if (elastic_.floating) return;
   weight_at_rest_.create(host, 3 * size());
   for (size_t a = 0; a < 3; ++a) {
     std::fill(f_.data(), f_.data() + size(), 0.0);
     for (size_t i = 0; i < elastic_.npoint; ++i) f_[3 * i + a] = elastic_.mass[i];
     for (size_t k = 0; k < modes_.count; ++k) load_[k] = pull_[3 * k + a];
     rest_under(f_.data(), load_.data(), weight_at_rest_.data() + a * size());
-    weight_gradient_[a] = elastic_.largest_gradient(weight_at_rest_.data() + a * size(), nullptr);
+    for (size_t j = 0; j < size(); ++j)
+      weight_of_weight_[3 * (j % 3) + a] += elastic_.mass[j / 3] * weight_at_rest_[a * size() + j];
   }
 }
 

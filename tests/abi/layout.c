@@ -178,6 +178,7 @@ static const Row rows[] = {
     M(dfm_late_points, commit),
     M(dfm_late_points, points),
     M(dfm_late_points, look),
+    M(dfm_late_points, sums),
     S(dfm_limited),
     M(dfm_limited, size),
     M(dfm_limited, reserved),

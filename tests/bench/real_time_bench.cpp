@@ -1,12 +1,14 @@
 // Whether a scene keeps up with its own clock: processor time of each step on one thread, median and the
-// largest of a thousand, and what a probe feels. The scene is run twice: a model may find something when it
-// is first asked (columns of a response), and a host that must not wait asks before. The second run is timed.
+// largest of a thousand, and what a probe feels. All steps count from the first on, first touches included.
 //
-// real_time_bench SCENE [--model NAME] [--integrator NAME] [--cells N] [--time S] [--step S]
-//                 [--series FILE] [--against FILE] [--csv FILE --commit HASH]
+// real_time_bench SCENE [--model NAME] [--integrator NAME] [--cells N] [--time S] [--step S] [--set TEXT]
+//                 [--wander S] [--series FILE] [--against FILE] [--csv FILE --commit HASH]
+//                 [--histogram FILE]
 //
-// --series writes t, the force on the first body (N) and the place of the first probe (m) at each
-// millisecond; --against compares with such a file: the largest difference over the largest value.
+// --wander has the first obstacle go to and fro over the top of probe_block.json for so long, at the scene's
+// speed, on lanes side by side, over surfels that nothing has touched before. --series writes t, the force on
+// the first body (N) and the place of the first probe (m) at each millisecond; --against compares with such a
+// file: the largest difference over the largest value. --histogram adds rows to a CSV file: steps by time.
 #include <time.h>
 
 #include <algorithm>
@@ -43,7 +45,8 @@ struct Run {
   double contacts = 0;
 };
 
-Run run(dfm_scene scene, dfm_world world, double duration, double step) {
+// places: ask for the probe's place each ten milliseconds; a body whose inner points are late finds them.
+Run run(dfm_scene scene, dfm_world world, double duration, double step, bool places) {
   Run out;
   const long steps = std::lround(duration / step), every = std::max(1L, std::lround(1e-3 / step));
   double force[3] = {};
@@ -61,6 +64,7 @@ Run run(dfm_scene scene, dfm_world world, double duration, double step) {
     out.contacts += double(stats.contacts) / double(steps);
     if ((n + 1) % every != 0) continue;
     Sample s{double(n + 1) * step, {force[0], force[1], force[2]}, {}};
+    if (!places) continue;
     if (every == 1 && (n + 1) % 10 != 0 && !out.series.empty())
       std::copy(out.series.back().place, out.series.back().place + 3, s.place);
     else ok(dfm_scene_probe(scene, 0, nullptr, s.place, nullptr));
@@ -96,6 +100,38 @@ void compare(const std::vector<Sample> &now, const std::vector<Sample> &with, do
   for (int i = 0; i < 2; ++i) error[i] = std::sqrt(apart[i] / most[i]);
 }
 
+// Keyframes on lanes of 8 cm, 5 mm apart, after the scene's own way down; 0.15 m/s.
+std::string lanes(double duration) {
+  std::string out = "/obstacles/0/motion/keyframes=[{\"t\":0,\"position\":[0.06,0.06,0.151]}";
+  const auto add = [&](double t, double x, double y) {
+    char text[120];
+    std::snprintf(text, sizeof text, ",{\"t\":%.4f,\"position\":[%.4f,%.4f,0.142]}", t, x, y);
+    out += text;
+  };
+  double t = 0.15;
+  for (int lane = 0; t < duration; ++lane) {
+    const double y = 0.06 + 0.005 * (lane % 17);
+    add(t, lane % 2 ? 0.14 : 0.06, y);
+    add(t += 0.08 / 0.15, lane % 2 ? 0.06 : 0.14, y);
+    t += 0.08 / 0.15 / 4;
+  }
+  return out + "]";
+}
+
+// Steps by their time, ms: a bin's upper end is a quarter above its lower one.
+void write_histogram(const char *path, const std::vector<double> &sorted, const std::string &row) {
+  std::FILE *csv = std::fopen(path, "a");
+  if (std::ftell(csv) == 0)
+    std::fprintf(csv, "machine,compiler,commit,model,points,contacts,below_ms,steps\n");
+  size_t at = 0;
+  for (double end = 0.1; at < sorted.size(); end *= 1.25) {
+    const size_t first = at;
+    while (at < sorted.size() && 1e3 * sorted[at] < end) ++at;
+    if (at > first) std::fprintf(csv, "%s,%.3f,%zu\n", row.c_str(), end, at - first);
+  }
+  std::fclose(csv);
+}
+
 std::vector<Sample> read(const char *path) {
   std::vector<Sample> out;
   std::ifstream in(path);
@@ -110,7 +146,8 @@ std::vector<Sample> read(const char *path) {
 int main(int argc, char **argv) {
   std::vector<std::string> set;
   std::string name = "scene", integrator = "explicit", model = "scene";
-  const char *series = nullptr, *against = nullptr, *csv_file = nullptr, *commit = "unknown";
+  const char *series = nullptr, *against = nullptr, *csv_file = nullptr, *histogram = nullptr,
+             *commit = "unknown";
   double duration = 0, step = 0;
   for (int i = 2; i + 1 < argc; i += 2) {
     const std::string key = argv[i], value = argv[i + 1];
@@ -122,6 +159,8 @@ int main(int argc, char **argv) {
     if (key == "--step") step = std::atof(argv[i + 1]);
     if (key == "--series") series = argv[i + 1];
     if (key == "--against") against = argv[i + 1];
+    if (key == "--wander") set.push_back(lanes(duration = std::atof(argv[i + 1])));
+    if (key == "--histogram") histogram = argv[i + 1];
     if (key == "--csv") csv_file = argv[i + 1];
     if (key == "--commit") commit = argv[i + 1];
   }
@@ -155,18 +194,10 @@ int main(int argc, char **argv) {
   info.size = sizeof info;
   ok(dfm_body_get_info(body, &info));
 
-  size_t bytes = 0;
-  ok(dfm_world_snapshot(world, nullptr, &bytes));
-  std::vector<char> snapshot(bytes);
-  ok(dfm_world_snapshot(world, snapshot.data(), &bytes));
-  if (model == "modal" || model == "condensed" || model == "scene") {
-    run(scene, world, duration, step);
-    ok(dfm_world_restore(world, snapshot.data(), bytes));
-  }
   dfm_stage_time before[32], after[32];
   uint32_t stages = 0;
   ok(dfm_world_profile(world, 32, before, &stages));
-  Run found = run(scene, world, duration, step);
+  Run found = run(scene, world, duration, step, series || against);
   ok(dfm_world_profile(world, 32, after, &stages));
   if (series) {
     std::FILE *out = std::fopen(series, "w");
@@ -180,15 +211,31 @@ int main(int argc, char **argv) {
   std::vector<double> sorted = found.seconds;
   std::sort(sorted.begin(), sorted.end());
   const double median = 1e3 * sorted[sorted.size() / 2], worst = 1e3 * sorted[sorted.size() * 999 / 1000];
+  const auto late = sorted.end() - std::upper_bound(sorted.begin(), sorted.end(), step);
   std::printf(
       "%s %s %g ms: %u points, %.1f contacts, made in %.1f s; ms per step: median %.3f, "
-      "99.9 %% %.3f; ",
-      model.c_str(), integrator.c_str(), 1e3 * step, info.npoint, found.contacts, made, median, worst);
+      "99.9 %% %.3f, most %.3f, %td of %zu above the step; ",
+      model.c_str(), integrator.c_str(), 1e3 * step, info.npoint, found.contacts, made, median, worst,
+      1e3 * sorted.back(), late, sorted.size());
   if (against) std::printf("error of force %.3g, of tip %.3g\n", error[0], error[1]);
   else std::printf("errors: give a finer run's series with --against\n");
+  std::vector<size_t> slow(found.seconds.size());
+  for (size_t n = 0; n < slow.size(); ++n) slow[n] = n;
+  const size_t most = std::min<size_t>(10, slow.size());
+  std::partial_sort(slow.begin(), slow.begin() + std::ptrdiff_t(most), slow.end(),
+                    [&](size_t a, size_t b) { return found.seconds[a] > found.seconds[b]; });
+  std::printf("    slowest:");
+  for (size_t n = 0; n < most; ++n) std::printf(" %.2f (%zu)", 1e3 * found.seconds[slow[n]], slow[n] + 1);
+  std::printf(" ms (step)\n");
   for (uint32_t i = 0; i < stages; ++i)
     std::printf("    %-18s %8.4f ms\n", after[i].name,
                 1e3 * (after[i].seconds - before[i].seconds) / double(found.seconds.size()));
+  if (histogram) {
+    char row[200];
+    std::snprintf(row, sizeof row, "%s,%s,%s,%s,%u,%.1f", bench::machine().c_str(), bench::compiler(), commit,
+                  model.c_str(), info.npoint, found.contacts);
+    write_histogram(histogram, sorted, row);
+  }
   if (csv_file) {
     std::FILE *csv = std::fopen(csv_file, "a");
     if (std::ftell(csv) == 0)

@@ -261,6 +261,11 @@ typedef struct dfm_late_points {
   dfm_status (*points)(void *self, const dfm_kin *k, double *x, double *v);
   /* [step] state: in the next step the points tell where the body is, all of them */
   dfm_status (*look)(const void *self, double *state);
+  /* [step] (optional; NULL, or a smaller size) of all points, from k->state and the points that steps move:
+   * sums[5] = kinetic and elastic energy, J, and the sum of mass times place, kg m. For who would otherwise
+   * ask for all points while the scene runs; leaves what predict has found. DFM_DISCARD: the points tell
+   * where the body is, so they are to be asked. */
+  dfm_status (*sums)(void *self, const dfm_kin *k, double *sums);
 } dfm_late_points;
 /* Extension "dfm.cell_energy/1" of a model: elastic energy per rest volume, for pictures
  * and probes. */

@@ -32,6 +32,25 @@ typedef struct dfm_f32 {
    * the same bits for the same k. Writes k->state_out as dfm_model.add_forces does. */
   dfm_status (*add_forces)(void *self, const dfm_kin *k, double *f);
 } dfm_f32;
+/* ---- services of a host: a direct solver --------------------------------------------------------------- */
+/* Service "dfm.direct/1" of a host, asked for by dfm_host.extension: the host's own direct solver of
+ * symmetric positive definite matrices of 3x3 blocks, for a model whose body is made with a factor. NULL:
+ * the host has none. It stays a draft until a second model asks for it. */
+#define DFM_HOST_DIRECT "dfm.direct/1"
+typedef struct dfm_direct {
+  uint32_t size, reserved;
+  /* every function, DFM_SOLVER_DIRECT; memory and threads are those of the host that is given, which outlives
+   * what is made. One call at a time for each self. */
+  const dfm_solver *solver;
+  /* [setup] as solver->analyse, for points that lie at places[n,3] m in space: an order that keeps the factor
+   * of a solid body small */
+  dfm_status (*analyse)(const dfm_host *h, uint32_t n, uint32_t nb, const uint32_t *ij, const double *places,
+                        void **self);
+  /* [setup] after a factor() that gave DFM_OK: w[3 nsel,3 nsel] = the rows and columns of the inverse at the
+   * points sel[nsel], each named once; row-major, symmetric to the bit. Takes much less time than a solve for
+   * each column; while it works, memory for half of w and a part of the factor per column. */
+  dfm_status (*inverse_at)(void *self, uint32_t nsel, const uint32_t *sel, double *w);
+} dfm_direct;
 /* ---- models: springs switched off --------------------------------------------------------------------- */
 /* Extension "dfm.spring_mask/1" of a model: springs by edge of the mesh, switched off and on. Like a
  * parameter, the mask is the host's to keep: it is no state. Off gives a spring's energy away; on again may

@@ -67,6 +67,13 @@ struct ImplicitOptions {
   bool second_order = false;       // TR-BDF2 without contact; else backward Euler always
 };
 
+// Of all points of a body, without a look at each.
+struct BodySums {
+  double kinetic = 0, elastic = 0;  // J
+  Vec3 first;                       // kg m: masses times places
+  double reach = 0;                 // m, the largest coordinate of the points that steps move
+};
+
 // What may be done to a body beside moving it.
 struct Abilities {
   bool forces = false;    // add_forces() does something
@@ -142,6 +149,8 @@ class Dynamics {
   virtual void points_changed() {}
   // Whether steps leave out points.
   virtual bool late() const { return false; }
+  // False: not known without see_points(). Also between free_motion() and end_state().
+  virtual bool sums(BodySums &) const { return false; }
 
   // trial: with room for the model's next state
   dfm_kin kin(double time, double h, bool trial = false) const;

@@ -135,6 +135,17 @@ void SelfStepping::see_points() {
   unseen_.store(false, std::memory_order_release);
 }
 
+bool SelfStepping::sums(BodySums &out) const {
+  if (!model_.late || !model_.late->sums) return false;
+  const dfm_kin k = kin(0, 0);
+  double found[5] = {};
+  if (model_.call("sums", [&] { return model_.late->sums(model_.self, &k, found); }) != DFM_OK) return false;
+  out = {found[0], found[1], load3(found + 2), 0};
+  for (const uint32_t i : near_)
+    for (size_t c = 0; c < 3; ++c) out.reach = std::max(out.reach, std::fabs(p_.x[size_t(i) * kStride + c]));
+  return true;
+}
+
 void SelfStepping::points_changed() {
   if (!model_.late) return;
   model_.call("look", [&] { return model_.late->look(model_.self, model_.state.data()); });

@@ -25,6 +25,7 @@ class SelfStepping : public Dynamics {
   void see_ends() override;
   void points_changed() override;
   bool late() const override { return model_.late.has_value(); }
+  bool sums(BodySums &out) const override;
 
  private:
   Array<double> mean_;     // [npoint,4] m/s

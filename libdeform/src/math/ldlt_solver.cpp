@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "math/nested_dissection.h"
 #include "math/width.h"
 
 namespace dfm {
@@ -33,9 +34,21 @@ LdltSolver::LdltSolver(const Memory &memory, Tasks *tasks)
 }
 
 void LdltSolver::analyse(const BlockPattern &pattern) {
+  nodes_.build(pattern);
+  find_places(pattern);
+}
+
+void LdltSolver::analyse(const BlockPattern &pattern, const double *places) {
+  std::vector<uint32_t> order(pattern.n);
+  nested_dissection(pattern, places, order.data());
+  nodes_.build(pattern, order.data());
+  find_places(pattern);
+}
+
+// Of the blocks of A in the panels, and memory for all that follows.
+void LdltSolver::find_places(const BlockPattern &pattern) {
   ready_ = false;
   n_ = pattern.n;
-  nodes_.build(pattern);
   const uint32_t ns = nodes_.count();
   entry_begin_.assign(size_t{ns} + 1, 0);
   const auto column = [&](uint32_t b) {
@@ -244,6 +257,14 @@ void LdltSolver::forget() {
   reach_begin_.assign(1, 0);
   reached_begin_.assign(1, 0);
   product_.clear();
+}
+
+void LdltSolver::forget_restricted() {
+  forget();
+  for (Array<double> *v : {&reached_, &product_}) {
+    v->clear();
+    v->shrink_to_fit();
+  }
 }
 
 // Supernodes that the points of panels from `first` on reach: their own and all above (Gilbert and Peierls

@@ -14,12 +14,16 @@ class LdltSolver final : public LinearSolver {
   const char *name() const override { return "ldlt"; }
   bool direct() const override { return true; }
   void analyse(const BlockPattern &pattern) override;
+  // The same where the points are at [n,3]: the order that suits a solid body (nested_dissection.h).
+  void analyse(const BlockPattern &pattern, const double *places);
   bool factor(const double *blk) override;
   bool solve(uint32_t nrhs, const double *b, double *x, double tolerance, SolveInfo &info) override;
   bool restricted(uint32_t nsel, const uint32_t *sel, double tolerance, double *w, SolveInfo &info) override;
+  void forget_restricted();  // gives back what restricted() keeps for points that are asked for again
   size_t factor_doubles() const { return value_.size(); }  // entries of L that are stored
 
  private:
+  void find_places(const BlockPattern &pattern);
   void assemble(uint32_t s, const double *blk, double *panel);
   void extend_add(uint32_t child, const double *update, uint32_t s, double *panel, double *own) const;
   bool factor_panel(uint32_t s, double *panel, double *own);

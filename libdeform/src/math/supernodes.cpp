@@ -81,11 +81,15 @@ Supernodes::Supernodes(const Memory &memory) {
 }
 
 void Supernodes::build(const BlockPattern &pattern) {
+  std::vector<uint32_t> order(pattern.n);
+  minimum_degree(pattern, order.data());
+  build(pattern, order.data());
+}
+
+void Supernodes::build(const BlockPattern &pattern, const uint32_t *order) {
   const uint32_t n = pattern.n;
   place.resize(n);
   {
-    std::vector<uint32_t> order(n);
-    minimum_degree(pattern, order.data());
     for (uint32_t k = 0; k < n; ++k) place[order[k]] = k;
     const std::vector<uint32_t> position = postorder(elimination_tree(neighbors(pattern, place, false)));
     for (uint32_t i = 0; i < n; ++i) place[i] = position[place[i]];

@@ -19,7 +19,9 @@ struct Supernodes {
   static constexpr uint32_t kNone = UINT32_MAX;
 
   explicit Supernodes(const Memory &memory);
-  void build(const BlockPattern &pattern);
+  void build(const BlockPattern &pattern);  // by minimum degree
+  // order[n]: the point eliminated as the k-th
+  void build(const BlockPattern &pattern, const uint32_t *order);
 
   uint32_t count() const { return uint32_t(parent.size()); }
   uint32_t width(uint32_t s) const { return begin[s + 1] - begin[s]; }

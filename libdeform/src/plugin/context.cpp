@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "core/error.h"
+#include "plugin/direct_service.h"
 #include "plugin/on_behalf.h"
 
 namespace {
@@ -53,7 +54,9 @@ void host_parallel_for(void *ctx, uint32_t n, uint32_t grain, void (*fn)(void *,
   });
 }
 
-const void *host_extension(void *, const char *) { return nullptr; }
+const void *host_extension(void *, const char *id) {
+  return id && std::strcmp(id, DFM_HOST_DIRECT) == 0 ? &dfm::direct_service() : nullptr;
+}
 
 dfm::Memory memory_of(const dfm_context_def &def) {
   return def.alloc ? dfm::Memory{def.user, def.alloc, def.release} : dfm::Memory::standard();

@@ -85,9 +85,32 @@ double work_of_new_size(const World &w, const StepContext &step, const Body &b) 
   return 0.5 * (1 - w.watch.last_h / step.h) * sum;
 }
 
+double rounding_of(const Body &b, double h, double potential, double kinetic, double elastic, double reach) {
+  const double drift = kPositionDigits * reach / h;
+  return kRounding * (std::fabs(b.energy.work) + std::fabs(potential) + kinetic + elastic) +
+         b.mass * drift * drift;
+}
+
+// Of a body whose model sums over its points, so that a look takes no longer than another step.
+bool look_at_sums(const World &w, const StepContext &step, const Body &b, EnergyLook &out) {
+  if (!steps_itself(b) || hides(b) || books_loads(b)) return false;
+  if (std::any_of(b.p.load.begin(), b.p.load.end(), [](double f) { return f != 0; })) return false;
+  BodySums sums;
+  if (!b.dynamics->sums(sums)) return false;
+  const double potential = -dot(w.gravity.now, sums.first);
+  out = {sums.kinetic,
+         sums.elastic,
+         sums.elastic + potential + sums.kinetic - b.energy.work,
+         0,
+         rounding_of(b, step.h, potential, sums.kinetic, sums.elastic, sums.reach),
+         true};
+  return true;
+}
+
 // The energy that the scheme keeps, U(x) - F.x + v.M v_free / 2, and half of the energy of the kick, by which
 // it may rise as stiff modes calm down.
 bool look(World &w, const StepContext &step, Body &b, EnergyLook &out) {
+  if (look_at_sums(w, step, b, out)) return true;
   const Phyxels &p = b.p;
   b.dynamics->see_points();
   const bool load_booked = books_loads(b), ends = at_end(b);
@@ -117,14 +140,12 @@ bool look(World &w, const StepContext &step, Body &b, EnergyLook &out) {
   if (steps_itself(b) && (!hides(b) || b.dynamics->late()) &&
       !b.dynamics->free_motion(sub_step_of(w, step), again))
     return false;
-  const double drift = kPositionDigits * reach / step.h;
   const double half_done = ends ? 0 : work_of_holders(w, step, b, false) + work_of_new_size(w, step, b);
   out = {kinetic,
          elastic,
          elastic + potential + (ends ? kinetic : cross) - (b.energy.work + half_done),
          kGivesBack * kick,
-         kRounding * (std::fabs(b.energy.work) + std::fabs(potential) + kinetic + elastic) +
-             b.mass * drift * drift,
+         rounding_of(b, step.h, potential, kinetic, elastic, reach),
          true};
   return true;
 }
@@ -284,6 +305,10 @@ void change_gravity(World &w, Vec3 gravity) {
   if (!watching(w) || norm2(by) == 0) return;
   for (auto &b : w.bodies) {
     if (!watched(*b)) continue;
+    if (BodySums sums; at_end(*b) && b->dynamics->sums(sums)) {
+      b->energy.work -= dot(by, sums.first);
+      continue;
+    }
     b->dynamics->see_points();
     const Phyxels &p = b->p;
     const double behind = at_end(*b) ? 0 : 0.5 * w.watch.last_h;

@@ -1,6 +1,7 @@
 // Held bodies of the models modal and condensed: a step moves the points that a surfel hangs on or that are
 // held, and looks at no other one; who asks for the others sees them where a host that moves all of them has
 // them.
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -19,7 +20,7 @@ struct Probed {
   dfm_scene scene = 0;
   dfm_world world = 0;
   dfm_body body = 0;
-  explicit Probed(const char *model, std::vector<std::string> more = {}) {
+  explicit Probed(const char *model, std::vector<std::string> more = {}, dfm_context *other = nullptr) {
     std::vector<std::string> set{std::string("/bodies/0/model/type=\"") + model + '"',
                                  "/bodies/0/mesh/cells=1500", "/contact/tolerance=1e-12",
                                  "/materials/tissue/damping/stiffness=0.001"};
@@ -31,7 +32,7 @@ struct Probed {
     options.nset = uint32_t(texts.size());
     options.set = texts.data();
     const std::string path = std::string(DEFORM_SOURCE_DIR) + "/examples/scenes/probe_block.json";
-    test::ok(dfm_scene_open(context, path.c_str(), &options, &scene));
+    test::ok(dfm_scene_open(other ? other : context, path.c_str(), &options, &scene));
     test::ok(dfm_scene_world(scene, &world));
     uint32_t n = 0;
     test::ok(dfm_world_bodies(world, 1, &body, &n));
@@ -175,6 +176,73 @@ TEST_P(LatePoints, SavedAndRestored_GoOnWithTheSameBits) {
   test::ok(dfm_world_restore(b.world, saved.data(), saved.size()));
   test::run(b.world, 0.1, 1e-3);
   EXPECT_EQ(dfm_world_hash(a.world), dfm_world_hash(b.world));
+}
+
+// Energies and the first moment by coordinates and by points, pressed, sliding, and let go of.
+TEST_P(LatePoints, Sums_AreThoseOfAllPoints) {
+  const Probed w(GetParam());
+  for (int n = 0; n < 5; ++n) {
+    test::run(w.world, 0.06, 1e-3);
+    dfm::Body &b = w.inside();
+    dfm::BodySums sums;
+    ASSERT_TRUE(b.dynamics->sums(sums));
+    b.dynamics->see_points();
+    double kinetic = 0, elastic = 0, first[3] = {};
+    for (uint32_t i = 0; i < b.p.n; ++i)
+      for (size_t k = 0; k < 3; ++k) {
+        const size_t at = 4 * size_t(i) + k;
+        kinetic += 0.5 * b.p.mass[i] * b.p.v[at] * b.p.v[at];
+        first[k] += b.p.mass[i] * b.p.x[at];
+      }
+    const dfm_kin kin = b.dynamics->kin(0, 0);
+    ASSERT_EQ(b.model.ops->energy(b.model.self, &kin, &elastic), DFM_OK);
+    EXPECT_NEAR(sums.kinetic, kinetic, 1e-9 * kinetic);
+    EXPECT_NEAR(sums.elastic, elastic, 1e-9 * elastic);
+    for (int k = 0; k < 3; ++k) EXPECT_NEAR(sums.first[k], first[k], 1e-12 * b.mass);
+  }
+}
+
+// Coordinates that grow by themselves, as those of a model with a fault would: the watch looks at no inner
+// point, and stops the run.
+TEST_P(LatePoints, PumpedBody_IsStopped) {
+  const Probed w(GetParam());
+  test::run(w.world, 0.05, 1e-3);
+  dfm::Body &b = w.inside();
+  for (uint32_t i = 0; i < b.p.n; ++i) {
+    if (b.p.held[i] || std::find(b.surface.point.begin(), b.surface.point.end(), i) != b.surface.point.end())
+      continue;
+    for (size_t k = 0; k < 3; ++k) b.p.x[4 * size_t(i) + k] = b.p.v[4 * size_t(i) + k] = kNan;
+  }
+  dfm_status status = DFM_OK;
+  uint32_t trouble = 0;
+  for (int n = 0; n < 2000 && status == DFM_OK; ++n) {
+    for (int k = 0; k < 80; ++k) b.model.state[2 + k] *= 1.01;
+    status = dfm_world_step(w.world, 1e-3, &trouble);
+  }
+  EXPECT_EQ(status, DFM_E_DIVERGED);
+  EXPECT_TRUE(trouble & DFM_TROUBLE_ENERGY);
+}
+
+// The probe presses a tenth of the height: the log says that this is more than small, though nobody asks for
+// a point.
+TEST_P(LatePoints, LargeGradient_IsToldWithoutAskingForPoints) {
+  std::string log;
+  dfm_context_def def = dfm_context_def_default();
+  def.threads = 1;
+  def.plugin_dir = DEFORM_PLUGIN_DIR;
+  def.user = &log;
+  def.log = [](void *user, int32_t, const char *text) { *static_cast<std::string *>(user) += text; };
+  dfm_context *context = nullptr;
+  test::ok(dfm_context_create(&def, &context));
+  {
+    const Probed w(GetParam(),
+                   {"/obstacles/0/motion/keyframes/1/position=[0.07,0.1,0.135]",
+                    "/obstacles/0/motion/keyframes/2/position=[0.07,0.1,0.135]"},
+                   context);
+    test::run(w.world, 0.2, 1e-3);
+    EXPECT_NE(log.find("the displacement gradient reaches"), std::string::npos);
+  }
+  dfm_context_destroy(context);
 }
 
 INSTANTIATE_TEST_SUITE_P(Of, LatePoints, testing::Values("modal", "condensed"),
