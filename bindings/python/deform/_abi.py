@@ -213,7 +213,8 @@ class dfm_stepper(_Structure):
 
 
 class dfm_late_points(_Structure):
-    _fields_ = [("size", u32), ("reserved", u32), ("commit", ptr), ("points", ptr), ("look", ptr)]
+    _fields_ = [("size", u32), ("reserved", u32), ("commit", ptr), ("points", ptr), ("look", ptr),
+                ("sums", ptr)]
 
 
 class dfm_cell_energy(_Structure):
