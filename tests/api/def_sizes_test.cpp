@@ -1,26 +1,11 @@
 // Structs of callers whose header is older or newer than the library: defaults, defs, reports (base.h,
 // "structs of another version"). Lists are in list_rows_test.
+#include <dlfcn.h>
+
 #include <cmath>
 #include <cstring>
 
 #include "world.h"
-
-// The symbols, past the inline functions of the headers.
-extern "C" {
-dfm_attach_def attach_symbol(void) __asm__("dfm_attach_def_default");
-dfm_context_def context_symbol(void) __asm__("dfm_context_def_default");
-dfm_world_def world_symbol(void) __asm__("dfm_world_def_default");
-dfm_equilibrium_def equilibrium_symbol(void) __asm__("dfm_equilibrium_def_default");
-dfm_material_def material_symbol(void) __asm__("dfm_material_def_default");
-dfm_obstacle_def obstacle_symbol(void) __asm__("dfm_obstacle_def_default");
-dfm_rigid_def rigid_symbol(void) __asm__("dfm_rigid_def_default");
-dfm_body_def body_symbol(void) __asm__("dfm_body_def_default");
-dfm_switch switch_symbol(void) __asm__("dfm_switch_default");
-dfm_switch_rule rule_symbol(void) __asm__("dfm_switch_rule_default");
-dfm_query_shape shape_symbol(void) __asm__("dfm_query_shape_default");
-dfm_query_filter filter_symbol(void) __asm__("dfm_query_filter_default");
-dfm_vertex_layout layout_symbol(void) __asm__("dfm_vertex_layout_default");
-}
 
 namespace {
 
@@ -30,19 +15,19 @@ using Bytes = std::vector<unsigned char>;
 // Each def with the bytes that it had in 0.1.
 template <class F>
 void each_default(F f) {
-  f(dfm_attach_def_default(), dfm_attach_def_default_sized, attach_symbol, 96, "attach");
-  f(dfm_context_def_default(), dfm_context_def_default_sized, context_symbol, 72, "context");
-  f(dfm_world_def_default(), dfm_world_def_default_sized, world_symbol, 184, "world");
-  f(dfm_equilibrium_def_default(), dfm_equilibrium_def_default_sized, equilibrium_symbol, 48, "equilibrium");
-  f(dfm_material_def_default(), dfm_material_def_default_sized, material_symbol, 72, "material");
-  f(dfm_obstacle_def_default(), dfm_obstacle_def_default_sized, obstacle_symbol, 248, "obstacle");
-  f(dfm_rigid_def_default(), dfm_rigid_def_default_sized, rigid_symbol, 224, "rigid");
-  f(dfm_body_def_default(), dfm_body_def_default_sized, body_symbol, 256, "body");
-  f(dfm_switch_default(), dfm_switch_default_sized, switch_symbol, 48, "switch");
-  f(dfm_switch_rule_default(), dfm_switch_rule_default_sized, rule_symbol, 160, "switch rule");
-  f(dfm_query_shape_default(), dfm_query_shape_default_sized, shape_symbol, 120, "query shape");
-  f(dfm_query_filter_default(), dfm_query_filter_default_sized, filter_symbol, 32, "query filter");
-  f(dfm_vertex_layout_default(), dfm_vertex_layout_default_sized, layout_symbol, 56, "vertex layout");
+  f(dfm_attach_def_default(), dfm_attach_def_default_sized, 96, "dfm_attach_def_default");
+  f(dfm_context_def_default(), dfm_context_def_default_sized, 72, "dfm_context_def_default");
+  f(dfm_world_def_default(), dfm_world_def_default_sized, 184, "dfm_world_def_default");
+  f(dfm_equilibrium_def_default(), dfm_equilibrium_def_default_sized, 48, "dfm_equilibrium_def_default");
+  f(dfm_material_def_default(), dfm_material_def_default_sized, 72, "dfm_material_def_default");
+  f(dfm_obstacle_def_default(), dfm_obstacle_def_default_sized, 248, "dfm_obstacle_def_default");
+  f(dfm_rigid_def_default(), dfm_rigid_def_default_sized, 224, "dfm_rigid_def_default");
+  f(dfm_body_def_default(), dfm_body_def_default_sized, 256, "dfm_body_def_default");
+  f(dfm_switch_default(), dfm_switch_default_sized, 48, "dfm_switch_default");
+  f(dfm_switch_rule_default(), dfm_switch_rule_default_sized, 160, "dfm_switch_rule_default");
+  f(dfm_query_shape_default(), dfm_query_shape_default_sized, 120, "dfm_query_shape_default");
+  f(dfm_query_filter_default(), dfm_query_filter_default_sized, 32, "dfm_query_filter_default");
+  f(dfm_vertex_layout_default(), dfm_vertex_layout_default_sized, 56, "dfm_vertex_layout_default");
 }
 
 template <class T>
@@ -69,7 +54,7 @@ struct Aged {
 
 TEST(DefSizes, DefaultsOfAnOlderOrANewerHeader_FillItsStructAndNothingBehind) {
   each_default(
-      [](const auto &defaults, auto sized, auto, uint32_t first, const char *name) {
+      [](const auto &defaults, auto sized, uint32_t first, const char *name) {
         SCOPED_TRACE(name);
         using T = std::remove_cvref_t<decltype(defaults)>;
         const uint32_t known = sizeof(T);
@@ -92,9 +77,13 @@ TEST(DefSizes, DefaultsOfAnOlderOrANewerHeader_FillItsStructAndNothingBehind) {
 }
 
 TEST(DefSizes, DefaultsBySymbolAlone_AreThoseOfTheFirstVersion) {
-  each_default([](const auto &defaults, auto, auto symbol, uint32_t first, const char *name) {
+  each_default([](const auto &defaults, auto, uint32_t first, const char *name) {
     SCOPED_TRACE(name);
-    const auto found = symbol();
+    // the symbol, past the inline function of the header
+    using T = std::remove_cvref_t<decltype(defaults)>;
+    const auto symbol = reinterpret_cast<T (*)()>(dlsym(RTLD_DEFAULT, name));
+    ASSERT_NE(symbol, nullptr);
+    const T found = symbol();
     EXPECT_EQ(found.size, first);
     const Bytes mine = bytes_of(found), all = bytes_of(defaults);  // but for the sizes
     EXPECT_TRUE(
