@@ -306,6 +306,7 @@ static const Row rows[] = {
     M(dfm_rigid_def, reserved),
     M(dfm_rigid_def, material),
     M(dfm_rigid_def, user),
+    M(dfm_rigid_def, cookie),
     S(dfm_joint_def),
     M(dfm_joint_def, size),
     M(dfm_joint_def, type),
