@@ -1,11 +1,10 @@
 #!/usr/bin/env python3
 """The Conan recipe, followed as somebody does who has no remote: conan create, with the headers of the
-system, shared; then test_package against what came out. Exit 77 where there is no conan (pip install conan).
-The objects are those of BUILD_DIR (ready.py), but for the one that the place of the package goes into.
+system, shared; then test_package against what came out. The objects are those of BUILD_DIR (ready.py), but for
+the one that the place of the package goes into.
 
-conan.py BUILD_DIR SOURCE_DIR SCRATCH_DIR
+conan.py BUILD_DIR SOURCE_DIR SCRATCH_DIR CONAN
 """
-import os
 import pathlib
 import re
 import shutil
@@ -16,11 +15,7 @@ from installed_tree import clean_environment, run, without_spaces
 
 
 def main():
-    build, source, scratch = sys.argv[1:]
-    conan = os.environ.get("CONAN") or shutil.which("conan")
-    if not conan:
-        print("no conan on this machine: the recipe is not tried")
-        sys.exit(77)
+    build, source, scratch, conan = sys.argv[1:]
     scratch = without_spaces(scratch)
     shutil.rmtree(scratch, ignore_errors=True)
     env = {**clean_environment(), **ready.prepare(scratch / "ready", source, build),

@@ -254,13 +254,10 @@ double bias_velocity(double distance, double offset, double h, double planned, d
   return std::min(slow, near) / planned;
 }
 
-}  // namespace
-
-// (W + soft)^-1 of the components in which anything moves. A held point has a row of zeros; less than that
-// share of the largest is its rounding.
-namespace {
+// Of the largest entry: less is the rounding of a held point, which has a row of zeros.
 constexpr double kMoves = 1e-12;
 
+// (W + soft)^-1 of the components in which anything moves.
 void invert(const Vec3 (&w)[3], Vec3 (&out)[3]) {
   double a[3][6] = {};
   const double least = kMoves * std::max({w[0].x, w[1].y, w[2].z});
@@ -286,6 +283,7 @@ void invert(const Vec3 (&w)[3], Vec3 (&out)[3]) {
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) out[i][j] = free[i] && free[j] ? a[i][3 + j] : 0;
 }
+
 }  // namespace
 
 void ContactRows::finish_bonds(std::span<const Bond> bonds) {

@@ -201,6 +201,12 @@ void sweep_until_good(World &w, StepContext &step, Acceleration &acceleration, c
 
 }  // namespace
 
+void give_impulses(StepContext &step) {
+  const ContactRows &rows = step.rows;
+  distribute(step.contacts, rows.frame.data(), rows.impulse.data(), step.sinks, step.bonds,
+             rows.impulse.data() + size_t{3} * rows.n);
+}
+
 // Contacts as rows, with what they kept from the last sub-step: its impulses, not applied yet.
 void make_rows(World &w, StepContext &step) {
   const uint32_t n = static_cast<uint32_t>(step.contacts.size());
@@ -294,7 +300,7 @@ enum class Revised { nothing, something, diverged, failed };
 // answer then is put in the place of what they answered before; impulses stay.
 Revised revise_bodies(World &w, StepContext &step, bool last = false) {
   if (!step.bodies_revise) return Revised::nothing;
-  row::distribute(w, step, nullptr);
+  give_impulses(step);
   bool velocities = false, responses = false;
   for (const ContactRows::Block &block : step.rows.blocks) {
     if (block.group != kNone) continue;

@@ -78,6 +78,8 @@ void stage_sleep(World &w, StepContext &step);  // sleep.cpp
 
 SubStep sub_step_of(const World &w, const StepContext &step);
 void begin_bodies(World &w, StepContext &step);  // before a sub-step and its repetitions
+// What contacts and bonds give to the points of bodies, by the impulses that the rows have now.
+void give_impulses(StepContext &step);
 // Where all active bodies end with the impulses that have been distributed, beside their present states.
 bool find_ends(World &w, StepContext &step, uint32_t *trouble);
 void keep_rigids(World &w, StepContext &step);  // once the sub-step is known to succeed

@@ -104,9 +104,7 @@ bool self(World &w, StepContext &step, uint32_t *) {
 }
 bool distribute(World &, StepContext &step, uint32_t *) {
   step.ended = false;
-  const ContactRows &rows = step.rows;
-  dfm::distribute(step.contacts, rows.frame.data(), rows.impulse.data(), step.sinks, step.bonds,
-                  rows.impulse.data() + size_t{3} * rows.n);
+  give_impulses(step);
   return true;
 }
 bool sleep(World &w, StepContext &step, uint32_t *) {
