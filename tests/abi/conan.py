@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The Conan recipe, followed as somebody does who has no remote: conan create, with the headers of the
-system, shared; then test_package against what came out. The objects are those of BUILD_DIR (ready.py), but for
-the one that the place of the package goes into.
+system, shared; then test_package against what came out. The objects are those of BUILD_DIR (ready.py), but
+for the one that the place of the package goes into.
 
 conan.py BUILD_DIR SOURCE_DIR SCRATCH_DIR CONAN
 """
