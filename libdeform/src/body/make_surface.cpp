@@ -2,6 +2,7 @@
 #include "body/make_surface.h"
 
 #include <algorithm>
+#include <cstring>
 
 #include "math/vec3.h"
 
@@ -193,15 +194,13 @@ void gather_rows(Surface &surface, const double *x, const double *v, uint32_t be
 
 void gather_surface(Surface &surface, const double *x, const double *v) {
   if (!surface.identity()) return gather_rows(surface, x, v, 0, surface.nsurfel);
-  double *__restrict xs = surface.x.data();
-  double *__restrict vs = surface.v.data();
-  const uint32_t *point = surface.point.data();
+  // whole points: the fourth double is zero on both sides
+  constexpr size_t kPoint = 4 * sizeof(double);
+  const uint32_t *const point = surface.point.data();
   for (uint32_t s = 0; s < surface.nsurfel; ++s) {
-    const double *xp = x + size_t{4} * point[s];
-    for (int k = 0; k < 3; ++k) xs[4 * s + k] = xp[k];
-    if (!v) continue;
-    const double *vp = v + size_t{4} * point[s];
-    for (int k = 0; k < 3; ++k) vs[4 * s + k] = vp[k];
+    const size_t to = size_t{4} * s, from = size_t{4} * point[s];
+    std::memcpy(&surface.x[to], x + from, kPoint);
+    if (v) std::memcpy(&surface.v[to], v + from, kPoint);
   }
 }
 

@@ -5,15 +5,10 @@
 #include <cmath>
 #include <cstdint>
 
+#include "contact/contact_kernel.h"
 #include "core/memory.h"
 
 namespace dfm {
-
-// The part of a law's dft/dvt that dissipates: its symmetric part without the positive eigenvalue. [a b; b
-// c], N s/m, negative semidefinite.
-struct Slope { double a, b, c; };
-// How a law is solved: by its slopes, by projection on the disc of radius limit, or not at all: no force.
-enum LawForm : uint8_t { kSmoothLaw, kSetValuedLaw, kNoFriction };
 
 struct ContactState {
   uint32_t n = 0, stride = 0, nstate = 0;
@@ -36,12 +31,7 @@ struct ContactState {
   Array<double> bristle_out;  // [nstate,stride]
   Array<uint8_t> mode;        // 0 open, 1 stick, 2 slip
   Array<uint8_t> form;        // LawForm
-  // [n] of smooth laws, by linearize(): slope D, and 1 - h w_t D as [m11 m12; m12 m22] with its determinant
-  struct Linear {
-    Slope slope;
-    double m11, m12, m22, det;
-  };
-  Array<Linear> linear;
+  Array<LinearLaw> linear;    // [n] of smooth laws, by linearize()
 
   void resize(uint32_t count, uint32_t states) {
     n = count;
@@ -57,6 +47,11 @@ struct ContactState {
     form.resize(stride);
     linear.resize(n);
     clear_padding();
+  }
+
+  LawView view() const {
+    return {stride,         fn.data(),    vt.data(),   ft.data(),   dft_dvt.data(),
+            dft_dfn.data(), limit.data(), mode.data(), form.data(), linear.data()};
   }
 
   // Laws may be asked in these columns, and touch the places beyond n: as where nothing is in contact.

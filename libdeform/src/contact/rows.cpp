@@ -7,10 +7,12 @@
 
 namespace dfm {
 
-ContactRows::ContactRows(const Memory &m) : kernels_(dense_kernels()) {
-  use_memory(m, begin, dof, weight, y, y_free, alone, source, point, block, blocks, response_, given_, frame,
-             drive, rate, wn, wt, cross, impulse, bond, dof_of_point_, dof_of_node_, place_, rigid, arm,
-             dof_of_group_, columns_, left_, first_column_, column_count_, first_value_);
+ContactRows::ContactRows(const Memory &m)
+    : kernels_(dense_kernels()),
+      loops_(doubles_at_once() >= 4 ? contact_kernels_avx2() : contact_kernels_sse2()) {
+  use_memory(m, across_, begin, dof, weight, y, y_free, alone, source, point, block, blocks, response_,
+             given_, frame, drive, rate, wn, wt, cross, impulse, bond, dof_of_point_, dof_of_node_, place_,
+             rigid, arm, dof_of_group_, columns_, left_, first_column_, column_count_, first_value_);
 }
 
 // Of the dofs from `first` on.
@@ -341,6 +343,33 @@ void ContactRows::finish(std::span<const ContactPoint> contacts, const double *t
     wt[i] = 0.5 * (a + c) + std::sqrt(0.25 * (a - c) * (a - c) + b * b);
   }
   if (nbond) finish_bonds(bonds);
+  turn_frames();
+}
+
+void ContactRows::turn_frames() {
+  if (!alone_all()) return;
+  constexpr size_t kMore = 4;  // doubles that a whole vector at the last contact may see
+  frame.resize(size_t(all()) * 9 + kMore);
+  drive.resize(size_t(all()) * 3 + kMore);
+  across_.resize(size_t(n) * 9 + kMore);
+  for (size_t i = 0; i < size_t(9) * n; i += 9)
+    for (size_t row = 0; row < 3; ++row)
+      for (size_t k = 0; k < 3; ++k) across_[i + 3 * k + row] = frame[i + 3 * row + k];
+}
+
+RowsView ContactRows::view() const {
+  return {n,
+          begin.data(),
+          dof.data(),
+          weight.data(),
+          alone.data(),
+          frame.data(),
+          drive.data(),
+          across_.data(),
+          rate.data(),
+          wn.data(),
+          wt.data(),
+          cross.data()};
 }
 
 Vec3 ContactRows::velocity(uint32_t i) const {

@@ -15,6 +15,7 @@
 #include <span>
 
 #include "contact/bond.h"
+#include "contact/contact_kernel.h"
 #include "contact/contact_set.h"
 #include "geometry/surface.h"
 #include "math/dense_kernel.h"
@@ -68,7 +69,8 @@ struct ContactRows {
   Array<double> arm;  // [all,3] m, where there are any
   Array<Block> blocks;
 
-  Array<double> frame;   // [all,9] normal, tangent, normal x tangent; of a bond the world's axes
+  // [all,9] normal, tangent, normal x tangent; of a bond the world's axes. It and `drive` have a vector more.
+  Array<double> frame;
   Array<double> drive;   // [all,3] obstacle velocity in the frame
   Array<double> rate;    // [n] m/s: gap / h; a depth 0.2 gap / h, at least -0.1 d_c / h
   Array<double> wn, wt;  // [all] 1/kg: W_nn; largest eigenvalue of W_tt, of a bond the larger of W_yy, W_zz
@@ -110,6 +112,12 @@ struct ContactRows {
   // longer than h where the guard has cut it, or depths would turn into speed.
   void finish(std::span<const ContactPoint> contacts, const double *tangents, double h, double planned,
               double offset, std::span<const Bond> bonds = {});
+  void turn_frames();  // once `frame` and `drive` are known, for the kernels; finish() has done it
+
+  // All dofs answer their own impulses only: the contacts' loops run in the kernels.
+  bool alone_all() const { return blocks.empty() && rigid.empty(); }
+  const ContactKernels &kernels() const { return loops_; }
+  RowsView view() const;
 
   Vec3 velocity(uint32_t i) const;             // relative velocity of contact i in its frame (normal, t1, t2)
   void apply(uint32_t i, Vec3 impulse_frame);  // changes y by an impulse given in the frame
@@ -132,6 +140,8 @@ struct ContactRows {
   Array<uint32_t> place_;
   Array<uint32_t> dof_of_group_;  // first dof of a rigid group
   const DenseKernels &kernels_;
+  const ContactKernels &loops_;
+  Array<double> across_;  // [n,9] frames transposed, and a vector more
   // per block [3 count columns, 4 count], 1/kg: what an impulse at one dof changes of all, as y has them
   Array<double> response_;
   Array<double> given_;  // scratch

@@ -42,13 +42,10 @@ class Acceleration {
   double gram_[kWindow][kWindow] = {};
 };
 
-// How far a state is from a solution. Per contact, m/s: r_n = |min(w_n lambda_n, u_n + gap/h)|, r_t = w_t
-// |lambda_t - law|.
-// A contact is good where both stay within what they may be off by:
+// Of the residuals (contact_kernel.h): a contact is good where both stay within what they may be off by:
 //   r_n <= normal[i]                      0.01 (d_c - d_g) / h: the gap is then off by less than a hundredth
 //                                         of its margin; less where laws remember
 //   r_t <= max(tangent[i], 1e-3 |slip|)   1e-6 m/s at rest, which bounds the creep of what sticks
-// `relative` is the worst contact's residual over its tolerance: at most 1 is converged
 // (doc/decisions/0004-contact-tolerance.md).
 struct Tolerance {
   double most_normal = 0;
@@ -56,9 +53,6 @@ struct Tolerance {
   Array<double> normal, tangent;
 };
 struct ToleranceBounds { double tangent, normal, most_normal; };  // m/s: at rest, at rest, ever
-// `due` is the same with most_normal for normal[i]: what must be reached, where the rest may be left to the
-// next sub-step's warm start. `normal` is the worst r_n alone, m/s.
-struct Residual { double relative = 0, due = 0, speed = 0, normal = 0; };
 // of the linearized laws
 Residual inner_residual(const ContactRows &rows, const ContactState &law, double h,
                         const Tolerance &tolerance);

@@ -11,6 +11,7 @@ ExplicitPoints::ExplicitPoints(const Memory &memory, Phyxels &points, Surface &s
                                const Array<uint32_t> &edges)
     : Dynamics(points, surface, model),
       edges_(edges),
+      loops_(points_kernels()),
       stiffness_(points.n, 0.0, HookAllocator<double>(memory)),
       damping_(points.n, 0.0, HookAllocator<double>(memory)) {}
 
@@ -55,7 +56,7 @@ bool ExplicitPoints::add_forces(const SubStep &now) {
 }
 
 bool ExplicitPoints::free_motion(const SubStep &now, double &kinetic) {
-  kinetic = predict(p_, now.gravity, now.h);
+  kinetic = predict(loops_, p_, now.gravity, now.h);
   // A lightest point at the limit has so much alone; who has less need not be looked at point by point.
   if (kinetic < 0.5 * p_.least_mass * (now.fastest * now.fastest)) return true;
   if (!std::isfinite(kinetic)) return false;
@@ -64,7 +65,7 @@ bool ExplicitPoints::free_motion(const SubStep &now, double &kinetic) {
 }
 
 bool ExplicitPoints::end_state(const SubStep &now, const double *, bool touched) {
-  find_end(p_, touched, now.h);
+  find_end(loops_, p_, touched, now.h);
   return true;
 }
 

@@ -1,6 +1,7 @@
 // Points that the library moves by symplectic Euler, each by its own mass, under the forces of a model.
 #pragma once
 #include "dynamics/dynamics.h"
+#include "dynamics/points_kernel.h"
 
 namespace dfm {
 
@@ -23,6 +24,7 @@ class ExplicitPoints : public Dynamics {
 
  private:
   const Array<uint32_t> &edges_;
+  const PointsKernels &loops_;
   Array<double> stiffness_, damping_;  // [npoint] row sums: N/m, N s/m
 
   double strain_rate() const;

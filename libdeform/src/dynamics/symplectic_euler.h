@@ -3,14 +3,16 @@
 // doc/concepts/step.md.)
 #pragma once
 #include "body/phyxels.h"
+#include "dynamics/points_kernel.h"
 
 namespace dfm {
 
+const PointsKernels &points_kernels();  // the widest of this processor
 // v_free for free components; held components keep the velocity they carry. Returns its kinetic energy, J,
 // which is not finite where a component is not.
-double predict(Phyxels &p, Vec3 gravity, double h);
+double predict(const PointsKernels &loops, Phyxels &p, Vec3 gravity, double h);
 // v_end = v_free + M^-1 impulse (impulse may be absent: `touched` false), x_end = x + h v_end.
-void find_end(Phyxels &p, bool touched, double h);
+void find_end(const PointsKernels &loops, Phyxels &p, bool touched, double h);
 // x_end for a shorter way: h times the mean velocity [n,4].
 void shorten(Phyxels &p, const double *mean, double h);
 

@@ -5,8 +5,6 @@
 
 namespace dfm {
 
-namespace {
-
 int doubles_at_once() {
   const bool avx2 = __builtin_cpu_supports("avx2");
   const bool avx512 = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
@@ -16,8 +14,6 @@ int doubles_at_once() {
   if (asked && std::strcmp(asked, "avx2") == 0 && avx2) return 4;
   return avx512 ? 8 : avx2 ? 4 : 2;
 }
-
-}  // namespace
 
 const DenseKernels &dense_kernels() {
   const int width = doubles_at_once();

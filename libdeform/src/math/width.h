@@ -6,6 +6,7 @@
 namespace dfm {
 
 // The widest that this processor has, or what DEFORM_SIMD (sse2, avx2, avx512) asks for where it has that.
+int doubles_at_once();
 const DenseKernels &dense_kernels();
 const BlockKernels &block_kernels();
 

@@ -53,6 +53,7 @@ struct Groove {
       law.dft_dfn[law.stride + i] = 0;
     }
     linearize(rows, 1e-3, law);
+    rows.turn_frames();
   }
   double friction(uint32_t i) const { return std::hypot(rows.impulse[3 * i + 1], rows.impulse[3 * i + 2]); }
 };

@@ -1,0 +1,14 @@
+// Two doubles in one register.
+#include <stdint.h>
+
+namespace dfm {
+namespace {
+constexpr uint32_t kWidth = 2;
+}
+}  // namespace dfm
+
+#include "points_kernel_lanes.h"
+
+namespace dfm {
+const PointsKernels &points_kernels_sse2() { return kKernels; }
+}  // namespace dfm
