@@ -215,3 +215,43 @@ TEST(TrBdf2, CubeThatLands_MovesByBackwardEulerAndGainsNoEnergy) {
       EXPECT_GT(test::measure(one.cube).momentum[2], -1e-6) << what;
     }
 }
+
+// A body whose integrator nobody names must swing: by backward Euler this bar hangs still after one period.
+// Undamped, so what is lost is the scheme's own; 19 steps are a period.
+TEST(TrBdf2, BarLeftToAuto_StillSwingsAfterFivePeriods) {
+  for (const char *model : {"msm", "linear_fem", "corotational_fem"}) {
+    test::Context context;
+    dfm_world_def d = dfm_world_def_default();
+    d.gravity[2] = -9.81;
+    d.step = kFrame;
+    dfm_world w = 0;
+    test::ok(dfm_world_create(context, &d, &w));
+    test::BodyOptions o;
+    o.model = model;
+    o.young = 2e7;
+    const dfm_body bar = test::make_body(context, w, "beam", {0.4, 0.02, 0.02}, 200, o);
+    const State start = state_of(bar);
+    std::vector<uint32_t> held;
+    uint32_t tip = 0;
+    for (uint32_t i = 0; i < start.x.size() / 3; ++i) {
+      if (start.x[3 * size_t{i}] < 1e-9) held.push_back(i);
+      if (start.x[3 * size_t{i}] > start.x[3 * size_t{tip}]) tip = i;
+    }
+    test::ok(dfm_body_hold(bar, uint32_t(held.size()), held.data(), 7));
+    std::vector<double> z;  // of the tip, after each step
+    for (int step = 0; step < 120; ++step) {
+      test::run(w, kFrame, kFrame);
+      z.push_back(state_of(bar).x[3 * size_t{tip} + 2]);
+    }
+    dfm_world_stats stats = {};
+    stats.size = sizeof stats;
+    test::ok(dfm_world_get_stats(w, &stats));
+    EXPECT_EQ(stats.substeps, 120u) << model << ": explicit time would take more";
+    const auto swing = [&](size_t from, size_t to) {
+      const auto [low, high] = std::minmax_element(z.begin() + long(from), z.begin() + long(to));
+      return *high - *low;
+    };
+    EXPECT_GT(swing(0, 24), 0.02) << model;
+    EXPECT_GT(swing(96, 120), 0.8 * swing(0, 24)) << model;
+  }
+}

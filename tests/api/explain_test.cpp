@@ -124,7 +124,7 @@ TEST(Explain, IntegratorAuto_IsImplicitWhereExplicitTimeCostsFourTimesAsMuch) {
   const std::string path = stiff_and_soft("auto", "corotational_fem", "2e4");
   for (const char *step : {"/time/step=0.016667", "/time/step=auto"}) {
     const Moves long_step = moves(path, {step});
-    EXPECT_EQ(long_step.bone.find("implicit_euler  auto"), 0u) << long_step.bone;
+    EXPECT_EQ(long_step.bone.find("tr_bdf2  auto"), 0u) << long_step.bone;
     EXPECT_EQ(long_step.gel.find("symplectic_euler  auto"), 0u) << long_step.gel;
     for (const char *part : {"(explicit: ", " sub-steps of ", " s in a step, bounded by point "})
       EXPECT_NE(long_step.bone.find(part), std::string::npos) << long_step.bone;
@@ -150,8 +150,8 @@ TEST(Explain, IntegratorNamed_Stays) {
 TEST(Explain, IntegratorAuto_IsOneChoiceForAllBodies) {
   const std::string path = stiff_and_soft("neighbors", "corotational_fem", "2e7");
   const Moves both = moves(path, {"/time/step=0.016667"});
-  EXPECT_EQ(both.bone.find("implicit_euler"), 0u) << both.bone;
-  EXPECT_EQ(both.gel.find("implicit_euler"), 0u) << both.gel;
+  EXPECT_EQ(both.bone.find("tr_bdf2"), 0u) << both.bone;
+  EXPECT_EQ(both.gel.find("tr_bdf2"), 0u) << both.gel;
   const Moves alone = moves(path, {"/time/step=0.016667", "/bodies/0/material=soft"});
   EXPECT_EQ(alone.gel.find("symplectic_euler"), 0u) << "alone it is cheap enough: " << alone.gel;
 }

@@ -14,7 +14,8 @@ extern "C" {
  * cannot do is refused with DFM_E_UNSUPPORTED where it is made. Since 0.1. */
 enum { DFM_METHOD_AUTO = 0, DFM_METHOD_VELOCITY = 1, DFM_METHOD_IMPLICIT = 2, DFM_METHOD_ROLLBACK = 3 };
 /* AUTO is SYMPLECTIC_EULER, or IMPLICIT_EULER where the method is IMPLICIT; with dfm_world_def.step it is
- * what costs less, chosen for each body before the first step that it takes. IMPLICIT_EULER and TR_BDF2 need
+ * SYMPLECTIC_EULER or TR_BDF2 (IMPLICIT_EULER where one Newton iteration is asked for), whichever costs less,
+ * chosen for each body before the first step that it takes. IMPLICIT_EULER and TR_BDF2 need
  * models that give their stiffness, and are stable at every step (doc/concepts/implicit.md). TR_BDF2 is of
  * second order and damps little; where a body touches, it moves by IMPLICIT_EULER. */
 enum {

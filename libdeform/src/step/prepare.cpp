@@ -281,6 +281,14 @@ IntegratorOption option_of(const World &w, const Body &b) {
   return o;
 }
 
+// Second order where the equations are solved: backward Euler takes the swing out of a body within a period
+// at the steps that implicit time is for (doc/decisions/0395-auto-is-of-second-order.md).
+ImplicitOptions implicit_choice(const World &w, const Body &b) {
+  ImplicitOptions out = w.implicit;
+  out.second_order = out.newton != 1 || b.model.can(DFM_CAP_CONSTANT_STIFFNESS);
+  return out;
+}
+
 // Of bodies that have come since the last step and leave it to the library. Before the first step it is one
 // choice for all of them, in whatever order they came and whatever was asked in between.
 void choose_integrators(World &w) {
@@ -293,18 +301,21 @@ void choose_integrators(World &w) {
   for (size_t i = 0; i < options.size(); ++i) {
     Body &b = *w.bodies[i];
     if (!b.integrator.open) continue;
-    const bool was = b.integrator.used == DFM_INTEGRATOR_IMPLICIT_EULER;
+    const bool was = b.integrator.used != DFM_INTEGRATOR_SYMPLECTIC_EULER;
     if (options[i].implicit != was) {
+      const ImplicitOptions chosen = implicit_choice(w, b);
       b.dynamics = make_dynamics(w.meters.dynamics.memory(), b.p, b.surface, b.model, b.edges,
-                                 options[i].implicit ? &w.implicit : nullptr);
-      b.integrator.used =
-          options[i].implicit ? DFM_INTEGRATOR_IMPLICIT_EULER : DFM_INTEGRATOR_SYMPLECTIC_EULER;
-    }
-    if (options[i].implicit && !was) {
-      w.context->logf(DFM_LOG_WARNING,
-                      "body '%s' moves by implicit_euler, which damps motion, for explicit time would take "
-                      "%.0f sub-steps of %.3g s in a step; an integrator that is named stays",
-                      b.name.c_str(), std::ceil(options[i].substeps), b.integrator.step);
+                                 options[i].implicit ? &chosen : nullptr);
+      b.integrator.used = !options[i].implicit  ? DFM_INTEGRATOR_SYMPLECTIC_EULER
+                          : chosen.second_order ? DFM_INTEGRATOR_TR_BDF2
+                                                : DFM_INTEGRATOR_IMPLICIT_EULER;
+      if (options[i].implicit)
+        w.context->logf(DFM_LOG_WARNING,
+                        "body '%s' moves by %s, which damps %s, for explicit time would take %.0f sub-steps "
+                        "of %.3g s in a step; an integrator that is named stays",
+                        b.name.c_str(), chosen.second_order ? "tr_bdf2" : "implicit_euler",
+                        chosen.second_order ? "what touches and what the step does not resolve" : "motion",
+                        std::ceil(options[i].substeps), b.integrator.step);
     }
     b.integrator.open = false;
     b.integrator.chosen = true;
