@@ -41,17 +41,12 @@ void single_pass(void *user, uint32_t begin, uint32_t end) {
 void merge_pass(void *user, uint32_t begin, uint32_t end) {
   const Call &call = *static_cast<const Call *>(user);
   Body &body = *call.body;
-  const auto drag = [&](uint32_t i) {
-    return body.point_drag.empty() ? body.params[kDampingMass] : body.point_drag[i];
-  };
+  const double *const drags = body.point_drag.empty() ? nullptr : body.point_drag.data();
   for (uint32_t n = begin; n < end; ++n) {
     const Block &b = body.block[n];
     body.merge_block(*body.kernels, n);
-    for (uint32_t i = 0; body.drag_on && i < b.owned; ++i) {
-      const double c = drag(b.point[i]) * body.mass[b.point[i]];
-      const double *v = call.k->v + size_t(call.k->stride) * b.point[i];
-      for (int a = 0; a < 3; ++a) b.f[4 * size_t(i) + a] -= c * v[a];
-    }
+    if (body.drag_on)
+      body.kernels->drag(b, body.mass.data(), drags, body.params[kDampingMass], call.k->v, call.k->stride);
     body.kernels->store(b, call.f, call.k->stride);
   }
 }

@@ -62,16 +62,18 @@ double Body::spring_energy(uint32_t e, const dfm_kin &k, const Branch &branch) c
 
 double Body::energy(const dfm_kin &k) const {
   double springs = 0, volumes = 0;
+  uint32_t first = 0;  // spring that the kernel leaves
+  if (form() != kTurned && !has_branch() && edge_off.empty()) {
+    first = nedge & ~3u;
+    const double *const rests = edge_tilt.empty() ? edge_length.data() : edge_rest.data();
+    const double *const tilts = edge_tilt.empty() ? nullptr : edge_tilt.data();
+    springs = kernels->spring_energies({first, edges.data(), scale, shape.data(), rests, tilts}, k.x,
+                                       k.stride, springs);
+  }
   const Branch branch = branch_at(k);
-  for (uint32_t e = 0; e < nedge; ++e) springs += spring_energy(e, k, branch);
-  if (cells_on)
-    for (size_t c = 0, n = cell_slots(); c < n; ++c) {
-      if (cell_id[c] == kNone) continue;
-      const uint32_t *q = cells.data() + 4 * size_t(cell_id[c]);
-      const double *x[4];
-      for (int a = 0; a < 4; ++a) x[a] = k.x + size_t(k.stride) * q[a];
-      volumes += cell_energy_of(x, bulk[c], collapse[c], volume6[c], limit[c]);
-    }
+  for (uint32_t e = first; e < nedge; ++e) springs += spring_energy(e, k, branch);
+  for (uint32_t n = 0; cells_on && n < nblock; ++n)
+    volumes = kernels->cell_energies(block[n], k.x, k.stride, volumes);
   return springs + volumes;
 }
 

@@ -86,6 +86,14 @@ struct SingleKernels {
   void (*cells)(const SingleBlock &b, float unit);
 };
 
+// Plain or tilted springs in the host's order, without branches.
+struct SpringList {
+  uint32_t n;                         // a multiple of 4
+  const uint32_t *edges;              // [n,2]
+  double scale;                       // of shape
+  const double *shape, *rest, *tilt;  // [n] N/m over scale, m, m^2 or NULL
+};
+
 struct Kernels {
   const char *name;
   const SingleKernels *single;
@@ -102,6 +110,11 @@ struct Kernels {
   void (*merge)(double *f, const model::Merge *merge, uint32_t n);
   void (*merge_rows)(double *row, const model::Merge *merge, uint32_t n);
   void (*store)(const model::BlockPoints &b, double *f, uint32_t stride);
+  // return `sum` and the energies beyond it, J
+  double (*spring_energies)(const SpringList &s, const double *x, uint32_t stride, double sum);
+  double (*cell_energies)(const Block &b, const double *x, uint32_t stride, double sum);
+  void (*drag)(const model::BlockPoints &b, const double *mass, const double *by_point, double all,
+               const double *v, uint32_t stride);
 };
 
 // The share of its rest volume below which a cell resists collapse, and that below which the step bound

@@ -4,6 +4,7 @@
 #include "../model_common/lanes_avx.h"
 
 #define DEFORM_LANES 8  // registers of 16 take longer: the sums per point, in double, have half their ports
+#include "msm_kernel_energy.h"
 #include "msm_kernel_single.h"
 
 namespace msm {
@@ -236,9 +237,9 @@ static void volume_cells8(const Block &b) {
   }
 }
 
-constexpr Kernels kKernels = {"avx512",     &single::kKernels, load_block, {MSM_SPRINGS(springs8)},
-                              MSM_BRANCHES, volume_cells8,     MSM_ROWS,   merge_halo,
-                              merge_rows,   add_to_host};
+constexpr Kernels kKernels = {"avx512",     &single::kKernels, load_block,  {MSM_SPRINGS(springs8)},
+                              MSM_BRANCHES, volume_cells8,     MSM_ROWS,    merge_halo,
+                              merge_rows,   add_to_host,       MSM_ENERGIES};
 
 }  // namespace
 
