@@ -4,13 +4,16 @@ state hash per scene.
 
 same_bits.py BUILD_DIR...    each holds bin/deform
 """
+import concurrent.futures
 import json
+import os
 import pathlib
 import subprocess
 import sys
 import tempfile
 
-# few, since -O0 runs them too; scenes start near enough for contacts to come, stick and slide by then
+# few, since a build with sanitizers runs them too; scenes start near enough for contacts to come, stick and
+# slide by then
 STEPS = 200
 
 
@@ -35,13 +38,17 @@ def meshes_present(scene):
 
 def main():
     differ, touched = False, False
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder, \
+            concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
+        started = {}
         for scene in sorted(pathlib.Path("examples/scenes").glob("*.json")):
             if not meshes_present(scene):
                 print(f"{scene.stem:24} left out: its meshes are not here")
                 continue
-            runs = {(build, threads): state_hash(build, scene, folder, threads) for build in sys.argv[1:]
-                    for threads in (1, 2)}
+            started[scene] = {(build, threads): pool.submit(state_hash, build, scene, folder, threads)
+                              for build in sys.argv[1:] for threads in (1, 2)}
+        for scene, runs in started.items():
+            runs = {key: run.result() for key, run in runs.items()}
             for (build, threads), (value, contacts) in runs.items():
                 print(f"{scene.stem:24} {build:16} threads {threads}  {value}  contacts {contacts}")
                 touched |= contacts > 0
