@@ -1,4 +1,4 @@
-// deform mesh info FILE | make SHAPE --out FILE | convert IN OUT | fill SURFACE
+// deform mesh info FILE | make SHAPE --out FILE | convert IN OUT | fill SURFACE | from-labels VOLUME | phantom KIND
 #include "cmd_mesh.h"
 
 #include <CLI/CLI.hpp>
@@ -237,6 +237,7 @@ void add_mesh(CLI::App &app, Globals &globals, int *exit_code) {
   convert_command->callback([=, &globals] { *exit_code = convert(globals, *first, *second); });
 
   add_mesh_fill(mesh, globals, exit_code);
+  add_mesh_labels(mesh, globals, exit_code);
 }
 
 }  // namespace cli

@@ -42,5 +42,6 @@ std::string mesh_ending(const std::string &path);  // lower case, without the do
 bool import_surface(const std::string &path, MeshSession &session, std::string &sentence);
 
 void add_mesh_fill(CLI::App *mesh, Globals &globals, int *exit_code);
+void add_mesh_labels(CLI::App *mesh, Globals &globals, int *exit_code);
 
 }  // namespace cli

@@ -1,6 +1,7 @@
 // Triangle pairs that cross, by exact predicates: the judge of "nothing passes through". It shares no code
 // with the library's detection, and sees positions only as the public API reports them.
 #pragma once
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -44,7 +45,9 @@ class Counter {
  public:
   // Pairs within and between surfaces; pairs of one surface that share a vertex (by number or by position)
   // are excepted. Coordinates must be finite, and below 1e90 for the exact signs not to overflow.
-  Found count(const std::vector<Surface> &surfaces, Touching touching);
+  // joined: pairs of surfaces, ascending, that are attached to each other and may coincide; not counted
+  Found count(const std::vector<Surface> &surfaces, Touching touching,
+              const std::vector<std::array<uint32_t, 2>> &joined = {});
 
  private:
   struct Box { double lo[3], hi[3]; };
@@ -64,6 +67,7 @@ class Counter {
 
   const std::vector<Surface> *surfaces_ = nullptr;
   Touching touching_ = Touching::counts;
+  const std::vector<std::array<uint32_t, 2>> *joined_ = nullptr;
   std::vector<Item> items_;
   std::vector<Node> nodes_;
   Found found_;

@@ -74,6 +74,29 @@ Checker::Checker(const SceneFile &scene) : scene_(scene), positions_(scene.bodie
   placed_.resize(solids_.size());
 }
 
+// Pairs of surfaces that are attached and do not touch: their common border coincides.
+std::vector<std::array<uint32_t, 2>> Checker::joined() const {
+  std::vector<std::array<uint32_t, 2>> out;
+  std::vector<uint32_t> numbers;
+  for (uint32_t b = 0; b < positions_.size(); ++b) {
+    const dfm_body body = scene_.bodies()[b].handle;
+    uint32_t n = 0;
+    need(dfm_body_attachments(body, 0, nullptr, &n));
+    numbers.resize(n);
+    if (n > 0) need(dfm_body_attachments(body, n, numbers.data(), &n));
+    for (const uint32_t number : numbers) {
+      dfm_attachment a = {};
+      a.size = sizeof a;
+      need(dfm_body_get_attachment(body, number, &a));
+      if (a.flags & DFM_ATTACH_TOUCH) continue;
+      for (uint32_t other = 0; other < positions_.size(); ++other)
+        if (scene_.bodies()[other].handle == a.to) out.push_back({std::min(b, other), std::max(b, other)});
+    }
+  }
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
 void Checker::check(bool start_state) {
   ++checks_.states;
   checks_.inverted_last = 0;
@@ -118,8 +141,8 @@ void Checker::check(bool start_state) {
     surfaces_.push_back(
         {placed_[o].data(), obstacle.def.npoint, obstacle.def.triangles, obstacle.def.ntriangle, true});
   }
-  const crossing::Found found =
-      counter_.count(surfaces_, start_state ? crossing::Touching::allowed : crossing::Touching::counts);
+  const crossing::Found found = counter_.count(
+      surfaces_, start_state ? crossing::Touching::allowed : crossing::Touching::counts, joined());
   checks_.intersections_max = std::max(checks_.intersections_max, found.all());
   checks_.between_max = std::max(checks_.between_max, found.between);
   checks_.self_max = std::max(checks_.self_max, found.within);

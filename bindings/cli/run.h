@@ -2,6 +2,7 @@
 #pragma once
 #include <cstdint>
 #include <map>
+#include <array>
 #include <string>
 #include <vector>
 
@@ -91,6 +92,8 @@ class Checker {
   const Checks &result() const { return checks_; }
 
  private:
+  std::vector<std::array<uint32_t, 2>> joined() const;
+
   const SceneFile &scene_;
   // obstacles of triangles, and the cores of voxels
   std::vector<ObstacleView> solids_;

@@ -1,0 +1,193 @@
+// deform mesh from-labels VOLUME --out DIR | phantom KIND --out FILE
+#include <CLI/CLI.hpp>
+
+#include <cstdio>
+#include <memory>
+
+#include "cmd_mesh.h"
+#include "file.h"
+#include "json_text.h"
+#include "labels/label_scene.h"
+#include "labels/phantom.h"
+#include "messages.h"
+#include "progress.h"
+
+namespace cli {
+namespace {
+
+std::string whole(uint64_t n) { return std::to_string(n); }
+
+std::string size_json(const std::array<uint32_t, 3> &n) { return json_array({whole(n[0]), whole(n[1]), whole(n[2])}); }
+
+std::string report_json(const labels::Report &r, const std::string &out) {
+  std::vector<std::string> names, things, borders, warnings;
+  for (const labels::LabelReport &l : r.labels)
+    names.push_back(JsonObject()
+                        .add("label", std::to_string(l.value))
+                        .add("name", quoted(l.name))
+                        .add(l.obstacle ? "obstacle" : "body", quoted(l.thing))
+                        .add("voxels", whole(l.voxels))
+                        .add("changed", whole(l.changed))
+                        .add("voxel_volume", number(l.voxel_volume))
+                        .add("volume", number(l.volume))
+                        .add("triangles", whole(l.triangles))
+                        .add("cells", whole(l.cells))
+                        .add("cell_volume", number(l.cell_volume))
+                        .add("at_border", l.at_border ? "true" : "false")
+                        .text());
+  for (const labels::ThingReport &t : r.things)
+    things.push_back(JsonObject()
+                         .add("name", quoted(t.name))
+                         .add("kind", t.obstacle ? "\"obstacle\"" : "\"body\"")
+                         .add("points", whole(t.points))
+                         .add("triangles", whole(t.triangles))
+                         .add("cells", whole(t.cells))
+                         .text());
+  for (const labels::Border &b : r.borders)
+    borders.push_back(JsonObject()
+                          .add("between", json_array({quoted(b.a), quoted(b.b)}))
+                          .add("points", whole(b.points))
+                          .add("triangles", whole(b.triangles))
+                          .add("kind", b.held ? "\"held\"" : "\"attached\"")
+                          .add("stiffness", number(b.stiffness))
+                          .text());
+  for (const std::string &w : r.warnings) warnings.push_back(quoted(w));
+  return JsonObject()
+      .add("scene", quoted(out + "/scene.json"))
+      .add("voxels", size_json(r.size))
+      .add("joined", size_json(r.factor))
+      .add("labels", json_array(names))
+      .add("parts", json_array(things))
+      .add("borders", json_array(borders))
+      .add("open_edges", whole(r.open_edges))
+      .add("crossing_pairs", whole(r.crossing))
+      .add("vertices_put_back", whole(r.put_back))
+      .add("largest_volume_change", number(r.largest_change))
+      .add("warnings", json_array(warnings))
+      .text();
+}
+
+void print_table(const labels::Report &r, const labels::Options &o) {
+  std::printf("%s: %u x %u x %u voxels", shown(o.volume).c_str(), r.size[0], r.size[1], r.size[2]);
+  if (r.factor != std::array<uint32_t, 3>{1, 1, 1})
+    std::printf(", joined by %u x %u x %u", r.factor[0], r.factor[1], r.factor[2]);
+  std::printf("\n  %-16s %-16s %10s %13s %13s %9s %8s\n", "label", "part of", "voxels", "volume, ml", "surface, ml",
+              "triangles", "cells");
+  for (const labels::LabelReport &l : r.labels)
+    std::printf("  %-16s %-16s %10zu %13.3f %13.3f %9u %8s\n", shown(l.name).c_str(), shown(l.thing).c_str(),
+                l.voxels, 1e6 * l.voxel_volume, 1e6 * l.volume, l.triangles,
+                l.obstacle ? "rigid" : std::to_string(l.cells).c_str());
+  for (const labels::Border &b : r.borders)
+    std::printf("  %s is %s %s at %u points of their border\n", shown(b.a).c_str(),
+                b.held ? "held by" : "attached to", shown(b.b).c_str(), b.points);
+  std::printf("  closed: %s; pairs of triangles that cross: %zu; largest change of a volume: %.2g %%\n",
+              r.open_edges ? "no" : "yes", r.crossing, 100 * r.largest_change);
+  if (r.put_back) std::printf("  %zu vertices are smoothed less, so that no triangles cross\n", r.put_back);
+  std::printf("deform run %s\n", shown(o.out + "/scene.json").c_str());
+}
+
+int from_labels(const Globals &globals, const labels::Options &options) {
+  MeshSession s(globals);
+  if (!s.context) return fail(dfm_last_error());
+  labels::Report report;
+  {
+    const Patience patience(told(globals), "making surfaces and bodies of " + options.volume);
+    report = labels::make_scene(s.context, options);
+  }
+  write_whole(options.out + "/summary.json", indented(report_json(report, options.out)));
+  if (globals.json) {
+    std::fputs(indented(report_json(report, options.out)).c_str(), stdout);
+  } else {
+    if (!globals.quiet)
+      for (const std::string &w : report.warnings)
+        std::fprintf(stderr, "deform: warning: %s\n", shown(w).c_str());
+    if (!globals.quiet) print_table(report, options);
+  }
+  return report.open_edges || report.crossing ? kFound : kDone;
+}
+
+int phantom(const Globals &globals, const std::string &kind, double voxel, const std::string &out) {
+  const labels::Phantom made = labels::make_phantom(kind, 1e-3 * voxel);
+  write_whole(out, labels::nrrd_text(made.volume));
+  const labels::Volume &v = made.volume;
+  if (globals.json) {
+    std::vector<std::string> rows;
+    for (size_t l = 1; l < v.value.size(); ++l)
+      rows.push_back(JsonObject()
+                         .add("label", std::to_string(v.value[l]))
+                         .add("name", quoted(v.name.at(v.value[l])))
+                         .add("volume", number(made.exact[l]))
+                         .text());
+    std::fputs(indented(JsonObject().add("file", quoted(out)).add("labels", json_array(rows)).text()).c_str(),
+               stdout);
+  } else if (!globals.quiet) {
+    std::printf("%s: %u x %u x %u voxels of %g mm\n", shown(out).c_str(), v.size[0], v.size[1], v.size[2], voxel);
+    for (size_t l = 1; l < v.value.size(); ++l)
+      std::printf("  %lld  %-14s %10.3f ml\n", static_cast<long long>(v.value[l]),
+                  v.name.at(v.value[l]).c_str(), 1e6 * made.exact[l]);
+  }
+  return kDone;
+}
+
+struct Given {
+  labels::Options options;
+  std::string unit, spacing = "auto", kind, out;
+  double voxel = 4;
+};
+
+}  // namespace
+
+void add_mesh_labels(CLI::App *mesh, Globals &globals, int *exit_code) {
+  const auto given = std::make_shared<Given>();
+  CLI::App *command = mesh->add_subcommand(
+      "from-labels", "a segmented scan (a volume of labels) as closed surfaces, bodies, obstacles and a scene");
+  command->add_option("VOLUME", given->options.volume, ".nrrd, .nhdr, .mha or .mhd with one whole number per voxel")
+      ->required();
+  command->add_option("--out", given->options.out, "folder to write into: scene.json, labels.json, meshes")
+      ->required()
+      ->type_name("DIR");
+  command->add_option("--table", given->options.table,
+                      "JSON file that says what becomes of each label; without it one is written")
+      ->type_name("FILE");
+  command->add_option("--spacing", given->spacing,
+                      "mm: voxels are joined up to about this length; 0: never; auto: 96 voxels along the longest edge")
+      ->capture_default_str()
+      ->type_name("MM");
+  command->add_option("--cells", given->options.cells, "about how many tetrahedra, of all bodies together")
+      ->capture_default_str()
+      ->type_name("N");
+  command->add_option("--smooth", given->options.passes, "passes of smoothing; 0: corners of voxels")
+      ->capture_default_str()
+      ->type_name("N");
+  command->add_option("--unit", given->unit, "of the lengths in the file, whatever it says: um, mm, cm, m or inch")
+      ->type_name("UNIT");
+  command->callback([=, &globals] {
+    labels::Options &o = given->options;
+    if (!given->unit.empty() && (o.unit = labels::unit_of(given->unit)) == 0) {
+      *exit_code = fail("--unit: unknown unit of length \"" + given->unit + "\"; known are um, mm, cm, dm, m and inch");
+      return;
+    }
+    if (given->spacing != "auto") {
+      if (!labels::to_number(given->spacing, o.spacing) || o.spacing < 0) {
+        *exit_code = fail("--spacing: expected a length in mm from 0 on, or auto; found \"" + given->spacing + "\"");
+        return;
+      }
+      o.spacing *= 1e-3;
+    }
+    if (o.passes > 1000 || o.cells < 1 || o.cells > 5000000) {
+      *exit_code = fail(o.passes > 1000 ? "--smooth: from 0 to 1000" : "--cells: from 1 to 5000000");
+      return;
+    }
+    *exit_code = from_labels(globals, o);
+  });
+
+  CLI::App *phantom_command = mesh->add_subcommand(
+      "phantom", "a volume of labels made from ellipsoids and cylinders, with the volumes that these have");
+  phantom_command->add_option("KIND", given->kind, "abdomen, or nodule: a block of gel with a ball in it")->required();
+  phantom_command->add_option("--out", given->out, "file to write, .nrrd")->required()->type_name("FILE");
+  phantom_command->add_option("--voxel", given->voxel, "edge of a voxel, mm")->capture_default_str()->type_name("MM");
+  phantom_command->callback(
+      [=, &globals] { *exit_code = phantom(globals, given->kind, given->voxel, given->out); });
+}
+
+}  // namespace cli

@@ -1,0 +1,554 @@
+#include "label_scene.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <map>
+
+#include "file.h"
+#include "messages.h"
+#include "run_folder.h"
+
+namespace labels {
+namespace {
+
+using cli::JsonObject;
+using cli::JsonValue;
+using cli::number;
+using cli::quoted;
+
+constexpr double kCellsAcross = 96;   // by default the labels are at most so many voxels long
+constexpr uint32_t kFewestCells = 200;
+constexpr size_t kFewVoxels = 27;
+
+struct Handles {
+  dfm_trimesh surface = 0;
+  dfm_tetmesh cells = 0;
+  ~Handles() {
+    if (cells) dfm_tetmesh_destroy(cells);
+    if (surface) dfm_trimesh_destroy(surface);
+  }
+};
+
+class Maker {
+ public:
+  Maker(dfm_context *context, const Options &options) : context_(context), o_(options) {}
+
+  Report run() {
+    read();
+    reduce();
+    surfaces_ = surfaces_of(volume_, target_, o_.passes);
+    report_.put_back = surfaces_.put_back;
+    report_.crossing = surfaces_.crossing;
+    cli::make_folder(o_.out);
+    cli::make_folder(o_.out + "/surfaces");
+    for (size_t e = 0; e < table_.entries.size(); ++e) write_label(e);
+    for (size_t t = 0; t < table_.things.size(); ++t) write_thing(t);
+    cli::write_whole(o_.out + "/labels.json", table_text(table_, volume_) + "\n");
+    write_scene();
+    return std::move(report_);
+  }
+
+ private:
+  void warn(const std::string &sentence) { report_.warnings.push_back(sentence); }
+  std::string told(const Entry &e) const {
+    return "label " + std::to_string(volume_.value[e.label]) + " (" + e.name + ")";
+  }
+
+  void read() {
+    volume_ = read_labels(o_.volume, o_.unit);
+    report_.size = volume_.size;
+    for (const std::string &note : volume_.notes) warn(o_.volume + ": " + note);
+    if (volume_.value.size() == 1)
+      refuse(o_.volume, "every voxel is 0, which is the background; give a volume with labels");
+    table_ = o_.table.empty() ? default_table(volume_, touching_labels(volume_)) : read_table(o_.table, volume_);
+    for (const std::string &w : table_.warnings) warn(w);
+    if (o_.table.empty())
+      warn("no table of labels is given: all labels got the material \"tissue\", and those that touch form one "
+           "body; change " + o_.out + "/labels.json and give it by --table");
+    std::vector<bool> kept(volume_.value.size(), false);
+    for (const Entry &e : table_.entries) kept[e.label] = true;
+    count_.assign(volume_.value.size(), 0);
+    for (uint16_t &v : volume_.voxel) {
+      if (!kept[v]) v = 0;
+      ++count_[v];
+    }
+    const double cell = std::fabs(volume_.cell());
+    for (const size_t n : count_) target_.push_back(double(n) * cell);
+    for (const Entry &e : table_.entries)
+      if (count_[e.label] < kFewVoxels)
+        warn(told(e) + " has only " + std::to_string(count_[e.label]) +
+             (count_[e.label] == 1 ? " voxel" : " voxels") + ", too few for its shape to be known");
+  }
+
+  // Crops, joins voxels, and takes apart what touches itself along an edge.
+  void reduce() {
+    volume_ = cropped(volume_);
+    double step[3], longest = 0, least = INFINITY;
+    for (size_t k = 0; k < 3; ++k) {
+      step[k] = 0;
+      for (const double x : volume_.axis[k]) step[k] += x * x;
+      step[k] = std::sqrt(step[k]);
+      longest = std::max(longest, step[k] * volume_.size[k]);
+      least = std::min(least, step[k]);
+    }
+    const double spacing = o_.spacing < 0 ? longest / kCellsAcross : o_.spacing;
+    for (size_t k = 0; k < 3; ++k)
+      report_.factor[k] = uint32_t(std::min(std::max(1.0, std::floor(spacing / step[k] + 0.5)), 1024.0));
+    if (report_.factor != std::array<uint32_t, 3>{1, 1, 1}) volume_ = cropped(coarsened(volume_, report_.factor));
+    if (volume_.voxels() > size_t(1) << 27)
+      refuse(o_.volume, "%u x %u x %u voxels are left; give a larger --spacing", volume_.size[0], volume_.size[1],
+             volume_.size[2]);
+    std::vector<uint32_t> group(volume_.value.size(), 0);
+    for (const Entry &e : table_.entries) group[e.label] = uint32_t(e.thing) + 1;
+    repaired_ = compose(o_.volume, volume_, group);
+    report_.taken = volume_.size;
+    if (repaired_.voxels)
+      warn(std::to_string(repaired_.voxels) +
+           (repaired_.voxels == 1 ? " voxel has" : " voxels have") +
+           " another label than in the file: there a label touched itself along an edge or at a corner alone, "
+           "which is no surface of a solid");
+    std::vector<bool> left(volume_.value.size(), false);
+    for (const uint16_t v : volume_.voxel) left[v] = true;
+    for (const Entry &e : table_.entries)
+      if (!left[e.label])
+        refuse(o_.volume, "%s has %zu voxels and is lost where %u x %u x %u of them are joined; give a smaller "
+                          "--spacing, or leave it out by \"skip\": true", told(e).c_str(), count_[e.label],
+               report_.factor[0], report_.factor[1], report_.factor[2]);
+  }
+
+  std::string beyond(uint16_t label) const {
+    if (label == kOutside) return "cut";
+    for (const Entry &e : table_.entries)
+      if (e.label == label) return "to_" + table_.things[e.thing].name;
+    return "free";
+  }
+
+  // Coordinates that read back the same, triangles in groups by what lies beyond them.
+  void write_obj(const std::string &path, const Shell &shell, const std::vector<std::string> &group) const {
+    std::string text = "# surface of a label; groups say what lies beyond\n";
+    for (size_t i = 0; i < shell.points.size(); i += 3)
+      text += "v " + number(shell.points[i]) + " " + number(shell.points[i + 1]) + " " +
+              number(shell.points[i + 2]) + "\n";
+    std::vector<std::string> names = group;
+    std::sort(names.begin(), names.end());
+    names.erase(std::unique(names.begin(), names.end()), names.end());
+    for (const std::string &name : names) {
+      text += "g " + name + "\n";
+      for (size_t t = 0; t < group.size(); ++t)
+        if (group[t] == name) {
+          text += "f";
+          for (size_t i = 0; i < 3; ++i) text += " " + std::to_string(shell.triangles[3 * t + i] + 1);
+          text += "\n";
+        }
+    }
+    cli::write_whole(path, text);
+  }
+
+  void write_label(size_t entry) {
+    const Entry &e = table_.entries[entry];
+    std::vector<bool> inside(volume_.value.size(), false);
+    inside[e.label] = true;
+    const Shell shell = shell_of(surfaces_, inside);
+    std::vector<std::string> group;
+    LabelReport r;
+    for (const uint16_t l : shell.beyond) {
+      std::string name = beyond(l);
+      for (const Entry &other : table_.entries)
+        if (other.label == l) name = "to_" + other.name;
+      group.push_back(name);
+      r.at_border = r.at_border || l == kOutside;
+    }
+    write_obj(o_.out + "/surfaces/" + e.name + ".obj", shell, group);
+    r.value = volume_.value[e.label];
+    r.name = e.name;
+    r.thing = table_.things[e.thing].name;
+    r.obstacle = table_.things[e.thing].obstacle;
+    r.voxels = count_[e.label];
+    r.changed = repaired_.of_label[e.label];
+    r.voxel_volume = target_[e.label];
+    r.volume = shell.volume;
+    r.triangles = uint32_t(shell.beyond.size());
+    report_.open_edges += shell.open_edges;
+    report_.largest_change = std::max(report_.largest_change, std::fabs(r.volume / r.voxel_volume - 1));
+    if (std::fabs(r.volume / r.voxel_volume - 1) > 0.02)
+      warn(told(e) + ": its surface encloses " + std::to_string(int(std::lround(100 * (r.volume / r.voxel_volume - 1)))) +
+           " % more than its voxels do" + (report_.factor[0] * report_.factor[1] * report_.factor[2] > 1 ? "; a smaller --spacing keeps more" : ""));
+    if (r.at_border)
+      warn(told(e) + " reaches the border of the volume, where its surface is closed by a plane");
+    report_.labels.push_back(r);
+  }
+
+  void write_thing(size_t thing) {
+    const Thing &t = table_.things[thing];
+    std::vector<bool> inside(volume_.value.size(), false);
+    for (const size_t e : t.entries) inside[table_.entries[e].label] = true;
+    const Shell shell = shell_of(surfaces_, inside);
+    report_.open_edges += shell.open_edges;
+    std::vector<std::string> group;
+    for (const uint16_t l : shell.beyond) group.push_back(beyond(l));
+    write_obj(o_.out + "/" + t.name + ".obj", shell, group);
+    ThingReport r;
+    r.name = t.name;
+    r.obstacle = t.obstacle;
+    r.points = uint32_t(shell.from.size());
+    r.triangles = uint32_t(shell.beyond.size());
+    for (size_t p = 2; p < shell.points.size(); p += 3) lowest_ = std::min(lowest_, shell.points[p]);
+    if (!t.obstacle) add_borders(thing, shell, group, fill(t, shell, r));
+    report_.things.push_back(r);
+  }
+
+  static double triangle_area(const Shell &shell, size_t t) {
+    double e[2][3], sum = 0;
+    for (size_t k = 0; k < 3; ++k) {
+      const double x = shell.points[3 * size_t(shell.triangles[3 * t]) + k];
+      e[0][k] = shell.points[3 * size_t(shell.triangles[3 * t + 1]) + k] - x;
+      e[1][k] = shell.points[3 * size_t(shell.triangles[3 * t + 2]) + k] - x;
+    }
+    for (size_t k = 0; k < 3; ++k) {
+      const double n = e[0][(k + 1) % 3] * e[1][(k + 2) % 3] - e[0][(k + 2) % 3] * e[1][(k + 1) % 3];
+      sum += n * n;
+    }
+    return std::sqrt(sum) / 2;
+  }
+
+  // A body is held where it meets an obstacle, and attached to bodies that come before it. edge: m, of its cells
+  void add_borders(size_t thing, const Shell &shell, const std::vector<std::string> &group, double edge) {
+    for (size_t other = 0; other < table_.things.size(); ++other) {
+      const Thing &a = table_.things[thing], &b = table_.things[other];
+      if (other == thing || a.obstacle || (!b.obstacle && other > thing)) continue;
+      Border border;
+      border.a = a.name;
+      border.b = b.name;
+      border.held = b.obstacle;
+      std::vector<bool> on(shell.from.size(), false);
+      double area = 0;
+      for (size_t t = 0; t < group.size(); ++t)
+        if (group[t] == "to_" + b.name) {
+          ++border.triangles;
+          for (size_t i = 0; i < 3; ++i) on[shell.triangles[3 * t + i]] = true;
+          area += triangle_area(shell, t);
+        }
+      border.points = uint32_t(std::count(on.begin(), on.end(), true));
+      if (border.triangles == 0) continue;
+      if (!border.held) set_stiffness(border, area, edge, a, b);
+      report_.borders.push_back(border);
+    }
+  }
+
+  double volume_of(const Thing &t) const {
+    double sum = 0;
+    for (const size_t e : t.entries) sum += target_[table_.entries[e].label];
+    return sum;
+  }
+  uint32_t cells_of(const Thing &t) const {
+    if (t.cells) return t.cells;
+    double all = 0;
+    for (const Thing &other : table_.things)
+      if (!other.obstacle) all += volume_of(other);
+    return std::max(kFewestCells, uint32_t(o_.cells * volume_of(t) / all));
+  }
+
+  // Returns the median edge of its cells, m.
+  double fill(const Thing &t, const Shell &shell, ThingReport &r) {
+    Handles h;
+    const auto need = [&](dfm_status status) {
+      if (status < 0) refuse(o_.volume, "the body %s: %s", t.name.c_str(), dfm_last_error());
+    };
+    need(dfm_trimesh_create(context_, uint32_t(shell.from.size()), shell.points.data(),
+                            uint32_t(shell.beyond.size()), shell.triangles.data(), &h.surface));
+    need(dfm_tetmesh_fill(h.surface, cells_of(t), &h.cells));
+    dfm_tetmesh_info info = {};
+    info.size = sizeof info;
+    need(dfm_tetmesh_get_info(h.cells, &info));
+    if (info.warnings[0]) warn("the body " + t.name + ": " + info.warnings);
+    const double *points = nullptr, *share = nullptr;
+    const uint32_t *tets = nullptr;
+    need(dfm_tetmesh_data(h.cells, &points, &tets, nullptr));
+    need(dfm_tetmesh_share(h.cells, &share));
+    std::vector<size_t> of_cell(info.ntet, t.entries[0]);
+    for (uint32_t c = 0; c < info.ntet; ++c) {
+      if (t.entries.size() > 1) of_cell[c] = label_of(t, points, tets + 4 * size_t(c));
+      LabelReport &label = report_.labels[of_cell[c]];
+      ++label.cells;
+      label.cell_volume += share[c] * cell_volume(points, tets + 4 * size_t(c));
+    }
+    for (const size_t e : t.entries)
+      if (report_.labels[e].cells == 0)
+        warn(told(table_.entries[e]) + " is smaller than a cell and has none; give more cells by --cells or in "
+             "the table");
+    write_vtk(o_.out + "/" + t.name + ".vtk", t, info, points, tets, share, of_cell);
+    r.cells = info.ntet;
+    return info.edge_median;
+  }
+
+  static double cell_volume(const double *x, const uint32_t *tet) {
+    double e[3][3];
+    for (size_t k = 0; k < 3; ++k)
+      for (size_t c = 0; c < 3; ++c) e[k][c] = x[3 * size_t(tet[k + 1]) + c] - x[3 * size_t(tet[0]) + c];
+    return (e[0][0] * (e[1][1] * e[2][2] - e[1][2] * e[2][1]) - e[0][1] * (e[1][0] * e[2][2] - e[1][2] * e[2][0]) +
+            e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0])) / 6;
+  }
+
+  // The label of this body that most of 35 places in the cell have; where none has one, the nearest voxel's.
+  size_t label_of(const Thing &t, const double *x, const uint32_t *tet) {
+    constexpr int kParts = 4;
+    std::map<uint16_t, int> votes;
+    for (int a = 0; a <= kParts; ++a)
+      for (int b = 0; a + b <= kParts; ++b)
+        for (int c = 0; a + b + c <= kParts; ++c) {
+          const int parts[4] = {a, b, c, kParts - a - b - c};
+          double p[3] = {0, 0, 0};
+          for (int i = 0; i < 4; ++i)
+            for (int k = 0; k < 3; ++k)
+              p[k] += (parts[i] + 0.25) / (kParts + 1) * x[3 * size_t(tet[i]) + size_t(k)];
+          ++votes[label_at(p)];
+        }
+    size_t best = t.entries[0];
+    int most = 0;
+    for (const size_t e : t.entries) {
+      const auto found = votes.find(table_.entries[e].label);
+      if (found == votes.end() || found->second <= most) continue;
+      most = found->second;
+      best = e;
+    }
+    return most > 0 ? best : nearest_label(t, x, tet);
+  }
+
+  void index_of(const double p[3], double out[3]) {
+    if (inverse_.empty()) {
+      const auto &a = volume_.axis;
+      for (size_t k = 0; k < 3; ++k) {
+        const double *u = a[(k + 1) % 3], *w = a[(k + 2) % 3];
+        const double row[3] = {u[1] * w[2] - u[2] * w[1], u[2] * w[0] - u[0] * w[2], u[0] * w[1] - u[1] * w[0]};
+        for (const double r : row) inverse_.push_back(r / volume_.cell());
+      }
+    }
+    for (size_t k = 0; k < 3; ++k) {
+      out[k] = 0;
+      for (size_t c = 0; c < 3; ++c) out[k] += inverse_[3 * k + c] * (p[c] - volume_.origin[c]);
+    }
+  }
+  uint16_t voxel(int64_t i, int64_t j, int64_t k) const {
+    if (i < 0 || j < 0 || k < 0 || i >= volume_.size[0] || j >= volume_.size[1] || k >= volume_.size[2])
+      return kOutside;
+    return volume_.voxel[size_t(i) + size_t(volume_.size[0]) * (size_t(j) + size_t(volume_.size[1]) * size_t(k))];
+  }
+  uint16_t label_at(const double p[3]) {
+    double c[3];
+    index_of(p, c);
+    return voxel(std::lround(c[0]), std::lround(c[1]), std::lround(c[2]));
+  }
+  size_t nearest_label(const Thing &t, const double *x, const uint32_t *tet) {
+    double p[3] = {0, 0, 0}, c[3];
+    for (int i = 0; i < 4; ++i)
+      for (int k = 0; k < 3; ++k) p[k] += x[3 * size_t(tet[i]) + size_t(k)] / 4;
+    index_of(p, c);
+    size_t best = t.entries[0];
+    double least = INFINITY;
+    for (int64_t reach = 1; reach <= 64 && !std::isfinite(least); reach *= 2)
+      for (int64_t k = -reach; k <= reach; ++k)
+        for (int64_t j = -reach; j <= reach; ++j)
+          for (int64_t i = -reach; i <= reach; ++i) {
+            const uint16_t l = voxel(std::lround(c[0]) + i, std::lround(c[1]) + j, std::lround(c[2]) + k);
+            const double d = double(i * i + j * j + k * k);
+            for (const size_t e : t.entries)
+              if (table_.entries[e].label == l && d < least) {
+                least = d;
+                best = e;
+              }
+          }
+    return best;
+  }
+
+  void write_vtk(const std::string &path, const Thing &t, const dfm_tetmesh_info &info, const double *points,
+                 const uint32_t *tets, const double *share, const std::vector<size_t> &of_cell) const {
+    const std::string npoint = std::to_string(info.npoint), ncell = std::to_string(info.ntet),
+                      ngroup = std::to_string(t.entries.size());
+    std::string text = "# vtk DataFile Version 3.0\ncells of a body, in groups by label\nASCII\n"
+                       "DATASET UNSTRUCTURED_GRID\nFIELD FieldData 2\ngroup_number 2 " + ngroup + " int\n";
+    for (const size_t e : t.entries) text += "3 " + std::to_string(e + 1) + "\n";
+    text += "group_name 1 " + ngroup + " string\n";
+    for (const size_t e : t.entries) text += table_.entries[e].name + "\n";
+    text += "POINTS " + npoint + " double\n";
+    for (size_t i = 0; i < 3 * size_t(info.npoint); i += 3)
+      text += number(points[i]) + " " + number(points[i + 1]) + " " + number(points[i + 2]) + "\n";
+    text += "CELLS " + ncell + " " + std::to_string(5 * size_t(info.ntet)) + "\n";
+    for (size_t c = 0; c < info.ntet; ++c) {
+      text += "4";
+      for (size_t i = 0; i < 4; ++i) text += " " + std::to_string(tets[4 * c + i]);
+      text += "\n";
+    }
+    text += "CELL_TYPES " + ncell + "\n";
+    for (size_t c = 0; c < info.ntet; ++c) text += "10\n";
+    text += "CELL_DATA " + ncell + "\nSCALARS group int 1\nLOOKUP_TABLE default\n";
+    for (const size_t e : of_cell) text += std::to_string(e + 1) + "\n";
+    text += "SCALARS share double 1\nLOOKUP_TABLE default\n";
+    for (size_t c = 0; c < info.ntet; ++c) text += number(share[c]) + "\n";
+    cli::write_whole(path, text);
+  }
+
+  std::string body_json(const Thing &t) const {
+    JsonObject out, surface;
+    surface.add("mesh", quoted(t.name + ".obj"));
+    out.add("name", quoted(t.name)).add("mesh", quoted(t.name + ".vtk")).add("surface", surface.text());
+    if (t.entries.size() == 1) out.add("material", quoted(table_.entries[t.entries[0]].material));
+    else {
+      JsonObject materials;
+      for (const size_t e : t.entries)
+        if (report_.labels[e].cells) materials.add(table_.entries[e].name, quoted(table_.entries[e].material));
+      out.add("materials_by_group", materials.text());
+    }
+    if (!t.more.find("model")) out.add("model", "{\"type\": \"corotational_fem\"}");
+    std::vector<std::string> attach, fix;
+    for (const Border &b : report_.borders) {
+      if (b.a != t.name) continue;
+      const std::string group = quoted("to_" + b.b);
+      if (b.held) fix.push_back(JsonObject().add("group", group).text());
+      else
+        attach.push_back(JsonObject()
+                             .add("to", quoted(b.b))
+                             .add("group", group)
+                             .add("stiffness", rounded(b.stiffness))
+                             .add("damping", rounded(b.damping))
+                             .text());
+    }
+    add_list(out, "attach", attach, t.more);
+    add_list(out, "fix", fix, t.more);
+    for (const cli::JsonMember &m : t.more.members)
+      if (m.name != "attach" && m.name != "fix") out.add(m.name, cli::json_text(m.value));
+    return out.text();
+  }
+
+  // Ours, then those of the table.
+  static void add_list(JsonObject &out, const char *key, std::vector<std::string> ours, const JsonValue &more) {
+    if (const JsonValue *own = more.find(key))
+      for (const JsonValue &a : own->items) ours.push_back(cli::json_text(a));
+    if (!ours.empty()) out.add(key, cli::json_array(ours));
+  }
+  static std::string rounded(double x) {
+    char text[40];
+    std::snprintf(text, sizeof text, "%.3g", x);
+    double value = 0;
+    to_number(text, value);
+    return number(value);
+  }
+
+  double of_material(const std::string &name, const char *key, const char *inner, double otherwise) const {
+    const JsonValue *m = table_.materials.find(name);
+    const JsonValue *v = m ? m->find(key) : nullptr;
+    if (v && inner) v = v->find(inner);
+    double x = 0;
+    return v && to_number(v->text, x) ? x : otherwise;
+  }
+
+  // As a layer of the softer of the two materials, a quarter of a cell thick.
+  void set_stiffness(Border &border, double area, double edge, const Thing &a, const Thing &b) const {
+    double young = INFINITY, damping = 0;
+    for (const Thing *t : {&a, &b})
+      for (const size_t e : t->entries) {
+        const std::string &material = table_.entries[e].material;
+        const double y = of_material(material, "young", nullptr, 1e4);
+        if (y >= young) continue;
+        young = y;
+        damping = of_material(material, "damping", "stiffness", 0.0);
+      }
+    border.stiffness = young * area / (0.25 * edge);
+    border.damping = border.stiffness * damping;
+  }
+
+  // A body and the obstacle that holds it share their border, so they do not touch.
+  std::string contact_json() const {
+    JsonObject out;
+    std::vector<std::string> filter;
+    for (const Border &b : report_.borders)
+      if (b.held)
+        filter.push_back(JsonObject().add("between", cli::json_array({quoted(b.a), quoted(b.b)})).text());
+    const JsonValue none, *own = table_.scene.find("contact");
+    if (!own) own = &none;
+    add_list(out, "filter", filter, *own);
+    for (const cli::JsonMember &m : own->members)
+      if (m.name != "filter") out.add(m.name, cli::json_text(m.value));
+    return out.text();
+  }
+
+  void write_scene() {
+    std::map<std::string, std::string> rest = {
+        {"time", "{\"duration\": 1, \"step\": 0.002}"},
+        {"output", output_json()}};
+    std::vector<std::string> obstacles, bodies;
+    bool held = false;
+    for (const Thing &t : table_.things) {
+      if (!t.obstacle) bodies.push_back(body_json(t));
+      held = held || t.obstacle || t.more.find("fix") || t.more.find("attach");
+      if (t.obstacle)
+        obstacles.push_back(JsonObject()
+                                .add("name", quoted(t.name))
+                                .add("shape", "\"voxels\"")
+                                .add("mesh", quoted(t.name + ".obj"))
+                                .text());
+    }
+    // A scan shows bodies under their weight already; what nothing holds falls onto a floor.
+    rest["gravity"] = held ? "[0, 0, 0]" : "[0, 0, -9.81]";
+    const JsonValue *own = table_.scene.find("obstacles");
+    if (own)
+      for (const JsonValue &o : own->items) obstacles.push_back(cli::json_text(o));
+    else if (!held) {
+      const double point[3] = {0, 0, lowest_};
+      obstacles.push_back(
+          JsonObject().add("name", "\"floor\"").add("shape", "\"plane\"").add("point", cli::json_vector(point)).text());
+    }
+    for (const cli::JsonMember &m : table_.scene.members)
+      if (m.name != "obstacles" && m.name != "contact") rest[m.name] = cli::json_text(m.value);
+    if (const std::string contact = contact_json(); contact != "{}") rest["contact"] = contact;
+    JsonObject out;
+    out.add("format", "\"deform-scene\"").add("version", "1");
+    out.add("materials", cli::json_text(table_.materials)).add("bodies", cli::json_array(bodies));
+    if (!obstacles.empty()) out.add("obstacles", cli::json_array(obstacles));
+    for (const auto &[key, value] : rest) out.add(key, value);
+    JsonValue whole;
+    cli::parse_json(out.text(), whole);
+    cli::write_whole(o_.out + "/scene.json", cli::json_lines(whole) + "\n");
+  }
+
+  // Looks from the front, a little from above, at all that there is.
+  std::string output_json() const {
+    double lo[3] = {INFINITY, INFINITY, INFINITY}, hi[3] = {-INFINITY, -INFINITY, -INFINITY};
+    for (size_t i = 0; i < surfaces_.points.size(); ++i) {
+      lo[i % 3] = std::min(lo[i % 3], surfaces_.points[i]);
+      hi[i % 3] = std::max(hi[i % 3], surfaces_.points[i]);
+    }
+    double look[3], eye[3], size = 0;
+    for (int k = 0; k < 3; ++k) {
+      look[k] = (lo[k] + hi[k]) / 2;
+      size = std::max(size, hi[k] - lo[k]);
+    }
+    const double way[3] = {0.9, -1.6, 1.0};
+    const auto rounded = [&](double x) { return std::round(x / size * 1e3) * size / 1e3; };
+    for (int k = 0; k < 3; ++k) {
+      eye[k] = rounded(look[k] + way[k] * size);
+      look[k] = rounded(look[k]);
+    }
+    JsonObject camera;
+    camera.add("eye", cli::json_vector(eye)).add("look_at", cli::json_vector(look));
+    return JsonObject().add("every", "0.05").add("camera", camera.text()).add("color", "\"body\"").text();
+  }
+
+  dfm_context *const context_;
+  const Options &o_;
+  Volume volume_;
+  Table table_;
+  std::vector<size_t> count_;    // voxels per label, of the file
+  std::vector<double> target_;   // m3
+  Repaired repaired_;
+  Surfaces surfaces_;
+  std::vector<double> inverse_;  // rows that give voxels for meters
+  double lowest_ = INFINITY;
+  Report report_;
+};
+
+}  // namespace
+
+Report make_scene(dfm_context *context, const Options &options) { return Maker(context, options).run(); }
+
+}  // namespace labels

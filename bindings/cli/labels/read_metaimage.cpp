@@ -1,0 +1,175 @@
+// MetaImage: "Key = value" lines that end with ElementDataFile; LOCAL: the voxels follow (.mha), else they lie
+// in that file (.mhd). Keys as the MetaIO documentation has them.
+#include <algorithm>
+
+#include "label_volume.h"
+
+namespace labels {
+namespace {
+
+struct Type {
+  const char *name;
+  uint32_t bytes;
+  bool is_signed;
+};
+// MET_LONG has 4 bytes in a MetaImage.
+const Type kTypes[] = {{"MET_CHAR", 1, true},       {"MET_UCHAR", 1, false}, {"MET_SHORT", 2, true},
+                       {"MET_USHORT", 2, false},    {"MET_INT", 4, true},    {"MET_UINT", 4, false},
+                       {"MET_LONG", 4, true},       {"MET_ULONG", 4, false}, {"MET_LONG_LONG", 8, true},
+                       {"MET_ULONG_LONG", 8, false}};
+
+class Reader {
+ public:
+  Reader(const std::string &path, std::string_view bytes) : path_(path), bytes_(bytes) {
+    for (int k = 0; k < 3; ++k) direction_[4 * size_t(k)] = 1;
+  }
+
+  Stored read() {
+    bool more = true;
+    while (more) {
+      if (at_ >= bytes_.size()) missing("ElementDataFile");
+      more = line();
+    }
+    stored_.data_at = at_;
+    finish();
+    return std::move(stored_);
+  }
+
+ private:
+  std::string_view next_line() {
+    const size_t end = std::min(bytes_.find('\n', at_), bytes_.size());
+    std::string_view text = bytes_.substr(at_, end - at_);
+    at_ = std::min(end + 1, bytes_.size());
+    ++number_;
+    if (!text.empty() && text.back() == '\r') text.remove_suffix(1);
+    return text;
+  }
+
+  template <class... T>
+  [[noreturn]] void refuse_line(const char *sentence, T... values) const {
+    refuse(path_ + ":" + std::to_string(number_), sentence, values...);
+  }
+  [[noreturn]] void missing(const char *what) const {
+    refuse(path_, "the header has no \"%s\"; save the label map again as MetaImage", what);
+  }
+
+  bool line() {
+    const std::string_view text = trimmed(next_line());
+    if (text.empty()) return true;
+    const size_t equals = text.find('=');
+    if (equals == std::string_view::npos)
+      refuse_line("expected \"Key = value\", found %s", quoted_part(text).c_str());
+    const std::string_view key = trimmed(text.substr(0, equals)), value = trimmed(text.substr(equals + 1));
+    if (key == "ElementDataFile") return data_file(value);
+    if (key == "NDims") dims(value);
+    else if (key == "DimSize") sizes_ = numbers(value, 3, "DimSize");
+    else if (key == "ElementSpacing") spacing_ = numbers(value, 3, "ElementSpacing");
+    else if (key == "ElementSize" && spacing_.empty()) spacing_ = numbers(value, 3, "ElementSize");
+    else if (key == "Offset" || key == "Position" || key == "Origin") origin_ = numbers(value, 3, "Offset");
+    else if (key == "TransformMatrix" || key == "Rotation" || key == "Orientation")
+      direction_ = numbers(value, 9, "TransformMatrix");
+    else if (key == "ElementType") type(value);
+    else if (key == "ElementNumberOfChannels") channels(value);
+    else if (key == "BinaryData") binary(value);
+    else if (key == "BinaryDataByteOrderMSB" || key == "ElementByteOrderMSB")
+      stored_.encoding.big_endian = truth(value);
+    else if (key == "CompressedData") stored_.encoding.compressed = truth(value);
+    else if (key == "HeaderSize") header_size(value);
+    else if (key == "DistanceUnits") unit(value);
+    return true;
+  }
+
+  std::vector<double> numbers(std::string_view value, size_t n, const char *what) const {
+    std::vector<double> out;
+    for (const std::string_view word : words(value)) {
+      out.push_back(0);
+      if (!to_number(word, out.back()))
+        refuse_line("expected %zu numbers as %s, found %s", n, what, quoted_part(word).c_str());
+    }
+    if (out.size() != n)
+      refuse_line("%s has %zu numbers; a volume of 3 axes has %zu", what, out.size(), n);
+    return out;
+  }
+
+  bool truth(std::string_view value) const {
+    const std::string word = lower(value);
+    if (word == "true" || word == "1") return true;
+    if (word == "false" || word == "0") return false;
+    refuse_line("expected True or False, found %s", quoted_part(value).c_str());
+  }
+
+  void dims(std::string_view value) const {
+    int64_t n = 0;
+    if (!to_number(value, n) || n != 3)
+      refuse_line("NDims is %s; a label map has 3 axes", quoted_part(value).c_str());
+  }
+  void channels(std::string_view value) const {
+    int64_t n = 0;
+    if (!to_number(value, n) || n != 1)
+      refuse_line("a voxel has %s values; a label map has one per voxel", quoted_part(value).c_str());
+  }
+  void binary(std::string_view value) const {
+    if (!truth(value))
+      refuse_line("the voxels are stored as text, which is not read; save the file with BinaryData = True");
+  }
+  void header_size(std::string_view value) {
+    if (!to_number(value, stored_.skip) || stored_.skip < -1)
+      refuse_line("expected how many bytes precede the voxels, or -1, as HeaderSize, found %s",
+                  quoted_part(value).c_str());
+  }
+  void unit(std::string_view value) {
+    stored_.unit = unit_of(value);
+    if (stored_.unit == 0)
+      refuse_line("unknown unit of length %s; known are um, mm, cm, dm, m and inch; give it by --unit",
+                  quoted_part(value).c_str());
+  }
+
+  void type(std::string_view value) {
+    for (const Type &t : kTypes)
+      if (value == t.name) {
+        stored_.encoding.bytes = t.bytes;
+        stored_.encoding.is_signed = t.is_signed;
+        return;
+      }
+    refuse_line("the voxels are of the type %s, and labels are whole numbers; save the label map with a type "
+                "from MET_CHAR to MET_ULONG_LONG",
+                quoted_part(value).c_str());
+  }
+
+  bool data_file(std::string_view value) {
+    if (value.empty()) refuse_line("expected LOCAL or the name of a file as ElementDataFile");
+    if (value == "LOCAL" || value == "Local" || value == "local") return false;
+    if (value.substr(0, 4) == "LIST" || value.find('%') != std::string_view::npos)
+      refuse_line("the data are a list or a pattern of files, which is not read; save all slices in one file");
+    stored_.file = value;
+    return false;
+  }
+
+  void finish() {
+    if (stored_.encoding.bytes == 0) missing("ElementType");
+    if (sizes_.empty()) missing("DimSize");
+    if (stored_.file.empty()) stored_.skip = 0;  // the voxels of a .mha follow the header
+    for (size_t k = 0; k < 3; ++k) {
+      const double n = sizes_[k];
+      if (!(n >= 1 && n <= 65535 && n == double(uint32_t(n))))
+        refuse(path_, "axis %zu has %g voxels; from 1 to 65,535 are read", k, n);
+      stored_.volume.size[k] = uint32_t(n);
+      if (!origin_.empty()) stored_.volume.origin[k] = origin_[k];
+      for (size_t c = 0; c < 3; ++c)
+        stored_.volume.axis[k][c] = direction_[3 * k + c] * (spacing_.empty() ? 1 : spacing_[k]);
+    }
+    if (spacing_.empty()) stored_.volume.notes.push_back("the file gives no spacing; 1 was taken for each axis");
+  }
+
+  const std::string &path_;
+  std::string_view bytes_;
+  size_t at_ = 0, number_ = 0;
+  std::vector<double> sizes_, spacing_, origin_, direction_ = std::vector<double>(9, 0.0);
+  Stored stored_;
+};
+
+}  // namespace
+
+Stored read_metaimage(const std::string &path, std::string_view bytes) { return Reader(path, bytes).read(); }
+
+}  // namespace labels
