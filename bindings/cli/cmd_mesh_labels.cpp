@@ -42,6 +42,8 @@ std::string report_json(const labels::Report &r, const std::string &out) {
                          .add("points", whole(t.points))
                          .add("triangles", whole(t.triangles))
                          .add("cells", whole(t.cells))
+                         .add("quality_min", number(t.quality_min))
+                         .add("quality_mean", number(t.quality_mean))
                          .text());
   for (const labels::Border &b : r.borders)
     borders.push_back(JsonObject()
@@ -67,16 +69,27 @@ std::string report_json(const labels::Report &r, const std::string &out) {
       .text();
 }
 
+std::string three(double x) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.3f", x);
+  return text;
+}
+
 void print_table(const labels::Report &r, const labels::Options &o) {
   std::printf("%s: %u x %u x %u voxels", shown(o.volume).c_str(), r.size[0], r.size[1], r.size[2]);
   if (r.factor != std::array<uint32_t, 3>{1, 1, 1})
     std::printf(", joined by %u x %u x %u", r.factor[0], r.factor[1], r.factor[2]);
-  std::printf("\n  %-16s %-16s %10s %13s %13s %9s %8s\n", "label", "part of", "voxels", "volume, ml", "surface, ml",
-              "triangles", "cells");
+  std::printf("\n  %-16s %-16s %10s %11s %11s %11s %9s %7s\n", "label", "part of", "voxels", "voxels, ml", "surface, ml",
+              "cells, ml", "triangles", "cells");
   for (const labels::LabelReport &l : r.labels)
-    std::printf("  %-16s %-16s %10zu %13.3f %13.3f %9u %8s\n", shown(l.name).c_str(), shown(l.thing).c_str(),
-                l.voxels, 1e6 * l.voxel_volume, 1e6 * l.volume, l.triangles,
+    std::printf("  %-16s %-16s %10zu %11.3f %11.3f %11s %9u %7s\n", shown(l.name).c_str(), shown(l.thing).c_str(),
+                l.voxels, 1e6 * l.voxel_volume, 1e6 * l.volume,
+                l.obstacle ? "" : three(1e6 * l.cell_volume).c_str(), l.triangles,
                 l.obstacle ? "rigid" : std::to_string(l.cells).c_str());
+  for (const labels::ThingReport &t : r.things)
+    if (!t.obstacle)
+      std::printf("  %s: %u cells, %u triangles; quality of cells %.2f at least, %.2f on average (1: regular)\n",
+                  shown(t.name).c_str(), t.cells, t.triangles, t.quality_min, t.quality_mean);
   for (const labels::Border &b : r.borders)
     std::printf("  %s is %s %s at %u points of their border\n", shown(b.a).c_str(),
                 b.held ? "held by" : "attached to", shown(b.b).c_str(), b.points);

@@ -27,7 +27,7 @@ class Composer {
         open = still_critical(open);
       }
       for (const Cell &corner : open) unify(corner, out);
-      open = open.empty() ? open : all_critical();
+      open = all_critical();  // a change may have moved a place out of the list
     }
     return open.empty();
   }

@@ -172,8 +172,9 @@ class Maker {
     report_.open_edges += shell.open_edges;
     report_.largest_change = std::max(report_.largest_change, std::fabs(r.volume / r.voxel_volume - 1));
     if (std::fabs(r.volume / r.voxel_volume - 1) > 0.02)
-      warn(told(e) + ": its surface encloses " + std::to_string(int(std::lround(100 * (r.volume / r.voxel_volume - 1)))) +
-           " % more than its voxels do" + (report_.factor[0] * report_.factor[1] * report_.factor[2] > 1 ? "; a smaller --spacing keeps more" : ""));
+      warn(told(e) + ": its surface encloses " +
+           std::to_string(std::lround(100 * std::fabs(r.volume / r.voxel_volume - 1))) +
+           (r.volume < r.voxel_volume ? " % less than" : " % more than") + " its voxels do" + (report_.factor[0] * report_.factor[1] * report_.factor[2] > 1 ? "; a smaller --spacing keeps more" : ""));
     if (r.at_border)
       warn(told(e) + " reaches the border of the volume, where its surface is closed by a plane");
     report_.labels.push_back(r);
@@ -273,12 +274,20 @@ class Maker {
       ++label.cells;
       label.cell_volume += share[c] * cell_volume(points, tets + 4 * size_t(c));
     }
-    for (const size_t e : t.entries)
-      if (report_.labels[e].cells == 0)
+    for (const size_t e : t.entries) {
+      const LabelReport &l = report_.labels[e];
+      const double more = l.cell_volume / l.voxel_volume - 1;
+      if (l.cells > 0 && std::fabs(more) > 0.1)
+        warn(told(table_.entries[e]) + ": its cells hold " + std::to_string(std::lround(100 * std::fabs(more))) +
+             (more < 0 ? " % less than" : " % more than") + " its voxels do; give more cells by --cells or in the table");
+      if (l.cells == 0)
         warn(told(table_.entries[e]) + " is smaller than a cell and has none; give more cells by --cells or in "
              "the table");
+    }
     write_vtk(o_.out + "/" + t.name + ".vtk", t, info, points, tets, share, of_cell);
     r.cells = info.ntet;
+    r.quality_min = info.quality_min;
+    r.quality_mean = info.quality_mean;
     return info.edge_median;
   }
 
@@ -524,7 +533,8 @@ class Maker {
       size = std::max(size, hi[k] - lo[k]);
     }
     const double way[3] = {0.9, -1.6, 1.0};
-    const auto rounded = [&](double x) { return std::round(x / size * 1e3) * size / 1e3; };
+    const double per_meter = std::pow(10, std::ceil(3 - std::log10(size)));
+    const auto rounded = [&](double x) { return std::round(x * per_meter) / per_meter + 0.0; };  // not -0
     for (int k = 0; k < 3; ++k) {
       eye[k] = rounded(look[k] + way[k] * size);
       look[k] = rounded(look[k]);

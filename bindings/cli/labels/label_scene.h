@@ -30,6 +30,7 @@ struct ThingReport {
   std::string name;
   bool obstacle = false;
   uint32_t points = 0, triangles = 0, cells = 0;
+  double quality_min = 0, quality_mean = 0;  // mean ratio of its cells, 1 for a regular tetrahedron
 };
 struct Border {
   std::string a, b;

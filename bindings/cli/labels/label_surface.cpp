@@ -60,6 +60,7 @@ class Net {
  public:
   Net(const Volume &v, const std::vector<double> &target) : v_(v), target_(target) {
     for (size_t k = 0; k < 3; ++k) n_[k] = v.size[k];
+    set_grid();
     build();
     find_neighbors();
     at_ = corner_;
@@ -314,9 +315,17 @@ class Net {
 
   // ---- nothing may cross ----
 
+  // Coordinates are decimals of a ten thousandth of a voxel, so that files are half as long. They are rounded
+  // before crossings are looked for.
+  void set_grid() {
+    double least = INFINITY;
+    for (const auto &axis : v_.axis)
+      least = std::min(least, std::sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]));
+    for (int digits = 0; digits < 15 && per_meter_ * least < 1e4; ++digits) per_meter_ *= 10;
+  }
   Point world(uint32_t vertex) const {
     Point out = meters(at_[vertex]);
-    for (int k = 0; k < 3; ++k) out.x[k] += v_.origin[k];
+    for (int k = 0; k < 3; ++k) out.x[k] = std::round((out.x[k] + v_.origin[k]) * per_meter_) / per_meter_;
     return out;
   }
 
@@ -454,6 +463,7 @@ class Net {
   const Volume &v_;
   const std::vector<double> &target_;
   int64_t n_[3];
+  double per_meter_ = 1;  // steps of the decimals of coordinates
   std::vector<Point> corner_, at_, world_;  // voxels, voxels, m
   std::vector<Quad> quads_;
   std::vector<uint32_t> first_, neighbor_;

@@ -97,6 +97,7 @@ class Reader {
     else if (name == "space directions") directions(value);
     else if (name == "space origin") origin(value);
     else if (name == "space units" || name == "units") units(value);
+    else if (name == "space") space(value);
     else if (name == "space dimension") count(value, "space dimension", 8);
     else if (name == "encoding") encoding(value);
     else if (name == "endian") endian(value);
@@ -177,6 +178,13 @@ class Reader {
     if (x.size() != 3) refuse_line("a vector has %zu numbers; the space of a label map has 3", x.size());
     value.remove_prefix(end + 1);
     return {x[0], x[1], x[2]};
+  }
+
+  // In a left-handed space the patient is mirrored.
+  void space(std::string_view value) {
+    const std::string word = lower(value);
+    mirrored_ = is_one_of(word, "left-anterior-superior,las,left-anterior-superior-time,last,3d-left-handed,"
+                                "3d-left-handed-time");
   }
 
   void origin(std::string_view value) {
@@ -269,6 +277,11 @@ class Reader {
       stored_.volume.size[k] = uint32_t(n);
       step(k, axes[k], spaced);
     }
+    if (mirrored_) {
+      stored_.volume.origin[1] = -stored_.volume.origin[1];
+      for (auto &axis : stored_.volume.axis) axis[1] = -axis[1];
+      stored_.volume.notes.push_back("the file's space is left-handed; y was negated, so that nothing is mirrored");
+    }
     if (!spaced) stored_.volume.notes.push_back("the file gives no spacing; 1 was taken for each axis");
     for (const auto &[segment, label] : segment_)
       if (segment_name_.count(segment)) stored_.volume.name[label] = segment_name_[segment];
@@ -289,7 +302,7 @@ class Reader {
   std::string_view bytes_;
   size_t at_ = 0, number_ = 0;
   uint32_t dimension_ = 0;
-  bool encoded_ = false, ordered_ = false;
+  bool encoded_ = false, ordered_ = false, mirrored_ = false;
   std::vector<int64_t> sizes_;
   std::vector<double> spacings_;
   std::vector<std::optional<std::array<double, 3>>> directions_;

@@ -1,0 +1,129 @@
+// `deform mesh from-labels` and `deform mesh phantom` as a user calls them.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <regex>
+
+#include "deform/deform.h"
+#include "support.h"
+
+namespace {
+
+bool has(const std::string &text, const std::string &word) { return text.find(word) != std::string::npos; }
+
+// In a folder with a space, as a stranger's may have.
+std::string folder() {
+  const std::string out = test::scratch("labels_command") + "/a folder";
+  std::filesystem::create_directories(out);
+  return out;
+}
+
+std::string phantom(const std::string &kind, const char *voxel) {
+  const std::string out = folder() + "/" + kind + ".nrrd";
+  const auto r = test::deform({"mesh", "phantom", kind, "--voxel", voxel, "--out", out, "--quiet"});
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  return out;
+}
+
+const char *const kTable = R"({
+  "format": "deform-labels", "version": 1,
+  "labels": {
+    "1": {"name": "fat", "body": "trunk", "material": "fat"},
+    "2": {"name": "liver", "body": "trunk", "material": "liver"},
+    "3": {"skip": true},
+    "4": {"name": "kidney_right", "material": "liver"},
+    "5": {"name": "kidney_left", "body": "trunk", "material": "liver"},
+    "6": {"name": "spine", "obstacle": true}
+  },
+  "materials": {"fat": {"density": 950, "young": 5e3, "poisson": 0.4}, "liver": {"density": 1050, "young": 1e4, "poisson": 0.4}},
+  "bodies": {"trunk": {"cells": 900, "model": {"type": "linear_fem"}}},
+  "scene": {"gravity": [0, 0.5, 0], "time": {"duration": 0.02, "step": 0.01, "integrator": "implicit_euler"}}
+})";
+
+double number(const std::string &json, const std::string &pattern) {
+  std::smatch m;
+  if (!std::regex_search(json, m, std::regex(pattern + R"re(": ([-+.\deE]+))re"))) return NAN;
+  return std::stod(m[1]);
+}
+
+}  // namespace
+
+TEST(LabelsCommand, WithoutATable_MakesOneBodyOfRegionsThatRuns) {
+  const std::string out = folder() + "/plain";
+  const auto made = test::deform({"mesh", "from-labels", phantom("nodule", "4"), "--out", out, "--cells", "3000"});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  for (const char *word : {"gel", "nodule", "closed: yes", "cross: 0", "quality of cells 0.9"})
+    EXPECT_TRUE(has(made.out, word)) << word << " not in\n" << made.out;
+  EXPECT_TRUE(has(made.err, "no table of labels is given")) << made.err;
+  const auto info = test::deform({"mesh", "info", out + "/body.vtk"});
+  EXPECT_TRUE(has(info.out, "gel") && has(info.out, "nodule")) << info.out;
+  const auto run = test::deform({"run", out + "/scene.json", "--time", "0.004", "--quiet", "--out", out + "/run"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  // what it wrote is the table that gives the same scene
+  const auto again = test::deform({"mesh", "from-labels", phantom("nodule", "4"), "--out", out + "/again", "--cells",
+                                   "3000", "--table", out + "/labels.json"});
+  ASSERT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_FALSE(has(again.err, "no table")) << again.err;
+  EXPECT_TRUE(has(again.err, "(nodule): its cells hold")) << again.err;  // few cells make a coarse ball
+  for (const char *name : {"/scene.json", "/labels.json", "/body.vtk", "/body.obj"})
+    EXPECT_EQ(test::read_file(out + name), test::read_file(out + "/again" + name)) << name;
+}
+
+TEST(LabelsCommand, WithATable_MakesBodiesAnObstacleAndWhatHoldsThem) {
+  const std::string table = folder() + "/table.json", out = folder() + "/organs";
+  test::write_file(table, kTable);
+  const auto made = test::deform({"mesh", "from-labels", phantom("abdomen", "12"), "--table", table, "--out", out,
+                                  "--json"});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  EXPECT_EQ(number(made.out, "open_edges"), 0);
+  EXPECT_EQ(number(made.out, "crossing_pairs"), 0);
+  EXPECT_LT(number(made.out, "largest_volume_change"), 1e-5);
+  EXPECT_EQ(made.out, test::read_file(out + "/summary.json"));
+  EXPECT_FALSE(has(made.out, "lesion"));
+  const std::string scene = test::read_file(out + "/scene.json");
+  for (const char *word :
+       {"\"fix\": [{\"group\": \"to_spine\"}]", "\"shape\": \"voxels\"", "\"to\": \"trunk\"", "\"linear_fem\"",
+        "\"kidney_left\": \"liver\"", "{\"between\": [\"trunk\", \"spine\"]}", "\"gravity\": [0, 0.5, 0]"})
+    EXPECT_TRUE(has(scene, word)) << word << " not in\n" << scene;
+  const auto run = test::deform({"run", out + "/scene.json", "--out", out + "/run", "--quiet"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(number(test::read_file(out + "/run/summary.json"), "intersections_max"), 0);
+  EXPECT_EQ(number(test::read_file(out + "/run/summary.json"), "inverted_max"), 0);
+}
+
+TEST(LabelsCommand, WhatIsWrong_IsToldInOneSentence) {
+  const std::string volume = phantom("nodule", "6"), out = folder() + "/refused", table = folder() + "/wrong.json";
+  const auto refused = [&](const std::vector<std::string> &more, const std::string &words) {
+    std::vector<std::string> args = {"mesh", "from-labels"};
+    args.insert(args.end(), more.begin(), more.end());
+    const auto r = test::deform(args);
+    EXPECT_EQ(r.exit_code, 2) << r.out;
+    EXPECT_EQ(std::count(r.err.begin(), r.err.end(), '\n'), 1) << r.err;
+    EXPECT_TRUE(has(r.err, words)) << "no '" << words << "' in: " << r.err;
+    EXPECT_FALSE(std::filesystem::exists(out)) << words;
+  };
+  const auto with_table = [&](const std::string &text, const std::string &words) {
+    test::write_file(table, text);
+    refused({volume, "--out", out, "--table", table}, words);
+  };
+  const std::string begin = R"({"format": "deform-labels", "version": 1, "materials": {"gel": {"density": 1000, "young": 1e4}}, )";
+  with_table(begin + R"("labels": {"7": {"material": "gel"}}})", "/labels/7: the volume has no label 7; it has 1, 2");
+  with_table(begin + R"("labels": {"1": {"material": "gle"}}})", "did you mean \"gel\"?");
+  with_table(begin + R"("labels": {"1": {}}})", "\"material\" is missing");
+  with_table(begin + R"("labels": {"1": {"colour": "red"}}})", "/labels/1/colour: no such key");
+  with_table(begin + R"("labels": {"1": {"skip": true}, "2": {"skip": true}}})", "no label is left");
+  with_table(begin + R"("labels": )", "wrong.json:1");
+  with_table("[]", "expected an object");
+  const std::string whole = test::read_file(volume), cut = folder() + "/cut.nrrd", none = folder() + "/none.nrrd";
+  test::write_file(cut, whole.substr(0, whole.size() - 40));
+  refused({cut, "--out", out}, "bytes too early");
+  refused({none, "--out", out}, "none.nrrd");
+  refused({volume, "--out", out, "--spacing", "wide"}, "--spacing: expected a length");
+  refused({volume, "--out", out, "--unit", "parsec"}, "unknown unit of length \"parsec\"");
+  refused({volume, "--out", out, "--unit", "m", "--cells", "0"}, "--cells: from 1");
+  refused({volume}, "--out");
+  const auto unknown = test::deform({"mesh", "phantom", "head", "--out", out});
+  EXPECT_EQ(unknown.exit_code, 2);
+  EXPECT_TRUE(has(unknown.err, "there are abdomen and nodule")) << unknown.err;
+}
