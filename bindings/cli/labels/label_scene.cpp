@@ -267,12 +267,13 @@ class Maker {
     const uint32_t *tets = nullptr;
     need(dfm_tetmesh_data(h.cells, &points, &tets, nullptr));
     need(dfm_tetmesh_share(h.cells, &share));
-    std::vector<size_t> of_cell(info.ntet, t.entries[0]);
+    std::vector<double> volume(info.ntet);
+    for (uint32_t c = 0; c < info.ntet; ++c) volume[c] = share[c] * cell_volume(points, tets + 4 * size_t(c));
+    const std::vector<size_t> of_cell = labels_of(t, points, tets, volume);
     for (uint32_t c = 0; c < info.ntet; ++c) {
-      if (t.entries.size() > 1) of_cell[c] = label_of(t, points, tets + 4 * size_t(c));
       LabelReport &label = report_.labels[of_cell[c]];
       ++label.cells;
-      label.cell_volume += share[c] * cell_volume(points, tets + 4 * size_t(c));
+      label.cell_volume += volume[c];
     }
     for (const size_t e : t.entries) {
       const LabelReport &l = report_.labels[e];
@@ -299,10 +300,10 @@ class Maker {
             e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0])) / 6;
   }
 
-  // The label of this body that most of 35 places in the cell have; where none has one, the nearest voxel's.
-  size_t label_of(const Thing &t, const double *x, const uint32_t *tet) {
+  // Places in a cell that each label of this body has, of 35; where none has one, the nearest voxel's label.
+  std::map<size_t, int> votes_of(const Thing &t, const double *x, const uint32_t *tet) {
     constexpr int kParts = 4;
-    std::map<uint16_t, int> votes;
+    std::map<uint16_t, int> found;
     for (int a = 0; a <= kParts; ++a)
       for (int b = 0; a + b <= kParts; ++b)
         for (int c = 0; a + b + c <= kParts; ++c) {
@@ -311,17 +312,59 @@ class Maker {
           for (int i = 0; i < 4; ++i)
             for (int k = 0; k < 3; ++k)
               p[k] += (parts[i] + 0.25) / (kParts + 1) * x[3 * size_t(tet[i]) + size_t(k)];
-          ++votes[label_at(p)];
+          ++found[label_at(p)];
         }
-    size_t best = t.entries[0];
-    int most = 0;
-    for (const size_t e : t.entries) {
-      const auto found = votes.find(table_.entries[e].label);
-      if (found == votes.end() || found->second <= most) continue;
-      most = found->second;
-      best = e;
+    std::map<size_t, int> out;
+    for (const size_t e : t.entries)
+      if (const auto v = found.find(table_.entries[e].label); v != found.end()) out[e] = v->second;
+    if (out.empty()) out[nearest_label(t, x, tet)] = 1;
+    return out;
+  }
+
+  // One label for each cell. The one with most places would take from what is thin or round: a weight for each
+  // label is sought with which the cells have the volumes of the voxels.
+  std::vector<size_t> labels_of(const Thing &t, const double *points, const uint32_t *tets,
+                                const std::vector<double> &volume) {
+    constexpr int kRounds = 60;
+    std::vector<size_t> best(volume.size(), t.entries[0]);
+    if (t.entries.size() == 1) return best;
+    struct Vote {
+      size_t entry;
+      int places;
+    };
+    std::vector<Vote> votes;
+    std::vector<size_t> first = {0};
+    for (size_t c = 0; c < volume.size(); ++c) {
+      for (const auto &[entry, places] : votes_of(t, points, tets + 4 * c)) votes.push_back({entry, places});
+      first.push_back(votes.size());
     }
-    return most > 0 ? best : nearest_label(t, x, tet);
+    std::map<size_t, double> weight;
+    for (const size_t e : t.entries) weight[e] = 1;
+    double least = INFINITY;
+    for (int round = 0; round < kRounds; ++round) {
+      std::vector<size_t> out(volume.size());
+      std::map<size_t, double> held;
+      for (size_t c = 0; c < volume.size(); ++c) {
+        double most = 0;
+        for (size_t v = first[c]; v < first[c + 1]; ++v)
+          if (const double w = weight[votes[v].entry] * votes[v].places; w > most) {
+            most = w;
+            out[c] = votes[v].entry;
+          }
+        held[out[c]] += volume[c];
+      }
+      double off = 0;
+      for (const size_t e : t.entries) {
+        const double wanted = report_.labels[e].voxel_volume;
+        off = std::max(off, std::fabs(held[e] / wanted - 1));
+        weight[e] *= std::pow(std::min(std::max(wanted / std::max(held[e], 1e-300), 0.5), 2.0), 0.3);
+      }
+      if (off < least) {
+        least = off;
+        best = out;
+      }
+    }
+    return best;
   }
 
   void index_of(const double p[3], double out[3]) {
