@@ -1,4 +1,5 @@
-// deform mesh info FILE | make SHAPE --out FILE | convert IN OUT | fill SURFACE | from-labels VOLUME | phantom KIND
+// deform mesh info FILE | make SHAPE --out FILE | convert IN OUT | fill SURFACE | from-labels VOLUME |
+// phantom KIND
 #include "cmd_mesh.h"
 
 #include <CLI/CLI.hpp>

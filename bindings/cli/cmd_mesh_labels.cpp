@@ -17,7 +17,9 @@ namespace {
 
 std::string whole(uint64_t n) { return std::to_string(n); }
 
-std::string size_json(const std::array<uint32_t, 3> &n) { return json_array({whole(n[0]), whole(n[1]), whole(n[2])}); }
+std::string size_json(const std::array<uint32_t, 3> &n) {
+  return json_array({whole(n[0]), whole(n[1]), whole(n[2])});
+}
 
 std::string report_json(const labels::Report &r, const std::string &out) {
   std::vector<std::string> names, things, borders, warnings;
@@ -79,17 +81,18 @@ void print_table(const labels::Report &r, const labels::Options &o) {
   std::printf("%s: %u x %u x %u voxels", shown(o.volume).c_str(), r.size[0], r.size[1], r.size[2]);
   if (r.factor != std::array<uint32_t, 3>{1, 1, 1})
     std::printf(", joined by %u x %u x %u", r.factor[0], r.factor[1], r.factor[2]);
-  std::printf("\n  %-16s %-16s %10s %11s %11s %11s %9s %7s\n", "label", "part of", "voxels", "voxels, ml", "surface, ml",
-              "cells, ml", "triangles", "cells");
+  std::printf("\n  %-16s %-16s %10s %11s %11s %11s %9s %7s\n", "label", "part of", "voxels", "voxels, ml",
+              "surface, ml", "cells, ml", "triangles", "cells");
   for (const labels::LabelReport &l : r.labels)
-    std::printf("  %-16s %-16s %10zu %11.3f %11.3f %11s %9u %7s\n", shown(l.name).c_str(), shown(l.thing).c_str(),
-                l.voxels, 1e6 * l.voxel_volume, 1e6 * l.volume,
+    std::printf("  %-16s %-16s %10zu %11.3f %11.3f %11s %9u %7s\n", shown(l.name).c_str(),
+                shown(l.thing).c_str(), l.voxels, 1e6 * l.voxel_volume, 1e6 * l.volume,
                 l.obstacle ? "" : three(1e6 * l.cell_volume).c_str(), l.triangles,
                 l.obstacle ? "rigid" : std::to_string(l.cells).c_str());
   for (const labels::ThingReport &t : r.things)
     if (!t.obstacle)
-      std::printf("  %s: %u cells, %u triangles; quality of cells %.2f at least, %.2f on average (1: regular)\n",
-                  shown(t.name).c_str(), t.cells, t.triangles, t.quality_min, t.quality_mean);
+      std::printf(
+          "  %s: %u cells, %u triangles; quality of cells %.2f at least, %.2f on average (1: regular)\n",
+          shown(t.name).c_str(), t.cells, t.triangles, t.quality_min, t.quality_mean);
   for (const labels::Border &b : r.borders)
     std::printf("  %s is %s %s at %u points of their border\n", shown(b.a).c_str(),
                 b.held ? "held by" : "attached to", shown(b.b).c_str(), b.points);
@@ -134,7 +137,8 @@ int phantom(const Globals &globals, const std::string &kind, double voxel, const
     std::fputs(indented(JsonObject().add("file", quoted(out)).add("labels", json_array(rows)).text()).c_str(),
                stdout);
   } else if (!globals.quiet) {
-    std::printf("%s: %u x %u x %u voxels of %g mm\n", shown(out).c_str(), v.size[0], v.size[1], v.size[2], voxel);
+    std::printf("%s: %u x %u x %u voxels of %g mm\n", shown(out).c_str(), v.size[0], v.size[1], v.size[2],
+                voxel);
     for (size_t l = 1; l < v.value.size(); ++l)
       std::printf("  %lld  %-14s %10.3f ml\n", static_cast<long long>(v.value[l]),
                   v.name.at(v.value[l]).c_str(), 1e6 * made.exact[l]);
@@ -153,17 +157,23 @@ struct Given {
 void add_mesh_labels(CLI::App *mesh, Globals &globals, int *exit_code) {
   const auto given = std::make_shared<Given>();
   CLI::App *command = mesh->add_subcommand(
-      "from-labels", "a segmented scan (a volume of labels) as closed surfaces, bodies, obstacles and a scene");
-  command->add_option("VOLUME", given->options.volume, ".nrrd, .nhdr, .mha or .mhd with one whole number per voxel")
+      "from-labels",
+      "a segmented scan (a volume of labels) as closed surfaces, bodies, obstacles and a scene");
+  command
+      ->add_option("VOLUME", given->options.volume,
+                   ".nrrd, .nhdr, .mha or .mhd with one whole number per voxel")
       ->required();
   command->add_option("--out", given->options.out, "folder to write into: scene.json, labels.json, meshes")
       ->required()
       ->type_name("DIR");
-  command->add_option("--table", given->options.table,
-                      "JSON file that says what becomes of each label; without it one is written")
+  command
+      ->add_option("--table", given->options.table,
+                   "JSON file that says what becomes of each label; without it one is written")
       ->type_name("FILE");
-  command->add_option("--spacing", given->spacing,
-                      "mm: voxels are joined up to about this length; 0: never; auto: 96 voxels along the longest edge")
+  command
+      ->add_option(
+          "--spacing", given->spacing,
+          "mm: voxels are joined up to about this length; 0: never; auto: 96 voxels along the longest edge")
       ->capture_default_str()
       ->type_name("MM");
   command->add_option("--cells", given->options.cells, "about how many tetrahedra, of all bodies together")
@@ -172,17 +182,21 @@ void add_mesh_labels(CLI::App *mesh, Globals &globals, int *exit_code) {
   command->add_option("--smooth", given->options.passes, "passes of smoothing; 0: corners of voxels")
       ->capture_default_str()
       ->type_name("N");
-  command->add_option("--unit", given->unit, "of the lengths in the file, whatever it says: um, mm, cm, m or inch")
+  command
+      ->add_option("--unit", given->unit,
+                   "of the lengths in the file, whatever it says: um, mm, cm, m or inch")
       ->type_name("UNIT");
   command->callback([=, &globals] {
     labels::Options &o = given->options;
     if (!given->unit.empty() && (o.unit = labels::unit_of(given->unit)) == 0) {
-      *exit_code = fail("--unit: unknown unit of length \"" + given->unit + "\"; known are um, mm, cm, dm, m and inch");
+      *exit_code = fail("--unit: unknown unit of length \"" + given->unit +
+                        "\"; known are um, mm, cm, dm, m and inch");
       return;
     }
     if (given->spacing != "auto") {
       if (!labels::to_number(given->spacing, o.spacing) || o.spacing < 0) {
-        *exit_code = fail("--spacing: expected a length in mm from 0 on, or auto; found \"" + given->spacing + "\"");
+        *exit_code =
+            fail("--spacing: expected a length in mm from 0 on, or auto; found \"" + given->spacing + "\"");
         return;
       }
       o.spacing *= 1e-3;
@@ -196,9 +210,12 @@ void add_mesh_labels(CLI::App *mesh, Globals &globals, int *exit_code) {
 
   CLI::App *phantom_command = mesh->add_subcommand(
       "phantom", "a volume of labels made from ellipsoids and cylinders, with the volumes that these have");
-  phantom_command->add_option("KIND", given->kind, "abdomen, or nodule: a block of gel with a ball in it")->required();
+  phantom_command->add_option("KIND", given->kind, "abdomen, or nodule: a block of gel with a ball in it")
+      ->required();
   phantom_command->add_option("--out", given->out, "file to write, .nrrd")->required()->type_name("FILE");
-  phantom_command->add_option("--voxel", given->voxel, "edge of a voxel, mm")->capture_default_str()->type_name("MM");
+  phantom_command->add_option("--voxel", given->voxel, "edge of a voxel, mm")
+      ->capture_default_str()
+      ->type_name("MM");
   phantom_command->callback(
       [=, &globals] { *exit_code = phantom(globals, given->kind, given->voxel, given->out); });
 }

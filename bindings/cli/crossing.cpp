@@ -295,9 +295,9 @@ void Counter::test(const Item &ia, const Item &ib) {
   if (!overlap(ia.box, ib.box)) return;
   const Surface &sa = (*surfaces_)[ia.surface], &sb = (*surfaces_)[ib.surface];
   if (sa.obstacle && sb.obstacle) return;
-  if (!joined_->empty() &&
-      std::binary_search(joined_->begin(), joined_->end(),
-                         std::array<uint32_t, 2>{std::min(ia.surface, ib.surface), std::max(ia.surface, ib.surface)}))
+  if (!joined_->empty() && std::binary_search(joined_->begin(), joined_->end(),
+                                              std::array<uint32_t, 2>{std::min(ia.surface, ib.surface),
+                                                                      std::max(ia.surface, ib.surface)}))
     return;
   const uint32_t *ta = sa.tri + 3 * size_t(ia.triangle), *tb = sb.tri + 3 * size_t(ib.triangle);
   const double *a[3], *b[3];

@@ -23,13 +23,13 @@ struct Type {
   int bytes;
   bool is_signed;
 };
-const Type kTypes[] = {{"int8", "MET_CHAR", 1, true},          {"uchar", "MET_UCHAR", 1, false},
-                       {"short", "MET_SHORT", 2, true},        {"uint16_t", "MET_USHORT", 2, false},
-                       {"int", "MET_INT", 4, true},            {"unsigned int", "MET_UINT", 4, false},
-                       {"int64", "MET_LONG_LONG", 8, true},    {"uint64", "MET_ULONG_LONG", 8, false}};
+const Type kTypes[] = {{"int8", "MET_CHAR", 1, true},       {"uchar", "MET_UCHAR", 1, false},
+                       {"short", "MET_SHORT", 2, true},     {"uint16_t", "MET_USHORT", 2, false},
+                       {"int", "MET_INT", 4, true},         {"unsigned int", "MET_UINT", 4, false},
+                       {"int64", "MET_LONG_LONG", 8, true}, {"uint64", "MET_ULONG_LONG", 8, false}};
 
-const std::vector<int> kVoxels = {0, 1, 1, 0, 2, 2, 0, 1, 100, 100, 2, 0,
-                                  1, 0, 0, 2, 2, 1, 100, 0, 0, 0, 1, 2};  // 4 x 3 x 2
+const std::vector<int> kVoxels = {0, 1, 1, 0, 2, 2, 0,   1, 100, 100, 2, 0,
+                                  1, 0, 0, 2, 2, 1, 100, 0, 0,   0,   1, 2};  // 4 x 3 x 2
 
 std::string bytes_of(const std::vector<int> &voxels, int bytes, bool big) {
   std::string out;
@@ -61,11 +61,13 @@ std::string nrrd_header(const std::string &type, bool big, const std::string &en
          "\nspace origin: (10,-20,30.5)\nSegment0_LabelValue:=100\nSegment0_Name:=left lung\n\n";
 }
 
-std::string meta_header(const std::string &type, bool big, bool compressed, const std::string &file = "LOCAL") {
+std::string meta_header(const std::string &type, bool big, bool compressed,
+                        const std::string &file = "LOCAL") {
   return "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = " +
          std::string(big ? "True" : "False") + "\nCompressedData = " + (compressed ? "True" : "False") +
          "\nTransformMatrix = 1 0 0 0 0 1 0 -1 0\nOffset = 10 -20 30.5\nElementSpacing = 0.5 2 1.5\n"
-         "DimSize = 4 3 2\nElementType = " + type + "\nElementDataFile = " + file + "\n";
+         "DimSize = 4 3 2\nElementType = " +
+         type + "\nElementDataFile = " + file + "\n";
 }
 
 void expect_volume(const Volume &v, const std::string &what) {
@@ -97,7 +99,8 @@ std::string replaced(std::string text, const std::string &from, const std::strin
   return text.replace(at, from.size(), to);
 }
 
-// Balls in each other and beside each other, on axes that are oblique, anisotropic and, if asked, left-handed.
+// Balls in each other and beside each other, on axes that are oblique, anisotropic and, if asked,
+// left-handed.
 Volume balls(bool left_handed) {
   Volume v;
   v.size = {26, 22, 18};
@@ -184,15 +187,20 @@ TEST(LabelVolume, SpacingsUnitsAndSpaces_AreThoseOfTheFile) {
   v = labels::read_labels("x", plain + "spacings: 1 2 3\n\n" + data, 1e-6);
   EXPECT_NEAR(v.axis[1][1], 2e-6, 1e-18);
   // left-handed: what lies at anterior y goes to posterior -y
-  v = labels::read_labels("x", plain + "space: left-anterior-superior\nspace directions: (1,0,0) (0,1,0) (0,0,1)\n"
-                                       "space origin: (1,2,3)\n\n" + data, 0);
+  v = labels::read_labels("x",
+                          plain +
+                              "space: left-anterior-superior\nspace directions: (1,0,0) (0,1,0) (0,0,1)\n"
+                              "space origin: (1,2,3)\n\n" +
+                              data,
+                          0);
   EXPECT_LT(v.cell(), 0);
   EXPECT_NEAR(v.origin[1], -0.002, 1e-15);
 }
 
 TEST(LabelVolume, WrongFile_IsRefusedInOneSentence) {
   const std::string data = bytes_of(kVoxels, 2, false), head = nrrd_header("short", false, "raw");
-  const std::string zipped = nrrd_header("short", false, "gzip"), meta = meta_header("MET_SHORT", false, false);
+  const std::string zipped = nrrd_header("short", false, "gzip"),
+                    meta = meta_header("MET_SHORT", false, false);
   const std::string stream = packed(data, 31);
   std::string damaged = stream;
   damaged[12] = char(damaged[12] ^ 0x55);

@@ -36,7 +36,8 @@ const char *const kTable = R"({
     "5": {"name": "kidney_left", "body": "trunk", "material": "liver"},
     "6": {"name": "spine", "obstacle": true}
   },
-  "materials": {"fat": {"density": 950, "young": 5e3, "poisson": 0.4}, "liver": {"density": 1050, "young": 1e4, "poisson": 0.4}},
+  "materials": {"fat": {"density": 950, "young": 5e3, "poisson": 0.4},
+                "liver": {"density": 1050, "young": 1e4, "poisson": 0.4}},
   "bodies": {"trunk": {"cells": 900, "model": {"type": "linear_fem"}}},
   "scene": {"gravity": [0, 0.5, 0], "time": {"duration": 0.02, "step": 0.01, "integrator": "implicit_euler"}}
 })";
@@ -51,18 +52,20 @@ double number(const std::string &json, const std::string &pattern) {
 
 TEST(LabelsCommand, WithoutATable_MakesOneBodyOfRegionsThatRuns) {
   const std::string out = folder() + "/plain";
-  const auto made = test::deform({"mesh", "from-labels", phantom("nodule", "4"), "--out", out, "--cells", "3000"});
+  const auto made =
+      test::deform({"mesh", "from-labels", phantom("nodule", "4"), "--out", out, "--cells", "3000"});
   ASSERT_EQ(made.exit_code, 0) << made.err;
   for (const char *word : {"gel", "nodule", "closed: yes", "cross: 0", "quality of cells 0.9"})
     EXPECT_TRUE(has(made.out, word)) << word << " not in\n" << made.out;
   EXPECT_TRUE(has(made.err, "no table of labels is given")) << made.err;
   const auto info = test::deform({"mesh", "info", out + "/body.vtk"});
   EXPECT_TRUE(has(info.out, "gel") && has(info.out, "nodule")) << info.out;
-  const auto run = test::deform({"run", out + "/scene.json", "--time", "0.004", "--quiet", "--out", out + "/run"});
+  const auto run =
+      test::deform({"run", out + "/scene.json", "--time", "0.004", "--quiet", "--out", out + "/run"});
   EXPECT_EQ(run.exit_code, 0) << run.err;
   // what it wrote is the table that gives the same scene
-  const auto again = test::deform({"mesh", "from-labels", phantom("nodule", "4"), "--out", out + "/again", "--cells",
-                                   "3000", "--table", out + "/labels.json"});
+  const auto again = test::deform({"mesh", "from-labels", phantom("nodule", "4"), "--out", out + "/again",
+                                   "--cells", "3000", "--table", out + "/labels.json"});
   ASSERT_EQ(again.exit_code, 0) << again.err;
   EXPECT_FALSE(has(again.err, "no table")) << again.err;
   EXPECT_TRUE(has(again.err, "(nodule): its cells hold")) << again.err;  // few cells make a coarse ball
@@ -73,8 +76,8 @@ TEST(LabelsCommand, WithoutATable_MakesOneBodyOfRegionsThatRuns) {
 TEST(LabelsCommand, WithATable_MakesBodiesAnObstacleAndWhatHoldsThem) {
   const std::string table = folder() + "/table.json", out = folder() + "/organs";
   test::write_file(table, kTable);
-  const auto made = test::deform({"mesh", "from-labels", phantom("abdomen", "12"), "--table", table, "--out", out,
-                                  "--json"});
+  const auto made = test::deform(
+      {"mesh", "from-labels", phantom("abdomen", "12"), "--table", table, "--out", out, "--json"});
   ASSERT_EQ(made.exit_code, 0) << made.err;
   EXPECT_EQ(number(made.out, "open_edges"), 0);
   EXPECT_EQ(number(made.out, "crossing_pairs"), 0);
@@ -82,9 +85,9 @@ TEST(LabelsCommand, WithATable_MakesBodiesAnObstacleAndWhatHoldsThem) {
   EXPECT_EQ(made.out, test::read_file(out + "/summary.json"));
   EXPECT_FALSE(has(made.out, "lesion"));
   const std::string scene = test::read_file(out + "/scene.json");
-  for (const char *word :
-       {"\"fix\": [{\"group\": \"to_spine\"}]", "\"shape\": \"voxels\"", "\"to\": \"trunk\"", "\"linear_fem\"",
-        "\"kidney_left\": \"liver\"", "{\"between\": [\"trunk\", \"spine\"]}", "\"gravity\": [0, 0.5, 0]"})
+  for (const char *word : {"\"fix\": [{\"group\": \"to_spine\"}]", "\"shape\": \"voxels\"",
+                           "\"to\": \"trunk\"", "\"linear_fem\"", "\"kidney_left\": \"liver\"",
+                           "{\"between\": [\"trunk\", \"spine\"]}", "\"gravity\": [0, 0.5, 0]"})
     EXPECT_TRUE(has(scene, word)) << word << " not in\n" << scene;
   const auto run = test::deform({"run", out + "/scene.json", "--out", out + "/run", "--quiet"});
   EXPECT_EQ(run.exit_code, 0) << run.err;
@@ -93,7 +96,8 @@ TEST(LabelsCommand, WithATable_MakesBodiesAnObstacleAndWhatHoldsThem) {
 }
 
 TEST(LabelsCommand, WhatIsWrong_IsToldInOneSentence) {
-  const std::string volume = phantom("nodule", "6"), out = folder() + "/refused", table = folder() + "/wrong.json";
+  const std::string volume = phantom("nodule", "6"), out = folder() + "/refused",
+                    table = folder() + "/wrong.json";
   const auto refused = [&](const std::vector<std::string> &more, const std::string &words) {
     std::vector<std::string> args = {"mesh", "from-labels"};
     args.insert(args.end(), more.begin(), more.end());
@@ -107,15 +111,18 @@ TEST(LabelsCommand, WhatIsWrong_IsToldInOneSentence) {
     test::write_file(table, text);
     refused({volume, "--out", out, "--table", table}, words);
   };
-  const std::string begin = R"({"format": "deform-labels", "version": 1, "materials": {"gel": {"density": 1000, "young": 1e4}}, )";
-  with_table(begin + R"("labels": {"7": {"material": "gel"}}})", "/labels/7: the volume has no label 7; it has 1, 2");
+  const std::string begin =
+      R"({"format": "deform-labels", "version": 1, "materials": {"gel": {"density": 1000, "young": 1e4}}, )";
+  with_table(begin + R"("labels": {"7": {"material": "gel"}}})",
+             "/labels/7: the volume has no label 7; it has 1, 2");
   with_table(begin + R"("labels": {"1": {"material": "gle"}}})", "did you mean \"gel\"?");
   with_table(begin + R"("labels": {"1": {}}})", "\"material\" is missing");
   with_table(begin + R"("labels": {"1": {"colour": "red"}}})", "/labels/1/colour: no such key");
   with_table(begin + R"("labels": {"1": {"skip": true}, "2": {"skip": true}}})", "no label is left");
   with_table(begin + R"("labels": )", "wrong.json:1");
   with_table("[]", "expected an object");
-  const std::string whole = test::read_file(volume), cut = folder() + "/cut.nrrd", none = folder() + "/none.nrrd";
+  const std::string whole = test::read_file(volume), cut = folder() + "/cut.nrrd",
+                    none = folder() + "/none.nrrd";
   test::write_file(cut, whole.substr(0, whole.size() - 40));
   refused({cut, "--out", out}, "bytes too early");
   refused({none, "--out", out}, "none.nrrd");

@@ -117,7 +117,8 @@ class Composer {
   // Of all corners of one voxel.
   int critical_about(const Cell &voxel) const {
     int n = 0;
-    for (int b = 0; b < 8; ++b) n += critical(Cell{voxel[0] + (b & 1), voxel[1] + ((b >> 1) & 1), voxel[2] + (b >> 2)});
+    for (int b = 0; b < 8; ++b)
+      n += critical(Cell{voxel[0] + (b & 1), voxel[1] + ((b >> 1) & 1), voxel[2] + (b >> 2)});
     return n;
   }
   int faces(const Cell &c) const {
@@ -183,7 +184,8 @@ class Composer {
     }
     for (int b = 0; b < 8; ++b)
       if (a.label[b] != kOutside && a.label[b] != most)
-        change({corner[0] - 1 + (b & 1), corner[1] - 1 + ((b >> 1) & 1), corner[2] - 1 + (b >> 2)}, most, out);
+        change({corner[0] - 1 + (b & 1), corner[1] - 1 + ((b >> 1) & 1), corner[2] - 1 + (b >> 2)}, most,
+               out);
   }
 
   Volume &v_;
@@ -196,8 +198,9 @@ class Composer {
 Repaired compose(const std::string &path, Volume &volume, const std::vector<uint32_t> &group) {
   Repaired out;
   if (!Composer(volume, group).run(out))
-    refuse(path, "the labels touch themselves along edges of voxels in so many places that they enclose no "
-                 "solids; smooth the label map, or give a larger --spacing");
+    refuse(path,
+           "the labels touch themselves along edges of voxels in so many places that they enclose no "
+           "solids; smooth the label map, or give a larger --spacing");
   return out;
 }
 

@@ -17,7 +17,7 @@ using cli::JsonValue;
 using cli::number;
 using cli::quoted;
 
-constexpr double kCellsAcross = 96;   // by default the labels are at most so many voxels long
+constexpr double kCellsAcross = 96;  // by default the labels are at most so many voxels long
 constexpr uint32_t kFewestCells = 200;
 constexpr size_t kFewVoxels = 27;
 
@@ -61,11 +61,15 @@ class Maker {
     for (const std::string &note : volume_.notes) warn(o_.volume + ": " + note);
     if (volume_.value.size() == 1)
       refuse(o_.volume, "every voxel is 0, which is the background; give a volume with labels");
-    table_ = o_.table.empty() ? default_table(volume_, touching_labels(volume_)) : read_table(o_.table, volume_);
+    table_ =
+        o_.table.empty() ? default_table(volume_, touching_labels(volume_)) : read_table(o_.table, volume_);
     for (const std::string &w : table_.warnings) warn(w);
     if (o_.table.empty())
-      warn("no table of labels is given: all labels got the material \"tissue\", and those that touch form one "
-           "body; change " + o_.out + "/labels.json and give it by --table");
+      warn(
+          "no table of labels is given: all labels got the material \"tissue\", and those that touch form "
+          "one "
+          "body; change " +
+          o_.out + "/labels.json and give it by --table");
     std::vector<bool> kept(volume_.value.size(), false);
     for (const Entry &e : table_.entries) kept[e.label] = true;
     count_.assign(volume_.value.size(), 0);
@@ -95,26 +99,28 @@ class Maker {
     const double spacing = o_.spacing < 0 ? longest / kCellsAcross : o_.spacing;
     for (size_t k = 0; k < 3; ++k)
       report_.factor[k] = uint32_t(std::min(std::max(1.0, std::floor(spacing / step[k] + 0.5)), 1024.0));
-    if (report_.factor != std::array<uint32_t, 3>{1, 1, 1}) volume_ = cropped(coarsened(volume_, report_.factor));
+    if (report_.factor != std::array<uint32_t, 3>{1, 1, 1})
+      volume_ = cropped(coarsened(volume_, report_.factor));
     if (volume_.voxels() > size_t(1) << 27)
-      refuse(o_.volume, "%u x %u x %u voxels are left; give a larger --spacing", volume_.size[0], volume_.size[1],
-             volume_.size[2]);
+      refuse(o_.volume, "%u x %u x %u voxels are left; give a larger --spacing", volume_.size[0],
+             volume_.size[1], volume_.size[2]);
     std::vector<uint32_t> group(volume_.value.size(), 0);
     for (const Entry &e : table_.entries) group[e.label] = uint32_t(e.thing) + 1;
     repaired_ = compose(o_.volume, volume_, group);
     report_.taken = volume_.size;
     if (repaired_.voxels)
-      warn(std::to_string(repaired_.voxels) +
-           (repaired_.voxels == 1 ? " voxel has" : " voxels have") +
-           " another label than in the file: there a label touched itself along an edge or at a corner alone, "
-           "which is no surface of a solid");
+      warn(
+          std::to_string(repaired_.voxels) + (repaired_.voxels == 1 ? " voxel has" : " voxels have") +
+          " another label than in the file: there a label touched itself along an edge or at a corner alone, "
+          "which is no surface of a solid");
     std::vector<bool> left(volume_.value.size(), false);
     for (const uint16_t v : volume_.voxel) left[v] = true;
     for (const Entry &e : table_.entries)
       if (!left[e.label])
-        refuse(o_.volume, "%s has %zu voxels and is lost where %u x %u x %u of them are joined; give a smaller "
-                          "--spacing, or leave it out by \"skip\": true", told(e).c_str(), count_[e.label],
-               report_.factor[0], report_.factor[1], report_.factor[2]);
+        refuse(o_.volume,
+               "%s has %zu voxels and is lost where %u x %u x %u of them are joined; give a smaller "
+               "--spacing, or leave it out by \"skip\": true",
+               told(e).c_str(), count_[e.label], report_.factor[0], report_.factor[1], report_.factor[2]);
   }
 
   std::string beyond(uint16_t label) const {
@@ -174,7 +180,9 @@ class Maker {
     if (std::fabs(r.volume / r.voxel_volume - 1) > 0.02)
       warn(told(e) + ": its surface encloses " +
            std::to_string(std::lround(100 * std::fabs(r.volume / r.voxel_volume - 1))) +
-           (r.volume < r.voxel_volume ? " % less than" : " % more than") + " its voxels do" + (report_.factor[0] * report_.factor[1] * report_.factor[2] > 1 ? "; a smaller --spacing keeps more" : ""));
+           (r.volume < r.voxel_volume ? " % less than" : " % more than") + " its voxels do" +
+           (report_.factor[0] * report_.factor[1] * report_.factor[2] > 1 ? "; a smaller --spacing keeps more"
+                                                                          : ""));
     if (r.at_border)
       warn(told(e) + " reaches the border of the volume, where its surface is closed by a plane");
     report_.labels.push_back(r);
@@ -213,7 +221,8 @@ class Maker {
     return std::sqrt(sum) / 2;
   }
 
-  // A body is held where it meets an obstacle, and attached to bodies that come before it. edge: m, of its cells
+  // A body is held where it meets an obstacle, and attached to bodies that come before it. edge: m, of its
+  // cells
   void add_borders(size_t thing, const Shell &shell, const std::vector<std::string> &group, double edge) {
     for (size_t other = 0; other < table_.things.size(); ++other) {
       const Thing &a = table_.things[thing], &b = table_.things[other];
@@ -279,10 +288,13 @@ class Maker {
       const LabelReport &l = report_.labels[e];
       const double more = l.cell_volume / l.voxel_volume - 1;
       if (l.cells > 0 && std::fabs(more) > 0.1)
-        warn(told(table_.entries[e]) + ": its cells hold " + std::to_string(std::lround(100 * std::fabs(more))) +
-             (more < 0 ? " % less than" : " % more than") + " its voxels do; give more cells by --cells or in the table");
+        warn(told(table_.entries[e]) + ": its cells hold " +
+             std::to_string(std::lround(100 * std::fabs(more))) +
+             (more < 0 ? " % less than" : " % more than") +
+             " its voxels do; give more cells by --cells or in the table");
       if (l.cells == 0)
-        warn(told(table_.entries[e]) + " is smaller than a cell and has none; give more cells by --cells or in "
+        warn(told(table_.entries[e]) +
+             " is smaller than a cell and has none; give more cells by --cells or in "
              "the table");
     }
     write_vtk(o_.out + "/" + t.name + ".vtk", t, info, points, tets, share, of_cell);
@@ -296,8 +308,10 @@ class Maker {
     double e[3][3];
     for (size_t k = 0; k < 3; ++k)
       for (size_t c = 0; c < 3; ++c) e[k][c] = x[3 * size_t(tet[k + 1]) + c] - x[3 * size_t(tet[0]) + c];
-    return (e[0][0] * (e[1][1] * e[2][2] - e[1][2] * e[2][1]) - e[0][1] * (e[1][0] * e[2][2] - e[1][2] * e[2][0]) +
-            e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0])) / 6;
+    return (e[0][0] * (e[1][1] * e[2][2] - e[1][2] * e[2][1]) -
+            e[0][1] * (e[1][0] * e[2][2] - e[1][2] * e[2][0]) +
+            e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0])) /
+           6;
   }
 
   // Places in a cell that each label of this body has, of 35; where none has one, the nearest voxel's label.
@@ -321,8 +335,8 @@ class Maker {
     return out;
   }
 
-  // One label for each cell. The one with most places would take from what is thin or round: a weight for each
-  // label is sought with which the cells have the volumes of the voxels.
+  // One label for each cell. The one with most places would take from what is thin or round: a weight for
+  // each label is sought with which the cells have the volumes of the voxels.
   std::vector<size_t> labels_of(const Thing &t, const double *points, const uint32_t *tets,
                                 const std::vector<double> &volume) {
     constexpr int kRounds = 60;
@@ -372,7 +386,8 @@ class Maker {
       const auto &a = volume_.axis;
       for (size_t k = 0; k < 3; ++k) {
         const double *u = a[(k + 1) % 3], *w = a[(k + 2) % 3];
-        const double row[3] = {u[1] * w[2] - u[2] * w[1], u[2] * w[0] - u[0] * w[2], u[0] * w[1] - u[1] * w[0]};
+        const double row[3] = {u[1] * w[2] - u[2] * w[1], u[2] * w[0] - u[0] * w[2],
+                               u[0] * w[1] - u[1] * w[0]};
         for (const double r : row) inverse_.push_back(r / volume_.cell());
       }
     }
@@ -384,7 +399,8 @@ class Maker {
   uint16_t voxel(int64_t i, int64_t j, int64_t k) const {
     if (i < 0 || j < 0 || k < 0 || i >= volume_.size[0] || j >= volume_.size[1] || k >= volume_.size[2])
       return kOutside;
-    return volume_.voxel[size_t(i) + size_t(volume_.size[0]) * (size_t(j) + size_t(volume_.size[1]) * size_t(k))];
+    return volume_
+        .voxel[size_t(i) + size_t(volume_.size[0]) * (size_t(j) + size_t(volume_.size[1]) * size_t(k))];
   }
   uint16_t label_at(const double p[3]) {
     double c[3];
@@ -417,8 +433,10 @@ class Maker {
                  const uint32_t *tets, const double *share, const std::vector<size_t> &of_cell) const {
     const std::string npoint = std::to_string(info.npoint), ncell = std::to_string(info.ntet),
                       ngroup = std::to_string(t.entries.size());
-    std::string text = "# vtk DataFile Version 3.0\ncells of a body, in groups by label\nASCII\n"
-                       "DATASET UNSTRUCTURED_GRID\nFIELD FieldData 2\ngroup_number 2 " + ngroup + " int\n";
+    std::string text =
+        "# vtk DataFile Version 3.0\ncells of a body, in groups by label\nASCII\n"
+        "DATASET UNSTRUCTURED_GRID\nFIELD FieldData 2\ngroup_number 2 " +
+        ngroup + " int\n";
     for (const size_t e : t.entries) text += "3 " + std::to_string(e + 1) + "\n";
     text += "group_name 1 " + ngroup + " string\n";
     for (const size_t e : t.entries) text += table_.entries[e].name + "\n";
@@ -448,7 +466,8 @@ class Maker {
     else {
       JsonObject materials;
       for (const size_t e : t.entries)
-        if (report_.labels[e].cells) materials.add(table_.entries[e].name, quoted(table_.entries[e].material));
+        if (report_.labels[e].cells)
+          materials.add(table_.entries[e].name, quoted(table_.entries[e].material));
       out.add("materials_by_group", materials.text());
     }
     if (!t.more.find("model")) out.add("model", "{\"type\": \"corotational_fem\"}");
@@ -473,7 +492,8 @@ class Maker {
   }
 
   // Ours, then those of the table.
-  static void add_list(JsonObject &out, const char *key, std::vector<std::string> ours, const JsonValue &more) {
+  static void add_list(JsonObject &out, const char *key, std::vector<std::string> ours,
+                       const JsonValue &more) {
     if (const JsonValue *own = more.find(key))
       for (const JsonValue &a : own->items) ours.push_back(cli::json_text(a));
     if (!ours.empty()) out.add(key, cli::json_array(ours));
@@ -525,9 +545,8 @@ class Maker {
   }
 
   void write_scene() {
-    std::map<std::string, std::string> rest = {
-        {"time", "{\"duration\": 1, \"step\": 0.002}"},
-        {"output", output_json()}};
+    std::map<std::string, std::string> rest = {{"time", "{\"duration\": 1, \"step\": 0.002}"},
+                                               {"output", output_json()}};
     std::vector<std::string> obstacles, bodies;
     bool held = false;
     for (const Thing &t : table_.things) {
@@ -547,8 +566,11 @@ class Maker {
       for (const JsonValue &o : own->items) obstacles.push_back(cli::json_text(o));
     else if (!held) {
       const double point[3] = {0, 0, lowest_};
-      obstacles.push_back(
-          JsonObject().add("name", "\"floor\"").add("shape", "\"plane\"").add("point", cli::json_vector(point)).text());
+      obstacles.push_back(JsonObject()
+                              .add("name", "\"floor\"")
+                              .add("shape", "\"plane\"")
+                              .add("point", cli::json_vector(point))
+                              .text());
     }
     for (const cli::JsonMember &m : table_.scene.members)
       if (m.name != "obstacles" && m.name != "contact") rest[m.name] = cli::json_text(m.value);
@@ -591,8 +613,8 @@ class Maker {
   const Options &o_;
   Volume volume_;
   Table table_;
-  std::vector<size_t> count_;    // voxels per label, of the file
-  std::vector<double> target_;   // m3
+  std::vector<size_t> count_;   // voxels per label, of the file
+  std::vector<double> target_;  // m3
   Repaired repaired_;
   Surfaces surfaces_;
   std::vector<double> inverse_;  // rows that give voxels for meters

@@ -12,9 +12,9 @@ namespace labels {
 struct Options {
   std::string volume, table, out;  // table: empty: defaults
   double unit = 0;                 // m; 0: as the file says
-  double spacing = -1;             // m: voxels are joined up to about this length; 0: never; below 0: by the size
-  uint32_t passes = 10;            // of smoothing
-  uint32_t cells = 10000;          // of all bodies together, about
+  double spacing = -1;     // m: voxels are joined up to about this length; 0: never; below 0: by the size
+  uint32_t passes = 10;    // of smoothing
+  uint32_t cells = 10000;  // of all bodies together, about
 };
 
 // What was made of one label.

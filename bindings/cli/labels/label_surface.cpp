@@ -5,9 +5,9 @@
 //
 // Smoothing is Taubin's (A signal processing approach to fair surface design, 1995, section 3.1): a step
 // inward by lambda and one outward by mu leave what is longer than a few voxels. Where three labels meet,
-// vertices are averaged along that line alone. Then the volumes are set right: with g_a(x) the gradient of the
-// volume of label a, vertices move by sum_a p_a g_a / A, A the area around a vertex, and the pressures p_a are
-// those for which every volume meets its target to first order.
+// vertices are averaged along that line alone. Then the volumes are set right: with g_a(x) the gradient of
+// the volume of label a, vertices move by sum_a p_a g_a / A, A the area around a vertex, and the pressures
+// p_a are those for which every volume meets its target to first order.
 #include "label_surface.h"
 
 #include <algorithm>
@@ -24,7 +24,9 @@ constexpr int kVolumeRounds = 4;
 
 struct Point { double x[3]; };
 
-Point operator-(const Point &a, const Point &b) { return {{a.x[0] - b.x[0], a.x[1] - b.x[1], a.x[2] - b.x[2]}}; }
+Point operator-(const Point &a, const Point &b) {
+  return {{a.x[0] - b.x[0], a.x[1] - b.x[1], a.x[2] - b.x[2]}};
+}
 Point cross(const Point &a, const Point &b) {
   return {{a.x[1] * b.x[2] - a.x[2] * b.x[1], a.x[2] * b.x[0] - a.x[0] * b.x[2],
            a.x[0] * b.x[1] - a.x[1] * b.x[0]}};
@@ -113,13 +115,16 @@ class Net {
                          under = label(i, j, k - 1);
           if (between(under, own))
             add({vertex(below, i, j, k), vertex(below, i + 1, j, k), vertex(below, i + 1, j + 1, k),
-                 vertex(below, i, j + 1, k)}, under, own);
+                 vertex(below, i, j + 1, k)},
+                under, own);
           if (between(left, own))
             add({vertex(below, i, j, k), vertex(below, i, j + 1, k), vertex(above, i, j + 1, k + 1),
-                 vertex(above, i, j, k + 1)}, left, own);
+                 vertex(above, i, j, k + 1)},
+                left, own);
           if (between(front, own))
             add({vertex(below, i, j, k), vertex(above, i, j, k + 1), vertex(above, i + 1, j, k + 1),
-                 vertex(below, i + 1, j, k)}, front, own);
+                 vertex(below, i + 1, j, k)},
+                front, own);
         }
       below.swap(above);
       std::fill(above.begin(), above.end(), UINT32_MAX);
@@ -142,9 +147,8 @@ class Net {
         const uint32_t a = q.corner[c], b = q.corner[(c + 1) & 3];
         sides.push_back({std::min(a, b), std::max(a, b), {q.behind, q.front}});
       }
-    std::sort(sides.begin(), sides.end(), [](const Side &s, const Side &t) {
-      return s.a != t.a ? s.a < t.a : s.b < t.b;
-    });
+    std::sort(sides.begin(), sides.end(),
+              [](const Side &s, const Side &t) { return s.a != t.a ? s.a < t.a : s.b < t.b; });
     struct Edge {
       uint32_t a, b;
       bool line;  // three labels or more
@@ -213,7 +217,8 @@ class Net {
 
   // The shorter diagonal divides a quadrilateral, of equal ones the first, whatever side is looked at.
   bool first_diagonal(const Quad &q) const {
-    const Point d0 = meters(at_[q.corner[2]] - at_[q.corner[0]]), d1 = meters(at_[q.corner[3]] - at_[q.corner[1]]);
+    const Point d0 = meters(at_[q.corner[2]] - at_[q.corner[0]]),
+                d1 = meters(at_[q.corner[3]] - at_[q.corner[1]]);
     return dot(d0, d0) <= dot(d1, d1);
   }
   // Corners of its triangles, counter-clockwise seen from the front also where the axes are left-handed.
@@ -378,7 +383,8 @@ class Net {
       for (int i = 1; i < 4; ++i) least = std::min(least, corner_[c[i]].x[k]);
       return int64_t(least + 0.75);
     };
-    for (uint32_t q = 0; q < quads_.size(); ++q) entries.push_back({key(corner(q, 0), corner(q, 1), corner(q, 2)), q});
+    for (uint32_t q = 0; q < quads_.size(); ++q)
+      entries.push_back({key(corner(q, 0), corner(q, 1), corner(q, 2)), q});
     std::sort(entries.begin(), entries.end(), [](const Entry &a, const Entry &b) {
       return a.key != b.key ? a.key < b.key : a.quad < b.quad;
     });
@@ -463,7 +469,7 @@ class Net {
   const Volume &v_;
   const std::vector<double> &target_;
   int64_t n_[3];
-  double per_meter_ = 1;  // steps of the decimals of coordinates
+  double per_meter_ = 1;                    // steps of the decimals of coordinates
   std::vector<Point> corner_, at_, world_;  // voxels, voxels, m
   std::vector<Quad> quads_;
   std::vector<uint32_t> first_, neighbor_;
@@ -502,7 +508,8 @@ Shell shell_of(const Surfaces &s, const std::vector<bool> &inside) {
     }
   std::sort(edges.begin(), edges.end());
   for (size_t i = 0, n; i < edges.size(); i += n) {
-    for (n = 1; i + n < edges.size() && edges[i + n][0] == edges[i][0] && edges[i + n][1] == edges[i][1]; ++n) {}
+    for (n = 1; i + n < edges.size() && edges[i + n][0] == edges[i][0] && edges[i + n][1] == edges[i][1];
+         ++n) {}
     out.open_edges += n != 2 || edges[i][2] == edges[i + 1][2];
   }
   if (!out.points.empty()) {
@@ -510,7 +517,8 @@ Shell shell_of(const Surfaces &s, const std::vector<bool> &inside) {
     std::copy_n(out.points.data(), 3, o.x);
     for (size_t t = 0; t < out.beyond.size(); ++t) {
       Point p[3];
-      for (size_t i = 0; i < 3; ++i) std::copy_n(&out.points[3 * size_t(out.triangles[3 * t + i])], 3, p[i].x);
+      for (size_t i = 0; i < 3; ++i)
+        std::copy_n(&out.points[3 * size_t(out.triangles[3 * t + i])], 3, p[i].x);
       out.volume += dot(p[0] - o, cross(p[1] - o, p[2] - o)) / 6;
     }
   }

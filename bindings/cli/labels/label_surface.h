@@ -38,9 +38,9 @@ struct Surfaces {
   // [ntriangle] labels (index into value, or kOutside) behind a triangle and in front of it: its corners turn
   // counter-clockwise seen from the front
   std::vector<std::array<uint16_t, 2>> sides;
-  std::vector<double> volume;       // [value.size()] m3 enclosed
-  size_t put_back = 0;              // vertices that went back toward their corner, so that nothing crosses
-  size_t crossing = 0;              // pairs of triangles that cross or fold onto each other: 0
+  std::vector<double> volume;  // [value.size()] m3 enclosed
+  size_t put_back = 0;         // vertices that went back toward their corner, so that nothing crosses
+  size_t crossing = 0;         // pairs of triangles that cross or fold onto each other: 0
 };
 // target: [value.size()] m3, volumes that smoothing is to keep. passes: of smoothing; 0: corners of voxels.
 Surfaces surfaces_of(const Volume &cropped, const std::vector<double> &target, uint32_t passes);

@@ -19,8 +19,8 @@ constexpr uint32_t kMostCells = 5000000;
 std::string plain_name(const std::string &name) {
   std::string out;
   for (const char c : name) {
-    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
-                       c == '-' || (c == '.' && !out.empty());
+    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                       c == '_' || c == '-' || (c == '.' && !out.empty());
     out += plain ? c : '_';
   }
   return out.substr(0, 60);
@@ -59,8 +59,7 @@ class Reader {
       need_object(*s, "/scene");
       for (const JsonMember &key : s->members)
         for (const char *ours : {"format", "version", "materials", "bodies"})
-          if (key.name == ours)
-            refuse(path_, "/scene/%s: is written from the labels; remove it here", ours);
+          if (key.name == ours) refuse(path_, "/scene/%s: is written from the labels; remove it here", ours);
       out_.scene = *s;
     }
     const JsonValue *list = root.find("labels");
@@ -141,7 +140,8 @@ class Reader {
                        volume_.value.begin());
     const auto named = volume_.name.find(value);
     e.name = text(m.value, "name", pointer);
-    if (e.name.empty()) e.name = named != volume_.name.end() ? named->second : "label_" + std::to_string(value);
+    if (e.name.empty())
+      e.name = named != volume_.name.end() ? named->second : "label_" + std::to_string(value);
     e.name = plain_name(e.name);
     const bool obstacle = truth(m.value, "obstacle", pointer);
     std::string thing = text(m.value, "body", pointer);
@@ -151,8 +151,10 @@ class Reader {
     thing = plain_name(thing.empty() ? e.name : thing);
     e.material = text(m.value, "material", pointer);
     if (!obstacle && e.material.empty())
-      refuse(path_, "%s: \"material\" is missing; name one of /materials, or say \"obstacle\": true or "
-                    "\"skip\": true", pointer.c_str());
+      refuse(path_,
+             "%s: \"material\" is missing; name one of /materials, or say \"obstacle\": true or "
+             "\"skip\": true",
+             pointer.c_str());
     if (!e.material.empty() && !out_.materials.find(e.material)) {
       std::vector<std::string> names;
       for (const JsonMember &k : out_.materials.members) names.push_back(k.name);
@@ -161,7 +163,8 @@ class Reader {
              near.empty() ? "" : ("; did you mean \"" + near + "\"?").c_str());
     }
     for (const Entry &other : out_.entries)
-      if (other.name == e.name) refuse(path_, "%s/name: another label has the name %s", pointer.c_str(), e.name.c_str());
+      if (other.name == e.name)
+        refuse(path_, "%s/name: another label has the name %s", pointer.c_str(), e.name.c_str());
     size_t t = 0;
     while (t < out_.things.size() && out_.things[t].name != thing) ++t;
     if (t == out_.things.size()) {
@@ -233,9 +236,10 @@ std::vector<std::array<uint16_t, 2>> touching_labels(const Volume &v) {
 
 Table default_table(const Volume &v, const std::vector<std::array<uint16_t, 2>> &touch) {
   Table out;
-  cli::parse_json("{\"tissue\": {\"density\": 1000, \"young\": 1e4, \"poisson\": 0.4, "
-                  "\"damping\": {\"mass\": 1, \"stiffness\": 0.005}}}",
-                  out.materials);
+  cli::parse_json(
+      "{\"tissue\": {\"density\": 1000, \"young\": 1e4, \"poisson\": 0.4, "
+      "\"damping\": {\"mass\": 1, \"stiffness\": 0.005}}}",
+      out.materials);
   std::vector<uint16_t> first(v.value.size());
   for (size_t i = 0; i < first.size(); ++i) first[i] = uint16_t(i);
   bool changed = true;

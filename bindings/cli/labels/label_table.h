@@ -26,7 +26,8 @@ struct Table {
   std::vector<std::string> warnings;
 };
 
-// Checks the file against the labels that the volume has. Throws cli::Failure: file, JSON pointer, what to do.
+// Checks the file against the labels that the volume has. Throws cli::Failure: file, JSON pointer, what to
+// do.
 Table read_table(const std::string &path, const Volume &volume);
 // Labels that share a border become one body of several materials; all have the same material.
 // touch: [n,2] labels that share a border

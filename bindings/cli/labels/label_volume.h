@@ -18,7 +18,7 @@ struct Volume {
   double origin[3] = {0, 0, 0};    // m, center of the first voxel
   double axis[3][3] = {};          // m, from a voxel's center to that of its next along axis k
   std::vector<uint16_t> voxel;     // index into `value`
-  std::vector<int64_t> value;      // labels as the file has them, ascending; 0 is always the first listed here
+  std::vector<int64_t> value;  // labels as the file has them, ascending; 0 is always the first listed here
   std::map<int64_t, std::string> name;  // those that the file names
   std::vector<std::string> notes;       // what was assumed, one sentence each
 
@@ -29,12 +29,12 @@ struct Volume {
 
 // How a header says that its voxels are stored.
 struct Encoding {
-  uint32_t bytes = 0;      // of a value: 1, 2, 4, 8
+  uint32_t bytes = 0;  // of a value: 1, 2, 4, 8
   bool is_signed = false, big_endian = false, compressed = false;
 };
 
-// Reads a .nrrd, .nhdr, .mha or .mhd file; what it is its content says. Throws cli::Failure with one sentence:
-// the file, the line or field, what to do.
+// Reads a .nrrd, .nhdr, .mha or .mhd file; its content says which it is. Throws cli::Failure with one
+// sentence: the file, the line or field, what to do.
 // unit: m that a length of 1 in the file has; 0: as the file says, else millimeters with a note
 Volume read_labels(const std::string &path, double unit = 0);
 
@@ -46,13 +46,13 @@ Volume read_labels(const std::string &path, std::string_view bytes, double unit)
 
 // A header and the bytes behind it.
 struct Stored {
-  Volume volume;                // all but voxel and value
+  Volume volume;  // all but voxel and value
   Encoding encoding;
-  std::string file;                // with the voxels, as the header names it; empty: they follow the header
-  int64_t skip = 0;                // bytes before the data; -1: the data are the last bytes
+  std::string file;  // with the voxels, as the header names it; empty: they follow the header
+  int64_t skip = 0;  // bytes before the data; -1: the data are the last bytes
   uint32_t skip_lines = 0;
-  size_t data_at = 0;              // where the header ends
-  double unit = 0;                 // m; 0: the header does not say
+  size_t data_at = 0;  // where the header ends
+  double unit = 0;     // m; 0: the header does not say
 };
 [[noreturn]] void refuse(const std::string &path, const char *sentence, ...)
     __attribute__((format(printf, 2, 3)));

@@ -104,7 +104,8 @@ Phantom make_phantom(const std::string &kind, double voxel) {
 }
 
 std::string nrrd_text(const Volume &v) {
-  std::string out = "NRRD0005\n# made by deform mesh phantom\ntype: uint8\ndimension: 3\nspace dimension: 3\nsizes:";
+  std::string out =
+      "NRRD0005\n# made by deform mesh phantom\ntype: uint8\ndimension: 3\nspace dimension: 3\nsizes:";
   const auto digits = [](double meters) {
     char text[40];
     std::snprintf(text, sizeof text, "%.12g", 1e3 * meters);

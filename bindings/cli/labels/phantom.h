@@ -1,5 +1,5 @@
-// Volumes of labels that are made from balls, ellipsoids and cylinders, with the volumes that these have: data
-// for examples and tests that need no file from outside.
+// Volumes of labels that are made from ellipsoids, cylinders and boxes, with the volumes that these have:
+// data for examples and tests that need no file from outside.
 #pragma once
 #include "label_volume.h"
 

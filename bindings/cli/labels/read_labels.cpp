@@ -79,12 +79,27 @@ std::string quoted_part(std::string_view text) {
 
 double unit_of(std::string_view name) {
   const std::string word = lower(name);
-  const struct { const char *name; double meters; } kUnits[] = {
-      {"mm", 1e-3}, {"millimeter", 1e-3}, {"millimeters", 1e-3}, {"millimetre", 1e-3},
-      {"m", 1},     {"meter", 1},         {"meters", 1},         {"metre", 1},
-      {"cm", 1e-2}, {"centimeter", 1e-2}, {"dm", 1e-1},          {"um", 1e-6},
-      {"\xc2\xb5m", 1e-6}, {"\xce\xbcm", 1e-6}, {"micrometer", 1e-6}, {"micron", 1e-6},
-      {"inch", 0.0254}, {"in", 0.0254}};
+  const struct {
+    const char *name;
+    double meters;
+  } kUnits[] = {{"mm", 1e-3},
+                {"millimeter", 1e-3},
+                {"millimeters", 1e-3},
+                {"millimetre", 1e-3},
+                {"m", 1},
+                {"meter", 1},
+                {"meters", 1},
+                {"metre", 1},
+                {"cm", 1e-2},
+                {"centimeter", 1e-2},
+                {"dm", 1e-1},
+                {"um", 1e-6},
+                {"\xc2\xb5m", 1e-6},
+                {"\xce\xbcm", 1e-6},
+                {"micrometer", 1e-6},
+                {"micron", 1e-6},
+                {"inch", 0.0254},
+                {"in", 0.0254}};
   for (const auto &u : kUnits)
     if (word == u.name) return u.meters;
   return 0;
@@ -92,7 +107,8 @@ double unit_of(std::string_view name) {
 
 double Volume::cell() const {
   const auto &a = axis;
-  return a[0][0] * (a[1][1] * a[2][2] - a[1][2] * a[2][1]) - a[0][1] * (a[1][0] * a[2][2] - a[1][2] * a[2][0]) +
+  return a[0][0] * (a[1][1] * a[2][2] - a[1][2] * a[2][1]) -
+         a[0][1] * (a[1][0] * a[2][2] - a[1][2] * a[2][0]) +
          a[0][2] * (a[1][0] * a[2][1] - a[1][1] * a[2][0]);
 }
 
@@ -159,10 +175,11 @@ class Collector {
     const auto [entry, is_new] = index_.emplace(value, uint16_t(out_.value.size()));
     if (is_new) {
       if (out_.value.size() == kMostLabels)
-        refuse(path_,
-               "more than %zu values differ, so these are gray values and not labels; give the label map that "
-               "a segmentation program writes",
-               kMostLabels);
+        refuse(
+            path_,
+            "more than %zu values differ, so these are gray values and not labels; give the label map that "
+            "a segmentation program writes",
+            kMostLabels);
       out_.value.push_back(value);
     }
     last_ = value;
@@ -181,8 +198,9 @@ class Collector {
 };
 
 [[noreturn]] void truncated(const std::string &path, uint64_t missing) {
-  refuse(path, "the voxels end %llu bytes too early: the file is cut off, or its header gives another size or "
-               "type; copy or save it again",
+  refuse(path,
+         "the voxels end %llu bytes too early: the file is cut off, or its header gives another size or "
+         "type; copy or save it again",
          static_cast<unsigned long long>(missing));
 }
 
@@ -278,19 +296,23 @@ void read_voxels(const std::string &path, std::string_view bytes, const Stored &
 void check_axes(const std::string &path, const Volume &v) {
   double length[3];
   for (int k = 0; k < 3; ++k) {
-    length[k] = std::sqrt(v.axis[k][0] * v.axis[k][0] + v.axis[k][1] * v.axis[k][1] + v.axis[k][2] * v.axis[k][2]);
+    length[k] =
+        std::sqrt(v.axis[k][0] * v.axis[k][0] + v.axis[k][1] * v.axis[k][1] + v.axis[k][2] * v.axis[k][2]);
     if (!(length[k] > 0))
       refuse(path, "the spacing of axis %d is 0; give the distance between its voxels in the header", k);
     if (!(length[k] >= 1e-9 && length[k] <= 1e3))
-      refuse(path, "the spacing of axis %d is %g m; from 1e-9 to 1e3 are read: check the unit, or give it by "
-                   "--unit", k, length[k]);
+      refuse(path,
+             "the spacing of axis %d is %g m; from 1e-9 to 1e3 are read: check the unit, or give it by "
+             "--unit",
+             k, length[k]);
     if (!(std::fabs(v.origin[k]) <= 1e6))
       refuse(path, "the origin lies at %g m; at most 1e6 m are read: check the unit, or give it by --unit",
              v.origin[k]);
   }
   if (!(std::fabs(v.cell()) > 0.1 * length[0] * length[1] * length[2]))
-    refuse(path, "the axes do not span a space: two of the directions are nearly the same; correct them in the "
-                 "header");
+    refuse(path,
+           "the axes do not span a space: two of the directions are nearly the same; correct them in the "
+           "header");
 }
 
 }  // namespace
@@ -302,10 +324,10 @@ Volume read_labels(const std::string &path, std::string_view bytes, double unit)
   else if (trimmed(bytes.substr(0, bytes.find('\n'))).find('=') != std::string_view::npos)
     stored = read_metaimage(told, bytes);
   else if (bytes.substr(0, 2) == "\x1f\x8b")
-    refuse(told, "is packed as a whole (a NIfTI file, perhaps); save the label map as .nrrd or .mha, whose voxels "
-                 "may be packed");
-  else
-    refuse(told, "is neither NRRD nor MetaImage; save the label map as .nrrd or .mha");
+    refuse(told,
+           "is packed as a whole (a NIfTI file, perhaps); save the label map as .nrrd or .mha, whose voxels "
+           "may be packed");
+  else refuse(told, "is neither NRRD nor MetaImage; save the label map as .nrrd or .mha");
   Volume out = std::move(stored.volume);
   if (unit == 0) unit = stored.unit;
   if (unit == 0) {

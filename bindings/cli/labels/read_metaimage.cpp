@@ -1,5 +1,5 @@
-// MetaImage: "Key = value" lines that end with ElementDataFile; LOCAL: the voxels follow (.mha), else they lie
-// in that file (.mhd). Keys as the MetaIO documentation has them.
+// MetaImage: "Key = value" lines that end with ElementDataFile; LOCAL: the voxels follow (.mha), else they
+// lie in that file (.mhd). Keys as the MetaIO documentation has them.
 #include <algorithm>
 
 #include "label_volume.h"
@@ -86,8 +86,7 @@ class Reader {
       if (!to_number(word, out.back()))
         refuse_line("expected %zu numbers as %s, found %s", n, what, quoted_part(word).c_str());
     }
-    if (out.size() != n)
-      refuse_line("%s has %zu numbers; a volume of 3 axes has %zu", what, out.size(), n);
+    if (out.size() != n) refuse_line("%s has %zu numbers; a volume of 3 axes has %zu", what, out.size(), n);
     return out;
   }
 
@@ -131,16 +130,18 @@ class Reader {
         stored_.encoding.is_signed = t.is_signed;
         return;
       }
-    refuse_line("the voxels are of the type %s, and labels are whole numbers; save the label map with a type "
-                "from MET_CHAR to MET_ULONG_LONG",
-                quoted_part(value).c_str());
+    refuse_line(
+        "the voxels are of the type %s, and labels are whole numbers; save the label map with a type "
+        "from MET_CHAR to MET_ULONG_LONG",
+        quoted_part(value).c_str());
   }
 
   bool data_file(std::string_view value) {
     if (value.empty()) refuse_line("expected LOCAL or the name of a file as ElementDataFile");
     if (value == "LOCAL" || value == "Local" || value == "local") return false;
     if (value.substr(0, 4) == "LIST" || value.find('%') != std::string_view::npos)
-      refuse_line("the data are a list or a pattern of files, which is not read; save all slices in one file");
+      refuse_line(
+          "the data are a list or a pattern of files, which is not read; save all slices in one file");
     stored_.file = value;
     return false;
   }
@@ -158,7 +159,8 @@ class Reader {
       for (size_t c = 0; c < 3; ++c)
         stored_.volume.axis[k][c] = direction_[3 * k + c] * (spacing_.empty() ? 1 : spacing_[k]);
     }
-    if (spacing_.empty()) stored_.volume.notes.push_back("the file gives no spacing; 1 was taken for each axis");
+    if (spacing_.empty())
+      stored_.volume.notes.push_back("the file gives no spacing; 1 was taken for each axis");
   }
 
   const std::string &path_;

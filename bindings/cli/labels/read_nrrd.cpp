@@ -115,16 +115,17 @@ class Reader {
         stored_.encoding.is_signed = t.is_signed;
         return;
       }
-    refuse_line("the voxels are of the type %s, and labels are whole numbers; save the label map with a type "
-                "from int8 to uint64",
-                quoted_part(value).c_str());
+    refuse_line(
+        "the voxels are of the type %s, and labels are whole numbers; save the label map with a type "
+        "from int8 to uint64",
+        quoted_part(value).c_str());
   }
 
   uint32_t count(std::string_view value, const char *what, int64_t most) const {
     int64_t n = 0;
     if (!to_number(value, n) || n < 1 || n > most)
-      refuse_line("expected a whole number from 1 to %lld as %s, found %s", static_cast<long long>(most), what,
-                  quoted_part(value).c_str());
+      refuse_line("expected a whole number from 1 to %lld as %s, found %s", static_cast<long long>(most),
+                  what, quoted_part(value).c_str());
     return uint32_t(n);
   }
 
@@ -183,8 +184,9 @@ class Reader {
   // In a left-handed space the patient is mirrored.
   void space(std::string_view value) {
     const std::string word = lower(value);
-    mirrored_ = is_one_of(word, "left-anterior-superior,las,left-anterior-superior-time,last,3d-left-handed,"
-                                "3d-left-handed-time");
+    mirrored_ = is_one_of(word,
+                          "left-anterior-superior,las,left-anterior-superior-time,last,3d-left-handed,"
+                          "3d-left-handed-time");
   }
 
   void origin(std::string_view value) {
@@ -218,8 +220,9 @@ class Reader {
     encoded_ = true;
     if (word == "raw") return;
     if (word != "gzip" && word != "gz")
-      refuse_line("the voxels are stored as %s, which is not read; save the file with the encoding raw or gzip",
-                  quoted_part(value).c_str());
+      refuse_line(
+          "the voxels are stored as %s, which is not read; save the file with the encoding raw or gzip",
+          quoted_part(value).c_str());
     stored_.encoding.compressed = true;
   }
 
@@ -234,7 +237,8 @@ class Reader {
   bool data_file(std::string_view value) {
     if (value.empty()) refuse_line("expected the name of a file as data file");
     if (value.substr(0, 4) == "LIST" || value.find('%') != std::string_view::npos)
-      refuse_line("the data are a list or a pattern of files, which is not read; save all slices in one file");
+      refuse_line(
+          "the data are a list or a pattern of files, which is not read; save all slices in one file");
     stored_.file = value;
     return true;
   }
@@ -251,8 +255,8 @@ class Reader {
     if (sizes_.empty()) missing("sizes");
     if (stored_.encoding.bytes > 1 && !ordered_ && !stored_.encoding.compressed) missing("endian");
     if (sizes_.size() != dimension_)
-      refuse(path_, "dimension is %u, and sizes has %zu numbers; save the label map again as NRRD", dimension_,
-             sizes_.size());
+      refuse(path_, "dimension is %u, and sizes has %zu numbers; save the label map again as NRRD",
+             dimension_, sizes_.size());
     if (!directions_.empty() && directions_.size() != dimension_)
       refuse(path_, "dimension is %u, and space directions has %zu vectors", dimension_, directions_.size());
     if (!spacings_.empty() && spacings_.size() != dimension_)
@@ -260,27 +264,30 @@ class Reader {
     std::vector<size_t> axes;
     for (size_t k = 0; k < dimension_; ++k) {
       const bool in_space = directions_.empty() || directions_[k].has_value();
-      if (in_space && (dimension_ <= 3 || sizes_[k] != 1 || directions_.size() == dimension_)) axes.push_back(k);
+      if (in_space && (dimension_ <= 3 || sizes_[k] != 1 || directions_.size() == dimension_))
+        axes.push_back(k);
       else if (sizes_[k] != 1)
         refuse(path_,
-               "axis %zu has %lld values per voxel; overlapping segments have one layer each: export them as one "
+               "axis %zu has %lld values per voxel; overlapping segments have one layer each: export them as "
+               "one "
                "label map of 3 axes",
                k, static_cast<long long>(sizes_[k]));
     }
-    if (axes.size() != 3)
-      refuse(path_, "the volume has %zu axes of space; a label map has 3", axes.size());
+    if (axes.size() != 3) refuse(path_, "the volume has %zu axes of space; a label map has 3", axes.size());
     bool spaced = true;
     for (size_t k = 0; k < 3; ++k) {
       const int64_t n = sizes_[axes[k]];
       if (n < 1 || n > 65535)
-        refuse(path_, "axis %zu has %lld voxels; from 1 to 65,535 are read", axes[k], static_cast<long long>(n));
+        refuse(path_, "axis %zu has %lld voxels; from 1 to 65,535 are read", axes[k],
+               static_cast<long long>(n));
       stored_.volume.size[k] = uint32_t(n);
       step(k, axes[k], spaced);
     }
     if (mirrored_) {
       stored_.volume.origin[1] = -stored_.volume.origin[1];
       for (auto &axis : stored_.volume.axis) axis[1] = -axis[1];
-      stored_.volume.notes.push_back("the file's space is left-handed; y was negated, so that nothing is mirrored");
+      stored_.volume.notes.push_back(
+          "the file's space is left-handed; y was negated, so that nothing is mirrored");
     }
     if (!spaced) stored_.volume.notes.push_back("the file gives no spacing; 1 was taken for each axis");
     for (const auto &[segment, label] : segment_)

@@ -50,6 +50,10 @@ const std::vector<Format> &formats() {
       {"HDF5 (MED, CGNS, XDMF)", {"med", "cgns", "h5m", "h5", "xdmf", "exo", "e"}, nullptr, kMeshio},
       {"Nastran", {"bdf", "nas"}, nullptr, kMeshio},
       {"CAD", {"step", "stp", "iges", "igs", "brep", "geo"}, nullptr, kCad},
+      {"volume",
+       {"nrrd", "nhdr", "mha", "mhd"},
+       nullptr,
+       "a label map becomes bodies first: deform mesh from-labels FILE --out DIR"},
       {"gzip", {"gz", "tgz"}, nullptr, "unpack it first: gunzip FILE"},
       {"compressed", {"bz2", "xz", "zst"}, nullptr, "unpack it first"},
       {"UTF-16 text", {}, nullptr, "save it as plain text (ASCII or UTF-8)"}};
@@ -118,6 +122,7 @@ const Format *format_by_content(std::string_view bytes) {
       Cursor::is_word(word, "*node,"))
     return format_called("Abaqus");
   if (word == "ISO-10303-21;") return format_called("CAD");
+  if (starts(word, "NRRD000")) return format_called("volume");
   return nullptr;
 }
 
