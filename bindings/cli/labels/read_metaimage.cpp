@@ -47,7 +47,9 @@ class Reader {
 
   template <class... T>
   [[noreturn]] void refuse_line(const char *sentence, T... values) const {
-    refuse(path_ + ":" + std::to_string(number_), sentence, values...);
+    const std::string where = path_ + ":" + std::to_string(number_);
+    if constexpr (sizeof...(values) == 0) refuse(where, "%s", sentence);
+    else refuse(where, sentence, values...);
   }
   [[noreturn]] void missing(const char *what) const {
     refuse(path_, "the header has no \"%s\"; save the label map again as MetaImage", what);
