@@ -116,7 +116,8 @@ double reach_of(const Pair &pair, std::span<const uint32_t> nodes, Vec3 o);
 void mesh_obstacle(const Pair &pair, const ObstacleView &view, uint8_t kind, Run run,
                    Array<ContactPoint> &out);
 // The faces beside an edge and their cone of normals: a unit direction that is orthogonal to the edge lies in
-// it if it leans to neither face by more than `slack` (sine).
+// it if it leans to neither face by more than `slack` (sine) and leaves the surface. Where the faces are
+// nearly flat, the direction straight into the body leans to neither of them, too.
 struct EdgeFaces {
   Vec3 along;  // unit, i to j
   // unit; inward lies in the face, orthogonal to the edge; both zero where there is no face
@@ -125,6 +126,8 @@ struct EdgeFaces {
   bool leans_out(Vec3 n, double slack) const {
     return dot(n, inward[0]) <= slack && dot(n, inward[1]) <= slack;
   }
+  // Not into the body. At a rim, with one face alone, other bodies may come from the side, along the face.
+  bool leaves(Vec3 n, double slack) const { return dot(n, outward()) > -slack; }
 };
 EdgeFaces edge_faces(const Surface &surface, uint32_t edge);
 bool edge_becomes_convex(const Surface &surface, uint32_t edge, double h);

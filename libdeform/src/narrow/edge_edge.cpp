@@ -124,6 +124,8 @@ void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out) {
     // As far as the edges can turn within the sub-step, their cones may open.
     const double slack = kCone + std::min(0.3, reach / std::sqrt(std::min(uu, ww)));
     if (!fb.leans_out(normal, slack) || !fa.leans_out(-normal, slack)) continue;
+    // Faces that look the same way do not press on each other.
+    if (!fb.leaves(normal, slack) || !fa.leaves(-normal, slack)) continue;
     if (place_a != kBetween && end_touches(sa, ea[place_a], q0, q0 + w, fb)) continue;
     if (place_b != kBetween && end_touches(sb, eb[place_b], p0, p0 + u, fa)) continue;
     const double edge_s = s / nn, edge_t = t / nn;

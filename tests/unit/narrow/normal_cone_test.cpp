@@ -93,6 +93,30 @@ TEST(NormalCone, BlockOnFlatBody_HasUprightContactsOnly) {
     }
 }
 
+// Blocks whose bulging sides are flush: edges in the sides face the same way and press on nothing, also where
+// blocks approach so fast that edges count as longer past their ends. twist: makes the diagonals of the sides
+// convex, one way or the other.
+TEST(NormalCone, FlushBlocks_HaveNoContactAcrossTheirSides) {
+  for (const double speed : {0.0, 1.0, 20.0})
+    for (const double twist : {-4e-3, 4e-3})
+      for (const double shift : {-1e-5, 0.0, 1e-5}) {
+        Mesh block = box_mesh({1, 1, 1}, 4, 4, 4);
+        for (uint32_t i = 0; i < block.npoint(); ++i) {
+          const Vec3 p = block.at(i);
+          const double round = 1 + 4e-3 * (1 - 2 * norm2(p));
+          store3(&block.x[3 * i],
+                 {(round + twist * p.y * p.z) * p.x, (round + twist * p.x * p.z) * p.y, p.z});
+        }
+        Scene scene;
+        scene.add(block);
+        scene.add(moved(block, {}, {shift, shift, 1 + scene.offset}), {0, 0, -speed});
+        const Array<ContactPoint> contacts = scene.listed();
+        EXPECT_GE(contacts.size(), 30u);
+        for (const ContactPoint &c : contacts)
+          EXPECT_GT(std::fabs(c.normal[2]), 0.9) << speed << ' ' << twist << ' ' << shift;
+      }
+}
+
 // Half from either side, and the fine side's own half is the patch to a percent wherever the rims lie.
 TEST(NormalCone, BlockOnFlatBody_CarriesThePatchOnce) {
   for (const double off : {0.0, 0.1, 20.0, 50.0, 83.0, 120.0}) {
