@@ -33,8 +33,7 @@ void single_pass(void *user, uint32_t begin, uint32_t end) {
     SingleBlock b = body.single.block[n];
     b.at = reinterpret_cast<SinglePoint *>(body.lend(n, begin).p);
     const float unit = kernels.load(b, call.k->x, damping != kUndamped ? call.k->v : nullptr, call.k->stride);
-    kernels.springs[body.form() != kPlain][damping](b, unit, damp);
-    if (body.cells_on) kernels.cells(b, unit);
+    kernels.forces[body.form() != kPlain][damping][body.cells_on](b, unit, damp);
   }
 }
 

@@ -47,15 +47,34 @@ bool valid(const dfm_host *h, const double *values);  // of all parameters; fals
 // negative gives less.
 inline double volume_for(double nu) { return nu > 0.25 ? 3 * (4 * nu - 1) / (2 * (1 + nu)) : 0; }
 
-// What single precision reads beside the points, in block order, filled up to whole registers.
+// What single precision reads beside the points (msm_kernel.h), block after block.
 struct Single {
   Buffer<SingleBlock> block;
-  Buffer<SingleQuad> quad;
-  Buffer<SingleCell> cell;
-  Buffer<float> stiffness, rest, rest_square, tilt, damp, bulk, volume6, collapse, limit;
+  size_t rays = 0, ncell = 0;
+  Buffer<uint32_t> cells;
+  Buffer<uint16_t> number;
+  Buffer<uint32_t> edge, cell;  // [rays] number of the spring, [ncell] place in block order; kNone for none
+  Buffer<float> stiffness, rest, rest_square, tilt, damp;
+  Buffer<float> bulk, volume6, collapse, limit;
+  void create(const dfm_host *h, size_t groups, size_t rings) {
+    rays = kFans * (2 * rings + 3 * groups);
+    ncell = kFans * rings;
+    cells.create(h, groups);
+    number.create(h, kFans * (rings + 3 * groups));
+    edge.create_raw(h, rays);
+    cell.create_raw(h, ncell);
+    std::fill(edge.data(), edge.data() + rays, ~0u);
+    std::fill(cell.data(), cell.data() + ncell, ~0u);
+    for (Buffer<float> *each : {&stiffness, &rest, &rest_square, &tilt, &damp}) each->create(h, rays);
+    for (Buffer<float> *each : {&bulk, &volume6, &collapse, &limit}) each->create(h, ncell);
+  }
   void swap(Single &o) {
     block.swap(o.block);
-    quad.swap(o.quad);
+    std::swap(rays, o.rays);
+    std::swap(ncell, o.ncell);
+    cells.swap(o.cells);
+    number.swap(o.number);
+    edge.swap(o.edge);
     cell.swap(o.cell);
     stiffness.swap(o.stiffness);
     rest.swap(o.rest);

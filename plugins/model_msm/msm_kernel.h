@@ -67,23 +67,23 @@ struct SinglePoint {
   int32_t x[4];
   float v[4];
 };
-// Numbers of points times 4.
-struct SingleQuad { uint16_t i, j[4]; };
-struct SingleCell { uint16_t p[4]; };
+// Groups of kFans fans of cells (msm_fans.h), a lane of floats each. The points of a group are a, b and its
+// ring; its springs a b, then from a and from b to each ring point in turn. Where a fan of a group has fewer
+// cells than another, its last ring point is repeated. What is missing has no stiffness.
+constexpr uint32_t kFans = 8, kMostInFan = 8;  // fans of a group, cells of a fan
 struct SingleBlock : model::BlockPoints {
   SinglePoint *at;  // [local]
-  uint32_t quads, cells;
-  // as in Block, but for the square of the rest length beside it
-  const SingleQuad *quad;
-  const float *stiffness, *rest, *rest_square, *tilt, *damp;
-  const SingleCell *cell;
-  const float *bulk, *volume6, *collapse, *limit;
+  uint32_t groups;
+  const uint32_t *cells;                                      // [groups] of the longest fan
+  const uint16_t *number;                                     // [groups][cells + 3][kFans] of points times 4
+  const float *stiffness, *rest, *rest_square, *tilt, *damp;  // [groups][2 cells + 3][kFans]
+  const float *bulk, *volume6, *collapse, *limit;             // [groups][cells][kFans]
 };
 struct SingleKernels {
   // Clears f; returns the unit of the places, m: NaN where one is not finite.
   float (*load)(const SingleBlock &b, const double *x, const double *v, uint32_t stride);
-  void (*springs[2][kDampings])(const SingleBlock &b, float unit, float damp);  // plain, tilted
-  void (*cells)(const SingleBlock &b, float unit);
+  // plain, tilted; then without, with cells
+  void (*forces[2][kDampings][2])(const SingleBlock &b, float unit, float damp);
 };
 
 // Plain or tilted springs in the host's order, without branches.

@@ -134,53 +134,22 @@ static inline float load_points(const SingleBlock &b, const double *x, const dou
   return sound ? float(power_of_two(above - 30)) : __builtin_nanf("");
 }
 
-// (L - L0)/L + damp (dv.d)/L^2 over one denominator, with L - L0 = (L^2 - L0^2)/(L + L0): what roots and
-// quotients round is then a share of the stretch.
+// Force over d = to - from on `from`: (L - L0)/L + damp (dv.d)/L^2 over one denominator, with L - L0 = (L^2 -
+// L0^2)/(L + L0). What roots and quotients round is then a share of the stretch.
 template <bool kTilts, Damping kDamping>
-static inline void springs(const SingleBlock &b, float unit, float damp) {
-  alignas(64) float out[4 * kLanes];
-  for (uint32_t n = 0; n < b.quads; n += kGroups) {
-    const SingleQuad *q = b.quad + n;
-    const auto ends = [&](auto at, uint32_t k) __attribute__((always_inline)) {
-      return groups([&](uint32_t g) __attribute__((always_inline)) { return at(q[g].j[k]); });
-    };
-    const auto starts = [&](auto at) __attribute__((always_inline)) {
-      return groups([&](uint32_t g) __attribute__((always_inline)) { return at(q[g].i); });
-    };
-    const auto at_place = [&](uint32_t p) __attribute__((always_inline)) { return place(b, p); };
-    const vi own = starts(at_place);
-    const Three d = metres(columns(between(own, ends(at_place, 0)), between(own, ends(at_place, 1)),
-                                   between(own, ends(at_place, 2)), between(own, ends(at_place, 3))),
-                           unit);
-    const vf dd = dot(d, d);
-    const vf counted = kTilts ? dd + load(b.tilt + 4 * size_t(n)) : dd;
-    const vf rest = load(b.rest + 4 * size_t(n)), length = root(counted), sum = length + rest;
-    vf stretch = (counted - load(b.rest_square + 4 * size_t(n))) * length;
-    if constexpr (kDamping != kUndamped) {
-      const auto at_velocity = [&](uint32_t p) __attribute__((always_inline)) { return velocity(b, p); };
-      const vf moves = (vf)starts(at_velocity);
-      const Three rate = columns((vf)ends(at_velocity, 0) - moves, (vf)ends(at_velocity, 1) - moves,
-                                 (vf)ends(at_velocity, 2) - moves, (vf)ends(at_velocity, 3) - moves);
-      const vf factor = kDamping == kPerSpring ? load(b.damp + 4 * size_t(n)) : all(damp);
-      stretch = stretch + (factor * dot(rate, d)) * sum;
-    }
-    vf scale = load(b.stiffness + 4 * size_t(n)) * (stretch / (counted * sum));
-    scale = dd <= kShortestSingle ? vf{} : scale;
-    store_rows(scale * d, out);
-    double *const f = b.f;
-#pragma GCC unroll 4
-    for (uint32_t g = 0; g < kGroups; ++g) {
-      const v4 f0 = row_of(out, g, 0), f1 = row_of(out, g, 1), f2 = row_of(out, g, 2), f3 = row_of(out, g, 3);
-      add_at(f, q[g].i, (f0 + f1) + (f2 + f3));
-      take_at(f, q[g].j[0], f0);
-      take_at(f, q[g].j[1], f1);
-      take_at(f, q[g].j[2], f2);
-      take_at(f, q[g].j[3], f3);
-    }
+DEFORM_INLINE vf pull(const SingleBlock &s, size_t slot, vf dd, vf rate, float damp) {
+  const vf counted = kTilts ? dd + load(s.tilt + slot) : dd;
+  const vf rest = load(s.rest + slot), length = root(counted), sum = length + rest;
+  vf stretch = (counted - load(s.rest_square + slot)) * length;
+  if constexpr (kDamping != kUndamped) {
+    const vf factor = kDamping == kPerSpring ? load(s.damp + slot) : all(damp);
+    stretch = stretch + (factor * rate) * sum;
   }
+  const vf scale = load(s.stiffness + slot) * (stretch / (counted * sum));
+  return dd <= kShortestSingle ? vf{} : scale;
 }
 
-DEFORM_INLINE vf pressure_of(const SingleBlock &b, uint32_t t, vf now) {
+DEFORM_INLINE vf pressure_of(const SingleBlock &b, size_t t, vf now) {
   const vf rest = load(b.volume6 + t);
   now = smaller(larger(now, float(kLeastVolume) * rest), float(kMostVolume) * rest);
   return load(b.bulk + t) * (rest - now) +
@@ -188,7 +157,7 @@ DEFORM_INLINE vf pressure_of(const SingleBlock &b, uint32_t t, vf now) {
 }
 
 // As the one of msm_kernel_quad.h: a lane that is within its limit gets pressure * g.
-DEFORM_INLINE void stretched_forces(const SingleBlock &b, uint32_t t, vf q, vf now, const Three &e1,
+DEFORM_INLINE void stretched_forces(const SingleBlock &b, size_t t, vf q, vf now, const Three &e1,
                                     const Three &e2, const Three &e3, Three &g1, Three &g2, Three &g3) {
   const vf limit = load(b.limit + t), most = larger(q, limit), u = limit / most, power = root(u) * u;
   const vf by_q = -3.75f * (power * (1.0f - u)) / most, share = power * (2.5f - 1.5f * u);
@@ -199,56 +168,135 @@ DEFORM_INLINE void stretched_forces(const SingleBlock &b, uint32_t t, vf q, vf n
   g3 = along * g3 + inward * (e3 - middle);
 }
 
-static inline void volume_cells(const SingleBlock &b, float unit) {
-  alignas(64) float f1[4 * kLanes], f2[4 * kLanes], f3[4 * kLanes];
-  for (uint32_t t = 0; t < b.cells; t += kLanes) {
-    const SingleCell *c = b.cell + t;
-    const auto corner = [&](uint32_t k, uint32_t n) __attribute__((always_inline)) {
-      return groups([&](uint32_t g) __attribute__((always_inline)) { return place(b, c[4 * g + k].p[n]); });
-    };
-    const vi o0 = corner(0, 0), o1 = corner(1, 0), o2 = corner(2, 0), o3 = corner(3, 0);
-    const auto edge = [&](uint32_t n) __attribute__((always_inline)) {
-      return metres(columns(between(o0, corner(0, n)), between(o1, corner(1, n)), between(o2, corner(2, n)),
-                            between(o3, corner(3, n))),
-                    unit);
-    };
-    const Three e1 = edge(1), e2 = edge(2), e3 = edge(3);
-    Three g1 = cross(e2, e3), g2 = cross(e3, e1), g3 = cross(e1, e2);
-    const vf now = dot(e1, g1);
-    const Three sum = (e1 + e2) + e3;
-    const vf q = 4.0f * ((dot(e1, e1) + dot(e2, e2)) + dot(e3, e3)) - dot(sum, sum);
-    if (any(q > load(b.limit + t))) {
-      stretched_forces(b, t, q, now, e1, e2, e3, g1, g2, g3);
-    } else {
-      const vf pressure = pressure_of(b, t, now);
-      if (!any(pressure != vf{})) continue;
-      g1 = pressure * g1;
-      g2 = pressure * g2;
-      g3 = pressure * g3;
-    }
-    store_rows(g1, f1);
-    store_rows(g2, f2);
-    store_rows(g3, f3);
-    double *const f = b.f;
-#pragma GCC unroll 4
-    for (uint32_t g = 0; g < kGroups; ++g)
-#pragma GCC unroll 4
-      for (uint32_t k = 0; k < 4; ++k) {
-        const uint16_t *p = c[4 * g + k].p;
-        const v4 a = row_of(f1, g, k), d = row_of(f2, g, k), h = row_of(f3, g, k);
-        add_at(f, p[1], a);
-        add_at(f, p[2], d);
-        add_at(f, p[3], h);
-        take_at(f, p[0], (a + d) + h);
+// One point of each lane's fan less a, in units and in m/s.
+struct Ray { Three whole, rate; };
+
+// A fan's forces are sums in floats at b and at each ring point; what a gets is their sum in double with the
+// other sign, so the momentum is kept as exactly as by forces in pairs.
+template <bool kTilts, Damping kDamping, bool kCells>
+static inline void fans(const SingleBlock &b, float unit, float damp) {
+  alignas(64) float out[4 * kLanes * (kMostInFan + 2)];  // b, then the ring
+  const uint16_t *number = b.number;
+  size_t ray_at = 0, cell_at = 0;
+  for (uint32_t n = 0; n < b.groups; ++n) {
+    const uint32_t cells = b.cells[n];
+    for (uint32_t half = 0; half < kFans; half += kLanes) {
+      const auto fetch = [&](uint32_t p, uint32_t k, auto at) __attribute__((always_inline)) {
+        const uint16_t *i = number + kFans * p + half + k;
+        return groups([&](uint32_t g) __attribute__((always_inline)) { return at(i[4 * g]); });
+      };
+      const auto at_place = [&](uint32_t p) __attribute__((always_inline)) { return place(b, p); };
+      const auto at_velocity = [&](uint32_t p) __attribute__((always_inline)) { return velocity(b, p); };
+      const vi o0 = fetch(0, 0, at_place), o1 = fetch(0, 1, at_place);
+      const vi o2 = fetch(0, 2, at_place), o3 = fetch(0, 3, at_place);
+      vf v0, v1, v2, v3;
+      if constexpr (kDamping != kUndamped) {
+        v0 = (vf)fetch(0, 0, at_velocity);
+        v1 = (vf)fetch(0, 1, at_velocity);
+        v2 = (vf)fetch(0, 2, at_velocity);
+        v3 = (vf)fetch(0, 3, at_velocity);
       }
+      const auto ray_to = [&](uint32_t p) __attribute__((always_inline)) {
+        Ray r;
+        r.whole = columns(between(o0, fetch(p, 0, at_place)), between(o1, fetch(p, 1, at_place)),
+                          between(o2, fetch(p, 2, at_place)), between(o3, fetch(p, 3, at_place)));
+        if constexpr (kDamping != kUndamped)
+          r.rate = columns((vf)fetch(p, 0, at_velocity) - v0, (vf)fetch(p, 1, at_velocity) - v1,
+                           (vf)fetch(p, 2, at_velocity) - v2, (vf)fetch(p, 3, at_velocity) - v3);
+        return r;
+      };
+      const auto rate_of = [](const Three &rate, const Three &d) __attribute__((always_inline)) {
+        if constexpr (kDamping == kUndamped) return vf{};
+        else return dot(rate, d);
+      };
+      const Three zero = {};
+      const Ray axis = ray_to(1);
+      const Three e1 = metres(axis.whole, unit);
+      const vf square1 = dot(e1, e1);
+      const size_t slot = ray_at + half, cell = cell_at + half;
+      Three at_b = zero - pull<kTilts, kDamping>(b, slot, square1, rate_of(axis.rate, e1), damp) * e1;
+      Three e2, normal2, at_ring;  // of the ring point before
+      vf square2;
+      for (uint32_t k = 0; k <= cells; ++k) {
+        const Ray ray = ray_to(2 + k);
+        const Three e3 = metres(ray.whole, unit);
+        const vf square3 = dot(e3, e3);
+        const Three from_b = {between((vi)axis.whole.x, (vi)ray.whole.x),
+                              between((vi)axis.whole.y, (vi)ray.whole.y),
+                              between((vi)axis.whole.z, (vi)ray.whole.z)};
+        const Three d = metres(from_b, unit);
+        vf rate = {};
+        if constexpr (kDamping != kUndamped) rate = dot(ray.rate - axis.rate, d);
+        const size_t both = slot + kFans * (1 + 2 * size_t(k));
+        const Three own = pull<kTilts, kDamping>(b, both, square3, rate_of(ray.rate, e3), damp) * e3;
+        const Three other = pull<kTilts, kDamping>(b, both + kFans, dot(d, d), rate, damp) * d;
+        at_b = at_b + other;
+        Three here = (zero - own) - other;
+        if constexpr (kCells) {
+          const Three normal3 = cross(e1, e3);
+          if (k > 0) {
+            const size_t t = cell + kFans * (k - 1);
+            Three g1 = cross(e2, e3), g2 = zero - normal3, g3 = normal2;
+            const vf now = dot(e1, g1);
+            const Three sum = (e1 + e2) + e3;
+            const vf q = 4.0f * ((square1 + square2) + square3) - dot(sum, sum);
+            if (any(q > load(b.limit + t))) {
+              stretched_forces(b, t, q, now, e1, e2, e3, g1, g2, g3);
+            } else {
+              const vf pressure = pressure_of(b, t, now);
+              g1 = pressure * g1;
+              g2 = pressure * g2;
+              g3 = pressure * g3;
+            }
+            at_b = at_b + g1;
+            at_ring = at_ring + g2;
+            here = here + g3;
+          }
+          e2 = e3;
+          square2 = square3;
+          normal2 = normal3;
+        }
+        if (k > 0) store_rows(at_ring, out + 4 * kLanes * k);
+        at_ring = here;
+      }
+      store_rows(at_ring, out + 4 * kLanes * (cells + 1));
+      store_rows(at_b, out);
+      double *const f = b.f;
+#pragma GCC unroll 4
+      for (uint32_t g = 0; g < kGroups; ++g) {
+        const uint16_t *i = number + half + 4 * g;
+        v4 a0 = splat(0), a1 = a0, a2 = a0, a3 = a0;
+        for (uint32_t p = 0; p < cells + 2; ++p) {
+          const float *row = out + 4 * kLanes * p;
+          const uint16_t *j = i + kFans * (p + 1);
+          const v4 f0 = row_of(row, g, 0), f1 = row_of(row, g, 1), f2 = row_of(row, g, 2),
+                   f3 = row_of(row, g, 3);
+          add_at(f, j[0], f0);
+          add_at(f, j[1], f1);
+          add_at(f, j[2], f2);
+          add_at(f, j[3], f3);
+          a0 = a0 + f0;
+          a1 = a1 + f1;
+          a2 = a2 + f2;
+          a3 = a3 + f3;
+        }
+        take_at(f, i[0], a0);
+        take_at(f, i[1], a1);
+        take_at(f, i[2], a2);
+        take_at(f, i[3], a3);
+      }
+    }
+    number += kFans * (cells + 3);
+    ray_at += kFans * (2 * size_t(cells) + 3);
+    cell_at += kFans * size_t(cells);
   }
 }
 
-constexpr SingleKernels kKernels = {
-    load_points,
-    {{springs<false, kUndamped>, springs<false, kUniform>, springs<false, kPerSpring>},
-     {springs<true, kUndamped>, springs<true, kUniform>, springs<true, kPerSpring>}},
-    volume_cells};
+#define MSM_FANS(t, d) {fans<t, d, false>, fans<t, d, true>}
+#define MSM_DAMPED(t) {MSM_FANS(t, kUndamped), MSM_FANS(t, kUniform), MSM_FANS(t, kPerSpring)}
+constexpr SingleKernels kKernels = {load_points, {MSM_DAMPED(false), MSM_DAMPED(true)}};
+#undef MSM_DAMPED
+#undef MSM_FANS
 
 }  // namespace single
 }  // namespace

@@ -1,6 +1,7 @@
 // What the kernels in single precision read beside the points: the arrays of the blocks in floats, each at
 // the place that it has in double. Places, velocities and forces stay double for whoever calls.
-#include "msm_body.h"
+#include "../model_common/edges.h"
+#include "msm_fans.h"
 
 namespace msm {
 namespace {
@@ -23,57 +24,83 @@ const char *Body::keeps_double() const {
 
 void Body::prepare_single() {
   if (has_single()) return;
+  const Fans fans(*this);
   Single made;
   made.block.create(host, nblock);
-  made.quad.create(host, spring_slots() / 4);
-  made.cell.create(host, cell_slots());
-  for (Buffer<float> *each : {&made.stiffness, &made.rest, &made.rest_square, &made.tilt, &made.damp})
-    each->create(host, spring_slots());
-  for (Buffer<float> *each : {&made.bulk, &made.volume6, &made.collapse, &made.limit})
-    each->create(host, cell_slots());
+  size_t groups = 0, rings = 0;
+  for (uint32_t n = 0; n < nblock; ++n)
+    fans.each_group(n, [&](const Fan *, uint32_t, uint32_t longest) {
+      ++groups;
+      rings += longest;
+    });
+  made.create(host, groups, rings);
+  size_t group = 0, number_at = 0, ray_at = 0, cell_at = 0;
   for (uint32_t n = 0; n < nblock; ++n) {
-    const Block &b = block[n];
     SingleBlock &out = made.block[n];
-    static_cast<model::BlockPoints &>(out) = b;
-    out.quads = b.quads;
-    out.cells = b.cells;
-    const size_t q = size_t(b.quad - quad.data()), c = size_t(b.cell - cell.data());
-    out.quad = made.quad.data() + q;
-    out.stiffness = made.stiffness.data() + 4 * q;
-    out.rest = made.rest.data() + 4 * q;
-    out.rest_square = made.rest_square.data() + 4 * q;
-    out.tilt = made.tilt.data() + 4 * q;
-    out.damp = made.damp.data() + 4 * q;
-    out.cell = made.cell.data() + c;
-    out.bulk = made.bulk.data() + c;
-    out.volume6 = made.volume6.data() + c;
-    out.collapse = made.collapse.data() + c;
-    out.limit = made.limit.data() + c;
+    static_cast<model::BlockPoints &>(out) = block[n];
+    out.cells = made.cells.data() + group;
+    out.number = made.number.data() + number_at;
+    out.stiffness = made.stiffness.data() + ray_at;
+    out.rest = made.rest.data() + ray_at;
+    out.rest_square = made.rest_square.data() + ray_at;
+    out.tilt = made.tilt.data() + ray_at;
+    out.damp = made.damp.data() + ray_at;
+    out.bulk = made.bulk.data() + cell_at;
+    out.volume6 = made.volume6.data() + cell_at;
+    out.collapse = made.collapse.data() + cell_at;
+    out.limit = made.limit.data() + cell_at;
+    const size_t first = group;
+    fans.each_group(n, [&](const Fan *fan, uint32_t count, uint32_t longest) {
+      made.cells[group++] = longest;
+      for (uint32_t lane = 0; lane < kFans; ++lane) {
+        const Fan &own = fan[lane < count ? lane : 0];
+        for (uint32_t k = 0; k < longest + 3; ++k) {
+          const uint32_t local = k == 0 ? own.a : k == 1 ? own.b : own.ring[std::min(k - 2, own.cells)];
+          made.number[number_at + kFans * size_t(k) + lane] = uint16_t(4 * local);
+        }
+        if (lane >= count) continue;
+        const auto spring = [&](uint32_t bit, uint32_t i, uint32_t j) {
+          if (!(own.springs >> bit & 1)) return;
+          made.edge[ray_at + kFans * size_t(bit) + lane] =
+              model::find_edge(edges.data(), nedge, block[n].point[i], block[n].point[j]);
+        };
+        spring(0, own.a, own.b);
+        for (uint32_t k = 0; k <= own.cells; ++k) {
+          spring(ray(k, false), own.a, own.ring[k]);
+          spring(ray(k, true), own.b, own.ring[k]);
+        }
+        for (uint32_t k = 0; k < own.cells; ++k) made.cell[cell_at + kFans * size_t(k) + lane] = own.slot[k];
+      }
+      number_at += kFans * (size_t(longest) + 3);
+      ray_at += kFans * (2 * size_t(longest) + 3);
+      cell_at += kFans * size_t(longest);
+    });
+    out.groups = uint32_t(group - first);
   }
-  for (size_t q = 0; q < spring_slots() / 4; ++q) {
-    made.quad[q].i = uint16_t(4 * quad[q].i);
-    for (int k = 0; k < 4; ++k) made.quad[q].j[k] = uint16_t(4 * quad[q].j[k]);
-  }
-  for (size_t c = 0; c < cell_slots(); ++c)
-    for (int k = 0; k < 4; ++k) made.cell[c].p[k] = uint16_t(4 * cell[c].p[k]);
   single.swap(made);
   fill_single();
 }
 
 void Body::fill_single() {
   if (!has_single()) return;
-  for (size_t s = 0; s < spring_slots(); ++s) {
-    single.stiffness[s] = float(stiffness[s]);
-    single.rest[s] = float(rest[s]);
-    single.rest_square[s] = float(rest[s] * rest[s]);
-    single.tilt[s] = tilt.empty() ? 0 : float(tilt[s]);
-    single.damp[s] = damp.empty() ? 0 : float(damp[s]);
+  Single &to = single;
+  for (size_t s = 0; s < to.rays; ++s) {
+    const uint32_t e = to.edge[s];
+    const bool real = e != kNone;
+    const double length = real ? rest_length(e) : 0;
+    to.stiffness[s] = real ? float(stiffness_of(e)) : 0;
+    to.rest[s] = float(length);
+    to.rest_square[s] = float(length * length);
+    to.tilt[s] = real && !edge_tilt.empty() ? float(edge_tilt[e]) : 0;
+    to.damp[s] = real && !edge_damp.empty() ? float(edge_damp[e]) : 0;
   }
-  for (size_t c = 0; c < cell_slots(); ++c) {
-    single.bulk[c] = float(bulk[c]);
-    single.volume6[c] = float(volume6[c]);
-    single.collapse[c] = float(collapse[c]);
-    single.limit[c] = limit[c] < 1e30 ? float(limit[c]) : 1e30f;
+  for (size_t s = 0; s < to.ncell; ++s) {
+    const uint32_t c = to.cell[s];
+    const bool real = c != kNone;
+    to.bulk[s] = real ? float(bulk[c]) : 0;
+    to.volume6[s] = real ? float(volume6[c]) : 0;
+    to.collapse[s] = real ? float(collapse[c]) : 0;
+    to.limit[s] = real && limit[c] < 1e30 ? float(limit[c]) : 1e30f;
   }
 }
 

@@ -1,8 +1,9 @@
 // Time of the mass-spring forces per spring and per cell, through the plugin ABI, beside plain kernels
 // (bound/msm_bound.h) for the layouts of the points, each for every instruction set. `--csv FILE --commit ID`
 // appends the figures; --mesh FILE takes another mesh than the fine cylinder; --only options leaves out the
-// plain kernels. The least of the repetitions counts: others share the machine. Options of the model are
-// timed against the same body without them, in turn: the median of eleven pairs counts.
+// plain kernels, --only single all but the forces of damped springs and cells in both precisions. The least
+// of the repetitions counts: others share the machine. Options of the model are timed against the same body
+// without them, in turn: the median of eleven pairs counts.
 #include <benchmark/benchmark.h>
 #include <sys/utsname.h>
 
@@ -26,7 +27,8 @@ const Params kDamped = {1e5, 0.3, 0.002, 0, 0}, kPlain = {1e5, 0.3, 0, 0, 0},
              kVolume = {1e5, 0.3, 0.002, 0, 1};
 double springs() { return double(mesh().edges.size() / 2); }
 
-void through_abi(benchmark::State &state, const char *isa, const Params &p, bool row_sums) {
+enum What { kForces, kSingleForces, kRowSums };
+void through_abi(benchmark::State &state, const char *isa, const Params &p, What what) {
   setenv("DEFORM_SIMD", isa, 1);
   Host host;
   Instance b(host, mesh(), p);
@@ -36,8 +38,12 @@ void through_abi(benchmark::State &state, const char *isa, const Params &p, bool
   std::vector<double> k(b.size()), c(b.size());
   const dfm_kin kin = b.kin();
   double h = 1;
+  const auto *single = static_cast<const dfm_f32 *>(b.ops->extension(b.self, DFM_EXT_F32));
+  if (what == kSingleForces && single->prepare(b.self) != DFM_OK)
+    return state.SkipWithError("no single precision");
   for (auto _ : state) {
-    if (row_sums) b.ops->bound(b.self, &kin, k.data(), c.data(), &h);
+    if (what == kRowSums) b.ops->bound(b.self, &kin, k.data(), c.data(), &h);
+    else if (what == kSingleForces) single->add_forces(b.self, &kin, b.f);
     else b.ops->add_forces(b.self, &kin, b.f);
   }
 }
@@ -256,8 +262,8 @@ std::string processor() {
   return "unknown";
 }
 
-void print(const Reporter &r, const std::string &csv, const std::string &commit,
-           const std::string &mesh_name) {
+void print(const Reporter &r, const std::string &csv, const std::string &commit, const std::string &mesh_name,
+           bool options) {
   const double ns = springs(), nc = mesh().ncell();
   std::ofstream out;
   if (!csv.empty()) {
@@ -283,6 +289,10 @@ void print(const Reporter &r, const std::string &csv, const std::string &commit,
   };
   for (const char *isa : {"sse2", "avx2", "avx512"}) {
     const std::string at = std::string("/") + isa;
+    if (r.of("plugin_single" + at) > 0) {
+      row(isa, "plugin_forces", 0, r.of("plugin_volume" + at) / nc);
+      row(isa, "plugin_forces_single", 0, r.of("plugin_single" + at) / nc);
+    }
     if (r.of("plugin_damped" + at) == 0) continue;
     double best = 1e300;
     for (const char *kernel :
@@ -301,7 +311,7 @@ void print(const Reporter &r, const std::string &csv, const std::string &commit,
   std::ostringstream head;
   head << processor() << "," << kCompiler << "," << commit << "," << mesh_name << "," << mesh().npoint()
        << "," << ns << "," << nc << ",";
-  print_options(out, head.str());
+  if (options) print_options(out, head.str());
 }
 
 }  // namespace
@@ -311,12 +321,12 @@ int main(int argc, char **argv) {
   std::string commit = "unknown";
   std::string path = test::shared_dir() + "/meshes/thesis/cyl_fine.msh";
   std::string name = "cyl_fine.msh";
-  bool only_options = false;
+  std::string only;
   for (int n = 1; n + 1 < argc; n += 2) {
     const std::string key = argv[n];
     if (key == "--csv") csv = argv[n + 1];
     if (key == "--commit") commit = argv[n + 1];
-    if (key == "--only") only_options = argv[n + 1] == std::string("options");
+    if (key == "--only") only = argv[n + 1];
     if (key == "--mesh") {
       path = argv[n + 1];
       name = path.substr(path.rfind('/') + 1);
@@ -342,19 +352,21 @@ int main(int argc, char **argv) {
           ->Repetitions(15)
           ->MinTime(0.02);
     };
+    add("plugin_volume", through_abi, isas[k], kVolume, kForces);
+    add("plugin_single", through_abi, isas[k], kVolume, kSingleForces);
+    if (only == "single") continue;
     add("scatter_padded", plain, t.scatter_padded, 0);
     add("scatter_packed", plain, t.scatter_packed, 1);
     add("scatter_split", plain, t.scatter_split, 2);
     add("rows_padded", plain, t.rows_padded, 0);
     add("rows_split", plain, t.rows_split, 2);
-    add("plugin_undamped", through_abi, isas[k], kPlain, false);
-    add("plugin_damped", through_abi, isas[k], kDamped, false);
-    add("plugin_volume", through_abi, isas[k], kVolume, false);
-    add("plugin_bound", through_abi, isas[k], kVolume, true);
+    add("plugin_undamped", through_abi, isas[k], kPlain, kForces);
+    add("plugin_damped", through_abi, isas[k], kDamped, kForces);
+    add("plugin_bound", through_abi, isas[k], kVolume, kRowSums);
   }
   int none = 1;
   benchmark::Initialize(&none, argv);
   Reporter reporter;
-  if (!only_options) benchmark::RunSpecifiedBenchmarks(&reporter);
-  print(reporter, csv, commit, name);
+  if (only != "options") benchmark::RunSpecifiedBenchmarks(&reporter);
+  print(reporter, csv, commit, name, only != "single");
 }
