@@ -65,6 +65,27 @@ TEST(AttachScene, RopeBetweenHookAndBrick_CarriesBoth) {
   EXPECT_NE(text.find("2 attachments hold"), std::string::npos);
 }
 
+// Most of a fine surface on coarse cells is held: more bonds than the cells' points have motions.
+TEST(AttachScene, FineSurfaceOnCoarseCells_IsHeldExactly) {
+  const Opened s(R"({"format": "deform-scene", "version": 1, "time": {"duration": 1, "step": 0.002},
+    "bodies": [{"name": "rabbit", "mesh": ")" DEFORM_SOURCE_DIR
+                 R"(/examples/data/rabbit.obj", "fill": {"cells": 300},
+      "attach": [{"to": "hook", "box": [[-1, -1, 0.03], [1, 1, 1]]}]}],
+    "obstacles": [{"name": "hook", "shape": "sphere", "radius": 0.01, "pose": {"position": [0, 0, 1]}}]})");
+  ASSERT_EQ(s.status, DFM_OK) << dfm_last_error();
+  dfm_body rabbit = 0;
+  test::ok(dfm_world_find_body(s.world, "rabbit", &rabbit));
+  for (int i = 0; i < 100; ++i) {
+    test::run(s.world, 0.002, 2e-3);
+    ASSERT_EQ(test::stats(s.world).unconverged, 0u) << i;
+  }
+  dfm_attachment a{};
+  a.size = sizeof a;
+  test::ok(dfm_body_get_attachment(rabbit, test::listed(dfm_body_attachments, rabbit).at(0), &a));
+  EXPECT_GT(a.nsurfel, 150u);
+  EXPECT_LT(a.stretch, 1e-8);
+}
+
 // The shipped scene: the jerk of the hook releases the tail, and not where more is allowed.
 TEST(AttachScene, Attached_LosesItsTail) {
   for (const bool strong : {false, true}) {

@@ -126,6 +126,42 @@ TEST(Attach, WhatHangs_PullsWithItsWeight) {
   }
 }
 
+// A modal body with more bonds than motions: the motions that hardly move the held points do not throw it.
+TEST(Attach, MoreBondsThanModes_StayAtRest) {
+  World s;
+  test::BodyOptions o;
+  o.model = "modal";
+  o.young = 1e6;
+  const dfm_body ball = test::make_body(s.context, s.w, "ball", {0.2, 0, 0}, 500, o);
+  const double box[] = {-1, -1, 0.08, 1, 1, 1};
+  const uint32_t held = attach(ball, s.hook({0, 0, 1}), true, [&](dfm_attach_def &d) { d.box = box; });
+  s.run(0.3);
+  const dfm_body_measure m = test::measure(ball);
+  const dfm_attachment a = info(ball, held);
+  EXPECT_GT(a.nsurfel, 20u);
+  EXPECT_NEAR(a.force[2], kG * m.mass, 0.01 * kG * m.mass);
+  for (const double p : m.momentum) EXPECT_NEAR(p, 0, 1e-3 * m.mass);
+  EXPECT_LT(a.stretch, 1e-7);
+  EXPECT_EQ(test::stats(s.w).unconverged, 0u);
+}
+
+// Many bonds share a brick of a ten-thousandth of the body's mass.
+TEST(Attach, ALightBrick_HangsOnManyBonds) {
+  World s;
+  test::BodyOptions o;
+  o.young = 1e6;
+  o.position = {-0.1, -0.1, 0};
+  const dfm_body block = test::make_body(s.context, s.w, "beam", {0.2, 0.2, 0.1}, 1000, o);
+  const dfm_rigid brick = s.brick({0, 0, -0.02}, 1e-4);
+  const uint32_t top = attach(block, s.hook({0, 0, 0.15})), held = attach(block, brick, false);
+  s.run(0.1);
+  EXPECT_GT(info(block, held).nsurfel, 40u);
+  EXPECT_LT(info(block, held).stretch, 1e-6);
+  EXPECT_LT(info(block, top).stretch, 1e-9);
+  EXPECT_LT(std::fabs(rigid_measure(brick).momentum[2]), 1e-4 * 0.2);
+  EXPECT_EQ(test::stats(s.w).unconverged, 0u);
+}
+
 // It goes where the obstacle goes, turned as well.
 TEST(Attach, AnObstacle_CarriesItAlong) {
   World s;

@@ -28,6 +28,7 @@ struct Bond {
   Vec3 velocity;  // m/s of the place on an obstacle, mean over the sub-step; 0 for bodies
   Vec3 rate;      // m/s
   double soft;    // 1/kg
+  double give;    // share of the surfel's own response that is added to soft
 };
 
 }  // namespace dfm

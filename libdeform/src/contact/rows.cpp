@@ -11,8 +11,9 @@ ContactRows::ContactRows(const Memory &m)
     : kernels_(dense_kernels()),
       loops_(doubles_at_once() >= 4 ? contact_kernels_avx2() : contact_kernels_sse2()) {
   use_memory(m, across_, begin, dof, weight, y, y_free, alone, source, point, block, blocks, response_,
-             given_, frame, drive, rate, wn, wt, cross, impulse, bond, dof_of_point_, dof_of_node_, place_,
-             rigid, arm, dof_of_group_, columns_, left_, first_column_, column_count_, first_value_);
+             given_, frame, drive, rate, wn, wt, cross, impulse, bond, bond_scratch, dof_of_point_,
+             dof_of_node_, place_, rigid, arm, dof_of_group_, columns_, left_, first_column_, column_count_,
+             first_value_);
 }
 
 // Of the dofs from `first` on.
@@ -305,10 +306,10 @@ void ContactRows::finish_bonds(std::span<const Bond> bonds) {
     }
     wn[i] = w[0].x;
     wt[i] = std::max(w[1].y, w[2].z);
-    for (int c = 0; c < 3; ++c) w[c][c] += b.soft;
     BondRow &row = bond[k];
     row.rate = b.rate;
-    row.soft = b.soft;
+    row.soft = b.soft + b.give * std::max(w[0].x, wt[i]);
+    for (int c = 0; c < 3; ++c) w[c][c] += row.soft;
     invert(w, row.inverse);
   }
 }

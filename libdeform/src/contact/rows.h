@@ -84,7 +84,8 @@ struct ContactRows {
     double soft;
     Vec3 inverse[3];
   };
-  Array<BondRow> bond;  // [nbond]
+  Array<BondRow> bond;         // [nbond]
+  Array<double> bond_scratch;  // of solve_bonds()
 
   // m/s, at most, at which a depth is opened; 0: a tenth of the rest distance per sub-step
   double recovery = 0;

@@ -4,6 +4,7 @@
 #include <functional>
 #include <limits>
 
+#include "contact/bonds.h"
 #include "contact/friction_kernel.h"
 
 namespace dfm {
@@ -18,27 +19,6 @@ Pair friction_impulse(const ContactRows &rows, const LawView &law, uint32_t i, d
 
 double normal_impulse(const ContactRows &rows, uint32_t i, double un) {
   return std::max(0.0, rows.impulse[size_t(i) * 3] - (un + rows.rate[i]) / rows.wn[i]);
-}
-
-// m/s, what the impulse of bond k leaves of its condition, in the components in which anything moves.
-Vec3 bond_residual(const ContactRows &rows, uint32_t k) {
-  const ContactRows::BondRow &b = rows.bond[k];
-  Vec3 r = rows.velocity(rows.n + k) + b.rate + b.soft * load3(&rows.impulse[size_t(3) * (rows.n + k)]);
-  for (int c = 0; c < 3; ++c)
-    if (b.inverse[c][c] == 0) r[c] = 0;
-  return r;
-}
-
-void sweep_bonds(ContactRows &rows) {
-  for (uint32_t k = 0; k < rows.nbond; ++k) {
-    const ContactRows::BondRow &b = rows.bond[k];
-    const Vec3 r = bond_residual(rows, k);
-    const Vec3 change{-dot(b.inverse[0], r), -dot(b.inverse[1], r), -dot(b.inverse[2], r)};
-    if (change.x == 0 && change.y == 0 && change.z == 0) continue;
-    rows.apply(rows.n + k, change);
-    double *const l = &rows.impulse[size_t(3) * (rows.n + k)];
-    store3(l, load3(l) + change);
-  }
 }
 
 }  // namespace
@@ -97,10 +77,10 @@ void sweep_answers(ContactRows &rows, const LawView &law, double h) {
 
 }  // namespace
 
-void sweep(ContactRows &rows, const ContactState &law, double h) {
+uint32_t sweep(ContactRows &rows, const ContactState &law, double h, double bond_tolerance) {
   if (!rows.alone_all()) sweep_answers(rows, law.view(), h);
   else rows.kernels().sweep(rows.view(), law.view(), h, rows.y.data(), rows.impulse.data());
-  if (rows.nbond) sweep_bonds(rows);
+  return rows.nbond ? solve_bonds(rows, bond_tolerance) : 0;
 }
 
 namespace {

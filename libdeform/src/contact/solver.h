@@ -15,8 +15,9 @@ void set_trial(const ContactRows &rows, double h, const double *response, Contac
 void linearize(const ContactRows &rows, double h, ContactState &state);
 
 // One sweep in contact order. Every contact first gets its normal impulse, then its friction impulse with
-// that new normal impulse.
-void sweep(ContactRows &rows, const ContactState &law, double h);
+// that new normal impulse. Then all bonds are solved together (bonds.h) to a residual of bond_tolerance, m/s.
+// Returns the number of passes over the bonds.
+uint32_t sweep(ContactRows &rows, const ContactState &law, double h, double bond_tolerance = 0);
 
 // Anderson acceleration of the sweeps (Walker and Ni 2011, type II). A sweep is a fixed-point map G; where
 // contacts are nearly redundant (vertex-face beside edge-edge, two bodies' grids on each other) it converges

@@ -43,6 +43,14 @@ Vec3 closing(const World &w, const StepContext &step, Vec3 gap) {
   return norm(gap) > w.offset && speed > most ? (most / speed) * rate : rate;
 }
 
+// A body that steps itself may have fewer motions than bonds. Some of its motions then move the held points
+// by almost nothing, and rigid bonds need impulses of a thousand times the weight to correct the last
+// micrometer by them: the body is thrown (doc/decisions/0390). Each rigid bond of such a body therefore gets
+// this share of its surfel's own response as compliance; at rest that is a gap of 1e-9 m and less.
+constexpr double kGive = 1e-5;
+
+bool few_motions(const Body &b) { return !b.dynamics->abilities().placed; }
+
 void add_bonds(World &w, StepContext &step, const Attachment &a) {
   const uint32_t slot_a = slot_of(w, a.body);
   const BodyView &body = step.body_views[slot_a];
@@ -76,6 +84,7 @@ void add_bonds(World &w, StepContext &step, const Attachment &a) {
       b.soft = 1 / spring;
     } else {
       b.rate = closing(w, step, gap);
+      if (few_motions(*w.bodies[slot_a]) || (!a.obstacle && few_motions(*w.bodies[b.slot_b]))) b.give = kGive;
     }
     step.bonds.push_back(b);
   }

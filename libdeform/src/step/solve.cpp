@@ -93,6 +93,10 @@ bool good(StepContext &step, const Residual &left, double most) {
          (left.due <= most && (step.sweeps >= kPolish || spares(step, Thrift::polish)));
 }
 
+// Each sweep solves the bonds to this share of their tolerance, so that the residual which the next sweep
+// finds comes from the contacts.
+constexpr double kBondShare = 0.1;
+
 // Beyond this times the best residual sweeps are running away: with a jam of strong friction block
 // Gauss-Seidel need not converge, and where laws are affine nothing else stops it before numbers end.
 constexpr double kRunsAway = 1e6;
@@ -173,7 +177,8 @@ void sweep_until_good(World &w, StepContext &step, Acceleration &acceleration, c
   acceleration.start(step.rows);
   for (;;) {
     charge(w, step, step.rows.all());
-    sweep(step.rows, step.state, step.h);
+    const uint32_t passes = sweep(step.rows, step.state, step.h, kBondShare * tolerance.bond);
+    charge(w, step, uint64_t{passes} * step.rows.nbond);
     ++step.sweeps;
     const Residual left = inner_residual(step.rows, step.state, step.h, tolerance);
     if (!(left.due <= kRunsAway * std::max(1.0, best)) || !(left.due < std::numeric_limits<double>::max())) {
