@@ -176,3 +176,24 @@ TEST(SceneStart, InsideOut_IsWarnedOfWhereItLasts) {
   EXPECT_EQ(late.find("cells are inside out"), std::string::npos) << late;
   EXPECT_EQ(late.find("crosses itself"), std::string::npos) << late;
 }
+
+// A mesh in millimeters that is read as meters, and the same with its scale.
+TEST(SceneStart, OwnWeightAboveTheModulus_IsWarnedOf) {
+  const std::string folder = test::scratch("scene_start_weight_" + std::to_string(getpid()));
+  const auto log = [&](const char *scale, const char *more = "\"model\": {\"type\": \"msm\"}") {
+    test::write_file(
+        folder + "/scene.json",
+        std::string(R"({"format": "deform-scene", "version": 1, "time": {"duration": 1e-6, "step": 1e-6},
+    "bodies": [{"name": "brick", "mesh": {"make": "beam", "size": [50, 30, 20], "cells": 60}, )") +
+            more + R"(, "pose": {"position": [0, 0, 1], "scale": )" + scale + "}}]}");
+    const test::CommandResult r = test::deform({"run", folder + "/scene.json", "--out", folder + "/out"});
+    EXPECT_EQ(r.exit_code, 0) << r.err;
+    return r.err;
+  };
+  EXPECT_NE(
+      log("1").find("body 'brick' is 20 m high, and the pressure of its own weight (density x gravity x "
+                    "height = 1.96e+05 Pa)"),
+      std::string::npos);
+  EXPECT_EQ(log("0.001").find("own weight"), std::string::npos);
+  EXPECT_EQ(log("1", "\"model\": {\"type\": \"shape_matching\"}").find("own weight"), std::string::npos);
+}
