@@ -1,4 +1,5 @@
-// A line of JSON that says what the state belongs to, then the bytes of dfm_world_snapshot.
+// A line of JSON that says what the state belongs to, then the bytes of dfm_world_snapshot. These alone, as
+// dfm_world_write_scene leaves them, are read too.
 #include "state_file.h"
 
 #include <algorithm>
@@ -13,6 +14,7 @@ namespace {
 
 constexpr uint64_t kMostPlugin = uint64_t{1} << 30, kMostState = uint64_t{1} << 33;  // bytes
 constexpr const char *kFormat = "deform-state", *kVersion = "1";
+constexpr const char *kSnapshot = "dfmsnap";  // how the bytes of dfm_world_snapshot begin
 
 // FNV-1a, 64 bit: against a mistaken file, not against forgery.
 uint64_t hash_of(const std::string &bytes) {
@@ -121,6 +123,10 @@ void write_state(const SceneFile &scene, const std::string &path) {
 
 void read_state(const SceneFile &scene, const std::string &path) {
   const std::string text = read_file(path, kMostState, "a state that `deform run --save` wrote");
+  if (text.rfind(kSnapshot, 0) == 0) {  // which says itself what it belongs to
+    if (dfm_world_restore(scene.world(), text.data(), text.size()) < 0) refuse(path, dfm_last_error());
+    return;
+  }
   const size_t line = text.find('\n');
   JsonValue head;
   if (line == std::string::npos || line > 1 << 20 || !parse_json(text.substr(0, line), head) ||

@@ -116,6 +116,7 @@ DFM_EVENT_SENSOR_END = 5
 DFM_ATTACH_TOUCH = 1
 DFM_MESH_TETS = 1
 DFM_MESH_SURFACE = 2
+DFM_SCENE_SNAPSHOT = 1
 DFM_SHAPE_PLANE = 0
 DFM_SHAPE_SPHERE = 1
 DFM_SHAPE_BOX = 2
@@ -441,7 +442,8 @@ class dfm_attachment(_Structure):
 
 class dfm_vertex_layout(_Structure):
     _fields_ = [("size", u32), ("stride", u32), ("position", u32), ("normal", u32), ("velocity", u32),
-                ("displacement", u32), ("stick", u32), ("reserved", u32), ("origin", f64 * 3)]
+                ("displacement", u32), ("stick", u32), ("reserved", u32), ("origin", f64 * 3),
+                ("cookie", u64)]
 
 
 class dfm_ray_hit(_Structure):
@@ -477,6 +479,11 @@ class dfm_scene_settings(_Structure):
     _fields_ = [("size", u32), ("nprobe", u32), ("duration", f64), ("step", f64), ("every", f64),
                 ("frames", flag), ("states", flag), ("nodes", flag), ("contacts", flag), ("check", flag),
                 ("color", text), ("eye", f64 * 3), ("look_at", f64 * 3), ("has_camera", flag)]
+
+
+class dfm_scene_write_def(_Structure):
+    _fields_ = [("size", u32), ("flags", u32), ("duration", f64), ("step", f64), ("note", ptr),
+                ("user", ptr), ("cookie", u64)]
 
 
 class dfm_obstacle_def(_Structure):
@@ -560,12 +567,12 @@ class dfm_toi_options(_Structure):
 class dfm_query_shape(_Structure):
     _fields_ = [("size", u32), ("shape", u32), ("pose", dfm_pose), ("half_size", f64 * 3),
                 ("radius", f64), ("half_length", f64), ("npoint", u32), ("reserved", u32),
-                ("points", ptr)]
+                ("points", ptr), ("cookie", u64)]
 
 
 class dfm_query_filter(_Structure):
     _fields_ = [("size", u32), ("what", u32), ("category", u32), ("collides_with", u32), ("accept", ptr),
-                ("user", ptr)]
+                ("user", ptr), ("cookie", u64)]
 
 
 class dfm_query_hit(_Structure):
@@ -705,6 +712,8 @@ FUNCTIONS = {
     "dfm_scene_value": (i32, [u64, text, ptr, ptr]),
     "dfm_scene_get_settings": (i32, [u64, ptr]),
     "dfm_scene_probe": (i32, [u64, u32, ptr, ptr, ptr]),
+    "dfm_scene_write_def_default_sized": (None, [u32, ptr]),
+    "dfm_world_write_scene": (i32, [u64, text, ptr, ptr]),
     "dfm_obstacle_def_default_sized": (None, [u32, ptr]),
     "dfm_obstacle_create": (i32, [u64, ptr, ptr]),
     "dfm_obstacle_destroy": (i32, [u64]),

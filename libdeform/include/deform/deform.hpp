@@ -438,6 +438,11 @@ class World : public Handle<dfm_world, struct WorldKind>, public WorldQueries<E,
       return dfm_world_memory(raw_, &m);
     });
   }
+  // How many sentences there were about what a scene cannot say.
+  auto write_scene(Text path, const dfm_scene_write_def *def = nullptr) const {
+    return produce<E, uint32_t>(
+        [&](uint32_t &notes) { return dfm_world_write_scene(raw_, path.c_str, def, &notes); });
+  }
   auto find_obstacle(Text name) const {
     return produce<E, Obstacle<E>>(
         [&](Obstacle<E> &o) { return dfm_world_find_obstacle(raw_, name.c_str, o.put()); });

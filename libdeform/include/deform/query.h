@@ -29,6 +29,7 @@ typedef struct dfm_query_shape {
   double half_length;   /* capsule: half of the axis between the centers of its caps, along local z, m */
   uint32_t npoint, reserved;
   const double *points; /* CONVEX: [npoint,3] m, in the shape's frame; borrowed during the call */
+  uint64_t cookie;      /* set by the default function */
 } dfm_query_shape;
 /** dfm_query_shape_default into a struct of any size (base.h). Threads: Any thread. Since 0.1. */
 DFM_API void dfm_query_shape_default_sized(uint32_t size, dfm_query_shape *out);
@@ -51,7 +52,8 @@ typedef struct dfm_query_filter {
   /* asked once per query for each thing that the masks pass, bodies first, each kind in order of creation; on
    * the calling thread. It may not change the world (DFM_E_BUSY). NULL: all pass. */
   bool (*accept)(void *user, uint64_t thing);
-  void *user; /* first argument of accept */
+  void *user;      /* first argument of accept */
+  uint64_t cookie; /* set by the default function */
 } dfm_query_filter;
 /** dfm_query_filter_default into a struct of any size (base.h). Threads: Any thread. Since 0.1. */
 DFM_API void dfm_query_filter_default_sized(uint32_t size, dfm_query_filter *out);

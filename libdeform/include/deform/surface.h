@@ -49,6 +49,7 @@ typedef struct dfm_vertex_layout {
   uint32_t stick;
   uint32_t reserved;
   double origin[3]; /* m, subtracted before rounding: far from 0 floats are coarse */
+  uint64_t cookie;  /* set by the default function */
 } dfm_vertex_layout;
 /** dfm_vertex_layout_default into a struct of any size (base.h). Threads: Any thread. Since 0.1. */
 DFM_API void dfm_vertex_layout_default_sized(uint32_t size, dfm_vertex_layout *out);

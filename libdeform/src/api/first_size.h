@@ -48,6 +48,7 @@ DFM_ENDED_WITH(dfm_query_shape, points)
 DFM_ENDED_WITH(dfm_query_filter, user)
 DFM_ENDED_WITH(dfm_query_hit, normal)
 DFM_ENDED_WITH(dfm_scene_settings, has_camera)
+DFM_ENDED_WITH(dfm_scene_write_def, cookie)
 #undef DFM_ENDED_WITH
 
 }  // namespace dfm

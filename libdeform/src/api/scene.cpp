@@ -1,11 +1,13 @@
 // deform/scene.h: argument checks; exceptions become statuses.
 #include "deform/scene.h"
 
+#include <cmath>
 #include <cstring>
 
 #include "api/objects.h"
 #include "plugin/context.h"
 #include "scene/scene.h"
+#include "scene/write.h"
 
 namespace {
 
@@ -128,5 +130,39 @@ dfm_status dfm_scene_probe(dfm_scene scene, uint32_t probe, const char **name, d
     if (name) *name = s.probe(probe).name.c_str();
     if (position) std::memcpy(position, x, sizeof x);
     if (velocity) std::memcpy(velocity, v, sizeof v);
+  });
+}
+
+void dfm_scene_write_def_default_sized(uint32_t size, dfm_scene_write_def *out) {
+  dfm_scene_write_def d{};
+  d.size = sizeof d;
+  d.duration = 1;
+  dfm::give_default(size, out, d);
+}
+
+dfm_status dfm_world_write_scene(dfm_world world, const char *path, const dfm_scene_write_def *def,
+                                 uint32_t *notes) {
+  return dfm::as_status([&] {
+    dfm::World &w = dfm::exclusive(dfm::world_of(world));
+    if (!path || !*path)
+      dfm::fail(DFM_E_ARG, "dfm_world_write_scene: path is %s; expected a file name that ends in .json",
+                path ? "empty" : "NULL");
+    const dfm_scene_write_def d = dfm::take_def(def, dfm_scene_write_def_default());
+    dfm::check_flags(d, DFM_SCENE_SNAPSHOT, "dfm_world_write_scene");
+    if (!(d.duration > 0 && std::isfinite(d.duration)) || !(d.step >= 0 && std::isfinite(d.step)))
+      dfm::fail(DFM_E_ARG,
+                "dfm_world_write_scene: a duration of %g s and a step of %g s; both are finite, the duration is "
+                "positive and the step not negative",
+                d.duration, d.step);
+    dfm::writing::WriteOptions options;
+    options.duration = d.duration;
+    options.step = d.step;
+    options.snapshot = d.flags & DFM_SCENE_SNAPSHOT;
+    options.note = [&](const std::string &sentence) {
+      if (d.note) d.note(d.user, sentence.c_str());
+      else w.context->logf(DFM_LOG_WARNING, "%s: %s", path, sentence.c_str());
+    };
+    const uint32_t told = dfm::writing::write_scene(w, path, options);
+    if (notes) *notes = told;
   });
 }

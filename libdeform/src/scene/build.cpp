@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <functional>
 #include <utility>
 
 #include "core/error.h"
@@ -33,9 +34,7 @@ class Builder {
   Built run() {
     create_world();
     for (Material &m : def_.materials) create_material(m);
-    for (Body &b : def_.bodies) create_body(b);
-    for (Obstacle &o : def_.obstacles) create_obstacle(o);
-    create_rigid(def_.rigid);
+    create_things();
     for (Friction &f : def_.friction) add_friction(f);
     for (const Filter &f : def_.filters)
       check(dfm_world_filter_pair(world_, f.between[0].c_str(), f.between[1].c_str(), f.collide), f.pointer);
@@ -82,9 +81,36 @@ class Builder {
     effects.push_back(nullptr);
     if (!def_.effects_auto) w.effects = effects.data();
     check(dfm_world_create(context_, &w, &world_), def_.effects_auto ? "/contact" : "/effects");
+    resolve<World>(Kind::world, world_).time = def_.begin;
     if (def_.gravity_keys.empty()) return;
     check(dfm_world_set_gravity_keys(world_, uint32_t(def_.gravity_keys.size()), def_.gravity_keys.data()),
           "/gravity/keyframes");
+  }
+
+  // Bodies, obstacles, rigid bodies, as they stand in the scene; or in the order of the ids that it gives.
+  void create_things() {
+    struct Thing {
+      uint64_t id;
+      std::string pointer;
+      std::function<void()> create;
+    };
+    std::vector<Thing> things;
+    for (Body &b : def_.bodies) things.push_back({b.id, b.pointer, [this, &b] { create_body(b); }});
+    for (Obstacle &o : def_.obstacles) things.push_back({o.id, o.pointer, [this, &o] { create_obstacle(o); }});
+    const auto set = [this] { create_rigid(def_.rigid); };
+    if (def_.rigid.bodies.empty()) things.push_back({0, "/rigid", set});
+    else things.push_back({def_.rigid.bodies[0].id, def_.rigid.bodies[0].pointer, set});
+    std::stable_sort(things.begin(), things.end(), [](const Thing &a, const Thing &b) {
+      return (a.id ? a.id : UINT64_MAX) < (b.id ? b.id : UINT64_MAX);
+    });
+    World &w = resolve<World>(Kind::world, world_);
+    for (const Thing &thing : things) {
+      if (thing.id && thing.id < w.next_id)
+        fail(DFM_E_ARG, "%s: %s/id: %llu is taken; ids of bodies, obstacles and rigid bodies are unique",
+             def_.file.c_str(), thing.pointer.c_str(), static_cast<unsigned long long>(thing.id));
+      if (thing.id) w.next_id = thing.id;
+      thing.create();
+    }
   }
 
   void create_material(Material &m) {
@@ -264,18 +290,38 @@ class Builder {
     check(dfm_body_create(world_, &d, &body), b.pointer);
     tell_own_weight(b, body);
     if (b.sensor) check(dfm_body_set_sensor(body, true), b.pointer);
-    if (b.start.kind != StartKind::rest)
+    if (b.start.kind != StartKind::rest && b.start.kind != StartKind::state)
       check(dfm_body_set_state(body, mesh.npoint, start_positions(b.start, mesh, b.pose).data(), nullptr),
             b.start.pointer);
     for (size_t i = 0; i < b.fixes.size(); ++i) move_held(body, b.fixes[i], held[i]);
     add_loads(body, b, mesh, nodal);
     for (const Spring &s : b.springs) add_spring(body, s, b.name, mesh);
+    if (b.start.kind == StartKind::state) set_state(body, b, mesh);
     for (Attach &a : b.attach) {
       if (mesh.wears_skin) a.surfels = select_skin(a.where, mesh, def_.file);
       else a.points = select(a.where, mesh, def_.file);
     }
     for (const Probe &p : def_.probes)
       if (p.body == b.name) add_probe(body, p, mesh);
+  }
+
+  // Held points too, which dfm_body_set_state leaves where they are.
+  void set_state(dfm_body body, const Body &b, const BodyMesh &mesh) const {
+    const std::string pointer = b.start.pointer + "/state";
+    const StartState state =
+        with_pointer(pointer, [&] { return read_start_state(files_.path_of(b.start.state), mesh); });
+    dfm::Body &made = resolve<dfm::Body>(Kind::body, body);
+    if (!made.dynamics->abilities().placed)
+      fail(DFM_E_UNSUPPORTED,
+           "%s: %s: the model '%s' moves the body as a whole, and its points cannot be put one by one",
+           def_.file.c_str(), pointer.c_str(), made.model.type->id);
+    for (uint32_t i = 0; i < mesh.npoint; ++i)
+      for (size_t k = 0; k < 3; ++k)
+        if (made.p.held[i] & (1u << k)) {
+          made.p.x[kStride * size_t{i} + k] = state.x[3 * size_t{i} + k];
+          made.p.v[kStride * size_t{i} + k] = state.v[3 * size_t{i} + k];
+        }
+    check(dfm_body_set_state(body, mesh.npoint, state.x.data(), state.v.data()), pointer);
   }
 
   // Of a world that is whole, so that one which could never be made is an error of the scene.
@@ -293,7 +339,7 @@ class Builder {
       to.params = s.model.params.view();
       to.max_jump = s.max_jump;
       switches.push_back(to);
-      if (s.t > 0 && s.t >= end_of_changes())
+      if (s.t > 0 && s.t >= def_.begin + end_of_changes())
         context_->logf(DFM_LOG_WARNING,
                        "body '%s': its change to '%s' at %g s (%s/t) is never made, because no step begins "
                        "then or later; give an earlier time, or a longer /time/duration",
@@ -344,7 +390,7 @@ class Builder {
            (a.integrator == b.integrator || b.integrator == kSameIntegrator);
   }
 
-  // s: no step of the scene's duration, or search for an equilibrium, begins then or later.
+  // s after the start: no step of the scene's duration, or search for an equilibrium, begins then or later.
   double end_of_changes() const {
     const double step = def_.equilibrium && !(def_.step > 0) ? def_.duration : def_.step;
     if (!(step > 0)) return def_.duration;
@@ -473,6 +519,7 @@ class Builder {
     dfm_obstacle obstacle = 0;
     check(dfm_obstacle_create(world_, &o.def, &obstacle), o.pointer);
     if (o.sensor) check(dfm_obstacle_set_sensor(obstacle, true), o.pointer);
+    if (o.start) check(dfm_obstacle_teleport(obstacle, &*o.start), o.pointer + "/start");
   }
 
   void create_rigid(Rigid &rigid) {
@@ -515,6 +562,9 @@ class Builder {
     check(dfm_rigid_create(world_, rigid.host.c_str(), &set, made.data()), rigid.pointer);
     for (size_t i = 0; i < made.size(); ++i)
       if (rigid.bodies[i].sensor) check(dfm_obstacle_set_sensor(made[i], true), rigid.bodies[i].pointer);
+    for (size_t i = 0; i < made.size(); ++i)
+      if (rigid.bodies[i].start)
+        check(dfm_rigid_set_state(made[i], &*rigid.bodies[i].start), rigid.bodies[i].pointer + "/start");
   }
 
   void add_friction(Friction &f) {

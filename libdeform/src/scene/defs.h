@@ -3,6 +3,7 @@
 #pragma once
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,8 +20,9 @@ struct Params {
 };
 
 struct Selection {
-  std::string pointer, group;  // group empty: by box
+  std::string pointer, group;  // group empty: by box, or the listed points
   double lo[3] = {}, hi[3] = {};
+  std::vector<uint32_t> points;  // nodes of the mesh file
 };
 
 struct Motion {
@@ -108,15 +110,17 @@ struct SwitchRule {
 };
 
 // How a body's points stand at the start.
-enum class StartKind { rest, scramble, plane, line, point, invert };
+enum class StartKind { rest, scramble, plane, line, point, invert, state };
 struct Start {
   std::string pointer;
   StartKind kind = StartKind::rest;
   uint64_t seed = 0;  // of scramble
+  std::string state;  // a file
 };
 
 struct Body {
   std::string pointer, name, mesh, material, model, nodal_bc;
+  uint64_t id = 0;  // 0: as it comes
   bool sensor = false;
   bool model_open = false;  // the planner chooses; `model` holds what stands in for it
   int32_t integrator = DFM_INTEGRATOR_AUTO;
@@ -139,6 +143,8 @@ struct Body {
 
 struct Obstacle {
   std::string pointer, name, material, mesh;
+  uint64_t id = 0;
+  std::optional<dfm_pose> start;  // where it stands at first
   double scale = 1;  // of the mesh
   bool sensor = false;
   dfm_obstacle_def def = {};
@@ -152,6 +158,8 @@ struct Joint {
 
 struct RigidBody {
   std::string pointer, name, material;
+  uint64_t id = 0;
+  std::optional<dfm_rigid_state> start;
   bool sensor = false;
   dfm_rigid_def def = {};
   std::vector<Joint> joints;
@@ -215,7 +223,7 @@ struct Definition {
   std::vector<Probe> probes;
   Wanted wanted;
   // what only a runner needs
-  double duration = 0, step = 0, every = 0, frame_rate = 0;
+  double begin = 0, duration = 0, step = 0, every = 0, frame_rate = 0;
   bool equilibrium = false;  // mode static
   bool frames = false, states = false, nodes = false, contacts = true, check = false, has_camera = false;
   double eye[3] = {}, look_at[3] = {};

@@ -234,6 +234,7 @@ void read_gravity(const Node &scene, Definition &def) {
 void read_time(const Node &scene, Definition &def) {
   const Node time = scene.at("time");
   time.object("time");
+  def.begin = time.number("start", 0.0, kNotNegative);
   def.duration = time.at("duration").number(kPositive);
   if (!time.has("step")) time.value()["step"] = "auto";
   if (time.has("max_time")) def.max_time = time.member("max_time").number(kPositive);

@@ -32,6 +32,9 @@ std::vector<Obstacle> read_obstacles(const Node &scene, ReadContext &context);
 // Size and place of a shape, as obstacles and rigid bodies say it; kind: of the pose's object.
 void check_shape_keys(const Node &node, const std::string &shape);
 dfm_pose read_pose(const Node &holder, const char *kind, double *scale);
+// Of a "start": what it leaves out is as otherwise.
+dfm_pose read_placed(const Node &start, const dfm_pose &otherwise);
+uint64_t read_id(const Node &node);  // 0: none is given
 void read_solid(const Node &node, const std::string &shape, uint32_t &number, double half_size[3],
                 double &radius, double &half_length);
 Rigid read_rigid(const Node &scene, ReadContext &context);

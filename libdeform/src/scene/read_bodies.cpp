@@ -7,11 +7,28 @@
 namespace dfm::scene {
 namespace {
 
+// x, y, z, w
+void read_quaternion(const Node &rotation, double out[4]) {
+  for (const char *key : {"axis", "angle_deg"})
+    if (rotation.has(key))
+      rotation.member(key).fail("a rotation is given by \"axis\" and \"angle_deg\" or by \"quaternion\"; keep one");
+  const Node node = rotation.member("quaternion");
+  const std::vector<Node> items = node.items();
+  if (items.size() != 4) node.fail("expected four numbers [x, y, z, w], found %zu", items.size());
+  double square = 0;
+  for (size_t k = 0; k < 4; ++k) {
+    out[k] = items[k].number(Range{-1e100, 1e100, false, false});
+    square += out[k] * out[k];
+  }
+  if (!(square > 1e-200)) node.fail("the quaternion of a rotation cannot be zero");
+}
+
 void read_rotation(const Node &holder, double out[4]) {
   Quaternion q;
   if (holder.has("rotation")) {
     const Node node = holder.member("rotation");
     node.object("rotation");
+    if (node.has("quaternion")) return read_quaternion(node, out);
     double axis[3];
     node.at("axis").vector(axis);
     if (axis[0] == 0 && axis[1] == 0 && axis[2] == 0)
@@ -25,6 +42,17 @@ void read_rotation(const Node &holder, double out[4]) {
 }
 
 }  // namespace
+
+dfm_pose read_placed(const Node &start, const dfm_pose &otherwise) {
+  dfm_pose pose = otherwise;
+  if (start.has("position")) start.member("position").vector(pose.position);
+  if (start.has("rotation")) read_rotation(start, pose.rotation);
+  return pose;
+}
+
+uint64_t read_id(const Node &node) {
+  return node.has("id") ? uint64_t(read_count(node.member("id"), 1, 4294967295.0)) : 0;
+}
 
 dfm_pose read_pose(const Node &holder, const char *kind, double *scale) {
   dfm_pose pose = {{0, 0, 0}, {0, 0, 0, 1}};
@@ -42,8 +70,14 @@ namespace {
 Selection read_selection(const Node &entry) {
   Selection s;
   s.pointer = entry.pointer();
-  if (entry.has("box") == entry.has("group"))
-    entry.fail("expected either \"box\" or \"group\" to say which points");
+  if (int(entry.has("box")) + int(entry.has("group")) + int(entry.has("points")) != 1)
+    entry.fail("expected one of \"box\", \"group\" and \"points\" to say which points");
+  if (entry.has("points")) {
+    const std::vector<Node> points = entry.member("points").items();
+    if (points.empty()) entry.member("points").fail("expected at least one node of the mesh file");
+    for (const Node &p : points) s.points.push_back(read_count(p, 0, 4294967294.0));
+    return s;
+  }
   if (entry.has("group")) {
     s.group = entry.member("group").text();
     return s;
@@ -139,8 +173,11 @@ Spring read_spring(const Node &entry) {
   entry.object("spring");
   spring.pointer = entry.pointer();
   spring.at_point = entry.has("point");
-  if (int(entry.has("point")) + int(entry.has("box")) + int(entry.has("group")) != 1)
-    entry.fail("expected one of \"point\", \"box\" and \"group\" to say where the spring pulls");
+  int said = 0;
+  for (const char *key : {"point", "points", "box", "group"}) said += entry.has(key);
+  if (said != 1)
+    entry.fail(
+        "expected one of \"point\", \"points\", \"box\" and \"group\" to say where the spring pulls");
   if (spring.at_point) entry.member("point").vector(spring.point);
   else spring.where = read_selection(entry);
   if (entry.has("to") == entry.has("keyframes"))
@@ -207,13 +244,17 @@ Start read_start(const Node &node) {
   Start out;
   out.pointer = node.pointer();
   if (node.value().size() != 1)
-    node.fail("expected one of \"scramble\", \"flatten\" and \"invert\" to say how the body begins");
+    node.fail(
+        "expected one of \"scramble\", \"flatten\", \"invert\" and \"state\" to say how the body begins");
   if (node.has("scramble")) {
     out.kind = StartKind::scramble;
     out.seed = read_count(node.member("scramble"), 0, kLargestSeed);
   } else if (node.has("flatten")) {
     const std::string onto = node.member("flatten").word("flatten");
     out.kind = onto == "plane" ? StartKind::plane : onto == "line" ? StartKind::line : StartKind::point;
+  } else if (node.has("state")) {
+    out.kind = StartKind::state;
+    out.state = node.member("state").text();
   } else if (node.member("invert").boolean()) {
     out.kind = StartKind::invert;
   }
@@ -311,6 +352,7 @@ Body read_body(const Node &node, ReadContext &context) {
   else b.mesh = mesh.text();
   if (node.has("material")) b.material = known(node.member("material"), context.materials, "material");
   b.sensor = node.boolean("sensor", false);
+  b.id = read_id(node);
   if (!node.has("model")) node.value()["model"] = json::object();
   const Node model = node.member("model");
   model.object("model");
@@ -437,6 +479,14 @@ Obstacle read_obstacle(const Node &node, ReadContext &context) {
   node.vector("velocity_surface", o.def.velocity_surface, 0, 0, 0);
   if (node.has("material")) o.material = known(node.member("material"), context.materials, "material");
   o.sensor = node.boolean("sensor", false);
+  o.id = read_id(node);
+  if (node.has("start")) {
+    const Node start = node.member("start");
+    start.object("obstacle_start");
+    if (node.has("motion"))
+      start.fail("a \"motion\" says where the obstacle is at every time; take one of the two away");
+    o.start = read_placed(start, o.def.pose);
+  }
   return o;
 }
 

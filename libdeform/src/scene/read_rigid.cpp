@@ -31,6 +31,18 @@ RigidBody read_rigid_body(const Node &node, ReadContext &context) {
   node.vector("spin", b.def.spin, 0, 0, 0);
   if (node.has("material")) b.material = known(node.member("material"), context.materials, "material");
   b.sensor = node.boolean("sensor", false);
+  b.id = read_id(node);
+  if (!node.has("start")) return b;
+  const Node start = node.member("start");
+  start.object("rigid_start");
+  if (b.def.fixed) start.fail("a fixed body stays where it is; take \"start\" or \"fixed\" away");
+  const dfm_pose pose = read_placed(start, b.def.pose);
+  dfm_rigid_state state{};
+  std::copy_n(pose.position, 3, state.position);
+  std::copy_n(pose.rotation, 4, state.rotation);
+  start.vector("velocity", state.velocity, b.def.velocity[0], b.def.velocity[1], b.def.velocity[2]);
+  start.vector("spin", state.spin, b.def.spin[0], b.def.spin[1], b.def.spin[2]);
+  b.start = state;
   return b;
 }
 

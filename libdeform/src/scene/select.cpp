@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "core/error.h"
 #include "math/vec3.h"
@@ -106,6 +107,27 @@ std::vector<uint32_t> marked(const std::vector<uint8_t> &marks) {
   return out;
 }
 
+// By the mesh file's numbers.
+std::vector<uint32_t> select_nodes(const Selection &where, const BodyMesh &mesh, const std::string &file) {
+  const std::string pointer = where.pointer + "/points";
+  if (mesh.filled)
+    fail(DFM_E_ARG,
+         "%s: %s: the mesh is a surface, whose nodes are none of the filled body's points; use \"box\" or "
+         "\"group\"",
+         file.c_str(), pointer.c_str());
+  std::map<uint32_t, uint32_t> point_of;
+  for (uint32_t i = 0; i < mesh.npoint; ++i) point_of[mesh.file_point[i]] = i;
+  std::vector<uint8_t> point(mesh.npoint, 0);
+  for (const uint32_t node : where.points) {
+    const auto at = point_of.find(node);
+    if (at == point_of.end())
+      fail(DFM_E_ARG, "%s: %s: no tetrahedron of the mesh file has a node %u; nodes are numbered from 0",
+           file.c_str(), pointer.c_str(), node);
+    point[at->second] = 1;
+  }
+  return marked(point);
+}
+
 std::vector<uint32_t> select_group(const Selection &where, const BodyMesh &mesh, const std::string &file) {
   const uint32_t group = find_group(where.group, mesh.group_names, mesh.ngroup);
   if (group == mesh.ngroup) {
@@ -135,6 +157,7 @@ std::vector<uint32_t> select_group(const Selection &where, const BodyMesh &mesh,
 
 std::vector<uint32_t> select(const Selection &where, const BodyMesh &mesh, const std::string &file) {
   if (!where.group.empty()) return select_group(where, mesh, file);
+  if (!where.points.empty()) return select_nodes(where, mesh, file);
   std::vector<uint8_t> point(mesh.npoint, 0);
   for (uint32_t i = 0; i < mesh.npoint; ++i) point[i] = in_box(where, mesh, &mesh.points[3 * size_t(i)]);
   if (mesh.filled) {
@@ -158,6 +181,13 @@ std::vector<uint32_t> select_skin(const Selection &where, const BodyMesh &mesh, 
   if (!where.group.empty()) {
     for (const uint32_t t : skin_triangles(where, mesh))
       for (int k = 0; k < 3; ++k) marks[mesh.skin.triangles[3 * size_t(t) + size_t(k)]] = 1;
+  } else if (!where.points.empty()) {
+    for (const uint32_t s : where.points) {
+      if (s >= mesh.skin.npoint)
+        fail(DFM_E_ARG, "%s: %s/points: the body's surface has the points 0 to %u, and no point %u",
+             file.c_str(), where.pointer.c_str(), mesh.skin.npoint - 1, s);
+      marks[s] = 1;
+    }
   } else {
     for (uint32_t s = 0; s < mesh.skin.npoint; ++s)
       marks[s] = in_box(where, mesh, &mesh.skin.points[3 * size_t(s)]);
@@ -269,7 +299,8 @@ Shared share_on_cells(const Force &force, const BodyMesh &mesh, const std::strin
 
 Shared share(const Force &force, const BodyMesh &mesh, const std::string &file) {
   const bool of_cells = find_group(force.where.group, mesh.group_names, mesh.ngroup) < mesh.ngroup;
-  const bool on_skin = force.where.group.empty() ? mesh.filled : !of_cells;
+  const bool on_skin =
+      force.where.points.empty() && (force.where.group.empty() ? mesh.filled : !of_cells);
   if (!on_skin || force.by == "mass") return share_on_cells(force, mesh, file);
   const std::vector<uint32_t> triangles = skin_triangles(force.where, mesh);
   if (!triangles.empty()) return share_on_skin(triangles, mesh);

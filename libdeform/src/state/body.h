@@ -92,6 +92,7 @@ struct Body {
   Surface surface;
   SurfaceZones zones;
   int32_t coupling = kNoCoupling;  // DFM_COUPLING_* of a surface of its own
+  double support = 0;              // of it, as its def gave it
   ModelInstance model;
   std::unique_ptr<Dynamics> dynamics;  // how it moves
   Integrator integrator;

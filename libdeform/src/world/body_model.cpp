@@ -251,6 +251,11 @@ void check_params(const World &w, const Body &b, const dfm_type &type, const Mod
   values_for(w, b, type, params, unused);
 }
 
+std::vector<double> values_asked(const World &w, const Body &b) {
+  BodyModel unused;
+  return values_for(w, b, *b.model.type, b.origin.params, unused);
+}
+
 std::unique_ptr<BodyModel> make_body_model(World &w, Body &b, const dfm_type &type, ModelOrigin origin,
                                            int32_t integrator) {
   auto out = std::make_unique<BodyModel>();

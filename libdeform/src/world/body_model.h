@@ -28,6 +28,8 @@ void warn_of_own_steps(const World &w, const std::string &body, const ModelInsta
                        int32_t integrator);
 // Of type and origin, for two bodies that differ in nothing else.
 uint64_t model_hash(const Body &b);
+// What its origin and makeup ask for, as its type's table orders them.
+std::vector<double> values_asked(const World &w, const Body &b);
 // Throws what make_body_model() throws about parameters.
 void check_params(const World &w, const Body &b, const dfm_type &type, const ModelParams &params);
 void exchange(Body &b, BodyModel &other) noexcept;

@@ -139,7 +139,10 @@ Body &create_body(World &w, const dfm_body_def &def) {
   b.edges = unique_edges(m, def.ntet, b.tets.data());
   make_body_surface(b, def.surface);
   check_resolved(b.name.c_str(), far, b.surface.median_edge);
-  if (def.surface) b.coupling = def.surface->coupling;
+  if (def.surface) {
+    b.coupling = def.surface->coupling;
+    b.support = def.surface->support;
+  }
   make_zones(b, def, materials, plain);
   make(b.surfel_impulse, size_t(3) * b.surface.nsurfel);
 

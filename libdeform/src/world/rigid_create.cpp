@@ -201,6 +201,8 @@ void create_rigids(World &w, const char *host, const dfm_rigid_set_def &def, uin
   for (uint32_t i = 0; i < def.nbody; ++i) set.defs[i].name = names[i].c_str();
   const std::vector<dfm_joint_def> joints(def.joints, def.joints + def.njoint);
   set.njoint = def.njoint;
+  set.joints = joints;
+  set.elsewhere = def.data != nullptr;
   for (uint32_t k = 0; k < set.njoint; ++k) check_joint(joints[k], k, set.defs);
   ask_host(set, joints, def.data);
 

@@ -33,7 +33,9 @@ struct RigidSet {
   dfm_rigid_host host;
   void *self = nullptr;
   std::vector<dfm_rigid_def> defs;                   // names: those of the obstacles
+  std::vector<dfm_joint_def> joints;                 // [njoint] with their motors as they were last set
   std::vector<uint64_t> obstacle;                    // [n] ids
+  bool elsewhere = false;                            // made with data: bodies of a world of the host's own
   uint32_t njoint = 0, ngroup = 0, first_group = 0;  // first_group: of this set among the world's
   std::vector<uint32_t> group, place;                // [n] within the set; its number within the group
   dfm_rigid_step step{};                             // this sub-step's

@@ -1,0 +1,408 @@
+#include "scene/write.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdarg>
+#include <cstring>
+#include <filesystem>
+
+#include "core/error.h"
+#include "core/file.h"
+#include "core/handle.h"
+#include "friction/pair_rules.h"
+#include "plugin/shared_object.h"
+#include "scene/node.h"
+#include "scene/scene.h"
+#include "world/create.h"
+#include "world/snapshot.h"
+#include "world/snapshot_structure.h"
+
+namespace dfm::writing {
+
+// ---- values -----------------------------------------------------------------------------------------------
+
+bool same_bits(const void *a, const void *b, size_t bytes) { return std::memcmp(a, b, bytes) == 0; }
+
+Written vector_of(const double *v) { return {v[0], v[1], v[2]}; }
+
+Written rotation_of(const double *q) { return {{"quaternion", {q[0], q[1], q[2], q[3]}}}; }
+
+Written pose_of(const dfm_pose &pose) {
+  Written out;
+  const double *const p = pose.position, *const q = pose.rotation;
+  if (p[0] != 0 || p[1] != 0 || p[2] != 0) out["position"] = vector_of(p);
+  if (q[0] != 0 || q[1] != 0 || q[2] != 0 || q[3] != 1) out["rotation"] = rotation_of(q);
+  return out;
+}
+
+bool moves(const dfm_sine &s) { return s.amplitude[0] != 0 || s.amplitude[1] != 0 || s.amplitude[2] != 0; }
+
+Written sine_of(const dfm_sine &s, bool scalar) {
+  Written out;
+  out["amplitude"] = scalar ? Written(s.amplitude[0]) : vector_of(s.amplitude);
+  out["frequency"] = s.frequency;
+  if (s.phase != 0) out["phase"] = s.phase;
+  return out;
+}
+
+Written value_of(const dfm_param &row, const double *values) {
+  const bool whole = row.flags & (DFM_PARAM_INTEGER | DFM_PARAM_ENUM);
+  const auto number = [&](double x) { return whole ? Written(int64_t(x)) : Written(x); };
+  if ((row.flags & DFM_PARAM_AUTO) && values[0] == row.def) return "auto";
+  if (row.width == 1) {
+    if ((row.flags & DFM_PARAM_ENUM) && row.names) return row.names[size_t(values[0])];
+    return number(values[0]);
+  }
+  Written out = Written::array();
+  for (uint32_t k = 0; k < row.width; ++k) out.push_back(number(values[k]));
+  return out;
+}
+
+Written params_of(const dfm_type &type, const std::vector<double> &values) {
+  Written out = Written::object();
+  size_t at = 0;
+  for (uint32_t i = 0; i < type.nparam; at += type.params[i++].width) {
+    const dfm_param &row = type.params[i];
+    if (std::any_of(&values[at], &values[at] + row.width, [&](double x) { return x != row.def; }))
+      out[row.key] = value_of(row, &values[at]);
+  }
+  return out;
+}
+
+// ---- the writer -------------------------------------------------------------------------------------------
+
+void SceneWriter::note(const char *text, ...) {
+  char line[1024];
+  va_list rest;
+  va_start(rest, text);
+  std::vsnprintf(line, sizeof line, text, rest);
+  va_end(rest);
+  ++notes;
+  if (options.note) options.note(line);
+}
+
+std::string SceneWriter::file(const std::string &name, std::string &made) {
+  const std::filesystem::path where = std::filesystem::path(folder) / files;
+  if (!has_folder) {
+    std::error_code error;
+    std::filesystem::create_directory(where, error);
+    if (!std::filesystem::is_directory(where, error))
+      fail(DFM_E_IO, "%s: there can be no folder %s for its meshes beside it; give a path where there can be one",
+           path.c_str(), where.c_str());
+    has_folder = true;
+  }
+  made = (where / name).string();
+  return files + "/" + name;
+}
+
+void SceneWriter::check_name(const char *kind, const std::string &name) const {
+  scene::json text = name;
+  try {
+    if (name.empty()) fail(DFM_E_ARG, "it is empty");
+    scene::Node(&text, "", &path).name();
+  } catch (const Error &) {
+    fail(DFM_E_ARG,
+         "%s: the name of %s '%s' cannot stand in a scene: one has 1 to 100 bytes, does not begin with a dot, "
+         "and holds no control characters and none of / \\ , : * = \"; make it under another name",
+         path.c_str(), kind, name.c_str());
+  }
+}
+
+namespace {
+
+// ---- materials --------------------------------------------------------------------------------------------
+
+Written material_of(const Material &m) {
+  Written out;
+  out["density"] = m.def.density;
+  out["young"] = m.def.young;
+  out["poisson"] = m.def.poisson;
+  if (m.def.damping_mass != 0) out["damping"]["mass"] = m.def.damping_mass;
+  if (m.def.damping_stiffness != 0) out["damping"]["stiffness"] = m.def.damping_stiffness;
+  for (size_t i = 0; i < m.extra_keys.size(); ++i)
+    out[m.extra_keys[i]] = m.extra_values[i].size() == 1 ? Written(m.extra_values[i][0]) : Written(m.extra_values[i]);
+  return out;
+}
+
+// What bodies are made of comes first: a material may have been destroyed, or made anew, since.
+Written write_materials(SceneWriter &to) {
+  Written out = Written::object();
+  std::vector<std::string> known{"friction"};
+  for (const std::string &key : scene::Types(to.w.context).model_keys()) known.push_back(key);
+  const auto add = [&](const Material &m) {
+    if (m.name.empty()) return;
+    to.check_name("material", m.name);
+    Written value = material_of(m);
+    for (const std::string &key : m.extra_keys)
+      if (std::find(known.begin(), known.end(), key) == known.end()) {
+        to.note("material '%s': its entry '%s' is left out, since no loaded model has such a parameter",
+                m.name.c_str(), key.c_str());
+        value.erase(key);
+      }
+    if (!out.contains(m.name)) out[m.name] = std::move(value);
+    else if (out[m.name] != value)
+      to.note("there are two materials '%s'; the scene has the one that a body is made of", m.name.c_str());
+  };
+  for (const auto &b : to.w.bodies)
+    for (const Material &m : b->makeup.materials) add(m);
+  for (const auto &m : to.w.materials) add(*m);
+  for (const auto &o : to.w.obstacles) {
+    if (o->material.empty() || out.contains(o->material)) continue;
+    Material m;
+    m.def = dfm_material_def_default();
+    m.name = o->material;
+    m.extra_keys = {"friction"};
+    m.extra_values = {{o->zone.friction}};
+    add(m);
+  }
+  return out;
+}
+
+// ---- contact ----------------------------------------------------------------------------------------------
+
+bool sides_known(const SceneWriter &to, const std::string &side, const Written &materials) {
+  if (side == "*") return true;
+  if (side.rfind("material=", 0) == 0) return materials.contains(side.substr(9));
+  return to.knows(side) || to.knows(side.substr(0, side.find(':')));
+}
+
+Written write_friction(SceneWriter &to, const Written &materials) {
+  Written out = Written::array();
+  for (const FrictionRule &r : to.w.friction) {
+    if (!sides_known(to, r.between[0], materials) || !sides_known(to, r.between[1], materials)) {
+      to.note("the friction rule for '%s' and '%s' is left out, since the world has no such two",
+              r.between[0].c_str(), r.between[1].c_str());
+      continue;
+    }
+    const LawInstance &law = *to.w.laws[r.law];
+    const dfm_type &type = law.asked_type ? *law.asked_type : *law.type;
+    Written entry;
+    entry["between"] = {r.between[0], r.between[1]};
+    entry["law"] = type.id;
+    const Written params = params_of(type, law.asked_type ? law.asked : law.params);
+    if (!params.empty()) entry["params"] = params;
+    out.push_back(std::move(entry));
+  }
+  return out;
+}
+
+// By masks and by the host's answers; a rule that names the two decides in place of the masks.
+Written write_filters(SceneWriter &to) {
+  World &w = to.w;
+  Written out = Written::array();
+  const auto add = [&](const std::string &a, const std::string &b, bool collide) {
+    out.push_back({{"between", {a, b}}, {"collide", collide}});
+  };
+  const auto pair = [&](const Body &a, const std::string &name, const std::string &material, uint32_t category,
+                        uint32_t with) {
+    if ((a.category & with) && (category & a.collides_with)) return;
+    const PairSide one{a.name, {}, a.material}, other{name, {}, material};
+    for (const FilterRule &r : w.filters)
+      if (rule_weight(r.between, one, other)) return;
+    add(a.name, name, false);
+  };
+  for (size_t i = 0; i < w.bodies.size(); ++i) {
+    const Body &a = *w.bodies[i];
+    for (size_t k = i + 1; k < w.bodies.size(); ++k) {
+      const Body &b = *w.bodies[k];
+      pair(a, b.name, b.material, b.category, b.collides_with);
+    }
+    for (const auto &o : w.obstacles)
+      if (!o->added) pair(a, o->name, o->material, o->def.category, o->def.collides_with);
+  }
+  for (const FilterRule &r : w.filters) {
+    if (to.knows(r.between[0]) && to.knows(r.between[1])) add(r.between[0], r.between[1], r.collide);
+    else if (r.between[0] == "*" || r.between[1] == "*" || r.between[0].rfind("material=", 0) == 0 ||
+             r.between[1].rfind("material=", 0) == 0)
+      add(r.between[0], r.between[1], r.collide);
+  }
+  const auto name = [&](uint64_t id) -> std::string {
+    for (const auto &b : w.bodies)
+      if (b->id == id) return b->name;
+    for (const auto &o : w.obstacles)
+      if (o->id == id && !o->added) return o->name;
+    return "";
+  };
+  for (const PairAnswer &p : w.may_touch.answers)
+    if (const std::string a = name(p.a), b = name(p.b); !p.touch && !a.empty() && !b.empty()) add(a, b, false);
+  return out;
+}
+
+Written write_contact(SceneWriter &to, const Written &materials) {
+  const dfm_world_def &d = to.w.def, usual = dfm_world_def_default();
+  Written out;
+  static const std::pair<int32_t, const char *> methods[] = {
+      {DFM_METHOD_VELOCITY, "velocity"}, {DFM_METHOD_IMPLICIT, "implicit"}, {DFM_METHOD_ROLLBACK, "rollback"}};
+  for (const auto &[method, word] : methods)
+    if (d.method == method) out["method"] = word;
+  if (d.self_contact == DFM_SELF_ON) out["self"] = true;
+  if (d.self_contact == DFM_SELF_AUTO) out["self"] = "auto";
+  if (d.flags & DFM_WORLD_UNTANGLE) out["untangle"] = true;
+  if (d.flags & DFM_WORLD_UNGUARDED) out["guard"] = false;
+  if (d.sleep) out["sleep"] = true;
+  if (d.contact_tolerance > 0) out["tolerance"] = d.contact_tolerance;
+  if (d.contact_offset > 0) out["offset"] = d.contact_offset;
+  if (d.energy_watch == 0) out["energy_watch"] = false;
+  else if (d.energy_watch != usual.energy_watch) out["energy_watch"] = d.energy_watch;
+  if (d.recovery_speed > 0) out["recovery_speed"] = d.recovery_speed;
+  if (d.obstacle_speed > 0) out["obstacle_speed"] = d.obstacle_speed;
+  if (Written friction = write_friction(to, materials); !friction.empty()) out["friction"] = std::move(friction);
+  if (Written filter = write_filters(to); !filter.empty()) out["filter"] = std::move(filter);
+  return out;
+}
+
+// ---- the rest ---------------------------------------------------------------------------------------------
+
+Written write_gravity(const World &w) {
+  if (w.gravity.keys.empty()) return vector_of(w.def.gravity);
+  Written out;
+  for (const dfm_vector_key &k : w.gravity.keys)
+    out["keyframes"].push_back({{"t", k.t}, {"value", vector_of(k.value)}});
+  return out;
+}
+
+Written write_time(const SceneWriter &to) {
+  const World &w = to.w;
+  Written out;
+  if (w.time > 0) out["start"] = w.time;
+  out["duration"] = to.options.duration;
+  const double step = to.options.step > 0 ? to.options.step : w.def.step;
+  if (step > 0) out["step"] = step;
+  else out["step"] = "auto";
+  switch (w.def.integrator) {
+    case DFM_INTEGRATOR_SYMPLECTIC_EULER: out["integrator"] = "symplectic_euler"; break;
+    case DFM_INTEGRATOR_IMPLICIT_EULER:
+    case DFM_INTEGRATOR_TR_BDF2: out["integrator"] = integrator_name(w.def.integrator); break;
+    default: break;
+  }
+  if (w.def.max_time > 0) out["max_time"] = w.def.max_time;
+  if (w.def.max_work > 0) out["max_work"] = double(w.def.max_work);
+  return out;
+}
+
+Written write_solver(const World &w) {
+  const ImplicitOptions usual;
+  Written out;
+  if (w.implicit.solver != usual.solver) out["type"] = w.implicit.solver;
+  if (w.implicit.tolerance != usual.tolerance) out["tolerance"] = w.implicit.tolerance;
+  if (w.implicit.solver_iterations != usual.solver_iterations)
+    out["max_iterations"] = w.implicit.solver_iterations;
+  if (w.implicit.newton != usual.newton) out["newton"] = w.implicit.newton;
+  return out;
+}
+
+// What a scene has no word for.
+void tell_what_is_left_out(SceneWriter &to) {
+  const World &w = to.w;
+  const dfm_world_def usual = dfm_world_def_default();
+  if (w.may_touch.call)
+    to.note("a callback of the host says which pairs may touch: the scene has its answers so far, and asks "
+            "nobody about pairs that come later");
+  if (w.pre_solve.call)
+    to.note("a callback of the host changes contacts before they are solved; a scene has none");
+  const std::pair<const char *, bool> members[] = {{"max_sweeps", w.def.max_sweeps != usual.max_sweeps},
+                                                   {"max_passes", w.def.max_passes != usual.max_passes},
+                                                   {"max_substeps", w.def.max_substeps != usual.max_substeps},
+                                                   {"sleep_speed", w.def.sleep_speed != usual.sleep_speed},
+                                                   {"sleep_time", w.def.sleep_time != usual.sleep_time}};
+  for (const auto &[member, set] : members)
+    if (set) to.note("dfm_world_def.%s is not its default; a scene has no such key", member);
+  struct Used {
+    std::set<std::string> ids, told;
+    SceneWriter *to;
+    std::string shipped;
+  } used{{}, {}, &to, default_plugin_directory()};
+  for (const auto &b : w.bodies) used.ids.insert(b->model.type->id);
+  for (const FrictionRule &r : w.friction) used.ids.insert(w.laws[r.law]->type->id);
+  dfm_plugin_visit(
+      w.context,
+      [](void *user, const dfm_type *type, const char *file) {
+        Used &u = *static_cast<Used *>(user);
+        const std::string path = file ? file : "";
+        if (path.empty() || !u.ids.count(type->id)) return;
+        if (path.rfind("static:", 0) == 0 ? path.rfind("static:host", 0) != 0
+                                          : std::filesystem::path(path).parent_path() ==
+                                                std::filesystem::path(u.shipped))
+          return;
+        if (u.told.insert(type->id).second)
+          u.to->note("'%s' comes from %s, which whoever runs the scene has to load: name its folder in "
+                     "DEFORM_PLUGIN_PATH",
+                     type->id, path.c_str());
+      },
+      &used);
+}
+
+Written write_root(SceneWriter &to) {
+  Written root;
+  root["format"] = "deform-scene";
+  root["version"] = 1;
+  root["gravity"] = write_gravity(to.w);
+  root["time"] = write_time(to);
+  if (to.w.selection.listed()) root["effects"] = to.w.selection.names();
+  const Written materials = write_materials(to);
+  if (!materials.empty()) root["materials"] = materials;
+  for (const auto &b : to.w.bodies) root["bodies"].push_back(write_body(to, *b));
+  for (const auto &o : to.w.obstacles)
+    if (!o->rigid) root["obstacles"].push_back(write_obstacle(to, *o));
+  if (Written rigid = write_rigid(to); !rigid.is_null()) root["rigid"] = std::move(rigid);
+  if (Written contact = write_contact(to, materials); !contact.is_null()) root["contact"] = std::move(contact);
+  if (Written solver = write_solver(to.w); !solver.is_null()) root["solver"] = std::move(solver);
+  tell_what_is_left_out(to);
+  return root;
+}
+
+// Indented, but for lists of numbers and what holds no further lists or objects.
+void print(const Written &value, const std::string &before, std::string &out) {
+  const auto leaf = [](const Written &v) { return !v.is_structured(); };
+  if (leaf(value) || std::all_of(value.begin(), value.end(), leaf)) {
+    out += value.dump(-1, ' ', false, Written::error_handler_t::strict);
+    return;
+  }
+  const std::string inside = before + "  ";
+  out += value.is_object() ? "{" : "[";
+  bool first = true;
+  for (const auto &entry : value.items()) {
+    out += first ? "\n" : ",\n";
+    first = false;
+    out += inside;
+    if (value.is_object()) out += Written(entry.key()).dump() + ": ";
+    print(entry.value(), inside, out);
+  }
+  out += "\n" + before + (value.is_object() ? "}" : "]");
+}
+
+// A snapshot fits a world that was made in the same way, so the scene is read and compared.
+void write_snapshot(SceneWriter &to, const std::string &name) {
+  scene::Scene back(to.w.context, to.path, nullptr);
+  const World &made = resolve<World>(Kind::world, back.world());
+  if (snapshot_structure(made) != snapshot_structure(to.w)) {
+    to.note("no snapshot is written, since the world that the scene gives is made otherwise than this one, as "
+            "the sentences before tell, or in what rounding leaves of its meshes and poses");
+    return;
+  }
+  std::string where;
+  to.file(name, where);
+  std::vector<unsigned char> bytes;
+  world_snapshot(to.w, bytes);
+  AtomicFile file(where);
+  file.write(bytes.data(), bytes.size());
+  file.commit();
+}
+
+}  // namespace
+
+uint32_t write_scene(World &w, const std::string &path, const WriteOptions &options) {
+  const std::filesystem::path whole(path);
+  if (whole.extension() != ".json" || whole.stem().empty())
+    fail(DFM_E_ARG, "%s: the name of a scene file ends in .json", path.c_str());
+  SceneWriter to{w, path, options, whole.parent_path().string(), whole.stem().string() + "_files"};
+  AtomicFile scene(path);  // what cannot be written is found out first
+  std::string text;
+  print(write_root(to), "", text);
+  scene.write(text + "\n");
+  scene.commit();
+  if (options.snapshot) write_snapshot(to, "snapshot.state");
+  return to.notes;
+}
+
+}  // namespace dfm::writing

@@ -1,0 +1,56 @@
+// A world as a scene: the file that `deform run` takes, with meshes and states in a folder beside it. What a
+// scene cannot say is told by a sentence each.
+#pragma once
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <string>
+
+#include "state/world.h"
+
+namespace dfm::writing {
+
+using Written = nlohmann::ordered_json;
+
+struct WriteOptions {
+  double duration = 1, step = 0;  // s; step 0: that of the world's def, else "auto"
+  bool snapshot = false;          // beside the scene, for `deform run --from`
+  std::function<void(const std::string &)> note;
+};
+
+// Returns how many sentences it has told. Throws Error; the scene file itself is written last, and as a whole.
+uint32_t write_scene(World &w, const std::string &path, const WriteOptions &options);
+
+// ---- for the parts of it (write_body.cpp, write_things.cpp) -----------------------------------------------
+
+struct SceneWriter {
+  World &w;
+  const std::string &path;  // of the scene
+  const WriteOptions &options;
+  std::string folder, files;  // where the scene lies; the name of the folder of its files
+  uint32_t notes = 0;
+  bool has_folder = false;
+
+  void note(const char *text, ...) __attribute__((format(printf, 2, 3)));
+  // The name of a file beside the scene as the scene says it; made: where it lies. Makes the folder.
+  std::string file(const std::string &name, std::string &made);
+  void check_name(const char *kind, const std::string &name) const;  // throws where a scene has no such name
+  bool knows(const std::string &name) const { return w.find_body(name) || w.find_obstacle(name); }
+};
+
+Written vector_of(const double *v);
+inline Written vector_of(Vec3 v) { return {v.x, v.y, v.z}; }
+Written rotation_of(const double *q);  // x y z w
+Written pose_of(const dfm_pose &pose);
+Written sine_of(const dfm_sine &sine, bool scalar);
+bool moves(const dfm_sine &sine);
+// Parameters by key, those that are not at the table's default.
+Written params_of(const dfm_type &type, const std::vector<double> &values);
+Written value_of(const dfm_param &row, const double *values);
+bool same_bits(const void *a, const void *b, size_t bytes);
+
+Written write_body(SceneWriter &to, Body &b);
+Written write_obstacle(SceneWriter &to, const Obstacle &o);
+Written write_rigid(SceneWriter &to);  // null: there are none
+
+}  // namespace dfm::writing

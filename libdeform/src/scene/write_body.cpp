@@ -1,0 +1,427 @@
+// A soft body as a scene says it: its mesh at rest, in files of their own, how it stands and moves now, and what
+// is prescribed for it.
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <map>
+
+#include "core/error.h"
+#include "core/file.h"
+#include "mesh/tri_mesh.h"
+#include "scene/start.h"
+#include "scene/write.h"
+#include "step/attach.h"
+#include "world/body_model.h"
+
+namespace dfm::writing {
+namespace {
+
+// Two groups of one name would be one.
+uint32_t group_number(std::vector<MeshGroup> &groups, const std::string &name, int32_t dimension) {
+  for (uint32_t g = 0; g < groups.size(); ++g)
+    if (groups[g].name == name && groups[g].dimension == dimension) return g;
+  MeshGroup group;
+  group.name = name;
+  group.dimension = dimension;
+  group.tag = int32_t(groups.size()) + 1;
+  groups.push_back(std::move(group));
+  return uint32_t(groups.size()) - 1;
+}
+
+// The group of a surface triangle; empty: none.
+const std::string &zone_group(const Body &b, uint32_t triangle) {
+  return b.zones.list[b.zones.of.empty() ? 0 : b.zones.of[triangle]].group;
+}
+
+std::string material_group(const std::string &material) { return "material " + material; }
+
+void write_cells(SceneWriter &to, const Body &b, Written &out) {
+  TetMesh mesh;
+  mesh.points.assign(b.p.rest.begin(), b.p.rest.end());
+  mesh.tets.assign(b.tets.begin(), b.tets.end());
+  mesh.share.assign(b.share.begin(), b.share.end());
+  const uint32_t ntet = mesh.ntet();
+  mesh.tet_group.assign(ntet, kNoGroup);
+  for (uint32_t t = 0; t < ntet && !b.makeup.of.empty(); ++t) {
+    const std::string &material = b.makeup.materials[b.makeup.of[t]].name;
+    if (material == b.material) continue;
+    if (material.empty()) {
+      to.note("body '%s': cells without a material lie beside others; a scene gives them '%s'",
+              b.name.c_str(), b.material.c_str());
+      break;
+    }
+    mesh.tet_group[t] = group_number(mesh.groups, material_group(material), 3);
+    out["materials_by_group"][material_group(material)] = material;
+  }
+  for (uint32_t t = 0; b.surface.identity() && t < b.surface.ntri; ++t) {
+    if (zone_group(b, t).empty()) continue;
+    for (size_t k = 0; k < 3; ++k) mesh.tris.push_back(b.surface.point[b.surface.tri[3 * size_t{t} + k]]);
+    mesh.tri_group.push_back(group_number(mesh.groups, zone_group(b, t), 2));
+  }
+  std::string made;
+  out["mesh"] = to.file(b.name + ".vtu", made);
+  write_vtu(mesh, made);
+}
+
+void write_surface(SceneWriter &to, const Body &b, Written &out) {
+  const Surface &s = b.surface;
+  if (s.identity()) return;
+  TriMesh mesh;
+  mesh.points.assign(s.rest.begin(), s.rest.end());
+  mesh.tris.assign(s.tri.begin(), s.tri.end());
+  for (uint32_t t = 0; t < s.ntri; ++t)
+    mesh.tri_group.push_back(
+        zone_group(b, t).empty() ? kNoGroup : group_number(mesh.groups, zone_group(b, t), 2));
+  std::string made;
+  Written &own = out["surface"];
+  own["mesh"] = to.file(b.name + "_surface.vtu", made);
+  own["coupling"] = b.coupling == DFM_COUPLING_MLS      ? "mls"
+                    : b.coupling == DFM_COUPLING_THESIS ? "thesis"
+                                                        : "barycentric";
+  if (b.coupling != DFM_COUPLING_BARYCENTRIC && b.support > 0) own["support"] = b.support;
+  write_tri_mesh(mesh, made);
+}
+
+// ---- the model --------------------------------------------------------------------------------------------
+
+struct GivenParam {
+  std::string key;
+  std::vector<double> values;
+};
+
+std::vector<GivenParam> rows_of(const ModelParams &params) {
+  std::vector<GivenParam> out;
+  const char *key = params.keys.c_str();
+  const double *value = params.values.data();
+  for (const uint32_t width : params.widths) {
+    const char *const end = std::strchr(key, '\n');
+    out.push_back({{key, end}, {value, value + width}});
+    key = end + 1;
+    value += width;
+  }
+  return out;
+}
+
+const dfm_param *row_of(const dfm_type &type, const std::string &key) {
+  for (uint32_t i = 0; i < type.nparam; ++i)
+    if (key == type.params[i].key) return &type.params[i];
+  return nullptr;
+}
+
+// "type", "params" and "precision".
+void write_choice(const dfm_type &type, const std::vector<GivenParam> &given, Written &out) {
+  out["type"] = type.id;
+  for (const GivenParam &p : given) {
+    const dfm_param *const row = row_of(type, p.key);
+    if (row) out["params"][p.key] = value_of(*row, p.values.data());
+    else if (p.values[0] == 1) out["precision"] = "single";
+  }
+}
+
+const char *integrator_word(uint32_t integrator) {
+  switch (integrator) {
+    case DFM_INTEGRATOR_SYMPLECTIC_EULER: return "symplectic_euler";
+    case DFM_INTEGRATOR_IMPLICIT_EULER: return "implicit_euler";
+    case DFM_INTEGRATOR_TR_BDF2: return "tr_bdf2";
+    default: return nullptr;
+  }
+}
+
+// With the values of now where they have been changed since the model was made.
+void write_model(SceneWriter &to, const Body &b, Written &out) {
+  const dfm_type &type = *b.model.type;
+  std::vector<GivenParam> given = rows_of(b.origin.params);
+  const std::vector<double> made = values_asked(to.w, b);
+  const std::vector<double> &now = b.withheld.asked.empty() ? b.model.params : b.withheld.asked;
+  size_t at = 0;
+  for (uint32_t i = 0; i < type.nparam; at += type.params[i++].width) {
+    const dfm_param &row = type.params[i];
+    if (std::equal(&now[at], &now[at] + row.width, &made[at])) continue;
+    if (std::any_of(b.fields.begin(), b.fields.end(), [&](const CellField &f) { return f.key == row.key; }))
+      continue;
+    std::erase_if(given, [&](const GivenParam &p) { return p.key == row.key; });
+    given.push_back({row.key, {&now[at], &now[at] + row.width}});
+  }
+  write_choice(type, given, out["model"]);
+  if (const char *const word = integrator_word(b.origin.integrator)) out["integrator"] = word;
+}
+
+void write_fields(SceneWriter &to, const Body &b, Written &out) {
+  for (const CellField &f : b.makeup.given) {
+    const dfm_param *const row = row_of(*b.model.type, f.key);
+    if (!row || !(row->flags & DFM_PARAM_PER_CELL)) {
+      to.note("body '%s': the field '%s' is left out, since the model '%s' has no such parameter",
+              b.name.c_str(), f.key.c_str(), b.model.type->id);
+      continue;
+    }
+    std::string made;
+    out["fields"][f.key] = to.file(b.name + "_" + f.key + ".csv", made);
+    AtomicFile file(made);
+    if (f.width == 1) {
+      file.write("value\n");
+    } else if (f.width == 3) {
+      file.write("x,y,z\n");
+    } else {
+      for (uint32_t k = 0; k < f.width; ++k) file.write(format("%svalue%u", k ? "," : "", k));
+      file.write("\n");
+    }
+    for (size_t i = 0; i < f.values.size(); ++i)
+      file.write(format("%.17g%s", f.values[i], (i + 1) % f.width ? "," : "\n"));
+    file.commit();
+  }
+}
+
+Written choice_of(SceneWriter &to, const ModelChoice &c) {
+  Written out;
+  write_choice(to.w.context->registry.find(DFM_KIND_MODEL, c.type.c_str()), rows_of(c.params), out);
+  if (c.integrator != kSameIntegrator)
+    if (const char *const word = integrator_word(c.integrator)) out["integrator"] = word;
+  return out;
+}
+
+void write_switches(SceneWriter &to, const Body &b, Written &out) {
+  if (!b.switches.empty() && !b.rule.empty())
+    to.note("body '%s': a scene has either changes of the model by time or a rule; the rule is left out",
+            b.name.c_str());
+  for (const Switch &s : b.switches) {
+    Written entry = choice_of(to, s.to);
+    entry["t"] = s.t;
+    if (s.to.max_jump < HUGE_VAL) entry["max_jump"] = s.to.max_jump;
+    out["switch"].push_back(std::move(entry));
+  }
+  if (b.rule.empty() || !b.switches.empty()) return;
+  const SwitchRule &r = b.rule[0];
+  Written &rule = out["switch"];
+  if (!r.touching.type.empty()) rule["touching"] = choice_of(to, r.touching);
+  if (!r.near.type.empty()) {
+    rule["near"] = choice_of(to, r.near);
+    rule["point"] = vector_of(r.point);
+    rule["distance"] = r.distance;
+    rule["hysteresis"] = r.hysteresis;
+  }
+  rule["far"] = choice_of(to, r.far);
+  rule["wait"] = r.wait;
+  if (r.far.max_jump < HUGE_VAL) rule["max_jump"] = r.far.max_jump;
+}
+
+// ---- how it stands ----------------------------------------------------------------------------------------
+
+Vec3 made_at(const Body &b, uint32_t point) {
+  const Quat &q = b.origin.frame.rotation;
+  const double turn[4] = {q.x, q.y, q.z, q.w};
+  return place({b.origin.frame.position, unit_quat(turn)}, load3(&b.p.rest[3 * size_t{point}]));
+}
+
+void write_state(SceneWriter &to, const Body &b, Written &out) {
+  const Pose &frame = b.origin.frame;
+  dfm_pose pose{};
+  store3(pose.position, frame.position);
+  const double turn[4] = {frame.rotation.x, frame.rotation.y, frame.rotation.z, frame.rotation.w};
+  std::copy_n(turn, 4, pose.rotation);
+  out["pose"] = pose_of(pose);
+  bool rests = true;
+  for (uint32_t i = 0; i < b.p.n && rests; ++i) {
+    const Vec3 x = made_at(b, i), v = load3(&b.p.v[kStride * size_t{i}]);
+    rests = same_bits(&x, &b.p.x[kStride * size_t{i}], sizeof x) && norm2(v) == 0;
+  }
+  if (rests) return;
+  if (!b.dynamics->abilities().placed) {
+    to.note("body '%s': its model '%s' moves it as a whole, so a scene cannot say how it stands and moves now; "
+            "it begins at rest where it was made",
+            b.name.c_str(), b.model.type->id);
+    return;
+  }
+  std::string made;
+  out["start"]["state"] = to.file(b.name + "_start.csv", made);
+  AtomicFile file(made);
+  file.write(std::string(scene::kStateHeader) + "\n");
+  for (uint32_t i = 0; i < b.p.n; ++i) {
+    const double *const x = &b.p.x[kStride * size_t{i}], *const v = &b.p.v[kStride * size_t{i}];
+    file.write(
+        format("%u,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g\n", i, x[0], x[1], x[2], v[0], v[1], v[2]));
+  }
+  file.commit();
+}
+
+// ---- what is prescribed -----------------------------------------------------------------------------------
+
+std::string axes_of(uint8_t held) {
+  std::string out;
+  for (int k = 0; k < 3; ++k)
+    if (held & (1 << k)) out += "xyz"[k];
+  return out;
+}
+
+// An entry for each set of held components, in rising order of these.
+void write_fix(const Body &b, const std::vector<uint32_t> &points, const Written &motion, Written &out) {
+  std::map<uint8_t, std::vector<uint32_t>> by_axes;
+  for (const uint32_t p : points)
+    if (b.p.held[p]) by_axes[b.p.held[p]].push_back(p);
+  for (auto &[held, list] : by_axes) {
+    std::sort(list.begin(), list.end());
+    Written entry;
+    entry["points"] = list;
+    entry["axes"] = axes_of(held);
+    if (!motion.is_null()) entry["motion"] = motion;
+    out["fix"].push_back(std::move(entry));
+  }
+}
+
+void write_held(SceneWriter &to, const Body &b, Written &out) {
+  std::vector<uint8_t> carried(b.p.n);
+  for (const HeldMotion &m : b.motions)
+    for (const uint32_t p : m.points) carried[p] = 1;
+  std::vector<uint32_t> still;
+  for (uint32_t i = 0; i < b.p.n; ++i)
+    if (!carried[i]) still.push_back(i);
+  write_fix(b, still, nullptr, out);
+  for (const HeldMotion &m : b.motions) {
+    Written motion;
+    for (const dfm_pose_key &k : m.keys) {
+      Written key;
+      key["t"] = k.t;
+      key["position"] = vector_of(k.pose.position);
+      key["rotation"] = rotation_of(k.pose.rotation);
+      motion["keyframes"].push_back(std::move(key));
+    }
+    if (moves(m.sine) || m.keys.empty()) motion["sine"] = sine_of(m.sine, false);
+    write_fix(b, m.points, motion, out);
+    double away = 0;
+    for (size_t i = 0; i < m.points.size(); ++i)
+      away = std::max(away, norm(load3(&m.start[3 * i]) - made_at(b, m.points[i])));
+    if (away > 1e-9 * b.surface.median_edge)
+      to.note("body '%s': held points move from where they stood when their motion was given, up to %g m from "
+              "the rest shape; a scene moves them from the rest shape",
+              b.name.c_str(), away);
+  }
+}
+
+void write_nodal(SceneWriter &to, const Body &b, const std::map<uint32_t, Vec3> &forces, Written &out) {
+  if (forces.empty()) return;
+  std::string made;
+  out["nodal_bc"] = to.file(b.name + "_forces.csv", made);
+  AtomicFile file(made);
+  file.write("node,fixx,fixy,fixz,fx,fy,fz\n");
+  for (const auto &[point, f] : forces) file.write(format("%u,0,0,0,%.17g,%.17g,%.17g\n", point, f.x, f.y, f.z));
+  file.commit();
+}
+
+void write_loads(SceneWriter &to, const Body &b, Written &out) {
+  std::map<uint32_t, Vec3> constant;
+  for (const Load &l : b.loads) {
+    const bool varies = !l.keys.empty() || moves(l.sine);
+    for (size_t i = 0; i < l.points.size(); ++i) {
+      const Vec3 f = load3(&l.force[3 * i]);
+      if (!varies) {
+        constant[l.points[i]] += f;
+        continue;
+      }
+      Written entry;
+      entry["points"] = {l.points[i]};
+      entry["total"] = vector_of(f);
+      for (const dfm_scale_key &k : l.keys) entry["keyframes"].push_back({{"t", k.t}, {"scale", k.value}});
+      if (moves(l.sine)) entry["sine"] = sine_of(l.sine, true);
+      out["forces"].push_back(std::move(entry));
+    }
+  }
+  write_nodal(to, b, constant, out);
+}
+
+// Where a spring pulls: at the center of mass of points, or at a place in a cell.
+bool write_spring_place(const Body &b, const Spring &s, Written &out) {
+  double whole = 0;
+  for (const uint32_t p : s.points) whole += b.p.mass[p];
+  bool by_mass = true;
+  for (size_t i = 0; i < s.points.size(); ++i)
+    by_mass = by_mass && std::fabs(s.weights[i] - b.p.mass[s.points[i]] / whole) < 1e-12;
+  if (by_mass) {
+    std::vector<uint32_t> points = s.points;
+    std::sort(points.begin(), points.end());
+    out["points"] = points;
+    return true;
+  }
+  if (s.points.size() > 4) return false;
+  Vec3 x;
+  for (size_t i = 0; i < s.points.size(); ++i) x += s.weights[i] * load3(&b.p.rest[3 * size_t{s.points[i]}]);
+  out["point"] = vector_of(x);
+  return true;
+}
+
+void write_springs(SceneWriter &to, const Body &b, Written &out) {
+  for (const Spring &s : b.springs) {
+    Written entry;
+    if (!write_spring_place(b, s, entry)) {
+      to.note("body '%s': a spring pulls at %zu points with weights of its own, which a scene cannot say; it is "
+              "left out",
+              b.name.c_str(), s.points.size());
+      continue;
+    }
+    if (s.keys.empty()) entry["to"] = vector_of(s.to);
+    for (const dfm_vector_key &k : s.keys)
+      entry["keyframes"].push_back({{"t", k.t}, {"position", vector_of(k.value)}});
+    entry["stiffness"] = s.stiffness;
+    if (s.damping > 0) entry["damping"] = s.damping;
+    out["springs"].push_back(std::move(entry));
+  }
+}
+
+void write_attachments(SceneWriter &to, const Body &b, Written &out) {
+  for (const Attachment &a : to.w.attachments) {
+    if (a.body != b.id || a.released) continue;
+    const Body *const other = [&]() -> const Body * {
+      for (const auto &x : to.w.bodies)
+        if (!a.obstacle && x->id == a.to) return x.get();
+      return nullptr;
+    }();
+    std::string name = other ? other->name : "";
+    for (const auto &o : to.w.obstacles)
+      if (a.obstacle && o->id == a.to) name = o->name;
+    Written entry;
+    entry["to"] = name;
+    std::vector<uint32_t> points;
+    for (const uint32_t s : a.surfels) points.push_back(b.surface.identity() ? b.surface.point[s] : s);
+    entry["points"] = points;
+    if (a.stiffness > 0) entry["stiffness"] = a.stiffness;
+    if (a.damping > 0) entry["damping"] = a.damping;
+    if (a.release > 0) entry["release"] = a.release;
+    if (a.flags & DFM_ATTACH_TOUCH) entry["touch"] = true;
+    out["attach"].push_back(std::move(entry));
+    double away = 0;
+    for (size_t i = 0; i < a.surfels.size(); ++i) {
+      Vec3 x;
+      b.surface.each_phyxel(a.surfels[i], [&](uint32_t p, double weight) {
+        x += weight * load3(&b.p.x[kStride * size_t{p}]);
+      });
+      away = std::max(away, norm(x - attached_place(to.w, a, i)));
+    }
+    if (away > 1e-6 * b.surface.median_edge)
+      to.note("body '%s': its attachment to '%s' is stretched by %g m now; in the scene it is at rest there",
+              b.name.c_str(), name.c_str(), away);
+  }
+}
+
+}  // namespace
+
+Written write_body(SceneWriter &to, Body &b) {
+  to.check_name("body", b.name);
+  b.dynamics->see_points();
+  Written out;
+  out["name"] = b.name;
+  out["id"] = b.id;
+  write_cells(to, b, out);
+  write_surface(to, b, out);
+  if (!b.material.empty()) out["material"] = b.material;
+  write_model(to, b, out);
+  write_fields(to, b, out);
+  write_state(to, b, out);
+  write_held(to, b, out);
+  write_loads(to, b, out);
+  write_springs(to, b, out);
+  write_attachments(to, b, out);
+  write_switches(to, b, out);
+  if (b.sensor) out["sensor"] = true;
+  return out;
+}
+
+}  // namespace dfm::writing

@@ -1,0 +1,225 @@
+// Obstacles and rigid bodies as a scene says them.
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "mesh/tri_mesh.h"
+#include "scene/write.h"
+
+namespace dfm::writing {
+namespace {
+
+const char *shape_word(uint32_t shape) {
+  switch (shape) {
+    case DFM_SHAPE_SPHERE: return "sphere";
+    case DFM_SHAPE_BOX: return "box";
+    case DFM_SHAPE_CAPSULE: return "capsule";
+    case DFM_SHAPE_MESH: return "mesh";
+    case DFM_SHAPE_VOXELS: return "voxels";
+    default: return "plane";
+  }
+}
+
+template <class Def>
+void write_size(const Def &d, Written &out) {
+  out["shape"] = shape_word(d.shape);
+  if (d.shape == DFM_SHAPE_BOX) out["half_size"] = vector_of(d.half_size);
+  if (d.shape == DFM_SHAPE_SPHERE || d.shape == DFM_SHAPE_CAPSULE) out["radius"] = d.radius;
+  if (d.shape == DFM_SHAPE_CAPSULE) out["half_length"] = d.half_length;
+}
+
+void write_triangles(SceneWriter &to, const Obstacle &o, Written &out) {
+  TriMesh mesh;
+  mesh.points.assign(o.points.begin(), o.points.end());
+  mesh.tris.assign(o.triangles.begin(), o.triangles.end());
+  mesh.tri_group.assign(mesh.ntri(), kNoGroup);
+  std::string made;
+  out["mesh"] = to.file(o.name + ".vtu", made);
+  write_tri_mesh(mesh, made);
+  if (o.def.shape == DFM_SHAPE_VOXELS && o.def.cells) out["cells"] = o.def.cells;
+}
+
+dfm_pose pose_now(const Pose &p) {
+  dfm_pose out{};
+  store3(out.position, p.position);
+  const double q[4] = {p.rotation.x, p.rotation.y, p.rotation.z, p.rotation.w};
+  std::copy_n(q, 4, out.rotation);
+  return out;
+}
+
+void write_motion(const Obstacle &o, Written &out) {
+  Written motion;
+  for (const dfm_pose_key &k : o.keys) {
+    Written key;
+    key["t"] = k.t;
+    key["position"] = vector_of(k.pose.position);
+    key["rotation"] = rotation_of(k.pose.rotation);
+    motion["keyframes"].push_back(std::move(key));
+  }
+  if (moves(o.def.sine)) motion["sine"] = sine_of(o.def.sine, false);
+  out["motion"] = std::move(motion);
+}
+
+}  // namespace
+
+Written write_obstacle(SceneWriter &to, const Obstacle &o) {
+  to.check_name("obstacle", o.name);
+  Written out;
+  out["name"] = o.name;
+  out["id"] = o.id;
+  write_size(o.def, out);
+  if (!o.points.empty()) write_triangles(to, o, out);
+  const Written pose = pose_of(o.def.pose);
+  if (!pose.is_null()) out["pose"] = pose;
+  if (o.moves()) {
+    write_motion(o, out);
+  } else if (const Pose made = to_pose(o.def.pose); !same_bits(&made, &o.pose, sizeof made)) {
+    const dfm_pose now = pose_now(o.pose);
+    out["start"] = {{"position", vector_of(now.position)}, {"rotation", rotation_of(now.rotation)}};
+  }
+  if (o.has_target)
+    to.note("obstacle '%s': the pose that it is to reach in the next step is left out", o.name.c_str());
+  const double *const belt = o.def.velocity_surface;
+  if (belt[0] != 0 || belt[1] != 0 || belt[2] != 0) out["velocity_surface"] = vector_of(belt);
+  if (!o.material.empty()) out["material"] = o.material;
+  if (o.sensor) out["sensor"] = true;
+  return out;
+}
+
+// ---- rigid bodies -----------------------------------------------------------------------------------------
+
+namespace {
+
+const Obstacle &obstacle_of(const World &w, uint64_t id) {
+  return **std::find_if(w.obstacles.begin(), w.obstacles.end(), [&](const auto &o) { return o->id == id; });
+}
+
+// The one added shape of a body without a shape of its own that a scene could say instead; null: none.
+const Obstacle *only_shape(const World &w, const RigidSet &set, uint32_t body) {
+  const Obstacle *found = nullptr;
+  const Pose none;
+  for (const auto &o : w.obstacles) {
+    if (o->rigid != &set || o->rigid_body != body || !o->added) continue;
+    const bool simple = o->def.shape == DFM_SHAPE_SPHERE || o->def.shape == DFM_SHAPE_BOX ||
+                        o->def.shape == DFM_SHAPE_CAPSULE;
+    if (found || !simple || !same_bits(&o->local, &none, sizeof none)) return nullptr;
+    found = o.get();
+  }
+  return found;
+}
+
+bool has_added(const World &w, const RigidSet &set, uint32_t body) {
+  return std::any_of(w.obstacles.begin(), w.obstacles.end(), [&](const auto &o) {
+    return o->rigid == &set && o->rigid_body == body && o->added;
+  });
+}
+
+void write_rigid_start(const RigidSet &set, uint32_t i, Written &out) {
+  const dfm_rigid_def &d = set.defs[i];
+  const dfm_rigid_state &s = set.state[i];
+  if (d.fixed || (same_bits(d.pose.position, s.position, sizeof s.position) &&
+                  same_bits(d.pose.rotation, s.rotation, sizeof s.rotation) &&
+                  same_bits(d.velocity, s.velocity, sizeof s.velocity) &&
+                  same_bits(d.spin, s.spin, sizeof s.spin)))
+    return;
+  out["start"] = {{"position", vector_of(s.position)},
+                  {"rotation", rotation_of(s.rotation)},
+                  {"velocity", vector_of(s.velocity)},
+                  {"spin", vector_of(s.spin)}};
+}
+
+Written joint_of(const RigidSet &set, const dfm_joint_def &j) {
+  static const char *const types[] = {"hinge", "slider", "ball", "fixed"};
+  Written out;
+  out["type"] = types[j.type];
+  if (j.with != DFM_RIGID_WORLD) out["with"] = set.defs[j.with].name;
+  out["anchor"] = vector_of(j.anchor);
+  if (j.type == DFM_JOINT_HINGE || j.type == DFM_JOINT_SLIDER) out["axis"] = vector_of(j.axis);
+  if (j.motor) out["motor"] = {{"velocity", j.velocity}, {"max", j.max}};
+  return out;
+}
+
+Written rigid_body_of(SceneWriter &to, const RigidSet &set, uint32_t i) {
+  const dfm_rigid_def &d = set.defs[i];
+  const Obstacle &o = obstacle_of(to.w, set.obstacle[i]);
+  to.check_name("rigid body", o.name);
+  const Obstacle *const other = d.shape == DFM_SHAPE_NONE ? only_shape(to.w, set, i) : nullptr;
+  if (d.shape == DFM_SHAPE_NONE && !other) {
+    to.note("rigid body '%s' is left out: in a scene it is one sphere, box or capsule about its center of mass",
+            o.name.c_str());
+    return nullptr;
+  }
+  if (!other && has_added(to.w, set, i))
+    to.note("rigid body '%s': the shapes that were added to it are left out; in a scene it has one",
+            o.name.c_str());
+  Written out;
+  out["name"] = o.name;
+  out["id"] = o.id;
+  if (other) write_size(other->def, out);
+  else write_size(d, out);
+  if (d.fixed) out["fixed"] = true;
+  else out["mass"] = d.mass;
+  if (!d.fixed) out["inertia"] = vector_of(d.inertia);
+  const Written pose = pose_of(d.pose);
+  if (!pose.is_null()) out["pose"] = pose;
+  if (!d.fixed) {
+    out["velocity"] = vector_of(d.velocity);
+    out["spin"] = vector_of(d.spin);
+  }
+  write_rigid_start(set, i, out);
+  const std::string &material = other ? other->material : o.material;
+  if (!material.empty()) out["material"] = material;
+  if (o.sensor) out["sensor"] = true;
+  return out;
+}
+
+// Bodies of the same host, of which a scene has one set.
+std::string host_of(SceneWriter &to) {
+  const World &w = to.w;
+  size_t bodies = 0;
+  for (const auto &set : w.rigid_sets)
+    if (set->elsewhere) bodies += set->defs.size();
+  const std::string &name = w.rigid_sets[0]->host_name;
+  const bool one = std::all_of(w.rigid_sets.begin(), w.rigid_sets.end(),
+                               [&](const auto &set) { return set->host_name == name; });
+  if (bodies > 0) {
+    to.note("%zu rigid bodies live in a world of the host '%s', of which a scene has no more than their "
+            "shapes, masses and motion: they are written for the host builtin, without the contacts and joints "
+            "that they have among each other",
+            bodies, name.c_str());
+    return "builtin";
+  }
+  if (!one)
+    to.note("the rigid bodies belong to several hosts, and in a scene to one: they are written for the host "
+            "builtin");
+  else if (w.rigid_sets.size() > 1)
+    to.note("the rigid bodies were made as %zu sets and are one in a scene; they move alike to rounding",
+            w.rigid_sets.size());
+  return one ? name : "builtin";
+}
+
+}  // namespace
+
+Written write_rigid(SceneWriter &to) {
+  if (to.w.rigid_sets.empty()) return nullptr;
+  Written out;
+  out["host"] = host_of(to);
+  Written &bodies = out["bodies"] = Written::array();
+  for (const auto &set : to.w.rigid_sets) {
+    std::vector<Written> rows;
+    for (uint32_t i = 0; i < set->defs.size(); ++i) rows.push_back(rigid_body_of(to, *set, i));
+    for (const dfm_joint_def &j : set->joints) {
+      Written &body = rows[j.body];
+      const bool gone = j.with != DFM_RIGID_WORLD && rows[j.with].is_null();
+      if (!body.is_null() && !gone) body["joints"].push_back(joint_of(*set, j));
+    }
+    for (Written &row : rows)
+      if (!row.is_null()) bodies.push_back(std::move(row));
+  }
+  // ids are consecutive where there is one set; those of others would not be
+  if (to.w.rigid_sets.size() > 1)
+    for (Written &row : bodies) row.erase("id");
+  return out;
+}
+
+}  // namespace dfm::writing

@@ -1,0 +1,224 @@
+// dfm_world_write_scene: a world that is written as a scene and loaded again is the same world.
+#include <unistd.h>
+
+#include <cstring>
+#include <filesystem>
+
+#include "support.h"
+#include "world.h"
+
+namespace {
+
+std::string folder_of(const std::string &name) {
+  return test::scratch("write_scene_" + std::to_string(getpid()) + "/with a space/" + name);
+}
+
+std::vector<std::string> write(dfm_world world, const std::string &path, bool snapshot = false,
+                               double step = 0) {
+  std::vector<std::string> notes;
+  dfm_scene_write_def def = dfm_scene_write_def_default();
+  def.flags = snapshot ? DFM_SCENE_SNAPSHOT : 0;
+  def.step = step;
+  def.user = &notes;
+  def.note = [](void *user, const char *sentence) {
+    static_cast<std::vector<std::string> *>(user)->push_back(sentence);
+  };
+  uint32_t n = 0;
+  test::ok(dfm_world_write_scene(world, path.c_str(), &def, &n));
+  EXPECT_EQ(n, notes.size());
+  return notes;
+}
+
+dfm_world load(dfm_context *context, const std::string &path) {
+  dfm_world out = 0;
+  EXPECT_EQ(dfm_scene_load(context, path.c_str(), &out), DFM_OK) << dfm_last_error();
+  return out;
+}
+
+std::string all(const std::vector<std::string> &notes) {
+  std::string out;
+  for (const std::string &n : notes) out += n + "\n";
+  return out;
+}
+
+// Largest distance between points of bodies of the same name, m.
+double apart(dfm_world a, dfm_world b) {
+  double most = 0;
+  for (const dfm_body body : test::listed(dfm_world_bodies, a)) {
+    dfm_body_info info{};
+    info.size = sizeof info;
+    test::ok(dfm_body_get_info(body, &info));
+    dfm_body other = 0;
+    test::ok(dfm_world_find_body(b, info.name, &other));
+    std::vector<double> x(3 * size_t{info.npoint}), y(x.size());
+    test::ok(dfm_body_get_state(body, info.npoint, x.data(), nullptr, nullptr));
+    test::ok(dfm_body_get_state(other, info.npoint, y.data(), nullptr, nullptr));
+    for (size_t i = 0; i < x.size(); ++i) most = std::max(most, std::fabs(x[i] - y[i]));
+  }
+  return most;
+}
+
+std::vector<unsigned char> read(const std::string &path) {
+  const std::string text = test::read_file(path);
+  return {text.begin(), text.end()};
+}
+
+void steps(dfm_world world, int n, double h) {
+  for (int i = 0; i < n; ++i) test::ok(dfm_world_step(world, h, nullptr));
+}
+
+class ShippedScene : public testing::TestWithParam<const char *> {};
+
+}  // namespace
+
+// Before the first step the two worlds have the same hash, and so they have after ten; in the middle of a
+// run a snapshot makes them so, and without one they stay together as far as contacts remember.
+TEST_P(ShippedScene, WrittenAndLoaded_IsTheSameWorld) {
+  test::Context context;
+  const std::string name = GetParam(), folder = folder_of(name);
+  const dfm_world world = load(context, DEFORM_SOURCE_DIR "/examples/scenes/" + name + ".json");
+  ASSERT_TRUE(world);
+  EXPECT_EQ(all(write(world, folder + "/start.json")), "");
+  const dfm_world again = load(context, folder + "/start.json");
+  ASSERT_TRUE(again);
+  EXPECT_EQ(dfm_world_hash(again), dfm_world_hash(world));
+  double h = 0;
+  test::ok(dfm_world_stable_step(world, &h, nullptr, nullptr));
+  h = std::min(h, 1e-3);
+  steps(world, 10, h);
+  steps(again, 10, h);
+  EXPECT_EQ(dfm_world_hash(again), dfm_world_hash(world));
+
+  EXPECT_EQ(all(write(world, folder + "/later.json", true)), "");
+  const dfm_world later = load(context, folder + "/later.json");
+  ASSERT_TRUE(later);
+  EXPECT_EQ(dfm_world_time(later), dfm_world_time(world));
+  EXPECT_EQ(apart(later, world), 0);
+  const std::vector<unsigned char> bytes = read(folder + "/later_files/snapshot.state");
+  const dfm_world restored = load(context, folder + "/later.json");
+  ASSERT_EQ(dfm_world_restore(restored, bytes.data(), bytes.size()), DFM_OK) << dfm_last_error();
+  EXPECT_EQ(dfm_world_hash(restored), dfm_world_hash(world));
+  steps(world, 5, h);
+  steps(restored, 5, h);
+  steps(later, 5, h);
+  EXPECT_EQ(dfm_world_hash(restored), dfm_world_hash(world));
+  EXPECT_LT(apart(later, world), 1e-6);
+}
+
+INSTANTIATE_TEST_SUITE_P(Each, ShippedScene,
+                         testing::Values("two_cylinders_coarse", "rigid_on_ball", "attached", "two_materials",
+                                         "pressed_ring", "probe_block", "rigid_pinch", "gravity_anisotropy",
+                                         "fill_drop", "terrain"),
+                         [](const auto &info) { return std::string(info.param); });
+
+namespace {
+
+// What a program makes: obstacles first, one removed, held points that move, loads, springs, masks.
+struct Made {
+  test::Context context;
+  dfm_world world = 0;
+  dfm_body block = 0, ball = 0;
+  Made() {
+    dfm_world_def def = dfm_world_def_default();
+    test::ok(dfm_world_create(context, &def, &world));
+    dfm_obstacle_def o = dfm_obstacle_def_default();
+    dfm_obstacle ground = 0, gone = 0;
+    o.name = "gone";
+    test::ok(dfm_obstacle_create(world, &o, &gone));
+    o.name = "floor";
+    test::ok(dfm_obstacle_create(world, &o, &ground));
+    test::ok(dfm_obstacle_destroy(gone));
+    block = make("block", "beam", {0.1, 0.1, 0.1}, {0, 0, 0.02}, {0.1, 0.2, 0.3, 0.9});
+    ball = make("ball", "ball", {0.05, 0, 0}, {0.05, 0.05, 0.3}, {0, 0, 0, 1});
+    test::ok(dfm_body_set_filter(ball, 2, 3));
+    const uint32_t held[] = {1, 4}, pushed[] = {2, 7, 9};
+    const dfm_pose_key keys[] = {{0, {{0, 0, 0}, {0, 0, 0, 1}}}, {1, {{0, 0.1, 0}, {0, 0, 0, 1}}}};
+    const double force[] = {0.1, 0, 0, 0, 0.1, 0, 0.1, 0.1, 0};
+    const dfm_scale_key scale[] = {{0, 0}, {1, 2}};
+    test::ok(dfm_body_hold(block, 2, held, 5));
+    test::ok(dfm_body_move_held(block, 2, held, 2, keys, nullptr));
+    test::ok(dfm_body_add_load(ball, 3, pushed, force, 0, nullptr, nullptr, nullptr));
+    test::ok(dfm_body_add_load(ball, 3, pushed, force, 2, scale, nullptr, nullptr));
+    dfm_spring_def spring{};
+    spring.size = sizeof spring;
+    spring.npoint = 3;
+    spring.points = pushed;
+    spring.stiffness = 5;
+    spring.to[2] = 0.5;
+    test::ok(dfm_body_add_spring(ball, &spring, nullptr));
+  }
+  dfm_body make(const char *name, const char *kind, std::array<double, 3> size, std::array<double, 3> at,
+                std::array<double, 4> turn) {
+    dfm_tetmesh mesh = 0;
+    test::ok(dfm_tetmesh_make(context, kind, size.data(), 200, &mesh));
+    dfm_tetmesh_info info{};
+    info.size = sizeof info;
+    test::ok(dfm_tetmesh_get_info(mesh, &info));
+    dfm_body_def d = dfm_body_def_default();
+    d.name = name;
+    test::ok(dfm_tetmesh_data(mesh, &d.points, &d.tets, nullptr));
+    d.npoint = info.npoint;
+    d.ntet = info.ntet;
+    std::copy(at.begin(), at.end(), d.pose.position);
+    std::copy(turn.begin(), turn.end(), d.pose.rotation);
+    dfm_body out = 0;
+    test::ok(dfm_body_create(world, &d, &out));
+    test::ok(dfm_tetmesh_destroy(mesh));
+    return out;
+  }
+};
+
+}  // namespace
+
+TEST(WriteScene, WorldOfAProgram_GoesOnWithTheSameBits) {
+  Made made;
+  steps(made.world, 50, 1e-4);
+  const std::string path = folder_of("program") + "/program.json";
+  EXPECT_EQ(all(write(made.world, path, true)), "");
+  const dfm_world back = load(made.context, path);
+  ASSERT_TRUE(back);
+  const std::vector<unsigned char> bytes = read(folder_of("program") + "/program_files/snapshot.state");
+  const dfm_world alone = load(made.context, path);
+  ASSERT_EQ(dfm_world_restore(back, bytes.data(), bytes.size()), DFM_OK) << dfm_last_error();
+  for (const dfm_world w : {made.world, back, alone}) steps(w, 50, 1e-4);
+  EXPECT_EQ(dfm_world_hash(back), dfm_world_hash(made.world));
+  EXPECT_LT(apart(alone, made.world), 1e-6);
+}
+
+// One sentence for each thing that a scene has no word for.
+TEST(WriteScene, WhatASceneCannotSay_IsTold) {
+  Made made;
+  test::ok(dfm_world_set_may_touch(
+      made.world, [](void *, uint64_t, uint64_t) { return true; }, nullptr));
+  test::ok(dfm_world_set_pre_solve(
+      made.world, [](void *, dfm_contact_choice *) {}, nullptr));
+  const std::string notes = all(write(made.world, folder_of("notes") + "/notes.json"));
+  EXPECT_NE(notes.find("which pairs may touch"), std::string::npos) << notes;
+  EXPECT_NE(notes.find("changes contacts before they are solved"), std::string::npos) << notes;
+}
+
+TEST(WriteScene, WrongArguments_GetOneSentence) {
+  Made made;
+  const auto refused = [&](const char *path, dfm_status status, const char *part) {
+    EXPECT_EQ(dfm_world_write_scene(made.world, path, nullptr, nullptr), status);
+    EXPECT_NE(std::string(dfm_last_error()).find(part), std::string::npos) << dfm_last_error();
+  };
+  refused(nullptr, DFM_E_ARG, "path is NULL");
+  refused("", DFM_E_ARG, "path is empty");
+  refused("scene.txt", DFM_E_ARG, "ends in .json");
+  refused("/no/such/folder/scene.json", DFM_E_IO, "/no/such/folder/scene.json");
+  const std::string here = folder_of("wrong");
+  test::write_file(here + "/taken_files", "");
+  refused((here + "/taken.json").c_str(), DFM_E_IO, "there can be no folder");
+  EXPECT_FALSE(std::filesystem::exists(here + "/taken.json"));
+  dfm_scene_write_def def = dfm_scene_write_def_default();
+  def.flags = 8;
+  EXPECT_EQ(dfm_world_write_scene(made.world, (here + "/a.json").c_str(), &def, nullptr), DFM_E_ARG);
+  def = dfm_scene_write_def_default();
+  def.duration = 0;
+  EXPECT_EQ(dfm_world_write_scene(made.world, (here + "/a.json").c_str(), &def, nullptr), DFM_E_ARG);
+  dfm_body odd = made.make("a/b", "ball", {0.05, 0, 0}, {1, 0, 0.3}, {0, 0, 0, 1});
+  refused((here + "/b.json").c_str(), DFM_E_ARG, "'a/b' cannot stand in a scene");
+  test::ok(dfm_body_destroy(odd));
+  EXPECT_EQ(dfm_world_write_scene(0, (here + "/a.json").c_str(), nullptr, nullptr), DFM_E_HANDLE);
+}
