@@ -13,12 +13,10 @@ std::string folder_of(const std::string &name) {
   return test::scratch("write_scene_" + std::to_string(getpid()) + "/with a space/" + name);
 }
 
-std::vector<std::string> write(dfm_world world, const std::string &path, bool snapshot = false,
-                               double step = 0) {
+std::vector<std::string> write(dfm_world world, const std::string &path, uint32_t flags = 0) {
   std::vector<std::string> notes;
   dfm_scene_write_def def = dfm_scene_write_def_default();
-  def.flags = snapshot ? DFM_SCENE_SNAPSHOT : 0;
-  def.step = step;
+  def.flags = flags;
   def.user = &notes;
   def.note = [](void *user, const char *sentence) {
     static_cast<std::vector<std::string> *>(user)->push_back(sentence);
@@ -89,7 +87,7 @@ TEST_P(ShippedScene, WrittenAndLoaded_IsTheSameWorld) {
   steps(again, 10, h);
   EXPECT_EQ(dfm_world_hash(again), dfm_world_hash(world));
 
-  EXPECT_EQ(all(write(world, folder + "/later.json", true)), "");
+  EXPECT_EQ(all(write(world, folder + "/later.json", DFM_SCENE_SNAPSHOT)), "");
   const dfm_world later = load(context, folder + "/later.json");
   ASSERT_TRUE(later);
   EXPECT_EQ(dfm_world_time(later), dfm_world_time(world));
@@ -174,7 +172,7 @@ TEST(WriteScene, WorldOfAProgram_GoesOnWithTheSameBits) {
   Made made;
   steps(made.world, 50, 1e-4);
   const std::string path = folder_of("program") + "/program.json";
-  EXPECT_EQ(all(write(made.world, path, true)), "");
+  EXPECT_EQ(all(write(made.world, path, DFM_SCENE_SNAPSHOT)), "");
   const dfm_world back = load(made.context, path);
   ASSERT_TRUE(back);
   const std::vector<unsigned char> bytes = read(folder_of("program") + "/program_files/snapshot.state");
@@ -185,16 +183,27 @@ TEST(WriteScene, WorldOfAProgram_GoesOnWithTheSameBits) {
   EXPECT_LT(apart(alone, made.world), 1e-6);
 }
 
-// One sentence for each thing that a scene has no word for.
-TEST(WriteScene, WhatASceneCannotSay_IsTold) {
+// One sentence for each thing that a scene has no word for: without the flag it ends the call, and neither the
+// scene nor its folder is there.
+TEST(WriteScene, WhatASceneCannotSay_IsRefusedOrTold) {
   Made made;
   test::ok(dfm_world_set_may_touch(
       made.world, [](void *, uint64_t, uint64_t) { return true; }, nullptr));
   test::ok(dfm_world_set_pre_solve(
       made.world, [](void *, dfm_contact_choice *) {}, nullptr));
-  const std::string notes = all(write(made.world, folder_of("notes") + "/notes.json"));
+  const std::string folder = folder_of("notes"), path = folder + "/notes.json";
+  uint32_t n = 0;
+  EXPECT_EQ(dfm_world_write_scene(made.world, path.c_str(), nullptr, &n), DFM_E_UNSUPPORTED);
+  EXPECT_EQ(n, 2u);
+  const std::string error = dfm_last_error();
+  EXPECT_NE(error.find("which pairs may touch"), std::string::npos) << error;
+  EXPECT_NE(error.find("(and 1 more like it)"), std::string::npos) << error;
+  EXPECT_FALSE(std::filesystem::exists(path));
+  EXPECT_FALSE(std::filesystem::exists(folder + "/notes_files"));
+  const std::string notes = all(write(made.world, path, DFM_SCENE_PARTIAL));
   EXPECT_NE(notes.find("which pairs may touch"), std::string::npos) << notes;
   EXPECT_NE(notes.find("changes contacts before they are solved"), std::string::npos) << notes;
+  EXPECT_TRUE(load(made.context, path));
 }
 
 TEST(WriteScene, WrongArguments_GetOneSentence) {

@@ -148,7 +148,7 @@ dfm_status dfm_world_write_scene(dfm_world world, const char *path, const dfm_sc
       dfm::fail(DFM_E_ARG, "dfm_world_write_scene: path is %s; expected a file name that ends in .json",
                 path ? "empty" : "NULL");
     const dfm_scene_write_def d = dfm::take_def(def, dfm_scene_write_def_default());
-    dfm::check_flags(d, DFM_SCENE_SNAPSHOT, "dfm_world_write_scene");
+    dfm::check_flags(d, DFM_SCENE_SNAPSHOT | DFM_SCENE_PARTIAL, "dfm_world_write_scene");
     if (!(d.duration > 0 && std::isfinite(d.duration)) || !(d.step >= 0 && std::isfinite(d.step)))
       dfm::fail(DFM_E_ARG,
                 "dfm_world_write_scene: a duration of %g s and a step of %g s; both are finite, the duration is "
@@ -158,11 +158,14 @@ dfm_status dfm_world_write_scene(dfm_world world, const char *path, const dfm_sc
     options.duration = d.duration;
     options.step = d.step;
     options.snapshot = d.flags & DFM_SCENE_SNAPSHOT;
+    options.partial = d.flags & DFM_SCENE_PARTIAL;
     options.note = [&](const std::string &sentence) {
       if (d.note) d.note(d.user, sentence.c_str());
       else w.context->logf(DFM_LOG_WARNING, "%s: %s", path, sentence.c_str());
     };
-    const uint32_t told = dfm::writing::write_scene(w, path, options);
-    if (notes) *notes = told;
+    uint32_t told = 0;
+    if (!notes) notes = &told;
+    *notes = 0;
+    dfm::writing::write_scene(w, path, options, *notes);
   });
 }

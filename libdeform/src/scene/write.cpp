@@ -77,22 +77,40 @@ void SceneWriter::note(const char *text, ...) {
   va_start(rest, text);
   std::vsnprintf(line, sizeof line, text, rest);
   va_end(rest);
-  ++notes;
-  if (options.note) options.note(line);
+  if (notes++ == 0) first = line;
+  remark(line);
 }
 
-std::string SceneWriter::file(const std::string &name, std::string &made) {
-  const std::filesystem::path where = std::filesystem::path(folder) / files;
-  if (!has_folder) {
-    std::error_code error;
-    std::filesystem::create_directory(where, error);
-    if (!std::filesystem::is_directory(where, error))
-      fail(DFM_E_IO, "%s: there can be no folder %s for its meshes beside it; give a path where there can be one",
-           path.c_str(), where.c_str());
-    has_folder = true;
-  }
-  made = (where / name).string();
-  return files + "/" + name;
+namespace {
+
+std::string folder_name(const std::string &path) {
+  return std::filesystem::path(path).stem().string() + "_files";
+}
+
+// Where a file of the folder beside the scene lies; makes the folder.
+std::string beside(const std::string &path, const std::string &name) {
+  const std::filesystem::path where = std::filesystem::path(path).parent_path() / folder_name(path);
+  std::error_code error;
+  std::filesystem::create_directory(where, error);
+  if (!std::filesystem::is_directory(where, error))
+    fail(DFM_E_IO, "%s: there can be no folder %s for its meshes beside it; give a path where there can be one",
+         path.c_str(), where.c_str());
+  return (where / name).string();
+}
+
+}  // namespace
+
+std::string SceneWriter::file(const std::string &name, std::function<void(const std::string &)> write) {
+  files.push_back({name, std::move(write)});
+  return folder_name(path) + "/" + name;
+}
+
+std::string SceneWriter::text_file(const std::string &name, std::string text) {
+  return file(name, [text = std::move(text)](const std::string &to_path) {
+    AtomicFile out(to_path);
+    out.write(text);
+    out.commit();
+  });
 }
 
 void SceneWriter::check_name(const char *kind, const std::string &name) const {
@@ -325,9 +343,9 @@ void tell_what_is_left_out(SceneWriter &to) {
                                                 std::filesystem::path(u.shipped))
           return;
         if (u.told.insert(type->id).second)
-          u.to->note("'%s' comes from %s, which whoever runs the scene has to load: name its folder in "
-                     "DEFORM_PLUGIN_PATH",
-                     type->id, path.c_str());
+          u.to->remark(format("'%s' comes from %s, which whoever runs the scene has to load: name its folder in "
+                              "DEFORM_PLUGIN_PATH",
+                              type->id, path.c_str()));
       },
       &used);
 }
@@ -376,33 +394,39 @@ void write_snapshot(SceneWriter &to, const std::string &name) {
   scene::Scene back(to.w.context, to.path, nullptr);
   const World &made = resolve<World>(Kind::world, back.world());
   if (snapshot_structure(made) != snapshot_structure(to.w)) {
-    to.note("no snapshot is written, since the world that the scene gives is made otherwise than this one, as "
-            "the sentences before tell, or in what rounding leaves of its meshes and poses");
+    to.note("no snapshot is written, since rounding of meshes or poses, or what the scene cannot say, makes the "
+            "world of the scene another one than this");
+    if (!to.options.partial)
+      fail(DFM_E_UNSUPPORTED, "%s is written, but %s", to.path.c_str(), to.first.c_str());
     return;
   }
-  std::string where;
-  to.file(name, where);
   std::vector<unsigned char> bytes;
   world_snapshot(to.w, bytes);
-  AtomicFile file(where);
+  AtomicFile file(beside(to.path, name));
   file.write(bytes.data(), bytes.size());
   file.commit();
 }
 
 }  // namespace
 
-uint32_t write_scene(World &w, const std::string &path, const WriteOptions &options) {
+void write_scene(World &w, const std::string &path, const WriteOptions &options, uint32_t &notes) {
   const std::filesystem::path whole(path);
   if (whole.extension() != ".json" || whole.stem().empty())
     fail(DFM_E_ARG, "%s: the name of a scene file ends in .json", path.c_str());
-  SceneWriter to{w, path, options, whole.parent_path().string(), whole.stem().string() + "_files"};
+  SceneWriter to{w, path, options, notes};
   AtomicFile scene(path);  // what cannot be written is found out first
   std::string text;
   print(write_root(to), "", text);
+  if (notes > 0 && !options.partial) {
+    const std::string more = notes > 1 ? format(" (and %u more like it)", notes - 1) : "";
+    fail(DFM_E_UNSUPPORTED,
+         "%s is not written: %s%s; with DFM_SCENE_PARTIAL the scene is written without it", path.c_str(),
+         to.first.c_str(), more.c_str());
+  }
+  for (const SceneWriter::File &f : to.files) f.write(beside(path, f.name));
   scene.write(text + "\n");
   scene.commit();
   if (options.snapshot) write_snapshot(to, "snapshot.state");
-  return to.notes;
 }
 
 }  // namespace dfm::writing

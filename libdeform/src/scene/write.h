@@ -1,10 +1,12 @@
 // A world as a scene: the file that `deform run` takes, with meshes and states in a folder beside it. What a
-// scene cannot say is told by a sentence each.
+// scene cannot say gets a sentence each (SceneWriter::note). A new kind of thing gets a write_* function of its
+// own here, called by write_root, and a call of `note` for what it has beyond its keys.
 #pragma once
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "state/world.h"
 
@@ -15,11 +17,12 @@ using Written = nlohmann::ordered_json;
 struct WriteOptions {
   double duration = 1, step = 0;  // s; step 0: that of the world's def, else "auto"
   bool snapshot = false;          // beside the scene, for `deform run --from`
+  bool partial = false;           // what a scene cannot say is left out; else it is refused
   std::function<void(const std::string &)> note;
 };
 
-// Returns how many sentences it has told. Throws Error; the scene file itself is written last, and as a whole.
-uint32_t write_scene(World &w, const std::string &path, const WriteOptions &options);
+// notes: how many sentences there were. Throws Error; the scene file itself is written last, and as a whole.
+void write_scene(World &w, const std::string &path, const WriteOptions &options, uint32_t &notes);
 
 // ---- for the parts of it (write_body.cpp, write_things.cpp) -----------------------------------------------
 
@@ -27,13 +30,22 @@ struct SceneWriter {
   World &w;
   const std::string &path;  // of the scene
   const WriteOptions &options;
-  std::string folder, files;  // where the scene lies; the name of the folder of its files
-  uint32_t notes = 0;
-  bool has_folder = false;
+  uint32_t &notes;
+  struct File {
+    std::string name;
+    std::function<void(const std::string &path)> write;
+  };
+  std::vector<File> files{};  // written when it is known that nothing is refused
+  std::string first{};        // of the sentences
 
   void note(const char *text, ...) __attribute__((format(printf, 2, 3)));
-  // The name of a file beside the scene as the scene says it; made: where it lies. Makes the folder.
-  std::string file(const std::string &name, std::string &made);
+  // What whoever runs the scene has to know: refuses nothing, and is not counted.
+  void remark(const std::string &sentence) const {
+    if (options.note) options.note(sentence);
+  }
+  // A file beside the scene: the path by which the scene names it.
+  std::string file(const std::string &name, std::function<void(const std::string &path)> write);
+  std::string text_file(const std::string &name, std::string text);
   void check_name(const char *kind, const std::string &name) const;  // throws where a scene has no such name
   bool knows(const std::string &name) const { return w.find_body(name) || w.find_obstacle(name); }
 };

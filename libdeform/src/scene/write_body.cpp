@@ -7,7 +7,6 @@
 #include <map>
 
 #include "core/error.h"
-#include "core/file.h"
 #include "mesh/tri_mesh.h"
 #include "scene/start.h"
 #include "scene/write.h"
@@ -59,9 +58,9 @@ void write_cells(SceneWriter &to, const Body &b, Written &out) {
     for (size_t k = 0; k < 3; ++k) mesh.tris.push_back(b.surface.point[b.surface.tri[3 * size_t{t} + k]]);
     mesh.tri_group.push_back(group_number(mesh.groups, zone_group(b, t), 2));
   }
-  std::string made;
-  out["mesh"] = to.file(b.name + ".vtu", made);
-  write_vtu(mesh, made);
+  out["mesh"] = to.file(b.name + ".vtu", [mesh = std::move(mesh)](const std::string &to_path) {
+    write_vtu(mesh, to_path);
+  });
 }
 
 void write_surface(SceneWriter &to, const Body &b, Written &out) {
@@ -73,14 +72,14 @@ void write_surface(SceneWriter &to, const Body &b, Written &out) {
   for (uint32_t t = 0; t < s.ntri; ++t)
     mesh.tri_group.push_back(
         zone_group(b, t).empty() ? kNoGroup : group_number(mesh.groups, zone_group(b, t), 2));
-  std::string made;
   Written &own = out["surface"];
-  own["mesh"] = to.file(b.name + "_surface.vtu", made);
+  own["mesh"] = to.file(b.name + "_surface.vtu", [mesh = std::move(mesh)](const std::string &to_path) {
+    write_tri_mesh(mesh, to_path);
+  });
   own["coupling"] = b.coupling == DFM_COUPLING_MLS      ? "mls"
                     : b.coupling == DFM_COUPLING_THESIS ? "thesis"
                                                         : "barycentric";
   if (b.coupling != DFM_COUPLING_BARYCENTRIC && b.support > 0) own["support"] = b.support;
-  write_tri_mesh(mesh, made);
 }
 
 // ---- the model --------------------------------------------------------------------------------------------
@@ -155,20 +154,12 @@ void write_fields(SceneWriter &to, const Body &b, Written &out) {
               b.name.c_str(), f.key.c_str(), b.model.type->id);
       continue;
     }
-    std::string made;
-    out["fields"][f.key] = to.file(b.name + "_" + f.key + ".csv", made);
-    AtomicFile file(made);
-    if (f.width == 1) {
-      file.write("value\n");
-    } else if (f.width == 3) {
-      file.write("x,y,z\n");
-    } else {
-      for (uint32_t k = 0; k < f.width; ++k) file.write(format("%svalue%u", k ? "," : "", k));
-      file.write("\n");
-    }
+    std::string rows = f.width == 3 ? "x,y,z" : f.width == 1 ? "value" : "value0";
+    for (uint32_t k = 1; f.width != 3 && k < f.width; ++k) rows += format(",value%u", k);
+    rows += "\n";
     for (size_t i = 0; i < f.values.size(); ++i)
-      file.write(format("%.17g%s", f.values[i], (i + 1) % f.width ? "," : "\n"));
-    file.commit();
+      rows += format("%.17g%s", f.values[i], (i + 1) % f.width ? "," : "\n");
+    out["fields"][f.key] = to.text_file(b.name + "_" + f.key + ".csv", std::move(rows));
   }
 }
 
@@ -232,16 +223,12 @@ void write_state(SceneWriter &to, const Body &b, Written &out) {
             b.name.c_str(), b.model.type->id);
     return;
   }
-  std::string made;
-  out["start"]["state"] = to.file(b.name + "_start.csv", made);
-  AtomicFile file(made);
-  file.write(std::string(scene::kStateHeader) + "\n");
+  std::string rows = std::string(scene::kStateHeader) + "\n";
   for (uint32_t i = 0; i < b.p.n; ++i) {
     const double *const x = &b.p.x[kStride * size_t{i}], *const v = &b.p.v[kStride * size_t{i}];
-    file.write(
-        format("%u,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g\n", i, x[0], x[1], x[2], v[0], v[1], v[2]));
+    rows += format("%u,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g\n", i, x[0], x[1], x[2], v[0], v[1], v[2]);
   }
-  file.commit();
+  out["start"]["state"] = to.text_file(b.name + "_start.csv", std::move(rows));
 }
 
 // ---- what is prescribed -----------------------------------------------------------------------------------
@@ -299,12 +286,9 @@ void write_held(SceneWriter &to, const Body &b, Written &out) {
 
 void write_nodal(SceneWriter &to, const Body &b, const std::map<uint32_t, Vec3> &forces, Written &out) {
   if (forces.empty()) return;
-  std::string made;
-  out["nodal_bc"] = to.file(b.name + "_forces.csv", made);
-  AtomicFile file(made);
-  file.write("node,fixx,fixy,fixz,fx,fy,fz\n");
-  for (const auto &[point, f] : forces) file.write(format("%u,0,0,0,%.17g,%.17g,%.17g\n", point, f.x, f.y, f.z));
-  file.commit();
+  std::string rows = "node,fixx,fixy,fixz,fx,fy,fz\n";
+  for (const auto &[point, f] : forces) rows += format("%u,0,0,0,%.17g,%.17g,%.17g\n", point, f.x, f.y, f.z);
+  out["nodal_bc"] = to.text_file(b.name + "_forces.csv", std::move(rows));
 }
 
 void write_loads(SceneWriter &to, const Body &b, Written &out) {

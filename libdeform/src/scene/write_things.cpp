@@ -33,9 +33,9 @@ void write_triangles(SceneWriter &to, const Obstacle &o, Written &out) {
   mesh.points.assign(o.points.begin(), o.points.end());
   mesh.tris.assign(o.triangles.begin(), o.triangles.end());
   mesh.tri_group.assign(mesh.ntri(), kNoGroup);
-  std::string made;
-  out["mesh"] = to.file(o.name + ".vtu", made);
-  write_tri_mesh(mesh, made);
+  out["mesh"] = to.file(o.name + ".vtu", [mesh = std::move(mesh)](const std::string &to_path) {
+    write_tri_mesh(mesh, to_path);
+  });
   if (o.def.shape == DFM_SHAPE_VOXELS && o.def.cells) out["cells"] = o.def.cells;
 }
 
