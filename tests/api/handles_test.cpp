@@ -31,6 +31,8 @@ dfm_friction_def friction() {
 std::vector<Call> world_calls() {
   return {
       {"world_destroy", [](uint64_t h) { return dfm_world_destroy(h); }},
+      {"world_write_scene",
+       [](uint64_t h) { return dfm_world_write_scene(h, "/nonexistent/x.json", nullptr, nullptr); }},
       {"world_set_gravity", [](uint64_t h) { return dfm_world_set_gravity(h, zero3); }},
       {"world_set_gravity_keys", [](uint64_t h) { return dfm_world_set_gravity_keys(h, 0, nullptr); }},
       {"world_step", [](uint64_t h) { return dfm_world_step(h, 1e-3, nullptr); }},

@@ -21,9 +21,7 @@ std::vector<std::string> write(dfm_world world, const std::string &path, uint32_
   def.note = [](void *user, const char *sentence) {
     static_cast<std::vector<std::string> *>(user)->push_back(sentence);
   };
-  uint32_t n = 0;
-  test::ok(dfm_world_write_scene(world, path.c_str(), &def, &n));
-  EXPECT_EQ(n, notes.size());
+  test::ok(dfm_world_write_scene(world, path.c_str(), &def, nullptr));
   return notes;
 }
 
@@ -69,8 +67,10 @@ class ShippedScene : public testing::TestWithParam<const char *> {};
 
 }  // namespace
 
+// Each scene but two that take long and those of ODE (adapters/ode/write_scene_test.cpp).
 // Before the first step the two worlds have the same hash, and so they have after ten; in the middle of a
-// run a snapshot makes them so, and without one they stay together as far as contacts remember.
+// run a snapshot makes them so, and without one they stay together as far as contacts remember. Models that
+// move a body as a whole need the snapshot.
 TEST_P(ShippedScene, WrittenAndLoaded_IsTheSameWorld) {
   test::Context context;
   const std::string name = GetParam(), folder = folder_of(name);
@@ -87,27 +87,39 @@ TEST_P(ShippedScene, WrittenAndLoaded_IsTheSameWorld) {
   steps(again, 10, h);
   EXPECT_EQ(dfm_world_hash(again), dfm_world_hash(world));
 
-  EXPECT_EQ(all(write(world, folder + "/later.json", DFM_SCENE_SNAPSHOT)), "");
+  const bool whole = name == "probe_block" || name == "reduced_models";
+  if (whole) {
+    EXPECT_EQ(dfm_world_write_scene(world, (folder + "/later.json").c_str(), nullptr, nullptr),
+              DFM_E_UNSUPPORTED);
+    EXPECT_NE(std::string(dfm_last_error()).find("moves it as a whole"), std::string::npos);
+  }
+  EXPECT_EQ(write(world, folder + "/later.json", DFM_SCENE_SNAPSHOT).empty(), !whole);
   const dfm_world later = load(context, folder + "/later.json");
   ASSERT_TRUE(later);
   EXPECT_EQ(dfm_world_time(later), dfm_world_time(world));
-  EXPECT_EQ(apart(later, world), 0);
   const std::vector<unsigned char> bytes = read(folder + "/later_files/snapshot.state");
   const dfm_world restored = load(context, folder + "/later.json");
   ASSERT_EQ(dfm_world_restore(restored, bytes.data(), bytes.size()), DFM_OK) << dfm_last_error();
   EXPECT_EQ(dfm_world_hash(restored), dfm_world_hash(world));
-  steps(world, 5, h);
-  steps(restored, 5, h);
-  steps(later, 5, h);
+  if (!whole) {
+    EXPECT_EQ(apart(later, world), 0);
+  }
+  for (const dfm_world w : {world, restored, later}) steps(w, 5, h);
   EXPECT_EQ(dfm_world_hash(restored), dfm_world_hash(world));
-  EXPECT_LT(apart(later, world), 1e-6);
+  if (!whole) {
+    EXPECT_LT(apart(later, world), 1e-6);
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Each, ShippedScene,
-                         testing::Values("two_cylinders_coarse", "rigid_on_ball", "attached", "two_materials",
-                                         "pressed_ring", "probe_block", "rigid_pinch", "gravity_anisotropy",
-                                         "fill_drop", "terrain"),
-                         [](const auto &info) { return std::string(info.param); });
+                         testing::Values("attached", "ball_incline", "changing_models", "fill_drop",
+                                         "fill_drop_organs", "gravity_anisotropy", "gravity_beams",
+                                         "guard_shot", "pinched_tube", "pressed_ring", "probe_block",
+                                         "rabbits_slope", "reduced_models", "rigid_on_ball", "rigid_on_bed",
+                                         "rigid_pinch", "rollback_compare", "slope_block", "ten_bodies",
+                                         "terrain", "two_cylinders", "two_cylinders_coarse", "two_materials",
+                                         "viscoelastic_bars"),
+                         [](const auto &scene) { return std::string(scene.param); });
 
 namespace {
 
@@ -146,7 +158,7 @@ struct Made {
     test::ok(dfm_body_add_spring(ball, &spring, nullptr));
   }
   dfm_body make(const char *name, const char *kind, std::array<double, 3> size, std::array<double, 3> at,
-                std::array<double, 4> turn) {
+                std::array<double, 4> turn, dfm_material material = 0) {
     dfm_tetmesh mesh = 0;
     test::ok(dfm_tetmesh_make(context, kind, size.data(), 200, &mesh));
     dfm_tetmesh_info info{};
@@ -154,6 +166,7 @@ struct Made {
     test::ok(dfm_tetmesh_get_info(mesh, &info));
     dfm_body_def d = dfm_body_def_default();
     d.name = name;
+    d.material = material;
     test::ok(dfm_tetmesh_data(mesh, &d.points, &d.tets, nullptr));
     d.npoint = info.npoint;
     d.ntet = info.ntet;
@@ -183,14 +196,12 @@ TEST(WriteScene, WorldOfAProgram_GoesOnWithTheSameBits) {
   EXPECT_LT(apart(alone, made.world), 1e-6);
 }
 
-// One sentence for each thing that a scene has no word for: without the flag it ends the call, and neither the
-// scene nor its folder is there.
+// One sentence for each thing that a scene has no word for: without the flag it ends the call, and neither
+// the scene nor its folder is there.
 TEST(WriteScene, WhatASceneCannotSay_IsRefusedOrTold) {
   Made made;
-  test::ok(dfm_world_set_may_touch(
-      made.world, [](void *, uint64_t, uint64_t) { return true; }, nullptr));
-  test::ok(dfm_world_set_pre_solve(
-      made.world, [](void *, dfm_contact_choice *) {}, nullptr));
+  test::ok(dfm_world_set_may_touch(made.world, [](void *, uint64_t, uint64_t) { return true; }, nullptr));
+  test::ok(dfm_world_set_pre_solve(made.world, [](void *, dfm_contact_choice *) {}, nullptr));
   const std::string folder = folder_of("notes"), path = folder + "/notes.json";
   uint32_t n = 0;
   EXPECT_EQ(dfm_world_write_scene(made.world, path.c_str(), nullptr, &n), DFM_E_UNSUPPORTED);
@@ -204,6 +215,47 @@ TEST(WriteScene, WhatASceneCannotSay_IsRefusedOrTold) {
   EXPECT_NE(notes.find("which pairs may touch"), std::string::npos) << notes;
   EXPECT_NE(notes.find("changes contacts before they are solved"), std::string::npos) << notes;
   EXPECT_TRUE(load(made.context, path));
+}
+
+// Materials without a name, and two of one name, of which one is gone: each body has its own again.
+TEST(WriteScene, Materials_AreThoseOfEachBody) {
+  Made made;
+  const auto material = [&](const char *name, double density, double friction) {
+    dfm_material_def d = dfm_material_def_default();
+    d.name = name;
+    d.density = density;
+    const dfm_param_value row = {"friction", &friction, 1};
+    d.extra = {sizeof d.extra, 1, &row};
+    dfm_material out = 0;
+    test::ok(dfm_material_create(made.world, &d, &out));
+    return out;
+  };
+  const auto block = [&](const char *name, double x, dfm_material of) {
+    return made.make(name, "ball", {0.05, 0, 0}, {x, 0, 0.3}, {0, 0, 0, 1}, of);
+  };
+  block("a", 1, material(nullptr, 700, 0.1));
+  const dfm_material rubber = material("rubber", 800, 0.2);
+  block("b", 2, rubber);
+  dfm_obstacle_def o = dfm_obstacle_def_default();
+  o.name = "wall";
+  o.material = material(nullptr, 1000, 0.4);
+  dfm_obstacle wall = 0;
+  test::ok(dfm_obstacle_create(made.world, &o, &wall));
+  const std::string path = folder_of("materials") + "/materials.json";
+  EXPECT_EQ(all(write(made.world, path)), "");
+  const dfm_world back = load(made.context, path);
+  ASSERT_TRUE(back);
+  EXPECT_EQ(dfm_world_hash(back), dfm_world_hash(made.world));
+  test::ok(dfm_material_destroy(rubber));
+  block("c", 3, material("rubber", 900, 0.3));
+  const std::vector<std::string> notes = write(made.world, path, DFM_SCENE_PARTIAL);
+  ASSERT_EQ(notes.size(), 1u);
+  EXPECT_NE(notes[0].find("two materials 'rubber'"), std::string::npos) << notes[0];
+  const dfm_world both = load(made.context, path);
+  ASSERT_TRUE(both);
+  EXPECT_EQ(dfm_world_hash(both), dfm_world_hash(made.world));
+  for (const dfm_world w : {made.world, both}) steps(w, 20, 1e-4);
+  EXPECT_EQ(dfm_world_hash(both), dfm_world_hash(made.world));
 }
 
 TEST(WriteScene, WrongArguments_GetOneSentence) {

@@ -19,14 +19,15 @@ from .rig import friction, plot_friction
 from .law import Law, PythonLaw
 from .mesh import TetMesh, TriMesh
 from .picture import Picture
+from .query import ContactChoice, Filter, Hit, Shape
 from .scene import Run, Scene, run
 from .world import JointDef, Material, RigidDef, Trouble, World
 
 __version__: str = _quick.dfm_version(None, None, None).decode()
 
-__all__ = ["ArgumentError", "Body", "BusyError", "Context", "Discarded", "Diverged", "Error",
-           "FileError", "FormatError", "HandleError", "JointDef", "Law", "Material", "Obstacle",
-           "OutOfMemory", "Parameter", "Picture", "PluginType", "PythonLaw", "Rigid", "RigidDef", "Run",
-           "Scene", "StateError", "TetMesh", "TriMesh", "Trouble", "UnsupportedError", "World",
-           "command", "cost", "default_context", "explain", "friction", "include_dir", "plot_friction",
-           "run", "template_dir"]
+__all__ = ["ArgumentError", "Body", "BusyError", "ContactChoice", "Context", "Discarded", "Diverged",
+           "Error", "FileError", "Filter", "FormatError", "HandleError", "Hit", "JointDef", "Law",
+           "Material", "Obstacle", "OutOfMemory", "Parameter", "Picture", "PluginType", "PythonLaw",
+           "Rigid", "RigidDef", "Run", "Scene", "Shape", "StateError", "TetMesh", "TriMesh", "Trouble",
+           "UnsupportedError", "World", "command", "cost", "default_context", "explain", "friction",
+           "include_dir", "plot_friction", "run", "template_dir"]

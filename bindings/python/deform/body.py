@@ -8,10 +8,12 @@ import numpy as np
 
 from . import _abi
 from ._arrays import Column, Report
+from ._context import number_of
 from ._library import ArgumentError, check, default, lib, quick, sized
 from .mesh import points_of
 
 if TYPE_CHECKING:
+    from .query import Shape
     from .world import World
 
 EVERYTHING = 0xFFFFFFFF
@@ -50,6 +52,24 @@ class _Part:
         if column is None:
             column = self._columns[key] = make()
         return column.look()
+
+    @property
+    def is_sensor(self) -> bool:
+        """Does it report what overlaps it, and push nothing (set_sensor)?"""
+        out = ctypes.c_bool()
+        self.world.free()
+        check(quick.dfm_is_sensor(self.handle, ctypes.byref(out)))
+        return out.value
+
+    @property
+    def sensed(self) -> list[Body | Obstacle]:
+        """What overlapped this sensor at the end of the last step: bodies, then obstacles and rigid bodies,
+        each in order of creation. World.events tells what comes and goes."""
+        self.world.free()
+        n = number_of(quick.dfm_sensor_things, self.handle)
+        out = (ctypes.c_uint64 * max(n, 1))()
+        check(quick.dfm_sensor_things(self.handle, n, ctypes.byref(out), None) if n else 0)
+        return [self.world.owner(handle) for handle in out[:n]]
 
     def __repr__(self) -> str:
         return f"<deform.{type(self).__name__} '{self.name}'>"
@@ -234,6 +254,17 @@ class Body(_Part):
         self.world.free()
         check(quick.dfm_body_set_filter(self.handle, category, collides_with))
 
+    def set_sensor(self, sensor: bool = True) -> None:
+        """Makes it a sensor, which reports what overlaps it and pushes nothing; False: it touches again."""
+        self.world.free()
+        check(quick.dfm_body_set_sensor(self.handle, sensor))
+
+    def query_triangles(self, shape: Shape) -> np.ndarray:
+        """Numbers of the surface triangles that a Shape touches or holds, [n], ascending."""
+        from .query import query_triangles
+        self.world.free()
+        return query_triangles(self, shape)
+
     def attach(self, to: Body | Obstacle, *, points: Any = None, surfels: Any = None,
                group: str | None = None, box: Any = None, max_distance: float = 0, stiffness: float = 0,
                damping: float = 0, release: float = 0, touch: bool = False) -> int:
@@ -272,8 +303,19 @@ class Body(_Part):
         self.world.free()
         check(lib.dfm_body_detach(self.handle, attachment))
 
+    @property
+    def attachments(self) -> list[int]:
+        """Numbers of the attachments that hold now, in order of creation."""
+        self.world.free()
+        n = number_of(quick.dfm_body_attachments, self.handle)
+        out = (ctypes.c_uint32 * max(n, 1))()
+        check(quick.dfm_body_attachments(self.handle, n, ctypes.byref(out), None) if n else 0)
+        return list(out[:n])
+
     def attachment(self, number: int) -> _abi.dfm_attachment:
-        """What it does, as the C struct: force and moment of the last sub-step, impulse, stretch, ..."""
+        """What it does, as the C struct: to (a handle), nsurfel, stiffness N/m, damping N s/m, release N,
+        point [3] m (mean of its surfels), force [3] N and moment [3] N m about it on the body (means over the
+        last sub-step), impulse [3] N s since it was made, stretch m."""
         out = sized(_abi.dfm_attachment)
         self.world.free()
         check(quick.dfm_body_get_attachment(self.handle, number, ctypes.byref(out)))
@@ -327,6 +369,11 @@ class Obstacle(_Part):
         """Puts it there at once, without a motion."""
         self.world.free()
         check(quick.dfm_obstacle_teleport(self.handle, ctypes.byref(pose_of(position, rotation))))
+
+    def set_sensor(self, sensor: bool = True) -> None:
+        """Makes it a sensor, which reports what overlaps it and pushes nothing; False: it touches again."""
+        self.world.free()
+        check(quick.dfm_obstacle_set_sensor(self.handle, sensor))
 
     def set_velocity_surface(self, velocity: Any) -> None:
         """Velocity of its surface, a belt's, beside that of its pose: [3] m/s, in the world's axes."""

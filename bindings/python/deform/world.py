@@ -19,6 +19,7 @@ from ._library import (ArgumentError, BusyError, check, default, encoded, error,
 from ._signals import watch
 from .body import EVERYTHING, Body, Obstacle, Rigid, pose_of, vector
 from .mesh import TetMesh, TriMesh, cells_of, points_of
+from .query import Queries
 
 METHODS = {"auto": 0, "velocity": 1, "implicit": 2, "rollback": 3}
 INTEGRATORS = {"auto": 0, "symplectic_euler": 1, "implicit_euler": 2, "tr_bdf2": 3}
@@ -129,7 +130,7 @@ class JointDef:
         return out
 
 
-class World:
+class World(Queries):
     """A world of soft bodies: build it, step it, look at it. SI units.
 
         with deform.World() as world:
@@ -186,6 +187,9 @@ class World:
         self._bits_at = ctypes.byref(self._bits)
         self._lists: dict[str, Any] = {}
         self._bodies: weakref.WeakValueDictionary[int, Body] = weakref.WeakValueDictionary()
+        self._raised = None  # by a function that decides about contacts
+        self._known = None  # objects by handle, while there is such a function
+        self._functions = {}
         watch(self)
 
     @classmethod
@@ -241,6 +245,9 @@ class World:
         cause."""
         if status == _abi.DFM_OK:
             return status
+        own = self._take_raised()
+        if own is not None:
+            raise own
         raised = error(status)
         if status == _abi.DFM_DISCARD:
             raised.trouble = Trouble(self._bits.value)  # type: ignore[attr-defined]
@@ -340,7 +347,7 @@ class World:
         with self.alone():
             status = lib.dfm_body_create(self.handle, ctypes.byref(definition), ctypes.byref(out))
         check(status)
-        return self._body(out.value)
+        return self._know(self._body(out.value))
 
     def add_obstacle(self, shape: str = "plane", *, name: str | None = None,
                      position: Sequence[float] = (0, 0, 0), rotation: Sequence[float] | None = None,
@@ -372,7 +379,7 @@ class World:
         with self.alone():
             status = lib.dfm_obstacle_create(self.handle, ctypes.byref(definition), ctypes.byref(out))
         check(status)
-        return self._obstacle(out.value)
+        return self._know(self._obstacle(out.value))
 
     def add_rigid(self, shape: str = "sphere", **options: Any) -> Rigid:
         """A rigid body that soft bodies push; options: those of RigidDef."""
@@ -391,7 +398,7 @@ class World:
         with self.alone():
             status = lib.dfm_rigid_create(self.handle, encoded(host), ctypes.byref(group), ctypes.byref(out))
         check(status)
-        return [self._obstacle(handle) for handle in out[:len(bodies)]]  # type: ignore[misc]
+        return [self._know(self._obstacle(handle)) for handle in out[:len(bodies)]]
 
     def _obstacle(self, handle: int) -> Obstacle:
         out = sized(_abi.dfm_obstacle_def)
@@ -497,6 +504,8 @@ class World:
             if self._by_signal():  # whose handler has not raised
                 return self.step(seconds)
             self.accept(status)
+        if self._raised is not None:
+            raise self._take_raised()  # type: ignore[misc]
         return Trouble(self._bits.value) if self._bits.value else _NO_TROUBLE
 
     def _by_signal(self) -> bool:
@@ -588,7 +597,10 @@ class World:
 
     @property
     def events(self) -> np.ndarray:
-        """Begin (kind 1) and end (2) of contacts since the last look: kind, a, b, key, t s; a view."""
+        """What has begun and ended since the last look, a structured array [n], a view: kind, a, b, key, t s.
+
+        kind: 1 and 2, a contact has begun and ended; 3, an attachment has ended (key: its number); 4 and 5,
+        something (b) has come into a sensor (a) and left it."""
         return self._list("events", lambda: Rows(quick.dfm_world_events_sized, self.handle,
                                                  _abi.dfm_contact_event))
 

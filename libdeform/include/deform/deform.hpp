@@ -438,7 +438,7 @@ class World : public Handle<dfm_world, struct WorldKind>, public WorldQueries<E,
       return dfm_world_memory(raw_, &m);
     });
   }
-  // How many sentences there were about what a scene cannot say.
+  // How many things a scene cannot say: 0, or with DFM_SCENE_PARTIAL more.
   auto write_scene(Text path, const dfm_scene_write_def *def = nullptr) const {
     return produce<E, uint32_t>(
         [&](uint32_t &notes) { return dfm_world_write_scene(raw_, path.c_str, def, &notes); });

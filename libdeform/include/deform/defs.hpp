@@ -35,6 +35,9 @@ struct ObstacleDef : dfm_obstacle_def {
 struct RigidDef : dfm_rigid_def {
   RigidDef() noexcept : dfm_rigid_def(dfm_rigid_def_default()) {}
 };
+struct SceneWriteDef : dfm_scene_write_def {
+  SceneWriteDef() noexcept : dfm_scene_write_def(dfm_scene_write_def_default()) {}
+};
 struct BodyDef : dfm_body_def {
   BodyDef() noexcept : dfm_body_def(dfm_body_def_default()) {}
   // Borrowed until the body is made: points [n,3], tets [n,4].

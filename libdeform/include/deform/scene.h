@@ -51,18 +51,18 @@ DFM_API dfm_status dfm_scene_get_settings(dfm_scene scene, dfm_scene_settings *o
 DFM_API dfm_status dfm_scene_probe(dfm_scene scene, uint32_t probe, const char **name, double position[3],
                                    double velocity[3]);
 
-/** dfm_scene_write_def.flags. SNAPSHOT: the bytes of dfm_world_snapshot too, as STEM_files/snapshot.state;
- * `deform run SCENE --from STEM_files/snapshot.state` goes on with the same bits. PARTIAL: what a scene cannot
- * say is left out, and told. */
+/** dfm_scene_write_def.flags. SNAPSHOT: the bytes of dfm_world_snapshot too, as
+ * STEM_files/snapshot.state; `deform run SCENE --from STEM_files/snapshot.state` goes on with the same bits.
+ * PARTIAL: what a scene cannot say is left out, and told. */
 enum { DFM_SCENE_SNAPSHOT = 1, DFM_SCENE_PARTIAL = 2 };
 /** What dfm_world_write_scene asks beside the world. Since 0.1. */
 typedef struct dfm_scene_write_def {
   uint32_t size, flags; /* flags: DFM_SCENE_* */
   double duration;      /* s, of the scene, from the world's time on; 1 */
   double step;          /* s, of the scene; 0: dfm_world_def.step, and "auto" where that is 0 too */
-  /* called with one sentence, which lives during the call, for each thing that a scene cannot say and for each
-   * plugin that is not shipped; NULL: they go to the log hook as warnings. It may call nothing of this library
-   */
+  /* called with one sentence, which lives during the call, for each thing that a scene cannot say and for
+   * each plugin that is not shipped; NULL: they go to the log hook as warnings. It may call nothing of this
+   * library */
   void (*note)(void *user, const char *sentence);
   void *user;      /* first argument of note */
   uint64_t cookie; /* set by the default function */
@@ -75,8 +75,8 @@ static inline dfm_scene_write_def dfm_scene_write_def_default(void) {
   dfm_scene_write_def_default_sized((uint32_t)sizeof out, &out);
   return out;
 }
-/** Writes a world as a scene that `deform run` and dfm_scene_load go on with: bodies (mesh at rest, points and
- * velocities of now, material, model, what is held and prescribed), obstacles, rigid bodies, friction,
+/** Writes a world as a scene that `deform run` and dfm_scene_load go on with: bodies (mesh at rest, points
+ * and velocities of now, material, model, what is held and prescribed), obstacles, rigid bodies, friction,
  * filters, attachments, settings, the time. A world with something that a scene cannot say (a callback, rigid
  * bodies of a host's own world, ...: doc/concepts/write_scene.md) is refused and nothing is written; with
  * DFM_SCENE_PARTIAL the rest is written.

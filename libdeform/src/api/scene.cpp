@@ -150,10 +150,11 @@ dfm_status dfm_world_write_scene(dfm_world world, const char *path, const dfm_sc
     const dfm_scene_write_def d = dfm::take_def(def, dfm_scene_write_def_default());
     dfm::check_flags(d, DFM_SCENE_SNAPSHOT | DFM_SCENE_PARTIAL, "dfm_world_write_scene");
     if (!(d.duration > 0 && std::isfinite(d.duration)) || !(d.step >= 0 && std::isfinite(d.step)))
-      dfm::fail(DFM_E_ARG,
-                "dfm_world_write_scene: a duration of %g s and a step of %g s; both are finite, the duration is "
-                "positive and the step not negative",
-                d.duration, d.step);
+      dfm::fail(
+          DFM_E_ARG,
+          "dfm_world_write_scene: a duration of %g s and a step of %g s; both are finite, the duration is "
+          "positive and the step not negative",
+          d.duration, d.step);
     dfm::writing::WriteOptions options;
     options.duration = d.duration;
     options.step = d.step;

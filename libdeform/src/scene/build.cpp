@@ -96,7 +96,8 @@ class Builder {
     };
     std::vector<Thing> things;
     for (Body &b : def_.bodies) things.push_back({b.id, b.pointer, [this, &b] { create_body(b); }});
-    for (Obstacle &o : def_.obstacles) things.push_back({o.id, o.pointer, [this, &o] { create_obstacle(o); }});
+    for (Obstacle &o : def_.obstacles)
+      things.push_back({o.id, o.pointer, [this, &o] { create_obstacle(o); }});
     const auto set = [this] { create_rigid(def_.rigid); };
     if (def_.rigid.bodies.empty()) things.push_back({0, "/rigid", set});
     else things.push_back({def_.rigid.bodies[0].id, def_.rigid.bodies[0].pointer, set});
@@ -115,7 +116,7 @@ class Builder {
 
   void create_material(Material &m) {
     dfm_material_def d = dfm_material_def_default();
-    d.name = m.name.c_str();
+    d.name = m.title.empty() ? nullptr : m.title.c_str();
     d.density = m.density;
     d.young = m.young;
     d.poisson = m.poisson;

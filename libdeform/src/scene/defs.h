@@ -145,7 +145,7 @@ struct Obstacle {
   std::string pointer, name, material, mesh;
   uint64_t id = 0;
   std::optional<dfm_pose> start;  // where it stands at first
-  double scale = 1;  // of the mesh
+  double scale = 1;               // of the mesh
   bool sensor = false;
   dfm_obstacle_def def = {};
   std::vector<dfm_pose_key> keys;
@@ -171,7 +171,7 @@ struct Rigid {
 };
 
 struct Material {
-  std::string pointer, name;
+  std::string pointer, name, title;  // the key; the name in the world, empty: none
   double density = 1000, young = 1e5, poisson = 0.3, damping_mass = 0, damping_stiffness = 0;
   Params extra;
 };

@@ -356,7 +356,8 @@ void read_materials(const Node &scene, Definition &def, ReadContext &context) {
     node.object("material", model_keys);
     Material m;
     m.pointer = node.pointer();
-    m.name = entry.key();
+    m.name = m.title = entry.key();
+    if (node.has("name")) m.title = node.value()["name"].is_null() ? "" : node.member("name").text();
     json copy = entry.key();
     Node(&copy, node.pointer(), &node.file()).name();
     m.density = node.number("density", m.density, kPositive);
@@ -379,6 +380,7 @@ void read_materials(const Node &scene, Definition &def, ReadContext &context) {
                                                  : read_extra(value, key, context.types));
     }
     context.materials.push_back(m.name);
+    context.titles.push_back(m.title);
     def.materials.push_back(std::move(m));
   }
 }
@@ -390,7 +392,7 @@ std::string read_side(const Node &side, const ReadContext &context, bool grouped
   if (text == "*") return text;
   if (text.rfind("material=", 0) == 0) {
     json name = text.substr(9);
-    return "material=" + known(Node(&name, side.pointer(), &side.file()), context.materials, "material");
+    return "material=" + known(Node(&name, side.pointer(), &side.file()), context.titles, "material");
   }
   const size_t colon = text.find(':');
   if (colon == std::string::npos) return known(side, context.sides, "body or obstacle");
@@ -514,7 +516,7 @@ Definition read_scene(json &tree, const std::string &file, const Types &types) {
   Definition def;
   def.file = file;
   def.folder = std::filesystem::path(file).parent_path().string();
-  ReadContext context{types, {}, {}};
+  ReadContext context{types, {}, {}, {}};
   read_gravity(scene, def);
   read_time(scene, def);
   read_wanted(scene, def);

@@ -11,7 +11,8 @@ namespace {
 void read_quaternion(const Node &rotation, double out[4]) {
   for (const char *key : {"axis", "angle_deg"})
     if (rotation.has(key))
-      rotation.member(key).fail("a rotation is given by \"axis\" and \"angle_deg\" or by \"quaternion\"; keep one");
+      rotation.member(key).fail(
+          "a rotation is given by \"axis\" and \"angle_deg\" or by \"quaternion\"; keep one");
   const Node node = rotation.member("quaternion");
   const std::vector<Node> items = node.items();
   if (items.size() != 4) node.fail("expected four numbers [x, y, z, w], found %zu", items.size());
@@ -176,8 +177,7 @@ Spring read_spring(const Node &entry) {
   int said = 0;
   for (const char *key : {"point", "points", "box", "group"}) said += entry.has(key);
   if (said != 1)
-    entry.fail(
-        "expected one of \"point\", \"points\", \"box\" and \"group\" to say where the spring pulls");
+    entry.fail("expected one of \"point\", \"points\", \"box\" and \"group\" to say where the spring pulls");
   if (spring.at_point) entry.member("point").vector(spring.point);
   else spring.where = read_selection(entry);
   if (entry.has("to") == entry.has("keyframes"))

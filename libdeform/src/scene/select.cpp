@@ -299,8 +299,7 @@ Shared share_on_cells(const Force &force, const BodyMesh &mesh, const std::strin
 
 Shared share(const Force &force, const BodyMesh &mesh, const std::string &file) {
   const bool of_cells = find_group(force.where.group, mesh.group_names, mesh.ngroup) < mesh.ngroup;
-  const bool on_skin =
-      force.where.points.empty() && (force.where.group.empty() ? mesh.filled : !of_cells);
+  const bool on_skin = force.where.points.empty() && (force.where.group.empty() ? mesh.filled : !of_cells);
   if (!on_skin || force.by == "mass") return share_on_cells(force, mesh, file);
   const std::vector<uint32_t> triangles = skin_triangles(force.where, mesh);
   if (!triangles.empty()) return share_on_skin(triangles, mesh);

@@ -25,13 +25,16 @@ bool same_bits(const void *a, const void *b, size_t bytes) { return std::memcmp(
 
 Written vector_of(const double *v) { return {v[0], v[1], v[2]}; }
 
-Written rotation_of(const double *q) { return {{"quaternion", {q[0], q[1], q[2], q[3]}}}; }
+// Of length zero: none, as in dfm_pose.
+bool turned(const double *q) { return q[0] != 0 || q[1] != 0 || q[2] != 0 || (q[3] != 0 && q[3] != 1); }
+
+Written rotation_of(const double *q) { return {{"quaternion", {q[0], q[1], q[2], turned(q) ? q[3] : 1.0}}}; }
 
 Written pose_of(const dfm_pose &pose) {
   Written out;
   const double *const p = pose.position, *const q = pose.rotation;
   if (p[0] != 0 || p[1] != 0 || p[2] != 0) out["position"] = vector_of(p);
-  if (q[0] != 0 || q[1] != 0 || q[2] != 0 || q[3] != 1) out["rotation"] = rotation_of(q);
+  if (turned(q)) out["rotation"] = rotation_of(q);
   return out;
 }
 
@@ -93,7 +96,8 @@ std::string beside(const std::string &path, const std::string &name) {
   std::error_code error;
   std::filesystem::create_directory(where, error);
   if (!std::filesystem::is_directory(where, error))
-    fail(DFM_E_IO, "%s: there can be no folder %s for its meshes beside it; give a path where there can be one",
+    fail(DFM_E_IO,
+         "%s: there can be no folder %s for its meshes beside it; give a path where there can be one",
          path.c_str(), where.c_str());
   return (where / name).string();
 }
@@ -119,16 +123,23 @@ void SceneWriter::check_name(const char *kind, const std::string &name) const {
     if (name.empty()) fail(DFM_E_ARG, "it is empty");
     scene::Node(&text, "", &path).name();
   } catch (const Error &) {
-    fail(DFM_E_ARG,
-         "%s: the name of %s '%s' cannot stand in a scene: one has 1 to 100 bytes, does not begin with a dot, "
-         "and holds no control characters and none of / \\ , : * = \"; make it under another name",
-         path.c_str(), kind, name.c_str());
+    fail(
+        DFM_E_ARG,
+        "%s: the name of %s '%s' cannot stand in a scene: one has 1 to 100 bytes, does not begin with a dot, "
+        "and holds no control characters and none of / \\ , : * = \"; make it under another name",
+        path.c_str(), kind, name.c_str());
   }
 }
 
 namespace {
 
 // ---- materials --------------------------------------------------------------------------------------------
+
+Material plain_material() {
+  Material m;
+  m.def = dfm_material_def_default();
+  return m;
+}
 
 Written material_of(const Material &m) {
   Written out;
@@ -138,56 +149,89 @@ Written material_of(const Material &m) {
   if (m.def.damping_mass != 0) out["damping"]["mass"] = m.def.damping_mass;
   if (m.def.damping_stiffness != 0) out["damping"]["stiffness"] = m.def.damping_stiffness;
   for (size_t i = 0; i < m.extra_keys.size(); ++i)
-    out[m.extra_keys[i]] = m.extra_values[i].size() == 1 ? Written(m.extra_values[i][0]) : Written(m.extra_values[i]);
+    out[m.extra_keys[i]] =
+        m.extra_values[i].size() == 1 ? Written(m.extra_values[i][0]) : Written(m.extra_values[i]);
   return out;
 }
 
-// What bodies are made of comes first: a material may have been destroyed, or made anew, since.
-Written write_materials(SceneWriter &to) {
-  Written out = Written::object();
-  std::vector<std::string> known{"friction"};
-  for (const std::string &key : scene::Types(to.w.context).model_keys()) known.push_back(key);
-  const auto add = [&](const Material &m) {
-    if (m.name.empty()) return;
-    to.check_name("material", m.name);
-    Written value = material_of(m);
-    for (const std::string &key : m.extra_keys)
-      if (std::find(known.begin(), known.end(), key) == known.end()) {
-        to.note("material '%s': its entry '%s' is left out, since no loaded model has such a parameter",
-                m.name.c_str(), key.c_str());
-        value.erase(key);
-      }
-    if (!out.contains(m.name)) out[m.name] = std::move(value);
-    else if (out[m.name] != value)
-      to.note("there are two materials '%s'; the scene has the one that a body is made of", m.name.c_str());
+}  // namespace
+
+// Entries that no loaded model has as a parameter are left out, since a scene refuses them.
+std::string SceneWriter::material(const Material &m) {
+  const Material plain = plain_material();
+  Written value = material_of(m);
+  if (m.name.empty() && value == material_of(plain)) return "";
+  if (!m.name.empty()) check_name("material", m.name);
+  for (const auto &[key, known] : material_keys)
+    if (known.first == m.name && known.second == value) return key;
+  const auto taken = [&](const std::string &key) {
+    return material_keys.count(key) ||
+           std::any_of(w.materials.begin(), w.materials.end(),
+                       [&](const auto &other) { return other->name == key && key != m.name; });
   };
-  for (const auto &b : to.w.bodies)
-    for (const Material &m : b->makeup.materials) add(m);
-  for (const auto &m : to.w.materials) add(*m);
-  for (const auto &o : to.w.obstacles) {
-    if (o->material.empty() || out.contains(o->material)) continue;
-    Material m;
-    m.def = dfm_material_def_default();
-    m.name = o->material;
-    m.extra_keys = {"friction"};
-    m.extra_values = {{o->zone.friction}};
-    add(m);
+  const bool second = !m.name.empty() && material_keys.count(m.name);
+  if (second)
+    note(
+        "there have been two materials '%s', one of which is destroyed; the scene has the second one without "
+        "a "
+        "name, so that rules for \"material=%s\" do not mean it",
+        m.name.c_str(), m.name.c_str());
+  std::string key = m.name.empty() ? "unnamed" : m.name;
+  for (int i = 2; taken(key); ++i) key = (m.name.empty() ? "unnamed" : m.name) + format(" %d", i);
+  material_keys[key] = {m.name, value};
+  for (const std::string &extra : m.extra_keys)
+    if (extra != "friction" && !model_keys.count(extra)) {
+      note("material '%s': its entry '%s' is left out, since no loaded model has such a parameter",
+           key.c_str(), extra.c_str());
+      value.erase(extra);
+    }
+  Written entry;
+  if (key != m.name) entry["name"] = nullptr;
+  entry.update(value);
+  materials[key] = std::move(entry);
+  return key;
+}
+
+std::string SceneWriter::material(const std::string &name, double friction) {
+  for (const auto &[key, known] : material_keys) {
+    const auto at = known.second.find("friction");
+    const double of_it = at == known.second.end() ? kDefaultFriction : at->get<double>();
+    if (!name.empty() && known.first == name && of_it == friction) return key;
   }
-  return out;
+  Material m = plain_material();
+  m.name = name;
+  if (friction != kDefaultFriction) {
+    m.extra_keys = {"friction"};
+    m.extra_values = {{friction}};
+  }
+  return material(m);
+}
+
+namespace {
+
+// Those with a name first, so that the first of each name has it as its key, and rules of friction find it.
+void write_materials(SceneWriter &to) {
+  for (const bool named : {true, false}) {
+    for (const auto &b : to.w.bodies)
+      for (const Material &m : b->makeup.materials)
+        if (m.name.empty() != named) to.material(m);
+    for (const auto &m : to.w.materials)
+      if (named && !m->name.empty()) to.material(*m);
+  }
 }
 
 // ---- contact ----------------------------------------------------------------------------------------------
 
-bool sides_known(const SceneWriter &to, const std::string &side, const Written &materials) {
+bool sides_known(const SceneWriter &to, const std::string &side) {
   if (side == "*") return true;
-  if (side.rfind("material=", 0) == 0) return materials.contains(side.substr(9));
+  if (side.rfind("material=", 0) == 0) return to.materials.contains(side.substr(9));
   return to.knows(side) || to.knows(side.substr(0, side.find(':')));
 }
 
-Written write_friction(SceneWriter &to, const Written &materials) {
+Written write_friction(SceneWriter &to) {
   Written out = Written::array();
   for (const FrictionRule &r : to.w.friction) {
-    if (!sides_known(to, r.between[0], materials) || !sides_known(to, r.between[1], materials)) {
+    if (!sides_known(to, r.between[0]) || !sides_known(to, r.between[1])) {
       to.note("the friction rule for '%s' and '%s' is left out, since the world has no such two",
               r.between[0].c_str(), r.between[1].c_str());
       continue;
@@ -211,8 +255,8 @@ Written write_filters(SceneWriter &to) {
   const auto add = [&](const std::string &a, const std::string &b, bool collide) {
     out.push_back({{"between", {a, b}}, {"collide", collide}});
   };
-  const auto pair = [&](const Body &a, const std::string &name, const std::string &material, uint32_t category,
-                        uint32_t with) {
+  const auto pair = [&](const Body &a, const std::string &name, const std::string &material,
+                        uint32_t category, uint32_t with) {
     if ((a.category & with) && (category & a.collides_with)) return;
     const PairSide one{a.name, {}, a.material}, other{name, {}, material};
     for (const FilterRule &r : w.filters)
@@ -242,15 +286,17 @@ Written write_filters(SceneWriter &to) {
     return "";
   };
   for (const PairAnswer &p : w.may_touch.answers)
-    if (const std::string a = name(p.a), b = name(p.b); !p.touch && !a.empty() && !b.empty()) add(a, b, false);
+    if (const std::string a = name(p.a), b = name(p.b); !p.touch && !a.empty() && !b.empty())
+      add(a, b, false);
   return out;
 }
 
-Written write_contact(SceneWriter &to, const Written &materials) {
+Written write_contact(SceneWriter &to) {
   const dfm_world_def &d = to.w.def, usual = dfm_world_def_default();
   Written out;
-  static const std::pair<int32_t, const char *> methods[] = {
-      {DFM_METHOD_VELOCITY, "velocity"}, {DFM_METHOD_IMPLICIT, "implicit"}, {DFM_METHOD_ROLLBACK, "rollback"}};
+  static const std::pair<int32_t, const char *> methods[] = {{DFM_METHOD_VELOCITY, "velocity"},
+                                                             {DFM_METHOD_IMPLICIT, "implicit"},
+                                                             {DFM_METHOD_ROLLBACK, "rollback"}};
   for (const auto &[method, word] : methods)
     if (d.method == method) out["method"] = word;
   if (d.self_contact == DFM_SELF_ON) out["self"] = true;
@@ -264,7 +310,7 @@ Written write_contact(SceneWriter &to, const Written &materials) {
   else if (d.energy_watch != usual.energy_watch) out["energy_watch"] = d.energy_watch;
   if (d.recovery_speed > 0) out["recovery_speed"] = d.recovery_speed;
   if (d.obstacle_speed > 0) out["obstacle_speed"] = d.obstacle_speed;
-  if (Written friction = write_friction(to, materials); !friction.empty()) out["friction"] = std::move(friction);
+  if (Written friction = write_friction(to); !friction.empty()) out["friction"] = std::move(friction);
   if (Written filter = write_filters(to); !filter.empty()) out["filter"] = std::move(filter);
   return out;
 }
@@ -314,8 +360,9 @@ void tell_what_is_left_out(SceneWriter &to) {
   const World &w = to.w;
   const dfm_world_def usual = dfm_world_def_default();
   if (w.may_touch.call)
-    to.note("a callback of the host says which pairs may touch: the scene has its answers so far, and asks "
-            "nobody about pairs that come later");
+    to.note(
+        "a callback of the host says which pairs may touch: the scene has its answers so far, and asks "
+        "nobody about pairs that come later");
   if (w.pre_solve.call)
     to.note("a callback of the host changes contacts before they are solved; a scene has none");
   const std::pair<const char *, bool> members[] = {{"max_sweeps", w.def.max_sweeps != usual.max_sweeps},
@@ -338,14 +385,15 @@ void tell_what_is_left_out(SceneWriter &to) {
         Used &u = *static_cast<Used *>(user);
         const std::string path = file ? file : "";
         if (path.empty() || !u.ids.count(type->id)) return;
-        if (path.rfind("static:", 0) == 0 ? path.rfind("static:host", 0) != 0
-                                          : std::filesystem::path(path).parent_path() ==
-                                                std::filesystem::path(u.shipped))
+        if (path.rfind("static:", 0) == 0
+                ? path.rfind("static:host", 0) != 0
+                : std::filesystem::path(path).parent_path() == std::filesystem::path(u.shipped))
           return;
         if (u.told.insert(type->id).second)
-          u.to->remark(format("'%s' comes from %s, which whoever runs the scene has to load: name its folder in "
-                              "DEFORM_PLUGIN_PATH",
-                              type->id, path.c_str()));
+          u.to->remark(
+              format("'%s' comes from %s, which whoever runs the scene has to load: name its folder in "
+                     "DEFORM_PLUGIN_PATH",
+                     type->id, path.c_str()));
       },
       &used);
 }
@@ -357,15 +405,17 @@ Written write_root(SceneWriter &to) {
   root["gravity"] = write_gravity(to.w);
   root["time"] = write_time(to);
   if (to.w.selection.listed()) root["effects"] = to.w.selection.names();
-  const Written materials = write_materials(to);
-  if (!materials.empty()) root["materials"] = materials;
+  write_materials(to);
+  root["materials"] = nullptr;  // their place; obstacles may add some
   for (const auto &b : to.w.bodies) root["bodies"].push_back(write_body(to, *b));
   for (const auto &o : to.w.obstacles)
     if (!o->rigid) root["obstacles"].push_back(write_obstacle(to, *o));
   if (Written rigid = write_rigid(to); !rigid.is_null()) root["rigid"] = std::move(rigid);
-  if (Written contact = write_contact(to, materials); !contact.is_null()) root["contact"] = std::move(contact);
+  if (Written contact = write_contact(to); !contact.is_null()) root["contact"] = std::move(contact);
   if (Written solver = write_solver(to.w); !solver.is_null()) root["solver"] = std::move(solver);
   tell_what_is_left_out(to);
+  if (to.materials.empty()) root.erase("materials");
+  else root["materials"] = to.materials;
   return root;
 }
 
@@ -394,8 +444,9 @@ void write_snapshot(SceneWriter &to, const std::string &name) {
   scene::Scene back(to.w.context, to.path, nullptr);
   const World &made = resolve<World>(Kind::world, back.world());
   if (snapshot_structure(made) != snapshot_structure(to.w)) {
-    to.note("no snapshot is written, since rounding of meshes or poses, or what the scene cannot say, makes the "
-            "world of the scene another one than this");
+    to.note(
+        "no snapshot is written, since rounding of meshes or poses, or what the scene cannot say, makes the "
+        "world of the scene another one than this");
     if (!to.options.partial)
       fail(DFM_E_UNSUPPORTED, "%s is written, but %s", to.path.c_str(), to.first.c_str());
     return;
@@ -414,14 +465,14 @@ void write_scene(World &w, const std::string &path, const WriteOptions &options,
   if (whole.extension() != ".json" || whole.stem().empty())
     fail(DFM_E_ARG, "%s: the name of a scene file ends in .json", path.c_str());
   SceneWriter to{w, path, options, notes};
+  for (const std::string &key : scene::Types(w.context).model_keys()) to.model_keys.insert(key);
   AtomicFile scene(path);  // what cannot be written is found out first
   std::string text;
   print(write_root(to), "", text);
   if (notes > 0 && !options.partial) {
     const std::string more = notes > 1 ? format(" (and %u more like it)", notes - 1) : "";
-    fail(DFM_E_UNSUPPORTED,
-         "%s is not written: %s%s; with DFM_SCENE_PARTIAL the scene is written without it", path.c_str(),
-         to.first.c_str(), more.c_str());
+    fail(DFM_E_UNSUPPORTED, "%s is not written: %s%s; with DFM_SCENE_PARTIAL the scene is written without it",
+         path.c_str(), to.first.c_str(), more.c_str());
   }
   for (const SceneWriter::File &f : to.files) f.write(beside(path, f.name));
   scene.write(text + "\n");

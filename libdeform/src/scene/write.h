@@ -1,8 +1,9 @@
 // A world as a scene: the file that `deform run` takes, with meshes and states in a folder beside it. What a
-// scene cannot say gets a sentence each (SceneWriter::note). A new kind of thing gets a write_* function of its
-// own here, called by write_root, and a call of `note` for what it has beyond its keys.
+// scene cannot say gets a sentence each (SceneWriter::note). A new kind of thing gets a write_* function of
+// its own here, called by write_root, and a call of `note` for what it has beyond its keys.
 #pragma once
 #include <functional>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <string>
@@ -37,6 +38,9 @@ struct SceneWriter {
   };
   std::vector<File> files{};  // written when it is known that nothing is refused
   std::string first{};        // of the sentences
+  Written materials = Written::object();
+  std::map<std::string, std::pair<std::string, Written>> material_keys{};  // name and entries by key
+  std::set<std::string> model_keys{};                                      // parameters of any loaded model
 
   void note(const char *text, ...) __attribute__((format(printf, 2, 3)));
   // What whoever runs the scene has to know: refuses nothing, and is not counted.
@@ -45,6 +49,9 @@ struct SceneWriter {
   }
   // A file beside the scene: the path by which the scene names it.
   std::string file(const std::string &name, std::function<void(const std::string &path)> write);
+  // The key of a material; empty: it is that of things without one. Adds it to `materials`.
+  std::string material(const Material &m);
+  std::string material(const std::string &name, double friction);  // of a thing that has no more of it
   std::string text_file(const std::string &name, std::string text);
   void check_name(const char *kind, const std::string &name) const;  // throws where a scene has no such name
   bool knows(const std::string &name) const { return w.find_body(name) || w.find_obstacle(name); }
@@ -52,8 +59,8 @@ struct SceneWriter {
 
 Written vector_of(const double *v);
 inline Written vector_of(Vec3 v) { return {v.x, v.y, v.z}; }
-Written rotation_of(const double *q);  // x y z w
-Written pose_of(const dfm_pose &pose);
+Written rotation_of(const double *q);   // x y z w
+Written pose_of(const dfm_pose &pose);  // null: at the origin, not turned
 Written sine_of(const dfm_sine &sine, bool scalar);
 bool moves(const dfm_sine &sine);
 // Parameters by key, those that are not at the table's default.

@@ -1,5 +1,5 @@
-// A soft body as a scene says it: its mesh at rest, in files of their own, how it stands and moves now, and what
-// is prescribed for it.
+// A soft body as a scene says it: its mesh at rest, in files of their own, how it stands and moves now, and
+// what is prescribed for it.
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -42,25 +42,32 @@ void write_cells(SceneWriter &to, const Body &b, Written &out) {
   mesh.share.assign(b.share.begin(), b.share.end());
   const uint32_t ntet = mesh.ntet();
   mesh.tet_group.assign(ntet, kNoGroup);
-  for (uint32_t t = 0; t < ntet && !b.makeup.of.empty(); ++t) {
-    const std::string &material = b.makeup.materials[b.makeup.of[t]].name;
-    if (material == b.material) continue;
-    if (material.empty()) {
+  std::vector<std::string> keys;
+  for (const Material &m : b.makeup.materials) keys.push_back(to.material(m));
+  // the body's own, which rules by name mean, and which the others differ from
+  size_t own = 0;
+  while (own + 1 < keys.size() && b.makeup.materials[own].name != b.material) ++own;
+  if (b.makeup.materials[own].name == b.material) out["material"] = keys[own];
+  else if (!b.material.empty()) out["material"] = to.material(b.material, kDefaultFriction);
+  if (out["material"].is_null() || out["material"] == "") out.erase("material");
+  for (uint32_t t = 0; t < ntet; ++t) {
+    const size_t m = b.makeup.of.empty() ? 0 : b.makeup.of[t];
+    if (keys[m] == out.value("material", "")) continue;
+    if (keys[m].empty()) {
       to.note("body '%s': cells without a material lie beside others; a scene gives them '%s'",
               b.name.c_str(), b.material.c_str());
       break;
     }
-    mesh.tet_group[t] = group_number(mesh.groups, material_group(material), 3);
-    out["materials_by_group"][material_group(material)] = material;
+    mesh.tet_group[t] = group_number(mesh.groups, material_group(keys[m]), 3);
+    out["materials_by_group"][material_group(keys[m])] = keys[m];
   }
   for (uint32_t t = 0; b.surface.identity() && t < b.surface.ntri; ++t) {
     if (zone_group(b, t).empty()) continue;
     for (size_t k = 0; k < 3; ++k) mesh.tris.push_back(b.surface.point[b.surface.tri[3 * size_t{t} + k]]);
     mesh.tri_group.push_back(group_number(mesh.groups, zone_group(b, t), 2));
   }
-  out["mesh"] = to.file(b.name + ".vtu", [mesh = std::move(mesh)](const std::string &to_path) {
-    write_vtu(mesh, to_path);
-  });
+  out["mesh"] = to.file(b.name + ".vtu",
+                        [mesh = std::move(mesh)](const std::string &to_path) { write_vtu(mesh, to_path); });
 }
 
 void write_surface(SceneWriter &to, const Body &b, Written &out) {
@@ -70,8 +77,8 @@ void write_surface(SceneWriter &to, const Body &b, Written &out) {
   mesh.points.assign(s.rest.begin(), s.rest.end());
   mesh.tris.assign(s.tri.begin(), s.tri.end());
   for (uint32_t t = 0; t < s.ntri; ++t)
-    mesh.tri_group.push_back(
-        zone_group(b, t).empty() ? kNoGroup : group_number(mesh.groups, zone_group(b, t), 2));
+    mesh.tri_group.push_back(zone_group(b, t).empty() ? kNoGroup
+                                                      : group_number(mesh.groups, zone_group(b, t), 2));
   Written &own = out["surface"];
   own["mesh"] = to.file(b.name + "_surface.vtu", [mesh = std::move(mesh)](const std::string &to_path) {
     write_tri_mesh(mesh, to_path);
@@ -210,7 +217,7 @@ void write_state(SceneWriter &to, const Body &b, Written &out) {
   store3(pose.position, frame.position);
   const double turn[4] = {frame.rotation.x, frame.rotation.y, frame.rotation.z, frame.rotation.w};
   std::copy_n(turn, 4, pose.rotation);
-  out["pose"] = pose_of(pose);
+  if (Written made = pose_of(pose); !made.is_null()) out["pose"] = std::move(made);
   bool rests = true;
   for (uint32_t i = 0; i < b.p.n && rests; ++i) {
     const Vec3 x = made_at(b, i), v = load3(&b.p.v[kStride * size_t{i}]);
@@ -218,9 +225,12 @@ void write_state(SceneWriter &to, const Body &b, Written &out) {
   }
   if (rests) return;
   if (!b.dynamics->abilities().placed) {
-    to.note("body '%s': its model '%s' moves it as a whole, so a scene cannot say how it stands and moves now; "
-            "it begins at rest where it was made",
-            b.name.c_str(), b.model.type->id);
+    const std::string sentence = format(
+        "body '%s': its model '%s' moves it as a whole, so a scene cannot say how it stands and moves now; "
+        "it begins at rest where it was made",
+        b.name.c_str(), b.model.type->id);
+    if (to.options.snapshot) to.remark(sentence + ", and the snapshot says the rest");
+    else to.note("%s", sentence.c_str());
     return;
   }
   std::string rows = std::string(scene::kStateHeader) + "\n";
@@ -278,9 +288,10 @@ void write_held(SceneWriter &to, const Body &b, Written &out) {
     for (size_t i = 0; i < m.points.size(); ++i)
       away = std::max(away, norm(load3(&m.start[3 * i]) - made_at(b, m.points[i])));
     if (away > 1e-9 * b.surface.median_edge)
-      to.note("body '%s': held points move from where they stood when their motion was given, up to %g m from "
-              "the rest shape; a scene moves them from the rest shape",
-              b.name.c_str(), away);
+      to.note(
+          "body '%s': held points move from where they stood when their motion was given, up to %g m from "
+          "the rest shape; a scene moves them from the rest shape",
+          b.name.c_str(), away);
   }
 }
 
@@ -336,9 +347,10 @@ void write_springs(SceneWriter &to, const Body &b, Written &out) {
   for (const Spring &s : b.springs) {
     Written entry;
     if (!write_spring_place(b, s, entry)) {
-      to.note("body '%s': a spring pulls at %zu points with weights of its own, which a scene cannot say; it is "
-              "left out",
-              b.name.c_str(), s.points.size());
+      to.note(
+          "body '%s': a spring pulls at %zu points with weights of its own, which a scene cannot say; it is "
+          "left out",
+          b.name.c_str(), s.points.size());
       continue;
     }
     if (s.keys.empty()) entry["to"] = vector_of(s.to);
@@ -374,9 +386,8 @@ void write_attachments(SceneWriter &to, const Body &b, Written &out) {
     double away = 0;
     for (size_t i = 0; i < a.surfels.size(); ++i) {
       Vec3 x;
-      b.surface.each_phyxel(a.surfels[i], [&](uint32_t p, double weight) {
-        x += weight * load3(&b.p.x[kStride * size_t{p}]);
-      });
+      b.surface.each_phyxel(
+          a.surfels[i], [&](uint32_t p, double weight) { x += weight * load3(&b.p.x[kStride * size_t{p}]); });
       away = std::max(away, norm(x - attached_place(to.w, a, i)));
     }
     if (away > 1e-6 * b.surface.median_edge)
@@ -395,7 +406,6 @@ Written write_body(SceneWriter &to, Body &b) {
   out["id"] = b.id;
   write_cells(to, b, out);
   write_surface(to, b, out);
-  if (!b.material.empty()) out["material"] = b.material;
   write_model(to, b, out);
   write_fields(to, b, out);
   write_state(to, b, out);

@@ -81,7 +81,7 @@ Written write_obstacle(SceneWriter &to, const Obstacle &o) {
     to.note("obstacle '%s': the pose that it is to reach in the next step is left out", o.name.c_str());
   const double *const belt = o.def.velocity_surface;
   if (belt[0] != 0 || belt[1] != 0 || belt[2] != 0) out["velocity_surface"] = vector_of(belt);
-  if (!o.material.empty()) out["material"] = o.material;
+  if (const std::string key = to.material(o.material, o.zone.friction); !key.empty()) out["material"] = key;
   if (o.sensor) out["sensor"] = true;
   return out;
 }
@@ -109,18 +109,17 @@ const Obstacle *only_shape(const World &w, const RigidSet &set, uint32_t body) {
 }
 
 bool has_added(const World &w, const RigidSet &set, uint32_t body) {
-  return std::any_of(w.obstacles.begin(), w.obstacles.end(), [&](const auto &o) {
-    return o->rigid == &set && o->rigid_body == body && o->added;
-  });
+  return std::any_of(w.obstacles.begin(), w.obstacles.end(),
+                     [&](const auto &o) { return o->rigid == &set && o->rigid_body == body && o->added; });
 }
 
 void write_rigid_start(const RigidSet &set, uint32_t i, Written &out) {
   const dfm_rigid_def &d = set.defs[i];
   const dfm_rigid_state &s = set.state[i];
-  if (d.fixed || (same_bits(d.pose.position, s.position, sizeof s.position) &&
-                  same_bits(d.pose.rotation, s.rotation, sizeof s.rotation) &&
-                  same_bits(d.velocity, s.velocity, sizeof s.velocity) &&
-                  same_bits(d.spin, s.spin, sizeof s.spin)))
+  if (d.fixed ||
+      (same_bits(d.pose.position, s.position, sizeof s.position) &&
+       same_bits(d.pose.rotation, s.rotation, sizeof s.rotation) &&
+       same_bits(d.velocity, s.velocity, sizeof s.velocity) && same_bits(d.spin, s.spin, sizeof s.spin)))
     return;
   out["start"] = {{"position", vector_of(s.position)},
                   {"rotation", rotation_of(s.rotation)},
@@ -145,8 +144,9 @@ Written rigid_body_of(SceneWriter &to, const RigidSet &set, uint32_t i) {
   to.check_name("rigid body", o.name);
   const Obstacle *const other = d.shape == DFM_SHAPE_NONE ? only_shape(to.w, set, i) : nullptr;
   if (d.shape == DFM_SHAPE_NONE && !other) {
-    to.note("rigid body '%s' is left out: in a scene it is one sphere, box or capsule about its center of mass",
-            o.name.c_str());
+    to.note(
+        "rigid body '%s' is left out: in a scene it is one sphere, box or capsule about its center of mass",
+        o.name.c_str());
     return nullptr;
   }
   if (!other && has_added(to.w, set, i))
@@ -167,8 +167,9 @@ Written rigid_body_of(SceneWriter &to, const RigidSet &set, uint32_t i) {
     out["spin"] = vector_of(d.spin);
   }
   write_rigid_start(set, i, out);
-  const std::string &material = other ? other->material : o.material;
-  if (!material.empty()) out["material"] = material;
+  const Obstacle &touched = other ? *other : o;
+  if (const std::string key = to.material(touched.material, touched.zone.friction); !key.empty())
+    out["material"] = key;
   if (o.sensor) out["sensor"] = true;
   return out;
 }
@@ -183,15 +184,17 @@ std::string host_of(SceneWriter &to) {
   const bool one = std::all_of(w.rigid_sets.begin(), w.rigid_sets.end(),
                                [&](const auto &set) { return set->host_name == name; });
   if (bodies > 0) {
-    to.note("%zu rigid bodies live in a world of the host '%s', of which a scene has no more than their "
-            "shapes, masses and motion: they are written for the host builtin, without the contacts and joints "
-            "that they have among each other",
-            bodies, name.c_str());
+    to.note(
+        "%zu rigid bodies live in a world of the host '%s', of which a scene has no more than their "
+        "shapes, masses and motion: they are written for the host builtin, without the contacts and joints "
+        "that they have among each other",
+        bodies, name.c_str());
     return "builtin";
   }
   if (!one)
-    to.note("the rigid bodies belong to several hosts, and in a scene to one: they are written for the host "
-            "builtin");
+    to.note(
+        "the rigid bodies belong to several hosts, and in a scene to one: they are written for the host "
+        "builtin");
   else if (w.rigid_sets.size() > 1)
     to.note("the rigid bodies were made as %zu sets and are one in a scene; they move alike to rounding",
             w.rigid_sets.size());

@@ -1,5 +1,6 @@
 #include "world/snapshot_structure.h"
 
+#include <algorithm>
 #include <cstring>
 
 #include "core/hash.h"
@@ -35,6 +36,20 @@ void makeup(Hash &h, const Makeup &m) {
   }
 }
 
+// The def with one value for what says the same: a rotation of length zero is none (dfm_pose), and sizes that
+// the shape does not have are the default's.
+dfm_obstacle_def told(const dfm_obstacle_def &d) {
+  static const double none[4] = {};
+  const dfm_obstacle_def usual = dfm_obstacle_def_default();
+  dfm_obstacle_def out = d;
+  if (std::equal(none, none + 4, out.pose.rotation)) out.pose.rotation[3] = 1;
+  const bool round = d.shape == DFM_SHAPE_SPHERE || d.shape == DFM_SHAPE_CAPSULE;
+  if (d.shape != DFM_SHAPE_BOX) std::copy_n(usual.half_size, 3, out.half_size);
+  if (!round) out.radius = usual.radius;
+  if (d.shape != DFM_SHAPE_CAPSULE) out.half_length = usual.half_length;
+  return out;
+}
+
 }  // namespace
 
 uint64_t snapshot_structure(const World &w) {
@@ -61,7 +76,7 @@ uint64_t snapshot_structure(const World &w) {
     h.add(b->zones.of.data(), b->zones.of.size() * sizeof(uint32_t));
   }
   for (auto &o : w.obstacles) {
-    const dfm_obstacle_def &d = o->def;
+    const dfm_obstacle_def d = told(o->def);
     h.add(o->id);
     h.add(d.shape);
     h.add(d.pose);
