@@ -54,10 +54,10 @@ struct Single {
   Buffer<uint32_t> cells;
   Buffer<uint16_t> number;
   Buffer<uint32_t> edge, cell;  // [rays] number of the spring, [ncell] place in block order; kNone for none
-  Buffer<float> stiffness, rest, rest_square, tilt, damp;
+  Buffer<float> stiffness, rest, tilt, damp;
   Buffer<float> bulk, volume6, collapse, limit;
   void create(const dfm_host *h, size_t groups, size_t rings) {
-    rays = kFans * (2 * rings + 3 * groups);
+    rays = kFans * (rings + 2 * groups);
     ncell = kFans * rings;
     cells.create(h, groups);
     number.create(h, kFans * (rings + 3 * groups));
@@ -65,7 +65,7 @@ struct Single {
     cell.create_raw(h, ncell);
     std::fill(edge.data(), edge.data() + rays, ~0u);
     std::fill(cell.data(), cell.data() + ncell, ~0u);
-    for (Buffer<float> *each : {&stiffness, &rest, &rest_square, &tilt, &damp}) each->create(h, rays);
+    for (Buffer<float> *each : {&stiffness, &rest, &tilt, &damp}) each->create(h, rays);
     for (Buffer<float> *each : {&bulk, &volume6, &collapse, &limit}) each->create(h, ncell);
   }
   void swap(Single &o) {
@@ -78,7 +78,6 @@ struct Single {
     cell.swap(o.cell);
     stiffness.swap(o.stiffness);
     rest.swap(o.rest);
-    rest_square.swap(o.rest_square);
     tilt.swap(o.tilt);
     damp.swap(o.damp);
     bulk.swap(o.bulk);

@@ -134,7 +134,8 @@ Fans::Fans(const Body &body) {
   add_rest(body);
 }
 
-// Each spring once: where it is an axis, then where it leaves one, from a sooner than from b.
+// Each spring once: where it is an axis, then where it leads from a to the ring; a is the end that has more of
+// those.
 void Fans::place_springs(const Body &body) {
   placed_.create(body.host, body.nedge);
   const auto edge = [&](uint32_t n, uint32_t i, uint32_t j) {
@@ -155,10 +156,7 @@ void Fans::place_springs(const Body &body) {
     for (uint32_t k = 0; k <= fan.cells; ++k)
       more += placed_[edge(n, fan.a, fan.ring[k])] - placed_[edge(n, fan.b, fan.ring[k])];
     if (more > 0) turn(fan);
-    for (uint32_t k = 0; k <= fan.cells; ++k) put(fan, edge(n, fan.a, fan.ring[k]), ray(k, false));
-  });
-  each([&](uint32_t n, Fan &fan) {
-    for (uint32_t k = 0; k <= fan.cells; ++k) put(fan, edge(n, fan.b, fan.ring[k]), ray(k, true));
+    for (uint32_t k = 0; k <= fan.cells; ++k) put(fan, edge(n, fan.a, fan.ring[k]), 1 + k);
   });
 }
 
@@ -196,7 +194,7 @@ void Fans::add_rest(const Body &body) {
     for (; from < begin[n + 1]; ++from) all[at++] = found[from];
     begin[n] = first;
     each_pair(n, [&](uint32_t i, uint32_t j, uint32_t k) {
-      Fan fan{0, i, j, {k}, {}, j == k ? 1u : 1u | 1u << ray(0, false)};
+      Fan fan{0, i, j, {k}, {}, j == k ? 1u : 3u};
       all[at++] = fan;
     });
     if (n + 1 == body.nblock) begin[n + 1] = at;

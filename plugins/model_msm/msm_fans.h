@@ -10,10 +10,8 @@ namespace msm {
 struct Fan {
   uint32_t cells, a, b;
   uint32_t ring[kMostInFan + 1], slot[kMostInFan];  // slot: place in the body's block order
-  // a bit for each spring that it has: a b, then from a and from b to each ring point in turn
-  uint32_t springs;
+  uint32_t springs;                                 // bit 0: a b, bit 1 + k: a ring[k]
 };
-constexpr uint32_t ray(uint32_t k, bool from_b) { return 1 + 2 * k + from_b; }  // bit of a spring to ring[k]
 
 // All of a body. Every cell and every spring is in one.
 struct Fans {

@@ -68,16 +68,16 @@ struct SinglePoint {
   float v[4];
 };
 // Groups of kFans fans of cells (msm_fans.h), a lane of floats each. The points of a group are a, b and its
-// ring; its springs a b, then from a and from b to each ring point in turn. Where a fan of a group has fewer
+// ring; its springs those from a to all others, in that order. Where a fan of a group has fewer
 // cells than another, its last ring point is repeated. What is missing has no stiffness.
 constexpr uint32_t kFans = 8, kMostInFan = 8;  // fans of a group, cells of a fan
 struct SingleBlock : model::BlockPoints {
   SinglePoint *at;  // [local]
   uint32_t groups;
-  const uint32_t *cells;                                      // [groups] of the longest fan
-  const uint16_t *number;                                     // [groups][cells + 3][kFans] of points times 4
-  const float *stiffness, *rest, *rest_square, *tilt, *damp;  // [groups][2 cells + 3][kFans]
-  const float *bulk, *volume6, *collapse, *limit;             // [groups][cells][kFans]
+  const uint32_t *cells;                           // [groups] of the longest fan
+  const uint16_t *number;                          // [groups][cells + 3][kFans] of points times 4
+  const float *stiffness, *rest, *tilt, *damp;     // [groups][cells + 2][kFans]
+  const float *bulk, *volume6, *collapse, *limit;  // [groups][cells][kFans]
 };
 struct SingleKernels {
   // Clears f; returns the unit of the places, m: NaN where one is not finite.

@@ -140,7 +140,7 @@ template <bool kTilts, Damping kDamping>
 DEFORM_INLINE vf pull(const SingleBlock &s, size_t slot, vf dd, vf rate, float damp) {
   const vf counted = kTilts ? dd + load(s.tilt + slot) : dd;
   const vf rest = load(s.rest + slot), length = root(counted), sum = length + rest;
-  vf stretch = (counted - load(s.rest_square + slot)) * length;
+  vf stretch = (counted - rest * rest) * length;
   if constexpr (kDamping != kUndamped) {
     const vf factor = kDamping == kPerSpring ? load(s.damp + slot) : all(damp);
     stretch = stretch + (factor * rate) * sum;
@@ -221,17 +221,9 @@ static inline void fans(const SingleBlock &b, float unit, float damp) {
         const Ray ray = ray_to(2 + k);
         const Three e3 = metres(ray.whole, unit);
         const vf square3 = dot(e3, e3);
-        const Three from_b = {between((vi)axis.whole.x, (vi)ray.whole.x),
-                              between((vi)axis.whole.y, (vi)ray.whole.y),
-                              between((vi)axis.whole.z, (vi)ray.whole.z)};
-        const Three d = metres(from_b, unit);
-        vf rate = {};
-        if constexpr (kDamping != kUndamped) rate = dot(ray.rate - axis.rate, d);
-        const size_t both = slot + kFans * (1 + 2 * size_t(k));
-        const Three own = pull<kTilts, kDamping>(b, both, square3, rate_of(ray.rate, e3), damp) * e3;
-        const Three other = pull<kTilts, kDamping>(b, both + kFans, dot(d, d), rate, damp) * d;
-        at_b = at_b + other;
-        Three here = (zero - own) - other;
+        Three here = zero - pull<kTilts, kDamping>(b, slot + kFans * (1 + size_t(k)), square3,
+                                                   rate_of(ray.rate, e3), damp) *
+                                e3;
         if constexpr (kCells) {
           const Three normal3 = cross(e1, e3);
           if (k > 0) {
@@ -287,7 +279,7 @@ static inline void fans(const SingleBlock &b, float unit, float damp) {
       }
     }
     number += kFans * (cells + 3);
-    ray_at += kFans * (2 * size_t(cells) + 3);
+    ray_at += kFans * (size_t(cells) + 2);
     cell_at += kFans * size_t(cells);
   }
 }

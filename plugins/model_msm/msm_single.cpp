@@ -42,7 +42,6 @@ void Body::prepare_single() {
     out.number = made.number.data() + number_at;
     out.stiffness = made.stiffness.data() + ray_at;
     out.rest = made.rest.data() + ray_at;
-    out.rest_square = made.rest_square.data() + ray_at;
     out.tilt = made.tilt.data() + ray_at;
     out.damp = made.damp.data() + ray_at;
     out.bulk = made.bulk.data() + cell_at;
@@ -59,20 +58,16 @@ void Body::prepare_single() {
           made.number[number_at + kFans * size_t(k) + lane] = uint16_t(4 * local);
         }
         if (lane >= count) continue;
-        const auto spring = [&](uint32_t bit, uint32_t i, uint32_t j) {
-          if (!(own.springs >> bit & 1)) return;
-          made.edge[ray_at + kFans * size_t(bit) + lane] =
-              model::find_edge(edges.data(), nedge, block[n].point[i], block[n].point[j]);
-        };
-        spring(0, own.a, own.b);
-        for (uint32_t k = 0; k <= own.cells; ++k) {
-          spring(ray(k, false), own.a, own.ring[k]);
-          spring(ray(k, true), own.b, own.ring[k]);
+        for (uint32_t k = 0; k < own.cells + 2; ++k) {
+          if (!(own.springs >> k & 1)) continue;
+          const uint32_t to = k == 0 ? own.b : own.ring[k - 1];
+          made.edge[ray_at + kFans * size_t(k) + lane] =
+              model::find_edge(edges.data(), nedge, block[n].point[own.a], block[n].point[to]);
         }
         for (uint32_t k = 0; k < own.cells; ++k) made.cell[cell_at + kFans * size_t(k) + lane] = own.slot[k];
       }
       number_at += kFans * (size_t(longest) + 3);
-      ray_at += kFans * (2 * size_t(longest) + 3);
+      ray_at += kFans * (size_t(longest) + 2);
       cell_at += kFans * size_t(longest);
     });
     out.groups = uint32_t(group - first);
@@ -87,10 +82,8 @@ void Body::fill_single() {
   for (size_t s = 0; s < to.rays; ++s) {
     const uint32_t e = to.edge[s];
     const bool real = e != kNone;
-    const double length = real ? rest_length(e) : 0;
     to.stiffness[s] = real ? float(stiffness_of(e)) : 0;
-    to.rest[s] = float(length);
-    to.rest_square[s] = float(length * length);
+    to.rest[s] = real ? float(rest_length(e)) : 0;
     to.tilt[s] = real && !edge_tilt.empty() ? float(edge_tilt[e]) : 0;
     to.damp[s] = real && !edge_damp.empty() ? float(edge_damp[e]) : 0;
   }
