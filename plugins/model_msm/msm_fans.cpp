@@ -134,8 +134,8 @@ Fans::Fans(const Body &body) {
   add_rest(body);
 }
 
-// Each spring once: where it is an axis, then where it leads from a to the ring; a is the end that has more of
-// those.
+// Each spring once: where it is an axis, then where it leads from a to the ring; a is the end that has more
+// of those.
 void Fans::place_springs(const Body &body) {
   placed_.create(body.host, body.nedge);
   const auto edge = [&](uint32_t n, uint32_t i, uint32_t j) {

@@ -42,7 +42,7 @@ Params collapsing() {
 }
 
 // A point of a free mesh has 14 springs of E h^2 per unit strain and 24 cells; the page's bound of one is
-// 3 units of the 24th bit.
+// 5 units of the 24th bit.
 double bound_of(const Params &p, double h) { return 30 * kUnit * p.young * h * h; }
 
 TEST(MsmSingle, Error_IsAFewUnitsOfTheLastBitOfAStrain) {
