@@ -130,13 +130,21 @@ Adapter::Traits Adapter::traits_of(const btCollisionObject *object) const {
 
 dfm_status Adapter::sync() { return look(0); }
 
+// Most worlds list their objects in the order in which they came.
+Adapter::Object *Adapter::known(const btCollisionObject *object, int place) const {
+  if (size_t(place) < objects_.size() && objects_[size_t(place)]->id == object)
+    return objects_[size_t(place)].get();
+  const auto at = by_id_.find(object);
+  return at == by_id_.end() ? nullptr : at->second;
+}
+
 // Refuses before anything has changed.
 dfm_status Adapter::check() const {
   const btCollisionObjectArray &all = engine_.world->getCollisionObjectArray();
   std::vector<Part> parts;
   for (int i = 0; i < all.size(); ++i) {
     const btCollisionShape *unknown = nullptr;
-    if (by_id_.count(all[i]) || !traits_of(all[i]).takes_part) continue;
+    if (known(all[i], i) || !traits_of(all[i]).takes_part) continue;
     if (!parts_of(all[i]->getCollisionShape(), {}, parts, unknown))
       return failed(
           DFM_E_UNSUPPORTED,
@@ -154,9 +162,9 @@ dfm_status Adapter::look(double h) {
   const btCollisionObjectArray &all = engine_.world->getCollisionObjectArray();
   for (auto &o : objects_) o->found = false;
   for (int i = 0; i < all.size(); ++i) {
-    const auto known = by_id_.find(all[i]);
-    if (known == by_id_.end()) continue;
-    Object &o = *known->second;
+    Object *const found = known(all[i], i);
+    if (!found) continue;
+    Object &o = *found;
     const btCollisionShape *unknown = nullptr;
     seen_.clear();
     const bool readable = !o.traits.takes_part || parts_of(all[i]->getCollisionShape(), {}, seen_, unknown);
@@ -166,7 +174,7 @@ dfm_status Adapter::look(double h) {
   if (objects_.size() != static_cast<size_t>(all.size()))
     for (int i = 0; i < all.size(); ++i)
       if (!by_id_.count(all[i])) TRY(bind(all[i]));
-  std::erase_if(props_, [&](const auto &p) { return !by_id_.count(p.first); });
+  if (!props_.empty()) std::erase_if(props_, [&](const auto &p) { return !by_id_.count(p.first); });
   for (auto &o : objects_) TRY(follow(*o, h));
   bool restored = false;
   TRY(clock_.ask(world_, restored));

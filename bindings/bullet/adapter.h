@@ -106,6 +106,7 @@ class Adapter {
   dfm_status look(double h);
   dfm_status check() const;
   Traits traits_of(const btCollisionObject *object) const;
+  Object *known(const btCollisionObject *object, int place) const;  // place: in the world's list
   const Props *props_of(const btCollisionObject *object) const;
   bool in_world(const btCollisionObject *object) const;
   dfm_status not_in_world(const btCollisionObject *object) const;

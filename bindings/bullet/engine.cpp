@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <unordered_set>
 
@@ -53,14 +54,32 @@ dfm_rigid_state state_of(const Pose &p, Vec v, Vec w) {
 
 }  // namespace
 
+bool Stand::holds(const btTransform &t, const btVector3 &v_now, const btVector3 &w_now) const {
+  const auto same = [](const btVector3 &a, const btVector3 &b) {
+    return std::memcmp(a.m_floats, b.m_floats, 3 * sizeof(btScalar)) == 0;
+  };
+  return known && same(transform.getOrigin(), t.getOrigin()) && same(v, v_now) && same(w, w_now) &&
+         same(transform.getBasis()[0], t.getBasis()[0]) && same(transform.getBasis()[1], t.getBasis()[1]) &&
+         same(transform.getBasis()[2], t.getBasis()[2]);
+}
+
 dfm_rigid_state BulletMember::state() const {
   return state_of(from_bullet(body->getWorldTransform()), from_bullet(body->getLinearVelocity()),
                   from_bullet(body->getAngularVelocity()));
 }
 
+void BulletMember::mark() {
+  marked = {body->getWorldTransform(), body->getLinearVelocity(), body->getAngularVelocity(), {}, true};
+}
+
+bool BulletMember::stays() const {
+  return marked.holds(body->getWorldTransform(), body->getLinearVelocity(), body->getAngularVelocity());
+}
+
 void BulletMember::put(const dfm_rigid_state &s) {
   put_in(body, to_bullet(Pose{load(s.position), rotation_of(s)}), to_bullet(load(s.velocity)),
          to_bullet(load(s.spin)));
+  last_put = {body->getWorldTransform(), body->getLinearVelocity(), body->getAngularVelocity(), s, true};
 }
 
 // Bullet's inertia is diagonal in the body's own frame; an axis of none is one that does not turn.
@@ -128,7 +147,22 @@ void LinkMember::push(Vec force, Vec torque) {
   }
 }
 
+// Are the bodies those of the last time? Looks at addresses alone, so that nothing that is gone is touched.
+bool BulletEngine::is_gathered() {
+  const btAlignedObjectArray<btRigidBody *> &all = world->getNonStaticRigidBodies();
+  bool same = gathered_ == members && listed_.size() == size_t(all.size());
+  for (size_t i = 0; same && i < bodies_.size(); ++i)
+    same = bodies_[i]->saved == i && saved_[i].member == bodies_[i] && saved_[i].body == bodies_[i]->body;
+  for (int i = 0; same && i < all.size(); ++i)
+    same = listed_[size_t(i)] ==
+           std::pair<const btRigidBody *, bool>(all[i], !all[i]->isStaticOrKinematicObject());
+  return same;
+}
+
 void BulletEngine::gather() {
+  if (is_gathered()) return;
+  gathered_ = members;
+  listed_.clear();
   saved_.clear();
   number_.clear();
   const auto add = [&](btRigidBody *b, BulletMember *m) {
@@ -147,8 +181,11 @@ void BulletEngine::gather() {
     add(m->body, m);
   }
   const btAlignedObjectArray<btRigidBody *> &all = world->getNonStaticRigidBodies();
-  for (int i = 0; i < all.size(); ++i)
-    if (!all[i]->isStaticOrKinematicObject() && !number_.count(all[i])) add(all[i], nullptr);
+  for (int i = 0; i < all.size(); ++i) {
+    const bool moves = !all[i]->isStaticOrKinematicObject();
+    listed_.emplace_back(all[i], moves);
+    if (moves && !number_.count(all[i])) add(all[i], nullptr);
+  }
 }
 
 void BulletEngine::prepare(const dfm_rigid_step &step) {
@@ -248,11 +285,13 @@ void BulletEngine::take(Member &any, const dfm_rigid_state &given, const double 
     s.idle = m.body->getDeactivationTime();
   }
   m.restored = false;
+  m.ended = given;
+  // prepare() has put back what stood there before, so that what was put last stands there still
+  if (same(given, m.last_put.state) && m.last_put.holds(s.transform, s.v, s.w)) return;
   m.put(given);
   s.transform = m.body->getWorldTransform();
   s.v = m.body->getLinearVelocity();
   s.w = m.body->getAngularVelocity();
-  m.ended = given;
 }
 
 void BulletEngine::put_forces(double) {

@@ -13,6 +13,8 @@
 // Gyroscopic terms are out of Bullet's solve where the body has them on; see ode/engine.h.
 #pragma once
 #include <unordered_map>
+#include <utility>
+#include <vector>
 
 #include "multi_state.h"
 
@@ -20,13 +22,25 @@ namespace dfm_bullet_detail {
 
 class BulletEngine;
 
+// Where a body of Bullet stands and how it moves, to the bit, and the state that goes with it.
+struct Stand {
+  btTransform transform;
+  btVector3 v, w;
+  dfm_rigid_state state;
+  bool known = false;
+  bool holds(const btTransform &t, const btVector3 &v_now, const btVector3 &w_now) const;
+};
+
 struct BulletMember : Member {
   btRigidBody *body = nullptr;
   bool touched = false;  // by a constraint or contact of Bullet's in this sub-step
   size_t saved = 0;      // where the engine keeps it
   dfm_rigid_state ended{};
+  Stand last_put, marked;  // last_put: what has been put into Bullet, and as what it stands there
 
   dfm_rigid_state state() const override;
+  void mark() override;
+  bool stays() const override;
   void put(const dfm_rigid_state &s) override;
   dfm_rigid_state end() const override { return ended; }
   bool enabled() const override { return body->isActive(); }
@@ -83,11 +97,14 @@ class BulletEngine : public Engine {
     bool touched;
   };
   std::unordered_map<const btCollisionObject *, size_t> number_;  // in saved_
+  std::vector<Member *> gathered_;                                // members when that was made
+  std::vector<std::pair<const btRigidBody *, bool>> listed_;      // the world's bodies then; may they move?
   MultiState multi_;
   std::vector<Saved> saved_;  // every body that may move, members first
 
   std::vector<BulletMember *> bodies_;  // of members
   std::vector<LinkMember *> links_;
+  bool is_gathered();
   void find_touched();
   void pull_awake();
   void finish(BulletMember &m, double h);

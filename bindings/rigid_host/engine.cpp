@@ -102,6 +102,7 @@ Inertia inertia_of(double mass, const double tensor[3][3]) {
 }
 
 Motion Member::answer(const Motion &p) const {
+  if (p.v.x == 0 && p.v.y == 0 && p.v.z == 0 && p.w.x == 0 && p.w.y == 0 && p.w.z == 0) return {};
   const Vec turned = in_axes(rotation_of(start), inverse(inertia.moments), each(turns_about, p.w));
   return {(1 / inertia.mass) * each(moves_along, p.v), each(turns_about, turned)};
 }
@@ -155,7 +156,7 @@ void Engine::classify(Member &m, const dfm_rigid_step &step, const double *extra
   m.impulse = {};
   const Vec v = load(m.start.velocity), w = load(m.start.spin);
   const Quat q = rotation_of(m.start);
-  m.turn_momentum = in_axes(q, m.inertia.moments, w) + step.h * f.torque;
+  if (m.turns) m.turn_momentum = in_axes(q, m.inertia.moments, w) + step.h * f.torque;
   const Motion pull = m.answer({f.force, f.torque});
   m.plain.v = v + step.h * (f.gravity + pull.v);
   m.plain.w =

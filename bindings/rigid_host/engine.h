@@ -86,10 +86,16 @@ struct Member {
   virtual dfm_rigid_state state() const = 0;               // as the engine has it now
   virtual void put(const dfm_rigid_state &s) = 0;          // into the engine
   virtual dfm_rigid_state end() const { return state(); }  // after the engine's step
+  // Is the engine's body where it was at the last mark(), to the bit?
+  virtual void mark() { marked_ = state(); }
+  virtual bool stays() const { return same(state(), marked_); }
   virtual bool enabled() const = 0;
   virtual Facts facts() const = 0;
   virtual std::array<double, 2> idle_limits() const = 0;  // m/s, rad/s
   Motion answer(const Motion &impulse) const;             // M^-1 p at the start
+
+ private:
+  dfm_rigid_state marked_{};
 };
 
 class Engine {

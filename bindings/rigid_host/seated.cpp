@@ -12,7 +12,8 @@ dfm_pose to_pose(const Pose &p) {
 dfm_status Seated::create(dfm_world in, const char *host, Member &m) {
   seat.member = &m;
   dfm_rigid_def def = dfm_rigid_def_default();
-  engine = m.state();
+  const dfm_rigid_state engine = m.state();
+  m.mark();
   def.shape = DFM_SHAPE_NONE;
   def.mass = m.inertia.mass;
   store(def.inertia, m.inertia.moments);
@@ -33,14 +34,18 @@ dfm_status Seated::agree(bool restored) {
   Member &m = *seat.member;
   dfm_rigid_state now_world;
   TRY(dfm_rigid_get_state(rigid, &now_world));
-  const dfm_rigid_state now_engine = m.state();
   restored &= !fresh;
   fresh = false;
   m.restored |= restored;
-  if (same(now_engine, engine) && same(now_world, world)) return DFM_OK;
-  if (restored || same(now_engine, engine)) m.put(now_world);
-  else TRY(dfm_rigid_set_state(rigid, &now_engine));
-  engine = m.state();
+  const bool stays = m.stays();
+  if (stays && same(now_world, world)) return DFM_OK;
+  if (restored || stays) {
+    m.put(now_world);
+  } else {
+    const dfm_rigid_state now_engine = m.state();
+    TRY(dfm_rigid_set_state(rigid, &now_engine));
+  }
+  m.mark();
   return dfm_rigid_get_state(rigid, &world);
 }
 
@@ -53,7 +58,7 @@ dfm_status Seated::after(dfm_status of_step) {
   Member &m = *seat.member;
   const dfm_status told = dfm_rigid_get_state(rigid, &world);
   if (of_step != DFM_OK && told == DFM_OK && !same(world, m.state())) m.put(world);
-  engine = m.state();
+  m.mark();
   return told;
 }
 

@@ -21,7 +21,7 @@ dfm_pose to_pose(const Pose &p);
 struct Seated {
   Seat seat;
   dfm_rigid rigid = 0;
-  dfm_rigid_state engine{}, world{};  // what both worlds had when they agreed last
+  dfm_rigid_state world{};  // what the dfm_world had when both agreed last; of the engine: Member::mark()
   // fresh: the engine's state counts, whatever the dfm_world has been restored to
   bool found = true, fresh = true;
 

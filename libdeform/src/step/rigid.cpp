@@ -101,16 +101,24 @@ bool stage_rigid_predict(World &w, StepContext &step, uint32_t *trouble) {
   return true;
 }
 
+namespace {
+
+// Sets number their groups one after another.
+RigidSet &set_of_group(World &w, uint32_t group) {
+  const auto after = std::upper_bound(w.rigid_sets.begin(), w.rigid_sets.end(), group,
+                                      [](uint32_t g, const auto &set) { return g < set->first_group; });
+  return **(after - 1);
+}
+
+}  // namespace
+
 void rigid_response(World &w, StepContext &step, const ContactRows::Block &block) {
-  for (auto &set : w.rigid_sets) {
-    if (block.group < set->first_group || block.group >= set->first_group + set->ngroup) continue;
-    step.rows.set_response(block, [&](double *matrix) {
-      if (!set->respond(block.group - set->first_group, step.rigid_groups[block.group], matrix))
-        fail(DFM_E_FATAL, "rigid host '%s' does not answer impulses on '%s' and those with it",
-             set->host_name.c_str(), set->defs[0].name);
-    });
-    return;
-  }
+  RigidSet &set = set_of_group(w, block.group);
+  step.rows.set_response(block, [&](double *matrix) {
+    if (!set.respond(block.group - set.first_group, step.rigid_groups[block.group], matrix))
+      fail(DFM_E_FATAL, "rigid host '%s' does not answer impulses on '%s' and those with it",
+           set.host_name.c_str(), set.defs[0].name);
+  });
 }
 
 // A host that says DFM_RIGID_AGAIN knows better now how its bodies move: the same contacts are solved once
@@ -119,14 +127,14 @@ void rigid_response(World &w, StepContext &step, const ContactRows::Block &block
 void correct_rigids(World &w, StepContext &step) {
   for (const ContactRows::Block &block : step.rows.blocks) {
     if (block.group == kNone) continue;
-    for (auto &set : w.rigid_sets)
-      for (uint32_t i = 0; i < set->defs.size(); ++i) {
-        if (set->group[i] == DFM_RIGID_STILL || set->first_group + set->group[i] != block.group) continue;
-        const double *const now = &set->velocity[6 * size_t{i}], *const then = &set->first[6 * size_t{i}];
-        double *const y = &step.rows.y[4 * size_t{block.first + 2 * set->place[i]}];
-        store3(y, load3(now) - load3(then));
-        store3(y + 4, load3(now + 3) - load3(then + 3));
-      }
+    const RigidSet &set = set_of_group(w, block.group);
+    for (uint32_t i = 0; i < set.defs.size(); ++i) {
+      if (set.group[i] == DFM_RIGID_STILL || set.first_group + set.group[i] != block.group) continue;
+      const double *const now = &set.velocity[6 * size_t{i}], *const then = &set.first[6 * size_t{i}];
+      double *const y = &step.rows.y[4 * size_t{block.first + 2 * set.place[i]}];
+      store3(y, load3(now) - load3(then));
+      store3(y + 4, load3(now + 3) - load3(then + 3));
+    }
   }
 }
 
