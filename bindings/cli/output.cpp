@@ -162,8 +162,9 @@ void Outputs::write_last() {
   }
 }
 
-// The numbers of the mesh file's nodes and where they are now. Of a filled body they are points of the
-// surface that it wears; where it wears another one, its own points are numbered as they stand.
+// The numbers of the mesh file's nodes and where they are now. Of a filled body they are the first points of
+// the surface that it wears (those of split edges follow); where it wears another one, its own points are
+// numbered as they stand.
 FileNodes Outputs::file_nodes(size_t b) const {
   const BodyView &body = scene_.bodies()[b];
   const std::string key = "/bodies/" + std::to_string(b);
@@ -184,7 +185,10 @@ FileNodes Outputs::file_nodes(size_t b) const {
   const uint32_t *file_point = nullptr;
   if (surface) {
     out.surface = scene_.value(key + "/surface/mesh").empty() && scene_.value(key + "/surface/from").empty();
-    out.number.resize(out.surface ? body.nsurfel : body.npoint);
+    dfm_trimesh_info info = {};
+    info.size = sizeof info;
+    need(dfm_trimesh_get_info(surface, &info));
+    out.number.resize(out.surface ? info.npoint : body.npoint);
     for (uint32_t i = 0; i < out.number.size(); ++i) out.number[i] = i;
     need(dfm_trimesh_data(surface, nullptr, nullptr, &file_point));
     if (out.surface) std::copy_n(file_point, out.number.size(), out.number.begin());
@@ -199,7 +203,7 @@ FileNodes Outputs::file_nodes(size_t b) const {
 }
 
 std::vector<double> Outputs::node_positions(const BodyView &body, const FileNodes &nodes) const {
-  uint32_t n = uint32_t(nodes.number.size());
+  uint32_t n = nodes.surface ? body.nsurfel : uint32_t(nodes.number.size());
   std::vector<double> x(3 * size_t(n));
   need(nodes.surface ? dfm_surface_positions(body.handle, n, x.data(), &n)
                      : dfm_body_get_state(body.handle, n, x.data(), nullptr, &n));

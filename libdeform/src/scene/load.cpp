@@ -1,5 +1,6 @@
 #include "scene/load.h"
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 
@@ -7,6 +8,24 @@
 #include "plugin/context.h"
 
 namespace dfm::scene {
+namespace {
+
+// Longest edge of a surface that is filled, over that of its cells (doc/decisions/0391).
+constexpr double kLongestEdge = 2.5;
+
+// m. All cells of a lattice are alike, so the first one tells.
+double longest_edge(const BodyMesh &mesh) {
+  double longest = 0;
+  for (int i = 0; i < 4; ++i)
+    for (int j = 0; j < i; ++j) {
+      const double *const a = &mesh.points[3 * size_t{mesh.tets[i]}],
+                          *const b = &mesh.points[3 * size_t{mesh.tets[j]}];
+      longest = std::max(longest, std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]));
+    }
+  return longest;
+}
+
+}  // namespace
 
 MeshFiles::~MeshFiles() {
   for (auto &[path, mesh] : cells_) dfm_tetmesh_destroy(mesh);
@@ -149,6 +168,24 @@ void MeshFiles::take_skin(dfm_trimesh mesh, const Body &b, const std::string &po
   for (size_t i = 0; i < skin.points.size(); ++i) skin.points[i] = points[i] * b.scale;
 }
 
+// Contact with a plane acts at the points of the surface. If triangles were much larger than cells, the body
+// would stand on a few cells, crush them, and sink through the floor between them.
+void MeshFiles::split_skin(BodyMesh &out) {
+  Skin &skin = out.skin;
+  Triangles s;
+  s.points = skin.points;
+  s.triangles.assign(skin.triangles, skin.triangles + 3 * size_t{skin.ntriangle});
+  if (skin.triangle_group) s.group.assign(skin.triangle_group, skin.triangle_group + skin.ntriangle);
+  split_long_edges(kLongestEdge * longest_edge(out), s);
+  if (s.points.size() == skin.points.size()) return;
+  skin.points = s.points;
+  Triangles &kept = split_.emplace_back(std::move(s));
+  skin.npoint = uint32_t(skin.points.size() / 3);
+  skin.ntriangle = uint32_t(kept.triangles.size() / 3);
+  skin.triangles = kept.triangles.data();
+  if (skin.triangle_group) skin.triangle_group = kept.group.data();
+}
+
 BodyMesh MeshFiles::load(const Body &b) {
   const std::string path = b.made.kind.empty() ? path_of(b.mesh) : make(b), pointer = b.pointer + "/mesh";
   BodyMesh out;
@@ -161,6 +198,7 @@ BodyMesh MeshFiles::load(const Body &b) {
     take_skin(surface(path_of(b.surface.mesh), where), b, where, out);
   } else if (out.filled) {
     take_skin(surface(path, pointer), b, pointer, out);
+    split_skin(out);
   }
   return out;
 }

@@ -1,11 +1,13 @@
 // Mesh files of a scene, each read once; a body whose file is a surface gets its cells by filling it.
 #pragma once
+#include <deque>
 #include <map>
 #include <set>
 #include <string>
 #include <utility>
 
 #include "scene/select.h"
+#include "scene/split.h"
 
 namespace dfm::scene {
 
@@ -37,6 +39,7 @@ class MeshFiles {
   dfm_tetmesh filling(const std::string &path, const Body &body);
   void check_keys(const Body &body, bool filled) const;
   void take_cells(dfm_tetmesh mesh, const Body &body, BodyMesh &out) const;
+  void split_skin(BodyMesh &out);
   void take_skin(dfm_trimesh mesh, const Body &body, const std::string &pointer, BodyMesh &out) const;
 
   dfm_context *context_;
@@ -45,6 +48,7 @@ class MeshFiles {
   std::map<std::string, dfm_tetmesh> cells_;
   std::map<std::string, dfm_trimesh> surfaces_;
   std::map<std::pair<std::string, uint32_t>, dfm_tetmesh> fillings_;  // by file and number of cells
+  std::deque<Triangles> split_;                                       // by body, lent to its BodyMesh
 };
 
 }  // namespace dfm::scene
