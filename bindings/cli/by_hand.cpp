@@ -1,5 +1,6 @@
 #include "by_hand.h"
 
+#include <algorithm>
 #include <cstdlib>
 
 #include "messages.h"
@@ -21,6 +22,30 @@ std::vector<double> vector(const JsonValue &line, const char *key) {
 }
 
 double scalar(const JsonValue &line, const char *key) { return std::strtod(line.get(key).c_str(), nullptr); }
+
+void cross(const double a[3], const double b[3], double out[3]) {
+  for (int k = 0; k < 3; ++k) out[k] = a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
+}
+
+// What an impulse at an arm from the center of mass changes of a rigid body's velocities.
+void strike(dfm_rigid rigid, const double arm[3], const double impulse[3]) {
+  dfm_rigid_def def = {};
+  def.size = sizeof def;
+  need(dfm_rigid_get_def(rigid, &def));
+  dfm_rigid_state state = {};
+  need(dfm_rigid_get_state(rigid, &state));
+  const double *const q = state.rotation, back[4] = {-q[0], -q[1], -q[2], q[3]};
+  double moment[3], own[3], spin[3];
+  cross(arm, impulse, moment);
+  rotate(back, moment, own);
+  for (int k = 0; k < 3; ++k) own[k] /= def.inertia[k];
+  rotate(q, own, spin);
+  for (int k = 0; k < 3; ++k) {
+    state.velocity[k] += impulse[k] / def.mass;
+    state.spin[k] += spin[k];
+  }
+  need(dfm_rigid_set_state(rigid, &state));
+}
 
 }  // namespace
 
@@ -48,6 +73,87 @@ void ByHand::pull(const JsonValue &line) {
   body_ = of;
 }
 
+void ByHand::drag(const JsonValue &line) {
+  Drag d;
+  d.to = vector(line, "to");
+  d.stiffness = scalar(line, "stiffness");
+  d.damping = scalar(line, "damping");
+  d.rigid = line.find("rigid") != nullptr;
+  dfm_body_measure m = {};
+  m.size = sizeof m;
+  if (d.rigid) {
+    for (const RigidView &r : scene_.rigids())
+      if (r.name == line.get("rigid")) d.thing = r.handle;
+    if (!d.thing) throw Failure(kBadInput, "there is no rigid body '" + line.get("rigid") + "'");
+    d.place = vector(line, "place");
+    need(dfm_rigid_get_measure(d.thing, &m));
+  } else {
+    const BodyView &of = body(line);
+    const std::vector<double> corners = numbers(line, "corners");
+    d.weights = numbers(line, "weights");
+    if (corners.size() != 3 || d.weights.size() != 3)
+      throw Failure(kBadInput, "what is dragged is held at three corners with a weight for each");
+    for (const double c : corners) {
+      if (!(c >= 0 && c < of.nsurfel)) throw Failure(kBadInput, "the body has no such corner");
+      d.corners.push_back(uint32_t(c));
+    }
+    d.thing = of.handle;
+    need(dfm_body_get_measure(of.handle, &m));
+  }
+  d.mass = m.mass;
+  drag_ = std::move(d);
+}
+
+void ByHand::at(double place[3], double velocity[3]) const {
+  if (drag_.rigid) {
+    dfm_rigid_state state = {};
+    need(dfm_rigid_get_state(drag_.thing, &state));
+    double arm[3], turn[3];
+    rotate(state.rotation, drag_.place.data(), arm);
+    cross(state.spin, arm, turn);
+    for (int k = 0; k < 3; ++k) {
+      place[k] = state.position[k] + arm[k];
+      velocity[k] = state.velocity[k] + turn[k];
+    }
+    return;
+  }
+  uint32_t n = 0;
+  for (const BodyView &b : scene_.bodies()) {
+    if (b.handle != drag_.thing) continue;
+    std::vector<double> x(3 * size_t(b.nsurfel)), v(x.size());
+    need(dfm_surface_positions(b.handle, b.nsurfel, x.data(), &n));
+    need(dfm_surface_velocities(b.handle, b.nsurfel, v.data(), &n));
+    for (size_t k = 0; k < 3; ++k) {
+      place[k] = velocity[k] = 0;
+      for (size_t c = 0; c < 3; ++c) {
+        place[k] += drag_.weights[c] * x[3 * size_t(drag_.corners[c]) + k];
+        velocity[k] += drag_.weights[c] * v[3 * size_t(drag_.corners[c]) + k];
+      }
+    }
+  }
+}
+
+// Backward Euler of the spring and the damper on a point of an eighth of the mass: no solid body's surface
+// moves more easily under an impulse, so the pull is stable at any stiffness.
+void ByHand::before_step(double h) {
+  if (!drag_.thing) return;
+  double x[3], v[3], impulse[3], arm[3];
+  at(x, v);
+  const double share = 1 / (1 + h * (drag_.damping + h * drag_.stiffness) / (drag_.mass / 8));
+  for (size_t k = 0; k < 3; ++k) {
+    drag_.force[k] = share * (drag_.stiffness * (drag_.to[k] - x[k] - h * v[k]) - drag_.damping * v[k]);
+    impulse[k] = h * drag_.force[k];
+  }
+  if (!drag_.rigid) {
+    need(dfm_body_apply_impulse(drag_.thing, x, impulse));
+    return;
+  }
+  dfm_rigid_state state = {};
+  need(dfm_rigid_get_state(drag_.thing, &state));
+  rotate(state.rotation, drag_.place.data(), arm);
+  strike(drag_.thing, arm, impulse);
+}
+
 void ByHand::act(const JsonValue &line) {
   const std::string what = line.get("do");
   const double value = scalar(line, "value");
@@ -56,6 +162,12 @@ void ByHand::act(const JsonValue &line) {
   const dfm_params params = {sizeof(dfm_params), 1, &row};
   if (what == "pull") {
     pull(line);
+  } else if (what == "drag") {
+    drag(line);
+  } else if (what == "move" && drag_.thing) {
+    drag_.to = vector(line, "to");
+  } else if (what == "release" && drag_.thing) {
+    drag_.thing = 0;
   } else if (what == "move" && body_) {
     need(dfm_body_set_spring_target(body_, spring_, vector(line, "to").data()));
   } else if (what == "release" && body_) {
@@ -77,6 +189,9 @@ void ByHand::act(const JsonValue &line) {
   }
 }
 
-void ByHand::force(double out[3]) const { need(dfm_body_get_spring_force(body_, spring_, out)); }
+void ByHand::force(double out[3]) const {
+  if (drag_.thing) std::copy_n(drag_.force, 3, out);
+  else need(dfm_body_get_spring_force(body_, spring_, out));
+}
 
 }  // namespace cli

@@ -2,6 +2,11 @@
 // it, `deform replay` does it again.
 //
 //   {"do": "pull", "body": B, "points": [..], "weights": [..], "to": [x,y,z], "stiffness": k, "damping": c}
+//   {"do": "drag", "body": B, "corners": [..], "weights": [..], "to": [x,y,z], "stiffness": k, "damping": c}
+//                                     by impulses before each step, where the body's model takes no spring;
+//                                     corners: surfels of the picked triangle
+//   {"do": "drag", "rigid": R, "place": [x,y,z], "to": .., "stiffness": k, "damping": c}
+//                                     the same of a rigid body; place: m, in the axes of its pose
 //   {"do": "move", "to": [x,y,z]}     the end of that spring
 //   {"do": "release"}                 the spring goes
 //   {"do": "gravity", "to": [x,y,z]}
@@ -10,6 +15,7 @@
 //   {"do": "step", "length": h}       of the steps that follow, s
 #pragma once
 #include <string>
+#include <vector>
 
 #include "json_text.h"
 #include "scene_file.h"
@@ -21,21 +27,39 @@ class ByHand {
   explicit ByHand(const SceneFile &scene) : scene_(scene) {}
   // Throws Failure with the library's sentence; nothing has changed then.
   void act(const JsonValue &line);
-  bool pulls() const { return body_ != 0; }
-  dfm_body pulled() const { return body_; }
-  // With which the spring pulls now, N.
+  // Before each step, of h s: what is dragged gets its impulse.
+  void before_step(double h);
+  bool pulls() const { return body_ != 0 || drag_.thing != 0; }
+  // With which the spring pulls now, or what was dragged was pulled in the last step; N.
   void force(double out[3]) const;
   double step() const { return step_; }  // s; 0: none was told
   // The world was put into another state: the spring is gone with the old one.
-  void forget() { body_ = 0; }
+  void forget() {
+    body_ = 0;
+    drag_.thing = 0;
+  }
 
  private:
+  struct Drag {
+    uint64_t thing = 0;  // a body, or a rigid body; 0: nothing is dragged
+    bool rigid = false;
+    std::vector<double> place;  // of a rigid body, [3] m in its own axes
+    std::vector<uint32_t> corners;
+    std::vector<double> weights;
+    std::vector<double> to;  // [3] m
+    double stiffness = 0, damping = 0, mass = 0;
+    double force[3] = {0, 0, 0};
+  };
+
   void pull(const JsonValue &line);
+  void drag(const JsonValue &line);
+  void at(double place[3], double velocity[3]) const;  // of what is dragged, now
   const BodyView &body(const JsonValue &line) const;
 
   const SceneFile &scene_;
   dfm_body body_ = 0;
   uint32_t spring_ = 0;
+  Drag drag_;
   double step_ = 0;
 };
 

@@ -116,7 +116,9 @@ double Comparison::prepare(const SceneFile &scene, double own) {
   const double t = dfm_world_time(scene.world());
   for (; act_ < recording_.acts.size() && recording_.acts[act_].t <= t; ++act_)
     hand_->act(recording_.acts[act_].line);
-  return hand_->step() > 0 ? hand_->step() : own;
+  const double h = hand_->step() > 0 ? hand_->step() : own;
+  hand_->before_step(h);
+  return h;
 }
 
 std::string Comparison::sentence() const {

@@ -381,6 +381,8 @@ void App::shot(const std::string &name) {
     cli::JsonObject bodies, row;
     for (const cli::BodyView &body : scene_.bodies())
       bodies.add(body.name, cli::json_vector(cli::body_measure(body).com));
+    for (const cli::RigidView &rigid : scene_.rigids())
+      bodies.add(rigid.name, cli::json_vector(cli::rigid_measure(rigid).com));
     row.add("shot", cli::quoted(path))
         .add("t", cli::number(simulation_.time()))
         .add("state_hash", cli::quoted(hash))

@@ -54,11 +54,12 @@ bool Pull::grab(const Vec &origin, const Vec &direction) {
   hit.size = sizeof hit;
   const double from[3] = {origin.x, origin.y, origin.z}, along[3] = {direction.x, direction.y, direction.z};
   cli::need(dfm_world_ray(scene.world(), from, along, std::numeric_limits<double>::infinity(), &hit));
-  if (!hit.body) return false;
+  to_ = render::vec(hit.point);
+  if (!hit.body) return hit.obstacle && grab_rigid(scene.name_of(hit.obstacle));
+  rigid_ = 0;
   for (body_ = 0; scene.bodies()[body_].handle != hit.body;) ++body_;
   const cli::BodyView &body = scene.bodies()[body_];
   for (int k = 0; k < 3; ++k) corners_[k] = body.triangles[3 * size_t(hit.triangle) + size_t(k)];
-  to_ = render::vec(hit.point);
   std::vector<double> x(3 * size_t(std::max(body.npoint, body.nsurfel)));
   uint32_t n = 0;
   cli::need(dfm_surface_positions(body.handle, body.nsurfel, x.data(), &n));
@@ -84,6 +85,51 @@ bool Pull::grab(const Vec &origin, const Vec &direction) {
       .add("to", text_of(patch.middle))
       .add("stiffness", cli::number(k))
       .add("damping", cli::number(std::sqrt(k * info.mass)));  // half of the critical one
+  // a model that steps itself and has no step bound takes no spring
+  try {
+    simulation_.act(line);
+    return true;
+  } catch (const cli::Failure &) {
+    offset_ = {};
+    cli::JsonObject held;
+    std::vector<std::string> corners, weights;
+    for (int c = 0; c < 3; ++c) {
+      corners.push_back(std::to_string(corners_[c]));
+      weights.push_back(cli::number(weights_[c]));
+    }
+    held.add("do", "\"drag\"")
+        .add("body", cli::quoted(body.name))
+        .add("corners", cli::json_array(corners))
+        .add("weights", cli::json_array(weights));
+    return drag(held, info.mass);
+  }
+}
+
+bool Pull::grab_rigid(const std::string &name) {
+  for (const cli::RigidView &r : simulation_.scene().rigids()) {
+    dfm_rigid_def def = {};
+    def.size = sizeof def;
+    cli::need(dfm_rigid_get_def(r.handle, &def));
+    if (r.name != name || def.fixed) continue;
+    dfm_rigid_state state = {};
+    cli::need(dfm_rigid_get_state(r.handle, &state));
+    const double *const q = state.rotation, back[4] = {-q[0], -q[1], -q[2], q[3]};
+    const double away[3] = {to_.x - state.position[0], to_.y - state.position[1], to_.z - state.position[2]};
+    cli::rotate(back, away, arm_);
+    rigid_ = r.handle;
+    offset_ = {};
+    cli::JsonObject held;
+    held.add("do", "\"drag\"").add("rigid", cli::quoted(name)).add("place", cli::json_vector(arm_));
+    return drag(held, def.mass);
+  }
+  return false;
+}
+
+bool Pull::drag(cli::JsonObject &line, double mass) {
+  const double rate = 2 * std::numbers::pi * 4, k = stiffness * mass * rate * rate;
+  line.add("to", text_of(to_))
+      .add("stiffness", cli::number(k))
+      .add("damping", cli::number(std::sqrt(k * mass)));  // half of the critical one
   simulation_.act(line);
   return true;
 }
@@ -102,6 +148,13 @@ void Pull::release() {
 }
 
 Vec Pull::place() const {
+  if (rigid_) {
+    dfm_rigid_state state = {};
+    cli::need(dfm_rigid_get_state(rigid_, &state));
+    double arm[3];
+    cli::rotate(state.rotation, arm_, arm);
+    return render::vec(state.position) + render::vec(arm);
+  }
   const cli::BodyView &body = simulation_.scene().bodies()[body_];
   std::vector<double> x(3 * size_t(body.nsurfel));
   uint32_t n = 0;

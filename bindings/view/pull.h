@@ -1,5 +1,6 @@
 // A body held by the mouse: a spring from the points around the picked place to where the mouse is. It is a
-// load like any other, inside the step: what is pulled still collides, sticks and slides.
+// load like any other, inside the step: what is pulled still collides, sticks and slides. A rigid body, or
+// one whose model takes no spring, gets the impulse of such a spring before each step.
 #pragma once
 #include <string>
 
@@ -11,8 +12,7 @@ namespace view {
 class Pull {
  public:
   explicit Pull(Simulation &simulation) : simulation_(simulation) {}
-  // Takes hold of what the ray meets first. False: no body. Throws cli::Failure where the body's model takes
-  // no spring.
+  // Takes hold of what the ray meets first. False: nothing that can be pulled.
   bool grab(const render::Vec &origin, const render::Vec &direction);
   void move(const render::Vec &to);  // m, where the mouse is
   void release();
@@ -24,8 +24,13 @@ class Pull {
   double stiffness = 1;
 
  private:
+  bool grab_rigid(const std::string &name);
+  bool drag(cli::JsonObject &line, double mass);
+
   Simulation &simulation_;
   size_t body_ = 0;
+  dfm_rigid rigid_ = 0;  // 0: it is a body that is held
+  double arm_[3] = {0, 0, 0};
   uint32_t corners_[3] = {0, 0, 0};  // surfels of the picked triangle
   double weights_[3] = {0, 0, 0};
   render::Vec to_, offset_;  // offset: from the picked place to the mean of the points that the spring holds

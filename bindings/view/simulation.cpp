@@ -34,6 +34,7 @@ bool Simulation::step() {
     recorder_->act(line.add("do", "\"step\"").add("length", cli::number(step)).text());
     recorded_step_ = step;
   }
+  hand_.before_step(step);
   if (dfm_world_step(world_, step, nullptr) != DFM_OK) {
     trouble_ = dfm_last_error();
     return false;

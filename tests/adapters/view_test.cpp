@@ -178,6 +178,42 @@ TEST_F(Viewer, PulledBody_FollowsTheMouseAndStaysOnTheFloor) {
   EXPECT_LT(number(stiff, "held.png", "block"), before + 0.2);
 }
 
+// A model that takes no spring, by impulses: it follows in the same way, stable at a stiffness far too large.
+TEST_F(Viewer, PulledBodyOfAModelThatTakesNoSpring_FollowsTheMouse) {
+  const std::string pull =
+      "0 key space\n0.3 shot rest.png\n0.3 drag 160 120 220 150 0.4 0.5\n1.1 shot held.png\n";
+  const std::vector<std::string> modal{"--set", "/time/duration=5", "--set",
+                                       R"(/bodies/0/model={"type": "modal"})"};
+  const test::CommandResult done = view(pull, modal);
+  ASSERT_EQ(done.exit_code, 0) << done.err;
+  const double before = number(done, "rest.png", "block");
+  EXPECT_GT(number(done, "held.png", "block"), before + 0.03) << done.out;
+  EXPECT_EQ(told(view(pull, modal), "held.png", "state_hash"), told(done, "held.png", "state_hash"));
+  const test::CommandResult stiff = view("0 slider pull 1000\n" + pull, modal);
+  ASSERT_EQ(stiff.exit_code, 0) << stiff.err;
+  EXPECT_GT(number(stiff, "held.png", "block"), before + 0.03);
+  EXPECT_LT(number(stiff, "held.png", "block"), before + 0.2);
+}
+
+// A rigid body that hangs before the block: the mouse takes it to the right, and the recording has it again.
+TEST_F(Viewer, PulledRigidBody_FollowsTheMouseAndIsReplayed) {
+  const std::vector<std::string> brick{
+      "--set", "/gravity=[0, 0, 0]", "--set",
+      R"(/rigid={"bodies": [{"name": "brick", "shape": "box", "half_size": [0.03, 0.03, 0.03], "mass": 0.2,
+         "pose": {"position": [0.05, -0.1, 0.107]}}]})"};
+  const test::CommandResult done = view(
+      "0 key space\n0 key v\n0 shot rest.png\n0.02 drag 165 115 220 120 0.1 0.1\n0.19 shot end.png\n"
+      "0.195 key v\n",
+      brick);
+  ASSERT_EQ(done.exit_code, 0) << done.err;
+  EXPECT_NEAR(number(done, "rest.png", "brick"), 0.05, 1e-9);
+  EXPECT_GT(number(done, "end.png", "brick"), 0.06) << done.out;
+  EXPECT_GT(different(picture("rest.png"), picture("end.png")), 300u);
+  const test::CommandResult again = test::deform({"replay", folder_, "--out", folder_ + "/again"});
+  EXPECT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_NE(again.out.find("the same bits in all "), std::string::npos) << again.out;
+}
+
 TEST_F(Viewer, Sliders_ChangeTheScene) {
   // on a floor that leans: with friction it stays, without it slides off
   const std::vector<std::string> leans{"--set", "/obstacles/0/normal=[-0.3, 0, 1]"};
