@@ -17,7 +17,7 @@ import numpy as np
 
 import palpation_case as case
 
-MESHES = ((20, 6, 6), (30, 8, 8))  # elements along x, half of y, z
+MESHES = ((20, 6, 6), (30, 8, 8), (40, 9, 9))  # elements along x, half of y, z
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 

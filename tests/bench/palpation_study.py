@@ -4,8 +4,8 @@ and figure.
 
 palpation_study.py DEFORM_COMMAND [FOLDER]   default folder build/palpation
 
-Writes tests/bench/results/palpation.csv and libdeform/doc/images/palpation.png. The finest mesh takes some
-minutes.
+Writes tests/bench/results/palpation.csv and libdeform/doc/images/palpation.png. The finest mesh takes a
+minute.
 """
 import csv
 import json
@@ -25,8 +25,7 @@ HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 CONDENSED = {"type": "condensed", "params": {"modes": 6}}
 # boxes along x, half of y, z; model
-RUNS = (((16, 4, 5), CONDENSED), ((24, 6, 8), CONDENSED), ((40, 9, 12), CONDENSED),
-        ((60, 13, 17), {"type": "linear_fem"}))
+RUNS = (((16, 4, 5), CONDENSED), ((24, 6, 8), CONDENSED), ((40, 9, 12), CONDENSED))
 
 
 def felt(command, folder, cells, model, more=()):
@@ -39,7 +38,7 @@ def felt(command, folder, cells, model, more=()):
                     "--set", "/bodies/0/mesh=" + json.dumps(str(mesh)),
                     "--set", "/bodies/0/model=" + json.dumps(model), *more], check=True)
     seconds = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
-    rows = list(csv.DictReader(open(folder / "run/bodies.csv")))[2:]
+    rows = list(csv.DictReader(open(folder / "run/bodies.csv")))[2::2]  # after moving on and resting a step
     return [-2 * float(row["force_z"]) for row in rows], seconds
 
 
@@ -70,9 +69,10 @@ def main():
             print("%d cells, %s: errors %.1f to %.1f %%, %.3g s" % told, flush=True)
             axis.plot(mirrored(x, -1), mirrored(force), "o-", ms=3, lw=1,
                       label=f"{count:,} tetrahedra, {model['type']}")
-        soft, _ = felt(command, folder, (24, 6, 8), CONDENSED, ("--set", "/materials/nodule/young=1e4"))
-        axis.plot(mirrored(x, -1), mirrored(soft), ":", color="gray", label="without the ball, 6,912 tetrahedra")
-    axis.set(xlabel="place of the probe from the middle of the ball, mm", ylabel="force, N", ylim=(0, None))
+        soft, _ = felt(command, folder, (16, 4, 5), CONDENSED, ("--set", "/materials/nodule/young=1e4"))
+        axis.plot(mirrored(x, -1), mirrored(soft), ":", color="gray", label="without the ball, 1,920 tetrahedra")
+    axis.set(xlabel="place of the probe from the middle of the ball, mm", ylabel="force, N",
+             ylim=(0, None))
     axis.legend(fontsize=8)
     figure.tight_layout()
     figure.savefig(ROOT / "libdeform/doc/images/palpation.png", dpi=110)
