@@ -70,7 +70,8 @@ def main():
             axis.plot(mirrored(x, -1), mirrored(force), "o-", ms=3, lw=1,
                       label=f"{count:,} tetrahedra, {model['type']}")
         soft, _ = felt(command, folder, (16, 4, 5), CONDENSED, ("--set", "/materials/nodule/young=1e4"))
-        axis.plot(mirrored(x, -1), mirrored(soft), ":", color="gray", label="without the ball, 1,920 tetrahedra")
+        axis.plot(mirrored(x, -1), mirrored(soft), ":", color="gray",
+                  label="without the ball, 1,920 tetrahedra")
     axis.set(xlabel="place of the probe from the middle of the ball, mm", ylabel="force, N",
              ylim=(0, None))
     axis.legend(fontsize=8)
