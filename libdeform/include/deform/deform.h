@@ -21,5 +21,6 @@
 #include "deform/sensor.h"
 #include "deform/surface.h"
 #include "deform/toi.h"
+#include "deform/tool.h"
 #include "deform/world.h"
 #endif

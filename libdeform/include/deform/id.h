@@ -18,8 +18,9 @@ typedef uint64_t dfm_scene;
 typedef uint64_t dfm_tetmesh;
 typedef uint64_t dfm_trimesh;
 typedef uint64_t dfm_rigid; /* names a dfm_obstacle too */
+typedef uint64_t dfm_tool;
 
-/** What a handle refers to. The first nine values are the kind in the handle; a dfm_rigid has that of an
+/** What a handle refers to. All values but RIGID are the kind in the handle; a dfm_rigid has that of an
  * obstacle there. */
 enum {
   DFM_HANDLE_NONE = 0,
@@ -31,7 +32,8 @@ enum {
   DFM_HANDLE_SCENE = 6,
   DFM_HANDLE_TETMESH = 7,
   DFM_HANDLE_TRIMESH = 8,
-  DFM_HANDLE_RIGID = 9
+  DFM_HANDLE_RIGID = 9,
+  DFM_HANDLE_TOOL = 10
 };
 /** Kind of what a handle refers to: for members that hold a body or an obstacle, as dfm_pair_report.b does.
  * @return DFM_HANDLE_*; DFM_HANDLE_NONE for a null, stale or made-up handle. Threads: Any thread. Not during

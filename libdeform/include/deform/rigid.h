@@ -176,8 +176,8 @@ DFM_API dfm_status dfm_rigid_add_shape(dfm_rigid rigid, const dfm_obstacle_def *
  * sentence says how); DFM_E_HANDLE; DFM_E_BUSY.
  * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_rigid_destroy(dfm_rigid rigid);
-/** All rigid bodies in order of creation; capacity 0 with out NULL only counts. Threads: Any thread. Not
- * during step. Since 0.1. */
+/** All rigid bodies in order of creation but the parts of tools (dfm_tool_parts); capacity 0 with out NULL
+ * only counts. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_rigids(dfm_world world, uint32_t capacity, dfm_rigid *out, uint32_t *n);
 /** @return DFM_OK; DFM_E_ARG none of that name (nearest one). Threads: Any thread. Not during
  * step. Since 0.1. */

@@ -20,6 +20,13 @@ Obstacle &rigid_of(dfm_rigid h) {
   return o;
 }
 
+// One that is not moved by its tool alone.
+Obstacle &free_rigid_of(dfm_rigid h, const char *instead) {
+  Obstacle &o = rigid_of(h);
+  if (o.rigid->of_tool) fail(DFM_E_STATE, "'%s' is part of a tool; %s", o.name.c_str(), instead);
+  return o;
+}
+
 }  // namespace
 
 dfm_status dfm_rigid_host_register(const char *name, const dfm_rigid_host *table) {
@@ -60,7 +67,7 @@ dfm_status dfm_rigid_create(dfm_world world, const char *host, const dfm_rigid_s
 
 dfm_status dfm_rigid_destroy(dfm_rigid rigid) {
   return as_status([&] {
-    Obstacle &o = rigid_of(rigid);
+    Obstacle &o = free_rigid_of(rigid, "dfm_tool_destroy removes it");
     exclusive(*o.world);
     destroy_rigids(*o.rigid);
   });
@@ -80,10 +87,11 @@ dfm_status dfm_world_rigids(dfm_world world, uint32_t capacity, dfm_rigid *out, 
   return as_status([&] {
     const World &w = world_of(world);
     uint32_t count = 0;
-    for (auto &o : w.obstacles) count += o->rigid && !o->added;
+    const auto counts = [](const Obstacle &o) { return o.rigid && !o.added && !o.rigid->of_tool; };
+    for (auto &o : w.obstacles) count += counts(*o);
     if (!room(count, capacity, out, n)) return;
     for (auto &o : w.obstacles)
-      if (o->rigid && !o->added) *out++ = o->handle;
+      if (counts(*o)) *out++ = o->handle;
   });
 }
 
@@ -124,7 +132,7 @@ dfm_status dfm_rigid_get_state(dfm_rigid rigid, dfm_rigid_state *out) {
 
 dfm_status dfm_rigid_set_state(dfm_rigid rigid, const dfm_rigid_state *state) {
   return as_status([&] {
-    Obstacle &o = rigid_of(rigid);
+    Obstacle &o = free_rigid_of(rigid, "dfm_tool_teleport puts it somewhere");
     World &w = exclusive(*o.world);
     need(state, "state");
     set_rigid_state(o, *state);

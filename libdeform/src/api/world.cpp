@@ -15,6 +15,7 @@
 #include "world/model_change.h"
 #include "world/sensors.h"
 #include "world/snapshot.h"
+#include "world/tool.h"
 
 using namespace dfm;
 
@@ -26,6 +27,7 @@ void destroy_world(uint64_t handle) {
   for (auto &b : w->bodies) handle_destroy(b->handle);
   for (auto &o : w->obstacles) handle_destroy(o->handle);
   for (auto &m : w->materials) handle_destroy(m->handle);
+  for (auto &t : w->tools) handle_destroy(t->handle);
   handle_destroy(handle);
   forget_stop(handle);
   delete w;
@@ -249,9 +251,11 @@ dfm_status dfm_world_step(dfm_world world, double dt, uint32_t *trouble) {
       fail(DFM_E_ARG, "%s", short_step(dt, floor).c_str());
     uint32_t bits = 0;
     make_switches(w, dt);
+    read_devices(w, w.time + dt);
     const dfm_status s = step_within_budget(w, dt, &bits);
     if (trouble) *trouble = bits;
     if (s == DFM_OK) look_at_sensors(w, true);
+    if (s == DFM_OK) write_devices(w);
     return s;
   });
 }

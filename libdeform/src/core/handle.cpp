@@ -37,6 +37,7 @@ const char *kind_name(Kind kind) {
     case Kind::scene: return "scene";
     case Kind::tetmesh: return "mesh";
     case Kind::trimesh: return "surface mesh";
+    case Kind::tool: return "tool";
     case Kind::none: break;
   }
   return "object";

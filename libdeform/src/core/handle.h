@@ -15,7 +15,9 @@ enum class Kind : uint8_t {
   law = 5,
   scene = 6,
   tetmesh = 7,
-  trimesh = 8
+  trimesh = 8,
+  // 9: DFM_HANDLE_RIGID, in handles an obstacle
+  tool = 10
 };
 
 // Registers an object (not owned) and returns its handle. Thread-safe; throws std::bad_alloc.

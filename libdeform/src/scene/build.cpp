@@ -35,6 +35,7 @@ class Builder {
     create_world();
     for (Material &m : def_.materials) create_material(m);
     create_things();
+    for (Tool &t : def_.tools) create_tool(t);
     for (Friction &f : def_.friction) add_friction(f);
     for (const Filter &f : def_.filters)
       check(dfm_world_filter_pair(world_, f.between[0].c_str(), f.between[1].c_str(), f.collide), f.pointer);
@@ -566,6 +567,25 @@ class Builder {
     for (size_t i = 0; i < made.size(); ++i)
       if (rigid.bodies[i].start)
         check(dfm_rigid_set_state(made[i], &*rigid.bodies[i].start), rigid.bodies[i].pointer + "/start");
+  }
+
+  void create_tool(Tool &t) {
+    t.def.name = t.solid.name.c_str();
+    t.def.material = material(t.solid.material);
+    t.def.nkey = uint32_t(t.keys.size());
+    t.def.keys = t.keys.data();
+    t.def.nopening = uint32_t(t.opening_keys.size());
+    t.def.opening_keys = t.opening_keys.data();
+    std::vector<double> points;
+    if (!t.solid.mesh.empty()) {
+      files_.load(t.solid, points);
+      t.def.npoint = t.solid.def.npoint;
+      t.def.ntriangle = t.solid.def.ntriangle;
+      t.def.points = t.solid.def.points;
+      t.def.triangles = t.solid.def.triangles;
+    }
+    dfm_tool tool = 0;
+    check(dfm_tool_create(world_, &t.def, &tool), t.solid.pointer);
   }
 
   void add_friction(Friction &f) {

@@ -170,6 +170,13 @@ struct Rigid {
   std::vector<RigidBody> bodies;
 };
 
+struct Tool {
+  Obstacle solid;  // pointer, name, material, mesh and scale; its def holds points and triangles
+  dfm_tool_def def = {};
+  std::vector<dfm_pose_key> keys;
+  std::vector<dfm_scale_key> opening_keys;
+};
+
 struct Material {
   std::string pointer, name, title;  // the key; the name in the world, empty: none
   double density = 1000, young = 1e5, poisson = 0.3, damping_mass = 0, damping_stiffness = 0;
@@ -218,6 +225,7 @@ struct Definition {
   std::vector<Body> bodies;
   std::vector<Obstacle> obstacles;
   Rigid rigid;
+  std::vector<Tool> tools;
   std::vector<Friction> friction;
   std::vector<Filter> filters;
   std::vector<Probe> probes;

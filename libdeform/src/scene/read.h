@@ -39,5 +39,7 @@ uint64_t read_id(const Node &node);  // 0: none is given
 void read_solid(const Node &node, const std::string &shape, uint32_t &number, double half_size[3],
                 double &radius, double &half_length);
 Rigid read_rigid(const Node &scene, ReadContext &context);
+std::vector<dfm_pose_key> read_keys(const Node &motion, const dfm_pose &base);
+std::vector<Tool> read_tools(const Node &scene, ReadContext &context);
 
 }  // namespace dfm::scene

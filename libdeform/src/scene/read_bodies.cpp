@@ -498,6 +498,10 @@ std::vector<Body> read_bodies(const Node &scene, ReadContext &context) {
   return out;
 }
 
+std::vector<dfm_pose_key> read_keys(const Node &motion, const dfm_pose &base) {
+  return read_keys(motion, base, Quaternion{});
+}
+
 std::vector<Obstacle> read_obstacles(const Node &scene, ReadContext &context) {
   std::vector<Obstacle> out;
   for (const Node &node : scene.items("obstacles")) out.push_back(read_obstacle(node, context));

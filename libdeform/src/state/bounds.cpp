@@ -43,9 +43,10 @@ double speed_of(const Obstacle &o, const Pose &from, const Pose &to, double seco
 void check_speed(const World &w, const Obstacle &o, double speed, const char *when) {
   if (speed <= speed_limit(w) * (1 + 1e-9)) return;
   fail(DFM_E_ARG,
-       "obstacle '%s' would move at %.4g m/s %s; at most %g m/s (dfm_world_def.obstacle_speed): give it more "
-       "time, or put it there without a motion (dfm_obstacle_teleport)",
-       o.name.c_str(), speed, when, speed_limit(w));
+       "%s '%s' would move at %.4g m/s %s; at most %g m/s (dfm_world_def.obstacle_speed): give it more "
+       "time, or put it there without a motion (%s)",
+       o.rigid ? "tool" : "obstacle", o.name.c_str(), speed, when, speed_limit(w),
+       o.rigid ? "dfm_tool_teleport" : "dfm_obstacle_teleport");
 }
 
 }  // namespace
@@ -120,13 +121,15 @@ void check_motion_speed(const World &w, const Obstacle &o) {
               "in its sine");
 }
 
+void check_way(const World &w, const Obstacle &o, const Pose &from, const Pose &to, double dt) {
+  char when[40];  // no string: a step allocates nothing
+  std::snprintf(when, sizeof when, "in a step of %g s", dt);
+  check_speed(w, o, speed_of(o, from, to, dt), when);
+}
+
 void check_target_speeds(const World &w, double dt) {
-  for (auto &o : w.obstacles) {
-    if (!o->has_target) continue;
-    char when[40];  // no string: a step allocates nothing
-    std::snprintf(when, sizeof when, "in a step of %g s", dt);
-    check_speed(w, *o, speed_of(*o, o->pose, o->target, dt), when);
-  }
+  for (auto &o : w.obstacles)
+    if (o->has_target) check_way(w, *o, o->pose, o->target, dt);
 }
 
 }  // namespace dfm

@@ -4,6 +4,7 @@
 #include <cstddef>
 
 #include "math/vec3.h"
+#include "state/motion.h"
 
 namespace dfm {
 
@@ -32,5 +33,6 @@ double largest_coordinate(const double *x, size_t n, size_t stride);  // m, of n
 // Motions of obstacles: by their keys and sine when they are made, by their target when dt is known.
 void check_motion_speed(const World &w, const Obstacle &o);
 void check_target_speeds(const World &w, double dt);
+void check_way(const World &w, const Obstacle &o, const Pose &from, const Pose &to, double dt);
 
 }  // namespace dfm

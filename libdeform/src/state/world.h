@@ -25,6 +25,7 @@
 #include "state/overlaps.h"
 #include "state/pair_tables.h"
 #include "state/step_sizes.h"
+#include "state/tool.h"
 #include "state/world_bound.h"
 
 namespace dfm {
@@ -105,6 +106,7 @@ struct World {
   std::vector<std::unique_ptr<Obstacle>> obstacles;  // in id order
   std::vector<std::unique_ptr<Material>> materials;
   std::vector<std::unique_ptr<RigidSet>> rigid_sets;  // each a host's bodies, which are obstacles too
+  std::vector<std::unique_ptr<Tool>> tools;           // in order of creation; the parts of each are a set
   std::vector<std::unique_ptr<LawInstance>> laws;     // the first is the default law, made when first needed
   std::vector<FrictionRule> friction;
   std::vector<FilterRule> filters;

@@ -27,6 +27,7 @@
 #include "step/stages.h"
 #include "step/step_bound.h"
 #include "step/step_impulses.h"
+#include "step/tools.h"
 
 namespace dfm {
 namespace {
@@ -118,6 +119,7 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
   drop_released(w);
   prepare(w);
   check_target_speeds(w, dt);
+  check_tool_ways(w, dt);
   release_overlaps(w);
   if (!std::exchange(w.overlaps.told, true)) *trouble |= DFM_TROUBLE_OVERLAP;
   if (bound_due(w)) update_bound(w);
@@ -142,6 +144,7 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
   if (w.bound.inverted) *trouble |= DFM_TROUBLE_INVERTED;
 
   begin_impulses(w.step_impulses);
+  begin_tools(w, dt);
   const double goal = w.time + dt;
   // `cut` equal sub-steps since `from`; the rest of the step is cut finer where the bound has fallen
   double from = w.time, span = dt;
@@ -177,6 +180,7 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
   w.stats.last_substeps = done;
   w.stats.substeps_max = std::max(w.stats.substeps_max, done);
   drop_released(w);
+  end_tools(w, dt);
   ++w.step_count;
   w.stats.steps = w.step_count;
   w.stats.time = w.time;

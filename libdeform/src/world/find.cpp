@@ -210,6 +210,12 @@ dfm_query_hit find_first_on_ray(World &w, const ThingFilter &filter, Vec3 o, Vec
   return hit;
 }
 
+double distance_from(Obstacle &o, Vec3 p, double limit) {
+  if (!of_triangles(o)) return closed_form(o).closest(p).distance;
+  const Vec3 local = rotate_back(o.pose.rotation, p - o.pose.position);
+  return closest_to(search(o), local, DistanceKey::root, limit).key;
+}
+
 dfm_query_hit find_closest(World &w, const ThingFilter &filter, Vec3 p, double limit) {
   dfm_query_hit hit = nothing();
   each_thing(w, filter, [&](const Thing &thing) {

@@ -49,6 +49,9 @@ bool overlap(const Thing &a, const Thing &b);
 
 dfm_query_hit find_first_on_ray(World &w, const ThingFilter &filter, Vec3 origin, Vec3 unit, double limit);
 dfm_query_hit find_closest(World &w, const ThingFilter &filter, Vec3 p, double limit);
+// m, of a point from an obstacle's surface, below 0 inside sphere, box and capsule; `limit` where it is
+// farther.
+double distance_from(Obstacle &o, Vec3 p, double limit);
 dfm_query_hit find_first_on_path(World &w, const ThingFilter &filter, const Convex &shape, Vec3 path);
 // All of them, into the caller's rows: nearest first, then by thing, then by triangle.
 class HitRows {

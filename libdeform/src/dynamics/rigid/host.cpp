@@ -5,6 +5,7 @@
 #include <mutex>
 
 #include "core/error.h"
+#include "dynamics/rigid/tool_host.h"
 #include "deform/obstacle.h"
 
 namespace dfm {
@@ -31,13 +32,14 @@ void register_host(const std::string &name, const dfm_rigid_host &table) {
          name.c_str());
   Hosts &all = hosts();
   std::lock_guard lock(all.mutex);
-  if (name == "builtin" || all.tables.count(name))
+  if (name == "builtin" || name == kToolHost || all.tables.count(name))
     fail(DFM_E_STATE, "a rigid host '%s' is registered already; choose another name", name.c_str());
   all.tables.emplace(name, table);
 }
 
 dfm_rigid_host find_host(const std::string &name) {
   if (name == "builtin") return builtin_host();
+  if (name == kToolHost) return tool_host();
   Hosts &all = hosts();
   std::lock_guard lock(all.mutex);
   const auto found = all.tables.find(name);

@@ -48,8 +48,9 @@ struct RigidSet {
   Array<double> first;
   // [n,6] the same velocity by what the host takes for granted now
   Array<double> revised;
-  Array<double> total;  // [n,3] N s of contact since creation
-  double last_h = 0;    // s, of the last sub-step; 0: none yet
+  Array<double> total;   // [n,3] N s of contact since creation
+  double last_h = 0;     // s, of the last sub-step; 0: none yet
+  bool of_tool = false;  // its bodies are the parts of a tool (state/tool.h)
 
   // As Dynamics: throws std::bad_alloc where the host finds no memory.
   void begin(const SubStep &now);  // what the host is asked with, until the next one

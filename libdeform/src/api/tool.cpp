@@ -1,0 +1,162 @@
+#include "deform/tool.h"
+
+#include <algorithm>
+
+#include "api/objects.h"
+#include "world/tool.h"
+
+using namespace dfm;
+
+namespace {
+
+Tool &tool_of(dfm_tool h) { return part_of<Tool>(Kind::tool, h); }
+
+}  // namespace
+
+void dfm_tool_def_default_sized(uint32_t size, dfm_tool_def *out) {
+  dfm_tool_def d{};
+  d.size = sizeof d;
+  d.radius = 0.005;
+  d.mass = 0.05;
+  d.inertia = 1e-5;
+  d.category = 1;
+  d.collides_with = ~0u;
+  dfm::give_default(size, out, d);
+}
+
+dfm_status dfm_tool_create(dfm_world world, const dfm_tool_def *def, dfm_tool *out) {
+  return as_status([&] {
+    World &w = exclusive(world_of(world));
+    need(def, "def");
+    need(out, "out");
+    const dfm_tool_def own = take_def(def, dfm_tool_def_default());
+    check_flags(own, DFM_TOOL_PASSIVE, "dfm_tool_def");
+    *out = create_tool(w, own).handle;
+  });
+}
+
+dfm_status dfm_tool_destroy(dfm_tool tool) {
+  return as_status([&] {
+    Tool &t = tool_of(tool);
+    exclusive(*t.world);
+    destroy_tool(t);
+  });
+}
+
+dfm_status dfm_world_tools(dfm_world world, uint32_t capacity, dfm_tool *out, uint32_t *n) {
+  return as_status([&] {
+    const World &w = world_of(world);
+    if (!room(static_cast<uint32_t>(w.tools.size()), capacity, out, n)) return;
+    for (auto &t : w.tools) *out++ = t->handle;
+  });
+}
+
+dfm_status dfm_world_find_tool(dfm_world world, const char *name, dfm_tool *out) {
+  return as_status([&] {
+    World &w = world_of(world);
+    need(name, "name");
+    need(out, "out");
+    std::vector<std::string> names;
+    for (auto &t : w.tools) {
+      if (t->name == name) {
+        *out = t->handle;
+        return;
+      }
+      names.push_back(t->name);
+    }
+    const std::string near = nearest(name, names);
+    fail(DFM_E_ARG, "there is no tool '%s'%s", name,
+         near.empty() ? "" : ("; did you mean '" + near + "'?").c_str());
+  });
+}
+
+dfm_status dfm_tool_get_def(dfm_tool tool, dfm_tool_def *out) {
+  return as_status([&] { give(out, tool_of(tool).def); });
+}
+
+dfm_status dfm_tool_parts(dfm_tool tool, uint32_t capacity, dfm_rigid *out, uint32_t *n) {
+  return as_status([&] {
+    const Tool &t = tool_of(tool);
+    if (!room(static_cast<uint32_t>(t.parts.size()), capacity, out, n)) return;
+    for (const uint64_t part : t.parts) *out++ = part;
+  });
+}
+
+dfm_status dfm_tool_set_pose(dfm_tool tool, const dfm_pose *pose, const double velocity[6]) {
+  return as_status([&] {
+    Tool &t = tool_of(tool);
+    exclusive(*t.world);
+    need(pose, "pose");
+    set_tool_pose(t, *pose, velocity);
+  });
+}
+
+dfm_status dfm_tool_set_opening(dfm_tool tool, double angle) {
+  return as_status([&] {
+    Tool &t = tool_of(tool);
+    exclusive(*t.world);
+    set_tool_opening(t, angle);
+  });
+}
+
+dfm_status dfm_tool_teleport(dfm_tool tool, const dfm_pose *pose) {
+  return as_status([&] {
+    Tool &t = tool_of(tool);
+    exclusive(*t.world);
+    need(pose, "pose");
+    teleport_tool(t, *pose);
+  });
+}
+
+dfm_status dfm_tool_force(dfm_tool tool, double force[3], double torque[3]) {
+  return as_status([&] {
+    const Tool &t = tool_of(tool);
+    settled(*t.world);
+    need(force, "force");
+    need(torque, "torque");
+    tool_force(t, force, torque);
+  });
+}
+
+dfm_status dfm_tool_feedback(dfm_tool tool, double force[3], double torque[3]) {
+  return as_status([&] {
+    const Tool &t = tool_of(tool);
+    settled(*t.world);
+    need(force, "force");
+    need(torque, "torque");
+    tool_feedback(t, force, torque);
+  });
+}
+
+dfm_status dfm_tool_get_state(dfm_tool tool, dfm_tool_state *out) {
+  return as_status([&] {
+    const Tool &t = tool_of(tool);
+    settled(*t.world);
+    give(out, tool_state(t));
+  });
+}
+
+dfm_status dfm_tool_grab(dfm_tool tool, dfm_body body, double reach, double release, uint32_t *attachment,
+                         uint32_t *n) {
+  return as_status([&] {
+    Tool &t = tool_of(tool);
+    exclusive(*t.world);
+    need(attachment, "attachment");
+    need(n, "n");
+    const std::vector<uint32_t> made = grab(t, body_of(body), reach, release);
+    std::copy(made.begin(), made.end(), attachment);
+    *n = static_cast<uint32_t>(made.size());
+  });
+}
+
+dfm_status dfm_tool_set_device(dfm_tool tool, const dfm_device *device) {
+  return as_status([&] {
+    Tool &t = tool_of(tool);
+    exclusive(*t.world);
+    if (!device) return set_device(t, nullptr);
+    const dfm_device own = take_known(device, dfm_device{});
+    refuse_unknown(device);
+    check_flags(own, 0, "dfm_device");
+    set_device(t, &own);
+  });
+}

@@ -1,0 +1,251 @@
+// Where a tool is at the end of a sub-step, and how it answers impulses. The frame is that of body 0.
+//
+//   not coupled   it goes to its target at constant rate, and answers no impulse
+//   coupled       spring and damper at the end of the sub-step (backward Euler), D the device:
+//                     m (v' - v) = h (k (D' - x - h v') + c (v_D - v')) + p
+//                 so v' = (m v + h k (D' - x) + h c v_D + p) / (m + h c + h^2 k), and the same for turning with
+//                 the rotation vector from the tool to the device, whose torque is the gradient of
+//                 k |r|^2 / 2. In each sub-step the spring's energy and the motion's rise by at most what
+//                 device and contact put in, whatever k, c, m and h are: an implicit virtual coupling is
+//                 passive (Colgate, Stanley and Brown 1995; Adams and Hannaford 1999).
+//   parts         impulse p at a part's center r acts on the frame as (p, r x p)
+#include "dynamics/rigid/tool_host.h"
+
+#include <cstring>
+#include <new>
+#include <vector>
+
+#include "core/error.h"
+#include "math/turn.h"
+
+namespace dfm {
+namespace {
+
+// As much of the way as rounding may leave of a step.
+constexpr double kWhole = 1 - 1e-9;
+
+struct Frame {
+  Vec3 velocity, spin;  // mean over the sub-step
+};
+
+class ToolHost {
+ public:
+  explicit ToolHost(const ToolMotion &motion) : motion_(motion) {}
+  void predict(const dfm_rigid_step &step, double *velocity) const;
+  void respond(const dfm_rigid_step &step, double *matrix) const;
+  void commit(const dfm_rigid_step &step, const double *impulse, dfm_rigid_state *state, double *extra) const;
+
+ private:
+  ToolMotion motion_;
+
+  struct Ways {
+    ToolValues values;
+    ToolPlace start, device;  // device: at the end of the sub-step
+    double opening;           // then
+  };
+  Ways ways(const dfm_rigid_step &step) const;
+  Frame move(const dfm_rigid_step &step, const Ways &w, Vec3 p, Vec3 turn) const;
+  ToolPlace end_of(const dfm_rigid_step &step, const Ways &w, const Frame &mean) const;
+  double mobility(double h) const {
+    return motion_.coupled() ? 1 / (motion_.mass + h * motion_.damping + h * h * motion_.stiffness) : 0;
+  }
+  double turn_mobility(double h) const {
+    return motion_.coupled()
+               ? 1 / (motion_.inertia + h * motion_.turn_damping + h * h * motion_.turn_stiffness)
+               : 0;
+  }
+  Vec3 arm(const dfm_rigid_step &step, size_t part) const {
+    return load3(step.state[part].position) - load3(step.state[0].position);
+  }
+};
+
+// The way that is left, of which a sub-step takes its share. A tool that is not coupled starts where it is,
+// since the guard may have stopped it short of where it was to be.
+ToolHost::Ways ToolHost::ways(const dfm_rigid_step &step) const {
+  Ways w{tool_values(step.extra), place_of(step.state[0]), {}, 0};
+  const ToolPlace from = motion_.coupled() ? load_place(w.values.device) : w.start;
+  const ToolPlace to = load_place(w.values.target);
+  const double left = w.values.goal - step.t, share = left > 0 ? step.h / left : 1;
+  if (share >= kWhole) {
+    w.device = to;
+    w.opening = w.values.target_opening;
+  } else {
+    w.device = {from.position + share * (to.position - from.position),
+                slerp(from.rotation, to.rotation, share)};
+    w.opening = w.values.opening + share * (w.values.target_opening - w.values.opening);
+  }
+  return w;
+}
+
+Frame ToolHost::move(const dfm_rigid_step &step, const Ways &w, Vec3 p, Vec3 turn) const {
+  const double h = step.h;
+  const Vec3 way = w.device.position - w.start.position;
+  const Vec3 turned_by = rotation_vector(w.device.rotation * conjugate(w.start.rotation));
+  if (!motion_.coupled()) return {(1 / h) * way, (1 / h) * turned_by};
+  const ToolPlace device = load_place(w.values.device);
+  Vec3 velocity = (1 / h) * (w.device.position - device.position);
+  Vec3 spin = (1 / h) * rotation_vector(w.device.rotation * conjugate(device.rotation));
+  if (w.values.measured == kToolMeasured) {
+    velocity = load3(w.values.target_velocity);
+    spin = load3(w.values.target_velocity + 3);
+  }
+  const dfm_rigid_state &s = step.state[0];
+  return {mobility(h) *
+              (motion_.mass * load3(s.velocity) + h * (motion_.stiffness * way + motion_.damping * velocity) + p),
+          turn_mobility(h) * (motion_.inertia * load3(s.spin) +
+                              h * (motion_.turn_stiffness * turned_by + motion_.turn_damping * spin) + turn)};
+}
+
+ToolPlace ToolHost::end_of(const dfm_rigid_step &step, const Ways &w, const Frame &mean) const {
+  if (!motion_.coupled()) return w.device;
+  return {w.start.position + step.h * mean.velocity, turned(w.start.rotation, step.h * mean.spin)};
+}
+
+// Mean velocities of the parts by where they end: what turns with the frame goes along an arc.
+void ToolHost::predict(const dfm_rigid_step &step, double *velocity) const {
+  const Ways w = ways(step);
+  const ToolPlace end = end_of(step, w, move(step, w, {}, {}));
+  for (size_t i = 0; i < motion_.parts.size(); ++i) {
+    const ToolPlace from = place_of(step.state[i]), to = part_place(motion_.parts[i], end, w.opening);
+    store3(velocity + 6 * i, (1 / step.h) * (to.position - from.position));
+    store3(velocity + 6 * i + 3, (1 / step.h) * rotation_vector(to.rotation * conjugate(from.rotation)));
+  }
+}
+
+void ToolHost::respond(const dfm_rigid_step &step, double *matrix) const {
+  const size_t n = motion_.parts.size(), width = 6 * n;
+  const double a = mobility(step.h), b = turn_mobility(step.h);
+  for (size_t j = 0; j < width; ++j) {
+    const size_t k = j % 6;
+    Vec3 unit;
+    unit[int(k % 3)] = 1;
+    const Vec3 p = k < 3 ? unit : Vec3{}, turn = k < 3 ? cross(arm(step, j / 6), unit) : unit;
+    for (size_t i = 0; i < n; ++i) {
+      const Vec3 velocity = a * p + b * cross(turn, arm(step, i)), spin = b * turn;
+      for (size_t l = 0; l < 3; ++l) {
+        matrix[(6 * i + l) * width + j] = velocity[int(l)];
+        matrix[(6 * i + 3 + l) * width + j] = spin[int(l)];
+      }
+    }
+  }
+}
+
+void ToolHost::commit(const dfm_rigid_step &step, const double *impulse, dfm_rigid_state *state,
+                      double *extra) const {
+  const Ways w = ways(step);
+  Vec3 p, turn;
+  for (size_t i = 0; i < motion_.parts.size(); ++i) {
+    const Vec3 q = load3(impulse + 6 * i);
+    p += q;
+    turn += load3(impulse + 6 * i + 3) + cross(arm(step, i), q);
+  }
+  const Frame mean = move(step, w, p, turn);
+  const ToolPlace end = end_of(step, w, mean);
+  ToolValues v = w.values;
+  const ToolPlace device = motion_.coupled() ? load_place(v.device) : w.start;
+  const Vec3 way = w.device.position - device.position;
+  const Vec3 turned_by = rotation_vector(w.device.rotation * conjugate(device.rotation));
+  // What holds the tool back is what it got less what moves it; without a coupling, all of it.
+  Vec3 held = -p, held_turn = -turn;
+  if (motion_.coupled()) {
+    held += motion_.mass * (mean.velocity - load3(step.state[0].velocity));
+    held_turn += motion_.inertia * (mean.spin - load3(step.state[0].spin));
+  }
+  store3(v.contact, load3(v.contact) + p);
+  store3(v.contact + 3, load3(v.contact + 3) + turn);
+  store3(v.coupling, load3(v.coupling) + held);
+  store3(v.coupling + 3, load3(v.coupling + 3) + held_turn);
+  v.work += (dot(held, way) + dot(held_turn, turned_by)) / step.h;
+  v.time += step.h;
+  v.opening = w.opening;
+  store_place(v.device, w.device);
+  store_values(v, extra);
+  for (size_t i = 0; i < motion_.parts.size(); ++i) {
+    const ToolPlace from = place_of(step.state[i]), to = part_place(motion_.parts[i], end, w.opening);
+    dfm_rigid_state &s = state[i];
+    store3(s.position, to.position);
+    s.rotation[0] = to.rotation.x;
+    s.rotation[1] = to.rotation.y;
+    s.rotation[2] = to.rotation.z;
+    s.rotation[3] = to.rotation.w;
+    store3(s.velocity, (1 / step.h) * (to.position - from.position));
+    store3(s.spin, (1 / step.h) * rotation_vector(to.rotation * conjugate(from.rotation)));
+  }
+  // to the last digit: part 0 is the frame
+  store3(state[0].velocity, mean.velocity);
+  store3(state[0].spin, mean.spin);
+}
+
+// ---- the table --------------------------------------------------------------------------------------------
+
+const ToolHost &self_of(void *self) { return *static_cast<const ToolHost *>(self); }
+
+dfm_status create(void *, const dfm_rigid_set_def *set, void **self, uint32_t *group, uint32_t *nextra) {
+  if (!set->data) 
+{
+    set_last_error("this host is that of tools; dfm_tool_create makes one");
+    return DFM_E_ARG;
+  }
+  auto *const made = new (std::nothrow) ToolHost(*static_cast<const ToolMotion *>(set->data));
+  if (!made) return DFM_E_NOMEM;
+  *self = made;
+  for (uint32_t i = 0; i < set->nbody; ++i) group[i] = 0;
+  *nextra = kToolValues;
+  return DFM_OK;
+}
+void destroy(void *self) { delete static_cast<ToolHost *>(self); }
+dfm_status predict(void *self, const dfm_rigid_step *step, double *velocity) {
+  self_of(self).predict(*step, velocity);
+  return DFM_OK;
+}
+dfm_status respond(void *self, const dfm_rigid_step *step, uint32_t, double *matrix) {
+  self_of(self).respond(*step, matrix);
+  return DFM_OK;
+}
+dfm_status commit(void *self, const dfm_rigid_step *step, const double *impulse, dfm_rigid_state *state,
+                  double *extra) {
+  self_of(self).commit(*step, impulse, state, extra);
+  return DFM_OK;
+}
+
+}  // namespace
+
+ToolValues tool_values(const double *extra) {
+  ToolValues v;
+  std::memcpy(&v, extra, sizeof v);
+  return v;
+}
+void store_values(const ToolValues &v, double *extra) { std::memcpy(extra, &v, sizeof v); }
+
+ToolPlace load_place(const double *p) { return {load3(p), {p[3], p[4], p[5], p[6]}}; }
+void store_place(double *p, const ToolPlace &place) {
+  store3(p, place.position);
+  p[3] = place.rotation.x;
+  p[4] = place.rotation.y;
+  p[5] = place.rotation.z;
+  p[6] = place.rotation.w;
+}
+ToolPlace place_of(const dfm_rigid_state &s) {
+  return {load3(s.position), {s.rotation[0], s.rotation[1], s.rotation[2], s.rotation[3]}};
+}
+ToolPlace part_place(const ToolMotion::Part &part, const ToolPlace &tool, double opening) {
+  Quat rotation = tool.rotation;
+  if (part.turns != 0) rotation = rotation * turned(Quat{}, {0, part.turns * opening, 0});
+  return {tool.position + rotate(rotation, part.at.position), rotation * part.at.rotation};
+}
+
+const dfm_rigid_host &tool_host() {
+  static const dfm_rigid_host table = [] {
+    dfm_rigid_host t{};
+    t.size = sizeof t;
+    t.create = create;
+    t.destroy = destroy;
+    t.predict = predict;
+    t.respond = respond;
+    t.commit = commit;
+    return t;
+  }();
+  return table;
+}
+
+}  // namespace dfm

@@ -1,0 +1,30 @@
+// A tool (deform/tool.h): a set of rigid bodies that dynamics/rigid/tool_host.h moves. What changes in a run
+// stands among the set's values, so that snapshots have it; the keys are those of the def, for good.
+#pragma once
+#include <string>
+#include <vector>
+
+#include "deform/tool.h"
+#include "dynamics/rigid/rigid_set.h"
+#include "dynamics/rigid/tool_host.h"
+
+namespace dfm {
+
+struct Tool {
+  World *world = nullptr;
+  uint64_t handle = 0;
+  std::string name;
+  dfm_tool_def def{};
+  ToolMotion motion;
+  std::vector<dfm_pose_key> keys;
+  std::vector<dfm_scale_key> opening_keys;
+  RigidSet *set = nullptr;
+  std::vector<uint64_t> parts;  // handles
+  dfm_device device{};          // read NULL: none
+  bool mute = false;            // the device has refused a force
+  bool has_jaws() const { return def.shape == DFM_TOOL_GRASPER || def.shape == DFM_TOOL_SCISSORS; }
+  ToolValues values() const { return tool_values(set->extra.data()); }
+  void store(const ToolValues &v) { store_values(v, set->extra.data()); }
+};
+
+}  // namespace dfm

@@ -1,0 +1,417 @@
+#include "world/tool.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "core/handle.h"
+#include "geometry/ellipsoid.h"
+#include "state/bounds.h"
+#include "state/world.h"
+#include "step/rigid.h"
+#include "step/stages.h"
+#include "world/attach.h"
+#include "world/create.h"
+#include "world/find.h"
+#include "world/queries.h"
+
+namespace dfm {
+namespace {
+
+constexpr double kWidest = 3;        // rad, of an opening
+constexpr uint32_t kRefinements = 2;  // of an ellipsoid: 320 triangles
+
+bool finite(const double *p, size_t n) {
+  return std::all_of(p, p + n, [](double x) { return std::isfinite(x); });
+}
+bool jawed(const dfm_tool_def &d) { return d.shape == DFM_TOOL_GRASPER || d.shape == DFM_TOOL_SCISSORS; }
+
+void check_opening(double angle, const char *name) {
+  if (!(angle >= 0 && angle <= kWidest))
+    fail(DFM_E_ARG, "tool '%s': an opening of %g rad; give 0 to %g", name, angle, kWidest);
+}
+
+void check_coupling(const dfm_tool_def &d, const char *name) {
+  const double values[] = {d.stiffness, d.damping, d.turn_stiffness, d.turn_damping, d.mass, d.inertia};
+  for (const double x : values)
+    if (!(x >= 0 && std::isfinite(x)))
+      fail(DFM_E_ARG,
+           "tool '%s': stiffness, damping, turn_stiffness, turn_damping, mass and inertia must be finite and "
+           "not negative, found %g",
+           name, x);
+  if (!(d.stiffness > 0)) {
+    if (d.flags & DFM_TOOL_PASSIVE)
+      fail(DFM_E_ARG, "tool '%s': DFM_TOOL_PASSIVE is for a coupled tool; give a stiffness", name);
+    if (d.damping > 0 || d.turn_stiffness > 0 || d.turn_damping > 0)
+      fail(DFM_E_ARG,
+           "tool '%s' has a part of a coupling, but its stiffness is 0, which means none; give a stiffness, "
+           "or leave damping, turn_stiffness and turn_damping 0",
+           name);
+    return;
+  }
+  if (!(d.turn_stiffness > 0))
+    fail(DFM_E_ARG, "tool '%s' is coupled with %g N/m and nothing turns it; give a turn_stiffness in N m/rad",
+         name, d.stiffness);
+  if (!(d.mass > 0 && d.inertia > 0))
+    fail(DFM_E_ARG, "tool '%s' is coupled, so it needs a mass and an inertia above 0; found %g kg, %g kg m2",
+         name, d.mass, d.inertia);
+}
+
+void check_sizes(const dfm_tool_def &d, const char *name) {
+  const bool boxes = jawed(d) || d.shape == DFM_TOOL_BOX || d.shape == DFM_TOOL_BLADE ||
+                     d.shape == DFM_TOOL_ELLIPSOID;
+  for (const double s : d.half_size)
+    if (boxes && !(s > 0 && std::isfinite(s)))
+      fail(DFM_E_ARG, "tool '%s': half_size %g m; all three must be positive and finite", name, s);
+  if (!(d.radius >= 0 && std::isfinite(d.radius)) || !(d.half_length >= 0 && std::isfinite(d.half_length)))
+    fail(DFM_E_ARG, "tool '%s': radius %g m and half_length %g m must be finite and not negative", name,
+         d.radius, d.half_length);
+}
+
+void check_def(const dfm_tool_def &d, const char *name) {
+  if (d.shape > DFM_TOOL_BLADE)
+    fail(DFM_E_ARG,
+         "tool '%s': shape %u is unknown; use DFM_TOOL_SPHERE, CAPSULE, BOX, MESH, GRASPER, SCISSORS, "
+         "ELLIPSOID or BLADE",
+         name, d.shape);
+  if (!finite(d.pose.position, 3) || !finite(d.pose.rotation, 4))
+    fail(DFM_E_ARG, "tool '%s': its pose must be finite", name);
+  check_sizes(d, name);
+  check_coupling(d, name);
+  check_opening(d.opening, name);
+  if (!jawed(d) && (d.opening != 0 || d.nopening))
+    fail(DFM_E_ARG, "tool '%s' has no jaws to open; only a grasper and scissors have", name);
+  if ((d.nkey && !d.keys) || (d.nopening && !d.opening_keys))
+    fail(DFM_E_ARG, "tool '%s': keys are announced, but they are NULL", name);
+}
+
+// Its frame first, then the jaws; the shape of a frame is that of the tool where a rigid body can have it.
+std::vector<dfm_rigid_def> parts_of(const dfm_tool_def &d, const std::string &name, ToolMotion &motion,
+                                    std::vector<std::string> &names) {
+  dfm_rigid_def frame = dfm_rigid_def{};
+  frame.size = sizeof frame;
+  frame.shape = d.shape == DFM_TOOL_SPHERE                                 ? DFM_SHAPE_SPHERE
+                : d.shape == DFM_TOOL_CAPSULE                              ? DFM_SHAPE_CAPSULE
+                : d.shape == DFM_TOOL_BOX || d.shape == DFM_TOOL_BLADE     ? DFM_SHAPE_BOX
+                                                                           : DFM_SHAPE_NONE;
+  std::copy(d.half_size, d.half_size + 3, frame.half_size);
+  frame.radius = d.radius;
+  frame.half_length = d.half_length;
+  // of no account: nothing moves by it that its host does not move
+  frame.mass = 1;
+  std::fill(frame.inertia, frame.inertia + 3, 1.0);
+  frame.material = d.material;
+  frame.category = d.category;
+  frame.collides_with = d.collides_with;
+  frame.user = d.user;
+  motion.parts.push_back({{}, 0});
+  names.push_back(name);
+  std::vector<dfm_rigid_def> out{frame};
+  const Vec3 half = load3(d.half_size);
+  for (const double side : {1.0, -1.0}) {
+    if (!jawed(d)) break;
+    const Vec3 beside = d.shape == DFM_TOOL_GRASPER ? Vec3{side * half.x, 0, 0} : Vec3{0, side * half.y, 0};
+    motion.parts.push_back({{beside - Vec3{0, 0, half.z}, {}}, -0.5 * side});
+    names.push_back(name + (side > 0 ? ".left" : ".right"));
+    out.push_back(frame);
+    out.back().shape = DFM_SHAPE_BOX;
+  }
+  const ToolPlace at{load3(d.pose.position), unit_quat(d.pose.rotation)};
+  for (size_t i = 0; i < out.size(); ++i) {
+    const ToolPlace part = part_place(motion.parts[i], at, d.opening);
+    store3(out[i].pose.position, part.position);
+    const Quat q = part.rotation;
+    const double rotation[] = {q.x, q.y, q.z, q.w};
+    std::copy(rotation, rotation + 4, out[i].pose.rotation);
+    out[i].name = names[i].c_str();
+  }
+  return out;
+}
+
+// What no rigid body has by itself: a shaft, the triangles of a mesh or an ellipsoid.
+void add_shapes(const dfm_tool_def &d, const std::string &name, Obstacle &frame) {
+  dfm_obstacle_def shape{};
+  shape.size = sizeof shape;
+  shape.material = d.material;
+  shape.category = d.category;
+  shape.collides_with = d.collides_with;
+  shape.user = d.user;
+  shape.radius = d.radius;
+  if (jawed(d) && d.radius > 0) {
+    const std::string shaft = name + ".shaft";
+    shape.name = shaft.c_str();
+    shape.shape = DFM_SHAPE_CAPSULE;
+    shape.half_length = d.half_length;
+    shape.pose.position[2] = d.half_length;
+    add_rigid_shape(frame, shape);
+  }
+  if (d.shape != DFM_TOOL_MESH && d.shape != DFM_TOOL_ELLIPSOID) return;
+  const std::string skin = name + ".shape";
+  shape.name = skin.c_str();
+  shape.shape = DFM_SHAPE_MESH;
+  shape.npoint = d.npoint;
+  shape.ntriangle = d.ntriangle;
+  shape.points = d.points;
+  shape.triangles = d.triangles;
+  EllipsoidMesh ball;
+  if (d.shape == DFM_TOOL_ELLIPSOID) {
+    ball = ellipsoid_mesh(load3(d.half_size), kRefinements);
+    shape.npoint = static_cast<uint32_t>(ball.points.size() / 3);
+    shape.ntriangle = static_cast<uint32_t>(ball.triangles.size() / 3);
+    shape.points = ball.points.data();
+    shape.triangles = ball.triangles.data();
+  }
+  add_rigid_shape(frame, shape);
+}
+
+void start_at(Tool &t, const ToolPlace &place) {
+  ToolValues v = t.values();
+  store_place(v.device, place);
+  store_place(v.target, place);
+  std::fill(v.target_velocity, v.target_velocity + 6, 0.0);
+  v.measured = 0;
+  t.store(v);
+}
+
+Tool &checked(Tool &t, const dfm_pose &pose) {
+  if (!finite(pose.position, 3) || !finite(pose.rotation, 4))
+    fail(DFM_E_ARG, "tool '%s': the given pose is not finite", t.name.c_str());
+  check_place(*t.world, "tool", t.name.c_str(), largest_coordinate(pose.position, 1, 3));
+  return t;
+}
+
+
+}  // namespace
+
+Tool &create_tool(World &w, const dfm_tool_def &def) {
+  auto owned = std::make_unique<Tool>();
+  Tool &t = *owned;
+  t.world = &w;
+  t.name = def.name ? def.name : "tool" + std::to_string(w.next_id);
+  const char *const name = t.name.c_str();
+  check_def(def, name);
+  t.def = def;
+  if (def.nkey) t.keys.assign(def.keys, def.keys + def.nkey);
+  if (def.nopening) t.opening_keys.assign(def.opening_keys, def.opening_keys + def.nopening);
+  check_keys(t.keys, name);
+  check_keys(t.opening_keys, name);
+  for (const dfm_scale_key &k : t.opening_keys) check_opening(k.value, name);
+  if (!t.keys.empty()) {
+    const Pose p = pose_at(t.keys, w.time);
+    store3(t.def.pose.position, p.position);
+    const double rotation[] = {p.rotation.x, p.rotation.y, p.rotation.z, p.rotation.w};
+    std::copy(rotation, rotation + 4, t.def.pose.rotation);
+  }
+  if (!t.opening_keys.empty()) t.def.opening = scale_at(t.opening_keys, w.time);
+  t.motion.stiffness = def.stiffness;
+  t.motion.damping = def.damping;
+  t.motion.turn_stiffness = def.turn_stiffness;
+  t.motion.turn_damping = def.turn_damping;
+  t.motion.mass = def.mass;
+  t.motion.inertia = def.inertia;
+  std::vector<std::string> names;
+  const std::vector<dfm_rigid_def> parts = parts_of(t.def, t.name, t.motion, names);
+  const dfm_rigid_set_def set = {
+      sizeof set, static_cast<uint32_t>(parts.size()), 0, 0, parts.data(), nullptr, &t.motion};
+  t.parts.resize(parts.size());
+  w.tools.reserve(w.tools.size() + 1);
+  create_rigids(w, kToolHost, set, t.parts.data());
+  t.set = w.rigid_sets.back().get();
+  t.set->of_tool = true;
+  try {
+    add_shapes(t.def, t.name, rigid_obstacle(w, t.set->obstacle[0]));
+    t.handle = handle_create(Kind::tool, &t);
+  } catch (...) {
+    destroy_rigids(*t.set);
+    throw;
+  }
+  start_at(t, {load3(t.def.pose.position), unit_quat(t.def.pose.rotation)});
+  ToolValues v = t.values();
+  v.opening = v.target_opening = t.def.opening;
+  v.keyed = t.keys.empty() ? 0 : 1;
+  v.opening_keyed = t.opening_keys.empty() ? 0 : 1;
+  t.store(v);
+  t.def.name = t.name.c_str();
+  t.def.points = nullptr;
+  t.def.triangles = nullptr;
+  t.def.keys = nullptr;
+  t.def.opening_keys = nullptr;
+  t.def.npoint = t.def.ntriangle = t.def.nkey = t.def.nopening = 0;
+  w.tools.push_back(std::move(owned));
+  return t;
+}
+
+void destroy_tool(Tool &t) {
+  World &w = *t.world;
+  destroy_rigids(*t.set);
+  handle_destroy(t.handle);
+  std::erase_if(w.tools, [&](auto &p) { return p.get() == &t; });
+}
+
+void set_tool_pose(Tool &t, const dfm_pose &pose, const double *velocity) {
+  checked(t, pose);
+  if (velocity && !finite(velocity, 6))
+    fail(DFM_E_ARG, "tool '%s': the given velocity is not finite", t.name.c_str());
+  ToolValues v = t.values();
+  store_place(v.target, {load3(pose.position), unit_quat(pose.rotation)});
+  v.keyed = 0;
+  v.measured = velocity ? kToolMeasuredNext : 0;
+  if (velocity) std::copy(velocity, velocity + 6, v.target_velocity);
+  t.store(v);
+}
+
+void set_tool_opening(Tool &t, double angle) {
+  if (!t.has_jaws()) fail(DFM_E_ARG, "tool '%s' has no jaws to open", t.name.c_str());
+  check_opening(angle, t.name.c_str());
+  ToolValues v = t.values();
+  v.target_opening = angle;
+  v.opening_keyed = 0;
+  t.store(v);
+}
+
+void teleport_tool(Tool &t, const dfm_pose &pose) {
+  checked(t, pose);
+  World &w = *t.world;
+  const ToolPlace place{load3(pose.position), unit_quat(pose.rotation)};
+  start_at(t, place);
+  ToolValues v = t.values();
+  v.keyed = 0;
+  t.store(v);
+  for (size_t i = 0; i < t.motion.parts.size(); ++i) {
+    const ToolPlace part = part_place(t.motion.parts[i], place, v.opening);
+    dfm_rigid_state s{};
+    store3(s.position, part.position);
+    const double rotation[] = {part.rotation.x, part.rotation.y, part.rotation.z, part.rotation.w};
+    std::copy(rotation, rotation + 4, s.rotation);
+    set_rigid_state(rigid_obstacle(w, t.set->obstacle[i]), s);
+  }
+  for (auto &o : w.obstacles)
+    if (o->rigid == t.set) w.overlaps.place(o->id);
+  wake_all(w);  // it may have been put where someone sleeps
+}
+
+dfm_tool_state tool_state(const Tool &t) {
+  const ToolValues v = t.values();
+  const dfm_rigid_state &s = t.set->state[0];
+  dfm_tool_state out{};
+  out.size = sizeof out;
+  out.nkeys = v.keyed != 0;
+  std::copy(s.position, s.position + 3, out.pose.position);
+  std::copy(s.rotation, s.rotation + 4, out.pose.rotation);
+  std::copy(s.velocity, s.velocity + 3, out.velocity);
+  std::copy(s.spin, s.spin + 3, out.spin);
+  out.device = out.pose;
+  if (t.motion.coupled()) {
+    std::copy(v.device, v.device + 3, out.device.position);
+    std::copy(v.device + 3, v.device + 7, out.device.rotation);
+  }
+  out.opening = v.opening;
+  out.time = v.time;
+  out.work = v.work;
+  out.port_work = v.port_work;
+  return out;
+}
+
+void tool_force(const Tool &t, double force[3], double torque[3]) {
+  const ToolValues v = t.values();
+  const Quat frame = place_of(t.set->state[0]).rotation;
+  const double per = v.time > 0 ? 1 / v.time : 0;
+  store3(force, rotate_back(frame, per * load3(v.contact)));
+  store3(torque, rotate_back(frame, per * load3(v.contact + 3)));
+}
+
+// The device gets what the coupling did to the tool, the other way, at its own origin: the spring and the
+// damper of the way and those of the turn are two couplings, and neither has an arm.
+void tool_feedback(const Tool &t, double force[3], double torque[3]) {
+  const ToolValues v = t.values();
+  const Quat frame = t.motion.coupled() ? load_place(v.device).rotation : place_of(t.set->state[0]).rotation;
+  store3(force, rotate_back(frame, load3(v.given)));
+  store3(torque, rotate_back(frame, load3(v.given + 3)));
+}
+
+// Each surfel to the nearest part, so that none is held twice.
+std::vector<uint32_t> grab(Tool &t, Body &b, double reach, double release) {
+  World &w = *t.world;
+  if (b.world != &w) fail(DFM_E_HANDLE, "tool '%s' and the body that it is to grab are of two worlds", t.name.c_str());
+  if (!(reach >= 0 && std::isfinite(reach)))
+    fail(DFM_E_ARG, "tool '%s': a reach of %g m; give 0 or more", t.name.c_str(), reach);
+  prepare(w);  // for d_c
+  const double limit = reach > 0 ? reach : 2 * w.offset;
+  std::vector<std::vector<uint32_t>> held(t.parts.size());
+  for (uint32_t i = 0; i < b.surface.nsurfel; ++i) {
+    const Vec3 x = surfel_vector(b, b.p.x, i);
+    double nearest = HUGE_VAL;
+    uint32_t part = kNone;
+    for (auto &o : w.obstacles) {
+      if (o->rigid != t.set || Shape(o->def.shape) == Shape::none) continue;
+      const double d = distance_from(*o, x, limit);
+      if (d < limit && d < nearest) {
+        nearest = d;
+        part = o->rigid_body;
+      }
+    }
+    if (part != kNone) held[part].push_back(i);
+  }
+  std::vector<uint32_t> out;
+  for (size_t part = 0; part < held.size(); ++part) {
+    if (held[part].empty()) continue;
+    dfm_attach_def d{};
+    d.size = sizeof d;
+    d.nsurfel = static_cast<uint32_t>(held[part].size());
+    d.surfels = held[part].data();
+    d.release = release;
+    out.push_back(attach(b, d, nullptr, &rigid_obstacle(w, t.set->obstacle[part])));
+  }
+  return out;
+}
+
+void set_device(Tool &t, const dfm_device *device) {
+  if (device && !device->read)
+    fail(DFM_E_ARG, "tool '%s': the device has no read(); it is needed, write() may be NULL", t.name.c_str());
+  t.device = device ? *device : dfm_device{};
+  t.mute = false;
+}
+
+void read_devices(World &w, double end) {
+  std::vector<dfm_device_sample> samples;
+  std::vector<bool> fresh;
+  for (auto &t : w.tools) {
+    if (!t->device.read) continue;
+    dfm_device_sample s{};
+    s.size = sizeof s;
+    const uint64_t said = sentences();
+    const dfm_status status = t->device.read(t->device.user, end, &s);
+    if (status < 0)
+      fail(status, "the device of tool '%s' refuses the step: %s", t->name.c_str(),
+           sentences() != said ? last_error().c_str() : "it gives no reason");
+    fresh.push_back(status == DFM_OK);
+    if (status == DFM_OK) {
+      checked(*t, s.pose);
+      if ((s.flags & DFM_DEVICE_VELOCITY) && !finite(s.velocity, 6))
+        fail(DFM_E_ARG, "the device of tool '%s' gives a velocity that is not finite", t->name.c_str());
+      if (s.flags & DFM_DEVICE_OPENING) check_opening(s.opening, t->name.c_str());
+    }
+    samples.push_back(s);
+  }
+  size_t k = 0;
+  for (auto &t : w.tools) {
+    if (!t->device.read) continue;
+    const dfm_device_sample &s = samples[k];
+    if (fresh[k++]) {
+      set_tool_pose(*t, s.pose, s.flags & DFM_DEVICE_VELOCITY ? s.velocity : nullptr);
+      if ((s.flags & DFM_DEVICE_OPENING) && t->has_jaws()) set_tool_opening(*t, s.opening);
+    }
+  }
+}
+
+void write_devices(World &w) {
+  for (auto &t : w.tools) {
+    if (!t->device.write || t->mute) continue;
+    const ToolValues v = t->values();
+    if (t->device.write(t->device.user, w.time, v.given, v.given + 3) >= 0) continue;
+    t->mute = true;
+    w.context->logf(DFM_LOG_WARNING, "the device of tool '%s' takes no force any more", t->name.c_str());
+  }
+}
+
+}  // namespace dfm

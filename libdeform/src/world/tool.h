@@ -1,0 +1,31 @@
+// Tools enter and leave a world, and are moved. All throw Error and leave the world as it was.
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "deform/tool.h"
+
+namespace dfm {
+
+struct Body;
+struct Tool;
+struct World;
+
+Tool &create_tool(World &w, const dfm_tool_def &def);
+void destroy_tool(Tool &tool);
+void set_tool_pose(Tool &tool, const dfm_pose &pose, const double *velocity);  // velocity: [6] or NULL
+void set_tool_opening(Tool &tool, double angle);
+void teleport_tool(Tool &tool, const dfm_pose &pose);
+dfm_tool_state tool_state(const Tool &tool);
+// Of the last step, in the frame of the tool (contact) or of its device (coupling); on tool or device.
+void tool_force(const Tool &tool, double force[3], double torque[3]);
+void tool_feedback(const Tool &tool, double force[3], double torque[3]);
+
+// Numbers of the attachments, one per part that holds something.
+std::vector<uint32_t> grab(Tool &tool, Body &b, double reach, double release);
+void set_device(Tool &tool, const dfm_device *device);
+// Around a step. read_devices() throws Error where a device refuses it, and has moved nothing then.
+void read_devices(World &w, double end);
+void write_devices(World &w);
+
+}  // namespace dfm
