@@ -27,6 +27,7 @@
 #include "progress.h"
 #include "recording.h"
 #include "sensors.h"
+#include "tools.h"
 #include "state_file.h"
 #include "step_size.h"
 
@@ -105,6 +106,7 @@ class Runner {
         checker_(scene),
         impulses_(scene),
         sensors_(scene, options.out),
+        tools_(scene, options.out),
         record_(scene.settings().every),
         frame_(frame_interval()),
         comparison_(comparison) {
@@ -229,6 +231,7 @@ class Runner {
 
   void record() {
     outputs_.record();
+    tools_.record();
     if (recorder_) recorder_->add();
   }
 
@@ -285,6 +288,7 @@ class Runner {
     trouble_ |= trouble;
     impulses_.add_step();
     sensors_.add_step();
+    tools_.add_step(step);
     result_.simulated = dfm_world_time(world_);
     return true;
   }
@@ -365,6 +369,7 @@ class Runner {
   Checker checker_;
   Impulses impulses_;
   Sensors sensors_;
+  Tools tools_;
   Schedule record_, frame_;
   std::unique_ptr<Frames> frames_;
   std::optional<Recorder> recorder_;

@@ -22,6 +22,7 @@ void each_default(F f) {
   f(dfm_material_def_default(), dfm_material_def_default_sized, 72, "dfm_material_def_default");
   f(dfm_obstacle_def_default(), dfm_obstacle_def_default_sized, 248, "dfm_obstacle_def_default");
   f(dfm_rigid_def_default(), dfm_rigid_def_default_sized, 224, "dfm_rigid_def_default");
+  f(dfm_tool_def_default(), dfm_tool_def_default_sized, 256, "dfm_tool_def_default");
   f(dfm_body_def_default(), dfm_body_def_default_sized, 256, "dfm_body_def_default");
   f(dfm_switch_default(), dfm_switch_default_sized, 48, "dfm_switch_default");
   f(dfm_switch_rule_default(), dfm_switch_rule_default_sized, 160, "dfm_switch_rule_default");
@@ -143,6 +144,8 @@ TEST(DefSizes, DefThatNobodyFilledWithDefaults_IsRefused) {
   const auto rigid = bare(dfm_rigid_def{});
   const dfm_rigid_set_def set = {sizeof set, 1, 0, 0, &rigid, nullptr, nullptr};
   refused(dfm_rigid_create(made, nullptr, &set, &out), "dfm_rigid_def_default()");
+  const auto tool = bare(dfm_tool_def{});
+  refused(dfm_tool_create(made, &tool, &out), "dfm_tool_def_default()");
   const auto body = bare(dfm_body_def{});
   refused(dfm_body_create(made, &body, &out), "dfm_body_def_default()");
   const dfm_body ball = test::make_body(c, made, "ball", {0.1, 0, 0}, 30, {});

@@ -61,6 +61,8 @@ std::vector<Call> world_calls() {
       {"world_untangle", [](uint64_t h) { return dfm_world_untangle(h, &count); }},
       {"world_find_rigid", [](uint64_t h) { return dfm_world_find_rigid(h, "box", &made); }},
       {"world_find_obstacle", [](uint64_t h) { return dfm_world_find_obstacle(h, "floor", &made); }},
+      {"world_tools", [](uint64_t h) { return dfm_world_tools(h, 0, nullptr, &count); }},
+      {"world_find_tool", [](uint64_t h) { return dfm_world_find_tool(h, "probe", &made); }},
       {"world_rigids", [](uint64_t h) { return dfm_world_rigids(h, 0, nullptr, &count); }},
       {"world_explain", [](uint64_t h) { return dfm_world_explain(h, nullptr, &bytes); }},
       {"world_add_friction",
@@ -159,6 +161,11 @@ std::vector<Call> world_calls() {
        [](uint64_t h) {
          const dfm_obstacle_def d = dfm_obstacle_def_default();
          return dfm_obstacle_create(h, &d, &made);
+       }},
+      {"tool_create",
+       [](uint64_t h) {
+         const dfm_tool_def d = dfm_tool_def_default();
+         return dfm_tool_create(h, &d, &made);
        }},
       {"rigid_create",
        [](uint64_t h) {
@@ -309,6 +316,34 @@ std::vector<Call> rigid_calls() {
   };
 }
 
+std::vector<Call> tool_calls() {
+  return {
+      {"tool_destroy", [](uint64_t h) { return dfm_tool_destroy(h); }},
+      {"tool_get_def",
+       [](uint64_t h) {
+         dfm_tool_def d{};
+         return dfm_tool_get_def(h, &d);
+       }},
+      {"tool_parts", [](uint64_t h) { return dfm_tool_parts(h, 0, nullptr, &count); }},
+      {"tool_set_pose", [](uint64_t h) { return dfm_tool_set_pose(h, &pose, nullptr); }},
+      {"tool_set_opening", [](uint64_t h) { return dfm_tool_set_opening(h, 0); }},
+      {"tool_teleport", [](uint64_t h) { return dfm_tool_teleport(h, &pose); }},
+      {"tool_force", [](uint64_t h) { return dfm_tool_force(h, numbers, numbers); }},
+      {"tool_feedback", [](uint64_t h) { return dfm_tool_feedback(h, numbers, numbers); }},
+      {"tool_get_state",
+       [](uint64_t h) {
+         dfm_tool_state s{};
+         return dfm_tool_get_state(h, &s);
+       }},
+      {"tool_grab",
+       [](uint64_t h) {
+         uint32_t held = 0;
+         return dfm_tool_grab(h, 0, 0, 0, 1, &held, &count);
+       }},
+      {"tool_set_device", [](uint64_t h) { return dfm_tool_set_device(h, nullptr); }},
+  };
+}
+
 std::vector<Call> material_calls() {
   return {{"material_destroy", [](uint64_t h) { return dfm_material_destroy(h); }}};
 }
@@ -398,6 +433,7 @@ std::vector<Taker> takers() {
           {DFM_HANDLE_BODY, "a body", body_calls()},
           {DFM_HANDLE_OBSTACLE, "an obstacle", obstacle_calls()},
           {DFM_HANDLE_RIGID, "", rigid_calls()},
+          {DFM_HANDLE_TOOL, "a tool", tool_calls()},
           {DFM_HANDLE_MATERIAL, "a material", material_calls()},
           {DFM_HANDLE_LAW, "a law", law_calls()},
           {DFM_HANDLE_TETMESH, "a mesh", tetmesh_calls()},
@@ -427,6 +463,9 @@ std::vector<Live> live(dfm_context *c) {
   const std::string file = std::string(DEFORM_SOURCE_DIR) + "/examples/scenes/two_cylinders.json";
   uint64_t h = 0;
   add(DFM_HANDLE_RIGID, "an obstacle", dfm_rigid_create(s.world, nullptr, &set, &h), h);
+  dfm_tool_def tool_def = dfm_tool_def_default();
+  tool_def.pose.position[2] = 9;
+  add(DFM_HANDLE_TOOL, "a tool", dfm_tool_create(s.world, &tool_def, &h), h);
   add(DFM_HANDLE_MATERIAL, "a material", dfm_material_create(s.world, &material_def, &h), h);
   add(DFM_HANDLE_LAW, "a law", dfm_law_open(c, "coulomb", &h), h);
   add(DFM_HANDLE_TETMESH, "a mesh", dfm_tetmesh_make(c, "ball", size, 100, &h), h);
@@ -439,8 +478,9 @@ std::vector<Live> live(dfm_context *c) {
 // alone those that give a status.
 std::multiset<std::string> declared() {
   const std::regex comment(R"(/\*[\s\S]*?\*/)");
-  const std::regex function(R"(\bdfm_status\s+dfm_(\w+)\s*\(\s*dfm_(world|body|obstacle|rigid|material|law|)"
-                            R"(scene|tetmesh|trimesh)\s+\w)");
+  const std::regex function(
+      R"(\bdfm_status\s+dfm_(\w+)\s*\(\s*dfm_(world|body|obstacle|rigid|tool|material|law|)"
+      R"(scene|tetmesh|trimesh)\s+\w)");
   std::multiset<std::string> out;
   for (const auto &entry :
        std::filesystem::directory_iterator(std::string(DEFORM_SOURCE_DIR) + "/libdeform/include/deform")) {

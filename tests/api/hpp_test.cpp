@@ -301,6 +301,31 @@ TEST(Hpp, RigidBodies_GoByTheirSet) {
   EXPECT_EQ(s.world.rigids().size(), 1u);
 }
 
+TEST(Hpp, Tools_PressAndFeel) {
+  const Scene s;
+  deform::ToolDef def;
+  def.name = "probe";
+  def.radius = 0.02;
+  def.pose.position[2] = 0.221;
+  const deform::Tool tool = s.world.add_tool(def);
+  EXPECT_EQ(s.world.find_tool("probe"), tool);
+  ASSERT_EQ(s.world.tools().size(), 1u);
+  for (int i = 1; i <= 50; ++i) {
+    tool.set_pose({{0, 0, 0.221 - 1e-4 * i}, {0, 0, 0, 1}});
+    EXPECT_TRUE(s.world.step(1e-3));
+  }
+  EXPECT_GT(tool.force().force[2], 0.01) << "the ball pushes back";
+  EXPECT_EQ(tool.feedback().force, tool.force().force);
+  EXPECT_NEAR(tool.state().pose.position[2], 0.216, 1e-12);
+  ASSERT_EQ(tool.parts().size(), 1u);
+  uint32_t number = 0;
+  EXPECT_EQ(tool.grab(s.ball, std::span(&number, 1)), 1u);
+  s.ball.detach(number);
+  EXPECT_THROW(tool.set_opening(0.1), deform::Error) << "a ball has no jaws";
+  tool.destroy();
+  EXPECT_TRUE(s.world.tools().empty());
+}
+
 TEST(Hpp, SceneAndLaw_AnswerAsInC) {
   const auto context = deform::Context::make(quiet());
   const std::string path = DEFORM_SOURCE_DIR "/examples/scenes/slope_block.json";

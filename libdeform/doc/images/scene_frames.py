@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Frames of scenes side by side: attached.png, scenes.png, fill_drop.png, pressed_ring.png, rigid.png,
+"""Frames of scenes side by side: attached.png, grasp.png, scenes.png, fill_drop.png, pressed_ring.png, rigid.png,
 ode_scenes.png, stability.png.
 
 scene_frames.py DEFORM_COMMAND [NAME.png...] [--out FOLDER]
@@ -32,6 +32,8 @@ PICTURES = {
         ("beams; a ball rolls; slides", [("gravity_beams", (), 2), ("ball_incline", (), 1),
                                          ("ball_incline", SLIDES, 1)])],
     "attached.png": [("0, 0.7, 1.1 s", [("attached", (), t) for t in (0, 0.7, 1.1)])],
+    "grasp.png": [("0, 0.4, 0.8, 1.6 s", [("grasp", (), t) for t in (0, 0.4, 0.8, 1.6)]),
+                  ("2, 2.4, 2.6, 3 s", [("grasp", (), t) for t in (2, 2.4, 2.6, 3)])],
     "fill_drop.png": [("0, 0.4, 1.8 s", [("fill_drop", (), t) for t in (0, 0.4, 1.8)])],
     "pressed_ring.png": [(None, [("pressed_ring", (), 0.5)])],
     "rigid.png": [("rigid_on_ball", [("rigid_on_ball", (), t) for t in (0, 1, 2)]),

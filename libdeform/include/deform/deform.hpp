@@ -36,6 +36,7 @@
 #include "deform/obstacles.hpp"
 #include "deform/queries.hpp"
 #include "deform/result.hpp"
+#include "deform/tools.hpp"
 
 namespace deform {
 
@@ -407,6 +408,9 @@ class World : public Handle<dfm_world, struct WorldKind>, public WorldQueries<E,
     return E::done(out.size() < set.nbody ? spans_disagree
                                           : dfm_rigid_create(raw_, host.c_str, &set, out.data()));
   }
+  auto add_tool(const dfm_tool_def &def) const {
+    return produce<E, Tool<E>>([&](Tool<E> &t) { return dfm_tool_create(raw_, &def, t.put()); });
+  }
   auto add_friction(const dfm_friction_def &def) const { return E::done(dfm_world_add_friction(raw_, &def)); }
   auto add_friction(Text a, Text b, Text law, const dfm_params &params = {}) const {
     dfm_friction_def def = sized<dfm_friction_def>();
@@ -450,9 +454,14 @@ class World : public Handle<dfm_world, struct WorldKind>, public WorldQueries<E,
   auto find_rigid(Text name) const {
     return produce<E, Rigid<E>>([&](Rigid<E> &r) { return dfm_world_find_rigid(raw_, name.c_str, r.put()); });
   }
+  auto find_tool(Text name) const {
+    return produce<E, Tool<E>>([&](Tool<E> &t) { return dfm_world_find_tool(raw_, name.c_str, t.put()); });
+  }
   auto bodies() const { return collect_handles<E, Body<E>>(dfm_world_bodies, raw_); }
   auto obstacles() const { return collect_handles<E, Obstacle<E>>(dfm_world_obstacles, raw_); }
   auto rigids() const { return collect_handles<E, Rigid<E>>(dfm_world_rigids, raw_); }
+  auto tools() const { return collect_handles<E, Tool<E>>(dfm_world_tools, raw_); }
+  auto tools(std::span<dfm_tool> out) const { return fill<E, 1>(dfm_world_tools, raw_, out); }
   auto bodies(std::span<dfm_body> out) const { return fill<E, 1>(dfm_world_bodies, raw_, out); }
   auto obstacles(std::span<dfm_obstacle> out) const { return fill<E, 1>(dfm_world_obstacles, raw_, out); }
   auto rigids(std::span<dfm_rigid> out) const { return fill<E, 1>(dfm_world_rigids, raw_, out); }
@@ -706,6 +715,7 @@ using World = basic::World<Values>;
 using Body = basic::Body<Values>;
 using Obstacle = basic::Obstacle<Values>;
 using Rigid = basic::Rigid<Values>;
+using Tool = basic::Tool<Values>;
 using Material = basic::Material<Values>;
 using Law = basic::Law<Values>;
 using Scene = basic::Scene<Values>;
@@ -721,6 +731,7 @@ using World = basic::World<Throw>;
 using Body = basic::Body<Throw>;
 using Obstacle = basic::Obstacle<Throw>;
 using Rigid = basic::Rigid<Throw>;
+using Tool = basic::Tool<Throw>;
 using Material = basic::Material<Throw>;
 using Law = basic::Law<Throw>;
 using Scene = basic::Scene<Throw>;

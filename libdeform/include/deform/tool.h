@@ -41,7 +41,7 @@ typedef struct dfm_tool_def {
   /* unique in the world among bodies and obstacles too. The jaws are NAME.left (towards +x) and NAME.right,
    * the triangles of a mesh or an ellipsoid NAME.shape */
   const char *name;
-  dfm_pose pose;        /* at the start: of the tool, and of the device */
+  dfm_pose pose; /* at the start: of the tool, and of the device */
   /* m. box, blade: half of the edges; ellipsoid: half axes; grasper, scissors: of one jaw, x its thickness,
    * z its length */
   double half_size[3];
@@ -56,12 +56,12 @@ typedef struct dfm_tool_def {
   double stiffness, damping, turn_stiffness, turn_damping;
   double mass, inertia; /* kg, kg m2 about any axis through the origin: of the tool, where it is coupled */
   uint32_t nkey, nopening;
-  const dfm_pose_key *keys;            /* [nkey] poses over time, until the first dfm_tool_set_pose; copied */
-  const dfm_scale_key *opening_keys;   /* [nopening] rad over time, until dfm_tool_set_opening; copied */
-  dfm_material material;               /* of all parts, for pair rules by material; 0: none */
-  uint32_t category, collides_with;    /* of all parts, as of bodies */
+  const dfm_pose_key *keys;          /* [nkey] poses over time, until the first dfm_tool_set_pose; copied */
+  const dfm_scale_key *opening_keys; /* [nopening] rad over time, until dfm_tool_set_opening; copied */
+  dfm_material material;             /* of all parts, for pair rules by material; 0: none */
+  uint32_t category, collides_with;  /* of all parts, as of bodies */
   void *user;
-  uint32_t flags, reserved; /* flags: DFM_TOOL_* below */
+  uint32_t flags, reserved; /* flags: DFM_TOOL_PASSIVE */
   uint64_t cookie;          /* set by the default function */
 } dfm_tool_def;
 /** dfm_tool_def_default into a def of any size (base.h). Threads: Any thread. Since 0.1. */
@@ -156,13 +156,13 @@ DFM_API dfm_status dfm_tool_get_state(dfm_tool tool, dfm_tool_state *out);
  * Another tool may hold the same body: to hand it over, grab with the second and let go with the first.
  * @param reach    m from the surface of a part; 0: twice the contact offset
  * @param release  N: a larger force ends the attachment; 0: none does
- * @param attachment out, [n] numbers among the body's attachments, one for each part that holds something; at
- * most as many as the tool has parts
- * @param n        out
- * @return DFM_OK, *n 0 where nothing is in reach; DFM_E_ARG; DFM_E_HANDLE; DFM_E_UNSUPPORTED the contact
- * method is ROLLBACK. Threads: Not during step. Since 0.1. */
+ * @param capacity of attachment; as many as the tool has parts is always enough
+ * @param attachment out, [n] numbers among the body's attachments, one for each part that holds something
+ * @param n        out; 0 where nothing is in reach
+ * @return DFM_OK; DFM_E_ARG, also where capacity is too small, and then nothing is held; DFM_E_HANDLE;
+ * DFM_E_UNSUPPORTED the contact method is ROLLBACK. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_tool_grab(dfm_tool tool, dfm_body body, double reach, double release,
-                                 uint32_t *attachment, uint32_t *n);
+                                 uint32_t capacity, uint32_t *attachment, uint32_t *n);
 
 /* ---- devices -------------------------------------------------------------------------------------------- */
 

@@ -18,6 +18,7 @@
 #define dfm_material_def_default material_def_inline
 #define dfm_obstacle_def_default obstacle_def_inline
 #define dfm_rigid_def_default rigid_def_inline
+#define dfm_tool_def_default tool_def_inline
 #define dfm_body_def_default body_def_inline
 #define dfm_switch_default switch_inline
 #define dfm_switch_rule_default switch_rule_inline
@@ -41,6 +42,7 @@
 #undef dfm_material_def_default
 #undef dfm_obstacle_def_default
 #undef dfm_rigid_def_default
+#undef dfm_tool_def_default
 #undef dfm_body_def_default
 #undef dfm_switch_default
 #undef dfm_switch_rule_default
@@ -79,6 +81,7 @@ DFM_DEFAULT_SYMBOL(dfm_equilibrium_def)
 DFM_DEFAULT_SYMBOL(dfm_material_def)
 DFM_DEFAULT_SYMBOL(dfm_obstacle_def)
 DFM_DEFAULT_SYMBOL(dfm_rigid_def)
+DFM_DEFAULT_SYMBOL(dfm_tool_def)
 DFM_DEFAULT_SYMBOL(dfm_body_def)
 DFM_DEFAULT_SYMBOL(dfm_switch)
 DFM_DEFAULT_SYMBOL(dfm_switch_rule)

@@ -136,14 +136,14 @@ dfm_status dfm_tool_get_state(dfm_tool tool, dfm_tool_state *out) {
   });
 }
 
-dfm_status dfm_tool_grab(dfm_tool tool, dfm_body body, double reach, double release, uint32_t *attachment,
-                         uint32_t *n) {
+dfm_status dfm_tool_grab(dfm_tool tool, dfm_body body, double reach, double release, uint32_t capacity,
+                         uint32_t *attachment, uint32_t *n) {
   return as_status([&] {
     Tool &t = tool_of(tool);
     exclusive(*t.world);
     need(attachment, "attachment");
     need(n, "n");
-    const std::vector<uint32_t> made = grab(t, body_of(body), reach, release);
+    const std::vector<uint32_t> made = grab(t, body_of(body), reach, release, capacity);
     std::copy(made.begin(), made.end(), attachment);
     *n = static_cast<uint32_t>(made.size());
   });

@@ -9,6 +9,7 @@
 #include "core/error.h"
 #include "core/handle.h"
 #include "dynamics/rigid/host.h"
+#include "scene/hand.h"
 #include "scene/jitter.h"
 #include "scene/load.h"
 #include "scene/start.h"
@@ -572,6 +573,8 @@ class Builder {
   void create_tool(Tool &t) {
     t.def.name = t.solid.name.c_str();
     t.def.material = material(t.solid.material);
+    if (!t.hand.empty())
+      with_pointer(t.solid.pointer + "/motion/file", [&] { read_hand(files_.path_of(t.hand), t); });
     t.def.nkey = uint32_t(t.keys.size());
     t.def.keys = t.keys.data();
     t.def.nopening = uint32_t(t.opening_keys.size());

@@ -175,6 +175,7 @@ struct Tool {
   dfm_tool_def def = {};
   std::vector<dfm_pose_key> keys;
   std::vector<dfm_scale_key> opening_keys;
+  std::string hand;  // file with both; empty: none
 };
 
 struct Material {

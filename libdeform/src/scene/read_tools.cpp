@@ -29,7 +29,8 @@ const std::vector<Shape> &shapes() {
 
 const Shape &read_shape(const Node &node) {
   const std::string word = node.at("shape").word("tool_shape");
-  const Shape &shape = *std::find_if(shapes().begin(), shapes().end(), [&](auto &s) { return s.name == word; });
+  const Shape &shape =
+      *std::find_if(shapes().begin(), shapes().end(), [&](auto &s) { return s.name == word; });
   for (const char *key : {"radius", "half_size", "half_length", "mesh", "opening_deg"}) {
     const auto listed = [&](const std::vector<std::string> &keys) {
       return std::find(keys.begin(), keys.end(), key) != keys.end();
@@ -81,6 +82,7 @@ void read_coupling(const Node &coupling, dfm_tool_def &d) {
   d.turn_damping = coupling.number("turn_damping", 0.0, kNotNegative);
   d.mass = coupling.number("mass", d.mass, kPositive);
   d.inertia = coupling.number("inertia", d.inertia, kPositive);
+  if (coupling.boolean("passive", false)) d.flags |= DFM_TOOL_PASSIVE;
 }
 
 Tool read_tool(const Node &node, ReadContext &context) {
@@ -105,14 +107,20 @@ Tool read_tool(const Node &node, ReadContext &context) {
   read_sizes(node, shape, t);
   const bool of_triangles = shape.number == DFM_TOOL_MESH;
   if (!of_triangles && node.has("pose") && node.member("pose").has("scale"))
-    node.member("pose").at("scale").fail("a %s has its own size; \"scale\" is for the shape mesh", shape.name);
+    node.member("pose").at("scale").fail("a %s has its own size; \"scale\" is for the shape mesh",
+                                         shape.name);
   t.def.pose = read_pose(node, "obstacle_pose", of_triangles ? &t.solid.scale : nullptr);
   if (node.has("motion")) {
     const Node motion = node.member("motion");
     motion.object("tool_motion");
-    t.keys = read_keys(motion, t.def.pose);
-    if (t.keys.empty()) motion.at("keyframes").fail("expected at least one keyframe");
+    if (motion.has("file") == motion.has("keyframes"))
+      motion.fail("expected one of \"keyframes\" and \"file\"");
+    if (motion.has("file")) t.hand = motion.member("file").text();
+    else t.keys = read_keys(motion, t.def.pose);
+    if (t.hand.empty() && t.keys.empty()) motion.at("keyframes").fail("expected at least one keyframe");
   }
+  if (node.has("opening_deg") && !t.hand.empty() && !node.member("opening_deg").value().is_number())
+    node.member("opening_deg").fail("the file of the motion says how far the jaws are open; drop one");
   if (node.has("opening_deg")) read_opening(node.member("opening_deg"), t);
   if (node.has("coupling")) read_coupling(node.member("coupling"), t.def);
   if (node.has("material")) t.solid.material = known(node.member("material"), context.materials, "material");

@@ -15,8 +15,9 @@ size_t locate(const std::vector<Key> &keys, double t, double *s) {
   *s = 0;
   if (t <= keys.front().t) return 0;
   if (t >= keys.back().t) return keys.size() - 1;
-  size_t i = 0;
-  while (keys[i + 1].t <= t) ++i;
+  const auto after =
+      std::upper_bound(keys.begin(), keys.end(), t, [](double time, const Key &key) { return time < key.t; });
+  const size_t i = static_cast<size_t>(after - keys.begin()) - 1;
   *s = (t - keys[i].t) / (keys[i + 1].t - keys[i].t);
   return i;
 }

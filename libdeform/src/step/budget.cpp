@@ -166,6 +166,7 @@ void changed_at_once(Stream &s, World &w) {
   s.array(w.step_impulses.pairs);
   s.value(w.step_impulses.idle);
   s.value(w.sizes);
+  for (auto &t : w.tools) s.array(t->set->extra);
 }
 
 void put_back_changing(PutBack &from, World &w) {
@@ -180,7 +181,11 @@ void put_back_changing(PutBack &from, World &w) {
 void return_to_start(World &w, StepContext &step) {
   PutBack from{step.budget.start.data()};
   changed_at_once(from, w);
-  if (step.budget.kept) put_back_changing(from, w);
+  if (step.budget.kept) {
+    put_back_changing(from, w);
+    PutBack first{step.budget.start.data()};
+    changed_at_once(first, w);  // of tools, the rest was kept after the step had begun with them
+  }
   const uint64_t cheapened = w.stats.cheapened;
   w.stats = step.budget.stats;
   w.stats.cheapened = cheapened;

@@ -30,8 +30,7 @@ ToolValues aimed(const Tool &tool, double end) {
 // Of whoever moves the tool, in the step that begins.
 struct Way { Vec3 path, turn; };
 Way way_of(const Tool &tool, const ToolValues &v) {
-  const ToolPlace from =
-      tool.motion.coupled() ? load_place(v.device) : place_of(tool.set->state[0]);
+  const ToolPlace from = tool.motion.coupled() ? load_place(v.device) : place_of(tool.set->state[0]);
   const ToolPlace to = load_place(v.target);
   return {to.position - from.position, rotation_vector(to.rotation * conjugate(from.rotation))};
 }
@@ -54,7 +53,8 @@ void check_tool_ways(const World &w, double dt) {
     const ToolValues v = aimed(*t, w.time + dt);
     for (auto &o : w.obstacles) {
       if (o->rigid != t->set) continue;
-      const ToolPlace end = part_place(t->motion.parts[o->rigid_body], load_place(v.target), v.target_opening);
+      const ToolPlace end =
+          part_place(t->motion.parts[o->rigid_body], load_place(v.target), v.target_opening);
       check_way(w, *o, pose_of(place_of(t->set->state[o->rigid_body])), pose_of(end), dt);
     }
   }
@@ -81,7 +81,8 @@ void end_tools(World &w, double dt) {
     ToolValues v = t->values();
     // the hand gets the other side of what holds the tool
     for (int k = 0; k < 6; ++k) v.given[k] = -v.coupling[k] / dt;
-    if (t->def.flags & DFM_TOOL_PASSIVE) keep_passive(t->motion, {load3(v.last_way), load3(v.last_way + 3)}, v);
+    if (t->def.flags & DFM_TOOL_PASSIVE)
+      keep_passive(t->motion, {load3(v.last_way), load3(v.last_way + 3)}, v);
     t->store(v);
   }
 }

@@ -105,6 +105,15 @@ uint64_t snapshot_structure(const World &w) {
       h.add(d.inertia);
     }
   }
+  for (auto &t : w.tools) {
+    h.add(t->name.data(), t->name.size());
+    const ToolMotion &m = t->motion;
+    for (const double x : {m.stiffness, m.damping, m.turn_stiffness, m.turn_damping, m.mass, m.inertia})
+      h.add(x);
+    h.add(t->def.flags);
+    h.add(t->keys.data(), t->keys.size() * sizeof(dfm_pose_key));
+    h.add(t->opening_keys.data(), t->opening_keys.size() * sizeof(dfm_scale_key));
+  }
   if (w.method->point_values) h.add(w.def.method);
   if (const uint8_t asked = asks_self_contact(w)) h.add(asked);
   return h.value;

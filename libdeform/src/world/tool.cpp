@@ -18,7 +18,7 @@
 namespace dfm {
 namespace {
 
-constexpr double kWidest = 3;        // rad, of an opening
+constexpr double kWidest = 3;         // rad, of an opening
 constexpr uint32_t kRefinements = 2;  // of an ellipsoid: 320 triangles
 
 bool finite(const double *p, size_t n) {
@@ -58,8 +58,8 @@ void check_coupling(const dfm_tool_def &d, const char *name) {
 }
 
 void check_sizes(const dfm_tool_def &d, const char *name) {
-  const bool boxes = jawed(d) || d.shape == DFM_TOOL_BOX || d.shape == DFM_TOOL_BLADE ||
-                     d.shape == DFM_TOOL_ELLIPSOID;
+  const bool boxes =
+      jawed(d) || d.shape == DFM_TOOL_BOX || d.shape == DFM_TOOL_BLADE || d.shape == DFM_TOOL_ELLIPSOID;
   for (const double s : d.half_size)
     if (boxes && !(s > 0 && std::isfinite(s)))
       fail(DFM_E_ARG, "tool '%s': half_size %g m; all three must be positive and finite", name, s);
@@ -90,10 +90,10 @@ std::vector<dfm_rigid_def> parts_of(const dfm_tool_def &d, const std::string &na
                                     std::vector<std::string> &names) {
   dfm_rigid_def frame = dfm_rigid_def{};
   frame.size = sizeof frame;
-  frame.shape = d.shape == DFM_TOOL_SPHERE                                 ? DFM_SHAPE_SPHERE
-                : d.shape == DFM_TOOL_CAPSULE                              ? DFM_SHAPE_CAPSULE
-                : d.shape == DFM_TOOL_BOX || d.shape == DFM_TOOL_BLADE     ? DFM_SHAPE_BOX
-                                                                           : DFM_SHAPE_NONE;
+  frame.shape = d.shape == DFM_TOOL_SPHERE                             ? DFM_SHAPE_SPHERE
+                : d.shape == DFM_TOOL_CAPSULE                          ? DFM_SHAPE_CAPSULE
+                : d.shape == DFM_TOOL_BOX || d.shape == DFM_TOOL_BLADE ? DFM_SHAPE_BOX
+                                                                       : DFM_SHAPE_NONE;
   std::copy(d.half_size, d.half_size + 3, frame.half_size);
   frame.radius = d.radius;
   frame.half_length = d.half_length;
@@ -180,7 +180,6 @@ Tool &checked(Tool &t, const dfm_pose &pose) {
   return t;
 }
 
-
 }  // namespace
 
 Tool &create_tool(World &w, const dfm_tool_def &def) {
@@ -211,8 +210,8 @@ Tool &create_tool(World &w, const dfm_tool_def &def) {
   t.motion.inertia = def.inertia;
   std::vector<std::string> names;
   const std::vector<dfm_rigid_def> parts = parts_of(t.def, t.name, t.motion, names);
-  const dfm_rigid_set_def set = {
-      sizeof set, static_cast<uint32_t>(parts.size()), 0, 0, parts.data(), nullptr, &t.motion};
+  const dfm_rigid_set_def set = {sizeof set, static_cast<uint32_t>(parts.size()), 0, 0, parts.data(), nullptr,
+                                 &t.motion};
   t.parts.resize(parts.size());
   w.tools.reserve(w.tools.size() + 1);
   create_rigids(w, kToolHost, set, t.parts.data());
@@ -330,9 +329,10 @@ void tool_feedback(const Tool &t, double force[3], double torque[3]) {
 }
 
 // Each surfel to the nearest part, so that none is held twice.
-std::vector<uint32_t> grab(Tool &t, Body &b, double reach, double release) {
+std::vector<uint32_t> grab(Tool &t, Body &b, double reach, double release, uint32_t capacity) {
   World &w = *t.world;
-  if (b.world != &w) fail(DFM_E_HANDLE, "tool '%s' and the body that it is to grab are of two worlds", t.name.c_str());
+  if (b.world != &w)
+    fail(DFM_E_HANDLE, "tool '%s' and the body that it is to grab are of two worlds", t.name.c_str());
   if (!(reach >= 0 && std::isfinite(reach)))
     fail(DFM_E_ARG, "tool '%s': a reach of %g m; give 0 or more", t.name.c_str(), reach);
   prepare(w);  // for d_c
@@ -352,6 +352,10 @@ std::vector<uint32_t> grab(Tool &t, Body &b, double reach, double release) {
     }
     if (part != kNone) held[part].push_back(i);
   }
+  const auto holding = std::count_if(held.begin(), held.end(), [](auto &list) { return !list.empty(); });
+  if (holding > capacity)
+    fail(DFM_E_ARG, "tool '%s' would hold '%s' with %d parts, and there is room for %u attachments",
+         t.name.c_str(), b.name.c_str(), int(holding), capacity);
   std::vector<uint32_t> out;
   for (size_t part = 0; part < held.size(); ++part) {
     if (held[part].empty()) continue;
@@ -383,7 +387,7 @@ void read_devices(World &w, double end) {
     const dfm_status status = t->device.read(t->device.user, end, &s);
     if (status < 0)
       fail(status, "the device of tool '%s' refuses the step: %s", t->name.c_str(),
-           sentences() != said ? last_error().c_str() : "it gives no reason");
+           sentences() != said ? last_error() : "it gives no reason");
     fresh.push_back(status == DFM_OK);
     if (status == DFM_OK) {
       checked(*t, s.pose);

@@ -22,7 +22,7 @@ void tool_force(const Tool &tool, double force[3], double torque[3]);
 void tool_feedback(const Tool &tool, double force[3], double torque[3]);
 
 // Numbers of the attachments, one per part that holds something.
-std::vector<uint32_t> grab(Tool &tool, Body &b, double reach, double release);
+std::vector<uint32_t> grab(Tool &tool, Body &b, double reach, double release, uint32_t capacity);
 void set_device(Tool &tool, const dfm_device *device);
 // Around a step. read_devices() throws Error where a device refuses it, and has moved nothing then.
 void read_devices(World &w, double end);

@@ -90,8 +90,8 @@ Frame ToolHost::move(const dfm_rigid_step &step, const Ways &w, Vec3 p, Vec3 tur
     spin = load3(w.values.target_velocity + 3);
   }
   const dfm_rigid_state &s = step.state[0];
-  return {mobility(h) *
-              (motion_.mass * load3(s.velocity) + h * (motion_.stiffness * way + motion_.damping * velocity) + p),
+  return {mobility(h) * (motion_.mass * load3(s.velocity) +
+                         h * (motion_.stiffness * way + motion_.damping * velocity) + p),
           turn_mobility(h) * (motion_.inertia * load3(s.spin) +
                               h * (motion_.turn_stiffness * turned_by + motion_.turn_damping * spin) + turn)};
 }
@@ -181,8 +181,7 @@ void ToolHost::commit(const dfm_rigid_step &step, const double *impulse, dfm_rig
 const ToolHost &self_of(void *self) { return *static_cast<const ToolHost *>(self); }
 
 dfm_status create(void *, const dfm_rigid_set_def *set, void **self, uint32_t *group, uint32_t *nextra) {
-  if (!set->data) 
-{
+  if (!set->data) {
     set_last_error("this host is that of tools; dfm_tool_create makes one");
     return DFM_E_ARG;
   }

@@ -19,8 +19,8 @@ struct ToolPlace {
 // What never changes of a tool.
 struct ToolMotion {
   struct Part {
-    ToolPlace at;   // in the tool's frame, at opening 0
-    double turns;   // about y through the origin, in openings: jaws +-1/2
+    ToolPlace at;  // in the tool's frame, at opening 0
+    double turns;  // about y through the origin, in openings: jaws +-1/2
   };
   std::vector<Part> parts;
   double stiffness = 0, damping = 0, turn_stiffness = 0, turn_damping = 0;
@@ -33,15 +33,15 @@ inline constexpr double kToolMeasured = 1, kToolMeasuredNext = 2;
 
 // The values of `extra`. Impulses, way and work are sums since the present step began.
 struct ToolValues {
-  double device[7];           // m and quaternion: where the device is now
-  double target[7];           // where it will be at `goal`
-  double target_velocity[6];  // m/s, rad/s then, where `measured` says so
-  double measured;            // 0, kToolMeasured, kToolMeasuredNext
-  double goal;                         // s
-  double opening, target_opening;      // rad
-  double keyed, opening_keyed;         // 1: keys lead
-  double contact[6], coupling[6];      // N s and N m s on the tool, about its origin, world frame
-  double time;                         // s of the step that are done
+  double device[7];                // m and quaternion: where the device is now
+  double target[7];                // where it will be at `goal`
+  double target_velocity[6];       // m/s, rad/s then, where `measured` says so
+  double measured;                 // 0, kToolMeasured, kToolMeasuredNext
+  double goal;                     // s
+  double opening, target_opening;  // rad
+  double keyed, opening_keyed;     // 1: keys lead
+  double contact[6], coupling[6];  // N s and N m s on the tool, about its origin, world frame
+  double time;                     // s of the step that are done
   double work;                     // J since the tool was made
   double port_work;                // J, with `given` held while the hand makes a step
   double last_way[6];              // m and rad that the hand made in the last step
