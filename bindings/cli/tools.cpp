@@ -6,8 +6,7 @@
 
 namespace cli {
 
-Tools::Tools(const SceneFile &scene, const std::string &folder)
-    : scene_(scene) {
+Tools::Tools(const SceneFile &scene, const std::string &folder) : scene_(scene) {
   uint32_t n = 0;
   need(dfm_world_tools(scene.world(), 0, nullptr, &n));
   std::vector<dfm_tool> list(n);

@@ -22,7 +22,7 @@ void each_default(F f) {
   f(dfm_material_def_default(), dfm_material_def_default_sized, 72, "dfm_material_def_default");
   f(dfm_obstacle_def_default(), dfm_obstacle_def_default_sized, 248, "dfm_obstacle_def_default");
   f(dfm_rigid_def_default(), dfm_rigid_def_default_sized, 224, "dfm_rigid_def_default");
-  f(dfm_tool_def_default(), dfm_tool_def_default_sized, 256, "dfm_tool_def_default");
+  f(dfm_tool_def_default(), dfm_tool_def_default_sized, 264, "dfm_tool_def_default");
   f(dfm_body_def_default(), dfm_body_def_default_sized, 256, "dfm_body_def_default");
   f(dfm_switch_default(), dfm_switch_default_sized, 48, "dfm_switch_default");
   f(dfm_switch_rule_default(), dfm_switch_rule_default_sized, 160, "dfm_switch_rule_default");

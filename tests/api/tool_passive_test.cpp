@@ -83,7 +83,9 @@ TEST(ToolPassive, Explore) {
           if (i >= 1500) top = std::max(top, hand.x), low = std::min(low, hand.x);
         }
         swing = top - low;
-        std::printf("k %5.0f late %2d passive %u: hand %9.2e J least %9.2e, port least %9.2e, work %9.2e, swing %8.2e m, at %g force %g\n",
-                    stiffness, late, flags, hand.given, least, port, s.state().work, swing, hand.x, force.back());
+        std::printf(
+            "k %5.0f late %2d passive %u: hand %9.2e J least %9.2e, port least %9.2e, work %9.2e, swing "
+            "%8.2e m, at %g force %g\n",
+            stiffness, late, flags, hand.given, least, port, s.state().work, swing, hand.x, force.back());
       }
 }

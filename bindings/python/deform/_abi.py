@@ -573,9 +573,10 @@ class dfm_tool_def(_Structure):
                 ("half_size", f64 * 3), ("radius", f64), ("half_length", f64), ("npoint", u32),
                 ("ntriangle", u32), ("points", ptr), ("triangles", ptr), ("opening", f64),
                 ("stiffness", f64), ("damping", f64), ("turn_stiffness", f64), ("turn_damping", f64),
-                ("mass", f64), ("inertia", f64), ("nkey", u32), ("nopening", u32), ("keys", ptr),
-                ("opening_keys", ptr), ("material", u64), ("category", u32), ("collides_with", u32),
-                ("user", ptr), ("flags", u32), ("reserved", u32), ("cookie", u64)]
+                ("mass", f64), ("inertia", f64), ("late", f64), ("nkey", u32), ("nopening", u32),
+                ("keys", ptr), ("opening_keys", ptr), ("material", u64), ("category", u32),
+                ("collides_with", u32), ("user", ptr), ("flags", u32), ("reserved", u32),
+                ("cookie", u64)]
 
 
 class dfm_tool_state(_Structure):

@@ -32,8 +32,8 @@ enum {
 };
 
 /** dfm_tool_def.flags. PASSIVE: of a coupled tool, a passivity controller watches the work that the hand does
- * against the force that it is given, which is older than its motion, and adds damping to that force where
- * the work would become negative (Hannaford and Ryu 2002). */
+ * against the force that it is given, which is older than its motion. While the sum is below 0 it adds damping
+ * to that force (Hannaford and Ryu 2002), and gives a smaller share of it where the device is late. */
 enum { DFM_TOOL_PASSIVE = 1 };
 
 typedef struct dfm_tool_def {
@@ -55,6 +55,9 @@ typedef struct dfm_tool_def {
    * else turn_stiffness too is above 0 */
   double stiffness, damping, turn_stiffness, turn_damping;
   double mass, inertia; /* kg, kg m2 about any axis through the origin: of the tool, where it is coupled */
+  /* s, 0 to 0.1, of a coupled tool: how much later than the next step the hand feels what answers its motion,
+   * by the device and its wires, both ways. port_work and PASSIVE count with it */
+  double late;
   uint32_t nkey, nopening;
   const dfm_pose_key *keys;          /* [nkey] poses over time, until the first dfm_tool_set_pose; copied */
   const dfm_scale_key *opening_keys; /* [nopening] rad over time, until dfm_tool_set_opening; copied */
@@ -142,8 +145,8 @@ typedef struct dfm_tool_state {
   double time;                 /* s, of the last step; 0: none yet */
   double work; /* J that whoever moves it has put in since it was made: into the coupling, or without one into
                 * what it touches; by the forces of the sub-steps themselves */
-  /* J, the same by the forces that dfm_tool_feedback gave: each acts while the hand makes the next step. Below
-   * 0 the hand has got energy that it never put in */
+  /* J, the same by the forces that dfm_tool_feedback gave: each acts while the hand makes the next step, or
+   * `late` seconds later. Below 0 the hand has got energy that it never put in */
   double port_work;
 } dfm_tool_state;
 /** @return DFM_OK; DFM_E_ARG; DFM_E_HANDLE. Threads: Any thread. Not during step. Since 0.1. */
@@ -152,7 +155,7 @@ DFM_API dfm_status dfm_tool_get_state(dfm_tool tool, dfm_tool_state *out);
 /* ---- grasping ------------------------------------------------------------------------------------------- */
 
 /** Attaches what a tool touches: the surfels of the body that touch a part of it or are nearer than `reach`
- * are held by the part, rigidly, as dfm_body_attach does (numbers, force, release, events, dfm_body_detach).
+ * are held by the part, rigidly, as dfm_body_attach does with DFM_ATTACH_TOUCH (force, events, dfm_body_detach).
  * Another tool may hold the same body: to hand it over, grab with the second and let go with the first.
  * @param reach    m from the surface of a part; 0: twice the contact offset
  * @param release  N: a larger force ends the attachment; 0: none does

@@ -181,6 +181,7 @@ const Table &objects() {
         {"turn_damping", true},
         {"mass", true},
         {"inertia", true},
+        {"late", true},
         {"passive", true}}},
       {"contact",
        {{"method", true},

@@ -8,6 +8,7 @@ namespace {
 
 constexpr double kRadian = 0.017453292519943295;  // of a degree
 constexpr Range kOpening{0, 170, false, false};   // degrees
+constexpr Range kLate{0, 0.1, false, false};      // s
 
 struct Shape {
   const char *name;
@@ -82,6 +83,7 @@ void read_coupling(const Node &coupling, dfm_tool_def &d) {
   d.turn_damping = coupling.number("turn_damping", 0.0, kNotNegative);
   d.mass = coupling.number("mass", d.mass, kPositive);
   d.inertia = coupling.number("inertia", d.inertia, kPositive);
+  d.late = coupling.number("late", 0.0, kLate);
   if (coupling.boolean("passive", false)) d.flags |= DFM_TOOL_PASSIVE;
 }
 

@@ -1,6 +1,8 @@
 // A tool (deform/tool.h): a set of rigid bodies that dynamics/rigid/tool_host.h moves. What changes in a run
 // stands among the set's values, so that snapshots have it; the keys are those of the def, for good.
 #pragma once
+#include <algorithm>
+#include <cstring>
 #include <string>
 #include <vector>
 
@@ -25,6 +27,19 @@ struct Tool {
   bool has_jaws() const { return def.shape == DFM_TOOL_GRASPER || def.shape == DFM_TOOL_SCISSORS; }
   ToolValues values() const { return tool_values(set->extra.data()); }
   void store(const ToolValues &v) { store_values(v, set->extra.data()); }
+  // Of a late device (ToolGiven): row of the past; what v gives at t comes into the next one.
+  ToolGiven past(size_t row) const {
+    ToolGiven g;
+    std::memcpy(&g, set->extra.data() + kToolValues + row * (sizeof g / sizeof(double)), sizeof g);
+    return g;
+  }
+  void remember(double t, ToolValues &v) {
+    const size_t row = static_cast<size_t>(v.ngiven) % kToolPast;
+    ToolGiven g{t, {}};
+    std::copy(v.given, v.given + 6, g.force);
+    std::memcpy(set->extra.data() + kToolValues + row * (sizeof g / sizeof(double)), &g, sizeof g);
+    v.ngiven += 1;
+  }
 };
 
 }  // namespace dfm

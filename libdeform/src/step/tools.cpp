@@ -28,6 +28,7 @@ ToolValues aimed(const Tool &tool, double end) {
 }
 
 // Of whoever moves the tool, in the step that begins.
+struct ToolForce { Vec3 force, torque; };
 struct Way { Vec3 path, turn; };
 Way way_of(const Tool &tool, const ToolValues &v) {
   const ToolPlace from = tool.motion.coupled() ? load_place(v.device) : place_of(tool.set->state[0]);
@@ -35,11 +36,33 @@ Way way_of(const Tool &tool, const ToolValues &v) {
   return {to.position - from.position, rotation_vector(to.rotation * conjugate(from.rotation))};
 }
 
-// Damping in the ratio of the coupling's two stiffnesses, for as long as the hand has got more than it gave:
-// so much that what is missing goes in the next step, if that is as fast as the last one.
+// What the hand feels while it makes the step that begins: the last force, or of a late device an older one.
+ToolForce felt(const Tool &tool, const ToolValues &v, double now) {
+  if (!(tool.motion.late > 0)) return {load3(v.given), load3(v.given + 3)};
+  const double then = now - tool.motion.late, slack = 1e-9 * tool.motion.late;
+  const size_t n = static_cast<size_t>(v.ngiven), kept = std::min(n, kToolPast);
+  for (size_t k = 1; k <= kept; ++k) {
+    const ToolGiven g = tool.past((n - k) % kToolPast);
+    if (g.t <= then + slack) return {load3(g.force), load3(g.force + 3)};
+  }
+  return {};
+}
+
+// For as long as the hand has got more than it gave: damping in the ratio of the coupling's two stiffnesses, so
+// much that what is missing goes in the next step, if that is as fast as the last one. A late device feels it
+// when the hand moves otherwise, and damping alone may then drive it; so a late hand gets a share of the force,
+// the smaller the more it has got, and with a small share every delay is stable.
 void keep_passive(const ToolMotion &m, const Way &way, ToolValues &v) {
+  if (!(v.port_work < 0)) return;
+  if (m.late > 0) {
+    const double stored =
+        0.5 * (norm2(load3(v.given)) / m.stiffness + norm2(load3(v.given + 3)) / m.turn_stiffness);
+    const double share = stored > 0 ? stored / (stored - v.port_work) : 0;
+    for (double &x : v.given) x *= share;
+    return;
+  }
   const double weight = m.stiffness * norm2(way.path) + m.turn_stiffness * norm2(way.turn);
-  if (!(v.port_work < 0) || !(weight > 0)) return;
+  if (!(weight > 0)) return;
   const double a = std::min(-v.port_work / weight, kMostDamping);  // steps
   store3(v.given, load3(v.given) - a * m.stiffness * way.path);
   store3(v.given + 3, load3(v.given + 3) - a * m.turn_stiffness * way.turn);
@@ -64,7 +87,8 @@ void begin_tools(World &w, double dt) {
   for (auto &t : w.tools) {
     ToolValues v = aimed(*t, w.time + dt);
     const Way way = way_of(*t, v);
-    v.port_work -= dot(load3(v.given), way.path) + dot(load3(v.given + 3), way.turn);
+    const ToolForce hand = felt(*t, v, w.time);
+    v.port_work -= dot(hand.force, way.path) + dot(hand.torque, way.turn);
     v.measured = v.measured == kToolMeasuredNext ? kToolMeasured : 0;
     v.goal = w.time + dt;
     v.time = 0;
@@ -83,6 +107,7 @@ void end_tools(World &w, double dt) {
     for (int k = 0; k < 6; ++k) v.given[k] = -v.coupling[k] / dt;
     if (t->def.flags & DFM_TOOL_PASSIVE)
       keep_passive(t->motion, {load3(v.last_way), load3(v.last_way + 3)}, v);
+    if (t->motion.late > 0) t->remember(w.time, v);
     t->store(v);
   }
 }

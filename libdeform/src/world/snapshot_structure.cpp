@@ -108,7 +108,8 @@ uint64_t snapshot_structure(const World &w) {
   for (auto &t : w.tools) {
     h.add(t->name.data(), t->name.size());
     const ToolMotion &m = t->motion;
-    for (const double x : {m.stiffness, m.damping, m.turn_stiffness, m.turn_damping, m.mass, m.inertia})
+    for (const double x :
+         {m.stiffness, m.damping, m.turn_stiffness, m.turn_damping, m.mass, m.inertia, m.late})
       h.add(x);
     h.add(t->def.flags);
     h.add(t->keys.data(), t->keys.size() * sizeof(dfm_pose_key));

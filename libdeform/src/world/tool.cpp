@@ -19,6 +19,7 @@ namespace dfm {
 namespace {
 
 constexpr double kWidest = 3;         // rad, of an opening
+constexpr double kLatest = 0.1;       // s, of a device
 constexpr uint32_t kRefinements = 2;  // of an ellipsoid: 320 triangles
 
 bool finite(const double *p, size_t n) {
@@ -39,7 +40,11 @@ void check_coupling(const dfm_tool_def &d, const char *name) {
            "tool '%s': stiffness, damping, turn_stiffness, turn_damping, mass and inertia must be finite and "
            "not negative, found %g",
            name, x);
+  if (!(d.late >= 0 && d.late <= kLatest))
+    fail(DFM_E_ARG, "tool '%s': a device that is %g s late; give 0 to %g s", name, d.late, kLatest);
   if (!(d.stiffness > 0)) {
+    if (d.late > 0)
+      fail(DFM_E_ARG, "tool '%s': late is of a coupled tool; give a stiffness, or leave it 0", name);
     if (d.flags & DFM_TOOL_PASSIVE)
       fail(DFM_E_ARG, "tool '%s': DFM_TOOL_PASSIVE is for a coupled tool; give a stiffness", name);
     if (d.damping > 0 || d.turn_stiffness > 0 || d.turn_damping > 0)
@@ -208,6 +213,7 @@ Tool &create_tool(World &w, const dfm_tool_def &def) {
   t.motion.turn_damping = def.turn_damping;
   t.motion.mass = def.mass;
   t.motion.inertia = def.inertia;
+  t.motion.late = def.late;
   std::vector<std::string> names;
   const std::vector<dfm_rigid_def> parts = parts_of(t.def, t.name, t.motion, names);
   const dfm_rigid_set_def set = {sizeof set, static_cast<uint32_t>(parts.size()), 0, 0, parts.data(), nullptr,
@@ -364,6 +370,7 @@ std::vector<uint32_t> grab(Tool &t, Body &b, double reach, double release, uint3
     d.nsurfel = static_cast<uint32_t>(held[part].size());
     d.surfels = held[part].data();
     d.release = release;
+    d.flags = DFM_ATTACH_TOUCH;  // what is not held must not come into the jaws
     out.push_back(attach(b, d, nullptr, &rigid_obstacle(w, t.set->obstacle[part])));
   }
   return out;

@@ -31,6 +31,7 @@ struct Frame {
 class ToolHost {
  public:
   explicit ToolHost(const ToolMotion &motion) : motion_(motion) {}
+  bool late() const { return motion_.late > 0; }
   void predict(const dfm_rigid_step &step, double *velocity) const;
   void respond(const dfm_rigid_step &step, double *matrix) const;
   void commit(const dfm_rigid_step &step, const double *impulse, dfm_rigid_state *state, double *extra) const;
@@ -160,6 +161,8 @@ void ToolHost::commit(const dfm_rigid_step &step, const double *impulse, dfm_rig
   v.opening = w.opening;
   store_place(v.device, w.device);
   store_values(v, extra);
+  if (late())  // no sub-step changes them
+    std::memcpy(extra + kToolValues, step.extra + kToolValues, kToolPastValues * sizeof(double));
   for (size_t i = 0; i < motion_.parts.size(); ++i) {
     const ToolPlace from = place_of(step.state[i]), to = part_place(motion_.parts[i], end, w.opening);
     dfm_rigid_state &s = state[i];
@@ -189,7 +192,7 @@ dfm_status create(void *, const dfm_rigid_set_def *set, void **self, uint32_t *g
   if (!made) return DFM_E_NOMEM;
   *self = made;
   for (uint32_t i = 0; i < set->nbody; ++i) group[i] = 0;
-  *nextra = kToolValues;
+  *nextra = kToolValues + (made->late() ? kToolPastValues : 0);
   return DFM_OK;
 }
 void destroy(void *self) { delete static_cast<ToolHost *>(self); }

@@ -25,6 +25,7 @@ struct ToolMotion {
   std::vector<Part> parts;
   double stiffness = 0, damping = 0, turn_stiffness = 0, turn_damping = 0;
   double mass = 0, inertia = 0;
+  double late = 0;  // s; above 0 the forces that were given are remembered
   bool coupled() const { return stiffness > 0; }
 };
 
@@ -46,8 +47,17 @@ struct ToolValues {
   double port_work;                // J, with `given` held while the hand makes a step
   double last_way[6];              // m and rad that the hand made in the last step
   double given[6];                 // N and N m on the hand after the last step, world frame
+  double ngiven;                   // forces given so far, of a late device
 };
 inline constexpr size_t kToolValues = sizeof(ToolValues) / sizeof(double);
+// Behind the values, of a late device: the last forces that were given, and when. Number k stands in row
+// k mod kToolPast.
+inline constexpr size_t kToolPast = 256;
+struct ToolGiven {
+  double t;  // s, the end of its step
+  double force[6];
+};
+inline constexpr size_t kToolPastValues = kToolPast * sizeof(ToolGiven) / sizeof(double);
 ToolValues tool_values(const double *extra);
 void store_values(const ToolValues &values, double *extra);
 
