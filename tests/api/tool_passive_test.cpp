@@ -14,7 +14,7 @@ struct Scene {
   dfm_world w = test::make_world(context, {0, 0, 0});
   dfm_body block;
   dfm_tool tool = 0;
-  Scene(double young, double stiffness, double damping, uint32_t flags) {
+  Scene(double young, double stiffness, double damping, uint32_t flags, double late = 0) {
     test::set_friction(w, 0.5);
     test::BodyOptions o;
     o.name = "block";
@@ -34,6 +34,7 @@ struct Scene {
     d.turn_stiffness = 0.2;
     d.turn_damping = 1e-3;
     d.flags = flags;
+    d.late = late;
     test::ok(dfm_tool_create(w, &d, &tool));
   }
   dfm_tool_state state() const {
@@ -63,7 +64,7 @@ TEST(ToolPassive, Explore) {
   for (const double stiffness : {300.0, 1000.0, 3000.0})
     for (const int late : {0, 10})
       for (const uint32_t flags : {0u, uint32_t(DFM_TOOL_PASSIVE)}) {
-        Scene s(2e6, stiffness, 1.0, flags);
+        Scene s(2e6, stiffness, 1.0, flags, 1e-3 * late);
         Hand hand{0.011};
         std::mt19937 random(7);
         std::deque<double> force(size_t(late) + 1, 0.0);
