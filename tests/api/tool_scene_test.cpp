@@ -49,14 +49,15 @@ constexpr double kDegree = 0.017453292519943295;
 TEST(ToolScene, EveryShape_GoesByItsKeys) {
   const Opened s(scene(R"([
     {"name": "ball", "shape": "sphere", "radius": 0.005, "pose": {"position": [0, 0, 0.1]}},
-    {"name": "pin", "shape": "capsule", "radius": 0.002, "half_length": 0.01, "pose": {"position": [0, 0, 0.2]},
+    {"name": "pin", "shape": "capsule", "radius": 0.002, "half_length": 0.01,
+     "pose": {"position": [0, 0, 0.2]},
      "coupling": {"stiffness": 300, "turn_stiffness": 0.2, "damping": 0.5, "passive": true},
      "motion": {"keyframes": [{"t": 0, "position": [0, 0, 0.2]}, {"t": 0.1, "position": [0, 0, 0.25]}]}},
-    {"name": "knife", "shape": "blade", "half_size": [0.0005, 0.01, 0.005], "pose": {"position": [0, 0, 0.3]}},
+    {"name": "knife", "shape": "blade", "half_size": [0.001, 0.01, 0.005], "pose": {"position": [0, 0, 0.3]}},
     {"name": "egg", "shape": "ellipsoid", "half_size": [0.01, 0.02, 0.01], "pose": {"position": [0, 0, 0.4]}},
     {"name": "brick", "shape": "box", "half_size": [0.01, 0.02, 0.01], "pose": {"position": [0, 0, 0.5]}},
-    {"name": "jaws", "shape": "grasper", "half_size": [0.001, 0.003, 0.01], "radius": 0.002, "half_length": 0.02,
-     "material": "steel", "pose": {"position": [0.2, 0, 0]},
+    {"name": "jaws", "shape": "grasper", "half_size": [0.001, 0.003, 0.01], "radius": 0.002,
+     "half_length": 0.02, "material": "steel", "pose": {"position": [0.2, 0, 0]},
      "opening_deg": {"keyframes": [{"t": 0, "value": 40}, {"t": 0.1, "value": 20}]}},
     {"name": "shears", "shape": "scissors", "half_size": [0.001, 0.001, 0.01], "opening_deg": 30,
      "pose": {"position": [0.3, 0, 0]}}])"));

@@ -1,4 +1,4 @@
-/* deform/tool.h -- tools: rigid things that a hand, a device or a program moves, and that feel what they touch.
+/* deform/tool.h -- tools: rigid things that a hand, a device or a program moves; they feel what they touch.
  * doc/concepts/tools.md.
  *
  * A tool has a frame and one or more parts, which are rigid bodies (deform/rigid.h): contact, friction,
@@ -32,8 +32,8 @@ enum {
 };
 
 /** dfm_tool_def.flags. PASSIVE: of a coupled tool, a passivity controller watches the work that the hand does
- * against the force that it is given, which is older than its motion. While the sum is below 0 it adds damping
- * to that force (Hannaford and Ryu 2002), and gives a smaller share of it where the device is late. */
+ * against the force that it is given, which is older than its motion. While the hand has got more than it
+ * gave, it is given a share of the force, the smaller the more that is. */
 enum { DFM_TOOL_PASSIVE = 1 };
 
 typedef struct dfm_tool_def {
@@ -99,13 +99,13 @@ DFM_API dfm_status dfm_tool_get_def(dfm_tool tool, dfm_tool_def *out);
  * thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_tool_parts(dfm_tool tool, uint32_t capacity, dfm_rigid *out, uint32_t *n);
 
-/* ---- moved once per step -------------------------------------------------------------------------------- */
+/* ---- moved once per step ------------------------------------------------------------------------------- */
 
 /** Where the tool, or the device that it is coupled to, is at the end of the next step; it goes there at
  * constant rate, and stands still in steps for which nothing is said. Replaces keys.
  * @param pose      world frame
- * @param velocity  [6] m/s and rad/s at that time, world frame, as the device measures it: what the coupling's
- * damper sees. NULL: that of the way there. Without a coupling it has no effect.
+ * @param velocity  [6] m/s and rad/s at that time, world frame, as the device measures it: what the damper of the
+ * coupling sees. NULL: that of the way there. Without a coupling it has no effect.
  * @return DFM_OK; DFM_E_ARG not finite; DFM_E_HANDLE. A step in which a tool without coupling would move
  * faster than dfm_world_def.obstacle_speed is refused by dfm_world_step, with DFM_E_ARG, and nothing changes.
  * Threads: Not during step. Since 0.1. */
@@ -119,7 +119,7 @@ DFM_API dfm_status dfm_tool_set_opening(dfm_tool tool, double angle);
  * Not during step. Since 0.1. */
 DFM_API dfm_status dfm_tool_teleport(dfm_tool tool, const dfm_pose *pose);
 
-/* ---- what is felt --------------------------------------------------------------------------------------- */
+/* ---- what is felt -------------------------------------------------------------------------------------- */
 
 /** What the world did to the tool in the last step: contact, friction and attachments, on all parts.
  * Impulses are summed over all sub-steps and divided by the length of the step, so that H times the force is
@@ -152,11 +152,11 @@ typedef struct dfm_tool_state {
 /** @return DFM_OK; DFM_E_ARG; DFM_E_HANDLE. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_tool_get_state(dfm_tool tool, dfm_tool_state *out);
 
-/* ---- grasping ------------------------------------------------------------------------------------------- */
+/* ---- grasping ------------------------------------------------------------------------------------------ */
 
 /** Attaches what a tool touches: the surfels of the body that touch a part of it or are nearer than `reach`
- * are held by the part, rigidly, as dfm_body_attach does with DFM_ATTACH_TOUCH (force, events, dfm_body_detach).
- * Another tool may hold the same body: to hand it over, grab with the second and let go with the first.
+ * are held by the part, rigidly, as dfm_body_attach does with DFM_ATTACH_TOUCH (force, events, end). Another
+ * tool may hold the same body: to hand it over, grab with the second, then dfm_body_detach from the first.
  * @param reach    m from the surface of a part; 0: twice the contact offset
  * @param release  N: a larger force ends the attachment; 0: none does
  * @param capacity of attachment; as many as the tool has parts is always enough
@@ -167,7 +167,7 @@ DFM_API dfm_status dfm_tool_get_state(dfm_tool tool, dfm_tool_state *out);
 DFM_API dfm_status dfm_tool_grab(dfm_tool tool, dfm_body body, double reach, double release,
                                  uint32_t capacity, uint32_t *attachment, uint32_t *n);
 
-/* ---- devices -------------------------------------------------------------------------------------------- */
+/* ---- devices ------------------------------------------------------------------------------------------- */
 
 /** What a device says of the hand. */
 typedef struct dfm_device_sample {
@@ -193,8 +193,8 @@ typedef struct dfm_device {
 } dfm_device;
 /** Lets a device move the tool from the next step on; it replaces keys, and dfm_tool_set_pose then has no
  * effect.
- * @param device copied; NULL: none any more. @return DFM_OK; DFM_E_ARG read is missing; DFM_E_HANDLE. Threads:
- * Not during step. Since 0.1. */
+ * @param device copied; NULL: none any more. @return DFM_OK; DFM_E_ARG read is missing; DFM_E_HANDLE.
+ * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_tool_set_device(dfm_tool tool, const dfm_device *device);
 #ifdef __cplusplus
 }

@@ -10,9 +10,11 @@
 namespace dfm {
 namespace {
 
-// Of a passivity controller, in steps: what it adds to a coupling of stiffness k is at most a damper of so
-// many k dt. A step of delay takes k dt to make up for (Colgate, Stanley and Brown 1995, eq. 12).
-constexpr double kMostDamping = 20;
+// Of the passivity controller. Where the hand has got as much as the coupling stores at the force that it is
+// to get, it gets an eleventh of that force; what it has got is forgiven within about a second, so that a
+// steady push is felt again once the loop is quiet.
+constexpr double kSteep = 10;
+constexpr double kForgiven = 1;  // s
 
 Pose pose_of(const ToolPlace &p) { return {p.position, p.rotation}; }
 
@@ -48,24 +50,14 @@ ToolForce felt(const Tool &tool, const ToolValues &v, double now) {
   return {};
 }
 
-// For as long as the hand has got more than it gave: damping in the ratio of the coupling's two stiffnesses, so
-// much that what is missing goes in the next step, if that is as fast as the last one. A late device feels it
-// when the hand moves otherwise, and damping alone may then drive it; so a late hand gets a share of the force,
-// the smaller the more it has got, and with a small share every delay is stable.
-void keep_passive(const ToolMotion &m, const Way &way, ToolValues &v) {
-  if (!(v.port_work < 0)) return;
-  if (m.late > 0) {
-    const double stored =
-        0.5 * (norm2(load3(v.given)) / m.stiffness + norm2(load3(v.given + 3)) / m.turn_stiffness);
-    const double share = stored > 0 ? stored / (stored - v.port_work) : 0;
-    for (double &x : v.given) x *= share;
-    return;
-  }
-  const double weight = m.stiffness * norm2(way.path) + m.turn_stiffness * norm2(way.turn);
-  if (!(weight > 0)) return;
-  const double a = std::min(-v.port_work / weight, kMostDamping);  // steps
-  store3(v.given, load3(v.given) - a * m.stiffness * way.path);
-  store3(v.given + 3, load3(v.given + 3) - a * m.turn_stiffness * way.turn);
+// A share of the force, the smaller the more the hand has got that it never gave. A loop with a small gain is
+// stable with every delay; damping, which would act as late as the force does, is not.
+void keep_passive(const ToolMotion &m, ToolValues &v) {
+  if (!(v.tank < 0)) return;
+  const double stored =
+      0.5 * (norm2(load3(v.given)) / m.stiffness + norm2(load3(v.given + 3)) / m.turn_stiffness);
+  const double share = stored > 0 ? stored / (stored - kSteep * v.tank) : 0;
+  for (double &x : v.given) x *= share;
 }
 
 }  // namespace
@@ -88,14 +80,15 @@ void begin_tools(World &w, double dt) {
     ToolValues v = aimed(*t, w.time + dt);
     const Way way = way_of(*t, v);
     const ToolForce hand = felt(*t, v, w.time);
-    v.port_work -= dot(hand.force, way.path) + dot(hand.torque, way.turn);
+    const double work = -dot(hand.force, way.path) - dot(hand.torque, way.turn);
+    v.port_work += work;
+    v.tank += work;
+    if (v.tank < 0) v.tank *= kForgiven / (kForgiven + dt);
     v.measured = v.measured == kToolMeasuredNext ? kToolMeasured : 0;
     v.goal = w.time + dt;
     v.time = 0;
     std::fill(v.contact, v.contact + 6, 0.0);
     std::fill(v.coupling, v.coupling + 6, 0.0);
-    store3(v.last_way, way.path);
-    store3(v.last_way + 3, way.turn);
     t->store(v);
   }
 }
@@ -105,8 +98,7 @@ void end_tools(World &w, double dt) {
     ToolValues v = t->values();
     // the hand gets the other side of what holds the tool
     for (int k = 0; k < 6; ++k) v.given[k] = -v.coupling[k] / dt;
-    if (t->def.flags & DFM_TOOL_PASSIVE)
-      keep_passive(t->motion, {load3(v.last_way), load3(v.last_way + 3)}, v);
+    if (t->def.flags & DFM_TOOL_PASSIVE) keep_passive(t->motion, v);
     if (t->motion.late > 0) t->remember(w.time, v);
     t->store(v);
   }

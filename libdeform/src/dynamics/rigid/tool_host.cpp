@@ -3,7 +3,7 @@
 //   not coupled   it goes to its target at constant rate, and answers no impulse
 //   coupled       spring and damper at the end of the sub-step (backward Euler), D the device:
 //                     m (v' - v) = h (k (D' - x - h v') + c (v_D - v')) + p
-//                 so v' = (m v + h k (D' - x) + h c v_D + p) / (m + h c + h^2 k), and the same for turning with
+//                 so v' = (m v + h k (D' - x) + h c v_D + p) / (m + h c + h^2 k), the same for turning with
 //                 the rotation vector from the tool to the device, whose torque is the gradient of
 //                 k |r|^2 / 2. In each sub-step the spring's energy and the motion's rise by at most what
 //                 device and contact put in, whatever k, c, m and h are: an implicit virtual coupling is

@@ -1,5 +1,5 @@
-// The rigid host that moves tools: a set is one tool, its bodies are the parts, all in one group that moves as
-// the tool's frame does. What lasts stands in `extra`, so that snapshots and the hash have it.
+// The rigid host that moves tools: a set is one tool, its bodies are the parts, all in one group that moves
+// as the tool's frame does. What lasts stands in `extra`, so that snapshots and the hash have it.
 #pragma once
 #include <vector>
 
@@ -45,7 +45,7 @@ struct ToolValues {
   double time;                     // s of the step that are done
   double work;                     // J since the tool was made
   double port_work;                // J, with `given` held while the hand makes a step
-  double last_way[6];              // m and rad that the hand made in the last step
+  double tank;                     // J, port_work, of which what is below 0 is forgiven in time
   double given[6];                 // N and N m on the hand after the last step, world frame
   double ngiven;                   // forces given so far, of a late device
 };
