@@ -11,7 +11,7 @@ import sys
 import textwrap
 
 HEADERS = ("plugin base id math world body contact attach surface mesh scene obstacle law material model "
-           "rigid tool toi debug query callback sensor").split()
+           "rigid toi debug query callback sensor").split()
 SCALARS = {"double": "f64", "float": "f32", "uint64_t": "u64", "uint32_t": "u32", "int32_t": "i32",
            "uint8_t": "u8", "size_t": "usize", "bool": "flag", "int": "cint", "dfm_status": "i32"}
 HEAD = '''"""The C interface of libdeform for ctypes. Written by make_abi.py from the public headers: change

@@ -133,17 +133,6 @@ DFM_JOINT_BALL = 2
 DFM_JOINT_FIXED = 3
 DFM_RIGID_AGAIN = 2
 DFM_RIGID_MOST_AGAIN = 4
-DFM_TOOL_SPHERE = 0
-DFM_TOOL_CAPSULE = 1
-DFM_TOOL_BOX = 2
-DFM_TOOL_MESH = 3
-DFM_TOOL_GRASPER = 4
-DFM_TOOL_SCISSORS = 5
-DFM_TOOL_ELLIPSOID = 6
-DFM_TOOL_BLADE = 7
-DFM_TOOL_PASSIVE = 1
-DFM_DEVICE_VELOCITY = 1
-DFM_DEVICE_OPENING = 2
 DFM_TOI_BISECTION = 0
 DFM_TOI_REGULA_FALSI = 1
 DFM_TOI_BRENT = 2
@@ -568,32 +557,6 @@ class dfm_rigid_host(_Structure):
                 ("revise", ptr), ("push", ptr), ("may_destroy", ptr)]
 
 
-class dfm_tool_def(_Structure):
-    _fields_ = [("size", u32), ("shape", u32), ("name", text), ("pose", dfm_pose),
-                ("half_size", f64 * 3), ("radius", f64), ("half_length", f64), ("npoint", u32),
-                ("ntriangle", u32), ("points", ptr), ("triangles", ptr), ("opening", f64),
-                ("stiffness", f64), ("damping", f64), ("turn_stiffness", f64), ("turn_damping", f64),
-                ("mass", f64), ("inertia", f64), ("late", f64), ("nkey", u32), ("nopening", u32),
-                ("keys", ptr), ("opening_keys", ptr), ("material", u64), ("category", u32),
-                ("collides_with", u32), ("user", ptr), ("flags", u32), ("reserved", u32),
-                ("cookie", u64)]
-
-
-class dfm_tool_state(_Structure):
-    _fields_ = [("size", u32), ("nkeys", u32), ("pose", dfm_pose), ("velocity", f64 * 3),
-                ("spin", f64 * 3), ("device", dfm_pose), ("opening", f64), ("time", f64), ("work", f64),
-                ("port_work", f64)]
-
-
-class dfm_device_sample(_Structure):
-    _fields_ = [("size", u32), ("flags", u32), ("pose", dfm_pose), ("velocity", f64 * 6),
-                ("opening", f64)]
-
-
-class dfm_device(_Structure):
-    _fields_ = [("size", u32), ("flags", u32), ("user", ptr), ("read", ptr), ("write", ptr)]
-
-
 class dfm_motion(_Structure):
     _fields_ = [("p0", f64 * 3), ("p1", f64 * 3)]
 
@@ -793,21 +756,6 @@ FUNCTIONS = {
     "dfm_rigid_contact_wrench": (i32, [u64, ptr, ptr]),
     "dfm_rigid_set_motor": (i32, [u64, u32, f64, f64]),
     "dfm_rigid_joint": (i32, [u64, u32, ptr, ptr, ptr]),
-    "dfm_tool_def_default_sized": (None, [u32, ptr]),
-    "dfm_tool_create": (i32, [u64, ptr, ptr]),
-    "dfm_tool_destroy": (i32, [u64]),
-    "dfm_world_tools": (i32, [u64, u32, ptr, ptr]),
-    "dfm_world_find_tool": (i32, [u64, text, ptr]),
-    "dfm_tool_get_def": (i32, [u64, ptr]),
-    "dfm_tool_parts": (i32, [u64, u32, ptr, ptr]),
-    "dfm_tool_set_pose": (i32, [u64, ptr, ptr]),
-    "dfm_tool_set_opening": (i32, [u64, f64]),
-    "dfm_tool_teleport": (i32, [u64, ptr]),
-    "dfm_tool_force": (i32, [u64, ptr, ptr]),
-    "dfm_tool_feedback": (i32, [u64, ptr, ptr]),
-    "dfm_tool_get_state": (i32, [u64, ptr]),
-    "dfm_tool_grab": (i32, [u64, u64, f64, f64, u32, ptr, ptr]),
-    "dfm_tool_set_device": (i32, [u64, ptr]),
     "dfm_toi_point_triangle": (i32, [ptr, ptr, ptr, ptr, ptr]),
     "dfm_toi_edge_edge": (i32, [ptr, ptr, ptr, ptr, ptr]),
     "dfm_toi_evaluations": (u32, []),

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Frames of scenes side by side: attached.png, grasp.png, scenes.png, fill_drop.png, pressed_ring.png, rigid.png,
-ode_scenes.png, stability.png.
+"""Frames of scenes side by side: attached.png, grasp.png, scenes.png, fill_drop.png, pressed_ring.png,
+rigid.png, ode_scenes.png, stability.png.
 
 scene_frames.py DEFORM_COMMAND [NAME.png...] [--out FOLDER]
 

@@ -104,8 +104,8 @@ DFM_API dfm_status dfm_tool_parts(dfm_tool tool, uint32_t capacity, dfm_rigid *o
 /** Where the tool, or the device that it is coupled to, is at the end of the next step; it goes there at
  * constant rate, and stands still in steps for which nothing is said. Replaces keys.
  * @param pose      world frame
- * @param velocity  [6] m/s and rad/s at that time, world frame, as the device measures it: what the damper of the
- * coupling sees. NULL: that of the way there. Without a coupling it has no effect.
+ * @param velocity  [6] m/s and rad/s at that time, world frame, as the device measures it: what the damper of
+ * the coupling sees. NULL: that of the way there. Without a coupling it has no effect.
  * @return DFM_OK; DFM_E_ARG not finite; DFM_E_HANDLE. A step in which a tool without coupling would move
  * faster than dfm_world_def.obstacle_speed is refused by dfm_world_step, with DFM_E_ARG, and nothing changes.
  * Threads: Not during step. Since 0.1. */
