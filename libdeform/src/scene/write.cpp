@@ -365,6 +365,8 @@ void tell_what_is_left_out(SceneWriter &to) {
         "nobody about pairs that come later");
   if (w.pre_solve.call)
     to.note("a callback of the host changes contacts before they are solved; a scene has none");
+  for (const auto &t : w.tools)
+    to.note("tool '%s' is left out; write it into \"tools\" by hand", t->name.c_str());
   const std::pair<const char *, bool> members[] = {{"max_sweeps", w.def.max_sweeps != usual.max_sweeps},
                                                    {"max_passes", w.def.max_passes != usual.max_passes},
                                                    {"max_substeps", w.def.max_substeps != usual.max_substeps},

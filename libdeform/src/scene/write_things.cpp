@@ -175,14 +175,13 @@ Written rigid_body_of(SceneWriter &to, const RigidSet &set, uint32_t i) {
 }
 
 // Bodies of the same host, of which a scene has one set.
-std::string host_of(SceneWriter &to) {
-  const World &w = to.w;
+std::string host_of(SceneWriter &to, const std::vector<const RigidSet *> &sets) {
   size_t bodies = 0;
-  for (const auto &set : w.rigid_sets)
+  for (const RigidSet *set : sets)
     if (set->elsewhere) bodies += set->defs.size();
-  const std::string &name = w.rigid_sets[0]->host_name;
-  const bool one = std::all_of(w.rigid_sets.begin(), w.rigid_sets.end(),
-                               [&](const auto &set) { return set->host_name == name; });
+  const std::string &name = sets[0]->host_name;
+  const bool one =
+      std::all_of(sets.begin(), sets.end(), [&](const RigidSet *set) { return set->host_name == name; });
   if (bodies > 0) {
     to.note(
         "%zu rigid bodies live in a world of the host '%s', of which a scene has no more than their "
@@ -195,20 +194,23 @@ std::string host_of(SceneWriter &to) {
     to.note(
         "the rigid bodies belong to several hosts, and in a scene to one: they are written for the host "
         "builtin");
-  else if (w.rigid_sets.size() > 1)
+  else if (sets.size() > 1)
     to.note("the rigid bodies were made as %zu sets and are one in a scene; they move alike to rounding",
-            w.rigid_sets.size());
+            sets.size());
   return one ? name : "builtin";
 }
 
 }  // namespace
 
 Written write_rigid(SceneWriter &to) {
-  if (to.w.rigid_sets.empty()) return nullptr;
+  std::vector<const RigidSet *> sets;
+  for (const auto &set : to.w.rigid_sets)
+    if (!set->of_tool) sets.push_back(set.get());
+  if (sets.empty()) return nullptr;
   Written out;
-  out["host"] = host_of(to);
+  out["host"] = host_of(to, sets);
   Written &bodies = out["bodies"] = Written::array();
-  for (const auto &set : to.w.rigid_sets) {
+  for (const RigidSet *set : sets) {
     std::vector<Written> rows;
     for (uint32_t i = 0; i < set->defs.size(); ++i) rows.push_back(rigid_body_of(to, *set, i));
     for (const dfm_joint_def &j : set->joints) {
@@ -220,7 +222,7 @@ Written write_rigid(SceneWriter &to) {
       if (!row.is_null()) bodies.push_back(std::move(row));
   }
   // ids are consecutive where there is one set; those of others would not be
-  if (to.w.rigid_sets.size() > 1)
+  if (sets.size() > 1)
     for (Written &row : bodies) row.erase("id");
   return out;
 }
