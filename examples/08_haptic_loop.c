@@ -38,7 +38,7 @@ static void add(Histogram *h, double seconds) {
 }
 
 static void print(const char *what, const Histogram *h) {
-  printf("%-28s", what);
+  printf("%-30s", what);
   for (int k = 0; k < CLASSES; ++k) printf(" %6ld", h->count[k]);
   printf("   mean %6.3f, most %6.3f ms\n", h->n ? h->sum / (double)h->n : 0.0, h->most);
 }
@@ -189,7 +189,7 @@ int main(int argc, char **argv) {
   pthread_mutex_unlock(&shared.lock);
   pthread_join(thread, NULL);
 
-  printf("%-28s", "ms, up to");
+  printf("%-30s", "ms, up to");
   for (int k = 0; k < CLASSES - 1; ++k) printf(" %6g", kClass[k]);
   printf("   more\n");
   print("loop wakes up late by", &loop.late);

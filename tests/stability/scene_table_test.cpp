@@ -27,6 +27,7 @@ constexpr Row kRows[] = {
     {"fill_drop_organs", 20, 0.2, true},
     {"gravity_anisotropy", 0, 0, false},
     {"gravity_beams", 0, 0, false},
+    {"grasp", 6, 0.75, false},
     {"guard_shot", 20, 0.02, false},
     {"pinched_tube", 8, 0.45, false},
     {"ode_bed", 30, 0.4, false, true},
