@@ -10,7 +10,7 @@ import subprocess
 import sys
 
 FLAGS = ["-fsyntax-only", "-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Werror"]
-CPP20 = {"attach.hpp", "defs.hpp", "deform.hpp", "models.hpp", "obstacles.hpp", "queries.hpp",
+CPP20 = {"attach.hpp", "defs.hpp", "deform.hpp", "models.hpp", "obstacles.hpp", "queries.hpp", "tools.hpp",
          "result.hpp"}   # std::span
 LANGUAGES = {"c99": "c", "c17": "c", "c++17": "c++", "c++20": "c++"}
 
