@@ -141,7 +141,7 @@ class Site(unittest.TestCase):
 
     def test_contents_follow_the_reading_order(self):
         sections = [next(iter(entry)) for entry in self.stage.nav]
-        self.assertEqual(sections[:3], ["Reading order", "What it is", "Ten minutes"])
+        self.assertEqual(sections[:3], ["Reading order", "Overview", "First steps"])
         for entry in self.stage.nav:
             pages = next(iter(entry.values()))
             for page in [pages] if isinstance(pages, str) else [next(iter(p.values())) for p in pages]:
