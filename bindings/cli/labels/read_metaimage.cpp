@@ -2,7 +2,7 @@
 // lie in that file (.mhd). Keys as the MetaIO documentation has them.
 #include <algorithm>
 
-#include "label_volume.h"
+#include "header_lines.h"
 
 namespace labels {
 namespace {
@@ -18,9 +18,9 @@ const Type kTypes[] = {{"MET_CHAR", 1, true},       {"MET_UCHAR", 1, false}, {"M
                        {"MET_LONG", 4, true},       {"MET_ULONG", 4, false}, {"MET_LONG_LONG", 8, true},
                        {"MET_ULONG_LONG", 8, false}};
 
-class Reader {
+class Reader : private HeaderLines {
  public:
-  Reader(const std::string &path, std::string_view bytes) : path_(path), bytes_(bytes) {
+  Reader(const std::string &path, std::string_view bytes) : HeaderLines(path, bytes) {
     for (int k = 0; k < 3; ++k) direction_[4 * size_t(k)] = 1;
   }
 
@@ -36,21 +36,6 @@ class Reader {
   }
 
  private:
-  std::string_view next_line() {
-    const size_t end = std::min(bytes_.find('\n', at_), bytes_.size());
-    std::string_view text = bytes_.substr(at_, end - at_);
-    at_ = std::min(end + 1, bytes_.size());
-    ++number_;
-    if (!text.empty() && text.back() == '\r') text.remove_suffix(1);
-    return text;
-  }
-
-  template <class... T>
-  [[noreturn]] void refuse_line(const char *sentence, T... values) const {
-    const std::string where = path_ + ":" + std::to_string(number_);
-    if constexpr (sizeof...(values) == 0) refuse(where, "%s", sentence);
-    else refuse(where, sentence, values...);
-  }
   [[noreturn]] void missing(const char *what) const {
     refuse(path_, "the header has no \"%s\"; save the label map again as MetaImage", what);
   }
@@ -165,9 +150,6 @@ class Reader {
       stored_.volume.notes.push_back("the file gives no spacing; 1 was taken for each axis");
   }
 
-  const std::string &path_;
-  std::string_view bytes_;
-  size_t at_ = 0, number_ = 0;
   std::vector<double> sizes_, spacing_, origin_, direction_ = std::vector<double>(9, 0.0);
   Stored stored_;
 };

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <optional>
 
-#include "label_volume.h"
+#include "header_lines.h"
 
 namespace labels {
 namespace {
@@ -33,9 +33,9 @@ bool is_one_of(const std::string &word, std::string_view names) {
   return false;
 }
 
-class Reader {
+class Reader : private HeaderLines {
  public:
-  Reader(const std::string &path, std::string_view bytes) : path_(path), bytes_(bytes) {}
+  Reader(const std::string &path, std::string_view bytes) : HeaderLines(path, bytes) {}
 
   Stored read() {
     bool more = true;
@@ -49,22 +49,6 @@ class Reader {
   }
 
  private:
-  std::string_view next_line() {
-    const size_t end = std::min(bytes_.find('\n', at_), bytes_.size());
-    std::string_view text = bytes_.substr(at_, end - at_);
-    at_ = std::min(end + 1, bytes_.size());
-    ++number_;
-    if (!text.empty() && text.back() == '\r') text.remove_suffix(1);
-    return text;
-  }
-
-  template <class... T>
-  [[noreturn]] void refuse_line(const char *sentence, T... values) const {
-    const std::string where = path_ + ":" + std::to_string(number_);
-    if constexpr (sizeof...(values) == 0) refuse(where, "%s", sentence);
-    else refuse(where, sentence, values...);
-  }
-
   // False: the header ends with it.
   bool line() {
     const std::string_view text = next_line();
@@ -307,9 +291,6 @@ class Reader {
     out[k] = given ? spacings_[axis] : 1;
   }
 
-  const std::string &path_;
-  std::string_view bytes_;
-  size_t at_ = 0, number_ = 0;
   uint32_t dimension_ = 0;
   bool encoded_ = false, ordered_ = false, mirrored_ = false;
   std::vector<int64_t> sizes_;
