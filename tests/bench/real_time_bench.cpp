@@ -54,10 +54,11 @@ Run run(dfm_scene scene, dfm_world world, double duration, double step, bool pla
     const double at = cpu_seconds();
     ok(dfm_world_step(world, step, nullptr));
     out.seconds.push_back(cpu_seconds() - at);
-    dfm_pair_impulse pair{};
+    dfm_pair_impulse pair[16] = {};
     uint32_t pairs = 0;
-    ok(dfm_world_pair_impulses(world, 1, &pair, &pairs));
-    for (int a = 0; pairs && a < 3; ++a) force[a] += pair.impulse[a] / (step * double(every));
+    ok(dfm_world_pair_impulses(world, 16, pair, &pairs));
+    for (uint32_t i = 0; i < pairs; ++i)
+      for (int a = 0; a < 3; ++a) force[a] += pair[i].impulse[a] / (step * double(every));
     dfm_world_stats stats{};
     stats.size = sizeof stats;
     ok(dfm_world_get_stats(world, &stats));

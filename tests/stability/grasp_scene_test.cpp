@@ -13,6 +13,6 @@ bool lifted(const test::SceneRun &run) {
 
 TEST(Grasp, JitteredRuns_AllLift) {
   test::expect_jittered("grasp", 1, 10, {"--time", "1.6"}, 6, lifted);
-  EXPECT_FALSE(lifted(
-      test::SceneRun("grasp", {"--time", "1.6", "--set", "/contact/friction/0/params/mu=0.05"})));
+  EXPECT_FALSE(
+      lifted(test::SceneRun("grasp", {"--time", "1.6", "--set", "/contact/friction/0/params/mu=0.05"})));
 }
