@@ -92,6 +92,19 @@ TEST(CProgram, Draw_FillsABufferAndDrawsFromIt) {
   EXPECT_GT(pixel(128, 180), 60) << "the ball, lit from the front";
 }
 
+// Its figures are those of the machine; the force is that of the scene.
+TEST(CProgram, HapticLoop_RunsBesideTheScene) {
+  const std::string scene = DEFORM_SOURCE_DIR "/examples/scenes/grasp.json";
+  const test::CommandResult r = example("08_haptic_loop", {scene, "grasper", "0.2", "500"});
+  ASSERT_EQ(r.exit_code, 0) << r.out << r.err;
+  EXPECT_NE(r.out.find("motion that the force answers"), std::string::npos) << r.out;
+  EXPECT_NE(r.out.find("of 200 steps ended behind the clock"), std::string::npos) << r.out;
+  const test::CommandResult none =
+      example("08_haptic_loop", {DEFORM_SOURCE_DIR "/examples/scenes/attached.json"});
+  EXPECT_EQ(none.exit_code, 1);
+  EXPECT_NE(none.out.find("it has no tools"), std::string::npos) << none.out;
+}
+
 TEST(CppProgram, Cpp_TellsOfTheMissingLawAndOfTheBalls) {
   const test::CommandResult r = example("05_cpp");
   ASSERT_EQ(r.exit_code, 0) << r.out << r.err;

@@ -499,3 +499,75 @@ TEST(Tool, Grab_HandsOver_AndReleases) {
   test::ok(dfm_tool_grab(g.tool, g.strip, 0, 0, 3, held, &n));
   EXPECT_EQ(n, 0u);
 }
+
+namespace {
+
+// Counts its calls; says where it is, nothing new, or that it will not do.
+struct Device {
+  int reads = 0, writes = 0;
+  dfm_status says = DFM_OK;
+  dfm_status takes = DFM_OK;
+  double z = 0.0245, force = 0;
+  dfm_device table() {
+    dfm_device d{};
+    d.size = sizeof d;
+    d.user = this;
+    d.read = [](void *user, double t, dfm_device_sample *out) {
+      Device &self = *static_cast<Device *>(user);
+      ++self.reads;
+      EXPECT_GT(t, 0);
+      out->pose = pose({0, 0, self.z});
+      return self.says;
+    };
+    d.write = [](void *user, double, const double *force, const double *) {
+      Device &self = *static_cast<Device *>(user);
+      ++self.writes;
+      self.force = force[2];
+      return self.takes;
+    };
+    return d;
+  }
+};
+
+}  // namespace
+
+TEST(Tool, ADevice_IsReadBeforeAndWrittenAfterEachStep) {
+  Scene s;
+  const dfm_tool t = make(s.w, tool_def("probe", DFM_TOOL_SPHERE, {0, 0, 0.0245}));
+  Device device;
+  dfm_device table = device.table();
+  test::ok(dfm_tool_set_device(t, &table));
+  for (int i = 0; i < 20; ++i) {
+    device.z -= 1e-4;
+    test::ok(dfm_world_step(s.w, 1e-3, nullptr));
+  }
+  EXPECT_EQ(device.reads, 20);
+  EXPECT_EQ(device.writes, 20);
+  EXPECT_GT(device.force, 0.01);
+  EXPECT_NEAR(state(t).pose.position[2], device.z, 1e-15);
+  const double stood = device.z;
+  device.says = DFM_DISCARD;
+  device.z -= 1e-4;
+  test::ok(dfm_world_step(s.w, 1e-3, nullptr));
+  EXPECT_NEAR(state(t).pose.position[2], stood, 1e-15) << "nothing new";
+  device.says = DFM_E_ARG;
+  const uint64_t before = dfm_world_hash(s.w);
+  EXPECT_EQ(dfm_world_step(s.w, 1e-3, nullptr), DFM_E_ARG);
+  test::says({"device of tool 'probe'"});
+  EXPECT_EQ(dfm_world_hash(s.w), before);
+  device.says = DFM_OK;
+  device.z = NAN;
+  EXPECT_EQ(dfm_world_step(s.w, 1e-3, nullptr), DFM_E_ARG);
+  device.z = stood;
+  device.takes = DFM_E_ARG;
+  const int writes = device.writes;
+  for (int i = 0; i < 3; ++i) test::ok(dfm_world_step(s.w, 1e-3, nullptr));
+  EXPECT_EQ(device.writes, writes + 1) << "asked no more";
+  test::ok(dfm_tool_set_device(t, nullptr));
+  const int reads = device.reads;
+  test::ok(dfm_world_step(s.w, 1e-3, nullptr));
+  EXPECT_EQ(device.reads, reads);
+  table.read = nullptr;
+  EXPECT_EQ(dfm_tool_set_device(t, &table), DFM_E_ARG);
+  test::says({"read()"});
+}
