@@ -519,10 +519,10 @@ struct Device {
       out->pose = pose({0, 0, self.z});
       return self.says;
     };
-    d.write = [](void *user, double, const double *force, const double *) {
+    d.write = [](void *user, double, const double *given, const double *) {
       Device &self = *static_cast<Device *>(user);
       ++self.writes;
-      self.force = force[2];
+      self.force = given[2];
       return self.takes;
     };
     return d;
