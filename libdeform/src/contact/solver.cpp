@@ -55,13 +55,15 @@ void linearize(const ContactRows &rows, double h, ContactState &s) {
 
 namespace {
 
-// As the kernel, where impulses at one dof change others.
-void sweep_answers(ContactRows &rows, const LawView &law, double h) {
+// As the kernel, where impulses at one dof change others. kLeaves: with `leave`.
+template <bool kLeaves>
+void sweep_answers(ContactRows &rows, const LawView &law, double h, double leave) {
   for (uint32_t i = 0; i < rows.n; ++i) {
     if (!(rows.wn[i] > 0)) continue;  // both sides are held: nothing an impulse could change
     double *const l = &rows.impulse[size_t(i) * 3];
     const Vec3 u = rows.velocity(i);
-    const double ln = normal_impulse(rows, i, u.x), d = ln - l[0];
+    const bool stays = kLeaves && std::fabs(u.x + rows.rate[i]) <= leave;
+    const double ln = stays ? l[0] : normal_impulse(rows, i, u.x), d = ln - l[0];
     if (ln == 0 && l[0] == 0 && l[1] == 0 && l[2] == 0) continue;
     Pair t{0, 0};
     if (ln > 0 && rows.wt[i] > 0)
@@ -77,8 +79,9 @@ void sweep_answers(ContactRows &rows, const LawView &law, double h) {
 
 }  // namespace
 
-uint32_t sweep(ContactRows &rows, const ContactState &law, double h, double bond_tolerance) {
-  if (!rows.alone_all()) sweep_answers(rows, law.view(), h);
+uint32_t sweep(ContactRows &rows, const ContactState &law, double h, double bond_tolerance, double leave) {
+  if (!rows.alone_all() && leave > 0) sweep_answers<true>(rows, law.view(), h, leave);
+  else if (!rows.alone_all()) sweep_answers<false>(rows, law.view(), h, 0);
   else rows.kernels().sweep(rows.view(), law.view(), h, rows.y.data(), rows.impulse.data());
   return rows.nbond ? solve_bonds(rows, bond_tolerance) : 0;
 }
@@ -167,6 +170,30 @@ void Acceleration::follow(ContactRows &rows) {
     leap(rows, now_.data());
   }
   std::copy(rows.impulse.begin(), rows.impulse.end(), from_.begin());
+}
+
+Momentum::Momentum(const Memory &m) { use_memory(m, from_, last_, jump_); }
+
+void Momentum::start(const ContactRows &rows) {
+  age_ = 0;
+  from_.assign(rows.impulse.begin(), rows.impulse.end());
+  last_.assign(rows.impulse.begin(), rows.impulse.end());
+}
+
+void Momentum::follow(ContactRows &rows) {
+  const uint32_t values = 3 * rows.all();
+  double along = 0;
+  for (uint32_t k = 0; k < values; ++k) {
+    const double x = rows.impulse[k];
+    along += (k % 3 == 0 ? rows.wn[k / 3] : rows.wt[k / 3]) * (x - from_[k]) * (x - last_[k]);
+  }
+  age_ = along < 0 ? 1 : age_ + 1;
+  jump_.resize(values);
+  for (uint32_t k = 0; k < values; ++k)
+    jump_[k] = double(age_ - 1) / double(age_ + 2) * (rows.impulse[k] - last_[k]);
+  last_.assign(rows.impulse.begin(), rows.impulse.end());
+  leap(rows, jump_.data());
+  from_.assign(rows.impulse.begin(), rows.impulse.end());
 }
 
 namespace {

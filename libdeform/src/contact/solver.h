@@ -16,8 +16,10 @@ void linearize(const ContactRows &rows, double h, ContactState &state);
 
 // One sweep in contact order. Every contact first gets its normal impulse, then its friction impulse with
 // that new normal impulse. Then all bonds are solved together (bonds.h) to a residual of bond_tolerance, m/s.
-// Returns the number of passes over the bonds.
-uint32_t sweep(ContactRows &rows, const ContactState &law, double h, double bond_tolerance = 0);
+// leave: m/s, >= 0; a contact whose u_n + gap/h is no further from zero keeps its normal impulse. Where points
+// answer their own impulses only, leave has no effect. Returns the number of passes over the bonds.
+uint32_t sweep(ContactRows &rows, const ContactState &law, double h, double bond_tolerance = 0,
+               double leave = 0);
 
 // Anderson acceleration of the sweeps (Walker and Ni 2011, type II). A sweep is a fixed-point map G; where
 // contacts are nearly redundant (vertex-face beside edge-edge, two bodies' grids on each other) it converges
@@ -41,6 +43,20 @@ class Acceleration {
   Array<double> f_, g_, now_;  // [n] of the last sweep, f in the metric; scratch
   Array<double> df_, dg_;      // [window,n] differences of successive f and g
   double gram_[kWindow][kWindow] = {};
+};
+
+// Momentum of the sweeps (Nesterov 1983), for what moves by the same step in every sweep: Anderson's method
+// sees no difference there that it could use. The next sweep starts beyond the last result, by (k - 1) / (k +
+// 2) of the last step; k starts anew where the sweep turns back (O'Donoghue and Candes 2015, section 3.2).
+class Momentum {
+ public:
+  explicit Momentum(const Memory &memory);
+  void start(const ContactRows &rows);
+  void follow(ContactRows &rows);  // after a sweep that another one follows
+
+ private:
+  uint32_t age_ = 0;
+  Array<double> from_, last_, jump_;  // [3 all] where the sweep started, the result before, scratch
 };
 
 // Of the residuals (contact_kernel.h): a contact is good where both stay within what they may be off by:

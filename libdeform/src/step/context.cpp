@@ -7,6 +7,7 @@ StepContext::StepContext(const Meters &meters)
       narrow(meters.detection.memory()),
       rows(meters.contacts.memory()),
       acceleration(meters.contacts.memory()),
+      momentum(meters.contacts.memory()),
       proximal(meters.contacts.memory()),
       batches(meters.contacts.memory()),
       areas(meters.contacts.memory()),

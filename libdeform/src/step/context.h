@@ -65,6 +65,7 @@ struct StepContext {
   Array<double> bond_impulse;  // [bonds,3] N s, that the next solve of this sub-step starts from
   ContactState state;
   Acceleration acceleration;
+  Momentum momentum;
   Proximal proximal;
   Tolerance tolerance;
   Residual residual;

@@ -1,5 +1,5 @@
 // Long strides for contacts of bodies that move in few ways: the operator by its motions, which contacts
-// belong together, and loads that sweeps hand over too slowly.
+// belong together, and loads that sweeps hand over too slowly; what sweeps leave, and their momentum.
 #include "contact/proximal.h"
 
 #include <cmath>
@@ -51,38 +51,81 @@ TEST(Proximal, Parts_AreWhatSharesMotionsAndHasNoPointsOfItsOwn) {
   EXPECT_EQ(p.find_parts(tied.rows, kNobody), 0u) << "the first contact has points too";
 }
 
-// Three contacts in one place, a hair's breadth apart: the nearest has to carry all, and the farthest does. A
-// sweep moves no more of it than rate / w_n, so that hundreds of them are not enough; a stride moves a
+namespace {
+
+// Three contacts in one place, a hair's breadth apart: the nearest has to carry all, and the farthest does.
+struct Equal {
+  static constexpr double kMu = 0.5, kFarthest = 2e-3;  // m/s, the farthest rate
+  const Vec3 taken{1, 0.2, -0.1};
+  RowsCase c{2, 2, 2};
+  ContactRows &rows = c.rows;
+  ContactState law;
+  Tolerance tolerance;
+
+  Equal() {
+    rows.y.assign(rows.y.size(), 0.0);
+    rows.drive.assign(rows.drive.size(), 0.0);
+    rows.rate = {0, 0.5 * kFarthest, kFarthest};
+    rows.apply(0, -taken);
+    rows.y_free.assign(rows.y.begin(), rows.y.end());
+    rows.impulse.assign(9, 0.0);
+    store3(&rows.impulse[6], taken);
+    rows.restore();
+    law.resize(3, 0);
+    for (uint32_t i = 0; i < 3; ++i) {
+      law.form[i] = dfm::kSetValuedLaw;
+      law.mode[i] = 1;
+      law.fn[i] = 1;
+      law.limit[i] = kMu;
+    }
+    tolerance.normal.assign(3, 1e-9);
+    tolerance.tangent.assign(3, 1e-9);
+    tolerance.most_normal = 1e-9;
+  }
+  double left() const { return inner_residual(rows, law, RowsCase::kStep, tolerance).speed; }
+};
+
+}  // namespace
+
+// What is no farther off than may be left keeps its load; beyond that it is handed over as ever.
+TEST(Sweep, LoadWithinWhatMayBeLeft_Stays) {
+  Equal stays, moves;
+  const Array<double> impulse(stays.rows.impulse);
+  for (int k = 0; k < 10; ++k) {
+    sweep(stays.rows, stays.law, RowsCase::kStep, 0, 1.01 * Equal::kFarthest);
+    sweep(moves.rows, moves.law, RowsCase::kStep, 0, 0.99 * Equal::kFarthest);
+  }
+  for (size_t k = 0; k < 9; ++k) EXPECT_NEAR(stays.rows.impulse[k], impulse[k], 1e-12) << k;
+  EXPECT_LT(moves.rows.impulse[6], impulse[6]);
+}
+
+// The same step in every sweep adds up: the load is handed over in a fraction of the sweeps.
+TEST(Momentum, LoadOnTheFartherOfEqualContacts_IsHandedOverSooner) {
+  const auto sweeps = [](bool momentum) {
+    Equal e;
+    Momentum m{Memory::standard()};
+    m.start(e.rows);
+    int count = 0;
+    for (; e.left() > 1e-6 && count < 5000; ++count) {
+      sweep(e.rows, e.law, RowsCase::kStep);
+      if (momentum) m.follow(e.rows);
+    }
+    return count;
+  };
+  const int plain = sweeps(false);
+  EXPECT_LT(plain, 5000);
+  EXPECT_LT(sweeps(true), plain / 4);
+}
+
+// A sweep moves no more of it than rate / w_n, so that hundreds of them are not enough; a stride moves a
 // thousand times as much.
 TEST(Proximal, LoadOnTheFartherOfEqualContacts_IsHandedOver) {
-  constexpr double kMu = 0.5;
-  RowsCase c({2, 2, 2});
-  ContactRows &rows = c.rows;
-  rows.y.assign(rows.y.size(), 0.0);
-  rows.drive.assign(rows.drive.size(), 0.0);
-  rows.rate = {0, 1e-3, 2e-3};
-  const Vec3 taken{1, 0.2, -0.1};
-  rows.apply(0, -taken);
-  rows.y_free.assign(rows.y.begin(), rows.y.end());
-  rows.impulse.assign(9, 0.0);
-  store3(&rows.impulse[6], taken);
-  rows.restore();
-  ContactState law;
-  law.resize(3, 0);
-  for (uint32_t i = 0; i < 3; ++i) {
-    law.form[i] = dfm::kSetValuedLaw;
-    law.mode[i] = 1;
-    law.fn[i] = 1;
-    law.limit[i] = kMu;
-  }
-  Tolerance t;
-  t.normal.assign(3, 1e-9);
-  t.tangent.assign(3, 1e-9);
-  t.most_normal = 1e-9;
-  const auto left = [&] { return inner_residual(rows, law, RowsCase::kStep, t).speed; };
+  Equal e;
+  ContactRows &rows = e.rows;
+  const ContactState &law = e.law;
   const Array<double> impulse(rows.impulse), y(rows.y);
   for (int k = 0; k < 200; ++k) sweep(rows, law, RowsCase::kStep);
-  EXPECT_GT(left(), 1e-4);
+  EXPECT_GT(e.left(), 1e-4);
   rows.impulse = impulse;
   rows.y = y;
 
@@ -91,9 +134,9 @@ TEST(Proximal, LoadOnTheFartherOfEqualContacts_IsHandedOver) {
   ASSERT_TRUE(p.take(rows, 0));
   for (int k = 0; k < 10; ++k) ASSERT_TRUE(p.stride(rows, law, RowsCase::kStep, 1e3)) << k;
   EXPECT_GT(p.work(), 0u);
-  EXPECT_LT(left(), 1e-9);
-  EXPECT_LT(inner_residual(rows, law, RowsCase::kStep, t, first(1)).speed, 1e-9);
-  test::expect_near(load3(&rows.impulse[0]), taken, 1e-6);
+  EXPECT_LT(e.left(), 1e-9);
+  EXPECT_LT(inner_residual(rows, law, RowsCase::kStep, e.tolerance, first(1)).speed, 1e-9);
+  test::expect_near(load3(&rows.impulse[0]), e.taken, 1e-6);
   EXPECT_EQ(rows.impulse[6], 0);
   p.put(rows, impulse.data());
   EXPECT_EQ(rows.impulse, impulse);
