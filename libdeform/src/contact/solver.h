@@ -15,9 +15,9 @@ void set_trial(const ContactRows &rows, double h, const double *response, Contac
 void linearize(const ContactRows &rows, double h, ContactState &state);
 
 // One sweep in contact order. Every contact first gets its normal impulse, then its friction impulse with
-// that new normal impulse. Then all bonds are solved together (bonds.h) to a residual of bond_tolerance, m/s.
-// leave: m/s, >= 0; a contact whose u_n + gap/h is no further from zero keeps its normal impulse. Where points
-// answer their own impulses only, leave has no effect. Returns the number of passes over the bonds.
+// that new normal impulse. leave: m/s, >= 0; a contact whose u_n + gap/h is no further from zero keeps its
+// normal impulse. Where points answer their own impulses only, leave has no effect. Then all bonds are solved
+// together (bonds.h) to a residual of bond_tolerance, m/s. Returns the number of passes over the bonds.
 uint32_t sweep(ContactRows &rows, const ContactState &law, double h, double bond_tolerance = 0,
                double leave = 0);
 
