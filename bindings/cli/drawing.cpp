@@ -10,18 +10,19 @@
 namespace cli {
 
 Drawing::Drawing(const SceneFile &scene, const std::string &color) : scene_(scene) {
-  for (const BodyView &body : scene.bodies()) {
-    Buffers b;
-    b.xyz.resize(3 * size_t(body.nsurfel));
-    b.vectors.resize(3 * size_t(body.nsurfel));
-    b.scalar.resize(body.nsurfel);
-    uint32_t n = 0;
-    need(dfm_surface_positions(body.handle, body.nsurfel, b.xyz.data(), &n));
-    b.start = b.xyz;
-    buffers_.push_back(std::move(b));
-  }
+  for (const BodyView &body : scene.bodies()) make(body, buffers_.emplace_back());
   placed_.resize(scene.obstacles().size());
   set_color(color);
+}
+
+void Drawing::make(const BodyView &body, Buffers &b) {
+  b.xyz.resize(3 * size_t(body.nsurfel));
+  b.vectors.resize(3 * size_t(body.nsurfel));
+  b.scalar.assign(body.nsurfel, 0.f);
+  uint32_t n = 0;
+  need(dfm_surface_positions(body.handle, body.nsurfel, b.xyz.data(), &n));
+  b.start = b.xyz;
+  b.stress.reset();
 }
 
 void Drawing::set_color(const std::string &color) {
@@ -66,6 +67,11 @@ void Drawing::add_bodies(render::Scene &out) {
   float top = 0;
   for (size_t i = 0; i < buffers_.size(); ++i) {
     const BodyView &body = scene_.bodies()[i];
+    scene_.renew(i);
+    if (buffers_[i].scalar.size() != body.nsurfel) {  // torn: a split point brings surfels
+      make(body, buffers_[i]);
+      if (color_ == "stress") buffers_[i].stress.emplace(body, buffers_[i].xyz);
+    }
     uint32_t n = 0;
     need(dfm_surface_positions(body.handle, body.nsurfel, buffers_[i].xyz.data(), &n));
     buffers_[i].colored = fill_values(body, buffers_[i]);

@@ -35,6 +35,8 @@ class Drawing {
     std::optional<SurfaceStress> stress;
     bool colored = false;
   };
+  // Of a body as it is now; displacements count from here.
+  static void make(const BodyView &body, Buffers &b);
   bool fill_values(const BodyView &body, Buffers &b);
   void add_bodies(render::Scene &out);
   void add_obstacles(render::Scene &out);

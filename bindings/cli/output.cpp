@@ -203,10 +203,13 @@ FileNodes Outputs::file_nodes(size_t b) const {
 }
 
 std::vector<double> Outputs::node_positions(const BodyView &body, const FileNodes &nodes) const {
-  uint32_t n = nodes.surface ? body.nsurfel : uint32_t(nodes.number.size());
+  uint32_t n = 0;
+  need(nodes.surface ? dfm_surface_positions(body.handle, 0, nullptr, &n)
+                     : dfm_body_get_state(body.handle, 0, nullptr, nullptr, &n));
   std::vector<double> x(3 * size_t(n));
   need(nodes.surface ? dfm_surface_positions(body.handle, n, x.data(), &n)
                      : dfm_body_get_state(body.handle, n, x.data(), nullptr, &n));
+  x.resize(3 * nodes.number.size());  // those of the file; others stand behind them
   return x;
 }
 

@@ -105,6 +105,7 @@ void Checker::check(bool start_state) {
   double reach = 0;
   bool finite = true;
   for (size_t b = 0; b < positions_.size(); ++b) {
+    scene_.renew(b);
     const BodyView &body = scene_.bodies()[b];
     uint32_t n = 0;
     state_.resize(6 * size_t(body.npoint));

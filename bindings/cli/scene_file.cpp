@@ -30,6 +30,20 @@ void place_points(const ObstacleView &obstacle, std::vector<double> &out) {
   }
 }
 
+namespace {
+
+void read_shape(const dfm_body_info &info, BodyView &body) {
+  body.npoint = info.npoint;
+  body.ntet = info.ntet;
+  body.nsurfel = info.nsurfel;
+  body.rest_volume = info.rest_volume;
+  body.triangles.resize(3 * size_t(info.ntriangle));
+  uint32_t n = 0;
+  need(dfm_surface_triangles(body.handle, info.ntriangle, body.triangles.data(), &n));
+}
+
+}  // namespace
+
 SceneFile::SceneFile(const Globals &globals, const std::string &path, const std::vector<std::string> &set,
                      uint64_t jitter_seed)
     : context_(make_context(globals), dfm_context_destroy), path_(path) {
@@ -62,13 +76,7 @@ SceneFile::SceneFile(const Globals &globals, const std::string &path, const std:
     body.handle = handle;
     body.name = info.name;
     body.model = info.model;
-    body.npoint = info.npoint;
-    body.ntet = info.ntet;
-    body.nsurfel = info.nsurfel;
-    body.rest_volume = info.rest_volume;
-    body.triangles.resize(3 * size_t(info.ntriangle));
-    uint32_t ntriangle = 0;
-    need(dfm_surface_triangles(handle, info.ntriangle, body.triangles.data(), &ntriangle));
+    read_shape(info, body);
     names_[handle] = body.name;
     bodies_.push_back(std::move(body));
   }
@@ -87,6 +95,14 @@ SceneFile::SceneFile(const Globals &globals, const std::string &path, const std:
   std::vector<dfm_rigid> rigids(n);
   if (n > 0) need(dfm_world_rigids(world_, n, rigids.data(), &n));
   for (const dfm_rigid handle : rigids) rigids_.push_back({handle, names_[handle]});
+}
+
+void SceneFile::renew(size_t at) const {
+  BodyView &body = bodies_[at];
+  dfm_body_info info = {};
+  info.size = sizeof info;
+  need(dfm_body_get_info(body.handle, &info));
+  if (info.npoint != body.npoint || info.ntet != body.ntet) read_shape(info, body);
 }
 
 const std::string &SceneFile::name_of(uint64_t handle) const {

@@ -44,6 +44,8 @@ class SceneFile {
   const std::string &path() const { return path_; }
   const dfm_scene_settings &settings() const { return settings_; }
   const std::vector<BodyView> &bodies() const { return bodies_; }
+  // Reads points, cells and surface of a body anew where a tear has changed them.
+  void renew(size_t body) const;
   const std::vector<ObstacleView> &obstacles() const { return obstacles_; }
   const std::vector<RigidView> &rigids() const { return rigids_; }
   const std::string &name_of(uint64_t handle) const;    // of a body or an obstacle
@@ -56,7 +58,7 @@ class SceneFile {
   dfm_scene scene_ = 0;
   dfm_world world_ = 0;
   dfm_scene_settings settings_ = {};
-  std::vector<BodyView> bodies_;
+  mutable std::vector<BodyView> bodies_;
   std::vector<ObstacleView> obstacles_;
   std::vector<RigidView> rigids_;
   std::map<uint64_t, std::string> names_;

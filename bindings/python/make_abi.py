@@ -11,7 +11,7 @@ import sys
 import textwrap
 
 HEADERS = ("plugin base id math world body contact attach surface mesh scene obstacle law material model "
-           "rigid toi debug query callback sensor").split()
+           "rigid toi debug query callback sensor cut").split()
 SCALARS = {"double": "f64", "float": "f32", "uint64_t": "u64", "uint32_t": "u32", "int32_t": "i32",
            "uint8_t": "u8", "size_t": "usize", "bool": "flag", "int": "cint", "dfm_status": "i32"}
 HEAD = '''"""The C interface of libdeform for ctypes. Written by make_abi.py from the public headers: change
@@ -37,7 +37,7 @@ class Interface:
         for name in HEADERS:
             source = (include / "deform" / f"{name}.h").read_text()
             for constant, value in re.findall(r"^#define (DFM_\w+) (\d+)u?\b", source, re.M):
-                self.constants.append((constant, int(value)))
+                self.constants.append([(constant, int(value))])
             self.read(plain(source))
 
     def read(self, source):
@@ -65,12 +65,13 @@ class Interface:
                 self.function(found)
 
     def enum(self, text):
-        value = 0
+        value, group = 0, []
         for part in filter(None, (p.strip() for p in text.split(","))):
             name, _, given = (p.strip() for p in part.partition("="))
             value = int(given.rstrip("uU"), 0) if given else value
-            self.constants.append((name, value))
+            group.append((name, value))
             value += 1
+        self.constants.append(group)
 
     def members(self, text):
         out = []
@@ -114,8 +115,9 @@ class Interface:
 
     def source(self):
         lines = [HEAD]
-        for name, value in self.constants:
-            lines.append(f"{name} = {value}")
+        for group in self.constants:   # an enumeration on one line where it fits
+            joined = ", ".join(name for name, _ in group) + " = " + ", ".join(str(v) for _, v in group)
+            lines += [joined] if len(joined) <= 108 else [f"{name} = {value}" for name, value in group]
         for name, members in self.structs:
             # a pair stays on one line
             fields = ", ".join(f'("{member}",{kind})'.replace(" ", "~") for member, kind in members)

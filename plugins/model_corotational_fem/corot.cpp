@@ -5,7 +5,7 @@
 
 #include "../model_common/entry.h"
 #include "corot_body.h"
-#include "deform/plugin.h"
+#include "deform/plugin_draft.h"
 
 namespace corot {
 
@@ -104,6 +104,7 @@ uint32_t caps_of(const void *self) {
   return gradient ? kCaps : kCaps & ~uint32_t(DFM_CAP_ENERGY | DFM_CAP_ROTATION_INVARIANT);
 }
 
+const dfm_topology kTopology = {sizeof(dfm_topology), 0, nullptr};
 const dfm_caps kOwnCaps = {sizeof(dfm_caps), 0, caps_of};
 
 const dfm_effect_row kOff[] = {{"damping", kDampingStiffness, 0, 0},  {"damping", kDampingMass, 0, 0},
@@ -119,6 +120,7 @@ const void *extension(const void *self, const char *id) {
   if (!strcmp(id, DFM_EXT_EFFECTS)) return &Ops::kActiveEffects;
   if (!strcmp(id, DFM_EXT_EFFECT_ROWS)) return &kEffectRows;
   if (!strcmp(id, DFM_EXT_IDLE)) return &Ops::kIdle;
+  if (!strcmp(id, DFM_EXT_TOPOLOGY)) return &kTopology;
   return nullptr;
 }
 

@@ -140,6 +140,7 @@ dfm_status add_single_forces(void *self, const dfm_kin *k, double *f) {
 }
 
 const dfm_f32 kSingle = {sizeof(dfm_f32), 0, prepare_single, add_single_forces};
+const dfm_topology kTopology = {sizeof(dfm_topology), 0, nullptr};
 const dfm_limited kLimited = {sizeof(dfm_limited), 0, limited};
 const dfm_spring_mask kSpringMask = {sizeof(dfm_spring_mask), 0, set_mask, get_mask};
 
@@ -157,6 +158,7 @@ const void *extension(const void *self, const char *id) {
   if (!strcmp(id, DFM_EXT_LIMITED)) return &kLimited;
   if (!strcmp(id, DFM_EXT_SPRING_MASK)) return &kSpringMask;
   if (!strcmp(id, DFM_EXT_F32)) return &kSingle;
+  if (!strcmp(id, DFM_EXT_TOPOLOGY)) return &kTopology;
   return nullptr;
 }
 

@@ -195,6 +195,13 @@ std::vector<Call> body_calls() {
          const dfm_attach_def d = dfm_attach_def_default();
          return dfm_body_attach(h, &d, nullptr);
        }},
+      {"body_cut",
+       [](uint64_t h) {
+         const dfm_cut_def d = dfm_cut_def_default();
+         return dfm_body_cut(h, &d, nullptr);
+       }},
+      {"body_remove_cells", [](uint64_t h) { return dfm_body_remove_cells(h, 1, &index0, nullptr); }},
+      {"body_origins", [](uint64_t h) { return dfm_body_origins(h, 0, nullptr, 0, nullptr); }},
       {"body_detach", [](uint64_t h) { return dfm_body_detach(h, 1); }},
       {"body_attachments", [](uint64_t h) { return dfm_body_attachments(h, 0, nullptr, &count); }},
       {"body_get_attachment",

@@ -10,8 +10,8 @@ import subprocess
 import sys
 
 FLAGS = ["-fsyntax-only", "-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Werror"]
-CPP20 = {"attach.hpp", "defs.hpp", "deform.hpp", "models.hpp", "obstacles.hpp", "queries.hpp", "tools.hpp",
-         "result.hpp"}   # std::span
+CPP20 = {"attach.hpp", "cut.hpp", "defs.hpp", "deform.hpp", "models.hpp", "obstacles.hpp", "queries.hpp",
+         "tools.hpp", "result.hpp"}   # std::span
 LANGUAGES = {"c99": "c", "c17": "c", "c++17": "c++", "c++20": "c++"}
 
 

@@ -96,8 +96,8 @@ def cpp_complete(tree):
     """deform.hpp (with the headers that are parts of it) calls every function that the public headers
     declare, ode.hpp those of the binding. Of a function that is inline because it hands over a sizeof, either
     name will do."""
-    parts_of = ["attach.hpp", "defs.hpp", "models.hpp", "obstacles.hpp", "queries.hpp", "result.hpp",
-                "tools.hpp"]
+    parts_of = ["attach.hpp", "cut.hpp", "defs.hpp", "models.hpp", "obstacles.hpp", "queries.hpp",
+                "result.hpp", "tools.hpp"]
     for folder, name, more in (PUBLIC, "deform.hpp", parts_of), (ODE, "ode.hpp", []):
         wrapper, functions = folder + name, list(declared(tree, folder))
         if wrapper not in tree.paths and (functions or folder == PUBLIC):

@@ -276,7 +276,7 @@ void model_sound(const dfm_type &type, const dfm_model &model) {
           "the function, or drop DFM_PARAM_RUNTIME",
           type.params[i].key ? type.params[i].key : "");
 
-  constexpr uint32_t kKnown = DFM_CAP_ENERGY | DFM_CAP_STIFFNESS | DFM_CAP_DAMPING | DFM_CAP_TOPOLOGY |
+  constexpr uint32_t kKnown = DFM_CAP_ENERGY | DFM_CAP_STIFFNESS | DFM_CAP_DAMPING |
                               DFM_CAP_ROTATION_INVARIANT | DFM_CAP_PLAUSIBLE | DFM_CAP_CONSTANT_STIFFNESS;
   if (model.caps & ~kKnown)
     broken("caps has bits that this ABI does not know (%#x), which no host honors; use DFM_CAP_*",

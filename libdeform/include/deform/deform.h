@@ -6,6 +6,7 @@
 #include "deform/body.h"
 #include "deform/callback.h"
 #include "deform/contact.h"
+#include "deform/cut.h"
 #include "deform/debug.h"
 #include "deform/id.h"
 #include "deform/law.h"

@@ -30,6 +30,7 @@
 #include <vector>
 
 #include "deform/attach.hpp"
+#include "deform/cut.hpp"
 #include "deform/defs.hpp"
 #include "deform/deform.h"
 #include "deform/models.hpp"
@@ -227,6 +228,7 @@ template <class E>
 class Body : public Handle<dfm_body, struct BodyKind>,
              public BodyModels<E, Body<E>>,
              public BodyAttachments<E, Body<E>>,
+             public BodyCuts<E, Body<E>>,
              public BodyQueries<E, Body<E>> {
  public:
   using Handle::Handle;

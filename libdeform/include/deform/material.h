@@ -8,8 +8,10 @@ extern "C" {
 #endif
 /** density kg/m3 (> 0), young Pa (> 0), poisson (-1..0.5), damping_mass 1/s, damping_stiffness s. A model
  * parameter that a body does not give itself is taken from the material's entry of the same key, else from
- * the model's default. `extra` holds such further entries, and "friction": the coefficient with which it
- * meets others where no rule names the pair (dfm_friction_def). */
+ * the model's default. `extra` holds such further entries, and two of the library's own: "friction", the
+ * coefficient with which it meets others where no rule names the pair (dfm_friction_def); "tear", the largest
+ * strain (> 0) that it bears in any direction. At the end of a step a body of this material splits the points
+ * beyond it (doc/concepts/cutting.md); its model must be msm or corotational_fem. */
 typedef struct dfm_material_def {
   uint32_t size, flags;
   const char *name; /* unique in its world; NULL: none */

@@ -10,8 +10,26 @@ extern "C" {
 #endif
 /* ---- models: cells other than tetrahedra ------------------------------------------------------------- */
 enum { DFM_CELL_POINT = 1, DFM_CELL_EDGE = 2, DFM_CELL_TRI = 4, DFM_CELL_HEX = 16 };
-/* ---- models: cells that come and go ------------------------------------------------------------------- */
-enum { DFM_CAP_TOPOLOGY = 8 /* extension "dfm.topology/1" */ };
+/* ---- models: cells that go, points that are split ------------------------------------------------------ */
+/* Extension "dfm.topology/1" of a model: what an instance is for a body follows from its cells one by one, so
+ * that an instance which create() makes of a part of the cells goes on from where this one is. A host cuts
+ * the body by making that instance beside this one and taking the state over, slot by slot: of points, cells
+ * and edges by these maps; an edge that was none before has the state of state_init(); a slot by instance is
+ * copied. Both instances live until one of them is destroyed. It stays a draft until a model of another
+ * author has it. */
+#define DFM_EXT_TOPOLOGY "dfm.topology/1"
+typedef struct dfm_topology_maps {
+  uint32_t size, npoint, ncell, nedge; /* of the mesh now */
+  /* [npoint], [ncell], [nedge] numbers in the mesh before; several points may have one; UINT32_MAX: an edge
+   * that was none */
+  const uint32_t *point, *cell, *edge;
+} dfm_topology_maps;
+typedef struct dfm_topology {
+  uint32_t size, reserved;
+  /* [setup] (optional) after the state was taken over, before the next step: what does not follow by slot.
+   * state: of `now`, slots end to end. Not DFM_OK: the cut does not take place. */
+  dfm_status (*carry)(const void *before, void *now, const dfm_topology_maps *maps, double *state);
+} dfm_topology;
 /* ---- self-stepping models: state that lives off the host ---------------------------------------------- */
 /* Type of dfm_stepper.fetch: copies what lives off the host. [step] */
 typedef dfm_status (*dfm_fetch_fn)(void *self, uint32_t what, double *dst);

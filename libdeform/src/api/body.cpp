@@ -133,7 +133,8 @@ dfm_status dfm_body_create(dfm_world world, const dfm_body_def *def, dfm_body *o
 
 dfm_status dfm_body_destroy(dfm_body body) {
   return as_status([&] {
-    Body &b = body_of(body);
+    Body &b = any_body_of(body);
+    if (!b.emptied) body_of(body);  // with all of its points
     exclusive(*b.world);
     destroy_body(b);
   });
@@ -141,18 +142,20 @@ dfm_status dfm_body_destroy(dfm_body body) {
 
 dfm_status dfm_body_get_info(dfm_body body, dfm_body_info *out) {
   return as_status([&] {
-    const Body &b = shown_body_of(body);
+    const Body &b = any_body_of(body);
     dfm_body_info i{};
-    i.npoint = b.p.n;
-    i.ntet = static_cast<uint32_t>(b.tets.size() / 4);
-    i.nsurfel = b.surface.nsurfel;
-    i.ntriangle = b.surface.ntri;
-    i.nedge = static_cast<uint32_t>(b.edges.size() / 2);
+    if (!b.emptied) {
+      i.npoint = b.p.n;
+      i.ntet = static_cast<uint32_t>(b.tets.size() / 4);
+      i.nsurfel = b.surface.nsurfel;
+      i.ntriangle = b.surface.ntri;
+      i.nedge = static_cast<uint32_t>(b.edges.size() / 2);
+      i.mass = b.mass;
+      i.rest_volume = b.rest_volume;
+    }
     i.world = b.world->handle;
     i.name = b.name.c_str();
     i.model = b.model.type->id;
-    i.mass = b.mass;
-    i.rest_volume = b.rest_volume;
     i.user = b.user;
     give(out, i);
   });

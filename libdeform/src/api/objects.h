@@ -21,7 +21,17 @@ Part &part_of(Kind kind, uint64_t h) {
   return part;
 }
 // Points may be late (Dynamics::see_points): calls that read no points but those of the surface take these.
-inline Body &shown_body_of(dfm_body h) { return part_of<Body>(Kind::body, h); }
+inline Body &any_body_of(dfm_body h) { return part_of<Body>(Kind::body, h); }
+// One that has cells.
+inline Body &shown_body_of(dfm_body h) {
+  Body &b = any_body_of(h);
+  if (b.emptied)
+    fail(DFM_E_STATE,
+         "body '%s' has no cells left: a cut has taken them all; destroy it, or restore a snapshot from "
+         "before",
+         b.name.c_str());
+  return b;
+}
 inline Body &body_of(dfm_body h) {
   Body &b = shown_body_of(h);
   if (!b.world->busy) b.dynamics->see_points();

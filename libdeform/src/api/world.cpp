@@ -15,6 +15,7 @@
 #include "world/model_change.h"
 #include "world/sensors.h"
 #include "world/snapshot.h"
+#include "world/tear.h"
 #include "world/tool.h"
 
 using namespace dfm;
@@ -25,6 +26,7 @@ void destroy_world(uint64_t handle) {
   World *const w = static_cast<World *>(handle_find(Kind::world, handle));
   if (!w) return;
   for (auto &b : w->bodies) handle_destroy(b->handle);
+  for (auto &b : w->emptied) handle_destroy(b->handle);
   for (auto &o : w->obstacles) handle_destroy(o->handle);
   for (auto &m : w->materials) handle_destroy(m->handle);
   for (auto &t : w->tools) handle_destroy(t->handle);
@@ -254,6 +256,7 @@ dfm_status dfm_world_step(dfm_world world, double dt, uint32_t *trouble) {
     read_devices(w, w.time + dt);
     const dfm_status s = step_within_budget(w, dt, &bits);
     if (trouble) *trouble = bits;
+    if (s == DFM_OK) tear_bodies(w);
     if (s == DFM_OK) look_at_sensors(w, true);
     if (s == DFM_OK) write_devices(w);
     return s;

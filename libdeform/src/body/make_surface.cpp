@@ -113,6 +113,7 @@ void make_surface(const Memory &memory, uint32_t npoint, const double *rest, con
   out.tri_edge = Array<uint32_t>(a);
   out.tri_owns = Array<uint32_t>(a);
   out.patch = Array<uint32_t>(a);
+  for (auto &names : out.name) names = Array<uint32_t>(a);
   out.point = Array<uint32_t>(a);
   out.row = Array<uint32_t>(a);
   out.col = Array<uint32_t>(a);

@@ -1,13 +1,36 @@
 // A surface as it is at rest, for judging whether two parts of it that are near have come near, or
 // have always been.
 #pragma once
+#include <algorithm>
+
 #include "core/memory.h"
 #include "math/vec3.h"
 
 namespace dfm {
 
+// What the surface of a body with open faces (mesh/cut_mesh.h) touches across them, though it lies on itself
+// there at rest. All empty where no face is open.
+struct OpenedSurface {
+  Array<uint32_t> origin;  // [nsurfel] point of the whole body: copies of a point have one number
+  Array<uint32_t> twin;    // [ntri] triangle on the other side of the open face, or kNone
+  // [nsurfel] points of the body that a surfel has an edge with, ascending, from begin[s] to begin[s+1]; and
+  // its own point
+  Array<uint32_t> begin, near, point;
+
+  bool any() const { return !origin.empty(); }
+  // Are two surfels joined by two edges of cells at most?
+  bool joined(uint32_t a, uint32_t b) const {
+    if (a == b) return true;
+    const auto first = near.begin() + begin[a], last = near.begin() + begin[a + 1];
+    if (std::binary_search(first, last, point[b])) return true;
+    return std::any_of(near.begin() + begin[b], near.begin() + begin[b + 1],
+                       [&](uint32_t p) { return std::binary_search(first, last, p); });
+  }
+};
+
 struct SelfRest {
   Array<double> x;  // [nsurfel,4] m, N times the phyxels at rest, in the mesh's frame
+  OpenedSurface opened;
   // m: parts that are nearer than this through the material are the two sides of one layer of cells or two
   double thin = 0;
   Vec3 at(uint32_t surfel) const { return load3(&x[4 * size_t{surfel}]); }

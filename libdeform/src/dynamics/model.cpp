@@ -54,9 +54,9 @@ void ModelInstance::create(const dfm_type &t, const dfm_host &h, const dfm_mesh 
   const std::optional<std::vector<dfm_slot>> own = ask_extensions();
   if (!stepper && !ops->add_forces)
     fail(DFM_E_UNSUPPORTED, "model '%s' neither adds forces nor steps itself; report it to its author", t.id);
-  const size_t nstate =
-      model_state_size(own ? std::span<const dfm_slot>(*own) : std::span(ops->slots, ops->nslot), mesh.npoint,
-                       mesh.ncell, mesh.nedge);
+  if (own) slots = *own;
+  else slots.assign(ops->slots, ops->slots + ops->nslot);
+  const size_t nstate = model_state_size(slots, mesh.npoint, mesh.ncell, mesh.nedge);
   state = Array<double>(nstate, 0.0, HookAllocator<double>(memory));
   state_out = state;
   start();
@@ -151,6 +151,7 @@ void ModelInstance::swap(ModelInstance &other) noexcept {
   std::swap(caps_, other.caps_);
   std::swap(self, other.self);
   params.swap(other.params);
+  slots.swap(other.slots);
   state.swap(other.state);
   state_out.swap(other.state_out);
 }

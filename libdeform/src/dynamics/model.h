@@ -29,6 +29,7 @@ struct ModelInstance {
   bool single = false;                  // add_forces() computes in single precision
   void *self = nullptr;
   std::vector<double> params;
+  std::vector<dfm_slot> slots;     // of its state
   Array<double> state, state_out;  // slots end to end
 
   ModelInstance() = default;

@@ -22,6 +22,9 @@ struct Surface {
   Array<uint32_t> tri_owns;
   // [ntri] features that share an edge within 60 degrees of normal (rest shape) are one patch
   Array<uint32_t> patch;
+  // Of a body that has been cut: what keys of contacts call surfels, edges and triangles, so that those which
+  // a cut has left keep theirs; patch holds such names itself. Empty: their numbers.
+  Array<uint32_t> name[3];
   Array<uint32_t> fan_begin, fan;  // [nsurfel+1], triangles around each surfel, ascending
   double median_edge = 0;          // m, rest
 

@@ -61,15 +61,18 @@ inline uint64_t mix(uint64_t hash, uint64_t value) {
   hash *= 0xc4ceb9fe1a85ec53ull;
   return hash ^ hash >> 29;
 }
-// ordinal: tells apart contacts of one feature with one patch, in the order of b's features.
-inline uint64_t contact_key(const ContactPoint &c, uint64_t id_a, uint64_t id_b, uint32_t patch,
-                            uint32_t ordinal) {
+// a: the surface of side a. ordinal: tells apart contacts of one feature with one patch, in the order of b's
+// features.
+inline uint64_t contact_key(const ContactPoint &c, const Surface &a, uint64_t id_a, uint64_t id_b,
+                            uint32_t patch, uint32_t ordinal) {
+  const Array<uint32_t> &names = a.name[c.type_a];
+  const uint32_t feature = names.empty() ? c.feature_a : names[c.feature_a];
   const uint64_t head =
       uint64_t{c.kind} | uint64_t{c.obstacle} << 8 | uint64_t{c.type_a} << 16 | uint64_t{ordinal} << 32;
   uint64_t hash = mix(0x9e3779b97f4a7c15ull, head);
   hash = mix(hash, id_a);
   hash = mix(hash, id_b);
-  return mix(hash, uint64_t{c.feature_a} << 32 | patch);
+  return mix(hash, uint64_t{feature} << 32 | patch);
 }
 
 // Blank contact of a pair; the caller fills geometry, nodes and weights.

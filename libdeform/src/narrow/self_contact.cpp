@@ -14,6 +14,10 @@
 //     there turns cells inside out. Seen from outside they make no contact; it would keep them so.
 //   - The side is that of the rest shape, so what is a little on the wrong one is led back. Near features
 //     side by side in one plane may fold either way: theirs is the side they are on.
+//
+// The two sides of an open face (a cut) lie on each other at rest, where the nearest triangle has no side.
+// There copies of one point touch, along the normal of the faces that were joined at them, as long as they
+// have not slid apart; other features of the two sides do not.
 #include "narrow/self_contact.h"
 
 #include <algorithm>
@@ -49,10 +53,16 @@ constexpr double kNearer = 1e-9;
 // cosine to the outward normal beyond which a pair at rest looks through the material, or away from it
 constexpr double kThrough = 0.25;
 
+// of the median edge: copies of a point that have slid less along each other touch
+constexpr double kSlid = 0.5;
+constexpr double kDeep = 1e-2;     // of the median edge: what is less deep is held by all faces
+constexpr double kOpposed = -0.5;  // cosine between normals that push against each other
+
 // What a pair is at rest.
 struct Kin {
-  double apart;  // m it rests at; 0: it makes no contact
-  double side;   // 1: kept apart outside, -1: within, 0: where it is
+  double apart = 0;     // m it rests at
+  double side = 0;      // 1: kept apart outside, -1: within, 0: where it is
+  bool touches = true;  // false: it makes no contact
 };
 
 class RestShape {
@@ -60,32 +70,51 @@ class RestShape {
   RestShape(const Surface &surface, const SelfRest &rest, double offset)
       : s_(surface), rest_(rest), offset_(offset) {}
 
+  const OpenedSurface &opened() const { return rest_.opened; }
   Kin of_face(uint32_t surfel, uint32_t t) const {
     const uint32_t *const c = &s_.tri[3 * size_t{t}];
     const Vec3 p = rest_.at(surfel), a = rest_.at(c[0]), b = rest_.at(c[1]), d = rest_.at(c[2]);
     const TrianglePoint q = closest_on_triangle(p, a, b, d);
     const double distance = std::sqrt(q.distance2);
+    if (Kin k; across({surfel}, {c[0], c[1], c[2]}, distance, k)) return k;
     return kin(distance, dot(normalized(cross(b - a, d - a)), p - q.point) / distance);
   }
   Kin of_edges(uint32_t a, uint32_t b) const {
     const uint32_t *const ea = &s_.edge[2 * size_t{a}], *const eb = &s_.edge[2 * size_t{b}];
     const Vec3 a0 = rest_.at(ea[0]), a1 = rest_.at(ea[1]), b0 = rest_.at(eb[0]), b1 = rest_.at(eb[1]);
     const SegmentPoints at = closest_segments(a0, a1, b0, b1);
-    const Vec3 across = a0 + at.s * (a1 - a0) - (b0 + at.t * (b1 - b0));
+    const Vec3 way = a0 + at.s * (a1 - a0) - (b0 + at.t * (b1 - b0));
     Vec3 up;
     for (const uint32_t t : {s_.edge_tri[2 * size_t{b}], s_.edge_tri[2 * size_t{b} + 1]}) {
       if (t == kNone) continue;
       const uint32_t *const c = &s_.tri[3 * size_t{t}];
       up += normalized(cross(rest_.at(c[1]) - rest_.at(c[0]), rest_.at(c[2]) - rest_.at(c[0])));
     }
-    const double distance = norm(across);
-    return kin(distance, dot(normalized(up), across) / distance);
+    const double distance = norm(way);
+    if (Kin k; across({ea[0], ea[1]}, {eb[0], eb[1]}, distance, k)) return k;
+    return kin(distance, dot(normalized(up), way) / distance);
   }
 
  private:
+  // Of a body with open faces: what a pair is that no cells beside it join. Beside a slit copies of points
+  // alone touch; what lies far apart at rest is kept outside, and rests at no distance, since a slit that is
+  // closed leaves room for none.
+  bool across(std::initializer_list<uint32_t> a, std::initializer_list<uint32_t> b, double at_rest,
+              Kin &out) const {
+    if (!rest_.opened.any()) return false;
+    out = at_rest >= rest_.thin ? Kin{0, 1} : Kin{0, 0, false};
+    if (at_rest >= rest_.thin) return true;
+    bool joined = false;
+    for (const uint32_t i : a)
+      for (const uint32_t j : b) {
+        if (rest_.opened.origin[i] == rest_.opened.origin[j]) return true;
+        joined = joined || rest_.opened.joined(i, j);
+      }
+    return !joined;
+  }
   // By the distance at rest and the cosine between the way across and the outward normal there.
   Kin kin(double at_rest, double facing) const {
-    if (!(at_rest > kClosedAtRest * offset_)) return {0, 0};
+    if (!(at_rest > kClosedAtRest * offset_)) return {0, 0, false};
     return {std::min(offset_, 0.5 * at_rest), at_rest >= rest_.thin || facing > kThrough ? 1.0
                                               : facing < -kThrough                       ? -1.0
                                                                                          : 0.0};
@@ -136,6 +165,8 @@ struct Self {
     return normalized(cross(x(c[1]) - x(c[0]), x(c[2]) - x(c[0])));
   }
 
+  bool copies(uint32_t surfel, uint32_t t);
+  void keep_shallow(size_t begin);
   bool yields(uint32_t t, double distance2, uint32_t other, uint32_t surfel) const;
   bool minimum(uint32_t surfel, uint32_t t, const TrianglePoint &at) const;
   Vec3 outward(uint32_t surfel, uint32_t t, const TrianglePoint &at) const;
@@ -197,7 +228,63 @@ Vec3 Self::outward(uint32_t surfel, uint32_t t, const TrianglePoint &at) const {
   return sum;
 }
 
+// A surfel that is through two faces which push it against each other, as in the tip of a cell, leaves by the
+// nearer one. Contacts of a surfel stand together.
+void Self::keep_shallow(size_t begin) {
+  const auto depth_of = [&](const ContactPoint &c) { return offset - c.distance; };
+  const double clearly = kDeep * s.median_edge;
+  const auto opposed = [&](const ContactPoint &c, const ContactPoint &d) {
+    return depth_of(d) > 0 && depth_of(c) > std::max(clearly, depth_of(d)) &&
+           dot(load3(c.normal), load3(d.normal)) < kOpposed;
+  };
+  std::vector<uint8_t> goes(out.size() - begin);
+  for (size_t i = begin; i < out.size(); ++i)
+    for (size_t j = i; j-- > begin && out[j].feature_a == out[i].feature_a;) {
+      if (opposed(out[i], out[j])) goes[i - begin] = 1;
+      if (opposed(out[j], out[i])) goes[j - begin] = 1;
+    }
+  size_t to = begin;
+  for (size_t i = begin; i < out.size(); ++i)
+    if (!goes[i - begin]) out[to++] = out[i];
+  out.resize(to);
+}
+
+// Is a corner of t a copy of the surfel's point that has not slid along it? The first of the triangles around
+// the corner that were joined to the surfel's makes their contact.
+bool Self::copies(uint32_t surfel, uint32_t t) {
+  const OpenedSurface &opened = rest.opened();
+  const uint32_t *const c = corners(t);
+  const uint32_t *const at =
+      std::find_if(c, c + 3, [&](uint32_t corner) { return opened.origin[corner] == opened.origin[surfel]; });
+  if (at == c + 3) return false;
+  Vec3 up;
+  uint32_t first = kNone;
+  for (uint32_t k = s.fan_begin[*at]; k < s.fan_begin[*at + 1]; ++k) {
+    const uint32_t twin = opened.twin[s.fan[k]];
+    if (twin == kNone || !has(twin, surfel)) continue;
+    first = std::min(first, s.fan[k]);
+    for (const double sign : {1.0, -1.0}) {
+      const uint32_t *const n = corners(sign > 0 ? s.fan[k] : twin);
+      up += sign * cross(x(n[1]) - x(n[0]), x(n[2]) - x(n[0]));
+    }
+  }
+  const Vec3 way = x(surfel) - x(*at), normal = normalized(up);
+  const double distance = dot(normal, way), slid = kSlid * s.median_edge;
+  if (norm2(way - distance * normal) > slid * slid) return false;
+  if (first != t || surfel < *at || !(norm2(normal) > 0)) return true;
+  const double reach = contact_reach(h, offset, norm(v(surfel) - v(*at)));
+  if (!(distance < reach && distance >= -depth)) return true;
+  ContactPoint contact = blank(pair, kVertexFace, 0, surfel, t);
+  add_node(contact, body.first_node + surfel, 1);
+  add_node(contact, body.first_node + *at, -1);
+  place(contact, x(surfel), x(*at), normal, distance + offset);
+  contact.area = 0.5 * facing_area(s, surfel, -normal);
+  out.push_back(contact);
+  return true;
+}
+
 void Self::vertex_face(uint32_t surfel, uint32_t t) {
+  if (rest.opened().any() && copies(surfel, t)) return;
   const uint32_t *const c = corners(t);
   const Vec3 p = x(surfel), a = x(c[0]), u = x(c[1]) - a, w = x(c[2]) - a, n = cross(u, w);
   double speed2 = 0;
@@ -215,7 +302,7 @@ void Self::vertex_face(uint32_t surfel, uint32_t t) {
   const Kin k = rest.of_face(surfel, t);
   double side = k.side != 0 ? k.side : now;
   if (now != side && face && distance <= depth && !through({surfel}, {c[0], c[1], c[2]})) side = now;
-  if (!(k.apart > 0) || !(now == side ? distance < reach : face && distance <= depth)) return;
+  if (!k.touches || !(now == side ? distance < reach : face && distance <= depth)) return;
   if (!face && !(distance > 1e-9 * s.median_edge)) return;
   const Vec3 normal = face ? side * up : (1 / distance) * (p - at.point);
   if (!(norm2(normal) > 0)) return;
@@ -251,7 +338,7 @@ void Self::edge_edge(uint32_t a, uint32_t b) {
       place_on_edge(on_b, 2 * h * std::sqrt(speed2 / ww)) != kBetween)
     return;
   const Kin k = rest.of_edges(a, b);
-  if (!(k.apart > 0)) return;
+  if (!k.touches) return;
   // An edge that is flat folds out where the blow bends its faces, by what they may move against each other
   // within the sub-step.
   const double bent = std::min(0.3, 2 * h * std::sqrt(speed2 / std::min(uu, ww))) - kConvex;
@@ -295,7 +382,7 @@ void Self::name(size_t begin) {
     for (size_t k = i; k < end; ++k) {
       uint32_t ordinal = 0;
       for (size_t j = i; j < k; ++j) ordinal += patch(out[j]) == patch(out[k]);
-      out[k].key = contact_key(out[k], body.id, body.id, patch(out[k]), ordinal);
+      out[k].key = contact_key(out[k], s, body.id, body.id, patch(out[k]), ordinal);
       if (out[k].distance < 2 * offset) out[k].area /= touching;
     }
     i = end;
@@ -331,6 +418,7 @@ void find_self_contacts(const BodyView &body, const SelfRest &rest, std::span<co
   Self self(body, rest, h, offset, tangled, out);
   const size_t begin = out.size();
   for (const SelfPair &pair : vertex_face) self.vertex_face(pair.a, pair.b);
+  if (rest.opened.any()) self.keep_shallow(begin);
   const size_t edges = out.size();
   for (const SelfPair &pair : edge_edge) self.edge_edge(pair.a, pair.b);
   self.name(begin);

@@ -58,6 +58,7 @@ std::string self_asked_by(const SceneFacts &f) {
       return need;
   }
   if (f.self_auto) return kSelfAuto;
+  if (f.self_cut) return "a cut";
   return {};
 }
 

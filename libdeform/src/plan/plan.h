@@ -40,6 +40,7 @@ struct SceneFacts {
   bool sleep = false;                    // islands at rest may sleep
   bool self = false, self_auto = false;  // contact.self
   unsigned self_bodies = 0;              // bodies that may touch themselves, filters applied
+  bool self_cut = false;                 // one of them does because it has been cut
   std::vector<std::string> asked;        // where listed
 };
 

@@ -8,6 +8,7 @@
 #include "deform/deform.h"
 #include "dynamics/dynamics.h"
 #include "state/change_book.h"
+#include "state/cut_record.h"
 #include "state/energy_book.h"
 #include "state/model_choice.h"
 #include "state/motion.h"
@@ -84,6 +85,7 @@ struct Body {
   std::string name, material;
   uint32_t category = 1, collides_with = ~0u;
   bool sensor = false;  // reports what overlaps it, and pushes nothing
+  bool tears = false;   // a material of its cells bears a limited strain
   void *user = nullptr;
 
   Phyxels p;
@@ -91,6 +93,9 @@ struct Body {
   Array<uint32_t> tets, edges;
   Surface surface;
   SurfaceZones zones;
+  CutRecord cut;
+  uint64_t shape = 0;  // another number after each cut: what is derived from points, cells or surface is old
+  bool emptied = false;            // a cut has taken all cells; the body stands in World::emptied
   int32_t coupling = kNoCoupling;  // DFM_COUPLING_* of a surface of its own
   double support = 0;              // of it, as its def gave it
   ModelInstance model;

@@ -8,6 +8,8 @@
 
 namespace dfm {
 
+inline constexpr char kTearKey[] = "tear";  // a material's entry: the largest strain that it bears
+
 struct Body;
 struct CellField;
 struct World;

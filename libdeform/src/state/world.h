@@ -102,7 +102,10 @@ struct World {
   Gravity gravity;
   Prescribed prescribed;
 
-  std::vector<std::unique_ptr<Body>> bodies;         // in id order
+  std::vector<std::unique_ptr<Body>> bodies;  // in id order
+  // bodies without cells, which no step sees, in id order
+  std::vector<std::unique_ptr<Body>> emptied;
+  uint64_t shapes = 0;                               // number of the last shape that a cut has made of a body
   std::vector<std::unique_ptr<Obstacle>> obstacles;  // in id order
   std::vector<std::unique_ptr<Material>> materials;
   std::vector<std::unique_ptr<RigidSet>> rigid_sets;  // each a host's bodies, which are obstacles too
@@ -114,6 +117,7 @@ struct World {
   MayTouch may_touch;
   PreSolve pre_solve;
   uint32_t sensors = 0;        // how many there are
+  uint32_t tearing = 0;        // bodies that may tear
   std::vector<Sensed> sensed;  // at the end of the last step
   Overlaps overlaps;
   // rises when positions or d_c change otherwise than by a step

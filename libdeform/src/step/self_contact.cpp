@@ -3,6 +3,7 @@
 //   the scene asks    contact.self, or "self_contact" among its effects; "auto": while the body folds so far
 //                     that it may (broad/self_watch.h)
 //   an effect needs   plan/plan.cpp: cutting, folding
+//   a cut             has been made in the body: while it may touch itself; with open faces, always
 //   a filter rule     that names the body on both sides decides for this body, whatever the above say
 //
 // and where its model does not promise the effect itself. Contacts come behind those of pairs, body by body,
@@ -11,6 +12,7 @@
 #include "step/self_contact.h"
 
 #include <algorithm>
+#include <array>
 
 #include "ccd/toi_guard_motion.h"
 #include "geometry/pierce.h"
@@ -37,6 +39,12 @@ uint8_t rule_of(const World &w, const Body &b, uint8_t otherwise) {
   return otherwise;
 }
 
+// What the body calls for, beside what the world asks.
+uint8_t needed_by(const Body &b, uint8_t asked) {
+  if (!b.cut.whole || asked == DFM_SELF_ON) return asked;
+  return b.cut.open.empty() ? uint8_t{DFM_SELF_AUTO} : uint8_t{DFM_SELF_ON};
+}
+
 bool promises(const Body &b) {
   const std::vector<std::string> words = effects(*b.model.type);
   return std::find(words.begin(), words.end(), kSelfContact) != words.end() && b.model.works(kSelfContact);
@@ -47,6 +55,10 @@ SelfBody *self_body(StepContext &step, uint32_t slot) {
                                    [](auto &s, uint32_t v) { return s->body->slot < v; });
   return at != step.self_bodies.end() && (*at)->body->slot == slot ? at->get() : nullptr;
 }
+
+// The guard keeps a distance, and two sides of an open face have none: a body with open faces is led back by
+// contact alone.
+bool is_guarded(const SelfBody &b) { return !b.rest.opened.any(); }
 
 void find_tangled(SelfBody &b) {
   const Surface &s = b.body->surface;
@@ -59,6 +71,43 @@ void find_tangled(SelfBody &b) {
   });
 }
 
+using Corners = std::array<uint32_t, 3>;
+
+OpenedSurface opened_surface(const Memory &m, const Body &b) {
+  OpenedSurface out;
+  use_memory(m, out.origin, out.twin, out.begin, out.near, out.point);
+  if (b.cut.open.empty()) return out;
+  const Surface &s = b.surface;
+  out.point = s.point;
+  for (const uint32_t p : s.point) out.origin.push_back(b.cut.point[p]);
+  std::vector<std::pair<Corners, uint32_t>> by_corners;
+  for (uint32_t t = 0; t < s.ntri; ++t) {
+    Corners c;
+    for (size_t k = 0; k < 3; ++k) c[k] = out.origin[s.tri[size_t{3} * t + k]];
+    std::sort(c.begin(), c.end());
+    by_corners.push_back({c, t});
+  }
+  std::sort(by_corners.begin(), by_corners.end());
+  out.twin.assign(s.ntri, kNone);
+  for (size_t i = 1; i < by_corners.size(); ++i) {
+    if (by_corners[i].first != by_corners[i - 1].first) continue;
+    out.twin[by_corners[i].second] = by_corners[i - 1].second;
+    out.twin[by_corners[i - 1].second] = by_corners[i].second;
+  }
+  std::vector<std::vector<uint32_t>> near(b.p.n);
+  for (size_t e = 0; e < b.edges.size(); e += 2) {
+    near[b.edges[e]].push_back(b.edges[e + 1]);
+    near[b.edges[e + 1]].push_back(b.edges[e]);
+  }
+  out.begin.push_back(0);
+  for (const uint32_t p : s.point) {
+    std::sort(near[p].begin(), near[p].end());
+    out.near.insert(out.near.end(), near[p].begin(), near[p].end());
+    out.begin.push_back(uint32_t(out.near.size()));
+  }
+  return out;
+}
+
 bool is_tangled(SelfBody &b, uint32_t surfel) {
   if (!b.looked) find_tangled(b);
   return b.tangled[surfel];
@@ -66,7 +115,7 @@ bool is_tangled(SelfBody &b, uint32_t surfel) {
 
 }  // namespace
 
-SelfBody::SelfBody(const Memory &m, const Body &b) : id(b.id), body(&b), list(m, b.surface) {
+SelfBody::SelfBody(const Memory &m, const Body &b) : id(b.id), shape(b.shape), body(&b), list(m, b.surface) {
   const Surface &s = b.surface;
   rest.x = Array<double>(size_t{4} * s.nsurfel, 0.0, HookAllocator<double>(m));
   const auto at = [&](uint32_t phyxel) { return load3(&b.p.rest[size_t{3} * phyxel]); };
@@ -78,6 +127,7 @@ SelfBody::SelfBody(const Memory &m, const Body &b) : id(b.id), body(&b), list(m,
   std::vector<double> cells;
   for (size_t e = 0; e < b.edges.size(); e += 2) cells.push_back(norm(at(b.edges[e]) - at(b.edges[e + 1])));
   rest.thin = 2 * std::max(s.median_edge, median(cells));
+  rest.opened = opened_surface(m, b);
 }
 
 uint8_t asks_self_contact(const World &w) {
@@ -92,10 +142,12 @@ void choose_self_bodies(World &w, StepContext &step, SceneFacts &facts, std::vec
   std::vector<std::unique_ptr<SelfBody>> before;
   before.swap(step.self_bodies);
   for (auto &b : w.bodies) {
-    const uint8_t when = w.selection.wants(kSelfContact) ? rule_of(w, *b, asked) : uint8_t{DFM_SELF_OFF};
+    const uint8_t when =
+        w.selection.wants(kSelfContact) ? rule_of(w, *b, needed_by(*b, asked)) : uint8_t{DFM_SELF_OFF};
     if (promises(*b) || when == DFM_SELF_OFF) continue;
-    const auto same =
-        std::find_if(before.begin(), before.end(), [&](auto &s) { return s && s->id == b->id; });
+    facts.self_cut = facts.self_cut || b->cut.whole != nullptr;
+    const auto same = std::find_if(before.begin(), before.end(),
+                                   [&](auto &s) { return s && s->id == b->id && s->shape == b->shape; });
     step.self_bodies.push_back(same != before.end()
                                    ? std::move(*same)
                                    : std::make_unique<SelfBody>(w.meters.detection.memory(), *b));
@@ -147,7 +199,8 @@ void stage_self(World &w, StepContext &step) {
     SelfBody *const self = s.get();
     const Tangled tangled = [self](uint32_t surfel) { return is_tangled(*self, surfel); };
     find_self_contacts(view, s->rest, s->list.vertex_face(), s->list.edge_edge(), step.h, w.offset,
-                       w.plan.has(StageRole::guards) ? tangled : nullptr, step.lent, step.contacts);
+                       w.plan.has(StageRole::guards) && is_guarded(*s) ? tangled : nullptr, step.lent,
+                       step.contacts);
   }
   count_self(w, step);
 }
@@ -162,6 +215,7 @@ bool cover_self(World &w, StepContext &step) {
     if (!s->on &&
         s->watch->meets(step.h, w.offset, change, [&](uint32_t surfel) { return velocity_after(b, surfel); }))
       switch_to(*s, true);
+    if (!is_guarded(*s)) continue;
     if (s->on) s->list.cover(step.h, w.offset, change);
     fresh |= s->joined != (s->on ? s->list.renewals() : 0);
   }
@@ -170,7 +224,8 @@ bool cover_self(World &w, StepContext &step) {
 }
 
 bool join_self(StepContext &step, const Array<Candidate> *pairs, Array<Candidate> &to) {
-  if (std::none_of(step.self_bodies.begin(), step.self_bodies.end(), [](auto &s) { return s->on; })) {
+  if (std::none_of(step.self_bodies.begin(), step.self_bodies.end(),
+                   [](auto &s) { return s->on && is_guarded(*s); })) {
     for (auto &s : step.self_bodies) s->joined = 0;
     return false;
   }
@@ -179,7 +234,7 @@ bool join_self(StepContext &step, const Array<Candidate> *pairs, Array<Candidate
   for (auto &s : step.self_bodies) {
     const uint32_t slot = s->body->slot;
     s->joined = 0;
-    if (!s->on) continue;
+    if (!s->on || !is_guarded(*s)) continue;
     for (const SelfPair &p : s->list.vertex_face()) to.push_back({slot, slot, p.a, p.b, kVertexFace, 0});
     for (const SelfPair &p : s->list.edge_edge()) to.push_back({slot, slot, p.a, p.b, kEdgeEdge, 0});
     s->joined = s->list.renewals();

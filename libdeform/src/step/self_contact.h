@@ -15,7 +15,7 @@ struct World;
 struct Body;
 
 struct SelfBody {
-  uint64_t id;
+  uint64_t id, shape;  // the body's (state/body.h)
   const Body *body;
   SelfRest rest;
   SelfList list;

@@ -19,8 +19,10 @@
 #include "world/body_model.h"
 #include "world/body_surface.h"
 #include "world/body_zones.h"
+#include "world/cut.h"
 #include "world/idle.h"
 #include "world/sensors.h"
+#include "world/tear.h"
 
 namespace dfm {
 namespace {
@@ -159,6 +161,9 @@ Body &create_body(World &w, const dfm_body_def &def) {
   if (!b.surface.identity()) need_ability(w, Ability::own_surface, "body", b.name);
   if (w.method->point_values) make(b.method_values, size_t(kStride) * p.n);
 
+  b.tears = may_tear(b);
+  if (b.tears) check_may_cut(b, b.model);
+
   w.bodies.reserve(w.bodies.size() + 1);
   reserve_sleep(w, step, static_cast<uint32_t>(w.bodies.size() + 1));
   w.overlaps.place(w.next_id);
@@ -166,6 +171,7 @@ Body &create_body(World &w, const dfm_body_def &def) {
   b.handle = handle_create(Kind::body, &b);
   ++w.next_id;
   w.bodies.push_back(std::move(owned));
+  w.tearing += b.tears;
   w.changed = true;
   warn_of_idle(b);
   warn_of_own_steps(w, b.name, b.model, def.integrator);
@@ -311,11 +317,7 @@ Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def) {
   return o;
 }
 
-namespace {
-
-// What remembers the removed thing: its contacts end with an event, its friction work leaves the books, and
-// rules that name it go with it.
-void forget(World &w, uint64_t id, bool obstacle, uint64_t handle, const std::string &name) {
+void leave_contacts(World &w, uint64_t id, bool obstacle) {
   drop_attachments(w, id);
   close_slot(w, id, obstacle);
   leave_sensors(w, id);
@@ -326,13 +328,20 @@ void forget(World &w, uint64_t id, bool obstacle, uint64_t handle, const std::st
       if (s.touching[i]) add_event(w, DFM_EVENT_END, s.id_a[i], s.id_b[i], s.key[i], w.time);
       s.touching[i] = 0;
     }
+  std::erase_if(w.work, [&](const PairWork &p) { return p.a == id || p.b == id; });
+  w.changed = true;
+}
+
+namespace {
+
+// Rules that name the removed thing go with it.
+void forget(World &w, uint64_t handle, const std::string &name) {
   const auto goes = [&](const std::string &side) {  // "body:GROUP" may also be all of another one's name
     return names(side, name) && (side == name || (!w.find_body(side) && !w.find_obstacle(side)));
   };
   const auto named = [&](const auto &rule) { return goes(rule.between[0]) || goes(rule.between[1]); };
   std::erase_if(w.friction, named);
   std::erase_if(w.filters, named);
-  std::erase_if(w.work, [&](const PairWork &p) { return p.a == id || p.b == id; });
   handle_destroy(handle);
   w.changed = true;
 }
@@ -341,16 +350,21 @@ void forget(World &w, uint64_t id, bool obstacle, uint64_t handle, const std::st
 
 void destroy_body(Body &b) {
   World &w = *b.world;
-  w.sensors -= b.sensor;
-  forget(w, b.id, false, b.handle, b.name);
-  std::erase_if(w.bodies, [&](auto &p) { return p.get() == &b; });
+  if (!b.emptied) {
+    w.sensors -= b.sensor;
+    leave_contacts(w, b.id, false);
+  }
+  w.tearing -= b.tears;
+  forget(w, b.handle, b.name);
+  std::erase_if(b.emptied ? w.emptied : w.bodies, [&](auto &p) { return p.get() == &b; });
   w.bound.body = nullptr;
 }
 
 void destroy_obstacle(Obstacle &o) {
   World &w = *o.world;
   w.sensors -= o.sensor;
-  forget(w, o.id, true, o.handle, o.name);
+  leave_contacts(w, o.id, true);
+  forget(w, o.handle, o.name);
   std::erase_if(w.obstacles, [&](auto &p) { return p.get() == &o; });
 }
 

@@ -17,5 +17,7 @@ Body &create_body(World &w, const dfm_body_def &def);
 Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def);
 void destroy_body(Body &b);
 void destroy_obstacle(Obstacle &o);
+// Of a body or an obstacle that steps are to see no more: attachments and contacts end, with their events.
+void leave_contacts(World &w, uint64_t id, bool obstacle);
 
 }  // namespace dfm

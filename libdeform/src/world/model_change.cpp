@@ -20,6 +20,7 @@
 #include "step/step_bound.h"
 #include "world/body_model.h"
 #include "world/change_energy.h"
+#include "world/cut.h"
 #include "world/idle.h"
 #include "world/measure.h"
 
@@ -237,6 +238,7 @@ void judge(World &w, Body &b, const ModelInstance &old, const ChangeBook &book, 
   check_jump(b, swap);
   check_unpaid(b, book, swap);
   check_surface(w, b);
+  if (b.tears) check_may_cut(b, b.model);
 }
 
 // What a later change may take back, in place of an older one made with the same. There is room.
@@ -282,6 +284,7 @@ void rehearse(Body &b, ModelChoice &to, uint32_t &integrator, bool at_rest, bool
   const std::unique_ptr<BodyModel> made =
       make_body_model(w, b, type, std::move(origin), static_cast<int32_t>(integrator));
   check_springs(b, type, *made->dynamics);
+  if (b.tears) check_may_cut(b, made->instance);
   to.stable = stable_with(b, *made);
   if (named) warn_of_own_steps(w, b.name, made->instance, static_cast<int32_t>(to.integrator));
   if (!w.changed) check_effects(w, b, b.model, made->instance);

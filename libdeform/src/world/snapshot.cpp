@@ -24,6 +24,7 @@
 #include "world/body_model.h"
 #include "world/measure.h"
 #include "world/obstacle_change.h"
+#include "world/snapshot_cuts.h"
 #include "world/snapshot_models.h"
 #include "world/snapshot_staged.h"
 #include "world/snapshot_stream.h"
@@ -99,8 +100,10 @@ bool good_stats(const dfm_world_stats &s) {
 // far more than any run makes, and far from where counting on would wrap
 constexpr uint64_t kMostIds = uint64_t{1} << 48;
 uint64_t last_id(const World &w) {
-  return std::max(w.bodies.empty() ? 0 : w.bodies.back()->id,
-                  w.obstacles.empty() ? 0 : w.obstacles.back()->id);
+  uint64_t last = w.obstacles.empty() ? 0 : w.obstacles.back()->id;
+  for (const auto *list : {&w.bodies, &w.emptied})
+    if (!list->empty()) last = std::max(last, list->back()->id);
+  return last;
 }
 
 // One that has been destroyed lives on in what was made of it.
@@ -701,6 +704,8 @@ uint64_t world_hash(const World &w) {
 void world_snapshot(const World &w, std::vector<unsigned char> &out, std::vector<SnapshotField> *map) {
   out.resize(sizeof(SnapshotHead));
   SnapshotWriter s(out, map);
+  const std::vector<CutRow> cuts = cut_rows(w);
+  cut_fields(s, cuts);
   fields(s, w, w);
   SnapshotHead head{{}, kSnapshotVersion, 0, out.size(), snapshot_structure(w), 0};
   std::memcpy(head.magic, kSnapshotMagic, sizeof head.magic);
@@ -744,6 +749,9 @@ void world_restore(World &w, const void *data, size_t bytes) {
   const unsigned char *const p = static_cast<const unsigned char *>(data);
   check_head(w, p, bytes);
   SnapshotReader s(p + sizeof(SnapshotHead), p + bytes);
+  std::vector<CutRow> cuts;
+  cut_fields(s, cuts);
+  SnapshotShapes shapes(w, cuts);
   Staged staged(w);
   fields(s, staged, w);
   for (StagedObstacle &o : staged.obstacles) o.material = o.zone.material;
@@ -772,6 +780,7 @@ void world_restore(World &w, const void *data, size_t bytes) {
     w.sleepers = sleepers;
     throw;
   }
+  shapes.keep();
 }
 
 }  // namespace dfm

@@ -5,6 +5,7 @@
 
 #include "core/hash.h"
 #include "state/world.h"
+#include "world/snapshot_cuts.h"
 #include "step/method.h"
 #include "step/stages.h"
 #include "step/context.h"
@@ -54,26 +55,31 @@ dfm_obstacle_def told(const dfm_obstacle_def &d) {
 
 uint64_t snapshot_structure(const World &w) {
   Hash h;
-  for (auto &b : w.bodies) {
+  for (const Body *const b : all_bodies(w)) {
+    // of one that has been cut: as it was made
+    const WholeBody *const whole = b->cut.whole.get();
     h.add(b->id);
-    h.add(b->p.n);
-    h.add(b->surface.nsurfel);
+    h.add(whole ? whole->npoint : b->p.n);
+    h.add(whole ? whole->nsurfel : b->surface.nsurfel);
     h.add(b->name.data(), b->name.size());
     h.add(b->material.data(), b->material.size());
-    h.add(b->tets.data(), b->tets.size() * sizeof(uint32_t));
-    h.add(b->p.rest.data(), b->p.rest.size() * sizeof(double));
-    h.add(b->p.mass.data(), b->p.mass.size() * sizeof(double));
-    makeup(h, b->makeup);
+    const Array<uint32_t> &tets = whole ? whole->tets : b->tets;
+    const Array<double> &rest = whole ? whole->rest : b->p.rest, &mass = whole ? whole->mass : b->p.mass;
+    h.add(tets.data(), tets.size() * sizeof(uint32_t));
+    h.add(rest.data(), rest.size() * sizeof(double));
+    h.add(mass.data(), mass.size() * sizeof(double));
+    makeup(h, whole ? whole->makeup : b->makeup);
+    const SurfaceZones &zones = whole ? whole->zones : b->zones;
     const Surface &s = b->surface;
     h.add(s.row.data(), s.row.size() * sizeof(uint32_t));
     h.add(s.col.data(), s.col.size() * sizeof(uint32_t));
     h.add(s.weight.data(), s.weight.size() * sizeof(double));
     h.add(s.rest.data(), s.rest.size() * sizeof(double));
     if (!s.identity()) h.add(s.tri.data(), s.tri.size() * sizeof(uint32_t));
-    zone(h, b->zones.list[0]);
-    if (b->zones.of.empty()) continue;
-    for (const auto &z : b->zones.list) zone(h, z);
-    h.add(b->zones.of.data(), b->zones.of.size() * sizeof(uint32_t));
+    zone(h, zones.list[0]);
+    if (zones.of.empty()) continue;
+    for (const auto &z : zones.list) zone(h, z);
+    h.add(zones.of.data(), zones.of.size() * sizeof(uint32_t));
   }
   for (auto &o : w.obstacles) {
     const dfm_obstacle_def d = told(o->def);

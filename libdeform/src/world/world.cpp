@@ -45,8 +45,9 @@ World::World(dfm_context *c)
 World::~World() = default;
 
 Body *World::find_body(const std::string &name) {
-  for (auto &b : bodies)
-    if (b->name == name) return b.get();
+  for (auto *list : {&bodies, &emptied})
+    for (auto &b : *list)
+      if (b->name == name) return b.get();
   return nullptr;
 }
 
@@ -57,8 +58,9 @@ Obstacle *World::find_obstacle(const std::string &name) {
 }
 
 uint64_t World::handle_of(uint64_t id) const {
-  for (auto &b : bodies)
-    if (b->id == id) return b->handle;
+  for (auto *list : {&bodies, &emptied})
+    for (auto &b : *list)
+      if (b->id == id) return b->handle;
   for (auto &o : obstacles)
     if (o->id == id) return o->handle;
   return 0;

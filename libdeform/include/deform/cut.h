@@ -1,0 +1,76 @@
+/* deform/cut.h -- cells removed from a body, and its faces opened, between two steps. */
+#ifndef DEFORM_CUT_H
+#define DEFORM_CUT_H
+#include "deform/base.h"
+#include "deform/id.h"
+#include "deform/math.h"
+#ifdef __cplusplus
+extern "C" {
+#endif
+/** dfm_cut_def.shape. ELLIPSOID (a sphere where its semi-axes are equal) and BOX stand at `pose` and are
+ * swept along `motion`. BLADE is a quadrilateral: an edge, and where the edge has come to. */
+enum { DFM_CUT_ELLIPSOID = 0, DFM_CUT_BOX = 1, DFM_CUT_BLADE = 2 };
+/** dfm_cut_def.how. REMOVE: the cells that the shape meets go, with their mass. SPLIT, of a blade: faces
+ * between cells open where the middles of their two cells lie on both sides of it, and points are split where
+ * the cells around them hang together no more; no cell is divided, and no mass is lost. */
+enum { DFM_CUT_REMOVE = 0, DFM_CUT_SPLIT = 1 };
+typedef struct dfm_cut_def {
+  uint32_t size, flags; /* flags: 0 */
+  uint32_t shape, how;  /* DFM_CUT_* */
+  dfm_pose pose;        /* of ellipsoid and box, before the motion */
+  double half_size[3];  /* m: semi-axes, or half the edges of the box; along the axes of the pose */
+  double motion[3];     /* m, in the world: straight way of the ellipsoid or box */
+  double blade[12];     /* [4,3] m, in the world: edge from 0 to 1, which has come to 3 and 2 */
+  /* REMOVE: cells that may go, those of the lowest numbers; SPLIT: faces that may open, in the order in which
+   * the blade meets them; 0: all that are met */
+  uint32_t most;
+  uint32_t reserved;
+  uint64_t cookie; /* set by the default function */
+} dfm_cut_def;
+/** dfm_cut_def_default into a def of any size (base.h). Threads: Any thread. Since 0.1. */
+DFM_API void dfm_cut_def_default_sized(uint32_t size, dfm_cut_def *out);
+/** REMOVE by an ellipsoid without a size or a motion, at the origin. Threads: Any thread. Since 0.1. */
+static inline dfm_cut_def dfm_cut_def_default(void) {
+  dfm_cut_def out;
+  dfm_cut_def_default_sized((uint32_t)sizeof out, &out);
+  return out;
+}
+/** What a cut has done. */
+typedef struct dfm_cut_info {
+  uint32_t size, cells; /* cells that have gone */
+  uint32_t left;        /* cells that the shape meets and that `most` has left */
+  uint32_t points;      /* copies of points that have been made */
+  uint32_t parts;       /* that the body consists of now, cells that share a point hanging together */
+  uint32_t reserved;
+  double area;              /* m2 of triangles that have come to the surface, both sides, at rest */
+  double mass, momentum[3]; /* kg and N s that have gone with cells */
+  double kinetic, elastic;  /* J, before less after; elastic NAN where the model gives no energy */
+} dfm_cut_info;
+/** Cuts a body. Points that stay keep their positions and velocities to the bit, and that part of their mass
+ * which the remaining cells give. The model keeps its state. Contacts of surface features that are left keep
+ * their impulses and the state of their friction; contacts of others end, with an event. Loads, springs, held
+ * points and attachments follow their points. Points, cells, surfels and triangles get new numbers
+ * (dfm_body_origins).
+ * A body that has been cut touches itself unless a filter forbids it. A body without cells takes no part in
+ * steps: only dfm_body_get_info and dfm_body_destroy work, other calls give DFM_E_STATE. A snapshot from
+ * before the cut undoes it.
+ * @param out  may be NULL; set its size, or 0
+ * @return DFM_OK, also where the shape meets nothing; DFM_E_ARG a size, a corner or `how`; DFM_E_UNSUPPORTED
+ * the model needs all of its cells (each but msm and corotational_fem), the body has a surface of its own,
+ * or the contact method is ROLLBACK; DFM_E_NOMEM. After an error nothing has changed.
+ * Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_body_cut(dfm_body body, const dfm_cut_def *def, dfm_cut_info *out);
+/** Removes cells by their numbers, as dfm_body_cut does. @param n number of entries; a cell may be named
+ * twice. @param cells [n] @return as dfm_body_cut; DFM_E_ARG a cell does not exist.
+ * Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_body_remove_cells(dfm_body body, uint32_t n, const uint32_t *cells, dfm_cut_info *out);
+/** Where the points and cells of a body come from: their numbers when the body was made. Copies of a point
+ * have its number. Either may be NULL. @param points [npoint] @param cells [ntet] @return DFM_OK; DFM_E_ARG a
+ * capacity too small (untouched); DFM_E_HANDLE; DFM_E_STATE.
+ * Threads: Any thread. Not during step. Since 0.1. */
+DFM_API dfm_status dfm_body_origins(dfm_body body, uint32_t capacity_points, uint32_t *points,
+                                    uint32_t capacity_cells, uint32_t *cells);
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,47 @@
+// deform/cut.hpp -- part of deform.hpp: cuts. Comments of deform/cut.h hold.
+#ifndef DEFORM_CUT_HPP
+#define DEFORM_CUT_HPP
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "deform/cut.h"
+#include "deform/result.hpp"
+
+namespace deform {
+
+struct CutDef : dfm_cut_def {
+  CutDef() noexcept : dfm_cut_def(dfm_cut_def_default()) {}
+};
+
+namespace basic {
+
+template <class E, class Self>
+class BodyCuts {
+ public:
+  auto cut(const dfm_cut_def &def) const {
+    return produce<E, dfm_cut_info>([&](dfm_cut_info &info) {
+      info.size = sizeof info;
+      return dfm_body_cut(body(), &def, &info);
+    });
+  }
+  auto remove_cells(std::span<const uint32_t> cells) const {
+    return produce<E, dfm_cut_info>([&](dfm_cut_info &info) {
+      info.size = sizeof info;
+      return dfm_body_remove_cells(body(), static_cast<uint32_t>(cells.size()), cells.data(), &info);
+    });
+  }
+  // [npoint], [ntet]; either may be empty.
+  auto origins(std::span<uint32_t> points, std::span<uint32_t> cells) const {
+    return E::done(dfm_body_origins(
+        body(), static_cast<uint32_t>(points.size()), points.empty() ? nullptr : points.data(),
+        static_cast<uint32_t>(cells.size()), cells.empty() ? nullptr : cells.data()));
+  }
+
+ private:
+  dfm_body body() const { return static_cast<const Self &>(*this).get(); }
+};
+
+}  // namespace basic
+}  // namespace deform
+#endif

@@ -1,0 +1,109 @@
+#include "deform/cut.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "api/objects.h"
+#include "world/cut.h"
+
+using namespace dfm;
+
+namespace {
+
+bool finite(const double *x, size_t n) {
+  return std::all_of(x, x + n, [](double value) { return std::isfinite(value); });
+}
+
+CutShape shape_of(const Body &b, const dfm_cut_def &def) {
+  const char *const name = b.name.c_str();
+  if (def.shape > DFM_CUT_BLADE)
+    fail(DFM_E_ARG, "body '%s': a cut of shape %u; use DFM_CUT_ELLIPSOID, DFM_CUT_BOX or DFM_CUT_BLADE", name,
+         def.shape);
+  if (def.how > DFM_CUT_SPLIT)
+    fail(DFM_E_ARG, "body '%s': a cut in the way %u; use DFM_CUT_REMOVE or DFM_CUT_SPLIT", name, def.how);
+  if (def.how == DFM_CUT_SPLIT && def.shape != DFM_CUT_BLADE)
+    fail(DFM_E_ARG, "body '%s': DFM_CUT_SPLIT opens faces along a blade; take the shape DFM_CUT_BLADE", name);
+  if (!finite(def.pose.position, 3) || !finite(def.pose.rotation, 4) || !finite(def.motion, 3) ||
+      !finite(def.blade, 12))
+    fail(DFM_E_ARG, "body '%s': pose, motion and blade of a cut must be finite", name);
+  CutShape s;
+  s.kind = CutKind(def.shape);
+  const Pose pose = to_pose(def.pose);
+  s.position = pose.position;
+  s.rotation = pose.rotation;
+  s.half_size = load3(def.half_size);
+  s.way = load3(def.motion);
+  for (int k = 0; k < 4; ++k) s.corner[k] = load3(def.blade + 3 * k);
+  if (def.shape != DFM_CUT_BLADE)
+    for (const double size : def.half_size)
+      if (!(size > 0 && std::isfinite(size)))
+        fail(DFM_E_ARG, "body '%s': half_size of a cut has %g m; all three must be positive and finite", name,
+             size);
+  return s;
+}
+
+dfm_cut_info told(const CutReport &r) {
+  dfm_cut_info out{};
+  out.cells = r.removed;
+  out.left = r.left;
+  out.points = r.copies;
+  out.parts = r.parts;
+  out.area = r.area;
+  out.mass = r.mass;
+  store3(out.momentum, r.momentum);
+  out.kinetic = r.kinetic;
+  out.elastic = r.elastic;
+  return out;
+}
+
+}  // namespace
+
+void dfm_cut_def_default_sized(uint32_t size, dfm_cut_def *out) {
+  dfm_cut_def d{};
+  d.size = sizeof d;
+  d.pose.rotation[3] = 1;
+  dfm::give_default(size, out, d);
+}
+
+dfm_status dfm_body_cut(dfm_body body, const dfm_cut_def *def, dfm_cut_info *out) {
+  return as_status([&] {
+    Body &b = body_of(body);
+    exclusive(*b.world);
+    need(def, "def");
+    const dfm_cut_def own = take_def(def, dfm_cut_def_default());
+    check_flags(own, 0, "dfm_cut_def");
+    const CutShape shape = shape_of(b, own);
+    const CutReport report =
+        own.how == DFM_CUT_SPLIT ? split_by_blade(b, shape, own.most) : remove_by_shape(b, shape, own.most);
+    if (out) give(out, told(report));
+  });
+}
+
+dfm_status dfm_body_remove_cells(dfm_body body, uint32_t n, const uint32_t *cells, dfm_cut_info *out) {
+  return as_status([&] {
+    Body &b = body_of(body);
+    exclusive(*b.world);
+    if (n) need(cells, "cells");
+    Array<uint8_t> removed(b.tets.size() / 4, 0, HookAllocator<uint8_t>(b.world->memory()));
+    for (uint32_t i = 0; i < n; ++i) {
+      if (cells[i] >= removed.size())
+        fail(DFM_E_ARG, "body '%s' has no cell %u to remove; it has %zu", b.name.c_str(), cells[i],
+             removed.size());
+      removed[cells[i]] = 1;
+    }
+    const CutReport report = remove_cells(b, removed);
+    if (out) give(out, told(report));
+  });
+}
+
+dfm_status dfm_body_origins(dfm_body body, uint32_t capacity_points, uint32_t *points,
+                            uint32_t capacity_cells, uint32_t *cells) {
+  return as_status([&] {
+    const Body &b = shown_body_of(body);
+    const uint32_t ntet = static_cast<uint32_t>(b.tets.size() / 4);
+    const bool give_points = points && room(b.p.n, capacity_points, points, nullptr);
+    const bool give_cells = cells && room(ntet, capacity_cells, cells, nullptr);
+    for (uint32_t i = 0; give_points && i < b.p.n; ++i) points[i] = b.cut.whole ? b.cut.point[i] : i;
+    for (uint32_t c = 0; give_cells && c < ntet; ++c) cells[c] = b.cut.whole ? b.cut.cell[c] : c;
+  });
+}

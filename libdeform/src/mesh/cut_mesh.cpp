@@ -1,0 +1,107 @@
+#include "mesh/cut_mesh.h"
+
+#include <algorithm>
+
+namespace dfm {
+namespace {
+
+uint32_t root(Array<uint32_t> &parent, uint32_t i) {
+  while (parent[i] != i) i = parent[i] = parent[parent[i]];
+  return i;
+}
+void join(Array<uint32_t> &parent, uint32_t i, uint32_t j) {
+  const uint32_t a = root(parent, i), b = root(parent, j);
+  parent[std::max(a, b)] = std::min(a, b);
+}
+
+Array<uint32_t> own_parents(const Memory &memory, size_t n) {
+  Array<uint32_t> parent(n, 0u, HookAllocator<uint32_t>(memory));
+  for (size_t i = 0; i < n; ++i) parent[i] = uint32_t(i);
+  return parent;
+}
+
+uint32_t corner_of(const uint32_t *tets, uint32_t cell, uint32_t point) {
+  const uint32_t *const c = tets + size_t{4} * cell;
+  return 4 * cell + uint32_t(std::find(c, c + 4, point) - c);
+}
+
+// Corners of cells {cell, corner} that are copies of one point: joined across faces that are not open.
+// split [npoint] out: 1: an open face has it.
+Array<uint32_t> join_corners(const Memory &memory, uint32_t npoint, uint32_t ntet, const uint32_t *tets,
+                             const Array<uint8_t> &removed, const Array<uint64_t> &open,
+                             Array<uint8_t> &split) {
+  Array<uint32_t> parent = own_parents(memory, size_t{4} * ntet);
+  split.assign(npoint, 0);
+  each_inner_face(memory, ntet, tets, [&](uint32_t a, uint32_t b) {
+    if (removed[a] || removed[b]) return;
+    const bool opened = std::binary_search(open.begin(), open.end(), open_face(a, b));
+    for (int k = 0; k < 4; ++k) {
+      const uint32_t point = tets[size_t{4} * a + size_t(k)], other = corner_of(tets, b, point);
+      if (other == 4 * b + 4) continue;  // the corner of a that the face has not
+      if (opened) split[point] = 1;
+      else join(parent, 4 * a + uint32_t(k), other);
+    }
+  });
+  return parent;
+}
+
+}  // namespace
+
+CutMesh::CutMesh(const Memory &memory)
+    : tets(HookAllocator<uint32_t>(memory)),
+      point(HookAllocator<uint32_t>(memory)),
+      cell(HookAllocator<uint32_t>(memory)) {}
+
+CutMesh make_cut_mesh(const Memory &memory, uint32_t npoint, uint32_t ntet, const uint32_t *tets,
+                      const Array<uint8_t> &removed, const Array<uint64_t> &open) {
+  CutMesh out(memory);
+  const HookAllocator<uint32_t> a(memory);
+  Array<uint32_t> number(npoint, UINT32_MAX, a), copy(a);
+  Array<uint8_t> split{HookAllocator<uint8_t>(memory)};
+  Array<uint32_t> parent(a);
+  if (!open.empty()) {
+    parent = join_corners(memory, npoint, ntet, tets, removed, open, split);
+    copy.assign(size_t{4} * ntet, UINT32_MAX);
+  }
+  for (uint32_t t = 0; t < ntet; ++t) {
+    if (removed[t]) continue;
+    out.cell.push_back(t);
+    for (int k = 0; k < 4; ++k) number[tets[size_t{4} * t + size_t(k)]] = 0;
+  }
+  for (uint32_t p = 0; p < npoint; ++p)
+    if (number[p] == 0) {
+      number[p] = uint32_t(out.point.size());
+      out.point.push_back(p);
+    }
+  Array<uint8_t> taken(npoint, 0, HookAllocator<uint8_t>(memory));  // the first copy has its cells
+  for (const uint32_t t : out.cell)
+    for (uint32_t k = 0; k < 4; ++k) {
+      const uint32_t p = tets[size_t{4} * t + k];
+      if (open.empty() || !split[p]) {
+        out.tets.push_back(number[p]);
+        continue;
+      }
+      uint32_t &mine = copy[root(parent, 4 * t + k)];
+      if (mine == UINT32_MAX) {
+        mine = number[p];
+        if (taken[p]) {
+          mine = uint32_t(out.point.size());
+          out.point.push_back(p);
+        }
+        taken[p] = 1;
+      }
+      out.tets.push_back(mine);
+    }
+  return out;
+}
+
+uint32_t count_parts(const Memory &memory, uint32_t npoint, uint32_t ntet, const uint32_t *tets) {
+  Array<uint32_t> parent = own_parents(memory, npoint);
+  for (size_t t = 0; t < size_t{4} * ntet; t += 4)
+    for (size_t k = 1; k < 4; ++k) join(parent, tets[t], tets[t + k]);
+  uint32_t n = 0;
+  for (uint32_t p = 0; p < npoint; ++p) n += parent[p] == p;
+  return n;
+}
+
+}  // namespace dfm

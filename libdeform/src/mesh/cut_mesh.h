@@ -1,0 +1,44 @@
+// What a cut makes of a mesh of tetrahedra: cells go, and points are split where faces between cells are
+// opened. No cell is divided, so no cell becomes smaller or thinner than those that the mesh had.
+#pragma once
+#include <cstdint>
+
+#include "core/memory.h"
+#include "mesh/faces.h"
+
+namespace dfm {
+
+// Two cells whose common face is open, the lower one in the high half.
+constexpr uint64_t open_face(uint32_t a, uint32_t b) {
+  return a < b ? uint64_t{a} << 32 | b : uint64_t{b} << 32 | a;
+}
+
+struct CutMesh {
+  Array<uint32_t> tets;   // [ncell,4]
+  Array<uint32_t> point;  // [npoint] number before; copies of a point stand behind all the others
+  Array<uint32_t> cell;   // [ncell] number before, ascending
+  explicit CutMesh(const Memory &memory);
+};
+
+// removed [ntet]: 1: goes. open: faces that are open, ascending; those of removed cells do not matter. Around
+// a point with an open face the cells that hang together by other faces share one copy of it; the first copy
+// is that of the lowest cell. Elsewhere points stay as they are, also where cells share nothing but them.
+// Points without cells go.
+CutMesh make_cut_mesh(const Memory &memory, uint32_t npoint, uint32_t ntet, const uint32_t *tets,
+                      const Array<uint8_t> &removed, const Array<uint64_t> &open);
+
+// Calls use(cell, cell) for the two sides of each inner face, the lower cell first, in the order of the
+// points of the faces. Faces of more than two cells are passed over.
+template <class Use>
+void each_inner_face(const Memory &memory, uint32_t ntet, const uint32_t *tets, Use &&use) {
+  const Array<TetFace> faces = sorted_faces(memory, ntet, tets);
+  for (size_t i = 0, j = 0; i < faces.size(); i = j) {
+    for (j = i + 1; j < faces.size() && faces[j].same_corners(faces[i]);) ++j;
+    if (j == i + 2) use(faces[i].owner >> 2, faces[i + 1].owner >> 2);
+  }
+}
+
+// Parts of cells that hang together by points.
+uint32_t count_parts(const Memory &memory, uint32_t npoint, uint32_t ntet, const uint32_t *tets);
+
+}  // namespace dfm

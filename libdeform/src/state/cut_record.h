@@ -1,0 +1,29 @@
+// What a body that has been cut remembers: how it was made, and where its points and cells come from.
+#pragma once
+#include <memory>
+
+#include "body/zones.h"
+#include "core/memory.h"
+#include "state/model_choice.h"
+
+namespace dfm {
+
+inline constexpr uint32_t kFeatureKinds = 4;  // surfels, edges, triangles, patches
+
+// A body as it was made.
+struct WholeBody {
+  uint32_t npoint = 0, nsurfel = 0;
+  Array<double> rest, mass, share;  // [npoint,3] m, [npoint] kg; [ntet] or empty
+  Array<uint32_t> tets, tri;        // [ntet,4]; [ntri,3] points of the surface's triangles
+  Makeup makeup;
+  SurfaceZones zones;
+};
+
+struct CutRecord {
+  std::shared_ptr<const WholeBody> whole;  // null: no cut has been made
+  Array<uint32_t> point, cell;             // [npoint], [ntet] numbers in the whole body
+  Array<uint64_t> open;  // faces between cells of the whole body (mesh/cut_mesh.h), ascending
+  uint32_t next_name[kFeatureKinds] = {};  // of features of the surface (geometry/surface.h)
+};
+
+}  // namespace dfm

@@ -1,0 +1,221 @@
+#include "world/body_shape.h"
+
+#include <algorithm>
+#include <array>
+
+#include "body/make_surface.h"
+#include "core/error.h"
+#include "mesh/mesh.h"
+#include "state/material.h"
+#include "state/world.h"
+#include "world/body_zones.h"
+#include "world/carry_state.h"
+#include "world/feature_names.h"
+
+namespace dfm {
+namespace {
+
+Surface blank_surface(const Memory &m) {
+  Surface s;
+  use_memory(m, s.tri, s.edge, s.edge_tri, s.tri_edge, s.tri_owns, s.patch, s.name[0], s.name[1], s.name[2],
+             s.fan_begin, s.fan, s.point, s.row, s.col, s.weight, s.rest, s.x, s.v);
+  return s;
+}
+
+void size_points(const Memory &m, Phyxels &p, uint32_t n) {
+  p.n = n;
+  const auto make = [&](Array<double> &a, size_t size) {
+    a = Array<double>(size, 0.0, HookAllocator<double>(m));
+  };
+  for (Array<double> *a : {&p.x, &p.v, &p.v_free, &p.x_end, &p.v_end, &p.f, &p.load, &p.impulse, &p.inv_mass})
+    make(*a, size_t{kStride} * n);
+  make(p.rest, size_t{3} * n);
+  make(p.mass, n);
+  p.held = Array<uint8_t>(n, 0, HookAllocator<uint8_t>(m));
+}
+
+// Rows of `width` values by number before.
+template <class List, class From>
+void take_rows(const From &from, const Array<uint32_t> &number, size_t width, List &to) {
+  to.resize(width * number.size());
+  for (size_t i = 0; i < number.size(); ++i)
+    std::copy_n(from.begin() + std::ptrdiff_t(width * number[i]), width,
+                to.begin() + std::ptrdiff_t(width * i));
+}
+
+// What follows from the cells: share, materials, fields.
+void take_cells(const Memory &m, const Array<double> &share, const Makeup &makeup, const CutMesh &mesh,
+                BodyShape &out) {
+  use_memory(m, out.share);
+  if (!share.empty()) take_rows(share, mesh.cell, 1, out.share);
+  out.makeup.materials = makeup.materials;
+  if (!makeup.of.empty()) take_rows(makeup.of, mesh.cell, 1, out.makeup.of);
+  for (const CellField &f : makeup.given) {
+    out.makeup.given.push_back({f.key, f.from, f.width, Array<double>(HookAllocator<double>(m))});
+    take_rows(f.values, mesh.cell, f.width, out.makeup.given.back().values);
+  }
+}
+
+void weigh(Body &b) {
+  CellMaterials cells;
+  for (const Material &material : b.makeup.materials) cells.list.push_back(&material);
+  cells.of = b.makeup.of;
+  dfm_body_def def = dfm_body_def_default();
+  def.ntet = static_cast<uint32_t>(b.tets.size() / 4);
+  def.cell_share = b.share.empty() ? nullptr : b.share.data();
+  lump_body(b, def, cells);
+  update_inverse_mass(b.p);
+}
+
+void make_skin(const Memory &m, const CutMesh &mesh, BodyShape &out) {
+  const uint32_t ntet = static_cast<uint32_t>(mesh.cell.size());
+  out.tets = Array<uint32_t>(mesh.tets);
+  out.edges = unique_edges(m, ntet, out.tets.data());
+  const Array<uint32_t> boundary = boundary_triangles(m, ntet, out.tets.data());
+  out.surface = blank_surface(m);
+  make_surface(m, out.p.n, out.p.rest.data(), boundary.data(), static_cast<uint32_t>(boundary.size() / 3),
+               out.surface);
+}
+
+// The body's present model, made for the mesh that it has now. Its integrator was chosen before.
+void make_model_again(Body &b, const BodyShape &before, ModelOrigin origin) {
+  const Integrator was = before.model.integrator;
+  std::unique_ptr<BodyModel> made = make_body_model(*b.world, b, *before.model.instance.type,
+                                                    std::move(origin), static_cast<int32_t>(was.used));
+  made->integrator.chosen = was.chosen;
+  made->integrator.open = was.open;
+  exchange(b, *made);
+  const std::vector<double> &values = before.model.instance.params;
+  if (values == b.model.params) return;
+  if (const dfm_status s = b.model.put_params(values, b.dynamics->claims()); s != DFM_OK)
+    fail(s, "body '%s': model '%s' does not take its present parameters for the cells that are left",
+         b.name.c_str(), b.model.type->id);
+  b.model.params = values;
+}
+
+// Puts the shape into the body; the last steps of making it may fail, and undo that.
+template <class Finish>
+std::unique_ptr<BodyShape> put(Body &b, std::unique_ptr<BodyShape> shape, Finish &&finish) {
+  shape->shape = ++b.world->shapes;
+  shape->search = std::make_unique<SearchTree>(b.world->memory());
+  exchange(b, *shape);
+  try {
+    weigh(b);
+    finish(*shape);
+  } catch (...) {
+    exchange(b, *shape);
+    throw;
+  }
+  return shape;
+}
+
+}  // namespace
+
+void exchange(Body &b, BodyShape &other) noexcept {
+  std::swap(b.p, other.p);
+  b.tets.swap(other.tets);
+  b.edges.swap(other.edges);
+  std::swap(b.surface, other.surface);
+  std::swap(b.zones, other.zones);
+  std::swap(b.cut, other.cut);
+  std::swap(b.shape, other.shape);
+  b.share.swap(other.share);
+  b.surfel_impulse.swap(other.surfel_impulse);
+  b.anchor.swap(other.anchor);
+  std::swap(b.makeup, other.makeup);
+  std::swap(b.mass, other.mass);
+  std::swap(b.rest_volume, other.rest_volume);
+  b.loads.swap(other.loads);
+  b.springs.swap(other.springs);
+  b.motions.swap(other.motions);
+  b.spares.swap(other.spares);
+  b.search.swap(other.search);
+  exchange(b, other.model);
+  ++b.x_version;
+}
+
+std::shared_ptr<const WholeBody> whole_of(const Body &b) {
+  if (b.cut.whole) return b.cut.whole;
+  const Memory &m = b.world->memory();
+  auto out = std::make_shared<WholeBody>();
+  use_memory(m, out->rest, out->mass, out->share, out->tets, out->tri);
+  out->npoint = b.p.n;
+  out->nsurfel = b.surface.nsurfel;
+  out->rest = b.p.rest;
+  out->mass = b.p.mass;
+  out->share = b.share;
+  out->tets = b.tets;
+  for (const uint32_t s : b.surface.tri) out->tri.push_back(b.surface.point[s]);
+  out->makeup = b.makeup;
+  out->zones = b.zones;
+  return out;
+}
+
+std::unique_ptr<BodyShape> cut_body(Body &b, CutMesh &&mesh, Array<uint64_t> &&open) {
+  const Memory &m = b.world->memory();
+  auto shape = std::make_unique<BodyShape>();
+  BodyShape &out = *shape;
+  out.cut.whole = whole_of(b);
+  use_memory(m, out.cut.point, out.cut.cell);
+  const bool again = b.cut.whole != nullptr;
+  for (const uint32_t p : mesh.point) out.cut.point.push_back(again ? b.cut.point[p] : p);
+  for (const uint32_t c : mesh.cell) out.cut.cell.push_back(again ? b.cut.cell[c] : c);
+  out.cut.open = std::move(open);
+
+  size_points(m, out.p, static_cast<uint32_t>(mesh.point.size()));
+  take_rows(b.p.rest, mesh.point, 3, out.p.rest);
+  take_rows(b.p.x, mesh.point, kStride, out.p.x);
+  take_rows(b.p.v, mesh.point, kStride, out.p.v);
+  take_rows(b.p.held, mesh.point, 1, out.p.held);
+  use_memory(m, out.anchor, out.surfel_impulse);
+  if (!b.anchor.empty()) take_rows(b.anchor, mesh.point, kStride, out.anchor);
+  take_cells(m, b.share, b.makeup, mesh, out);
+  make_skin(m, mesh, out);
+  name_features(b, mesh, out.surface, out.cut);
+  make_cut_zones(m, *out.cut.whole, out.cut, out.makeup, out.tets, out.surface, out.zones);
+  carry_surfels(b, mesh, out);
+  gather_surface(out.surface, out.p.x.data(), out.p.v.data());
+
+  ModelOrigin origin = b.origin;
+  take_rows(b.origin.held, mesh.point, 1, origin.held);
+  return put(b, std::move(shape), [&](BodyShape &before) {
+    carry_loads(before, mesh, b);
+    make_model_again(b, before, std::move(origin));
+    carry_state(before, mesh, b);
+  });
+}
+
+std::unique_ptr<BodyShape> restore_shape(Body &b, std::shared_ptr<const WholeBody> whole, CutMesh &&mesh,
+                                         Array<uint64_t> &&open, FeatureNames *names) {
+  const Memory &m = b.world->memory();
+  auto shape = std::make_unique<BodyShape>();
+  BodyShape &out = *shape;
+  size_points(m, out.p, static_cast<uint32_t>(mesh.point.size()));
+  take_rows(whole->rest, mesh.point, 3, out.p.rest);
+  for (uint32_t i = 0; i < out.p.n; ++i)
+    std::copy_n(&out.p.rest[size_t{3} * i], 3, &out.p.x[size_t{kStride} * i]);
+  use_memory(m, out.anchor, out.surfel_impulse);
+  if (b.world->def.sleep) out.anchor = out.p.x;
+  take_cells(m, whole->share, whole->makeup, mesh, out);
+  make_skin(m, mesh, out);
+  out.surfel_impulse.assign(size_t{3} * out.surface.nsurfel, 0.0);
+  if (names) {
+    out.cut.whole = whole;
+    out.cut.open = std::move(open);
+    take_names(b.name, *names, out.surface, out.cut);
+    use_memory(m, out.cut.point, out.cut.cell);
+    out.cut.point = mesh.point;
+    out.cut.cell = mesh.cell;
+    make_cut_zones(m, *whole, out.cut, out.makeup, out.tets, out.surface, out.zones);
+  } else {
+    out.zones = whole->zones;
+  }
+  gather_surface(out.surface, out.p.x.data(), out.p.v.data());
+  return put(b, std::move(shape), [&](BodyShape &before) {
+    ModelOrigin origin = before.model.origin;
+    origin.held.assign(b.p.n, 0);
+    make_model_again(b, before, std::move(origin));
+  });
+}
+
+}  // namespace dfm

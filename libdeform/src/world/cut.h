@@ -1,0 +1,37 @@
+// Cells leave a body between two steps, and faces between cells open (doc/concepts/cutting.md).
+#pragma once
+#include "geometry/cut_shape.h"
+#include "state/body.h"
+
+namespace dfm {
+
+struct CutReport {
+  uint32_t removed = 0;             // cells
+  uint32_t left = 0;                // cells that the shape meets and that its limit has left
+  uint32_t copies = 0;              // of points
+  uint32_t parts = 0;               // that the body consists of now
+  double area = 0;                  // m2 of triangles that have come to the surface, at rest
+  double mass = 0;                  // kg, taken away
+  Vec3 momentum;                    // N s, taken away
+  double kinetic = 0, elastic = 0;  // J, taken away; elastic NaN where the model gives none
+};
+
+// Throws Error, in one sentence, where the body cannot be cut while it has this model.
+void check_may_cut(const Body &b, const ModelInstance &model);
+
+// Throw Error, and then nothing has changed.
+// The first `most` of the cells that the shape meets go.
+CutReport remove_by_shape(Body &b, const CutShape &shape, uint32_t most);
+CutReport remove_cells(Body &b, const Array<uint8_t> &removed);
+// Faces between cells whose middles lie on both sides of the blade open, the first `most` on its way. No cell
+// goes.
+CutReport split_by_blade(Body &b, const CutShape &blade, uint32_t most);
+
+// Opens faces between present cells: pairs (mesh/cut_mesh.h), in any order.
+CutReport open_faces(Body &b, const Array<uint64_t> &faces);
+
+// Puts a body without cells where steps do not see it, and back; allocates nothing once there is room.
+void reserve_places(World &w);
+void set_emptied(World &w, Body &b, bool emptied) noexcept;
+
+}  // namespace dfm

@@ -1,0 +1,167 @@
+#include "world/feature_names.h"
+
+#include <algorithm>
+#include <array>
+
+#include "core/error.h"
+#include "mesh/mesh.h"
+#include "world/body_shape.h"
+#include "world/body_zones.h"
+
+namespace dfm {
+namespace {
+
+using Corners = std::array<uint32_t, 3>;
+
+Corners sorted(uint32_t a, uint32_t b, uint32_t c) {
+  Corners out{a, b, c};
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+// Triangles by their three points.
+class TriangleList {
+ public:
+  // point(k): of corner k of all triangles
+  template <class Point>
+  TriangleList(uint32_t ntri, Point &&point) {
+    for (uint32_t t = 0; t < ntri; ++t)
+      entries_.push_back(
+          {sorted(point(3 * size_t{t}), point(3 * size_t{t} + 1), point(3 * size_t{t} + 2)), t});
+    std::sort(entries_.begin(), entries_.end());
+  }
+  uint32_t find(Corners key) const {  // kNone: there is none
+    const auto at = std::lower_bound(entries_.begin(), entries_.end(), std::pair(key, 0u));
+    return at != entries_.end() && at->first == key ? at->second : kNone;
+  }
+
+ private:
+  std::vector<std::pair<Corners, uint32_t>> entries_;
+};
+
+// Gives each old name once, and new ones from `next` on.
+class Names {
+ public:
+  Names(const Array<uint32_t> &old, uint32_t n, uint32_t &next) : old_(old), taken_(n), next_(next) {}
+  uint32_t of(uint32_t feature) {  // kNone: of no feature before
+    if (feature == kNone || taken_[feature]) return next_++;
+    taken_[feature] = 1;
+    return old_.empty() ? feature : old_[feature];
+  }
+
+ private:
+  const Array<uint32_t> &old_;
+  std::vector<uint8_t> taken_;
+  uint32_t &next_;
+};
+
+uint32_t find_edge(const Surface &s, uint32_t a, uint32_t b) {
+  if (a == kNone || b == kNone) return kNone;
+  const std::pair key = std::minmax(a, b);
+  uint32_t low = 0, high = s.nedge;
+  const auto at = [&](uint32_t e) { return std::pair(s.edge[2 * size_t{e}], s.edge[2 * size_t{e} + 1]); };
+  while (low < high) {
+    const uint32_t middle = low + (high - low) / 2;
+    if (at(middle) < std::pair<uint32_t, uint32_t>(key)) low = middle + 1;
+    else high = middle;
+  }
+  return low < s.nedge && at(low) == std::pair<uint32_t, uint32_t>(key) ? low : kNone;
+}
+
+uint32_t above_all(const Array<uint32_t> &names) {
+  return names.empty() ? 0 : *std::max_element(names.begin(), names.end()) + 1;
+}
+
+// old [ntri]: the triangle before that each one is, or kNone.
+void name_patches(const Surface &before, const std::vector<uint32_t> &old, Surface &surface, uint32_t &next) {
+  std::vector<uint32_t> name(above_all(surface.patch), kNone);
+  std::vector<uint8_t> taken(above_all(before.patch));
+  for (uint32_t t = 0; t < surface.ntri; ++t) {
+    if (old[t] == kNone || name[surface.patch[t]] != kNone || taken[before.patch[old[t]]]) continue;
+    name[surface.patch[t]] = before.patch[old[t]];
+    taken[before.patch[old[t]]] = 1;
+  }
+  for (uint32_t &n : name)
+    if (n == kNone) n = next++;
+  for (uint32_t &p : surface.patch) p = name[p];
+}
+
+}  // namespace
+
+void name_features(const Body &b, const CutMesh &mesh, Surface &surface, CutRecord &record) {
+  const Surface &before = b.surface;
+  if (b.cut.whole) {
+    std::copy(b.cut.next_name, b.cut.next_name + kFeatureKinds, record.next_name);
+  } else {
+    const uint32_t next[kFeatureKinds] = {before.nsurfel, before.nedge, before.ntri, above_all(before.patch)};
+    std::copy(next, next + kFeatureKinds, record.next_name);
+  }
+  std::vector<uint32_t> surfel_of(b.p.n, kNone);
+  for (uint32_t s = 0; s < before.nsurfel; ++s) surfel_of[before.point[s]] = s;
+  std::vector<uint32_t> was(surface.nsurfel);  // surfel before
+  for (uint32_t s = 0; s < surface.nsurfel; ++s) was[s] = surfel_of[mesh.point[surface.point[s]]];
+
+  Names surfels(before.name[0], before.nsurfel, record.next_name[0]);
+  for (uint32_t s = 0; s < surface.nsurfel; ++s) surface.name[0].push_back(surfels.of(was[s]));
+  Names edges(before.name[1], before.nedge, record.next_name[1]);
+  for (size_t e = 0; e < surface.edge.size(); e += 2)
+    surface.name[1].push_back(edges.of(find_edge(before, was[surface.edge[e]], was[surface.edge[e + 1]])));
+  const TriangleList list(before.ntri, [&](size_t k) { return before.tri[k]; });
+  std::vector<uint32_t> old(surface.ntri);
+  Names triangles(before.name[2], before.ntri, record.next_name[2]);
+  for (uint32_t t = 0; t < surface.ntri; ++t) {
+    const uint32_t *const c = &surface.tri[3 * size_t{t}];
+    old[t] = list.find(sorted(was[c[0]], was[c[1]], was[c[2]]));
+    surface.name[2].push_back(triangles.of(old[t]));
+  }
+  name_patches(before, old, surface, record.next_name[3]);
+}
+
+void take_names(const std::string &body, FeatureNames &names, Surface &surface, CutRecord &record) {
+  const uint32_t counts[kFeatureKinds] = {surface.nsurfel, surface.nedge, surface.ntri, surface.ntri};
+  for (uint32_t k = 0; k < kFeatureKinds; ++k) {
+    const Array<uint32_t> &of = names.of[k];
+    if (of.size() != counts[k] || above_all(of) > names.next[k])
+      fail(DFM_E_FORMAT,
+           "the snapshot is damaged: body '%s': names of its surface: expected one for each feature; "
+           "nothing was restored",
+           body.c_str());
+    record.next_name[k] = names.next[k];
+    (k < 3 ? surface.name[k] : surface.patch).swap(names.of[k]);
+  }
+}
+
+void make_cut_zones(const Memory &m, const WholeBody &whole, const CutRecord &record, const Makeup &makeup,
+                    const Array<uint32_t> &tets, const Surface &surface, SurfaceZones &out) {
+  const TriangleList skin(static_cast<uint32_t>(whole.tri.size() / 3),
+                          [&](size_t k) { return whole.tri[k]; });
+  const auto point = [&](size_t k) { return surface.point[surface.tri[k]]; };
+  const TriangleList own(surface.ntri, point);
+  out.list = whole.zones.list;
+  use_memory(m, out.of);
+  out.of.assign(surface.ntri, 0);
+  bool one = true;
+  for (size_t c = 0; c < tets.size(); c += 4)
+    for (const auto &f : kTetFace) {
+      const Corners face = sorted(tets[c + f[0]], tets[c + f[1]], tets[c + f[2]]);
+      const uint32_t t = own.find(face);
+      if (t == kNone) continue;
+      const uint32_t was =
+          skin.find(sorted(record.point[face[0]], record.point[face[1]], record.point[face[2]]));
+      if (was != kNone) {
+        out.of[t] = whole.zones.of.empty() ? 0 : whole.zones.of[was];
+      } else {
+        const Material &made_of = makeup.materials[makeup.of.empty() ? 0 : makeup.of[c / 4]];
+        const auto same = [&](const SurfaceZones::Zone &z) {
+          return z.group == kCutGroup && z.material == made_of.name;
+        };
+        const auto at = std::find_if(out.list.begin(), out.list.end(), same);
+        out.of[t] = uint32_t(at - out.list.begin());
+        if (at == out.list.end()) out.list.push_back({kCutGroup, made_of.name, friction_of(made_of)});
+      }
+      one = one && out.of[t] == 0;
+    }
+  if (one && out.list.size() == 1) out.of.clear();
+}
+
+}  // namespace dfm

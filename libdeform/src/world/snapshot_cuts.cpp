@@ -1,0 +1,144 @@
+#include "world/snapshot_cuts.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "core/error.h"
+#include "state/world.h"
+#include "world/cut.h"
+
+namespace dfm {
+namespace {
+
+[[noreturn]] void refuse(const Body &b, const char *what) {
+  fail(DFM_E_FORMAT, "the snapshot is damaged: body '%s': %s; nothing was restored", b.name.c_str(), what);
+}
+
+bool has_shape(const Body &b, const CutRow &r) {
+  if (!b.cut.whole || b.tets != r.tets || b.cut.point != r.point || b.cut.cell != r.cell ||
+      b.cut.open != r.open || b.surface.patch != r.names.of[3])
+    return false;
+  for (size_t k = 0; k < 3; ++k)
+    if (b.surface.name[k] != r.names.of[k]) return false;
+  return std::equal(b.cut.next_name, b.cut.next_name + kFeatureKinds, r.names.next);
+}
+
+// Cells and points of a part of the whole body.
+void check(const Body &b, const WholeBody &whole, const CutRow &r) {
+  const size_t n = whole.tets.size() / 4;
+  if (r.cell.empty() || r.tets.size() != 4 * r.cell.size())
+    refuse(b, "cells left: expected corners for each");
+  for (size_t i = 0; i < r.cell.size(); ++i)
+    if (r.cell[i] >= n || (i && r.cell[i] <= r.cell[i - 1]))
+      refuse(b, "cells left: expected numbers of cells, ascending");
+  for (const uint32_t p : r.point)
+    if (p >= whole.npoint) refuse(b, "points left: expected numbers of points");
+  std::vector<uint8_t> used(r.point.size());
+  for (size_t k = 0; k < r.tets.size(); ++k) {
+    if (r.tets[k] >= r.point.size() || r.point[r.tets[k]] != whole.tets[size_t{4} * r.cell[k / 4] + k % 4])
+      refuse(b, "corners of cells: expected those of the body as it was made");
+    used[r.tets[k]] = 1;
+  }
+  if (std::find(used.begin(), used.end(), uint8_t{0}) != used.end())
+    refuse(b, "points left: expected points that cells have");
+  for (size_t i = 0; i < r.open.size(); ++i)
+    if (r.open[i] >> 32 >= n || (r.open[i] & kNone) >= n || (i && r.open[i] <= r.open[i - 1]))
+      refuse(b, "open faces: expected pairs of cells, ascending");
+}
+
+CutMesh mesh_of(const Memory &m, const CutRow &r) {
+  CutMesh out(m);
+  out.tets.assign(r.tets.begin(), r.tets.end());
+  out.point.assign(r.point.begin(), r.point.end());
+  out.cell.assign(r.cell.begin(), r.cell.end());
+  return out;
+}
+
+CutMesh mesh_of(const Memory &m, const WholeBody &whole) {
+  CutMesh out(m);
+  out.tets.assign(whole.tets.begin(), whole.tets.end());
+  out.point.resize(whole.npoint);
+  std::iota(out.point.begin(), out.point.end(), 0u);
+  out.cell.resize(whole.tets.size() / 4);
+  std::iota(out.cell.begin(), out.cell.end(), 0u);
+  return out;
+}
+
+}  // namespace
+
+std::vector<Body *> all_bodies(const World &w) {
+  std::vector<Body *> out;
+  for (const auto *list : {&w.bodies, &w.emptied})
+    for (const auto &b : *list) out.push_back(b.get());
+  std::sort(out.begin(), out.end(), [](const Body *l, const Body *r) { return l->id < r->id; });
+  return out;
+}
+
+std::vector<CutRow> cut_rows(const World &w) {
+  std::vector<CutRow> out;
+  for (const Body *const b : all_bodies(w)) {
+    if (!b->cut.whole && !b->emptied) continue;
+    CutRow &r = out.emplace_back();
+    r.id = b->id;
+    r.emptied = b->emptied;
+    if (b->emptied) continue;
+    r.tets = b->tets;
+    r.point = b->cut.point;
+    r.cell = b->cut.cell;
+    r.open = b->cut.open;
+    for (size_t k = 0; k < 3; ++k) r.names.of[k] = b->surface.name[k];
+    r.names.of[3] = b->surface.patch;
+    std::copy(b->cut.next_name, b->cut.next_name + kFeatureKinds, r.names.next);
+  }
+  return out;
+}
+
+void SnapshotShapes::put(Body &b, CutRow *row) {
+  const Memory &m = w_.memory();
+  const bool emptied = row && row->emptied;
+  undo_.push_back({&b, b.emptied, nullptr});
+  set_emptied(w_, b, emptied);
+  if (emptied || (row ? has_shape(b, *row) : !b.cut.whole)) return;
+  if (!b.surface.identity()) refuse(b, "cells left: expected a body that cells can be cut from");
+  const std::shared_ptr<const WholeBody> whole = whole_of(b);
+  Array<uint64_t> open{HookAllocator<uint64_t>(m)};
+  if (row) {
+    check(b, *whole, *row);
+    open.assign(row->open.begin(), row->open.end());
+    undo_.back().shape = restore_shape(b, whole, mesh_of(m, *row), std::move(open), &row->names);
+  } else {
+    undo_.back().shape = restore_shape(b, whole, mesh_of(m, *whole), std::move(open), nullptr);
+  }
+}
+
+SnapshotShapes::SnapshotShapes(World &w, std::vector<CutRow> &rows) : w_(w) {
+  const std::vector<Body *> bodies = all_bodies(w);
+  reserve_places(w);
+  undo_.reserve(bodies.size());
+  size_t found = 0;
+  try {
+    for (Body *const b : bodies) {
+      const auto row = std::find_if(rows.begin(), rows.end(), [&](const CutRow &r) { return r.id == b->id; });
+      found += row != rows.end();
+      put(*b, row == rows.end() ? nullptr : &*row);
+    }
+    if (found != rows.size())
+      fail(DFM_E_FORMAT,
+           "the snapshot is damaged: cut body: expected a body of this world, once; nothing was restored");
+  } catch (...) {
+    take_back();
+    throw;
+  }
+}
+
+SnapshotShapes::~SnapshotShapes() { take_back(); }
+
+void SnapshotShapes::take_back() noexcept {
+  for (; !undo_.empty(); undo_.pop_back()) {
+    Undo &u = undo_.back();
+    if (u.shape) exchange(*u.body, *u.shape);
+    set_emptied(w_, *u.body, u.emptied);
+  }
+}
+
+}  // namespace dfm

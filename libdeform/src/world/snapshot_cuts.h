@@ -1,0 +1,62 @@
+// Which cells the bodies of a snapshot have. A restore reads this first and gives the world's bodies these
+// cells, so that all other fields find arrays of their length; where it fails later on they get their own
+// cells back.
+#pragma once
+#include <vector>
+
+#include "world/body_shape.h"
+#include "world/snapshot_stream.h"
+
+namespace dfm {
+
+// Of a body that is not as it was made. emptied: it has no cells, and the lists are empty.
+struct CutRow {
+  uint64_t id = 0;
+  bool emptied = false;
+  Array<uint32_t> tets, point, cell;  // as in CutRecord
+  Array<uint64_t> open;
+  FeatureNames names;
+};
+
+std::vector<CutRow> cut_rows(const World &w);
+
+template <class Stream, class Rows>
+void cut_fields(Stream &s, Rows &rows) {
+  s.list("bodies that have been cut", rows, [&](auto &r) {
+    s.value("cut body", r.id, must::any);
+    s.value("without cells", r.emptied, must::flag);
+    s.array("cells left", r.cell, kAnyCount, must::any);
+    s.array("corners of cells", r.tets, kAnyCount, must::any);
+    s.array("points left", r.point, kAnyCount, must::any);
+    s.array("open faces", r.open, kAnyCount, must::any);
+    for (auto &names : r.names.of) s.array("names of features", names, kAnyCount, must::any);
+    for (auto &next : r.names.next) s.value("next name", next, must::any);
+  });
+}
+
+// While it lives, the world's bodies have the cells that the rows say; keep(): from then on.
+class SnapshotShapes {
+ public:
+  // Throws Error, and then the world is as it was.
+  SnapshotShapes(World &w, std::vector<CutRow> &rows);
+  SnapshotShapes(const SnapshotShapes &) = delete;
+  SnapshotShapes &operator=(const SnapshotShapes &) = delete;
+  ~SnapshotShapes();
+  void keep() noexcept { undo_.clear(); }
+
+ private:
+  struct Undo {
+    Body *body;
+    bool emptied;
+    std::unique_ptr<BodyShape> shape;  // null: it has not changed
+  };
+  void put(Body &b, CutRow *row);
+  void take_back() noexcept;
+  World &w_;
+  std::vector<Undo> undo_;
+};
+
+// All bodies, those without cells too, in id order.
+std::vector<Body *> all_bodies(const World &w);
+
+}  // namespace dfm
