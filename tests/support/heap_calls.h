@@ -19,6 +19,14 @@ inline void *counted_alloc(size_t bytes, size_t align) {
   throw std::bad_alloc();
 }
 
+inline void *counted_or_null(size_t bytes, size_t align) noexcept {
+  try {
+    return counted_alloc(bytes, align);
+  } catch (const std::bad_alloc &) {
+    return nullptr;
+  }
+}
+
 // Out of line: where a compiler sees free() behind its own operator new, it calls them mismatched.
 [[gnu::noinline]] inline void counted_free(void *p) noexcept { std::free(p); }
 
@@ -29,6 +37,17 @@ void *operator new[](size_t bytes) { return test::counted_alloc(bytes, 0); }
 void *operator new(size_t bytes, std::align_val_t align) { return test::counted_alloc(bytes, size_t(align)); }
 void *operator new[](size_t bytes, std::align_val_t align) {
   return test::counted_alloc(bytes, size_t(align));
+}
+// Under a sanitizer these would be the sanitizer's own, and not fit the delete below.
+void *operator new(size_t bytes, const std::nothrow_t &) noexcept { return test::counted_or_null(bytes, 0); }
+void *operator new[](size_t bytes, const std::nothrow_t &) noexcept {
+  return test::counted_or_null(bytes, 0);
+}
+void *operator new(size_t bytes, std::align_val_t align, const std::nothrow_t &) noexcept {
+  return test::counted_or_null(bytes, size_t(align));
+}
+void *operator new[](size_t bytes, std::align_val_t align, const std::nothrow_t &) noexcept {
+  return test::counted_or_null(bytes, size_t(align));
 }
 void operator delete(void *p) noexcept { test::counted_free(p); }
 void operator delete[](void *p) noexcept { test::counted_free(p); }
