@@ -11,6 +11,7 @@
 #define dfm_world_profile profile_inline
 #define dfm_world_swaps swaps_inline
 #define dfm_attach_def_default attach_def_inline
+#define dfm_cut_def_default cut_def_inline
 #define dfm_scene_write_def_default scene_write_def_inline
 #define dfm_context_def_default context_def_inline
 #define dfm_world_def_default world_def_inline
@@ -35,6 +36,7 @@
 #undef dfm_world_profile
 #undef dfm_world_swaps
 #undef dfm_attach_def_default
+#undef dfm_cut_def_default
 #undef dfm_scene_write_def_default
 #undef dfm_context_def_default
 #undef dfm_world_def_default
@@ -74,6 +76,7 @@ DFM_LIST_SYMBOL(dfm_world_swaps, dfm_swap, 64)
     return out;                                                                      \
   }
 DFM_DEFAULT_SYMBOL(dfm_attach_def)
+DFM_DEFAULT_SYMBOL(dfm_cut_def)
 DFM_DEFAULT_SYMBOL(dfm_scene_write_def)
 DFM_DEFAULT_SYMBOL(dfm_context_def)
 DFM_DEFAULT_SYMBOL(dfm_world_def)

@@ -59,9 +59,9 @@ constexpr uint32_t kMostRevisions = 6;  // of what rigid hosts take for granted,
 // anyway where they do not rest. Further solves at most, once bodies are content, of what the cap on sweeps
 // has cut off.
 constexpr uint32_t kWarmRevisions = 4, kMostAgain = 6;
-// A solve that ends at its cap leaves impulses that drift, and bodies follow them: each finds something to
-// change after the other, and none of it is an error that falls. After so many such solves a body is as right
-// as it will be where it lies within what it tolerates.
+// A solve that ends at its cap, or goes on beyond it by momentum, leaves impulses that drift, and bodies
+// follow them: each finds something to change after the other, and none of it is an error that falls. After
+// so many such solves a body is as right as it will be where it lies within what it tolerates.
 constexpr uint32_t kMostCapped = 20;
 // A sub-step in which a body does not come to a state with its contacts is taken anew, half as long, down to
 // this share of the planned one.
@@ -396,6 +396,7 @@ const LawInstance *solve_revised(World &w, StepContext &step, Revised &revised) 
   if (warm == Revised::diverged || warm == Revised::failed) forget_revisions(w, step);
   for (uint32_t hosts = 0, again = 0, capped = 0;;) {
     bad = solve_rows(w, step);
+    const bool beyond = step.sweeps >= w.def.max_sweeps;
     passes += std::exchange(step.passes, 0);
     sweeps += std::exchange(step.sweeps, 0);
     if (bad) break;
@@ -405,7 +406,7 @@ const LawInstance *solve_revised(World &w, StepContext &step, Revised &revised) 
       ++hosts;
       continue;
     }
-    capped += step.residual.due > 1;
+    capped += beyond || step.residual.due > 1;
     revised = revise_bodies(w, step, capped >= kMostCapped);
     if (revised == Revised::nothing && step.bodies_revise && step.residual.due > 1 && again++ < kMostAgain)
       continue;
