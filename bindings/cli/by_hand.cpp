@@ -136,6 +136,7 @@ void ByHand::at(double place[3], double velocity[3]) const {
 // Backward Euler of the spring and the damper on a point of an eighth of the mass: no solid body's surface
 // moves more easily under an impulse, so the pull is stable at any stiffness.
 void ByHand::before_step(double h) {
+  tools_.before_step(h);
   if (!drag_.thing) return;
   double x[3], v[3], impulse[3], arm[3];
   at(x, v);
@@ -173,6 +174,10 @@ void ByHand::act(const JsonValue &line) {
   } else if (what == "release" && body_) {
     need(dfm_body_remove_spring(body_, spring_));
     body_ = 0;
+  } else if (what == "tool") {
+    tools_.lead(line);
+  } else if (what == "let") {
+    tools_.let(line);
   } else if (what == "gravity") {
     need(dfm_world_set_gravity(scene_.world(), vector(line, "to").data()));
   } else if (what == "friction") {

@@ -12,11 +12,16 @@
 //   {"do": "gravity", "to": [x,y,z]}
 //   {"do": "friction", "between": [A,B], "key": "mu", "value": v}
 //   {"do": "param", "body": B, "key": "young", "value": v}
+//   {"do": "tool", "tool": T, "to": [x,y,z], "rotation": [x,y,z,w], "opening": rad, "speed": v}
+//                                     a tool follows the hand to there, at v m/s at most
+//   {"do": "let", "tool": T, "speed": v}
+//                                     it returns to its keys, or stands still where it has none
 //   {"do": "step", "length": h}       of the steps that follow, s
 #pragma once
 #include <string>
 #include <vector>
 
+#include "held_tools.h"
 #include "json_text.h"
 #include "scene_file.h"
 
@@ -24,17 +29,20 @@ namespace cli {
 
 class ByHand {
  public:
-  explicit ByHand(const SceneFile &scene) : scene_(scene) {}
+  explicit ByHand(const SceneFile &scene) : scene_(scene), tools_(scene) {}
   // Throws Failure with the library's sentence; nothing has changed then.
   void act(const JsonValue &line);
-  // Before each step, of h s: what is dragged gets its impulse.
+  // Before each step, of h s: what is dragged gets its impulse, and tools go on.
   void before_step(double h);
   bool pulls() const { return body_ != 0 || drag_.thing != 0; }
   // With which the spring pulls now, or what was dragged was pulled in the last step; N.
   void force(double out[3]) const;
   double step() const { return step_; }  // s; 0: none was told
-  // The world was put into another state: the spring is gone with the old one.
+  // Acts by which tools are led now: those of a recording that begins here.
+  std::vector<JsonValue> tool_lines() const { return tools_.lines(); }
+  // The world was put into another state: the spring is gone with the old one, and tools are led no more.
   void forget() {
+    tools_.forget();
     body_ = 0;
     drag_.thing = 0;
   }
@@ -60,6 +68,7 @@ class ByHand {
   dfm_body body_ = 0;
   uint32_t spring_ = 0;
   Drag drag_;
+  HeldTools tools_;
   double step_ = 0;
 };
 

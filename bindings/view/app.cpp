@@ -17,7 +17,6 @@ namespace {
 
 constexpr double kFrame = 1.0 / 60;  // s, of the clock of a script
 constexpr double kBudget = 0.022;    // s of a frame that may go into steps, so that the window answers
-constexpr double kTurn = 3.5;        // radians for a way across the picture's height
 
 std::string folder_of(const Options &options, const std::string &scene) {
   if (!options.out.empty()) return options.out;
@@ -45,12 +44,23 @@ double begin(const cli::SceneFile &scene, const Options &options) {
   return start;
 }
 
+render::Bounds extent_of(cli::Drawing &drawing) {
+  render::Scene picture;
+  drawing.fill(picture);
+  return render::bounds(picture);
+}
+
 // --set of a replay may change what is shown, not what was simulated.
 std::optional<cli::Recording> recording_of(const Options &options) {
   if (options.replay.empty()) return std::nullopt;
   cli::Recording out = cli::read_recording(options.replay);
   out.set.insert(out.set.end(), options.set.begin(), options.set.end());
   return out;
+}
+
+std::string text_of(const render::Vec &v) {
+  const double x[3] = {v.x, v.y, v.z};
+  return cli::json_vector(x);
 }
 
 bool on_processor(const std::string &device) {
@@ -60,29 +70,36 @@ bool on_processor(const std::string &device) {
 
 }  // namespace
 
+Stage::Stage(const Options &options, const cli::Globals &globals, const cli::Recording *replay)
+    : scene(globals, replay && options.scene.empty() ? replay->scene : options.scene,
+            replay ? replay->set : options.set, replay ? replay->jitter : 0),
+      simulation(scene, begin(scene, options)),
+      drawing(scene, scene.settings().color),
+      extent(extent_of(drawing)),
+      bodies(drawing.place_of_bodies()),
+      size(extent.empty() ? 1 : render::norm(render::vec(extent.hi) - render::vec(extent.lo))),
+      pull(simulation),
+      grip(simulation, size),
+      plots(simulation, grip),
+      sliders(make_sliders(simulation)) {}
+
 App::App(const Options &options, const cli::Globals &globals)
     : options_(options),
       globals_(globals),
       replay_(recording_of(options)),
-      scene_(globals, replay_ && options.scene.empty() ? replay_->scene : options.scene,
-             replay_ ? replay_->set : options.set, replay_ ? replay_->jitter : 0),
-      simulation_(scene_, begin(scene_, options)),
-      pull_(simulation_),
-      plots_(simulation_),
-      sliders_(make_sliders(simulation_)),
-      drawing_(scene_, scene_.settings().color) {
+      stage_(std::make_unique<Stage>(options, globals, replay_ ? &*replay_ : nullptr)) {
   if (!options.script.empty()) script_.emplace(options.script);
-  options_.out = folder_of(options, scene_.path());
+  const std::string &path = stage_->scene.path();
+  options_.out = folder_of(options, path);
   window_ = Window::open(options.width, options.height,
-                         "deform view " + std::filesystem::path(scene_.path()).filename().string(), !script_);
+                         "deform view " + std::filesystem::path(path).filename().string(), !script_);
   window_->size(width_, height_);
   render::Scene picture;
-  drawing_.fill(picture);
-  extent_ = render::bounds(picture);
-  orbit_.set(first_camera(scene_, picture, height_ > 0 ? aspect() : 1));
-  plots_.sample();
+  stage_->drawing.fill(picture);
+  orbit_.set(first_camera(stage_->scene, picture, height_ > 0 ? aspect() : 1));
+  stage_->plots.sample();
   if (replay_) show_state(0);
-  wanted_ = simulation_.time();
+  wanted_ = stage_->simulation.time();
   last_ = window_->now();
 }
 
@@ -103,7 +120,7 @@ void App::run() {
 }
 
 void App::frame() {
-  const bool idle = !script_ && !running_ && held_ < 0 && !pull_.holds();
+  const bool idle = !script_ && !running_ && held_ < 0 && !stage_->pull.holds();
   std::vector<Input> inputs = window_->poll(idle ? 0.05 : 0);
   std::vector<ScriptLine> due;
   const double now = window_->now();
@@ -123,7 +140,7 @@ void App::frame() {
     pull_to_mouse();
     advance(seconds);
   });
-  plots_.sample();
+  stage_->plots.sample();
   panels();
   if (!draw()) return;
   for (const ScriptLine &line : due)
@@ -141,28 +158,28 @@ void App::key(const std::string &name) {
   message_.clear();
   if (name == "space") {
     if (replay_ && !running_ && shown_ + 1 == replay_->states.size()) show_state(0);
-    if (!replay_ && !running_ && simulation_.at_end()) simulation_.go_on();
+    if (!replay_ && !running_ && stage_->simulation.at_end()) stage_->simulation.go_on();
     running_ = !running_;
-    wanted_ = simulation_.time();
+    wanted_ = stage_->simulation.time();
   } else if (name == "s" || name == ".") {
     running_ = false;
     if (replay_) {
       show_state(std::min(shown_ + 1, replay_->states.size() - 1));
     } else {
-      if (simulation_.at_end()) simulation_.go_on();
-      attempt([&] { simulation_.step(); });
+      if (stage_->simulation.at_end()) stage_->simulation.go_on();
+      attempt([&] { stage_->simulation.step(); });
     }
-    wanted_ = simulation_.time();
+    wanted_ = stage_->simulation.time();
   } else if (name == "r") {
     restart();
   } else if (name == "home") {
     render::Scene picture;
-    drawing_.fill(picture);
-    orbit_.set(first_camera(scene_, picture, aspect()));
+    stage_->drawing.fill(picture);
+    orbit_.set(first_camera(stage_->scene, picture, aspect()));
   } else if (name == "c") {
     static const std::vector<std::string> kColors{"body", "contact", "speed", "displacement", "stress"};
-    const auto at = std::find(kColors.begin(), kColors.end(), drawing_.color());
-    drawing_.set_color(at == kColors.end() || at + 1 == kColors.end() ? kColors.front() : at[1]);
+    const auto at = std::find(kColors.begin(), kColors.end(), stage_->drawing.color());
+    stage_->drawing.set_color(at == kColors.end() || at + 1 == kColors.end() ? kColors.front() : at[1]);
   } else if (name == "a") {
     show_arrows_ = !show_arrows_;
   } else if (name == "p") {
@@ -179,7 +196,7 @@ void App::key(const std::string &name) {
     help_ = !help_;
   } else if (name == "q" || name == "escape") {
     quit_ = true;
-  } else if (script_) {
+  } else if (!tool_key(name) && script_) {
     throw cli::Failure(cli::kBadInput,
                        script_->path() + ": there is no key \"" + name + "\"; the key h shows them all");
   }
@@ -187,7 +204,8 @@ void App::key(const std::string &name) {
 
 void App::mouse(const Input &in) {
   if (in.kind == Input::wheel) {
-    if (!window_->panels_want_mouse()) orbit_.zoom(std::pow(0.88, in.turns));
+    if (leads_) lead_deeper(in.turns);
+    else if (!window_->panels_want_mouse()) orbit_.zoom(std::pow(0.88, in.turns));
     return;
   }
   const double dx = in.x - mouse_[0], dy = in.y - mouse_[1];
@@ -195,24 +213,39 @@ void App::mouse(const Input &in) {
   mouse_[1] = in.y;
   if (in.kind == Input::press && held_ < 0 && !window_->panels_want_mouse())
     attempt([&] { press(in.button); });
-  if (in.kind == Input::release && in.button == kLeft && pull_.holds()) attempt([&] { pull_.release(); });
-  if (in.kind == Input::release && in.button == held_) held_ = -1;
+  if (in.kind == Input::release && in.button == kLeft && stage_->pull.holds())
+    attempt([&] { stage_->pull.release(); });
+  if (in.kind == Input::release && in.button == held_) {
+    held_ = -1;
+    leads_ = false;
+  }
   if (in.kind != Input::move || held_ < 0) return;
+  if (leads_) return attempt([&] { lead(dx, dy); });
   if (held_ == kMiddle) orbit_.shift(-dx / height_, dy / height_);
   else orbit_.turn(-kTurn * dx / height_, kTurn * dy / height_);
 }
 
 void App::press(int button) {
+  const Ray ray = orbit_.ray(across(), above(), aspect());
+  if (button != kMiddle && !replay_) {
+    const int tool = stage_->pull.tool_at(stage_->grip, ray.origin, ray.direction);
+    if (tool >= 0) {
+      if (tool != stage_->grip.taken()) stage_->grip.take(tool);
+      leads_ = true;
+      held_ = button;
+      return;
+    }
+  }
   if (button == kLeft && !replay_) {
-    const Ray ray = orbit_.ray(across(), above(), aspect());
-    if (pull_.grab(ray.origin, ray.direction)) return;
+    if (stage_->pull.grab(ray.origin, ray.direction)) return;
   }
   held_ = button;
 }
 
 // In the plane through the picked place that faces the camera.
 void App::pull_to_mouse() {
-  if (pull_.holds()) pull_.move(orbit_.at_depth(across(), above(), aspect(), pull_.to()));
+  if (stage_->pull.holds())
+    stage_->pull.move(orbit_.at_depth(across(), above(), aspect(), stage_->pull.to()));
 }
 
 void App::set_slider(const std::string &name, double value) {
@@ -221,7 +254,7 @@ void App::set_slider(const std::string &name, double value) {
     return;
   }
   if (name == "pull") {
-    pull_.stiffness = value;
+    stage_->pull.stiffness = value;
     return;
   }
   if (name == "time" && replay_) {
@@ -231,7 +264,7 @@ void App::set_slider(const std::string &name, double value) {
     return;
   }
   std::string names = "speed, pull";
-  for (Slider &s : sliders_) {
+  for (Slider &s : stage_->sliders) {
     if (s.name == name) {
       s.apply(value);
       s.value = value;
@@ -245,7 +278,7 @@ void App::set_slider(const std::string &name, double value) {
 
 void App::advance(double seconds) {
   if (!running_) return;
-  const double before = simulation_.time(), began = window_->now();
+  const double before = stage_->simulation.time(), began = window_->now();
   wanted_ += seconds * speed_;
   if (replay_) {
     const auto next = [&] { return shown_ + 1 < replay_->states.size(); };
@@ -255,25 +288,25 @@ void App::advance(double seconds) {
     if (!next()) running_ = false;
     return;
   }
-  while (simulation_.time() < wanted_ - 1e-9) {
-    if (!simulation_.step()) {
+  while (stage_->simulation.time() < wanted_ - 1e-9) {
+    if (!stage_->simulation.step()) {
       running_ = false;
-      message_ = simulation_.trouble().empty() ? "The scene is at its end; space goes on."
-                                               : "Stopped: " + simulation_.trouble();
+      message_ = stage_->simulation.trouble().empty() ? "The scene is at its end; space goes on."
+                                                      : "Stopped: " + stage_->simulation.trouble();
       break;
     }
     if (!script_ && window_->now() - began > kBudget) {  // slower than asked for, rather than stuck
-      wanted_ = simulation_.time();
+      wanted_ = stage_->simulation.time();
       break;
     }
   }
-  if (seconds > 0) real_ += 0.1 * ((simulation_.time() - before) / seconds - real_);
+  if (seconds > 0) real_ += 0.1 * ((stage_->simulation.time() - before) / seconds - real_);
 }
 
 void App::show_state(size_t i) {
   const cli::RecordedState &state = replay_->states[i];
-  cli::read_state(scene_, state.path);
-  if (i < shown_) plots_.clear();
+  cli::read_state(stage_->scene, state.path);
+  if (i < shown_) stage_->plots.clear();
   shown_ = i;
 }
 
@@ -282,7 +315,7 @@ void App::save() {
     cli::make_folder(options_.out);
     char name[32];
     std::snprintf(name, sizeof name, "/%03u.state", saved_);
-    simulation_.save(options_.out + name);
+    stage_->simulation.save(options_.out + name);
     ++saved_;
     message_ = "Saved: " + options_.out + name;
   });
@@ -296,17 +329,18 @@ void App::load() {
   attempt([&] {
     char name[32];
     std::snprintf(name, sizeof name, "/%03u.state", saved_ - 1);
-    simulation_.load(options_.out + name);
-    plots_.clear();
-    wanted_ = simulation_.time();
+    stage_->simulation.load(options_.out + name);
+    stage_->grip.forget();
+    stage_->plots.clear();
+    wanted_ = stage_->simulation.time();
     message_ = "Loaded: " + options_.out + name;
   });
 }
 
 void App::record() {
   attempt([&] {
-    if (simulation_.recording()) {
-      const uint32_t n = simulation_.stop_recording();
+    if (stage_->simulation.recording()) {
+      const uint32_t n = stage_->simulation.stop_recording();
       message_ = std::to_string(n) + " states recorded: deform replay " + options_.out;
       return;
     }
@@ -314,17 +348,18 @@ void App::record() {
     cli::RunOptions run;
     run.out = options_.out;
     run.set = options_.set;
-    simulation_.start_recording(run);
+    stage_->simulation.start_recording(run);
   });
 }
 
 void App::restart() {
   if (replay_) show_state(0);
-  else simulation_.restart();
-  for (Slider &s : sliders_) s.value = s.first;
-  plots_.clear();
-  plots_.sample();
-  wanted_ = simulation_.time();
+  else stage_->simulation.restart();
+  stage_->grip.forget();
+  for (Slider &s : stage_->sliders) s.value = s.first;
+  stage_->plots.clear();
+  stage_->plots.sample();
+  wanted_ = stage_->simulation.time();
   running_ = false;
 }
 
@@ -349,14 +384,15 @@ bool App::draw() {
     if (options_.detail.empty() && !on_processor(device_)) make(render::Detail::full);
   }
   render::Scene picture;
-  drawing_.fill(picture);
-  picture.extent = extent_;
+  stage_->drawing.fill(picture);
+  picture.extent = stage_->extent;
   picture.camera = orbit_.camera();
-  const double size = extent_.empty() ? 1 : render::norm(render::vec(extent_.hi) - render::vec(extent_.lo));
-  if (show_arrows_ && !replay_) arrows_.fill(scene_, size, *picture.camera, picture);
+  const double size = stage_->size;
+  if (show_arrows_ && !replay_) stage_->arrows.fill(stage_->scene, size, *picture.camera, picture);
+  if (show_arrows_ && !replay_) add_tool_arrows(*picture.camera, picture);
   double held[6];
-  if (pull_.holds()) {
-    const render::Vec from = pull_.place(), to = pull_.to();
+  if (stage_->pull.holds()) {
+    const render::Vec from = stage_->pull.place(), to = stage_->pull.to();
     const double ends[6] = {from.x, from.y, from.z, to.x, to.y, to.z};
     std::copy_n(ends, 6, held);
     picture.lines.push_back({held, 1, {0.1f, 0.1f, 0.1f}, 2, true});
@@ -376,20 +412,29 @@ void App::shot(const std::string &name) {
   renderer_->read_window(image);
   std::string why;
   if (!render::write_png(path, image, &why)) throw cli::Failure(cli::kBadInput, why);
-  const std::string hash = cli::hash_text(dfm_world_hash(scene_.world()));
+  const std::string hash = cli::hash_text(dfm_world_hash(stage_->scene.world()));
   if (globals_.json) {
-    cli::JsonObject bodies, row;
-    for (const cli::BodyView &body : scene_.bodies())
+    cli::JsonObject bodies, tools, row;
+    for (const cli::BodyView &body : stage_->scene.bodies())
       bodies.add(body.name, cli::json_vector(cli::body_measure(body).com));
-    for (const cli::RigidView &rigid : scene_.rigids())
+    for (const cli::RigidView &rigid : stage_->scene.rigids())
       bodies.add(rigid.name, cli::json_vector(cli::rigid_measure(rigid).com));
+    for (size_t i = 0; i < stage_->grip.count(); ++i) {
+      const Felt felt = stage_->grip.felt(i);
+      cli::JsonObject tool;
+      tools.add(stage_->grip.name(i), tool.add("at", text_of(felt.at))
+                                          .add("force", text_of(felt.force))
+                                          .add("torque", text_of(felt.torque))
+                                          .text());
+    }
     row.add("shot", cli::quoted(path))
-        .add("t", cli::number(simulation_.time()))
+        .add("t", cli::number(stage_->simulation.time()))
         .add("state_hash", cli::quoted(hash))
         .add("com", bodies.text());
+    if (stage_->grip.count() > 0) row.add("tools", tools.text());
     std::printf("%s\n", row.text().c_str());
   } else if (!globals_.quiet) {
-    std::printf("%s: t = %g s, state %s\n", path.c_str(), simulation_.time(), hash.c_str());
+    std::printf("%s: t = %g s, state %s\n", path.c_str(), stage_->simulation.time(), hash.c_str());
   }
   std::fflush(stdout);
 }

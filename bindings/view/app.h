@@ -10,6 +10,7 @@
 #include "camera.h"
 #include "cli.h"
 #include "drawing.h"
+#include "grip.h"
 #include "options.h"
 #include "plots.h"
 #include "pull.h"
@@ -18,6 +19,23 @@
 #include "window.h"
 
 namespace view {
+
+inline constexpr double kTurn = 3.5;  // radians for a way across the picture's height
+
+// What belongs to the scene as it was read.
+struct Stage {
+  Stage(const Options &options, const cli::Globals &globals, const cli::Recording *replay);
+  cli::SceneFile scene;
+  Simulation simulation;
+  cli::Drawing drawing;
+  render::Bounds extent, bodies;  // at the start
+  double size;                    // m, of that
+  Pull pull;
+  Grip grip;
+  Arrows arrows;
+  Plots plots;
+  std::vector<Slider> sliders;
+};
 
 class App {
  public:
@@ -31,6 +49,11 @@ class App {
   void key(const std::string &name);
   void mouse(const Input &input);
   void press(int button);
+  bool tool_key(const std::string &name);  // false: no key of tools
+  void lead(double dx, double dy);         // the tool in hand by the mouse
+  void lead_deeper(double turns);          // of the wheel, away from the user
+  void add_probe();
+  void add_tool_arrows(const render::Camera &camera, render::Scene &picture);
   void pull_to_mouse();
   void set_slider(const std::string &name, double value);
   void advance(double seconds);
@@ -59,18 +82,11 @@ class App {
   cli::Globals globals_;
   std::optional<Script> script_;
   std::optional<cli::Recording> replay_;
-  cli::SceneFile scene_;
-  Simulation simulation_;
-  Pull pull_;
-  Arrows arrows_;
-  Plots plots_;
-  std::vector<Slider> sliders_;
+  std::unique_ptr<Stage> stage_;
   std::unique_ptr<Window> window_;
   std::unique_ptr<render::WindowRenderer> renderer_;
   std::string device_;  // what GL calls itself
-  cli::Drawing drawing_;
   Orbit orbit_;
-  render::Bounds extent_;
   uint32_t width_ = 0, height_ = 0;  // pixels
   bool running_ = false, quit_ = false, help_ = false, show_arrows_ = true, show_plots_ = true,
        show_panels_ = true;
@@ -80,10 +96,14 @@ class App {
   double frame_ms_ = 0, real_ = 0;  // smoothed; simulated seconds per second
   uint64_t frames_ = 0;
   double mouse_[2] = {0, 0};
-  int held_ = -1;        // the button that turns or shifts the camera; -1: none
-  std::string message_;  // for the user, until the next one
-  uint32_t saved_ = 0;   // states
-  size_t shown_ = 0;     // state of the recording
+  int held_ = -1;                 // the button that turns or shifts the camera, or leads a tool; -1: none
+  bool leads_ = false;            // it leads the tool in hand
+  std::vector<double> felt_[2];   // arrows of forces and torques on tools
+  double lead_[6] = {};           // from the tool in hand to where it shall go
+  double strongest_[2] = {0, 0};  // N, N m, of an arrow of full length
+  std::string message_;           // for the user, until the next one
+  uint32_t saved_ = 0;            // states
+  size_t shown_ = 0;              // state of the recording
 };
 
 }  // namespace view

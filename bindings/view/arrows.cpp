@@ -20,6 +20,16 @@ void add(std::vector<double> &to, const Vec &a, const Vec &b) {
 
 }  // namespace
 
+void add_arrow(std::vector<double> &xyz, const Vec &foot, const Vec &tip, const render::Camera &camera,
+               double size) {
+  const double length = render::norm(tip - foot), head = std::min(0.3 * length, 0.02 * size);
+  const Vec along = render::unit(tip - foot);
+  const Vec side = render::unit(cross(along, render::view_of(camera).back), {1, 0, 0});
+  add(xyz, foot, tip);
+  add(xyz, tip, tip - along * head + side * (0.5 * head));
+  add(xyz, tip, tip - along * head - side * (0.5 * head));
+}
+
 void Arrows::fill(const cli::SceneFile &scene, double size, const render::Camera &camera,
                   render::Scene &out) {
   uint32_t n = 0;
@@ -37,18 +47,13 @@ void Arrows::fill(const cli::SceneFile &scene, double size, const render::Camera
   // Follows a rise at once and a fall slowly, so that neighboring pictures can be compared.
   scale_ = std::max(top, 0.98 * scale_);
   for (std::vector<double> &xyz : xyz_) xyz.clear();
-  const Vec back = render::view_of(camera).back;
   for (const dfm_contact &c : contacts_) {
     const Vec f = force(c);
     const double length = scale_ > 0 ? kLength * size * render::norm(f) / scale_ : 0;
     if (!(length > 0)) continue;
-    std::vector<double> &to = xyz_[c.flags & DFM_CONTACT_STICKING ? 0 : 1];
-    const Vec along = render::unit(f), foot = render::vec(c.point), tip = foot + along * length;
-    const Vec side = render::unit(cross(along, back), {1, 0, 0});
-    const double head = std::min(0.3 * length, 0.02 * size);
-    add(to, foot, tip);
-    add(to, tip, tip - along * head + side * (0.5 * head));
-    add(to, tip, tip - along * head - side * (0.5 * head));
+    const Vec foot = render::vec(c.point);
+    add_arrow(xyz_[c.flags & DFM_CONTACT_STICKING ? 0 : 1], foot, foot + render::unit(f) * length, camera,
+              size);
   }
   for (int i = 0; i < 2; ++i) {
     render::Lines lines;

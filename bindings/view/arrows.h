@@ -2,12 +2,17 @@
 #pragma once
 #include <vector>
 
+#include "render/geometry.h"
 #include "render/render.h"
 #include "scene_file.h"
 
 namespace view {
 
 inline constexpr float kSticks[3] = {0.10f, 0.55f, 0.30f}, kSlides[3] = {0.95f, 0.62f, 0.05f};
+
+// A shaft and two strokes for its head, which turn to the viewer; size: m, of what is shown.
+void add_arrow(std::vector<double> &xyz, const render::Vec &foot, const render::Vec &tip,
+               const render::Camera &camera, double size);
 
 class Arrows {
  public:

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <numbers>
 
 #include "app.h"
 #include "run.h"
@@ -59,11 +60,11 @@ void App::controls() {
   int at = int(shown_);
   ImGui::SetNextItemWidth(scaled(kSlider));
   char label[32];
-  std::snprintf(label, sizeof label, "%.3f s", simulation_.time());
+  std::snprintf(label, sizeof label, "%.3f s", stage_->simulation.time());
   if (ImGui::SliderInt("time", &at, 0, int(replay_->states.size()) - 1, label) && size_t(at) != shown_)
     attempt([&] {
       show_state(size_t(at));
-      wanted_ = simulation_.time();
+      wanted_ = stage_->simulation.time();
     });
 }
 
@@ -72,7 +73,7 @@ void App::files() {
   ImGui::SameLine();
   if (ImGui::Button("load")) key("f9");
   ImGui::SameLine();
-  if (ImGui::Button(simulation_.recording() ? "end recording" : "record")) key("v");
+  if (ImGui::Button(stage_->simulation.recording() ? "end recording" : "record")) key("v");
 }
 
 void App::slide(Slider &s) {
@@ -88,11 +89,11 @@ void App::slide(Slider &s) {
 
 void App::sliders() {
   ImGui::Separator();
-  float stiffness = float(pull_.stiffness);
+  float stiffness = float(stage_->pull.stiffness);
   ImGui::SetNextItemWidth(scaled(kSlider));
   if (ImGui::SliderFloat("pull", &stiffness, 0.1f, 1000, "%.3g x", ImGuiSliderFlags_Logarithmic))
-    pull_.stiffness = stiffness;
-  for (Slider &s : sliders_) slide(s);
+    stage_->pull.stiffness = stiffness;
+  for (Slider &s : stage_->sliders) slide(s);
 }
 
 namespace {
@@ -141,18 +142,19 @@ void draw_plot(const Plot &plot, const std::vector<double> &times) {
 }  // namespace
 
 void App::plots() {
-  if (plots_.times().size() < 2) return;
+  if (stage_->plots.times().size() < 2) return;
   ImGui::SetNextWindowPos({float(width_) - scaled(kGap), scaled(kGap)}, ImGuiCond_Always, {1, 0});
   ImGui::SetNextWindowSize({scaled(kPlot), 0}, ImGuiCond_Always);
   ImGui::Begin("plots", nullptr, kFixed);
-  for (const Plot &p : plots_.plots())
-    if (!(p.measured && (script_ || replay_))) draw_plot(p, plots_.times());
+  for (const Plot &p : stage_->plots.plots())
+    if (!(p.measured && (script_ || replay_)) && (p.tool < 0 || p.tool == std::max(stage_->grip.taken(), 0)))
+      draw_plot(p, stage_->plots.times());
   ImGui::End();
 }
 
 void App::numbers() {
-  const dfm_world_stats stats = cli::world_stats(scene_);
-  ImGui::Text("t = %.4f s", simulation_.time());
+  const dfm_world_stats stats = cli::world_stats(stage_->scene);
+  ImGui::Text("t = %.4f s", stage_->simulation.time());
   if (!replay_) {
     ImGui::Text("%u contacts,", stats.contacts);
     ImGui::SameLine();
@@ -160,16 +162,30 @@ void App::numbers() {
     if (show_arrows_ && stats.contacts > 0) {
       ImGui::SameLine();
       ImGui::TextColored({0.8f, 0.5f, 0, 1}, "others slide");
-      ImGui::Text("longest arrow %.3g N", arrows_.longest());
+      ImGui::Text("longest arrow %.3g N", stage_->arrows.longest());
     }
   }
-  if (pull_.holds()) ImGui::Text("pulled with %.3g N", pull_.force());
+  if (stage_->pull.holds()) ImGui::Text("pulled with %.3g N", stage_->pull.force());
+  const Grip &grip = stage_->grip;
+  if (grip.holds() && !replay_) {
+    const Felt felt = grip.felt(size_t(grip.taken()));
+    const auto text = [](const char *what, render::Vec v, const char *unit) {
+      if (render::norm(v) < 0.1) v = v * 1e3;
+      else ++unit;  // without its m for milli
+      ImGui::Text("  %s %.2g %s (%.2g, %.2g, %.2g)", what, render::norm(v), unit, v.x, v.y, v.z);
+    };
+    const char *const name = grip.name(size_t(grip.taken())).c_str();
+    if (grip.jaws()) ImGui::Text("in hand: %s, jaws %.0f deg", name, grip.opening() * 180 / std::numbers::pi);
+    else ImGui::Text("in hand: %s", name);
+    text("force", felt.force, "mN");
+    text("torque", felt.torque, "mN m");
+  }
   cli::Drawing::Legend legend;
-  if (drawing_.legend(legend))
+  if (stage_->drawing.legend(legend))
     ImGui::Text("color: %s, 0 to %.3g %s", legend.title.c_str(), legend.top, legend.unit.c_str());
   // What the machine needs differs from run to run, so that a script's pictures are without it.
   if (!script_) {
-    ImGui::Text("%.3f ms a step, %.2f x real time", simulation_.step_ms(), running_ ? real_ : 0);
+    ImGui::Text("%.3f ms a step, %.2f x real time", stage_->simulation.step_ms(), running_ ? real_ : 0);
     ImGui::Text("%.0f frames a second", frame_ms_ > 0 ? 1e3 / frame_ms_ : 0);
   }
   if (!message_.empty()) {
@@ -184,6 +200,8 @@ void App::numbers() {
       "wheel  nearer, farther\nspace  run or pause\ns  one step\nr  back to the start\n"
       "c  next coloring\na  arrows of contact forces\np  plots\nt  no panels, for a picture\nf5, f9  save, "
       "load\nv  begin or end a recording\n"
+      "tab  takes the next tool in hand; so does the mouse\narrows, page up, down  move it; with shift: turn "
+      "it\nj, k  close, open its jaws\nl  lets it go back to its motion\nb  adds a ball as a tool\n"
       "home  first camera\nh  this help\nq  quit");
 }
 

@@ -12,18 +12,26 @@ constexpr size_t kMost = 600;  // samples
 
 }  // namespace
 
-Plots::Plots(const Simulation &simulation) : simulation_(simulation) {
-  plots_.push_back({"energy", "J", {{"kinetic", {}}, {"elastic", {}}}, false});
+Plots::Plots(const Simulation &simulation, const Grip &grip) : simulation_(simulation), grip_(grip) {
+  plots_.push_back({"energy", "J", {{"kinetic", {}}, {"elastic", {}}}, false, -1});
   const cli::SceneFile &scene = simulation.scene();
   for (uint32_t i = 0; i < scene.settings().nprobe; ++i) {
     const char *name = "";
     double at[3];
     cli::need(dfm_scene_probe(scene.scene(), i, &name, at, nullptr));
     starts_.insert(starts_.end(), at, at + 3);
-    plots_.push_back(
-        {std::string("probe ") + name + ", from its start", "m", {{"x", {}}, {"y", {}}, {"z", {}}}, false});
+    plots_.push_back({std::string("probe ") + name + ", from its start",
+                      "m",
+                      {{"x", {}}, {"y", {}}, {"z", {}}},
+                      false,
+                      -1});
   }
-  plots_.push_back({"time of a step", "ms", {{"", {}}}, true});
+  for (size_t i = 0; i < grip.count(); ++i) {
+    const std::vector<Curve> axes = {{"x", {}}, {"y", {}}, {"z", {}}};
+    plots_.push_back({"force on " + grip.name(i), "N", axes, false, int(i)});
+    plots_.push_back({"torque on it", "N m", axes, false, int(i)});
+  }
+  plots_.push_back({"time of a step", "ms", {{"", {}}}, true, -1});
 }
 
 void Plots::clear() {
@@ -47,6 +55,11 @@ void Plots::sample() {
     double at[3];
     cli::need(dfm_scene_probe(scene.scene(), i, nullptr, at, nullptr));
     for (size_t k = 0; k < 3; ++k) row.push_back(at[k] - starts_[3 * i + k]);
+  }
+  for (size_t i = 0; i < grip_.count(); ++i) {
+    const Felt felt = grip_.felt(i);
+    row.insert(row.end(), {felt.force.x, felt.force.y, felt.force.z});
+    row.insert(row.end(), {felt.torque.x, felt.torque.y, felt.torque.z});
   }
   row.push_back(simulation_.step_ms());
   const bool full = times_.size() == kMost;

@@ -1,8 +1,10 @@
-// What is plotted over simulated time: energy, how far each probe is from its start, the time of a step.
+// What is plotted over simulated time: energy, how far each probe is from its start, what tools feel, and the
+// time of a step.
 #pragma once
 #include <string>
 #include <vector>
 
+#include "grip.h"
 #include "simulation.h"
 
 namespace view {
@@ -16,11 +18,12 @@ struct Plot {
   std::string title, unit;
   std::vector<Curve> curves;
   bool measured = false;  // differs from run to run
+  int tool = -1;          // number of the tool that it is about
 };
 
 class Plots {
  public:
-  explicit Plots(const Simulation &simulation);
+  Plots(const Simulation &simulation, const Grip &grip);
   void sample();  // where simulated time has gone on
   void clear();
   const std::vector<Plot> &plots() const { return plots_; }
@@ -28,6 +31,7 @@ class Plots {
 
  private:
   const Simulation &simulation_;
+  const Grip &grip_;
   std::vector<Plot> plots_;
   std::vector<double> times_, starts_;  // s; [nprobe,3] m
 };

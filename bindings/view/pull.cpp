@@ -46,14 +46,24 @@ Patch patch_around(const std::vector<double> &x, const Vec &place) {
   return out;
 }
 
-}  // namespace
-
-bool Pull::grab(const Vec &origin, const Vec &direction) {
-  const cli::SceneFile &scene = simulation_.scene();
+dfm_ray_hit first_hit(const cli::SceneFile &scene, const Vec &origin, const Vec &direction) {
   dfm_ray_hit hit = {};
   hit.size = sizeof hit;
   const double from[3] = {origin.x, origin.y, origin.z}, along[3] = {direction.x, direction.y, direction.z};
   cli::need(dfm_world_ray(scene.world(), from, along, std::numeric_limits<double>::infinity(), &hit));
+  return hit;
+}
+
+}  // namespace
+
+int Pull::tool_at(const Grip &grip, const Vec &origin, const Vec &direction) const {
+  const dfm_ray_hit hit = first_hit(simulation_.scene(), origin, direction);
+  return hit.obstacle ? grip.tool_of(simulation_.scene().name_of(hit.obstacle)) : -1;
+}
+
+bool Pull::grab(const Vec &origin, const Vec &direction) {
+  const cli::SceneFile &scene = simulation_.scene();
+  const dfm_ray_hit hit = first_hit(scene, origin, direction);
   to_ = render::vec(hit.point);
   if (!hit.body) return hit.obstacle && grab_rigid(scene.name_of(hit.obstacle));
   rigid_ = 0;

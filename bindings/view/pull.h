@@ -5,6 +5,7 @@
 #include <string>
 
 #include "render/geometry.h"
+#include "grip.h"
 #include "simulation.h"
 
 namespace view {
@@ -14,6 +15,8 @@ class Pull {
   explicit Pull(Simulation &simulation) : simulation_(simulation) {}
   // Takes hold of what the ray meets first. False: nothing that can be pulled.
   bool grab(const render::Vec &origin, const render::Vec &direction);
+  // The tool that the ray meets first; -1: it meets something else first, or nothing.
+  int tool_at(const Grip &grip, const render::Vec &origin, const render::Vec &direction) const;
   void move(const render::Vec &to);  // m, where the mouse is
   void release();
   bool holds() const { return simulation_.hand().pulls(); }

@@ -87,6 +87,7 @@ void Simulation::start_recording(const cli::RunOptions &options) {
   recorded_at_ = time();
   next_record_ = recorded_at_ + interval();
   recorded_step_ = 0;
+  for (const cli::JsonValue &line : hand_.tool_lines()) recorder_->act(cli::json_text(line));
 }
 
 uint32_t Simulation::stop_recording() {

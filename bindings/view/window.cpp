@@ -48,16 +48,22 @@ Glfw open_glfw() {
   return glfw;
 }
 
-std::string key_name(int key) {
+std::string key_name(int key, int mods) {
   if (key >= GLFW_KEY_A && key <= GLFW_KEY_Z) return std::string(1, char('a' + key - GLFW_KEY_A));
   if (key >= GLFW_KEY_F1 && key <= GLFW_KEY_F12) return "f" + std::to_string(key - GLFW_KEY_F1 + 1);
   static const struct {
     int key;
     const char *name;
-  } kNames[] = {{GLFW_KEY_SPACE, "space"}, {GLFW_KEY_ESCAPE, "escape"}, {GLFW_KEY_LEFT, "left"},
-                {GLFW_KEY_RIGHT, "right"}, {GLFW_KEY_HOME, "home"},     {GLFW_KEY_PERIOD, "."}};
-  for (const auto &k : kNames)
-    if (k.key == key) return k.name;
+  } kNames[] = {{GLFW_KEY_SPACE, "space"}, {GLFW_KEY_ESCAPE, "escape"},     {GLFW_KEY_LEFT, "left"},
+                {GLFW_KEY_RIGHT, "right"}, {GLFW_KEY_HOME, "home"},         {GLFW_KEY_PERIOD, "."},
+                {GLFW_KEY_UP, "up"},       {GLFW_KEY_DOWN, "down"},         {GLFW_KEY_PAGE_UP, "pageup"},
+                {GLFW_KEY_TAB, "tab"},     {GLFW_KEY_PAGE_DOWN, "pagedown"}};
+  static const std::string kWays[] = {"left", "right", "up", "down", "pageup", "pagedown"};
+  for (const auto &k : kNames) {
+    if (k.key != key) continue;
+    const bool way = std::find(std::begin(kWays), std::end(kWays), k.name) != std::end(kWays);
+    return (way && (mods & GLFW_MOD_SHIFT) ? "shift+" : "") + std::string(k.name);
+  }
   return "";
 }
 
@@ -178,8 +184,8 @@ class GlfwWindow final : public Window {
 
   void listen() {
     one_ = this;
-    glfw_.SetKeyCallback(window_, [](GLFWwindow *w, int key, int, int action, int) {
-      const std::string name = key_name(key);
+    glfw_.SetKeyCallback(window_, [](GLFWwindow *w, int key, int, int action, int mods) {
+      const std::string name = key_name(key, mods);
       if (name.empty() || action == GLFW_RELEASE) return;
       Input in;
       in.kind = Input::key;

@@ -334,6 +334,8 @@ std::vector<Call> tool_calls() {
       {"tool_parts", [](uint64_t h) { return dfm_tool_parts(h, 0, nullptr, &count); }},
       {"tool_set_pose", [](uint64_t h) { return dfm_tool_set_pose(h, &pose, nullptr); }},
       {"tool_set_opening", [](uint64_t h) { return dfm_tool_set_opening(h, 0); }},
+      {"tool_follow_keys", [](uint64_t h) { return dfm_tool_follow_keys(h); }},
+      {"tool_keys_at", [](uint64_t h) { return dfm_tool_keys_at(h, 0, &pose, numbers); }},
       {"tool_teleport", [](uint64_t h) { return dfm_tool_teleport(h, &pose); }},
       {"tool_force", [](uint64_t h) { return dfm_tool_force(h, numbers, numbers); }},
       {"tool_feedback", [](uint64_t h) { return dfm_tool_feedback(h, numbers, numbers); }},

@@ -225,6 +225,45 @@ TEST(Tool, GoesWhereItIsPut_InAnyNumberOfSubSteps) {
   EXPECT_EQ(state(t).pose.position[0], 1);
 }
 
+// Taken from its keys and given back, a tool is where they want it; it says where that is.
+TEST(Tool, GivenBackToItsKeys_FollowsThemAgain) {
+  Scene s;
+  dfm_tool_def d = tool_def("key", DFM_TOOL_GRASPER, {0, 0, 0.1});
+  for (double &half : d.half_size) half = 0.005;
+  const dfm_pose_key keys[] = {{0, pose({0, 0, 0.1})}, {0.1, pose({0.01, 0, 0.1}, 0.4)}};
+  const dfm_scale_key openings[] = {{0, 0.5}, {0.1, 0.1}};
+  d.keys = keys;
+  d.nkey = 2;
+  d.opening_keys = openings;
+  d.nopening = 2;
+  const dfm_tool t = make(s.w, d);
+  const dfm_pose aside = pose({0.002, 0.001, 0.1});
+  test::ok(dfm_tool_set_pose(t, &aside, nullptr));
+  test::ok(dfm_tool_set_opening(t, 0.45));
+  for (int i = 0; i < 10; ++i) test::ok(dfm_world_step(s.w, 1e-3, nullptr));
+  EXPECT_EQ(state(t).nkeys, 0u);
+  EXPECT_EQ(state(t).pose.position[1], 0.001);
+  dfm_pose there{};
+  double opening = 0;
+  test::ok(dfm_tool_keys_at(t, 0.05, &there, &opening));
+  EXPECT_NEAR(there.position[0], 0.005, 1e-15);
+  EXPECT_NEAR(there.rotation[1], std::sin(0.1), 1e-12);
+  EXPECT_NEAR(opening, 0.3, 1e-15);
+  test::ok(dfm_tool_keys_at(t, 0.05, nullptr, nullptr));
+  test::ok(dfm_tool_follow_keys(t));
+  EXPECT_EQ(state(t).nkeys, 1u);
+  test::ok(dfm_world_step(s.w, 1e-3, nullptr));
+  test::ok(dfm_tool_keys_at(t, dfm_world_time(s.w), &there, &opening));
+  const dfm_tool_state now = state(t);
+  for (int k = 0; k < 3; ++k) EXPECT_NEAR(now.pose.position[k], there.position[k], 1e-15);
+  EXPECT_NEAR(now.opening, opening, 1e-15);
+  EXPECT_EQ(dfm_tool_keys_at(t, NAN, &there, nullptr), DFM_E_ARG);
+  const dfm_tool bare = make(s.w, tool_def("bare", DFM_TOOL_SPHERE, {0, 0, 0.2}));
+  EXPECT_EQ(dfm_tool_follow_keys(bare), DFM_E_ARG);
+  test::says({"'bare' has no keys"});
+  EXPECT_EQ(dfm_tool_keys_at(bare, 0, &there, nullptr), DFM_E_ARG);
+}
+
 // Tools and forces go on from a snapshot to the same bits, coupled and not, also in the middle of a motion.
 TEST(Tool, FromASnapshot_GoesOnToTheSameBits) {
   Scene s;

@@ -114,6 +114,18 @@ DFM_API dfm_status dfm_tool_set_pose(dfm_tool tool, const dfm_pose *pose, const 
  * @param angle rad, 0 to 3. @return DFM_OK; DFM_E_ARG out of range, or the tool has no jaws; DFM_E_HANDLE.
  * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_tool_set_opening(dfm_tool tool, double angle);
+/** Lets its keys lead again from the next step on, after dfm_tool_set_pose and dfm_tool_set_opening. By the
+ * end of that step it is where they want it; far from there, bring it near first (dfm_tool_keys_at).
+ * @return DFM_OK; DFM_E_ARG it has no keys, or a device moves it; DFM_E_HANDLE. Threads: Not during step.
+ * Since 0.1. */
+DFM_API dfm_status dfm_tool_follow_keys(dfm_tool tool);
+/** Where its keys lead at a time, followed or not.
+ * @param t        s
+ * @param pose     out, may be NULL; of a tool without keys of this kind: where it was told to be
+ * @param opening  out, rad, may be NULL; likewise
+ * @return DFM_OK; DFM_E_ARG t is not finite, or the tool has no keys at all; DFM_E_HANDLE. Threads: Any
+ * thread. Not during step. Since 0.1. */
+DFM_API dfm_status dfm_tool_keys_at(dfm_tool tool, double t, dfm_pose *pose, double *opening);
 /** Puts tool and device there now, at rest, without a motion; replaces keys. What the tool then lies in is
  * found as after creation (dfm_world_overlaps). @return DFM_OK; DFM_E_ARG not finite; DFM_E_HANDLE. Threads:
  * Not during step. Since 0.1. */

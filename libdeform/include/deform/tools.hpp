@@ -36,6 +36,10 @@ class Tool : public Handle<dfm_tool, struct ToolKind> {
     return E::done(dfm_tool_set_pose(raw_, &pose, velocity.data()));
   }
   auto set_opening(double angle) const { return E::done(dfm_tool_set_opening(raw_, angle)); }
+  auto follow_keys() const { return E::done(dfm_tool_follow_keys(raw_)); }
+  auto keys_at(double t, double *opening = nullptr) const {
+    return produce<E, dfm_pose>([&](dfm_pose &p) { return dfm_tool_keys_at(raw_, t, &p, opening); });
+  }
   auto teleport(const dfm_pose &pose) const { return E::done(dfm_tool_teleport(raw_, &pose)); }
   // On the tool, in its frame, about its origin.
   auto force() const {

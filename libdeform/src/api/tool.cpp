@@ -99,6 +99,26 @@ dfm_status dfm_tool_set_opening(dfm_tool tool, double angle) {
   });
 }
 
+dfm_status dfm_tool_follow_keys(dfm_tool tool) {
+  return as_status([&] {
+    Tool &t = tool_of(tool);
+    exclusive(*t.world);
+    follow_keys(t);
+  });
+}
+
+dfm_status dfm_tool_keys_at(dfm_tool tool, double t, dfm_pose *pose, double *opening) {
+  return as_status([&] {
+    const Tool &own = tool_of(tool);
+    settled(*own.world);
+    dfm_pose at{};
+    double angle = 0;
+    keys_at(own, t, at, angle);
+    if (pose) *pose = at;
+    if (opening) *opening = angle;
+  });
+}
+
 dfm_status dfm_tool_teleport(dfm_tool tool, const dfm_pose *pose) {
   return as_status([&] {
     Tool &t = tool_of(tool);

@@ -274,6 +274,44 @@ void set_tool_opening(Tool &t, double angle) {
   t.store(v);
 }
 
+namespace {
+
+void need_keys(const Tool &t) {
+  if (t.keys.empty() && t.opening_keys.empty())
+    fail(DFM_E_ARG, "tool '%s' has no keys; give it some when it is made", t.name.c_str());
+}
+
+}  // namespace
+
+void follow_keys(Tool &t) {
+  need_keys(t);
+  if (t.device.read)
+    fail(DFM_E_ARG, "tool '%s' is moved by a device; take that away first (dfm_tool_set_device with NULL)",
+         t.name.c_str());
+  ToolValues v = t.values();
+  v.keyed = t.keys.empty() ? 0 : 1;
+  v.opening_keyed = t.opening_keys.empty() ? 0 : 1;
+  if (v.keyed != 0) v.measured = 0;
+  t.store(v);
+}
+
+void keys_at(const Tool &t, double time, dfm_pose &pose, double &opening) {
+  need_keys(t);
+  if (!std::isfinite(time))
+    fail(DFM_E_ARG, "tool '%s': the time at which its keys are asked for is not finite", t.name.c_str());
+  const ToolValues v = t.values();
+  ToolPlace place = load_place(v.target);
+  if (!t.keys.empty()) {
+    const Pose p = pose_at(t.keys, time);
+    place = {p.position, p.rotation};
+  }
+  double values[7];
+  store_place(values, place);
+  std::copy(values, values + 3, pose.position);
+  std::copy(values + 3, values + 7, pose.rotation);
+  opening = t.opening_keys.empty() ? v.target_opening : scale_at(t.opening_keys, time);
+}
+
 void teleport_tool(Tool &t, const dfm_pose &pose) {
   checked(t, pose);
   World &w = *t.world;

@@ -15,6 +15,8 @@ Tool &create_tool(World &w, const dfm_tool_def &def);
 void destroy_tool(Tool &tool);
 void set_tool_pose(Tool &tool, const dfm_pose &pose, const double *velocity);  // velocity: [6] or NULL
 void set_tool_opening(Tool &tool, double angle);
+void follow_keys(Tool &tool);
+void keys_at(const Tool &tool, double t, dfm_pose &pose, double &opening);
 void teleport_tool(Tool &tool, const dfm_pose &pose);
 dfm_tool_state tool_state(const Tool &tool);
 // Of the last step, in the frame of the tool (contact) or of its device (coupling); on tool or device.

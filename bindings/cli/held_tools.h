@@ -1,0 +1,39 @@
+// Tools that a hand leads (by_hand.h). They follow the hand at a bounded speed, so that no jump of a mouse
+// becomes a step that the library refuses; let go, they return to their keys in the same way.
+#pragma once
+#include <string>
+#include <vector>
+
+#include "json_text.h"
+#include "scene_file.h"
+
+namespace cli {
+
+class HeldTools {
+ public:
+  explicit HeldTools(const SceneFile &scene) : scene_(scene) {}
+  // {"do": "tool", ..}, {"do": "let", ..}. Throw Failure; nothing has changed then.
+  void lead(const JsonValue &line);
+  void let(const JsonValue &line);
+  void before_step(double h);
+  void forget() { held_.clear(); }
+  // What somebody has to do who goes on from the present state.
+  std::vector<JsonValue> lines() const;
+
+ private:
+  struct Held {
+    dfm_tool tool = 0;
+    std::string name;
+    dfm_pose to = {};
+    double opening = 0, speed = 0;  // rad, m/s
+    bool jaws = false, returns = false;
+    JsonValue line;
+  };
+  Held &held(const std::string &name);
+  static bool walk(Held &held, double now, double h);
+
+  const SceneFile &scene_;
+  std::vector<Held> held_;
+};
+
+}  // namespace cli

@@ -1,0 +1,152 @@
+#include "grip.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "messages.h"
+#include "run.h"
+
+namespace view {
+
+using render::Vec;
+
+Grip::Grip(Simulation &simulation, double size) : simulation_(simulation), speed_(2 * size) {
+  const dfm_world world = simulation.scene().world();
+  uint32_t n = 0;
+  cli::need(dfm_world_tools(world, 0, nullptr, &n));
+  std::vector<dfm_tool> list(n);
+  if (n > 0) cli::need(dfm_world_tools(world, n, list.data(), &n));
+  for (const dfm_tool tool : list) {
+    dfm_tool_def def = dfm_tool_def_default();
+    cli::need(dfm_tool_get_def(tool, &def));
+    tools_.push_back({tool, def.name, def.shape == DFM_TOOL_GRASPER || def.shape == DFM_TOOL_SCISSORS});
+  }
+}
+
+Felt Grip::felt(size_t tool) const {
+  dfm_tool_state state = {};
+  state.size = sizeof state;
+  cli::need(dfm_tool_get_state(tools_[tool].tool, &state));
+  double force[3], torque[3], out[3];
+  cli::need(dfm_tool_force(tools_[tool].tool, force, torque));
+  Felt felt;
+  felt.at = render::vec(state.pose.position);
+  cli::rotate(state.pose.rotation, force, out);
+  felt.force = render::vec(out);
+  cli::rotate(state.pose.rotation, torque, out);
+  felt.torque = render::vec(out);
+  return felt;
+}
+
+int Grip::tool_of(const std::string &part) const {
+  for (size_t i = 0; i < tools_.size(); ++i)
+    for (const char *ending : {"", ".left", ".right", ".shaft", ".shape"})
+      if (part == tools_[i].name + ending) return int(i);
+  return -1;
+}
+
+void Grip::take(int tool) {
+  taken_ = tool;
+  if (tool < 0) return;
+  dfm_tool_state state = {};
+  state.size = sizeof state;
+  cli::need(dfm_tool_get_state(tools_[size_t(tool)].tool, &state));
+  put(state.device, state.opening);
+}
+
+void Grip::next() { take(taken_ + 1 < int(tools_.size()) ? taken_ + 1 : -1); }
+
+void Grip::let_go() {
+  if (taken_ < 0) return;
+  cli::JsonObject line;
+  simulation_.act(line.add("do", "\"let\"")
+                      .add("tool", cli::quoted(name(size_t(taken_))))
+                      .add("speed", cli::number(speed_)));
+  taken_ = -1;
+}
+
+void Grip::put(const dfm_pose &pose, double opening) {
+  to_ = render::vec(pose.position);
+  std::copy_n(pose.rotation, 4, rotation_);
+  opening_ = opening;
+  tell();
+}
+
+void Grip::move_to(const Vec &to) {
+  if (to.x == to_.x && to.y == to_.y && to.z == to_.z) return;
+  to_ = to;
+  tell();
+}
+
+void Grip::turn(const Vec &axis, double angle) {
+  const double s = std::sin(0.5 * angle), c = std::cos(0.5 * angle), *const b = rotation_;
+  const Vec a = render::unit(axis) * s;
+  const double q[4] = {
+      c * b[0] + a.x * b[3] + a.y * b[2] - a.z * b[1], c * b[1] - a.x * b[2] + a.y * b[3] + a.z * b[0],
+      c * b[2] + a.x * b[1] - a.y * b[0] + a.z * b[3], c * b[3] - a.x * b[0] - a.y * b[1] - a.z * b[2]};
+  const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+  for (int k = 0; k < 4; ++k) rotation_[k] = q[k] / length;
+  tell();
+}
+
+void Grip::open(double by) {
+  if (!jaws()) return;
+  opening_ = std::clamp(opening_ + by, 0.0, 0.5 * std::numbers::pi);
+  tell();
+}
+
+void Grip::tell() {
+  const double to[3] = {to_.x, to_.y, to_.z};
+  std::vector<std::string> rotation;
+  for (const double q : rotation_) rotation.push_back(cli::number(q));
+  cli::JsonObject line;
+  simulation_.act(line.add("do", "\"tool\"")
+                      .add("tool", cli::quoted(name(size_t(taken_))))
+                      .add("to", cli::json_vector(to))
+                      .add("rotation", cli::json_array(rotation))
+                      .add("opening", cli::number(opening_))
+                      .add("speed", cli::number(speed_)));
+}
+
+// The spring would swing all bodies six times a second, and the ball moves as lightly as a hundredth of them:
+// it gives way before it crushes what it meets.
+std::string tools_with_probe(const cli::SceneFile &scene, const render::Bounds &bodies) {
+  if (scene.bodies().empty())
+    throw cli::Failure(cli::kBadInput, "There is no soft body for a tool to touch.");
+  cli::JsonValue tools;
+  cli::parse_json(scene.value("/tools"), tools);
+  std::vector<std::string> all;
+  std::string name = "probe";
+  const auto taken = [&] {
+    const auto same = [&](const auto &thing) { return thing.name == name; };
+    return std::any_of(scene.bodies().begin(), scene.bodies().end(), same) ||
+           std::any_of(scene.obstacles().begin(), scene.obstacles().end(), same);
+  };
+  for (int n = 2; taken(); ++n) name = "probe" + std::to_string(n);
+  for (const cli::JsonValue &tool : tools.items) all.push_back(cli::json_text(tool));
+  double mass = 0;
+  for (const cli::BodyView &body : scene.bodies()) mass += cli::body_measure(body).mass;
+  const Vec low = render::vec(bodies.lo), high = render::vec(bodies.hi), size = high - low;
+  const double radius = 0.08 * std::max({size.x, size.y, size.z});
+  const double rate = 2 * std::numbers::pi * 6, k = mass * rate * rate, light = 0.01 * mass;
+  const double at[3] = {0.5 * (low.x + high.x), 0.5 * (low.y + high.y), high.z + 2 * radius};
+  const double damping = 2 * std::sqrt(k * light), arm = radius * radius;
+  cli::JsonObject coupling, pose, probe;
+  coupling.add("stiffness", cli::number(k))
+      .add("damping", cli::number(damping))
+      .add("turn_stiffness", cli::number(k * arm))
+      .add("turn_damping", cli::number(damping * arm))
+      .add("mass", cli::number(light))
+      .add("inertia", cli::number(light * arm));
+  pose.add("position", cli::json_vector(at));
+  probe.add("name", cli::quoted(name))
+      .add("shape", "\"sphere\"")
+      .add("radius", cli::number(radius))
+      .add("pose", pose.text())
+      .add("coupling", coupling.text());
+  all.push_back(probe.text());
+  return cli::json_array(all);
+}
+
+}  // namespace view
