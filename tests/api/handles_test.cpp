@@ -350,6 +350,8 @@ std::vector<Call> tool_calls() {
          return dfm_tool_grab(h, 0, 0, 0, 1, &held, &count);
        }},
       {"tool_set_device", [](uint64_t h) { return dfm_tool_set_device(h, nullptr); }},
+      {"tool_set_cuts", [](uint64_t h) { return dfm_tool_set_cuts(h, 0, 0, 0, nullptr); }},
+      {"tool_cuts", [](uint64_t h) { return dfm_tool_cuts(h, nullptr, nullptr, 0, nullptr, &count); }},
   };
 }
 

@@ -16,7 +16,7 @@ extern "C" {
 #endif
 /** Shapes, in the tool's frame.
  * SPHERE, BOX, MESH, ELLIPSOID: around the origin (a mesh where its points say). CAPSULE: around the origin,
- * axis along z. BLADE: a box whose lower edge, at -z, is the sharp one.
+ * axis along z. BLADE: a box, x its thickness, whose lower edge, along y at -z, is the sharp one.
  * GRASPER: two boxes, hinged at the origin about y, that point along -z and lie on each other's faces x = 0
  * where the opening is 0. SCISSORS: the same, and the two lie side by side along y, so that they pass each
  * other. Both have a shaft where radius is above 0: a capsule from the origin along +z. */
@@ -178,6 +178,31 @@ DFM_API dfm_status dfm_tool_get_state(dfm_tool tool, dfm_tool_state *out);
  * DFM_E_UNSUPPORTED the contact method is ROLLBACK. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_tool_grab(dfm_tool tool, dfm_body body, double reach, double release,
                                  uint32_t capacity, uint32_t *attachment, uint32_t *n);
+
+/* ---- cutting ------------------------------------------------------------------------------------------- */
+
+/** Lets a tool cut bodies at the end of each step, as dfm_body_cut does (deform/cut.h). Replaces what was set
+ * before. The parts that cut (of scissors the jaws) do not touch these bodies. An event DFM_EVENT_CUT tells
+ * of each body that has been cut in a step (deform/contact.h).
+ * SPLIT, of a blade and of scissors: faces open where the edge crosses the line between the middles of their
+ * cells and moves forward, seen from the cells. REMOVE: cells go that the shape meets on its way; of a blade
+ * and of scissors their boxes.
+ * @param how     DFM_CUT_REMOVE or DFM_CUT_SPLIT
+ * @param most    of one body in one step: cells, those of the lowest numbers, or faces, those that the edge
+ * has met first; 0: no limit. What is left is cut in the next steps: cells as long as the shape is in them,
+ * faces as long as they are less than one edge length of the body's surface behind the edge
+ * @param n       number of bodies; 0: the tool cuts nothing
+ * @param bodies  [n]
+ * @return DFM_OK; DFM_E_ARG the shape cannot cut, or not in this way; DFM_E_UNSUPPORTED a body cannot be cut
+ * (dfm_body_cut says which can); DFM_E_HANDLE. After an error nothing has changed. Where a cut finds no
+ * memory, dfm_world_step returns DFM_E_NOMEM after the step. Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_tool_set_cuts(dfm_tool tool, uint32_t how, uint32_t most, uint32_t n,
+                                     const dfm_body *bodies);
+/** What the tool cuts. @param how, most  may be NULL @param capacity  of bodies; 0 with bodies NULL only
+ * counts @param n  out, number of bodies that are still there; 0: it cuts nothing @return DFM_OK; DFM_E_ARG
+ * capacity too small (bodies untouched); DFM_E_HANDLE. Threads: Any thread. Not during step. Since 0.1. */
+DFM_API dfm_status dfm_tool_cuts(dfm_tool tool, uint32_t *how, uint32_t *most, uint32_t capacity,
+                                 dfm_body *bodies, uint32_t *n);
 
 /* ---- devices ------------------------------------------------------------------------------------------- */
 

@@ -4,6 +4,7 @@
 
 #include "api/objects.h"
 #include "world/tool.h"
+#include "world/tool_cut.h"
 
 using namespace dfm;
 
@@ -166,6 +167,31 @@ dfm_status dfm_tool_grab(dfm_tool tool, dfm_body body, double reach, double rele
     const std::vector<uint32_t> made = grab(t, body_of(body), reach, release, capacity);
     std::copy(made.begin(), made.end(), attachment);
     *n = static_cast<uint32_t>(made.size());
+  });
+}
+
+dfm_status dfm_tool_set_cuts(dfm_tool tool, uint32_t how, uint32_t most, uint32_t n, const dfm_body *bodies) {
+  return as_status([&] {
+    Tool &t = tool_of(tool);
+    exclusive(*t.world);
+    if (n) need(bodies, "bodies");
+    std::vector<Body *> list;
+    for (uint32_t i = 0; i < n; ++i) list.push_back(&body_of(bodies[i]));
+    set_cuts(t, how, most, list);
+  });
+}
+
+dfm_status dfm_tool_cuts(dfm_tool tool, uint32_t *how, uint32_t *most, uint32_t capacity, dfm_body *bodies,
+                         uint32_t *n) {
+  return as_status([&] {
+    const Tool &t = tool_of(tool);
+    std::vector<dfm_body> list;
+    for (const uint64_t id : t.cuts.bodies)
+      if (const uint64_t handle = t.world->handle_of(id)) list.push_back(handle);
+    if (how) *how = t.cuts.how;
+    if (most) *most = t.cuts.most;
+    if (room(static_cast<uint32_t>(list.size()), capacity, bodies, n))
+      std::copy(list.begin(), list.end(), bodies);
   });
 }
 

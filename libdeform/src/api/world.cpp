@@ -17,6 +17,7 @@
 #include "world/snapshot.h"
 #include "world/tear.h"
 #include "world/tool.h"
+#include "world/tool_cut.h"
 
 using namespace dfm;
 
@@ -254,8 +255,10 @@ dfm_status dfm_world_step(dfm_world world, double dt, uint32_t *trouble) {
     uint32_t bits = 0;
     make_switches(w, dt);
     read_devices(w, w.time + dt);
+    begin_cuts(w);
     const dfm_status s = step_within_budget(w, dt, &bits);
     if (trouble) *trouble = bits;
+    if (s == DFM_OK) cut_by_tools(w, dt);
     if (s == DFM_OK) tear_bodies(w);
     if (s == DFM_OK) look_at_sensors(w, true);
     if (s == DFM_OK) write_devices(w);

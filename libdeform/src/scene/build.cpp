@@ -589,6 +589,12 @@ class Builder {
     }
     dfm_tool tool = 0;
     check(dfm_tool_create(world_, &t.def, &tool), t.solid.pointer);
+    if (t.cuts.bodies.empty()) return;
+    std::vector<dfm_body> bodies(t.cuts.bodies.size());
+    for (size_t i = 0; i < bodies.size(); ++i)
+      check(dfm_world_find_body(world_, t.cuts.bodies[i].c_str(), &bodies[i]), t.cuts.pointer);
+    check(dfm_tool_set_cuts(tool, t.cuts.how, t.cuts.most, uint32_t(bodies.size()), bodies.data()),
+          t.cuts.pointer);
   }
 
   void add_friction(Friction &f) {

@@ -176,6 +176,11 @@ struct Tool {
   std::vector<dfm_pose_key> keys;
   std::vector<dfm_scale_key> opening_keys;
   std::string hand;  // file with both; empty: none
+  struct Cuts {
+    std::string pointer;
+    std::vector<std::string> bodies;
+    uint32_t how = DFM_CUT_REMOVE, most = 0;
+  } cuts;
 };
 
 struct Material {

@@ -9,7 +9,8 @@ struct ReadContext {
   const Types &types;
   std::vector<std::string> materials, titles;  // keys so far, and the names that sides of rules have
   std::vector<std::string> sides;              // bodies and obstacles
-  bool planned = false;                        // the planner chooses models that are not named
+  std::vector<std::string> bodies{};
+  bool planned = false;  // the planner chooses models that are not named
 };
 
 Definition read_scene(json &tree, const std::string &file, const Types &types);

@@ -347,6 +347,7 @@ Body read_body(const Node &node, ReadContext &context) {
   b.name = node.at("name").name();
   check_fresh(node.at("name"), b.name, context.sides, "body or obstacle");
   context.sides.push_back(b.name);
+  context.bodies.push_back(b.name);
   const Node mesh = node.at("mesh");
   if (mesh.value().is_object()) b.made = read_made(mesh);
   else b.mesh = mesh.text();

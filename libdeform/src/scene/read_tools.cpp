@@ -87,6 +87,23 @@ void read_coupling(const Node &coupling, dfm_tool_def &d) {
   if (coupling.boolean("passive", false)) d.flags |= DFM_TOOL_PASSIVE;
 }
 
+// A list of bodies, or an object with the list, how and how much.
+void read_cuts(const Node &cuts, const ReadContext &context, Tool &t) {
+  const bool edge = t.def.shape == DFM_TOOL_BLADE || t.def.shape == DFM_TOOL_SCISSORS;
+  t.cuts.how = edge ? DFM_CUT_SPLIT : DFM_CUT_REMOVE;
+  t.cuts.pointer = cuts.pointer();
+  const bool list = cuts.value().is_array();
+  if (!list) {
+    cuts.object("tool_cuts");
+    if (cuts.word("mode", edge ? "split" : "remove", "cut_mode") == "remove") t.cuts.how = DFM_CUT_REMOVE;
+    else t.cuts.how = DFM_CUT_SPLIT;
+    if (cuts.has("most")) t.cuts.most = read_count(cuts.member("most"), 0, UINT32_MAX);
+  }
+  const Node bodies = list ? cuts : cuts.at("bodies");
+  for (const Node &name : bodies.items()) t.cuts.bodies.push_back(known(name, context.bodies, "body"));
+  if (t.cuts.bodies.empty()) bodies.fail("expected at least one body");
+}
+
 Tool read_tool(const Node &node, ReadContext &context) {
   Tool t;
   t.def = dfm_tool_def_default();
@@ -125,6 +142,7 @@ Tool read_tool(const Node &node, ReadContext &context) {
     node.member("opening_deg").fail("the file of the motion says how far the jaws are open; drop one");
   if (node.has("opening_deg")) read_opening(node.member("opening_deg"), t);
   if (node.has("coupling")) read_coupling(node.member("coupling"), t.def);
+  if (node.has("cuts")) read_cuts(node.member("cuts"), context, t);
   if (node.has("material")) t.solid.material = known(node.member("material"), context.materials, "material");
   return t;
 }

@@ -24,7 +24,16 @@ struct Tool {
   std::vector<uint64_t> parts;  // handles
   dfm_device device{};          // read NULL: none
   bool mute = false;            // the device has refused a force
+  // What it cuts (world/tool_cut.h).
+  struct Cuts {
+    uint32_t how = 0, most = 0;
+    std::vector<uint64_t> bodies;  // ids, ascending
+    std::vector<ToolPlace> from;   // of its parts when the step began; empty: it has never cut
+  } cuts;
   bool has_jaws() const { return def.shape == DFM_TOOL_GRASPER || def.shape == DFM_TOOL_SCISSORS; }
+  bool cuts_body(uint64_t id) const { return std::binary_search(cuts.bodies.begin(), cuts.bodies.end(), id); }
+  // Parts from this one on cut: of scissors the jaws, else all there is.
+  uint32_t first_cutting_part() const { return def.shape == DFM_TOOL_SCISSORS ? 1 : 0; }
   ToolValues values() const { return tool_values(set->extra.data()); }
   void store(const ToolValues &v) { store_values(v, set->extra.data()); }
   // Of a late device (ToolGiven): row of the past; what v gives at t comes into the next one.

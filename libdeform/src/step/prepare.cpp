@@ -17,6 +17,7 @@
 #include "step/overlap.h"
 #include "step/pair_table.h"
 #include "step/rigid.h"
+#include "step/tools.h"
 
 namespace dfm {
 namespace {
@@ -220,6 +221,11 @@ bool parted(const World &w, uint32_t i, uint32_t thing) {
   });
 }
 
+bool cut_through(const World &w, uint32_t i, uint32_t thing) {
+  const size_t nb = w.bodies.size();
+  return !w.tools.empty() && thing >= nb && passes_through(w, *w.bodies[i], *w.obstacles[thing - nb]);
+}
+
 // Filters, then laws. The default law is made only when a pair needs it.
 void make_pair_tables(World &w, StepContext &step, SceneFacts &facts) {
   const uint32_t nb = static_cast<uint32_t>(w.bodies.size());
@@ -246,7 +252,7 @@ void make_pair_tables(World &w, StepContext &step, SceneFacts &facts) {
         if (!is_body || i < j) w.pairs.filter.set(a.id, b.id, !is_body, rule->collide);
         touch = rule->collide;
       }
-      if (touch && (parted(w, i, j) || refused(w, step, i, j, a, b, answers))) {
+      if (touch && (parted(w, i, j) || cut_through(w, i, j) || refused(w, step, i, j, a, b, answers))) {
         if (!is_body || i < j) w.pairs.filter.set(a.id, b.id, !is_body, false);
         touch = false;
       }

@@ -1,0 +1,380 @@
+// Tools that cut what they pass through: blades, scissors, solids; limits, events, snapshots, the key "cuts".
+#include <unistd.h>
+
+#include <set>
+
+#include "deform/tool.h"
+#include "rigid.h"
+#include "support.h"
+
+namespace {
+
+// A cube of 40 mm about the origin, at rest in empty space.
+struct Cube {
+  test::Context context;
+  dfm_world w;
+  dfm_body body;
+  explicit Cube(const char *model = "corotational_fem", uint32_t cells = 320)
+      : w(test::make_world(context, {0, 0, 0})) {
+    test::BodyOptions o;
+    o.name = "cube";
+    o.model = model;
+    o.young = 3e4;
+    o.damping_stiffness = 2e-3;
+    o.position = {-0.02, -0.02, -0.02};
+    body = test::make_body(context, w, "beam", {0.04, 0.04, 0.04}, cells, o);
+  }
+};
+
+dfm_tool make(dfm_world w, uint32_t shape, std::array<double, 3> half, std::array<double, 3> at,
+              double radius = 0) {
+  dfm_tool_def d = dfm_tool_def_default();
+  d.name = "tool";
+  d.shape = shape;
+  d.radius = radius;
+  for (size_t k = 0; k < 3; ++k) {
+    d.half_size[k] = half[k];
+    d.pose.position[k] = at[k];
+  }
+  dfm_tool t = 0;
+  test::ok(dfm_tool_create(w, &d, &t));
+  return t;
+}
+dfm_tool blade(dfm_world w, double x = 0.001) {
+  return make(w, DFM_TOOL_BLADE, {0.0005, 0.03, 0.02}, {x, 0, 0.05});
+}
+void cuts(dfm_tool t, uint32_t how, dfm_body b, uint32_t most = 0) {
+  test::ok(dfm_tool_set_cuts(t, how, most, 1, &b));
+}
+void move(dfm_world w, dfm_tool t, std::array<double, 3> from, std::array<double, 3> to, int n) {
+  for (int i = 1; i <= n; ++i) {
+    dfm_pose p{{0, 0, 0}, {0, 0, 0, 1}};
+    for (size_t k = 0; k < 3; ++k) p.position[k] = from[k] + (to[k] - from[k]) * i / n;
+    test::ok(dfm_tool_set_pose(t, &p, nullptr));
+    uint32_t trouble = 0;
+    test::ok(dfm_world_step(w, 1e-3, &trouble));
+  }
+}
+uint32_t parts(dfm_body b) {
+  dfm_cut_info info{};
+  info.size = sizeof info;
+  test::ok(dfm_body_remove_cells(b, 0, nullptr, &info));
+  return info.parts;
+}
+uint32_t cells(dfm_body b) {
+  dfm_body_info i{};
+  i.size = sizeof i;
+  test::ok(dfm_body_get_info(b, &i));
+  return i.ntet;
+}
+// Sum of the keys of the cut events since the last call, and the largest one.
+struct Told { uint64_t sum = 0, most = 0, n = 0; };
+Told told(dfm_world w, dfm_body b, dfm_tool t) {
+  dfm_rigid list[3] = {};
+  uint32_t n = 0;
+  test::ok(dfm_tool_parts(t, 3, list, &n));
+  const std::set<uint64_t> of_tool(list, list + n);
+  Told out;
+  for (const dfm_contact_event &e : test::listed(dfm_world_events, w)) {
+    if (e.kind != uint32_t{DFM_EVENT_CUT}) continue;
+    EXPECT_EQ(e.a, b);
+    EXPECT_TRUE(of_tool.count(e.b));
+    out.sum += e.key;
+    out.most = std::max(out.most, e.key);
+    ++out.n;
+  }
+  return out;
+}
+double force_on(dfm_tool t) {
+  double f[3], m[3];
+  test::ok(dfm_tool_force(t, f, m));
+  return std::hypot(f[0], f[1], f[2]);
+}
+
+const char *const kModels[] = {"msm", "corotational_fem"};
+
+}  // namespace
+
+TEST(ToolCut, BladeThroughACube_PartsIt_WithoutMassMomentumOrForce) {
+  for (const char *model : kModels) {
+    Cube s(model);
+    const dfm_tool t = blade(s.w);
+    cuts(t, DFM_CUT_SPLIT, s.body);
+    const dfm_body_measure before = test::measure(s.body);
+    const uint32_t before_cells = cells(s.body);
+    move(s.w, t, {0.001, 0, 0.05}, {0.001, 0, 0.015}, 20);
+    EXPECT_GT(told(s.w, s.body, t).n, 1u) << "a cut grows from step to step";
+    EXPECT_EQ(parts(s.body), 1u) << "half way";
+    move(s.w, t, {0.001, 0, 0.015}, {0.001, 0, -0.01}, 20);
+    EXPECT_EQ(parts(s.body), 2u) << model;
+    EXPECT_EQ(cells(s.body), before_cells);
+    EXPECT_EQ(force_on(t), 0);
+    const dfm_body_measure after = test::measure(s.body);
+    EXPECT_NEAR(after.mass, before.mass, 1e-15);
+    for (int k = 0; k < 3; ++k) EXPECT_NEAR(after.momentum[k], 0, 1e-15);
+    EXPECT_NEAR(after.com[0], before.com[0], 1e-12);
+  }
+}
+
+// What the limit leaves is cut in the steps that follow.
+TEST(ToolCut, Limit_HoldsInEachStep_AndNothingIsForgotten) {
+  Cube whole, s;
+  const dfm_tool free = blade(whole.w), t = blade(s.w);
+  cuts(free, DFM_CUT_SPLIT, whole.body);
+  cuts(t, DFM_CUT_SPLIT, s.body, 5);
+  move(whole.w, free, {0.001, 0, 0.05}, {0.001, 0, -0.01}, 60);
+  move(s.w, t, {0.001, 0, 0.05}, {0.001, 0, -0.01}, 60);
+  const Told all = told(whole.w, whole.body, free), some = told(s.w, s.body, t);
+  EXPECT_GT(all.most, 5u);
+  EXPECT_LE(some.most, 5u);
+  EXPECT_EQ(some.sum, all.sum);
+  EXPECT_EQ(parts(s.body), 2u);
+}
+
+// Its flat side is no edge: a blade that stands, goes sideways or is drawn back leaves what it is in whole.
+TEST(ToolCut, BladeThatDoesNotGoForward_CutsNothing) {
+  Cube s;
+  const dfm_tool t = blade(s.w);
+  const dfm_pose inside{{0.001, 0, 0.02}, {0, 0, 0, 1}};
+  test::ok(dfm_tool_teleport(t, &inside));
+  cuts(t, DFM_CUT_SPLIT, s.body);
+  move(s.w, t, {0.001, 0, 0.02}, {0.001, 0, 0.02}, 5);
+  move(s.w, t, {0.001, 0, 0.02}, {-0.015, 0, 0.02}, 20);
+  move(s.w, t, {-0.015, 0, 0.02}, {-0.015, 0, 0.06}, 20);
+  EXPECT_EQ(told(s.w, s.body, t).n, 0u);
+  EXPECT_TRUE(test::contacts(s.w).empty()) << "the two do not touch";
+}
+
+// Seen from the cells, it is the body that stands and the blade that moves.
+TEST(ToolCut, BodyThatMovesIntoABlade_IsCut) {
+  Cube s;
+  const dfm_tool t = blade(s.w);
+  cuts(t, DFM_CUT_SPLIT, s.body);
+  dfm_body_info i{};
+  i.size = sizeof i;
+  test::ok(dfm_body_get_info(s.body, &i));
+  std::vector<double> x(3 * size_t{i.npoint}), v(x.size());
+  uint32_t n = 0;
+  test::ok(dfm_body_get_state(s.body, i.npoint, x.data(), v.data(), &n));
+  for (size_t k = 2; k < v.size(); k += 3) v[k] = 1;
+  test::ok(dfm_body_set_state(s.body, i.npoint, x.data(), v.data()));
+  for (int k = 0; k < 70; ++k) test::ok(dfm_world_step(s.w, 1e-3, nullptr));
+  EXPECT_EQ(parts(s.body), 2u);
+}
+
+TEST(ToolCut, Solids_TakeCellsAway_AsTheyGo) {
+  const struct {
+    uint32_t shape;
+    std::array<double, 3> half;
+    double radius;
+  } solids[] = {{DFM_TOOL_SPHERE, {}, 0.008},
+                {DFM_TOOL_CAPSULE, {}, 0.006},
+                {DFM_TOOL_ELLIPSOID, {0.008, 0.006, 0.01}, 0},
+                {DFM_TOOL_BOX, {0.006, 0.006, 0.006}, 0},
+                {DFM_TOOL_BLADE, {0.001, 0.03, 0.02}, 0}};
+  for (const auto &solid : solids) {
+    Cube s;
+    const dfm_tool t = make(s.w, solid.shape, solid.half, {0, 0, 0.06}, solid.radius);
+    cuts(t, DFM_CUT_REMOVE, s.body, 40);
+    const double before = test::measure(s.body).mass;
+    const uint32_t whole = cells(s.body);
+    move(s.w, t, {0, 0, 0.06}, {0, 0, 0}, 30);
+    const Told gone = told(s.w, s.body, t);
+    EXPECT_GT(gone.sum, 30u) << solid.shape;
+    EXPECT_LE(gone.most, 40u);
+    EXPECT_EQ(cells(s.body), whole - gone.sum);
+    EXPECT_LT(test::measure(s.body).mass, before);
+    EXPECT_EQ(force_on(t), 0) << solid.shape;
+  }
+}
+
+TEST(ToolCut, EverythingRemoved_LeavesABodyThatIsANameOnly) {
+  Cube s;
+  const dfm_tool t = make(s.w, DFM_TOOL_SPHERE, {}, {0, 0, 0.2}, 0.1);
+  cuts(t, DFM_CUT_REMOVE, s.body);
+  move(s.w, t, {0, 0, 0.2}, {0, 0, 0}, 4);
+  EXPECT_EQ(cells(s.body), 0u);
+  move(s.w, t, {0, 0, 0}, {0, 0, 0.1}, 4);
+}
+
+TEST(ToolCut, Scissors_CutWhatTheyCloseOn) {
+  Cube s;
+  dfm_tool_def d = dfm_tool_def_default();
+  d.name = "tool";
+  d.shape = DFM_TOOL_SCISSORS;
+  d.half_size[0] = 0.004;
+  d.half_size[1] = 0.001;
+  d.half_size[2] = 0.04;
+  d.pose.position[1] = 0.001;
+  d.pose.position[2] = 0.03;
+  d.opening = 1.5;
+  dfm_tool t = 0;
+  test::ok(dfm_tool_create(s.w, &d, &t));
+  cuts(t, DFM_CUT_SPLIT, s.body);
+  for (int i = 1; i <= 60; ++i) {
+    test::ok(dfm_tool_set_opening(t, 1.5 * (1 - i / 60.0)));
+    test::ok(dfm_world_step(s.w, 1e-3, nullptr));
+    if (i == 20) {
+      EXPECT_EQ(parts(s.body), 1u);
+    }
+  }
+  EXPECT_EQ(parts(s.body), 2u);
+  told(s.w, s.body, t);
+  for (int i = 1; i <= 60; ++i) {
+    test::ok(dfm_tool_set_opening(t, 1.5 * i / 60.0));
+    test::ok(dfm_world_step(s.w, 1e-3, nullptr));
+  }
+  EXPECT_EQ(told(s.w, s.body, t).n, 0u) << "opening cuts nothing";
+}
+
+TEST(ToolCut, Snapshot_TakesBackACut_WhichThenGoesTheSameWay) {
+  Cube s;
+  const dfm_tool t = blade(s.w);
+  cuts(t, DFM_CUT_SPLIT, s.body);
+  move(s.w, t, {0.001, 0, 0.05}, {0.001, 0, 0.02}, 20);
+  const std::string half = test::snapshot(s.w);
+  move(s.w, t, {0.001, 0, 0.02}, {0.001, 0, -0.01}, 20);
+  const std::string end = test::snapshot(s.w);
+  ASSERT_EQ(parts(s.body), 2u);
+  test::ok(dfm_world_restore(s.w, half.data(), half.size()));
+  EXPECT_EQ(parts(s.body), 1u);
+  move(s.w, t, {0.001, 0, 0.02}, {0.001, 0, -0.01}, 20);
+  EXPECT_TRUE(test::snapshot(s.w) == end);
+}
+
+TEST(ToolCut, WhatIsSet_CanBeAsked_AndTakenBack) {
+  Cube s;
+  const dfm_tool t = blade(s.w);
+  uint32_t how = 9, most = 9, n = 9;
+  test::ok(dfm_tool_cuts(t, &how, &most, 0, nullptr, &n));
+  EXPECT_EQ(n, 0u);
+  cuts(t, DFM_CUT_SPLIT, s.body, 7);
+  dfm_body b = 0;
+  test::ok(dfm_tool_cuts(t, &how, &most, 1, &b, &n));
+  EXPECT_EQ(how, uint32_t{DFM_CUT_SPLIT});
+  EXPECT_EQ(most, 7u);
+  EXPECT_EQ(b, s.body);
+  EXPECT_EQ(dfm_body_set_model(s.body, "modal", nullptr), DFM_E_UNSUPPORTED);
+  test::says({"cube", "neither cut nor torn", "modal"});
+  test::ok(dfm_tool_set_cuts(t, DFM_CUT_SPLIT, 0, 0, nullptr));
+  move(s.w, t, {0.001, 0, 0.05}, {0.001, 0, 0.036}, 30);
+  EXPECT_GT(force_on(t), 1e-3) << "a blade that cuts nothing presses";
+  EXPECT_EQ(parts(s.body), 1u);
+}
+
+TEST(ToolCut, WhatCannotCut_IsRefused) {
+  Cube s, modal("modal");
+  const dfm_tool grasper = make(s.w, DFM_TOOL_GRASPER, {0.001, 0.002, 0.01}, {0, 0, 0.1});
+  EXPECT_EQ(dfm_tool_set_cuts(grasper, DFM_CUT_REMOVE, 0, 1, &s.body), DFM_E_ARG);
+  test::says({"tool", "grasper", "scissors"});
+  test::ok(dfm_tool_destroy(grasper));
+  const dfm_tool ball = make(s.w, DFM_TOOL_SPHERE, {}, {0, 0, 0.1}, 0.01);
+  EXPECT_EQ(dfm_tool_set_cuts(ball, DFM_CUT_SPLIT, 0, 1, &s.body), DFM_E_ARG);
+  test::says({"tool", "edge", "DFM_CUT_REMOVE"});
+  EXPECT_EQ(dfm_tool_set_cuts(ball, 5, 0, 1, &s.body), DFM_E_ARG);
+  EXPECT_EQ(dfm_tool_set_cuts(ball, DFM_CUT_REMOVE, 0, 1, nullptr), DFM_E_ARG);
+  EXPECT_EQ(dfm_tool_set_cuts(ball, DFM_CUT_REMOVE, 0, 1, &modal.body), DFM_E_HANDLE);
+  test::ok(dfm_tool_destroy(ball));
+  const dfm_tool thick = make(s.w, DFM_TOOL_BLADE, {0.02, 0.001, 0.01}, {0, 0, 0.1});
+  EXPECT_EQ(dfm_tool_set_cuts(thick, DFM_CUT_SPLIT, 0, 1, &s.body), DFM_E_ARG);
+  test::says({"along y", "exchange"});
+  const dfm_tool t = blade(modal.w);
+  EXPECT_EQ(dfm_tool_set_cuts(t, DFM_CUT_SPLIT, 0, 1, &modal.body), DFM_E_UNSUPPORTED);
+  test::says({"cube", "msm"});
+}
+
+// ---- scenes ---------------------------------------------------------------------------------------------
+
+namespace {
+
+std::string folder() { return test::scratch("tool cut " + std::to_string(getpid())); }
+
+std::string scene(const std::string &cuts,
+                  const char *shape = R"("blade", "half_size": [0.0005, 0.03, 0.02])") {
+  return R"({"format": "deform-scene", "version": 1, "gravity": [0, 0, 0],
+    "time": {"duration": 0.06, "step": 0.001, "integrator": "symplectic_euler"},
+    "materials": {"gel": {"young": 3e4, "damping": {"stiffness": 0.002}}},
+    "bodies": [{"name": "cube", "mesh": {"make": "beam", "size": [0.04, 0.04, 0.04], "cells": 320},
+      "material": "gel", "pose": {"position": [-0.02, -0.02, -0.02]}}],
+    "tools": [{"name": "knife", "shape": )" +
+         std::string(shape) + R"(, "cuts": )" + cuts + R"(, "pose": {"position": [0.001, 0, 0.05]},
+      "motion": {"keyframes": [{"t": 0, "position": [0.001, 0, 0.05]},
+                               {"t": 0.06, "position": [0.001, 0, -0.01]}]}}]})";
+}
+
+struct Opened {
+  test::Context context;
+  dfm_scene scene = 0;
+  dfm_world world = 0;
+  dfm_status status;
+  explicit Opened(const std::string &text) {
+    const std::string path = folder() + "/scene.json";
+    test::write_file(path, text);
+    status = dfm_scene_open(context, path.c_str(), nullptr, &scene);
+    if (scene) test::ok(dfm_scene_world(scene, &world));
+  }
+  ~Opened() {
+    if (scene) dfm_scene_close(scene);
+  }
+  Opened(const Opened &) = delete;
+  Opened &operator=(const Opened &) = delete;
+};
+
+}  // namespace
+
+TEST(ToolCutScene, BothForms_CutByTheKeysOfTheTool) {
+  for (const char *form :
+       {R"(["cube"])", R"({"bodies": ["cube"]})", R"({"bodies": ["cube"], "mode": "split", "most": 12})"}) {
+    const Opened s(scene(form));
+    ASSERT_EQ(s.status, DFM_OK) << dfm_last_error();
+    test::run(s.world, 0.06, 1e-3);
+    dfm_body cube = 0;
+    test::ok(dfm_world_find_body(s.world, "cube", &cube));
+    EXPECT_EQ(parts(cube), 2u) << form;
+  }
+  const Opened s(scene(R"({"bodies": ["cube"], "mode": "remove"})"));
+  ASSERT_EQ(s.status, DFM_OK) << dfm_last_error();
+  test::run(s.world, 0.06, 1e-3);
+  dfm_body cube = 0;
+  test::ok(dfm_world_find_body(s.world, "cube", &cube));
+  EXPECT_LT(cells(cube), 300u);
+}
+
+TEST(ToolCutScene, WhatIsWrong_IsNamed) {
+  const auto refused = [](const std::string &text, std::initializer_list<const char *> words) {
+    const Opened s(text);
+    EXPECT_LT(s.status, 0) << text;
+    test::says(words);
+  };
+  refused(scene(R"(["cub"])"), {"/tools/0/cuts/0", "cube"});
+  refused(scene("[]"), {"/tools/0/cuts", "at least one body"});
+  refused(scene(R"({"mode": "split"})"), {"/tools/0/cuts", "bodies"});
+  refused(scene(R"({"bodies": ["cube"], "mode": "spilt"})"), {"/tools/0/cuts/mode", "split"});
+  refused(scene(R"({"bodies": ["cube"], "limit": 3})"), {"/tools/0/cuts/limit", "most"});
+  refused(scene(R"({"bodies": ["cube"], "most": -1})"), {"/tools/0/cuts/most"});
+  refused(scene(R"(["cube"])", R"("grasper", "half_size": [0.001, 0.002, 0.01])"),
+          {"/tools/0/cuts", "grasper"});
+  refused(scene(R"({"bodies": ["cube"], "mode": "split"})", R"("sphere", "radius": 0.01)"),
+          {"/tools/0/cuts", "edge"});
+}
+
+// Recorded and replayed, and continued from a saved state in the middle of the cut: the same bits.
+TEST(ToolCutScene, RunThatCuts_IsReplayedAndContinuedToTheBit) {
+  const std::string dir = folder(), path = dir + "/a scene.json";
+  test::write_file(path, scene(R"({"bodies": ["cube"], "most": 12})"));
+  const auto run = [&](std::vector<std::string> words) {
+    const test::CommandResult r = test::deform(words);
+    EXPECT_EQ(r.exit_code, 0) << r.err;
+  };
+  const auto hash = [&](const std::string &out) {
+    const std::string text = test::read_file(out + "/summary.json");
+    const size_t at = text.find("\"state_hash\"");
+    EXPECT_NE(at, std::string::npos);
+    return text.substr(at, 36);
+  };
+  run({"run", path, "--out", dir + "/whole", "--quiet", "--record", "--save", "0.03", dir + "/half.state"});
+  run({"run", path, "--out", dir + "/rest", "--quiet", "--from", dir + "/half.state"});
+  EXPECT_EQ(hash(dir + "/whole"), hash(dir + "/rest"));
+  run({"replay", dir + "/whole", "--quiet"});
+  run({"replay", dir + "/whole", "--quiet", "--states", "--out", dir + "/pictures"});
+}
