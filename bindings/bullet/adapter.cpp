@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 namespace dfm_bullet_detail {
 namespace {
@@ -23,8 +24,6 @@ Adapter *adapter_of(const btDynamicsWorld *world) {
   const auto at = w.all.find(world);
   return at == w.all.end() ? nullptr : at->second;
 }
-
-bool same(Vec a, Vec b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
 
 const void *address(const btCollisionObject *o) { return o; }
 
@@ -92,12 +91,6 @@ void Adapter::after_tick(btDynamicsWorld *world, btScalar h) {
   if (a->theirs_after_) a->theirs_after_(world, h);
 }
 
-bool Adapter::Traits::operator==(const Traits &o) const {
-  return handle == o.handle && group == o.group && mask == o.mask && moves == o.moves &&
-         takes_part == o.takes_part && mass == o.mass && same(moments, o.moments) && same(along, o.along) &&
-         same(about, o.about);
-}
-
 const Adapter::Props *Adapter::props_of(const btCollisionObject *object) const {
   const auto known = props_.find(object);
   return known == props_.end() ? nullptr : &known->second;
@@ -155,6 +148,18 @@ dfm_status Adapter::check() const {
   return DFM_OK;
 }
 
+// To the bit: they have no padding.
+bool Adapter::same(const Traits &a, const Traits &b) { return std::memcmp(&a, &b, sizeof a) == 0; }
+
+// Is the shape what the object's obstacles have been made of?
+bool Adapter::has_parts(const Object &o, const btCollisionShape *shape) {
+  if (!o.traits.takes_part) return o.parts.empty();
+  if (is_still(shape, o.parts)) return true;
+  const btCollisionShape *unknown = nullptr;
+  seen_.clear();
+  return parts_of(shape, {}, seen_, unknown) && o.parts == seen_;
+}
+
 // Nothing that is out of the world is touched: objects are known alive because the world lists them.
 dfm_status Adapter::look(double h) {
   const Timer timer(sync_seconds_);
@@ -165,10 +170,7 @@ dfm_status Adapter::look(double h) {
     Object *const found = known(all[i], i);
     if (!found) continue;
     Object &o = *found;
-    const btCollisionShape *unknown = nullptr;
-    seen_.clear();
-    const bool readable = !o.traits.takes_part || parts_of(all[i]->getCollisionShape(), {}, seen_, unknown);
-    o.found = readable && !o.stale && o.traits == traits_of(all[i]) && o.parts == seen_;
+    o.found = !o.stale && same(o.traits, traits_of(all[i])) && has_parts(o, all[i]->getCollisionShape());
   }
   TRY(drop());
   if (objects_.size() != static_cast<size_t>(all.size()))
@@ -178,8 +180,9 @@ dfm_status Adapter::look(double h) {
   for (auto &o : objects_) TRY(follow(*o, h));
   bool restored = false;
   TRY(clock_.ask(world_, restored));
+  TRY(states_.ask(world_));
   for (auto &o : objects_)
-    if (o->body) TRY(o->body->agree(restored));
+    if (o->body) TRY(o->body->agree(restored, states_));
   return DFM_OK;
 }
 
@@ -293,9 +296,9 @@ dfm_status Adapter::tick(double h) {
     status = dfm_world_step(world_, h, &trouble_);
   }
   ++ticks_;
-  dfm_status told = DFM_OK;
+  dfm_status told = states_.ask(world_);
   for (auto &o : objects_) {
-    const dfm_status of_body = o->body ? o->body->after(status) : dfm_status{DFM_OK};
+    const dfm_status of_body = o->body ? o->body->after(status, states_) : dfm_status{DFM_OK};
     if (told == DFM_OK) told = of_body;
   }
   bool restored = false;

@@ -61,13 +61,13 @@ class Adapter {
  private:
   // All that makes an object's obstacles what they are, beside where it stands.
   struct Traits {
-    int handle = 0;  // the broadphase's: another one after the object has been out of the world
-    int group = 0, mask = 0;
-    bool moves = false, takes_part = false;
     double mass = 0;
     Vec moments, along, about;
-    bool operator==(const Traits &o) const;
+    int handle = 0;  // the broadphase's: another one after the object has been out of the world
+    int group = 0, mask = 0;
+    int16_t moves = 0, takes_part = 0;  // 0 or 1
   };
+  static_assert(sizeof(Traits) == 10 * sizeof(double) + 4 * sizeof(int), "compared as bytes");
   struct Body : Seated { std::unique_ptr<Member> member; };
   struct Object {
     const btCollisionObject *id;
@@ -93,6 +93,7 @@ class Adapter {
   std::unordered_map<const btCollisionObject *, Props> props_;
   std::vector<Part> seen_;  // of the object that is looked at
   Clock clock_;
+  States states_;
   std::unique_ptr<Vacated> vacated_;
   uint64_t ticks_ = 0;
   double sync_seconds_ = 0;
@@ -105,6 +106,8 @@ class Adapter {
   dfm_status tick(double h);
   dfm_status look(double h);
   dfm_status check() const;
+  static bool same(const Traits &a, const Traits &b);
+  bool has_parts(const Object &o, const btCollisionShape *shape);
   Traits traits_of(const btCollisionObject *object) const;
   Object *known(const btCollisionObject *object, int place) const;  // place: in the world's list
   const Props *props_of(const btCollisionObject *object) const;

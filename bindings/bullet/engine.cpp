@@ -42,6 +42,14 @@ Motion beside(const btTransform &a, const btTransform &b, const Motion &m, doubl
   return out;
 }
 
+bool same_bits(const btVector3 &a, const btVector3 &b) {
+  return std::memcmp(a.m_floats, b.m_floats, 3 * sizeof(btScalar)) == 0;
+}
+bool same_place(const btTransform &a, const btTransform &b) {
+  return same_bits(a.getOrigin(), b.getOrigin()) && same_bits(a.getBasis()[0], b.getBasis()[0]) &&
+         same_bits(a.getBasis()[1], b.getBasis()[1]) && same_bits(a.getBasis()[2], b.getBasis()[2]);
+}
+
 dfm_rigid_state state_of(const Pose &p, Vec v, Vec w) {
   dfm_rigid_state s{};
   const double rotation[4] = {p.rotation.x, p.rotation.y, p.rotation.z, p.rotation.w};
@@ -54,13 +62,15 @@ dfm_rigid_state state_of(const Pose &p, Vec v, Vec w) {
 
 }  // namespace
 
+void Stand::take(const btRigidBody &body) {
+  transform = body.getWorldTransform();
+  v = body.getLinearVelocity();
+  w = body.getAngularVelocity();
+  known = true;
+}
+
 bool Stand::holds(const btTransform &t, const btVector3 &v_now, const btVector3 &w_now) const {
-  const auto same = [](const btVector3 &a, const btVector3 &b) {
-    return std::memcmp(a.m_floats, b.m_floats, 3 * sizeof(btScalar)) == 0;
-  };
-  return known && same(transform.getOrigin(), t.getOrigin()) && same(v, v_now) && same(w, w_now) &&
-         same(transform.getBasis()[0], t.getBasis()[0]) && same(transform.getBasis()[1], t.getBasis()[1]) &&
-         same(transform.getBasis()[2], t.getBasis()[2]);
+  return known && same_bits(v, v_now) && same_bits(w, w_now) && same_place(transform, t);
 }
 
 dfm_rigid_state BulletMember::state() const {
@@ -68,18 +78,17 @@ dfm_rigid_state BulletMember::state() const {
                   from_bullet(body->getAngularVelocity()));
 }
 
-void BulletMember::mark() {
-  marked = {body->getWorldTransform(), body->getLinearVelocity(), body->getAngularVelocity(), {}, true};
-}
+void BulletMember::mark() { marked.take(*body); }
 
 bool BulletMember::stays() const {
   return marked.holds(body->getWorldTransform(), body->getLinearVelocity(), body->getAngularVelocity());
 }
 
 void BulletMember::put(const dfm_rigid_state &s) {
-  put_in(body, to_bullet(Pose{load(s.position), rotation_of(s)}), to_bullet(load(s.velocity)),
-         to_bullet(load(s.spin)));
-  last_put = {body->getWorldTransform(), body->getLinearVelocity(), body->getAngularVelocity(), s, true};
+  last_put = {to_bullet(Pose{load(s.position), rotation_of(s)}), to_bullet(load(s.velocity)),
+              to_bullet(load(s.spin)), true};
+  put_in(body, last_put.transform, last_put.v, last_put.w);
+  put_state = s;
 }
 
 // Bullet's inertia is diagonal in the body's own frame; an axis of none is one that does not turn.
@@ -167,13 +176,14 @@ void BulletEngine::gather() {
   number_.clear();
   const auto add = [&](btRigidBody *b, BulletMember *m) {
     number_[b] = saved_.size();
-    saved_.push_back(
-        {b, b->getWorldTransform(), b->getLinearVelocity(), b->getAngularVelocity(), 0, 0, 0, m, false});
+    Saved &s = saved_.emplace_back();
+    s.body = b;
+    s.member = m;
   };
   bodies_.clear();
   links_.clear();
   for (Member *m : members) {
-    if (auto *const link = dynamic_cast<LinkMember *>(m)) links_.push_back(link);
+    if (static_cast<AnyMember *>(m)->is_link) links_.push_back(static_cast<LinkMember *>(m));
     else bodies_.push_back(static_cast<BulletMember *>(m));
   }
   for (BulletMember *m : bodies_) {
@@ -185,6 +195,17 @@ void BulletEngine::gather() {
     const bool moves = !all[i]->isStaticOrKinematicObject();
     listed_.emplace_back(all[i], moves);
     if (moves && !number_.count(all[i])) add(all[i], nullptr);
+  }
+}
+
+void BulletEngine::take_damping_back(Saved &s) {
+  s.damped_v = s.body->getLinearVelocity();
+  s.damped_w = s.body->getAngularVelocity();
+  if (same_place(s.body->getWorldTransform(), s.transform)) {
+    s.body->setLinearVelocity(s.v);
+    s.body->setAngularVelocity(s.w);
+  } else {
+    put_in(s.body, s.transform, s.v, s.w);
   }
 }
 
@@ -206,7 +227,9 @@ void BulletEngine::prepare(const dfm_rigid_step &step) {
   (world->*Opened::find_predictive())(h);
   world->performDiscreteCollisionDetection();
   (world->*Opened::find_islands())();
-  for (Saved &s : saved_) put_in(s.body, s.transform, s.v, s.w);  // damping is predict's too
+  for (Saved &s : saved_) take_damping_back(s);
+  predicted_ = multi_.any() ? 0 : step.h;
+  has_islands_ = true;
   multi_.restore();
   find_touched();
   pull_awake();
@@ -224,8 +247,9 @@ void BulletEngine::find_touched() {
       s.body->activate();
   };
   btDispatcher *const dispatcher = world->getDispatcher();
-  for (int i = 0; i < dispatcher->getNumManifolds(); ++i) {
-    const btPersistentManifold *const m = dispatcher->getManifoldByIndexInternal(i);
+  btPersistentManifold **const manifolds = dispatcher->getInternalManifoldPointer();
+  for (int i = 0, n = dispatcher->getNumManifolds(); i < n; ++i) {
+    const btPersistentManifold *const m = manifolds[i];
     if (m->getNumContacts() == 0) continue;
     touch(m->getBody0(), m->getBody1());
     touch(m->getBody1(), m->getBody0());
@@ -242,13 +266,16 @@ void BulletEngine::find_touched() {
 
 // Whatever is in one island with something awake is awake, as Bullet has it when it builds its islands.
 void BulletEngine::pull_awake() {
-  std::unordered_set<int> awake;
   bool sleepers = false;
   for (const Saved &s : saved_) {
-    const int state = s.body->getActivationState();
-    if (state == ACTIVE_TAG || state == DISABLE_DEACTIVATION) awake.insert(s.body->getIslandTag());
-    sleepers |= state == ISLAND_SLEEPING;
+    sleepers |= s.body->getActivationState() == ISLAND_SLEEPING;
     if (s.member) s.member->pulled = false;
+  }
+  std::unordered_set<int> awake;
+  for (const Saved &s : saved_) {
+    const int state = s.body->getActivationState();
+    if (sleepers && (state == ACTIVE_TAG || state == DISABLE_DEACTIVATION))
+      awake.insert(s.body->getIslandTag());
   }
   if (sleepers)
     for (Saved &s : saved_) {
@@ -271,9 +298,9 @@ void BulletEngine::restore(bool given) {
 
 void BulletEngine::take(Member &any, const dfm_rigid_state &given, const double *extra) {
   any.start = given;
-  if (auto *const link = dynamic_cast<LinkMember *>(&any)) {
-    link->ended = given;
-    link->restored = false;
+  if (static_cast<AnyMember &>(any).is_link) {
+    static_cast<LinkMember &>(any).ended = given;
+    any.restored = false;
     return;
   }
   BulletMember &m = static_cast<BulletMember &>(any);
@@ -287,11 +314,12 @@ void BulletEngine::take(Member &any, const dfm_rigid_state &given, const double 
   m.restored = false;
   m.ended = given;
   // prepare() has put back what stood there before, so that what was put last stands there still
-  if (same(given, m.last_put.state) && m.last_put.holds(s.transform, s.v, s.w)) return;
+  if (same(given, m.put_state) && m.last_put.holds(s.transform, s.v, s.w)) return;
   m.put(given);
   s.transform = m.body->getWorldTransform();
   s.v = m.body->getLinearVelocity();
   s.w = m.body->getAngularVelocity();
+  predicted_ = 0;
 }
 
 void BulletEngine::put_forces(double) {
@@ -301,24 +329,37 @@ void BulletEngine::put_forces(double) {
     if (m->wakes) m->body->wakeUp();
 }
 
+// Of what predictUnconstraintMotion does, the constraints see the velocities alone: integrateTransforms does
+// not read the predicted transforms, and whatever puts a body somewhere sets them again.
+void BulletEngine::predict_again(double h) {
+  if (predicted_ != h) {
+    (world->*Opened::predict())(static_cast<btScalar>(h));
+    return;
+  }
+  for (Saved &s : saved_) {
+    s.body->setLinearVelocity(s.damped_v);
+    s.body->setAngularVelocity(s.damped_w);
+  }
+}
+
 void BulletEngine::run(double h) {
   const btScalar step = static_cast<btScalar>(h);
-  (world->*Opened::predict())(step);
-  std::vector<int> flags;
+  predict_again(h);
+  flags_.clear();
   for (Saved &s : saved_) {
-    flags.push_back(s.body->getFlags());
-    s.body->setFlags(flags.back() & ~kGyroscopic);
+    flags_.push_back(s.body->getFlags());
+    s.body->setFlags(flags_.back() & ~kGyroscopic);
     if (!s.member || s.member->kind == Member::still) continue;
     const Motion change = s.member->answer(s.member->impulse);
     s.body->setLinearVelocity(s.body->getLinearVelocity() + to_bullet(change.v));
     s.body->setAngularVelocity(s.body->getAngularVelocity() + to_bullet(change.w));
   }
   for (LinkMember *m : links_) m->push((1 / h) * m->impulse.v, (1 / h) * m->impulse.w);
-  (world->*Opened::find_islands())();
+  if (!std::exchange(has_islands_, false)) (world->*Opened::find_islands())();
   world->getSolverInfo().m_timeStep = step;
   world->solveConstraints(world->getSolverInfo());
   (world->*Opened::integrate())(step);
-  for (size_t i = 0; i < saved_.size(); ++i) saved_[i].body->setFlags(flags[i]);
+  for (size_t i = 0; i < saved_.size(); ++i) saved_[i].body->setFlags(flags_[i]);
   for (BulletMember *m : bodies_) finish(*m, h);
   for (LinkMember *m : links_) {
     m->push((-1 / h) * m->impulse.v, (-1 / h) * m->impulse.w);
@@ -333,9 +374,9 @@ void BulletEngine::finish(BulletMember &m, double h) {
     store(m.ended.spin, {});
     return;
   }
-  const Vec x = load(m.start.position), own = m.answer(m.impulse).v;
+  const Vec x = load(m.start.position);
   if (m.kind == Member::free) {
-    const Vec v = m.plain.v + own;
+    const Vec v = m.plain.v + m.answer(m.impulse).v;
     store(m.ended.velocity, v);
     store(m.ended.position, x + h * v);
     return;
@@ -345,7 +386,8 @@ void BulletEngine::finish(BulletMember &m, double h) {
   const Vec v = load(m.start.velocity) + (got.v - from_bullet(s.v));
   const Vec w = load(m.start.spin) + (got.w - from_bullet(s.w));
   const Motion more = beside(s.transform, m.body->getWorldTransform(), got, h);
-  const Quat from = rotation_of(m.start), to = unit(turn_by(more.w) * turn_by(h * w) * from);
+  const Quat from = rotation_of(m.start), turn = turn_by(h * w);
+  const Quat to = unit((is_none(more.w) ? turn : turn_by(more.w) * turn) * from);
   store(m.ended.velocity, v);
   store(m.ended.position, x + h * v + more.v);
   const Vec L = in_axes(from, m.inertia.moments, w);
@@ -361,22 +403,24 @@ void BulletEngine::turned(Member &any, Quat to, Vec spin) {
 
 void BulletEngine::rest(double h) {
   for (BulletMember *m : bodies_) m->put(m->ended);
-  std::vector<std::pair<btVector3, btVector3>> before;
-  for (const Saved &s : saved_)
-    before.emplace_back(s.body->getLinearVelocity(), s.body->getAngularVelocity());
+  const bool acts = (world->*Opened::actions()).size() > 0;
+  before_actions_.clear();
+  for (size_t i = 0; acts && i < bodies_.size(); ++i)
+    before_actions_.emplace_back(bodies_[i]->body->getLinearVelocity(),
+                                 bodies_[i]->body->getAngularVelocity());
   (world->*Opened::act())(static_cast<btScalar>(h));
   for (size_t i = 0; i < bodies_.size(); ++i) {
     BulletMember &m = *bodies_[i];
-    const auto &[v, w] = before[i];
-    const Vec dv = from_bullet(m.body->getLinearVelocity()) - from_bullet(v);
-    const Vec dw = from_bullet(m.body->getAngularVelocity()) - from_bullet(w);
-    store(m.ended.velocity, load(m.ended.velocity) + dv);
-    store(m.ended.spin, load(m.ended.spin) + dw);
+    if (acts) {
+      const auto &[v, w] = before_actions_[i];
+      const Vec dv = from_bullet(m.body->getLinearVelocity()) - from_bullet(v);
+      const Vec dw = from_bullet(m.body->getAngularVelocity()) - from_bullet(w);
+      store(m.ended.velocity, load(m.ended.velocity) + dv);
+      store(m.ended.spin, load(m.ended.spin) + dw);
+    }
+    if (!(dot(m.impulse.v, m.impulse.v) > 0) || !may_sleep(m.body)) continue;
     const auto [speed, spin] = m.idle_limits();
-    const bool pushed = dot(m.impulse.v, m.impulse.v) > 0;
-    if (pushed && may_sleep(m.body) &&
-        (norm(load(m.ended.velocity)) > speed || norm(load(m.ended.spin)) > spin))
-      m.body->activate(true);
+    if (norm(load(m.ended.velocity)) > speed || norm(load(m.ended.spin)) > spin) m.body->activate(true);
   }
   (world->*Opened::idle())(static_cast<btScalar>(h));
   for (BulletMember *m : bodies_) m->next_idle = {0, m->body->getDeactivationTime()};

@@ -22,27 +22,34 @@ namespace dfm_bullet_detail {
 
 class BulletEngine;
 
-// Where a body of Bullet stands and how it moves, to the bit, and the state that goes with it.
+// Where a body of Bullet stands and how it moves, to the bit.
 struct Stand {
   btTransform transform;
   btVector3 v, w;
-  dfm_rigid_state state;
   bool known = false;
+  void take(const btRigidBody &body);
   bool holds(const btTransform &t, const btVector3 &v_now, const btVector3 &w_now) const;
 };
 
-struct BulletMember : Member {
+// What the engine has of a member before it knows which kind that is.
+struct AnyMember : Member {
+  explicit AnyMember(bool of_multibody) : is_link(of_multibody) {}
+  const bool is_link;
+};
+
+struct BulletMember : AnyMember {
+  BulletMember() : AnyMember(false) {}
   btRigidBody *body = nullptr;
-  bool touched = false;  // by a constraint or contact of Bullet's in this sub-step
-  size_t saved = 0;      // where the engine keeps it
-  dfm_rigid_state ended{};
-  Stand last_put, marked;  // last_put: what has been put into Bullet, and as what it stands there
+  bool touched = false;    // by a constraint or contact of Bullet's in this sub-step
+  size_t saved = 0;        // where the engine keeps it
+  Stand last_put, marked;  // last_put: as what stands in Bullet what has been put there
+  dfm_rigid_state put_state{};
 
   dfm_rigid_state state() const override;
   void mark() override;
   bool stays() const override;
   void put(const dfm_rigid_state &s) override;
-  dfm_rigid_state end() const override { return ended; }
+  const dfm_rigid_state &end() override { return ended; }
   bool enabled() const override { return body->isActive(); }
   Facts facts() const override;
   std::array<double, 2> idle_limits() const override;
@@ -51,15 +58,15 @@ struct BulletMember : Member {
 
 // A link of a multibody, or its base (-1): jointed to the others like bodies by constraints, and like those
 // in the solve with its own mass and what the joints did last.
-struct LinkMember : Member {
+struct LinkMember : AnyMember {
+  LinkMember() : AnyMember(true) {}
   btMultiBody *body = nullptr;
   int link = -1;
   Vec gravity;
-  dfm_rigid_state ended{};
 
   dfm_rigid_state state() const override;
   void put(const dfm_rigid_state &) override {}  // its joints say where it is
-  dfm_rigid_state end() const override { return ended; }
+  const dfm_rigid_state &end() override { return ended; }
   bool enabled() const override { return body->isAwake(); }
   Facts facts() const override;
   std::array<double, 2> idle_limits() const override;
@@ -88,23 +95,30 @@ class BulletEngine : public Engine {
 
  private:
   struct Saved {
-    btRigidBody *body;
+    btRigidBody *body = nullptr;
     btTransform transform;
     btVector3 v, w;
-    int activation, given;  // for this sub-step; as it was given
-    btScalar idle;          // s
-    BulletMember *member;   // null: soft bodies do not touch it
-    bool touched;
+    btVector3 damped_v, damped_w;    // by Bullet's predictUnconstraintMotion
+    int activation = 0, given = 0;   // for this sub-step; as it was given
+    btScalar idle = 0;               // s
+    BulletMember *member = nullptr;  // null: soft bodies do not touch it
+    bool touched = false;
   };
   std::unordered_map<const btCollisionObject *, size_t> number_;  // in saved_
   std::vector<Member *> gathered_;                                // members when that was made
   std::vector<std::pair<const btRigidBody *, bool>> listed_;      // the world's bodies then; may they move?
+  std::vector<int> flags_;                                        // of saved_ bodies, while the engine steps
+  std::vector<std::pair<btVector3, btVector3>> before_actions_;
   MultiState multi_;
+  double predicted_ = 0;      // s: damped_v and damped_w are v and w after this time; 0: they are not known
+  bool has_islands_ = false;  // Bullet's islands are those of now, and not sorted yet
   std::vector<Saved> saved_;  // every body that may move, members first
 
   std::vector<BulletMember *> bodies_;  // of members
   std::vector<LinkMember *> links_;
   bool is_gathered();
+  static void take_damping_back(Saved &s);
+  void predict_again(double h);
   void find_touched();
   void pull_awake();
   void finish(BulletMember &m, double h);

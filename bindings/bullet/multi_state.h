@@ -10,6 +10,7 @@ class MultiState {
  public:
   void keep(btDiscreteDynamicsWorld &world);
   void restore();
+  bool any() const { return count_ > 0; }
 
  private:
   struct Kept {

@@ -94,37 +94,34 @@ Quat along(int axis) {
   return axis == 0 ? Quat{0, h, 0, h} : axis == 1 ? Quat{-h, 0, 0, h} : Quat{};
 }
 
-void sizes(Part &p) {
-  const btCollisionShape *const s = p.shape;
-  Vec size;
-  switch (p.type) {
+Vec size_of(const btCollisionShape *s, int type) {
+  switch (type) {
     case BOX_SHAPE_PROXYTYPE:
-      size = from_bullet(static_cast<const btBoxShape *>(s)->getHalfExtentsWithMargin());
-      break;
-    case SPHERE_SHAPE_PROXYTYPE: size.x = static_cast<const btSphereShape *>(s)->getRadius(); break;
+      return from_bullet(static_cast<const btBoxShape *>(s)->getHalfExtentsWithMargin());
+    case SPHERE_SHAPE_PROXYTYPE: return {static_cast<const btSphereShape *>(s)->getRadius(), 0, 0};
     case CAPSULE_SHAPE_PROXYTYPE: {
       const auto &c = *static_cast<const btCapsuleShape *>(s);
-      size = {c.getRadius(), c.getHalfHeight(), double(c.getUpAxis())};
-      break;
+      return {c.getRadius(), c.getHalfHeight(), double(c.getUpAxis())};
     }
     case CYLINDER_SHAPE_PROXYTYPE: {
       const auto &c = *static_cast<const btCylinderShape *>(s);
-      size = {c.getRadius(), double(c.getHalfExtentsWithMargin()[c.getUpAxis()]), double(c.getUpAxis())};
-      break;
+      return {c.getRadius(), double(c.getHalfExtentsWithMargin()[c.getUpAxis()]), double(c.getUpAxis())};
     }
-    case STATIC_PLANE_PROXYTYPE: {
-      const auto &plane = *static_cast<const btStaticPlaneShape *>(s);
-      size = from_bullet(plane.getPlaneNormal());
-      p.local = p.local * plane_pose(size, plane.getPlaneConstant());
-      break;
-    }
-    case CONVEX_HULL_SHAPE_PROXYTYPE:
-      p.revision = static_cast<const btConvexHullShape *>(s)->getNumPoints();
-      break;
-    default: break;
+    case STATIC_PLANE_PROXYTYPE:
+      return from_bullet(static_cast<const btStaticPlaneShape *>(s)->getPlaneNormal());
+    default: return {};
   }
+}
+
+void sizes(Part &p) {
+  const Vec size = size_of(p.shape, p.type);
+  if (p.type == STATIC_PLANE_PROXYTYPE)
+    p.local =
+        p.local * plane_pose(size, static_cast<const btStaticPlaneShape *>(p.shape)->getPlaneConstant());
+  if (p.type == CONVEX_HULL_SHAPE_PROXYTYPE)
+    p.revision = static_cast<const btConvexHullShape *>(p.shape)->getNumPoints();
   store(p.size, size);
-  store(p.scaling, from_bullet(s->getLocalScaling()));
+  store(p.scaling, from_bullet(p.shape->getLocalScaling()));
 }
 
 bool same(const Pose &a, const Pose &b) {
@@ -138,6 +135,23 @@ bool same(const Pose &a, const Pose &b) {
 bool Part::operator==(const Part &o) const {
   return shape == o.shape && type == o.type && revision == o.revision && std::equal(size, size + 3, o.size) &&
          std::equal(scaling, scaling + 3, o.scaling) && same(local, o.local);
+}
+
+bool is_still(const btCollisionShape *shape, const std::vector<Part> &parts) {
+  if (parts.size() != 1 || parts[0].shape != shape || parts[0].type != shape->getShapeType()) return false;
+  const double *const size = parts[0].size;
+  switch (parts[0].type) {  // their sizes are those after scaling
+    case BOX_SHAPE_PROXYTYPE: {
+      const btVector3 now = static_cast<const btBoxShape *>(shape)->getHalfExtentsWithMargin();
+      return size[0] == now.x() && size[1] == now.y() && size[2] == now.z();
+    }
+    case SPHERE_SHAPE_PROXYTYPE: return size[0] == static_cast<const btSphereShape *>(shape)->getRadius();
+    case CAPSULE_SHAPE_PROXYTYPE: {
+      const auto &now = *static_cast<const btCapsuleShape *>(shape);
+      return size[0] == now.getRadius() && size[1] == now.getHalfHeight() && size[2] == now.getUpAxis();
+    }
+    default: return false;
+  }
 }
 
 bool parts_of(const btCollisionShape *shape, const Pose &local, std::vector<Part> &out,

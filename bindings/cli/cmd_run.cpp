@@ -139,6 +139,7 @@ class Runner {
       warn("--save " + options_.saves[saved_].path + ": not written, the run ended before its time");
     if (result_.hold_begun) end_hold();
     outputs_.write_nodes();
+    if (!options_.save_scene.empty()) write_as_scene(scene_, options_.save_scene);
     result_.impulses = impulses_.json();
     result_.sensors = sensors_.json();
     add_unwatched(scene_, result_);  // models may have changed
@@ -207,6 +208,7 @@ class Runner {
   void check_saves() const {
     if (!options_.saves.empty()) refuse_static(scene_, "--save");
     if (options_.record) refuse_static(scene_, "--record");
+    if (!options_.save_scene.empty()) check_scene_path(scene_, options_.save_scene);
     for (const RunOptions::Save &save : options_.saves) {
       const std::filesystem::path folder = std::filesystem::path(save.path).parent_path();
       if (access(folder.empty() ? "." : folder.c_str(), W_OK) != 0)
@@ -451,6 +453,9 @@ void add_run(CLI::App &app, Globals &globals, int *exit_code) {
   sub->add_option("--save", *saves,
                   "write the state of the first step that reaches T to FILE; may be repeated")
       ->type_name("T FILE");
+  sub->add_option("--save-scene", options->save_scene,
+                  "write the world at the end of the run as a scene of its own")
+      ->type_name("FILE");
   sub->add_option("--from", options->from,
                   "go on from a state that --save or --record wrote, to the end of the scene or of --time")
       ->type_name("FILE");

@@ -23,8 +23,9 @@ struct RunOptions {
     std::string path;
   };
   std::vector<Save> saves;
-  std::string from;     // a state to go on from; empty: the scene's start
-  bool record = false;  // every recorded state, as a state file
+  std::string from;        // a state to go on from; empty: the scene's start
+  bool record = false;     // every recorded state, as a state file
+  std::string save_scene;  // where the world of the end is written as a scene; empty: nowhere
 };
 
 class Comparison;

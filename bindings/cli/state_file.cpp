@@ -2,7 +2,12 @@
 // dfm_world_write_scene leaves them, are read too.
 #include "state_file.h"
 
+#include <unistd.h>
+
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
 #include <map>
 
 #include "file.h"
@@ -111,6 +116,33 @@ void refuse_static(const SceneFile &scene, const std::string &option) {
     throw Failure(kBadInput, option + ": " + scene.path() +
                                  " looks for equilibria (\"mode\": \"static\"), which have no state to go on "
                                  "from; leave the option out");
+}
+
+void check_scene_path(const SceneFile &scene, const std::string &path) {
+  const std::filesystem::path file(path);
+  const auto refuse = [&](const std::string &why) {
+    throw Failure(kBadInput, "--save-scene " + path + ": " + why);
+  };
+  if (file.extension() != ".json" || file.stem().empty())
+    refuse("the name of a scene file ends in .json; give one that does");
+  std::error_code error;
+  if (std::filesystem::equivalent(file, scene.path(), error))
+    refuse("that is the scene which is run; give another name, so that it stays");
+  if (access(file.has_parent_path() ? file.parent_path().c_str() : ".", W_OK) != 0)
+    refuse(std::string("cannot be written there: ") + std::strerror(errno));
+}
+
+void write_as_scene(const SceneFile &scene, const std::string &path) {
+  dfm_scene_write_def def = dfm_scene_write_def_default();
+  def.flags = DFM_SCENE_PARTIAL;
+  if (scene.value("/time/mode") != "\"static\"") def.flags |= DFM_SCENE_SNAPSHOT;
+  def.duration = scene.settings().duration;
+  std::string about = path;
+  def.user = &about;
+  def.note = [](void *user, const char *sentence) {
+    warn(*static_cast<const std::string *>(user) + ": " + sentence);
+  };
+  need(dfm_scene_write(scene.scene(), path.c_str(), &def, nullptr));
 }
 
 void write_state(const SceneFile &scene, const std::string &path) {

@@ -16,6 +16,12 @@ uint64_t scene_hash(const SceneFile &scene);
 void refuse_static(const SceneFile &scene, const std::string &option);
 void write_state(const SceneFile &scene, const std::string &path);
 
+// The world as it is now as a scene at path, with the scene's probes and outputs, and its state beside it for
+// --from. Where a scene cannot say something the rest is written and the user warned.
+void write_as_scene(const SceneFile &scene, const std::string &path);
+// Before the first step. Throws Failure where there can be no scene of that name.
+void check_scene_path(const SceneFile &scene, const std::string &path);
+
 // Puts the scene's world into the state of the file. Throws Failure where the file is damaged, of another
 // format or scene, or was written with another build of a plugin that is loaded here; the world is then as
 // before.

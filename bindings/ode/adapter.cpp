@@ -109,7 +109,8 @@ dfm_status Adapter::look() {
   TRY(clock_.ask(world_, restored));
   if (restored && !keeps_friction_) near_.forget();
   if (restored) keeps_friction_ = false;
-  for (auto &b : bodies_) TRY(b->agree(restored));
+  TRY(states_.ask(world_));
+  for (auto &b : bodies_) TRY(b->agree(restored, states_));
   return DFM_OK;
 }
 
@@ -236,9 +237,9 @@ dfm_status Adapter::step(double dt) {
   ++steps_;
   // what the bodies say of it comes after the step's own verdict, and one of them does not keep
   // it from the next
-  dfm_status told = DFM_OK;
+  dfm_status told = states_.ask(world_);
   for (auto &b : bodies_) {
-    const dfm_status of_body = b->after(status);
+    const dfm_status of_body = b->after(status, states_);
     if (told == DFM_OK) told = of_body;
   }
   bool restored = false;

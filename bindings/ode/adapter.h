@@ -69,6 +69,7 @@ class Adapter {
   std::vector<Signature> signatures_;
   uint64_t steps_ = 0;
   Clock clock_;
+  States states_;
   bool keeps_friction_ = false;  // restored with the states of the rigid contacts
   double sync_seconds_ = 0;
 

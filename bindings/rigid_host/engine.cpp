@@ -101,8 +101,8 @@ Inertia inertia_of(double mass, const double tensor[3][3]) {
   return out;
 }
 
-Motion Member::answer(const Motion &p) const {
-  if (p.v.x == 0 && p.v.y == 0 && p.v.z == 0 && p.w.x == 0 && p.w.y == 0 && p.w.z == 0) return {};
+Motion Member::answer_of(const Motion &p) const {
+  if (is_none(p.w)) return {(1 / inertia.mass) * each(moves_along, p.v), {}};
   const Vec turned = in_axes(rotation_of(start), inverse(inertia.moments), each(turns_about, p.w));
   return {(1 / inertia.mass) * each(moves_along, p.v), each(turns_about, turned)};
 }
@@ -243,7 +243,7 @@ void Engine::turn_free(double h) {
 double Engine::judge(Member &m, double h) {
   m.next_bias = m.kind == Member::still ? m.bias : Motion{};
   if (m.kind != Member::jointed || !m.enabled()) return 0;
-  const dfm_rigid_state end = m.end();
+  const dfm_rigid_state &end = m.end();
   const Motion got{(1 / h) * (load(end.position) - load(m.start.position)),
                    (1 / h) * turn_of(rotation_of(end) * conjugate(rotation_of(m.start)))};
   const Motion own = m.answer(m.impulse);

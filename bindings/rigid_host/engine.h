@@ -79,22 +79,26 @@ struct Member {
   Motion bias, next_bias;  // b
   Vec turn_momentum;       // angular, at the start plus h T
   Motion impulse;
+  dfm_rigid_state ended{};
   Motion drift;                               // of one that sleeps: what it would move at by now
   std::array<double, 2> idle{}, next_idle{};  // sub-steps, s
 
   virtual ~Member() = default;
-  virtual dfm_rigid_state state() const = 0;               // as the engine has it now
-  virtual void put(const dfm_rigid_state &s) = 0;          // into the engine
-  virtual dfm_rigid_state end() const { return state(); }  // after the engine's step
+  virtual dfm_rigid_state state() const = 0;                        // as the engine has it now
+  virtual void put(const dfm_rigid_state &s) = 0;                   // into the engine
+  virtual const dfm_rigid_state &end() { return ended = state(); }  // after the engine's step
   // Is the engine's body where it was at the last mark(), to the bit?
   virtual void mark() { marked_ = state(); }
   virtual bool stays() const { return same(state(), marked_); }
   virtual bool enabled() const = 0;
   virtual Facts facts() const = 0;
   virtual std::array<double, 2> idle_limits() const = 0;  // m/s, rad/s
-  Motion answer(const Motion &impulse) const;             // M^-1 p at the start
+  Motion answer(const Motion &p) const {                  // M^-1 p at the start
+    return is_none(p.v) && is_none(p.w) ? Motion{} : answer_of(p);
+  }
 
  private:
+  Motion answer_of(const Motion &p) const;
   dfm_rigid_state marked_{};
 };
 

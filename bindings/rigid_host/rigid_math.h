@@ -12,6 +12,7 @@ inline double dot(Vec a, Vec b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 inline Vec cross(Vec a, Vec b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
+inline bool is_none(Vec a) { return a.x == 0 && a.y == 0 && a.z == 0; }
 inline double norm(Vec a) { return std::sqrt(dot(a, a)); }
 inline Vec load(const double *p) { return {p[0], p[1], p[2]}; }
 inline void store(double *p, Vec a) {

@@ -30,17 +30,38 @@ dfm_status Seated::create(dfm_world in, const char *host, Member &m) {
   return dfm_rigid_get_state(rigid, &world);
 }
 
-dfm_status Seated::agree(bool restored) {
+dfm_status States::ask(dfm_world world) {
+  next_ = count_ = 0;
+  uint32_t n = 0;
+  const auto room = [&] { return static_cast<uint32_t>(rigids_.size()); };
+  // There is room for those of the last time, which mostly are those of now.
+  if (dfm_world_rigid_states(world, room(), rigids_.data(), states_.data(), &n) != DFM_OK || n > room()) {
+    TRY(dfm_world_rigid_states(world, 0, nullptr, nullptr, &n));
+    rigids_.resize(n);
+    states_.resize(n);
+    if (n > 0) TRY(dfm_world_rigid_states(world, n, rigids_.data(), states_.data(), &n));
+  }
+  count_ = n;
+  return DFM_OK;
+}
+
+const dfm_rigid_state *States::of(dfm_rigid rigid) {
+  if (next_ == count_ || rigids_[next_] != rigid)
+    next_ = static_cast<size_t>(std::find(rigids_.data(), rigids_.data() + count_, rigid) - rigids_.data());
+  return next_ < count_ ? &states_[next_++] : nullptr;
+}
+
+dfm_status Seated::agree(bool restored, States &now) {
   Member &m = *seat.member;
-  dfm_rigid_state now_world;
-  TRY(dfm_rigid_get_state(rigid, &now_world));
+  const dfm_rigid_state *const now_world = now.of(rigid);
+  if (!now_world) return dfm_rigid_get_state(rigid, &world);  // its sentence
   restored &= !fresh;
   fresh = false;
   m.restored |= restored;
   const bool stays = m.stays();
-  if (stays && same(now_world, world)) return DFM_OK;
+  if (stays && same(*now_world, world)) return DFM_OK;
   if (restored || stays) {
-    m.put(now_world);
+    m.put(*now_world);
   } else {
     const dfm_rigid_state now_engine = m.state();
     TRY(dfm_rigid_set_state(rigid, &now_engine));
@@ -54,9 +75,11 @@ dfm_status Seated::release() {
   return dfm_rigid_destroy(rigid);
 }
 
-dfm_status Seated::after(dfm_status of_step) {
+dfm_status Seated::after(dfm_status of_step, States &now) {
   Member &m = *seat.member;
-  const dfm_status told = dfm_rigid_get_state(rigid, &world);
+  const dfm_rigid_state *const known = now.of(rigid);
+  if (known) world = *known;
+  const dfm_status told = known ? dfm_status{DFM_OK} : dfm_rigid_get_state(rigid, &world);
   if (of_step != DFM_OK && told == DFM_OK && !same(world, m.state())) m.put(world);
   m.mark();
   return told;

@@ -5,6 +5,7 @@
 #include <mutex>
 #include <new>
 #include <unordered_map>
+#include <vector>
 
 #include "host.h"
 
@@ -16,6 +17,20 @@ namespace dfm_rigid_detail {
   } while (0)
 
 dfm_pose to_pose(const Pose &p);
+
+// The states of a dfm_world's rigid bodies, asked for in one call.
+class States {
+ public:
+  dfm_status ask(dfm_world world);
+  // Quick where bodies are asked for in the order in which they were made.
+  // null: there is no such body.
+  const dfm_rigid_state *of(dfm_rigid rigid);
+
+ private:
+  std::vector<dfm_rigid> rigids_;
+  std::vector<dfm_rigid_state> states_;
+  size_t count_ = 0, next_ = 0;
+};
 
 // A body of an attached world and what stands for it.
 struct Seated {
@@ -29,10 +44,10 @@ struct Seated {
   dfm_status create(dfm_world in, const char *host, Member &member);
   // Who has moved the body since both worlds agreed: the caller in the engine, or a restore in the dfm_world,
   // which counts for all bodies that were there.
-  dfm_status agree(bool restored);
+  dfm_status agree(bool restored, States &now);
   dfm_status release();
   // after a step of the dfm_world that ended with `of_step`
-  dfm_status after(dfm_status of_step);
+  dfm_status after(dfm_status of_step, States &now);
 };
 
 // The dfm_world's time and steps when both worlds agreed last: others tell that it has been restored.

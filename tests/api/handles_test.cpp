@@ -64,6 +64,8 @@ std::vector<Call> world_calls() {
       {"world_tools", [](uint64_t h) { return dfm_world_tools(h, 0, nullptr, &count); }},
       {"world_find_tool", [](uint64_t h) { return dfm_world_find_tool(h, "probe", &made); }},
       {"world_rigids", [](uint64_t h) { return dfm_world_rigids(h, 0, nullptr, &count); }},
+      {"world_rigid_states",
+       [](uint64_t h) { return dfm_world_rigid_states(h, 0, nullptr, nullptr, &count); }},
       {"world_explain", [](uint64_t h) { return dfm_world_explain(h, nullptr, &bytes); }},
       {"world_add_friction",
        [](uint64_t h) {
@@ -430,6 +432,7 @@ std::vector<Call> scene_calls() {
          return dfm_scene_get_settings(h, &s);
        }},
       {"scene_probe", [](uint64_t h) { return dfm_scene_probe(h, 0, nullptr, nullptr, nullptr); }},
+      {"scene_write", [](uint64_t h) { return dfm_scene_write(h, "/nonexistent/x.json", nullptr, nullptr); }},
   };
 }
 

@@ -126,3 +126,46 @@ TEST(Replay, StateOfALaterVersion_IsRefused) {
   EXPECT_EQ(r.exit_code, 2);
   EXPECT_NE(r.err.find("state format 2"), std::string::npos) << r.err;
 }
+
+TEST(SaveScene, RunGoesOnFromIt_WithTheSameBitsProbesAndOutputs) {
+  const Folder f;
+  const std::string made = f.path + "/with a space/later.json";
+  fs::create_directories(f.path + "/with a space");
+  const std::vector<std::string> probe = {
+      "--set", R"(/probes=[{"name": "top", "body": "block", "point": [0.05, 0.05, 0.1]}])"};
+  const auto with_probe = [&](std::vector<std::string> more) {
+    more.insert(more.end(), probe.begin(), probe.end());
+    return f.run(more);
+  };
+  ASSERT_EQ(with_probe({"--out", f.path + "/whole"}).exit_code, 0);
+  const test::CommandResult half =
+      with_probe({"--out", f.path + "/half", "--time", "0.06", "--save-scene", made});
+  ASSERT_EQ(half.exit_code, 0) << half.err;
+  EXPECT_EQ(half.err, "");
+  const test::CommandResult rest =
+      test::deform({"run", made, "--quiet", "--out", f.path + "/rest", "--time", "0.06", "--from",
+                    f.path + "/with a space/later_files/snapshot.state"});
+  ASSERT_EQ(rest.exit_code, 0) << rest.err;
+  EXPECT_FALSE(f.hash("whole").empty());
+  EXPECT_EQ(f.hash("rest"), f.hash("whole"));
+  const auto last_line = [&](const std::string &out) {
+    const std::string text = test::read_file(f.path + "/" + out + "/probes.csv");
+    return text.substr(text.rfind('\n', text.size() - 2) + 1);
+  };
+  EXPECT_NE(last_line("whole").find("top"), std::string::npos);
+  EXPECT_EQ(last_line("rest"), last_line("whole"));
+}
+
+TEST(SaveScene, WrongNames_AreASentenceBeforeTheFirstStep) {
+  const Folder f;
+  const auto refused = [&](const std::string &path, const char *part) {
+    const test::CommandResult r = f.run({"--out", f.path + "/never", "--save-scene", path});
+    EXPECT_EQ(r.exit_code, 2);
+    EXPECT_NE(r.err.find("--save-scene " + path + ": "), std::string::npos) << r.err;
+    EXPECT_NE(r.err.find(part), std::string::npos) << r.err;
+    EXPECT_FALSE(fs::exists(f.path + "/never/summary.json")) << path;
+  };
+  refused(f.path + "/scene.vtu", "ends in .json");
+  refused(f.path + "/no/such/scene.json", "cannot be written there");
+  refused(f.scene, "give another name");
+}

@@ -226,6 +226,40 @@ TEST(RigidBodies, ReportsNameThem) {
   run(w, 0.05, 1e-3);
 }
 
+TEST(RigidBodies, StatesInOneCall_AreThoseOfEachBody) {
+  Context c;
+  const dfm_world w = make_world(c);
+  ok(Set{{box("a", {0.1, 0.1, 0.1}, 1)}, {}}.create(w));
+  add_plane(w, "floor");
+  ok(Set{{box("b", {0.1, 0.1, 0.1}, 1, {1, 0, 0})}, {}}.create(w));
+  dfm_rigid a = 0, b = 0;
+  ok(dfm_world_find_rigid(w, "a", &a));
+  ok(dfm_world_find_rigid(w, "b", &b));
+  run(w, 0.05, 1e-3);
+  uint32_t n = 0;
+  ok(dfm_world_rigid_states(w, 0, nullptr, nullptr, &n));
+  ASSERT_EQ(n, 2u);
+  dfm_rigid handles[3] = {};
+  dfm_rigid_state states[3] = {};
+  EXPECT_EQ(dfm_world_rigid_states(w, 1, handles, states, &n), DFM_E_ARG);
+  EXPECT_EQ(dfm_world_rigid_states(w, 1, handles, nullptr, &n), DFM_E_ARG);
+  EXPECT_EQ(handles[0], 0u) << "a refused call writes nothing";
+  ok(dfm_world_rigid_states(w, 3, handles, states, &n));
+  EXPECT_EQ(n, 2u);
+  EXPECT_EQ(handles[0], a);
+  EXPECT_EQ(handles[1], b);
+  for (int i = 0; i < 2; ++i) {
+    dfm_rigid_state one{};
+    ok(dfm_rigid_get_state(handles[i], &one));
+    EXPECT_EQ(std::memcmp(&one, &states[i], sizeof one), 0);
+  }
+  ok(dfm_rigid_destroy(a));
+  ok(dfm_world_rigid_states(w, 2, nullptr, states, nullptr));
+  dfm_rigid_state left{};
+  ok(dfm_rigid_get_state(b, &left));
+  EXPECT_EQ(std::memcmp(&left, &states[0], sizeof left), 0);
+}
+
 TEST(RigidBodies, BadDefs_AreRefused) {
   Context c;
   const dfm_world w = make_world(c);

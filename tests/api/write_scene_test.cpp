@@ -283,3 +283,71 @@ TEST(WriteScene, WrongArguments_GetOneSentence) {
   test::ok(dfm_body_destroy(odd));
   EXPECT_EQ(dfm_world_write_scene(0, (here + "/a.json").c_str(), nullptr, nullptr), DFM_E_HANDLE);
 }
+
+// What a scene has beside its world comes along: probes, outputs, the mode.
+TEST(WriteScene, OfAScene_HasItsProbesAndOutputs) {
+  test::Context context;
+  const std::string folder = folder_of("of_a_scene");
+  const auto open = [&](const std::string &path) {
+    dfm_scene out = 0;
+    EXPECT_EQ(dfm_scene_open(context, path.c_str(), nullptr, &out), DFM_OK) << dfm_last_error();
+    return out;
+  };
+  const auto value = [](dfm_scene scene, const char *pointer) {
+    size_t bytes = 0;
+    if (dfm_scene_value(scene, pointer, nullptr, &bytes) != DFM_OK) return std::string();
+    std::string text(bytes, '\0');
+    test::ok(dfm_scene_value(scene, pointer, text.data(), &bytes));
+    return text;
+  };
+  const dfm_scene scene = open(DEFORM_SOURCE_DIR "/examples/scenes/gravity_beams.json");
+  ASSERT_TRUE(scene);
+  dfm_world world = 0;
+  test::ok(dfm_scene_world(scene, &world));
+  steps(world, 10, 1e-4);
+  test::ok(dfm_scene_write(scene, (folder + "/later.json").c_str(), nullptr, nullptr));
+  const dfm_scene later = open(folder + "/later.json");
+  ASSERT_TRUE(later);
+  for (const char *pointer : {"/probes", "/output", "/time/duration"}) {
+    EXPECT_NE(value(scene, pointer), "") << pointer;
+    EXPECT_EQ(value(later, pointer), value(scene, pointer)) << pointer;
+  }
+  double a[3], b[3];
+  test::ok(dfm_scene_probe(scene, 0, nullptr, a, nullptr));
+  test::ok(dfm_scene_probe(later, 0, nullptr, b, nullptr));
+  for (int k = 0; k < 3; ++k) EXPECT_EQ(a[k], b[k]);
+
+  dfm_body probed = 0;
+  const std::string entry = value(scene, "/probes/0/body");
+  test::ok(dfm_world_find_body(world, entry.substr(1, entry.rfind('"') - 1).c_str(), &probed));
+  test::ok(dfm_body_destroy(probed));
+  uint32_t notes = 0;
+  EXPECT_EQ(dfm_scene_write(scene, (folder + "/gone.json").c_str(), nullptr, &notes), DFM_E_UNSUPPORTED);
+  EXPECT_NE(std::string(dfm_last_error()).find("nothing left of its body"), std::string::npos)
+      << dfm_last_error();
+  EXPECT_GE(notes, 1u);
+  EXPECT_FALSE(std::filesystem::exists(folder + "/gone.json"));
+  EXPECT_EQ(dfm_scene_write(scene, "", nullptr, nullptr), DFM_E_ARG);
+  EXPECT_EQ(std::string(dfm_last_error()).find("dfm_scene_write:"), 0u) << dfm_last_error();
+  EXPECT_EQ(dfm_scene_write(world, (folder + "/a.json").c_str(), nullptr, nullptr), DFM_E_HANDLE);
+}
+
+TEST(WriteScene, OfAStaticScene_LooksForEquilibriaAgain) {
+  test::Context context;
+  const std::string folder = folder_of("static"), path = folder + "/made.json";
+  test::write_file(path, R"({"format": "deform-scene", "version": 1, "gravity": [0, 0, -9.81],
+    "time": {"duration": 1, "mode": "static"},
+    "bodies": [{"name": "b", "mesh": {"make": "beam", "size": [0.4, 0.1, 0.1], "cells": 60},
+      "model": {"type": "corotational_fem"},
+      "fix": [{"box": [[-1, -1, -1], [0.01, 1, 1]]}]}]})");
+  dfm_scene scene = 0;
+  ASSERT_EQ(dfm_scene_open(context, path.c_str(), nullptr, &scene), DFM_OK) << dfm_last_error();
+  test::ok(dfm_scene_write(scene, (folder + "/again.json").c_str(), nullptr, nullptr));
+  dfm_scene again = 0;
+  ASSERT_EQ(dfm_scene_open(context, (folder + "/again.json").c_str(), nullptr, &again), DFM_OK)
+      << dfm_last_error();
+  char mode[32];
+  size_t bytes = sizeof mode;
+  test::ok(dfm_scene_value(again, "/time/mode", mode, &bytes));
+  EXPECT_STREQ(mode, "\"static\"");
+}

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "engine.h"
+#include "load.h"
 #include "machine.h"
 
 namespace {
@@ -35,19 +35,7 @@ Parts now(const test::Engine &engine) {
 
 int main() {
   test::Engine engine;
-  engine.ground();
-  test::BodyOptions o;
-  o.name = "bed";
-  o.young = 4e4;
-  o.damping_stiffness = 0.003;
-  o.damping_mass = 4;
-  o.position = {0, 0, 0.001};
-  const dfm_body bed = test::make_body(engine.context, engine.soft, "beam", {1.0, 0.4, 0.1}, 4000, o);
-  test::hold_bottom(bed);
-  for (int i = 0; i < 10; ++i)
-    engine.box({0.04, 0.04, 0.04}, 0.3, {0.1 + 0.2 * (i % 5), 0.1 + 0.2 * (i / 5), 0.142});
-  for (int i = 0; i < 90; ++i)
-    engine.box({0.04, 0.04, 0.04}, 0.3, {2 + 0.2 * (i % 10), 0.2 * (i / 10), 0.04});
+  test::fill_load(engine);
   engine.run(0.5);
   constexpr int kWindows = 20, kSteps = 25;
   std::vector<Parts> windows;
@@ -73,10 +61,10 @@ int main() {
   std::printf(
       "machine,compiler,engine,rigid,touching contacts,sub-steps,step ms,engine ms,soft ms,look over the "
       "world "
-      "ms,solve's questions ms,adapter share\n");
-  std::printf("%s,%s,%s,%u,%u,%u,%.4f,%.4f,%.4f,%.4f,%.4f,%.4f\n", bench::machine().c_str(),
+      "ms,solve's questions ms,adapter share,state\n");
+  std::printf("%s,%s,%s,%u,%u,%u,%.4f,%.4f,%.4f,%.4f,%.4f,%.4f,%016llx\n", bench::machine().c_str(),
               bench::compiler(), test::kEngine, engine.stats().bodies, w.contacts, w.last_substeps,
-              ms * p.total, ms * p.engine, ms * p.soft, ms * p.sync, ms * p.host,
-              (p.sync + p.host) / p.total);
+              ms * p.total, ms * p.engine, ms * p.soft, ms * p.sync, ms * p.host, (p.sync + p.host) / p.total,
+              static_cast<unsigned long long>(dfm_world_hash(engine.soft)));
   return (p.sync + p.host) / p.total <= 0.05 ? 0 : 1;
 }

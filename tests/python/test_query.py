@@ -227,6 +227,22 @@ class Export(unittest.TestCase):
                 scene.world.restore((pathlib.Path(folder) / "later_files" / "snapshot.state").read_bytes())
                 self.assertEqual(scene.world.hash, later)
 
+    def test_a_scene_that_is_written_keeps_its_probes_and_outputs(self):
+        source = pathlib.Path(__file__).parents[2] / "examples" / "scenes" / "gravity_beams.json"
+        with tempfile.TemporaryDirectory(prefix="a space ") as folder:
+            path = pathlib.Path(folder) / "later.json"
+            with deform.Scene(source) as scene:
+                scene.world.run(0.002, dt=1e-4)
+                self.assertEqual(scene.write_scene(path), [])
+                probes, said, duration = scene.probes, scene.value("/output"), scene.settings.duration
+            with deform.Scene(path) as later:
+                self.assertEqual(later.value("/output"), said)
+                self.assertEqual(later.settings.duration, duration)
+                self.assertEqual(list(later.probes), list(probes))
+                for name, (x, v) in later.probes.items():
+                    np.testing.assert_array_equal(x, probes[name][0])
+                    np.testing.assert_array_equal(v, probes[name][1])
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -412,16 +412,21 @@ class Queries:
         something that a scene cannot say is refused with UnsupportedError; with partial the rest is written.
         Returns a sentence for each thing left out, and for each plugin that a run needs."""
         self.free()
-        sentences: list[str] = []
-        note = _NoteFn(lambda _user, sentence: sentences.append(sentence.decode()))
-        definition = default(_abi.dfm_scene_write_def)
-        definition.duration, definition.step = duration, step
-        definition.flags = ((_abi.DFM_SCENE_SNAPSHOT if snapshot else 0)
-                            | (_abi.DFM_SCENE_PARTIAL if partial else 0))
-        definition.note = ctypes.cast(note, ctypes.c_void_p).value
-        check(lib.dfm_world_write_scene(self.handle, os.fspath(path).encode(), ctypes.byref(definition),
-                                        None))
-        return sentences
+        return write_scene(lib.dfm_world_write_scene, self.handle, path, duration, step, snapshot, partial)
+
+
+def write_scene(function: Any, handle: int, path: str | os.PathLike[str], duration: float, step: float,
+                snapshot: bool, partial: bool) -> list[str]:
+    """World.write_scene and Scene.write_scene by a function of the library."""
+    sentences: list[str] = []
+    note = _NoteFn(lambda _user, sentence: sentences.append(sentence.decode()))
+    definition = default(_abi.dfm_scene_write_def)
+    definition.duration, definition.step = duration, step
+    definition.flags = ((_abi.DFM_SCENE_SNAPSHOT if snapshot else 0)
+                        | (_abi.DFM_SCENE_PARTIAL if partial else 0))
+    definition.note = ctypes.cast(note, ctypes.c_void_p).value
+    check(function(handle, os.fspath(path).encode(), ctypes.byref(definition), None))
+    return sentences
 
 
 def _shape(shape: Shape) -> Any:

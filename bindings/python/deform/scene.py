@@ -15,6 +15,7 @@ from ._arrays import row_type
 from ._context import Context, default_context
 from ._library import ArgumentError, check, encoded, lib, quick, read_text, sized
 from .picture import Picture, Solid, body_values, draw, palette, scaled, solids
+from .query import write_scene
 from .world import Trouble, World
 
 
@@ -94,6 +95,15 @@ class Scene:
             check(quick.dfm_scene_probe(self.handle, i, ctypes.byref(name), x, v))
             found[(name.value or b"").decode()] = (np.array(x), np.array(v))
         return found
+
+    def write_scene(self, path: Any, *, duration: float | None = None, step: float = 0,
+                    snapshot: bool = False, partial: bool = False) -> list[str]:
+        """World.write_scene for the scene's world as it is now, with the scene's probes and outputs.
+
+        duration: s, of the scene that is written; None: that of this one. step: s, 0 for this one's."""
+        self.world.free()
+        return write_scene(lib.dfm_scene_write, self.handle, path,
+                           self.settings.duration if duration is None else duration, step, snapshot, partial)
 
     def run(self, duration: float | None = None, every: float | None = None,
             watch: Callable[[World], Any] | None = None) -> Run:

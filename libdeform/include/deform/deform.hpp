@@ -467,6 +467,12 @@ class World : public Handle<dfm_world, struct WorldKind>, public WorldQueries<E,
   auto bodies(std::span<dfm_body> out) const { return fill<E, 1>(dfm_world_bodies, raw_, out); }
   auto obstacles(std::span<dfm_obstacle> out) const { return fill<E, 1>(dfm_world_obstacles, raw_, out); }
   auto rigids(std::span<dfm_rigid> out) const { return fill<E, 1>(dfm_world_rigids, raw_, out); }
+  // Of all rigid bodies, in the order of rigids().
+  auto rigid_states(std::span<dfm_rigid_state> out) const {
+    return produce<E, uint32_t>([&](uint32_t &n) {
+      return dfm_world_rigid_states(raw_, uint32_t(out.size()), nullptr, out.data(), &n);
+    });
+  }
 
   // What a step did: into the caller's memory, returning how many, or as a vector.
   auto contacts(std::span<dfm_contact> out) const {
@@ -588,6 +594,11 @@ class Scene : public Handle<dfm_scene, struct SceneKind> {
     return produce<E, ProbeState>([&](ProbeState &p) {
       return dfm_scene_probe(raw_, index, &p.name, p.position.data(), p.velocity.data());
     });
+  }
+  // As World::write_scene, with the scene's probes and outputs.
+  auto write(Text path, const dfm_scene_write_def *def = nullptr) const {
+    return produce<E, uint32_t>(
+        [&](uint32_t &notes) { return dfm_scene_write(raw_, path.c_str, def, &notes); });
   }
 };
 

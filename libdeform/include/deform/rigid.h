@@ -179,6 +179,16 @@ DFM_API dfm_status dfm_rigid_destroy(dfm_rigid rigid);
 /** All rigid bodies in order of creation but the parts of tools (dfm_tool_parts); capacity 0 with out NULL
  * only counts. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_rigids(dfm_world world, uint32_t capacity, dfm_rigid *out, uint32_t *n);
+/** dfm_rigid_get_state of all of them in one call, in the order of dfm_world_rigids. For hosts with many
+ * bodies: it costs a fraction of a call for each.
+ * @param capacity  length of states, and of rigids; 0 with states NULL only counts
+ * @param rigids    out, which body each state is of; may be NULL
+ * @param states    out
+ * @param n         out, number of bodies; may be NULL
+ * @return DFM_OK; DFM_E_ARG fewer places than bodies; DFM_E_HANDLE. Threads: Any thread. Not during
+ * step. Since 0.1. */
+DFM_API dfm_status dfm_world_rigid_states(dfm_world world, uint32_t capacity, dfm_rigid *rigids,
+                                          dfm_rigid_state *states, uint32_t *n);
 /** @return DFM_OK; DFM_E_ARG none of that name (nearest one). Threads: Any thread. Not during
  * step. Since 0.1. */
 DFM_API dfm_status dfm_world_find_rigid(dfm_world world, const char *name, dfm_rigid *out);

@@ -27,6 +27,13 @@ Obstacle &free_rigid_of(dfm_rigid h, const char *instead) {
   return o;
 }
 
+bool is_listed(const Obstacle &o) { return o.rigid && !o.added && !o.rigid->of_tool; }
+uint32_t listed_rigids(const World &w) {
+  uint32_t count = 0;
+  for (auto &o : w.obstacles) count += is_listed(*o);
+  return count;
+}
+
 }  // namespace
 
 dfm_status dfm_rigid_host_register(const char *name, const dfm_rigid_host *table) {
@@ -86,12 +93,23 @@ dfm_status dfm_rigid_add_shape(dfm_rigid rigid, const dfm_obstacle_def *def, dfm
 dfm_status dfm_world_rigids(dfm_world world, uint32_t capacity, dfm_rigid *out, uint32_t *n) {
   return as_status([&] {
     const World &w = world_of(world);
-    uint32_t count = 0;
-    const auto counts = [](const Obstacle &o) { return o.rigid && !o.added && !o.rigid->of_tool; };
-    for (auto &o : w.obstacles) count += counts(*o);
-    if (!room(count, capacity, out, n)) return;
+    if (!room(listed_rigids(w), capacity, out, n)) return;
     for (auto &o : w.obstacles)
-      if (counts(*o)) *out++ = o->handle;
+      if (is_listed(*o)) *out++ = o->handle;
+  });
+}
+
+dfm_status dfm_world_rigid_states(dfm_world world, uint32_t capacity, dfm_rigid *rigids,
+                                  dfm_rigid_state *states, uint32_t *n) {
+  return as_status([&] {
+    const World &w = world_of(world);
+    if (!states && rigids) need(states, "states");
+    if (!room(listed_rigids(w), capacity, states, n)) return;
+    for (auto &o : w.obstacles) {
+      if (!is_listed(*o)) continue;
+      if (rigids) *rigids++ = o->handle;
+      *states++ = o->rigid->state[o->rigid_body];
+    }
   });
 }
 

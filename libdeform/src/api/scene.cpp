@@ -140,33 +140,61 @@ void dfm_scene_write_def_default_sized(uint32_t size, dfm_scene_write_def *out) 
   dfm::give_default(size, out, d);
 }
 
+namespace {
+
+// call: the function's name, for its errors; beside: what the scene has that is not the world's.
+void write_scene(const char *call, dfm::World &w, const char *path, const dfm_scene_write_def &d,
+                 dfm::writing::Beside beside, uint32_t *notes) {
+  if (!path || !*path)
+    dfm::fail(DFM_E_ARG, "%s: path is %s; expected a file name that ends in .json", call,
+              path ? "empty" : "NULL");
+  dfm::check_flags(d, DFM_SCENE_SNAPSHOT | DFM_SCENE_PARTIAL, call);
+  if (!(d.duration > 0 && std::isfinite(d.duration)) || !(d.step >= 0 && std::isfinite(d.step)))
+    dfm::fail(DFM_E_ARG,
+              "%s: a duration of %g s and a step of %g s; both are finite, the duration is positive and the "
+              "step not negative",
+              call, d.duration, d.step);
+  dfm::writing::WriteOptions options;
+  options.duration = d.duration;
+  options.step = d.step;
+  options.snapshot = d.flags & DFM_SCENE_SNAPSHOT;
+  options.partial = d.flags & DFM_SCENE_PARTIAL;
+  options.beside = std::move(beside);
+  options.note = [&](const std::string &sentence) {
+    if (d.note) d.note(d.user, sentence.c_str());
+    else w.context->logf(DFM_LOG_WARNING, "%s: %s", path, sentence.c_str());
+  };
+  uint32_t told = 0;
+  if (!notes) notes = &told;
+  *notes = 0;
+  dfm::writing::write_scene(w, path, options, *notes);
+}
+
+}  // namespace
+
 dfm_status dfm_world_write_scene(dfm_world world, const char *path, const dfm_scene_write_def *def,
                                  uint32_t *notes) {
   return dfm::as_status([&] {
     dfm::World &w = dfm::exclusive(dfm::world_of(world));
-    if (!path || !*path)
-      dfm::fail(DFM_E_ARG, "dfm_world_write_scene: path is %s; expected a file name that ends in .json",
-                path ? "empty" : "NULL");
-    const dfm_scene_write_def d = dfm::take_def(def, dfm_scene_write_def_default());
-    dfm::check_flags(d, DFM_SCENE_SNAPSHOT | DFM_SCENE_PARTIAL, "dfm_world_write_scene");
-    if (!(d.duration > 0 && std::isfinite(d.duration)) || !(d.step >= 0 && std::isfinite(d.step)))
-      dfm::fail(
-          DFM_E_ARG,
-          "dfm_world_write_scene: a duration of %g s and a step of %g s; both are finite, the duration is "
-          "positive and the step not negative",
-          d.duration, d.step);
-    dfm::writing::WriteOptions options;
-    options.duration = d.duration;
-    options.step = d.step;
-    options.snapshot = d.flags & DFM_SCENE_SNAPSHOT;
-    options.partial = d.flags & DFM_SCENE_PARTIAL;
-    options.note = [&](const std::string &sentence) {
-      if (d.note) d.note(d.user, sentence.c_str());
-      else w.context->logf(DFM_LOG_WARNING, "%s: %s", path, sentence.c_str());
-    };
-    uint32_t told = 0;
-    if (!notes) notes = &told;
-    *notes = 0;
-    dfm::writing::write_scene(w, path, options, *notes);
+    write_scene("dfm_world_write_scene", w, path, dfm::take_def(def, dfm_scene_write_def_default()), {},
+                notes);
+  });
+}
+
+dfm_status dfm_scene_write(dfm_scene scene, const char *path, const dfm_scene_write_def *def,
+                           uint32_t *notes) {
+  return dfm::as_status([&] {
+    const Scene &s = scene_of(scene);
+    const dfm::scene::Definition &has = s.definition();
+    dfm_scene_write_def usual = dfm_scene_write_def_default();
+    usual.duration = has.duration;
+    dfm_scene_write_def d = dfm::take_def(def, usual);
+    if (d.step == 0) d.step = has.step;
+    dfm::writing::Beside beside;
+    if (!has.probes.empty()) beside.probes = s.value("/probes");
+    beside.output = s.value("/output");
+    beside.equilibrium = has.equilibrium;
+    write_scene("dfm_scene_write", dfm::exclusive(dfm::world_of(s.world())), path, d, std::move(beside),
+                notes);
   });
 }

@@ -339,6 +339,7 @@ Written write_time(const SceneWriter &to) {
     case DFM_INTEGRATOR_TR_BDF2: out["integrator"] = integrator_name(w.def.integrator); break;
     default: break;
   }
+  if (to.options.beside.equilibrium) out["mode"] = "static";
   if (w.def.max_time > 0) out["max_time"] = w.def.max_time;
   if (w.def.max_work > 0) out["max_work"] = double(w.def.max_work);
   return out;
@@ -352,6 +353,21 @@ Written write_solver(const World &w) {
   if (w.implicit.solver_iterations != usual.solver_iterations)
     out["max_iterations"] = w.implicit.solver_iterations;
   if (w.implicit.newton != usual.newton) out["newton"] = w.implicit.newton;
+  return out;
+}
+
+// Points of probes are in the frame of the body's mesh, which is written as it was read.
+Written write_probes(SceneWriter &to) {
+  Written out;
+  if (to.options.beside.probes.empty()) return out;
+  for (const Written &probe : Written::parse(to.options.beside.probes)) {
+    const std::string body = probe.at("body");
+    const Body *const of = to.w.find_body(body);
+    if (of && !of->emptied) out.push_back(probe);
+    else
+      to.note("probe '%s' is left out, since there is nothing left of its body '%s'",
+              probe.at("name").get<std::string>().c_str(), body.c_str());
+  }
   return out;
 }
 
@@ -415,6 +431,9 @@ Written write_root(SceneWriter &to) {
   if (Written rigid = write_rigid(to); !rigid.is_null()) root["rigid"] = std::move(rigid);
   if (Written contact = write_contact(to); !contact.is_null()) root["contact"] = std::move(contact);
   if (Written solver = write_solver(to.w); !solver.is_null()) root["solver"] = std::move(solver);
+  if (Written probes = write_probes(to); !probes.is_null()) root["probes"] = std::move(probes);
+  if (const std::string &output = to.options.beside.output; !output.empty())
+    root["output"] = Written::parse(output);
   tell_what_is_left_out(to);
   if (to.materials.empty()) root.erase("materials");
   else root["materials"] = to.materials;

@@ -15,10 +15,17 @@ namespace dfm::writing {
 
 using Written = nlohmann::ordered_json;
 
+// What a scene has that its world does not know of. Values are JSON text, empty where there is none.
+struct Beside {
+  std::string probes, output;
+  bool equilibrium = false;  // "time"/"mode" is "static"
+};
+
 struct WriteOptions {
   double duration = 1, step = 0;  // s; step 0: that of the world's def, else "auto"
   bool snapshot = false;          // beside the scene, for `deform run --from`
   bool partial = false;           // what a scene cannot say is left out; else it is refused
+  Beside beside;
   std::function<void(const std::string &)> note;
 };
 
