@@ -9,7 +9,7 @@ struct EnergyBook {
   uint32_t known = 0;  // looks since the host last changed anything, the first few of which take the base
   double base = 0;     // J, least balance so far, with what the stiff modes may give back
   double work = 0;     // J, since base was first taken
-  double kinetic = 0;  // J, when last looked at
+  double kinetic = 0;  // J, after predict, when last looked at
 };
 
 inline constexpr uint32_t kMostCredit = 4096;  // sub-steps

@@ -361,7 +361,8 @@ bool watch_energy(World &w, StepContext &step, uint32_t *trouble) {
     if (!settled) e.base = e.known ? std::max(e.base, level) : level;
     else if (!hidden) e.base = std::min(e.base, level);
     e.known += !settled;
-    e.kinetic = now.kinetic;
+    // what contact takes away again included: it is compared with the same of later sub-steps
+    e.kinetic = step.free_kinetic[step.active[k]];
   }
   if (w.watch.age == ~0u) s.energy_start = total;
   w.watch.age = 0;
