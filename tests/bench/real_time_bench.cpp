@@ -209,6 +209,11 @@ int main(int argc, char **argv) {
   }
   double error[2] = {NAN, NAN};
   if (against) compare(found.series, read(against), error);
+  if (getenv("TIMES")) {
+    FILE *f = fopen(getenv("TIMES"), "w");
+    for (double t : found.seconds) fprintf(f, "%.5f\n", 1e3 * t);
+    fclose(f);
+  }
   std::vector<double> sorted = found.seconds;
   std::sort(sorted.begin(), sorted.end());
   const double median = 1e3 * sorted[sorted.size() / 2], worst = 1e3 * sorted[sorted.size() * 999 / 1000];

@@ -15,19 +15,6 @@ ExplicitPoints::ExplicitPoints(const Memory &memory, Phyxels &points, Surface &s
       stiffness_(points.n, 0.0, HookAllocator<double>(memory)),
       damping_(points.n, 0.0, HookAllocator<double>(memory)) {}
 
-// Turning gives none.
-double ExplicitPoints::strain_rate() const {
-  const double *const x = p_.x.data(), *const v = p_.v.data();
-  double most = 0;
-  for (size_t e = 0; e < edges_.size(); e += 2) {
-    const size_t i = size_t(edges_[e]) * kStride, j = size_t(edges_[e + 1]) * kStride;
-    const Vec3 d = load3(x + j) - load3(x + i);
-    const double dd = norm2(d), stretch = std::fabs(dot(d, load3(v + j) - load3(v + i)));
-    if (stretch > most * dd) most = dd > 0 ? stretch / dd : most;
-  }
-  return most;
-}
-
 bool ExplicitPoints::bound(double time, const AddRowSums &outside, StepBound &out) {
   const dfm_model &ops = *model_.ops;
   if (!ops.bound) return true;
@@ -45,7 +32,8 @@ bool ExplicitPoints::bound(double time, const AddRowSums &outside, StepBound &ou
     out.by_stiffness = 2 * std::sqrt(m / stiffness_[out.point]);
     out.by_damping = 2 * m / damping_[out.point];
   }
-  out.strain_rate = strain_rate();
+  // turning gives none
+  out.strain_rate = loops_.strain_rate(uint32_t(edges_.size() / 2), edges_.data(), p_.x.data(), p_.v.data());
   return true;
 }
 

@@ -26,8 +26,6 @@ class ExplicitPoints : public Dynamics {
   const Array<uint32_t> &edges_;
   const PointsKernels &loops_;
   Array<double> stiffness_, damping_;  // [npoint] row sums: N/m, N s/m
-
-  double strain_rate() const;
 };
 
 }  // namespace dfm

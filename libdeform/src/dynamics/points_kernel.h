@@ -1,4 +1,4 @@
-// Loops over points, four doubles each, compiled for several vector widths: the same operations on each
+// Loops over points, four doubles each, the last of which is zero, compiled for several vector widths: the same operations on each
 // component at every width. Plain data only.
 #pragma once
 #include <cstdint>
@@ -12,6 +12,10 @@ struct PointsKernels {
   // v_end = free + w impulse (impulse null: free), x_end = x + h v_end
   void (*end)(uint32_t n, double h, const double *x, const double *free, const double *w,
               const double *impulse, double *x_end, double *v_end);
+  // how many of the cells [n,4] are inverted. x: [..,4]
+  uint32_t (*inverted)(uint32_t n, const uint32_t *cells, const double *x);
+  // of edges [n,2] d between points at x that move at v: the largest |d.(v_j - v_i)| / d.d, 1/s
+  double (*strain_rate)(uint32_t n, const uint32_t *edges, const double *x, const double *v);
 };
 
 const PointsKernels &points_kernels_sse2();

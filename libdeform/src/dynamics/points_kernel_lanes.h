@@ -56,7 +56,85 @@ void end(uint32_t n, double h, const double *x, const double *free, const double
   }
 }
 
-constexpr PointsKernels kKernels = {predict, end};
+// Component by component, of kWidth points or differences; part(k, p): vector p of lane k.
+template <class V>
+struct Columns {
+  V x, y, z;
+};
+template <class V, class Part>
+DEFORM_INLINE Columns<V> columns(const Part &part) {
+  if constexpr (kWidth == 4) {
+    const V p = part(0, 0), q = part(1, 0), r = part(2, 0), s = part(3, 0);
+    const V a = __builtin_shufflevector(p, q, 0, 4, 2, 6), b = __builtin_shufflevector(p, q, 1, 5, 3, 7);
+    const V c = __builtin_shufflevector(r, s, 0, 4, 2, 6), d = __builtin_shufflevector(r, s, 1, 5, 3, 7);
+    return {__builtin_shufflevector(a, c, 0, 1, 4, 5), __builtin_shufflevector(b, d, 0, 1, 4, 5),
+            __builtin_shufflevector(a, c, 2, 3, 6, 7)};
+  } else {
+    const V p = part(0, 0), q = part(1, 0);
+    return {__builtin_shufflevector(p, q, 0, 2), __builtin_shufflevector(p, q, 1, 3),
+            __builtin_shufflevector(part(0, 1), part(1, 1), 0, 2)};
+  }
+}
+// of `to` less `from`, four doubles each; to(k), from(k): those of lane k
+template <class To, class From>
+DEFORM_INLINE Columns<Vector> differences(const To &to, const From &from) {
+  return columns<Vector>([&](uint32_t k, uint32_t p) __attribute__((always_inline)) {
+    return load(to(k) + p * kWidth) - load(from(k) + p * kWidth);
+  });
+}
+DEFORM_INLINE Vector dot(const Columns<Vector> &a, const Columns<Vector> &b) {
+  return (a.x * b.x + a.y * b.y) + a.z * b.z;
+}
+
+typedef long long Mask __attribute__((vector_size(8 * kWidth)));
+
+// use(at, real): of n rows kWidth at a time, at(k) the row of lane k; the last of all again in lanes that are not real
+template <class Use>
+DEFORM_INLINE void each_lane(uint32_t n, const Use &use) {
+  uint32_t t = 0;
+  for (; t + kWidth <= n; t += kWidth)
+    use([&](uint32_t k) __attribute__((always_inline)) { return size_t(t) + k; }, ~Mask{});
+  if (t == n) return;
+  Mask real = {};
+  for (uint32_t k = 0; k < n - t; ++k) real[k] = -1;
+  use([&](uint32_t k) __attribute__((always_inline)) { return size_t(t + k < n ? t + k : n - 1); }, real);
+}
+
+uint32_t inverted(uint32_t n, const uint32_t *cells, const double *x) {
+  Mask found = {};
+  each_lane(n, [&](const auto &cell, Mask real) __attribute__((always_inline)) {
+    const auto corner = [&](uint32_t c) __attribute__((always_inline)) {
+      return [=](uint32_t k)
+                 __attribute__((always_inline)) { return x + 4 * size_t(cells[4 * cell(k) + c]); };
+    };
+    const auto a = differences(corner(1), corner(0)), b = differences(corner(2), corner(0));
+    const auto c = differences(corner(3), corner(0));
+    const Columns<Vector> normal = {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+    found -= real & (dot(normal, c) < Vector{});
+  });
+  uint32_t sum = 0;
+  for (uint32_t k = 0; k < kWidth; ++k) sum += uint32_t(found[k]);
+  return sum;
+}
+
+double strain_rate(uint32_t n, const uint32_t *edges, const double *x, const double *v) {
+  Vector most = {};
+  each_lane(n, [&](const auto &edge, Mask) __attribute__((always_inline)) {
+    const auto end = [&](const double *of, uint32_t side) __attribute__((always_inline)) {
+      return [=](uint32_t k)
+                 __attribute__((always_inline)) { return of + 4 * size_t(edges[2 * edge(k) + side]); };
+    };
+    const auto d = differences(end(x, 1), end(x, 0));
+    const Vector stretch = dot(d, differences(end(v, 1), end(v, 0)));
+    const Vector rate = (stretch < Vector{} ? -stretch : stretch) / dot(d, d);
+    most = rate > most ? rate : most;  // no number where both ends are one place
+  });
+  double out = 0;
+  for (uint32_t k = 0; k < kWidth; ++k) out = most[k] > out ? most[k] : out;
+  return out;
+}
+
+constexpr PointsKernels kKernels = {predict, end, inverted, strain_rate};
 
 }  // namespace
 }  // namespace dfm

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "core/error.h"
+#include "dynamics/symplectic_euler.h"
 #include "plugin/context.h"
 #include "plugin/on_behalf.h"
 #include "state/spring.h"
@@ -21,9 +22,7 @@ constexpr uint32_t kBoundEvery = 16;
 constexpr double kBoundStrain = 0.05;
 
 uint32_t inverted_cells(const Body &b) {
-  uint32_t n = 0;
-  for (size_t t = 0; t < b.tets.size(); t += 4) n += tet_volume(b.p.x.data(), kStride, &b.tets[t]) < 0;
-  return n;
+  return points_kernels().inverted(uint32_t(b.tets.size() / 4), b.tets.data(), b.p.x.data());
 }
 
 // False: its model gives none.
