@@ -161,17 +161,19 @@ DEFORM_INLINE __m512d squares(const Edges8 &e1, const Edges8 &e2, const Edges8 &
   return _mm512_sub_pd(_mm512_mul_pd(_mm512_set1_pd(4), sum3(dot(e1, e1), dot(e2, e2), dot(e3, e3))),
                        dot(sum, sum));
 }
-DEFORM_INLINE void stretched_forces(const Block &b, uint32_t t, __m512d q, __m512d now, const Edges8 &e1,
-                                    const Edges8 &e2, const Edges8 &e3, Edges8 &g1, Edges8 &g2, Edges8 &g3) {
-  const __m512d limit = _mm512_load_pd(b.limit + t);
+DEFORM_INLINE __m512d fade(__m512d q, __m512d limit, __m512d &by_q) {
   const __m512d most = _mm512_max_pd(q, limit);
   const __m512d u = _mm512_div_pd(limit, most);
   const __m512d one = _mm512_set1_pd(1);
   const __m512d power = _mm512_mul_pd(_mm512_sqrt_pd(u), u);
-  const __m512d by_q =
+  by_q =
       _mm512_div_pd(_mm512_mul_pd(_mm512_set1_pd(-3.75), _mm512_mul_pd(power, _mm512_sub_pd(one, u))), most);
-  const __m512d share =
-      _mm512_mul_pd(power, _mm512_sub_pd(_mm512_set1_pd(2.5), _mm512_mul_pd(_mm512_set1_pd(1.5), u)));
+  return _mm512_mul_pd(power, _mm512_sub_pd(_mm512_set1_pd(2.5), _mm512_mul_pd(_mm512_set1_pd(1.5), u)));
+}
+DEFORM_INLINE void stretched_forces(const Block &b, uint32_t t, __m512d q, __m512d now, const Edges8 &e1,
+                                    const Edges8 &e2, const Edges8 &e3, Edges8 &g1, Edges8 &g2, Edges8 &g3) {
+  __m512d by_q;
+  const __m512d share = fade(q, _mm512_load_pd(b.limit + t), by_q);
   const __m512d p = pressure_of(b, t, _mm512_mul_pd(now, share));
   const __m512d along = _mm512_mul_pd(p, share);
   const __m512d quarter = _mm512_set1_pd(0.25);
@@ -237,9 +239,122 @@ static void volume_cells8(const Block &b) {
   }
 }
 
-constexpr Kernels kKernels = {"avx512",     &single::kKernels, load_block,  {MSM_SPRINGS(springs8)},
-                              MSM_BRANCHES, volume_cells8,     MSM_ROWS,    merge_halo,
-                              merge_rows,   add_to_host,       MSM_ENERGIES};
+// One spring's row sums, diagonal block and what is beside it, in a register.
+DEFORM_INLINE __m512d row_of_spring(int k, __m512d along, __m512d all, __m256d d) {
+  const __m512i turned = _mm512_setr_epi64(0, 1, 2, 3, 1, 2, 0, 3), lane = _mm512_set1_epi64(k);
+  const __m512d twice = _mm512_broadcast_f64x4(d);
+  const __m512d row = (_mm512_permutexvar_pd(lane, along) * twice) * _mm512_permutexvar_pd(turned, twice);
+  return _mm512_mask_add_pd(row, 0x0f, row, _mm512_permutexvar_pd(lane, all));
+}
+
+// Of plain springs, as spring_rows of msm_kernel_quad.h.
+static void spring_rows8(const Block &b) {
+  for (uint32_t n = 0; n < b.local; ++n) _mm512_store_pd(b.row + 8 * size_t(n), _mm512_setzero_pd());
+  const auto add = [&b](uint32_t n, __m512d row) __attribute__((always_inline)) {
+    double *to = b.row + 8 * size_t(n);
+    _mm512_store_pd(to, _mm512_load_pd(to) + row);
+  };
+  for (uint32_t n = 0; n < b.quads; n += 2) {
+    const Quad *q = b.quad + n;
+    __m256d d[2][4], dd2[2];
+    for (int h = 0; h < 2; ++h) {
+      const __m256d x = point4(b, q[h].i);
+      for (int k = 0; k < 4; ++k) d[h][k] = point4(b, q[h].j[k]) - x;
+      dd2[h] = lanes::sum_rows(d[h][0] * d[h][0], d[h][1] * d[h][1], d[h][2] * d[h][2], d[h][3] * d[h][3]);
+    }
+    const __m512d dd = _mm512_insertf64x4(_mm512_castpd256_pd512(dd2[0]), dd2[1], 1);
+    const __m512d inverse = _mm512_set1_pd(1) / _mm512_sqrt_pd(dd);
+    const __m512d more = _mm512_sqrt_pd(dd) - _mm512_load_pd(b.rest + 4 * size_t(n));
+    const __m512d k = _mm512_load_pd(b.stiffness + 4 * size_t(n));
+    const __mmask8 has_direction = _mm512_cmp_pd_mask(dd, _mm512_set1_pd(kShortestSquared), _CMP_GT_OQ);
+    const __m512d straight =
+        _mm512_maskz_sub_pd(has_direction, k, k * _mm512_max_pd(more * inverse, _mm512_setzero_pd()));
+    const __m512d all = k - straight;
+    const __m512d along = _mm512_maskz_mul_pd(has_direction, straight * inverse, inverse);
+    for (int h = 0; h < 2; ++h) {
+      __m512d row[4];
+      for (int m = 0; m < 4; ++m) row[m] = row_of_spring(4 * h + m, along, all, d[h][m]);
+      add(q[h].i, (row[0] + row[1]) + (row[2] + row[3]));
+      for (int m = 0; m < 4; ++m) add(q[h].j[m], row[m]);
+    }
+  }
+}
+
+DEFORM_INLINE __m512d weights8(const Block &b, const Cell *c, int n) {
+  const auto of = [&](int k) __attribute__((always_inline)) { return b.weight[c[k].p[n]]; };
+  return _mm512_setr_pd(of(0), of(1), of(2), of(3), of(4), of(5), of(6), of(7));
+}
+DEFORM_INLINE __m512d norm8(const Edges8 &a) { return _mm512_sqrt_pd(dot(a, a)); }
+DEFORM_INLINE Edges8 minus(const Edges8 &a, const Edges8 &b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+
+static void cell_rows8(const Block &b) {
+  uint32_t limited = 0;
+  for (uint32_t t = 0; t < b.cells; t += 8) {
+    const Cell *c = b.cell + t;
+    const __m512d o0 = corner(b, c, 0, 0);
+    const __m512d o1 = corner(b, c, 1, 0);
+    const __m512d o2 = corner(b, c, 2, 0);
+    const __m512d o3 = corner(b, c, 3, 0);
+    Edges8 e1, e2, e3, g1, g2, g3;
+    gather_edges(b, c, 1, o0, o1, o2, o3, e1);
+    gather_edges(b, c, 2, o0, o1, o2, o3, e2);
+    gather_edges(b, c, 3, o0, o1, o2, o3, e3);
+    cross(e2, e3, g1);
+    cross(e3, e1, g2);
+    cross(e1, e2, g3);
+    const Edges8 a = minus(e2, e1), d = minus(e3, e2), h = minus(e1, e3);
+    const __m512d long1 = _mm512_max_pd(dot(e1, e1), dot(e2, e2)),
+                  long2 = _mm512_max_pd(dot(e3, e3), dot(a, a));
+    const __m512d long3 = _mm512_max_pd(dot(d, d), dot(h, h));
+    const __m512d longest = _mm512_sqrt_pd(_mm512_max_pd(_mm512_max_pd(long1, long2), long3));
+    const __m512d limit = _mm512_load_pd(b.limit + t), q = squares(e1, e2, e3);
+    const __mmask8 far = _mm512_cmp_pd_mask(q, limit, _CMP_GT_OQ);
+    __m512d now = dot(e1, g1);
+    if (far) {
+      __m512d by_q;
+      now = now * fade(q, limit, by_q);
+    }
+    const __m512d pressure = _mm512_abs_pd(pressure_of(b, t, now)), more = pressure * longest;
+    const __mmask8 counted =
+        _mm512_cmp_pd_mask(_mm512_set1_pd(kCollapseCounted) * _mm512_load_pd(b.volume6 + t), now, _CMP_GT_OQ);
+    const __m512d k = _mm512_load_pd(b.bulk + t) + _mm512_maskz_load_pd(counted, b.collapse + t);
+    const __m512d w0 = weights8(b, c, 0), w1 = weights8(b, c, 1), w2 = weights8(b, c, 2),
+                  w3 = weights8(b, c, 3);
+    const __m512d w = (w0 + w1) + (w2 + w3);
+    const __m512d n0 = norm8(sum3(g1, g2, g3)), n1 = norm8(g1), n2 = norm8(g2), n3 = norm8(g3);
+    const __m512d sum = (n0 * w0 + n1 * w1) + (n2 * w2 + n3 * w3);
+    alignas(64) double row[4][8];
+    const auto store = [&](int corner, __m512d own, __m512d weight) __attribute__((always_inline)) {
+      _mm512_store_pd(row[corner], (k * (own * sum) + more * (w - weight)) / weight);
+    };
+    store(0, n0, w0);
+    store(1, n1, w1);
+    store(2, n2, w2);
+    store(3, n3, w3);
+    if (far) {
+      const __m512d beyond = k * (_mm512_set1_pd(kFade1) * (limit * limit)) +
+                             pressure * (_mm512_set1_pd(kFade2) * _mm512_sqrt_pd(limit));
+      for (int n = 0; n < 4; ++n) _mm512_mask_store_pd(row[n], far, beyond);
+      limited += uint32_t(__builtin_popcount(far));
+    }
+    for (int n = 0; n < 8; ++n)
+      for (int m = 0; m < 4; ++m) b.row[8 * size_t(c[n].p[m]) + 7] += row[m][n];
+  }
+  *b.limited = limited;
+}
+
+constexpr Kernels kKernels = {"avx512",
+                              &single::kKernels,
+                              load_block,
+                              {MSM_SPRINGS(springs8)},
+                              MSM_BRANCHES,
+                              volume_cells8,
+                              {spring_rows8, spring_rows<kTilted>, spring_rows<kTurned>},
+                              cell_rows8,
+                              merge_halo,
+                              merge_rows,
+                              add_to_host,
+                              MSM_ENERGIES};
 
 }  // namespace
 

@@ -230,13 +230,16 @@ static inline void cell_rows(const Block &b) {
     const v4 longest = sqrt4(
         max4(max4(max4(dot(e1, e1), dot(e2, e2)), max4(dot(e3, e3), dot(a, a))), max4(dot(d, d), dot(h, h))));
     const v4 limit = load4(b.limit + t), q = squares(e1, e2, e3);
-    v4 by_q;
-    const v4 now = dot(e1, g1) * fade(q, limit, by_q);
+    v4 now = dot(e1, g1);
+    const bool far = any_above(q, limit);
+    if (far) {
+      v4 by_q;
+      now = now * fade(q, limit, by_q);
+    }
     const v4 pressure = abs4(pressure_of(b, t, now));
     const v4 more = pressure * longest;
     const v4 k = load4(b.bulk + t) + zero_unless_above(load4(b.collapse + t),
                                                        splat(kCollapseCounted) * load4(b.volume6 + t), now);
-    limited += count_above(q, limit);
     alignas(32) double row[4][4];
     const v4 w0 = weights(b, c, 0);
     const v4 w1 = weights(b, c, 1);
@@ -248,14 +251,18 @@ static inline void cell_rows(const Block &b) {
     const v4 n2 = sqrt4(dot(g2, g2));
     const v4 n3 = sqrt4(dot(g3, g3));
     const v4 sum = (n0 * w0 + n1 * w1) + (n2 * w2 + n3 * w3);
-    const v4 beyond = k * (splat(kFade1) * (limit * limit)) + pressure * (splat(kFade2) * sqrt4(limit));
     const auto store = [&](int corner, v4 own, v4 weight) __attribute__((always_inline)) {
-      store4(row[corner], choose_above(q, limit, beyond, (k * (own * sum) + more * (w - weight)) / weight));
+      store4(row[corner], (k * (own * sum) + more * (w - weight)) / weight);
     };
     store(0, n0, w0);
     store(1, n1, w1);
     store(2, n2, w2);
     store(3, n3, w3);
+    if (far) {
+      const v4 beyond = k * (splat(kFade1) * (limit * limit)) + pressure * (splat(kFade2) * sqrt4(limit));
+      for (int n = 0; n < 4; ++n) store4(row[n], choose_above(q, limit, beyond, load4(row[n])));
+      limited += count_above(q, limit);
+    }
     for (int n = 0; n < 4; ++n)
       for (int m = 0; m < 4; ++m) b.row[8 * size_t(c[n].p[m]) + 7] += row[m][n];
   }

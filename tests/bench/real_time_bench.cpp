@@ -3,12 +3,13 @@
 //
 // real_time_bench SCENE [--model NAME] [--integrator NAME] [--cells N] [--time S] [--step S] [--set TEXT]
 //                 [--wander S] [--series FILE] [--against FILE] [--csv FILE --commit HASH]
-//                 [--histogram FILE]
+//                 [--histogram FILE] [--times FILE]
 //
 // --wander has the first obstacle go to and fro over the top of probe_block.json for so long, at the scene's
 // speed, on lanes side by side, over surfels that nothing has touched before. --series writes t, the force on
 // the first body (N) and the place of the first probe (m) at each millisecond; --against compares with such a
 // file: the largest difference over the largest value. --histogram adds rows to a CSV file: steps by time.
+// --times writes the milliseconds of each step, one a line.
 #include <time.h>
 
 #include <algorithm>
@@ -148,7 +149,7 @@ int main(int argc, char **argv) {
   std::vector<std::string> set;
   std::string name = "scene", integrator = "explicit", model = "scene";
   const char *series = nullptr, *against = nullptr, *csv_file = nullptr, *histogram = nullptr,
-             *commit = "unknown";
+             *times = nullptr, *commit = "unknown";
   double duration = 0, step = 0;
   for (int i = 2; i + 1 < argc; i += 2) {
     const std::string key = argv[i], value = argv[i + 1];
@@ -162,6 +163,7 @@ int main(int argc, char **argv) {
     if (key == "--against") against = argv[i + 1];
     if (key == "--wander") set.push_back(lanes(duration = std::atof(argv[i + 1])));
     if (key == "--histogram") histogram = argv[i + 1];
+    if (key == "--times") times = argv[i + 1];
     if (key == "--csv") csv_file = argv[i + 1];
     if (key == "--commit") commit = argv[i + 1];
   }
@@ -207,13 +209,13 @@ int main(int argc, char **argv) {
                    s.place[0], s.place[1], s.place[2]);
     std::fclose(out);
   }
+  if (times) {
+    std::FILE *out = std::fopen(times, "w");
+    for (const double t : found.seconds) std::fprintf(out, "%.4f\n", 1e3 * t);
+    std::fclose(out);
+  }
   double error[2] = {NAN, NAN};
   if (against) compare(found.series, read(against), error);
-  if (getenv("TIMES")) {
-    FILE *f = fopen(getenv("TIMES"), "w");
-    for (double t : found.seconds) fprintf(f, "%.5f\n", 1e3 * t);
-    fclose(f);
-  }
   std::vector<double> sorted = found.seconds;
   std::sort(sorted.begin(), sorted.end());
   const double median = 1e3 * sorted[sorted.size() / 2], worst = 1e3 * sorted[sorted.size() * 999 / 1000];

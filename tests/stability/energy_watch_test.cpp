@@ -165,6 +165,34 @@ TEST(EnergyWatch, HostThatChangesEveryStep_CostsFewLooks) {
   EXPECT_LE(looks, 16 + steps / 256);
 }
 
+// The pressed points move in every sub-step until contact stops them; that is no new motion.
+TEST(EnergyWatch, BodyThatIsPressedAndStands_CostsFewLooks) {
+  test::Context context;
+  test::ok(dfm_plugin_register_static(context, dfm_plugin_entry_counting_looks, "counting_looks"));
+  const dfm_world w = test::make_world(context, {0, 0, 0});
+  test::add_plane(w, "floor");
+  test::BodyOptions o;
+  o.model = "test.counting_looks";
+  const dfm_body b = test::make_body(context, w, "beam", {0.1, 0.1, 0.1}, 60, o);
+  uint32_t n = 0;
+  test::ok(dfm_body_get_state(b, 0, nullptr, nullptr, &n));
+  std::vector<double> x(3 * size_t(n));
+  test::ok(dfm_body_get_state(b, n, x.data(), nullptr, &n));
+  std::vector<uint32_t> low;
+  for (uint32_t i = 0; i < n; ++i)
+    if (x[3 * i + 2] < 1e-6) low.push_back(i);
+  ASSERT_FALSE(low.empty());
+  std::vector<double> force(3 * low.size(), 0.0);
+  for (size_t i = 2; i < force.size(); i += 3) force[i] = -10;
+  test::ok(
+      dfm_body_add_load(b, uint32_t(low.size()), low.data(), force.data(), 0, nullptr, nullptr, nullptr));
+  looks = 0;
+  const uint32_t steps = 5000;
+  for (uint32_t i = 0; i < steps; ++i) test::ok(dfm_world_step(w, 1e-3, nullptr));
+  EXPECT_LT(test::measure(b).kinetic, 1e-6);
+  EXPECT_LE(looks, 16 + steps / 512);
+}
+
 // Held points that are shaken, a load and a gravity that vary, a spring, an obstacle that strikes from below:
 // all put energy in and take it out.
 void do_work(int32_t integrator, double h) {
