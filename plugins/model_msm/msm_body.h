@@ -50,6 +50,7 @@ inline double volume_for(double nu) { return nu > 0.25 ? 3 * (4 * nu - 1) / (2 *
 // What single precision reads beside the points (msm_kernel.h), block after block.
 struct Single {
   Buffer<SingleBlock> block;
+  Buffer<int> above;  // [block]
   size_t rays = 0, ncell = 0;
   Buffer<uint32_t> cells;
   Buffer<uint16_t> number;
@@ -70,6 +71,7 @@ struct Single {
   }
   void swap(Single &o) {
     block.swap(o.block);
+    above.swap(o.above);
     std::swap(rays, o.rays);
     std::swap(ncell, o.ncell);
     cells.swap(o.cells);

@@ -73,6 +73,7 @@ struct SinglePoint {
 constexpr uint32_t kFans = 8, kMostInFan = 8;  // fans of a group, cells of a fan
 struct SingleBlock : model::BlockPoints {
   SinglePoint *at;  // [local]
+  int *above;       // power of two above the largest offset of the last call: guessed for this one
   uint32_t groups;
   const uint32_t *cells;                           // [groups] of the longest fan
   const uint16_t *number;                          // [groups][cells + 3][kFans] of points times 4

@@ -100,18 +100,22 @@ DEFORM_INLINE double power_of_two(int power) {
 }
 
 // The origin is the block's first point, so that a block that moves as one keeps its digits. Half of the
-// range of an int32 is used: differences of two places fit.
+// range of an int32 is used: differences of two places fit. The unit is known when all points have been seen;
+// it is nearly always that of the last call, so they are stored by that one at once.
 static inline float load_points(const SingleBlock &b, const double *x, const double *v, uint32_t stride) {
   const auto of = [&](const double *all_points, uint32_t n) __attribute__((always_inline)) {
     return load_xyz(all_points + size_t(stride) * b.point[n]);
   };
-  const v4 origin = of(x, 0);
+  const v4 origin = of(x, 0), drift = v ? of(v, 0) : splat(0);
   v4 most = splat(0), unsound = splat(0);
+  const v4 guess = splat(power_of_two(30 - *b.above));
   for (uint32_t n = 0; n < b.local; ++n) {
     const v4 a = of(x, n) - origin;
-    store4(reinterpret_cast<double *>(b.at + n), a);
+    store4_whole(b.at[n].x, a * guess);
     most = max4(most, abs4(a));
     unsound = unsound + (a - a);
+    if (v) store4_single(b.at[n].v, of(v, n) - drift);
+    store4(b.f + 4 * size_t(n), splat(0));
   }
   alignas(32) double far[4], bad[4];
   store4(far, most);
@@ -123,13 +127,10 @@ static inline float load_points(const SingleBlock &b, const double *x, const dou
   int above = int(bits >> 52) - 1022;  // largest < 2^above
   above = above < -90 ? -90 : above;
   const bool sound = (bad[0] + bad[1]) + bad[2] == 0 && above < 120;
-  const v4 scale = splat(sound ? power_of_two(30 - above) : 0);
-  const v4 drift = v ? of(v, 0) : splat(0);
-  for (uint32_t n = 0; n < b.local; ++n) {
-    const v4 a = load4(reinterpret_cast<const double *>(b.at + n));
-    store4_whole(b.at[n].x, a * scale);
-    if (v) store4_single(b.at[n].v, of(v, n) - drift);
-    store4(b.f + 4 * size_t(n), splat(0));
+  if (!sound || above != *b.above) {
+    const v4 scale = splat(sound ? power_of_two(30 - above) : 0);
+    for (uint32_t n = 0; n < b.local; ++n) store4_whole(b.at[n].x, (of(x, n) - origin) * scale);
+    *b.above = sound ? above : 0;
   }
   return sound ? float(power_of_two(above - 30)) : __builtin_nanf("");
 }

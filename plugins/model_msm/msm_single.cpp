@@ -27,6 +27,7 @@ void Body::prepare_single() {
   const Fans fans(*this);
   Single made;
   made.block.create(host, nblock);
+  made.above.create(host, nblock);
   size_t groups = 0, rings = 0;
   for (uint32_t n = 0; n < nblock; ++n)
     fans.each_group(n, [&](const Fan *, uint32_t, uint32_t longest) {
@@ -38,6 +39,7 @@ void Body::prepare_single() {
   for (uint32_t n = 0; n < nblock; ++n) {
     SingleBlock &out = made.block[n];
     static_cast<model::BlockPoints &>(out) = block[n];
+    out.above = made.above.data() + n;
     out.cells = made.cells.data() + group;
     out.number = made.number.data() + number_at;
     out.stiffness = made.stiffness.data() + ray_at;

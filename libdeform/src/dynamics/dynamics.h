@@ -38,7 +38,6 @@ struct StepBound {
   double step = std::numeric_limits<double>::infinity();  // s; infinite: nothing bounds it
   uint32_t point = 0;                                     // that bounds it
   double by_stiffness = step, by_damping = step;          // s, that each would allow alone at that point
-  double strain_rate = 0;                                 // 1/s, of the edge that stretches fastest
 };
 // Adds row sums of stiffness N/m and damping N s/m that act on the points from outside of the model.
 using AddRowSums = std::function<void(double *stiffness, double *damping)>;
@@ -101,6 +100,8 @@ class Dynamics {
 
   // False: the model gives none.
   virtual bool bound(double time, const AddRowSums &outside, StepBound &out) = 0;
+  // 1/s, of the edge that stretches fastest; 0 where no bound follows the shape
+  virtual double strain_rate() const { return 0; }
   // touched: the last sub-step ended with contacts. Asked once for a sub-step and its repetitions.
   virtual void begin(bool) {}
   // The present loads are those of the start of the sub-step; those of its end come next. Not asked where

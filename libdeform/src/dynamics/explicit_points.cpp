@@ -32,9 +32,13 @@ bool ExplicitPoints::bound(double time, const AddRowSums &outside, StepBound &ou
     out.by_stiffness = 2 * std::sqrt(m / stiffness_[out.point]);
     out.by_damping = 2 * m / damping_[out.point];
   }
-  // turning gives none
-  out.strain_rate = loops_.strain_rate(uint32_t(edges_.size() / 2), edges_.data(), p_.x.data(), p_.v.data());
   return true;
+}
+
+// Turning gives none.
+double ExplicitPoints::strain_rate() const {
+  if (!model_.ops->bound) return 0;
+  return loops_.strain_rate(uint32_t(edges_.size() / 2), edges_.data(), p_.x.data(), p_.v.data());
 }
 
 bool ExplicitPoints::add_forces(const SubStep &now) {
@@ -52,8 +56,10 @@ bool ExplicitPoints::free_motion(const SubStep &now, double &kinetic) {
                      [&](double v) { return std::fabs(v) <= now.fastest; });
 }
 
-bool ExplicitPoints::end_state(const SubStep &now, const double *, bool touched) {
-  find_end(loops_, p_, touched, now.h);
+// Contact reaches few points, where surfels are points: only those are asked for their impulse.
+bool ExplicitPoints::end_state(const SubStep &now, const double *surfel_impulse, bool touched) {
+  if (touched && surface_.identity()) find_end(loops_, p_, surface_, surfel_impulse, now.h);
+  else find_end(loops_, p_, touched, now.h);
   return true;
 }
 

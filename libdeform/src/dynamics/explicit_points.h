@@ -14,6 +14,7 @@ class ExplicitPoints : public Dynamics {
     return {.forces = true, .springs = true, .placed = true, .energy = true};
   }
   bool bound(double time, const AddRowSums &outside, StepBound &out) override;
+  double strain_rate() const override;
   bool add_forces(const SubStep &now) override;
   bool free_motion(const SubStep &now, double &kinetic) override;
   const double *diagonal() const override { return p_.inv_mass.data(); }

@@ -56,6 +56,15 @@ void end(uint32_t n, double h, const double *x, const double *free, const double
   }
 }
 
+void end_apart(uint32_t n, double h, const double *x, const double *free, double *x_end, double *v_end) {
+  const Vector step = splat(h), none = {};
+  for (size_t at = 0; at < 4 * size_t(n); at += kWidth) {
+    const Vector u = load(free + at) + none;  // an impulse of zero makes +0 of -0
+    store(v_end + at, u);
+    store(x_end + at, load(x + at) + step * u);
+  }
+}
+
 // Component by component, of kWidth points or differences; part(k, p): vector p of lane k.
 template <class V>
 struct Columns {
@@ -134,7 +143,7 @@ double strain_rate(uint32_t n, const uint32_t *edges, const double *x, const dou
   return out;
 }
 
-constexpr PointsKernels kKernels = {predict, end, inverted, strain_rate};
+constexpr PointsKernels kKernels = {predict, end, end_apart, inverted, strain_rate};
 
 }  // namespace
 }  // namespace dfm

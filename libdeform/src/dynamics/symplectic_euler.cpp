@@ -28,6 +28,19 @@ void find_end(const PointsKernels &loops, Phyxels &p, bool touched, double h) {
             p.x_end.data(), p.v_end.data());
 }
 
+void find_end(const PointsKernels &loops, Phyxels &p, const Surface &surface, const double *impulse,
+              double h) {
+  loops.end_apart(p.n, h, p.x.data(), p.v_free.data(), p.x_end.data(), p.v_end.data());
+  for (uint32_t s = 0; s < surface.nsurfel; ++s) {
+    const double *const q = impulse + 3 * size_t(s);
+    if (q[0] == 0 && q[1] == 0 && q[2] == 0) continue;
+    for (size_t k = 0, at = size_t(surface.point[s]) * kStride; k < 3; ++k, ++at) {
+      p.v_end[at] = p.v_free[at] + p.inv_mass[at] * q[k];
+      p.x_end[at] = p.x[at] + h * p.v_end[at];
+    }
+  }
+}
+
 void shorten(Phyxels &p, const double *mean, double h) {
   Point *const x_end = points(p.x_end);
   const Point *const x = points(p.x), *const u = reinterpret_cast<const Point *>(mean);

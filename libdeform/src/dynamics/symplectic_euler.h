@@ -4,6 +4,7 @@
 #pragma once
 #include "body/phyxels.h"
 #include "dynamics/points_kernel.h"
+#include "geometry/surface.h"
 
 namespace dfm {
 
@@ -13,6 +14,9 @@ const PointsKernels &points_kernels();  // the widest of this processor
 double predict(const PointsKernels &loops, Phyxels &p, Vec3 gravity, double h);
 // v_end = v_free + M^-1 impulse (impulse may be absent: `touched` false), x_end = x + h v_end.
 void find_end(const PointsKernels &loops, Phyxels &p, bool touched, double h);
+// The same where surfels are points, whose impulses [nsurfel,3], N s, are zero but for few.
+void find_end(const PointsKernels &loops, Phyxels &p, const Surface &surface, const double *impulse,
+              double h);
 // x_end for a shorter way: h times the mean velocity [n,4].
 void shorten(Phyxels &p, const double *mean, double h);
 

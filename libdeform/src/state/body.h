@@ -128,6 +128,7 @@ struct Body {
     bool known = false;
     StepBound found;
     uint32_t inverted = 0;
+    double strain_rate = 0;  // 1/s, of the edge that stretches fastest
   } bound;
   Slumber slumber;
   // [n,4] m, positions since which it is calm; empty where nothing may sleep

@@ -104,6 +104,7 @@ void changing(Stream &s, World &w) {
   s.value(w.bound.step);
   s.value(w.bound.inverted);
   s.value(w.bound.age);
+  s.value(w.bound.strain);
   s.value(w.bound.body);
   s.value(w.bound.point);
   s.value(w.gravity.now);

@@ -16,19 +16,28 @@ namespace dfm {
 namespace {
 
 // The bound depends on the state (volume terms stiffen as cells grow, tilted springs as they stretch). 0.9 of
-// it is used, which pays for what a shape changes by about a twentieth of its lengths; so it is asked for
-// again after 16 sub-steps, sooner where the edges stretch faster.
+// it is used, which pays for what a shape changes by about a twentieth of its lengths. So after 16 sub-steps,
+// sooner where the edges stretch faster, a look at the rates tells how much of that may be spent; where it is
+// not, the bound holds on. A look sees rates at one instant, so it counts them for the time before and for
+// that to the next look, and the bound is asked for anew in every eighth.
 constexpr uint32_t kBoundEvery = 16;
-constexpr double kBoundStrain = 0.05;
+constexpr double kBoundStrain = 0.05, kLeastStrain = kBoundStrain / 8;
 
 uint32_t inverted_cells(const Body &b) {
   return points_kernels().inverted(uint32_t(b.tets.size() / 4), b.tets.data(), b.p.x.data());
 }
 
+void look_at_shape(Body &b) {
+  // of points that are late nobody knows until they are asked for
+  b.bound.inverted = b.dynamics->late() ? 0 : inverted_cells(b);
+  b.bound.strain_rate = b.slumber.asleep ? 0 : b.dynamics->strain_rate();
+}
+
 // False: its model gives none.
 bool ask_bound(const World &w, Body &b) {
-  // of points that are late nobody knows until they are asked for
-  b.bound = {true, {}, b.dynamics->late() ? 0 : inverted_cells(b)};
+  b.bound.known = true;
+  b.bound.found = {};
+  look_at_shape(b);
   const auto springs = [&b](double *stiffness, double *damping) {
     for (const Spring &spring : b.springs) add_spring_bound(spring, stiffness, damping);
   };
@@ -38,8 +47,10 @@ bool ask_bound(const World &w, Body &b) {
 // Who sleeps keeps what it had.
 bool keeps(const Body &b) { return b.slumber.asleep && b.bound.known; }
 
-// Each body by itself; no worker is woken for a world that sleeps.
-void ask_bounds(World &w) {
+// act(body) -> did it answer? Each body that does not keep what it had by itself; no worker is woken for a
+// world that sleeps.
+template <class Act>
+void ask_each(World &w, const Act &act) {
   if (std::ranges::all_of(w.bodies, [](const auto &b) { return keeps(*b); })) return;
   FirstFailure failed;
   w.context->tasks.parallel_for(static_cast<uint32_t>(w.bodies.size()), 1, [&](uint32_t begin, uint32_t end) {
@@ -47,7 +58,7 @@ void ask_bounds(World &w) {
       Body &b = *w.bodies[i];
       if (keeps(b)) continue;
       const OnBehalf speaks(b.name);
-      if (!ask_bound(w, b)) failed.note(i);
+      if (!act(b)) failed.note(i);
     }
   });
   if (failed.body == kNone) return;
@@ -55,22 +66,50 @@ void ask_bounds(World &w) {
   fail(DFM_E_FATAL, "model '%s' of body '%s' gives no step bound", b.model.type->id, b.name.c_str());
 }
 
+// Strain of the edge that stretches fastest until the next look. Who sleeps has a step too, which must not
+// change when it wakes, and stretches no edge.
+double strain_of_16(const World &w) {
+  double fastest = 0;
+  for (const auto &b : w.bodies)
+    if (!b->slumber.asleep) fastest = std::max(fastest, b->bound.strain_rate);
+  return fastest > 0 ? std::min(1.0, fastest * w.bound.step * kBoundEvery) : 0;
+}
+
+uint32_t count_inverted(World &w) {
+  uint32_t sum = 0;
+  for (const auto &b : w.bodies) sum += b->bound.inverted;
+  return sum;
+}
+
+// Does the bound hold on? What a model keeps as state may change its stiffness in the same shape.
+bool holds(World &w) {
+  if (w.bound.age == kNone || !std::isfinite(w.bound.step)) return false;
+  if (std::ranges::any_of(w.bodies,
+                          [](const auto &b) { return !b->slumber.asleep && !b->model.state.empty(); }))
+    return false;
+  ask_each(w, [](Body &b) {
+    look_at_shape(b);
+    return true;
+  });
+  const double strain = w.bound.strain + std::max(2 * strain_of_16(w), kLeastStrain);
+  if (!(strain <= kBoundStrain) || count_inverted(w) != w.bound.inverted) return false;
+  w.bound.strain = strain;
+  w.bound.age = 0;
+  return true;
+}
+
 }  // namespace
 
 bool bound_due(const World &w) { return w.bound.age >= kBoundEvery; }
 
 void update_bound(World &w) {
+  if (holds(w)) return;
   w.bound.step = std::numeric_limits<double>::infinity();
   w.bound.body = nullptr;
   w.bound.point = 0;
-  w.bound.inverted = 0;
   uint32_t limited = 0;
-  double fastest = 0;
-  ask_bounds(w);
+  ask_each(w, [&w](Body &b) { return ask_bound(w, b); });
   for (auto &b : w.bodies) {
-    // who sleeps has a step too, which must not change when it wakes, and stretches no edge
-    if (!b->slumber.asleep) fastest = std::max(fastest, b->bound.found.strain_rate);
-    w.bound.inverted += b->bound.inverted;
     limited += b->model.limited_cells();
     const StepBound &found = b->bound.found;
     if (found.step < w.bound.step) {
@@ -79,13 +118,16 @@ void update_bound(World &w) {
       w.bound.point = found.point;
     }
   }
+  w.bound.inverted = count_inverted(w);
   w.bound.step *= kBoundShare;
   w.stats.stable_step = w.bound.step;
   w.stats.inverted_max = std::max(w.stats.inverted_max, w.bound.inverted);
   w.stats.limited_max = std::max(w.stats.limited_max, limited);
-  const double keeps = kBoundStrain / (fastest * w.bound.step);  // sub-steps
-  w.bound.age =
-      keeps >= kBoundEvery || !(fastest > 0) ? 0 : kBoundEvery - static_cast<uint32_t>(std::max(1.0, keeps));
+  w.bound.strain = strain_of_16(w);
+  const double looks = kBoundStrain / w.bound.strain;  // until it is spent
+  w.bound.age = looks >= 1 || !(w.bound.strain > 0)
+                    ? 0
+                    : kBoundEvery - static_cast<uint32_t>(std::max(1.0, kBoundEvery * looks));
 }
 
 }  // namespace dfm

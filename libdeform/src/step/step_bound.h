@@ -8,7 +8,7 @@ struct World;
 
 inline constexpr double kBoundShare = 0.9;  // of the bound, that is used
 
-bool bound_due(const World &w);  // does the next sub-step ask for it?
-void update_bound(World &w);     // w.bound
+bool bound_due(const World &w);  // does the next sub-step look whether it still holds?
+void update_bound(World &w);     // w.bound, asked for anew where it may not
 
 }  // namespace dfm

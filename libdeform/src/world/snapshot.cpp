@@ -295,6 +295,7 @@ void fields(Stream &s, W &w, const World &like) {
   s.value("step bound", w.bound.step, must::Be{[](double x) { return x >= 0; }, "a time above zero"});
   s.value("inverted cells", w.bound.inverted, must::any);
   s.value("age of the bound", w.bound.age, must::any);
+  s.value("strain since the bound", w.bound.strain, must::not_negative);
   s.must_hold("step bound", "a time that a sub-step can have",
               [&] { return w.bound.age == kNone || w.bound.step >= kLeastStep; });
   for (auto *r : {&w.sizes.cut, &w.sizes.offer}) {
