@@ -59,7 +59,7 @@ void merge_row_pass(void *user, uint32_t begin, uint32_t end) {
       const double springs = own + (body.edge_tilt.empty() ? body.coupled[i] : row[3]);
       const double damp =
           body.damp_most.empty() ? body.damp_scale() * body.params[kDampingStiffness] : body.damp_most[i];
-      call.ksum[i] += std::max(springs + row[7], body.rest_rows[i]);
+      call.ksum[i] += std::max(springs + row[7] / body.weight[i], body.rest_rows[i]);
       // A damper's n n^T is at most its spring's part of A_i over k.
       call.csum[i] +=
           damp * springs +

@@ -31,7 +31,7 @@ struct Cell { uint32_t p[4]; };
 struct Block : model::BlockPoints {
   uint32_t quads, cells;  // quads is even, cells a multiple of 8
   // [local,8] row sums: the springs' block xx yy zz, coupling (kTilted, kTurned), xy yz zx, then
-  // the cells' row
+  // the cells' row times the weight
   double *row;
   const double *weight;            // [local] of the row sums, see Body::find_weights
   const Quad *quad;                // [quads]

@@ -325,7 +325,7 @@ static void cell_rows8(const Block &b) {
     const __m512d sum = (n0 * w0 + n1 * w1) + (n2 * w2 + n3 * w3);
     alignas(64) double row[4][8];
     const auto store = [&](int corner, __m512d own, __m512d weight) __attribute__((always_inline)) {
-      _mm512_store_pd(row[corner], (k * (own * sum) + more * (w - weight)) / weight);
+      _mm512_store_pd(row[corner], k * (own * sum) + more * (w - weight));
     };
     store(0, n0, w0);
     store(1, n1, w1);
@@ -334,7 +334,8 @@ static void cell_rows8(const Block &b) {
     if (far) {
       const __m512d beyond = k * (_mm512_set1_pd(kFade1) * (limit * limit)) +
                              pressure * (_mm512_set1_pd(kFade2) * _mm512_sqrt_pd(limit));
-      for (int n = 0; n < 4; ++n) _mm512_mask_store_pd(row[n], far, beyond);
+      const __m512d weight[4] = {w0, w1, w2, w3};
+      for (int n = 0; n < 4; ++n) _mm512_mask_store_pd(row[n], far, beyond * weight[n]);
       limited += uint32_t(__builtin_popcount(far));
     }
     for (int n = 0; n < 8; ++n)

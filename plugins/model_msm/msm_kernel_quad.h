@@ -212,9 +212,9 @@ static inline void volume_cells(const Block &b) {
 DEFORM_INLINE v4 weights(const Block &b, const Cell *c, int n) {
   return set4(b.weight[c[0].p[n]], b.weight[c[1].p[n]], b.weight[c[2].p[n]], b.weight[c[3].p[n]]);
 }
-// Weighted row sums of the second derivative of a cell's energy, (1 / w_a) (k g_a sum_b g_b w_b + |p| l
-// sum_{b != a} w_b): g_a = 6 |dV/dx_a|, and l, the longest edge, for the opposite edge that makes each
-// mixed derivative.
+// Weighted row sums of the second derivative of a cell's energy, times w_a:
+// k g_a sum_b g_b w_b + |p| l sum_{b != a} w_b, with g_a = 6 |dV/dx_a|, and l, the longest edge, for the
+// opposite edge that makes each mixed derivative.
 static inline void cell_rows(const Block &b) {
   uint32_t limited = 0;
   for (uint32_t t = 0; t < b.cells; t += 4) {
@@ -252,7 +252,7 @@ static inline void cell_rows(const Block &b) {
     const v4 n3 = sqrt4(dot(g3, g3));
     const v4 sum = (n0 * w0 + n1 * w1) + (n2 * w2 + n3 * w3);
     const auto store = [&](int corner, v4 own, v4 weight) __attribute__((always_inline)) {
-      store4(row[corner], (k * (own * sum) + more * (w - weight)) / weight);
+      store4(row[corner], k * (own * sum) + more * (w - weight));
     };
     store(0, n0, w0);
     store(1, n1, w1);
@@ -260,7 +260,8 @@ static inline void cell_rows(const Block &b) {
     store(3, n3, w3);
     if (far) {
       const v4 beyond = k * (splat(kFade1) * (limit * limit)) + pressure * (splat(kFade2) * sqrt4(limit));
-      for (int n = 0; n < 4; ++n) store4(row[n], choose_above(q, limit, beyond, load4(row[n])));
+      const v4 weight[4] = {w0, w1, w2, w3};
+      for (int n = 0; n < 4; ++n) store4(row[n], choose_above(q, limit, beyond * weight[n], load4(row[n])));
       limited += count_above(q, limit);
     }
     for (int n = 0; n < 4; ++n)

@@ -37,7 +37,6 @@ void look_at_shape(Body &b) {
 bool ask_bound(const World &w, Body &b) {
   b.bound.known = true;
   b.bound.found = {};
-  look_at_shape(b);
   const auto springs = [&b](double *stiffness, double *damping) {
     for (const Spring &spring : b.springs) add_spring_bound(spring, stiffness, damping);
   };
@@ -75,7 +74,7 @@ double strain_of_16(const World &w) {
   return fastest > 0 ? std::min(1.0, fastest * w.bound.step * kBoundEvery) : 0;
 }
 
-uint32_t count_inverted(World &w) {
+uint32_t count_inverted(const World &w) {
   uint32_t sum = 0;
   for (const auto &b : w.bodies) sum += b->bound.inverted;
   return sum;
@@ -87,10 +86,6 @@ bool holds(World &w) {
   if (std::ranges::any_of(w.bodies,
                           [](const auto &b) { return !b->slumber.asleep && !b->model.state.empty(); }))
     return false;
-  ask_each(w, [](Body &b) {
-    look_at_shape(b);
-    return true;
-  });
   const double strain = w.bound.strain + std::max(2 * strain_of_16(w), kLeastStrain);
   if (!(strain <= kBoundStrain) || count_inverted(w) != w.bound.inverted) return false;
   w.bound.strain = strain;
@@ -103,6 +98,10 @@ bool holds(World &w) {
 bool bound_due(const World &w) { return w.bound.age >= kBoundEvery; }
 
 void update_bound(World &w) {
+  ask_each(w, [](Body &b) {
+    look_at_shape(b);
+    return true;
+  });
   if (holds(w)) return;
   w.bound.step = std::numeric_limits<double>::infinity();
   w.bound.body = nullptr;
