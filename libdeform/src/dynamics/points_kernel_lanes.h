@@ -97,7 +97,8 @@ DEFORM_INLINE Vector dot(const Columns<Vector> &a, const Columns<Vector> &b) {
 
 typedef long long Mask __attribute__((vector_size(8 * kWidth)));
 
-// use(at, real): of n rows kWidth at a time, at(k) the row of lane k; the last of all again in lanes that are not real
+// use(at, real): of n rows kWidth at a time, at(k) the row of lane k; lanes that are not real have the last
+// row again
 template <class Use>
 DEFORM_INLINE void each_lane(uint32_t n, const Use &use) {
   uint32_t t = 0;
