@@ -113,7 +113,7 @@ TEST_P(ShippedScene, WrittenAndLoaded_IsTheSameWorld) {
 
 INSTANTIATE_TEST_SUITE_P(Each, ShippedScene,
                          testing::Values("attached", "ball_incline", "changing_models", "fill_drop",
-                                         "fill_drop_organs", "gravity_anisotropy", "gravity_beams",
+                                         "fill_drop_organs", "grasp", "gravity_anisotropy", "gravity_beams",
                                          "guard_shot", "pinched_tube", "pressed_ring", "probe_block",
                                          "rabbits_slope", "reduced_models", "rigid_on_ball", "rigid_on_bed",
                                          "rigid_pinch", "rollback_compare", "slope_block", "ten_bodies",
@@ -194,6 +194,59 @@ TEST(WriteScene, WorldOfAProgram_GoesOnWithTheSameBits) {
   for (const dfm_world w : {made.world, back, alone}) steps(w, 50, 1e-4);
   EXPECT_EQ(dfm_world_hash(back), dfm_world_hash(made.world));
   EXPECT_LT(apart(alone, made.world), 1e-6);
+}
+
+// Tools of each kind, one led by keys, one coupled, one that cuts: the scene has them, and goes on alike.
+TEST(WriteScene, Tools_AreWrittenWithKeysCouplingAndCuts) {
+  const std::string folder = folder_of("tools"), path = folder + "/tools.json";
+  test::write_file(path, R"({"format": "deform-scene", "version": 1, "gravity": [0, 0, 0],
+    "time": {"duration": 0.1, "step": 0.001, "integrator": "symplectic_euler"},
+    "materials": {"gel": {"young": 3e4, "damping": {"stiffness": 0.002}}, "steel": {"young": 1e6}},
+    "bodies": [{"name": "block", "mesh": {"make": "beam", "size": [0.04, 0.04, 0.04], "cells": 320},
+      "material": "gel", "pose": {"position": [-0.02, -0.02, -0.02]}}],
+    "tools": [
+      {"name": "knife", "shape": "blade", "half_size": [0.0005, 0.03, 0.02], "material": "steel",
+       "cuts": {"bodies": ["block"], "most": 40},
+       "motion": {"keyframes": [{"t": 0, "position": [0.001, 0, 0.05]},
+                                {"t": 0.06, "position": [0.001, 0, -0.01]}]}},
+      {"name": "pin", "shape": "capsule", "radius": 0.002, "half_length": 0.01,
+       "pose": {"position": [0.2, 0, 0]},
+       "coupling": {"stiffness": 300, "turn_stiffness": 0.2, "damping": 0.5, "passive": true}},
+      {"name": "egg", "shape": "ellipsoid", "half_size": [0.01, 0.02, 0.01],
+       "pose": {"position": [0.3, 0, 0]}},
+      {"name": "jaws", "shape": "grasper", "half_size": [0.001, 0.003, 0.01], "radius": 0.002,
+       "half_length": 0.02, "pose": {"position": [0.4, 0, 0]},
+       "opening_deg": {"keyframes": [{"t": 0, "value": 40}, {"t": 0.1, "value": 20}]}}]})");
+  test::Context context;
+  const dfm_world world = load(context, path);
+  ASSERT_TRUE(world);
+  steps(world, 20, 1e-3);
+  dfm_body block = 0;
+  test::ok(dfm_world_find_body(world, "block", &block));
+  EXPECT_EQ(all(write(world, folder + "/again.json", DFM_SCENE_PARTIAL)).find("tool '"), std::string::npos);
+  const dfm_world start = load(context, path);
+  const std::vector<unsigned char> before = [&] {
+    EXPECT_EQ(all(write(start, folder + "/start.json", DFM_SCENE_SNAPSHOT)), "");
+    return read(folder + "/start_files/snapshot.state");
+  }();
+  const dfm_world again = load(context, folder + "/start.json");
+  ASSERT_TRUE(again);
+  ASSERT_EQ(dfm_world_restore(again, before.data(), before.size()), DFM_OK) << dfm_last_error();
+  for (const dfm_world w : {start, again}) steps(w, 60, 1e-3);
+  EXPECT_EQ(dfm_world_hash(again), dfm_world_hash(start));
+  for (const char *name : {"knife", "pin", "egg", "jaws"}) {
+    dfm_tool one = 0, other = 0;
+    test::ok(dfm_world_find_tool(start, name, &one));
+    test::ok(dfm_world_find_tool(again, name, &other));
+    dfm_tool_def a{}, b{};
+    a.size = b.size = sizeof a;
+    test::ok(dfm_tool_get_def(one, &a));
+    test::ok(dfm_tool_get_def(other, &b));
+    EXPECT_EQ(a.shape, b.shape);
+    EXPECT_EQ(a.stiffness, b.stiffness);
+    EXPECT_EQ(a.flags, b.flags);
+    EXPECT_EQ(a.radius, b.radius);
+  }
 }
 
 // One sentence for each thing that a scene has no word for: without the flag it ends the call, and neither

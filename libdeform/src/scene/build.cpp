@@ -36,7 +36,7 @@ class Builder {
     create_world();
     for (Material &m : def_.materials) create_material(m);
     create_things();
-    for (Tool &t : def_.tools) create_tool(t);
+    for (const Tool &t : def_.tools) set_cuts(t);
     for (Friction &f : def_.friction) add_friction(f);
     for (const Filter &f : def_.filters)
       check(dfm_world_filter_pair(world_, f.between[0].c_str(), f.between[1].c_str(), f.collide), f.pointer);
@@ -89,7 +89,7 @@ class Builder {
           "/gravity/keyframes");
   }
 
-  // Bodies, obstacles, rigid bodies, as they stand in the scene; or in the order of the ids that it gives.
+  // Bodies, obstacles, rigid bodies, tools, as they stand in the scene; or in the order of their ids.
   void create_things() {
     struct Thing {
       uint64_t id;
@@ -103,13 +103,16 @@ class Builder {
     const auto set = [this] { create_rigid(def_.rigid); };
     if (def_.rigid.bodies.empty()) things.push_back({0, "/rigid", set});
     else things.push_back({def_.rigid.bodies[0].id, def_.rigid.bodies[0].pointer, set});
+    for (Tool &t : def_.tools)
+      things.push_back({t.solid.id, t.solid.pointer, [this, &t] { create_tool(t); }});
     std::stable_sort(things.begin(), things.end(), [](const Thing &a, const Thing &b) {
       return (a.id ? a.id : UINT64_MAX) < (b.id ? b.id : UINT64_MAX);
     });
     World &w = resolve<World>(Kind::world, world_);
     for (const Thing &thing : things) {
       if (thing.id && thing.id < w.next_id)
-        fail(DFM_E_ARG, "%s: %s/id: %llu is taken; ids of bodies, obstacles and rigid bodies are unique",
+        fail(DFM_E_ARG,
+             "%s: %s/id: %llu is taken; ids of bodies, obstacles, rigid bodies and tools are unique",
              def_.file.c_str(), thing.pointer.c_str(), static_cast<unsigned long long>(thing.id));
       if (thing.id) w.next_id = thing.id;
       thing.create();
@@ -589,7 +592,12 @@ class Builder {
     }
     dfm_tool tool = 0;
     check(dfm_tool_create(world_, &t.def, &tool), t.solid.pointer);
+  }
+
+  void set_cuts(const Tool &t) const {
     if (t.cuts.bodies.empty()) return;
+    dfm_tool tool = 0;
+    check(dfm_world_find_tool(world_, t.solid.name.c_str(), &tool), t.cuts.pointer);
     std::vector<dfm_body> bodies(t.cuts.bodies.size());
     for (size_t i = 0; i < bodies.size(); ++i)
       check(dfm_world_find_body(world_, t.cuts.bodies[i].c_str(), &bodies[i]), t.cuts.pointer);

@@ -172,6 +172,7 @@ const Table &objects() {
         {"opening_deg", true},
         {"coupling", true},
         {"cuts", true},
+        {"id", true},
         {"material", true}}},
       {"tool_cuts", {{"bodies", true}, {"mode", true}, {"most", true}}},
       {"tool_motion", {{"keyframes", true}, {"file", true}}},

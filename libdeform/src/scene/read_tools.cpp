@@ -110,6 +110,7 @@ Tool read_tool(const Node &node, ReadContext &context) {
   node.object("tool");
   t.solid.pointer = node.pointer();
   t.solid.name = node.at("name").name();
+  t.solid.id = read_id(node);
   const Shape &shape = read_shape(node);
   t.def.shape = shape.number;
   std::vector<std::string> names = {t.solid.name};

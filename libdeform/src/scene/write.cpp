@@ -381,8 +381,6 @@ void tell_what_is_left_out(SceneWriter &to) {
         "nobody about pairs that come later");
   if (w.pre_solve.call)
     to.note("a callback of the host changes contacts before they are solved; a scene has none");
-  for (const auto &t : w.tools)
-    to.note("tool '%s' is left out; write it into \"tools\" by hand", t->name.c_str());
   const std::pair<const char *, bool> members[] = {{"max_sweeps", w.def.max_sweeps != usual.max_sweeps},
                                                    {"max_passes", w.def.max_passes != usual.max_passes},
                                                    {"max_substeps", w.def.max_substeps != usual.max_substeps},
@@ -429,6 +427,7 @@ Written write_root(SceneWriter &to) {
   for (const auto &o : to.w.obstacles)
     if (!o->rigid) root["obstacles"].push_back(write_obstacle(to, *o));
   if (Written rigid = write_rigid(to); !rigid.is_null()) root["rigid"] = std::move(rigid);
+  for (const auto &t : to.w.tools) root["tools"].push_back(write_tool(to, *t));
   if (Written contact = write_contact(to); !contact.is_null()) root["contact"] = std::move(contact);
   if (Written solver = write_solver(to.w); !solver.is_null()) root["solver"] = std::move(solver);
   if (Written probes = write_probes(to); !probes.is_null()) root["probes"] = std::move(probes);

@@ -32,7 +32,7 @@ struct WriteOptions {
 // notes: how many sentences there were. Throws Error; the scene file itself is written last, and as a whole.
 void write_scene(World &w, const std::string &path, const WriteOptions &options, uint32_t &notes);
 
-// ---- for the parts of it (write_body.cpp, write_things.cpp) -----------------------------------------------
+// ---- for its parts: write_body.cpp, write_things.cpp, write_tools.cpp ------------------------------------
 
 struct SceneWriter {
   World &w;
@@ -78,5 +78,6 @@ bool same_bits(const void *a, const void *b, size_t bytes);
 Written write_body(SceneWriter &to, Body &b);
 Written write_obstacle(SceneWriter &to, const Obstacle &o);
 Written write_rigid(SceneWriter &to);  // null: there are none
+Written write_tool(SceneWriter &to, const Tool &t);
 
 }  // namespace dfm::writing

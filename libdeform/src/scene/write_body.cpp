@@ -415,6 +415,9 @@ Written write_body(SceneWriter &to, Body &b) {
   write_attachments(to, b, out);
   write_switches(to, b, out);
   if (b.sensor) out["sensor"] = true;
+  if (!b.cut.open.empty())
+    to.note("body '%s' has been cut: the scene has it as it is now, but the two sides of a slit do not touch",
+            b.name.c_str());
   return out;
 }
 

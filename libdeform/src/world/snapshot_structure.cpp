@@ -85,7 +85,7 @@ uint64_t snapshot_structure(const World &w) {
     const dfm_obstacle_def d = told(o->def);
     h.add(o->id);
     h.add(d.shape);
-    h.add(d.pose);
+    if (!o->rigid || !o->rigid->of_tool) h.add(d.pose);  // a tool's is where its keys led it at first
     h.add(d.half_size);
     h.add(d.radius);
     h.add(d.half_length);

@@ -1,0 +1,133 @@
+// Tools as a scene says them.
+#include <algorithm>
+#include <cmath>
+
+#include "mesh/tri_mesh.h"
+#include "scene/write.h"
+
+namespace dfm::writing {
+namespace {
+
+constexpr double kRadian = 0.017453292519943295;  // of a degree
+
+const char *shape_word(uint32_t shape) {
+  static const char *const words[] = {"sphere",  "capsule",  "box",       "mesh",
+                                      "grasper", "scissors", "ellipsoid", "blade"};
+  return words[shape];
+}
+
+// In degrees, so that the reader gets the same radians where any number gives them.
+double degrees_of(double radians) {
+  const double near = radians / kRadian;
+  double low = near, high = near;
+  for (int k = 0; k < 4; ++k) {
+    if (kRadian * low == radians) return low;
+    if (kRadian * high == radians) return high;
+    low = std::nextafter(low, 0);
+    high = std::nextafter(high, 400);
+  }
+  return near;
+}
+
+dfm_pose standing(const ToolPlace &p) {
+  dfm_pose out{};
+  store3(out.position, p.position);
+  const double q[] = {p.rotation.x, p.rotation.y, p.rotation.z, p.rotation.w};
+  std::copy_n(q, 4, out.rotation);
+  return out;
+}
+
+void write_sizes(SceneWriter &to, const Tool &t, Written &out) {
+  const dfm_tool_def &d = t.def;
+  out["shape"] = shape_word(d.shape);
+  const bool round = d.shape == DFM_TOOL_SPHERE || d.shape == DFM_TOOL_CAPSULE;
+  if (round || (t.has_jaws() && d.radius > 0)) out["radius"] = d.radius;
+  if (d.shape == DFM_TOOL_CAPSULE || (t.has_jaws() && d.radius > 0)) out["half_length"] = d.half_length;
+  if (!round && d.shape != DFM_TOOL_MESH) out["half_size"] = vector_of(d.half_size);
+  if (d.shape != DFM_TOOL_MESH) return;
+  const Obstacle &skin = *to.w.find_obstacle(t.name + ".shape");
+  TriMesh mesh;
+  mesh.points.assign(skin.points.begin(), skin.points.end());
+  mesh.tris.assign(skin.triangles.begin(), skin.triangles.end());
+  mesh.tri_group.assign(mesh.ntri(), kNoGroup);
+  out["mesh"] = to.file(t.name + ".vtu", [mesh = std::move(mesh)](const std::string &to_path) {
+    write_tri_mesh(mesh, to_path);
+  });
+}
+
+void write_motion(const Tool &t, const ToolValues &v, Written &out) {
+  // keys go on from where they are; without keys the tool stands
+  const ToolPlace now = t.motion.coupled() ? load_place(v.device) : place_of(t.set->state[0]);
+  if (const Written pose = pose_of(v.keyed != 0 ? t.def.pose : standing(now)); !pose.is_null())
+    out["pose"] = pose;
+  if (v.keyed == 0) return;
+  Written &keys = out["motion"]["keyframes"] = Written::array();
+  for (const dfm_pose_key &k : t.keys)
+    keys.push_back(
+        {{"t", k.t}, {"position", vector_of(k.pose.position)}, {"rotation", rotation_of(k.pose.rotation)}});
+}
+
+void write_opening(const Tool &t, const ToolValues &v, Written &out) {
+  if (!t.has_jaws()) return;
+  if (v.opening_keyed == 0) {
+    out["opening_deg"] = degrees_of(v.opening);
+    return;
+  }
+  Written &keys = out["opening_deg"]["keyframes"] = Written::array();
+  for (const dfm_scale_key &k : t.opening_keys) keys.push_back({{"t", k.t}, {"value", degrees_of(k.value)}});
+}
+
+void write_coupling(const Tool &t, Written &out) {
+  if (!t.motion.coupled()) return;
+  const dfm_tool_def &d = t.def;
+  Written &c = out["coupling"];
+  c = {{"stiffness", d.stiffness},       {"damping", d.damping}, {"turn_stiffness", d.turn_stiffness},
+       {"turn_damping", d.turn_damping}, {"mass", d.mass},       {"inertia", d.inertia}};
+  if (d.late > 0) c["late"] = d.late;
+  if (d.flags & DFM_TOOL_PASSIVE) c["passive"] = true;
+}
+
+void write_cuts(const SceneWriter &to, const Tool &t, Written &out) {
+  Written names = Written::array();
+  for (const auto &b : to.w.bodies)
+    if (t.cuts_body(b->id)) names.push_back(b->name);
+  if (names.empty()) return;
+  out["cuts"] = {{"bodies", names}, {"mode", t.cuts.how == DFM_CUT_SPLIT ? "split" : "remove"}};
+  if (t.cuts.most > 0) out["cuts"]["most"] = t.cuts.most;
+}
+
+void tell(SceneWriter &to, const Tool &t, const ToolValues &v) {
+  const char *const name = t.name.c_str();
+  const std::string own[] = {t.name + ".shape", t.name + ".shaft"};
+  const auto is_own = [&](const auto &o) { return !o->added || o->name == own[0] || o->name == own[1]; };
+  if (!std::all_of(to.w.obstacles.begin(), to.w.obstacles.end(),
+                   [&](const auto &o) { return o->rigid != t.set || is_own(o); }))
+    to.note("tool '%s': the shapes that were added to its parts are left out", name);
+  if (t.device.read) to.note("tool '%s': its device is left out; in the scene the tool stands", name);
+  const bool led = !t.keys.empty() || !t.opening_keys.empty();
+  if (led && ((v.keyed == 0 && !t.keys.empty()) || (v.opening_keyed == 0 && !t.opening_keys.empty())))
+    to.note("tool '%s': the host leads it now and not its keys, which are left out", name);
+}
+
+}  // namespace
+
+Written write_tool(SceneWriter &to, const Tool &t) {
+  to.check_name("tool", t.name);
+  const ToolValues v = t.values();
+  Written out;
+  out["name"] = t.name;
+  out["id"] = t.set->obstacle[0];
+  write_sizes(to, t, out);
+  write_motion(t, v, out);
+  write_opening(t, v, out);
+  write_coupling(t, out);
+  write_cuts(to, t, out);
+  const auto touched = std::find_if(to.w.obstacles.begin(), to.w.obstacles.end(),
+                                    [&](const auto &o) { return o->id == t.set->obstacle[0]; });
+  if (const std::string key = to.material((*touched)->material, (*touched)->zone.friction); !key.empty())
+    out["material"] = key;
+  tell(to, t, v);
+  return out;
+}
+
+}  // namespace dfm::writing
