@@ -137,7 +137,7 @@ void Acceleration::start(const ContactRows &rows) {
   std::copy(rows.impulse.begin(), rows.impulse.end(), from_.begin());
 }
 
-void Acceleration::follow(ContactRows &rows) {
+void Acceleration::follow(ContactRows &rows, bool leaps) {
   const ContactKernels &loops = rows.kernels();
   std::fill(now_.begin(), now_.end(), 0.0);
   std::copy(rows.impulse.begin(), rows.impulse.end(), now_.begin());
@@ -165,7 +165,7 @@ void Acceleration::follow(ContactRows &rows) {
   first_ = false;
   last_ = size;
 
-  if (count_ > 0 && least_combination(count_, gram_, y, gamma)) {
+  if (leaps && count_ > 0 && least_combination(count_, gram_, y, gamma)) {
     loops.combine(n_, count_, gamma, dg_.data(), now_.data());
     leap(rows, now_.data());
   }

@@ -31,7 +31,8 @@ class Acceleration {
  public:
   explicit Acceleration(const Memory &memory);
   void start(const ContactRows &rows);  // before the first sweep of a pass
-  void follow(ContactRows &rows);       // after a sweep that another one follows
+  // After a sweep that another one follows. leaps: false: the next sweep starts where this one has ended.
+  void follow(ContactRows &rows, bool leaps = true);
 
  private:
   static constexpr uint32_t kWindow = kAndersonWindow;

@@ -9,6 +9,7 @@ StepContext::StepContext(const Meters &meters)
       acceleration(meters.contacts.memory()),
       momentum(meters.contacts.memory()),
       proximal(meters.contacts.memory()),
+      redundant(meters.contacts.memory()),
       batches(meters.contacts.memory()),
       areas(meters.contacts.memory()),
       exchange(meters.contacts.memory()),

@@ -9,6 +9,7 @@
 #include "contact/distribute.h"
 #include "contact/exchange.h"
 #include "contact/proximal.h"
+#include "contact/redundant.h"
 #include "contact/renewal.h"
 #include "contact/solver.h"
 #include "contact/store.h"
@@ -67,6 +68,7 @@ struct StepContext {
   Acceleration acceleration;
   Momentum momentum;
   Proximal proximal;
+  Redundant redundant;
   Tolerance tolerance;
   Residual residual;
   uint32_t passes = 0, sweeps = 0;

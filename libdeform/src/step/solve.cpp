@@ -200,21 +200,33 @@ void settle(World &w, StepContext &step, const Tolerance &tolerance, double &bes
   step.rows.restore();
 }
 
+// Whether velocities still move is asked after every so many sweeps, once the polish is over, and of laws
+// without memory: what is left over stretches bristles.
+constexpr uint32_t kAskStands = 4;
+bool asks_redundant(StepContext &step) {
+  return step.bodies_revise && step.sweeps >= kPolish && step.sweeps % kAskStands == 0 &&
+         !step.batches.remembers() && step.redundant.found(step.rows);
+}
+
 // Sweeps on the laws as they were last answered. At the cap the best state seen is taken, not the last one.
-void sweep_until_good(World &w, StepContext &step, Acceleration &acceleration, const Tolerance &tolerance) {
+void sweep_until_good(World &w, StepContext &step, Acceleration &acceleration, Tolerance &tolerance) {
   const uint32_t cap = asks_beyond(w, step) ? step.sweeps + kPassSweeps : w.def.max_sweeps;
   double best = std::numeric_limits<double>::infinity();
   step.best_impulse.assign(step.rows.impulse.begin(), step.rows.impulse.end());
   acceleration.start(step.rows);
+  bool asks = false;
   for (double before = leave_of(step, tolerance);;) {
     charge(w, step, step.rows.all());
     const double leave = leave_of(step, tolerance);
     if (leave > before) acceleration.start(step.rows);
     before = leave;
+    if (asks) step.redundant.note(step.rows);
     const uint32_t passes = sweep(step.rows, step.state, step.h, kBondShare * tolerance.bond, leave);
     charge(w, step, uint64_t{passes} * step.rows.nbond);
     ++step.sweeps;
-    const Residual left = inner_residual(step.rows, step.state, step.h, tolerance);
+    Residual left = inner_residual(step.rows, step.state, step.h, tolerance);
+    if (asks && left.due > 0.5 && step.redundant.stands(step.rows, step.state, step.h, tolerance))
+      left = inner_residual(step.rows, step.state, step.h, tolerance);
     if (!(left.due <= kRunsAway * std::max(1.0, best)) || !(left.due < std::numeric_limits<double>::max())) {
       step.rows.impulse.assign(step.best_impulse.begin(), step.best_impulse.end());
       return step.rows.restore();
@@ -225,7 +237,9 @@ void sweep_until_good(World &w, StepContext &step, Acceleration &acceleration, c
       step.best_impulse.assign(step.rows.impulse.begin(), step.rows.impulse.end());
     }
     if (!may_sweep(w, step, left, cap)) break;
-    acceleration.follow(step.rows);
+    // what stands is seen from one plain sweep to the next
+    asks = asks_redundant(step);
+    acceleration.follow(step.rows, !asks);
   }
   if (std::isinf(best)) return;
   for (uint32_t i = 0; i < step.rows.all(); ++i) {
@@ -309,9 +323,11 @@ const LawInstance *solve_rows(World &w, StepContext &step) {
     }
     if (const LawInstance *bad = step.batches.slopes(step.h, step.state)) return bad;
     if (step.batches.differences()) linearize(step.rows, step.h, step.state);
-    if (!step.sweeps)
+    if (!step.sweeps) {
       set_tolerance(step.rows, step.state, step.contacts, step.h, bounds,
                     static_cast<uint32_t>(w.bodies.size()), step.disturbance, step.tolerance);
+      step.redundant.allow(step.tolerance);
+    }
     // at least one sweep on a warm start is part of the method
     sweep_until_good(w, step, step.acceleration, step.tolerance);
   }
@@ -460,6 +476,7 @@ bool stage_solve(World &w, StepContext &step, uint32_t *trouble) {
   step.residual = {};
   make_rows(w, step);
   apply_last(step.rows);
+  step.redundant.start();
   if (step.rows.all() == 0) {
     w.stats.passes = w.stats.sweeps = 0;
     w.stats.residual = 0;
