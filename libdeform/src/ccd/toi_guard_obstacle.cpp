@@ -37,6 +37,31 @@ ToiHit surfel_touch(const ObstacleShape &shape, Vec3 from, Vec3 way, double dist
   return {t, {1, 0, 0}, 0};
 }
 
+// Whether an edge or a triangle reaches into a box as it stands at the start: no axis separates the two.
+bool reaches_in(const ObstacleShape &box, std::span<const dfm_motion> corners) {
+  const Vec3 half = box.view().half_size;
+  const size_t n = corners.size();
+  Vec3 p[3];
+  for (size_t k = 0; k < n; ++k) p[k] = box.local(load3(corners[k].p0));
+  const auto apart = [&](Vec3 axis) {
+    double low = HUGE_VAL, high = -HUGE_VAL, reach = 0;
+    for (int i = 0; i < 3; ++i) reach += half[i] * std::fabs(axis[i]);
+    for (size_t k = 0; k < n; ++k) {
+      low = std::min(low, dot(axis, p[k]));
+      high = std::max(high, dot(axis, p[k]));
+    }
+    return low >= reach || high <= -reach;
+  };
+  const Vec3 unit[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  for (const Vec3 &axis : unit) {
+    if (apart(axis)) return false;
+    for (size_t k = 0; k < (n == 3 ? 3 : 1); ++k)
+      if (const Vec3 across = cross(axis, p[(k + 1) % n] - p[k]); norm2(across) > 0 && apart(across))
+        return false;
+  }
+  return n < 3 || !apart(cross(p[1] - p[0], p[2] - p[0]));
+}
+
 class Judge {
  public:
   Judge(GuardScene &scene, Array<GuardHit> &out) : scene_(scene), out_(out) {}
@@ -126,7 +151,12 @@ class Judge {
     if (m.far_apart(scene_.floor) || !(m.distance(0) > 0)) return;
     GuardHit hit{candidate, part, 0, 0, 0, {}};
     const auto touch = [&](double d, double within) { return m.touch(d, within); };
-    keep(narrow::judge(touch, [&] { return m.distance(0); }, scene_.floor, scene_.margin, hit), hit);
+    const bool trips = narrow::judge(touch, [&] { return m.distance(0); }, scene_.floor, scene_.margin, hit);
+    // What is in the box already comes out of it past its edges and corners: kept off them it would be kept
+    // in, against contacts that lead it out.
+    const bool box = frame_->shape.view().shape == Shape::box;
+    if (trips && box && reaches_in(frame_->shape, {m.m + (m.edges ? 0 : 1), m.edges ? 2u : 3u})) return;
+    keep(trips, hit);
   }
   bool keep(bool trips, const GuardHit &hit) {
     if (!trips) return false;
