@@ -135,9 +135,9 @@ DFM_API dfm_status dfm_tool_teleport(dfm_tool tool, const dfm_pose *pose);
 
 /** What the world did to the tool in the last step: contact, friction and attachments, on all parts.
  * Impulses are summed over all sub-steps and divided by the length of the step, so that H times the force is
- * what the tool has given to bodies and taken from them, to rounding.
+ * the momentum that bodies gave to the tool, and H times the torque the angular momentum, to rounding.
  * @param force   [3] N on the tool, in its frame as it stands now
- * @param torque  [3] N m on the tool, about its origin, in that frame
+ * @param torque  [3] N m on the tool, about its origin as it stands now, in that frame
  * @return DFM_OK (zero before the first step); DFM_E_ARG; DFM_E_HANDLE. Threads: Any thread. Not during
  * step. Since 0.1. */
 DFM_API dfm_status dfm_tool_force(dfm_tool tool, double force[3], double torque[3]);

@@ -24,6 +24,7 @@
 #include "step/method.h"
 #include "step/self_contact.h"
 #include "step/stages.h"
+#include "step/tool_touch.h"
 
 namespace dfm {
 
@@ -90,6 +91,7 @@ struct StepContext {
   Array<uint8_t> near;              // [bodies] had contacts in the last sub-step
   Array<uint8_t> touching;          // [bodies] touch something, between steps
   const Body *unsettled = nullptr;  // that has found no state with its contacts
+  ToolTouch tools;                  // with each other
   // a host has answered, and the solve goes on from its last impulses
   bool rigid_again = false;
   AreaShares areas;

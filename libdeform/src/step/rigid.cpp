@@ -86,6 +86,7 @@ bool stage_rigid_predict(World &w, StepContext &step, uint32_t *trouble) {
   step.rigid_again = false;
   for (auto &set : w.rigid_sets) set->begin(sub_step_of(w, step));
   if (!ask_rigids(w, trouble)) return false;
+  step.tools.begin(w, step);
   for (auto &set : w.rigid_sets) set->first.assign(set->velocity.begin(), set->velocity.end());
   for (auto &o : w.obstacles) {
     if (!o->rigid || o->rigid->group[o->rigid_body] == DFM_RIGID_STILL) continue;
@@ -202,12 +203,16 @@ int ask_rigid_ends(World &w, uint32_t *trouble) {
 bool stage_rigid_commit(World &w, StepContext &step, uint32_t *trouble) {
   for (uint32_t round = 0;; ++round) {
     sum_rigid_impulses(w, step);
+    const bool differ = step.tools.answer();
     const int end = ask_rigid_ends(w, trouble);
     if (end == 0) return false;
-    if (end == 1 || round == DFM_RIGID_MOST_AGAIN || !w.plan.touches() || step.rows.all() == 0) break;
+    if ((end == 1 && !differ) || round == DFM_RIGID_MOST_AGAIN || !w.plan.touches() || step.rows.all() == 0)
+      break;
     step.rigid_again = true;
     ++w.stats.rigid_again;
-    if (!ask_rigids(w, trouble) || !stage_solve(w, step, trouble)) return false;
+    if (!ask_rigids(w, trouble)) return false;
+    step.tools.correct();
+    if (!stage_solve(w, step, trouble)) return false;
   }
   step.rigid_again = false;
   // What is looked at from here on (the guard) sees how they truly move.

@@ -97,6 +97,7 @@ void begin_tools(World &w, double dt) {
     v.goal = w.time + dt;
     v.time = 0;
     std::fill(v.contact, v.contact + 6, 0.0);
+    store3(v.about, place_of(t->set->state[0]).position);
     std::fill(v.coupling, v.coupling + 6, 0.0);
     t->store(v);
   }

@@ -357,10 +357,12 @@ dfm_tool_state tool_state(const Tool &t) {
 
 void tool_force(const Tool &t, double force[3], double torque[3]) {
   const ToolValues v = t.values();
-  const Quat frame = place_of(t.set->state[0]).rotation;
+  const ToolPlace now = place_of(t.set->state[0]);
   const double per = v.time > 0 ? 1 / v.time : 0;
-  store3(force, rotate_back(frame, per * load3(v.contact)));
-  store3(torque, rotate_back(frame, per * load3(v.contact + 3)));
+  const Vec3 p = per * load3(v.contact);
+  const Vec3 moment = per * load3(v.contact + 3) - cross(now.position - load3(v.about), p);
+  store3(force, rotate_back(now.rotation, p));
+  store3(torque, rotate_back(now.rotation, moment));
 }
 
 // The device gets what the coupling did to the tool, the other way, at its own origin: the spring and the

@@ -153,7 +153,9 @@ void ToolHost::commit(const dfm_rigid_step &step, const double *impulse, dfm_rig
     held_turn += motion_.inertia * (mean.spin - load3(step.state[0].spin));
   }
   store3(v.contact, load3(v.contact) + p);
-  store3(v.contact + 3, load3(v.contact + 3) + turn);
+  // about a point that stands through the step: the origin moves from sub-step to sub-step
+  store3(v.contact + 3,
+         load3(v.contact + 3) + turn + cross(load3(step.state[0].position) - load3(v.about), p));
   store3(v.coupling, load3(v.coupling) + held);
   store3(v.coupling + 3, load3(v.coupling + 3) + held_turn);
   v.work += (dot(held, way) + dot(held_turn, turned_by)) / step.h;

@@ -41,7 +41,9 @@ struct ToolValues {
   double goal;                     // s
   double opening, target_opening;  // rad
   double keyed, opening_keyed;     // 1: keys lead
-  double contact[6], coupling[6];  // N s and N m s on the tool, about its origin, world frame
+  double contact[6];               // N s and N m s on the tool, about `about`, world frame
+  double about[3];                 // m, where its origin was when the step began
+  double coupling[6];              // N s and N m s on the tool, about its origin as it moved
   double time;                     // s of the step that are done
   double work;                     // J since the tool was made
   double port_work;                // J, with `given` held while the hand makes a step
