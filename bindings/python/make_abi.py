@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Writes deform/_abi.py, the C interface as ctypes has it, from the public headers: constants, structs, and
-the argument and result types of every function.
+"""Writes deform/_abi.py and deform/_abi_functions.py, the C interface as ctypes has it, from the public
+headers: constants and structs; the argument and result types of every function.
 
-make_abi.py INCLUDE_DIR OUT.py           writes
-make_abi.py INCLUDE_DIR OUT.py --check   exit 1 where OUT.py is not what would be written
+make_abi.py INCLUDE_DIR OUT.py           writes OUT.py and, beside it, OUT_functions.py
+make_abi.py INCLUDE_DIR OUT.py --check   exit 1 where the two are not what would be written
 """
 import pathlib
 import re
@@ -11,7 +11,7 @@ import sys
 import textwrap
 
 HEADERS = ("plugin base id math world body contact attach surface mesh scene obstacle law material model "
-           "rigid toi debug query callback sensor cut").split()
+           "rigid toi debug query callback sensor cut tool").split()
 SCALARS = {"double": "f64", "float": "f32", "uint64_t": "u64", "uint32_t": "u32", "int32_t": "i32",
            "uint8_t": "u8", "size_t": "usize", "bool": "flag", "int": "cint", "dfm_status": "i32"}
 HEAD = '''"""The C interface of libdeform for ctypes. Written by make_abi.py from the public headers: change
@@ -19,6 +19,11 @@ those."""
 from ctypes import (Structure as _Structure, c_bool as flag, c_char_p as text,
                     c_double as f64, c_float as f32, c_int as cint, c_int32 as i32, c_size_t as usize,
                     c_uint8 as u8, c_uint32 as u32, c_uint64 as u64, c_void_p as ptr)
+'''
+FUNCTIONS_HEAD = '''"""The functions of libdeform for ctypes.
+
+Written by make_abi.py from the public headers: change those.
+"""
 '''
 
 
@@ -125,7 +130,16 @@ class Interface:
             wrapped = textwrap.wrap(f"_fields_ = [{fields}]", 100, initial_indent="    ",
                                     subsequent_indent="                ", break_long_words=False)
             lines += [re.sub(r'(",)(?=[\w])', r"\1 ", line.replace("~", " ")) for line in wrapped]
-        lines.append("\n\n# name: (result, arguments)\nFUNCTIONS = {")
+        return "\n".join(lines) + "\n"
+
+    def functions_source(self, module):
+        """With the names of types that it needs, from the other file."""
+        used = sorted({kind for _, result, arguments in self.functions for kind in (result, *arguments)}
+                      - {"None"})
+        lines = [FUNCTIONS_HEAD]
+        lines += textwrap.wrap(f"from .{module} import ({', '.join(used)})", 108,
+                               subsequent_indent=" " * len(f"from .{module} import ("))
+        lines.append("\n# name: (result, arguments)\nFUNCTIONS = {")
         for name, kind, arguments in self.functions:
             lines += textwrap.wrap(f'"{name}": ({kind}, [{", ".join(arguments)}]),', 108,
                                    initial_indent="    ", subsequent_indent="        ",
@@ -135,11 +149,14 @@ class Interface:
 
 def main():
     include, out = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
-    source = Interface(include).source()
-    if "--check" not in sys.argv[3:]:
-        out.write_text(source)
-    elif not out.exists() or out.read_text() != source:
-        sys.exit(f"{out} is not what the headers say; run bindings/python/make_abi.py {include} {out}")
+    interface = Interface(include)
+    sources = {out: interface.source(),
+               out.with_name(f"{out.stem}_functions.py"): interface.functions_source(out.stem)}
+    for path, source in sources.items():
+        if "--check" not in sys.argv[3:]:
+            path.write_text(source)
+        elif not path.exists() or path.read_text() != source:
+            sys.exit(f"{path} is not what the headers say; run bindings/python/make_abi.py {include} {out}")
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ from ._context import Context, Parameter, PluginType, default_context
 from ._library import (ArgumentError, BusyError, Discarded, Diverged, Error, FileError, FormatError,
                        HandleError, OutOfMemory, StateError, UnsupportedError, include_dir, quick as _quick,
                        template_dir)
-from .body import Body, Obstacle, Rigid
+from .body import Body, CutInfo, Obstacle, Rigid
 from ._command import command, cost, explain
 from .rig import friction, plot_friction
 from .law import Law, PythonLaw
@@ -21,13 +21,15 @@ from .mesh import TetMesh, TriMesh
 from .picture import Picture
 from .query import ContactChoice, Filter, Hit, Shape
 from .scene import Run, Scene, run
+from .tool import Tool
 from .world import JointDef, Material, RigidDef, Trouble, World
 
 __version__: str = _quick.dfm_version(None, None, None).decode()
 
-__all__ = ["ArgumentError", "Body", "BusyError", "ContactChoice", "Context", "Discarded", "Diverged",
-           "Error", "FileError", "Filter", "FormatError", "HandleError", "Hit", "JointDef", "Law",
-           "Material", "Obstacle", "OutOfMemory", "Parameter", "Picture", "PluginType", "PythonLaw",
-           "Rigid", "RigidDef", "Run", "Scene", "Shape", "StateError", "TetMesh", "TriMesh", "Trouble",
-           "UnsupportedError", "World", "command", "cost", "default_context", "explain", "friction",
-           "include_dir", "plot_friction", "run", "template_dir"]
+__all__ = ["ArgumentError", "Body", "BusyError", "ContactChoice", "Context", "CutInfo",
+           "Discarded", "Diverged", "Error", "FileError", "Filter", "FormatError", "HandleError",
+           "Hit", "JointDef", "Law", "Material", "Obstacle", "OutOfMemory", "Parameter",
+           "Picture", "PluginType", "PythonLaw", "Rigid", "RigidDef", "Run", "Scene", "Shape",
+           "StateError", "TetMesh", "Tool", "TriMesh", "Trouble", "UnsupportedError", "World",
+           "command", "cost", "default_context", "explain", "friction", "include_dir",
+           "plot_friction", "run", "template_dir"]

@@ -21,16 +21,19 @@ def row_type(struct: Any) -> np.dtype:
 
 
 class Column:
-    """One array of a fixed number of rows, filled again at each look."""
+    """One array, filled again at each look. A look gives None where the number of rows is another one."""
 
     def __init__(self, function: Any, handle: int, rows: int, width: int, kind: Any = np.float64):
         self.view = np.zeros((rows, width) if width else rows, dtype=kind)
         self.view.flags.writeable = False  # for Python; the library has the address
         self._function = function
-        self._arguments = (handle, rows, self.view.ctypes.data, None)
+        self._rows, self._count = rows, ctypes.c_uint32(rows)
+        self._arguments = (handle, rows, self.view.ctypes.data, ctypes.byref(self._count))
 
-    def look(self) -> np.ndarray:
+    def look(self) -> np.ndarray | None:
         status = self._function(*self._arguments)
+        if self._count.value != self._rows:
+            return None
         if status < 0:
             check(status)
         return self.view

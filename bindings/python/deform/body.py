@@ -2,13 +2,14 @@
 from __future__ import annotations
 
 import ctypes
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Mapping, Sequence
 
 import numpy as np
 
 from . import _abi
 from ._arrays import Column, Report
-from ._context import number_of
+from ._context import choice, number_of
 from ._library import ArgumentError, check, default, lib, quick, sized
 from .mesh import points_of
 
@@ -17,6 +18,30 @@ if TYPE_CHECKING:
     from .world import World
 
 EVERYTHING = 0xFFFFFFFF
+CUT_SHAPES = {"ellipsoid": 0, "box": 1, "blade": 2}
+CUT_WAYS = {"remove": 0, "split": 1}
+
+
+@dataclass
+class CutInfo:
+    """What a cut has done: cells that have gone, `left` by its limit, points that were copied, parts that
+    the body consists of now, area of the new surface m2 (both sides, at rest); mass kg, momentum [3] N s,
+    kinetic and elastic energy J that have gone (elastic nan where the model tells none)."""
+
+    cells: int
+    left: int
+    points: int
+    parts: int
+    area: float
+    mass: float
+    momentum: np.ndarray
+    kinetic: float
+    elastic: float
+
+    @classmethod
+    def of(cls, info: _abi.dfm_cut_info) -> CutInfo:
+        return cls(info.cells, info.left, info.points, info.parts, info.area, info.mass,
+                   np.array(info.momentum), info.kinetic, info.elastic)
 
 
 def vector(values: Any, what: str, width: int = 3) -> Any:
@@ -51,7 +76,11 @@ class _Part:
         column = self._columns.get(key)
         if column is None:
             column = self._columns[key] = make()
-        return column.look()
+        array = column.look()
+        if array is None:  # the body has been cut since
+            column = self._columns[key] = make()
+            array = column.look()
+        return array
 
     @property
     def is_sensor(self) -> bool:
@@ -90,12 +119,34 @@ class Body(_Part):
     """
 
     def __init__(self, world: World, handle: int):
-        info = sized(_abi.dfm_body_info)
-        check(quick.dfm_body_get_info(handle, ctypes.byref(info)))
-        super().__init__(world, handle, info.name.decode())
-        self.npoint, self.ntet, self.nsurfel = info.npoint, info.ntet, info.nsurfel
-        self.ntriangle = info.ntriangle
-        self._triangles: np.ndarray | None = None
+        self._info = sized(_abi.dfm_body_info)
+        check(quick.dfm_body_get_info(handle, ctypes.byref(self._info)))
+        super().__init__(world, handle, self._info.name.decode())
+
+    def _number(self, what: str) -> int:
+        """Of now, or of the last look where the body is gone."""
+        quick.dfm_body_get_info(self.handle, ctypes.byref(self._info))
+        return int(getattr(self._info, what))
+
+    @property
+    def npoint(self) -> int:
+        """Number of points; a cut changes it."""
+        return self._number("npoint")
+
+    @property
+    def ntet(self) -> int:
+        """Number of cells; a cut changes it."""
+        return self._number("ntet")
+
+    @property
+    def nsurfel(self) -> int:
+        """Number of surface points; a cut changes it."""
+        return self._number("nsurfel")
+
+    @property
+    def ntriangle(self) -> int:
+        """Number of surface triangles; a cut changes it."""
+        return self._number("ntriangle")
 
     def _surface(self, key: str, function: Any) -> np.ndarray:
         return self._look(key, lambda: Column(function, self.handle, self.nsurfel, 3))
@@ -122,12 +173,10 @@ class Body(_Part):
 
     @property
     def triangles(self) -> np.ndarray:
-        """Surface triangles, [ntriangle,3] numbers of surface points, counter-clockwise from outside."""
-        if self._triangles is None:
-            self.world.free()
-            column = Column(quick.dfm_surface_triangles, self.handle, self.ntriangle, 3, np.uint32)
-            self._triangles = column.look()
-        return self._triangles
+        """Surface triangles, [ntriangle,3] numbers of surface points, counter-clockwise from outside; a
+        view."""
+        return self._look("triangles", lambda: Column(quick.dfm_surface_triangles, self.handle,
+                                                      self.ntriangle, 3, np.uint32))
 
     def _state(self, which: int) -> np.ndarray:
         def fill(handle: int, rows: int, address: int, count: Any) -> int:
@@ -180,14 +229,16 @@ class Body(_Part):
     @property
     def energy_density(self) -> np.ndarray:
         """Of each cell, [ntet] J/m3; a view."""
-        def fill(handle: int, rows: int, address: int, _count: Any) -> int:
+        def fill(handle: int, rows: int, address: int, count: Any) -> int:
+            count._obj.value = self.ntet
             return quick.dfm_body_energy_density(handle, rows, address)
         return self._look("energy_density", lambda: Column(fill, self.handle, self.ntet, 0))
 
     @property
     def stress(self) -> np.ndarray:
         """Cauchy stress of each cell, [ntet,6] Pa: xx yy zz xy yz zx, world axes, tension > 0; a view."""
-        def fill(handle: int, rows: int, address: int, _count: Any) -> int:
+        def fill(handle: int, rows: int, address: int, count: Any) -> int:
+            count._obj.value = self.ntet
             return quick.dfm_body_stress(handle, rows, address)
         return self._look("stress", lambda: Column(fill, self.handle, self.ntet, 6))
 
@@ -320,6 +371,52 @@ class Body(_Part):
         self.world.free()
         check(quick.dfm_body_get_attachment(self.handle, number, ctypes.byref(out)))
         return out
+
+    def cut(self, shape: str = "blade", *, corners: Any = None, position: Any = (0, 0, 0),
+            rotation: Any = (0, 0, 0, 1), half_size: Any = (0, 0, 0), motion: Any = (0, 0, 0),
+            how: str | None = None, most: int = 0) -> CutInfo:
+        """Cuts the body between two steps. Points and cells get new numbers (origins).
+
+        shape: a "blade" has corners [4,3] m in the world: an edge from 0 to 1, which has come to 3 and 2. An
+        "ellipsoid" or a "box" has half_size [3] m (semi-axes, half edges) at position [3] m with rotation (a
+        quaternion x, y, z, w), and goes by motion [3] m. how: "split" opens the faces that a blade crosses,
+        "remove" takes the cells that the shape meets; None: "split" of a blade. most: faces or cells, 0: all.
+        UnsupportedError where the model needs all of its cells: msm and corotational_fem do not."""
+        definition = default(_abi.dfm_cut_def)
+        definition.shape = CUT_SHAPES[choice("shape", shape, CUT_SHAPES)]
+        word = how if how is not None else "split" if shape == "blade" else "remove"
+        definition.how = CUT_WAYS[choice("how", word, CUT_WAYS)]
+        if (shape == "blade") != (corners is not None):
+            raise ArgumentError("a blade needs corners [4,3], and no other shape has them", "DFM_E_ARG")
+        if corners is not None:
+            definition.blade = vector(corners, "corners", 12)
+        definition.pose = pose_of(position, rotation)
+        definition.half_size, definition.motion = vector(half_size, "half_size"), vector(motion, "motion")
+        definition.most = most
+        info = sized(_abi.dfm_cut_info)
+        with self.world.alone():
+            status = lib.dfm_body_cut(self.handle, ctypes.byref(definition), ctypes.byref(info))
+        check(status)
+        return CutInfo.of(info)
+
+    def remove_cells(self, cells: Any) -> CutInfo:
+        """Takes cells away by their numbers [n], between two steps."""
+        numbers, info = numbers_of(cells), sized(_abi.dfm_cut_info)
+        with self.world.alone():
+            status = lib.dfm_body_remove_cells(self.handle, numbers.size, numbers.ctypes.data,
+                                               ctypes.byref(info))
+        check(status)
+        return CutInfo.of(info)
+
+    @property
+    def origins(self) -> tuple[np.ndarray, np.ndarray]:
+        """Where points [npoint] and cells [ntet] come from: their numbers when the body was made. Copies of
+        a point have its number."""
+        points, cells = np.empty(self.npoint, np.uint32), np.empty(self.ntet, np.uint32)
+        self.world.free()
+        check(quick.dfm_body_origins(self.handle, len(points), points.ctypes.data, len(cells),
+                                     cells.ctypes.data))
+        return points, cells
 
     def wake(self) -> None:
         self.world.free()

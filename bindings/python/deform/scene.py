@@ -126,6 +126,7 @@ class Frame:
     probes: dict[str, np.ndarray]
     contacts: int
     sticking: int
+    triangles: dict[str, np.ndarray]  # [ntriangle,3]; others than at the start where a body has been cut
 
 
 class Run:
@@ -147,7 +148,7 @@ class Run:
         """An empty one for a world that is stepped by hand; add() records a frame (World.film)."""
         run = cls(color, camera)
         run.world = world
-        run.triangles = {body.name: body.triangles for body in world.bodies}
+        run.triangles = {body.name: body.triangles.copy() for body in world.bodies}
         run.add()
         return run
 
@@ -163,7 +164,14 @@ class Run:
         self.frames.append(Frame(
             world.time, {name: bodies[name].positions.astype(np.float32) for name in self.triangles},
             {name: body_values(bodies[name], self.color) for name in self.triangles}, solids(world),
-            dict(probes or {}), int(stats.contacts), int(stats.sticking)))
+            dict(probes or {}), int(stats.contacts), int(stats.sticking),
+            {name: self._surface(body) for name, body in bodies.items()}))
+
+    def _surface(self, body: Any) -> np.ndarray:
+        """Triangles now: those of the frame before where no cut has changed them."""
+        last = self.frames[-1].triangles if self.frames else self.triangles
+        now = body.triangles
+        return last[body.name] if np.array_equal(last[body.name], now) else now.copy()
 
     @property
     def times(self) -> np.ndarray:
@@ -175,7 +183,7 @@ class Run:
         return np.array([frame.probes[name] for frame in self.frames])
 
     def positions(self, body: str) -> np.ndarray:
-        """Surface of a body in all frames, [n,nsurfel,3] m, float32."""
+        """Surface of a body in all frames, [n,nsurfel,3] m, float32; of a body that is not cut."""
         return np.stack([frame.positions[body] for frame in self.frames])
 
     def top(self) -> float:
@@ -189,15 +197,20 @@ class Run:
         shown, top = self.frames[frame], self.top()
         if eye is None and self.camera is not None:
             eye, look_at = self.camera
-        surfaces = [(shown.positions[name], self.triangles[name], palette(i),
+        surfaces = [(shown.positions[name], shown.triangles[name], palette(i),
                      scaled(shown.values[name], top, self.color)) for i, name in enumerate(self.triangles)]
         return draw(surfaces, shown.obstacles, size=size, eye=eye, look_at=look_at,
                     texts=[f"t = {shown.t:.3f} s"])
 
     def html(self, height: int = 480) -> str:
         """The run as one piece of HTML with WebGL in it: no server, no other file, nothing from the
-        network."""
+        network. It shows one surface per body: a run in which a body is cut has picture() instead."""
         from .webgl import html
+        for frame in self.frames:
+            for name, triangles in frame.triangles.items():
+                if triangles is not self.triangles[name]:
+                    raise ArgumentError(f"html() shows one surface per body, and '{name}' has been cut at "
+                                        f"{frame.t:.6g} s; draw single frames with picture(i)", "DFM_E_ARG")
         return html(self, height)
 
     def _repr_html_(self) -> str:
@@ -222,7 +235,7 @@ class _Runner:
         color = self.settings.color if self.settings.color in ("speed", "contact") else "body"
         out = self.run_ = Run(color, self.settings.camera)
         out.world = self.world
-        out.triangles = {body.name: body.triangles for body in self.world.bodies}
+        out.triangles = {body.name: body.triangles.copy() for body in self.world.bodies}
         self.record()
         while self.advance():
             self.steps += 1

@@ -20,6 +20,7 @@ from ._signals import watch
 from .body import EVERYTHING, Body, Obstacle, Rigid, pose_of, vector
 from .mesh import TetMesh, TriMesh, cells_of, points_of
 from .query import Queries
+from .tool import Tools
 
 METHODS = {"auto": 0, "velocity": 1, "implicit": 2, "rollback": 3}
 INTEGRATORS = {"auto": 0, "symplectic_euler": 1, "implicit_euler": 2, "tr_bdf2": 3}
@@ -130,7 +131,7 @@ class JointDef:
         return out
 
 
-class World(Queries):
+class World(Queries, Tools):
     """A world of soft bodies: build it, step it, look at it. SI units.
 
         with deform.World() as world:
@@ -600,7 +601,8 @@ class World(Queries):
         """What has begun and ended since the last look, a structured array [n], a view: kind, a, b, key, t s.
 
         kind: 1 and 2, a contact has begun and ended; 3, an attachment has ended (key: its number); 4 and 5,
-        something (b) has come into a sensor (a) and left it."""
+        something (b) has come into a sensor (a) and left it; 6, body a has torn (key: points that
+        were split); 7, part b of a tool has cut body a (key: faces or cells)."""
         return self._list("events", lambda: Rows(quick.dfm_world_events_sized, self.handle,
                                                  _abi.dfm_contact_event))
 
