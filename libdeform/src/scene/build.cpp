@@ -9,6 +9,7 @@
 #include "core/error.h"
 #include "core/handle.h"
 #include "dynamics/rigid/host.h"
+#include "scene/back_side.h"
 #include "scene/hand.h"
 #include "scene/jitter.h"
 #include "scene/load.h"
@@ -36,6 +37,7 @@ class Builder {
     create_world();
     for (Material &m : def_.materials) create_material(m);
     create_things();
+    tell_back_side(context_, resolve<World>(Kind::world, world_), load3(def_.gravity));
     for (const Tool &t : def_.tools) set_cuts(t);
     for (Friction &f : def_.friction) add_friction(f);
     for (const Filter &f : def_.filters)
