@@ -35,6 +35,11 @@ class Guides(unittest.TestCase):
         for picture in ("ball.png", "end.png"):
             self.assertEqual(pathlib.Path(picture).read_bytes()[:4], b"\x89PNG")
 
+    def test_cut(self):
+        names, _ = follow(HOWTO / "cut.md")
+        self.assertGreater(len(names["cuts"]), 5)
+        self.assertGreaterEqual(names["done"].parts, 3)
+
     def test_law_in_python_then_in_c(self):
         names, _ = follow(HOWTO / "python-law.md")
         self.assertLess(abs(names["ours"]["ft"] - names["compiled"]["ft"]).max(), 1e-12)
