@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "rigid.h"
 #include "stack.h"
 #include "support.h"
 
@@ -166,6 +167,34 @@ TEST(Snapshot, OfAHoldMeasure_GoesOnMeasuring) {
   EXPECT_EQ(n, m);
   EXPECT_EQ(creep, restored);
   EXPECT_TRUE(std::isfinite(creep));
+}
+
+// Edges of the bed's surface bear those of the box: the contact store keeps both numbers, and a box has edges
+// without a mesh.
+TEST(Snapshot, WhereEdgesBearThoseOfABox_ContinuesWithTheSameBits) {
+  test::Context c;
+  const dfm_world w = test::make_world(c);
+  test::BodyOptions o;
+  o.name = "bed";
+  o.young = 5e4;
+  o.damping_mass = 2;
+  o.damping_stiffness = 0.002;
+  o.position = {-0.2, -0.2, 0.001};
+  test::make_body(c, w, "beam", {0.4, 0.4, 0.1}, 300, o);
+  test::add_plane(w, "floor");
+  const dfm_rigid_def box = test::box("box", {0.05, 0.05, 0.05}, 1, {0, 0, 0.152});
+  const dfm_rigid_set_def set = {sizeof set, 1, 0, 0, &box, nullptr, nullptr};
+  dfm_rigid rigid = 0;
+  test::ok(dfm_rigid_create(w, nullptr, &set, &rigid));
+  steps(w, 50);
+  for (int k = 0; k < 5; ++k) {
+    const std::string data = snapshot(w);
+    steps(w, 50);
+    const uint64_t later = dfm_world_hash(w);
+    ASSERT_EQ(restore(w, data), DFM_OK) << dfm_last_error();
+    steps(w, 50);
+    EXPECT_EQ(dfm_world_hash(w), later);
+  }
 }
 
 TEST(Snapshot, DamagedCutOrForeign_IsRefusedAndChangesNothing) {

@@ -389,11 +389,11 @@ struct Things {
                                      [](const auto &x, uint64_t value) { return x->id < value; });
     return at != list.end() && (*at)->id == id ? at->get() : nullptr;
   }
-  // Edges of a body or of a mesh.
-  uint32_t edges(uint64_t id) const {
-    if (const Body *const b = body(id)) return b->surface.nedge;
+  // May an edge have this number? What a primitive calls its edges is compared, and indexes nothing.
+  bool edge(uint64_t id, uint32_t number) const {
+    if (const Body *const b = body(id)) return number < b->surface.nedge;
     const Obstacle *const o = obstacle(id);
-    return o && o->mesh ? o->mesh->surface.nedge : 0;
+    return o && (!o->mesh || number < o->mesh->surface.nedge);
   }
 };
 
@@ -412,7 +412,7 @@ bool good_contacts(const Staged &t, const Things &things) {
   if (c.crossings.size() > c.n || !std::is_sorted(c.crossings.begin(), c.crossings.end())) return false;
   for (const Crossing &x : c.crossings)
     if (things.known(x.id_a) && things.known(x.id_b) &&
-        (x.edge_a >= things.edges(x.id_a) || x.edge_b >= things.edges(x.id_b)))
+        !(things.edge(x.id_a, x.edge_a) && things.edge(x.id_b, x.edge_b)))
       return false;
   return true;
 }
