@@ -427,8 +427,9 @@ void add_run(CLI::App &app, Globals &globals, int *exit_code) {
   const auto positive = [](const std::string &text) {
     char *end = nullptr;
     const double x = std::strtod(text.c_str(), &end);
-    return *end == 0 && x > 0 && std::isfinite(x) ? std::string()
-                                                  : "expected a finite number above 0, found " + text;
+    return *end == 0 && x > 0 && std::isfinite(x)
+               ? std::string()
+               : "expected a finite number above 0, found \"" + text + "\"";
   };
   CLI::App *sub = app.add_subcommand("run", "simulates a scene and writes figures and pictures");
   sub->add_option("SCENE", options->scene, "scene file (JSON)")->required();

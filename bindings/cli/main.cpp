@@ -64,6 +64,15 @@ std::string not_a_number(const std::string &text, CLI::App *at) {
   return text;
 }
 
+// "--frames: 1 required FPS missing" becomes "--frames needs a value: FPS".
+std::string value_missing(const std::string &text, const CLI::App *at) {
+  for (const CLI::Option *option : at->get_options())
+    if (text.rfind(option->get_name() + ": ", 0) == 0 && text.find(" required ") != std::string::npos)
+      return option->get_name() + (option->get_type_size() > 1 ? " needs values: " : " needs a value: ") +
+             option->get_type_name();
+  return text;
+}
+
 int bad_usage(CLI::App &app, const CLI::ParseError &error) {
   CLI::App *at = reached(&app);
   std::string text = error.what();
@@ -84,6 +93,7 @@ int bad_usage(CLI::App &app, const CLI::ParseError &error) {
     }
   }
   if (dynamic_cast<const CLI::ConversionError *>(&error)) text = not_a_number(text, at);
+  if (dynamic_cast<const CLI::ArgumentMismatch *>(&error)) text = value_missing(text, at);
   std::replace(text.begin(), text.end(), '\n', ' ');
   return fail(text + " (see: " + path_of(at) + " --help)");
 }

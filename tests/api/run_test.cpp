@@ -431,6 +431,15 @@ TEST(Run, Frames_WithoutABackendAreAWarning) {
   EXPECT_NE(value(r.summary, "warnings").find("no pictures"), std::string::npos);
 }
 
+TEST(Run, OptionWithoutItsValue_SaysWhatIsMissing) {
+  EXPECT_EQ(test::deform({"run", "x.json", "--frames"}).err,
+            "deform: --frames needs a value: FPS (see: deform run --help)\n");
+  EXPECT_EQ(test::deform({"run", "x.json", "--save", "1"}).err,
+            "deform: --save needs values: T FILE (see: deform run --help)\n");
+  EXPECT_EQ(test::deform({"run", "x.json", "--frames", "often"}).err,
+            "deform: --frames: expected a finite number above 0, found \"often\" (see: deform run --help)\n");
+}
+
 TEST(Run, EverySubcommand_HasHelp) {
   for (const char *command : {"run", "explain", "mesh", "plugin", "friction", "cost", "ccd"}) {
     const test::CommandResult result = test::deform({command, "--help"});

@@ -184,14 +184,14 @@ TEST(SceneStart, BodyAboveTheBackOfAnOpenMesh_IsWarnedOf) {
   test::write_file(folder + "/up.obj", points + "f 1 2 3\nf 1 3 4\n");
   test::write_file(folder + "/down.obj", points + "f 1 3 2\nf 1 4 3\n");
   const auto log = [&](const std::string &mesh, double height, const char *turn = "0") {
-    test::write_file(
-        folder + "/scene.json",
-        R"({"format": "deform-scene", "version": 1, "time": {"duration": 1e-6, "step": 1e-6},
+    test::write_file(folder + "/scene.json",
+                     R"({"format": "deform-scene", "version": 1, "time": {"duration": 1e-6, "step": 1e-6},
     "bodies": [{"name": "brick", "mesh": {"make": "beam", "size": [0.2, 0.1, 0.1], "cells": 60},
                 "pose": {"position": [0.3, 0, )" +
-            std::to_string(height) + R"(]}}],
-    "obstacles": [{"name": "tray", "shape": "mesh", "mesh": ")" + mesh +
-            R"(", "pose": {"rotation": {"axis": [1, 0, 0], "angle_deg": )" + turn + "}}}]}");
+                         std::to_string(height) + R"(]}}],
+    "obstacles": [{"name": "tray", "shape": "mesh", "mesh": ")" +
+                         mesh + R"(", "pose": {"rotation": {"axis": [1, 0, 0], "angle_deg": )" + turn +
+                         "}}}]}");
     return test::deform({"run", folder + "/scene.json", "--out", folder + "/out"}).err;
   };
   EXPECT_NE(log("down.obj", 1).find("body 'brick' would fall on the back of obstacle 'tray'"),
