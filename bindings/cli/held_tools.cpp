@@ -31,13 +31,6 @@ void turn_between(const double from[4], const double to[4], double out[3]) {
   for (int k = 0; k < 3; ++k) out[k] = s > 0 ? sign * angle * q[k] / s : 0;
 }
 
-void turned(const double from[4], const double turn[3], double out[4]) {
-  const double angle = std::sqrt(turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2]);
-  const double s = angle > 0 ? std::sin(0.5 * angle) / angle : 0;
-  const double q[4] = {s * turn[0], s * turn[1], s * turn[2], std::cos(0.5 * angle)};
-  product(q, from, out);
-}
-
 double length(const double v[3]) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
 
 // Of a way, in a step of h at that speed at most.
@@ -53,6 +46,13 @@ std::vector<double> numbers(const JsonValue &line, const char *key, size_t n) {
 }
 
 }  // namespace
+
+void turned(const double from[4], const double turn[3], double out[4]) {
+  const double angle = std::sqrt(turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2]);
+  const double s = angle > 0 ? std::sin(0.5 * angle) / angle : 0;
+  const double q[4] = {s * turn[0], s * turn[1], s * turn[2], std::cos(0.5 * angle)};
+  product(q, from, out);
+}
 
 HeldTools::Held &HeldTools::held(const std::string &name) {
   for (Held &h : held_)

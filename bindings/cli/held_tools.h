@@ -9,6 +9,9 @@
 
 namespace cli {
 
+// A rotation (x, y, z, w) turned further by a rotation vector in the world frame.
+void turned(const double from[4], const double turn[3], double out[4]);
+
 class HeldTools {
  public:
   explicit HeldTools(const SceneFile &scene) : scene_(scene) {}

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 
 #include "json_text.h"
@@ -94,6 +95,7 @@ App::App(const Options &options, const cli::Globals &globals)
   window_ = Window::open(options.width, options.height,
                          "deform view " + std::filesystem::path(path).filename().string(), !script_);
   window_->size(width_, height_);
+  if (!script_ || std::getenv("DEFORM_VIEW_SPNAV")) space_mouse_ = SpaceMouse::open(no_space_mouse_);
   render::Scene picture;
   stage_->drawing.fill(picture);
   orbit_.set(first_camera(stage_->scene, picture, height_ > 0 ? aspect() : 1));
@@ -120,7 +122,7 @@ void App::run() {
 }
 
 void App::frame() {
-  const bool idle = !script_ && !running_ && held_ < 0 && !stage_->pull.holds();
+  const bool idle = !script_ && !running_ && held_ < 0 && !space_mouse_ && !stage_->pull.holds();
   std::vector<Input> inputs = window_->poll(idle ? 0.05 : 0);
   std::vector<ScriptLine> due;
   const double now = window_->now();
@@ -138,6 +140,7 @@ void App::frame() {
     if (line.kind == ScriptLine::slider) set_slider(line.name, line.value);
   attempt([&] {
     pull_to_mouse();
+    lead_by_space_mouse(script_ ? double(frames_) * kFrame : now);
     advance(seconds);
   });
   stage_->plots.sample();

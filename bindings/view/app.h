@@ -16,6 +16,7 @@
 #include "pull.h"
 #include "script.h"
 #include "sliders.h"
+#include "space_mouse.h"
 #include "window.h"
 
 namespace view {
@@ -51,7 +52,8 @@ class App {
   void press(int button);
   bool tool_key(const std::string &name);  // false: no key of tools
   void lead(double dx, double dy);         // the tool in hand by the mouse
-  void lead_deeper(double turns);          // of the wheel, away from the user
+  void lead_by_space_mouse(double now);
+  void lead_deeper(double turns);  // of the wheel, away from the user
   void add_probe();
   void add_tool_arrows(const render::Camera &camera, render::Scene &picture);
   void pull_to_mouse();
@@ -84,6 +86,8 @@ class App {
   std::optional<cli::Recording> replay_;
   std::unique_ptr<Stage> stage_;
   std::unique_ptr<Window> window_;
+  std::unique_ptr<SpaceMouse> space_mouse_;
+  std::string no_space_mouse_;  // why there is none
   std::unique_ptr<render::WindowRenderer> renderer_;
   std::string device_;  // what GL calls itself
   Orbit orbit_;

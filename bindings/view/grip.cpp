@@ -73,6 +73,10 @@ void Grip::put(const dfm_pose &pose, double opening) {
   tell();
 }
 
+dfm_pose Grip::pose() const {
+  return {{to_.x, to_.y, to_.z}, {rotation_[0], rotation_[1], rotation_[2], rotation_[3]}};
+}
+
 void Grip::move_to(const Vec &to) {
   if (to.x == to_.x && to.y == to_.y && to.z == to_.z) return;
   to_ = to;
@@ -80,11 +84,10 @@ void Grip::move_to(const Vec &to) {
 }
 
 void Grip::turn(const Vec &axis, double angle) {
-  const double s = std::sin(0.5 * angle), c = std::cos(0.5 * angle), *const b = rotation_;
-  const Vec a = render::unit(axis) * s;
-  const double q[4] = {
-      c * b[0] + a.x * b[3] + a.y * b[2] - a.z * b[1], c * b[1] - a.x * b[2] + a.y * b[3] + a.z * b[0],
-      c * b[2] + a.x * b[1] - a.y * b[0] + a.z * b[3], c * b[3] - a.x * b[0] - a.y * b[1] - a.z * b[2]};
+  const Vec a = render::unit(axis) * angle;
+  const double by[3] = {a.x, a.y, a.z};
+  double q[4];
+  cli::turned(rotation_, by, q);
   const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
   for (int k = 0; k < 4; ++k) rotation_[k] = q[k] / length;
   tell();

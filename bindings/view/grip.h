@@ -30,6 +30,7 @@ class Grip {
   bool jaws() const { return tools_[size_t(taken_)].jaws; }
   double opening() const { return opening_; }  // rad, where it shall go
   render::Vec to() const { return to_; }       // m
+  dfm_pose pose() const;                       // the same with its rotation
   void move_to(const render::Vec &to);
   void turn(const render::Vec &axis, double angle);  // about an axis through its origin, world frame
   void open(double by);                              // rad

@@ -203,6 +203,8 @@ void App::numbers() {
       "tab  takes the next tool in hand; so does the mouse\narrows, page up, down  move it; with shift: turn "
       "it\nj, k  close, open its jaws\nl  lets it go back to its motion\nb  adds a ball as a tool\n"
       "home  first camera\nh  this help\nq  quit");
+  if (space_mouse_) ImGui::TextUnformatted("6-DOF mouse  leads the tool in hand");
+  else if (!no_space_mouse_.empty()) ImGui::TextUnformatted(no_space_mouse_.c_str());
 }
 
 }  // namespace view

@@ -73,6 +73,17 @@ void App::lead(double dx, double dy) {
   grip.move_to(grip.to() + now - then);
 }
 
+// Each move is an act like those of mouse and keys, so that it is recorded.
+void App::lead_by_space_mouse(double now) {
+  Grip &grip = stage_->grip;
+  if (!space_mouse_ || !grip.holds() || replay_) return;
+  space_mouse_->lead(grip.pose(), grip.opening(), render::view_of(orbit_.camera()), 0.5 * stage_->size);
+  const dfm_device device = space_mouse_->device();
+  dfm_device_sample sample = {};
+  sample.size = sizeof sample;
+  if (device.read(device.user, now, &sample) == DFM_OK) grip.put(sample.pose, sample.opening);
+}
+
 void App::lead_deeper(double turns) {
   if (!stage_->grip.holds()) return;
   const Vec back = render::view_of(orbit_.camera()).back;

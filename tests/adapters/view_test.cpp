@@ -271,6 +271,28 @@ TEST_F(Viewer, AddedProbe_PressesAndFeels) {
   EXPECT_NE(again.out.find("the same bits in all "), std::string::npos) << again.out;
 }
 
+// A stand-in for libspnav (spnav_stand_in.cpp) pushes a ball to the right and away while it is in hand.
+TEST_F(Viewer, SpaceMouse_LeadsTheToolInHand) {
+  const std::string ball = R"(/tools=[{"name": "ball", "shape": "sphere", "radius": 0.01,
+    "pose": {"position": [0.05, -0.05, 0.15]}}])";
+  const std::vector<std::string> more{"--set", "/time/duration=5", "--set", ball};
+  setenv("DEFORM_VIEW_SPNAV", DEFORM_TEST_SPNAV, 1);
+  const test::CommandResult done = view(
+      "0 key space\n0 key v\n0.1 key tab\n0.1 shot a.png\n1.6 shot b.png\n2 shot c.png\n2 key v\n", more);
+  setenv("DEFORM_VIEW_SPNAV", "/nothing/libspnav.so", 1);
+  const test::CommandResult none = view("0 key h\n0 key tab\n0.2 shot d.png\n", more);
+  unsetenv("DEFORM_VIEW_SPNAV");
+  ASSERT_EQ(done.exit_code, 0) << done.err;
+  const std::vector<double> from = vector(done, "a.png", "at"), to = vector(done, "b.png", "at");
+  // the camera looks along +y and a little down; fifty frames at half of the size in a second
+  EXPECT_GT(to[0] - from[0], 0.05) << done.out;
+  EXPECT_NEAR((to[1] - from[1]) / (to[0] - from[0]), 0.45, 0.1) << "half as far away as to the right";
+  EXPECT_NEAR(vector(done, "c.png", "at")[0], to[0], 1e-3) << "nobody pushes any more";
+  EXPECT_EQ(none.exit_code, 0) << "without the library it is not there, and nothing else changes";
+  const test::CommandResult again = test::deform({"replay", folder_, "--out", folder_ + "/again"});
+  EXPECT_EQ(again.exit_code, 0) << again.err;
+}
+
 TEST_F(Viewer, Sliders_ChangeTheScene) {
   // on a floor that leans: with friction it stays, without it slides off
   const std::vector<std::string> leans{"--set", "/obstacles/0/normal=[-0.3, 0, 1]"};
