@@ -15,23 +15,29 @@ constexpr uint32_t kMostPasses = 100;
 // response) no impulse reduces what is left.
 constexpr double kNothingMoves = 1e-10;
 
+// f(number in the part, row)
+template <class F>
+void each_bond(const RowsPart &part, F &&f) {
+  uint32_t k = 0;
+  each_row(part.bonds, [&](uint32_t row) { f(k++, row); });
+}
+
 struct Vectors {
   double *change, *residual, *z, *p, *az, *ap, *undone, *velocity;  // [nbond,3] each
 };
 
-Vectors vectors_of(ContactRows &rows) {
-  const size_t n = size_t{3} * rows.nbond;
-  rows.bond_scratch.assign(8 * n, 0.0);
-  double *const a = rows.bond_scratch.data();
+Vectors vectors_in(Array<double> &scratch, size_t n) {
+  scratch.assign(8 * n, 0.0);
+  double *const a = scratch.data();
   return {a, a + n, a + 2 * n, a + 3 * n, a + 4 * n, a + 5 * n, a + 6 * n, a + 7 * n};
 }
 
 // By the inverse of each bond's own response.
-void scale(const ContactRows &rows, const double *from, double *to) {
-  for (uint32_t k = 0; k < rows.nbond; ++k) {
-    const Vec3 r = load3(from + size_t{3} * k), *const inverse = rows.bond[k].inverse;
+void scale(const ContactRows &rows, const RowsPart &part, const double *from, double *to) {
+  each_bond(part, [&](uint32_t k, uint32_t row) {
+    const Vec3 r = load3(from + size_t{3} * k), *const inverse = rows.bond[row - rows.n].inverse;
     store3(to + size_t{3} * k, {dot(inverse[0], r), dot(inverse[1], r), dot(inverse[2], r)});
-  }
+  });
 }
 
 double product(const double *a, const double *b, size_t n) {
@@ -47,59 +53,60 @@ double largest(const double *a, uint32_t n) {
 }
 
 // Applies the impulses z on top of those before; response is the change of the residual by them.
-void respond(ContactRows &rows, const double *z, double *velocity, double *response) {
-  for (uint32_t k = 0; k < rows.nbond; ++k)
-    if (const Vec3 l = load3(z + size_t{3} * k); l.x != 0 || l.y != 0 || l.z != 0) rows.apply(rows.n + k, l);
-  for (uint32_t k = 0; k < rows.nbond; ++k) {
-    const ContactRows::BondRow &b = rows.bond[k];
-    const Vec3 now = rows.velocity(rows.n + k);
+void respond(ContactRows &rows, const RowsPart &part, const double *z, double *velocity, double *response) {
+  each_bond(part, [&](uint32_t k, uint32_t row) {
+    if (const Vec3 l = load3(z + size_t{3} * k); l.x != 0 || l.y != 0 || l.z != 0) rows.apply(row, l);
+  });
+  each_bond(part, [&](uint32_t k, uint32_t row) {
+    const ContactRows::BondRow &b = rows.bond[row - rows.n];
+    const Vec3 now = rows.velocity(row);
     Vec3 change = now - load3(velocity + size_t{3} * k) + b.soft * load3(z + size_t{3} * k);
     for (int c = 0; c < 3; ++c)
       if (b.inverse[c][c] == 0) change[c] = 0;
     store3(response + size_t{3} * k, change);
     store3(velocity + size_t{3} * k, now);
-  }
+  });
 }
 
 // Of one bond this is the solution.
-void solve_one(ContactRows &rows) {
-  const ContactRows::BondRow &b = rows.bond[0];
-  const Vec3 r = bond_residual(rows, 0);
+void solve_one(ContactRows &rows, uint32_t row) {
+  const ContactRows::BondRow &b = rows.bond[row - rows.n];
+  const Vec3 r = bond_residual(rows, row);
   const Vec3 change{-dot(b.inverse[0], r), -dot(b.inverse[1], r), -dot(b.inverse[2], r)};
   if (change.x == 0 && change.y == 0 && change.z == 0) return;
-  rows.apply(rows.n, change);
-  double *const l = &rows.impulse[size_t{3} * rows.n];
+  rows.apply(row, change);
+  double *const l = &rows.impulse[size_t{3} * row];
   store3(l, load3(l) + change);
 }
 
 }  // namespace
 
-Vec3 bond_residual(const ContactRows &rows, uint32_t k) {
-  const ContactRows::BondRow &b = rows.bond[k];
-  Vec3 r = rows.velocity(rows.n + k) + b.rate + b.soft * load3(&rows.impulse[size_t(3) * (rows.n + k)]);
+Vec3 bond_residual(const ContactRows &rows, uint32_t row) {
+  const ContactRows::BondRow &b = rows.bond[row - rows.n];
+  Vec3 r = rows.velocity(row) + b.rate + b.soft * load3(&rows.impulse[size_t(3) * row]);
   for (int c = 0; c < 3; ++c)
     if (b.inverse[c][c] == 0) r[c] = 0;
   return r;
 }
 
-uint32_t solve_bonds(ContactRows &rows, double tolerance) {
-  if (rows.nbond == 1) {
-    solve_one(rows);
+uint32_t solve_bonds(ContactRows &rows, const RowsPart &part, double tolerance, Array<double> &scratch) {
+  if (part.nbond == 1) {
+    solve_one(rows, part.bonds[0].first);
     return 1;
   }
-  const size_t n = size_t{3} * rows.nbond;
-  const Vectors v = vectors_of(rows);
-  for (uint32_t k = 0; k < rows.nbond; ++k) {
-    store3(v.residual + size_t{3} * k, -bond_residual(rows, k));
-    store3(v.velocity + size_t{3} * k, rows.velocity(rows.n + k));
-  }
-  if (!(largest(v.residual, rows.nbond) > tolerance)) return 0;
-  scale(rows, v.residual, v.z);
+  const size_t n = size_t{3} * part.nbond;
+  const Vectors v = vectors_in(scratch, n);
+  each_bond(part, [&](uint32_t k, uint32_t row) {
+    store3(v.residual + size_t{3} * k, -bond_residual(rows, row));
+    store3(v.velocity + size_t{3} * k, rows.velocity(row));
+  });
+  if (!(largest(v.residual, part.nbond) > tolerance)) return 0;
+  scale(rows, part, v.residual, v.z);
   uint32_t passes = 0;
   // undone: minus the sum of what respond() has applied
   double before = 0;
   for (; passes < kMostPasses; ++passes) {
-    respond(rows, v.z, v.velocity, v.az);
+    respond(rows, part, v.z, v.velocity, v.az);
     for (size_t i = 0; i < n; ++i) v.undone[i] -= v.z[i];
     const double now = product(v.z, v.az, n);
     if (!(now > kNothingMoves * product(v.z, v.residual, n))) break;
@@ -109,21 +116,21 @@ uint32_t solve_bonds(ContactRows &rows, double tolerance) {
       v.p[i] = v.z[i] + beta * v.p[i];
       v.ap[i] = v.az[i] + beta * v.ap[i];
     }
-    scale(rows, v.ap, v.az);
+    scale(rows, part, v.ap, v.az);
     const double alpha = now / product(v.ap, v.az, n);
     for (size_t i = 0; i < n; ++i) {
       v.change[i] += alpha * v.p[i];
       v.residual[i] -= alpha * v.ap[i];
       v.z[i] -= alpha * v.az[i];
     }
-    if (!(largest(v.residual, rows.nbond) > tolerance)) break;
+    if (!(largest(v.residual, part.nbond) > tolerance)) break;
   }
-  for (uint32_t k = 0; k < rows.nbond; ++k) {
+  each_bond(part, [&](uint32_t k, uint32_t row) {
     const Vec3 change = load3(v.change + size_t{3} * k);
-    rows.apply(rows.n + k, change + load3(v.undone + size_t{3} * k));
-    double *const l = &rows.impulse[size_t{3} * (rows.n + k)];
+    rows.apply(row, change + load3(v.undone + size_t{3} * k));
+    double *const l = &rows.impulse[size_t{3} * row];
     store3(l, load3(l) + change);
-  }
+  });
   return passes + 1;
 }
 

@@ -4,15 +4,17 @@
 #include <cstdint>
 
 #include "contact/rows.h"
+#include "core/memory.h"
 #include "math/vec3.h"
 
 namespace dfm {
 
-// m/s, what the impulse of bond k leaves of its condition, in the components in which anything moves.
-Vec3 bond_residual(const ContactRows &rows, uint32_t k);
+// m/s, what the impulse of the bond in this row leaves of its condition, in the components in which anything
+// moves.
+Vec3 bond_residual(const ContactRows &rows, uint32_t row);
 
-// Solves all bonds with the impulses of contacts as they are, until no residual is above `tolerance`, m/s.
-// Returns how many times it has passed over the bonds.
-uint32_t solve_bonds(ContactRows &rows, double tolerance);
+// Solves all bonds of a part with the impulses of contacts as they are, until no residual is above
+// `tolerance`, m/s. Returns how many times it has passed over the bonds.
+uint32_t solve_bonds(ContactRows &rows, const RowsPart &part, double tolerance, Array<double> &scratch);
 
 }  // namespace dfm

@@ -32,6 +32,13 @@ struct ContactState {
   Array<uint8_t> mode;        // 0 open, 1 stick, 2 slip
   Array<uint8_t> form;        // LawForm
   Array<LinearLaw> linear;    // [n] of smooth laws, by linearize()
+  // [n] Where slopes were made by differences: the force that they start from, and which of them hold at the
+  // present answer.
+  struct Origin {
+    double v[2], fn, f[2];
+    uint8_t made, hold;
+  };
+  Array<Origin> origin;
 
   void resize(uint32_t count, uint32_t states) {
     n = count;
@@ -46,12 +53,20 @@ struct ContactState {
     mode.resize(stride);
     form.resize(stride);
     linear.resize(n);
+    origin.resize(n);
     clear_padding();
   }
 
   LawView view() const {
     return {stride,         fn.data(),    vt.data(),   ft.data(),   dft_dvt.data(),
             dft_dfn.data(), limit.data(), mode.data(), form.data(), linear.data()};
+  }
+  // from contact i on
+  LawView view(uint32_t i) const {
+    return {stride,           fn.data() + i,      vt.data() + i,
+            ft.data() + i,    dft_dvt.data() + i, dft_dfn.data() + i,
+            limit.data() + i, mode.data() + i,    form.data() + i,
+            linear.data() + i};
   }
 
   // Laws may be asked in these columns, and touch the places beyond n: as where nothing is in contact.

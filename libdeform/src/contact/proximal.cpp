@@ -44,8 +44,10 @@ Disc disc_of(const ContactState &s, uint32_t i, double h, double ln) {
 }  // namespace
 
 Proximal::Proximal(const Memory &m) {
-  use_memory(m, parts_, root_, alone_, contact_, block_, g_, from_, start_, z_, try_, f_, down_, u_, l_,
-             slope_, matrix_);
+  ContactRows::Motions &of = motions_;
+  use_memory(m, of.g, of.columns, of.left, of.first_column, of.column_count, of.first_value);
+  use_memory(m, parts_, root_, alone_, contact_, block_, from_, start_, z_, try_, f_, down_, u_, l_, slope_,
+             matrix_);
 }
 
 uint32_t Proximal::root_of(uint32_t block) const {
@@ -53,17 +55,16 @@ uint32_t Proximal::root_of(uint32_t block) const {
   return block;
 }
 
-uint32_t Proximal::find_parts(const ContactRows &rows, std::span<const uint8_t> leave) {
-  const uint32_t count = static_cast<uint32_t>(rows.blocks.size());
-  root_.resize(count);
-  for (uint32_t b = 0; b < count; ++b) root_[b] = b;
+uint32_t Proximal::find_parts(const ContactRows &rows, const RowsPart &of, std::span<const uint8_t> leave) {
+  root_.resize(rows.blocks.size());
+  for (const uint32_t b : of.blocks) root_[b] = b;
   alone_.assign(leave.begin(), leave.end());
   // blocks of a contact, in any order
   const auto each_block = [&](uint32_t i, auto &&f) {
     for (uint32_t j = rows.begin[i]; j < rows.begin[i + 1]; ++j) f(rows.block[rows.dof[j]]);
     if (!rows.rigid.empty() && rows.rigid[i] != kNone) f(rows.block[rows.rigid[i]]);
   };
-  for (uint32_t i = 0; i < rows.n; ++i) {
+  each_row(of.contacts, [&](uint32_t i) {
     uint32_t seen = kNone;
     bool points = false;
     each_block(i, [&](uint32_t b) {
@@ -75,13 +76,14 @@ uint32_t Proximal::find_parts(const ContactRows &rows, std::span<const uint8_t> 
       root_[std::max(root, other)] = seen = std::min(root, other);
     });
     if (points && seen != kNone) alone_[seen] = 1;
-  }
+  });
   // strides know contacts only: what bonds hold as well is left to the sweeps
-  for (uint32_t i = rows.n; i < rows.all(); ++i)
+  each_row(of.bonds, [&](uint32_t i) {
     each_block(i, [&](uint32_t b) {
       if (b != kNone) alone_[b] = 1;
     });
-  for (uint32_t b = count; b-- > 0;)
+  });
+  for (const uint32_t b : of.blocks)
     if (alone_[b]) alone_[root_of(b)] = 1;
   parts_.clear();
   contact_.clear();
@@ -89,16 +91,16 @@ uint32_t Proximal::find_parts(const ContactRows &rows, std::span<const uint8_t> 
   const auto close = [&](uint32_t root) {
     parts_.push_back({root, static_cast<uint32_t>(contact_.size()), static_cast<uint32_t>(block_.size())});
   };
-  for (uint32_t root = 0; root < count; ++root) {
+  for (const uint32_t root : of.blocks) {
     if (root_[root] != root || alone_[root]) continue;
     close(root);
-    for (uint32_t b = root; b < count; ++b)
+    for (const uint32_t b : of.blocks)
       if (root_of(b) == root) block_.push_back(b);
-    for (uint32_t i = 0; i < rows.n; ++i) {
+    each_row(of.contacts, [&](uint32_t i) {
       uint32_t own = kNone;
       each_block(i, [&](uint32_t b) { own = b; });
       if (own != kNone && root_of(own) == root) contact_.push_back(i);
-    }
+    });
   }
   close(kNone);
   return static_cast<uint32_t>(parts_.size() - 1);
@@ -108,11 +110,12 @@ std::span<const uint32_t> Proximal::contacts(uint32_t part) const {
   return {contact_.data() + parts_[part].contact, contact_.data() + parts_[part + 1].contact};
 }
 
-bool Proximal::take(ContactRows &rows, uint32_t part) {
+bool Proximal::take(const ContactRows &rows, uint32_t part) {
   contacts_ = contacts(part);
   blocks_ = {block_.data() + parts_[part].block, block_.data() + parts_[part + 1].block};
   n_ = static_cast<uint32_t>(contacts_.size());
-  if (!rows.motions(contacts_, blocks_, kMostMotions, g_, r_)) return false;
+  if (!rows.motions(contacts_, blocks_, kMostMotions, motions_)) return false;
+  r_ = motions_.rank;
   width_ = (r_ + 3) & ~3u;
   for (Array<double> *a : {&z_, &try_, &f_, &down_}) a->assign(width_, 0.0);
   for (Array<double> *a : {&from_, &start_, &u_, &l_}) a->resize(size_t(3) * n_);
@@ -180,7 +183,7 @@ double Proximal::residual(const ContactRows &rows, const ContactState &law, doub
   std::copy_n(z, width_, f);
   for (uint32_t i = 0; i < n_; ++i) {
     const size_t at = size_t(3) * i;
-    const double *const g = &g_[at * width_];
+    const double *const g = &motions_.g[at * width_];
     for (size_t k = 0; k < 3; ++k) u_[at + k] = from_[at + k] + dot(g + k * width_, z, width_);
     Answer a;
     const bool carries = answer(rows, law, i, h, rho, a);
@@ -198,7 +201,7 @@ bool Proximal::newton() {
   for (uint32_t k = 0; k < r_; ++k) matrix_[size_t(k) * width_ + k] = 1;
   uint64_t carry = 0;
   for (uint32_t i = 0; i < n_; ++i) {
-    const double *const d = &slope_[size_t(9) * i], *const g = &g_[size_t(3) * i * width_];
+    const double *const d = &slope_[size_t(9) * i], *const g = &motions_.g[size_t(3) * i * width_];
     if (d[0] == 0) continue;
     ++carry;
     const double *const g1 = g + width_, *const g2 = g1 + width_;
@@ -243,14 +246,12 @@ bool Proximal::stride(ContactRows &rows, const ContactState &law, double h, doub
   work_ = 0;
   // velocities without impulses; z of the impulses that there are
   std::fill(z_.begin(), z_.end(), 0.0);
-  rows.y.swap(rows.y_free);
   for (uint32_t k = 0; k < n_; ++k) {
     std::copy_n(&rows.impulse[size_t(3) * contacts_[k]], 3, &start_[size_t(3) * k]);
-    store3(&from_[size_t(3) * k], rows.velocity(contacts_[k]));
+    store3(&from_[size_t(3) * k], rows.velocity(contacts_[k], rows.y_free.data()));
   }
-  rows.y.swap(rows.y_free);
   for (uint32_t k = 0; k < 3 * n_; ++k)
-    if (start_[k] != 0) add(z_.data(), start_[k], &g_[size_t(k) * width_], width_);
+    if (start_[k] != 0) add(z_.data(), start_[k], &motions_.g[size_t(k) * width_], width_);
   double left = residual(rows, law, h, rho, z_.data(), f_.data());
   for (uint32_t it = 0;; ++it) {
     if (left <= kLeast * std::sqrt(dot(z_.data(), z_.data(), width_))) break;

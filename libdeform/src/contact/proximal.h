@@ -27,12 +27,12 @@ namespace dfm {
 class Proximal {
  public:
   explicit Proximal(const Memory &memory);
-  // The parts of these rows. leave: [blocks] 1: a part with this block is none of them; nor is one with
-  // points that answer their own impulses alone.
-  uint32_t find_parts(const ContactRows &rows, std::span<const uint8_t> leave);
+  // The parts of these rows. leave: [blocks of all] 1: a part with this block is none of them; nor is one
+  // with points that answer their own impulses alone.
+  uint32_t find_parts(const ContactRows &rows, const RowsPart &of, std::span<const uint8_t> leave);
   std::span<const uint32_t> contacts(uint32_t part) const;
   // False: its bodies move in too many ways.
-  bool take(ContactRows &rows, uint32_t part);
+  bool take(const ContactRows &rows, uint32_t part);
   // One stride of the part taken from the rows' impulses, which change; rho: over each contact's own 1 /
   // response. False: it was not found, and nothing has changed.
   bool stride(ContactRows &rows, const ContactState &law, double h, double rho);
@@ -52,7 +52,7 @@ class Proximal {
   std::span<const uint32_t> contacts_, blocks_;    // of the part taken
   uint32_t n_ = 0, r_ = 0, width_ = 0;             // width: r, padded with zeros to whole fours
   uint64_t work_ = 0;
-  Array<double> g_;                   // [3n, width]
+  ContactRows::Motions motions_;      // g: [3n, width]
   Array<double> from_;                // [3n] m/s without impulses
   Array<double> start_;               // [3n] l0
   Array<double> z_, try_, f_, down_;  // [width]

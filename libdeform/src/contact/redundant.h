@@ -14,18 +14,19 @@ class Redundant {
   // Before the first solve of a sub-step.
   void start() { left_.clear(); }
   // More contacts carry load than dofs are touched by these.
-  bool found(const ContactRows &rows);
+  bool found(const ContactRows &rows, const RowsPart &part);
   // Velocities before a plain sweep.
-  void note(const ContactRows &rows);
+  void note(const ContactRows &rows, const RowsPart &part);
   // After it: whether it has left velocities as they were. What each contact then slips by against its law,
   // up to the largest normal tolerance, is allowed, here and in later solves of the sub-step.
-  bool stands(const ContactRows &rows, const ContactState &law, double h, Tolerance &tolerance);
+  bool stands(const ContactRows &rows, const RowsPart &part, const ContactState &law, double h,
+              const Tolerance &tolerance);
   // In a later solve, after its own tolerance has been set.
-  void allow(Tolerance &tolerance) const;
+  void allow(const RowsPart &part, const Tolerance &tolerance) const;
 
  private:
-  Array<double> before_;    // [n,3] m/s
-  Array<double> left_;      // [n] m/s, allowed; empty: none yet
+  Array<double> before_;    // [contacts of the part,3] m/s
+  Array<double> left_;      // [contacts of the part] m/s, allowed; empty: none yet
   Array<uint8_t> touched_;  // [dofs]
 };
 

@@ -11,9 +11,8 @@ ContactRows::ContactRows(const Memory &m)
     : kernels_(dense_kernels()),
       loops_(doubles_at_once() >= 4 ? contact_kernels_avx2() : contact_kernels_sse2()) {
   use_memory(m, across_, begin, dof, weight, y, y_free, alone, source, point, block, blocks, response_,
-             given_, frame, drive, rate, wn, wt, cross, impulse, bond, bond_scratch, dof_of_point_,
-             dof_of_node_, place_, rigid, arm, dof_of_group_, columns_, left_, first_column_, column_count_,
-             first_value_);
+             given_, frame, drive, rate, wn, wt, cross, impulse, bond, dof_of_point_, dof_of_node_, place_,
+             rigid, arm, dof_of_group_, every_block_);
 }
 
 // Of the dofs from `first` on.
@@ -358,26 +357,11 @@ void ContactRows::turn_frames() {
       for (size_t k = 0; k < 3; ++k) across_[i + 3 * k + row] = frame[i + 3 * row + k];
 }
 
-RowsView ContactRows::view() const {
-  return {n,
-          begin.data(),
-          dof.data(),
-          weight.data(),
-          alone.data(),
-          frame.data(),
-          drive.data(),
-          across_.data(),
-          rate.data(),
-          wn.data(),
-          wt.data(),
-          cross.data()};
-}
-
-Vec3 ContactRows::velocity(uint32_t i) const {
+Vec3 ContactRows::velocity(uint32_t i, const double *of) const {
   Vec3 u;
-  for (uint32_t j = begin[i]; j < begin[i + 1]; ++j) u += weight[j] * load3(&y[size_t(dof[j]) * 4]);
+  for (uint32_t j = begin[i]; j < begin[i + 1]; ++j) u += weight[j] * load3(of + size_t(dof[j]) * 4);
   if (!rigid.empty() && rigid[i] != kNone) {
-    const double *const v = &y[size_t(rigid[i]) * 4];
+    const double *const v = of + size_t(rigid[i]) * 4;
     u -= load3(v) + dfm::cross(load3(v + 4), load3(&arm[size_t(3) * i]));
   }
   const double *const f = &frame[size_t(i) * 9];
@@ -431,14 +415,6 @@ void ContactRows::apply(uint32_t i, Vec3 q) {
   }
 }
 
-void ContactRows::restore() {
-  y.assign(y_free.begin(), y_free.end());
-  for (uint32_t i = 0; i < all(); ++i) {
-    const Vec3 l = load3(&impulse[size_t(i) * 3]);
-    if (l.x != 0 || l.y != 0 || l.z != 0) apply(i, l);
-  }
-}
-
 void ContactRows::restore(std::span<const uint32_t> contacts, std::span<const uint32_t> of_blocks) {
   for (const uint32_t number : of_blocks) {
     const size_t first = size_t(4) * blocks[number].first;
@@ -470,38 +446,41 @@ constexpr double kRounding = 1e-13;
 // Each block's response is R = L L^T, by Cholesky's method that takes the largest diagonal next (Higham 1990)
 // and stops where nothing is left: the columns of L are motions that answer unit impulses.
 bool ContactRows::motions(std::span<const uint32_t> contacts, std::span<const uint32_t> of_blocks,
-                          uint32_t most, Array<double> &g, uint32_t &rank) {
-  columns_.clear();
-  for (Array<size_t> *a : {&first_column_, &column_count_, &first_value_}) a->assign(blocks.size(), 0);
+                          uint32_t most, Motions &out) const {
+  Array<double> &g = out.g, &columns = out.columns, &left = out.left;
+  Array<size_t> &first_column = out.first_column, &column_count = out.column_count,
+                &first_value = out.first_value;
+  columns.clear();
+  for (Array<size_t> *a : {&first_column, &column_count, &first_value}) a->assign(blocks.size(), 0);
   size_t found = 0;
   for (const uint32_t number : of_blocks) {
     const Block &b = blocks[number];
-    const size_t size = size_t(3) * b.count, start = columns_.size();
+    const size_t size = size_t(3) * b.count, start = columns.size();
     const auto value = [&](size_t row, size_t column) { return response(b, column, row / 3, row % 3); };
-    first_column_[number] = found;
-    first_value_[number] = start;
-    left_.resize(size);
+    first_column[number] = found;
+    first_value[number] = start;
+    left.resize(size);
     double top = 0;
-    for (size_t k = 0; k < size; ++k) top = std::max(top, left_[k] = value(k, k));
+    for (size_t k = 0; k < size; ++k) top = std::max(top, left[k] = value(k, k));
     for (size_t own = 0; own < size; ++own) {
-      const size_t pivot = size_t(std::max_element(left_.begin(), left_.end()) - left_.begin());
-      if (!(left_[pivot] > kRounding * top)) break;
+      const size_t pivot = size_t(std::max_element(left.begin(), left.end()) - left.begin());
+      if (!(left[pivot] > kRounding * top)) break;
       if (++found > most) return false;
-      const size_t at = columns_.size();
-      columns_.resize(at + size);
-      const double *const before = &columns_[start];
-      const double root = std::sqrt(left_[pivot]);
+      const size_t at = columns.size();
+      columns.resize(at + size);
+      const double *const before = &columns[start];
+      const double root = std::sqrt(left[pivot]);
       for (size_t k = 0; k < size; ++k) {
         double sum = value(k, pivot);
         for (size_t c = 0; c < own; ++c) sum -= before[c * size + k] * before[c * size + pivot];
-        columns_[at + k] = sum / root;
-        left_[k] = std::max(0.0, left_[k] - columns_[at + k] * columns_[at + k]);
+        columns[at + k] = sum / root;
+        left[k] = std::max(0.0, left[k] - columns[at + k] * columns[at + k]);
       }
-      left_[pivot] = 0;
+      left[pivot] = 0;
     }
-    column_count_[number] = found - first_column_[number];
+    column_count[number] = found - first_column[number];
   }
-  rank = static_cast<uint32_t>(found);
+  out.rank = static_cast<uint32_t>(found);
   const size_t width = (found + 3) & ~size_t{3};
   g.assign(size_t(3) * contacts.size() * width, 0.0);
   for (size_t k = 0; k < contacts.size(); ++k) {
@@ -512,11 +491,11 @@ bool ContactRows::motions(std::span<const uint32_t> contacts, std::span<const ui
     const auto put = [&](uint32_t d, auto &&change) {
       const uint32_t number = block[d];
       const Block &b = blocks[number];
-      for (size_t c = 0; c < column_count_[number]; ++c) {
-        const size_t at = first_value_[number] + c * 3 * b.count + size_t(3) * (d - b.first);
-        const Vec3 u = change(&columns_[at]);
+      for (size_t c = 0; c < column_count[number]; ++c) {
+        const size_t at = first_value[number] + c * 3 * b.count + size_t(3) * (d - b.first);
+        const Vec3 u = change(&columns[at]);
         for (size_t row = 0; row < 3; ++row)
-          to[row * width + first_column_[number] + c] += dot(load3(f + 3 * row), u);
+          to[row * width + first_column[number] + c] += dot(load3(f + 3 * row), u);
       }
     };
     for (uint32_t j = begin[i]; j < begin[i + 1]; ++j)

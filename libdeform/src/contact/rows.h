@@ -17,6 +17,7 @@
 #include "contact/bond.h"
 #include "contact/contact_kernel.h"
 #include "contact/contact_set.h"
+#include "contact/rows_part.h"
 #include "geometry/surface.h"
 #include "math/dense_kernel.h"
 #include "math/vec3.h"
@@ -84,8 +85,7 @@ struct ContactRows {
     double soft;
     Vec3 inverse[3];
   };
-  Array<BondRow> bond;         // [nbond]
-  Array<double> bond_scratch;  // of solve_bonds()
+  Array<BondRow> bond;  // [nbond]
 
   // m/s, at most, at which a depth is opened; 0: a tenth of the rest distance per sub-step
   double recovery = 0;
@@ -118,19 +118,30 @@ struct ContactRows {
   // All dofs answer their own impulses only: the contacts' loops run in the kernels.
   bool alone_all() const { return blocks.empty() && rigid.empty(); }
   const ContactKernels &kernels() const { return loops_; }
-  RowsView view() const;
+  RowsView view(RowRun contacts) const;
+  RowsPart whole();  // all of them; valid until the next call
 
-  Vec3 velocity(uint32_t i) const;             // relative velocity of contact i in its frame (normal, t1, t2)
+  // relative velocity of contact i in its frame (normal, t1, t2); of unknowns like y
+  Vec3 velocity(uint32_t i) const { return velocity(i, y.data()); }
+  Vec3 velocity(uint32_t i, const double *of) const;
   void apply(uint32_t i, Vec3 impulse_frame);  // changes y by an impulse given in the frame
-  // y from the impulses alone: sweeps have left it not finite, or with their rounding
-  void restore();
+  // y of a part from the impulses alone: sweeps have left it not finite, or with their rounding
+  void restore(const RowsPart &part);
   // The same for blocks that these contacts alone act on.
   void restore(std::span<const uint32_t> contacts, std::span<const uint32_t> of_blocks);
   // G [3 contacts, padded] with velocity = velocity without impulses + G G^T impulse for contacts that act on
   // these blocks alone, padded: rank rounded up to fours, with zeros. False: they move in more ways than
   // `most`.
+  struct Motions {
+    Array<double> g;
+    uint32_t rank = 0;
+    // columns of the blocks, what is left of a diagonal; [blocks] first column, columns, and place of their
+    // first value
+    Array<double> columns, left;
+    Array<size_t> first_column, column_count, first_value;
+  };
   bool motions(std::span<const uint32_t> contacts, std::span<const uint32_t> of_blocks, uint32_t most,
-               Array<double> &g, uint32_t &rank);
+               Motions &out) const;
   // changes y of a rigid group by all impulses that act on it: its response has been renewed
   void push_rigid(const Block &group);
 
@@ -146,10 +157,9 @@ struct ContactRows {
   // per block [3 count columns, 4 count], 1/kg: what an impulse at one dof changes of all, as y has them
   Array<double> response_;
   Array<double> given_;  // scratch
-  // of motions(): columns of its blocks, what is left of a diagonal; [blocks] first column, columns, and
-  // place of their first value
-  Array<double> columns_, left_;
-  Array<size_t> first_column_, column_count_, first_value_;
+  // of whole()
+  RowRun every_row_[2] = {};
+  Array<uint32_t> every_block_;
   void add_block(uint32_t from, uint32_t first, uint32_t group);
   void take_response(const Block &b);
   void take_answers(const Block &b);

@@ -8,18 +8,20 @@
 
 namespace dfm {
 
+// All of them work on a part of the rows; parts of the same rows may be worked on by several threads at once.
+
 // Sets the trial of every contact from the rows' present state: fn, vt, slip, ft_stop. response: change of
 // slip per friction impulse by which ft_stop is found, the contact's own (rows.wt) or more.
-void set_trial(const ContactRows &rows, double h, const double *response, ContactState &state);
+void set_trial(const ContactRows &rows, const RowsPart &part, double h, const double *response,
+               ContactState &state);
 // Of smooth laws what sweeps and residuals need of dft_dvt; after each answer, and after new slopes.
-void linearize(const ContactRows &rows, double h, ContactState &state);
+void linearize(const ContactRows &rows, const RowsPart &part, double h, ContactState &state);
 
 // One sweep in contact order. Every contact first gets its normal impulse, then its friction impulse with
 // that new normal impulse. leave: m/s, >= 0; a contact whose u_n + gap/h is no further from zero keeps its
-// normal impulse. Where points answer their own impulses only, leave has no effect. Then all bonds are solved
-// together (bonds.h) to a residual of bond_tolerance, m/s. Returns the number of passes over the bonds.
-uint32_t sweep(ContactRows &rows, const ContactState &law, double h, double bond_tolerance = 0,
-               double leave = 0);
+// normal impulse. Where points answer their own impulses only, leave has no effect. Bonds are solved behind
+// it (bonds.h).
+void sweep(ContactRows &rows, const RowsPart &part, const ContactState &law, double h, double leave = 0);
 
 // Anderson acceleration of the sweeps (Walker and Ni 2011, type II). A sweep is a fixed-point map G; where
 // contacts are nearly redundant (vertex-face beside edge-edge, two bodies' grids on each other) it converges
@@ -30,9 +32,9 @@ uint32_t sweep(ContactRows &rows, const ContactState &law, double h, double bond
 class Acceleration {
  public:
   explicit Acceleration(const Memory &memory);
-  void start(const ContactRows &rows);  // before the first sweep of a pass
+  void start(const ContactRows &rows, const RowsPart &part);  // before the first sweep of a pass
   // After a sweep that another one follows. leaps: false: the next sweep starts where this one has ended.
-  void follow(ContactRows &rows, bool leaps = true);
+  void follow(ContactRows &rows, const RowsPart &part, bool leaps = true);
 
  private:
   static constexpr uint32_t kWindow = kAndersonWindow;
@@ -52,12 +54,13 @@ class Acceleration {
 class Momentum {
  public:
   explicit Momentum(const Memory &memory);
-  void start(const ContactRows &rows);
-  void follow(ContactRows &rows);  // after a sweep that another one follows
+  void start(const ContactRows &rows, const RowsPart &part);
+  void follow(ContactRows &rows, const RowsPart &part);  // after a sweep that another one follows
 
  private:
   uint32_t age_ = 0;
-  Array<double> from_, last_, jump_;  // [3 all] where the sweep started, the result before, scratch
+  // [3 rows of the part] where the sweep started, the result before, scratch
+  Array<double> from_, last_, now_;
 };
 
 // Of the residuals (contact_kernel.h): a contact is good where both stay within what they may be off by:
@@ -67,19 +70,21 @@ class Momentum {
 // (doc/decisions/0004-contact-tolerance.md).
 struct Tolerance {
   double most_normal = 0;
-  double bond = 0;  // of |u + rate + soft l|, all bonds
-  Array<double> normal, tangent;
+  double bond = 0;                               // of |u + rate + soft l|, all bonds of the part
+  double *normal = nullptr, *tangent = nullptr;  // by contact of the rows
 };
 struct ToleranceBounds { double tangent, normal, most_normal; };  // m/s: at rest, at rest, ever
 // of the linearized laws
-Residual inner_residual(const ContactRows &rows, const ContactState &law, double h,
+Residual inner_residual(const ContactRows &rows, const RowsPart &part, const ContactState &law, double h,
                         const Tolerance &tolerance);
 // the same of some contacts
 Residual inner_residual(const ContactRows &rows, const ContactState &law, double h,
                         const Tolerance &tolerance, std::span<const uint32_t> contacts);
 // laws asked at this state
-Residual true_residual(const ContactRows &rows, const ContactState &answer, double h,
+Residual true_residual(const ContactRows &rows, const RowsPart &part, const ContactState &answer, double h,
                        const Tolerance &tolerance);
+// of parts together
+Residual larger(const Residual &a, const Residual &b);
 
 // tangent[i] = max(bounds.tangent, 1e-2 d), d: the largest r_t that the warm start leaves at any contact of
 // the two bodies. A contact at rest is warm started at its solution, so d vanishes and the bound at rest
@@ -87,8 +92,8 @@ Residual true_residual(const ContactRows &rows, const ContactState &answer, doub
 // the next sub-step's d. normal[i] = max(bounds.normal, 2e-2 d), d the largest of all r_n and r_t, up to
 // most_normal. bond = max(bounds.tangent, 1e-3 of the largest that the warm start leaves). disturbance:
 // scratch, two entries per body slot.
-void set_tolerance(const ContactRows &rows, const ContactState &answer,
+void set_tolerance(const ContactRows &rows, const RowsPart &part, const ContactState &answer,
                    std::span<const ContactPoint> contacts, double h, const ToleranceBounds &bounds,
-                   uint32_t bodies, Array<double> &disturbance, Tolerance &tolerance);
+                   double *disturbance, Tolerance &tolerance);
 
 }  // namespace dfm

@@ -66,28 +66,31 @@ LawBatches::LawBatches(const Memory &m)
       out_(HookAllocator<double>(m)),
       moved_(HookAllocator<double>(m)),
       answer_(HookAllocator<double>(m)),
-      origin_(HookAllocator<Origin>(m)),
       mode_(HookAllocator<uint8_t>(m)),
       local_(HookAllocator<Local>(m)),
       asked_(HookAllocator<uint32_t>(m)) {}
 
-void LawBatches::gather(const std::vector<LawInstance *> &laws, ContactState &state) {
+void LawBatches::gather(const std::vector<LawInstance *> &laws, std::span<const RowRun> contacts,
+                        ContactState &state) {
   batches_.clear();
-  order_.clear();
-  origin_.assign(state.n, {});
+  uint32_t n = 0, end = 0;
+  for (const RowRun &r : contacts) n += r.n;
+  order_.resize(n);
   smooth_ = remembers_ = differences_ = false;
-  for (uint32_t l = 0; l < laws.size(); ++l) {
-    const uint32_t begin = static_cast<uint32_t>(order_.size());
-    for (uint32_t i = 0; i < state.n; ++i)
-      if (state.law[i] == l) {
-        order_.push_back(i);
-        state.form[i] = laws[l]->form();
-      }
-    if (order_.size() == begin) continue;
-    smooth_ |= laws[l]->form() != kSetValuedLaw;
+  for (uint32_t l = 0; l < laws.size() && end < n; ++l) {
+    const uint32_t begin = end;
+    const LawForm form = laws[l]->form();
+    each_row(contacts, [&](uint32_t i) {
+      if (state.law[i] != l) return;
+      order_[end++] = i;
+      state.form[i] = form;
+      state.origin[i].made = state.origin[i].hold = kNoSlope;
+    });
+    if (end == begin) continue;
+    smooth_ |= form != kSetValuedLaw;
     remembers_ |= laws[l]->nstate > 0;
     differences_ |= !(laws[l]->ops->flags & DFM_FRIC_JACOBIAN);
-    batches_.push_back({laws[l], begin, static_cast<uint32_t>(order_.size()) - begin});
+    batches_.push_back({laws[l], begin, end - begin});
   }
 }
 
@@ -115,13 +118,13 @@ const LawInstance *LawBatches::slopes(double h, ContactState &state) {
       asked_.clear();
       for (uint32_t k = 0; k < batch.n; ++k) {
         const uint32_t i = order_[batch.begin + k];
-        if (origin_[i].hold & which) continue;
+        if (state.origin[i].hold & which) continue;
         // What sticks hangs on its bristle, not on its normal force; where that is not quite so the
         // passes notice.
         if (which == kByFn && state.mode[i] == 1) {
           state.dft_dfn[i] = state.dft_dfn[state.stride + i] = 0;
-          origin_[i].made |= which;
-          origin_[i].hold |= which;
+          state.origin[i].made |= which;
+          state.origin[i].hold |= which;
         } else {
           asked_.push_back(i);
         }
@@ -135,9 +138,9 @@ const LawInstance *LawBatches::slopes(double h, ContactState &state) {
 
 // Slopes whose prediction of the change of force since they were made is right to a tenth let the passes
 // converge by that tenth; new ones are not worth three answers.
-void LawBatches::look_back(uint32_t i, const ContactState &s) {
+void LawBatches::look_back(uint32_t i, ContactState &s) {
   constexpr double kGood = 0.1;
-  Origin &o = origin_[i];
+  ContactState::Origin &o = s.origin[i];
   if (!o.made) return;
   const uint32_t n = s.stride;
   const double v1 = s.vt[i] - o.v[0], v2 = s.vt[n + i] - o.v[1], fn = s.fn[i] - o.fn;
@@ -354,7 +357,7 @@ const LawInstance *LawBatches::difference(const LawInstance &law, std::span<cons
     for (const uint32_t i : index)
       for (size_t r = 0; r < 2; ++r) state.dft_dfn[r * n + i] *= state.scale[i];
   for (const uint32_t i : index) {
-    Origin &o = origin_[i];
+    ContactState::Origin &o = state.origin[i];
     // what was made elsewhere belongs to another force
     if (!(o.hold & ~which)) o.made = kNoSlope;
     const uint8_t made = o.made | which, hold = o.hold | which;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "contact/contact_state.h"
+#include "contact/rows_part.h"
 #include "core/memory.h"
 #include "deform/base.h"
 #include "geometry/surface.h"
@@ -47,8 +48,9 @@ std::vector<LeftOut> left_out_of(const LawInstance &law);
 class LawBatches {
  public:
   explicit LawBatches(const Memory &memory);
-  // Sorts the contacts into batches by state.law and sets state.form. Call once per sub-step.
-  void gather(const std::vector<LawInstance *> &laws, ContactState &state);
+  // Sorts these contacts into batches by state.law and sets state.form. Call once per sub-step. Batches of
+  // contacts that nobody else has may be asked on several threads at once.
+  void gather(const std::vector<LawInstance *> &laws, std::span<const RowRun> contacts, ContactState &state);
   // Asks every batch at the trial in state: force, limit, mode, trial state, and the slopes dft_dvt and
   // dft_dfn of laws that give them. nullptr, or the law that failed or answered with something not finite.
   const LawInstance *evaluate(double h, ContactState &state);
@@ -62,7 +64,7 @@ class LawBatches {
   //          that others leave
   //   least, relative   m/s, 1: a contact's slip need not be known closer than least + relative of it
   const LawInstance *answer(double h, const double *wt, double least, double relative, ContactState &state);
-  bool smooth() const { return smooth_; }            // is any law of this sub-step not set-valued?
+  bool smooth() const { return smooth_; }            // is any law of them not set-valued?
   bool differences() const { return differences_; }  // has any no slopes of its own?
   bool remembers() const { return remembers_; }      // has any a state?
   // After a law has failed: the contact whose answer is not to be used; kNone: it refused the whole batch.
@@ -81,17 +83,10 @@ class LawBatches {
     double v[2], left, step[2], fraction;
   };
   enum Slopes : uint8_t { kNoSlope = 0, kByVt = 1, kByFn = 2 };
-  // Where slopes were made by differences: the force that they start from, and which of them hold at the
-  // present answer.
-  struct Origin {
-    double v[2], fn, f[2];
-    uint8_t made, hold;
-  };
   std::vector<Batch> batches_;
   Array<uint32_t> order_;         // contacts by law, in contact order within each
   Array<double> in_, out_;        // columns of one batch
   Array<double> moved_, answer_;  // inputs and force beside the trial, for laws without derivatives
-  Array<Origin> origin_;          // [n] of their contacts
   Array<uint8_t> mode_;
   Array<Local> local_;
   Array<uint32_t> asked_;  // contacts of local_ that are asked together
@@ -112,7 +107,7 @@ class LawBatches {
   // The answer of contacts without friction, whose law nobody asks.
   static void leave_free(std::span<const uint32_t> contacts, ContactState &state);
   // do earlier slopes hold at the answer just given?
-  void look_back(uint32_t contact, const ContactState &state);
+  static void look_back(uint32_t contact, ContactState &state);
 };
 
 }  // namespace dfm

@@ -101,7 +101,7 @@ const LawInstance *LawBatches::settle(const Batch &batch, double h, const double
         c.fresh = true;
         c.left = size;
         c.fraction = 1;
-        if (!gives_slopes && !(origin_[i].hold & kByVt)) asked_.push_back(i);
+        if (!gives_slopes && !(s.origin[i].hold & kByVt)) asked_.push_back(i);
       } else if (!c.from_zero && asked < kMostAsked) {  // tangents from where it slips lead nowhere
         c = {i, true, false, false, {0, 0}, INFINITY, {0, 0}, 0};
       } else {

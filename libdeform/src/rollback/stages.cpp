@@ -277,10 +277,11 @@ bool stage_rollback(World &w, StepContext &step, uint32_t *trouble) {
   find_points(w, step);
   make_rows(w, step);
   set_forces(w, step);
-  if (const LawInstance *bad = step.batches.evaluate(step.h, step.state)) {
-    *trouble |= tell_failed_solve(w, step, bad);
-    return false;
-  }
+  for (SolveIsland &island : step.solve_islands.all())
+    if (const LawInstance *bad = island.batches.evaluate(step.h, step.state)) {
+      *trouble |= tell_failed_solve(w, step, bad, island.batches.failed());
+      return false;
+    }
   w.stats.passes = step.rows.n > 0;
   w.stats.sweeps = 0;
   w.stats.residual = 0;

@@ -47,9 +47,14 @@ double now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-double used_share(const StepContext &step) {
+bool requested(uint64_t world) noexcept {
+  return waiting.load(std::memory_order_relaxed) != 0 &&
+         std::any_of(requests.begin(), requests.end(), [&](const auto &r) { return r.load() == world; });
+}
+
+double used_share(const StepContext &step, uint64_t more) {
   const Budget &b = step.budget;
-  double share = b.limit ? double(b.work) / double(b.limit) : 0;
+  double share = b.limit ? double(b.work + more) / double(b.limit) : 0;
   if (b.end > 0) share = std::max(share, 1 - (b.end - now()) / b.span);
   return share;
 }
@@ -243,12 +248,32 @@ void charge(World &w, StepContext &step, uint64_t units) {
 }
 
 bool spares(StepContext &step, Thrift what) {
+  Spent nothing;
+  const bool so = spares(step, nothing, what);
+  step.budget.used = std::max(step.budget.used, nothing.used);
+  return so;
+}
+
+void spend(const World &w, const StepContext &step, Spent &spent, uint64_t units) {
+  const Budget &b = step.budget;
+  spent.work += units;
+  if (b.limit && b.work + spent.work > b.limit) throw StepStopped{StepStopped::work};
+  if (b.end > 0 && now() > b.end) throw StepStopped{StepStopped::time};
+  if (requested(w.handle)) throw StepStopped{StepStopped::asked};
+}
+
+bool spares(const StepContext &step, Spent &spent, Thrift what) {
   const double from = what == Thrift::polish   ? kNoPolishAt
                       : what == Thrift::sweeps ? kFewSweepsAt
                                                : kNoPiecesAt;
-  if (!(used_share(step) > from)) return false;
-  step.budget.used = std::max(step.budget.used, what);
+  if (!(used_share(step, spent.work * spent.all / spent.own) > from)) return false;
+  spent.used = std::max(spent.used, what);
   return true;
+}
+
+void charge(World &w, StepContext &step, const Spent &spent) {
+  step.budget.used = std::max(step.budget.used, spent.used);
+  charge(w, step, spent.work);
 }
 
 void keep_start(World &w, StepContext &step) {

@@ -36,6 +36,18 @@ void plan_work(World &w, StepContext &step, uint32_t substeps);
 // Adds units and throws where the step has to end here. Called by the stepping thread only, never while
 // another stage's threads run.
 void charge(World &w, StepContext &step, uint64_t units);
+// What one island of the contact solve uses, on whatever thread solves it. It knows what had been used before
+// the islands, and takes the others to use as much per row as it does itself: what it leaves out does not
+// depend on who solves what, or when.
+struct Spent {
+  uint64_t work = 0;
+  uint64_t all = 1, own = 1;  // rows of all islands, of this one
+  Thrift used = Thrift::none;
+};
+// Adds units. Throws where the step has to end here, as charge() will for what has been spent.
+void spend(const World &w, const StepContext &step, Spent &spent, uint64_t units);
+bool spares(const StepContext &step, Spent &spent, Thrift what);
+void charge(World &w, StepContext &step, const Spent &spent);  // after all islands, by the stepping thread
 // Units of one pass over the bodies that are awake: points and cells; surfels.
 uint64_t body_work(const World &w, const StepContext &step);
 uint64_t surface_work(const World &w, const StepContext &step);

@@ -6,11 +6,7 @@ StepContext::StepContext(const Meters &meters)
     : broad(meters.detection.memory()),
       narrow(meters.detection.memory()),
       rows(meters.contacts.memory()),
-      acceleration(meters.contacts.memory()),
-      momentum(meters.contacts.memory()),
-      proximal(meters.contacts.memory()),
-      redundant(meters.contacts.memory()),
-      batches(meters.contacts.memory()),
+      solve_islands(meters.contacts.memory()),
       areas(meters.contacts.memory()),
       exchange(meters.contacts.memory()),
       renewal(meters.contacts.memory()),
@@ -24,7 +20,7 @@ StepContext::StepContext(const Meters &meters)
              bond_impulse, chosen);
   use_memory(meters.contacts.memory(), state.law, state.fn, state.vt, state.ft_stop, state.area, state.dwell,
              state.bristle, state.ft, state.dft_dvt, state.dft_dfn, state.limit, state.bristle_out,
-             state.mode, state.form, state.slip, state.scale, state.linear);
+             state.mode, state.form, state.slip, state.scale, state.linear, state.origin);
   use_memory(meters.detection.memory(), guard.joined, guard.near, guard.hits, guard.speed, guard.change,
              guard.kept, guard.blocks.pieces);
   GuardMemory &known = guard.memory;

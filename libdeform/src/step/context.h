@@ -8,12 +8,8 @@
 #include "contact/areas.h"
 #include "contact/distribute.h"
 #include "contact/exchange.h"
-#include "contact/proximal.h"
-#include "contact/redundant.h"
 #include "contact/renewal.h"
-#include "contact/solver.h"
 #include "contact/store.h"
-#include "friction/laws.h"
 #include "geometry/views.h"
 #include "narrow/narrow_phase.h"
 #include "state/world.h"
@@ -23,6 +19,7 @@
 #include "step/islands.h"
 #include "step/method.h"
 #include "step/self_contact.h"
+#include "step/solve_islands.h"
 #include "step/stages.h"
 #include "step/tool_touch.h"
 
@@ -66,16 +63,12 @@ struct StepContext {
   Array<Bond> bonds;
   Array<double> bond_impulse;  // [bonds,3] N s, that the next solve of this sub-step starts from
   ContactState state;
-  Acceleration acceleration;
-  Momentum momentum;
-  Proximal proximal;
-  Redundant redundant;
-  Tolerance tolerance;
-  Residual residual;
-  uint32_t passes = 0, sweeps = 0;
+  SolveIslands solve_islands;
+  struct { Array<double> normal, tangent; } tolerance;  // [contacts] of all islands
+  Residual residual;                                    // the worst of all islands
+  uint32_t passes = 0, sweeps = 0;                      // of the island that took most
   Array<double> disturbance, best_impulse, trial_response;
   Array<uint8_t> revised;  // [blocks of rows] the body answers otherwise by its impulses
-  LawBatches batches;
   Array<double> tangents;
   // [contacts] place in the store that the contact goes on from, or kNone
   Array<uint32_t> match;

@@ -65,8 +65,8 @@ Asked asked(const StepContext &step, const LawInstance &law, uint32_t i) {
 
 }  // namespace
 
-uint32_t tell_failed_solve(World &w, StepContext &step, const LawInstance *law) {
-  const uint32_t at = law ? step.batches.failed() : spoilt(step);
+uint32_t tell_failed_solve(World &w, StepContext &step, const LawInstance *law, uint32_t contact) {
+  const uint32_t at = law ? contact : spoilt(step);
   const std::string where =
       format("step %llu, %s", static_cast<unsigned long long>(w.step_count), sides(w, step, at).c_str());
   constexpr const char *kDo = "take a smaller step, lessen the loads or change the law";

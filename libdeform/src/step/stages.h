@@ -86,8 +86,9 @@ void keep_rigids(World &w, StepContext &step);  // once the sub-step is known to
 
 // solve.cpp
 void make_rows(World &w, StepContext &step);  // contacts as rows, with what they kept
-// to dfm_last_error(), null: not finite; which trouble that is
-uint32_t tell_failed_solve(World &w, StepContext &step, const LawInstance *law);
+// To dfm_last_error(): the law failed at this contact, or kNone; null: something is not finite. Which trouble
+// that is.
+uint32_t tell_failed_solve(World &w, StepContext &step, const LawInstance *law, uint32_t contact);
 // The sentence where the guard has left no way and contact has no answer. Gives the trouble bit.
 uint32_t tell_jam(World &w, StepContext &step);
 void reserve_contacts(World &w, StepContext &step);  // memory for keep_contacts()

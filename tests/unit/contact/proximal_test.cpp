@@ -7,6 +7,7 @@
 #include "contact/solver.h"
 #include "near.h"
 #include "rows_case.h"
+#include "same_tolerance.h"
 
 namespace {
 
@@ -26,10 +27,10 @@ std::vector<uint32_t> first(uint32_t n) {
 // W = G G^T, of a body that steps itself against jointed rigid ones.
 TEST(Rows, Motions_GiveTheOperator) {
   RowsCase c({2, 2, 2});
-  Array<double> g;
-  uint32_t rank = 0;
-  ASSERT_TRUE(c.rows.motions(first(3), first(2), 15, g, rank));
-  EXPECT_EQ(rank, 15u);
+  ContactRows::Motions found;
+  ASSERT_TRUE(c.rows.motions(first(3), first(2), 15, found));
+  EXPECT_EQ(found.rank, 15u);
+  const Array<double> &g = found.g;
   const test::Dense w = c.delassus();
   for (size_t i = 0; i < 9; ++i)
     for (size_t j = 0; j < 9; ++j) {
@@ -37,18 +38,18 @@ TEST(Rows, Motions_GiveTheOperator) {
       for (size_t k = 0; k < 16; ++k) sum += g[16 * i + k] * g[16 * j + k];
       EXPECT_NEAR(sum, w(i, j), 1e-12);
     }
-  EXPECT_FALSE(c.rows.motions(first(3), first(2), 14, g, rank));
+  EXPECT_FALSE(c.rows.motions(first(3), first(2), 14, found));
 }
 
 TEST(Proximal, Parts_AreWhatSharesMotionsAndHasNoPointsOfItsOwn) {
   Proximal p{Memory::standard()};
-  const RowsCase apart({0, 2, 4, 2});
-  ASSERT_EQ(p.find_parts(apart.rows, kNobody), 1u);
+  RowsCase apart({0, 2, 4, 2});
+  ASSERT_EQ(p.find_parts(apart.rows, apart.rows.whole(), kNobody), 1u);
   EXPECT_EQ(std::vector<uint32_t>(p.contacts(0).begin(), p.contacts(0).end()), (std::vector<uint32_t>{1, 3}));
   const uint8_t second[2] = {0, 1};
-  EXPECT_EQ(p.find_parts(apart.rows, second), 0u) << "a block that is to be left";
-  const RowsCase tied({1, 2});
-  EXPECT_EQ(p.find_parts(tied.rows, kNobody), 0u) << "the first contact has points too";
+  EXPECT_EQ(p.find_parts(apart.rows, apart.rows.whole(), second), 0u) << "a block that is to be left";
+  RowsCase tied({1, 2});
+  EXPECT_EQ(p.find_parts(tied.rows, tied.rows.whole(), kNobody), 0u) << "the first contact has points too";
 }
 
 namespace {
@@ -60,7 +61,7 @@ struct Equal {
   RowsCase c{2, 2, 2};
   ContactRows &rows = c.rows;
   ContactState law;
-  Tolerance tolerance;
+  test::SameTolerance tolerance{3, 1e-9, 1e-9, 1e-9};
 
   Equal() {
     rows.y.assign(rows.y.size(), 0.0);
@@ -70,7 +71,7 @@ struct Equal {
     rows.y_free.assign(rows.y.begin(), rows.y.end());
     rows.impulse.assign(9, 0.0);
     store3(&rows.impulse[6], taken);
-    rows.restore();
+    rows.restore(rows.whole());
     law.resize(3, 0);
     for (uint32_t i = 0; i < 3; ++i) {
       law.form[i] = dfm::kSetValuedLaw;
@@ -78,11 +79,8 @@ struct Equal {
       law.fn[i] = 1;
       law.limit[i] = kMu;
     }
-    tolerance.normal.assign(3, 1e-9);
-    tolerance.tangent.assign(3, 1e-9);
-    tolerance.most_normal = 1e-9;
   }
-  double left() const { return inner_residual(rows, law, RowsCase::kStep, tolerance).speed; }
+  double left() { return inner_residual(rows, rows.whole(), law, RowsCase::kStep, tolerance).speed; }
 };
 
 }  // namespace
@@ -92,8 +90,8 @@ TEST(Sweep, LoadWithinWhatMayBeLeft_Stays) {
   Equal stays, moves;
   const Array<double> impulse(stays.rows.impulse);
   for (int k = 0; k < 10; ++k) {
-    sweep(stays.rows, stays.law, RowsCase::kStep, 0, 1.01 * Equal::kFarthest);
-    sweep(moves.rows, moves.law, RowsCase::kStep, 0, 0.99 * Equal::kFarthest);
+    sweep(stays.rows, stays.rows.whole(), stays.law, RowsCase::kStep, 1.01 * Equal::kFarthest);
+    sweep(moves.rows, moves.rows.whole(), moves.law, RowsCase::kStep, 0.99 * Equal::kFarthest);
   }
   for (size_t k = 0; k < 9; ++k) EXPECT_NEAR(stays.rows.impulse[k], impulse[k], 1e-12) << k;
   EXPECT_LT(moves.rows.impulse[6], impulse[6]);
@@ -104,11 +102,11 @@ TEST(Momentum, LoadOnTheFartherOfEqualContacts_IsHandedOverSooner) {
   const auto sweeps = [](bool momentum) {
     Equal e;
     Momentum m{Memory::standard()};
-    m.start(e.rows);
+    m.start(e.rows, e.rows.whole());
     int count = 0;
     for (; e.left() > 1e-6 && count < 5000; ++count) {
-      sweep(e.rows, e.law, RowsCase::kStep);
-      if (momentum) m.follow(e.rows);
+      sweep(e.rows, e.rows.whole(), e.law, RowsCase::kStep);
+      if (momentum) m.follow(e.rows, e.rows.whole());
     }
     return count;
   };
@@ -124,13 +122,13 @@ TEST(Proximal, LoadOnTheFartherOfEqualContacts_IsHandedOver) {
   ContactRows &rows = e.rows;
   const ContactState &law = e.law;
   const Array<double> impulse(rows.impulse), y(rows.y);
-  for (int k = 0; k < 200; ++k) sweep(rows, law, RowsCase::kStep);
+  for (int k = 0; k < 200; ++k) sweep(rows, rows.whole(), law, RowsCase::kStep);
   EXPECT_GT(e.left(), 1e-4);
   rows.impulse = impulse;
   rows.y = y;
 
   Proximal p{Memory::standard()};
-  ASSERT_EQ(p.find_parts(rows, kNobody), 1u);
+  ASSERT_EQ(p.find_parts(rows, rows.whole(), kNobody), 1u);
   ASSERT_TRUE(p.take(rows, 0));
   for (int k = 0; k < 10; ++k) ASSERT_TRUE(p.stride(rows, law, RowsCase::kStep, 1e3)) << k;
   EXPECT_GT(p.work(), 0u);

@@ -28,7 +28,7 @@ TEST(Rows, UnitImpulses_ChangeAllVelocitiesByTheDenseOperator) {
     for (int axis = 0; axis < 3; ++axis) {
       Vec3 unit;
       unit[axis] = 1;
-      c.rows.restore();
+      c.rows.restore(c.rows.whole());
       c.rows.apply(i, unit);
       const std::vector<double> u = c.free_velocity();
       for (uint32_t j = 0; j < RowsCase::kContacts; ++j)
@@ -68,7 +68,7 @@ TEST(Rows, Restore_AppliesAllImpulsesAtOnce) {
     c.rows.impulse[k] = p[k];
   }
   c.rows.y.assign(c.rows.y.size(), NAN);
-  c.rows.restore();
+  c.rows.restore(c.rows.whole());
   const std::vector<double> free = c.free_velocity();
   const std::vector<double> change = c.delassus() * p;
   double work = 0;

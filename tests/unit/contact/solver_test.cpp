@@ -8,6 +8,7 @@
 
 #include "near.h"
 #include "rows_case.h"
+#include "same_tolerance.h"
 
 namespace {
 
@@ -52,7 +53,7 @@ struct Groove {
       law.dft_dfn[i] = steep;
       law.dft_dfn[law.stride + i] = 0;
     }
-    linearize(rows, 1e-3, law);
+    linearize(rows, rows.whole(), 1e-3, law);
     rows.turn_frames();
   }
   double friction(uint32_t i) const { return std::hypot(rows.impulse[3 * i + 1], rows.impulse[3 * i + 2]); }
@@ -97,29 +98,21 @@ struct Problem : RowsCase {
     return delassus() * std::vector<double>(rows.impulse.begin(), rows.impulse.end());
   }
   void ask() {
-    set_trial(rows, kStep, rows.wt.data(), state);
+    set_trial(rows, rows.whole(), kStep, rows.wt.data(), state);
     ask_coulomb(mu, state);
   }
   // One answer of the law, and `sweeps` on it.
   void pass(uint32_t sweeps) {
     ask();
     Acceleration acceleration{Memory::standard()};
-    acceleration.start(rows);
+    acceleration.start(rows, rows.whole());
     for (uint32_t k = 0; k < sweeps; ++k) {
-      if (k > 0) acceleration.follow(rows);
-      sweep(rows, state, kStep);
+      if (k > 0) acceleration.follow(rows, rows.whole());
+      sweep(rows, rows.whole(), state, kStep);
     }
   }
   Vec3 impulse(uint32_t i) const { return load3(&rows.impulse[3 * size_t{i}]); }
 };
-
-Tolerance same_tolerance(uint32_t n, double normal, double tangent) {
-  Tolerance t;
-  t.normal.assign(n, normal);
-  t.tangent.assign(n, tangent);
-  t.most_normal = 4 * normal;
-  return t;
-}
 
 }  // namespace
 
@@ -218,10 +211,10 @@ TEST(Solver, Residual_IsThatOfItsDefinition) {
   p.rows.rate = {0.25, -0.5, 0.125};
   const std::vector<double> before = p.velocities();
   p.rows.impulse = {0.5, 0.1, 0.1, 0.25, -0.2, 0, 0.75, 0, 0.3};
-  p.rows.restore();
+  p.rows.restore(p.rows.whole());
   p.ask();
-  const Tolerance tolerance = same_tolerance(3, 0.5, 0.25);
-  const Residual found = true_residual(p.rows, p.state, RowsCase::kStep, tolerance);
+  const test::SameTolerance tolerance{3, 0.5, 0.25, 4 * 0.5};
+  const Residual found = true_residual(p.rows, p.rows.whole(), p.state, RowsCase::kStep, tolerance);
   const std::vector<double> change = p.changes();
   double normal = 0;
   double tangent = 0;
@@ -244,7 +237,8 @@ TEST(Solver, Residual_IsThatOfItsDefinition) {
   EXPECT_NEAR(found.due, std::max(normal / (4 * 0.5), share), 1e-12);
   // Where friction may be off by much, the normal residual alone decides: over what it may be off by, and at
   // most.
-  const Residual loose = true_residual(p.rows, p.state, RowsCase::kStep, same_tolerance(3, 0.5, 1e6));
+  const Residual loose = true_residual(p.rows, p.rows.whole(), p.state, RowsCase::kStep,
+                                       test::SameTolerance{3, 0.5, 1e6, 4 * 0.5});
   EXPECT_NEAR(loose.relative, normal / 0.5, 1e-12);
   EXPECT_NEAR(loose.due, normal / (4 * 0.5), 1e-12);
 }
@@ -254,8 +248,8 @@ TEST(Solver, Residual_OfASolutionVanishes) {
   Problem p({0, 2, 6}, 0.4, {{1, 0.2, -0.1}, {-2, 0.5, 0.4}, {1, 2, -1}});
   for (int k = 0; k < 40; ++k) p.pass(20);
   p.ask();
-  const Tolerance tolerance = same_tolerance(3, 1e-6, 1e-6);
-  EXPECT_LT(true_residual(p.rows, p.state, RowsCase::kStep, tolerance).speed, 1e-11);
+  const test::SameTolerance tolerance{3, 1e-6, 1e-6, 4 * 1e-6};
+  EXPECT_LT(true_residual(p.rows, p.rows.whole(), p.state, RowsCase::kStep, tolerance).speed, 1e-11);
 }
 
 // Before: every sweep multiplied the impulses by the square of the slope, until they were infinite, and the
@@ -263,7 +257,7 @@ TEST(Solver, Residual_OfASolutionVanishes) {
 TEST(Sweep, LawThatIsSteepWhereItWasAsked_StaysWithinItsLimit) {
   for (const uint8_t mode : {1, 2}) {
     Groove g(10, 0.5, mode);
-    for (int k = 0; k < 400; ++k) sweep(g.rows, g.law, 1e-3);
+    for (int k = 0; k < 400; ++k) sweep(g.rows, g.rows.whole(), g.law, 1e-3);
     for (uint32_t i = 0; i < 2; ++i) {
       const double ln = g.rows.impulse[3 * i];
       EXPECT_LE(ln, 10) << int(mode);
@@ -274,10 +268,10 @@ TEST(Sweep, LawThatIsSteepWhereItWasAsked_StaysWithinItsLimit) {
 
 TEST(Sweep, RestoredVelocities_AreThoseOfTheImpulses) {
   Groove g(0.2, 0.5, 2);
-  for (int k = 0; k < 20; ++k) sweep(g.rows, g.law, 1e-3);
+  for (int k = 0; k < 20; ++k) sweep(g.rows, g.rows.whole(), g.law, 1e-3);
   const Vec3 now = load3(g.rows.y.data());
   g.rows.y.assign(4, NAN);
-  g.rows.restore();
+  g.rows.restore(g.rows.whole());
   EXPECT_NEAR(norm(load3(g.rows.y.data()) - now), 0, 1e-15);
 }
 
@@ -285,10 +279,7 @@ TEST(Sweep, RestoredVelocities_AreThoseOfTheImpulses) {
 TEST(Sweep, ImpulseThatIsNoNumber_IsNotConverged) {
   Groove g(0.2, 0.5, 2);
   g.rows.impulse[0] = NAN;
-  g.rows.restore();
-  Tolerance t;
-  t.normal.assign(2, 1e-6);
-  t.tangent.assign(2, 1e-6);
-  t.most_normal = 1e-6;
-  EXPECT_EQ(inner_residual(g.rows, g.law, 1e-3, t).due, INFINITY);
+  g.rows.restore(g.rows.whole());
+  const test::SameTolerance t{2, 1e-6, 1e-6, 1e-6};
+  EXPECT_EQ(inner_residual(g.rows, g.rows.whole(), g.law, 1e-3, t).due, INFINITY);
 }

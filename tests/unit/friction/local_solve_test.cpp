@@ -75,7 +75,8 @@ TEST(LocalSolve, AnyStiffnessAndStep_MeetsTheRadialReturn) {
           s.vt[k * s.stride + i] = from * c.free[k];
         }
       }
-      batches.gather({&law}, s);
+      const dfm::RowRun contacts{0, n};
+      batches.gather({&law}, {&contacts, 1}, s);
       EXPECT_TRUE(batches.smooth());
       ASSERT_EQ(batches.answer(h, wt.data(), 1e-8, 1e-4, s), nullptr);
       for (uint32_t i = 0; i < n; ++i) {

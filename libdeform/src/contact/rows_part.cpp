@@ -1,0 +1,50 @@
+// What ContactRows does for one part of its rows, and all of them as a part.
+#include <algorithm>
+
+#include "contact/rows.h"
+
+namespace dfm {
+
+RowsView ContactRows::view(RowRun r) const {
+  const size_t i = r.first;
+  return {r.n,
+          begin.data() + i,
+          dof.data(),
+          weight.data(),
+          alone.data(),
+          frame.data() + 9 * i,
+          drive.data() + 3 * i,
+          across_.data() + 9 * i,
+          rate.data() + i,
+          wn.data() + i,
+          wt.data() + i,
+          cross.data() + 2 * i};
+}
+
+RowsPart ContactRows::whole() {
+  every_row_[0] = {0, n};
+  every_row_[1] = {n, nbond};
+  every_block_.resize(blocks.size());
+  for (uint32_t b = 0; b < every_block_.size(); ++b) every_block_[b] = b;
+  return {{&every_row_[0], 1}, {&every_row_[1], nbond ? size_t{1} : 0}, every_block_, n, nbond};
+}
+
+void ContactRows::restore(const RowsPart &part) {
+  for (const uint32_t b : part.blocks)
+    std::copy_n(&y_free[size_t(4) * blocks[b].first], size_t(4) * blocks[b].count,
+                &y[size_t(4) * blocks[b].first]);
+  const auto free = [&](uint32_t i) {
+    for (uint32_t j = begin[i]; j < begin[i + 1]; ++j)
+      if (block[dof[j]] == kNone) std::copy_n(&y_free[size_t(4) * dof[j]], 4, &y[size_t(4) * dof[j]]);
+  };
+  const auto push = [&](uint32_t i) {
+    const Vec3 l = load3(&impulse[size_t(i) * 3]);
+    if (l.x != 0 || l.y != 0 || l.z != 0) apply(i, l);
+  };
+  each_row(part.contacts, free);
+  each_row(part.bonds, free);
+  each_row(part.contacts, push);
+  each_row(part.bonds, push);
+}
+
+}  // namespace dfm

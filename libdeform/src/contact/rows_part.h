@@ -1,0 +1,25 @@
+// A part of the rows of a contact solve: contacts and bonds that share no unknown with the others. What is
+// done to one part neither reads nor changes what is done to another, so they may be solved at the same time.
+#pragma once
+#include <cstdint>
+#include <span>
+
+namespace dfm {
+
+struct RowRun { uint32_t first, n; };
+
+struct RowsPart {
+  std::span<const RowRun> contacts, bonds;  // ascending; the rows of bonds follow those of all contacts
+  std::span<const uint32_t> blocks;         // ascending
+  uint32_t n = 0, nbond = 0;                // contacts and bonds in it
+  uint32_t all() const { return n + nbond; }
+};
+
+// f(row)
+template <class F>
+void each_row(std::span<const RowRun> runs, F &&f) {
+  for (const RowRun &r : runs)
+    for (uint32_t i = r.first; i < r.first + r.n; ++i) f(i);
+}
+
+}  // namespace dfm

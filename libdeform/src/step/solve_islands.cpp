@@ -1,0 +1,401 @@
+// The outer loop of one island over the laws, around the inner sweeps (doc/concepts/contact.md).
+#include "step/solve_islands.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "contact/bonds.h"
+#include "state/world.h"
+#include "step/context.h"
+#include "step/tolerance.h"
+
+namespace dfm {
+namespace {
+
+// Where laws remember, errors of the normal force do not average out: each time a force falls by one, the
+// cone cuts off a part of the bristle that does not come back when it rises; and a point that shakes under a
+// bristle of share s stretches it by (1 - s) of each way forth and slackens it by (1 + s) of each way back.
+// What is held creeps by both. This share of the normal tolerance then holds while bodies shake, and at rest
+// this share of the tangential one (doc/decisions/0028). So it does for bodies whose end is solved for: stiff
+// ones sag by less than the normal tolerance in a long step.
+constexpr double kRememberedShare = 0.05, kRememberedRest = 1e-3;
+
+// The cap on sweeps bounds the cost of what is not exact, not of what lets bodies through: where a normal
+// residual would eat more than a tenth of the rest distance within the sub-step, up to kBeyondCap times as
+// many are done (many surfels on few phyxels, struck hard).
+constexpr uint32_t kBeyondCap = 8, kFewSweeps = 8;  // kFewSweeps: where the step has to save
+bool may_sweep(const World &w, const StepContext &step, SolveIsland &own, const Residual &residual,
+               uint32_t cap) {
+  if (own.sweeps >= kFewSweeps && spares(step, own.spent, Thrift::sweeps)) return false;
+  if (own.sweeps < cap) return true;
+  return residual.normal * step.h > 0.1 * w.offset && own.sweeps < uint64_t{kBeyondCap} * w.def.max_sweeps;
+}
+
+// What goes beyond what must be reached is polish, and this many sweeps of a sub-step are enough for it: the
+// next one goes on from there.
+constexpr uint32_t kPolish = 20;
+bool good(const StepContext &step, SolveIsland &own, const Residual &left, double most) {
+  return left.relative <= most ||
+         (left.due <= most && (own.sweeps >= kPolish || spares(step, own.spent, Thrift::polish)));
+}
+
+// Beyond this times the best residual sweeps are running away: with a jam of strong friction block
+// Gauss-Seidel need not converge, and where laws are affine nothing else stops it before numbers end.
+constexpr double kRunsAway = 1e6;
+
+// A law that is no projection is known by its tangent, so what is solved is only as right as the slip is near
+// at which the law was asked. Where nearly redundant normal forces take all sweeps of the first pass, that
+// slip is the one before contact: bodies would be left with friction that no law gives, and pushed by it.
+// Beyond the cap laws are asked again, with so many sweeps each time (doc/decisions/0201).
+constexpr uint32_t kPassSweeps = 20;
+bool asks_beyond(const World &w, const SolveIsland &own) {
+  return own.sweeps >= w.def.max_sweeps && own.batches.remembers();
+}
+bool may_ask(const World &w, const StepContext &step, SolveIsland &own) {
+  return asks_beyond(w, own) && own.residual.due > 1 &&
+         own.sweeps < uint64_t{kBeyondCap} * w.def.max_sweeps && !spares(step, own.spent, Thrift::sweeps);
+}
+
+// The response by which a contact looks for the slip at which it comes to rest alone. Many contacts that hold
+// one body turn its slip round together and could not stop it one by one: asked by their own responses they
+// say "slide" one way and the other in turn, for ever. Beyond the cap each takes that of all.
+const double *trial_response(const World &w, StepContext &step, const SolveIsland &own) {
+  const ContactRows &rows = step.rows;
+  if (!asks_beyond(w, own)) return rows.wt.data();
+  double loaded = 0;
+  each_row(own.part.contacts, [&](uint32_t i) { loaded += rows.impulse[size_t(i) * 3] > 0; });
+  each_row(own.part.contacts,
+           [&](uint32_t i) { step.trial_response[i] = rows.wt[i] * std::max(1.0, loaded); });
+  return step.trial_response.data();
+}
+
+// The island's rows of [3 rows] columns.
+void copy_impulses(const RowsPart &part, const Array<double> &from, Array<double> &to) {
+  const auto copy = [&](std::span<const RowRun> runs) {
+    for (const RowRun &r : runs)
+      std::copy_n(from.data() + size_t(3) * r.first, size_t(3) * r.n, to.data() + size_t(3) * r.first);
+  };
+  copy(part.contacts);
+  copy(part.bonds);
+}
+void keep_best(StepContext &step, const SolveIsland &own) {
+  copy_impulses(own.part, step.rows.impulse, step.best_impulse);
+}
+void take_best(StepContext &step, const SolveIsland &own) {
+  copy_impulses(own.part, step.best_impulse, step.rows.impulse);
+  step.rows.restore(own.part);
+}
+
+// One sweep. Each solves the bonds to a share of their tolerance, so that the residual which the next sweep
+// finds comes from the contacts.
+constexpr double kBondShare = 0.1;
+void sweep_once(const World &w, StepContext &step, SolveIsland &own, double leave) {
+  spend(w, step, own.spent, own.part.all());
+  sweep(step.rows, own.part, step.state, step.h, leave);
+  ++own.sweeps;
+  if (!own.part.nbond) return;
+  const uint32_t passes = solve_bonds(step.rows, own.part, kBondShare * own.tolerance.bond, own.scratch);
+  spend(w, step, own.spent, uint64_t{passes} * own.part.nbond);
+}
+
+// Of bodies that move in few ways sweeps hand loads over too slowly: what they have left at the cap goes on
+// in long strides. rho is 1000 over a contact's own response; less where a stride is not found so. The
+// strides of a part cost no more than so many times its sweeps up to the cap; what is left then is left to
+// the next sub-step, which begins there. Not of bodies that revise what they answer: impulses that move far
+// move them.
+constexpr uint32_t kMostStrides = 12, kStridesOverCap = 32;
+constexpr double kRho = 1e3, kLeastRho = 10;
+void stride_on(const World &w, StepContext &step, SolveIsland &own, uint32_t part) {
+  Proximal &proximal = own.proximal;
+  const std::span<const uint32_t> contacts = proximal.contacts(part);
+  const auto left = [&] { return inner_residual(step.rows, step.state, step.h, own.tolerance, contacts); };
+  double best = left().due, rho = kRho;
+  if (best <= 1 || !proximal.take(step.rows, part)) return;
+  const uint64_t most = uint64_t{kStridesOverCap} * w.def.max_sweeps * contacts.size();
+  uint64_t work = 0;
+  for (uint32_t k = 0; k < kMostStrides && rho >= kLeastRho && work < most; ++k) {
+    const bool found = proximal.stride(step.rows, step.state, step.h, rho);
+    work += proximal.work();
+    spend(w, step, own.spent, proximal.work());
+    if (!found) {
+      rho *= 0.1;
+      continue;
+    }
+    const Residual now = left();
+    if (now.due < best) {
+      best = now.due;
+      for (const uint32_t i : contacts)
+        std::copy_n(&step.rows.impulse[size_t(3) * i], 3, &step.best_impulse[size_t(3) * i]);
+    }
+    if (good(step, own, now, 0.5)) break;
+  }
+  proximal.put(step.rows, step.best_impulse.data());
+}
+void stride_on(const World &w, StepContext &step, SolveIsland &own) {
+  if (spares(step, own.spent, Thrift::sweeps)) return;
+  const uint32_t parts = own.proximal.find_parts(step.rows, own.part, step.revised);
+  for (uint32_t part = 0; part < parts; ++part) stride_on(w, step, own, part);
+}
+
+// Nearly redundant contacts of bodies that revise (doc/decisions/0360). Normal forces that hold the bodies in
+// more places than these can move in agree only to a few 1e-8 m: a sweep takes a little load from a contact
+// that is that far open, gives it to others, and goes on so until the first has none, with friction behind.
+// What nobody needs is left out: once the polish is over, contacts whose normal velocity is within kLeave of
+// what is allowed keep their normal impulses. At the cap as many sweeps are added, by momentum, from the best
+// state.
+constexpr double kLeave = 0.2;
+double leave_of(const SolveIsland &own) {
+  return own.revises && own.sweeps >= kPolish ? kLeave * own.tolerance.most_normal : 0;
+}
+void settle(const World &w, StepContext &step, SolveIsland &own, double &best) {
+  own.momentum.start(step.rows, own.part);
+  for (uint32_t k = 0; k < w.def.max_sweeps && !spares(step, own.spent, Thrift::sweeps); ++k) {
+    sweep_once(w, step, own, kLeave * own.tolerance.most_normal);
+    const Residual left = inner_residual(step.rows, own.part, step.state, step.h, own.tolerance);
+    if (left.due < best) {
+      best = left.due;
+      keep_best(step, own);
+    }
+    if (left.due <= 0.5) return;
+    if (!(left.due <= kRunsAway * std::max(1.0, best))) break;
+    own.momentum.follow(step.rows, own.part);
+  }
+  take_best(step, own);
+}
+
+// Whether velocities still move is asked after every so many sweeps, once the polish is over, and of laws
+// without memory: what is left over stretches bristles.
+constexpr uint32_t kAskStands = 4;
+bool asks_redundant(const StepContext &step, SolveIsland &own) {
+  return own.revises && own.sweeps >= kPolish && own.sweeps % kAskStands == 0 && !own.batches.remembers() &&
+         own.redundant.found(step.rows, own.part);
+}
+
+// Sweeps on the laws as they were last answered. At the cap the best state seen is taken, not the last one.
+void sweep_until_good(const World &w, StepContext &step, SolveIsland &own) {
+  ContactRows &rows = step.rows;
+  const uint32_t cap = asks_beyond(w, own) ? own.sweeps + kPassSweeps : w.def.max_sweeps;
+  double best = std::numeric_limits<double>::infinity();
+  keep_best(step, own);
+  own.acceleration.start(rows, own.part);
+  bool asks = false;
+  for (double before = leave_of(own);;) {
+    const double leave = leave_of(own);
+    if (leave > before) own.acceleration.start(rows, own.part);
+    before = leave;
+    if (asks) own.redundant.note(rows, own.part);
+    sweep_once(w, step, own, leave);
+    Residual left = inner_residual(rows, own.part, step.state, step.h, own.tolerance);
+    if (asks && left.due > 0.5 && own.redundant.stands(rows, own.part, step.state, step.h, own.tolerance))
+      left = inner_residual(rows, own.part, step.state, step.h, own.tolerance);
+    if (!(left.due <= kRunsAway * std::max(1.0, best)) || !(left.due < std::numeric_limits<double>::max()))
+      return take_best(step, own);
+    if (good(step, own, left, 0.5)) return;
+    if (left.due < best) {
+      best = left.due;
+      keep_best(step, own);
+    }
+    if (!may_sweep(w, step, own, left, cap)) break;
+    // what stands is seen from one plain sweep to the next
+    asks = asks_redundant(step, own);
+    own.acceleration.follow(rows, own.part, !asks);
+  }
+  if (std::isinf(best)) return;
+  const auto go_back = [&](uint32_t i) {
+    double *const l = &rows.impulse[size_t(i) * 3];
+    const Vec3 change = load3(&step.best_impulse[size_t(i) * 3]) - load3(l);
+    if (change.x == 0 && change.y == 0 && change.z == 0) return;
+    rows.apply(i, change);
+    store3(l, load3(&step.best_impulse[size_t(i) * 3]));
+  };
+  each_row(own.part.contacts, go_back);
+  each_row(own.part.bonds, go_back);
+  if (best > 0.5 && own.revises) settle(w, step, own, best);
+  if (best > 1) stride_on(w, step, own);
+}
+
+// Passes until the true residual is good enough, or a law has failed.
+void solve_island(const World &w, StepContext &step, SolveIsland &own) {
+  const double gap_margin = normal_at_rest(w, step.h), least = tangent_at_rest(w, step.h);
+  const bool memory = own.batches.remembers();
+  // an equilibrium is as good as its contacts: nothing is left to a next sub-step
+  const ToleranceBounds bounds =
+      w.prescribed.stands()
+          ? ToleranceBounds{least, least, least}
+          : ToleranceBounds{least, memory || own.revises ? kRememberedRest * least : gap_margin,
+                            memory ? kRememberedShare * gap_margin : gap_margin};
+  for (;;) {
+    spend(w, step, own.spent, 4 * uint64_t{own.part.all()});
+    const double *const response = trial_response(w, step, own);
+    set_trial(step.rows, own.part, step.h, response, step.state);
+    // The sweeps take the next Newton step from there: what is asked a hundredth off is answered to a
+    // ten-thousandth.
+    if ((own.bad = own.batches.answer(step.h, response, 0.1 * least, 1e-2, step.state))) return;
+    if (own.batches.smooth()) linearize(step.rows, own.part, step.h, step.state);
+    ++own.passes;
+    if (own.sweeps) {
+      own.residual = true_residual(step.rows, own.part, step.state, step.h, own.tolerance);
+      if (good(step, own, own.residual, 1) || own.passes > w.def.max_passes ||
+          !(may_sweep(w, step, own, own.residual, w.def.max_sweeps) || may_ask(w, step, own)))
+        return;
+    }
+    if ((own.bad = own.batches.slopes(step.h, step.state))) return;
+    if (own.batches.differences()) linearize(step.rows, own.part, step.h, step.state);
+    if (!own.sweeps) {
+      set_tolerance(step.rows, own.part, step.state, step.contacts, step.h, bounds, step.disturbance.data(),
+                    own.tolerance);
+      own.redundant.allow(own.part, own.tolerance);
+    }
+    // at least one sweep on a warm start is part of the method
+    sweep_until_good(w, step, own);
+  }
+}
+
+}  // namespace
+
+SolveIslands::SolveIslands(const Memory &m) : memory_(m), bodies_(m) {
+  use_memory(m, pairs_, number_, order_, contact_, bond_, block_, begin_);
+}
+
+// Rows of the same two sides follow each other, so that little is done for each row.
+void SolveIslands::find(const World &w, StepContext &step) {
+  const uint32_t nbody = static_cast<uint32_t>(w.bodies.size());
+  bodies_.start(nbody + static_cast<uint32_t>(step.rigid_groups.size()));
+  pairs_.clear();
+  const auto add = [&](const auto &all, uint32_t first) {
+    for (uint32_t i = 0; i < all.size();) {
+      const auto &c = all[i];
+      const uint32_t begin = i, a = c.slot_a, b = c.slot_b, obstacle = c.obstacle;
+      while (++i < all.size() && all[i].slot_a == a && all[i].slot_b == b && all[i].obstacle == obstacle) {}
+      pairs_.push_back({a, {first + begin, i - begin}});
+      const uint32_t group = !obstacle || step.rigid_places.empty() ? kNone : step.rigid_places[b].group;
+      if (!obstacle) bodies_.join(a, b);
+      else if (group != kNone) bodies_.join(a, nbody + group);  // others feel nothing
+    }
+  };
+  add(step.contacts, 0);
+  const size_t of_contacts = pairs_.size();
+  add(step.bonds, step.rows.n);
+  bodies_.finish();
+  number_.assign(bodies_.count, kNone);
+  for (const Pair &p : pairs_) number_[bodies_.of[p.body]] = 0;
+  count_ = 0;
+  for (uint32_t &n : number_)
+    if (n != kNone) n = count_++;
+  while (islands_.size() < count_) islands_.emplace_back(memory_);
+
+  const auto of = [&](const Pair &p) { return number_[bodies_.of[p.body]]; };
+  // begin_[k] is then the end of island k's, where that of the next one begins
+  const auto split = [&](std::span<const Pair> pairs, Array<RowRun> &out) {
+    begin_.assign(size_t{count_} + 1, 0);
+    uint32_t last = kNone;
+    for (const Pair &p : pairs)
+      if (const uint32_t k = of(p); k != std::exchange(last, k)) ++begin_[k + 1];
+    for (uint32_t k = 0; k < count_; ++k) begin_[k + 1] += begin_[k];
+    out.resize(begin_[count_]);
+    last = kNone;
+    for (const Pair &p : pairs) {
+      const uint32_t k = of(p);
+      if (k != std::exchange(last, k)) out[begin_[k]++] = p.rows;
+      else out[begin_[k] - 1].n += p.rows.n;
+    }
+  };
+  const auto slice = [&](const auto &all, uint32_t k) {
+    const uint32_t begin = k ? begin_[k - 1] : 0;
+    return std::span(all.data() + begin, begin_[k] - begin);
+  };
+  const auto rows_of = [](std::span<const RowRun> runs) {
+    uint32_t n = 0;
+    for (const RowRun &r : runs) n += r.n;
+    return n;
+  };
+  split({pairs_.data(), of_contacts}, contact_);
+  for (uint32_t k = 0; k < count_; ++k) {
+    RowsPart &part = islands_[k].part;
+    part.contacts = slice(contact_, k);
+    part.n = rows_of(part.contacts);
+  }
+  split({pairs_.data() + of_contacts, pairs_.size() - of_contacts}, bond_);
+  for (uint32_t k = 0; k < count_; ++k) {
+    RowsPart &part = islands_[k].part;
+    part.bonds = slice(bond_, k);
+    part.nbond = rows_of(part.bonds);
+  }
+
+  const Array<ContactRows::Block> &blocks = step.rows.blocks;
+  const auto of_block = [&](const ContactRows::Block &b) {
+    return number_[bodies_.of[b.group == kNone ? b.source : nbody + b.group]];
+  };
+  begin_.assign(size_t{count_} + 1, 0);
+  for (const ContactRows::Block &b : blocks) ++begin_[of_block(b) + 1];
+  for (uint32_t k = 0; k < count_; ++k) begin_[k + 1] += begin_[k];
+  block_.resize(blocks.size());
+  for (uint32_t b = 0; b < blocks.size(); ++b) block_[begin_[of_block(blocks[b])]++] = b;
+
+  step.revised.resize(blocks.size());
+  order_.resize(count_);
+  for (uint32_t k = 0; k < count_; ++k) {
+    SolveIsland &own = islands_[k];
+    order_[k] = k;
+    own.part.blocks = slice(block_, k);
+    own.revises = own.rigid = false;
+    for (const uint32_t b : own.part.blocks) {
+      const bool rigid = blocks[b].group != kNone;
+      step.revised[b] = !rigid && w.bodies[blocks[b].source]->dynamics->abilities().revises;
+      own.rigid = own.rigid || rigid;
+      own.revises = own.revises || step.revised[b];
+    }
+    own.batches.gather(w.pairs.laws, own.part.contacts, step.state);
+  }
+  std::sort(order_.begin(), order_.end(), [&](uint32_t l, uint32_t r) {
+    const uint32_t a = islands_[l].part.all(), b = islands_[r].part.all();
+    return a != b ? a > b : l < r;
+  });
+}
+
+const SolveIsland *solve_islands(World &w, StepContext &step) {
+  const size_t n = step.rows.n;
+  step.tolerance.normal.resize(n);
+  step.tolerance.tangent.resize(n);
+  step.trial_response.resize(n);
+  step.best_impulse.resize(3 * size_t{step.rows.all()});
+  step.disturbance.resize(2 * w.bodies.size());
+  const std::span<SolveIsland> all = step.solve_islands.all();
+  uint64_t rows = 0;
+  for (SolveIsland &own : all) {
+    if (!own.open) continue;
+    rows += own.part.all();
+    own.passes = own.sweeps = 0;
+    own.residual = {};
+    own.bad = nullptr;
+    own.thrown = nullptr;
+    own.tolerance.normal = step.tolerance.normal.data();
+    own.tolerance.tangent = step.tolerance.tangent.data();
+  }
+  const std::span<const uint32_t> order = step.solve_islands.by_size();
+  w.context->tasks.parallel_for(static_cast<uint32_t>(order.size()), 1, [&](uint32_t begin, uint32_t end) {
+    for (uint32_t k = begin; k < end; ++k) {
+      SolveIsland &own = all[order[k]];
+      if (!own.open) continue;
+      own.spent = {0, rows, own.part.all(), Thrift::none};
+      try {
+        solve_island(w, step, own);
+      } catch (...) {
+        own.thrown = std::current_exception();
+      }
+    }
+  });
+  for (const SolveIsland &own : all)
+    if (own.open) charge(w, step, own.spent);
+  const SolveIsland *bad = nullptr;
+  for (const SolveIsland &own : all) {
+    if (!own.open) continue;
+    if (own.thrown) std::rethrow_exception(own.thrown);
+    if (own.bad && !bad) bad = &own;
+  }
+  return bad;
+}
+
+}  // namespace dfm
