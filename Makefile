@@ -87,6 +87,7 @@ bench-peers: setup-peers build/release/build.ninja
 soak: setup-bench build/bench/build.ninja build/release/build.ninja
 	$(BUILD) release
 	DEFORM_SOAK=1 nice -n 19 ctest --preset release -j $(JOBS) -L stability -R Jittered
+	DEFORM_SOAK=1 nice -n 19 ctest --preset release -R '^python\.cut_scenes$$'
 	$(BUILD) bench --target hold_soak suite_soak cover_soak
 	nice -n 19 build/bench/bin/cover_soak tests/bench/results/cover_soak.csv
 	nice -n 19 build/bench/bin/suite_soak tests/bench/results/suite_soak.csv
