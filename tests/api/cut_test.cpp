@@ -3,94 +3,11 @@
 #include <cstring>
 #include <random>
 
-#include "stack.h"
+#include "cut_scenes.h"
 
 namespace {
 
-dfm_cut_info ask() {
-  dfm_cut_info i{};
-  i.size = sizeof i;
-  return i;
-}
-
-dfm_body_info info(dfm_body b) {
-  dfm_body_info i{};
-  i.size = sizeof i;
-  test::ok(dfm_body_get_info(b, &i));
-  return i;
-}
-
-struct State {
-  std::vector<double> x, v;
-  explicit State(dfm_body b) {
-    uint32_t n = 0;
-    test::ok(dfm_body_get_state(b, 0, nullptr, nullptr, &n));
-    x.resize(3 * size_t{n});
-    v.resize(3 * size_t{n});
-    test::ok(dfm_body_get_state(b, n, x.data(), v.data(), &n));
-  }
-};
-
-dfm_cut_def sphere(std::array<double, 3> at, double radius) {
-  dfm_cut_def d = dfm_cut_def_default();
-  for (int k = 0; k < 3; ++k) {
-    d.pose.position[k] = at[k];
-    d.half_size[k] = radius;
-  }
-  return d;
-}
-
-// The whole plane at right angles to an axis.
-dfm_cut_def plane(int axis, double at, uint32_t how) {
-  dfm_cut_def d = dfm_cut_def_default();
-  d.shape = DFM_CUT_BLADE;
-  d.how = how;
-  const double corner[4][2] = {{-9, -9}, {9, -9}, {9, 9}, {-9, 9}};
-  for (int i = 0; i < 4; ++i) {
-    d.blade[3 * i + axis] = at;
-    d.blade[3 * i + (axis + 1) % 3] = corner[i][0];
-    d.blade[3 * i + (axis + 2) % 3] = corner[i][1];
-  }
-  return d;
-}
-
-dfm_cut_info cut(dfm_body b, const dfm_cut_def &d) {
-  dfm_cut_info out = ask();
-  test::ok(dfm_body_cut(b, &d, &out));
-  return out;
-}
-
-void restore(dfm_world w, const std::string &data) {
-  test::ok(dfm_world_restore(w, data.data(), data.size()));
-}
-
-void steps(dfm_world w, int n, double h = 1e-3) {
-  for (int i = 0; i < n; ++i) {
-    uint32_t trouble = 0;
-    ASSERT_EQ(dfm_world_step(w, h, &trouble), DFM_OK) << dfm_last_error();
-    ASSERT_EQ(trouble & DFM_TROUBLE_ENERGY, 0u);
-  }
-}
-
-struct Cube {
-  test::Context context;
-  dfm_world w;
-  dfm_body b;
-  explicit Cube(const char *model, std::array<double, 3> gravity = {0, 0, 0}, uint32_t cells = 320)
-      : w(test::make_world(context, gravity)) {
-    test::BodyOptions o;
-    o.name = "cube";
-    o.model = model;
-    o.young = 2e4;
-    o.damping_stiffness = 1e-3;
-    o.velocity = {0.3, -0.2, 0.1};
-    o.spin = {1, 2, -3};
-    o.position = {0, 0, 0.06};
-    b = test::make_body(context, w, "beam", {0.1, 0.1, 0.1}, cells, o);
-  }
-};
-
-const char *const kModels[] = {"msm", "corotational_fem"};
+using namespace test::cutting;
 
 }  // namespace
 
@@ -548,6 +465,68 @@ TEST(Cut, MovingBlade_WithJitter_PartsTheCubeEachTime) {
 }
 
 // Cuts of every kind at random places while two cubes lie on each other, until nothing is left.
+// The blade goes down through a cube that spins in front of it, in steps; the host passes the edge of the
+// step before and that of now.
+TEST(Cut, MovingBlade_PartsASpinningCubeEachTime) {
+  for (int run = 0; run < 10; ++run) {
+    test::Context context;
+    const dfm_world w = test::make_world(context, {0, 0, 0});
+    test::BodyOptions o;
+    o.name = "cube";
+    o.model = run % 2 ? "msm" : "corotational_fem";
+    o.young = 1e6;  // bends by less than a hundredth of a cell
+    o.damping_stiffness = 1e-5;
+    o.spin = {0.7, 1.1 + 0.1 * run, 1.7 - 0.05 * run};
+    const dfm_body b = test::make_body(context, w, "beam", {0.1, 0.1, 0.1}, 320, o);
+    dfm_cut_def d = plane(0, 0.052 + 1e-3 * run, DFM_CUT_SPLIT);
+    dfm_cut_info last{};
+    double z = 0.2;
+    for (int k = 0; k < 60; ++k) {
+      const double next = z - 0.005;
+      const double edge[] = {0.052, -1, z, 0.052, 1, z, 0.052, 1, next, 0.052, -1, next};
+      std::copy(edge, edge + 12, d.blade);
+      last = cut(b, d);
+      z = next;
+      steps(w, 1, 2e-3);
+    }
+    EXPECT_GT(last.parts, 1u) << run;
+  }
+}
+
+TEST(Cut, FractureEnergy_IsTheForceOnTheBladeTimesItsWay) {
+  test::Context context;
+  const dfm_world w = test::make_world(context, {0, 0, 0});
+  dfm_tetmesh mesh = 0;
+  const double size[] = {0.1, 0.06, 0.08}, toughness = 250;
+  test::ok(dfm_tetmesh_make(context, "beam", size, 600, &mesh));
+  dfm_body_def d = dfm_body_def_default();
+  test::lend(mesh, d);
+  dfm_material_def m = dfm_material_def_default();
+  m.name = "tissue";
+  const dfm_param_value row{"fracture_energy", &toughness, 1};
+  m.extra = {sizeof(dfm_params), 1, &row};
+  test::ok(dfm_material_create(w, &m, &d.material));
+  d.name = "block";
+  dfm_body b = 0;
+  test::ok(dfm_body_create(w, &d, &b));
+  dfm_cut_def blade = plane(0, 0, DFM_CUT_SPLIT);
+  double work = 0, most = 0, z = 0.09;
+  const double step = 0.001;
+  for (int k = 0; k < 100; ++k) {
+    const double edge[] = {0.047, -1, z, 0.047, 1, z, 0.047, 1, z - step, 0.047, -1, z - step};
+    std::copy(edge, edge + 12, blade.blade);
+    const dfm_cut_info done = cut(b, blade);
+    EXPECT_NEAR(done.force[2] * step, done.fracture, 1e-12);
+    EXPECT_NEAR(done.force[0], 0, 1e-9);
+    work += done.force[2] * step;
+    most = std::max(most, done.force[2]);
+    z = blade.blade[8];
+  }
+  // width of the block times its height, however rough the cut face is: mean force G b = 15 N
+  EXPECT_NEAR(work, toughness * 0.06 * 0.08, 1e-10);
+  EXPECT_GT(most, toughness * 0.06);
+}
+
 TEST(Cut, RandomCuts_KeepTheBooksToTheEnd) {
   std::mt19937 random(3);
   const auto share = [&] { return double(random() % 10001) / 10000; };

@@ -81,6 +81,7 @@ DFM_EVENT_SENSOR_BEGIN = 4
 DFM_EVENT_SENSOR_END = 5
 DFM_EVENT_TEAR = 6
 DFM_EVENT_CUT = 7
+DFM_EVENT_PIECE = 8
 DFM_ATTACH_TOUCH = 1
 DFM_MESH_TETS, DFM_MESH_SURFACE = 1, 2
 DFM_SCENE_SNAPSHOT, DFM_SCENE_PARTIAL = 1, 2
@@ -102,6 +103,7 @@ DFM_QUERY_INSIDE = 1
 DFM_CHOICE_TOUCHED = 1
 DFM_CUT_ELLIPSOID, DFM_CUT_BOX, DFM_CUT_BLADE = 0, 1, 2
 DFM_CUT_REMOVE, DFM_CUT_SPLIT = 0, 1
+DFM_CRUMBS_STAY, DFM_CRUMBS_REMOVE = 0, 1
 DFM_TOOL_SPHERE = 0
 DFM_TOOL_CAPSULE = 1
 DFM_TOOL_BOX = 2
@@ -563,7 +565,12 @@ class dfm_cut_def(_Structure):
 class dfm_cut_info(_Structure):
     _fields_ = [("size", u32), ("cells", u32), ("left", u32), ("points", u32), ("parts", u32),
                 ("reserved", u32), ("area", f64), ("mass", f64), ("momentum", f64 * 3), ("kinetic", f64),
-                ("elastic", f64)]
+                ("elastic", f64), ("pieces", u32), ("reserved2", u32), ("fracture", f64),
+                ("force", f64 * 3)]
+
+
+class dfm_separate_def(_Structure):
+    _fields_ = [("size", u32), ("flags", u32), ("least_cells", u32), ("crumbs", u32), ("cookie", u64)]
 
 
 class dfm_tool_def(_Structure):

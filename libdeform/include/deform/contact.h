@@ -190,7 +190,8 @@ typedef struct dfm_contact_event {
  * (deform/attach.h). SENSOR: a thing has come into a sensor or left it (deform/sensor.h). TEAR: body a == b
  * has torn, by "tear" of its material (deform/material.h); key is the number of points that were split.
  * CUT: part b of a tool has cut body a (dfm_tool_set_cuts); key is the number of faces that have opened or of
- * cells that have gone */
+ * cells that have gone. PIECE: a part of body a has become body b (dfm_body_separate); key is the number of
+ * its cells */
 enum {
   DFM_EVENT_BEGIN = 1,
   DFM_EVENT_END = 2,
@@ -198,15 +199,16 @@ enum {
   DFM_EVENT_SENSOR_BEGIN = 4,
   DFM_EVENT_SENSOR_END = 5,
   DFM_EVENT_TEAR = 6,
-  DFM_EVENT_CUT = 7
+  DFM_EVENT_CUT = 7,
+  DFM_EVENT_PIECE = 8
 };
 /** dfm_world_events with rows of any size. @param row_size bytes from one row of out to the next
  * (base.h). Since 0.1.
  * Threads: Not during step. */
 DFM_API dfm_status dfm_world_events_sized(dfm_world world, uint32_t row_size, uint32_t capacity,
                                           dfm_contact_event *out, uint32_t *n);
-/** Begin and end of contacts and of overlaps with sensors, ends of attachments, tears, and cuts by tools,
- * since the last call; empties the list. Where more than 65,536 wait, the oldest are left out.
+/** Begin and end of contacts and of overlaps with sensors, ends of attachments, tears, cuts by tools
+ * and pieces since the last call; empties the list. Where more than 65,536 wait, the oldest are left out.
  * Threads: Not during step. Since 0.1. */
 static inline dfm_status dfm_world_events(dfm_world world, uint32_t capacity, dfm_contact_event *out,
                                           uint32_t *n) {

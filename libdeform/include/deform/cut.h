@@ -45,6 +45,11 @@ typedef struct dfm_cut_info {
   double area;              /* m2 of triangles that have come to the surface, both sides, at rest */
   double mass, momentum[3]; /* kg and N s that have gone with cells */
   double kinetic, elastic;  /* J, before less after; elastic NAN where the model gives no energy */
+  uint32_t pieces;          /* bodies that have come off it (dfm_body_set_separate) */
+  uint32_t reserved2;
+  /* of a blade that opens faces of a material with "fracture_energy": J that it takes to open them; N on the
+   * blade, against its way: the force that does this work */
+  double fracture, force[3];
 } dfm_cut_info;
 /** Cuts a body. Points that stay keep their positions and velocities to the bit, and that part of their mass
  * which the remaining cells give. The model keeps its state. Contacts of surface features that are left keep
@@ -70,6 +75,52 @@ DFM_API dfm_status dfm_body_remove_cells(dfm_body body, uint32_t n, const uint32
  * Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_origins(dfm_body body, uint32_t capacity_points, uint32_t *points,
                                     uint32_t capacity_cells, uint32_t *cells);
+/** dfm_separate_def.crumbs: what parts of fewer than least_cells do. STAY: they remain parts of the body.
+ * REMOVE: they go, with their mass. Since 0.1. */
+enum { DFM_CRUMBS_STAY = 0, DFM_CRUMBS_REMOVE = 1 };
+/** How parts of a body that hang together no more become bodies of their own. Since 0.1. */
+typedef struct dfm_separate_def {
+  uint32_t size, flags; /* flags: 0 */
+  uint32_t least_cells; /* a part of fewer cells does not become a body; 1: each does */
+  uint32_t crumbs;      /* DFM_CRUMBS_* */
+  uint64_t cookie;      /* set by the default function */
+} dfm_separate_def;
+/** dfm_separate_def_default into a def of any size (base.h). Threads: Any thread. Since 0.1. */
+DFM_API void dfm_separate_def_default_sized(uint32_t size, dfm_separate_def *out);
+/** Each part becomes a body. Threads: Any thread. Since 0.1. */
+static inline dfm_separate_def dfm_separate_def_default(void) {
+  dfm_separate_def out;
+  dfm_separate_def_default_sized((uint32_t)sizeof out, &out);
+  return out;
+}
+/** Makes each part of a body but the heaviest a body of its own, a piece: cells that share a point are one
+ * part. The body keeps its handle and the heaviest part. A piece is named after the body that the host made,
+ * "block.1", "block.2" and so on, and takes over from the body: positions and velocities to the bit, the
+ * state of its model, materials, surface groups, contacts with their impulses and the state of their
+ * friction, loads, springs, held points and attachments on its points under their numbers, filter, user
+ * pointer and this setting. Rules of friction and contact that name the body hold for its pieces too. Mass
+ * and both momenta are kept. dfm_world_events has DFM_EVENT_PIECE for each; dfm_body_pieces lists them.
+ * A snapshot from before takes the pieces back: calls with their handles then give DFM_E_STATE. Where a
+ * piece of the same number comes again, by a later snapshot or as the run is repeated, it has its handle
+ * again.
+ * @param def  NULL: the default
+ * @param out  may be NULL; set its size, or 0. pieces, parts, and of parts that were removed cells, mass,
+ * momentum
+ * @return DFM_OK, also where there is one part only; DFM_E_ARG `crumbs`; DFM_E_UNSUPPORTED as dfm_body_cut;
+ * DFM_E_STATE; DFM_E_NOMEM. After an error nothing has changed. Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_body_separate(dfm_body body, const dfm_separate_def *def, dfm_cut_info *out);
+/** From now on each cut and each tear of the body (deform/material.h) is followed by a separation. Snapshots
+ * hold this setting.
+ * @param def  copied; NULL: parts stay in one body, which is the default
+ * @return DFM_OK; DFM_E_ARG; DFM_E_UNSUPPORTED the body cannot be cut; DFM_E_STATE. Threads: Not during
+ * step. Since 0.1. */
+DFM_API dfm_status dfm_body_set_separate(dfm_body body, const dfm_separate_def *def);
+/** The pieces that have come off a body since the host made it, and that are there, in order of creation.
+ * Of a piece: those of the body that it came off.
+ * @param pieces  [capacity], or NULL with capacity 0, which only counts
+ * @return DFM_OK; DFM_E_ARG capacity too small (untouched, *n set); DFM_E_HANDLE. Threads: Any thread. Not
+ * during step. Since 0.1. */
+DFM_API dfm_status dfm_body_pieces(dfm_body body, uint32_t capacity, dfm_body *pieces, uint32_t *n);
 #ifdef __cplusplus
 }
 #endif

@@ -14,6 +14,10 @@ struct CutDef : dfm_cut_def {
   CutDef() noexcept : dfm_cut_def(dfm_cut_def_default()) {}
 };
 
+struct SeparateDef : dfm_separate_def {
+  SeparateDef() noexcept : dfm_separate_def(dfm_separate_def_default()) {}
+};
+
 namespace basic {
 
 template <class E, class Self>
@@ -37,6 +41,17 @@ class BodyCuts {
         body(), static_cast<uint32_t>(points.size()), points.empty() ? nullptr : points.data(),
         static_cast<uint32_t>(cells.size()), cells.empty() ? nullptr : cells.data()));
   }
+  auto separate(const dfm_separate_def &def = SeparateDef()) const {
+    return produce<E, dfm_cut_info>([&](dfm_cut_info &info) {
+      info.size = sizeof info;
+      return dfm_body_separate(body(), &def, &info);
+    });
+  }
+  auto set_separate(const dfm_separate_def &def) const {
+    return E::done(dfm_body_set_separate(body(), &def));
+  }
+  auto keep_together() const { return E::done(dfm_body_set_separate(body(), nullptr)); }
+  auto pieces() const { return collect_handles<E, Self>(dfm_body_pieces, body()); }
 
  private:
   dfm_body body() const { return static_cast<const Self &>(*this).get(); }

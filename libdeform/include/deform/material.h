@@ -11,7 +11,8 @@ extern "C" {
  * the model's default. `extra` holds such further entries, and two of the library's own: "friction", the
  * coefficient with which it meets others where no rule names the pair (dfm_friction_def); "tear", the largest
  * strain (> 0) that it bears in any direction. At the end of a step a body of this material splits the points
- * beyond it (doc/concepts/cutting.md); its model must be msm or corotational_fem. */
+ * beyond it (doc/concepts/cutting.md); its model must be msm or corotational_fem.
+ * "fracture_energy", J/m2 (0: none), is what a blade takes to open faces (dfm_cut_info.fracture). */
 typedef struct dfm_material_def {
   uint32_t size, flags;
   const char *name; /* unique in its world; NULL: none */

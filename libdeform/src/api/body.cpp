@@ -134,7 +134,7 @@ dfm_status dfm_body_create(dfm_world world, const dfm_body_def *def, dfm_body *o
 dfm_status dfm_body_destroy(dfm_body body) {
   return as_status([&] {
     Body &b = any_body_of(body);
-    if (!b.emptied) body_of(body);  // with all of its points
+    if (!b.emptied && !b.undone) body_of(body);  // with all of its points
     exclusive(*b.world);
     destroy_body(b);
   });
@@ -144,7 +144,7 @@ dfm_status dfm_body_get_info(dfm_body body, dfm_body_info *out) {
   return as_status([&] {
     const Body &b = any_body_of(body);
     dfm_body_info i{};
-    if (!b.emptied) {
+    if (!b.emptied && !b.undone) {
       i.npoint = b.p.n;
       i.ntet = static_cast<uint32_t>(b.tets.size() / 4);
       i.nsurfel = b.surface.nsurfel;

@@ -4,7 +4,8 @@
 #include <cmath>
 
 #include "api/objects.h"
-#include "world/cut.h"
+#include "world/separate.h"
+#include "world/snapshot_cuts.h"
 
 using namespace dfm;
 
@@ -53,7 +54,19 @@ dfm_cut_info told(const CutReport &r) {
   store3(out.momentum, r.momentum);
   out.kinetic = r.kinetic;
   out.elastic = r.elastic;
+  out.pieces = r.pieces;
+  out.fracture = r.fracture;
+  store3(out.force, r.force);
   return out;
+}
+
+SeparateRule rule_of(const Body &b, const dfm_separate_def *def) {
+  const dfm_separate_def own = def ? take_def(def, dfm_separate_def_default()) : dfm_separate_def_default();
+  check_flags(own, 0, "dfm_separate_def");
+  if (own.crumbs > DFM_CRUMBS_REMOVE)
+    fail(DFM_E_ARG, "body '%s': crumbs %u; use DFM_CRUMBS_STAY or DFM_CRUMBS_REMOVE", b.name.c_str(),
+         own.crumbs);
+  return {true, own.crumbs == DFM_CRUMBS_REMOVE, std::max(own.least_cells, 1u)};
 }
 
 }  // namespace
@@ -73,8 +86,9 @@ dfm_status dfm_body_cut(dfm_body body, const dfm_cut_def *def, dfm_cut_info *out
     const dfm_cut_def own = take_def(def, dfm_cut_def_default());
     check_flags(own, 0, "dfm_cut_def");
     const CutShape shape = shape_of(b, own);
-    const CutReport report =
+    CutReport report =
         own.how == DFM_CUT_SPLIT ? split_by_blade(b, shape, own.most) : remove_by_shape(b, shape, own.most);
+    separate_if_asked(b, report);
     if (out) give(out, told(report));
   });
 }
@@ -91,7 +105,8 @@ dfm_status dfm_body_remove_cells(dfm_body body, uint32_t n, const uint32_t *cell
              removed.size());
       removed[cells[i]] = 1;
     }
-    const CutReport report = remove_cells(b, removed);
+    CutReport report = remove_cells(b, removed);
+    separate_if_asked(b, report);
     if (out) give(out, told(report));
   });
 }
@@ -105,5 +120,45 @@ dfm_status dfm_body_origins(dfm_body body, uint32_t capacity_points, uint32_t *p
     const bool give_cells = cells && room(ntet, capacity_cells, cells, nullptr);
     for (uint32_t i = 0; give_points && i < b.p.n; ++i) points[i] = b.cut.whole ? b.cut.point[i] : i;
     for (uint32_t c = 0; give_cells && c < ntet; ++c) cells[c] = b.cut.whole ? b.cut.cell[c] : c;
+  });
+}
+
+void dfm_separate_def_default_sized(uint32_t size, dfm_separate_def *out) {
+  dfm_separate_def d{};
+  d.size = sizeof d;
+  d.least_cells = 1;
+  dfm::give_default(size, out, d);
+}
+
+dfm_status dfm_body_separate(dfm_body body, const dfm_separate_def *def, dfm_cut_info *out) {
+  return as_status([&] {
+    Body &b = body_of(body);
+    exclusive(*b.world);
+    const SeparateRule rule = rule_of(b, def);
+    CutReport report;
+    separate(b, rule, report);
+    if (out) give(out, told(report));
+  });
+}
+
+dfm_status dfm_body_set_separate(dfm_body body, const dfm_separate_def *def) {
+  return as_status([&] {
+    Body &b = body_of(body);
+    exclusive(*b.world);
+    const SeparateRule rule = def ? rule_of(b, def) : SeparateRule{};
+    if (rule.on) check_may_cut(b, b.model);
+    b.separate = rule;
+  });
+}
+
+dfm_status dfm_body_pieces(dfm_body body, uint32_t capacity, dfm_body *pieces, uint32_t *n) {
+  return as_status([&] {
+    const Body &b = any_body_of(body);
+    const uint64_t whole = b.piece_of ? b.piece_of : b.id;
+    std::vector<dfm_body> found;
+    for (const Body *const other : all_bodies(*b.world))
+      if (other->piece_of == whole) found.push_back(other->handle);
+    if (!room(static_cast<uint32_t>(found.size()), capacity, pieces, n)) return;
+    std::copy(found.begin(), found.end(), pieces);
   });
 }

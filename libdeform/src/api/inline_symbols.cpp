@@ -12,6 +12,7 @@
 #define dfm_world_swaps swaps_inline
 #define dfm_attach_def_default attach_def_inline
 #define dfm_cut_def_default cut_def_inline
+#define dfm_separate_def_default separate_def_inline
 #define dfm_scene_write_def_default scene_write_def_inline
 #define dfm_context_def_default context_def_inline
 #define dfm_world_def_default world_def_inline
@@ -37,6 +38,7 @@
 #undef dfm_world_swaps
 #undef dfm_attach_def_default
 #undef dfm_cut_def_default
+#undef dfm_separate_def_default
 #undef dfm_scene_write_def_default
 #undef dfm_context_def_default
 #undef dfm_world_def_default
@@ -77,6 +79,7 @@ DFM_LIST_SYMBOL(dfm_world_swaps, dfm_swap, 64)
   }
 DFM_DEFAULT_SYMBOL(dfm_attach_def)
 DFM_DEFAULT_SYMBOL(dfm_cut_def)
+DFM_DEFAULT_SYMBOL(dfm_separate_def)
 DFM_DEFAULT_SYMBOL(dfm_scene_write_def)
 DFM_DEFAULT_SYMBOL(dfm_context_def)
 DFM_DEFAULT_SYMBOL(dfm_world_def)

@@ -59,6 +59,13 @@ dfm_status dfm_material_create(dfm_world world, const dfm_material_def *def, dfm
       if (!std::strcmp(v.key, kTearKey) && !(v.width == 1 && v.value[0] > 0 && std::isfinite(v.value[0])))
         fail(DFM_E_ARG, "material '%s': tear is %g of %u values; it must be one strain, positive and finite",
              name, v.width ? v.value[0] : 0.0, v.width);
+      if (!std::strcmp(v.key, kToughnessKey) &&
+          !(v.width == 1 && v.value[0] >= 0 && std::isfinite(v.value[0])))
+        fail(
+            DFM_E_ARG,
+            "material '%s': fracture_energy is %g J/m2 of %u values; it must be one value, zero or positive, "
+            "and finite",
+            name, v.width ? v.value[0] : 0.0, v.width);
       m->extra_keys.push_back(v.key);
       m->extra_values.emplace_back(v.value, v.value + v.width);
     }

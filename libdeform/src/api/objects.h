@@ -25,6 +25,11 @@ inline Body &any_body_of(dfm_body h) { return part_of<Body>(Kind::body, h); }
 // One that has cells.
 inline Body &shown_body_of(dfm_body h) {
   Body &b = any_body_of(h);
+  if (b.undone)
+    fail(DFM_E_STATE,
+         "body '%s' is not there: the snapshot that was restored is from before it came off; destroy it, or "
+         "restore a later snapshot",
+         b.name.c_str());
   if (b.emptied)
     fail(DFM_E_STATE,
          "body '%s' has no cells left: a cut has taken them all; destroy it, or restore a snapshot from "

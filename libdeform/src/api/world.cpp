@@ -28,6 +28,7 @@ void destroy_world(uint64_t handle) {
   if (!w) return;
   for (auto &b : w->bodies) handle_destroy(b->handle);
   for (auto &b : w->emptied) handle_destroy(b->handle);
+  for (auto &b : w->undone) handle_destroy(b->handle);
   for (auto &o : w->obstacles) handle_destroy(o->handle);
   for (auto &m : w->materials) handle_destroy(m->handle);
   for (auto &t : w->tools) handle_destroy(t->handle);

@@ -193,6 +193,44 @@ void gather_rows(Surface &surface, const double *x, const double *v, uint32_t be
   }
 }
 
+namespace {
+
+constexpr double kTilt = 1e-3;   // share of the trace by which planes that are nearly one are told apart
+constexpr double kFarthest = 3;  // how many times as far as the planes a surfel goes
+
+// Each surfel of laid faces goes to where their planes have gone back by `back`: by w with n.w = -back for
+// each of them, in the mean square, and the shortest such w.
+void set_back(Surface &s) {
+  const auto at = [&](uint32_t i) { return load3(&s.x[4 * size_t{i}]); };
+  s.sums.assign(kBackSums * s.laid_surfel.size(), 0.0);
+  for (const uint32_t t : s.laid) {
+    const uint32_t *const c = &s.tri[3 * size_t{t}];
+    const Vec3 n = normalized(cross(at(c[1]) - at(c[0]), at(c[2]) - at(c[0])));
+    const double add[kBackSums] = {n.x,       n.y,       n.z,       n.x * n.x, n.y * n.y,
+                                   n.z * n.z, n.x * n.y, n.y * n.z, n.z * n.x};
+    for (size_t k = 0; k < 3; ++k) {
+      const auto found = std::lower_bound(s.laid_surfel.begin(), s.laid_surfel.end(), c[k]);
+      double *const sum = &s.sums[kBackSums * size_t(found - s.laid_surfel.begin())];
+      for (size_t i = 0; i < kBackSums; ++i) sum[i] += add[i];
+    }
+  }
+  for (size_t i = 0; i < s.laid_surfel.size(); ++i) {
+    const double *const sum = &s.sums[kBackSums * i];
+    const double tilt = kTilt * (sum[3] + sum[4] + sum[5]);
+    if (!(tilt > 0)) continue;
+    const Vec3 a{sum[3] + tilt, sum[6], sum[8]}, b{sum[6], sum[4] + tilt, sum[7]},
+        c{sum[8], sum[7], sum[5] + tilt}, r = load3(sum);
+    const double det = dot(a, cross(b, c));
+    Vec3 way = (1 / det) * Vec3{dot(r, cross(b, c)), dot(r, cross(c, a)), dot(r, cross(a, b))};
+    const double far = norm(way);
+    if (far > kFarthest) way = (kFarthest / far) * way;
+    double *const to = &s.x[4 * size_t{s.laid_surfel[i]}];
+    store3(to, load3(to) - s.back * way);
+  }
+}
+
+}  // namespace
+
 void gather_surface(Surface &surface, const double *x, const double *v) {
   if (!surface.identity()) return gather_rows(surface, x, v, 0, surface.nsurfel);
   // whole points: the fourth double is zero on both sides
@@ -203,6 +241,7 @@ void gather_surface(Surface &surface, const double *x, const double *v) {
     std::memcpy(&surface.x[to], x + from, kPoint);
     if (v) std::memcpy(&surface.v[to], v + from, kPoint);
   }
+  if (surface.back > 0) set_back(surface);
 }
 
 }  // namespace dfm

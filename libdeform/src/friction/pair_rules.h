@@ -3,7 +3,7 @@
 //
 //   pattern        matches                                   weight
 //   body:GROUP     that group of that body's surface         4
-//   body           that body or obstacle                     3
+//   body           that body or obstacle, or a piece of it   3
 //   material=NAME  where it is of that material              2
 //   *              everything                                1
 //
@@ -17,7 +17,8 @@
 
 namespace dfm {
 
-struct PairSide { std::string_view name, group, material; };
+// whole: name of the body that this one is a piece of; empty: it is none.
+struct PairSide { std::string_view name, group, material, whole = {}; };
 
 inline constexpr std::string_view kMaterialPrefix = "material=";
 
@@ -26,10 +27,13 @@ inline int pattern_weight(std::string_view pattern, const PairSide &side) {
   if (pattern == "*") return 1;
   if (pattern.substr(0, kMaterialPrefix.size()) == kMaterialPrefix)
     return pattern.substr(kMaterialPrefix.size()) == side.material ? 2 : 0;
-  if (pattern == side.name) return 3;
-  const bool grouped = !side.group.empty() && pattern.size() == side.name.size() + 1 + side.group.size() &&
-                       pattern[side.name.size()] == ':' && pattern.substr(0, side.name.size()) == side.name &&
-                       pattern.substr(side.name.size() + 1) == side.group;
+  if (pattern == side.name || (!side.whole.empty() && pattern == side.whole)) return 3;
+  const auto group_of = [&](std::string_view name) {
+    return pattern.size() == name.size() + 1 + side.group.size() && pattern[name.size()] == ':' &&
+           pattern.substr(0, name.size()) == name && pattern.substr(name.size() + 1) == side.group;
+  };
+  const bool grouped =
+      !side.group.empty() && (group_of(side.name) || (!side.whole.empty() && group_of(side.whole)));
   return grouped ? 4 : 0;
 }
 

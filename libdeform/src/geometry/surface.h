@@ -10,6 +10,16 @@
 namespace dfm {
 
 inline constexpr uint32_t kNone = UINT32_MAX;
+inline constexpr uint32_t kFeatureKinds = 4;  // surfels, edges, triangles, patches
+
+// Names below these were given while the body was part of another one.
+struct NamedBy {
+  uint64_t id;  // of that body
+  uint32_t below[kFeatureKinds];
+  bool operator==(const NamedBy &) const = default;
+};
+
+inline constexpr size_t kBackSums = 9;
 
 struct Surface {
   uint32_t nsurfel = 0, ntri = 0, nedge = 0;
@@ -25,6 +35,14 @@ struct Surface {
   // Of a body that has been cut: what keys of contacts call surfels, edges and triangles, so that those which
   // a cut has left keep theirs; patch holds such names itself. Empty: their numbers.
   Array<uint32_t> name[3];
+  // Of a piece that has come off a body, the oldest first: its contacts keep the keys that they had there.
+  Array<NamedBy> named;
+  // Id under which the name of a feature was given; `own` is the body's.
+  uint64_t namer(uint32_t kind, uint32_t feature, uint64_t own) const {
+    for (const NamedBy &n : named)
+      if (feature < n.below[kind]) return n.id;
+    return own;
+  }
   Array<uint32_t> fan_begin, fan;  // [nsurfel+1], triangles around each surfel, ascending
   double median_edge = 0;          // m, rest
 
@@ -43,6 +61,15 @@ struct Surface {
     if (identity()) return f(point[s], 1.0);
     for (uint32_t j = row[s]; j < row[s + 1]; ++j) f(col[j], weight[j]);
   }
+
+  // Triangles that lay on others when a cut opened the face between them, and their surfels; `slit`: some
+  // lie on others of this surface. x of a piece is set back there by half of the rest distance of contacts:
+  // copies of a point in one place would touch along the normals of all faces around them, which no motion
+  // satisfies (doc/decisions/0398).
+  Array<uint32_t> laid, laid_surfel;
+  bool slit = false;
+  double back = 0;     // m
+  Array<double> sums;  // scratch, [laid_surfel,kBackSums]
 
   // State, [nsurfel,4] (fourth component zero), m and m/s.
   Array<double> x, v;

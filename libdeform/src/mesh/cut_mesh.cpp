@@ -95,12 +95,25 @@ CutMesh make_cut_mesh(const Memory &memory, uint32_t npoint, uint32_t ntet, cons
   return out;
 }
 
-uint32_t count_parts(const Memory &memory, uint32_t npoint, uint32_t ntet, const uint32_t *tets) {
+Array<uint32_t> parts_of_cells(const Memory &memory, uint32_t npoint, uint32_t ntet, const uint32_t *tets,
+                               uint32_t &n) {
+  const HookAllocator<uint32_t> a(memory);
   Array<uint32_t> parent = own_parents(memory, npoint);
   for (size_t t = 0; t < size_t{4} * ntet; t += 4)
     for (size_t k = 1; k < 4; ++k) join(parent, tets[t], tets[t + k]);
-  uint32_t n = 0;
-  for (uint32_t p = 0; p < npoint; ++p) n += parent[p] == p;
+  Array<uint32_t> number(npoint, UINT32_MAX, a), out(ntet, 0u, a);
+  n = 0;
+  for (uint32_t t = 0; t < ntet; ++t) {
+    uint32_t &mine = number[root(parent, tets[size_t{4} * t])];
+    if (mine == UINT32_MAX) mine = n++;
+    out[t] = mine;
+  }
+  return out;
+}
+
+uint32_t count_parts(const Memory &memory, uint32_t npoint, uint32_t ntet, const uint32_t *tets) {
+  uint32_t n;
+  parts_of_cells(memory, npoint, ntet, tets, n);
   return n;
 }
 

@@ -38,7 +38,9 @@ void each_inner_face(const Memory &memory, uint32_t ntet, const uint32_t *tets, 
   }
 }
 
-// Parts of cells that hang together by points.
+// [ntet] part of each cell, where cells hang together by points; parts are numbered by their lowest cells.
+Array<uint32_t> parts_of_cells(const Memory &memory, uint32_t npoint, uint32_t ntet, const uint32_t *tets,
+                               uint32_t &n);
 uint32_t count_parts(const Memory &memory, uint32_t npoint, uint32_t ntet, const uint32_t *tets);
 
 }  // namespace dfm

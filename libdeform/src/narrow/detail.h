@@ -61,12 +61,17 @@ inline uint64_t mix(uint64_t hash, uint64_t value) {
   hash *= 0xc4ceb9fe1a85ec53ull;
   return hash ^ hash >> 29;
 }
-// a: the surface of side a. ordinal: tells apart contacts of one feature with one patch, in the order of b's
-// features.
-inline uint64_t contact_key(const ContactPoint &c, const Surface &a, uint64_t id_a, uint64_t id_b,
-                            uint32_t patch, uint32_t ordinal) {
+// a, b: the surfaces of the sides; b null where patches have no names. ordinal: tells apart contacts of one
+// feature with one patch, in the order of b's features.
+inline uint64_t contact_key(const ContactPoint &c, const Surface &a, uint64_t id_a, const Surface *b,
+                            uint64_t id_b, uint32_t patch, uint32_t ordinal) {
   const Array<uint32_t> &names = a.name[c.type_a];
-  const uint32_t feature = names.empty() ? c.feature_a : names[c.feature_a];
+  uint32_t feature = c.feature_a;
+  if (!names.empty()) {
+    feature = names[feature];
+    id_a = a.namer(c.type_a, feature, id_a);
+  }
+  if (b && !b->named.empty()) id_b = b->namer(3, patch, id_b);
   const uint64_t head =
       uint64_t{c.kind} | uint64_t{c.obstacle} << 8 | uint64_t{c.type_a} << 16 | uint64_t{ordinal} << 32;
   uint64_t hash = mix(0x9e3779b97f4a7c15ull, head);

@@ -145,7 +145,7 @@ void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out) {
     uint32_t ordinal = 0;
     for (size_t j = i; j-- > begin && out[j].feature_a == out[i].feature_a;)
       ordinal += patch(out[j]) == patch(out[i]);
-    out[i].key = contact_key(out[i], *pair.a.surface, pair.a.id, pair.b->id, patch(out[i]), ordinal);
+    out[i].key = contact_key(out[i], *pair.a.surface, pair.a.id, &sb, pair.b->id, patch(out[i]), ordinal);
   }
 }
 

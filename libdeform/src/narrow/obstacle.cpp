@@ -17,7 +17,7 @@ void finish(const Pair &pair, ContactPoint &c, Vec3 q, Vec3 o, Vec3 normal, doub
   // impulses act (ContactRows::arm), so that a spin which they take back leaves nothing.
   const ObstacleView &view = pair.shape->view();
   store3(c.velocity, view.velocity_at(q, pair.h) - dot(view.belt, normal) * normal);
-  c.key = contact_key(c, *pair.a.surface, pair.a.id, view.id, patch, 0);
+  c.key = contact_key(c, *pair.a.surface, pair.a.id, nullptr, view.id, patch, 0);
   out.push_back(c);
 }
 

@@ -382,7 +382,7 @@ void Self::name(size_t begin) {
     for (size_t k = i; k < end; ++k) {
       uint32_t ordinal = 0;
       for (size_t j = i; j < k; ++j) ordinal += patch(out[j]) == patch(out[k]);
-      out[k].key = contact_key(out[k], s, body.id, body.id, patch(out[k]), ordinal);
+      out[k].key = contact_key(out[k], s, body.id, &s, body.id, patch(out[k]), ordinal);
       if (out[k].distance < 2 * offset) out[k].area /= touching;
     }
     i = end;

@@ -340,7 +340,7 @@ void vertex_face(const Pair &pair, Run run, Array<ContactPoint> &out) {
       uint32_t ordinal = 0;
       for (size_t j = begin; j < k; ++j) ordinal += b.patch[out[j].feature_b] == b.patch[out[k].feature_b];
       out[k].key =
-          contact_key(out[k], *pair.a.surface, pair.a.id, pair.b->id, b.patch[out[k].feature_b], ordinal);
+          contact_key(out[k], *pair.a.surface, pair.a.id, &b, pair.b->id, b.patch[out[k].feature_b], ordinal);
       const double area = facing_area(*pair.a.surface, group.surfel, -load3(out[k].normal));
       out[k].area = 0.5 * area / (out[k].distance < 2 * pair.offset ? touching : 1);
     }

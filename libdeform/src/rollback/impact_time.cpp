@@ -314,7 +314,7 @@ ContactPoint ImpactQuery::contact(const Candidate &c, const ImpactHit &hit) cons
     patch = b.patch[c.kind == kEdgeEdge && t[0] == kNone ? t[1] : t[0]];
     if (p.type_a == 0) p.area = 0.5 * facing_area(*a.surface, c.feature_a, -normal);
   }
-  p.key = narrow::contact_key(p, *a.surface, a.id, id_b, patch, 0);
+  p.key = narrow::contact_key(p, *a.surface, a.id, nullptr, id_b, patch, 0);
   return p;
 }
 

@@ -42,8 +42,10 @@ class Builder {
     for (Friction &f : def_.friction) add_friction(f);
     for (const Filter &f : def_.filters)
       check(dfm_world_filter_pair(world_, f.between[0].c_str(), f.between[1].c_str(), f.collide), f.pointer);
-    for (const Body &b : def_.bodies)
+    for (const Body &b : def_.bodies) {
       for (const Attach &a : b.attach) add_attachment(b, a);
+      if (b.separate) add_separation(b);
+    }
     // Makes the plan now, so that an effect that nothing provides is an error of the scene and not of
     // its first step.
     double step = 0;
@@ -490,6 +492,11 @@ class Builder {
          a.pointer.c_str(), a.to.c_str(), near.empty() ? "" : ("; did you mean \"" + near + "\"?").c_str());
   }
 
+  void add_separation(const Body &b) const {
+    dfm_body body = 0;
+    check(dfm_world_find_body(world_, b.name.c_str(), &body), b.pointer);
+    check(dfm_body_set_separate(body, &*b.separate), b.pointer + "/separate");
+  }
   void add_attachment(const Body &b, const Attach &a) const {
     dfm_body body = 0;
     check(dfm_world_find_body(world_, b.name.c_str(), &body), b.pointer);

@@ -137,6 +137,7 @@ struct Body {
   std::vector<Force> forces;
   std::vector<Spring> springs;
   std::vector<Attach> attach;
+  std::optional<dfm_separate_def> separate;
   std::vector<Switch> switches;
   SwitchRule rule;
 };

@@ -371,14 +371,15 @@ void read_materials(const Node &scene, Definition &def, ReadContext &context) {
     for (const auto &further : node.value().items()) {
       const std::string &key = further.key();
       const std::vector<Key> &own = keys_of("material");
-      if (key != "friction" && key != "tear" &&
+      if (key != "friction" && key != "tear" && key != "fracture_energy" &&
           std::any_of(own.begin(), own.end(), [&](const Key &k) { return key == k.name; }))
         continue;
       const Node value = node.member(key);
       m.extra.keys.push_back(key);
-      m.extra.values.push_back(key == "friction" ? std::vector<double>{value.number(kNotNegative)}
-                               : key == "tear"   ? std::vector<double>{value.number(kPositive)}
-                                                 : read_extra(value, key, context.types));
+      m.extra.values.push_back(key == "friction" || key == "fracture_energy"
+                                   ? std::vector<double>{value.number(kNotNegative)}
+                               : key == "tear" ? std::vector<double>{value.number(kPositive)}
+                                               : read_extra(value, key, context.types));
     }
     context.materials.push_back(m.name);
     context.titles.push_back(m.title);

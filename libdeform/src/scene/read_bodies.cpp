@@ -211,6 +211,14 @@ Attach read_attach(const Node &entry) {
   return attach;
 }
 
+dfm_separate_def read_separate(const Node &node) {
+  dfm_separate_def def = dfm_separate_def_default();
+  node.object("separate");
+  def.least_cells = node.has("least_cells") ? read_count(node.at("least_cells"), 1, 1e9) : 1;
+  def.crumbs = node.word("crumbs", "stay", "crumbs") == "remove" ? DFM_CRUMBS_REMOVE : DFM_CRUMBS_STAY;
+  return def;
+}
+
 constexpr double kLargestSeed = 4294967295.0;
 
 // {"make": "cylinder", "radius", "length", "cells"} and so on, with the keys of that shape and no others.
@@ -372,6 +380,7 @@ Body read_body(const Node &node, ReadContext &context) {
   for (const Node &entry : node.items("forces")) b.forces.push_back(read_force(entry));
   for (const Node &entry : node.items("springs")) b.springs.push_back(read_spring(entry));
   for (const Node &entry : node.items("attach")) b.attach.push_back(read_attach(entry));
+  if (node.has("separate")) b.separate = read_separate(node.member("separate"));
   read_carriers(node, type, context, b);
   if (node.has("switch")) {
     const Node change = node.member("switch");

@@ -180,7 +180,7 @@ std::string SceneWriter::material(const Material &m) {
   for (int i = 2; taken(key); ++i) key = (m.name.empty() ? "unnamed" : m.name) + format(" %d", i);
   material_keys[key] = {m.name, value};
   for (const std::string &extra : m.extra_keys)
-    if (extra != "friction" && extra != "tear" && !model_keys.count(extra)) {
+    if (extra != "friction" && extra != "tear" && extra != "fracture_energy" && !model_keys.count(extra)) {
       note("material '%s': its entry '%s' is left out, since no loaded model has such a parameter",
            key.c_str(), extra.c_str());
       value.erase(extra);

@@ -413,6 +413,8 @@ Written write_body(SceneWriter &to, Body &b) {
   write_loads(to, b, out);
   write_springs(to, b, out);
   write_attachments(to, b, out);
+  if (b.separate.on)
+    out["separate"] = {{"least_cells", b.separate.least}, {"crumbs", b.separate.removes ? "remove" : "stay"}};
   write_switches(to, b, out);
   if (b.sensor) out["sensor"] = true;
   if (!b.cut.open.empty())

@@ -95,7 +95,12 @@ struct Body {
   SurfaceZones zones;
   CutRecord cut;
   uint64_t shape = 0;  // another number after each cut: what is derived from points, cells or surface is old
-  bool emptied = false;            // a cut has taken all cells; the body stands in World::emptied
+  bool emptied = false;    // a cut has taken all cells; the body stands in World::emptied
+  uint64_t piece_of = 0;   // id of the body that the host made and this one has come off; 0: none
+  std::string whole_name;  // of that body; its rules of friction and contact hold here too
+  bool undone = false;     // a piece that a restore has taken back; it stands in World::undone
+  SeparateRule separate;
+  std::vector<BladeTrack> blades;  // of the last cuts
   int32_t coupling = kNoCoupling;  // DFM_COUPLING_* of a surface of its own
   double support = 0;              // of it, as its def gave it
   ModelInstance model;

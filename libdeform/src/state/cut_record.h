@@ -4,11 +4,17 @@
 
 #include "body/zones.h"
 #include "core/memory.h"
+#include "geometry/surface.h"
 #include "state/model_choice.h"
 
 namespace dfm {
 
-inline constexpr uint32_t kFeatureKinds = 4;  // surfels, edges, triangles, patches
+// When parts that have come off a body become bodies of their own (dfm_body_set_separate).
+struct SeparateRule {
+  bool on = false;
+  bool removes = false;  // parts of fewer cells than `least` go; else they stay
+  uint32_t least = 1;    // cells
+};
 
 // A body as it was made.
 struct WholeBody {
@@ -17,6 +23,13 @@ struct WholeBody {
   Array<uint32_t> tets, tri;        // [ntet,4]; [ntri,3] points of the surface's triangles
   Makeup makeup;
   SurfaceZones zones;
+};
+
+// Where a blade's edge has come to, and the body's points at that time: the blade's next way is taken
+// relative to the body's own.
+struct BladeTrack {
+  double edge[6] = {};  // m
+  Array<double> x;      // [npoint,4] m
 };
 
 struct CutRecord {

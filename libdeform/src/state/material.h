@@ -8,6 +8,7 @@
 
 namespace dfm {
 
+inline constexpr char kToughnessKey[] = "fracture_energy";  // J/m2 that a blade's cut takes
 inline constexpr char kTearKey[] = "tear";  // a material's entry: the largest strain that it bears
 
 struct Body;

@@ -9,6 +9,7 @@
 #include "deform/tool.h"
 #include "dynamics/rigid/rigid_set.h"
 #include "dynamics/rigid/tool_host.h"
+#include "state/body.h"
 
 namespace dfm {
 
@@ -31,7 +32,13 @@ struct Tool {
     std::vector<ToolPlace> from;   // of its parts when the step began; empty: it has never cut
   } cuts;
   bool has_jaws() const { return def.shape == DFM_TOOL_GRASPER || def.shape == DFM_TOOL_SCISSORS; }
-  bool cuts_body(uint64_t id) const { return std::binary_search(cuts.bodies.begin(), cuts.bodies.end(), id); }
+  // with its pieces
+  bool cuts_body(const Body &b) const {
+    const auto in = [&](uint64_t id) {
+      return std::binary_search(cuts.bodies.begin(), cuts.bodies.end(), id);
+    };
+    return in(b.id) || (b.piece_of && in(b.piece_of));
+  }
   // Parts from this one on cut: of scissors the jaws, else all there is.
   uint32_t first_cutting_part() const { return def.shape == DFM_TOOL_SCISSORS ? 1 : 0; }
   ToolValues values() const { return tool_values(set->extra.data()); }

@@ -105,6 +105,9 @@ struct World {
   std::vector<std::unique_ptr<Body>> bodies;  // in id order
   // bodies without cells, which no step sees, in id order
   std::vector<std::unique_ptr<Body>> emptied;
+  // pieces that a restore has taken back; they keep their handles, and have them again where a piece gets
+  // the same id
+  std::vector<std::unique_ptr<Body>> undone;
   uint64_t shapes = 0;                               // number of the last shape that a cut has made of a body
   std::vector<std::unique_ptr<Obstacle>> obstacles;  // in id order
   std::vector<std::unique_ptr<Material>> materials;

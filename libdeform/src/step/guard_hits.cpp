@@ -162,14 +162,14 @@ uint64_t free_key(const World &w, const StepContext &step, const ContactPoint &c
   const uint64_t id_a = w.bodies[c.slot_a]->id;
   const Surface &a = w.bodies[c.slot_a]->surface;
   const uint64_t id_b = c.obstacle ? w.obstacles[c.slot_b]->id : w.bodies[c.slot_b]->id;
+  const Surface *const b = c.obstacle ? nullptr : &w.bodies[c.slot_b]->surface;
   uint32_t patch = c.feature_b;
-  if (!c.obstacle) {
-    const Surface &b = w.bodies[c.slot_b]->surface;
-    const uint32_t *const t = c.kind == kEdgeEdge ? &b.edge_tri[2 * size_t{c.feature_b}] : &c.feature_b;
-    patch = b.patch[c.kind == kEdgeEdge && t[0] == kNone ? t[1] : t[0]];
+  if (b) {
+    const uint32_t *const t = c.kind == kEdgeEdge ? &b->edge_tri[2 * size_t{c.feature_b}] : &c.feature_b;
+    patch = b->patch[c.kind == kEdgeEdge && t[0] == kNone ? t[1] : t[0]];
   }
   for (uint32_t ordinal = 0;; ++ordinal) {
-    const uint64_t key = narrow::contact_key(c, a, id_a, id_b, patch, ordinal);
+    const uint64_t key = narrow::contact_key(c, a, id_a, b, id_b, patch, ordinal);
     if (std::none_of(step.contacts.begin(), step.contacts.end(),
                      [&](const ContactPoint &o) { return o.key == key; }))
       return key;

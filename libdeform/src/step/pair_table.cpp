@@ -30,6 +30,10 @@ const std::string &name_of(const World &w, uint32_t thing) {
   return thing < nb ? w.bodies[thing]->name : w.obstacles[thing - nb]->name;
 }
 
+std::string_view whole_of(const World &w, uint32_t thing) {
+  return thing < w.bodies.size() ? std::string_view(w.bodies[thing]->whole_name) : std::string_view();
+}
+
 // No rule: Coulomb's law with the geometric mean of the two materials' coefficients (doc/decisions/0014).
 uint32_t default_law(World &w, double a, double b) {
   const double mu = std::sqrt(a * b);
@@ -42,8 +46,8 @@ uint32_t default_law(World &w, double a, double b) {
 
 const FrictionRule *rule_of(const World &w, uint32_t a, const SurfaceZones::Zone &za, uint32_t b,
                             const SurfaceZones::Zone &zb) {
-  return best_rule(w.friction, {name_of(w, a), za.group, za.material},
-                   {name_of(w, b), zb.group, zb.material});
+  return best_rule(w.friction, {name_of(w, a), za.group, za.material, whole_of(w, a)},
+                   {name_of(w, b), zb.group, zb.material, whole_of(w, b)});
 }
 
 // On which zones of its two sides a contact stands.

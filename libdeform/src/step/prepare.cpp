@@ -166,7 +166,7 @@ Partner partner_of(const World &w, const StepContext &step, uint32_t thing) {
   const uint32_t nb = static_cast<uint32_t>(w.bodies.size());
   if (thing < nb) {
     const Body &b = *w.bodies[thing];
-    return {b.id, b.category, b.collides_with, {b.name, {}, b.material}, true, b.sensor};
+    return {b.id, b.category, b.collides_with, {b.name, {}, b.material, b.whole_name}, true, b.sensor};
   }
   const Obstacle &o = *w.obstacles[thing - nb];
   return {o.id,
@@ -400,6 +400,8 @@ void prepare(World &w, const RestoredChoice *restored) {
   const double before = w.offset;
   w.offset = restored ? restored->offset : choose_offset(w);
   if (!restored) check_offset(w);
+  for (auto &b : w.bodies)
+    if (!b->surface.laid.empty()) b->surface.back = b->surface.slit ? 0 : 0.5 * w.offset;
   for (auto &b : w.bodies)
     if (w.def.sleep && b->anchor.empty()) b->anchor = b->p.x;
   step.active.reserve(nb);

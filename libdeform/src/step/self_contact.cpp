@@ -33,8 +33,11 @@ double median(std::vector<double> &v) {
 
 // The last rule that names the body on both sides.
 uint8_t rule_of(const World &w, const Body &b, uint8_t otherwise) {
+  const auto named = [&](const std::string &side) {
+    return side == b.name || (!b.whole_name.empty() && side == b.whole_name);
+  };
   for (const FilterRule &rule : w.filters)
-    if (rule.between[0] == b.name && rule.between[1] == b.name)
+    if (named(rule.between[0]) && named(rule.between[1]))
       otherwise = rule.collide ? DFM_SELF_ON : DFM_SELF_OFF;
   return otherwise;
 }
@@ -42,7 +45,7 @@ uint8_t rule_of(const World &w, const Body &b, uint8_t otherwise) {
 // What the body calls for, beside what the world asks.
 uint8_t needed_by(const Body &b, uint8_t asked) {
   if (!b.cut.whole || asked == DFM_SELF_ON) return asked;
-  return b.cut.open.empty() ? uint8_t{DFM_SELF_AUTO} : uint8_t{DFM_SELF_ON};
+  return b.surface.slit ? uint8_t{DFM_SELF_ON} : uint8_t{DFM_SELF_AUTO};
 }
 
 bool promises(const Body &b) {
@@ -76,7 +79,7 @@ using Corners = std::array<uint32_t, 3>;
 OpenedSurface opened_surface(const Memory &m, const Body &b) {
   OpenedSurface out;
   use_memory(m, out.origin, out.twin, out.begin, out.near, out.point);
-  if (b.cut.open.empty()) return out;
+  if (!b.surface.slit) return out;
   const Surface &s = b.surface;
   out.point = s.point;
   for (const uint32_t p : s.point) out.origin.push_back(b.cut.point[p]);

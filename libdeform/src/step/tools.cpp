@@ -78,7 +78,7 @@ void check_tool_ways(const World &w, double dt) {
 bool passes_through(const World &w, const Body &b, const Obstacle &o) {
   if (!o.rigid || !o.rigid->of_tool) return false;
   const auto at = std::find_if(w.tools.begin(), w.tools.end(), [&](auto &t) { return t->set == o.rigid; });
-  if (at == w.tools.end() || !(*at)->cuts_body(b.id)) return false;
+  if (at == w.tools.end() || !(*at)->cuts_body(b)) return false;
   const Tool &t = **at;
   return t.def.shape == DFM_TOOL_ELLIPSOID ? o.name == t.name + ".shape"
                                            : !o.added && o.rigid_body >= t.first_cutting_part();

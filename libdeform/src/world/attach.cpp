@@ -186,43 +186,49 @@ uint32_t attach(Body &b, const dfm_attach_def &def, Body *other, const Obstacle 
 
 void detach(Body &b, uint32_t number) {
   World &w = *b.world;
-  const Attachment &a = attachment_of(b, number);
-  if (const uint32_t slot = a.obstacle ? kNone : slot_of(w, a.to); slot != kNone) wake(w, *w.bodies[slot]);
+  attachment_of(b, number);
+  const auto meant = [&](const Attachment &a) { return a.body == b.id && a.number == number; };
+  for (const Attachment &a : w.attachments)
+    if (const uint32_t slot = meant(a) && !a.obstacle ? slot_of(w, a.to) : kNone; slot != kNone)
+      wake(w, *w.bodies[slot]);
   wake(w, b);
   w.overlaps.place(b.id);
-  w.attachments.erase(w.attachments.begin() + (&a - w.attachments.data()));
+  std::erase_if(w.attachments, meant);
   w.changed = true;
 }
 
 dfm_attachment attachment_report(const Body &b, uint32_t number) {
   const World &w = *b.world;
-  const Attachment &a = attachment_of(b, number);
-  const size_t n = a.surfels.size();
-  std::vector<Vec3> x(n);
-  Vec3 middle;
+  const Attachment &first = attachment_of(b, number);
   dfm_attachment out{};
-  for (size_t i = 0; i < n; ++i) {
-    x[i] = surfel_vector(b, b.p.x, a.surfels[i]);
-    middle += (1 / double(n)) * x[i];
-    out.stretch = std::max(out.stretch, norm(x[i] - attached_place(w, a, i)));
+  std::vector<Vec3> x, f;
+  Vec3 middle, force, moment, total;
+  // what it holds on to may have come apart since, and each piece has a part of it
+  for (const Attachment &a : w.attachments) {
+    if (a.body != b.id || a.number != number || a.released) continue;
+    for (size_t i = 0; i < a.surfels.size(); ++i) {
+      x.push_back(surfel_vector(b, b.p.x, a.surfels[i]));
+      f.push_back(a.h > 0 ? (1 / a.h) * load3(&a.impulse[3 * i]) : Vec3{});
+      out.stretch = std::max(out.stretch, norm(x.back() - attached_place(w, a, i)));
+    }
+    out.stiffness += a.stiffness;
+    out.damping += a.damping;
+    out.release += a.release;
+    total += a.total;
   }
-  Vec3 force, moment;
-  for (size_t i = 0; i < n && a.h > 0; ++i) {
-    const Vec3 f = (1 / a.h) * load3(&a.impulse[3 * i]);
-    force += f;
-    moment += cross(x[i] - middle, f);
+  for (const Vec3 at : x) middle += (1 / double(x.size())) * at;
+  for (size_t i = 0; i < x.size(); ++i) {
+    force += f[i];
+    moment += cross(x[i] - middle, f[i]);
   }
-  out.flags = a.flags;
-  out.to = w.handle_of(a.to);
-  out.nsurfel = static_cast<uint32_t>(n);
-  out.stiffness = a.stiffness;
-  out.damping = a.damping;
-  out.release = a.release;
+  out.flags = first.flags;
+  out.to = w.handle_of(first.to);
+  out.nsurfel = static_cast<uint32_t>(x.size());
   store3(out.point, middle);
   store3(out.force, force);
   store3(out.moment, moment);
   const double asleep = b.slumber.asleep ? w.time - b.slumber.since : 0;
-  store3(out.impulse, a.total + asleep * force);
+  store3(out.impulse, total + asleep * force);
   return out;
 }
 

@@ -18,7 +18,7 @@ namespace {
 Surface blank_surface(const Memory &m) {
   Surface s;
   use_memory(m, s.tri, s.edge, s.edge_tri, s.tri_edge, s.tri_owns, s.patch, s.name[0], s.name[1], s.name[2],
-             s.fan_begin, s.fan, s.point, s.row, s.col, s.weight, s.rest, s.x, s.v);
+             s.named, s.fan_begin, s.fan, s.point, s.row, s.col, s.weight, s.rest, s.x, s.v);
   return s;
 }
 
@@ -78,14 +78,14 @@ void make_skin(const Memory &m, const CutMesh &mesh, BodyShape &out) {
 }
 
 // The body's present model, made for the mesh that it has now. Its integrator was chosen before.
-void make_model_again(Body &b, const BodyShape &before, ModelOrigin origin) {
-  const Integrator was = before.model.integrator;
-  std::unique_ptr<BodyModel> made = make_body_model(*b.world, b, *before.model.instance.type,
-                                                    std::move(origin), static_cast<int32_t>(was.used));
+void make_model_again(Body &b, const Former &before, ModelOrigin origin) {
+  const Integrator was = before.integrator;
+  std::unique_ptr<BodyModel> made =
+      make_body_model(*b.world, b, *before.model.type, std::move(origin), static_cast<int32_t>(was.used));
   made->integrator.chosen = was.chosen;
   made->integrator.open = was.open;
   exchange(b, *made);
-  const std::vector<double> &values = before.model.instance.params;
+  const std::vector<double> values = before.model.params;
   if (values == b.model.params) return;
   if (const dfm_status s = b.model.put_params(values, b.dynamics->claims()); s != DFM_OK)
     fail(s, "body '%s': model '%s' does not take its present parameters for the cells that are left",
@@ -129,6 +129,7 @@ void exchange(Body &b, BodyShape &other) noexcept {
   b.springs.swap(other.springs);
   b.motions.swap(other.motions);
   b.spares.swap(other.spares);
+  b.blades.swap(other.blades);
   b.search.swap(other.search);
   exchange(b, other.model);
   ++b.x_version;
@@ -151,7 +152,17 @@ std::shared_ptr<const WholeBody> whole_of(const Body &b) {
   return out;
 }
 
-std::unique_ptr<BodyShape> cut_body(Body &b, CutMesh &&mesh, Array<uint64_t> &&open) {
+Former former(const BodyShape &s) {
+  return {s.p, s.tets, s.edges, s.loads, s.springs, s.motions, s.model.instance, s.model.integrator};
+}
+Former former(const Body &b) {
+  return {b.p, b.tets, b.edges, b.loads, b.springs, b.motions, b.model, b.integrator};
+}
+
+namespace {
+
+// The part of b's present mesh, without what is put in by put().
+std::unique_ptr<BodyShape> part_of(const Body &b, const CutMesh &mesh, Array<uint64_t> &&open) {
   const Memory &m = b.world->memory();
   auto shape = std::make_unique<BodyShape>();
   BodyShape &out = *shape;
@@ -169,24 +180,63 @@ std::unique_ptr<BodyShape> cut_body(Body &b, CutMesh &&mesh, Array<uint64_t> &&o
   take_rows(b.p.held, mesh.point, 1, out.p.held);
   use_memory(m, out.anchor, out.surfel_impulse);
   if (!b.anchor.empty()) take_rows(b.anchor, mesh.point, kStride, out.anchor);
+  for (const BladeTrack &t : b.blades) {
+    BladeTrack &track = out.blades.emplace_back();
+    use_memory(m, track.x);
+    std::copy_n(t.edge, 6, track.edge);
+    take_rows(t.x, mesh.point, kStride, track.x);
+  }
   take_cells(m, b.share, b.makeup, mesh, out);
   make_skin(m, mesh, out);
   name_features(b, mesh, out.surface, out.cut);
+  find_laid(m, *out.cut.whole, out.cut, out.surface);
+  out.surface.back = b.surface.back;
   make_cut_zones(m, *out.cut.whole, out.cut, out.makeup, out.tets, out.surface, out.zones);
   carry_surfels(b, mesh, out);
   gather_surface(out.surface, out.p.x.data(), out.p.v.data());
+  return shape;
+}
 
+ModelOrigin origin_of(const Body &b, const CutMesh &mesh) {
   ModelOrigin origin = b.origin;
   take_rows(b.origin.held, mesh.point, 1, origin.held);
-  return put(b, std::move(shape), [&](BodyShape &before) {
+  return origin;
+}
+
+}  // namespace
+
+std::unique_ptr<BodyShape> cut_body(Body &b, CutMesh &&mesh, Array<uint64_t> &&open, bool parts) {
+  std::unique_ptr<BodyShape> shape = part_of(b, mesh, std::move(open));
+  shape->surface.named = b.surface.named;
+  ModelOrigin origin = origin_of(b, mesh);
+  return put(b, std::move(shape), [&](BodyShape &had) {
+    Former before = former(had);
+    before.parts = parts;
     carry_loads(before, mesh, b);
     make_model_again(b, before, std::move(origin));
     carry_state(before, mesh, b);
   });
 }
 
-std::unique_ptr<BodyShape> restore_shape(Body &b, std::shared_ptr<const WholeBody> whole, CutMesh &&mesh,
-                                         Array<uint64_t> &&open, FeatureNames *names) {
+void shape_piece(const Body &from, CutMesh &&mesh, Array<uint64_t> &&open, Body &piece) {
+  std::unique_ptr<BodyShape> shape = part_of(from, mesh, std::move(open));
+  Surface &s = shape->surface;
+  s.named = from.surface.named;
+  NamedBy there{from.id, {}};
+  std::copy(shape->cut.next_name, shape->cut.next_name + kFeatureKinds, there.below);
+  s.named.push_back(there);
+  ModelOrigin origin = origin_of(from, mesh);
+  put(piece, std::move(shape), [&](BodyShape &) {
+    Former before = former(from);
+    before.parts = true;
+    carry_loads(before, mesh, piece);
+    make_model_again(piece, before, std::move(origin));
+    carry_state(before, mesh, piece);
+  });
+}
+
+std::unique_ptr<BodyShape> restore_shape(Body &b, const Body &like, std::shared_ptr<const WholeBody> whole,
+                                         CutMesh &&mesh, Array<uint64_t> &&open, FeatureNames *names) {
   const Memory &m = b.world->memory();
   auto shape = std::make_unique<BodyShape>();
   BodyShape &out = *shape;
@@ -207,14 +257,15 @@ std::unique_ptr<BodyShape> restore_shape(Body &b, std::shared_ptr<const WholeBod
     out.cut.point = mesh.point;
     out.cut.cell = mesh.cell;
     make_cut_zones(m, *whole, out.cut, out.makeup, out.tets, out.surface, out.zones);
+    find_laid(m, *whole, out.cut, out.surface);
   } else {
     out.zones = whole->zones;
   }
   gather_surface(out.surface, out.p.x.data(), out.p.v.data());
-  return put(b, std::move(shape), [&](BodyShape &before) {
-    ModelOrigin origin = before.model.origin;
+  return put(b, std::move(shape), [&](BodyShape &had) {
+    ModelOrigin origin = &like == &b ? had.model.origin : like.origin;
     origin.held.assign(b.p.n, 0);
-    make_model_again(b, before, std::move(origin));
+    make_model_again(b, &like == &b ? former(had) : former(like), std::move(origin));
   });
 }
 

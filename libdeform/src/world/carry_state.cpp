@@ -38,7 +38,9 @@ class Copies {
   std::vector<double> share_;
 };
 
-Spring carried(const Spring &s, const Copies &copies) {
+// parts: points that are not here are in other bodies. Each has the share of the spring that its points have
+// of the weights, so that the force of the whole and its work stay.
+Spring carried(const Spring &s, const Copies &copies, bool parts) {
   Spring out = s;
   out.points.clear();
   out.weights.clear();
@@ -51,6 +53,10 @@ Spring carried(const Spring &s, const Copies &copies) {
     });
   for (double &w : out.weights) w = sum > 0 && sum != 1 ? w / sum : w;
   if (!(sum > 0)) out.points.clear();
+  if (parts && out.points.size() < s.points.size()) {
+    out.stiffness *= sum;
+    out.damping *= sum;
+  }
   return out;
 }
 
@@ -71,7 +77,7 @@ std::vector<uint32_t> edges_before(const Array<uint32_t> &before, const CutMesh 
 
 }  // namespace
 
-void carry_loads(const BodyShape &before, const CutMesh &mesh, Body &b) {
+void carry_loads(const Former &before, const CutMesh &mesh, Body &b) {
   const Copies copies(mesh, b, before.p.n);
   for (const Load &l : before.loads) {
     Load out = l;
@@ -85,7 +91,8 @@ void carry_loads(const BodyShape &before, const CutMesh &mesh, Body &b) {
     b.loads.push_back(std::move(out));
   }
   for (const Spring &s : before.springs)
-    if (Spring out = carried(s, copies); !out.points.empty()) b.springs.push_back(std::move(out));
+    if (Spring out = carried(s, copies, before.parts); !out.points.empty())
+      b.springs.push_back(std::move(out));
   for (const HeldMotion &m : before.motions) {
     HeldMotion out = m;
     out.points.clear();
@@ -114,8 +121,8 @@ std::optional<dfm_topology> topology_of(const ModelInstance &model) {
   return copy_table<dfm_topology>(table, kTopologyHead, model.type->id, "dfm_topology");
 }
 
-void carry_state(const BodyShape &before, const CutMesh &mesh, Body &b) {
-  const ModelInstance &old = before.model.instance;
+void carry_state(const Former &before, const CutMesh &mesh, Body &b) {
+  const ModelInstance &old = before.model;
   ModelInstance &now = b.model;
   const auto same = [](const dfm_slot &l, const dfm_slot &r) {
     return l.unit == r.unit && l.width == r.width && l.kind == r.kind;

@@ -22,6 +22,7 @@
 #include "world/cut.h"
 #include "world/idle.h"
 #include "world/sensors.h"
+#include "world/separate.h"
 #include "world/tear.h"
 
 namespace dfm {
@@ -350,6 +351,12 @@ void forget(World &w, uint64_t handle, const std::string &name) {
 
 void destroy_body(Body &b) {
   World &w = *b.world;
+  if (b.undone) {
+    handle_destroy(b.handle);
+    std::erase_if(w.undone, [&](auto &p) { return p.get() == &b; });
+    return;
+  }
+  if (!b.piece_of) orphan_pieces(w, b);
   if (!b.emptied) {
     w.sensors -= b.sensor;
     leave_contacts(w, b.id, false);

@@ -10,6 +10,7 @@
 #include "mesh/cut_mesh.h"
 #include "mesh/mesh.h"
 #include "plugin/on_behalf.h"
+#include "state/material.h"
 #include "state/world.h"
 #include "step/method.h"
 #include "step/stages.h"
@@ -17,6 +18,7 @@
 #include "world/carry_state.h"
 #include "world/change_energy.h"
 #include "world/create.h"
+#include "world/cut_lasting.h"
 #include "world/measure.h"
 
 namespace dfm {
@@ -28,12 +30,6 @@ uint32_t cells_of(const Body &b) { return static_cast<uint32_t>(b.tets.size() / 
 
 void corners_of(const Body &b, uint32_t cell, Vec3 x[4]) {
   for (size_t k = 0; k < 4; ++k) x[k] = load3(&b.p.x[size_t{kStride} * b.tets[size_t{4} * cell + k]]);
-}
-
-double kinetic_of(const Body &b) {
-  double sum = 0;
-  for (uint32_t i = 0; i < b.p.n; ++i) sum += 0.5 * b.p.mass[i] * norm2(load3(&b.p.v[size_t{kStride} * i]));
-  return sum;
 }
 
 // m2 at rest of triangles that are no part of the surface before.
@@ -60,115 +56,6 @@ void tell_what_went(const BodyShape &before, const CutMesh &mesh, const Body &b,
   }
 }
 
-// ---- what names the surface's features, and lasts ---------------------------------------------------------
-
-// Numbers now by numbers before, the first of copies; kNone: gone.
-struct FeatureMap {
-  std::vector<uint32_t> of[3];  // surfels, edges, triangles
-  FeatureMap(const Surface &before, const Surface &now) {
-    const uint32_t counts[3] = {before.nsurfel, before.nedge, before.ntri};
-    for (size_t kind = 0; kind < 3; ++kind) {
-      std::vector<std::pair<uint32_t, uint32_t>> by_name;
-      for (uint32_t i = 0; i < now.name[kind].size(); ++i) by_name.push_back({now.name[kind][i], i});
-      std::sort(by_name.begin(), by_name.end());
-      for (uint32_t i = 0; i < counts[kind]; ++i) {
-        const uint32_t name = before.name[kind].empty() ? i : before.name[kind][i];
-        const auto at = std::lower_bound(by_name.begin(), by_name.end(), std::pair(name, 0u));
-        of[kind].push_back(at != by_name.end() && at->first == name ? at->second : kNone);
-      }
-    }
-  }
-};
-
-// Of one attachment: the places that are still there. The stiffness of the whole is that of its places.
-Attachment carried(const Attachment &a, uint64_t id, const FeatureMap &map) {
-  Attachment out = a;
-  out.surfels.clear();
-  out.place.clear();
-  out.node.clear();
-  out.weight.clear();
-  out.impulse.clear();
-  const std::vector<uint32_t> &surfel = map.of[0];
-  for (size_t i = 0; i < a.surfels.size(); ++i) {
-    const uint32_t own = a.body == id ? surfel[a.surfels[i]] : a.surfels[i];
-    bool there = own != kNone;
-    for (size_t k = kAnchors * i; !a.obstacle && a.to == id && k < kAnchors * (i + 1); ++k)
-      there = there && (a.weight[k] == 0 || surfel[a.node[k]] != kNone);
-    if (!there) continue;
-    out.surfels.push_back(own);
-    for (size_t k = 0; k < 3; ++k) {
-      if (a.obstacle) out.place.push_back(a.place[3 * i + k]);
-      out.impulse.push_back(a.impulse[3 * i + k]);
-    }
-    for (size_t k = kAnchors * i; !a.obstacle && k < kAnchors * (i + 1); ++k) {
-      const uint32_t node = a.to == id ? surfel[a.node[k]] : a.node[k];
-      out.node.push_back(node == kNone ? 0 : node);
-      out.weight.push_back(a.weight[k]);
-    }
-  }
-  const double share = double(out.surfels.size()) / double(a.surfels.size());
-  out.stiffness *= share;
-  out.damping *= share;
-  return out;
-}
-
-// What the world keeps by numbers of the surface's features, with the numbers that they have now.
-struct Lasting {
-  std::vector<Attachment> attachments;
-  Array<Crossing> crossings;
-  Array<ContactPoint> contacts;  // of the report
-  std::vector<uint8_t> ended;    // [contacts of the store] its feature has gone
-
-  Lasting(const World &w, const Body &b, const FeatureMap &map)
-      : crossings(w.store.crossings.get_allocator()), contacts(w.report.contacts.get_allocator()) {
-    for (const Attachment &a : w.attachments)
-      attachments.push_back(a.body == b.id || (!a.obstacle && a.to == b.id) ? carried(a, b.id, map) : a);
-    for (Crossing c : w.store.crossings) {
-      if (c.id_a == b.id) c.edge_a = map.of[1][c.edge_a];
-      if (c.id_b == b.id) c.edge_b = map.of[1][c.edge_b];
-      if (c.edge_a != kNone && c.edge_b != kNone) crossings.push_back(c);
-    }
-    std::sort(crossings.begin(), crossings.end());
-    contacts = w.report.contacts;
-    ended.assign(w.store.n, 0);
-    for (uint32_t i = 0; i < w.report.n; ++i) ended[i] = !renumber(contacts[i], b.slot, map);
-  }
-
- private:
-  static bool renumber(ContactPoint &c, uint32_t slot, const FeatureMap &map) {
-    const uint32_t kind_b = c.kind == kEdgeEdge ? 1 : 2;
-    bool there = true;
-    if (c.slot_a == slot) there = (c.feature_a = map.of[c.type_a][c.feature_a]) != kNone;
-    if (!c.obstacle && c.slot_b == slot)
-      there = (c.feature_b = map.of[kind_b][c.feature_b]) != kNone && there;
-    if (!there) c.feature_a = c.feature_b = 0;  // of a contact that has ended
-    return there;
-  }
-};
-
-void exchange(World &w, Lasting &other) noexcept {
-  w.attachments.swap(other.attachments);
-  w.store.crossings.swap(other.crossings);
-  w.report.contacts.swap(other.contacts);
-}
-
-// Contacts whose feature has gone, and attachments that hold nothing any more. Reserved before.
-void end_what_went(World &w, const Lasting &lasting) {
-  for (uint32_t i = 0; i < w.report.n; ++i) {
-    if (!lasting.ended[i]) continue;
-    if (w.store.touching[i])
-      add_event(w, DFM_EVENT_END, w.store.id_a[i], w.store.id_b[i], w.store.key[i], w.time);
-    w.store.touching[i] = 0;
-    std::fill_n(w.report.impulse.begin() + std::ptrdiff_t{3} * i, 3, 0.0);
-  }
-  for (Attachment &a : w.attachments) {
-    if (!a.surfels.empty() || a.released) continue;
-    a.released = true;
-    add_event(w, DFM_EVENT_RELEASE, a.body, a.to, a.number, w.time);
-  }
-  std::erase_if(w.attachments, [](const Attachment &a) { return a.surfels.empty(); });
-}
-
 // ---- cuts -------------------------------------------------------------------------------------------------
 
 CutReport empty(Body &b) {
@@ -179,9 +66,9 @@ CutReport empty(Body &b) {
   for (uint32_t i = 0; i < b.p.n; ++i) out.momentum += b.p.mass[i] * load3(&b.p.v[size_t{kStride} * i]);
   out.kinetic = kinetic_of(b);
   out.elastic = elastic_energy(b);
-  reserve_places(w);
+  reserve_places(w, 0);
   leave_contacts(w, b.id, false);
-  set_emptied(w, b, true);
+  set_place(w, b, true, false);
   return out;
 }
 
@@ -198,9 +85,9 @@ CutReport cut(Body &b, const Array<uint8_t> &removed, Array<uint64_t> &&open,
   const HostWork work(b);
   CutMesh numbers(m);
   numbers.point = Array<uint32_t>(mesh.point);
-  const std::unique_ptr<BodyShape> before = cut_body(b, std::move(mesh), std::move(open));
+  const std::unique_ptr<BodyShape> before = cut_body(b, std::move(mesh), std::move(open), false);
   try {
-    Lasting lasting(w, b, FeatureMap(before->surface, b.surface));
+    Lasting lasting(w, {{b.id, b.slot, FeatureMap(before->surface, b.surface)}});
     reserve_events(w, w.store.n + w.attachments.size());
     for (const Attachment &a : lasting.attachments)
       if (a.surfels.empty()) w.overlaps.place(a.body);  // what it held may touch now
@@ -264,6 +151,12 @@ CutReport cut(Body &b, const Array<uint8_t> &removed, const Array<uint64_t> &mor
 
 }  // namespace
 
+double kinetic_of(const Body &b) {
+  double sum = 0;
+  for (uint32_t i = 0; i < b.p.n; ++i) sum += 0.5 * b.p.mass[i] * norm2(load3(&b.p.v[size_t{kStride} * i]));
+  return sum;
+}
+
 void check_may_cut(const Body &b, const ModelInstance &model) {
   const char *const name = b.name.c_str();
   if (!b.surface.identity())
@@ -310,49 +203,158 @@ CutReport remove_by_shape(Body &b, const CutShape &shape, uint32_t most) {
   return out;
 }
 
+namespace {
+
+constexpr size_t kMostTracks = 4;  // blades that cut a body by turns
+
+Vec3 middle_of(const Body &b, const double *x, uint32_t cell) {
+  const auto at = [&](size_t k) { return load3(x + size_t{kStride} * b.tets[size_t{4} * cell + k]); };
+  return 0.25 * ((at(0) + at(1)) + (at(2) + at(3)));
+}
+
+// What takes the line from a to b, as it was, to where it is: the smallest rotation, and a scale. Calls of a
+// moving blade share an edge; each face sees it at the same place in both, in the frame of its own line, so
+// the ways of all calls are one surface there, without a gap for a body that moves in between.
+class LineMotion {
+ public:
+  LineMotion(Vec3 a0, Vec3 b0, Vec3 a1, Vec3 b1) : from_(0.5 * (a0 + b0)), to_(0.5 * (a1 + b1)) {
+    const double l0 = norm(b0 - a0), l1 = norm(b1 - a1);
+    still_ = !(l0 > 0 && l1 > 0) || (norm2(a1 - a0) == 0 && norm2(b1 - b0) == 0);
+    if (still_) return;
+    const Vec3 u = (1 / l0) * (b0 - a0), v = (1 / l1) * (b1 - a1);
+    scale_ = l1 / l0;
+    axis_ = cross(u, v);
+    cosine_ = std::max(dot(u, v), -0.5);
+  }
+  Vec3 operator()(Vec3 p) const {
+    if (still_) return p;
+    const Vec3 r = p - from_;
+    return to_ + scale_ * (cosine_ * r + cross(axis_, r) + (dot(axis_, r) / (1 + cosine_)) * axis_);
+  }
+
+ private:
+  Vec3 from_, to_, axis_;
+  double scale_ = 1, cosine_ = 1;
+  bool still_ = true;
+};
+
+double toughness(const Body &b, uint32_t cell) {
+  const Material &m = b.makeup.materials[b.makeup.of.empty() ? 0 : b.makeup.of[cell]];
+  for (size_t i = 0; i < m.extra_keys.size(); ++i)
+    if (m.extra_keys[i] == kToughnessKey) return m.extra_values[i][0];
+  return 0;
+}
+
+// m2, of the face between two cells, with its normal from i to j.
+Vec3 area_between(const Body &b, uint32_t i, uint32_t j, Vec3 way) {
+  Vec3 x[3];
+  size_t n = 0;
+  const uint32_t *const c = &b.tets[size_t{4} * j];
+  for (size_t k = 0; k < 4 && n < 3; ++k)
+    if (const uint32_t p = b.tets[size_t{4} * i + k]; std::find(c, c + 4, p) != c + 4)
+      x[n++] = load3(&b.p.x[size_t{kStride} * p]);
+  const Vec3 area = 0.5 * cross(x[1] - x[0], x[2] - x[0]);
+  return dot(area, way) < 0 ? -area : area;
+}
+
+void keep_track(Body &b, const CutShape &blade, size_t track) {
+  if (track == b.blades.size()) {
+    if (b.blades.size() == kMostTracks) b.blades.erase(b.blades.begin());
+    b.blades.emplace_back();
+    use_memory(b.world->memory(), b.blades.back().x);
+    track = b.blades.size() - 1;
+  }
+  BladeTrack &t = b.blades[track];
+  store3(t.edge, blade.corner[3]);
+  store3(t.edge + 3, blade.corner[2]);
+  t.x.assign(b.p.x.begin(), b.p.x.end());
+}
+
+}  // namespace
+
 CutReport split_by_blade(Body &b, const CutShape &blade, uint32_t most) {
   const Memory &m = b.world->memory();
-  std::vector<Vec3> middle;
+  size_t track = 0;
+  const auto goes_on = [&](const BladeTrack &t) {
+    const auto same = [](Vec3 p, Vec3 q) { return p.x == q.x && p.y == q.y && p.z == q.z; };
+    return same(load3(t.edge), blade.corner[0]) && same(load3(t.edge + 3), blade.corner[1]);
+  };
+  while (track < b.blades.size() && !goes_on(b.blades[track])) ++track;
+  const double *const before = track < b.blades.size() ? b.blades[track].x.data() : b.p.x.data();
+  std::vector<Vec3> middle, was;
   for (uint32_t c = 0; c < cells_of(b); ++c) {
-    Vec3 x[4];
-    corners_of(b, c, x);
-    middle.push_back(0.25 * ((x[0] + x[1]) + (x[2] + x[3])));
+    middle.push_back(middle_of(b, b.p.x.data(), c));
+    was.push_back(middle_of(b, before, c));
   }
-  const Vec3 way = (blade.corner[3] - blade.corner[0]) + (blade.corner[2] - blade.corner[1]);
   const auto is_open = [&](uint32_t i, uint32_t j) {
     return !b.cut.open.empty() &&
            std::binary_search(b.cut.open.begin(), b.cut.open.end(), open_face(b.cut.cell[i], b.cut.cell[j]));
   };
-  std::vector<std::pair<double, uint64_t>> met;
+  struct Met {
+    double order;  // along the way of the blade
+    uint64_t face;
+    double work;  // J
+    Vec3 way;     // m, of the edge's middle relative to the face
+    bool operator<(const Met &o) const { return order != o.order ? order < o.order : face < o.face; }
+  };
+  std::vector<Met> met;
   each_inner_face(m, cells_of(b), b.tets.data(), [&](uint32_t i, uint32_t j) {
-    if (crosses_blade(blade, middle[i], middle[j]) && !is_open(i, j))
-      met.push_back({dot(way, middle[i] + middle[j]), open_face(i, j)});
+    if (is_open(i, j)) return;
+    CutShape own = blade;
+    const LineMotion moves(was[i], was[j], middle[i], middle[j]);
+    for (int k = 0; k < 2; ++k) own.corner[k] = moves(blade.corner[k]);
+    if (!crosses_blade(own, middle[i], middle[j])) return;
+    const Vec3 *const c = own.corner;
+    const Vec3 way = 0.5 * ((c[3] - c[0]) + (c[2] - c[1])), line = middle[j] - middle[i];
+    const Vec3 across = normalized(cross(c[2] - c[0], c[3] - c[1]));
+    // of the face as the blade sees it: together they are the area that it has passed over, however rough
+    const double area = dot(area_between(b, i, j, line), dot(across, line) < 0 ? -across : across);
+    const double energy = 0.5 * (toughness(b, i) + toughness(b, j));
+    met.push_back({dot(way, middle[i] + middle[j]), open_face(i, j), energy * area, way});
   });
   std::sort(met.begin(), met.end());
   const size_t n = most > 0 ? std::min<size_t>(most, met.size()) : met.size();
   Array<uint64_t> more{HookAllocator<uint64_t>(m)};
-  for (size_t k = 0; k < n; ++k) more.push_back(met[k].second);
+  double work = 0;
+  Vec3 way;
+  for (size_t k = 0; k < n; ++k) {
+    more.push_back(met[k].face);
+    work += met[k].work;
+    way += (1 / double(n)) * met[k].way;
+  }
   CutReport out = open_faces(b, more);
   out.left = static_cast<uint32_t>(met.size() - n);
+  out.fracture = work;
+  if (norm2(way) > 0) out.force = (-work / norm2(way)) * way;
+  keep_track(b, blade, track);
   return out;
 }
 
-void reserve_places(World &w) {
-  w.bodies.reserve(w.bodies.size() + w.emptied.size() + 1);
-  w.emptied.reserve(w.bodies.size() + w.emptied.size() + 1);
+void reserve_places(World &w, size_t more) {
+  const size_t n = w.bodies.size() + w.emptied.size() + w.undone.size() + more;
+  for (auto *list : {&w.bodies, &w.emptied, &w.undone}) list->reserve(n);
 }
 
-void set_emptied(World &w, Body &b, bool emptied) noexcept {
-  if (b.emptied == emptied) return;
-  auto &from = emptied ? w.bodies : w.emptied, &to = emptied ? w.emptied : w.bodies;
+void set_place(World &w, Body &b, bool emptied, bool undone) noexcept {
+  if (b.emptied == emptied && b.undone == undone) return;
+  const auto list = [&](bool no_cells, bool gone) -> auto & {
+    return gone ? w.undone : no_cells ? w.emptied : w.bodies;
+  };
+  const auto counts = [&] { return uint32_t(b.sensor && !b.emptied && !b.undone); };
+  auto &from = list(b.emptied, b.undone), &to = list(emptied, undone);
+  w.sensors -= counts();
+  w.tearing -= b.tears && !b.undone;
+  b.emptied = emptied;
+  b.undone = undone;
+  w.sensors += counts();
+  w.tearing += b.tears && !b.undone;
+  w.bound.body = nullptr;
+  w.changed = true;
+  if (&from == &to) return;
   const auto at = std::find_if(from.begin(), from.end(), [&](auto &p) { return p.get() == &b; });
   const auto place = std::find_if(to.begin(), to.end(), [&](auto &p) { return p->id > b.id; });
   to.insert(place, std::move(*at));
   from.erase(at);
-  b.emptied = emptied;
-  w.sensors += b.sensor ? (emptied ? -1u : 1u) : 0;
-  w.bound.body = nullptr;
-  w.changed = true;
 }
 
 }  // namespace dfm

@@ -10,10 +10,13 @@ struct CutReport {
   uint32_t left = 0;                // cells that the shape meets and that its limit has left
   uint32_t copies = 0;              // of points
   uint32_t parts = 0;               // that the body consists of now
+  uint32_t pieces = 0;              // bodies that have come off it
   double area = 0;                  // m2 of triangles that have come to the surface, at rest
   double mass = 0;                  // kg, taken away
   Vec3 momentum;                    // N s, taken away
   double kinetic = 0, elastic = 0;  // J, taken away; elastic NaN where the model gives none
+  double fracture = 0;              // J, that opening the faces takes
+  Vec3 force;                       // N, on the blade: by which its way takes that work
 };
 
 // Throws Error, in one sentence, where the body cannot be cut while it has this model.
@@ -30,8 +33,12 @@ CutReport split_by_blade(Body &b, const CutShape &blade, uint32_t most);
 // Opens faces between present cells: pairs (mesh/cut_mesh.h), in any order.
 CutReport open_faces(Body &b, const Array<uint64_t> &faces);
 
-// Puts a body without cells where steps do not see it, and back; allocates nothing once there is room.
-void reserve_places(World &w);
-void set_emptied(World &w, Body &b, bool emptied) noexcept;
+// Kinetic energy, J.
+double kinetic_of(const Body &b);
+
+// Puts a body without cells, or a piece that a restore takes back, where steps do not see it, and back;
+// allocates nothing once there is room.
+void reserve_places(World &w, size_t more);  // for all bodies that there are, and `more`
+void set_place(World &w, Body &b, bool emptied, bool undone) noexcept;
 
 }  // namespace dfm

@@ -117,6 +117,34 @@ void name_features(const Body &b, const CutMesh &mesh, Surface &surface, CutReco
   name_patches(before, old, surface, record.next_name[3]);
 }
 
+void find_laid(const Memory &m, const WholeBody &whole, const CutRecord &record, Surface &surface) {
+  use_memory(m, surface.laid, surface.laid_surfel, surface.sums);
+  if (record.open.empty()) return;
+  std::vector<Corners> open;
+  for (const uint64_t face : record.open) {
+    const uint32_t *const a = &whole.tets[4 * size_t(face >> 32)], *const b = &whole.tets[4 * (face & kNone)];
+    std::vector<uint32_t> common;
+    for (int k = 0; k < 4; ++k)
+      if (std::find(b, b + 4, a[k]) != b + 4) common.push_back(a[k]);
+    if (common.size() == 3) open.push_back(sorted(common[0], common[1], common[2]));
+  }
+  std::sort(open.begin(), open.end());
+  std::vector<Corners> found;
+  for (uint32_t t = 0; t < surface.ntri; ++t) {
+    const auto point = [&](size_t k) { return record.point[surface.point[surface.tri[3 * size_t{t} + k]]]; };
+    const Corners corners = sorted(point(0), point(1), point(2));
+    if (!std::binary_search(open.begin(), open.end(), corners)) continue;
+    surface.laid.push_back(t);
+    found.push_back(corners);
+    for (size_t k = 0; k < 3; ++k) surface.laid_surfel.push_back(surface.tri[3 * size_t{t} + k]);
+  }
+  std::sort(surface.laid_surfel.begin(), surface.laid_surfel.end());
+  surface.laid_surfel.erase(std::unique(surface.laid_surfel.begin(), surface.laid_surfel.end()),
+                            surface.laid_surfel.end());
+  std::sort(found.begin(), found.end());
+  surface.slit = std::adjacent_find(found.begin(), found.end()) != found.end();
+}
+
 void take_names(const std::string &body, FeatureNames &names, Surface &surface, CutRecord &record) {
   const uint32_t counts[kFeatureKinds] = {surface.nsurfel, surface.nedge, surface.ntri, surface.ntri};
   for (uint32_t k = 0; k < kFeatureKinds; ++k) {
@@ -129,6 +157,7 @@ void take_names(const std::string &body, FeatureNames &names, Surface &surface, 
     record.next_name[k] = names.next[k];
     (k < 3 ? surface.name[k] : surface.patch).swap(names.of[k]);
   }
+  surface.named.swap(names.named);
 }
 
 void make_cut_zones(const Memory &m, const WholeBody &whole, const CutRecord &record, const Makeup &makeup,

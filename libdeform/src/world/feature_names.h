@@ -15,6 +15,9 @@ inline constexpr char kCutGroup[] = "cut";  // of the triangles that cuts have l
 // of the first of its triangles which was there before. Others get new names. `record` gets the next ones.
 void name_features(const Body &before, const CutMesh &mesh, Surface &surface, CutRecord &record);
 
+// Which triangles lay on others before a cut opened their face: fills laid, laid_surfel, slit.
+void find_laid(const Memory &memory, const WholeBody &whole, const CutRecord &record, Surface &surface);
+
 // As a snapshot has them. Throws Error where they do not fit the surface.
 void take_names(const std::string &body, FeatureNames &names, Surface &surface, CutRecord &record);
 

@@ -44,7 +44,7 @@ std::vector<Unused> find_unused(const dfm_type &type, const CellMaterials &cells
     if (d.damping_mass != plain.damping_mass) note("damping_mass", m->name);
     if (d.damping_stiffness != plain.damping_stiffness) note("damping_stiffness", m->name);
     for (const std::string &key : m->extra_keys)
-      if (key != "friction" && key != kTearKey) note(key, m->name);
+      if (key != "friction" && key != kTearKey && key != kToughnessKey) note(key, m->name);
   }
   return out;
 }

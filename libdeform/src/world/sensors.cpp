@@ -10,7 +10,7 @@ namespace dfm {
 namespace {
 
 PairSide side_of(const Thing &t) {
-  return t.body ? PairSide{t.body->name, {}, t.body->material}
+  return t.body ? PairSide{t.body->name, {}, t.body->material, t.body->whole_name}
                 : PairSide{t.obstacle->name, {}, t.obstacle->material};
 }
 

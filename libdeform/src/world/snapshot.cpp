@@ -205,6 +205,14 @@ void body_fields(Stream &s, W &w, B &b, const Body &like) {
     s.value("energy of changes", *x, must::finite);
   s.value("category", b.category, must::any);
   s.value("collides_with", b.collides_with, must::any);
+  s.list("blades", b.blades, [&](auto &blade) {
+    s.value("blade's edge", blade.edge,
+            must::Be{[](const double (&e)[6]) { return must::all_finite(e); }, "a finite place"});
+    s.array("points at a blade", blade.x, like.p.x.size(), must::finite);
+  });
+  s.value("separates", b.separate.on, must::flag);
+  s.value("crumbs go", b.separate.removes, must::flag);
+  s.value("fewest cells of a piece", b.separate.least, must::any);
   s.value("asleep", b.slumber.asleep, must::flag);
   s.value("calm", b.slumber.calm, must::not_negative);
   s.value("asleep since", b.slumber.since, must::not_negative);
@@ -613,6 +621,8 @@ void exchange(World &w, Staged &t) noexcept {
     std::swap(b.next_load, other.next_load);
     std::swap(b.category, other.category);
     std::swap(b.collides_with, other.collides_with);
+    std::swap(b.separate, other.separate);
+    b.blades.swap(other.blades);
     std::swap(b.slumber, other.slumber);
     b.bound.known = false;
     b.anchor.swap(other.anchor);

@@ -5,7 +5,7 @@
 
 #include "core/error.h"
 #include "state/world.h"
-#include "world/cut.h"
+#include "world/separate.h"
 
 namespace dfm {
 namespace {
@@ -20,7 +20,8 @@ bool has_shape(const Body &b, const CutRow &r) {
     return false;
   for (size_t k = 0; k < 3; ++k)
     if (b.surface.name[k] != r.names.of[k]) return false;
-  return std::equal(b.cut.next_name, b.cut.next_name + kFeatureKinds, r.names.next);
+  return b.surface.named == r.names.named &&
+         std::equal(b.cut.next_name, b.cut.next_name + kFeatureKinds, r.names.next);
 }
 
 // Cells and points of a part of the whole body.
@@ -80,6 +81,8 @@ std::vector<CutRow> cut_rows(const World &w) {
     if (!b->cut.whole && !b->emptied) continue;
     CutRow &r = out.emplace_back();
     r.id = b->id;
+    r.piece_of = b->piece_of;
+    if (b->piece_of) r.name = b->name;
     r.emptied = b->emptied;
     if (b->emptied) continue;
     r.tets = b->tets;
@@ -88,36 +91,73 @@ std::vector<CutRow> cut_rows(const World &w) {
     r.open = b->cut.open;
     for (size_t k = 0; k < 3; ++k) r.names.of[k] = b->surface.name[k];
     r.names.of[3] = b->surface.patch;
+    r.names.named = b->surface.named;
     std::copy(b->cut.next_name, b->cut.next_name + kFeatureKinds, r.names.next);
   }
   return out;
 }
 
+// The body that the host made, of which this one is a piece; itself, if it is none.
+Body &SnapshotShapes::whole_body(Body &b) {
+  if (!b.piece_of) return b;
+  for (Body *const other : all_bodies(w_))
+    if (other->id == b.piece_of && !other->piece_of) return *other;
+  refuse(b, "a piece: expected one of a body of this world");
+}
+
+// Pieces that the snapshot has come, the others go; none has the shape of the snapshot yet.
+void SnapshotShapes::find_pieces(const std::vector<CutRow> &rows) {
+  const std::vector<Body *> bodies = all_bodies(w_);
+  reserve_places(w_, rows.size());
+  undo_.reserve(2 * (bodies.size() + rows.size()));
+  const auto move = [&](Body &b, bool undone) {
+    undo_.push_back({&b, b.emptied, b.undone, nullptr});
+    set_place(w_, b, b.emptied && undone, undone);
+  };
+  for (Body *const b : bodies)
+    if (b->piece_of && std::none_of(rows.begin(), rows.end(), [&](const CutRow &r) { return r.id == b->id; }))
+      move(*b, true);
+  for (const CutRow &r : rows) {
+    const auto has_id = [&](const Body *b) { return b->id == r.id; };
+    const std::vector<Body *> now = all_bodies(w_);
+    if (!r.piece_of || std::any_of(now.begin(), now.end(), has_id)) continue;
+    const auto whole = std::find_if(now.begin(), now.end(),
+                                    [&](const Body *b) { return b->id == r.piece_of && !b->piece_of; });
+    if (whole == now.end() || r.id <= r.piece_of || r.name.empty() || w_.find_body(r.name) ||
+        w_.find_obstacle(r.name))
+      fail(DFM_E_FORMAT,
+           "the snapshot is damaged: piece '%s': expected one of a body of this world, with a name of its "
+           "own; nothing was restored",
+           r.name.c_str());
+    move(place_for_piece(w_, **whole, r.id, r.name), false);
+  }
+}
+
 void SnapshotShapes::put(Body &b, CutRow *row) {
   const Memory &m = w_.memory();
   const bool emptied = row && row->emptied;
-  undo_.push_back({&b, b.emptied, nullptr});
-  set_emptied(w_, b, emptied);
-  if (emptied || (row ? has_shape(b, *row) : !b.cut.whole)) return;
-  if (!b.surface.identity()) refuse(b, "cells left: expected a body that cells can be cut from");
-  const std::shared_ptr<const WholeBody> whole = whole_of(b);
+  undo_.push_back({&b, b.emptied, b.undone, nullptr});
+  if (row && row->piece_of != b.piece_of) refuse(b, "a piece: expected it of another body");
+  set_place(w_, b, emptied, false);
+  if ((emptied && b.dynamics) || (row ? has_shape(b, *row) : !b.cut.whole)) return;
+  Body &like = whole_body(b);
+  if (!like.surface.identity()) refuse(b, "cells left: expected a body that cells can be cut from");
+  const std::shared_ptr<const WholeBody> whole = whole_of(like);
   Array<uint64_t> open{HookAllocator<uint64_t>(m)};
-  if (row) {
+  if (row && !emptied) {
     check(b, *whole, *row);
     open.assign(row->open.begin(), row->open.end());
-    undo_.back().shape = restore_shape(b, whole, mesh_of(m, *row), std::move(open), &row->names);
+    undo_.back().shape = restore_shape(b, like, whole, mesh_of(m, *row), std::move(open), &row->names);
   } else {
-    undo_.back().shape = restore_shape(b, whole, mesh_of(m, *whole), std::move(open), nullptr);
+    undo_.back().shape = restore_shape(b, like, whole, mesh_of(m, *whole), std::move(open), nullptr);
   }
 }
 
 SnapshotShapes::SnapshotShapes(World &w, std::vector<CutRow> &rows) : w_(w) {
-  const std::vector<Body *> bodies = all_bodies(w);
-  reserve_places(w);
-  undo_.reserve(bodies.size());
   size_t found = 0;
   try {
-    for (Body *const b : bodies) {
+    find_pieces(rows);
+    for (Body *const b : all_bodies(w)) {
       const auto row = std::find_if(rows.begin(), rows.end(), [&](const CutRow &r) { return r.id == b->id; });
       found += row != rows.end();
       put(*b, row == rows.end() ? nullptr : &*row);
@@ -137,7 +177,7 @@ void SnapshotShapes::take_back() noexcept {
   for (; !undo_.empty(); undo_.pop_back()) {
     Undo &u = undo_.back();
     if (u.shape) exchange(*u.body, *u.shape);
-    set_emptied(w_, *u.body, u.emptied);
+    set_place(w_, *u.body, u.emptied, u.undone);
   }
 }
 

@@ -2,6 +2,7 @@
 // cells, so that all other fields find arrays of their length; where it fails later on they get their own
 // cells back.
 #pragma once
+#include <string>
 #include <vector>
 
 #include "world/body_shape.h"
@@ -9,9 +10,10 @@
 
 namespace dfm {
 
-// Of a body that is not as it was made. emptied: it has no cells, and the lists are empty.
+// Of a body that is not as it was made, and of each piece. emptied: it has no cells, and the lists are empty.
 struct CutRow {
-  uint64_t id = 0;
+  uint64_t id = 0, piece_of = 0;  // as in Body
+  std::string name;               // of a piece
   bool emptied = false;
   Array<uint32_t> tets, point, cell;  // as in CutRecord
   Array<uint64_t> open;
@@ -24,6 +26,8 @@ template <class Stream, class Rows>
 void cut_fields(Stream &s, Rows &rows) {
   s.list("bodies that have been cut", rows, [&](auto &r) {
     s.value("cut body", r.id, must::any);
+    s.value("piece of", r.piece_of, must::any);
+    s.array("name of a piece", r.name, kAnyCount, must::any);
     s.value("without cells", r.emptied, must::flag);
     s.array("cells left", r.cell, kAnyCount, must::any);
     s.array("corners of cells", r.tets, kAnyCount, must::any);
@@ -31,6 +35,7 @@ void cut_fields(Stream &s, Rows &rows) {
     s.array("open faces", r.open, kAnyCount, must::any);
     for (auto &names : r.names.of) s.array("names of features", names, kAnyCount, must::any);
     for (auto &next : r.names.next) s.value("next name", next, must::any);
+    s.array("names given elsewhere", r.names.named, kAnyCount, must::any);
   });
 }
 
@@ -47,16 +52,18 @@ class SnapshotShapes {
  private:
   struct Undo {
     Body *body;
-    bool emptied;
+    bool emptied, undone;
     std::unique_ptr<BodyShape> shape;  // null: it has not changed
   };
+  void find_pieces(const std::vector<CutRow> &rows);
+  Body &whole_body(Body &b);
   void put(Body &b, CutRow *row);
   void take_back() noexcept;
   World &w_;
   std::vector<Undo> undo_;
 };
 
-// All bodies, those without cells too, in id order.
+// All bodies, those without cells too, in id order; not the pieces that a restore has taken back.
 std::vector<Body *> all_bodies(const World &w);
 
 }  // namespace dfm

@@ -56,6 +56,7 @@ dfm_obstacle_def told(const dfm_obstacle_def &d) {
 uint64_t snapshot_structure(const World &w) {
   Hash h;
   for (const Body *const b : all_bodies(w)) {
+    if (b->piece_of) continue;
     // of one that has been cut: as it was made
     const WholeBody *const whole = b->cut.whole.get();
     h.add(b->id);

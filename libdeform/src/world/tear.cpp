@@ -11,7 +11,7 @@
 #include "state/material.h"
 #include "state/world.h"
 #include "step/stages.h"
-#include "world/cut.h"
+#include "world/separate.h"
 
 namespace dfm {
 namespace {
@@ -199,14 +199,16 @@ bool may_tear(const Body &b) {
 
 void tear_bodies(World &w) {
   if (w.tearing == 0) return;
-  for (size_t i = 0; i < w.bodies.size(); ++i) {
+  const size_t n = w.bodies.size();  // pieces that come off now are behind
+  for (size_t i = 0; i < n; ++i) {
     Body &b = *w.bodies[i];
     if (!b.tears || b.slumber.asleep) continue;
     const Array<uint64_t> faces = Tear(b).faces();
     if (faces.empty()) continue;
-    const CutReport done = open_faces(b, faces);
+    CutReport done = open_faces(b, faces);
     reserve_events(w, 1);
     add_event(w, DFM_EVENT_TEAR, b.id, b.id, done.copies, w.time);
+    separate_if_asked(b, done);
   }
 }
 

@@ -22,7 +22,7 @@
 #include "mesh/cut_mesh.h"
 #include "state/world.h"
 #include "step/stages.h"
-#include "world/cut.h"
+#include "world/separate.h"
 
 namespace dfm {
 namespace {
@@ -313,7 +313,7 @@ void set_cuts(Tool &t, uint32_t how, uint32_t most, std::span<Body *const> bodie
 
 bool cut_by_any(const Body &b) {
   const auto &tools = b.world->tools;
-  return std::any_of(tools.begin(), tools.end(), [&](auto &t) { return t->cuts_body(b.id); });
+  return std::any_of(tools.begin(), tools.end(), [&](auto &t) { return t->cuts_body(b); });
 }
 
 void begin_cuts(World &w) {
@@ -325,13 +325,17 @@ void begin_cuts(World &w) {
 void cut_by_tools(World &w, double dt) {
   for (size_t k = 0; k < w.tools.size(); ++k) {
     Tool &t = *w.tools[k];
-    // by id, since a body without cells leaves the list
-    for (const uint64_t id : std::vector<uint64_t>(t.cuts.bodies)) {
+    // by id, since a body without cells leaves the list; a body is cut with its pieces
+    std::vector<uint64_t> ids;
+    for (auto &b : w.bodies)
+      if (t.cuts_body(*b)) ids.push_back(b->id);
+    for (const uint64_t id : ids) {
       const auto at = std::find_if(w.bodies.begin(), w.bodies.end(), [&](auto &b) { return b->id == id; });
       if (at == w.bodies.end()) continue;
       Body &b = **at;
       const uint32_t n = t.cuts.how == DFM_CUT_SPLIT ? split(t, b, dt) : remove(t, b);
       if (n == 0) continue;
+      separate_if_asked(b);
       reserve_events(w, 1);
       add_event(w, DFM_EVENT_CUT, id, t.set->obstacle[t.first_cutting_part()], n, w.time);
     }

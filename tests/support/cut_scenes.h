@@ -1,0 +1,98 @@
+// Bodies, shapes and calls that the tests of cuts share.
+#pragma once
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "stack.h"
+
+namespace test::cutting {
+
+inline dfm_cut_info ask() {
+  dfm_cut_info i{};
+  i.size = sizeof i;
+  return i;
+}
+
+inline dfm_body_info info(dfm_body b) {
+  dfm_body_info i{};
+  i.size = sizeof i;
+  test::ok(dfm_body_get_info(b, &i));
+  return i;
+}
+
+struct State {
+  std::vector<double> x, v;
+  explicit State(dfm_body b) {
+    uint32_t n = 0;
+    test::ok(dfm_body_get_state(b, 0, nullptr, nullptr, &n));
+    x.resize(3 * size_t{n});
+    v.resize(3 * size_t{n});
+    test::ok(dfm_body_get_state(b, n, x.data(), v.data(), &n));
+  }
+};
+
+inline dfm_cut_def sphere(std::array<double, 3> at, double radius) {
+  dfm_cut_def d = dfm_cut_def_default();
+  for (int k = 0; k < 3; ++k) {
+    d.pose.position[k] = at[k];
+    d.half_size[k] = radius;
+  }
+  return d;
+}
+
+// The whole plane at right angles to an axis.
+inline dfm_cut_def plane(int axis, double at, uint32_t how) {
+  dfm_cut_def d = dfm_cut_def_default();
+  d.shape = DFM_CUT_BLADE;
+  d.how = how;
+  const double corner[4][2] = {{-9, -9}, {9, -9}, {9, 9}, {-9, 9}};
+  for (int i = 0; i < 4; ++i) {
+    d.blade[3 * i + axis] = at;
+    d.blade[3 * i + (axis + 1) % 3] = corner[i][0];
+    d.blade[3 * i + (axis + 2) % 3] = corner[i][1];
+  }
+  return d;
+}
+
+inline dfm_cut_info cut(dfm_body b, const dfm_cut_def &d) {
+  dfm_cut_info out = ask();
+  test::ok(dfm_body_cut(b, &d, &out));
+  return out;
+}
+
+inline void restore(dfm_world w, const std::string &data) {
+  test::ok(dfm_world_restore(w, data.data(), data.size()));
+}
+
+inline void steps(dfm_world w, int n, double h = 1e-3) {
+  for (int i = 0; i < n; ++i) {
+    uint32_t trouble = 0;
+    ASSERT_EQ(dfm_world_step(w, h, &trouble), DFM_OK) << dfm_last_error();
+    ASSERT_EQ(trouble & DFM_TROUBLE_ENERGY, 0u);
+  }
+}
+
+struct Cube {
+  test::Context context;
+  dfm_world w;
+  dfm_body b;
+  explicit Cube(const char *model, std::array<double, 3> gravity = {0, 0, 0}, uint32_t cells = 320)
+      : w(test::make_world(context, gravity)) {
+    test::BodyOptions o;
+    o.name = "cube";
+    o.model = model;
+    o.young = 2e4;
+    o.damping_stiffness = 1e-3;
+    o.velocity = {0.3, -0.2, 0.1};
+    o.spin = {1, 2, -3};
+    o.position = {0, 0, 0.06};
+    b = test::make_body(context, w, "beam", {0.1, 0.1, 0.1}, cells, o);
+  }
+};
+
+inline const char *const kModels[] = {"msm", "corotational_fem"};
+
+}  // namespace test::cutting
