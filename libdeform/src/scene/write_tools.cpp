@@ -90,7 +90,7 @@ void write_coupling(const Tool &t, Written &out) {
 void write_cuts(const SceneWriter &to, const Tool &t, Written &out) {
   Written names = Written::array();
   for (const auto &b : to.w.bodies)
-    if (t.cuts_body(b->id)) names.push_back(b->name);
+    if (t.cuts_body(*b)) names.push_back(b->name);
   if (names.empty()) return;
   out["cuts"] = {{"bodies", names}, {"mode", t.cuts.how == DFM_CUT_SPLIT ? "split" : "remove"}};
   if (t.cuts.most > 0) out["cuts"]["most"] = t.cuts.most;
