@@ -465,34 +465,6 @@ TEST(Cut, MovingBlade_WithJitter_PartsTheCubeEachTime) {
 }
 
 // Cuts of every kind at random places while two cubes lie on each other, until nothing is left.
-// The blade goes down through a cube that spins in front of it, in steps; the host passes the edge of the
-// step before and that of now.
-TEST(Cut, MovingBlade_PartsASpinningCubeEachTime) {
-  for (int run = 0; run < 10; ++run) {
-    test::Context context;
-    const dfm_world w = test::make_world(context, {0, 0, 0});
-    test::BodyOptions o;
-    o.name = "cube";
-    o.model = run % 2 ? "msm" : "corotational_fem";
-    o.young = 1e6;  // bends by less than a hundredth of a cell
-    o.damping_stiffness = 1e-5;
-    o.spin = {0.7, 1.1 + 0.1 * run, 1.7 - 0.05 * run};
-    const dfm_body b = test::make_body(context, w, "beam", {0.1, 0.1, 0.1}, 320, o);
-    dfm_cut_def d = plane(0, 0.052 + 1e-3 * run, DFM_CUT_SPLIT);
-    dfm_cut_info last{};
-    double z = 0.2;
-    for (int k = 0; k < 60; ++k) {
-      const double next = z - 0.005;
-      const double edge[] = {0.052, -1, z, 0.052, 1, z, 0.052, 1, next, 0.052, -1, next};
-      std::copy(edge, edge + 12, d.blade);
-      last = cut(b, d);
-      z = next;
-      steps(w, 1, 2e-3);
-    }
-    EXPECT_GT(last.parts, 1u) << run;
-  }
-}
-
 TEST(Cut, FractureEnergy_IsTheForceOnTheBladeTimesItsWay) {
   test::Context context;
   const dfm_world w = test::make_world(context, {0, 0, 0});
