@@ -38,67 +38,68 @@ DFM_API const char *dfm_version(int *major, int *minor, int *patch);
 /** Name of a status value, e.g. "DFM_E_ARG". Static storage. Threads: Any thread. Since 0.1. */
 DFM_API const char *dfm_status_name(dfm_status s);
 
-/** The sentence that belongs to the last call on this thread that returned a negative status: what was wrong,
- * where, what to do. Empty when no call has failed. Valid until the next failing call on this thread.
+/** One sentence about the last call on this thread that returned a negative status: what was wrong, where,
+ * what to do. Empty if no call has failed. Valid until the next failing call on this thread.
  * Threads: Any thread. Since 0.1. */
 DFM_API const char *dfm_last_error(void);
 
-/** For what is built on the library (bindings, rigid hosts): makes a sentence the last error of this thread.
+/** For code built on the library (bindings, rigid hosts): sets the last error of this thread.
  * @return status
  * Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_fail(dfm_status status, const char *sentence);
 
 typedef void (*dfm_file_take_fn)(void *user, const char *bytes, size_t n);
-/** For what is built on the library: the bytes of a file that somebody names, read as the library reads its
- * own. Devices and pipes are refused at once instead of being waited for; /dev/stdin is standard input, if
- * that is a file or a pipe.
- * @param limit     bytes that such a file may have; a larger one is refused before anything is allocated
- * @param expected  what is wanted, with its article ("a table of queries"), for the sentence
+/** For code built on the library: reads a file that the user names, with the checks that the library applies
+ * to its own files. Devices and pipes are refused at once; /dev/stdin is standard input, if that is a file or
+ * a pipe.
+ * @param limit     bytes; a larger file is refused before anything is allocated
+ * @param expected  noun for the error, with its article ("a table of queries")
  * @param take      called once with the bytes, which are borrowed until it returns; not called on failure
  * @return DFM_OK; DFM_E_ARG; DFM_E_IO; DFM_E_FORMAT larger than limit; DFM_E_NOMEM. Threads: Any
  * thread. Since 0.1. */
 DFM_API dfm_status dfm_file_read(const char *path, uint64_t limit, const char *expected,
                                  dfm_file_take_fn take, void *user);
-/** Writes a file whole or not at all: under no name or another name first, then renamed. What stood at path
- * before, a link included, is replaced; a device or a pipe is written to.
+/** Writes a whole file or nothing: to a temporary file first, which is then renamed. A file or a link at path
+ * is replaced; a device or a pipe is written to.
  * @return DFM_OK; DFM_E_ARG; DFM_E_IO. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_file_write(const char *path, const void *bytes, size_t n);
 
 enum { DFM_LOG_DEBUG = 0, DFM_LOG_INFO = 1, DFM_LOG_WARNING = 2, DFM_LOG_ERROR = 3 };
 
 /* ---- structs of another version ---------------------------------------------------------------------------
- * Structs that start with `size` grow at their end in later versions (but those of which it is said that they
- * do not: dfm_params, dfm_model_choice). A program goes on with every later library as it was built, and with
- * an older one as long as it asks for nothing that this does not have:
- * - What a caller fills in (defs, options): `size` is sizeof in the caller's header. Members that this lacks
- *   have their defaults. Where it is larger than the library's struct, what the library does not know must
- *   be zero; else DFM_E_UNSUPPORTED. A def that has a default function comes from it: it sets `cookie`, and a
- *   def without that is DFM_E_ARG (as is one with flags that are not known).
- * - Defaults: dfm_X_default is inline and hands sizeof the caller's struct to dfm_X_default_sized, which
- *   writes that many bytes and no more: the defaults that the library knows, zero behind them, `size` as
+ * Structs that start with `size` grow at their end in later versions, except dfm_params and dfm_model_choice.
+ * A compiled program works with every later library, and with an older one if it uses nothing that the older
+ * one lacks:
+ * - Structs that the caller fills in (defs, options): `size` is sizeof in the caller's header. Members that
+ *   the caller's struct lacks have their defaults. If the caller's struct is larger than the library's, the
+ *   bytes that the library does not know must be zero; else DFM_E_UNSUPPORTED. A def with a default function
+ *   must be made by it: the function sets `cookie`, and a def without the cookie is DFM_E_ARG (as is one with
+ *   unknown flags).
+ * - Defaults: dfm_X_default is inline and passes sizeof the caller's struct to dfm_X_default_sized. That
+ *   function writes exactly so many bytes: the defaults that the library knows, then zeros, and `size` as
  *   given. out NULL: nothing.
- * - What the library fills in: the caller sets `size` to sizeof; the library writes so many bytes at most and
- *   leaves in `size` how many it has filled in. 0 is the size that the struct had in 0.1.
- * - Lists: further down.
- * The library also has a symbol for each of the inline functions, for callers that look functions up by name
- * without a C compiler: it answers structs as they are in 0.1, in every later version too. */
+ * - Structs that the library fills in: the caller sets `size` to sizeof; the library writes at most so many
+ *   bytes and sets `size` to the number written. 0 is the size of the struct in 0.1.
+ * - Lists: see below.
+ * The library also exports a symbol for each inline function, for callers that look functions up by name
+ * without a C compiler. It uses the structs of 0.1, in every later version too. */
 
 typedef struct dfm_context dfm_context; /* the only pointer of the API: hooks, loaded plugins, worlds */
 
-/** What a host may lend to the library. Every hook may be NULL: then the library's own is used. */
+/** Hooks of the host. A hook that is NULL is replaced by the library's own. */
 typedef struct dfm_context_def {
   uint32_t size; /* sizeof(dfm_context_def) */
-  /* size of the own pool where parallel_for is NULL; 1 (default): no pool; 0: one per processor */
+  /* threads of the library's pool if parallel_for is NULL; 1 (default): no pool; 0: one per processor */
   uint32_t threads;
   void *user;                                                       /* first argument of every hook */
   void *(*alloc)(void *user, size_t bytes, size_t align);           /* NULL on failure. Any thread. */
   void (*release)(void *user, void *p, size_t bytes, size_t align); /* Any thread. */
   void (*log)(void *user, int32_t level, const char *utf8);         /* Any thread. */
-  /* Runs fn over [0,n), cut at multiples of grain; returns when all is done. Called from the
+  /* Runs fn over [0,n), divided at multiples of grain; returns when all parts are done. Called from the
    * stepping thread. */
   void (*parallel_for)(void *user, uint32_t n, uint32_t grain,
                        void (*fn)(void *task, uint32_t begin, uint32_t end), void *task);
-  /* stage zones of a step; same thread nests */
+  /* zones of a trace, one per stage of a step; they nest on one thread */
   void (*trace_begin)(void *user, const char *zone);
   void (*trace_end)(void *user, const char *zone);
   const char *plugin_dir; /* NULL: DEFORM_PLUGIN_PATH, then the installed or build directory */
@@ -114,8 +115,8 @@ static inline dfm_context_def dfm_context_def_default(void) {
   return out;
 }
 
-/** Creates a context and scans its plugin directories (nothing is opened twice, nothing runs but
- * plugin entries).
+/** Creates a context and scans its plugin directories (opens each file once and calls only plugin
+ * entries).
  * @param def  NULL: all defaults; copied
  * @param out  the context; untouched on failure
  * @return DFM_OK; DFM_E_ARG; DFM_E_NOMEM
@@ -134,7 +135,8 @@ DFM_API void dfm_context_destroy(dfm_context *context);
  * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_plugin_load(dfm_context *context, const char *path);
 
-/** Loads every plugin of a directory; files passed over are kept with their reason (dfm_plugin_visit_passed).
+/** Loads every plugin of a directory; dfm_plugin_visit_passed lists the files that were skipped, with
+ * reasons.
  * @param loaded  out, number of plugins loaded now; may be NULL
  * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_plugin_scan(dfm_context *context, const char *directory, uint32_t *loaded);
@@ -151,26 +153,25 @@ typedef void (*dfm_plugin_passed_fn)(void *user, const char *file, const char *r
  * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_plugin_visit(dfm_context *context, dfm_plugin_visit_fn visit, void *user);
 
-/** Calls visit for every file that discovery passed over, with the reason in one sentence.
+/** Calls visit for every file that was skipped, with the reason in one sentence.
  * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_plugin_visit_passed(dfm_context *context, dfm_plugin_passed_fn visit, void *user);
 
-/** Which plugin the calling thread is in: for a handler of a signal or of the end of the process, which
- * can then name it.
- * @param what  out, what it was asked for ("eval", "create", "load"), or NULL where none; the
- * parameter may be NULL
- * @return the id of the type, the file while it is loaded, or NULL where the thread is in none; valid while
- * that call lasts
+/** The plugin that the calling thread is executing: lets a handler of a signal or of the end of the process
+ * name it.
+ * @param what  out, the call ("eval", "create", "load"), or NULL if there is none; the parameter may be NULL
+ * @return the id of the type, the file while it is being loaded, or NULL if the thread is in no plugin; valid
+ * during that call
  * Threads: Any thread, and from a handler of a signal. Since 0.1. */
 DFM_API const char *dfm_plugin_running(const char **what);
 
 /* ---- lists of structs -------------------------------------------------------------------------------------
- * Rows of a list grow at their end in later versions, as structs that start with their size do. The function
- * that fills a list, dfm_world_contacts for one, is inline and hands sizeof the row of the caller's header to
- * the library's function, whose name ends in _sized:
+ * Rows of a list grow at their end in later versions, as structs that start with their size do. A function
+ * that fills a list, such as dfm_world_contacts, is inline and passes sizeof the caller's row to the
+ * library's function, whose name ends in _sized:
  * - a caller with an older header than the library gets rows of its own size, without the newer members;
- * - a caller with a newer header gets the members that the library knows, and zero in those behind.
- * Where a row starts with `size`, that is the number of bytes that the library has filled in.
+ * - a caller with a newer header gets the members that the library knows, and zeros after them.
+ * If a row starts with `size`, that is the number of bytes that the library has written.
  * row_size is a multiple of 8, at least 8; else DFM_E_ARG. */
 
 /* ---- parameters by key --------------------------------------------------------------------------------- */
@@ -179,7 +180,7 @@ typedef struct {
   const double *value;
   uint32_t width;
 } dfm_param_value;
-/* Stands in defs, and is the same in every version. */
+/* A member of defs; it does not grow in later versions. */
 typedef struct {
   uint32_t size, n;
   const dfm_param_value *values;

@@ -7,10 +7,10 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-/** How a surface of its own hangs on the body's points: x_s = N x_p, rows of N sum to one; forces go back by
- * the transpose. BARYCENTRIC: in the cell that holds the surfel, or the nearest one. MLS: moving least
- * squares over the points within the support; both reproduce linear fields. THESIS: as Zerbato (2010) prints
- * (3.9), to compare: torque and power are wrong (doc/concepts/couplings.md). */
+/** Coupling of a separate surface to the body's points: x_s = N x_p, rows of N sum to one; forces are
+ * distributed by the transpose. BARYCENTRIC: in the cell that contains the surfel, or the nearest one. MLS:
+ * moving least squares over the points within the support. Both reproduce linear fields. THESIS: Zerbato
+ * (2010), equation 3.9 as printed, for comparison: torque and power are wrong (doc/concepts/couplings.md). */
 enum { DFM_COUPLING_BARYCENTRIC = 0, DFM_COUPLING_MLS = 1, DFM_COUPLING_THESIS = 2 };
 typedef struct dfm_surface_def {
   uint32_t size;
@@ -22,10 +22,10 @@ typedef struct dfm_surface_def {
   double support;
 } dfm_surface_def;
 
-/** Groups of a body's surface triangles, for friction by "body:GROUP". With `triangles`: any of the surface's
- * triangles by their points (the body's, or those of a surface of its own), in any order and turn; those
- * inside the body are passed over, one that is named twice keeps its first group. Without: one entry for
- * every triangle in the order of dfm_surface_triangles. Since 0.1. */
+/** Groups of a body's surface triangles, for friction by "body:GROUP". With `triangles`: some of the
+ * surface's triangles by their points (those of the body, or of its separate surface), in any order and
+ * orientation; triangles inside the body are ignored, and a triangle named twice keeps its first group.
+ * Without `triangles`: one entry per triangle, in the order of dfm_surface_triangles. Since 0.1. */
 typedef struct dfm_surface_groups {
   uint32_t size, ngroup;
   const char *const *names; /* [ngroup] */
@@ -49,7 +49,7 @@ typedef struct dfm_body_def {
   const uint32_t *tets;  /* [ntet,4] positive volume; copied */
   dfm_material material; /* 0: dfm_material_def_default() */
   const char *model;     /* short name or full id; NULL: "msm" */
-  /* the model's; beside them "precision", 0 double or 1 single, of its forces in explicit steps */
+  /* of the model; a further key "precision": its forces in explicit steps, 0 double, 1 single */
   dfm_params model_params;
   dfm_pose pose;
   double velocity[3], spin[3]; /* m/s of the center of mass; rad/s about it */
@@ -59,10 +59,10 @@ typedef struct dfm_body_def {
   void *user;
   const dfm_surface_def *surface; /* NULL: the boundary of the cells, each surfel a point of the body */
   uint32_t nfield;
-  /* model parameters that differ by cell ("young", "anisotropy_axis"); win over materials; copied */
+  /* model parameters that differ by cell ("young", "anisotropy_axis"); they override materials; copied */
   const dfm_cell_field *fields;
   const dfm_material *cell_materials; /* [ntet] material of each cell, 0: `material`; NULL: one for all */
-  /* [ntet] how much of the cell is material, (0,1]: scales its mass and Young's modulus; NULL: all */
+  /* [ntet] fraction of the cell that is material, (0,1]: scales its mass and Young's modulus; NULL: 1 */
   const double *cell_share;
   const dfm_surface_groups *groups; /* named parts of its surface; NULL: none. Copied */
   int32_t integrator;               /* DFM_INTEGRATOR_* of this body; AUTO: the world's */
@@ -78,11 +78,10 @@ static inline dfm_body_def dfm_body_def_default(void) {
   dfm_body_def_default_sized((uint32_t)sizeof out, &out);
   return out;
 }
-/** @return DFM_OK; DFM_E_ARG (which entry, why); DFM_E_UNSUPPORTED no plugin offers the model (lists those
- * that do); DFM_E_NOMEM;
- *          DFM_E_HANDLE. Threads: Not during step. Since 0.1. */
+/** @return DFM_OK; DFM_E_ARG (which entry, why); DFM_E_UNSUPPORTED no plugin offers the model (lists the
+ * loaded models); DFM_E_NOMEM; DFM_E_HANDLE. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_create(dfm_world world, const dfm_body_def *def, dfm_body *out);
-/** Removes the body, between two steps of a running world too; its contacts end (events are reported).
+/** Removes the body, also from a running world between two steps; its contacts end (events are reported).
  * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_destroy(dfm_body body);
 
@@ -93,13 +92,13 @@ typedef struct dfm_body_info {
   double mass, rest_volume; /* kg, m3 */
   void *user;
 } dfm_body_info;
-/** What it is made of. Threads: Any thread. Not during step. Since 0.1. */
+/** Sizes, names and mass of a body. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_get_info(dfm_body body, dfm_body_info *out);
-/** Changes the user pointer that its def gave. @return DFM_OK; DFM_E_HANDLE. Threads: Not during
+/** Changes the user pointer of dfm_body_def. @return DFM_OK; DFM_E_HANDLE. Threads: Not during
  * step. Since 0.1. */
 DFM_API dfm_status dfm_body_set_user(dfm_body body, void *user);
-/** Changes the collision filter that its def gave (dfm_body_def). @return DFM_OK; DFM_E_HANDLE. Threads: Not
- * during step. Since 0.1. */
+/** Changes the collision filter of dfm_body_def. @return DFM_OK; DFM_E_HANDLE. Threads: Not during
+ * step. Since 0.1. */
 DFM_API dfm_status dfm_body_set_filter(dfm_body body, uint32_t category, uint32_t collides_with);
 
 /** Positions and velocities of all phyxels, [npoint,3] each, m and m/s; either may be NULL.
@@ -107,7 +106,7 @@ DFM_API dfm_status dfm_body_set_filter(dfm_body body, uint32_t category, uint32_
  * small (untouched, *n set); DFM_E_HANDLE.
  * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_get_state(dfm_body body, uint32_t capacity, double *x, double *v, uint32_t *n);
-/** Sets them, [n,3] each, m and m/s; either may be NULL. Held components stay where they are told to be.
+/** Sets positions and velocities, [n,3] each, m and m/s; either may be NULL. Held components do not change.
  * @param n number of phyxels
  * @return DFM_OK; DFM_E_ARG n is another number, or a value is not finite (nothing changed); DFM_E_HANDLE.
  * Threads: Not during step. Since 0.1. */
@@ -118,21 +117,21 @@ DFM_API dfm_status dfm_body_set_state(dfm_body body, uint32_t n, const double *x
 DFM_API dfm_status dfm_body_get_rest(dfm_body body, uint32_t capacity_points, double *x,
                                      uint32_t capacity_tets, uint32_t *tets);
 
-/** Holds (bits 1 x, 2 y, 4 z) or releases (0) components of points. A point that is released loses its motion
- * (dfm_body_move_held); one that stays held keeps it.
- * @return DFM_OK; DFM_E_ARG axes or a point does not exist; DFM_E_UNSUPPORTED the model steps itself and is
- * told at the start (dfm_body_def.fixed); DFM_E_HANDLE. Threads: Not during step. Since 0.1. */
+/** Holds (bits 1 x, 2 y, 4 z) or releases (0) components of points. A released point loses its motion
+ * (dfm_body_move_held); a point that stays held keeps it.
+ * @return DFM_OK; DFM_E_ARG axes or a point does not exist; DFM_E_UNSUPPORTED the model steps itself and
+ * takes held points at creation only (dfm_body_def.fixed); DFM_E_HANDLE. Threads: Not during step.
+ * Since 0.1. */
 DFM_API dfm_status dfm_body_hold(dfm_body body, uint32_t n, const uint32_t *points, uint8_t axes);
-/** Moves held points together: their start positions carried by the keys' pose (relative to key 0) and, on
- * top, the sine offset.
- * A point has one motion: a new one replaces what carried the point before, so calling this each frame takes
- * no more memory than calling it once.
+/** Moves held points together: their start positions are moved by the keys' pose (relative to key 0), then
+ * offset by the sine. A point has one motion: a new one replaces the old one, so that calling this in every
+ * frame takes no more memory than calling it once.
  * @param keys  [nkey], times strictly rising; nkey may be 0 when sine is given; copied
  * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_move_held(dfm_body body, uint32_t n, const uint32_t *points, uint32_t nkey,
                                       const dfm_pose_key *keys, const dfm_sine *sine);
-/** Adds a lasting load: force[i] N on points[i], times the keyed scale (nkey 0: 1), times (1 + sine) where
- * sine is given (its amplitude[0] counts). @param load out, number to remove it by; may be NULL. Threads: Not
+/** Adds a lasting load: force[i] N on points[i], times the keyed scale (nkey 0: 1), times (1 + sine) if sine
+ * is given (only its amplitude[0] is used). @param load out, its number; may be NULL. Threads: Not
  * during step. Since 0.1. */
 DFM_API dfm_status dfm_body_add_load(dfm_body body, uint32_t n, const uint32_t *points, const double *force,
                                      uint32_t nkey, const dfm_scale_key *keys, const dfm_sine *sine,
@@ -143,67 +142,67 @@ DFM_API dfm_status dfm_body_remove_load(dfm_body body, uint32_t load);
 
 /** A spring of rest length zero from a point of the body to a place in the world, F = stiffness (to - x) +
  * damping (v_to - v), where x = sum weights[i] x[points[i]]; each point takes its weight's share of F.
- * Explicit: it counts in the body's stable step. */
+ * The spring is explicit: it limits the stable step of the body. */
 typedef struct dfm_spring_def {
   uint32_t size, npoint;
   const uint32_t *points; /* [npoint] */
-  /* [npoint] >= 0, scaled to sum 1; NULL: by mass, so that it pulls at the center of mass of these points */
+  /* [npoint] >= 0, scaled to sum 1; NULL: by mass, so that F acts at the center of mass of these points */
   const double *weights;
-  double to[3];               /* m; counts where nkey is 0 */
-  const dfm_vector_key *keys; /* [nkey] m, times strictly rising: where it ends, over time; copied */
+  double to[3];               /* m; used if nkey is 0 */
+  const dfm_vector_key *keys; /* [nkey] m, times strictly rising: its end over time; copied */
   uint32_t nkey, reserved;
   double stiffness, damping; /* N/m, N s/m; >= 0 */
 } dfm_spring_def;
-/** Adds a spring. @param spring out, number to name it by; may be NULL. @return DFM_E_ARG for points that do
- * not exist, weights without a sum, values that are negative or not finite; DFM_E_UNSUPPORTED where the model
- * steps itself and has no step bound. Threads: Not during step. Since 0.1. */
+/** Adds a spring. @param spring out, its number; may be NULL. @return DFM_E_ARG a point does not exist, the
+ * weights sum to zero, a value is negative or not finite; DFM_E_UNSUPPORTED the model steps itself and has no
+ * step bound. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_add_spring(dfm_body body, const dfm_spring_def *def, uint32_t *spring);
-/** Moves the spring's end to a place; its keys, if it had any, are gone. Threads: Not during
+/** Moves the end of a spring; its keys, if any, are removed. Threads: Not during
  * step. Since 0.1. */
 DFM_API dfm_status dfm_body_set_spring_target(dfm_body body, uint32_t spring, const double to[3]);
-/** The force with which it pulls at the body now, N. @param force out [3]. Threads: Any thread. Not during
+/** The present force of a spring on the body, N. @param force out [3]. Threads: Any thread. Not during
  * step. Since 0.1. */
 DFM_API dfm_status dfm_body_get_spring_force(dfm_body body, uint32_t spring, double force[3]);
 /** Removes a spring by its number. @return DFM_OK; DFM_E_ARG no such spring; DFM_E_HANDLE. Threads: Not
  * during step. Since 0.1. */
 DFM_API dfm_status dfm_body_remove_spring(dfm_body body, uint32_t spring);
-/** Impulse (N s) at a point of space, spread over the nearest surface triangle by barycentric weights.
+/** Applies an impulse (N s) at a point in space, distributed to the nearest surface triangle by barycentric
+ * weights.
  * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_apply_impulse(dfm_body body, const double point[3], const double impulse[3]);
 /** Changes runtime parameters of the body's model by key. @return DFM_E_ARG unknown key (nearest valid name),
- * out of range, not a runtime row, or a parameter that differs by cell in this body (from fields, materials
- * or share): one value cannot replace it.
+ * out of range, not changeable at run time, or a parameter that differs by cell in this body (from fields,
+ * materials or share), which one value cannot replace.
  * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_set_params(dfm_body body, const dfm_params *params);
 
-/** Wakes the body and those it touches, directly or through others; awake, it starts to count its calm anew.
- * Whatever changes a body, or reaches it, wakes it by itself. Threads: Not during step. Since 0.1. */
+/** Wakes the body and all bodies that it touches, directly or through others. For a body that is awake, the
+ * time at rest starts again from zero. A body that is changed or reached wakes without this call. Threads:
+ * Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_wake(dfm_body body);
-/** Does the body sleep (dfm_world_def.sleep)? @param asleep out. Threads: Any thread. Not during
+/** Whether the body sleeps (dfm_world_def.sleep). @param asleep out. Threads: Any thread. Not during
  * step. Since 0.1. */
 DFM_API dfm_status dfm_body_is_asleep(dfm_body body, bool *asleep);
 
-/** Sums over the body, in SI units. angular: about the center of mass. contact_impulse: total contact impulse
- * on the body since it was created (N s): divide differences by the interval for a mean force. elastic is NAN
- * if the model has no energy. */
+/** Sums over the body, in SI units. A difference of contact_impulse over its interval is a mean force. */
 typedef struct dfm_body_measure {
   uint32_t size, inverted;
   double mass, com[3], velocity[3];      /* kg; m, m/s of the center of mass */
   double momentum[3], angular[3];        /* kg m/s; kg m2/s about the center of mass */
-  double kinetic, elastic;               /* J; elastic NAN where the model gives no energy */
+  double kinetic, elastic;               /* J; elastic NAN if the model has no energy */
   double volume, rest_volume, speed_max; /* m3 of the cells, signed; m/s of the fastest phyxel */
-  double contact_impulse[3];             /* N s that contact has given it since creation */
+  double contact_impulse[3];             /* N s, sum of contact impulses since creation */
 } dfm_body_measure;
 /** @return DFM_OK; DFM_E_HANDLE; DFM_E_ARG. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_get_measure(dfm_body body, dfm_body_measure *out);
 /** Strain energy density of each cell, J/m3, [ntet]. @param capacity of out in cells
- * @return DFM_OK; DFM_E_UNSUPPORTED the model offers none; DFM_E_ARG capacity too small; DFM_E_HANDLE.
- * Threads: Any thread. Not during step. Since 0.1. */
+ * @return DFM_OK; DFM_E_UNSUPPORTED the model does not provide it; DFM_E_ARG capacity too small;
+ * DFM_E_HANDLE. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_energy_density(dfm_body body, uint32_t capacity, double *out);
 /** Cauchy stress of each cell, Pa, [ntet,6] as xx yy zz xy yz zx in the axes of the world, tension > 0;
  * without dampers. @param capacity of out in cells
- * @return DFM_OK; DFM_E_UNSUPPORTED the model offers none; DFM_E_ARG capacity too small; DFM_E_HANDLE.
- * Threads: Any thread. Not during step. Since 0.1. */
+ * @return DFM_OK; DFM_E_UNSUPPORTED the model does not provide it; DFM_E_ARG capacity too small;
+ * DFM_E_HANDLE. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_stress(dfm_body body, uint32_t capacity, double *out);
 #ifdef __cplusplus
 }

@@ -7,12 +7,12 @@
 extern "C" {
 #endif
 /** density kg/m3 (> 0), young Pa (> 0), poisson (-1..0.5), damping_mass 1/s, damping_stiffness s. A model
- * parameter that a body does not give itself is taken from the material's entry of the same key, else from
- * the model's default. `extra` holds such further entries, and two of the library's own: "friction", the
- * coefficient with which it meets others where no rule names the pair (dfm_friction_def); "tear", the largest
- * strain (> 0) that it bears in any direction. At the end of a step a body of this material splits the points
- * beyond it (doc/concepts/cutting.md); its model must be msm or corotational_fem.
- * "fracture_energy", J/m2 (0: none), is what a blade takes to open faces (dfm_cut_info.fracture). */
+ * parameter that the body does not set is taken from the material's entry of the same key, else from the
+ * model's default. `extra` holds such further entries, and three of the library: "friction", the coefficient
+ * for pairs without a rule (dfm_friction_def); "tear", the largest strain (> 0) that the material bears in
+ * any direction; "fracture_energy", J/m2 (0: none), the energy that a blade needs to open faces
+ * (dfm_cut_info.fracture). At the end of a step a body of a material with "tear" splits the points beyond
+ * that strain (doc/concepts/cutting.md); its model must be msm or corotational_fem. */
 typedef struct dfm_material_def {
   uint32_t size, flags;
   const char *name; /* unique in its world; NULL: none */
@@ -32,7 +32,8 @@ static inline dfm_material_def dfm_material_def_default(void) {
 /** @return DFM_OK; DFM_E_ARG a value out of range or the name is taken; DFM_E_HANDLE. Threads: Not during
  * step. Since 0.1. */
 DFM_API dfm_status dfm_material_create(dfm_world world, const dfm_material_def *def, dfm_material *out);
-/** Bodies keep what they took from it. Threads: Not during step. Since 0.1. */
+/** Destroys a material; bodies keep the values that they took from it. Threads: Not during step.
+ * Since 0.1. */
 DFM_API dfm_status dfm_material_destroy(dfm_material material);
 #ifdef __cplusplus
 }

@@ -7,23 +7,24 @@
 extern "C" {
 #endif
 /** Reads the tetrahedra of MSH 2.2 and 4.1, legacy VTK 2.0 to 5.1, VTU and Medit files (ASCII and binary;
- * doc/reference/mesh_files.md). What a file is its first bytes say, else its name's ending. Memory is bounded
- * by the file's size.
- * Negative cells are turned, unused points and duplicate cells dropped, each with a count in a warning on the
- * log and in dfm_tetmesh_info. A cell without volume is refused: it has no rest shape.
+ * doc/reference/mesh_files.md). The format is recognized by the first bytes, else by the file name ending.
+ * Memory is bounded by the size of the file.
+ * Inverted cells are reversed, unused points and duplicate cells removed, each with a count in a warning of
+ * the log and in dfm_tetmesh_info. A cell without volume is refused: it has no rest shape.
  * @return DFM_OK; DFM_E_IO; DFM_E_FORMAT (file, line or byte, what was expected); DFM_E_UNSUPPORTED (how to
  * convert); DFM_E_NOMEM
  * Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_read(dfm_context *context, const char *path, dfm_tetmesh *out);
-/** Generators, SI units, about `cells` tetrahedra: a number near it that the shape's lattice offers, more
- * where cells would otherwise be longer than twice their width.
+/** Generators, SI units, with about `cells` tetrahedra: the nearest number that the shape's lattice allows,
+ * more if cells would otherwise be longer than twice their width.
  * "cylinder": size = {radius, length, 0}, axis z from 0 to length, base at the origin; "beam": size = {x, y,
  * z} edges from the origin; "ball": size = {radius, 0, 0}, about the origin; "tube": size = {inner radius,
  * outer radius, length}, as the cylinder.
  * @return DFM_OK; DFM_E_ARG; DFM_E_NOMEM. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_make(dfm_context *context, const char *kind, const double size[3],
                                     uint32_t cells, dfm_tetmesh *out);
-/** @return DFM_OK; DFM_E_HANDLE. Threads: Any thread, with nobody using the mesh or its arrays. Since 0.1. */
+/** @return DFM_OK; DFM_E_HANDLE. Threads: Any thread, while no other thread uses the mesh or its arrays.
+ * Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_destroy(dfm_tetmesh mesh);
 
 typedef struct dfm_tetmesh_info {
@@ -38,66 +39,65 @@ typedef struct dfm_tetmesh_info {
   double lo[3], hi[3];
   /* one sentence a line; valid while the mesh lives */
   const char *warnings;
-  /* m: what a wave passes in the largest explicit step of its equation on these cells, by row sums: the
-   * least 2 sqrt(m/k) of the points, m a quarter of the cells' volumes, k = sum of V |g_i| |g_j| over cells
-   * and their corners, g the gradients of their shape functions */
+  /* m: distance that a wave travels in the largest stable explicit step of the wave equation on these cells,
+   * by row sums: the least 2 sqrt(m/k) of the points, m a quarter of the cells' volumes, k = sum of
+   * V |g_i| |g_j| over cells and their corners, g the gradients of the shape functions */
   double wave_path;
 } dfm_tetmesh_info;
-/** Counts, sizes and what reading repaired, as far as out->size goes. @return DFM_OK; DFM_E_ARG;
+/** Counts, sizes and repairs, out->size bytes at most. @return DFM_OK; DFM_E_ARG;
  * DFM_E_HANDLE. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_get_info(dfm_tetmesh mesh, dfm_tetmesh_info *out);
-/** Borrowed arrays, valid while the mesh lives: points [npoint,3], tets [ntet,4], file_point [npoint] 0-based
- * place in the file. Each out may be NULL. Threads: Any thread. Since 0.1. */
+/** Borrowed arrays, valid while the mesh lives: points [npoint,3], tets [ntet,4], file_point [npoint] index
+ * in the file, from 0. Each out may be NULL. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_data(dfm_tetmesh mesh, const double **points, const uint32_t **tets,
                                     const uint32_t **file_point);
-/** Physical groups, [ngroup], of all dimensions: name of group k (its number where it has none); per
- * cell, its group (UINT32_MAX none). Each out may be NULL; valid while the mesh lives. Threads: Any
+/** Physical groups, [ngroup], of all dimensions: name of group k (its number if it has no name);
+ * for each cell, its group (UINT32_MAX: none). Each out may be NULL; valid while the mesh lives. Threads: Any
  * thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_groups(dfm_tetmesh mesh, const char *const **names,
                                       const uint32_t **cell_group);
-/** Triangles of the file that belong to a group, [n,3] points, and the group of each, [n]: a body takes
- * them as dfm_body_def.groups. They may lie inside. Each out may be NULL; borrowed. Threads: Any
+/** Triangles of the file that belong to a group, [n,3] points, and the group of each, [n], for
+ * dfm_body_def.groups. Some may lie inside the mesh. Each out may be NULL; borrowed. Threads: Any
  * thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_triangles(dfm_tetmesh mesh, const uint32_t **triangles, const uint32_t **group,
                                          uint32_t *n);
-/** Points of the elements of a group, ascending: a named surface may be held or loaded by them.
+/** Points of the elements of a group, ascending, for holding or loading a named surface.
  * @param dimension  out, of the group's elements: 0 points, 1 lines, 2 triangles, 3 cells
  * @param points     out, borrowed, [n]. Each out may be NULL
  * @return DFM_OK; DFM_E_ARG no such group; DFM_E_HANDLE. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_group_points(dfm_tetmesh mesh, uint32_t group, uint32_t *dimension,
                                             const uint32_t **points, uint32_t *n);
 /** Writes binary MSH 4.1 ("*.msh"), MSH 2.2 ("*.msh2"), legacy VTK ("*.vtk"), VTU ("*.vtu") or Medit
- * ("*.mesh", groups by number alone) by file name ending; to a temporary name first, so never half a file.
- * Groups of cells and of triangles are kept in all of them, groups of points in MSH, groups of lines in none.
+ * ("*.mesh", groups by number alone) by file name ending, to a temporary file that is then renamed.
+ * All formats keep groups of cells and triangles, MSH also groups of points; groups of lines are lost.
  * @return DFM_OK; DFM_E_IO; DFM_E_UNSUPPORTED another ending. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_write(dfm_tetmesh mesh, const char *path);
-/** Place of each cell among the file's tetrahedra, [ntet], from 0; NULL where reading dropped none (they
- * stand as in the file). Borrowed.
+/** Index of each cell among the file's tetrahedra, [ntet], from 0; NULL if no cell was removed (the order is
+ * that of the file). Borrowed.
  * Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_file_cells(dfm_tetmesh mesh, const uint32_t **file_cell);
-/** What a mesh file holds. Decides whether a body takes its cells from the file or is filled from
- * its surface. */
+/** Kind of a mesh file: tells whether a body takes its cells from the file or is filled from its surface. */
 enum { DFM_MESH_TETS = 1, DFM_MESH_SURFACE = 2 };
-/** Looks into a file of any format that dfm_tetmesh_read or dfm_trimesh_read take. @param kind out:
+/** Kind of a file in any format of dfm_tetmesh_read or dfm_trimesh_read. @param kind out:
  * DFM_MESH_TETS if it has any tetrahedron, else DFM_MESH_SURFACE. @return DFM_OK; as dfm_tetmesh_read.
  * Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_mesh_file_kind(dfm_context *context, const char *path, uint32_t *kind);
-/** Reads a file of either kind once, where dfm_mesh_file_kind and dfm_tetmesh_read or dfm_trimesh_read would
- * read it twice.
- * @param cells    out: what dfm_tetmesh_read gives, where the file has any tetrahedron; else 0
- * @param surface  out: what dfm_trimesh_read gives, where it has none; else 0
+/** Reads a file of either kind once, while dfm_mesh_file_kind followed by dfm_tetmesh_read or
+ * dfm_trimesh_read reads it twice.
+ * @param cells    out: as dfm_tetmesh_read, if the file has any tetrahedron; else 0
+ * @param surface  out: as dfm_trimesh_read, if it has none; else 0
  * @return DFM_OK; as dfm_tetmesh_read (both untouched). Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_mesh_read(dfm_context *context, const char *path, dfm_tetmesh *cells,
                                  dfm_trimesh *surface);
 
-/** Reads a triangle surface: OBJ, PLY, STL, OFF, and the triangles of MSH, VTK, VTU and Medit files (where
- * such a file has tetrahedra: their boundary). Polygons are cut into triangles. Points at the same place are
- * merged, triangles without area and doubles dropped, triangles turned so that neighbors agree and closed
- * pieces face outward; holes are counted, not closed. Each repair is one sentence of warnings.
+/** Reads a triangle surface: OBJ, PLY, STL, OFF, and the triangles of MSH, VTK, VTU and Medit files (the
+ * boundary if such a file has tetrahedra). Polygons are divided into triangles. Coincident points are merged,
+ * triangles without area and duplicates removed, and triangles oriented so that neighbors agree and closed
+ * pieces face outward. Holes are counted, not closed. Each repair adds one sentence to warnings.
  * @return as dfm_tetmesh_read. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_trimesh_read(dfm_context *context, const char *path, dfm_trimesh *out);
-/** The same repair for triangles of the host: points [npoint,3] m, triangles [ntriangle,3]. Threads: Any
- * thread. Since 0.1. */
+/** Applies the same repairs to triangles of the host: points [npoint,3] m, triangles [ntriangle,3]. Threads:
+ * Any thread. Since 0.1. */
 DFM_API dfm_status dfm_trimesh_create(dfm_context *context, uint32_t npoint, const double *points,
                                       uint32_t ntriangle, const uint32_t *triangles, dfm_trimesh *out);
 /** Generators of closed surfaces, SI units, about `triangles` near-equilateral triangles: "cylinder",
@@ -106,15 +106,16 @@ DFM_API dfm_status dfm_trimesh_create(dfm_context *context, uint32_t npoint, con
  * @return DFM_OK; DFM_E_ARG; DFM_E_NOMEM. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_trimesh_make(dfm_context *context, const char *kind, const double size[3],
                                     uint32_t triangles, dfm_trimesh *out);
-/** @return DFM_OK; DFM_E_HANDLE. Threads: Any thread, with nobody using the mesh or its arrays. Since 0.1. */
+/** @return DFM_OK; DFM_E_HANDLE. Threads: Any thread, while no other thread uses the mesh or its arrays.
+ * Since 0.1. */
 DFM_API dfm_status dfm_trimesh_destroy(dfm_trimesh mesh);
 typedef struct dfm_trimesh_info {
   uint32_t size, npoint, ntriangle, nedge, npiece, ngroup;
-  /* what reading repaired */
+  /* repairs */
   uint32_t merged_points, dropped_points, dropped_triangles, turned;
-  /* closed: 1 if every edge has two triangles that agree */
+  /* closed: 1 if every edge has two triangles of consistent orientation */
   uint32_t open_edges, holes, nonmanifold_edges, closed;
-  /* m2, m3 (signed sum; of a closed surface), m */
+  /* m2; m3 (signed sum; meaningful for a closed surface); m */
   double area, volume, edge_min, edge_median, edge_max;
   /* 4 sqrt(3) area / sum l2: 1 for an equilateral triangle */
   double quality_min, quality_mean;
@@ -123,11 +124,11 @@ typedef struct dfm_trimesh_info {
   /* one sentence a line; valid while the mesh lives */
   const char *warnings;
 } dfm_trimesh_info;
-/** Counts, sizes and what reading repaired, as far as out->size goes. @return DFM_OK; DFM_E_ARG;
+/** Counts, sizes and repairs, out->size bytes at most. @return DFM_OK; DFM_E_ARG;
  * DFM_E_HANDLE. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_trimesh_get_info(dfm_trimesh mesh, dfm_trimesh_info *out);
 /** Borrowed arrays, valid while the mesh lives: points [npoint,3], triangles [ntriangle,3] outward,
- * file_point [npoint] 0-based place in the file. Each out may be NULL. Threads: Any thread. Since 0.1. */
+ * file_point [npoint] index in the file, from 0. Each out may be NULL. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_trimesh_data(dfm_trimesh mesh, const double **points, const uint32_t **triangles,
                                     const uint32_t **file_point);
 /** Groups of triangles, [ngroup]: physical groups, OBJ groups or materials, PLY and STL solids; per
@@ -135,23 +136,23 @@ DFM_API dfm_status dfm_trimesh_data(dfm_trimesh mesh, const double **points, con
  * thread. Since 0.1. */
 DFM_API dfm_status dfm_trimesh_groups(dfm_trimesh mesh, const char *const **names,
                                       const uint32_t **triangle_group);
-/** Writes OBJ, PLY (binary), STL (binary), OFF, legacy VTK or VTU by file name ending; to a temporary
- * name first, so never half a file. Groups survive in OBJ, VTK and VTU, in PLY by number. STL holds
- * single precision.
+/** Writes OBJ, PLY (binary), STL (binary), OFF, legacy VTK or VTU by file name ending, to a temporary
+ * file that is then renamed. OBJ, VTK and VTU keep groups, PLY by number. STL has single precision.
  * @return DFM_OK; DFM_E_IO; DFM_E_UNSUPPORTED another ending. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_trimesh_write(dfm_trimesh mesh, const char *path);
 
-/** Lattice cells inside a closed surface, so that a surface alone becomes a body. Small holes, flipped or
- * touching triangles do no harm: inside is where the winding number exceeds one half.
- * @param surface  closed but for small holes; else DFM_E_FORMAT says how large the opening is
- * @param cells    wanted number of tetrahedra; the lattice offers one near it
- * @param out      cells that cover the inside; the surface lies within them. dfm_tetmesh_share tells how much
- *                 of each is material
+/** Fills a closed surface with cells of a lattice. Small holes, flipped and touching triangles are allowed:
+ * inside is where the winding number exceeds one half.
+ * @param surface  closed except for small holes; else DFM_E_FORMAT, and the error gives the size of the
+ * opening
+ * @param cells    wanted number of tetrahedra; the result has a number near it
+ * @param out      cells that cover the inside; the surface lies within them. dfm_tetmesh_share gives the
+ *                 fraction of each that is material
  * @return DFM_OK; DFM_E_ARG cells below 1 or above 1e8; DFM_E_FORMAT; DFM_E_NOMEM; DFM_E_HANDLE
  * Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_fill(dfm_trimesh surface, uint32_t cells, dfm_tetmesh *out);
-/** Share of each cell that is material, [ntet], in (0,1]; NULL for a mesh that was not filled. VTK and VTU
- * files keep it. Borrowed.
+/** Fraction of each cell that is material, [ntet], in (0,1]; NULL for a mesh that was not filled. VTK and VTU
+ * files store it. Borrowed.
  * @return DFM_OK; DFM_E_HANDLE. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_share(dfm_tetmesh mesh, const double **share);
 

@@ -1,4 +1,4 @@
-/* deform/surface.h -- surfels: what touches and what is drawn. */
+/* deform/surface.h -- surfels: the surface of a body, for contact and drawing. */
 #ifndef DEFORM_SURFACE_H
 #define DEFORM_SURFACE_H
 #include "deform/base.h"
@@ -34,21 +34,21 @@ DFM_API dfm_status dfm_surface_triangles(dfm_body body, uint32_t capacity, uint3
 DFM_API dfm_status dfm_surface_points(dfm_body body, uint32_t capacity, uint32_t *point, uint32_t *n);
 
 #define DFM_VERTEX_NONE UINT32_MAX /* dfm_vertex_layout: this member is not written */
-/** How single-precision vertices lie in the caller's memory: bytes from one vertex to the next, and bytes
- * from the start of a vertex to each member, all multiples of 4. What lies between the members is left
- * alone, so that texture coordinates stand beside them and are written once by the host. */
+/** Layout of single-precision vertices in the caller's memory: bytes from one vertex to the next, and bytes
+ * from the start of a vertex to each member, all multiples of 4. Bytes between the members are not written,
+ * so that the host can store texture coordinates there once. */
 typedef struct dfm_vertex_layout {
   uint32_t size, stride;
-  uint32_t position; /* 3 floats, m: world, less origin */
-  uint32_t normal;   /* 3 floats: that of dfm_surface_normals */
+  uint32_t position; /* 3 floats, m: world, minus origin */
+  uint32_t normal;   /* 3 floats: as dfm_surface_normals */
   uint32_t velocity; /* 3 floats, m/s */
-  /* 3 floats, m: from the rest position before pose, as dfm_debug_write_surface gives it */
+  /* 3 floats, m: from the rest position before pose, as in dfm_debug_write_surface */
   uint32_t displacement;
-  /* 1 float: of the contacts of the last sub-step that carry load at this surfel, at an edge or a triangle
-   * of it: 1 one sticks, 0.5 all slide, 0 there is none */
+  /* 1 float, from the loaded contacts of the last sub-step at this surfel, its edges and its triangles:
+   * 1 at least one sticks, 0.5 all slide, 0 there is none */
   uint32_t stick;
   uint32_t reserved;
-  double origin[3]; /* m, subtracted before rounding: far from 0 floats are coarse */
+  double origin[3]; /* m, subtracted before rounding, for precision far from the origin */
   uint64_t cookie;  /* set by the default function */
 } dfm_vertex_layout;
 /** dfm_vertex_layout_default into a struct of any size (base.h). Threads: Any thread. Since 0.1. */
@@ -59,12 +59,12 @@ static inline dfm_vertex_layout dfm_vertex_layout_default(void) {
   dfm_vertex_layout_default_sized((uint32_t)sizeof out, &out);
   return out;
 }
-/** Writes one vertex per surfel for drawing, each value the nearest float to that of the functions above; the
- * triangles of dfm_surface_triangles are its index buffer. Memory is only written, in rising order but for
- * `stick`, so it may be a mapped vertex buffer. A body whose surface is its own boundary needs no memory of
- * the library; another one's first call makes what dfm_world_ray makes for it.
+/** Writes one vertex per surfel for drawing; each value is the nearest float to that of the functions above.
+ * The triangles of dfm_surface_triangles are the index buffer. Memory is only written, in ascending order
+ * except for `stick`, so it may be a mapped vertex buffer. If the surface is the boundary of the cells, the
+ * call allocates nothing; otherwise the first call builds the tree that dfm_world_ray uses.
  * @param layout  NULL: dfm_vertex_layout_default()
- * @param bytes   that out has; 0 with out NULL only counts
+ * @param bytes   size of out; 0 with out NULL only counts
  * @param out     aligned to 4
  * @param n       out, vertices, one per surfel; may be NULL
  * @return DFM_OK; DFM_E_ARG members overlap, lie beyond the stride or are not aligned, or bytes is too small
@@ -79,21 +79,21 @@ typedef struct dfm_ray_hit {
   dfm_obstacle obstacle;
   double distance, point[3], normal[3];
 } dfm_ray_hit;
-/** First surface a ray meets; of equal distances the body before the obstacle, then the lower number. The
- * answer is found through a tree of boxes per body and per obstacle that is a mesh or voxels: it looks at
- * about 100 boxes of 100,000 triangles, not at all of them. A tree is made when it is first needed (about 150
- * bytes a triangle) and kept; a body's is renewed by the first query after its points have moved, which takes
- * about as long as reading its surface. Later queries allocate nothing. Several threads may ask at once.
+/** First surface that a ray hits; at equal distance a body before an obstacle, then the lower number. The
+ * search uses a tree of boxes for each body and each obstacle that is a mesh or voxels: about 100 boxes for
+ * 100,000 triangles. A tree is built when it is first needed (about 150 bytes a triangle). The tree of a body
+ * is updated by the first query after its points have moved, which takes about as long as reading its
+ * surface. Later queries allocate nothing. Several threads may call it at once.
  * @param origin        m
  * @param direction     need not be unit; distance is in meters
  * @param max_distance  m, above 0; INFINITY for any
- * @param hit           out; hit->body and hit->obstacle are both 0: nothing met. From inside of a shape it is
- *                      where the ray leaves it
+ * @param hit           out; hit->body and hit->obstacle are both 0: no hit. For a ray that starts inside a
+ *                      shape: where it leaves the shape
  * @return DFM_OK; DFM_E_ARG; DFM_E_NOMEM no memory for a tree; DFM_E_HANDLE. Threads: Any thread. Not during
  * step. Since 0.1. */
 DFM_API dfm_status dfm_world_ray(dfm_world world, const double origin[3], const double direction[3],
                                  double max_distance, dfm_ray_hit *hit);
-/** Closest point of any body's surface within max_distance, found as dfm_world_ray finds its answer. Same
+/** Closest point on the surface of any body within max_distance, with the trees of dfm_world_ray. Same
  * result struct.
  * @return as dfm_world_ray. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_closest(dfm_world world, const double point[3], double max_distance,
