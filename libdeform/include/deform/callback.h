@@ -4,8 +4,8 @@
  * They are called on the thread that steps the world, never on workers, one at a time and in an order that
  * does not depend on the number of threads. Results have the same bits if the answers depend on the arguments
  * alone. Calls into the world are refused with DFM_E_BUSY. Callbacks must not throw. Snapshots contain
- * neither functions nor answers: the host sets the functions again. A world without callbacks pays nothing.
- * */
+ * neither functions nor answers: the host sets the functions again. A world without callbacks pays
+ * nothing. */
 #ifndef DEFORM_CALLBACK_H
 #define DEFORM_CALLBACK_H
 #include "deform/base.h"
@@ -51,8 +51,8 @@ typedef struct dfm_contact_choice {
   /* 1; factor on the coefficient of friction (the law is evaluated with the normal force times this
    * factor). 0: no friction. At least 0 */
   double friction_scale;
-  double
-      surface_velocity[3]; /* m/s, zero; velocity of b's surface along itself, added to its motion: a belt */
+  /* m/s, zero; velocity of b's surface along itself, added to its motion: a belt */
+  double surface_velocity[3];
 } dfm_contact_choice;
 typedef void (*dfm_pre_solve_fn)(void *user, dfm_contact_choice *contact);
 /** Sets the function that is called for every contact before it is solved, in every sub-step: first for

@@ -1,16 +1,16 @@
 /* deform/plugin.h -- plugin ABI 1. Stand-alone: needs only the two headers below. SI units, binary64, C
- * calling convention. Structs start with their size and grow at the end only; who reads one looks at its
- * size before what ABI 1 did not begin with, and a missing tail is zero. Rows of tables have their size
- * beside them (param_size, slot_size). What stays and what may be added: doc/reference/abi.md. What the
- * library does not call yet stands in plugin_draft.h and is no part of the ABI.
- * Threads: [setup] no other call on this instance, while others, of other worlds too, are set up and step;
+ * calling convention. Structs start with their size and grow at the end only. A reader checks
+ * the size before it reads a member that was added after the first version of ABI 1; missing members are
+ * zero. The size of table rows is given beside the table (param_size, slot_size). Promises and possible
+ * additions: doc/reference/abi.md. plugin_draft.h has tables that are not part of the ABI yet.
+ * Threads: [setup] no other call on this instance at that time; other instances may be set up and step;
  * [step] one call at a time per instance, instances run concurrently; [batch] re-entrant, many workers at
- * once; [any] from anywhere. No C++ exception, exit or longjmp crosses. Text is UTF-8.
- * Bits 16 to 31 of flags and caps are for what a host must know: one that does not refuses the type. It
- * passes over lower bits that it does not know.
- * Functions: (required) is never NULL, (required: ..) is not NULL where that is so, (optional) may be NULL.
- * Members called reserved, and bits without a name, are 0. `deform plugin check` (V03) refuses a plugin that
- * leaves out what is required or fills what is reserved. */
+ * once; [any] on any thread. No C++ exception, exit or longjmp may leave a function. Text is UTF-8.
+ * A host refuses a type that sets one of the bits 16 to 31 of flags or caps that the host does not know; it
+ * ignores unknown lower bits.
+ * Functions: (required) is never NULL, (required: CONDITION) is not NULL under that condition, (optional) may
+ * be NULL. Members called reserved, and bits without a name, are 0. `deform plugin check` (V03) refuses a
+ * plugin that lacks a required function or sets a reserved member. */
 #ifndef DEFORM_PLUGIN_H
 #define DEFORM_PLUGIN_H
 #include <stddef.h>
@@ -18,10 +18,10 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-/* Raised by breaks alone. 0 were the drafts, which no host takes any more. */
+/* Increased by incompatible changes only. 0 were the drafts, which hosts no longer accept. */
 #define DFM_ABI 1u
-#define DFM_ABI_MIN 1u   /* oldest that this version's host speaks */
-#define DFM_ABI_DRAFT 0u /* of an ABI that is not frozen yet; else 0 */
+#define DFM_ABI_MIN 1u   /* oldest ABI that this version's host supports */
+#define DFM_ABI_DRAFT 0u /* number of a draft; 0 for a frozen ABI */
 /* 0 ok, > 0 try again, < 0 failed; never renumbered; base.h includes this header */
 typedef int32_t dfm_status;
 enum {
@@ -38,27 +38,29 @@ enum {
   DFM_E_DIVERGED = -9,
   DFM_E_BUSY = -10
 };
-/* ---- services the host lends to a plugin; valid from entry until the last destroy ---------------- */
+/* ---- services of the host for a plugin; valid from entry until the last destroy ------------------ */
 typedef struct dfm_host {
-  uint32_t size, abi;          /* sizeof this struct in the host; newest ABI that it speaks */
-  uint32_t abi_draft, abi_min; /* DFM_ABI_DRAFT of the host; oldest ABI that it speaks */
+  uint32_t size, abi;          /* sizeof this struct in the host; newest ABI that it supports */
+  uint32_t abi_draft, abi_min; /* DFM_ABI_DRAFT of the host; oldest ABI that it supports */
   void *ctx;                   /* pass back as the first argument of every call below */
   void *(*alloc)(void *ctx, size_t bytes, size_t align);           /* [any] NULL on failure */
   void (*release)(void *ctx, void *p, size_t bytes, size_t align); /* [any] */
   /* [batch] thread-local, aligned to 64 bytes, NULL on failure; valid until the call, or the block of
    * parallel_for, returns */
   void *(*scratch)(void *ctx, size_t bytes);
-  /* [any] level 0 details, 1 information, 2 warning, 3 error: the reason of what fails next; code: yours */
+  /* [any] level 0 details, 1 information, 2 warning, 3 error: reason of the failure that follows; code:
+   * chosen by the plugin */
   void (*log)(void *ctx, int32_t level, uint32_t code, const char *utf8);
-  /* [setup][step] blocking. fn may be called with any cut at multiples of grain; put partial sums into slot
-   * begin/grain and add them in slot order; a call from inside a worker runs serially in the caller. */
+  /* [setup][step] blocking. fn may be called for any division at multiples of grain; store partial sums in
+   * slot begin/grain and add them in slot order; a call from inside a worker runs serially in the caller. */
   void (*parallel_for)(void *ctx, uint32_t n, uint32_t grain,
                        void (*fn)(void *user, uint32_t begin, uint32_t end), void *user);
-  /* [any] a table of further services that begins with its size; NULL: this host has none of that id */
+  /* [any] a table of further services that begins with its size; NULL: the host has none with that id */
   const void *(*extension)(void *ctx, const char *id);
 } dfm_host;
 /* ---- self-description ---------------------------------------------------------------------------- */
-typedef struct dfm_param { /* a row; values of all rows lie end to end, width doubles each */
+/* a row; the values of all rows are stored one after the other, width doubles each */
+typedef struct dfm_param {
   /* "sigma0", "bristle stiffness per area", "N/m^3"; "1" if dimensionless */
   const char *key, *label, *unit;
   double min, max, def;     /* closed finite range; def inside it */
@@ -72,25 +74,24 @@ enum {
   DFM_PARAM_ENUM = 8,
   DFM_PARAM_PER_CELL = 16 /* may come as a field of the mesh with this key */,
   DFM_PARAM_AUTO =
-      32 /* def is no value but a sign, read and shown as "auto": the plugin takes one from the others */,
-  DFM_PARAM_LIST = 64 /* 1 to width values may be given, the rest read 0 */
+      32 /* def means "auto" and is shown so: the plugin computes the value from the other parameters */,
+  DFM_PARAM_LIST = 64 /* 1 to width values may be given; the rest are 0 */
 };
-/* A row: one block of state. It does not grow in ABI 1, so rows of this type are 16 bytes apart with every
- * header, and slot_size 0 or sizeof(dfm_slot) say the same. Longer rows will be of another type, whose size
- * slot_size must be. */
+/* A row: one block of state. It does not grow in ABI 1: rows of this type are always 16 bytes apart, and
+ * slot_size is 0 or sizeof(dfm_slot). Longer rows will have another type, whose size is then slot_size. */
 typedef struct dfm_slot { uint32_t unit, width, kind, reserved; /* 0 */ } dfm_slot;
 enum { DFM_PER_CONTACT = 1, DFM_PER_POINT = 2, DFM_PER_CELL = 3, DFM_PER_EDGE = 4, DFM_PER_INSTANCE = 5 };
 enum {
   DFM_SLOT_SCALAR = 1,
-  DFM_SLOT_TANGENT = 2 /* pair, turns with the contact frame */,
+  DFM_SLOT_TANGENT = 2 /* pair; rotates with the contact frame */,
   DFM_SLOT_VECTOR = 3,
   DFM_SLOT_ROTATION = 4 /* unit quaternion */
 };
-/* all of an instance */
+/* all state of an instance */
 typedef struct dfm_slots {
   uint32_t size, nslot;
   const dfm_slot *slots; /* [nslot] rows of slot_size bytes */
-  uint32_t slot_size;    /* from row to row: sizeof(dfm_slot), or 0, which is 16 for ever */
+  uint32_t slot_size;    /* bytes per row: sizeof(dfm_slot), or 0 for 16 */
   uint32_t reserved;     /* 0 */
 } dfm_slots;
 typedef struct dfm_type {
@@ -111,14 +112,14 @@ enum {
   DFM_FRIC_PASSIVE = 2,
   DFM_FRIC_JACOBIAN = 4,
   DFM_FRIC_SET_VALUED = 8,
-  DFM_FRIC_NONE = 16 /* no force at any slip, and no state: hosts do not ask */
+  DFM_FRIC_NONE = 16 /* no force at any slip, and no state: hosts do not call it */
 };
 typedef struct dfm_friction_in { /* SoA; column c of contact i is at [c*stride + i]; 64-byte aligned */
   /* stride % 8 == 0; lanes up to n rounded to 8 may be touched, ignored */
   uint32_t size, n, stride, flags; /* flags: 0 */
   double dt;                       /* s */
   const double *params;            /* shared by the batch (host groups contacts by law and params) */
-  const void *data;                /* what prepare() made from params; NULL without prepare */
+  const void *data;                /* result of prepare() for params; NULL without prepare */
   const double *fn;                /* [n]   normal force, >= 0 (N) */
   /* [2,n] trial slip, mean over the step = slip path / dt, of the surfel's owner against the other side, in
    * the contact frame (m/s) */
@@ -127,7 +128,7 @@ typedef struct dfm_friction_in { /* SoA; column c of contact i is at [c*stride +
   const double *area, *dwell; /* [n]   m^2, s; NULL unless needed */
   const double *state;        /* [nstate,n] at t */
 } dfm_friction_in;
-typedef struct dfm_friction_out { /* each pointer may be NULL: not wanted */
+typedef struct dfm_friction_out { /* a pointer that is NULL is not wanted */
   uint32_t size, flags;           /* flags: 0 */
   /* [2,n] force ON the moving side (N); opposes slip; ft_stop while stuck */
   double *ft;
@@ -146,23 +147,24 @@ typedef struct dfm_friction {
   /* [batch] (required) no alloc, no I/O */
   dfm_status (*eval)(const dfm_friction_in *in, dfm_friction_out *out);
   dfm_status (*check)(const double *params, char *why, size_t cap); /* [any] (optional) cross-field rules */
-  /* [setup] (optional) tables; not DFM_OK: data is not read, what was made is freed */
+  /* [setup] (optional) tables; on failure data is not read, and prepare has freed its memory */
   dfm_status (*prepare)(const dfm_host *h, const double *params, void **data);
   void (*release)(const dfm_host *h, void *data); /* [setup] (required: with prepare, and not without) */
-  /* [any] (optional; NULL: slots) the state that these parameters call for, where they decide how much there
-   * is; it stands in the place of slots, which then is the most that any parameters call for. Constant data,
-   * the same for the same parameters. */
+  /* [any] (optional; NULL: slots) the state that these parameters need, if it depends on them; it replaces
+   * slots, which is then the most that any parameters need. Constant data, the same for the same
+   * parameters. */
   const dfm_slots *(*state)(const double *params);
   uint32_t slot_size, reserved; /* of slots, as in dfm_slots */
-  /* [any] optional (NULL: no parameter switches one off): changes params, all values end to end, so that the
-   * effect, one of dfm_type.effects, is off, and nothing else; changes nothing where it is off already. What
-   * check() takes it takes afterwards. DFM_E_UNSUPPORTED: no parameter switches it off. */
+  /* [any] optional (NULL: no effect can be switched off): changes params, the values of all rows, so that the
+   * effect, one of dfm_type.effects, is off and nothing else changes; does nothing if it is off already.
+   * Parameters that check() accepts it still accepts afterwards. DFM_E_UNSUPPORTED: no parameter switches the
+   * effect off. */
   dfm_status (*without)(const char *effect, double *params);
 } dfm_friction;
 /* ---- deformable model: host owns x, v, f and all state; plugin owns only rebuildable caches -------- */
 enum {
   DFM_CAP_ENERGY = 1,
-  DFM_CAP_STIFFNESS = 2, /* pattern and stiffness are there: the body may be moved by an implicit step */
+  DFM_CAP_STIFFNESS = 2, /* has pattern and stiffness: implicit steps are possible */
   DFM_CAP_DAMPING = 4,
   DFM_CAP_ROTATION_INVARIANT = 16,
   DFM_CAP_PLAUSIBLE = 32,         /* not derived from a continuum */
@@ -171,8 +173,7 @@ enum {
 enum { DFM_CELL_TET = 8 };
 typedef struct dfm_mesh {             /* rest configuration; borrowed during create() only */
   uint32_t size, npoint, ncell, cell; /* cell: one DFM_CELL_* */
-  /* [npoint,3] m, before the body's pose; where that has put them, for a model without
-   * DFM_CAP_ROTATION_INVARIANT */
+  /* [npoint,3] m, before the body's pose; after it for a model without DFM_CAP_ROTATION_INVARIANT */
   const double *rest;
   const uint32_t *cells; /* [ncell,k] */
   const double *mass;    /* [npoint] kg */
@@ -198,12 +199,12 @@ typedef struct dfm_kin { /* one evaluation point */
 } dfm_kin;
 typedef struct dfm_model {           /* self is void*: one shared struct tag would break the C++ ODR */
   uint32_t size, caps, cells, nslot; /* DFM_CAP_*, accepted DFM_CELL_* */
-  /* what can change one bit of a later result is state, warm starts included */
+  /* state is everything that can change a bit of a later result, warm starts included */
   const dfm_slot *slots;
-  /* [setup] (required) not DFM_OK: self is not read, what was made is freed */
+  /* [setup] (required) on failure self is not read, and create has freed its memory */
   dfm_status (*create)(const dfm_host *h, const dfm_mesh *m, void **self);
   void (*destroy)(void *self); /* [setup] (required) */
-  /* [setup] (required: with RUNTIME rows) these alone differ; not DFM_OK: nothing has changed */
+  /* [setup] (required: with RUNTIME rows) only those rows differ; on failure nothing has changed */
   dfm_status (*set_params)(void *self, const double *params);
   dfm_status (*state_init)(const void *self, double *state); /* [setup] (optional; NULL: all 0) */
   /* [step] (required: without "dfm.stepper/1") f[npoint,stride] += N */
@@ -212,21 +213,22 @@ typedef struct dfm_model {           /* self is void*: one shared struct tag wou
   dfm_status (*bound)(void *self, const dfm_kin *k, double *ksum, double *csum, double *dt);
   /* [step] (required: CAP_ENERGY) f = -dE/dx */
   dfm_status (*energy)(void *self, const dfm_kin *k, double *joule);
-  /* [setup] (required: CAP_STIFFNESS) pairs of points that answer each other, ij[nb,2], i <= j, each pair
-   * once, each point with itself. ij NULL: only counts. */
+  /* [setup] (required: CAP_STIFFNESS) pairs of coupled points, ij[nb,2], i <= j, each pair once, each point
+   * with itself. ij NULL: only counts. */
   dfm_status (*pattern)(const void *self, uint32_t *nb, uint32_t *ij);
   /* [step] (required: CAP_STIFFNESS) blk[nb,9] += a*df_i/dx_j + b*df_i/dv_j, row-major, in the order of the
    * pattern; block (j, i) is the transpose of (i, j). f is what add_forces adds at the same k; state_out is
-   * NULL. For a, b >= 0 the sum is to be negative semidefinite: what would make it indefinite is left out. */
+   * NULL. For a, b >= 0 the sum must be negative semidefinite: leave out terms that make it indefinite. */
   dfm_status (*stiffness)(void *self, const dfm_kin *k, double a, double b, double *blk);
-  /* [setup] (optional) "dfm.stepper/1" ...: a table that begins with its size and stays as it is while the
-   * instance lives; NULL to every id that the model does not know */
+  /* [setup] (optional) "dfm.stepper/1" ...: a table that begins with its size and does not change while the
+   * instance lives; NULL for ids that the model does not know */
   const void *(*extension)(const void *self, const char *id);
   uint32_t slot_size, reserved; /* of slots, as in dfm_slots */
 } dfm_model;
 /* Self-stepping model, extension "dfm.stepper/1". Contact, friction, report and pictures see surfels only.
- * Velocities here are means over the step: (x_s(t+dt) - x_s(t)) / dt. The functions of this table and of the
- * ones below are required where nothing else is said: a model without them does not answer the table's id. */
+ * Velocities here are means over the step: (x_s(t+dt) - x_s(t)) / dt. The functions of this table and of
+ * those below are required unless marked (optional): a model without them returns NULL for the id of the
+ * table. */
 typedef struct dfm_stepper {
   uint32_t size, reserved; /* reserved: 0, here and in the tables below */
   /* [step] without contact. f_ext [npoint,stride] N: gravity, loads, springs. u_s [nsurfel,3]. Held
@@ -241,30 +243,30 @@ typedef struct dfm_stepper {
   /* [step] equals predict + respond. p_s [nsurfel,3] total impulses; x, v [npoint,stride] out at t+dt,
    * not aliasing k */
   dfm_status (*commit)(void *self, const dfm_kin *k, const double *p_s, double *x, double *v);
-  void (*fetch)(void); /* NULL: a place kept for dfm_fetch_fn of plugin_draft.h */
-  /* [step] (optional; NULL, or a smaller size) respond for nrhs right-hand sides at once, p, du_s [nrhs,n,3].
-   * Without it respond is called nrhs times. */
+  void (*fetch)(void); /* NULL: reserved for dfm_fetch_fn of plugin_draft.h */
+  /* [step] (optional: NULL, or a smaller size) respond for nrhs right-hand sides at once, p, du_s [nrhs,n,3];
+   * otherwise respond is called nrhs times. */
   dfm_status (*respond_many)(void *self, const dfm_kin *k, uint32_t n, const uint32_t *surfel, uint32_t nrhs,
                              const double *p, double *du_s);
 } dfm_stepper;
-/* Extension "dfm.late_points/1" of a self-stepping model: its state tells where its points are, so that a
- * step moves those alone that a surfel hangs on or that are held, and the others when somebody asks. A host
- * that knows the table ends steps by its commit; the others are in k->x and k->v as they last were seen. It
- * calls `points` before anybody else reads them, `look` after somebody else wrote points. */
+/* Extension "dfm.late_points/1" of a self-stepping model whose state determines all points: a step moves only
+ * the points of surfels and the held ones, and computes the others on request. A host that knows the table
+ * ends steps by its commit; the other points keep their last computed values in k->x and k->v. The host calls
+ * `points` before anything else reads them, and `look` after anything else wrote points. */
 #define DFM_EXT_LATE_POINTS "dfm.late_points/1"
 typedef struct dfm_late_points {
   uint32_t size, reserved;
-  /* [step] as dfm_stepper.commit, but may leave out what no surfel hangs on and nothing holds */
+  /* [step] as dfm_stepper.commit, but may leave out points that belong to no surfel and are not held */
   dfm_status (*commit)(void *self, const dfm_kin *k, const double *p_s, double *x, double *v);
   /* [step] x, v [npoint,stride]: those left out, of k->state; k->x and k->v may be the same arrays. Never
    * between predict and commit of a step. */
   dfm_status (*points)(void *self, const dfm_kin *k, double *x, double *v);
-  /* [step] state: in the next step the points tell where the body is, all of them */
+  /* [step] marks the state so that the next step starts from the points, all of them */
   dfm_status (*look)(const void *self, double *state);
-  /* [step] (optional; NULL, or a smaller size) of all points, from k->state and the points that steps move:
-   * sums[5] = kinetic and elastic energy, J, and the sum of mass times place, kg m. For who would otherwise
-   * ask for all points while the scene runs; leaves what predict has found. DFM_DISCARD: the points tell
-   * where the body is, so they are to be asked. */
+  /* [step] (optional: NULL, or a smaller size) over all points, from k->state and the points that steps move:
+   * sums[5] = kinetic and elastic energy, J, and the sum of mass times position, kg m. It replaces a request
+   * for all points while the scene runs, and does not change the results of predict. DFM_DISCARD: the points
+   * determine the state, so the host must compute the sums from them. */
   dfm_status (*sums)(void *self, const dfm_kin *k, double *sums);
 } dfm_late_points;
 /* Extension "dfm.cell_energy/1" of a model: elastic energy per rest volume, for pictures
@@ -283,60 +285,58 @@ typedef struct dfm_cell_stress {
   /* [step] stress[ncell,6] = Pa, Cauchy stress as xx yy zz xy yz zx in the axes of the world; tension > 0 */
   dfm_status (*cell_stress)(void *self, const dfm_kin *k, double *stress);
 } dfm_cell_stress;
-/* Extension "dfm.slots/1" of a model: state of this instance, where its parameters decide how much
- * there is. It stands in the place of dfm_model.slots, is asked for once after create() and stays as it is
- * while the instance lives. */
+/* Extension "dfm.slots/1" of a model: state of this instance, if its size depends on the parameters. It
+ * replaces dfm_model.slots, is read once after create() and does not change while the instance lives. */
 #define DFM_EXT_SLOTS "dfm.slots/1"
-/* Extension "dfm.effects/1" of a model: those of dfm_type.effects that the instance's present
- * parameters call for, NULL-terminated. Without it all of them are taken to be at work. */
+/* Extension "dfm.effects/1" of a model: those of dfm_type.effects that the present parameters of the instance
+ * call for, NULL-terminated. Without it all of them count as active. */
 #define DFM_EXT_EFFECTS "dfm.effects/1"
 typedef struct dfm_effects {
   uint32_t size, reserved;
   /* [setup] valid until the next call of set_params */
   const char *const *(*active)(const void *self);
 } dfm_effects;
-/* Extension "dfm.idle/1" of a model: parameters that do nothing beside the present others, or not
- * what their row says, and why: part of a sentence without a full stop. Hosts tell it to the user. NULL where
- * the parameter does what it says. */
+/* Extension "dfm.idle/1" of a model: parameters that have no effect with the present values of the others, or
+ * another effect than their row says. `why` gives the reason as part of a sentence, without a full stop, for
+ * the user; NULL if the parameter acts as its row says. */
 #define DFM_EXT_IDLE "dfm.idle/1"
 typedef struct dfm_idle {
   uint32_t size, reserved;
   /* [setup] row of dfm_type.params; valid until the next call of set_params */
   const char *(*why)(const void *self, uint32_t row);
 } dfm_idle;
-/* Extension "dfm.limited/1" of a model: cells so far from their shape that the model limits their
- * stiffness there. */
+/* Extension "dfm.limited/1" of a model: cells so distorted that the model limits their stiffness. */
 #define DFM_EXT_LIMITED "dfm.limited/1"
 typedef struct dfm_limited {
   uint32_t size, reserved;
   /* [step] as counted by the last call of bound */
   uint32_t (*count)(const void *self);
 } dfm_limited;
-/* Extension "dfm.caps/1" of a model: those of dfm_model.caps that hold with the instance's present
- * parameters, where some choice of them takes one away. A host asks after create and after set_params, and
- * goes by the answer: without CAP_ENERGY the body's energy is neither told nor watched. set_params is refused
- * and taken back where an implicit step needs what it would take away. dfm_mesh.rest goes by dfm_model.caps,
- * since there is no instance yet. */
+/* Extension "dfm.caps/1" of a model: the bits of dfm_model.caps that are valid with the present parameters of
+ * the instance, if some parameters remove one. A host reads them after create and after set_params. Without
+ * CAP_ENERGY the body's energy is neither reported nor watched. set_params is refused and undone if it
+ * removes a capability that an implicit step needs. dfm_mesh.rest follows dfm_model.caps, since there is no
+ * instance yet. */
 #define DFM_EXT_CAPS "dfm.caps/1"
 typedef struct dfm_caps {
   uint32_t size, reserved;
   uint32_t (*active)(const void *self); /* [setup] DFM_CAP_*, until the next call of set_params */
 } dfm_caps;
 /* Extension "dfm.effect_rows/1" of a model: the parameters that switch its effects off. An effect without a
- * row is the model's own, or the body's. A world whose list of effects lacks one makes the model with these
+ * row cannot be switched off. If an effect is not in the world's list, the world creates the model with these
  * values. */
 #define DFM_EXT_EFFECT_ROWS "dfm.effect_rows/1"
 typedef struct dfm_effect_row {
   const char *effect;       /* one of dfm_type.effects */
   uint32_t param, reserved; /* row of dfm_type.params, one wide */
-  double off;               /* the effect is off where each of its rows has this value */
+  double off;               /* the effect is off if each of its rows has this value */
 } dfm_effect_row;
 typedef struct dfm_effect_rows {
   uint32_t size, row_size, n, reserved;
   const dfm_effect_row *rows; /* [n] rows of row_size bytes; constant */
 } dfm_effect_rows;
-/* Extension "dfm.facts/1" of a model: numbers that the instance found when it was made and that its user
- * should know. Told by `deform explain` and the summary of a run. */
+/* Extension "dfm.facts/1" of a model: numbers that the instance computed at creation, for the user. `deform
+ * explain` and the summary of a run show them. */
 #define DFM_EXT_FACTS "dfm.facts/1"
 typedef struct dfm_fact {
   const char *key, *label, *unit; /* "modes", "modes that the body has", "1" */
@@ -352,28 +352,28 @@ enum { DFM_SOLVER_DIRECT = 1 /* exact up to rounding, whatever x holds and the t
 typedef struct dfm_solver { /* all functions are required */
   uint32_t size, flags;     /* DFM_SOLVER_* */
   /* [setup] a matrix of n points: pairs ij[nb,2], i <= j, each pair once, each point with itself, in any
-   * order; borrowed during the call. Not DFM_OK: self is not read, what was made is freed */
+   * order; borrowed during the call. On failure self is not read, and analyse has freed its memory */
   dfm_status (*analyse)(const dfm_host *h, uint32_t n, uint32_t nb, const uint32_t *ij, void **self);
   /* [step] values blk[nb,9], row-major, in that order; block (j, i) is the transpose of (i, j); borrowed
    * during the call. DFM_DISCARD: the matrix is not positive definite. */
   dfm_status (*factor)(void *self, const double *blk);
-  /* [step] after a factor() that gave DFM_OK: b, x [nrhs,n,3], not overlapping; starts from x, ends where the
-   * residual is tolerance times that of x = 0. DFM_DISCARD: it did not get there, x is its best. */
+  /* [step] after a factor() that returned DFM_OK: b, x [nrhs,n,3], not overlapping; starts from x, ends when
+   * the residual is tolerance times that of x = 0. DFM_DISCARD: not reached, x is the best found. */
   dfm_status (*solve)(void *self, uint32_t nrhs, const double *b, double *x, double tolerance);
   /* [setup] */
   void (*release)(void *self);
 } dfm_solver;
 /* ---- entry: the one symbol a plugin exports ------------------------------------------------------- */
-/* Does this host speak the ABI that the plugin is compiled for? Its entry returns NULL where it does not.
- * Nothing of dfm_host behind log may be read before that is known. */
+/* Whether this host supports the ABI that the plugin is compiled for. The entry of the plugin returns NULL if
+ * not. Before this check no member of dfm_host after log may be read. */
 #define DFM_ABI_OK(h)                                    \
   ((h)->abi == DFM_ABI ? (h)->abi_draft == DFM_ABI_DRAFT \
                        : (h)->abi > DFM_ABI && (h)->abi_min != 0u && (h)->abi_min <= DFM_ABI)
-/* The entry is called once for each context that loads the file, and shutdown once for each entry that gave
- * a plugin, while other contexts go on. A process runs one of these calls at a time, whatever its threads do,
- * so none of them may wait for another thread that loads or unloads. What the entry returns is constant and
- * stays as long as the file is loaded, and no host is kept in a static: each instance has its own, which is
- * valid until that shutdown has returned. */
+/* The entry is called once for each context that loads the file, and shutdown once for each entry that
+ * returned a plugin; other contexts may run meanwhile. A process runs one of these calls at a time, so none
+ * of them may wait for another thread that loads or unloads plugins. The result of the entry is constant and
+ * valid while the file is loaded. Do not store a host in a static variable: each instance has its own, which
+ * is valid until that shutdown has returned. */
 typedef struct dfm_plugin {
   uint32_t size, abi, abi_draft, ntype; /* DFM_ABI, DFM_ABI_DRAFT */
   const dfm_type *const *types;         /* [ntype] array of pointers, so dfm_type may grow */
