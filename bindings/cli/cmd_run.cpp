@@ -163,7 +163,10 @@ class Runner {
                     " steps used so much of their budget that they went without polish, sweeps or guard "
                     "pieces (max_work, max_time)");
     if (stats.unconverged > 0)
-      out.push_back("the contact solve met its cap in " + std::to_string(stats.unconverged) + " sub-steps");
+      out.push_back("the contact solve stopped at its limit of sweeps in " +
+                    std::to_string(stats.unconverged) + " of " + std::to_string(stats.substeps) +
+                    " sub-steps (solver.residual_max is the largest error): take a shorter step, add damping "
+                    "to the material, or lower the ratio of masses or stiffnesses");
     // a start that is asked for may be inside out and cross itself; what is left of it at the end is told
     if (spoiled_ && checks().inverted_last > 0)
       out.push_back(std::to_string(checks().inverted_last) +

@@ -177,7 +177,7 @@ DFM_API dfm_status dfm_rigid_destroy(dfm_rigid rigid);
 /** All rigid bodies in order of creation, except the parts of tools (dfm_tool_parts); capacity 0 with out
  * NULL only counts. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_rigids(dfm_world world, uint32_t capacity, dfm_rigid *out, uint32_t *n);
-/** dfm_rigid_get_state of all bodies in one call, in the order of dfm_world_rigids. Much cheaper than one call
+/** dfm_rigid_get_state of all bodies in one call, in the order of dfm_world_rigids: much cheaper than a call
  * for each body.
  * @param capacity  length of states, and of rigids; 0 with states NULL only counts
  * @param rigids    out, the body of each state; may be NULL

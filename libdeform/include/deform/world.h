@@ -119,7 +119,7 @@ enum {
   /* dt is above the stable step: sub-steps were taken or, with DFM_DISCARD, more than max_substeps would be
    * needed. Use a softer material, a coarser mesh or a shorter step, or accept the cost */
   DFM_TROUBLE_SUBSTEPS = 1,
-  DFM_TROUBLE_UNCONVERGED = 2, /* the contact solve reached its cap: raise max_sweeps, or lower mass ratios */
+  DFM_TROUBLE_UNCONVERGED = 2, /* the contact solve stopped at max_sweeps: raise it, or lower mass ratios */
   /* a plugin or a load produced a NaN or a velocity above the speed of light: the last good sub-step is kept
    * (DFM_E_DIVERGED) */
   DFM_TROUBLE_NONFINITE = 4,
