@@ -313,6 +313,7 @@ class Runner {
     }
     ++result_.steps;
     trouble_ |= trouble;
+    scene_.renew_list();
     impulses_.add_step();
     sensors_.add_step();
     tools_.add_step(step);

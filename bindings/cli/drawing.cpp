@@ -65,6 +65,14 @@ render::Bounds Drawing::place_of_bodies() const {
 
 void Drawing::add_bodies(render::Scene &out) {
   float top = 0;
+  scene_.renew_list();
+  buffers_.resize(std::min(buffers_.size(), scene_.bodies().size()));
+  while (buffers_.size() < scene_.bodies().size()) {  // pieces of a cut
+    const BodyView &body = scene_.bodies()[buffers_.size()];
+    Buffers &b = buffers_.emplace_back();
+    make(body, b);
+    if (color_ == "stress") b.stress.emplace(body, b.xyz);
+  }
   for (size_t i = 0; i < buffers_.size(); ++i) {
     const BodyView &body = scene_.bodies()[i];
     scene_.renew(i);

@@ -79,11 +79,11 @@ Outputs::Outputs(const SceneFile &scene, const std::string &folder)
     index_ = std::make_unique<Csv>(folder + "/states/index.csv", "index,t");
   }
   last_time_ = dfm_world_time(scene.world());
-  last_impulse_.assign(3 * (scene.bodies().size() + scene.rigids().size()), 0.0);
   for (size_t b = 0; b < scene.bodies().size() && s.nodes; ++b) nodes_.push_back(file_nodes(b));
 }
 
 void Outputs::record() {
+  scene_.renew_list();
   const double t = dfm_world_time(scene_.world());
   write_bodies(t);
   if (contacts_) write_contacts(t);
@@ -99,21 +99,22 @@ void Outputs::record() {
   last_time_ = t;
 }
 
-// b: place among the soft bodies and the rigid ones after them.
-void Outputs::write_body(double t, const std::string &name, const dfm_body_measure &m, size_t b) {
+// handle: of a soft or a rigid body.
+void Outputs::write_body(double t, uint64_t handle, const std::string &name, const dfm_body_measure &m) {
   double force[3] = {0, 0, 0};
+  std::array<double, 3> &last = last_impulse_[handle];
   for (size_t k = 0; k < 3; ++k) {
-    if (t > last_time_) force[k] = (m.contact_impulse[k] - last_impulse_[3 * b + k]) / (t - last_time_);
-    last_impulse_[3 * b + k] = m.contact_impulse[k];
+    if (t > last_time_) force[k] = (m.contact_impulse[k] - last[k]) / (t - last_time_);
+    last[k] = m.contact_impulse[k];
   }
   bodies_.cell(t).cell(name).cells(m.com, 3).cells(m.velocity, 3).cells(m.angular, 3);
   bodies_.cell(m.kinetic).cell(m.elastic).cell(m.volume).cells(force, 3).end_row();
 }
 
 void Outputs::write_bodies(double t) {
-  size_t row = 0;
-  for (const BodyView &body : scene_.bodies()) write_body(t, body.name, body_measure(body), row++);
-  for (const RigidView &rigid : scene_.rigids()) write_body(t, rigid.name, rigid_measure(rigid), row++);
+  for (const BodyView &body : scene_.bodies()) write_body(t, body.handle, body.name, body_measure(body));
+  for (const RigidView &rigid : scene_.rigids())
+    write_body(t, rigid.handle, rigid.name, rigid_measure(rigid));
   bodies_.flush();
 }
 

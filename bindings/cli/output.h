@@ -1,6 +1,8 @@
 // The files of a run: tables row by row, states, nodes.
 #pragma once
+#include <array>
 #include <cstdio>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -46,7 +48,7 @@ class Outputs {
  private:
   FileNodes file_nodes(size_t body) const;
   std::vector<double> node_positions(const BodyView &body, const FileNodes &nodes) const;
-  void write_body(double t, const std::string &name, const dfm_body_measure &m, size_t b);
+  void write_body(double t, uint64_t handle, const std::string &name, const dfm_body_measure &m);
   void write_bodies(double t);
   void write_contacts(double t);
   void write_probes(double t);
@@ -60,8 +62,8 @@ class Outputs {
   std::unique_ptr<Csv> contacts_, probes_, index_;
   uint32_t recorded_ = 0;
   double last_time_ = 0;
-  std::vector<double> last_impulse_;  // [nbody,3]
-  std::vector<FileNodes> nodes_;      // of each body, where the scene asks for them
+  std::map<uint64_t, std::array<double, 3>> last_impulse_;  // N s at the last record, by handle
+  std::vector<FileNodes> nodes_;                            // of each body, where the scene asks for them
   std::vector<dfm_pair_report> pairs_;
 };
 

@@ -104,6 +104,8 @@ void Checker::check(bool start_state) {
   surfaces_.clear();
   double reach = 0;
   bool finite = true;
+  scene_.renew_list();
+  positions_.resize(scene_.bodies().size());
   for (size_t b = 0; b < positions_.size(); ++b) {
     scene_.renew(b);
     const BodyView &body = scene_.bodies()[b];

@@ -1,5 +1,7 @@
 #include "scene_file.h"
 
+#include <algorithm>
+
 #include "costs_file.h"
 #include "messages.h"
 #include "progress.h"
@@ -64,22 +66,8 @@ SceneFile::SceneFile(const Globals &globals, const std::string &path, const std:
   settings_.size = sizeof settings_;
   need(dfm_scene_get_settings(scene_, &settings_));
 
+  renew_list();
   uint32_t n = 0;
-  need(dfm_world_bodies(world_, 0, nullptr, &n));
-  std::vector<dfm_body> handles(n);
-  need(dfm_world_bodies(world_, n, handles.data(), &n));
-  for (const dfm_body handle : handles) {
-    dfm_body_info info = {};
-    info.size = sizeof info;
-    need(dfm_body_get_info(handle, &info));
-    BodyView body;
-    body.handle = handle;
-    body.name = info.name;
-    body.model = info.model;
-    read_shape(info, body);
-    names_[handle] = body.name;
-    bodies_.push_back(std::move(body));
-  }
   need(dfm_world_obstacles(world_, 0, nullptr, &n));
   std::vector<dfm_obstacle> obstacles(n);
   need(dfm_world_obstacles(world_, n, obstacles.data(), &n));
@@ -95,6 +83,27 @@ SceneFile::SceneFile(const Globals &globals, const std::string &path, const std:
   std::vector<dfm_rigid> rigids(n);
   if (n > 0) need(dfm_world_rigids(world_, n, rigids.data(), &n));
   for (const dfm_rigid handle : rigids) rigids_.push_back({handle, names_[handle]});
+}
+
+void SceneFile::renew_list() const {
+  uint32_t n = 0;
+  need(dfm_world_bodies(world_, 0, nullptr, &n));
+  if (n == bodies_.size()) return;
+  std::vector<dfm_body> handles(n);
+  need(dfm_world_bodies(world_, n, handles.data(), &n));
+  bodies_.resize(std::min(bodies_.size(), handles.size()));
+  for (size_t at = bodies_.size(); at < handles.size(); ++at) {
+    dfm_body_info info = {};
+    info.size = sizeof info;
+    need(dfm_body_get_info(handles[at], &info));
+    BodyView body;
+    body.handle = handles[at];
+    body.name = info.name;
+    body.model = info.model;
+    read_shape(info, body);
+    names_[body.handle] = body.name;
+    bodies_.push_back(std::move(body));
+  }
 }
 
 void SceneFile::renew(size_t at) const {

@@ -44,6 +44,9 @@ class SceneFile {
   const std::string &path() const { return path_; }
   const dfm_scene_settings &settings() const { return settings_; }
   const std::vector<BodyView> &bodies() const { return bodies_; }
+  // Lists the bodies of the world again where their number has changed: pieces of a cut come behind the bodies
+  // of the scene, and go again where an earlier state is restored. Cheap enough for every step.
+  void renew_list() const;
   // Reads points, cells and surface of a body anew where a tear has changed them.
   void renew(size_t body) const;
   const std::vector<ObstacleView> &obstacles() const { return obstacles_; }
@@ -61,7 +64,7 @@ class SceneFile {
   mutable std::vector<BodyView> bodies_;
   std::vector<ObstacleView> obstacles_;
   std::vector<RigidView> rigids_;
-  std::map<uint64_t, std::string> names_;
+  mutable std::map<uint64_t, std::string> names_;
 };
 
 }  // namespace cli
