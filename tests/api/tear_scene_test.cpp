@@ -1,6 +1,8 @@
 // The key "tear" of a material, through the command: a bar that is pulled apart.
 #include <unistd.h>
 
+#include <algorithm>
+
 #include "support.h"
 
 namespace {
@@ -24,4 +26,21 @@ double fall(const char *limit) {
 TEST(TearScene, BarBetweenJaws_FallsWhereItTearsAndHangsWhereItDoesNot) {
   EXPECT_GT(fall("0.35"), 0.08) << "on the table";
   EXPECT_LT(fall("10"), 0.05) << "between the jaws";
+}
+
+// Pieces are bodies that the scene does not name: tables, states and the summary have them all the same.
+TEST(TearScene, PiecesOfAnOrange_AreInTheTablesAndStates) {
+  const std::string out = test::scratch("pieces of an orange " + std::to_string(getpid()));
+  const test::CommandResult r = test::deform(
+      {"run", DEFORM_SOURCE_DIR "/tests/bench/orange.json", "--time", "0.4", "--quiet", "--set",
+       "/bodies/0/mesh/cells=800", "--set", R"(/bodies/0/separate={"least_cells": 20, "crumbs": "remove"})",
+       "--set", "/output/states=true", "--set", "/output/every=0.1", "--out", out});
+  ASSERT_EQ(r.exit_code, 0) << r.err;
+  const auto rows = test::read_csv(out + "/bodies.csv");
+  for (const char *piece : {"orange", "orange.1", "orange.2"}) {
+    const auto is = [&](const std::vector<std::string> &row) { return row.at(1) == piece; };
+    EXPECT_TRUE(std::any_of(rows.begin(), rows.end(), is)) << piece;
+    EXPECT_NE(test::read_file(out + "/states/" + piece + "_surface_000004.vtu"), "") << piece;
+    EXPECT_NE(test::read_file(out + "/summary.json").find('"' + std::string(piece) + '"'), std::string::npos);
+  }
 }
