@@ -161,19 +161,8 @@ void set_fraction(World &w, StepContext &step, double fraction) {
 // Two surfaces that cross at the start (as given by the user) are let out: what is through cannot be kept
 // out, and to guard it would keep it in.
 bool cross_at_start(StepContext &step, const Candidate &c) {
-  Guard &g = step.guard;
-  const uint32_t slot_a = c.obstacle ? c.slot_a : std::min(c.slot_a, c.slot_b);
-  const uint32_t slot_b = c.obstacle ? c.slot_b : std::max(c.slot_a, c.slot_b);
-  for (const Guard::Through &t : g.through)
-    if (t.a == slot_a && t.b == slot_b && t.obstacle == bool(c.obstacle)) return t.yes;
-  const Surface &a = *step.body_views[slot_a].surface;
-  const Surface &b = c.obstacle ? *step.obstacle_views[slot_b].surface : *step.body_views[slot_b].surface;
-  bool yes = false;
-  step.broad.near_triangles_of(slot_a, slot_b, c.obstacle, [&](uint32_t s, uint32_t t) {
-    yes = yes || edges_pierce(a, s, b, t) || edges_pierce(b, t, a, s);
-  });
-  g.through.push_back({slot_a, slot_b, bool(c.obstacle), yes});
-  return yes;
+  const bool swap = !c.obstacle && c.slot_b < c.slot_a;
+  return cross_at_start(step, swap ? c.slot_b : c.slot_a, swap ? c.slot_a : c.slot_b, c.obstacle);
 }
 
 // The safe fraction of the way; 1: nothing comes too near.
@@ -230,10 +219,23 @@ bool jammed(const World &w, const StepContext &step) {
 
 }  // namespace
 
+bool cross_at_start(StepContext &step, uint32_t slot_a, uint32_t slot_b, bool obstacle) {
+  Guard &g = step.guard;
+  for (const Guard::Through &t : g.through)
+    if (t.a == slot_a && t.b == slot_b && t.obstacle == obstacle) return t.yes;
+  const Surface &a = *step.body_views[slot_a].surface;
+  const Surface &b = obstacle ? *step.obstacle_views[slot_b].surface : *step.body_views[slot_b].surface;
+  bool yes = false;
+  step.broad.near_triangles_of(slot_a, slot_b, obstacle, [&](uint32_t s, uint32_t t) {
+    yes = yes || edges_pierce(a, s, b, t) || edges_pierce(b, t, a, s);
+  });
+  g.through.push_back({slot_a, slot_b, obstacle, yes});
+  return yes;
+}
+
 // False: trouble, or guard.again: the sub-step is to be taken anew, guard.cut times as long.
 bool stage_guard(World &w, StepContext &step, uint32_t *trouble) {
   step.guard.kept.clear();
-  step.guard.through.clear();
   double safe = 1;
   for (uint32_t solve = 0;; ++solve) {
     if (overloaded(w, step)) {

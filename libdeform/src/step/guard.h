@@ -47,12 +47,16 @@ struct Guard {
 
   void start() {
     kept.clear();
+    through.clear();
     cut = motion = 1;
     acted = again = resolving = false;
   }
   void forget() { memory.forget(); }  // positions or d_c have changed otherwise than by a step
 };
 
+// Do two surfaces cross at the start of the sub-step? Each pair is looked at once in it. slot_a < slot_b
+// where both are slots of bodies.
+bool cross_at_start(StepContext &step, uint32_t slot_a, uint32_t slot_b, bool obstacle);
 // guard_hits.cpp: the earliest hits as contacts of the sub-step, among those that it has.
 void guard_add_hits(World &w, StepContext &step);
 // Leaves out the hits whose contacts the host does not want (PreSolve).

@@ -1,0 +1,67 @@
+// A surface with faces that look inward, as a file gives it whose concave polygons are cut into fans: what
+// comes near such a face from outside is behind it, but has not come through it.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "coupled.h"
+
+namespace {
+
+// A star of ten corners in the plane, 0.12 m high, on the box [0, 0.6] x [0, 0.6]. Its two caps are fans
+// about one corner: some of their triangles lie outside of the star, and some look inward.
+test::Skin fanned_star() {
+  test::detail::Weld w;
+  const auto at = [](int i, double z) {
+    const double r = i % 2 ? 0.12 : 0.3, angle = M_PI * i / 5;
+    return test::detail::Point{0.3 + r * std::cos(angle), 0.3 + r * std::sin(angle), z};
+  };
+  for (int i = 0; i < 10; ++i) {
+    const int j = (i + 1) % 10;
+    w.triangle(at(i, 0), at(j, 0), at(j, 0.12));
+    w.triangle(at(i, 0), at(j, 0.12), at(i, 0.12));
+  }
+  for (int i = 2; i < 10; ++i) {
+    w.triangle(at(0, 0), at(i, 0), at(i - 1, 0));
+    w.triangle(at(0, 0.12), at(i - 1, 0.12), at(i, 0.12));
+  }
+  return w.skin;
+}
+
+}  // namespace
+
+TEST(FoldedSurface, HitByABall_GivesNoEnergy) {
+  test::Context context;
+  const dfm_world world = test::make_world(context, {0, 0, 0});
+  test::set_friction(world, 0.5);
+  const test::Skin skin = fanned_star();
+  const dfm_surface_def surface = skin.def();
+  test::BodyOptions o;
+  o.name = "star";
+  o.surface = &surface;
+  const dfm_body star = test::make_body(context, world, "beam", {0.6, 0.6, 0.12}, 400, o);
+  o.name = "ball";
+  o.surface = nullptr;
+  o.position = {0.4, 0.3, 0.3};
+  o.velocity = {0, 0, -2};
+  const dfm_body ball = test::make_body(context, world, "ball", {0.15, 0, 0}, 400, o);
+  const auto energy = [&] {
+    const dfm_body_measure a = test::measure(star), b = test::measure(ball);
+    return a.kinetic + a.elastic + b.kinetic + b.elastic;
+  };
+  const double before = energy();
+  double most = before;
+  for (int k = 0; k < 300; ++k) {
+    uint32_t trouble = 0;
+    test::ok(dfm_world_step(world, 1e-3, &trouble));
+    most = std::max(most, energy());
+  }
+  const dfm_world_stats s = test::stats(world);
+  std::printf("%g J at first, %g J at most; %g sub-steps, %g without convergence, %g solves of the guard\n",
+              before, most, double(s.substeps), double(s.unconverged), double(s.guard_solves));
+  EXPECT_LT(most, 1.01 * before);
+  EXPECT_LT(s.unconverged, 50u);
+  EXPECT_LT(s.guard_solves, 200u);
+}
