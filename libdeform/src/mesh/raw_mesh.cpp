@@ -1,11 +1,80 @@
 #include "mesh/raw_mesh.h"
 
 #include <algorithm>
+#include <numeric>
+#include <span>
+
+#include "math/vec3.h"
 
 namespace dfm {
 namespace {
 
 constexpr uint32_t kMaxGroups = 1u << 16;  // a file cannot make us keep more names than this
+// Corners of a polygon up to which its ears are looked for, which takes the cube of them at worst.
+constexpr size_t kMostEars = 512;
+constexpr double kRounding = 1e-12;  // of areas, of the polygon's
+
+// Is a triangle of the fan about the first corner turned over? Without memory, for every polygon of a file.
+bool fan_folds(const Array<double> &points, const uint32_t *corners, size_t n) {
+  const auto at = [&](size_t k) { return load3(&points[3 * size_t{corners[k]}]); };
+  const auto twice = [&](size_t k) { return cross(at(k - 1) - at(0), at(k) - at(0)); };
+  Vec3 normal;
+  for (size_t k = 2; k < n; ++k) normal += twice(k);
+  const double least = -kRounding * norm2(normal);
+  for (size_t k = 2; k < n; ++k)
+    if (dot(normal, twice(k)) < least) return true;
+  return false;
+}
+
+// A polygon seen along its normal, for which triangles count with their sign.
+class Outline {
+ public:
+  Outline(const Memory &memory, const Array<double> &points, const uint32_t *corners, size_t n)
+      : corners_(corners, n), at_(HookAllocator<Vec3>(memory)), left_(HookAllocator<uint32_t>(memory)) {
+    at_.reserve(n);
+    for (size_t k = 0; k < n; ++k) at_.push_back(load3(&points[3 * size_t{corners[k]}]));
+    for (size_t k = 2; k < n; ++k) normal_ += cross(at_[k - 1] - at_[0], at_[k] - at_[0]);
+    least_ = kRounding * norm2(normal_);
+  }
+  // emit(a, b, c) for corners of the triangles. What crosses itself has no ears at some time: the rest is cut
+  // into a fan.
+  template <class Emit>
+  void cut(Emit &&emit) {
+    left_.resize(at_.size());
+    std::iota(left_.begin(), left_.end(), 0u);
+    for (size_t at = 1, tried = 0; left_.size() > 3 && tried < left_.size(); ++at, ++tried) {
+      const size_t n = left_.size(), k = at % n;
+      const uint32_t before = left_[(k + n - 1) % n], next = left_[(k + 1) % n];
+      if (!ear(before, left_[k], next)) continue;
+      emit(corners_[before], corners_[left_[k]], corners_[next]);
+      left_.erase(left_.begin() + std::ptrdiff_t(k));
+      at = k;
+      tried = 0;
+    }
+    for (size_t k = 2; k < left_.size(); ++k)
+      emit(corners_[left_[0]], corners_[left_[k - 1]], corners_[left_[k]]);
+  }
+
+ private:
+  double area(uint32_t a, uint32_t b, uint32_t c) const {
+    return dot(normal_, cross(at_[b] - at_[a], at_[c] - at_[a]));
+  }
+  // A triangle that looks the polygon's way, with no other corner in it.
+  bool ear(uint32_t a, uint32_t b, uint32_t c) const {
+    if (!(area(a, b, c) > least_)) return false;
+    return std::none_of(left_.begin(), left_.end(), [&](uint32_t p) {
+      const auto is = [&](uint32_t q) { return norm2(at_[p] - at_[q]) == 0; };
+      return !is(a) && !is(b) && !is(c) && area(a, b, p) >= -least_ && area(b, c, p) >= -least_ &&
+             area(c, a, p) >= -least_;
+    });
+  }
+
+  std::span<const uint32_t> corners_;
+  Array<Vec3> at_;
+  Array<uint32_t> left_;
+  Vec3 normal_;
+  double least_ = 0;
+};
 
 }  // namespace
 
@@ -53,7 +122,12 @@ void RawMesh::add_triangle(const Cursor &at, uint32_t a, uint32_t b, uint32_t c,
 }
 
 void RawMesh::add_polygon(const Cursor &at, const uint32_t *corners, size_t n, uint32_t in_group) {
-  for (size_t k = 2; k < n; ++k) add_triangle(at, corners[0], corners[k - 1], corners[k], in_group);
+  const auto add = [&](uint32_t a, uint32_t b, uint32_t c) { add_triangle(at, a, b, c, in_group); };
+  const auto known = [&](uint32_t corner) { return corner < npoint(); };
+  const bool small = n > 3 && n <= kMostEars && std::all_of(corners, corners + n, known);
+  if (small && fan_folds(points, corners, n)) Outline(*memory, points, corners, n).cut(add);
+  else
+    for (size_t k = 2; k < n; ++k) add(corners[0], corners[k - 1], corners[k]);
   if (in_group != kNoGroup)
     groups[in_group].points.insert(groups[in_group].points.end(), corners, corners + n);
 }

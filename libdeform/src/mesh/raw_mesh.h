@@ -42,8 +42,8 @@ struct RawMesh {
   uint32_t named_group(const Cursor &at, int32_t dimension, std::string_view name);
 
   void add_tet(const Cursor &at, const uint32_t corners[4], uint32_t in_group);
-  // n >= 3 corners around a face, cut into the n-2 triangles of a fan about the first: right for
-  // convex polygons.
+  // n >= 3 corners around a face, cut into n-2 triangles: a fan about the first where none of them looks
+  // the other way, else ears. A fan always where a corner is not known yet, or there are more than 512.
   void add_polygon(const Cursor &at, const uint32_t *corners, size_t n, uint32_t in_group);
   // Triangles (i, i+1, i+2), every second one turned.
   void add_strip(const Cursor &at, const uint32_t *corners, size_t n, uint32_t in_group);

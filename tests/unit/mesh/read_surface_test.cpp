@@ -114,6 +114,46 @@ TEST(ReadSurface, PolygonOfNCorners_IsAFanOfNMinusTwoTriangles) {
   }
 }
 
+// Twice the area of a plane polygon's triangles, with its sign.
+std::vector<double> doubled_areas(const RawMesh &raw) {
+  std::vector<double> out;
+  for (uint32_t t = 0; t < raw.ntri(); ++t) {
+    const auto p = [&](uint32_t k, uint32_t axis) { return raw.points[3 * raw.tris[3 * t + k] + axis]; };
+    out.push_back((p(1, 0) - p(0, 0)) * (p(2, 1) - p(0, 1)) - (p(2, 0) - p(0, 0)) * (p(1, 1) - p(0, 1)));
+  }
+  return out;
+}
+
+TEST(ReadSurface, PolygonThatIsNotConvex_IsCutWithoutAFold) {
+  for (int corners = 4; corners <= 40; corners += 2) {
+    std::string text, face = "f";
+    double doubled = 0, last[2] = {0.1, 0};
+    for (int k = 0; k <= corners; ++k) {  // a star, from an inner corner on
+      const double r = k % 2 ? 0.3 : 0.1, angle = 2 * M_PI * (k % corners) / corners;
+      const double x = r * std::cos(angle), y = r * std::sin(angle);
+      doubled += last[0] * y - last[1] * x;
+      last[0] = x;
+      last[1] = y;
+      if (k == corners) break;
+      text += "v " + std::to_string(x) + " " + std::to_string(y) + " 0\n";
+      face += " " + std::to_string((k + corners - 1) % corners + 1);
+    }
+    const RawMesh raw = parse("a.obj", text + face + "\n");
+    ASSERT_EQ(raw.ntri(), uint32_t(corners - 2));
+    double sum = 0;
+    for (const double a : doubled_areas(raw)) {
+      EXPECT_GT(a, 0) << corners << " corners";
+      sum += a;
+    }
+    EXPECT_NEAR(sum, doubled, 1e-5) << corners << " corners";
+  }
+}
+
+TEST(ReadSurface, PolygonThatCrossesItself_IsCutAllTheSame) {
+  const RawMesh raw = parse("a.obj", "v 0 0 0\nv 2 1 0\nv 2 0 0\nv 0 1 0\nv -1 0.5 0\nf 1 2 3 4 5\n");
+  EXPECT_EQ(raw.ntri(), 3u);
+}
+
 TEST(ReadSurface, ObjRefusals_NameLineAndReason) {
   const std::string v = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
   expect_refusal("a.obj", v + "f 1 2 0\n", DFM_E_FORMAT, {"a.obj:4:", "vertex 0", "from 1"});
