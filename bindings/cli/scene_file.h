@@ -44,8 +44,8 @@ class SceneFile {
   const std::string &path() const { return path_; }
   const dfm_scene_settings &settings() const { return settings_; }
   const std::vector<BodyView> &bodies() const { return bodies_; }
-  // Lists the bodies of the world again where their number has changed: pieces of a cut come behind the bodies
-  // of the scene, and go again where an earlier state is restored. Cheap enough for every step.
+  // Lists the bodies of the world again if their number has changed: pieces of a cut come behind the bodies
+  // of the scene, and are gone after an earlier state has been restored. Cheap enough for every step.
   void renew_list() const;
   // Reads points, cells and surface of a body anew where a tear has changed them.
   void renew(size_t body) const;
