@@ -4,6 +4,8 @@
 #include <cmath>
 
 #include "contact/reach.h"
+#include "geometry/area.h"
+#include "geometry/closest.h"
 #include "narrow/narrow_phase.h"
 #include "state/world.h"
 #include "step/context.h"
@@ -16,8 +18,14 @@ namespace {
 // away, except where surfaces start nearer.
 constexpr double kClearly = 0.25;
 
-// Side a's weights are not negative and side b's not positive: no feature is taken for longer than it is.
-bool within(const StepContext &step, const ContactPoint &c) {
+const Surface &surface_b(const StepContext &step, const ContactPoint &c) {
+  return c.obstacle ? *step.obstacle_views[c.slot_b].surface : *step.body_views[c.slot_b].surface;
+}
+
+bool of_surfel_and_face(const ContactPoint &c) { return c.obstacle ? c.type_a != 1 : c.kind == kVertexFace; }
+
+// Of two bodies: do the edges cross between their ends? None is then taken for longer than it is.
+bool edges_cross(const StepContext &step, const ContactPoint &c) {
   const BodyView &a = step.body_views[c.slot_a];
   for (uint32_t k = 0; k < c.nnode; ++k) {
     const bool of_a = c.node[k] - a.first_node < a.surface->nsurfel;
@@ -26,31 +34,44 @@ bool within(const StepContext &step, const ContactPoint &c) {
   return true;
 }
 
-// A surfel's contact with a face, on the side of the face where the surfel is. False: out of reach.
+// A contact of a surfel and a face, on the side of the face where the surfel is. False: the surfel is not
+// over the face itself, or out of reach.
 bool turn_over(const StepContext &step, double offset, ContactPoint &c) {
-  const BodyView &a = step.body_views[c.slot_a], &b = step.body_views[c.slot_b];
-  const Vec3 v = load3(&a.surface->v[4 * size_t{c.feature_a}]);
+  const Surface &a = *step.body_views[c.slot_a].surface, &b = surface_b(step, c);
+  const bool face_of_a = c.type_a == 2;
+  const Surface &points = face_of_a ? b : a, &faces = face_of_a ? a : b;
+  const uint32_t surfel = face_of_a ? c.feature_b : c.feature_a;
+  const uint32_t *const corner = &faces.tri[3 * size_t{face_of_a ? c.feature_a : c.feature_b}];
+  const auto x = [](const Surface &s, uint32_t i) { return load3(&s.x[4 * size_t{i}]); };
+  const auto v = [](const Surface &s, uint32_t i) { return load3(&s.v[4 * size_t{i}]); };
+  if (closest_on_triangle(x(points, surfel), x(faces, corner[0]), x(faces, corner[1]), x(faces, corner[2]))
+          .feature != TriangleFeature::face)
+    return false;
   double speed2 = 0;
-  for (uint32_t k = 1; k < c.nnode; ++k)
-    speed2 = std::max(speed2, norm2(v - load3(&b.surface->v[4 * size_t{c.node[k] - b.first_node}])));
+  for (int k = 0; k < 3; ++k) speed2 = std::max(speed2, norm2(v(points, surfel) - v(faces, corner[k])));
   c.distance = -c.distance;
   store3(c.normal, -load3(c.normal));
+  if (!face_of_a) c.area = (c.obstacle ? 1 : 0.5) * facing_area(a, surfel, -load3(c.normal));
   return c.distance < contact_reach(step.h, offset, std::sqrt(speed2));
 }
 
-// Where two bodies do not cross, nothing has come through a surface. What is behind a face lies outside all
-// the same: the face looks inward, because its surface is folded through itself. To lead it out through the
-// face is what the guard prevents, and the impulses of the two would grow without bound
+// Where two surfaces do not cross, nothing has come through one of them. What is behind a face lies outside
+// all the same: the face looks inward, because its surface is folded through itself. To lead it out through
+// the face is what the guard prevents, and the impulses of the two would grow without bound
 // (doc/decisions/0413-depths-that-cannot-be.md).
 void turn_false_depths(World &w, StepContext &step) {
   if (!w.plan.has(StageRole::guards)) return;
   const auto is_false = [&](const ContactPoint &c) {
-    return !c.obstacle && c.distance < -kClearly * w.offset && (c.kind == kVertexFace || within(step, c)) &&
+    if (!(c.distance < -kClearly * w.offset)) return false;
+    if (c.obstacle) {
+      if (step.obstacle_views[c.slot_b].shape != Shape::mesh || !of_surfel_and_face(c)) return false;
+      return !cross_at_start(step, c.slot_a, c.slot_b, true);
+    }
+    return (of_surfel_and_face(c) || edges_cross(step, c)) &&
            !cross_at_start(step, std::min(c.slot_a, c.slot_b), std::max(c.slot_a, c.slot_b), false);
   };
   std::erase_if(step.contacts, [&](ContactPoint &c) {
-    if (!is_false(c)) return false;
-    return c.kind != kVertexFace || !within(step, c) || !turn_over(step, w.offset, c);
+    return is_false(c) && !(of_surfel_and_face(c) && turn_over(step, w.offset, c));
   });
 }
 
