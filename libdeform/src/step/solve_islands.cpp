@@ -166,11 +166,12 @@ void settle(const World &w, StepContext &step, SolveIsland &own, double &best) {
 }
 
 // Whether velocities still move is asked after every so many sweeps, once the polish is over, and of laws
-// without memory: what is left over stretches bristles.
+// without memory: what is left over stretches bristles. Not while an equilibrium is searched for, which is as
+// good as its contacts.
 constexpr uint32_t kAskStands = 4;
-bool asks_redundant(const StepContext &step, SolveIsland &own) {
+bool asks_redundant(const World &w, const StepContext &step, SolveIsland &own) {
   return own.revises && own.sweeps >= kPolish && own.sweeps % kAskStands == 0 && !own.batches.remembers() &&
-         own.redundant.found(step.rows, own.part);
+         !w.prescribed.stands() && own.redundant.found(step.rows, own.part);
 }
 
 // Sweeps on the laws as they were last answered. At the cap the best state seen is taken, not the last one.
@@ -199,7 +200,7 @@ void sweep_until_good(const World &w, StepContext &step, SolveIsland &own) {
     }
     if (!may_sweep(w, step, own, left, cap)) break;
     // what stands is seen from one plain sweep to the next
-    asks = asks_redundant(step, own);
+    asks = asks_redundant(w, step, own);
     own.acceleration.follow(rows, own.part, !asks);
   }
   if (std::isinf(best)) return;
