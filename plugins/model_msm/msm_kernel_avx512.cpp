@@ -110,6 +110,21 @@ DEFORM_INLINE void cross(const Edges8 &a, const Edges8 &b, Edges8 &out) {
   out.z = minor2(a.x, b.y, a.y, b.x);
 }
 
+// Of eight cells: edges from their first corners, and for each the vector product of the other two.
+struct Shape8 { Edges8 e1, e2, e3, g1, g2, g3; };
+DEFORM_INLINE Shape8 shape8(const Block &b, const Cell *c) {
+  const __m512d o0 = corner(b, c, 0, 0), o1 = corner(b, c, 1, 0), o2 = corner(b, c, 2, 0),
+                o3 = corner(b, c, 3, 0);
+  Shape8 s;
+  gather_edges(b, c, 1, o0, o1, o2, o3, s.e1);
+  gather_edges(b, c, 2, o0, o1, o2, o3, s.e2);
+  gather_edges(b, c, 3, o0, o1, o2, o3, s.e3);
+  cross(s.e2, s.e3, s.g1);
+  cross(s.e3, s.e1, s.g2);
+  cross(s.e1, s.e2, s.g3);
+  return s;
+}
+
 struct Forces { __m512d f0, f1, f2, f3; };  // of cells k and k + 4 at one corner
 DEFORM_INLINE void forces_at(__m512d pressure, const Edges8 &g, Forces &f) {
   f.f0 = _mm512_mul_pd(pressure, g.x);
@@ -195,17 +210,7 @@ DEFORM_INLINE void stretched_forces(const Block &b, uint32_t t, __m512d q, __m51
 static void volume_cells8(const Block &b) {
   for (uint32_t t = 0; t < b.cells; t += 8) {
     const Cell *c = b.cell + t;
-    const __m512d o0 = corner(b, c, 0, 0);
-    const __m512d o1 = corner(b, c, 1, 0);
-    const __m512d o2 = corner(b, c, 2, 0);
-    const __m512d o3 = corner(b, c, 3, 0);
-    Edges8 e1, e2, e3, g1, g2, g3;
-    gather_edges(b, c, 1, o0, o1, o2, o3, e1);
-    gather_edges(b, c, 2, o0, o1, o2, o3, e2);
-    gather_edges(b, c, 3, o0, o1, o2, o3, e3);
-    cross(e2, e3, g1);
-    cross(e3, e1, g2);
-    cross(e1, e2, g3);
+    auto [e1, e2, e3, g1, g2, g3] = shape8(b, c);
     const __m512d volume6 = dot(e1, g1);
     const __m512d q = squares(e1, e2, e3);
     __m512d pressure = _mm512_set1_pd(1);
@@ -291,17 +296,7 @@ static void cell_rows8(const Block &b) {
   uint32_t limited = 0;
   for (uint32_t t = 0; t < b.cells; t += 8) {
     const Cell *c = b.cell + t;
-    const __m512d o0 = corner(b, c, 0, 0);
-    const __m512d o1 = corner(b, c, 1, 0);
-    const __m512d o2 = corner(b, c, 2, 0);
-    const __m512d o3 = corner(b, c, 3, 0);
-    Edges8 e1, e2, e3, g1, g2, g3;
-    gather_edges(b, c, 1, o0, o1, o2, o3, e1);
-    gather_edges(b, c, 2, o0, o1, o2, o3, e2);
-    gather_edges(b, c, 3, o0, o1, o2, o3, e3);
-    cross(e2, e3, g1);
-    cross(e3, e1, g2);
-    cross(e1, e2, g3);
+    auto [e1, e2, e3, g1, g2, g3] = shape8(b, c);
     const Edges8 a = minus(e2, e1), d = minus(e3, e2), h = minus(e1, e3);
     const __m512d long1 = _mm512_max_pd(dot(e1, e1), dot(e2, e2)),
                   long2 = _mm512_max_pd(dot(e3, e3), dot(a, a));

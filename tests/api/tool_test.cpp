@@ -1,20 +1,12 @@
 // Tools: what they give to bodies is what they feel, they go where they are put, and their life in a world.
 #include <cstring>
 
-#include "deform/tool.h"
-#include "rigid.h"
+#include "tool.h"
 
 namespace {
 
+using namespace test::tools;
 using test::Vec;
-
-Vec cross(Vec a, Vec b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-Vec rotate(const double q[4], Vec v) {
-  const Vec u = {q[0], q[1], q[2]}, t = cross(u, v), s = cross(u, t);
-  return {v[0] + 2 * (q[3] * t[0] + s[0]), v[1] + 2 * (q[3] * t[1] + s[1]), v[2] + 2 * (q[3] * t[2] + s[2])};
-}
 
 dfm_tool_def tool_def(const char *name, uint32_t shape, Vec at) {
   dfm_tool_def d = dfm_tool_def_default();
@@ -22,17 +14,6 @@ dfm_tool_def tool_def(const char *name, uint32_t shape, Vec at) {
   d.shape = shape;
   for (int k = 0; k < 3; ++k) d.pose.position[k] = at[size_t(k)];
   return d;
-}
-dfm_tool make(dfm_world w, const dfm_tool_def &d) {
-  dfm_tool t = 0;
-  test::ok(dfm_tool_create(w, &d, &t));
-  return t;
-}
-dfm_tool_state state(dfm_tool t) {
-  dfm_tool_state s{};
-  s.size = sizeof s;
-  test::ok(dfm_tool_get_state(t, &s));
-  return s;
 }
 
 // Force and torque on the tool in the world's axes, and where its origin is.

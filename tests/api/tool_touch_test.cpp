@@ -1,18 +1,11 @@
 // Tools that touch each other and rigid bodies: forces, both momenta, energy, and no way through.
-#include "deform/tool.h"
-#include "rigid.h"
+#include "tool.h"
 
 namespace {
 
+using namespace test::tools;
 using test::Vec;
 
-Vec cross(Vec a, Vec b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-Vec rotate(const double q[4], Vec v) {
-  const Vec u = {q[0], q[1], q[2]}, t = cross(u, v), s = cross(u, t);
-  return {v[0] + 2 * (q[3] * t[0] + s[0]), v[1] + 2 * (q[3] * t[1] + s[1]), v[2] + 2 * (q[3] * t[2] + s[2])};
-}
 dfm_pose pose(Vec at, Vec axis = {0, 0, 1}, double angle = 0) {
   const double s = std::sin(0.5 * angle) / test::norm(axis);
   return {{at[0], at[1], at[2]}, {s * axis[0], s * axis[1], s * axis[2], std::cos(0.5 * angle)}};
@@ -35,17 +28,6 @@ dfm_tool_def shape_def(const char *name, uint32_t shape, dfm_pose at, Spring spr
   d.damping = 2 * spring.damping * std::sqrt(spring.way * d.mass);
   d.turn_damping = 2 * spring.damping * std::sqrt(spring.turn * d.inertia);
   return d;
-}
-dfm_tool make(dfm_world w, const dfm_tool_def &d) {
-  dfm_tool t = 0;
-  test::ok(dfm_tool_create(w, &d, &t));
-  return t;
-}
-dfm_tool_state state(dfm_tool t) {
-  dfm_tool_state s{};
-  s.size = sizeof s;
-  test::ok(dfm_tool_get_state(t, &s));
-  return s;
 }
 
 // What acts on the tool, about the world's origin.
