@@ -25,11 +25,23 @@ struct WholeBody {
   SurfaceZones zones;
 };
 
+// On which side of a blade's way the middle of a cell lies. ahead: of the edge, so far; passed: as the edge
+// came past it; behind: the edge as it began.
+enum class SideKind : uint32_t { none = 0, ahead = 1, passed = 2, behind = 3 };
+struct BladeSide {
+  uint32_t cell;
+  SideKind kind;
+  double along, way, off;  // along the edge, 0 to 1; m on the blade's way; m from it
+};
+
 // Where a blade's edge has come to, and the body's points at that time: the blade's next way is taken
 // relative to the body's own.
 struct BladeTrack {
-  double edge[6] = {};  // m
-  Array<double> x;      // [npoint,4] m
+  double edge[6] = {};     // m
+  Array<double> x;         // [npoint,4] m
+  Vec3 lead;               // m, way of late; zero where the blade itself says where it looks
+  double way[2] = {};      // m, that both ends have come
+  Array<BladeSide> sides;  // of cells near it, ascending
 };
 
 struct CutRecord {

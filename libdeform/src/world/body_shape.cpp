@@ -182,9 +182,17 @@ std::unique_ptr<BodyShape> part_of(const Body &b, const CutMesh &mesh, Array<uin
   if (!b.anchor.empty()) take_rows(b.anchor, mesh.point, kStride, out.anchor);
   for (const BladeTrack &t : b.blades) {
     BladeTrack &track = out.blades.emplace_back();
-    use_memory(m, track.x);
+    use_memory(m, track.x, track.sides);
     std::copy_n(t.edge, 6, track.edge);
+    track.lead = t.lead;
+    std::copy_n(t.way, 2, track.way);
     take_rows(t.x, mesh.point, kStride, track.x);
+    for (BladeSide side : t.sides) {
+      const auto at = std::lower_bound(mesh.cell.begin(), mesh.cell.end(), side.cell);
+      if (at == mesh.cell.end() || *at != side.cell) continue;
+      side.cell = uint32_t(at - mesh.cell.begin());
+      track.sides.push_back(side);
+    }
   }
   take_cells(m, b.share, b.makeup, mesh, out);
   make_skin(m, mesh, out);

@@ -14,6 +14,7 @@
 #include "state/world.h"
 #include "step/method.h"
 #include "step/stages.h"
+#include "world/blade_sweep.h"
 #include "world/body_shape.h"
 #include "world/carry_state.h"
 #include "world/change_energy.h"
@@ -203,118 +204,11 @@ CutReport remove_by_shape(Body &b, const CutShape &shape, uint32_t most) {
   return out;
 }
 
-namespace {
-
-constexpr size_t kMostTracks = 4;  // blades that cut a body by turns
-
-Vec3 middle_of(const Body &b, const double *x, uint32_t cell) {
-  const auto at = [&](size_t k) { return load3(x + size_t{kStride} * b.tets[size_t{4} * cell + k]); };
-  return 0.25 * ((at(0) + at(1)) + (at(2) + at(3)));
-}
-
-// What takes the line from a to b, as it was, to where it is: the smallest rotation, and a scale. Calls of a
-// moving blade share an edge; each face sees it at the same place in both, in the frame of its own line, so
-// the ways of all calls are one surface there, without a gap for a body that moves in between.
-class LineMotion {
- public:
-  LineMotion(Vec3 a0, Vec3 b0, Vec3 a1, Vec3 b1) : from_(0.5 * (a0 + b0)), to_(0.5 * (a1 + b1)) {
-    const double l0 = norm(b0 - a0), l1 = norm(b1 - a1);
-    still_ = !(l0 > 0 && l1 > 0) || (norm2(a1 - a0) == 0 && norm2(b1 - b0) == 0);
-    if (still_) return;
-    const Vec3 u = (1 / l0) * (b0 - a0), v = (1 / l1) * (b1 - a1);
-    scale_ = l1 / l0;
-    axis_ = cross(u, v);
-    cosine_ = std::max(dot(u, v), -0.5);
-  }
-  Vec3 operator()(Vec3 p) const {
-    if (still_) return p;
-    const Vec3 r = p - from_;
-    return to_ + scale_ * (cosine_ * r + cross(axis_, r) + (dot(axis_, r) / (1 + cosine_)) * axis_);
-  }
-
- private:
-  Vec3 from_, to_, axis_;
-  double scale_ = 1, cosine_ = 1;
-  bool still_ = true;
-};
-
-double toughness(const Body &b, uint32_t cell) {
-  const Material &m = b.makeup.materials[b.makeup.of.empty() ? 0 : b.makeup.of[cell]];
-  for (size_t i = 0; i < m.extra_keys.size(); ++i)
-    if (m.extra_keys[i] == kToughnessKey) return m.extra_values[i][0];
-  return 0;
-}
-
-// m2, of the face between two cells, with its normal from i to j.
-Vec3 area_between(const Body &b, uint32_t i, uint32_t j, Vec3 way) {
-  Vec3 x[3];
-  size_t n = 0;
-  const uint32_t *const c = &b.tets[size_t{4} * j];
-  for (size_t k = 0; k < 4 && n < 3; ++k)
-    if (const uint32_t p = b.tets[size_t{4} * i + k]; std::find(c, c + 4, p) != c + 4)
-      x[n++] = load3(&b.p.x[size_t{kStride} * p]);
-  const Vec3 area = 0.5 * cross(x[1] - x[0], x[2] - x[0]);
-  return dot(area, way) < 0 ? -area : area;
-}
-
-void keep_track(Body &b, const CutShape &blade, size_t track) {
-  if (track == b.blades.size()) {
-    if (b.blades.size() == kMostTracks) b.blades.erase(b.blades.begin());
-    b.blades.emplace_back();
-    use_memory(b.world->memory(), b.blades.back().x);
-    track = b.blades.size() - 1;
-  }
-  BladeTrack &t = b.blades[track];
-  store3(t.edge, blade.corner[3]);
-  store3(t.edge + 3, blade.corner[2]);
-  t.x.assign(b.p.x.begin(), b.p.x.end());
-}
-
-}  // namespace
-
 CutReport split_by_blade(Body &b, const CutShape &blade, uint32_t most) {
-  const Memory &m = b.world->memory();
-  size_t track = 0;
-  const auto goes_on = [&](const BladeTrack &t) {
-    const auto same = [](Vec3 p, Vec3 q) { return p.x == q.x && p.y == q.y && p.z == q.z; };
-    return same(load3(t.edge), blade.corner[0]) && same(load3(t.edge + 3), blade.corner[1]);
-  };
-  while (track < b.blades.size() && !goes_on(b.blades[track])) ++track;
-  const double *const before = track < b.blades.size() ? b.blades[track].x.data() : b.p.x.data();
-  std::vector<Vec3> middle, was;
-  for (uint32_t c = 0; c < cells_of(b); ++c) {
-    middle.push_back(middle_of(b, b.p.x.data(), c));
-    was.push_back(middle_of(b, before, c));
-  }
-  const auto is_open = [&](uint32_t i, uint32_t j) {
-    return !b.cut.open.empty() &&
-           std::binary_search(b.cut.open.begin(), b.cut.open.end(), open_face(b.cut.cell[i], b.cut.cell[j]));
-  };
-  struct Met {
-    double order;  // along the way of the blade
-    uint64_t face;
-    double work;  // J
-    Vec3 way;     // m, of the edge's middle relative to the face
-    bool operator<(const Met &o) const { return order != o.order ? order < o.order : face < o.face; }
-  };
-  std::vector<Met> met;
-  each_inner_face(m, cells_of(b), b.tets.data(), [&](uint32_t i, uint32_t j) {
-    if (is_open(i, j)) return;
-    CutShape own = blade;
-    const LineMotion moves(was[i], was[j], middle[i], middle[j]);
-    for (int k = 0; k < 2; ++k) own.corner[k] = moves(blade.corner[k]);
-    if (!crosses_blade(own, middle[i], middle[j])) return;
-    const Vec3 *const c = own.corner;
-    const Vec3 way = 0.5 * ((c[3] - c[0]) + (c[2] - c[1])), line = middle[j] - middle[i];
-    const Vec3 across = normalized(cross(c[2] - c[0], c[3] - c[1]));
-    // of the face as the blade sees it: together they are the area that it has passed over, however rough
-    const double area = dot(area_between(b, i, j, line), dot(across, line) < 0 ? -across : across);
-    const double energy = 0.5 * (toughness(b, i) + toughness(b, j));
-    met.push_back({dot(way, middle[i] + middle[j]), open_face(i, j), energy * area, way});
-  });
-  std::sort(met.begin(), met.end());
+  BladeSweep sweep(b, blade, nullptr);
+  const std::vector<SweptFace> &met = sweep.faces;
   const size_t n = most > 0 ? std::min<size_t>(most, met.size()) : met.size();
-  Array<uint64_t> more{HookAllocator<uint64_t>(m)};
+  Array<uint64_t> more{HookAllocator<uint64_t>(b.world->memory())};
   double work = 0;
   Vec3 way;
   for (size_t k = 0; k < n; ++k) {
@@ -326,7 +220,7 @@ CutReport split_by_blade(Body &b, const CutShape &blade, uint32_t most) {
   out.left = static_cast<uint32_t>(met.size() - n);
   out.fracture = work;
   if (norm2(way) > 0) out.force = (-work / norm2(way)) * way;
-  keep_track(b, blade, track);
+  sweep.keep(b);
   return out;
 }
 

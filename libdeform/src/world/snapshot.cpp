@@ -206,9 +206,12 @@ void body_fields(Stream &s, W &w, B &b, const Body &like) {
   s.value("category", b.category, must::any);
   s.value("collides_with", b.collides_with, must::any);
   s.list("blades", b.blades, [&](auto &blade) {
-    s.value("blade's edge", blade.edge,
-            must::Be{[](const double (&e)[6]) { return must::all_finite(e); }, "a finite place"});
+    for (auto &x : blade.edge) s.value("blade's edge", x, must::finite);
     s.array("points at a blade", blade.x, like.p.x.size(), must::finite);
+    s.value("blade's way of late", blade.lead, must::finite);
+    for (auto &way : blade.way) s.value("blade's way", way, must::finite);
+    s.array("sides of a blade", blade.sides, kAnyCount, must::any);
+    s.must_hold("sides of a blade", "those of cells", [&] { return sound(blade.sides, like.tets.size()); });
   });
   s.value("separates", b.separate.on, must::flag);
   s.value("crumbs go", b.separate.removes, must::flag);

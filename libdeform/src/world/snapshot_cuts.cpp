@@ -1,6 +1,7 @@
 #include "world/snapshot_cuts.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 #include "core/error.h"
@@ -66,6 +67,16 @@ CutMesh mesh_of(const Memory &m, const WholeBody &whole) {
 }
 
 }  // namespace
+
+bool sound(const Array<BladeSide> &sides, size_t ncorner) {
+  for (size_t i = 0; i < sides.size(); ++i) {
+    const BladeSide &s = sides[i];
+    if (s.cell >= ncorner / 4 || (i && s.cell <= sides[i - 1].cell) || s.kind > SideKind::behind ||
+        !(std::isfinite(s.along) && std::isfinite(s.way) && std::isfinite(s.off)))
+      return false;
+  }
+  return true;
+}
 
 std::vector<Body *> all_bodies(const World &w) {
   std::vector<Body *> out;

@@ -66,4 +66,7 @@ class SnapshotShapes {
 // All bodies, those without cells too, in id order; not the pieces that a restore has taken back.
 std::vector<Body *> all_bodies(const World &w);
 
+// Of cells of a mesh that has ncorner corners of cells, ascending.
+bool sound(const Array<BladeSide> &sides, size_t ncorner);
+
 }  // namespace dfm

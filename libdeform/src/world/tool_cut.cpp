@@ -1,15 +1,5 @@
-// A blade opens faces along its edge. The quadrilaterals of a step are, in the plane of the blade:
-//
-//      back    +-----------+
-//              |           |        swept   from the edge before the step to the edge now
-//              |           |        strip   from the edge now one edge length of the body's surface back
-//              |:::strip:::|        (in the strip, faces are found that a limit has left, or that a moving
-//      edge    +-----------+        body has carried past the swept quadrilateral)
-//              |///swept///|
-//
-// A face opens where the blade crosses the line between the middles of its cells and the edge moves forward
-// there, seen from the cells. So a blade that stands still or is drawn back cuts nothing, and what leans on
-// it from the side stays whole (decision 0403).
+// A blade opens faces along its edge (world/blade_sweep.h). It looks to where its edge is, so a blade that
+// stands still or is drawn back cuts nothing, and what leans on it from the side stays whole (decision 0403).
 #include "world/tool_cut.h"
 
 #include <algorithm>
@@ -22,14 +12,14 @@
 #include "mesh/cut_mesh.h"
 #include "state/world.h"
 #include "step/stages.h"
+#include "world/blade_sweep.h"
 #include "world/separate.h"
 
 namespace dfm {
 namespace {
 
-constexpr double kTurn = 0.1;  // rad: a solid that turns by more in a step is placed at several poses
-constexpr double kRounding = 64 * 2.220446049250313e-16;  // of a coordinate, in a step
-constexpr int kMostPlaces = 64;                           // of a solid in a step
+constexpr double kTurn = 0.1;    // rad: a solid that turns by more in a step is placed at several poses
+constexpr int kMostPlaces = 64;  // of a solid in a step
 
 struct Box {
   Vec3 lo{HUGE_VAL, HUGE_VAL, HUGE_VAL}, hi{-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
@@ -62,12 +52,6 @@ Box box_of(const Body &b) {
   for (uint32_t i = 0; i < b.p.n; ++i) out.add(load3(&b.p.x[size_t{kStride} * i]));
   return out;
 }
-// The mean of a cell's corners, of positions or velocities.
-Vec3 middle_of(const Body &b, const Array<double> &values, size_t cell) {
-  Vec3 sum[2];
-  for (size_t k = 0; k < 4; ++k) sum[k / 2] += load3(&values[point_of(b, cell, k)]);
-  return 0.25 * (sum[0] + sum[1]);
-}
 
 bool has_edge(const Tool &t) { return t.def.shape == DFM_TOOL_BLADE || t.def.shape == DFM_TOOL_SCISSORS; }
 
@@ -84,109 +68,40 @@ Plate plate_of(const Tool &t, size_t part) {
           {{s * h.x, -s * h.y, h.z}, {s * h.x, -s * h.y, -h.z}}};
 }
 
-class Edge {
- public:
-  Edge(const Tool &t, size_t part, double strip, double dt) {
+// The way of a part's edge in the step, and where its blade looks at the start and at the end.
+struct Edge {
+  CutShape blade;
+  Vec3 forward[2];
+  Edge(const Tool &t, size_t part) {
     const Plate plate = plate_of(t, part);
-    const ToolPlace from = t.cuts.from[part], to = place_of(t.set->state[part]);
-    const auto at = [](const ToolPlace &p, Vec3 x) { return p.position + rotate(p.rotation, x); };
-    for (size_t k = 0; k < 2; ++k) {
-      now_[k] = at(to, plate.edge[k]);
-      const Vec3 before = at(from, plate.edge[k]), behind = at(to, plate.back[k]) - now_[k];
-      const double height = norm(behind);
-      forward_[k] = (-1 / height) * behind;
-      velocity_[k] = (1 / dt) * (now_[k] - before);
-      swept_.corner[k] = before;
-      swept_.corner[3 - k] = now_[k];
-      strip_.corner[k] = now_[k];
-      strip_.corner[3 - k] = now_[k] - std::min(strip, height) * forward_[k];
+    const ToolPlace places[2] = {t.cuts.from[part], place_of(t.set->state[part])};
+    for (size_t i = 0; i < 2; ++i) {
+      const auto at = [&](Vec3 x) { return places[i].position + rotate(places[i].rotation, x); };
+      for (size_t k = 0; k < 2; ++k) blade.corner[i ? 3 - k : k] = at(plate.edge[k]);
+      forward[i] = rotate(places[i].rotation, plate.edge[0] - plate.back[0]);
     }
-    double far = 0;
-    for (const Vec3 x : now_)
-      for (int k = 0; k < 3; ++k) far = std::max(far, std::fabs(x[k]));
-    still_ = kRounding * far / dt;
-    for (const CutShape *s : {&swept_, &strip_})
-      for (const Vec3 x : s->corner) box_.add(x);
+    blade.kind = CutKind::blade;
   }
-  const Box &box() const { return box_; }
-  bool opens(Vec3 a, Vec3 b, Vec3 velocity) const {
-    if (!crosses_blade(swept_, a, b) && !crosses_blade(strip_, a, b)) return false;
-    const double s = along(0.5 * (a + b));
-    const Vec3 edge = velocity_[0] + s * (velocity_[1] - velocity_[0]);
-    return dot(edge - velocity, forward_[0] + s * (forward_[1] - forward_[0])) > still_;
-  }
-  // How far forward a place lies: what the edge meets first is lowest.
-  double order(Vec3 x) const {
-    const double s = along(x);
-    const Vec3 forward = forward_[0] + s * (forward_[1] - forward_[0]);
-    return dot(forward, x - now_[0] - s * (now_[1] - now_[0]));
-  }
-
- private:
-  double along(Vec3 x) const { return closest_on_segment(x, now_[0], now_[1]); }
-  Vec3 now_[2], velocity_[2], forward_[2];
-  double still_;            // m/s, below which a motion is rounding
-  CutShape swept_, strip_;  // corners alone
-  Box box_;
 };
 
-// Cells near the edges alone, since there is a pass over all of them in each step.
-std::vector<uint32_t> cells_near(const Body &b, const std::vector<Edge> &edges) {
-  std::vector<uint32_t> out;
-  const Box whole = box_of(b);
-  if (std::none_of(edges.begin(), edges.end(), [&](const Edge &e) { return e.box().meets(whole); }))
-    return out;
-  // the line between the middles of two cells lies in the box of both
-  Vec3 largest;
-  for (size_t c = 0; c < cells_of(b); ++c) {
-    const Box box = box_of(b, c);
-    for (int k = 0; k < 3; ++k) largest[k] = std::max(largest[k], box.hi[k] - box.lo[k]);
-  }
-  for (size_t c = 0; c < cells_of(b); ++c) {
-    Box box = box_of(b, c);
-    box.grow(largest);
-    if (std::any_of(edges.begin(), edges.end(), [&](const Edge &e) { return e.box().meets(box); }))
-      out.push_back(uint32_t(c));
-  }
-  return out;
-}
-
 // How many faces have opened.
-uint32_t split(const Tool &t, Body &b, double dt) {
-  std::vector<Edge> edges;
-  for (size_t part = t.first_cutting_part(); part < t.motion.parts.size(); ++part)
-    edges.emplace_back(t, part, b.surface.median_edge, dt);
-  const std::vector<uint32_t> near = cells_near(b, edges);
-  if (near.empty()) return 0;
-  const Memory &m = b.world->memory();
-  std::vector<uint32_t> tets;
-  std::vector<Vec3> middle, velocity;
-  for (const uint32_t c : near) {
-    tets.insert(tets.end(), b.tets.begin() + std::ptrdiff_t{4} * c,
-                b.tets.begin() + std::ptrdiff_t{4} * (c + 1));
-    middle.push_back(middle_of(b, b.p.x, c));
-    velocity.push_back(middle_of(b, b.p.v, c));
-  }
-  const auto is_open = [&](uint32_t i, uint32_t j) {
-    return !b.cut.open.empty() &&
-           std::binary_search(b.cut.open.begin(), b.cut.open.end(), open_face(b.cut.cell[i], b.cut.cell[j]));
-  };
-  std::vector<std::pair<double, uint64_t>> met;
-  each_inner_face(m, static_cast<uint32_t>(near.size()), tets.data(), [&](uint32_t i, uint32_t j) {
-    for (const Edge &e : edges) {
-      if (!e.opens(middle[i], middle[j], 0.5 * (velocity[i] + velocity[j])) || is_open(near[i], near[j]))
-        continue;
-      met.push_back({e.order(0.5 * (middle[i] + middle[j])), open_face(near[i], near[j])});
-      return;
+uint32_t split(const Tool &t, Body &b) {
+  uint32_t n = 0;
+  for (size_t part = t.first_cutting_part(); part < t.motion.parts.size(); ++part) {
+    const Edge edge(t, part);
+    BladeSweep sweep(b, edge.blade, edge.forward);
+    if (!sweep.near()) continue;
+    std::vector<SweptFace> &met = sweep.faces;
+    if (t.cuts.most > 0 && met.size() > t.cuts.most - n) met.resize(t.cuts.most - n);
+    if (!met.empty()) {
+      Array<uint64_t> more{HookAllocator<uint64_t>(b.world->memory())};
+      for (const SweptFace &f : met) more.push_back(f.face);
+      open_faces(b, more);
+      n += static_cast<uint32_t>(met.size());
     }
-  });
-  if (met.empty()) return 0;
-  std::sort(met.begin(), met.end());
-  if (t.cuts.most > 0 && met.size() > t.cuts.most) met.resize(t.cuts.most);
-  Array<uint64_t> faces{HookAllocator<uint64_t>(m)};
-  for (const auto &face : met) faces.push_back(face.second);
-  open_faces(b, faces);
-  return static_cast<uint32_t>(met.size());
+    sweep.keep(b);
+  }
+  return n;
 }
 
 // ---- solids ---------------------------------------------------------------------------------------------
@@ -333,7 +248,7 @@ void cut_by_tools(World &w, double dt) {
       const auto at = std::find_if(w.bodies.begin(), w.bodies.end(), [&](auto &b) { return b->id == id; });
       if (at == w.bodies.end()) continue;
       Body &b = **at;
-      const uint32_t n = t.cuts.how == DFM_CUT_SPLIT ? split(t, b, dt) : remove(t, b);
+      const uint32_t n = t.cuts.how == DFM_CUT_SPLIT ? split(t, b) : remove(t, b);
       if (n == 0) continue;
       separate_if_asked(b);
       reserve_events(w, 1);

@@ -1,0 +1,321 @@
+// A cut must have no gaps where the body moves between two steps of the blade. So it is cells that take a
+// side, and faces follow: each cell takes the side of the blade on which its middle lies as the edge comes
+// past it, and keeps it, and a face opens if the sides of its cells differ. Around each edge of the mesh the
+// number of faces that open is even then, whatever the body does; where each face asks by itself whether the
+// blade has crossed it, two that ask in different steps may disagree (decision 0404).
+//
+//                forward
+//       . |  .      ^        ahead: may still change sides
+//   ------+---------+-edge-- passed: has its side. The face between two of different sides opens where the
+//    .    |   .              line between their middles meets the blade's way behind the edge and between
+//      +  | -                its ends.
+//
+// A cell that the edge has left far behind, or to its side, has none any more: the blade may come again.
+#include "world/blade_sweep.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "math/elementary.h"
+#include "mesh/cut_mesh.h"
+#include "state/material.h"
+#include "state/world.h"
+
+namespace dfm {
+namespace {
+
+constexpr size_t kMostTracks = 8;  // blades that cut a body by turns
+// of the largest distance between neighbors: how far from the edge sides are kept
+constexpr double kKept = 2;
+// of the median edge: a blade that has come so far forward has begun to cut, and a body that is so far from
+// it is not looked at
+constexpr double kBegun = 1e-3, kReach = 8;
+
+uint32_t cells_of(const Body &b) { return static_cast<uint32_t>(b.tets.size() / 4); }
+
+Vec3 middle_of(const Body &b, const double *x, uint32_t cell) {
+  const auto at = [&](size_t k) { return load3(x + size_t{kStride} * b.tets[size_t{4} * cell + k]); };
+  return 0.25 * ((at(0) + at(1)) + (at(2) + at(3)));
+}
+
+// What takes the line from a to b, as it was, to where it is: the smallest rotation, and a scale.
+class LineMotion {
+ public:
+  LineMotion(Vec3 a0, Vec3 b0, Vec3 a1, Vec3 b1) : from_(0.5 * (a0 + b0)), to_(0.5 * (a1 + b1)) {
+    const double l0 = norm(b0 - a0), l1 = norm(b1 - a1);
+    still_ = !(l0 > 0 && l1 > 0) || (norm2(a1 - a0) == 0 && norm2(b1 - b0) == 0);
+    if (still_) return;
+    const Vec3 u = (1 / l0) * (b0 - a0), v = (1 / l1) * (b1 - a1);
+    scale_ = l1 / l0;
+    axis_ = cross(u, v);
+    cosine_ = std::max(dot(u, v), -0.5);
+  }
+  Vec3 operator()(Vec3 p) const {
+    if (still_) return p;
+    const Vec3 r = p - from_;
+    return to_ + scale_ * (cosine_ * r + cross(axis_, r) + (dot(axis_, r) / (1 + cosine_)) * axis_);
+  }
+
+ private:
+  Vec3 from_, to_, axis_;
+  double scale_ = 1, cosine_ = 1;
+  bool still_ = true;
+};
+
+struct Extent {
+  Vec3 lo{HUGE_VAL, HUGE_VAL, HUGE_VAL}, hi{-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
+  void add(Vec3 x) {
+    for (int k = 0; k < 3; ++k) {
+      lo[k] = std::min(lo[k], x[k]);
+      hi[k] = std::max(hi[k], x[k]);
+    }
+  }
+  bool within(const Extent &o, double reach) const {
+    for (int k = 0; k < 3; ++k)
+      if (hi[k] + reach < o.lo[k] || o.hi[k] + reach < lo[k]) return false;
+    return true;
+  }
+};
+
+double toughness(const Body &b, uint32_t cell) {
+  const Material &m = b.makeup.materials[b.makeup.of.empty() ? 0 : b.makeup.of[cell]];
+  for (size_t i = 0; i < m.extra_keys.size(); ++i)
+    if (m.extra_keys[i] == kToughnessKey) return m.extra_values[i][0];
+  return 0;
+}
+
+// m2, of the face between two cells, with its normal from i to j.
+Vec3 area_between(const Body &b, uint32_t i, uint32_t j, Vec3 way) {
+  Vec3 x[3];
+  size_t n = 0;
+  const uint32_t *const c = &b.tets[size_t{4} * j];
+  for (size_t k = 0; k < 4 && n < 3; ++k)
+    if (const uint32_t p = b.tets[size_t{4} * i + k]; std::find(c, c + 4, p) != c + 4)
+      x[n++] = load3(&b.p.x[size_t{kStride} * p]);
+  const Vec3 area = 0.5 * cross(x[1] - x[0], x[2] - x[0]);
+  return dot(area, way) < 0 ? -area : area;
+}
+
+bool is_open(const Body &b, uint32_t i, uint32_t j) {
+  return !b.cut.open.empty() &&
+         std::binary_search(b.cut.open.begin(), b.cut.open.end(), open_face(b.cut.cell[i], b.cut.cell[j]));
+}
+
+double between(const double ends[2], double along) { return ends[0] + along * (ends[1] - ends[0]); }
+
+}  // namespace
+
+BladeSweep::Frame::Frame(Vec3 a, Vec3 b, Vec3 towards) : origin(a), length(norm(b - a)) {
+  if (!(length > 0)) return;
+  along = (1 / length) * (b - a);
+  const Vec3 across = towards - dot(towards, along) * along;
+  if (const double size = norm(across); size > 1e-9 * norm(towards)) {
+    forward = (1 / size) * across;
+    normal = cross(along, forward);
+  } else {
+    length = 0;
+  }
+}
+
+BladeSweep::BladeSweep(Body &b, const CutShape &blade, const Vec3 *forward) : blade_(blade), track_(0) {
+  const auto goes_on = [&](const BladeTrack &t) {
+    const auto same = [](Vec3 p, Vec3 q) { return p.x == q.x && p.y == q.y && p.z == q.z; };
+    return same(load3(t.edge), blade.corner[0]) && same(load3(t.edge + 3), blade.corner[1]);
+  };
+  while (track_ < b.blades.size() && !goes_on(b.blades[track_])) ++track_;
+  const BladeTrack *const track = track_ < b.blades.size() ? &b.blades[track_] : nullptr;
+  fresh_ = !track;
+  if (track) {
+    lead_ = track->lead;
+    std::copy_n(track->way, 2, way_);
+    if (forward && std::max(way_[0], way_[1]) < kBegun * b.surface.median_edge) {
+      fresh_ = true;  // it has stood, or gone sideways, so far
+      way_[0] = way_[1] = 0;
+    }
+  }
+  if (forward) strip_ = b.surface.median_edge;
+  find_near(b);
+  const bool looks = turn(b, forward);
+  if (near_.empty()) return;
+  find_faces(b);
+  const bool still = std::all_of(near_.begin(), near_.end(), [](const Near &n) {
+    return n.was.x == n.is.x && n.was.y == n.is.y && n.was.z == n.is.z;
+  });
+  if (looks) take_sides(track);
+  if (looks || !forward) compare(b, !forward && (fresh_ || still));
+  std::sort(faces.begin(), faces.end());
+}
+
+// Cells that may have been near the edge between the calls, alone: there may be a call in each step.
+void BladeSweep::find_near(const Body &b) {
+  const double *const before = track_ < b.blades.size() ? b.blades[track_].x.data() : b.p.x.data();
+  Extent way, whole;
+  for (const Vec3 c : blade_.corner) way.add(c);
+  for (uint32_t i = 0; i < b.p.n; ++i)
+    for (const double *x : {before, b.p.x.data()}) whole.add(load3(x + size_t{kStride} * i));
+  if (!way.within(whole, kReach * b.surface.median_edge)) return;
+  double largest = 0;
+  std::vector<Extent> boxes(cells_of(b));
+  for (uint32_t c = 0; c < cells_of(b); ++c) {
+    Extent now;
+    for (size_t k = 0; k < 4; ++k) {
+      const size_t p = size_t{kStride} * b.tets[size_t{4} * c + k];
+      now.add(load3(&b.p.x[p]));
+      boxes[c].add(load3(before + p));
+    }
+    largest = std::max(largest, norm(now.hi - now.lo));
+    boxes[c].add(now.lo);
+    boxes[c].add(now.hi);
+  }
+  for (uint32_t c = 0; c < cells_of(b); ++c)
+    if (way.within(boxes[c], kKept * largest)) {
+      const BladeSide none{c, SideKind::none, 0, 0, 0};
+      near_.push_back({c, middle_of(b, before, c), middle_of(b, b.p.x.data(), c), 0, none});
+    }
+}
+
+// Where the blade looks. false: nobody knows.
+bool BladeSweep::turn(const Body &b, const Vec3 *forward) {
+  const Vec3 *const c = blade_.corner;
+  for (const Near &n : near_) drift_ += (1 / double(near_.size())) * (n.is - n.was);
+  Vec3 looks[2];
+  if (forward) {
+    std::copy_n(forward, 2, looks);
+  } else {
+    // The way of late, over about an edge: the body may tremble, and the blade be slow.
+    const Vec3 way = 0.5 * ((c[3] - c[0]) + (c[2] - c[1])) - drift_;
+    const Vec3 lead = dfm_exp(-norm(way) / b.surface.median_edge) * lead_ + way;
+    if (dot(lead, lead_) < 0) {  // it has turned back, and begins anew
+      fresh_ = true;
+      way_[0] = way_[1] = 0;
+    }
+    lead_ = lead;
+    looks[0] = looks[1] = lead;
+  }
+  from_ = Frame(c[0], c[1], looks[0]);
+  to_ = Frame(c[3], c[2], looks[1]);
+  if (!(from_.length > 0 && to_.length > 0)) return false;
+  step_[0] = dot(c[3] - c[0] - drift_, to_.forward);
+  step_[1] = dot(c[2] - c[1] - drift_, to_.forward);
+  return true;
+}
+
+void BladeSweep::find_faces(const Body &b) {
+  std::vector<uint32_t> tets;
+  for (const Near &n : near_)
+    tets.insert(tets.end(), b.tets.begin() + std::ptrdiff_t{4} * n.cell,
+                b.tets.begin() + std::ptrdiff_t{4} * (n.cell + 1));
+  each_inner_face(b.world->memory(), static_cast<uint32_t>(near_.size()), tets.data(),
+                  [&](uint32_t i, uint32_t j) {
+                    apart_ = std::max(apart_, norm(near_[i].is - near_[j].is));
+                    if (!is_open(b, near_[i].cell, near_[j].cell)) pairs_.push_back({i, j});
+                  });
+}
+
+void BladeSweep::take_sides(const BladeTrack *track) {
+  if (track && !fresh_) {
+    size_t k = 0;
+    for (Near &n : near_) {
+      while (k < track->sides.size() && track->sides[k].cell < n.cell) ++k;
+      if (k < track->sides.size() && track->sides[k].cell == n.cell) n.side = track->sides[k];
+    }
+  }
+  struct Place { double along, ahead, off; };
+  const auto place = [](const Frame &f, Vec3 x) {
+    const Vec3 r = x - f.origin;
+    return Place{dot(r, f.along) / f.length, dot(r, f.forward), dot(r, f.normal)};
+  };
+  const double far = kKept * apart_;
+  for (Near &n : near_) {
+    const Place was = place(from_, n.was), is = place(to_, n.is);
+    BladeSide &side = n.side;
+    n.ahead = is.ahead;
+    if (side.kind == SideKind::passed || side.kind == SideKind::behind) continue;
+    const bool was_ahead = was.ahead > 0 || side.kind == SideKind::ahead;
+    if (is.ahead > 0) {
+      const double way = between(way_, is.along) + between(step_, is.along) + is.ahead;
+      side = {n.cell, SideKind::ahead, is.along, way, is.off};
+    } else if (was_ahead) {
+      const double share = was.ahead > 0 ? was.ahead / (was.ahead - is.ahead) : 0;
+      const double along = was.along + share * (is.along - was.along);
+      const double way = between(way_, along) + share * between(step_, along);
+      side = {n.cell, SideKind::passed, along, way, was.off + share * (is.off - was.off)};
+    } else if (fresh_ && -was.ahead < far) {
+      side = {n.cell, SideKind::behind, was.along, was.ahead, was.off};
+    } else {
+      side.kind = SideKind::none;
+    }
+    if (std::fabs(side.off) > far) side.kind = SideKind::none;
+  }
+  for (int k = 0; k < 2; ++k) way_[k] += step_[k];
+}
+
+// by_shape: where the body has not moved, or nothing is known of it, the blade's quadrilateral decides.
+void BladeSweep::compare(const Body &b, bool by_shape) {
+  const auto add = [&](const Face &f, Vec3 across, Vec3 way, double along) {
+    const Near &i = near_[f.i], &j = near_[f.j];
+    // of the face as the blade sees it: together they are the area that it has passed over, however rough
+    const double area = dot(area_between(b, i.cell, j.cell, j.is - i.is), across);
+    const double energy = 0.5 * (toughness(b, i.cell) + toughness(b, j.cell));
+    faces.push_back({dot(way, i.is + j.is), open_face(i.cell, j.cell), energy * area, way, along});
+  };
+  const bool begins = strip_ > 0 && std::max(way_[0], way_[1]) > kBegun * strip_;
+  const auto passed = [&](const BladeSide &s) {
+    return s.kind == SideKind::passed || (begins && s.kind == SideKind::behind);
+  };
+  for (const Face &f : pairs_) {
+    Near &i = near_[f.i], &j = near_[f.j];
+    if (by_shape) {
+      CutShape own = blade_;
+      const LineMotion moves(i.was, j.was, i.is, j.is);
+      for (int k = 0; k < 2; ++k) own.corner[k] = moves(blade_.corner[k]);
+      if (!crosses_blade(own, i.is, j.is)) continue;
+      const Vec3 *const c = own.corner;
+      const Vec3 across = normalized(cross(c[2] - c[0], c[3] - c[1]));
+      add(f, dot(across, j.is - i.is) < 0 ? -across : across, 0.5 * ((c[3] - c[0]) + (c[2] - c[1])), 0.5);
+      continue;
+    }
+    BladeSide &a = i.side, &o = j.side;
+    if (a.kind == SideKind::none || o.kind == SideKind::none || !(passed(a) || passed(o)) ||
+        (a.off < 0) == (o.off < 0))
+      continue;
+    const double share = std::fabs(a.off) / (std::fabs(a.off) + std::fabs(o.off));
+    const auto at = [&](double of_a, double of_o) { return of_a + share * (of_o - of_a); };
+    const double along = at(a.along, o.along);
+    if (!(along >= 0 && along <= 1) || at(a.way, o.way) < -strip_) continue;
+    if (!(passed(a) && passed(o)) && at(i.ahead, j.ahead) > 0) continue;
+    for (BladeSide *s : {&a, &o})
+      if (s->kind == SideKind::ahead) s->kind = SideKind::passed;  // its side is settled by now
+    const Vec3 *const c = blade_.corner;
+    const Vec3 of_edge = (1 - along) * (c[3] - c[0]) + along * (c[2] - c[1]);
+    const Vec3 way = of_edge - 0.5 * (i.is - i.was + j.is - j.was);
+    add(f, o.off < a.off ? -to_.normal : to_.normal, way, along);
+    faces.back().order = at(a.way, o.way);
+  }
+}
+
+void BladeSweep::keep(Body &b) {
+  if (track_ == b.blades.size()) {
+    if (b.blades.size() == kMostTracks) b.blades.erase(b.blades.begin());
+    b.blades.emplace_back();
+    use_memory(b.world->memory(), b.blades.back().x, b.blades.back().sides);
+    track_ = b.blades.size() - 1;
+  }
+  BladeTrack &t = b.blades[track_];
+  store3(t.edge, blade_.corner[3]);
+  store3(t.edge + 3, blade_.corner[2]);
+  t.x.assign(b.p.x.begin(), b.p.x.end());
+  t.lead = lead_;
+  std::copy_n(way_, 2, t.way);
+  t.sides.clear();
+  const double far = kKept * apart_;
+  for (const Near &n : near_) {
+    const bool settled = n.side.kind == SideKind::passed || n.side.kind == SideKind::behind;
+    const double off = to_.length > 0 ? dot(n.is - to_.origin, to_.normal) : 0;
+    if (n.side.kind == SideKind::none || n.ahead < -far || std::fabs(off) > far) continue;
+    if (settled && n.ahead > apart_) continue;  // drawn back from
+    t.sides.push_back(n.side);
+  }
+}
+
+}  // namespace dfm

@@ -1,0 +1,66 @@
+// Faces between cells that a moving edge passes, while the body moves too.
+#pragma once
+#include <vector>
+
+#include "geometry/cut_shape.h"
+#include "state/body.h"
+
+namespace dfm {
+
+struct SweptFace {
+  double order;   // along the way of the edge
+  uint64_t face;  // between present cells (mesh/cut_mesh.h)
+  double work;    // J, that opening it takes
+  Vec3 way;       // m, of the edge relative to the face
+  double along;   // where the edge meets it: 0 one end, 1 the other
+  bool operator<(const SweptFace &o) const { return order != o.order ? order < o.order : face < o.face; }
+};
+
+// From the edge of corners 0 and 1 to that of 3 and 2. If the body remembers that an edge has come to the
+// first one, the way goes on from there.
+class BladeSweep {
+ public:
+  // forward [2]: where the blade looks at the start and at the end, at right angles to its edge; null: where
+  // it goes.
+  BladeSweep(Body &b, const CutShape &blade, const Vec3 *forward);
+  // In the order in which the edge meets them; none of them is open.
+  std::vector<SweptFace> faces;
+  bool near() const { return !near_.empty(); }  // is the body?
+  // The body remembers the edge, after faces have been opened and before anything else has changed.
+  void keep(Body &b);
+
+ private:
+  void find_near(const Body &b);
+  bool turn(const Body &b, const Vec3 *forward);
+  void find_faces(const Body &b);
+  void take_sides(const BladeTrack *track);
+  void compare(const Body &b, bool by_shape);
+
+  struct Frame {
+    Vec3 origin, along, forward, normal;
+    double length = 0;
+    Frame() = default;
+    Frame(Vec3 a, Vec3 b, Vec3 towards);
+  };
+  struct Near {
+    uint32_t cell;
+    Vec3 was, is;      // its middle
+    double ahead = 0;  // m, of the edge now
+    BladeSide side{};
+  };
+  struct Face { uint32_t i, j; };  // of near_
+
+  CutShape blade_;
+  size_t track_;
+  bool fresh_ = true;
+  std::vector<Near> near_;
+  std::vector<Face> pairs_;
+  Vec3 drift_, lead_;  // m: mean motion of the cells; way of the edge, of late
+  Frame from_, to_;
+  double way_[2] = {};   // m, that the ends have come forward since the track began
+  double step_[2] = {};  // m, of these in this call
+  double strip_ = 0;     // m, behind the edge as it began, that is cut too
+  double apart_ = 0;     // m, largest distance between the middles of two neighbors
+};
+
+}  // namespace dfm
