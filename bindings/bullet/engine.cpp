@@ -226,6 +226,7 @@ void BulletEngine::prepare(const dfm_rigid_step &step) {
   (world->*Opened::predict())(h);
   (world->*Opened::find_predictive())(h);
   world->performDiscreteCollisionDetection();
+  collided();
   (world->*Opened::find_islands())();
   for (Saved &s : saved_) take_damping_back(s);
   predicted_ = multi_.any() ? 0 : step.h;

@@ -12,6 +12,7 @@
 //
 // Gyroscopic terms are out of Bullet's solve where the body has them on; see ode/engine.h.
 #pragma once
+#include <functional>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -79,6 +80,7 @@ class BulletEngine : public Engine {
   btDiscreteDynamicsWorld *world = nullptr;
   bool falls = false;  // every body under `gravity`, which is not in its forces
   Vec gravity;
+  std::function<void()> collided = [] {};  // between Bullet's collision and its islands
 
   void gather();  // before begin()
 

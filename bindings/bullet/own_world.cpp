@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "engine.h"
+#include "own_contacts.h"
 #include "rigid_host/own_world.h"
 
 namespace dfm_bullet_detail {
@@ -26,7 +27,13 @@ class BulletWorld : public OwnWorld {
   Member *make_body(const dfm_rigid_def &def, uint32_t number) override;
   void make_joint(const Joint &joint, size_t number) override;
   void set_gravity(const double g[3]) override;
-  void forget() override;
+  uint32_t memory() const override { return contacts_.room(); }
+  void remember(double *out, bool last) override { contacts_.write(out, last); }
+  bool remembers(const double *in) const override { return contacts_.are_of_now(in); }
+  void recall(const double *in) override { contacts_.put_back(in); }
+  void set_correction(double share) override {
+    world_.getSolverInfo().m_erp = world_.getSolverInfo().m_erp2 = btScalar(share);
+  }
   void drive(size_t joint, double velocity, double max, double h) override;
   Wrench wrench(size_t joint) const override {
     const btJointFeedback &f = ties_[joint].feedback;
@@ -37,7 +44,6 @@ class BulletWorld : public OwnWorld {
   struct Body {
     std::unique_ptr<btCollisionShape> shape;
     std::unique_ptr<btRigidBody> body;
-    int category = 0, collides_with = 0;
     BulletMember member;
   };
   struct Tie {
@@ -47,7 +53,7 @@ class BulletWorld : public OwnWorld {
   };
   btDefaultCollisionConfiguration configuration_;
   btCollisionDispatcher dispatcher_;
-  btDbvtBroadphase broadphase_;
+  OverlapsOfNow broadphase_;
   // Directly, as dWorldStep: what sweeps leave open would be drift that grows with chains and mass ratios.
   btDantzigSolver direct_;
   btMLCPSolver solver_;
@@ -55,6 +61,7 @@ class BulletWorld : public OwnWorld {
   BulletEngine engine_;
   std::vector<Body> bodies_;  // by number in the set
   std::vector<Tie> ties_;
+  OwnContacts contacts_;
   btRigidBody anchor_;  // the world, for joints to it
 
   btRigidBody &body(uint32_t number) { return number == DFM_RIGID_WORLD ? anchor_ : *bodies_[number].body; }
@@ -69,16 +76,29 @@ std::unique_ptr<btCollisionShape> shape_of(const dfm_rigid_def &def) {
   return std::make_unique<btEmptyShape>();
 }
 
+// How many bodies with a shape move, or stand.
+uint32_t touching(const dfm_rigid_set_def &set, uint32_t fixed) {
+  uint32_t n = 0;
+  for (uint32_t i = 0; i < set.nbody; ++i) {
+    const dfm_rigid_def &def = *dfm_rigid_set_body(&set, i);
+    n += def.shape != DFM_SHAPE_NONE && (def.fixed != 0) == (fixed != 0);
+  }
+  return n;
+}
+
 BulletWorld::BulletWorld(const dfm_rigid_set_def &set, uint32_t *group)
     : OwnWorld(bullet_kind().host, engine_),
       dispatcher_(&configuration_),
+      broadphase_(static_cast<int>(set.nbody)),
       solver_(&direct_),
       world_(&dispatcher_, &broadphase_, &solver_, &configuration_),
       bodies_(set.nbody),
       ties_(set.njoint),
+      contacts_(dispatcher_, touching(set, 0), touching(set, 1)),
       anchor_(btRigidBody::btRigidBodyConstructionInfo(0, nullptr, nullptr)) {
   engine_.world = &world_;
   engine_.falls = true;
+  engine_.collided = [this] { contacts_.collided(world_); };
   build(set, group);
   engine_.gather();
   engine_.begin(0);
@@ -102,9 +122,8 @@ Member *BulletWorld::make_body(const dfm_rigid_def &def, uint32_t number) {
   b.body->setCenterOfMassTransform(to_bullet(Pose{load(def.pose.position), unit({q[0], q[1], q[2], q[3]})}));
   b.body->setFriction(btScalar(kFriction));
   b.body->setActivationState(DISABLE_DEACTIVATION);
-  b.category = static_cast<int>(def.category);
-  b.collides_with = static_cast<int>(def.collides_with);
-  world_.addRigidBody(b.body.get(), b.category, b.collides_with);
+  b.body->setUserIndex(static_cast<int>(number));
+  world_.addRigidBody(b.body.get(), static_cast<int>(def.category), static_cast<int>(def.collides_with));
   if (def.shape == DFM_SHAPE_NONE)
     b.body->setCollisionFlags(b.body->getCollisionFlags() | btCollisionObject::CF_NO_CONTACT_RESPONSE);
   if (def.fixed) return nullptr;
@@ -114,13 +133,6 @@ Member *BulletWorld::make_body(const dfm_rigid_def &def, uint32_t number) {
   b.member.inertia.mass = def.mass;
   b.member.inertia.moments = load(def.inertia);
   return &b.member;
-}
-
-// Its contacts and the order of its pairs have grown over earlier sub-steps: the world begins as a new one.
-void BulletWorld::forget() {
-  for (Body &b : bodies_) world_.removeRigidBody(b.body.get());
-  broadphase_.resetPool(&dispatcher_);
-  for (Body &b : bodies_) world_.addRigidBody(b.body.get(), b.category, b.collides_with);
 }
 
 void BulletWorld::set_gravity(const double g[3]) {

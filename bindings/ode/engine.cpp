@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <utility>
 
 namespace dfm_ode_detail {
@@ -85,6 +86,27 @@ dfm_rigid_state OdeMember::state() const {
   return s;
 }
 
+std::array<dReal, 13> OdeMember::now() const {
+  std::array<dReal, 13> out;
+  std::copy_n(dBodyGetPosition(body), 3, out.begin());
+  std::copy_n(dBodyGetQuaternion(body), 4, out.begin() + 3);
+  std::copy_n(dBodyGetLinearVel(body), 3, out.begin() + 7);
+  std::copy_n(dBodyGetAngularVel(body), 3, out.begin() + 10);
+  return out;
+}
+
+const dfm_rigid_state &OdeMember::end() {
+  if (!std::exchange(has_ended, true)) ended = state();
+  return ended;
+}
+
+void OdeMember::mark() { marked_ = now(); }
+
+bool OdeMember::stays() const {
+  const std::array<dReal, 13> here = now();
+  return std::memcmp(here.data(), marked_.data(), sizeof here) == 0;
+}
+
 void OdeMember::put(const dfm_rigid_state &s) {
   dQuaternion q;
   to_ode(unit(rotation_of(s) * conjugate(inertia.axes)), q);
@@ -143,8 +165,16 @@ OdeEngine::Idle OdeEngine::idle(dBodyID body) const {
 
 void OdeEngine::find_ties() {
   ties_.clear();
-  number_.clear();
-  for (size_t i = 0; i < saved_.size(); ++i) number_[saved_[i].body] = i;
+  bool numbered = number_.size() == saved_.size() && bodies_.size() == saved_.size();
+  for (size_t i = 0; numbered && i < saved_.size(); ++i) numbered = bodies_[i] == saved_[i].body;
+  if (!numbered) {
+    number_.clear();
+    bodies_.clear();
+    for (size_t i = 0; i < saved_.size(); ++i) {
+      number_[saved_[i].body] = i;
+      bodies_.push_back(saved_[i].body);
+    }
+  }
   for (size_t i = 0; i < saved_.size(); ++i)
     for (int k = 0; k < dBodyGetNumJoints(saved_[i].body); ++k) {
       const dJointID j = dBodyGetJoint(saved_[i].body, k);
@@ -209,6 +239,7 @@ void OdeEngine::flood(std::vector<size_t> open, F &&reach) {
 // Whatever hangs on something awake is awake, as in dWorldStep.
 void OdeEngine::pull_awake() {
   for (Member *m : members) m->pulled = false;
+  if (std::all_of(saved_.begin(), saved_.end(), [](const Saved &s) { return s.enabled; })) return;
   std::vector<size_t> awake;
   for (size_t i = 0; i < saved_.size(); ++i)
     if (saved_[i].enabled && dBodyGetNumJoints(saved_[i].body) > 0) awake.push_back(i);
@@ -240,6 +271,7 @@ void OdeEngine::rest(double h) {
     dBodyDisable(saved_[i].body);
     dBodySetLinearVel(saved_[i].body, 0, 0, 0);
     dBodySetAngularVel(saved_[i].body, 0, 0, 0);
+    if (i < members.size()) member(i).has_ended = false;
   }
 }
 
@@ -255,6 +287,7 @@ void OdeEngine::prepare(const dfm_rigid_step &step) {
   close();
   if (friction) friction->h = step.h;
   for (const dSpaceID space : spaces) dSpaceCollide(space, near_data, near_callback);
+  collided();
   pull_awake();
 }
 
@@ -319,6 +352,7 @@ void OdeEngine::run(double h) {
     const Lent lent(*this);
     (quick ? dWorldQuickStep : dWorldStep)(world, h);
   }
+  for (size_t i = 0; i < members.size(); ++i) member(i).has_ended = false;
   turn_jointed(h);
 }
 
@@ -328,6 +362,7 @@ void OdeEngine::turned(Member &any, Quat to, Vec w) {
   to_ode(unit(to * conjugate(m.inertia.axes)), q);
   dBodySetQuaternion(m.body, q);
   dBodySetAngularVel(m.body, w.x, w.y, w.z);
+  m.has_ended = false;
 }
 
 void OdeEngine::turn_jointed(double h) {

@@ -9,6 +9,7 @@
 // w0) = impulses without these terms, after which w = I(q1)^-1 I(q0) w1. What a joint does at two anchors
 // that stand apart by its error is a couple; it is taken back from both of its bodies.
 #pragma once
+#include <functional>
 #include <ode/ode.h>
 
 #include <array>
@@ -35,15 +36,23 @@ class OdeEngine;
 
 struct OdeMember : Member {
   dBodyID body = nullptr;
-  size_t saved = 0;  // where the engine keeps it
+  size_t saved = 0;        // where the engine keeps it
+  bool has_ended = false;  // `ended` is what ODE has
 
   dfm_rigid_state state() const override;
+  const dfm_rigid_state &end() override;
+  void mark() override;
+  bool stays() const override;
   void put(const dfm_rigid_state &s) override;
   bool enabled() const override { return dBodyIsEnabled(body); }
   Facts facts() const override;
   std::array<double, 2> idle_limits() const override {
     return {dBodyGetAutoDisableLinearThreshold(body), dBodyGetAutoDisableAngularThreshold(body)};
   }
+
+ private:
+  std::array<dReal, 13> marked_{};  // position, quaternion, velocity, spin, as ODE has them
+  std::array<dReal, 13> now() const;
 };
 
 class OdeEngine : public Engine {
@@ -54,6 +63,7 @@ class OdeEngine : public Engine {
   std::vector<dSpaceID> spaces;  // collided at the start of each sub-step, each in itself
   dNearCallback *near_callback = nullptr;
   void *near_data = nullptr;
+  std::function<void()> collided = [] {};  // after these collisions
   RigidFriction *friction = nullptr;
 
   void gather(const std::vector<dBodyID> &bodies_without_geoms);  // before begin()
@@ -94,6 +104,7 @@ class OdeEngine : public Engine {
     dJointFeedback own, *callers;
   };
   std::unordered_map<dBodyID, size_t> number_;  // in saved_
+  std::vector<dBodyID> bodies_;                 // of saved_, when number_ was made
   std::vector<Tie> ties_;                       // joints between two bodies that move, but for contacts
   // every body known: members in their order, then bodies without geoms
   std::vector<Saved> saved_;

@@ -1,5 +1,7 @@
 #include "own_world.h"
 
+#include <algorithm>
+#include <utility>
 #include <vector>
 
 #include "engine.h"
@@ -21,6 +23,7 @@ class OdeWorld : public OwnWorld {
   Member *make_body(const dfm_rigid_def &def, uint32_t number) override;
   void make_joint(const Joint &joint, size_t number) override;
   void set_gravity(const double g[3]) override { dWorldSetGravity(engine_.world, g[0], g[1], g[2]); }
+  void set_correction(double share) override { dWorldSetERP(engine_.world, share); }
   void drive(size_t joint, double velocity, double max, double h) override;
   Wrench wrench(size_t joint) const override {
     return {load(ties_[joint].feedback.f1), load(ties_[joint].feedback.t1)};
@@ -37,14 +40,21 @@ class OdeWorld : public OwnWorld {
   OdeEngine engine_;
   dSpaceID space_ = nullptr;
   std::vector<OdeMember> members_;  // by number in the set; body null: fixed
+  std::vector<uint32_t> numbers_;   // the data of geoms
   std::vector<Tie> ties_;           // ODE keeps the address of each feedback
   RigidFriction near_;
+  // In the order in which ODE finds them, which depends on where the bodies have been; contact joints are
+  // made in the order of the bodies, so that a step is a function of their states.
+  std::vector<std::pair<dGeomID, dGeomID>> pairs_;
 
   // what ODE said when it stopped in the middle of a call; its world is not touched after that
   std::string broken_;
 
   void make_world(const dfm_rigid_set_def &set);
+  void collide_in_order();
 };
+
+uint32_t number_of(dGeomID geom) { return *static_cast<uint32_t *>(dGeomGetData(geom)); }
 
 Member *OdeWorld::make_body(const dfm_rigid_def &def, uint32_t number) {
   dGeomID geom = nullptr;
@@ -57,6 +67,7 @@ Member *OdeWorld::make_body(const dfm_rigid_def &def, uint32_t number) {
   to_ode(unit({def.pose.rotation[0], def.pose.rotation[1], def.pose.rotation[2], def.pose.rotation[3]}), q);
   const double *const x = def.pose.position;
   if (geom) {
+    dGeomSetData(geom, &numbers_[number]);
     dGeomSetCategoryBits(geom, def.category);
     dGeomSetCollideBits(geom, def.collides_with);
   }
@@ -142,10 +153,25 @@ void OdeWorld::make_world(const dfm_rigid_set_def &set) {
   near_.world = engine_.world;
   near_.group = engine_.contacts;
   engine_.friction = &near_;
-  engine_.near_callback = near_callback;
-  engine_.near_data = &near_;
+  engine_.near_callback = [](void *data, dGeomID a, dGeomID b) {
+    if (number_of(a) > number_of(b)) std::swap(a, b);
+    static_cast<OdeWorld *>(data)->pairs_.emplace_back(a, b);
+  };
+  engine_.near_data = this;
+  engine_.collided = [this] { collide_in_order(); };
   members_.resize(set.nbody);
+  numbers_.resize(set.nbody);
+  for (uint32_t i = 0; i < set.nbody; ++i) numbers_[i] = i;
   ties_.resize(set.njoint);
+}
+
+void OdeWorld::collide_in_order() {
+  std::sort(pairs_.begin(), pairs_.end(), [](const auto &x, const auto &y) {
+    return std::pair(number_of(x.first), number_of(x.second)) <
+           std::pair(number_of(y.first), number_of(y.second));
+  });
+  for (const auto &[a, b] : pairs_) near_callback(&near_, a, b);
+  pairs_.clear();
 }
 
 OdeWorld::~OdeWorld() {

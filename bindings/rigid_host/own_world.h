@@ -10,7 +10,7 @@ namespace dfm_rigid_detail {
 
 class OwnWorld : public Host {
  public:
-  uint32_t extra() const { return static_cast<uint32_t>(first_joint() + kMotor * joints_.size()); }
+  uint32_t extra() const { return first_memory() + memory(); }
 
   dfm_status predict(const dfm_rigid_step &step, double *velocity) override;
   void respond(const dfm_rigid_step &step, uint32_t group, double *matrix) override;
@@ -46,11 +46,18 @@ class OwnWorld : public Host {
   virtual Member *make_body(const dfm_rigid_def &def, uint32_t number) = 0;  // null: fixed
   virtual void make_joint(const Joint &joint, size_t number) = 0;
   virtual void set_gravity(const double gravity[3]) = 0;
+  // The share of an overlap or of a joint's error that the engine undoes in the sub-step.
+  virtual void set_correction(double share) = 0;
   // Of the first body against the second, in a sub-step of h.
   virtual void drive(size_t joint, double velocity, double max, double h) = 0;
   virtual Wrench wrench(size_t joint) const = 0;
-  // What the engine remembers of earlier sub-steps goes: the bodies have been put somewhere else.
-  virtual void forget() {}
+  // What the engine remembers of earlier sub-steps, behind the values of bodies and joints: how many numbers;
+  // after a sub-step, last: contact is not solved again; are these what it remembers; from these, before the
+  // next sub-step.
+  virtual uint32_t memory() const { return 0; }
+  virtual void remember(double *, bool) {}
+  virtual bool remembers(const double *) const { return true; }
+  virtual void recall(const double *) {}
   // Runs what calls the engine, which may refuse.
   virtual void call(const std::function<void()> &f) { f(); }
 
@@ -67,6 +74,7 @@ class OwnWorld : public Host {
   std::vector<dfm_rigid_state> given_;  // as the engine's bodies stand
 
   void predict_all(const dfm_rigid_step &step, double *velocity);
+  uint32_t first_memory() const { return static_cast<uint32_t>(first_joint() + kMotor * joints_.size()); }
   size_t first_joint() const { return size_t{Member::kExtra} * members_.size(); }
   void add_joint(const dfm_joint_def &def);
   double effort(size_t joint, const dfm_rigid_state *state) const;

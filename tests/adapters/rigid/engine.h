@@ -14,7 +14,6 @@ namespace test {
 #ifdef DEFORM_TEST_BULLET
 constexpr const char *kEngine = "bullet";
 constexpr double kRounding = kSingle ? 6e-8 : 1e-16;  // of the engine's own numbers
-constexpr bool kKeepsContacts = true;                 // from step to step, in no snapshot
 inline dfm_status register_engine() { return dfm_bullet_register(); }
 struct Engine : Bullet {
   using Bullet::Bullet;
@@ -31,7 +30,6 @@ struct Engine : Bullet {
 #else
 constexpr const char *kEngine = "ode";
 constexpr double kRounding = 1e-16;
-constexpr bool kKeepsContacts = false;
 inline dfm_status register_engine() { return dfm_ode_register(); }
 inline Vec spin(dBodyID b) { return vec(dBodyGetAngularVel(b)); }
 inline void set_spin(dBodyID b, Vec w) { dBodySetAngularVel(b, w[0], w[1], w[2]); }
