@@ -47,7 +47,18 @@ class Wheel(unittest.TestCase):
             self.assertIn(str(folder / "venv"), last)
             self.assertGreater(int(last.split()[-1]), 10)  # laws and models, loaded from the package's folder
             self.assertEqual((folder / "other" / "ball.png").read_bytes()[:4], b"\x89PNG")
-            print(f"environment, wheel, install and first picture: {time.monotonic() - began:.1f} s")
+            first_picture = time.monotonic() - began
+            # from the sources into another environment, by the same back end
+            subprocess.run([sys.executable, "-m", "venv", "--system-site-packages", folder / "of sources"],
+                           check=True, env=clean())
+            other = folder / "of sources" / "bin" / "python"
+            subprocess.run([other, *pip[1:], "install", "--no-index", SOURCE, "--config-settings",
+                            f"prebuilt={os.environ['DEFORM_BUILD']}"], check=True, env=clean())
+            where = "import deform; print(deform.__file__)"
+            said = subprocess.run([other, "-c", where], cwd=folder / "other", capture_output=True, text=True,
+                                  env=clean())
+            self.assertIn(str(folder / "of sources"), said.stdout, said.stderr)
+            print(f"environment, wheel, install and first picture: {first_picture:.1f} s")
             shutil.copy(SOURCE / "tests" / "python" / "test_law.py", folder / "other")
             law = "import test_law; print(test_law.Bristle().check(only=['F01', 'F02']).column('result'))"
             said = subprocess.run([python, "-c", law], cwd=folder / "other", capture_output=True, text=True,

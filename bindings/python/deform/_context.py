@@ -74,6 +74,7 @@ class PluginType:
 
     @property
     def short_name(self) -> str:
+        """The last word of its id, by which scenes and functions name it."""
         return self.id.rpartition(".")[2]
 
 

@@ -59,7 +59,11 @@ def pose_of(position: Any, rotation: Any) -> _abi.dfm_pose:
 
 def numbers_of(points: Any) -> np.ndarray:
     """Numbers of points as the library takes them."""
-    return np.ascontiguousarray(np.atleast_1d(np.asarray(points)), dtype=np.uint32)
+    given = np.atleast_1d(np.asarray(points))
+    if given.ndim != 1 or (given.size and (given.dtype.kind not in "iu" or given.min() < 0)):
+        raise ArgumentError("points must be a list of whole numbers from 0 on, numbers of points of the body",
+                            "DFM_E_ARG")
+    return np.ascontiguousarray(given, dtype=np.uint32)
 
 
 class _Part:
@@ -265,13 +269,18 @@ class Body(_Part):
     def add_load(self, points: Any, force: Any) -> int:
         """A lasting force [3] N on each of the points, or [n,3] N on each its own. Returns its number."""
         numbers, out = numbers_of(points), ctypes.c_uint32()
-        forces = np.ascontiguousarray(np.broadcast_to(np.asarray(force, np.float64), (numbers.size, 3)))
+        given = np.asarray(force, np.float64)
+        if given.shape not in ((3,), (numbers.size, 3)):
+            raise ArgumentError(f"force has the shape {given.shape}; expected (3,), or ({numbers.size}, 3): "
+                                "one for each point", "DFM_E_ARG")
+        forces = np.ascontiguousarray(np.broadcast_to(given, (numbers.size, 3)))
         self.world.free()
         check(quick.dfm_body_add_load(self.handle, numbers.size, numbers.ctypes.data, forces.ctypes.data, 0,
                                       None, None, ctypes.byref(out)))
         return out.value
 
     def remove_load(self, load: int) -> None:
+        """Ends a load by the number that add_load returned."""
         self.world.free()
         check(quick.dfm_body_remove_load(self.handle, load))
 
@@ -419,11 +428,13 @@ class Body(_Part):
         return points, cells
 
     def wake(self) -> None:
+        """Ends the sleep of the body and of what touches it."""
         self.world.free()
         check(quick.dfm_body_wake(self.handle))
 
     @property
     def asleep(self) -> bool:
+        """Whether the body sleeps: it rested long enough in a world with sleep=True, and is not stepped."""
         out = ctypes.c_bool()
         self.world.free()
         check(quick.dfm_body_is_asleep(self.handle, ctypes.byref(out)))
@@ -496,6 +507,7 @@ class Obstacle(_Part):
         return out
 
     def remove(self) -> None:
+        """Takes the obstacle out of its world; its contacts end."""
         self.world.free()
         check(lib.dfm_obstacle_destroy(self.handle))
 

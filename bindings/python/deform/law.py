@@ -122,6 +122,7 @@ class PythonLaw:
         return out
 
     def width(self) -> int:
+        """Numbers of all parameters together."""
         return sum(row.width for row in self.parameters)
 
     def slots(self) -> list[tuple[int, int]]:

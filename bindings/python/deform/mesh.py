@@ -68,6 +68,10 @@ class _Mesh:
     _cell_width: int
 
     def __init__(self, handle: int, destroy: Any, context: Context):
+        if not isinstance(context, Context):
+            kind = type(self).__name__
+            raise ArgumentError(f"a {kind} is made by {kind}.from_arrays(points, cells), read(path) or "
+                                "another of its functions, not by calling the class", "DFM_E_ARG")
         self._keeper = _Keeper(handle, destroy, context)
         self._context = context
 
@@ -102,7 +106,7 @@ class TetMesh(_Mesh):
     _info_kind = _abi.dfm_tetmesh_info
     _get_info = staticmethod(quick.dfm_tetmesh_get_info)
 
-    def __init__(self, handle: int, context: Context):
+    def __init__(self, handle: Any = None, context: Any = None):
         super().__init__(handle, lib.dfm_tetmesh_destroy, context)
 
     @classmethod
@@ -248,7 +252,7 @@ class TriMesh(_Mesh):
     _info_kind = _abi.dfm_trimesh_info
     _get_info = staticmethod(quick.dfm_trimesh_get_info)
 
-    def __init__(self, handle: int, context: Context):
+    def __init__(self, handle: Any = None, context: Any = None):
         super().__init__(handle, lib.dfm_trimesh_destroy, context)
 
     @classmethod

@@ -66,6 +66,8 @@ class Picture:
     def save(self, path: Any) -> pathlib.Path:
         """Writes PNG, whole or not at all."""
         target = pathlib.Path(path)
+        if target.suffix.lower() != ".png":
+            raise ArgumentError(f"{target}: pictures are written as .png", "DFM_E_ARG")
         partial = target.with_name(f"{target.name}.part{os.getpid()}")
         partial.write_bytes(self._repr_png_())
         partial.replace(target)

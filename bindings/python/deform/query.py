@@ -103,14 +103,17 @@ class ContactChoice:
 
     @property
     def a(self) -> Body | Obstacle:
+        """The body that the normal points to."""
         return self._world._thing(self._of.a)
 
     @property
     def b(self) -> Body | Obstacle:
+        """What it touches."""
         return self._world._thing(self._of.b)
 
     @property
     def key(self) -> int:
+        """The same for as long as the contact lasts."""
         return self._of.key
 
     @property
@@ -120,18 +123,22 @@ class ContactChoice:
 
     @property
     def time(self) -> float:
+        """s, start of the sub-step."""
         return self._of.time
 
     @property
     def dt(self) -> float:
+        """s, length of the sub-step."""
         return self._of.dt
 
     @property
     def gap(self) -> float:
+        """m, distance of the surfaces less the rest distance."""
         return self._of.gap
 
     @property
     def touched(self) -> bool:
+        """It carried load, or was not yet apart, at the end of the last sub-step."""
         return bool(self._of.flags & _abi.DFM_CHOICE_TOUCHED)
 
     @property

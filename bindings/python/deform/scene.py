@@ -77,6 +77,7 @@ class Scene:
 
     @property
     def settings(self) -> Settings:
+        """What the scene says of its run: step and duration in s, mode, output, camera."""
         out = sized(_abi.dfm_scene_settings)
         check(quick.dfm_scene_get_settings(self.handle, ctypes.byref(out)))
         camera = (np.array(out.eye), np.array(out.look_at)) if out.has_camera else None
@@ -111,6 +112,9 @@ class Scene:
 
         duration, every: s, instead of the scene's. watch: called after each step; it may look at the
         world."""
+        for what, value in (("duration", duration), ("every", every)):
+            if value is not None and not 0 <= value < math.inf:
+                raise ArgumentError(f"{what} is {value} s; it must be finite and not negative", "DFM_E_ARG")
         return _Runner(self, duration, every, watch).run()
 
 
@@ -184,6 +188,9 @@ class Run:
 
     def positions(self, body: str) -> np.ndarray:
         """Surface of a body in all frames, [n,nsurfel,3] m, float32; of a body that is not cut."""
+        if body not in self.triangles:
+            raise ArgumentError(f"'{body}' is no body of this run; it has {', '.join(self.triangles)}",
+                                "DFM_E_ARG")
         return np.stack([frame.positions[body] for frame in self.frames])
 
     def top(self) -> float:

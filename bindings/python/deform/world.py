@@ -212,6 +212,7 @@ class World(Queries, Tools):
 
     @property
     def closed(self) -> bool:
+        """Whether the world is gone: close() was called, or a `with` has ended."""
         return quick.dfm_handle_kind(self.handle) != _abi.DFM_HANDLE_WORLD
 
     def __enter__(self) -> World:
@@ -474,6 +475,7 @@ class World(Queries, Tools):
         check(lib.dfm_world_set_friction(self.handle, a.encode(), b.encode(), ctypes.byref(values.struct)))
 
     def remove_friction(self, a: str, b: str) -> None:
+        """Takes back what add_friction or set_friction said of the two; less specific rules count again."""
         self.free()
         check(lib.dfm_world_remove_friction(self.handle, a.encode(), b.encode()))
 
@@ -517,11 +519,16 @@ class World(Queries, Tools):
 
     def run(self, duration: float, dt: float | None = None) -> Trouble:
         """Steps until `duration` s have passed, by dt or, where none is given, by the stable step."""
+        if not 0 <= duration < np.inf:
+            raise ArgumentError(f"a duration of {duration} s; it must be finite and not negative",
+                                "DFM_E_ARG")
         seen, end = _NO_TROUBLE, self.time + duration
         while True:
-            left, step = end - self.time, dt or self.stable_step
-            if not np.isfinite(step):
+            left, step = end - self.time, self.stable_step if dt is None else dt
+            if dt is None and not np.isfinite(step):
                 step = 1e-3  # nothing bounds it
+            if not step > 0:
+                raise ArgumentError(f"a step of {step} s; it must be positive and finite", "DFM_E_ARG")
             if left <= 1e-6 * min(step, duration):
                 return seen
             seen |= self.step(left if left < step * 1.001 else step)

@@ -1,0 +1,58 @@
+"""A wrong argument is refused with a sentence that says what was expected, before anything has changed."""
+import math
+import pathlib
+import tempfile
+import unittest
+
+import deform
+
+SCENE = """{"format": "deform-scene", "version": 1, "time": {"duration": 0.01, "step": 0.002},
+ "bodies": [{"name": "ball", "mesh": {"make": "ball", "radius": 0.1, "cells": 100}}]}"""
+
+
+class Arguments(unittest.TestCase):
+    def refused(self, sentence, function):
+        with self.assertRaisesRegex(deform.ArgumentError, sentence):
+            function()
+
+    def test_world_runs_for_a_time_that_ends_by_steps_that_get_there(self):
+        with deform.World() as world:
+            for duration in (-1, math.nan, math.inf):
+                self.refused("duration of .* s; it must be finite and not negative",
+                             lambda duration=duration: world.run(duration))
+            for dt in (0, -1e-3, math.nan):
+                self.refused("a step of .* s; it must be positive", lambda dt=dt: world.run(0.1, dt=dt))
+            self.assertEqual(world.time, 0)
+
+    def test_points_are_numbers_of_points_and_forces_fit_them(self):
+        with deform.World() as world:
+            ball = world.add_body(deform.TetMesh.ball(0.1, cells=100), position=(0, 0, 0.2))
+            for wrong in ("x", None, [[1, 2]], [-1], [0.5], [True, False]):
+                self.refused("points must be a list of whole numbers", lambda wrong=wrong: ball.hold(wrong))
+            ball.hold([])
+            self.refused(r"force has the shape \(2,\); expected \(3,\), or \(1, 3\)",
+                         lambda: ball.add_load([0], (1, 2)))
+
+    def test_mesh_says_what_makes_one(self):
+        points, tets = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]]
+        for kind in (deform.TetMesh, deform.TriMesh):
+            self.refused(f"made by {kind.__name__}.from_arrays", lambda kind=kind: kind(points, tets))
+            self.refused(f"made by {kind.__name__}.from_arrays", kind)
+        self.assertEqual(len(deform.TetMesh.from_arrays(points, tets).points), 4)
+
+    def test_run_of_a_scene(self):
+        with tempfile.TemporaryDirectory(suffix=" with space") as name:
+            scene = pathlib.Path(name) / "drop.json"
+            scene.write_text(SCENE)
+            self.refused("every is -1 s", lambda: deform.run(scene, every=-1))
+            self.refused("duration is nan s", lambda: deform.Scene(scene).run(math.nan))
+            run = deform.run(scene)
+            self.refused("'bal' is no body of this run; it has ball", lambda: run.positions("bal"))
+
+    def test_picture_is_a_png(self):
+        picture = deform.Picture([[[0, 0, 0]]])
+        self.refused("a.jpg: pictures are written as .png", lambda: picture.save("a.jpg"))
+
+
+if __name__ == "__main__":
+    unittest.main()
