@@ -283,6 +283,129 @@ TEST(ToolCut, WhatCannotCut_IsRefused) {
   test::says({"cube", "msm"});
 }
 
+namespace {
+
+// By a quaternion x, y, z, w.
+std::array<double, 3> turned(const double q[4], const double v[3]) {
+  std::array<double, 3> t, out;
+  for (size_t k = 0; k < 3; ++k) {
+    const size_t i = (k + 1) % 3, j = (k + 2) % 3;
+    t[k] = 2 * (q[i] * v[j] - q[j] * v[i]);
+  }
+  for (size_t k = 0; k < 3; ++k) {
+    const size_t i = (k + 1) % 3, j = (k + 2) % 3;
+    out[k] = v[k] + q[3] * t[k] + q[i] * t[j] - q[j] * t[i];
+  }
+  return out;
+}
+
+// A cube of a material that takes energy to be cut, and a blade above it.
+struct Tough {
+  static constexpr double kEnergy = 100, kArea = 0.04 * 0.04;  // J/m2, m2
+  test::Context context;
+  dfm_world w;
+  dfm_body body = 0;
+  dfm_tool t = 0;
+  explicit Tough(double stiffness) : w(test::make_world(context, {0, 0, 0}, DFM_INTEGRATOR_IMPLICIT_EULER)) {
+    dfm_tetmesh mesh = 0;
+    const double size[] = {0.04, 0.04, 0.04}, energy = kEnergy;
+    test::ok(dfm_tetmesh_make(context, "beam", size, 320, &mesh));
+    dfm_body_def d = dfm_body_def_default();
+    test::lend(mesh, d);
+    dfm_material_def m = dfm_material_def_default();
+    m.name = "tissue";
+    const dfm_param_value row{"fracture_energy", &energy, 1};
+    m.extra = {sizeof(dfm_params), 1, &row};
+    test::ok(dfm_material_create(w, &m, &d.material));
+    d.name = "cube";
+    for (double &c : d.pose.position) c = -0.02;
+    test::ok(dfm_body_create(w, &d, &body));
+    dfm_tool_def td = dfm_tool_def_default();
+    td.name = "knife";
+    td.shape = DFM_TOOL_BLADE;
+    const double half[] = {0.0005, 0.03, 0.02};
+    std::copy(half, half + 3, td.half_size);
+    td.pose.position[0] = 0.001;
+    td.pose.position[2] = 0.05;
+    td.stiffness = stiffness;
+    td.turn_stiffness = stiffness > 0 ? 5 : 0;
+    td.damping = stiffness > 0 ? 2 : 0;
+    td.turn_damping = stiffness > 0 ? 0.01 : 0;
+    test::ok(dfm_tool_create(w, &td, &t));
+    cuts(t, DFM_CUT_SPLIT, body);
+  }
+  dfm_tool_state state() const {
+    dfm_tool_state s{};
+    s.size = sizeof s;
+    test::ok(dfm_tool_get_state(t, &s));
+    return s;
+  }
+  // J, of force and torque on the tool over its way; N, largest forces along it and across.
+  double work = 0, most = 0, aside = 0;
+  void down(double to, double speed) {
+    for (double z = state().device.position[2]; z > to;) {
+      z -= 1e-3 * speed;
+      const dfm_tool_state before = state();
+      const dfm_pose p{{0.001, 0, z}, {0, 0, 0, 1}};
+      test::ok(dfm_tool_set_pose(t, &p, nullptr));
+      test::ok(dfm_world_step(w, 1e-3, nullptr));
+      double f[3], m[3];
+      test::ok(dfm_tool_force(t, f, m));
+      const dfm_tool_state now = state();
+      const double *const q = now.pose.rotation;
+      std::array<double, 3> way, force = turned(q, f), torque = turned(q, m);
+      for (size_t k = 0; k < 3; ++k) way[k] = now.pose.position[k] - before.pose.position[k];
+      for (size_t k = 0; k < 3; ++k) {
+        const size_t i = (k + 1) % 3, j = (k + 2) % 3;
+        // about the origin as it stood before the step
+        const double turn = torque[k] + way[i] * force[j] - way[j] * force[i];
+        work -= force[k] * way[k] + turn * now.spin[k] * 1e-3;
+      }
+      most = std::max(most, f[2]);
+      aside = std::max(aside, std::hypot(f[0], f[1]));
+      EXPECT_GE(f[2], -1e-12) << "it holds back and never pulls";
+    }
+  }
+};
+
+}  // namespace
+
+// A driven blade: the force of each step times its way is the energy of the faces that open in it.
+TEST(ToolCut, DrivenBlade_FeelsTheEnergyOfTheCut) {
+  Tough s(0);
+  s.down(-0.03, 0.2);
+  EXPECT_EQ(parts(s.body), 2u);
+  EXPECT_NEAR(s.work, s.kEnergy * s.kArea, 1e-9 * s.kEnergy * s.kArea);
+  EXPECT_NEAR(s.state().work, s.work, 1e-9 * s.work) << "who moves it has put it in";
+  EXPECT_GT(s.most, s.kEnergy * 0.04);
+  EXPECT_LT(s.aside, 1e-9);
+}
+
+// On a virtual coupling the energy is paid over the way that follows, as dry friction takes it.
+TEST(ToolCut, CoupledBlade_PaysTheEnergyOfTheCut_AndIsHeldBack) {
+  Tough s(2000);
+  s.down(0.0, 0.1);
+  EXPECT_GT(s.state().pose.position[2] - s.state().device.position[2], 1e-3);
+  EXPECT_LT(s.most, 3 * s.kEnergy * 0.04) << "no blows";
+  s.down(-0.4, 0.5);
+  EXPECT_EQ(parts(s.body), 2u);
+  EXPECT_NEAR(s.work, s.kEnergy * s.kArea, 1e-9 * s.kEnergy * s.kArea);
+  EXPECT_GT(s.state().work, s.work) << "the hand has paid for it";
+  EXPECT_GT(s.state().port_work, 0);
+}
+
+// What the cut still takes holds the blade where the hand is too weak, without a creep.
+TEST(ToolCut, CoupledBlade_StandsWhereTheHandIsTooWeak) {
+  Tough s(200);
+  s.down(0.005, 0.1);
+  for (int i = 0; i < 3000; ++i) test::ok(dfm_world_step(s.w, 1e-3, nullptr));  // it turns about its edge
+  const double there = s.state().pose.position[2];
+  EXPECT_GT(there - s.state().device.position[2], 1e-3) << "the spring pulls";
+  for (int i = 0; i < 200; ++i) test::ok(dfm_world_step(s.w, 1e-3, nullptr));
+  EXPECT_NEAR(s.state().pose.position[2], there, 1e-9);
+  EXPECT_EQ(parts(s.body), 1u);
+}
+
 // ---- scenes ---------------------------------------------------------------------------------------------
 
 namespace {

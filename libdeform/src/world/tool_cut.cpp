@@ -84,8 +84,58 @@ struct Edge {
   }
 };
 
+// What an edge has opened in a body.
+struct Opened {
+  uint32_t n = 0;
+  double work = 0;  // J
+  double size = 0;  // J, without signs
+  Vec3 at, way;     // m, `size` times where on the edge, and the edge's way relative to the faces
+};
+
+void add(const Edge &edge, const SweptFace &f, Opened &to) {
+  const Vec3 *const c = edge.blade.corner;
+  const double size = std::fabs(f.work);
+  ++to.n;
+  to.work += f.work;
+  to.size += size;
+  to.at += size * ((1 - f.along) * c[3] + f.along * c[2]);
+  to.way += size * f.way;
+}
+
+// The tool owes the work of the faces. One that a hand leads by a spring pays it over the way that follows
+// (dynamics/rigid/tool_host.cpp); one that is driven pays at once: the force is what, over the way of this
+// step, takes the work.
+void charge(Tool &t, const Body &b, const Opened &opened, double dt) {
+  if (!(opened.size > 0)) return;
+  ToolValues v = t.values();
+  v.cut_due += opened.work;
+  const ToolPlace tool = place_of(t.set->state[0]);
+  const Vec3 at = (1 / opened.size) * opened.at, way = (1 / opened.size) * opened.way;
+  if (t.motion.coupled()) {
+    v.cut_length = b.surface.median_edge;
+    store3(v.cut_at, rotate_back(tool.rotation, at - tool.position));
+    store3(v.cut_way, rotate_back(tool.rotation, normalized(way)));
+  } else if (v.cut_due > 0 && norm2(way) > 0) {
+    const Vec3 p = (-dt * v.cut_due / norm2(way)) * way, turn = cross(at - tool.position, p);
+    store3(v.contact, load3(v.contact) + p);
+    store3(v.contact + 3, load3(v.contact + 3) + cross(at - load3(v.about), p));
+    for (int k = 0; k < 3; ++k) {
+      v.coupling[k] -= p[k];
+      v.coupling[3 + k] -= turn[k];
+      v.given[k] += p[k] / dt;
+      v.given[3 + k] += turn[k] / dt;
+    }
+    const ToolPlace from = t.cuts.from[0];
+    v.work -= (dot(p, tool.position - from.position) +
+               dot(turn, rotation_vector(tool.rotation * conjugate(from.rotation)))) /
+              dt;
+    v.cut_due = 0;
+  }
+  t.store(v);
+}
+
 // How many faces have opened.
-uint32_t split(const Tool &t, Body &b) {
+uint32_t split(Tool &t, Body &b, double dt) {
   uint32_t n = 0;
   for (size_t part = t.first_cutting_part(); part < t.motion.parts.size(); ++part) {
     const Edge edge(t, part);
@@ -93,13 +143,18 @@ uint32_t split(const Tool &t, Body &b) {
     if (!sweep.near()) continue;
     std::vector<SweptFace> &met = sweep.faces;
     if (t.cuts.most > 0 && met.size() > t.cuts.most - n) met.resize(t.cuts.most - n);
+    Opened opened;
     if (!met.empty()) {
       Array<uint64_t> more{HookAllocator<uint64_t>(b.world->memory())};
-      for (const SweptFace &f : met) more.push_back(f.face);
+      for (const SweptFace &f : met) {
+        more.push_back(f.face);
+        add(edge, f, opened);
+      }
       open_faces(b, more);
-      n += static_cast<uint32_t>(met.size());
+      n += opened.n;
     }
     sweep.keep(b);
+    charge(t, b, opened, dt);
   }
   return n;
 }
@@ -248,7 +303,7 @@ void cut_by_tools(World &w, double dt) {
       const auto at = std::find_if(w.bodies.begin(), w.bodies.end(), [&](auto &b) { return b->id == id; });
       if (at == w.bodies.end()) continue;
       Body &b = **at;
-      const uint32_t n = t.cuts.how == DFM_CUT_SPLIT ? split(t, b) : remove(t, b);
+      const uint32_t n = t.cuts.how == DFM_CUT_SPLIT ? split(t, b, dt) : remove(t, b);
       if (n == 0) continue;
       separate_if_asked(b);
       reserve_events(w, 1);

@@ -50,6 +50,9 @@ struct ToolValues {
   double tank;                     // J, port_work, of which what is below 0 is forgiven in time
   double given[6];                 // N and N m on the hand after the last step, world frame
   double ngiven;                   // forces given so far, of a late device
+  double cut_due;                  // J, that cuts have taken and the tool has not paid yet
+  double cut_length;               // m, over which a coupled tool pays it
+  double cut_at[3], cut_way[3];    // m, unit length: where its edge cuts and where to, in the tool's frame
 };
 inline constexpr size_t kToolValues = sizeof(ToolValues) / sizeof(double);
 // Behind the values, of a late device: the last forces that were given, and when. Number k stands in row
