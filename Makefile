@@ -88,8 +88,9 @@ soak: setup-bench build/bench/build.ninja build/release/build.ninja
 	$(BUILD) release
 	DEFORM_SOAK=1 nice -n 19 ctest --preset release -j $(JOBS) -L stability -R Jittered
 	DEFORM_SOAK=1 nice -n 19 ctest --preset release -R '^python\.cut_scenes$$'
-	$(BUILD) bench --target hold_soak suite_soak cover_soak
+	$(BUILD) bench --target hold_soak suite_soak cover_soak cut_soak
 	nice -n 19 build/bench/bin/cover_soak tests/bench/results/cover_soak.csv
+	nice -n 19 build/bench/bin/cut_soak tests/bench/results/cut_soak.csv
 	nice -n 19 build/bench/bin/suite_soak tests/bench/results/suite_soak.csv
 	nice -n 19 build/bench/bin/hold_soak tests/bench/results/hold_soak.csv
 

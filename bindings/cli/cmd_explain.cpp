@@ -121,6 +121,30 @@ void print_attachments(const JsonValue &plan) {
   }
 }
 
+void print_cuts(const JsonValue &plan) {
+  const JsonValue *bodies = plan.find("bodies");
+  for (size_t i = 0; bodies && i < bodies->items.size(); ++i) {
+    const JsonValue &b = bodies->items[i];
+    const JsonValue *const list = b.find("cuts");
+    const std::string tears = b.get("tears_beyond");
+    const bool may_tear = !tears.empty() && tears != "null";
+    for (size_t k = 0; list && k < list->items.size(); ++k) {
+      const JsonValue &c = list->items[k];
+      const std::string most = c.get("most") == "0" ? "" : ", " + c.get("most") + " in a step at most";
+      std::printf("  %-20s  cut by %s, which %s%s\n", b.get("name").c_str(), c.get("by").c_str(),
+                  c.get("how").c_str(), most.c_str());
+    }
+    if (may_tear)
+      std::printf("  %-20s  tears beyond a strain of %s, 64 points in a step at most\n",
+                  b.get("name").c_str(), tears.c_str());
+    if (may_tear || (list && !list->items.empty()))
+      std::printf(
+          "  %-20s  a step that cuts or tears makes the body of %s cells anew; any other step looks at each "
+          "of them once\n",
+          "", b.get("cells").c_str());
+  }
+}
+
 bool changes_bound(const JsonValue &plan) {
   const JsonValue *bodies = plan.find("bodies");
   for (size_t i = 0; bodies && i < bodies->items.size(); ++i) {
@@ -195,6 +219,7 @@ int explain(const Options &options, Globals &globals) {
   if (scene.value("/time/mode") != "\"static\"") print_integrators(plan);
   print_precision(plan);
   print_changes(plan);
+  print_cuts(plan);
   print_attachments(plan);
   if (scene.value("/time/mode") != "\"static\"") print_unwatched(plan);
   print_fields(plan);

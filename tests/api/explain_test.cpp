@@ -371,3 +371,17 @@ TEST(Explain, ModesAndTheirShare_AreTold) {
   EXPECT_NE(summary.find(R"("facts": {"modes": 7,)"), std::string::npos) << summary;
   EXPECT_NE(summary.find(R"("share": 0.)"), std::string::npos) << summary;
 }
+
+TEST(Explain, ToolThatCutsAndTear_AreTold) {
+  const test::CommandResult result =
+      test::deform({"explain", scene("cut",
+                                     R"("materials": {"dough": {"young": 1e4, "tear": 0.4}},
+                "bodies": [{"name": "loaf", "mesh": "block.msh", "material": "dough"}],
+                "tools": [{"name": "knife", "shape": "blade", "half_size": [0.001, 0.1, 0.1],
+                           "pose": {"position": [0.05, 0, 0.3]},
+                           "cuts": {"bodies": ["loaf"], "most": 9}}])")});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  for (const char *text : {"cut by knife, which opens faces, 9 in a step at most",
+                           "tears beyond a strain of 0.4", "makes the body of 60 cells anew"})
+    EXPECT_NE(result.out.find(text), std::string::npos) << text << "\n" << result.out;
+}

@@ -11,7 +11,7 @@ namespace {
 double fall(const char *limit) {
   const std::string out = test::scratch("tear scene " + std::to_string(getpid())) + "/" + limit;
   const test::CommandResult r =
-      test::deform({"run", DEFORM_SOURCE_DIR "/tests/bench/torn_dough.json", "--time", "0.6", "--quiet",
+      test::deform({"run", DEFORM_SOURCE_DIR "/examples/scenes/torn_dough.json", "--time", "0.6", "--quiet",
                     "--set", std::string("/materials/dough/tear=") + limit, "--out", out});
   EXPECT_EQ(r.exit_code, 0) << r.err;
   const auto rows = test::read_csv(out + "/bodies.csv");
@@ -31,10 +31,9 @@ TEST(TearScene, BarBetweenJaws_FallsWhereItTearsAndHangsWhereItDoesNot) {
 // Pieces are bodies that the scene does not name: tables, states and the summary have them all the same.
 TEST(TearScene, PiecesOfAnOrange_AreInTheTablesAndStates) {
   const std::string out = test::scratch("pieces of an orange " + std::to_string(getpid()));
-  const test::CommandResult r = test::deform(
-      {"run", DEFORM_SOURCE_DIR "/tests/bench/orange.json", "--time", "0.4", "--quiet", "--set",
-       "/bodies/0/mesh/cells=800", "--set", R"(/bodies/0/separate={"least_cells": 20, "crumbs": "remove"})",
-       "--set", "/output/states=true", "--set", "/output/every=0.1", "--out", out});
+  const test::CommandResult r =
+      test::deform({"run", DEFORM_SOURCE_DIR "/examples/scenes/orange.json", "--time", "0.4", "--quiet",
+                    "--set", "/output/states=true", "--set", "/output/every=0.1", "--out", out});
   ASSERT_EQ(r.exit_code, 0) << r.err;
   const auto rows = test::read_csv(out + "/bodies.csv");
   for (const char *piece : {"orange", "orange.1", "orange.2"}) {
@@ -43,4 +42,15 @@ TEST(TearScene, PiecesOfAnOrange_AreInTheTablesAndStates) {
     EXPECT_NE(test::read_file(out + "/states/" + piece + "_surface_000004.vtu"), "") << piece;
     EXPECT_NE(test::read_file(out + "/summary.json").find('"' + std::string(piece) + '"'), std::string::npos);
   }
+}
+
+// Where they were one, a piece and its body lie on each other, which is no overlap.
+TEST(TearScene, PartsOfALiver_AreNotToldToOverlap) {
+  const std::string out = test::scratch("parts of a liver " + std::to_string(getpid()));
+  const test::CommandResult r = test::deform(
+      {"run", DEFORM_SOURCE_DIR "/examples/scenes/liver.json", "--time", "1.1", "--quiet", "--out", out});
+  ASSERT_EQ(r.exit_code, 0) << r.err;
+  const std::string summary = test::read_file(out + "/summary.json");
+  EXPECT_NE(summary.find("\"liver.1\""), std::string::npos);
+  EXPECT_EQ(summary.find("overlap by"), std::string::npos) << summary;
 }

@@ -87,6 +87,10 @@ class SceneRun {
     if (rows.empty()) rows.emplace_back();
     return rows;
   }
+  bool has(const std::string &body) const {
+    return std::any_of(bodies_.begin(), bodies_.end(),
+                       [&](auto &row) { return row.size() > 1 && row[1] == body; });
+  }
   BodyRow last(const std::string &body) const { return rows(body).back(); }
   // Last place of a probe.
   std::vector<double> probe(const std::string &name) const {

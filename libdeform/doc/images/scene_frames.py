@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Frames of scenes side by side: attached.png, grasp.png, scenes.png, fill_drop.png, pressed_ring.png,
-rigid.png, ode_scenes.png, stability.png, torn_dough.png, orange.png, cheese.png.
+rigid.png, ode_scenes.png, stability.png, torn_dough.png, orange.png, cheese.png,
+liver.png.
 
 scene_frames.py DEFORM_COMMAND [NAME.png...] [--out FOLDER]
 
@@ -18,7 +19,6 @@ import PIL.Image
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 SUITE = "../../tests/stability/suite/"
-BENCH = "../../tests/bench/"
 SLIDES = ("/contact/friction/0/params/mu=0",)
 EXPLICIT = ("/time/integrator=symplectic_euler",)
 # as tests/stability/suite/hand.expect.json has it moved
@@ -35,12 +35,15 @@ PICTURES = {
     "attached.png": [("0, 0.7, 1.1 s", [("attached", (), t) for t in (0, 0.7, 1.1)])],
     "grasp.png": [("0, 0.4, 0.8, 1.6 s", [("grasp", (), t) for t in (0, 0.4, 0.8, 1.6)]),
                   ("2, 2.4, 2.6, 3 s", [("grasp", (), t) for t in (2, 2.4, 2.6, 3)])],
-    "torn_dough.png": [("0, 0.4, 0.6 s", [(BENCH + "torn_dough", (), t) for t in (0, 0.4, 0.6)]),
-                       ("0.8, 1, 1.2 s", [(BENCH + "torn_dough", (), t) for t in (0.8, 1, 1.2)])],
-    "orange.png": [("0, 0.2, 0.4 s", [(BENCH + "orange", (), t) for t in (0, 0.2, 0.4)]),
-                   ("0.6, 0.8, 1.2 s", [(BENCH + "orange", (), t) for t in (0.6, 0.8, 1.2)])],
-    "cheese.png": [("0.3, 0.5, 0.7 s", [(BENCH + "cheese", (), t) for t in (0.3, 0.5, 0.7)]),
-                   ("1.2, 1.4, 1.6 s", [(BENCH + "cheese", (), t) for t in (1.2, 1.4, 1.6)])],
+    "torn_dough.png": [("0, 0.4, 0.6 s", [("torn_dough", (), t) for t in (0, 0.4, 0.6)]),
+                       ("0.8, 1, 1.2 s", [("torn_dough", (), t) for t in (0.8, 1, 1.2)])],
+    "orange.png": [("0, 0.15, 0.25 s", [("orange", (), t) for t in (0, 0.15, 0.25)]),
+                   ("0.3, 0.4, 1.2 s", [("orange", (), t) for t in (0.3, 0.4, 1.2)])],
+    "liver.png": [("0, 0.3, 0.7 s", [("liver", (), t) for t in (0, 0.3, 0.7)]),
+                  ("1, 1.1, 1.4 s", [("liver", (), t) for t in (1, 1.1, 1.4)]),
+                  ("1.7, 1.9, 2.2 s", [("liver", (), t) for t in (1.7, 1.9, 2.2)])],
+    "cheese.png": [("0.3, 0.5, 0.7 s", [("cheese", (), t) for t in (0.3, 0.5, 0.7)]),
+                   ("1.2, 1.4, 1.6 s", [("cheese", (), t) for t in (1.2, 1.4, 1.6)])],
     "fill_drop.png": [("0, 0.4, 1.8 s", [("fill_drop", (), t) for t in (0, 0.4, 1.8)])],
     "pressed_ring.png": [(None, [("pressed_ring", (), 0.5)])],
     "rigid.png": [("rigid_on_ball", [("rigid_on_ball", (), t) for t in (0, 1, 2)]),

@@ -31,6 +31,14 @@ uint64_t other_id(const World &w, const OverlapPair &p) {
   return p.obstacle ? w.obstacles[p.b]->id : w.bodies[p.b]->id;
 }
 
+// Parts of what was one body lie on each other where they were one, with the faces of the cut set back by
+// half of the rest distance each (doc/decisions/0398). What is within that is how they lie, and no overlap.
+bool lie_on_cut(const World &w, const OverlapPair &p, const Crossed &c) {
+  const auto whole = [](const Body &b) { return b.piece_of ? b.piece_of : b.id; };
+  return !p.obstacle && whole(*w.bodies[p.a]) == whole(*w.bodies[p.b]) && c.depth <= w.offset &&
+         !deep(w, p, c);
+}
+
 std::vector<Overlap> find_overlaps(World &w) {
   std::vector<uint64_t> &placed = w.overlaps.placed;
   std::sort(placed.begin(), placed.end());
@@ -43,7 +51,8 @@ std::vector<Overlap> find_overlaps(World &w) {
     const uint64_t a = w.bodies[p.a]->id, b = other_id(w, p);
     if ((!asked(a) && !asked(b)) || !sides.may_touch(p)) return;
     const Crossed c = sides.look(p, w.offset, false);
-    if (c.through) out.push_back({a, b, p.obstacle, c.crossings, c.enclosed, c.depth, deep(w, p, c)});
+    if (c.through && !lie_on_cut(w, p, c))
+      out.push_back({a, b, p.obstacle, c.crossings, c.enclosed, c.depth, deep(w, p, c)});
   };
   for (uint32_t i = 0; i < w.bodies.size(); ++i) {
     for (uint32_t j = i + 1; j < w.bodies.size(); ++j) look({i, j, false});

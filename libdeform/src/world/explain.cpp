@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "state/material.h"
 #include "step/context.h"
 #include "step/energy_watch.h"
 #include "step/method.h"
@@ -171,6 +172,22 @@ std::string attachments(const Body &b) {
   return ",\"attached\":[" + join(rows, ",") + "]";
 }
 
+// What divides it: tools, and strain beyond what a material bears.
+std::string cuts(const Body &b) {
+  std::vector<std::string> rows;
+  for (const auto &t : b.world->tools)
+    if (t->cuts_body(b))
+      rows.push_back("{\"by\":" + quote(t->name) +
+                     ",\"how\":" + quote(t->cuts.how == DFM_CUT_SPLIT ? "opens faces" : "removes cells") +
+                     format(",\"most\":%u}", t->cuts.most));
+  double least = HUGE_VAL;
+  for (const Material &m : b.makeup.materials)
+    for (size_t i = 0; i < m.extra_keys.size(); ++i)
+      if (m.extra_keys[i] == kTearKey) least = std::min(least, m.extra_values[i][0]);
+  return ",\"cuts\":[" + join(rows, ",") +
+         "],\"tears_beyond\":" + (b.tears ? format("%.9g", least) : std::string("null"));
+}
+
 // Where a body's numbers come from: its cells, its surface, and the parameters that differ by cell.
 std::string body(const Body &b) {
   std::string out = "{\"name\":" + quote(b.name) + ",\"model\":" + quote(b.model.type->id);
@@ -195,7 +212,8 @@ std::string body(const Body &b) {
     out += (first ? "" : ",") + ("{\"name\":" + quote(p.key) + ",\"why\":" + quote(p.why) + "}");
     first = false;
   }
-  return out + "]" + changes(b) + attachments(b) + ",\"unwatched\":" + quote(unwatched(*b.world, b)) + "}";
+  return out + "]" + changes(b) + attachments(b) + cuts(b) +
+         ",\"unwatched\":" + quote(unwatched(*b.world, b)) + "}";
 }
 
 std::string seconds(double s) { return std::isfinite(s) ? format("%.3g s", s) : "any step"; }

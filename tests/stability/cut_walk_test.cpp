@@ -1,0 +1,21 @@
+// Random cuts, tears, pieces and undone cuts, in contact with a floor (support/cut_walk.h). A million of
+// them: make soak.
+#include "cut_walk.h"
+
+TEST(CutWalk, RandomCuts_KeepMassMomentumContactsAndVolumes) {
+  uint64_t cuts = 0, contacts = 0, pieces = 0, tears = 0, undone = 0, fast = 0;
+  for (uint64_t seed = 1; seed <= 40; ++seed) {
+    const test::cutting::Walked r = test::cutting::walk_cuts(seed, 60);
+    EXPECT_EQ(r.failure, "") << "seed " << seed;
+    cuts += r.cuts;
+    contacts += r.contacts;
+    pieces += r.pieces;
+    tears += r.tears;
+    undone += r.undone;
+    fast += r.speed >= test::cutting::CutWalk::kFast;
+  }
+  EXPECT_GT(cuts, 1000u);
+  for (const uint64_t n : {contacts, pieces, tears, undone}) EXPECT_GT(n, 20u);
+  // known: pieces that come off with teeth in each other may be thrown (doc/concepts/cutting.md, limits)
+  EXPECT_LE(fast, 2u);
+}
