@@ -14,7 +14,8 @@ double fall(const char *limit) {
       test::deform({"run", DEFORM_SOURCE_DIR "/examples/scenes/torn_dough.json", "--time", "0.6", "--quiet",
                     "--set", std::string("/materials/dough/tear=") + limit, "--out", out});
   EXPECT_EQ(r.exit_code, 0) << r.err;
-  const auto rows = test::read_csv(out + "/bodies.csv");
+  auto rows = test::read_csv(out + "/bodies.csv");
+  std::erase_if(rows, [](auto &row) { return row.at(1).find('.') != std::string::npos; });  // of its pieces
   size_t z = 0;
   for (size_t i = 0; i < rows.at(0).size(); ++i)
     if (rows[0][i] == "com_z") z = i;

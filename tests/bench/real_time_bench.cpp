@@ -9,7 +9,8 @@
 // speed, on lanes side by side, over surfels that nothing has touched before. --series writes t, the force on
 // the first body (N) and the place of the first probe (m) at each millisecond; --against compares with such a
 // file: the largest difference over the largest value. --histogram adds rows to a CSV file: steps by time.
-// --times writes the milliseconds of each step, one a line.
+// --times writes the milliseconds of each step, one a line. Where tools cut, steps that cut, and the step
+// after each of them, which makes its tables anew, are told apart from the others.
 #include <time.h>
 
 #include <algorithm>
@@ -42,9 +43,19 @@ struct Sample { double t, force[3], place[3]; };
 
 struct Run {
   std::vector<double> seconds;
+  std::vector<uint8_t> cut;  // 1: the step has cut; 2: the one before it has
   std::vector<Sample> series;
   double contacts = 0;
 };
+
+bool has_cut(dfm_world world) {
+  static std::vector<dfm_contact_event> events(4096);
+  uint32_t n = 0;
+  ok(dfm_world_events(world, uint32_t(events.size()), events.data(), &n));
+  return std::any_of(events.begin(), events.begin() + n, [](const dfm_contact_event &e) {
+    return e.kind == DFM_EVENT_CUT || e.kind == DFM_EVENT_TEAR;
+  });
+}
 
 // places: ask for the probe's place each ten milliseconds; a body whose inner points are late finds them.
 Run run(dfm_scene scene, dfm_world world, double duration, double step, bool places) {
@@ -55,6 +66,7 @@ Run run(dfm_scene scene, dfm_world world, double duration, double step, bool pla
     const double at = cpu_seconds();
     ok(dfm_world_step(world, step, nullptr));
     out.seconds.push_back(cpu_seconds() - at);
+    out.cut.push_back(has_cut(world) ? 1 : !out.cut.empty() && out.cut.back() == 1 ? 2 : 0);
     dfm_pair_impulse pair[16] = {};
     uint32_t pairs = 0;
     ok(dfm_world_pair_impulses(world, 16, pair, &pairs));
@@ -132,6 +144,18 @@ void write_histogram(const char *path, const std::vector<double> &sorted, const 
     if (at > first) std::fprintf(csv, "%s,%.3f,%zu\n", row.c_str(), end, at - first);
   }
   std::fclose(csv);
+}
+
+// Of the steps of one kind.
+void print_kind(const Run &run, uint8_t kind, const char *what, double step) {
+  std::vector<double> t;
+  for (size_t n = 0; n < run.seconds.size(); ++n)
+    if (run.cut[n] == kind) t.push_back(run.seconds[n]);
+  if (t.empty()) return;
+  std::sort(t.begin(), t.end());
+  const auto late = t.end() - std::upper_bound(t.begin(), t.end(), step);
+  std::printf("    %-22s %7zu steps: median %.3f, 99.9 %% %.3f, most %.3f ms, %td above the step\n", what,
+              t.size(), 1e3 * t[t.size() / 2], 1e3 * t[t.size() * 999 / 1000], 1e3 * t.back(), late);
 }
 
 std::vector<Sample> read(const char *path) {
@@ -235,6 +259,11 @@ int main(int argc, char **argv) {
   std::printf("    slowest:");
   for (size_t n = 0; n < most; ++n) std::printf(" %.2f (%zu)", 1e3 * found.seconds[slow[n]], slow[n] + 1);
   std::printf(" ms (step)\n");
+  if (std::any_of(found.cut.begin(), found.cut.end(), [](uint8_t k) { return k != 0; })) {
+    print_kind(found, 0, "without a cut", step);
+    print_kind(found, 2, "after a cut", step);
+    print_kind(found, 1, "that cut", step);
+  }
   for (uint32_t i = 0; i < stages; ++i)
     std::printf("    %-18s %8.4f ms\n", after[i].name,
                 1e3 * (after[i].seconds - before[i].seconds) / double(found.seconds.size()));
