@@ -249,7 +249,8 @@ dfm_status dfm_world_pairs_sized(dfm_world world, uint32_t row_size, uint32_t ca
         p.b = s.b;
         p.law = w.store.law[i];
         for (const PairWork &work : w.work)
-          if ((work.a == ia && work.b == ib) || (work.a == ib && work.b == ia)) p.friction_work += work.work;
+          if ((work.a == ia && work.b == ib) || (work.a == ib && work.b == ia))
+            p.friction_work += work.friction;
         at = pairs.insert(at, {ia, ib, p});
       }
       dfm_pair_report *const it = &at->report;

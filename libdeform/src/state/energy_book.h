@@ -23,6 +23,9 @@ struct EnergyWatch {
   double last_h = 0;   // s, of the last sub-step
   // the next one is longer or shorter because the step's bound has it so; not state: said anew by each step
   bool new_size = false;
+  // the last look has stopped the run because of a pair: what the host changes then starts sums anew; not
+  // state
+  bool told = false;
 };
 
 bool sound(const EnergyBook &e);  // could a world have come to it?

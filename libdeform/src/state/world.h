@@ -41,10 +41,16 @@ struct FilterRule {
   std::string between[2];
   bool collide;
 };
+// Of a pair of ids, a body first, J. Two are sums of the watch on energies (step/pair_energy.h), over
+// sub-steps since each was last zero, and never below; that of friction over all, where laws remember.
 struct PairWork {
   uint64_t a, b;
-  double work;
+  double friction;     // work over the run
+  double rubbed = 0;   // that friction has put into both sides
+  double made = 0;     // that contact has, beyond what recovery puts in
+  uint64_t apart = 0;  // 0: still led to the rest distance from where they were placed
 };
+bool sound(const PairWork &p);  // could a world have come to it?
 
 struct Gravity {
   std::vector<dfm_vector_key> keys;

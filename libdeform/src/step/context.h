@@ -103,7 +103,9 @@ struct StepContext {
   std::vector<ImpulseSink> sinks;
   bool ended = false;  // find_ends() has been asked since the last solve
   Guard guard;
-  // commit: trades places with the world's
+  // commit
+  Array<double> mean;  // [dofs of rows,4] m/s, over the sub-step; of bodies
+  // trades places with the world's
   ContactStore next_store;
   Report last_report;
   // sleep. With nobody asleep `active` holds all bodies.

@@ -7,6 +7,7 @@
 #include "plugin/on_behalf.h"
 #include "state/world.h"
 #include "step/context.h"
+#include "step/pair_energy.h"
 #include "step/stages.h"
 
 namespace dfm {
@@ -162,16 +163,28 @@ void look_at_all(World &w, StepContext &step) {
   });
 }
 
+// Of the dofs of contact, and the mean velocities that it does its work at.
 void book_contact(World &w, StepContext &step) {
+  step.mean.resize(size_t{kStride} * step.rows.ndof);
   for (uint32_t d = 0; d < step.rows.ndof; ++d) {
+    double *const mean = &step.mean[size_t{kStride} * d];
+    std::fill_n(mean, kStride, 0.0);
     if (step.rows.source[d] == kNone) continue;
     Body &b = *w.bodies[step.rows.source[d]];
-    if (!b.dynamics->abilities().energy) continue;
+    if (!b.dynamics->abilities().energy) {
+      const EndState ends = b.dynamics->end();
+      const double *const way = steps_itself(b) ? ends.mean : ends.v;
+      b.surface.each_phyxel(step.rows.point[d], [&](uint32_t point, double weight) {
+        for (size_t k = 0; k < 3; ++k) mean[k] += weight * way[size_t(point) * kStride + k];
+      });
+      continue;
+    }
     const size_t at = size_t(step.rows.point[d]) * kStride;
     const double *const end = b.dynamics->end().v;
     double sum = 0;
     for (size_t k = 0; k < 3; ++k) {
-      if (b.p.moves(at + k)) sum += 0.5 * b.p.impulse[at + k] * (b.p.v[at + k] + end[at + k]);
+      mean[k] = 0.5 * (b.p.v[at + k] + end[at + k]);
+      if (b.p.moves(at + k)) sum += b.p.impulse[at + k] * mean[k];
     }
     b.energy.work += sum;
   }
@@ -288,6 +301,8 @@ void book_body(World &w, StepContext &step, Body &b, double motion) {
 
 }  // namespace
 
+bool has_balance(const Body &b) { return watched(b); }
+
 const char *unwatched(const World &w, const Body &b) {
   if (!(w.def.energy_watch > 0)) return "energy_watch is 0";
   if (!watching(w)) return "the contact method gives no impulses to book";
@@ -324,7 +339,7 @@ bool watch_energy(World &w, StepContext &step, uint32_t *trouble) {
   double moving = 0;
   for (const uint32_t i : step.active) moving += watched(*w.bodies[i]) ? step.free_kinetic[i] : 0;
   const double limit = w.def.energy_watch * w.stats.energy_max;
-  bool due = w.watch.age >= kEvery;
+  bool due = w.watch.age >= kEvery || pair_over(w);
   for (const uint32_t i : step.active) {
     const EnergyBook &e = w.bodies[i]->energy;
     const bool faster = step.free_kinetic[i] > 2 * e.kinetic + limit;
@@ -371,23 +386,36 @@ bool watch_energy(World &w, StepContext &step, uint32_t *trouble) {
     *trouble |= DFM_TROUBLE_ENERGY;
     w.watch.age = kEvery;  // the next step is asked again
     set_last_error(
-        format("step %llu, body '%s': its energy has grown by %.3g J beyond what loads, motions and contact "
-               "have put in (limit: %g %% of %.3g J, the largest energy so far); take a shorter step, or "
-               "give the material stiffness damping (energy_watch sets the limit, 0 switches the watch off)",
-               static_cast<unsigned long long>(w.step_count), worst.body->name.c_str(), worst.rise,
-               100 * worst.share, s.energy_max)
+        format("step %llu, body '%s' of model '%s': its energy has grown by %.3g J beyond what loads, "
+               "motions and "
+               "contact have put in (limit: %g %% of %.3g J, the largest energy so far); take a shorter "
+               "step, or "
+               "give the material stiffness damping; where the model is a plugin's, check its forces "
+               "(energy_watch sets the limit, 0 switches the watch off)",
+               static_cast<unsigned long long>(w.step_count), worst.body->name.c_str(),
+               worst.body->model.type->id, worst.rise, 100 * worst.share, s.energy_max)
             .c_str());
     return false;
   }
   s.energy_max = std::max({s.energy_max, total, moving});
   s.energy_gain = std::max(s.energy_gain, gain);
+  const std::string pair = tell_pair_gain(w);
+  if ((w.watch.told = !pair.empty())) {
+    *trouble |= DFM_TROUBLE_ENERGY;
+    w.watch.age = kEvery;
+    set_last_error(pair.c_str());
+    return false;
+  }
   return true;
 }
 
 void book_energy(World &w, StepContext &step, double motion) {
   if (!watching(w)) return;
   const bool touched = w.plan.touches() && step.rows.all() > 0;
-  if (touched) book_contact(w, step);
+  if (touched) {
+    book_contact(w, step);
+    book_pairs(w, step);
+  }
   uint32_t ages = 1;
   for (const uint32_t i : step.active) {
     Body &b = *w.bodies[i];
@@ -409,6 +437,7 @@ void book_energy(World &w, StepContext &step, double motion) {
 // Of a hidden elastic energy as much is left as was there: at most what the body had and was given, less what
 // its place in gravity and in lasting loads has taken.
 void forget_energy(Body &b) {
+  forget_pairs(*b.world, b.id);
   EnergyBook &e = b.energy;
   double hidden = 0;
   if (hides(b)) {
@@ -427,6 +456,7 @@ void forget_energy(Body &b) {
 }
 
 void lose_energy(Body &b) {
+  forget_pairs(*b.world, b.id);
   b.energy = {};
   if (hides(b)) b.energy.base = kNoLimit;
 }

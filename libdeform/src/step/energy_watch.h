@@ -23,7 +23,9 @@ struct EnergyLook {
 void change_gravity(World &w, Vec3 gravity);
 // Why the watch does not look at the body; empty where it does.
 const char *unwatched(const World &w, const Body &b);
-// After predict. False: a body has gained too much; the sentence says which.
+// Its energy counts in the largest one.
+bool has_balance(const Body &b);
+// After predict. False: a body, or the contact of a pair, has gained too much; the sentence says which.
 bool watch_energy(World &w, StepContext &step, uint32_t *trouble);
 // Before commit: what this sub-step puts into the bodies.
 void book_energy(World &w, StepContext &step, double motion);

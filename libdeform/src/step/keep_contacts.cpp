@@ -5,6 +5,7 @@
 #include "state/world.h"
 #include "step/bristles.h"
 #include "step/context.h"
+#include "step/pair_energy.h"
 #include "step/stages.h"
 #include "step/step_impulses.h"
 #include "step/tolerance.h"
@@ -18,6 +19,7 @@ void reserve_contacts(World &w, StepContext &step) {
   Report &next = w.sleepers ? step.last_report : w.report;  // the one that keep_contacts(w, step) will write
   each_column([&](const ContactColumn &column, auto &values) { values.reserve(column.entries(n, S)); }, to);
   each_report_column([&](size_t width, auto &column) { column.reserve(width * n); }, next);
+  step.mean.reserve(size_t{kStride} * step.rows.ndof);
   w.work.reserve(std::min(w.work.size() + n, w.bodies.size() * (w.bodies.size() + w.obstacles.size())));
   reserve_events(w, size_t(n) + w.store.n + w.attachments.size());
   reserve_impulses(w, n);
@@ -147,12 +149,7 @@ void keep_contacts(World &w, StepContext &step) {
     touching += now;
     sticking += stick;
 
-    if (l[1] != 0 || l[2] != 0) {
-      auto it = std::lower_bound(w.work.begin(), w.work.end(), std::pair(a, b),
-                                 [](const PairWork &p, auto &k) { return std::pair(p.a, p.b) < k; });
-      if (it == w.work.end() || it->a != a || it->b != b) it = w.work.insert(it, {a, b, 0});
-      it->work += l[1] * v1 + l[2] * v2;
-    }
+    if (l[1] != 0 || l[2] != 0) work_of(w, a, b).friction += l[1] * v1 + l[2] * v2;
   }
   follow_load(w, step);
   turn_frames(w, step);

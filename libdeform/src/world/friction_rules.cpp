@@ -11,6 +11,7 @@
 #include "state/world.h"
 #include "step/context.h"
 #include "step/method.h"
+#include "step/pair_energy.h"
 #include "step/pair_table.h"
 #include "step/stages.h"
 
@@ -66,6 +67,7 @@ bool bring_the_same(const LawInstance &a, const LawInstance &b) {
 
 // The rule's law, with other values of its parameters.
 void put_params(World &w, FrictionRule &rule, std::vector<double> values) {
+  forget_pairs(w, 0);
   std::unique_ptr<LawInstance> &law = w.laws[rule.law];
   auto fresh = make_law(w, *law->asked_type, std::move(values));
   const bool remembers = same_memory(*law, *fresh);

@@ -373,7 +373,7 @@ void fields(Stream &s, W &w, const World &like) {
   rule_fields(s, w, w.laws.size());
   contact_fields(s, w.store, w.laws.size());
   s.array("friction work", w.work, kAnyCount,
-          must::Be{[](const PairWork &x) { return must::all_finite(x.work); }, "finite work"});
+          must::Be{[](const PairWork &x) { return sound(x); }, "finite work, rises not below zero"});
   if (w.sleepers == 0) return;  // contacts that sleep are reported from what the last sub-step left
   auto &r = w.report;
   const uint64_t n = w.store.n;

@@ -1,0 +1,214 @@
+#include "step/pair_energy.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "state/world.h"
+#include "step/context.h"
+#include "step/energy_watch.h"
+#include "step/pair_table.h"
+#include "step/stages.h"
+
+namespace dfm {
+namespace {
+
+// Sides whose energies the largest energy has: not rigid bodies that give way.
+bool booked(const World &w, const StepContext &step, const ContactPoint &c) {
+  const Body &a = *w.bodies[c.slot_a];
+  if (!has_balance(a)) return false;
+  if (!c.obstacle) return has_balance(*w.bodies[c.slot_b]);
+  return step.rigid_places.empty() || step.rigid_places[c.slot_b].group == kNone;
+}
+
+// Of the rest distance: what lies deeper was placed there, or recovery is late.
+constexpr double kShallow = 0.99;
+// Work counts at the mean of the velocities at both ends, and a depth is led out by a fifth in a sub-step: in
+// the one before by 1.25 times as much.
+constexpr double kOpens = 0.5 * (1 + 1.25);
+// What such a law has stored, it gives back.
+bool remembers(const LawInstance *law) { return law->nstate > 0; }
+
+// J, of a contact in the sub-step. Sides that book their work differently (step/energy_watch.cpp) are
+// compared at the end of the sub-step: what accelerates both would else be work of one.
+struct Made {
+  double all = 0;       // without friction where the law remembers
+  double recovery = 0;  // at most what leading it out of a depth puts in
+  // What the law has, by its own answer at the slip that it was asked at; a set-valued law gives a limit
+  // only, and the projection on it cannot drive.
+  double friction = 0;
+};
+Made made_by(const World &w, const StepContext &step, uint32_t i, bool ends) {
+  const ContactRows &rows = step.rows;
+  const ContactState &law = step.state;
+  const double *const l = &rows.impulse[size_t(3) * i], *const f = &rows.frame[size_t(9) * i];
+  Vec3 u;
+  for (uint32_t k = rows.begin[i]; k < rows.begin[i + 1]; ++k) {
+    const uint32_t d = rows.dof[k];
+    const double *v = &step.mean[size_t{kStride} * d];
+    if (ends && w.bodies[rows.source[d]]->dynamics->abilities().energy)
+      v = w.bodies[rows.source[d]]->dynamics->end().v + size_t{kStride} * rows.point[d];
+    u += rows.weight[k] * load3(v);
+  }
+  u = Vec3{dot(load3(f), u), dot(load3(f + 3), u), dot(load3(f + 6), u)} - load3(&rows.drive[size_t(3) * i]);
+  const bool smooth = law.form[i] == kSmoothLaw;
+  const double asked = law.ft[i] * law.slip[i] + law.ft[law.stride + i] * law.slip[law.stride + i];
+  const double along = remembers(w.pairs.laws[law.law[i]]) ? 0 : l[1] * u.y + l[2] * u.z;
+  return {l[0] * u.x + along, kOpens * l[0] * std::max(0.0, -rows.rate[i]), smooth ? step.h * asked : 0};
+}
+
+// What is compared with the share that the watch allows.
+double excess_of(const PairWork &p) { return std::max(p.rubbed, p.made); }
+
+// J, that rises are compared with a share of. Contact knows places to a small part of the rest distance:
+// while bodies that lie on each other have hardly begun to move, the work of their weight over that distance
+// is the measure. Elastic energies that nobody knows are not in the largest one (energy_watch.cpp).
+struct Scale {
+  double joule;
+  bool hidden;
+  double limit(const World &w) const { return (w.def.energy_watch + (hidden ? 1 : 0)) * joule; }
+};
+Scale scale_of(const World &w, const PairWork &p) {
+  double mass = 0;
+  bool hidden = false;
+  for (const auto &b : w.bodies) {
+    if (b->id != p.a && b->id != p.b) continue;
+    mass += b->mass;
+    hidden = hidden || !b->model.can(DFM_CAP_ENERGY);
+  }
+  return {std::max(w.stats.energy_max, mass * std::sqrt(norm2(w.gravity.now)) * w.offset), hidden};
+}
+
+const std::string &name_of(const World &w, uint64_t id) {
+  static const std::string gone = "?";
+  for (const auto &b : w.bodies)
+    if (b->id == id) return b->name;
+  for (const auto &o : w.obstacles)
+    if (o->id == id) return o->name;
+  return gone;
+}
+
+bool is_body(const World &w, uint64_t id) {
+  return std::any_of(w.bodies.begin(), w.bodies.end(), [&](const auto &b) { return b->id == id; });
+}
+
+// Of the pair's contact that carries most.
+std::string law_of(const World &w, const PairWork &p) {
+  const LawInstance *law = nullptr;
+  double most = 0;
+  for (uint32_t m = 0; m < w.store.n; ++m) {
+    const double normal = w.store.impulse[size_t(3) * m];
+    if (w.store.id_a[m] != p.a || w.store.id_b[m] != p.b || !(normal >= most)) continue;
+    most = normal;
+    law = w.pairs.laws[w.store.law[m]];
+  }
+  return law ? law->type->id : "?";
+}
+
+std::string models_of(const World &w, const PairWork &p) {
+  std::string out;
+  for (const auto &b : w.bodies)
+    if ((b->id == p.a || b->id == p.b) && b->model.stepper) out += format(", model '%s'", b->model.type->id);
+  return out;
+}
+
+}  // namespace
+
+PairWork &work_of(World &w, uint64_t a, uint64_t b) {
+  auto it = std::lower_bound(w.work.begin(), w.work.end(), std::pair(a, b),
+                             [](const PairWork &p, auto &k) { return std::pair(p.a, p.b) < k; });
+  if (it == w.work.end() || it->a != a || it->b != b) it = w.work.insert(it, {a, b, 0});
+  return *it;
+}
+
+void book_pairs(World &w, StepContext &step) {
+  const std::span<const ContactPoint> all = step.contacts;
+  for (uint32_t i = 0; i < all.size();) {
+    const ContactPoint &c = all[i];
+    const uint32_t begin = i;
+    while (++i < all.size() && all[i].slot_a == c.slot_a && all[i].slot_b == c.slot_b &&
+           all[i].obstacle == c.obstacle) {}
+    if (!booked(w, step, c)) continue;
+    const uint64_t a = w.bodies[c.slot_a]->id;
+    const uint64_t b = c.obstacle ? w.obstacles[c.slot_b]->id : w.bodies[c.slot_b]->id;
+    const auto by_halves = [&](uint32_t slot) { return w.bodies[slot]->dynamics->abilities().energy; };
+    const bool ends = !c.obstacle && by_halves(c.slot_a) != by_halves(c.slot_b);
+    Made sum;
+    bool touch = false, deep = false;
+    for (uint32_t k = begin; k < i; ++k) {
+      if (!(step.rows.impulse[size_t(3) * k] > 0)) continue;
+      const Made one = made_by(w, step, k, ends);
+      sum.all += one.all;
+      sum.recovery += one.recovery;
+      sum.friction += one.friction;
+      touch = true;
+      deep = deep || all[k].distance < kShallow * w.offset;
+    }
+    if (!touch) continue;
+    PairWork &pair = work_of(w, a, b);
+    pair.rubbed += sum.friction;
+    if (!pair.apart) pair.apart = !deep;
+    if (!pair.apart) continue;
+    pair.made += sum.all - sum.recovery;
+  }
+  const bool stores = std::any_of(w.pairs.laws.begin(), w.pairs.laws.end(), remembers);
+  for (PairWork &p : w.work) {
+    if (!stores) p.rubbed = std::max(0.0, p.rubbed);
+    p.made = std::max(0.0, p.made);
+  }
+}
+
+bool pair_over(const World &w) {
+  const double limit = w.def.energy_watch * w.stats.energy_max;
+  return std::any_of(w.work.begin(), w.work.end(), [&](const PairWork &p) {
+    return excess_of(p) > limit && excess_of(p) > scale_of(w, p).limit(w);
+  });
+}
+
+std::string tell_pair_gain(const World &w) {
+  const PairWork *worst = nullptr;
+  double most = 1, limit = 0;
+  for (const PairWork &p : w.work) {
+    if (!(excess_of(p) > w.def.energy_watch * w.stats.energy_max)) continue;
+    const double own = scale_of(w, p).limit(w);
+    if (!(excess_of(p) > most * own)) continue;
+    worst = &p;
+    limit = own;
+    most = excess_of(p) / own;
+  }
+  if (!worst) return {};
+  const bool rubs = worst->rubbed > limit;
+  const std::string sides =
+      worst->a == worst->b ? format("body '%s' on itself", name_of(w, worst->a).c_str())
+      : is_body(w, worst->b)
+          ? format("bodies '%s' and '%s'", name_of(w, worst->a).c_str(), name_of(w, worst->b).c_str())
+          : format("body '%s' on obstacle '%s'", name_of(w, worst->a).c_str(), name_of(w, worst->b).c_str());
+  const std::string grown =
+      format("%.3g J more than it has taken (limit: %.3g J; %.3g J is the largest energy so far)",
+             excess_of(*worst), limit, w.stats.energy_max);
+  const std::string law = law_of(w, *worst);
+  if (rubs)
+    return format(
+        "step %llu, %s: friction law '%s' has put in %s; its force must point against the slip: "
+        "change the law or its parameters (energy_watch sets the limit, 0 switches the watch off)",
+        static_cast<unsigned long long>(w.step_count), sides.c_str(), law.c_str(), grown.c_str());
+  return format(
+      "step %llu, %s: their contact (law '%s'%s) has put in %s; take a shorter step, repair their "
+      "surfaces, or, where a model of a plugin steps itself, check its answers to impulses "
+      "(energy_watch sets the limit, 0 switches the watch off)",
+      static_cast<unsigned long long>(w.step_count), sides.c_str(), law.c_str(), models_of(w, *worst).c_str(),
+      grown.c_str());
+}
+
+void forget_pairs(World &w, uint64_t id) {
+  if (!w.watch.told) return;
+  for (PairWork &p : w.work)
+    if (id == 0 || p.a == id || p.b == id) p.made = p.rubbed = 0;
+}
+
+bool sound(const PairWork &p) {
+  return std::isfinite(p.friction) && std::isfinite(p.rubbed) && std::isfinite(p.made) && p.made >= 0 &&
+         p.apart <= 1;
+}
+
+}  // namespace dfm
