@@ -98,6 +98,10 @@ class Dynamics {
   // of a sub-step, over that of an explicit one: a rough number for the budget of a step
   virtual uint32_t relative_work() const { return 1; }
 
+  // Multiplications so far, roughly: differences are counts of what sub-steps have done. They depend on the
+  // states that it came through, not on what it still knows of earlier ones. 0: nobody counts.
+  virtual double effort() const { return 0; }
+
   // False: the model gives none.
   virtual bool bound(double time, const AddRowSums &outside, StepBound &out) = 0;
   // 1/s, of the edge that stretches fastest; 0 where no bound follows the shape

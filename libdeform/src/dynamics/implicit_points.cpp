@@ -29,6 +29,8 @@ constexpr double kTolerated = 100, kDiverges = 100;
 // An end that moves by more than this times the last correction has new impulses: what earlier corrections
 // have taught does not hold there.
 constexpr double kElsewhere = 3;
+// Of effort: forces in the time of a stiffness, and multiplications in that of an entry of a response.
+constexpr double kStiffnessForces = 10, kCopies = 4;
 constexpr uint32_t kCuts = 8;  // of a correction that leads too far
 // What a sub-step may err by, over the median edge of the surface; how much longer the next one may be.
 constexpr double kErrs = 0.005, kGrows = 2;
@@ -73,6 +75,7 @@ ImplicitPoints::ImplicitPoints(const Memory &memory, Phyxels &points, Surface &s
     a->assign(size_t{3} * points.n, 0.0);
   held_.assign(points.n, 0);
   stiffness_.create(model, points.n);
+  forces_ = kUnitWork * stiffness_.pattern().nb;  // points and edges, about as many as points and cells
   if (options_.second_order && options_.newton == 1 && !stiffness_.constant())
     fail(
         DFM_E_UNSUPPORTED,
@@ -121,6 +124,7 @@ bool ImplicitPoints::ask(const SubStep &now, const double *v, bool commits) {
 
 // share: of the way from the loads at the start of the sub-step to those at its end.
 bool ImplicitPoints::ask_here(const dfm_kin &k, double share) {
+  effort_ += forces_;
   if (share == 1) std::copy(p_.load.begin(), p_.load.end(), p_.f.begin());
   else
     for (size_t j = 0; j < x_.size(); ++j) p_.f[j] = load_before_[j] + share * (p_.load[j] - load_before_[j]);
@@ -170,6 +174,7 @@ bool ImplicitPoints::linearize(const SubStep &now) {
   dfm_kin k = kin(now.time + stage_.elapsed, stage_.elapsed);
   k.x = x_.data();
   k.v = v_.data();
+  effort_ += kStiffnessForces * forces_ + exact_->factor_work();
   if (!stiffness_.evaluate(model_, k, -stage_.h * stage_.h, -stage_.h)) return false;
   stiffness_.each_own([&](uint32_t i, double *block) {
     for (size_t c = 0; c < 3; ++c) {
@@ -193,15 +198,21 @@ bool ImplicitPoints::linearize(const SubStep &now) {
 }
 
 bool ImplicitPoints::solve(const Array<double> &b, Array<double> &x) {
-  if (by_rest_) return rest_->solve(b.data(), x.data());
+  if (by_rest_) {
+    effort_ += rest_->solve_work();
+    return rest_->solve(b.data(), x.data());
+  }
   SolveInfo info;
   std::fill(x.begin(), x.end(), 0.0);
-  return exact_->solve(1, b.data(), x.data(), options_.tolerance, info);
+  const bool solved = exact_->solve(1, b.data(), x.data(), options_.tolerance, info);
+  effort_ += exact_->solve_work() * std::max(1u, info.iterations);
+  return solved;
 }
 
 // What A^-1 says between points; held components answer nothing.
 bool ImplicitPoints::restricted(uint32_t count, const uint32_t *points, double *w) {
   SolveInfo info;
+  effort_ += kCopies * 9.0 * count * count;
   if (by_rest_ ? !rest_->restricted(count, points, w)
                : !exact_->restricted(count, points, options_.tolerance, w, info))
     return false;

@@ -45,6 +45,7 @@ class ImplicitPoints : public Dynamics {
   }
   // of a stage: 30 at 700 points, 60 at 4,300
   uint32_t relative_work() const override { return (options_.second_order ? 2 : 1) * kImplicitWork; }
+  double effort() const override { return effort_; }
   bool bound(double time, const AddRowSums &outside, StepBound &out) override;
   void begin(bool touched) override;
   void loads_before() override { load_before_ = p_.load; }
@@ -108,6 +109,7 @@ class ImplicitPoints : public Dynamics {
   double corrected_ = 0;               // m/s, the last correction
   uint32_t revisions_ = 0;             // since one found nothing to change
   bool ended_ = false;                 // v_end is v_free and what push_ makes of it
+  double forces_ = 0, effort_ = 0;     // multiplications: of an evaluation of forces; so far
 
   std::unique_ptr<LinearSolver> new_solver() const;
   bool start(const SubStep &now);

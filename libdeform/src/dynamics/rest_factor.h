@@ -32,6 +32,7 @@ class RestFactor {
 
   bool solve(const double *b, double *x);                              // [npoint,3]
   bool restricted(uint32_t count, const uint32_t *points, double *w);  // as LinearSolver::restricted
+  double solve_work() const { return solver_->solve_work(); }          // as LinearSolver::solve_work
   const Array<double> &diagonal() const { return diagonal_; }          // [npoint,3] kg, 0 where held
 
  private:

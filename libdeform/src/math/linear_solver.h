@@ -30,6 +30,10 @@ class LinearSolver {
   // forces on each other.
   virtual bool restricted(uint32_t nsel, const uint32_t *sel, double tolerance, double *w,
                           SolveInfo &info) = 0;
+  // Multiplications of a factor() and of a right-hand side (or of one of its iterations), by the pattern
+  // alone; those of dense panels, which take less time, as fewer. 0: not known.
+  virtual double factor_work() const { return 0; }
+  virtual double solve_work() const { return 0; }
 };
 
 // restricted() of a solver that can only solve: a right-hand side per column, some at a time.

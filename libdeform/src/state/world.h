@@ -19,6 +19,7 @@
 #include "state/body.h"
 #include "state/energy_book.h"
 #include "state/impulses.h"
+#include "state/integrator_purse.h"
 #include "state/material.h"
 #include "state/meters.h"
 #include "state/obstacle.h"
@@ -147,6 +148,7 @@ struct World {
   WorldBound bound;
   StepSizes sizes;
   EnergyWatch watch;
+  IntegratorPurse purse;
   std::atomic<bool> busy{false};  // a call of the API changes it (api/call.h)
 
   std::unique_ptr<StepContext> steps;  // buffers: step/context.h

@@ -11,6 +11,7 @@
 #include "state/world.h"
 #include "step/context.h"
 #include "step/stages.h"
+#include "step/turn_integrators.h"
 
 namespace dfm {
 namespace {
@@ -22,7 +23,7 @@ constexpr double kNoPolishAt = 0.25, kFewSweepsAt = 0.5, kNoPiecesAt = 0.75;
 constexpr uint64_t kAutomaticFactor = 1000;
 
 struct StepStopped {
-  enum Why { work, time, asked } why;
+  enum Why { work, time, asked, dear, fine } why;
 };
 
 // Worlds that were asked to stop. A signal may arrive while any lock is held, so there is none; 0: free.
@@ -245,6 +246,8 @@ void charge(World &w, StepContext &step, uint64_t units) {
   if (b.end > 0 && now() > b.end) throw StepStopped{StepStopped::time};
   if (waiting.load(std::memory_order_relaxed) != 0 && take_request(w.handle))
     throw StepStopped{StepStopped::asked};
+  if (const Counting &c = step.counting; c.most > 0 && c.contact + body_effort(w, step) > c.most)
+    throw StepStopped{StepStopped::dear};
 }
 
 bool spares(StepContext &step, Thrift what) {
@@ -260,6 +263,9 @@ void spend(const World &w, const StepContext &step, Spent &spent, uint64_t units
   if (b.limit && b.work + spent.work > b.limit) throw StepStopped{StepStopped::work};
   if (b.end > 0 && now() > b.end) throw StepStopped{StepStopped::time};
   if (requested(w.handle)) throw StepStopped{StepStopped::asked};
+  const Counting &c = step.counting;
+  if (c.most > 0 && c.contact + c.bodies + spent.effort * double(spent.all) / double(spent.own) > c.most)
+    throw StepStopped{StepStopped::dear};
 }
 
 bool spares(const StepContext &step, Spent &spent, Thrift what) {
@@ -273,8 +279,11 @@ bool spares(const StepContext &step, Spent &spent, Thrift what) {
 
 void charge(World &w, StepContext &step, const Spent &spent) {
   step.budget.used = std::max(step.budget.used, spent.used);
+  step.counting.contact += spent.effort;
   charge(w, step, spent.work);
 }
+
+void end_explicit_step() { throw StepStopped{StepStopped::fine}; }
 
 void keep_start(World &w, StepContext &step) {
   Budget &b = step.budget;
@@ -316,8 +325,29 @@ dfm_status step_within_budget(World &w, double dt, uint32_t *trouble) {
   changed_at_once(to, w);
   dfm_status status = DFM_DISCARD;
   const Tasks::Step awake(w.context->tasks);
+  const uint32_t before = *trouble;
+  const auto run = [&] {
+    for (;;) {
+      StepStopped::Why why = StepStopped::dear;
+      try {
+        return run_step(w, step, dt, trouble);
+      } catch (const StepStopped &stopped) {
+        why = stopped.why;
+        if (why != StepStopped::dear && why != StepStopped::fine) throw;
+      }
+      return_to_start(w, step);
+      if (why == StepStopped::dear) give_up_implicit(w);
+      else take_up_implicit(w);
+      b.kept = false;
+      b.start.clear();
+      Keep again{b.start};
+      changed_at_once(again, w);
+      b.work = b.limit = 0;
+      *trouble = before;
+    }
+  };
   try {
-    status = run_step(w, step, dt, trouble);
+    status = run();
   } catch (const StepStopped &stopped) {
     return_to_start(w, step);
     tell(w, step, stopped.why, dt);

@@ -43,6 +43,7 @@ struct Spent {
   uint64_t work = 0;
   uint64_t all = 1, own = 1;  // rows of all islands, of this one
   Thrift used = Thrift::none;
+  double effort = 0;  // multiplications of sweeps over bodies whose points answer each other
 };
 // Adds units. Throws where the step has to end here, as charge() will for what has been spent.
 void spend(const World &w, const StepContext &step, Spent &spent, uint64_t units);

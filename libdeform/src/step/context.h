@@ -14,6 +14,7 @@
 #include "narrow/narrow_phase.h"
 #include "state/world.h"
 #include "step/budget.h"
+#include "step/counting.h"
 #include "step/energy_watch.h"
 #include "step/guard.h"
 #include "step/islands.h"
@@ -34,6 +35,7 @@ struct StepContext {
   // s: of the sub-step; from its start to the end of the step
   double h = 0, left = 0;
   Budget budget;
+  Counting counting;
   std::vector<StageTime> stage_times;  // by row of the method's table
 
   // prepare(): the world's entities as the stages see them

@@ -287,20 +287,15 @@ IntegratorOption option_of(const World &w, const Body &b) {
   return o;
 }
 
-// Second order where the equations are solved: backward Euler takes the swing out of a body within a period
-// at the steps that implicit time is for (doc/decisions/0395-auto-is-of-second-order.md).
-ImplicitOptions implicit_choice(const World &w, const Body &b) {
-  ImplicitOptions out = w.implicit;
-  out.second_order = out.newton != 1 || b.model.can(DFM_CAP_CONSTANT_STIFFNESS);
-  return out;
-}
-
 // Of bodies that have come since the last step and leave it to the library. Before the first step it is one
 // choice for all of them, in whatever order they came and whatever was asked in between.
 void choose_integrators(World &w) {
   const auto open = [](const auto &b) { return b->integrator.open; };
   if (std::none_of(w.bodies.begin(), w.bodies.end(), open)) return;
-  if (w.step_count == 0) reopen_integrators(w);
+  if (w.step_count == 0) {
+    reopen_integrators(w);
+    w.purse = {};
+  }
   std::vector<IntegratorOption> options;
   for (const auto &b : w.bodies) options.push_back(option_of(w, *b));
   choose_integrators(options);
@@ -325,6 +320,7 @@ void choose_integrators(World &w) {
     }
     b.integrator.open = false;
     b.integrator.chosen = true;
+    b.integrator.counted = options[i].implicit ? Counted::implicit : Counted::no;
   }
 }
 

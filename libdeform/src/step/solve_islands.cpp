@@ -91,7 +91,10 @@ void take_best(StepContext &step, const SolveIsland &own) {
 // One sweep. Each solves the bonds to a share of their tolerance, so that the residual which the next sweep
 // finds comes from the contacts.
 constexpr double kBondShare = 0.1;
+// Multiplications of a sweep by the pairs of touched surfels that answer each other: three columns of four.
+constexpr double kSweepWork = 12;
 void sweep_once(const World &w, StepContext &step, SolveIsland &own, double leave) {
+  own.spent.effort += own.effort;
   spend(w, step, own.spent, own.part.all());
   sweep(step.rows, own.part, step.state, step.h, leave);
   ++own.sweeps;
@@ -342,8 +345,10 @@ void SolveIslands::find(const World &w, StepContext &step) {
     order_[k] = k;
     own.part.blocks = slice(block_, k);
     own.revises = own.rigid = false;
+    own.effort = 0;
     for (const uint32_t b : own.part.blocks) {
       const bool rigid = blocks[b].group != kNone;
+      if (!rigid) own.effort += kSweepWork * blocks[b].count * blocks[b].count;
       step.revised[b] = !rigid && w.bodies[blocks[b].source]->dynamics->abilities().revises;
       own.rigid = own.rigid || rigid;
       own.revises = own.revises || step.revised[b];
@@ -376,11 +381,12 @@ const SolveIsland *solve_islands(World &w, StepContext &step) {
     own.tolerance.tangent = step.tolerance.tangent.data();
   }
   const std::span<const uint32_t> order = step.solve_islands.by_size();
+  if (step.counting.most > 0) step.counting.bodies = body_effort(w, step);
   w.context->tasks.parallel_for(static_cast<uint32_t>(order.size()), 1, [&](uint32_t begin, uint32_t end) {
     for (uint32_t k = begin; k < end; ++k) {
       SolveIsland &own = all[order[k]];
       if (!own.open) continue;
-      own.spent = {0, rows, own.part.all(), Thrift::none};
+      own.spent = {0, rows, own.part.all(), Thrift::none, 0};
       try {
         solve_island(w, step, own);
       } catch (...) {

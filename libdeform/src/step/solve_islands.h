@@ -25,6 +25,7 @@ struct SolveIsland {
   RowsPart part;
   bool revises = false;  // some body of it looks again at what the solve has made of it
   bool rigid = false;    // some body of it is of a rigid host
+  double effort = 0;     // of a sweep (Spent)
   LawBatches batches;
   Acceleration acceleration;
   Momentum momentum;

@@ -29,6 +29,9 @@ struct RestoredChoice {
 };
 // Plan, pair tables, offset, views of the entities; where nothing has changed it does nothing. Throws Error.
 void prepare(World &w, const RestoredChoice *restored = nullptr);
+// Second order where the equations are solved: backward Euler takes the swing out of a body within a period
+// at the steps that implicit time is for (doc/decisions/0395-auto-is-of-second-order.md).
+ImplicitOptions implicit_choice(const World &w, const Body &b);
 // After a change of values that no table depends on: loads, motions, gravity, parameters of a model or of
 // a law. The step bound is asked for anew and the energy books begin anew; the plan is looked at in the
 // next prepare().

@@ -28,6 +28,7 @@
 #include "step/step_bound.h"
 #include "step/step_impulses.h"
 #include "step/tools.h"
+#include "step/turn_integrators.h"
 
 namespace dfm {
 namespace {
@@ -126,6 +127,7 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
   const double needed =
       std::ceil(dt / w.bound.step - 1e-9);  // bound.step is infinite where nothing bounds it
   if (!(needed <= w.def.max_substeps)) {
+    if (may_take_up_implicit(w)) end_explicit_step();
     set_last_error(
         format("a step of %g s needs %g sub-steps of %g s (max_substeps %u): soften or coarsen body '%s', "
                "whose point %u bounds the step, lower its damping, or take a shorter step",
@@ -140,6 +142,7 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
       static_cast<uint32_t>(std::min<double>(w.def.max_substeps, choose_pieces(w.sizes, dt, w.bound.step)));
   w.watch.new_size = earned(before, w.sizes, w.bound.step);
   plan_work(w, step, n);
+  begin_count(w, step, dt);
   if (n > 1) *trouble |= DFM_TROUBLE_SUBSTEPS;
   if (w.bound.inverted) *trouble |= DFM_TROUBLE_INVERTED;
 
@@ -155,6 +158,7 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
       if (w.bound.inverted) *trouble |= DFM_TROUBLE_INVERTED;
       const double more = (cut - k) * cut_finer(w.sizes, span / cut, w.bound.step);
       if (!(done + more <= w.def.max_substeps)) {
+        if (may_take_up_implicit(w)) end_explicit_step();
         set_last_error(format("step %llu: the shape of body '%s' has changed so much that the rest of the "
                               "step needs %g sub-steps of %g s (max_substeps %u); take a shorter step",
                               static_cast<unsigned long long>(w.step_count),
@@ -184,6 +188,7 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
   ++w.step_count;
   w.stats.steps = w.step_count;
   w.stats.time = w.time;
+  end_count(w, step, dt, done);
   return DFM_OK;
 }
 

@@ -84,6 +84,8 @@ void make_model_again(Body &b, const Former &before, ModelOrigin origin) {
       make_body_model(*b.world, b, *before.model.type, std::move(origin), static_cast<int32_t>(was.used));
   made->integrator.chosen = was.chosen;
   made->integrator.open = was.open;
+  made->integrator.counted = was.counted;
+  if (was.counted == Counted::implicit) made->integrator.step = was.step;
   exchange(b, *made);
   const std::vector<double> values = before.model.params;
   if (values == b.model.params) return;

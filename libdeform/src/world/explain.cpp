@@ -40,6 +40,8 @@ std::string integrator(const Body &b) {
   std::string why;
   if (b.model.stepper) why = "the model steps itself";
   else if (!i.chosen) why = "named, or the world's";
+  else if (i.counted == Counted::explicitly)
+    why = "auto: implicit steps have cost more, by count; they are tried again later";
   else if (i.used != DFM_INTEGRATOR_SYMPLECTIC_EULER)
     why = "auto: explicit time costs more than four times as much";
   else if (!b.model.can(DFM_CAP_STIFFNESS))

@@ -173,6 +173,10 @@ void model_fields(Stream &s, B &b, const Body &like) {
   s.array("model's held", b.origin.held, like.origin.held.size(), must::at_most(7));
   s.value("integrator used", b.integrator.used,
           must::Be{[](uint32_t x) { return x - 1 < DFM_INTEGRATOR_TR_BDF2; }, "an integrator"});
+  s.value("integrator by count", b.integrator.counted,
+          must::Be{[](Counted x) { return x <= Counted::explicitly; }, "no, implicit or explicit"});
+  s.value("explicit sub-step", b.integrator.step,
+          must::Be{[](double x) { return x > 0; }, "a time above zero"});
   const bool alike = made_alike(b, like);
   s.array("model state", b.model.state, alike ? like.model.state.size() : kAnyCount, must::finite);
   s.array("model parameters", b.model.params, alike ? like.model.params.size() : kAnyCount, must::finite);
@@ -315,6 +319,8 @@ void fields(Stream &s, W &w, const World &like) {
     s.value("patience", r->patience, must::any);
   }
   s.value("accurate step", w.sizes.accurate, must::not_negative);
+  s.value("work put by", w.purse,
+          must::Be{[](const IntegratorPurse &x) { return sound(x); }, "a finite sum"});
   s.must_hold("step size", "sizes that the library chooses", [&] { return sound(w.sizes); });
   s.value("age of the energies", w.watch.age, must::any);
   s.value("credit of the energies", w.watch.credit, must::any);
@@ -544,11 +550,19 @@ void make_models(const SnapshotReader &s, World &w, Staged &t) {
         fail(DFM_E_FORMAT, "the snapshot's model does not fit this world: %s; nothing was restored",
              e.what());
       }
+      Integrator &moves = other.made->integrator;
+      moves.counted = other.integrator.counted;
+      moves.chosen = moves.counted != Counted::no;
+      moves.step = other.integrator.step;
       ModelInstance &made = other.made->instance;
       if (made.state.size() != other.model.state.size()) s.refuse("model state", "as many as the model has");
       if (made.params.size() != other.model.params.size() || !in_range(type, other.model.params))
         s.refuse("model parameters", "values in the range of the model's table");
       made.state.swap(other.model.state);
+    } else {
+      const bool counted = other.integrator.counted != Counted::no;
+      other.integrator.open = !counted && b.integrator.open;
+      other.integrator.chosen = counted || b.integrator.chosen;
     }
     const Dynamics &moves = other.made ? *other.made->dynamics : *b.dynamics;
     if (!other.springs.empty() && !moves.abilities().springs)
@@ -611,6 +625,10 @@ void exchange(World &w, Staged &t) noexcept {
     } else {
       b.model.state.swap(other.model.state);
       b.model.params.swap(other.model.params);
+      std::swap(b.integrator.open, other.integrator.open);
+      std::swap(b.integrator.chosen, other.integrator.chosen);
+      std::swap(b.integrator.counted, other.integrator.counted);
+      std::swap(b.integrator.step, other.integrator.step);
     }
     b.switches.swap(other.switches);
     b.rule.swap(other.rule);
@@ -676,6 +694,7 @@ void exchange(World &w, Staged &t) noexcept {
   std::swap(w.next_id, t.next_id);
   std::swap(w.hold, t.hold);
   std::swap(w.sizes, t.sizes);
+  std::swap(w.purse, t.purse);
   std::swap(w.watch, t.watch);
   w.bound.body = nullptr;
   w.bound.point = 0;
@@ -683,37 +702,6 @@ void exchange(World &w, Staged &t) noexcept {
 }
 
 }  // namespace
-
-uint64_t world_hash(const World &w) {
-  Hash h;
-  for (auto &b : w.bodies) {
-    for (const Array<double> *a : {&b->p.x, &b->p.v, &b->model.state})
-      h.add(a->data(), a->size() * sizeof(double));
-  }
-  for (auto &set : w.rigid_sets) {
-    h.add(set->state.data(), set->state.size() * sizeof(dfm_rigid_state));
-    h.add(set->extra.data(), set->extra.size() * sizeof(double));
-  }
-  each_column(
-      [&](const ContactColumn &column, const auto &values) {
-        if (column.hashed) h.add(values.data(), values.size() * sizeof(values[0]));
-      },
-      w.store);
-  for (auto &b : w.bodies) h.add(b->method_values.data(), b->method_values.size() * sizeof(double));
-  if (w.def.sleep)
-    for (auto &b : w.bodies) {
-      h.add(b->slumber.asleep);
-      h.add(b->slumber.calm);
-      h.add(b->slumber.since);
-    }
-  // where it is another one than at the first step: until then it follows from how the world was made
-  for (auto &b : w.bodies)
-    if (const uint64_t model = model_hash(*b); model != b->first_model) {
-      h.add(b->id);
-      h.add(model);
-    }
-  return h.value;
-}
 
 void world_snapshot(const World &w, std::vector<unsigned char> &out, std::vector<SnapshotField> *map) {
   out.resize(sizeof(SnapshotHead));

@@ -67,6 +67,7 @@ struct Staged {
   Hold hold;
   StepSizes sizes;
   EnergyWatch watch;
+  IntegratorPurse purse;
   dfm_world_stats stats{};
   Gravity gravity;
   dfm_world_def def{};

@@ -102,7 +102,7 @@ inline auto at_most(uint64_t n) {
 template <class T>
 constexpr char snapshot_kind() {
   if constexpr (std::is_same_v<T, bool>) return 'f';
-  else if constexpr (std::is_unsigned_v<T>) return 'u';
+  else if constexpr (std::is_unsigned_v<T> || std::is_enum_v<T>) return 'u';
   else return 'd';
 }
 

@@ -1,0 +1,21 @@
+// What implicit steps may cost beyond explicit ones, where the library has chosen them
+// (step/counting.h, doc/decisions/0400-auto-goes-by-counts.md).
+#pragma once
+#include <cmath>
+#include <cstdint>
+
+namespace dfm {
+
+inline constexpr uint32_t kMostTries = 5;
+
+// Lasts: a restored world goes on with it.
+struct IntegratorPurse {
+  uint32_t open = 0;   // it has been filled for the first time
+  uint32_t tries = 0;  // of implicit time that were given up since it has last paid
+  double units = 0;    // of work, as points and cells in an explicit sub-step
+};
+inline bool sound(const IntegratorPurse &p) {
+  return p.open <= 1 && p.tries <= kMostTries && std::isfinite(p.units);
+}
+
+}  // namespace dfm

@@ -1,0 +1,144 @@
+#include "step/counting.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "dynamics/relative_work.h"
+#include "plugin/context.h"
+#include "state/world.h"
+#include "step/context.h"
+#include "step/stages.h"
+#include "step/turn_integrators.h"
+
+namespace dfm {
+namespace {
+
+constexpr double kTry = 1.0 / 30;    // s of explicit time, whose work a try may lose
+constexpr double kPutBy = 0.25;      // of explicit work, toward the next try
+constexpr double kMost = 4;          // tries, that implicit time may save up
+constexpr double kSafeShare = 0.25;  // of the limit on sub-steps
+constexpr double kFilled = 1e300;    // units, of a step that may cost anything
+
+bool is(const Body &b, Counted what) { return b.integrator.counted == what; }
+bool any(const World &w, Counted what) {
+  return std::ranges::any_of(w.bodies, [&](const auto &b) { return is(*b, what); });
+}
+
+// Units of one explicit sub-step of those that are awake, or of those among them that are explicit now.
+double units(const World &w, bool all) {
+  double sum = 0;
+  for (const auto &b : w.bodies)
+    if (!b->slumber.asleep && (all || !is(*b, Counted::implicit)))
+      sum += double(b->p.n) + double(b->tets.size() / 4);
+  return sum;
+}
+
+// s, the sub-step if all of them were explicit.
+double explicit_step(const World &w) {
+  double least = w.bound.step;
+  for (const auto &b : w.bodies)
+    if (!is(*b, Counted::no) && !b->slumber.asleep) least = std::min(least, b->integrator.step);
+  return least;
+}
+
+// Whether a step may be taken by explicit sub-steps of h. Their number rises while shapes change, and
+// implicit steps of that length would have to take over in the midst of it: so not if it is near the limit,
+// unless the library chooses the steps, the next of which will be short.
+bool may_be_cut(const World &w, double dt, double h) {
+  const double n = dt / h;
+  return n <= kSafeShare * w.def.max_substeps || (dt == accurate_step(w.sizes) && n <= w.def.max_substeps);
+}
+
+double effort(const World &w) {
+  double sum = 0;
+  for (const auto &b : w.bodies) sum += b->dynamics->effort();
+  return sum;
+}
+
+// All of them or none.
+void turn(World &w, Counted from, Counted to) {
+  std::vector<std::pair<Body *, std::unique_ptr<Dynamics>>> made;
+  for (const auto &b : w.bodies) {
+    if (!is(*b, from)) continue;
+    const ImplicitOptions chosen = implicit_choice(w, *b);
+    made.emplace_back(b.get(), make_dynamics(w.meters.dynamics.memory(), b->p, b->surface, b->model, b->edges,
+                                             to == Counted::implicit ? &chosen : nullptr));
+  }
+  for (auto &[b, dynamics] : made) {
+    b->dynamics.swap(dynamics);
+    b->integrator.counted = to;
+    b->integrator.used = to == Counted::explicitly             ? DFM_INTEGRATOR_SYMPLECTIC_EULER
+                         : implicit_choice(w, *b).second_order ? DFM_INTEGRATOR_TR_BDF2
+                                                               : DFM_INTEGRATOR_IMPLICIT_EULER;
+    b->bound.known = false;
+    w.context->logf(DFM_LOG_INFO, "body '%s' goes on by %s from %g s on, by count of what steps take",
+                    b->name.c_str(), to == Counted::explicitly ? "symplectic_euler" : "implicit steps",
+                    w.time);
+  }
+  w.changed = true;
+  w.sizes = {};  // another bound, and other errors
+}
+
+}  // namespace
+
+ImplicitOptions implicit_choice(const World &w, const Body &b) {
+  ImplicitOptions out = w.implicit;
+  out.second_order = out.newton != 1 || b.model.can(DFM_CAP_CONSTANT_STIFFNESS);
+  return out;
+}
+
+void begin_count(World &w, StepContext &step, double dt) {
+  Counting &c = step.counting = {};
+  if (w.prescribed.stands() || !(any(w, Counted::implicit) || any(w, Counted::explicitly))) return;
+  const double h = explicit_step(w);
+  if (!(h > 0 && std::isfinite(h))) return;
+  c.on = true;
+  c.before = effort(w);
+  if (!w.purse.open) w.purse = {1, 0, kTry / h * units(w, true)};
+  if (any(w, Counted::implicit) && may_be_cut(w, dt, h))
+    c.most = kUnitWork * (dt / h * units(w, true) + std::max(0.0, w.purse.units));
+}
+
+double body_effort(const World &w, const StepContext &step) { return effort(w) - step.counting.before; }
+
+void give_up_implicit(World &w) {
+  turn(w, Counted::implicit, Counted::explicitly);
+  w.purse.units = 0;
+  w.purse.tries = std::min(w.purse.tries + 1, kMostTries);
+}
+
+bool may_take_up_implicit(const World &w) {
+  return std::ranges::any_of(
+      w.bodies, [](const auto &b) { return is(*b, Counted::explicitly) && b->model.can(DFM_CAP_STIFFNESS); });
+}
+
+void take_up_implicit(World &w) {
+  for (const auto &b : w.bodies)  // parameters may have changed
+    if (is(*b, Counted::explicitly) && !b->model.can(DFM_CAP_STIFFNESS)) b->integrator.counted = Counted::no;
+  turn(w, Counted::explicitly, Counted::implicit);
+  w.purse.units = kFilled;
+}
+
+void end_count(World &w, StepContext &step, double dt, double substeps) {
+  const Counting &c = step.counting;
+  if (!c.on) return;
+  IntegratorPurse &purse = w.purse;
+  const double h = explicit_step(w), all = units(w, true), one = kTry / h * all;
+  if (any(w, Counted::implicit)) {
+    const double taken = (body_effort(w, step) + c.contact) / kUnitWork + substeps * units(w, false);
+    purse.units = std::min(purse.units + dt / h * all - taken, kMost * one);
+    if (purse.units == kMost * one) purse.tries = 0;
+    if (purse.units < 0 && c.most > 0) give_up_implicit(w);
+    return;
+  }
+  purse.units += kPutBy * substeps * all;
+  if (purse.units < std::ldexp(one, int(purse.tries))) return;
+  take_up_implicit(w);
+  purse.units = one;
+}
+
+}  // namespace dfm

@@ -1,0 +1,18 @@
+// What ends a step because bodies have the wrong one of the two integrators that are left to the library
+// (step/counting.h): it is taken again with the other one, from the state before it.
+#pragma once
+
+namespace dfm {
+
+struct World;
+
+// Implicit steps cost too much: explicit ones from now on.
+void give_up_implicit(World &w);
+// Explicit time would take more sub-steps than a step may have: implicit steps, whatever this one costs.
+void take_up_implicit(World &w);
+// Whether the latter has anybody to move.
+bool may_take_up_implicit(const World &w);
+// Ends the present step for that reason.
+[[noreturn]] void end_explicit_step();
+
+}  // namespace dfm
