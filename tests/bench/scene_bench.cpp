@@ -47,7 +47,7 @@ void run(dfm_context *context, const Case &c, std::FILE *csv, const std::string 
   const std::string path = std::string(DEFORM_SOURCE_DIR) + "/examples/scenes/" + c.scene;
   if (dfm_scene_open(context, path.c_str(), &options, &scene) != DFM_OK ||
       dfm_scene_world(scene, &world) != DFM_OK) {
-    std::printf("%-34s left out: %s\n", c.name, dfm_last_error());
+    std::printf("%-40s left out: %s\n", c.name, dfm_last_error());
     return;
   }
   dfm_scene_settings settings{};
@@ -88,7 +88,7 @@ void run(dfm_context *context, const Case &c, std::FILE *csv, const std::string 
   dfm_world_profile(world, 16, t1, &n);
   const dfm_world_stats after = stats();
   const double substeps = double(after.substeps - before.substeps) / double(total);
-  std::printf("%-34s %8.0f (best %.0f)", c.name, rate, fastest);
+  std::printf("%-40s %8.0f (best %.0f)", c.name, rate, fastest);
   if (c.reach > 0) std::printf("  reach %6.0f: %3.0f %%", c.reach, 100 * rate / c.reach);
   if (after.guard_steps > before.guard_steps)
     std::printf("  guard acted in %g sub-steps", double(after.guard_steps - before.guard_steps));
@@ -128,11 +128,21 @@ int main(int argc, char **argv) {
                                     "/materials/firm/young=6e5",
                                     std::string("/materials/soft/young=") + soft};
   };
+  // The forces in single precision (dfm.f32/1).
+  const auto single = [](std::vector<std::string> set) {
+    for (const char *body : {"0", "1"})
+      set.push_back(std::string("/bodies/") + body + "/model/precision=\"single\"");
+    return set;
+  };
   const std::vector<Case> cases{
       {"fine pair: springs", "two_cylinders_fine.json", springs("1.2e5"), 3, 1, 2000},
       {"fine pair: springs and volume", "two_cylinders_fine.json", {}, 3, 1, 1200},
       {"coarse pair: springs", "two_cylinders_coarse.json", springs("2.5e5"), 3, 1, 10000},
       {"coarse pair: springs and volume", "two_cylinders_coarse.json", {}, 3, 1, 6000},
+      {"fine pair: springs, single", "two_cylinders_fine.json", single(springs("1.2e5")), 3, 1, 3000},
+      {"fine pair: springs and volume, single", "two_cylinders_fine.json", single({}), 3, 1, 0},
+      {"coarse pair: springs, single", "two_cylinders_coarse.json", single(springs("2.5e5")), 3, 1, 15000},
+      {"coarse pair: springs and volume, single", "two_cylinders_coarse.json", single({}), 3, 1, 0},
       {"own pair (demo)", "two_cylinders.json", {}, 2, 1, 0},
       {"ten bodies", "ten_bodies.json", {}, 1, 0.5, 0},
       // What the guard costs: the same without it.
@@ -140,7 +150,7 @@ int main(int argc, char **argv) {
       {"own pair, unguarded", "two_cylinders.json", {"/contact/guard=false"}, 2, 1, 0},
       {"ten bodies, unguarded", "ten_bodies.json", {"/contact/guard=false"}, 1, 0.5, 0},
   };
-  std::printf("%-34s %8s\n", "scene", "full steps per second of processor time");
+  std::printf("%-40s %8s\n", "scene", "full steps per second of processor time");
   for (Case c : cases) {
     if (std::string(c.name).find(only) == std::string::npos) continue;
     const char *const params = law == "none"   ? "{}"

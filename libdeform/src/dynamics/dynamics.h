@@ -134,6 +134,11 @@ class Dynamics {
   // touched: there are any. False: the model cannot, or its end is not finite.
   virtual bool end_state(const SubStep &now, const double *surfel_impulse, bool touched) = 0;
   virtual EndState end() const = 0;
+  // point_velocity() is that without contact again, before a further solve: end_state() may have put the end
+  // in its place.
+  virtual void free_again(const SubStep &) {}
+  // After somebody has changed point_velocity().
+  virtual void free_changed() {}
   // Bounds of the surfels' mean velocities and of what contact has changed of them, m/s, as the linear
   // response gives them: replaced by the true ones where the end need not agree with it. After end_state().
   virtual void bound_ends(double &, double &) const {}

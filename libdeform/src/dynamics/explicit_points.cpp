@@ -13,7 +13,9 @@ ExplicitPoints::ExplicitPoints(const Memory &memory, Phyxels &points, Surface &s
       edges_(edges),
       loops_(points_kernels()),
       stiffness_(points.n, 0.0, HookAllocator<double>(memory)),
-      damping_(points.n, 0.0, HookAllocator<double>(memory)) {}
+      damping_(points.n, 0.0, HookAllocator<double>(memory)) {
+  use_memory(memory, reached_, before_);
+}
 
 bool ExplicitPoints::bound(double time, const AddRowSums &outside, StepBound &out) {
   const dfm_model &ops = *model_.ops;
@@ -49,6 +51,9 @@ bool ExplicitPoints::add_forces(const SubStep &now) {
 
 bool ExplicitPoints::free_motion(const SubStep &now, double &kinetic) {
   kinetic = predict(loops_, p_, now.gravity, now.h);
+  ways_known_ = true;
+  in_place_ = false;
+  reached_.clear();
   // A lightest point at the limit has so much alone; who has less need not be looked at point by point.
   if (kinetic < 0.5 * p_.least_mass * (now.fastest * now.fastest)) return true;
   if (!std::isfinite(kinetic)) return false;
@@ -56,17 +61,44 @@ bool ExplicitPoints::free_motion(const SubStep &now, double &kinetic) {
                      [&](double v) { return std::fabs(v) <= now.fastest; });
 }
 
-// Contact reaches few points, where surfels are points: only those are asked for their impulse.
+// Contact reaches few points, where surfels are points: only those move otherwise than freely.
 bool ExplicitPoints::end_state(const SubStep &now, const double *surfel_impulse, bool touched) {
-  if (touched && surface_.identity()) find_end(loops_, p_, surface_, surfel_impulse, now.h);
-  else find_end(loops_, p_, touched, now.h);
+  free_again(now);
+  in_place_ = ways_known_ && (!touched || surface_.identity());
+  if (!in_place_) {
+    find_end(loops_, p_, touched, now.h);
+    return true;
+  }
+  if (!touched) return true;
+  reached_.reserve(surface_.nsurfel);
+  before_.resize(size_t{3} * surface_.nsurfel);
+  for (uint32_t s = 0; s < surface_.nsurfel; ++s) {
+    const double *const q = surfel_impulse + 3 * size_t(s);
+    if (q[0] == 0 && q[1] == 0 && q[2] == 0) continue;
+    const size_t first = size_t(surface_.point[s]) * kStride;
+    std::copy_n(&p_.v_free[first], 3, &before_[3 * reached_.size()]);
+    reached_.push_back(first);
+    for (size_t k = 0, at = first; k < 3; ++k, ++at) {
+      p_.v_free[at] += p_.inv_mass[at] * q[k];
+      p_.x_end[at] = p_.x[at] + now.h * p_.v_free[at];
+    }
+  }
   return true;
 }
 
+void ExplicitPoints::free_again(const SubStep &now) {
+  for (size_t m = 0; m < reached_.size(); ++m)
+    for (size_t k = 0, at = reached_[m]; k < 3; ++k, ++at) {
+      p_.v_free[at] = before_[3 * m + k];
+      p_.x_end[at] = p_.x[at] + now.h * p_.v_free[at];
+    }
+  reached_.clear();
+}
+
 void ExplicitPoints::commit(const SubStep &now, double fraction) {
-  if (fraction < 1) shorten(p_, p_.v_end.data(), now.h * fraction);
+  if (fraction < 1) shorten(p_, end().mean, now.h * fraction);
   p_.x.swap(p_.x_end);
-  p_.v.swap(p_.v_end);
+  p_.v.swap(in_place_ ? p_.v_free : p_.v_end);
   model_.commit_state();
 }
 

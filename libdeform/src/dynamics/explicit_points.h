@@ -20,13 +20,24 @@ class ExplicitPoints : public Dynamics {
   const double *diagonal() const override { return p_.inv_mass.data(); }
   const double *point_velocity() const override { return p_.v_free.data(); }
   bool end_state(const SubStep &now, const double *surfel_impulse, bool touched) override;
-  EndState end() const override { return {p_.v_end.data(), p_.v_end.data()}; }
+  void free_again(const SubStep &now) override;
+  void free_changed() override { ways_known_ = false; }
+  EndState end() const override {
+    const double *const v = in_place_ ? p_.v_free.data() : p_.v_end.data();
+    return {v, v};
+  }
   void commit(const SubStep &now, double fraction) override;
 
  private:
   const Array<uint32_t> &edges_;
   const PointsKernels &loops_;
   Array<double> stiffness_, damping_;  // [npoint] row sums: N/m, N s/m
+  // The end is the free motion but for the few points that contact reaches: it stands in v_free, and what
+  // these had there before is kept.
+  bool ways_known_ = false;  // x_end follows from v_free
+  bool in_place_ = false;
+  Array<size_t> reached_;  // places in v_free
+  Array<double> before_;   // [reached,3] m/s
 };
 
 }  // namespace dfm

@@ -6,14 +6,13 @@
 namespace dfm {
 
 struct PointsKernels {
-  // free = v + h (w (f + mass g)), of all points [n,4]; returns the kinetic energy at free, J. gravity: [4]
+  // free = v + h (w (f + mass g)), x_end = x + h free, of all points [n,4]; returns the kinetic energy at
+  // free, J. gravity: [4]
   double (*predict)(uint32_t n, double h, const double *gravity, const double *mass, const double *v,
-                    const double *w, const double *f, double *free);
+                    const double *w, const double *f, const double *x, double *free, double *x_end);
   // v_end = free + w impulse (impulse null: free), x_end = x + h v_end
   void (*end)(uint32_t n, double h, const double *x, const double *free, const double *w,
               const double *impulse, double *x_end, double *v_end);
-  // the same of points that contact does not reach: with impulses of zero
-  void (*end_apart)(uint32_t n, double h, const double *x, const double *free, double *x_end, double *v_end);
   // how many of the cells [n,4] are inverted. x: [..,4]
   uint32_t (*inverted)(uint32_t n, const uint32_t *cells, const double *x);
   // of edges [n,2] d between points at x that move at v: the largest |d.(v_j - v_i)| / d.d, 1/s

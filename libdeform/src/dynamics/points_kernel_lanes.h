@@ -11,8 +11,8 @@ namespace {
 constexpr uint32_t kParts = 4 / kWidth;  // vectors that hold a point
 
 double predict(uint32_t n, double h, const double *gravity, const double *mass, const double *v,
-               const double *w, const double *f, double *free) {
-  const Vector step = splat(h);
+               const double *w, const double *f, const double *x, double *free, double *x_end) {
+  const Vector step = splat(h), none = {};
   Vector g[kParts], square[2][kParts] = {};  // two sums, so that one addition does not wait for the other
   DEFORM_UNROLL
   for (uint32_t p = 0; p < kParts; ++p) g[p] = load(gravity + p * kWidth);
@@ -21,8 +21,10 @@ double predict(uint32_t n, double h, const double *gravity, const double *mass, 
     DEFORM_UNROLL
     for (uint32_t p = 0; p < kParts; ++p) {
       const size_t at = 4 * size_t(i) + p * kWidth;
-      const Vector u = load(v + at) + step * (load(w + at) * (load(f + at) + m * g[p]));
+      // none: +0 of -0, as an impulse of zero would make it
+      const Vector u = (load(v + at) + step * (load(w + at) * (load(f + at) + m * g[p]))) + none;
       store(free + at, u);
+      store(x_end + at, load(x + at) + step * u);
       square[sum][p] += m * (u * u);
     }
   };
@@ -51,15 +53,6 @@ void end(uint32_t n, double h, const double *x, const double *free, const double
   }
   for (size_t at = 0; at < 4 * size_t(n); at += kWidth) {
     const Vector u = load(free + at);
-    store(v_end + at, u);
-    store(x_end + at, load(x + at) + step * u);
-  }
-}
-
-void end_apart(uint32_t n, double h, const double *x, const double *free, double *x_end, double *v_end) {
-  const Vector step = splat(h), none = {};
-  for (size_t at = 0; at < 4 * size_t(n); at += kWidth) {
-    const Vector u = load(free + at) + none;  // an impulse of zero makes +0 of -0
     store(v_end + at, u);
     store(x_end + at, load(x + at) + step * u);
   }
@@ -144,7 +137,7 @@ double strain_rate(uint32_t n, const uint32_t *edges, const double *x, const dou
   return out;
 }
 
-constexpr PointsKernels kKernels = {predict, end, end_apart, inverted, strain_rate};
+constexpr PointsKernels kKernels = {predict, end, inverted, strain_rate};
 
 }  // namespace
 }  // namespace dfm

@@ -20,25 +20,13 @@ const PointsKernels &points_kernels() {
 
 double predict(const PointsKernels &loops, Phyxels &p, Vec3 gravity, double h) {
   const double g[kStride] = {gravity.x, gravity.y, gravity.z, 0};
-  return loops.predict(p.n, h, g, p.mass.data(), p.v.data(), p.inv_mass.data(), p.f.data(), p.v_free.data());
+  return loops.predict(p.n, h, g, p.mass.data(), p.v.data(), p.inv_mass.data(), p.f.data(), p.x.data(),
+                       p.v_free.data(), p.x_end.data());
 }
 
 void find_end(const PointsKernels &loops, Phyxels &p, bool touched, double h) {
   loops.end(p.n, h, p.x.data(), p.v_free.data(), p.inv_mass.data(), touched ? p.impulse.data() : nullptr,
             p.x_end.data(), p.v_end.data());
-}
-
-void find_end(const PointsKernels &loops, Phyxels &p, const Surface &surface, const double *impulse,
-              double h) {
-  loops.end_apart(p.n, h, p.x.data(), p.v_free.data(), p.x_end.data(), p.v_end.data());
-  for (uint32_t s = 0; s < surface.nsurfel; ++s) {
-    const double *const q = impulse + 3 * size_t(s);
-    if (q[0] == 0 && q[1] == 0 && q[2] == 0) continue;
-    for (size_t k = 0, at = size_t(surface.point[s]) * kStride; k < 3; ++k, ++at) {
-      p.v_end[at] = p.v_free[at] + p.inv_mass[at] * q[k];
-      p.x_end[at] = p.x[at] + h * p.v_end[at];
-    }
-  }
 }
 
 void shorten(Phyxels &p, const double *mean, double h) {

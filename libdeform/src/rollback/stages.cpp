@@ -63,7 +63,9 @@ void stage_lagged(World &w, StepContext &step) {
         any = true;
         p.v_free[i] += step.h * (diagonal[i] * force[i]);
       }
-    if (any) gather_surface(b->surface, p.x.data(), p.v_free.data());
+    if (!any) continue;
+    b->dynamics->free_changed();
+    gather_surface(b->surface, p.x.data(), p.v_free.data());
   }
 }
 
@@ -214,6 +216,7 @@ void roll_back(World &w, StepContext &step) {
   for (size_t i = 0; i < step.body_views.size(); ++i) {
     Body &b = *w.bodies[step.body_views[i].slot];
     const double *const fraction = buffers(step).fractions[i];
+    b.dynamics->free_changed();
     for (uint32_t s = 0; s < b.surface.nsurfel; ++s) {
       const size_t at = size_t{b.surface.point[s]} * kStride;
       const Vec3 before = load3(&b.p.v_free[at]);

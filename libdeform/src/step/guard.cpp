@@ -259,6 +259,7 @@ bool stage_guard(World &w, StepContext &step, uint32_t *trouble) {
     if (solve == kSolves || spares(step, Thrift::pieces)) break;
     guard_add_hits(w, step);
     if (step.residual.due > 1) --w.stats.unconverged;  // counted once, by the last solve
+    for (const uint32_t i : step.active) w.bodies[i]->dynamics->free_again(sub_step_of(w, step));
     step.guard.resolving = true;
     const bool solved = stage_solve(w, step, trouble);
     step.guard.resolving = false;

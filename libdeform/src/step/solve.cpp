@@ -91,6 +91,8 @@ void make_rows(World &w, StepContext &step) {
   take_choices(step);
   if (step.rigid_again) step.best_impulse.assign(step.rows.impulse.begin(), step.rows.impulse.end());
   make_bonds(w, step, step.rigid_again || step.guard.resolving);
+  for (size_t i = 0; i < w.bodies.size(); ++i)  // where it stands has changed places with the last end
+    step.sources[i].velocity = w.bodies[i]->dynamics->contact_velocity();
   step.rows.build(step.contacts, step.sources, {step.rigid_places, step.rigid_groups}, step.bonds);
   correct_rigids(w, step);
   fill_responses(w, step);
