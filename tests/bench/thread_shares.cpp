@@ -1,8 +1,8 @@
 // What more threads can give a scene, from one thread: a host's parallel_for that runs the blocks of each job
 // one after the other and takes their times. Per stage: microseconds of a step, the share of it that comes in
-// blocks, jobs, blocks; then the factor that n threads would give, the blocks of each job taken in turn by
-// whoever is free, with `handout` microseconds for each job. Steps that took three times the median
-// were disturbed by other work of the machine, and are left out.
+// blocks, jobs, blocks, microseconds on two threads; then the factor that n threads would give, the blocks of
+// each job taken in turn by whoever is free, with `handout` microseconds for each job. Steps that took three
+// times the median were disturbed by other work of the machine, and are left out.
 //   thread_shares SCENE SECONDS [HANDOUT]
 #include <time.h>
 
@@ -40,6 +40,7 @@ struct Zone {
   std::string name;
   double time = 0, blocks_time = 0;
   double jobs = 0, blocks = 0;
+  double saved = 0;  // by a second thread
 };
 
 struct Shares {
@@ -82,6 +83,7 @@ struct Shares {
     }
     ++zone.jobs;
     zone.blocks_time += total;
+    zone.saved += total - *std::max_element(free[1].begin(), free[1].end()) - s.handout;
     for (size_t k = 1; k < kCounts; ++k)
       s.saved[k].back() += total - *std::max_element(free[k].begin(), free[k].end()) - s.handout;
   }
@@ -137,12 +139,13 @@ int main(int argc, char **argv) {
   for (const double t : shares.times) all += t;
   for (const Zone &z : shares.zones) total += z.time;
   const double steps = double(shares.times.size());
-  std::printf("%-18s %10s %8s %10s %8s %8s\n", "stage", "us/step", "share", "in blocks", "jobs", "blocks");
+  std::printf("%-18s %10s %8s %10s %8s %8s %12s\n", "stage", "us/step", "share", "in blocks", "jobs",
+              "blocks", "on 2 threads");
   for (const Zone &z : shares.zones) {
     blocks += z.blocks_time;
-    std::printf("%-18s %10.2f %7.1f%% %9.1f%% %8.2f %8.1f\n", z.name.c_str(), z.time / steps,
+    std::printf("%-18s %10.2f %7.1f%% %9.1f%% %8.2f %8.1f %12.2f\n", z.name.c_str(), z.time / steps,
                 100 * z.time / total, z.time > 0 ? 100 * z.blocks_time / z.time : 0, z.jobs / steps,
-                z.blocks / steps);
+                z.blocks / steps, (z.time - z.saved) / steps);
   }
   std::printf("%.0f of %ld steps, %.1f us each, p = %.3f, hand-out %.2f us\n", steps, n, all / steps,
               blocks / total, shares.handout);

@@ -88,6 +88,8 @@ BroadPhase::BroadPhase(const Memory &memory)
       fresh_(HookAllocator<uint64_t>(memory_)),
       order_(HookAllocator<uint32_t>(memory_)),
       pairs_(HookAllocator<Pair>(memory_)),
+      parts_(HookAllocator<Part>(memory_)),
+      merged_(HookAllocator<std::span<const uint64_t>>(memory_)),
       stack_(HookAllocator<PairOfTriangles>(memory_)) {
   found_.emplace_back(memory_);
 }
@@ -324,28 +326,54 @@ void BroadPhase::find_pairs(std::span<const BodyView> bodies, std::span<const Ob
 }
 
 void BroadPhase::list_pairs(Tasks *tasks) {
-  const size_t n = pairs_.size();
-  if (n < 2 || !tasks || !tasks->parallel()) {
+  if (!tasks || !tasks->parallel()) {
     for (const Pair &pair : pairs_) {
-      list(pair, found_[0]);
-      add_segments(pair, found_[0]);
+      list(pair, 0, found_[0]);
+      add_segments(pair, {&found_[0], 1});
     }
     return;
   }
-  while (found_.size() < n) found_.emplace_back(memory_);
-  each(n, 1, tasks, [&](size_t i) { list(pairs_[i], found_[i]); });
-  for (size_t i = 0; i < n; ++i) add_segments(pairs_[i], found_[i]);
+  parts_.clear();
+  for (uint32_t i = 0; i < pairs_.size(); ++i) cut(i);
+  while (found_.size() < parts_.size()) found_.emplace_back(memory_);
+  each(parts_.size(), 1, tasks, [&](size_t i) { list(pairs_[parts_[i].pair], parts_[i].node, found_[i]); });
+  for (size_t i = 0, end = 0; i < parts_.size(); i = end) {
+    while (end < parts_.size() && parts_[end].pair == parts_[i].pair) ++end;
+    add_segments(pairs_[parts_[i].pair], {&found_[i], end - i});
+  }
 }
 
-void BroadPhase::list(const Pair &pair, Found &found) const {
+// Surfaces alone are large enough: into halves of a's tree, of at most kPart nodes, those that are near b.
+void BroadPhase::cut(uint32_t pair) {
+  constexpr uint32_t kPart = 32, kMost = 64;  // kMost: nodes that wait, one for each level
+  const Pair &p = pairs_[pair];
+  const BoxTree &tree = bodies_[p.a].tree;
+  if ((p.obstacle && things_[p.b].view.shape != Shape::mesh) || tree.nodes().size() <= kPart)
+    return parts_.push_back({pair, 0});
+  struct Piece { uint32_t node, end; } waiting[kMost];
+  uint32_t n = 0;
+  waiting[n++] = {0, uint32_t(tree.nodes().size())};
+  while (n > 0) {
+    const Piece at = waiting[--n];
+    const BoxTree::Node node = tree.nodes()[at.node];
+    if (at.end - at.node <= kPart || node.count || n + 2 > kMost) {
+      parts_.push_back({pair, at.node});
+      continue;
+    }
+    waiting[n++] = {node.right, at.end};
+    waiting[n++] = {at.node + 1, node.right};
+  }
+}
+
+void BroadPhase::list(const Pair &pair, uint32_t node, Found &found) const {
   found.clear();
   const Body &a = bodies_[pair.a];
   if (!pair.obstacle) {
-    found.near = list_surfaces(a, bodies_[pair.b], found);
+    found.near = list_surfaces(a, bodies_[pair.b], node, found);
   } else {
     const Thing &thing = things_[pair.b];
     switch (thing.view.shape) {
-      case Shape::mesh: found.near = thing.usable && list_surfaces(a, thing, found); break;
+      case Shape::mesh: found.near = thing.usable && list_surfaces(a, thing, node, found); break;
       case Shape::voxels: found.near = list_voxels(a, thing, found); break;
       default: found.near = list_obstacle(a, thing, found);
     }
@@ -354,7 +382,7 @@ void BroadPhase::list(const Pair &pair, Found &found) const {
 }
 
 // False where the two are too far apart for any.
-bool BroadPhase::list_surfaces(const Side &a, const Side &b, Found &found) const {
+bool BroadPhase::list_surfaces(const Side &a, const Side &b, uint32_t node, Found &found) const {
   const Features fa{*a.surface, a.x.data()}, fb{*b.surface, b.x.data()};
   const double near = kRounding * (a.margin + b.margin);
   const double edges = near + edge_recovery_depth(*a.surface, *b.surface);
@@ -373,7 +401,7 @@ bool BroadPhase::list_surfaces(const Side &a, const Side &b, Found &found) const
                                            to.corner(face, 2), limit))
         list.push_back(features(from.surface.tri[3 * size_t{t} + k], face));
   };
-  near_pairs(a.tree, b.tree, wide, found.stack, [&](uint32_t place_a, uint32_t place_b, double distance2) {
+  const auto look_at = [&](uint32_t place_a, uint32_t place_b, double distance2) {
     const uint32_t s = a.tree.triangles()[place_a], t = b.tree.triangles()[place_b];
     vertices(fa, s, fb, t, deep_b, found.vf);
     vertices(fb, t, fa, s, deep_a, found.fv);
@@ -385,7 +413,8 @@ bool BroadPhase::list_surfaces(const Side &a, const Side &b, Found &found) const
                                                            fb.corner(t, l), fb.corner(t, (l + 1) % 3), edges))
           found.ee.push_back(
               features(fa.surface.tri_edge[3 * size_t{s} + k], fb.surface.tri_edge[3 * size_t{t} + l]));
-  });
+  };
+  near_pairs(a.tree, b.tree, wide, found.stack, look_at, node);
   return true;
 }
 
@@ -464,23 +493,35 @@ bool BroadPhase::list_obstacle(const Body &a, const Thing &thing, Found &found) 
   return true;
 }
 
-void BroadPhase::add_segments(const Pair &pair, const Found &found) {
-  if (!found.near) return;
+void BroadPhase::add_segments(const Pair &pair, std::span<const Found> parts) {
+  if (!parts.front().near) return;
   const auto [a, b, obstacle] = pair;
   const Shape shape = obstacle ? things_[b].view.shape : Shape::none;
-  add_segment(a, b, obstacle, 0, found.vf);
+  add_segment(a, b, obstacle, 0, parts, &Found::vf);
   if (shape == Shape::plane) return;
-  if (shape != Shape::voxels) add_segment(a, b, obstacle, 1, found.ee);
-  if (obstacle) add_segment(a, b, true, 2, found.fv);
-  else add_segment(b, a, false, 0, found.fv);
+  if (shape != Shape::voxels) add_segment(a, b, obstacle, 1, parts, &Found::ee);
+  if (obstacle) add_segment(a, b, true, 2, parts, &Found::fv);
+  else add_segment(b, a, false, 0, parts, &Found::fv);
 }
 
 void BroadPhase::add_segment(uint32_t a, uint32_t b, bool obstacle, uint8_t kind,
-                             const Array<uint64_t> &found) {
+                             std::span<const Found> parts, Array<uint64_t> Found::*list) {
   const uint64_t id_b = obstacle ? things_[b].view.id : bodies_[b].id;
+  const size_t begin = fresh_.size();
+  merged_.clear();
+  for (const Found &found : parts)
+    if (!(found.*list).empty()) merged_.emplace_back(found.*list);
+  while (merged_.size() > 1) {
+    size_t least = 0;
+    for (size_t k = 1; k < merged_.size(); ++k)
+      if (merged_[k].front() < merged_[least].front()) least = k;
+    fresh_.push_back(merged_[least].front());
+    merged_[least] = merged_[least].subspan(1);
+    if (merged_[least].empty()) merged_.erase(merged_.begin() + std::ptrdiff_t(least));
+  }
+  if (!merged_.empty()) fresh_.insert(fresh_.end(), merged_[0].begin(), merged_[0].end());
   next_segments_.push_back(
-      {bodies_[a].id, id_b, a, b, uint32_t(fresh_.size()), uint32_t(found.size()), obstacle, kind, true});
-  fresh_.insert(fresh_.end(), found.begin(), found.end());
+      {bodies_[a].id, id_b, a, b, uint32_t(begin), uint32_t(fresh_.size() - begin), obstacle, kind, true});
 }
 
 // Runs in the order of contacts, from the old lists and the fresh ones.

@@ -8,8 +8,8 @@
 // reach of a contact then. Lists hold a superset of the contacts and narrow/ decides by the geometry of the
 // sub-step alone, so results never depend on when lists were made.
 //
-// On several threads bodies are looked at one by one and pairs are listed one by one, each into memory of its
-// own; runs are put together in the order of one thread.
+// On several threads bodies are looked at one by one, and pairs are listed in parts, a part of one surface
+// with all of the other, each into memory of its own. Lists are sorted, so parts do not show in them.
 #pragma once
 #include <cstdint>
 #include <span>
@@ -110,7 +110,10 @@ class BroadPhase {
     uint32_t a, b;  // indices of the views; listed bodies in the order of ids
     bool obstacle;
   };
-  struct Found {        // {feature a, feature b} of one pair, each sorted
+  struct Part {  // of a pair: the triangles of a below that node of its tree
+    uint32_t pair, node;
+  };
+  struct Found {        // {feature a, feature b} of one part, each sorted
     bool near = false;  // not too far apart for any
     Array<uint64_t> vf, fv, ee;
     Array<PairOfTriangles> stack;
@@ -133,12 +136,14 @@ class BroadPhase {
   void find_pairs(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
                   const PairFilter &filter, Tasks *tasks);
   void list_pairs(Tasks *tasks);
-  void list(const Pair &pair, Found &found) const;
-  bool list_surfaces(const Side &a, const Side &b, Found &found) const;
+  void cut(uint32_t pair);
+  void list(const Pair &pair, uint32_t node, Found &found) const;
+  bool list_surfaces(const Side &a, const Side &b, uint32_t node, Found &found) const;
   bool list_voxels(const Body &a, const Thing &thing, Found &found) const;
   bool list_obstacle(const Body &a, const Thing &thing, Found &found) const;
-  void add_segments(const Pair &pair, const Found &found);
-  void add_segment(uint32_t a, uint32_t b, bool obstacle, uint8_t kind, const Array<uint64_t> &found);
+  void add_segments(const Pair &pair, std::span<const Found> parts);
+  void add_segment(uint32_t a, uint32_t b, bool obstacle, uint8_t kind, std::span<const Found> parts,
+                   Array<uint64_t> Found::*list);
   void assemble();
 
   Memory memory_;
@@ -154,7 +159,9 @@ class BroadPhase {
   Array<uint64_t> fresh_;  // {feature a, feature b}
   Array<uint32_t> order_;
   Array<Pair> pairs_;         // to be listed
-  std::vector<Found> found_;  // by number in pairs_; of one thread the first
+  Array<Part> parts_;         // of these, in their order
+  std::vector<Found> found_;  // by number in parts_; of one thread the first
+  Array<std::span<const uint64_t>> merged_;
   Array<PairOfTriangles> stack_;
   Stats stats_;
 };

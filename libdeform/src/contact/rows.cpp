@@ -314,7 +314,7 @@ void ContactRows::finish_bonds(std::span<const Bond> bonds) {
 }
 
 void ContactRows::finish(std::span<const ContactPoint> contacts, const double *tangents, double h,
-                         double planned, double offset, std::span<const Bond> bonds) {
+                         double planned, double offset, std::span<const Bond> bonds, Tasks *tasks) {
   frame.resize(size_t(all()) * 9);
   drive.resize(size_t(all()) * 3);
   rate.resize(n);
@@ -323,7 +323,7 @@ void ContactRows::finish(std::span<const ContactPoint> contacts, const double *t
   cross.resize(size_t(n) * 2);
   impulse.resize(size_t(all()) * 3);
   const double most = recovery > 0 ? recovery * planned : kOpens * offset;
-  for (uint32_t i = 0; i < n; ++i) {
+  const auto fill = [&](uint32_t i) {
     const Vec3 normal = load3(contacts[i].normal);
     const Vec3 t1 = load3(tangents + size_t(i) * 3);
     const Vec3 t2 = dfm::cross(normal, t1);
@@ -341,7 +341,8 @@ void ContactRows::finish(std::span<const ContactPoint> contacts, const double *t
     const Vec3 w1 = diagonal(i, t1), w2 = diagonal(i, t2);
     const double a = dot(t1, w1), c = dot(t2, w2), b = dot(t1, w2);
     wt[i] = 0.5 * (a + c) + std::sqrt(0.25 * (a - c) * (a - c) + b * b);
-  }
+  };
+  each_row_in_blocks(n, tasks, fill);
   if (nbond) finish_bonds(bonds);
   turn_frames();
 }

@@ -110,9 +110,10 @@ struct ContactRows {
     take_answers(b);
   }
   // Frames from normals and tangents [n,3], W diagonals, rates. planned: s, time in which a depth closes;
-  // longer than h where the guard has cut it, or depths would turn into speed.
+  // longer than h where the guard has cut it, or depths would turn into speed. tasks: null: on this thread
+  // alone.
   void finish(std::span<const ContactPoint> contacts, const double *tangents, double h, double planned,
-              double offset, std::span<const Bond> bonds = {});
+              double offset, std::span<const Bond> bonds = {}, Tasks *tasks = nullptr);
   void turn_frames();  // once `frame` and `drive` are known, for the kernels; finish() has done it
 
   // All dofs answer their own impulses only: the contacts' loops run in the kernels.

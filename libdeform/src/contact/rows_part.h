@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <span>
 
+#include "core/tasks.h"
+
 namespace dfm {
 
 struct RowRun { uint32_t first, n; };
@@ -20,6 +22,18 @@ template <class F>
 void each_row(std::span<const RowRun> runs, F &&f) {
   for (const RowRun &r : runs)
     for (uint32_t i = r.first; i < r.first + r.n; ++i) f(i);
+}
+
+// f(row) for all rows < n, which cannot fail, in blocks; tasks: null: on this thread alone. A block
+// takes some microseconds.
+inline constexpr uint32_t kRowsTogether = 32;
+template <class F>
+void each_row_in_blocks(uint32_t n, Tasks *tasks, F &&f) {
+  const auto block = [&](uint32_t begin, uint32_t end) {
+    for (uint32_t i = begin; i < end; ++i) f(i);
+  };
+  if (tasks) tasks->parallel_for(n, kRowsTogether, [&](uint32_t begin, uint32_t end) { block(begin, end); });
+  else block(0, n);
 }
 
 }  // namespace dfm

@@ -24,10 +24,10 @@ Vec3 transport(Vec3 t, Vec3 m, Vec3 n, bool *reset) {
 }
 
 void warm_start(const ContactStore &old, std::span<const ContactPoint> contacts, double h, ContactRows &rows,
-                ContactState &state, double *tangents, uint32_t *match) {
+                ContactState &state, double *tangents, uint32_t *match, Tasks *tasks) {
   const double scale = old.h > 0 ? h / old.h : 0;
   rows.impulse.resize(size_t(contacts.size()) * 3);
-  for (uint32_t i = 0; i < contacts.size(); ++i) {
+  each_row_in_blocks(static_cast<uint32_t>(contacts.size()), tasks, [&](uint32_t i) {
     const Vec3 n = load3(contacts[i].normal);
     const uint32_t m = match[i] = old.find(contacts[i].key);
     double *const l = &rows.impulse[size_t(i) * 3];
@@ -42,7 +42,7 @@ void warm_start(const ContactStore &old, std::span<const ContactPoint> contacts,
     store3(tangents + size_t(i) * 3, t);
     if (reset) {
       match[i] = kNone;
-      continue;
+      return;
     }
     for (int k = 0; k < 3; ++k) l[k] = scale * old.impulse[size_t(m) * 3 + size_t(k)];
     state.dwell[i] = old.dwell[m];
@@ -50,7 +50,7 @@ void warm_start(const ContactStore &old, std::span<const ContactPoint> contacts,
     if (old.law[m] == state.law[i])
       for (uint32_t s = 0; s < std::min(old.nstate, state.nstate); ++s)
         state.bristle[size_t(s) * state.stride + i] = old.bristle[size_t(m) * old.nstate + s];
-  }
+  });
 }
 
 }  // namespace dfm

@@ -76,9 +76,9 @@ void each_column(F &&f, Store &...c) {
 
 // Fresh contacts take over what their predecessors kept: the tangent turned with the normal (minimal
 // rotation), impulse times h/h_old, bristles where the law is the same. `tangents` [n,3] out; rows.impulse
-// and state.bristle are filled. match [n] out: index or kNone.
+// and state.bristle are filled. match [n] out: index or kNone. tasks: null: on this thread alone.
 void warm_start(const ContactStore &old, std::span<const ContactPoint> contacts, double h, ContactRows &rows,
-                ContactState &state, double *tangents, uint32_t *match);
+                ContactState &state, double *tangents, uint32_t *match, Tasks *tasks = nullptr);
 
 // The tangent t of normal m turned to normal n by the smallest rotation; a fresh tangent where the normals
 // are more than 120 degrees apart.

@@ -73,13 +73,15 @@ class BoxTree {
 };
 
 // f(place in a, place in b, squared distance of the boxes) for all triangles whose boxes are no further apart
-// than margin; places count in the order of the leaves. stack is scratch.
+// than margin; places count in the order of the leaves. stack is scratch. from: node of a, whose triangles
+// alone are looked at.
 template <class F>
-void near_pairs(const BoxTree &a, const BoxTree &b, double margin, Array<PairOfTriangles> &stack, F &&f) {
+void near_pairs(const BoxTree &a, const BoxTree &b, double margin, Array<PairOfTriangles> &stack, F &&f,
+                uint32_t from = 0) {
   if (a.empty() || b.empty()) return;
   const double limit = margin * margin;
   stack.clear();
-  stack.push_back({0, 0});
+  stack.push_back({from, 0});
   while (!stack.empty()) {
     const auto [i, j] = stack.back();
     stack.pop_back();

@@ -160,6 +160,20 @@ bool same_run(const Candidate &l, const Candidate &r) {
   return l.slot_a == r.slot_a && l.slot_b == r.slot_b && l.obstacle == r.obstacle && l.kind == r.kind;
 }
 
+// Runs are long, and no two have the same sides and kind: steps that double, then halves of the last one.
+size_t end_of_run(const Array<Candidate> &list, size_t begin) {
+  size_t in = begin, step = 1;
+  while (in + step < list.size() && same_run(list[in + step], list[begin])) {
+    in += step;
+    step *= 2;
+  }
+  const auto first = list.begin() + std::ptrdiff_t(in) + 1;
+  const auto last = list.begin() + std::ptrdiff_t(std::min(in + step, list.size()));
+  return size_t(
+      std::partition_point(first, last, [&](const Candidate &c) { return same_run(c, list[begin]); }) -
+      list.begin());
+}
+
 // Candidates that are worth a block of their own: some five microseconds.
 constexpr size_t kBlock = 96;
 
@@ -200,9 +214,7 @@ void find_contacts(std::span<const BodyView> bodies, std::span<const ObstacleVie
   double speed = 0;
   for (size_t i = 0; i < candidates.size();) {
     const Candidate &c = candidates[i];
-    size_t end = i + 1;
-    while (end < candidates.size() && same_run(candidates[end], c)) ++end;
-    const size_t begin = i;
+    const size_t begin = i, end = end_of_run(candidates, i);
     i = end;
     if (find.skips(c)) continue;
     if (!c.obstacle) {

@@ -98,11 +98,13 @@ void make_rows(World &w, StepContext &step) {
   fill_responses(w, step);
   step.tangents.resize(size_t(3) * n);
   step.match.resize(n);
-  warm_start(w.store, step.contacts, step.h, step.rows, step.state, step.tangents.data(), step.match.data());
+  warm_start(w.store, step.contacts, step.h, step.rows, step.state, step.tangents.data(), step.match.data(),
+             &w.context->tasks);
   share_areas(w, step);
   fit_bristles(w, step);
   step.rows.recovery = w.def.recovery_speed;
-  step.rows.finish(step.contacts, step.tangents.data(), step.h, step.guard.planned, w.offset, step.bonds);
+  step.rows.finish(step.contacts, step.tangents.data(), step.h, step.guard.planned, w.offset, step.bonds,
+                   &w.context->tasks);
   run_belts(step);
   std::copy(step.bond_impulse.begin(), step.bond_impulse.end(),
             step.rows.impulse.begin() + std::ptrdiff_t{3} * step.rows.n);
@@ -116,7 +118,8 @@ namespace {
 
 // After the operator has changed.
 void finish_rows(World &w, StepContext &step) {
-  step.rows.finish(step.contacts, step.tangents.data(), step.h, step.guard.planned, w.offset, step.bonds);
+  step.rows.finish(step.contacts, step.tangents.data(), step.h, step.guard.planned, w.offset, step.bonds,
+                   &w.context->tasks);
   run_belts(step);
   if (!step.guard.kept.empty()) guard_rates(step);
 }

@@ -203,6 +203,36 @@ TEST(BroadPhase, PairsOnSeveralThreads_AreThoseOfOne) {
   }
 }
 
+// A host's loop that runs blocks from the last to the first, and how many of them the largest job had.
+void backwards(void *user, uint32_t n, uint32_t grain, void (*fn)(void *, uint32_t, uint32_t), void *task) {
+  const uint32_t blocks = (n + grain - 1) / grain;
+  uint32_t &most = *static_cast<uint32_t *>(user);
+  most = std::max(most, blocks);
+  for (uint32_t k = blocks; k-- > 0;) fn(task, k * grain, std::min(n, (k + 1) * grain));
+}
+
+TEST(BroadPhase, OnePairOfSurfaces_IsListedInParts) {
+  Scene scene;
+  scene.offset = 1e-4;
+  std::mt19937 random(1);
+  for (const double x : {0.0, 0.598})
+    deform_at_random(scene.add(moved(sphere_mesh(0.3, 3), random_turn(random), Vec3{x, 0, 0})), random, 0.001,
+                     1);
+  uint32_t most = 0;
+  Tasks tasks(1, backwards, &most);
+  BroadPhase one(Memory::standard()), many(Memory::standard());
+  one.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset);
+  many.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset, &tasks);
+  EXPECT_GT(one.candidates().size(), 20u);
+  EXPECT_GT(most, 2u) << "the bodies alone are two blocks";
+  EXPECT_TRUE(same_bits(scene.contacts(one.candidates()), scene.contacts(many.candidates())));
+  ASSERT_EQ(one.candidates().size(), many.candidates().size());
+  for (size_t i = 0; i < one.candidates().size(); ++i) {
+    const Candidate &l = one.candidates()[i], &r = many.candidates()[i];
+    EXPECT_TRUE(l.feature_a == r.feature_a && l.feature_b == r.feature_b && l.kind == r.kind) << i;
+  }
+}
+
 TEST(BroadPhase, PairWithoutMemoryOnTwoThreads_ThrowsInTheCaller) {
   Scene scene = random_scene(12, 1);
   static std::atomic<bool> refuses;
