@@ -1,0 +1,82 @@
+// Ends of explicit points: the free motion but for what contact reaches, whichever solve was before.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "../world/inside.h"
+#include "support.h"
+#include "world.h"
+
+namespace {
+
+struct Falling {
+  test::Context context;
+  dfm_world world = test::make_world(context);
+  dfm::Body *body = nullptr;
+  dfm::SubStep now{0, 1e-4, {0, 0, -9.81}, HUGE_VAL, {}};
+  Falling() {
+    test::BodyOptions o;
+    o.position = {0.1, -0.2, 0.3};
+    o.velocity = {1, 2, -3};
+    test::make_body(context, world, "beam", {0.1, 0.1, 0.1}, 60, o);
+    test::run(world, 1e-3, 1e-3);
+    body = test::inside(world).bodies[0].get();
+    double kinetic = 0;
+    EXPECT_TRUE(body->dynamics->add_forces(now) && body->dynamics->free_motion(now, kinetic));
+  }
+  std::vector<double> impulses(unsigned seed, uint32_t every) const {
+    std::vector<double> q(3 * size_t{body->surface.nsurfel});
+    std::mt19937 random(seed);
+    for (size_t k = 0; k < q.size(); ++k)
+      if (k / 3 % every == 0) q[k] = 1e-3 * double(random()) / 4294967296.0;
+    return q;
+  }
+  void end(const std::vector<double> &q) const {
+    EXPECT_TRUE(body->dynamics->end_state(now, q.data(), true));
+  }
+};
+
+TEST(ExplicitPoints, ASecondEnd_IsThatOfItsImpulsesAlone) {
+  const Falling once, twice;
+  const std::vector<double> free(once.body->p.v_free.begin(), once.body->p.v_free.end());
+  twice.end(twice.impulses(1, 2));
+  twice.end(twice.impulses(2, 3));
+  once.end(once.impulses(2, 3));
+  const size_t n = 4 * size_t{once.body->p.n};
+  const double *const v = once.body->dynamics->end().v, *const w = twice.body->dynamics->end().v;
+  size_t changed = 0;
+  for (size_t k = 0; k < n; ++k) {
+    EXPECT_EQ(v[k], w[k]) << k;
+    EXPECT_EQ(once.body->p.x_end[k], twice.body->p.x_end[k]) << k;
+    EXPECT_EQ(once.body->p.x_end[k], once.body->p.x[k] + once.now.h * v[k]) << k;
+    changed += v[k] != free[k];
+  }
+  EXPECT_GT(changed, 10u);
+  EXPECT_LT(changed, n / 2);
+}
+
+TEST(ExplicitPoints, BeforeAFurtherSolve_TheVelocityIsFreeAgain) {
+  const Falling f;
+  const std::vector<double> free(f.body->p.v_free.begin(), f.body->p.v_free.end());
+  f.end(f.impulses(1, 2));
+  f.body->dynamics->free_again(f.now);
+  const double *const v = f.body->dynamics->point_velocity();
+  for (size_t k = 0; k < free.size(); ++k) EXPECT_EQ(v[k], free[k]) << k;
+}
+
+TEST(ExplicitPoints, ACommittedEnd_IsWhatTheNextSubStepBeginsWith) {
+  const Falling f;
+  f.end(f.impulses(1, 2));
+  const double *const end = f.body->dynamics->end().v;
+  const std::vector<double> v(end, end + 4 * size_t{f.body->p.n}),
+      x(f.body->p.x_end.begin(), f.body->p.x_end.end());
+  f.body->dynamics->commit(f.now, 1);
+  for (size_t k = 0; k < v.size(); ++k) {
+    EXPECT_EQ(f.body->p.v[k], v[k]) << k;
+    EXPECT_EQ(f.body->p.x[k], x[k]) << k;
+  }
+}
+
+}  // namespace
