@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "contact/bonds.h"
+#include "contact/fixed_limits.h"
 #include "state/world.h"
 #include "step/context.h"
 #include "step/tolerance.h"
@@ -88,8 +89,8 @@ void take_best(StepContext &step, const SolveIsland &own) {
   step.rows.restore(own.part);
 }
 
-// One sweep. Each solves the bonds to a share of their tolerance, so that the residual which the next sweep
-// finds comes from the contacts.
+// Bonds are solved to a share of their tolerance, so that the residual which the next sweep finds comes from the
+// contacts.
 constexpr double kBondShare = 0.1;
 // Multiplications of a sweep by the pairs of touched surfels that answer each other: three columns of four.
 constexpr double kSweepWork = 12;
@@ -98,9 +99,7 @@ void sweep_once(const World &w, StepContext &step, SolveIsland &own, double leav
   spend(w, step, own.spent, own.part.all());
   sweep(step.rows, own.part, step.state, step.h, leave);
   ++own.sweeps;
-  if (!own.part.nbond) return;
-  const uint32_t passes = solve_bonds(step.rows, own.part, kBondShare * own.tolerance.bond, own.scratch);
-  spend(w, step, own.spent, uint64_t{passes} * own.part.nbond);
+  solve_island_bonds(w, step, own);
 }
 
 // Of bodies that move in few ways sweeps hand loads over too slowly: what they have left at the cap goes on
@@ -178,7 +177,8 @@ bool asks_redundant(const World &w, const StepContext &step, SolveIsland &own) {
 }
 
 // Sweeps on the laws as they were last answered. At the cap the best state seen is taken, not the last one.
-void sweep_until_good(const World &w, StepContext &step, SolveIsland &own) {
+// Returns whether the result is good enough.
+bool sweep_until_good(const World &w, StepContext &step, SolveIsland &own) {
   ContactRows &rows = step.rows;
   const uint32_t cap = asks_beyond(w, own) ? own.sweeps + kPassSweeps : w.def.max_sweeps;
   double best = std::numeric_limits<double>::infinity();
@@ -194,9 +194,11 @@ void sweep_until_good(const World &w, StepContext &step, SolveIsland &own) {
     Residual left = inner_residual(rows, own.part, step.state, step.h, own.tolerance);
     if (asks && left.due > 0.5 && own.redundant.stands(rows, own.part, step.state, step.h, own.tolerance))
       left = inner_residual(rows, own.part, step.state, step.h, own.tolerance);
-    if (!(left.due <= kRunsAway * std::max(1.0, best)) || !(left.due < std::numeric_limits<double>::max()))
-      return take_best(step, own);
-    if (good(step, own, left, 0.5)) return;
+    if (!(left.due <= kRunsAway * std::max(1.0, best)) || !(left.due < std::numeric_limits<double>::max())) {
+      take_best(step, own);
+      return false;
+    }
+    if (good(step, own, left, 0.5)) return true;
     if (left.due < best) {
       best = left.due;
       keep_best(step, own);
@@ -206,7 +208,7 @@ void sweep_until_good(const World &w, StepContext &step, SolveIsland &own) {
     asks = asks_redundant(w, step, own);
     own.acceleration.follow(rows, own.part, !asks);
   }
-  if (std::isinf(best)) return;
+  if (std::isinf(best)) return false;
   const auto go_back = [&](uint32_t i) {
     double *const l = &rows.impulse[size_t(i) * 3];
     const Vec3 change = load3(&step.best_impulse[size_t(i) * 3]) - load3(l);
@@ -218,6 +220,27 @@ void sweep_until_good(const World &w, StepContext &step, SolveIsland &own) {
   each_row(own.part.bonds, go_back);
   if (best > 0.5 && own.revises) settle(w, step, own, best);
   if (best > 1) stride_on(w, step, own);
+  return best <= 1;
+}
+
+// Sweeps that have not converged may leave impulses that do work: with much friction in a jam each sweep adds to
+// it. If the contacts of an island do more work than their bias velocities explain, it is solved again with fixed
+// friction limits, without friction first, which cannot add energy (contact/fixed_limits.h,
+// doc/decisions/0425).
+constexpr double kExcess = 0.1;       // of the work that the impulses would do without a response
+constexpr uint32_t kFixedSweeps = 8;  // without friction, and as many with friction
+void hold_work_back(const World &w, StepContext &step, SolveIsland &own) {
+  const ExcessWork excess = excess_work(step.rows, own.part);
+  if (excess.work <= kExcess * excess.scale) return;
+  drop_impulses(step.rows, own.part);
+  own.limit.assign(own.part.n, 0.0);
+  for (uint32_t k = 0; k < 2 * kFixedSweeps; ++k) {
+    if (k == kFixedSweeps) fix_limits(step.rows, own.part, step.state, own.limit);
+    spend(w, step, own.spent, own.part.all());
+    sweep_fixed(step.rows, own.part, own.limit.data());
+    ++own.sweeps;
+    solve_island_bonds(w, step, own);
+  }
 }
 
 // Passes until the true residual is good enough, or a law has failed.
@@ -253,7 +276,7 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
       own.redundant.allow(own.part, own.tolerance);
     }
     // at least one sweep on a warm start is part of the method
-    sweep_until_good(w, step, own);
+    if (!sweep_until_good(w, step, own)) hold_work_back(w, step, own);
   }
 }
 
@@ -374,6 +397,7 @@ const SolveIsland *solve_islands(World &w, StepContext &step) {
     if (!own.open) continue;
     rows += own.part.all();
     own.passes = own.sweeps = 0;
+    own.limit.reserve(own.part.n);
     own.residual = {};
     own.bad = nullptr;
     own.thrown = nullptr;

@@ -33,6 +33,7 @@ struct SolveIsland {
   Redundant redundant;
   Tolerance tolerance;
   Array<double> scratch;  // of solve_bonds()
+  Array<double> limit;    // [contacts of the part] N s, fixed limits of friction
   // of the last solve
   Residual residual;
   uint32_t passes = 0, sweeps = 0;
@@ -46,7 +47,7 @@ struct SolveIsland {
 
   explicit SolveIsland(const Memory &m)
       : batches(m), acceleration(m), momentum(m), proximal(m), redundant(m) {
-    use_memory(m, scratch);
+    use_memory(m, scratch, limit);
   }
 };
 
