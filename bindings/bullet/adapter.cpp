@@ -72,7 +72,7 @@ void Adapter::before_tick(btDynamicsWorld *world, btScalar h) {
   } catch (const std::bad_alloc &) {
     a->of_tick_ = dfm_fail(DFM_E_NOMEM, "bullet: out of memory");
   } catch (...) {
-    a->of_tick_ = dfm_fail(DFM_E_FATAL, "bullet: an exception that should not be");
+    a->of_tick_ = dfm_fail(DFM_E_FATAL, "bullet: internal error: an unexpected exception");
   }
   if (a->of_tick_ < 0) a->sentence_ = dfm_last_error();
   if (a->of_tick_ < 0 && a->of_call_ == DFM_OK) {
@@ -139,11 +139,10 @@ dfm_status Adapter::check() const {
     const btCollisionShape *unknown = nullptr;
     if (known(all[i], i) || !traits_of(all[i]).takes_part) continue;
     if (!parts_of(all[i]->getCollisionShape(), {}, parts, unknown))
-      return failed(
-          DFM_E_UNSUPPORTED,
-          "collision object %p has a %s, which soft bodies cannot touch; call dfm_bullet_set_object "
-          "with ignore = 1, or stand a triangle mesh for it",
-          address(all[i]), unknown->getName());
+      return failed(DFM_E_UNSUPPORTED,
+                    "collision object %p has a %s, which soft bodies cannot touch; call "
+                    "dfm_bullet_set_object with ignore = 1, or replace it by a triangle mesh",
+                    address(all[i]), unknown->getName());
   }
   return DFM_OK;
 }
@@ -219,11 +218,11 @@ dfm_status Adapter::bind_body(Object &o) {
   m.engine = &engine_;
   const btCollisionObject *const body = o.id;
   o.body->seat.refuse = [body] {
-    return failed(DFM_E_STATE,
-                  "the rigid body stands for Bullet's body %p, which owns it, and dfm_rigid_destroy would "
-                  "leave the adapter without it; call removeRigidBody, and the next tick lets it go; "
-                  "dfm_bullet_detach takes all of them away",
-                  address(body));
+    return failed(
+        DFM_E_STATE,
+        "the rigid body belongs to the adapter, which made it for Bullet's body %p; call removeRigidBody, "
+        "and the next tick removes it, or dfm_bullet_detach, which removes all of them",
+        address(body));
   };
   TRY(o.body->create(world_, bullet_kind().host, m));
   engine_.members.push_back(&m);
@@ -338,11 +337,10 @@ dfm_status Adapter::obstacle(const btCollisionObject *object, uint32_t leaf, dfm
   if (known == by_id_.end()) return not_in_world(object);
   const Object &o = *known->second;
   if (leaf >= o.obstacles.size())
-    return failed(
-        DFM_E_ARG,
-        "collision object %p has %zu leaves that take part, and no leaf %u; it has none where it is "
-        "ignored (dfm_bullet_set_object), empty or without contact response",
-        address(object), o.obstacles.size(), leaf);
+    return failed(DFM_E_ARG,
+                  "collision object %p has %zu leaf shapes that take part in contact, and no leaf %u; it has "
+                  "none if it is ignored (dfm_bullet_set_object), empty or without contact response",
+                  address(object), o.obstacles.size(), leaf);
   *out = o.obstacles[leaf];
   return DFM_OK;
 }
@@ -352,9 +350,7 @@ dfm_status Adapter::rigid(const btCollisionObject *body, dfm_rigid *out) {
   const auto known = by_id_.find(body);
   if (known == by_id_.end()) return not_in_world(body);
   if (!known->second->body)
-    return failed(DFM_E_ARG,
-                  "body %p does not take part as one that forces move: it is static, kinematic, "
-                  "ignored or empty",
+    return failed(DFM_E_ARG, "body %p is not moved by forces: it is static, kinematic, ignored or empty",
                   address(body));
   *out = known->second->body->rigid;
   return DFM_OK;

@@ -52,7 +52,8 @@ dfm_status check_def(const dfm_bullet_def &d) {
         d.version, d.real_bytes, BT_BULLET_VERSION, sizeof(btScalar));
   if (const dfm_status s = check_bullet(); s != DFM_OK) return s;
   if (!d.world) return missing("world");
-  if (d.flags) return failed(DFM_E_ARG, "dfm_bullet_def: flags %u; none is known", d.flags);
+  if (d.flags)
+    return failed(DFM_E_ARG, "dfm_bullet_def: flags is %u; leave it 0, since no flag is defined", d.flags);
   return DFM_OK;
 }
 
@@ -77,9 +78,8 @@ dfm_status dfm_bullet_attach(dfm_world world, const dfm_bullet_def *def, dfm_bul
     if (!bullet || def->world->getWorldType() != BT_DISCRETE_DYNAMICS_WORLD)
       return failed(
           DFM_E_UNSUPPORTED,
-          "the world is of btDynamicsWorldType %d; an adapter takes a btDiscreteDynamicsWorld, whose "
-          "ticks it can run (btSimpleDynamicsWorld has none, and Bullet's own soft bodies move in "
-          "ticks of theirs: make them bodies of the dfm_world)",
+          "the world is of btDynamicsWorldType %d; pass a btDiscreteDynamicsWorld (a btSimpleDynamicsWorld "
+          "has no ticks; make Bullet's own soft bodies bodies of the dfm_world)",
           static_cast<int>(def->world->getWorldType()));
     if (const dfm_status s = register_host(bullet_kind()); s != DFM_OK) return s;
     uint32_t n = 0;
@@ -87,7 +87,7 @@ dfm_status dfm_bullet_attach(dfm_world world, const dfm_bullet_def *def, dfm_bul
     return Registry<Adapter>::get().add(
         [&](const Adapter &other) {
           if (other.bullet() != bullet) return dfm_status{DFM_OK};
-          return dfm_fail(DFM_E_STATE, "this world has an adapter already; dfm_bullet_detach it first");
+          return dfm_fail(DFM_E_STATE, "this world already has an adapter; call dfm_bullet_detach first");
         },
         [&] { return std::make_shared<Adapter>(world, *bullet); }, out);
   } catch (const std::bad_alloc &) {

@@ -78,8 +78,8 @@ dfm_status take(dfm_context *context, dfm_world world, const btSoftBody &body, c
     def.ntet = info.ntet;
   } else {
     return failed(DFM_E_ARG,
-                  "the btSoftBody has neither tetrahedra nor faces; ropes and bodies of links alone have no "
-                  "volume that the library could fill");
+                  "the btSoftBody has neither tetrahedra nor faces; the library needs a volume, which ropes "
+                  "and bodies made only of links do not have");
   }
   TRY(dfm_body_create(world, &def, out));
   if (a.tets.empty() || a.held.empty()) return DFM_OK;

@@ -45,7 +45,7 @@ dfm_status open_build(const Build &build, const dfm_rigid_host *&table) {
     if (file && o.file == file) wanted = file;
   if (o.table && o.file != wanted)
     return refuse("host \"" + std::string(build.host) + "\" needs " + wanted + ", and " + o.file +
-                  " is open; a process has one build of Bullet: use one of the two in a run");
+                  " is already open; use only one of the two in a run");
   std::string why;
   for (size_t i = 0; i < 2 && !o.table && build.files[i]; ++i) {
     void *const library = dlopen(build.files[i], RTLD_NOW | RTLD_LOCAL);

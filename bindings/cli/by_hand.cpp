@@ -58,7 +58,7 @@ const BodyView &ByHand::body(const JsonValue &line) const {
 void ByHand::pull(const JsonValue &line) {
   const std::vector<double> points = numbers(line, "points"), weights = numbers(line, "weights");
   const std::vector<double> to = vector(line, "to");
-  if (weights.size() != points.size()) throw Failure(kBadInput, "a pull has a weight for each point");
+  if (weights.size() != points.size()) throw Failure(kBadInput, "a pull needs one weight for each point");
   const std::vector<uint32_t> places(points.begin(), points.end());
   dfm_spring_def def = {};
   def.size = sizeof def;
@@ -92,9 +92,9 @@ void ByHand::drag(const JsonValue &line) {
     const std::vector<double> corners = numbers(line, "corners");
     d.weights = numbers(line, "weights");
     if (corners.size() != 3 || d.weights.size() != 3)
-      throw Failure(kBadInput, "what is dragged is held at three corners with a weight for each");
+      throw Failure(kBadInput, "a drag needs three corners and one weight for each");
     for (const double c : corners) {
-      if (!(c >= 0 && c < of.nsurfel)) throw Failure(kBadInput, "the body has no such corner");
+      if (!(c >= 0 && c < of.nsurfel)) throw Failure(kBadInput, "the body has no corner of this number");
       d.corners.push_back(uint32_t(c));
     }
     d.thing = of.handle;
@@ -182,7 +182,7 @@ void ByHand::act(const JsonValue &line) {
     need(dfm_world_set_gravity(scene_.world(), vector(line, "to").data()));
   } else if (what == "friction") {
     const JsonValue *const sides = line.find("between");
-    if (!sides || sides->items.size() != 2) throw Failure(kBadInput, "friction is between two sides");
+    if (!sides || sides->items.size() != 2) throw Failure(kBadInput, "friction needs two sides");
     need(dfm_world_set_friction(scene_.world(), sides->items[0].text.c_str(), sides->items[1].text.c_str(),
                                 &params));
   } else if (what == "param") {

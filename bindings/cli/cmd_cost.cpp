@@ -70,8 +70,8 @@ int cost_of(CostOptions options, Globals &globals) {
   if (options.apply.empty()) return kDone;
   if (study.pick < 0)
     return fail(
-        "--apply: no choice stays within the target, so there is nothing to apply; give more with "
-        "--budget or a larger --target");
+        "--apply: no choice meets the target, so there is nothing to apply; give a larger --budget or a "
+        "larger --target");
   cost::write_applied(subject, study, options.apply);
   return kDone;
 }
@@ -90,8 +90,9 @@ void add_cost(CLI::App &app, Globals &globals, int *exit_code) {
   CLI::App *sub = app.add_subcommand(
       "cost", "what accuracy costs on a scene: models, steps, meshes, contact against a fine reference");
   sub->add_option("SCENE", options->scene, "scene file (JSON)")->required();
-  sub->add_option("--budget", options->study.budget,
-                  "seconds for all runs in DIR; a larger one goes on where a smaller one has ended")
+  sub->add_option(
+         "--budget", options->study.budget,
+         "time limit in seconds for all runs in DIR; a later call with a larger limit continues there")
       ->check(positive)
       ->capture_default_str()
       ->type_name("SECONDS");

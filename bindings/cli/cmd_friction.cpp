@@ -125,9 +125,9 @@ int friction(const FrictionOptions &options, const Globals &globals) {
   }
   if (result.jumps)
     warn("the law " + std::string(law.type().id) +
-         " jumps where it does not say so: " + std::to_string(result.jumps) +
-         " steps took the force between the two sides of a jump; a law that jumps at rest sets "
-         "DFM_FRIC_SET_VALUED and answers with ft_stop");
+         " is discontinuous without declaring it: " + std::to_string(result.jumps) +
+         " steps used a force between the two sides of a jump; a law that jumps at rest must set "
+         "DFM_FRIC_SET_VALUED and use ft_stop");
   const std::string rows = csv_text(result);
   if (!options.csv.empty()) write_whole(options.csv, rows);
   if (!options.plot.empty() && !result.rows.empty()) picture(options, rig, law, rows);

@@ -61,7 +61,7 @@ std::string lost_shares(dfm_tetmesh cells, const std::string &out) {
   const double *share = nullptr;
   const std::string ending = mesh_ending(out);
   if (dfm_tetmesh_share(cells, &share) < 0 || !share || ending == "vtk" || ending == "vtu") return "";
-  return "shares of material, which .vtk and .vtu hold: as a body every cell of ." + ending +
+  return "the share of material of each cell, which only .vtk and .vtu store: every cell of ." + ending +
          " counts whole in mass and stiffness";
 }
 
@@ -75,16 +75,15 @@ std::vector<std::string> losses(const MeshSession &s, const std::string &out) {
     dfm_tetmesh_info i = {};
     i.size = sizeof i;
     dfm_tetmesh_get_info(s.cells, &i);
-    if (i.ngroup && ending == "mesh")
-      lost.push_back("names of groups, of which Medit holds the number alone");
+    if (i.ngroup && ending == "mesh") lost.push_back("names of groups (Medit stores only their numbers)");
     if (const std::string shares = lost_shares(s.cells, out); !shares.empty()) lost.push_back(shares);
     return lost;
   }
   dfm_trimesh_info i = {};
   i.size = sizeof i;
   dfm_trimesh_get_info(s.surface, &i);
-  if (ending == "stl") lost.push_back("digits beyond single precision, about 7, which is all that STL holds");
-  if (i.ngroup && ending == "ply") lost.push_back("names of groups, of which PLY holds the number alone");
+  if (ending == "stl") lost.push_back("digits beyond the first 7 (STL stores single precision)");
+  if (i.ngroup && ending == "ply") lost.push_back("names of groups (PLY stores only their numbers)");
   if (i.ngroup && (ending == "stl" || ending == "off"))
     lost.push_back(std::to_string(i.ngroup) + (i.ngroup == 1 ? " group" : " groups") +
                    " of triangles, without which ." + ending + " is written");
@@ -97,7 +96,7 @@ int convert_file(MeshSession &s, const std::string &in, const std::string &out,
   std::string sentence;
   if (!s.context) return fail(dfm_last_error());
   if (!import_surface(in, s, sentence)) return fail(sentence);
-  if (s.surface) lost.push_back("materials, normals, textures and movement, of which a surface has none");
+  if (s.surface) lost.push_back("materials, normals, textures and animation");
   else if (!open(s, in, false)) return fail(dfm_last_error());
   if (s.surface && written_by(out) == Writes::cells)
     return fail(out + ": ." + mesh_ending(out) + " is written with tetrahedra, and " + in +
@@ -225,9 +224,9 @@ void add_mesh(CLI::App &app, Globals &globals, int *exit_code) {
 
   add_make(mesh, globals, exit_code);
 
-  CLI::App *convert_command = mesh->add_subcommand(
-      "convert",
-      "reads IN, writes OUT by its file name ending; of cells the boundary where OUT is a surface");
+  CLI::App *convert_command = mesh->add_subcommand("convert",
+                                                   "reads IN and writes OUT in the format of its file name "
+                                                   "ending; a surface format gets the boundary of the cells");
   convert_command
       ->add_option("IN", *first, std::string(kIn) + "; glTF, FBX, COLLADA and others where built with assimp")
       ->required();

@@ -123,8 +123,7 @@ struct FillOptions {
 
 void add_mesh_fill(CLI::App *mesh, Globals &globals, int *exit_code) {
   CLI::App *command = mesh->add_subcommand(
-      "fill",
-      "lattice tetrahedra inside a closed surface; a scene does it by itself with the body key \"fill\"");
+      "fill", "fills a closed surface with tetrahedra; in a scene, the body key \"fill\" does the same");
   const auto options = std::make_shared<FillOptions>();
   command
       ->add_option("SURFACE", options->surface,

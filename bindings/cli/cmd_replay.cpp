@@ -24,8 +24,8 @@ void only_outputs(const std::vector<std::string> &set) {
   for (const std::string &s : set)
     if (s.rfind("/output", 0) != 0)
       throw Failure(kBadInput, "--set " + s +
-                                   ": a replay is the run that was recorded; only values under /output "
-                                   "may be others, such as /output/camera/eye=[1,-2,1]");
+                                   ": a replay repeats the recorded run; only values under /output may "
+                                   "change, such as /output/camera/eye=[1,-2,1]");
 }
 
 // The recorded states one after another: what they look like, not how they came about.
@@ -33,8 +33,8 @@ int show(const Recording &recording, const ReplayOptions &options, const Globals
          const std::vector<std::string> &set) {
   if (options.frame_rate > 0)
     throw Failure(kBadInput,
-                  "--states: there is a picture of each recorded state; leave --frames out, or "
-                  "--states, to have the run simulated again");
+                  "--states draws each recorded state, so --frames does not apply; leave out --frames, or "
+                  "leave out --states to simulate the run again");
   const SceneFile scene(globals, recording.scene, set, recording.jitter);
   const RunFolder held(options.out);
   const std::unique_ptr<Frames> frames = Frames::create(scene, options.out + "/frames");
@@ -84,8 +84,8 @@ int replay(ReplayOptions options, const Globals &globals) {
 
 void add_replay(CLI::App &app, Globals &globals, int *exit_code) {
   auto options = std::make_shared<ReplayOptions>();
-  CLI::App *sub =
-      app.add_subcommand("replay", "simulates a recorded run again, to the same bits, or shows it again");
+  CLI::App *sub = app.add_subcommand(
+      "replay", "simulates a recorded run again, with the same bits, or shows its recorded states");
   sub->add_option("DIR", options->folder, "results of `deform run --record`")->required();
   sub->add_option("--out", options->out, "folder for the results (DIR/replay)")->type_name("DIR");
   sub->add_option("--frames", options->frame_rate, "pictures per simulated second")

@@ -160,29 +160,35 @@ class Runner {
                     " sub-steps: the step is longer than the stable one; deform explain says why");
     if (stats.cheapened > 0)
       out.push_back(std::to_string(stats.cheapened) +
-                    " steps used so much of their budget that they went without polish, sweeps or guard "
-                    "pieces (max_work, max_time)");
+                    " steps came near their limit of work or time (max_work, max_time), so some refinements "
+                    "of the contact solve were left out");
     if (stats.unconverged > 0)
       out.push_back("the contact solve stopped at its limit of sweeps in " +
                     std::to_string(stats.unconverged) + " of " + std::to_string(stats.substeps) +
                     " sub-steps (solver.residual_max is the largest error): take a shorter step, add damping "
                     "to the material, or lower the ratio of masses or stiffnesses");
-    // a start that is asked for may be inside out and cross itself; what is left of it at the end is told
-    if (spoiled_ && checks().inverted_last > 0)
-      out.push_back(std::to_string(checks().inverted_last) +
-                    " cells are inside out still at the end, as \"start\" asked for: give it more time, or a "
-                    "model that finds back from there (corotational_fem, shape_matching)");
-    else if (!spoiled_ && trouble_ & DFM_TROUBLE_INVERTED)
-      out.push_back("cells turned inside out: refine the mesh or soften the load");
     if (stats.limited_max > 0)
       out.push_back("up to " + std::to_string(stats.limited_max) +
                     " cells at once were stretched so far that their model limited their stiffness: refine "
-                    "the mesh or soften the load");
+                    "the mesh or reduce the load");
     const auto refused = [](const dfm_swap &s) { return (s.flags & DFM_SWAP_REFUSED) != 0; };
     if (const auto n = std::count_if(result_.swaps.begin(), result_.swaps.end(), refused))
       out.push_back(
           std::string(n == 1 ? "a change of model was" : std::to_string(n) + " changes of models were") +
           " refused, because energy or surface would jump: swaps lists what was refused");
+    return out;
+  }
+
+  // Results that are wrong as a picture of the scene: these are shown on the terminal too.
+  std::vector<std::string> faults() const {
+    std::vector<std::string> out;
+    // A start with inverted cells may also cross itself; only what is left of that at the end counts.
+    if (spoiled_ && checks().inverted_last > 0)
+      out.push_back(std::to_string(checks().inverted_last) +
+                    " cells that \"start\" inverted are still inverted at the end: give it more time, or use "
+                    "a model that recovers (corotational_fem, shape_matching)");
+    else if (!spoiled_ && trouble_ & DFM_TROUBLE_INVERTED)
+      out.push_back("cells became inverted (inside out): refine the mesh or reduce the load");
     const size_t between = spoiled_ ? checks().between_last : checks().between_max;
     const size_t within = spoiled_ ? checks().self_last : checks().self_max;
     const std::string when = spoiled_ ? " in the last state" : " in one state";
@@ -191,7 +197,7 @@ class Runner {
     if (within > 0)
       out.push_back("a surface crosses itself: " + pairs(within) + when +
                     (any_cut() ? "; sides of a cut or a tear that have slid over each other do not touch"
-                               : "; \"contact\": {\"self\": \"auto\"} keeps it from that"));
+                               : "; \"contact\": {\"self\": \"auto\"} prevents this"));
     return out;
   }
 
@@ -426,6 +432,7 @@ int run_scene(RunOptions options, const Globals &globals, Comparison *comparison
     Runner runner(scene, options, globals, comparison);
     runner.run();
     for (const std::string &remark : runner.remarks()) keep_warning(remark);
+    for (const std::string &fault : runner.faults()) warn(fault);
     result = runner.result();
     checks = runner.checks();
   }
@@ -478,13 +485,13 @@ void add_run(CLI::App &app, Globals &globals, int *exit_code) {
                 "count crossing triangles in every step, not only in recorded states");
   auto saves = std::make_shared<std::vector<std::pair<double, std::string>>>();
   sub->add_option("--save", *saves,
-                  "write the state of the first step that reaches T to FILE; may be repeated")
+                  "write the state of the first step at or after time T to FILE; may be repeated")
       ->type_name("T FILE");
   sub->add_option("--save-scene", options->save_scene,
                   "write the world at the end of the run as a scene of its own")
       ->type_name("FILE");
   sub->add_option("--from", options->from,
-                  "go on from a state that --save or --record wrote, to the end of the scene or of --time")
+                  "continue from a state that --save or --record wrote, to the end of the scene or of --time")
       ->type_name("FILE");
   sub->add_flag("--record", options->record, "keep every recorded state, for `deform replay`");
   sub->callback([=, &globals] {

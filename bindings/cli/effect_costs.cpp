@@ -345,7 +345,7 @@ void print_effects(const JsonValue &plan, const std::vector<EffectCost> *costs) 
       const bool works = effect.get("works") == "true";
       const char *const word = effect.get("used") == "true" ? "used" : works ? "on, not asked for" : "idle";
       std::printf("  %-20s  %-18s  %s", body.c_str(), name.c_str(), word);
-      if (!works && off.empty()) std::printf(": the body, as it is held, does not call for it");
+      if (!works && off.empty()) std::printf(": not needed, as the body is held");
       else if (!works) std::printf(": %s", switches_text(effect, "now").c_str());
       else if (off.empty()) std::printf("; no parameter switches it off: it is the model's own");
       else std::printf("; off with %s", off.c_str());

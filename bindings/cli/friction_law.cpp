@@ -335,7 +335,9 @@ class StepSolver {
       a = c;
       c = at(a.u + step);
       if (!std::isfinite(c.u) || std::fabs(c.u) > 1e150)
-        throw Failure(kStopped, "no speed balances the force: friction drives the mass faster and faster");
+        throw Failure(
+            kStopped,
+            "friction does not balance the force at any speed, so the mass accelerates without limit");
     }
     if (c.stopped && c.u != 0) c = at(0);  // its solution is rest, wherever it was asked
     if (a.u * c.u <= 0 && a.u != 0) cut_toward_rest(a, c);

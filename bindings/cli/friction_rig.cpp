@@ -105,7 +105,7 @@ class Rig {
   void push(double t, double t1) {
     if (law_.jumps_at_rest()) out_.jumps += euler(t, t1, 0.5).on_jump;
     else extrapolated(t, t1);
-    if (!std::isfinite(x_)) throw Failure(kStopped, "the mass has left every finite place");
+    if (!std::isfinite(x_)) throw Failure(kStopped, "the position of the mass is no longer finite");
   }
 
   // Implicit Euler. The spring pulls as at x + h (s v' - (1 - s) v): s = 1 is x'; s = 1/2 is the leapfrog

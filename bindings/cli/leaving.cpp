@@ -79,8 +79,8 @@ void on_leave() {
 }
 
 const char *name_of(int number) {
-  return number == SIGSEGV  ? "SIGSEGV: it touched memory that is not its own"
-         : number == SIGBUS ? "SIGBUS: it touched memory that is not there"
+  return number == SIGSEGV  ? "SIGSEGV: it accessed memory that does not belong to it"
+         : number == SIGBUS ? "SIGBUS: it accessed memory that does not exist"
          : number == SIGFPE ? "SIGFPE: a division by zero, or a floating-point exception that was unmasked"
          : number == SIGILL ? "SIGILL: an instruction that this processor lacks"
                             : "SIGABRT: abort, or a failed assertion";

@@ -57,6 +57,9 @@ std::string not_a_number(const std::string &text, CLI::App *at) {
   for (const CLI::Option *option : at->get_options()) {
     const std::string begin = "Could not convert: " + option->get_name() + " = ";
     if (text.rfind(begin, 0) != 0) continue;
+    if (option->get_type_size() > 1)
+      return option->get_name() + ": expected " + option->get_type_name() + ", found \"" +
+             text.substr(begin.size()) + "\"";
     return option->get_name() + ": expected " +
            (option->get_type_name()[0] == 'N' ? "a whole number, 0 or more" : "a number") + ", found \"" +
            text.substr(begin.size()) + "\"";
@@ -64,11 +67,15 @@ std::string not_a_number(const std::string &text, CLI::App *at) {
   return text;
 }
 
+int value_count(const CLI::Option *option) { return option->get_type_size() * option->get_expected_min(); }
+
 // "--frames: 1 required FPS missing" becomes "--frames needs a value: FPS".
 std::string value_missing(const std::string &text, const CLI::App *at) {
   for (const CLI::Option *option : at->get_options())
     if (text.rfind(option->get_name() + ": ", 0) == 0 && text.find(" required ") != std::string::npos)
-      return option->get_name() + (option->get_type_size() > 1 ? " needs values: " : " needs a value: ") +
+      return option->get_name() +
+             (value_count(option) > 1 ? " needs " + std::to_string(value_count(option)) + " values: "
+                                      : " needs a value: ") +
              option->get_type_name();
   return text;
 }

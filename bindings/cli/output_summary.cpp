@@ -338,7 +338,7 @@ std::string summary_json(const SceneFile &scene, const RunOptions &options, cons
 namespace {
 
 std::string joules(double energy) {
-  if (std::isnan(energy)) return "what the model does not give";
+  if (std::isnan(energy)) return "unknown (the model computes none)";
   char text[40];
   std::snprintf(text, sizeof text, "%.4g J", energy);
   return text;

@@ -63,9 +63,8 @@ std::string planned_sentence(const std::string &json) {
   JsonValue plan;
   if (json.empty() || !parse_json(json, plan) || plan.get("meets") == "true") return "";
   const JsonValue *const way = plan.find("predicted");
-  return "the planner finds no way that meets what the scene asks for; it takes the nearest, with a "
-         "predicted "
-         "error of " +
+  return "the planner finds no settings that meet the goal of the scene; it uses the nearest ones, with a "
+         "predicted error of " +
          (way ? percent(*way, "error") + " and " + way->get("ms_per_step") + " ms per step" : "?") +
          " (see: deform explain)";
 }

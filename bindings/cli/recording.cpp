@@ -70,7 +70,7 @@ Recording read_recording(const std::string &run) {
   JsonValue text;
   if (!parse_json(read_file(file, kMostIndex, "a recording's run.json"), text) ||
       text.get("format") != kFormat || (text.get("version") != kVersion && text.get("version") != kByHand))
-    throw Failure(kBadInput, file + ": not of a recording that this command reads; record the run anew");
+    throw Failure(kBadInput, file + ": not a recording that this version reads; record the run again");
   Recording out;
   out.scene = text.get("scene");
   out.jitter = std::strtoull(text.get("jitter").c_str(), nullptr, 10);
@@ -89,12 +89,12 @@ Recording read_recording(const std::string &run) {
     std::istringstream lines(read_file(acts, kMostIndex, "a recording's acts.jsonl"));
     while (std::getline(lines, row)) {
       RecordedAct act;
-      if (!parse_json(row, act.line)) throw Failure(kBadInput, acts + ": damaged; record the run anew");
+      if (!parse_json(row, act.line)) throw Failure(kBadInput, acts + ": damaged; record the run again");
       act.t = std::strtod(act.line.get("t").c_str(), nullptr);
       out.acts.push_back(std::move(act));
     }
   }
-  if (out.states.empty()) throw Failure(kBadInput, index + ": no state in it; record the run anew");
+  if (out.states.empty()) throw Failure(kBadInput, index + ": no state in it; record the run again");
   return out;
 }
 
@@ -126,7 +126,7 @@ std::string Comparison::sentence() const {
   if (same_ == recording_.states.size()) return "";
   return std::to_string(recording_.states.size() - same_) + " of " +
          std::to_string(recording_.states.size()) +
-         " recorded states did not come: the steps fell elsewhere, or the run ended before";
+         " recorded states were not reached: the steps differ, or the run ended earlier";
 }
 
 }  // namespace cli

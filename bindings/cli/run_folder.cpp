@@ -41,9 +41,10 @@ void refuse_linked_folders(const std::string &folder) {
   for (const char *name : {"/states", "/nodes", "/frames", "/recording"}) {
     std::error_code error;
     if (fs::is_symlink(folder + name, error))
-      throw Failure(kBadInput, folder + name +
-                                   ": a link, and a run removes and writes files there; remove the link, or "
-                                   "give another folder with --out (which may itself be a link)");
+      throw Failure(kBadInput,
+                    folder + name +
+                        ": a symbolic link, and a run deletes and writes files in this folder; remove the "
+                        "link, or give another folder with --out (which may itself be a link)");
   }
 }
 

@@ -84,10 +84,10 @@ void check_plugins(const SceneFile &scene, const std::string &path, const JsonVa
     if (now == here.end()) continue;  // where it is needed the restore says so
     if (now->second.version != then.get("version"))
       refuse(path, "written with '" + now->first + "' " + then.get("version") + ", and " +
-                       now->second.version + " is loaded here; run the scene anew, or load that plugin");
+                       now->second.version + " is loaded here; run the scene again, or load that plugin");
     if (now->second.hash != then.get("hash"))
       refuse(path, "written with another build of '" + now->first + "' " + now->second.version +
-                       " than the one that is loaded here; run the scene anew, or load that build");
+                       " than the one that is loaded here; run the scene again, or load that build");
   }
 }
 
@@ -124,10 +124,10 @@ void check_scene_path(const SceneFile &scene, const std::string &path) {
     throw Failure(kBadInput, "--save-scene " + path + ": " + why);
   };
   if (file.extension() != ".json" || file.stem().empty())
-    refuse("the name of a scene file ends in .json; give one that does");
+    refuse("the name of a scene file must end in .json");
   std::error_code error;
   if (std::filesystem::equivalent(file, scene.path(), error))
-    refuse("that is the scene which is run; give another name, so that it stays");
+    refuse("this is the scene that is being run, which would be overwritten; give another name");
   if (access(file.has_parent_path() ? file.parent_path().c_str() : ".", W_OK) != 0)
     refuse(std::string("cannot be written there: ") + std::strerror(errno));
 }
@@ -154,7 +154,7 @@ void write_state(const SceneFile &scene, const std::string &path) {
 }
 
 void read_state(const SceneFile &scene, const std::string &path) {
-  const std::string text = read_file(path, kMostState, "a state that `deform run --save` wrote");
+  const std::string text = read_file(path, kMostState, "a state file of `deform run --save`");
   if (text.rfind(kSnapshot, 0) == 0) {  // which says itself what it belongs to
     if (dfm_world_restore(scene.world(), text.data(), text.size()) < 0) refuse(path, dfm_last_error());
     return;
@@ -163,14 +163,14 @@ void read_state(const SceneFile &scene, const std::string &path) {
   JsonValue head;
   if (line == std::string::npos || line > 1 << 20 || !parse_json(text.substr(0, line), head) ||
       head.get("format") != kFormat)
-    refuse(path, "no state that `deform run --save` or --record wrote");
+    refuse(path, "not a state file of `deform run --save` or --record");
   if (head.get("version") != kVersion)
     refuse(path, "state format " + head.get("version") + ", and this command reads " + kVersion +
-                     "; run the scene anew");
+                     "; run the scene again");
   if (head.get("scene") != hash_text(scene_hash(scene)))
     refuse(
         path,
-        "of another scene than " + scene.path() +
+        "belongs to another scene than " + scene.path() +
             " as it is now; give the same scene and --set values (\"output\" and the duration may differ)");
   check_plugins(scene, path, head);
   const size_t bytes = text.size() - line - 1;
@@ -179,9 +179,10 @@ void read_state(const SceneFile &scene, const std::string &path) {
                      std::to_string(bytes) + " do");
   if (dfm_world_restore(scene.world(), text.data() + line + 1, bytes) < 0) refuse(path, dfm_last_error());
   if (head.get("state_hash") != hash_text(dfm_world_hash(scene.world())))
-    throw Failure(kStopped, path +
-                                ": the state that it gives has another hash than the one it was written "
-                                "with; please report this with the file");
+    throw Failure(
+        kStopped,
+        path +
+            ": the restored state has another hash than when it was saved; please report this with the file");
 }
 
 }  // namespace cli

@@ -64,7 +64,7 @@ dfm_status Adapter::check(const std::vector<Signature> &signatures) const {
     if (part == Part::unknown)
       return failed(DFM_E_UNSUPPORTED,
                     "geom %p (%s) is a %s, which soft bodies cannot touch; call dfm_ode_set_geom with ignore "
-                    "= 1, or stand a trimesh for it",
+                    "= 1, or replace it by a trimesh",
                     static_cast<void *>(seen_[i]), name, kind);
     return failed(DFM_E_UNSUPPORTED,
                   "geom %p (%s) is a %s, and ODE does not tell its arrays; hand them to %s, or call "
@@ -146,9 +146,9 @@ dfm_status Adapter::bind_body(dBodyID id, Body *&out) {
   m.inertia = inertia_of(id);
   body->seat.refuse = [id] {
     return failed(DFM_E_STATE,
-                  "the rigid body stands for ODE's body %p, which owns it, and dfm_rigid_destroy would leave "
-                  "the adapter without it; call dBodyDestroy, or take its geoms out of the adapter's space, "
-                  "and the next dfm_ode_step lets it go; dfm_ode_detach takes all of them away",
+                  "the rigid body belongs to the adapter, which made it for ODE's body %p; call "
+                  "dBodyDestroy, or remove its geoms from the adapter's space, and the next dfm_ode_step "
+                  "removes it, or dfm_ode_detach, which removes all of them",
                   static_cast<void *>(id));
   };
   TRY(body->create(world_, "ode", m));

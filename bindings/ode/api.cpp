@@ -95,9 +95,9 @@ dfm_status dfm_ode_attach(dfm_world world, const dfm_ode_def *def, dfm_ode *out)
     return Registry<Adapter>::get().add(
         [&](const Adapter &other) {
           if (other.ode_world() == def->world)
-            return dfm_fail(DFM_E_STATE, "this dWorldID has an adapter already; dfm_ode_detach it first");
+            return dfm_fail(DFM_E_STATE, "this dWorldID already has an adapter; call dfm_ode_detach first");
           if (other.ode_space() == def->space)
-            return dfm_fail(DFM_E_STATE, "this dSpaceID has an adapter already; dfm_ode_detach it first");
+            return dfm_fail(DFM_E_STATE, "this dSpaceID already has an adapter; call dfm_ode_detach first");
           return dfm_status{DFM_OK};
         },
         [&] { return std::make_shared<Adapter>(world, *def); }, out);

@@ -112,7 +112,7 @@ dfm_status with(const EngineKind &kind, uint64_t handle, F &&f) noexcept {
   } catch (const std::bad_alloc &) {
     return failed(DFM_E_NOMEM, "%s: out of memory", kind.host);
   } catch (...) {
-    return failed(DFM_E_FATAL, "%s: an exception that should not be", kind.host);
+    return failed(DFM_E_FATAL, "%s: internal error: an unexpected exception", kind.host);
   }
 }
 

@@ -45,11 +45,11 @@ inline void warn(const dfm_host *host, const double *p, double excess, const cha
   const int form = static_cast<int>(p[kForm]);
   const double sigma1 = p[kSigma1], present = p[kSigma2] * p[kMuC];
   if (form == bristle::kConstant && excess > present)
-    std::snprintf(
-        text, sizeof text,
-        "constant sigma1 can push instead of brake: sigma2 mu_C >= sigma1 %s is violated, %g < %g (sigma1 "
-        "%g, sigma2 %g, mu_C %g, mu_S %g); \"sigma1_form\": \"passive\" is safe with any parameters",
-        as, present, excess, sigma1, p[kSigma2], p[kMuC], p[kMuS]);
+    std::snprintf(text, sizeof text,
+                  "with these parameters LuGre friction with constant sigma1 can add energy: it needs sigma2 "
+                  "mu_C >= sigma1 %s, and %g < %g (sigma1 %g, sigma2 %g, mu_C %g, mu_S %g); \"sigma1_form\": "
+                  "\"passive\" is safe with any parameters",
+                  as, present, excess, sigma1, p[kSigma2], p[kMuC], p[kMuS]);
   if (form == bristle::kFalling && sigma1 > 0)
     std::snprintf(text, sizeof text,
                   "falling sigma1 is passive only where v_d <= 4 mu_C p/(0.4289 sigma1), that is above a "

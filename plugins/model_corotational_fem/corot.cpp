@@ -57,7 +57,7 @@ namespace {
 bool check_params(const dfm_host *h, const double *values) {
   if (!model::in_range(h, kId, kParams, kParamCount, values)) return false;
   if (values[kCreep] < 0 && values[kCreep] != kAuto) {
-    complain(h, "parameter creep lies between -1 (at once) and 0 (no flow); give one of them, or more");
+    complain(h, "parameter creep is between -1 and 0; give -1 (at once), 0 (no flow) or a positive rate");
     return false;
   }
   const double *a = values + kAxis;
@@ -75,11 +75,12 @@ dfm_status set_params(void *self, const double *params) {
   Body *body = static_cast<Body *>(self);
   if (!check_params(body->host, params)) return DFM_E_ARG;
   if (params[kLocking] != body->params[kLocking]) {
-    complain(body->host, "parameter locking cannot change while the body lives; make it anew");
+    complain(body->host, "parameter locking cannot change during a run; create the body again");
     return DFM_E_ARG;
   }
   if (params[kYield] > 0 && !body->plastic()) {
-    complain(body->host, "the body was made without yield and has no plastic strain; make it anew with it");
+    complain(body->host,
+             "the body was created without yield and has no plastic strain; create it again with yield");
     return DFM_E_ARG;
   }
   return model::change(*body, params);

@@ -50,17 +50,20 @@ model::Fibre Body::fibre_at(uint32_t c) const {
 void Body::make_room(Room &room) const {
   if (has_fibres() && choice(kEnergy) != kLinear) {
     complain(host,
-             "anisotropy takes the energy corotational only; choose it, or leave the constants along the "
-             "axis at auto");
+             "anisotropy works with the energy corotational only; choose it, or leave the constants along "
+             "the axis at auto");
     throw model::Refused{};
   }
   if (nodal() && (has_fibres() || choice(kEnergy) != kLinear)) {
     complain(host,
-             "locking nodal takes the energy corotational without anisotropy; choose them, or locking none");
+             "locking nodal works with the energy corotational and without anisotropy only; choose these, or "
+             "locking none");
     throw model::Refused{};
   }
   if (plastic() && (has_fibres() || choice(kEnergy) != kLinear)) {
-    complain(host, "yield takes the energy corotational without anisotropy; choose them, or yield 0");
+    complain(
+        host,
+        "yield works with the energy corotational and without anisotropy only; choose these, or yield 0");
     throw model::Refused{};
   }
   if (has_fibres()) room.fibre.create(host, groups);

@@ -270,13 +270,12 @@ void Body::tell(const Farthest &most) {
   if (!(most.beyond > 1) || !(most.beyond > 2 * told)) return;
   told = most.beyond;
   char text[320];
-  std::snprintf(
-      text, sizeof text,
-      "%s: cell %u is turned by %.0f degrees and strained by %.0f %% against the rest shape: beyond "
-      "%.0f degrees or %.0f %% this model takes turns for strain, so that the body swells, and its "
-      "forces are not those of the body; corotational_fem has no such limit.",
-      kId, most.cell, degrees_of(most.turn), 100 * most.strain, degrees_of(kLargestTurn),
-      100 * kLargestStrain);
+  std::snprintf(text, sizeof text,
+                "%s: cell %u is turned by %.0f degrees and strained by %.0f %% against the rest shape: "
+                "beyond %.0f degrees or %.0f %% this model treats rotation as strain, so the body swells and "
+                "its forces are wrong; corotational_fem has no such limit.",
+                kId, most.cell, degrees_of(most.turn), 100 * most.strain, degrees_of(kLargestTurn),
+                100 * kLargestStrain);
   host->log(host->ctx, 2, 0, text);
 }
 

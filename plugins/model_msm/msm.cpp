@@ -48,7 +48,7 @@ void complain(const dfm_host *h, const char *what) { model::complain(h, kId, wha
 bool valid(const dfm_host *h, const double *values) {
   if (!model::in_range(h, kId, kParams, kParamCount, values)) return false;
   if (values[kVolume] < 0 && values[kVolume] != kFromPoisson) {
-    complain(h, "parameter volume lies between -1 (from poisson) and 0 (off); give one of them, or more");
+    complain(h, "parameter volume is between -1 and 0; give -1 (from poisson), 0 (off) or a positive number");
     return false;
   }
   const double *a = values + kAxis;
@@ -58,8 +58,8 @@ bool valid(const dfm_host *h, const double *values) {
   }
   if (uint32_t(values[kAxisForm]) == kFormA && uint32_t(values[kDamper]) != kVoigt) {
     complain(h,
-             "parameter anisotropy_form A takes damper voigt only: with a branch its force has no energy; "
-             "choose form B");
+             "parameter anisotropy_form A works with damper voigt only, since with other dampers its force "
+             "has no energy; choose form B");
     return false;
   }
   return true;
@@ -97,7 +97,7 @@ dfm_status set_mask(void *self, uint32_t n, const uint32_t *edges, uint8_t on) {
   Body &body = *static_cast<Body *>(self);
   for (uint32_t k = 0; k < n; ++k)
     if (edges[k] >= body.nedge) {
-      complain(body.host, "a spring that is to be switched does not exist; nothing was changed");
+      complain(body.host, "the spring to switch does not exist; nothing was changed");
       return DFM_E_ARG;
     }
   try {

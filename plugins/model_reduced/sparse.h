@@ -17,7 +17,7 @@ namespace reduced {
 using model::Buffer;
 
 constexpr const char *kIndefinite =
-    "the stiffness of the mesh is not positive definite: it has flat cells, or parts that hang on nothing";
+    "the stiffness of the mesh is not positive definite: it has flat cells, or parts that nothing holds";
 
 // A = L L^T of the points in an order that keeps L sparse. Column block j of L holds that of its point with
 // itself (a triangle), then the blocks of the points below, in rising order.

@@ -322,7 +322,7 @@ void Body::tell_gradient(double time, double most, const char *where, uint32_t w
   char text[240];
   std::snprintf(text, sizeof text,
                 "%s: the displacement gradient reaches %.2g %s %u: above %g the strains of this model are "
-                "no longer those of the body; corotational_fem has no such limit.",
+                "wrong; corotational_fem has no such limit.",
                 id_, most, where, which, kLargestGradient);
   host->log(host->ctx, 2, 0, text);
 }

@@ -273,7 +273,7 @@ TEST(StaticContact, Interrupted_EndsWithTheWorldAsItWas) {
   const std::string before = test::snapshot(s.world);
   test::ok(dfm_world_interrupt(s.world));
   EXPECT_EQ(find(s.world), DFM_DISCARD);
-  test::says({"asked to stop"});
+  test::says({"interrupted"});
   EXPECT_TRUE(test::snapshot(s.world) == before);
   dfm_world_destroy(s.world);
 }

@@ -152,7 +152,7 @@ TEST(MayTouch, CallsIntoTheWorld_AreRefused) {
         a.refused += dfm_world_query_overlap(a.s.world, &point, nullptr, 0, nullptr, &n) == DFM_E_BUSY;
         a.refused += dfm_body_destroy(a.s.upper) == DFM_E_BUSY;
         a.refused += dfm_world_ask_again(a.s.world, 0, 0) == DFM_E_BUSY;
-        test::says({"inside a call"});
+        test::says({"busy with another call"});
         return true;
       },
       &attack));
@@ -391,7 +391,7 @@ TEST(PreSolve, CallsIntoTheWorld_AreRefused) {
         a.refused += dfm_world_query_closest(a.s.w, p, 1, nullptr, &hit) == DFM_E_BUSY;
         a.refused += dfm_world_set_pre_solve(a.s.w, nullptr, nullptr) == DFM_E_BUSY;
         a.refused += dfm_surface_vertices(a.s.body, nullptr, 0, nullptr, nullptr) == DFM_E_BUSY;
-        test::says({"inside a call"});
+        test::says({"busy with another call"});
       },
       &attack));
   test::ok(dfm_world_step(s.w, 1e-3, nullptr));

@@ -83,17 +83,9 @@ TEST(Cut, SplitBlade_LosesNothingAndLetsTheHalvesPart) {
 // at rest.
 TEST(Cut, CutFaces_CarryTheWeightAboveThem) {
   for (const char *model : kModels) {
-    test::Context context;
-    const dfm_world w = test::make_world(context, {0, 0, -9.81});
-    test::add_plane(w, "floor");
-    test::set_friction(w, 0.5);
-    test::BodyOptions o;
-    o.name = "cube";
-    o.model = model;
-    o.young = 5e4;
-    o.damping_stiffness = 2e-3;
-    o.position = {0, 0, 1e-4};
-    const dfm_body b = test::make_body(context, w, "beam", {0.1, 0.1, 0.1}, 320, o);
+    const CubeOnFloor scene(model, 5e4);
+    const dfm_world w = scene.w;
+    const dfm_body b = scene.b;
     steps(w, 400);
     const dfm_body_measure before = test::measure(b);
     const std::string whole = test::snapshot(w);
@@ -200,16 +192,9 @@ TEST(Cut, AllCells_LeaveABodyThatIsOnlyAName) {
 }
 
 TEST(Cut, SurvivingContacts_KeepImpulsesAndBristles) {
-  test::Context context;
-  const dfm_world w = test::make_world(context, {1.5, 0, -9.81});
-  test::add_plane(w, "floor");
-  test::set_friction(w, 0.6, "elastoplastic");
-  test::BodyOptions o;
-  o.model = "corotational_fem";
-  o.young = 1e5;
-  o.damping_stiffness = 2e-3;
-  o.position = {0, 0, 1e-4};
-  const dfm_body b = test::make_body(context, w, "beam", {0.1, 0.1, 0.1}, 320, o);
+  const CubeOnFloor scene("corotational_fem", 1e5, true);
+  const dfm_world w = scene.w;
+  const dfm_body b = scene.b;
   steps(w, 400);
   std::vector<dfm_contact> before = test::contacts(w);
   ASSERT_GT(before.size(), 9u);
@@ -429,16 +414,9 @@ TEST(Cut, MovingBlade_WithJitter_PartsTheCubeEachTime) {
   std::mt19937 random(11);
   const auto jitter = [&](double size) { return size * (double(random() % 2001) / 1000 - 1); };
   for (int run = 0; run < 10; ++run) {
-    test::Context context;
-    const dfm_world w = test::make_world(context, {0, 0, -9.81});
-    test::add_plane(w, "floor");
-    test::set_friction(w, 0.5);
-    test::BodyOptions o;
-    o.model = "corotational_fem";
-    o.young = 1e5;
-    o.damping_stiffness = 2e-3;
-    o.position = {0, 0, 1e-4};
-    const dfm_body b = test::make_body(context, w, "beam", {0.1, 0.1, 0.1}, 60, o);
+    const CubeOnFloor scene("corotational_fem", 1e5, false, 60);
+    const dfm_world w = scene.w;
+    const dfm_body b = scene.b;
     steps(w, 100);
     const dfm_body_measure before = test::measure(b);
     double edge[2] = {0.2, 0.2};  // heights of its two ends

@@ -167,7 +167,7 @@ TEST(Effects, WithoutMemory_TakeAnotherLaw) {
   test::ok(make(c.context, off, &w));
   EXPECT_NE(plan(w).find(R"("name":"org.deform.coulomb","asked":"org.deform.lugre")"), std::string::npos)
       << plan(w);
-  EXPECT_NE(c.log.find("friction law org.deform.lugre: the list of effects leaves memory out"),
+  EXPECT_NE(c.log.find("friction law org.deform.lugre: the list of effects does not contain memory"),
             std::string::npos)
       << c.log;
   off.effects = {"presliding", "volume"};
@@ -227,10 +227,10 @@ TEST(Effects, ThatAreLeftOut_AreTold) {
   o.effects = {"damping", "friction"};
   test::ok(make(c.context, o, &w, &b));
   for (const char *part :
-       {"body 'block': the list of effects leaves volume out, which is called for: volume 1",
-        "friction law org.deform.coulomb: the list of effects leaves viscous out, which is "
-        "called for: sigma2 300",
-        "leaves guard out", "leaves self_contact out"})
+       {"body 'block': the list of effects does not contain volume, which the scene needs: volume 1",
+        "friction law org.deform.coulomb: the list of effects does not contain viscous, which "
+        "the scene needs: sigma2 300",
+        "does not contain guard", "does not contain self_contact"})
     EXPECT_NE(c.log.find(part), std::string::npos) << part << "\n" << c.log;
   EXPECT_NE(plan(w).find(R"({"name":"volume","of":"body 'block'","by":"volume 1"})"), std::string::npos)
       << plan(w);

@@ -255,7 +255,7 @@ TEST(Equilibrium, StaticSceneThatCannotBe_IsRefusedWhenItIsRead) {
   const char *const rigid = R"(, "rigid": {"host": "builtin", "bodies": [{"name": "stone", "shape": "sphere",
     "radius": 0.1, "mass": 1, "pose": {"position": [0, 0, 1]}}]})";
   const std::pair<const char *, const char *> cases[] = {
-      {rigid, "where rigid bodies move"},
+      {rigid, "moving rigid bodies"},
       {R"(, "contact": {"method": "rollback"})", "contact method is rollback"}};
   for (const auto &[more, word] : cases) {
     const test::CommandResult r =

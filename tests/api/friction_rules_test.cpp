@@ -156,11 +156,11 @@ TEST(FrictionRules, WhatIsRefused_SaysWhyAndChangesNothing) {
   };
   EXPECT_EQ(s.set("block", "*", "mu", 0.4), DFM_E_ARG);
   EXPECT_TRUE(
-      says("no rule of friction is for ['block', '*'] (rules: ['block', 'floor']); dfm_world_add_friction "
-           "makes one"))
+      says("there is no friction rule for ['block', '*'] (rules: ['block', 'floor']); create one with "
+           "dfm_world_add_friction"))
       << dfm_last_error();
   EXPECT_EQ(dfm_world_remove_friction(s.w, "nobody", "*"), DFM_E_ARG);
-  EXPECT_TRUE(says("no rule of friction is for ['nobody', '*']")) << dfm_last_error();
+  EXPECT_TRUE(says("there is no friction rule for ['nobody', '*']")) << dfm_last_error();
   EXPECT_EQ(s.set("block", "floor", "mu_K", 0.4), DFM_E_ARG);
   EXPECT_TRUE(says("did you mean")) << dfm_last_error();
   EXPECT_EQ(s.set("block", "floor", "mu", -1), DFM_E_ARG);
@@ -170,7 +170,7 @@ TEST(FrictionRules, WhatIsRefused_SaysWhyAndChangesNothing) {
   EXPECT_EQ(dfm_world_set_friction(s.w, "block", "floor", nullptr), DFM_E_ARG);
   EXPECT_EQ(dfm_world_set_friction(s.w, nullptr, "floor", &lost), DFM_E_ARG);
   EXPECT_EQ(dfm_world_remove_filter(s.w, "block", "floor"), DFM_E_ARG);
-  EXPECT_TRUE(says("no filter is for ['block', 'floor']; dfm_world_filter_pair makes one"))
+  EXPECT_TRUE(says("there is no filter for ['block', 'floor']; create one with dfm_world_filter_pair"))
       << dfm_last_error();
   EXPECT_EQ(s.bytes(), bytes);
 }

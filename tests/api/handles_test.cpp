@@ -553,7 +553,7 @@ TEST(Handles, OfAnotherKind_AreRefusedByEveryCall_WithBothKindsNamed) {
         EXPECT_EQ(call(one.handle), DFM_E_HANDLE) << name;
         const std::string said = dfm_last_error();
         if (taker.kind == DFM_HANDLE_RIGID && one.kind == DFM_HANDLE_OBSTACLE) {
-          EXPECT_NE(said.find("obstacle 'floor', which is no rigid body"), std::string::npos)
+          EXPECT_NE(said.find("obstacle 'floor', which is not a rigid body"), std::string::npos)
               << name << ": " << said;
           continue;
         }
@@ -567,7 +567,7 @@ TEST(Handles, OfAnotherKind_AreRefusedByEveryCall_WithBothKindsNamed) {
     EXPECT_TRUE(std::isnan(dfm_world_time(one.handle)));
     EXPECT_EQ(dfm_world_hash(one.handle), 0u);
     EXPECT_EQ(dfm_world_interrupt(one.handle), DFM_E_HANDLE);
-    test::says({"is not that of a world"});
+    test::says({"is not the handle of a world"});
   }
   test::run(all[0].handle, 2e-3, 1e-3);  // and nothing was harmed
 }

@@ -258,7 +258,7 @@ TEST(Memory, ParametersThatFindNoMemory_SayWhyAndChangeNothing) {
   test::ok(dfm_world_get_stats(w, &stats));
   hooks.fail_from = hooks.calls.load();
   EXPECT_EQ(dfm_body_set_params(b, &params), DFM_E_NOMEM);
-  EXPECT_NE(std::string(dfm_last_error()).find("no memory"), std::string::npos) << dfm_last_error();
+  EXPECT_NE(std::string(dfm_last_error()).find("ran out of memory"), std::string::npos) << dfm_last_error();
   hooks.fail_from = -1;
   test::ok(dfm_world_stable_step(w, &after, nullptr, nullptr));
   EXPECT_EQ(before, after);

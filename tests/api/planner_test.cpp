@@ -93,7 +93,7 @@ TEST_F(PlannerScene, BudgetThatCannotBeMet_IsSaidByTheRun) {
   const test::CommandResult r =
       test::deform({"run", bar(R"("budget": {"ms_per_step": 1e-6},)"), "--out", folder() + "/out"});
   EXPECT_EQ(r.exit_code, 0) << r.err;
-  EXPECT_TRUE(has(r.err, "the planner finds no way that meets what the scene asks for")) << r.err;
+  EXPECT_TRUE(has(r.err, "the planner finds no settings that meet the goal of the scene")) << r.err;
 }
 
 TEST_F(PlannerScene, WhatCannotBePlanned_IsOneSentence) {

@@ -199,7 +199,7 @@ TEST(QueryFilter, ACallbackThatChangesTheWorld_IsRefused) {
     Asked &a = *static_cast<Asked *>(user);
     a.refused += dfm_body_destroy(a.b) == DFM_E_BUSY;
     a.refused += dfm_world_step(a.w, 1e-3, nullptr) == DFM_E_BUSY;
-    test::says({"inside a call"});
+    test::says({"busy with another call"});
     return true;
   };
   EXPECT_EQ(overlaps(y.world, sphere({0, 0, 0}, 20), &f).size(), 7u);
@@ -269,7 +269,7 @@ TEST(QueryCast, WhatOverlapsAtTheStart_IsHitAtOnce) {
   inside(sphere({0.05, 0.05, 0.05}, 0.06), y.lower, "through its surface");
   inside(sphere({1, 0, 1}, 0.01), y.ball, "within a ball");
   inside(sphere({4, 0, 1}, 0.01), y.mesh, "within a mesh");
-  inside(sphere({9, 9, -1}, 0.01), y.floor, "below the floor");
+  inside(sphere({9, 9, -1}, 0.01), y.floor, "below the smallest step");
   const dfm_query_hit still = cast(y.world, sphere({1, 0, 1}, 0.01), {0, 0, 0});
   EXPECT_EQ(still.thing, y.ball) << "a path of no length";
   EXPECT_EQ(cast(y.world, sphere({1.5, 0, 1}, 0.01), {0, 0, 0}).thing, 0u);

@@ -88,9 +88,9 @@ TEST(Replay, WhatDoesNotFit_IsASentenceAndNothingIsLost) {
     EXPECT_NE(r.err.find(words), std::string::npos) << r.err;
   };
   const std::string other = f.path + "/other";
-  says(f.run({"--out", other, "--from", state, "--set", "/materials/gel/young=4e4"}), "of another scene");
+  says(f.run({"--out", other, "--from", state, "--set", "/materials/gel/young=4e4"}), "another scene");
   says(f.run({"--out", other, "--from", state, "--time", "0.04"}), "give a longer --time");
-  says(f.run({"--out", other, "--from", f.scene}), "no state that");
+  says(f.run({"--out", other, "--from", f.scene}), "not a state file");
   says(f.run({"--out", other, "--from", f.path + "/none"}), "cannot be opened");
   says(f.run({"--out", other, "--save", "0.05", f.path + "/none/x.state"}), "cannot be written there");
   says(f.run({"--out", other, "--save", "0.5", f.path + "/x.state"}), "the run ends at 0.12 s");
@@ -165,7 +165,7 @@ TEST(SaveScene, WrongNames_AreASentenceBeforeTheFirstStep) {
     EXPECT_NE(r.err.find(part), std::string::npos) << r.err;
     EXPECT_FALSE(fs::exists(f.path + "/never/summary.json")) << path;
   };
-  refused(f.path + "/scene.vtu", "ends in .json");
+  refused(f.path + "/scene.vtu", "must end in .json");
   refused(f.path + "/no/such/scene.json", "cannot be written there");
   refused(f.scene, "give another name");
 }

@@ -314,7 +314,7 @@ TEST(RigidBodies, BadDefs_AreRefused) {
   refused(tied(j), {"max -1"});
   dfm_rigid_state s{};
   EXPECT_EQ(dfm_rigid_get_state(floor, &s), DFM_E_HANDLE);
-  EXPECT_NE(std::strstr(dfm_last_error(), "no rigid body"), nullptr);
+  EXPECT_NE(std::strstr(dfm_last_error(), "not a rigid body"), nullptr);
 }
 
 // Scene errors name their place.

@@ -435,7 +435,7 @@ TEST(Run, OptionWithoutItsValue_SaysWhatIsMissing) {
   EXPECT_EQ(test::deform({"run", "x.json", "--frames"}).err,
             "deform: --frames needs a value: FPS (see: deform run --help)\n");
   EXPECT_EQ(test::deform({"run", "x.json", "--save", "1"}).err,
-            "deform: --save needs values: T FILE (see: deform run --help)\n");
+            "deform: --save needs 2 values: T FILE (see: deform run --help)\n");
   EXPECT_EQ(test::deform({"run", "x.json", "--frames", "often"}).err,
             "deform: --frames: expected a finite number above 0, found \"often\" (see: deform run --help)\n");
 }

@@ -145,7 +145,7 @@ TEST(SceneErrors, Switches_SayWhatTheyLack) {
        {"/bodies/0/switch=[{\"t\":1,\"type\":\"msm\",\"params\":{\"yuong\":1}}]",
         {at + "/0/params", "young"}},
        {"/bodies/0/switch=[{\"t\":2,\"type\":\"msm\"},{\"t\":1,\"type\":\"msm\"}]",
-        {at + "/1/t", "do not fall"}},
+        {at + "/1/t", "must not decrease"}},
        {"/bodies/0/switch=[{\"t\":1,\"type\":\"msm\",\"max_jump\":0}]", {at + "/0/max_jump", "above 0"}},
        {"/bodies/0/switch=[{\"t\":1,\"type\":\"msm\",\"integrator\":\"euler\"}]",
         {at + "/0/integrator", "implicit_euler"}},
@@ -256,7 +256,7 @@ TEST(SceneErrors, Arguments_AreRefused) {
 TEST(SceneErrors, OutputThatCannotBeWritten_IsRefused) {
   test::write_file(folder() + "/file", "in the way");
   expect_refused(test::deform({"run", scene(), "--quiet", "--out", folder() + "/file"}), {folder() + "/file"},
-                 "a file in the way");
+                 "a file has the unknown way of cutting");
 }
 
 TEST(SceneApi, ErrorsLeaveNothingBehind) {

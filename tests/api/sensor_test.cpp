@@ -139,7 +139,7 @@ TEST(Sensor, WhatEnds_IsToldAtOnce) {
   EXPECT_EQ(told(w), (std::vector<Event>{{DFM_EVENT_SENSOR_END, g, two}}));
   uint32_t n = 0;
   EXPECT_EQ(dfm_sensor_things(g, 0, nullptr, &n), DFM_E_ARG);
-  test::says({"no sensor"});
+  test::says({"not a sensor"});
   test::ok(dfm_obstacle_set_sensor(g, true));
   test::ok(dfm_world_step(w, 1e-3, nullptr));
   told(w);

@@ -85,17 +85,9 @@ TEST(Separate, Pieces_KeepMassBothMomentaAndEnergy) {
 // that lie on each other at rest.
 TEST(Separate, UpperPart_RestsOnTheLowerOne) {
   for (const char *model : kModels) {
-    test::Context context;
-    const dfm_world w = test::make_world(context, {0, 0, -9.81});
-    test::add_plane(w, "floor");
-    test::set_friction(w, 0.5);
-    test::BodyOptions o;
-    o.name = "cube";
-    o.model = model;
-    o.young = 5e4;
-    o.damping_stiffness = 2e-3;
-    o.position = {0, 0, 1e-4};
-    const dfm_body b = test::make_body(context, w, "beam", {0.1, 0.1, 0.1}, 320, o);
+    const CubeOnFloor scene(model, 5e4);
+    const dfm_world w = scene.w;
+    const dfm_body b = scene.b;
     steps(w, 400);
     const dfm_body_measure before = test::measure(b);
     cut(b, plane(2, 0.052, DFM_CUT_SPLIT));
@@ -212,17 +204,9 @@ TEST(Separate, Snapshot_TakesPiecesBackWithTheirHandles) {
 }
 
 TEST(Separate, Contacts_KeepKeysImpulsesAndBristles) {
-  test::Context context;
-  const dfm_world w = test::make_world(context, {1.5, 0, -9.81});
-  test::add_plane(w, "floor");
-  test::set_friction(w, 0.6, "elastoplastic");
-  test::BodyOptions o;
-  o.name = "cube";
-  o.model = "corotational_fem";
-  o.young = 1e5;
-  o.damping_stiffness = 2e-3;
-  o.position = {0, 0, 1e-4};
-  const dfm_body b = test::make_body(context, w, "beam", {0.1, 0.1, 0.1}, 320, o);
+  const CubeOnFloor scene("corotational_fem", 1e5, true);
+  const dfm_world w = scene.w;
+  const dfm_body b = scene.b;
   steps(w, 400);
   cut(b, plane(0, 0.052, DFM_CUT_SPLIT));
   steps(w, 200);

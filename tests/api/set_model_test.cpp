@@ -466,7 +466,7 @@ TEST(SetModel, AnyModelFromAnyOther_TakesABlockOverInContact) {
       const dfm_body_measure m = test::measure(s.block);
       const dfm_status status = set_model(s.block, to.c_str());
       if (status == DFM_DISCARD) {  // a shape that the model does not know, by more than 1e-6 of the size
-        test::says({"would put the surface", to.c_str()});
+        test::says({"would move the surface", to.c_str()});
         EXPECT_EQ(to, "org.deform.condensed");
         EXPECT_EQ(model_of(s.block), from);
       } else {
@@ -530,7 +530,7 @@ TEST(Switches, ThatAreNone_AreRefusedWhole) {
     test::says(parts);
     EXPECT_EQ(before, test::snapshot(s.world));
   };
-  refused({switch_at(2, "msm"), switch_at(1, "msm")}, {"body 'block'", "1 s", "do not fall"});
+  refused({switch_at(2, "msm"), switch_at(1, "msm")}, {"body 'block'", "1 s", "must not decrease"});
   refused({switch_at(NAN, "msm")}, {"finite"});
   refused({switch_at(1, "mms")}, {"msm"});
   refused({switch_at(1, nullptr)}, {"type"});

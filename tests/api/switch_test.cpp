@@ -139,7 +139,8 @@ TEST(SwitchOfAScene, ToTheModelThatTheBodyHas_IsTold) {
     EXPECT_EQ(log.find("the same parameters") != std::string::npos, *what != 0) << change << log;
     EXPECT_NE(log.find(what), std::string::npos) << log;
   };
-  told(R"([{"t": 0.005, "type": "msm"}])", "/bodies/0/switch/0) is to the model that it has by then");
+  told(R"([{"t": 0.005, "type": "msm"}])",
+       "/bodies/0/switch/0) is to the model that the body already has then");
   told(R"([{"t": 0.005, "type": "msm", "params": {"young": 2e5}}])", "");
   told(R"([{"t": 0.004, "type": "modal"}, {"t": 0.005, "type": "modal"}])", "/bodies/0/switch/1) is to");
   told(R"([{"t": 0.004, "type": "modal"}, {"t": 0.005, "type": "msm"}])", "");

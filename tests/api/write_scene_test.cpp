@@ -319,11 +319,11 @@ TEST(WriteScene, WrongArguments_GetOneSentence) {
   };
   refused(nullptr, DFM_E_ARG, "path is NULL");
   refused("", DFM_E_ARG, "path is empty");
-  refused("scene.txt", DFM_E_ARG, "ends in .json");
+  refused("scene.txt", DFM_E_ARG, "must end in .json");
   refused("/no/such/folder/scene.json", DFM_E_IO, "/no/such/folder/scene.json");
   const std::string here = folder_of("wrong");
   test::write_file(here + "/taken_files", "");
-  refused((here + "/taken.json").c_str(), DFM_E_IO, "there can be no folder");
+  refused((here + "/taken.json").c_str(), DFM_E_IO, "cannot be created beside it");
   EXPECT_FALSE(std::filesystem::exists(here + "/taken.json"));
   dfm_scene_write_def def = dfm_scene_write_def_default();
   def.flags = 8;
@@ -332,7 +332,7 @@ TEST(WriteScene, WrongArguments_GetOneSentence) {
   def.duration = 0;
   EXPECT_EQ(dfm_world_write_scene(made.world, (here + "/a.json").c_str(), &def, nullptr), DFM_E_ARG);
   dfm_body odd = made.make("a/b", "ball", {0.05, 0, 0}, {1, 0, 0.3}, {0, 0, 0, 1});
-  refused((here + "/b.json").c_str(), DFM_E_ARG, "'a/b' cannot stand in a scene");
+  refused((here + "/b.json").c_str(), DFM_E_ARG, "'a/b' cannot be used in a scene");
   test::ok(dfm_body_destroy(odd));
   EXPECT_EQ(dfm_world_write_scene(0, (here + "/a.json").c_str(), nullptr, nullptr), DFM_E_HANDLE);
 }

@@ -9,7 +9,7 @@
 namespace {
 
 // Each point hangs on its place at rest by a spring. `kind`: 0 stiffness that never changes, 1 one that may,
-// 2 none, 3 fails when it is asked what it can.
+// 2 none, 3 fails when it is asked its abilities.
 struct Springs {
   uint32_t npoint;
   std::vector<double> rest;
@@ -61,7 +61,7 @@ const void *extension(const void *, const char *id) {
 }
 
 const dfm_param rows[] = {
-    {"kind", "what it can", "1", 0, 3, 0, DFM_PARAM_RUNTIME | DFM_PARAM_INTEGER, 1, nullptr}};
+    {"kind", "its abilities", "1", 0, 3, 0, DFM_PARAM_RUNTIME | DFM_PARAM_INTEGER, 1, nullptr}};
 const dfm_model model = {sizeof(dfm_model),
                          DFM_CAP_STIFFNESS | DFM_CAP_CONSTANT_STIFFNESS,
                          DFM_CELL_TET,

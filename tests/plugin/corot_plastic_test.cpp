@@ -205,14 +205,14 @@ TEST(CorotPlastic, Refusals_SayWhy) {
     EXPECT_EQ(b.status, DFM_E_ARG) << word;
     EXPECT_NE(host.logged.find(word), std::string::npos) << host.logged;
   };
-  refused(soft({{"energy", {1}}}), "yield takes the energy corotational");
-  refused(soft({{"anisotropy_young", {1e6}}}), "yield takes the energy corotational");
+  refused(soft({{"energy", {1}}}), "yield works with the energy corotational");
+  refused(soft({{"anisotropy_young", {1e6}}}), "yield works with the energy corotational");
   refused(soft({{"creep", {-0.5}}}), "creep");
   Host host;
   Instance elastic(host, regular_tet());
   const std::vector<double> values = Instance::row(soft());
   EXPECT_EQ(elastic.ops->set_params(elastic.self, values.data()), DFM_E_ARG);
-  EXPECT_NE(host.logged.find("made without yield"), std::string::npos);
+  EXPECT_NE(host.logged.find("created without yield"), std::string::npos);
   Instance b(host, regular_tet(), soft());
   dfm_kin k = b.kin();
   k.state = nullptr;

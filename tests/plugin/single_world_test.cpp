@@ -138,7 +138,7 @@ TEST(Single, ImplicitSteps_StayDoubleAndSaySo) {
 TEST(Single, WhatHasNone_IsRefusedInOneSentence) {
   Beam fem({{"precision", 1}}, 200, 1, "corotational_fem");
   EXPECT_EQ(fem.status, DFM_E_UNSUPPORTED);
-  test::says({"org.deform.corotational_fem", "double precision alone", "msm"});
+  test::says({"org.deform.corotational_fem", "only in double precision", "msm"});
   Beam maxwell({{"precision", 1}, {"damper", 1}});
   EXPECT_EQ(maxwell.status, DFM_E_UNSUPPORTED);
   test::says({"org.deform.msm", "no single precision", "damper"});
@@ -211,7 +211,7 @@ TEST(Single, Scene_TakesTheWordAndNoOther) {
   test::says({"/bodies/0/model/precision", "half", "single"});
   Scene fem(kSlope, {"/bodies/0/model/precision=single", "/bodies/0/model/type=linear_fem"});
   EXPECT_EQ(fem.status, DFM_E_UNSUPPORTED);
-  test::says({"org.deform.linear_fem", "double precision alone"});
+  test::says({"org.deform.linear_fem", "only in double precision"});
 }
 
 }  // namespace

@@ -315,7 +315,7 @@ TEST(Stepper, ThatWouldMoveTheSurfaceAtOnce_IsRefused) {
   EXPECT_EQ(dfm_world_hash(b.world), hash);
   first_shape[2] += 1e-6;
   EXPECT_EQ(to_model(b.body, "toy_stepper"), DFM_DISCARD);
-  test::says({"body 'block'", "test.toy_stepper", "would put the surface", "nothing was changed"});
+  test::says({"body 'block'", "test.toy_stepper", "would move the surface", "nothing was changed"});
   EXPECT_EQ(dfm_world_hash(b.world), hash);
   snaps = false;
 }

@@ -93,6 +93,25 @@ struct Cube {
   }
 };
 
+// A cube at rest on a floor; pushed: gravity is tilted, and friction with memory holds the cube.
+struct CubeOnFloor {
+  test::Context context;
+  dfm_world w;
+  dfm_body b;
+  explicit CubeOnFloor(const char *model, double young, bool pushed = false, uint32_t cells = 320)
+      : w(test::make_world(context, {pushed ? 1.5 : 0, 0, -9.81})) {
+    test::add_plane(w, "floor");
+    test::set_friction(w, pushed ? 0.6 : 0.5, pushed ? "elastoplastic" : "coulomb");
+    test::BodyOptions o;
+    o.name = "cube";
+    o.model = model;
+    o.young = young;
+    o.damping_stiffness = 2e-3;
+    o.position = {0, 0, 1e-4};
+    b = test::make_body(context, w, "beam", {0.1, 0.1, 0.1}, cells, o);
+  }
+};
+
 inline const char *const kModels[] = {"msm", "corotational_fem"};
 
 }  // namespace test::cutting

@@ -60,7 +60,8 @@ Verdict judge(const Request &request, const Rule &rule, int type) {
   subject.plugin = plugin.get();
   if (type >= 0) {
     if (static_cast<size_t>(type) >= plugin->types().size())
-      return {Result::fail, "the number of its types differs from load to load; hand out constant tables"};
+      return {Result::fail,
+              "the number of types differs between two loads of the plugin; return constant tables"};
     subject.index = static_cast<uint32_t>(type);
     subject.type = plugin->types()[subject.index];
   }
@@ -132,11 +133,11 @@ Line run_rule(const Request &request, const Rule &rule, int type) {
   if (!a.spoke)
     line.verdict = {Result::fail, "it " + a.ending + (a.at.empty() ? "" : " (" + a.at + ")") +
                                       (found.empty() ? "" : ": " + found) +
-                                      ", and would take a world with it; answer every input in bounded time, "
-                                      "and touch only the arrays that are given"};
+                                      ", which would end the program that uses it; return in bounded time "
+                                      "for every input, and access only the given arrays"};
   else if (!found.empty() && a.verdict.result != Result::fail)
-    line.verdict = {Result::fail, "the sanitizer reports " + found +
-                                      "; what it names is a mistake even where it goes well"};
+    line.verdict = {Result::fail,
+                    "the sanitizer reports " + found + "; fix this even if the results look right"};
   return line;
 }
 
@@ -198,7 +199,7 @@ class Rules {
   }
   void one(std::vector<Line> &to, const Rule &rule, int type) {
     if (late_ >= kEnough)
-      return add(to, {&rule, {Result::skip, "not asked: others did not come back; mend them first"}, 0});
+      return add(to, {&rule, {Result::skip, "not run: earlier rules did not return; fix them first"}, 0});
     add(to, run_rule(request_, rule, type));
     late_ += to.back().late;
   }

@@ -92,8 +92,8 @@ Process Process::now() {
 std::string Process::difference(const Process &later) const {
   if (later.folder_ != folder_)
     return text(
-        "changes the current folder from %s to %s: relative paths of the program lead elsewhere from then "
-        "on, and results with them; open files by whole paths",
+        "changes the current folder from %s to %s: the program's relative paths then name other files; open "
+        "files by absolute paths",
         folder_.c_str(), later.folder_.c_str());
   if (later.locale_ != locale_)
     return text(

@@ -132,7 +132,7 @@ const dfm_model &model_of(const Subject &subject) {
 std::vector<Variant> variants(const Subject &subject) {
   const dfm_type &type = *subject.type;
   if (!(model_of(subject).cells & DFM_CELL_TET))
-    skip("it takes no tetrahedra, which the meshes of this validator are made of");
+    skip("the model does not accept tetrahedra, and all meshes of this check consist of them");
   const std::vector<double> defaults = default_params(type);
   std::vector<Variant> wanted = {{"the defaults", defaults}};
   size_t at = 0;
@@ -256,9 +256,8 @@ std::vector<double> Body::stiffness(double a, double b) const {
     const uint32_t i = ij[2 * size_t(e)], j = ij[2 * size_t(e) + 1];
     if (i > j || j >= points() || !seen.insert({i, j}).second)
       broken(
-          "pair %u of its pattern is (%u, %u), which is out of order, named twice or no pair of points, so "
-          "the "
-          "host's matrix would lose or double a block; name each pair once, i <= j",
+          "pair %u of its pattern is (%u, %u), which is out of order, listed twice or not a pair of points, "
+          "so the host's matrix would lose or double a block; name each pair once, i <= j",
           e, i, j);
   }
   Numbers blocks(9 * size_t(n), 0.0);
@@ -286,9 +285,8 @@ double Body::longest_step() const {
     const double m = solid.mass[i], s = ksum[i], c = csum[i];
     if (!(s >= 0) || !(c >= 0) || !std::isfinite(s + c))
       broken(
-          "bound answers row sums of %g N/m and %g N s/m for point %u, from which no step follows; add what "
-          "is "
-          "finite and not negative",
+          "bound answers row sums of %g N/m and %g N s/m for point %u, from which no stable step can be "
+          "computed; return finite sums that are not negative",
           s, c, i);
     if (s > 0) h = std::min(h, (-c + std::sqrt(c * c + 4 * m * s)) / s);
     else if (c > 0) h = std::min(h, 2 * m / c);

@@ -132,9 +132,8 @@ Plugin::Plugin(const std::string &file) {
         DFM_ABI, DFM_ABI_DRAFT, host_.said().empty() ? "without a reason" : host_.said().c_str());
   if (given->abi < DFM_ABI_MIN || given->abi > DFM_ABI || given->abi_draft != DFM_ABI_DRAFT)
     broken(
-        "it was built for ABI %u draft %u and hands itself to a host of ABI %u draft %u, where its structs "
-        "would be misread; rebuild it against this library's deform/plugin.h and refuse other hosts with "
-        "DFM_ABI_OK",
+        "it was built for ABI %u draft %u and accepts a host of ABI %u draft %u, which would misread its "
+        "structs; rebuild it against this library's deform/plugin.h and refuse other hosts with DFM_ABI_OK",
         given->abi, given->abi_draft, DFM_ABI, DFM_ABI_DRAFT);
   dfm_plugin full{};
   if (!copy_struct(full, given, offsetof(dfm_plugin, types) + sizeof(void *)))

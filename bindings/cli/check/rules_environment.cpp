@@ -34,8 +34,8 @@ std::string keeps_rounding(const Subject &subject) {
   if (subject.type->kind == DFM_KIND_MODEL) use_model(subject);
   if (const std::string &left = left_changed(); !left.empty())
     broken(
-        "%s: the host would compute everything after it with other bits, and read numbers of files "
-        "otherwise; put back what you change (fegetenv, fesetenv)",
+        "%s: the host would then compute other results and read numbers in files differently; restore what "
+        "you change (fegetenv, fesetenv)",
         left.c_str());
   return "";
 }
@@ -80,11 +80,9 @@ std::string keeps_process(const Subject &subject) {
   if (!changed.empty()) broken("%s", changed.c_str());
   for (int k = 0; k < 2; ++k)
     if (!printed[k].empty())
-      broken(
-          "it writes to standard %s (\"%s\"): that lands in the middle of the program's own output, which "
-          "others read; say it through dfm_host.log",
-          k == 0 ? "output" : "error",
-          printed[k].substr(0, std::min<size_t>(printed[k].find('\n'), 60)).c_str());
+      broken("it writes to standard %s (\"%s\"): this mixes with the program's own output; use dfm_host.log",
+             k == 0 ? "output" : "error",
+             printed[k].substr(0, std::min<size_t>(printed[k].find('\n'), 60)).c_str());
   if (threads > 0)
     broken(
         "%d thread%s of it still run%s after it was unloaded: %s next instruction may be gone; join them in "

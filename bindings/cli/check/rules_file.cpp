@@ -67,12 +67,12 @@ bool read_symbols(const std::string &bytes, unsigned type, std::vector<Symbol> &
 std::vector<std::string> exported(const std::string &file) {
   const std::string bytes = bytes_of(file);
   if (bytes.size() < sizeof(ElfW(Ehdr)) || std::memcmp(bytes.data(), ELFMAG, SELFMAG) != 0)
-    broken("it is no shared library (ELF), so nothing can load it; build it with deform_add_plugin");
+    broken("it is not a shared library (ELF), so it cannot be loaded; build it with deform_add_plugin");
   std::vector<Symbol> symbols;
   if (!read_symbols(bytes, SHT_DYNSYM, symbols))
     skip(
-        "the file carries no section headers, so its symbols cannot be listed; check it before it is "
-        "stripped of them");
+        "the file has no section headers, so its symbols cannot be listed; run the check before you strip "
+        "the file");
   std::vector<std::string> out;
   for (const Symbol &s : symbols) {
     const int visibility = s.entry.st_other & 3, binding = s.entry.st_info >> 4;
@@ -146,15 +146,15 @@ std::string refuses_unknown_abi(const Subject &subject) {
     stage("the entry is called by a host of ABI %u draft %u", stranger.abi, stranger.draft);
     if (given_to(entry, stranger.abi, stranger.draft, stranger.min))
       broken(
-          "its entry hands itself to a host of ABI %u draft %u, which it cannot know, and would be called "
-          "with structs of another shape; return NULL unless DFM_ABI_OK(host)",
+          "its entry accepts a host of ABI %u draft %u, which it cannot know, and would be called with "
+          "structs of another layout; return NULL unless DFM_ABI_OK(host)",
           stranger.abi, stranger.draft);
   }
   stage("the entry is called by a host of ABI %u that still speaks %u", DFM_ABI + 1, DFM_ABI);
   if (!given_to(entry, DFM_ABI + 1, 3, DFM_ABI))
     broken(
-        "its entry refuses a host of ABI %u that still speaks ABI %u, so every later library would be closed "
-        "to it; ask DFM_ABI_OK(host), which reads abi_min",
+        "its entry refuses a host of ABI %u that still supports ABI %u, so the plugin would not run with "
+        "later libraries; use DFM_ABI_OK(host), which reads abi_min",
         DFM_ABI + 1, DFM_ABI);
   return text("ABI %u", DFM_ABI);
 }
@@ -184,14 +184,15 @@ void effects_known(const dfm_type &type) {
     if (std::strchr(*e, '.') || std::find(known.begin(), known.end(), *e) != known.end()) continue;
     const std::string near = nearest(*e, known);
     broken(
-        "it promises \"%s\", a word that no scene can ask for%s%s%s; a word of your own reads "
+        "it promises \"%s\", which is not the name of an effect%s%s%s; write an effect of your own as "
         "\"vendor.word\"",
         *e, near.empty() ? "" : "; did you mean \"", near.c_str(), near.empty() ? "" : "\"");
   }
 }
 
 void reserved_free(const char *what, uint32_t found) {
-  if (found) broken("%s has %u in reserved, which a later host may read as a wish; set it to 0", what, found);
+  if (found)
+    broken("%s has %u in reserved, to which a later host may give a meaning; set it to 0", what, found);
 }
 
 void slots_sound(const std::vector<dfm_slot> &slots, bool law) {
@@ -267,8 +268,8 @@ void model_sound(const dfm_type &type, const dfm_model &model) {
            model.cells & ~kCells);
   if (model.add_forces && !model.bound)
     broken(
-        "it adds forces without bound, so the host takes steps of any length and the body flies apart; set "
-        "dfm_model.bound");
+        "it adds forces but dfm_model.bound is NULL, so the host would take steps of any length and the body "
+        "would diverge; set the function");
   for (uint32_t i = 0; i < type.nparam && !model.set_params; ++i)
     if (type.params[i].flags & DFM_PARAM_RUNTIME)
       broken(
@@ -291,7 +292,8 @@ void model_sound(const dfm_type &type, const dfm_model &model) {
   for (const auto &c : claims)
     if ((model.caps & c.bit) && !c.there)
       broken(
-          "it claims %s without %s, so the host calls what is not there; set the function, or drop the claim",
+          "it claims %s without %s, so the host would call a missing function; set the function, or drop the "
+          "claim",
           c.cap, c.function);
   if ((model.caps & DFM_CAP_CONSTANT_STIFFNESS) && !(model.caps & DFM_CAP_STIFFNESS))
     broken(
@@ -362,10 +364,7 @@ void tables_sound(const Subject &subject) {
              k.id, head[1]);
     if (!k.row) reserved_free(text("the table of its extension \"%s\"", k.id).c_str(), head[1]);
     if (k.one && lacks_its_function(table))
-      broken(
-          "the table of its extension \"%s\" has no function, so it says nothing; set it, or answer NULL to "
-          "the id",
-          k.id);
+      broken("the table of its extension \"%s\" has no function; set it, or return NULL for this id", k.id);
   }
   const auto *stepper = static_cast<const dfm_stepper *>(body.extension("dfm.stepper/1"));
   if (!stepper && !model.add_forces)
@@ -387,8 +386,8 @@ void tables_sound(const Subject &subject) {
                     "set size to sizeof(dfm_slots) and slot_size to sizeof(dfm_slot)");
   if (body.extension("dfm.unheard-of/1"))
     broken(
-        "extension answers an id that it cannot know with a table, which a host would read as another "
-        "one; return NULL for all but the ids that it compares");
+        "extension returns a table for an id that it cannot know; return NULL for every id except those that "
+        "it compares");
 }
 
 }  // namespace
@@ -397,10 +396,10 @@ std::string metadata_complete(const Subject &subject) {
   const dfm_type &type = *subject.type;
   const struct {
     const char *key, *text, *remedy;
-  } fields[] = {{"name", type.name, "what a list shows"},
-                {"version", type.version, "results are quoted with it"},
-                {"licence", type.licence, "without one nobody may pass it on"},
-                {"source", type.source, "paper and equation: nobody can judge a formula without"}};
+  } fields[] = {{"name", type.name, "the name that lists show"},
+                {"version", type.version, "results are cited with it"},
+                {"licence", type.licence, "without one nobody may redistribute it"},
+                {"source", type.source, "the paper and equation that it implements"}};
   if (!type.id || !reverse_dns(type.id))
     broken(
         "its id \"%s\" is not in reverse-DNS form, so two plugins may claim it; call it like "
@@ -451,11 +450,11 @@ void row_sane(const dfm_type &type, uint32_t i) {
   if (key.empty()) broken("row %u of the table has no key, so nothing can set it; give one", i);
   for (uint32_t j = 0; j < i; ++j)
     if (type.params[j].key && key == type.params[j].key)
-      broken("parameter \"%s\" stands twice in the table, so the second can never be set; rename one", k);
+      broken("parameter \"%s\" is listed twice, so the second can never be set; rename one", k);
   if (!row.label || !*row.label || !row.unit || !*row.unit)
     broken(
-        "parameter \"%s\" lacks a label or a unit, so nobody knows what to give; the unit of a number is "
-        "\"1\"",
+        "parameter \"%s\" lacks a label or a unit, so users do not know what to give; the unit of a number "
+        "is \"1\"",
         k);
   if (!std::isfinite(row.min) || !std::isfinite(row.max) || !(row.min <= row.def && row.def <= row.max))
     broken(
@@ -502,10 +501,8 @@ void asks_check(const dfm_friction &law, const std::vector<double> &params) {
     law.check(params.data(), room, cap);
     for (size_t i = cap; i < sizeof room; ++i)
       if (room[i] != 0x5a)
-        broken(
-            "check writes %zu bytes past the %zu that it was given for its sentence, over what lies behind; "
-            "use snprintf(why, cap, ...)",
-            i - cap + 1, cap);
+        broken("check writes %zu bytes past the end of its buffer of %zu bytes; use snprintf(why, cap, ...)",
+               i - cap + 1, cap);
   }
 }
 
@@ -536,8 +533,8 @@ void library_refuses(const Subject &subject) {
       const dfm_params params{sizeof params, 1, &value};
       if (dfm_law_pack(law, &params, 0, nullptr, nullptr) == DFM_OK)
         broken(
-            "parameter \"%s\" = %.17g lies outside [%g, %g] and is accepted, so the law meets values that it "
-            "never promised to bear; correct the range",
+            "parameter \"%s\" = %.17g is accepted although it lies outside [%g, %g]; correct the range, or "
+            "refuse the value",
             row.key, outside, row.min, row.max);
     }
   }
@@ -570,8 +567,8 @@ std::string parameters_sane(const Subject &subject) {
       if (const std::string why = refusal(law, params); !why.empty()) {
         if (why == "(no reason)")
           broken(
-              "check refuses \"%s\" = %g without a sentence, so the user does not learn what to change; "
-              "write one into why",
+              "check refuses \"%s\" = %g without a reason, so the user does not learn what to change; write "
+              "a sentence into why",
               type.params[i].key, end);
         ++refused;
         continue;

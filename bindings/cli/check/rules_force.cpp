@@ -36,11 +36,11 @@ std::string rests_at_zero(const Subject &subject) {
     for (uint32_t i = 0; i < b.n; ++i) {
       if (!(b.ft(i) == 0))
         broken(
-            "at rest, with no state and a normal force of %g N, it pushes with %g N: bodies that only lie "
-            "there would be set in motion; let the force vanish with slip and state",
+            "at rest, with no state and a normal force of %g N, the force is %g N, so bodies at rest would "
+            "start to move; make the force zero where slip and state are zero",
             b.fn[i], b.ft(i));
       if (law.nstate == 0 && !(b.stored[i] == 0))
-        broken("at rest it says that %g J are stored although it keeps no state; write 0", b.stored[i]);
+        broken("at rest it reports a stored energy of %g J although it has no state; write 0", b.stored[i]);
     }
   }
   return "";
@@ -128,8 +128,8 @@ void loops_dissipate(const Law &law, const Scales &s) {
     for (uint32_t i = 0; i < n; ++i)
       if (!(work[i] >= -1e-9 * moved[i]))
         broken(
-            "a closed loop of slip of %.3g m at steps of %g s gives %.3g J instead of taking some: bodies in "
-            "contact would speed up by themselves; the force must oppose the slip (ft = -F)",
+            "a closed loop of slip of %.3g m at steps of %g s produces %.3g J instead of dissipating energy: "
+            "bodies in contact would speed up by themselves; the force must oppose the slip (ft = -F)",
             sizes[i / kinds], h, -work[i]);
   }
 }
@@ -167,8 +167,8 @@ void gives_back_no_more(const Law &law, const Scales &s, Random &random) {
       moved[i] += h * b.ft(i) * std::hypot(vx, vy);
       if (!(work[i] >= -1e-9 * moved[i]))
         broken(
-            "after %d random steps of slip and normal force it has given %.3g J although nothing was stored "
-            "when it began: contacts would feed their bodies with energy; damp the state less at high speed, "
+            "after %d random steps of slip and normal force it has produced %.3g J although no energy was "
+            "stored at the start: contacts would add energy to bodies; damp the state less at high speed, "
             "project it on the cone when the normal force falls, or do not flag DFM_FRIC_PASSIVE",
             k + 1, -work[i]);
     }
@@ -179,7 +179,7 @@ void gives_back_no_more(const Law &law, const Scales &s, Random &random) {
 
 std::string dissipates(const Subject &subject) {
   const Law law(subject, lively_params(subject));
-  if (!law.needs(DFM_NEED_VT)) skip("the law does not look at the slip (no DFM_NEED_VT)");
+  if (!law.needs(DFM_NEED_VT)) skip("the law does not use the slip (no DFM_NEED_VT)");
   const Scales s = scales_of(law);
   loops_dissipate(law, s);
   if (!law.has(DFM_FRIC_PASSIVE)) return "loops alone: the law is not flagged DFM_FRIC_PASSIVE";
@@ -332,15 +332,14 @@ std::string bounded_at_every_step(const Subject &subject) {
         for (uint32_t c = 0; c < law.nstate; ++c) sum += std::fabs(b.state[size_t(c) * b.stride + i]);
         peak = std::max(peak, b.ft(i));
         if (!std::isfinite(b.ft(i)) || !std::isfinite(sum))
-          broken(
-              "at steps of %g s force or state leave the finite numbers after %d steps: a world would lose "
-              "the contact; update the state implicitly",
-              h, k + 1);
+          broken("at steps of %g s force or state is not finite after %d steps; update the state implicitly",
+                 h, k + 1);
         if (b.mode[i] > 2) broken("it writes mode %u; the host knows 0 open, 1 stick and 2 slip", b.mode[i]);
         if (!(b.limit[i] >= 0))
           broken("it writes a limit of %g N; a force without a limit has +inf, none has 0", b.limit[i]);
         if (!(b.stored[i] >= 0) || !std::isfinite(b.stored[i]))
-          broken("it says that %g J are stored; what a state stores is finite and not negative", b.stored[i]);
+          broken("it reports a stored energy of %g J; stored energy must be finite and not negative",
+                 b.stored[i]);
       }
     }
     if (at < 2) reference = std::max(reference, peak);
@@ -378,7 +377,7 @@ std::vector<double> from_first_touch(const Law &law, const std::vector<double> &
 
 std::string follows_normal_force(const Subject &subject) {
   const Law law(subject, lively_params(subject));
-  if (!law.needs(DFM_NEED_FN)) skip("the law does not look at the normal force (no DFM_NEED_FN)");
+  if (!law.needs(DFM_NEED_FN)) skip("the law does not use the normal force (no DFM_NEED_FN)");
   const Scales s = scales_of(law);
   const double h = 1e-3;
   const int steps = 400;
@@ -404,12 +403,12 @@ std::string follows_normal_force(const Subject &subject) {
         if (path[leg] == 0 && !(b.ft(i) == 0))
           broken(
               "a contact whose normal force has gone to zero still pulls with %.3g N: bodies that have "
-              "parted would drag each other; answer zero and rest where fn <= 0",
+              "parted would drag each other; return zero force and the state of rest where fn <= 0",
               b.ft(i));
         if (!(b.ft(i) <= most * (1 + 1e-9)))
           broken(
-              "when the normal force goes from %.3g to %.3g N the force is %.3g N, where %.3g N is all that "
-              "a contact under that load makes: a spike that throws bodies apart; project the old state on "
+              "when the normal force goes from %.3g to %.3g N the force is %.3g N, where a contact under "
+              "that load gives at most %.3g N: a spike that throws bodies apart; project the old state on "
               "the cone of the new normal force before the update",
               (leg ? path[leg - 1] : path[leg]) * s.fn, path[leg] * s.fn, b.ft(i), most / 1.1);
       }

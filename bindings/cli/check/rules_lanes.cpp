@@ -101,8 +101,8 @@ std::string same_bits(const Subject &subject) {
       if (!again.same(i, first, i))
         broken(
             "lane %u of the same batch answered (%.17g, %.17g) N and, asked again after another batch, "
-            "(%.17g, %.17g) N: it keeps something between calls, so a restored or repeated step goes "
-            "elsewhere; move it into a state slot",
+            "(%.17g, %.17g) N: it keeps data between calls, so a restored or repeated step would give other "
+            "results; keep the data in a state slot",
             i, first.out_ft[i], first.out_ft[first.stride + i], again.out_ft[i],
             again.out_ft[again.stride + i]);
   }
@@ -110,8 +110,8 @@ std::string same_bits(const Subject &subject) {
   const uint64_t here = digest(subject), once_more = digest(subject);
   if (here != once_more)
     broken(
-        "the same series of batches gave other bits the second time: it keeps something between calls; move "
-        "it into a state slot");
+        "the same series of batches gave other bits the second time: it keeps data between calls; keep the "
+        "data in a state slot");
   const std::string number = std::to_string(subject.index), seed = std::to_string(subject.seed);
   const Answer other =
       in_fresh_process(subject.command, {"plugin", "check", subject.file, "--digest", number, "--seed", seed},
@@ -173,8 +173,8 @@ std::string bad_lane_stays(const Subject &subject) {
         finite = finite && std::isfinite(spoilt.out_state[c * S + kBad]);
       if (std::isnan(bad) && std::strcmp(input.name, "dwell") != 0 && finite)
         broken(
-            "%s = NaN gave a finite force (%.17g, %.17g) N, so the host would not notice that its contact is "
-            "broken; let the NaN through, or return DFM_DISCARD",
+            "%s = NaN gave a finite force (%.17g, %.17g) N, so the host would not notice the invalid "
+            "contact; return a NaN, or DFM_DISCARD",
             input.name, spoilt.out_ft[kBad], spoilt.out_ft[S + kBad]);
     }
   return "";
@@ -231,9 +231,9 @@ std::string endures(const Subject &subject) {
   for (uint32_t i = 0; i < first.n; ++i)
     if (!again.same(i, first, i))
       broken(
-          "lane %u answered (%.17g, %.17g) N and, after %u other contacts, (%.17g, %.17g) N: it counts or "
-          "wears out, so a long run goes elsewhere than a short one; keep nothing between calls but state "
-          "slots",
+          "lane %u answered (%.17g, %.17g) N and, after %u other contacts, (%.17g, %.17g) N: it keeps data "
+          "between calls, so a long run would give other results than a short one; keep nothing between "
+          "calls but state slots",
           i, first.out_ft[i], first.out_ft[first.stride + i], asked, again.out_ft[i],
           again.out_ft[again.stride + i]);
   Lanes large(law, kLarge);
@@ -245,8 +245,8 @@ std::string endures(const Subject &subject) {
     if (!large.same(i, many, i % kBatch))
       broken(
           "contact %u of a batch of %u answers (%.17g, %.17g) N and the same contact in a batch of %u "
-          "(%.17g, %.17g) N: large worlds would go wrong; index contacts by uint32_t, and keep no table of "
-          "fixed size",
+          "(%.17g, %.17g) N: large worlds would give wrong results; index contacts by uint32_t, and keep no "
+          "table of fixed size",
           i, kLarge, large.out_ft[i], large.out_ft[large.stride + i], kBatch, many.out_ft[i % kBatch],
           many.out_ft[many.stride + i % kBatch]);
   return text("%u contacts", asked);

@@ -31,7 +31,7 @@ double force_scale(Body &body, Random &random) {
   if (!(most > 0) || !std::isfinite(most))
     broken(
         "its largest force is %g N where every point of a body is 1 %% of an edge off its place, so nothing "
-        "holds the body together; give it forces, or do not call it a model",
+        "holds the body together; add forces",
         most);
   return most;
 }
@@ -46,8 +46,8 @@ void rests(Body &body, const char *where, const Variant &variant) {
   for (size_t i = 0; i < before.size(); ++i) most = std::max(most, std::fabs(body.x[i] - before[i]));
   if (!(most <= 1e-9 * kCube))
     broken(
-        "%s a body at rest in its rest shape, %s, moves by %g m in a step without any load: it would stir by "
-        "itself; let what it aims at be the rest shape",
+        "%s a body at rest in its rest shape, %s, moves by %g m in a step without any load: it would move "
+        "without a load; make the rest shape its goal",
         with(variant).c_str(), where, most);
 }
 
@@ -154,14 +154,14 @@ void keeps_momentum_of_steps(const Subject &subject, const Variant &variant) {
   Sums after = sums_of(body, body.v, body.solid.mass);
   if (!(apart(before.force, after.force) <= 1e-10 * before.size))
     broken(
-        "%s the momentum of a free body changes by %g kg m/s of %g in 20 steps: it would fly off by itself; "
-        "let inner forces or goals leave the center of mass where it is",
+        "%s the momentum of a free body changes by %g kg m/s of %g in 20 steps: it would move without a "
+        "load; let inner forces or goals leave the center of mass where it is",
         with(variant).c_str(), apart(before.force, after.force), before.size);
   if (body.can(DFM_CAP_ROTATION_INVARIANT) &&
       !(apart(before.torque, after.torque) <= 1e-9 * std::max(before.arm, after.arm)))
     broken(
-        "%s the angular momentum of a free body changes by %g kg m2/s of %g in 20 steps: it would begin to "
-        "spin by itself; let inner forces or goals have no moment",
+        "%s the angular momentum of a free body changes by %g kg m2/s of %g in 20 steps: it would start to "
+        "spin without a load; let inner forces or goals have no moment",
         with(variant).c_str(), apart(before.torque, after.torque), before.arm);
 }
 
@@ -178,8 +178,8 @@ std::string forces_sum_to_zero(const Subject &subject) {
       const Sums s = sums_of(body, f, std::vector<double>(body.points(), 1.0));
       if (!(length(s.force) <= 1e-10 * s.size))
         broken(
-            "%s the forces of a free body sum to %g N (their sizes to %g N): it would fly off by itself; let "
-            "the forces of each cell sum to zero, as those of an energy of differences do",
+            "%s the forces of a free body sum to %g N (their sizes to %g N): it would move without a load; "
+            "let the forces of each cell sum to zero, as those of an energy of differences do",
             with(variant).c_str(), length(s.force), s.size);
       if (body.can(DFM_CAP_ROTATION_INVARIANT) && !(length(s.torque) <= 1e-10 * s.arm))
         broken(
@@ -282,7 +282,7 @@ void tangent_agrees(Body &body, const Variant &variant, const Tangent &t, Random
       if (!(std::fabs(k[i * width + j] - k[j * width + i]) <= 1e-9 * most))
         broken(
             "%s the block of point %zu with itself is not symmetric (%g and %g N/m), so the host's solver, "
-            "which takes half of it, solves something else; give the symmetric part",
+            "which reads one half of it, would solve other equations; give the symmetric part",
             with(variant).c_str(), i / 3, k[i * width + j], k[j * width + i]);
   for (size_t n = 0; n < k.size(); ++n)
     if (!(std::fabs(both[n] - (2 * k[n] + 3 * c[n])) <= 1e-9 * (2 * most + 3 * damping)))
@@ -294,12 +294,12 @@ void tangent_agrees(Body &body, const Variant &variant, const Tangent &t, Random
   if (!below(k, width, 1e-8 * most))
     broken(
         "%s, points shaken by %g of an edge, stiffness has a positive direction: the matrix of an implicit "
-        "step may lose its factorization and the body jumps; leave out what makes it indefinite",
+        "step may lose its factorization and the body jumps; drop the terms that make it indefinite",
         with(variant).c_str(), t.share);
   if (damping > 0 && !below(c, width, 1e-8 * damping))
     broken(
         "%s, points shaken by %g of an edge, the part of stiffness by velocity has a positive direction: "
-        "dampers would push; leave out what makes it indefinite",
+        "dampers would push; drop the terms that make it indefinite",
         with(variant).c_str(), t.share);
   if (t.tolerance > 0) {
     const std::vector<double> d = differences(body, body.x, 1e-5 * kCube);
@@ -488,8 +488,8 @@ std::string collapsed_cells_stay_finite(const Subject &subject) {
       discarded += status == DFM_DISCARD;
       if (status < 0)
         broken(
-            "%s, %s, it returns %s, which ends the body for good; answer, or return DFM_DISCARD where a "
-            "shorter step may help",
+            "%s, %s, it returns %s, which stops the world; return a result, or DFM_DISCARD if a shorter step "
+            "may help",
             with(variant).c_str(), kCollapses[how], dfm_status_name(status));
       for (size_t n = 0; n < out.size() && status == DFM_OK; ++n)
         if (!std::isfinite(out[n] + v[n]) || !std::isfinite(u[n % u.size()]))

@@ -92,7 +92,7 @@ std::string model_parameters_sane(const Subject &subject) {
       if (!body.made()) {
         if (body.why().empty())
           broken(
-              "create refuses \"%s\" = %g without a sentence, so the user does not learn what to change; say "
+              "create refuses \"%s\" = %g without a reason, so the user does not learn what to change; say "
               "it "
               "through dfm_host.log",
               type.params[i].key, end);
@@ -147,8 +147,8 @@ std::string step_keeps_to_itself(const Subject &subject) {
       ++calls;
       if (found)
         broken(
-            "%s %s calls %s, in its third step: it runs in every step of a world, where this costs time or "
-            "stops it; take memory in create, and leave files, environment, clock and chance to the host",
+            "%s %s calls %s, in its third step: this runs in every step and costs time or may block; "
+            "allocate in create, and do not use files, environment, clock or random numbers",
             with(variant).c_str(), name, spelt(found).c_str());
       told(name, status);
     });
@@ -273,8 +273,7 @@ class FencedBody {
     long offset = 0;
     if (array.spoilt(&offset))
       broken(
-          "%s writes %s %s (offset %ld bytes), over what lies there; loop to the number of points, and step "
-          "by "
+          "%s writes %s %s (offset %ld bytes), over other data; loop to the number of points, and step by "
           "dfm_kin.stride",
           name, offset < 0 ? "before" : "past the end of", what, offset);
   }
@@ -287,7 +286,7 @@ class FencedBody {
     body_.subject.plugin->host().give_back_scratch();
     if (!trouble.empty())
       broken(
-          "at stride %u %s %s, over what lies there in a world; loop to the number of points, step by "
+          "at stride %u %s %s, over other data of a world; loop to the number of points, step by "
           "dfm_kin.stride, and write only what is an output",
           body_.stride, name, trouble.c_str());
     must_be_good(name, status);
@@ -383,7 +382,7 @@ std::string model_same_bits(const Subject &subject) {
           !equal(first.x_end, with_that.x_end) || !equal(first.v_end, with_that.v_end) ||
           !equal(first.next, with_that.next) || !equal(first.du, with_that.du) ||
           !equal(first.w, with_that.w))
-        broken("%s a state answers with other bits %s: a repeated step would go elsewhere; %s",
+        broken("%s a state answers with other bits %s: a repeated step would give other results; %s",
                with(variant).c_str(), what, remedy);
     };
     compare(again, "the second time", "keep nothing between calls but state slots");
@@ -422,8 +421,8 @@ std::string bad_point_returns(const Subject &subject) {
           for (const double a : *out) finite = finite && std::isfinite(a);
         if (std::isnan(bad) && place && finite && !refused)
           broken(
-              "%s a position that is NaN gives finite answers, so the host would not notice that the body is "
-              "broken; let the NaN through, or return DFM_DISCARD",
+              "%s a position that is NaN gives finite answers, so the host would not notice the invalid "
+              "body; return a NaN, or DFM_DISCARD",
               with(variant).c_str());
       }
   });
@@ -467,9 +466,8 @@ std::string instances_share_nothing(const Subject &subject) {
   for (size_t t = 0; t < kThreads; ++t)
     if (std::memcmp(bodies[t]->x.data(), alone[t]->x.data(), alone[t]->x.size() * sizeof(double)) != 0)
       broken(
-          "%zu bodies stepped at once go elsewhere than one after the other: instances share something; keep "
-          "it "
-          "in the instance, or in state slots",
+          "%zu bodies stepped at the same time give other results than one after the other: instances share "
+          "data; keep it in the instance, or in state slots",
           kThreads);
   return text("%zu instances at once", kThreads);
 }

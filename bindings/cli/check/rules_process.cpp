@@ -76,9 +76,9 @@ std::string eval_keeps_to_itself(const Subject &subject) {
         subject.plugin->host().give_back_scratch();
         if (name)
           broken(
-              "eval calls %s: it runs in every pass of every step from many threads, where this costs time "
-              "or stops the world; take memory from dfm_host.scratch, make tables in prepare, and leave "
-              "files, environment, clock and chance to the host",
+              "eval calls %s: this runs in every iteration of every step on many threads and costs time or "
+              "may block; use dfm_host.scratch for memory, make tables in prepare, and do not use files, "
+              "environment, clock or random numbers",
               spelt(name).c_str());
         ++calls;
       }
@@ -141,8 +141,8 @@ class FencedBatch {
     for (const auto &o : outputs_) {
       if (o.array->spoilt(&offset))
         broken(
-            "eval writes %s array %s (offset %ld bytes), over what lies there; loop to in->n and step "
-            "columns by in->stride",
+            "eval writes %s array %s (offset %ld bytes), over other data; loop to in->n and step columns by "
+            "in->stride",
             offset < 0 ? "before the" : "past the end of the", o.name, offset);
       const unsigned char *p = static_cast<const unsigned char *>(o.array->data());
       for (size_t c = 0; c < o.width; ++c)
@@ -184,8 +184,8 @@ void asks_fenced(const Law &law, Lanes &lanes, Fenced::Place place) {
   law.subject.plugin->host().give_back_scratch();
   if (!trouble.empty())
     broken(
-        "in a batch of %u contacts (stride %u) eval %s: over what lies there in a world; loop to in->n and "
-        "step columns by in->stride",
+        "in a batch of %u contacts (stride %u) eval %s: over other data of a world; loop to in->n and step "
+        "columns by in->stride",
         lanes.n, lanes.stride, trouble.c_str());
   if (status != DFM_OK)
     broken("eval returns %s for finite input, which would stop a world; answer every finite input",
@@ -217,14 +217,14 @@ void asks_with_nulls(const Law &law, Lanes &whole) {
     const std::string trouble = Fenced::guard([&] { status = law.ops.eval(&b.in, &out); });
     law.subject.plugin->host().give_back_scratch();
     if (!trouble.empty() || status != DFM_OK)
-      broken("with %s%s eval %s: an output that is NULL is not wanted; ask each pointer before writing",
+      broken("with %s%s eval %s: an output that is NULL is not wanted; check each pointer before writing",
              alone ? "every output NULL but " : "the output NULL: ", names[one],
              trouble.empty() ? dfm_status_name(status) : trouble.c_str());
     for (uint32_t i = 0; out.ft && i < b.n; ++i)
       if (std::memcmp(&b.out_ft[i], &whole.out_ft[i], sizeof(double)) != 0)
         broken(
-            "with %s%s the force of lane %u is %.17g instead of %.17g N: what is computed must not depend on "
-            "what is asked for beside",
+            "with %s%s the force of lane %u is %.17g instead of %.17g N: an output must not depend on which "
+            "other outputs are requested",
             alone ? "nothing wanted but " : "no ", names[one], i, b.out_ft[i], whole.out_ft[i]);
   }
 }
@@ -299,8 +299,8 @@ void load_and_unload(const Subject &subject) {
   plugin.close();
   if (const size_t n = plugin.host().pieces())
     broken(
-        "after it was unloaded %zu piece%s of the host's memory %s still held: every load would cost that "
-        "again; release in release() or shutdown() what was taken",
+        "after it was unloaded %zu piece%s of the host's memory %s still allocated: every load would leak "
+        "as much; free them in release() or shutdown()",
         n, n == 1 ? "" : "s", n == 1 ? "is" : "are");
 }
 
@@ -327,17 +327,17 @@ std::string unloads_without_leak(const Subject &subject) {
   };
   if (const long left = each(&Use::heap); left >= kSmallestPiece)
     broken(
-        "each load-unload cycle leaves %ld bytes on the heap: a host that reloads an edited law fills up; "
-        "free in shutdown() what the entry or prepare() made",
+        "each load-unload cycle leaves %ld bytes on the heap: a host that reloads the plugin would run out "
+        "of memory; free in shutdown() what the entry or prepare() allocated",
         left);
   if (const long left = each(&Use::pages); left > 0)
     broken(
-        "each load-unload cycle leaves %ld pages mapped: a host that reloads an edited law fills up; unmap "
-        "in shutdown()",
+        "each load-unload cycle leaves %ld pages mapped: a host that reloads the plugin would run out of "
+        "memory; unmap in shutdown()",
         left);
   if (each(&Use::files) > 0)
     broken(
-        "each load-unload cycle leaves a file open: a host that reloads an edited law runs out of them; "
+        "each load-unload cycle leaves a file open: a host that reloads the plugin would run out of files; "
         "close in shutdown()");
   const std::string path = std::string(subject.file);
   if (void *still = dlopen(path.find('/') == std::string::npos ? ("./" + path).c_str() : path.c_str(),
@@ -383,8 +383,8 @@ std::string sanitizer_finds_nothing(const Subject &subject) {
     work(t, alone[t]);
     if (std::memcmp(told[t].data(), alone[t].data(), told[t].size() * sizeof(double)) != 0)
       broken(
-          "evaluated from %d threads at once it gives other forces than alone: it writes something that "
-          "batches share; keep it in state slots, or in what prepare() makes and eval only reads",
+          "evaluated on %d threads at once it gives other forces than on one: it writes data that batches "
+          "share; keep it in state slots, or in what prepare() makes and eval only reads",
           kThreads);
   }
   return text("%d threads", kThreads);
@@ -420,7 +420,7 @@ std::string writes_no_static(const Subject &subject) {
     if (!ours) broken("eval %s; touch only the arrays that are given", trouble.c_str());
     const std::string name = variable_at(subject.file, reinterpret_cast<uintptr_t>(at) - base);
     broken(
-        "eval writes the static variable %s: threads and worlds share it, so results depend on what else "
+        "eval writes the static variable %s, which threads and worlds share, so results depend on what else "
         "runs; keep it in a state slot, or on the stack",
         name.empty() ? text("at %#zx of the file", reinterpret_cast<uintptr_t>(at) - base).c_str()
                      : ("\"" + name + "\"").c_str());

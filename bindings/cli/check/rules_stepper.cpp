@@ -90,9 +90,9 @@ std::string state_is_the_hosts(const Subject &subject) {
     }
     if (!same_bits(one, other))
       broken(
-          "%s a body that was saved after 8 steps and goes on in a new instance is elsewhere 10 steps later "
-          "than one that was never saved (%g m): it keeps something that the host cannot save; declare it as "
-          "state slots, or compute it from positions and velocities",
+          "%s a body that is saved after 8 steps and continues in a new instance differs 10 steps later from "
+          "one that was never saved (%g m): it keeps data that the host cannot save; declare it as state "
+          "slots, or compute it from positions and velocities",
           with(variant).c_str(), [&] {
             double most = 0;
             for (size_t n = 0; n < one.x.size(); ++n) most = std::max(most, std::fabs(one.x[n] - other.x[n]));
@@ -114,8 +114,7 @@ std::string state_is_the_hosts(const Subject &subject) {
     run(again, 3, h);
     if (!same_bits(again, other))
       broken(
-          "%s a body that is taken back 10 steps goes elsewhere than before: rollback and replay would not "
-          "be "
+          "%s a body that is taken back 10 steps then moves differently: rollback and replay would not be "
           "what happened; declare what it keeps as state slots, and share nothing between instances",
           with(variant).c_str());
   });
@@ -219,8 +218,7 @@ std::string bound_is_honest(const Subject &subject) {
       const double h = body.longest_step();
       if (!(h > 0) || h > 1e6)
         broken(
-            "%s bound lets explicit steps of a free body be %g s long, so it says nothing; add row sums of "
-            "the "
+            "%s bound allows explicit steps of %g s for a free body, which is no bound; add row sums of the "
             "stiffness, or a bound by cell",
             with(variant).c_str(), h);
       body.dt = h;
@@ -325,8 +323,8 @@ std::string commit_is_predict_and_respond(const Subject &subject) {
     if (!(most <= 1e-10 * speed + 1e-14 * way / body.dt))
       broken(
           "%s commit moves a surfel by a mean velocity that is off predict plus respond by %g of %g m/s: "
-          "contacts would press other points than they see, and bodies sink or stick; let commit do what "
-          "predict and respond have said",
+          "contacts would act on other motions than they computed, and bodies would sink or stick; make "
+          "commit use the velocities of predict and respond",
           with(variant).c_str(), most, speed);
   });
   return text("%s, %.0e at most", asked.c_str(), worst);
@@ -339,7 +337,8 @@ std::string response_is_an_operator(const Subject &subject) {
     const std::vector<double> r = response_of(body);
     double most = 0;
     for (const double a : r) most = std::max(most, std::fabs(a));
-    if (!(most > 0)) broken("respond answers nothing but 0, so no contact can hold it; answer impulses");
+    if (!(most > 0))
+      broken("respond always returns 0, so no contact can hold the body; return the response to impulses");
     for (size_t i = 0; i < width; ++i)
       for (size_t j = 0; j < i; ++j)
         if (!(std::fabs(r[i * width + j] - r[j * width + i]) <= 1e-10 * most))

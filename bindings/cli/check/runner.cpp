@@ -62,8 +62,8 @@ double clock_of(clockid_t clock) {
 
 const char *signal_name(int number) {
   switch (number) {
-    case SIGSEGV: return "SIGSEGV (it touched memory that is not its own)";
-    case SIGBUS: return "SIGBUS (it touched memory that is not there)";
+    case SIGSEGV: return "SIGSEGV (it accessed memory that does not belong to it)";
+    case SIGBUS: return "SIGBUS (it accessed memory that does not exist)";
     case SIGABRT: return "SIGABRT (it called abort, or threw through a C function)";
     case SIGFPE: return "SIGFPE (a whole number was divided by zero)";
     case SIGILL: return "SIGILL (an instruction that this processor lacks)";
@@ -168,7 +168,7 @@ Verdict run_here(const Rule &rule, const Subject &subject) {
   try {
     const uint32_t kind = subject.type ? subject.type->kind : uint32_t(DFM_KIND_FRICTION);
     const auto run = asked_of(rule, kind);
-    if (!run) return {Result::skip, "not asked of this kind of plugin"};
+    if (!run) return {Result::skip, "does not apply to this kind of plugin"};
     return {Result::pass, run(subject)};
   } catch (const Broken &b) {
     return {Result::fail, b.what()};
@@ -207,11 +207,11 @@ Answer in_own_process(const std::function<void()> &work, const Limits &limits) {
   if (pipe2(reports, O_CLOEXEC) != 0)
     throw Failure(
         kBadInput,
-        "no pipe is left for the process of a rule; close programs or raise the limit of open files");
+        "no pipe could be opened for the process of a rule; close programs or raise the limit of open files");
   if (pipe2(output, O_CLOEXEC) != 0)
     throw Failure(
         kBadInput,
-        "no pipe is left for the process of a rule; close programs or raise the limit of open files");
+        "no pipe could be opened for the process of a rule; close programs or raise the limit of open files");
   // or the child would print what waits here once more
   std::fflush(nullptr);
   const pid_t child = fork();
@@ -220,7 +220,7 @@ Answer in_own_process(const std::function<void()> &work, const Limits &limits) {
   close(output[1]);
   if (child < 0)
     throw Failure(kBadInput,
-                  "the system starts no further process for a rule; close programs, or say --in-process");
+                  "the system cannot start another process for a rule; close programs, or use --in-process");
   Answer out;
   std::string pending;
   pollfd ends[2] = {{reports[0], POLLIN, 0}, {output[0], POLLIN, 0}};

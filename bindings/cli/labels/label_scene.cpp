@@ -109,10 +109,9 @@ class Maker {
     repaired_ = compose(o_.volume, volume_, group);
     report_.taken = volume_.size;
     if (repaired_.voxels)
-      warn(
-          std::to_string(repaired_.voxels) + (repaired_.voxels == 1 ? " voxel has" : " voxels have") +
-          " another label than in the file: there a label touched itself along an edge or at a corner alone, "
-          "which is no surface of a solid");
+      warn(std::to_string(repaired_.voxels) + (repaired_.voxels == 1 ? " voxel has" : " voxels have") +
+           " another label than in the file: there a label touched itself only along an edge or at a corner, "
+           "which is not the surface of a solid");
     std::vector<bool> left(volume_.value.size(), false);
     for (const uint16_t v : volume_.voxel) left[v] = true;
     for (const Entry &e : table_.entries)

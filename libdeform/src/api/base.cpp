@@ -19,9 +19,10 @@ dfm_context_def checked(const dfm_context_def *given) {
     fail(DFM_E_ARG, "dfm_context_def.size is %u; start from dfm_context_def_default()", given->size);
   const dfm_context_def def = dfm::take_def(given, dfm_context_def_default());
   if (!def.alloc != !def.release)
-    fail(DFM_E_ARG, "the hooks alloc and release go together; %s is missing",
+    fail(DFM_E_ARG, "set both hooks alloc and release, or neither; %s is missing",
          def.alloc ? "release" : "alloc");
-  if (!def.trace_begin != !def.trace_end) fail(DFM_E_ARG, "the hooks trace_begin and trace_end go together");
+  if (!def.trace_begin != !def.trace_end)
+    fail(DFM_E_ARG, "set both hooks trace_begin and trace_end, or neither");
   if (def.threads > 1024)
     fail(DFM_E_ARG, "threads is %u, at most 1024 expected (0: one per processor)", def.threads);
   return def;
@@ -118,8 +119,8 @@ void dfm_context_destroy(dfm_context *context) {
   if (!context) return;
   if (context->calls != 0 || context->ending.exchange(true)) {
     dfm::set_last_error(
-        "the context is inside a call whose hook, plugin or host asks to destroy it; nothing was destroyed: "
-        "do it when that call has returned");
+        "dfm_context_destroy was called by a hook, plugin or host inside another call of this context; "
+        "nothing was destroyed; call it after that call has returned");
     context->log(DFM_LOG_ERROR, dfm::last_error());
     return;
   }

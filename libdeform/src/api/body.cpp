@@ -79,7 +79,9 @@ void springs_changed(Body &b) {
 Spring make_spring(const Body &b, const dfm_spring_def &d) {
   const char *const name = b.name.c_str();
   if (!b.dynamics->abilities().springs)
-    fail(DFM_E_UNSUPPORTED, "body '%s': a spring is explicit, and model '%s' has no step bound to hold it to",
+    fail(DFM_E_UNSUPPORTED,
+         "body '%s': springs are integrated explicitly and need a model with a step bound, which '%s' does "
+         "not have",
          name, b.model.type->id);
   check_points(b, d.npoint, d.points);
   if (d.npoint == 0) fail(DFM_E_ARG, "body '%s': a spring needs at least one point", name);
@@ -238,7 +240,7 @@ dfm_status dfm_body_hold(dfm_body body, uint32_t n, const uint32_t *points, uint
     if (axes > 7) fail(DFM_E_ARG, "axes is %u; it is a sum of 1 (x), 2 (y) and 4 (z)", unsigned(axes));
     if (b.model.stepper)
       fail(DFM_E_UNSUPPORTED,
-           "body '%s': model '%s' steps itself and learns which points are held when the body is made; give "
+           "body '%s': model '%s' steps itself and must know the held points when the body is created; give "
            "dfm_body_def.fixed",
            b.name.c_str(), b.model.type->id);
     const HostWork work(b);

@@ -59,8 +59,8 @@ class Call {
 
   [[noreturn]] static void refuse(const char *what) {
     fail(DFM_E_BUSY,
-         "the %s is inside a call: a step, or one whose hook, plugin or host has called back; call again "
-         "when that has returned",
+         "the %s is busy with another call (a step, or a call in which a hook, plugin or host runs now); "
+         "call again after that call has returned",
          what);
   }
 

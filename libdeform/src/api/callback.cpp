@@ -14,7 +14,7 @@ uint64_t id_of(const World &w, uint64_t handle, const char *name) {
     if (b->handle == handle) return b->id;
   for (auto &o : w.obstacles)
     if (o->handle == handle) return o->id;
-  fail(DFM_E_HANDLE, "'%s' is no body or obstacle of this world", name);
+  fail(DFM_E_HANDLE, "'%s' is not a body or obstacle of this world", name);
 }
 
 // Tables are made anew before the next step, with what may touch now.
@@ -52,8 +52,8 @@ dfm_status dfm_world_set_pre_solve(dfm_world world, dfm_pre_solve_fn pre_solve, 
     World &w = exclusive(world_of(world));
     if (pre_solve && w.def.method == DFM_METHOD_ROLLBACK)
       fail(DFM_E_UNSUPPORTED,
-           "a pre-solve function cannot be in a world whose contact method is ROLLBACK: it solves no contact "
-           "on its own; take DFM_METHOD_AUTO");
+           "the contact method ROLLBACK cannot call a pre-solve function, since it does not solve single "
+           "contacts; use DFM_METHOD_AUTO");
     w.pre_solve = {pre_solve, user};
     wake_all(w);
   });

@@ -63,7 +63,7 @@ std::string side(World &w, const char *text, bool grouped) {
     return found;
   }
   const std::string near = nearest(s, names);
-  fail(DFM_E_ARG, "'%s' is no body, obstacle or material of this world%s; known: %s", text,
+  fail(DFM_E_ARG, "'%s' is not a body, obstacle or material of this world%s; known: %s", text,
        near.empty() ? "" : (", did you mean '" + near + "'?").c_str(), join(names).c_str());
 }
 
@@ -115,7 +115,7 @@ uint64_t id_of(const World &w, uint64_t handle, const char *what) {
     if (b->handle == handle) return b->id;
   for (auto &o : w.obstacles)
     if (o->handle == handle) return o->id;
-  fail(DFM_E_HANDLE, "'%s' is no body or obstacle of this world", what);
+  fail(DFM_E_HANDLE, "'%s' is not a body or obstacle of this world", what);
 }
 
 // The values of a def; `what` names them where they are missing.
@@ -177,7 +177,7 @@ dfm_status dfm_world_remove_filter(dfm_world world, const char *a, const char *b
     const auto rule = std::find_if(w.filters.begin(), w.filters.end(),
                                    [&](const FilterRule &r) { return same_pair(r.between, between); });
     if (rule == w.filters.end())
-      fail(DFM_E_ARG, "no filter is for ['%s', '%s']; dfm_world_filter_pair makes one", a, b);
+      fail(DFM_E_ARG, "there is no filter for ['%s', '%s']; create one with dfm_world_filter_pair", a, b);
     if (!rule->collide) w.overlaps.all = true;
     w.filters.erase(rule);
     wake_all(w);
@@ -204,7 +204,7 @@ dfm_status dfm_world_law_info(dfm_world world, uint32_t law, dfm_law_info *info)
     const World &w = settled(world_of(world));
     if (law >= w.laws.size())
       fail(DFM_E_ARG,
-           "law %u is none of this world, which has %zu; take the number from a dfm_contact or a "
+           "there is no law %u in this world, which has %zu; take the number from a dfm_contact or a "
            "dfm_pair_report",
            law, w.laws.size());
     const LawInstance &l = *w.laws[law];

@@ -18,10 +18,12 @@ bool finite(const double *x, size_t n) {
 CutShape shape_of(const Body &b, const dfm_cut_def &def) {
   const char *const name = b.name.c_str();
   if (def.shape > DFM_CUT_BLADE)
-    fail(DFM_E_ARG, "body '%s': a cut of shape %u; use DFM_CUT_ELLIPSOID, DFM_CUT_BOX or DFM_CUT_BLADE", name,
+    fail(DFM_E_ARG,
+         "body '%s': unknown shape of a cut, %u; use DFM_CUT_ELLIPSOID, DFM_CUT_BOX or DFM_CUT_BLADE", name,
          def.shape);
   if (def.how > DFM_CUT_SPLIT)
-    fail(DFM_E_ARG, "body '%s': a cut in the way %u; use DFM_CUT_REMOVE or DFM_CUT_SPLIT", name, def.how);
+    fail(DFM_E_ARG, "body '%s': unknown way of cutting, %u; use DFM_CUT_REMOVE or DFM_CUT_SPLIT", name,
+         def.how);
   if (def.how == DFM_CUT_SPLIT && def.shape != DFM_CUT_BLADE)
     fail(DFM_E_ARG, "body '%s': DFM_CUT_SPLIT opens faces along a blade; take the shape DFM_CUT_BLADE", name);
   if (!finite(def.pose.position, 3) || !finite(def.pose.rotation, 4) || !finite(def.motion, 3) ||

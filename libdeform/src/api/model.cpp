@@ -21,8 +21,8 @@ dfm_params params_of(const dfm_params *given) {
 Switch make_switch(const Body &b, const dfm_switch &s, double after) {
   need(s.type, "type");
   if (!std::isfinite(s.t) || s.t < after)
-    fail(DFM_E_ARG, "body '%s': a switch at %g s; times are finite and do not fall from one to the next",
-         b.name.c_str(), s.t);
+    fail(DFM_E_ARG, "body '%s': a switch at %g s; times must be finite and must not decrease", b.name.c_str(),
+         s.t);
   Switch out{s.t, choose_model(b, s.type, s.params, s.integrator)};
   if (!(s.max_jump >= 0))
     fail(DFM_E_ARG, "body '%s': max_jump is %g J; it must be above 0, or 0 for any jump", b.name.c_str(),
@@ -47,9 +47,12 @@ SwitchRule make_rule(const Body &b, const dfm_switch_rule &r) {
   const char *const name = b.name.c_str();
   if (!r.otherwise.type || (!r.touching.type && !r.near_by.type))
     fail(DFM_E_ARG,
-         "body '%s': a rule names the model for otherwise (far) and one for touching, near_by (near) or both",
+         "body '%s': a rule needs a model for otherwise (far), and a model for touching, near_by (near) or "
+         "both",
          name);
-  if (!(r.max_jump >= 0)) fail(DFM_E_ARG, "body '%s': max_jump is %g J; 0 is any jump", name, r.max_jump);
+  if (!(r.max_jump >= 0))
+    fail(DFM_E_ARG, "body '%s': max_jump is %g J; give a number above 0, or 0 for no limit", name,
+         r.max_jump);
   for (const double x : {r.hysteresis, r.wait})
     if (!(x >= 0 && std::isfinite(x)))
       fail(DFM_E_ARG, "body '%s': hysteresis and wait (s) are finite and not negative; found %g", name, x);
@@ -139,7 +142,7 @@ dfm_status dfm_body_set_interest(dfm_body body, const double point[3]) {
     for (int k = 0; k < 3; ++k)
       if (!std::isfinite(point[k])) fail(DFM_E_ARG, "body '%s': the point is not finite", b.name.c_str());
     if (b.rule.empty() || b.rule[0].near.type.empty())
-      fail(DFM_E_ARG, "body '%s' has no rule that asks for a place; call dfm_body_set_switch_rule first",
+      fail(DFM_E_ARG, "body '%s' has no rule that depends on a point; call dfm_body_set_switch_rule first",
            b.name.c_str());
     b.rule[0].point = load3(point);
   });

@@ -27,8 +27,8 @@ inline Body &shown_body_of(dfm_body h) {
   Body &b = any_body_of(h);
   if (b.undone)
     fail(DFM_E_STATE,
-         "body '%s' is not there: the snapshot that was restored is from before it came off; destroy it, or "
-         "restore a later snapshot",
+         "body '%s' does not exist in the restored snapshot, which is older than the cut that made it; "
+         "destroy it, or restore a later snapshot",
          b.name.c_str());
   if (b.emptied)
     fail(DFM_E_STATE,
@@ -101,7 +101,8 @@ class Rows {
       : at_(reinterpret_cast<unsigned char *>(out)), step_(row_size) {
     if (row_size < kLeast || row_size % kLeast != 0)
       fail(DFM_E_ARG,
-           "row_size %u is no size of a %s: it is a multiple of %zu, %zu in this version; pass sizeof(%s)",
+           "row_size %u is not the size of a %s: expected a multiple of %zu (%zu in this version); pass "
+           "sizeof(%s)",
            row_size, type, kLeast, sizeof(T), type);
   }
   void add(T row) {

@@ -36,7 +36,7 @@ dfm_status dfm_obstacle_destroy(dfm_obstacle obstacle) {
     Obstacle &o = obstacle_of(obstacle);
     exclusive(*o.world);
     if (o.rigid && !o.added)
-      fail(DFM_E_STATE, "'%s' is a rigid body; dfm_rigid_destroy removes it, with the set it came with",
+      fail(DFM_E_STATE, "'%s' is a rigid body; remove it with dfm_rigid_destroy, which removes its whole set",
            o.name.c_str());
     destroy_obstacle(o);
   });
@@ -66,9 +66,7 @@ Obstacle &movable(dfm_obstacle obstacle, const dfm_pose *pose) {
   Obstacle &o = obstacle_of(obstacle);
   exclusive(*o.world);
   need(pose, "pose");
-  if (o.rigid)
-    fail(DFM_E_STATE, "'%s' is a rigid body and moves by itself; dfm_rigid_set_state puts it somewhere",
-         o.name.c_str());
+  if (o.rigid) fail(DFM_E_STATE, "'%s' is a rigid body; move it with dfm_rigid_set_state", o.name.c_str());
   for (int i = 0; i < 4; ++i)
     if (!std::isfinite(pose->rotation[i]) || (i < 3 && !std::isfinite(pose->position[i])))
       fail(DFM_E_ARG, "obstacle '%s': the target pose is not finite", o.name.c_str());

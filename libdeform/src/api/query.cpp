@@ -34,7 +34,7 @@ struct Given {
       : taken(take_def(filter, dfm_query_filter_default())), any(filter != nullptr) {
     constexpr uint32_t known = DFM_QUERY_BODIES | DFM_QUERY_OBSTACLES | DFM_QUERY_RIGIDS | DFM_QUERY_SENSORS;
     if (taken.what & ~known)
-      fail(DFM_E_ARG, "filter: what is %u; it is a sum of DFM_QUERY_* (%u at most)", taken.what, known);
+      fail(DFM_E_ARG, "filter.what is %u; expected a sum of DFM_QUERY_* (at most %u)", taken.what, known);
   }
   ThingFilter filter() const { return ThingFilter(any ? &taken : nullptr); }
 };
@@ -83,7 +83,7 @@ Convex taken_shape(const dfm_query_shape *given) {
       break;
     default:
       fail(DFM_E_ARG,
-           "shape %u does not ask; it is DFM_SHAPE_SPHERE, DFM_SHAPE_BOX, DFM_SHAPE_CAPSULE or "
+           "a query cannot use shape %u; expected DFM_SHAPE_SPHERE, DFM_SHAPE_BOX, DFM_SHAPE_CAPSULE or "
            "DFM_SHAPE_CONVEX",
            def.shape);
   }
@@ -96,7 +96,8 @@ struct Ray {
 };
 Ray taken_ray(const double *origin, const double *direction, double max_distance) {
   Ray r{finite(origin, "origin"), normalized(finite(direction, "direction")), max_distance};
-  if (!(norm2(r.unit) > 0.5)) fail(DFM_E_ARG, "the direction of a ray is zero or too long for a number");
+  if (!(norm2(r.unit) > 0.5))
+    fail(DFM_E_ARG, "the direction of the ray is zero, or its length is too large for a double");
   if (!(max_distance > 0)) fail(DFM_E_ARG, "max_distance is %g m; it must be above 0", max_distance);
   return r;
 }
@@ -137,7 +138,7 @@ dfm_status dfm_world_query_ray_all_sized(dfm_world world, const double origin[3]
   return as_status([&] {
     if (row_size < sizeof(dfm_query_hit) || row_size % 8 != 0)
       fail(DFM_E_ARG,
-           "row_size %u is no size of a dfm_query_hit: it is a multiple of 8, at least %zu; pass "
+           "row_size %u is not the size of a dfm_query_hit: expected a multiple of 8, at least %zu; pass "
            "sizeof(dfm_query_hit)",
            row_size, sizeof(dfm_query_hit));
     World &w = settled(world_of(world));
@@ -206,7 +207,7 @@ dfm_status dfm_world_query_cast(dfm_world world, const dfm_query_shape *shape, c
     World &w = settled(world_of(world));
     const Convex asked = taken_shape(shape);
     const Vec3 way = finite(path, "path");
-    if (!std::isfinite(norm(way))) fail(DFM_E_ARG, "the path is too long for a number");
+    if (!std::isfinite(norm(way))) fail(DFM_E_ARG, "the length of the path is too large for a double");
     const Given given(filter);
     give(hit, find_first_on_path(w, given.filter(), asked, way));
   });

@@ -13,9 +13,7 @@ Obstacle &rigid_of(dfm_rigid h) {
   Obstacle &o = obstacle_of(h);
   if (!o.rigid)
     fail(DFM_E_HANDLE,
-         "rigid body handle 0x%llx is that of obstacle '%s', which is no rigid body and feels nothing; pass "
-         "the "
-         "handle of a rigid body",
+         "handle 0x%llx belongs to obstacle '%s', which is not a rigid body; pass the handle of a rigid body",
          static_cast<unsigned long long>(h), o.name.c_str());
   return o;
 }
@@ -150,7 +148,7 @@ dfm_status dfm_rigid_get_state(dfm_rigid rigid, dfm_rigid_state *out) {
 
 dfm_status dfm_rigid_set_state(dfm_rigid rigid, const dfm_rigid_state *state) {
   return as_status([&] {
-    Obstacle &o = free_rigid_of(rigid, "dfm_tool_teleport puts it somewhere");
+    Obstacle &o = free_rigid_of(rigid, "move it with dfm_tool_teleport");
     World &w = exclusive(*o.world);
     need(state, "state");
     set_rigid_state(o, *state);

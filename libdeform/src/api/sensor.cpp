@@ -62,7 +62,9 @@ dfm_status dfm_sensor_things(uint64_t sensor, uint32_t capacity, uint64_t *out, 
     const Found found = thing_of(sensor);
     const World &w = settled(*found.world);
     if (!found.sensor)
-      fail(DFM_E_ARG, "the thing is no sensor; dfm_body_set_sensor or dfm_obstacle_set_sensor makes it one");
+      fail(
+          DFM_E_ARG,
+          "this body or obstacle is not a sensor; call dfm_body_set_sensor or dfm_obstacle_set_sensor first");
     uint32_t count = 0;
     for (const Sensed &s : w.sensed) count += s.sensor == found.id;
     if (!room(count, capacity, out, n)) return;

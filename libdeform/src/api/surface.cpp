@@ -56,7 +56,7 @@ dfm_status dfm_surface_points(dfm_body body, uint32_t capacity, uint32_t *point,
     const Body &b = shown_body_of(body);
     if (!b.surface.identity())
       fail(DFM_E_UNSUPPORTED,
-           "body '%s': its surfels hang on several points each; there is no one point per surfel",
+           "body '%s': each of its surfels depends on several points, so there is no single point per surfel",
            b.name.c_str());
     if (room(b.surface.nsurfel, capacity, point, n))
       std::copy(b.surface.point.begin(), b.surface.point.begin() + b.surface.nsurfel, point);

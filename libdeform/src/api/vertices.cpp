@@ -38,7 +38,8 @@ uint32_t check_layout(const dfm_vertex_layout &l) {
   uint32_t end = 0;
   for (const Member &m : members) {
     if (m.at == DFM_VERTEX_NONE) continue;
-    if (m.at % 4 != 0) fail(DFM_E_ARG, "layout: %s is at byte %u, which is no multiple of 4", m.name, m.at);
+    if (m.at % 4 != 0)
+      fail(DFM_E_ARG, "layout: %s is at byte %u, which is not a multiple of 4", m.name, m.at);
     if (m.at > l.stride || l.stride - m.at < m.bytes)
       fail(DFM_E_ARG, "layout: %s is at byte %u and has %u bytes, beyond the stride of %u", m.name, m.at,
            m.bytes, l.stride);

@@ -39,7 +39,7 @@ void destroy_world(uint64_t handle) {
 
 void check_max_time(double seconds) {
   if (!(seconds >= 0))
-    fail(DFM_E_ARG, "max_time is %g s; give the machine's time that a step may take, or 0 for any", seconds);
+    fail(DFM_E_ARG, "max_time is %g s; give the wall time that a step may take, or 0 for no limit", seconds);
 }
 
 // A text or buffer that the caller sizes first.
@@ -84,7 +84,7 @@ void choose_integrator(World &w) {
          "DFM_INTEGRATOR_IMPLICIT_EULER or DFM_INTEGRATOR_TR_BDF2",
          d.integrator);
   if (!(d.step >= 0 && std::isfinite(d.step)))
-    fail(DFM_E_ARG, "step is %g; give the length of the steps in s, or 0 (not told)", d.step);
+    fail(DFM_E_ARG, "step is %g; give the length of the steps in s, or 0 (unknown)", d.step);
   if (d.integrator == DFM_INTEGRATOR_AUTO && d.method == DFM_METHOD_IMPLICIT)
     w.def.integrator = DFM_INTEGRATOR_IMPLICIT_EULER;
   if (d.integrator == DFM_INTEGRATOR_AUTO && (d.step == 0 || d.method != DFM_METHOD_AUTO))
@@ -116,8 +116,8 @@ void select_effects(World &w) {
   const bool unguarded = w.def.flags & DFM_WORLD_UNGUARDED;
   if (unguarded && w.selection.lists(kGuard))
     fail(DFM_E_ARG,
-         "effect 'guard' is asked for, but DFM_WORLD_UNGUARDED (contact.guard false) leaves it out; "
-         "take one of the two away");
+         "effect 'guard' is asked for, but DFM_WORLD_UNGUARDED (contact.guard false) leaves it out; remove "
+         "one of the two");
   if (!w.selection.wants(kGuard) && !unguarded && guards(*w.method)) {
     w.def.flags |= DFM_WORLD_UNGUARDED;
     w.left_out.push_back({kGuard, "contact", "contact.guard"});
@@ -306,11 +306,13 @@ dfm_status dfm_world_interrupt(dfm_world world) {
   if (uint8_t(world >> 32) != uint8_t(Kind::world))
     return as_status([&] {
       fail(DFM_E_HANDLE,
-           "world handle 0x%llx is not that of a world; pass the handle of the world to interrupt",
+           "world handle 0x%llx is not the handle of a world; pass the handle of the world to interrupt",
            static_cast<unsigned long long>(world));
     });
   return request_stop(world) ? DFM_OK : as_status([] {
-    fail(DFM_E_NOMEM, "64 other worlds have been asked to stop and have not stepped since");
+    fail(DFM_E_NOMEM,
+         "64 other worlds have been interrupted and have not stepped since; step or destroy one of them "
+         "first");
   });
 }
 

@@ -47,8 +47,8 @@ void *allocate(size_t bytes, size_t align) {
 void need_memory(uint64_t bytes, const char *what) {
   static const uint64_t most = memory_of_machine();
   if (bytes > most)
-    fail(DFM_E_NOMEM, "%s needs about %.1f GiB of memory, and there are %.1f GiB in all; ask for less", what,
-         double(bytes) / double(1u << 30), double(most) / double(1u << 30));
+    fail(DFM_E_NOMEM, "%s needs about %.1f GiB of memory, and this machine has %.1f GiB; reduce the size",
+         what, double(bytes) / double(1u << 30), double(most) / double(1u << 30));
 }
 
 const Memory &Memory::standard() {

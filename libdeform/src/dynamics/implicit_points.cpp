@@ -77,11 +77,10 @@ ImplicitPoints::ImplicitPoints(const Memory &memory, Phyxels &points, Surface &s
   stiffness_.create(model, points.n);
   forces_ = kUnitWork * stiffness_.pattern().nb;  // points and edges, about as many as points and cells
   if (options_.second_order && options_.newton == 1 && !stiffness_.constant())
-    fail(
-        DFM_E_UNSUPPORTED,
-        "the integrator tr_bdf2 needs solutions of the equations of model '%s', which one iteration does not "
-        "give; choose implicit_euler, or solver.newton above 1",
-        model.type->id);
+    fail(DFM_E_UNSUPPORTED,
+         "the integrator tr_bdf2 needs more than one Newton iteration with model '%s'; choose "
+         "implicit_euler, or set solver.newton above 1",
+         model.type->id);
   std::unique_ptr<LinearSolver> solver = new_solver();
   if (options_.rest_factor && solver->direct() && (options_.newton > 1 || stiffness_.constant()))
     rest_ = std::make_unique<RestFactor>(memory, points, model, stiffness_, std::move(solver));

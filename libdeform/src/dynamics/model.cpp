@@ -38,7 +38,8 @@ void ModelInstance::create(const dfm_type &t, const dfm_host &h, const dfm_mesh 
   ops = static_cast<const dfm_model *>(t.ops);
   params = std::move(values);
   if (!(ops->cells & DFM_CELL_TET))
-    fail(DFM_E_UNSUPPORTED, "model '%s' takes no tetrahedra; choose another model for this mesh", t.id);
+    fail(DFM_E_UNSUPPORTED, "model '%s' does not accept tetrahedra; choose another model for this mesh",
+         t.id);
   {
     const Overheard why;
     const dfm_status s = call("create", [&] { return ops->create(host, &mesh, &self); });
@@ -47,7 +48,7 @@ void ModelInstance::create(const dfm_type &t, const dfm_host &h, const dfm_mesh 
       fail(s < 0 ? s : DFM_E_FATAL, "model '%s' refused the body: %s", t.id,
            *why.text() ? why.text()
            : s < 0     ? dfm_status_name(s)
-                       : "it made none, and does not say why");
+                       : "it gave no reason");
     }
     if (*why.text()) static_cast<const dfm_context *>(h.ctx)->log(DFM_LOG_ERROR, why.text());
   }
@@ -83,17 +84,16 @@ std::optional<std::vector<dfm_slot>> ModelInstance::ask_extensions() {
   late = copy_table<dfm_late_points>(tables[7], kLatePoints, type->id, "dfm_late_points");
   if (late && !(stepper && late->commit && late->points && late->look)) late.reset();
   if (ask_caps() != DFM_OK)
-    fail(DFM_E_FATAL, "model '%s' failed when it was asked what it can; the log says why", type->id);
+    fail(DFM_E_FATAL, "model '%s' failed to report its abilities; see the log", type->id);
   return copy_slots(type->id, static_cast<const dfm_slots *>(tables[1]), false);
 }
 
 void ModelInstance::use_single() {
   if (!f32 || !f32->prepare || !f32->add_forces)
-    fail(
-        DFM_E_UNSUPPORTED,
-        "model '%s' computes in double precision alone; leave precision out, or take a model that has single "
-        "precision, such as msm",
-        type->id);
+    fail(DFM_E_UNSUPPORTED,
+         "model '%s' computes only in double precision; leave precision out, or take a model that has single "
+         "precision, such as msm",
+         type->id);
   const Overheard why;
   const dfm_status s = call("prepare", [&] { return f32->prepare(self); });
   if (s != DFM_OK)

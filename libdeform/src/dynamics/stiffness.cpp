@@ -14,23 +14,21 @@ void ModelStiffness::create(const ModelInstance &model, uint32_t npoint) {
   const char *const id = model.type->id;
   if (!offered(model))
     fail(DFM_E_UNSUPPORTED,
-         "model '%s' has no stiffness, which implicit steps and equilibria need; choose another model, "
-         "or for steps the integrator symplectic_euler",
+         "model '%s' has no stiffness, which implicit steps and static mode need; choose another model, or "
+         "the integrator symplectic_euler",
          id);
   if (!ops.pattern || !ops.stiffness)
     fail(DFM_E_UNSUPPORTED,
-         "model '%s' promises a stiffness and has no function for it; report it to its "
-         "author",
-         id);
+         "model '%s' claims a stiffness but has no function for it; report it to its author", id);
   npoint_ = npoint;
   uint32_t nb = 0;
   if (model.call("pattern", [&] { return ops.pattern(model.self, &nb, nullptr); }) != DFM_OK)
-    fail(DFM_E_FATAL, "model '%s' does not tell the pattern of its stiffness; the log says why", id);
+    fail(DFM_E_FATAL, "model '%s' failed to give the pattern of its stiffness matrix; see the log", id);
   pairs_.assign(2 * size_t{nb}, 0);
   blocks_.assign(9 * size_t{nb}, 0.0);
   if (model.call("pattern", [&] { return ops.pattern(model.self, &nb, pairs_.data()); }) != DFM_OK ||
       2 * size_t{nb} != pairs_.size())
-    fail(DFM_E_FATAL, "model '%s' does not tell the pattern of its stiffness; the log says why", id);
+    fail(DFM_E_FATAL, "model '%s' failed to give the pattern of its stiffness matrix; see the log", id);
   std::vector<uint64_t> keys(nb);
   uint32_t own = 0;
   for (uint32_t b = 0; b < nb; ++b) {

@@ -26,7 +26,7 @@ LawInstance::LawInstance(const dfm_type &t, const dfm_host &h, std::vector<doubl
   // check() was asked by pack_params
   if (ops->prepare &&
       call_plugin(h, t, "prepare", [&] { return ops->prepare(host, params.data(), &data); }) != DFM_OK)
-    fail(DFM_E_FATAL, "law '%s' could not prepare its tables; the log says why", t.id);
+    fail(DFM_E_FATAL, "law '%s' could not prepare its tables; see the log", t.id);
 }
 
 std::vector<LeftOut> left_out_of(const LawInstance &law) {
@@ -35,7 +35,7 @@ std::vector<LeftOut> left_out_of(const LawInstance &law) {
   const bool other = law.type != &asked;
   if (!other && law.params == law.asked) return out;
   const std::string of = std::string("friction law ") + asked.id,
-                    instead = other ? format("%s stands in its place", law.type->id) : std::string();
+                    instead = other ? format("%s is used instead", law.type->id) : std::string();
   if (other && is_frictionless(*law.ops)) return {{kFriction, of, instead}};
   const std::vector<LawEffect> left = law_effects(*law.type, *law.host, law.params);
   for (const LawEffect &e : law_effects(asked, *law.host, law.asked)) {

@@ -96,8 +96,8 @@ Lattice choose_lattice(const FillSurface &surface, uint32_t cells) {
   if (!better && apart == HUGE_VAL)
     fail(DFM_E_FORMAT,
          "about %u cells cannot fill this surface of %zu triangles, %.3g m across with an area of %.3g m2: "
-         "at every pitch that was tried its triangles enter more than %u; stray corners or thin spikes that "
-         "reach far out do that, so remove them, or ask for more cells",
+         "with every lattice spacing that was tried its triangles pass through more than %u; stray corners "
+         "or long thin spikes cause this: remove them, or ask for more cells",
          cells, surface.tris.size() / 3, surface.size, surface.area * surface.size * surface.size,
          most_cells(cells));
   return better ? other : symmetric;
@@ -290,8 +290,8 @@ void refuse_unfit(const TriMesh &surface, const FillSurface &s, uint32_t cells) 
   if (s.opening_area > kOpening * whole)
     fail(DFM_E_FORMAT,
          "the surface is open: %u opening%s of %.3g m2 in all, %.0f %% of the closed surface, the widest "
-         "%.3g m across where the whole is %.3g m; openings up to %.0f %% are filled across, so close it or "
-         "give a mesh with tetrahedra",
+         "%.3g m across (the whole surface: %.3g m); only openings of up to %.0f %% are closed "
+         "automatically: close the surface, or give a mesh with tetrahedra",
          s.openings, s.openings == 1 ? "" : "s", s.opening_area * s.size * s.size,
          100 * s.opening_area / whole, s.opening_width * s.size, s.size, 100 * kOpening);
   const double needed = expected_half_pitch(s, cells), least = least_half_pitch(s);
@@ -299,12 +299,12 @@ void refuse_unfit(const TriMesh &surface, const FillSurface &s, uint32_t cells) 
   const double reach = s.resolution / DBL_EPSILON * s.size;
   if (80 * s.resolution > 2.0 / kLatticeReach)
     fail(DFM_E_FORMAT,
-         "%u cells need a pitch of %.3g m, and coordinates of up to %.3g m are known to %.3g m only, where "
-         "the surface is %.3g m across; move it nearer to the origin",
+         "%u cells need a lattice spacing of %.3g m, but coordinates of up to %.3g m are rounded to %.3g m "
+         "(the surface is %.3g m across); move it nearer to the origin",
          cells, 2 * needed * s.size, reach, DBL_EPSILON * reach, s.size);
   fail(DFM_E_FORMAT,
-       "%u cells need a pitch of %.3g m, which is too fine for a surface that is %.3g m across; its parts "
-       "lie too far apart, or spikes reach far out: remove them, or ask for fewer cells",
+       "%u cells need a lattice spacing of %.3g m, which is too fine for a surface that is %.3g m across; "
+       "its parts lie too far apart, or it has long spikes: remove them, or ask for fewer cells",
        cells, 2 * needed * s.size, s.size);
 }
 
@@ -314,13 +314,13 @@ void tell(const FillSurface &s, const Filling &f, double half_pitch, uint32_t ce
   if (!s.closed)
     out.warnings.push_back(
         format("the surface has %u opening%s (or triangles that face the wrong way) of %.3g m2 in all, %.2g "
-               "%% of its area, the widest %.3g m across; it is filled across them",
+               "%% of its area, the widest %.3g m across; the filling closes them",
                s.openings, s.openings == 1 ? "" : "s", s.opening_area * s.size * s.size,
                100 * s.opening_area / (s.area + s.opening_area), s.opening_width * s.size));
   if (s.closed && !settled)
     out.warnings.push_back(
-        format("the triangles sum up to a volume of %.6g m3, but %.6g m3 lie inside: the surface passes "
-               "through itself, and what it encloses twice counts once",
+        format("the triangles sum up to a volume of %.6g m3, but %.6g m3 lie inside: the surface crosses "
+               "itself, and a volume enclosed twice counts once",
                s.volume * cube, sampled * unit * cube));
   if (empty)
     out.warnings.push_back(
@@ -328,7 +328,8 @@ void tell(const FillSurface &s, const Filling &f, double half_pitch, uint32_t ce
   const double count = double(f.size());
   if (std::fabs(count - cells) > 0.1 * cells)
     out.warnings.push_back(
-        format("%zu cells instead of %u: the lattice offers none nearer for this surface", f.size(), cells));
+        format("%zu cells instead of %u: this is the nearest number that the lattice gives for this surface",
+               f.size(), cells));
 }
 
 }  // namespace

@@ -117,7 +117,7 @@ void write_tri_mesh(const TriMesh &mesh, const std::string &path) {
   static const std::vector<std::string> known{".obj", ".ply", ".stl", ".off", ".vtk", ".vtu"};
   if (std::find(known.begin(), known.end(), ending) == known.end())
     fail(DFM_E_UNSUPPORTED,
-         "%s: a surface is written as %s, told by the file name's ending; this one ends with '%s'",
+         "%s: a surface is written as %s, chosen by the ending of the file name, which is '%s' here",
          path.c_str(), join(known).c_str(), ending.c_str());
   AtomicFile out(path);
   if (ending == ".obj") put_obj(out, mesh);

@@ -26,8 +26,8 @@ void plan_effects(const SceneFacts &f, Plan &plan) {
     const std::string by = provider(f.offered, name);
     if (const std::string idle = provider(f.idle, name); by.empty() && !idle.empty())
       fail(DFM_E_ARG,
-           "effect '%s' is asked for, and %s provides it, but the parameters leave it off everywhere; set "
-           "them ('deform plugin info %s' lists them) or take the effect from the list",
+           "effect '%s' is asked for, and %s provides it, but the parameters switch it off everywhere; set "
+           "them ('deform plugin info %s' lists them) or remove the effect from the list",
            name.c_str(), idle.c_str(), idle.c_str());
     if (by.empty()) {
       const std::string could = provider(f.available, name);

@@ -20,8 +20,8 @@ dfm_status call_plugin(const dfm_host &host, const dfm_type &type, const char *w
   }
   if (const char *changed = boundary.restore(); changed && context.left_changed.first(&type))
     context.logf(DFM_LOG_WARNING,
-                 "%s: %s changed %s and left it so; it was put back, and is from now on without a word; a "
-                 "plugin must leave the floating-point environment as it finds it",
+                 "%s: %s changed %s and did not restore it; the library restored it, and will do so again "
+                 "without a message; a plugin must not change the floating-point environment",
                  type.id, what, changed);
   if (threw)
     context.logf(DFM_LOG_ERROR,

@@ -87,8 +87,7 @@ class Visit {
     const char *changed = put_back();
     if (!changed) return;
     std::snprintf(sentence, sizeof sentence,
-                  "%s: loading it changed %s; it was put back, since the host would compute or read numbers "
-                  "otherwise; a plugin must leave that as it finds it",
+                  "%s: loading it changed %s, which was restored; a plugin must leave it unchanged",
                   file_.c_str(), changed);
     host_.log(host_.ctx, DFM_LOG_WARNING, 0, sentence);
   }
@@ -153,20 +152,19 @@ void Loader::enter(dfm_plugin_fn entry, const std::string &file, dfm_plugin &plu
     fail(DFM_E_UNSUPPORTED, "%s: its entry threw an exception%s%s", file.c_str(),
          said.empty() ? "" : " after it said: ", said.c_str());
   if (!given)
-    fail(
-        DFM_E_UNSUPPORTED,
-        "%s: the plugin refuses this library, which speaks plugin ABI %u%s%s; one that was built for a draft "
-        "or another ABI is to be built again against this library's deform/plugin.h",
-        file.c_str(), DFM_ABI, said.empty() ? ", and gave no reason" : ": ", said.c_str());
+    fail(DFM_E_UNSUPPORTED,
+         "%s: the plugin refuses this library, which has plugin ABI %u%s%s; if it was built for a draft or "
+         "another ABI, rebuild it against this library's deform/plugin.h",
+         file.c_str(), DFM_ABI, said.empty() ? ", and gave no reason" : ": ", said.c_str());
   if (given->abi == 0)
     fail(DFM_E_UNSUPPORTED,
-         "%s: built for a draft of the plugin ABI (ABI 0 draft %u), which no library takes since ABI 1; "
-         "rebuild it against this library's deform/plugin.h",
+         "%s: built for a draft of the plugin ABI (ABI 0 draft %u), which no library has accepted since ABI "
+         "1; rebuild it against this library's deform/plugin.h",
          file.c_str(), given->abi_draft);
   if (given->abi < DFM_ABI_MIN || given->abi > DFM_ABI || given->abi_draft != DFM_ABI_DRAFT)
     fail(DFM_E_UNSUPPORTED,
-         "%s: built for plugin ABI %u draft %u, this library speaks ABI %u draft %u; rebuild it against this "
-         "library's deform/plugin.h, or take a library that speaks that ABI",
+         "%s: built for plugin ABI %u draft %u, this library has ABI %u draft %u; rebuild it against this "
+         "library's deform/plugin.h, or use a library with that ABI",
          file.c_str(), given->abi, given->abi_draft, DFM_ABI, DFM_ABI_DRAFT);
   constexpr uint32_t head = offsetof(dfm_plugin, types) + sizeof(void *);
   if (given->size < head || given->size > 65536)

@@ -32,7 +32,7 @@ void PluginSolver::analyse(const BlockPattern &pattern) {
   self_ = nullptr;  // a solver that fails has freed what it made
   if (status == DFM_E_NOMEM)
     fail(DFM_E_NOMEM, "the memory does not suffice for solver '%s' and a matrix of %u points", type_.id, n_);
-  fail(DFM_E_FATAL, "solver '%s' cannot take a matrix of %u points; the log says why", type_.id, n_);
+  fail(DFM_E_FATAL, "solver '%s' cannot take a matrix of %u points; see the log", type_.id, n_);
 }
 
 bool PluginSolver::factor(const double *blk) {

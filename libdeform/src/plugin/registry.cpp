@@ -39,10 +39,9 @@ bool reverse_dns(const char *id) {
 
 void check_known(const std::string &id, const char *where, uint32_t bits) {
   if (bits & kMustKnow)
-    bad_type(id,
-             format("%s calls for what this library does not know (bits %#x); take a newer library, or set "
-                    "names of its deform/plugin.h alone",
-                    where, bits & kMustKnow));
+    bad_type(id, format("%s has bits that this library does not know (%#x); use a newer library, or set only "
+                        "names of its deform/plugin.h",
+                        where, bits & kMustKnow));
 }
 
 void check_head(const dfm_type &type) {
@@ -64,7 +63,7 @@ void check_row(const std::string &id, const dfm_param &row, const std::vector<df
   const std::string key = row.key ? row.key : "";
   if (key.empty()) bad_type(id, "a parameter row has no key");
   for (const auto &other : before)
-    if (key == other.key) bad_type(id, format("parameter \"%s\" stands twice in the table", key.c_str()));
+    if (key == other.key) bad_type(id, format("parameter \"%s\" is listed twice in the table", key.c_str()));
   if (!row.label || !row.unit)
     bad_type(id, format("parameter \"%s\" lacks a label or a unit (\"1\" if dimensionless)", key.c_str()));
   if (!std::isfinite(row.min) || !std::isfinite(row.max) || !(row.min <= row.def && row.def <= row.max))
@@ -120,10 +119,11 @@ void copy_ops(RegisteredType &out) {
   if (out.type.kind == DFM_KIND_FRICTION) {
     copy_struct(out.friction, ops, kLawHead, id, "dfm_friction");
     if (!out.friction.eval) bad_type(id, "a law needs eval");
-    if (!out.friction.prepare != !out.friction.release) bad_type(id, "prepare and release go together");
+    if (!out.friction.prepare != !out.friction.release)
+      bad_type(id, "set both prepare and release, or neither");
     if (out.friction.needs & ~kKnownNeeds)
-      bad_type(id, format("it needs inputs that this library does not have (bits %#x of needs); take a newer "
-                          "library, or ask for DFM_NEED_* of its deform/plugin.h alone",
+      bad_type(id, format("it needs inputs that this library does not have (bits %#x of needs); use a newer "
+                          "library, or only the DFM_NEED_* of its deform/plugin.h",
                           out.friction.needs & ~kKnownNeeds));
     check_known(id, "dfm_friction.flags", out.friction.flags);
     own_slots(out, out.friction, true);
@@ -189,7 +189,7 @@ std::vector<dfm_slot> law_slots(const dfm_type &type, const dfm_host &host, cons
     own = law.state(params);
     return DFM_OK;
   });
-  if (!own) bad_type(type.id, "it does not say what state its parameters call for");
+  if (!own) bad_type(type.id, "it does not report the state that its parameters need");
   return *copy_slots(type.id, own, true);
 }
 
@@ -226,7 +226,7 @@ void Registry::add(const dfm_plugin &plugin, const std::string &file) {
     for (const auto *list : {&types_, &fresh})
       for (const auto &other : *list)
         if (std::strcmp(other->type.id, entry->type.id) == 0)
-          fail(DFM_E_STATE, "id \"%s\" is taken by %s; unload that one, or give this plugin an id of its own",
+          fail(DFM_E_STATE, "id \"%s\" is taken by %s; unload that one, or give this plugin another id",
                entry->type.id, other->file.c_str());
     fresh.push_back(std::move(entry));
   }

@@ -78,7 +78,7 @@ bool Selection::lists(const std::string &effect) const {
 }
 
 void warn_of(const dfm_context &context, const LeftOut &o) {
-  context.logf(DFM_LOG_WARNING, "%s: the list of effects leaves %s out, which is called for: %s",
+  context.logf(DFM_LOG_WARNING, "%s: the list of effects does not contain %s, which the scene needs: %s",
                o.of.c_str(), o.effect.c_str(), o.by.c_str());
 }
 

@@ -8,8 +8,8 @@ namespace dfm {
 
 SharedObject::SharedObject(const std::string &, const std::string &name) {
   fail(DFM_E_UNSUPPORTED,
-       "%s is not opened: this library was built to load no files (DEFORM_PLUGINS_STATIC); link the plugin "
-       "into the program and call dfm_plugin_register_static",
+       "%s is not opened: this library was built without loading of files (DEFORM_PLUGINS_STATIC); link the "
+       "plugin into the program and call dfm_plugin_register_static",
        name.c_str());
 }
 void SharedObject::close(void *) noexcept {}

@@ -19,9 +19,9 @@ StageChoice when_lagged(const SceneFacts &f) {
   return with_contact(f, "friction that the last sub-step found");
 }
 StageChoice when_rollback(const SceneFacts &f) {
-  return with_contact(f,
-                      "contact.method rollback: vertices that collide go back to their time of impact; "
-                      "there to compare, not to use");
+  return with_contact(
+      f,
+      "contact.method rollback: vertices that collide go back to their time of impact; only for comparison");
 }
 StageChoice replaced(const SceneFacts &f) {
   return touches(f) ? StageChoice{false, kWhyNot} : when::solve(f);
@@ -72,7 +72,7 @@ constexpr ContactMethod kMethod{.name = "rollback",
                                 .table = kTable,
                                 .point_values = "lagged friction",
                                 .unable = kUnable,
-                                .remark = " (it is there to compare: doc/concepts/rollback.md)",
+                                .remark = " (it exists only for comparison: doc/concepts/rollback.md)",
                                 .buffers = make_buffers};
 
 }  // namespace

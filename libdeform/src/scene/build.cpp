@@ -323,7 +323,7 @@ class Builder {
     dfm::Body &made = resolve<dfm::Body>(Kind::body, body);
     if (!made.dynamics->abilities().placed)
       fail(DFM_E_UNSUPPORTED,
-           "%s: %s: the model '%s' moves the body as a whole, and its points cannot be put one by one",
+           "%s: %s: the model '%s' moves the body as a whole, so its points cannot be placed one by one",
            def_.file.c_str(), pointer.c_str(), made.model.type->id);
     for (uint32_t i = 0; i < mesh.npoint; ++i)
       for (size_t k = 0; k < 3; ++k)
@@ -381,8 +381,8 @@ class Builder {
       if (last ? alike(*last, to) : is_made_so(b, to))
         context_->logf(
             DFM_LOG_WARNING,
-            "body '%s': its change at %g s (%s/%zu) is to the model that it has by then, '%s' with the "
-            "same parameters: nothing but what that remembers (plastic strain, say) is changed",
+            "body '%s': its change at %g s (%s/%zu) is to the model that the body already has then, '%s' "
+            "with the same parameters: it only resets the state of the model (plastic strain, for example)",
             b.name.c_str(), b.switches[i].t, pointer.c_str(), i, to.type.c_str());
       last = &to;
     }

@@ -109,7 +109,7 @@ void MeshFiles::check_keys(const Body &b, bool filled) const {
   if (filled) {
     if (!b.nodal_bc.empty())
       refuse(b.pointer + "/nodal_bc",
-             "the mesh is a surface, whose nodes are none of the filled body's points; use \"fix\" and "
+             "the mesh is a surface, and its nodes are not points of the filled body; use \"fix\" and "
              "\"forces\"");
     if (!b.fields.empty())
       refuse(b.fields[0].pointer,

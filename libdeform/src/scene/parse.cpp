@@ -39,8 +39,10 @@ size_t string_end(const std::string &text, size_t i) {
 void scan(const std::string &text, const std::string &file) {
   if (const size_t nul = text.find('\0'); nul != std::string::npos) {
     const Place p = place_of(text, nul);
-    fail(DFM_E_FORMAT, "%s:%zu:%zu: not JSON: a NUL character; whatever follows would be passed over",
-         file.c_str(), p.line, p.column);
+    fail(
+        DFM_E_FORMAT,
+        "%s:%zu:%zu: not JSON: it contains a NUL character, and readers would ignore what follows; remove it",
+        file.c_str(), p.line, p.column);
   }
   std::vector<std::set<std::string>> keys;  // of each open object; arrays hold none
   for (size_t i = 0; i < text.size(); ++i) {

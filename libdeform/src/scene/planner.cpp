@@ -323,8 +323,9 @@ json plan_scene(dfm_context *context, const Definition &def, const Types &types,
   const char *const key = wanted.target > 0 ? "accuracy" : "budget";
   if (!plan.found)
     fail(DFM_E_UNSUPPORTED,
-         "%s: /%s: no costs of the models and integrators that this scene names were measured; deform "
-         "calibrate measures all that are loaded, or name model, integrator and step and take \"%s\" away",
+         "%s: /%s: there are no measured costs for the models and integrators that this scene names; run "
+         "deform calibrate, which measures all that are loaded, or name model, integrator and step and "
+         "remove \"%s\"",
          def.file.c_str(), key, key);
   json set = json::object();
   const auto write = [&](const std::string &pointer, const json &value) {

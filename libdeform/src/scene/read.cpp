@@ -188,7 +188,7 @@ void check_fresh(const Node &name, const std::string &value, const std::vector<s
 
 void check_rising(const Node &key, size_t i, double previous, double t) {
   if (i > 0 && !(t > previous))
-    key.at("t").fail("times of keyframes rise strictly; found %g after %g", t, previous);
+    key.at("t").fail("times of keyframes must increase; found %g after %g", t, previous);
 }
 
 int32_t integrator_of(const Node &holder) {
@@ -280,12 +280,11 @@ void read_wanted(const Node &scene, Definition &def) {
     if (scene.has(key) && scene.member(key).value().is_null()) scene.value().erase(key);
   if (scene.has("accuracy") && scene.has("budget"))
     scene.member("budget").fail(
-        "\"accuracy\" is given too; the planner reaches an error or a time, keep one");
+        "\"accuracy\" is given too, and the planner aims at one of the two; keep one");
   const char *const key = scene.has("accuracy") ? "accuracy" : "budget";
   if (!scene.has(key)) return;
   const Node wanted = scene.member(key);
-  if (def.equilibrium)
-    wanted.fail("a static scene has no step to choose; take \"%s\" or /time/mode away", key);
+  if (def.equilibrium) wanted.fail("a static scene has no step to choose; remove \"%s\" or /time/mode", key);
   wanted.object(key);
   if (scene.has("accuracy")) {
     def.wanted.target = wanted.at("target").number(Range{0, 1, true, true});
@@ -333,7 +332,7 @@ std::vector<double> read_extra(const Node &value, const std::string &key, const 
       if (!automatic && (!row || !(row->flags & DFM_PARAM_ENUM) || !row->names)) continue;
       const double number = automatic ? row->def : enum_value(value, row->names);
       if (!out.empty() && out[0] != number)
-        value.fail("the models number this word differently; give it in the body's model params");
+        value.fail("this word has different values in different models; give it in the body's model params");
       out = {number};
     }
     if (out.empty())
@@ -429,7 +428,7 @@ void read_contact(const Node &scene, Definition &def, const ReadContext &context
   else def.self = contact.boolean("self", listed) ? DFM_SELF_ON : DFM_SELF_OFF;
   if (self_given && def.self != DFM_SELF_ON && listed)
     contact.member("self").fail(
-        "\"self\" is not true, but /effects asks for \"self_contact\"; take one of the two away");
+        "\"self\" is not true, but /effects asks for \"self_contact\"; remove one of the two");
   def.untangle = contact.boolean("untangle", false);
   def.guard = contact.boolean("guard", true);
   if (contact.has("energy_watch")) {

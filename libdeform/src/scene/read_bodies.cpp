@@ -300,7 +300,8 @@ void read_switches(const Node &list, const Types &types, Body &b) {
     s.model = read_model(entry, types);
     if (entry.has("max_jump")) s.max_jump = entry.member("max_jump").number(kPositive);
     if (!b.switches.empty() && s.t < b.switches.back().t)
-      entry.at("t").fail("times of switches do not fall; found %g s after %g s", s.t, b.switches.back().t);
+      entry.at("t").fail("times of switches must not decrease; found %g s after %g s", s.t,
+                         b.switches.back().t);
     b.switches.push_back(std::move(s));
   }
 }
@@ -494,7 +495,7 @@ Obstacle read_obstacle(const Node &node, ReadContext &context) {
     const Node start = node.member("start");
     start.object("obstacle_start");
     if (node.has("motion"))
-      start.fail("a \"motion\" says where the obstacle is at every time; take one of the two away");
+      start.fail("a \"motion\" gives the place of the obstacle at every time; remove one of the two");
     o.start = read_placed(start, o.def.pose);
   }
   return o;

@@ -11,7 +11,7 @@ std::vector<CostAt> read_sizes(const Node &sizes) {
   std::vector<CostAt> out;
   for (const Node &size : sizes.items()) {
     const double points = size.at("points").number(kPositive);
-    if (!out.empty() && !(points > out.back().points)) size.at("points").fail("sizes rise strictly");
+    if (!out.empty() && !(points > out.back().points)) size.at("points").fail("sizes must increase");
     out.push_back({points, size.at("ns_per_point").number(kPositive)});
   }
   if (out.empty()) sizes.fail("expected at least one size");

@@ -35,7 +35,7 @@ RigidBody read_rigid_body(const Node &node, ReadContext &context) {
   if (!node.has("start")) return b;
   const Node start = node.member("start");
   start.object("rigid_start");
-  if (b.def.fixed) start.fail("a fixed body stays where it is; take \"start\" or \"fixed\" away");
+  if (b.def.fixed) start.fail("a fixed body stays where it is; remove \"start\" or \"fixed\"");
   const dfm_pose pose = read_placed(start, b.def.pose);
   dfm_rigid_state state{};
   std::copy_n(pose.position, 3, state.position);

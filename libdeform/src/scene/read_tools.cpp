@@ -140,7 +140,8 @@ Tool read_tool(const Node &node, ReadContext &context) {
     if (t.hand.empty() && t.keys.empty()) motion.at("keyframes").fail("expected at least one keyframe");
   }
   if (node.has("opening_deg") && !t.hand.empty() && !node.member("opening_deg").value().is_number())
-    node.member("opening_deg").fail("the file of the motion says how far the jaws are open; drop one");
+    node.member("opening_deg")
+        .fail("the file of the motion already gives the opening of the jaws; remove one");
   if (node.has("opening_deg")) read_opening(node.member("opening_deg"), t);
   if (node.has("coupling")) read_coupling(node.member("coupling"), t.def);
   if (node.has("cuts")) read_cuts(node.member("cuts"), context, t);

@@ -112,7 +112,7 @@ std::vector<uint32_t> select_nodes(const Selection &where, const BodyMesh &mesh,
   const std::string pointer = where.pointer + "/points";
   if (mesh.filled)
     fail(DFM_E_ARG,
-         "%s: %s: the mesh is a surface, whose nodes are none of the filled body's points; use \"box\" or "
+         "%s: %s: the mesh is a surface, and its nodes are not points of the filled body; use \"box\" or "
          "\"group\"",
          file.c_str(), pointer.c_str());
   std::map<uint32_t, uint32_t> point_of;

@@ -96,8 +96,7 @@ std::string beside(const std::string &path, const std::string &name) {
   std::error_code error;
   std::filesystem::create_directory(where, error);
   if (!std::filesystem::is_directory(where, error))
-    fail(DFM_E_IO,
-         "%s: there can be no folder %s for its meshes beside it; give a path where there can be one",
+    fail(DFM_E_IO, "%s: the folder %s for its meshes cannot be created beside it; give another path",
          path.c_str(), where.c_str());
   return (where / name).string();
 }
@@ -125,8 +124,8 @@ void SceneWriter::check_name(const char *kind, const std::string &name) const {
   } catch (const Error &) {
     fail(
         DFM_E_ARG,
-        "%s: the name of %s '%s' cannot stand in a scene: one has 1 to 100 bytes, does not begin with a dot, "
-        "and holds no control characters and none of / \\ , : * = \"; make it under another name",
+        "%s: the name of %s '%s' cannot be used in a scene: a name has 1 to 100 bytes, does not begin with a "
+        "dot, and contains no control characters and none of / \\ , : * = \"; create it under another name",
         path.c_str(), kind, name.c_str());
   }
 }
@@ -232,7 +231,7 @@ Written write_friction(SceneWriter &to) {
   Written out = Written::array();
   for (const FrictionRule &r : to.w.friction) {
     if (!sides_known(to, r.between[0]) || !sides_known(to, r.between[1])) {
-      to.note("the friction rule for '%s' and '%s' is left out, since the world has no such two",
+      to.note("the friction rule for '%s' and '%s' is left out, since the world does not have both of them",
               r.between[0].c_str(), r.between[1].c_str());
       continue;
     }
@@ -377,8 +376,8 @@ void tell_what_is_left_out(SceneWriter &to) {
   const dfm_world_def usual = dfm_world_def_default();
   if (w.may_touch.call)
     to.note(
-        "a callback of the host says which pairs may touch: the scene has its answers so far, and asks "
-        "nobody about pairs that come later");
+        "a callback of the host decides which pairs may touch: the scene contains its answers so far, and "
+        "does not filter pairs that come later");
   if (w.pre_solve.call)
     to.note("a callback of the host changes contacts before they are solved; a scene has none");
   const std::pair<const char *, bool> members[] = {{"max_sweeps", w.def.max_sweeps != usual.max_sweeps},
@@ -465,8 +464,8 @@ void write_snapshot(SceneWriter &to, const std::string &name) {
   const World &made = resolve<World>(Kind::world, back.world());
   if (snapshot_structure(made) != snapshot_structure(to.w)) {
     to.note(
-        "no snapshot is written, since rounding of meshes or poses, or what the scene cannot say, makes the "
-        "world of the scene another one than this");
+        "no snapshot is written, since rounding of meshes or poses, or what a scene cannot describe, makes "
+        "the world of the scene differ from this one");
     if (!to.options.partial)
       fail(DFM_E_UNSUPPORTED, "%s is written, but %s", to.path.c_str(), to.first.c_str());
     return;

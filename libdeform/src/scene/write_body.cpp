@@ -226,10 +226,10 @@ void write_state(SceneWriter &to, const Body &b, Written &out) {
   if (rests) return;
   if (!b.dynamics->abilities().placed) {
     const std::string sentence = format(
-        "body '%s': its model '%s' moves it as a whole, so a scene cannot say how it stands and moves now; "
-        "it begins at rest where it was made",
+        "body '%s': its model '%s' moves it as a whole, so a scene cannot describe its present state; it "
+        "begins at rest where it was created",
         b.name.c_str(), b.model.type->id);
-    if (to.options.snapshot) to.remark(sentence + ", and the snapshot says the rest");
+    if (to.options.snapshot) to.remark(sentence + "; the snapshot contains its state");
     else to.note("%s", sentence.c_str());
     return;
   }
@@ -348,8 +348,8 @@ void write_springs(SceneWriter &to, const Body &b, Written &out) {
     Written entry;
     if (!write_spring_place(b, s, entry)) {
       to.note(
-          "body '%s': a spring pulls at %zu points with weights of its own, which a scene cannot say; it is "
-          "left out",
+          "body '%s': a spring pulls at %zu points with its own weights, which a scene cannot describe; it "
+          "is left out",
           b.name.c_str(), s.points.size());
       continue;
     }

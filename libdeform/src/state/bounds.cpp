@@ -61,8 +61,7 @@ void check_velocity(const char *what, const char *name, Vec3 velocity, Vec3 spin
   const double speed = farthest(velocity) + farthest(spin) * radius;
   if (!(speed <= kLight))
     fail(DFM_E_ARG,
-         "%s '%s': a velocity of %.4g m/s (spin included) is above that of light; a step can mean nothing by "
-         "it: give a smaller one",
+         "%s '%s': a velocity of %.4g m/s (spin included) is above the speed of light; give a smaller one",
          what, name, speed);
 }
 

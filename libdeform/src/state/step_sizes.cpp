@@ -113,9 +113,8 @@ bool sound(const StepSizes &s) { return s.accurate >= 0 && sound(s.cut) && sound
 
 std::string short_step(double dt, double floor) {
   return format(
-      "a step of %g s is below the floor of %g s (1 ns for each meter from the origin, at least one meter): "
-      "positions are numbers of 16 digits, and over such a step their rounding is more than contact may err; "
-      "take a longer step",
+      "a step of %g s is below the smallest step of %g s (1 ns for each meter from the origin, at least 1 "
+      "ns), in which the rounding of positions would exceed the contact tolerance; take a longer step",
       dt, floor);
 }
 

@@ -202,7 +202,8 @@ void return_to_start(World &w, StepContext &step) {
 void tell(const World &w, const StepContext &step, StepStopped::Why why, double dt) {
   const unsigned long long number = w.step_count;
   if (why == StepStopped::asked)
-    return set_last_error(format("step %llu was asked to stop; the state is as before it", number).c_str());
+    return set_last_error(
+        format("step %llu was interrupted; the state is as before the step", number).c_str());
   const char *const body = w.bound.body ? w.bound.body->name.c_str() : "?";
   if (why == StepStopped::time)
     return set_last_error(format("step %llu: %g s of simulated time took longer than max_time (%g s); the "
@@ -210,8 +211,8 @@ void tell(const World &w, const StepContext &step, StepStopped::Why why, double 
                                  number, dt, w.def.max_time)
                               .c_str());
   set_last_error(format("step %llu: %g s of simulated time need more than %llu units of work (max_work), in "
-                        "contact or in body '%s', whose step bound is the least; the state is as before it; "
-                        "take a shorter step, soften the blow, or raise max_work",
+                        "contact or in body '%s', whose step bound is the smallest; the state is as before "
+                        "it; take a shorter step, reduce the speed of the impact, or raise max_work",
                         number, dt, static_cast<unsigned long long>(step.budget.limit), body)
                      .c_str());
 }

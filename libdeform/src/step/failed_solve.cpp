@@ -69,7 +69,7 @@ uint32_t tell_failed_solve(World &w, StepContext &step, const LawInstance *law, 
   const uint32_t at = law ? contact : spoilt(step);
   const std::string where =
       format("step %llu, %s", static_cast<unsigned long long>(w.step_count), sides(w, step, at).c_str());
-  constexpr const char *kDo = "take a smaller step, lessen the loads or change the law";
+  constexpr const char *kDo = "take a smaller step, reduce the loads or change the law";
   const Asked in = law && at != kNone ? asked(step, *law, at) : Asked{"", true};
   if (!law || !in.sound) {
     set_last_error(
@@ -92,11 +92,10 @@ uint32_t tell_jam(World &w, StepContext &step) {
   uint32_t worst = kNone;
   for (uint32_t i = 0; i < step.rows.n; ++i)
     if (worst == kNone || step.rows.impulse[3 * size_t{i}] > step.rows.impulse[3 * size_t{worst}]) worst = i;
-  set_last_error(
-      format("step %llu, %s: squeezed until nothing can move any more; open what closes on it, move "
-             "it slower, or make the body stiffer",
-             static_cast<unsigned long long>(w.step_count), sides(w, step, worst).c_str())
-          .c_str());
+  set_last_error(format("step %llu, %s: squeezed until nothing can move; open what closes on it, move that "
+                        "more slowly, or make the body stiffer",
+                        static_cast<unsigned long long>(w.step_count), sides(w, step, worst).c_str())
+                     .c_str());
   return DFM_TROUBLE_UNCONVERGED;
 }
 

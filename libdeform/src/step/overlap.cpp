@@ -83,8 +83,8 @@ void warn(const World &w, const Overlap &o) {
       : thing->rigid ? "rigid body"
                      : "obstacle",
       name.c_str(), o.depth, o.crossings, o.enclosed,
-      o.aside ? "they do not touch until they are apart; move one of them, or ask for \"untangle\""
-              : "contact pushes them apart slowly; move one of them, or ask for \"untangle\"");
+      o.aside ? "contact between them is off until they are apart; move one of them, or set \"untangle\""
+              : "contact pushes them apart slowly; move one of them, or set \"untangle\"");
 }
 
 // It is apart: contact again.

@@ -259,7 +259,7 @@ dfm_body_measure measure_rigid(const RigidSet &set, uint32_t i) {
 void set_rigid_state(Obstacle &o, const dfm_rigid_state &given) {
   RigidSet &set = *o.rigid;
   if (set.group[o.rigid_body] == DFM_RIGID_STILL)
-    fail(DFM_E_ARG, "rigid body '%s' is fixed; it cannot be put elsewhere", o.name.c_str());
+    fail(DFM_E_ARG, "rigid body '%s' is fixed and cannot be moved", o.name.c_str());
   if (!finite_values({&given, 1}))
     fail(DFM_E_ARG, "rigid body '%s': the given state is not finite", o.name.c_str());
   check_velocity("rigid body", o.name.c_str(), load3(given.velocity), load3(given.spin), 1);

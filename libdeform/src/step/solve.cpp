@@ -296,11 +296,10 @@ bool retry_shorter(World &w, StepContext &step, uint32_t *trouble) {
     step.guard.cut = 0.5;
     return false;
   }
-  set_last_error(
-      format("step %llu, body '%s': no state was found in which its forces and contacts agree, not "
-             "even in a sub-step of %g s; take a smaller step, or lessen the stiffness",
-             static_cast<unsigned long long>(w.step_count), step.unsettled->name.c_str(), step.h)
-          .c_str());
+  set_last_error(format("step %llu, body '%s': no state was found in which its forces and contacts agree, "
+                        "not even in a sub-step of %g s; take a smaller step, or lower the stiffness",
+                        static_cast<unsigned long long>(w.step_count), step.unsettled->name.c_str(), step.h)
+                     .c_str());
   *trouble |= DFM_TROUBLE_NONFINITE;
   return false;
 }

@@ -23,7 +23,8 @@ std::vector<uint8_t> selected(const Body &b, const dfm_attach_def &def) {
     fail(DFM_E_ARG, "body '%s': points or surfels to attach are announced, but the list is NULL", name);
   if (def.npoint && !s.identity())
     fail(DFM_E_ARG,
-         "body '%s' has a surface of its own, of which no surfel is a point; name surfels, a group or a box",
+         "body '%s' has its own surface, whose surfels are not points of the body; name surfels, a group or "
+         "a box",
          name);
   if (def.npoint) {
     std::vector<uint32_t> surfel(b.p.n, kNone);
@@ -151,7 +152,7 @@ uint32_t attach(Body &b, const dfm_attach_def &def, Body *other, const Obstacle 
   check_values(b, def);
   if (other == &b) fail(DFM_E_ARG, "body '%s' cannot be attached to itself", b.name.c_str());
   if ((other ? other->world : obstacle->world) != &w)
-    fail(DFM_E_HANDLE, "body '%s' is to be attached to something of another world", b.name.c_str());
+    fail(DFM_E_HANDLE, "body '%s' cannot be attached to an object of another world", b.name.c_str());
   Attachment a;
   const std::vector<uint8_t> meant = selected(b, def);
   for (uint32_t i = 0; i < meant.size(); ++i)

@@ -63,7 +63,7 @@ void check_outward(const Surface &s, const char *name) {
   }
   if (volume < 0)
     fail(DFM_E_ARG,
-         "body '%s': its surface is closed and faces inward; turn its triangles (dfm_trimesh_create does)",
+         "body '%s': its surface is closed and faces inward; reverse its triangles (dfm_trimesh_create does)",
          name);
 }
 

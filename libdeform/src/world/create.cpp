@@ -58,8 +58,8 @@ void check_mesh(const dfm_body_def &def, const std::string &name) {
     }
     if (!(tet_volume(def.points, 3, c) > 0))
       fail(DFM_E_ARG,
-           "body '%s': tetrahedron %u has no positive volume; turn or remove it (deform mesh info shows such "
-           "cells)",
+           "body '%s': tetrahedron %u has no positive volume; reverse or remove it (deform mesh info shows "
+           "such cells)",
            name.c_str(), t);
   }
   const auto unused = std::find(used.begin(), used.end(), uint8_t(0));
@@ -236,7 +236,7 @@ void make_voxels(Obstacle &o, const Memory &memory) {
         name);
   if (!(signed_volume(o) > 0))
     fail(DFM_E_ARG,
-         "obstacle '%s': its surface encloses no volume or faces inward; turn its triangles "
+         "obstacle '%s': its surface encloses no volume or faces inward; reverse its triangles "
          "(dfm_trimesh_create does)",
          name);
   o.grid = std::make_unique<VoxelGrid>(memory, o.points.data(), o.def.ntriangle, o.triangles.data(), cells);

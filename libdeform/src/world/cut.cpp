@@ -162,8 +162,8 @@ void check_may_cut(const Body &b, const ModelInstance &model) {
   const char *const name = b.name.c_str();
   if (!b.surface.identity())
     fail(DFM_E_UNSUPPORTED,
-         "body '%s' can be neither cut nor torn: it wears a surface of its own; make it with the "
-         "surface of its cells",
+         "body '%s' can be neither cut nor torn: it has its own surface; create it with the boundary of its "
+         "cells as surface",
          name);
   if (b.world->method->point_values)
     fail(DFM_E_UNSUPPORTED,

@@ -180,16 +180,15 @@ class Search {
 void check_equilibrium(const World &w) {
   if (!w.rigid_sets.empty())
     fail(DFM_E_UNSUPPORTED,
-         "an equilibrium is not looked for where rigid bodies move; take them out, or run the world in time");
+         "static mode does not support moving rigid bodies; remove them, or run the world in time");
   for (const auto &b : w.bodies)
     if (b->model.stepper)
       fail(DFM_E_UNSUPPORTED,
-           "body '%s': model '%s' steps itself and tells no stiffness, which an equilibrium needs; choose "
+           "body '%s': model '%s' steps itself and gives no stiffness, which an equilibrium needs; choose "
            "another model",
            b->name.c_str(), b->model.type->id);
   if (w.plan.touches() && w.method != &velocity_method())
-    fail(DFM_E_UNSUPPORTED,
-         "an equilibrium is not looked for in a world whose contact method is %s; use the method auto",
+    fail(DFM_E_UNSUPPORTED, "static mode does not support the contact method %s; use the method auto",
          w.method->name);
 }
 

@@ -44,8 +44,9 @@ FrictionRule &need_rule(World &w, const char *a, const char *b) {
   std::vector<std::string> known;
   for (const FrictionRule &r : w.friction)
     known.push_back("['" + r.between[0] + "', '" + r.between[1] + "']");
-  fail(DFM_E_ARG, "no rule of friction is for ['%s', '%s'] (rules: %s); dfm_world_add_friction makes one", a,
-       b, known.empty() ? "none" : join(known).c_str());
+  fail(DFM_E_ARG,
+       "there is no friction rule for ['%s', '%s'] (rules: %s); create one with dfm_world_add_friction", a, b,
+       known.empty() ? "none" : join(known).c_str());
 }
 
 bool shared(const World &w, const FrictionRule &rule) {

@@ -132,15 +132,15 @@ void give_params(Body &b, const std::vector<double> &values) {
   const char *const type = b.model.type->id;
   const dfm_status status = b.model.put_params(values, b.dynamics->claims());
   if (status == DFM_E_NOMEM)
-    fail(DFM_E_NOMEM, "body '%s': model '%s' found no memory for these parameters; nothing was changed",
+    fail(DFM_E_NOMEM, "body '%s': model '%s' ran out of memory with these parameters; nothing was changed",
          b.name.c_str(), type);
   if (status == DFM_E_UNSUPPORTED && b.dynamics->claims())
     fail(DFM_E_UNSUPPORTED,
-         "body '%s': model '%s' does not take these parameters, or has no stiffness of the same kind with "
-         "them, which the body moves by; give it the model anew with them (dfm_body_set_model)",
+         "body '%s': model '%s' does not accept these parameters during a run, or its stiffness matrix would "
+         "change in kind; set the model again with them (dfm_body_set_model)",
          b.name.c_str(), type);
   if (status != DFM_OK)
-    fail(DFM_E_ARG, "body '%s': model '%s' refuses these parameters; the log says why", b.name.c_str(), type);
+    fail(DFM_E_ARG, "body '%s': model '%s' refuses these parameters; see the log", b.name.c_str(), type);
   b.model.params = values;
 }
 
@@ -156,8 +156,8 @@ void set_model_params(Body &b, const dfm_params &params) {
     for (const CellField &f : b.fields)
       if (value.key && f.key == value.key)
         fail(DFM_E_ARG,
-             "body '%s': parameter '%s' differs by cell (from %s), so one value cannot replace it while it "
-             "runs; make the body anew",
+             "body '%s': parameter '%s' differs by cell (from %s), so one value cannot replace it during a "
+             "run; create the body again",
              b.name.c_str(), f.key.c_str(), f.from.c_str());
   const std::vector<double> &before_asked = b.withheld.asked.empty() ? b.model.params : b.withheld.asked;
   const std::vector<double> asked = changed_params(type, given, before_asked);
@@ -168,10 +168,10 @@ void set_model_params(Body &b, const dfm_params &params) {
   for (uint32_t i = 0; i < type.nparam; at += type.params[i++].width)
     if (!(type.params[i].flags & DFM_PARAM_RUNTIME) &&
         !std::equal(&values[at], &values[at] + type.params[i].width, &b.model.params[at]))
-      fail(DFM_E_ARG, "body '%s': parameter '%s' of model '%s' cannot change while it runs", b.name.c_str(),
+      fail(DFM_E_ARG, "body '%s': parameter '%s' of model '%s' cannot change during a run", b.name.c_str(),
            type.params[i].key, type.id);
   if (!b.model.ops->set_params)
-    fail(DFM_E_UNSUPPORTED, "model '%s' takes no parameters while it runs", type.id);
+    fail(DFM_E_UNSUPPORTED, "model '%s' accepts no parameters during a run", type.id);
   const EffectsAtWork before(b.model);
   give_params(b, values);
   std::vector<uint8_t> by_cell = differs_by_cell(type, b.fields);

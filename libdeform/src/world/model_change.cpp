@@ -169,8 +169,8 @@ void check_surface(World &w, Body &b) {
          b.name.c_str(), b.model.type->id);
   if (most > kSurfaceStays * size_of(b))
     fail(DFM_DISCARD,
-         "body '%s': model '%s' would put the surface %g m aside at once, and %g m may be; change the model "
-         "where the body is nearer to its rest shape; nothing was changed",
+         "body '%s': model '%s' would move the surface by %g m at once, and at most %g m are allowed; change "
+         "the model where the body is nearer to its rest shape; nothing was changed",
          b.name.c_str(), b.model.type->id, most, kSurfaceStays * size_of(b));
 }
 
@@ -194,8 +194,8 @@ void check_effects(const World &w, const Body &b, const ModelInstance &old, cons
 void check_springs(const Body &b, const dfm_type &type, const Dynamics &moves) {
   if (b.springs.empty() || moves.abilities().springs) return;
   fail(DFM_E_UNSUPPORTED,
-       "body '%s': a spring is explicit, and model '%s' has no step bound to hold it to; remove its springs "
-       "first; nothing was changed",
+       "body '%s': springs are integrated explicitly and need a model with a step bound, which '%s' does not "
+       "have; remove its springs first; nothing was changed",
        b.name.c_str(), type.id);
 }
 
@@ -291,7 +291,7 @@ void rehearse(Body &b, ModelChoice &to, uint32_t &integrator, bool at_rest, bool
   if (!w.changed) check_effects(w, b, b.model, made->instance);
   if (at_rest && made->instance.stepper)
     fail(DFM_E_UNSUPPORTED,
-         "body '%s': model '%s' steps itself and tells no stiffness, which an equilibrium needs; choose "
+         "body '%s': model '%s' steps itself and gives no stiffness, which an equilibrium needs; choose "
          "another model",
          b.name.c_str(), type.id);
   // one whose forces do not turn with the body is of the present place only

@@ -207,8 +207,8 @@ class Settling {
       if (taken) refused = 0;
       else if (++refused == kRefused)
         fail(DFM_E_DIVERGED,
-             "no equilibrium was found, for steps from rest fail (%s); use more load_steps, hold what moves "
-             "freely, or raise max_time and max_work",
+             "no equilibrium was found, because a step from rest failed (%s); use more load_steps, hold what "
+             "moves freely, or raise max_time and max_work",
              dfm_last_error());
       weigh_all(h);
       bool rests = taken && off <= kGap;
@@ -240,7 +240,7 @@ class Settling {
     uint32_t trouble = 0;
     const dfm_status status = step_within_budget(w_, h, &trouble);
     if (trouble & DFM_TROUBLE_INTERRUPTED)
-      fail(DFM_DISCARD, "the search for an equilibrium was asked to stop; the world is as before it");
+      fail(DFM_DISCARD, "the search for an equilibrium was interrupted; the world is as before it");
     return status == DFM_OK;
   }
 

@@ -723,9 +723,9 @@ void check_head(const World &w, const unsigned char *data, size_t bytes) {
   SnapshotHead head{};
   std::memcpy(&head, data, std::min(bytes, sizeof head));
   if (bytes < sizeof head.magic || std::memcmp(head.magic, kSnapshotMagic, sizeof head.magic - 1) != 0)
-    fail(DFM_E_FORMAT, "these %zu bytes are no snapshot; take one with dfm_world_snapshot", bytes);
+    fail(DFM_E_FORMAT, "these %zu bytes are not a snapshot; take one with dfm_world_snapshot", bytes);
   if (bytes < sizeof head)
-    fail(DFM_E_FORMAT, "the snapshot is cut short: %zu bytes, its head alone has %zu; nothing was restored",
+    fail(DFM_E_FORMAT, "the snapshot is cut short: %zu bytes, the header alone has %zu; nothing was restored",
          bytes, sizeof head);
   if (head.magic[7] != 0 || head.version != kSnapshotVersion || head.zero != 0)
     fail(DFM_E_FORMAT,

@@ -44,19 +44,19 @@ void check_coupling(const dfm_tool_def &d, const char *name) {
     fail(DFM_E_ARG, "tool '%s': a device that is %g s late; give 0 to %g s", name, d.late, kLatest);
   if (!(d.stiffness > 0)) {
     if (d.late > 0)
-      fail(DFM_E_ARG, "tool '%s': late is of a coupled tool; give a stiffness, or leave it 0", name);
+      fail(DFM_E_ARG, "tool '%s': late applies to coupled tools only; give a stiffness, or leave it 0", name);
     if (d.flags & DFM_TOOL_PASSIVE)
       fail(DFM_E_ARG, "tool '%s': DFM_TOOL_PASSIVE is for a coupled tool; give a stiffness", name);
     if (d.damping > 0 || d.turn_stiffness > 0 || d.turn_damping > 0)
       fail(DFM_E_ARG,
-           "tool '%s' has a part of a coupling, but its stiffness is 0, which means none; give a stiffness, "
-           "or leave damping, turn_stiffness and turn_damping 0",
+           "tool '%s' has parameters of a coupling, but its stiffness is 0, which means no coupling; give a "
+           "stiffness, or leave damping, turn_stiffness and turn_damping 0",
            name);
     return;
   }
   if (!(d.turn_stiffness > 0))
-    fail(DFM_E_ARG, "tool '%s' is coupled with %g N/m and nothing turns it; give a turn_stiffness in N m/rad",
-         name, d.stiffness);
+    fail(DFM_E_ARG, "tool '%s' is coupled with %g N/m but has no turn_stiffness; give one in N m/rad", name,
+         d.stiffness);
   if (!(d.mass > 0 && d.inertia > 0))
     fail(DFM_E_ARG, "tool '%s' is coupled, so it needs a mass and an inertia above 0; found %g kg, %g kg m2",
          name, d.mass, d.inertia);
@@ -286,7 +286,7 @@ void need_keys(const Tool &t) {
 void follow_keys(Tool &t) {
   need_keys(t);
   if (t.device.read)
-    fail(DFM_E_ARG, "tool '%s' is moved by a device; take that away first (dfm_tool_set_device with NULL)",
+    fail(DFM_E_ARG, "tool '%s' is moved by a device; remove the device first (dfm_tool_set_device with NULL)",
          t.name.c_str());
   ToolValues v = t.values();
   v.keyed = t.keys.empty() ? 0 : 1;
@@ -378,7 +378,8 @@ void tool_feedback(const Tool &t, double force[3], double torque[3]) {
 std::vector<uint32_t> grab(Tool &t, Body &b, double reach, double release, uint32_t capacity) {
   World &w = *t.world;
   if (b.world != &w)
-    fail(DFM_E_HANDLE, "tool '%s' and the body that it is to grab are of two worlds", t.name.c_str());
+    fail(DFM_E_HANDLE, "tool '%s' and the body that it should grab belong to different worlds",
+         t.name.c_str());
   if (!(reach >= 0 && std::isfinite(reach)))
     fail(DFM_E_ARG, "tool '%s': a reach of %g m; give 0 or more", t.name.c_str(), reach);
   prepare(w);  // for d_c
@@ -461,7 +462,7 @@ void write_devices(World &w) {
     const ToolValues v = t->values();
     if (t->device.write(t->device.user, w.time, v.given, v.given + 3) >= 0) continue;
     t->mute = true;
-    w.context->logf(DFM_LOG_WARNING, "the device of tool '%s' takes no force any more", t->name.c_str());
+    w.context->logf(DFM_LOG_WARNING, "the device of tool '%s' no longer takes forces", t->name.c_str());
   }
 }
 

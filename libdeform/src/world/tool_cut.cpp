@@ -237,16 +237,16 @@ uint32_t remove(const Tool &t, Body &b) {
 void check_shape(const Tool &t, uint32_t how) {
   const char *const name = t.name.c_str();
   if (how > DFM_CUT_SPLIT)
-    fail(DFM_E_ARG, "tool '%s' is to cut in the way %u; use DFM_CUT_REMOVE or DFM_CUT_SPLIT", name, how);
+    fail(DFM_E_ARG, "tool '%s' has the unknown way of cutting %u; use DFM_CUT_REMOVE or DFM_CUT_SPLIT", name,
+         how);
   if (t.def.shape == DFM_TOOL_GRASPER || t.def.shape == DFM_TOOL_MESH)
-    fail(
-        DFM_E_ARG,
-        "tool '%s' cannot cut: a %s has no edge, and no solid by which cells could be removed; take a blade, "
-        "scissors, a sphere, a capsule, a box or an ellipsoid",
-        name, t.def.shape == DFM_TOOL_MESH ? "mesh" : "grasper");
+    fail(DFM_E_ARG,
+         "tool '%s' cannot cut: a %s has neither an edge nor a volume; use a blade, scissors, a sphere, a "
+         "capsule, a box or an ellipsoid",
+         name, t.def.shape == DFM_TOOL_MESH ? "mesh" : "grasper");
   if (how == DFM_CUT_SPLIT && !has_edge(t))
     fail(DFM_E_ARG,
-         "tool '%s' cannot open faces, since it has no edge; let it remove cells (DFM_CUT_REMOVE), or take a "
+         "tool '%s' cannot open faces, since it has no edge; let it remove cells (DFM_CUT_REMOVE), or use a "
          "blade or scissors",
          name);
   if (t.def.shape == DFM_TOOL_BLADE && how == DFM_CUT_SPLIT && t.def.half_size[0] > t.def.half_size[1])
@@ -264,8 +264,8 @@ void set_cuts(Tool &t, uint32_t how, uint32_t most, std::span<Body *const> bodie
   std::vector<uint64_t> ids;
   for (const Body *const b : bodies) {
     if (b->world != &w)
-      fail(DFM_E_HANDLE, "tool '%s' and body '%s', which it is to cut, are of two worlds", t.name.c_str(),
-           b->name.c_str());
+      fail(DFM_E_HANDLE, "tool '%s' and body '%s', which it should cut, belong to different worlds",
+           t.name.c_str(), b->name.c_str());
     check_may_cut(*b, b->model);
     ids.push_back(b->id);
   }

@@ -483,7 +483,7 @@ TEST(OdeLifecycle, WrongUse_IsOneSentence) {
   d.world = ode.world;
   refused(DFM_E_ARG, "space");
   d.space = ode.space;
-  refused(DFM_E_STATE, "adapter already");
+  refused(DFM_E_STATE, "already has an adapter");
   d.real_bytes = 4;
   refused(DFM_E_UNSUPPORTED, "4 bytes");
   d.real_bytes = 8;

@@ -264,7 +264,7 @@ TEST(Fill, ShellsThroughEachOther_CountWhatIsInsideOnce) {
   const double ball = 4 * M_PI / 3 * 0.125, lens = 5 * M_PI / 12 * 0.125;
   EXPECT_NEAR(material(m), 2 * ball - lens, 0.005 * ball);
   ASSERT_EQ(m.warnings.size(), 1u);
-  EXPECT_NE(m.warnings[0].find("passes through itself"), std::string::npos);
+  EXPECT_NE(m.warnings[0].find("crosses itself"), std::string::npos);
 }
 
 TEST(Fill, CavityAndSecondPiece_AreSeen) {

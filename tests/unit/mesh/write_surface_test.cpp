@@ -108,7 +108,7 @@ TEST(WriteSurface, WhatAFormatCannotHold_IsRefusedAndLeavesNoFile) {
   EXPECT_NE(refused(m, "big.stl", DFM_E_UNSUPPORTED).find("STL holds coordinates up to"), std::string::npos);
   EXPECT_NE(refused(m, "ball.xyz", DFM_E_UNSUPPORTED).find(".obj, .ply, .stl, .off, .vtk, .vtu"),
             std::string::npos);
-  EXPECT_NE(refused(m, "ball", DFM_E_UNSUPPORTED).find("this one ends with ''"), std::string::npos);
+  EXPECT_NE(refused(m, "ball", DFM_E_UNSUPPORTED).find("which is '' here"), std::string::npos);
   EXPECT_NE(refused(m, "none/ball.obj", DFM_E_IO).find("No such file"), std::string::npos);
   for (const auto &entry : std::filesystem::directory_iterator(folder()))
     EXPECT_EQ(entry.path().string().find("big"), std::string::npos);

@@ -203,7 +203,7 @@ TEST(PlanEffects, ThatNobodyProvides_AreRefusedWithThoseWhoCould) {
   f.available = {{"volume", "model.a"}};
   EXPECT_NE(refusal(f).find("these loaded plugins could: model.a"), std::string::npos) << refusal(f);
   f.idle = {{"volume", "model.a"}};
-  EXPECT_NE(refusal(f).find("the parameters leave it off everywhere"), std::string::npos) << refusal(f);
+  EXPECT_NE(refusal(f).find("the parameters switch it off everywhere"), std::string::npos) << refusal(f);
   f.offered = {{"volume", "model.a"}};
   EXPECT_EQ(refusal(f), "");
   dfm::SceneFacts empty;  // whoever comes first may provide it

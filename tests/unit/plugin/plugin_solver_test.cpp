@@ -64,7 +64,7 @@ TEST(PluginSolver, RefusedMatrix_NamesThePlugin) {
     solver->analyse(large.pattern());
     FAIL();
   } catch (const dfm::Error &e) {
-    EXPECT_EQ(e.sentence, "solver 'org.tiny.cholesky' cannot take a matrix of 125 points; the log says why");
+    EXPECT_EQ(e.sentence, "solver 'org.tiny.cholesky' cannot take a matrix of 125 points; see the log");
   }
   EXPECT_FALSE(solver->factor(large.blk.data()));
   solver->analyse(small.pattern());  // and it can still be used

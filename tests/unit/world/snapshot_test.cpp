@@ -173,7 +173,7 @@ TEST_F(DamagedSnapshot, OfAnotherVersion_IsNamed) {
   bad = good.bytes;
   bad[0] = 'x';
   seal(bad);
-  refused(bad, "no snapshot", "no snapshot");
+  refused(bad, "not a snapshot", "not a snapshot");
 }
 
 // Each field that has a check, with what it must not be.
