@@ -1,4 +1,4 @@
-// No exception crosses the C API: every function of api/ runs its body in here.
+// No exception crosses the C API: every function of api/ runs its body through this.
 #pragma once
 #include <new>
 #include <type_traits>
@@ -9,7 +9,7 @@
 
 namespace dfm {
 
-// Runs f and turns what it throws into a status and the sentence of dfm_last_error().
+// Runs f and turns an exception into a status and the message of dfm_last_error().
 template <class F>
 dfm_status as_status(F &&f) noexcept {
   Call call;

@@ -38,16 +38,15 @@ void check_points(const Body &b, uint32_t n, const uint32_t *points) {
            b.p.n);
 }
 
-// The held components keep what holds them: their velocity is that of the hold, zero unless a
-// motion moves them.
+// Held components keep the velocity of the hold: zero unless a motion moves them.
 void stop_held(Body &b) {
   for (uint32_t i = 0; i < b.p.n; ++i)
     for (int k = 0; k < 3; ++k)
       if (b.p.held[i] & (1 << k)) b.p.v[size_t(i) * kStride + size_t(k)] = 0;
 }
 
-// Lasting loads that do not vary are summed once; varying ones are summed anew by the motion stage.
-// What the host changes is no work of the step's.
+// Constant lasting loads are summed once; varying ones are summed in the motion stage. Changes by the host
+// are no work of the step.
 void disturb(Body &b) {
   wake(*b.world, b);
   forget_energy(b);
@@ -70,7 +69,7 @@ Spring &spring_of(Body &b, uint32_t number) {
   fail(DFM_E_ARG, "body '%s' has no spring %u", b.name.c_str(), number);
 }
 
-// They count in the step bound and pull from the next sub-step on.
+// They count in the step bound and act from the next sub-step on.
 void springs_changed(Body &b) {
   sum_loads(b);
   b.bound.known = false;
@@ -372,7 +371,7 @@ dfm_status dfm_body_apply_impulse(dfm_body body, const double point[3], const do
     const TriangleNearPoint near = closest_on_body(b, load3(point));
     disturb(b);
     const HostWork work(b);
-    // dv = M^-1 N^T p: of all changes that give the point its new velocity the one of least kinetic energy
+    // dv = M^-1 N^T p: the change with the least kinetic energy that gives the point its new velocity
     for (int k = 0; k < 3; ++k)
       b.surface.each_phyxel(
           b.surface.tri[size_t(3) * near.triangle + size_t(k)],

@@ -1,6 +1,6 @@
 // The calls of the API that are in progress on this thread, the innermost first. A hook, a plugin or a host's
-// table may call back into the library in the middle of one; what a call works on must not be destroyed or
-// changed beneath it, so each names what it holds.
+// table may call back into the library during a call. Objects in use by an outer call must not be destroyed
+// or changed, so each call registers the objects that it uses.
 #pragma once
 #include <atomic>
 #include <cstddef>
@@ -21,40 +21,40 @@ class Call {
   Call(const Call &) = delete;
   Call &operator=(const Call &) = delete;
 
-  // The call whose body runs now. Only under as_status().
+  // The innermost call. Only inside as_status().
   static Call &now() { return *innermost_; }
 
-  // Works on `object`, which those that it calls may look at and not destroy.
+  // Registers `object` as in use: nested calls may read it and not destroy it.
   void hold(const void *object) noexcept {
     for (size_t i = 0; i < nheld_; ++i)
       if (held_[i] == object) return;
     if (nheld_ < kMostHeld) held_[nheld_++] = object;
   }
-  // Does a call around this one hold it?
+  // Whether an outer call uses it.
   bool held_outside(const void *object) const noexcept {
     for (const Call *c = outer_; c; c = c->outer_)
       for (size_t i = 0; i < c->nheld_; ++i)
         if (c->held_[i] == object) return true;
     return false;
   }
-  // Changes `object` until the call ends. busy: that somebody does, on whatever thread.
+  // Registers `object` as changing until the call ends. busy: set while any thread changes it.
   void change(const void *object, std::atomic<bool> &busy, const char *what) {
     if (writing_ == &busy) return;
     if (held_outside(object) || busy.exchange(true, std::memory_order_acquire)) refuse(what);
     hold(object);
     writing_ = &busy;
   }
-  // Destroys or changes something that has no flag of its own.
+  // Called before destroying or changing an object without such a flag.
   void need_alone(const void *object, const char *what) const {
     if (held_outside(object)) refuse(what);
   }
-  // Counts among the calls that a context is in.
+  // Counts this call among those in progress in a context.
   void count(std::atomic<uint32_t> &calls) noexcept {
     if (counted_) return;
     calls.fetch_add(1, std::memory_order_acquire);
     counted_ = &calls;
   }
-  // The object is going, and its flag with it.
+  // The object is being destroyed, and its flag with it.
   void let_go() noexcept { writing_ = nullptr; }
 
   [[noreturn]] static void refuse(const char *what) {
@@ -65,7 +65,7 @@ class Call {
   }
 
  private:
-  static constexpr size_t kMostHeld = 6;  // no function works on more things than that
+  static constexpr size_t kMostHeld = 6;  // no function uses more objects
   static inline thread_local Call *innermost_ = nullptr;
   Call *const outer_;
   std::atomic<bool> *writing_ = nullptr;

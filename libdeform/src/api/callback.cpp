@@ -17,7 +17,7 @@ uint64_t id_of(const World &w, uint64_t handle, const char *name) {
   fail(DFM_E_HANDLE, "'%s' is not a body or obstacle of this world", name);
 }
 
-// Tables are made anew before the next step, with what may touch now.
+// The tables are rebuilt before the next step, with the pairs that may touch now.
 void ask_pairs_again(World &w) {
   w.overlaps.all = true;
   wake_all(w);

@@ -15,7 +15,7 @@ using namespace dfm;
 
 namespace {
 
-// Names of the groups that a body's surface has, by first triangle.
+// Names of the groups of a body's surface, in the order of their first triangles.
 std::vector<std::string> groups_of(const Body &b) {
   std::vector<std::string> out;
   for (const auto &zone : b.zones.list)
@@ -24,7 +24,7 @@ std::vector<std::string> groups_of(const Body &b) {
   return out;
 }
 
-// "body:GROUP", or an empty string where the text is none of a body.
+// "body:GROUP", or an empty string if the text does not name a group of a body.
 std::string group_side(World &w, const std::string &text) {
   for (size_t colon = text.find(':'); colon != std::string::npos; colon = text.find(':', colon + 1)) {
     const std::string name = text.substr(0, colon), group = text.substr(colon + 1);
@@ -67,7 +67,7 @@ std::string side(World &w, const char *text, bool grouped) {
        near.empty() ? "" : (", did you mean '" + near + "'?").c_str(), join(names).c_str());
 }
 
-// Is anything carried between a and b? Contacts that only stand by are not reported.
+// Whether a force acts between a and b. Contacts without force are not reported.
 bool touching(const World &w, uint32_t i) { return w.store.touching[i]; }
 
 struct Sides { uint64_t a, b; };
@@ -118,7 +118,7 @@ uint64_t id_of(const World &w, uint64_t handle, const char *what) {
   fail(DFM_E_HANDLE, "'%s' is not a body or obstacle of this world", what);
 }
 
-// The values of a def; `what` names them where they are missing.
+// The values of a def; `what` names them in the error if they are missing.
 std::span<const dfm_param_value> values_of(const dfm_params &params, const char *what) {
   if (params.n && !params.values)
     fail(DFM_E_ARG, "%u parameters are announced for %s, but params.values is NULL", params.n, what);
@@ -255,7 +255,7 @@ dfm_status dfm_world_pairs_sized(dfm_world world, uint32_t row_size, uint32_t ca
       }
       dfm_pair_report *const it = &at->report;
       const uint32_t body = turned ? c.slot_b : c.slot_a;
-      // where the center was when the contact points were there: at the start of the sub-step
+      // the center at the time of the contact points: at the start of the sub-step
       if (!known[body]) {
         const dfm_body_measure m = measure(*w.bodies[body]);
         com[body] = load3(m.com) - w.report.h * load3(m.velocity);
@@ -268,7 +268,7 @@ dfm_status dfm_world_pairs_sized(dfm_world world, uint32_t row_size, uint32_t ca
       ++it->count;
       it->sticking += l[0] > 0 && w.report.mode[i] == 1;
       it->normal += l[0] / w.report.h;
-      if (ia != ib) {  // what a body does to itself sums to nothing
+      if (ia != ib) {  // forces of a body on itself sum to zero
         store3(it->force, load3(it->force) + force);
         store3(it->friction, load3(it->friction) + friction);
         store3(it->moment, load3(it->moment) + cross(load3(c.point) - com[body], force));

@@ -1,5 +1,5 @@
-// What the structs of the C API were in 0.1. It stands here by name, since sizeof grows with the structs: a
-// caller that says no size has these, and so do the symbols for callers without a C compiler.
+// Sizes of the structs of the C API in 0.1, because sizeof grows with the structs. A caller that gives no
+// size has these, and so do the symbols for callers without a C compiler.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -13,7 +13,7 @@ inline constexpr uint32_t kFirstSize = 0;
 template <class T>
 inline constexpr const char *kStructName = "def";
 
-// last: the member with which the struct ended in 0.1; never another one.
+// last: the last member of the struct in 0.1; must never change.
 #define DFM_ENDED_WITH(type, last)                                                              \
   template <>                                                                                   \
   inline constexpr uint32_t kFirstSize<type> =                                                  \

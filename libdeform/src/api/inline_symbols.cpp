@@ -1,6 +1,6 @@
-// What is inline in the headers because it takes sizeof of the caller's structs, lists and defaults, as
-// symbols of the library: for callers that look functions up by name without a C compiler and so have no
-// sizeof. Structs are those of 0.1 and stay so.
+// Functions that are inline in the headers because they use sizeof of the caller's structs (lists and
+// defaults), exported as symbols for callers that look functions up by name without a C compiler. Their
+// structs remain those of 0.1.
 //
 // In this file the headers' inline functions have other names.
 #define dfm_world_contacts contacts_inline
@@ -55,7 +55,7 @@
 #undef dfm_vertex_layout_default
 #undef dfm_world_query_ray_all
 
-// bytes: of a row in 0.1.
+// bytes: size of a row in 0.1.
 #define DFM_LIST_SYMBOL(name, row, bytes)                                                         \
   extern "C" DFM_API dfm_status name(dfm_world world, uint32_t capacity, row *out, uint32_t *n) { \
     return name##_sized(world, bytes, capacity, out, n);                                          \
@@ -68,7 +68,7 @@ DFM_LIST_SYMBOL(dfm_world_overlaps, dfm_overlap, 40)
 DFM_LIST_SYMBOL(dfm_world_profile, dfm_stage_time, 24)
 DFM_LIST_SYMBOL(dfm_world_swaps, dfm_swap, 64)
 
-// As many bytes come back in memory, as the struct of 0.1 does, and no more where the struct has grown.
+// Returns in memory exactly the bytes of the struct of 0.1, also after the struct has grown.
 #define DFM_DEFAULT_SYMBOL(type)                                                     \
   struct first_##type { alignas(type) unsigned char bytes[dfm::kFirstSize<type>]; }; \
   extern "C" DFM_API first_##type type##_default(void) {                             \

@@ -16,7 +16,7 @@
 namespace dfm {
 namespace {
 
-// What prepare() made of one set of parameters; released with the last evaluation that uses it.
+// Result of prepare() for one set of parameters; released with the last evaluation that uses it.
 struct Prepared {
   const dfm_host &host;
   const dfm_type &type;
@@ -45,7 +45,7 @@ struct Law {
   const dfm_type &type;
   uint64_t handle = 0;
   std::mutex mutex;
-  // of the last parameters: a rig or plot calls with the same ones again and again
+  // for the last parameters: a rig or plot calls repeatedly with the same ones
   std::shared_ptr<const Prepared> prepared;
 
   std::shared_ptr<const Prepared> prepare(const double *params) {
@@ -77,7 +77,7 @@ uint32_t state_width(const Law &law, const double *params) {
     for (const dfm_slot &slot : slots) n += slot.width;
   };
   if (ops.state) add(law_slots(law.type, law.context.host, params));
-  else add({ops.slots, ops.nslot});  // takes no memory
+  else add({ops.slots, ops.nslot});  // needs no memory
   return n;
 }
 
@@ -120,8 +120,7 @@ void check_input(const Law &law, const dfm_friction_in &in) {
       fail(DFM_E_ARG, "dfm_law_eval (%s): the law needs %s, which is NULL", id, column.name);
 }
 
-// A plugin may rely on 64-byte columns and a stride of whole vectors; a caller with plain arrays need
-// not provide them.
+// Plugins may rely on 64-byte alignment and a stride of whole vectors; callers may pass plain arrays.
 class Aligned {
  public:
   Aligned(dfm_context &context, const dfm_friction_in &in, const dfm_friction_out &out, uint32_t nstate)

@@ -1,4 +1,4 @@
-// Meshes behind handles, with what the C side borrows from them.
+// Meshes behind handles, with the arrays that the C API lends out.
 #pragma once
 #include <memory>
 #include <string>
@@ -34,7 +34,7 @@ struct MeshObject {
     return object;
   }
 
-  // Takes the mesh into the context and returns its handle.
+  // Moves the mesh into the context and returns its handle.
   static uint64_t keep(dfm_context &context, Mesh &&mesh) {
     auto object = std::make_unique<MeshObject>(context, std::move(mesh));
     const uint64_t handle = handle_create(kKind, object.get());

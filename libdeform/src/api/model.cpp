@@ -31,14 +31,15 @@ Switch make_switch(const Body &b, const dfm_switch &s, double after) {
   return out;
 }
 
-// It stands inside dfm_switch_rule, so its size is the same in every version.
+// It is a member of dfm_switch_rule, so its size is the same in every version.
 ModelChoice make_choice(const Body &b, const char *name, const dfm_model_choice &c, double max_jump) {
   if (c.size != sizeof c && (c.type || c.size))
     fail(DFM_E_ARG, "body '%s': the size of '%s' is %u, expected %zu; start from dfm_switch_rule_default()",
          b.name.c_str(), name, c.size, sizeof c);
   if (!c.type) return {};
   ModelChoice out = choose_model(b, c.type, c.params, c.integrator);
-  if (out.integrator == kSameIntegrator) out.integrator = b.origin.integrator;  // before another model's
+  // before a change to another model
+  if (out.integrator == kSameIntegrator) out.integrator = b.origin.integrator;
   if (max_jump > 0) out.max_jump = max_jump;
   return out;
 }

@@ -1,4 +1,4 @@
-// Handles to objects for the files of api/: each throws Error(DFM_E_HANDLE).
+// Objects of handles, for the files of api/: each function throws Error(DFM_E_HANDLE).
 #pragma once
 #include "api/as_status.h"
 #include "api/structs.h"
@@ -20,9 +20,9 @@ Part &part_of(Kind kind, uint64_t h) {
   held(*part.world);
   return part;
 }
-// Points may be late (Dynamics::see_points): calls that read no points but those of the surface take these.
+// Points may be late (Dynamics::see_points): calls that read only points of the surface use these functions.
 inline Body &any_body_of(dfm_body h) { return part_of<Body>(Kind::body, h); }
-// One that has cells.
+// A body that has cells.
 inline Body &shown_body_of(dfm_body h) {
   Body &b = any_body_of(h);
   if (b.undone)
@@ -50,20 +50,20 @@ inline World &whole(World &w) {
 inline Obstacle &obstacle_of(dfm_obstacle h) { return part_of<Obstacle>(Kind::obstacle, h); }
 inline Material &material_of(dfm_material h) { return part_of<Material>(Kind::material, h); }
 
-// For calls that change the world: no other one may be inside it, neither around this one nor on
+// For calls that change the world: no other call may be in progress on it, neither an outer call nor one on
 // another thread.
 inline World &exclusive(World &w) {
   Call::now().change(&w, w.busy, "world");
   return w;
 }
 
-// For calls that read arrays which a step has in pieces.
+// For calls that read arrays which are incomplete during a step.
 inline World &settled(World &w) {
   if (w.busy) Call::refuse("world");
   return w;
 }
 
-// For calls that make something in a context.
+// For calls that create something in a context.
 inline dfm_context &used(dfm_context &context) {
   if (context.ending) Call::refuse("context");
   Call::now().hold(&context);
@@ -71,7 +71,7 @@ inline dfm_context &used(dfm_context &context) {
   return context;
 }
 
-// For calls that change what a context has loaded.
+// For calls that change the plugins of a context.
 inline dfm_context &exclusive(dfm_context &context) {
   Call::now().need_alone(&context, "context");
   return used(context);
@@ -81,7 +81,8 @@ inline void need(const void *p, const char *name) {
   if (!p) fail(DFM_E_ARG, "argument '%s' is NULL", name);
 }
 
-// The two-call convention: the count always, the data where there is room. True: copy.
+// The two-call convention: writes the count always, the data if there is room. Returns true if the data
+// should be copied.
 inline bool room(uint32_t count, uint32_t capacity, const void *out, uint32_t *n) {
   if (n) *n = count;
   if (!out && capacity == 0) return false;
@@ -91,9 +92,9 @@ inline bool room(uint32_t count, uint32_t capacity, const void *out, uint32_t *n
   return true;
 }
 
-// The rows of a list in the caller's memory, row_size bytes each: members that the caller's header lacks
-// are left out, those that this library lacks read zero. `size`, where the row has one, says how many bytes
-// are filled in.
+// The rows of a list in the caller's memory, row_size bytes each: members unknown to the caller's header are
+// left out, those unknown to this library are zero. `size`, if the row has one, is the number of bytes
+// written.
 template <class T>
 class Rows {
  public:

@@ -61,7 +61,7 @@ dfm_status dfm_obstacle_get_def(dfm_obstacle obstacle, dfm_obstacle_def *out) {
 
 namespace {
 
-// Where a host may put an obstacle; checked.
+// Checks the pose that a host gives to an obstacle.
 Obstacle &movable(dfm_obstacle obstacle, const dfm_pose *pose) {
   Obstacle &o = obstacle_of(obstacle);
   exclusive(*o.world);
@@ -92,7 +92,7 @@ dfm_status dfm_obstacle_teleport(dfm_obstacle obstacle, const dfm_pose *pose) {
     Obstacle &o = movable(obstacle, pose);
     World &w = *o.world;
     w.overlaps.place(o.id);
-    wake_all(w);  // it may have been put where someone sleeps, or taken from under someone
+    wake_all(w);  // it may have been placed where a body sleeps, or removed from under one
     o.keys.clear();
     o.def.sine = {};
     o.pose = to_pose(*pose);

@@ -26,7 +26,7 @@ void dfm_query_filter_default_sized(uint32_t size, dfm_query_filter *out) {
 
 namespace {
 
-// The filter that a call has been given, taken whole.
+// The filter of a call, in the full size of this library.
 struct Given {
   dfm_query_filter taken;
   bool any;

@@ -18,7 +18,7 @@ Obstacle &rigid_of(dfm_rigid h) {
   return o;
 }
 
-// One that is not moved by its tool alone.
+// A rigid body that is not part of a tool.
 Obstacle &free_rigid_of(dfm_rigid h, const char *instead) {
   Obstacle &o = rigid_of(h);
   if (o.rigid->of_tool) fail(DFM_E_STATE, "'%s' is part of a tool; %s", o.name.c_str(), instead);
@@ -154,7 +154,7 @@ dfm_status dfm_rigid_set_state(dfm_rigid rigid, const dfm_rigid_state *state) {
     set_rigid_state(o, *state);
     for (auto &shape : w.obstacles)
       if (shape->rigid == o.rigid && shape->rigid_body == o.rigid_body) w.overlaps.place(shape->id);
-    wake_all(w);  // it may have been put where someone sleeps
+    wake_all(w);  // it may have been placed where a body sleeps
   });
 }
 

@@ -24,7 +24,7 @@ Scene &scene_of(dfm_scene handle) {
 void close_scene(dfm_scene handle) {
   Scene *scene = &scene_of(handle);
   dfm::Call::now().need_alone(scene, "scene");
-  // it goes with the scene
+  // destroyed with the scene
   if (const auto *world = static_cast<dfm::World *>(dfm::handle_find(dfm::Kind::world, scene->world()))) {
     dfm::Call::now().need_alone(world, "scene's world");
     if (world->busy) dfm::Call::refuse("scene's world");
@@ -142,7 +142,7 @@ void dfm_scene_write_def_default_sized(uint32_t size, dfm_scene_write_def *out) 
 
 namespace {
 
-// call: the function's name, for its errors; beside: what the scene has that is not the world's.
+// call: name of the function, for its errors; beside: data of the scene that are not part of the world.
 void write_scene(const char *call, dfm::World &w, const char *path, const dfm_scene_write_def &d,
                  dfm::writing::Beside beside, uint32_t *notes) {
   if (!path || !*path)

@@ -14,7 +14,7 @@ template <class Part>
 void mark(Part &part, bool sensor) {
   World &w = exclusive(*part.world);
   if (part.sensor == sensor) return;
-  leave_sensors(w, part.id);  // what it sees, or what has seen it
+  leave_sensors(w, part.id);  // ends overlaps in both directions
   if (sensor) {
     ++w.sensors;
   } else {

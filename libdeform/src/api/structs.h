@@ -10,10 +10,10 @@
 
 namespace dfm {
 
-// No header has such a def: a size that nobody has set.
+// No header has a def of this size: the size was not set.
 constexpr uint32_t kMostDef = 4096;
 
-// A caller with a newer header may not ask for what this library would pass over in silence.
+// A caller with a newer header must not set members that this library would ignore.
 template <class T>
 void refuse_unknown(const T *given) {
   const unsigned char *const bytes = reinterpret_cast<const unsigned char *>(given);
@@ -26,7 +26,7 @@ void refuse_unknown(const T *given) {
            given->size, DFM_VERSION_MAJOR, DFM_VERSION_MINOR, DFM_VERSION_PATCH, sizeof(T), i);
 }
 
-// The part of a def that the caller's version of the struct has; the rest keeps its default.
+// Copies the part of a def that the caller's version of the struct has; the rest keeps its default.
 template <class T>
 T take_known(const T *given, const T &defaults) {
   T def = defaults;
@@ -37,7 +37,7 @@ T take_known(const T *given, const T &defaults) {
   def.size = sizeof(T);
   return def;
 }
-// What a default function leaves in a def. Headers of 0.1 have no place for it.
+// The cookie that a default function writes into a def. Headers of 0.1 have no member for it.
 constexpr uint64_t kCookie = 0x6d726f666564;
 
 template <class T>
@@ -49,7 +49,7 @@ void check_cookie(const T *given) {
   }
 }
 
-// Flags that the library does not know would be a wish passed over in silence.
+// Unknown flags are refused, not ignored.
 template <class T>
 void check_flags(const T &def, uint32_t known, const char *whose) {
   if (const uint32_t other = def.flags & ~known)
@@ -67,8 +67,7 @@ T take_def(const T *given, const T &defaults) {
   return def;
 }
 
-// Defs that lie side by side, as far apart as the first one's size says: the caller's header may be
-// older or newer.
+// An array of defs with the stride given by the size of the first: the caller's header may be older or newer.
 template <class T>
 std::vector<T> take_defs(const T *given, uint32_t n, const T &defaults, const char *what, const char *from) {
   std::vector<T> defs;
@@ -87,8 +86,8 @@ std::vector<T> take_defs(const T *given, uint32_t n, const T &defaults, const ch
   return defs;
 }
 
-// One that a def points to: of this library's size too, in `own`. What was never so short is left as it is,
-// for who reads it to refuse by its name.
+// A struct that a def points to, converted to the size of this library in `own`. An impossible size is left
+// for the reader, who refuses it by name.
 template <class T>
 void take_pointed(const T *&given, T &own) {
   if (!given || given->size < kFirstSize<T>) return;
@@ -96,7 +95,7 @@ void take_pointed(const T *&given, T &own) {
   given = &own;
 }
 
-// A def's defaults, as long as the caller's version of the struct is: zero behind what this one knows.
+// The defaults of a def in the size of the caller's struct: members unknown to this library are zero.
 template <class T>
 void give_default(uint32_t size, T *out, T value) noexcept {
   if (!out) return;

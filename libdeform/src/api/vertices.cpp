@@ -1,5 +1,5 @@
-// Single-precision vertices of a surface, into memory that may be a graphics card's: each byte is written
-// once, but for `stick`, and none is read.
+// Single-precision vertices of a surface, written into memory that may belong to a graphics card: each byte
+// is written once, except `stick`, and none is read.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -60,7 +60,7 @@ void put(unsigned char *vertex, uint32_t at, Vec3 v) {
   std::memcpy(vertex + at, x, sizeof x);
 }
 
-// f(surfel) for those of a feature: a surfel, an edge or a triangle.
+// Calls f(surfel) for the surfels of a feature: a surfel, an edge or a triangle.
 template <class F>
 void each_surfel(const Surface &s, uint32_t type, uint32_t feature, F &&f) {
   if (type == 0) return f(feature);
@@ -68,7 +68,7 @@ void each_surfel(const Surface &s, uint32_t type, uint32_t feature, F &&f) {
   for (uint32_t k = 0; k <= type; ++k) f(at[k]);
 }
 
-// Where contacts that carry load stick, or slide.
+// Marks where loaded contacts stick or slide.
 void put_stick(const Body &b, const dfm_vertex_layout &l, bool sticks, unsigned char *out) {
   const World &w = *b.world;
   const float value = sticks ? 1.0f : 0.5f;
@@ -86,7 +86,7 @@ void put_stick(const Body &b, const dfm_vertex_layout &l, bool sticks, unsigned 
 
 void put_vertices(Body &b, const dfm_vertex_layout &l, unsigned char *out) {
   const Surface &s = b.surface;
-  // N x_p takes many points: where it does, it is formed once for all the triangles around a surfel
+  // N x_p may involve many points; then it is computed once for all triangles around a surfel
   const double *const formed = s.identity() ? nullptr : search(b).x;
   const auto x = [&](uint32_t i) {
     return formed ? load3(formed + 4 * size_t{i}) : surfel_vector(b, b.p.x, i);

@@ -42,7 +42,7 @@ void check_max_time(double seconds) {
     fail(DFM_E_ARG, "max_time is %g s; give the wall time that a step may take, or 0 for no limit", seconds);
 }
 
-// A text or buffer that the caller sizes first.
+// A text or buffer whose size the caller queries first.
 void give_bytes(const void *data, size_t size, void *to, size_t *bytes) {
   need(bytes, "bytes");
   const size_t room = *bytes;
@@ -53,7 +53,7 @@ void give_bytes(const void *data, size_t size, void *to, size_t *bytes) {
   std::memcpy(to, data, size);
 }
 
-// Positions are looked at where it could matter: up to a kilometer away.
+// Positions are checked only up to a kilometer away, where it could matter.
 double shortest_step(const World &w, double dt) {
   double reach = 1;
   if (dt < 1e3 * kShortestStep)
@@ -66,7 +66,7 @@ const ContactMethod &method_of(int32_t number) {
   switch (number) {
     case DFM_METHOD_AUTO:
     case DFM_METHOD_VELOCITY:
-    case DFM_METHOD_IMPLICIT: return velocity_method();  // by what bodies answer: another operator
+    case DFM_METHOD_IMPLICIT: return velocity_method();  // with another response operator
     case DFM_METHOD_ROLLBACK: return rollback::method();
   }
   fail(DFM_E_UNSUPPORTED,
@@ -75,7 +75,7 @@ const ContactMethod &method_of(int32_t number) {
        number);
 }
 
-// Contact takes the operator of the integrator: with another one bodies at rest stand where they should not.
+// Contact uses the operator of the integrator: with another one bodies would rest at wrong positions.
 void choose_integrator(World &w) {
   const dfm_world_def &d = w.def;
   if (d.integrator < DFM_INTEGRATOR_AUTO || d.integrator > DFM_INTEGRATOR_TR_BDF2)
@@ -110,7 +110,7 @@ void choose_integrator(World &w) {
   w.implicit.tasks = &w.context->tasks;
 }
 
-// What the list leaves out of the world itself; bodies and laws follow as they come.
+// What the list of effects leaves out of the world itself; bodies and laws follow when they are created.
 void select_effects(World &w) {
   w.selection = Selection(w.def.effects, w.context->registry);
   const bool unguarded = w.def.flags & DFM_WORLD_UNGUARDED;
@@ -302,7 +302,7 @@ dfm_status dfm_world_set_budget(dfm_world world, double max_time, uint64_t max_w
 }
 
 dfm_status dfm_world_interrupt(dfm_world world) {
-  // no look into the table: a signal may have come inside it
+  // does not use the handle table: a signal may have interrupted it
   if (uint8_t(world >> 32) != uint8_t(Kind::world))
     return as_status([&] {
       fail(DFM_E_HANDLE,
@@ -321,7 +321,7 @@ dfm_status dfm_world_stable_step(dfm_world world, double *dt, dfm_body *body, ui
     World &w = whole(exclusive(world_of(world)));
     need(dt, "dt");
     prepare(w);
-    // The bound that the next step uses: asked anew only when it would ask, so that reading it
+    // The bound that the next step uses, recomputed only when the step would recompute it, so that reading it
     // changes no result.
     if (bound_due(w)) update_bound(w);
     *dt = offered_step(w.sizes, w.bound.step);

@@ -1,4 +1,4 @@
-// A surfel moves with the tetrahedron that it lies in: its barycentric coordinates at rest are its weights.
+// A surfel moves with the tetrahedron that contains it: its barycentric coordinates at rest are its weights.
 // They reproduce linear fields, also outside the cell, where they extrapolate.
 #include <limits>
 
@@ -34,7 +34,7 @@ Array<RestBox> cell_boxes(const Memory &memory, const CouplingInput &in, const L
         b.hi[a] = std::max(b.hi[a], x[a]);
       }
     }
-    // what kInside calls inside may stand out by that share of the cell
+    // points accepted by kInside may be outside by that share of the cell
     const Vec3 size = b.hi - b.lo;
     const double more = 4 * kInside * std::max({size.x, size.y, size.z});
     b.lo -= {more, more, more};
@@ -121,7 +121,7 @@ void append_row(Coupling &out, RowEntry *entries, size_t n) {
                             [&](const RowEntry &e) { return std::fabs(e.weight) <= kNothing * largest; }) -
              entries);
   std::sort(entries, entries + n, [](const RowEntry &a, const RowEntry &b) { return a.col < b.col; });
-  // Added up in the order in which gather_surface() adds, the last one completes the sum.
+  // Summed in the order of gather_surface(); the last weight completes the sum.
   double before = 0;
   for (size_t i = 0; i + 1 < n; ++i) before += entries[i].weight;
   entries[n - 1].weight = 1 - before;

@@ -1,5 +1,4 @@
-// How the surfels of a surface of its own hang on the phyxels: one sparse matrix N in rest
-// positions, precomputed.
+// The coupling of a separate surface to the phyxels: a sparse matrix N, computed once from rest positions.
 #pragma once
 #include <cstdint>
 
@@ -17,7 +16,7 @@ struct Coupling {
   double farthest = 0;  // m, distance of the farthest such surfel from its cell
 };
 
-// What couplings are made from, all at rest, m.
+// Input of couplings, all at rest, m.
 struct CouplingInput {
   uint32_t npoint = 0, ntet = 0, nsurfel = 0;
   const double *point = nullptr;   // [npoint,3]

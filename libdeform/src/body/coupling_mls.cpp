@@ -1,4 +1,4 @@
-// A surfel takes the motion of the phyxels that reach it, each carried on to the surfel by its own gradient
+// A surfel takes the motion of the phyxels that reach it, each extrapolated to the surfel by its gradient
 // (Zerbato 2010, (3.9), with the corrections of doc/concepts/couplings.md):
 //
 //   u_s = sum_i W_i (u_i + H_i (X_s - X_i)),   W_i = w(|X_s - X_i|, h_i) / sum,
@@ -15,7 +15,7 @@
 namespace dfm {
 namespace {
 
-constexpr uint32_t kNeighbours = 10;  // whose mean distance is the unit of the support
+constexpr uint32_t kNeighbours = 10;  // their mean distance is the unit of the support
 // det(A / trace A) below this: the neighbors lie in a plane (1/27 for a sphere of them)
 constexpr double kFlat = 1e-10;
 
@@ -128,7 +128,7 @@ class Cloud {
   }
 };
 
-// Neighbourhoods of the phyxels that reach a surfel, made when first met.
+// Neighborhoods of the phyxels that reach a surfel, computed at first use.
 class Neighbourhoods {
  public:
   Neighbourhoods(const Memory &memory, const Cloud &cloud)
@@ -136,7 +136,7 @@ class Neighbourhoods {
         known_(cloud.support.size(), Known{}, HookAllocator<Known>(memory)),
         neighbor_(HookAllocator<uint32_t>(memory)),
         list_(HookAllocator<uint32_t>(memory)) {}
-  // state 0 not looked at, 1 spans space, 2 flat
+  // state 0 not computed, 1 spans space, 2 flat
   struct Known {
     size_t begin = 0, end = 0;
     Symmetric inverse;
@@ -166,7 +166,7 @@ class Neighbourhoods {
   Array<uint32_t> neighbor_, list_;
 };
 
-// One row by scattering into a dense column, with the list of what was touched.
+// One row, by scattering into a dense column with a list of its nonzero entries.
 class RowBuilder {
  public:
   RowBuilder(const Memory &memory, uint32_t npoint)
@@ -200,9 +200,9 @@ class RowBuilder {
   Array<RowEntry> row_;
 };
 
-// Rounding in A^-1 of a flat neighborhood grows with its condition: the row is given back the linear fields
-// that it lost, by the least change relative to |w_j|:  w_j += |w_j| p_j . M^-1 (p_s - sum w p),  p = (1, X -
-// X_s),  M = sum |w| p p^T.
+// Rounding in A^-1 of a flat neighborhood grows with its condition number: linear fields are restored in the
+// row by the smallest change relative to |w_j|: w_j += |w_j| p_j . M^-1 (p_s - sum w p), p = (1, X - X_s), M
+// = sum |w| p p^T.
 void restore_linear(const Array<Vec3> &point, Vec3 x, Array<RowEntry> &row) {
   double extent2 = 0;
   for (const RowEntry &e : row) extent2 = std::max(extent2, norm2(point[e.col] - x));
@@ -223,7 +223,7 @@ void restore_linear(const Array<Vec3> &point, Vec3 x, Array<RowEntry> &row) {
     for (int b = 0; b <= a; ++b) {
       double s = m[a][b];
       for (int k = 0; k < b; ++k) s -= m[a][k] * m[b][k];
-      if (a == b && !(s > 1e-14 * m[0][0])) return;  // all but flat: what the row has is as good as it gets
+      if (a == b && !(s > 1e-14 * m[0][0])) return;  // nearly flat: the row cannot be improved
       m[a][b] = a == b ? std::sqrt(s) : s / m[b][b];
     }
     for (int k = 0; k < a; ++k) r[a] -= m[a][k] * r[k];
@@ -239,8 +239,8 @@ void restore_linear(const Array<Vec3> &point, Vec3 x, Array<RowEntry> &row) {
   }
 }
 
-// One row for each surfel from the phyxels that reach it, but for those that stand back, by `row`; where none
-// does, the row of its cell.
+// One row for each surfel, by `row`, from the phyxels that reach it and are not excluded; if there is none,
+// the row of its cell.
 template <class StandsBack, class Row>
 Coupling couple_by_reach(const Memory &memory, const CouplingInput &in, const Cloud &cloud,
                          const StandsBack &stands_back, const Row &row) {
@@ -270,8 +270,7 @@ Coupling couple_mls(const Memory &memory, const CouplingInput &in) {
   const Cloud cloud(memory, in);
   const Array<Vec3> &point = cloud.rest.point;
   Neighbourhoods near(memory, cloud);
-  // A phyxel whose neighbors lie in a plane has no gradient to give: it stands back where others
-  // reach the surfel.
+  // A phyxel whose neighbors are in a plane has no gradient: it is excluded if others reach the surfel.
   const auto stands_back = [&](uint32_t i) { return near.of(i).state == 2; };
   return couple_by_reach(
       memory, in, cloud, stands_back,

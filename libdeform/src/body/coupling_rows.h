@@ -1,5 +1,5 @@
-// What the couplings share: positions about a local origin, the cell that holds a point, and rows
-// that sum to one.
+// Shared by the couplings: positions about a local origin, the cell that contains a point, rows that sum to
+// one.
 #pragma once
 #include <optional>
 
@@ -13,8 +13,8 @@ struct RowEntry {
   double weight;
 };
 
-// Positions about the first point: differences of neighbors are exact there, so that a body far from the
-// world's origin gets the weights that it would have at home.
+// Positions relative to the first point: differences of neighbors are exact, so the weights do not depend on
+// the distance from the origin of the world.
 struct LocalRest {
   Array<Vec3> point, surfel;
   LocalRest(const Memory &memory, const CouplingInput &in);
@@ -27,7 +27,7 @@ void tet_weights(Vec3 x, const Vec3 c[4], double w[4]);
 class RestCells {
  public:
   RestCells(const Memory &memory, const CouplingInput &in, const LocalRest &rest);
-  // The lowest cell that holds x (away 0), else the nearest one (away: how far it is, m; may be null).
+  // The lowest cell that contains x (away 0), else the nearest one (away: its distance, m; may be null).
   uint32_t find(Vec3 x, double *away = nullptr) const;
   // The row of a surfel at x, from the cell that find() gives; returns away.
   double row(Vec3 x, RowEntry out[4]) const;
@@ -43,8 +43,8 @@ class RestCells {
 // sum lacks of one.
 void append_row(Coupling &out, RowEntry *entries, size_t n);
 Coupling empty_coupling(const Memory &memory, uint32_t nsurfel);
-// Where nothing else determines a row: the cell's, counted in out.outside. Makes the finder
-// when first needed.
+// The row of the nearest cell, if nothing else determines it; counted in out.outside. Makes the finder at
+// first use.
 void append_cell_row(const Memory &memory, const CouplingInput &in, const LocalRest &rest, uint32_t surfel,
                      std::optional<RestCells> &cells, Coupling &out);
 

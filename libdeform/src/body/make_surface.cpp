@@ -1,4 +1,5 @@
-// Topology of a surface is found by sorting, never by hashing, so that numbers depend on the input alone.
+// The topology of a surface is found by sorting and not by hashing, so that numbers depend on the input
+// alone.
 #include "body/make_surface.h"
 
 #include <algorithm>
@@ -164,8 +165,8 @@ void wear_coupling(Coupling &&coupling, Surface &surface) {
 }
 
 void gather_rows(Surface &surface, const double *x, const double *v, uint32_t begin, uint32_t end) {
-  // Half a point: sums of whole ones (32 bytes) are kept in memory by gcc 12 where the machine's vectors are
-  // 16, at ten times the cost. The same operations on each component at every width; the fourth stays zero.
+  // Half a point: with vectors of 16 bytes, gcc 12 keeps sums of whole points (32 bytes) in memory at ten
+  // times the cost. Every width performs the same operations on each component; the fourth stays zero.
   using Half = double __attribute__((vector_size(16)));
   Half *const xs = reinterpret_cast<Half *>(surface.x.data());
   Half *const vs = reinterpret_cast<Half *>(surface.v.data());
@@ -195,11 +196,11 @@ void gather_rows(Surface &surface, const double *x, const double *v, uint32_t be
 
 namespace {
 
-constexpr double kTilt = 1e-3;   // share of the trace by which planes that are nearly one are told apart
-constexpr double kFarthest = 3;  // how many times as far as the planes a surfel goes
+constexpr double kTilt = 1e-3;   // share of the trace; distinguishes nearly parallel planes
+constexpr double kFarthest = 3;  // limit on the motion of a surfel relative to that of the planes
 
-// Each surfel of laid faces goes to where their planes have gone back by `back`: by w with n.w = -back for
-// each of them, in the mean square, and the shortest such w.
+// Each surfel of coincident faces moves to where their planes are set back by `back`: by the shortest w with
+// n.w = -back for each of them, in the least-squares sense.
 void set_back(Surface &s) {
   const auto at = [&](uint32_t i) { return load3(&s.x[4 * size_t{i}]); };
   s.sums.assign(kBackSums * s.laid_surfel.size(), 0.0);

@@ -1,5 +1,5 @@
-// Builds a body's surface from its triangles, and renews positions and velocities of its surfels
-// from the phyxels.
+// Builds a body's surface from its triangles, and updates positions and velocities of its surfels from the
+// phyxels.
 #pragma once
 #include <cstdint>
 
@@ -18,8 +18,8 @@ namespace dfm {
 void make_surface(const Memory &memory, uint32_t npoint, const double *rest, const uint32_t *boundary_tris,
                   uint32_t ntri, Surface &out);
 
-// Makes `surface`, built on its own points (all of them used, so that surfel s is point s), hang on phyxels.
-// x becomes N times them at the next gather.
+// Couples `surface`, built on its own points (all of them used, so that surfel s is point s), to phyxels. The
+// next gather computes x as N times the phyxels.
 void wear_coupling(Coupling &&coupling, Surface &surface);
 
 // x_s = N x_p and v_s = N v_p. x and v are [npoint,4], aligned to 32 bytes; v null: x alone. Terms of a row

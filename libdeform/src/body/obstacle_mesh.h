@@ -1,5 +1,5 @@
-// A triangle mesh that the host moves and that feels nothing: a Surface whose positions and velocities come
-// from a pose and whose nodes have no dof, so that detection treats it like a body's.
+// A triangle mesh with prescribed motion: a Surface whose positions and velocities come from a pose and whose
+// nodes have no degrees of freedom, so that detection treats it like the surface of a body.
 #pragma once
 #include <cstdint>
 
@@ -10,11 +10,11 @@
 namespace dfm {
 
 struct ObstacleMesh {
-  // x and v: world, as last placed. Features that can never be met first are owned by no triangle
+  // x and v: world frame, as last placed. Features that can never touch first are owned by no triangle
   Surface surface;
   Array<double> local;  // [nsurfel,3] m, in the obstacle's frame
   double extent = 0;    // m, farthest point from the frame's origin
-  bool closed = false;  // every edge has two triangles that agree
+  bool closed = false;  // every edge has two consistently oriented triangles
   Vec3 position;        // of the last place()
   Quat rotation;
   bool moving = false;  // v is not zero
@@ -22,7 +22,7 @@ struct ObstacleMesh {
   // points [npoint,3], tris [ntri,3] counter-clockwise seen from outside.
   ObstacleMesh(const Memory &memory, uint32_t npoint, const double *points, uint32_t ntri,
                const uint32_t *tris);
-  // Pose at the start of a sub-step and the rates over it. Costs nothing while nothing moves.
+  // Sets the pose at the start of a sub-step and the rates over it. Costs nothing without motion.
   void place(Vec3 position, Quat rotation, Vec3 velocity, Vec3 spin);
 };
 

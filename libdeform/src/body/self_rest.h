@@ -1,5 +1,5 @@
-// A surface as it is at rest, for judging whether two parts of it that are near have come near, or
-// have always been.
+// The rest shape of a surface, to decide whether two near parts of it have come near or have always been
+// near.
 #pragma once
 #include <algorithm>
 
@@ -8,8 +8,8 @@
 
 namespace dfm {
 
-// What the surface of a body with open faces (mesh/cut_mesh.h) touches across them, though it lies on itself
-// there at rest. All empty where no face is open.
+// Contact across the open faces (mesh/cut_mesh.h) of a cut body, where the surface coincides with itself at
+// rest. All lists are empty if no face is open.
 struct OpenedSurface {
   Array<uint32_t> origin;  // [nsurfel] point of the whole body: copies of a point have one number
   Array<uint32_t> twin;    // [ntri] triangle on the other side of the open face, or kNone
@@ -18,7 +18,7 @@ struct OpenedSurface {
   Array<uint32_t> begin, near, point;
 
   bool any() const { return !origin.empty(); }
-  // Are two surfels joined by two edges of cells at most?
+  // Whether two surfels are connected by at most two edges of cells.
   bool joined(uint32_t a, uint32_t b) const {
     if (a == b) return true;
     const auto first = near.begin() + begin[a], last = near.begin() + begin[a + 1];
@@ -36,11 +36,11 @@ struct SelfRest {
   Vec3 at(uint32_t surfel) const { return load3(&x[4 * size_t{surfel}]); }
 };
 
-// of d_c: what is nearer at rest lies on itself there, and has no side
+// of d_c: parts that are nearer at rest coincide and have no side
 inline constexpr double kClosedAtRest = 1e-2;
 
-// Two features of one surface: surfel and triangle that does not have it, or two edges without a common end,
-// the lower one first.
+// Two features of one surface: a surfel and a triangle without it, or two edges without a common end, the
+// lower one first.
 struct SelfPair { uint32_t a, b; };
 
 }  // namespace dfm

@@ -6,7 +6,7 @@
 namespace dfm {
 namespace {
 
-// Twice the vector area of a triangle as it now lies.
+// Twice the present vector area of a triangle.
 Vec3 area_normal(const Surface &s, uint32_t t) {
   const uint32_t *const c = &s.tri[size_t{3} * t];
   const Vec3 a = load3(&s.x[size_t{4} * c[0]]);
@@ -47,7 +47,7 @@ uint32_t zone_of(const Surface &s, const Array<uint32_t> &of, uint8_t type, uint
     return facing_zone(s, of, {s.fan.data() + s.fan_begin[feature], s.fan.data() + s.fan_begin[feature + 1]},
                        outward);
   uint32_t side[2] = {s.edge_tri[size_t{2} * feature], s.edge_tri[size_t{2} * feature + 1]};
-  if (side[0] > side[1]) std::swap(side[0], side[1]);  // kNone, where the edge is open, comes last
+  if (side[0] > side[1]) std::swap(side[0], side[1]);  // kNone (open edge) comes last
   return facing_zone(s, of, {side, side[1] == kNone ? size_t{1} : size_t{2}}, outward);
 }
 

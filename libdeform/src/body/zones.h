@@ -1,5 +1,5 @@
-// Zones of a body's surface: triangles of one group and one material. What friction by group and by material
-// of a cell is decided from.
+// Zones of a body's surface: triangles of one group and one material. They decide friction by group and by
+// material.
 #pragma once
 #include <cstdint>
 #include <string>

@@ -12,10 +12,10 @@
 namespace dfm {
 namespace {
 
-constexpr double kRounding = 1 + 1e-9;  // margins hold in spite of rounded distances
+constexpr double kRounding = 1 + 1e-9;  // margins hold despite rounded distances
 constexpr double kSkinLeast = 0.02;     // of the median edge: a resting body keeps its lists
 constexpr double kSkinMost = 0.5;       // beyond half an edge, lists grow faster than they last
-// speeds may rise by so much before the margin of the reach is used up
+// factor by which speeds may increase before the margin of the reach is used up
 constexpr double kSpeedGrowth = 1.25;
 
 double obstacle_speed(const ObstacleView &o, double extent) {
@@ -31,7 +31,7 @@ double obstacle_displacement(const ObstacleView &now, const ObstacleView &then, 
   return norm(now.position - then.position) + 2 * extent * std::sqrt(dx * dx + dy * dy + dz * dz + dw * dw);
 }
 
-// Shape, size and belt are an obstacle's own; a new one under an old id has other lists.
+// Compares shape, size and belt: a new obstacle under an old id needs new lists.
 bool same_shape(const ObstacleView &a, const ObstacleView &b) {
   return a.shape == b.shape && a.surface == b.surface && a.grid == b.grid && a.slot == b.slot &&
          a.category == b.category && a.collides_with == b.collides_with && a.radius == b.radius &&
@@ -49,7 +49,7 @@ struct Features {  // corners of a surface as listed
   Vec3 edge(uint32_t e, int k) const { return point(surface.edge[2 * size_t{e} + k]); }
 };
 
-constexpr size_t kLook = 2000;  // surfels that are worth a block of their own
+constexpr size_t kLook = 2000;  // surfels per block of work
 
 // f(i) for all i < n on the threads of tasks. An exception must not leave a worker.
 template <class F>
@@ -143,7 +143,7 @@ void BroadPhase::renew(std::span<const BodyView> bodies, std::span<const Obstacl
   bound_bodies();
   for (size_t o = 0; o < things_.size(); ++o) {
     Thing &t = things_[o];
-    // A plane's share is taken over the sphere around the bodies, which has just changed.
+    // The displacement of a plane is measured over the sphere around the bodies, which has just changed.
     if (!t.dirty && t.view.shape == Shape::plane) t.dirty = !holds(t, obstacles[o], h, offset);
     if (t.dirty) renew_thing(t, obstacles[o], h, offset);
   }
@@ -163,7 +163,7 @@ void BroadPhase::renew(std::span<const BodyView> bodies, std::span<const Obstacl
   }
 }
 
-// Brings bodies_ and things_ in line with the views; what is new, gone or changed in kind loses its lists.
+// Matches bodies_ and things_ to the views; new, removed or changed things lose their lists.
 void BroadPhase::match(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
                        const PairFilter &filter) {
   bool same = bodies.size() == bodies_.size() && obstacles.size() == things_.size() &&
@@ -224,7 +224,7 @@ bool BroadPhase::find_dirty(std::span<const BodyView> bodies, std::span<const Ob
   return any;
 }
 
-// times: how often the obstacle's way of the sub-step is to be covered.
+// times: how many times the obstacle's displacement of the sub-step is covered.
 bool BroadPhase::holds(const Thing &thing, const ObstacleView &now, double h, double offset,
                        double times) const {
   const ObstacleView &then = thing.view;
@@ -242,7 +242,7 @@ bool BroadPhase::holds(const Thing &thing, const ObstacleView &now, double h, do
   return kRounding * (moved + offset + times * h * obstacle_speed(now, extent)) <= thing.margin;
 }
 
-// Brings the side's copy and tree up to date with its surface; false where that is not finite.
+// Updates the copy and tree of a side; returns false if its surface is not finite.
 bool BroadPhase::renew_tree(Side &side) {
   const Surface &s = *side.surface;
   side.usable = s.ntri > 0 && finite_positions(s);
@@ -292,8 +292,7 @@ void BroadPhase::bound_bodies() {
   radius_ = 0.5 * norm(hi - lo);
 }
 
-// Pairs of which neither side has changed keep their runs; the others are listed again. Bodies are
-// swept along x.
+// Pairs without a changed side keep their runs; the others are listed again. Bodies are swept along x.
 void BroadPhase::find_pairs(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
                             const PairFilter &filter, Tasks *tasks) {
   fresh_.clear();
@@ -440,8 +439,8 @@ bool BroadPhase::list_voxels(const Body &a, const Thing &thing, Found &found) co
   return true;
 }
 
-// Edges and triangles count only where a surfel alone would let the obstacle through: edges at a round shape
-// or at a box's edges, triangles at a round shape or at a box's corners.
+// Edges and triangles are listed only where surfels alone would let the obstacle through: edges at a round
+// shape or at the edges of a box, triangles at a round shape or at the corners of a box.
 bool BroadPhase::list_obstacle(const Body &a, const Thing &thing, Found &found) const {
   const ObstacleShape shape(thing.view);
   const Features fa{*a.surface, a.x.data()};

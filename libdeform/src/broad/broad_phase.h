@@ -1,12 +1,12 @@
-// Which features may touch: lists of pairs with a skin around them, so that most sub-steps only check that
-// the lists still hold.
+// Lists of feature pairs that may touch, with a skin, so that most sub-steps only check that the lists are
+// still valid.
 //
 // Every body and obstacle keeps the shape it had when its lists were made, and a margin m. Its share is
 // respected while
 //     displacement since then + d_c + 2 h speed <= m,
 // and two features whose boxes were further apart than m_a + m_b (+ recovery depth) cannot be within the
-// reach of a contact then. Lists hold a superset of the contacts and narrow/ decides by the geometry of the
-// sub-step alone, so results never depend on when lists were made.
+// reach of a contact then. Lists contain a superset of the contacts, and narrow/ decides by the geometry of
+// the sub-step alone, so results never depend on when lists were built.
 //
 // On several threads bodies are looked at one by one, and pairs are listed in parts, a part of one surface
 // with all of the other, each into memory of its own. Lists are sorted, so parts do not show in them.
@@ -28,18 +28,18 @@ class BroadPhase {
  public:
   explicit BroadPhase(const Memory &memory);
 
-  // Renews what is out of date; true if candidates() changed. h in s; offset d_c in m. Views may
+  // Updates what is out of date; returns true if candidates() changed. h in s; offset d_c in m. Views may
   // come in any order. tasks: null: on this thread alone.
   bool update(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
               const PairFilter &filter, double h, double offset, Tasks *tasks = nullptr);
 
-  // The same lists, made anew where they do not cover the way that the sub-step takes after its solve:
-  // speed[i] bounds that of the surfels of body i; the obstacles' views hold theirs.
-  // After update(), on the same views.
+  // The same lists, rebuilt if they do not cover the motion of the sub-step after its solve: speed[i] bounds
+  // that of the surfels of body i; the views of obstacles contain theirs. After update(), on the same views.
   bool cover(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
              const PairFilter &filter, double h, double offset, std::span<const double> speed,
              Tasks *tasks = nullptr);
-  // f(triangle of a, triangle of b) for pairs that may meet now; slots of bodies, or of a mesh obstacle.
+  // Calls f(triangle of a, triangle of b) for pairs that may meet now; slots of bodies, or of a mesh
+  // obstacle.
   template <class F>
   void near_triangles_of(uint32_t slot_a, uint32_t slot_b, bool obstacle, F &&f) {
     const Side *a = nullptr, *b = nullptr;
@@ -57,21 +57,21 @@ class BroadPhase {
   // In the order that find_contacts expects: (id a, body before obstacle, id b, kind, feature a, feature b).
   const Array<Candidate> &candidates() const { return candidates_; }
 
-  // m/s, largest of view i's surfels, at the last update().
+  // m/s, largest speed of the surfels of view i at the last update().
   double speed(size_t i) const { return bodies_[i].speed; }
 
-  // The skin is made to last for about this many sub-steps of the present motion. Results do
-  // not depend on it.
+  // The skin is chosen to last for about this many sub-steps of the present motion. Results do not depend on
+  // it.
   void set_skin_steps(double steps) { skin_steps_ = steps; }
-  // Forgets all lists (after a change that update() cannot see). Results do not depend on it.
+  // Drops all lists (after a change that update() cannot detect). Results do not depend on it.
   void clear();
 
   struct Stats {
     uint64_t updates = 0;   // calls
-    uint64_t renewals = 0;  // calls that made lists anew
-    uint64_t refits = 0;    // trees whose boxes were renewed
+    uint64_t renewals = 0;  // calls that rebuilt lists
+    uint64_t refits = 0;    // trees whose boxes were refitted
     uint64_t rebuilds = 0;  // trees built from nothing
-    uint64_t pairs = 0;     // body pairs and body-obstacle pairs with lists, now
+    uint64_t pairs = 0;     // present body pairs and body-obstacle pairs with lists
   };
   const Stats &stats() const { return stats_; }
 
@@ -81,9 +81,9 @@ class BroadPhase {
     double margin = -1;  // negative: no lists yet
     // since the lists were made, at the last update(); largest at that time
     double moved = 0, speed = 0;
-    double expected = 0;                // speed that cover() asks the lists to hold for
+    double expected = 0;                // speed that cover() requires of the lists
     bool dirty = true, usable = false;  // usable: all positions finite
-    bool asleep = false;                // at the last update: nothing has moved if it still is
+    bool asleep = false;                // at the last update; unchanged positions if it still sleeps
     uint32_t refits = 0, rebuilds = 0;  // of the tree, not in stats_ yet
     BoxTree tree;
     Array<double> x;  // [nsurfel,4] when the lists were made
@@ -103,7 +103,7 @@ class BroadPhase {
     uint32_t a, b;  // indices of the views
     uint32_t begin, count;
     uint8_t obstacle, kind;
-    bool fresh;  // lies in fresh_, not in candidates_
+    bool fresh;  // is in fresh_, not in candidates_
   };
 
   struct Pair {

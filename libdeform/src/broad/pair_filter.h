@@ -1,4 +1,4 @@
-// Which two things may touch: category masks, and rules for named pairs that outrank them.
+// Which pairs may touch: category masks, and rules for named pairs, which take precedence.
 #pragma once
 #include <algorithm>
 #include <cstdint>
@@ -16,7 +16,7 @@ struct PairRule {
 
 struct PairFilter {
   Array<PairRule> rules;  // sorted by (a, obstacle, b); changed through set()
-  uint64_t version = 0;   // rises with every change, so that lists built under older rules are renewed
+  uint64_t version = 0;   // increases with every change, so that lists built with older rules are rebuilt
 
   PairFilter() = default;
   explicit PairFilter(const Memory &memory) : rules(HookAllocator<PairRule>(memory)) {}

@@ -6,7 +6,7 @@
 namespace dfm {
 namespace {
 
-// Sums over points r about their mean and vectors d: what the best rigid field theta x r + mean takes of d.
+// Sums over points r about their mean and vectors d, for the rigid field theta x r + mean that fits d best.
 struct Fit { Vec3 mean, theta; };
 template <class Point, class Vector>
 Fit fit(uint32_t n, Point r, Vector d) {
@@ -66,7 +66,7 @@ DeformingMotion deforming_motion(const Surface &s, double h) {
   const auto v = [&](uint32_t i) { return load3(&s.v[4 * size_t{i}]); };
   Fit f = fit(s.nsurfel, place, v);
   if (!(4 * h * norm(f.theta) < 1)) f.theta = {};
-  Vec3 sum;  // the mean of what the turn leaves
+  Vec3 sum;  // the mean of the remainder after rotation
   for (uint32_t i = 0; i < s.nsurfel; ++i) sum += v(i) - cross(f.theta, place(i));
   const Vec3 mean = (1.0 / s.nsurfel) * sum;
   double most = 0;

@@ -1,4 +1,4 @@
-// How a surface has moved, and moves, beyond a rigid motion: only that brings parts of it together.
+// The non-rigid part of the motion of a surface: only this part can bring parts of the surface together.
 #pragma once
 #include "core/memory.h"
 #include "geometry/surface.h"
@@ -18,7 +18,7 @@ class RigidReference {
  private:
   Array<double> x_;  // [nsurfel,4]
   Vec3 center_;      // of x_
-  Quat turn_;        // that fitted best at the last look
+  Quat turn_;        // best fit at the last call
 };
 
 // rad/s; m/s, largest beyond the rigid motion that fits best

@@ -10,7 +10,7 @@ namespace dfm {
 namespace {
 
 constexpr double kSkinLeast = 0.02;  // of the median edge
-// wider than this, every surfel would list the triangles of the second ring around it
+// if wider, every surfel would list the triangles of the second ring around it
 constexpr double kSkinMost = 0.2;
 constexpr double kSpeedGrowth = 1.25;
 
@@ -54,7 +54,7 @@ bool SelfList::cover(double h, double offset, double change) {
 
 void SelfList::renew(double h, double offset, double change) {
   const Surface &s = surface_;
-  margin_ = -1;  // until the lists are whole: a refused allocation leaves none that anyone believes
+  margin_ = -1;  // until the lists are complete: a failed allocation leaves invalid lists
   at_.set(s);
   longest_ = longest_edge(s);
   moved_ = 0;

@@ -18,16 +18,15 @@ class SelfList {
  public:
   SelfList(const Memory &memory, const Surface &surface);
 
-  // Renews what is out of date; true if the lists changed. h in s; offset d_c in m. Results never depend on
-  // when lists were made.
+  // Updates what is out of date; returns true if the lists changed. h in s; offset d_c in m. Results never
+  // depend on when lists were built.
   bool update(double h, double offset);
-  // After update(), at the same positions: the same lists, made anew where they do not cover the way
-  // that the sub-step takes after its solve. change: m/s, by how much the solve has changed the velocity
-  // of any surfel.
+  // After update(), at the same positions: the same lists, rebuilt if they do not cover the motion of the
+  // sub-step after its solve. change: m/s, largest change of a surfel's velocity by the solve.
   bool cover(double h, double offset, double change);
   // m/s: no surfel was faster than that at the last update(), beyond the rigid motion that fits best.
   double deforming() const { return motion_.speed; }
-  // How often the lists were made.
+  // How often the lists were built.
   uint64_t renewals() const { return renewals_; }
   // f(triangle, triangle) for pairs whose boxes may meet now; each pair once.
   template <class F>
@@ -40,8 +39,8 @@ class SelfList {
   const Array<SelfPair> &edge_edge() const { return ee_; }
   // m: every pair that is nearer than this now is listed. After update(), at the same positions.
   double covered() const { return limit_ - kDistanceRounding * 2 * moved_; }
-  // Wide: at the next renewal the skin is as wide as it ever is, whatever the motion; for a body that waits
-  // to touch itself, whose list is not gone through.
+  // Wide: the next rebuild uses the widest skin, independent of the motion; for a body that may touch itself
+  // later, whose list is not traversed.
   void set_wide(bool wide) { wide_ = wide; }
   // The skin is made to last for about this many sub-steps of the present motion.
   void set_skin_steps(double steps) { skin_steps_ = steps; }
@@ -57,7 +56,7 @@ class SelfList {
   BoxTree tree_;
   RigidReference at_;               // when the lists were made
   double longest_ = 0, moved_ = 0;  // m, edge of that time; what displaced() said at the last update()
-  double limit_ = 0;                // m, that the lists were made with
+  double limit_ = 0;                // m, with which the lists were built
   bool wide_ = false;
   DeformingMotion motion_;
   uint64_t renewals_ = 0;

@@ -22,9 +22,9 @@
 // would have to pass through d = 0 first. (A surface that crosses itself at the start is led back where a
 // feature is less than r deep in a triangle: d < r.)
 //
-// The answer is a function of positions, velocities and h. What is kept from look to look only saves work:
-// most sub-steps compare one number with the slack of all pairs at the last look, which falls by no more than
-// the surfels have moved against each other since.
+// The result is a function of positions, velocities and h. The data kept between calls only save work: most
+// sub-steps compare one number with the slack of all pairs at the last full check, which decreases by no more
+// than the relative motion of the surfels since.
 #pragma once
 #include <cmath>
 #include <functional>
@@ -35,7 +35,7 @@ namespace dfm {
 
 class SelfWatch {
  public:
-  // The list is the body's own: it is brought up to date where the slack does not answer.
+  // The list belongs to the body and is updated if the slack does not decide.
   SelfWatch(const Memory &memory, const Surface &surface, const SelfRest &rest, SelfList &list);
   // speed: m/s, no surfel is faster; infinite: not known.
   bool near(double h, double offset, double speed);
@@ -55,7 +55,7 @@ class SelfWatch {
   SelfList &list_;
   std::function<Vec3(uint32_t)> now_;  // velocity of a surfel before the solve
   // m, least d - max(l, min(r, 0.6 D)) of all pairs at the last look that found none near, and d_c then;
-  // negative: no such look
+  // negative: no such check
   double slack_ = -1, offset_ = 0;
   // of this sub-step: m, of that slack; m/s, no surfel is faster, or than the first one
   double left_ = -1, speed_ = -1;
@@ -64,7 +64,7 @@ class SelfWatch {
   double way_ = 0;
   // m, D of the listed pairs, vertex_face() first; `way_` up to which a pair has slack
   Array<double> apart_, safe_;
-  uint64_t renewals_ = 0;  // of the list that apart_ is of
+  uint64_t renewals_ = 0;  // of the list to which apart_ belongs
 };
 
 }  // namespace dfm

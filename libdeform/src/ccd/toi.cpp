@@ -1,6 +1,6 @@
-// Brings a query to the form that the finders work on. Only differences between the two features enter, in an
-// order that their coordinates decide, times a power of two: so the answer's bits do not depend on how the
-// caller numbers vertices, on where the origin is, or on the unit of length.
+// Converts a query to the form that the finders use. It contains only differences between the two features,
+// in an order decided by their coordinates, times a power of two. So the bits of the result do not depend on
+// the caller's numbering of vertices, the origin, or the unit of length.
 #include "ccd/toi.h"
 
 #include <cstring>
@@ -136,7 +136,7 @@ toi::Answer solve(const Query &query, int method) {
   return method == DFM_TOI_CONSERVATIVE ? toi::conservative(query) : toi::by_roots(query, method);
 }
 
-// Builds the query of a point and a triangle; order: which of the caller's vertices stands where.
+// Builds the query of a point and a triangle; order: permutation of the caller's vertices.
 Builder build(const dfm_motion &p, const dfm_motion tri[3], int order[3]) {
   const auto sort2 = [&](int i, int j) {
     if (before(tri[order[j]], tri[order[i]])) std::swap(order[i], order[j]);

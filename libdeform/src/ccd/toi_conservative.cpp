@@ -112,8 +112,7 @@ class Advance {
     return true;
   }
 
-  // Moves on further than the fixed plane would allow, aiming at the touch as the distance's
-  // slope foretells it.
+  // Advances further than the fixed plane allows, to the contact time predicted by the slope of the distance.
   bool turning_plane(Separation &s, double &t, double fixed, double &stride) {
     const double slope = dot(s.normal, q_.at(1, s.u, s.v) - q_.at(t, s.u, s.v)) / (1 - t);
     const double aim = 0.5 * (safe_ + stop_);

@@ -1,9 +1,9 @@
-// Distance of a flat patch to the origin. The nearest point comes from the interior or from an edge that the
-// origin's foot lies beyond. What the caller may rely on are the bounds, not the way there: any point of the
-// patch bounds the distance from above, any unit vector n with min n . w[k] > 0 from below.
+// Distance of a flat patch to the origin. The nearest point is in the interior or on an edge beyond which the
+// foot of the origin lies. Callers rely on the bounds only: any point of the patch bounds the distance from
+// above, any unit vector n with min n . w[k] > 0 from below.
 //
-// Close to a touch the vector to the nearest point is all rounding, so normals are taken from the features:
-// across the patch, across an edge.
+// Near contact the vector to the nearest point is mostly rounding error, so normals are computed from the
+// features: across the patch, across an edge.
 #include <algorithm>
 
 #include "ccd/toi_query.h"
@@ -11,7 +11,7 @@
 namespace dfm::toi {
 namespace {
 
-// Less of the distance proven than this fraction: other normals are tried as well.
+// If a smaller fraction of the distance is proven, other normals are tried too.
 constexpr double kProven = 0.9;
 // A cubic that is nowhere larger than that many times its error is computed again, sharper.
 constexpr double kBlurred = 0x1p32;
@@ -76,8 +76,8 @@ void offer_side(Separation &s, const Patch &patch, int k) {
   offer_normal(s, patch, point - (dot(point, e) / ee) * e);
 }
 
-// The foot of the origin from the best point so far instead of from a corner: what a sliver's small area
-// spoils is then the small rest alone.
+// Computes the foot of the origin from the best point so far instead of from a corner: the small area of a
+// sliver then affects only the small remainder.
 void offer_foot(Separation &s, const Patch &patch, Vec3 across) {
   const double area2 = norm2(across);
   if (!(area2 > 0)) return;
@@ -101,7 +101,7 @@ Vec3 level(const Patch &patch, Vec3 across) {
   return ee > 0 ? across - (dot(across, longest) / ee) * longest : across;
 }
 
-// Everything there is: for slivers and points next to the border of two features' regions.
+// Tries all normals: for slivers, and for points near the border between the regions of two features.
 void offer_all(Separation &s, const Patch &patch, Vec3 across) {
   const Vec3 normal = level(patch, across);
   offer_normal(s, patch, normal);

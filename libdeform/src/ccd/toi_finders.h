@@ -31,9 +31,9 @@ double bisection(const F &f, Bracket b, double width, int max_iterations, uint32
 }
 
 // (4.9) keeps one end for ever on a convex function; halving the value kept (Illinois, Dowell and Jarratt
-// 1971) makes it super-linear. The end that approaches the root tells nothing of the other one, so at the
-// last the other end is fetched with a step of half the width over the root. Made for smooth functions: over
-// a kink it crawls to the cap.
+// 1971) makes it super-linear. The end that approaches the root gives no information on the other one, so
+// finally the other end is moved by a step of half the width over the root. Meant for smooth functions: at a
+// kink it converges slowly, up to the cap.
 template <class F>
 double regula_falsi(const F &f, Bracket b, double width, int max_iterations, uint32_t &evaluations) {
   int kept = 0;  // the end that stayed last time: -1 lo, 1 hi

@@ -17,10 +17,10 @@ namespace {
 using narrow::Features;
 using narrow::PairMotion;
 
-constexpr double kRounding = 1 + 1e-6;  // bounds hold in spite of rounding; nothing next to the margin
+constexpr double kRounding = 1 + 1e-6;  // bounds hold despite rounding; negligible relative to the margin
 
-// What stays above this never trips: whether a pair is asked about does not change the answer, whatever is
-// known of it from before.
+// A pair that stays above this never triggers, so skipping it does not change the result, whatever is known
+// from before.
 double clear_of(const GuardScene &scene) {
   return kRounding * (scene.floor + 2 * narrow::kSharp * scene.margin);
 }
@@ -45,7 +45,7 @@ Vec3 apart(const Features &f) {
   return x[0] - c.weight[0] * x[1] - c.weight[1] * x[2] - c.weight[2] * x[3];
 }
 
-// Candidates that are worth a block of their own, most of which end at the first comparison.
+// Candidates per block; most end at the first comparison.
 constexpr uint32_t kBlock = 192;
 constexpr uint32_t kTogether = 4;  // pieces of a block: most runs are short
 
@@ -65,7 +65,7 @@ class NearPairs {
   }
 
  private:
-  // The height along any direction is a lower bound of the distance, so what is found for the start is kept.
+  // The height along any direction is a lower bound of the distance, so the value for the start is kept.
   void look(uint32_t i, double way, double now) {
     Features f(*a_, *b_, list_[i]);
     double *const known = &memory_.normal[3 * size_t{i}], &rest = memory_.rest[i];
@@ -291,7 +291,7 @@ void near_in_blocks(GuardScene &scene, const Array<Candidate> &list, GuardMemory
           try {
             Near<true>(scene, list, memory, blocks.near[k]).look(memory.runs[p.run], p.begin, p.end);
           } catch (const std::bad_alloc &) {
-            failed = true;  // an exception must not leave a worker
+            failed = true;  // exceptions must not leave a worker
           }
         }
       });

@@ -1,12 +1,12 @@
-// What the guard asks of detection: which of the listed feature pairs come as near as the floor d_g on the
-// way from the start to the end of a sub-step, and how far all of them may safely go. Conservative, on the
-// real motion (after the contact solve): vertex-face and edge-edge between bodies, of one body, and against
-// meshes; closed-form shapes and voxels in their own frames.
+// Detection for the guard: which of the listed feature pairs come nearer than the floor d_g between the start
+// and the end of a sub-step, and how far all of them may safely move. Conservative, on the real motion (after
+// the contact solve): vertex-face and edge-edge between bodies, within one body, and against meshes;
+// closed-form shapes and voxels in their own frames.
 //
-// A pair trips the guard only if its distance reaches d_g itself. The margin then decides where the motion
-// stops: at d_g + margin, an absolute distance, since one that is relative to the gap trips on every first
-// touch. A pair that starts nearer than twice the margin stops half way to the floor, so it always moves; one
-// that starts at or below the floor may rise, or come down to half of the distance that it has.
+// A pair triggers the guard only if its distance reaches d_g itself. The margin then decides where the motion
+// stops: at d_g + margin, an absolute distance, since a distance relative to the gap would trigger at every
+// first contact. A pair that starts nearer than twice the margin stops halfway to the floor, so it always
+// moves; one that starts at or below the floor may separate, or approach to half of its distance.
 #pragma once
 #include <cstdint>
 #include <span>
@@ -28,14 +28,14 @@ struct GuardHit {
   double at[3];  // at t: weights of the triangle's corners, or places on edge a and edge b
 };
 
-// Where an obstacle's pose stands at the end of the sub-step.
+// The pose of an obstacle at the end of the sub-step.
 struct GuardPose {
   Vec3 position;
   Quat rotation;
 };
 
-// One surface and where its surfels end. Few surfels are near anything, so ends are found when they are
-// first asked for.
+// One surface and the end positions of its surfels. Few surfels are near anything, so ends are computed at
+// first use.
 struct GuardSide {
   const Surface *surface = nullptr;
   bool still = false;
@@ -70,11 +70,11 @@ struct GuardScene {
     return &s.end[4 * size_t{surfel}];
   }
   void find_end(GuardSide &s, uint32_t surfel);
-  Vec3 end_of(const GuardSide &s, uint32_t surfel) const;  // the same, kept nowhere
+  Vec3 end_of(const GuardSide &s, uint32_t surfel) const;  // the same, without storing it
 };
 
-// What is known of the listed pairs; saves work and changes nothing. Holds as long as d_c and the bodies
-// stand; what two lists share is carried over.
+// Data on the listed pairs that save work and do not change results. Valid as long as d_c and the bodies are
+// the same; pairs that two lists share are carried over.
 struct GuardMemory {
   struct Run {  // of the list: one pair of sides, one kind
     uint32_t begin, end, slot_a, slot_b;
@@ -100,7 +100,7 @@ struct GuardMemory {
   void carry_over(Run &run, uint32_t from);  // place in old_runs, or kNone
 };
 
-// The list cut into blocks that workers take, and what each has found. Cuts depend on the list alone.
+// The list divided into blocks for workers, and their results. The division depends on the list alone.
 struct GuardBlocks {
   struct Piece { uint32_t run, begin, end; };  // of the list, within a run
   Array<Piece> pieces;

@@ -1,5 +1,4 @@
-// The straight motion of two features, and the judgment of the guard on it. Shared by the parts of
-// ccd/toi_guard.
+// The straight motion of two features, and the decision of the guard. Shared by the parts of ccd/toi_guard.
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -12,8 +11,8 @@
 namespace dfm::narrow {
 
 constexpr double kSharp = 1e-3;  // share of the margin to which hit times are found
-// of the way to the floor that a pair which starts within the margin may go; of its distance, one
-// below the floor
+// share of the distance to the floor that a pair which starts within the margin may move; share of its
+// distance for one below the floor
 constexpr double kShare = 0.5;
 
 // kind 0: a surfel, 1: an edge, 2: a triangle.
@@ -43,7 +42,7 @@ struct Features {
   void find_ends(GuardScene &scene) {
     for (int k = 0; k < 4; ++k) end[k] = scene.end(*side[k >= split], surfel(k));
   }
-  // On several threads: the sides keep no ends that two would write.
+  // On several threads: the sides do not store ends, which two threads could write.
   void find_ends(const GuardScene &scene, double own[4][4]) {
     for (int k = 0; k < 4; ++k) {
       store3(own[k], scene.end_of(*side[k >= split], surfel(k)));
@@ -91,8 +90,8 @@ struct PairMotion {
     return (edges ? distance_edge_edge(m, m + 2, t) : distance_point_triangle(m[0], m + 1, t)) - round;
   }
 
-  // The plane of the triangle, or along both edges, as it stands at the start, keeps them apart up to the
-  // end: heights over it change linearly.
+  // The plane of the triangle (or along both edges) at the start separates them up to the end: heights over
+  // it change linearly.
   bool plane_apart(double floor) const {
     const int split = edges ? 2 : 1;
     Vec3 from[4], to[4];
@@ -111,8 +110,7 @@ struct PairMotion {
     return least > 0 && least * least > grown * grown * norm2(n);
   }
 
-  // The boxes of the two swept features, grown by the floor, do not meet: nearly all pairs of a
-  // list end here.
+  // The boxes of the two swept features, grown by the floor, do not overlap: nearly all pairs end here.
   bool far_apart(double floor) const {
     const int split = edges ? 2 : 1;
     for (int i = 0; i < 3; ++i) {

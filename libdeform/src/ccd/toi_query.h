@@ -1,10 +1,10 @@
-// What all time-of-impact finders share: a query brought to one form, the distance of its features, the
+// Shared by all time-of-impact finders: the query in a common form, the distance of its features, the
 // coplanarity cubic.
 //
-// Both kinds of query ask when the origin first lies in a moving flat patch: corners w[k](t) are differences
-// of a vertex of one feature and a vertex of the other, for a point and a triangle {p - a, p - b, p - c}, for
-// two edges the parallelogram {a0-b0, a1-b0, a1-b1, a0-b1}. The features are as far apart as the patch is
-// from the origin.
+// Both kinds of query find the first time at which the origin is in a moving flat patch: corners w[k](t) are
+// differences of a vertex of one feature and a vertex of the other, for a point and a triangle {p - a, p - b,
+// p - c}, for two edges the parallelogram {a0-b0, a1-b0, a1-b1, a0-b1}. The features are as far apart as the
+// patch is from the origin.
 #pragma once
 #include <cstdint>
 
@@ -45,7 +45,7 @@ struct Answer {
   uint32_t evaluations = 0;
 };
 
-// Distance of the patch to the origin, between two bounds that hold whatever happened in the computation of
+// Distance of the patch to the origin, between two bounds that are valid for any error in the computation of
 // the nearest point.
 struct Separation {
   // all of the patch lies beyond the plane normal . x = lower (below 0: no such plane was found)
@@ -61,7 +61,7 @@ struct Coplanarity {
   Poly f;
   double error;       // bound of the rounding of coefficients and values
   double normal_max;  // bound of |e1 x e2| over [0,1]
-  bool vanishes;      // all that is known of f is that it is nearly zero
+  bool vanishes;      // f is zero within its error
 };
 Coplanarity coplanarity(const Query &query);
 // The same in pairs of doubles, ten times slower.

@@ -18,8 +18,8 @@ namespace {
 
 constexpr double kPolyRound = 0x1p-44;  // rounding of a polynomial's values, in sizes of its coefficients
 
-constexpr double kSharp = 1e-10;     // in t: roots less certain than that are sharpened
-constexpr double kSharpenBy = 1e-8;  // in t: no step further than that
+constexpr double kSharp = 1e-10;     // in t: roots with a larger uncertainty are refined
+constexpr double kSharpenBy = 1e-8;  // in t: limit of a refinement step
 
 struct VectorPoly { Poly x, y, z; };
 VectorPoly path(Vec3 at0, Vec3 at1) {
@@ -42,7 +42,7 @@ class Roots {
       touch_ = q_.separation + 4 * kRound;
       if (touches(0)) return answer_;
     }
-    // as far as the features may move while t is uncertain
+    // motion of the features within the uncertainty of t
     touch_ = q_.separation + 8 * q_.tolerance + 4 * kRound;
     if (contacts && !plane_.vanishes && in_order()) return answer_;
     if (contacts) contact();
@@ -206,7 +206,7 @@ class Roots {
     }
   }
 
-  // at most 6 + 4 sides x (3 quadratics x 4 + 3 lines x 2) = 78 are there
+  // there are at most 6 + 4 sides x (3 quadratics x 4 + 3 lines x 2) = 78
   static constexpr int kMaxTimes = 128;
   const Query &q_;
   const int method_;

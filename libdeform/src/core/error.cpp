@@ -10,7 +10,7 @@ namespace {
 thread_local char last_sentence[1024];
 thread_local uint64_t said = 0;
 
-// Appends bytes as long as they and the closing zero fit.
+// Appends bytes as long as they and the terminating zero fit.
 class Line {
  public:
   Line(char *out, size_t capacity) : out_(out), left_(capacity - 1) {}
@@ -30,7 +30,7 @@ class Line {
   size_t left_;
 };
 
-// Bytes of the UTF-8 character at `s`; 0: it is none.
+// Number of bytes of the UTF-8 character at `s`; 0 if it is not valid.
 size_t character(const unsigned char *s) {
   const size_t n = s[0] < 0x80                   ? 1
                    : s[0] >= 0xc2 && s[0] < 0xe0 ? 2
@@ -38,7 +38,7 @@ size_t character(const unsigned char *s) {
                    : s[0] >= 0xf0 && s[0] < 0xf5 ? 4
                                                  : 0;
   for (size_t i = 1; i < n; ++i)
-    if ((s[i] & 0xc0) != 0x80) return 0;  // the closing zero too
+    if ((s[i] & 0xc0) != 0x80) return 0;  // also ends at the terminating zero
   return n;
 }
 
@@ -97,7 +97,7 @@ void printable(const char *text, char *out, size_t capacity) noexcept {
 
 void set_last_error(const char *sentence) noexcept {
   char text[sizeof last_sentence];
-  printable(sentence, text, sizeof text);  // by way of a copy: the sentence may be a part of the last one
+  printable(sentence, text, sizeof text);  // copied first: the sentence may be part of the previous one
   std::memcpy(last_sentence, text, sizeof text);
   ++said;
 }

@@ -25,8 +25,7 @@ const char *kind_of(mode_t mode) {
 }  // namespace
 
 InputFile::InputFile(const std::string &path, const char *expected) : path_(path) {
-  // Without O_NONBLOCK opening a pipe that nobody writes would wait for ever. Whoever names standard input
-  // wants to wait for it.
+  // Without O_NONBLOCK, opening a pipe without a writer would block forever. Standard input may block.
   const bool standard = path == "/dev/stdin";
   descriptor_ = standard ? fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 0)
                          : open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
@@ -67,7 +66,8 @@ Array<char> read_whole_file(const Memory &memory, const std::string &path, uint6
          static_cast<unsigned long long>(limit / (small ? 1024 : kMiB)), small ? "KiB" : "MiB", expected);
   };
   if (file.bytes() > limit) too_large();
-  // What the system claims may be too little (pipes, files that grow): pieces are read until the end.
+  // The size that the system reports may be too small (pipes, growing files), so pieces are read until the
+  // end.
   Array<char> bytes{HookAllocator<char>(memory)};
   size_t piece = size_t(file.bytes()) + 1;
   for (;;) {
@@ -82,8 +82,8 @@ Array<char> read_whole_file(const Memory &memory, const std::string &path, uint6
   }
 }
 
-// A file without a name in the folder of `path`, which a process that is killed does not leave behind; -1
-// where the file system has none.
+// Opens an unnamed file in the folder of `path`, which disappears if the process is killed; -1 if the file
+// system does not support that.
 int AtomicFile::open_beside() {
   const size_t slash = path_.rfind('/');
   const std::string folder = slash == std::string::npos ? "." : path_.substr(0, slash + 1);
@@ -108,7 +108,7 @@ AtomicFile::AtomicFile(const std::string &path) : path_(path) {
     kind_ = Kind::device;
     if (S_ISDIR(status.st_mode) || S_ISBLK(status.st_mode))
       fail(DFM_E_IO, "%s: is %s; give the name of a file to write", path.c_str(), kind_of(status.st_mode));
-    // a pipe that nobody reads is refused, and not waited for
+    // a pipe without a reader is an error; the call does not wait
     fd = open(path.c_str(), O_WRONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
     if (fd >= 0) fcntl(fd, F_SETFL, fcntl(fd, F_GETFL) & ~O_NONBLOCK);
   } else {

@@ -1,5 +1,5 @@
-// Whole files in and out: bounded reading, and writing that leaves either the old file or the
-// complete new one.
+// Reading of whole files up to a limit, and atomic writing: either the old file or the complete new one
+// remains.
 #pragma once
 #include <cstdint>
 #include <cstdio>
@@ -9,8 +9,8 @@
 
 namespace dfm {
 
-// Opens for reading what is a regular file, without waiting for the writer of a pipe. Throws Error(DFM_E_IO).
-// `expected` ends the sentence.
+// Opens a regular file for reading; does not wait for the writer of a pipe. Throws Error(DFM_E_IO), whose
+// sentence ends with `expected`.
 class InputFile {
  public:
   InputFile(const std::string &path, const char *expected);
@@ -18,8 +18,8 @@ class InputFile {
   InputFile(const InputFile &) = delete;
   InputFile &operator=(const InputFile &) = delete;
   int descriptor() const { return descriptor_; }
-  uint64_t bytes() const { return bytes_; }  // that the system claims; 0 for standard input
-  size_t read(char *to, size_t n);           // fewer than n at the end only
+  uint64_t bytes() const { return bytes_; }  // as the system reports; 0 for standard input
+  size_t read(char *to, size_t n);           // returns fewer than n bytes only at the end
 
  private:
   std::string path_;
@@ -27,19 +27,19 @@ class InputFile {
   uint64_t bytes_ = 0;
 };
 
-// The bytes of a regular file, or of standard input where `path` is /dev/stdin: at most `limit`, which is
-// checked before anything is allocated. `expected` says what kind of file is wanted, with its article. Throws
-// Error: DFM_E_IO, DFM_E_FORMAT where there are more bytes than that.
+// Returns the bytes of a regular file, or of standard input if `path` is /dev/stdin: at most `limit`, checked
+// before anything is allocated. `expected` is the kind of file that is expected, with its article. Throws
+// Error: DFM_E_IO, or DFM_E_FORMAT if the file is longer than `limit`.
 Array<char> read_whole_file(const Memory &memory, const std::string &path, uint64_t limit,
                             const char *expected);
 
 inline constexpr uint64_t kMiB = uint64_t(1) << 20;
-// 1e8 tetrahedra in binary, the most that a mesh may have
+// 1e8 tetrahedra in binary, the largest mesh that is allowed
 inline constexpr uint64_t kMaxMeshBytes = 4096 * kMiB;
 
-// Writes beside `path`; commit() renames. Without commit, and where the process is killed, nothing stays
-// behind on file systems that know files without a name; elsewhere a killed process leaves a file
-// PATH.partPID-N. A link at `path` is replaced and not followed; a device or pipe is written to as it stands.
+// Writes to a temporary file next to `path`; commit() renames it. Without commit(), or if the process is
+// killed, nothing remains on file systems with unnamed files; elsewhere a killed process leaves a file
+// PATH.partPID-N. A symbolic link at `path` is replaced, not followed; a device or pipe is written directly.
 class AtomicFile {
  public:
   explicit AtomicFile(const std::string &path);

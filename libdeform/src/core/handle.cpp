@@ -23,7 +23,7 @@ struct Table {
 };
 
 Table &table() {
-  static Table *const t = new Table;  // never destroyed: handles may be asked about during exit
+  static Table *const t = new Table;  // never destroyed: handles may be used during exit
   return *t;
 }
 
@@ -43,12 +43,12 @@ const char *kind_name(Kind kind) {
   return "object";
 }
 
-// With its article.
+// Name of a kind, with its article.
 std::string a_kind(Kind kind) {
   return std::string(kind == Kind::obstacle || kind == Kind::none ? "an " : "a ") + kind_name(kind);
 }
 
-// The slot that the handle names, or an empty one for a null, stale or made-up handle.
+// The slot of the handle; an empty one for a null, stale or invalid handle.
 Slot slot_of(uint64_t handle) noexcept {
   const uint32_t index = static_cast<uint32_t>(handle);
   if (index == 0) return {};

@@ -1,5 +1,5 @@
-// The process-wide table behind all handles: {generation:24, kind:8, index+1:32}. A slot's generation rises
-// when its object goes, so an old handle no longer matches; kinds are checked too.
+// The process-wide table behind all handles: {generation:24, kind:8, index+1:32}. The generation of a slot
+// increases when its object is destroyed, so old handles no longer match. Kinds are checked too.
 #pragma once
 #include <cstdint>
 #include <memory>
@@ -16,7 +16,7 @@ enum class Kind : uint8_t {
   scene = 6,
   tetmesh = 7,
   trimesh = 8,
-  // 9: DFM_HANDLE_RIGID, in handles an obstacle
+  // 9: DFM_HANDLE_RIGID; its handles have kind obstacle
   tool = 10
 };
 
@@ -24,11 +24,11 @@ enum class Kind : uint8_t {
 uint64_t handle_create(Kind kind, void *object);
 // The object, or nullptr for a null, stale or wrong-kind handle. Thread-safe.
 void *handle_find(Kind kind, uint64_t handle) noexcept;
-// Kind of the object, or none for a null, stale or made-up handle. Thread-safe.
+// Kind of the object, or none for a null, stale or invalid handle. Thread-safe.
 Kind handle_kind(uint64_t handle) noexcept;
 void handle_destroy(uint64_t handle) noexcept;
 
-// Throws Error(DFM_E_HANDLE) with a sentence that says which kind is wanted and what the handle is instead.
+// Throws Error(DFM_E_HANDLE), which names the expected kind and what the handle is instead.
 void *handle_require(Kind kind, uint64_t handle);
 template <class T>
 T &resolve(Kind kind, uint64_t handle) {

@@ -16,7 +16,7 @@ namespace {
 uint64_t memory_of_machine() {
   const long pages = sysconf(_SC_PHYS_PAGES), page = sysconf(_SC_PAGESIZE);
   uint64_t most = pages > 0 && page > 0 ? uint64_t(pages) * uint64_t(page) : UINT64_MAX;
-  // A container's own limit; the file holds "max" where there is none.
+  // The limit of the process's control group; the file contains "max" if there is none.
   const std::unique_ptr<FILE, int (*)(FILE *)> file(std::fopen("/sys/fs/cgroup/memory.max", "re"),
                                                     std::fclose);
   unsigned long long limit = 0;
@@ -25,11 +25,11 @@ uint64_t memory_of_machine() {
   return most;
 }
 
-// A page of x86-64 that spares walks through 512 small ones.
+// Size of a huge page on x86-64 (512 small pages).
 constexpr size_t kHugePage = size_t(2) << 20;
 
-// A step of a large body reads tens of arrays side by side, more than the processor keeps addresses of small
-// pages for: large arrays ask for huge pages where the system gives them to who asks.
+// A step of a large body reads tens of arrays at the same time and exceeds the processor's buffer of page
+// addresses. Large arrays therefore request huge pages, if the system grants them on request.
 void *allocate(size_t bytes, size_t align) {
   if (bytes == 0) bytes = align;
   if (bytes < kHugePage || align > kHugePage)
@@ -37,7 +37,7 @@ void *allocate(size_t bytes, size_t align) {
   void *p = nullptr;
   if (posix_memalign(&p, kHugePage, bytes) != 0) return nullptr;
 #ifdef MADV_HUGEPAGE
-  madvise(p, bytes / kHugePage * kHugePage, MADV_HUGEPAGE);  // only a wish
+  madvise(p, bytes / kHugePage * kHugePage, MADV_HUGEPAGE);  // advice only; a failure has no effect
 #endif
   return p;
 }

@@ -1,5 +1,5 @@
-// Memory of a context: every array of ours is allocated through the host's hooks, so that a host can count,
-// pool or refuse it.
+// Memory of a context: every array of the library is allocated through the host's hooks, so that a host can
+// count, pool or refuse allocations.
 #pragma once
 #include <atomic>
 #include <cstddef>
@@ -16,7 +16,7 @@ struct Memory {
   static const Memory &standard();  // aligned malloc and free
 };
 
-// Memory that counts what is taken through it and not given back. Outlives what is taken.
+// Memory that counts the bytes allocated through it and not yet freed. Must outlive these allocations.
 class Meter {
  public:
   explicit Meter(const Memory &under) : under_(under), memory_{this, take, give_back} {}
@@ -42,8 +42,8 @@ class Meter {
   std::atomic<uint64_t> bytes_{0};
 };
 
-// Throws Error(DFM_E_NOMEM) where work that is about to begin would need more memory than the machine, or the
-// group of processes, may ever have.
+// Throws Error(DFM_E_NOMEM) if a computation that is about to start needs more memory than the machine has,
+// or the control group allows.
 void need_memory(uint64_t bytes, const char *what);
 
 // Allocator of std::vector over Memory; 64-byte alignment so that kernels may load whole vectors.
@@ -66,7 +66,7 @@ struct HookAllocator {
   bool operator==(const HookAllocator<U> &other) const {
     return memory == other.memory;
   }
-  // Containers move between worlds of one context only, so allocators travel with their content.
+  // Containers move only between worlds of one context, so allocators move with the content.
   using propagate_on_container_move_assignment = std::true_type;
   using propagate_on_container_swap = std::true_type;
 };
@@ -74,7 +74,7 @@ struct HookAllocator {
 template <class T>
 using Array = std::vector<T, HookAllocator<T>>;
 
-// Empties arrays and has them allocate from m from now on.
+// Empties arrays; they allocate from m from now on.
 template <class... T>
 void use_memory(const Memory &m, Array<T> &...arrays) {
   ((arrays = Array<T>(HookAllocator<T>(m))), ...);

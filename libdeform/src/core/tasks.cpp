@@ -19,7 +19,7 @@ struct Inside {
   ~Inside() { inside_worker = outer; }
 };
 
-// A host's workers do not know that they are ours: each block marks its thread while it runs.
+// A host's worker threads are not marked as workers: each block marks its thread while it runs.
 struct HostTask {
   void (*fn)(void *, uint32_t, uint32_t);
   void *task;
@@ -32,9 +32,9 @@ void run_host_block(void *task, uint32_t begin, uint32_t end) {
 
 }  // namespace
 
-// Waits for `ready` without sleeping, until `most` has passed: to wake a thread takes 50 microseconds, as
-// long as the work of a small body. After a first moment it yields: threads that share its core go on.
-// False: not ready yet, sleep.
+// Waits for `ready` without sleeping, until `most` has passed: waking a thread takes 50 microseconds, as long
+// as the work of a small body. After a short time it yields, so that other threads of its core can run.
+// Returns false if it is not ready yet; then sleep.
 template <class Ready, class Most>
 bool spin(Ready ready, Most most) {
   using Clock = std::chrono::steady_clock;
@@ -56,27 +56,28 @@ bool spin(Ready ready, Most most) {
 
 constexpr std::chrono::microseconds kWithinStep{2000}, kBetweenSteps{200}, kCrowded{2};
 
-// Blocks of `grain` lie in as many runs as there are threads. Each thread takes those of its own run, in job
-// after job the same bodies, which its core still has in its cache; then what is left of the others'. Only
-// workers that have entered a job are waited for: one that sleeps, or whose core does something else, costs
-// its help and nothing more. So that it does not sleep, a worker spins between the jobs of a step.
+// Blocks of `grain` are divided into one run per thread. Each thread first takes the blocks of its own run
+// (in each job the same bodies, which are still in the cache of its core), then blocks that are left in other
+// runs. The owner waits only for workers that have entered the job: a worker that sleeps, or whose core is
+// busy, does not delay it. Between the jobs of a step workers spin so that they do not fall asleep.
 struct Tasks::Pool {
   static constexpr uint64_t kOpen = uint64_t{1} << 31, kInside = kOpen - 1;
   static constexpr int kNumber = 32;  // bits below a job's number
 
-  std::mutex taken;  // held by the thread whose job runs: worlds of one context may step on several threads
+  // held by the thread that owns the job: worlds of one context may step on several threads
+  std::mutex taken;
   std::mutex mutex;
   std::condition_variable start, done;
   std::vector<std::thread> workers;
-  // number of the job, may it be entered, workers inside; what the job is was written before it opened
+  // number of the job, whether it is open, number of workers inside; the job is written before it opens
   std::atomic<uint64_t> gate{0};
   std::atomic<bool> stop{false};
   std::atomic<uint32_t> asleep{0};    // workers in start
   std::atomic<bool> waiting{false};   // the owner is in done
-  std::atomic<uint32_t> stepping{0};  // worlds in a step
-  bool crowded = false;               // more threads than processors: who spins keeps others from working
+  std::atomic<uint32_t> stepping{0};  // number of worlds in a step
+  bool crowded = false;  // more threads than processors: a spinning thread would keep others from working
 
-  struct alignas(64) Run {  // of blocks; a line of the cache for each
+  struct alignas(64) Run {  // of blocks; each has its own cache line
     std::atomic<uint32_t> next{0};
     uint32_t end = 0;
   };
@@ -85,7 +86,7 @@ struct Tasks::Pool {
   void (*fn)(void *, uint32_t, uint32_t) = nullptr;
   void *task = nullptr;
 
-  // Also where a later worker could not be started and the pool never came to be.
+  // Also runs if a worker could not be started and the pool was never complete.
   ~Pool() {
     {
       const std::lock_guard lock(mutex);
@@ -135,7 +136,7 @@ struct Tasks::Pool {
     }
   }
 
-  // Nobody is inside, and the job is written.
+  // No worker is inside, and the job is written.
   void open() {
     const uint32_t blocks = 1 + (n - 1) / grain;
     runs = std::min(blocks, static_cast<uint32_t>(run.size()));
@@ -147,7 +148,7 @@ struct Tasks::Pool {
     const uint32_t sleepers = asleep.load(), all = static_cast<uint32_t>(workers.size());
     const uint32_t wanted = std::min(blocks - 1, all), awake = all - std::min(sleepers, all);
     if (wanted <= awake) return;
-    { const std::lock_guard lock(mutex); }  // who has counted himself in is in start now
+    { const std::lock_guard lock(mutex); }  // a worker that has counted itself is waiting in start now
     for (uint32_t k = awake; k < wanted; ++k) start.notify_one();
   }
 
@@ -192,7 +193,7 @@ void Tasks::run(uint32_t n, uint32_t grain, void (*fn)(void *, uint32_t, uint32_
   }
   Pool &pool = *pool_;
   const std::unique_lock own(pool.taken, std::try_to_lock);
-  if (!own) {  // results do not depend on the cut, so the work is done here rather than waited for
+  if (!own) {  // results do not depend on the division, so this thread does the work instead of waiting
     fn(task, 0, n);
     return;
   }

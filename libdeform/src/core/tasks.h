@@ -1,5 +1,6 @@
-// parallel_for over the host's hook or our own pool. Results must not depend on the cut: work writes to its
-// own lanes, or to partial sums in slot begin/grain that the caller adds in slot order.
+// parallel_for over the host's hook or the library's pool. Results must not depend on the division: each
+// block writes to its own elements, or to a partial sum in slot begin/grain; the caller adds these in slot
+// order.
 #pragma once
 #include <cstdint>
 #include <memory>
@@ -12,15 +13,15 @@ class Tasks {
  public:
   using HostFor = void (*)(void *user, uint32_t n, uint32_t grain, void (*fn)(void *, uint32_t, uint32_t),
                            void *task);
-  // threads: 1 none, 0 one per processor; host_for wins where given
+  // threads: 1 no workers, 0 one per processor. host_for is used instead if given.
   Tasks(uint32_t threads, HostFor host_for, void *host_user);
   ~Tasks();
   uint32_t threads() const { return threads_; }
-  // may run() use more than the caller's thread?
+  // whether run() may use more than the caller's thread
   bool parallel() const { return host_for_ || pool_; }
 
-  // fn(begin, end) over [0,n), cut at multiples of grain; blocks. A call from inside a worker runs serially
-  // in the caller.
+  // Calls fn(begin, end) over [0,n), divided at multiples of grain, and waits for the end. A call from a
+  // worker runs serially in that worker.
   void run(uint32_t n, uint32_t grain, void (*fn)(void *, uint32_t, uint32_t), void *task);
   template <class F>
   void parallel_for(uint32_t n, uint32_t grain, F &&f) {
@@ -29,7 +30,7 @@ class Tasks {
         &f);
   }
 
-  // While one stands workers that have had a job stay awake for the next one.
+  // While an object of this type exists, workers that have had a job stay awake for the next one.
   class Step {
    public:
     explicit Step(Tasks &tasks);

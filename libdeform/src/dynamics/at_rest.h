@@ -1,4 +1,4 @@
-// What a model does with a body that stands still.
+// Forces and stiffness of a model for a body at rest.
 #pragma once
 #include "body/phyxels.h"
 #include "dynamics/model.h"
@@ -6,9 +6,10 @@
 namespace dfm {
 
 inline constexpr double kForever = 1e9;  // s: longer than any relaxation
-// Up to so many points a factorization beats conjugate gradients on a matrix without the mass of a step.
+// Up to this number of points a factorization is faster than conjugate gradients on a matrix without the mass
+// term of a step.
 inline constexpr uint32_t kFactoredAtRest = 30000;
-// Of the largest stiffness times coordinate: what forces are rounded by.
+// Rounding of forces, relative to the largest product of stiffness and coordinate.
 inline constexpr double kForceRounding = 8 * 2.220446049250313e-16;
 
 class AtRest {
@@ -17,10 +18,10 @@ class AtRest {
 
   // In a step of dt seconds at the present positions, velocities zero.
   dfm_kin kin(double time, double dt = kForever) const;
-  // The model's forces added to points().f. False: the model cannot.
+  // Adds the forces of the model to points().f. Returns false if the model fails.
   bool add_forces(double time, double dt = kForever);
-  // What relaxes or flows has done so: the model's next state in a time without end. False: there is none, or
-  // the model cannot.
+  // Sets the state of the model to its limit after infinite time (relaxed, flowed). Returns false if there is
+  // no limit, or the model fails.
   bool relax(double time);
 
  private:

@@ -27,7 +27,7 @@ dfm_kin Dynamics::kin(double time, double h, bool trial) const {
   return k;
 }
 
-// From the points' mean velocities [npoint,4]; without contact the surfels have surface.v.
+// From the mean velocities of the points [npoint,4]; without contact surface.v holds those of the surfels.
 void Dynamics::bound_surfel_ends(const double *mean, double &speed, double &change) const {
   double fastest = 0, most = 0;
   for (uint32_t s = 0; s < surface_.nsurfel; ++s) {

@@ -9,9 +9,9 @@
 namespace dfm {
 namespace {
 
-constexpr uint32_t kCuts = 12;  // of a correction that leads too far
-// Share of its own diagonal that a matrix gets which is singular, at first; a hundred times as much where
-// that is not enough.
+constexpr uint32_t kCuts = 12;  // halvings of a correction that is too long
+// Share of its diagonal that is first added to a singular matrix; a hundred times as much if that is not
+// enough.
 constexpr double kLeastRegular = 1e-9, kMostRegular = 1e-1;
 
 }  // namespace
@@ -33,7 +33,7 @@ Equilibrium::Equilibrium(const Memory &memory, Phyxels &points, ModelInstance &m
   solver_->analyse(stiffness_.pattern());
 }
 
-// What is not balanced at the present positions, and the largest load or reaction.
+// The unbalanced forces at the present positions, and the largest load or reaction.
 bool Equilibrium::residual(double time, const Loads &loads) {
   loads(p_.f.data());
   scale_ = 0;
@@ -51,7 +51,7 @@ bool Equilibrium::residual(double time, const Loads &loads) {
   return poison == 0;
 }
 
-// Blocks of A are in place; adds a share of the diagonal, holds what is held, and factors.
+// The blocks of A are set; adds a share of the diagonal, applies the held components, and factors.
 bool Equilibrium::factor(double share) {
   stiffness_.each_own([&](uint32_t, double *block) {
     const double mean = (block[0] + block[4] + block[8]) / 3;
@@ -94,7 +94,7 @@ double Equilibrium::left() const {
   return most;
 }
 
-// Along the way, to where the residual is known again.
+// Moves along the correction, and computes the residual there.
 bool Equilibrium::search(double time, const Loads &loads) {
   return search_line(
       product(residual_, way_), kCuts, [&](double share) { move(share); },
@@ -114,7 +114,7 @@ EquilibriumResult Equilibrium::find(const EquilibriumLimits &limits, double time
     out.left = left();
     out.scale = scale_;
     const bool small = out.left <= std::max(limits.tolerance * scale_, floor_);
-    // one more correction once it is small: forces are balanced long before positions are known
+    // one more correction after the residual is small: forces converge earlier than positions
     if ((small && polished) || (out.left == 0)) break;
     polished = small;
     if (out.iterations == limits.iterations || !linearize(time, softness, free)) return out;

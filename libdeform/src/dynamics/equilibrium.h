@@ -1,5 +1,5 @@
-// Where the points of one body are in equilibrium: f(x) + loads = 0 at all components that are not held, by
-// Newton's method with a line search on the model's stiffness.
+// The equilibrium of the points of one body: f(x) + loads = 0 in all components that are not held, by
+// Newton's method with line search on the stiffness of the model.
 #pragma once
 #include <functional>
 #include <memory>
@@ -18,20 +18,20 @@ struct EquilibriumLimits {
 struct EquilibriumResult {
   bool found = false;
   uint32_t iterations = 0;  // linear solves
-  double left = 0;          // N, the largest component of a force that nothing balances
-  double scale = 0;         // N, the largest component of a load or of a reaction
+  double left = 0;          // N, largest component of an unbalanced force
+  double scale = 0;         // N, largest component of a load or of a reaction
 };
 
 class Equilibrium {
  public:
-  // Throws Error where the model gives no stiffness.
+  // Throws Error if the model has no stiffness.
   Equilibrium(const Memory &memory, Phyxels &points, ModelInstance &model, const ImplicitOptions &options);
 
   // Writes loads at the present positions, weight included, into f [npoint,4] N.
   using Loads = std::function<void(double *f)>;
-  // From the present positions to the equilibrium. softness: [npoint] N/m of what the loads give way, added
-  // to the matrix. free: nothing holds the body, so that its matrix has to be regularized. Where none is
-  // found positions are anywhere; velocities are taken for zero.
+  // Goes from the present positions to the equilibrium. softness: [npoint] N/m, stiffness of the loads, added
+  // to the matrix. free: no point is held, so the matrix must be regularized. If no equilibrium is found,
+  // positions are undefined. Velocities are taken as zero.
   EquilibriumResult find(const EquilibriumLimits &limits, double time, const Loads &loads,
                          const double *softness, bool free);
 
@@ -43,7 +43,7 @@ class Equilibrium {
   double solve_tolerance_;
   AtRest rest_;
   Array<double> residual_, way_;  // [npoint,3] N; m
-  Array<uint8_t> held_;           // as in the factor at hand
+  Array<uint8_t> held_;           // as in the present factor
   double floor_ = 0;              // N, rounding of forces at the present positions
   double scale_ = 0;              // N, the largest load or reaction
   bool factored_ = false;

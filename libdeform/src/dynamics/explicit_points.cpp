@@ -28,7 +28,7 @@ bool ExplicitPoints::bound(double time, const AddRowSums &outside, StepBound &ou
   if (model_.call("bound", ask) != DFM_OK) return false;
   outside(stiffness_.data(), damping_.data());
   out.step = std::min(cell, stable_step(p_, stiffness_.data(), damping_.data(), &out.point));
-  // Of 4 m / (c + sqrt(c^2 + 4 m k)): without damping, without stiffness.
+  // Limits of 4 m / (c + sqrt(c^2 + 4 m k)): without damping, without stiffness.
   if (out.point < p_.n) {
     const double m = p_.mass[out.point];
     out.by_stiffness = 2 * std::sqrt(m / stiffness_[out.point]);

@@ -1,4 +1,4 @@
-// Points that the library moves by symplectic Euler, each by its own mass, under the forces of a model.
+// Points that the library moves by symplectic Euler, each with its own mass, under the forces of a model.
 #pragma once
 #include "dynamics/dynamics.h"
 #include "dynamics/points_kernel.h"

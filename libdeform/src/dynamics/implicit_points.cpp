@@ -14,20 +14,20 @@
 namespace dfm {
 namespace {
 
-// What Newton's method may leave: this share of the largest change of velocity in the sub-step, and what
-// ImplicitOptions say. Contact at rest is solved to 1e-6 m/s. What is left is an error of the first order:
-// where the second is wanted, it has to be small beside that.
+// Tolerance of Newton's method: this share of the largest change of velocity in the sub-step, and that of
+// ImplicitOptions. Contact at rest is solved to 1e-6 m/s. The remaining error is of first order; for a scheme
+// of second order it must be small compared with the error of that order.
 constexpr double kShare = 1e-3, kStagedShare = 1e-6;
-// A correction that does not halve the one before needs a new matrix.
+// If a correction is not at most half of the one before, a new matrix is needed.
 constexpr double kContracts = 0.5;
-// The rest state's factor may fail to do so that often in a sub-step.
+// The factor of the rest state may fail to do so this often in a sub-step.
 constexpr uint32_t kPatience = 4;
-// Corrections of one solve at most, what may be left of `allowed_error` then, and how far above the least
-// correction one may lie before the iteration counts as lost.
+// Largest number of corrections of one solve, the share of `allowed_error` that may remain then, and the
+// ratio to the least correction at which the iteration counts as diverged.
 constexpr uint32_t kRevisions = 20;
 constexpr double kTolerated = 100, kDiverges = 100;
-// An end that moves by more than this times the last correction has new impulses: what earlier corrections
-// have taught does not hold there.
+// An end that moves by more than this times the last correction has new impulses: the history of corrections
+// does not apply there.
 constexpr double kElsewhere = 3;
 // Of effort: forces in the time of a stiffness, and multiplications in that of an entry of a response.
 constexpr double kStiffnessForces = 10, kCopies = 4;
@@ -40,8 +40,8 @@ constexpr double kErrs = 0.005, kGrows = 2;
 // An end is kAhead times what the middle has beyond the start, plus kPart times the derivative there.
 constexpr double kMiddle = 0.585786437626904951, kPart = kMiddle / 2;
 constexpr double kAhead = 1 / (kMiddle * (2 - kMiddle));
-// Of h^3 times the third derivative (Hosea and Shampine 1996, Analysis and implementation of TR-BDF2,
-// section 2).
+// Error coefficient, times h^3 times the third derivative (Hosea and Shampine 1996, Analysis and
+// implementation of TR-BDF2, section 2).
 constexpr double kError = (3 * kMiddle * kMiddle - 4 * kMiddle + 2) / (12 * (2 - kMiddle));
 
 double largest_change(const Array<double> &a, const Array<double> &b) {
@@ -99,7 +99,7 @@ std::unique_ptr<LinearSolver> ImplicitPoints::new_solver() const {
   return solver;
 }
 
-// The scheme is stable at any step. Springs of loads act with what they are at the start of the sub-step.
+// The scheme is stable at any step. The stiffness of load springs is that at the start of the sub-step.
 bool ImplicitPoints::bound(double, const AddRowSums &outside, StepBound &out) {
   springs_.assign(p_.n, 0.0);
   dampers_.assign(p_.n, 0.0);
@@ -108,8 +108,8 @@ bool ImplicitPoints::bound(double, const AddRowSums &outside, StepBound &out) {
   return true;
 }
 
-// The model's forces at the end that the velocities v [npoint,4] lead to, into f. commits: with its next
-// state.
+// Writes the model's forces at the positions that the velocities v [npoint,4] lead to into f. commits: also
+// its next state.
 bool ImplicitPoints::ask(const SubStep &now, const double *v, bool commits) {
   for (size_t j = 0; j < x_.size(); ++j) {
     v_[j] = v[j];
@@ -121,7 +121,7 @@ bool ImplicitPoints::ask(const SubStep &now, const double *v, bool commits) {
   return ask_here(k, stage_.share);
 }
 
-// share: of the way from the loads at the start of the sub-step to those at its end.
+// share: position between the loads at the start of the sub-step (0) and those at its end (1).
 bool ImplicitPoints::ask_here(const dfm_kin &k, double share) {
   effort_ += forces_;
   if (share == 1) std::copy(p_.load.begin(), p_.load.end(), p_.f.begin());
@@ -147,7 +147,8 @@ bool ImplicitPoints::residual_at(const SubStep &now, const double *v, const doub
   return poison == 0;
 }
 
-// The rest state's factor in place of A, turned to where forces were asked last. False: there is none.
+// Uses the factor of the rest state instead of A, rotated to the positions of the last force evaluation.
+// Returns false if there is none.
 bool ImplicitPoints::take_rest() {
   by_rest_ = rest_ && rest_->prepare(stage_.h);
   if (!by_rest_) return false;
@@ -158,7 +159,7 @@ bool ImplicitPoints::take_rest() {
   return true;
 }
 
-// A at the state where forces were asked last.
+// Computes A at the state of the last force evaluation.
 bool ImplicitPoints::linearize(const SubStep &now) {
   const bool known =
       stiffness_.constant() && factor_h_ == stage_.h && held_ == p_.held && factor_params_ == model_.params;
@@ -167,7 +168,7 @@ bool ImplicitPoints::linearize(const SubStep &now) {
   by_rest_ = false;
   try {
     if (!exact_) exact_ = new_solver();
-  } catch (const std::bad_alloc &) {  // on whichever thread this body moves
+  } catch (const std::bad_alloc &) {  // on any thread that moves this body
     return false;
   }
   dfm_kin k = kin(now.time + stage_.elapsed, stage_.elapsed);
@@ -186,7 +187,7 @@ bool ImplicitPoints::linearize(const SubStep &now) {
   });
   Array<double> &blocks = stiffness_.blocks();
   hold_components(stiffness_.pattern(), p_.held.data(), blocks.data());
-  // a matrix that stays may not depend on where the points were when it was made
+  // a constant matrix must not depend on the positions at the time when it was made
   if (stiffness_.constant()) exact_->place(p_.rest.data(), 3);
   else exact_->place(x_.data(), kStride);
   if (!exact_->factor(blocks.data())) return false;
@@ -208,7 +209,7 @@ bool ImplicitPoints::solve(const Array<double> &b, Array<double> &x) {
   return solved;
 }
 
-// What A^-1 says between points; held components answer nothing.
+// The entries of A^-1 between points; zero for held components.
 bool ImplicitPoints::restricted(uint32_t count, const uint32_t *points, double *w) {
   SolveInfo info;
   effort_ += kCopies * 9.0 * count * count;
@@ -225,7 +226,7 @@ bool ImplicitPoints::restricted(uint32_t count, const uint32_t *points, double *
   return true;
 }
 
-// Whether the rest state's factor serves on, where it left that share of what there was.
+// Whether the factor of the rest state is still good enough, if it left this share of the residual.
 bool ImplicitPoints::patient(double left) { return by_rest_ && (left <= kContracts || ++slow_ <= kPatience); }
 
 double ImplicitPoints::allowed_error(const Array<double> &v, double share) const {
@@ -234,7 +235,7 @@ double ImplicitPoints::allowed_error(const Array<double> &v, double share) const
   return options_.rest + share * most;
 }
 
-// From v, whose residual is known, along the way in change_. The residual is then that of the new v.
+// Moves from v, whose residual is known, along change_. The residual is then that of the new v.
 bool ImplicitPoints::search(const SubStep &now, Array<double> &v) {
   return search_line(
       -product(residual_, change_), kCuts, [&](double share) { add(v, share); },
@@ -245,7 +246,7 @@ bool ImplicitPoints::search(const SubStep &now, Array<double> &v) {
       });
 }
 
-// From the velocities at the start of the sub-step.
+// Starts from the velocities at the start of the sub-step.
 bool ImplicitPoints::start(const SubStep &now) {
   stage_ = {now.h, now.h, p_.x.data(), p_.v.data(), 1, now.gravity};
   p_.v_free = p_.v;
@@ -264,10 +265,10 @@ bool ImplicitPoints::take_first_way(const SubStep &now) {
   return true;
 }
 
-// Newton's method. A factorization costs many solves, so that of the rest state serves while the residual
-// falls well, then one of A itself; the combination of the ways it leads to makes good what the matrix is
-// not. v: its start, whose residual is known, and its end. False: forces are not known, or a stage of TR-BDF2
-// is not solved.
+// Newton's method. A factorization costs as much as many solves, so the factor of the rest state is used
+// while the residual decreases fast enough, then a factor of A itself; Anderson acceleration makes up for the
+// inexact matrix. v: start, whose residual is known, and result. Returns false if the model fails, or a stage
+// of TR-BDF2 is not solved.
 bool ImplicitPoints::newton(const SubStep &now, Array<double> &v) {
   ways_.start(change_.size());
   bool fresh = !take_rest();
@@ -301,9 +302,9 @@ bool ImplicitPoints::free_motion(const SubStep &now, double &kinetic) {
   return good;
 }
 
-// False: a stage has no solution that is near enough. Energy would come out of what is left; backward Euler
-// loses it. The end is left in v_end, the mean velocity in v_free: from the velocities at the three times,
-// because a difference of positions would lose digits.
+// Returns false if a stage was not solved accurately enough: the remaining residual could add energy, while
+// backward Euler dissipates it. Writes the end into v_end and the mean velocity into v_free, computed from
+// the velocities at the three times, because a difference of positions would lose digits.
 bool ImplicitPoints::two_stages(const SubStep &now) {
   const double part = kPart * now.h;
   if (!ask_here(kin(now.time, 0), 0)) return false;
@@ -354,7 +355,8 @@ bool ImplicitPoints::solve_way(const Array<double> &r) {
   return true;
 }
 
-// The way in change_ by what the ways before it have taught, where that still leads down.
+// Improves the correction in change_ by the previous corrections (Anderson), if it remains a descent
+// direction.
 void ImplicitPoints::accelerate(const Array<double> &v) {
   for (uint32_t i = 0; i < p_.n; ++i)
     for (uint32_t c = 0; c < 3; ++c) push_[size_t{3} * i + c] = v[size_t{kStride} * i + c];
@@ -435,7 +437,7 @@ Revision ImplicitPoints::revise(const SubStep &now, const double *surfel_impulse
   const bool known = residual_at(now, p_.v_end.data(), push_.data());
   if (known && !solve_way(residual_)) return Revision::failed;
   error_ = known ? largest(change_) : HUGE_VAL;
-  // without forces there is no correction, and with no revision before nothing to go half way back to
+  // without forces there is no correction; without an earlier revision there is no state to return halfway to
   if (!known && !(before > 0 && before < HUGE_VAL)) return Revision::diverged;
   const double allowed = allowed_error(p_.v_end, kShare);
   if (error_ <= allowed || ((last || revisions_ >= kRevisions) && error_ <= kTolerated * allowed)) {
@@ -444,7 +446,7 @@ Revision ImplicitPoints::revise(const SubStep &now, const double *surfel_impulse
     least_error_ = HUGE_VAL;
     return Revision::none;
   }
-  // The error is compared with how far the end has moved, because new impulses move it too.
+  // The error is compared with the displacement of the end, because new impulses move it too.
   const double moved = before > 0 ? largest_change(p_.v_end, before_) : HUGE_VAL;
   if (moved > kElsewhere * corrected_) {
     ways_.start(change_.size());
@@ -454,7 +456,8 @@ Revision ImplicitPoints::revise(const SubStep &now, const double *surfel_impulse
   if (++revisions_ > kRevisions || (error_ > moved && !(error_ <= kDiverges * least_error_)))
     return Revision::diverged;
   least_error_ = std::min(least_error_, error_);
-  // The first correction is tried with the matrix at hand, and so is each that leaves half of what it moved.
+  // The first correction uses the present matrix, and so does each one that follows a correction which halved
+  // the error.
   Array<double> &v = p_.v_free;
   ended_ = false;
   if (error_ <= kContracts * moved || (error_ <= kDiverges * moved && patient(error_ / moved))) {
@@ -463,7 +466,7 @@ Revision ImplicitPoints::revise(const SubStep &now, const double *surfel_impulse
     add(v, 1);
     return Revision::velocity;
   }
-  // What leads away from the solution is taken half way.
+  // A correction that leads away from the solution is halved.
   const double share = error_ <= moved ? 1 : 0.5;
   for (size_t j = 0; j < v.size(); ++j) v[j] = before_[j] + share * (p_.v_end[j] - before_[j]);
   if (!residual_at(now, v.data(), nullptr) || !linearize(now) || !solve_way(residual_))
@@ -474,7 +477,7 @@ Revision ImplicitPoints::revise(const SubStep &now, const double *surfel_impulse
   return Revision::response;
 }
 
-// Forces are asked once more where the model has a state, whose next value they write.
+// If the model has a state, forces are evaluated once more, which writes its next value.
 bool ImplicitPoints::end_state(const SubStep &now, const double *surfel_impulse, bool touched) {
   if (!staged_ && !linear_end(touched ? surfel_impulse : nullptr)) return false;
   const Array<double> &v = p_.v_end;
@@ -487,13 +490,14 @@ bool ImplicitPoints::end_state(const SubStep &now, const double *surfel_impulse,
   return poison == 0;
 }
 
-// An impulse moves all points, touched or not.
+// An impulse moves all points, not only the touched ones.
 void ImplicitPoints::bound_ends(double &speed, double &change) const {
   bound_surfel_ends(mean(), speed, change);
 }
 
-// Backward Euler errs by h^2 a / 2 in the position, a the acceleration, and TR-BDF2 by what the velocities at
-// its three times tell (Hosea and Shampine 1996); what all points have in common bends nothing.
+// The error of backward Euler is h^2 a / 2 in the position, with the acceleration a; that of TR-BDF2 follows
+// from the velocities at its three times (Hosea and Shampine 1996). The part that all points have in common
+// deforms nothing and is left out.
 double ImplicitPoints::accurate_step(const SubStep &now) const {
   const auto gained = [&](uint32_t i) {
     const size_t at = size_t{kStride} * i;

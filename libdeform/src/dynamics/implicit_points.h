@@ -8,12 +8,12 @@
 // other x0, v0. Contact is solved for with backward Euler alone: doc/decisions/0140-tr-bdf2.md.
 //
 // free_motion() solves r(v) = 0 by Newton's method with a line search, with the rest state's factor in place
-// of A (rest_factor.h) or with A as it was last. Contact sees A^-1, never M^-1: a prediction with A and
-// contact with M^-1 leaves bodies at rest by h^2 p / m per point where they should not be. revise() asks the
-// true residual of the state that contact has found and goes on from there, so that forces and contacts
-// hold at one state, the end of the sub-step. Every linear solve keeps linear momentum to its own tolerance:
-// the forces of a model and the rows of its stiffness sum to zero, and the rest state's factor has the rigid
-// motions apart. Source: Baraff and Witkin 1998, Large steps in cloth simulation, section 3.
+// of A (rest_factor.h) or with the last A. Contact uses A^-1, never M^-1: a prediction with A and contact
+// with M^-1 would displace bodies at rest by h^2 p / m per point. revise() evaluates the true residual at the
+// state that contact has found and continues from there, so that forces and contacts hold at the same state,
+// the end of the sub-step. Every linear solve conserves linear momentum to its tolerance: the forces of a
+// model and the rows of its stiffness sum to zero, and the factor of the rest state treats rigid motions
+// separately. Source: Baraff and Witkin 1998, Large steps in cloth simulation, section 3.
 #pragma once
 #include <memory>
 #include <utility>
@@ -43,7 +43,7 @@ class ImplicitPoints : public Dynamics {
   uint32_t claims() const override {
     return DFM_CAP_STIFFNESS | (stiffness_.constant() ? uint32_t{DFM_CAP_CONSTANT_STIFFNESS} : 0);
   }
-  // of a stage: 30 at 700 points, 60 at 4,300
+  // of a stage; measured: 30 at 700 points, 60 at 4,300
   uint32_t relative_work() const override { return (options_.second_order ? 2 : 1) * kImplicitWork; }
   double effort() const override { return effort_; }
   bool bound(double time, const AddRowSums &outside, StepBound &out) override;
@@ -63,25 +63,25 @@ class ImplicitPoints : public Dynamics {
 
  protected:
   ImplicitOptions options_;
-  Array<double> softness_;  // [npoint] N/m of loads that give way as the points move; empty: none do
+  Array<double> softness_;  // [npoint] N/m, stiffness of loads; empty: none
 
   bool solve(const Array<double> &b, Array<double> &x);
   double largest_diagonal() const;  // kg, of A
   // v_free: Newton's first correction of the velocities at the start, as a whole
   bool take_first_way(const SubStep &now);
-  // scale times the impulses at the surfels [nsurfel,3], added to the points that move [npoint,3]
+  // adds scale times the impulses at the surfels [nsurfel,3] to the free points [npoint,3]
   void spread_impulses(const double *surfel_impulse, double scale, Array<double> &to) const;
 
  private:
   ModelStiffness stiffness_;
   Memory memory_;
-  std::unique_ptr<RestFactor> rest_;     // null: where the solver is not direct, or one solve has to do
-  std::unique_ptr<LinearSolver> exact_;  // of A itself; null until it is wanted
-  bool by_rest_ = false;                 // which of the two stands for A
-  uint32_t slow_ = 0;                    // iterations with rest_ that did not halve what was left
+  std::unique_ptr<RestFactor> rest_;     // null if the solver is not direct, or only one solve is allowed
+  std::unique_ptr<LinearSolver> exact_;  // of A itself; null until it is needed
+  bool by_rest_ = false;                 // which of the two represents A
+  uint32_t slow_ = 0;                    // iterations with rest_ that did not halve the residual
   Anderson ways_;
-  // What is solved for now: s, its h; from the start of the sub-step to its end; [npoint,4] m, m/s: x0, v0.
-  // Loads and gravity in between are on the line from the start to the end.
+  // The present stage: its h (s); its times as shares of the sub-step; x0, v0 ([npoint,4] m, m/s). Loads and
+  // gravity are interpolated linearly between start and end.
   struct Stage {
     double h, elapsed;
     const double *x, *v;
@@ -89,21 +89,22 @@ class ImplicitPoints : public Dynamics {
     Vec3 gravity;
   };
   Stage stage_{};
-  bool staged_ = false;                // this sub-step is taken by TR-BDF2
-  Array<double> stage_x_, stage_v_;    // [npoint,4] m, m/s: x0, v0 of its stages
-  Array<double> middle_;               // [npoint,4] m/s, the end of its first stage
-  Array<double> load_before_;          // [npoint,4] N, at the start of the sub-step
-  Array<double> x_, v_;                // [npoint,4] m, m/s: where forces are asked
-  Array<double> before_;               // [npoint,4] m/s, the end before the last revision
-  Array<double> residual_;             // [npoint,3] N s
-  Array<double> push_, change_;        // [npoint,3] N s of contact; m/s, a solution
-  Array<double> springs_, dampers_;    // [npoint] N/m, N s/m of loads
-  Array<double> weight_, scale_;       // [npoint,3] kg, diagonal of A; 1/kg, its inverse; zero where held
-  Array<uint8_t> held_;                // [npoint] as in the factor at hand
-  Array<uint32_t> column_, points_;    // [npoint] place among the points that touched surfels hang on; these
+  bool staged_ = false;              // this sub-step uses TR-BDF2
+  Array<double> stage_x_, stage_v_;  // [npoint,4] m, m/s: x0, v0 of its stages
+  Array<double> middle_;             // [npoint,4] m/s, the end of its first stage
+  Array<double> load_before_;        // [npoint,4] N, at the start of the sub-step
+  Array<double> x_, v_;              // [npoint,4] m, m/s: state of the last force evaluation
+  Array<double> before_;             // [npoint,4] m/s, the end before the last revision
+  Array<double> residual_;           // [npoint,3] N s
+  Array<double> push_, change_;      // [npoint,3] N s of contact; m/s, a solution
+  Array<double> springs_, dampers_;  // [npoint] N/m, N s/m of loads
+  Array<double> weight_, scale_;     // [npoint,3] kg, diagonal of A; 1/kg, its inverse; zero where held
+  Array<uint8_t> held_;              // [npoint] as in the present factor
+  // [npoint] index among the points on which touched surfels depend; these points
+  Array<uint32_t> column_, points_;
   Array<double> between_;              // [3m,3m] 1/kg, response between these points
-  double factor_h_ = 0;                // s, of the factor at hand; 0: none
-  std::vector<double> factor_params_;  // of the model then, where its stiffness is constant
+  double factor_h_ = 0;                // s, of the present factor; 0: none
+  std::vector<double> factor_params_;  // of the model at that time, if its stiffness is constant
   double error_ = 0;                   // m/s, the correction that the last revision found; 0: none yet
   double least_error_ = 0;             // m/s, of all revisions in the sub-step
   double corrected_ = 0;               // m/s, the last correction

@@ -1,4 +1,4 @@
-// Newton's corrections, shortened where the whole of one leads too far.
+// Line search for Newton's corrections.
 #pragma once
 #include <algorithm>
 #include <cstddef>
@@ -6,7 +6,7 @@
 
 namespace dfm {
 
-// a . b over all components, in their order.
+// a . b over all components, in order.
 template <class Values>
 double product(const Values &a, const Values &b) {
   double sum = 0;

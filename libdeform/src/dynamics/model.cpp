@@ -11,7 +11,7 @@
 namespace dfm {
 namespace {
 
-// What every version of these tables has had.
+// The part of these tables that every version has.
 constexpr size_t kStepperHead = offsetof(dfm_stepper, commit) + sizeof(void *);
 constexpr size_t kLatePoints = offsetof(dfm_late_points, look) + sizeof(void *);
 constexpr size_t kOneFunction = 2 * sizeof(uint32_t) + sizeof(void *);

@@ -1,5 +1,5 @@
-// Loops over points, four doubles each, the last of which is zero, compiled for several vector widths: the
-// same operations on each component at every width. Plain data only.
+// Loops over points of four doubles, the last of which is zero, compiled for several vector widths: every
+// width performs the same operations on each component. Plain data only.
 #pragma once
 #include <cstdint>
 

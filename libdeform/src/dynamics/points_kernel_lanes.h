@@ -130,7 +130,7 @@ double strain_rate(uint32_t n, const uint32_t *edges, const double *x, const dou
     const auto d = differences(end(x, 1), end(x, 0));
     const Vector stretch = dot(d, differences(end(v, 1), end(v, 0)));
     const Vector rate = (stretch < Vector{} ? -stretch : stretch) / dot(d, d);
-    most = rate > most ? rate : most;  // no number where both ends are one place
+    most = rate > most ? rate : most;  // NaN if both ends coincide
   });
   double out = 0;
   for (uint32_t k = 0; k < kWidth; ++k) out = most[k] > out ? most[k] : out;

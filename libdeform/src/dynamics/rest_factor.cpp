@@ -10,8 +10,9 @@
 namespace dfm {
 namespace {
 
-constexpr uint32_t kRigid = 6;     // motions
-constexpr double kOnALine = 1e-9;  // determinant of an inertia over the cube of its mean: no axis without
+constexpr uint32_t kRigid = 6;  // motions
+// determinant of an inertia over the cube of its mean: below it the points are on a line
+constexpr double kOnALine = 1e-9;
 
 Vec3 times_transposed(const double *m, Vec3 a) {
   return {m[0] * a.x + m[3] * a.y + m[6] * a.z, m[1] * a.x + m[4] * a.y + m[7] * a.z,
@@ -20,7 +21,7 @@ Vec3 times_transposed(const double *m, Vec3 a) {
 
 Vec3 axis(uint32_t k) { return {double(k == 0), double(k == 1), double(k == 2)}; }
 
-// What the rigid motion k moves a point at that arm by.
+// Displacement of a point at this arm by the rigid motion k.
 Vec3 rigid_column(uint32_t k, Vec3 arm) { return k < 3 ? axis(k) : cross(axis(k - 3), arm); }
 
 }  // namespace
@@ -38,10 +39,10 @@ RestFactor::RestFactor(const Memory &memory, const Phyxels &points, ModelInstanc
   for (Array<double> *a : {&diagonal_, &b_, &y_, &arm_}) a->assign(size_t{3} * p_.n, 0.0);
   turned_.assign(size_t{9} * p_.n, 0.0);
   for (size_t k = 0; k < turned_.size(); ++k) turned_[k] = k % 9 % 4 == 0;
-  ask_model();  // a step is on any thread, where memory may not be asked for
+  ask_model();  // steps run on any thread, where no memory may be allocated
 }
 
-// A model gives its stiffness where it was asked for forces.
+// A model gives its stiffness at the state of its last force evaluation.
 bool RestFactor::ask_model() {
   if (!stiff_.empty() && params_ == model_.params) return true;
   stiff_.clear();
@@ -70,7 +71,7 @@ bool RestFactor::prepare(double h) {
   serves_ = false;
   try {
     if (!ask_model()) return false;
-  } catch (const std::bad_alloc &) {  // new parameters, on whichever thread this body moves
+  } catch (const std::bad_alloc &) {  // new parameters, on any thread that moves this body
     return false;
   }
   h_ = h;
@@ -91,8 +92,8 @@ bool RestFactor::prepare(double h) {
   return serves_ = solver_->factor(blocks.data());
 }
 
-// Least squares over the pairs of points that answer each other, each by its direction; where they are flat
-// or inside out, the body as a whole tells.
+// Least squares over the pairs of coupled points, each by its direction; if a neighborhood is flat or
+// inverted, the rotation of the whole body is used.
 void RestFactor::find_turns(const double *x) {
   std::fill(turned_.begin(), turned_.end(), 0.0);
   const BlockPattern pattern = stiffness_.pattern();
@@ -135,7 +136,7 @@ void RestFactor::find_rigid(const double *x) {
   const double mean = (inertia[0] + inertia[4] + inertia[8]) / 3;
   if (!(mean > 0)) return;
   for (double &value : inertia) value /= mean;
-  // points on a line turn about it for nothing
+  // rotation about the line of the points moves nothing
   if (!(determinant3(inertia) > kOnALine))
     for (int j = 0; j < 3; ++j) inertia[4 * j] += kOnALine;
   inverse3(inertia, rigid_.inverse);

@@ -7,8 +7,8 @@
 // U are the six rigid motions of a body that nothing holds. These belong to the mass alone, and with their
 // own term an impulse reaches the body's momentum and angular momentum exactly, however far A0 is from A.
 //
-// What it says depends on the rest state, h, what is held and where the points are, not on what has been
-// asked before: a world that was restored takes the same bits.
+// The result depends on the rest state, h, the held components and the present positions, and not on earlier
+// calls: a restored world computes the same bits.
 #pragma once
 #include <memory>
 
@@ -24,10 +24,11 @@ class RestFactor {
   RestFactor(const Memory &memory, const Phyxels &points, ModelInstance &model, ModelStiffness &stiffness,
              std::unique_ptr<LinearSolver> solver);
 
-  // For sub-steps of h seconds and what is held now; returns at once where nothing has changed. False: it
-  // cannot serve, for A0 is not positive definite, or points that turn are held in some directions only.
+  // Factors for sub-steps of h seconds and the present held components; returns at once if nothing has
+  // changed. Returns false if it cannot be used: A0 is not positive definite, or rotating points are held in
+  // some directions only.
   bool prepare(double h);
-  // To where the points are, [npoint,4] m.
+  // Rotates to the present positions, [npoint,4] m.
   void turn(const double *x);
 
   bool solve(const double *b, double *x);                              // [npoint,3]
@@ -42,12 +43,12 @@ class RestFactor {
   std::unique_ptr<LinearSolver> solver_;
   bool turns_ = false;                   // G is not the identity
   Array<double> rest_;                   // [npoint,4] m
-  Array<double> state_;                  // of the model when it was made
+  Array<double> state_;                  // of the model when the factor was made
   Array<double> stiff_, damp_;           // [nb,9] df/dx, df/dv at rest
-  std::vector<double> params_;           // of the model when these were asked for
+  std::vector<double> params_;           // of the model when these were computed
   double h_ = 0;                         // s, of the factor; 0: none
   Array<uint8_t> held_;                  // [npoint] as in the factor
-  bool serves_ = false, loose_ = false;  // loose: nothing is held
+  bool serves_ = false, loose_ = false;  // loose: no point is held
   Array<double> diagonal_;
   Array<double> turned_;  // [npoint,9] G, row-major
   Array<double> b_, y_;   // [npoint,3] scratch of solve
@@ -59,7 +60,7 @@ class RestFactor {
   };
   Rigid rigid_ = {};
   Array<double> arm_;    // [npoint,3] m, from the center
-  Array<double> moved_;  // [6,npoint,3], G A0^-1 G^T M U, and what it was asked with
+  Array<double> moved_;  // [6,npoint,3], G A0^-1 G^T M U, and its inputs
   Array<double> asked_;
   Array<double> left_, right_;  // scratch of restricted: [count,3,6]
 

@@ -29,15 +29,15 @@ void SelfStepping::each_moved(F &&f) const {
     for (size_t j = size_t(i) * kStride; j < size_t(i + 1) * kStride; ++j) f(j);
 }
 
-// Loads and gravity are external forces of the model, which answers the surfels' mean velocities.
-// The kinetic energy is that of its start: points are not told how they end without contact.
+// Loads and gravity are external forces of the model, which returns the mean velocities of the surfels. The
+// kinetic energy is that at the start: the end without contact is not known for points.
 bool SelfStepping::free_motion(const SubStep &now, double &kinetic) {
   double sum = 0;
   for (uint32_t i = 0; i < p_.n; ++i) {
     const size_t at = size_t(i) * kStride;
     store3(&p_.f[at], load3(&p_.load[at]) + p_.mass[i] * now.gravity);
   }
-  // of late points: of those that every sub-step moves, whether somebody has seen the others or not
+  // with late points: of the points that every sub-step moves, whether or not the others have been computed
   const uint32_t count = model_.late ? uint32_t(near_.size()) : p_.n;
   for (uint32_t n = 0; n < count; ++n) {
     const uint32_t i = model_.late ? near_[n] : n;
@@ -71,7 +71,7 @@ bool SelfStepping::respond(const SubStep &now, uint32_t n, const uint32_t *surfe
   return true;
 }
 
-// As many unit impulses as in the last sub-step are the same ones.
+// If the number of unit impulses is that of the last sub-step, they are the same.
 bool SelfStepping::response(const SubStep &now, uint32_t n, const uint32_t *surfel, double *answers) {
   const uint32_t width = 3 * n;
   if (unit_.size() != size_t(width) * width) {
@@ -113,7 +113,7 @@ void SelfStepping::commit(const SubStep &, double fraction) {
   unseen_ = model_.late.has_value();
 }
 
-// Part of the way is no state that the model knows: from there on all points tell it.
+// A partial displacement is no state of the model: it then continues from the positions of all points.
 void SelfStepping::see_ends() {
   if (!model_.late) return;
   see_points();

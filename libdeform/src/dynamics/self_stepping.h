@@ -1,6 +1,6 @@
-// A model that moves its body itself (dfm.stepper/1): it predicts, answers impulses at its surfels, and
-// ends the sub-step. Where it can tell later where its points are (dfm.late_points/1), a sub-step moves those
-// alone that surfels hang on or that are held: what a probe costs then does not grow with what lies beneath.
+// A model that moves its body itself (dfm.stepper/1): it predicts, responds to impulses at its surfels, and
+// ends the sub-step. If it can compute points later (dfm.late_points/1), a sub-step moves only the points on
+// which surfels depend and held points, so the cost of a probe does not grow with the interior.
 #pragma once
 #include <atomic>
 #include <mutex>

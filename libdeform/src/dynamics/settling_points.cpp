@@ -20,14 +20,14 @@ void SettlingPoints::start_from(const double *surfel_impulse, double h) {
   if (h > 0) spread_impulses(surfel_impulse, 1 / h, last_);
 }
 
-// The scheme is stable at any step, with loads that give way too.
+// The scheme is stable at any step, also with loads that depend on positions.
 bool SettlingPoints::bound(double, const AddRowSums &, StepBound &out) {
   out = {};
   return true;
 }
 
-// One linear correction: under forces that do not turn with it a body that stands on them has nowhere to go
-// back to, and Newton's method would look for that without end.
+// One linear correction only: with contact forces that do not rotate with the body, a standing body may have
+// no equilibrium near, and Newton's method would search for it forever.
 bool SettlingPoints::free_motion(const SubStep &now, double &) {
   load_ = p_.load;
   for (uint32_t i = 0; i < p_.n; ++i)

@@ -2,10 +2,10 @@
 //
 //   f(x) + loads + M g + contact = (M / h^2 + S) (x - x0)        S: of loads that give way, N/m
 //
-// which is what an equilibrium asks for once x stops changing. M / h^2 decides how far a step goes and not
-// where steps end: it keeps what nothing holds from going without end (the proximal point method, Rockafellar
-// 1976). The step starts with the contact forces of the one before. Without them everything would fall freely
-// by h^2 g before contact is looked for, which is meters in a step of a second.
+// which is the condition of equilibrium once x stops changing. M / h^2 decides the length of a step, not
+// where steps end; it bounds the motion of bodies that nothing holds (the proximal point method, Rockafellar
+// 1976). A step starts with the contact forces of the step before. Without them bodies would fall freely by
+// h^2 g before contacts are found, which is meters in a step of a second.
 #pragma once
 #include "dynamics/implicit_points.h"
 
@@ -13,7 +13,7 @@ namespace dfm {
 
 class SettlingPoints : public ImplicitPoints {
  public:
-  // softness: [npoint] N/m, S. error: m, what Newton's method may leave of the positions of points at rest.
+  // softness: [npoint] N/m, S. error: m, tolerance of Newton's method for points at rest.
   SettlingPoints(const Memory &memory, Phyxels &points, Surface &surface, ModelInstance &model,
                  const ImplicitOptions &options, const std::vector<double> &softness, double error);
 
@@ -24,12 +24,12 @@ class SettlingPoints : public ImplicitPoints {
 
   Abilities abilities() const override {
     Abilities a = ImplicitPoints::abilities();
-    a.damps = false;  // its steps are none in time
+    a.damps = false;  // its steps are not steps in time
     return a;
   }
   bool bound(double time, const AddRowSums &outside, StepBound &out) override;
   bool free_motion(const SubStep &now, double &kinetic) override;
-  // with the last contact forces: where contact is looked for
+  // with the last contact forces: used to find contacts
   const double *point_velocity() const override { return guess_.data(); }
   const double *contact_velocity() const override { return surfels_.data(); }  // without
   Revision revise(const SubStep &now, const double *surfel_impulse, bool last) override;
@@ -39,11 +39,12 @@ class SettlingPoints : public ImplicitPoints {
 
  private:
   double error_allowed_, stiffest_ = 0;
-  Array<double> last_, next_;      // [npoint,3] N, contact forces of the last step and at the end of this one
-  Array<double> guess_;            // [npoint,4] m/s
-  Array<double> surfels_;          // [nsurfel,4] m/s without contact
-  Array<double> load_;             // [npoint,4] N, loads alone
-  Array<double> impulse_, taken_;  // [npoint,3] N s, m/s: the last contact forces, and what they change
+  Array<double> last_, next_;  // [npoint,3] N, contact forces of the last step and at the end of this one
+  Array<double> guess_;        // [npoint,4] m/s
+  Array<double> surfels_;      // [nsurfel,4] m/s without contact
+  Array<double> load_;         // [npoint,4] N, loads alone
+  // [npoint,3] N s, m/s: the last contact forces, and their effect on velocities
+  Array<double> impulse_, taken_;
 
   void gather();
 };

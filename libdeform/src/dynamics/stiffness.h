@@ -10,15 +10,15 @@ class ModelStiffness {
   explicit ModelStiffness(const Memory &memory);
 
   static bool offered(const ModelInstance &model) { return model.can(DFM_CAP_STIFFNESS); }
-  // Asks the model for its pairs; throws Error naming the plugin where they are not what plugin.h asks for.
+  // Gets the pairs of the model; throws Error, which names the plugin, if they do not meet plugin.h.
   void create(const ModelInstance &model, uint32_t npoint);
   bool constant() const { return constant_; }  // for the same parameters
-  // blocks = a df/dx + b df/dv; false: the model cannot.
+  // blocks = a df/dx + b df/dv; returns false if the model fails.
   bool evaluate(const ModelInstance &model, const dfm_kin &k, double a, double b);
 
   BlockPattern pattern() const { return {npoint_, static_cast<uint32_t>(pairs_.size() / 2), pairs_.data()}; }
   Array<double> &blocks() { return blocks_; }  // [nb,9] row-major
-  // act(point, block) on the blocks of points with themselves
+  // calls act(point, block) for the diagonal blocks
   template <class Act>
   void each_own(const Act &act) {
     for (size_t b = 0; b < pairs_.size() / 2; ++b)

@@ -23,7 +23,7 @@ LawInstance::LawInstance(const dfm_type &t, const dfm_host &h, std::vector<doubl
     tangent.resize(nstate, slot.kind == DFM_SLOT_TANGENT);
     turns |= slot.kind == DFM_SLOT_TANGENT;
   }
-  // check() was asked by pack_params
+  // pack_params has called check()
   if (ops->prepare &&
       call_plugin(h, t, "prepare", [&] { return ops->prepare(host, params.data(), &data); }) != DFM_OK)
     fail(DFM_E_FATAL, "law '%s' could not prepare its tables; see the log", t.id);
@@ -119,8 +119,8 @@ const LawInstance *LawBatches::slopes(double h, ContactState &state) {
       for (uint32_t k = 0; k < batch.n; ++k) {
         const uint32_t i = order_[batch.begin + k];
         if (state.origin[i].hold & which) continue;
-        // What sticks hangs on its bristle, not on its normal force; where that is not quite so the
-        // passes notice.
+        // The force of a sticking contact depends on its bristle and not on the normal force; the passes
+        // correct small deviations.
         if (which == kByFn && state.mode[i] == 1) {
           state.dft_dfn[i] = state.dft_dfn[state.stride + i] = 0;
           state.origin[i].made |= which;
@@ -136,8 +136,8 @@ const LawInstance *LawBatches::slopes(double h, ContactState &state) {
   return nullptr;
 }
 
-// Slopes whose prediction of the change of force since they were made is right to a tenth let the passes
-// converge by that tenth; new ones are not worth three answers.
+// If slopes predict the change of force since they were computed to a tenth, each pass reduces the error to a
+// tenth; new slopes are not worth three evaluations.
 void LawBatches::look_back(uint32_t i, ContactState &s) {
   constexpr double kGood = 0.1;
   ContactState::Origin &o = s.origin[i];
@@ -238,7 +238,7 @@ const LawInstance *LawBatches::evaluate(const LawInstance &law, std::span<const 
     } else {
       look_back(i, state);
     }
-    // poison of NaN or infinite: not equal to zero; a limit of +inf is an answer: none
+    // the poison of NaN and infinity is not zero; a limit of +inf is valid: no limit
     if (failed_ == kNone && !(poison == 0 && limit[k] >= 0)) failed_ = i;
   }
   if (given && !state.scale.empty())
@@ -249,7 +249,7 @@ const LawInstance *LawBatches::evaluate(const LawInstance &law, std::span<const 
 
 namespace {
 
-// 0 where all of a column, padded to fours, is finite; else NaN.
+// 0 if the whole column, padded to fours, is finite; else NaN.
 using Four = double __attribute__((vector_size(32)));
 void add_poison(const double *column, size_t n, Four &sum) {
   const Four *const x = reinterpret_cast<const Four *>(column);
@@ -299,7 +299,7 @@ const LawInstance *LawBatches::evaluate_all(const LawInstance &law, double h, Co
   bool good = (poison[0] + poison[1]) + (poison[2] + poison[3]) == 0;
   for (uint32_t i = 0; i < n; ++i) good &= s.limit[i] >= 0;
   if (good) return nullptr;
-  // which one it was; none where only the padding is not finite, which a law may leave as it likes
+  // find the contact; there is none if only the padding is not finite, which a law may leave undefined
   for (uint32_t i = 0; i < n && failed_ == kNone; ++i) {
     double bad = 0;
     const auto add = [&](const Array<double> &a, size_t width) {
@@ -311,15 +311,15 @@ const LawInstance *LawBatches::evaluate_all(const LawInstance &law, double h, Co
       add(s.dft_dvt, 4);
       add(s.dft_dfn, 2);
     }
-    // a limit of +inf is an answer: none
+    // a limit of +inf is valid: no limit
     if (!(bad == 0 && s.limit[i] >= 0)) failed_ = i;
   }
   return failed_ == kNone ? nullptr : &law;
 }
 
-// Derivatives of a law that gives none, by forward differences: without them a steep law (h w_t c > 1) would
-// make the passes diverge. The step is a millionth of the value, and at least a tenth of the slip and of the
-// force that the solve resolves.
+// Derivatives of a law that does not give them, by forward differences: without them a steep law (h w_t c >
+// 1) would make the passes diverge. The difference is a millionth of the value, and at least a tenth of the
+// slip and of the force that the solve resolves.
 const LawInstance *LawBatches::difference(const LawInstance &law, std::span<const uint32_t> index, double h,
                                           Slopes which, ContactState &state) {
   dfm_friction_in in = inputs(law, index, h, state);
@@ -358,7 +358,7 @@ const LawInstance *LawBatches::difference(const LawInstance &law, std::span<cons
       for (size_t r = 0; r < 2; ++r) state.dft_dfn[r * n + i] *= state.scale[i];
   for (const uint32_t i : index) {
     ContactState::Origin &o = state.origin[i];
-    // what was made elsewhere belongs to another force
+    // slopes computed at another trial belong to another force
     if (!(o.hold & ~which)) o.made = kNoSlope;
     const uint8_t made = o.made | which, hold = o.hold | which;
     o = {{state.vt[i], state.vt[n + i]}, state.fn[i], {state.ft[i], state.ft[n + i]}, made, hold};

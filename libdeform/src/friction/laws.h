@@ -1,5 +1,5 @@
-// Friction laws of a world, and the one place where they are asked: contacts are gathered into one batch per
-// law, evaluated by the plugin, screened, and scattered back to the contacts' columns.
+// Friction laws of a world, and the only place where they are evaluated: contacts are gathered into one batch
+// per law, evaluated by the plugin, checked, and scattered back to the columns of the contacts.
 #pragma once
 #include <span>
 #include <string>
@@ -20,17 +20,17 @@ struct LawInstance {
   const dfm_friction *ops = nullptr;
   std::vector<double> params;
   std::vector<dfm_param_value> by_key;  // params, for dfm_world_law_info
-  void *data = nullptr;                 // what prepare() made
+  void *data = nullptr;                 // result of prepare()
   const dfm_host *host = nullptr;
   uint32_t nstate = 0;
   std::vector<uint8_t> tangent;  // [nstate] 1: a component of a vector in the tangent plane
   bool turns = false;            // any
-  bool by_default = false;       // pairs without a rule have it
-  // What was asked for, of which the list of effects has left this.
+  bool by_default = false;       // used for pairs without a rule
+  // The parameters that were asked for, of which the list of effects may have left out some.
   const dfm_type *asked_type = nullptr;
   std::vector<double> asked;
 
-  // throws where check() or prepare() refuses
+  // throws if check() or prepare() refuses
   LawInstance(const dfm_type &t, const dfm_host &h, std::vector<double> values);
   LawForm form() const {
     return is_frictionless(*ops)              ? kNoFriction
@@ -42,21 +42,22 @@ struct LawInstance {
   ~LawInstance();
 };
 
-// What the list of effects has left out of it.
+// What the list of effects has left out of the law.
 std::vector<LeftOut> left_out_of(const LawInstance &law);
 
 class LawBatches {
  public:
   explicit LawBatches(const Memory &memory);
-  // Sorts these contacts into batches by state.law and sets state.form. Call once per sub-step. Batches of
-  // contacts that nobody else has may be asked on several threads at once.
+  // Sorts these contacts into batches by state.law and sets state.form. Call once per sub-step. Several
+  // threads may evaluate batches of disjoint contacts at once.
   void gather(const std::vector<LawInstance *> &laws, std::span<const RowRun> contacts, ContactState &state);
-  // Asks every batch at the trial in state: force, limit, mode, trial state, and the slopes dft_dvt and
-  // dft_dfn of laws that give them. nullptr, or the law that failed or answered with something not finite.
+  // Evaluates every batch at the trial in state: force, limit, mode, trial state, and the slopes dft_dvt and
+  // dft_dfn of laws that give them. Returns nullptr, or the law that failed or returned a value that is not
+  // finite.
   const LawInstance *evaluate(double h, ContactState &state);
-  // The slopes at the last answer, of laws that give none, by differences of the force; asked for where the
-  // solve goes on, since they cost three more answers. Where the force has followed the slopes of an earlier
-  // pass they are kept.
+  // Computes the slopes at the last evaluation, for laws that do not give them, by differences of the force.
+  // Called only if the solve continues, because they cost three more evaluations. Slopes of an earlier pass
+  // are kept if they have predicted the change of the force.
   const LawInstance *slopes(double h, ContactState &state);
   // The same, but a smooth law is asked where the contact would come to rest alone
   // (friction/local_solve.cpp): state.vt moves there.
@@ -64,10 +65,10 @@ class LawBatches {
   //          that others leave
   //   least, relative   m/s, 1: a contact's slip need not be known closer than least + relative of it
   const LawInstance *answer(double h, const double *wt, double least, double relative, ContactState &state);
-  bool smooth() const { return smooth_; }            // is any law of them not set-valued?
-  bool differences() const { return differences_; }  // has any no slopes of its own?
-  bool remembers() const { return remembers_; }      // has any a state?
-  // After a law has failed: the contact whose answer is not to be used; kNone: it refused the whole batch.
+  bool smooth() const { return smooth_; }            // whether any law is not set-valued
+  bool differences() const { return differences_; }  // whether any law gives no slopes
+  bool remembers() const { return remembers_; }      // whether any law has a state
+  // After a law has failed: the contact whose result is invalid; kNone: the law refused the whole batch.
   uint32_t failed() const { return failed_; }
 
  private:
@@ -75,8 +76,8 @@ class LawBatches {
     const LawInstance *law;
     uint32_t begin, n;
   };
-  // A contact whose own answer is still looked for: the best slip so far, what it leaves of its equation, and
-  // the step tried from there.
+  // A contact whose local solution is not found yet: the best slip so far, its residual, and the step tried
+  // from there.
   struct Local {
     uint32_t contact;
     bool from_zero, last, fresh;
@@ -89,7 +90,7 @@ class LawBatches {
   Array<double> moved_, answer_;  // inputs and force beside the trial, for laws without derivatives
   Array<uint8_t> mode_;
   Array<Local> local_;
-  Array<uint32_t> asked_;  // contacts of local_ that are asked together
+  Array<uint32_t> asked_;  // contacts of local_ that are evaluated together
   bool smooth_ = false, remembers_ = false, differences_ = false;
   uint32_t failed_ = kNone;
   // in in_
@@ -101,12 +102,12 @@ class LawBatches {
   const LawInstance *evaluate_all(const LawInstance &law, double h, ContactState &state);
   const LawInstance *settle(const Batch &batch, double h, const double *wt, double least, double relative,
                             ContactState &state);
-  // Slopes by differences at the present answer. The law where it fails.
+  // Slopes by differences at the present trial. Returns the law if it fails.
   const LawInstance *difference(const LawInstance &law, std::span<const uint32_t> contacts, double h,
                                 Slopes which, ContactState &state);
-  // The answer of contacts without friction, whose law nobody asks.
+  // The result for contacts without friction, whose law is not evaluated.
   static void leave_free(std::span<const uint32_t> contacts, ContactState &state);
-  // do earlier slopes hold at the answer just given?
+  // whether earlier slopes are still valid at the last evaluation
   static void look_back(uint32_t contact, ContactState &state);
 };
 

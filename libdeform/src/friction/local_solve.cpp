@@ -1,4 +1,4 @@
-// Where a smooth law is asked.
+// The slip at which a smooth law is evaluated.
 //
 // Seen from one contact, with what all others do held still, slip and friction force lie on the line v = m (f
 // - f_stop), m = h w_t; the law is a monotone curve f = ft(v), and the contact's answer is where they cross.
@@ -27,9 +27,9 @@ namespace dfm {
 namespace {
 
 constexpr uint32_t kMostAsked = 24;
-// Where the law is asked on the very edge of its cone, its tangent is that of slip and the step too long by 1
-// + h m sigma0 A, which may be 1e12.
-constexpr double kCut = 1.0 / 16, kLeastFraction = 1e-15;  // of a Newton step that leads away
+// If the law is evaluated exactly at the edge of its cone, its tangent is that of slip, and the step is too
+// long by a factor 1 + h m sigma0 A, which may be 1e12.
+constexpr double kCut = 1.0 / 16, kLeastFraction = 1e-15;  // of a Newton step that increases the residual
 
 struct Residue { double a, b, square; };
 inline Residue residue(const ContactState &s, uint32_t i, double m) {
@@ -39,14 +39,14 @@ inline Residue residue(const ContactState &s, uint32_t i, double m) {
   return {a, b, a * a + b * b};
 }
 
-// Is the slip at which the law was asked close enough to that at which the contact comes to rest?
+// Whether the slip at which the law was evaluated is close enough to the solution.
 inline bool answers(const ContactState &s, uint32_t i, double m, double least, double relative) {
   const Residue g = residue(s, i, m);
   const double v1 = s.vt[i], v2 = s.vt[s.stride + i];
   return g.square <= least * least || std::sqrt(g.square) <= least + relative * std::sqrt(v1 * v1 + v2 * v2);
 }
 
-// From the present slip, which becomes v.
+// Starts from the present slip, which becomes v.
 void newton_step(const ContactState &s, uint32_t i, double m, double v[2], double step[2]) {
   const Residue g = residue(s, i, m);
   const auto [d11, d12, d22] = dissipative_slope(s, i);
@@ -73,7 +73,7 @@ const LawInstance *LawBatches::answer(double h, const double *wt, double least, 
   return nullptr;
 }
 
-// All contacts of a batch side by side; those that are done leave it.
+// All contacts of a batch side by side; finished contacts leave the batch.
 const LawInstance *LawBatches::settle(const Batch &batch, double h, const double *wt, double least,
                                       double relative, ContactState &s) {
   const uint32_t n = s.stride;
@@ -91,8 +91,8 @@ const LawInstance *LawBatches::settle(const Batch &batch, double h, const double
       const Residue g = residue(s, i, m);
       if (answers(s, i, m, least, relative)) continue;
       const double size = std::sqrt(g.square);
-      // Beyond the crossing, g points along the step: deep in stick it is nearly as large there as it was, so
-      // less does not tell.
+      // Beyond the crossing, g points along the step. Deep in stick it is nearly as large there as before, so
+      // its size is no criterion.
       const bool nearer =
           size < 0.5 * c.left || (c.from_zero && size < c.left && g.a * c.step[0] + g.b * c.step[1] < 0);
       c.fresh = false;
@@ -102,7 +102,7 @@ const LawInstance *LawBatches::settle(const Batch &batch, double h, const double
         c.left = size;
         c.fraction = 1;
         if (!gives_slopes && !(s.origin[i].hold & kByVt)) asked_.push_back(i);
-      } else if (!c.from_zero && asked < kMostAsked) {  // tangents from where it slips lead nowhere
+      } else if (!c.from_zero && asked < kMostAsked) {  // tangents at the present slip do not converge
         c = {i, true, false, false, {0, 0}, INFINITY, {0, 0}, 0};
       } else {
         c.fraction *= kCut;
@@ -116,7 +116,8 @@ const LawInstance *LawBatches::settle(const Batch &batch, double h, const double
     for (Local &c : local_) {
       const uint32_t i = c.contact;
       if (c.fresh) newton_step(s, i, h * wt[i], c.v, c.step);
-      // Out of turns, or at the end of what steps can do: the best slip is asked once more and is the answer.
+      // The limit on evaluations, or on shortened steps, is reached: evaluate at the best slip again and
+      // return that.
       c.last = asked >= kMostAsked || (c.fraction > 0 && c.fraction < kLeastFraction);
       if (c.last) c.fraction = 0;
       s.vt[i] = c.v[0] + c.fraction * c.step[0];

@@ -1,5 +1,5 @@
-// Which rule holds between two sides. A side of a rule is a pattern, a side of a pair is a thing with a name,
-// a group and a material.
+// The friction rule of a pair. A side of a rule is a pattern; a side of a pair has a name, a group and a
+// material.
 //
 //   pattern        matches                                   weight
 //   body:GROUP     that group of that body's surface         4
@@ -17,7 +17,7 @@
 
 namespace dfm {
 
-// whole: name of the body that this one is a piece of; empty: it is none.
+// whole: name of the body of which this one is a piece; empty if it is not a piece.
 struct PairSide { std::string_view name, group, material, whole = {}; };
 
 inline constexpr std::string_view kMaterialPrefix = "material=";
@@ -45,14 +45,13 @@ inline int rule_weight(const std::string between[2], const PairSide &a, const Pa
   return std::max(both(a, b), both(b, a));
 }
 
-// The same two patterns, in either order: the newer rule holds wherever the older one did, so the
-// older one can go.
+// Whether both rules have the same two patterns, in either order: then the newer rule replaces the older one.
 inline bool same_pair(const std::string a[2], const std::string b[2]) {
   return (a[0] == b[0] && a[1] == b[1]) || (a[0] == b[1] && a[1] == b[0]);
 }
 
-// Puts a rule behind the others and drops the one it supersedes. The vector must have room for one more, or
-// this may throw before it changes anything.
+// Appends a rule and removes the one that it replaces. If the vector has no room for one more, this may throw
+// before it changes anything.
 template <class Rule>
 void add_rule(std::vector<Rule> &rules, Rule &&fresh) {
   rules.reserve(rules.size() + 1);
@@ -60,13 +59,13 @@ void add_rule(std::vector<Rule> &rules, Rule &&fresh) {
   rules.push_back(std::forward<Rule>(fresh));
 }
 
-// Is `name` a body or obstacle that the pattern names, as a whole or by a group?
+// Whether the pattern names the body or obstacle `name`, as a whole or by a group.
 inline bool names(std::string_view pattern, std::string_view name) {
   return pattern == name || (pattern.size() > name.size() && pattern.substr(0, name.size()) == name &&
                              pattern[name.size()] == ':');
 }
 
-// nullptr: no rule names the pair.
+// Returns nullptr if no rule matches the pair.
 template <class Rule>
 const Rule *best_rule(const std::vector<Rule> &rules, const PairSide &a, const PairSide &b) {
   const Rule *best = nullptr;

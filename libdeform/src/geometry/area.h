@@ -1,6 +1,5 @@
-// The area that a surfel brings to a contact: a third of the triangles around it, as seen along the
-// contact's normal, so that a patch that touches all over adds up to its area and a rim does not count the
-// sides beside it.
+// The area of a surfel in a contact: a third of the triangles around it, projected along the contact normal,
+// so that the areas of a patch in full contact add up to its area, and faces next to its rim do not count.
 #pragma once
 #include "geometry/surface.h"
 #include "math/vec3.h"

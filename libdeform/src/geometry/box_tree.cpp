@@ -5,7 +5,7 @@
 namespace dfm {
 namespace {
 
-constexpr double kQualityLimit = 2;  // boxes that have grown this much in sum are worth a new tree
+constexpr double kQualityLimit = 2;  // rebuild the tree when the sum of the boxes has grown by this factor
 
 void join(Box &a, const Box &b) {
   for (int k = 0; k < 4; ++k) {
@@ -39,8 +39,7 @@ BoxTree::BoxTree(const Memory &memory)
       tri_(HookAllocator<uint32_t>(memory)),
       centroid_(HookAllocator<Centroid>(memory)) {}
 
-// All memory first: where one allocation is refused the tree stays what it was, nodes and boxes in step
-// with each other.
+// Allocates all memory first: if an allocation fails, the tree is unchanged, with matching nodes and boxes.
 void BoxTree::build(std::span<const uint32_t> corners, const double *x) {
   const uint32_t ntri = uint32_t(corners.size() / 3);
   const size_t leaves = (size_t{ntri} + kLeaf - 1) / kLeaf, nodes = leaves ? 2 * leaves - 1 : 0;

@@ -1,5 +1,5 @@
 // Binary tree of boxes over triangles. Its topology is found once by median splits; later only its boxes are
-// renewed from below, and it is built anew when they have grown too much.
+// refitted bottom-up, and it is rebuilt when they have grown too much.
 #pragma once
 #include <cstdint>
 #include <span>
@@ -47,7 +47,8 @@ class BoxTree {
   // corners: [ntri,3]; x: [points,4]
   void build(std::span<const uint32_t> corners, const double *x);
   void refit(std::span<const uint32_t> corners, const double *x);
-  // Refits, and builds where there is no tree yet or its boxes have grown too much. Was it built?
+  // Refits the boxes; builds the tree if there is none or its boxes have grown too much. Returns whether it
+  // was built.
   bool renew(std::span<const uint32_t> corners, const double *x);
   // Sum of the boxes' areas over its value after build().
   double quality() const { return area_built_ > 0 ? area_ / area_built_ : 1; }
@@ -149,7 +150,7 @@ void near_self_pairs(const BoxTree &tree, double margin, Array<PairOfTriangles> 
   }
 }
 
-// f(triangle) for all whose boxes pass `near(const Box &)`.
+// Calls f(triangle) for all triangles whose boxes pass `near(const Box &)`.
 template <class N, class F>
 void near_triangles(const BoxTree &tree, Array<PairOfTriangles> &stack, N &&near, F &&f) {
   if (tree.empty()) return;

@@ -1,5 +1,4 @@
-// Voronoi regions of a triangle are told apart by signs of dot products; no division happens before the
-// region is known.
+// The Voronoi region of a triangle is found by signs of dot products, without division.
 #include "geometry/closest.h"
 
 #include <algorithm>
@@ -7,7 +6,7 @@
 namespace dfm {
 namespace {
 
-// squared sine below which a cross product is too much rounding to judge distances by
+// squared sine below which a cross product is too inaccurate to decide by
 constexpr double kSolid = 1e-12;
 
 TrianglePoint on_corner(Vec3 p, Vec3 a, int corner) {
@@ -93,7 +92,8 @@ bool segments_within(Vec3 p0, Vec3 p1, Vec3 q0, Vec3 q1, double limit) {
     if (std::max(p0[k], p1[k]) + limit < std::min(q0[k], q1[k]) ||
         std::max(q0[k], q1[k]) + limit < std::min(p0[k], p1[k]))
       return false;
-  // Lines are never further apart than the segments on them. NaN goes on and fails the last comparison.
+  // The distance of lines is a lower bound for segments on them. NaN passes here and fails the last
+  // comparison.
   const Vec3 u = p1 - p0, w = q1 - q0, n = cross(u, w);
   const double along = dot(n, p0 - q0), nn = norm2(n);
   if (nn > kSolid * norm2(u) * norm2(w) && along * along > limit * limit * (1 + 1e-9) * nn) return false;

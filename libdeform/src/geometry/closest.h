@@ -39,7 +39,7 @@ struct SegmentPoints {
 };
 SegmentPoints closest_segments(Vec3 p0, Vec3 p1, Vec3 q0, Vec3 q1);
 
-// Are they no further apart than `limit`? Bounds first: most pairs that are asked for are far apart.
+// Whether they are at most `limit` apart. Checks bounds first, because most pairs are far apart.
 bool segments_within(Vec3 p0, Vec3 p1, Vec3 q0, Vec3 q1, double limit);
 bool triangle_within(Vec3 p, Vec3 a, Vec3 b, Vec3 c, double limit);
 

@@ -1,7 +1,7 @@
-// Which features stick out, and where to: an edge or a vertex can be the first of its surface to meet
-// something only along a direction that lies in its cone of normals. Along any other the surface beside it is
-// nearer, and the contact is that feature's. Of a flat patch the edges' cones are empty and the vertices'
-// have one direction; a patch that stays flat (a rigid mesh's) needs neither.
+// Cones of normals of edges and vertices: an edge or a vertex can be the first part of its surface to touch
+// only along a direction in its cone of normals. Along any other direction a neighboring feature is nearer
+// and gets the contact. Of a flat patch the edges' cones are empty and the vertices' have one direction; a
+// patch that stays flat (a rigid mesh's) needs neither.
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -11,13 +11,13 @@
 
 namespace dfm {
 
-// Sine of the fold: such an edge rises over its faces' corners by at most kConvex / 4 of its length, 0.005 of
-// the default d_c, so that nothing is felt when it comes or goes.
+// Sine of the fold angle: such an edge is higher than the corners of its faces by at most kConvex / 4 of its
+// length, 0.005 of the default d_c, so its contact begins and ends without a jump.
 inline constexpr double kConvex = 2e-5;
 
 // Sine of the fold at the positions x + ahead v, > 0 where the second face falls away from the first: -c0 .
 // r1 |e| / (|c0| |c1|), with r1 to the second face's far corner and c the faces' normals times twice their
-// areas. f(numerator, square of the denominator over |e|^2); an open edge is not asked.
+// areas. f(numerator, square of the denominator over |e|^2); not called for an open edge.
 template <class F>
 bool with_fold(const Surface &surface, uint32_t edge, double ahead, F &&f) {
   const uint32_t *ends = &surface.edge[2 * size_t{edge}], *tris = &surface.edge_tri[2 * size_t{edge}];
@@ -40,7 +40,7 @@ inline bool edge_open(const Surface &surface, uint32_t edge) {
   return surface.edge_tri[2 * size_t{edge}] == kNone || surface.edge_tri[2 * size_t{edge} + 1] == kNone;
 }
 
-// An open edge is as convex as can be.
+// An open edge counts as fully convex.
 inline bool edge_convex(const Surface &surface, uint32_t edge, double ahead = 0) {
   return edge_open(surface, edge) ||
          with_fold(surface, edge, ahead, [](double fold, double sine2, double one) {

@@ -8,12 +8,12 @@
 namespace dfm {
 namespace {
 
-constexpr uint32_t kRounds = 96;   // of the search for a distance; polytopes end it far earlier
-constexpr uint32_t kStrides = 96;  // of a cast: a path that grazes halves the rest each time
+constexpr uint32_t kRounds = 96;   // limit of the distance search; polytopes need far fewer
+constexpr uint32_t kStrides = 96;  // limit of a cast: a grazing path halves the remainder each time
 constexpr double kRounding = 4e-15;
 constexpr double kTouch = 1e-10;  // of the largest length
 
-// Points of the difference a - b, with the points of a and b that they are made of.
+// Points of the Minkowski difference a - b, with the points of a and b that form them.
 struct Simplex {
   Vec3 w[4], a[4], b[4];
   double weight[4];
@@ -29,7 +29,7 @@ struct Simplex {
       if (w[i].x == v.x && w[i].y == v.y && w[i].z == v.z) return true;
     return false;
   }
-  // Drops the points that the closest one does not need.
+  // Removes the points that do not contribute to the closest one.
   void keep(const double *by_weight, const uint32_t *which, uint32_t count) {
     Simplex old = *this;
     n = 0;
@@ -74,7 +74,7 @@ bool Simplex::reduce_tetrahedron() {
   for (const auto &f : faces) {
     const Vec3 normal = cross(w[f[1]] - w[f[0]], w[f[2]] - w[f[0]]);
     const double other = dot(normal, w[f[3]] - w[f[0]]), origin = dot(normal, -w[f[0]]);
-    // a flat tetrahedron has no inside
+    // a flat tetrahedron has no interior
     const bool flat = std::fabs(other) <= kRounding * norm(normal) * norm(w[f[3]] - w[f[0]]);
     if (!flat && other * origin > 0) continue;
     const TrianglePoint p = closest_on_triangle({}, w[f[0]], w[f[1]], w[f[2]]);
@@ -87,7 +87,7 @@ bool Simplex::reduce_tetrahedron() {
   return true;
 }
 
-// Of all lengths that a gap is made of, as seen from a's place.
+// Largest length in the computation of a gap, relative to the position of a.
 double length_of(const Convex &a, const Convex &b, Vec3 shift) {
   return a.reach() + norm(shift) + norm(b.position - a.position) + b.reach();
 }
@@ -175,7 +175,7 @@ ConvexGap convex_gap(const Convex &a, const Convex &b, Vec3 shift) {
     s.add(on_a, on_b);
     if (!s.reduce()) return {};
     const Vec3 next = s.sum(s.w);
-    if (!(norm2(next) < norm2(v))) {  // rounding: no better answer is to be had
+    if (!(norm2(next) < norm2(v))) {  // rounding: no further improvement is possible
       s = before;
       break;
     }

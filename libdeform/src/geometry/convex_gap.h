@@ -1,4 +1,5 @@
-// Distance of two convex shapes, and where one that moves straight on first touches the other.
+// Distance of two convex shapes, and the first contact of one that moves along a straight line with the
+// other.
 //
 // A shape is a core, the hull of a few points, and a radius around it: a sphere is a point, a capsule a
 // segment. The distance of two cores is found by the algorithm of Gilbert, Johnson and Keerthi (1988), with
@@ -34,18 +35,18 @@ Convex convex_triangle(Vec3 a, Vec3 b, Vec3 c);
 struct ConvexGap {
   bool apart = false;   // the cores do not meet
   double distance = 0;  // m, of the cores
-  double least = 0;     // m, proven: a plane across `normal` keeps the cores so far apart
+  double least = 0;     // m, proven lower bound: a plane across `normal` separates the cores by this distance
   Vec3 normal;          // unit, from b to a
   Vec3 on_a, on_b;
 };
-// a stands `shift` off its place.
+// a is displaced by `shift`.
 ConvexGap convex_gap(const Convex &a, const Convex &b, Vec3 shift = {});
-// Do the shapes touch? Touching counts, to rounding.
+// Whether the shapes overlap; touching counts, up to rounding.
 bool convex_touch(const Convex &a, const Convex &b);
 
-// The distance of two convex shapes is a convex function of the way of one of them. So Newton's method from
-// the start never goes too far: each step goes as far as the separating plane allows (conservative
-// advancement), and ends where the distance is below 1e-10 of the largest length.
+// The distance of two convex shapes is a convex function of the displacement of one of them, so Newton's
+// method from the start never goes too far: each step goes as far as the separating plane allows
+// (conservative advancement), until the distance is below 1e-10 of the largest length.
 struct ConvexHit {
   bool hit = false;
   bool inside = false;  // touched at the start

@@ -1,6 +1,6 @@
-// A convex shape and a surface of triangles, through the surface's tree. Boxes are left out only where no
-// triangle in them can change the answer, so answers are those of a look at every triangle: of equals the
-// lowest number.
+// A convex shape against a surface of triangles, through the tree of the surface. A box is skipped only if no
+// triangle in it can change the result, so results are those of a test of every triangle; of equal triangles
+// the lowest number.
 #pragma once
 #include <algorithm>
 
@@ -14,7 +14,7 @@ struct TriangleOnPath {
   ConvexHit hit;
   uint32_t triangle = kNone;
 };
-// The first triangle that the shape touches on its way, up to and with `limit`.
+// The first triangle that the shape touches, up to and including the distance `limit`.
 TriangleOnPath first_on_path(const Triangles &triangles, const Convex &shape, Vec3 unit, double limit);
 
 bool touches_any(const Triangles &triangles, const Convex &shape);
@@ -23,7 +23,7 @@ bool touches_any(const Triangles &triangles, const Convex &shape);
 // to rounding; p on the surface may count either way.
 int winding_by_ray(const Triangles &triangles, Vec3 p);
 
-// Takes the least of what is offered into the caller's memory; finish() puts it in order.
+// Keeps the smallest of the offered items in the caller's memory; finish() sorts them.
 template <class T>
 class Least {
  public:
@@ -39,7 +39,7 @@ class Least {
     out_[capacity_ - 1] = value;
     std::push_heap(out_, out_ + capacity_);
   }
-  uint32_t finish() {  // how many were offered
+  uint32_t finish() {  // returns the number of offered items
     std::sort(out_, out_ + std::min(count_, capacity_));
     return count_;
   }
@@ -49,10 +49,11 @@ class Least {
   uint32_t capacity_, count_ = 0;
 };
 
-// Numbers of the triangles that the shape touches or holds, the lowest ones; how many there are in all.
+// The lowest numbers of the triangles that the shape touches or contains, and their total count.
 uint32_t triangles_touched(const Triangles &triangles, const Convex &shape, uint32_t capacity, uint32_t *out);
 
-// f(distance, triangle) for all that a ray meets up to and with `limit`, in no order. As first_on_ray.
+// Calls f(distance, triangle) for all triangles on a ray up to and including `limit`, in no order. As
+// first_on_ray.
 template <class F>
 void all_on_ray(const Triangles &m, Vec3 o, Vec3 unit, double limit, F &&f) {
   if (m.tree.empty()) return;

@@ -1,7 +1,7 @@
-// An ellipsoid is the unit ball of the space that its semi-axes scale; there the question is how near the
-// tetrahedron comes to the segment on which the center goes. A box on a straight way and a blade are convex,
-// as the tetrahedron is: two convex bodies are apart if the normal of a face of one, or the product of an
-// edge of each, parts them.
+// In coordinates scaled by its semi-axes an ellipsoid is a unit ball; there the test is the distance of the
+// tetrahedron from the segment along which the center moves. A box swept along a straight line and a blade
+// are convex, like the tetrahedron: two convex bodies are disjoint if a face normal of one, or the cross
+// product of an edge of each, separates them.
 #include "geometry/cut_shape.h"
 
 #include <algorithm>
@@ -21,7 +21,7 @@ bool inside(Vec3 p, const Vec3 x[4]) {
   return whole != 0 && std::all_of(part, part + 4, [&](double v) { return v * whole >= 0; });
 }
 
-// Does the segment go through the triangle? Ends on its plane lie on the side of its normal.
+// Whether the segment passes through the triangle. An end on its plane counts as on the side of its normal.
 bool crosses(Vec3 p, Vec3 q, Vec3 a, Vec3 b, Vec3 c) {
   const Vec3 n = cross(b - a, c - a);
   if ((dot(n, p - a) >= 0) == (dot(n, q - a) >= 0)) return false;

@@ -1,4 +1,4 @@
-// Shapes that cut: which tetrahedra one meets on its way, and which segments it crosses.
+// Shapes that cut: the tetrahedra that a moving shape meets, and the segments that it crosses.
 //
 //   ellipsoid, box   at a pose, swept along a straight way
 //   blade            a quadrilateral: where an edge was, and where it is now
@@ -22,8 +22,8 @@ struct CutShape {
 
 // Corners in any order; one without volume counts as its hull. Touching counts as meeting.
 bool meets_tetrahedron(const CutShape &shape, const Vec3 corner[4]);
-// Does the segment from a to b go through the blade? An end on it counts as lying on the side that the
-// blade's normal points to, so that segments which go on from each other cross it once.
+// Whether the segment from a to b passes through the blade. An end on the blade counts as on the side to
+// which the blade's normal points, so that consecutive segments cross it once.
 bool crosses_blade(const CutShape &blade, Vec3 a, Vec3 b);
 
 }  // namespace dfm

@@ -46,7 +46,7 @@ ObstaclePoint ObstacleShape::closest(Vec3 p) const {
   }
   const Vec3 c = end_[0] + closest_on_segment(p, end_[0], end_[1]) * (end_[1] - end_[0]);
   const double d = norm(p - c);
-  // on the axis every direction is as good
+  // on the axis all directions are equal
   const Vec3 n = d > 1e-12 * view_.radius ? (1 / d) * (p - c) : axis_[0];
   return {c + view_.radius * n, n, d - view_.radius, 0};
 }
@@ -75,7 +75,8 @@ ObstaclePoint ObstacleShape::closest_on_box(Vec3 p) const {
     if (std::fabs(outside[k]) > std::fabs(outside[most])) most = k;
   const Vec3 r = outside.x * axis_[0] + outside.y * axis_[1] + outside.z * axis_[2];
   const double d = norm(outside);
-  // Straight above a face the axis itself is the normal: no rounding between two points of one face.
+  // Directly above a face the axis itself is the normal, so that all points of a face have exactly the same
+  // normal.
   int sides = 0;
   for (int k = 0; k < 3; ++k) sides += outside[k] != 0;
   const Vec3 n = sides == 1 ? (outside[most] < 0 ? -axis_[most] : axis_[most]) : normalized(r);
@@ -85,7 +86,7 @@ ObstaclePoint ObstacleShape::closest_on_box(Vec3 p) const {
 ObstaclePoint ObstacleShape::closest_on_voxels(Vec3 p) const {
   const VoxelGrid::Value value = view_.grid->at(local(p));
   const double g = norm(value.gradient);
-  // Halfway between two walls no direction is better than another.
+  // Halfway between two walls any direction is valid.
   const Vec3 n = g > 1e-6 ? normalized(rotate(view_.rotation, value.gradient)) : axis_[2];
   return {p - value.distance * n, n, value.distance, 0};
 }

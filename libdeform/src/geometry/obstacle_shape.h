@@ -1,5 +1,5 @@
-// An obstacle's shape in world coordinates: its axes, corners and signed distance. Made once per obstacle and
-// use, so that the many queries against it rotate nothing.
+// An obstacle's shape in world coordinates: its axes, corners and signed distance. Computed once per obstacle
+// and use, so that queries need no rotations.
 #pragma once
 #include <cstdint>
 
@@ -12,7 +12,7 @@ struct ObstaclePoint {
   Vec3 point;       // on the obstacle's surface
   Vec3 normal;      // unit, outward
   double distance;  // negative inside
-  uint32_t face;    // box: the face that the normal belongs to, or leans to most; else 0
+  uint32_t face;    // box: the face of the normal, or the nearest one to it; else 0
 };
 
 class ObstacleShape {
@@ -33,11 +33,11 @@ class ObstacleShape {
   Vec3 local(Vec3 p) const { return rotate_back(view_.rotation, p - view_.position); }
   // Voxels: may p, or a place near it, be nearer than `limit`? (VoxelGrid::near)
   bool voxels_near(Vec3 p, double limit) const;
-  // Velocity with which the shape at q moves, without the belt and without a round shape's spin about itself,
-  // which moves no surface.
+  // Velocity of the shape at q, without the belt, and without the spin of a round shape about itself, which
+  // does not move its surface.
   Vec3 shape_velocity(Vec3 q) const;
-  // Largest distance from position at which rotation moves the shape; 0 for a sphere; a plane has none (its
-  // caller bounds it).
+  // Largest distance from position of a point that rotation moves; 0 for a sphere; not for a plane, whose
+  // extent the caller bounds.
   double extent() const;
   // Axis-parallel bounds; not for a plane or a mesh.
   void bounds(double lo[3], double hi[3]) const;

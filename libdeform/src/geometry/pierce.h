@@ -1,5 +1,5 @@
-// Do triangles pass through each other? By signs of volumes as they round: good enough to tell what is
-// through from what is not, where nothing hangs on the last bit.
+// Whether triangles pass through each other, by signs of rounded volumes: accurate enough where the last bit
+// does not matter.
 #pragma once
 #include "geometry/surface.h"
 #include "math/vec3.h"
@@ -23,7 +23,7 @@ inline bool pierces(Vec3 p, Vec3 q, const Surface &s, uint32_t triangle) {
   return (v0 >= 0 && v1 >= 0 && v2 >= 0) || (v0 <= 0 && v1 <= 0 && v2 <= 0);
 }
 
-// Does an edge of triangle s of `from` pass through triangle t of `to`?
+// Whether an edge of triangle s of `from` passes through triangle t of `to`.
 inline bool edges_pierce(const Surface &from, uint32_t s, const Surface &to, uint32_t t) {
   const auto corner = [&](uint32_t k) { return load3(&from.x[4 * size_t{from.tri[3 * size_t{s} + k % 3]}]); };
   for (uint32_t k = 0; k < 3; ++k)

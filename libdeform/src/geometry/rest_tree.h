@@ -1,5 +1,5 @@
-// A tree of boxes over things at rest (points, cells, supports), for the searches that couplings are made
-// from. Built once, then only asked.
+// A tree of boxes over things at rest (points, cells, supports), for the construction of couplings. Built
+// once, never changed.
 #pragma once
 #include <algorithm>
 #include <cstdint>
@@ -11,8 +11,8 @@ namespace dfm {
 
 struct RestBox { Vec3 lo, hi; };
 
-// Cut in the middle of the longest side of the boxes' centers, items in order of (center, number): the tree
-// depends on its input alone.
+// Splits at the median along the longest extent of the box centers, items ordered by (center, number): the
+// tree depends on its input alone.
 class RestTree {
  public:
   RestTree(const Memory &memory, const Array<RestBox> &boxes);

@@ -1,7 +1,6 @@
-// The surface of one body: surfels, triangles, edges, patches, and where each surfel hangs on the
-// body's phyxels.
-// Filled once per topology by make_surface, and by wear_coupling where the body wears a surface of its own; x
-// and v are renewed every sub-step from the phyxels (N x_p).
+// The surface of one body: surfels, triangles, edges, patches, and the coupling of surfels to phyxels. Filled
+// once per topology by make_surface, and by wear_coupling for a separate surface; x and v are computed in
+// every sub-step from the phyxels (N x_p).
 #pragma once
 #include <cstdint>
 
@@ -32,10 +31,10 @@ struct Surface {
   Array<uint32_t> tri_owns;
   // [ntri] features that share an edge within 60 degrees of normal (rest shape) are one patch
   Array<uint32_t> patch;
-  // Of a body that has been cut: what keys of contacts call surfels, edges and triangles, so that those which
-  // a cut has left keep theirs; patch holds such names itself. Empty: their numbers.
+  // For a body that has been cut: names of surfels, edges and triangles in contact keys, so that remaining
+  // features keep theirs; patch contains such names itself. Empty: names are the numbers.
   Array<uint32_t> name[3];
-  // Of a piece that has come off a body, the oldest first: its contacts keep the keys that they had there.
+  // For a piece of a body, the oldest first: its contacts keep the keys that they had in the whole body.
   Array<NamedBy> named;
   // Id under which the name of a feature was given; `own` is the body's.
   uint64_t namer(uint32_t kind, uint32_t feature, uint64_t own) const {
@@ -55,17 +54,17 @@ struct Surface {
   // [nsurfel,3] m, as given; where N does not reproduce linear fields this is not N times the phyxels at rest
   Array<double> rest;
   bool identity() const { return row.empty(); }
-  // f(phyxel, weight) for all that surfel s hangs on.
+  // Calls f(phyxel, weight) for all phyxels of surfel s.
   template <class F>
   void each_phyxel(uint32_t s, F &&f) const {
     if (identity()) return f(point[s], 1.0);
     for (uint32_t j = row[s]; j < row[s + 1]; ++j) f(col[j], weight[j]);
   }
 
-  // Triangles that lay on others when a cut opened the face between them, and their surfels; `slit`: some
-  // lie on others of this surface. x of a piece is set back there by half of the rest distance of contacts:
-  // copies of a point in one place would touch along the normals of all faces around them, which no motion
-  // satisfies (doc/decisions/0398).
+  // Triangles that coincided with others when a cut opened the face between them, and their surfels; `slit`:
+  // some coincide with others of this surface. x of a piece is set back there by half of the rest distance of
+  // contacts: copies of a point in one place would touch along the normals of all faces around them, which no
+  // motion satisfies (doc/decisions/0398).
   Array<uint32_t> laid, laid_surfel;
   bool slit = false;
   double back = 0;     // m

@@ -62,7 +62,7 @@ TriangleNearPoint closest_to(const Triangles &m, Vec3 p, DistanceKey key, double
   const Box point{{p.x, p.y, p.z, 0}, {p.x, p.y, p.z, 0}};
   const auto bound = [&](const Box &b) { return box_distance2(point, b); };
   // A triangle is at least as far from p as the plane across `away` through that of its corners which lies
-  // farthest along it. Where triangles curve away from p this leaves out most of those whose boxes are near.
+  // farthest along it. If the triangles curve away from p, this skips most of those whose boxes are near.
   const auto behind = [&](Vec3 a, Vec3 b, Vec3 c) {
     return dot(away, p) - std::max({dot(away, a), dot(away, b), dot(away, c)}) > reach;
   };

@@ -1,6 +1,6 @@
 // The first triangle on a ray and the closest one to a point, through a tree of boxes. Nodes are visited
-// nearest first, and left out only where no triangle in them can do better, so the answers are those of a
-// look at every triangle: of equals the lowest number.
+// nearest first, and skipped only if no triangle in them can be better, so results are those of a test of
+// every triangle; of equal triangles the lowest number.
 #pragma once
 #include <cmath>
 #include <cstdint>
@@ -22,7 +22,7 @@ struct Triangles {
   Vec3 corner(uint32_t t, uint32_t k) const { return load3(x + 4 * size_t{corners[3 * size_t{t} + k]}); }
 };
 
-// Boxes and triangles that were looked at.
+// Numbers of visited boxes and triangles.
 struct SearchCount {
   uint64_t nodes = 0;
   uint64_t triangles = 0;

@@ -1,4 +1,4 @@
-// What the detection stages see of bodies and obstacles: plain views that step/ fills each sub-step.
+// The input of the detection stages: plain views of bodies and obstacles, filled by step/ in each sub-step.
 #pragma once
 #include <cstdint>
 
@@ -10,10 +10,10 @@ namespace dfm {
 struct BodyView {
   uint32_t slot, first_node;  // body slot in the world; node number of its surfel 0
   uint32_t category, collides_with;
-  uint64_t id;  // rises with creation: decides order, never a pointer
+  uint64_t id;  // increases with creation; decides the order, independent of addresses
   // surface->x: start of the sub-step; surface->v: velocity without contact (mean over the sub-step)
   const Surface *surface;
-  bool asleep = false;  // x stays as it is; it meets only what is awake or moves
+  bool asleep = false;  // x is constant; it can touch only things that are awake or move
 };
 
 enum class Shape : uint8_t { plane = 0, sphere = 1, box = 2, capsule = 3, mesh = 4, voxels = 5, none = 6 };
@@ -37,7 +37,7 @@ struct ObstacleView {
   // starts with. Contact takes most of it back, to first order (its rows are linear); squared it would
   // stay, as creep
   Vec3 linear;
-  Vec3 belt;  // velocity_surface: slips along, moves nothing
+  Vec3 belt;  // velocity_surface: velocity of the surface material, without motion of the shape
   bool moves() const { return norm2(velocity) + norm2(spin) != 0; }
   // Mean over the sub-step, from p to where the turn carries it: (exp(h spin) - 1) r / h to third order. The
   // first term alone is the tangent, and what sticks to a turntable would creep outwards by h spin^2 r / 2.
@@ -50,8 +50,8 @@ struct ObstacleView {
   }
 };
 
-// Feature pairs that may touch while no surfel has moved further than the skin allows: a superset of all
-// contacts until broad/ renews it.
+// Feature pairs that may touch while no surfel has moved further than the skin: a superset of all contacts
+// until broad/ rebuilds it.
 struct Candidate {
   uint32_t slot_a, slot_b;  // slot_b: obstacle slot where obstacle != 0
   // kVertexFace: surfel of a, triangle of b (a may be the higher body); kEdgeEdge: edges, a the lower body id
@@ -61,7 +61,7 @@ struct Candidate {
   uint8_t kind, obstacle;
 };
 
-// Of a Candidate or a ContactPoint: does a body meet itself?
+// For a Candidate or a ContactPoint: whether a body touches itself.
 template <class Pair>
 bool of_one_body(const Pair &p) {
   return !p.obstacle && p.slot_a == p.slot_b;

@@ -91,8 +91,8 @@ class Distances {
   WindingTree winding_;
 };
 
-// Signs of a block of n^3 corners `step` apart, x first: beside a corner that is further than the step from
-// the surface lies one of the same side, and only where neither is the winding number is asked.
+// Signs of a block of n^3 corners `step` apart, x first: a neighbor of a corner that is farther than the step
+// from the surface is on the same side; the winding number is computed only if there is no such neighbor.
 template <class At, class D>
 void add_signs(uint32_t nx, uint32_t ny, uint32_t nz, double step, const Distances &surface, At &&place,
                D &&d) {
@@ -128,7 +128,7 @@ VoxelGrid::VoxelGrid(const Memory &memory, const double *points, uint32_t ntri, 
     (size.x / s * (size.y / s) * (size.z / s) > cells ? small : large) = s;
   }
   cell_ = large;
-  // A box without height would be filled by cells without size, so the bricks are bounded too: a plate one
+  // In a box without height the cells would have no size, so the number of bricks is bounded too: a plate one
   // cell high has cells/8 of them.
   const auto bricks_of = [&](int k) { return std::ceil((size[k] + 2 * kBand * cell_) / (kBrick * cell_)); };
   while (bricks_of(0) * bricks_of(1) * bricks_of(2) > 512 + 0.5 * cells) cell_ *= 1.125;
@@ -235,7 +235,7 @@ VoxelGrid::Value VoxelGrid::at(Vec3 p) const {
     value = join(c, t, per_cell_ / kBrick);
   }
   const Vec3 beyond = p - w.inside;
-  if (norm2(beyond) > 0) {  // beside the grid: what is certain
+  if (norm2(beyond) > 0) {  // outside the grid: a certain bound
     const double way = norm(beyond);
     value.distance = std::max(value.distance - way, way + margin_);
   }

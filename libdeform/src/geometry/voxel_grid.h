@@ -1,10 +1,10 @@
-// Signed distances of a closed surface on a uniform grid: a static structure of any complexity answers a
-// surfel in constant time.
+// Signed distances of a closed surface on a uniform grid: the distance of a surfel takes constant time for
+// structures of any complexity.
 //
 // Distances at the corners of cells are joined trilinearly; they are kept (as floats, exact at the corners)
 // in bricks of 4 x 4 x 4 cells, and only for bricks near the surface, so that memory grows with the
-// surface. Everywhere else corners of bricks are joined, which is enough to know that something is far away
-// or deep inside.
+// surface. Elsewhere distances are interpolated between corners of bricks, which is accurate enough far
+// outside or deep inside.
 #pragma once
 #include <cstdint>
 
@@ -21,7 +21,7 @@ class VoxelGrid {
 
   struct Value {
     double distance;  // m, negative inside
-    Vec3 gradient;    // of what is joined; not a unit vector
+    Vec3 gradient;    // of the interpolation; not a unit vector
   };
 
   // points [.,3], tris [ntri,3] of a closed surface with an inside, outward. About `cells` cells fill its
@@ -34,11 +34,10 @@ class VoxelGrid {
   // they are off the true distance by at most half the diagonal of what is joined.
   bool near(Vec3 p, double limit) const;
 
-  // How near to p the surface may be for all that is known: no place within `way` of p has a distance below
-  // clearance(p) - way.
+  // Lower bound of the distance near p: no place within `way` of p has a distance below clearance(p) - way.
   double clearance(Vec3 p) const;
-  // The first share of the way from `from` at which the distance is not above `limit`; infinity: nowhere on
-  // it. Never late.
+  // The first share of the line from `from` at which the distance is not above `limit`; infinity if there is
+  // none. Never late.
   double touch(Vec3 from, Vec3 way, double limit) const;
 
   double cell() const { return cell_; }
@@ -48,8 +47,8 @@ class VoxelGrid {
   uint64_t bytes() const {
     return value_.size() * sizeof(float) + coarse_.size() * sizeof(float) + brick_.size() * sizeof(uint32_t);
   }
-  // Largest |distance| at the centers of the surface's triangles, m: the walls are thicker than the grid can
-  // tell where it is far below a cell.
+  // Largest |distance| at the centers of the surface's triangles, m: if it is far below the size of a cell,
+  // the grid resolves the walls.
   double error() const { return error_; }
 
  private:

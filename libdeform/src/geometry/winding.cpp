@@ -16,7 +16,7 @@ class AngleSum {
  public:
   void add(double x, double y) {
     const double size = std::fabs(x) + std::fabs(y);
-    if (!(size > 0)) return;  // the place is a corner of the triangle
+    if (!(size > 0)) return;  // the point is a corner of the triangle
     x /= size;
     y /= size;
     const double re = x_ * x - y_ * y, im = x_ * y + y_ * x, scale = 1 / (std::fabs(re) + std::fabs(im));

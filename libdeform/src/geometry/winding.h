@@ -1,7 +1,7 @@
-// How often a triangle surface winds around a place: 1 inside, 0 outside, and in between where the surface
-// has holes or triangles face the wrong way (Jacobson, Kavan and Sorkine-Hornung 2013). What a box of
-// triangles contributes from afar is summed as one dipole with its first correction (Barill, Dickson,
-// Schmidt, Levin and Jacobson 2018). Set-up code.
+// The winding number of a triangle surface around a point: 1 inside, 0 outside, and in between if the surface
+// has holes or wrongly oriented triangles (Jacobson, Kavan and Sorkine-Hornung 2013). The contribution of a
+// distant box of triangles is approximated by a dipole with its first correction (Barill, Dickson, Schmidt,
+// Levin and Jacobson 2018). Set-up code.
 #pragma once
 #include <cstdint>
 

@@ -1,6 +1,6 @@
-// Anderson acceleration (Walker and Ni 2011, type II) of a fixed-point map x -> x + f(x): of the last few
-// iterates, the combination whose f would be least is taken, and from there the next one. Once a map is
-// linear this is GMRES on its equation.
+// Anderson acceleration (Walker and Ni 2011, type II) of a fixed-point map x -> x + f(x): the next iterate
+// starts from the combination of the last few iterates whose f would be smallest. For a linear map this is
+// equivalent to GMRES on its equation.
 #pragma once
 #include <cstdint>
 
@@ -10,16 +10,17 @@ namespace dfm {
 
 inline constexpr uint32_t kAndersonWindow = 5;
 
-// gamma that makes |f - sum gamma_j df_j| least, from the products gram = df_i . df_j and y = df_j . f, which
-// is overwritten: normal equations by Cholesky, slightly regularized. False: not usable.
+// Computes the gamma that minimizes |f - sum gamma_j df_j| from the products gram = df_i . df_j and y = df_j
+// . f (overwritten), by the normal equations, slightly regularized, and Cholesky. Returns false if the result
+// is not usable.
 bool least_combination(uint32_t count, const double (*gram)[kAndersonWindow], double *y, double *gamma);
 
 class Anderson {
  public:
   explicit Anderson(const Memory &memory);
   void start(size_t n);
-  // d: from x, where the map asks for the change f, to the next iterate; equal to f at first. weight [n]: of
-  // the norm. d may be f.
+  // f: the change that the map asks for at x. d (output, may be f): from x to the next iterate; equal to f in
+  // the first call. weight [n]: weights of the norm.
   void next(const double *x, const double *f, const double *weight, double *d);
 
  private:

@@ -1,4 +1,4 @@
-// 3x3 matrices, row-major, as nine doubles: blocks of what acts between points.
+// 3x3 matrices, row-major, as nine doubles: the blocks of matrices that couple points.
 #pragma once
 #include "math/vec3.h"
 

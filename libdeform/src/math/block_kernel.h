@@ -1,6 +1,7 @@
 // Loops over 3x3 blocks, compiled for several vector widths. Every element sees the same operations in the
-// same order at each width. Blocks are stored column after column: a column is one load, whose last lane
-// holds what follows it and is ignored. So a double stands behind the last block.
+// same order at each width. Blocks are stored column after column. A column is loaded as one vector of four;
+// its last lane holds the next value in memory and is ignored. Therefore one more double must follow the last
+// block.
 #pragma once
 #include <cstddef>
 #include <cstdint>

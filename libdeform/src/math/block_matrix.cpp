@@ -34,7 +34,7 @@ void BlockMatrix::set_pattern(const BlockPattern &pattern) {
   for (uint32_t i = 0; i < n_; ++i) row_[i + 1] = row_[i] + (row_[i + 1] + 1) / 2 * 2;
   const uint32_t count = row_[n_];
   column_.assign(count, UINT32_MAX);
-  // Every row gets its columns, sorts them, and each block of the pattern looks up its two places.
+  // Collect the columns of every row, sort them, then look up the two places of each block of the pattern.
   diagonal_.assign(row_.begin(), row_.end() - 1);
   for (uint32_t b = 0; b < nb_; ++b) {
     const uint32_t i = pattern.ij[2 * size_t{b}], j = pattern.ij[2 * size_t{b} + 1];
@@ -58,7 +58,7 @@ void BlockMatrix::set_pattern(const BlockPattern &pattern) {
   }
   for (uint32_t i = 0; i < n_; ++i)
     if (column_[row_[i + 1] - 1] == UINT32_MAX) column_[row_[i + 1] - 1] = i;
-  value_.assign(9 * size_t{count} + 1, 0.0);  // and what the load of the last column reads
+  value_.assign(9 * size_t{count} + 1, 0.0);  // one more: the load of the last column reads it
 }
 
 void BlockMatrix::set_values(const double *blk) {

@@ -1,5 +1,5 @@
-// Symmetric matrices of 3x3 blocks between pairs of points: what a model's stiffness and an implicit step are
-// made of. Vectors are [n,3].
+// Symmetric matrices of 3x3 blocks between pairs of points: the stiffness of a model, the matrix of an
+// implicit step. Vectors are [n,3].
 #pragma once
 #include "core/memory.h"
 #include "core/tasks.h"
@@ -18,8 +18,8 @@ struct BlockPattern {
 // Rows and columns of held components become those of the identity; mask[n]: bits 1 x, 2 y, 4 z.
 void hold_components(const BlockPattern &pattern, const uint8_t *mask, double *blk);
 
-// The whole matrix by rows, both triangles stored: the product then reads once and in order, and its rows may
-// be shared among threads without changing one bit.
+// The whole matrix by rows, with both triangles stored: the product reads memory once and in order, and
+// threads can share its rows without changing any bit.
 class BlockMatrix {
  public:
   explicit BlockMatrix(const Memory &memory);
@@ -39,13 +39,13 @@ class BlockMatrix {
   void multiply(Tasks *tasks, const double *x, double *y) const;  // all rows; tasks may be null
 
   static constexpr uint32_t kGrain = 64;   // rows that one thread takes at a time
-  static constexpr uint32_t kAlone = 512;  // rows that one thread has done before another has started
+  static constexpr uint32_t kAlone = 512;  // rows up to which one thread alone is faster
 
  private:
   const BlockKernels &kernels_;
   uint32_t n_ = 0, nb_ = 0;
   Array<uint32_t> row_, column_, diagonal_;
-  Array<uint32_t> upper_, lower_;  // [nb] where block b of the pattern stands, as it is and transposed
+  Array<uint32_t> upper_, lower_;  // [nb] place of block b of the pattern, as it is and transposed
   Array<double> value_;
 };
 

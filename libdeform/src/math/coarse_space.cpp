@@ -13,8 +13,8 @@ namespace {
 // Motions of a patch are two coarse points: 2p its translation, 2p + 1 its rotation.
 constexpr uint32_t kPatches = 64;  // at least these many points each, and about so many patches
 constexpr uint32_t kMembers = 48;
-// Patches on a line, or of one point, do not feel all their motions: a little more on the diagonal keeps the
-// factorization, and what such a motion gets moves no point.
+// In a patch of one point, or of points on a line, some rigid motions move no point. A small addition to the
+// diagonal keeps the matrix factorizable; the value that such a motion gets has no effect.
 constexpr double kRidge = 1e-9;
 
 // a [w]x and [w]x^T a, where [w]x u = w x u; a row-major
@@ -41,8 +41,8 @@ CoarseSpace::CoarseSpace(const Memory &memory, Tasks *tasks) : tasks_(tasks), so
   use_memory(memory, arm_, free_, blk_, r_, y_);
 }
 
-// Patches grow breadth first from a point beside those there are; what is left over too small joins a
-// neighbor.
+// Patches grow breadth first, each from a point next to the existing patches. A remainder that is too small
+// joins a neighbor.
 void CoarseSpace::form_patches(const BlockRows &rows) {
   constexpr uint32_t kNone = UINT32_MAX;
   const uint32_t members = std::max(kMembers, n_ / kPatches);
@@ -111,7 +111,7 @@ void CoarseSpace::analyse(const BlockPattern &pattern, const BlockRows &rows) {
   solver_.analyse({2 * patches_, uint32_t(ij_.size() / 2), ij_.data()});
 }
 
-// A held component has the identity's row: no motion of its patch moves it.
+// A held component has a row of the identity: no motion of its patch moves it.
 void CoarseSpace::find_free(const BlockRows &rows) {
   for (uint32_t i = 0; i < n_; ++i)
     for (uint32_t r = 0; r < 3; ++r) {

@@ -1,5 +1,6 @@
-// The second level of a preconditioner: rigid motions of patches of points. Conjugate gradients with block
-// Jacobi alone carry a force from end to end of a body one point per iteration; here it arrives at once.
+// The second level of a preconditioner: rigid motions of patches of points. With block Jacobi alone,
+// conjugate gradients carry a force through a body by one point per iteration; with this level it arrives at
+// the other end in one iteration.
 //
 //   M^-1 = D^-1 + P (P^T A P)^-1 P^T      (additive, two levels)
 //
@@ -15,7 +16,8 @@ class CoarseSpace {
   CoarseSpace(const Memory &memory, Tasks *tasks);
 
   void analyse(const BlockPattern &pattern, const BlockRows &rows);
-  // points [n,stride]: where the patches turn now. False: not positive definite.
+  // points [n,stride]: present positions, about which the patches turn. Returns false if the matrix is not
+  // positive definite.
   bool factor(const BlockPattern &pattern, const double *blk, const BlockRows &rows, const double *points,
               uint32_t stride);
   // y = (P^T A P)^-1 P^T r; returns r.P y
@@ -31,7 +33,7 @@ class CoarseSpace {
 
   Tasks *tasks_;
   uint32_t n_ = 0, patches_ = 0;
-  Array<uint32_t> patch_;                  // [n] of a point
+  Array<uint32_t> patch_;                  // [n] patch of a point
   Array<uint32_t> member_begin_, member_;  // points of a patch
   Array<double> arm_;                      // [n,3] from the patch's center, in units of its radius
   Array<double> free_;                     // [n,3] 1, or 0 for a component that A ties to nothing

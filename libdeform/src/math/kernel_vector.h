@@ -3,7 +3,8 @@
 #pragma once
 
 #define DEFORM_INLINE static inline __attribute__((always_inline))
-// Loops over lanes and registers: arrays of vectors stay in registers only where no loop is left.
+// Unrolls loops over lanes and registers: the compiler keeps arrays of vectors in registers only if no loop
+// is left.
 #if defined(__clang__)
 #define DEFORM_UNROLL _Pragma("unroll")
 #else

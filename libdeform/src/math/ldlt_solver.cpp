@@ -18,9 +18,9 @@ constexpr double kDense = 6;
 constexpr double kPivot = 64 * std::numeric_limits<double>::epsilon();
 constexpr uint32_t kBlock = 24;         // columns of a panel that are factored at a time
 constexpr uint32_t kChunk = 96;         // columns that one pass over an update takes
-constexpr double kShared = 1.0e6;       // multiplications below which threads only wait for each other
+constexpr double kShared = 1.0e6;       // multiplications; below that threads cost more than they save
 constexpr uint32_t kTilesPerShare = 4;  // of kTileColumns columns
-// Points beyond those asked for that restricted() keeps: so many times as many, and so many.
+// How many points restricted() keeps beyond those of the present call: a factor, and a number.
 constexpr uint32_t kKeepTimes = 2, kKeep = 64;
 
 size_t rounded(size_t n) { return (n + kTileRows - 1) / kTileRows * kTileRows; }
@@ -48,7 +48,7 @@ void LdltSolver::analyse(const BlockPattern &pattern, const double *places) {
   find_places(pattern);
 }
 
-// Of the blocks of A in the panels, and memory for all that follows.
+// Finds the places of the blocks of A in the panels, and allocates the memory of all later calls.
 void LdltSolver::find_places(const BlockPattern &pattern) {
   ready_ = false;
   n_ = pattern.n;
@@ -104,8 +104,8 @@ void LdltSolver::assemble(uint32_t s, const double *blk, double *panel) {
     floor_[3 * size_t{nodes_.begin[s]} + k] = kPivot * panel[k + k * ld];
 }
 
-// The update of a child, lower triangle, goes to where its rows stand in the parent: into the panel, or into
-// the parent's own update.
+// Adds the update of a child (lower triangle) to the rows of the parent that it belongs to: in the panel, or
+// in the parent's own update.
 void LdltSolver::extend_add(uint32_t child, const double *update, uint32_t s, double *panel,
                             double *own) const {
   const uint32_t count = nodes_.below(child), width = nodes_.width(s);
@@ -275,8 +275,8 @@ void LdltSolver::forget_restricted() {
   }
 }
 
-// Supernodes that the points of panels from `first` on reach: their own and all above (Gilbert and Peierls
-// 1988).
+// Supernodes that the points of the panels from `first` on reach: their own and all ancestors (Gilbert and
+// Peierls 1988).
 void LdltSolver::find_reach(uint32_t first) {
   for (size_t c = size_t{first} * kLanes; c < row_.size(); c += kLanes) {
     const uint32_t begin = reach_begin_.back();
@@ -332,8 +332,8 @@ void LdltSolver::gram(uint32_t p, uint32_t q, double *sum) const {
   }
 }
 
-// Columns of the points in fresh_, and their products with all that are known. What a product is depends on
-// its two points alone, not on when they were asked for: rows are added in the order of elimination.
+// Columns of the points in fresh_, and their products with all known columns. A product depends on its two
+// points alone and not on the order of calls, because rows are added in the order of elimination.
 void LdltSolver::learn() {
   std::sort(fresh_.begin(), fresh_.end(),
             [&](uint32_t a, uint32_t b) { return nodes_.place[a] < nodes_.place[b]; });
@@ -359,8 +359,8 @@ void LdltSolver::learn() {
   });
 }
 
-// W = S P^T L^-T D^-1 L^-1 P S^T = Y^T Y with Y = D^-1/2 L^-1 P S^T: the forward half is enough. While a
-// factor serves, each point's half is found once.
+// W = S P^T L^-T D^-1 L^-1 P S^T = Y^T Y with Y = D^-1/2 L^-1 P S^T: forward substitution is enough. It is
+// done once for each point while a factor is in use.
 bool LdltSolver::restricted(uint32_t nsel, const uint32_t *sel, double, double *w, SolveInfo &info) {
   info = {};
   if (!ready_) return false;

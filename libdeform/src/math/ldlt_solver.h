@@ -1,5 +1,5 @@
 // Direct solver: A = P^T L D L^T P by a multifrontal factorization with supernodes. Order and pattern are
-// found once; factor() only computes.
+// found once; factor() computes values only.
 #pragma once
 #include "math/dense_kernel.h"
 #include "math/linear_solver.h"
@@ -14,7 +14,8 @@ class LdltSolver final : public LinearSolver {
   const char *name() const override { return "ldlt"; }
   bool direct() const override { return true; }
   void analyse(const BlockPattern &pattern) override;
-  // The same where the points are at [n,3]: the order that suits a solid body (nested_dissection.h).
+  // The same with the positions of the points, [n,3]: uses the order that suits a solid body
+  // (nested_dissection.h).
   void analyse(const BlockPattern &pattern, const double *places);
   bool factor(const double *blk) override;
   bool solve(uint32_t nrhs, const double *b, double *x, double tolerance, SolveInfo &info) override;
@@ -39,7 +40,7 @@ class LdltSolver final : public LinearSolver {
   void forward_reached(uint32_t p, double *panel);
   void gram(uint32_t p, uint32_t q, double *sum) const;
   template <class F>
-  void each(uint32_t count, F &&f) const;  // f(0) ... f(count - 1), on the threads there are
+  void each(uint32_t count, F &&f) const;  // calls f(0) ... f(count - 1), on all threads
   uint32_t slots() const { return tasks_ ? 2 * tasks_->threads() : 1; }
 
   const DenseKernels &kernels_;
@@ -58,8 +59,8 @@ class LdltSolver final : public LinearSolver {
   Array<uint32_t> waiting_;                        // supernodes whose updates are on the stack
   Array<double> panels_;                           // scratch: right-hand sides, [slot][3n][kLanes]
 
-  // What restricted() has found of the present factor: Y = D^-1/2 L^-1 P S^T of the points that it was asked
-  // for, and Y^T Y. Columns stand in panels of kLanes; every call that knows new points begins a panel.
+  // Results of restricted() for the present factor: Y = D^-1/2 L^-1 P S^T of the points of all calls so far,
+  // and Y^T Y. Columns are in panels of kLanes; every call with new points begins a new panel.
   uint32_t known_ = 0;      // points
   Array<uint32_t> row_;     // [columns] row of Y^T's unit vector in the order of elimination; kNone: empty
   Array<uint32_t> column_;  // [n] first column of a point, kNone

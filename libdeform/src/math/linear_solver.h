@@ -6,7 +6,7 @@ namespace dfm {
 
 struct SolveInfo {
   uint32_t iterations = 0;  // of all right-hand sides; 0 for a direct solver
-  double residual = 0;      // the largest relative residual that the solver stopped at, in its own norm
+  double residual = 0;      // the largest relative residual at the end, in the solver's own norm
   bool indefinite = false;  // a direction of negative or no curvature was met
 };
 
@@ -14,20 +14,21 @@ class LinearSolver {
  public:
   virtual ~LinearSolver() = default;
   virtual const char *name() const = 0;
-  // Exact up to rounding: neither the tolerance nor what x holds before the call matters.
+  // True: exact up to rounding; the tolerance and the initial x have no effect.
   virtual bool direct() const = 0;
-  // A new pattern; what is asked of the solver before the next factor() is void. Throws where memory ends.
+  // Sets a new pattern; call factor() before any solve. Throws if there is not enough memory.
   virtual void analyse(const BlockPattern &pattern) = 0;
-  // Where the points are now, [n,stride]: before factor(), read there. Who is told may need fewer iterations.
+  // Sets the present positions of the points, [n,stride], before factor(), which reads them. A solver that
+  // uses them may need fewer iterations.
   virtual void place(const double *points, uint32_t stride) {}
-  // New values blk[nb,9], read during the call only. False: the matrix is not positive definite, and nothing
-  // may be solved with it.
+  // Sets new values blk[nb,9], read during the call only. Returns false if the matrix is not positive
+  // definite; then no solve is allowed.
   virtual bool factor(const double *blk) = 0;
-  // b, x [nrhs][n,3], not overlapping; an iterative solver starts from x and ends where the residual is
-  // tolerance times that of x = 0. False: it did not get there; x is its best.
+  // b, x [nrhs][n,3], not overlapping; an iterative solver starts from x and ends when the residual is at
+  // most tolerance times that of x = 0. Returns false if it did not get there; x is then the best iterate.
   virtual bool solve(uint32_t nrhs, const double *b, double *x, double tolerance, SolveInfo &info) = 0;
-  // w[3 nsel, 3 nsel] = S A^-1 S^T, row-major and symmetric: how the selected points, each named once, answer
-  // forces on each other.
+  // w[3 nsel, 3 nsel] = S A^-1 S^T, row-major and symmetric: how the selected points (each given once)
+  // respond to forces on each other.
   virtual bool restricted(uint32_t nsel, const uint32_t *sel, double tolerance, double *w,
                           SolveInfo &info) = 0;
   // Multiplications of a factor() and of a right-hand side (or of one of its iterations), by the pattern
@@ -36,7 +37,7 @@ class LinearSolver {
   virtual double solve_work() const { return 0; }
 };
 
-// restricted() of a solver that can only solve: a right-hand side per column, some at a time.
+// restricted() for a solver that can only solve: one right-hand side per column, several at a time.
 class RestrictedBySolving {
  public:
   explicit RestrictedBySolving(const Memory &memory) { use_memory(memory, b_, x_); }

@@ -9,7 +9,8 @@ namespace dfm {
 
 namespace {
 
-// Points up to which a factor that serves many steps is worth its time and memory: doc/reference/solvers.md
+// Up to this number of points a factor that is used for many steps is worth its time and memory:
+// doc/reference/solvers.md
 constexpr uint32_t kFactored = 20000;
 
 }  // namespace

@@ -9,7 +9,7 @@ namespace dfm {
 struct SolverChoice {
   const char *name = "auto";    // "auto", "ldlt", "pcg"; plugin_solver.h knows those of plugins, too
   uint32_t points = 0;          // for "auto"
-  bool constant = false;        // the matrix stays as it is while the body lives
+  bool constant = false;        // the matrix never changes
   uint32_t max_iterations = 0;  // of an iterative solver, per right-hand side; 0: as many as there are rows
 };
 

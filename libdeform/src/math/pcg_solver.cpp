@@ -25,7 +25,7 @@ bool invert(const double *a, double *out) {
   return true;
 }
 
-constexpr uint32_t kTwoLevels = 200;  // points below which one level has done before two are set up
+constexpr uint32_t kTwoLevels = 200;  // below this number of points one level alone is faster
 
 }  // namespace
 
@@ -46,7 +46,7 @@ void PcgSolver::analyse(const BlockPattern &pattern) {
   a_.set_pattern(pattern);
   ij_.assign(pattern.ij, pattern.ij + 2 * size_t{pattern.nb});
   const size_t rows = 3 * size_t{pattern.n};
-  inverse_.assign(3 * rows + 1, 0.0);  // and what the load of the last column reads
+  inverse_.assign(3 * rows + 1, 0.0);  // one more: the load of the last column reads it
   for (Array<double> *v : {&r_, &z_, &p_, &q_}) v->assign(rows, 0.0);
   partial_.assign((pattern.n + BlockMatrix::kGrain - 1) / BlockMatrix::kGrain, 0.0);
 }
@@ -72,7 +72,7 @@ bool PcgSolver::factor(const double *blk) {
   return ready_;
 }
 
-// f(begin, end) for grains of the points, whatever the cut that a thread is given.
+// Calls f(begin, end) for each grain of points, however the work is divided among threads.
 template <class F>
 void PcgSolver::each(F &&f) {
   constexpr uint32_t kGrain = BlockMatrix::kGrain;
@@ -85,7 +85,7 @@ void PcgSolver::each(F &&f) {
   else grains(0, n);
 }
 
-// The sum of what f returns, grain after grain.
+// The sum of the values that f returns, added grain by grain in order.
 template <class F>
 double PcgSolver::sum(F &&f) {
   each([&](uint32_t begin, uint32_t end) { partial_[begin / BlockMatrix::kGrain] = f(begin, end); });

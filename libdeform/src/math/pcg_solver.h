@@ -1,5 +1,5 @@
-// Conjugate gradients with a preconditioner of inverted 3x3 blocks (block Jacobi), and of rigid motions of
-// patches where the solver knows the places of the points (coarse_space.h).
+// Conjugate gradients with a preconditioner of inverted 3x3 blocks (block Jacobi), and, if the solver knows
+// the positions of the points, of rigid motions of patches (coarse_space.h).
 #pragma once
 #include "math/coarse_space.h"
 
@@ -39,7 +39,7 @@ class PcgSolver final : public LinearSolver {
   CoarseSpace coarse_;
   const double *points_ = nullptr;
   uint32_t stride_ = 0;
-  bool two_levels_ = false, patched_ = false;  // at work; patches are formed
+  bool two_levels_ = false, patched_ = false;  // in use; patches exist
   RestrictedBySolving by_solving_;
 };
 

@@ -5,7 +5,7 @@
 
 namespace dfm {
 
-// r = U of f = U P, both row-major. False, and r as it was, where f is flat or turned inside out.
+// r = U of f = U P, both row-major. Returns false and leaves r unchanged if f is flat or inverted.
 inline bool polar_rotation(const double *f, double *r) {
   constexpr int kIterations = 12;
   constexpr double kFlat = 1e-3;  // of the volume of a cube with the same sum of squares

@@ -48,15 +48,15 @@ std::vector<uint32_t> elimination_tree(const Graph &earlier) {
   return parent;
 }
 
-// position[j] of column j where each subtree stands together and before its root.
+// position[j] of column j in postorder: each subtree is contiguous and precedes its root.
 std::vector<uint32_t> postorder(const std::vector<uint32_t> &parent) {
   const uint32_t n = uint32_t(parent.size());
   std::vector<uint32_t> size(n, 1), position(n);
   for (uint32_t j = 0; j < n; ++j)
     if (parent[j] != kNone) size[parent[j]] += size[j];
-  // A subtree's columns end with its root; its children fill what is before, the last child last.
+  // The root is the last column of its subtree; its children fill the columns before it, the last child last.
   uint32_t end = n;
-  std::vector<uint32_t> room(n);  // end of what a column's children have left to fill
+  std::vector<uint32_t> room(n);  // end of the range that the children of a column have not filled yet
   for (uint32_t j = n; j-- > 0;) {
     uint32_t &limit = parent[j] == kNone ? end : room[parent[j]];
     position[j] = limit - 1;
@@ -66,8 +66,8 @@ std::vector<uint32_t> postorder(const std::vector<uint32_t> &parent) {
   return position;
 }
 
-// May columns of one point each more be stored as if they had their parent's rows? A few zeros cost less than
-// many narrow panels.
+// Whether columns may be stored with the rows of their parent. A few stored zeros cost less than many narrow
+// panels.
 bool worth_merging(uint64_t columns, uint64_t zeros, uint64_t all) {
   const double share = double(zeros) / double(all);
   return columns <= 2 ? share < 0.8 : columns <= 6 ? share < 0.5 : columns <= 16 ? share < 0.2 : share < 0.05;
@@ -97,8 +97,8 @@ void Supernodes::build(const BlockPattern &pattern, const uint32_t *order) {
   const std::vector<uint32_t> above = elimination_tree(neighbors(pattern, place, false));
   const Graph later = neighbors(pattern, place, true);
 
-  // Rows of a column: those of the matrix and those of its children. Columns with the rows of the next one
-  // (and itself) join it at once.
+  // Rows of a column: those of the matrix and those of its children. A column whose rows are those of the
+  // next column, and the next column itself, joins it at once.
   struct Node {
     uint32_t begin, end, zeros;
     std::vector<uint32_t> rows;
@@ -113,7 +113,7 @@ void Supernodes::build(const BlockPattern &pattern, const uint32_t *order) {
     seen[row] = j;
     found.push_back(row);
   };
-  const auto merge = [&](Node &into) {  // the node before, which is its child
+  const auto merge = [&](Node &into) {  // the preceding node, which is its child
     Node &child = nodes[nodes.size() - 2];
     into.begin = child.begin;
     nodes.erase(nodes.end() - 2);
@@ -125,7 +125,7 @@ void Supernodes::build(const BlockPattern &pattern, const uint32_t *order) {
       for (const uint32_t row : nodes[node_of[c]].rows) add(j, row);
     std::sort(found.begin(), found.end());
     nodes.push_back({j, j + 1, 0, found});
-    // The child that ends where this begins: merged as long as it pays.
+    // Merge the child that ends where this node begins, as long as this reduces the cost.
     while (nodes.size() > 1) {
       Node &own = nodes.back();
       const Node &child = nodes[nodes.size() - 2];

@@ -1,4 +1,4 @@
-// What a factorization A = P^T L D L^T P of a block matrix looks like before any value is known.
+// The symbolic factorization of a block matrix, A = P^T L D L^T P: its structure before any value is known.
 #pragma once
 #include "math/block_matrix.h"
 
@@ -13,8 +13,8 @@ namespace dfm {
 //   rows[0]   | . . .  |      rows below: ascending, the same for all its columns
 //   rows[1]   | . . .  |
 //
-// A supernode's parent owns the first of its rows; children come before their parent and next to each other's
-// subtrees (postorder).
+// The parent of a supernode owns the first of its rows. Children precede their parent, and subtrees are
+// contiguous (postorder).
 struct Supernodes {
   static constexpr uint32_t kNone = UINT32_MAX;
 
@@ -34,7 +34,7 @@ struct Supernodes {
   Array<uint32_t> parent;     // [count] kNone at a root
   Array<uint32_t> row_begin;  // [count + 1] into rows
   Array<uint32_t> rows;       // columns of the matrix
-  Array<uint32_t> relative;   // as rows: where a row stands in the parent, pivots first
+  Array<uint32_t> relative;   // as rows: the place of a row in the parent, pivots first
   Array<size_t> value_begin;  // [count + 1] of the panels [3 width][3 height], column after column
   size_t stack = 0;           // doubles that the updates of children need at most
 };

@@ -1,4 +1,5 @@
-// sin in a step: + - * / only, so that the bits do not depend on which libm variant the processor picks.
+// sin in a step: + - * / only, so that the bits do not depend on the variant of libm that the processor
+// selects.
 #pragma once
 #include <cmath>
 

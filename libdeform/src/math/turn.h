@@ -1,5 +1,5 @@
-// Rotations: between two, and of a rigid body over a step: exponential map, its inverse, and the mean spin
-// that conserves angular momentum. + - * / sqrt only.
+// Rotations: interpolation, exponential map and its inverse, and the mean spin of a rigid body over a step
+// that conserves angular momentum. Uses + - * / sqrt only.
 #pragma once
 #include "math/trig.h"
 #include "math/vec3.h"
@@ -12,7 +12,8 @@ inline Quat unit(Quat q) {
 }
 inline Quat conjugate(Quat q) { return {-q.x, -q.y, -q.z, q.w}; }
 
-// Of a rotation matrix, row-major: from its largest component, so that nothing cancels (Shepperd 1978).
+// The quaternion of a rotation matrix (row-major), from its largest component, which avoids cancellation
+// (Shepperd 1978).
 inline Quat quat_of(const double *r) {
   const double trace = r[0] + r[4] + r[8];
   Quat q{r[7] - r[5], r[2] - r[6], r[3] - r[1], 1 + trace};
@@ -24,8 +25,8 @@ inline Quat quat_of(const double *r) {
   return unit(q);
 }
 
-// From a to b along the shorter arc, s in [0,1]. Halving the arc needs square roots only: the midpoint of two
-// unit quaternions is their normalized sum. 52 halvings follow the bits of s.
+// Interpolates from a to b along the shorter arc, s in [0,1]. Halving the arc needs square roots only: the
+// midpoint of two unit quaternions is their normalized sum. 52 halvings follow the bits of s.
 inline Quat slerp(Quat a, Quat b, double s) {
   if (a.x * b.x + a.y * b.y + a.z * b.z + a.w * b.w < 0) b = {-b.x, -b.y, -b.z, -b.w};
   for (int bit = 0; bit < 52 && s > 0; ++bit) {

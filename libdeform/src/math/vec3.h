@@ -1,5 +1,4 @@
-// Three doubles and the few operations that geometry needs. No FMA, no reordering: the bits are the same
-// on every build.
+// Vectors of three doubles and their operations. No FMA, no reordering: every build gives the same bits.
 #pragma once
 #include <cmath>
 
@@ -35,7 +34,7 @@ inline Vec3 normalized(Vec3 a) {
 }
 // Signed volume of a tetrahedron: positive where a, b, c run counter-clockwise seen from d's other side.
 inline double tet_volume(Vec3 a, Vec3 b, Vec3 c, Vec3 d) { return dot(cross(b - a, c - a), d - a) / 6; }
-// A unit vector orthogonal to the unit vector n; depends on n alone, so that equal frames come out equal.
+// A unit vector orthogonal to the unit vector n; depends on n alone, so that equal normals give equal frames.
 inline Vec3 any_tangent(Vec3 n) {
   const double ax = std::fabs(n.x), ay = std::fabs(n.y), az = std::fabs(n.z);
   const Vec3 e = ax <= ay && ax <= az ? Vec3{1, 0, 0} : ay <= az ? Vec3{0, 1, 0} : Vec3{0, 0, 1};
@@ -53,8 +52,8 @@ inline Quat operator*(Quat a, Quat b) {
   return {a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y, a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x,
           a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w, a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z};
 }
-// All zero reads as identity (dfm_pose). Lengths whose square a double does not hold are brought
-// near one first.
+// A quaternion of zeros is read as the identity (dfm_pose). Lengths whose square overflows or underflows are
+// scaled first.
 inline Quat unit_quat(const double q[4]) {
   const double n = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
   if (n > 1e-150 && n < 1e150) return {q[0] / n, q[1] / n, q[2] / n, q[3] / n};

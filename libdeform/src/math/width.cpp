@@ -20,7 +20,7 @@ const DenseKernels &dense_kernels() {
   return width == 8 ? dense_kernels_avx512() : width == 4 ? dense_kernels_avx2() : dense_kernels_sse2();
 }
 
-// A row of a block has three doubles: vectors of eight find no use.
+// A row of a block has three doubles: vectors of eight would be half empty.
 const BlockKernels &block_kernels() {
   return doubles_at_once() >= 4 ? block_kernels_avx2() : block_kernels_sse2();
 }

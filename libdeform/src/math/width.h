@@ -5,7 +5,8 @@
 
 namespace dfm {
 
-// The widest that this processor has, or what DEFORM_SIMD (sse2, avx2, avx512) asks for where it has that.
+// The widest that this processor supports, or the one that DEFORM_SIMD names (sse2, avx2, avx512) if it is
+// supported.
 int doubles_at_once();
 const DenseKernels &dense_kernels();
 const BlockKernels &block_kernels();

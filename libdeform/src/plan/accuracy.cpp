@@ -24,7 +24,7 @@ double ns_per_point(const std::vector<CostAt> &costs, double points) {
   while (k + 1 < costs.size() && costs[k].points < points) ++k;
   const CostAt &a = costs[k - 1], &b = costs[k];
   const double slope = std::max(std::log(b.ns / a.ns) / std::log(b.points / a.points), -1.0);
-  // below the least size cost per point stays, for what is small fits the caches all the same
+  // below the smallest size the cost per point is constant, since small bodies fit the caches
   return a.ns * std::pow(std::max(points, costs[0].points) / a.points, slope);
 }
 
@@ -60,8 +60,8 @@ double mesh_error(const BodyRegime &b) {
   return at_most((b.held ? kBending : kElse) / (cells * cells), 1);
 }
 
-// What the scheme does to the lowest mode until damping has ended it; how far a body goes between two looks
-// at what it may touch; and how much of a rebound backward Euler takes away, which all that follows lacks.
+// The error of the scheme in the lowest mode until damping has ended it; the distance that a body moves
+// between two detections; and the share of a rebound that backward Euler removes.
 double time_error(Scheme scheme, bool steps_itself, double h, const BodyRegime &b, const Estimate &e) {
   const double wh = e.frequency * h, turns = e.frequency * e.lasts;
   double oscillation = 0;
@@ -113,8 +113,8 @@ BodyWay way_of(const MeasuredModel &m, Scheme scheme, double h, const Try &t, co
 
 double sum(const BodyWay &w) { return w.model_error + w.time_error; }
 
-// Less is better. With a target: whoever meets it by cost, the others by error. With a budget the other way
-// round.
+// Smaller is better. With a target: choices that meet it are ordered by cost, the others by error. With a
+// budget the other way round.
 bool better(const BodyWay &a, const BodyWay &b, const Wish &wish, double budget) {
   const bool errs = wish.target > 0;
   const bool am = errs ? sum(a) <= wish.target : a.cpu_s_per_s <= budget;
@@ -145,7 +145,7 @@ class Planner {
       out_.found = true;
       if (first || wins(w, out_.way)) out_.way = w;
     }
-    // who is dearer than another and errs as much is not worth a line
+    // skip choices that cost more than another without a smaller error
     double least = 2;
     std::erase_if(out_.considered, [&](const Way &w) {
       const bool behind = reach(w) >= least;
@@ -292,7 +292,7 @@ Estimate estimate(const BodyRegime &b, double duration) {
   const double weight = b.load * b.length / (c * c);  // rho a L / E
   double deflection = 0;                              // over the length
   if (b.held) {
-    // a load that comes at once swings beyond its rest
+    // a load that is applied at once overshoots the rest position
     const double swing = 1 + std::exp(-kPi * at_most(rate / e.frequency, 10));
     deflection = at_most(swing * 1.5 * weight * slender * slender, 1);
     e.strain = at_most(swing * std::max(weight, 3 * weight * slender), 1);

@@ -1,7 +1,7 @@
 // The planner: which model, integrator and step reach an accuracy for the least processor time, or the best
-// accuracy for a given time. It predicts, before anything moves, from a few numbers of each body and from
-// what models were measured to cost and to leave out (`deform calibrate`); it may be wrong, so it says what
-// it assumed. Rules and their sources: doc/concepts/planner.md.
+// accuracy for a given time. It predicts before the first step, from a few numbers of each body and from
+// measured costs and errors of models (`deform calibrate`). It may be wrong, so it states its assumptions.
+// Rules and their sources: doc/concepts/planner.md.
 #pragma once
 #include <array>
 #include <cmath>
@@ -11,9 +11,10 @@
 
 namespace dfm {
 
-// ---- what was measured -----------------------------------------------------------------------------------
+// ---- measured costs and errors
+// -----------------------------------------------------------------------------------
 
-// Ways to advance a body. A model that steps itself has only the first.
+// Time integration schemes. A model that steps itself has only the first.
 enum class Scheme { explicit_euler, implicit_euler, tr_bdf2 };
 inline constexpr size_t kSchemes = 3;
 const char *scheme_name(Scheme scheme);  // as a scene names it
@@ -22,8 +23,8 @@ struct CostAt {
   double points = 0, ns = 0;  // of a body; processor time of one sub-step per point
 };
 
-// What a body meets, by what a sub-step costs: nothing; the ground that it lies on; a probe that presses
-// it while it is held; another deformable body.
+// What a body touches, which determines the cost of a sub-step: nothing; the ground; a probe that presses it
+// while it is held; another deformable body.
 enum class Meets { nothing, ground, probe, body };
 inline constexpr size_t kMeets = 4;
 const char *meets_name(Meets meets);  // as a file of costs names it
@@ -43,11 +44,11 @@ struct MeasuredModel {
 };
 
 struct Measured {
-  std::string machine;  // where, with which compiler and version of the library
+  std::string machine;  // machine, compiler and version of the library
   std::vector<MeasuredModel> models;
 };
 
-// ---- what is to be planned -------------------------------------------------------------------------------
+// ---- input of the planner -------------------------------------------------------------------------------
 
 struct BodyRegime {
   std::string name;
@@ -81,15 +82,15 @@ struct Wish {
   double step = 0;         // s, that the scene names; 0: to be chosen
 };
 
-// ---- what comes out --------------------------------------------------------------------------------------
+// ---- results --------------------------------------------------------------------------------------
 
-// What decides the behavior of one body, from its numbers.
+// Numbers that determine the behavior of one body.
 struct Estimate {
   double wave_speed = 0;  // m/s
   double frequency = 0;   // rad/s of the lowest mode
   double strain = 0, rotation = 0;
   double sag = 0;    // m, of the shape
-  double lasts = 0;  // s, until damping has ended what moves
+  double lasts = 0;  // s, until damping has ended the motion
 };
 Estimate estimate(const BodyRegime &body, double duration);
 // Whether it is touched over less than its own thickness, which dents it where it is touched.
@@ -111,10 +112,10 @@ struct Way {
 };
 
 struct PlannedWay {
-  bool found = false;  // else no model can be chosen: nothing measured fits
+  bool found = false;  // false: no model can be chosen, because no measurement applies
   bool meets = false;  // target or budget
   Way way;
-  std::vector<Way> considered;       // the front: by cost, each with less error than all that cost less
+  std::vector<Way> considered;       // the Pareto front: by cost, each with less error than all cheaper ones
   std::vector<std::string> assumed;  // sentences
 };
 PlannedWay plan_accuracy(const std::vector<BodyRegime> &bodies, const Measured &measured, const Wish &wish);

@@ -11,7 +11,7 @@ namespace {
 constexpr double kCheaper = 4;
 
 struct Cost {
-  double substeps = 1;  // that whoever stays explicit needs
+  double substeps = 1;  // sub-steps that the explicit bodies need
   double work = 0;      // of one
 };
 
@@ -24,9 +24,9 @@ bool stays(const IntegratorOption &b) { return !b.open || b.implicit_work == 0; 
 
 }  // namespace
 
-// The stiffest so many of them, and more of them only where that is four times cheaper again.
+// Makes the stiffest bodies implicit, and further ones only if that is cheaper by another factor of four.
 void choose_integrators(std::vector<IntegratorOption> &bodies) {
-  Cost rest;  // whose integrator is not to be chosen
+  Cost rest;  // bodies whose integrator is fixed
   std::vector<size_t> order;
   for (size_t i = 0; i < bodies.size(); ++i) {
     if (stays(bodies[i])) add(rest, bodies[i], bodies[i].implicit);

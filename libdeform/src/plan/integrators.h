@@ -1,6 +1,6 @@
-// Which bodies move implicitly, where that is left to the library. All bodies of a world take the same
-// sub-steps, so the choice is one for all of them: explicit bodies bound the sub-step, and whoever moves
-// implicitly beside them pays for each of theirs (doc/decisions/0170-integrators-by-cost.md).
+// Chooses which bodies move implicitly, if the host leaves it to the library. All bodies of a world take the
+// same sub-steps, so the choice is made for all of them together: explicit bodies bound the sub-step, and
+// implicit bodies pay for each of these sub-steps (doc/decisions/0170-integrators-by-cost.md).
 #pragma once
 #include <cstdint>
 #include <string>
@@ -10,10 +10,10 @@ namespace dfm {
 
 // How one body may move.
 struct IntegratorOption {
-  double substeps = 1;       // that it would take explicitly in a step
+  double substeps = 1;       // explicit sub-steps per step
   double work = 1;           // of one of them
-  double implicit_work = 0;  // over `work`, of an implicit one; 0: it cannot move implicitly
-  bool open = false;         // to be chosen; else it moves as `implicit` says
+  double implicit_work = 0;  // of an implicit one, relative to `work`; 0: it cannot move implicitly
+  bool open = false;         // to be chosen; otherwise `implicit` is given
   bool implicit = false;
 };
 

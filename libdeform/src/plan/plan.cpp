@@ -31,7 +31,7 @@ void plan_effects(const SceneFacts &f, Plan &plan) {
            name.c_str(), idle.c_str(), idle.c_str());
     if (by.empty()) {
       const std::string could = provider(f.available, name);
-      if (f.bodies == 0 && !could.empty()) {  // an empty world: whoever comes first may provide it
+      if (f.bodies == 0 && !could.empty()) {  // an empty world: later bodies may provide it
         plan.effects.push_back({name, "effects", ""});
         continue;
       }

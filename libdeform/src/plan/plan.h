@@ -1,7 +1,6 @@
-// The plan: which stages a sub-step runs, and which effects they are there for, derived from what the scene
-// contains. A stage that nothing calls for is not in the list, so it costs no instruction; `deform explain`
-// prints both lists with the reasons. The order of the stages is that of the contact method's table
-// (step/method.h).
+// The plan: which stages a sub-step runs, and for which effects, derived from the contents of the scene. A
+// stage that is not needed is not in the list, so it costs no instruction; `deform explain` prints both lists
+// with reasons. The order of the stages is that of the contact method's table (step/method.h).
 #pragma once
 #include <cstddef>
 #include <string>
@@ -11,17 +10,17 @@
 
 namespace dfm {
 
-// What a stage does that other stages ask the plan about; most stages are asked for by nobody.
+// Functions of stages on which other stages depend; most stages have none.
 enum class StageRole {
   none,
   lists_pairs,     // candidates of pairs, and how fast surfaces are
   finds_contacts,  // contacts of pairs
   solves,          // contacts act on bodies
-  gives_impulses,  // and they do so by impulses on points
+  gives_impulses,  // as impulses on points
   guards,          // nothing crosses at the end of the sub-step
 };
 
-// What the plan is derived from.
+// Input of the plan.
 struct SceneFacts {
   unsigned bodies = 0, self_stepping = 0, obstacles = 0;
   unsigned coupled = 0, coupled_surfels = 0;    // bodies with a surface of their own, and its surfels
@@ -31,20 +30,20 @@ struct SceneFacts {
   std::string rigid_hosts;  // names
   bool gravity_keys = false, loads_vary = false, held_move = false, obstacles_move = false, unguarded = false;
   struct Provider { std::string effect, plugin; };
-  // by models and laws that the scene uses, as their parameters stand
+  // by models and laws of the scene, with their present parameters
   std::vector<Provider> offered;
-  // by models and laws that the scene uses, if their parameters called for it
+  // by models and laws of the scene, with suitable parameters
   std::vector<Provider> idle;
   std::vector<Provider> available;  // by every loaded plugin
   bool effects_listed = false;
   bool sleep = false;                    // islands at rest may sleep
   bool self = false, self_auto = false;  // contact.self
   unsigned self_bodies = 0;              // bodies that may touch themselves, filters applied
-  bool self_cut = false;                 // one of them does because it has been cut
+  bool self_cut = false;                 // one of them because it has been cut
   std::vector<std::string> asked;        // where listed
 };
 
-// Does a stage run, and why; where it does not: why not, or nothing where that is not worth a line.
+// Whether a stage runs, and why; if it does not: why not, or empty if that is obvious.
 struct StageChoice {
   bool runs = false;
   std::string why;
@@ -83,11 +82,10 @@ struct Plan {
 };
 
 inline constexpr char kSelfAuto[] = "contact.self auto";
-// Who calls for self contact: "contact.self", "effects", the effect that needs it; "" where nobody does.
+// What calls for self contact: "contact.self", "effects", or the effect that needs it; "" if nothing does.
 std::string self_asked_by(const SceneFacts &facts);
 
-// The effects. Throws Error(DFM_E_ARG) where a listed one is provided by nothing in the scene;
-// names who could.
+// The effects. Throws Error(DFM_E_ARG) if nothing in the scene provides a listed one; names what could.
 void plan_effects(const SceneFacts &facts, Plan &plan);
 
 }  // namespace dfm

@@ -1,4 +1,4 @@
-// When a stage runs, and what `deform explain` says of it.
+// When a stage runs, and its text in `deform explain`.
 #include "plan/plan.h"
 
 #include "core/error.h"
@@ -26,7 +26,7 @@ std::string rigids(const SceneFacts &f) {
          count(f.rigid_joints, "joint", "joints") + " of host " + f.rigid_hosts;
 }
 
-// What acts on bodies through their surfaces.
+// Loads that act on bodies through their surfaces.
 bool acts(const SceneFacts &f) { return touches(f) || f.attachments; }
 StageChoice of_contact(const SceneFacts &f) {
   if (!f.attachments) return touches(f) ? runs(who(f)) : left_out(nobody(f));

@@ -1,5 +1,5 @@
-// What must hold on both sides of a call into a plugin: the thread computes with the host's rounding mode,
-// denormals and exception masks again, and it can be asked which plugin it is in.
+// Guards around calls into plugins: the rounding mode, denormal handling and exception masks of the host are
+// restored, and the plugin that a thread is in can be queried.
 #pragma once
 #include <array>
 #include <atomic>
@@ -17,9 +17,9 @@ namespace dfm {
 class FloatEnv {
  public:
   static FloatEnv now() noexcept;
-  void apply() const noexcept;  // out of line: no arithmetic of the caller may be moved before it
+  void apply() const noexcept;  // not inline, so that no arithmetic of the caller moves before it
   bool operator==(const FloatEnv &) const = default;
-  // What differs from `other`, for a sentence: "the rounding mode".
+  // What differs from `other`, as text: "the rounding mode".
   const char *difference(const FloatEnv &other) const noexcept;
 
  private:
@@ -74,12 +74,12 @@ inline FloatEnv FloatEnv::now() noexcept {
 inline const char *FloatEnv::difference(const FloatEnv &) const noexcept { return "the rounding mode"; }
 #endif
 
-// Which plugin this thread is in: for dfm_plugin_running. Plain pointers, so that a handler of a signal
-// may read them.
+// The plugin that this thread is in, for dfm_plugin_running. Plain pointers, so that signal handlers can read
+// them.
 struct Running { const char *who = nullptr, *what = nullptr; };
 extern constinit thread_local Running running;
 
-// Stands around every call into a plugin.
+// An object of this type surrounds every call into a plugin.
 class Boundary {
  public:
   Boundary(const char *who, const char *what) noexcept : before_(FloatEnv::now()), outer_(running) {
@@ -91,7 +91,7 @@ class Boundary {
   }
   Boundary(const Boundary &) = delete;
   Boundary &operator=(const Boundary &) = delete;
-  // Puts the floating-point environment back; what the call had changed, or null.
+  // Restores the floating-point environment; returns what the call had changed, or null.
   const char *restore() noexcept {
     const FloatEnv after = FloatEnv::now();
     if (after == before_) return nullptr;
@@ -104,7 +104,8 @@ class Boundary {
   Running outer_;
 };
 
-// Remembers what was said once. Has room for some and allocates nothing; what finds none is not said.
+// Remembers which messages have been given. Has limited room and does not allocate; without room a message is
+// dropped.
 class SaidOnce {
  public:
   bool first(const void *about) noexcept {

@@ -1,5 +1,5 @@
-// Every call into a plugin goes through here: what it took as scratch is given back, the floating-point
-// environment is put back, an exception becomes a status, and a failure is logged under the plugin's name.
+// Every call into a plugin goes through this: its scratch memory is returned, the floating-point environment
+// is restored, an exception becomes a status, and a failure is logged with the plugin's name.
 #pragma once
 #include "plugin/boundary.h"
 #include "plugin/context.h"

@@ -22,8 +22,8 @@ void host_release(void *ctx, void *p, size_t bytes, size_t align) {
   if (p) memory.release(memory.user, p, bytes, align);
 }
 
-// Outside a PluginCall (a thread of the plugin's own) each piece replaces the one before it, so that memory
-// stays bounded.
+// Outside a PluginCall (on a thread of the plugin) each piece replaces the previous one, so that memory stays
+// bounded.
 void *host_scratch(void *ctx, size_t bytes) {
   dfm::ScratchArena *arena = self(ctx).scratch.arena();
   if (!arena) return nullptr;
@@ -47,7 +47,7 @@ void host_parallel_for(void *ctx, uint32_t n, uint32_t grain, void (*fn)(void *,
   dfm_context &context = self(ctx);
   const dfm::Running caller = dfm::running;
   context.tasks.parallel_for(n, grain, [&](uint32_t begin, uint32_t end) {
-    // what a worker took as scratch is given back when its block is done
+    // scratch memory of a worker is returned at the end of its block
     const dfm::PluginCall call(context.scratch);
     const dfm::Boundary boundary(caller.who, caller.what);
     fn(user, begin, end);
@@ -102,7 +102,7 @@ void dfm_context::log(int32_t level, const char *utf8) const noexcept {
     try {
       hooks.log(hooks.user, level, utf8);
     } catch (...) {
-      // a hook in C++ that ran out of memory: what it had to say is lost, the caller's work is not
+      // a C++ hook ran out of memory: its message is lost, the caller's work continues
     }
   } else if (level >= DFM_LOG_WARNING) {
     std::fprintf(stderr, "deform: %s: %s\n", level >= DFM_LOG_ERROR ? "error" : "warning", utf8);

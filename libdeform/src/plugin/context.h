@@ -1,5 +1,4 @@
-// The context: hooks of the host, what is lent to plugins, what plugins are loaded, and the objects
-// that live in it.
+// The context: hooks of the host, services for plugins, loaded plugins, and the objects created in it.
 #pragma once
 #include <atomic>
 #include <cstdint>
@@ -17,11 +16,11 @@
 
 struct dfm_context {
   explicit dfm_context(const dfm_context_def &def);
-  ~dfm_context();  // destroys what lives in it, newest first, then the plugins
+  ~dfm_context();  // destroys its objects, newest first, then the plugins
   dfm_context(const dfm_context &) = delete;
   dfm_context &operator=(const dfm_context &) = delete;
 
-  // To the host's hook; without one, warnings and errors go to stderr.
+  // Logs to the host's hook; without one, warnings and errors go to stderr.
   void log(int32_t level, const char *utf8) const noexcept;
   void logf(int32_t level, const char *format, ...) const noexcept __attribute__((format(printf, 3, 4)));
   void trace_begin(const char *zone) const {
@@ -31,20 +30,20 @@ struct dfm_context {
     if (hooks.trace_end) hooks.trace_end(hooks.user, zone);
   }
 
-  // Worlds, laws and scenes stand here so that dfm_context_destroy can end them: destroy(handle) is called
-  // for those still listed.
+  // Worlds, laws and scenes are listed so that dfm_context_destroy can destroy them: destroy(handle) is
+  // called for those still in the list.
   void add_live(uint64_t handle, void (*destroy)(uint64_t));
   void remove_live(uint64_t handle) noexcept;
 
-  dfm_context_def hooks;  // what the host lent
+  dfm_context_def hooks;  // given by the host
   dfm::Memory memory;
   dfm::Tasks tasks;
   dfm::Scratch scratch;
-  dfm_host host;  // what we lend to plugins
+  dfm_host host;  // given to plugins
   dfm::Registry registry;
   dfm::Loader loader;
   dfm::SaidOnce left_changed;      // types that left the floating-point environment changed
-  std::atomic<uint32_t> calls{0};  // of the API that are in progress in it or in its worlds (api/call.h)
+  std::atomic<uint32_t> calls{0};  // calls of the API in progress in it or in its worlds (api/call.h)
   std::atomic<bool> ending{false};
 
  private:
@@ -54,18 +53,18 @@ struct dfm_context {
 
 namespace dfm {
 
-// While it stands, an error that a plugin logs on this thread is kept here instead: who has called the plugin
-// says it in its own sentence. The first one counts; allocates nothing.
+// During its lifetime, an error that a plugin logs on this thread is kept here instead, and the caller of the
+// plugin includes it in its own message. Keeps the first one; does not allocate.
 class Overheard {
  public:
   Overheard() noexcept : outer_(now_) { now_ = this; }
   ~Overheard() { now_ = outer_; }
   Overheard(const Overheard &) = delete;
   Overheard &operator=(const Overheard &) = delete;
-  const char *text() const { return text_; }  // without a full stop; empty: nothing was said
+  const char *text() const { return text_; }  // without a full stop; empty: no message
 
   static bool active() noexcept { return now_; }
-  static bool take(const char *text) noexcept;  // false: nobody listens
+  static bool take(const char *text) noexcept;  // false: there is no listener
 
  private:
   static thread_local Overheard *now_;
@@ -73,7 +72,7 @@ class Overheard {
   char text_[512] = {};
 };
 
-// A zone of the host's tracer for the life of the object.
+// A zone of the host's tracer during the lifetime of the object.
 class TraceZone {
  public:
   TraceZone(const dfm_context &context, const char *zone) : context_(context), zone_(zone) {

@@ -9,10 +9,10 @@
 namespace dfm {
 namespace {
 
-// Panels of right-hand sides that are worked on at a time: two of them for each of so many threads.
+// Panels of right-hand sides that are processed at a time: two per thread, for this many threads.
 constexpr uint32_t kThreads = 4;
 
-// The library's own solver in a plugin's hands: memory and threads are those of the host that it gives.
+// The library's solver as a service for plugins: it uses the memory and threads of the given host.
 struct Direct {
   const dfm_host &host;
   Memory memory;

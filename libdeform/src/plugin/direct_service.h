@@ -1,10 +1,10 @@
-// The service "dfm.direct/1" that plugins may ask a host for (deform/plugin_draft.h).
+// The service "dfm.direct/1" for plugins (deform/plugin_draft.h).
 #pragma once
 #include "deform/plugin_draft.h"
 
 namespace dfm {
 
-// Depends on the host alone that its analyse() is given.
+// Depends only on the host that is passed to analyse().
 const dfm_direct &direct_service();
 
 }  // namespace dfm

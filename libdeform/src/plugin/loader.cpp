@@ -25,9 +25,9 @@ namespace {
 
 thread_local std::string *entry_log = nullptr;
 
-// Plugins are let in and out one at a time in the whole process: two contexts may load one file at once,
-// whose entry may fill statics of its own, and the locale that a Visit puts back is everybody's. Recursive,
-// since an entry may make a context.
+// Only one plugin is loaded or unloaded at a time in the whole process: two contexts may load the same file,
+// whose entry may fill its static data, and the locale that a Visit restores is global. Recursive, because an
+// entry may create a context.
 std::recursive_mutex door;
 
 std::string real_path(const std::string &path) {
@@ -48,8 +48,8 @@ bool is_link(const std::string &path) {
   return lstat(path.c_str(), &st) == 0 && S_ISLNK(st.st_mode);
 }
 
-// By readdir: the iterators of the standard library allocate inside functions that must not throw, so memory
-// that runs out there ends the process.
+// Uses readdir, because the iterators of the standard library allocate inside noexcept functions, which ends
+// the process if memory runs out.
 std::vector<std::string> entries(const std::string &directory) {
   const std::unique_ptr<DIR, int (*)(DIR *)> open(opendir(directory.c_str()), &closedir);
   if (!open)
@@ -117,7 +117,7 @@ void Loader::note_log(const char *text) noexcept {
   } catch (...) {}
 }
 
-// Takes no memory: it may be memory that has run out.
+// Does not allocate, since memory may have run out.
 Loader::~Loader() {
   while (!modules_.empty()) {
     const Module module = std::move(modules_.back());
@@ -135,8 +135,7 @@ Loader::~Loader() {
   }
 }
 
-// Calls the entry and copies what it returns; nothing beyond the two ABI numbers is read before they are
-// found to match.
+// Calls the entry and copies the result; nothing except the two ABI numbers is read before these match.
 void Loader::enter(dfm_plugin_fn entry, const std::string &file, dfm_plugin &plugin) {
   std::string said;
   const dfm_plugin *given = nullptr;
@@ -195,7 +194,7 @@ bool Loader::load(const std::string &path) {
   return true;
 }
 
-// Into the registry and the list of modules, or into neither.
+// Adds it to the registry and to the list of modules, or to neither.
 void Loader::keep(Module &&module, const dfm_plugin &plugin) {
   try {
     modules_.reserve(modules_.size() + 1);

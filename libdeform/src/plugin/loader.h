@@ -1,4 +1,4 @@
-// Plugin files into the registry: one symbol, one ABI, a reason for everything passed over.
+// Loads plugin files into the registry: one symbol, one ABI, and a reason for every file that is skipped.
 #pragma once
 #include <cstdint>
 #include <string>
@@ -17,21 +17,21 @@ class Loader {
   Loader(const Loader &) = delete;
   Loader &operator=(const Loader &) = delete;
 
-  // Returns true where the file was loaded now, false where it was there already (the same file under another
-  // name counts as there). Throws DFM_E_IO, DFM_E_UNSUPPORTED or DFM_E_STATE with the reason.
+  // Returns true if the file was loaded now, false if it was loaded before (also under another name). Throws
+  // DFM_E_IO, DFM_E_UNSUPPORTED or DFM_E_STATE with the reason.
   bool load(const std::string &path);
-  // Every plugin of a directory, by name; what is passed over goes to the registry with its reason. Throws
-  // DFM_E_IO: no directory.
+  // Loads every plugin of a directory, by name; skipped files go to the registry with the reason. Throws
+  // DFM_E_IO if it is no directory.
   uint32_t scan(const std::string &directory);
   void add_static(dfm_plugin_fn entry, const std::string &name);
   void add_bundled();  // plugins linked into this library (option DEFORM_PLUGINS_STATIC)
-  // DEFORM_PLUGIN_PATH (not under elevated privilege), then the directory beside this library, else the
-  // installed one.
+  // Loads from DEFORM_PLUGIN_PATH (not with elevated privileges), then from the directory next to this
+  // library, else from the installed one.
   void discover();
-  // Plugins of one file, by type id order; empty where the file is not loaded.
+  // Plugins of one file, ordered by type id; empty if the file is not loaded.
   std::vector<const dfm_type *> types_of(const std::string &path) const;
 
-  // What a plugin logs from its entry becomes part of the reason.
+  // Messages that a plugin logs in its entry become part of the reason.
   static void note_log(const char *text) noexcept;
 
  private:

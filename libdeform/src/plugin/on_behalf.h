@@ -1,4 +1,4 @@
-// While it stands, what a plugin logs on this thread names the body that it was called for.
+// During its lifetime, messages that a plugin logs on this thread name the body for which it was called.
 #pragma once
 #include <string>
 
@@ -10,7 +10,7 @@ class OnBehalf {
   ~OnBehalf() { now_ = outer_; }
   OnBehalf(const OnBehalf &) = delete;
   OnBehalf &operator=(const OnBehalf &) = delete;
-  static const std::string *body() noexcept { return now_; }  // null: of none
+  static const std::string *body() noexcept { return now_; }  // null: no body
 
  private:
   static thread_local const std::string *now_;

@@ -29,7 +29,7 @@ void PluginSolver::analyse(const BlockPattern &pattern) {
   const auto ask = [&] { return ops_.analyse(&host_, pattern.n, pattern.nb, pattern.ij, &self_); };
   const dfm_status status = call_plugin(host_, type_, "analyse", ask);
   if (status == DFM_OK && self_) return;
-  self_ = nullptr;  // a solver that fails has freed what it made
+  self_ = nullptr;  // a solver that fails has freed its data
   if (status == DFM_E_NOMEM)
     fail(DFM_E_NOMEM, "the memory does not suffice for solver '%s' and a matrix of %u points", type_.id, n_);
   fail(DFM_E_FATAL, "solver '%s' cannot take a matrix of %u points; see the log", type_.id, n_);

@@ -14,7 +14,7 @@ class PluginSolver final : public LinearSolver {
 
   const char *name() const override { return type_.id; }
   bool direct() const override;
-  void analyse(const BlockPattern &pattern) override;  // throws Error naming the plugin where it fails
+  void analyse(const BlockPattern &pattern) override;  // throws Error, which names the plugin, if it fails
   bool factor(const double *blk) override;
   bool solve(uint32_t nrhs, const double *b, double *x, double tolerance, SolveInfo &info) override;
   bool restricted(uint32_t nsel, const uint32_t *sel, double tolerance, double *w, SolveInfo &info) override;
@@ -31,7 +31,7 @@ class PluginSolver final : public LinearSolver {
   RestrictedBySolving by_solving_;
 };
 
-// The solver of that name, the library's own or a plugin's. Throws Error with those there are.
+// The solver of that name, from the library or a plugin. Throws Error, which lists the existing ones.
 std::unique_ptr<LinearSolver> make_solver(const SolverChoice &choice, const dfm_context &context,
                                           const Memory &memory, Tasks *tasks);
 

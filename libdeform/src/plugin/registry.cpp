@@ -12,7 +12,7 @@
 namespace dfm {
 namespace {
 
-// The head that every version of a struct has had; smaller sizes are a plugin's mistake.
+// The size that every version of a struct has at least; smaller sizes are an error of the plugin.
 constexpr uint32_t kTypeHead = offsetof(dfm_type, ops) + sizeof(void *);
 constexpr uint32_t kParamHead = offsetof(dfm_param, names);
 constexpr uint32_t kLawHead = offsetof(dfm_friction, eval) + sizeof(void *);
@@ -20,10 +20,10 @@ constexpr uint32_t kModelHead = offsetof(dfm_model, destroy) + sizeof(void *);
 constexpr uint32_t kSolverHead = offsetof(dfm_solver, release) + sizeof(void *);
 constexpr uint32_t kSlotsHead = offsetof(dfm_slots, slots) + sizeof(void *);
 constexpr uint32_t kSlotHead = 16;
-// Of flags and claims: what a host must know. None is defined yet; lower ones of a later header are passed
-// over.
+// Flags and claims that a host must know. None is defined yet; other unknown flags of a later header are
+// ignored.
 constexpr uint32_t kMustKnow = 0xffff0000u;
-// An input that is not there cannot be done without, so a law that asks for one of a later ABI is refused.
+// A law that needs an input of a later ABI is refused.
 constexpr uint32_t kKnownNeeds =
     DFM_NEED_FN | DFM_NEED_VT | DFM_NEED_FT_STOP | DFM_NEED_AREA | DFM_NEED_DWELL;
 bool reverse_dns(const char *id) {
@@ -105,7 +105,7 @@ void copy_rows(RegisteredType &out) {
   out.type.param_size = sizeof(dfm_param);
 }
 
-// The table's rows are ours from then on, of our size.
+// Copies the rows of the table in the size of this library.
 template <class Ops>
 void own_slots(RegisteredType &out, Ops &ops, bool law) {
   out.slots = copy_slots(out.type.id, ops.slots, ops.nslot, ops.slot_size, law);

@@ -1,6 +1,6 @@
-// What the loaded plugins offer. Types are copied into full structs of this library's size with stable
-// addresses: a plugin built against an older header has shorter structs, whose absent tail then reads zero,
-// and nobody behind this file has to know.
+// The types of all loaded plugins. They are copied into structs of this library's size with stable addresses:
+// a plugin built against an older header has shorter structs, whose missing tail is set to zero, so that the
+// rest of the library need not distinguish versions.
 #pragma once
 #include <cstdint>
 #include <memory>
@@ -31,12 +31,12 @@ class Registry {
   Registry(const Registry &) = delete;
   Registry &operator=(const Registry &) = delete;
 
-  // Takes all types of a plugin, or none: throws Error with the reason (metadata, parameter table,
-  // operations, id taken).
+  // Adds all types of a plugin, or none: throws Error with the reason (metadata, parameter table, operations,
+  // duplicate id).
   void add(const dfm_plugin &plugin, const std::string &file);
 
-  // By full id, else by short name (what follows the last dot of the id). Throws DFM_E_UNSUPPORTED with those
-  // loaded and the nearest.
+  // Finds by full id, else by short name (the part after the last dot of the id). Throws DFM_E_UNSUPPORTED,
+  // which lists the loaded ones and suggests the nearest.
   const dfm_type &find(uint32_t kind, std::string_view name) const;
   const dfm_type *try_find(uint32_t kind, std::string_view name) const noexcept;
   std::vector<const dfm_type *> list(uint32_t kind = 0) const;  // by kind and id; 0: all
@@ -55,7 +55,7 @@ class Registry {
 const char *kind_name(uint32_t kind);  // "law", "model", "solver"
 std::string short_name(const dfm_type &type);
 std::vector<std::string> effects(const dfm_type &type);
-// The state slots of a law with these parameters; throws Error where what it answers is none.
+// The state slots of a law with these parameters; throws Error if they are invalid.
 std::vector<dfm_slot> law_slots(const dfm_type &type, const dfm_host &host, const double *params);
 inline const dfm_friction &law_of(const dfm_type &type) {
   return *static_cast<const dfm_friction *>(type.ops);

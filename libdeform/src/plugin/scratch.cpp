@@ -31,7 +31,7 @@ void ScratchArena::drop_all() noexcept {
 bool ScratchArena::grow(size_t bytes) noexcept {
   size_t end = chunks_.empty() ? 0 : chunks_.back().begin + chunks_.back().bytes;
   size_t want = std::max({bytes, kFirstChunk, end});  // doubles, so the number of chunks stays small
-  if (used_ == 0) {  // nothing is in use: one larger chunk replaces the pieces of the last call
+  if (used_ == 0) {  // not in use: one larger chunk replaces the chunks of the last call
     drop_all();
     end = 0;
   }

@@ -1,6 +1,6 @@
 // Scratch memory lent to plugins: one bump arena per thread and context, in memory of the context's hooks. A
-// PluginCall around each call into a plugin gives back what that call took, so several pieces of one call are
-// valid together, and nothing is allocated once the largest call has been seen.
+// PluginCall around each call into a plugin returns the memory of that call: all pieces of one call are valid
+// together, and nothing is allocated after the largest call.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -19,7 +19,7 @@ class ScratchArena {
   ScratchArena(const ScratchArena &) = delete;
   ScratchArena &operator=(const ScratchArena &) = delete;
 
-  void *take(size_t bytes) noexcept;  // 64-byte aligned; nullptr where memory is refused
+  void *take(size_t bytes) noexcept;  // 64-byte aligned; nullptr if there is no memory
   size_t mark() const { return used_; }
   void reset(size_t mark) noexcept;
   uint32_t depth = 0;  // open PluginCalls of this thread
@@ -42,7 +42,7 @@ class Scratch {
  public:
   explicit Scratch(const Memory &memory);
   ~Scratch();
-  ScratchArena *arena() noexcept;  // of this thread; nullptr where memory is refused
+  ScratchArena *arena() noexcept;  // of this thread; nullptr if there is no memory
 
  private:
   struct Owned {
@@ -50,12 +50,12 @@ class Scratch {
     ScratchArena *arena;
   };
   const Memory &memory_;
-  const uint64_t serial_;  // an address may be used again by a later context, a serial number never
+  const uint64_t serial_;  // unique, unlike the address, which a later context may reuse
   std::mutex mutex_;
   std::vector<Owned> arenas_;
 };
 
-// Every call into a plugin stands inside one of these.
+// An object of this type surrounds every call into a plugin.
 class PluginCall {
  public:
   explicit PluginCall(Scratch &scratch) noexcept : arena_(scratch.arena()) {

@@ -13,12 +13,12 @@
 namespace dfm {
 namespace {
 
-// Laws that stand for others. Of those without memory `coulomb` takes fewer instructions than `karnopp` on
-// the frozen scenes with contact (tests/abi/frozen/effects.csv).
+// Laws that replace others. Of those without memory `coulomb` takes fewer instructions than `karnopp` on the
+// frozen scenes with contact (tests/abi/frozen/effects.csv).
 constexpr char kNoFriction[] = "none", kCheapest[] = "coulomb";
 constexpr char kStiction[] = "stiction";
 
-// What the rows of ABI 1 began with.
+// The first fields of the rows of ABI 1.
 constexpr uint32_t kRowHead = offsetof(dfm_effect_row, off) + sizeof(double);
 constexpr size_t kTableHead = offsetof(dfm_effect_rows, rows) + sizeof(void *);
 
@@ -45,7 +45,7 @@ bool remembers(const dfm_type &type, const dfm_host &host, const std::vector<dou
   return !law_slots(type, host, values.data()).empty();
 }
 
-// The cheapest law with the parameters that it shares with this one; none where it has no mu_C of its own.
+// The cheapest law, with the parameters that it shares with this one; none if this one has no mu_C.
 std::optional<SelectedLaw> plain_law(const Registry &registry, const dfm_type &type,
                                      const std::vector<double> &values) {
   const dfm_type *const plain = registry.try_find(DFM_KIND_FRICTION, kCheapest);
@@ -102,7 +102,7 @@ bool leave_out(const dfm_type &type, const std::vector<EffectRow> &rows, const S
   const auto on = [&](const EffectRow &row) {
     return by_cell[row.param] || values[first[row.param]] != row.off;
   };
-  // would a wanted effect be off without it?
+  // whether a wanted effect would be off without it
   const auto alone = [&](const EffectRow &row) {
     return std::any_of(rows.begin(), rows.end(), [&](const EffectRow &r) {
       return r.param == row.param && selection.wants(r.effect) && on(r) &&

@@ -52,7 +52,7 @@ std::string default_plugin_directory() {
     self = info.dli_fname;
   std::error_code error;
   fs::path binary = self.empty() ? fs::path() : fs::canonical(self, error);
-  // For the main program dladdr repeats argv[0], which may name something else.
+  // For the main program dladdr returns argv[0], which may be another file.
   if (self.empty() || error || binary.extension() == "") binary = fs::canonical("/proc/self/exe", error);
   for (const char *relative : {"deform", "../lib/deform"}) {
     const fs::path candidate = binary.parent_path() / relative / DEFORM_ABI_DIR;

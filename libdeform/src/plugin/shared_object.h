@@ -1,6 +1,6 @@
-// Plugin files as the system's dynamic linker opens them. Built with DEFORM_PLUGINS_STATIC nothing here
-// knows a dynamic linker: every file is refused with a sentence, so that a program may be linked where
-// there is none.
+// Opens plugin files through the dynamic linker of the system. Built with DEFORM_PLUGINS_STATIC, this file
+// does not use a dynamic linker and refuses every file with a message, so that programs can be linked on
+// systems without one.
 #pragma once
 #include <string>
 #include <utility>
@@ -11,8 +11,8 @@ namespace dfm {
 
 class SharedObject {
  public:
-  // Looks at the file before anything in it runs. Throws DFM_E_UNSUPPORTED or DFM_E_IO; `name` is what
-  // sentences call it.
+  // Checks the file before any code in it runs. Throws DFM_E_UNSUPPORTED or DFM_E_IO; `name` is its name in
+  // messages.
   SharedObject(const std::string &file, const std::string &name);
   ~SharedObject() { close(image_); }
   SharedObject(const SharedObject &) = delete;
@@ -26,8 +26,8 @@ class SharedObject {
   dfm_plugin_fn entry_ = nullptr;
 };
 
-// Directory of the plugins that belong to this library (build tree or relocated installation), else the
-// configured one; empty where they are linked into it.
+// Directory of the plugins of this library (build tree or relocated installation), else the configured one;
+// empty if the plugins are linked into the library.
 std::string default_plugin_directory();
 
 }  // namespace dfm

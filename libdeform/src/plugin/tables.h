@@ -1,5 +1,5 @@
-// Structs of a plugin, which may be built against an older or a newer header, as full structs of this
-// library's size: what both sides know is copied, a missing tail is zero.
+// Converts structs of a plugin, which may be built against an older or newer header, to the size of this
+// library: common members are copied, a missing tail is zero.
 #pragma once
 #include <algorithm>
 #include <cstddef>
@@ -14,14 +14,14 @@
 
 namespace dfm {
 
-// no struct of this ABI will ever be larger: what claims more is not one
+// no struct of this ABI is ever larger; a larger size is an error
 constexpr uint32_t kLargestStruct = 1u << 16;
 
 [[noreturn]] inline void bad_type(const std::string &id, const std::string &what) {
   fail(DFM_E_UNSUPPORTED, "type \"%s\" is not usable: %s", id.c_str(), what.c_str());
 }
 
-// The first member of every struct is its size; head: bytes that every version has had.
+// The first member of every struct is its size; head: bytes that every version has.
 template <class T>
 void copy_struct(T &full, const void *from, size_t head, const std::string &id, const char *name) {
   uint32_t size;
@@ -34,7 +34,7 @@ void copy_struct(T &full, const void *from, size_t head, const std::string &id, 
   full.size = sizeof(T);
 }
 
-// A table that an extension of a model answered, or nothing.
+// The table of an extension of a model, or nothing.
 template <class T>
 std::optional<T> copy_table(const void *from, size_t head, const std::string &id, const char *name) {
   if (!from) return std::nullopt;
@@ -43,7 +43,7 @@ std::optional<T> copy_table(const void *from, size_t head, const std::string &id
   return full;
 }
 
-// Rows of state slots; throws Error naming the type where unit, kind and width of one do not agree.
+// Rows of state slots; throws Error, which names the type, if unit, kind and width of a slot do not agree.
 std::vector<dfm_slot> copy_slots(const std::string &id, const dfm_slot *slots, uint32_t n, uint32_t slot_size,
                                  bool law);
 // null: nothing

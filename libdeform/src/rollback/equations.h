@@ -1,6 +1,6 @@
-// The equations of Zerbato (2010, sections 4.2 and 5.4) for a colliding point, one by one, in the form that
-// can be computed; what is printed and why it cannot be is told at each. doc/concepts/rollback.md shows what
-// they do to sliding, momentum and force.
+// The equations of Zerbato (2010, sections 4.2 and 5.4) for a colliding point, one by one, in a form that can
+// be computed; each says how the printed form differs and why it cannot be computed. doc/concepts/rollback.md
+// shows what they do to sliding, momentum and force.
 #pragma once
 #include <algorithm>
 
@@ -8,9 +8,9 @@
 
 namespace dfm::rollback {
 
-// (4.5): a vertex is where it is at its impact, x + t h v, t that of its island (printed: of its own).
-// Position Verlet, Zerbato's integrator, then reads the velocity from positions, (x(t) - x(0)) / h: t times
-// that of the full way. The text does not say.
+// (4.5): position of a vertex at the impact, x + t h v, with the time t of its island (printed: of the
+// vertex). Position Verlet, Zerbato's integrator, then reads the velocity from positions, (x(t) - x(0)) / h:
+// t times that of the full displacement. The text does not state it.
 inline Vec3 velocity_after(Vec3 velocity, double t) { return t * velocity; }
 
 // A safety factor on impact times; with it the next sub-step does not begin in the touch that

@@ -12,10 +12,11 @@
 namespace dfm::rollback {
 namespace {
 
-// fraction of d_c to which times are found; what is nearer than d_c by twice as much rests
+// fraction of d_c, accuracy of impact times; features nearer than d_c by twice that are at rest
 constexpr double kSharp = 1e-3;
-constexpr double kBack = 0.5;  // of its distance, down to which what parts from a rest may come back
-constexpr int kNewton = 60;    // far more than it takes; every step is safe, so stopping early stops early
+constexpr double kBack = 0.5;  // share of its distance to which a feature that leaves a rest may return
+// far more than needed; every step is safe, so stopping early gives an earlier time
+constexpr int kNewton = 60;
 
 // The two nearest places of the features at one moment.
 struct Nearest {
@@ -56,7 +57,7 @@ void weights_of(const Nearest &n, bool edges, double w[4]) {
   }
 }
 
-// The boxes of the two swept features, grown by `by`, do not meet: nearly all pairs of a list end here.
+// The boxes of the two swept features, grown by `by`, do not overlap: nearly all pairs end here.
 bool far_apart(const Vec3 x[4], const Vec3 way[4], bool edges, double by) {
   const int split = edges ? 2 : 1;
   for (int i = 0; i < 3; ++i) {
@@ -203,8 +204,8 @@ void ImpactQuery::against(const Features &f, std::span<const double *const> frac
   store3(best.point, 0.5 * (n.a + n.b));
 }
 
-// A surfel against a convex shape that stands still: the distance is a convex function of time, and Newton's
-// steps from the left never pass its root.
+// A surfel against a convex shape at rest: the distance is a convex function of time, and Newton steps from
+// the left never pass its root.
 void ImpactQuery::against_shape(const Candidate &c, std::span<const double *const> fraction,
                                 ImpactHit &best) const {
   const ObstacleShape shape(obstacles_[c.slot_b]);
@@ -215,7 +216,7 @@ void ImpactQuery::against_shape(const Candidate &c, std::span<const double *cons
   if (!(distance > 0)) return;
   double touch = touch_, t = 0;
   if (distance <= touch_ * (1 + 2 * kSharp)) {
-    if (!(dot(p.normal, d) < 0)) return;  // parts, and what parts from a convex shape does not come back
+    if (!(dot(p.normal, d) < 0)) return;  // separates, and from a convex shape it does not return
     touch = distance;
   }
   for (int i = 0; i < kNewton && p.distance > touch * (1 + kSharp); ++i) {

@@ -1,10 +1,10 @@
-// What the roll-back (doc/concepts/rollback.md) asks of detection: when do two listed features, on
-// straight ways over the sub-step, first come as near as they rest? And what are the places and the normal
-// of that moment?
+// Impact times for the roll-back (doc/concepts/rollback.md): the time at which two listed features, moving on
+// straight lines over the sub-step, first reach their rest distance, with the places and the normal at that
+// time.
 //
 // Features that are apart touch when their true distance falls to d_c, found conservatively: never late.
-// Features that rest at d_c (or nearer) touch at t = 0 if they approach; if they part, only once they come
-// back to half of their distance. What is through already (a start state) is let out.
+// Features that rest at d_c (or nearer) touch at t = 0 if they approach; if they separate, only when they
+// return to half of their distance. Features that have crossed at the start may separate.
 #pragma once
 #include <cstdint>
 #include <span>
@@ -32,7 +32,7 @@ class ImpactQuery {
   ImpactQuery(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, double h,
               double touch);
 
-  // fraction: by slot, [nsurfel] how much of its way h v each surfel goes; empty: all of it. Re-entrant.
+  // fraction: by slot, [nsurfel] share of its displacement h v for each surfel; empty: all of it. Re-entrant.
   ImpactHit first(const Candidate &c, std::span<const double *const> fraction) const;
   // World-wide surfel numbers of both features; returns how many.
   uint32_t nodes(const Candidate &c, uint32_t out[4]) const;
@@ -41,7 +41,7 @@ class ImpactQuery {
   ContactPoint contact(const Candidate &c, const ImpactHit &hit) const;
 
  private:
-  // One moving corner: a surfel of a body, or a point that stands still.
+  // One corner: a surfel of a body, or a fixed point.
   struct Corner {
     uint32_t slot, surfel;
     Vec3 still;
@@ -60,7 +60,7 @@ class ImpactQuery {
   Vec3 start(const Corner &c) const;
   Vec3 way(const Corner &c, std::span<const double *const> fraction) const;
   template <class F>
-  // f(Features), all that the candidate stands for but a surfel against a closed form
+  // calls f(Features) for all feature pairs of the candidate except a surfel against a closed form
   void each(const Candidate &c, F &&f) const;
   void mesh_features(const Candidate &c, const Surface &mesh, Features &f) const;
   void against_shape(const Candidate &c, std::span<const double *const> fraction, ImpactHit &best) const;

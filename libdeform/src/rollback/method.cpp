@@ -1,4 +1,4 @@
-// The table of stages of the method `rollback`, and what it cannot do.
+// The table of stages of the method `rollback`, and its limits.
 #include "rollback/rollback.h"
 
 #include "rollback/stages.h"
@@ -36,7 +36,7 @@ bool lagged_friction(World &w, StepContext &step, uint32_t *) {
   return true;
 }
 
-// Rows without a function tell why a stage of the method velocity is not there.
+// Rows without a function give the reason why a stage of the method velocity is missing.
 constexpr Stage kTable[] = {
     {"motion", row::motion, cost::prescribed, when::motion},
     {"model", row::model, cost::cells, when::model},

@@ -1,5 +1,5 @@
-// The contact method `rollback`, there to compare: the collision solution of Zerbato (2010), sections 4.2 and
-// 5.4. Vertices that collide go back to the time of their impact. doc/concepts/rollback.md,
+// The contact method `rollback`, for comparison: the collision solution of Zerbato (2010), sections 4.2 and
+// 5.4. Colliding vertices go back to the time of their impact. doc/concepts/rollback.md,
 // doc/decisions/0022-rollback-to-compare.md.
 #pragma once
 #include "step/method.h"

@@ -1,4 +1,4 @@
-// Bodies that would fall on the back of an open mesh.
+// Warns of bodies that would fall on the back of an open mesh.
 #pragma once
 #include "state/world.h"
 

@@ -21,7 +21,7 @@
 namespace dfm::scene {
 namespace {
 
-constexpr double kFrame = 1.0 / 60;  // s, that a step is taken for where the scene names none
+constexpr double kFrame = 1.0 / 60;  // s, assumed step if the scene names none
 
 class Builder {
  public:
@@ -46,8 +46,7 @@ class Builder {
       for (const Attach &a : b.attach) add_attachment(b, a);
       if (b.separate) add_separation(b);
     }
-    // Makes the plan now, so that an effect that nothing provides is an error of the scene and not of
-    // its first step.
+    // Makes the plan now, so that a missing effect is an error of the scene and not of its first step.
     double step = 0;
     check(dfm_world_stable_step(world_, &step, nullptr, nullptr), def_.effects_auto ? "/bodies" : "/effects");
     if (def_.equilibrium) check_static();
@@ -93,7 +92,7 @@ class Builder {
           "/gravity/keyframes");
   }
 
-  // Bodies, obstacles, rigid bodies, tools, as they stand in the scene; or in the order of their ids.
+  // Bodies, obstacles, rigid bodies, tools, in the order of the scene, or of their ids.
   void create_things() {
     struct Thing {
       uint64_t id;
@@ -137,7 +136,7 @@ class Builder {
 
   dfm_material material(const std::string &name) const { return name.empty() ? 0 : materials_.at(name); }
 
-  // Errors of what is called say which key of the scene asked for it.
+  // Adds the scene's key to errors of the called function.
   template <class Call>
   auto with_pointer(const std::string &pointer, Call &&call) const {
     try {
@@ -164,7 +163,7 @@ class Builder {
     });
   }
 
-  // Material of each cell; empty where no group has its own.
+  // Material of each cell; empty if no group has its own material.
   std::vector<dfm_material> materials_by_group(const Body &b, const BodyMesh &mesh) const {
     std::vector<dfm_material> of_group(mesh.ngroup, material(b.material)), out;
     if (b.by_group.empty()) return out;
@@ -199,7 +198,7 @@ class Builder {
     return {size, mesh.nface ? mesh.ngroup : 0, mesh.group_names, mesh.nface, 0, mesh.faces, mesh.face_group};
   }
 
-  // What forces that are shared by mass go by: density times share.
+  // Weights of forces that are divided by mass: density times share.
   std::vector<double> cell_weights(const BodyMesh &mesh, const std::vector<dfm_material> &materials) const {
     std::vector<double> out;
     if (!mesh.share && materials.empty()) return out;
@@ -315,7 +314,7 @@ class Builder {
       if (p.body == b.name) add_probe(body, p, mesh);
   }
 
-  // Held points too, which dfm_body_set_state leaves where they are.
+  // Also moves held points, which dfm_body_set_state does not move.
   void set_state(dfm_body body, const Body &b, const BodyMesh &mesh) const {
     const std::string pointer = b.start.pointer + "/state";
     const StartState state =
@@ -334,7 +333,7 @@ class Builder {
     check(dfm_body_set_state(body, mesh.npoint, state.x.data(), state.v.data()), pointer);
   }
 
-  // Of a world that is whole, so that one which could never be made is an error of the scene.
+  // Checks the complete world, so that an impossible change is an error of the scene.
   void add_switches(Body &b) const {
     if (b.switches.empty() && b.rule.far.type.empty()) return;
     const std::string pointer = b.pointer + "/switch";
@@ -373,7 +372,7 @@ class Builder {
     });
   }
 
-  // Changes to the model that the body has anyway.
+  // Changes to the model that the body already has.
   void tell_idle_changes(const dfm::Body &b, const std::string &pointer) const {
     const ModelChoice *last = nullptr;
     for (size_t i = 0; i < b.switches.size(); ++i) {
@@ -440,7 +439,7 @@ class Builder {
           b.pointer + "/nodal_bc");
   }
 
-  // The cell that holds a point of the body at rest, or the nearest one where the point lies close by.
+  // The cell that contains a point of the body at rest, or the nearest one if the point is close to it.
   void locate_near(const double point[3], const std::string &pointer, const std::string &name,
                    const BodyMesh &mesh, uint32_t corners[4], double weights[4]) const {
     const double away = locate(mesh, point, corners, weights);
@@ -457,7 +456,7 @@ class Builder {
     std::vector<double> weights(4);
     if (s.at_point) {
       locate_near(s.point, s.pointer, name, mesh, points.data(), weights.data());
-      // a point beside the body pulls at the nearest place of the cell
+      // a point outside the body acts on the nearest place of the cell
       for (double &w : weights) w = std::max(w, 0.0);
     } else {
       points = select(s.where, mesh, def_.file);
@@ -539,7 +538,7 @@ class Builder {
 
   void create_rigid(Rigid &rigid) {
     if (rigid.bodies.empty()) {
-      // a host that is not there is an error all the same
+      // a missing host is an error in any case
       with_pointer(rigid.pointer + "/host", [&] {
         find_host(rigid.host);
         return 0;
@@ -555,7 +554,7 @@ class Builder {
       bool tied = b.def.fixed != 0;
       for (const RigidBody &other : rigid.bodies)
         for (const Joint &j : other.joints) tied = tied || &other == &b || j.with == b.name;
-      if (jittered_ && !tied) {  // what hangs on joints stands where they say
+      if (jittered_ && !tied) {  // jointed bodies are placed by their joints
         const double center[3] = {0, 0, 0}, *const a = b.def.half_size;
         const double size = b.def.shape == DFM_SHAPE_BOX ? 2 * std::max({a[0], a[1], a[2]})
                                                          : 2 * (b.def.radius + b.def.half_length);

@@ -1,5 +1,5 @@
-// What a scene file says, checked and in plain structs; build.cpp turns it into a world through
-// the public API.
+// The contents of a scene file, checked and in plain structs; build.cpp makes a world from it through the
+// public API.
 #pragma once
 #include <cstdint>
 #include <map>
@@ -62,8 +62,8 @@ struct FieldFile {
   bool directions = false;  // scaled to unit length, as an axis given in the scene is
 };
 
-// What of a body's surface is attached to what, made when all is there. Beside what the scene says: the
-// points of the body that `where` means, or the surfels of a surface of its own.
+// An attachment of a body's surface, made after all objects exist. In addition to the keys of the scene: the
+// points of the body selected by `where`, or the surfels of a separate surface.
 struct Attach {
   std::string pointer, to;
   Selection where;
@@ -81,14 +81,14 @@ struct OwnSurface {
   bool boundary = false, coupled = false;  // "from": "boundary" is said; a coupling is said
 };
 
-// A mesh that is made and not read, as dfm_tetmesh_make does.
+// A generated mesh (dfm_tetmesh_make).
 struct MadeMesh {
   std::string kind;  // empty: the mesh is a file
   double size[3] = {};
   uint32_t cells = 0;
 };
 
-// A model that the body is to have; type empty: none is named.
+// A model; type empty: none is named.
 struct ModelWords {
   std::string type;
   Params params;
@@ -103,13 +103,13 @@ struct Switch {
   ModelWords model;
   double t = 0, max_jump = 0;
 };
-// By what it does and where it is; far empty: there is no rule.
+// By contact and distance; far empty: there is no rule.
 struct SwitchRule {
   ModelWords touching, near, far;
   dfm_switch_rule values = dfm_switch_rule_default();
 };
 
-// How a body's points stand at the start.
+// The initial state of a body's points.
 enum class StartKind { rest, scramble, plane, line, point, invert, state };
 struct Start {
   std::string pointer;
@@ -122,7 +122,7 @@ struct Body {
   std::string pointer, name, mesh, material, model, nodal_bc;
   uint64_t id = 0;  // 0: as it comes
   bool sensor = false;
-  bool model_open = false;  // the planner chooses; `model` holds what stands in for it
+  bool model_open = false;  // the planner chooses; `model` holds a placeholder
   int32_t integrator = DFM_INTEGRATOR_AUTO;
   MadeMesh made;
   OwnSurface surface;
@@ -145,7 +145,7 @@ struct Body {
 struct Obstacle {
   std::string pointer, name, material, mesh;
   uint64_t id = 0;
-  std::optional<dfm_pose> start;  // where it stands at first
+  std::optional<dfm_pose> start;  // its initial pose
   double scale = 1;               // of the mesh
   bool sensor = false;
   dfm_obstacle_def def = {};
@@ -205,11 +205,11 @@ struct Probe {
   double point[3] = {};
 };
 
-// What the planner is to reach (planner.h): an error or a time, one of the two.
+// The goal of the planner (planner.h): either an error or a time.
 struct Wanted {
   double target = 0;       // relative error, 0: none
   double weight = 1;       // errors of the quantity over those of positions
-  bool force = false;      // a force of contact is asked for, or nothing but a time
+  bool force = false;      // the goal is the error of a contact force, or a time only
   double ms_per_step = 0;  // milliseconds of processor time, 0: none
   bool any() const { return target > 0 || ms_per_step > 0; }
 };
@@ -237,7 +237,7 @@ struct Definition {
   std::vector<Filter> filters;
   std::vector<Probe> probes;
   Wanted wanted;
-  // what only a runner needs
+  // used by the runner only
   double begin = 0, duration = 0, step = 0, every = 0, frame_rate = 0;
   bool equilibrium = false;  // mode static
   bool frames = false, states = false, nodes = false, contacts = true, check = false, has_camera = false;

@@ -69,7 +69,7 @@ std::vector<double> read_field(const std::string &path, const FieldFile &field, 
     if (seen[cell]) fail(DFM_E_ARG, "%s:%zu: cell %u has a row already", path.c_str(), line, cell);
     seen[cell] = 1;
     ++next;
-    if (cell_of[cell] == UINT32_MAX) continue;  // a double that reading dropped
+    if (cell_of[cell] == UINT32_MAX) continue;  // a duplicate that was dropped when reading
     double *const to = &out[size_t(cell_of[cell]) * w];
     std::copy_n(&row[has_cell], w, to);
     if (field.directions) make_unit(to);

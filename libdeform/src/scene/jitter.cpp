@@ -31,7 +31,7 @@ void Jitter::apply(double size, const double center[3], dfm_pose &pose, double v
   pose.rotation[2] = turned.z;
   pose.rotation[3] = turned.w;
   const double faster = 1 + 0.01 * symmetric(), spinning = 1 + 0.01 * symmetric();
-  symmetric();  // kept for a further quantity, so that adding one does not change older results
+  symmetric();  // reserved for another quantity, so that adding one does not change existing results
   for (int i = 0; i < 3; ++i) {
     velocity[i] *= faster;
     spin[i] *= spinning;

@@ -1,4 +1,4 @@
-// Random numbers of a scene, and the small displacements of the start state that they make.
+// Random numbers of a scene, and small random displacements of the start state.
 #pragma once
 #include "deform/deform.h"
 

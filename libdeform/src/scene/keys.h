@@ -1,5 +1,5 @@
-// The one table of names that a scene file may hold: reader, error messages and the shipped schema are
-// checked against it.
+// The table of all names in scene files; reader, error messages and the shipped schema are checked against
+// it.
 #pragma once
 #include <string>
 #include <vector>
@@ -15,7 +15,7 @@ struct Key {
 const std::vector<std::string> &object_kinds();
 const std::vector<Key> &keys_of(const std::string &kind);
 
-// Words that a value may be, where the format fixes them ("time.mode", "shape", ...).
+// The allowed words of a value, if the format fixes them ("time.mode", "shape", ...).
 const std::vector<Key> &words_of(const std::string &what);
 const std::vector<std::string> &word_sets();
 

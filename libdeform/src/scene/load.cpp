@@ -59,12 +59,12 @@ bool MeshFiles::has_cells(const std::string &path, const std::string &pointer) {
     return true;
   }
   surface_only_.insert(path);
-  // known as somebody's skin already
+  // already known as the surface of a body
   if (!surfaces_.try_emplace(path, surface).second) check(dfm_trimesh_destroy(surface), pointer);
   return false;
 }
 
-// Under a name that no file can have.
+// Stored under a name that no file can have.
 std::string MeshFiles::make(const Body &b) {
   const MadeMesh &m = b.made;
   const std::string name =

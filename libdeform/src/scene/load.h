@@ -11,7 +11,7 @@
 
 namespace dfm::scene {
 
-inline constexpr uint32_t kFillCells = 5000;  // where a scene says none
+inline constexpr uint32_t kFillCells = 5000;  // if a scene gives no number
 
 class MeshFiles {
  public:
@@ -21,7 +21,7 @@ class MeshFiles {
   MeshFiles &operator=(const MeshFiles &) = delete;
 
   std::string path_of(const std::string &path) const;  // relative to the scene file
-  // Cells, skin and groups of a body, scaled. Borrows from this object.
+  // Cells, surface and groups of a body, scaled. Borrows from this object.
   BodyMesh load(const Body &body);
   // Triangles of an obstacle of shape mesh or voxels into its def. `points` takes those that are scaled; the
   // rest is borrowed from this object.

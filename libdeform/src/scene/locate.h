@@ -1,5 +1,5 @@
-// Which cell holds a point, for probes and for surface points that hang on cells: cells by the bins of
-// a uniform grid.
+// Finds the cell that contains a point, for probes and for surface points coupled to cells, by the bins of a
+// uniform grid.
 #pragma once
 #include <cstdint>
 #include <vector>

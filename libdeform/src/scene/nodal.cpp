@@ -40,7 +40,7 @@ std::vector<NodalRow> read_nodal(const std::string &path, const BodyMesh &mesh) 
       if (cell[1 + k] == 1) row.axes = uint8_t(row.axes | (1u << k));
     }
     if (row.point == UINT32_MAX) {
-      // A node that no cell uses has no phyxel: holding it means nothing, a force on it would be lost.
+      // A node without cells has no phyxel: holding it has no effect, and a force on it would be lost.
       if (cell[4] != 0 || cell[5] != 0 || cell[6] != 0)
         fail(DFM_E_ARG, "%s:%zu: node %g belongs to no tetrahedron, so no force can act on it", path.c_str(),
              line, cell[0]);

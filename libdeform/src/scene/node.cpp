@@ -9,7 +9,7 @@
 namespace dfm::scene {
 namespace {
 
-// What the file says, short enough for a sentence.
+// The text of the file, shortened for an error message.
 std::string excerpt(const json &value) {
   std::string text = value.dump(-1, ' ', false, json::error_handler_t::replace);
   if (text.size() > 40) text = text.substr(0, 37) + "...";

@@ -1,6 +1,6 @@
-// A place in the scene's JSON tree that knows its pointer (RFC 6901), so that every complaint names file,
-// place and what was expected. Optional values are written back with their defaults: the tree then reads as
-// the scene that really runs.
+// A node of the scene's JSON tree with its pointer (RFC 6901), so that every error names file, place and what
+// was expected. Optional values are written back with their defaults, so that the tree describes the scene
+// that runs.
 #pragma once
 #include <cstdint>
 #include <nlohmann/json.hpp>

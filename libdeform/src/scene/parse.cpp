@@ -1,6 +1,5 @@
-// Text to tree. A scan of our own runs before the JSON parser: it bounds nesting (so that neither the parser
-// nor the tree's later use can exhaust the stack) and finds keys given twice, which the parser would
-// silently drop.
+// Text to tree. A scan before the JSON parser limits nesting (so that neither the parser nor later use of the
+// tree can exhaust the stack) and finds duplicate keys, which the parser would silently drop.
 #include <cctype>
 #include <cstring>
 #include <set>
@@ -76,7 +75,7 @@ void scan(const std::string &text, const std::string &file) {
   }
 }
 
-// The parser's own words after its code and place, which we give ourselves.
+// The parser's message without its code and place, which are added separately.
 std::string reason(const char *what) {
   std::string text = what;
   const size_t colon = text.find(": ");
@@ -87,7 +86,7 @@ std::string reason(const char *what) {
   return text;
 }
 
-// Whether the word at which the parser stopped is one of the ways to write what is not finite.
+// Whether the parser stopped at a way to write NaN or infinity.
 bool is_not_finite(const std::string &text, size_t byte) {
   size_t begin = std::min(byte, text.size());
   while (begin > 0 && (std::isalpha(static_cast<unsigned char>(text[begin - 1])) || text[begin - 1] == '-'))

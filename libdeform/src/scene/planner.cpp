@@ -69,7 +69,7 @@ double fall_to_box(const Box &box, const double down[3], const Box &other) {
     if (k != axis && (box.lo[k] > other.hi[k] || other.lo[k] > box.hi[k])) return HUGE_VAL;
   const double gap = down[axis] < 0 ? box.lo[axis] - other.hi[axis] : other.lo[axis] - box.hi[axis];
   const double through = down[axis] < 0 ? other.lo[axis] - box.hi[axis] : box.lo[axis] - other.hi[axis];
-  if (through > 0) return HUGE_VAL;  // it lies behind
+  if (through > 0) return HUGE_VAL;  // it is behind
   return std::max(gap, 0.0);
 }
 
@@ -78,11 +78,11 @@ double round_width(double radius, double depth) {
   const double d = std::min(depth, radius);
   return 2 * std::sqrt(d * (2 * radius - d));
 }
-// m, across a contact with a thing of these sides: the one in the middle, since a slab meets with its face.
+// m, width of a contact with a box of these sides: the middle one, since a slab touches with its face.
 double flat_width(double a, double b, double c) {
   return std::max(std::min(a, b), std::min(std::max(a, b), c));
 }
-// m, by which a round thing at a place enters a box; 0: not at all.
+// m, depth by which a round thing at this place enters a box; 0: none.
 double depth_in(const Box &box, const double center[3], double radius) {
   double outside = 0, inside = HUGE_VAL;
   for (int k = 0; k < 3; ++k) {
@@ -147,7 +147,7 @@ class Reader {
   static bool thrown(const Body &b) { return length(b.velocity) > 0 || length(b.spin) > 0; }
   static bool held(const Body &b) { return !b.fixes.empty() || !b.nodal_bc.empty(); }
 
-  // Something comes to it, whatever gravity does.
+  // Something moves toward it, independent of gravity.
   bool something_moves() const {
     return std::any_of(def_.obstacles.begin(), def_.obstacles.end(), moves) || !def_.rigid.bodies.empty() ||
            (def_.bodies.size() + def_.obstacles.size() > 1 && one_is_thrown());
@@ -170,7 +170,7 @@ class Reader {
     return flat_width(box.hi[0] - box.lo[0], box.hi[1] - box.lo[1], box.hi[2] - box.lo[2]);
   }
 
-  // What an obstacle that moves does to a body: how fast it comes, and how deep it goes in.
+  // The effect of a moving obstacle on a body: its speed, and the depth to which it enters.
   void add_approach(size_t i, const Obstacle &o, BodyRegime &r) const {
     const bool round = o.def.shape == DFM_SHAPE_SPHERE || o.def.shape == DFM_SHAPE_CAPSULE;
     double way = 0, depth = 0;
@@ -187,7 +187,7 @@ class Reader {
     r.depth = std::max(r.depth, depth > 0 ? depth : way + swing);
   }
 
-  // How far a body falls until it meets something, and with what it has its narrowest contact.
+  // How far a body falls until it touches something, and its narrowest contact.
   void find_contacts(size_t i, double falls, double &fall, BodyRegime &r) {
     const auto narrow = [&](double width, const std::string &name) {
       if (!(width < r.contact)) return;
@@ -344,7 +344,7 @@ json plan_scene(dfm_context *context, const Definition &def, const Types &types,
   if (!implicit && def.integrator == DFM_INTEGRATOR_AUTO)
     write("/time/integrator", scheme_name(Scheme::explicit_euler));
   if (!(def.step > 0) && plan.way.step > 0) write("/time/step", plan.way.step);
-  // What a contact at rest may creep in the whole time shall be a tenth of the error.
+  // The allowed creep of a resting contact over the whole time is a tenth of the error.
   double scale = HUGE_VAL;
   for (const BodyRegime &b : bodies)
     if (b.touches) scale = std::min(scale, std::max(estimate(b, def.duration).sag, b.travel));

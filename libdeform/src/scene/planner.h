@@ -1,6 +1,5 @@
-// The planner of a scene that names an accuracy or a budget: reads what each body is and what it meets from
-// the definition and its meshes, lets plan/accuracy.h choose, and gives back what the scene would have to
-// say.
+// The planner of a scene that names an accuracy or a budget: derives properties and contacts of each body
+// from the definition and its meshes, lets plan/accuracy.h choose, and returns the corresponding scene keys.
 #pragma once
 #include "plan/accuracy.h"
 #include "scene/defs.h"
@@ -13,8 +12,7 @@ namespace dfm::scene {
 Measured read_costs();
 
 // Chooses what the scene leaves open (model of a body, integrator, step, contact tolerance), writes it into
-// the tree and returns what stands at /accuracy/chosen or /budget/chosen afterwards. What the scene names
-// stays.
+// the tree and returns the value of /accuracy/chosen or /budget/chosen. Keys that the scene names are kept.
 json plan_scene(dfm_context *context, const Definition &def, const Types &types, json &tree);
 
 }  // namespace dfm::scene

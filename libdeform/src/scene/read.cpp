@@ -83,7 +83,7 @@ dfm_params Params::view() {
   return {sizeof(dfm_params), uint32_t(rows.size()), rows.data()};
 }
 
-// The word for the default of a row that stands for the plugin's own choice.
+// The word for the default of a row that means a choice by the plugin.
 constexpr const char *kAuto = "auto";
 
 // A word of an enumeration; its number otherwise.
@@ -290,7 +290,7 @@ void read_wanted(const Node &scene, Definition &def) {
     def.wanted.target = wanted.at("target").number(Range{0, 1, true, true});
   } else {
     def.wanted.ms_per_step = wanted.at("ms_per_step").number(kPositive);
-    def.wanted.force = true;  // nobody says what the error is to be of: a dent counts by both
+    def.wanted.force = true;  // the scene names no quantity: a dent counts by both
   }
 }
 

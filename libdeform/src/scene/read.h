@@ -7,7 +7,7 @@ namespace dfm::scene {
 
 struct ReadContext {
   const Types &types;
-  std::vector<std::string> materials, titles;  // keys so far, and the names that sides of rules have
+  std::vector<std::string> materials, titles;  // keys so far, and names for the sides of rules
   std::vector<std::string> sides;              // bodies and obstacles
   std::vector<std::string> bodies{};
   bool planned = false;  // the planner chooses models that are not named
@@ -26,15 +26,14 @@ void check_rising(const Node &keys, size_t i, double previous, double t);
 void check_fresh(const Node &name, const std::string &value, const std::vector<std::string> &taken,
                  const char *what);
 std::string known(const Node &name, const std::vector<std::string> &valid, const char *what);
-// What a body is made of beside its material: fields, materials by group, anisotropy; its surface and
-// filling. read_carriers.cpp
+// Fields, materials by group, anisotropy, surface and filling of a body. read_carriers.cpp
 void read_carriers(const Node &body, const dfm_type *model, ReadContext &context, Body &out);
 std::vector<Body> read_bodies(const Node &scene, ReadContext &context);
 std::vector<Obstacle> read_obstacles(const Node &scene, ReadContext &context);
-// Size and place of a shape, as obstacles and rigid bodies say it; kind: of the pose's object.
+// Size and pose of a shape, for obstacles and rigid bodies; kind: of the pose's object.
 void check_shape_keys(const Node &node, const std::string &shape);
 dfm_pose read_pose(const Node &holder, const char *kind, double *scale);
-// Of a "start": what it leaves out is as otherwise.
+// Reads a "start"; missing keys keep their usual values.
 dfm_pose read_placed(const Node &start, const dfm_pose &otherwise);
 uint64_t read_id(const Node &node);  // 0: none is given
 void read_solid(const Node &node, const std::string &shape, uint32_t &number, double half_size[3],

@@ -269,7 +269,7 @@ Start read_start(const Node &node) {
   return out;
 }
 
-// The library's own key beside the model's parameters.
+// The key of the library among the parameters of the model.
 void read_precision(const Node &model, Params &params) {
   if (!model.has("precision") || model.member("precision").word("precision") == "double") return;
   params.keys.push_back("precision");
@@ -306,7 +306,7 @@ void read_switches(const Node &list, const Types &types, Body &b) {
   }
 }
 
-// A model by its name alone, or with what it is made with.
+// A model by name only, or with its inputs.
 ModelWords read_word(const Node &rule, const char *key, const Types &types) {
   if (!rule.has(key)) return {};
   const Node node = rule.member(key);

@@ -1,4 +1,4 @@
-// A soft body: its points, surface, model and how it moves, and what is prescribed for it.
+// A soft body: its points, surface, model, dynamics, and its prescribed loads and motions.
 #pragma once
 #include <memory>
 #include <string>
@@ -56,14 +56,14 @@ enum class Counted : uint32_t { no, implicit, explicitly };
 struct Integrator {
   uint32_t used = DFM_INTEGRATOR_SYMPLECTIC_EULER;
   bool open = false;    // prepare() is to choose it
-  bool chosen = false;  // and has
+  bool chosen = false;  // and has chosen it
   double step = std::numeric_limits<double>::infinity();
   uint32_t point = 0;  // that bounds it
   Counted counted = Counted::no;
 };
 
-// What the list of effects has left out of a model: the values asked for, all rows end to end (empty: nothing
-// is left out), and, [nparam], the rows whose differences by cell are.
+// What the list of effects has left out of a model: the values that were asked for, all rows end to end
+// (empty: nothing is left out), and, [nparam], the rows whose differences between cells are left out.
 struct Withheld {
   std::vector<double> asked;
   std::vector<uint8_t> by_cell;
@@ -88,35 +88,36 @@ struct Body {
   std::string name, material;
   uint32_t category = 1, collides_with = ~0u;
   bool sensor = false;  // reports what overlaps it, and pushes nothing
-  bool tears = false;   // a material of its cells bears a limited strain
+  bool tears = false;   // a material of its cells tears at a limited strain
   void *user = nullptr;
 
   Phyxels p;
-  uint64_t x_version = 1;  // rises whenever p.x may have changed
+  uint64_t x_version = 1;  // increases whenever p.x may have changed
   Array<uint32_t> tets, edges;
   Surface surface;
   SurfaceZones zones;
   CutRecord cut;
-  uint64_t shape = 0;  // another number after each cut: what is derived from points, cells or surface is old
-  bool emptied = false;    // a cut has taken all cells; the body stands in World::emptied
-  uint64_t piece_of = 0;   // id of the body that the host made and this one has come off; 0: none
-  std::string whole_name;  // of that body; its rules of friction and contact hold here too
-  bool undone = false;     // a piece that a restore has taken back; it stands in World::undone
+  // a new number after each cut: what is derived from points, cells or surface is out of date
+  uint64_t shape = 0;
+  bool emptied = false;    // a cut has removed all cells; the body is in World::emptied
+  uint64_t piece_of = 0;   // id of the body, made by the host, of which this one is a piece; 0: none
+  std::string whole_name;  // name of that body; its rules of friction and contact apply to this piece too
+  bool undone = false;     // a piece that a restore has removed; it is in World::undone
   SeparateRule separate;
   std::vector<BladeTrack> blades;  // of the last cuts
   int32_t coupling = kNoCoupling;  // DFM_COUPLING_* of a surface of its own
-  double support = 0;              // of it, as its def gave it
+  double support = 0;              // of that coupling, as in the def
   ModelInstance model;
   std::unique_ptr<Dynamics> dynamics;  // how it moves
   Integrator integrator;
   Makeup makeup;
   ModelOrigin origin;
   Withheld withheld;
-  std::vector<Switch> switches;  // to come, by time
+  std::vector<Switch> switches;  // future changes, by time
   std::vector<SwitchRule> rule;  // one or none
-  // instances that a change to come may take: what they have made of the mesh is theirs still
+  // instances for future changes; they keep what they computed from the mesh
   std::vector<SpareModel> spares;
-  uint64_t first_model = 0;  // hash of what its model was made with as the world took its first step
+  uint64_t first_model = 0;  // hash of the model's inputs when the world took its first step
   double mass = 0, rest_volume = 0;
   Array<double> share;  // [ntet] how much of each cell is material; empty: all
   std::vector<CellField> fields;
@@ -129,9 +130,9 @@ struct Body {
   EnergyBook energy;
   ChangeBook changes;
   Array<double> surfel_impulse;  // [nsurfel,3] N s of the last sub-step
-  // [n,4] what the contact method keeps of each point; empty where it keeps nothing
+  // [n,4] values that the contact method keeps for each point; empty if it keeps none
   Array<double> method_values;
-  // as last asked for; holds while asleep
+  // as last computed; valid while asleep
   struct {
     bool known = false;
     StepBound found;
@@ -139,7 +140,7 @@ struct Body {
     double strain_rate = 0;  // 1/s, of the edge that stretches fastest
   } bound;
   Slumber slumber;
-  // [n,4] m, positions since which it is calm; empty where nothing may sleep
+  // [n,4] m, positions at the start of its calm; empty if sleep is off
   Array<double> anchor;
   std::unique_ptr<SearchTree> search;  // rays and closest points
 

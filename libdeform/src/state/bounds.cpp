@@ -12,7 +12,7 @@ namespace dfm {
 namespace {
 
 constexpr double kUnit = 2.220446049250313e-16;  // spacing of doubles at 1
-constexpr double kUnits = 64;                    // of them a rest distance has to span
+constexpr double kUnits = 64;                    // spacings that a rest distance must span
 // the rest distance is no more than this share of the thinnest body
 constexpr double kOfThickness = 0.1;
 constexpr double kTurn = 6.283185307179586476925;
@@ -23,8 +23,7 @@ double speed_limit(const World &w) {
   return w.def.obstacle_speed > 0 ? w.def.obstacle_speed : kObstacleSpeed;
 }
 
-// Of a turn by an obstacle's pose: how far from its position something moves. A plane has no extent; its tilt
-// is taken at 1 m.
+// Radius at which a rotation of an obstacle is measured. A plane has no extent; its tilt is measured at 1 m.
 double turned(const Obstacle &o) {
   ObstacleView v{};
   v.shape = Shape(o.def.shape);
@@ -121,7 +120,7 @@ void check_motion_speed(const World &w, const Obstacle &o) {
 }
 
 void check_way(const World &w, const Obstacle &o, const Pose &from, const Pose &to, double dt) {
-  char when[40];  // no string: a step allocates nothing
+  char when[40];  // not a string: a step must not allocate
   std::snprintf(when, sizeof when, "in a step of %g s", dt);
   check_speed(w, o, speed_of(o, from, to, dt), when);
 }

@@ -1,5 +1,5 @@
-// What numbers a world takes: places that doubles still resolve, speeds that a step can mean, a rest distance
-// that fits its bodies.
+// Limits on the numbers that a world accepts: positions that doubles resolve, plausible speeds, a rest
+// distance that fits the bodies.
 #pragma once
 #include <cstddef>
 
@@ -16,7 +16,7 @@ struct Obstacle;
 struct World;
 
 // Throw DFM_E_ARG, in one sentence that names `what` (a body, an obstacle, a rigid body with its name).
-// radius: m, what turns
+// radius: m, of the thing that rotates
 void check_velocity(const char *what, const char *name, Vec3 velocity, Vec3 spin = {}, double radius = 0);
 // m, largest coordinate; where d_c is known
 void check_place(const World &w, const char *what, const char *name, double farthest);

@@ -1,4 +1,4 @@
-// What a body that has been cut remembers: how it was made, and where its points and cells come from.
+// Record of a body that has been cut: the body as it was made, and the origin of its points and cells.
 #pragma once
 #include <memory>
 
@@ -9,10 +9,10 @@
 
 namespace dfm {
 
-// When parts that have come off a body become bodies of their own (dfm_body_set_separate).
+// When separate parts of a body become bodies (dfm_body_set_separate).
 struct SeparateRule {
   bool on = false;
-  bool removes = false;  // parts of fewer cells than `least` go; else they stay
+  bool removes = false;  // parts of fewer cells than `least` are removed; else they stay
   uint32_t least = 1;    // cells
 };
 

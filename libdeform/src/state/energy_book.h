@@ -1,34 +1,34 @@
-// What the watch on energies (step/energy_watch.h) keeps between steps.
+// Lasting state of the energy watch (step/energy_watch.h).
 #pragma once
 #include <cstdint>
 
 namespace dfm {
 
-// Of one body. Lasts.
+// Of one body. Lasting state.
 struct EnergyBook {
-  uint32_t known = 0;  // looks since the host last changed anything, the first few of which take the base
-  double base = 0;     // J, least balance so far, with what the stiff modes may give back
+  uint32_t known = 0;  // checks since the host last changed anything; the first few set the base
+  double base = 0;     // J, least balance so far, plus the energy that stiff modes may return
   double work = 0;     // J, since base was first taken
-  double kinetic = 0;  // J, after predict, when last looked at
+  double kinetic = 0;  // J, after predict, at the last check
 };
 
 inline constexpr uint32_t kMostCredit = 4096;  // sub-steps
 
-// Of the world. Lasts.
+// Of the world. Lasting state.
 struct EnergyWatch {
-  // sub-steps without a look, less what looks have cost: new bases wait for it where the host changes
-  // something all the time
+  // sub-steps without a check, minus the cost of checks: limits new bases if the host changes something in
+  // every step
   uint32_t credit = kMostCredit;
-  uint32_t age = ~0u;  // sub-steps since the energies were last looked at
+  uint32_t age = ~0u;  // sub-steps since the last check
   double last_h = 0;   // s, of the last sub-step
-  // the next one is longer or shorter because the step's bound has it so; not state: said anew by each step
+  // the step bound changes the size of the next sub-step; not lasting state: set in each step
   bool new_size = false;
   // the last look has stopped the run because of a pair: what the host changes then starts sums anew; not
   // state
   bool told = false;
 };
 
-bool sound(const EnergyBook &e);  // could a world have come to it?
+bool sound(const EnergyBook &e);  // whether a world could have reached it
 bool sound(const EnergyWatch &e);
 
 }  // namespace dfm

@@ -1,4 +1,4 @@
-// Held points: which motions carry them. A point has at most one.
+// Held points and the motions that carry them. A point has at most one motion.
 #pragma once
 #include <cstdint>
 #include <span>
@@ -7,7 +7,7 @@
 
 namespace dfm {
 
-// Takes the points out of the motions that carry them; a motion without points goes. All or nothing.
+// Removes the points from the motions that carry them; a motion without points is removed. All or nothing.
 void drop_motions(Body &b, std::span<const uint32_t> points);
 
 }  // namespace dfm

@@ -1,4 +1,4 @@
-// What pairs did to each other over the whole last step; step/step_impulses.h adds it up.
+// Contact impulses of pairs over the whole last step; step/step_impulses.h sums them.
 #pragma once
 #include "core/memory.h"
 #include "math/vec3.h"
@@ -11,13 +11,13 @@ struct StepImpulses {
     Vec3 impulse;                    // N s, on a
     Vec3 place;                      // m N s: points of contact, weighted with their normal impulses
     double normal;                   // N s, sum of normal impulses
-    double touching;                 // s, in which it carried something
+    double touching;                 // s with a nonzero impulse
     double peak_normal, peak_force;  // N, means over the sub-step where they were largest
     Vec3 now;                        // N s, of the present sub-step
     double now_normal;
   };
   Array<Pair> pairs;  // sorted by (a, b)
-  double idle = 0;    // s of this step in which everybody slept: forces are those of the report
+  double idle = 0;    // s of this step in which all bodies slept: forces are those of the report
 };
 
 }  // namespace dfm

@@ -137,7 +137,8 @@ void check_fields(const dfm_type &type, const dfm_body_def &def, const std::stri
 
 namespace {
 
-// One parameter of the table: where its values stand in the packed ones, and what they are for each material.
+// One parameter of the table: the place of its values among the packed ones, and its values for each
+// material.
 struct Row {
   const dfm_param &param;
   size_t at;

@@ -1,5 +1,5 @@
-// What a body is made of, cell by cell: density, share of each cell that is material, and the model's
-// parameters that differ between cells.
+// The materials of a body by cell: density, share of each cell that is material, and parameters of the model
+// that differ between cells.
 #pragma once
 #include <string>
 #include <vector>
@@ -8,8 +8,8 @@
 
 namespace dfm {
 
-inline constexpr char kToughnessKey[] = "fracture_energy";  // J/m2 that a blade's cut takes
-inline constexpr char kTearKey[] = "tear";  // a material's entry: the largest strain that it bears
+inline constexpr char kToughnessKey[] = "fracture_energy";  // J/m2 that a cut by a blade takes
+inline constexpr char kTearKey[] = "tear";  // entry of a material: the strain at which it tears
 
 struct Body;
 struct CellField;
@@ -30,7 +30,7 @@ struct CellMaterials {
   std::vector<uint32_t> of;            // [ntet] index into list
 };
 
-// Throws Error(HANDLE) for a material that is none or belongs to another world. `plain` stands for handle 0.
+// Throws Error(HANDLE) if the handle is no material, or one of another world. `plain` is used for handle 0.
 CellMaterials cell_materials(const World &w, const dfm_body_def &def, const std::string &body,
                              const Material &plain);
 
@@ -40,7 +40,7 @@ void check_share(const dfm_body_def &def, const std::string &body);
 // Lumped mass of all points into b.p.mass; b.mass and b.rest_volume.
 void lump_body(Body &b, const dfm_body_def &def, const CellMaterials &cells);
 
-// Throws Error(ARG) for fields of the def that the model does not take, or that are none.
+// Throws Error(ARG) for fields of the def that the model does not support, or that are invalid.
 void check_fields(const dfm_type &type, const dfm_body_def &def, const std::string &body);
 
 // Values of the model's parameters for the whole body, as its table orders them; those that differ by cell go
@@ -49,7 +49,7 @@ void check_fields(const dfm_type &type, const dfm_body_def &def, const std::stri
 // "young".
 std::vector<double> model_values(const World &w, const Body &b, const dfm_type &type, const dfm_body_def &def,
                                  const CellMaterials &cells, std::vector<CellField> &fields);
-// May the parameter of this key differ by cell?
+// Whether the parameter of this key may differ by cell.
 bool by_cell(const dfm_type &type, const std::string &key);
 
 }  // namespace dfm

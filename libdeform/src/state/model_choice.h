@@ -1,4 +1,4 @@
-// What a body's model follows from, and which one it is to have later (doc/concepts/changing_models.md).
+// The inputs of a body's model, and its future changes (doc/concepts/changing_models.md).
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -13,22 +13,22 @@
 
 namespace dfm {
 
-// A model parameter that differs from cell to cell, and who said so ("field", "materials", "share").
+// A model parameter that differs between cells, and its source ("field", "materials", "share").
 struct CellField {
   std::string key, from;
   uint32_t width;
   Array<double> values;
 };
 
-// What the body is made of, whichever model it has: stays with its mesh.
+// The material of the body, independent of its model: stays with its mesh.
 struct Makeup {
   std::vector<Material> materials;  // of its cells, by first cell
   std::vector<uint32_t> of;         // [ntet] index into materials; empty: the first for all
   std::vector<CellField> given;     // fields of its def
 };
 
-// Parameters of a model that somebody has given. Three arrays: a snapshot that claims many takes
-// little memory.
+// Parameters of a model that the host has given. Three arrays, so that a damaged snapshot that claims many of
+// them takes little memory.
 struct ModelParams {
   std::string keys;              // a newline ends each
   std::vector<uint32_t> widths;  // [key]
@@ -42,43 +42,44 @@ struct ModelParams {
   }
 };
 
-// What the present instance was made with, beside the makeup.
+// The inputs of the present instance other than the makeup.
 struct ModelOrigin {
   ModelParams params;
-  Pose frame;                 // that puts the rest positions where the instance takes them to be
+  Pose frame;                 // takes the rest positions to where the instance expects them
   uint32_t integrator = 0;    // DFM_INTEGRATOR_*; AUTO: the world's
-  std::vector<uint8_t> held;  // [npoint] components, as the instance was told
+  std::vector<uint8_t> held;  // [npoint] held components, as given to the instance
 };
 
-// In place of a DFM_INTEGRATOR_*: that which the body has when its model changes.
+// Used instead of a DFM_INTEGRATOR_*: keep the integrator that the body has when its model changes.
 inline constexpr uint32_t kSameIntegrator = DFM_INTEGRATOR_TR_BDF2 + 1;
 
-// A model that a body is to have, in the words of dfm_body_set_model.
+// A requested model, with the fields of dfm_body_set_model.
 struct ModelChoice {
   std::string type;  // id
   ModelParams params;
   uint32_t integrator = kSameIntegrator;
   double max_jump = HUGE_VAL;  // J
-  double stable = -1;  // s, explicit sub-step when it was made beforehand; infinite: any; negative: not known
+  // s, explicit sub-step if the model was made in advance; infinite: any; negative: unknown
+  double stable = -1;
 };
-// From the step on that begins at t or after it.
+// Takes effect in the first step that begins at t or later.
 struct Switch {
   double t = 0;  // s
   ModelChoice to;
 };
 
-// Which model a body has by what it does and where it is.
+// Rule that selects a model by contact and distance.
 enum class SwitchLevel : uint32_t { far, near, touching, undecided };
 struct SwitchRule {
-  ModelChoice touching, near, far;  // type empty: this one is not asked for; far is
+  ModelChoice touching, near, far;  // an empty type means unused; far is always used
   Vec3 point;                       // m, the place of interest
   double distance = 0;              // m from it within which the body is near
-  double hysteresis = 0;            // share of the distance by which it has to be farther to be so no more
-  double wait = 0;                  // s that a finer model stays when nothing calls for it
-  // as it stands
+  double hysteresis = 0;  // share of the distance that must be exceeded before the body is far again
+  double wait = 0;        // s for which a finer model is kept after it is no longer needed
+  // present state
   uint32_t level = uint32_t(SwitchLevel::undecided);
-  double called = 0;    // s, when the level was last called for
-  double refused = -1;  // s, when a change was last refused; negative: the last one was not
+  double called = 0;    // s, when the level was last needed
+  double refused = -1;  // s, when a change was last refused; negative: the last one was made
 };
 
 // A change of a model, made or refused.
@@ -86,10 +87,10 @@ struct Swap {
   uint64_t body = 0;  // handle
   double t = 0;       // s
   const dfm_type *from = nullptr, *to = nullptr;
-  double before = 0, after = 0;  // J, elastic; NaN where the model gives none
+  double before = 0, after = 0;  // J, elastic; NaN if the model has no energy
   double max_jump = 0;           // J
   bool refused = false;
-  bool unpaid = false;  // refused, because changes have put in too much
+  bool unpaid = false;  // refused because changes have added too much energy
 };
 
 }  // namespace dfm

@@ -1,4 +1,4 @@
-// What is prescribed over time: poses by keys, vectors and factors by keys, sines.
+// Prescribed functions of time: poses, vectors and factors by keys, and sines.
 #pragma once
 #include <vector>
 
@@ -26,7 +26,7 @@ double sine_at(const dfm_sine &s, double t);
 // well below a turn.
 Vec3 spin_between(Quat a, Quat b, double h);
 
-// Throws Error(DFM_E_ARG) where times do not rise or a value is not finite; `what` names the keys.
+// Throws Error(DFM_E_ARG) if times do not increase or a value is not finite; `what` names the keys.
 void check_keys(const std::vector<dfm_pose_key> &keys, const char *what);
 void check_keys(const std::vector<dfm_vector_key> &keys, const char *what);
 void check_keys(const std::vector<dfm_scale_key> &keys, const char *what);

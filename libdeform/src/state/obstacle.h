@@ -27,12 +27,12 @@ struct Obstacle {
   dfm_obstacle_def def{};
   std::vector<dfm_pose_key> keys;
   Pose pose;    // now
-  Pose target;  // at the end of the next step, where move_to set it
+  Pose target;  // at the end of the next step, if move_to was called
   bool has_target = false;
   bool sensor = false;        // reports what overlaps it, and pushes nothing
-  RigidSet *rigid = nullptr;  // a body of a rigid host: where it stands in `rigid`
+  RigidSet *rigid = nullptr;  // if it is a body of a rigid host: its index in `rigid`
   uint32_t rigid_body = 0;
-  bool added = false;  // a further shape of that body, at `local` in its frame
+  bool added = false;  // an additional shape of that body, at `local` in its frame
   Pose local;
   bool moves() const {
     return !keys.empty() || def.sine.amplitude[0] != 0 || def.sine.amplitude[1] != 0 ||
@@ -44,7 +44,7 @@ struct Obstacle {
   std::unique_ptr<VoxelGrid> grid;
   std::unique_ptr<SearchTree> search;  // rays
   Pose pose_at_time(double t) const;
-  // of a sub-step, in a step that lasts for `left` from t
+  // of a sub-step, in a step whose remaining time from t is `left`
   Pose end_pose(double t, double h, double left) const;
 };
 

@@ -1,4 +1,4 @@
-// Overlaps that have been found, and what the next look is to take in; step/overlap.h looks.
+// Overlaps that have been found, and what the next search covers; step/overlap.h searches.
 #pragma once
 #include <algorithm>
 #include <cstdint>
@@ -11,20 +11,21 @@ struct Overlap {
   bool obstacle;  // b is one
   // pairs of triangles that cross; of a plane, a sphere or a capsule: triangles that it cuts
   uint32_t crossings = 0;
-  uint32_t enclosed = 0;   // surfels of either that lie inside the other
-  double depth = 0;        // m, how far what is inside lies from the surface
-  bool aside = false;      // deeper than contact leads out: left out of contact until it is apart
-  bool separated = false;  // untangle() has put it apart
+  uint32_t enclosed = 0;   // surfels of one that lie inside the other, both ways
+  double depth = 0;        // m, largest distance of such a surfel from the other surface
+  bool aside = false;      // too deep for contact to resolve: excluded from contact until the two are apart
+  bool separated = false;  // untangle() has separated it
 };
 struct PairAside { uint64_t a, b, obstacle; };
 
 struct Overlaps {
-  std::vector<uint64_t> placed;         // ids that the next look takes in
-  bool all = false, look_only = false;  // it takes in everything; it moves nothing and sets nothing aside
-  bool untangle = false;                // it puts apart what it finds, once, whatever the world's flags
-  std::vector<Overlap> found;           // by the last look
+  std::vector<uint64_t> placed;  // ids that the next search covers
+  // search everything; search only, without moving or excluding anything
+  bool all = false, look_only = false;
+  bool untangle = false;       // separate what is found, once, whatever the flags of the world
+  std::vector<Overlap> found;  // by the last search
   std::vector<PairAside> aside;
-  bool told = true;  // a step has told it
+  bool told = true;  // a step has reported it
   bool is_aside(uint64_t a, uint64_t b, bool obstacle) const {
     return std::any_of(aside.begin(), aside.end(), [&](const PairAside &p) {
       return p.a == a && p.b == b && (p.obstacle != 0) == obstacle;

@@ -1,6 +1,6 @@
-// The tree through which rays and closest points look at one body or obstacle. It is made when it is first
-// asked for, and renewed when it is asked for after positions have changed. Any number of threads may ask at
-// once, as long as none changes positions.
+// The search tree of one body or obstacle for rays and closest points. It is built at the first query, and
+// refitted at the first query after positions have changed. Any number of threads may query at once while
+// none changes positions.
 #pragma once
 #include <atomic>
 #include <mutex>

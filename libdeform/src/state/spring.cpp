@@ -13,7 +13,7 @@ Vec3 spring_force(const Body &b, const Spring &s, double t, double h) {
     x += s.weights[i] * load3(&b.p.x[at]);
     v += s.weights[i] * load3(&b.p.v[at]);
   }
-  // Both ends at t, or a body that follows would run ahead by a step.
+  // Both ends are taken at t; otherwise a body that follows would be ahead by one step.
   const Vec3 end = spring_end(s, t), speed = h > 0 ? (1 / h) * (spring_end(s, t + h) - end) : Vec3{};
   return s.stiffness * (end - x) + s.damping * (speed - v);
 }

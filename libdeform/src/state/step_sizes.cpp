@@ -8,12 +8,12 @@
 namespace dfm {
 namespace {
 
-constexpr double kRounding = 1e-9;  // of a quotient of two sizes
-// sizes within this factor are one rung: half way to the next, the nearest of which is 8/7 away
+constexpr double kRounding = 1e-9;  // relative, of the quotient of two sizes
+// sizes within this factor are the same rung: half the distance to the nearest rung, a factor of 8/7 away
 constexpr double kSame = 1.06;
-// longer sub-steps are taken up to this share of the stable one, so that they need not be given up again soon
+// longer sub-steps are used up to this share of the stable one, so that they need not be shortened again soon
 constexpr double kRise = 0.9;
-// s, of implicit bodies: the first step, before an error is known, and the longest that is offered
+// s, for implicit bodies: the first step, before an error is known, and the longest step
 constexpr double kFirstOffer = 1e-3, kLongestOffer = 1.0 / 30;
 constexpr uint32_t kLeastCalm = 64;  // sub-steps: four evaluations of the bound
 
@@ -41,8 +41,8 @@ void take(Rung &r, double size) {
   r.calm = 0;
 }
 
-// Down at once to `most`, the longest size that is stable. Up to `longer`, which has a margin to it: the more
-// there is to win, the sooner.
+// Decreases at once to `most`, the longest stable size. Increases up to `longer`, which is below it by a
+// margin; the larger the gain, the sooner.
 void settle(Rung &r, double stable, double most, double longer) {
   if (!(r.size > 0 && r.size <= stable * (1 + kRounding))) return take(r, most);
   if (!(longer > r.size * kSame)) r.calm = 0;
@@ -77,7 +77,7 @@ double choose_pieces(StepSizes &s, double dt, double stable) {
   settle_offer(s.offer, stable);
   if (std::isinf(stable)) return 1;
   Rung &r = s.cut;
-  // A step that differs little from the last one, or is a multiple of its sub-steps, goes on with them.
+  // If a step differs little from the last one, or is a multiple of its sub-steps, their size is kept.
   const double ratio = dt / r.size, same = r.size > 0 ? count_above(ratio / kSame) : 0;
   if (same > 0 && same <= ratio * kSame) {
     r.size = dt / same;

@@ -1,5 +1,6 @@
 // A tool (deform/tool.h): a set of rigid bodies that dynamics/rigid/tool_host.h moves. What changes in a run
-// stands among the set's values, so that snapshots have it; the keys are those of the def, for good.
+// is among the values of the set, so that snapshots contain it; the keys are those of the def and never
+// change.
 #pragma once
 #include <algorithm>
 #include <cstring>
@@ -25,11 +26,11 @@ struct Tool {
   std::vector<uint64_t> parts;  // handles
   dfm_device device{};          // read NULL: none
   bool mute = false;            // the device has refused a force
-  // What it cuts (world/tool_cut.h).
+  // The bodies that it cuts (world/tool_cut.h).
   struct Cuts {
     uint32_t how = 0, most = 0;
     std::vector<uint64_t> bodies;  // ids, ascending
-    std::vector<ToolPlace> from;   // of its parts when the step began; empty: it has never cut
+    std::vector<ToolPlace> from;   // places of its parts at the start of the step; empty: it has never cut
   } cuts;
   bool has_jaws() const { return def.shape == DFM_TOOL_GRASPER || def.shape == DFM_TOOL_SCISSORS; }
   // with its pieces
@@ -39,11 +40,11 @@ struct Tool {
     };
     return in(b.id) || (b.piece_of && in(b.piece_of));
   }
-  // Parts from this one on cut: of scissors the jaws, else all there is.
+  // First part that cuts: of scissors the jaws, else all parts.
   uint32_t first_cutting_part() const { return def.shape == DFM_TOOL_SCISSORS ? 1 : 0; }
   ToolValues values() const { return tool_values(set->extra.data()); }
   void store(const ToolValues &v) { store_values(v, set->extra.data()); }
-  // Of a late device (ToolGiven): row of the past; what v gives at t comes into the next one.
+  // For a late device (ToolGiven): row of the past; the force that v gives at t goes into the next row.
   ToolGiven past(size_t row) const {
     ToolGiven g;
     std::memcpy(&g, set->extra.data() + kToolValues + row * (sizeof g / sizeof(double)), sizeof g);

@@ -1,5 +1,5 @@
-// The world: what lasts. step/step.cpp is the table of contents of what happens to it in a step,
-// step/context.h has the buffers of that.
+// The world: its lasting state. step/step.cpp is the table of contents of a step; step/context.h has the
+// buffers of a step.
 #pragma once
 #include <algorithm>
 #include <atomic>
@@ -58,15 +58,15 @@ struct Gravity {
   Vec3 now;  // m/s2
 };
 
-// What is prescribed, where an equilibrium is looked for.
+// Prescribed motions and loads during a search for an equilibrium.
 struct Prescribed {
-  double until = HUGE_VAL;  // s: what has keys or a sine stands still from then on
-  double share = 1;         // of loads that nothing varies
+  double until = HUGE_VAL;  // s: keys and sines are constant from then on
+  double share = 1;         // share of the constant loads
   double at(double t) const { return std::min(t, until); }
   bool stands() const { return until < HUGE_VAL; }
 };
 
-// What the host answers about pairs (deform/callback.h); by ids, a body first, the older of two.
+// The host's answers about pairs (deform/callback.h), by ids: the body first, of two bodies the older one.
 struct PairAnswer {
   uint64_t a, b;
   bool touch;
@@ -87,40 +87,40 @@ struct Sensed {
   auto operator<=>(const Sensed &) const = default;
 };
 
-// A measurement of what creeps (dfm_world_hold_begin).
+// A measurement of creep (dfm_world_hold_begin).
 struct Hold {
   bool on = false;
   double start = 0;  // s
 };
 
-// Events that are kept between steps. Beyond that so many of the oldest go at once that the next steps find
-// room.
+// Number of events that are kept between steps. Beyond it many of the oldest are dropped at once, so that
+// there is room for the next steps.
 inline constexpr size_t kMostEvents = 65536;
 inline constexpr size_t kEventsAtOnce = 1024;
 
 struct World {
   dfm_context *context;
-  Meters meters;  // before all that they count
+  Meters meters;  // declared before everything that they count
   uint64_t handle = 0;
   dfm_world_def def{};
-  Selection selection;            // by its list of effects
+  Selection selection;            // by the list of effects
   std::vector<LeftOut> left_out;  // of the world itself
   ImplicitOptions implicit;       // of bodies whose integrator is implicit
   Gravity gravity;
   Prescribed prescribed;
 
   std::vector<std::unique_ptr<Body>> bodies;  // in id order
-  // bodies without cells, which no step sees, in id order
+  // bodies without cells, which take no part in steps, in id order
   std::vector<std::unique_ptr<Body>> emptied;
-  // pieces that a restore has taken back; they keep their handles, and have them again where a piece gets
-  // the same id
+  // pieces that a restore has removed; their handles are valid again when a piece gets the same id
   std::vector<std::unique_ptr<Body>> undone;
-  uint64_t shapes = 0;                               // number of the last shape that a cut has made of a body
+  uint64_t shapes = 0;                               // number of the last shape that a cut has made
   std::vector<std::unique_ptr<Obstacle>> obstacles;  // in id order
   std::vector<std::unique_ptr<Material>> materials;
-  std::vector<std::unique_ptr<RigidSet>> rigid_sets;  // each a host's bodies, which are obstacles too
-  std::vector<std::unique_ptr<Tool>> tools;           // in order of creation; the parts of each are a set
-  std::vector<std::unique_ptr<LawInstance>> laws;     // the first is the default law, made when first needed
+  // each holds the bodies of one host, which are also obstacles
+  std::vector<std::unique_ptr<RigidSet>> rigid_sets;
+  std::vector<std::unique_ptr<Tool>> tools;        // in order of creation; the parts of each are a set
+  std::vector<std::unique_ptr<LawInstance>> laws;  // the first is the default law, made when first needed
   std::vector<FrictionRule> friction;
   std::vector<FilterRule> filters;
   std::vector<Attachment> attachments;  // in order of creation
@@ -130,13 +130,13 @@ struct World {
   uint32_t tearing = 0;        // bodies that may tear
   std::vector<Sensed> sensed;  // at the end of the last step
   Overlaps overlaps;
-  // rises when positions or d_c change otherwise than by a step
+  // increases when positions or d_c change other than by a step
   uint64_t placements = 0;
   uint64_t next_id = 1;
 
   // Derived from the above by prepare() whenever something changed.
   bool changed = true;
-  bool revalued = false;  // values_changed(): tables hold, the plan is looked at
+  bool revalued = false;  // values_changed(): tables stay valid, the plan is checked
   Plan plan;
   PairTables pairs;
   double offset = 0;                      // d_c, m
@@ -157,7 +157,7 @@ struct World {
   Report report;
   std::vector<PairWork> work;  // sorted by (a, b)
   std::vector<dfm_contact_event> events;
-  std::vector<Swap> swaps;  // that the host has not read yet
+  std::vector<Swap> swaps;  // not yet read by the host
   StepImpulses step_impulses;
   Hold hold;
   uint32_t sleepers = 0;

@@ -14,7 +14,7 @@
 namespace dfm {
 namespace {
 
-// [nsurfel] 1: meant
+// [nsurfel] 1: selected
 std::vector<uint8_t> selected(const Body &b, const dfm_attach_def &def) {
   const Surface &s = b.surface;
   const char *const name = b.name.c_str();
@@ -68,8 +68,8 @@ std::vector<uint8_t> selected(const Body &b, const dfm_attach_def &def) {
 }
 
 // Weights on three corners of a triangle and one surfel off its plane that give the point x and every linear
-// field: what is attached at a small distance then turns with the surface, and forces on it keep the angular
-// momentum. corner[3] has the weight 0 where x lies in the plane.
+// field: a point attached at a small distance then rotates with the surface, and forces on it conserve
+// angular momentum. corner[3] has weight 0 if x is in the plane.
 struct Place {
   uint32_t node[kAnchors];
   double weight[kAnchors];
@@ -204,7 +204,7 @@ dfm_attachment attachment_report(const Body &b, uint32_t number) {
   dfm_attachment out{};
   std::vector<Vec3> x, f;
   Vec3 middle, force, moment, total;
-  // what it holds on to may have come apart since, and each piece has a part of it
+  // the other body may have been parted since, and each piece has some of the points
   for (const Attachment &a : w.attachments) {
     if (a.body != b.id || a.number != number || a.released) continue;
     for (size_t i = 0; i < a.surfels.size(); ++i) {

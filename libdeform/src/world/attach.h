@@ -1,4 +1,4 @@
-// Attachments made, ended and reported between two steps (deform/attach.h).
+// Creating, ending and reporting attachments between two steps (deform/attach.h).
 #pragma once
 #include <cstdint>
 
@@ -8,7 +8,8 @@
 
 namespace dfm {
 
-// The number of the new one. One of `other` and `obstacle` is null. Throws Error and changes nothing.
+// Returns the number of the new attachment. One of `other` and `obstacle` is null. Throws Error; then nothing
+// has changed.
 uint32_t attach(Body &b, const dfm_attach_def &def, Body *other, const Obstacle *obstacle);
 void detach(Body &b, uint32_t number);
 dfm_attachment attachment_report(const Body &b, uint32_t number);

@@ -12,7 +12,7 @@
 namespace dfm {
 namespace {
 
-// The table of an extension; head: what every version of it has had.
+// The table of an extension; head: bytes that every version of it has.
 template <class Table>
 std::optional<Table> ask(const Body &b, const char *id, size_t head, const char *name) {
   const void *table = nullptr;
@@ -24,7 +24,7 @@ std::optional<Table> ask(const Body &b, const char *id, size_t head, const char 
   return copy_table<Table>(table, head, b.model.type->id, name);
 }
 
-// Row i of a list whose rows may be longer or shorter than this library's.
+// Row i of a list whose rows may be longer or shorter than those of this library.
 template <class Row>
 Row row_at(const Row *rows, uint32_t row_size, uint32_t i) {
   Row row{};
@@ -33,7 +33,7 @@ Row row_at(const Row *rows, uint32_t row_size, uint32_t i) {
   return row;
 }
 
-// What a row of ABI 1 began with.
+// The first fields of a row of ABI 1.
 constexpr uint32_t kFactHead = offsetof(dfm_fact, value) + sizeof(double);
 
 }  // namespace

@@ -1,5 +1,5 @@
-// What a body's model brings beyond forces, as users are told it: its effects, what would switch them off,
-// and numbers that the model found when it was made.
+// Reports on a body's model beyond forces: its effects, how to switch them off, and numbers that the model
+// computed at creation.
 #pragma once
 #include <string>
 #include <vector>
@@ -15,8 +15,8 @@ struct EffectSwitch {
 struct BodyEffect {
   std::string name;
   bool works = false;                  // with the present parameters
-  std::vector<EffectSwitch> switches;  // all of them together switch it off; none: no parameter does
-  // where the list of effects leaves it out: the parameters that called for it, "volume 1"
+  std::vector<EffectSwitch> switches;  // all of them together switch it off; empty: no parameter does
+  // if the list of effects leaves it out: the parameters that called for it, for example "volume 1"
   std::vector<std::string> would;
 };
 

@@ -21,7 +21,7 @@
 namespace dfm {
 namespace {
 
-// Beside the parameters of a model that has none of that name: 0 double, 1 single.
+// An additional parameter, unless the model has one of that name: 0 double, 1 single.
 constexpr char kPrecision[] = "precision";
 
 bool is_precision(const dfm_type &type, const char *key) {
@@ -55,7 +55,7 @@ bool asks_single(const dfm_type &type, const ModelParams &params) {
   return single;
 }
 
-// None: its points move explicitly, or what moves them is to be chosen (out.open).
+// None: its points move explicitly, or the integrator is not chosen yet (out.open).
 std::optional<ImplicitOptions> implicit_of(const World &w, const std::string &name, int32_t asked,
                                            Integrator &out) {
   if (asked < DFM_INTEGRATOR_AUTO || asked > DFM_INTEGRATOR_TR_BDF2)
@@ -77,7 +77,7 @@ std::optional<ImplicitOptions> implicit_of(const World &w, const std::string &na
   return options;
 }
 
-// What an explicit sub-step of the body may be, for integrators to be chosen by.
+// The longest explicit sub-step of the body, for the choice of the integrator.
 void ask_explicit_bound(const World &w, Dynamics &dynamics, Integrator &out) {
   StepBound bound;
   if (w.def.step == 0 || !dynamics.bound(w.time, [](double *, double *) {}, bound)) return;
@@ -85,8 +85,8 @@ void ask_explicit_bound(const World &w, Dynamics &dynamics, Integrator &out) {
   out.point = bound.point;
 }
 
-// [n,3] the rest positions where the frame puts them, for a model whose forces do not turn with the body;
-// empty for the others.
+// [n,3] rest positions transformed by the frame, for a model whose forces do not rotate with the body; empty
+// for other models.
 std::vector<double> rest_for(const dfm_type &type, const Body &b, const Pose &frame) {
   std::vector<double> placed;
   if (rests_unplaced(type)) return placed;
@@ -95,7 +95,7 @@ std::vector<double> rest_for(const dfm_type &type, const Body &b, const Pose &fr
   return placed;
 }
 
-// Fields that the type has no parameter for stay with the mesh, and are told.
+// Fields for which the type has no parameter stay with the mesh, and are reported.
 std::vector<dfm_cell_field> fields_for(const dfm_type &type, const Body &b, std::vector<Unused> &unused) {
   std::vector<dfm_cell_field> out;
   for (const CellField &f : b.makeup.given) {
@@ -105,7 +105,7 @@ std::vector<dfm_cell_field> fields_for(const dfm_type &type, const Body &b, std:
   return out;
 }
 
-// And what follows with them: fields, entries without use.
+// Also sets what depends on them: fields, unused entries.
 std::vector<double> values_for(const World &w, const Body &b, const dfm_type &type, const ModelParams &params,
                                BodyModel &out) {
   CellMaterials cells;
@@ -126,7 +126,7 @@ std::vector<double> values_for(const World &w, const Body &b, const dfm_type &ty
   return model_values(w, b, type, def, cells, out.fields);
 }
 
-// One that the body has had before, for the same; or none.
+// An instance that the body had before with the same inputs, or none.
 bool take_spare(Body &b, const dfm_type &type, const std::vector<double> &values, BodyModel &out) {
   const ModelOrigin &origin = out.origin;
   const bool turns = rests_unplaced(type);
@@ -183,12 +183,12 @@ void drop_fields(const dfm_type &type, const Withheld &withheld, std::vector<Cel
   });
 }
 
-// Without what the list of effects does not have. An instance with all that is asked for comes first: it
-// knows which effects are at work and what switches them off.
+// Leaves out effects that are not in the list of effects. First makes an instance with all parameters: it
+// knows which effects are active and what switches them off.
 void make_selected(World &w, Body &b, const dfm_type &type, std::vector<double> values, BodyModel &out) {
   make_instance(w, b, type, values, out);
   if (!w.selection.listed()) return;
-  if (!out.withheld.asked.empty()) return drop_fields(type, out.withheld, out.fields);  // a spare
+  if (!out.withheld.asked.empty()) return drop_fields(type, out.withheld, out.fields);  // from the spares
   Withheld withheld{values, differs_by_cell(type, out.fields)};
   std::vector<uint8_t> left = withheld.by_cell;
   const auto works = [&](const std::string &effect) { return out.instance.works(effect); };
@@ -206,7 +206,7 @@ void make_model(World &w, Body &b, const dfm_type &type, std::vector<double> val
   const auto implicit = implicit_of(w, b.name, integrator, out.integrator);
   const OnBehalf speaks(b.name);
   make_selected(w, b, type, std::move(values), out);
-  // a body's dynamics hold to its own instance, which is the new one meanwhile
+  // the dynamics of a body refer to its own instance, which is the new one by now
   struct Lent {
     ModelInstance &a, &b;
     Lent(ModelInstance &x, ModelInstance &y) : a(x), b(y) { a.swap(b); }

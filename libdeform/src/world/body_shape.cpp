@@ -34,7 +34,7 @@ void size_points(const Memory &m, Phyxels &p, uint32_t n) {
   p.held = Array<uint8_t>(n, 0, HookAllocator<uint8_t>(m));
 }
 
-// Rows of `width` values by number before.
+// Copies rows of `width` values by their previous number.
 template <class List, class From>
 void take_rows(const From &from, const Array<uint32_t> &number, size_t width, List &to) {
   to.resize(width * number.size());
@@ -43,7 +43,7 @@ void take_rows(const From &from, const Array<uint32_t> &number, size_t width, Li
                 to.begin() + std::ptrdiff_t(width * i));
 }
 
-// What follows from the cells: share, materials, fields.
+// Data by cell: share, materials, fields.
 void take_cells(const Memory &m, const Array<double> &share, const Makeup &makeup, const CutMesh &mesh,
                 BodyShape &out) {
   use_memory(m, out.share);
@@ -77,7 +77,7 @@ void make_skin(const Memory &m, const CutMesh &mesh, BodyShape &out) {
                out.surface);
 }
 
-// The body's present model, made for the mesh that it has now. Its integrator was chosen before.
+// Makes the present model of the body for its present mesh. Keeps the chosen integrator.
 void make_model_again(Body &b, const Former &before, ModelOrigin origin) {
   const Integrator was = before.integrator;
   std::unique_ptr<BodyModel> made =
@@ -95,7 +95,7 @@ void make_model_again(Body &b, const Former &before, ModelOrigin origin) {
   b.model.params = values;
 }
 
-// Puts the shape into the body; the last steps of making it may fail, and undo that.
+// Puts the shape into the body; the last steps may fail, which undoes it.
 template <class Finish>
 std::unique_ptr<BodyShape> put(Body &b, std::unique_ptr<BodyShape> shape, Finish &&finish) {
   shape->shape = ++b.world->shapes;
@@ -163,7 +163,7 @@ Former former(const Body &b) {
 
 namespace {
 
-// The part of b's present mesh, without what is put in by put().
+// The part of the present mesh of b, without what put() adds.
 std::unique_ptr<BodyShape> part_of(const Body &b, const CutMesh &mesh, Array<uint64_t> &&open) {
   const Memory &m = b.world->memory();
   auto shape = std::make_unique<BodyShape>();

@@ -1,6 +1,5 @@
-// All of a body that depends on which points and cells it has. A cut, and a snapshot from before or after
-// one, makes it beside what the body has and exchanges the two, so that a body is cut as a whole or not at
-// all.
+// All data of a body that depend on its set of points and cells. A cut, and a restore across a cut, make a
+// new shape and exchange it with that of the body, so that a cut is complete or has no effect.
 #pragma once
 #include "mesh/cut_mesh.h"
 #include "state/body.h"
@@ -29,7 +28,7 @@ struct BodyShape {
 
 void exchange(Body &b, BodyShape &other) noexcept;
 
-// What a shape takes over from the one before, wherever that stands now.
+// What a shape takes over from the previous one.
 struct Former {
   const Phyxels &p;
   const Array<uint32_t> &tets, &edges;
@@ -38,34 +37,33 @@ struct Former {
   const std::vector<HeldMotion> &motions;
   const ModelInstance &model;
   Integrator integrator;
-  bool parts = false;  // another body takes the rest: springs are shared
+  bool parts = false;  // another body takes the other cells: springs are shared
 };
 Former former(const BodyShape &s);
 Former former(const Body &b);
 
-// Names of the surface's features and the numbers that give the next ones; empty lists: make_shape() finds
-// them.
+// Names of the features of the surface and the next free names; empty lists: make_shape() finds them.
 struct FeatureNames {
   Array<uint32_t> of[kFeatureKinds];  // patches: by triangle
   Array<NamedBy> named;               // as in Surface
   uint32_t next[kFeatureKinds] = {};
 };
 
-// The body as it was made, for its record.
+// The original body, for its record.
 std::shared_ptr<const WholeBody> whole_of(const Body &b);
 
-// Puts into `b` what a cut of its present mesh leaves, and what it had into the shape that is returned;
-// exchange() with that undoes it. open: faces of the whole body. State, loads, springs, motions and held
-// points follow the points, the model's state its slots. Throws Error, and then `b` is as it was.
-// parts: another body takes the rest of the cells.
+// Gives `b` the mesh that a cut leaves, and returns the previous shape; exchange() with it undoes the cut.
+// open: faces of the whole body. State, loads, springs, motions and held points follow the points; the state
+// of the model follows its slots. Throws Error; then `b` is unchanged. parts: another body takes the other
+// cells.
 std::unique_ptr<BodyShape> cut_body(Body &b, CutMesh &&mesh, Array<uint64_t> &&open, bool parts);
-// Puts into `piece`, which has no shape or one that it loses, a part of the present mesh of `from`, with its
-// state. Throws Error, and then the piece has the shape that it had.
+// Gives `piece` a part of the present mesh of `from`, with its state; a previous shape of the piece is
+// dropped. Throws Error; then the piece is unchanged.
 void shape_piece(const Body &from, CutMesh &&mesh, Array<uint64_t> &&open, Body &piece);
 
-// Puts into `b` the shape of a snapshot: a mesh cut from the whole body, which `b` has been or comes from.
-// Its state is that of rest. names: of the surface; null: the whole body, which has no names of its own.
-// like: has the model that the body gets, and how it was made: `b` itself, or the body that it is a piece of.
+// Gives `b` the shape of a snapshot: a mesh cut from the whole body of `b`. Its state is that at rest. names:
+// of the surface; null: the whole body, which has no own names. like: provides the model and its inputs: `b`
+// itself, or the body of which it is a piece.
 std::unique_ptr<BodyShape> restore_shape(Body &b, const Body &like, std::shared_ptr<const WholeBody> whole,
                                          CutMesh &&mesh, Array<uint64_t> &&open, FeatureNames *names);
 

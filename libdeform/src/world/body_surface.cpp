@@ -10,9 +10,10 @@
 namespace dfm {
 namespace {
 
-// mean distances; beyond, rows hold hundreds of phyxels and the surface no longer follows the body
+// mean distances; beyond it rows hold hundreds of phyxels and the surface no longer follows the body
 constexpr double kMostSupport = 10;
-// of the cells' diagonal: further out than a coarse lattice's boundary is from a curved surface
+// of the diagonal of the cells: more than the distance between the boundary of a coarse lattice and a curved
+// surface
 constexpr double kTellOutside = 0.02;
 
 void check_surface(const dfm_surface_def &def, const char *name) {
@@ -51,7 +52,7 @@ void check_surface(const dfm_surface_def &def, const char *name) {
            name, i);
 }
 
-// A closed surface that faces inward would take every outside for its inside.
+// A closed surface that faces inward would exchange inside and outside.
 void check_outward(const Surface &s, const char *name) {
   for (uint32_t e = 0; e < 2 * s.nedge; ++e)
     if (s.edge_tri[e] == kNone) return;

@@ -1,14 +1,14 @@
-// The skin of a new body: the boundary of its cells, or a surface of its own that hangs on its points.
+// Makes the surface of a new body: the boundary of its cells, or its own surface, coupled to its points.
 #pragma once
 #include "state/body.h"
 
 namespace dfm {
 
-// b.p (rest, x, v) and b.tets stand. Throws Error; tells the log where a surface of its own lies
-// outside the cells.
+// b.p (rest, x, v) and b.tets are complete. Throws Error; logs a warning if its own surface is outside the
+// cells.
 void make_body_surface(Body &b, const dfm_surface_def *def);
 
-// The coupling as models are told about it; lives as long as the body's surface and this object.
+// The coupling in the form that models get; valid as long as the surface of the body and this object.
 class MeshCoupling {
  public:
   MeshCoupling(const Memory &memory, const Surface &surface);
@@ -16,7 +16,7 @@ class MeshCoupling {
 
  private:
   const Surface &surface_;
-  Array<uint32_t> row_, col_;  // of an identity, which needs none otherwise
+  Array<uint32_t> row_, col_;  // of an identity, which stores no rows otherwise
   Array<double> weight_;
 };
 

@@ -21,7 +21,7 @@ Corners sorted(const uint32_t *c) {
   return out;
 }
 
-// Finds triangles of the surface by their points, as the def numbers them.
+// Finds triangles of the surface by their points, numbered as in the def.
 class TriangleIndex {
  public:
   explicit TriangleIndex(const Surface &s) {
@@ -69,8 +69,8 @@ void check_groups(const dfm_surface_groups &g, const Body &b, uint32_t npoint) {
   }
 }
 
-// [ntri] group of each triangle, kNone without. A triangle that is named twice keeps its first group; one
-// inside the body is passed over.
+// [ntri] group of each triangle, or kNone. A triangle that is named twice keeps its first group; triangles
+// inside the body are ignored.
 std::vector<uint32_t> triangle_groups(const Body &b, const dfm_body_def &def) {
   std::vector<uint32_t> out(b.surface.ntri, kNone);
   if (!def.groups) return out;
@@ -88,8 +88,8 @@ std::vector<uint32_t> triangle_groups(const Body &b, const dfm_body_def &def) {
   return out;
 }
 
-// [ntri] entry of materials.list of the cell that carries each triangle: the cell that it is a face of, or
-// that its middle lies in.
+// [ntri] entry of materials.list of the cell that carries each triangle: the cell whose face it is, or the
+// cell that contains its centroid.
 std::vector<uint32_t> triangle_materials(const Body &b, const dfm_body_def &def,
                                          const CellMaterials &materials) {
   std::vector<uint32_t> out(b.surface.ntri, 0);

@@ -1,4 +1,4 @@
-// Which group and which material each triangle of a body's surface has.
+// Group and material of each triangle of a body's surface.
 #pragma once
 #include "state/material.h"
 
@@ -6,7 +6,7 @@ namespace dfm {
 
 inline constexpr char kFrictionKey[] = "friction";  // a material's entry
 
-// The material's coefficient of friction, or kDefaultFriction where it has none.
+// The friction coefficient of the material, or kDefaultFriction if it has none.
 double friction_of(const Material &material);
 
 // Fills b.zones; the surface and its coupling are there. Throws Error(ARG).

@@ -11,7 +11,7 @@ namespace {
 
 constexpr size_t kTopologyHead = offsetof(dfm_topology, carry) + sizeof(void *);
 
-// Points now by points before, with the share of the mass that each has of all copies.
+// Maps previous points to present points, with the share of each copy in the mass of all copies.
 class Copies {
  public:
   Copies(const CutMesh &mesh, const Body &b, uint32_t before) : begin_(before + 1) {
@@ -38,8 +38,8 @@ class Copies {
   std::vector<double> share_;
 };
 
-// parts: points that are not here are in other bodies. Each has the share of the spring that its points have
-// of the weights, so that the force of the whole and its work stay.
+// parts: missing points are in other bodies. Each body gets the share of the spring that its points have of
+// the weights, so that the total force and its work are unchanged.
 Spring carried(const Spring &s, const Copies &copies, bool parts) {
   Spring out = s;
   out.points.clear();

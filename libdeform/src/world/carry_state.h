@@ -1,4 +1,4 @@
-// What a body takes along into the shape that a cut leaves it, beside its points.
+// What a body carries over into its shape after a cut, other than its points.
 #pragma once
 #include <optional>
 
@@ -6,15 +6,15 @@
 
 namespace dfm {
 
-// `before`: what the body had, or the body that it comes off; numbers before by numbers now are the mesh's.
-// Lasting loads, springs and motions of points. A load on a point that is split is shared by its copies as
-// their masses are; on a point that is gone it goes.
+// `before`: the previous shape of the body, or of the body that it came from; the mesh maps present to
+// previous numbers. Lasting loads, springs and motions of points. A load on a split point is divided among
+// its copies in proportion to their masses; a load on a removed point is removed.
 void carry_loads(const Former &before, const CutMesh &mesh, Body &b);
-// None: the model needs the whole of its cells.
+// None: the model needs all of its cells.
 std::optional<dfm_topology> topology_of(const ModelInstance &model);
-// The state of the model: slots by point, cell, edge and instance; edges that are new begin as at first.
+// The state of the model: slots by point, cell, edge and instance; new edges start in the initial state.
 void carry_state(const Former &before, const CutMesh &mesh, Body &b);
-// Impulses of surfels; a copy has none.
+// Impulses of surfels; copies have none.
 void carry_surfels(const Body &before, const CutMesh &mesh, BodyShape &out);
 
 }  // namespace dfm

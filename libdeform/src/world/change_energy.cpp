@@ -11,12 +11,12 @@
 namespace dfm {
 namespace {
 
-// Of the largest energy that the body has had: what changes may have put in and it has not lost; and how
-// little of it counts as none.
+// Relative to the largest energy of the body: the unpaid energy that is allowed, and the amount that counts
+// as none.
 constexpr double kMost = 0.1, kLittle = 0.01;
-// Of its elastic energy, where the body has lost what earlier changes put in.
+// Relative to its elastic energy, if the body has lost what earlier changes added.
 constexpr double kAnother = 4;
-constexpr double kSmallJump = 1e-9;  // J, that counts as none
+constexpr double kSmallJump = 1e-9;  // J, counts as none
 
 double finite_or_none(double joule) { return std::isfinite(joule) ? joule : 0; }
 double energy_now(Body &b) { return moving_energy(b) + finite_or_none(elastic_energy(b)); }
@@ -27,7 +27,7 @@ double jump_of(const Swap &s) { return finite_or_none(s.after) - finite_or_none(
 ChangeBook look_at_changes(const Body &b, double elastic) {
   ChangeBook out = b.changes;
   const double now = moving_energy(b) + finite_or_none(elastic);
-  // what changes have taken out stays to be given back
+  // energy that changes have removed may be returned by later ones
   if (out.open) out.unpaid = std::max(std::min(0.0, out.unpaid), out.unpaid - (out.level + out.work - now));
   out.largest = std::max(out.largest, now - std::max(0.0, out.unpaid));
   out.level = now;
@@ -35,10 +35,10 @@ ChangeBook look_at_changes(const Body &b, double elastic) {
   return out;
 }
 
-// Beyond the share, a body that has lost what earlier changes put in may take a multiple of its elastic
-// energy: so far are models and materials from each other that bear the same load. No sequence of such
-// changes grows, since the body has to lose each jump before the next. Of an old model without energy nobody
-// knows what the new one adds.
+// Above that share, a body that has lost what earlier changes added may gain a multiple of its elastic
+// energy, because models and materials that bear the same load differ by that much. No sequence of such
+// changes can grow, since the body must lose each jump before the next. If the old model has no energy, the
+// jump is unknown.
 void check_unpaid(const Body &b, const ChangeBook &before, Swap &swap) {
   const double jump = jump_of(swap), share = kMost * before.largest;
   const bool paid = before.unpaid <= kLittle * before.largest;

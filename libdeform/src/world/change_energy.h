@@ -1,22 +1,22 @@
-// What changes of its model may put into a body (doc/concepts/changing_models.md). A change leaves positions
-// and velocities, so the elastic energy jumps, and to and fro the jumps need not cancel: a body is one that
-// is pumped. What they have put in is counted until the body has lost as much: its losses are what work on
-// it from outside has put in (step/change_work.h) less what its energy has grown by.
+// Limit on the energy that changes of its model may add to a body (doc/concepts/changing_models.md). A change
+// keeps positions and velocities, so the elastic energy jumps, and repeated changes back and forth could pump
+// energy. The added energy counts until the body has lost as much; its loss is the work done on it from
+// outside (step/change_work.h) minus the growth of its energy.
 #pragma once
 #include "state/body.h"
 
 namespace dfm {
 
-// The book as it is at the present state, with this elastic energy (NaN: none).
+// The book at the present state, with this elastic energy (NaN: none).
 ChangeBook look_at_changes(const Body &b, double elastic);
-// With the change that the book of before it and the swap tell of. Throws Error, DFM_DISCARD, where jumps
-// that nothing has paid for would come to too much.
+// Adds a change, given by the book before it and the swap. Throws Error, DFM_DISCARD, if the unpaid jumps
+// would exceed the limit.
 void check_unpaid(const Body &b, const ChangeBook &before, Swap &swap);
 void book_change(const Body &b, ChangeBook &book, const Swap &swap);
-// Bodies are at rest: nothing of what changes have put in is left.
+// Bodies are at rest: no added energy is left.
 void settle_changes(Body &b);
 
-// While it lives the host changes the state of the body, which is work from outside.
+// During its lifetime the host changes the state of the body; the change counts as external work.
 class HostWork {
  public:
   explicit HostWork(Body &b);

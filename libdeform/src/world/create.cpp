@@ -1,5 +1,5 @@
-// Bodies and obstacles come into a world: defs are checked, meshes become phyxels and surfels, the model
-// plugin gets its instance.
+// Creates bodies and obstacles: checks defs, turns meshes into phyxels and surfels, creates the model
+// instance.
 #include "world/create.h"
 
 #include <algorithm>
@@ -84,7 +84,7 @@ void place_phyxels(Body &b, const dfm_body_def &def) {
   }
 }
 
-// Copies, which outlive the def and its materials.
+// Copies, valid after the def and its materials are gone.
 void keep_makeup(World &w, Body &b, const dfm_body_def &def, const CellMaterials &cells) {
   for (const Material *m : cells.list) b.makeup.materials.push_back(*m);
   b.makeup.of = cells.of;
@@ -313,7 +313,7 @@ Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def) {
   ++w.next_id;
   o.def.name = o.name.c_str();
   w.obstacles.push_back(std::move(owned));
-  wake_all(w);  // it may stand where someone sleeps
+  wake_all(w);  // it may be where a body sleeps
   w.changed = true;
   return o;
 }
@@ -335,9 +335,9 @@ void leave_contacts(World &w, uint64_t id, bool obstacle) {
 
 namespace {
 
-// Rules that name the removed thing go with it.
+// Rules that name the removed thing are removed too.
 void forget(World &w, uint64_t handle, const std::string &name) {
-  const auto goes = [&](const std::string &side) {  // "body:GROUP" may also be all of another one's name
+  const auto goes = [&](const std::string &side) {  // "body:GROUP" may also be the full name of another body
     return names(side, name) && (side == name || (!w.find_body(side) && !w.find_obstacle(side)));
   };
   const auto named = [&](const auto &rule) { return goes(rule.between[0]) || goes(rule.between[1]); };

@@ -1,4 +1,4 @@
-// Bodies and obstacles enter and leave a world. All throw Error and leave the world as it was.
+// Creates and removes bodies and obstacles. All functions throw Error; then the world is unchanged.
 #pragma once
 #include "deform/deform.h"
 
@@ -8,7 +8,7 @@ struct Body;
 struct Obstacle;
 struct World;
 
-// The word of a scene for one that solves for the end of a sub-step.
+// The name in scenes of an implicit integrator.
 inline const char *integrator_name(int32_t implicit) {
   return implicit == DFM_INTEGRATOR_TR_BDF2 ? "tr_bdf2" : "implicit_euler";
 }
@@ -17,7 +17,7 @@ Body &create_body(World &w, const dfm_body_def &def);
 Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def);
 void destroy_body(Body &b);
 void destroy_obstacle(Obstacle &o);
-// Of a body or an obstacle that steps are to see no more: attachments and contacts end, with their events.
+// Ends the attachments and contacts, with their events, of a body or obstacle that leaves the simulation.
 void leave_contacts(World &w, uint64_t id, bool obstacle);
 
 }  // namespace dfm

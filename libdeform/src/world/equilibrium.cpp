@@ -18,9 +18,9 @@
 namespace dfm {
 namespace {
 
-// A load step without an answer is halved so many times.
+// How often a load step without a solution is halved.
 constexpr uint32_t kHalvings = 6;
-// What relaxes changes what is balanced, and the other way round: so often at most.
+// Limit on alternations between relaxation and equilibrium, which depend on each other.
 constexpr uint32_t kRelaxations = 4;
 
 // Time and share of the loads.
@@ -62,7 +62,7 @@ class Search {
     std::unique_ptr<Equilibrium> solver;
     std::unique_ptr<AtRest> rest;
     std::vector<double> softness;  // [npoint] N/m of the body's springs
-    bool free;                     // neither held nor on springs
+    bool free;                     // without held points and without springs
   };
   struct Kept {
     double time;
@@ -94,7 +94,7 @@ class Search {
     }
   }
 
-  // From an equilibrium at `from` to one at `to`, in halves where one step finds none.
+  // Goes from an equilibrium at `from` to one at `to`; halves the step if it finds none.
   void go(const Station &from, const Station &to, uint32_t halved) {
     const Kept before = kept_;
     const One *failed = nullptr;
@@ -132,7 +132,7 @@ class Search {
           failed = &one;
           return false;
         }
-        // done once what has relaxed changes nothing
+        // done when relaxation changes nothing
         if ((round > 0 && result.iterations <= 1) || round == kRelaxations || !one.rest->relax(to.time))
           break;
       }

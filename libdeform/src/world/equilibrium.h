@@ -6,10 +6,10 @@ namespace dfm {
 
 struct World;
 
-// Throws Error where the world has what no equilibrium is looked for with.
+// Throws Error if the world has something for which no equilibrium can be computed.
 void check_equilibrium(const World &w);
-// Positions where every body is balanced, velocities zero, time gone on by def.time. Throws Error, and then
-// nothing has changed.
+// Sets positions at which every body is in equilibrium, zero velocities, and advances time by def.time.
+// Throws Error; then nothing has changed.
 void find_equilibrium(World &w, const dfm_equilibrium_def &def, dfm_equilibrium_info &info);
 
 }  // namespace dfm

@@ -33,7 +33,7 @@ const char *word_of(uint32_t integrator) {
 }
 const char *word_of(const Body &b) { return b.model.stepper ? "its own" : word_of(b.integrator.used); }
 
-// How it moves, and what explicit time would take.
+// Its integrator, and the explicit sub-step.
 std::string integrator(const Body &b) {
   const auto &i = b.integrator;
   const double step = b.world->def.step, n = std::max(1.0, std::ceil(step / i.step));
@@ -72,7 +72,7 @@ bool used(const World &w, const std::string &effect) {
   return w.selection.wants(effect) && planned(w, effect);
 }
 
-// Laws of pairs, and what they bring.
+// Laws of pairs, and their effects.
 std::string laws(const World &w) {
   std::vector<std::string> rows;
   for (const auto &law : w.laws) {
@@ -87,7 +87,7 @@ std::string laws(const World &w) {
   return "\"laws\":[" + join(rows, ",") + "]";
 }
 
-// What parameters call for, and the list of effects does not have.
+// Effects that parameters call for but the list of effects leaves out.
 std::string left_out(const World &w) {
   std::vector<LeftOut> all = w.left_out;
   const auto take = [&](const std::vector<LeftOut> &some) {
@@ -102,7 +102,7 @@ std::string left_out(const World &w) {
   return "\"left_out\":[" + join(rows, ",") + "]";
 }
 
-// What the model brings, which of it the scene uses, and what would switch it off.
+// Effects of the model, which of them the scene uses, and what switches them off.
 std::string effects(const Body &b) {
   std::string out = "\"effects\":[";
   bool first = true;
@@ -122,7 +122,7 @@ std::string effects(const Body &b) {
   return out + "]";
 }
 
-// What the model found when it was made.
+// Facts that the model computed at creation.
 std::string facts(const Body &b) {
   std::string out = "\"facts\":[";
   bool first = true;
@@ -145,7 +145,7 @@ std::string change(const ModelChoice &c, const std::string &when) {
   return out + "}";
 }
 
-// Models that it is to have.
+// Future models.
 std::string changes(const Body &b) {
   std::vector<std::string> rows;
   for (const Switch &s : b.switches) rows.push_back(change(s.to, format("at %g s", s.t)));
@@ -159,7 +159,7 @@ std::string changes(const Body &b) {
   return ",\"changes\":[" + join(rows, ",") + "]";
 }
 
-// What of it is held by what.
+// Attachments.
 std::string attachments(const Body &b) {
   std::vector<std::string> rows;
   const auto name = [&](const Attachment &a) -> const std::string & {
@@ -220,7 +220,7 @@ std::string body(const Body &b) {
 
 std::string seconds(double s) { return std::isfinite(s) ? format("%.3g s", s) : "any step"; }
 
-// Which term rules at the worst point: the one that alone would allow the shorter step.
+// The dominant term at the worst point: the one that alone would allow the shorter step.
 std::string reason(const World &w) {
   if (!w.bound.body) return "nothing bounds the step";
   const Body &b = *w.bound.body;

@@ -30,7 +30,7 @@ class TriangleList {
           {sorted(point(3 * size_t{t}), point(3 * size_t{t} + 1), point(3 * size_t{t} + 2)), t});
     std::sort(entries_.begin(), entries_.end());
   }
-  uint32_t find(Corners key) const {  // kNone: there is none
+  uint32_t find(Corners key) const {  // kNone: none
     const auto at = std::lower_bound(entries_.begin(), entries_.end(), std::pair(key, 0u));
     return at != entries_.end() && at->first == key ? at->second : kNone;
   }
@@ -39,11 +39,11 @@ class TriangleList {
   std::vector<std::pair<Corners, uint32_t>> entries_;
 };
 
-// Gives each old name once, and new ones from `next` on.
+// Gives out each old name once, and new names from `next` on.
 class Names {
  public:
   Names(const Array<uint32_t> &old, uint32_t n, uint32_t &next) : old_(old), taken_(n), next_(next) {}
-  uint32_t of(uint32_t feature) {  // kNone: of no feature before
+  uint32_t of(uint32_t feature) {  // kNone: no feature before
     if (feature == kNone || taken_[feature]) return next_++;
     taken_[feature] = 1;
     return old_.empty() ? feature : old_[feature];
@@ -72,7 +72,7 @@ uint32_t above_all(const Array<uint32_t> &names) {
   return names.empty() ? 0 : *std::max_element(names.begin(), names.end()) + 1;
 }
 
-// old [ntri]: the triangle before that each one is, or kNone.
+// old [ntri]: the previous number of each triangle, or kNone.
 void name_patches(const Surface &before, const std::vector<uint32_t> &old, Surface &surface, uint32_t &next) {
   std::vector<uint32_t> name(above_all(surface.patch), kNone);
   std::vector<uint8_t> taken(above_all(before.patch));

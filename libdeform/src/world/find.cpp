@@ -33,14 +33,14 @@ Shape shape_of(const Obstacle &o) { return Shape(o.def.shape); }
 bool of_triangles(const Obstacle &o) { return shape_of(o) == Shape::mesh || shape_of(o) == Shape::voxels; }
 
 Vec3 plane_normal(const Obstacle &o) { return rotate(o.pose.rotation, {0, 0, 1}); }
-// m, of the point of a shape that lies deepest; and that point
+// m, depth of the deepest point of a shape, and that point
 double above_plane(const Convex &shape, const Obstacle &o, Vec3 *lowest = nullptr) {
   const Vec3 n = plane_normal(o), p = shape.support(-n);
   if (lowest) *lowest = p - shape.radius * n;
   return dot(n, p - o.pose.position) - shape.radius;
 }
 
-// Closed forms but planes, in place.
+// Closed forms except planes, in place.
 ObstacleShape closed_form(const Obstacle &o) {
   ObstacleView v{};
   v.shape = shape_of(o);
@@ -60,7 +60,7 @@ bool closed(const Thing &thing) {
   return thing.obstacle->grid || (thing.obstacle->mesh && thing.obstacle->mesh->closed);
 }
 
-// The triangles of a thing, and a shape as they see it.
+// The triangles of a thing, and a shape in their frame.
 Triangles triangles_of(const Thing &thing) {
   return thing.body ? search(*thing.body) : search(*thing.obstacle);
 }
@@ -78,7 +78,7 @@ Vec3 turned_back(const Thing &thing, Vec3 d) {
 }
 Vec3 back(const Thing &thing, Vec3 p) { return thing.body ? p : place(thing.obstacle->pose, p); }
 
-// What a closed surface encloses; `p` as the triangles see it.
+// Whether a closed surface encloses `p`, in the frame of the triangles.
 bool encloses(const Thing &thing, const Triangles &m, Vec3 p) {
   if (m.tree.empty()) return false;
   const Box &root = m.tree.root();
@@ -89,7 +89,7 @@ bool encloses(const Thing &thing, const Triangles &m, Vec3 p) {
 
 bool has_triangles(const Thing &thing) { return thing.body || of_triangles(*thing.obstacle); }
 
-// A thing with triangles, and one whose triangles are asked for one by one.
+// A thing with triangles, and one whose triangles are tested one by one.
 bool surfaces_overlap(const Thing &a, const Thing &b) {
   const Triangles of_a = triangles_of(a), of_b = triangles_of(b);
   if (of_a.tree.empty() || of_b.tree.empty()) return false;
@@ -108,7 +108,7 @@ bool surfaces_overlap(const Thing &a, const Thing &b) {
          encloses(a, of_a, seen_by(a, back(b, of_b.corner(0, 0))));
 }
 
-// A plane and a thing that is no plane.
+// A plane and another shape.
 bool plane_overlaps(const Obstacle &plane, const Thing &thing) {
   if (!has_triangles(thing))
     return is_convex(*thing.obstacle) && above_plane(convex_of(*thing.obstacle), plane) <= 0;
@@ -185,7 +185,7 @@ bool overlap(const Thing &a, const Thing &b) {
   if (a.obstacle && is_convex(*a.obstacle)) return overlaps(convex_of(*a.obstacle), b);
   if (b.obstacle && is_convex(*b.obstacle)) return overlaps(convex_of(*b.obstacle), a);
   if (!has_triangles(a) || !has_triangles(b)) return false;  // a rigid body without shapes
-  // the one with fewer triangles is asked for one by one
+  // the one with fewer triangles is tested one by one
   return triangles_of(a).corners.size() <= triangles_of(b).corners.size() ? surfaces_overlap(a, b)
                                                                           : surfaces_overlap(b, a);
 }
@@ -256,7 +256,7 @@ dfm_query_hit find_first_on_path(World &w, const ThingFilter &filter, const Conv
       const Convex seen = seen_by(thing, shape);
       const TriangleOnPath found = first_on_path(m, seen, turned_by(thing, unit), most);
       take(thing, found.hit, found.triangle);
-      // a shape within a closed surface may meet it from within later on
+      // a shape inside a closed surface may hit it from inside later
       if (hit.distance > 0 && encloses(thing, m, seen.any())) {
         hit = hit_of(thing, kNone, 0, inside.point, inside.normal);
         hit.flags = DFM_QUERY_INSIDE;
@@ -288,7 +288,7 @@ bool HitRows::before(const dfm_query_hit &hit, uint32_t row) const {
   dfm_query_hit other;
   std::memcpy(&other, at_ + size_t{step_} * row, sizeof other);
   if (hit.distance != other.distance) return hit.distance < other.distance;
-  // of equals what was offered first, but for triangles of one thing
+  // of equal hits the first one offered, except for triangles of one thing
   return hit.thing == other.thing && hit.triangle < other.triangle;
 }
 
@@ -319,7 +319,7 @@ void find_all_on_ray(World &w, const ThingFilter &filter, Vec3 origin, Vec3 unit
     const double first = ray_obstacle(o, origin, unit, limit, &n, nullptr);
     if (!(first < kFar)) return true;
     if (first <= limit) rows.offer(hit_of(thing, kNone, first, origin + first * unit, n));
-    // What it enters it leaves where the same line, seen from behind, enters.
+    // The exit point is the entry point of the reversed line.
     if (!is_convex(o) || !(dot(n, unit) < 0)) return true;
     const double beyond = first + 2 * convex_of(o).reach() + 1;
     const double last = beyond - ray_obstacle(o, origin + beyond * unit, -unit, beyond, &n, nullptr);

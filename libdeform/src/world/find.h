@@ -1,5 +1,5 @@
-// What a shape, a ray or a point finds among bodies, obstacles and rigid bodies: overlaps, casts, all hits.
-// The functions of deform/query.h, for checked arguments.
+// Overlaps, casts and all-hits queries of a shape, a ray or a point among bodies, obstacles and rigid bodies:
+// the functions of deform/query.h, for checked arguments.
 #pragma once
 #include "deform/query.h"
 #include "geometry/convex_gap.h"
@@ -29,7 +29,7 @@ class ThingFilter {
   const dfm_query_filter *given_;
 };
 
-// f(thing) for all that pass, bodies first, each kind in order of creation; ends where f returns false.
+// Calls f(thing) for all that pass, bodies first, each kind in order of creation, until f returns false.
 template <class F>
 void each_thing(World &w, const ThingFilter &filter, F &&f) {
   for (auto &b : w.bodies)
@@ -38,22 +38,22 @@ void each_thing(World &w, const ThingFilter &filter, F &&f) {
     if (const Thing thing{nullptr, o.get()}; filter.passes(thing) && !f(thing)) return;
 }
 
-// A sphere, capsule or box as a convex shape; not another one.
+// A sphere, capsule or box as a convex shape.
 Convex convex_of(const Obstacle &o);
 bool is_convex(const Obstacle &o);
 
-// Touches the thing's surface, or lies within it.
+// Whether it touches the surface of the thing, or is inside it.
 bool overlaps(const Convex &shape, const Thing &thing);
-// Do two things overlap? Two planes do not.
+// Whether two things overlap. Two planes do not.
 bool overlap(const Thing &a, const Thing &b);
 
 dfm_query_hit find_first_on_ray(World &w, const ThingFilter &filter, Vec3 origin, Vec3 unit, double limit);
 dfm_query_hit find_closest(World &w, const ThingFilter &filter, Vec3 p, double limit);
-// m, of a point from an obstacle's surface, below 0 inside sphere, box and capsule; `limit` where it is
-// farther.
+// m, signed distance of a point from the surface of an obstacle, negative inside a sphere, box or capsule;
+// `limit` if it is farther.
 double distance_from(Obstacle &o, Vec3 p, double limit);
 dfm_query_hit find_first_on_path(World &w, const ThingFilter &filter, const Convex &shape, Vec3 path);
-// All of them, into the caller's rows: nearest first, then by thing, then by triangle.
+// Writes all hits into the caller's rows: nearest first, then by thing, then by triangle.
 class HitRows {
  public:
   HitRows(dfm_query_hit *out, uint32_t row_size, uint32_t capacity)

@@ -1,6 +1,5 @@
-// A law that only one rule refers to takes new parameters in its place: numbers of laws, tables and plan
-// stand, and contacts keep their memory. A law that others share is left to them, and the rule gets one of
-// its own, once.
+// If only one rule refers to a law, its parameters are replaced: numbers of laws, tables and plan remain
+// valid, and contacts keep their state. If several rules share a law, the rule gets a new law.
 #include "world/friction_rules.h"
 
 #include <algorithm>
@@ -18,7 +17,7 @@
 namespace dfm {
 namespace {
 
-// Laws that no rule but `but`, no contact and no table of pairs refers to. They make room for new ones.
+// Laws to which no rule except `but`, no contact and no pair table refers. New laws may take their places.
 std::vector<uint8_t> free_laws(const World &w, const FrictionRule *but) {
   std::vector<uint8_t> free(w.laws.size(), 1);
   const auto use = [&](uint32_t law) {
@@ -66,13 +65,14 @@ bool bring_the_same(const LawInstance &a, const LawInstance &b) {
   });
 }
 
-// The rule's law, with other values of its parameters.
+// The law of the rule, with other parameter values.
 void put_params(World &w, FrictionRule &rule, std::vector<double> values) {
   forget_pairs(w, 0);
   std::unique_ptr<LawInstance> &law = w.laws[rule.law];
   auto fresh = make_law(w, *law->asked_type, std::move(values));
   const bool remembers = same_memory(*law, *fresh);
-  if (!bring_the_same(*law, *fresh)) w.changed = true;  // the plan names what the parameters call for
+  // the plan names the effects that the parameters call for
+  if (!bring_the_same(*law, *fresh)) w.changed = true;
   if (remembers && !shared(w, rule)) {
     law.swap(fresh);
     if (rule.law < w.pairs.laws.size()) w.pairs.laws[rule.law] = law.get();
@@ -84,14 +84,13 @@ void put_params(World &w, FrictionRule &rule, std::vector<double> values) {
   w.changed = true;
 }
 
-// Does it hold for one pair of things, as a whole? Then its place among the others of this sort
-// does not matter.
+// Whether it applies to one pair of whole things. Then its order among rules of this kind does not matter.
 bool names_things(World &w, const FrictionRule &rule) {
   return std::all_of(rule.between, rule.between + 2,
                      [&](const std::string &side) { return w.find_body(side) || w.find_obstacle(side); });
 }
 
-// The last given wins of rules that weigh the same.
+// Of rules of equal weight the last one wins.
 void move_to_end(World &w, FrictionRule *rule) {
   FrictionRule *const end = w.friction.data() + w.friction.size();
   if (std::any_of(rule, end, [&](const FrictionRule &r) { return !names_things(w, r); }) && rule + 1 != end)

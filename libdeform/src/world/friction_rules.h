@@ -1,4 +1,4 @@
-// Rules of friction of a world, which may come, change and go between steps.
+// Friction rules of a world, which can be added, changed and removed between steps.
 #pragma once
 #include <span>
 #include <string>
@@ -10,12 +10,11 @@ namespace dfm {
 struct FrictionRule;
 struct World;
 
-// A rule for two sides. One for the same two sides goes: its law takes the new parameters where it is of
-// the same kind.
+// Adds a rule for two sides and removes an older one for the same sides; if that one has the same kind of
+// law, its law gets the new parameters.
 void add_friction_rule(World &w, std::string a, std::string b, const char *law,
                        std::span<const dfm_param_value> given);
-// Parameters of the rule for two sides; what is not given keeps its value. Throws Error(ARG) where there
-// is no such rule.
+// Parameters of the rule for two sides; others keep their values. Throws Error(ARG) if there is no such rule.
 void set_friction_rule(World &w, const char *a, const char *b, std::span<const dfm_param_value> given);
 void remove_friction_rule(World &w, const char *a, const char *b);
 

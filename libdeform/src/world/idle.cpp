@@ -15,7 +15,7 @@ bool has_row(const dfm_type &type, const std::string &key) {
   return false;
 }
 
-// What every material has, so that its author may think of it as at work whatever its value.
+// Keys that every material has, which users expect to have an effect at any value.
 bool from_material(const char *key) {
   for (const char *k : {"young", "poisson", "damping_mass", "damping_stiffness"})
     if (!std::strcmp(key, k)) return true;

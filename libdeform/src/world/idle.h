@@ -1,5 +1,5 @@
-// Parameters of a body that do nothing: those of its materials that its model lacks, and those that the model
-// says have no effect now.
+// Parameters of a body without effect: material entries that its model does not have, and parameters that the
+// model reports as having no effect now.
 #pragma once
 #include <string>
 #include <vector>
@@ -11,18 +11,18 @@ namespace dfm {
 
 struct IdleParam {
   std::string key, why;
-  bool chosen;  // not the default: somebody set it and expects something of it
+  bool chosen;  // not the default: the user set it and expects an effect
 };
 
-// Entries of the materials that the model has no parameter for and that are not at their default. Friction is
-// the pairs' to use.
+// Material entries that are no parameter of the model and differ from their default. Friction is used by
+// pairs.
 std::vector<Unused> find_unused(const dfm_type &type, const CellMaterials &cells);
 
-// b.unused, then what the model's extension "dfm.idle/1" says about the present parameters, in the order of
-// its table; those at their default only where a material has them.
+// b.unused, then the report of the model's extension "dfm.idle/1" on the present parameters, in the order of
+// its table; parameters at their default only if a material has them.
 std::vector<IdleParam> idle_params(const Body &b);
 
-// One warning for each that was chosen.
+// Logs one warning for each chosen parameter.
 void warn_of_idle(const Body &b);
 
 }  // namespace dfm

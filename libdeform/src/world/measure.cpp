@@ -71,7 +71,7 @@ const void *extension_of(const Body &b, const char *id) {
   return found;
 }
 
-// What a model gives by cell, at the present positions.
+// Values of a model by cell, at the present positions.
 template <class Give>
 void ask_by_cell(Body &b, const char *entry, const char *what, const Give &give) {
   const dfm_kin k = b.dynamics->kin(b.world->time, 0);
@@ -79,7 +79,7 @@ void ask_by_cell(Body &b, const char *entry, const char *what, const Give &give)
     fail(DFM_E_FATAL, "model '%s' could not give its %s", b.model.type->id, what);
 }
 
-// The table of an extension that has one function.
+// The table of an extension with one function.
 template <class T>
 std::optional<T> table_of(const Body &b, const char *id, const char *name) {
   return copy_table<T>(extension_of(b, id), 2 * sizeof(uint32_t) + sizeof(void *), b.model.type->id, name);
@@ -109,7 +109,7 @@ void cell_stress(Body &b, double *out) {
 
 namespace {
 
-// Which effects the parameters call for. changed() allocates nothing.
+// The effects that the parameters call for. changed() does not allocate.
 class EffectsAtWork {
  public:
   explicit EffectsAtWork(const ModelInstance &model) : model_(model), names_(effects(*model.type)) {
@@ -162,7 +162,7 @@ void set_model_params(Body &b, const dfm_params &params) {
   const std::vector<double> &before_asked = b.withheld.asked.empty() ? b.model.params : b.withheld.asked;
   const std::vector<double> asked = changed_params(type, given, before_asked);
   std::vector<double> values = asked;
-  for (size_t k = 0; k < values.size(); ++k)  // what is left out stays so
+  for (size_t k = 0; k < values.size(); ++k)  // what the list of effects leaves out remains left out
     if (before_asked[k] != b.model.params[k]) values[k] = b.model.params[k];
   size_t at = 0;
   for (uint32_t i = 0; i < type.nparam; at += type.params[i++].width)

@@ -5,12 +5,12 @@
 namespace dfm {
 
 dfm_body_measure measure(Body &b);
-double elastic_energy(Body &b);  // J; NaN where the model gives none
-// [ntet] J/m3; throws where the model offers none
+double elastic_energy(Body &b);  // J; NaN if the model has none
+// [ntet] J/m3; throws if the model has none
 void energy_density(Body &b, double *out);
-// [ntet,6] Pa; throws where the model offers none
+// [ntet,6] Pa; throws if the model has none
 void cell_stress(Body &b, double *out);
 bool offers(const Body &b, const char *extension);
-void set_model_params(Body &b, const dfm_params &params);  // runtime rows only; throws
+void set_model_params(Body &b, const dfm_params &params);  // runtime rows only; throws Error
 
 }  // namespace dfm

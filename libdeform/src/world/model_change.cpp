@@ -1,6 +1,6 @@
 // A change of model changes no position and no velocity: surface, momentum, angular momentum and kinetic
 // energy stay to the bit. What jumps is the elastic energy, because two models see different energies in one
-// shape; the jump is measured before the change stands (doc/decisions/0180-a-swap-moves-nothing.md).
+// shape; the jump is measured before the change takes effect (doc/decisions/0180-a-swap-moves-nothing.md).
 #include "world/model_change.h"
 
 #include <algorithm>
@@ -29,21 +29,22 @@ namespace dfm {
 namespace {
 
 constexpr char kMaxJump[] = "max_jump";
-// m of the surface, over the body's size, that a model which steps itself may put it elsewhere.
+// Largest displacement of the surface, relative to the size of the body, by a model that steps itself.
 constexpr double kSurfaceStays = 1e-6;
-constexpr double kInstant = 1e-9;    // s, in which nothing moves far
-constexpr double kSlender = 1e-3;    // of the longest arm: shorter ones give no direction
-constexpr double kOnTime = 1e-6;     // of a step, by which a switch may be early
+constexpr double kInstant = 1e-9;    // s, too short for any motion
+constexpr double kSlender = 1e-3;    // of the longest arm: shorter arms define no direction
+constexpr double kOnTime = 1e-6;     // of a step: a switch may be early by this share
 constexpr double kSmallJump = 1e-9;  // J
 constexpr size_t kMostSwaps = 4096;
 constexpr size_t kSpares = 2;  // a rule has three models
 
-// ---- where the body is, as a rigid whole ------------------------------------------------------------------
+// ---- rigid placement of the body ------------------------------------------------------------------
 
 Vec3 rest_of(const Body &b, uint32_t i) { return load3(&b.p.rest[size_t{3} * i]); }
 Vec3 now_of(const Body &b, uint32_t i) { return load3(&b.p.x[size_t{kStride} * i]); }
 
-// Unit axes whose first is along a, the second in the plane of a and b; row-major, by rows. False: no plane.
+// Orthonormal axes: the first along a, the second in the plane of a and b; row-major, by rows. Returns false
+// if a and b are parallel.
 bool axes_of(Vec3 a, Vec3 b, double *out) {
   if (!(norm(a) > 0)) return false;
   const Vec3 x = (1 / norm(a)) * a, aside = b - dot(b, x) * x;
@@ -55,7 +56,7 @@ bool axes_of(Vec3 a, Vec3 b, double *out) {
   return true;
 }
 
-// The held point that lies farthest from `from` and, where `line` is not zero, from the line along it.
+// The held point farthest from `from` or, if `line` is not zero, from the line along it.
 uint32_t farthest_held(const Body &b, Vec3 from, Vec3 line) {
   uint32_t found = kNone;
   double most = 0;
@@ -71,7 +72,7 @@ uint32_t farthest_held(const Body &b, Vec3 from, Vec3 line) {
   return found;
 }
 
-// How held points are turned, where they are not on a line: the shape that they hold keeps its direction.
+// The rotation of the held points, if they are not on a line: they fix the orientation of the shape.
 bool turn_of_held(const Body &b, double *r) {
   const auto first = std::find(b.p.held.begin(), b.p.held.end(), uint8_t{7});
   if (first == b.p.held.end()) return false;
@@ -89,8 +90,8 @@ bool turn_of_held(const Body &b, double *r) {
   return true;
 }
 
-// The rotation of the linear map that takes the rest shape to the present one with the least squares of the
-// masses. False: there is none.
+// The rotation of the linear map from the rest shape to the present one, by mass-weighted least squares.
+// Returns false if there is none.
 bool turn_of_all(const Body &b, Vec3 rest_center, Vec3 center, double *r) {
   double a[9] = {}, s[9] = {};  // sums of m x X^T, m X X^T
   for (uint32_t i = 0; i < b.p.n; ++i) {
@@ -103,7 +104,7 @@ bool turn_of_all(const Body &b, Vec3 rest_center, Vec3 center, double *r) {
   }
   const Vec3 columns[3] = {{s[0], s[3], s[6]}, {s[1], s[4], s[7]}, {s[2], s[5], s[8]}};
   const Vec3 rows[3] = {cross(columns[1], columns[2]), cross(columns[2], columns[0]),
-                        cross(columns[0], columns[1])};  // of the inverse, times the determinant
+                        cross(columns[0], columns[1])};  // inverse times determinant
   double f[9] = {};
   for (int row = 0; row < 3; ++row)
     for (int col = 0; col < 3; ++col)
@@ -111,8 +112,8 @@ bool turn_of_all(const Body &b, Vec3 rest_center, Vec3 center, double *r) {
   return polar_rotation(f, r);
 }
 
-// Where a model whose forces do not turn with the body has to take its rest shape to be: turned as the body
-// is now. It knows small rotations only, and counts them from there.
+// The frame of the rest shape for a model whose forces do not rotate with the body: the present rotation of
+// the body. Such a model is valid for small rotations relative to this frame.
 Pose frame_of(const Body &b) {
   Vec3 rest_center, center;
   for (uint32_t i = 0; i < b.p.n; ++i) {
@@ -126,7 +127,7 @@ Pose frame_of(const Body &b) {
   return frame;
 }
 
-// ---- is the new model one to go on with? ------------------------------------------------------------------
+// ---- checks of the new model ------------------------------------------------------------------
 
 double size_of(const Body &b) {
   double size = 0;
@@ -141,8 +142,8 @@ double size_of(const Body &b) {
   return size;
 }
 
-// A model that steps itself may know only some shapes. Where it would put the surface at once is asked with a
-// sub-step in which nothing can move, under the forces of the last one; nothing of it is kept.
+// A model that steps itself may represent only some shapes. A sub-step that is too short for any motion, with
+// the forces of the last one, shows where it would put the surface; the result is discarded.
 void check_surface(World &w, Body &b) {
   if (!b.model.stepper) return;
   const SubStep now{w.time, kInstant, w.gravity.now, HUGE_VAL, w.gravity.now};
@@ -174,7 +175,7 @@ void check_surface(World &w, Body &b) {
          b.name.c_str(), b.model.type->id, most, kSurfaceStays * size_of(b));
 }
 
-// Effects that the scene lists, and that the old model alone provides.
+// Effects of the scene's list that only the old model provides.
 void check_effects(const World &w, const Body &b, const ModelInstance &old, const ModelInstance &fresh) {
   if (!w.selection.listed()) return;
   const std::vector<std::string> now = effects(*fresh.type);
@@ -215,7 +216,7 @@ void check_jump(const Body &b, const Swap &swap) {
         b.name.c_str(), swap.from->id, swap.to->id, swap.before, swap.after, swap.max_jump);
 }
 
-// A model that does not turn with the body sees strain where the body has turned.
+// A model whose forces do not rotate with the body has strain if the body has rotated.
 void warn_of_jump(const World &w, const Body &b, const Swap &swap) {
   double kinetic = 0;
   for (uint32_t i = 0; i < b.p.n; ++i)
@@ -231,7 +232,7 @@ void warn_of_jump(const World &w, const Body &b, const Swap &swap) {
       w.time, b.name.c_str(), swap.from->id, swap.to->id, swap.before, swap.after);
 }
 
-// With the new model in place.
+// Called with the new model in place.
 void judge(World &w, Body &b, const ModelInstance &old, const ChangeBook &book, Swap &swap) {
   check_springs(b, *b.model.type, *b.dynamics);
   check_effects(w, b, old, b.model);
@@ -242,7 +243,7 @@ void judge(World &w, Body &b, const ModelInstance &old, const ChangeBook &book, 
   if (b.tears || cut_by_any(b)) check_may_cut(b, b.model);
 }
 
-// What a later change may take back, in place of an older one made with the same. There is room.
+// Keeps an instance for later changes; replaces an older one with the same inputs. There is room.
 void keep_spare(std::vector<SpareModel> &spares, BodyModel &left, std::unique_ptr<ModelInstance> place) {
   const auto same = [&](const SpareModel &s) {
     return s.instance->type == left.instance.type && s.origin.params == left.origin.params;
@@ -253,7 +254,7 @@ void keep_spare(std::vector<SpareModel> &spares, BodyModel &left, std::unique_pt
   spares.push_back({std::move(place), std::move(left.origin), std::move(left.withheld)});
 }
 
-// What an instance of this type is to be made with, as the body is now.
+// The inputs of an instance of this type, at the present state of the body.
 ModelOrigin origin_for(const Body &b, const dfm_type &type, const ModelChoice &to) {
   ModelOrigin origin{to.params,
                      b.origin.frame,
@@ -263,7 +264,7 @@ ModelOrigin origin_for(const Body &b, const dfm_type &type, const ModelChoice &t
   return origin;
 }
 
-// s, the sub-step that the body may take with it.
+// s, the stable sub-step of the body with it.
 double stable_with(Body &b, BodyModel &made) {
   StepBound bound;
   exchange(b, made);
@@ -272,8 +273,7 @@ double stable_with(Body &b, BodyModel &made) {
   return known ? kBoundShare * bound.step : -1;
 }
 
-// A change that is to come, of a body which will have this integrator until then.
-// named: its integrator was, for this change.
+// A future change of a body that has this integrator until then. named: the change names its integrator.
 void rehearse(Body &b, ModelChoice &to, uint32_t &integrator, bool at_rest, bool named,
               std::vector<SpareModel> &spares) {
   World &w = *b.world;
@@ -294,7 +294,7 @@ void rehearse(Body &b, ModelChoice &to, uint32_t &integrator, bool at_rest, bool
          "body '%s': model '%s' steps itself and gives no stiffness, which an equilibrium needs; choose "
          "another model",
          b.name.c_str(), type.id);
-  // one whose forces do not turn with the body is of the present place only
+  // one whose forces do not rotate with the body is valid at the present placement only
   const bool lasts = rests_unplaced(type);
   if (lasts && spares.size() < kSpares) keep_spare(spares, *made, std::move(place));
 }
@@ -350,11 +350,11 @@ void change_model(Body &b, const ModelChoice &to, Swap &swap) {
     judge(w, b, made->instance, book, swap);
     warn_of_jump(w, b, swap);
     w.changed = true;
-    reopen_integrators(w);  // what the others do may not fit any more
+    reopen_integrators(w);  // the choices for other bodies may no longer fit
     prepare(w);
   } catch (...) {
     exchange(b, *made);
-    if (!b.rule.empty()) keep_spare(b.spares, *made, std::move(place));  // the rule will ask for it again
+    if (!b.rule.empty()) keep_spare(b.spares, *made, std::move(place));  // the rule may use it again
     throw;
   }
   book_change(b, book, swap);

@@ -1,28 +1,31 @@
-// A body's model changes between two steps (doc/concepts/changing_models.md).
+// Changes a body's model between two steps (doc/concepts/changing_models.md).
 #pragma once
 #include "state/body.h"
 
 namespace dfm {
 
-// The choice as a caller words it; `type` short or full. Beside the model's own parameters `params` may have
-// "max_jump". Throws Error where the model is not there or does not take the parameters.
+// Makes a choice from the caller's arguments; `type` is a short or full name. `params` may contain "max_jump"
+// in addition to the parameters of the model. Throws Error if the model does not exist or does not have the
+// parameters.
 ModelChoice choose_model(const Body &b, const char *type, const dfm_params &params, int32_t integrator);
-// Positions and velocities stay as they are. Throws Error and leaves the world as it was: DFM_DISCARD where
-// the elastic energy would jump by more than max_jump. swap: out, what is known of it in that case too.
+// Positions and velocities do not change. Throws Error; then the world is unchanged. DFM_DISCARD: the elastic
+// energy would jump by more than max_jump. swap: output, also in that case.
 void change_model(Body &b, const ModelChoice &to, Swap &swap);
-// Has the body the model of this choice, made with the same?
+// Whether the body has the model of this choice with the same inputs.
 bool is_made_so(const Body &b, const ModelChoice &c);
-// Makes the models of changes that are to come, to know now what no state of the body would mend: the contact
-// method, the integrator, springs, cells that a model does not take, effects (where the world has its plan).
-// What was made of the mesh is kept as the body's spares. at_rest: equilibria will be looked for.
-// What is known of each then is kept with it. Throws Error.
+// Makes the models of future changes to detect errors now that do not depend on the state: contact method,
+// integrator, springs, cells that a model rejects, effects (if the world has its plan). The instances are
+// kept as spares of the body. at_rest: equilibria will be computed. Results are kept with each change. Throws
+// Error.
 void rehearse(Body &b, std::vector<Switch> &switches, std::vector<SwitchRule> &rule, bool at_rest);
-// Asks a model that steps itself for a sub-step of a nanosecond, of which nothing is kept: what it would
-// refuse in the first step. Throws Error with its reason.
+// Tests a model that steps itself with a sub-step of a nanosecond, whose result is discarded: finds what it
+// would refuse in the first step. Throws Error with its reason.
 void check_first_step(World &w, Body &b);
-// Changes the model and keeps the row. False: refused for what would jump, and the row says so where `tell`.
+// Changes the model and keeps the row. Returns false if it was refused because of the energy jump; the row
+// reports that if `tell`.
 bool try_change(World &w, Body &b, const ModelChoice &to, bool tell);
-// What is due in the step of dt seconds that begins now: by time, then by rules (model_rule.cpp).
+// Makes the changes that are due in the step of dt seconds that begins now: by time, then by rules
+// (model_rule.cpp).
 void make_switches(World &w, double dt);
 void follow_rules(World &w);
 void keep_swap(World &w, const Swap &swap);

@@ -1,12 +1,13 @@
-// Which model a body has by what it does and where it is, asked between steps:
+// Selects the model of a body by contact and distance, between steps:
 //
 //   touching   it has a contact
 //   near       a point of its surface lies within a distance of the place of interest
 //   far        else
 //
-// A finer model (further up) is taken at once. It stays until nothing has called for it for a while, and near
-// ends farther away than it begins, so that a body which bounces, or stands on the line, does not change to
-// and fro. A sleeping body is left alone: a change would wake it.
+// A finer model (higher in this list) is taken at once. It is kept until it has not been needed for a while,
+// and the distance at which near ends is larger than that at which it begins, so that a body that bounces, or
+// stays near the limit, does not change back and forth. Sleeping bodies do not change, because a change would
+// wake them.
 #include <algorithm>
 #include <cmath>
 

@@ -23,7 +23,7 @@ void set_belt(Obstacle &o, Vec3 velocity) {
   if (norm2(velocity - load3(o.def.velocity_surface)) == 0) return;
   store3(o.def.velocity_surface, velocity);
   wake_all(w);
-  // the view is made anew where tables are, and lasts else
+  // the view is rebuilt with the tables, and stays valid otherwise
   if (!w.changed) w.steps->obstacle_views[o.slot].belt = velocity;
 }
 

@@ -1,4 +1,4 @@
-// What a host changes of an obstacle between two steps, beside its place: belt, filter, material.
+// Changes of an obstacle by the host between two steps, other than its pose: belt, filter, material.
 #pragma once
 #include "math/vec3.h"
 #include "state/material.h"
@@ -10,7 +10,7 @@ void set_belt(Obstacle &o, Vec3 velocity);
 void set_filter(Obstacle &o, uint32_t category, uint32_t collides_with);
 // material: null for none.
 void set_material(Obstacle &o, const Material *material);
-// After a restore: the defs that a host can ask for have the filter and the material that hold.
+// After a restore: updates the defs that a host can query with the present filter and material.
 void renew_defs(Obstacle &o) noexcept;
 
 }  // namespace dfm

@@ -17,7 +17,7 @@ double ray_sphere(Vec3 o, Vec3 d, Vec3 center, double r) {
   return t >= 0 ? t : c < 0 ? -b + root : kFar;
 }
 
-// In the obstacle's own frame. From inside, the surface met first is the one that the ray leaves by.
+// In the frame of the obstacle. From inside, the first hit is the point where the ray leaves.
 double ray_box(Vec3 o, Vec3 d, Vec3 half, Vec3 *normal) {
   double near = -kFar, far = kFar;
   int axis = 0, exit = 0;
@@ -45,7 +45,7 @@ double ray_box(Vec3 o, Vec3 d, Vec3 half, Vec3 *normal) {
 }
 
 double ray_capsule(Vec3 o, Vec3 d, double r, double half, Vec3 *normal) {
-  // A capsule is convex: from outside the first of all crossings of its parts counts, from inside the last.
+  // A capsule is convex: from outside the first crossing of its parts counts, from inside the last.
   const bool inside = norm2(o - Vec3{0, 0, std::clamp(o.z, -half, half)}) < r * r;
   double first = kFar, last = -kFar;
   auto crossing = [&](double t) {
@@ -222,7 +222,7 @@ dfm_ray_hit closest_surface(World &w, Vec3 p, double max_distance, SearchCount *
 TriangleNearPoint closest_on_body(Body &b, Vec3 p) {
   TriangleNearPoint near = closest_to(search(b), p, DistanceKey::squared, kFar);
   if (near.triangle != kNone) return near;
-  near.triangle = 0;  // so far away that squared distances overflow: all are equal
+  near.triangle = 0;  // so far away that squared distances overflow and are all equal
   near.at.weight[0] = 1;
   return near;
 }

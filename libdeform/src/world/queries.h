@@ -1,4 +1,4 @@
-// Questions about the present state that no step needs: surface vectors and normals, rays, closest points.
+// Queries of the present state that steps do not need: surface vectors and normals, rays, closest points.
 #pragma once
 #include "geometry/triangle_search.h"
 #include "state/body.h"
@@ -8,12 +8,12 @@ namespace dfm {
 struct World;
 struct Obstacle;
 
-// The tree of a body's surface, in the world; of an obstacle that is a mesh or voxels, in its frame, where
-// its points never change. Voxels answer as the surface that they are made from.
+// The tree of a body's surface, in the world frame; of a mesh or voxel obstacle, in its own frame, where its
+// points never change. Voxels use the surface that they were made from.
 Triangles search(Body &b);
 Triangles search(Obstacle &ob);
 Vec3 normal_of(const Triangles &triangles, uint32_t triangle);
-// Distance of an obstacle along a ray, or infinity, and the surface's normal there. From inside it is where
+// Distance of an obstacle along a ray, or infinity, and the normal there. From inside it is the point where
 // the ray leaves.
 double ray_obstacle(Obstacle &ob, Vec3 origin, Vec3 unit_direction, double limit, Vec3 *normal,
                     SearchCount *count);
@@ -22,8 +22,8 @@ double ray_obstacle(Obstacle &ob, Vec3 origin, Vec3 unit_direction, double limit
 Vec3 surfel_vector(const Body &b, const Array<double> &phyxel_column, uint32_t surfel);
 // [nsurfel,3], area-weighted
 void surface_normals(const Body &b, double *out);
-// Several threads may ask at once. The first who asks after positions have changed renews the trees
-// (state/search_tree.h); a later one allocates nothing.
+// Several threads may query at once. The first query after positions have changed refits the trees
+// (state/search_tree.h); later ones do not allocate.
 dfm_ray_hit cast_ray(World &w, Vec3 origin, Vec3 unit_direction, double max_distance,
                      SearchCount *count = nullptr);
 dfm_ray_hit closest_surface(World &w, Vec3 p, double max_distance, SearchCount *count = nullptr);

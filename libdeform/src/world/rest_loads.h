@@ -1,4 +1,4 @@
-// What pulls at a body that stands still, without its model and its contacts.
+// Loads on a body at rest, without model and contact forces.
 #pragma once
 #include <vector>
 
@@ -6,10 +6,10 @@
 
 namespace dfm {
 
-// Loads, weight and springs at the present positions and w.time, into f [npoint,4] N.
+// Writes loads, weight and springs at the present positions and w.time into f [npoint,4] N.
 void loads_at_rest(const World &w, const Body &b, double *f);
-// [npoint] N/m, row sums: how much of that gives way as the points move.
+// [npoint] N/m, row sums of the stiffness of these loads.
 std::vector<double> softness_of(const Body &b);
-bool is_free(const Body &b);  // neither held nor on springs
+bool is_free(const Body &b);  // no held points and no springs
 
 }  // namespace dfm

@@ -1,5 +1,4 @@
-// A set of rigid bodies comes into a world: defs are checked, the host gets them, each becomes
-// an obstacle too.
+// Adds a set of rigid bodies to a world: checks defs, passes them to the host, makes each an obstacle too.
 #include <algorithm>
 #include <cmath>
 
@@ -18,7 +17,7 @@ bool finite(const double *p, size_t n) {
 }
 bool zero(const double *p) { return p[0] == 0 && p[1] == 0 && p[2] == 0; }
 
-// Shape, pose and material are checked where the obstacle is made.
+// Shape, pose and material are checked when the obstacle is created.
 void check_body(dfm_rigid_def &d, const char *name) {
   if (d.shape != DFM_SHAPE_SPHERE && d.shape != DFM_SHAPE_BOX && d.shape != DFM_SHAPE_CAPSULE &&
       d.shape != DFM_SHAPE_NONE)
@@ -150,7 +149,7 @@ void destroy_rigids(RigidSet &set) {
                                          set.host_name.c_str(), set.defs[0].name);
     fail(status < 0 ? status : DFM_E_STATE, "%s", why.c_str());
   }
-  std::vector<uint64_t> ids;  // with the shapes that were added
+  std::vector<uint64_t> ids;  // including additional shapes
   for (auto &o : w.obstacles)
     if (o->rigid == &set) ids.push_back(o->id);
   for (const uint64_t id : ids) destroy_obstacle(rigid_obstacle(w, id));

@@ -19,7 +19,7 @@ bool of_one_rigid(const Thing &a, const Thing &b) {
          a.obstacle->rigid_body == b.obstacle->rigid_body;
 }
 
-// Would they touch, if neither were a sensor?
+// Whether they could touch if neither were a sensor.
 bool may_meet(const World &w, const Thing &a, const Thing &b) {
   if (of_one_rigid(a, b)) return false;
   if (const FilterRule *const rule = best_rule(w.filters, side_of(a), side_of(b))) return rule->collide;

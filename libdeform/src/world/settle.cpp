@@ -1,6 +1,6 @@
-// Each step is one of the world, from rest: contact, friction and guard are those of every other step. What
-// differs is how bodies move in it (dynamics/settling_points.h) and that what is prescribed stands still at
-// the end of the load step (World::prescribed).
+// Each step is a step of the world from rest, with the usual contact, friction and guard. Two things differ:
+// the dynamics of bodies (dynamics/settling_points.h), and prescribed motions and loads are constant at their
+// values at the end of the load step (World::prescribed).
 //
 //   load step   gravity and loads at its share; keys and sines go on to its time
 //     rounds    what relaxes has done so, until that changes nothing
@@ -28,25 +28,25 @@
 namespace dfm {
 namespace {
 
-// s, a step. The longer it is, the more the stiffness of a body decides where it ends and not its mass.
+// s, length of a step. The longer it is, the more the stiffness and the less the mass of a body decides its
+// end.
 constexpr double kLongest = 1, kShortest = 1e-4;
-// The longer a step, the more a body answers impulses as a whole, and the more sweeps they take: steps grow
-// below the first, and shrink above the second number of sweeps. What a solve may take of them, and passes.
+// The longer a step, the more a body responds to impulses as a whole, and the more sweeps are needed: steps
+// grow below the first number of sweeps and shrink above the second. Limits of a solve on sweeps and passes.
 constexpr uint32_t kEasy = 300, kHard = 900, kMostSweeps = 100, kMostPasses = 100;
-// What Newton's method and contact may leave in a step, over the median edge of a body; what a body may move
-// by in the last step, over its size; N left at a point per N of the largest load, reaction or contact force,
-// or what rounding of positions makes of them; what contacts and friction may be off by, over the rest
-// distance.
+// Tolerances: of Newton's method and contact in a step, relative to the median edge of a body; of the motion
+// in the last step, relative to the size of the body; of forces at a point, relative to the largest load,
+// reaction or contact force (or their rounding); of contacts and friction, relative to the rest distance.
 constexpr double kGap = 0.01, kError = 1e-7, kContact = 2e-8, kMoves = 1e-6, kLeft = 1e-6;
-// How far a body that nothing holds up may go in a step: the median edge at first, less where steps are cut,
-// down to the first share of it; more where they are easy, up to the second share of its size.
+// Limit on the motion of an unsupported body in a step: the median edge at first, less if steps are halved,
+// down to the first share of it; more if they converge well, up to the second share of its size.
 constexpr double kNear = 0.1, kFar = 0.25;
-constexpr double kNet = 0.1;      // of the tolerance: for the sum of all that acts on a body
+constexpr double kNet = 0.1;      // share of the tolerance, for the sum of forces on a body
 constexpr uint32_t kSteps = 500;  // of a round
-constexpr uint32_t kWaits = 50;   // for a rest before keys go on
+constexpr uint32_t kWaits = 50;   // steps to wait for rest before keys advance
 constexpr uint32_t kRounds = 4;   // of relaxation
-constexpr uint32_t kRefused = 8;  // steps in a row that could not be taken
-constexpr double kAway = 10;      // of its size: who touches something and has gone so far slides on
+constexpr uint32_t kRefused = 8;  // consecutive failed steps
+constexpr double kAway = 10;      // of its size: a body in contact that has moved so far keeps sliding
 
 struct Station { double time, share; };
 
@@ -61,7 +61,7 @@ class Settling {
     if (def.tolerance > 0) tolerance_ = def.tolerance;
     if (def.max_iterations) most_ = def.max_iterations;
     for (auto &b : w.bodies) bodies_.push_back(make(*b));
-    earlier_.swap(w.events);  // a long search has more of them than a world keeps
+    earlier_.swap(w.events);  // a long search produces more than a world keeps
     write_down(w_, step_, before_);
     stats_ = w.stats;
     steps_ = w.step_count;
@@ -69,7 +69,7 @@ class Settling {
     aside_ = w.overlaps.aside;
     def_ = w.def;
     exchange();
-    wake_all(w_);  // adds what contact has carried in the meantime
+    wake_all(w_);  // adds the contact impulses of the meantime
     for (One &one : bodies_) one.contact_impulse = one.body->contact_impulse;
     w.def.sleep = 0;
     w.changed = true;
@@ -88,7 +88,7 @@ class Settling {
     try {
       set_gravity_now(w_);
       prepare(w_);
-    } catch (...) {  // no memory for the tables: they are made when next needed
+    } catch (...) {  // no memory for the tables: they are made at the next use
     }
     if (done_) return;
     put_back(w_, step_, before_);
@@ -108,18 +108,18 @@ class Settling {
  private:
   struct One {
     Body *body;
-    std::unique_ptr<Dynamics> other;  // how it moves else; meanwhile the other way round
+    std::unique_ptr<Dynamics> other;  // its normal dynamics; exchanged during the search
     SettlingPoints *points;
     std::unique_ptr<AtRest> rest;
     double size, edge;           // m
     Vec3 contact_impulse;        // N s, before the search
-    double reach = 0;            // m that it may move by without contact in the next step
-    double slid = 0;             // m since it touches something
+    double reach = 0;            // m, limit on its motion without contact in the next step
+    double slid = 0;             // m moved since it has been in contact
     std::vector<double> last{};  // [npoint,4] m, at the start of the step
-    double left = 0, scale = 0;  // N, the largest component of what nothing balances; of what acts
+    double left = 0, scale = 0;  // N, largest component of unbalanced forces; of all forces
     double moved = 0;            // m, in the last step
-    double net = 0, all = 0;     // N, sum of what acts from outside, of its sizes
-    double pull = 0;             // m/s2, what this sum would do to it as it is
+    double net = 0, all = 0;     // N, sum of external forces, sum of their norms
+    double pull = 0;             // m/s2, acceleration by this sum
     bool touches = false;
   };
 
@@ -183,13 +183,14 @@ class Settling {
     return any;
   }
 
-  // How many steps it took with all that is prescribed at its place.
+  // Number of steps with all prescribed motions at their end.
   uint32_t come_to_rest(const Station &to) {
     stand_still();
     weigh_all(kLongest);
     double longest = kLongest;
     uint32_t refused = 0, before = 0;
-    // Keys go on once bodies rest under the new loads: what nothing presses on is not carried along.
+    // Keys advance after bodies rest under the new loads: otherwise unloaded contacts would not carry bodies
+    // along.
     bool goes_on = w_.time >= to.time;
     for (uint32_t steps = 0;;) {
       const double h = length(longest);
@@ -197,7 +198,7 @@ class Settling {
       const uint64_t pieces = w_.stats.substeps;
       const bool taken = step(h);
       const bool whole = taken && w_.stats.substeps == pieces + 1;
-      const double off = h * w_.stats.residual / w_.offset;  // contacts, over the rest distance
+      const double off = h * w_.stats.residual / w_.offset;  // of contacts, relative to the rest distance
       const bool easy = whole && (w_.stats.sweeps < kEasy || off < 0.1 * kGap);
       w_.time = w_.prescribed.at(w_.time);
       const bool there = w_.time >= to.time;
@@ -220,14 +221,14 @@ class Settling {
       }
       if (rests && there) return steps;
       goes_on = goes_on || rests || ++before == kWaits;
-      // sweeps of the guard's further solves count too: many of them that lead to a solution are no reason
+      // sweeps of additional solves by the guard count too; many sweeps that converge are no reason to shrink
       const bool fair = whole && (w_.stats.sweeps <= kHard || off <= kGap);
       longest = easy ? std::min(kLongest, 2 * h) : fair ? h : 0.5 * h;
       if (there) check_progress(steps, h);
     }
   }
 
-  // False: it could not be taken; the world stands where its last part has ended.
+  // Returns false if it failed; the world is then at the end of its last completed part.
   bool step(double h) {
     double edge = HUGE_VAL;
     for (One &one : bodies_) {
@@ -260,12 +261,13 @@ class Settling {
 
   void weigh_all(double h) {
     for (One &one : bodies_) {
-      set_loads(*one.body, w_.time, w_.prescribed.share);  // springs apart
+      set_loads(*one.body, w_.time, w_.prescribed.share);  // without springs
       weigh(one, h);
     }
   }
 
-  // What is left at the present positions, with the contact forces of the last step, which took h seconds.
+  // Computes the unbalanced forces at the present positions, with the contact forces of the last step of h
+  // seconds.
   void weigh(One &one, double h) {
     sum_loads(one);
     const Phyxels &p = one.body->p;
@@ -280,8 +282,8 @@ class Settling {
     if (poison != 0) one.left = HUGE_VAL;
   }
 
-  // Loads and contact forces, into points().f and as a whole. Components that are held somewhere count for
-  // nothing: there the body is held up.
+  // Writes loads and contact forces into points().f and sums them. Components that are held at some point do
+  // not count: there the body is supported.
   void sum_loads(One &one) const {
     Body &b = *one.body;
     Phyxels &p = b.p;
@@ -315,7 +317,7 @@ class Settling {
     one.pull = one.net / b.mass + norm(torque) / inertia * std::sqrt(far);
   }
 
-  // Of the next step: who is not held up goes no farther than it may reach.
+  // Limits the next step so that an unsupported body moves no farther than its reach.
   double length(double longest) const {
     double h = longest;
     for (const One &one : bodies_) {
@@ -326,9 +328,9 @@ class Settling {
     return std::max(h, kShortest);
   }
 
-  // s, by which keys go on in the next step, so that nothing is told to go farther than a body may reach. The
-  // step itself is as long as ever: with a short one, what moves a body by friction would have to accelerate
-  // it.
+  // s, by which keys advance in the next step, so that no prescribed motion exceeds the reach of a body. The
+  // length of the step itself is unchanged: in a short step, friction would have to accelerate the body's
+  // mass.
   double way_on(const Station &to) const {
     double part = to.time - w_.time, reach = HUGE_VAL;
     for (const One &one : bodies_) reach = std::min(reach, one.reach);
@@ -336,7 +338,7 @@ class Settling {
     return std::max(part, kShortest);
   }
 
-  // m, the farthest that anything is told to go in the next h seconds; what comes back on the way counts too.
+  // m, the largest prescribed motion in the next h seconds, also if it returns in between.
   double prescribed_way(double h) const {
     double most = 0;
     for (const double part : {1.0, 0.5, 0.25, 0.125})
@@ -376,7 +378,7 @@ class Settling {
          one.body->name.c_str(), w_.prescribed.share, steps, h, one.moved, one.left, one.scale);
   }
 
-  // What is found becomes the present; the steps on the way have not been.
+  // The result becomes the present state; the steps of the search leave no trace.
   void keep() {
     info_.residual = 0;
     for (One &one : bodies_) {

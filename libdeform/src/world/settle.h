@@ -1,4 +1,4 @@
-// Equilibrium of a world whose bodies may touch: steps from rest until nothing changes any more.
+// Equilibrium of a world with contact: steps from rest until nothing changes.
 #pragma once
 #include "deform/world.h"
 
@@ -6,7 +6,7 @@ namespace dfm {
 
 struct World;
 
-// As find_equilibrium(), with contact and friction; the world is prepared. Throws Error, and then nothing has
+// As find_equilibrium(), with contact and friction; the world is prepared. Throws Error; then nothing has
 // changed.
 void settle(World &w, const dfm_equilibrium_def &def, dfm_equilibrium_info &info);
 

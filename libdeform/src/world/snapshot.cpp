@@ -1,12 +1,12 @@
-// Snapshot, restore and hash: everything that a later result depends on, and nothing else. Candidate lists
-// are left out on purpose: contacts come from exact geometry, so lists that are built anew give the same
-// contacts (broad/). What the host may change between two steps (loads, holds, motions, gravity, filters,
-// friction rules, runtime parameters) is state too.
+// Snapshot, restore and hash of everything that later results depend on, and nothing else. Candidate lists
+// are not included: contacts come from exact geometry, so rebuilt lists give the same contacts (broad/). What
+// the host may change between two steps (loads, holds, motions, gravity, filters, friction rules, runtime
+// parameters) is state too.
 //
-// A field is one line in one of the ..._fields() functions below: its name, where it lies and what it must
-// be. Writing, reading and the check all follow from it; what must hold between fields stands in check(). A
-// restore reads and checks everything into a Staged before it changes anything, then exchanges it with the
-// world, which cannot fail; where the tables that follow cannot be made it exchanges back.
+// A field is one line in one of the ..._fields() functions below: its name, its location and its valid
+// values. Writing, reading and checking use this line; conditions between fields are in check(). A restore
+// reads and checks everything into a Staged before it changes anything, then exchanges it with the world,
+// which cannot fail; if the derived tables cannot be made, it exchanges back.
 #include "world/snapshot.h"
 
 #include <algorithm>
@@ -47,7 +47,7 @@ std::string &id_of(StagedLaw &law) { return law.id; }
 std::string id_of(const ModelInstance &model) { return model.type->id; }
 std::string &id_of(decltype(StagedBody::model) &model) { return model.id; }
 
-// ---- what values must be ----------------------------------------------------------------------------------
+// ---- valid values ----------------------------------------------------------------------------------
 
 template <class Key>
 bool rise(const std::vector<Key> &keys) {
@@ -59,7 +59,7 @@ bool rise(const std::vector<Key> &keys) {
   }
 }
 
-// Vectors lie four doubles apart, and detection counts on a fourth that is zero.
+// Vectors are four doubles apart, and detection relies on a fourth that is zero.
 template <class A>
 bool padded(const A &a) {
   for (size_t i = 3; i < a.size(); i += kStride)
@@ -97,7 +97,7 @@ bool good_stats(const dfm_world_stats &s) {
          must::all_finite(s.guard_lost);
 }
 
-// far more than any run makes, and far from where counting on would wrap
+// far more than any run makes, and far below an overflow
 constexpr uint64_t kMostIds = uint64_t{1} << 48;
 uint64_t last_id(const World &w) {
   uint64_t last = w.obstacles.empty() ? 0 : w.obstacles.back()->id;
@@ -106,18 +106,18 @@ uint64_t last_id(const World &w) {
   return last;
 }
 
-// One that has been destroyed lives on in what was made of it.
+// A destroyed material remains in the bodies made of it.
 bool knows_material(const World &w, const std::string &name) {
   return std::any_of(w.materials.begin(), w.materials.end(), [&](auto &m) { return m->name == name; }) ||
          std::any_of(w.obstacles.begin(), w.obstacles.end(), [&](auto &o) { return o->material == name; });
 }
 
-// s; no bound of a body in SI units lies below, and a smaller one would never let the world step again
+// s; no bound of a body in SI units is smaller, and a smaller one would stop the world
 constexpr double kLeastStep = 1e-15;
 
 // ---- the fields -------------------------------------------------------------------------------------------
 
-// `like`: the world that is written, or read into.
+// `like`: the world that is written, or restored into.
 template <class Stream, class B>
 void prescribed_fields(Stream &s, B &b, const Body &like) {
   s.value("next_load", b.next_load, must::any);
@@ -154,7 +154,7 @@ void prescribed_fields(Stream &s, B &b, const Body &like) {
   });
 }
 
-// Does the world's body have the model that the snapshot's had, made with the same?
+// Whether the body has the same model, with the same inputs, as in the snapshot.
 template <class B>
 bool made_alike(B &b, const Body &like) {
   const ModelOrigin &mine = b.origin, &other = like.origin;
@@ -392,9 +392,9 @@ void fields(Stream &s, W &w, const World &like) {
   s.array("reported mode", r.mode, n, must::at_most(2));
 }
 
-// ---- what must hold between fields ------------------------------------------------------------------------
+// ---- conditions between fields ------------------------------------------------------------------------
 
-// Of the world that is restored into; both lists are in id order.
+// Bodies of the world that is restored into; both lists are in id order.
 struct Things {
   const World &w;
   const Body *body(uint64_t id) const { return find(w.bodies, id); }
@@ -406,7 +406,7 @@ struct Things {
                                      [](const auto &x, uint64_t value) { return x->id < value; });
     return at != list.end() && (*at)->id == id ? at->get() : nullptr;
   }
-  // May an edge have this number? What a primitive calls its edges is compared, and indexes nothing.
+  // Whether an edge may have this number. Edge numbers of primitives are only compared and index nothing.
   bool edge(uint64_t id, uint32_t number) const {
     if (const Body *const b = body(id)) return number < b->surface.nedge;
     const Obstacle *const o = obstacle(id);
@@ -421,7 +421,7 @@ bool good_contacts(const Staged &t, const Things &things) {
   for (uint32_t i = 0; i < c.n; ++i) {
     const Vec3 n = load3(&c.normal[3 * size_t{i}]), u = load3(&c.tangent[3 * size_t{i}]);
     if (!(norm2(n) < 1.01 && norm2(u) < 1.01)) return false;
-    // Of what was removed since, contacts stay until the next sub-step, and touch no more.
+    // Contacts of removed things remain until the next sub-step, without touching.
     if (c.id_a[i] >= t.next_id || c.id_b[i] >= t.next_id ||
         (c.touching[i] && !(things.body(c.id_a[i]) && things.known(c.id_b[i]))))
       return false;
@@ -468,7 +468,7 @@ bool good_report(const Staged &t, const World &w) {
       if (!must::all_finite(values[k], counts[k])) return false;
     if (c.key != t.store.key[i] || c.kind > kPrimitive || c.obstacle > 1 || c.nnode > 4 || c.type_a > 2)
       return false;
-    if (!t.store.touching[i] && c.slot_a == kNone) continue;  // of a body that was removed since
+    if (!t.store.touching[i] && c.slot_a == kNone) continue;  // of a removed body
     if (c.slot_a >= w.bodies.size()) return false;
     if (!t.store.touching[i]) continue;
     if (c.slot_b >= (c.obstacle ? w.obstacles.size() : w.bodies.size())) return false;
@@ -501,7 +501,7 @@ void check(const SnapshotReader &s, const Staged &t, const World &w) {
   }
 }
 
-// Laws stand in the order in which the run first needed them, and contacts remember their law by that place.
+// Laws are in the order in which the run first needed them, and contacts refer to them by this index.
 std::vector<std::unique_ptr<LawInstance>> make_laws(const SnapshotReader &s, const World &w,
                                                     const Staged &t) {
   std::vector<std::unique_ptr<LawInstance>> laws;
@@ -524,7 +524,7 @@ std::vector<std::unique_ptr<LawInstance>> make_laws(const SnapshotReader &s, con
   return laws;
 }
 
-// Derived, so it is found anew rather than believed.
+// Derived data, therefore recomputed and not read.
 void order_contacts(ContactStore &c) {
   c.by_key.resize(c.n);
   std::iota(c.by_key.begin(), c.by_key.end(), 0u);
@@ -532,7 +532,7 @@ void order_contacts(ContactStore &c) {
             [&](uint32_t i, uint32_t j) { return c.key[i] != c.key[j] ? c.key[i] < c.key[j] : i < j; });
 }
 
-// Models that the world's bodies do not have are made, with what the snapshot's had.
+// Makes the models that the world's bodies do not have, with the inputs in the snapshot.
 void make_models(const SnapshotReader &s, World &w, Staged &t) {
   for (size_t i = 0; i < w.bodies.size(); ++i) {
     Body &b = *w.bodies[i];
@@ -582,7 +582,7 @@ void put_parameters(const Body &b, ModelInstance &model, const Dynamics &moves,
          model.type->id, b.name.c_str());
 }
 
-// Of the first `n` bodies, back to what they were.
+// Restores the first `n` bodies.
 void take_parameters_back(World &w, const Staged &t, size_t n) noexcept {
   while (n-- > 0) {
     Body &b = *w.bodies[n];
@@ -591,7 +591,7 @@ void take_parameters_back(World &w, const Staged &t, size_t n) noexcept {
   }
 }
 
-// All parameters of all models, or none.
+// Sets all parameters of all models, or none.
 void put_parameters(World &w, Staged &t) {
   for (size_t i = 0; i < w.bodies.size(); ++i)
     if (StagedBody &other = t.bodies[i]; other.made) {
@@ -610,7 +610,7 @@ void put_parameters(World &w, Staged &t) {
   }
 }
 
-// Allocates nothing; a second call undoes the first.
+// Does not allocate; a second call undoes the first.
 void exchange(World &w, Staged &t) noexcept {
   for (size_t i = 0; i < w.bodies.size(); ++i) {
     Body &b = *w.bodies[i];
@@ -718,7 +718,7 @@ void world_snapshot(const World &w, std::vector<unsigned char> &out, std::vector
 
 namespace {
 
-// Whole, of this version, undamaged and of such a world.
+// Checks that it is complete, of this version, undamaged, and of a matching world.
 void check_head(const World &w, const unsigned char *data, size_t bytes) {
   SnapshotHead head{};
   std::memcpy(&head, data, std::min(bytes, sizeof head));
@@ -767,14 +767,14 @@ void world_restore(World &w, const void *data, size_t bytes) {
   exchange(w, staged);
   w.laws.swap(laws);
   try {
-    // Tables and plan follow from what is there now; what prepare() would choose anew is put back as it was.
+    // Rebuilds tables and plan; choices that prepare() would make again are set to those of the snapshot.
     const RestoredChoice choice{staged.gravity.now, staged.bound, staged.offset};
     w.changed = true;
     w.overlaps.all = w.overlaps.look_only = true;
     w.sleepers = 0;  // prepare() counts them
     prepare(w, &choice);
   } catch (...) {
-    // no memory for the tables: the state is as it was, and the tables are made when next needed
+    // no memory for the tables: the state is unchanged, and the tables are made at the next use
     exchange(w, staged);
     take_parameters_back(w, staged, w.bodies.size());
     w.laws.swap(laws);

@@ -10,9 +10,9 @@ struct World;
 struct SnapshotField;
 
 uint64_t world_hash(const World &w);
-// map: where each field lies, for tests; may be null.
+// map: the location of each field, for tests; may be null.
 void world_snapshot(const World &w, std::vector<unsigned char> &out,
                     std::vector<SnapshotField> *map = nullptr);
-void world_restore(World &w, const void *data, size_t bytes);  // throws Error and leaves the world as it was
+void world_restore(World &w, const void *data, size_t bytes);  // throws Error; then the world is unchanged
 
 }  // namespace dfm

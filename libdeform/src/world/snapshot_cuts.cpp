@@ -108,7 +108,7 @@ std::vector<CutRow> cut_rows(const World &w) {
   return out;
 }
 
-// The body that the host made, of which this one is a piece; itself, if it is none.
+// The body, made by the host, of which this one is a piece; itself if it is no piece.
 Body &SnapshotShapes::whole_body(Body &b) {
   if (!b.piece_of) return b;
   for (Body *const other : all_bodies(w_))
@@ -116,7 +116,7 @@ Body &SnapshotShapes::whole_body(Body &b) {
   refuse(b, "a piece: expected one of a body of this world");
 }
 
-// Pieces that the snapshot has come, the others go; none has the shape of the snapshot yet.
+// Adds the pieces of the snapshot and removes the others; their shapes follow later.
 void SnapshotShapes::find_pieces(const std::vector<CutRow> &rows) {
   const std::vector<Body *> bodies = all_bodies(w_);
   reserve_places(w_, rows.size());

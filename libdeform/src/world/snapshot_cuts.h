@@ -1,6 +1,6 @@
-// Which cells the bodies of a snapshot have. A restore reads this first and gives the world's bodies these
-// cells, so that all other fields find arrays of their length; where it fails later on they get their own
-// cells back.
+// The cells of the bodies in a snapshot. A restore reads this first and gives the world's bodies these cells,
+// so that all other fields find arrays of the right length; if it fails later, the bodies get their own cells
+// back.
 #pragma once
 #include <string>
 #include <vector>
@@ -10,7 +10,8 @@
 
 namespace dfm {
 
-// Of a body that is not as it was made, and of each piece. emptied: it has no cells, and the lists are empty.
+// One row for each body that has been cut, and for each piece. emptied: it has no cells, and the lists are
+// empty.
 struct CutRow {
   uint64_t id = 0, piece_of = 0;  // as in Body
   std::string name;               // of a piece
@@ -39,10 +40,10 @@ void cut_fields(Stream &s, Rows &rows) {
   });
 }
 
-// While it lives, the world's bodies have the cells that the rows say; keep(): from then on.
+// During its lifetime the world's bodies have the cells of the rows; keep() makes that permanent.
 class SnapshotShapes {
  public:
-  // Throws Error, and then the world is as it was.
+  // Throws Error; then the world is unchanged.
   SnapshotShapes(World &w, std::vector<CutRow> &rows);
   SnapshotShapes(const SnapshotShapes &) = delete;
   SnapshotShapes &operator=(const SnapshotShapes &) = delete;
@@ -53,7 +54,7 @@ class SnapshotShapes {
   struct Undo {
     Body *body;
     bool emptied, undone;
-    std::unique_ptr<BodyShape> shape;  // null: it has not changed
+    std::unique_ptr<BodyShape> shape;  // null: unchanged
   };
   void find_pieces(const std::vector<CutRow> &rows);
   Body &whole_body(Body &b);
@@ -63,7 +64,7 @@ class SnapshotShapes {
   std::vector<Undo> undo_;
 };
 
-// All bodies, those without cells too, in id order; not the pieces that a restore has taken back.
+// All bodies in id order, including those without cells; not the pieces that a restore has removed.
 std::vector<Body *> all_bodies(const World &w);
 
 // Of cells of a mesh that has ncorner corners of cells, ascending.

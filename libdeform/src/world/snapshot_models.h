@@ -1,4 +1,4 @@
-// The fields of a snapshot that say which models a body is to have.
+// The fields of a snapshot for the future models of a body.
 #pragma once
 #include "deform/world.h"
 #include "state/model_choice.h"

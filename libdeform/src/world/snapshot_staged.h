@@ -1,4 +1,4 @@
-// What is read of a snapshot before anything of it is put in place (snapshot.cpp).
+// The contents of a snapshot, read in full before the world changes (snapshot.cpp).
 #pragma once
 #include <memory>
 #include <string>
@@ -9,8 +9,7 @@
 
 namespace dfm {
 
-// A world's changing part, read in full before anything of it is put in place. Members are named as in World,
-// Body and Obstacle, so that the lists of fields serve both.
+// Members have the names of those in World, Body and Obstacle, so that the lists of fields work for both.
 struct StagedBody {
   struct {
     Array<double> x, v, load;
@@ -26,7 +25,7 @@ struct StagedBody {
   std::vector<Switch> switches;
   std::vector<SwitchRule> rule;
   uint64_t first_model = 0;
-  std::unique_ptr<BodyModel> made;  // where the world's body has another model than the snapshot's
+  std::unique_ptr<BodyModel> made;  // if the body has another model than in the snapshot
   Vec3 contact_impulse;
   EnergyBook energy;
   ChangeBook changes;

@@ -1,6 +1,5 @@
-// How a snapshot's bytes are written, read and checked. One list of fields (snapshot.cpp) serves both
-// ways: each line says the field's name, where it lies and what it must be, so that nothing is read that
-// was not asked for.
+// Writing, reading and checking the bytes of a snapshot. One list of fields (snapshot.cpp) is used for both
+// directions: each line gives name, location and valid values of a field.
 //
 //   bytes 0  "dfmsnap" 0 | u32 version | u32 0 | u64 length of all | u64 hash of what must be the same in
 //   both worlds | u64 checksum | fields
@@ -23,7 +22,7 @@ namespace dfm {
 struct SnapshotHead {
   char magic[8];
   uint32_t version, zero;
-  uint64_t length, structure, checksum;  // checksum: of all bytes but itself
+  uint64_t length, structure, checksum;  // checksum: of all bytes except its own
 };
 inline constexpr char kSnapshotMagic[8] = {'d', 'f', 'm', 's', 'n', 'a', 'p', 0};
 inline constexpr uint32_t kSnapshotVersion = 18;
@@ -35,15 +34,15 @@ inline uint64_t snapshot_checksum(const unsigned char *data, size_t bytes) {
   return h.value;
 }
 
-// Where a field of a snapshot lies, for tests that damage each.
+// The location of a field, for tests that damage each.
 struct SnapshotField {
   const char *name;
-  size_t at, bytes;  // of its values; of a list's, its count
+  size_t at, bytes;  // of its values; for a list, of its count
   char kind;         // d: doubles, u: unsigned, f: flags, n: a count
   bool checked;
 };
 
-// What values must be; `what` completes "expected".
+// Valid values; `what` completes "expected".
 namespace must {
 
 template <class Is>
@@ -78,7 +77,7 @@ inline constexpr Be not_negative{[](double x) { return x >= 0 && std::isfinite(x
                                  "a finite number that is not negative"};
 inline constexpr Be positive{[](double x) { return x > 0 && std::isfinite(x); },
                              "a finite number above zero"};
-// Hosts answer for the length of their quaternions, so it is not asked to a rounding.
+// The length of quaternions comes from hosts, so it need not be exact.
 inline constexpr Be rotation{[](const double (&q)[4]) {
                                const double n = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
                                return n > 0.25 && n < 4;
@@ -106,7 +105,7 @@ constexpr char snapshot_kind() {
   else return 'd';
 }
 
-// `count` of an array: as many as this; kAnyCount: as many as there are bytes for.
+// `count` of an array: exactly this; kAnyCount: as many as the bytes allow.
 inline constexpr uint64_t kAnyCount = ~uint64_t{0};
 
 class SnapshotWriter {
@@ -154,11 +153,12 @@ class SnapshotWriter {
   std::vector<SnapshotField> *map_;
 };
 
-// Takes no more memory than the bytes it was given account for, and refuses whole what does not fit.
+// Allocates no more memory than the given bytes can fill, and refuses the whole snapshot if something does
+// not fit.
 class SnapshotReader {
  public:
   SnapshotReader(const unsigned char *begin, const unsigned char *end) : p_(begin), end_(end) {}
-  // In whose fields the reader is now, for the sentence.
+  // Whose fields are being read, for error messages.
   void where(const char *kind, const std::string &name) {
     where_ = name.empty() ? std::string() : std::string(kind) + " '" + name + "': ";
   }
@@ -187,14 +187,14 @@ class SnapshotReader {
     for (const T &x : a)
       if (!be.is(x)) refuse(name, be.what);
   }
-  // Entries of their own; each has at least 8 bytes, and is made only when it is read.
+  // A list of entries; each has at least 8 bytes, and is created only when it is read.
   template <class A, class F>
   void list(const char *name, A &a, F f) {
     const uint64_t n = count(name, kAnyCount, 8);
     a.clear();
     for (uint64_t i = 0; i < n; ++i) f(a.emplace_back());
   }
-  // What the world has as well: as many as there.
+  // A list that the world also has, of the same length.
   template <class A, class F>
   void members(const char *name, A &a, uint64_t expected, F f) {
     a.resize(size_t(count(name, expected, 1)));

@@ -37,8 +37,8 @@ void makeup(Hash &h, const Makeup &m) {
   }
 }
 
-// The def with one value for what says the same: a rotation of length zero is none (dfm_pose), and sizes that
-// the shape does not have are the default's.
+// The def in a unique form: a rotation of length zero means none (dfm_pose), and sizes that the shape does
+// not use get their defaults.
 dfm_obstacle_def told(const dfm_obstacle_def &d) {
   static const double none[4] = {};
   const dfm_obstacle_def usual = dfm_obstacle_def_default();
@@ -57,7 +57,7 @@ uint64_t snapshot_structure(const World &w) {
   Hash h;
   for (const Body *const b : all_bodies(w)) {
     if (b->piece_of) continue;
-    // of one that has been cut: as it was made
+    // for a body that has been cut: the original
     const WholeBody *const whole = b->cut.whole.get();
     h.add(b->id);
     h.add(whole ? whole->npoint : b->p.n);
@@ -86,7 +86,7 @@ uint64_t snapshot_structure(const World &w) {
     const dfm_obstacle_def d = told(o->def);
     h.add(o->id);
     h.add(d.shape);
-    if (!o->rigid || !o->rigid->of_tool) h.add(d.pose);  // a tool's is where its keys led it at first
+    if (!o->rigid || !o->rigid->of_tool) h.add(d.pose);  // that of a tool follows from its keys
     h.add(d.half_size);
     h.add(d.radius);
     h.add(d.half_length);

@@ -1,5 +1,5 @@
-// What must be the same in the world that a snapshot is restored into: who is there and what it is made of,
-// as a hash. Models are not part of it: a snapshot has its own.
+// A hash of what must be equal in the world that a snapshot is restored into: its bodies and obstacles and
+// their materials. Models are not part of it: a snapshot contains them.
 #pragma once
 #include <cstdint>
 

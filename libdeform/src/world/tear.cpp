@@ -16,7 +16,7 @@
 namespace dfm {
 namespace {
 
-constexpr uint32_t kMostPoints = 64;  // of a body in one step, those that are stretched most
+constexpr uint32_t kMostPoints = 64;  // per body and step; the most stretched points come first
 
 double limit_of(const Material &m) {
   for (size_t i = 0; i < m.extra_keys.size(); ++i)
@@ -144,7 +144,7 @@ class Tear {
     }
   }
 
-  // Points beyond what they bear, those most beyond first.
+  // Points above their limit, the largest excess first.
   void find_weakest() {
     for (uint32_t i = 0; i < b_.p.n; ++i) {
       Point &p = points_[i];
@@ -165,7 +165,7 @@ class Tear {
     std::sort(weakest_.begin(), weakest_.end());
   }
 
-  // A split relieves the points around: those of the same cells wait for the next step.
+  // A split unloads the points around it, so points of the same cells wait for the next step.
   void mark() {
     std::vector<std::vector<uint32_t>> cells(b_.p.n);
     for (uint32_t k = 0; k < 4 * ncell_; ++k) cells[b_.tets[k]].push_back(k / 4);
@@ -176,7 +176,7 @@ class Tear {
       const auto free = [&](uint32_t c) { return !taken[c]; };
       if (n == kMostPoints || !std::all_of(cells[i].begin(), cells[i].end(), free)) continue;
       const auto first = [&](uint32_t c) { return side(c, i) == side(cells[i].front(), i); };
-      if (std::all_of(cells[i].begin(), cells[i].end(), first)) continue;  // the end of something
+      if (std::all_of(cells[i].begin(), cells[i].end(), first)) continue;  // a tip of the body
       points_[i].split = true;
       for (const uint32_t c : cells[i]) taken[c] = 1;
       ++n;
@@ -199,7 +199,7 @@ bool may_tear(const Body &b) {
 
 void tear_bodies(World &w) {
   if (w.tearing == 0) return;
-  const size_t n = w.bodies.size();  // pieces that come off now are behind
+  const size_t n = w.bodies.size();  // new pieces come after
   for (size_t i = 0; i < n; ++i) {
     Body &b = *w.bodies[i];
     if (!b.tears || b.slumber.asleep) continue;

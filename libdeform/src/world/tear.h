@@ -1,13 +1,13 @@
-// Bodies that tear where their material is stretched beyond what it bears (doc/concepts/cutting.md).
+// Tearing of bodies where the strain exceeds the limit of the material (doc/concepts/cutting.md).
 #pragma once
 #include "state/body.h"
 
 namespace dfm {
 
-// Does a material of its cells have "tear"?
+// Whether a material of its cells has "tear".
 bool may_tear(const Body &b);
-// At the end of a step: splits points of the world's bodies that are stretched too far. Throws Error; bodies
-// before the one that fails have torn then.
+// At the end of a step: splits points of the world's bodies whose strain is above the limit. Throws Error;
+// bodies before the one that fails have then been torn.
 void tear_bodies(World &w);
 
 }  // namespace dfm

@@ -90,7 +90,7 @@ void check_def(const dfm_tool_def &d, const char *name) {
     fail(DFM_E_ARG, "tool '%s': keys are announced, but they are NULL", name);
 }
 
-// Its frame first, then the jaws; the shape of a frame is that of the tool where a rigid body can have it.
+// Its frame first, then the jaws; the frame has the shape of the tool if a rigid body can have it.
 std::vector<dfm_rigid_def> parts_of(const dfm_tool_def &d, const std::string &name, ToolMotion &motion,
                                     std::vector<std::string> &names) {
   dfm_rigid_def frame = dfm_rigid_def{};
@@ -102,7 +102,7 @@ std::vector<dfm_rigid_def> parts_of(const dfm_tool_def &d, const std::string &na
   std::copy(d.half_size, d.half_size + 3, frame.half_size);
   frame.radius = d.radius;
   frame.half_length = d.half_length;
-  // of no account: nothing moves by it that its host does not move
+  // without effect: only its host moves it
   frame.mass = 1;
   std::fill(frame.inertia, frame.inertia + 3, 1.0);
   frame.material = d.material;
@@ -133,7 +133,7 @@ std::vector<dfm_rigid_def> parts_of(const dfm_tool_def &d, const std::string &na
   return out;
 }
 
-// What no rigid body has by itself: a shaft, the triangles of a mesh or an ellipsoid.
+// Shapes that the rigid body itself cannot have: a shaft, the triangles of a mesh or an ellipsoid.
 void add_shapes(const dfm_tool_def &d, const std::string &name, Obstacle &frame) {
   dfm_obstacle_def shape{};
   shape.size = sizeof shape;
@@ -330,7 +330,7 @@ void teleport_tool(Tool &t, const dfm_pose &pose) {
   }
   for (auto &o : w.obstacles)
     if (o->rigid == t.set) w.overlaps.place(o->id);
-  wake_all(w);  // it may have been put where someone sleeps
+  wake_all(w);  // it may have been placed where a body sleeps
 }
 
 dfm_tool_state tool_state(const Tool &t) {
@@ -365,8 +365,8 @@ void tool_force(const Tool &t, double force[3], double torque[3]) {
   store3(torque, rotate_back(now.rotation, moment));
 }
 
-// The device gets what the coupling did to the tool, the other way, at its own origin: the spring and the
-// damper of the way and those of the turn are two couplings, and neither has an arm.
+// The device gets the opposite of the coupling's effect on the tool, at its own origin: spring and damper of
+// the translation and of the rotation are two separate couplings without lever arm.
 void tool_feedback(const Tool &t, double force[3], double torque[3]) {
   const ToolValues v = t.values();
   const Quat frame = t.motion.coupled() ? load_place(v.device).rotation : place_of(t.set->state[0]).rotation;
@@ -374,7 +374,7 @@ void tool_feedback(const Tool &t, double force[3], double torque[3]) {
   store3(torque, rotate_back(frame, load3(v.given + 3)));
 }
 
-// Each surfel to the nearest part, so that none is held twice.
+// Assigns each surfel to the nearest part, so that none is held twice.
 std::vector<uint32_t> grab(Tool &t, Body &b, double reach, double release, uint32_t capacity) {
   World &w = *t.world;
   if (b.world != &w)
@@ -411,7 +411,7 @@ std::vector<uint32_t> grab(Tool &t, Body &b, double reach, double release, uint3
     d.nsurfel = static_cast<uint32_t>(held[part].size());
     d.surfels = held[part].data();
     d.release = release;
-    d.flags = DFM_ATTACH_TOUCH;  // what is not held must not come into the jaws
+    d.flags = DFM_ATTACH_TOUCH;  // surfels that are not held must not enter the jaws
     out.push_back(attach(b, d, nullptr, &rigid_obstacle(w, t.set->obstacle[part])));
   }
   return out;

@@ -1,4 +1,4 @@
-// Tools enter and leave a world, and are moved. All throw Error and leave the world as it was.
+// Creates, removes and moves tools. All functions throw Error; then the world is unchanged.
 #pragma once
 #include <cstdint>
 #include <vector>
@@ -19,14 +19,15 @@ void follow_keys(Tool &tool);
 void keys_at(const Tool &tool, double t, dfm_pose &pose, double &opening);
 void teleport_tool(Tool &tool, const dfm_pose &pose);
 dfm_tool_state tool_state(const Tool &tool);
-// Of the last step, in the frame of the tool (contact) or of its device (coupling); on tool or device.
+// Force and torque over the last step: of contact on the tool in its frame, or of the coupling on the device
+// in the device's frame.
 void tool_force(const Tool &tool, double force[3], double torque[3]);
 void tool_feedback(const Tool &tool, double force[3], double torque[3]);
 
-// Numbers of the attachments, one per part that holds something.
+// Numbers of the attachments, one for each part that holds surfels.
 std::vector<uint32_t> grab(Tool &tool, Body &b, double reach, double release, uint32_t capacity);
 void set_device(Tool &tool, const dfm_device *device);
-// Around a step. read_devices() throws Error where a device refuses it, and has moved nothing then.
+// Called before and after a step. read_devices() throws Error if a device fails; then nothing has moved.
 void read_devices(World &w, double end);
 void write_devices(World &w);
 

@@ -1,4 +1,4 @@
-// What the world knows about itself between steps: names, pair tables, offset, plan.
+// Derived data of the world between steps: names, pair tables, offset, plan.
 #include "state/world.h"
 #include "step/context.h"
 #include "step/method.h"

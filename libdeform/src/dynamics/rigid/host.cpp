@@ -68,7 +68,7 @@ void solid_inertia(const dfm_rigid_def &d, double out[3]) {
     for (int k = 0; k < 3; ++k)
       out[k] = m / 3 * (a[(k + 1) % 3] * a[(k + 1) % 3] + a[(k + 2) % 3] * a[(k + 2) % 3]);
   } else if (d.shape == DFM_SHAPE_CAPSULE) {
-    // A cylinder of length 2 c and two half balls, whose centers of mass lie 3/8 r beyond their planes.
+    // A cylinder of length 2 c and two half balls, whose centers of mass are 3/8 r beyond their planes.
     const double c = d.half_length;
     const double ball = 4.0 / 3 * kPi * r * r * r;
     const double tube = 2 * kPi * r * r * c;

@@ -9,7 +9,7 @@ Quat rotation_of(const dfm_rigid_state &s) {
   return {s.rotation[0], s.rotation[1], s.rotation[2], s.rotation[3]};
 }
 
-// Where one side of a joint stands.
+// Present position and axes of one side of a joint.
 struct Side {
   Vec3 center;
   Quat turn;
@@ -19,7 +19,8 @@ Side side(uint32_t part, std::span<const dfm_rigid_state> state) {
   return {load3(state[part].position), rotation_of(state[part])};
 }
 
-constexpr double kRedundant = 1e-12;  // of a row's own diagonal: what is left of it after the earlier rows
+// share of a row's diagonal that remains after elimination by earlier rows
+constexpr double kRedundant = 1e-12;
 
 Vec3 unit_vector(int k) {
   Vec3 e;
@@ -125,7 +126,7 @@ void JointSystem::build(std::span<const JointRow> rows, std::span<const RigidPar
     store3(m + 6, dv);
     store3(m + 9, dw);
   }
-  // Lower triangle of A: row i on the response of row k, side by side where they share a part.
+  // Lower triangle of A: row i times the response of row k, for the parts that they share.
   for (size_t i = 0; i < n_; ++i)
     for (size_t k = 0; k <= i; ++k) {
       const JointRow &r = rows[i], &q = rows[k];
@@ -140,7 +141,7 @@ void JointSystem::build(std::span<const JointRow> rows, std::span<const RigidPar
       add(r.b, r.lb, r.ab);
       factor_[i * n_ + k] = sum;
     }
-  // L D L^T in place: D on the diagonal, 0 where the row is left out.
+  // L D L^T in place: D on the diagonal, 0 if the row is left out.
   for (size_t i = 0; i < n_; ++i) {
     double *const row = &factor_[i * n_];
     const double own = row[i];

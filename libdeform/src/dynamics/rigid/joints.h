@@ -2,8 +2,7 @@
 //
 //   row: J v = la . va + aa . wa + lb . vb + ab . wb        A = J M^-1 J^T, factorised as L D L^T
 //
-// A row whose pivot vanishes says what earlier rows say already (a closed loop, a joint between still bodies)
-// and is left out.
+// A row whose pivot vanishes is redundant (a closed loop, a joint between fixed bodies) and is left out.
 #pragma once
 #include <span>
 #include <vector>
@@ -15,7 +14,7 @@ namespace dfm {
 
 struct RigidPart {
   double inverse_mass = 0;
-  Vec3 moments, inverse_moments;  // about its own axes; inverse 0 where still
+  Vec3 moments, inverse_moments;  // about its own axes; inverse 0 if fixed
 };
 
 struct RigidJoint {
@@ -30,12 +29,12 @@ RigidJoint make_joint(const dfm_joint_def &def, std::span<const dfm_rigid_def> b
 struct JointRow {
   uint32_t a, b;  // parts; b kNone: the world
   Vec3 la, aa, lb, ab;
-  double error = 0;  // m or rad: what the position is off by
+  double error = 0;  // m or rad, error of the position
 };
 
-// Appends the rows that hold joint j, as the bodies stand.
+// Appends the rows of joint j at the present poses.
 void hold_rows(const RigidJoint &j, std::span<const dfm_rigid_state> state, std::vector<JointRow> &out);
-// The row that its motor drives; error: its angle (within half a turn) or path.
+// The row of its motor; error: its angle (within half a turn) or distance.
 JointRow drive_row(const RigidJoint &j, std::span<const dfm_rigid_state> state);
 
 double row_rate(const JointRow &row, std::span<const double> velocity);  // J v, velocity [n,6]
@@ -45,7 +44,7 @@ class JointSystem {
  public:
   void build(std::span<const JointRow> rows, std::span<const RigidPart> parts,
              std::span<const dfm_rigid_state> state);
-  // A x = x in place; rows left out get 0
+  // solves A x = x in place; rows that are left out get 0
   void solve(std::span<double> x) const;
   // velocity += M^-1 J^T x
   static void push(std::span<const JointRow> rows, std::span<const double> x,

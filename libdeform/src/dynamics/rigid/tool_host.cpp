@@ -1,4 +1,4 @@
-// Where a tool is at the end of a sub-step, and how it answers impulses. The frame is that of body 0.
+// The pose of a tool at the end of a sub-step, and its response to impulses. The frame is that of body 0.
 //
 //   not coupled   it goes to its target at constant rate, and answers no impulse
 //   coupled       spring and damper at the end of the sub-step (backward Euler), D the device:
@@ -25,7 +25,7 @@
 namespace dfm {
 namespace {
 
-// As much of the way as rounding may leave of a step.
+// Share of a step that may remain by rounding.
 constexpr double kWhole = 1 - 1e-9;
 
 struct Frame {
@@ -67,8 +67,8 @@ class ToolHost {
   }
 };
 
-// The way that is left, of which a sub-step takes its share. A tool that is not coupled starts where it is,
-// since the guard may have stopped it short of where it was to be.
+// The remaining motion, of which a sub-step takes its share. A tool that is not coupled starts from its
+// present pose, because the guard may have stopped it early.
 ToolHost::Ways ToolHost::ways(const dfm_rigid_step &step) const {
   Ways w{tool_values(step.extra), place_of(step.state[0]), {}, 0};
   const ToolPlace from = motion_.coupled() ? load_place(w.values.device) : w.start;
@@ -122,7 +122,7 @@ ToolPlace ToolHost::end_of(const dfm_rigid_step &step, const Ways &w, const Fram
   return {w.start.position + step.h * mean.velocity, turned(w.start.rotation, step.h * mean.spin)};
 }
 
-// Mean velocities of the parts by where they end: what turns with the frame goes along an arc.
+// Mean velocities of the parts from their end poses: parts that rotate with the frame move along an arc.
 void ToolHost::predict(const dfm_rigid_step &step, double *velocity) const {
   const Ways w = ways(step);
   const Drag held = drag(step, w);
@@ -171,14 +171,15 @@ void ToolHost::commit(const dfm_rigid_step &step, const double *impulse, dfm_rig
   const ToolPlace device = motion_.coupled() ? load_place(v.device) : w.start;
   const Vec3 way = w.device.position - device.position;
   const Vec3 turned_by = rotation_vector(w.device.rotation * conjugate(device.rotation));
-  // What holds the tool back is what it got less what moves it; without a coupling, all of it.
+  // The reaction on the tool is the impulse that it received minus the part that moves it; without a coupling
+  // all of it.
   Vec3 held = -p, held_turn = -turn;
   if (motion_.coupled()) {
     held += motion_.mass * (mean.velocity - load3(step.state[0].velocity));
     held_turn += motion_.inertia * (mean.spin - load3(step.state[0].spin));
   }
   store3(v.contact, load3(v.contact) + p);
-  // about a point that stands through the step: the origin moves from sub-step to sub-step
+  // about a point that is fixed during the step, because the origin moves in each sub-step
   store3(v.contact + 3,
          load3(v.contact + 3) + turn + cross(load3(step.state[0].position) - load3(v.about), p));
   store3(v.coupling, load3(v.coupling) + held);
@@ -188,7 +189,7 @@ void ToolHost::commit(const dfm_rigid_step &step, const double *impulse, dfm_rig
   v.opening = w.opening;
   store_place(v.device, w.device);
   store_values(v, extra);
-  if (late())  // no sub-step changes them
+  if (late())  // sub-steps do not change them
     std::memcpy(extra + kToolValues, step.extra + kToolValues, kToolPastValues * sizeof(double));
   for (size_t i = 0; i < motion_.parts.size(); ++i) {
     const ToolPlace from = place_of(step.state[i]), to = part_place(motion_.parts[i], end, w.opening);
@@ -201,7 +202,7 @@ void ToolHost::commit(const dfm_rigid_step &step, const double *impulse, dfm_rig
     store3(s.velocity, (1 / step.h) * (to.position - from.position));
     store3(s.spin, (1 / step.h) * rotation_vector(to.rotation * conjugate(from.rotation)));
   }
-  // to the last digit: part 0 is the frame
+  // exactly: part 0 is the frame
   store3(state[0].velocity, mean.velocity);
   store3(state[0].spin, mean.spin);
 }

@@ -1,5 +1,5 @@
 // The rigid host that moves tools: a set is one tool, its bodies are the parts, all in one group that moves
-// as the tool's frame does. What lasts stands in `extra`, so that snapshots and the hash have it.
+// with the frame of the tool. Lasting state is in `extra`, so that snapshots and the hash contain it.
 #pragma once
 #include <vector>
 
@@ -8,7 +8,7 @@
 
 namespace dfm {
 
-// Reserved: no other host may have it, and dfm_rigid_create cannot ask for it.
+// Reserved name: no other host may use it, and dfm_rigid_create does not accept it.
 inline constexpr char kToolHost[] = "tools";
 
 struct ToolPlace {
@@ -16,7 +16,7 @@ struct ToolPlace {
   Quat rotation;
 };
 
-// What never changes of a tool.
+// The constant data of a tool.
 struct ToolMotion {
   struct Part {
     ToolPlace at;  // in the tool's frame, at opening 0
@@ -25,29 +25,29 @@ struct ToolMotion {
   std::vector<Part> parts;
   double stiffness = 0, damping = 0, turn_stiffness = 0, turn_damping = 0;
   double mass = 0, inertia = 0;
-  double late = 0;  // s; above 0 the forces that were given are remembered
+  double late = 0;  // s; if above 0, past forces are kept
   bool coupled() const { return stiffness > 0; }
 };
 
-// A velocity of the device was given: for this step, for the next one.
+// The velocity of the device is given: for this step, for the next one.
 inline constexpr double kToolMeasured = 1, kToolMeasuredNext = 2;
 
-// The values of `extra`. Impulses, way and work are sums since the present step began.
+// The values of `extra`. Impulses, displacement and work are sums since the start of the present step.
 struct ToolValues {
   double device[7];                // m and quaternion: where the device is now
   double target[7];                // where it will be at `goal`
-  double target_velocity[6];       // m/s, rad/s then, where `measured` says so
+  double target_velocity[6];       // m/s, rad/s at that time, if `measured` is set
   double measured;                 // 0, kToolMeasured, kToolMeasuredNext
   double goal;                     // s
   double opening, target_opening;  // rad
-  double keyed, opening_keyed;     // 1: keys lead
+  double keyed, opening_keyed;     // 1: driven by keys
   double contact[6];               // N s and N m s on the tool, about `about`, world frame
   double about[3];                 // m, where its origin was when the step began
   double coupling[6];              // N s and N m s on the tool, about its origin as it moved
-  double time;                     // s of the step that are done
-  double work;                     // J since the tool was made
+  double time;                     // s of the step completed so far
+  double work;                     // J since creation of the tool
   double port_work;                // J, with `given` held while the hand makes a step
-  double tank;                     // J, port_work, of which what is below 0 is forgiven in time
+  double tank;                     // J, port_work, whose negative part decays over time
   double given[6];                 // N and N m on the hand after the last step, world frame
   double ngiven;                   // forces given so far, of a late device
   double cut_due;                  // J, that cuts have taken and the tool has not paid yet
@@ -55,8 +55,8 @@ struct ToolValues {
   double cut_at[3], cut_way[3];    // m, unit length: where its edge cuts and where to, in the tool's frame
 };
 inline constexpr size_t kToolValues = sizeof(ToolValues) / sizeof(double);
-// Behind the values, of a late device: the last forces that were given, and when. Number k stands in row
-// k mod kToolPast.
+// After the values, for a late device: the last forces and their times. Force number k is in row k mod
+// kToolPast.
 inline constexpr size_t kToolPast = 256;
 struct ToolGiven {
   double t;  // s, the end of its step
@@ -69,7 +69,7 @@ void store_values(const ToolValues &values, double *extra);
 ToolPlace load_place(const double *p);  // m and quaternion
 void store_place(double *p, const ToolPlace &place);
 ToolPlace place_of(const dfm_rigid_state &state);
-// Where a part stands when the tool's frame stands there, at that opening.
+// The place of a part for this pose of the tool's frame and this opening.
 ToolPlace part_place(const ToolMotion::Part &part, const ToolPlace &tool, double opening);
 
 const dfm_rigid_host &tool_host();  // its create takes a ToolMotion as the set's data
