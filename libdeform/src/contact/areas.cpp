@@ -7,11 +7,12 @@
 namespace dfm {
 namespace {
 
-// The other side, seen from the side on which a node is.
+// The side opposite to that of a node.
 uint32_t other_of(const ContactPoint &c, int node) {
   return c.weight[node] < 0 ? c.slot_a : c.slot_b | (c.obstacle ? 0x80000000u : 0u);
 }
-// Takes from corners: a crossing between bodies, and what else detection leaves without an area.
+// Contacts that take area from corners: a crossing between bodies, and other contacts without an area from
+// detection.
 bool takes(const ContactPoint &c) { return !(c.area > 0) || (c.type_a != 0 && !c.obstacle); }
 bool corner_on_face(const ContactPoint &c) { return c.type_a == 0 && !c.obstacle; }
 
@@ -19,8 +20,8 @@ bool corner_on_face(const ContactPoint &c) { return c.type_a == 0 && !c.obstacle
 
 AreaShares::AreaShares(const Memory &m) { use_memory(m, owners_, parts_, taken_, given_, left_); }
 
-// Contacts of corners that carry load or touch, or of the others; against an obstacle also the one that a
-// corner has lent its area to.
+// Contacts of corners that are loaded or touch, or of the others; against an obstacle also the contact to
+// which a corner has lent its area.
 void AreaShares::list_owners(std::span<const ContactPoint> contacts, const double *impulse, double touch,
                              bool idle) {
   owners_.clear();
@@ -73,7 +74,8 @@ void AreaShares::share(std::span<const ContactPoint> contacts, const double *imp
       if (take(i)) area[i] = 0;
       else if (!(c.area > 0)) left_.push_back(i);
     } else if (corner_on_face(c)) {
-      double covered = 0, beside = 0;  // by corners of the other side that carry load, that touch idle
+      // by loaded corners of the other side; by touching corners without load
+      double covered = 0, beside = 0;
       for (int k = 1; k < c.nnode; ++k) {
         const auto owners = owners_of(c.node[k], other_of(c, k));
         if (!owners.empty())
@@ -86,7 +88,7 @@ void AreaShares::share(std::span<const ContactPoint> contacts, const double *imp
       area[i] *= 2 / (1 + covered);
     }
   }
-  // between corners of which none carries anything: their area is not in use
+  // between corners without load: their area is free
   if (!left_.empty()) list_owners(contacts, impulse, touch, true);
   for (const uint32_t i : left_) take(i);
   for (const Part &p : parts_)

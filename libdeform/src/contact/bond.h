@@ -1,5 +1,4 @@
-// A surfel of body a that is held at a place of something else: three rows of the contact solve, in the axes
-// of the world.
+// A surfel of body a held at a place of something else: three rows of the contact solve, in world axes.
 //
 //     u + rate + soft l = 0      u: mean velocity of the surfel against the place; l: impulse on it, N s
 //
@@ -7,9 +6,8 @@
 // the force is -k (gap + h u) - c u, that of a spring and a damper at the end of the sub-step, which no
 // stiffness makes unstable: with s = h^2 k + h c, rate = h k gap / s and soft = 1 / s.
 //
-// What l does to the surfel, -l does to the place: to a body's surfels by the weights that also read their
-// velocity, to a rigid body at the surfel's own point. Both momenta are therefore kept whatever the solve has
-// left over.
+// The place gets -l: the surfels of a body by the weights with which their velocity is read, a rigid body at
+// the point of the surfel. So both momenta are conserved whatever the residual of the solve.
 #pragma once
 #include <cstdint>
 
@@ -18,8 +16,8 @@
 
 namespace dfm {
 
-// Nodes are world-wide surfel numbers (contact_set.h). The first is the surfel, of weight 1; those behind it
-// are of body b, and their weights sum to -1.
+// Nodes are world-wide surfel numbers (contact_set.h). The first is the surfel, of weight 1; the others
+// belong to body b, and their weights sum to -1.
 struct Bond {
   uint32_t slot_a, slot_b;  // slot_b: obstacle slot where obstacle != 0
   uint8_t obstacle, nnode;

@@ -11,8 +11,8 @@ namespace {
 // left: a hanging body is shaken to pieces. Conjugate residuals (Stiefel 1955) end after as many passes as
 // there are motions; bonds that contradict each other end at the least residual.
 constexpr uint32_t kMostPasses = 100;
-// Below this ratio of the residual's response to the residual (Rayleigh's quotient, scaled by each bond's own
-// response) no impulse reduces what is left.
+// If the Rayleigh quotient of the residual (scaled by the response of each bond) is below this, no impulse
+// reduces the residual.
 constexpr double kNothingMoves = 1e-10;
 
 // f(number in the part, row)
@@ -32,7 +32,7 @@ Vectors vectors_in(Array<double> &scratch, size_t n) {
   return {a, a + n, a + 2 * n, a + 3 * n, a + 4 * n, a + 5 * n, a + 6 * n, a + 7 * n};
 }
 
-// By the inverse of each bond's own response.
+// Preconditions by the inverse of each bond's own response.
 void scale(const ContactRows &rows, const RowsPart &part, const double *from, double *to) {
   each_bond(part, [&](uint32_t k, uint32_t row) {
     const Vec3 r = load3(from + size_t{3} * k), *const inverse = rows.bond[row - rows.n].inverse;
@@ -52,7 +52,7 @@ double largest(const double *a, uint32_t n) {
   return most;
 }
 
-// Applies the impulses z on top of those before; response is the change of the residual by them.
+// Adds the impulses z; response is the resulting change of the residual.
 void respond(ContactRows &rows, const RowsPart &part, const double *z, double *velocity, double *response) {
   each_bond(part, [&](uint32_t k, uint32_t row) {
     if (const Vec3 l = load3(z + size_t{3} * k); l.x != 0 || l.y != 0 || l.z != 0) rows.apply(row, l);
@@ -68,7 +68,7 @@ void respond(ContactRows &rows, const RowsPart &part, const double *z, double *v
   });
 }
 
-// Of one bond this is the solution.
+// For one bond this is the solution.
 void solve_one(ContactRows &rows, uint32_t row) {
   const ContactRows::BondRow &b = rows.bond[row - rows.n];
   const Vec3 r = bond_residual(rows, row);
@@ -103,7 +103,7 @@ uint32_t solve_bonds(ContactRows &rows, const RowsPart &part, double tolerance, 
   if (!(largest(v.residual, part.nbond) > tolerance)) return 0;
   scale(rows, part, v.residual, v.z);
   uint32_t passes = 0;
-  // undone: minus the sum of what respond() has applied
+  // undone: minus the sum of the impulses applied by respond()
   double before = 0;
   for (; passes < kMostPasses; ++passes) {
     respond(rows, part, v.z, v.velocity, v.az);

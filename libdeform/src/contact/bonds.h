@@ -1,5 +1,5 @@
-// Bonds of the contact solve. Their impulses have no sign and no law, so all bonds together are one symmetric
-// linear system.
+// Bonds of the contact solve. Their impulses have neither sign condition nor law, so all bonds together form
+// one symmetric linear system.
 #pragma once
 #include <cstdint>
 
@@ -9,12 +9,11 @@
 
 namespace dfm {
 
-// m/s, what the impulse of the bond in this row leaves of its condition, in the components in which anything
-// moves.
+// m/s, residual of the bond in this row, in the components that can move.
 Vec3 bond_residual(const ContactRows &rows, uint32_t row);
 
-// Solves all bonds of a part with the impulses of contacts as they are, until no residual is above
-// `tolerance`, m/s. Returns how many times it has passed over the bonds.
+// Solves all bonds of a part with fixed contact impulses, until no residual is above `tolerance`, m/s.
+// Returns the number of passes over the bonds.
 uint32_t solve_bonds(ContactRows &rows, const RowsPart &part, double tolerance, Array<double> &scratch);
 
 }  // namespace dfm

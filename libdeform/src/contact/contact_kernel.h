@@ -1,7 +1,7 @@
 // Loops of the contact solve, compiled for several vector widths. Every element sees the same operations in
 // the same order at each width: the four lanes are the components of one point (the last one is ignored), or
-// four of the partial sums. Contacts follow each other in their order, for each starts from what the one
-// before has left. Plain data only.
+// four of the partial sums. Contacts are processed in order, because each starts from the result of the one
+// before. Plain data only.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -11,7 +11,7 @@ namespace dfm {
 // The part of a law's dft/dvt that dissipates: its symmetric part without the positive eigenvalue. [a b; b
 // c], N s/m, negative semidefinite.
 struct Slope { double a, b, c; };
-// How a law is solved: by its slopes, by projection on the disc of radius limit, or not at all: no force.
+// How a law is solved: by its slopes, by projection on the disc of radius limit, or not at all (no force).
 enum LawForm : uint8_t { kSmoothLaw, kSetValuedLaw, kNoFriction };
 // Of a smooth law: slope D, and 1 - h w_t D as [m11 m12; m12 m22] with its determinant.
 struct LinearLaw {
@@ -19,13 +19,13 @@ struct LinearLaw {
   double m11, m12, m22, det;
 };
 
-// Of ContactRows, whose names these are: contacts whose dofs all answer their own impulses only.
+// Members of ContactRows, with the same names, if all dofs respond to their own impulses only.
 struct RowsView {
   uint32_t n;
   const uint32_t *begin, *dof;
   const double *weight;
   const double *alone;          // [ndof,4]
-  const double *frame, *drive;  // [n,9], [n,3] and a vector more, which is ignored
+  const double *frame, *drive;  // [n,9], [n,3] plus one vector, which is ignored
   const double *across;         // [n,9] the frame transposed, and a vector more
   const double *rate, *wn, *wt, *cross;
 };
@@ -42,10 +42,10 @@ struct ToleranceView {
   double most_normal;
 };
 
-// How far a state is from a solution. Of each contact, m/s: r_n = |min(w_n lambda_n, u_n + gap/h)|, r_t =
-// w_t |lambda_t - law|. `relative` is the worst over its tolerance: at most 1 is converged. `due` is the same
-// with most_normal for normal[i]: what must be reached, where the rest may be left to the next sub-step's
-// warm start. `normal` is the worst r_n alone, m/s.
+// Residual of a state. Of each contact, m/s: r_n = |min(w_n lambda_n, u_n + gap/h)|, r_t = w_t |lambda_t -
+// law|. `relative` is the worst over its tolerance: at most 1 is converged. `due` is the same with
+// most_normal for normal[i]: the required accuracy; the rest may be left to the warm start of the next
+// sub-step. `normal` is the worst r_n alone, m/s.
 struct Residual { double relative = 0, due = 0, speed = 0, normal = 0; };
 
 struct ContactKernels {

@@ -69,7 +69,7 @@ DEFORM_INLINE void apply(const RowsView &rows, double *y, uint32_t i, double a, 
 void sweep(const RowsView &rows, const LawView &law, double h, double *y, double *impulse) {
   for (uint32_t i = 0; i < rows.n; ++i) {
     const double wn = rows.wn[i], wt = rows.wt[i];
-    if (!(wn > 0)) continue;  // both sides are held: nothing an impulse could change
+    if (!(wn > 0)) continue;  // both sides are held: impulses have no effect
     double *const l = impulse + 3 * size_t(i);
     const Four u = velocity(rows, y, i);
     const double ln = larger(0.0, l[0] - (get(u, 0) + rows.rate[i]) / wn), d = ln - l[0];
@@ -112,7 +112,7 @@ Residual residual(const RowsView &rows, const LawView &law, const ToleranceView 
     r.due = larger(r.due, share);
     r.speed = larger(r.speed, tangent);
   }
-  // larger() passes over what is no number
+  // larger() ignores NaN
   if (poison != 0) r.relative = r.due = __builtin_inf();
   return r;
 }
@@ -143,7 +143,7 @@ void differences(size_t n, const double *metric, const double *now, const double
   }
 }
 
-// One sum waits for itself at every addition, four go on side by side.
+// One sum would wait for each addition; four sums run in parallel.
 void dots(size_t n, const double *a, const double *b, const double *y, const double *z, double out[4]) {
   Four ay = {}, az = {}, by = {}, bz = {};
   for (size_t k = 0; k < n; k += 4) {

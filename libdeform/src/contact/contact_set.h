@@ -1,5 +1,5 @@
-// Contacts of one sub-step as a structure of arrays: what narrow/ finds, contact/ and friction/ solve,
-// step/ keeps and world/ reports.
+// Contacts of one sub-step as a structure of arrays: found by narrow/, solved by contact/ and friction/, kept
+// by step/, reported by world/.
 //
 //        a (surfel, edge or triangle of body a)
 //        |  ^ normal (from b to a)
@@ -28,7 +28,7 @@ struct ContactPoint {
   uint32_t feature_a, feature_b;
   uint8_t kind, obstacle, nnode;
   uint8_t type_a;  // what feature_a is: 0 surfel, 1 edge, 2 triangle
-  // area: of an edge or triangle contact, the node that lent it, plus 1; else 0
+  // area: for an edge or triangle contact, the node that lent it, plus 1; else 0
   uint32_t lender;
   uint32_t node[4];
   double weight[4];

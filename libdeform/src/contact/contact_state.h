@@ -1,6 +1,6 @@
-// What contact/ and friction/ exchange while they solve one sub-step: columns over the contacts, in the
-// contacts' order. Pairs in the tangent plane are [2,stride], 2x2 matrices [4,stride] row-major; stride is a
-// multiple of 8.
+// Data shared by contact/ and friction/ in the solve of one sub-step: columns over the contacts, in their
+// order. Pairs in the tangent plane are [2,stride], 2x2 matrices [4,stride] row-major; stride is a multiple
+// of 8.
 #pragma once
 #include <cmath>
 #include <cstdint>
@@ -13,17 +13,17 @@ namespace dfm {
 struct ContactState {
   uint32_t n = 0, stride = 0, nstate = 0;
   Array<uint32_t> law;  // [n] index into the world's law table
-  // Trial: where the laws are asked.
+  // Trial: the state at which the laws are evaluated.
   Array<double> fn;           // N
   Array<double> vt;           // [2,stride] m/s, mean slip of side a against side b
   Array<double> ft_stop;      // [2,stride] N, force that makes the mean slip zero
-  Array<double> slip;         // [2,stride] m/s, that of the state in which the laws were asked
+  Array<double> slip;         // [2,stride] m/s, of the state at which the laws were evaluated
   Array<double> area, dwell;  // m2, s
-  // [nstate,stride] law state at the start of the sub-step, nstate = most that any law has
+  // [nstate,stride] law state at the start of the sub-step, nstate = the largest of all laws
   Array<double> bristle;
-  // [n] the law is asked at so many times the normal force, where the host scales friction; empty: 1
+  // [n] factor on the normal force in the law, if the host scales friction; empty: 1
   Array<double> scale;
-  // Answer: the laws there.
+  // Results of the laws at the trial.
   Array<double> ft;           // [2,stride] N, force on side a
   Array<double> dft_dvt;      // [4,stride] N s/m
   Array<double> dft_dfn;      // [2,stride]
@@ -32,8 +32,8 @@ struct ContactState {
   Array<uint8_t> mode;        // 0 open, 1 stick, 2 slip
   Array<uint8_t> form;        // LawForm
   Array<LinearLaw> linear;    // [n] of smooth laws, by linearize()
-  // [n] Where slopes were made by differences: the force that they start from, and which of them hold at the
-  // present answer.
+  // [n] For slopes by differences: the force at which they were computed, and which of them are valid at the
+  // present result.
   struct Origin {
     double v[2], fn, f[2];
     uint8_t made, hold;
@@ -69,7 +69,8 @@ struct ContactState {
             linear.data() + i};
   }
 
-  // Laws may be asked in these columns, and touch the places beyond n: as where nothing is in contact.
+  // Laws may be evaluated in these columns, including places beyond n: these have the values of an open
+  // contact.
   void clear_padding() {
     const auto clear = [&](Array<double> &a) {
       for (size_t end = stride; end <= a.size(); end += stride)

@@ -1,5 +1,5 @@
 // Contact impulses to surfels to phyxels: f_s = sum_k w_k p at the contact's nodes, f_p = N^T f_s. Force,
-// torque and power are those of the contacts to rounding, because it is the transpose of how the contacts
+// torque and power equal those of the contacts to rounding, because this is the transpose of how the contacts
 // read velocities.
 #pragma once
 #include <span>
@@ -15,8 +15,8 @@ struct ImpulseSink {
   uint32_t first_node, nnode, npoint;
   const Surface *surface;
   double *surfel;  // [nsurfel,3] N s, zeroed here
-  // [npoint,4] N s, written where surfels hang, zero elsewhere from the start; null: self-stepping,
-  // surfel impulses do
+  // [npoint,4] N s, written for points with surfels, zero elsewhere from the start; null for self-stepping
+  // bodies, which use surfel impulses
   double *phyxel;
 };
 
@@ -24,8 +24,8 @@ void distribute(std::span<const ContactPoint> contacts, const double *frame, con
                 std::span<const ImpulseSink> sinks, std::span<const Bond> bonds = {},
                 const double *bond_impulse = nullptr);
 
-// f_p = N^T f_s of a coupled surface: surfel [nsurfel,3], phyxel [npoint,4] is overwritten. A surfel that
-// carries nothing costs one look.
+// f_p = N^T f_s of a coupled surface: surfel [nsurfel,3], phyxel [npoint,4] is overwritten. A surfel without
+// impulse costs one test.
 void scatter_surface(const Surface &surface, const double *surfel, uint32_t npoint, double *phyxel);
 
 }  // namespace dfm

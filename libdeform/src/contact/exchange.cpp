@@ -20,8 +20,8 @@ void AreaExchange::list(std::span<const ContactPoint> contacts, std::span<const 
   fresh_.clear();
   for (uint32_t i = 0; i < n; ++i) {
     const ContactPoint &c = contacts[i];
-    // A contact may stand for less than its triangles, of which detection gives it half between two meshes,
-    // and for none where the guard added it: of each of them for the same share.
+    // A contact may have less area than its triangles (detection gives it half between two meshes, and none
+    // if the guard added it): it has the same share of each of them.
     part_[i] = c.area > 0 ? std::min(1.0, area[i] / ((c.obstacle ? 1 : 2) * c.area)) : 0;
     if (c.type_a == 0 && law[i] != kNone && area[i] > 0)
       fresh_.push_back({c.node[0], c.slot_b | (c.obstacle ? 0x80000000u : 0u), i, law[i]});
@@ -41,11 +41,11 @@ const AreaExchange::Corner *AreaExchange::find(uint32_t node, uint32_t other) co
   return at != corners_.end() && at->node == node && at->other == other ? &*at : nullptr;
 }
 
-// Triangles of which two corners or more take part, each once: by the first of them. A corner that touches
-// the other side twice takes no part.
+// Triangles with at least two corners that take part, each once, listed by the first of these corners. A
+// corner that touches the other side twice takes no part.
 void AreaExchange::list_triangles(std::span<const ContactPoint> contacts,
                                   std::span<const DofSource> sources) {
-  last_.clear();  // what is half listed when memory runs out is listed anew
+  last_.clear();  // if memory runs out, an incomplete list is rebuilt
   corners_.assign(fresh_.begin(), fresh_.end());
   triangles_.clear();
   std::sort(corners_.begin(), corners_.end(), [](const Corner &l, const Corner &r) {
@@ -80,7 +80,7 @@ void AreaExchange::list_triangles(std::span<const ContactPoint> contacts,
   last_.assign(fresh_.begin(), fresh_.end());
 }
 
-// What each corner sees of its triangles.
+// The share of each corner in its triangles.
 void AreaExchange::measure(std::span<const ContactPoint> contacts, std::span<const DofSource> sources) {
   for (Triangle &t : triangles_) {
     const Surface &s = *sources[t.slot].surface;
@@ -103,7 +103,7 @@ void AreaExchange::pass(std::span<const ContactPoint> contacts, std::span<const 
     double p[3], sum = 0;
     for (int j = 0; j < 3; ++j) sum += p[j] = t.contact[j] != kNone ? pressure_[t.contact[j]] : 0;
     for (int j = 0, next = 1; j < 3; ++j, next = next == 2 ? 0 : next + 1) {
-      // what the corner takes from the next one: a term of (1)
+      // the area that the corner takes from the next one: a term of (1)
       const double low = std::min(p[j], p[next]), high = std::max(p[j], p[next]);
       if (!(low > 0)) continue;
       const double moved =

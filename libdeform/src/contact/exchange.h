@@ -1,15 +1,15 @@
-// Even pressure where the load is even: the areas of neighboring contacts follow the shares in which the mesh
-// carries the normal force.
+// Gives uniform pressure under uniform load: the areas of neighboring contacts follow the shares of the
+// normal force that the mesh gives them.
 //
-// Detection gives a corner a third of the triangles around it. What a uniform pressure puts on a corner is
-// another share: it depends on how the body's model hands force to its points (springs, lumped masses), and
-// on a pad of regular cells the pressures fn/A of neighbors differ by a factor of two, however fine the mesh
-// is. Rigid-plastic friction does not see it. A bristle does, since its force K A z is bounded by mu fn: a
-// level that is concave in the pressure, so corners with little force slip early, those with much lag behind,
-// and the patch breaks loose below its limit.
+// Detection gives a corner a third of the triangles around it. The share of a uniform pressure that a corner
+// bears differs: it depends on how the body's model distributes force to its points (springs, lumped masses),
+// and on a pad of regular cells the pressures fn/A of neighbors differ by a factor of two, however fine the
+// mesh is. Rigid-plastic friction is not affected. A bristle is, since its force K A z is bounded by mu fn:
+// corners with little force slip early, those with much force lag behind, and the patch breaks loose below
+// its limit.
 //
-// So each triangle of the patch, of area w, hands area between its corners in proportion to what they carry.
-// With p_i = fn_i / A_i,
+// So each triangle of the patch, of area w, exchanges area between its corners in proportion to their normal
+// forces. With p_i = fn_i / A_i,
 //
 //     A_i* = A_i + sum over triangles T, their other corners j of
 //            w (p_i - p_j) / (3 sum_T p) min(1, 2 min(p_i, p_j) / max(p_i, p_j))                  (1)
@@ -33,9 +33,8 @@ namespace dfm {
 class AreaExchange {
  public:
   explicit AreaExchange(const Memory &memory);
-  // Which contacts' areas depend on each other. sources: by body slot. law: [n], contacts of one law
-  // hand area to each other, none where kNone. area: [n] m2, as detection and AreaShares
-  // (contact/areas.h) have it.
+  // Lists the contacts that exchange area. sources: by body slot. law: [n], contacts of the same law exchange
+  // area; kNone: none. area: [n] m2, as detection and AreaShares (contact/areas.h) have it.
   void list(std::span<const ContactPoint> contacts, std::span<const DofSource> sources, const uint32_t *law,
             const double *area);
   void clear() {
@@ -50,8 +49,8 @@ class AreaExchange {
 
  private:
   struct Corner { uint32_t node, other, contact, law; };
-  // A triangle of the surface in slot_a of its contacts, and what each corner sees of it. kNone:
-  // takes no part.
+  // A triangle of the surface in slot_a of its contacts, and the share of each corner in it. kNone: takes no
+  // part.
   struct Triangle {
     uint32_t slot, number, contact[3];
     double area[3];

@@ -1,4 +1,4 @@
-// What the linearized law of a contact wants of it. Internal linkage only.
+// The friction impulse by the linearized law of a contact. Internal linkage only.
 #pragma once
 #include "contact_kernel.h"
 
@@ -9,8 +9,8 @@ struct Pair { double a, b; };
 
 static inline double larger(double a, double b) { return a < b ? b : a; }  // as std::max, also of a NaN
 
-// Friction impulse that the linearized law wants, given the contact's present impulse (l1, l2), slip (u1, u2)
-// and new normal impulse.
+// The friction impulse by the linearized law, for the present impulse (l1, l2), slip (u1, u2) and new normal
+// impulse of the contact.
 //
 // Set-valued laws: lambda* = lambda - u / w_t would stop the slip. Inside the disc it is taken (stick);
 // outside the contact slides along lambda* on a disc whose radius grows with the slip speed s by the law's

@@ -6,10 +6,10 @@
 namespace dfm {
 namespace {
 
-// Motions beyond which sweeps are left alone: a matrix of them is factored in every iteration.
+// Largest number of motions: a matrix of this size is factored in every iteration.
 constexpr uint32_t kMostMotions = 300;
 constexpr uint32_t kMostIterations = 16, kMostHalvings = 6;
-// Of |z|, what is left of F.
+// Tolerance for |F|, relative to |z|.
 constexpr double kLeast = 1e-11;
 
 // Sums have four partial sums at every vector width.
@@ -26,7 +26,7 @@ void add(double *to, double s, const double *a, uint32_t n) {
   for (uint32_t k = 0; k < n / 4; ++k) fours(to)[k] += s * fours(a)[k];
 }
 
-// What friction may be at a normal impulse, N s, and how it grows with it.
+// The limit of friction at a normal impulse, N s, and its derivative.
 struct Disc { double radius, growth; };
 Disc disc_of(const ContactState &s, uint32_t i, double h, double ln) {
   const uint32_t n = s.stride;
@@ -77,7 +77,7 @@ uint32_t Proximal::find_parts(const ContactRows &rows, const RowsPart &of, std::
     });
     if (points && seen != kNone) alone_[seen] = 1;
   });
-  // strides know contacts only: what bonds hold as well is left to the sweeps
+  // strides treat contacts only: parts with bonds are left to the sweeps
   each_row(of.bonds, [&](uint32_t i) {
     each_block(i, [&](uint32_t b) {
       if (b != kNone) alone_[b] = 1;
@@ -129,7 +129,7 @@ void Proximal::put(ContactRows &rows, const double *impulse) const {
   rows.restore(contacts_, blocks_);
 }
 
-// The impulse of a contact at the velocity u_. False: it carries nothing.
+// The impulse of a contact at the velocity u_. Returns false if it is zero.
 bool Proximal::answer(const ContactRows &rows, const ContactState &s, uint32_t k, double h, double rho,
                       Answer &out) const {
   const uint32_t i = contacts_[k];
@@ -165,7 +165,7 @@ bool Proximal::answer(const ContactRows &rows, const ContactState &s, uint32_t k
   const double size = std::sqrt(l[1] * l[1] + l[2] * l[2]);
   if (size <= disc.radius) return true;
   const double e1 = l[1] / size, e2 = l[2] / size, cut = disc.radius / size;
-  for (int c = 0; c < 3; ++c) {  // what leads along the edge of the disc, and how far that is
+  for (int c = 0; c < 3; ++c) {  // the component along the edge of the disc, and its length
     const double a = d[3 + c], b = d[6 + c], across = cut * (e1 * b - e2 * a);
     d[3 + c] = -e2 * across;
     d[6 + c] = e1 * across;
@@ -213,7 +213,7 @@ bool Proximal::newton() {
         fours(to)[k] -= s[0] * fours(g)[k] + (s[1] * fours(g1)[k] + s[2] * fours(g2)[k]);
     }
   }
-  work_ += carry * r_ / 4 + uint64_t{r_} * r_ / 24;  // by their operations, over those of a contact's sweep
+  work_ += carry * r_ / 4 + uint64_t{r_} * r_ / 24;  // operations relative to those of the sweep of a contact
   for (uint32_t k = 0; k < r_; ++k) down_[k] = -f_[k];
   for (uint32_t k = 0; k < r_; ++k) {
     uint32_t best = k;

@@ -1,10 +1,10 @@
-// Contacts of bodies that move in few ways: more contacts than motions to hold them by.
+// Contacts of bodies with few motions: more contacts than motions.
 //
 // With r motions (modes, a rigid body) and n contacts, W = G G^T with G [3n, r], and impulses that change no
-// motion lie in its null space. They are not told by the motion, but complementarity decides on them: a
-// contact that carries load at a gap has to hand it to others. A sweep moves such loads by u / w at most,
-// the same each time, so what has to be handed over takes thousands of sweeps, at a rate that no acceleration
-// of them knows, because nothing else changes (doc/decisions/0225).
+// motion are in its null space. The motion does not determine them, but complementarity does: a loaded
+// contact with a gap must transfer its load to others. A sweep moves such loads by at most u / w, the same in
+// each sweep, so the transfer takes thousands of sweeps, which acceleration cannot predict, because nothing
+// else changes (doc/decisions/0225).
 //
 // The proximal point method takes the same way in long strides (Rockafellar 1976). With l0 the impulses so
 // far, it solves the contact problem in which each contact gives way to its change of impulse by 1/rho beside
@@ -15,7 +15,7 @@
 //     F(z) = z - G^T l(u0 + G z),
 // whose matrix I - G^T (dl/du) G is of size r and regular, with a line search on |F|.
 //
-// What does not touch, directly or by others, is solved apart: a part is the contacts that share motions.
+// Contacts that share motions, directly or through others, form a part; parts are solved separately.
 #pragma once
 #include <span>
 
@@ -31,14 +31,14 @@ class Proximal {
   // with points that answer their own impulses alone.
   uint32_t find_parts(const ContactRows &rows, const RowsPart &of, std::span<const uint8_t> leave);
   std::span<const uint32_t> contacts(uint32_t part) const;
-  // False: its bodies move in too many ways.
+  // Returns false if its bodies have too many motions.
   bool take(const ContactRows &rows, uint32_t part);
   // One stride of the part taken from the rows' impulses, which change; rho: over each contact's own 1 /
   // response. False: it was not found, and nothing has changed.
   bool stride(ContactRows &rows, const ContactState &law, double h, double rho);
   // The part taken, as it is with these impulses [3 rows.n].
   void put(ContactRows &rows, const double *impulse) const;
-  // Work of the last stride in contacts swept.
+  // Work of the last stride, in units of swept contacts.
   uint64_t work() const { return work_; }
 
  private:
@@ -47,7 +47,7 @@ class Proximal {
   struct Part { uint32_t root, contact, block; };  // first of its contacts, of its blocks
   Array<Part> parts_;                              // and one behind the last
   Array<uint32_t> root_;                           // [blocks] the part's lowest block
-  Array<uint8_t> alone_;                           // [blocks] of a root: the part is left alone
+  Array<uint8_t> alone_;                           // [blocks] of a root: the part is skipped
   Array<uint32_t> contact_, block_;                // by part
   std::span<const uint32_t> contacts_, blocks_;    // of the part taken
   uint32_t n_ = 0, r_ = 0, width_ = 0;             // width: r, padded with zeros to whole fours

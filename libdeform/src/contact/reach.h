@@ -1,4 +1,4 @@
-// How near two features must be at the start of a sub-step for a contact between them to be made. Shared by
+// The distance at the start of a sub-step below which a contact between two features is made. Shared by
 // broad/, whose lists must cover it, and narrow/, which applies it.
 #pragma once
 #include <algorithm>
@@ -8,17 +8,17 @@
 
 namespace dfm {
 
-// speed: bound of the relative speed, m/s. Twice the motion, because contact impulses turn and bounce what
-// the prediction saw.
+// speed: bound of the relative speed, m/s. Twice the motion, because contact impulses change the predicted
+// motion.
 inline double contact_reach(double h, double offset, double speed) { return 2 * offset + 2 * h * speed; }
-// What one side adds to it: contact_reach(va + vb) = reach_share(va) + reach_share(vb).
+// Contribution of one side: contact_reach(va + vb) = reach_share(va) + reach_share(vb).
 inline double reach_share(double h, double offset, double speed) { return offset + 2 * h * speed; }
 
-// A surfel behind a face is pushed back out from no deeper than this: deeper, the nearest face is no longer
-// the one it came through.
+// A surfel behind a face is pushed back only up to this depth: deeper, the nearest face may not be the one
+// through which it came.
 inline double recovery_depth(const Surface &faces) { return 0.25 * faces.median_edge; }
-// Edges that have slipped through each other are pushed back from a smaller depth: their cones of normals say
-// less than a face does.
+// Edges that have passed through each other are pushed back up to a smaller depth: their cones of normals are
+// less reliable than a face.
 inline double edge_recovery_depth(const Surface &a, const Surface &b) {
   return 0.02 * std::min(a.median_edge, b.median_edge);
 }

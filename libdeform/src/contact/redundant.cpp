@@ -8,9 +8,9 @@
 namespace dfm {
 namespace {
 
-// Of what is allowed, what one sweep may still change of a velocity.
+// Share of the tolerance by which one sweep may still change a velocity.
 constexpr double kStands = 0.5;
-// Over the slip that is left: sweeps end at half of what is allowed, and laws are asked once more.
+// Factor on the remaining slip: sweeps end at half of the tolerance, and laws are evaluated once more.
 constexpr double kAllows = 2.5;
 
 bool carries(const ContactRows &rows, uint32_t i) {

@@ -1,6 +1,6 @@
-// Slip that no impulse removes (doc/decisions/0361). Where more contacts carry load than points are touched,
-// they ask for more than the bodies can do: normals a little askew and gaps that do not quite agree leave
-// slips that sweeps answer by moving impulses from one contact to others for ever, while velocities stand.
+// Slip that no impulse removes (doc/decisions/0361). If there are more loaded contacts than touched points,
+// their conditions cannot all be met: slightly different normals and inconsistent gaps leave slips, and
+// sweeps keep moving impulses between contacts while velocities no longer change.
 #pragma once
 #include "contact/contact_state.h"
 #include "contact/rows.h"
@@ -13,12 +13,12 @@ class Redundant {
   explicit Redundant(const Memory &memory);
   // Before the first solve of a sub-step.
   void start() { left_.clear(); }
-  // More contacts carry load than dofs are touched by these.
+  // Whether there are more loaded contacts than dofs that they touch.
   bool found(const ContactRows &rows, const RowsPart &part);
   // Velocities before a plain sweep.
   void note(const ContactRows &rows, const RowsPart &part);
-  // After it: whether it has left velocities as they were. What each contact then slips by against its law,
-  // up to the largest normal tolerance, is allowed, here and in later solves of the sub-step.
+  // After it: whether velocities have not changed. The remaining slip of each contact against its law, up to
+  // the largest normal tolerance, is then allowed in this and later solves of the sub-step.
   bool stands(const ContactRows &rows, const RowsPart &part, const ContactState &law, double h,
               const Tolerance &tolerance);
   // In a later solve, after its own tolerance has been set.

@@ -1,11 +1,11 @@
-// How far the area of a contact goes to where it should be (its aim: contact/areas.h, contact/exchange.h).
+// How fast the area of a contact approaches its target (its aim: contact/areas.h, contact/exchange.h).
 //
-// Bristles stand on the surface. Area that moved with every change of load would mix deflections that differ,
-// and a patch that is rocked would forget where it stood. Worse, which of several redundant contacts carries
-// a load is chance, down to the last digits of the solve: where an area follows at once, each turn takes
-// bristles off one contact and gives bare area to another, the patch loses force, what it holds gives way,
-// the loads change, and they take turns again. A stack of cubes walked by micrometers per second on that. So
-// what does not move changes nothing:
+// Bristles are attached to the surface. If area moved with every change of load, different deflections would
+// be mixed, and a rocked patch would lose its memory. Also, which of several redundant contacts is loaded
+// depends on the last digits of the solve: if areas followed at once, each change would remove bristles from
+// one contact and give area without bristles to another, the patch would lose force, the loads would change,
+// and so on. A stack of cubes walked by micrometers per second for this reason. So areas of a patch at rest
+// do not change:
 //
 //   a contact that carries nothing   has no bristle out, and gets its aim when it begins to carry
 //   one that carries                 keeps its area, except that

@@ -1,4 +1,4 @@
-// What the last sub-step left for the report: contacts in key order with their solution.
+// Data of the last sub-step for the report: contacts in key order with their solution.
 #pragma once
 #include "contact/contact_set.h"
 #include "core/memory.h"
@@ -15,8 +15,8 @@ struct Report {
   explicit Report(const Memory &memory);
 };
 
-// f(width, column of each report). Memory, room, carrying over sleepers and the copy that a step's budget
-// puts back follow from this list.
+// Calls f(width, column of each report). Memory, reserved room, the data of sleepers and the copy for the
+// budget of a step use this list.
 template <class F, class... R>
 void each_report_column(F &&f, R &...r) {
   f(size_t{1}, r.contacts...);

@@ -1,4 +1,4 @@
-// What ContactRows does for one part of its rows, and all of them as a part.
+// Functions of ContactRows for one part of its rows, and the part of all rows.
 #include <algorithm>
 
 #include "contact/rows.h"

@@ -1,5 +1,5 @@
-// A part of the rows of a contact solve: contacts and bonds that share no unknown with the others. What is
-// done to one part neither reads nor changes what is done to another, so they may be solved at the same time.
+// A part of the rows of a contact solve: contacts and bonds that share no unknown with others. Work on one
+// part neither reads nor changes another, so parts may be solved at the same time.
 #pragma once
 #include <cstdint>
 #include <span>

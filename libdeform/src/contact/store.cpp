@@ -46,7 +46,7 @@ void warm_start(const ContactStore &old, std::span<const ContactPoint> contacts,
     }
     for (int k = 0; k < 3; ++k) l[k] = scale * old.impulse[size_t(m) * 3 + size_t(k)];
     state.dwell[i] = old.dwell[m];
-    // The columns are as wide as the law with most state needs; a law's own values stand first.
+    // The columns have the width of the law with the largest state; the values of a law come first.
     if (old.law[m] == state.law[i])
       for (uint32_t s = 0; s < std::min(old.nstate, state.nstate); ++s)
         state.bristle[size_t(s) * state.stride + i] = old.bristle[size_t(m) * old.nstate + s];

@@ -1,5 +1,5 @@
-// Contacts that live: what one contact keeps from step to step, found again by its key. Warm start, bristle
-// state, events and the hold measure hang on it.
+// Lasting contacts: the data that a contact keeps from step to step, found by its key: warm start, bristle
+// state, events, hold measure.
 #pragma once
 #include <span>
 
@@ -8,15 +8,15 @@
 
 namespace dfm {
 
-// What all that handles columns alike must know of one. `values`: what a snapshot may hold.
+// Description of a column for code that handles all columns. `values`: valid values in a snapshot.
 enum class ColumnValues : uint8_t { any, finite, not_negative, flag, law };
-// widths: as many as the state has columns; not by contact, or not always there
+// widths: number of columns of the state; not by contact, or not always present
 inline constexpr uint32_t kPerState = ~0u, kOwnLength = ~0u - 1;
 struct ContactColumn {
-  const char *name;     // in a snapshot; null: not in there, follows from the others
+  const char *name;     // in a snapshot; null: not included, follows from the others
   uint32_t width;       // values per contact
   bool hashed = false;  // part of dfm_world_hash()
-  bool carried = true;  // goes on as it is while its contact sleeps
+  bool carried = true;  // kept unchanged while its contact sleeps
   uint64_t entries(uint64_t n, uint64_t nstate) const {
     return n * (width == kPerState ? nstate : width == kOwnLength ? 1 : width);
   }
@@ -27,8 +27,8 @@ struct ColumnOf : ContactColumn {
 };
 
 struct ContactStore {
-  // Columns over the contacts of the last sub-step, in their order. A new one is declared here, named in
-  // each_column(), and filled in by keep_contacts().
+  // Columns over the contacts of the last sub-step, in their order. To add one, declare it here, name it in
+  // each_column(), and fill it in keep_contacts().
   uint32_t n = 0, nstate = 0;
   double h = 0;  // s, the sub-step that the impulses belong to
   Array<uint64_t> key;
@@ -50,8 +50,8 @@ struct ContactStore {
   uint32_t find(uint64_t key) const;  // index, or kNone
 };
 
-// f(ColumnOf<..>, column of each store). Memory, room, carrying over, the copy that a step's budget puts
-// back, snapshot and hash follow from this list, whose order is that of snapshots and of the hash.
+// f(ColumnOf<..>, column of each store). Memory, reserved room, data of sleepers, the copy for the budget of
+// a step, snapshot and hash use this list, in this order.
 template <class F, class... Store>
 void each_column(F &&f, Store &...c) {
   using V = ColumnValues;
@@ -80,8 +80,8 @@ void each_column(F &&f, Store &...c) {
 void warm_start(const ContactStore &old, std::span<const ContactPoint> contacts, double h, ContactRows &rows,
                 ContactState &state, double *tangents, uint32_t *match, Tasks *tasks = nullptr);
 
-// The tangent t of normal m turned to normal n by the smallest rotation; a fresh tangent where the normals
-// are more than 120 degrees apart.
+// The tangent t of normal m rotated to normal n by the smallest rotation; a new tangent if the normals are
+// more than 120 degrees apart.
 Vec3 transport(Vec3 t, Vec3 m, Vec3 n, bool *reset);
 
 }  // namespace dfm

@@ -1,6 +1,6 @@
-// A place in the bytes of a mesh file: words and numbers as text, or values as binary, with the place
-// named in every refusal. Nothing is copied and no line is limited; numbers go through from_chars, so the
-// locale has no say.
+// A position in the bytes of a mesh file: reads words and numbers as text, or binary values, and names the
+// position in every error. Nothing is copied and lines may have any length; numbers are read by from_chars,
+// so the locale has no effect.
 #pragma once
 #include <charconv>
 #include <cmath>
@@ -26,13 +26,13 @@ class Cursor {
 
   bool binary = false;  // names places by byte instead of line
   bool swap = false;    // binary values have the other byte order
-  char comment = 0;     // from a word that starts with it to the end of the line nothing is read
+  char comment = 0;     // a word that starts with it begins a comment up to the end of the line
 
   const std::string &path() const { return path_; }
   size_t left() const { return size_t(end_ - p_); }
   size_t offset() const { return size_t(p_ - begin_); }
   void seek(size_t offset) { p_ = begin_ + offset; }
-  // The same file from here on, ending after `bytes`: places in sentences stay those of the file.
+  // The same file from here on, ending after `bytes`: positions in errors remain those of the file.
   Cursor part(size_t bytes) const {
     Cursor out = *this;
     out.end_ = p_ + bytes;
@@ -40,9 +40,9 @@ class Cursor {
   }
   std::string_view rest() const { return {p_, left()}; }
 
-  // Throws "FILE:12: " or "FILE, byte 345: " and then the sentence; DFM_E_FORMAT.
+  // Throws "FILE:12: " or "FILE, byte 345: " followed by the sentence; DFM_E_FORMAT.
   [[noreturn]] void refuse(const char *sentence, ...) const __attribute__((format(printf, 2, 3)));
-  // The same for content that is sound but not ours to read; DFM_E_UNSUPPORTED.
+  // The same for valid content that is not supported; DFM_E_UNSUPPORTED.
   [[noreturn]] void unsupported(const char *sentence, ...) const __attribute__((format(printf, 2, 3)));
 
   // ---- text ----
@@ -113,14 +113,14 @@ class Cursor {
     }
     return {};
   }
-  // Whether a word is `lower` whatever its case.
+  // Whether a word equals `lower`, ignoring case.
   static bool is_word(std::string_view word, std::string_view lower) {
     if (word.size() != lower.size()) return false;
     for (size_t i = 0; i < word.size(); ++i)
       if ((word[i] >= 'A' && word[i] <= 'Z' ? word[i] + ('a' - 'A') : word[i]) != lower[i]) return false;
     return true;
   }
-  // Numbers that the file promises before it shows them: refused when the bytes left cannot hold them.
+  // Checks a count that the file announces: an error if the remaining bytes cannot hold so many numbers.
   uint64_t count(int64_t claimed, size_t least_bytes_each, const char *what) const {
     if (claimed < 0) refuse("promises %lld %s; a count cannot be negative", ll(claimed), what);
     if (static_cast<uint64_t>(claimed) > left() / least_bytes_each)
@@ -130,7 +130,7 @@ class Cursor {
           ll(claimed), what, left());
     return static_cast<uint64_t>(claimed);
   }
-  // The same in text, where the last number needs no space behind it.
+  // The same in text, where no space need follow the last number.
   uint64_t text_count(int64_t claimed, size_t words_each, const char *what) const {
     if (claimed > 0 && uint64_t(claimed) <= (left() + 1) / (2 * words_each)) return uint64_t(claimed);
     return count(claimed, 2 * words_each, what);
@@ -175,7 +175,7 @@ class Cursor {
     return true;
   }
 
-  // A word of the file as it may stand in a sentence: short and printable.
+  // A word of the file for error messages: short and printable.
   static std::string quote(std::string_view text);
 
  private:

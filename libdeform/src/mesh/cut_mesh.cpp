@@ -37,7 +37,7 @@ Array<uint32_t> join_corners(const Memory &memory, uint32_t npoint, uint32_t nte
     const bool opened = std::binary_search(open.begin(), open.end(), open_face(a, b));
     for (int k = 0; k < 4; ++k) {
       const uint32_t point = tets[size_t{4} * a + size_t(k)], other = corner_of(tets, b, point);
-      if (other == 4 * b + 4) continue;  // the corner of a that the face has not
+      if (other == 4 * b + 4) continue;  // the corner of a that is not in the face
       if (opened) split[point] = 1;
       else join(parent, 4 * a + uint32_t(k), other);
     }

@@ -1,5 +1,5 @@
-// What a cut makes of a mesh of tetrahedra: cells go, and points are split where faces between cells are
-// opened. No cell is divided, so no cell becomes smaller or thinner than those that the mesh had.
+// The effect of a cut on a mesh of tetrahedra: cells are removed, and points are split where faces between
+// cells are opened. No cell is divided, so no cell becomes smaller or thinner.
 #pragma once
 #include <cstdint>
 
@@ -15,20 +15,20 @@ constexpr uint64_t open_face(uint32_t a, uint32_t b) {
 
 struct CutMesh {
   Array<uint32_t> tets;   // [ncell,4]
-  Array<uint32_t> point;  // [npoint] number before; copies of a point stand behind all the others
-  Array<uint32_t> cell;   // [ncell] number before, ascending
+  Array<uint32_t> point;  // [npoint] previous number; copies of points come after all others
+  Array<uint32_t> cell;   // [ncell] previous number, ascending
   explicit CutMesh(const Memory &memory);
 };
 
-// removed [ntet]: 1: goes. open: faces that are open, ascending; those of removed cells do not matter. Around
-// a point with an open face the cells that hang together by other faces share one copy of it; the first copy
-// is that of the lowest cell. Elsewhere points stay as they are, also where cells share nothing but them.
-// Points without cells go.
+// removed [ntet]: 1: removed. open: open faces, ascending; those of removed cells have no effect. Around a
+// point with an open face, the cells that are connected by other faces share one copy of it; the first copy
+// is that of the lowest cell. Other points are not split, even if cells share only that point. Points without
+// cells are removed.
 CutMesh make_cut_mesh(const Memory &memory, uint32_t npoint, uint32_t ntet, const uint32_t *tets,
                       const Array<uint8_t> &removed, const Array<uint64_t> &open);
 
 // Calls use(cell, cell) for the two sides of each inner face, the lower cell first, in the order of the
-// points of the faces. Faces of more than two cells are passed over.
+// points of the faces. Skips faces of more than two cells.
 template <class Use>
 void each_inner_face(const Memory &memory, uint32_t ntet, const uint32_t *tets, Use &&use) {
   const Array<TetFace> faces = sorted_faces(memory, ntet, tets);
@@ -38,7 +38,8 @@ void each_inner_face(const Memory &memory, uint32_t ntet, const uint32_t *tets, 
   }
 }
 
-// [ntet] part of each cell, where cells hang together by points; parts are numbered by their lowest cells.
+// [ntet] part of each cell; cells that share a point are in the same part; parts are numbered by their lowest
+// cells.
 Array<uint32_t> parts_of_cells(const Memory &memory, uint32_t npoint, uint32_t ntet, const uint32_t *tets,
                                uint32_t &n);
 uint32_t count_parts(const Memory &memory, uint32_t npoint, uint32_t ntet, const uint32_t *tets);

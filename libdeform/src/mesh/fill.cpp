@@ -1,17 +1,17 @@
-// A surface becomes cells: the pitch of the lattice is sought that offers the wanted number, each cell's
-// share of material is measured, the sum of the shares is made to agree with the enclosed volume where that
-// is known better, and light cells are given a floor.
+// Fills a surface with cells: finds the lattice pitch that gives the wanted number of cells, measures the
+// share of material of each cell, corrects the sum of the shares to the enclosed volume if that is more
+// accurate, and raises light cells to a least share.
 //
 // The floor. Mass and stiffness of a cell are scaled by the same share, so a model that is linear in the
 // cells keeps its step bound however small a share is: K = sum s_c K_c and M = sum s_c M_c give x.Kx <=
-// max_c(lambda_c) x.Mx. What suffers is contact, and springs whose weights come from all cells around: a
-// corner that only cells of tiny share know has next to no mass, an impulse on a surfel near it throws it
-// through its cell, and mass ratios have no bound. So no cell has less than kShareFloor of what the fullest
-// cell around it has; the mass for it comes from the full cells around it, so that the body's mass stays and
-// its center moves by less than a cell times the little that is moved. Measured on
-// examples/scenes/fill_drop.json (doc/concepts/filling.md): 41 sub-steps a step without a floor, 3 from 0.01
-// on; 0.1 leaves mass ratios of 60 between points and the fewest steps at the solver's cap, and makes a ball
-// of 5,000 cells 0.8 % wider in its inertia.
+// max_c(lambda_c) x.Mx. The problem is contact, and springs whose weights come from all cells around: a
+// corner of cells of tiny share has almost no mass, an impulse on a surfel near it throws it through its
+// cell, and mass ratios are unbounded. So no cell has less than kShareFloor of the share of the fullest
+// neighbor it; the mass comes from the full cells around it, so that the mass of the body is unchanged and
+// its center moves by less than a cell times the moved share. Measured on examples/scenes/fill_drop.json
+// (doc/concepts/filling.md): 41 sub-steps a step without a floor, 3 from 0.01 on; 0.1 leaves mass ratios of
+// 60 between points and the fewest steps at the solver's cap, and makes a ball of 5,000 cells 0.8 % wider in
+// its inertia.
 #include <algorithm>
 #include <cfloat>
 #include <cmath>
@@ -55,15 +55,15 @@ uint32_t most_cells(uint32_t cells) {
   return uint32_t(std::min<uint64_t>(4 * uint64_t(cells) + 1000, kMostCells));
 }
 
-// Below it keys do not fit, or the rounding of the coordinates (four times that is what touching allows)
-// reaches 1/20 of the lattice's unit.
+// Below it keys overflow, or the rounding of coordinates (a quarter of the touch tolerance) reaches 1/20 of
+// the lattice unit.
 double least_half_pitch(const FillSurface &s) { return std::max(2.0 / kLatticeReach, 80 * s.resolution); }
 
 // Half the pitch that offers the number of cells. The count falls with the pitch to the power of 2 (all
 // surface) to 3 (all inside), and 8/3 makes each try some ten times better than the last; where the count
 // jumps the tries are kept between those that were too many and too few. Square roots alone, so that the
-// lattice is the same on every machine. Returns how far the count is off, as a ratio above 1; infinity: no
-// lattice that was tried has so few cells.
+// lattice is the same on every machine. Returns the error of the count, as a ratio above 1; infinity if no
+// tried lattice has so few cells.
 double seek_pitch(const FillSurface &surface, uint32_t cells, Lattice &lattice) {
   const uint32_t limit = most_cells(cells);
   double fine = least_half_pitch(surface);
@@ -86,8 +86,8 @@ double seek_pitch(const FillSurface &surface, uint32_t cells, Lattice &lattice) 
   return best_apart;
 }
 
-// A grid point in the middle of the box keeps the symmetries of a body. Where that makes the number of cells
-// jump too far, as across a rod of a few cells' width, any other place will do.
+// A grid point in the middle of the box preserves the symmetries of a body. If the number of cells then jumps
+// too far, as across a rod a few cells wide, another position is used.
 Lattice choose_lattice(const FillSurface &surface, uint32_t cells) {
   Lattice symmetric, other;
   other.shift = {0.39, 0.27, 0.61};
@@ -125,8 +125,8 @@ double sum(const Array<double> &x) {
   return s;
 }
 
-// Shifts every unsettled share by the same part of what is unsettled in it until the sum is `wanted` cells,
-// if chance explains the gap.
+// Shifts every share by the same fraction of its uncertain part until the sum is `wanted` cells, if the
+// difference is within the sampling error.
 bool settle(Filling &f, double wanted, double piece) {
   Array<double> &share = f.share;
   if (std::fabs(sum(share) - wanted) > kDeviations * 0.5 * std::sqrt(piece * sum(f.loose)) + 1e-9 * wanted)
@@ -144,7 +144,7 @@ bool settle(Filling &f, double wanted, double piece) {
   return true;
 }
 
-// Cells in order, without those around an opening that turn out to be outside.
+// Cells in order, without cells near an opening that are outside.
 Filling arrange(const FillSurface &surface, const FillCover &cover, const FillShares &shares) {
   const Memory &memory = surface.memory;
   Array<uint32_t> order{HookAllocator<uint32_t>(memory)};
@@ -180,8 +180,8 @@ void number_points(const Memory &memory, Filling &f) {
   for (const uint64_t s : sites) f.sites.push_back(unpack(s));
 }
 
-// Drops pieces that hold no material: sheets without thickness, and triangles that hang in the air. Returns
-// their number of cells.
+// Removes pieces without material: sheets without thickness, and isolated triangles. Returns their number of
+// cells.
 uint32_t drop_empty_pieces(const Memory &memory, Filling &f) {
   Array<uint32_t> parent(f.sites.size(), HookAllocator<uint32_t>(memory));
   for (uint32_t i = 0; i < parent.size(); ++i) parent[i] = i;
@@ -230,9 +230,9 @@ struct Around {
   }
 };
 
-// Raises light cells to the floor at the expense of the full ones around them (those with at least half of
-// what the fullest has); none gives more than half of what it has. Where nothing around has material, as
-// along a hair thinner than the samples, the whole body gives.
+// Raises light cells to the least share at the expense of the full cells around them (those with at least
+// half of the largest share); no cell gives more than half of its share. If no cell around has material, as
+// along a hair thinner than the samples, all cells of the body give.
 void raise_to_floor(const Memory &memory, Filling &f) {
   const Around around(memory, f);
   double first = 0, second = 0;

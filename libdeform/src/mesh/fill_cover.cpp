@@ -1,6 +1,6 @@
-// Which cells of the lattice a surface needs. Triangles are put into cells by separating axes, and what they
-// enclose is reached from there across faces without a triangle, so that work and memory follow the cells
-// kept and not the box around a slanting rod.
+// Finds the cells of the lattice that a surface needs. Triangles are assigned to cells by separating axes,
+// and enclosed cells are reached from there across faces without triangles, so that work and memory grow with
+// the number of kept cells and not with the bounding box.
 #include <algorithm>
 #include <array>
 #include <cfloat>
@@ -48,7 +48,7 @@ struct Kinds {
   static int number(int a, int b, bool upper) { return (a * 3 + b) * 2 + upper; }
   static TetShape make(int kind) {
     int a = kind / 6, b = kind / 2 % 3;
-    if (a == b) b = (a + 1) % 3;  // six numbers are never asked for
+    if (a == b) b = (a + 1) % 3;  // six of these numbers are never used
     int32_t key[3];
     key[a] = 0;
     key[b] = 2;
@@ -87,7 +87,7 @@ class PieceTest {
         hi[k] = std::max(hi[k], corner[i][k]);
       }
     const Vec3 size = hi - lo;
-    if (std::max({size.x, size.y, size.z}) > kLongestPiece) {  // in two at the longest edge
+    if (std::max({size.x, size.y, size.z}) > kLongestPiece) {  // split at the longest edge
       int k = 0;
       for (int i = 1; i < 3; ++i)
         if (norm2(corner[(i + 1) % 3] - corner[i]) > norm2(corner[(k + 1) % 3] - corner[k])) k = i;
@@ -150,9 +150,9 @@ FillSurface::FillSurface(const TriMesh &surface)
   measure_openings();
 }
 
-// The edges that are passed more often one way than the other form closed loops; a loop's vector area is that
-// of any patch that closes it without turning back, at most its area. A triangle that faces the wrong way
-// among its neighbors counts twice: so does its harm.
+// Edges that are traversed more often in one direction than in the other form closed loops; the vector area
+// of a loop is that of any patch that closes it, at most the patch's area. A triangle with wrong orientation
+// counts twice.
 void FillSurface::measure_openings() {
   struct Edge {
     uint32_t a, b;
@@ -253,7 +253,7 @@ FillCover cover(const FillSurface &surface, const Lattice &lattice, uint32_t lim
   for (uint32_t i = 0; i < touched.size(); ++i) look(touched[i], false);
   const uint32_t near = out.cells.size();
   for (uint32_t i = 0; i < out.cells.size() && out.kept <= limit; ++i)
-    // nothing lies between neighbors that no triangle touches
+    // no surface separates neighbors that no triangle touches
     for (uint32_t face = 0; face < 4 && out.kind[i] != CellKind::outside; ++face)
       look(pack(neighbor(unpack(out.cells[i]), face)),
            i >= near && surface.closed && out.kind[i] == CellKind::inside);

@@ -1,4 +1,4 @@
-// The body-centered cubic lattice that surfaces are filled with, and the cells of it that a surface needs.
+// The body-centered cubic lattice for filling surfaces, and the cells of it that a surface needs.
 //
 // Unit of length is half the pitch h of the grid: grid points have even coordinates, centers of the cubes odd
 // ones. A cell spans two neighboring grid points along axis b and two neighboring centers along axis a, at
@@ -94,12 +94,12 @@ struct FillCover {
   // by number; outside for cells that were looked at only
   Array<CellKind> kind;
   uint32_t kept = 0;
-  // false: given up, for more cells than `limit` or more work than it allows
+  // false: stopped, because of more than `limit` cells or too much work
   bool complete = true;
-  // given up for the work: long triangles through a lattice far too fine for them
+  // stopped because of the work: long triangles in a lattice that is far too fine for them
   bool hopeless = false;
 };
-// `limit`: most cells. Work is bounded by the triangles and the limit, wherever the corners lie.
+// `limit`: largest number of cells. Work is bounded by the triangles and the limit, independent of positions.
 FillCover cover(const FillSurface &surface, const Lattice &lattice, uint32_t limit);
 
 // Calls visit(cell's key, triangle, deep) for every cell within the touch tolerance of a triangle, a pair

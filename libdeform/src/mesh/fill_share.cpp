@@ -1,7 +1,7 @@
-// How much of a cell is material: the cell is cut into eight again and again where a triangle crosses it, and
-// each part that no triangle crosses is settled by the winding number at its middle. Parts still crossed at
-// the last cut count whole or not at all by one place in them, which differs from part to part: places at
-// fixed spots would all lie on one side of a face along the lattice's planes.
+// The share of material of a cell: a cell crossed by a triangle is divided into eight, repeatedly; a part
+// that no triangle crosses is inside or outside by the winding number at its middle. Parts that are still
+// crossed at the last level count as inside or outside by one sample point, whose place differs between
+// parts: samples at a fixed place would all be on one side of a face along a lattice plane.
 #include <algorithm>
 #include <cmath>
 
@@ -11,7 +11,7 @@
 namespace dfm {
 namespace {
 
-// above so many crossed cells one cut less is enough: their errors average out
+// above this number of crossed cells one level less is enough: errors average out
 constexpr uint32_t kFineCells = 20000;
 
 class Sampler {
@@ -61,9 +61,9 @@ class Sampler {
            ((u[2] - u[1]) * corner[2] + (1 - u[2]) * corner[3]);
   }
 
-  // The winding number at `place` from the one at `known`, both in the part at `level`: it rises by one where
-  // the way goes in through a triangle. Only for closed surfaces, where nothing else changes it. False: the
-  // way meets an edge, or begins or ends on a triangle.
+  // The winding number at `place` from the one at `known`, both in the part at `level`: it increases by one
+  // where the segment enters through a triangle. Only for closed surfaces. Returns false if the segment hits
+  // an edge, or begins or ends on a triangle.
   bool go(int level, Vec3 known, Vec3 place, double *winding) const {
     const Vec3 way = place - known;
     for (const uint32_t t : level_[size_t(level)]) {

@@ -1,7 +1,7 @@
-// From what a file says to a mesh a body can be made of. Order matters: unsound input is refused first (flat
-// cells), then cells are turned, doubles dropped and points renumbered; what was done is counted and told.
-// All thresholds are relative: a cell counts as flat when its volume is not above the rounding of its own
-// coordinates, so bodies of nanometers and of 100 km load alike.
+// Turns the contents of a file into a mesh for a body. Order matters: invalid input is refused first (flat
+// cells), then cells are reoriented, duplicates dropped and points renumbered; repairs are counted and
+// reported. All thresholds are relative: a cell counts as flat when its volume is not above the rounding of
+// its own coordinates, so bodies of nanometers and of 100 km load alike.
 #include <algorithm>
 #include <array>
 #include <cfloat>
@@ -32,7 +32,7 @@ CellShape cell_shape(const double *points, const uint32_t *tet) {
   return s;
 }
 
-// A coordinate x is known to eps*x; an altitude below a few of those says nothing.
+// A coordinate x is known to eps*x; an altitude below a few of these is meaningless.
 bool is_flat(const CellShape &s) {
   return !(std::fabs(s.volume6) > 8 * DBL_EPSILON * s.edge_max * s.edge_max * (s.edge_max + s.reach));
 }
@@ -63,7 +63,7 @@ void turn_negative(RawMesh &raw, TetMesh &mesh) {
     }
 }
 
-// Triangles without a group say nothing that the cells' boundary does not.
+// Triangles without a group add nothing to the boundary of the cells.
 void keep_grouped_triangles(const RawMesh &raw, TetMesh &mesh, const Array<uint32_t> &number) {
   for (size_t t = 0; t < raw.tri_group.size(); ++t) {
     const uint32_t *c = &raw.tris[3 * t];
@@ -132,8 +132,7 @@ void sort_groups(RawMesh &raw, TetMesh &mesh) {
   for (uint32_t &g : mesh.tri_group) g = place[g];
 }
 
-// Shares count where there is one for each cell, all in (0,1]: another array of that name means
-// something else.
+// Shares are used only if there is one for each cell, all in (0,1]; otherwise the array means something else.
 void take_shares(RawMesh &raw, TetMesh &mesh) {
   const bool sound =
       raw.tet_share.size() == raw.ntet() &&

@@ -1,4 +1,4 @@
-// What the repair of tetrahedral meshes and of surfaces share.
+// Shared by the repair of tetrahedral meshes and of surfaces.
 #pragma once
 #include <string>
 
@@ -11,9 +11,9 @@ inline constexpr double kLargestCoordinate = 1e100;  // m; beyond it squares of 
 void check_points(const std::string &path, const Array<double> &points);
 void sort_once(Array<uint32_t> &points);  // points of a group: ascending, each once
 // Drops cells with the same four corners as an earlier cell; returns how many. file_cell (may be null):
-// numbers of those kept, if any goes.
+// numbers of the kept cells, if any is dropped.
 uint32_t drop_duplicate_cells(RawMesh &raw, Array<uint32_t> *file_cell = nullptr);
-// The body's box against the rounding of its coordinates: a sentence where they are coarse, else empty.
+// Compares the bounding box with the rounding of its coordinates: a warning if they are coarse, else empty.
 std::string coarse_coordinates(const double lo[3], const double hi[3], double edge_min);
 
 // Grammar of a counted noun.
@@ -22,8 +22,8 @@ inline const char *is_are(uint32_t n) { return n == 1 ? "is" : "are"; }
 inline const char *was_were(uint32_t n) { return n == 1 ? "was" : "were"; }
 
 // Turns triangles so that neighbors agree across every edge of two triangles, solid pieces face outward and
-// the inner surface of a hollow one into its hole. Returns how many were turned; `twisted` counts the pieces
-// that have no two sides (left as they were).
+// the inner surface of a hollow one into its hole. Returns the number of reoriented triangles; `twisted`
+// counts the one-sided pieces (left unchanged).
 uint32_t orient_triangles(const Memory &memory, const Array<double> &points, Array<uint32_t> &tris,
                           uint32_t *twisted);
 

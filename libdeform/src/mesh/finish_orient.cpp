@@ -1,7 +1,7 @@
 // Which side of a surface is outside. Triangles are joined to patches across edges of exactly two triangles,
-// breadth first, and turned to agree. A patch with holes is closed in thought by fans over its boundary
-// loops; where those are small beside the patch, it bounds a solid and the sign of its volume tells outside
-// from inside. A patch inside an odd number of others is the wall of a hole and faces into it:
+// breadth first, and turned to agree. The holes of a patch are closed virtually by fans over its boundary
+// loops; if these are small relative to the patch, it bounds a solid and the sign of its volume distinguishes
+// outside from inside. A patch inside an odd number of others is the wall of a hole and faces into it:
 //
 //      +--------------+      depth 0 faces outward, depth 1 into the hole, depth 2 (a kernel in the hole)
 //      | ^  +----+    |      outward again. Inside is where the winding number (solid angle over 4 pi) of the
@@ -54,7 +54,7 @@ struct Rim { uint32_t patch, from, to; };  // a boundary edge as its patch runs 
 double volume6(const Corners &t, Vec3 o) { return dot(cross(t.a - o, t.b - o), t.c - o); }
 double area2(const Corners &t) { return norm(cross(t.b - t.a, t.c - t.a)); }
 
-// Of a triangle that holds the point: 0, between its two sides, instead of a sign that rounding chose.
+// For a triangle that contains the point: 0 instead of a sign decided by rounding.
 double solid_angle(const Corners &t, Vec3 at) {
   const Vec3 a = t.a - at, b = t.b - at, c = t.c - at;
   const double la = norm(a), lb = norm(b), lc = norm(c), triple = dot(cross(a, b), c);
@@ -211,8 +211,8 @@ class Orienter {
     return sum / kFourPi;
   }
 
-  // Triangles at the ends of the box and some between: a patch that only pokes into another shows one
-  // of them outside.
+  // Samples triangles at the ends of the box and some between: if a patch only intersects another, one of
+  // them is outside.
   std::vector<Vec3> samples(const Patch &p) const {
     constexpr uint32_t kBetween = 6;
     uint32_t end[6] = {order_[p.begin], order_[p.begin], order_[p.begin],
@@ -239,7 +239,7 @@ class Orienter {
     return out;
   }
 
-  // Near one half the sample lies on the other surface and says nothing.
+  // Near one half the sample is on the other surface and decides nothing.
   bool inside(const std::vector<Vec3> &of_patch, const Patch &other) const {
     bool any = false;
     for (const Vec3 &s : of_patch) {

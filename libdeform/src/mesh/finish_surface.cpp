@@ -1,7 +1,7 @@
-// From loose triangles to a surface with two sides. Order matters: points at one place become one (an STL
-// file has each corner anew), which makes neighbors; triangles without area go, and where one lies flat along
-// a neighbor's side that neighbor is split, so that no slit opens; doubles go; what is left is turned to
-// agree and to face outward. Nothing is closed or smoothed. All thresholds are relative.
+// Turns separate triangles into an oriented surface. Order matters: coincident points are merged (an STL file
+// repeats every corner), which makes neighbors; triangles without area are removed, and if one is flat along
+// a side of a neighbor, that neighbor is split, so that no slit opens; duplicates are removed; the rest is
+// oriented consistently and outward. Nothing is closed or smoothed. All thresholds are relative.
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -17,7 +17,7 @@
 namespace dfm {
 namespace {
 
-constexpr int kSplitRounds = 16;  // a flat triangle beside a flat one waits for the next round
+constexpr int kSplitRounds = 16;  // a flat triangle next to a flat one waits for the next round
 
 struct Repairs { uint32_t split = 0, flat = 0, doubles = 0, walls = 0, twisted = 0; };
 using Corners3 = std::array<uint32_t, 3>;
@@ -57,8 +57,8 @@ uint64_t place_hash(const double *p) {
   return h;
 }
 
-// Every used point becomes the first used one at exactly its place. Open addressing in file order, so the
-// outcome has one answer.
+// Every used point is replaced by the first used one at exactly the same place. Open addressing in file
+// order, so the result is unique.
 uint32_t merge_points(RawMesh &raw) {
   const uint32_t n = raw.npoint();
   Array<uint32_t> into(n, kNoGroup, HookAllocator<uint32_t>(*raw.memory));
@@ -116,8 +116,8 @@ uint32_t take_boundary(RawMesh &raw) {
 
 bool has_double_corner(const uint32_t *c) { return c[0] == c[1] || c[1] == c[2] || c[2] == c[0]; }
 
-// An altitude below a few roundings of the coordinates says nothing. Relative to the longest edge, so that no
-// product leaves the range.
+// An altitude below a few roundings of the coordinates is meaningless. Relative to the longest edge, so that
+// no product overflows.
 bool is_flat(const RawMesh &raw, const uint32_t *c) {
   const Vec3 a = load3(&raw.points[3 * size_t(c[0])]);
   const Vec3 b = load3(&raw.points[3 * size_t(c[1])]);
@@ -191,9 +191,9 @@ uint32_t split_beside_flat(RawMesh &raw) {
 
 // ---- doubles ----------------------------------------------------------------------------------------------
 
-// Triangles that lie twice in the surface are either listed twice, or a wall where two pieces touch, which is
-// inside and must go. They differ at their rim: across it a triangle listed twice has one neighbor, a wall
-// two. A sheet that is doubled everywhere keeps one side.
+// Duplicate triangles are either listed twice, or a wall between two touching pieces, which is inside and
+// must be removed. They differ at their rim: across it a triangle listed twice has one neighbor, a wall two.
+// A sheet that is doubled everywhere keeps one side.
 class Walls {
  public:
   Walls(const RawMesh &raw, const Array<uint8_t> &drop, const Array<uint8_t> &twice) : parent_(count(raw)) {
@@ -247,7 +247,7 @@ void drop_doubles(RawMesh &raw, Repairs &done) {
       drop[t] = 1;
       ++done.walls;
     }
-  done.doubles -= done.walls;  // of a wall both go
+  done.doubles -= done.walls;  // both triangles of a wall are removed
   keep_triangles(raw, [&](uint32_t t) { return !drop[t]; });
 }
 

@@ -25,16 +25,15 @@ inline void check_cells(uint32_t cells) {
 void check_tube(double inner, double outer, double length);
 
 inline uint32_t rounded(double x) { return uint32_t(std::max(1.0, std::floor(x + 0.5))); }
-// How far two positive numbers are apart, as a ratio of at least 1.
+// The ratio of two positive numbers, at least 1.
 inline double apart(double a, double b) { return std::max(a, b) / std::min(a, b); }
-// What a choice of counts costs, 1 at best: cells longer than wide (a little is cheap; beyond 2:1 they
-// spoil the mesh, and more cells than asked for are made instead) against a number of cells far from the
-// one asked for.
+// The cost of a choice of counts, 1 at best: weighs elongated cells (cheap up to 2:1; beyond that they spoil
+// the mesh, and more cells are made instead) against a number of cells far from the requested one.
 inline double choice_score(double elongation, double count, double asked) {
   const double excess = std::max(1.0, elongation / 2);
   return std::sqrt(elongation) * excess * excess * excess * apart(count, asked);
 }
-// More cells than asked for are made within reason only.
+// The number of cells may exceed the requested one only up to a limit.
 inline void check_choice(const char *shape, double count, uint32_t asked) {
   if (count > 100.0 * std::max(asked, 100u))
     fail(DFM_E_ARG,

@@ -43,7 +43,7 @@ struct TetMesh {
   // [ntet] of a filled surface: how much of the cell is material, (0,1]; else empty
   Array<double> share;
   std::vector<MeshGroup> groups;  // by dimension, then tag
-  // What reading had to repair or noticed.
+  // Repairs and observations of the reader.
   uint32_t turned = 0, dropped_points = 0, dropped_cells = 0;
   uint32_t overlapping = 0;           // faces whose two cells lie on the same side: the mesh is tangled there
   std::vector<std::string> warnings;  // one sentence each
@@ -57,7 +57,7 @@ inline constexpr uint32_t kMaxTets = 1u << 30;  // face numbers are 4*cell+face 
 // By file name ending; throws Error (IO, FORMAT, UNSUPPORTED) with one sentence. Memory stays within a small
 // multiple of the file's size.
 TetMesh read_tet_mesh(const Memory &memory, const std::string &path);
-// The same from bytes that already lie in memory; `path` tells the format and stands in sentences.
+// The same from bytes in memory; `path` gives the format and the name for errors.
 TetMesh parse_tet_mesh(const Memory &memory, const std::string &path, const char *bytes, size_t size);
 
 // ---- generators (SI units, near-isotropic cells, about `cells` of them) -----------------------------------
@@ -105,7 +105,8 @@ struct MeshStatistics {
 MeshStatistics mesh_statistics(const TetMesh &mesh);
 
 // ---- writing ----------------------------------------------------------------------------------------------
-// All write to a temporary name beside the target and rename it: never half a file. Throw Error(DFM_E_IO).
+// All write to a temporary file next to the target and rename it, so no partial file remains. Throw
+// Error(DFM_E_IO).
 void write_msh41(const TetMesh &mesh, const std::string &path);  // binary
 void write_msh22(const TetMesh &mesh, const std::string &path);  // binary
 void write_vtk(const TetMesh &mesh, const std::string &path);    // legacy 3.0, binary

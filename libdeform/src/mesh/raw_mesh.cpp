@@ -9,12 +9,13 @@
 namespace dfm {
 namespace {
 
-constexpr uint32_t kMaxGroups = 1u << 16;  // a file cannot make us keep more names than this
+constexpr uint32_t kMaxGroups = 1u << 16;  // limit on the number of names of a file
 // Corners of a polygon up to which its ears are looked for, which takes the cube of them at worst.
 constexpr size_t kMostEars = 512;
 constexpr double kRounding = 1e-12;  // of areas, of the polygon's
 
-// Is a triangle of the fan about the first corner turned over? Without memory, for every polygon of a file.
+// Whether a triangle of the fan about the first corner is inverted. Needs no memory; called for every polygon
+// of a file.
 bool fan_folds(const Array<double> &points, const uint32_t *corners, size_t n) {
   const auto at = [&](size_t k) { return load3(&points[3 * size_t{corners[k]}]); };
   const auto twice = [&](size_t k) { return cross(at(k - 1) - at(0), at(k) - at(0)); };
@@ -36,8 +37,8 @@ class Outline {
     for (size_t k = 2; k < n; ++k) normal_ += cross(at_[k - 1] - at_[0], at_[k] - at_[0]);
     least_ = kRounding * norm2(normal_);
   }
-  // emit(a, b, c) for corners of the triangles. What crosses itself has no ears at some time: the rest is cut
-  // into a fan.
+  // emit(a, b, c) for corners of the triangles. A self-intersecting polygon may run out of ears: the
+  // remainder is cut into a fan.
   template <class Emit>
   void cut(Emit &&emit) {
     left_.resize(at_.size());
@@ -59,7 +60,7 @@ class Outline {
   double area(uint32_t a, uint32_t b, uint32_t c) const {
     return dot(normal_, cross(at_[b] - at_[a], at_[c] - at_[a]));
   }
-  // A triangle that looks the polygon's way, with no other corner in it.
+  // A triangle with the orientation of the polygon that contains no other corner.
   bool ear(uint32_t a, uint32_t b, uint32_t c) const {
     if (!(area(a, b, c) > least_)) return false;
     return std::none_of(left_.begin(), left_.end(), [&](uint32_t p) {

@@ -1,5 +1,4 @@
-// What a reader hands over: points, tetrahedra and triangles in the file's order, not yet looked
-// at as geometry.
+// The result of a reader: points, tetrahedra and triangles in the file's order, not yet checked as geometry.
 #pragma once
 #include <map>
 #include <optional>
@@ -80,7 +79,7 @@ struct AnyMesh {
   std::optional<TriMesh> surface;
 };
 AnyMesh read_any_mesh(const Memory &memory, const std::string &path);
-// Whether a body takes its cells from the file. Throws DFM_E_FORMAT where there is nothing to make a body of.
+// Whether the file has cells for a body. Throws DFM_E_FORMAT if it has neither cells nor a surface.
 bool has_cells(const std::string &path, const RawMesh &raw);
 
 // Repairs what can be repaired, counts it, and refuses what has no volume.

@@ -1,5 +1,5 @@
-// Which reader a file needs: by what it begins with where that is beyond doubt, else by its name's ending.
-// What is not read is refused with the way to convert it.
+// Selects the reader of a file: by its first bytes if these are unambiguous, else by the ending of its name.
+// Unsupported formats are refused with advice on conversion.
 #include <algorithm>
 #include <cctype>
 
@@ -90,8 +90,7 @@ std::string readable() {
 
 bool starts(std::string_view text, std::string_view with) { return text.substr(0, with.size()) == with; }
 
-// What the first bytes say beyond doubt; null where they say nothing. OBJ, ASCII STL and TetGen have no
-// mark of their own.
+// The format by unambiguous first bytes; null if there is none. OBJ, ASCII STL and TetGen have no signature.
 const Format *format_by_content(std::string_view bytes) {
   if (starts(bytes, "\x1f\x8b")) return format_called("gzip");
   if (starts(bytes, "glTF")) return format_called("glTF");
@@ -166,7 +165,8 @@ Mesh finish_with_warnings(Mesh (*finish)(const std::string &, RawMesh &&), const
 
 RawMesh parse_raw(const Memory &memory, const std::string &path, const char *bytes, size_t size) {
   RawMesh raw(memory);
-  const size_t mark = starts({bytes, size}, "\xef\xbb\xbf") ? 3 : 0;  // some editors put this before text
+  // byte order mark, written by some editors
+  const size_t mark = starts({bytes, size}, "\xef\xbb\xbf") ? 3 : 0;
   Cursor in(path, bytes + mark, size - mark);
   choose(path, in.rest(), raw).read(in, raw);
   return raw;
@@ -174,7 +174,7 @@ RawMesh parse_raw(const Memory &memory, const std::string &path, const char *byt
 
 RawMesh read_raw(const Memory &memory, const std::string &path) {
   const Format *const named = format_by_ending(ending(path));
-  if (named && !named->read)  // before a large file is read for nothing
+  if (named && !named->read)  // checked before a large file is read
     fail(DFM_E_UNSUPPORTED, "%s: the library itself reads no %s files; %s", path.c_str(), named->name,
          named->advice);
   const Array<char> bytes = read_whole_file(memory, path, kMaxMeshBytes, "a mesh file");

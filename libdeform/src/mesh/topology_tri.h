@@ -1,4 +1,4 @@
-// Which triangles meet at which edge. Half-edge 3 t + k runs from corner k of triangle t to its next corner.
+// The triangles at each edge. Half-edge 3 t + k runs from corner k of triangle t to its next corner.
 #pragma once
 #include "core/memory.h"
 

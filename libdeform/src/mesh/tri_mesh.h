@@ -1,4 +1,4 @@
-// Triangle surfaces before they become a body's skin or are filled with cells: reading, repair,
+// Triangle surfaces before they become the surface of a body or are filled with cells: reading, repair,
 // measures, writing.
 #pragma once
 #include "mesh/mesh.h"
@@ -19,7 +19,7 @@ struct TriMesh {
   // [npoint] 0-based position of the point in its file (the first of those merged)
   Array<uint32_t> file_point;
   std::vector<MeshGroup> groups;
-  // What reading had to repair or noticed.
+  // Repairs and observations of the reader.
   uint32_t merged_points = 0, dropped_points = 0, dropped_tris = 0, turned = 0;
   std::vector<std::string> warnings;  // one sentence each
   uint32_t npoint() const { return static_cast<uint32_t>(points.size() / 3); }

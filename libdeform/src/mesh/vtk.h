@@ -1,5 +1,5 @@
-// What legacy VTK and VTU share: number types, cell types, and groups of cells, which both keep as an integer
-// array over the cells and, from our own writer, names in the field data.
+// Shared by legacy VTK and VTU: number types, cell types, and groups of cells, which both store as an integer
+// array over the cells and, from our writer, names in the field data.
 #pragma once
 #include <string>
 #include <vector>
@@ -30,8 +30,8 @@ inline bool vtk_names_share(std::string_view array, VtkNumber type) {
   return array == kVtkShare && (type == VtkNumber::f32 || type == VtkNumber::f64);
 }
 
-// Takes cells one by one: keeps tetrahedra and straight faces (cut into triangles), passes over points and
-// lines, refuses other volume cells: a body must not lose parts in silence.
+// Takes cells one by one: keeps tetrahedra and straight faces (cut into triangles), skips points and lines,
+// refuses other volume cells, because a body must not lose parts silently.
 class VtkCells {
  public:
   explicit VtkCells(RawMesh &out) : out_(out) {}

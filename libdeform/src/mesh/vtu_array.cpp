@@ -7,9 +7,9 @@
 namespace dfm {
 namespace {
 
-// Unpacked bytes that one array may have, over the bytes of its whole file: an array of types packs a
-// thousandfold, but coordinates and cells of a sound file are not all alike. And what deflate can make of
-// one byte at most.
+// Limit on the unpacked bytes of an array relative to the bytes of the file: an array of types compresses a
+// thousandfold, but coordinates and cells of a valid file vary. Second: the largest expansion of one byte by
+// deflate.
 constexpr uint64_t kMaxUnpacking = 64, kFreeUnpacking = 4096, kMaxDeflation = 1032;
 
 // Bytes out of raw data or base64. White space is passed over; a padded group may stand anywhere, as writers
@@ -84,7 +84,7 @@ class Unpacker {
   Unpacker(const Cursor &in, const VtuPacking &packing, ByteSource source)
       : in_(in), packing_(packing), source_(source) {}
 
-  // Raw data are left where they lie; all else is unpacked into `out`.
+  // Raw data are used in place; other data are unpacked into `out`.
   std::string_view run(Array<char> &out, bool in_place) {
     const uint64_t first = length();
     if (packing_.compressed) return inflate_blocks(first, out);

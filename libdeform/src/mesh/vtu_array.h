@@ -1,6 +1,6 @@
-// A DataArray of a VTU file as a cursor over numbers, wherever and however they are kept: text between the
-// tags, base64 between the tags, or at an offset into the appended data (raw or base64); the last three
-// perhaps cut into blocks that zlib has compressed.
+// A DataArray of a VTU file as a cursor over numbers in any storage: text between the tags, base64 between
+// the tags, or at an offset into the appended data (raw or base64); the last three may be in blocks
+// compressed by zlib.
 #pragma once
 #include <optional>
 #include <string>
@@ -18,7 +18,7 @@ class XmlTag {
   std::string_view attributes;
   std::string_view get(std::string_view key) const;  // empty where it is absent
 };
-// Moves past the next tag; comments and declarations are passed over. Empty at the end of the file.
+// Moves past the next tag; skips comments and declarations. Empty at the end of the file.
 std::optional<XmlTag> next_tag(Cursor &in);
 
 // How the file packs its numbers.

@@ -1,4 +1,4 @@
-// What the parts of narrow/ share.
+// Shared by the files of narrow/.
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -42,7 +42,7 @@ struct Pair {
   Vec3 va(uint32_t s) const { return load3(&a.surface->v[4 * size_t{s}]); }
   Vec3 xb(uint32_t s) const { return load3(&b->surface->x[4 * size_t{s}]); }
   Vec3 vb(uint32_t s) const { return load3(&b->surface->v[4 * size_t{s}]); }
-  // Did edge a touch any edge of b, or this one, at the end of the last sub-step?
+  // Whether edge a touched any edge of b, or this one, at the end of the last sub-step.
   bool bears(uint32_t edge_a) const {
     const auto at = std::lower_bound(crossings.begin(), crossings.end(), edge_a,
                                      [](const Crossing &c, uint32_t edge) { return c.edge_a < edge; });
@@ -54,14 +54,14 @@ struct Pair {
   }
 };
 
-// Strong enough that a clash of two keys is as likely as an error of the memory.
+// Strong enough that a collision of two keys is as unlikely as a memory error.
 inline uint64_t mix(uint64_t hash, uint64_t value) {
   hash = (hash ^ value) * 0xff51afd7ed558ccdull;
   hash ^= hash >> 32;
   hash *= 0xc4ceb9fe1a85ec53ull;
   return hash ^ hash >> 29;
 }
-// a, b: the surfaces of the sides; b null where patches have no names. ordinal: tells apart contacts of one
+// a, b: the surfaces of the sides; b null where patches have no names. ordinal: distinguishes contacts of one
 // feature with one patch, in the order of b's features.
 inline uint64_t contact_key(const ContactPoint &c, const Surface &a, uint64_t id_a, const Surface *b,
                             uint64_t id_b, uint32_t patch, uint32_t ordinal) {
@@ -110,8 +110,8 @@ void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out);
 void surfel_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out);
 void edge_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out);
 void triangle_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out);
-// Is a place inside the face x (in the grid's frame) lower than its corners by more than `dip`? Where and how
-// low. Faces above `most` are not looked at.
+// Finds whether a place inside the face x (in the frame of the grid) is lower than its corners by more than
+// `dip`, and where and how low. Skips faces above `most`.
 bool dips(const VoxelGrid &grid, const Vec3 x[3], double most, double dip, double weight[3],
           double &distance);
 void voxel_triangle(const Pair &pair, Run run, Array<ContactPoint> &out);
@@ -120,7 +120,7 @@ void finish(const Pair &pair, ContactPoint &c, Vec3 q, Vec3 o, Vec3 normal, doub
             Array<ContactPoint> &out);
 // Of these surfels against the obstacle's surface at o.
 double reach_of(const Pair &pair, std::span<const uint32_t> nodes, Vec3 o);
-// A body against a mesh that has no dofs: pair.b is the mesh, and its nodes lie beyond those of all bodies.
+// A body against a mesh without dofs: pair.b is the mesh, and its nodes come after those of all bodies.
 void mesh_obstacle(const Pair &pair, const ObstacleView &view, uint8_t kind, Run run,
                    Array<ContactPoint> &out);
 // The faces beside an edge and their cone of normals: a unit direction that is orthogonal to the edge lies in
@@ -134,7 +134,8 @@ struct EdgeFaces {
   bool leans_out(Vec3 n, double slack) const {
     return dot(n, inward[0]) <= slack && dot(n, inward[1]) <= slack;
   }
-  // Not into the body. At a rim, with one face alone, other bodies may come from the side, along the face.
+  // Not into the body. At a rim, which has one face only, other bodies may come from the side, along the
+  // face.
   bool leaves(Vec3 n, double slack) const { return dot(n, outward()) > -slack; }
 };
 EdgeFaces edge_faces(const Surface &surface, uint32_t edge);

@@ -21,7 +21,7 @@ std::span<const Crossing> of_pair(std::span<const Crossing> all, uint64_t id_a, 
   return {begin, std::upper_bound(begin, all.end(), Crossing{id_a, id_b, kNone, kNone})};
 }
 
-// Surfels of one body that have contacts of their own with one other side: a sorted run of the list.
+// Surfels of one body that have contacts with one other side: a sorted run of the list.
 struct Owners {
   const ContactPoint *begin, *end;
   bool has(uint32_t surfel) const {
@@ -31,9 +31,9 @@ struct Owners {
   }
 };
 
-// An edge or triangle contact takes over the area of the nearest of its corners that carries no contact of
-// its own with the other side; none is given twice; 0 where none is free (doc/concepts/detection.md). lender
-// holds the node that gave.
+// An edge or triangle contact takes the area of the nearest of its corners without a contact with the other
+// side; no area is given twice; 0 if none is free (doc/concepts/detection.md). lender: the node that gave its
+// area.
 class Areas {
  public:
   Areas(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
@@ -189,7 +189,7 @@ double NarrowBlocks::speed(std::span<const BodyView> bodies, size_t i) {
 
 void NarrowBlocks::add(const Array<Candidate> &list, size_t begin, size_t end, double speed) {
   const Candidate &first = list[begin];
-  // contacts of two surfaces are told apart by what is at one feature of body a; others by the whole run
+  // a run of two surfaces may be divided between features of body a; other runs not
   if (!first.obstacle)
     for (size_t at = begin + kBlock; at < end; ++at)
       if (list[at].feature_a != list[at - 1].feature_a) {

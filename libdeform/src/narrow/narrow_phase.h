@@ -1,14 +1,14 @@
 // Contacts of a sub-step from the pairs that broad/ lists: closest points at the start of the sub-step, made
 // where they are nearer than
 //     reach = 2 d_c + 2 h |relative velocity of the features|,
-// so that whatever may touch within the sub-step is a constraint in its solve.
+// so that everything that may touch within the sub-step is a constraint in its solve.
 //
-// One rule keeps ghosts out: a contact is a local minimum of the distance of the two surfaces, seen from
-// outside. A point over a face has the face's normal; over an edge or a corner it counts only if no triangle
-// beside it is nearer, and then once, not once per triangle. Two edges count only where both are convex and
-// face each other. Beside a concave edge the second face's plane is a contact too if it can be reached. Edges
-// that bore each other in the last sub-step count on, convex or not. All decisions use this and the geometry
-// of the sub-step alone: more candidates never change the result.
+// One rule excludes false contacts: a contact is a local minimum of the distance of the two surfaces, seen
+// from outside. A point over a face has the face's normal; over an edge or a corner it counts only if no
+// triangle beside it is nearer, and then once, not once per triangle. Two edges count only where both are
+// convex and face each other. Beside a concave edge the second face's plane is a contact too if it can be
+// reached. Edges that bore each other in the last sub-step count on, convex or not. All decisions use this
+// and the geometry of the sub-step alone: more candidates never change the result.
 #pragma once
 #include <atomic>
 #include <cstdint>
@@ -22,8 +22,8 @@
 
 namespace dfm {
 
-// The list of candidates cut into blocks that workers take, and what each has found. Cuts depend on the list
-// alone, contacts are put together in its order, and no block sees another: the bits are those of one thread.
+// The list of candidates divided into blocks for workers, and their results. The division depends on the list
+// alone, contacts are joined in its order, and blocks are independent: the bits are those of one thread.
 class NarrowBlocks {
  public:
   explicit NarrowBlocks(const Memory &memory);
@@ -46,7 +46,7 @@ class NarrowBlocks {
           const Piece &p = pieces_[k];
           find(std::span(&list[p.begin], p.end - p.begin), p.speed, found_[k]);
         } catch (const std::bad_alloc &) {
-          failed = true;  // an exception must not leave a worker
+          failed = true;  // exceptions must not leave a worker
         }
       }
     });
@@ -73,7 +73,7 @@ class NarrowBlocks {
 //   crossings  ascending: what edges bore in the last sub-step
 //   lent       scratch that the caller keeps
 //   blocks, tasks   the same for work on several threads; null: none
-// Numbers that are not finite make no contact.
+// Values that are not finite make no contact.
 void find_contacts(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
                    const Array<Candidate> &candidates, double h, double offset,
                    std::span<const Crossing> crossings, Array<uint8_t> &lent, Array<ContactPoint> &out,

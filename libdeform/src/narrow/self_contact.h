@@ -1,5 +1,5 @@
 // Contacts of a surface with itself. Same reach, same rule as between two bodies (narrow_phase.h): a contact
-// is a local minimum of the distance, seen from outside. What differs is said in self_contact.cpp.
+// is a local minimum of the distance, seen from outside. The differences are described in self_contact.cpp.
 #pragma once
 #include <functional>
 #include <span>
@@ -11,8 +11,8 @@
 
 namespace dfm {
 
-// Does a surfel belong to a triangle that passes through another one at the start of the sub-step? Asked only
-// where a pair seems to be through.
+// Whether a surfel belongs to a triangle that passes through another one at the start of the sub-step. Called
+// only if a pair seems to have crossed.
 using Tangled = std::function<bool(uint32_t surfel)>;
 
 // Appends the contacts of one body, sorted by (kind, feature a, feature b); keys are unique within the
@@ -26,8 +26,8 @@ void find_self_contacts(const BodyView &body, const SelfRest &rest, std::span<co
                         std::span<const SelfPair> edge_edge, double h, double offset, const Tangled &tangled,
                         Array<uint8_t> &lent, Array<ContactPoint> &out);
 
-// m that two features of one surface rest apart: min(offset, half of their distance in the rest shape). 0
-// where they lie on each other there: no contact.
+// m, rest distance of two features of one surface: min(offset, half of their distance in the rest shape). 0
+// if they coincide there: no contact.
 double self_apart(const Surface &surface, const SelfRest &rest, ContactKind kind, uint32_t a, uint32_t b,
                   double offset);
 
