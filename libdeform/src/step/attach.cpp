@@ -14,8 +14,8 @@ namespace {
 
 bool feels(const Obstacle &o) { return o.rigid && o.rigid->group[o.rigid_body] != DFM_RIGID_STILL; }
 
-// Mean velocity of a rigid body's point at this arm without contact: its way over the sub-step to third order
-// of the spin that the body starts with, as its shapes move (shape_velocity).
+// Mean velocity of a point of a rigid body at this arm without contact: its displacement over the sub-step to
+// third order in the initial spin, as for shapes (shape_velocity).
 Vec3 rigid_velocity(const Obstacle &o, Vec3 arm, double h) {
   const double *const v = &o.rigid->first[6 * size_t{o.rigid_body}];
   const Vec3 turn = load3(o.rigid->state[o.rigid_body].spin);
@@ -34,8 +34,8 @@ void set_nodes(const StepContext &step, const Attachment &a, size_t i, uint32_t 
   }
 }
 
-// The gap is closed within the sub-step. One that a host has made, beyond d_c, closes by d_c at most, or at
-// recovery_speed: it would throw the body.
+// The gap is closed within the sub-step. A gap beyond d_c, made by a host, closes by at most d_c, or at
+// recovery_speed; otherwise it would throw the body.
 Vec3 closing(const World &w, const StepContext &step, Vec3 gap) {
   const double most = w.def.recovery_speed > 0 ? w.def.recovery_speed : w.offset / step.guard.planned;
   const Vec3 rate = (1 / step.h) * gap;
@@ -43,10 +43,10 @@ Vec3 closing(const World &w, const StepContext &step, Vec3 gap) {
   return norm(gap) > w.offset && speed > most ? (most / speed) * rate : rate;
 }
 
-// A body that steps itself may have fewer motions than bonds. Some of its motions then move the held points
-// by almost nothing, and rigid bonds need impulses of a thousand times the weight to correct the last
-// micrometer by them: the body is thrown (doc/decisions/0390). Each rigid bond of such a body therefore gets
-// this share of its surfel's own response as compliance; at rest that is a gap of 1e-9 m and less.
+// A body that steps itself may have fewer motions than bonds. Some of its motions then hardly move the held
+// points, and rigid bonds would need impulses of a thousand times the weight to correct the last micrometer,
+// which throws the body (doc/decisions/0390). Each rigid bond of such a body therefore gets this share of its
+// surfel's own response as compliance; at rest that is a gap of at most 1e-9 m.
 constexpr double kGive = 1e-5;
 
 bool few_motions(const Body &b) { return !b.dynamics->abilities().placed; }
@@ -55,7 +55,7 @@ void add_bonds(World &w, StepContext &step, const Attachment &a) {
   const uint32_t slot_a = slot_of(w, a.body);
   const BodyView &body = step.body_views[slot_a];
   const size_t n = a.surfels.size();
-  // the whole's, shared by its points
+  // that of the attachment, divided among its points
   const double share = 1 / double(n), spring = step.h * (step.h * a.stiffness + a.damping) * share;
   for (size_t i = 0; i < n; ++i) {
     Bond b{};
@@ -98,7 +98,7 @@ void add_release(World &w, const Attachment &a, double t) {
   add_event(w, DFM_EVENT_RELEASE, a.body, a.to, a.number, t);
 }
 
-// They may touch from now on, where they stand in each other.
+// They may touch from now on, and may overlap at present.
 void part(World &w, const Attachment &a) {
   w.overlaps.place(a.body);
   w.changed = true;
@@ -145,7 +145,7 @@ void keep_bonds(World &w, StepContext &step) {
     a.h = step.h;
     const Vec3 p = a.sum();
     a.total += p;
-    // an equilibrium is not reached by what happens on the way
+    // the way to an equilibrium does not count
     if (!(a.release > 0 && norm(p) > a.release * step.h) || w.prescribed.stands()) continue;
     a.released = true;
     add_release(w, a, w.time + step.h);

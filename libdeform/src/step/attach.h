@@ -12,21 +12,21 @@ struct Obstacle;
 struct StepContext;
 struct World;
 
-// The bonds of this sub-step, and the impulses that they start from: those of the last sub-step, or where the
-// same sub-step is solved again (`again`), those of its last solve.
+// Makes the bonds of this sub-step, with their initial impulses: those of the last sub-step, or of the last
+// solve if the same sub-step is solved again (`again`).
 void make_bonds(World &w, StepContext &step, bool again);
-// Of the sub-step that has been taken. Those whose force is above what releases them hold no more.
+// Keeps the impulses of the completed sub-step. Releases attachments whose force is above their limit.
 void keep_bonds(World &w, StepContext &step);
-// Released ones go, between two steps.
+// Removes released attachments, between two steps.
 void drop_released(World &w);
-// All of a body or an obstacle that goes, with an event each.
+// Removes all attachments of a removed body or obstacle, with an event each.
 void drop_attachments(World &w, uint64_t id);
 
-// Bodies that sleep while what they are attached to moves.
+// Wakes bodies that sleep while the thing to which they are attached moves.
 void wake_attached(World &w, StepContext &step);
-// What places on it are told in: a rigid body's center of mass and axes; else the obstacle's own frame.
+// The frame of places on it: center of mass and axes of a rigid body; else the frame of the obstacle.
 Pose attached_frame(const Obstacle &o);
-// Where point i is held now, m.
+// The present target of point i, m.
 Vec3 attached_place(const World &w, const Attachment &a, size_t i);
 
 }  // namespace dfm

@@ -22,8 +22,8 @@
 namespace dfm {
 namespace {
 
-// Share of the bristles renewed in a sub-step, up to which a contact counts as at rest: areas are then off
-// by less than 1 % after 1e7 sub-steps.
+// Share of the bristles renewed in a sub-step up to which a contact counts as at rest: areas then drift by
+// less than 1 % in 1e7 sub-steps.
 constexpr double kRests = 1e-9;
 
 // A turn in the plane of n: cosine and sine.
@@ -79,8 +79,8 @@ class Neighborhood {
   }
 };
 
-// t1, t2: the contact's tangents. Corners count once per triangle; the first twelve triangles of a fan tell
-// its turn.
+// t1, t2: tangents of the contact. Corners count once per triangle; the first twelve triangles of a fan are
+// used.
 Turn turn_of(const Body &b, uint8_t type, uint32_t feature, Vec3 t1, Vec3 t2) {
   constexpr uint32_t kMost = 12;
   const Surface &s = b.surface;
@@ -118,7 +118,7 @@ Turn turn_of(const World &w, const StepContext &step, const Obstacle &o, Vec3 n)
   const double a = step.guard.motion *
                    dot(n, spin_between(o.pose.rotation, o.end_pose(w.time, step.h, step.left).rotation, 1));
   const double half = 0.5 * a * (1 + a * a / 12);  // tan(a / 2) up to a^5
-  return unit_turn(1 - half * half, 2 * half);     // of length one: what is halved after it counts on that
+  return unit_turn(1 - half * half, 2 * half);     // of length one, as the following halving requires
 }
 
 }  // namespace
@@ -153,8 +153,8 @@ void share_areas(World &w, StepContext &step) {
   step.renewal.fill(step.stands.data(), step.aim.data(), step.state.area.data());
 }
 
-// Slid on: beyond what the bristles have taken up. The slip that a law was asked at is known to a hundredth
-// (friction/local_solve.cpp); five count as none.
+// Slip beyond the change of the bristles. The slip of the last evaluation is known to one percent
+// (friction/local_solve.cpp); up to five percent counts as none.
 void follow_load(World &w, StepContext &step) {
   ContactStore &to = step.next_store;
   const ContactState &s = step.state;
@@ -181,7 +181,7 @@ void follow_load(World &w, StepContext &step) {
   }
   step.renewal.measure(step.h, step.rows.impulse.data(), step.ways.data(), s.dwell.data(),
                        step.renewed.data());
-  // At rest nothing is renewed but by rounding, and where areas should go to need not be known.
+  // At rest renewal is rounding only, and the target areas are not needed.
   if (std::all_of(step.renewed.begin(), step.renewed.end(), [](double r) { return r <= kRests; })) {
     std::copy_n(s.area.begin(), n, to.due.begin());
     return;

@@ -1,4 +1,4 @@
-// What a law's state goes through between two sub-steps beside the contact solve;
+// Changes of a law's state between two sub-steps other than by the contact solve;
 // doc/concepts/friction_memory.md.
 #pragma once
 
@@ -7,13 +7,13 @@ namespace dfm {
 struct StepContext;
 struct World;
 
-// state.area, where some law has bristles per area: what the contact stood for so far, or what it should
-// (aim) where it stands nowhere yet. After the warm start.
+// Sets state.area, if a law has bristles per area: the present area of the contact, or its target (aim) if it
+// has none yet. After the warm start.
 void share_areas(World &w, StepContext &step);
-// Where a contact's area has changed: its bristles keep their force where it has grown, their deflection
-// where it has shrunk; what they store never rises.
+// After a change of a contact's area: bristles keep their force if it has grown, their deflection if it has
+// shrunk, so that their energy never increases.
 void fit_bristles(World &w, StepContext &step);
-// After the commit: as bristles slide, contacts' areas go where the load asks for them (next_store.due).
+// After the commit: as bristles slide, areas move to where the load is (next_store.due).
 void follow_load(World &w, StepContext &step);
 // After the commit: frames of laws with tangent state (next_store.tangent) turn with the mean spin of the two
 // surfaces about the normal.

@@ -18,15 +18,14 @@ namespace {
 
 // Shares of the budget at which the step begins to go without polish, sweeps and guard pieces.
 constexpr double kNoPolishAt = 0.25, kFewSweepsAt = 0.5, kNoPiecesAt = 0.75;
-// Where none is given, a step may cost this many times what its planned sub-steps cost with
-// nothing in contact.
+// Default limit: this factor times the cost of the planned sub-steps without contact.
 constexpr uint64_t kAutomaticFactor = 1000;
 
 struct StepStopped {
   enum Why { work, time, asked, dear, fine } why;
 };
 
-// Worlds that were asked to stop. A signal may arrive while any lock is held, so there is none; 0: free.
+// Worlds that were asked to stop. A signal may arrive while a lock is held, so no lock is used; 0: free.
 constexpr size_t kMostRequests = 64;
 std::array<std::atomic<uint64_t>, kMostRequests> requests{};
 std::atomic<uint32_t> waiting{0};
@@ -60,8 +59,8 @@ double used_share(const StepContext &step, uint64_t more) {
   return share;
 }
 
-// One list of what a step changes serves writing down and putting back. Room: what putting back may need is
-// reserved before.
+// One list of what a step changes is used for saving and restoring. Room: memory for restoring is reserved in
+// advance.
 struct Keep {
   std::vector<unsigned char> &out;
   template <class T>
@@ -155,11 +154,11 @@ void changing(Stream &s, World &w) {
     s.value(a.released);
   }
   s.array(w.work);
-  s.length(w.events);  // a step only adds to it, and it may wait for the host for many steps
+  s.length(w.events);  // steps only append to it, and the host may read it after many steps
 }
 
-// The two stores and the two reports change places as sub-steps end, so what is put back may have to fit into
-// the other one.
+// The two stores and the two reports are swapped at the end of sub-steps, so the saved data may have to fit
+// into the other one.
 void reserve_others(World &w, StepContext &step) {
   each_column([](const ContactColumn &, const auto &from, auto &to) { to.reserve(from.size()); }, w.store,
               step.next_store);
@@ -167,7 +166,7 @@ void reserve_others(World &w, StepContext &step) {
                      step.last_report);
 }
 
-// What the step changes at its start, before it is known whether more has to be kept.
+// Data that the step changes at its start, before it is known whether more must be saved.
 template <class Stream>
 void changed_at_once(Stream &s, World &w) {
   s.array(w.step_impulses.pairs);
@@ -191,7 +190,7 @@ void return_to_start(World &w, StepContext &step) {
   if (step.budget.kept) {
     put_back_changing(from, w);
     PutBack first{step.budget.start.data()};
-    changed_at_once(first, w);  // of tools, the rest was kept after the step had begun with them
+    changed_at_once(first, w);  // of tools; the rest was saved after the step had changed them
   }
   const uint64_t cheapened = w.stats.cheapened;
   w.stats = step.budget.stats;

@@ -22,14 +22,14 @@ void book_change_work(const World &w, Body &b, double h) {
   ChangeBook &book = b.changes;
   if (!book.open) return;
   const Phyxels &p = b.p;
-  const double *const before = p.x_end.data();  // the two have changed places
+  const double *const before = p.x_end.data();  // the two have been swapped
   const bool driven = !b.motions.empty();
   double sum = 0;
   for (uint32_t i = 0; i < p.n; ++i)
     for (size_t k = 0, at = size_t{kStride} * i; k < 3; ++k, ++at) {
       const double way = p.x[at] - before[at];
       if (p.moves(at)) sum += (p.load[at] + p.mass[i] * w.gravity.now[int(k)]) * way;
-      else if (driven) sum -= (p.f[at] - p.load[at]) * way;  // the holder against the inner forces
+      else if (driven) sum -= (p.f[at] - p.load[at]) * way;  // work of the hold against the inner forces
     }
   if (w.plan.touches())
     for (uint32_t s = 0; s < b.surface.nsurfel; ++s) {

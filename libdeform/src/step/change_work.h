@@ -1,5 +1,5 @@
-// Work that is done from outside on a body whose model has changed: what its energy does beyond that is its
-// own loss, which pays for what changes have put in (world/change_energy.h).
+// External work on a body whose model has changed: the decrease of its energy beyond that work is its own
+// loss, which compensates the energy added by changes (world/change_energy.h).
 #pragma once
 #include "dynamics/dynamics.h"
 
@@ -8,7 +8,7 @@ namespace dfm {
 struct Body;
 struct World;
 
-double moving_energy(const Body &b);  // J, kinetic, of the components that nothing holds
+double moving_energy(const Body &b);  // J, kinetic energy of the free components
 // Before the commit: forces at the end, where the holders of driven points have to be asked for their work.
 void ready_change_work(Body &b, const SubStep &now);
 // After it: forces times the way that their points went.

@@ -1,4 +1,4 @@
-// Where bodies end: contact impulses to points, then positions and velocities at the end of the sub-step.
+// The end of the sub-step: contact impulses on points, then positions and velocities.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -60,7 +60,7 @@ bool stage_commit(World &w, StepContext &step, uint32_t *trouble) {
         for (const uint32_t i : std::span(step.active).subspan(begin, end - begin)) {
           Body &b = *w.bodies[i];
           ready_change_work(b, now);
-          b.dynamics->commit(now, step.guard.motion);  // the guard may leave out some of the way
+          b.dynamics->commit(now, step.guard.motion);  // the guard may shorten the displacement
           if (reads_points(w, b)) b.dynamics->see_points();
           ++b.x_version;
           book_change_work(w, b, now.h);

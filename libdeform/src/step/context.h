@@ -1,5 +1,5 @@
-// Buffers of a step, by the stage that writes them. Nothing here is state, and no snapshot has any of it.
-// What lasts is the World's (state/world.h).
+// Buffers of a step, by the stage that writes them. None of them is state, and none is in a snapshot. Lasting
+// state is in World (state/world.h).
 #pragma once
 #include <memory>
 #include <vector>
@@ -32,7 +32,7 @@ struct StageTime {
 };
 
 struct StepContext {
-  // s: of the sub-step; from its start to the end of the step
+  // s: length of the sub-step; from its start to the end of the step
   double h = 0, left = 0;
   Budget budget;
   Counting counting;
@@ -40,7 +40,7 @@ struct StepContext {
 
   // prepare(): the world's entities as the stages see them
   SceneFacts facts;  // what the plan was made from
-  // how often prepare() has made all of this anew, and the plan
+  // how often prepare() has rebuilt these, and the plan
   struct { uint64_t tables = 0, plans = 0; } made;
   std::vector<BodyView> body_views;
   std::vector<ObstacleView> obstacle_views;
@@ -63,43 +63,43 @@ struct StepContext {
   // contact <-> friction
   ContactRows rows;
   Array<Bond> bonds;
-  Array<double> bond_impulse;  // [bonds,3] N s, that the next solve of this sub-step starts from
+  Array<double> bond_impulse;  // [bonds,3] N s, initial values of the next solve of this sub-step
   ContactState state;
   SolveIslands solve_islands;
   struct { Array<double> normal, tangent; } tolerance;  // [contacts] of all islands
   Residual residual;                                    // the worst of all islands
-  uint32_t passes = 0, sweeps = 0;                      // of the island that took most
+  uint32_t passes = 0, sweeps = 0;                      // of the island with the most
   Array<double> disturbance, best_impulse, trial_response;
-  Array<uint8_t> revised;  // [blocks of rows] the body answers otherwise by its impulses
+  Array<uint8_t> revised;  // [blocks of rows] the response of the body has changed with its impulses
   Array<double> tangents;
-  // [contacts] place in the store that the contact goes on from, or kNone
+  // [contacts] index of the contact in the store of the last sub-step, or kNone
   Array<uint32_t> match;
   Array<uint32_t> block_surfels;  // responses of bodies whose points answer each other
-  bool bodies_revise = false;     // some body looks again at what the solve has made of it
-  bool bodies_part = false;       // some body moves otherwise where contacts are
+  bool bodies_revise = false;     // some body revises its response after the solve
+  bool bodies_part = false;       // the motion of some body depends on whether there are contacts
   struct Chosen {
     uint32_t law;
     double scale;  // of friction
     Vec3 belt;     // m/s
   };
-  Array<Chosen> chosen;             // [contacts] by the host (PreSolve); empty where it is not asked
+  Array<Chosen> chosen;             // [contacts] by the host (PreSolve); empty without a callback
   Array<uint8_t> near;              // [bodies] had contacts in the last sub-step
   Array<uint8_t> touching;          // [bodies] touch something, between steps
-  const Body *unsettled = nullptr;  // that has found no state with its contacts
+  const Body *unsettled = nullptr;  // a body without a solution for its contacts
   ToolTouch tools;                  // with each other
-  // a host has answered, and the solve goes on from its last impulses
+  // a rigid host has revised its response, and the solve continues from its last impulses
   bool rigid_again = false;
   AreaShares areas;
   AreaExchange exchange;
   // law of contacts whose areas follow the load, else kNone
   Array<uint32_t> sharing;
-  bool shares = false;  // does any law count by area?
+  bool shares = false;  // whether any law uses area
   Array<double> aim;    // [contacts] m2, what they should stand for, if so
   Renewal renewal;
-  Array<uint8_t> stands;  // [contacts] carries, and has an area that it keeps
+  Array<uint8_t> stands;  // [contacts] is loaded, and keeps its area
   Array<Renewal::Way> ways;
   Array<double> renewed;
-  std::unique_ptr<MethodBuffers> method;  // of stages that the contact method has for itself
+  std::unique_ptr<MethodBuffers> method;  // of stages of the contact method only
 
   // distribute, guard
   std::vector<ImpulseSink> sinks;
@@ -112,7 +112,7 @@ struct StepContext {
   Report last_report;
   // sleep. With nobody asleep `active` holds all bodies.
   Islands islands;
-  // slots that the stages work on, ascending; slots woken in this sub-step
+  // slots of active bodies, ascending; slots woken in this sub-step
   Array<uint32_t> active, woken;
   Array<uint8_t> stirred;  // [island]
 

@@ -1,4 +1,4 @@
-// The sentence for a contact solve that cannot be used: which bodies, which law, and what the law was asked.
+// The message for a failed contact solve: the bodies, the law, and the inputs of the law.
 #include <cmath>
 #include <string>
 
@@ -10,8 +10,8 @@
 namespace dfm {
 namespace {
 
-// The body to name where no contact is to blame: where a load or a parameter is out of bounds, that body is
-// off before contact is.
+// The body to name if no contact is the cause: with an invalid load or parameter, the body fails before its
+// contacts do.
 const Body &fastest(const World &w) {
   const Body *fast = w.bodies.front().get();
   double most = -1;
@@ -24,7 +24,7 @@ const Body &fastest(const World &w) {
   return *fast;
 }
 
-// The first contact that the solve has left with something not finite, or kNone.
+// The first contact with a value that is not finite after the solve, or kNone.
 uint32_t spoilt(const StepContext &step) {
   for (uint32_t i = 0; i < step.rows.n; ++i)
     for (size_t k = 0; k < 3; ++k)
@@ -41,7 +41,7 @@ std::string sides(const World &w, const StepContext &step, uint32_t i) {
   return format("bodies '%s' and '%s'", w.bodies[c.slot_a]->name.c_str(), w.bodies[c.slot_b]->name.c_str());
 }
 
-// What the law was asked at a contact, and whether all of it is finite.
+// The inputs of the law at a contact, and whether all are finite.
 struct Asked {
   std::string text;
   bool sound;

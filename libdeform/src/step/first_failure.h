@@ -6,7 +6,8 @@
 
 namespace dfm {
 
-// The first body, in id order, for which something failed: the same for every cut of the bodies over threads.
+// The first body, in id order, for which something failed, independent of the division of bodies among
+// threads.
 struct FirstFailure {
   std::atomic<uint32_t> body{kNone};
   void note(uint32_t i) {

@@ -1,5 +1,4 @@
-// How bodies would move without contact, and where that puts their surfaces: stages model, predict,
-// gather, broad.
+// The motion of bodies and their surfaces without contact: stages model, predict, gather, broad.
 #include <algorithm>
 #include <cmath>
 
@@ -20,7 +19,7 @@ SubStep sub_step_of(const World &w, const StepContext &step) {
   return {w.time, step.h, w.gravity.now, kLight, before};
 }
 
-// By the contacts that are kept, so that a restored world does the same.
+// Decided by the stored contacts, so that a restored world does the same.
 void begin_bodies(World &w, StepContext &step) {
   if (!step.bodies_part) return;
   step.near.assign(w.bodies.size(), 0);
@@ -34,7 +33,7 @@ void begin_bodies(World &w, StepContext &step) {
 }
 
 namespace {
-// From so many cells on models cut their work themselves, among all threads.
+// From this number of cells on models divide their work among all threads themselves.
 constexpr size_t kLargeBody = 10000;
 bool fewer_than_threads_and_large(const World &w, Active active) {
   return active.size() < w.context->tasks.threads() &&
@@ -64,7 +63,8 @@ bool stage_model(World &w, Active active, const SubStep &now, uint32_t *trouble)
 }
 
 namespace {
-// A model that steps itself and refused to: asked again where it is heard, so that its reason is the error.
+// A model that steps itself has refused: called again while its log is captured, so that its reason becomes
+// the error.
 bool tells_why(const World &w, const Body &b, const SubStep &now) {
   if (!b.model.stepper) return false;
   const Overheard why;
@@ -109,8 +109,7 @@ bool stage_predict(World &w, Active active, const SubStep &now, Array<double> &k
   return false;
 }
 
-// Surfels that hang on several phyxels: rows of N are independent of each other, so they are cut
-// among the threads.
+// Surfels coupled to several phyxels: rows of N are independent, so they are divided among the threads.
 void stage_gather(World &w, Active active) {
   for (const uint32_t i : active) {
     const auto &b = w.bodies[i];
@@ -127,7 +126,7 @@ void stage_broad(std::span<const BodyView> bodies, std::span<const ObstacleView>
   try {
     out.update(bodies, obstacles, filter, h, offset, &tasks);
   } catch (...) {
-    out.clear();  // out of memory half way through its lists: they are made anew next time
+    out.clear();  // out of memory while making its lists: they are rebuilt next time
     throw;
   }
 }

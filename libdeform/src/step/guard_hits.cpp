@@ -17,8 +17,8 @@ namespace {
 
 constexpr uint32_t kMostHits = 128;
 
-// A hit as a contact: features, places on them and normal as they are at the hit time. Returns the distance
-// of the two places along that normal at the start, which is what a straight motion is added to.
+// Makes a contact from a hit: features, places and normal at the hit time. Returns the distance of the two
+// places along that normal at the start, to which the straight motion is added.
 class HitContact {
  public:
   HitContact(World &w, StepContext &step, const GuardHit &hit)
@@ -95,7 +95,7 @@ class HitContact {
     }
     for (int k = 0; kind == 2 && k < 3; ++k) add(out, c_.slot_a, corner[k], hit_.at[k]);
   }
-  // The obstacle's point: from where it is to where it would get without this contact.
+  // The point of the obstacle: from its present position to that at the end without this contact.
   void carry(Vec3 from, Vec3 to) {
     start_ -= from;
     obstacle_way_ = (1 / step_.h) * (to - from);
@@ -105,7 +105,7 @@ class HitContact {
     const ObstacleView &v = step_.obstacle_views[c_.slot_b];
     out.type_a = c_.kind;
     add_feature(out, c_.kind, c_.feature_a);
-    // The shape's point of the hit: nearest to the body's as the shape stands then.
+    // The point of the shape at the hit: the nearest to the body's point at the hit time.
     ObstacleView at = v;
     at.position = v.position + hit_.t * (end_.position - v.position);
     at.rotation = slerp(v.rotation, end_.rotation, hit_.t);
@@ -176,9 +176,9 @@ uint64_t free_key(const World &w, const StepContext &step, const ContactPoint &c
   }
 }
 
-// Of each feature's hits with one other side the earliest, and of those the earliest kMostHits: one impact
-// trips all pairs around it, what the first ones leave is asked again, and a solve with thousands of nearly
-// equal rows would not converge.
+// Keeps the earliest hit of each feature with each other side, and of those the earliest kMostHits: an impact
+// triggers all pairs around it, remaining hits are tested again, and a solve with thousands of nearly equal
+// rows would not converge.
 void choose_hits(StepContext &step) {
   Array<GuardHit> &hits = step.guard.hits;
   const Array<Candidate> &list = *step.guard.list;
@@ -215,8 +215,8 @@ void guard_ask_hits(World &w, StepContext &step) {
   });
 }
 
-// Hits join the contacts of the sub-step, in their order; one that has a contact already turns it to how it
-// stands at the hit.
+// Adds hits to the contacts of the sub-step, in order; if there is a contact already, it gets the geometry of
+// the hit.
 void guard_add_hits(World &w, StepContext &step) {
   Guard &g = step.guard;
   choose_hits(step);
@@ -236,8 +236,8 @@ void guard_add_hits(World &w, StepContext &step) {
     ContactPoint c;
     double along;
     if (!HitContact(w, step, hit).make(c, along)) continue;
-    // One that starts nearer than d_c comes no nearer; what it lacks to 0.8 d_c closes in the time that the
-    // sub-step was planned with.
+    // A pair that starts nearer than d_c comes no nearer; the difference to 0.8 d_c closes in the planned
+    // length of the sub-step.
     const Candidate &pair = (*g.list)[hit.candidate];
     const double apart = of_one_body(pair) ? guarded_apart(w, step, pair) : w.offset;
     const double target =

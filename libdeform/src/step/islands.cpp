@@ -1,5 +1,5 @@
-// Union-find with the lowest number as each set's root: the root of an island is its first member, so
-// numbering needs no sort.
+// Union-find with the lowest number as root: the root of an island is its first member, so numbering needs no
+// sort.
 #include "step/islands.h"
 
 #include <algorithm>
@@ -35,7 +35,7 @@ void Islands::join(uint32_t a, uint32_t b) {
 void Islands::finish() {
   const uint32_t n = static_cast<uint32_t>(of.size());
   begin.assign(size_t{n} + 1, 0);
-  // Roots come before what hangs on them, and point to no one: one ascending pass turns links into numbers.
+  // Roots precede their members and have no link: one ascending pass turns links into numbers.
   for (uint32_t i = 0; i < n; ++i) of[i] = of[i] == i ? count++ : of[of[i]];
   begin.resize(size_t{count} + 1);
   for (uint32_t i = 0; i < n; ++i) ++begin[of[i] + 1];

@@ -1,6 +1,5 @@
-// Islands: sets of things that touch each other, directly or through others. What holds for one of them may
-// depend on all of its own and on nothing outside; so sleep, and whatever else goes by groups that touch, is
-// decided by island. Made only by those who ask.
+// Islands: sets of things that touch each other, directly or through others. Sleep, and other decisions for
+// groups of touching bodies, depend on all members of an island and on nothing outside. Built on demand.
 #pragma once
 #include <cstdint>
 
@@ -8,9 +7,9 @@
 
 namespace dfm {
 
-// Things are numbers 0..n-1 (body slots; whoever wants more kinds puts them behind). start(), join() any
-// pairs, finish(); then the columns hold. Order is that of the lowest number in each island, whatever the
-// order of the pairs.
+// Things are numbers 0..n-1 (body slots, then other kinds if needed). Call start(), join() any pairs,
+// finish(); then the columns are valid. Order is that of the lowest number in each island, whatever the order
+// of the pairs.
 struct Islands {
   uint32_t count = 0;
   Array<uint32_t> of;             // [n] island of each thing

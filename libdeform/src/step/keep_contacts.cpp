@@ -1,5 +1,5 @@
-// What contacts leave behind when a sub-step has been taken: the store for the next one, events, the hold,
-// the work of friction, and the report.
+// Results of contacts after a completed sub-step: the store for the next one, events, the hold, the work of
+// friction, and the report.
 #include <algorithm>
 
 #include "state/world.h"
@@ -12,11 +12,12 @@
 
 namespace dfm {
 
-// All memory that keep_contacts() will need, so that it cannot fail once the bodies have moved.
+// Reserves all memory of keep_contacts(), so that it cannot fail after bodies have moved.
 void reserve_contacts(World &w, StepContext &step) {
   const uint32_t n = step.rows.n + (w.sleepers ? w.store.n : 0), S = step.state.nstate;
   ContactStore &to = step.next_store;
-  Report &next = w.sleepers ? step.last_report : w.report;  // the one that keep_contacts(w, step) will write
+  // the report that keep_contacts(w, step) will write
+  Report &next = w.sleepers ? step.last_report : w.report;
   each_column([&](const ContactColumn &column, auto &values) { values.reserve(column.entries(n, S)); }, to);
   each_report_column([&](size_t width, auto &column) { column.reserve(width * n); }, next);
   step.mean.reserve(size_t{kStride} * step.rows.ndof);
@@ -57,8 +58,8 @@ void list_crossings(World &w, StepContext &step) {
 
 namespace {
 
-// Do all bodies of the contact keep the velocity that the solve has left them? Those that step themselves may
-// damp it within a sub-step.
+// Whether all bodies of the contact keep the velocity of the solve. Bodies that step themselves may damp it
+// within a sub-step.
 bool keeps_velocity(const ContactRows &rows, uint32_t i) {
   for (uint32_t j = rows.begin[i]; j < rows.begin[i + 1]; ++j) {
     const uint32_t block = rows.block[rows.dof[j]];
@@ -112,7 +113,7 @@ void keep_contacts(World &w, StepContext &step) {
     const uint64_t b = c.obstacle ? w.obstacles[c.slot_b]->id : w.bodies[c.slot_b]->id;
     const double *const l = &step.rows.impulse[size_t(i) * 3];
     const uint32_t m = step.match[i];
-    // also where the normal turned over and nothing else is taken along
+    // also if the normal was reversed and nothing else is kept
     const uint32_t known = m != kNone ? m : w.store.find(c.key);
     const bool before = known != kNone && w.store.touching[known];
     // hysteresis: a contact ends when it carries nothing and has opened by a tenth of the offset
@@ -126,14 +127,15 @@ void keep_contacts(World &w, StepContext &step) {
     store3(&to.normal[size_t(3) * i], load3(&step.rows.frame[size_t(9) * i]));
     store3(&to.tangent[size_t(3) * i], load3(&step.rows.frame[size_t(9) * i + 3]));
     store3(&to.impulse[size_t(3) * i], next_start(w, step, i));
-    // its law wrote no further: the rest of the columns is another contact's
+    // its law wrote no more: the rest of the columns belongs to other laws
     const uint32_t own = now ? w.pairs.laws[step.state.law[i]]->nstate : 0;
     for (uint32_t s = 0; s < S; ++s)
       to.bristle[size_t(S) * i + s] = s < own ? step.state.bristle_out[size_t(s) * step.state.stride + i] : 0;
     to.dwell[i] = now ? step.state.dwell[i] + step.h : 0;
     to.area[i] = step.state.area[i];
     const double v1 = step.state.vt[i], v2 = step.state.vt[step.state.stride + i];
-    // A hold counts from hold_begin on: what sticks in the first sub-step after it, and in every one since.
+    // A hold counts from hold_begin on: contacts that stick in the first sub-step after it and in every one
+    // since.
     const bool first = w.time <= w.hold.start, carried = !first && m != kNone && w.store.held[m];
     const bool holds = w.hold.on && stick && (first || carried);
     to.path[2 * i] = holds ? (carried ? w.store.path[2 * m] : 0) + step.h * v1 : 0;

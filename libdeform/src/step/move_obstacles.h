@@ -6,13 +6,13 @@ namespace dfm {
 struct StepContext;
 struct World;
 
-// Pose now and at the end of the sub-step, as the velocity and spin that lead from one to the other, into
-// step.obstacle_views.
+// Writes into step.obstacle_views the velocity and spin that lead from the present pose to that at the end of
+// the sub-step.
 void view_obstacles(World &w, StepContext &step);
-// Where the obstacles are at the end of the sub-step; `last`: of the step, so that a target is met exactly.
+// Moves the obstacles to the end of the sub-step; `last`: last of the step, so that a target is met exactly.
 void move_obstacles(World &w, const StepContext &step, bool last);
-// Where the guard let the bodies go a fraction of their way only. Obstacles come to their poses in the
-// sub-steps after.
+// The same if the guard allowed only a fraction of the displacement. Obstacles reach their poses in later
+// sub-steps.
 void move_obstacles_by(World &w, const StepContext &step, double fraction);
 
 }  // namespace dfm

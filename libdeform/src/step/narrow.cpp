@@ -1,5 +1,5 @@
-// Contacts of the sub-step, without depths that cannot be. A contact of a sleeper wakes its island, whose
-// bodies then take the stages that the others have passed, model to broad, before contacts are found again.
+// Contacts of the sub-step, without impossible depths. A contact of a sleeping body wakes its island; its
+// bodies then run the stages model to broad before contacts are found again.
 #include <algorithm>
 #include <cmath>
 
@@ -14,8 +14,8 @@
 namespace dfm {
 namespace {
 
-// m, of d_c: where a surface is nearer than this, rounding may decide the side. The guard keeps twice as far
-// away, except where surfaces start nearer.
+// Share of d_c: if a surface is nearer than this, rounding may decide the side. The guard keeps twice this
+// distance, unless surfaces start nearer.
 constexpr double kClearly = 0.25;
 
 const Surface &surface_b(const StepContext &step, const ContactPoint &c) {
@@ -24,7 +24,7 @@ const Surface &surface_b(const StepContext &step, const ContactPoint &c) {
 
 bool of_surfel_and_face(const ContactPoint &c) { return c.obstacle ? c.type_a != 1 : c.kind == kVertexFace; }
 
-// Of two bodies: do the edges cross between their ends? None is then taken for longer than it is.
+// For two bodies: whether the edges cross between their ends, without extending them.
 bool edges_cross(const StepContext &step, const ContactPoint &c) {
   const BodyView &a = step.body_views[c.slot_a];
   for (uint32_t k = 0; k < c.nnode; ++k) {

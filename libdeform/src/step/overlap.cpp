@@ -14,11 +14,11 @@
 namespace dfm {
 namespace {
 
-constexpr uint64_t kReleaseEvery = 16;  // steps: pairs that are aside are looked at no more often
-constexpr size_t kSentences = 8;        // pairs that are named in the log one by one
+constexpr uint64_t kReleaseEvery = 16;  // steps: interval at which excluded pairs are tested
+constexpr size_t kSentences = 8;        // number of pairs that the log names individually
 
-// Deeper than contact leads out. Closed shapes and voxels lead out from any depth; of triangles only
-// the nearest do.
+// Whether the overlap is too deep for contact to resolve. Closed shapes and voxels resolve any depth;
+// triangles only small ones.
 bool deep(const World &w, const OverlapPair &p, const Crossed &c) {
   if (p.obstacle && !w.obstacles[p.b]->mesh) return false;
   const Surface &a = w.bodies[p.a]->surface;
@@ -87,7 +87,7 @@ void warn(const World &w, const Overlap &o) {
               : "contact pushes them apart slowly; move one of them, or set \"untangle\"");
 }
 
-// It is apart: contact again.
+// It has separated: contact is on again.
 void take_back(World &w, const Overlap &f) {
   if (std::erase_if(w.overlaps.aside, [&](const PairAside &p) {
         return p.a == f.a && p.b == f.b && (p.obstacle != 0) == f.obstacle;

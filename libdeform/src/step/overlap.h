@@ -1,6 +1,5 @@
-// Which surfaces are through each other where no step has put them: after a body or an obstacle is made, a
-// state is set, a pose or a snapshot is put in place. Looked for once each time, not in every step;
-// doc/concepts/overlaps.md.
+// Finds surfaces that cross each other other than by a step: after a body or obstacle is created, or a state,
+// pose or snapshot is set. Searched once each time, not in every step; doc/concepts/overlaps.md.
 #pragma once
 #include "state/overlaps.h"
 
@@ -8,11 +7,11 @@ namespace dfm {
 
 struct World;
 
-// At the end of prepare(): the look that is due, with its warnings. What is through deeply leaves contact.
+// At the end of prepare(): the pending search, with its warnings. Deep overlaps are excluded from contact.
 void settle_overlaps(World &w);
-// Before a step: pairs that have come apart take part in contact again.
+// Before a step: includes separated pairs in contact again.
 void release_overlaps(World &w);
-// In prepare(), once the filter is made anew.
+// In prepare(), after the filter has been rebuilt.
 void keep_overlaps_aside(World &w);
 
 }  // namespace dfm

@@ -12,14 +12,14 @@
 namespace dfm {
 namespace {
 
-// surfels that are asked first: with no crossing, a piece lies inside as a whole or not at all
+// surfels that are tested first: without crossings, a piece is completely inside or outside
 constexpr uint32_t kProbes = 64;
-constexpr uint32_t kInner = 256;    // places inside a body that are asked where surfaces coincide
+constexpr uint32_t kInner = 256;    // places inside a body that are tested if surfaces coincide
 constexpr uint32_t kDepths = 2048;  // enclosed surfels whose depth is measured
 
 uint32_t stride_of(size_t n, uint32_t most) { return static_cast<uint32_t>(n / most + 1); }
 
-// How far the edge p-q reaches on either side of a triangle that it goes through; negative: it does not.
+// The length of the edge p-q on the shorter side of a triangle that it crosses; negative: it does not cross.
 double pierce(Vec3 p, Vec3 q, Vec3 a, Vec3 b, Vec3 c) {
   const double vp = tet_volume(a, b, c, p), vq = tet_volume(a, b, c, q);
   if (!(vp * vq < 0)) return -1;
@@ -48,7 +48,7 @@ bool in_box(Vec3 p, const OverlapSkin &s) {
 
 bool may_hold(const OverlapSkin &b, Vec3 p) { return b.room() || in_box(p, b); }
 
-// What of a lies inside b.
+// The part of a inside b.
 void count_enclosed(const OverlapSkin &a, OverlapSkin &b, double least, Crossed &out) {
   bool any = out.crossings > 0;
   for (uint32_t s = 0, n = stride_of(a.nsurfel(), kProbes); s < a.nsurfel() && !any; s += n)
@@ -69,7 +69,7 @@ void count_enclosed(const OverlapSkin &a, OverlapSkin &b, double least, Crossed 
   }
 }
 
-// Surfaces that coincide neither cross nor hold each other's surfels; what is inside the bodies tells.
+// Coincident surfaces neither cross nor contain surfels of each other; places inside the bodies decide.
 void probe_inner(const OverlapSkin &a, OverlapSkin &b, double least, Crossed &out) {
   for (const Vec3 p : a.inner()) {
     if (!may_hold(b, p) || !b.inside(p)) continue;

@@ -1,4 +1,4 @@
-// One side of a look for overlaps: a surface in place, with what tells inside from outside. Set-up code.
+// One side of an overlap search: a surface in place, with a test for inside and outside. Set-up code.
 #pragma once
 #include <memory>
 #include <vector>
@@ -28,7 +28,7 @@ class OverlapSkin {
   Vec3 hi() const { return hi_; }
   // places inside that lie on no surface; of a body
   const std::vector<Vec3> &inner() const { return inner_; }
-  // m, by which its triangles may be off what contact sees (voxels)
+  // m, difference between its triangles and the surface for contact (voxels)
   double slack() const { return slack_; }
   bool room() const { return closed_ && !outward_; }  // material is outside its triangles
 
@@ -52,14 +52,14 @@ class OverlapSkin {
   Array<PairOfTriangles> stack_;
 };
 
-// What is measured between two sides.
+// The result for two sides.
 struct Crossed {
   uint32_t crossings = 0, enclosed = 0;
   double depth = 0;       // m
-  bool through = false;   // beyond the rest distance: more than touching
-  bool coincide = false;  // no surface tells the sides apart
+  bool through = false;   // deeper than the rest distance: more than touching
+  bool coincide = false;  // no surface separates the sides
 };
-// `yes_or_no`: only `through` is asked for.
+// `yes_or_no`: only `through` is needed.
 Crossed cross_skins(OverlapSkin &a, OverlapSkin &b, double offset, bool yes_or_no,
                     Array<PairOfTriangles> &stack);
 // Plane, sphere, capsule: in closed form.
@@ -70,12 +70,12 @@ struct OverlapPair {
   bool obstacle;  // b is one
 };
 
-// Sides as they are needed, each made once.
+// Sides on demand, each made once.
 class OverlapSides {
  public:
   explicit OverlapSides(World &w);
   OverlapSkin &body(uint32_t i);
-  bool may_touch(const OverlapPair &p) const;  // but for being aside
+  bool may_touch(const OverlapPair &p) const;  // ignoring exclusion
   // through: by more than `least`.
   Crossed look(const OverlapPair &p, double least, bool yes_or_no);
 

@@ -1,8 +1,8 @@
 // Friction laws of a world's pairs, from the rules by name, group and material.
 //
-// PairTables::law holds one law per pair of things. Only where rules tell parts of a surface apart does the
-// pair have a table over the zones of both sides as well, and only then is a contact asked which triangle it
-// stands on: a world without such rules runs no instruction of it.
+// PairTables::law holds one law per pair of things. Only if rules distinguish parts of a surface does the
+// pair also have a table over the zones of both sides, and only then is the triangle of a contact looked up:
+// a world without such rules runs no instruction of it.
 #include <algorithm>
 #include <cmath>
 
@@ -50,7 +50,7 @@ const FrictionRule *rule_of(const World &w, uint32_t a, const SurfaceZones::Zone
                    {name_of(w, b), zb.group, zb.material, whole_of(w, b)});
 }
 
-// On which zones of its two sides a contact stands.
+// The zones of the two sides of a contact.
 struct Zones { uint32_t a, b; };
 Zones zones_of(const World &w, const ContactPoint &c) {
   const Vec3 normal = load3(c.normal);
@@ -61,7 +61,7 @@ Zones zones_of(const World &w, const ContactPoint &c) {
   return {a, c.obstacle ? 0 : zone(*w.bodies[c.slot_b], c.kind == kEdgeEdge ? 1 : 2, c.feature_b, normal)};
 }
 
-// Place among bodies and obstacles, or kNone.
+// Index among bodies and obstacles, or kNone.
 uint32_t thing_of(const World &w, uint64_t id) {
   const auto is = [id](const auto &thing) { return thing->id == id; };
   if (const auto b = std::find_if(w.bodies.begin(), w.bodies.end(), is); b != w.bodies.end())

@@ -1,4 +1,4 @@
-// What the rules of friction and of contact come to: the laws of a world, and which one each pair has.
+// The result of the rules of friction and contact: the laws of a world, and the law of each pair.
 #pragma once
 #include <cstdint>
 #include <memory>
@@ -15,11 +15,11 @@ struct FrictionRule;
 struct SceneFacts;
 struct World;
 
-// Index of the law with these values: one that is there, else a new one, in a place that `free` marks or
-// behind the others.
+// Index of the law with these values: an existing one, else a new one, at an index that `free` marks or at
+// the end.
 uint32_t add_law(World &w, const char *name, std::span<const dfm_param_value> values,
                  std::span<const uint8_t> free = {});
-// Of what the list of effects leaves of the law that is asked for.
+// The same for the requested law without the effects that the list leaves out.
 std::unique_ptr<LawInstance> make_law(const World &w, const dfm_type &type, std::vector<double> asked);
 uint32_t place_law(World &w, std::unique_ptr<LawInstance> law, std::span<const uint8_t> free);
 
@@ -28,7 +28,7 @@ void find_law(World &w, uint32_t a, uint32_t b, std::vector<uint32_t> &used);
 uint32_t pair_law(const World &w, uint32_t slot_a, bool obstacle, uint32_t slot_b);
 // law: of contacts between pairs that have a table of zones.
 void set_zone_laws(const World &w, std::span<const ContactPoint> contacts, Array<uint32_t> &law);
-// What the law brings as its parameters stand, and what it would with others.
+// The effects of the law with its present parameters, and with other parameters.
 void offer_law(const LawInstance &law, SceneFacts &facts);
 void rename_law(World &w, const FrictionRule &rule, uint32_t to);  // in the store, of contacts it holds for
 

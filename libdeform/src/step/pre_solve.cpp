@@ -46,7 +46,7 @@ dfm_contact_choice choice_of(const World &w, const StepContext &step, const Cont
   return out;
 }
 
-// Answered and checked; is it wanted?
+// Applies and checks the host's answer; returns whether the contact is accepted.
 bool ask(World &w, StepContext &step, const ContactPoint &c, uint32_t law, StepContext::Chosen &to) {
   dfm_contact_choice choice = choice_of(w, step, c, law);
   w.pre_solve.call(w.pre_solve.user, &choice);
@@ -69,7 +69,7 @@ bool ask(World &w, StepContext &step, const ContactPoint &c, uint32_t law, StepC
 void ask_pre_solve(World &w, StepContext &step) {
   step.chosen.clear();
   if (!w.pre_solve.call || step.contacts.empty()) return;
-  Array<uint32_t> &law = step.state.law;  // made anew for the rows
+  Array<uint32_t> &law = step.state.law;  // set again for the rows
   law.resize(step.contacts.size());
   for (size_t i = 0; i < step.contacts.size(); ++i) {
     const ContactPoint &c = step.contacts[i];

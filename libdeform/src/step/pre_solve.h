@@ -1,4 +1,4 @@
-// What the host decides about contacts before they are solved (deform/callback.h).
+// The host's decisions about contacts before they are solved (deform/callback.h).
 #pragma once
 #include "contact/contact_set.h"
 
@@ -7,10 +7,10 @@ namespace dfm {
 struct StepContext;
 struct World;
 
-// Asks about every contact of the sub-step, in order, and drops those that are not wanted. Where no function
-// is set: nothing.
+// Calls the host for every contact of the sub-step, in order, and drops rejected ones. Does nothing without a
+// callback.
 void ask_pre_solve(World &w, StepContext &step);
-// About one more; is it wanted?
+// The same for one more contact; returns whether it is accepted.
 bool ask_host(World &w, StepContext &step, const ContactPoint &c);
 
 // While rows are made: laws and scales, before stored contacts are matched; belts, once frames stand.

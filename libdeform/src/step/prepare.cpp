@@ -1,4 +1,4 @@
-// What is derived from a world whenever something has changed: plan, pair tables, rest distance, views of the
+// Derived data, recomputed when something has changed: plan, pair tables, rest distance, views of the
 // entities for the stages.
 #include "state/world.h"
 #include "step/context.h"
@@ -43,7 +43,7 @@ void offer(const dfm_type &type, std::vector<SceneFacts::Provider> &to) {
   for (const std::string &e : effects(type)) to.push_back({e, type.id});
 }
 
-// What is prescribed over time, as the plan has to know it.
+// Prescribed motions and loads, for the plan.
 struct Prescribed {
   bool gravity_keys = false;
   bool loads_vary = false;
@@ -70,7 +70,7 @@ void put(const Prescribed &p, SceneFacts &facts) {
   facts.obstacles_move = p.obstacles_move;
 }
 
-// The plan alone, where values have changed so that another stage is called for.
+// Updates only the plan, if changed values call for another stage.
 void look_at_plan(World &w, StepContext &step) {
   const SceneFacts &old = step.facts;
   const Prescribed now = prescribed(w);
@@ -155,7 +155,7 @@ void view_rigids(World &w, SceneFacts &facts) {
   }
 }
 
-// What a body may meet: another body, or an obstacle.
+// A possible partner of a body: another body, or an obstacle.
 struct Partner {
   uint64_t id;
   uint32_t category, collides_with;
@@ -179,8 +179,8 @@ Partner partner_of(const World &w, const StepContext &step, uint32_t thing) {
 
 bool before_pair(const PairAnswer &l, const PairAnswer &r) { return l.a != r.a ? l.a < r.a : l.b < r.b; }
 
-// Of a pair that masks and rules let touch: is one of them a sensor, or does the host say no? The host is
-// asked where it has not answered yet: things i < j.
+// For a pair allowed by masks and rules: whether one is a sensor, or the host refuses. The host is called if
+// it has not answered yet: things i < j.
 bool refused(const World &w, const StepContext &step, uint32_t i, uint32_t j, const Partner &a,
              const Partner &b, std::vector<PairAnswer> &answers) {
   if (a.sensor || b.sensor) return true;
@@ -204,8 +204,7 @@ bool refused(const World &w, const StepContext &step, uint32_t i, uint32_t j, co
   return !pair.touch;
 }
 
-// Attached to each other two things do not touch, unless they are told to. A rigid body is meant with all of
-// its shapes.
+// Two attached things do not touch, unless requested. This applies to all shapes of a rigid body.
 bool parted(const World &w, uint32_t i, uint32_t thing) {
   const uint32_t nb = static_cast<uint32_t>(w.bodies.size());
   const uint64_t a = w.bodies[i]->id;
@@ -230,7 +229,7 @@ bool cut_through(const World &w, uint32_t i, uint32_t thing) {
 void make_pair_tables(World &w, StepContext &step, SceneFacts &facts) {
   const uint32_t nb = static_cast<uint32_t>(w.bodies.size());
   const uint32_t width = nb + static_cast<uint32_t>(w.obstacles.size());
-  // rises, so that lists made under older rules are renewed
+  // increases, so that lists made with older rules are rebuilt
   const uint64_t filter_version = w.pairs.filter.version;
   w.pairs.filter = PairFilter(w.meters.detection.memory());
   w.pairs.filter.version = filter_version + 1;
@@ -238,9 +237,9 @@ void make_pair_tables(World &w, StepContext &step, SceneFacts &facts) {
   w.pairs.zone_table.clear();
   w.pairs.zone_law.clear();
   for (auto &law : w.laws) law->by_default = false;
-  std::vector<PairAnswer> answers;  // those that are kept or given now
+  std::vector<PairAnswer> answers;  // kept, or given now
   std::vector<uint32_t> used;
-  std::vector<uint8_t> told;  // by law: what it offers is a fact of the scene, however many pairs have it
+  std::vector<uint8_t> told;  // by law: its effects are listed once, however many pairs use it
   for (uint32_t i = 0; i < nb; ++i) {
     const Partner a = partner_of(w, step, i);
     for (uint32_t j = 0; j < width; ++j) {
@@ -275,7 +274,7 @@ void make_pair_tables(World &w, StepContext &step, SceneFacts &facts) {
   for (auto &l : w.laws) w.pairs.laws.push_back(l.get());
 }
 
-// As many sub-steps as the step has without the others, for who may choose; nothing else is known of them.
+// Assumes the number of sub-steps that the step has without the other bodies; nothing else is known.
 IntegratorOption option_of(const World &w, const Body &b) {
   IntegratorOption o;
   o.substeps = std::max(1.0, w.def.step / b.integrator.step);
@@ -344,8 +343,8 @@ void choose_plan(World &w, StepContext &step, SceneFacts &facts) {
   ++step.made.plans;
 }
 
-// While contacts live it only falls: a larger one would turn their rest into a depth, and push them apart at
-// 0.1 d_c / h.
+// While contacts exist it only decreases: a larger value would turn their rest distance into a depth, and
+// push them apart at 0.1 d_c / h.
 double choose_offset(const World &w) {
   if (w.def.contact_offset > 0) return w.def.contact_offset;
   const double wanted = contact_offset(w);
@@ -403,7 +402,7 @@ void prepare(World &w, const RestoredChoice *restored) {
   step.active.reserve(nb);
   step.sinks.reserve(nb);
   reserve_sleep(w, step, nb);
-  if (w.sleepers > 0 && w.offset != before) wake_all(w);  // contacts rest at another distance now
+  if (w.sleepers > 0 && w.offset != before) wake_all(w);  // the rest distance of contacts has changed
   gather_active(w);
   set_gravity_now(w);
   w.bound.age = kNone;

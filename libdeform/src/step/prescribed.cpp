@@ -1,4 +1,4 @@
-// What is prescribed over time: gravity, loads, springs, the ways of held points.
+// Prescribed gravity, loads, springs, and motions of held points.
 #include "state/spring.h"
 #include "state/world.h"
 #include "step/energy_watch.h"
@@ -33,8 +33,8 @@ void each_held_place(const Body &b, double t, const std::function<void(uint32_t,
 }
 
 void stage_motion(World &w, double h, Array<Driven> &driven) {
-  // Held velocities are the one part of the state that changes before a sub-step is known to succeed; what
-  // was there is kept.
+  // Held velocities are the only state that changes before a sub-step has succeeded; the previous values are
+  // kept.
   const double end = w.prescribed.at(w.time + h);
   if (!w.gravity.keys.empty()) change_gravity(w, vector_at(w.gravity.keys, end));
   for (auto &b : w.bodies) {

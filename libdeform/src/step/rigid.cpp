@@ -1,5 +1,4 @@
-// The two stages of rigid bodies, around the solve: how they would move without contact, and where
-// they end with it.
+// The two stages of rigid bodies around the solve: motion without contact, and the end with contact.
 #include "state/bounds.h"
 #include "step/rigid.h"
 
@@ -20,7 +19,7 @@ Quat rotation_of(const dfm_rigid_state &s) {
   return {s.rotation[0], s.rotation[1], s.rotation[2], s.rotation[3]};
 }
 
-// said: sentences() before the host was called. Its own reason comes along where it has given one.
+// said: sentences() before the call of the host. Includes the host's reason if it has given one.
 bool host_failed(const World &w, const RigidSet &set, const HostFault &fault, uint64_t said,
                  uint32_t *trouble) {
   need_memory(fault.status);
@@ -47,7 +46,7 @@ Pose shape_pose(const Obstacle &o, const dfm_rigid_state &s) {
   return o.added ? Pose{place(body, o.local.position), body.rotation * o.local.rotation} : body;
 }
 
-// Mean velocity of a shape's origin while its body moves so, as ObstacleView::velocity_at.
+// Mean velocity of a shape's origin for this motion of its body, as ObstacleView::velocity_at.
 Vec3 shape_velocity(const Obstacle &o, const dfm_rigid_state &start, Vec3 velocity, Vec3 spin, double h) {
   if (!o.added) return velocity;
   const Vec3 arm = rotate(rotation_of(start), o.local.position), turn = load3(start.spin);
@@ -186,7 +185,7 @@ bool revise_rigids(World &w, StepContext &step) {
   return any;
 }
 
-// 1: all have ended their step; 2: somebody asks for another solve; 0: failed.
+// 1: all have ended their step; 2: a host asks for another solve; 0: failed.
 int ask_rigid_ends(World &w, uint32_t *trouble) {
   const uint64_t said = sentences();
   bool again = false;
@@ -215,7 +214,7 @@ bool stage_rigid_commit(World &w, StepContext &step, uint32_t *trouble) {
     if (!stage_solve(w, step, trouble)) return false;
   }
   step.rigid_again = false;
-  // What is looked at from here on (the guard) sees how they truly move.
+  // From here on (guard) their true motion is used.
   for (auto &o : w.obstacles) {
     if (!o->rigid || o->rigid->group[o->rigid_body] == DFM_RIGID_STILL) continue;
     const Pose from = shape_pose(*o, o->rigid->state[o->rigid_body]);

@@ -42,7 +42,7 @@ uint8_t rule_of(const World &w, const Body &b, uint8_t otherwise) {
   return otherwise;
 }
 
-// What the body calls for, beside what the world asks.
+// What the body calls for, in addition to the setting of the world.
 uint8_t needed_by(const Body &b, uint8_t asked) {
   if (!b.cut.whole || asked == DFM_SELF_ON) return asked;
   return b.surface.slit ? uint8_t{DFM_SELF_ON} : uint8_t{DFM_SELF_AUTO};
@@ -59,8 +59,8 @@ SelfBody *self_body(StepContext &step, uint32_t slot) {
   return at != step.self_bodies.end() && (*at)->body->slot == slot ? at->get() : nullptr;
 }
 
-// The guard keeps a distance, and two sides of an open face have none: a body with open faces is led back by
-// contact alone.
+// The guard keeps a distance, and two sides of an open face have none: in a body with open faces only contact
+// resolves crossings.
 bool is_guarded(const SelfBody &b) { return !b.rest.opened.any(); }
 
 void find_tangled(SelfBody &b) {
@@ -177,7 +177,7 @@ void count_self(World &w, StepContext &step) {
   w.stats.self_max = std::max(w.stats.self_max, w.stats.self_bodies);
 }
 
-// How fast a surfel goes to its end of the sub-step, as the solve left it.
+// Velocity of a surfel over the sub-step after the solve.
 Vec3 velocity_after(const Body &b, uint32_t surfel) {
   const double *const mean = b.dynamics->end().mean;
   Vec3 sum;
@@ -190,7 +190,7 @@ Vec3 velocity_after(const Body &b, uint32_t surfel) {
 
 void stage_self(World &w, StepContext &step) {
   if (!w.plan.has(StageRole::finds_contacts)) step.contacts.clear();
-  const bool listed = w.plan.has(StageRole::lists_pairs);  // which has looked at the speeds
+  const bool listed = w.plan.has(StageRole::lists_pairs);  // that stage has computed the speeds
   for (auto &s : step.self_bodies) {
     const BodyView &view = step.body_views[s->body->slot];
     s->looked = false;
@@ -214,7 +214,7 @@ bool cover_self(World &w, StepContext &step) {
     const Body &b = *s->body;
     if (step.body_views[b.slot].asleep) continue;
     const double change = step.guard.change[b.slot];
-    // A blow may fold within the sub-step what was far from itself before the solve.
+    // An impact may fold a surface within the sub-step that was far from itself before the solve.
     if (!s->on &&
         s->watch->meets(step.h, w.offset, change, [&](uint32_t surfel) { return velocity_after(b, surfel); }))
       switch_to(*s, true);

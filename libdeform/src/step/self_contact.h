@@ -1,5 +1,4 @@
-// Bodies whose surfaces touch themselves: who they are, and what detection keeps of them. A world in which
-// none does has no stage for it.
+// Bodies with self contact, and their data for detection. A world without such bodies has no stage for it.
 #pragma once
 #include <memory>
 
@@ -19,9 +18,9 @@ struct SelfBody {
   const Body *body;
   SelfRest rest;
   SelfList list;
-  std::unique_ptr<SelfWatch> watch;  // says when; null: always
+  std::unique_ptr<SelfWatch> watch;  // decides when; null: always
   bool on = false;                   // in this sub-step
-  // renewals of `list` that the guard's list was made of; 0: it is not in there
+  // rebuild of `list` that is included in the guard's list; 0: not included
   uint64_t joined = 0;
   // [nsurfel] of a triangle that crosses another one at the start of the sub-step; where `looked`
   Array<uint8_t> tangled;
@@ -29,14 +28,14 @@ struct SelfBody {
   SelfBody(const Memory &memory, const Body &b);
 };
 
-// DFM_SELF_*: what the world asks for (dfm_world_def.self_contact, or the effect in its list).
+// DFM_SELF_*: the setting of the world (dfm_world_def.self_contact, or the effect in its list).
 uint8_t asks_self_contact(const World &w);
-// Of prepare(): fills step.self_bodies and what the plan is told of them; laws of the pairs of a body with
-// itself are found, `used` is scratch.
+// For prepare(): fills step.self_bodies and the facts for the plan; finds the laws of bodies with themselves;
+// `used` is scratch.
 void choose_self_bodies(World &w, StepContext &step, SceneFacts &facts, std::vector<uint32_t> &used);
 
-// Of the guard. Lists that do not cover the ways after the solve are made anew; true if any has changed since
-// it was joined.
+// For the guard: rebuilds lists that do not cover the motion after the solve; returns true if any has changed
+// since it was joined.
 bool cover_self(World &w, StepContext &step);
 // Fills `to` with `pairs` (null: none) and behind them those of bodies with themselves; false: there are
 // none, and `to` is as it was.

@@ -14,7 +14,7 @@
 //                        and detection looks again. So a woken body meets what comes with all of its own
 //                        dynamics, warm started by the contacts that it had when it fell asleep
 //
-// Everything is decided by the state alone, in the order of ids.
+// All decisions depend on the state alone, in the order of ids.
 #include "state/sleep.h"
 
 #include <algorithm>
@@ -39,7 +39,7 @@ double last_time(const std::vector<Key> &keys) {
   return keys.empty() ? -kForever : keys.back().t;
 }
 
-// From when on nothing that is prescribed for a body changes any more.
+// The time after which prescribed motions and loads of a body no longer change.
 double settled_from(const Body &b) {
   double t = -kForever;
   for (const Load &l : b.loads)
@@ -52,7 +52,7 @@ double settled_from(const Body &b) {
   return t;
 }
 
-// Bodies of which `counts` holds share an island with those that they are attached to.
+// Bodies for which `counts` is true share an island with those to which they are attached.
 template <class Counts>
 void join_attached(World &w, Counts counts) {
   for (const Attachment &a : w.attachments) {
@@ -69,7 +69,7 @@ bool asleep(const World &w, uint64_t id) {
 
 }  // namespace
 
-// Ids rise with the slots; slots themselves are renewed by prepare() only.
+// Ids increase with the slots; only prepare() renumbers slots.
 uint32_t slot_of(const World &w, uint64_t id) {
   const auto at = std::lower_bound(w.bodies.begin(), w.bodies.end(), id,
                                    [](const auto &b, uint64_t value) { return b->id < value; });
@@ -82,7 +82,7 @@ uint32_t obstacle_slot_of(const World &w, uint64_t id) {
   return at != w.obstacles.end() && (*at)->id == id ? static_cast<uint32_t>(at - w.obstacles.begin()) : kNone;
 }
 
-// Which bodies the stages of a sub-step work on, and whom contact impulses go to.
+// Finds the active bodies of a sub-step, and the bodies that receive contact impulses.
 void gather_active(World &w) {
   StepContext &step = *w.steps;
   step.active.clear();
@@ -109,7 +109,7 @@ void reserve_sleep(World &w, StepContext &step, uint32_t n) {
 
 void rouse(World &w, std::span<const uint32_t> slots) {
   StepContext &step = *w.steps;
-  // What time would have added to contacts that stay: their age, and the impulse that they pass on.
+  // Adds the elapsed time to contacts that sleep: their age, and their total impulse.
   for (uint32_t m = 0; m < w.store.n; ++m) {
     const uint32_t a = slot_of(w, w.store.id_a[m]);
     if (w.store.touching[m] && a != kNone && w.bodies[a]->slumber.asleep &&
@@ -126,10 +126,10 @@ void rouse(World &w, std::span<const uint32_t> slots) {
     }
     b.slumber = {};
   }
-  if (!w.changed) gather_active(w);  // else prepare(w) does, whose views are out of date now
+  if (!w.changed) gather_active(w);  // otherwise prepare(w) does it, since its views are out of date
 }
 
-// The whole island, as its contacts stood when it fell asleep.
+// Wakes the whole island, by its contacts at the time when it fell asleep.
 void wake(World &w, Body &b) {
   StepContext &step = *w.steps;
   b.slumber.calm = 0;
@@ -161,8 +161,8 @@ void wake_touching(World &w, uint64_t obstacle) {
       wake(w, *w.bodies[i]);
 }
 
-// Nothing moves and nothing will: the sub-step would leave everything as it is. What a rigid host's bodies do
-// only the host knows.
+// Whether nothing moves and nothing will, so that the sub-step would change nothing. The motion of a rigid
+// host's bodies is known to the host only.
 bool all_idle(const World &w, const StepContext &step) {
   return w.sleepers > 0 && step.active.empty() && w.rigid_sets.empty() &&
          std::none_of(step.obstacle_views.begin(), step.obstacle_views.end(),
@@ -205,8 +205,8 @@ void stage_sleep(World &w, StepContext &step) {
   for (size_t i = 0; i < n; ++i) {
     const ContactPoint &c = step.contacts[i];
     const double *const l = &step.rows.impulse[3 * i];
-    // At the edge of its cone a contact may rest as well: sliding is what is faster than a contact that
-    // sticks may be left with.
+    // A contact at the edge of its cone may also be at rest: it slides if it is faster than the tolerance of
+    // a sticking contact.
     const double s1 = step.state.vt[i], s2 = step.state.vt[step.state.stride + i];
     const bool slides =
         step.state.mode[i] != 1 && (l[1] != 0 || l[2] != 0) && s1 * s1 + s2 * s2 > creep * creep;
@@ -242,7 +242,7 @@ void fall_asleep(World &w, StepContext &step, Body &b, double end) {
   std::fill(p.v.begin(), p.v.end(), 0.0);
   std::fill(p.v_free.begin(), p.v_free.end(), 0.0);
   b.dynamics->points_changed();
-  gather_surface(b.surface, p.x.data(), p.v.data());  // detection goes on seeing it, where it stays
+  gather_surface(b.surface, p.x.data(), p.v.data());  // detection continues to see it at its place
   if (w.plan.touches())
     for (uint32_t s = 0; s < b.surface.nsurfel; ++s) impulse += load3(&b.surfel_impulse[3 * size_t(s)]);
   b.slumber = {true, 0, end, step.h, (1 / step.h) * impulse};
@@ -330,7 +330,7 @@ void close_slot(World &w, uint64_t id, bool obstacle) {
   else wake(w, *w.bodies[slot]);
   if (w.sleepers == 0) w.report.n = 0;
   for (ContactPoint &c : w.report.contacts) {
-    // touches no more, and is nobody's until the next sub-step drops it
+    // no longer touches; the next sub-step removes it
     if (!obstacle && c.slot_a == slot) c.slot_a = kNone;
     else if (!obstacle && c.slot_a > slot && c.slot_a != kNone) --c.slot_a;
     if (bool(c.obstacle) == obstacle && c.slot_b > slot) --c.slot_b;

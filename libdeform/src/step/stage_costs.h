@@ -1,4 +1,4 @@
-// What the cost of a stage grows with: counts of the present scene, not seconds. For `deform explain`.
+// The counts of the present scene with which the cost of a stage grows (not seconds). For `deform explain`.
 #pragma once
 #include <string>
 

@@ -1,6 +1,6 @@
-// The stages of a sub-step, and what they share. The table of the contact method has their order
-// (step/method.h). False: the sub-step cannot be taken; `trouble` and dfm_last_error() say why, and nothing
-// of it has been committed.
+// The stages of a sub-step, and shared functions. The table of the contact method has their order
+// (step/method.h). Return false if the sub-step failed; `trouble` and dfm_last_error() give the reason, and
+// nothing of it has been committed.
 #pragma once
 #include <cstdint>
 #include <functional>
@@ -21,24 +21,25 @@ struct LawInstance;
 struct StepContext;
 struct World;
 
-// What prepare() would choose anew and a restored world keeps: it was chosen at a state that is past.
+// Choices that prepare() would make again but a restored world keeps, because they were made at an earlier
+// state.
 struct RestoredChoice {
   Vec3 gravity;
   WorldBound bound;
   double offset;
 };
-// Plan, pair tables, offset, views of the entities; where nothing has changed it does nothing. Throws Error.
+// Updates plan, pair tables, offset and views of the entities; does nothing if nothing has changed. Throws
+// Error.
 void prepare(World &w, const RestoredChoice *restored = nullptr);
 // Second order where the equations are solved: backward Euler takes the swing out of a body within a period
 // at the steps that implicit time is for (doc/decisions/0395-auto-is-of-second-order.md).
 ImplicitOptions implicit_choice(const World &w, const Body &b);
 // After a change of values that no table depends on: loads, motions, gravity, parameters of a model or of
-// a law. The step bound is asked for anew and the energy books begin anew; the plan is looked at in the
-// next prepare().
+// a law. The step bound is recomputed, the energy balance restarts, and the next prepare() checks the plan.
 void values_changed(World &w);
-// The library chooses the integrators that were left to it anew, in the next prepare().
+// In the next prepare() the library chooses again the integrators that are left to it.
 void reopen_integrators(World &w);
-void set_gravity_now(World &w);  // from what is prescribed, at the present time
+void set_gravity_now(World &w);  // from its keys, at the present time
 dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble);
 
 // The rows of the table: what a stage reads and writes of world and context stands in step.cpp.
@@ -54,13 +55,13 @@ bool sleep(World &w, StepContext &step, uint32_t *trouble);
 }  // namespace row
 
 using Active = std::span<const uint32_t>;  // slots of the bodies that stages work on, ascending
-// A held component of a velocity that this sub-step has set.
+// A held velocity component set by this sub-step.
 struct Driven { double *velocity, before; };
 
 void stage_motion(World &w, double h, Array<Driven> &driven);
 // b.p.load at time t; loads that nothing varies over time times share. Springs are not in it.
 void set_loads(Body &b, double t, double share);
-// Where held points that move are told to be at time t.
+// Prescribed positions of moving held points at time t.
 void each_held_place(const Body &b, double t, const std::function<void(uint32_t point, Vec3 to)> &use);
 void undo_motion(Array<Driven> &driven);  // held velocities as before stage_motion()
 bool stage_model(World &w, Active active, const SubStep &now, uint32_t *trouble);
@@ -73,7 +74,7 @@ void stage_broad(std::span<const BodyView> bodies, std::span<const ObstacleView>
 bool stage_narrow(World &w, StepContext &step, uint32_t *trouble);  // narrow.cpp
 void stage_self(World &w, StepContext &step);                       // self_contact.cpp
 bool stage_solve(World &w, StepContext &step, uint32_t *trouble);   // solve.cpp
-// rigid.cpp: ends beside the present states, kept by keep_rigids()
+// rigid.cpp: end states, stored separately until keep_rigids()
 bool stage_rigid_commit(World &w, StepContext &step, uint32_t *trouble);
 bool stage_guard(World &w, StepContext &step, uint32_t *trouble);  // guard.cpp
 bool stage_commit(World &w, StepContext &step, uint32_t *trouble);
@@ -81,14 +82,14 @@ void stage_sleep(World &w, StepContext &step);  // sleep.cpp
 
 SubStep sub_step_of(const World &w, const StepContext &step);
 void begin_bodies(World &w, StepContext &step);  // before a sub-step and its repetitions
-// What contacts and bonds give to the points of bodies, by the impulses that the rows have now.
+// Distributes the present impulses of the rows to the points of bodies.
 void give_impulses(StepContext &step);
-// Where all active bodies end with the impulses that have been distributed, beside their present states.
+// Computes the end states of all active bodies with the distributed impulses; the present states are kept.
 bool find_ends(World &w, StepContext &step, uint32_t *trouble);
-void keep_rigids(World &w, StepContext &step);  // once the sub-step is known to succeed
+void keep_rigids(World &w, StepContext &step);  // after the sub-step has succeeded
 
 // solve.cpp
-void make_rows(World &w, StepContext &step);  // contacts as rows, with what they kept
+void make_rows(World &w, StepContext &step);  // makes rows from contacts, with their stored data
 // To dfm_last_error(): the law failed at this contact, or kNone; null: something is not finite. Which trouble
 // that is.
 uint32_t tell_failed_solve(World &w, StepContext &step, const LawInstance *law, uint32_t contact);
@@ -96,7 +97,7 @@ uint32_t tell_failed_solve(World &w, StepContext &step, const LawInstance *law, 
 uint32_t tell_jam(World &w, StepContext &step);
 void reserve_contacts(World &w, StepContext &step);  // memory for keep_contacts()
 void keep_contacts(World &w, StepContext &step);     // store, events, hold, work, report; allocates nothing
-// all, with their events, where no stage of a plan looks after them
+// all, with their events, if the plan has no stage for contacts
 void end_contacts(World &w);
 void reserve_events(World &w, size_t more);
 void add_event(World &w, uint32_t kind, uint64_t a, uint64_t b, uint64_t key, double t);  // a, b: ids

@@ -51,7 +51,7 @@ constexpr Stage kTable[] = {
 };
 constexpr ContactMethod kVelocity{"velocity", kTable};
 
-// A row of the method's table, timed and traced.
+// Runs a row of the method's table, with timing and tracing.
 bool run(size_t row, World &w, StepContext &step, uint32_t *trouble) {
   const Stage &stage = w.method->table[row];
   struct Timer {
@@ -124,8 +124,7 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
   release_overlaps(w);
   if (!std::exchange(w.overlaps.told, true)) *trouble |= DFM_TROUBLE_OVERLAP;
   if (bound_due(w)) update_bound(w);
-  const double needed =
-      std::ceil(dt / w.bound.step - 1e-9);  // bound.step is infinite where nothing bounds it
+  const double needed = std::ceil(dt / w.bound.step - 1e-9);  // bound.step is infinite without a bound
   if (!(needed <= w.def.max_substeps)) {
     if (may_take_up_implicit(w)) end_explicit_step();
     set_last_error(
@@ -149,7 +148,7 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
   begin_impulses(w.step_impulses);
   begin_tools(w, dt);
   const double goal = w.time + dt;
-  // `cut` equal sub-steps since `from`; the rest of the step is cut finer where the bound has fallen
+  // `cut` equal sub-steps since `from`; the rest of the step is divided further if the bound has fallen
   double from = w.time, span = dt;
   uint32_t cut = n, done = 0;
   for (uint32_t k = 0; k < cut; ++k, ++done) {
@@ -203,7 +202,7 @@ bool advance(World &w, StepContext &step, double end, double goal, bool last, ui
   for (bool whole = false; !whole;) {
     const double rest = step.h = end - w.time;
     step.left = goal - w.time;
-    // waking changes what a later failure must put back
+    // waking changes state that a later failure must restore
     if (step.h < step.left || (w.def.sleep && !all_idle(w, step))) keep_start(w, step);
     charge(w, step, 1);
     view_obstacles(w, step);
@@ -222,7 +221,7 @@ bool advance(World &w, StepContext &step, double end, double goal, bool last, ui
   return true;
 }
 
-// Until bodies move as their contacts ask, and with h so short that the guard has nothing against it.
+// Repeats until bodies and contacts are consistent, and h is short enough for the guard.
 bool piece(World &w, StepContext &step, uint32_t *trouble) {
   const uint32_t before = *trouble;
   const uint64_t unconverged = w.stats.unconverged;
@@ -241,7 +240,7 @@ bool piece(World &w, StepContext &step, uint32_t *trouble) {
   return true;
 }
 
-// All stages, or none: where one fails or throws, the state is that of the sub-step before.
+// All stages or none: if one fails or throws, the state is that before the sub-step.
 bool sub_step(World &w, StepContext &step, uint32_t *trouble) {
   struct Undo {
     World &w;
