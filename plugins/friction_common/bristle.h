@@ -43,29 +43,30 @@ struct Batch {
   double v_d, sigma2;
 };
 
-// N: a smaller normal force counts as none; the square of a greater one has no double
+// N: smaller normal forces count as zero; the square of larger ones overflows
 constexpr double kLeast = 1e-140, kMost = 1e140;
-constexpr double kFar = 1e100;  // m/s and m: greater ones count as this
+constexpr double kFar = 1e100;  // m/s and m: larger values are clamped to this
 constexpr double kWide = 1e20;  // m^2
 
-// A block of eight contacts on its way through the passes.
+// Intermediate values of a block of eight contacts.
 struct Block {
   double poison[kLanes], fn[kLanes], k0[kLanes], k1[kLanes], k2[kLanes];
-  // by_w = 1/w, held at its value for 1e-140 m/s below it
+  // by_w = 1/w, constant below 1e-140 m/s
   double vx[kLanes], vy[kLanes], w[kLanes], by_w[kLanes];
-  double zx[kLanes], zy[kLanes], cut[kLanes];  // z0, and 1/fn where the cone cut the old bristle, else 0
+  // z0, and 1/fn if the cone has shortened the old bristle, else 0
+  double zx[kLanes], zy[kLanes], cut[kLanes];
   double mu[kLanes], g[kLanes], fall[kLanes];  // g = mu fn, fall = w g'(w)
   double ex[kLanes], ey[kLanes];               // v/w, 0 at rest
   // plastic rate and its total derivatives by v and fn
   double m[kLanes], mx[kLanes], my[kLanes], mn[kLanes];
 };
 
-// Where the columns of eight contacts go; one that is not wanted goes to a place of its own, so that
-// no two overlap.
+// Output columns of eight contacts; an unwanted column goes to a separate spare place, so that no two
+// overlap.
 enum Column { kFx, kFy, kZx, kZy, kXx, kXy, kYx, kYy, kNx, kNy, kLimit, kStored, kColumns };
 struct Columns {
   double *first[kColumns], spare[kColumns][kLanes];
-  size_t follows[kColumns];  // all ones: a column of the batch; 0: a spare place
+  size_t follows[kColumns];  // all ones: a column of the batch; 0: the spare place
   DEFORM_PASS Columns(dfm_friction_out *out, size_t stride) {
     const auto place = [&](uint32_t at, double *base, uint32_t n) DEFORM_PASS {
       for (uint32_t c = 0; c < n; ++c) {
@@ -83,7 +84,7 @@ struct Columns {
   DEFORM_PASS double *to(Column c, size_t at) const { return first[c] + (at & follows[c]); }
 };
 
-// Are all eight within the range that the passes compute in? Not where an input is NaN.
+// Whether all eight are within the range of the passes; false if an input is NaN.
 DEFORM_PASS inline bool sound(const dfm_friction_in *in, size_t at) {
   const size_t stride = in->stride;
   const double *const fn = in->fn + at;
@@ -101,7 +102,7 @@ DEFORM_PASS inline bool sound(const dfm_friction_in *in, size_t at) {
   return odd == 0;
 }
 
-// kSound: nothing to hold within bounds, nothing bad to pass on.
+// kSound: no value to clamp, no invalid value to pass on.
 template <bool kSound, bool kFlat>
 DEFORM_PASS inline void load(const Batch &p, const dfm_friction_in *in, size_t at, Block &b) {
   const size_t stride = in->stride;
@@ -114,7 +115,7 @@ DEFORM_PASS inline void load(const Batch &p, const dfm_friction_in *in, size_t a
   double size2[kLanes], over[kLanes];
   uint64_t cuts = 0;
   EACH_LANE (i) {
-    // 0 where every input is finite, NaN otherwise: no output of a bad lane passes for a good one.
+    // 0 if every input is finite, else NaN, so that a lane with an invalid input has invalid outputs.
     b.poison[i] =
         kSound ? 0.0
                : ((0.0 * fn[i] + 0.0 * vx[i]) + (0.0 * vy[i] + 0.0 * zx[i])) + (0.0 * zy[i] + 0.0 * area[i]);
@@ -204,7 +205,7 @@ DEFORM_PASS inline void damping(const Batch &p, const Block &b, Damping &d) {
       const double kw = b.k1[i] * W[i];
       const double sum = level4 + kw;
       const double inverse = 1.0 / (sum > kLeast ? sum : kLeast);
-      // K1e = K1 share; at g = W = 0 a limit of no interest: nothing touches
+      // K1e = K1 share; the limit at g = W = 0 has no effect, because there is no contact
       const double share = level4 * inverse, rest = kw * inverse;
       const double by_speed = -(b.k1[i] * share) * (b.k1[i] * inverse);
       const double by_g = 4.0 * b.k1[i] * rest * inverse;
@@ -234,8 +235,8 @@ DEFORM_PASS inline void damping(const Batch &p, const Block &b, Damping &d) {
 }
 
 // kDamped: sigma1 > 0; kFlat: g does not depend on the speed, and nothing is viscous; kSlips: every
-// motion slips, m = w (Dahl, LuGre). Pointers that overlap nothing, as arguments, or the compiler would
-// not use vectors.
+// motion slips, m = w (Dahl, LuGre). Arguments are pointers that do not overlap; otherwise the compiler would
+// not vectorize.
 template <bool kDamped, bool kFlat, bool kSlips>
 DEFORM_PASS inline void answer(const Batch &p, const Block &b, const Damping &d, double *__restrict ofx,
                                double *__restrict ofy, double *__restrict ozx, double *__restrict ozy,
@@ -255,10 +256,10 @@ DEFORM_PASS inline void answer(const Batch &p, const Block &b, const Damping &d,
     const double sum = g + hk * m;
     const double divisor = sum > kLeast * 1e-10 ? sum : kLeast * 1e-10;
     const double poison = b.poison[i];
-    // q itself: at rest it is 1 to the bit, and a bristle that holds does not fade
+    // q itself: exactly 1 at rest, so that a holding bristle does not decay
     const double q = g / divisor, inverse = 1.0 / divisor;
     const double tx = z0x + p.h * vx, ty = z0y + p.h * vy, zx = tx * q, zy = ty * q;
-    // dm and dg times what they share
+    // dm and dg times their common factor
     const double mx = kSlips ? b.ex[i] : b.mx[i];
     const double my = kSlips ? b.ey[i] : b.my[i];
     const double by_plastic = kSlips ? 0.0 : q * b.mn[i];
@@ -323,8 +324,8 @@ DEFORM_PASS inline void answer(const Batch &p, const Block &b, const Damping &d,
                                  c.to(kNy, at), c.to(kLimit, at), c.to(kStored, at), mode);
 }
 
-// Law::batch(params), Law::kFlat, and Law::flow(params, batch, block), which fills m and its derivatives or
-// says false: every motion slips. That is all that a law of the family says.
+// A law of the family defines Law::batch(params), Law::kFlat, and Law::flow(params, batch, block), which
+// computes m and its derivatives, or returns false if every motion slips.
 template <class Law>
 struct Run {
   DEFORM_PASS static dfm_status run(const dfm_friction_in *in, dfm_friction_out *out) {

@@ -35,7 +35,7 @@ DEFORM_PASS inline void curve(double v_s, double delta, const double *w, double 
   EACH_LANE (i) e[i] = dfm_exp(-a[i]);
   EACH_LANE (i) {
     excess[i] = e[i];
-    slope[i] = e[i] > 0 ? -delta * a[i] * e[i] : 0.0;  // a may be infinite where e has vanished
+    slope[i] = e[i] > 0 ? -delta * a[i] * e[i] : 0.0;  // a may be infinite where e is zero
   }
 }
 

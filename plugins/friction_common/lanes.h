@@ -1,9 +1,9 @@
-// Eight contacts at a time, for every law of the shelf: the lanes, the values that they are kept within, and
-// the choice of vector width.
+// Eight contacts at a time, for every law of the library: lanes, ranges of values, and the choice of vector
+// width.
 //
-// The passes over a block choose by value, not by branch: real batches mix stick and slip, and a mispredicted
-// branch costs more than both sides. They run the same operations in the same order at every width, without
-// fused multiply-add, so the wide build of a law gives the bits of the narrow one.
+// The passes over a block select values instead of branching: real batches mix stick and slip, and a
+// mispredicted branch costs more than computing both sides. They run the same operations in the same order at
+// every width, without fused multiply-add, so every width gives the same bits.
 #pragma once
 #include <cmath>
 #include <cstdio>
@@ -17,10 +17,10 @@ namespace lanes {
 
 constexpr uint32_t kLanes = 8;
 
-// A pass over a block. Columns overlap nowhere, so each lane is on its own; the compiler cannot see
-// that and is told.
+// A pass over a block. Columns do not overlap, so lanes are independent; the compiler cannot detect that and
+// must be told.
 #ifdef __clang__
-// a build that does not optimize uses no vectors, and that is no fault
+// a build without optimization does not vectorize, which is no error
 #pragma clang diagnostic ignored "-Wpass-failed"
 #define EACH_LANE(i)                                                                                         \
   _Pragma("clang loop vectorize(assume_safety) interleave(disable) unroll(disable)") for (uint32_t i = 0;    \
@@ -57,9 +57,9 @@ inline Width widest() {
 inline Width widest() { return kNarrow; }
 #endif
 
-// Law::run(in, out) compiled once per width; the processor chooses. What it calls must become part of it, or
-// it would stay at the width that everybody has: gcc draws in whatever a `flatten` function calls, clang only
-// the outermost calls, so each pass says DEFORM_PASS.
+// Law::run(in, out) compiled once per width, selected at run time. Functions that it calls must be inlined,
+// otherwise they would have the baseline width: gcc inlines everything that a `flatten` function calls, clang
+// only the outermost calls, so each pass is marked DEFORM_PASS.
 template <class Law>
 DEFORM_AVX512 dfm_status eval_avx512(const dfm_friction_in *in, dfm_friction_out *out) {
   return Law::run(in, out);
@@ -73,7 +73,7 @@ DEFORM_NARROW dfm_status eval_narrow(const dfm_friction_in *in, dfm_friction_out
   return Law::run(in, out);
 }
 
-// DEFORM_SIMD (sse2, avx2, avx512) asks for less than the processor has; read when the plugin is loaded.
+// DEFORM_SIMD (sse2, avx2, avx512) limits the width; read when the plugin is loaded.
 inline Width chosen() {
   const char *const asked = std::getenv("DEFORM_SIMD");
   const Width most = widest();
@@ -92,8 +92,7 @@ dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
                             : eval_narrow<Law>(in, out);
 }
 
-// A NaN becomes `most`: what a lane computes stays finite, and its outputs are spoilt at the end
-// by what came in.
+// A NaN becomes `most`: intermediate values stay finite, and the outputs are set to NaN at the end.
 DEFORM_PASS inline double within(double x, double most) {
   const double low = x > -most ? x : -most;
   return low < most ? low : most;

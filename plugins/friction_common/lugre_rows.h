@@ -36,10 +36,10 @@ inline dfm_status check(const double *p, char *why, size_t cap) {
   return DFM_E_ARG;
 }
 
-constexpr int32_t kWarning = 2;  // DFM_LOG_WARNING of base.h, which plugins do not see
+constexpr int32_t kWarning = 2;  // DFM_LOG_WARNING of base.h, which plugins do not include
 
-// What constant micro-damping can push with at most, against the viscous part that must brake it; `excess` as
-// the law's flow has it.
+// The largest push of constant micro-damping, compared with the viscous part that must brake it; `excess` as
+// in the law's flow.
 inline void warn(const dfm_host *host, const double *p, double excess, const char *as) {
   char text[320] = "";
   const int form = static_cast<int>(p[kForm]);
@@ -59,7 +59,7 @@ inline void warn(const dfm_host *host, const double *p, double excess, const cha
   if (*text && host && host->log) host->log(host->ctx, kWarning, 0, text);
 }
 
-// Nothing is prepared: this is where a law may speak.
+// Prepares nothing; logs the warning, because a law may log here.
 inline dfm_status prepare(const dfm_host *host, const double *p, void **data) {
   *data = nullptr;
   warn(host, p, p[kSigma1] * (p[kMuS] - p[kMuC]), "(mu_S - mu_C)");

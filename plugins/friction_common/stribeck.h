@@ -1,4 +1,4 @@
-// Set-valued friction with a Stribeck curve: what the laws coulomb and karnopp share.
+// Set-valued friction with a Stribeck curve, shared by the laws coulomb and karnopp.
 //
 //   g(w) = F_C + (F_S - F_C) exp(-(w/v_s)^delta), F_C = mu_C fn, F_S = mu_S fn, w = |v|  (Stribeck curve, N)
 //   stick  |ft_stop| <= R:  ft = ft_stop, the force that makes the slip of this step zero
@@ -29,32 +29,31 @@ constexpr dfm_param kRows[kShared] = {
 };
 
 using lanes::kLanes;
-constexpr double kTiny = 1e-280, kHuge = 1e280;  // squares beyond these have lost digits or are about to
-// m/s; below it 1/w is held constant, so that no derivative is infinite
+constexpr double kTiny = 1e-280, kHuge = 1e280;  // squares of values beyond these underflow or overflow
+// m/s; below it 1/w is constant, so that no derivative is infinite
 constexpr double kRest = 1e-100;
 
-// kinetic_stop: what slides already is stopped by g(w) + sigma2 A w alone (Karnopp), not by F_S.
+// kinetic_stop: a sliding contact is stopped by g(w) + sigma2 A w alone (Karnopp), not by F_S.
 struct Batch {
   double mu_c, mu_s, v_s, delta, sigma2, band;
   bool kinetic_stop;
 };
 
-// Eight contacts: where their columns lie. An output that is not wanted goes to a place of its own, so that
-// no two overlap.
+// Columns of eight contacts. An unwanted output goes to a separate spare place, so that no two overlap.
 struct Block {
   const double *fn, *vx, *vy, *sx, *sy, *area;
   double *fx, *fy, *limit, *xx, *xy, *yx, *yy, *nx, *ny;
 };
 
-// What the passes over a block hand on: mode 0 open, 1 stick, 2 slip; odd: left to odd_lane; speed and its
-// inverse; excess s = exp(-a), a = (w/v_s)^delta, the share of F_S - F_C at this speed, and slope = w
-// s'(w) = -delta a s.
+// Intermediate values of a block: mode 0 open, 1 stick, 2 slip; odd: left to odd_lane; speed and its inverse;
+// excess s = exp(-a), a = (w/v_s)^delta, the share of F_S - F_C at this speed, and slope = w s'(w) = -delta a
+// s.
 struct Passes {
   double mode[kLanes], odd[kLanes], w[kLanes], inverse[kLanes], excess[kLanes], slope[kLanes];
 };
 
-// Where squares leave the range of doubles, or slip begins from the band of rest: rare, so one lane at a
-// time, scaled by the larger component.
+// If squares leave the range of doubles, or slip begins from the band of rest: rare, so one lane at a time,
+// scaled by the larger component.
 struct Polar { double length, x, y; };
 
 inline Polar polar(double x, double y) {
@@ -109,9 +108,9 @@ inline void odd_lane(const Batch &p, const Block &b, Passes &t, uint32_t i) {
   b.yy[i] = yy + poison;
 }
 
-// The passes below choose by value, not by branch: real batches mix stick and slip, and a mispredicted branch
-// costs more than both sides. Tells whether any lane slips; with kinetic_stop these are the lanes beyond the
-// band, and answer() finds those that stop.
+// The passes below select values instead of branching: real batches mix stick and slip, and a mispredicted
+// branch costs more than computing both sides. Returns whether any lane slips; with kinetic_stop these are
+// the lanes beyond the band, and answer() finds those that stop.
 struct Found { bool slips, odd; };
 template <bool kKineticStop>
 DEFORM_PASS inline Found decide(const Batch &p, const Block &b, Passes &t) {
@@ -163,7 +162,7 @@ DEFORM_PASS inline void answer(const Batch &p, const Block &b, Passes &t, double
     const double moves = mode > 1 ? 1.0 : 0.0;
     const double stops = kKineticStop && sx * sx + sy * sy <= level * level ? moves : 0.0;
     const double slip = moves - stops;
-    // What does not slip goes through the same operations with no direction and no level.
+    // Lanes without slip use the same operations with zero direction and zero level.
     const double fs = slip > 0 ? level : 0.0, ux = slip > 0 ? vx : 0.0, uy = slip > 0 ? vy : 0.0;
     const double hold = mode - moves - slip;
     const double hx = hold > 0 ? sx : 0.0;
@@ -186,7 +185,7 @@ DEFORM_PASS inline void answer(const Batch &p, const Block &b, Passes &t, double
   }
 }
 
-// Law::kKineticStop, and Law::band(params), which begins to matter where it is above zero.
+// A law defines Law::kKineticStop, and Law::band(params), which is used if it is above zero.
 template <class Law>
 struct Run {
   DEFORM_PASS static dfm_status run(const dfm_friction_in *in, dfm_friction_out *out) {

@@ -1,5 +1,5 @@
-// What laws with a Stribeck level answer to dfm_friction.without: the level does not fall where mu_S = mu_C,
-// and nothing grows with speed where sigma2 = 0. Row numbers of parameters one wide.
+// dfm_friction.without for laws with a Stribeck level: without the Stribeck effect mu_S = mu_C, without the
+// viscous part sigma2 = 0. The arguments are row numbers of scalar parameters.
 #pragma once
 #include <cstring>
 

@@ -55,7 +55,7 @@ DEFORM_PASS inline void trial(double a, const bristle::Batch &batch, const Block
     const double g = b.g[i];
     const double w = b.w[i];
     const double k0 = b.k0[i];
-    // too little bent for the exponent to be felt: left as it is
+    // deflection too small for the exponent to matter: unchanged
     const double loaded = g > 0 ? 1.0 : 0.0;
     const double moving = w > 0 ? loaded : 0.0;
     const double on = k0 * size > 1e-100 * g ? moving : 0.0;
@@ -117,7 +117,7 @@ DEFORM_PASS inline void solve(double a, Trial &t) {
 // |q|^(alpha - 1),
 //   (1 + p f') drho = drho_t - f dp + p rho^2 c' dkappa,
 //   drho_t - f dp = (h K0/F_C) (t - f v^) . dv + (K0 t.dz0 - rho dF_C)/F_C
-// Near q = 1 both quotients of c and c' lose their digits to a difference; their series do not.
+// Near q = 1 the quotients for c and c' lose digits by cancellation; their series do not.
 DEFORM_PASS inline void rates(double a, const bristle::Batch &batch, const Trial &t, Block &b) {
   const double c1 = a * (a - 1) / 2, c2 = c1 * (a - 2) / 3;
   EACH_LANE (i) {

@@ -75,7 +75,7 @@ DEFORM_PASS inline Yield yield(double rho, double lambda, const Exponent &e) {
       kPlain ? 1.0
              : (e.one * size + (1.0 - e.one)) * (e.two * q2 + (1.0 - e.two)) * (e.four * q4 + (1.0 - e.four));
   const double steep = kPlain ? 1.0 : e.i * power, bend = steep * rho * by_u * width, left = q * power;
-  // 1 - q^i = (1 - q)(1 + q + ...): no difference where little yields
+  // 1 - q^i = (1 - q)(1 + q + ...): avoids a difference when little yields
   const double *const n = e.takes;
   const double sum =
       1.0 + q * (n[1] + q * (n[2] + q * (n[3] + q * (n[4] + q * (n[5] + q * (n[6] + q * n[7]))))));
@@ -112,7 +112,7 @@ DEFORM_PASS inline void trial(const bristle::Batch &p, const Block &b, double ka
     t.by_r[i] = by_r;
     t.load[i] = load;
     t.top[i] = top;
-    const double both = 0.5 * (b.w[i] + load);  // rounds below 0 where slip and bristle are exactly opposed
+    const double both = 0.5 * (b.w[i] + load);  // may round below 0 if slip and bristle are exactly opposed
     t.mult[i] = multiplier == kCosine ? (both > 0 ? both : 0.0) : forward;
     t.p[i] = p.h * k * t.mult[i];
     t.rest[i] = multiplier == kCosine ? 0.5 * (beyond + beside) : load > 0 ? beside : top;
@@ -121,7 +121,7 @@ DEFORM_PASS inline void trial(const bristle::Batch &p, const Block &b, double ka
   }
 }
 
-// 1 where a lane yields, else 0.
+// 1 if a lane yields, else 0.
 DEFORM_PASS inline bool yields(const Return &t, double *active) {
   uint64_t some = 0;
   EACH_LANE (k) {
@@ -131,7 +131,7 @@ DEFORM_PASS inline bool yields(const Return &t, double *active) {
   return some != 0;
 }
 
-// Nobody yields: what rates() gives for f = 0 or M = 0, by the associated multiplier.
+// No lane yields: the result of rates() for f = 0 or M = 0, by the associated multiplier.
 DEFORM_PASS inline void hold(Block &b) {
   EACH_LANE (k) {
     const double plastic = b.g[k] > 1e-30 * b.fn[k] ? 1.0 : 0.0;
@@ -184,7 +184,7 @@ template <bool kPlain>
 DEFORM_PASS inline void rates(const bristle::Batch &p, const Exponent &exponent, int multiplier,
                               const Return &t, Block &b) {
   const double whole = multiplier == kCosine ? 0.5 : 0.0;
-  // no choice by `multiplier` in the loop, or the compiler would not use vectors
+  // no selection by `multiplier` in the loop; otherwise the compiler would not vectorize
   EACH_LANE (k) {
     const double plastic = b.g[k] > 1e-30 * b.fn[k] ? 1.0 : 0.0;
     const double level = plastic > 0 ? b.g[k] : 1.0;

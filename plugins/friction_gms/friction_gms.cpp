@@ -67,12 +67,12 @@ constexpr std::array<Slots, kMost> all_slots(std::index_sequence<N...>) {
 }
 constexpr std::array<Slots, kMost> kSlots = all_slots(std::make_index_sequence<kMost>{});
 
-uint32_t given(const double *p) {  // up to the last that is not 0
+uint32_t given(const double *p) {  // up to the last nonzero one
   uint32_t n = kMost;
   while (n > 0 && p[n - 1] == 0) --n;
   return n;
 }
-// Parameters that check refuses have no elements; this many keep what is asked for them within its arrays.
+// Invalid parameters have no elements; this number keeps accesses within the arrays.
 uint32_t elements(const double *params) {
   const uint32_t k = given(params + kK), nu = given(params + kNu);
   return std::max(k > 0 ? k : kUsual, nu > 0 ? nu : kUsual);
@@ -104,7 +104,7 @@ struct Block {
   // sums over elements
   double fx[kLanes], fy[kLanes], xx[kLanes], xy[kLanes], yx[kLanes], yy[kLanes], nx[kLanes], ny[kLanes],
       stored[kLanes], slips[kLanes];
-  // J; theta: share of the rise that is paid for
+  // J; theta: share of the rise that the budget covers
   double budget[kLanes], most[kLanes], theta[kLanes], theta_fn[kLanes], lost[kLanes];
 };
 
@@ -168,13 +168,13 @@ DEFORM_PASS inline void pay(const Batch &p, const dfm_friction_in *in, size_t at
     const double given = budget[i] > 0 ? budget[i] : 0.0;
     b.budget[i] = given < b.most[i] ? given : b.most[i];
     b.theta[i] = b.budget[i] < need[i] ? b.budget[i] / need[i] : 1.0;
-    // the bound goes as fn^2
+    // the bound is proportional to fn^2
     b.theta_fn[i] =
         b.theta[i] < 1.0 && given > b.most[i] ? 2.0 * b.theta[i] / (b.fn[i] > 0 ? b.fn[i] : kLargest) : 0.0;
   }
 }
 
-// Element e of eight contacts: its new deflection, its share of the sums.
+// Element e of eight contacts: its new deflection and its contribution to the sums.
 DEFORM_PASS inline void element(const Batch &p, uint32_t e, const dfm_friction_in *in, dfm_friction_out *out,
                                 size_t at, Block &b) {
   const size_t stride = in->stride;
@@ -195,7 +195,7 @@ DEFORM_PASS inline void element(const Batch &p, uint32_t e, const dfm_friction_i
     const double ax = K * (keeps * within(zx[i], kFar));
     const double ay = K * (keeps * within(zy[i], kFar));
     const double a2 = ax * ax + ay * ay;
-    // the old force into the new cone
+    // brings the old force into the new cone
     const double size = std::sqrt(a2 > kLeast * kLeast ? a2 : 1.0);
     const double r = a2 > kLeast * kLeast ? size : 0.0;
     const double outside = r > cone ? 1.0 : 0.0;

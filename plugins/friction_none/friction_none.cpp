@@ -1,10 +1,9 @@
-// No friction: zero force at every slip. A law of its own, so that a frictionless pair is a choice
-// like any other.
+// No friction: zero force at every slip. It is a law, so that a frictionless pair is selected like any other.
 #include "deform/plugin.hpp"
 
 namespace {
 
-// Zero, but for a lane whose input is not finite: that one must not pass for a result.
+// Zero, except for a lane whose input is not finite, which must not look valid.
 dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
   const size_t stride = in->stride;
   for (uint32_t i = 0; i < in->n; ++i) {

@@ -1,4 +1,4 @@
-// What kernels do with the points of a block, for the files that bring `v4` and its operations (lanes_avx.h,
+// Kernel functions for the points of a block, for files that define `v4` and its operations (lanes_avx.h,
 // lanes_sse2.h). Internal linkage only.
 #pragma once
 #include <stddef.h>

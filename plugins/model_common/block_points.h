@@ -1,5 +1,5 @@
-// The points of one block of a body, as kernels see them: those it owns, then those of other blocks that its
-// cells or springs touch (halo). Plain data only.
+// The points of one block of a body for kernels: its own points, then points of other blocks that its cells
+// or springs use (halo). Plain data only.
 #pragma once
 #include <stdint.h>
 
@@ -8,11 +8,11 @@ namespace model {
 struct BlockPoints {
   uint32_t owned, local;
   const uint32_t *point;  // [local] number of the point in the host's arrays
-  double *p;  // [local,8] x y z 0 vx vy vz 0: a point with its velocity is one cache line; lent by the pass
+  double *p;  // [local,8] x y z 0 vx vy vz 0: a point with its velocity is one cache line; owned by the pass
   double *f;  // [local,4]
 };
 
-// Slots of all blocks' f: a halo point of another block, and the point that it stands for.
+// Slots in the f of all blocks: a halo point of another block, and the corresponding own point.
 struct Merge { uint32_t from, to; };
 
 }  // namespace model

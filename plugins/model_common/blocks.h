@@ -1,6 +1,7 @@
-// A body's points cut into blocks that fit the first-level cache. Passes run block by block: each loads its
-// points and sums into its own array, halo included; then each adds up, in block order, what the others'
-// halos hold for its points. No two workers write one place, and the order of every sum is fixed by the mesh.
+// The points of a body divided into blocks that fit the first-level cache. Passes run block by block: each
+// loads its points and sums into its own array, halo included; then each adds up, in block order, what the
+// others' halos hold for its points. No two workers write the same place, and the mesh alone determines the
+// order of every sum.
 #pragma once
 #include <algorithm>
 
@@ -10,11 +11,11 @@
 
 namespace model {
 
-// Block: a BlockPoints with what the model adds.
+// Block: a BlockPoints with additions of the model.
 template <class Block>
 struct Blocks {
   static constexpr uint32_t kNone = ~0u;
-  // pieces of a pass at most: enough for the workers that one body can feed
+  // largest number of pieces of a pass: enough for the workers that one body can use
   static constexpr uint32_t kPieces = 32;
 
   const dfm_host *host = nullptr;
@@ -36,20 +37,20 @@ struct Blocks {
     return b;
   }
 
-  // fn over the blocks, by the host's workers where that pays.
+  // Calls fn for all blocks, on the host's workers if that is faster.
   void for_each_block(bool parallel, void (*fn)(void *, uint32_t, uint32_t), void *user) {
     if (parallel && host->parallel_for) return host->parallel_for(host->ctx, nblock, grain, fn, user);
     fn(user, 0, nblock);
   }
 
-  // Adds to block n what the others' halos hold for its points.
+  // Adds the halo values of other blocks to the points of block n.
   template <class Kernels>
   void merge_block(const Kernels &kernels, uint32_t n) {
     kernels.merge(f.data(), merge.data() + merge_begin[n], merge_begin[n + 1] - merge_begin[n]);
   }
 
  protected:
-  // What leads from the mesh to the blocks; a rank is a point's place in the order of partition_points.
+  // Maps from the mesh to the blocks; a rank is the place of a point in the order of partition_points.
   struct Order {
     // points by rank, ranks by point, first rank of each block, block of a rank
     Buffer<uint32_t> order, rank, begin, block_of;
@@ -87,7 +88,7 @@ struct Blocks {
     return n;
   }
 
-  // Places for all blocks' points; halo(b) finds that of block b.
+  // Allocates the points of all blocks; halo(b) finds the halo of block b.
   template <class Halo>
   void create_points(Order &l, const Halo &halo) {
     slot_begin.create(host, size_t(nblock) + 1);
@@ -123,7 +124,7 @@ struct Blocks {
     return out;
   }
 
-  // Halo sums by owner, sources in block order: the order of the sums is the mesh's, never the threads'.
+  // Halo sums by owner, sources in block order: the order of the sums depends on the mesh and not on threads.
   void build_merge(const Order &l) {
     merge_begin.create(host, size_t(nblock) + 1);
     const auto each = [&](auto &&use) {

@@ -1,4 +1,4 @@
-// Memory of a model: it all comes from the host, so that a refused allocation is the host's to answer for.
+// Memory of a model: all of it comes from the host's allocator.
 #pragma once
 #include <deform/plugin.h>
 

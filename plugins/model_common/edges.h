@@ -7,8 +7,8 @@ namespace model {
 
 constexpr int kEdgeOf[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
 
-// Number of the edge between two points; edges [nedge,2] i < j, lexicographic. Throws a sentence where it
-// lacks.
+// Number of the edge between two points; edges [nedge,2] i < j, lexicographic. Throws a message if it is
+// missing.
 inline uint32_t find_edge(const uint32_t *edges, uint32_t nedge, uint32_t a, uint32_t b) {
   const auto key = [](uint32_t i, uint32_t j) {
     return i < j ? uint64_t(i) << 32 | j : uint64_t(j) << 32 | i;

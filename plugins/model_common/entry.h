@@ -1,5 +1,5 @@
-// What the entry of every model on tetrahedra does: checks of parameters and mesh, an instance in the host's
-// memory, and failures as a status after a sentence in the log.
+// The entry shared by all models on tetrahedra: checks parameters and mesh, creates an instance in the host's
+// memory, and returns failures as a status after logging a message.
 #pragma once
 #include <deform/plugin.h>
 
@@ -10,7 +10,7 @@ namespace model {
 
 struct Refused {};  // thrown after the reason was logged
 
-// `who` begins the sentence, `what` ends without a full stop.
+// `who` begins the message, `what` ends without a full stop.
 inline void complain(const dfm_host *h, const char *who, const char *what) {
   char text[256];
   snprintf(text, sizeof text, "%s: %s.", who, what);
@@ -38,7 +38,7 @@ constexpr dfm_effect_rows rows_of(const dfm_effect_row (&rows)[N]) {
   return {sizeof(dfm_effect_rows), sizeof(dfm_effect_row), N, 0, rows};
 }
 
-// What keeps a model on tetrahedra with edges from taking the mesh; NULL: nothing.
+// Why a model on tetrahedra with edges cannot use the mesh; NULL if it can.
 inline const char *wrong_with(const dfm_mesh &m) {
   if (m.cell != DFM_CELL_TET) return "the cells must be tetrahedra";
   if (!m.npoint || !m.ncell || !m.nedge || !m.edges || !m.cells || !m.rest || !m.mass)
@@ -50,8 +50,8 @@ inline const char *wrong_with(const dfm_mesh &m) {
   return nullptr;
 }
 
-// A Body in the host's memory; body.create(h, m) may throw Refused, a sentence, or anything where memory
-// ends.
+// A Body in the host's memory; body.create(h, m) may throw Refused, a message, or any exception if memory
+// runs out.
 template <class Body>
 dfm_status create(const dfm_host *h, const dfm_mesh *m, const char *who, void **self) {
   *self = nullptr;
@@ -82,7 +82,7 @@ dfm_status create(const dfm_host *h, const dfm_mesh *m, const char *who, void **
   return status;
 }
 
-// Values for a living instance; body.apply_params(values) changes nothing where it throws.
+// New values for an instance; body.apply_params(values) changes nothing if it throws.
 template <class Body>
 dfm_status change(Body &body, const double *values) {
   try {
@@ -147,7 +147,7 @@ struct Ops {
   static constexpr dfm_idle kIdle = {sizeof(dfm_idle), 0, idle};
 };
 
-// What the plugin's entry answers.
+// The result of the plugin's entry.
 inline const dfm_plugin *enter(const dfm_host *host, const char *who, const dfm_plugin &plugin) {
   if (DFM_ABI_OK(host)) return &plugin;
   complain(host, who, "built for another plugin ABI: build it against this library's header");

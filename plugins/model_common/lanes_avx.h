@@ -1,6 +1,6 @@
 // Four doubles in one AVX register, for the files compiled with it. Internal linkage only.
 #pragma once
-// GCC 12 takes the undefined pass-through of its own unmasked intrinsics for a bug of ours
+// GCC 12 warns about the undefined pass-through operand of its own unmasked intrinsics
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
 #pragma GCC diagnostic ignored "-Wuninitialized"

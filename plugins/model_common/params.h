@@ -1,4 +1,4 @@
-// Parameters that come as fields by cell, and sets of values that are taken as a whole or not at all.
+// Parameters given as fields by cell, and sets of values that are applied completely or not at all.
 #pragma once
 #include <algorithm>
 #include <cstring>
@@ -40,12 +40,12 @@ void take_fields(const dfm_host *host, const char *who, const dfm_param *rows, u
     }
 }
 
-// Of a parameter that may come by cell.
+// For a parameter that may be given by cell.
 inline double largest_of(const Buffer<double> &field, double value, uint32_t ncell) {
   return field.empty() ? value : *std::max_element(field.data(), field.data() + ncell);
 }
 
-// `params` become `values` while make() takes the memory that they need, and stay so unless it throws.
+// Sets `params` to `values`, calls make() for the memory that they need, and restores them if it throws.
 template <size_t kCount, class Make>
 void try_params(double (&params)[kCount], const double *values, const Make &make) {
   double before[kCount];

@@ -1,5 +1,5 @@
-// Rotations out of a 3 x 3 matrix, one at a time: the nearest one for every matrix, and two that are compared
-// with it. All of them are proper (det = +1) whatever the matrix: flat, turned inside out, zero.
+// Rotations from a 3 x 3 matrix, one at a time: the nearest one for every matrix, and two others for
+// comparison. All of them are proper (det = +1) for every matrix: flat, inverted, zero.
 #pragma once
 #include <cmath>
 
@@ -52,7 +52,7 @@ inline void identity(double *r) {
   for (int k = 0; k < 9; ++k) r[k] = k % 4 == 0;
 }
 
-// Copies f over its largest entry; false where there is none, or it is not finite.
+// Copies f divided by its largest entry; returns false if that is zero or not finite.
 inline bool scaled(const double *f, double *out) {
   double most = 0;
   for (int k = 0; k < 9; ++k) {
@@ -81,8 +81,8 @@ inline void from_quaternion(const double *q, double *r) {
   r[7] = y * q[3] + x * q[0];
 }
 
-// w of the Newton step R exp([w]x): (tr S I - S) w = axial(R^T F), S the symmetric part of R^T F; false where
-// the matrix is not safely positive.
+// w of the Newton step R exp([w]x): (tr S I - S) w = axial(R^T F), S the symmetric part of R^T F; false if
+// the matrix is not safely positive definite.
 inline bool correction(const double *f, const double *r, double *w) {
   double a[9], b[3];
   for (int i = 0; i < 3; ++i)
@@ -102,8 +102,8 @@ inline bool correction(const double *f, const double *r, double *w) {
 }
 
 // Nearest rotation of any matrix: the eigenvector of the largest eigenvalue of Horn's matrix, which no matrix
-// makes ambiguous to the point of no result, then Newton's method on the rotation while that is safe. Of a
-// matrix without one nearest rotation (zero, not finite) the identity.
+// makes ambiguous to the point of no result, then Newton's method on the rotation while that is safe. Returns
+// the identity for a matrix without a unique nearest rotation (zero, not finite).
 inline void nearest(const double *given, double *r) {
   double f[9];
   if (!scaled(given, f)) return identity(r);

@@ -1,4 +1,4 @@
-// Which of the kernels compiled for several vector widths this processor runs.
+// Selects among the kernels compiled for several vector widths.
 #pragma once
 #include <deform/plugin.h>
 

@@ -1,6 +1,6 @@
-// org.deform.corotational_fem: linear tetrahedra whose strain is measured in a frame that turns with each
-// cell. Zerbato 2010, 2.1.2, (2.1)-(2.13), as corrected in doc/models/corotational_fem.md, which derives
-// what stands here.
+// org.deform.corotational_fem: linear tetrahedra whose strain is measured in a frame that rotates with each
+// cell. Zerbato 2010, 2.1.2, (2.1)-(2.13), as corrected in doc/models/corotational_fem.md, which derives what
+// stands here.
 #include <string.h>
 
 #include "../model_common/entry.h"
@@ -98,8 +98,7 @@ const dfm_slots kNoSlots = {sizeof(dfm_slots), 0, nullptr, 0, 0},
 
 constexpr uint32_t kCaps = DFM_CAP_ENERGY | DFM_CAP_STIFFNESS | DFM_CAP_DAMPING | DFM_CAP_ROTATION_INVARIANT;
 
-// A frame by Gram-Schmidt is not the one in which the energy is stationary, so forces are no gradient and
-// have a moment.
+// The energy is not stationary in a frame by Gram-Schmidt, so forces are no gradient and have a moment.
 uint32_t caps_of(const void *self) {
   const bool gradient = uint32_t(static_cast<const Body *>(self)->params[kRotation]) != kQr;
   return gradient ? kCaps : kCaps & ~uint32_t(DFM_CAP_ENERGY | DFM_CAP_ROTATION_INVARIANT);

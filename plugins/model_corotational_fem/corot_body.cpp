@@ -1,6 +1,6 @@
 // The ops on the blocks. Forces run in two passes: each block loads its points and sums its cells into its
 // own array, halo included; then each block adds up, in block order, what the others' halos hold for its
-// points. No two workers write one place, and the order of every sum is fixed by the mesh.
+// points. No two workers write the same place, and the mesh alone determines the order of every sum.
 #include <deform/elementary.h>
 
 #include "corot_body.h"
@@ -88,7 +88,7 @@ void Body::add_forces(const dfm_kin &k, double *f_out) {
   for_each_block(ncell >= kParallelMergeCells, merge_pass, &call);
 }
 
-// The logarithm is not for kernels: one cell after the other.
+// Uses the logarithm, which kernels do not have: one cell at a time.
 double Body::direct_energy(const dfm_kin &k, size_t place) const {
   const uint32_t c = cell_id[place], lane = uint32_t(place % kGroup);
   const Group &own = group[place / kGroup];

@@ -46,8 +46,8 @@ void complain(const dfm_host *h, const char *what);
 
 struct Body : model::Blocks<Block> {
   using Row = Param;
-  // From this size on the blocks go through the host's parallel_for; below it waking a worker costs more than
-  // it brings. Adding up the blocks is a twentieth of the work.
+  // From this size on blocks go through the host's parallel_for; below it waking a worker costs more than it
+  // saves. Summing the blocks is a twentieth of the work.
   static constexpr uint32_t kParallelCells = 3000, kParallelMergeCells = 100000;
 
   const Kernels *kernels = nullptr;
@@ -100,7 +100,7 @@ struct Body : model::Blocks<Block> {
   size_t lanes() const { return size_t(groups) * kGroup; }
   uint32_t groups = 0;
 
-  // why a parameter does nothing beside the present others; NULL where it does
+  // why a parameter has no effect with the present others; NULL if it has
   const char *idle(Param which) const;
   void create(const dfm_host *h, const dfm_mesh &m);
   void apply_params(const double *values);
@@ -111,12 +111,12 @@ struct Body : model::Blocks<Block> {
   void cell_energy(const dfm_kin &k, double *out);
   void cell_stress(const dfm_kin &k, double *out);
 
-  // Whether the cells have a plastic strain, which is for good: it is state.
+  // Whether the cells have a plastic strain, which cannot change: it is state.
   bool plastic() const { return made_plastic; }
-  bool lacks_state(const dfm_kin &k) const;  // says so
-  double flow_at(const dfm_kin &k) const;    // share of the flow that comes about in its step
+  bool lacks_state(const dfm_kin &k) const;  // logs it
+  double flow_at(const dfm_kin &k) const;    // share of the flow that occurs in the step
   bool nodal() const { return choice(kLocking) == kNodal; }
-  void dilate(const dfm_kin &k);  // before all that uses the volume change of the points
+  void dilate(const dfm_kin &k);  // before all code that uses the volume change of the points
   // Positions of the corners of a cell.
   void corners(const dfm_kin &k, uint32_t c, const double **x) const {
     for (size_t m = 0; m < 4; ++m) x[m] = k.x + size_t(k.stride) * cells[4 * size_t(c) + m];
@@ -149,7 +149,7 @@ struct Body : model::Blocks<Block> {
   void find_bulk();
   uint32_t slot_of(const Patches &in, uint32_t i, uint32_t j) const;
   void add_nodal(const dfm_kin &k, double a, double b, double *blk);
-  // what new parameters need, taken before anything changes: arrays to swap in, and sums on the way
+  // memory for new parameters, allocated before anything changes: arrays to swap in, and sums
   struct Room {
     Buffer<FibreGroup> fibre;
     Buffer<double> damp, damp_value, point_drag, around, next, blocks;
@@ -167,7 +167,7 @@ struct Body : model::Blocks<Block> {
   void find_rows(Room &room);
 };
 
-// What the passes over blocks hand on to their pieces.
+// Arguments of the passes over blocks.
 struct Call {
   Body *body;
   const dfm_kin *k;

@@ -1,4 +1,4 @@
-// From a mesh to blocks: cells side by side in groups, halos, and who adds up whose forces.
+// Builds blocks from a mesh: cells side by side in groups, halos, and the sums of forces between blocks.
 #include <cmath>
 
 #include "../model_common/edges.h"
@@ -15,7 +15,7 @@ const Kernels *choose_kernels(const dfm_host *host) {
 
 }  // namespace
 
-// A cell without volume keeps none of its gradients and with them no stiffness.
+// A cell without volume gets zero gradients, and so no stiffness.
 model::Tetrahedron shape_of(const double *rest, const uint32_t *cell) {
   const double *x[4];
   for (int a = 0; a < 4; ++a) x[a] = rest + 3 * size_t(cell[a]);
@@ -78,7 +78,7 @@ uint32_t Body::cell_halo(Layout &l, uint32_t b) const {
   });
 }
 
-// The last group is filled up with the block's first cell, which then has no stiffness.
+// The last group is padded with the first cell of the block, without stiffness.
 void Body::fill_groups(const Layout &l, const dfm_mesh &m, uint32_t b, uint32_t groups_at) {
   const uint32_t begin = l.cell_begin[b], count = l.cell_begin[b + 1] - begin;
   for (uint32_t n = 0; n < block[b].groups * kGroup; ++n) {
@@ -102,7 +102,7 @@ void Body::build_blocks(const dfm_mesh &m) {
   Layout l;
   order_points(l, m.rest);
   order_cells(l);
-  // Sizes, then one allocation per array, then each block's share.
+  // Sizes, then one allocation per array, then the data of each block.
   create_points(l, [&](uint32_t b) { return cell_halo(l, b); });
   for (uint32_t b = 0; b < nblock; ++b) {
     block[b].groups = (l.cell_begin[b + 1] - l.cell_begin[b] + kGroup - 1) / kGroup;

@@ -1,4 +1,4 @@
-// From parameters and fields by cell to what the passes read. What nothing calls for stays empty.
+// Converts parameters and fields by cell to the arrays that the passes read. Unused arrays stay empty.
 #include <stdio.h>
 
 #include "../model_common/params.h"
@@ -25,8 +25,8 @@ double Body::largest_of(Param which) const { return model::largest_of(field[whic
 
 bool Body::given(Param which) const { return largest_of(which) != kAuto; }
 
-// Constants of a cell as a solid with an axis: what is left to `auto` is as without one. Refuses constants
-// without a positive energy.
+// Constants of a cell as a transversely isotropic solid: `auto` values are those of the isotropic one.
+// Refuses constants without a positive energy.
 model::Fibre Body::fibre_at(uint32_t c) const {
   const auto or_else = [&](Param which, double otherwise) {
     const double x = at(which, c);
@@ -162,7 +162,7 @@ const char *Body::idle(Param which) const {
   return nullptr;
 }
 
-// All or nothing: what may fail comes first.
+// All or nothing: steps that may fail come first.
 void Body::apply_params(const double *values) {
   Room room;
   model::try_params(params, values, [&] { make_room(room); });

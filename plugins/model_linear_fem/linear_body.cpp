@@ -1,8 +1,8 @@
 // K is the sum over the cells of V [ lambda g_a g_b^T + mu g_b g_a^T + mu (g_a.g_b) I ], the block between
 // corners a and b, g their gradients. Its rows sum to zero, so forces are taken of differences,
 //   f_i = - sum_j K_ij (w_j - w_i),   w = u + damping_stiffness v,
-// and a body that is moved as a whole has none to the last bit of its positions. Rows are summed in the order
-// of the neighbors: bits do not depend on the cut of the work.
+// and a translated body has zero forces up to the rounding of its positions. Rows are summed in the order of
+// the neighbors: bits do not depend on the division of the work.
 
 #include <algorithm>
 #include <cmath>
@@ -20,7 +20,7 @@ namespace {
 
 // From this size on rows go through the host's parallel_for, in pieces of this many points.
 constexpr uint32_t kParallelCells = 10000, kGrain = 512;
-// Up to which small displacements are taken for the true ones: tangent of the turn, largest strain.
+// Range of small displacements: tangent of the rotation, largest strain.
 constexpr double kLargestTurn = 0.27, kLargestStrain = 0.3;
 
 // The angle of a tangent to half a degree, for a sentence.
@@ -249,9 +249,9 @@ double Body::energy(const dfm_kin &k) {
   return sum;
 }
 
-// Energies are asked for now and then and not in each step, which makes them the place to look at turns and
-// strains. Of a turn by theta about an axis n the forces are zero with u = tan(theta) n x X, so the
-// antisymmetric part of the gradient is its tangent.
+// Energies are computed occasionally and not in each step, so rotations and strains are checked there. Of a
+// turn by theta about an axis n the forces are zero with u = tan(theta) n x X, so the antisymmetric part of
+// the gradient is its tangent.
 void Body::look_at(uint32_t c, const dfm_kin &k, const Tetrahedron &t, Farthest &most) const {
   double h[3][3] = {}, turn = 0, strain = 0;
   gradient_of(c, k, t, h);
@@ -265,7 +265,7 @@ void Body::look_at(uint32_t c, const dfm_kin &k, const Tetrahedron &t, Farthest 
   if (beyond > most.beyond) most = {beyond, std::sqrt(turn), strain, c};
 }
 
-// When a cell leaves the range, and again where it has gone twice as far since.
+// Warns when a cell leaves the range, and again when it is twice as far out.
 void Body::tell(const Farthest &most) {
   if (!(most.beyond > 1) || !(most.beyond > 2 * told)) return;
   told = most.beyond;

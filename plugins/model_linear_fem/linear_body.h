@@ -54,7 +54,7 @@ struct Body {
   Buffer<double> drag, volume;  // [npoint] kg/s; m3, four times its own
   Buffer<double> ksum, csum;    // [npoint] of the bound
   bool damping_on = false, drag_on = false;
-  double told = 0;  // how far beyond its range the model was when it said so last
+  double told = 0;  // excess over the range at the last warning
 
   // The cell that is farthest from small displacements: of the limits, tangent of its turn, strain.
   struct Farthest {

@@ -1,6 +1,6 @@
 // The ops on the blocks. Forces run in two passes: each block loads its points, sums its springs and cells
 // into its own array, halo included; then each block adds up, in block order, what the others' halos hold for
-// its points. No two workers write one place, and the order of every sum is fixed by the mesh.
+// its points. No two workers write the same place, and the mesh alone determines the order of every sum.
 #include <deform/elementary.h>
 
 #include "../model_common/width.h"

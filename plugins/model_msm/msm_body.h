@@ -91,8 +91,8 @@ struct Single {
 
 struct Body : model::Blocks<Block> {
   using Row = Param;
-  // From this size on the blocks go through the host's parallel_for; below it waking a worker costs more than
-  // it brings. Adding up the blocks is a twentieth of the work.
+  // From this size on blocks go through the host's parallel_for; below it waking a worker costs more than it
+  // saves. Summing the blocks is a twentieth of the work.
   static constexpr uint32_t kParallelCells = 10000, kParallelMergeCells = 100000;
 
   const Kernels *kernels = nullptr;
@@ -112,7 +112,7 @@ struct Body : model::Blocks<Block> {
   Buffer<double> rest_rows;
   Buffer<double> spring_sum, coupled;  // [npoint] sum of the springs' stiffness k; sum of k w_other / w_own
 
-  // What an effect that is off leaves empty.
+  // Empty if the effect is off.
   Buffer<double> edge_tilt, edge_rest;  // [nedge] w^2 and sqrt(L0^2 + w^2)
   // [nedge], [npoint] damper over stiffness and its largest around a point, where it differs
   Buffer<double> edge_damp, damp_most;
@@ -128,12 +128,12 @@ struct Body : model::Blocks<Block> {
   Buffer<uint32_t> limited;  // [nblock] cells beyond their limit at the last bound
   Buffer<Quad> quad;
   Buffer<Cell> cell;
-  Single single;  // empty until somebody asks for it
+  Single single;  // empty until it is needed
   bool has_single() const { return !single.block.empty(); }
-  const char *keeps_double() const;  // why there are no forces in single precision; NULL: there are
+  const char *keeps_double() const;  // why forces in single precision are not available; NULL if they are
   void prepare_single();
 
-  // why a parameter does nothing beside the present others; NULL where it does
+  // why a parameter has no effect with the present others; NULL if it has
   const char *idle(Param which) const;
   uint32_t choice(Param which) const { return uint32_t(params[which]); }
   bool volume_on = false, cells_on = false;  // the volume term; that or the resistance to collapse
@@ -209,8 +209,7 @@ struct Body : model::Blocks<Block> {
   size_t fill_cells(const Layout &l, Block &out, uint32_t b, size_t cells_at);
   void take_fields(const dfm_mesh &m);
   void find_shapes();
-  // what new parameters need, taken before anything changes: arrays to swap in, and sums and
-  // vectors on the way
+  // memory for new parameters, allocated before anything changes: arrays to swap in, sums and vectors
   struct Room {
     Buffer<double> edge_tilt, edge_rest, tilt, edge_damp, damp_most, damp, point_drag, rest_now;
     Buffer<double> damp_share, drag_around, own, next, gradient;
@@ -231,7 +230,7 @@ struct Body : model::Blocks<Block> {
   void add_cells(const dfm_kin &k, double a, double *blk) const;
 };
 
-// What the passes over blocks hand on to their pieces.
+// Arguments of the passes over blocks.
 struct Call {
   Body *body;
   const dfm_kin *k;
@@ -242,8 +241,8 @@ struct Call {
 // Best kernels of this processor, or those that DEFORM_SIMD names.
 const Kernels *choose_kernels(const dfm_host *host);
 
-// Six volumes and the length of a spring, by the operations of the kernels, so that the rest shape
-// gives exactly zero.
+// Six times the volume and the length of a spring, by the operations of the kernels, so that forces of the
+// rest shape are exactly zero.
 inline double volume6_of(const double *x0, const double *x1, const double *x2, const double *x3) {
   const double a[3] = {x1[0] - x0[0], x1[1] - x0[1], x1[2] - x0[2]};
   const double c[3] = {x2[0] - x0[0], x2[1] - x0[1], x2[2] - x0[2]};

@@ -1,4 +1,4 @@
-// From a mesh to blocks: rows of springs in quads, halos, and who adds up whose forces.
+// Builds blocks from a mesh: rows of springs in quads, halos, and the sums of forces between blocks.
 #include <algorithm>
 
 #include "../model_common/edges.h"
@@ -160,7 +160,7 @@ void Body::build_blocks() {
   order_points(l, rest_point.data());
   order_springs(l);
   order_cells(l);
-  // Sizes, then one allocation per array, then each block's share.
+  // Sizes, then one allocation per array, then the data of each block.
   create_points(l, [&](uint32_t b) { return spring_halo(l, b); });
   size_t nquad = 0, ncells = 0;
   for (uint32_t b = 0; b < nblock; ++b) {

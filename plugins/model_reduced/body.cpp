@@ -1,4 +1,4 @@
-// What is made once: modes, their integrals, memory. And what pictures ask for.
+// Set-up: modes, their integrals, memory. Also output for pictures.
 #include "body.h"
 
 #include <algorithm>

@@ -1,7 +1,7 @@
-// Linear elasticity of a mesh in its frame: stiffness, what is held, and the displacements that forces call
-// for. A body of which nothing is held has no displacement of its own under a force that moves it: its
-// compliance is that of the force less the inertia forces it raises, and moves neither the center of mass
-// nor turns the body (displacements orthogonal, by mass, to the rigid motions).
+// Linear elasticity of a mesh in its frame: stiffness, held components, and displacements under forces. For a
+// body without held points the compliance applies to the force minus the inertia forces of the rigid
+// acceleration, and its displacements neither move the center of mass nor rotate the body (they are
+// orthogonal, by mass, to the rigid motions).
 #pragma once
 #include <deform/plugin.h>
 

@@ -1,7 +1,7 @@
 // The largest eigenpairs by Lanczos's method on blocks of kLanes vectors (Golub and Underwood 1977): as many
 // right-hand sides go through the factor for the price of two or three, and the copies of a multiple
 // eigenvalue are found together. All vectors are kept and orthogonalized against each other, so there is no
-// restart and nothing to find twice.
+// restart and no eigenpair is found twice.
 #include <Eigen/Dense>
 
 #include <algorithm>

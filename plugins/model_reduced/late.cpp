@@ -1,10 +1,10 @@
 // A held body whose state tells where it is: q, q' and what follows at rest. A step then needs and moves the
 // points that a surfel hangs on or that are held, O(surface x modes), and with contact one column of C_rest
-// at those points for each component that is pushed. All other points are found when somebody asks: the same
-// sums over all of the matrix of modes, and over all columns that have not decayed.
+// at those points for each component that is pushed. All other points are computed on demand: the same sums
+// over the whole matrix of modes, and over all columns that have not decayed.
 //
-// This holds while nothing held moves, and forces are a uniform acceleration; else all points are moved, as
-// they are where the points lead (step.cpp).
+// This applies while held points do not move and forces are a uniform acceleration; otherwise all points are
+// moved, as in step.cpp.
 #include <algorithm>
 #include <cmath>
 #include <vector>
