@@ -83,7 +83,9 @@ void AreaShares::share(std::span<const ContactPoint> contacts, const double *imp
                                                                                               : beside) -=
               c.weight[k];
       }
-      covered = std::min(1.0, covered);
+      // places beyond an edge of the face have weights below zero and above one
+      covered = std::clamp(covered, 0.0, 1.0);
+      beside = std::max(beside, 0.0);
       given_[i] = idle(i) ? 2 * area[i] * (1 - covered) / (1 + beside) : 2 * area[i] / (1 + covered);
       area[i] *= 2 / (1 + covered);
     }

@@ -30,7 +30,8 @@ void drop_impulses(ContactRows &rows, const RowsPart &part) {
   rows.restore(part);
 }
 
-void fix_limits(const ContactRows &rows, const RowsPart &part, const ContactState &law, Array<double> &limit) {
+void fix_limits(const ContactRows &rows, const RowsPart &part, const ContactState &law,
+                Array<double> &limit) {
   limit.clear();
   each_row(part.contacts, [&](uint32_t i) {
     const double ln = rows.impulse[size_t(i) * 3], fn = law.fn[i];

@@ -89,9 +89,14 @@ void take_best(StepContext &step, const SolveIsland &own) {
   step.rows.restore(own.part);
 }
 
-// Bonds are solved to a share of their tolerance, so that the residual which the next sweep finds comes from the
-// contacts.
+// Bonds are solved to a share of their tolerance, so that the residual of the next sweep comes from contacts.
 constexpr double kBondShare = 0.1;
+void solve_island_bonds(const World &w, StepContext &step, SolveIsland &own) {
+  if (!own.part.nbond) return;
+  const uint32_t passes = solve_bonds(step.rows, own.part, kBondShare * own.tolerance.bond, own.scratch);
+  spend(w, step, own.spent, uint64_t{passes} * own.part.nbond);
+}
+
 // Multiplications of a sweep by the pairs of touched surfels that answer each other: three columns of four.
 constexpr double kSweepWork = 12;
 void sweep_once(const World &w, StepContext &step, SolveIsland &own, double leave) {
@@ -223,10 +228,10 @@ bool sweep_until_good(const World &w, StepContext &step, SolveIsland &own) {
   return best <= 1;
 }
 
-// Sweeps that have not converged may leave impulses that do work: with much friction in a jam each sweep adds to
-// it. If the contacts of an island do more work than their bias velocities explain, it is solved again with fixed
-// friction limits, without friction first, which cannot add energy (contact/fixed_limits.h,
-// doc/decisions/0425).
+// A solve that did not converge may leave impulses that do work: with much friction in a jam each sweep adds
+// to it. If the contacts of an island do more work than their bias velocities explain, the island is solved
+// again with fixed friction limits, first without friction, which cannot add energy
+// (contact/fixed_limits.h, doc/decisions/0425-contact-does-no-work-of-its-own.md).
 constexpr double kExcess = 0.1;       // of the work that the impulses would do without a response
 constexpr uint32_t kFixedSweeps = 8;  // without friction, and as many with friction
 void hold_work_back(const World &w, StepContext &step, SolveIsland &own) {
@@ -236,6 +241,7 @@ void hold_work_back(const World &w, StepContext &step, SolveIsland &own) {
   own.limit.assign(own.part.n, 0.0);
   for (uint32_t k = 0; k < 2 * kFixedSweeps; ++k) {
     if (k == kFixedSweeps) fix_limits(step.rows, own.part, step.state, own.limit);
+    own.spent.effort += own.effort;
     spend(w, step, own.spent, own.part.all());
     sweep_fixed(step.rows, own.part, own.limit.data());
     ++own.sweeps;

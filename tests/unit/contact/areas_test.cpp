@@ -70,6 +70,14 @@ TEST(AreaShares, CornersOfBothSides_HaveHalfWhereTheOtherSideIsCovered) {
   EXPECT_EQ(shared(c, {1, 0})[0], 2) << "what carries nothing covers nothing";
 }
 
+// Beside a concave edge the place on the other face's plane lies beyond that face.
+TEST(AreaShares, PlaceBeyondAFace_NeverMakesAnAreaNegative) {
+  const std::vector<ContactPoint> c{corner(0, 1, 0, {{100, -2}, {101, 1.5}, {102, 1.5}}, 1),
+                                    corner(1, 0, 100, {{0, 1}}, 1)};
+  EXPECT_EQ(shared(c, {1, 1})[0], 2);
+  EXPECT_GE(shared(c, {0, 0})[0], 0);
+}
+
 TEST(AreaShares, Crossing_TakesFromLoadedCornersAndMakesNone) {
   const std::vector<ContactPoint> c{corner(0, 1, 0, {{110, 1}}, 1), corner(0, 1, 1, {{111, 1}}, 1),
                                     crossing(0, 1, 0.25, 100, 101, 0.5)};
