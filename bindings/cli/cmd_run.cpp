@@ -184,9 +184,10 @@ class Runner {
     std::vector<std::string> out;
     // A start with inverted cells may also cross itself; only what is left of that at the end counts.
     if (spoiled_ && checks().inverted_last > 0)
-      out.push_back(std::to_string(checks().inverted_last) +
-                    " cells that \"start\" inverted are still inverted at the end: give it more time, or use "
-                    "a model that recovers (corotational_fem, shape_matching)");
+      out.push_back(
+          std::to_string(checks().inverted_last) +
+          " cells inverted by \"start\" are still inverted at the end: simulate a longer time, or use "
+          "a model that recovers (corotational_fem, shape_matching)");
     else if (!spoiled_ && trouble_ & DFM_TROUBLE_INVERTED)
       out.push_back("cells became inverted (inside out): refine the mesh or reduce the load");
     const size_t between = spoiled_ ? checks().between_last : checks().between_max;

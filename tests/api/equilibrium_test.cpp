@@ -256,7 +256,7 @@ TEST(Equilibrium, StaticSceneThatCannotBe_IsRefusedWhenItIsRead) {
     "radius": 0.1, "mass": 1, "pose": {"position": [0, 0, 1]}}]})";
   const std::pair<const char *, const char *> cases[] = {
       {rigid, "moving rigid bodies"},
-      {R"(, "contact": {"method": "rollback"})", "contact method is rollback"}};
+      {R"(, "contact": {"method": "rollback"})", "does not support the contact method rollback"}};
   for (const auto &[more, word] : cases) {
     const test::CommandResult r =
         test::deform({"run", block_scene(folder, more), "--out", folder + "/out", "--quiet"});

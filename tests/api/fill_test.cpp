@@ -114,10 +114,12 @@ TEST(MeshFillCommand, Shares_SurviveInVtkAndVtu_AndTheirLossIsTold) {
   EXPECT_GT(mean, 0.3);
   EXPECT_LT(mean, 0.8);
   for (const char *name : {"c.msh", "c.msh2", "c.mesh"}) {
-    EXPECT_NE(fill(name).out.find("warning: not kept: shares of material"), std::string::npos) << name;
+    EXPECT_NE(fill(name).out.find("warning: not kept: the share of material of each cell"), std::string::npos)
+        << name;
     const test::CommandResult converted =
         test::deform({"mesh", "convert", folder + "/a.vtu", folder + "/" + name});
-    EXPECT_NE(converted.err.find("not kept: shares of material"), std::string::npos) << name << converted.err;
+    EXPECT_NE(converted.err.find("not kept: the share of material of each cell"), std::string::npos)
+        << name << converted.err;
     EXPECT_EQ(FromFile(folder + "/" + name).share, nullptr);
   }
 }

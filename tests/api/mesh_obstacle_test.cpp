@@ -75,7 +75,7 @@ TEST(MeshObstacle, WhatIsWrong_IsSaid) {
       {test::mesh_def("m", bad_point), {"point 2", "finite"}},
       {test::mesh_def("m", far), {"triangle 1", "100000"}},
       {test::mesh_def("m", twice), {"triangle 1", "twice"}},
-      {test::mesh_def("m", inward, DFM_SHAPE_VOXELS, 1000), {"inward", "turn"}},
+      {test::mesh_def("m", inward, DFM_SHAPE_VOXELS, 1000), {"inward", "reverse its triangles"}},
       {test::mesh_def("m", open, DFM_SHAPE_VOXELS, 1000), {"closed", "shape mesh"}},
       {few, {"63 cells", "64"}},
   };

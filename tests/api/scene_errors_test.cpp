@@ -130,7 +130,7 @@ TEST(SceneErrors, Ranges_AreChecked) {
          {"/output/every=0", {"/output/every", "above 0"}},
          {"/output/camera={\"eye\":[1,1,1],\"look_at\":[1,1,1]}", {"/output/camera", "same point"}},
          {"/gravity={\"keyframes\":[{\"t\":1,\"value\":[0,0,0]},{\"t\":1,\"value\":[0,0,0]}]}",
-          {"/gravity/keyframes/1/t", "rise"}}});
+          {"/gravity/keyframes/1/t", "must increase"}}});
 }
 
 TEST(SceneErrors, Switches_SayWhatTheyLack) {

@@ -172,7 +172,7 @@ TEST(SceneStart, InsideOut_IsWarnedOfWhereItLasts) {
     return test::read_file(folder + "/out/summary.json");
   };
   const std::string soon = log("1e-6", "1e-5"), late = log("0.005", "0.1");
-  EXPECT_NE(soon.find("72 cells that \"start\" inverted are still inverted"), std::string::npos) << soon;
+  EXPECT_NE(soon.find(R"(72 cells inverted by \"start\" are still inverted)"), std::string::npos) << soon;
   EXPECT_EQ(late.find("are still inverted"), std::string::npos) << late;
   EXPECT_EQ(late.find("crosses itself"), std::string::npos) << late;
 }

@@ -138,7 +138,8 @@ TEST(Loader, SymbolicLink_IsFollowed) {
 TEST(Loader, ForeignAbi_IsRefusedByTheLibrary) {
   Context c;
   EXPECT_EQ(load(c, plugin("tiny_foreign")), DFM_E_UNSUPPORTED);
-  EXPECT_TRUE(says("ABI 7 draft 3") && says("speaks ABI 1 draft 0") && says("rebuild")) << dfm_last_error();
+  EXPECT_TRUE(says("ABI 7 draft 3") && says("this library has ABI 1 draft 0") && says("rebuild"))
+      << dfm_last_error();
   EXPECT_TRUE(c.ids().empty());
 }
 
@@ -147,7 +148,7 @@ TEST(Loader, ForeignHost_IsRefusedByThePluginWithItsOwnWords) {
   EXPECT_EQ(load(c, plugin("tiny_refuse")), DFM_E_UNSUPPORTED);
   EXPECT_TRUE(says("refuses this library") && says("built for ABI 1 draft 99")) << dfm_last_error();
   EXPECT_EQ(load(c, plugin("tiny_silent")), DFM_E_UNSUPPORTED);
-  EXPECT_TRUE(says("speaks plugin ABI 1") && says("gave no reason") && says("if it was built for a draft"))
+  EXPECT_TRUE(says("which has plugin ABI 1") && says("gave no reason") && says("if it was built for a draft"))
       << dfm_last_error();
 }
 

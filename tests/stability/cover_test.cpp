@@ -56,7 +56,8 @@ TEST(CoverRefused, BeyondTheProduct_SaysWhichModelAndWhatInstead) {
       test::ok(dfm_body_hold(body, 1, &point, 7));
       continue;
     }
-    refused(dfm_body_add_spring(body, &spring, nullptr), {"'body'", model.c_str(), "no step bound"});
+    refused(dfm_body_add_spring(body, &spring, nullptr),
+            {"'body'", model.c_str(), "step bound", "choose another model"});
     refused(dfm_body_hold(body, 1, &point, 7), {"'body'", model.c_str(), "dfm_body_def.fixed"});
     refused(dfm_world_equilibrium(w, nullptr, nullptr), {"'body'", model.c_str(), "choose another model"});
   }

@@ -32,7 +32,8 @@ bool prepared(const Body &body, const dfm_f32 &table, const Variant &variant) {
   if (status == DFM_OK) return true;
   if (status == DFM_E_UNSUPPORTED && body.subject.plugin->host().said().size() > said) return false;
   if (status == DFM_E_UNSUPPORTED)
-    broken("%s prepare of " DFM_EXT_F32 " refuses without a sentence; log why, then return DFM_E_UNSUPPORTED",
+    broken("%s prepare of " DFM_EXT_F32
+           " refuses without a reason; log the reason, then return DFM_E_UNSUPPORTED",
            with(variant).c_str());
   broken("%s prepare of " DFM_EXT_F32
          " returns %d; return DFM_OK, or DFM_E_UNSUPPORTED after the reason was logged",

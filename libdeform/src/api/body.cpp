@@ -79,8 +79,8 @@ Spring make_spring(const Body &b, const dfm_spring_def &d) {
   const char *const name = b.name.c_str();
   if (!b.dynamics->abilities().springs)
     fail(DFM_E_UNSUPPORTED,
-         "body '%s': springs are integrated explicitly and need a model with a step bound, which '%s' does "
-         "not have",
+         "body '%s': springs are integrated explicitly and need a model with a step bound, which model "
+         "'%s' does not have; choose another model",
          name, b.model.type->id);
   check_points(b, d.npoint, d.points);
   if (d.npoint == 0) fail(DFM_E_ARG, "body '%s': a spring needs at least one point", name);

@@ -482,7 +482,7 @@ void write_snapshot(SceneWriter &to, const std::string &name) {
 void write_scene(World &w, const std::string &path, const WriteOptions &options, uint32_t &notes) {
   const std::filesystem::path whole(path);
   if (whole.extension() != ".json" || whole.stem().empty())
-    fail(DFM_E_ARG, "%s: the name of a scene file ends in .json", path.c_str());
+    fail(DFM_E_ARG, "%s: the name of a scene file must end in .json", path.c_str());
   SceneWriter to{w, path, options, notes};
   for (const std::string &key : scene::Types(w.context).model_keys()) to.model_keys.insert(key);
   AtomicFile scene(path);  // what cannot be written is found out first
