@@ -121,7 +121,7 @@ TEST(ToolScene, WhatIsWrong_IsNamed) {
   };
   hand("t,x,y\n", {"h.csv:1", "t,x,y,z,qx,qy,qz,qw"});
   hand("t,x,y,z,qx,qy,qz,qw\n", {"no rows"});
-  hand("t,x,y,z,qx,qy,qz,qw\n0,0,0,1,0,0,0,1\n0,0,0,1,0,0,0,1\n", {"h.csv:3", "times must rise"});
+  hand("t,x,y,z,qx,qy,qz,qw\n0,0,0,1,0,0,0,1\n0,0,0,1,0,0,0,1\n", {"h.csv:3", "times must increase"});
   hand("t,x,y,z,qx,qy,qz,qw\n0,0,0,1,0,0,0,0\n", {"h.csv:2", "quaternion"});
   hand("t,x,y,z,qx,qy,qz,qw\n0,0,0,one,0,0,0,1\n", {"h.csv:2", "one"});
 }

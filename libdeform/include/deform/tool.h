@@ -133,7 +133,8 @@ DFM_API dfm_status dfm_tool_teleport(dfm_tool tool, const dfm_pose *pose);
 
 /* ---- what is felt -------------------------------------------------------------------------------------- */
 
-/** What the world did to the tool in the last step: contact, friction and attachments, on all parts.
+/** What the world did to the tool in the last step: contact, friction, attachments and the force of its cuts
+ * (`fracture_energy` of materials), on all parts.
  * Impulses are summed over all sub-steps and divided by the length of the step, so that H times the force is
  * the momentum that bodies gave to the tool, and H times the torque the angular momentum, to rounding.
  * @param force   [3] N on the tool, in its frame as it stands now

@@ -28,8 +28,8 @@ void read_hand(const std::string &path, Tool &tool) {
     double v[9];
     split_row(path, line, row, header.c_str(), opens ? 9 : 8, v);
     if (!tool.keys.empty() && !(v[0] > tool.keys.back().t))
-      fail(DFM_E_FORMAT, "%s:%zu: times must rise, and %g s does not come after %g s", path.c_str(), line,
-           v[0], tool.keys.back().t);
+      fail(DFM_E_FORMAT, "%s:%zu: times must increase, but %g s follows %g s", path.c_str(), line, v[0],
+           tool.keys.back().t);
     if (!(v[4] * v[4] + v[5] * v[5] + v[6] * v[6] + v[7] * v[7] > 0))
       fail(DFM_E_FORMAT, "%s:%zu: the quaternion qx,qy,qz,qw is zero", path.c_str(), line);
     tool.keys.push_back({v[0], {{v[1], v[2], v[3]}, {v[4], v[5], v[6], v[7]}}});

@@ -28,7 +28,7 @@ void check(const std::vector<Key> &keys, const char *what, Finite finite) {
     if (!std::isfinite(keys[i].t) || !finite(keys[i]))
       fail(DFM_E_ARG, "%s: key %zu is not finite; give finite numbers", what, i);
     if (i && !(keys[i].t > keys[i - 1].t))
-      fail(DFM_E_ARG, "%s: times must rise, but key %zu has t = %g after %g", what, i, keys[i].t,
+      fail(DFM_E_ARG, "%s: times must increase, but key %zu has t = %g after %g", what, i, keys[i].t,
            keys[i - 1].t);
   }
 }

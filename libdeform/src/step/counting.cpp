@@ -75,9 +75,9 @@ void turn(World &w, Counted from, Counted to) {
                          : implicit_choice(w, *b).second_order ? DFM_INTEGRATOR_TR_BDF2
                                                                : DFM_INTEGRATOR_IMPLICIT_EULER;
     b->bound.known = false;
-    w.context->logf(DFM_LOG_INFO, "body '%s' goes on by %s from %g s on, by count of what steps take",
-                    b->name.c_str(), to == Counted::explicitly ? "symplectic_euler" : "implicit steps",
-                    w.time);
+    w.context->logf(
+        DFM_LOG_INFO, "body '%s' is integrated by %s from %g s on, because its counted work is less that way",
+        b->name.c_str(), to == Counted::explicitly ? "symplectic_euler" : "implicit steps", w.time);
   }
   w.changed = true;
   w.sizes = {};  // another bound, and other errors

@@ -311,10 +311,10 @@ void choose_integrators(World &w) {
                                                 : DFM_INTEGRATOR_IMPLICIT_EULER;
       if (options[i].implicit)
         w.context->logf(DFM_LOG_WARNING,
-                        "body '%s' moves by %s, which damps %s, for explicit time would take %.0f sub-steps "
-                        "of %.3g s in a step; an integrator that is named stays",
+                        "body '%s' is integrated by %s, which damps %s, because explicit integration would "
+                        "need %.0f sub-steps of %.3g s per step; set its integrator to choose another",
                         b.name.c_str(), chosen.second_order ? "tr_bdf2" : "implicit_euler",
-                        chosen.second_order ? "what touches and what the step does not resolve" : "motion",
+                        chosen.second_order ? "contacts and unresolved vibrations" : "motion",
                         std::ceil(options[i].substeps), b.integrator.step);
     }
     b.integrator.open = false;

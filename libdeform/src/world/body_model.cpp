@@ -269,10 +269,8 @@ void warn_of_own_steps(const World &w, const std::string &body, const ModelInsta
   if (!model.stepper || integrator == DFM_INTEGRATOR_AUTO) return;
   const char *const name =
       integrator == DFM_INTEGRATOR_SYMPLECTIC_EULER ? "symplectic_euler" : integrator_name(integrator);
-  w.context->logf(
-      DFM_LOG_WARNING,
-      "body '%s': model '%s' steps itself, so the integrator that is named for it, %s, is not used",
-      body.c_str(), model.type->id, name);
+  w.context->logf(DFM_LOG_WARNING, "body '%s': model '%s' steps itself, so its integrator, %s, is not used",
+                  body.c_str(), model.type->id, name);
 }
 
 uint64_t model_hash(const Body &b) {
