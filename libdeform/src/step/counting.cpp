@@ -17,18 +17,18 @@
 namespace dfm {
 namespace {
 
-constexpr double kTry = 1.0 / 30;    // s of explicit time, whose work a try may lose
-constexpr double kPutBy = 0.25;      // of explicit work, toward the next try
-constexpr double kMost = 4;          // tries, that implicit time may save up
+constexpr double kTry = 1.0 / 30;    // s of explicit integration, whose work a trial may cost
+constexpr double kPutBy = 0.25;      // share of explicit work that is saved for the next trial
+constexpr double kMost = 4;          // largest credit, in trials
 constexpr double kSafeShare = 0.25;  // of the limit on sub-steps
-constexpr double kFilled = 1e300;    // units, of a step that may cost anything
+constexpr double kFilled = 1e300;    // units, for a step without limit
 
 bool is(const Body &b, Counted what) { return b.integrator.counted == what; }
 bool any(const World &w, Counted what) {
   return std::ranges::any_of(w.bodies, [&](const auto &b) { return is(*b, what); });
 }
 
-// Units of one explicit sub-step of those that are awake, or of those among them that are explicit now.
+// Units of one explicit sub-step of all awake bodies, or of those that are explicit now.
 double units(const World &w, bool all) {
   double sum = 0;
   for (const auto &b : w.bodies)
@@ -37,7 +37,7 @@ double units(const World &w, bool all) {
   return sum;
 }
 
-// s, the sub-step if all of them were explicit.
+// s, the sub-step if all bodies were explicit.
 double explicit_step(const World &w) {
   double least = w.bound.step;
   for (const auto &b : w.bodies)
@@ -45,9 +45,9 @@ double explicit_step(const World &w) {
   return least;
 }
 
-// Whether a step may be taken by explicit sub-steps of h. Their number rises while shapes change, and
-// implicit steps of that length would have to take over in the midst of it: so not if it is near the limit,
-// unless the library chooses the steps, the next of which will be short.
+// Whether a step may be divided into explicit sub-steps of h. Their number grows while shapes change, and
+// near the limit on sub-steps implicit integration would have to take over during the motion. So it may not
+// be near the limit, unless the library chooses the steps, since the next one will be short.
 bool may_be_cut(const World &w, double dt, double h) {
   const double n = dt / h;
   return n <= kSafeShare * w.def.max_substeps || (dt == accurate_step(w.sizes) && n <= w.def.max_substeps);
@@ -59,7 +59,7 @@ double effort(const World &w) {
   return sum;
 }
 
-// All of them or none.
+// Changes the integrator of all these bodies, or of none.
 void turn(World &w, Counted from, Counted to) {
   std::vector<std::pair<Body *, std::unique_ptr<Dynamics>>> made;
   for (const auto &b : w.bodies) {

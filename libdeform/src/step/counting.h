@@ -1,12 +1,12 @@
-// Whether implicit time pays where it was left to the library. Costs are counted, never timed, so that every
-// run of a scene changes integrators at the same steps: units are points and cells in an explicit sub-step,
-// kUnitWork multiplications each.
+// Checks whether implicit integration pays for bodies whose integrator is left to the library. Costs are
+// counted and not timed, so that every run of a scene changes integrators at the same steps. One unit is a
+// point or cell in an explicit sub-step, kUnitWork multiplications.
 //
-// Implicit steps draw on a purse what they take beyond the explicit sub-steps of the same time, and put in
-// what they save. Where it is empty the bodies go on explicitly, from the start of the step whose work has
-// emptied it. Explicit steps put in a share of their work; once that is enough for a try, the bodies are
-// implicit again. So what is lost to tries is at most that share of what explicit time alone would take, and
-// a body at rest, for which implicit steps are cheap, finds back to them.
+// A credit of work decides. Implicit steps add what they save compared with the explicit sub-steps of the
+// same time, and subtract what they cost more. When the credit is used up, the bodies become explicit, from
+// the start of the step that used it up. Explicit steps add a share of their work; when that pays for a
+// trial, the bodies become implicit again. So trials cost at most that share of the work of explicit
+// integration alone, and a body at rest, for which implicit steps are cheap, returns to them.
 #pragma once
 
 namespace dfm {
@@ -17,14 +17,14 @@ struct World;
 // Of the present step.
 struct Counting {
   bool on = false;
-  double before = 0;   // multiplications: effort of all bodies before it
+  double before = 0;   // multiplications: effort of all bodies before the step
   double contact = 0;  // of its contact solves
-  double bodies = 0;   // of its bodies, as the islands began to be solved
-  double most = 0;     // above which it is given up; 0: never
+  double bodies = 0;   // of its bodies, when the solve of the islands began
+  double most = 0;     // limit above which the step is repeated explicitly; 0: none
 };
 
 void begin_count(World &w, StepContext &step, double dt);
-// After the step: bodies may move by another integrator from now on.
+// After the step: may change the integrator of bodies.
 void end_count(World &w, StepContext &step, double dt, double substeps);
 double body_effort(const World &w, const StepContext &step);  // since begin_count()
 

@@ -13,7 +13,7 @@
 namespace dfm {
 namespace {
 
-// Sides whose energies the largest energy has: not rigid bodies that give way.
+// Whether both sides are part of the largest energy; not with movable rigid bodies.
 bool booked(const World &w, const StepContext &step, const ContactPoint &c) {
   const Body &a = *w.bodies[c.slot_a];
   if (!has_balance(a)) return false;
@@ -21,21 +21,21 @@ bool booked(const World &w, const StepContext &step, const ContactPoint &c) {
   return step.rigid_places.empty() || step.rigid_places[c.slot_b].group == kNone;
 }
 
-// Of the rest distance: what lies deeper was placed there, or recovery is late.
+// Share of the rest distance: deeper contacts were placed there, or recovery is late.
 constexpr double kShallow = 0.99;
-// Work counts at the mean of the velocities at both ends, and a depth is led out by a fifth in a sub-step: in
-// the one before by 1.25 times as much.
+// Work is taken at the mean of the velocities at both ends of a sub-step. A depth decreases by a fifth per
+// sub-step, so in the sub-step before by 1.25 times as much.
 constexpr double kOpens = 0.5 * (1 + 1.25);
-// What such a law has stored, it gives back.
+// Such a law returns the energy that it has stored.
 bool remembers(const LawInstance *law) { return law->nstate > 0; }
 
-// J, of a contact in the sub-step. Sides that book their work differently (step/energy_watch.cpp) are
-// compared at the end of the sub-step: what accelerates both would else be work of one.
+// J, of a contact in the sub-step. If the sides count their work differently (step/energy_watch.cpp),
+// velocities at the end of the sub-step are used; otherwise a common acceleration would count as work.
 struct Made {
-  double all = 0;       // without friction where the law remembers
-  double recovery = 0;  // at most what leading it out of a depth puts in
-  // What the law has, by its own answer at the slip that it was asked at; a set-valued law gives a limit
-  // only, and the projection on it cannot drive.
+  double all = 0;       // without friction if the law has memory
+  double recovery = 0;  // upper bound of the energy added by recovery of depths
+  // Work of the law by its own force at the slip of its evaluation. A set-valued law gives a limit only, and
+  // projection onto it cannot add energy.
   double friction = 0;
 };
 Made made_by(const World &w, const StepContext &step, uint32_t i, bool ends) {
@@ -57,12 +57,12 @@ Made made_by(const World &w, const StepContext &step, uint32_t i, bool ends) {
   return {l[0] * u.x + along, kOpens * l[0] * std::max(0.0, -rows.rate[i]), smooth ? step.h * asked : 0};
 }
 
-// What is compared with the share that the watch allows.
+// The sum that is compared with the limit of the watch.
 double excess_of(const PairWork &p) { return std::max(p.rubbed, p.made); }
 
-// J, that rises are compared with a share of. Contact knows places to a small part of the rest distance:
-// while bodies that lie on each other have hardly begun to move, the work of their weight over that distance
-// is the measure. Elastic energies that nobody knows are not in the largest one (energy_watch.cpp).
+// The energy to which the limit refers. Contact is accurate to a small part of the rest distance, so while
+// bodies at rest on each other have hardly begun to move, the work of their weight over that distance is
+// used. Unknown elastic energies are not part of the largest energy (energy_watch.cpp).
 struct Scale {
   double joule;
   bool hidden;
@@ -92,7 +92,7 @@ bool is_body(const World &w, uint64_t id) {
   return std::any_of(w.bodies.begin(), w.bodies.end(), [&](const auto &b) { return b->id == id; });
 }
 
-// Of the pair's contact that carries most.
+// The law of the contact of the pair with the largest load.
 std::string law_of(const World &w, const PairWork &p) {
   const LawInstance *law = nullptr;
   double most = 0;
