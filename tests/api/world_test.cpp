@@ -160,7 +160,9 @@ TEST(Arguments, Wrong_AreRefusedInOneSentenceAndChangeNothing) {
       {DFM_E_ARG, [&] { return dfm_world_set_gravity(s.world, bad3); }, {"gravity"}},
       {DFM_E_ARG, [&] { return dfm_world_set_gravity(s.world, nullptr); }, {"'gravity'"}},
       {DFM_E_ARG, [&] { return dfm_world_set_gravity_keys(s.world, 2, nullptr); }, {"'keys'"}},
-      {DFM_E_ARG, [&] { return dfm_world_set_gravity_keys(s.world, 2, gravity_back); }, {"gravity", "rise"}},
+      {DFM_E_ARG,
+       [&] { return dfm_world_set_gravity_keys(s.world, 2, gravity_back); },
+       {"gravity", "increase"}},
       {DFM_E_ARG, [&] { return dfm_world_find_body(s.world, "lowr", &b); }, {"'lowr'", "'lower'"}},
       {DFM_E_ARG, [&] { return dfm_world_find_body(s.world, nullptr, &b); }, {"'name'"}},
       {DFM_E_ARG,
@@ -220,7 +222,7 @@ TEST(Arguments, Wrong_AreRefusedInOneSentenceAndChangeNothing) {
       {DFM_E_ARG,
        [&] { return dfm_body_move_held(s.lower, 1, &zero, 0, nullptr, nullptr); },
        {"keys or a sine"}},
-      {DFM_E_ARG, [&] { return dfm_body_move_held(s.lower, 1, &zero, 2, falling, nullptr); }, {"rise"}},
+      {DFM_E_ARG, [&] { return dfm_body_move_held(s.lower, 1, &zero, 2, falling, nullptr); }, {"increase"}},
       {DFM_E_ARG,
        [&] { return dfm_body_move_held(s.lower, 1, &zero, 2, nullptr, nullptr); },
        {"keys is NULL"}},
@@ -319,7 +321,7 @@ TEST(Arguments, Wrong_AreRefusedInOneSentenceAndChangeNothing) {
            d.keys = falling;
          });
        },
-       {"rise"}},
+       {"increase"}},
       {DFM_E_ARG, [&] { return obstacle([&](auto &d) { d.sine.frequency = nan; }); }, {"sine"}},
       {DFM_E_ARG, [&] { return dfm_obstacle_move_to(s.floor, nullptr); }, {"'pose'"}},
       {DFM_E_ARG, [&] { return material([](auto &d) { d.density = 0; }); }, {"density", "positive"}},
