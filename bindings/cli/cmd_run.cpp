@@ -197,7 +197,8 @@ class Runner {
     if (between > 0) out.push_back("surfaces cross: " + pairs(between) + " of two surfaces" + when);
     if (within > 0)
       out.push_back("a surface crosses itself: " + pairs(within) + when +
-                    (any_cut() ? "; sides of a cut or a tear that have slid over each other do not touch"
+                    (any_cut() ? "; sides of a cut that have slid over each other do not touch: set "
+                                 "\"separate\" of the body to make its parts bodies"
                                : "; \"contact\": {\"self\": \"auto\"} prevents this"));
     return out;
   }

@@ -6,10 +6,7 @@ Run in this folder: python3 slices.py
 import itertools
 import math
 
-# Kuhn's cut of a cube into six tetrahedra about the diagonal from corner 000 to 111: every permutation of the
-# axes is one path along edges.
-PATHS = list(itertools.permutations(range(3)))
-ODD = {(0, 2, 1), (1, 0, 2), (2, 1, 0)}
+import kuhn
 
 
 def lattice(counts):
@@ -17,17 +14,8 @@ def lattice(counts):
     the middle, so that a corner of the box may be rounded without a flat cell."""
     for place in itertools.product(*(range(n) for n in counts)):
         mirror = [2 * i < n for i, n in zip(place, counts)]
-        for path in PATHS:
-            at = [0, 0, 0]
-            corners = [tuple(at)]
-            for axis in path:
-                at[axis] = 1
-                corners.append(tuple(at))
-            tet = [tuple(i + (1 - a if m else a) for i, a, m in zip(place, corner, mirror))
-                   for corner in corners]
-            if (path in ODD) != (sum(mirror) % 2 == 1):
-                tet[2], tet[3] = tet[3], tet[2]
-            yield tet
+        for tet in kuhn.cube(mirror):
+            yield [tuple(i + a for i, a in zip(place, corner)) for corner in tet]
 
 
 def ball(flat, layers, cap, across):

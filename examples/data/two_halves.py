@@ -4,13 +4,10 @@ tip.
 
 Run in this folder: python3 two_halves.py
 """
+import kuhn
 
 NX, NY, NZ = 14, 3, 3
 SIZE = (0.5, 0.1, 0.1)
-# Kuhn's cut of a cube into six tetrahedra about the diagonal from corner 000 to 111: every permutation of the
-# axes is one path along edges.
-PATHS = [(0, 1, 2), (0, 2, 1), (1, 0, 2), (1, 2, 0), (2, 0, 1), (2, 1, 0)]
-ODD = {(0, 2, 1), (1, 0, 2), (2, 1, 0)}
 
 
 def node(i, j, k):
@@ -23,17 +20,8 @@ def cells():
         for j in range(NY):
             for i in range(NX):
                 mirror = (i % 2, j % 2, k % 2)
-                for path in PATHS:
-                    at = [0, 0, 0]
-                    corners = [tuple(at)]
-                    for axis in path:
-                        at[axis] = 1
-                        corners.append(tuple(at))
-                    ids = [node(*(c + (1 - a if m else a) for c, a, m in zip((i, j, k), corner, mirror)))
-                           for corner in corners]
-                    if (path in ODD) != (sum(mirror) % 2 == 1):
-                        ids[2], ids[3] = ids[3], ids[2]
-                    yield (1 if i < NX // 2 else 2), ids
+                for corners in kuhn.cube(mirror):
+                    yield (1 if i < NX // 2 else 2), [node(i + a, j + b, k + c) for a, b, c in corners]
 
 
 def main():

@@ -22,7 +22,7 @@ constexpr double kNoPolishAt = 0.25, kFewSweepsAt = 0.5, kNoPiecesAt = 0.75;
 constexpr uint64_t kAutomaticFactor = 1000;
 
 struct StepStopped {
-  enum Why { work, time, asked, dear, fine } why;
+  enum Why { work, time, asked, costly, too_fine } why;
 };
 
 // Worlds that were asked to stop. A signal may arrive while a lock is held, so no lock is used; 0: free.
@@ -247,7 +247,7 @@ void charge(World &w, StepContext &step, uint64_t units) {
   if (waiting.load(std::memory_order_relaxed) != 0 && take_request(w.handle))
     throw StepStopped{StepStopped::asked};
   if (const Counting &c = step.counting; c.most > 0 && c.contact + body_effort(w, step) > c.most)
-    throw StepStopped{StepStopped::dear};
+    throw StepStopped{StepStopped::costly};
 }
 
 bool spares(StepContext &step, Thrift what) {
@@ -265,7 +265,7 @@ void spend(const World &w, const StepContext &step, Spent &spent, uint64_t units
   if (requested(w.handle)) throw StepStopped{StepStopped::asked};
   const Counting &c = step.counting;
   if (c.most > 0 && c.contact + c.bodies + spent.effort * double(spent.all) / double(spent.own) > c.most)
-    throw StepStopped{StepStopped::dear};
+    throw StepStopped{StepStopped::costly};
 }
 
 bool spares(const StepContext &step, Spent &spent, Thrift what) {
@@ -283,7 +283,7 @@ void charge(World &w, StepContext &step, const Spent &spent) {
   charge(w, step, spent.work);
 }
 
-void end_explicit_step() { throw StepStopped{StepStopped::fine}; }
+void end_explicit_step() { throw StepStopped{StepStopped::too_fine}; }
 
 void keep_start(World &w, StepContext &step) {
   Budget &b = step.budget;
@@ -328,15 +328,15 @@ dfm_status step_within_budget(World &w, double dt, uint32_t *trouble) {
   const uint32_t before = *trouble;
   const auto run = [&] {
     for (;;) {
-      StepStopped::Why why = StepStopped::dear;
+      StepStopped::Why why = StepStopped::costly;
       try {
         return run_step(w, step, dt, trouble);
       } catch (const StepStopped &stopped) {
         why = stopped.why;
-        if (why != StepStopped::dear && why != StepStopped::fine) throw;
+        if (why != StepStopped::costly && why != StepStopped::too_fine) throw;
       }
       return_to_start(w, step);
-      if (why == StepStopped::dear) give_up_implicit(w);
+      if (why == StepStopped::costly) give_up_implicit(w);
       else take_up_implicit(w);
       b.kept = false;
       b.start.clear();

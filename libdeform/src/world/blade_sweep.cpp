@@ -16,6 +16,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "geometry/extent.h"
 #include "math/elementary.h"
 #include "mesh/cut_mesh.h"
 #include "state/material.h"
@@ -60,21 +61,6 @@ class LineMotion {
   Vec3 from_, to_, axis_;
   double scale_ = 1, cosine_ = 1;
   bool still_ = true;
-};
-
-struct Extent {
-  Vec3 lo{HUGE_VAL, HUGE_VAL, HUGE_VAL}, hi{-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
-  void add(Vec3 x) {
-    for (int k = 0; k < 3; ++k) {
-      lo[k] = std::min(lo[k], x[k]);
-      hi[k] = std::max(hi[k], x[k]);
-    }
-  }
-  bool within(const Extent &o, double reach) const {
-    for (int k = 0; k < 3; ++k)
-      if (hi[k] + reach < o.lo[k] || o.hi[k] + reach < lo[k]) return false;
-    return true;
-  }
 };
 
 double toughness(const Body &b, uint32_t cell) {
@@ -153,7 +139,7 @@ void BladeSweep::find_near(const Body &b) {
   for (const Vec3 c : blade_.corner) way.add(c);
   for (uint32_t i = 0; i < b.p.n; ++i)
     for (const double *x : {before, b.p.x.data()}) whole.add(load3(x + size_t{kStride} * i));
-  if (!way.within(whole, kReach * b.surface.median_edge)) return;
+  if (!way.meets(whole, kReach * b.surface.median_edge)) return;
   double largest = 0;
   std::vector<Extent> boxes(cells_of(b));
   for (uint32_t c = 0; c < cells_of(b); ++c) {
@@ -168,7 +154,7 @@ void BladeSweep::find_near(const Body &b) {
     boxes[c].add(now.hi);
   }
   for (uint32_t c = 0; c < cells_of(b); ++c)
-    if (way.within(boxes[c], kKept * largest)) {
+    if (way.meets(boxes[c], kKept * largest)) {
       const BladeSide none{c, SideKind::none, 0, 0, 0};
       near_.push_back({c, middle_of(b, before, c), middle_of(b, b.p.x.data(), c), 0, none});
     }

@@ -8,6 +8,7 @@
 
 #include "core/error.h"
 #include "geometry/closest.h"
+#include "geometry/extent.h"
 #include "math/turn.h"
 #include "mesh/cut_mesh.h"
 #include "state/world.h"
@@ -21,34 +22,15 @@ namespace {
 constexpr double kTurn = 0.1;    // rad: a solid that turns by more in a step is placed at several poses
 constexpr int kMostPlaces = 64;  // of a solid in a step
 
-struct Box {
-  Vec3 lo{HUGE_VAL, HUGE_VAL, HUGE_VAL}, hi{-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
-  void add(Vec3 x) {
-    for (int k = 0; k < 3; ++k) {
-      lo[k] = std::min(lo[k], x[k]);
-      hi[k] = std::max(hi[k], x[k]);
-    }
-  }
-  void grow(Vec3 by) {
-    lo = lo - by;
-    hi = hi + by;
-  }
-  bool meets(const Box &o) const {
-    for (int k = 0; k < 3; ++k)
-      if (hi[k] < o.lo[k] || o.hi[k] < lo[k]) return false;
-    return true;
-  }
-};
-
 size_t cells_of(const Body &b) { return b.tets.size() / 4; }
 size_t point_of(const Body &b, size_t cell, size_t k) { return size_t{kStride} * b.tets[4 * cell + k]; }
-Box box_of(const Body &b, size_t cell) {
-  Box out;
+Extent box_of(const Body &b, size_t cell) {
+  Extent out;
   for (size_t k = 0; k < 4; ++k) out.add(load3(&b.p.x[point_of(b, cell, k)]));
   return out;
 }
-Box box_of(const Body &b) {
-  Box out;
+Extent box_of(const Body &b) {
+  Extent out;
   for (uint32_t i = 0; i < b.p.n; ++i) out.add(load3(&b.p.x[size_t{kStride} * i]));
   return out;
 }
@@ -163,7 +145,7 @@ uint32_t split(Tool &t, Body &b, double dt) {
 
 struct Solid {
   CutShape shape;
-  Box box;
+  Extent box;
 };
 
 // On the way from one place to the next; `at`: where it is within the part.
@@ -216,13 +198,13 @@ std::vector<Solid> solids_of(const Tool &t) {
 // How many cells have gone.
 uint32_t remove(const Tool &t, Body &b) {
   const std::vector<Solid> solids = solids_of(t);
-  const Box whole = box_of(b);
+  const Extent whole = box_of(b);
   if (std::none_of(solids.begin(), solids.end(), [&](const Solid &s) { return s.box.meets(whole); }))
     return 0;
   Array<uint8_t> removed(cells_of(b), 0, HookAllocator<uint8_t>(b.world->memory()));
   uint32_t n = 0;
   for (size_t c = 0; c < cells_of(b) && (t.cuts.most == 0 || n < t.cuts.most); ++c) {
-    const Box box = box_of(b, c);
+    const Extent box = box_of(b, c);
     Vec3 x[4];
     for (size_t k = 0; k < 4; ++k) x[k] = load3(&b.p.x[point_of(b, c, k)]);
     const auto meets = [&](const Solid &s) { return s.box.meets(box) && meets_tetrahedron(s.shape, x); };

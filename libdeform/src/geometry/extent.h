@@ -1,0 +1,30 @@
+// An axis-parallel box that grows with the points that are added to it.
+#pragma once
+#include <algorithm>
+#include <cmath>
+
+#include "math/vec3.h"
+
+namespace dfm {
+
+struct Extent {
+  Vec3 lo{HUGE_VAL, HUGE_VAL, HUGE_VAL}, hi{-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
+  void add(Vec3 x) {
+    for (int k = 0; k < 3; ++k) {
+      lo[k] = std::min(lo[k], x[k]);
+      hi[k] = std::max(hi[k], x[k]);
+    }
+  }
+  void grow(Vec3 by) {
+    lo = lo - by;
+    hi = hi + by;
+  }
+  // Whether the two are at most `reach` apart along every axis.
+  bool meets(const Extent &o, double reach = 0) const {
+    for (int k = 0; k < 3; ++k)
+      if (hi[k] + reach < o.lo[k] || o.hi[k] + reach < lo[k]) return false;
+    return true;
+  }
+};
+
+}  // namespace dfm
