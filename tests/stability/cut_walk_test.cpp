@@ -28,3 +28,14 @@ TEST(CutWalk, JammedPieces_AreNotThrown) {
     EXPECT_LT(r.speed, test::cutting::CutWalk::kFast) << "seed " << seed;
   }
 }
+
+// A crumb reached 12 to 48 km/s where a hit had turned a contact, whose friction stayed without its normal
+// impulse, and up to 2,430 m/s where contacts that oppose each other opened their depths
+// (doc/decisions/0411).
+TEST(CutWalk, CrumbsBetweenTeeth_AreNotThrown) {
+  for (const uint64_t seed : {202123u, 200171u, 203186u, 200117u, 200176u}) {
+    const test::cutting::Walked r = test::cutting::walk_cuts(seed, 60);
+    EXPECT_EQ(r.failure, "") << "seed " << seed;
+    EXPECT_LT(r.speed, test::cutting::CutWalk::kFast) << "seed " << seed;
+  }
+}

@@ -126,6 +126,10 @@ struct ContactRows {
   Vec3 velocity(uint32_t i) const { return velocity(i, y.data()); }
   Vec3 velocity(uint32_t i, const double *of) const;
   void apply(uint32_t i, Vec3 impulse_frame);  // changes y by an impulse given in the frame
+  // Begins a solve: y_free is y as it is, and y has the impulses of the last one. Those without a normal part
+  // go as a whole, for there is no friction without it: they come from hits that have turned a contact, and
+  // from fixed limits.
+  void apply_last();
   // y of a part from the impulses alone: sweeps have left it not finite, or with their rounding
   void restore(const RowsPart &part);
   // The same for blocks that these contacts alone act on.

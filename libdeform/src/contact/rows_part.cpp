@@ -29,6 +29,16 @@ RowsPart ContactRows::whole() {
   return {{&every_row_[0], 1}, {&every_row_[1], nbond ? size_t{1} : 0}, every_block_, n, nbond};
 }
 
+void ContactRows::apply_last() {
+  y_free.assign(y.begin(), y.end());
+  for (uint32_t i = 0; i < n; ++i) {
+    double *const l = &impulse[size_t(i) * 3];
+    if (wn[i] > 0 && l[0] > 0) apply(i, load3(l));
+    else l[0] = l[1] = l[2] = 0;  // what stayed here, sweeps would take back from y, which never had it
+  }
+  for (uint32_t i = n; i < all(); ++i) apply(i, load3(&impulse[size_t(i) * 3]));
+}
+
 void ContactRows::restore(const RowsPart &part) {
   for (const uint32_t b : part.blocks)
     std::copy_n(&y_free[size_t(4) * blocks[b].first], size_t(4) * blocks[b].count,

@@ -45,16 +45,6 @@ void fill_responses(World &w, StepContext &step) {
   }
 }
 
-void apply_last(ContactRows &rows) {
-  rows.y_free.assign(rows.y.begin(), rows.y.end());
-  for (uint32_t i = 0; i < rows.n; ++i) {
-    double *const l = &rows.impulse[size_t(i) * 3];
-    if (!(rows.wn[i] > 0)) l[0] = l[1] = l[2] = 0;
-    else if (l[0] != 0) rows.apply(i, load3(l));
-  }
-  for (uint32_t i = rows.n; i < rows.all(); ++i) rows.apply(i, load3(&rows.impulse[size_t(i) * 3]));
-}
-
 constexpr uint32_t kMostRevisions = 6;  // of what rigid hosts take for granted, within a sub-step
 // Revisions of bodies by the last impulses before the first solve: a few, because the solve moves bodies
 // anyway where they do not rest. Further solves at most, once bodies are content, of what the cap on sweeps
@@ -312,7 +302,7 @@ bool stage_solve(World &w, StepContext &step, uint32_t *trouble) {
   step.passes = step.sweeps = 0;
   step.residual = {};
   make_rows(w, step);
-  apply_last(step.rows);
+  step.rows.apply_last();
   if (step.rows.all() == 0) {
     w.stats.passes = w.stats.sweeps = 0;
     w.stats.residual = 0;

@@ -8,6 +8,7 @@
 
 #include "contact/bonds.h"
 #include "contact/fixed_limits.h"
+#include "contact/recovery.h"
 #include "state/world.h"
 #include "step/context.h"
 #include "step/tolerance.h"
@@ -250,7 +251,7 @@ void hold_work_back(const World &w, StepContext &step, SolveIsland &own) {
 }
 
 // Passes until the true residual is good enough, or a law has failed.
-void solve_island(const World &w, StepContext &step, SolveIsland &own) {
+void solve_passes(const World &w, StepContext &step, SolveIsland &own) {
   const double gap_margin = normal_at_rest(w, step.h), least = tangent_at_rest(w, step.h);
   const bool memory = own.batches.remembers();
   // an equilibrium is as good as its contacts: nothing is left to a next sub-step
@@ -283,6 +284,28 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
     }
     // at least one sweep on a warm start is part of the method
     if (!sweep_until_good(w, step, own)) hold_work_back(w, step, own);
+  }
+}
+
+// Depths are opened at velocities that cost little. Where contacts oppose each other they cost much, and the
+// island is solved again with slower ones, from zero impulses: with so much slower ones that they should cost
+// what is allowed, since the work goes with their square, then with none, which add no energy
+// (contact/recovery.h, doc/decisions/0411-opening-depths-does-little-work.md).
+constexpr double kSlowOpening = 0.03;  // of the rest distance in a sub-step: this is always allowed
+void solve_island(const World &w, StepContext &step, SolveIsland &own) {
+  const double slow = kSlowOpening * w.offset / step.guard.planned;
+  for (bool last = false;;) {
+    solve_passes(w, step, own);
+    if (own.bad || last || !opens_dearly(step.rows, own.part, slow)) return;
+    const OpeningWork opening = opening_work(step.rows, own.part, slow);
+    if (!(opening.put_in > opening.allowed)) return;
+    const double work = work_of_opening(step.rows, own.part, opening.put_in);
+    if (!(work > opening.allowed)) return;
+    last = own.slowed;
+    slow_opening(step.rows, own.part, last ? 0 : std::sqrt(opening.allowed / work));
+    own.slowed = true;
+    drop_impulses(step.rows, own.part);
+    own.passes = own.sweeps = 0;
   }
 }
 
@@ -403,6 +426,7 @@ const SolveIsland *solve_islands(World &w, StepContext &step) {
     if (!own.open) continue;
     rows += own.part.all();
     own.passes = own.sweeps = 0;
+    own.slowed = false;
     own.limit.reserve(own.part.n);
     own.residual = {};
     own.bad = nullptr;

@@ -37,6 +37,7 @@ struct SolveIsland {
   // of the last solve
   Residual residual;
   uint32_t passes = 0, sweeps = 0;
+  bool slowed = false;  // its depths are opened more slowly
   Spent spent;
   const LawInstance *bad = nullptr;  // that has failed
   std::exception_ptr thrown;

@@ -80,6 +80,24 @@ TEST(Rows, Restore_AppliesAllImpulsesAtOnce) {
   EXPECT_GT(work, 0);
 }
 
+// The velocities that a solve begins with are those of its impulses, whatever the last solve left.
+TEST(Rows, ApplyLast_LeavesNoFrictionWithoutANormalImpulse) {
+  RowsCase c;
+  for (size_t k = 0; k < c.rows.impulse.size(); ++k) c.rows.impulse[k] = 1 + 0.25 * double(k);
+  c.rows.impulse[3] = c.rows.impulse[9] = 0;  // of contacts 1 and 3, whose friction is 2 N s and more
+  const Array<double> free = c.rows.y;
+  c.rows.apply_last();
+  EXPECT_EQ(c.rows.y_free, free);
+  for (const size_t i : {3, 9})
+    for (size_t k = i; k < i + 3; ++k) EXPECT_EQ(c.rows.impulse[k], 0) << k;
+  const std::vector<double> u = c.free_velocity();
+  const std::vector<double> change =
+      c.delassus() * std::vector<double>(c.rows.impulse.begin(), c.rows.impulse.end());
+  for (uint32_t i = 0; i < RowsCase::kContacts; ++i)
+    for (uint32_t k = 0; k < 3; ++k)
+      EXPECT_NEAR(c.rows.velocity(i)[int(k)], u[3 * i + k] + change[3 * i + k], 100 * kRounding) << i;
+}
+
 // The rate is the velocity along the normal at which the gap closes to nothing (gap / h), or a depth opens by
 // a fifth in the planned time, by a tenth of d_c at most. Nearer than 0.6 d_c all of a further depth opens at
 // once: with g = distance / d_c - 1 the rates g / 5 and g + 0.32 are the same, -0.08, at distance 0.6 d_c.
