@@ -46,13 +46,13 @@ void print_left_out(const JsonValue &plan) {
   }
 }
 
-// Parameters that do nothing, or not what they name.
+// Parameters that do nothing, or something else than they name.
 void print_idle(const JsonValue &plan) {
   const JsonValue *bodies = plan.find("bodies");
   for (size_t i = 0; bodies && i < bodies->items.size(); ++i) {
     const JsonValue *idle = bodies->items[i].find("idle");
     for (size_t k = 0; idle && k < idle->items.size(); ++k)
-      std::printf("  %-20s  %s has no effect, or not the one it names: %s\n",
+      std::printf("  %-20s  %s has no effect, or another one than it names: %s\n",
                   bodies->items[i].get("name").c_str(), idle->items[k].get("name").c_str(),
                   idle->items[k].get("why").c_str());
   }

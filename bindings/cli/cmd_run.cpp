@@ -312,7 +312,8 @@ class Runner {
     stepping = world_;
     const dfm_status status = interrupted ? DFM_DISCARD : dfm_world_step(world_, step, &trouble);
     stepping = 0;
-    result_.times.add(wall_seconds() - begin);
+    last_step_ = wall_seconds() - begin;
+    result_.times.add(last_step_);
     take_swaps();
     if (interrupted && status == DFM_DISCARD) return false;  // the world is as before the step
     if (status != DFM_OK) {
@@ -362,13 +363,22 @@ class Runner {
       if (!start_state) count_time();
       if (at_record_) record();
       if (at_record_ || check_every_step_) check(start_state);
-      if (frame_due) frames_->draw(t);
+      if (frame_due) draw(t);
       mark_ = {wall_seconds(), cpu_seconds()};
     }
-    if (result_.steps % 16 != 0) return;
+    if (result_.steps % 16 != 0 && !frame_due && last_step_ < kSlowStep) return;
     const double spent = result_.wall + wall_seconds() - mark_.wall;
     progress_.show(t - result_.start, duration_,
-                   result_.steps && spent > 0 ? double(result_.steps) / spent : 0);
+                   result_.steps && spent > 0 ? double(result_.steps) / spent : 0, result_.pictures,
+                   result_.drawing);
+  }
+
+  void draw(double t) {
+    const double begin = wall_seconds();
+    frames_->draw(t);
+    result_.drawing += wall_seconds() - begin;
+    ++result_.pictures;
+    result_.drawn_by = frames_->drawn_by();
   }
 
   void count_time() {
@@ -410,7 +420,9 @@ class Runner {
   std::unique_ptr<Frames> frames_;
   std::optional<Recorder> recorder_;
   Comparison *comparison_;
-  size_t saved_ = 0;  // of options_.saves, which are in order of time
+  size_t saved_ = 0;                         // of options_.saves, which are in order of time
+  static constexpr double kSlowStep = 0.02;  // s; after a longer step the progress is shown at once
+  double last_step_ = 0;                     // s, wall time
   RunResult result_;
   Mark mark_ = {};
 };
@@ -425,7 +437,9 @@ int run_scene(RunOptions options, const Globals &globals, Comparison *comparison
     options.set.push_back(text);
   }
   const SceneFile scene(globals, options.scene, options.set, options.jitter);
-  if (const std::string short_of = planned_sentence(planned_json(scene)); !short_of.empty()) warn(short_of);
+  const std::string planned = planned_json(scene);
+  if (const std::string short_of = planned_sentence(planned); !short_of.empty()) warn(short_of);
+  if (!globals.quiet && !globals.json) print_choice(planned);
   RunResult result;
   Checks checks;
   results_lie_in(options.out);

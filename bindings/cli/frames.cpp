@@ -56,6 +56,8 @@ class OffScreen : public Frames {
     if (!render::write_png(folder_ + name, image, &why)) throw Failure(kBadInput, why);
   }
 
+  std::string drawn_by() const override { return renderer_->device(); }
+
  private:
   void annotate(render::Image &image, double t) const {
     char text[40];

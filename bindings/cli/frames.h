@@ -14,6 +14,7 @@ class Frames {
   static std::unique_ptr<Frames> create(const SceneFile &scene, const std::string &folder);
   virtual ~Frames() = default;
   virtual void draw(double t) = 0;
+  virtual std::string drawn_by() const = 0;  // as OpenGL names it, e.g. "llvmpipe (LLVM 15.0.6, 256 bits)"
 };
 
 }  // namespace cli

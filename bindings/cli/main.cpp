@@ -94,9 +94,9 @@ int bad_usage(CLI::App &app, const CLI::ParseError &error) {
     text = "a subcommand is needed:";
     for (const CLI::App *sub : children(at)) text += (text.back() == ':' ? " " : ", ") + sub->get_name();
     if (!extra.empty()) {
-      text = "there is no subcommand \"" + extra[0] + "\"";
+      const std::string wrong = "there is no subcommand \"" + extra[0] + "\"; ";
       const std::string near = nearest_to(extra[0], at);
-      if (!near.empty()) text += "; did you mean \"" + near + "\"?";
+      text = wrong + (near.empty() ? text : "did you mean \"" + near + "\"?");
     }
   }
   if (dynamic_cast<const CLI::ConversionError *>(&error)) text = not_a_number(text, at);

@@ -376,6 +376,10 @@ void print_table(const SceneFile &scene, const RunResult &run, const Checks &che
   std::printf("%llu steps, %g s simulated in %.3g s: %.4g steps/s, %.3g x real time\n",
               static_cast<unsigned long long>(run.steps), run.simulated - run.begun, run.wall,
               double(run.steps) / run.wall, (run.simulated - run.begun) / run.wall);
+  if (run.pictures)
+    std::printf("pictures: %llu, drawn in a further %.3g s, %.2g s each, by %s\n",
+                static_cast<unsigned long long>(run.pictures), run.drawing,
+                run.drawing / double(run.pictures), run.drawn_by.c_str());
   std::printf(
       "contacts: %u at most, %.3g on average; states checked: %llu, crossing triangle pairs: %zu (%zu of a "
       "body with itself), inverted cells: %u\n",

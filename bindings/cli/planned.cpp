@@ -59,6 +59,13 @@ void print_planned(const std::string &json) {
                 set->members[i].value.text.c_str());
 }
 
+void print_choice(const std::string &json) {
+  JsonValue plan;
+  if (json.empty() || !parse_json(json, plan)) return;
+  if (const JsonValue *const way = plan.find("predicted"))
+    print_way(*way, plan.get("meets") == "true" ? "planner: " : "planner, nearest: ");
+}
+
 std::string planned_sentence(const std::string &json) {
   JsonValue plan;
   if (json.empty() || !parse_json(json, plan) || plan.get("meets") == "true") return "";

@@ -17,7 +17,7 @@ Progress::~Progress() {
   if (drawn_) std::fprintf(stderr, "\r\033[K");
 }
 
-void Progress::show(double done, double total, double steps_per_second) {
+void Progress::show(double done, double total, double steps_per_second, uint64_t pictures, double drawing) {
   if (!on_) return;
   const Clock::time_point now = Clock::now();
   if (now < next_) return;
@@ -25,9 +25,14 @@ void Progress::show(double done, double total, double steps_per_second) {
   const double part = total > 0 ? std::clamp(done / total, 0.0, 1.0) : 0.0;
   const double elapsed = std::chrono::duration<double>(now - begin_).count();
   const int width = 32, filled = int(part * width);
-  std::fprintf(stderr, "\r[%s%s] %3.0f %%  t = %.3f s of %g s  %.0f steps/s  %.0f s left \033[K",
+  char drawn[64] = "";
+  if (pictures)
+    std::snprintf(drawn, sizeof drawn, "  %llu pictures took %.0f s of %.0f s",
+                  static_cast<unsigned long long>(pictures), drawing, elapsed);
+  std::fprintf(stderr, "\r[%s%s] %3.0f %%  t = %.3f s of %g s  %.*f steps/s%s  %.0f s left \033[K",
                std::string(size_t(filled), '#').c_str(), std::string(size_t(width - filled), '.').c_str(),
-               100 * part, done, total, steps_per_second, part > 0 ? elapsed / part * (1 - part) : 0.0);
+               100 * part, done, total, steps_per_second < 10 ? 1 : 0, steps_per_second, drawn,
+               part > 0 ? elapsed / part * (1 - part) : 0.0);
   std::fflush(stderr);
   drawn_ = true;
 }

@@ -2,6 +2,7 @@
 #pragma once
 #include <chrono>
 #include <condition_variable>
+#include <cstdint>
 #include <mutex>
 #include <string>
 #include <thread>
@@ -11,8 +12,9 @@ namespace cli {
 class Progress {
  public:
   explicit Progress(bool wanted);
-  ~Progress();                                                    // wipes the line
-  void show(double done, double total, double steps_per_second);  // cheap: draws ten times a second at most
+  ~Progress();  // wipes the line
+  // Cheap: draws ten times a second at most. drawing: s that the pictures took so far.
+  void show(double done, double total, double steps_per_second, uint64_t pictures = 0, double drawing = 0);
 
  private:
   using Clock = std::chrono::steady_clock;

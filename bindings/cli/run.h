@@ -54,6 +54,9 @@ struct RunResult {
   // checks
   double start = 0, begun = 0, simulated = 0, wall = 0, cpu = 0;
   StepTimes times;
+  uint64_t pictures = 0;
+  double drawing = 0;    // s, wall time of the pictures
+  std::string drawn_by;  // the renderer, as OpenGL names it
   std::vector<dfm_swap> swaps;
   std::map<std::string, std::string> unwatched;  // bodies that the energy watch did not look at, and why
   std::string impulses = "{}";                   // JSON, Impulses::json()

@@ -21,7 +21,11 @@ std::vector<std::string> kept_warnings;
 
 void on_log(void *, int32_t level, const char *utf8) {
   if (level < DFM_LOG_WARNING) return;
-  if (level == DFM_LOG_WARNING) kept_warnings.push_back(utf8);
+  if (level == DFM_LOG_WARNING) {
+    // Once each: `--save-scene` loads what it has written, and steps may find the same overlap again.
+    if (std::ranges::find(kept_warnings, utf8) != kept_warnings.end()) return;
+    kept_warnings.push_back(utf8);
+  }
   if (!globals.quiet || level > DFM_LOG_WARNING)
     std::fprintf(stderr, "deform: %s: %s\n", level == DFM_LOG_WARNING ? "warning" : "error",
                  shown(utf8).c_str());

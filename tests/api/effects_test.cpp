@@ -218,6 +218,17 @@ TEST(Effects, ThatNothingProvides_AreRefusedWithThoseWhoCould) {
   test::says({"'guard'", "contact.guard"});
 }
 
+// Before anything is said about what the list leaves out.
+TEST(Effects, ThatNoPluginKnows_AreRefusedWithTheNearest) {
+  Logged c;
+  dfm_world w = 0;
+  Options o = everything();
+  o.effects = {"frictoin", "volume"};
+  EXPECT_EQ(make(c.context, o, &w), DFM_E_ARG);
+  test::says({"'frictoin'", "did you mean 'friction'", "provided:", "stribeck"});
+  EXPECT_EQ(c.log, "");
+}
+
 // What parameters would have called for is told as bodies and laws come, and in the plan.
 TEST(Effects, ThatAreLeftOut_AreTold) {
   Logged c;

@@ -10,6 +10,7 @@ namespace {
 struct Setting {
   double poisson = 0.3, volume = -1;
   const char *extra = nullptr;
+  double young = 1e5;
 };
 
 std::vector<std::string> warnings;
@@ -26,6 +27,7 @@ std::string plan(const Setting &s) {
   const dfm_world world = test::make_world(c);
   dfm_material_def md = dfm_material_def_default();
   md.poisson = s.poisson;
+  md.young = s.young;
   const double one = 1;
   const dfm_param_value extra{s.extra, &one, 1}, volume{"volume", &s.volume, 1};
   if (s.extra) md.extra = {sizeof(dfm_params), 1, &extra};
@@ -78,6 +80,25 @@ TEST(Idle, EntryOfAMaterialThatTheModelLacks_IsListedAndWarnedOf) {
   EXPECT_EQ(plan({0.3, -1, "friction"}).find("\"idle\":[]"), 0u) << "friction is the pairs' to use";
 }
 
+TEST(Idle, EntryThatNoModelKnows_NamesTheNearest) {
+  plan({0.3, -1, "youngs"});
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].find("its material gives it"), std::string::npos) << warnings[0];
+  EXPECT_NE(warnings[0].find("did you mean 'young'?"), std::string::npos) << warnings[0];
+  plan({0.3, -1, "locking"});  // of another model
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_EQ(warnings[0].find("did you mean"), std::string::npos) << warnings[0];
+}
+
+// A meter of it weighs 9810 Pa.
+TEST(Idle, BodyThatItsOwnWeightPressesFlat_IsWarnedOf) {
+  plan({0.3, -1, nullptr, 9000});
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].find("its own weight"), std::string::npos) << warnings[0];
+  plan({0.3, -1, nullptr, 10000});
+  EXPECT_TRUE(warnings.empty()) << warnings[0];
+}
+
 TEST(Idle, AutoInAScene_IsTheDefaultAndTheCommandShowsWhatDoesNothing) {
   const std::string folder = test::scratch("idle_" + std::to_string(getpid())), path = folder + "/scene.json";
   ASSERT_EQ(test::deform({"mesh", "make", "beam", "--cells", "60", "--out", folder + "/block.msh", "--quiet"})
@@ -100,6 +121,13 @@ TEST(Idle, AutoInAScene_IsTheDefaultAndTheCommandShowsWhatDoesNothing) {
   EXPECT_EQ(hash(R"({"volume": "auto"})"), by_default);
   EXPECT_EQ(hash(R"({"volume": -1})"), by_default);
   EXPECT_NE(hash(R"({"volume": 0})"), by_default);
+  hash(R"({"volume": 0})");
+  const test::CommandResult saved =
+      test::deform({"run", path, "--out", folder + "/out", "--save-scene", folder + "/saved.json"});
+  const size_t told = saved.err.find("poisson has no effect");
+  ASSERT_NE(told, std::string::npos) << saved.err;
+  EXPECT_EQ(saved.err.find("poisson has no effect", told + 1), std::string::npos)
+      << "the saved scene is loaded to check it, and warns of the same: " << saved.err;
   const test::CommandResult explain = test::deform({"explain", path});
   EXPECT_NE(explain.out.find("poisson has no effect"), std::string::npos) << explain.out;
   const test::CommandResult info = test::deform({"plugin", "info", "msm"});

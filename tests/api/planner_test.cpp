@@ -94,6 +94,8 @@ TEST_F(PlannerScene, BudgetThatCannotBeMet_IsSaidByTheRun) {
       test::deform({"run", bar(R"("budget": {"ms_per_step": 1e-6},)"), "--out", folder() + "/out"});
   EXPECT_EQ(r.exit_code, 0) << r.err;
   EXPECT_TRUE(has(r.err, "the planner finds no settings that meet the goal of the scene")) << r.err;
+  EXPECT_EQ(r.out.find("planner, nearest: "), 0u) << "what is simulated: " << r.out;
+  EXPECT_TRUE(has(r.out, " ms per step\nbody ")) << r.out;
 }
 
 TEST_F(PlannerScene, WhatCannotBePlanned_IsOneSentence) {

@@ -400,6 +400,9 @@ TEST(Run, Frames_AreDrawnAtTheirRate) {
   for (const char *file : {"frame_000000.png", "frame_000001.png", "frame_000002.png"})
     EXPECT_GT(fs::file_size(r.out + "/frames/" + file), 1000u);
   EXPECT_FALSE(fs::exists(r.out + "/frames/frame_000003.png"));
+  // what the time went into: "x real time" is of the steps alone
+  EXPECT_NE(r.result.out.find("pictures: 3, drawn in a further "), std::string::npos) << r.result.out;
+  EXPECT_NE(r.result.out.find(" s each, by "), std::string::npos) << r.result.out;
 }
 
 // A block pressed on the floor is stressed, so its picture is another one than by body. Springs tell no

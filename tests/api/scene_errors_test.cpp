@@ -233,6 +233,7 @@ TEST(SceneErrors, Files_AreRefusedWithTheirPlace) {
 TEST(SceneErrors, Arguments_AreRefused) {
   const std::vector<std::pair<std::vector<std::string>, std::vector<std::string>>> calls = {
       {{"rnu"}, {"rnu", "did you mean \"run\"?"}},
+      {{"validate", scene()}, {"there is no subcommand \"validate\"; a subcommand is needed: run, "}},
       {{}, {"subcommand"}},
       {{"run"}, {"SCENE"}},
       {{"run", scene(), "--tiem", "1"}, {"--tiem", "did you mean \"--time\"?"}},

@@ -111,6 +111,10 @@ TEST(Registry, UnknownName_ListsWhatIsLoadedAndTheNearest) {
   dfm_law law = 0;
   EXPECT_EQ(dfm_law_open(c.c, "darg", &law), DFM_E_UNSUPPORTED);
   EXPECT_STREQ(dfm_last_error(), "no law \"darg\" is loaded, did you mean \"drag\"; loaded: drag, old");
+  // a part of a name is nearer to that name than a short one with few letters in common
+  EXPECT_EQ(dfm_law_open(c.c, "tiny.d", &law), DFM_E_UNSUPPORTED);
+  EXPECT_NE(std::string(dfm_last_error()).find("did you mean \"org.tiny.drag\""), std::string::npos)
+      << dfm_last_error();
   Context empty;
   EXPECT_EQ(dfm_law_open(empty.c, "coulomb", &law), DFM_E_UNSUPPORTED);
   EXPECT_NE(std::string(dfm_last_error()).find("no plugin with a law is loaded"), std::string::npos)

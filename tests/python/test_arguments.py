@@ -33,6 +33,16 @@ class Arguments(unittest.TestCase):
             self.refused(r"force has the shape \(2,\); expected \(3,\), or \(1, 3\)",
                          lambda: ball.add_load([0], (1, 2)))
 
+    def test_material_has_entries_that_something_reads(self):
+        mesh = deform.TetMesh.ball(0.1, cells=100)
+        with deform.World() as world:
+            self.refused("no loaded model has a parameter 'yung'.* did you mean 'young'",
+                         lambda: world.add_body(mesh, material={"yung": 1e6}))
+            self.refused("load the plugin that has it", lambda: world.add_material("x", qqqqqq=1))
+            self.assertEqual(len(world.bodies), 0)
+            world.add_body(mesh, material={"young": 1e6, "friction": 0.3, "volume": 0})
+            world.add_body(mesh, material={"locking": 1}, model="corotational_fem", position=(0, 0, 1))
+
     def test_mesh_says_what_makes_one(self):
         points, tets = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]]
         for kind in (deform.TetMesh, deform.TriMesh):

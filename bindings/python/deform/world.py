@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import difflib
 import enum
 import json
 import weakref
@@ -28,6 +29,8 @@ SELF_CONTACT = {"off": 0, "on": 1, "auto": 2}
 SHAPES = {"plane": 0, "sphere": 1, "box": 2, "capsule": 3, "mesh": 4, "voxels": 5}
 JOINTS = {"hinge": 0, "slider": 1, "ball": 2, "fixed": 3}
 COUPLINGS = {"barycentric": 0, "mls": 1}
+MATERIAL_MEMBERS = {"density", "young", "poisson", "damping_mass", "damping_stiffness"}
+MATERIAL_ENTRIES = {"friction", "tear", "fracture_energy"}  # further ones are parameters of models
 
 
 class Trouble(enum.IntFlag):
@@ -263,6 +266,7 @@ class World(Queries, Tools):
         """density kg/m3, young Pa, poisson 1, damping_mass 1/s, damping_stiffness s; `extra`: further
         entries that models take by key, and friction=..., the coefficient where no rule names the pair."""
         definition = default(_abi.dfm_material_def)
+        self._check_entries(extra)
         values = Params(extra)
         definition.name = encoded(name)
         definition.density, definition.young, definition.poisson = density, young, poisson
@@ -272,6 +276,18 @@ class World(Queries, Tools):
         self.free()
         check(lib.dfm_material_create(self.handle, ctypes.byref(definition), ctypes.byref(out)))
         return Material(self, out.value, name)
+
+    def _check_entries(self, extra: Mapping[str, Any]) -> None:
+        if all(key in MATERIAL_ENTRIES for key in extra):
+            return
+        known = {p.key for t in self.context.types if t.kind == "model" for p in t.parameters}
+        known.update(MATERIAL_ENTRIES)
+        for key in extra:
+            if key not in known:
+                near = difflib.get_close_matches(key, known | MATERIAL_MEMBERS, 1)
+                meant = f", did you mean '{near[0]}'?" if near else "; load the plugin that has it first"
+                raise ArgumentError(f"no loaded model has a parameter '{key}', and it is no entry of a "
+                                    f"material{meant}", "DFM_E_ARG")
 
     def add_body(self, mesh: TetMesh | str | None = None, *, points: Any = None, tets: Any = None,
                  name: str | None = None, model: str | None = None, params: Mapping[str, Any] | None = None,

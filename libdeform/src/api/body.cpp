@@ -13,6 +13,7 @@
 #include "world/change_energy.h"
 #include "world/create.h"
 #include "world/measure.h"
+#include "world/own_weight.h"
 #include "world/queries.h"
 
 using namespace dfm;
@@ -128,7 +129,9 @@ dfm_status dfm_body_create(dfm_world world, const dfm_body_def *def, dfm_body *o
     dfm_surface_groups groups;
     take_pointed(own.surface, surface);
     take_pointed(own.groups, groups);
-    *out = create_body(w, own).handle;
+    const Body &made = create_body(w, own);
+    warn_of_own_weight(w, made);
+    *out = made.handle;
   });
 }
 

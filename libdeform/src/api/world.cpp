@@ -110,8 +110,24 @@ void choose_integrator(World &w) {
   w.implicit.tasks = &w.context->tasks;
 }
 
+// Refuses words that no loaded plugin and no part of the library provides.
+void check_effects(const World &w) {
+  std::vector<std::string> known = {kFriction, kGuard, kMemory, kSelfContact};
+  for (const dfm_type *type : w.context->registry.list())
+    for (const std::string &word : effects(*type)) known.push_back(word);
+  std::sort(known.begin(), known.end());
+  known.erase(std::unique(known.begin(), known.end()), known.end());
+  for (const char *const *word = w.def.effects; word && *word; ++word) {
+    if (std::find(known.begin(), known.end(), *word) != known.end()) continue;
+    const std::string near = nearest(*word, known);
+    fail(DFM_E_ARG, "effect '%s' is asked for, but no loaded plugin provides it%s%s%s; provided: %s", *word,
+         near.empty() ? "" : ", did you mean '", near.c_str(), near.empty() ? "" : "'", join(known).c_str());
+  }
+}
+
 // What the list of effects leaves out of the world itself; bodies and laws follow when they are created.
 void select_effects(World &w) {
+  check_effects(w);
   w.selection = Selection(w.def.effects, w.context->registry);
   const bool unguarded = w.def.flags & DFM_WORLD_UNGUARDED;
   if (unguarded && w.selection.lists(kGuard))

@@ -106,9 +106,15 @@ const char *last_error() noexcept { return last_sentence; }
 uint64_t sentences() noexcept { return said; }
 
 std::string nearest(const std::string &wrong, const std::vector<std::string> &valid) {
+  // A part of a name, such as "fem", is nearer to that name than to a short one with few letters in common.
+  const auto part_of = [&](const std::string &name) {
+    return wrong.size() > 2 && name.find(wrong) != std::string::npos;
+  };
+  const bool parts = std::ranges::any_of(valid, part_of);
   std::string best;
-  size_t best_distance = std::max<size_t>(2, wrong.size() / 2) + 1;
+  size_t best_distance = parts ? SIZE_MAX : std::max<size_t>(2, wrong.size() / 2) + 1;
   for (const auto &name : valid) {
+    if (parts && !part_of(name)) continue;
     const size_t d = edit_distance(wrong, name);
     if (d < best_distance) {
       best_distance = d;

@@ -1,8 +1,6 @@
 #include "scene/build.h"
 
 #include <algorithm>
-#include <cmath>
-#include <cstring>
 #include <functional>
 #include <utility>
 
@@ -209,40 +207,6 @@ class Builder {
     return out;
   }
 
-  // Warns of a body that its own weight presses flat. The usual causes are a mesh file in millimeters and a
-  // material that the scene does not name.
-  void tell_own_weight(const Body &b, dfm_body body) const {
-    const dfm::Body &made = resolve<dfm::Body>(Kind::body, body);
-    const Vec3 down = load3(def_.gravity);
-    const double g = norm(down), young = largest_young(made);
-    if (!(g > 0) || !def_.gravity_keys.empty() || !(young > 0)) return;
-    double lo = INFINITY, hi = -INFINITY;
-    for (uint32_t i = 0; i < made.p.n; ++i) {
-      const double depth = dot(load3(&made.p.x[size_t{kStride} * i]), down) / g;
-      lo = std::min(lo, depth);
-      hi = std::max(hi, depth);
-    }
-    const double weight = made.mass / made.rest_volume * g * (hi - lo);
-    if (weight > young)
-      context_->logf(
-          DFM_LOG_WARNING,
-          "body '%s' is %.3g m high, and the pressure of its own weight (density x gravity x height = "
-          "%.3g Pa) is above its Young's modulus of %.3g Pa, so it collapses; if its mesh file is in "
-          "millimeters, write \"scale\": 0.001 in its \"pose\"; if it is not, give it a stiffer "
-          "material",
-          b.name.c_str(), hi - lo, weight, young);
-  }
-
-  // Pa, of all cells; 0: the model has no such parameter.
-  static double largest_young(const dfm::Body &b) {
-    for (const CellField &f : b.fields)
-      if (f.key == "young") return *std::max_element(f.values.begin(), f.values.end());
-    size_t at = 0;
-    for (uint32_t i = 0; i < b.model.type->nparam; at += b.model.type->params[i++].width)
-      if (!std::strcmp(b.model.type->params[i].key, "young")) return b.model.params[at];
-    return 0;
-  }
-
   void create_body(Body &b) {
     BodyMesh mesh = files_.load(b);
     const std::vector<dfm_material> materials = materials_by_group(b, mesh);
@@ -297,7 +261,6 @@ class Builder {
     std::copy_n(b.spin, 3, d.spin);
     dfm_body body = 0;
     check(dfm_body_create(world_, &d, &body), b.pointer);
-    tell_own_weight(b, body);
     if (b.sensor) check(dfm_body_set_sensor(body, true), b.pointer);
     if (b.start.kind != StartKind::rest && b.start.kind != StartKind::state)
       check(dfm_body_set_state(body, mesh.npoint, start_positions(b.start, mesh, b.pose).data(), nullptr),

@@ -311,8 +311,9 @@ void choose_integrators(World &w) {
                                                 : DFM_INTEGRATOR_IMPLICIT_EULER;
       if (options[i].implicit)
         w.context->logf(DFM_LOG_WARNING,
-                        "body '%s' is integrated by %s, which damps %s, because explicit integration would "
-                        "need %.0f sub-steps of %.3g s per step; set its integrator to choose another",
+                        "body '%s' is integrated by %s, which damps %s, as long as that takes less work than "
+                        "explicit integration by %.0f sub-steps of %.3g s per step; set its integrator to "
+                        "choose one",
                         b.name.c_str(), chosen.second_order ? "tr_bdf2" : "implicit_euler",
                         chosen.second_order ? "contacts and unresolved vibrations" : "motion",
                         std::ceil(options[i].substeps), b.integrator.step);

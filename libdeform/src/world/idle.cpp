@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "core/error.h"
+#include "plugin/context.h"
 #include "state/world.h"
 
 namespace dfm {
@@ -20,6 +21,17 @@ bool from_material(const char *key) {
   for (const char *k : {"young", "poisson", "damping_mass", "damping_stiffness"})
     if (!std::strcmp(key, k)) return true;
   return false;
+}
+
+// For a key that no model knows: the nearest one that the body's model has.
+std::string meant(const Body &b, const std::string &key) {
+  if (from_material(key.c_str())) return {};
+  for (const dfm_type *model : b.world->context->registry.list(DFM_KIND_MODEL))
+    if (has_row(*model, key)) return {};
+  std::vector<std::string> known = {"density", "friction", kTearKey, kToughnessKey};
+  for (uint32_t i = 0; i < b.model.type->nparam; ++i) known.push_back(b.model.type->params[i].key);
+  const std::string near = nearest(key, known);
+  return near.empty() ? "" : ", did you mean '" + near + "'?";
 }
 
 const CellField *field_of(const Body &b, const char *key) {
@@ -52,15 +64,18 @@ std::vector<Unused> find_unused(const dfm_type &type, const CellMaterials &cells
 std::vector<IdleParam> idle_params(const Body &b) {
   std::vector<IdleParam> out;
   const dfm_type &type = *b.model.type;
-  for (const Unused &u : b.unused)
-    out.push_back(
-        {u.key,
-         u.material.empty()
-             ? format("a field of the body gives it, and %s has no such parameter that "
-                      "may differ by cell",
-                      type.id)
-             : format("material '%s' gives it, and %s has no such parameter", u.material.c_str(), type.id),
-         true});
+  for (const Unused &u : b.unused) {
+    const bool field = u.material.empty() && std::ranges::any_of(b.makeup.given, [&](const CellField &f) {
+                         return f.key == u.key;
+                       });
+    const std::string by = field                ? "a field of the body"
+                           : u.material.empty() ? "its material"
+                                                : "material '" + u.material + "'";
+    out.push_back({u.key,
+                   format("%s gives it, and %s has no such parameter%s%s", by.c_str(), type.id,
+                          field ? " that may differ by cell" : "", meant(b, u.key).c_str()),
+                   true, true});
+  }
   size_t at = 0;
   for (uint32_t i = 0; i < type.nparam; at += type.params[i++].width) {
     const dfm_param &row = type.params[i];
@@ -77,8 +92,8 @@ std::vector<IdleParam> idle_params(const Body &b) {
 void warn_of_idle(const Body &b) {
   for (const IdleParam &p : idle_params(b))
     if (p.chosen)
-      b.world->context->logf(DFM_LOG_WARNING, "body '%s': %s has no effect, or not the one it names: %s",
-                             b.name.c_str(), p.key.c_str(), p.why.c_str());
+      b.world->context->logf(DFM_LOG_WARNING, "body '%s': %s has no effect%s: %s", b.name.c_str(),
+                             p.key.c_str(), p.unknown ? "" : ", or another one than it names", p.why.c_str());
 }
 
 }  // namespace dfm

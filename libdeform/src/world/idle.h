@@ -11,7 +11,8 @@ namespace dfm {
 
 struct IdleParam {
   std::string key, why;
-  bool chosen;  // not the default: the user set it and expects an effect
+  bool chosen;           // not the default: the user set it and expects an effect
+  bool unknown = false;  // the model has no such parameter
 };
 
 // Material entries that are no parameter of the model and differ from their default. Friction is used by

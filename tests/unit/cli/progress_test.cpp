@@ -55,6 +55,21 @@ using std::chrono::milliseconds;
 
 }  // namespace
 
+// The line says where the time goes: steps per second alone would not.
+TEST(Progress, PicturesAreToldWithTheirTime) {
+  const Terminal terminal;
+  if (!terminal.works()) GTEST_SKIP() << "this system gives no pseudo terminal";
+  {
+    cli::Progress progress(true);
+    progress.show(0.1, 1, 50, 1, 1.2);
+    EXPECT_EQ(terminal.read(), "") << "what is short is not shown";
+    std::this_thread::sleep_for(milliseconds(2000));
+    progress.show(0.5, 1, 50, 3, 4.2);
+  }
+  const std::string text = terminal.read();
+  EXPECT_NE(text.find("50 steps/s  3 pictures took 4 s of "), std::string::npos) << text;
+}
+
 TEST(Patience, LongCall_IsToldAndWiped) {
   const std::string text = shown(true, milliseconds(20), milliseconds(300));
   if (text == "no terminal") GTEST_SKIP() << "this system gives no pseudo terminal";
