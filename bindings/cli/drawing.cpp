@@ -165,11 +165,11 @@ void Drawing::add_triangles(const ObstacleView &o, std::vector<double> &placed, 
 void Drawing::fill(render::Scene &out) {
   add_bodies(out);
   add_obstacles(out);
-  if (color_ == "displacement") out.map = render::ColourMap::lagoon;
+  if (color_ == "displacement") out.map = render::ColorMap::lagoon;
 }
 
 bool Drawing::legend(Legend &out) const {
-  out.map = color_ == "displacement" ? render::ColourMap::lagoon : render::ColourMap::ember;
+  out.map = color_ == "displacement" ? render::ColorMap::lagoon : render::ColorMap::ember;
   out.top = scale_;
   static const struct {
     const char *color, *title, *unit;

@@ -22,7 +22,7 @@ class Drawing {
   const std::vector<double> &positions(size_t body) const { return buffers_[body].xyz; }
   // What the colors mean: false where each body has its own.
   struct Legend {
-    render::ColourMap map = render::ColourMap::ember;
+    render::ColorMap map = render::ColorMap::ember;
     double top = 0;
     std::string title, unit;
   };

@@ -73,12 +73,12 @@ Color palette(uint32_t i) {
   return colors[i % std::size(colors)];
 }
 
-Color map_color(ColourMap map, float t) {
+Color map_color(ColorMap map, float t) {
   t = t > 0 ? std::min(t, 1.f) : 0.f;
   switch (map) {
-    case ColourMap::lagoon: return along(kLagoon, t);
-    case ColourMap::balance: return t < 0.5f ? along(kCold, 2 * t) : along(kWarm, 2 * t - 1);
-    case ColourMap::ember: break;
+    case ColorMap::lagoon: return along(kLagoon, t);
+    case ColorMap::balance: return t < 0.5f ? along(kCold, 2 * t) : along(kWarm, 2 * t - 1);
+    case ColorMap::ember: break;
   }
   return along(kEmber, t);
 }

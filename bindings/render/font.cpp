@@ -218,7 +218,7 @@ void draw_text(Image &picture, double x, double y, double size, const std::strin
   }
 }
 
-void legend(Image &picture, ColourMap map, double min, double max, const std::string &title,
+void legend(Image &picture, ColorMap map, double min, double max, const std::string &title,
             const std::string &unit) {
   const double size = std::max(8.0, picture.height / 46.0);
   const std::string head = unit.empty() ? title : title + " [" + unit + "]";

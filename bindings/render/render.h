@@ -84,7 +84,7 @@ struct Lines {
 };
 
 // our own paths through OKLab: dark to light warm, dark to light cool, blue-gray-red
-enum class ColourMap { ember, lagoon, balance };
+enum class ColorMap { ember, lagoon, balance };
 
 struct Scene {
   std::vector<Surface> surfaces;
@@ -97,7 +97,7 @@ struct Scene {
   std::optional<Camera> camera;  // none: auto_camera() over `extent`
   // what grid, slabs and camera are sized to; none: bounds(scene). Give one for all frames of a film.
   std::optional<Bounds> extent;
-  ColourMap map = ColourMap::ember;
+  ColorMap map = ColorMap::ember;
 };
 
 // Box around surfaces, spheres, capsules and boxes (not planes); a solid far larger than the surfaces counts
@@ -153,7 +153,7 @@ struct Color { float r, g, b; };
 // Distinct colors for bodies, repeating after ten.
 Color palette(uint32_t i);
 // t is clamped to 0..1.
-Color map_color(ColourMap map, float t);
+Color map_color(ColorMap map, float t);
 
 // Through a temporary file and a rename, so that nobody reads half a picture. False: *why_not
 // is one sentence.
@@ -165,9 +165,9 @@ bool read_png(const std::string &path, Image &picture, std::string *why_not);
 void draw_text(Image &picture, double x, double y, double size, const std::string &text, Color color);
 double text_width(double size, const std::string &text);
 
-// A bar of the map in the lower right corner with its ends, e.g. legend(p, ColourMap::ember, 0, 1.5,
+// A bar of the map in the lower right corner with its ends, e.g. legend(p, ColorMap::ember, 0, 1.5,
 // "speed", "m/s").
-void legend(Image &picture, ColourMap map, double min, double max, const std::string &title,
+void legend(Image &picture, ColorMap map, double min, double max, const std::string &title,
             const std::string &unit);
 
 // Pictures in a grid, row by row; rows may differ in length. `row_labels` stand to the left and

@@ -300,7 +300,7 @@ class GlRenderer final : public WindowRenderer {
     current_ = program;
     gl_.UseProgram(program);
   }
-  void upload(const Frame &frame, ColourMap map);
+  void upload(const Frame &frame, ColorMap map);
   // Into the sampled target. False: the sentence is in *why_not.
   bool paint(const Scene &scene, std::string *why_not);
   bool without_error(std::string *why_not) const;
@@ -465,7 +465,7 @@ void GlRenderer::set(const char *name, const Vec &v) const {
   gl_.Uniform3fv(gl_.GetUniformLocation(current_, name), 1, f);
 }
 
-void GlRenderer::upload(const Frame &frame, ColourMap map) {
+void GlRenderer::upload(const Frame &frame, ColorMap map) {
   gl_.BindVertexArray(array_);
   gl_.BindBuffer(GL_ARRAY_BUFFER, buffer_);
   gl_.BufferData(GL_ARRAY_BUFFER, GLsizeiptr(frame.shape.vertices.size() * sizeof(Vertex)),

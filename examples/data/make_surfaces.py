@@ -2,7 +2,7 @@
 """Makes organ.obj and rabbit.obj: closed surfaces of our own for scenes that fill them with cells.
 
 A sphere of even triangles is pulled out to a radius that depends on the direction; then each point moves to
-the middle of its neighbours and back onto the shape, again and again, until the triangles are even there. Run
+the middle of its neighbors and back onto the shape, again and again, until the triangles are even there. Run
 in this folder: python3 make_surfaces.py
 """
 import math

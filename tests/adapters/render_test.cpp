@@ -176,7 +176,7 @@ TEST_P(Pixels, NearerBody_HidesTheFarther) {
 
 TEST_P(Pixels, Scalars_TakeTheColoursOfTheMap) {
   const Ball ball(0, 0, 1, 1);
-  for (const ColourMap map : {ColourMap::ember, ColourMap::lagoon, ColourMap::balance})
+  for (const ColorMap map : {ColorMap::ember, ColorMap::lagoon, ColorMap::balance})
     for (const float t : {0.f, 0.5f, 1.f}) {
       const Color c = map_color(map, t);
       const std::vector<float> values(ball.xyz.size() / 3, t);
@@ -502,7 +502,7 @@ TEST(Colors, Maps_GrowLighterSteadily) {
     const double y = 0.2126 * linear(c.r) + 0.7152 * linear(c.g) + 0.0722 * linear(c.b);
     return y > 0.008856 ? 116 * std::cbrt(y) - 16 : 903.3 * y;
   };
-  for (const ColourMap map : {ColourMap::ember, ColourMap::lagoon}) {
+  for (const ColorMap map : {ColorMap::ember, ColorMap::lagoon}) {
     const double span = lightness(map_color(map, 1)) - lightness(map_color(map, 0));
     EXPECT_GT(span, 60);
     for (int i = 0; i < 32; ++i) {
@@ -512,8 +512,8 @@ TEST(Colors, Maps_GrowLighterSteadily) {
       EXPECT_LT(step, 2.0 * span / 32) << i;
     }
   }
-  EXPECT_EQ(map_color(ColourMap::ember, -3).r, map_color(ColourMap::ember, 0).r);
-  EXPECT_EQ(map_color(ColourMap::ember, 3).r, map_color(ColourMap::ember, 1).r);
+  EXPECT_EQ(map_color(ColorMap::ember, -3).r, map_color(ColorMap::ember, 0).r);
+  EXPECT_EQ(map_color(ColorMap::ember, 3).r, map_color(ColorMap::ember, 1).r);
 }
 
 TEST(Colors, Palette_IsDistinct) {
@@ -602,9 +602,9 @@ TEST(Montage, Grid_HoldsEveryPictureAndItsLabels) {
 
 TEST(Legend, Bar_RunsFromEndToEndOfTheMap) {
   Image p = blank(1600, 900, 128);
-  legend(p, ColourMap::ember, 0, 1.5, "speed", "m/s");
+  legend(p, ColorMap::ember, 0, 1.5, "speed", "m/s");
   const auto holds = [&](float t) {
-    const Color c = map_color(ColourMap::ember, t);
+    const Color c = map_color(ColorMap::ember, t);
     for (uint32_t i = 0; i < p.width * p.height; ++i) {
       const uint8_t *q = &p.rgb[3 * size_t(i)];
       if (std::abs(q[0] - 255 * c.r) + std::abs(q[1] - 255 * c.g) + std::abs(q[2] - 255 * c.b) < 3)

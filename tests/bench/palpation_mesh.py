@@ -8,11 +8,14 @@ box.
 """
 import itertools
 import math
+import pathlib
 import sys
 
 import palpation_case as case
 
-PATHS = list(itertools.permutations(range(3)))
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "examples" / "data"))
+import kuhn  # noqa: E402
+
 PLACES = [[(q + 0.25) / 5 for q in (a, b, c, 4 - a - b - c)]
           for a in range(5) for b in range(5 - a) for c in range(5 - a - b)]
 
@@ -44,19 +47,9 @@ def main():
               for k in range(n[2] + 1) for j in range(n[1] + 1) for i in range(n[0] + 1)]
     cells = []
     for place in itertools.product(*map(range, n)):
-        for path in PATHS:
-            at = [0, 0, 0]
-            corners = [tuple(at)]
-            for axis in path:
-                at[axis] = 1
-                corners.append(tuple(at))
-            ids = []
-            for corner in corners:
-                i, j, k = (c + (1 - a if c % 2 else a) for c, a in zip(place, corner))
-                ids.append(i + (n[0] + 1) * (j + (n[1] + 1) * k))
-            if volume([points[p] for p in ids]) < 0:
-                ids[2], ids[3] = ids[3], ids[2]
-            cells.append(ids)
+        for tet in kuhn.cube([c % 2 for c in place]):
+            corners = [[c + a for c, a in zip(place, corner)] for corner in tet]
+            cells.append([i + (n[0] + 1) * (j + (n[1] + 1) * k) for i, j, k in corners])
     # as many cells, those that lie in the ball most, as have the volume of its half
     shares = [share([points[p] for p in ids]) for ids in cells]
     group, left = [1] * len(cells), 2 / 3 * math.pi * case.RADIUS ** 3

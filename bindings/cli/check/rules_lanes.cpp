@@ -123,7 +123,7 @@ std::string same_bits(const Subject &subject) {
   if (other.verdict.detail != mine)
     broken(
         "the same batches give %s here and %s in another process: it uses an address, the time or something "
-        "left uninitialised, so results differ from run to run; compute from the inputs alone",
+        "left uninitialized, so results differ from run to run; compute from the inputs alone",
         mine.c_str(), other.verdict.detail.c_str());
   return "digest " + mine;
 }

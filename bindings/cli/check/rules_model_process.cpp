@@ -401,7 +401,7 @@ std::string model_same_bits(const Subject &subject) {
     broken(
         "the same steps give %s here and %s in another process: it uses an address, the time or something "
         "left "
-        "uninitialised, so results differ from run to run; compute from the inputs alone",
+        "uninitialized, so results differ from run to run; compute from the inputs alone",
         mine.c_str(), other.verdict.detail.c_str());
   return "digest " + mine;
 }

@@ -16,7 +16,7 @@ from .picture import Solid, palette, turned
 if TYPE_CHECKING:
     from .scene import Run
 
-_GREY = (0.72, 0.73, 0.75)
+_GRAY = (0.72, 0.73, 0.75)
 _LEVELS = 65535  # positions travel as 16 bits of the box around everything
 _AROUND = 24     # points on a circle
 
@@ -76,7 +76,7 @@ def _surfaces(run: Run) -> list[tuple[list[np.ndarray], np.ndarray, tuple[float,
         meshes = [mesh_of(frame.obstacles[k], reach) for frame in run.frames]
         points = [mesh[0] for mesh in meshes]
         still = all(np.array_equal(points[0], p) for p in points)
-        out.append((points[:1] if still else points, meshes[0][1], _GREY, None))
+        out.append((points[:1] if still else points, meshes[0][1], _GRAY, None))
     return out
 
 

@@ -15,7 +15,7 @@
 namespace dfm {
 namespace {
 
-constexpr uint32_t kNeighbours = 10;  // their mean distance is the unit of the support
+constexpr uint32_t kNeighbors = 10;  // their mean distance is the unit of the support
 // det(A / trace A) below this: the neighbors lie in a plane (1/27 for a sphere of them)
 constexpr double kFlat = 1e-10;
 
@@ -107,16 +107,16 @@ class Cloud {
   Array<RestBox> find_supports(const Memory &memory, double factor) {
     Array<RestBox> cubes(HookAllocator<RestBox>{memory});
     for (uint32_t i = 0; i < support.size(); ++i) {
-      double nearest[kNeighbours], limit2 = std::numeric_limits<double>::infinity();
+      double nearest[kNeighbors], limit2 = std::numeric_limits<double>::infinity();
       uint32_t n = 0;
       dot_tree_.near(rest.point[i], limit2, [&](uint32_t j) {
         if (j == i) return;
         const double d2 = norm2(rest.point[j] - rest.point[i]);
-        if (n == kNeighbours && d2 >= limit2) return;
-        uint32_t at = n < kNeighbours ? n++ : kNeighbours - 1;
+        if (n == kNeighbors && d2 >= limit2) return;
+        uint32_t at = n < kNeighbors ? n++ : kNeighbors - 1;
         for (; at > 0 && nearest[at - 1] > d2; --at) nearest[at] = nearest[at - 1];
         nearest[at] = d2;
-        if (n == kNeighbours) limit2 = nearest[kNeighbours - 1];
+        if (n == kNeighbors) limit2 = nearest[kNeighbors - 1];
       });
       double sum = 0;
       for (uint32_t k = 0; k < n; ++k) sum += std::sqrt(nearest[k]);
@@ -129,9 +129,9 @@ class Cloud {
 };
 
 // Neighborhoods of the phyxels that reach a surfel, computed at first use.
-class Neighbourhoods {
+class Neighborhoods {
  public:
-  Neighbourhoods(const Memory &memory, const Cloud &cloud)
+  Neighborhoods(const Memory &memory, const Cloud &cloud)
       : cloud_(cloud),
         known_(cloud.support.size(), Known{}, HookAllocator<Known>(memory)),
         neighbor_(HookAllocator<uint32_t>(memory)),
@@ -269,14 +269,14 @@ Coupling couple_by_reach(const Memory &memory, const CouplingInput &in, const Cl
 Coupling couple_mls(const Memory &memory, const CouplingInput &in) {
   const Cloud cloud(memory, in);
   const Array<Vec3> &point = cloud.rest.point;
-  Neighbourhoods near(memory, cloud);
+  Neighborhoods near(memory, cloud);
   // A phyxel whose neighbors are in a plane has no gradient: it is excluded if others reach the surfel.
   const auto stands_back = [&](uint32_t i) { return near.of(i).state == 2; };
   return couple_by_reach(
       memory, in, cloud, stands_back,
       [&](Vec3 x, const Array<uint32_t> &reach, double sum, RowBuilder &build) -> Array<RowEntry> & {
         for (uint32_t i : reach) {
-          const Neighbourhoods::Known &k = near.of(i);
+          const Neighborhoods::Known &k = near.of(i);
           const double share = kernel(norm2(x - point[i]), cloud.support[i]) / sum;
           const Vec3 a = share * (k.inverse * (x - point[i]));
           double back = 0;
