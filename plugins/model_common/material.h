@@ -10,7 +10,7 @@ inline Lame lame_of(double young, double poisson) {
   return {young * poisson / ((1 + poisson) * (1 - 2 * poisson)), young / (2 * (1 + poisson))};
 }
 
-// Five constants of a solid that is the same in all directions across an axis (the fibre):
+// Five constants of a solid that is the same in all directions across an axis (the fiber):
 //   young, poisson        in the plane across the axis
 //   young_along           along the axis
 //   poisson_along         contraction across the axis for a pull along it, over that pull's strain
@@ -21,11 +21,11 @@ struct Transverse { double young, poisson, young_along, poisson_along, shear_alo
 // Composites): with e the strain, a the unit axis, t = tr e, q = a.e a,
 //   W = lambda/2 t^2 + mu e:e + alpha t q + 2 (mu_along - mu) |e a|^2 + beta/2 q^2
 //   stress = lambda t I + 2 mu e + alpha (q I + t a a) + 2 (mu_along - mu) (a (e a) + (e a) a) + beta q a a
-struct Fibre { double lambda, mu, alpha, beta, mu_along; };
+struct Fiber { double lambda, mu, alpha, beta, mu_along; };
 
 // False where the constants have no positive energy. With n = poisson_along^2 young / young_along the plane
 // strain of the plane has the bulk modulus k = young / (2 (1 - poisson - 2 n)).
-inline bool fibre_of(const Transverse &t, Fibre &out) {
+inline bool fiber_of(const Transverse &t, Fiber &out) {
   const double ratio = t.poisson_along * t.poisson_along * t.young / t.young_along;
   const double room = 1 - t.poisson - 2 * ratio;
   if (!(t.young > 0 && t.young_along > 0 && t.shear_along > 0 && t.poisson > -1 && room > 0)) return false;
@@ -43,7 +43,7 @@ inline bool fibre_of(const Transverse &t, Fibre &out) {
 
 // No strain has more than this times its square as twice its energy: the axially symmetric strains have the
 // 2 x 2 matrix of c11 + c12, sqrt 2 c13, c33, the others 2 mu and 2 mu_along.
-inline double largest_modulus(const Fibre &c) {
+inline double largest_modulus(const Fiber &c) {
   const double plane = 2 * (c.lambda + c.mu), cross = c.lambda + c.alpha;
   const double along = c.lambda + 2 * c.alpha + 4 * c.mu_along - 2 * c.mu + c.beta;
   const double half = 0.5 * (plane - along), mean = 0.5 * (plane + along);
@@ -53,7 +53,7 @@ inline double largest_modulus(const Fibre &c) {
 }
 
 // D[6][6] of stress = D strain; axis of unit length.
-inline void elasticity_matrix(const Fibre &c, const double *axis, double (*d)[6]) {
+inline void elasticity_matrix(const Fiber &c, const double *axis, double (*d)[6]) {
   constexpr int kRow[6] = {0, 1, 2, 0, 1, 2}, kCol[6] = {0, 1, 2, 1, 2, 0};
   const double shear = c.mu_along - c.mu;
   const auto delta = [](int i, int j) { return i == j ? 1.0 : 0.0; };

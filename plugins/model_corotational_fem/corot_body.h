@@ -85,7 +85,7 @@ struct Body : model::Blocks<Block> {
   Buffer<double> damp, value, damp_value;
   Buffer<Group> group;
   Buffer<SlotGroup> slots;
-  Buffer<FibreGroup> fibre;
+  Buffer<FiberGroup> fiber;
   Buffer<PlasticGroup> plastic_group;
 
   uint32_t choice(Param which) const { return uint32_t(params[which]); }
@@ -95,7 +95,7 @@ struct Body : model::Blocks<Block> {
   }
   double largest_of(Param which) const;
   bool given(Param which) const;  // auto in no cell
-  bool has_fibres() const { return given(kYoungAlong) || given(kPoissonAlong) || given(kShearAlong); }
+  bool has_fibers() const { return given(kYoungAlong) || given(kPoissonAlong) || given(kShearAlong); }
   bool has_dampers() const { return largest_of(kDampingStiffness) > 0; }
   size_t lanes() const { return size_t(groups) * kGroup; }
   uint32_t groups = 0;
@@ -151,11 +151,11 @@ struct Body : model::Blocks<Block> {
   void add_nodal(const dfm_kin &k, double a, double b, double *blk);
   // memory for new parameters, allocated before anything changes: arrays to swap in, and sums
   struct Room {
-    Buffer<FibreGroup> fibre;
+    Buffer<FiberGroup> fiber;
     Buffer<double> damp, damp_value, point_drag, around, next, blocks;
   };
   void make_room(Room &room) const;
-  model::Fibre fibre_at(uint32_t c) const;
+  model::Fiber fiber_at(uint32_t c) const;
   double direct_energy(const dfm_kin &k, size_t place) const;
   void cell_elasticity(size_t place, double (*d)[6]) const;  // times the volume
   bool soften_cell(const dfm_kin &k, uint32_t c, const double (*s)[3], double (*d)[6], bool &flows) const;

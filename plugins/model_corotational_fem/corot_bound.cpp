@@ -18,7 +18,7 @@
 // The damper works on dS/dt, whose mixed entries in the axes of S are (s_i A_ij + s_j A_ji)/(s_i + s_j), A
 // = R^T dF/dt. Their squares are at most (A_ij^2 + A_ji^2)(1 + d^2)/2, d = (s_i - s_j)/(s_i + s_j), where R
 // K_e R^T has the halves without d: the row of the damper grows by damp 2 mu d^2 V times the same factors.
-// With fibres stress and S have different axes. Let D be the elasticity, |D| its largest eigenvalue. dS is
+// With fibers stress and S have different axes. Let D be the elasticity, |D| its largest eigenvalue. dS is
 // the symmetric part of A less a matrix of norm at most d |A|/sqrt 2, which adds |D| (sqrt 2 d + d^2/2);
 // and stress : d2S adds |stress| (6 sqrt(1 + d^2)/p + 6 s^2/p^3), p the least sum of two stretches, s the
 // largest one: d2S = X solves S X + X S = 2 Q, Q = dS [w]x S - S [w]x dS + S [w]x^T [w]x S, |w| <= |A|/p.
@@ -70,8 +70,8 @@ void Body::cell_elasticity(size_t place, double (*d)[6]) const {
   const Group &g = group[place / kGroup];
   const size_t lane = place % kGroup;
   const double mu = g.mu2[lane] / 2;
-  if (fibre.empty()) return model::elasticity_matrix(model::Lame{g.lambda[lane], mu}, d);
-  const FibreGroup &own = fibre[place / kGroup];
+  if (fiber.empty()) return model::elasticity_matrix(model::Lame{g.lambda[lane], mu}, d);
+  const FiberGroup &own = fiber[place / kGroup];
   const double axis[3] = {own.axis[0][lane], own.axis[1][lane], own.axis[2][lane]};
   model::elasticity_matrix({g.lambda[lane], mu, own.alpha[lane], own.beta[lane], mu + own.shear[lane] / 2},
                            axis, d);

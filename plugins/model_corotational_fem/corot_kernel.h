@@ -24,7 +24,7 @@ struct Group {
 // of model_common/edges.h.
 struct SlotGroup { uint32_t slot[10][kGroup]; };
 // Transverse isotropy: unit axis at rest and the constants of model_common/material.h times the volume.
-struct FibreGroup {
+struct FiberGroup {
   double axis[3][kGroup];
   double alpha[kGroup], beta[kGroup], shear[kGroup];  // shear: 2 (mu_along - mu)
   double most[kGroup];                                // largest eigenvalue of the elasticity, or more
@@ -54,7 +54,7 @@ struct Block : model::BlockPoints {
   uint32_t rotate_all;  // no closed form, every cell goes to `rotate`
   uint32_t nodal;       // the volume change is that of the points, see corot_nodal.cpp
   const Group *group;
-  const FibreGroup *fibre;  // NULL: isotropic
+  const FiberGroup *fiber;  // NULL: isotropic
   const double *damp;       // [groups,8] s; NULL: none
   // NULL: elastic; else the rest counts: state [ncell,7] of the host, `state_out` NULL where not wanted;
   // number of each cell [groups,8], ~0 for one that fills up; share of the flow at once, and one over it.

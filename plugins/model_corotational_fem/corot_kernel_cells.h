@@ -195,8 +195,8 @@ DEFORM_INLINE v4 plastic_energy(const Block &b, uint32_t n, const Four &q, const
   return kept - flow.step * (flow.over - splat(0.5) * ((flow.stiff * law.per_flow) * flow.step));
 }
 
-struct Fibres { v4 a[3], alpha, beta, shear; };
-DEFORM_INLINE void load_fibres(const FibreGroup &g, uint32_t at, Fibres &out) {
+struct Fibers { v4 a[3], alpha, beta, shear; };
+DEFORM_INLINE void load_fibers(const FiberGroup &g, uint32_t at, Fibers &out) {
   for (int k = 0; k < 3; ++k) out.a[k] = load4(g.axis[k] + at);
   out.alpha = load4(g.alpha + at);
   out.beta = load4(g.beta + at);
@@ -222,9 +222,9 @@ DEFORM_INLINE void nodal_stress(const Four &q, const v4 *e, v4 change, v4 *s) {
   const v4 pressure = bulk4(q) * change - splat(1.0 / 3) * (mu2 * trace_of(e));
   for (int k = 0; k < 6; ++k) s[k] = k < 3 ? mu2 * e[k] + pressure : mu2 * e[k];
 }
-DEFORM_INLINE void fibre_stress(const FibreGroup &g, uint32_t at, const v4 *e, v4 *s) {
-  Fibres c;
-  load_fibres(g, at, c);
+DEFORM_INLINE void fiber_stress(const FiberGroup &g, uint32_t at, const v4 *e, v4 *s) {
+  Fibers c;
+  load_fibers(g, at, c);
   v4 ea[3], pull[3];
   const v4 t = trace_of(e), q = along(e, c.a, ea), more = c.alpha * q, both = c.alpha * t + c.beta * q;
   for (int k = 0; k < 3; ++k) pull[k] = splat(0.5) * (both * c.a[k]) + c.shear * ea[k];
@@ -238,9 +238,9 @@ DEFORM_INLINE void fibre_stress(const FibreGroup &g, uint32_t at, const v4 *e, v
   s[5] = pair(2, 0);
 }
 
-DEFORM_INLINE void add_fibre_stress(const FibreGroup &g, uint32_t at, const v4 *e, v4 *s) {
+DEFORM_INLINE void add_fiber_stress(const FiberGroup &g, uint32_t at, const v4 *e, v4 *s) {
   v4 more[6];
-  fibre_stress(g, at, e, more);
+  fiber_stress(g, at, e, more);
   for (int k = 0; k < 6; ++k) s[k] = s[k] + more[k];
 }
 
@@ -315,7 +315,7 @@ DEFORM_INLINE void strain_rate(const v4 *r, const v4 *rate, const v4 *s, const T
   e[5] = half * (share * (a[2] + a[6]) - w20);
 }
 
-// A stress whose axes are not those of S (fibres, dampers) works on dS as R (stress - [q]x) works on dF, (t
+// A stress whose axes are not those of S (fibers, dampers) works on dS as R (stress - [q]x) works on dF, (t
 // I - S) q = axial(stress S): the transpose of strain_rate. It leaves no torque. out += share (stress -
 // [q]x).
 DEFORM_INLINE void balance(const v4 *stress, const v4 *s, const Turning &turn_by, v4 *out) {
@@ -337,8 +337,8 @@ DEFORM_INLINE void balance(const v4 *stress, const v4 *s, const Turning &turn_by
   out[2] = out[2] - q[1];
 }
 
-// What fibres, dampers and plastic strain (kMore) add to the stress of a cell in its frame; f is lost.
-template <bool kFibre, bool kDamped, bool kMore>
+// What fibers, dampers and plastic strain (kMore) add to the stress of a cell in its frame; f is lost.
+template <bool kFiber, bool kDamped, bool kMore>
 DEFORM_INLINE void add_others(const Block &b, uint32_t n, const Four &q, const v4 *r, const v4 *e, v4 *f,
                               v4 *all) {
   v4 s[6], other[6];
@@ -354,9 +354,9 @@ DEFORM_INLINE void add_others(const Block &b, uint32_t n, const Four &q, const v
     if (kMore && b.nodal) nodal_stress(q, rate, damp * corner_mean<4>(b, q), other);
     else stress_of(q, rate, other);
     for (int k = 0; k < 6; ++k) rate[k] = rate[k] + e[k];
-    if constexpr (kFibre) add_fibre_stress(b.fibre[n], q.at, rate, other);
-  } else if constexpr (kFibre) {
-    fibre_stress(b.fibre[n], q.at, e, other);
+    if constexpr (kFiber) add_fiber_stress(b.fiber[n], q.at, rate, other);
+  } else if constexpr (kFiber) {
+    fiber_stress(b.fiber[n], q.at, e, other);
   } else {
     for (int k = 0; k < 6; ++k) other[k] = splat(0);
   }
@@ -390,7 +390,7 @@ DEFORM_INLINE void direct_stress(const Four &q, const v4 *f, const model::Polar<
 }
 
 // P V of four cells; f is lost where there are dampers.
-template <Energy kEnergy, bool kFibre, bool kDamped, bool kMore>
+template <Energy kEnergy, bool kFiber, bool kDamped, bool kMore>
 DEFORM_INLINE void piola(const Block &b, uint32_t n, const Four &q, v4 *f, const v4 *r,
                          const model::Polar<Wide> &o, v4 *p) {
   v4 e[6], stress[6], all[9];
@@ -399,7 +399,7 @@ DEFORM_INLINE void piola(const Block &b, uint32_t n, const Four &q, v4 *f, const
     if (kMore && b.nodal) nodal_stress(q, e, corner_mean<0>(b, q), stress);
     else stress_of(q, e, stress);
     full(stress, all);
-    if (kFibre || kDamped || (kMore && b.plastic)) add_others<kFibre, kDamped, kMore>(b, n, q, r, e, f, all);
+    if (kFiber || kDamped || (kMore && b.plastic)) add_others<kFiber, kDamped, kMore>(b, n, q, r, e, f, all);
     turn(r, all, p);
   } else {
     direct_stress<kEnergy>(q, f, o, p);
@@ -413,14 +413,14 @@ DEFORM_INLINE void piola(const Block &b, uint32_t n, const Four &q, v4 *f, const
   }
 }
 
-template <Energy kEnergy, bool kFibre, bool kDamped, bool kMore = false>
+template <Energy kEnergy, bool kFiber, bool kDamped, bool kMore = false>
 static inline void cell_forces(const Block &b) {
   each_four<kEnergy == kLinear || kDamped>(
       b, [&](uint32_t n, uint32_t at, v4 *f, const v4 *r, const model::Polar<Wide> &o)
              __attribute__((always_inline)) {
                const Four q = {b.group + n, at};
                v4 p[9], sum[4], other[4];
-               piola<kEnergy, kFibre, kDamped, kMore>(b, n, q, f, r, o, p);
+               piola<kEnergy, kFiber, kDamped, kMore>(b, n, q, f, r, o, p);
                spread(b, q, 0, p, sum);
                for (int k = 1; k < 3; ++k) {
                  spread(b, q, k, p, other);
@@ -463,19 +463,19 @@ static inline void forces(const Block &b) {
     return damped ? cell_forces<kVenant, false, true>(b) : cell_forces<kVenant, false, false>(b);
   if (b.nodal || b.plastic)
     return damped ? cell_forces<kLinear, false, true, true>(b) : cell_forces<kLinear, false, false, true>(b);
-  if (b.fibre) return damped ? cell_forces<kLinear, true, true>(b) : cell_forces<kLinear, true, false>(b);
+  if (b.fiber) return damped ? cell_forces<kLinear, true, true>(b) : cell_forces<kLinear, true, false>(b);
   return damped ? cell_forces<kLinear, false, true>(b) : cell_forces<kLinear, false, false>(b);
 }
 
 // Cauchy stress P F^T / J times V, without dampers, J no less than kLeastVolume in size.
-template <Energy kEnergy, bool kFibre, bool kMore = false>
+template <Energy kEnergy, bool kFiber, bool kMore = false>
 static inline void cell_stresses(const Block &b, const uint32_t *cells, double *out) {
   each_four<kEnergy == kLinear>(b, [&](uint32_t n, uint32_t at, v4 *f, const v4 *r,
                                        const model::Polar<Wide> &o) __attribute__((always_inline)) {
     const Four q = {b.group + n, at};
     v4 p[9];
     alignas(32) double one[6][4];
-    piola<kEnergy, kFibre, false, kMore>(b, n, q, f, r, o, p);
+    piola<kEnergy, kFiber, false, kMore>(b, n, q, f, r, o, p);
     const v4 over = splat(1) / max4(abs4(o.det), splat(kLeastVolume));
     constexpr int kRow[6] = {0, 1, 2, 0, 1, 2}, kCol[6] = {0, 1, 2, 1, 2, 0};
     for (int k = 0; k < 6; ++k) {
@@ -492,7 +492,7 @@ static inline void stresses(const Block &b, const uint32_t *cells, double *out) 
   if (b.energy == kNeoHookean) return cell_stresses<kNeoHookean, false>(b, cells, out);
   if (b.energy == kVenant) return cell_stresses<kVenant, false>(b, cells, out);
   if (b.nodal || b.plastic) return cell_stresses<kLinear, false, true>(b, cells, out);
-  return b.fibre ? cell_stresses<kLinear, true>(b, cells, out) : cell_stresses<kLinear, false>(b, cells, out);
+  return b.fiber ? cell_stresses<kLinear, true>(b, cells, out) : cell_stresses<kLinear, false>(b, cells, out);
 }
 
 // Of the volume change a cell has the share k V/2 mean(change^2) of its corners: the sum over the cells is
@@ -504,7 +504,7 @@ DEFORM_INLINE v4 nodal_energy(const Block &b, const Four &q, const v4 *e) {
   const v4 shape = load4(q.group->mu2 + q.at) * square_of<Wide>(way);
   return splat(0.5) * (shape + bulk4(q) * corner_mean<0, true>(b, q));
 }
-template <bool kFibre, bool kMore = false>
+template <bool kFiber, bool kMore = false>
 static inline void cell_energies(const Block &b) {
   each_four(b, [&](uint32_t n, uint32_t at, v4 *f, const v4 *r, const model::Polar<Wide> &o)
                    __attribute__((always_inline)) {
@@ -512,7 +512,7 @@ static inline void cell_energies(const Block &b) {
                      v4 e[6], s[6];
                      strain_of(r, f, e);
                      stress_of(q, e, s);
-                     if constexpr (kFibre) add_fibre_stress(b.fibre[n], at, e, s);
+                     if constexpr (kFiber) add_fiber_stress(b.fiber[n], at, e, s);
                      const v4 own = (e[0] * s[0] + e[1] * s[1]) + e[2] * s[2];
                      const v4 mixed = (e[3] * s[3] + e[4] * s[4]) + e[5] * s[5];
                      v4 sum = splat(0.5) * own + mixed;
@@ -523,7 +523,7 @@ static inline void cell_energies(const Block &b) {
 }
 static inline void energies(const Block &b) {
   if (b.nodal || b.plastic) return cell_energies<false, true>(b);
-  return b.fibre ? cell_energies<true>(b) : cell_energies<false>(b);
+  return b.fiber ? cell_energies<true>(b) : cell_energies<false>(b);
 }
 
 // Largest eigenvalue of a symmetric 3 x 3 matrix, or a little more, from its trace and the square of its
@@ -551,7 +551,7 @@ DEFORM_INLINE v4 direct_stiffness(uint32_t energy, const Four &q, const model::P
 // the stretch and n = |F|^2: the mean stretch m = t/3 and the variance n/3 - m^2 enclose each stretch
 // within sqrt(2 variance) of m, the sum of two of them within 2 m -+ that, and the square of the difference
 // of two below 6 variances.
-template <bool kFibre>
+template <bool kFiber>
 static inline void cell_twists(const Block &b) {
   each_four(b, [&](uint32_t n, uint32_t at, v4 *f, const v4 *r,
                    const model::Polar<Wide> &o) __attribute__((always_inline)) {
@@ -570,17 +570,17 @@ static inline void cell_twists(const Block &b) {
     v4 twist;
     if (b.energy != kLinear) {
       twist = direct_stiffness(b.energy, q, o);
-    } else if constexpr (kFibre) {
+    } else if constexpr (kFiber) {
       v4 e[6], stress[6];
       strain_of(r, f, e);
       stress_of(q, e, stress);
-      add_fibre_stress(b.fibre[n], at, e, stress);
+      add_fiber_stress(b.fiber[n], at, e, stress);
       const v4 own = (stress[0] * stress[0] + stress[1] * stress[1]) + stress[2] * stress[2];
       const v4 mixed = (stress[3] * stress[3] + stress[4] * stress[4]) + stress[5] * stress[5];
       const v4 size = sqrt4(own + splat(2) * mixed), longest = mean + far;
       const v4 turn_by = (splat(6) * sqrt4(splat(1) + uneven)) / least +
                          (splat(6) * (longest * longest)) / ((least * least) * least);
-      twist = load4(b.fibre[n].most + at) * (splat(1.4143) * sqrt4(uneven) + splat(0.5) * uneven) +
+      twist = load4(b.fiber[n].most + at) * (splat(1.4143) * sqrt4(uneven) + splat(0.5) * uneven) +
               size * turn_by;
     } else {
       v4 c = load4(q.group->lambda + at) * (t - splat(3)) - mu2;
@@ -599,19 +599,19 @@ static inline void cell_twists(const Block &b) {
     const size_t place = size_t(kGroup) * n + at;
     store4(b.value + place, twist);
     if (!b.damp) return;
-    const v4 stiff = kFibre ? load4(b.fibre[n].most + at) : mu2;
+    const v4 stiff = kFiber ? load4(b.fiber[n].most + at) : mu2;
     store4(b.damp_value + place,
            load4(b.damp + place) *
-               (stiff * (kFibre ? splat(1.4143) * sqrt4(uneven) + splat(0.5) * uneven : uneven)));
+               (stiff * (kFiber ? splat(1.4143) * sqrt4(uneven) + splat(0.5) * uneven : uneven)));
   });
 }
-static inline void twists(const Block &b) { return b.fibre ? cell_twists<true>(b) : cell_twists<false>(b); }
+static inline void twists(const Block &b) { return b.fiber ? cell_twists<true>(b) : cell_twists<false>(b); }
 
 // Blocks of R K_e R^T with q_a = R g_a: lambda q_a q_b^T + mu (q_b q_a^T + g_a.g_b I); with p the turned
-// axis and c_a = a.g_a the fibres add what the stress of fibre_stress does at corner a for the strain of a
+// axis and c_a = a.g_a the fibers add what the stress of fiber_stress does at corner a for the strain of a
 // motion of corner b.
 struct Turned { v4 q[4][3], g[4][3], axis[3], along[4], alpha, beta, shear; };
-template <bool kFibre>
+template <bool kFiber>
 DEFORM_INLINE void block_of(const Turned &t, int a, int b, v4 lambda, v4 mu, v4 *out) {
   const v4 *const x = t.q[a];
   const v4 *const y = t.q[b];
@@ -619,7 +619,7 @@ DEFORM_INLINE void block_of(const Turned &t, int a, int b, v4 lambda, v4 mu, v4 
   v4 same = mu * gg;
   const v4 *const p = t.axis;
   v4 right[3], left[3];  // right p^T + p left^T
-  if constexpr (kFibre) {
+  if constexpr (kFiber) {
     const v4 ca = t.along[a], cb = t.along[b], cc = ca * cb, half = splat(0.5) * t.shear;
     same = same + half * cc;
     const v4 own = splat(0.5) * (t.beta * cc + half * gg);
@@ -632,11 +632,11 @@ DEFORM_INLINE void block_of(const Turned &t, int a, int b, v4 lambda, v4 mu, v4 
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) {
       v4 sum = lambda * (x[i] * y[j]) + mu * (y[i] * x[j]);
-      if constexpr (kFibre) sum = sum + (right[i] * p[j] + p[i] * left[j]);
+      if constexpr (kFiber) sum = sum + (right[i] * p[j] + p[i] * left[j]);
       out[3 * i + j] = i == j ? sum + same : sum;
     }
 }
-template <bool kFibre>
+template <bool kFiber>
 static inline void cell_tangents(const Block &b, double a, double damp, double *blk) {
   constexpr int kFirst[10] = {0, 1, 2, 3, 0, 0, 0, 1, 1, 2}, kSecond[10] = {0, 1, 2, 3, 1, 2, 3, 2, 3, 3};
   each_four(b, [&](uint32_t n, uint32_t at, v4 *f, const v4 *r,
@@ -654,9 +654,9 @@ static inline void cell_tangents(const Block &b, double a, double damp, double *
     }
     v4 by = splat(a);
     if (b.damp) by = by + splat(damp) * load4(b.damp + size_t(kGroup) * n + at);
-    if constexpr (kFibre) {
-      Fibres c;
-      load_fibres(b.fibre[n], at, c);
+    if constexpr (kFiber) {
+      Fibers c;
+      load_fibers(b.fiber[n], at, c);
       for (int k = 0; k < 3; ++k)
         t.axis[k] = (r[3 * k] * c.a[0] + r[3 * k + 1] * c.a[1]) + r[3 * k + 2] * c.a[2];
       for (int k = 0; k < 4; ++k) t.along[k] = (c.a[0] * t.g[k][0] + c.a[1] * t.g[k][1]) + c.a[2] * t.g[k][2];
@@ -669,7 +669,7 @@ static inline void cell_tangents(const Block &b, double a, double damp, double *
     const v4 lambda = by * (b.nodal ? splat(-1.0 / 3) * mu2 : load4(q.group->lambda + at));
     for (int m = 0; m < 10; ++m) {
       v4 one[9];
-      block_of<kFibre>(t, kFirst[m], kSecond[m], lambda, mu, one);
+      block_of<kFiber>(t, kFirst[m], kSecond[m], lambda, mu, one);
       alignas(32) double last[4];
       transpose(one[0], one[1], one[2], one[3]);
       transpose(one[4], one[5], one[6], one[7]);
@@ -684,7 +684,7 @@ static inline void cell_tangents(const Block &b, double a, double damp, double *
   });
 }
 static inline void tangents(const Block &b, double a, double damp, double *blk) {
-  return b.fibre ? cell_tangents<true>(b, a, damp, blk) : cell_tangents<false>(b, a, damp, blk);
+  return b.fiber ? cell_tangents<true>(b, a, damp, blk) : cell_tangents<false>(b, a, damp, blk);
 }
 
 constexpr Kernels kKernels = {load_block, dilate,   forces,     stresses,   energies,

@@ -27,7 +27,7 @@ bool Body::given(Param which) const { return largest_of(which) != kAuto; }
 
 // Constants of a cell as a transversely isotropic solid: `auto` values are those of the isotropic one.
 // Refuses constants without a positive energy.
-model::Fibre Body::fibre_at(uint32_t c) const {
+model::Fiber Body::fiber_at(uint32_t c) const {
   const auto or_else = [&](Param which, double otherwise) {
     const double x = at(which, c);
     return x == kAuto ? otherwise : x;
@@ -35,8 +35,8 @@ model::Fibre Body::fibre_at(uint32_t c) const {
   const double young = at(kYoung, c), poisson = at(kPoisson, c);
   const model::Transverse t = {young, poisson, or_else(kYoungAlong, young), or_else(kPoissonAlong, poisson),
                                or_else(kShearAlong, model::lame_of(young, poisson).mu)};
-  model::Fibre out;
-  if (model::fibre_of(t, out)) return out;
+  model::Fiber out;
+  if (model::fiber_of(t, out)) return out;
   char text[240];
   snprintf(
       text, sizeof text,
@@ -48,25 +48,25 @@ model::Fibre Body::fibre_at(uint32_t c) const {
 }
 
 void Body::make_room(Room &room) const {
-  if (has_fibres() && choice(kEnergy) != kLinear) {
+  if (has_fibers() && choice(kEnergy) != kLinear) {
     complain(host,
              "anisotropy works with the energy corotational only; choose it, or leave the constants along "
              "the axis at auto");
     throw model::Refused{};
   }
-  if (nodal() && (has_fibres() || choice(kEnergy) != kLinear)) {
+  if (nodal() && (has_fibers() || choice(kEnergy) != kLinear)) {
     complain(host,
              "locking nodal works with the energy corotational and without anisotropy only; choose these, or "
              "locking none");
     throw model::Refused{};
   }
-  if (plastic() && (has_fibres() || choice(kEnergy) != kLinear)) {
+  if (plastic() && (has_fibers() || choice(kEnergy) != kLinear)) {
     complain(
         host,
         "yield works with the energy corotational and without anisotropy only; choose these, or yield 0");
     throw model::Refused{};
   }
-  if (has_fibres()) room.fibre.create(host, groups);
+  if (has_fibers()) room.fiber.create(host, groups);
   if (has_dampers()) {
     room.damp.create(host, lanes());
     room.damp_value.create(host, lanes());
@@ -77,11 +77,11 @@ void Body::make_room(Room &room) const {
   }
   room.next.create(host, npoint);
   room.blocks.create(host, 10 * size_t(ncell));
-  for (uint32_t c = 0; has_fibres() && c < ncell; ++c) (void)fibre_at(c);
+  for (uint32_t c = 0; has_fibers() && c < ncell; ++c) (void)fiber_at(c);
 }
 
 void Body::fill_material(Room &room) {
-  fibre.swap(room.fibre);
+  fiber.swap(room.fiber);
   damp.swap(room.damp);
   damp_value.swap(room.damp_value);
   for (size_t n = 0; n < lanes(); ++n) {
@@ -97,16 +97,16 @@ void Body::fill_material(Room &room) {
       flow.hardening[lane] = flows ? at(kHardening, like) * v : 0;
       flow.limit[lane] = at(kPlasticLimit, like) > 0 ? at(kPlasticLimit, like) : kNoYield;
     }
-    if (!has_fibres()) {
+    if (!has_fibers()) {
       const model::Lame lame = model::lame_of(at(kYoung, like), at(kPoisson, like));
       g.mu2[lane] = 2 * lame.mu * v;
       g.lambda[lane] = lame.lambda * v;
       continue;
     }
-    const model::Fibre constants = fibre_at(like);
+    const model::Fiber constants = fiber_at(like);
     const double *a = axis_of(like);
     const double length = __builtin_sqrt((a[0] * a[0] + a[1] * a[1]) + a[2] * a[2]);
-    FibreGroup &out = fibre[n / kGroup];
+    FiberGroup &out = fiber[n / kGroup];
     g.mu2[lane] = 2 * constants.mu * v;
     g.lambda[lane] = constants.lambda * v;
     for (int k = 0; k < 3; ++k) out.axis[k][lane] = a[k] / length;
@@ -117,7 +117,7 @@ void Body::fill_material(Room &room) {
   }
   size_t groups_at = 0;
   for (uint32_t b = 0; b < nblock; ++b) {
-    block[b].fibre = fibre.empty() ? nullptr : fibre.data() + groups_at;
+    block[b].fiber = fiber.empty() ? nullptr : fiber.data() + groups_at;
     block[b].damp = damp.empty() ? nullptr : damp.data() + kGroup * groups_at;
     block[b].damp_value = damp.empty() ? nullptr : damp_value.data() + kGroup * groups_at;
     block[b].energy = choice(kEnergy);
@@ -149,7 +149,7 @@ void Body::find_effects() {
   active_effects[n++] = "volume";
   if (has_dampers() || !point_drag.empty()) active_effects[n++] = "damping";
   active_effects[n++] = "large_rotation";
-  if (has_fibres()) active_effects[n++] = "anisotropy";
+  if (has_fibers()) active_effects[n++] = "anisotropy";
   if (largest_of(kYield) > 0) active_effects[n++] = "deform.plasticity";
   active_effects[n] = nullptr;
 }
@@ -157,7 +157,7 @@ void Body::find_effects() {
 const char *Body::idle(Param which) const {
   if ((which == kHardening || which == kCreep || which == kPlasticLimit) && !(largest_of(kYield) > 0))
     return "yield is 0";
-  if (which == kAxis && !has_fibres())
+  if (which == kAxis && !has_fibers())
     return "anisotropy_young, anisotropy_poisson and anisotropy_shear are all auto";
   return nullptr;
 }

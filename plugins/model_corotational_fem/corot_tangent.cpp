@@ -5,8 +5,8 @@
 //   d2W = usual + sum_k max(0, e_k) q_k^2.
 // e_k < 0 is left out, so that the sum stays negative semidefinite: it belongs to the three turns alone,
 // which nothing else in d2W touches, and cutting it off is the projection of d2W. With v_k the axes of S, a
-// motion u of corner b has q_k = (R (v_k x g_b)).u / sqrt 2. Dampers, and fibres: L_a^T D L_b, L_b u the
-// change of S (the damper's times its fading, see strain_rate in corot_kernel_cells.h). What fibres under
+// motion u of corner b has q_k = (R (v_k x g_b)).u / sqrt 2. Dampers, and fibers: L_a^T D L_b, L_b u the
+// change of S (the damper's times its fading, see strain_rate in corot_kernel_cells.h). What fibers under
 // stress change as S turns against their axes is left out.
 #include "../model_common/edges.h"
 #include "../model_common/rotation.h"
@@ -232,9 +232,9 @@ void Body::add_exact(const dfm_kin &k, uint32_t c, double a, double b, double *b
   std::copy(&d[0][0], &d[0][0] + 36, &soft[0][0]);
   bool now = false;
   const bool flows = plastic() && soften_cell(k, c, shape.s, soft, now);
-  const bool by_fibre = !fibre.empty() && share >= 1, by_flow = flows && share >= 1;
-  const double change_by = damping + (by_fibre ? a : 0), flow_by = by_flow ? a : 0;
-  const double frame_by = by_fibre || by_flow || direct ? 0 : a;
+  const bool by_fiber = !fiber.empty() && share >= 1, by_flow = flows && share >= 1;
+  const double change_by = damping + (by_fiber ? a : 0), flow_by = by_flow ? a : 0;
+  const double frame_by = by_fiber || by_flow || direct ? 0 : a;
   const double bulk_here = own.lambda[lane] + own.mu2[lane] / 3;
   for (int i = 0; nodal() && i < 9; ++i) {
     d[i / 3][i % 3] -= bulk_here;
@@ -256,7 +256,7 @@ void Body::add_exact(const dfm_kin &k, uint32_t c, double a, double b, double *b
   const double pressure =
       nodal() ? bulk_here * mean_change(c) - own.mu2[lane] / 3 * more : own.lambda[lane] * more;
   const double pull = pressure - own.mu2[lane];
-  for (int m = 0; fibre.empty() && !flows && !direct && m < 3; ++m) {
+  for (int m = 0; fiber.empty() && !flows && !direct && m < 3; ++m) {
     const double pair =
         std::max(shape.stretch[(m + 1) % 3] + shape.stretch[(m + 2) % 3], kLeast * shape.trace);
     if (pair > 0) twist[m] = 0.5 * a * std::max(0.0, own.mu2[lane] + 2 * pull / pair);

@@ -174,7 +174,7 @@ TEST_P(Pixels, NearerBody_HidesTheFarther) {
   EXPECT_TRUE(bluish(pixel(blue, kWide / 2, kHigh / 2)));
 }
 
-TEST_P(Pixels, Scalars_TakeTheColoursOfTheMap) {
+TEST_P(Pixels, Scalars_TakeTheColorsOfTheMap) {
   const Ball ball(0, 0, 1, 1);
   for (const ColorMap map : {ColorMap::ember, ColorMap::lagoon, ColorMap::balance})
     for (const float t : {0.f, 0.5f, 1.f}) {

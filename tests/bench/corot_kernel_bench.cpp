@@ -70,7 +70,7 @@ int main(int argc, char **argv) {
   }
   const std::pair<const char *, Params> kinds[] = {{"forces", {}},
                                                    {"forces_damped", {{"damping_stiffness", {0.002}}}},
-                                                   {"forces_fibres", {{"anisotropy_young", {1e6}}}},
+                                                   {"forces_fibers", {{"anisotropy_young", {1e6}}}},
                                                    {"forces_neo_hookean", {{"energy", {1}}}},
                                                    {"forces_stvk", {{"energy", {2}}}}};
   const std::pair<const char *, corot_bound::Kernel> plain[] = {{"sse2", corot_bound::plain_sse2()},

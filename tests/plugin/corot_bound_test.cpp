@@ -17,8 +17,8 @@ TEST(CorotBound, RowSums_BoundTheTrueSpectrumInEveryShape) {
   }
   const Params soft = {{"poisson", {0.0}}}, damped = {{"damping_stiffness", {0.004}}, {"damping_mass", {3}}};
   const Params full = {{"poisson", {0.49}}}, negative = {{"poisson", {-0.5}}};
-  const Params fibres = {{"anisotropy_young", {1e6}}, {"anisotropy_axis", {1, 1, 0.3}}};
-  const Params damped_fibres = {{"anisotropy_young", {3e4}},
+  const Params fibers = {{"anisotropy_young", {1e6}}, {"anisotropy_axis", {1, 1, 0.3}}};
+  const Params damped_fibers = {{"anisotropy_young", {3e4}},
                                 {"anisotropy_shear", {1e5}},
                                 {"anisotropy_axis", {1, 1, 0.3}},
                                 {"damping_stiffness", {0.004}}};
@@ -28,11 +28,11 @@ TEST(CorotBound, RowSums_BoundTheTrueSpectrumInEveryShape) {
            {damped, {}},
            {full, {}},
            {negative, {}},
-           {fibres, {}},
+           {fibers, {}},
            {{{"energy", {1}}}, {}},
            {{{"energy", {1}}, {"poisson", {0.45}}, {"damping_stiffness", {0.004}}}, {}},
            {{{"energy", {2}}, {"poisson", {0.45}}}, {}},
-           {damped_fibres, {}},
+           {damped_fibers, {}},
            {{{"locking", {1}}, {"poisson", {0.49}}, {"damping_stiffness", {0.004}}}, {}},
            {{{"locking", {1}}}, uneven},
            {{{"yield", {1e3}}}, {}},

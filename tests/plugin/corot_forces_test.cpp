@@ -4,7 +4,7 @@
 namespace corot_test {
 namespace {
 
-const Params kFibres = {{"poisson", {0.3}},
+const Params kFibers = {{"poisson", {0.3}},
                         {"anisotropy_young", {1e6}},
                         {"anisotropy_poisson", {0.4}},
                         {"anisotropy_shear", {1e5}},
@@ -43,7 +43,7 @@ TEST(CorotForces, RigidMotionByAnyAngle_GivesNoForce) {
 }
 
 TEST(CorotForces, ShakenBody_HasNoNetForceOrTorque) {
-  for (const Params &p : {Params{}, kUneven, kFibres, damped(kFibres), kNeoHookean, damped(kNeoHookean),
+  for (const Params &p : {Params{}, kUneven, kFibers, damped(kFibers), kNeoHookean, damped(kNeoHookean),
                           kVenant, damped(kVenant), kNodal, damped(kNodal)})
     for (const Mesh &mesh : {irregular_tet(), kuhn_bar(4, 2, 2, 0.1, 0.2)})
       for (const double shake : {1e-3, 0.03, 0.3}) {  // the last turns cells inside out
@@ -71,7 +71,7 @@ TEST(CorotForces, GramSchmidt_LeavesATorque) {
 }
 
 TEST(CorotForces, Force_IsTheGradientOfTheEnergy) {
-  for (const Params &p : {Params{{"poisson", {0.4}}}, kFibres, kNeoHookean, kVenant, kNodal,
+  for (const Params &p : {Params{{"poisson", {0.4}}}, kFibers, kNeoHookean, kVenant, kNodal,
                           Params{{"energy", {1}}, {"poisson", {-0.9}}}})
     for (const double shake : {0.005, 0.02}) {
       Host host;
@@ -115,7 +115,7 @@ TEST(CorotForces, CellStress_OfUniformStretchIsTheClosedForm) {
 }
 
 TEST(CorotForces, CellStress_IsSymmetricAndHasTheVirialOfTheForces) {
-  for (const Params &p : {Params{{"poisson", {0.4}}}, kFibres, kNeoHookean, kVenant, kNodal}) {
+  for (const Params &p : {Params{{"poisson", {0.4}}}, kFibers, kNeoHookean, kVenant, kNodal}) {
     Host host;
     Instance b(host, kuhn_bar(3, 2, 2, 0.1, 0.2), p);
     b.shake(0.01, 0);
@@ -328,8 +328,8 @@ TEST(CorotForces, OtherEnergies_AreTheLinearOneAtSmallStrain) {
 // A stretched body that spins as a whole strains no damper.
 TEST(CorotForces, DamperUnderRigidSpin_TakesNothing) {
   Host host;
-  Instance plain(host, irregular_tet(), kFibres);
-  Params p = kFibres;
+  Instance plain(host, irregular_tet(), kFibers);
+  Params p = kFibers;
   p["damping_stiffness"] = {0.02};
   Instance damped(host, irregular_tet(), p);
   for (Instance *b : {&plain, &damped}) {
@@ -344,7 +344,7 @@ TEST(CorotForces, DamperUnderRigidSpin_TakesNothing) {
 // The five constants: a pull along and across the axis with the strains that they promise leaves one stress.
 TEST(CorotForces, FiveConstants_AreThoseOfThePulls) {
   const double young = 1e5, nu = 0.3, along = 1e6, nu_along = 0.4, shear = 1e5, small = 1e-7;
-  Params p = kFibres;
+  Params p = kFibers;
   p["anisotropy_axis"] = {0, 0, 3};
   const auto stress = [&](const double (*strain)[3], double (*out)[3]) {
     Host host;

@@ -7,7 +7,7 @@
 namespace corot_test {
 namespace {
 
-const Params kFibres = {
+const Params kFibers = {
     {"anisotropy_young", {1e6}}, {"anisotropy_shear", {1e5}}, {"anisotropy_axis", {1, 2, -0.5}}};
 Params with(Params p, const char *key, double value) {
   p[key] = {value};
@@ -58,7 +58,7 @@ TEST(CorotStiffness, Pattern_IsEachPointAndEachEdgeOnce) {
 // At rest and turned as a whole nothing is stressed: the usual tangent is the derivative.
 TEST(CorotStiffness, TurnedBody_HasTheDerivativeOfTheForces) {
   for (const Params &p :
-       {Params{}, kFibres, exact(), exact(kFibres), Params{{"poisson", {0.45}}}, kNodal, exact(kNodal)}) {
+       {Params{}, kFibers, exact(), exact(kFibers), Params{{"poisson", {0.45}}}, kNodal, exact(kNodal)}) {
     Host host;
     Instance b(host, kuhn_bar(2, 2, 1, 0.1), with(p, "damping_stiffness", 0.01));
     for (uint32_t i = 0; i < b.size(); ++i)
@@ -125,7 +125,7 @@ TEST(CorotStiffness, ExactTangentOfPressedCell_IsTheProjectedDerivative) {
 }
 
 TEST(CorotStiffness, ExactDampers_AreDifferencesByVelocity) {
-  for (const Params &p : {Params{}, kFibres, kNodal}) {
+  for (const Params &p : {Params{}, kFibers, kNodal}) {
     Host host;
     Instance b(host, kuhn_bar(2, 2, 1, 0.1),
                with(with(exact(p), "damping_stiffness", 0.01), "damping_mass", 3));
@@ -138,7 +138,7 @@ TEST(CorotStiffness, ExactDampers_AreDifferencesByVelocity) {
 
 TEST(CorotStiffness, EveryShape_IsNegativeSemidefiniteAndFinite) {
   for (const Params &p :
-       {Params{}, exact(), kFibres, exact(kFibres), Params{{"poisson", {0.49}}}, exact({{"poisson", {0.49}}}),
+       {Params{}, exact(), kFibers, exact(kFibers), Params{{"poisson", {0.49}}}, exact({{"poisson", {0.49}}}),
         exact({{"energy", {1}}}), exact({{"energy", {2}}}), kNodal, exact(kNodal)})
     for (const double size : {1.0, 0.3, 2.0, 0.0, -1.0, 10.0, -30.0}) {
       Host host;

@@ -206,7 +206,7 @@ TEST(Mls, TooFewPhyxelsInReach_FallBackAndAreCounted) {
   EXPECT_LT(linear_error(c, narrow), 1e-14);
 }
 
-// A sheet one cell thick: neighbourhoods that are all but flat.
+// A sheet one cell thick: neighborhoods that are all but flat.
 TEST(Mls, ThinSheet_StaysLinear) {
   for (const double thick : {1e-2, 1e-4, 1e-6, 1e-9}) {
     Case c;

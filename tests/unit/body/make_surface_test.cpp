@@ -253,7 +253,7 @@ TEST(ObstacleShape, CentresOfSymmetry_GiveUnitNormals) {
   }
 }
 
-TEST(ObstacleShape, BoxEdges_JoinNeighbouringCorners) {
+TEST(ObstacleShape, BoxEdges_JoinNeighboringCorners) {
   ObstacleView o{};
   o.shape = Shape::box;
   o.half_size = {1, 2, 3};

@@ -228,7 +228,7 @@ TEST(Fill, Ball_MassCentreAndInertiaWithinOnePercent) {
   EXPECT_NEAR(inertia, 0.4 * truth * r * r, 0.01 * 0.4 * truth * r * r);
 }
 
-TEST(Fill, Shares_NeverBelowTheFloorOfTheirNeighbourhood) {
+TEST(Fill, Shares_NeverBelowTheFloorOfTheirNeighborhood) {
   const TetMesh m = fill_surface(test::sphere_surface(0.5, 5), 5000);
   std::vector<double> fullest(m.npoint(), 0.0);
   for (size_t i = 0; i < m.tets.size(); ++i)

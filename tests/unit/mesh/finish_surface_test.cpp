@@ -268,7 +268,7 @@ TEST(FinishSurface, WithoutArea_IsDropped) {
 }
 
 // A flat triangle that closes a T-junction: dropping it would open a slit, so its neighbor is split.
-TEST(FinishSurface, FlatAlongANeighboursSide_LeavesNoSlit) {
+TEST(FinishSurface, FlatAlongANeighborsSide_LeavesNoSlit) {
   Soup s = kTetrahedron;
   s.points.push_back({0.5, 0, 0});  // on the edge 0-1
   s.tris = {{0, 2, 1}, {0, 4, 3}, {4, 1, 3}, {0, 3, 2}, {1, 2, 3}, {0, 1, 4}};
