@@ -150,7 +150,7 @@ dfm_status dfm_body_get_info(dfm_body body, dfm_body_info *out) {
     dfm_body_info i{};
     if (!b.emptied && !b.undone) {
       i.npoint = b.p.n;
-      i.ntet = static_cast<uint32_t>(b.tets.size() / 4);
+      i.ntet = b.ncell();
       i.nsurfel = b.surface.nsurfel;
       i.ntriangle = b.surface.ntri;
       i.nedge = static_cast<uint32_t>(b.edges.size() / 2);
@@ -229,8 +229,7 @@ dfm_status dfm_body_get_rest(dfm_body body, uint32_t capacity_points, double *x,
   return as_status([&] {
     const Body &b = shown_body_of(body);
     if (x && room(b.p.n, capacity_points, x, nullptr)) std::copy(b.p.rest.begin(), b.p.rest.end(), x);
-    if (tets && room(static_cast<uint32_t>(b.tets.size() / 4), capacity_tets, tets, nullptr))
-      std::copy(b.tets.begin(), b.tets.end(), tets);
+    if (tets && room(b.ncell(), capacity_tets, tets, nullptr)) std::copy(b.tets.begin(), b.tets.end(), tets);
   });
 }
 
@@ -415,7 +414,7 @@ dfm_status dfm_body_get_measure(dfm_body body, dfm_body_measure *out) {
 dfm_status dfm_body_energy_density(dfm_body body, uint32_t capacity, double *out) {
   return as_status([&] {
     Body &b = body_of(body);
-    if (!room(static_cast<uint32_t>(b.tets.size() / 4), capacity, out, nullptr)) return;
+    if (!room(b.ncell(), capacity, out, nullptr)) return;
     energy_density(b, out);
   });
 }
@@ -423,7 +422,7 @@ dfm_status dfm_body_energy_density(dfm_body body, uint32_t capacity, double *out
 dfm_status dfm_body_stress(dfm_body body, uint32_t capacity, double *out) {
   return as_status([&] {
     Body &b = body_of(body);
-    if (!room(static_cast<uint32_t>(b.tets.size() / 4), capacity, out, nullptr)) return;
+    if (!room(b.ncell(), capacity, out, nullptr)) return;
     cell_stress(b, out);
   });
 }

@@ -100,7 +100,7 @@ dfm_status dfm_body_remove_cells(dfm_body body, uint32_t n, const uint32_t *cell
     Body &b = body_of(body);
     exclusive(*b.world);
     if (n) need(cells, "cells");
-    Array<uint8_t> removed(b.tets.size() / 4, 0, HookAllocator<uint8_t>(b.world->memory()));
+    Array<uint8_t> removed(b.ncell(), 0, HookAllocator<uint8_t>(b.world->memory()));
     for (uint32_t i = 0; i < n; ++i) {
       if (cells[i] >= removed.size())
         fail(DFM_E_ARG, "body '%s' has no cell %u to remove; it has %zu", b.name.c_str(), cells[i],
@@ -117,7 +117,7 @@ dfm_status dfm_body_origins(dfm_body body, uint32_t capacity_points, uint32_t *p
                             uint32_t capacity_cells, uint32_t *cells) {
   return as_status([&] {
     const Body &b = shown_body_of(body);
-    const uint32_t ntet = static_cast<uint32_t>(b.tets.size() / 4);
+    const uint32_t ntet = b.ncell();
     const bool give_points = points && room(b.p.n, capacity_points, points, nullptr);
     const bool give_cells = cells && room(ntet, capacity_cells, cells, nullptr);
     for (uint32_t i = 0; give_points && i < b.p.n; ++i) points[i] = b.cut.whole ? b.cut.point[i] : i;

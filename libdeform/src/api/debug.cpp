@@ -35,7 +35,7 @@ dfm_status dfm_debug_write_body(dfm_body body, const char *path) {
     for (size_t i = 0; i < u.size(); ++i) u[i] -= b.p.rest[i];
     VtuGrid grid;
     grid.npoint = b.p.n;
-    grid.ncell = static_cast<uint32_t>(b.tets.size() / 4);
+    grid.ncell = b.ncell();
     grid.corners = 4;
     grid.points = x.data();
     grid.cells = b.tets.data();

@@ -94,6 +94,7 @@ struct Body {
   Phyxels p;
   uint64_t x_version = 1;  // increases whenever p.x may have changed
   Array<uint32_t> tets, edges;
+  uint32_t ncell() const { return static_cast<uint32_t>(tets.size() / 4); }
   Surface surface;
   SurfaceZones zones;
   CutRecord cut;

@@ -32,8 +32,7 @@ bool any(const World &w, Counted what) {
 double units(const World &w, bool all) {
   double sum = 0;
   for (const auto &b : w.bodies)
-    if (!b->slumber.asleep && (all || !is(*b, Counted::implicit)))
-      sum += double(b->p.n) + double(b->tets.size() / 4);
+    if (!b->slumber.asleep && (all || !is(*b, Counted::implicit))) sum += double(b->p.n) + double(b->ncell());
   return sum;
 }
 

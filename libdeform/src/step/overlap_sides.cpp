@@ -97,7 +97,7 @@ OverlapSkin::OverlapSkin(const Memory &memory, const Body &b)
     store3(&x_[size_t{4} * i], x);
   }
   closed_ = std::find(s.edge_tri.begin(), s.edge_tri.end(), kNone) == s.edge_tri.end();
-  const size_t cells = b.tets.size() / 4;
+  const size_t cells = b.ncell();
   b.dynamics->see_points();
   for (size_t t = 0, n = stride_of(cells, kInner); t < cells; t += n) {
     Vec3 sum;

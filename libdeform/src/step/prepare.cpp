@@ -278,7 +278,7 @@ void make_pair_tables(World &w, StepContext &step, SceneFacts &facts) {
 IntegratorOption option_of(const World &w, const Body &b) {
   IntegratorOption o;
   o.substeps = std::max(1.0, w.def.step / b.integrator.step);
-  o.work = double(b.p.n) + double(b.tets.size() / 4);
+  o.work = double(b.p.n) + double(b.ncell());
   if (!b.model.stepper && b.model.can(DFM_CAP_STIFFNESS))
     o.implicit_work = b.model.can(DFM_CAP_CONSTANT_STIFFNESS) ? kConstantWork : kImplicitWork;
   o.open = b.integrator.open;

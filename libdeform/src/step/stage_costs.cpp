@@ -21,7 +21,7 @@ size_t surfels(const World &w) {
 std::string prescribed(const World &) { return "what is prescribed"; }
 
 std::string cells(const World &w) {
-  return format("%zu cells", sum(w, [](const Body &b) { return b.tets.size() / 4; }));
+  return format("%zu cells", sum(w, [](const Body &b) { return size_t{b.ncell()}; }));
 }
 
 std::string points(const World &w) {

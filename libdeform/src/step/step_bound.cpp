@@ -24,7 +24,7 @@ constexpr uint32_t kBoundEvery = 16;
 constexpr double kBoundStrain = 0.05, kLeastStrain = kBoundStrain / 8;
 
 uint32_t inverted_cells(const Body &b) {
-  return points_kernels().inverted(uint32_t(b.tets.size() / 4), b.tets.data(), b.p.x.data());
+  return points_kernels().inverted(b.ncell(), b.tets.data(), b.p.x.data());
 }
 
 void look_at_shape(Body &b) {

@@ -32,8 +32,6 @@ constexpr double kKept = 2;
 // it is not looked at
 constexpr double kBegun = 1e-3, kReach = 8;
 
-uint32_t cells_of(const Body &b) { return static_cast<uint32_t>(b.tets.size() / 4); }
-
 Vec3 middle_of(const Body &b, const double *x, uint32_t cell) {
   const auto at = [&](size_t k) { return load3(x + size_t{kStride} * b.tets[size_t{4} * cell + k]); };
   return 0.25 * ((at(0) + at(1)) + (at(2) + at(3)));
@@ -141,8 +139,8 @@ void BladeSweep::find_near(const Body &b) {
     for (const double *x : {before, b.p.x.data()}) whole.add(load3(x + size_t{kStride} * i));
   if (!way.meets(whole, kReach * b.surface.median_edge)) return;
   double largest = 0;
-  std::vector<Extent> boxes(cells_of(b));
-  for (uint32_t c = 0; c < cells_of(b); ++c) {
+  std::vector<Extent> boxes(b.ncell());
+  for (uint32_t c = 0; c < b.ncell(); ++c) {
     Extent now;
     for (size_t k = 0; k < 4; ++k) {
       const size_t p = size_t{kStride} * b.tets[size_t{4} * c + k];
@@ -153,7 +151,7 @@ void BladeSweep::find_near(const Body &b) {
     boxes[c].add(now.lo);
     boxes[c].add(now.hi);
   }
-  for (uint32_t c = 0; c < cells_of(b); ++c)
+  for (uint32_t c = 0; c < b.ncell(); ++c)
     if (way.meets(boxes[c], kKept * largest)) {
       const BladeSide none{c, SideKind::none, 0, 0, 0};
       near_.push_back({c, middle_of(b, before, c), middle_of(b, b.p.x.data(), c), 0, none});

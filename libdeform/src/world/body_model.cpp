@@ -119,7 +119,7 @@ std::vector<double> values_for(const World &w, const Body &b, const dfm_type &ty
     if (!is_precision(type, key)) rows.push_back({key, value, width});
   });
   dfm_body_def def = dfm_body_def_default();
-  def.ntet = static_cast<uint32_t>(b.tets.size() / 4);
+  def.ntet = b.ncell();
   def.model_params = {sizeof(dfm_params), static_cast<uint32_t>(rows.size()), rows.data()};
   def.nfield = static_cast<uint32_t>(given.size());
   def.fields = given.data();
@@ -157,7 +157,7 @@ void make_instance(World &w, Body &b, const dfm_type &type, std::vector<double> 
   dfm_mesh mesh{};
   mesh.size = sizeof mesh;
   mesh.npoint = b.p.n;
-  mesh.ncell = static_cast<uint32_t>(b.tets.size() / 4);
+  mesh.ncell = b.ncell();
   mesh.cell = DFM_CELL_TET;
   const std::vector<double> placed = rest_for(type, b, out.origin.frame);
   mesh.rest = placed.empty() ? b.p.rest.data() : placed.data();

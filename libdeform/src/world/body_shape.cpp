@@ -61,7 +61,7 @@ void weigh(Body &b) {
   for (const Material &material : b.makeup.materials) cells.list.push_back(&material);
   cells.of = b.makeup.of;
   dfm_body_def def = dfm_body_def_default();
-  def.ntet = static_cast<uint32_t>(b.tets.size() / 4);
+  def.ntet = b.ncell();
   def.cell_share = b.share.empty() ? nullptr : b.share.data();
   lump_body(b, def, cells);
   update_inverse_mass(b.p);

@@ -82,7 +82,7 @@ void couple(Body &b, const dfm_surface_def &def) {
   const Memory &m = b.world->memory();
   CouplingInput in;
   in.npoint = b.p.n;
-  in.ntet = static_cast<uint32_t>(b.tets.size() / 4);
+  in.ntet = b.ncell();
   in.nsurfel = def.npoint;
   in.point = b.p.rest.data();
   in.tet = b.tets.data();
@@ -116,8 +116,7 @@ void make_body_surface(Body &b, const dfm_surface_def *def) {
     check_outward(b.surface, b.name.c_str());
     couple(b, *def);
   } else {
-    const Array<uint32_t> boundary =
-        boundary_triangles(m, static_cast<uint32_t>(b.tets.size() / 4), b.tets.data());
+    const Array<uint32_t> boundary = boundary_triangles(m, b.ncell(), b.tets.data());
     make_surface(m, b.p.n, b.p.rest.data(), boundary.data(), static_cast<uint32_t>(boundary.size() / 3),
                  b.surface);
   }

@@ -27,8 +27,6 @@ namespace {
 
 constexpr double kRounding = 1e-12;  // of the mass of a point that copies share
 
-uint32_t cells_of(const Body &b) { return static_cast<uint32_t>(b.tets.size() / 4); }
-
 void corners_of(const Body &b, uint32_t cell, Vec3 x[4]) {
   for (size_t k = 0; k < 4; ++k) x[k] = load3(&b.p.x[size_t{kStride} * b.tets[size_t{4} * cell + k]]);
 }
@@ -62,7 +60,7 @@ void tell_what_went(const BodyShape &before, const CutMesh &mesh, const Body &b,
 CutReport empty(Body &b) {
   World &w = *b.world;
   CutReport out;
-  out.removed = cells_of(b);
+  out.removed = b.ncell();
   out.mass = b.mass;
   for (uint32_t i = 0; i < b.p.n; ++i) out.momentum += b.p.mass[i] * load3(&b.p.v[size_t{kStride} * i]);
   out.kinetic = kinetic_of(b);
@@ -79,9 +77,9 @@ CutReport cut(Body &b, const Array<uint8_t> &removed, Array<uint64_t> &&open,
   World &w = *b.world;
   const Memory &m = w.memory();
   CutReport out;
-  CutMesh mesh = make_cut_mesh(m, b.p.n, cells_of(b), b.tets.data(), removed, own_open);
+  CutMesh mesh = make_cut_mesh(m, b.p.n, b.ncell(), b.tets.data(), removed, own_open);
   if (mesh.cell.empty()) return empty(b);
-  out.removed = cells_of(b) - static_cast<uint32_t>(mesh.cell.size());
+  out.removed = b.ncell() - static_cast<uint32_t>(mesh.cell.size());
   const double elastic = elastic_energy(b), kinetic = kinetic_of(b);
   const HostWork work(b);
   CutMesh numbers(m);
@@ -111,7 +109,7 @@ CutReport cut(Body &b, const Array<uint8_t> &removed, Array<uint64_t> &&open,
   out.area = new_area(b, *before);
   out.kinetic = kinetic - kinetic_of(b);
   out.elastic = elastic - elastic_energy(b);
-  out.parts = count_parts(m, b.p.n, cells_of(b), b.tets.data());
+  out.parts = count_parts(m, b.p.n, b.ncell(), b.tets.data());
   std::vector<uint8_t> seen(before->p.n);
   for (const uint32_t p : numbers.point) out.copies += std::exchange(seen[p], uint8_t{1});
   return out;
@@ -134,7 +132,7 @@ CutReport cut(Body &b, const Array<uint8_t> &removed, const Array<uint64_t> &mor
   const bool opens = open.size() > b.cut.open.size();
   if (!opens && std::find(removed.begin(), removed.end(), 1) == removed.end()) {
     CutReport none;
-    none.parts = count_parts(b.world->memory(), b.p.n, cells_of(b), b.tets.data());
+    none.parts = count_parts(b.world->memory(), b.p.n, b.ncell(), b.tets.data());
     return none;
   }
   // cells keep their order, so numbers in the whole body are found by bisection
@@ -178,7 +176,7 @@ void check_may_cut(const Body &b, const ModelInstance &model) {
 }
 
 CutReport open_faces(Body &b, const Array<uint64_t> &faces) {
-  return cut(b, Array<uint8_t>(cells_of(b), 0, HookAllocator<uint8_t>(b.world->memory())), faces);
+  return cut(b, Array<uint8_t>(b.ncell(), 0, HookAllocator<uint8_t>(b.world->memory())), faces);
 }
 
 CutReport remove_cells(Body &b, const Array<uint8_t> &removed) {
@@ -186,9 +184,9 @@ CutReport remove_cells(Body &b, const Array<uint8_t> &removed) {
 }
 
 CutReport remove_by_shape(Body &b, const CutShape &shape, uint32_t most) {
-  Array<uint8_t> removed(cells_of(b), 0, HookAllocator<uint8_t>(b.world->memory()));
+  Array<uint8_t> removed(b.ncell(), 0, HookAllocator<uint8_t>(b.world->memory()));
   uint32_t n = 0, left = 0;
-  for (uint32_t c = 0; c < cells_of(b); ++c) {
+  for (uint32_t c = 0; c < b.ncell(); ++c) {
     Vec3 x[4];
     corners_of(b, c, x);
     if (!meets_tetrahedron(shape, x)) continue;

@@ -195,7 +195,7 @@ std::string body(const Body &b) {
   std::string out = "{\"name\":" + quote(b.name) + ",\"model\":" + quote(b.model.type->id);
   out += std::string(",\"kind\":") +
          quote(b.model.can(DFM_CAP_PLAUSIBLE) ? "plausible, not physical" : "physical");
-  out += format(",\"cells\":%zu,\"points\":%u,\"surfels\":%u", b.tets.size() / 4, b.p.n, b.surface.nsurfel);
+  out += format(",\"cells\":%u,\"points\":%u,\"surfels\":%u", b.ncell(), b.p.n, b.surface.nsurfel);
   const char *const surface = b.coupling == kNoCoupling           ? "boundary"
                               : b.coupling == DFM_COUPLING_MLS    ? "own, mls"
                               : b.coupling == DFM_COUPLING_THESIS ? "own, thesis"

@@ -32,7 +32,7 @@ struct Parts {
 Parts parts_of(const Body &b, const SeparateRule &rule) {
   const Memory &m = b.world->memory();
   Parts out{Array<uint32_t>(HookAllocator<uint32_t>(m)), {}, {}};
-  const uint32_t ncell = static_cast<uint32_t>(b.tets.size() / 4);
+  const uint32_t ncell = b.ncell();
   out.of = parts_of_cells(m, b.p.n, ncell, b.tets.data(), out.n);
   out.cells.assign(out.n, 0);
   std::vector<double> mass(out.n);
@@ -59,7 +59,7 @@ struct Share {
 };
 Share share_of(const Body &b, const Parts &parts, uint32_t to) {
   const Memory &m = b.world->memory();
-  const uint32_t ncell = static_cast<uint32_t>(b.tets.size() / 4);
+  const uint32_t ncell = b.ncell();
   Array<uint8_t> removed(ncell, 0, HookAllocator<uint8_t>(m));
   for (uint32_t c = 0; c < ncell; ++c) removed[c] = parts.to[parts.of[c]] != to;
   const Array<uint64_t> none{HookAllocator<uint64_t>(m)};
@@ -168,7 +168,7 @@ void separate(Body &b, const SeparateRule &rule, CutReport &out) {
   for (Body *const p : pieces) {
     kinetic_now += kinetic_of(*p);
     elastic_now += elastic_energy(*p);
-    add_event(w, DFM_EVENT_PIECE, b.id, p->id, p->tets.size() / 4, w.time);
+    add_event(w, DFM_EVENT_PIECE, b.id, p->id, p->ncell(), w.time);
   }
   out.kinetic += kinetic - kinetic_now;
   out.elastic += elastic - elastic_now;

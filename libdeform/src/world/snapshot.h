@@ -1,4 +1,4 @@
-// Snapshot, restore and hash of a world (snapshot.cpp).
+// Snapshot (snapshot.cpp), restore (snapshot_restore.cpp) and hash (world_hash.cpp) of a world.
 #pragma once
 #include <cstddef>
 #include <cstdint>

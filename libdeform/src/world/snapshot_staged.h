@@ -1,4 +1,4 @@
-// The contents of a snapshot, read in full before the world changes (snapshot.cpp).
+// The contents of a snapshot, read in full before the world changes (snapshot_restore.cpp).
 #pragma once
 #include <memory>
 #include <string>

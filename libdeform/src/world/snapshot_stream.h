@@ -1,4 +1,4 @@
-// Writing, reading and checking the bytes of a snapshot. One list of fields (snapshot.cpp) is used for both
+// Writing, reading and checking the bytes of a snapshot. One list of fields (snapshot_fields.h) is used for both
 // directions: each line gives name, location and valid values of a field.
 //
 //   bytes 0  "dfmsnap" 0 | u32 version | u32 0 | u64 length of all | u64 hash of what must be the same in

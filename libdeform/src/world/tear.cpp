@@ -68,7 +68,7 @@ double largest_eigenvalue(const Tensor &t, Vec3 &vector) {
 
 class Tear {
  public:
-  explicit Tear(const Body &b) : b_(b), ncell_(static_cast<uint32_t>(b.tets.size() / 4)), points_(b.p.n) {
+  explicit Tear(const Body &b) : b_(b), ncell_(b.ncell()), points_(b.p.n) {
     for (const Material &m : b.makeup.materials) limits_.push_back(limit_of(m));
     for (uint32_t c = 0; c < ncell_; ++c) add(c);
   }

@@ -22,7 +22,6 @@ namespace {
 constexpr double kTurn = 0.1;    // rad: a solid that turns by more in a step is placed at several poses
 constexpr int kMostPlaces = 64;  // of a solid in a step
 
-size_t cells_of(const Body &b) { return b.tets.size() / 4; }
 size_t point_of(const Body &b, size_t cell, size_t k) { return size_t{kStride} * b.tets[4 * cell + k]; }
 Extent box_of(const Body &b, size_t cell) {
   Extent out;
@@ -201,9 +200,9 @@ uint32_t remove(const Tool &t, Body &b) {
   const Extent whole = box_of(b);
   if (std::none_of(solids.begin(), solids.end(), [&](const Solid &s) { return s.box.meets(whole); }))
     return 0;
-  Array<uint8_t> removed(cells_of(b), 0, HookAllocator<uint8_t>(b.world->memory()));
+  Array<uint8_t> removed(b.ncell(), 0, HookAllocator<uint8_t>(b.world->memory()));
   uint32_t n = 0;
-  for (size_t c = 0; c < cells_of(b) && (t.cuts.most == 0 || n < t.cuts.most); ++c) {
+  for (size_t c = 0; c < b.ncell() && (t.cuts.most == 0 || n < t.cuts.most); ++c) {
     const Extent box = box_of(b, c);
     Vec3 x[4];
     for (size_t k = 0; k < 4; ++k) x[k] = load3(&b.p.x[point_of(b, c, k)]);
