@@ -1,7 +1,7 @@
 // The entry shared by all models on tetrahedra: checks parameters and mesh, creates an instance in the host's
 // memory, and returns failures as a status after logging a message.
 #pragma once
-#include <deform/plugin.h>
+#include <deform/plugin.hpp>
 
 #include <cstdio>
 #include <new>
@@ -95,6 +95,14 @@ dfm_status change(Body &body, const double *values) {
   return DFM_OK;
 }
 
+// The same for values that need only be in the range of their rows.
+template <class Body, uint32_t kCount>
+dfm_status change_in_range(void *self, const char *who, const dfm_param (&rows)[kCount],
+                           const double *values) {
+  Body &body = *static_cast<Body *>(self);
+  return in_range(body.host, who, rows, kCount, values) ? change(body, values) : DFM_E_ARG;
+}
+
 // Ops and extensions as calls of the Body. Its lacks_state(k) is true, and has said so, where the host gives
 // none that it needs; rows of its parameters are numbered by its Row.
 template <class Body>
@@ -147,13 +155,6 @@ struct Ops {
   static constexpr dfm_idle kIdle = {sizeof(dfm_idle), 0, idle};
 };
 
-// The result of the plugin's entry.
-inline const dfm_plugin *enter(const dfm_host *host, const char *who, const dfm_plugin &plugin) {
-  if (DFM_ABI_OK(host)) return &plugin;
-  complain(host, who, "built for another plugin ABI: build it against this library's header");
-  return nullptr;
-}
-
 template <class Body>
 void destroy(void *self) {
   Body *body = static_cast<Body *>(self);
@@ -161,6 +162,32 @@ void destroy(void *self) {
   const dfm_host *h = body->host;
   body->~Body();
   h->release(h->ctx, self, sizeof(Body), 64);
+}
+
+// The table of a model with forces, an energy and a stiffness; state_init may be NULL.
+template <class Body>
+constexpr dfm_model table(uint32_t caps, decltype(dfm_model::create) create,
+                          decltype(dfm_model::set_params) set_params,
+                          decltype(dfm_model::state_init) state_init,
+                          decltype(dfm_model::extension) extension) {
+  using Of = Ops<Body>;
+  return {sizeof(dfm_model),
+          caps,
+          DFM_CELL_TET,
+          0,
+          nullptr,
+          create,
+          destroy<Body>,
+          set_params,
+          state_init,
+          Of::add_forces,
+          Of::bound,
+          Of::energy,
+          Of::pattern,
+          Of::stiffness,
+          extension,
+          0,
+          0};
 }
 
 }  // namespace model

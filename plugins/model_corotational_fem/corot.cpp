@@ -127,44 +127,15 @@ const void *extension(const void *self, const char *id) {
 const char *const kEffects[] = {"volume",     "damping",           "large_rotation",
                                 "anisotropy", "deform.plasticity", nullptr};
 
-const dfm_model kModel = {sizeof(dfm_model),
-                          kCaps,
-                          DFM_CELL_TET,
-                          0,
-                          nullptr,
-                          create,
-                          model::destroy<Body>,
-                          set_params,
-                          state_init,
-                          Ops::add_forces,
-                          Ops::bound,
-                          Ops::energy,
-                          Ops::pattern,
-                          Ops::stiffness,
-                          extension,
-                          0,
-                          0};
+const dfm_model kModel = model::table<Body>(kCaps, create, set_params, state_init, extension);
 
-const dfm_type kType = {sizeof(dfm_type),
-                        DFM_KIND_MODEL,
-                        kId,
-                        "corotational finite elements",
-                        "0.1.0",
-                        "MIT",
-                        "Zerbato 2010, (2.1)-(2.13) corrected; Mueller and Gross 2004, Interactive virtual "
-                        "materials; Horn 1987 for the rotation",
-                        kParams,
-                        kParamCount,
-                        sizeof(dfm_param),
-                        kEffects,
-                        &kModel};
-
-const dfm_type *const kTypes[] = {&kType};
-const dfm_plugin kPlugin = {sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 1, kTypes, nullptr};
+const dfm_type kType =
+    dfm::plugin::type(DFM_KIND_MODEL, kId, "corotational finite elements", "0.1.0", "MIT",
+                      "Zerbato 2010, (2.1)-(2.13) corrected; Mueller and Gross 2004, Interactive virtual "
+                      "materials; Horn 1987 for the rotation",
+                      kParams, kEffects, &kModel);
 
 }  // namespace
 }  // namespace corot
 
-extern "C" DFM_EXPORT const dfm_plugin *dfm_plugin_entry(const dfm_host *host, uint32_t, uint32_t) {
-  return model::enter(host, corot::kId, corot::kPlugin);
-}
+DFM_PLUGIN(&corot::kType)

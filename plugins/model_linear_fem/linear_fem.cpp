@@ -3,7 +3,6 @@
 // (doc/models/linear_fem.md).
 #include <cstring>
 
-#include "deform/plugin.h"
 #include "linear_body.h"
 
 namespace linear {
@@ -26,9 +25,7 @@ dfm_status create(const dfm_host *h, const dfm_mesh *m, void **self) {
 }
 
 dfm_status set_params(void *self, const double *params) {
-  Body *body = static_cast<Body *>(self);
-  if (!model::in_range(body->host, kId, kParams, kParamCount, params)) return DFM_E_ARG;
-  return model::change(*body, params);
+  return model::change_in_range<Body>(self, kId, kParams, params);
 }
 
 const dfm_effect_row kOff[] = {{"damping", kDampingStiffness, 0, 0}, {"damping", kDampingMass, 0, 0}};
@@ -44,45 +41,17 @@ const void *extension(const void *, const char *id) {
 
 const char *const kEffects[] = {"damping", nullptr};
 
-const dfm_model kModel = {sizeof(dfm_model),
-                          DFM_CAP_ENERGY | DFM_CAP_STIFFNESS | DFM_CAP_DAMPING | DFM_CAP_CONSTANT_STIFFNESS,
-                          DFM_CELL_TET,
-                          0,
-                          nullptr,
-                          create,
-                          model::destroy<Body>,
-                          set_params,
-                          nullptr,
-                          Ops::add_forces,
-                          Ops::bound,
-                          Ops::energy,
-                          Ops::pattern,
-                          Ops::stiffness,
-                          extension,
-                          0,
-                          0};
+const dfm_model kModel =
+    model::table<Body>(DFM_CAP_ENERGY | DFM_CAP_STIFFNESS | DFM_CAP_DAMPING | DFM_CAP_CONSTANT_STIFFNESS,
+                       create, set_params, nullptr, extension);
 
-const dfm_type kType = {
-    sizeof(dfm_type),
-    DFM_KIND_MODEL,
-    kId,
-    "linear elasticity",
-    "0.1.0",
-    "MIT",
+const dfm_type kType = dfm::plugin::type(
+    DFM_KIND_MODEL, kId, "linear elasticity", "0.1.0", "MIT",
     "first-order tetrahedra of linear elasticity (Zienkiewicz, Taylor, Zhu 2013, The Finite "
     "Element Method: Its Basis and Fundamentals, ch. 2)",
-    kParams,
-    kParamCount,
-    sizeof(dfm_param),
-    kEffects,
-    &kModel};
-
-const dfm_type *const kTypes[] = {&kType};
-const dfm_plugin kPlugin = {sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 1, kTypes, nullptr};
+    kParams, kEffects, &kModel);
 
 }  // namespace
 }  // namespace linear
 
-extern "C" DFM_EXPORT const dfm_plugin *dfm_plugin_entry(const dfm_host *host, uint32_t, uint32_t) {
-  return model::enter(host, linear::kId, linear::kPlugin);
-}
+DFM_PLUGIN(&linear::kType)

@@ -4,7 +4,6 @@
 // (doc/models/meshless.md).
 #include <cstring>
 
-#include "deform/plugin.h"
 #include "meshless_body.h"
 
 namespace meshless {
@@ -38,9 +37,7 @@ dfm_status create(const dfm_host *h, const dfm_mesh *m, void **self) {
 }
 
 dfm_status set_params(void *self, const double *params) {
-  Body *body = static_cast<Body *>(self);
-  if (!model::in_range(body->host, kId, kParams, kParamCount, params)) return DFM_E_ARG;
-  return model::change(*body, params);
+  return model::change_in_range<Body>(self, kId, kParams, params);
 }
 
 const dfm_effect_row kOff[] = {{"damping", kDampingStiffness, 0, 0}, {"damping", kDampingMass, 0, 0}};
@@ -55,44 +52,17 @@ const void *extension(const void *, const char *id) {
 
 const char *const kEffects[] = {"large_rotation", "damping", nullptr};
 
-const dfm_model kModel = {sizeof(dfm_model),
-                          DFM_CAP_ENERGY | DFM_CAP_STIFFNESS | DFM_CAP_DAMPING | DFM_CAP_ROTATION_INVARIANT,
-                          DFM_CELL_TET,
-                          0,
-                          nullptr,
-                          create,
-                          model::destroy<Body>,
-                          set_params,
-                          nullptr,
-                          Ops::add_forces,
-                          Ops::bound,
-                          Ops::energy,
-                          Ops::pattern,
-                          Ops::stiffness,
-                          extension,
-                          0,
-                          0};
+const dfm_model kModel =
+    model::table<Body>(DFM_CAP_ENERGY | DFM_CAP_STIFFNESS | DFM_CAP_DAMPING | DFM_CAP_ROTATION_INVARIANT,
+                       create, set_params, nullptr, extension);
 
-const dfm_type kType = {sizeof(dfm_type),
-                        DFM_KIND_MODEL,
-                        kId,
-                        "meshless elasticity",
-                        "0.1.0",
-                        "MIT",
-                        "Mueller et al. 2004, Point based animation of elastic, plastic and melting objects; "
-                        "Zerbato 2010, (2.28)-(2.44) corrected; Ganzenmueller 2015 for the residuals",
-                        kParams,
-                        kParamCount,
-                        sizeof(dfm_param),
-                        kEffects,
-                        &kModel};
-
-const dfm_type *const kTypes[] = {&kType};
-const dfm_plugin kPlugin = {sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 1, kTypes, nullptr};
+const dfm_type kType =
+    dfm::plugin::type(DFM_KIND_MODEL, kId, "meshless elasticity", "0.1.0", "MIT",
+                      "Mueller et al. 2004, Point based animation of elastic, plastic and melting objects; "
+                      "Zerbato 2010, (2.28)-(2.44) corrected; Ganzenmueller 2015 for the residuals",
+                      kParams, kEffects, &kModel);
 
 }  // namespace
 }  // namespace meshless
 
-extern "C" DFM_EXPORT const dfm_plugin *dfm_plugin_entry(const dfm_host *host, uint32_t, uint32_t) {
-  return model::enter(host, meshless::kId, meshless::kPlugin);
-}
+DFM_PLUGIN(&meshless::kType)

@@ -165,45 +165,17 @@ const void *extension(const void *self, const char *id) {
 const char *const kEffects[] = {"volume",     "damping",           "large_rotation",
                                 "anisotropy", "deform.relaxation", nullptr};
 
-const dfm_model kModel = {
-    sizeof(dfm_model),
+const dfm_model kModel = model::table<Body>(
     DFM_CAP_ENERGY | DFM_CAP_STIFFNESS | DFM_CAP_DAMPING | DFM_CAP_ROTATION_INVARIANT | DFM_CAP_PLAUSIBLE,
-    DFM_CELL_TET,
-    0,
-    nullptr,
-    create,
-    model::destroy<Body>,
-    set_params,
-    state_init,
-    Ops::add_forces,
-    Ops::bound,
-    Ops::energy,
-    Ops::pattern,
-    Ops::stiffness,
-    extension,
-    0,
-    0};
+    create, set_params, state_init, extension);
 
-const dfm_type kType = {sizeof(dfm_type),
-                        DFM_KIND_MODEL,
-                        kId,
-                        "mass-spring",
-                        "0.2.0",
-                        "MIT",
-                        "Zerbato 2010, (2.25)-(2.27) and chapter 6 corrected, Fig. 2.5; Van Gelder 1998, "
-                        "Approximate simulation of elastic membranes by triangulated spring meshes",
-                        kParams,
-                        kParamCount,
-                        sizeof(dfm_param),
-                        kEffects,
-                        &kModel};
-
-const dfm_type *const kTypes[] = {&kType};
-const dfm_plugin kPlugin = {sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 1, kTypes, nullptr};
+const dfm_type kType =
+    dfm::plugin::type(DFM_KIND_MODEL, kId, "mass-spring", "0.2.0", "MIT",
+                      "Zerbato 2010, (2.25)-(2.27) and chapter 6 corrected, Fig. 2.5; Van Gelder 1998, "
+                      "Approximate simulation of elastic membranes by triangulated spring meshes",
+                      kParams, kEffects, &kModel);
 
 }  // namespace
 }  // namespace msm
 
-extern "C" DFM_EXPORT const dfm_plugin *dfm_plugin_entry(const dfm_host *host, uint32_t, uint32_t) {
-  return model::enter(host, msm::kId, msm::kPlugin);
-}
+DFM_PLUGIN(&msm::kType)

@@ -34,9 +34,7 @@ struct Entry {
     return model::create<B>(h, m, B().name(), self);
   }
   static dfm_status set_params(void *self, const double *params) {
-    B *body = static_cast<B *>(self);
-    if (!model::in_range(body->host, body->name(), kParams, kParamCount, params)) return DFM_E_ARG;
-    return model::change(*body, params);
+    return model::change_in_range<B>(self, static_cast<B *>(self)->name(), kParams, params);
   }
   static dfm_status state_init(const void *, double *state) {
     *state = 0;
@@ -129,42 +127,19 @@ struct Entry {
 
 const char *const kEffects[] = {"large_rotation", "damping", nullptr};
 
-const dfm_type kModal = {
-    sizeof(dfm_type),
-    DFM_KIND_MODEL,
-    kModalId,
-    "modes of linear elasticity",
-    "0.1.0",
-    "MIT",
-    "modes of first-order tetrahedra (Pentland, Williams 1989, Good Vibrations, SIGGRAPH) "
-    "in a floating frame (Shabana 2020, Dynamics of Multibody Systems, ch. 5)",
-    kParams,
-    kParamCount,
-    sizeof(dfm_param),
-    kEffects,
-    &Entry<Modal>::kModel};
+const dfm_type kModal =
+    dfm::plugin::type(DFM_KIND_MODEL, kModalId, "modes of linear elasticity", "0.1.0", "MIT",
+                      "modes of first-order tetrahedra (Pentland, Williams 1989, Good Vibrations, SIGGRAPH) "
+                      "in a floating frame (Shabana 2020, Dynamics of Multibody Systems, ch. 5)",
+                      kParams, kEffects, &Entry<Modal>::kModel);
 
-const dfm_type kCondensed = {
-    sizeof(dfm_type),
-    DFM_KIND_MODEL,
-    kCondensedId,
-    "linear elasticity condensed to the surface",
-    "0.1.0",
-    "MIT",
+const dfm_type kCondensed = dfm::plugin::type(
+    DFM_KIND_MODEL, kCondensedId, "linear elasticity condensed to the surface", "0.1.0", "MIT",
     "static condensation (Guyan 1965, AIAA Journal 3) with modes for the inertia and a "
     "residual flexibility (MacNeal 1971, Computers & Structures 1)",
-    kParams,
-    kParamCount,
-    sizeof(dfm_param),
-    kEffects,
-    &Entry<Condensed>::kModel};
-
-const dfm_type *const kTypes[] = {&kModal, &kCondensed};
-const dfm_plugin kPlugin = {sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 2, kTypes, nullptr};
+    kParams, kEffects, &Entry<Condensed>::kModel);
 
 }  // namespace
 }  // namespace reduced
 
-extern "C" DFM_EXPORT const dfm_plugin *dfm_plugin_entry(const dfm_host *host, uint32_t, uint32_t) {
-  return model::enter(host, reduced::kModalId, reduced::kPlugin);
-}
+DFM_PLUGIN(&reduced::kModal, &reduced::kCondensed)

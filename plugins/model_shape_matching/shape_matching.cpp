@@ -3,7 +3,6 @@
 // one of a material (doc/models/shape_matching.md).
 #include <cstring>
 
-#include "deform/plugin.h"
 #include "shape_body.h"
 
 namespace shape {
@@ -40,9 +39,7 @@ dfm_status create(const dfm_host *h, const dfm_mesh *m, void **self) {
 }
 
 dfm_status set_params(void *self, const double *params) {
-  Body *body = static_cast<Body *>(self);
-  if (!model::in_range(body->host, kId, kParams, kParamCount, params)) return DFM_E_ARG;
-  return model::change(*body, params);
+  return model::change_in_range<Body>(self, kId, kParams, params);
 }
 
 dfm_status state_init(const void *self, double *state) {
@@ -132,26 +129,13 @@ const dfm_model kModel = {sizeof(dfm_model),
                           0,
                           0};
 
-const dfm_type kType = {sizeof(dfm_type),
-                        DFM_KIND_MODEL,
-                        kId,
-                        "shape matching (plausible)",
-                        "0.1.0",
-                        "MIT",
-                        "Mueller, Heidelberger, Teschner, Gross 2005, Meshless deformations based on shape "
-                        "matching, (7), (9)-(14); Zerbato 2010, (2.45)-(2.47) corrected",
-                        kParams,
-                        kParamCount,
-                        sizeof(dfm_param),
-                        kEffects,
-                        &kModel};
-
-const dfm_type *const kTypes[] = {&kType};
-const dfm_plugin kPlugin = {sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 1, kTypes, nullptr};
+const dfm_type kType =
+    dfm::plugin::type(DFM_KIND_MODEL, kId, "shape matching (plausible)", "0.1.0", "MIT",
+                      "Mueller, Heidelberger, Teschner, Gross 2005, Meshless deformations based on shape "
+                      "matching, (7), (9)-(14); Zerbato 2010, (2.45)-(2.47) corrected",
+                      kParams, kEffects, &kModel);
 
 }  // namespace
 }  // namespace shape
 
-extern "C" DFM_EXPORT const dfm_plugin *dfm_plugin_entry(const dfm_host *host, uint32_t, uint32_t) {
-  return model::enter(host, shape::kId, shape::kPlugin);
-}
+DFM_PLUGIN(&shape::kType)

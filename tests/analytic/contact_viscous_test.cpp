@@ -2,6 +2,7 @@
 // without, and set-valued with a viscous part. A block on a layer of c per area loses its speed as exp(-c A t
 // / m); on mu fn v / sqrt(v^2 + e^2) it creeps down a slope at a speed that is known. Sources: closed forms;
 // doc/laws/formulas.md (16), creep of smoothed laws.
+#include "deform/plugin.hpp"
 #include "world.h"
 
 namespace {
@@ -100,19 +101,7 @@ const dfm_friction smooth = {sizeof(dfm_friction),
                              nullptr};
 
 dfm_type type(const char *id, const dfm_friction *ops) {
-  dfm_type t{};
-  t.size = sizeof t;
-  t.kind = DFM_KIND_FRICTION;
-  t.id = id;
-  t.name = "test";
-  t.version = "1.0";
-  t.licence = "MIT";
-  t.source = "test";
-  t.params = rows;
-  t.nparam = 1;
-  t.param_size = sizeof(dfm_param);
-  t.ops = ops;
-  return t;
+  return dfm::plugin::type(DFM_KIND_FRICTION, id, "test", "1.0", "MIT", "test", rows, nullptr, ops);
 }
 const dfm_type types[] = {type("org.test.viscous", &with), type("org.test.viscous_bare", &without),
                           type("org.test.smoothed", &smooth)};

@@ -4,7 +4,7 @@
 #include <functional>
 #include <map>
 
-#include "deform/plugin.h"
+#include "deform/plugin.hpp"
 #include "obstacle.h"
 #include "rigid.h"
 
@@ -104,18 +104,8 @@ struct Scene {
     d.trace_begin = [](void *, const char *) { hook("trace_begin"); };
     d.trace_end = [](void *, const char *) { hook("trace_end"); };
     EXPECT_EQ(dfm_context_create(&d, &c), DFM_OK) << dfm_last_error();
-    static const dfm_type type = [] {
-      dfm_type t{};
-      t.size = sizeof t;
-      t.kind = DFM_KIND_FRICTION;
-      t.id = "test.calling";
-      t.name = "calling";
-      t.version = "1";
-      t.licence = "MIT";
-      t.source = "test";
-      t.ops = &law_table;
-      return t;
-    }();
+    static const dfm_type type = dfm::plugin::type(DFM_KIND_FRICTION, "test.calling", "calling", "1", "MIT",
+                                                   "test", nullptr, &law_table);
     static const dfm_type *const types[] = {&type};
     static dfm_plugin plugin{};
     plugin.size = sizeof plugin;

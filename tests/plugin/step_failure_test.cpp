@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <thread>
 
+#include "deform/plugin.hpp"
 #include "stack.h"
 
 namespace {
@@ -99,22 +100,10 @@ extern "C" const dfm_plugin *dfm_plugin_entry_misbehaving(const dfm_host *host, 
   ops.destroy = destroy;
   ops.add_forces = add_forces;
   ops.bound = bound;
-  static dfm_type law{}, model{};
-  law.size = sizeof law;
-  law.kind = DFM_KIND_FRICTION;
-  law.id = "test.bad_law";
-  law.name = "bad law";
-  law.version = "1";
-  law.licence = "MIT";
-  law.source = "test";
-  law.param_size = sizeof(dfm_param);
-  law.effects = effects;
-  law.ops = &friction;
-  model = law;
-  model.kind = DFM_KIND_MODEL;
-  model.id = "test.bad_model";
-  model.name = "bad model";
-  model.ops = &ops;
+  static const dfm_type law = dfm::plugin::type(DFM_KIND_FRICTION, "test.bad_law", "bad law", "1", "MIT",
+                                                "test", effects, &friction),
+                        model = dfm::plugin::type(DFM_KIND_MODEL, "test.bad_model", "bad model", "1", "MIT",
+                                                  "test", effects, &ops);
   static const dfm_type *const types[] = {&law, &model};
   static const dfm_plugin plugin{sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 2, types, nullptr};
   return &plugin;

@@ -1,6 +1,7 @@
 // A toy self-stepping model in contact, through dfm.stepper/1: a body that only translates. Its answers are
 // those of a point mass, so every figure has a closed form.
 #define DFM_STATIC_PLUGIN toy_stepper
+#include "deform/plugin.hpp"
 #include "coupled.h"
 #include "under_ball.h"
 
@@ -111,18 +112,9 @@ extern "C" const dfm_plugin *dfm_plugin_entry_toy_stepper(const dfm_host *host, 
   ops.create = create;
   ops.destroy = destroy;
   ops.extension = extension;
-  static dfm_type type{};
   static const char *const effects[] = {nullptr};
-  type.size = sizeof type;
-  type.kind = DFM_KIND_MODEL;
-  type.id = "test.toy_stepper";
-  type.name = "translating toy";
-  type.version = "1";
-  type.licence = "MIT";
-  type.source = "Newton 1687";
-  type.param_size = sizeof(dfm_param);
-  type.effects = effects;
-  type.ops = &ops;
+  static const dfm_type type = dfm::plugin::type(DFM_KIND_MODEL, "test.toy_stepper", "translating toy", "1",
+                                                 "MIT", "Newton 1687", effects, &ops);
   static const dfm_type *const types[] = {&type};
   static const dfm_plugin plugin{sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 1, types, nullptr};
   return &plugin;

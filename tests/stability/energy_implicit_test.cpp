@@ -3,6 +3,7 @@
 #define DFM_STATIC_PLUGIN pumped_points
 #include <vector>
 
+#include "deform/plugin.hpp"
 #include "support.h"
 #include "world.h"
 
@@ -49,17 +50,8 @@ extern "C" const dfm_plugin *dfm_plugin_entry_pumped_points(const dfm_host *host
   ops.energy = no_energy;
   ops.pattern = pattern;
   ops.stiffness = no_stiffness;
-  static dfm_type type{};
-  type.size = sizeof type;
-  type.kind = DFM_KIND_MODEL;
-  type.id = "test.pumped_points";
-  type.name = "points";
-  type.version = "1";
-  type.licence = "MIT";
-  type.source = "test";
-  type.param_size = sizeof(dfm_param);
-  type.effects = effects;
-  type.ops = &ops;
+  static const dfm_type type =
+      dfm::plugin::type(DFM_KIND_MODEL, "test.pumped_points", "points", "1", "MIT", "test", effects, &ops);
   static const dfm_type *const types[] = {&type};
   static const dfm_plugin plugin{sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 1, types, nullptr};
   return &plugin;

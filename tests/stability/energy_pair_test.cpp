@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "deform/plugin.hpp"
 #include "stack.h"
 
 namespace {
@@ -227,12 +228,11 @@ extern "C" const dfm_plugin *dfm_plugin_entry_wrong_energy(const dfm_host *host,
   steps.extension = extension;
   ops.add_forces = add_forces;
   ops.bound = bound;
-  static const dfm_type types[] = {{sizeof(dfm_type), DFM_KIND_FRICTION, kLaw, "law", "1", "MIT", "test",
-                                    rows, 1, sizeof(dfm_param), effects, &law},
-                                   {sizeof(dfm_type), DFM_KIND_MODEL, kPointsModel, "points", "1", "MIT",
-                                    "test", rows, 1, sizeof(dfm_param), effects, &ops},
-                                   {sizeof(dfm_type), DFM_KIND_MODEL, kStepsModel, "steps", "1", "MIT",
-                                    "test", rows, 1, sizeof(dfm_param), effects, &steps}};
+  using dfm::plugin::type;
+  static const dfm_type types[] = {
+      type(DFM_KIND_FRICTION, kLaw, "law", "1", "MIT", "test", rows, effects, &law),
+      type(DFM_KIND_MODEL, kPointsModel, "points", "1", "MIT", "test", rows, effects, &ops),
+      type(DFM_KIND_MODEL, kStepsModel, "steps", "1", "MIT", "test", rows, effects, &steps)};
   static const dfm_type *const list[] = {&types[0], &types[1], &types[2]};
   static const dfm_plugin plugin{sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 3, list, nullptr};
   return &plugin;

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <random>
 
+#include "deform/plugin.hpp"
 #include "step_energy.h"
 #include "support.h"
 
@@ -54,17 +55,8 @@ extern "C" const dfm_plugin *dfm_plugin_entry_counting_looks(const dfm_host *hos
   ops.destroy = destroy;
   ops.add_forces = no_forces;
   ops.energy = no_energy;
-  static dfm_type type{};
-  type.size = sizeof type;
-  type.kind = DFM_KIND_MODEL;
-  type.id = "test.counting_looks";
-  type.name = "points";
-  type.version = "1";
-  type.licence = "MIT";
-  type.source = "test";
-  type.param_size = sizeof(dfm_param);
-  type.effects = effects;
-  type.ops = &ops;
+  static const dfm_type type =
+      dfm::plugin::type(DFM_KIND_MODEL, "test.counting_looks", "points", "1", "MIT", "test", effects, &ops);
   static const dfm_type *const types[] = {&type};
   static const dfm_plugin plugin{sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 1, types, nullptr};
   return &plugin;

@@ -2,6 +2,7 @@
 // radial return. Included by one file of a program.
 #pragma once
 #define DFM_STATIC_PLUGIN bristle
+#include "deform/plugin.hpp"
 #include "world.h"
 
 namespace {
@@ -67,19 +68,9 @@ extern "C" const dfm_plugin *dfm_plugin_entry_bristle(const dfm_host *host, uint
       {"mu", "friction coefficient", "1", 0, 10, 0.5, 0, 1, nullptr},
       {"sigma0", "bristle stiffness per area", "N/m^3", 0, 1e15, 1e8, 0, 1, nullptr}};
   static const char *const effects[] = {"presliding", nullptr};
-  static dfm_type type{};
-  type.size = sizeof type;
-  type.kind = DFM_KIND_FRICTION;
-  type.id = "test.bristle";
-  type.name = "bristle";
-  type.version = "1";
-  type.licence = "MIT";
-  type.source = "elastic predictor and radial return, Simo and Hughes 1998, box 1.4";
-  type.params = rows;
-  type.nparam = 2;
-  type.param_size = sizeof(dfm_param);
-  type.effects = effects;
-  type.ops = &ops;
+  static const dfm_type type = dfm::plugin::type(
+      DFM_KIND_FRICTION, "test.bristle", "bristle", "1", "MIT",
+      "elastic predictor and radial return, Simo and Hughes 1998, box 1.4", rows, effects, &ops);
   static const dfm_type *const types[] = {&type};
   static const dfm_plugin plugin{sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 1, types, nullptr};
   return &plugin;

@@ -1,6 +1,5 @@
 #include "deform/mesh.h"
 
-#include <algorithm>
 #include <string>
 
 #include "api/mesh_objects.h"
@@ -18,7 +17,7 @@ dfm_status dfm_tetmesh_read(dfm_context *context, const char *path, dfm_tetmesh 
     need(path, "path");
     need(out, "out");
     dfm::TetMesh mesh = dfm::read_tet_mesh(context->memory, path);
-    for (const std::string &w : mesh.warnings) context->logf(DFM_LOG_WARNING, "%s: %s", path, w.c_str());
+    dfm::log_warnings(*context, path, mesh.warnings);
     *out = Object::keep(*context, std::move(mesh));
   });
 }
@@ -41,8 +40,7 @@ dfm_status dfm_mesh_read(dfm_context *context, const char *path, dfm_tetmesh *ce
     need(cells, "cells");
     need(surface, "surface");
     dfm::AnyMesh mesh = dfm::read_any_mesh(context->memory, path);
-    for (const std::string &w : mesh.cells ? mesh.cells->warnings : mesh.surface->warnings)
-      context->logf(DFM_LOG_WARNING, "%s: %s", path, w.c_str());
+    dfm::log_warnings(*context, path, mesh.cells ? mesh.cells->warnings : mesh.surface->warnings);
     const dfm_tetmesh c = mesh.cells ? Object::keep(*context, std::move(*mesh.cells)) : 0;
     *surface = mesh.surface ? dfm::TriMeshObject::keep(*context, std::move(*mesh.surface)) : 0;
     *cells = c;
@@ -80,29 +78,13 @@ dfm_status dfm_tetmesh_get_info(dfm_tetmesh mesh, dfm_tetmesh_info *out) {
     const dfm::TetMesh &m = object.mesh;
     const dfm::MeshStatistics &s = object.statistics;
     dfm_tetmesh_info info{};
-    info.npoint = s.npoint;
+    dfm::put_shared(info, object);
     info.ntet = s.ntet;
     info.ntriangle = s.ntriangle;
-    info.nedge = s.nedge;
-    info.npiece = s.npiece;
-    info.turned = m.turned;
-    info.dropped_points = m.dropped_points;
     info.dropped_cells = m.dropped_cells;
     info.flat_cells = s.flat_cells;
     info.duplicate_points = s.duplicate_points;
-    info.nonmanifold_edges = s.nonmanifold_edges;
     info.overlapping_faces = m.overlapping;
-    info.ngroup = static_cast<uint32_t>(m.groups.size());
-    info.volume = s.volume;
-    info.edge_min = s.edge_min;
-    info.edge_median = s.edge_median;
-    info.edge_max = s.edge_max;
-    info.quality_min = s.quality_min;
-    info.quality_mean = s.quality_mean;
-    std::copy_n(s.histogram, 10, info.quality_histogram);
-    std::copy_n(s.lo, 3, info.lo);
-    std::copy_n(s.hi, 3, info.hi);
-    info.warnings = object.warnings.c_str();
     info.wave_path = s.wave_path;
     dfm::give(out, info);
   });

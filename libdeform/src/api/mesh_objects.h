@@ -1,5 +1,6 @@
 // Meshes behind handles, with the arrays that the C API lends out.
 #pragma once
+#include <algorithm>
 #include <memory>
 #include <string>
 #include <vector>
@@ -62,6 +63,34 @@ struct MeshObject {
     delete object;
   }
 };
+
+inline void log_warnings(const dfm_context &context, const char *what,
+                         const std::vector<std::string> &warnings) {
+  for (const std::string &w : warnings) context.logf(DFM_LOG_WARNING, "%s: %s", what, w.c_str());
+}
+
+// The fields that dfm_tetmesh_info and dfm_trimesh_info share.
+template <class Info, class Object>
+void put_shared(Info &info, const Object &object) {
+  const auto &s = object.statistics;
+  info.npoint = s.npoint;
+  info.nedge = s.nedge;
+  info.npiece = s.npiece;
+  info.ngroup = static_cast<uint32_t>(object.mesh.groups.size());
+  info.turned = object.mesh.turned;
+  info.dropped_points = object.mesh.dropped_points;
+  info.nonmanifold_edges = s.nonmanifold_edges;
+  info.volume = s.volume;
+  info.edge_min = s.edge_min;
+  info.edge_median = s.edge_median;
+  info.edge_max = s.edge_max;
+  info.quality_min = s.quality_min;
+  info.quality_mean = s.quality_mean;
+  std::copy_n(s.histogram, 10, info.quality_histogram);
+  std::copy_n(s.lo, 3, info.lo);
+  std::copy_n(s.hi, 3, info.hi);
+  info.warnings = object.warnings.c_str();
+}
 
 using TetMeshObject = MeshObject<TetMesh, Kind::tetmesh>;
 using TriMeshObject = MeshObject<TriMesh, Kind::trimesh>;

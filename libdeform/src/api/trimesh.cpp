@@ -1,4 +1,3 @@
-#include <algorithm>
 #include <string>
 
 #include "api/mesh_objects.h"
@@ -10,14 +9,6 @@ using dfm::as_status;
 using dfm::need;
 using Object = dfm::TriMeshObject;
 
-namespace {
-
-void log_warnings(const dfm_context &context, const char *what, const dfm::TriMesh &mesh) {
-  for (const std::string &w : mesh.warnings) context.logf(DFM_LOG_WARNING, "%s: %s", what, w.c_str());
-}
-
-}  // namespace
-
 dfm_status dfm_trimesh_read(dfm_context *context, const char *path, dfm_trimesh *out) {
   return as_status([&] {
     need(context, "context");
@@ -25,7 +16,7 @@ dfm_status dfm_trimesh_read(dfm_context *context, const char *path, dfm_trimesh 
     need(path, "path");
     need(out, "out");
     dfm::TriMesh mesh = dfm::read_tri_mesh(context->memory, path);
-    log_warnings(*context, path, mesh);
+    dfm::log_warnings(*context, path, mesh.warnings);
     *out = Object::keep(*context, std::move(mesh));
   });
 }
@@ -46,7 +37,7 @@ dfm_status dfm_trimesh_create(dfm_context *context, uint32_t npoint, const doubl
     raw.points.assign(points, points + 3 * size_t(npoint));
     raw.tris.assign(triangles, triangles + 3 * size_t(ntriangle));
     dfm::TriMesh mesh = dfm::finish_surface("dfm_trimesh_create", std::move(raw));
-    log_warnings(*context, "dfm_trimesh_create", mesh);
+    dfm::log_warnings(*context, "dfm_trimesh_create", mesh.warnings);
     *out = Object::keep(*context, std::move(mesh));
   });
 }
@@ -87,30 +78,14 @@ dfm_status dfm_trimesh_get_info(dfm_trimesh mesh, dfm_trimesh_info *out) {
     const dfm::TriMesh &m = object.mesh;
     const dfm::TriMeshStatistics &s = object.statistics;
     dfm_trimesh_info info{};
-    info.npoint = s.npoint;
+    dfm::put_shared(info, object);
     info.ntriangle = s.ntri;
-    info.nedge = s.nedge;
-    info.npiece = s.npiece;
-    info.ngroup = static_cast<uint32_t>(m.groups.size());
     info.merged_points = m.merged_points;
-    info.dropped_points = m.dropped_points;
     info.dropped_triangles = m.dropped_tris;
-    info.turned = m.turned;
     info.open_edges = s.open_edges;
     info.holes = s.holes;
-    info.nonmanifold_edges = s.nonmanifold_edges;
     info.closed = s.closed;
     info.area = s.area;
-    info.volume = s.volume;
-    info.edge_min = s.edge_min;
-    info.edge_median = s.edge_median;
-    info.edge_max = s.edge_max;
-    info.quality_min = s.quality_min;
-    info.quality_mean = s.quality_mean;
-    std::copy_n(s.histogram, 10, info.quality_histogram);
-    std::copy_n(s.lo, 3, info.lo);
-    std::copy_n(s.hi, 3, info.hi);
-    info.warnings = object.warnings.c_str();
     dfm::give(out, info);
   });
 }

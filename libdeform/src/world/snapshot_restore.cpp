@@ -56,7 +56,8 @@ std::vector<std::unique_ptr<LawInstance>> make_laws(const SnapshotReader &s, con
     if (l.params.size() != packed_width(type))
       fail(DFM_E_FORMAT, "the snapshot was made with another version of law '%s'; nothing was restored",
            type.id);
-    if (!snapshot::in_range(type, l.params)) s.refuse("law parameters", "values in the range of the law's table");
+    if (!snapshot::in_range(type, l.params))
+      s.refuse("law parameters", "values in the range of the law's table");
     laws.push_back(std::make_unique<LawInstance>(type, w.context->host, l.params));
     for (const auto &own : w.laws)
       if (own->type == &type && own->params == l.params) {
