@@ -131,10 +131,10 @@ Line run_rule(const Request &request, const Rule &rule, int type) {
   Line line{&rule, a.verdict, a.seconds, a.late};
   const std::string found = sanitizer_line(a.said);
   if (!a.spoke)
-    line.verdict = {Result::fail, "it " + a.ending + (a.at.empty() ? "" : " (" + a.at + ")") +
-                                      (found.empty() ? "" : ": " + found) +
-                                      ", which would end the program that uses it; return in bounded time "
-                                      "for every input, and access only the given arrays"};
+    line.verdict = {Result::fail,
+                    "it " + a.ending + (a.at.empty() ? "" : " (" + a.at + ")") +
+                        (found.empty() ? "" : ": " + found) +
+                        "; return in bounded time for every input, and access only the given arrays"};
   else if (!found.empty() && a.verdict.result != Result::fail)
     line.verdict = {Result::fail,
                     "the sanitizer reports " + found + "; fix this even if the results look right"};

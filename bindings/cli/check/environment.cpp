@@ -91,23 +91,17 @@ Process Process::now() {
 
 std::string Process::difference(const Process &later) const {
   if (later.folder_ != folder_)
-    return text(
-        "changes the current folder from %s to %s: the program's relative paths then name other files; open "
-        "files by absolute paths",
-        folder_.c_str(), later.folder_.c_str());
+    return text("changes the current folder from %s to %s; open files by absolute paths", folder_.c_str(),
+                later.folder_.c_str());
   if (later.locale_ != locale_)
-    return text(
-        "changes the locale from \"%s\" to \"%s\": numbers would be read and written with another decimal "
-        "point; leave it to the program",
-        locale_.c_str(), later.locale_.c_str());
+    return text("changes the locale from \"%s\" to \"%s\"; leave the locale to the program", locale_.c_str(),
+                later.locale_.c_str());
   for (const auto *both : {&later.environment_, &environment_})
     for (const std::string &entry : *both) {
       const auto &other = both == &environment_ ? later.environment_ : environment_;
       if (std::find(other.begin(), other.end(), entry) == other.end())
-        return text(
-            "changes the environment (%s): other threads may be reading it, and other plugins read it later; "
-            "take parameters instead",
-            entry.substr(0, entry.find('=')).c_str());
+        return text("changes the environment (%s); use parameters instead",
+                    entry.substr(0, entry.find('=')).c_str());
     }
   for (const auto &[descriptor, target] : streams_)
     if (later.streams_.at(descriptor) != target)
@@ -117,15 +111,11 @@ std::string Process::difference(const Process &later) const {
                   : descriptor == 1 ? "standard output"
                                     : "standard error");
   if (later.handlers_ != handlers_ || later.mask_ != mask_)
-    return "changes how signals or fatal errors are handled: Ctrl-C and the program's own handlers would no "
-           "longer work; leave them to the program";
-  if (later.timers_ != timers_)
-    return "leaves a timer running: its signal ends a program that does not expect it; stop it";
+    return "changes the handlers of signals or fatal errors; leave them to the program";
+  if (later.timers_ != timers_) return "leaves a timer running; stop it";
   if (later.file_mask_ != file_mask_)
-    return text(
-        "changes the mask of new files from %03o to %03o: what the program writes gets other permissions; "
-        "leave it to the program",
-        file_mask_, later.file_mask_);
+    return text("changes the mask of new files from %03o to %03o; leave the mask to the program", file_mask_,
+                later.file_mask_);
   return "";
 }
 

@@ -17,9 +17,7 @@ uint32_t width_of_state(const dfm_friction &law, const double *params) {
   const Kept kept("state");
   const auto own = slot_rows(law.state ? law.state(params) : nullptr);
   if (law.state && !own)
-    broken(
-        "its function state names no slots for parameters that check accepts, so the host cannot keep its "
-        "state; return constant tables");
+    broken("its function state names no slots for parameters that check accepts; return constant tables");
   uint32_t n = 0;
   for (const dfm_slot &s : own ? *own : slot_rows(law.slots, law.nslot, law.slot_size)) n += s.width;
   return n;
@@ -75,9 +73,7 @@ Law::Law(const Subject &s, std::vector<double> values)
     : subject(s), ops(law_of(s)), params(std::move(values)), nstate(width_of_state(ops, params.data())) {
   const Kept kept("prepare");
   if (ops.prepare && ops.prepare(&s.plugin->host().table(), params.data(), &data) != DFM_OK)
-    broken(
-        "prepare refuses parameters that check accepts, so a scene would fail after it was read; refuse them "
-        "in check");
+    broken("prepare refuses parameters that check accepts; refuse them in check");
 }
 
 Law::~Law() {
@@ -148,8 +144,8 @@ dfm_status Lanes::ask(double dt) {
 void Lanes::must(double dt) {
   if (const dfm_status status = ask(dt); status != DFM_OK)
     broken(
-        "eval returns %s for finite slip and normal force at a step of %g s, which would stop a world; "
-        "answer every finite input",
+        "eval returns %s for finite slip and normal force at a step of %g s; return finite values for every "
+        "finite input",
         dfm_status_name(status), dt);
 }
 

@@ -185,8 +185,8 @@ Body::Body(const Subject &s, const Solid &of, const Variant &variant, uint32_t w
   if (why_.rfind("; ", 0) == 0) why_.erase(0, 2);
   if (!self && refusal == Refusal::is_broken)
     broken(
-        "create refuses a block of %u tetrahedra with %s (%s), so no body can have them; take every mesh of "
-        "cells that dfm_model.cells names, or refuse the parameters for all",
+        "create refuses a block of %u tetrahedra with %s (%s); accept every mesh of cells that "
+        "dfm_model.cells names, or refuse the parameters for all",
         solid.ncell(), variant.name.c_str(), why_.empty() ? "without a reason" : why_.c_str());
   if (!self) return;
   stepper = static_cast<const dfm_stepper *>(extension("dfm.stepper/1"));
@@ -216,8 +216,8 @@ const void *Body::extension(const char *id) const {
 }
 
 void Body::refused(const char *name, dfm_status status) const {
-  broken("%s returns %s at a state of a body that moves, which would stop a world; answer every finite state",
-         name, dfm_status_name(status));
+  broken("%s returns %s at a state of a body that moves; return finite values for every finite state", name,
+         dfm_status_name(status));
 }
 
 dfm_kin Body::kin() const {
@@ -256,8 +256,8 @@ std::vector<double> Body::stiffness(double a, double b) const {
     const uint32_t i = ij[2 * size_t(e)], j = ij[2 * size_t(e) + 1];
     if (i > j || j >= points() || !seen.insert({i, j}).second)
       broken(
-          "pair %u of its pattern is (%u, %u), which is out of order, listed twice or not a pair of points, "
-          "so the host's matrix would lose or double a block; name each pair once, i <= j",
+          "pair %u of its pattern is (%u, %u), which is out of order, listed twice or not a pair of points; "
+          "list each pair once, i <= j",
           e, i, j);
   }
   Numbers blocks(9 * size_t(n), 0.0);
@@ -285,8 +285,8 @@ double Body::longest_step() const {
     const double m = solid.mass[i], s = ksum[i], c = csum[i];
     if (!(s >= 0) || !(c >= 0) || !std::isfinite(s + c))
       broken(
-          "bound answers row sums of %g N/m and %g N s/m for point %u, from which no stable step can be "
-          "computed; return finite sums that are not negative",
+          "bound answers row sums of %g N/m and %g N s/m for point %u; return finite sums that are not "
+          "negative",
           s, c, i);
     if (s > 0) h = std::min(h, (-c + std::sqrt(c * c + 4 * m * s)) / s);
     else if (c > 0) h = std::min(h, 2 * m / c);

@@ -115,30 +115,25 @@ Plugin::Plugin(const std::string &file) {
   const dfm_plugin_fn entry = entry_of(image_);
   if (!entry)
     broken(
-        "it has no symbol dfm_plugin_entry, so no host can use it; build it with deform_add_plugin and "
-        "define the entry of deform/plugin.h");
+        "it has no symbol dfm_plugin_entry; build it with deform_add_plugin and define the entry of "
+        "deform/plugin.h");
   const dfm_plugin *given = nullptr;
   try {
     given = entry(&host_.table(), DFM_ABI, DFM_ABI_MIN);
   } catch (...) {
-    broken(
-        "its entry threw an exception, which ends a host written in C; catch it in the entry, log why, and "
-        "return NULL");
+    broken("its entry threw an exception; catch it in the entry, log the reason, and return NULL");
   }
   if (!given)
-    broken(
-        "it refuses a host of ABI %u draft %u (%s), so no world can use it; rebuild it against this "
-        "library's deform/plugin.h",
-        DFM_ABI, DFM_ABI_DRAFT, host_.said().empty() ? "without a reason" : host_.said().c_str());
+    broken("it refuses a host of ABI %u draft %u (%s); rebuild it against this library's deform/plugin.h",
+           DFM_ABI, DFM_ABI_DRAFT, host_.said().empty() ? "without a reason" : host_.said().c_str());
   if (given->abi < DFM_ABI_MIN || given->abi > DFM_ABI || given->abi_draft != DFM_ABI_DRAFT)
     broken(
-        "it was built for ABI %u draft %u and accepts a host of ABI %u draft %u, which would misread its "
-        "structs; rebuild it against this library's deform/plugin.h and refuse other hosts with DFM_ABI_OK",
+        "it was built for ABI %u draft %u and accepts a host of ABI %u draft %u; rebuild it against this "
+        "library's deform/plugin.h and refuse other hosts with DFM_ABI_OK",
         given->abi, given->abi_draft, DFM_ABI, DFM_ABI_DRAFT);
   dfm_plugin full{};
   if (!copy_struct(full, given, offsetof(dfm_plugin, types) + sizeof(void *)))
-    broken("dfm_plugin.size is %u, so its fields cannot be told apart; set it to sizeof(dfm_plugin)",
-           given->size);
+    broken("dfm_plugin.size is %u; set it to sizeof(dfm_plugin)", given->size);
   shutdown_ = full.shutdown;
   if (full.ntype == 0 || full.ntype > 4096 || !full.types)
     broken("it offers no types (ntype %u); name at least one dfm_type", full.ntype);
@@ -160,8 +155,8 @@ void Plugin::copy_type(const void *from, uint32_t number) {
     }
   if (copy->rows.size() != type.nparam)
     broken(
-        "type #%u: its table has %u rows of %u bytes at %p, so no parameter can be set; set params, nparam "
-        "and param_size (sizeof(dfm_param))",
+        "type #%u: its table has %u rows of %u bytes at %p; set params, nparam and param_size "
+        "(sizeof(dfm_param))",
         number, type.nparam, width, static_cast<const void *>(type.params));
   type.params = copy->rows.data();
   type.param_size = sizeof(dfm_param);
@@ -175,8 +170,8 @@ void Plugin::copy_type(const void *from, uint32_t number) {
   take(DFM_KIND_SOLVER, copy->solver, offsetof(dfm_solver, release));
   if (!full)
     broken(
-        "type #%u has kind %u and operations that do not fit it, so nothing can be called; set kind, and "
-        "ops.size to the sizeof of its struct",
+        "type #%u has kind %u and operations that do not fit it; set kind, and ops.size to the sizeof of its "
+        "struct",
         number, type.kind);
   type.ops = full;
   types_.push_back(std::move(copy));

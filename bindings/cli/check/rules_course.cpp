@@ -60,8 +60,8 @@ std::string state_stays_bounded(const Subject &subject) {
             const double size = std::fabs(b.state[size_t(c) * b.stride + i]);
             if (!std::isfinite(size))
               broken(
-                  "state %u is no longer finite after %d steps of %g s, so every step would be discarded; "
-                  "make the state tend to a finite value",
+                  "state %u is no longer finite after %d steps of %g s; make the state tend to a finite "
+                  "value",
                   c, k * kSteps + step + 1, h);
             block[size_t(c) * kRuns + i] = std::max(block[size_t(c) * kRuns + i], size);
           }
@@ -73,9 +73,8 @@ std::string state_stays_bounded(const Subject &subject) {
       worst = std::max(worst, block[j] / before[j]);
       if (block[j] > kMost * before[j])
         broken(
-            "state %zu grows by %.3g while the same %d steps of %g s are made %d times more: it grows "
-            "without bound, and in the end every step would be discarded; make the state tend to a finite "
-            "value, or grow at most in proportion to time",
+            "state %zu grows by %.3g while the same %d steps of %g s are repeated %d times; make the state "
+            "tend to a finite value, or grow at most in proportion to time",
             j / kRuns, block[j] / before[j], kSteps, h, kBlocks - 1 - kFirst);
     }
   }
@@ -102,8 +101,8 @@ void stays_on_the_line(const Law &law, const Scales &s) {
         const double across = b.out_ft[b.stride + i] * kWays[i][0] - b.out_ft[i] * kWays[i][1];
         if (!(std::fabs(across) <= 1e-9 * (b.ft(i) + s.level)))
           broken(
-              "slip along a straight line from rest gives a force that is %.3g rad off that line, so a body "
-              "that slides straight would be pushed aside; make the force parallel to slip and state",
+              "slip along a straight line from rest gives a force that is %.3g rad off that line; make the "
+              "force parallel to slip and state",
               std::asin(std::min(1.0, std::fabs(across) / b.ft(i))));
       }
     }
@@ -149,8 +148,7 @@ std::string opposes_slip(const Subject &subject) {
         if (!(error <= 1e-12))
           broken(
               "a history and its mirror image give forces that are not each other's mirror image (off by "
-              "%.2g): the law prefers one sense of rotation, so bodies would turn while they slide; use "
-              "lengths and dot products of the pairs, not cross products",
+              "%.2g); use lengths and dot products of the pairs, not cross products",
               error);
       }
     }
@@ -201,8 +199,7 @@ std::string converges_with_step(const Subject &subject) {
   if (!(apart[2] <= 0.5 * std::max(apart[0], apart[1]) + 0.02))
     broken(
         "the same slip cut into steps of 1e-5 and of 1e-6 s gives forces that differ by %.3g of the level "
-        "(%.3g from 1e-4 to 1e-5 s): the force does not converge as the step shrinks; divide only changes of "
-        "the state by dt",
+        "(%.3g from 1e-4 to 1e-5 s), so it does not converge; divide only changes of the state by dt",
         apart[2], apart[1]);
   return text("%.1e, %.1e, %.1e of the level apart", apart[0], apart[1], apart[2]);
 }

@@ -33,10 +33,7 @@ std::string keeps_rounding(const Subject &subject) {
   if (subject.type->kind == DFM_KIND_FRICTION) use(subject);
   if (subject.type->kind == DFM_KIND_MODEL) use_model(subject);
   if (const std::string &left = left_changed(); !left.empty())
-    broken(
-        "%s: the host would then compute other results and read numbers in files differently; restore what "
-        "you change (fegetenv, fesetenv)",
-        left.c_str());
+    broken("%s; restore what you change (fegetenv, fesetenv)", left.c_str());
   return "";
 }
 
@@ -80,8 +77,7 @@ std::string keeps_process(const Subject &subject) {
   if (!changed.empty()) broken("%s", changed.c_str());
   for (int k = 0; k < 2; ++k)
     if (!printed[k].empty())
-      broken("it writes to standard %s (\"%s\"): this mixes with the program's own output; use dfm_host.log",
-             k == 0 ? "output" : "error",
+      broken("it writes to standard %s (\"%s\"); use dfm_host.log", k == 0 ? "output" : "error",
              printed[k].substr(0, std::min<size_t>(printed[k].find('\n'), 60)).c_str());
   if (threads > 0)
     broken(

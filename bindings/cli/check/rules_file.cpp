@@ -67,12 +67,10 @@ bool read_symbols(const std::string &bytes, unsigned type, std::vector<Symbol> &
 std::vector<std::string> exported(const std::string &file) {
   const std::string bytes = bytes_of(file);
   if (bytes.size() < sizeof(ElfW(Ehdr)) || std::memcmp(bytes.data(), ELFMAG, SELFMAG) != 0)
-    broken("it is not a shared library (ELF), so it cannot be loaded; build it with deform_add_plugin");
+    broken("it is not a shared library (ELF); build it with deform_add_plugin");
   std::vector<Symbol> symbols;
   if (!read_symbols(bytes, SHT_DYNSYM, symbols))
-    skip(
-        "the file has no section headers, so its symbols cannot be listed; run the check before you strip "
-        "the file");
+    skip("the file has no section headers; run the check before you strip the file");
   std::vector<std::string> out;
   for (const Symbol &s : symbols) {
     const int visibility = s.entry.st_other & 3, binding = s.entry.st_info >> 4;
@@ -102,15 +100,12 @@ std::string exports_one_symbol(const Subject &subject) {
   std::vector<std::string> names = exported(subject.file);
   const auto entry = std::find(names.begin(), names.end(), "dfm_plugin_entry");
   if (entry == names.end())
-    broken(
-        "it exports no dfm_plugin_entry, so no host can use it; define the entry of deform/plugin.h with "
-        "DFM_EXPORT");
+    broken("it exports no dfm_plugin_entry; define the entry of deform/plugin.h with DFM_EXPORT");
   names.erase(entry);
   if (!names.empty())
     broken(
-        "it exports %zu symbol%s beside dfm_plugin_entry (%s%s), which another plugin or the host may bind "
-        "to instead of its own; build it with deform_add_plugin, or link with -Wl,--version-script holding { "
-        "global: dfm_plugin_entry; local: *; };",
+        "it exports %zu symbol%s beside dfm_plugin_entry (%s%s); build it with deform_add_plugin, or link "
+        "with -Wl,--version-script holding { global: dfm_plugin_entry; local: *; };",
         names.size(), names.size() == 1 ? "" : "s", names[0].c_str(), names.size() > 1 ? ", ..." : "");
   return "dfm_plugin_entry";
 }
@@ -146,15 +141,15 @@ std::string refuses_unknown_abi(const Subject &subject) {
     stage("the entry is called by a host of ABI %u draft %u", stranger.abi, stranger.draft);
     if (given_to(entry, stranger.abi, stranger.draft, stranger.min))
       broken(
-          "its entry accepts a host of ABI %u draft %u, which it cannot know, and would be called with "
-          "structs of another layout; return NULL unless DFM_ABI_OK(host)",
+          "its entry accepts a host of ABI %u draft %u, which it cannot know; return NULL unless "
+          "DFM_ABI_OK(host)",
           stranger.abi, stranger.draft);
   }
   stage("the entry is called by a host of ABI %u that still speaks %u", DFM_ABI + 1, DFM_ABI);
   if (!given_to(entry, DFM_ABI + 1, 3, DFM_ABI))
     broken(
-        "its entry refuses a host of ABI %u that still supports ABI %u, so the plugin would not run with "
-        "later libraries; use DFM_ABI_OK(host), which reads abi_min",
+        "its entry refuses a host of ABI %u that still supports ABI %u; use DFM_ABI_OK(host), which reads "
+        "abi_min",
         DFM_ABI + 1, DFM_ABI);
   return text("ABI %u", DFM_ABI);
 }
@@ -191,8 +186,7 @@ void effects_known(const dfm_type &type) {
 }
 
 void reserved_free(const char *what, uint32_t found) {
-  if (found)
-    broken("%s has %u in reserved, to which a later host may give a meaning; set it to 0", what, found);
+  if (found) broken("%s has %u in reserved; set it to 0", what, found);
 }
 
 void slots_sound(const std::vector<dfm_slot> &slots, bool law) {
@@ -203,10 +197,8 @@ void slots_sound(const std::vector<dfm_slot> &slots, bool law) {
                            : s.kind == DFM_SLOT_ROTATION ? 4
                                                          : s.width;
     if (s.kind < DFM_SLOT_SCALAR || s.kind > DFM_SLOT_ROTATION || s.width == 0 || s.width != width)
-      broken(
-          "state slot %u has kind %u and width %u, which do not agree, so the host would turn the wrong "
-          "numbers; a tangent pair has width 2",
-          i, s.kind, s.width);
+      broken("state slot %u has kind %u and width %u, which do not agree; a tangent pair has width 2", i,
+             s.kind, s.width);
     if (law ? s.unit != DFM_PER_CONTACT : s.unit < DFM_PER_POINT || s.unit > DFM_PER_INSTANCE)
       broken(
           "state slot %u has unit %u, which the host does not keep for it; a law's state is DFM_PER_CONTACT",
@@ -218,16 +210,11 @@ void slots_sound(const std::vector<dfm_slot> &slots, bool law) {
 // slots, nslot, slot_size and reserved of the operations of a law or a model
 template <class Ops>
 void slot_table_sound(const Ops &ops, bool law) {
-  if (ops.nslot && !ops.slots)
-    broken("it has %u state slots but slots is NULL, so the host cannot keep its state; name them",
-           ops.nslot);
+  if (ops.nslot && !ops.slots) broken("it has %u state slots but slots is NULL; set slots", ops.nslot);
   reserved_free(law ? "dfm_friction" : "dfm_model", ops.reserved);
   if (!slot_size_sound(ops.slot_size))
-    broken(
-        "slot_size is %u, so its state slots cannot be told apart; set it to sizeof(dfm_slot), or to 0, "
-        "which "
-        "says the same in all of ABI 1",
-        ops.slot_size);
+    broken("slot_size is %u; set it to sizeof(dfm_slot), or to 0, which means the same in all of ABI 1",
+           ops.slot_size);
   slots_sound(slot_rows(ops.slots, ops.nslot, ops.slot_size), law);
 }
 
@@ -243,12 +230,8 @@ void own_slots_sound(const dfm_slots *own, bool law, const char *from, const cha
 
 void law_sound(const dfm_type &type, const dfm_friction &law) {
   if (!law.eval) broken("a law without eval cannot be evaluated; set dfm_friction.eval");
-  if (!law.prepare != !law.release)
-    broken(
-        "it has only one of prepare and release, so its tables leak or are never made; give both or neither");
-  if (law.needs & ~31u)
-    broken("needs has bits that this ABI does not know (%#x), which no host fills; use DFM_NEED_*",
-           law.needs);
+  if (!law.prepare != !law.release) broken("it has only one of prepare and release; set both or neither");
+  if (law.needs & ~31u) broken("needs has bits that this ABI does not know (%#x); use DFM_NEED_*", law.needs);
   if (law.flags & ~31u) broken("flags has bits that this ABI does not know (%#x); use DFM_FRIC_*", law.flags);
   if ((law.flags & DFM_FRIC_SET_VALUED) && !(law.needs & DFM_NEED_FT_STOP))
     broken("a set-valued law that does not need FT_STOP cannot hold at rest; add DFM_NEED_FT_STOP to needs");
@@ -264,24 +247,20 @@ void law_sound(const dfm_type &type, const dfm_friction &law) {
 void model_sound(const dfm_type &type, const dfm_model &model) {
   constexpr uint32_t kCells = DFM_CELL_POINT | DFM_CELL_EDGE | DFM_CELL_TRI | DFM_CELL_TET | DFM_CELL_HEX;
   if (model.cells & ~kCells)
-    broken("cells has bits that this ABI does not know (%#x), which no host gives; use DFM_CELL_*",
-           model.cells & ~kCells);
+    broken("cells has bits that this ABI does not know (%#x); use DFM_CELL_*", model.cells & ~kCells);
   if (model.add_forces && !model.bound)
-    broken(
-        "it adds forces but dfm_model.bound is NULL, so the host would take steps of any length and the body "
-        "would diverge; set the function");
+    broken("it adds forces but dfm_model.bound is NULL; set the function");
   for (uint32_t i = 0; i < type.nparam && !model.set_params; ++i)
     if (type.params[i].flags & DFM_PARAM_RUNTIME)
       broken(
-          "parameter \"%s\" may change while it runs, but there is no set_params, so every change fails; set "
-          "the function, or drop DFM_PARAM_RUNTIME",
+          "parameter \"%s\" may change during a run, but there is no set_params; set the function, or drop "
+          "DFM_PARAM_RUNTIME",
           type.params[i].key ? type.params[i].key : "");
 
   constexpr uint32_t kKnown = DFM_CAP_ENERGY | DFM_CAP_STIFFNESS | DFM_CAP_DAMPING |
                               DFM_CAP_ROTATION_INVARIANT | DFM_CAP_PLAUSIBLE | DFM_CAP_CONSTANT_STIFFNESS;
   if (model.caps & ~kKnown)
-    broken("caps has bits that this ABI does not know (%#x), which no host honors; use DFM_CAP_*",
-           model.caps & ~kKnown);
+    broken("caps has bits that this ABI does not know (%#x); use DFM_CAP_*", model.caps & ~kKnown);
   const struct {
     uint32_t bit;
     bool there;
@@ -291,14 +270,9 @@ void model_sound(const dfm_type &type, const dfm_model &model) {
       {DFM_CAP_STIFFNESS, model.pattern && model.stiffness, "DFM_CAP_STIFFNESS", "pattern and stiffness"}};
   for (const auto &c : claims)
     if ((model.caps & c.bit) && !c.there)
-      broken(
-          "it claims %s without %s, so the host would call a missing function; set the function, or drop the "
-          "claim",
-          c.cap, c.function);
+      broken("it claims %s without %s; set the function, or drop the claim", c.cap, c.function);
   if ((model.caps & DFM_CAP_CONSTANT_STIFFNESS) && !(model.caps & DFM_CAP_STIFFNESS))
-    broken(
-        "it claims DFM_CAP_CONSTANT_STIFFNESS without DFM_CAP_STIFFNESS, so there is nothing to be constant; "
-        "claim both or none");
+    broken("it claims DFM_CAP_CONSTANT_STIFFNESS without DFM_CAP_STIFFNESS; claim both or none");
 }
 
 // A table of one function: what stands behind size and reserved.
@@ -311,16 +285,15 @@ bool lacks_its_function(const void *table) {
 void effect_rows_sound(const dfm_type &type, const dfm_effect_rows &table) {
   reserved_free("its dfm_effect_rows", table.reserved);
   if (table.n > 4096 || (table.n && !table.rows))
-    broken("its dfm_effect_rows announces %u rows and rows is NULL or too long, so none is read; name them",
-           table.n);
+    broken("its dfm_effect_rows has nrow %u, but rows is NULL or too long; set rows", table.n);
   for (uint32_t i = 0; i < table.n; ++i) {
     dfm_effect_row row;
     std::memcpy(&row, reinterpret_cast<const char *>(table.rows) + size_t(i) * table.row_size, sizeof row);
     reserved_free(text("row %u of its dfm_effect_rows", i).c_str(), row.reserved);
     if (row.param >= type.nparam || type.params[row.param].width != 1)
       broken(
-          "row %u of its dfm_effect_rows names parameter %u of %u, or one that is not one wide, so nothing "
-          "can switch the effect off; name a row of dfm_type.params",
+          "row %u of its dfm_effect_rows names parameter %u of %u, or one that is not one wide; name a row "
+          "of dfm_type.params",
           i, row.param, type.nparam);
   }
 }
@@ -357,28 +330,23 @@ void tables_sound(const Subject &subject) {
     uint32_t head[2];
     std::memcpy(head, table, sizeof head);
     if (head[0] < k.head || head[0] > 65536)
-      broken("the table of its extension \"%s\" has size %u, so the library refuses it; set it to sizeof(%s)",
-             k.id, head[0], k.name);
+      broken("the table of its extension \"%s\" has size %u; set it to sizeof(%s)", k.id, head[0], k.name);
     if (k.row && (head[1] < k.row || head[1] > 65536))
-      broken("the rows of its extension \"%s\" have row_size %u, so none is read; set it to their sizeof",
-             k.id, head[1]);
+      broken("the rows of its extension \"%s\" have row_size %u; set it to their sizeof", k.id, head[1]);
     if (!k.row) reserved_free(text("the table of its extension \"%s\"", k.id).c_str(), head[1]);
     if (k.one && lacks_its_function(table))
       broken("the table of its extension \"%s\" has no function; set it, or return NULL for this id", k.id);
   }
   const auto *stepper = static_cast<const dfm_stepper *>(body.extension("dfm.stepper/1"));
   if (!stepper && !model.add_forces)
-    broken(
-        "it has no add_forces and does not answer \"dfm.stepper/1\", so nothing moves it; set one of them");
+    broken("it has no add_forces and does not answer \"dfm.stepper/1\"; set one of them");
   const auto *single = static_cast<const dfm_f32 *>(body.extension(DFM_EXT_F32));
   if (single && !(single->prepare && single->add_forces))
-    broken("dfm_f32 lacks prepare or add_forces, so no body has single precision; set both, or answer NULL");
+    broken("dfm_f32 lacks prepare or add_forces; set both, or return NULL");
   if (stepper && !(stepper->predict && stepper->respond && stepper->commit))
-    broken(
-        "dfm_stepper lacks predict, respond or commit, so the library refuses every body of it; set the "
-        "three");
+    broken("dfm_stepper lacks predict, respond or commit; set the three");
   if (stepper && stepper->size >= offsetof(dfm_stepper, fetch) + sizeof(void *) && stepper->fetch)
-    broken("dfm_stepper.fetch is set, a place that is kept for a later use; leave it NULL");
+    broken("dfm_stepper.fetch is set, but it is reserved; leave it NULL");
   if (const auto *rows = static_cast<const dfm_effect_rows *>(body.extension(DFM_EXT_EFFECT_ROWS)); rows)
     effect_rows_sound(*subject.type, *rows);
   if (const auto *own = static_cast<const dfm_slots *>(body.extension(DFM_EXT_SLOTS)); own)
@@ -401,19 +369,15 @@ std::string metadata_complete(const Subject &subject) {
                 {"licence", type.licence, "without one nobody may redistribute it"},
                 {"source", type.source, "the paper and equation that it implements"}};
   if (!type.id || !reverse_dns(type.id))
-    broken(
-        "its id \"%s\" is not in reverse-DNS form, so two plugins may claim it; call it like "
-        "\"org.example.mylaw\"",
-        type.id ? type.id : "");
+    broken("its id \"%s\" is not in reverse-DNS form; use a name like \"org.example.mylaw\"",
+           type.id ? type.id : "");
   for (const auto &field : fields)
     if (!field.text || !*field.text)
-      broken("its metadata lacks \"%s\" (%s), and the library refuses it; fill it in", field.key,
-             field.remedy);
+      broken("its metadata lacks \"%s\" (%s); fill it in", field.key, field.remedy);
   const auto &types = subject.plugin->types();
   for (uint32_t i = 0; i < types.size(); ++i)
     if (i != subject.index && types[i]->id && std::strcmp(types[i]->id, type.id) == 0)
-      broken("two types of this file have the id \"%s\", so one of them cannot be found; give each its own",
-             type.id);
+      broken("two types of this file have the id \"%s\"; give each its own id", type.id);
   effects_known(type);
   if (type.kind == DFM_KIND_FRICTION) {
     law_sound(type, law_of(subject));
@@ -447,47 +411,32 @@ void row_sane(const dfm_type &type, uint32_t i) {
   const dfm_param &row = type.params[i];
   const std::string key = row.key ? row.key : "";
   const char *k = key.c_str();
-  if (key.empty()) broken("row %u of the table has no key, so nothing can set it; give one", i);
+  if (key.empty()) broken("row %u of the parameter table has no key; give it one", i);
   for (uint32_t j = 0; j < i; ++j)
     if (type.params[j].key && key == type.params[j].key)
-      broken("parameter \"%s\" is listed twice, so the second can never be set; rename one", k);
+      broken("parameter \"%s\" is listed twice; rename one", k);
   if (!row.label || !*row.label || !row.unit || !*row.unit)
-    broken(
-        "parameter \"%s\" lacks a label or a unit, so users do not know what to give; the unit of a number "
-        "is \"1\"",
-        k);
+    broken("parameter \"%s\" lacks a label or a unit; the unit of a pure number is \"1\"", k);
   if (!std::isfinite(row.min) || !std::isfinite(row.max) || !(row.min <= row.def && row.def <= row.max))
-    broken(
-        "parameter \"%s\": the range [%g, %g] must be finite and hold the default %g, or the library refuses "
-        "the table; correct it",
-        k, row.min, row.max, row.def);
+    broken("parameter \"%s\": the range [%g, %g] must be finite and contain the default %g; correct it", k,
+           row.min, row.max, row.def);
   if (row.width < 1 || row.width > 16)
     broken("parameter \"%s\" has width %u; 1 to 16 doubles are packed", k, row.width);
   if ((row.flags & (DFM_PARAM_INTEGER | DFM_PARAM_ENUM)) && row.def != std::floor(row.def))
-    broken(
-        "parameter \"%s\" is a whole number but its default is %g, which is refused when it is given; round "
-        "it",
-        k, row.def);
+    broken("parameter \"%s\" is a whole number but its default is %g; round it", k, row.def);
   if ((row.flags & DFM_PARAM_LOG_SCALE) && !(row.min > 0))
-    broken(
-        "parameter \"%s\" has a logarithmic scale that begins at %g, where no slider can begin; let min be "
-        "above 0",
-        k, row.min);
+    broken("parameter \"%s\" has a logarithmic scale that begins at %g; let min be above 0", k, row.min);
   if (row.flags & ~127u)
     broken("parameter \"%s\" has flags that this ABI does not know (%#x); use DFM_PARAM_*", k, row.flags);
   if ((row.flags & DFM_PARAM_LIST) && !(row.min <= 0 && 0 <= row.max))
     broken(
-        "parameter \"%s\" is a list, whose values that are not given read 0, which its range [%g, %g] "
-        "excludes; widen it",
+        "parameter \"%s\" is a list, where missing values are 0, but its range [%g, %g] excludes 0; widen it",
         k, row.min, row.max);
   if (row.flags & DFM_PARAM_ENUM) {
     uint32_t n = 0;
     while (row.names && n < 4096 && row.names[n]) ++n;
     if (n == 0 || row.min != 0 || row.max != n - 1)
-      broken(
-          "parameter \"%s\" names %u words, which needs the range [0, %g]; a value outside the words would "
-          "be read otherwise",
-          k, n, n - 1.0);
+      broken("parameter \"%s\" has %u words; set its range to [0, %g]", k, n, n - 1.0);
   }
 }
 
@@ -550,10 +499,7 @@ std::string parameters_sane(const Subject &subject) {
   const std::vector<double> defaults = default_params(type);
   stage("check is asked about the defaults");
   if (const std::string why = refusal(law, defaults); !why.empty())
-    broken(
-        "its own check refuses the defaults (%s), so a scene that names no parameter fails; choose defaults "
-        "that check accepts",
-        why.c_str());
+    broken("its own check refuses the defaults (%s); choose defaults that check accepts", why.c_str());
   if (law.check) asks_check(law, defaults);
   library_refuses(subject);
   // The ends of every range, one at a time: check refuses them with a sentence, or eval answers them.
@@ -566,10 +512,8 @@ std::string parameters_sane(const Subject &subject) {
       stage("parameter \"%s\" at %g", type.params[i].key, end);
       if (const std::string why = refusal(law, params); !why.empty()) {
         if (why == "(no reason)")
-          broken(
-              "check refuses \"%s\" = %g without a reason, so the user does not learn what to change; write "
-              "a sentence into why",
-              type.params[i].key, end);
+          broken("check refuses \"%s\" = %g without a reason; write a message into why", type.params[i].key,
+                 end);
         ++refused;
         continue;
       }
@@ -585,8 +529,8 @@ std::string parameters_sane(const Subject &subject) {
       for (uint32_t k = 0; k < b.n; ++k)
         if (!std::isfinite(b.ft(k)))
           broken(
-              "with \"%s\" = %g, the end of its range, the force at %g N and %g m/s is not finite and the "
-              "batch would be discarded; narrow the range, or let check refuse it",
+              "with \"%s\" = %g, the end of its range, the force at %g N and %g m/s is not finite; narrow "
+              "the range, or let check refuse it",
               type.params[i].key, end, b.fn[k], k < 4 ? 0.0 : 1e-3);
     }
   return text("%u parameters, %u ends of ranges refused by check", type.nparam, refused);

@@ -36,8 +36,8 @@ std::string rests_at_zero(const Subject &subject) {
     for (uint32_t i = 0; i < b.n; ++i) {
       if (!(b.ft(i) == 0))
         broken(
-            "at rest, with no state and a normal force of %g N, the force is %g N, so bodies at rest would "
-            "start to move; make the force zero where slip and state are zero",
+            "at rest, with no state and a normal force of %g N, the force is %g N; make the force zero where "
+            "slip and state are zero",
             b.fn[i], b.ft(i));
       if (law.nstate == 0 && !(b.stored[i] == 0))
         broken("at rest it reports a stored energy of %g J although it has no state; write 0", b.stored[i]);
@@ -81,9 +81,8 @@ std::string turns_with_frame(const Subject &subject) {
         worst = std::max(worst, error);
         if (!(error <= 1e-12))
           broken(
-              "the same history turned by %u degrees gives %.6g N instead of %.6g N (off by %.2g of it): "
-              "which way a body slides would depend on how its triangles are numbered; use lengths and dot "
-              "products of the pairs, never their components",
+              "the same history turned by %u degrees gives %.6g N instead of %.6g N (off by %.2g of it); use "
+              "lengths and dot products of the pairs, never their components",
               i, b.ft(i), std::hypot(x, y), error);
       }
       b.commit();
@@ -128,8 +127,8 @@ void loops_dissipate(const Law &law, const Scales &s) {
     for (uint32_t i = 0; i < n; ++i)
       if (!(work[i] >= -1e-9 * moved[i]))
         broken(
-            "a closed loop of slip of %.3g m at steps of %g s produces %.3g J instead of dissipating energy: "
-            "bodies in contact would speed up by themselves; the force must oppose the slip (ft = -F)",
+            "a closed loop of slip of %.3g m at steps of %g s produces %.3g J instead of dissipating energy; "
+            "let the force oppose the slip (ft = -F)",
             sizes[i / kinds], h, -work[i]);
   }
 }
@@ -168,8 +167,8 @@ void gives_back_no_more(const Law &law, const Scales &s, Random &random) {
       if (!(work[i] >= -1e-9 * moved[i]))
         broken(
             "after %d random steps of slip and normal force it has produced %.3g J although no energy was "
-            "stored at the start: contacts would add energy to bodies; damp the state less at high speed, "
-            "project it on the cone when the normal force falls, or do not flag DFM_FRIC_PASSIVE",
+            "stored at the start; damp the state less at high speed, project it on the cone when the normal "
+            "force falls, or do not flag DFM_FRIC_PASSIVE",
             k + 1, -work[i]);
     }
   }
@@ -291,8 +290,7 @@ std::string derivatives_agree(const Subject &subject) {
                 c < 2 ? b.dv[size_t(2 * row + c) * b.stride + i] : b.dn[size_t(row) * b.stride + i];
             broken(
                 "%s[%u%u] is given as %.6g and differences say %.6g (slip %.3g m/s, normal force %.3g N, "
-                "step %g s): the contact solve would overshoot or crawl; derive it from the same update, or "
-                "drop DFM_FRIC_JACOBIAN and let the host take differences",
+                "step %g s); differentiate the same update, or drop DFM_FRIC_JACOBIAN",
                 c < 2 ? "dft_dvt" : "dft_dfn", row, c < 2 ? c : 0, told, d.seen[2 * i + row], speed(i),
                 b.fn[i], h);
           }
@@ -336,9 +334,10 @@ std::string bounded_at_every_step(const Subject &subject) {
                  h, k + 1);
         if (b.mode[i] > 2) broken("it writes mode %u; the host knows 0 open, 1 stick and 2 slip", b.mode[i]);
         if (!(b.limit[i] >= 0))
-          broken("it writes a limit of %g N; a force without a limit has +inf, none has 0", b.limit[i]);
+          broken("it writes a limit of %g N; write +inf for a force without a limit, and 0 for no force",
+                 b.limit[i]);
         if (!(b.stored[i] >= 0) || !std::isfinite(b.stored[i]))
-          broken("it reports a stored energy of %g J; stored energy must be finite and not negative",
+          broken("it reports a stored energy of %g J; report a finite value that is not negative",
                  b.stored[i]);
       }
     }
@@ -346,8 +345,8 @@ std::string bounded_at_every_step(const Subject &subject) {
     worst = std::max(worst, peak / reference);
     if (peak > 10 * reference)
       broken(
-          "at steps of %g s the force reaches %.3g N where fine steps reach %.3g N: long steps would throw "
-          "bodies apart; update the state implicitly",
+          "at steps of %g s the force reaches %.3g N where fine steps reach %.3g N; update the state "
+          "implicitly",
           h, peak, reference);
   }
   return reference > 0 ? text("largest force %.2f of that at fine steps", worst) : "";
@@ -402,14 +401,14 @@ std::string follows_normal_force(const Subject &subject) {
             std::max({1.1 * bound[leg][i / 2], std::isfinite(b.limit[i]) ? 1.1 * s.level * path[leg] : 0.0});
         if (path[leg] == 0 && !(b.ft(i) == 0))
           broken(
-              "a contact whose normal force has gone to zero still pulls with %.3g N: bodies that have "
-              "parted would drag each other; return zero force and the state of rest where fn <= 0",
+              "a contact whose normal force has gone to zero still pulls with %.3g N; return zero force and "
+              "the state of rest where fn <= 0",
               b.ft(i));
         if (!(b.ft(i) <= most * (1 + 1e-9)))
           broken(
               "when the normal force goes from %.3g to %.3g N the force is %.3g N, where a contact under "
-              "that load gives at most %.3g N: a spike that throws bodies apart; project the old state on "
-              "the cone of the new normal force before the update",
+              "that load gives at most %.3g N (a spike); project the old state on the cone of the new normal "
+              "force before the update",
               (leg ? path[leg - 1] : path[leg]) * s.fn, path[leg] * s.fn, b.ft(i), most / 1.1);
       }
       b.commit();

@@ -100,9 +100,8 @@ std::string same_bits(const Subject &subject) {
     for (uint32_t i = 0; i < first.n; ++i)
       if (!again.same(i, first, i))
         broken(
-            "lane %u of the same batch answered (%.17g, %.17g) N and, asked again after another batch, "
-            "(%.17g, %.17g) N: it keeps data between calls, so a restored or repeated step would give other "
-            "results; keep the data in a state slot",
+            "lane %u of the same batch gave (%.17g, %.17g) N and, after another batch, (%.17g, %.17g) N, so "
+            "it keeps data between calls; keep the data in a state slot",
             i, first.out_ft[i], first.out_ft[first.stride + i], again.out_ft[i],
             again.out_ft[again.stride + i]);
   }
@@ -110,20 +109,19 @@ std::string same_bits(const Subject &subject) {
   const uint64_t here = digest(subject), once_more = digest(subject);
   if (here != once_more)
     broken(
-        "the same series of batches gave other bits the second time: it keeps data between calls; keep the "
-        "data in a state slot");
+        "the same series of batches gave other bits the second time, so it keeps data between calls; keep "
+        "the data in a state slot");
   const std::string number = std::to_string(subject.index), seed = std::to_string(subject.seed);
   const Answer other =
       in_fresh_process(subject.command, {"plugin", "check", subject.file, "--digest", number, "--seed", seed},
                        {0.5 * subject.limit});
   const std::string mine = text("%016llx", static_cast<unsigned long long>(here));
   if (!other.spoke)
-    broken("asked in a second process, it %s; a law must not depend on the process it runs in",
-           other.ending.c_str());
+    broken("in a second process it %s; let the law depend on its inputs only", other.ending.c_str());
   if (other.verdict.detail != mine)
     broken(
-        "the same batches give %s here and %s in another process: it uses an address, the time or something "
-        "left uninitialized, so results differ from run to run; compute from the inputs alone",
+        "the same batches give %s here and %s in another process; compute from the inputs only, not from "
+        "addresses, time or uninitialized memory",
         mine.c_str(), other.verdict.detail.c_str());
   return "digest " + mine;
 }
@@ -164,18 +162,16 @@ std::string bad_lane_stays(const Subject &subject) {
       for (uint32_t i = 0; i < good.n; ++i)
         if (i != kBad && !spoilt.same(i, good, i))
           broken(
-              "%s = %g in lane %u changed lane %u from (%.17g, %.17g) to (%.17g, %.17g) N: one broken "
-              "contact would spoil others; compute each lane from its own inputs",
+              "%s = %g in lane %u changed lane %u from (%.17g, %.17g) to (%.17g, %.17g) N; compute each lane "
+              "from its own inputs",
               input.name, bad, kBad, i, good.out_ft[i], good.out_ft[S + i], spoilt.out_ft[i],
               spoilt.out_ft[S + i]);
       bool finite = std::isfinite(spoilt.ft(kBad));
       for (uint32_t c = 0; c < law.nstate && std::strcmp(input.name, "state") == 0; ++c)
         finite = finite && std::isfinite(spoilt.out_state[c * S + kBad]);
       if (std::isnan(bad) && std::strcmp(input.name, "dwell") != 0 && finite)
-        broken(
-            "%s = NaN gave a finite force (%.17g, %.17g) N, so the host would not notice the invalid "
-            "contact; return a NaN, or DFM_DISCARD",
-            input.name, spoilt.out_ft[kBad], spoilt.out_ft[S + kBad]);
+        broken("%s = NaN gave a finite force (%.17g, %.17g) N; return a NaN, or DFM_DISCARD", input.name,
+               spoilt.out_ft[kBad], spoilt.out_ft[S + kBad]);
     }
   return "";
 }
@@ -200,9 +196,8 @@ std::string split_equals_whole(const Subject &subject) {
         for (uint32_t k = 0; k < n; ++k)
           if (!part.same(n - 1 - k, whole, begin + k))
             broken(
-                "contact %u answers (%.17g, %.17g) N in a batch of %u and (%.17g, %.17g) N in one of %u: a "
-                "world would change with the number of its contacts; compute each lane by the same "
-                "operations wherever it stands",
+                "contact %u gets (%.17g, %.17g) N in a batch of %u and (%.17g, %.17g) N in one of %u; "
+                "compute each lane by the same operations at every place in a batch",
                 begin + k, whole.out_ft[begin + k], whole.out_ft[whole.stride + begin + k], whole.n,
                 part.out_ft[n - 1 - k], part.out_ft[part.stride + n - 1 - k], n);
       }
@@ -231,9 +226,8 @@ std::string endures(const Subject &subject) {
   for (uint32_t i = 0; i < first.n; ++i)
     if (!again.same(i, first, i))
       broken(
-          "lane %u answered (%.17g, %.17g) N and, after %u other contacts, (%.17g, %.17g) N: it keeps data "
-          "between calls, so a long run would give other results than a short one; keep nothing between "
-          "calls but state slots",
+          "lane %u gave (%.17g, %.17g) N and, after %u other contacts, (%.17g, %.17g) N; keep nothing "
+          "between calls but state slots",
           i, first.out_ft[i], first.out_ft[first.stride + i], asked, again.out_ft[i],
           again.out_ft[again.stride + i]);
   Lanes large(law, kLarge);
@@ -244,9 +238,8 @@ std::string endures(const Subject &subject) {
   for (uint32_t i = 0; i < kLarge; ++i)
     if (!large.same(i, many, i % kBatch))
       broken(
-          "contact %u of a batch of %u answers (%.17g, %.17g) N and the same contact in a batch of %u "
-          "(%.17g, %.17g) N: large worlds would give wrong results; index contacts by uint32_t, and keep no "
-          "table of fixed size",
+          "contact %u of a batch of %u gets (%.17g, %.17g) N, and in a batch of %u (%.17g, %.17g) N; index "
+          "contacts by uint32_t, and keep no table of fixed size",
           i, kLarge, large.out_ft[i], large.out_ft[large.stride + i], kBatch, many.out_ft[i % kBatch],
           many.out_ft[many.stride + i % kBatch]);
   return text("%u contacts", asked);

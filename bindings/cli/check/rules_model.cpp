@@ -30,8 +30,7 @@ double force_scale(Body &body, Random &random) {
   body.v = v;
   if (!(most > 0) || !std::isfinite(most))
     broken(
-        "its largest force is %g N where every point of a body is 1 %% of an edge off its place, so nothing "
-        "holds the body together; add forces",
+        "its largest force is %g N where every point of a body is displaced by 1 %% of an edge; add forces",
         most);
   return most;
 }
@@ -46,8 +45,8 @@ void rests(Body &body, const char *where, const Variant &variant) {
   for (size_t i = 0; i < before.size(); ++i) most = std::max(most, std::fabs(body.x[i] - before[i]));
   if (!(most <= 1e-9 * kCube))
     broken(
-        "%s a body at rest in its rest shape, %s, moves by %g m in a step without any load: it would move "
-        "without a load; make the rest shape its goal",
+        "%s a body at rest in its rest shape, %s, moves by %g m in a step without a load; make the rest "
+        "shape its goal",
         with(variant).c_str(), where, most);
 }
 
@@ -61,9 +60,8 @@ std::string rest_pose_is_free(const Subject &subject) {
     const double scale = force_scale(body, random), most = largest(body.forces());
     if (!(most <= 1e-9 * scale))
       broken(
-          "%s the rest pose has forces of %g N (%g N where points are 1 %% of an edge off): a body would "
-          "move "
-          "before anything touches it; take lengths, volumes and frames at rest from dfm_mesh.rest",
+          "%s the rest pose has forces of %g N (%g N where points are displaced by 1 %% of an edge); take "
+          "lengths, volumes and frames at rest from dfm_mesh.rest",
           with(variant).c_str(), most, scale);
   });
 }
@@ -96,10 +94,8 @@ std::string rigid_motion_is_free(const Subject &subject) {
       if (!(off <= 1e-8 * std::max(scale, largest(before))))
         broken(
             "%s the forces of a body that is turned by %g rad and shifted are off the forces turned by as "
-            "much "
-            "by %g N of %g N, though it claims DFM_CAP_ROTATION_INVARIANT: a tumbling body would swell; "
-            "measure "
-            "strain in a frame that turns with the body, or drop the claim",
+            "much by %g N of %g N, though it claims DFM_CAP_ROTATION_INVARIANT; measure strain in a frame "
+            "that turns with the body, or drop the claim",
             with(variant).c_str(), angle, off, largest(before));
       if (!body.can(DFM_CAP_ENERGY)) continue;
       if (const double told = body.energy(); !(std::fabs(told - joule) <= 1e-8 * std::fabs(joule)))
@@ -154,14 +150,14 @@ void keeps_momentum_of_steps(const Subject &subject, const Variant &variant) {
   Sums after = sums_of(body, body.v, body.solid.mass);
   if (!(apart(before.force, after.force) <= 1e-10 * before.size))
     broken(
-        "%s the momentum of a free body changes by %g kg m/s of %g in 20 steps: it would move without a "
-        "load; let inner forces or goals leave the center of mass where it is",
+        "%s the momentum of a free body changes by %g kg m/s of %g in 20 steps; let inner forces or goals "
+        "not move the center of mass",
         with(variant).c_str(), apart(before.force, after.force), before.size);
   if (body.can(DFM_CAP_ROTATION_INVARIANT) &&
       !(apart(before.torque, after.torque) <= 1e-9 * std::max(before.arm, after.arm)))
     broken(
-        "%s the angular momentum of a free body changes by %g kg m2/s of %g in 20 steps: it would start to "
-        "spin without a load; let inner forces or goals have no moment",
+        "%s the angular momentum of a free body changes by %g kg m2/s of %g in 20 steps; let inner forces or "
+        "goals have no moment",
         with(variant).c_str(), apart(before.torque, after.torque), before.arm);
 }
 
@@ -178,14 +174,13 @@ std::string forces_sum_to_zero(const Subject &subject) {
       const Sums s = sums_of(body, f, std::vector<double>(body.points(), 1.0));
       if (!(length(s.force) <= 1e-10 * s.size))
         broken(
-            "%s the forces of a free body sum to %g N (their sizes to %g N): it would move without a load; "
-            "let the forces of each cell sum to zero, as those of an energy of differences do",
+            "%s the forces of a free body sum to %g N (their absolute values to %g N); let the forces of "
+            "each cell sum to zero, as those of an energy of differences do",
             with(variant).c_str(), length(s.force), s.size);
       if (body.can(DFM_CAP_ROTATION_INVARIANT) && !(length(s.torque) <= 1e-10 * s.arm))
         broken(
-            "%s the forces of a free body have a moment of %g N m (force by distance: %g N m): it would "
-            "begin "
-            "to spin by itself; take forces from an energy that does not change when the body turns",
+            "%s the forces of a free body have a moment of %g N m (force times distance: %g N m); take "
+            "forces from an energy that does not change when the body turns",
             with(variant).c_str(), length(s.torque), s.arm);
     }
   });
@@ -225,10 +220,9 @@ std::string forces_are_the_gradient(const Subject &subject) {
         worst = std::max(worst, best / size);
         if (!(best <= 1e-5 * size))
           broken(
-              "%s, points shaken by %g of an edge: along a random direction the forces do %.9g J/m and the "
-              "energy falls by %.9g J/m: a swinging body would gain or lose energy; let forces be the "
-              "negative "
-              "gradient of energy, every term of both",
+              "%s, points shaken by %g of an edge: along a random direction the forces do %.9g J/m of work "
+              "and the energy falls by %.9g J/m; let the forces be the negative gradient of the energy, with "
+              "every term of both",
               with(variant).c_str(), share, work, told);
       }
     }
@@ -281,33 +275,30 @@ void tangent_agrees(Body &body, const Variant &variant, const Tangent &t, Random
     for (size_t j = 0; j < i; ++j)
       if (!(std::fabs(k[i * width + j] - k[j * width + i]) <= 1e-9 * most))
         broken(
-            "%s the block of point %zu with itself is not symmetric (%g and %g N/m), so the host's solver, "
-            "which reads one half of it, would solve other equations; give the symmetric part",
+            "%s the block of point %zu with itself is not symmetric (%g and %g N/m); give the symmetric part",
             with(variant).c_str(), i / 3, k[i * width + j], k[j * width + i]);
   for (size_t n = 0; n < k.size(); ++n)
     if (!(std::fabs(both[n] - (2 * k[n] + 3 * c[n])) <= 1e-9 * (2 * most + 3 * damping)))
       broken(
-          "%s stiffness(2, 3) is not 2 df/dx + 3 df/dv as answered one by one (%g and %g), so an implicit "
-          "step "
-          "solves something else; add a times the one and b times the other",
+          "%s stiffness(2, 3) is not 2 stiffness(1, 0) + 3 stiffness(0, 1) (%g and %g); return a df/dx + b "
+          "df/dv",
           with(variant).c_str(), both[n], 2 * k[n] + 3 * c[n]);
   if (!below(k, width, 1e-8 * most))
     broken(
-        "%s, points shaken by %g of an edge, stiffness has a positive direction: the matrix of an implicit "
-        "step may lose its factorization and the body jumps; drop the terms that make it indefinite",
+        "%s, points shaken by %g of an edge, stiffness has a positive direction; drop the terms that make it "
+        "indefinite",
         with(variant).c_str(), t.share);
   if (damping > 0 && !below(c, width, 1e-8 * damping))
     broken(
-        "%s, points shaken by %g of an edge, the part of stiffness by velocity has a positive direction: "
-        "dampers would push; drop the terms that make it indefinite",
+        "%s, points shaken by %g of an edge, the part of stiffness by velocity has a positive direction; "
+        "drop the terms that make it indefinite",
         with(variant).c_str(), t.share);
   if (t.tolerance > 0) {
     const std::vector<double> d = differences(body, body.x, 1e-5 * kCube);
     if (const double off = most_apart(d, k); !(off <= t.tolerance * most_of(d)))
       broken(
           "%s, points shaken by %g of an edge, stiffness is off the differences of the forces by %g of %g "
-          "N/m: implicit steps would converge slowly or to something else; differentiate the forces, every "
-          "term",
+          "N/m; differentiate the forces, every term",
           with(variant).c_str(), t.share, off, most_of(d));
   }
   if (!(t.tolerance > 0)) return;
@@ -318,8 +309,7 @@ void tangent_agrees(Body &body, const Variant &variant, const Tangent &t, Random
       !(off <= t.tolerance * std::max(most_of(d), damping) + 1e-12 * most))
     broken(
         "%s, points shaken by %g of an edge, the part of stiffness by velocity is off the differences of the "
-        "forces by %g of %g N s/m: damping in implicit steps would be another one than in explicit steps; "
-        "differentiate the dampers too",
+        "forces by %g of %g N s/m; differentiate the dampers too",
         with(variant).c_str(), t.share, off, most_of(d));
 }
 
@@ -354,8 +344,7 @@ std::string constant_stiffness_is_constant(const Subject &subject) {
     if (const double off = most_apart(before, body.stiffness(1, 0.1)); off != 0)
       broken(
           "%s its stiffness at a deformed state is off that at rest by %g of %g N/m, though it claims "
-          "DFM_CAP_CONSTANT_STIFFNESS: the host would keep a factorization that is no longer true; drop the "
-          "claim",
+          "DFM_CAP_CONSTANT_STIFFNESS; drop the claim",
           with(variant).c_str(), off, most_of(before));
   });
 }
@@ -379,14 +368,13 @@ std::string dampers_take_energy(const Subject &subject) {
         if (!damps && f[n] != still[n])
           broken(
               "%s its forces change with velocities (%g N and %g N), though it does not claim "
-              "DFM_CAP_DAMPING: "
-              "the host would leave its dampers out of the bound of steps; claim it",
+              "DFM_CAP_DAMPING; claim it",
               with(variant).c_str(), still[n], f[n]);
       }
       if (!(power <= 1e-10 * size))
         broken(
-            "%s its forces at random velocities, less those at rest, do %g W on the body: dampers that push "
-            "make every motion grow; turn the sign of what depends on velocities",
+            "%s its forces at random velocities, less those at rest, do %g W on the body, as dampers that "
+            "push; change the sign of the terms that depend on velocities",
             with(variant).c_str(), power);
     }
   });
@@ -430,8 +418,8 @@ std::string numbering_does_not_matter(const Subject &subject) {
       for (int d = 0; d < 3; ++d)
         if (!(std::fabs(a.at(f, i)[d] - b.at(g, to[i])[d]) <= 1e-7 * scale))
           broken(
-              "%s point %u %s %.12g %s and, with points and cells numbered otherwise, %.12g: a mesh that was "
-              "written by another program would move differently; let no result depend on numbers of points",
+              "%s point %u %s %.12g %s and, with points and cells numbered otherwise, %.12g; let no result "
+              "depend on numbers of points",
               with(variant).c_str(), i, a.steps_itself() ? "goes to" : "has a force of", a.at(f, i)[d],
               a.steps_itself() ? "m" : "N", b.at(g, to[i])[d]);
   });
@@ -487,16 +475,13 @@ std::string collapsed_cells_stay_finite(const Subject &subject) {
       }
       discarded += status == DFM_DISCARD;
       if (status < 0)
-        broken(
-            "%s, %s, it returns %s, which stops the world; return a result, or DFM_DISCARD if a shorter step "
-            "may help",
-            with(variant).c_str(), kCollapses[how], dfm_status_name(status));
+        broken("%s, %s, it returns %s; return a result, or DFM_DISCARD if a shorter step may help",
+               with(variant).c_str(), kCollapses[how], dfm_status_name(status));
       for (size_t n = 0; n < out.size() && status == DFM_OK; ++n)
         if (!std::isfinite(out[n] + v[n]) || !std::isfinite(u[n % u.size()]))
           broken(
-              "%s, %s, it answers %g for point %zu: the host would have to throw the step away, and a body "
-              "that "
-              "was crushed once never comes back; bear shapes without volume and lengths of zero",
+              "%s, %s, it returns %g for point %zu; return finite values for shapes without volume and "
+              "lengths of zero",
               with(variant).c_str(), kCollapses[how], out[n], n / body.stride);
     }
   });
@@ -520,9 +505,8 @@ std::string cell_energy_sums(const Subject &subject) {
     for (uint32_t c = 0; c < body.solid.ncell(); ++c) sum += density[c] * body.solid.volume(c);
     if (const double whole = body.energy(); !(std::fabs(sum - whole) <= 1e-9 * std::fabs(whole)))
       broken(
-          "%s the energies of the cells sum to %.12g J and the body's is %.12g J: pictures would show "
-          "another "
-          "body than the one that moves; share every term among the cells, over their volumes at rest",
+          "%s the energies of the cells sum to %.12g J and the body's is %.12g J; divide every term among "
+          "the cells, over their volumes at rest",
           with(variant).c_str(), sum, whole);
   });
   if (!offered) skip("it does not offer " DFM_EXT_CELL_ENERGY);

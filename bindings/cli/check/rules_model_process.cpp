@@ -67,9 +67,8 @@ class StepCalls {
 
 void must_be_good(const char *name, dfm_status status) {
   if (status != DFM_OK)
-    broken(
-        "%s returns %s at a state of a body that moves, which would stop a world; answer every finite state",
-        name, dfm_status_name(status));
+    broken("%s returns %s at a state of a body that moves; return finite values for every finite state", name,
+           dfm_status_name(status));
 }
 
 }  // namespace
@@ -91,11 +90,8 @@ std::string model_parameters_sane(const Subject &subject) {
       Body body(subject, solid, one, 4, Body::Refusal::is_told);
       if (!body.made()) {
         if (body.why().empty())
-          broken(
-              "create refuses \"%s\" = %g without a reason, so the user does not learn what to change; say "
-              "it "
-              "through dfm_host.log",
-              type.params[i].key, end);
+          broken("create refuses \"%s\" = %g without a reason; log it through dfm_host.log",
+                 type.params[i].key, end);
         ++refused;
         continue;
       }
@@ -111,9 +107,8 @@ std::string model_parameters_sane(const Subject &subject) {
       for (const double a : answer)
         if (!std::isfinite(a))
           broken(
-              "with \"%s\" = %g, the end of its range, a body answers %g at a small strain, and every step "
-              "would "
-              "be discarded; narrow the range, or let create refuse it",
+              "with \"%s\" = %g, the end of its range, a body returns %g at a small strain; narrow the "
+              "range, or let create refuse it",
               type.params[i].key, end, a);
     }
   return text("%s, %u ends of ranges refused by create", rows.c_str(), refused);
@@ -147,8 +142,8 @@ std::string step_keeps_to_itself(const Subject &subject) {
       ++calls;
       if (found)
         broken(
-            "%s %s calls %s, in its third step: this runs in every step and costs time or may block; "
-            "allocate in create, and do not use files, environment, clock or random numbers",
+            "%s %s calls %s, in its third step; allocate in create, and do not use files, environment, clock "
+            "or random numbers",
             with(variant).c_str(), name, spelt(found).c_str());
       told(name, status);
     });
@@ -180,13 +175,9 @@ std::string step_writes_no_static(const Subject &subject) {
       if (trouble.empty()) return;
       if (!ours) broken("%s %s; touch only the arrays that are given", name, trouble.c_str());
       const std::string variable = variable_at(subject.file, reinterpret_cast<uintptr_t>(at) - base);
-      broken(
-          "%s writes the static variable %s: instances run at once and share it, so results depend on what "
-          "else "
-          "runs; keep it in the instance, or in a state slot",
-          name,
-          variable.empty() ? text("at %#zx of the file", reinterpret_cast<uintptr_t>(at) - base).c_str()
-                           : ("\"" + variable + "\"").c_str());
+      broken("%s writes the static variable %s; keep it in the instance, or in a state slot", name,
+             variable.empty() ? text("at %#zx of the file", reinterpret_cast<uintptr_t>(at) - base).c_str()
+                              : ("\"" + variable + "\"").c_str());
     });
   });
 }
@@ -272,10 +263,8 @@ class FencedBody {
   void spoilt(const char *name, const Fenced &array, const char *what) const {
     long offset = 0;
     if (array.spoilt(&offset))
-      broken(
-          "%s writes %s %s (offset %ld bytes), over other data; loop to the number of points, and step by "
-          "dfm_kin.stride",
-          name, offset < 0 ? "before" : "past the end of", what, offset);
+      broken("%s writes %s %s (offset %ld bytes); loop to the number of points, and step by dfm_kin.stride",
+             name, offset < 0 ? "before" : "past the end of", what, offset);
   }
   template <class F>
   void ask(const char *name, const F &call) {
@@ -286,8 +275,7 @@ class FencedBody {
     body_.subject.plugin->host().give_back_scratch();
     if (!trouble.empty())
       broken(
-          "at stride %u %s %s, over other data of a world; loop to the number of points, step by "
-          "dfm_kin.stride, and write only what is an output",
+          "at stride %u %s %s; loop to the number of points, step by dfm_kin.stride, and write only outputs",
           body_.stride, name, trouble.c_str());
     must_be_good(name, status);
     for (const auto &[what, array] : outputs_) spoilt(name, *array, what);
@@ -348,9 +336,8 @@ std::string model_stays_in_its_arrays(const Subject &subject) {
         if (first.empty()) first = fenced.told();
         if (std::memcmp(first.data(), fenced.told().data(), first.size() * sizeof(double)) != 0)
           broken(
-              "%s its answers have other bits at stride %u than at stride 4: it reads numbers that lie "
-              "between "
-              "the points; step by dfm_kin.stride, and read three numbers for each point",
+              "%s its results have other bits at stride %u than at stride 4; step by dfm_kin.stride, and "
+              "read three numbers for each point",
               with(variant).c_str(), stride);
       }
   });
@@ -382,8 +369,7 @@ std::string model_same_bits(const Subject &subject) {
           !equal(first.x_end, with_that.x_end) || !equal(first.v_end, with_that.v_end) ||
           !equal(first.next, with_that.next) || !equal(first.du, with_that.du) ||
           !equal(first.w, with_that.w))
-        broken("%s a state answers with other bits %s: a repeated step would give other results; %s",
-               with(variant).c_str(), what, remedy);
+        broken("%s the same state gives other bits %s; %s", with(variant).c_str(), what, remedy);
     };
     compare(again, "the second time", "keep nothing between calls but state slots");
     compare(elsewhere, "in another instance of the same body", "set everything in create, and share nothing");
@@ -395,13 +381,11 @@ std::string model_same_bits(const Subject &subject) {
       in_fresh_process(subject.command, {"plugin", "check", subject.file, "--digest", number, "--seed", seed},
                        {0.5 * subject.limit});
   if (!other.spoke)
-    broken("asked in a second process, it %s; a model must not depend on the process it runs in",
-           other.ending.c_str());
+    broken("in a second process it %s; let the model depend on its inputs only", other.ending.c_str());
   if (other.verdict.detail != mine)
     broken(
-        "the same steps give %s here and %s in another process: it uses an address, the time or something "
-        "left "
-        "uninitialized, so results differ from run to run; compute from the inputs alone",
+        "the same steps give %s here and %s in another process; compute from the inputs only, not from "
+        "addresses, time or uninitialized memory",
         mine.c_str(), other.verdict.detail.c_str());
   return "digest " + mine;
 }
@@ -420,10 +404,8 @@ std::string bad_point_returns(const Subject &subject) {
         for (const Numbers *out : {&step.f, &step.x_end, &step.v_end})
           for (const double a : *out) finite = finite && std::isfinite(a);
         if (std::isnan(bad) && place && finite && !refused)
-          broken(
-              "%s a position that is NaN gives finite answers, so the host would not notice the invalid "
-              "body; return a NaN, or DFM_DISCARD",
-              with(variant).c_str());
+          broken("%s a position that is NaN gives finite answers; return a NaN, or DFM_DISCARD",
+                 with(variant).c_str());
       }
   });
 }
@@ -466,7 +448,7 @@ std::string instances_share_nothing(const Subject &subject) {
   for (size_t t = 0; t < kThreads; ++t)
     if (std::memcmp(bodies[t]->x.data(), alone[t]->x.data(), alone[t]->x.size() * sizeof(double)) != 0)
       broken(
-          "%zu bodies stepped at the same time give other results than one after the other: instances share "
+          "%zu bodies stepped at the same time give other results than one after the other, so they share "
           "data; keep it in the instance, or in state slots",
           kThreads);
   return text("%zu instances at once", kThreads);

@@ -76,8 +76,7 @@ std::string eval_keeps_to_itself(const Subject &subject) {
         subject.plugin->host().give_back_scratch();
         if (name)
           broken(
-              "eval calls %s: this runs in every iteration of every step on many threads and costs time or "
-              "may block; use dfm_host.scratch for memory, make tables in prepare, and do not use files, "
+              "eval calls %s; use dfm_host.scratch for memory, make tables in prepare, and do not use files, "
               "environment, clock or random numbers",
               spelt(name).c_str());
         ++calls;
@@ -140,17 +139,15 @@ class FencedBatch {
     const size_t lanes = (lanes_.n + 7) & ~7u;
     for (const auto &o : outputs_) {
       if (o.array->spoilt(&offset))
-        broken(
-            "eval writes %s array %s (offset %ld bytes), over other data; loop to in->n and step columns by "
-            "in->stride",
-            offset < 0 ? "before the" : "past the end of the", o.name, offset);
+        broken("eval writes %s array %s (offset %ld bytes); loop to in->n and step columns by in->stride",
+               offset < 0 ? "before the" : "past the end of the", o.name, offset);
       const unsigned char *p = static_cast<const unsigned char *>(o.array->data());
       for (size_t c = 0; c < o.width; ++c)
         for (size_t i = lanes * o.bytes; i < lanes_.stride * o.bytes; ++i)
           if (p[c * lanes_.stride * o.bytes + i] != kPaint)
             broken(
-                "eval writes lane %zu of %s, column %zu, in a batch of %u: only lanes up to n rounded to 8 "
-                "may be touched; loop to in->n",
+                "eval writes lane %zu of %s, column %zu, in a batch of %u, beyond n rounded up to 8; loop to "
+                "in->n",
                 i / o.bytes, o.name, c, lanes_.n);
     }
   }
@@ -183,12 +180,10 @@ void asks_fenced(const Law &law, Lanes &lanes, Fenced::Place place) {
   const std::string trouble = Fenced::guard([&] { status = law.ops.eval(&batch.in(), &batch.out()); });
   law.subject.plugin->host().give_back_scratch();
   if (!trouble.empty())
-    broken(
-        "in a batch of %u contacts (stride %u) eval %s: over other data of a world; loop to in->n and step "
-        "columns by in->stride",
-        lanes.n, lanes.stride, trouble.c_str());
+    broken("in a batch of %u contacts (stride %u) eval %s; loop to in->n and step columns by in->stride",
+           lanes.n, lanes.stride, trouble.c_str());
   if (status != DFM_OK)
-    broken("eval returns %s for finite input, which would stop a world; answer every finite input",
+    broken("eval returns %s for finite input; return finite values for every finite input",
            dfm_status_name(status));
   batch.look();
 }
@@ -217,14 +212,14 @@ void asks_with_nulls(const Law &law, Lanes &whole) {
     const std::string trouble = Fenced::guard([&] { status = law.ops.eval(&b.in, &out); });
     law.subject.plugin->host().give_back_scratch();
     if (!trouble.empty() || status != DFM_OK)
-      broken("with %s%s eval %s: an output that is NULL is not wanted; check each pointer before writing",
+      broken("with %s%s eval %s; check each pointer for NULL before writing",
              alone ? "every output NULL but " : "the output NULL: ", names[one],
              trouble.empty() ? dfm_status_name(status) : trouble.c_str());
     for (uint32_t i = 0; out.ft && i < b.n; ++i)
       if (std::memcmp(&b.out_ft[i], &whole.out_ft[i], sizeof(double)) != 0)
         broken(
-            "with %s%s the force of lane %u is %.17g instead of %.17g N: an output must not depend on which "
-            "other outputs are requested",
+            "with %s%s the force of lane %u is %.17g instead of %.17g N; let no output depend on which "
+            "others are requested",
             alone ? "nothing wanted but " : "no ", names[one], i, b.out_ft[i], whole.out_ft[i]);
   }
 }
@@ -299,8 +294,8 @@ void load_and_unload(const Subject &subject) {
   plugin.close();
   if (const size_t n = plugin.host().pieces())
     broken(
-        "after it was unloaded %zu piece%s of the host's memory %s still allocated: every load would leak "
-        "as much; free them in release() or shutdown()",
+        "after it was unloaded %zu piece%s of the host's memory %s still allocated; free them in release() "
+        "or shutdown()",
         n, n == 1 ? "" : "s", n == 1 ? "is" : "are");
 }
 
@@ -327,25 +322,19 @@ std::string unloads_without_leak(const Subject &subject) {
   };
   if (const long left = each(&Use::heap); left >= kSmallestPiece)
     broken(
-        "each load-unload cycle leaves %ld bytes on the heap: a host that reloads the plugin would run out "
-        "of memory; free in shutdown() what the entry or prepare() allocated",
+        "each load-unload cycle leaves %ld bytes on the heap; free in shutdown() what the entry or prepare() "
+        "allocated",
         left);
   if (const long left = each(&Use::pages); left > 0)
-    broken(
-        "each load-unload cycle leaves %ld pages mapped: a host that reloads the plugin would run out of "
-        "memory; unmap in shutdown()",
-        left);
-  if (each(&Use::files) > 0)
-    broken(
-        "each load-unload cycle leaves a file open: a host that reloads the plugin would run out of files; "
-        "close in shutdown()");
+    broken("each load-unload cycle leaves %ld pages mapped; unmap in shutdown()", left);
+  if (each(&Use::files) > 0) broken("each load-unload cycle leaves a file open; close in shutdown()");
   const std::string path = std::string(subject.file);
   if (void *still = dlopen(path.find('/') == std::string::npos ? ("./" + path).c_str() : path.c_str(),
                            RTLD_NOW | RTLD_NOLOAD)) {
     dlclose(still);
     broken(
-        "it stays in memory after it was unloaded, so an edited law cannot be loaded in its place; build it "
-        "with deform_add_plugin (unique C++ symbols and -z nodelete keep a library)");
+        "it stays in memory after it was unloaded; build it with deform_add_plugin (unique C++ symbols and "
+        "-z nodelete keep a library)");
   }
   return text("%d cycles", kCycles);
 }
@@ -383,8 +372,8 @@ std::string sanitizer_finds_nothing(const Subject &subject) {
     work(t, alone[t]);
     if (std::memcmp(told[t].data(), alone[t].data(), told[t].size() * sizeof(double)) != 0)
       broken(
-          "evaluated on %d threads at once it gives other forces than on one: it writes data that batches "
-          "share; keep it in state slots, or in what prepare() makes and eval only reads",
+          "evaluated on %d threads at once it gives other forces than on one, so batches share data; keep it "
+          "in state slots, or in what prepare() makes and eval only reads",
           kThreads);
   }
   return text("%d threads", kThreads);
@@ -420,8 +409,8 @@ std::string writes_no_static(const Subject &subject) {
     if (!ours) broken("eval %s; touch only the arrays that are given", trouble.c_str());
     const std::string name = variable_at(subject.file, reinterpret_cast<uintptr_t>(at) - base);
     broken(
-        "eval writes the static variable %s, which threads and worlds share, so results depend on what else "
-        "runs; keep it in a state slot, or on the stack",
+        "eval writes the static variable %s, which threads and worlds share; keep it in a state slot, or on "
+        "the stack",
         name.empty() ? text("at %#zx of the file", reinterpret_cast<uintptr_t>(at) - base).c_str()
                      : ("\"" + name + "\"").c_str());
   };

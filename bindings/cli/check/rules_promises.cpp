@@ -69,8 +69,8 @@ void load_up(Masses &masses, const std::vector<double> &load) {
 double presliding_or_break(const Scales &s) {
   if (s.z > 0) return s.z;
   broken(
-      "the contact does not give elastically before it slides (a displacement leaves no force behind), so "
-      "there is no presliding; keep a bristle in a state slot, or drop the promise");
+      "a small displacement leaves no elastic force, so there is no presliding; keep a bristle in a state "
+      "slot, or drop the promise");
 }
 
 }  // namespace
@@ -93,8 +93,8 @@ std::string holds_below_threshold(const Subject &subject) {
     worst = std::max(worst, moved);
     if (!(moved < 1e-9))
       broken(
-          "held with %g of its limit of %.3g N it moves by %.3g m in 1000 s (1e-9 m allowed): a grip would "
-          "let go in time; the force at rest must not relax, and must not need a speed",
+          "under %g of its limit of %.3g N it moves by %.3g m in 1000 s (1e-9 m allowed); let the force at "
+          "rest neither relax nor need a speed",
           shares[i], s.level, moved);
   }
   return text("moved %.1e m in 1000 s", worst);
@@ -104,8 +104,8 @@ std::string falls_with_speed(const Subject &subject) {
   needs_promise(subject, "stribeck");
   const std::vector<double> speeds = decades(1e-5, 10, 8);
   return some_candidate(subject,
-                        "it promises stribeck, but %s for none of the parameters tried: no stick-slip would "
-                        "come of it; let the level fall from mu_S to mu_C with speed, or drop the promise",
+                        "it promises stribeck, but %s for none of the parameters tried; let the level fall "
+                        "from mu_S to mu_C with speed, or drop the promise",
                         [&](const Law &law, const Scales &s, std::string *why) -> std::string {
                           const std::vector<double> f = steady_force(law, s, speeds);
                           double top = 0, fall = 0;
@@ -120,15 +120,14 @@ std::string falls_with_speed(const Subject &subject) {
 
 std::string rises_at_high_speed(const Subject &subject) {
   needs_promise(subject, "viscous");
-  return some_candidate(
-      subject,
-      "it promises viscous, but %s for any of the parameters tried: nothing would slow a fast slide more "
-      "than a slow one; add a term that grows with speed, or drop the promise",
-      [&](const Law &law, const Scales &s, std::string *why) -> std::string {
-        const std::vector<double> f = steady_force(law, s, {10, 100});
-        *why = "the steady force does not rise between 10 and 100 m/s";
-        return f[1] > f[0] * (1 + 1e-9) ? text("%.3g N s/m", (f[1] - f[0]) / 90) : "";
-      });
+  return some_candidate(subject,
+                        "it promises viscous, but %s for any of the parameters tried; add a term that grows "
+                        "with speed, or drop the promise",
+                        [&](const Law &law, const Scales &s, std::string *why) -> std::string {
+                          const std::vector<double> f = steady_force(law, s, {10, 100});
+                          *why = "the steady force does not rise between 10 and 100 m/s";
+                          return f[1] > f[0] * (1 + 1e-9) ? text("%.3g N s/m", (f[1] - f[0]) / 90) : "";
+                        });
 }
 
 // ---- presliding -------------------------------------------------------------------------------------------
@@ -181,14 +180,13 @@ std::string presliding_is_displacement(const Subject &subject) {
   if (!(late <= 0.01 * s.level) || !(late <= 0.3 * early + 2e-5 * s.level))
     broken(
         "along one presliding path the force still changes by %.3g N when the rate falls from a tenth to a "
-        "hundredth (%.3g N before, of a level of %.3g N): it is a function of the rate, so a slow load "
-        "creeps; let slip path, not time, change the state",
+        "hundredth (%.3g N before, of a level of %.3g N); let slip path, not time, change the state",
         late, early, s.level);
   const double small = std::fabs(along(law, s, {0, 0.01 * z}, 1.0 / 30)[0]);
   if (!(small < 0.1 * s.level))
     broken(
-        "a hundredth of the presliding displacement meets %.3g N of %.3g N: the contact is rigid, not "
-        "presliding",
+        "a hundredth of the presliding displacement gives %.3g N of %.3g N, so the contact is rigid; make "
+        "the bristle softer, or drop the promise",
         small, s.level);
   return text("%.3g m, %.3g N/m, rate changes it by %.1e of the level", z, s.stiffness, late / s.level);
 }
@@ -208,8 +206,8 @@ std::string loop_has_area(const Subject &subject) {
   if (!(share > 1e-3))
     broken(
         "a loop of +-%.3g m, one and a half times the presliding displacement, takes %.3g J (%.2g of the "
-        "largest it could): it promises hysteresis, and vibration there would never die out; let the bristle "
-        "yield before the level, or drop the promise",
+        "largest possible), though it promises hysteresis; let the bristle yield before the level, or drop "
+        "the promise",
         amplitude, area, share);
   return text("%.0f %% of a full loop", 100 * share);
 }
@@ -248,8 +246,8 @@ std::string breaks_away(const Subject &subject) {
     return falls ? text("%.3g to %.3g of the kinetic level", peak.front() / *low, peak.back() / *low) : "";
   };
   return some_candidate(subject,
-                        "it promises breakaway, but %s, whatever the parameters tried: a jerk would need as "
-                        "much force as a slow pull; let the state lag behind the slip, or drop the promise",
+                        "it promises breakaway, but %s, for all parameters tried; let the state lag behind "
+                        "the slip, or drop the promise",
                         show);
 }
 
@@ -279,8 +277,7 @@ std::string does_not_drift(const Subject &subject) {
     if (!(drift <= 1e-6 * s.length()))
       broken(
           "a load of %g +- %g of its limit, which it should hold, moves it by %.3g m per cycle (elastic "
-          "displacement %.3g m): what vibrates would walk away; give the bristle a zone in which it is "
-          "purely elastic, or do not promise stiction",
+          "displacement %.3g m); give the bristle a purely elastic zone, or do not promise stiction",
           loads[i].bias, loads[i].amplitude, drift, s.length());
   }
   return text("%.1e m per cycle", worst);

@@ -64,18 +64,16 @@ std::string single_is_close(const Subject &subject) {
       }
     if (!(off <= kClose * scale))
       broken(
-          "%s forces in single precision are up to %.3g N off those in double, whose largest is %.3g N: more "
-          "than "
-          "rounding; compute the same forces",
+          "%s forces in single precision are up to %.3g N off those in double, whose largest is %.3g N; "
+          "compute the same forces",
           with(variant).c_str(), off, scale);
     if (const double rest = length(sum); !(rest <= kSum * all))
       broken(
-          "%s forces in single precision sum to %.3g N (%.3g N in all): a free body would drift; add each "
-          "force "
-          "and its reaction up in double, from the same rounded number",
+          "%s forces in single precision sum to %.3g N (absolute values: %.3g N); add up each force and its "
+          "reaction in double, from the same rounded number",
           with(variant).c_str(), rest, all);
     if (single_forces(body, *table) != found)
-      broken("%s forces in single precision differ when asked twice; let them depend on dfm_kin alone",
+      broken("%s forces in single precision differ between two calls; let them depend on dfm_kin only",
              with(variant).c_str());
   });
   if (!offered) skip("it does not offer " DFM_EXT_F32);

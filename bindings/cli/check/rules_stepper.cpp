@@ -91,7 +91,7 @@ std::string state_is_the_hosts(const Subject &subject) {
     if (!same_bits(one, other))
       broken(
           "%s a body that is saved after 8 steps and continues in a new instance differs 10 steps later from "
-          "one that was never saved (%g m): it keeps data that the host cannot save; declare it as state "
+          "one that was never saved (%g m), so it keeps data that the host cannot save; declare it as state "
           "slots, or compute it from positions and velocities",
           with(variant).c_str(), [&] {
             double most = 0;
@@ -114,8 +114,8 @@ std::string state_is_the_hosts(const Subject &subject) {
     run(again, 3, h);
     if (!same_bits(again, other))
       broken(
-          "%s a body that is taken back 10 steps then moves differently: rollback and replay would not be "
-          "what happened; declare what it keeps as state slots, and share nothing between instances",
+          "%s a body that is taken back 10 steps then moves differently; declare what it keeps as state "
+          "slots, and share nothing between instances",
           with(variant).c_str());
   });
 }
@@ -154,9 +154,8 @@ std::string cost_grows_with_cells(const Subject &subject) {
   // 27 times as many cells: what grows with their square costs 27 times as much for each
   if (!(many <= 6 * few))
     broken(
-        "a cell costs %.3g us in a body of 384 cells and %.3g us in one of 10,368: the cost grows faster "
-        "than "
-        "the body, and a body of a million cells would never end a step; visit each cell and its points once",
+        "a cell costs %.3g us in a body of 384 cells and %.3g us in one of 10,368, so the cost grows faster "
+        "than the body; visit each cell and its points once",
         1e6 * few, 1e6 * many);
   return text("%.3g us for each cell", 1e6 * many);
 }
@@ -219,21 +218,19 @@ std::string bound_is_honest(const Subject &subject) {
       if (!(h > 0) || h > 1e6)
         broken(
             "%s bound allows explicit steps of %g s for a free body, which is no bound; add row sums of the "
-            "stiffness, or a bound by cell",
+            "stiffness",
             with(variant).c_str(), h);
       body.dt = h;
       const double over = quotient(body, h, random);
       if (!(over <= 1 + 1e-6))
         broken(
-            "%s, points shaken by %g of an edge, bound allows explicit steps of %g s, which is %.3g of what "
-            "is "
-            "stable: bodies would explode; let row sums cover the stiffness and twice the dampers",
+            "%s, points shaken by %g of an edge, bound allows explicit steps of %g s, which is %.3g of the "
+            "stable step, so bodies would explode; let row sums cover the stiffness and twice the dampers",
             with(variant).c_str(), share, h, std::sqrt(over));
       if (share == 0 && !(over >= 1.0 / 16))
         broken(
-            "%s bound allows explicit steps of %g s where %g s are stable, so every step costs %.0f times "
-            "what "
-            "it must; sum the rows of the stiffness of each point, no more",
+            "%s bound allows explicit steps of %g s where %g s are stable, so a run needs %.0f times as many "
+            "steps; sum only the rows of the stiffness of each point",
             with(variant).c_str(), h, h / std::sqrt(over), 1 / std::sqrt(over));
       narrow = std::max(narrow, 1 / std::sqrt(over));
       wide = std::min(wide, 1 / std::sqrt(over));
@@ -322,9 +319,8 @@ std::string commit_is_predict_and_respond(const Subject &subject) {
     // positions are rounded, and mean velocities are their differences
     if (!(most <= 1e-10 * speed + 1e-14 * way / body.dt))
       broken(
-          "%s commit moves a surfel by a mean velocity that is off predict plus respond by %g of %g m/s: "
-          "contacts would act on other motions than they computed, and bodies would sink or stick; make "
-          "commit use the velocities of predict and respond",
+          "%s commit moves a surfel by a mean velocity that is off predict plus respond by %g of %g m/s; "
+          "make commit use the velocities of predict and respond",
           with(variant).c_str(), most, speed);
   });
   return text("%s, %.0e at most", asked.c_str(), worst);
@@ -337,14 +333,13 @@ std::string response_is_an_operator(const Subject &subject) {
     const std::vector<double> r = response_of(body);
     double most = 0;
     for (const double a : r) most = std::max(most, std::fabs(a));
-    if (!(most > 0))
-      broken("respond always returns 0, so no contact can hold the body; return the response to impulses");
+    if (!(most > 0)) broken("respond always returns 0; return the response to impulses");
     for (size_t i = 0; i < width; ++i)
       for (size_t j = 0; j < i; ++j)
         if (!(std::fabs(r[i * width + j] - r[j * width + i]) <= 1e-10 * most))
           broken(
-              "%s respond is not symmetric: an impulse at surfel %zu moves surfel %zu by %.12g 1/kg and the "
-              "other way round by %.12g: contacts would create energy; apply the same coupling on both sides",
+              "%s respond is not symmetric: an impulse at surfel %zu moves surfel %zu by %.12g 1/kg, and the "
+              "reverse gives %.12g; apply the same coupling on both sides",
               with(variant).c_str(), j / 3, i / 3, r[i * width + j], r[j * width + i]);
     std::vector<double> p(width), sum(width, 0.0);
     for (double &a : p) a = random.uniform(-1, 1);
@@ -356,18 +351,15 @@ std::string response_is_an_operator(const Subject &subject) {
       work += p[i] * whole[i];
       if (!(std::fabs(whole[i] - sum[i]) <= 1e-10 * most * std::sqrt(double(width)) * 10))
         broken(
-            "%s respond is not linear: to all impulses at once it answers %.12g m/s, and one by one %.12g "
-            "m/s: contacts would not converge; freeze what depends on the state in predict",
+            "%s respond is not linear: all impulses at once give %.12g m/s, and one by one %.12g m/s; "
+            "compute what depends on the state in predict",
             with(variant).c_str(), whole[i], sum[i]);
     }
     std::vector<double> against = r;
     for (double &a : against) a = -a;
     if (!(work >= 0) || !below(against, width, 1e-10 * most))
-      broken(
-          "%s there are impulses p with p . respond(p) < 0: pressing would pull the body nearer, and "
-          "contacts "
-          "explode; let respond be what impulses do to a body with mass",
-          with(variant).c_str());
+      broken("%s there are impulses p with p . respond(p) < 0; make respond positive semidefinite",
+             with(variant).c_str());
     if (body.stepper->size < offsetof(dfm_stepper, respond_many) + sizeof(void *) ||
         !body.stepper->respond_many)
       return;
@@ -381,10 +373,8 @@ std::string response_is_an_operator(const Subject &subject) {
     for (size_t i = 0; i < width; ++i)
       for (size_t c = 0; c < width; ++c)
         if (!(std::fabs(many[c * width + i] - r[i * width + c]) <= 1e-12 * most))
-          broken(
-              "%s respond_many answers %.12g 1/kg where respond answers %.12g: results would depend on how "
-              "contacts are grouped; let one call the other",
-              with(variant).c_str(), many[c * width + i], r[i * width + c]);
+          broken("%s respond_many gives %.12g 1/kg where respond gives %.12g; let one call the other",
+                 with(variant).c_str(), many[c * width + i], r[i * width + c]);
   });
 }
 
@@ -417,8 +407,7 @@ std::string diagonal_bounds_response(const Subject &subject) {
       if (!good)
         broken(
             "%s the diagonal of surfel %zu (%.6g %.6g %.6g 1/kg) is below what respond answers there (%.6g "
-            "%.6g %.6g 1/kg): sweeps over contacts would overshoot and diverge; answer the block itself, or "
-            "more",
+            "%.6g %.6g 1/kg); return the block itself, or more",
             with(variant).c_str(), s, w[9 * s], w[9 * s + 4], w[9 * s + 8], r[(3 * s) * width + 3 * s],
             r[(3 * s + 1) * width + 3 * s + 1], r[(3 * s + 2) * width + 3 * s + 2]);
     }
@@ -461,10 +450,9 @@ std::string cut_does_not_matter(const Subject &subject) {
     if (const std::vector<double> again = answers(cut);
         std::memcmp(told.data(), again.data(), told.size() * sizeof(double)) != 0)
       broken(
-          "two steps of a body of %u cells have other bits when parallel_for cuts its work otherwise: "
-          "results "
-          "would change with the number of threads; put partial sums into slot begin/grain, add them in the "
-          "order of slots, and let no two pieces write one place",
+          "two steps of a body of %u cells have other bits when parallel_for divides its work otherwise; put "
+          "partial sums into slot begin/grain, add them in the order of slots, and let no two pieces write "
+          "one place",
           solid.ncell());
   }
   return calls ? text("%u cells", solid.ncell()) : text("%u cells, no work handed out", solid.ncell());

@@ -175,13 +175,10 @@ Verdict run_here(const Rule &rule, const Subject &subject) {
   } catch (const Skipped &s) {
     return {Result::skip, s.what()};
   } catch (const std::exception &e) {
-    return {Result::fail, text("an exception left the plugin (%s), which ends a program written in C; wrap "
-                               "its entries in dfm::plugin::guarded",
-                               e.what())};
-  } catch (...) {
     return {Result::fail,
-            "an exception left the plugin, which ends a program written in C; wrap its entries in "
-            "dfm::plugin::guarded"};
+            text("an exception left the plugin (%s); wrap its entries in dfm::plugin::guarded", e.what())};
+  } catch (...) {
+    return {Result::fail, "an exception left the plugin; wrap its entries in dfm::plugin::guarded"};
   }
 }
 

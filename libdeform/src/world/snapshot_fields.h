@@ -1,11 +1,11 @@
-// The fields of a snapshot: everything that later results depend on, and nothing else. Candidate lists are not
-// included: contacts come from exact geometry, so rebuilt lists give the same contacts (broad/). What the host
-// may change between two steps (loads, holds, motions, gravity, filters, friction rules, runtime parameters)
-// is state too.
+// The fields of a snapshot: everything that later results depend on, and nothing else. Candidate lists are
+// not included: contacts come from exact geometry, so rebuilt lists give the same contacts (broad/). What the
+// host may change between two steps (loads, holds, motions, gravity, filters, friction rules, runtime
+// parameters) is state too.
 //
 // A field is one line in one of the ..._fields() functions: its name, its location and its valid values.
-// Writing (snapshot.cpp), reading and checking (snapshot_restore.cpp) use this line; conditions between fields
-// are in check().
+// Writing (snapshot.cpp), reading and checking (snapshot_restore.cpp) use this line; conditions between
+// fields are in check().
 #pragma once
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
-// Restores a snapshot. Everything is read and checked into a Staged before the world changes. Then the two are
-// exchanged, which cannot fail; if the derived tables cannot be made, they are exchanged back.
+// Restores a snapshot. Everything is read and checked into a Staged before the world changes. Then the two
+// are exchanged, which cannot fail; if the derived tables cannot be made, they are exchanged back.
 #include <algorithm>
 #include <cstring>
 #include <numeric>

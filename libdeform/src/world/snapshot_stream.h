@@ -1,5 +1,5 @@
-// Writing, reading and checking the bytes of a snapshot. One list of fields (snapshot_fields.h) is used for both
-// directions: each line gives name, location and valid values of a field.
+// Writing, reading and checking the bytes of a snapshot. One list of fields (snapshot_fields.h) is used for
+// both directions: each line gives name, location and valid values of a field.
 //
 //   bytes 0  "dfmsnap" 0 | u32 version | u32 0 | u64 length of all | u64 hash of what must be the same in
 //   both worlds | u64 checksum | fields
