@@ -19,7 +19,7 @@ namespace dfm {
 
 enum ContactKind : uint8_t { kVertexFace = 0, kEdgeEdge = 1, kPrimitive = 2 };
 
-// One contact's geometry, as narrow/ emits it. 160 bytes, plain.
+// One contact's geometry, as narrow/ emits it. Plain.
 struct ContactPoint {
   // persistent: (kind, a's feature, b's body or obstacle, b's patch); unique within a sub-step
   uint64_t key;
@@ -32,10 +32,12 @@ struct ContactPoint {
   uint32_t lender;
   uint32_t node[4];
   double weight[4];
-  double point[3];     // m, midway between the closest points
-  double normal[3];    // unit, from b to a
-  double distance;     // m, true distance, >= 0; negative: depth below b's surface, for recovery
-  double area;         // m2
+  double point[3];   // m, midway between the closest points
+  double normal[3];  // unit, from b to a
+  double distance;   // m, true distance, >= 0; negative: depth below b's surface, for recovery
+  double area;       // m2
+  // m, >= 0: how far below the rest distance a load may press this contact (doc/decisions/0416)
+  double give;
   double velocity[3];  // m/s of the obstacle where a's closest point is, belt included; 0 for bodies
 };
 

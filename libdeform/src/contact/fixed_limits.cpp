@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "contact/friction_kernel.h"
+
 namespace dfm {
 
 ExcessWork excess_work(const ContactRows &rows, const RowsPart &part) {
@@ -15,6 +17,7 @@ ExcessWork excess_work(const ContactRows &rows, const RowsPart &part) {
     out.work += 0.5 * dot(l, rows.velocity(i) - free) + 0.5 * soft * norm2(l) + start;
     out.scale += std::fabs(start);
   };
+  // Without what contacts give (rows.yields), which only dissipates.
   each_row(part.contacts, [&](uint32_t i) { add(i, {rows.rate[i], 0, 0}, 0); });
   each_row(part.bonds, [&](uint32_t i) {
     const ContactRows::BondRow &bond = rows.bond[i - rows.n];
@@ -45,7 +48,8 @@ void sweep_fixed(ContactRows &rows, const RowsPart &part, const double *limit) {
     if (!(rows.wn[i] > 0)) return;  // both sides are held: impulses have no effect
     double *const l = &rows.impulse[size_t(i) * 3];
     const Vec3 u = rows.velocity(i);
-    const double ln = std::max(0.0, l[0] - (u.x + rows.rate[i]) / rows.wn[i]), d = ln - l[0];
+    const double ln = normal_impulse(l[0], u.x + rows.rate[i], rows.wn[i], &rows.yields[size_t(i) * 2]),
+                 d = ln - l[0];
     double t1 = 0, t2 = 0;
     if (most > 0 && rows.wt[i] > 0) {
       t1 = l[1] - (u.y + rows.cross[2 * size_t(i)] * d) / rows.wt[i];

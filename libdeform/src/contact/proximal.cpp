@@ -138,7 +138,14 @@ bool Proximal::answer(const ContactRows &rows, const ContactState &s, uint32_t k
   std::fill_n(l, 3, 0.0);
   std::fill_n(d, 9, 0.0);
   if (!(rows.wn[i] > 0)) return false;
-  const double rn = rho / rows.wn[i], pressed = l0[0] - rn * (u[0] + rows.rate[i]);
+  double rn = rho / rows.wn[i];
+  const double *const yields = &rows.yields[size_t(2) * i];
+  const double closing = u[0] + rows.rate[i], share = 1 / (1 + rn * yields[0]);
+  double pressed = l0[0] - rn * (closing + yields[1]);
+  if (const double gives = share * (l0[0] - rn * closing); gives >= pressed) {
+    pressed = gives;
+    rn *= share;
+  }
   if (!(pressed > 0)) return false;
   l[0] = pressed;
   d[0] = -rn;

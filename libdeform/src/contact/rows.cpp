@@ -11,8 +11,8 @@ ContactRows::ContactRows(const Memory &m)
     : kernels_(dense_kernels()),
       loops_(doubles_at_once() >= 4 ? contact_kernels_avx2() : contact_kernels_sse2()) {
   use_memory(m, across_, begin, dof, weight, y, y_free, alone, source, point, block, blocks, response_,
-             given_, frame, drive, rate, wn, wt, cross, impulse, bond, dof_of_point_, dof_of_node_, place_,
-             rigid, arm, dof_of_group_, every_block_);
+             given_, frame, drive, rate, yields, wn, wt, cross, impulse, bond, dof_of_point_, dof_of_node_,
+             place_, rigid, arm, dof_of_group_, every_block_);
 }
 
 // Of the dofs from `first` on.
@@ -244,6 +244,9 @@ constexpr double kCloses = 0.2;
 // by slip times turn in every sub-step, which the contact's straight motion does not see. Deeper than 0.4 d_c
 // the whole of a further depth is closed in the sub-step: (1 - kCloses) 0.4 of d_c is what may stay.
 constexpr double kStays = 0.32;
+// Softness of contacts that give, in units of W_nn. With 0.3, 1, 3 and 10, five stacked blocks left 261, 16,
+// 0 and 1 of 2,880 sub-steps at the limit on sweeps (doc/decisions/0416).
+constexpr double kSoft = 3;
 // Surfaces that are through each other already (a start state) take their time: so much of d_c per sub-step.
 constexpr double kOpens = 0.1;
 
@@ -318,6 +321,7 @@ void ContactRows::finish(std::span<const ContactPoint> contacts, const double *t
   frame.resize(size_t(all()) * 9);
   drive.resize(size_t(all()) * 3);
   rate.resize(n);
+  yields.resize(size_t(n) * 2);
   wn.resize(all());
   wt.resize(all());
   cross.resize(size_t(n) * 2);
@@ -336,6 +340,9 @@ void ContactRows::finish(std::span<const ContactPoint> contacts, const double *t
     rate[i] = bias_velocity(contacts[i].distance, offset, h, planned, most);
     const Vec3 w0 = diagonal(i, normal);
     wn[i] = dot(normal, w0);
+    // min(c l, m) balances the opening speed of a depth `give` at most: no load presses it deeper.
+    yields[2 * size_t(i)] = contacts[i].give > 0 ? kSoft * wn[i] : 0;
+    yields[2 * size_t(i) + 1] = kCloses * contacts[i].give / planned;
     cross[2 * size_t(i)] = dot(t1, w0);
     cross[2 * size_t(i) + 1] = dot(t2, w0);
     const Vec3 w1 = diagonal(i, t1), w2 = diagonal(i, t2);

@@ -72,8 +72,11 @@ struct ContactRows {
 
   // [all,9] normal, tangent, normal x tangent; of a bond the world's axes. It and `drive` have a vector more.
   Array<double> frame;
-  Array<double> drive;   // [all,3] obstacle velocity in the frame
-  Array<double> rate;    // [n] m/s: gap / h; a depth 0.2 gap / h, at least -0.1 d_c / h
+  Array<double> drive;  // [all,3] obstacle velocity in the frame
+  Array<double> rate;   // [n] m/s: gap / h; a depth 0.2 gap / h, at least -0.1 d_c / h
+  // [n,2] Of a contact that gives way under its load l (ContactPoint::give): the softness c, 1/kg, and the
+  // largest effect m, m/s, of min(c l, m), which is added to u_n + rate. 0, 0 for all others.
+  Array<double> yields;
   Array<double> wn, wt;  // [all] 1/kg: W_nn; largest eigenvalue of W_tt, of a bond the larger of W_yy, W_zz
   // [n,2] 1/kg: W_tn, the slip that a unit normal impulse makes at its own contact
   Array<double> cross;

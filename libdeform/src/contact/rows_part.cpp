@@ -18,7 +18,8 @@ RowsView ContactRows::view(RowRun r) const {
           rate.data() + i,
           wn.data() + i,
           wt.data() + i,
-          cross.data() + 2 * i};
+          cross.data() + 2 * i,
+          yields.data() + 2 * i};
 }
 
 RowsPart ContactRows::whole() {

@@ -17,7 +17,8 @@ Pair friction_impulse(const ContactRows &rows, const LawView &law, uint32_t i, d
 }
 
 double normal_impulse(const ContactRows &rows, uint32_t i, double un) {
-  return std::max(0.0, rows.impulse[size_t(i) * 3] - (un + rows.rate[i]) / rows.wn[i]);
+  return normal_impulse(rows.impulse[size_t(i) * 3], un + rows.rate[i], rows.wn[i],
+                        &rows.yields[size_t(i) * 2]);
 }
 
 }  // namespace
@@ -62,7 +63,8 @@ void sweep_answers(ContactRows &rows, const RowsPart &part, const LawView &law, 
     if (!(rows.wn[i] > 0)) return;  // both sides are held: nothing an impulse could change
     double *const l = &rows.impulse[size_t(i) * 3];
     const Vec3 u = rows.velocity(i);
-    const bool stays = kLeaves && std::fabs(u.x + rows.rate[i]) <= leave;
+    const bool stays =
+        kLeaves && std::fabs(u.x + rows.rate[i] + given(l[0], &rows.yields[size_t(i) * 2])) <= leave;
     const double ln = stays ? l[0] : normal_impulse(rows, i, u.x), d = ln - l[0];
     if (ln == 0 && l[0] == 0 && l[1] == 0 && l[2] == 0) return;
     Pair t{0, 0};
@@ -222,7 +224,9 @@ void Momentum::follow(ContactRows &rows, const RowsPart &part) {
 namespace {
 
 double normal_residual(const ContactRows &rows, uint32_t i, Vec3 u) {
-  return std::fabs(std::min(rows.wn[i] * rows.impulse[size_t(i) * 3], u.x + rows.rate[i]));
+  return std::fabs(
+      std::min(rows.wn[i] * rows.impulse[size_t(i) * 3],
+               u.x + rows.rate[i] + given(rows.impulse[size_t(i) * 3], &rows.yields[size_t(i) * 2])));
 }
 
 double tangent_residual(const ContactRows &rows, uint32_t i, Pair law) {

@@ -9,6 +9,7 @@
 // be hit again, for ever (doc/decisions/0035-edges-that-bear.md). Between hollow edges the lines are further
 // apart than the surfaces, so such a contact keeps nothing away that the others would let come.
 #include <algorithm>
+#include <cmath>
 
 #include "geometry/closest.h"
 #include "narrow/detail.h"
@@ -46,6 +47,10 @@ int place_on_edge(double at, double slide) {
 
 namespace {
 
+// Of the rest distance: with the depth that a contact may keep before it opens at once (contact/rows.cpp), it
+// stays above the distance at which the guard acts, half of the rest distance.
+constexpr double kGive = 0.3;
+
 // Does a vertex this near an edge make a contact of its own there: over one of the edge's faces, or off the
 // edge in the vertex's cone of normals?
 bool end_touches(const Surface &surface, uint32_t vertex, Vec3 from, Vec3 to, const EdgeFaces &faces) {
@@ -55,6 +60,24 @@ bool end_touches(const Surface &surface, uint32_t vertex, Vec3 from, Vec3 to, co
   const double distance = norm(off);
   if (dot(off, faces.inward[0]) < 0 || dot(off, faces.inward[1]) < 0 || !(distance > 0)) return true;
   return vertex_cone_has(surface, vertex, (1 / distance) * off);
+}
+
+// m, how far a surface rises at an edge (or dips, if it is concave) above the middle of a straight edge of
+// this length and direction that crosses it.
+double rise(const EdgeFaces &faces, Vec3 outward, Vec3 across, double length) {
+  if (!(norm2(faces.normal[0]) > 0) || !(norm2(faces.normal[1]) > 0)) return HUGE_VAL;  // a rim
+  const double turn = dot(faces.inward[0] + faces.inward[1], outward);
+  return 0.25 * length * std::fabs(turn) * norm(cross(faces.along, across));
+}
+
+// m, how far a crossing may give way under load (doc/decisions/0416). Where one of the edges lies in a flat
+// face, the distance of the surfaces is linear along the other edge, so that the crossing is no minimum:
+// contacts of surfels and of rims hold the surfaces apart, and the crossing only repeats them. Not so where
+// both edges are rims. Faces of a cut touch at the rest distance of their surfaces, which were set back, and
+// must not come nearer.
+double give(const Surface &sa, const Surface &sb, double rise_a, double rise_b, double offset) {
+  if (sa.back > 0 || sb.back > 0) return 0;
+  return kGive * offset * std::clamp(2 - std::min(rise_a, rise_b) / offset, 0.0, 1.0);
 }
 
 }  // namespace
@@ -135,6 +158,8 @@ void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out) {
     add_node(c, pair.b->first_node + eb[0], edge_t - 1);
     add_node(c, pair.b->first_node + eb[1], -edge_t);
     place(c, p0 + edge_s * u, q0 + edge_t * w, normal, distance);
+    c.give = give(sa, sb, rise(fa, -normal, fb.along, std::sqrt(ww)),
+                  rise(fb, normal, fa.along, std::sqrt(uu)), pair.offset);
     out.push_back(c);
   }
   const auto patch = [&](const ContactPoint &c) {

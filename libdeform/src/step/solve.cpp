@@ -78,6 +78,10 @@ void make_rows(World &w, StepContext &step) {
     step.state.area[i] = c.area;
   }
   if (!w.pairs.zone_table.empty()) set_zone_laws(w, step.contacts, step.state.law);
+  // Laws with memory count by area. A crossing has its share of it, so it has to bear its share of the load.
+  if (nstate > 0)
+    for (uint32_t i = 0; i < n; ++i)
+      if (w.pairs.laws[step.state.law[i]]->nstate > 0) step.contacts[i].give = 0;
   take_choices(step);
   if (step.rigid_again) step.best_impulse.assign(step.rows.impulse.begin(), step.rows.impulse.end());
   make_bonds(w, step, step.rigid_again || step.guard.resolving);

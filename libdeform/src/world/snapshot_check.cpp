@@ -76,9 +76,9 @@ bool good_report(const Staged &t, const World &w) {
   if (r.n != t.store.n) return false;
   for (uint32_t i = 0; i < r.n; ++i) {
     const ContactPoint &c = r.contacts[i];
-    const double *const values[] = {c.weight, c.point, c.normal, &c.distance, &c.area, c.velocity};
-    const size_t counts[] = {4, 3, 3, 1, 1, 3};
-    for (int k = 0; k < 6; ++k)
+    const double *const values[] = {c.weight, c.point, c.normal, &c.distance, &c.area, c.velocity, &c.give};
+    const size_t counts[] = {4, 3, 3, 1, 1, 3, 1};
+    for (int k = 0; k < 7; ++k)
       if (!must::all_finite(values[k], counts[k])) return false;
     if (c.key != t.store.key[i] || c.kind > kPrimitive || c.obstacle > 1 || c.nnode > 4 || c.type_a > 2)
       return false;

@@ -140,3 +140,27 @@ TEST(Proximal, LoadOnTheFartherOfEqualContacts_IsHandedOver) {
   EXPECT_EQ(rows.impulse, impulse);
   test::expect_near(rows.velocity(2), {0, 0, 0}, 1e-12);
 }
+
+// Equal contacts share a load in any way. If some of them give way under it, those that do not carry it all.
+TEST(Sweep, LoadOnContactsThatGive_IsHandedToOneThatDoesNot) {
+  for (const bool gives : {false, true}) {
+    Equal swept, strode;
+    for (Equal *e : {&swept, &strode}) {
+      e->rows.rate.assign(3, 0.0);
+      for (size_t i = 1; gives && i < 3; ++i) {
+        e->rows.yields[2 * i] = 3 * e->rows.wn[i];
+        e->rows.yields[2 * i + 1] = 1;  // m/s
+      }
+    }
+    for (int k = 0; k < 100; ++k) sweep(swept.rows, swept.rows.whole(), swept.law, RowsCase::kStep);
+    Proximal p{Memory::standard()};
+    ASSERT_EQ(p.find_parts(strode.rows, strode.rows.whole(), kNobody), 1u);
+    ASSERT_TRUE(p.take(strode.rows, 0));
+    for (int k = 0; k < 10; ++k) ASSERT_TRUE(p.stride(strode.rows, strode.law, RowsCase::kStep, 30)) << k;
+    for (Equal *e : {&swept, &strode}) {
+      EXPECT_LT(e->left(), 1e-9) << gives;
+      EXPECT_NEAR(e->rows.impulse[6], gives ? 0 : e->taken.x, 1e-9) << gives;
+      EXPECT_NEAR(e->rows.impulse[0], gives ? e->taken.x : 0, 1e-9) << gives;
+    }
+  }
+}

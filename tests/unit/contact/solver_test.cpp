@@ -39,6 +39,7 @@ struct Groove {
     rows.frame = {s, 0, s, s, 0, -s, 0, 1, 0, -s, 0, s, -s, 0, -s, 0, -1, 0};
     rows.drive.assign(6, 0);
     rows.rate.assign(2, 0);
+    rows.yields.assign(4, 0);
     rows.wn.assign(2, 1);
     rows.wt.assign(2, 1);
     rows.cross.assign(4, 0);
@@ -135,6 +136,22 @@ TEST(Solver, OnePointThatLeaves_FeelsNothing) {
   Problem p({4}, 0.6, {{-1, 0.3, 0.4}});
   p.pass(1);
   expect_near(p.impulse(0), {}, 0);
+}
+
+// Where the contact gives way by min(c l, m) under the impulse l, it leaves that approach: a point that comes
+// at 1 m/s, with c = 3 / m, keeps 3/4 m/s, or the largest effect.
+TEST(Solver, OnePointThatMeetsAContactThatGives_KeepsWhatItGives) {
+  for (const double most : {0.0, 0.3, 0.7, 0.8, 2.0}) {
+    Problem p({4}, 0.6, {{1 / 1.75, 0, 0}});
+    p.rows.yields = {3 * 1.75, most};
+    p.pass(1);
+    const double left = std::min(0.75, most);
+    EXPECT_NEAR(p.impulse(0).x, (1 - left) / 1.75, 1e-15) << most;
+    EXPECT_NEAR(p.rows.velocity(0).x, -left, 1e-15) << most;
+    const test::SameTolerance tolerance{1, 1e-9, 1e-9, 1e-9};
+    EXPECT_LT(inner_residual(p.rows, p.rows.whole(), p.state, RowsCase::kStep, tolerance).normal, 1e-15)
+        << most;
+  }
 }
 
 // The normal impulse p_n = -u_n / W_nn changes the slip by W_tn p_n, and friction answers that: in the same
