@@ -36,7 +36,7 @@ TEST(FrictionRig, BrakedMass_StopsWhereEnergySays) {
   }
 }
 
-TEST(FrictionRig, SteadyPush_AcceleratesByWhatIsLeft) {
+TEST(FrictionRig, SteadyPush_AcceleratesByTheNetForce) {
   const Outcome out = run(example("steady_push"));
   const std::vector<double> t = out.rows.column("t"), x = out.rows.column("x"), v = out.rows.column("v");
   for (size_t i = 0; i < t.size(); ++i) {

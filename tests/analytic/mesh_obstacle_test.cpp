@@ -219,7 +219,7 @@ TEST(MeshObstacle, SpikeUnderFace_CarriesIt) {
 
 // Beside an open mesh there is no inside: what hangs over its rim, or passes below it sideways,
 // is left alone.
-TEST(MeshObstacle, OpenRim_PullsNothing) {
+TEST(MeshObstacle, OpenRim_ExertsNoForce) {
   Block b({0, 0, 0});
   const test::Triangles sheet = test::height_field(0.1, 1, flat);  // coarse: it would pull back from 50 mm
   dfm_obstacle_def d = test::mesh_def("sheet", sheet);

@@ -174,7 +174,7 @@ TEST(SelfContact, LegsPressedTogether_DoNotCreep) {
   EXPECT_LT(creep, 1e-7) << "m/s";
 }
 
-TEST(SelfContact, NothingTouchesAtRest_HoweverItMoves) {
+TEST(SelfContact, RestShape_HasNoContactInAnyRigidMotion) {
   const test::Context c;
   struct {
     const char *kind;

@@ -246,7 +246,7 @@ TEST(StaticContact, PressedThenMoved_IsNotMovedThenPressed) {
   dfm_world_destroy(w);
 }
 
-TEST(StaticContact, WhereNoRestIsFound_NothingHasChanged) {
+TEST(StaticContact, WithoutAnEquilibrium_NothingChanges) {
   const double a = 26.5 * M_PI / 180;
   test::Context context;
   const dfm_world w = test::make_world(context, {kG * std::sin(a), 0, -kG * std::cos(a)});

@@ -103,7 +103,7 @@ constexpr Case kCases[] = {{"msm", DFM_INTEGRATOR_SYMPLECTIC_EULER},
 }  // namespace
 
 // What hangs pulls with its weight, whatever moves it, and stays where it is held.
-TEST(Attach, WhatHangs_PullsWithItsWeight) {
+TEST(Attach, HangingBody_PullsWithItsWeight) {
   for (const Case &c : kCases) {
     SCOPED_TRACE(std::string(c.model) + " " + std::to_string(c.integrator));
     World s;
@@ -370,7 +370,7 @@ TEST(Attach, Snapshot_GoesOnWithTheSameBits) {
   EXPECT_EQ(dfm_world_hash(a.w), hash);
 }
 
-TEST(Attach, WhatHangs_SleepsAndWakesWithItsHook) {
+TEST(Attach, HangingBody_SleepsAndWakesWithItsSupport) {
   World s;
   const dfm_obstacle hook = s.hook();
   const dfm_body beam = s.beam("msm");

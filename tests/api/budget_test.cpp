@@ -145,7 +145,7 @@ TEST(Budget, ThatCheapensAStep_IsToldAndIsTheSameWithAnyThreads) {
   EXPECT_EQ(hash[0], hash[1]);
 }
 
-TEST(Budget, OfTimeThatNothingFitsIn_DiscardsTheStep) {
+TEST(Budget, OfTooLittleTime_DiscardsTheStep) {
   Busy b;
   const Seen before(b.world);
   b.set_work(0, 1e-9);

@@ -153,7 +153,7 @@ TEST(Cut, ToSingleCells_AllStayWithTheirMass) {
   }
 }
 
-TEST(Cut, AllCells_LeaveABodyThatIsOnlyAName) {
+TEST(Cut, RemovingAllCells_LeavesAnEmptyBody) {
   for (const char *model : kModels) {
     test::Context context;
     test::Stack s = test::make_stack(context);

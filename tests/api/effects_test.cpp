@@ -201,7 +201,7 @@ TEST(Effects, ThatParametersDoNotCallFor_AreNotListedByAuto) {
         << not_there << ": " << effects;
 }
 
-TEST(Effects, ThatNothingProvides_AreRefusedWithThoseWhoCould) {
+TEST(Effects, WithoutAProvider_AreRefusedWithPossibleProviders) {
   test::Context c;
   dfm_world w = 0;
   Options o = everything();

@@ -533,7 +533,7 @@ TEST(Handles, NullOrMadeUp_AreRefusedByEveryCall) {
 }
 
 // The lists above are complete: a function that joins the headers joins them.
-TEST(Handles, EveryFunctionThatTakesOne_IsTriedHere) {
+TEST(Handles, EveryFunctionWithAHandle_IsTested) {
   std::multiset<std::string> tried{"world_interrupt"};  // looks at the kind alone: below
   for (const Taker &taker : takers())
     for (const auto &[name, call] : taker.calls) tried.insert(name);
@@ -609,7 +609,7 @@ TEST(Handles, AfterTheirObjectWent_AreRefusedThoughTheSlotIsUsedAgain) {
   test::ok(dfm_body_get_info(s.lower, &info));
 }
 
-TEST(Handles, WhenAWorldGoes_AllThatWasInItIsStale) {
+TEST(Handles, AfterAWorldIsDestroyed_ItsHandlesAreStale) {
   test::Context c;
   const test::Stack s = test::make_stack(c);
   dfm_material material = 0;
@@ -624,7 +624,7 @@ TEST(Handles, WhenAWorldGoes_AllThatWasInItIsStale) {
   test::run(other.world, 2e-3, 1e-3);  // the world beside it lives
 }
 
-TEST(Handles, WhenTheContextGoesFirst_EveryHandleIsStale) {
+TEST(Handles, AfterTheContextIsDestroyed_EveryHandleIsStale) {
   test::Stack s;
   dfm_law law = 0;
   dfm_tetmesh mesh = 0;

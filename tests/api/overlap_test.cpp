@@ -74,7 +74,7 @@ TEST(Overlap, OfTwoBallsAtAnyDistance_ThrowsNothingAndSolvesNothing) {
   }
 }
 
-TEST(Overlap, OfPairThatComesApart_TouchesFromThenOn) {
+TEST(Overlap, OfPairThatSeparates_HasContactAfterwards) {
   test::Context c;
   const dfm_world w = test::make_world(c, {});
   const dfm_body a = ball(c, w, "a", {}), b = ball(c, w, "b", {0.15, 0, 0});

@@ -260,7 +260,7 @@ TEST(SceneErrors, OutputThatCannotBeWritten_IsRefused) {
                  "a file has the unknown way of cutting");
 }
 
-TEST(SceneApi, ErrorsLeaveNothingBehind) {
+TEST(SceneApi, Errors_LeakNothing) {
   test::Context context;
   dfm_scene s = 77;
   dfm_world w = 77;

@@ -105,7 +105,7 @@ INSTANTIATE_TEST_SUITE_P(Shapes, Gate,
                          ::testing::Values(DFM_SHAPE_BOX, DFM_SHAPE_SPHERE, DFM_SHAPE_MESH,
                                            DFM_SHAPE_VOXELS));
 
-TEST(Sensor, APlane_SeesWhatIsBelow) {
+TEST(Sensor, Plane_DetectsBodiesBelow) {
   test::Context c;
   const dfm_world w = test::make_world(c);
   const dfm_obstacle g = test::add_plane(w, "water");
@@ -119,7 +119,7 @@ TEST(Sensor, APlane_SeesWhatIsBelow) {
   EXPECT_TRUE(told(w).empty()) << "told once";
 }
 
-TEST(Sensor, WhatEnds_IsToldAtOnce) {
+TEST(Sensor, EndOfAnOverlap_IsReportedAtOnce) {
   test::Context c;
   const dfm_world w = test::make_world(c, {0, 0, 0});
   const dfm_obstacle g = gate(w, DFM_SHAPE_BOX, 0);

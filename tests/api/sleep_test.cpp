@@ -368,7 +368,7 @@ TEST(Wake, ByAnObstacleOnKeys_ComesWhenItReachesTheBody) {
 
 // A ball dropped on a stack that sleeps, beside the same one awake all along: within half of d_c
 // after the blow.
-TEST(Wake, ByAFallingBody_GivesTheMotionOfAStackThatNeverSlept) {
+TEST(Wake, ByAFallingBody_GivesTheMotionWithoutSleep) {
   std::vector<double> lower[2], ball[2];
   double d_c = 0;
   for (const bool sleep : {false, true}) {

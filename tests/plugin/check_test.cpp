@@ -79,7 +79,7 @@ std::ostream &operator<<(std::ostream &out, const Case &c) { return out << c.law
 
 class BrokenLaw : public testing::TestWithParam<Case> {};
 
-TEST_P(BrokenLaw, FailsTheRuleThatIsMeantForItAndNoOther) {
+TEST_P(BrokenLaw, FailsItsRuleOnly) {
   const test::CommandResult r = check(broken(GetParam().law));
   EXPECT_EQ(r.exit_code, 1) << r.out << r.err;
   const std::vector<std::string> expected{GetParam().rule};
@@ -181,7 +181,7 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"model_single_refuses_in_silence", "M22", "without a reason"}),
     [](const auto &one) { return std::string(one.param.law); });
 
-TEST(BrokenLaw, EveryLawOfTheFolder_IsInTheTable) {
+TEST(BrokenLaw, EveryBrokenLaw_IsInTheTable) {
   std::vector<std::string> known{"sound", "model_sound", "model_sound_stepper", "hangs_always",
                                  "sleeps_for_ever"};
   for (int s = 0; s < testing::UnitTest::GetInstance()->total_test_suite_count(); ++s)
@@ -196,7 +196,7 @@ TEST(BrokenLaw, EveryLawOfTheFolder_IsInTheTable) {
         << entry.path();
 }
 
-TEST(BrokenLaw, WhatTheyAreMadeFrom_KeepsEveryRule) {
+TEST(BrokenLaw, SoundTemplates_PassEveryRule) {
   const test::CommandResult r = check(broken("sound"));
   EXPECT_EQ(r.exit_code, 0) << r.out << r.err;
   EXPECT_GE(rules_that("pass", r.out).size(), 20u) << r.out;

@@ -219,12 +219,12 @@ struct Late {
 
 }  // namespace
 
-TEST(OdeExitDeathTest, AdapterOfAHostThatTearsDownLate_IsStillThere) {
+TEST(OdeExitDeathTest, AdapterOfAHostThatExitsLate_IsStillValid) {
   // a process of its own, in which no adapter has been before
   GTEST_FLAG_SET(death_test_style, "threadsafe");
   EXPECT_EXIT(detach_late(), ::testing::ExitedWithCode(0), "");
 }
-TEST(OdeExitDeathTest, AdapterThatNobodyDetaches_TouchesNothingAtTheEnd) {
+TEST(OdeExitDeathTest, AdapterThatIsNotDetached_AccessesNothingAtExit) {
   GTEST_FLAG_SET(death_test_style, "threadsafe");
   EXPECT_EXIT(never_detach(), ::testing::ExitedWithCode(0), "");
 }

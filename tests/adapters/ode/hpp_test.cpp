@@ -54,7 +54,7 @@ struct OdeHpp : ::testing::Test {
 
 }  // namespace
 
-TEST_F(OdeHpp, UniqueOde_DetachesWhenItGoes) {
+TEST_F(OdeHpp, UniqueOde_DetachesAtTheEndOfItsScope) {
   Scene s;
   const values::World as_values(s.soft.get());
   {

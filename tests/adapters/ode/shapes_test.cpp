@@ -224,7 +224,7 @@ TEST(OdeShapes, Heightfield_CarriesWhereOdeSaysItIs) {
   dGeomHeightfieldDataDestroy(data);
 }
 
-TEST(OdeShapes, WhatIsNoSolid_IsLeftOut) {
+TEST(OdeShapes, ShapesThatAreNotSolid_AreIgnored) {
   Ode ode;
   dCreateRay(ode.space, 1);
   const dGeomID off = dCreateSphere(ode.space, 1), ignored = dCreateSphere(ode.space, 1);
