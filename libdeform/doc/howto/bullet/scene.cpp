@@ -73,7 +73,7 @@ int main() {
   def.world = &world;
   must(dfm_bullet_attach(soft, &def, &bullet));
 
-  must(dfm_bullet_rigid(bullet, plate, &rigid));  // what stands for the plate in reports
+  must(dfm_bullet_rigid(bullet, plate, &rigid));  // the handle of the plate in reports
   constexpr int kRate = 60, kSeconds = 4;
   double carried = 0;
   for (int frame = 1; frame <= kSeconds * kRate; ++frame) {

@@ -74,7 +74,7 @@ int main(void) {
   def.space = space;
   TRY(dfm_ode_attach(soft, &def, &ode));
 
-  TRY(dfm_ode_rigid(ode, plate, &rigid)); /* what stands for the plate in reports */
+  TRY(dfm_ode_rigid(ode, plate, &rigid)); /* the handle of the plate in reports */
   for (int frame = 1; frame <= SECONDS * RATE; ++frame) {
     /* was: dSpaceCollide, dWorldStep, dJointGroupEmpty */
     TRY(dfm_ode_step(ode, 1.0 / RATE));
