@@ -81,30 +81,30 @@ def measure(shape, cells, model):
 
 PAGE = """# What a cut costs
 
-A block of the model `msm`, 0.12 x 0.12 x 0.05 m, held below, 5 kPa, steps of 1 ms. One tool of each shape
-goes 3 cm down into it (scissors close in it); `tests/bench/cut_cost.py` measures and writes this page, rows:
-`tests/bench/results/cut_cost.csv`.
+The body is a block of the model `msm`, 0.12 x 0.12 x 0.05 m, 5 kPa, held below, with steps of 1 ms. One tool
+of each shape moves 3 cm down into it (scissors close in it). `tests/bench/cut_cost.py` measures and writes
+this page; the rows are in `tests/bench/results/cut_cost.csv`.
 
-{machine}, {compiler}, commit {commit}, **load of the machine {load}**: processor time of the thread, so read
-factors, not percents.
+{machine}, {compiler}, commit {commit}, **load of the machine {load}**. Times are processor times of the
+thread; on the loaded machine only factors are significant, not percents.
 
 | points | cells | tool | cut | in steps | plain step | step that cuts | largest | extra per face or cell |
 |---|---|---|---|---|---|---|---|---|
 {rows}
 
-- "Plain step": before the first cut, median. "Extra": steps from the first cut to the last and one more,
-  beyond as many plain ones, by opened face or removed cell. It holds the self contact that a cut body has
-  from then on.
-- **The time of a cut does not depend on the tool and hardly on how much it cuts, but on the body**:
-  {per_cell:.1f} us per cell of the whole body, since a cut makes the body anew
-  ([cutting]({concepts}/cutting.md#cost)). So cut much in few steps, or use few cells.
-- A step of 1 ms has no room for a cut in a body of more than about {room:.0f} cells.
+- "Plain step" is the median before the first cut. "Extra" is the time of the steps from the first cut to one
+  after the last, less that of as many plain steps, per opened face or removed cell. It includes the self
+  contact that a body has after a cut.
+- **The time of a cut depends on the size of the body, not on the tool, and hardly on the size of the cut**:
+  {per_cell:.1f} us per cell of the whole body, since a cut rebuilds the body
+  ([cutting]({concepts}/cutting.md#cost)). Cut much in few steps, or use few cells.
+- A cut fits into a step of 1 ms only in a body of less than about {room:.0f} cells.
 
 **The source** (Zerbato 2010, tables 7.1 and 7.2) gives 0.91 and 0.92, 0.74 and 0.70, 0.90 and 0.94 ms for a
 step of its two shaders, on a graphics card, on bodies of 113,085, 39,740 and 106,278 cells. A cut there sets
 bits of a mask of springs, without a new surface, and leaves the volume terms of cut cells
-([corrections](zerbato.md)). Its machine was another one; the tables tell proportions. Here a plain step of
-{most:,} cells takes {plain} on one core.
+([corrections](zerbato.md)). The machine was different, so only proportions can be compared. Here a plain step
+of {most:,} cells takes {plain} on one core.
 """
 
 
