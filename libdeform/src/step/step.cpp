@@ -127,10 +127,13 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
   const double needed = std::ceil(dt / w.bound.step - 1e-9);  // bound.step is infinite without a bound
   if (!(needed <= w.def.max_substeps)) {
     if (may_take_up_implicit(w)) end_explicit_step();
+    const Body *const b = w.bound.body;
+    const bool implicit = b && !b->model.stepper && b->model.can(DFM_CAP_STIFFNESS);
     set_last_error(
-        format("a step of %g s needs %g sub-steps of %g s (max_substeps %u): soften or coarsen body '%s', "
+        format("a step of %g s needs %g sub-steps of %g s (max_substeps %u): %ssoften or coarsen body '%s', "
                "whose point %u bounds the step, lower its damping, or take a shorter step",
-               dt, needed, w.bound.step, w.def.max_substeps, w.bound.body ? w.bound.body->name.c_str() : "?",
+               dt, needed, w.bound.step, w.def.max_substeps,
+               implicit ? "let bodies move by tr_bdf2 or implicit_euler, " : "", b ? b->name.c_str() : "?",
                w.bound.point)
             .c_str());
     *trouble |= DFM_TROUBLE_SUBSTEPS;

@@ -161,7 +161,7 @@ void check_may_cut(const Body &b, const ModelInstance &model) {
   if (!b.surface.identity())
     fail(DFM_E_UNSUPPORTED,
          "body '%s' can be neither cut nor torn: it has its own surface; create it with the boundary of its "
-         "cells as surface",
+         "cells as surface (in a scene: \"surface\": {\"from\": \"boundary\"})",
          name);
   if (b.world->method->point_values)
     fail(DFM_E_UNSUPPORTED,
