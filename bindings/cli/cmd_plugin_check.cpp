@@ -1,7 +1,11 @@
 // deform plugin check FILE: the command line of the validator (check/).
 #include <CLI/CLI.hpp>
 
+#include <cstring>
+#include <filesystem>
 #include <memory>
+#include <string>
+#include <utility>
 
 #include "cli.h"
 #ifdef DEFORM_HAVE_CHECK
@@ -12,11 +16,34 @@ namespace cli {
 
 #ifdef DEFORM_HAVE_CHECK
 
+namespace {
+
+// The file of a plugin that is found by its short name or full id; the same text where it is none of them.
+std::string file_of(const std::string &text, const Globals &globals) {
+  std::error_code error;
+  if (std::filesystem::exists(text, error) || text.find('/') != std::string::npos) return text;
+  const std::unique_ptr<dfm_context, decltype(&dfm_context_destroy)> context(make_context(globals),
+                                                                             dfm_context_destroy);
+  std::pair<std::string, std::string> named{text, text};
+  dfm_plugin_visit(
+      context.get(),
+      [](void *user, const dfm_type *type, const char *file) {
+        auto &[name, found] = *static_cast<std::pair<std::string, std::string> *>(user);
+        const char *const dot = std::strrchr(type->id, '.');
+        if (name == type->id || (dot && name == dot + 1)) found = file;
+      },
+      &named);
+  return named.second;
+}
+
+}  // namespace
+
 void add_plugin_check(CLI::App &plugin, Globals &globals, int *exit_code) {
   CLI::App *sub = plugin.add_subcommand(
       "check", "holds a plugin to the rules, each in a process of its own; exit 1 where one is broken");
   auto request = std::make_shared<check::Request>();
-  sub->add_option("FILE", request->file, "plugin file")->required();
+  sub->add_option("FILE", request->file, "plugin file, or short name or full id of a plugin that is found")
+      ->required();
   sub->add_option("--seed", request->seed, "of the random inputs")->type_name("N");
   sub->add_option("--only", request->only, "run this rule alone; may be repeated")->type_name("ID");
   sub->add_option("--limit", request->limit, "processor time that a rule may take, s")
@@ -29,7 +56,10 @@ void add_plugin_check(CLI::App &plugin, Globals &globals, int *exit_code) {
   sub->add_option("--type", request->type)->group("");
   sub->add_option("--digest", request->digest)->group("");
   sub->add_option("--report-to", request->report)->group("");
-  sub->callback([=, &globals] { *exit_code = check::run(globals, *request); });
+  sub->callback([=, &globals] {
+    request->file = file_of(request->file, globals);
+    *exit_code = check::run(globals, *request);
+  });
 }
 
 #else

@@ -315,6 +315,17 @@ TEST(PluginCheck, OneRule_IsRunAlone) {
   EXPECT_EQ(check(broken("wrong_sign"), {"--only", "F02"}).exit_code, 0);
 }
 
+TEST(PluginCheck, NameOfALawThatIsFound_IsCheckedInItsFile) {
+  for (const char *name : {"coulomb", "org.deform.coulomb"}) {
+    const test::CommandResult r = test::deform({"plugin", "check", name, "--only", "V02"});
+    EXPECT_EQ(r.exit_code, 0) << r.err;
+    EXPECT_NE(r.out.find("friction_coulomb.so"), std::string::npos) << r.out;
+  }
+  const test::CommandResult none = test::deform({"plugin", "check", "coulom"});
+  EXPECT_EQ(none.exit_code, 2);
+  EXPECT_NE(none.err.find("a name of deform plugin list"), std::string::npos) << none.err;
+}
+
 // A rule of laws cannot pass for want of a law.
 TEST(PluginCheck, OneRuleOfAFileThatDoesNotLoad_Fails) {
   const test::CommandResult r = check(broken("wrong_abi"), {"--only", "F03"});

@@ -267,9 +267,10 @@ int run(const Globals &globals, const Request &request) {
   if (request.report >= 0) return child(request);
   std::error_code error;
   if (!std::filesystem::is_regular_file(request.file, error))
-    return fail(request.file + ": " +
-                (std::filesystem::exists(request.file, error) ? "is no file" : "there is no such file") +
-                "; the shared library of a plugin is expected, such as ./mylaw.so");
+    return fail(
+        request.file + ": " +
+        (std::filesystem::exists(request.file, error) ? "is no file" : "there is no such file") +
+        "; expected the shared library of a plugin, such as ./mylaw.so, or a name of deform plugin list");
   std::vector<const Rule *> wanted;
   for (const std::string &id : request.only) {
     const Rule *rule = find_rule(id);
