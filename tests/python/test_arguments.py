@@ -43,6 +43,21 @@ class Arguments(unittest.TestCase):
             world.add_body(mesh, material={"young": 1e6, "friction": 0.3, "volume": 0})
             world.add_body(mesh, material={"locking": 1}, model="corotational_fem", position=(0, 0, 1))
 
+    def test_scale_is_of_lengths_and_above_zero(self):
+        wide = deform.TetMesh.ball(100, cells=100)
+        surface = deform.TriMesh.make("ball", (100,), triangles=200)
+        with deform.World() as world:
+            for wrong in (0, -1, math.nan):
+                self.refused("scale is .*; expected a finite number above 0",
+                             lambda wrong=wrong: world.add_body(wide, scale=wrong))
+            small = world.add_body(wide, scale=1e-3, position=(0, 0, 1), surface=surface)
+            same = world.add_body(deform.TetMesh.ball(0.1, cells=100), position=(0, 0, 2))
+            self.assertAlmostEqual(small.measure.mass, same.measure.mass, places=9)
+            self.assertLess(abs(small.positions - [0, 0, 1]).max(), 0.1001)
+            world.add_obstacle("mesh", mesh=surface, scale=1e-3)
+            hit = world.query_ray((0, 0, -1), (0, 0, 1))
+            self.assertAlmostEqual(hit.distance, 0.9, places=2)
+
     def test_mesh_says_what_makes_one(self):
         points, tets = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]]
         for kind in (deform.TetMesh, deform.TriMesh):

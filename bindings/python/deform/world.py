@@ -54,6 +54,12 @@ class Material:
         self.world, self.handle, self.name = world, handle, name
 
 
+def _scaled(points: np.ndarray, scale: float) -> np.ndarray:
+    if not (np.isfinite(scale) and scale > 0):
+        raise ArgumentError(f"scale is {scale}; expected a finite number above 0", "DFM_E_ARG")
+    return points if scale == 1 else np.ascontiguousarray(points * scale)
+
+
 def _word(what: str, given: str, table: Mapping[str, int]) -> int:
     return table[choice(what, given, table)]
 
@@ -296,14 +302,14 @@ class World(Queries, Tools):
                  velocity: Sequence[float] = (0, 0, 0), spin: Sequence[float] = (0, 0, 0), fixed: Any = None,
                  surface: TriMesh | None = None, coupling: str = "barycentric",
                  fields: Mapping[str, Any] | None = None, integrator: str = "auto", category: int = 1,
-                 collides_with: int = EVERYTHING) -> Body:
+                 collides_with: int = EVERYTHING, scale: float = 1) -> Body:
         """A body of a mesh (a TetMesh or the path of its file), or of points [n,3] m and tets [m,4].
 
         model: "msm" (default), "corotational_fem", ...; params: of the model, by key. material: of
         add_material, or its entries as a dict. position [3] m, rotation [4] (a quaternion x, y, z, w),
         velocity [3] m/s, spin [3] rad/s. fixed: [n] held components of each point, bits 1 x, 2 y, 4 z.
         surface: a finer one that hangs on the cells. fields: model parameters that differ by cell, [m] or
-        [m,width] by key.
+        [m,width] by key. scale: of the points of mesh and surface, 0.001 where they are in millimeters.
         """
         if isinstance(mesh, (str, bytes)) or hasattr(mesh, "__fspath__"):
             mesh = TetMesh.read(mesh)
@@ -324,7 +330,7 @@ class World(Queries, Tools):
             keep += [share, groups]
         elif points is None or tets is None:
             raise ArgumentError("add_body needs a mesh, or points and tets", "DFM_E_ARG")
-        x, cells = points_of(points), cells_of(tets, 4, "tets")
+        x, cells = _scaled(points_of(points), scale), cells_of(tets, 4, "tets")
         keep += [x, cells]
         definition.npoint, definition.ntet = len(x), len(cells)
         definition.points, definition.tets = x.ctypes.data, cells.ctypes.data
@@ -348,7 +354,7 @@ class World(Queries, Tools):
         if surface is not None:
             hung = _abi.dfm_surface_def(ctypes.sizeof(_abi.dfm_surface_def),
                                         _word("coupling", coupling, COUPLINGS))
-            sp, st = surface.points, surface.triangles
+            sp, st = _scaled(surface.points, scale), surface.triangles
             hung.npoint, hung.ntriangle, hung.points = len(sp), len(st), sp.ctypes.data
             hung.triangles = st.ctypes.data
             definition.surface = ctypes.addressof(hung)
@@ -373,10 +379,10 @@ class World(Queries, Tools):
                      half_size: Sequence[float] = (0, 0, 0), half_length: float = 0,
                      mesh: TriMesh | None = None, cells: int = 0,
                      velocity_surface: Sequence[float] = (0, 0, 0), material: Material | None = None,
-                     category: int = 1, collides_with: int = EVERYTHING) -> Obstacle:
+                     category: int = 1, collides_with: int = EVERYTHING, scale: float = 1) -> Obstacle:
         """A "plane" (through position, with a normal), "sphere" (radius), "box" (half_size [3]), "capsule"
-        (radius, half_length, along z), "mesh" or "voxels" (mesh). m. velocity_surface: of a belt, [3]
-        m/s."""
+        (radius, half_length, along z), "mesh" or "voxels" (mesh, whose points times scale are in m). m.
+        velocity_surface: of a belt, [3] m/s."""
         definition = default(_abi.dfm_obstacle_def)
         definition.shape = _word("shape", shape, SHAPES)
         definition.name = encoded(name)
@@ -390,7 +396,7 @@ class World(Queries, Tools):
         definition.category, definition.collides_with = category, collides_with
         definition.material = material.handle if material is not None else 0
         if mesh is not None:
-            p, t = mesh.points, mesh.triangles
+            p, t = _scaled(mesh.points, scale), mesh.triangles
             definition.npoint, definition.ntriangle = len(p), len(t)
             definition.points, definition.triangles, definition.cells = p.ctypes.data, t.ctypes.data, cells
         out = ctypes.c_uint64()
