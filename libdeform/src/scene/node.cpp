@@ -60,8 +60,9 @@ std::string Node::kind_found() const {
 }
 
 void Node::object(const std::string &kind, const std::vector<std::string> &further) const {
-  if (!value_->is_object()) fail("expected an object, found %s", kind_found().c_str());
   const std::vector<Key> &keys = keys_of(kind);
+  if (!value_->is_object())
+    fail("expected an object with %s, found %s", join(delivered(keys)).c_str(), kind_found().c_str());
   for (auto it = value_->begin(); it != value_->end(); ++it) {
     const Key *known = nullptr;
     for (const Key &k : keys)

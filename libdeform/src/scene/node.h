@@ -53,9 +53,9 @@ class Node {
   void vector(const char *key, double out[3], double x, double y, double z) const;
   // A name for a file or a table: no separators, no control characters.
   std::string name() const;
+  std::string kind_found() const;  // "number 5", for sentences
 
  private:
-  std::string kind_found() const;
   json *value_;
   std::string pointer_;
   const std::string *file_;

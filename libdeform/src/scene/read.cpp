@@ -217,6 +217,9 @@ void read_gravity(const Node &scene, Definition &def) {
   if (!scene.has("gravity")) scene.value()["gravity"] = json::array({0.0, 0.0, -9.81});
   const Node gravity = scene.member("gravity");
   if (gravity.value().is_array()) return gravity.vector(def.gravity);
+  if (!gravity.value().is_object())
+    gravity.fail("expected [x, y, z] in m/s2 or an object with keyframes, found %s",
+                 gravity.kind_found().c_str());
   gravity.object("gravity");
   const std::vector<Node> keys = gravity.at("keyframes").items();
   if (keys.empty()) gravity.at("keyframes").fail("expected at least one keyframe");
@@ -440,6 +443,12 @@ void read_contact(const Node &scene, Definition &def, const ReadContext &context
   if (contact.has("offset")) def.offset = contact.member("offset").number(kPositive);
   if (contact.has("recovery_speed")) def.recovery_speed = contact.member("recovery_speed").number(kPositive);
   if (contact.has("obstacle_speed")) def.obstacle_speed = contact.member("obstacle_speed").number(kPositive);
+  if (contact.has("friction") && !contact.value()["friction"].is_array())
+    contact.member("friction")
+        .fail(
+            "expected an array of rules, such as [{\"between\": [\"*\", \"*\"], \"law\": \"coulomb\", "
+            "\"params\": {\"mu\": 0.5}}], found %s",
+            contact.member("friction").kind_found().c_str());
   for (const Node &entry : contact.items("friction")) {
     entry.object("friction");
     Friction f;
