@@ -43,6 +43,8 @@ struct Sample { double t, force[3], place[3]; };
 
 struct Run {
   std::vector<double> seconds;
+  std::vector<uint64_t> work;  // units of each step, which no load of the machine changes
+  dfm_world_stats last{};
   std::vector<uint8_t> cut;  // 1: the step has cut; 2: the one before it has
   std::vector<Sample> series;
   double contacts = 0;
@@ -76,6 +78,8 @@ Run run(dfm_scene scene, dfm_world world, double duration, double step, bool pla
     stats.size = sizeof stats;
     ok(dfm_world_get_stats(world, &stats));
     out.contacts += double(stats.contacts) / double(steps);
+    out.work.push_back(stats.work);
+    out.last = stats;
     if ((n + 1) % every != 0) continue;
     Sample s{double(n + 1) * step, {force[0], force[1], force[2]}, {}};
     if (!places) continue;
@@ -259,6 +263,13 @@ int main(int argc, char **argv) {
   std::printf("    slowest:");
   for (size_t n = 0; n < most; ++n) std::printf(" %.2f (%zu)", 1e3 * found.seconds[slow[n]], slow[n] + 1);
   std::printf(" ms (step)\n");
+  std::sort(found.work.begin(), found.work.end());
+  std::printf(
+      "    units of work: median %llu, 99.9 %% %llu, most %llu; at most %u passes, %u sweeps, "
+      "unconverged sub-steps %llu\n",
+      (unsigned long long)found.work[found.work.size() / 2],
+      (unsigned long long)found.work[found.work.size() * 999 / 1000], (unsigned long long)found.work.back(),
+      found.last.passes_max, found.last.sweeps_max, (unsigned long long)found.last.unconverged);
   if (std::any_of(found.cut.begin(), found.cut.end(), [](uint8_t k) { return k != 0; })) {
     print_kind(found, 0, "without a cut", step);
     print_kind(found, 2, "after a cut", step);

@@ -8,15 +8,15 @@
 
 namespace dfm {
 
-// The part of a law's dft/dvt that dissipates: its symmetric part without the positive eigenvalue. [a b; b
-// c], N s/m, negative semidefinite.
-struct Slope { double a, b, c; };
+// The part of a law's dft/dvt that dissipates: its symmetric part without the positive eigenvalue, and its
+// antisymmetric part, which does no work. [a b; c d], N s/m; v.D v <= 0 for every v.
+struct Slope { double a, b, c, d; };
 // How a law is solved: by its slopes, by projection on the disc of radius limit, or not at all (no force).
 enum LawForm : uint8_t { kSmoothLaw, kSetValuedLaw, kNoFriction };
-// Of a smooth law: slope D, and 1 - h w_t D as [m11 m12; m12 m22] with its determinant.
+// Of a smooth law: slope D, and 1 - h w_t D as [m11 m12; m21 m22] with its determinant.
 struct LinearLaw {
   Slope slope;
-  double m11, m12, m22, det;
+  double m11, m12, m21, m22, det;
 };
 
 // Members of ContactRows, with the same names, if all dofs respond to their own impulses only.

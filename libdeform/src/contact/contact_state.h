@@ -85,14 +85,15 @@ inline Slope dissipative_slope(const ContactState &s, uint32_t i) {
   const uint32_t n = s.stride;
   const double a = s.dft_dvt[i];
   const double c = s.dft_dvt[3 * size_t(n) + i];
-  const double b = 0.5 * (s.dft_dvt[size_t(n) + i] + s.dft_dvt[2 * size_t(n) + i]);
+  const double b1 = s.dft_dvt[size_t(n) + i], b2 = s.dft_dvt[2 * size_t(n) + i];
+  const double b = 0.5 * (b1 + b2), turn = 0.5 * (b1 - b2);
   const double mean = 0.5 * (a + c), dev = 0.5 * (a - c), spread = std::sqrt(dev * dev + b * b);
   const double top = mean + spread, bottom = mean - spread;
-  if (bottom >= 0) return {0, 0, 0};
-  if (!(top > 0)) return {a, b, c};
-  // keep only bottom * p p^T, p p^T = (top I - D) / (top - bottom)
+  if (bottom >= 0) return {0, turn, -turn, 0};
+  if (!(top > 0)) return {a, b1, b2, c};
+  // keep only bottom * p p^T of the symmetric part, p p^T = (top I - D) / (top - bottom)
   const double scale = bottom / (top - bottom);
-  return {scale * (top - a), scale * -b, scale * (top - c)};
+  return {scale * (top - a), turn - scale * b, -turn - scale * b, scale * (top - c)};
 }
 
 }  // namespace dfm

@@ -34,8 +34,9 @@ static inline double given(double l, const double *yields) {
 // (its viscous part does not).
 //
 // Smooth laws: lambda = h [ft + D (u' - v) + d (fn' - fn)] with u' = u + w_t (lambda - lambda_old): a 2x2
-// system, positive definite
-// because only the negative semidefinite part of D is used. The law's limit is kept: an elastic bristle that
+// system that has a solution because D dissipates. D is not symmetric where the bristle and the slip are not
+// parallel; without that part passes over the laws are no Newton steps and may go round
+// (doc/decisions/0406-slopes-of-laws-are-not-symmetric.md). The law's limit is kept: an elastic bristle that
 // breaks away then slides on the cone at once instead of overshooting it. A contact that stuck when its law
 // was asked is kept inside the limit in proportion to the normal impulse. One that slid is kept inside what
 // the limit can be at all: limit(fn) is concave (a cone and a bounded part), so never above limit max(1, ln /
@@ -69,13 +70,13 @@ static inline Pair friction_impulse(const LawView &s, uint32_t i, double h, doub
     return {radius / size * a, radius / size * b};
   }
   if (s.form[i] == kNoFriction) return {0, 0};
-  const auto &[slope, m11, m12, m22, det] = s.linear[i];
-  const auto &[d11, d12, d22] = slope;
+  const auto &[slope, m11, m12, m21, m22, det] = s.linear[i];
+  const auto &[d11, d12, d21, d22] = slope;
   const double dfn = ln / h - fn;
   const double v1 = u1 - wt * l1 - s.vt[i], v2 = u2 - wt * l2 - s.vt[n + i];
   const double r1 = h * (s.ft[i] + d11 * v1 + d12 * v2 + s.dft_dfn[i] * dfn);
-  const double r2 = h * (s.ft[n + i] + d12 * v1 + d22 * v2 + s.dft_dfn[n + i] * dfn);
-  Pair l{(m22 * r1 - m12 * r2) / det, (m11 * r2 - m12 * r1) / det};
+  const double r2 = h * (s.ft[n + i] + d21 * v1 + d22 * v2 + s.dft_dfn[n + i] * dfn);
+  Pair l{(m22 * r1 - m12 * r2) / det, (m11 * r2 - m21 * r1) / det};
   const double size = __builtin_sqrt(l.a * l.a + l.b * l.b), radius = fn > 0 ? s.limit[i] / fn * ln : 0;
   const double most = s.mode[i] == 1 ? radius : larger(radius, h * s.limit[i]);
   if (size > most) l = {most / size * l.a, most / size * l.b};

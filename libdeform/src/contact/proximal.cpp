@@ -158,12 +158,13 @@ bool Proximal::answer(const ContactRows &rows, const ContactState &s, uint32_t k
     }
   } else {
     const uint32_t n = s.stride;
-    const auto [d11, d12, d22] = dissipative_slope(s, i);
+    const auto [d11, d12, d21, d22] = dissipative_slope(s, i);
     const double v1 = u[1] - s.vt[i], v2 = u[2] - s.vt[n + i], dfn = pressed / h - s.fn[i];
     l[1] = h * (s.ft[i] + d11 * v1 + d12 * v2 + s.dft_dfn[i] * dfn);
-    l[2] = h * (s.ft[n + i] + d12 * v1 + d22 * v2 + s.dft_dfn[n + i] * dfn);
+    l[2] = h * (s.ft[n + i] + d21 * v1 + d22 * v2 + s.dft_dfn[n + i] * dfn);
     d[4] = h * d11;
-    d[5] = d[7] = h * d12;
+    d[5] = h * d12;
+    d[7] = h * d21;
     d[8] = h * d22;
     d[3] = -rn * s.dft_dfn[i];
     d[6] = -rn * s.dft_dfn[n + i];

@@ -48,9 +48,10 @@ void linearize(const ContactRows &rows, const RowsPart &part, double h, ContactS
     LinearLaw &l = s.linear[i];
     l.slope = dissipative_slope(s, i);
     l.m11 = 1 - h * wt * l.slope.a;
-    l.m22 = 1 - h * wt * l.slope.c;
+    l.m22 = 1 - h * wt * l.slope.d;
     l.m12 = -h * wt * l.slope.b;
-    l.det = l.m11 * l.m22 - l.m12 * l.m12;
+    l.m21 = -h * wt * l.slope.c;
+    l.det = l.m11 * l.m22 - l.m12 * l.m21;
   });
 }
 

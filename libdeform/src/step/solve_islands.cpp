@@ -62,10 +62,22 @@ bool may_ask(const World &w, const StepContext &step, SolveIsland &own) {
 
 // The response by which a contact looks for the slip at which it comes to rest alone. Many contacts that hold
 // one body turn its slip round together and could not stop it one by one: asked by their own responses they
-// say "slide" one way and the other in turn, for ever. Beyond the cap each takes that of all.
-const double *trial_response(const World &w, StepContext &step, const SolveIsland &own) {
+// say "slide" one way and the other in turn, for ever. Beyond the cap each takes that of all. Where few of
+// them bear most of the load that one can lead round as well, so from then on two passes by one response
+// that do not halve the residual are followed by passes with the other.
+constexpr double kHalves = 0.5;
+void choose_response(const World &w, SolveIsland &own, double now, double before) {
+  if (!asks_beyond(w, own)) return;
+  if (!own.asked) own.common = true;
+  else if (own.asked >= 2 && !(now <= kHalves * before)) {
+    own.common = !own.common;
+    own.asked = 0;
+  }
+  ++own.asked;
+}
+const double *trial_response(StepContext &step, const SolveIsland &own) {
   const ContactRows &rows = step.rows;
-  if (!asks_beyond(w, own)) return rows.wt.data();
+  if (!own.common) return rows.wt.data();
   double loaded = 0;
   each_row(own.part.contacts, [&](uint32_t i) { loaded += rows.impulse[size_t(i) * 3] > 0; });
   each_row(own.part.contacts,
@@ -140,6 +152,13 @@ void stride_on(const World &w, StepContext &step, SolveIsland &own, uint32_t par
     if (good(step, own, now, 0.5)) break;
   }
   proximal.put(step.rows, step.best_impulse.data());
+}
+// Of laws that remember, the first pass knows the tangent at the slip before contact, and later ones are as
+// far off as the law was: strides that answer a tangent more closely than that are lost with it.
+constexpr double kTangentShare = 0.1;
+bool strides_help(const SolveIsland &own, double left) {
+  return left > 1 &&
+         (!own.batches.remembers() || (own.passes > 1 && left > kTangentShare * own.residual.due));
 }
 void stride_on(const World &w, StepContext &step, SolveIsland &own) {
   if (spares(step, own.spent, Thrift::sweeps)) return;
@@ -225,7 +244,7 @@ bool sweep_until_good(const World &w, StepContext &step, SolveIsland &own) {
   each_row(own.part.contacts, go_back);
   each_row(own.part.bonds, go_back);
   if (best > 0.5 && own.revises) settle(w, step, own, best);
-  if (best > 1) stride_on(w, step, own);
+  if (strides_help(own, best)) stride_on(w, step, own);
   return best <= 1;
 }
 
@@ -260,9 +279,11 @@ void solve_passes(const World &w, StepContext &step, SolveIsland &own) {
           ? ToleranceBounds{least, least, least}
           : ToleranceBounds{least, memory || own.revises ? kRememberedRest * least : gap_margin,
                             memory ? kRememberedShare * gap_margin : gap_margin};
+  double now = std::numeric_limits<double>::infinity(), before = now;
   for (;;) {
     spend(w, step, own.spent, 4 * uint64_t{own.part.all()});
-    const double *const response = trial_response(w, step, own);
+    choose_response(w, own, now, before);
+    const double *const response = trial_response(step, own);
     set_trial(step.rows, own.part, step.h, response, step.state);
     // The sweeps take the next Newton step from there: what is asked a hundredth off is answered to a
     // ten-thousandth.
@@ -271,6 +292,7 @@ void solve_passes(const World &w, StepContext &step, SolveIsland &own) {
     ++own.passes;
     if (own.sweeps) {
       own.residual = true_residual(step.rows, own.part, step.state, step.h, own.tolerance);
+      before = std::exchange(now, own.residual.due);
       if (good(step, own, own.residual, 1) || own.passes > w.def.max_passes ||
           !(may_sweep(w, step, own, own.residual, w.def.max_sweeps) || may_ask(w, step, own)))
         return;
@@ -427,6 +449,8 @@ const SolveIsland *solve_islands(World &w, StepContext &step) {
     rows += own.part.all();
     own.passes = own.sweeps = 0;
     own.slowed = false;
+    own.common = false;
+    own.asked = 0;
     own.limit.reserve(own.part.n);
     own.residual = {};
     own.bad = nullptr;

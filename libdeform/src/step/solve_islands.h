@@ -38,6 +38,8 @@ struct SolveIsland {
   Residual residual;
   uint32_t passes = 0, sweeps = 0;
   bool slowed = false;  // its depths are opened more slowly
+  bool common = false;  // laws are asked by the response of all contacts together
+  uint32_t asked = 0;   // passes beyond the cap with the present response
   Spent spent;
   const LawInstance *bad = nullptr;  // that has failed
   std::exception_ptr thrown;

@@ -33,6 +33,7 @@ struct Slit {
     rows.frame = {c, 0, s, s, 0, -c, 0, 1, 0, -c, 0, s, -s, 0, -c, 0, -1, 0};
     rows.drive.assign(6, 0);
     rows.rate.assign(2, -kOpening);
+    rows.yields.assign(4, 0);
     rows.wn.assign(2, 1);
     rows.wt.assign(2, 1);
     rows.cross.assign(4, 0);

@@ -283,6 +283,27 @@ TEST(Sweep, LawThatIsSteepWhereItWasAsked_StaysWithinItsLimit) {
   }
 }
 
+// A bristle that is not parallel to the slip turns as it grows, so its force answers a slip along one axis on
+// the other one as well, and not the same both ways. The impulse is on the law's tangent, all of it.
+TEST(Sweep, LawWhoseSlopeIsNotSymmetric_IsAnsweredOnItsTangent) {
+  Groove g(0, 0, 2);
+  const double h = 1e-3, ft[2] = {5, -3}, vt[2] = {0.1, 0.2}, slope[4] = {-200, -300, 100, -250};
+  g.rows.wn[1] = 0;  // one wall only
+  g.law.fn[0] = 500;
+  g.law.limit[0] = 1e6;
+  for (uint32_t k = 0; k < 2; ++k) {
+    g.law.ft[k * g.law.stride] = ft[k];
+    g.law.vt[k * g.law.stride] = vt[k];
+  }
+  for (uint32_t k = 0; k < 4; ++k) g.law.dft_dvt[k * g.law.stride] = slope[k];
+  linearize(g.rows, g.rows.whole(), h, g.law);
+  sweep(g.rows, g.rows.whole(), g.law, h);
+  const Vec3 u = g.rows.velocity(0);
+  const double v[2] = {u.y - vt[0], u.z - vt[1]};
+  for (uint32_t k = 0; k < 2; ++k)
+    EXPECT_NEAR(g.rows.impulse[1 + k], h * (ft[k] + slope[2 * k] * v[0] + slope[2 * k + 1] * v[1]), 1e-15);
+}
+
 TEST(Sweep, RestoredVelocities_AreThoseOfTheImpulses) {
   Groove g(0.2, 0.5, 2);
   for (int k = 0; k < 20; ++k) sweep(g.rows, g.rows.whole(), g.law, 1e-3);
