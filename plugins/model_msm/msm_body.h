@@ -212,7 +212,7 @@ struct Body : model::Blocks<Block> {
   // memory for new parameters, allocated before anything changes: arrays to swap in, sums and vectors
   struct Room {
     Buffer<double> edge_tilt, edge_rest, tilt, edge_damp, damp_most, damp, point_drag, rest_now;
-    Buffer<double> damp_share, drag_around, own, next, gradient;
+    Buffer<double> damp_share, drag_around, own, next, gradient, tangent;
   };
   void make_room(Room &room) const;
   double largest_of(Param which) const;

@@ -103,12 +103,14 @@ void Body::find_weights(Room &room) {
       }
     }
   std::fill(weight.data(), weight.data() + npoint, 1.0);
+  Buffer<double> &stiff = room.tangent;
+  for (uint32_t e = 0; e < nedge; ++e) stiff[e] = tangent(e);
   for (int step = 0; step < kWeightSteps; ++step) {
     for (uint32_t i = 0; i < npoint; ++i) next[i] = own[i] * weight[i];
     for (uint32_t e = 0; e < nedge; ++e) {
       const uint32_t i = edges[2 * size_t(e)], j = edges[2 * size_t(e) + 1];
-      next[i] += tangent(e) * weight[j];
-      next[j] += tangent(e) * weight[i];
+      next[i] += stiff[e] * weight[j];
+      next[j] += stiff[e] * weight[i];
     }
     for (uint32_t c = 0; volume_on && c < ncell; ++c) {
       const uint32_t *q = cells.data() + 4 * size_t(c);

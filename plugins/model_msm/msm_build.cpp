@@ -30,6 +30,9 @@ void Body::take_mesh(const dfm_mesh &m) {
   for (uint32_t e = 0; e < nedge; ++e)
     edge_length[e] =
         length_of(m.rest + 3 * size_t(edges[2 * size_t(e)]), m.rest + 3 * size_t(edges[2 * size_t(e) + 1]));
+  Buffer<uint32_t> row_of_edges;
+  row_of_edges.create(host, size_t(npoint) + 1);
+  model::find_rows(edges.data(), nedge, npoint, row_of_edges.data());
   for (uint32_t c = 0; c < ncell; ++c) {
     uint32_t *q = cells.data() + 4 * size_t(c);
     const auto six = [&] {
@@ -41,7 +44,7 @@ void Body::take_mesh(const dfm_mesh &m) {
     cell_volume6[c] = six();
     const double volume = cell_volume6[c] / 6;
     uint32_t *const e = cell_edge.data() + 6 * size_t(c);
-    model::find_edges(edges.data(), nedge, q, e);
+    model::find_edges_by_rows(edges.data(), row_of_edges.data(), q, e);
     for (int n = 0; n < 6; ++n) edge_volume[e[n]] += volume;
   }
   find_directions();
@@ -59,12 +62,15 @@ void Body::order_springs(Layout &l) const {
   const auto low = [&](uint32_t e) {
     return std::min(l.rank[edges[2 * size_t(e)]], l.rank[edges[2 * size_t(e) + 1]]);
   };
-  for (uint32_t e = 0; e < nedge; ++e) l.edge[e] = e;
-  std::sort(l.edge.data(), l.edge.data() + nedge, [&](uint32_t a, uint32_t b) {
-    return low(a) != low(b) ? low(a) < low(b) : high_rank(l, a) < high_rank(l, b);
-  });
   for (uint32_t e = 0; e < nedge; ++e) ++l.row[low(e) + 1];
   for (uint32_t r = 0; r < npoint; ++r) l.row[r + 1] += l.row[r];
+  Buffer<uint32_t> next;
+  next.create(host, npoint);
+  std::copy(l.row.data(), l.row.data() + npoint, next.data());
+  for (uint32_t e = 0; e < nedge; ++e) l.edge[next[low(e)]++] = e;
+  for (uint32_t r = 0; r < npoint; ++r)
+    std::sort(l.edge.data() + l.row[r], l.edge.data() + l.row[r + 1],
+              [&](uint32_t a, uint32_t b) { return high_rank(l, a) < high_rank(l, b); });
 }
 
 uint32_t Body::high_rank(const Layout &l, uint32_t e) const {
@@ -90,15 +96,19 @@ void Body::order_cells(Layout &l) const {
         best_count = count;
       }
     }
-    l.cell_order[c] = c;
     block_of_cell[c] = best;
     ++l.cell_begin[best + 1];
   }
   for (uint32_t b = 0; b < nblock; ++b) l.cell_begin[b + 1] += l.cell_begin[b];
-  std::sort(l.cell_order.data(), l.cell_order.data() + ncell, [&](uint32_t a, uint32_t b) {
-    if (block_of_cell[a] != block_of_cell[b]) return block_of_cell[a] < block_of_cell[b];
-    return lowest(a) != lowest(b) ? lowest(a) < lowest(b) : a < b;
-  });
+  Buffer<uint64_t> key;  // {lowest rank, cell}
+  Buffer<uint32_t> next;
+  key.create(host, ncell);
+  next.create(host, nblock);
+  std::copy(l.cell_begin.data(), l.cell_begin.data() + nblock, next.data());
+  for (uint32_t c = 0; c < ncell; ++c) key[next[block_of_cell[c]]++] = uint64_t(lowest(c)) << 32 | c;
+  for (uint32_t b = 0; b < nblock; ++b)
+    std::sort(key.data() + l.cell_begin[b], key.data() + l.cell_begin[b + 1]);
+  for (uint32_t n = 0; n < ncell; ++n) l.cell_order[n] = uint32_t(key[n]);
 }
 
 uint32_t Body::spring_halo(Layout &l, uint32_t b) const {

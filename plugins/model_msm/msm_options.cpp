@@ -252,6 +252,7 @@ void Body::make_room(Room &room) const {
   if (has_branch() && rest_now.empty()) room.rest_now.create(host, slots);
   room.own.create(host, npoint);
   room.next.create(host, npoint);
+  room.tangent.create(host, nedge);
   room.gradient.create(host, largest_volume() > 0 ? 4 * size_t(ncell) : 0);
 }
 

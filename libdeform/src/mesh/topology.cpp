@@ -7,6 +7,30 @@
 
 namespace dfm {
 
+namespace {
+
+// Lists by their lowest point are short, so that sorting is done within them and not over all.
+//   begin [points + 1] where the items of each lowest point begin; items in any order
+// key(item): the lowest point.
+template <class Item, class Key>
+void sort_by_lowest(Array<Item> &items, const Key &key) {
+  uint32_t most = 0;
+  for (const Item &f : items) most = std::max(most, key(f));
+  // numbers far beyond the items would make the table larger than the work
+  if (items.empty() || most > 4 * items.size() + 64) return std::sort(items.begin(), items.end());
+  Array<uint32_t> begin(size_t{most} + 2, 0u, HookAllocator<uint32_t>(items.get_allocator()));
+  for (const Item &f : items) ++begin[key(f) + 1];
+  for (size_t p = 1; p < begin.size(); ++p) begin[p] += begin[p - 1];
+  Array<Item> sorted(items.size(), Item{}, items.get_allocator());
+  for (const Item &f : items) sorted[begin[key(f)]++] = f;  // begin is then the end of each list
+  uint32_t first = 0;
+  for (size_t p = 0; p + 1 < begin.size(); first = begin[p++])
+    std::sort(sorted.begin() + first, sorted.begin() + begin[p]);
+  items.swap(sorted);
+}
+
+}  // namespace
+
 Array<TetFace> sorted_faces(const Memory &memory, uint32_t ntet, const uint32_t *tets) {
   Array<TetFace> faces{HookAllocator<TetFace>(memory)};
   faces.reserve(size_t(ntet) * 4);
@@ -15,21 +39,19 @@ Array<TetFace> sorted_faces(const Memory &memory, uint32_t ntet, const uint32_t 
       uint32_t c[3];
       for (int k = 0; k < 3; ++k) c[k] = tets[size_t(t) * 4 + kTetFace[f][k]];
       uint32_t odd = 0;  // whether sorting the corners turned the face over
-      if (c[0] > c[1]) {
-        std::swap(c[0], c[1]);
-        odd ^= 1;
-      }
-      if (c[1] > c[2]) {
-        std::swap(c[1], c[2]);
-        odd ^= 1;
-      }
-      if (c[0] > c[1]) {
-        std::swap(c[0], c[1]);
-        odd ^= 1;
-      }
+      const auto order = [&](int a, int b) {
+        const bool turned = c[a] > c[b];
+        const uint32_t low = std::min(c[a], c[b]), high = std::max(c[a], c[b]);
+        c[a] = low;
+        c[b] = high;
+        odd ^= uint32_t(turned);
+      };
+      order(0, 1);
+      order(1, 2);
+      order(0, 1);
       faces.push_back({c[0], c[1], c[2], t * 4 + f, odd});
     }
-  std::sort(faces.begin(), faces.end());
+  sort_by_lowest(faces, [](const TetFace &f) { return f.a; });
   return faces;
 }
 
@@ -59,7 +81,7 @@ Array<uint32_t> unique_edges(const Memory &memory, uint32_t ntet, const uint32_t
       const uint32_t a = tets[size_t(t) * 4 + e[0]], b = tets[size_t(t) * 4 + e[1]];
       keys.push_back(uint64_t(std::min(a, b)) << 32 | std::max(a, b));
     }
-  std::sort(keys.begin(), keys.end());
+  sort_by_lowest(keys, [](uint64_t key) { return uint32_t(key >> 32); });
   keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
   Array<uint32_t> edges{HookAllocator<uint32_t>(memory)};
   edges.reserve(keys.size() * 2);

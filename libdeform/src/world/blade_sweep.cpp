@@ -15,6 +15,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "geometry/extent.h"
 #include "math/elementary.h"
@@ -130,32 +131,79 @@ BladeSweep::BladeSweep(Body &b, const CutShape &blade, const Vec3 *forward) : bl
   std::sort(faces.begin(), faces.end());
 }
 
-// Cells that may have been near the edge between the calls, alone: there may be a call in each step.
+namespace {
+
+// On which sides of a box a point lies: one bit for beyond its high and one for below its low end, by axis.
+// A cell whose points have a bit in common does not meet the box.
+struct Beyond {
+  Vec3 lo, hi;
+  double reach;
+  uint8_t operator()(const double *x) const {
+    uint8_t out = 0;
+    for (int k = 0; k < 3; ++k) {
+      out |= uint8_t(uint8_t(hi[k] + reach < x[k]) << k);
+      out |= uint8_t(uint8_t(x[k] + reach < lo[k]) << (3 + k));
+    }
+    return out;
+  }
+};
+
+// Points have a fourth value that is zero, so that one is two pairs.
+using Pair = double __attribute__((vector_size(16)));
+struct Four { Pair xy, z; };
+Four four_at(const double *x) {
+  Four out;
+  std::memcpy(&out, x, sizeof out);
+  return out;
+}
+Pair least(Pair a, Pair b) { return b < a ? b : a; }
+Pair most(Pair a, Pair b) { return a < b ? b : a; }
+Four least(Four a, Four b) { return {least(a.xy, b.xy), least(a.z, b.z)}; }
+Four most(Four a, Four b) { return {most(a.xy, b.xy), most(a.z, b.z)}; }
+
+// Diagonal of the largest box around a cell, m.
+double largest_cell(const Body &b) {
+  double square = 0;
+  for (uint32_t c = 0; c < b.ncell(); ++c) {
+    const uint32_t *const p = &b.tets[size_t{4} * c];
+    const auto at = [&](size_t k) { return four_at(&b.p.x[size_t{kStride} * p[k]]); };
+    const Four x[4] = {at(0), at(1), at(2), at(3)};
+    const Four lo = least(least(x[0], x[1]), least(x[2], x[3]));
+    const Four hi = most(most(x[0], x[1]), most(x[2], x[3]));
+    const Pair a = hi.xy - lo.xy, z = hi.z - lo.z, a2 = a * a, z2 = z * z;
+    square = std::max(square, (a2[0] + a2[1]) + z2[0]);
+  }
+  return std::sqrt(square);
+}
+
+}  // namespace
+
+// Cells that may have been near the edge between the calls, alone: there is a call in each step, so what
+// is done for all cells of the body is little.
 void BladeSweep::find_near(const Body &b) {
   const double *const before = track_ < b.blades.size() ? b.blades[track_].x.data() : b.p.x.data();
   Extent way, whole;
   for (const Vec3 c : blade_.corner) way.add(c);
+  Four lo = four_at(before), hi = lo;
   for (uint32_t i = 0; i < b.p.n; ++i)
-    for (const double *x : {before, b.p.x.data()}) whole.add(load3(x + size_t{kStride} * i));
+    for (const double *all : {before, b.p.x.data()}) {
+      const Four x = four_at(all + size_t{kStride} * i);
+      lo = least(lo, x);
+      hi = most(hi, x);
+    }
+  whole.add({lo.xy[0], lo.xy[1], lo.z[0]});
+  whole.add({hi.xy[0], hi.xy[1], hi.z[0]});
   if (!way.meets(whole, kReach * b.surface.median_edge)) return;
-  double largest = 0;
-  std::vector<Extent> boxes(b.ncell());
+  const Beyond beyond{way.lo, way.hi, kKept * largest_cell(b)};
+  std::vector<uint8_t> side(b.p.n);
+  for (uint32_t i = 0; i < b.p.n; ++i)
+    side[i] = beyond(before + size_t{kStride} * i) & beyond(&b.p.x[size_t{kStride} * i]);
   for (uint32_t c = 0; c < b.ncell(); ++c) {
-    Extent now;
-    for (size_t k = 0; k < 4; ++k) {
-      const size_t p = size_t{kStride} * b.tets[size_t{4} * c + k];
-      now.add(load3(&b.p.x[p]));
-      boxes[c].add(load3(before + p));
-    }
-    largest = std::max(largest, norm(now.hi - now.lo));
-    boxes[c].add(now.lo);
-    boxes[c].add(now.hi);
+    const uint32_t *const p = &b.tets[size_t{4} * c];
+    if (side[p[0]] & side[p[1]] & side[p[2]] & side[p[3]]) continue;
+    const BladeSide none{c, SideKind::none, 0, 0, 0};
+    near_.push_back({c, middle_of(b, before, c), middle_of(b, b.p.x.data(), c), 0, none});
   }
-  for (uint32_t c = 0; c < b.ncell(); ++c)
-    if (way.meets(boxes[c], kKept * largest)) {
-      const BladeSide none{c, SideKind::none, 0, 0, 0};
-      near_.push_back({c, middle_of(b, before, c), middle_of(b, b.p.x.data(), c), 0, none});
-    }
 }
 
 // Where the blade looks. false: nobody knows.
