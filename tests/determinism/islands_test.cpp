@@ -1,6 +1,8 @@
 // An island of contacts is solved as if it were alone: what bodies do has the same bits with and without
 // other bodies in the world that they do not touch.
 #include <algorithm>
+#include <cstdint>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -111,3 +113,57 @@ TEST(Islands, OnMoreThreads_HaveTheSameBits) {
   const auto one = run(stacks);
   for (const uint32_t threads : {2u, 3u, 4u}) EXPECT_EQ(run(stacks, threads), one) << threads;
 }
+
+namespace {
+
+// A host's loop that notes how many islands the contact solve has handed out.
+struct Jobs {
+  bool solve = false;
+  uint32_t most = 0;
+  static void run(void *user, uint32_t n, uint32_t grain, void (*fn)(void *, uint32_t, uint32_t),
+                  void *task) {
+    Jobs &jobs = *static_cast<Jobs *>(user);
+    if (jobs.solve && grain == 1) jobs.most = std::max(jobs.most, n);
+    for (uint32_t k = 0; k < n; k += grain) fn(task, k, std::min(n, k + grain));
+  }
+  static void begin(void *user, const char *stage) {
+    static_cast<Jobs *>(user)->solve = std::string_view(stage) == "contact+friction";
+  }
+  static void end(void *user, const char *) { static_cast<Jobs *>(user)->solve = false; }
+};
+
+// A beam that lies on two blocks on a floor: number of islands in the last of 40 steps.
+uint32_t islands_of_a_bridge() {
+  Jobs jobs;
+  dfm_context_def def = dfm_context_def_default();
+  def.plugin_dir = DEFORM_PLUGIN_DIR;
+  def.user = &jobs;
+  def.parallel_for = Jobs::run;
+  def.trace_begin = Jobs::begin;
+  def.trace_end = Jobs::end;
+  dfm_context *c = nullptr;
+  test::ok(dfm_context_create(&def, &c));
+  const dfm_world w = test::make_world(c);
+  test::add_plane(w, "floor");
+  test::BodyOptions o;
+  o.young = 2e5;
+  o.damping_stiffness = 1e-3;
+  o.integrator = DFM_INTEGRATOR_SYMPLECTIC_EULER;
+  for (const double x : {0.0, 0.3}) {
+    o.position = {x, 0, 1e-4};
+    test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 80, o);
+  }
+  o.position = {0, 0.01, 0.1002};
+  test::make_body(c, w, "beam", {0.4, 0.08, 0.05}, 200, o);
+  for (int k = 0; k < 40; ++k) {
+    jobs.most = 0;
+    test::ok(dfm_world_step(w, 1e-3, nullptr));
+  }
+  dfm_context_destroy(c);
+  return jobs.most;
+}
+
+}  // namespace
+
+// Both ends of the beam and both blocks: no point is in two of these patches.
+TEST(Islands, OfOneExplicitBody_AreItsPatches) { EXPECT_EQ(islands_of_a_bridge(), 4u); }

@@ -69,6 +69,12 @@ void each(size_t n, size_t grain, Tasks *tasks, F &&f) {
   if (failed) throw std::bad_alloc();
 }
 
+// m, the largest distance of triangles that are listed
+template <class Side>
+double reach_of(const Side &a, const Side &b) {
+  return kRounding * (a.margin + b.margin) + std::max(recovery_depth(*a.surface), recovery_depth(*b.surface));
+}
+
 bool finite_positions(const Surface &s) {
   double sum = 0;
   for (const double x : s.x) sum += x - x;
@@ -89,7 +95,7 @@ BroadPhase::BroadPhase(const Memory &memory)
       order_(HookAllocator<uint32_t>(memory_)),
       pairs_(HookAllocator<Pair>(memory_)),
       parts_(HookAllocator<Part>(memory_)),
-      merged_(HookAllocator<std::span<const uint64_t>>(memory_)),
+      lists_(HookAllocator<List>(memory_)),
       stack_(HookAllocator<PairOfTriangles>(memory_)) {
   found_.emplace_back(memory_);
 }
@@ -325,70 +331,66 @@ void BroadPhase::find_pairs(std::span<const BodyView> bodies, std::span<const Ob
 }
 
 void BroadPhase::list_pairs(Tasks *tasks) {
+  lists_.clear();
   if (!tasks || !tasks->parallel()) {
     for (const Pair &pair : pairs_) {
-      list(pair, 0, found_[0]);
+      list(pair, {0, 0}, found_[0]);
       add_segments(pair, {&found_[0], 1});
+      for (const List &l : lists_) put_together(l);
+      lists_.clear();
     }
     return;
   }
   parts_.clear();
   for (uint32_t i = 0; i < pairs_.size(); ++i) cut(i);
   while (found_.size() < parts_.size()) found_.emplace_back(memory_);
-  each(parts_.size(), 1, tasks, [&](size_t i) { list(pairs_[parts_[i].pair], parts_[i].node, found_[i]); });
+  each(parts_.size(), 1, tasks, [&](size_t i) { list(pairs_[parts_[i].pair], parts_[i].nodes, found_[i]); });
   for (size_t i = 0, end = 0; i < parts_.size(); i = end) {
     while (end < parts_.size() && parts_[end].pair == parts_[i].pair) ++end;
     add_segments(pairs_[parts_[i].pair], {&found_[i], end - i});
   }
+  each(lists_.size(), 1, tasks, [&](size_t i) { put_together(lists_[i]); });
 }
 
-// Surfaces alone are large enough: into halves of a's tree, of at most kPart nodes, those that are near b.
+// Surfaces alone are large enough. Most of the work is where they are nearest, so both trees are divided.
 void BroadPhase::cut(uint32_t pair) {
-  constexpr uint32_t kPart = 32, kMost = 64;  // kMost: nodes that wait, one for each level
+  constexpr size_t kParts = 16, kSmall = 32;  // nodes of both trees
   const Pair &p = pairs_[pair];
-  const BoxTree &tree = bodies_[p.a].tree;
-  if ((p.obstacle && things_[p.b].view.shape != Shape::mesh) || tree.nodes().size() <= kPart)
-    return parts_.push_back({pair, 0});
-  struct Piece { uint32_t node, end; } waiting[kMost];
-  uint32_t n = 0;
-  waiting[n++] = {0, uint32_t(tree.nodes().size())};
-  while (n > 0) {
-    const Piece at = waiting[--n];
-    const BoxTree::Node node = tree.nodes()[at.node];
-    if (at.end - at.node <= kPart || node.count || n + 2 > kMost) {
-      parts_.push_back({pair, at.node});
-      continue;
+  const bool surfaces = !p.obstacle || (things_[p.b].view.shape == Shape::mesh && things_[p.b].usable);
+  if (surfaces) {
+    const Side &a = bodies_[p.a];
+    const Side &b = p.obstacle ? static_cast<const Side &>(things_[p.b]) : bodies_[p.b];
+    if (a.tree.nodes().size() + b.tree.nodes().size() > kSmall) {
+      near_nodes(a.tree, b.tree, reach_of(a, b), kParts, stack_);
+      for (const PairOfTriangles nodes : stack_) parts_.push_back({pair, nodes});
     }
-    waiting[n++] = {node.right, at.end};
-    waiting[n++] = {at.node + 1, node.right};
   }
+  if (parts_.empty() || parts_.back().pair != pair) parts_.push_back({pair, {0, 0}});
 }
 
-void BroadPhase::list(const Pair &pair, uint32_t node, Found &found) const {
+void BroadPhase::list(const Pair &pair, PairOfTriangles nodes, Found &found) const {
   found.clear();
   const Body &a = bodies_[pair.a];
   if (!pair.obstacle) {
-    found.near = list_surfaces(a, bodies_[pair.b], node, found);
+    found.near = list_surfaces(a, bodies_[pair.b], nodes, found);
   } else {
     const Thing &thing = things_[pair.b];
     switch (thing.view.shape) {
-      case Shape::mesh: found.near = thing.usable && list_surfaces(a, thing, node, found); break;
+      case Shape::mesh: found.near = thing.usable && list_surfaces(a, thing, nodes, found); break;
       case Shape::voxels: found.near = list_voxels(a, thing, found); break;
       default: found.near = list_obstacle(a, thing, found);
     }
   }
-  for (Array<uint64_t> *list : {&found.vf, &found.fv, &found.ee}) std::sort(list->begin(), list->end());
 }
 
 // False where the two are too far apart for any.
-bool BroadPhase::list_surfaces(const Side &a, const Side &b, uint32_t node, Found &found) const {
+bool BroadPhase::list_surfaces(const Side &a, const Side &b, PairOfTriangles nodes, Found &found) const {
   const Features fa{*a.surface, a.x.data()}, fb{*b.surface, b.x.data()};
-  const double near = kRounding * (a.margin + b.margin);
+  const double near = kRounding * (a.margin + b.margin), wide = reach_of(a, b);
   const double edges = near + edge_recovery_depth(*a.surface, *b.surface);
   const double edges2 = edges * edges;
   const double deep_a = near + recovery_depth(*a.surface);
   const double deep_b = near + recovery_depth(*b.surface);
-  const double wide = std::max(deep_a, deep_b);
   if (!(box_distance2(a.tree.root(), b.tree.root()) <= wide * wide)) return false;
   // Surfels of one side against a triangle of the other: those that the triangle owns, so that no
   // pair comes twice.
@@ -413,7 +415,7 @@ bool BroadPhase::list_surfaces(const Side &a, const Side &b, uint32_t node, Foun
           found.ee.push_back(
               features(fa.surface.tri_edge[3 * size_t{s} + k], fb.surface.tri_edge[3 * size_t{t} + l]));
   };
-  near_pairs(a.tree, b.tree, wide, found.stack, look_at, node);
+  near_pairs(a.tree, b.tree, wide, found.stack, look_at, nodes);
   return true;
 }
 
@@ -507,20 +509,18 @@ void BroadPhase::add_segment(uint32_t a, uint32_t b, bool obstacle, uint8_t kind
                              std::span<const Found> parts, Array<uint64_t> Found::*list) {
   const uint64_t id_b = obstacle ? things_[b].view.id : bodies_[b].id;
   const size_t begin = fresh_.size();
-  merged_.clear();
-  for (const Found &found : parts)
-    if (!(found.*list).empty()) merged_.emplace_back(found.*list);
-  while (merged_.size() > 1) {
-    size_t least = 0;
-    for (size_t k = 1; k < merged_.size(); ++k)
-      if (merged_[k].front() < merged_[least].front()) least = k;
-    fresh_.push_back(merged_[least].front());
-    merged_[least] = merged_[least].subspan(1);
-    if (merged_[least].empty()) merged_.erase(merged_.begin() + std::ptrdiff_t(least));
-  }
-  if (!merged_.empty()) fresh_.insert(fresh_.end(), merged_[0].begin(), merged_[0].end());
+  size_t count = 0;
+  for (const Found &found : parts) count += (found.*list).size();
+  fresh_.resize(begin + count);
+  if (count) lists_.push_back({parts, list, begin});
   next_segments_.push_back(
-      {bodies_[a].id, id_b, a, b, uint32_t(begin), uint32_t(fresh_.size() - begin), obstacle, kind, true});
+      {bodies_[a].id, id_b, a, b, uint32_t(begin), uint32_t(count), obstacle, kind, true});
+}
+
+void BroadPhase::put_together(const List &l) {
+  uint64_t *const begin = &fresh_[l.begin], *end = begin;
+  for (const Found &found : l.parts) end = std::copy((found.*l.list).begin(), (found.*l.list).end(), end);
+  std::sort(begin, end);
 }
 
 // Runs in the order of contacts, from the old lists and the fresh ones.

@@ -110,15 +110,21 @@ class BroadPhase {
     uint32_t a, b;  // indices of the views; listed bodies in the order of ids
     bool obstacle;
   };
-  struct Part {  // of a pair: the triangles of a below that node of its tree
-    uint32_t pair, node;
+  struct Part {  // of a pair: the triangles below these nodes of its trees
+    uint32_t pair;
+    PairOfTriangles nodes;
   };
-  struct Found {        // {feature a, feature b} of one part, each sorted
+  struct Found {        // {feature a, feature b} of one part
     bool near = false;  // not too far apart for any
     Array<uint64_t> vf, fv, ee;
     Array<PairOfTriangles> stack;
     explicit Found(const Memory &memory);
     void clear();
+  };
+  struct List {  // of one pair and kind, from all parts; its place in fresh_
+    std::span<const Found> parts;
+    Array<uint64_t> Found::*list;
+    size_t begin;
   };
 
   void match(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
@@ -137,13 +143,14 @@ class BroadPhase {
                   const PairFilter &filter, Tasks *tasks);
   void list_pairs(Tasks *tasks);
   void cut(uint32_t pair);
-  void list(const Pair &pair, uint32_t node, Found &found) const;
-  bool list_surfaces(const Side &a, const Side &b, uint32_t node, Found &found) const;
+  void list(const Pair &pair, PairOfTriangles nodes, Found &found) const;
+  bool list_surfaces(const Side &a, const Side &b, PairOfTriangles nodes, Found &found) const;
   bool list_voxels(const Body &a, const Thing &thing, Found &found) const;
   bool list_obstacle(const Body &a, const Thing &thing, Found &found) const;
   void add_segments(const Pair &pair, std::span<const Found> parts);
   void add_segment(uint32_t a, uint32_t b, bool obstacle, uint8_t kind, std::span<const Found> parts,
                    Array<uint64_t> Found::*list);
+  void put_together(const List &list);
   void assemble();
 
   Memory memory_;
@@ -161,7 +168,7 @@ class BroadPhase {
   Array<Pair> pairs_;         // to be listed
   Array<Part> parts_;         // of these, in their order
   std::vector<Found> found_;  // by number in parts_; of one thread the first
-  Array<std::span<const uint64_t>> merged_;
+  Array<List> lists_;
   Array<PairOfTriangles> stack_;
   Stats stats_;
 };

@@ -318,32 +318,45 @@ Residual true_residual(const ContactRows &rows, const RowsPart &part, const Cont
   return inner_residual(rows, part, answer, h, tolerance);
 }
 
-void set_tolerance(const ContactRows &rows, const RowsPart &part, const ContactState &answer,
-                   std::span<const ContactPoint> contacts, double h, const ToleranceBounds &bounds,
-                   double *disturbance, Tolerance &tolerance) {
+namespace {
+
+// f(entries of the body) for both sides of contact i.
+template <class T, class F>
+void each_side(const uint32_t *sides, uint32_t i, T *disturbance, F &&f) {
+  const uint32_t *const side = sides + 2 * size_t{i};
+  f(disturbance + 2 * size_t{side[0]});
+  if (side[1] != kNone) f(disturbance + 2 * size_t{side[1]});
+}
+
+}  // namespace
+
+void find_disturbance(const ContactRows &rows, const RowsPart &part, const ContactState &answer, double h,
+                      const uint32_t *sides, double *disturbance) {
   const LawView law = answer.view();
-  auto visit = [&](uint32_t i, auto f) {
-    f(&disturbance[2 * size_t{contacts[i].slot_a}]);
-    if (!contacts[i].obstacle) f(&disturbance[2 * size_t{contacts[i].slot_b}]);
-  };
-  each_row(part.contacts, [&](uint32_t i) { visit(i, [](double *d) { d[0] = d[1] = 0; }); });
+  each_row(part.contacts,
+           [&](uint32_t i) { each_side(sides, i, disturbance, [](double *d) { d[0] = d[1] = 0; }); });
   each_row(part.contacts, [&](uint32_t i) {
     if (!(rows.wn[i] > 0)) return;
     const Vec3 u = rows.velocity(i);
     const bool rubs = rows.wt[i] > 0 && (rows.impulse[size_t(i) * 3] > 0 || answer.fn[i] > 0);
     const double normal = normal_residual(rows, i, u);
     const double tangent = rubs ? tangent_residual(rows, i, answered(rows, law, i, h, u)) : 0;
-    visit(i, [&](double *d) {
+    each_side(sides, i, disturbance, [&](double *d) {
       d[0] = std::max(d[0], tangent);
       d[1] = std::max({d[1], tangent, normal});
     });
   });
+}
+
+void set_tolerance(const ContactRows &rows, const RowsPart &part, std::span<const ContactPoint> contacts,
+                   double h, const ToleranceBounds &bounds, const uint32_t *sides, const double *disturbance,
+                   Tolerance &tolerance) {
   tolerance.most_normal = bounds.most_normal;
   each_row(part.contacts, [&](uint32_t i) {
     // what a gap is off by where coordinates are large: a few roundings of them
     double normal = std::max(bounds.normal, 0x1p-49 * norm(load3(contacts[i].point)) / h);
     double tangent = bounds.tangent;
-    visit(i, [&](const double *d) {
+    each_side(sides, i, disturbance, [&](const double *d) {
       tangent = std::max(tangent, 1e-2 * d[0]);
       normal = std::max(normal, 2e-2 * d[1]);
     });

@@ -120,4 +120,37 @@ void BoxTree::refit(std::span<const uint32_t> corners, const double *x) {
   }
 }
 
+void near_nodes(const BoxTree &a, const BoxTree &b, double margin, size_t wanted,
+                Array<PairOfTriangles> &out) {
+  const double limit = margin * margin;
+  const auto near = [&](PairOfTriangles p) { return box_distance2(a.boxes()[p.a], b.boxes()[p.b]) <= limit; };
+  out.clear();
+  if (a.empty() || b.empty() || !near({0, 0})) return;
+  out.push_back({0, 0});
+  // one after the other is divided, until a whole round has found leaves alone
+  for (size_t at = 0, leaves = 0; !out.empty() && out.size() < wanted && leaves < out.size();) {
+    at %= out.size();
+    const auto [i, j] = out[at];
+    const BoxTree::Node m = a.nodes()[i], n = b.nodes()[j];
+    if (m.count && n.count) {
+      ++leaves;
+      ++at;
+      continue;
+    }
+    leaves = 0;
+    const bool first = n.count || (!m.count && m.right - i >= n.right - j);
+    const PairOfTriangles left = first ? PairOfTriangles{i + 1, j} : PairOfTriangles{i, j + 1};
+    const PairOfTriangles right = first ? PairOfTriangles{m.right, j} : PairOfTriangles{i, n.right};
+    if (near(left)) {
+      out[at++] = left;
+      if (near(right)) out.push_back(right);
+    } else if (near(right)) {
+      out[at++] = right;
+    } else {
+      out[at] = out.back();
+      out.pop_back();
+    }
+  }
+}
+
 }  // namespace dfm

@@ -73,16 +73,21 @@ class BoxTree {
   double area_ = 0, area_built_ = 0;
 };
 
+// Pairs of nodes, no further apart than margin, below which all such pairs of triangles lie, each in one of
+// them: as many as wanted if the trees are deep enough.
+void near_nodes(const BoxTree &a, const BoxTree &b, double margin, size_t wanted,
+                Array<PairOfTriangles> &out);
+
 // f(place in a, place in b, squared distance of the boxes) for all triangles whose boxes are no further apart
-// than margin; places count in the order of the leaves. stack is scratch. from: node of a, whose triangles
-// alone are looked at.
+// than margin; places count in the order of the leaves. stack is scratch. from: two nodes, below which alone
+// triangles are looked at.
 template <class F>
 void near_pairs(const BoxTree &a, const BoxTree &b, double margin, Array<PairOfTriangles> &stack, F &&f,
-                uint32_t from = 0) {
+                PairOfTriangles from = {0, 0}) {
   if (a.empty() || b.empty()) return;
   const double limit = margin * margin;
   stack.clear();
-  stack.push_back({from, 0});
+  stack.push_back(from);
   while (!stack.empty()) {
     const auto [i, j] = stack.back();
     stack.pop_back();

@@ -17,7 +17,7 @@ StepContext::StepContext(const Meters &meters)
              stirred);
   use_memory(meters.contacts.memory(), lent, contacts, tolerance.normal, tolerance.tangent, disturbance,
              best_impulse, trial_response, tangents, match, sharing, aim, stands, ways, renewed, bonds,
-             bond_impulse, chosen, mean);
+             bond_impulse, chosen, mean, before);
   use_memory(meters.contacts.memory(), state.law, state.fn, state.vt, state.ft_stop, state.area, state.dwell,
              state.bristle, state.ft, state.dft_dvt, state.dft_dfn, state.limit, state.bristle_out,
              state.mode, state.form, state.slip, state.scale, state.linear, state.origin);

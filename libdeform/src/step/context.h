@@ -106,7 +106,8 @@ struct StepContext {
   bool ended = false;  // find_ends() has been asked since the last solve
   Guard guard;
   // commit
-  Array<double> mean;  // [dofs of rows,4] m/s, over the sub-step; of bodies
+  Array<double> mean;     // [dofs of rows,4] m/s, over the sub-step; of bodies
+  Array<uint8_t> before;  // [contacts] touched in the last sub-step
   // trades places with the world's
   ContactStore next_store;
   Report last_report;

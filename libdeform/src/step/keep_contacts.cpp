@@ -21,6 +21,7 @@ void reserve_contacts(World &w, StepContext &step) {
   each_column([&](const ContactColumn &column, auto &values) { values.reserve(column.entries(n, S)); }, to);
   each_report_column([&](size_t width, auto &column) { column.reserve(width * n); }, next);
   step.mean.reserve(size_t{kStride} * step.rows.ndof);
+  step.before.resize(n);
   w.work.reserve(std::min(w.work.size() + n, w.bodies.size() * (w.bodies.size() + w.obstacles.size())));
   reserve_events(w, size_t(n) + w.store.n + w.attachments.size());
   reserve_impulses(w, n);
@@ -83,6 +84,51 @@ Vec3 next_start(const World &w, const StepContext &step, uint32_t i) {
   return before.x > 0 && keeps_velocity(step.rows, i) ? 0.5 * (before + l) : l;
 }
 
+// What the next sub-step knows of contact i, and what is reported of it.
+void keep_contact(World &w, StepContext &step, uint32_t i) {
+  const uint32_t S = step.state.nstate;
+  ContactStore &to = step.next_store;
+  const ContactPoint &c = step.contacts[i];
+  const double *const l = &step.rows.impulse[size_t(i) * 3];
+  const uint32_t m = step.match[i];
+  // also if the normal was reversed and nothing else is kept
+  const uint32_t known = m != kNone ? m : w.store.find(c.key);
+  const bool before = known != kNone && w.store.touching[known];
+  // hysteresis: a contact ends when it carries nothing and has opened by a tenth of the offset
+  const bool now = l[0] > 0 || (before && c.distance - w.offset < 0.1 * w.offset);
+  const bool stick = l[0] > 0 && step.state.mode[i] == 1;
+  to.key[i] = c.key;
+  to.id_a[i] = w.bodies[c.slot_a]->id;
+  to.id_b[i] = c.obstacle ? w.obstacles[c.slot_b]->id : w.bodies[c.slot_b]->id;
+  to.law[i] = step.state.law[i];
+  to.by_key[i] = i;
+  store3(&to.normal[size_t(3) * i], load3(&step.rows.frame[size_t(9) * i]));
+  store3(&to.tangent[size_t(3) * i], load3(&step.rows.frame[size_t(9) * i + 3]));
+  store3(&to.impulse[size_t(3) * i], next_start(w, step, i));
+  // its law wrote no more: the rest of the columns belongs to other laws
+  const uint32_t own = now ? w.pairs.laws[step.state.law[i]]->nstate : 0;
+  for (uint32_t s = 0; s < S; ++s)
+    to.bristle[size_t(S) * i + s] = s < own ? step.state.bristle_out[size_t(s) * step.state.stride + i] : 0;
+  to.dwell[i] = now ? step.state.dwell[i] + step.h : 0;
+  to.area[i] = step.state.area[i];
+  const double v1 = step.state.vt[i], v2 = step.state.vt[step.state.stride + i];
+  // A hold counts from hold_begin on: contacts that stick in the first sub-step after it and in every one
+  // since.
+  const bool first = w.time <= w.hold.start, carried = !first && m != kNone && w.store.held[m];
+  const bool holds = w.hold.on && stick && (first || carried);
+  to.path[2 * i] = holds ? (carried ? w.store.path[2 * m] : 0) + step.h * v1 : 0;
+  to.path[2 * i + 1] = holds ? (carried ? w.store.path[2 * m + 1] : 0) + step.h * v2 : 0;
+  to.touching[i] = now;
+  to.held[i] = holds;
+  to.began[i] = now && !before;
+  step.before[i] = before;
+  w.report.contacts[i] = c;
+  w.report.contacts[i].area = step.state.area[i];
+  w.report.slip[2 * i] = v1;
+  w.report.slip[2 * i + 1] = v2;
+  w.report.mode[i] = step.state.mode[i];
+}
+
 }  // namespace
 
 void keep_contacts(World &w, StepContext &step) {
@@ -99,59 +145,23 @@ void keep_contacts(World &w, StepContext &step) {
       to);
   w.report.n = n;
   w.report.h = step.h;
-  w.report.contacts.assign(step.contacts.begin(), step.contacts.end());
-  for (uint32_t i = 0; i < n; ++i) w.report.contacts[i].area = step.state.area[i];
+  w.report.contacts.resize(n);
   w.report.frame.assign(step.rows.frame.begin(), step.rows.frame.begin() + std::ptrdiff_t{9} * n);
   w.report.impulse.assign(step.rows.impulse.begin(), step.rows.impulse.begin() + std::ptrdiff_t{3} * n);
   w.report.slip.resize(size_t(2) * n);
   w.report.mode.resize(n);
 
+  each_row_in_blocks(n, &w.context->tasks, [&](uint32_t i) { keep_contact(w, step, i); });
   uint32_t touching = 0, sticking = 0;
   for (uint32_t i = 0; i < n; ++i) {
-    const ContactPoint &c = step.contacts[i];
-    const uint64_t a = w.bodies[c.slot_a]->id;
-    const uint64_t b = c.obstacle ? w.obstacles[c.slot_b]->id : w.bodies[c.slot_b]->id;
+    const uint64_t a = to.id_a[i], b = to.id_b[i];
+    if (to.began[i]) add_event(w, DFM_EVENT_BEGIN, a, b, to.key[i], w.time + step.h);
+    if (step.before[i] && !to.touching[i]) add_event(w, DFM_EVENT_END, a, b, to.key[i], w.time + step.h);
     const double *const l = &step.rows.impulse[size_t(i) * 3];
-    const uint32_t m = step.match[i];
-    // also if the normal was reversed and nothing else is kept
-    const uint32_t known = m != kNone ? m : w.store.find(c.key);
-    const bool before = known != kNone && w.store.touching[known];
-    // hysteresis: a contact ends when it carries nothing and has opened by a tenth of the offset
-    const bool now = l[0] > 0 || (before && c.distance - w.offset < 0.1 * w.offset);
-    const bool stick = l[0] > 0 && step.state.mode[i] == 1;
-    to.key[i] = c.key;
-    to.id_a[i] = a;
-    to.id_b[i] = b;
-    to.law[i] = step.state.law[i];
-    to.by_key[i] = i;
-    store3(&to.normal[size_t(3) * i], load3(&step.rows.frame[size_t(9) * i]));
-    store3(&to.tangent[size_t(3) * i], load3(&step.rows.frame[size_t(9) * i + 3]));
-    store3(&to.impulse[size_t(3) * i], next_start(w, step, i));
-    // its law wrote no more: the rest of the columns belongs to other laws
-    const uint32_t own = now ? w.pairs.laws[step.state.law[i]]->nstate : 0;
-    for (uint32_t s = 0; s < S; ++s)
-      to.bristle[size_t(S) * i + s] = s < own ? step.state.bristle_out[size_t(s) * step.state.stride + i] : 0;
-    to.dwell[i] = now ? step.state.dwell[i] + step.h : 0;
-    to.area[i] = step.state.area[i];
-    const double v1 = step.state.vt[i], v2 = step.state.vt[step.state.stride + i];
-    // A hold counts from hold_begin on: contacts that stick in the first sub-step after it and in every one
-    // since.
-    const bool first = w.time <= w.hold.start, carried = !first && m != kNone && w.store.held[m];
-    const bool holds = w.hold.on && stick && (first || carried);
-    to.path[2 * i] = holds ? (carried ? w.store.path[2 * m] : 0) + step.h * v1 : 0;
-    to.path[2 * i + 1] = holds ? (carried ? w.store.path[2 * m + 1] : 0) + step.h * v2 : 0;
-    to.touching[i] = now;
-    to.held[i] = holds;
-    to.began[i] = now && !before;
-    if (now && !before) add_event(w, DFM_EVENT_BEGIN, a, b, c.key, w.time + step.h);
-    if (before && !now) add_event(w, DFM_EVENT_END, a, b, c.key, w.time + step.h);
-    w.report.slip[2 * i] = v1;
-    w.report.slip[2 * i + 1] = v2;
-    w.report.mode[i] = step.state.mode[i];
-    touching += now;
-    sticking += stick;
-
-    if (l[1] != 0 || l[2] != 0) work_of(w, a, b).friction += l[1] * v1 + l[2] * v2;
+    touching += to.touching[i];
+    sticking += l[0] > 0 && step.state.mode[i] == 1;
+    if (l[1] != 0 || l[2] != 0)
+      work_of(w, a, b).friction += l[1] * w.report.slip[2 * i] + l[2] * w.report.slip[2 * i + 1];
   }
   follow_load(w, step);
   turn_frames(w, step);

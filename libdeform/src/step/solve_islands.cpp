@@ -66,10 +66,10 @@ bool may_ask(const World &w, const StepContext &step, SolveIsland &own) {
 // them bear most of the load that one can lead round as well, so from then on two passes by one response
 // that do not halve the residual are followed by passes with the other.
 constexpr double kHalves = 0.5;
-void choose_response(const World &w, SolveIsland &own, double now, double before) {
+void choose_response(const World &w, SolveIsland &own) {
   if (!asks_beyond(w, own)) return;
   if (!own.asked) own.common = true;
-  else if (own.asked >= 2 && !(now <= kHalves * before)) {
+  else if (own.asked >= 2 && !(own.due <= kHalves * own.due_before)) {
     own.common = !own.common;
     own.asked = 0;
   }
@@ -201,6 +201,34 @@ bool asks_redundant(const World &w, const StepContext &step, SolveIsland &own) {
          !w.prescribed.stands() && own.redundant.found(step.rows, own.part);
 }
 
+// A residual costs as much as a sweep, where points answer their own impulses alone. A sweep seldom leaves
+// less than a quarter of it, and seldom less than a half where the ones before left more than 0.7: it is
+// looked at again when it could be good at the earliest. Not once the polish is over, where the best state
+// is looked for (doc/decisions/0419-islands-by-unknowns.md).
+class Looks {
+ public:
+  bool due(const StepContext &step, const SolveIsland &own, uint32_t cap) const {
+    if (own.sweeps >= std::min({next_, kPolish, cap}) || !own.part.blocks.empty()) return true;
+    Spent spent = own.spent;
+    return own.sweeps >= kFewSweeps && spares(step, spent, Thrift::sweeps);
+  }
+  void note(uint32_t sweeps, const Residual &left, double most) {
+    const int size = std::ilogb(left.due / most);  // in halves
+    const bool slow = known_ && 2 * (size_ - size) <= int(sweeps - at_);
+    const int sweeps_left = slow ? size + 1 : (size + 2) / 2;
+    next_ = sweeps + uint32_t(std::clamp(sweeps_left, 1, kMostUnseen));
+    known_ = true;
+    size_ = size;
+    at_ = sweeps;
+  }
+
+ private:
+  static constexpr int kMostUnseen = 4;
+  bool known_ = false;
+  int size_ = 0;
+  uint32_t at_ = 0, next_ = 0;
+};
+
 // Sweeps on the laws as they were last answered. At the cap the best state seen is taken, not the last one.
 // Returns whether the result is good enough.
 bool sweep_until_good(const World &w, StepContext &step, SolveIsland &own) {
@@ -209,21 +237,28 @@ bool sweep_until_good(const World &w, StepContext &step, SolveIsland &own) {
   double best = std::numeric_limits<double>::infinity();
   keep_best(step, own);
   own.acceleration.start(rows, own.part);
+  constexpr double kMost = 0.5;  // of the tolerance
   bool asks = false;
+  Looks looks;
   for (double before = leave_of(own);;) {
     const double leave = leave_of(own);
     if (leave > before) own.acceleration.start(rows, own.part);
     before = leave;
     if (asks) own.redundant.note(rows, own.part);
     sweep_once(w, step, own, leave);
+    if (!looks.due(step, own, cap)) {
+      own.acceleration.follow(rows, own.part);
+      continue;
+    }
     Residual left = inner_residual(rows, own.part, step.state, step.h, own.tolerance);
-    if (asks && left.due > 0.5 && own.redundant.stands(rows, own.part, step.state, step.h, own.tolerance))
+    if (asks && left.due > kMost && own.redundant.stands(rows, own.part, step.state, step.h, own.tolerance))
       left = inner_residual(rows, own.part, step.state, step.h, own.tolerance);
     if (!(left.due <= kRunsAway * std::max(1.0, best)) || !(left.due < std::numeric_limits<double>::max())) {
       take_best(step, own);
       return false;
     }
-    if (good(step, own, left, 0.5)) return true;
+    if (good(step, own, left, kMost)) return true;
+    looks.note(own.sweeps, left, kMost);
     if (left.due < best) {
       best = left.due;
       keep_best(step, own);
@@ -243,7 +278,7 @@ bool sweep_until_good(const World &w, StepContext &step, SolveIsland &own) {
   };
   each_row(own.part.contacts, go_back);
   each_row(own.part.bonds, go_back);
-  if (best > 0.5 && own.revises) settle(w, step, own, best);
+  if (best > kMost && own.revises) settle(w, step, own, best);
   if (strides_help(own, best)) stride_on(w, step, own);
   return best <= 1;
 }
@@ -269,43 +304,45 @@ void hold_work_back(const World &w, StepContext &step, SolveIsland &own) {
   }
 }
 
+// A pass asks the laws at the state so far. False: one has failed.
+bool ask(const World &w, StepContext &step, SolveIsland &own) {
+  spend(w, step, own.spent, 4 * uint64_t{own.part.all()});
+  choose_response(w, own);
+  const double *const response = trial_response(step, own);
+  set_trial(step.rows, own.part, step.h, response, step.state);
+  // The sweeps take the next Newton step from there: what is asked a hundredth off is answered to a
+  // ten-thousandth.
+  if ((own.bad = own.batches.answer(step.h, response, 0.1 * tangent_at_rest(w, step.h), 1e-2, step.state)))
+    return false;
+  if (own.batches.smooth()) linearize(step.rows, own.part, step.h, step.state);
+  ++own.passes;
+  return true;
+}
+bool ask_slopes(StepContext &step, SolveIsland &own) {
+  if ((own.bad = own.batches.slopes(step.h, step.state))) return false;
+  if (own.batches.differences()) linearize(step.rows, own.part, step.h, step.state);
+  return true;
+}
+
+// The laws at the warm start, and what it leaves at the bodies.
+void start_island(const World &w, StepContext &step, SolveIsland &own) {
+  if (ask(w, step, own) && ask_slopes(step, own))
+    find_disturbance(step.rows, own.part, step.state, step.h, step.solve_islands.sides(),
+                     step.disturbance.data());
+}
+
 // Passes until the true residual is good enough, or a law has failed.
 void solve_passes(const World &w, StepContext &step, SolveIsland &own) {
-  const double gap_margin = normal_at_rest(w, step.h), least = tangent_at_rest(w, step.h);
-  const bool memory = own.batches.remembers();
-  // an equilibrium is as good as its contacts: nothing is left to a next sub-step
-  const ToleranceBounds bounds =
-      w.prescribed.stands()
-          ? ToleranceBounds{least, least, least}
-          : ToleranceBounds{least, memory || own.revises ? kRememberedRest * least : gap_margin,
-                            memory ? kRememberedShare * gap_margin : gap_margin};
-  double now = std::numeric_limits<double>::infinity(), before = now;
   for (;;) {
-    spend(w, step, own.spent, 4 * uint64_t{own.part.all()});
-    choose_response(w, own, now, before);
-    const double *const response = trial_response(step, own);
-    set_trial(step.rows, own.part, step.h, response, step.state);
-    // The sweeps take the next Newton step from there: what is asked a hundredth off is answered to a
-    // ten-thousandth.
-    if ((own.bad = own.batches.answer(step.h, response, 0.1 * least, 1e-2, step.state))) return;
-    if (own.batches.smooth()) linearize(step.rows, own.part, step.h, step.state);
-    ++own.passes;
-    if (own.sweeps) {
-      own.residual = true_residual(step.rows, own.part, step.state, step.h, own.tolerance);
-      before = std::exchange(now, own.residual.due);
-      if (good(step, own, own.residual, 1) || own.passes > w.def.max_passes ||
-          !(may_sweep(w, step, own, own.residual, w.def.max_sweeps) || may_ask(w, step, own)))
-        return;
-    }
-    if ((own.bad = own.batches.slopes(step.h, step.state))) return;
-    if (own.batches.differences()) linearize(step.rows, own.part, step.h, step.state);
-    if (!own.sweeps) {
-      set_tolerance(step.rows, own.part, step.state, step.contacts, step.h, bounds, step.disturbance.data(),
-                    own.tolerance);
-      own.redundant.allow(own.part, own.tolerance);
-    }
     // at least one sweep on a warm start is part of the method
     if (!sweep_until_good(w, step, own)) hold_work_back(w, step, own);
+    if (!ask(w, step, own)) return;
+    own.residual = true_residual(step.rows, own.part, step.state, step.h, own.tolerance);
+    own.due_before = std::exchange(own.due, own.residual.due);
+    if (good(step, own, own.residual, 1) || own.passes > w.def.max_passes ||
+        !(may_sweep(w, step, own, own.residual, w.def.max_sweeps) || may_ask(w, step, own)))
+      return;
+    if (!ask_slopes(step, own)) return;
   }
 }
 
@@ -315,6 +352,18 @@ void solve_passes(const World &w, StepContext &step, SolveIsland &own) {
 // (contact/recovery.h, doc/decisions/0411-opening-depths-does-little-work.md).
 constexpr double kSlowOpening = 0.03;  // of the rest distance in a sub-step: this is always allowed
 void solve_island(const World &w, StepContext &step, SolveIsland &own) {
+  if (own.bad || own.thrown) return;
+  const double gap_margin = normal_at_rest(w, step.h), least = tangent_at_rest(w, step.h);
+  const bool memory = own.batches.remembers();
+  // an equilibrium is as good as its contacts: nothing is left to a next sub-step
+  const ToleranceBounds bounds =
+      w.prescribed.stands()
+          ? ToleranceBounds{least, least, least}
+          : ToleranceBounds{least, memory || own.revises ? kRememberedRest * least : gap_margin,
+                            memory ? kRememberedShare * gap_margin : gap_margin};
+  set_tolerance(step.rows, own.part, step.contacts, step.h, bounds, step.solve_islands.sides(),
+                step.disturbance.data(), own.tolerance);
+  own.redundant.allow(own.part, own.tolerance);
   const double slow = kSlowOpening * w.offset / step.guard.planned;
   for (bool last = false;;) {
     solve_passes(w, step, own);
@@ -327,44 +376,103 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
     slow_opening(step.rows, own.part, last ? 0 : std::sqrt(opening.allowed / work));
     own.slowed = true;
     drop_impulses(step.rows, own.part);
-    own.passes = own.sweeps = 0;
+    own.start();
+    if (!ask(w, step, own) || !ask_slopes(step, own)) return;
   }
 }
 
 }  // namespace
 
-SolveIslands::SolveIslands(const Memory &m) : memory_(m), bodies_(m) {
-  use_memory(m, pairs_, number_, order_, contact_, bond_, block_, begin_);
+SolveIslands::SolveIslands(const Memory &m) : memory_(m), joined_(m) {
+  use_memory(m, pairs_, owner_, met_, side_, body_of_, largest_, sides_, order_, contact_, bond_, block_,
+             begin_);
+}
+
+// Pairs that move the same unknown.
+void SolveIslands::join(const ContactRows &rows) {
+  joined_.start(static_cast<uint32_t>(pairs_.size()));
+  owner_.assign(pairs_.size() > 1 ? rows.ndof : 0, kNone);
+  for (uint32_t k = 0; k < pairs_.size() && !owner_.empty(); ++k) {
+    bool points = false;  // of a pair without them the first row tells all
+    const auto move = [&](uint32_t dof) {
+      const uint32_t block = rows.block[dof];
+      points = points || block == kNone;
+      uint32_t &owner = owner_[block == kNone ? dof : rows.blocks[block].first];
+      if (owner == kNone) owner = k;
+      else if (owner != k) joined_.join(owner, k);
+    };
+    const RowRun run = pairs_[k].rows;
+    for (uint32_t i = run.first; i < run.first + run.n; ++i) {
+      for (uint32_t j = rows.begin[i]; j < rows.begin[i + 1]; ++j) move(rows.dof[j]);
+      if (!rows.rigid.empty() && rows.rigid[i] != kNone) move(rows.rigid[i]);
+      if (!points) break;
+    }
+  }
+  joined_.finish();
+  count_ = joined_.count;
+}
+
+// A body in two islands is two sides.
+void SolveIslands::number_sides(size_t bodies, size_t of_contacts) {
+  met_.assign(bodies, kNone);
+  side_.resize(bodies);
+  body_of_.clear();
+  const auto number = [&](uint32_t body, uint32_t island) {
+    if (body == kNone) return kNone;
+    if (std::exchange(met_[body], island) != island) {
+      side_[body] = static_cast<uint32_t>(body_of_.size());
+      body_of_.push_back(body);
+    }
+    return side_[body];
+  };
+  for (uint32_t k = 0; k < count_; ++k)
+    for (uint32_t m = joined_.begin[k]; m < joined_.begin[k + 1]; ++m) {
+      const Pair &p = pairs_[joined_.member[m]];
+      if (joined_.member[m] >= of_contacts) continue;
+      const uint32_t a = number(p.a, k), b = number(p.b, k);
+      for (uint32_t i = p.rows.first; i < p.rows.first + p.rows.n; ++i) {
+        sides_[2 * size_t{i}] = a;
+        sides_[2 * size_t{i} + 1] = b;
+      }
+    }
+}
+
+bool SolveIslands::shares_sides() const {
+  size_t bodies = 0;
+  for (const uint32_t m : met_) bodies += m != kNone;
+  return bodies < body_of_.size();
+}
+
+void SolveIslands::largest_by_body(Array<double> &values) {
+  largest_.assign(2 * met_.size(), 0.0);
+  const auto each = [&](auto &&f) {
+    for (size_t s = 0; s < body_of_.size(); ++s)
+      for (size_t k = 0; k < 2; ++k) f(values[2 * s + k], largest_[2 * size_t{body_of_[s]} + k]);
+  };
+  each([](double value, double &most) { most = std::max(most, value); });
+  each([](double &value, double most) { value = most; });
 }
 
 // Rows of the same two sides follow each other, so that little is done for each row.
 void SolveIslands::find(const World &w, StepContext &step) {
-  const uint32_t nbody = static_cast<uint32_t>(w.bodies.size());
-  bodies_.start(nbody + static_cast<uint32_t>(step.rigid_groups.size()));
   pairs_.clear();
   const auto add = [&](const auto &all, uint32_t first) {
     for (uint32_t i = 0; i < all.size();) {
       const auto &c = all[i];
       const uint32_t begin = i, a = c.slot_a, b = c.slot_b, obstacle = c.obstacle;
       while (++i < all.size() && all[i].slot_a == a && all[i].slot_b == b && all[i].obstacle == obstacle) {}
-      pairs_.push_back({a, {first + begin, i - begin}});
-      const uint32_t group = !obstacle || step.rigid_places.empty() ? kNone : step.rigid_places[b].group;
-      if (!obstacle) bodies_.join(a, b);
-      else if (group != kNone) bodies_.join(a, nbody + group);  // others feel nothing
+      pairs_.push_back({a, obstacle ? kNone : b, {first + begin, i - begin}});
     }
   };
   add(step.contacts, 0);
   const size_t of_contacts = pairs_.size();
   add(step.bonds, step.rows.n);
-  bodies_.finish();
-  number_.assign(bodies_.count, kNone);
-  for (const Pair &p : pairs_) number_[bodies_.of[p.body]] = 0;
-  count_ = 0;
-  for (uint32_t &n : number_)
-    if (n != kNone) n = count_++;
+  join(step.rows);
+  sides_.resize(2 * size_t{step.rows.n});
+  number_sides(w.bodies.size(), of_contacts);
   while (islands_.size() < count_) islands_.emplace_back(memory_);
 
-  const auto of = [&](const Pair &p) { return number_[bodies_.of[p.body]]; };
+  const auto of = [&](const Pair &p) { return joined_.of[size_t(&p - pairs_.data())]; };
   // begin_[k] is then the end of island k's, where that of the next one begins
   const auto split = [&](std::span<const Pair> pairs, Array<RowRun> &out) {
     begin_.assign(size_t{count_} + 1, 0);
@@ -404,7 +512,7 @@ void SolveIslands::find(const World &w, StepContext &step) {
 
   const Array<ContactRows::Block> &blocks = step.rows.blocks;
   const auto of_block = [&](const ContactRows::Block &b) {
-    return number_[bodies_.of[b.group == kNone ? b.source : nbody + b.group]];
+    return owner_.empty() ? 0 : joined_.of[owner_[b.first]];
   };
   begin_.assign(size_t{count_} + 1, 0);
   for (const ContactRows::Block &b : blocks) ++begin_[of_block(b) + 1];
@@ -441,37 +549,46 @@ const SolveIsland *solve_islands(World &w, StepContext &step) {
   step.tolerance.tangent.resize(n);
   step.trial_response.resize(n);
   step.best_impulse.resize(3 * size_t{step.rows.all()});
-  step.disturbance.resize(2 * w.bodies.size());
+  step.disturbance.resize(2 * size_t{step.solve_islands.side_count()});
   const std::span<SolveIsland> all = step.solve_islands.all();
   uint64_t rows = 0;
   for (SolveIsland &own : all) {
     if (!own.open) continue;
     rows += own.part.all();
-    own.passes = own.sweeps = 0;
+    own.start();
     own.slowed = false;
-    own.common = false;
-    own.asked = 0;
     own.limit.reserve(own.part.n);
+    own.spent = {0, 0, own.part.all(), Thrift::none, 0};
     own.residual = {};
     own.bad = nullptr;
     own.thrown = nullptr;
     own.tolerance.normal = step.tolerance.normal.data();
     own.tolerance.tangent = step.tolerance.tangent.data();
   }
+  for (SolveIsland &own : all) own.spent.all = rows;
   const std::span<const uint32_t> order = step.solve_islands.by_size();
   if (step.counting.most > 0) step.counting.bodies = body_effort(w, step);
-  w.context->tasks.parallel_for(static_cast<uint32_t>(order.size()), 1, [&](uint32_t begin, uint32_t end) {
-    for (uint32_t k = begin; k < end; ++k) {
-      SolveIsland &own = all[order[k]];
-      if (!own.open) continue;
-      own.spent = {0, rows, own.part.all(), Thrift::none, 0};
-      try {
-        solve_island(w, step, own);
-      } catch (...) {
-        own.thrown = std::current_exception();
+  // one job for both, unless islands share a body: then its tolerances follow from all of them
+  const bool shared = step.solve_islands.shares_sides();
+  const auto run = [&](bool starts, bool solves) {
+    w.context->tasks.parallel_for(static_cast<uint32_t>(order.size()), 1, [&](uint32_t begin, uint32_t end) {
+      for (uint32_t k = begin; k < end; ++k) {
+        SolveIsland &own = all[order[k]];
+        if (!own.open) continue;
+        try {
+          if (starts) start_island(w, step, own);
+          if (solves) solve_island(w, step, own);
+        } catch (...) {
+          own.thrown = std::current_exception();
+        }
       }
-    }
-  });
+    });
+  };
+  run(true, !shared);
+  if (shared) {
+    step.solve_islands.largest_by_body(step.disturbance);
+    run(false, true);
+  }
   for (const SolveIsland &own : all)
     if (own.open) charge(w, step, own.spent);
   const SolveIsland *bad = nullptr;

@@ -233,6 +233,34 @@ TEST(BroadPhase, OnePairOfSurfaces_IsListedInParts) {
   }
 }
 
+// A small surface on a large one: most of the large one is far away, and the small one is a few leaves.
+TEST(BoxTree, NodesThatAreNear_HoldEachNearPairOnce) {
+  Scene scene;
+  scene.add(moved(sphere_mesh(0.05, 1), Quat{}, Vec3{0.35, 0, 0}));
+  scene.add(moved(sphere_mesh(0.3, 3), Quat{}, Vec3{}));
+  BoxTree small(Memory::standard()), large(Memory::standard());
+  small.build(scene.bodies[0].surface->tri, scene.bodies[0].surface->x.data());
+  large.build(scene.bodies[1].surface->tri, scene.bodies[1].surface->x.data());
+  Array<PairOfTriangles> stack{HookAllocator<PairOfTriangles>(Memory::standard())}, nodes = stack;
+  for (const double margin : {0.001, 0.05, 10.0}) {
+    std::vector<std::pair<uint32_t, uint32_t>> whole, parts;
+    near_pairs(small, large, margin, stack, [&](uint32_t p, uint32_t q, double) { whole.push_back({p, q}); });
+    near_nodes(small, large, margin, 16, nodes);
+    EXPECT_GE(nodes.size(), 16u) << margin;
+    for (const PairOfTriangles from : nodes) {
+      const size_t before = parts.size();
+      near_pairs(
+          small, large, margin, stack, [&](uint32_t p, uint32_t q, double) { parts.push_back({p, q}); },
+          from);
+      EXPECT_LT(2 * (parts.size() - before), whole.size() + 2) << "one part has most of the pairs";
+    }
+    std::sort(whole.begin(), whole.end());
+    std::sort(parts.begin(), parts.end());
+    EXPECT_FALSE(whole.empty());
+    EXPECT_EQ(parts, whole) << margin;
+  }
+}
+
 TEST(BroadPhase, PairWithoutMemoryOnTwoThreads_ThrowsInTheCaller) {
   Scene scene = random_scene(12, 1);
   static std::atomic<bool> refuses;
