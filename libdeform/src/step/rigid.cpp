@@ -214,6 +214,7 @@ bool stage_rigid_commit(World &w, StepContext &step, uint32_t *trouble) {
     if (!stage_solve(w, step, trouble)) return false;
   }
   step.rigid_again = false;
+  step.tools.turn_jaws();
   // From here on (guard) their true motion is used.
   for (auto &o : w.obstacles) {
     if (!o->rigid || o->rigid->group[o->rigid_body] == DFM_RIGID_STILL) continue;

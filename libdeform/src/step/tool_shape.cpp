@@ -1,0 +1,153 @@
+#include "step/tool_shape.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "geometry/closest.h"
+
+namespace dfm {
+namespace {
+
+constexpr double kAlong = 1e-9;  // of a normal that counts as on the border of the cone of an edge
+
+Vec3 least(Vec3 a, Vec3 b) { return {std::min(a.x, b.x), std::min(a.y, b.y), std::min(a.z, b.z)}; }
+Vec3 most(Vec3 a, Vec3 b) { return {std::max(a.x, b.x), std::max(a.y, b.y), std::max(a.z, b.z)}; }
+
+}  // namespace
+
+bool ToolBox::holds(Vec3 from, Vec3 to) const {
+  const Vec3 a = least(from, to), b = most(from, to);
+  return a.x <= hi.x && a.y <= hi.y && a.z <= hi.z && b.x >= lo.x && b.y >= lo.y && b.z >= lo.z;
+}
+
+bool ToolShape::Edge::leaves(Vec3 n) const {
+  for (int k = 0; k < faces; ++k)
+    if (!(dot(n, beside[k]) < kAlong)) return false;
+  return true;
+}
+
+bool ToolShape::takes_part(const ObstacleView &o) {
+  return o.shape == Shape::sphere || o.shape == Shape::capsule || o.shape == Shape::box ||
+         o.shape == Shape::mesh;
+}
+
+ToolShape::ToolShape(const ObstacleView &view) : shape_(view), surface_(view.surface) {
+  if (view.shape == Shape::sphere || view.shape == Shape::capsule) round_ = view.radius;
+  reach_ = (view.shape == Shape::sphere ? 0 : shape_.extent()) + round_;
+}
+
+ToolBox ToolShape::bounds() const {
+  ToolBox out;
+  if (shape_.view().shape != Shape::mesh) {
+    double lo[3], hi[3];
+    shape_.bounds(lo, hi);
+    return {load3(lo), load3(hi)};
+  }
+  out.lo = {HUGE_VAL, HUGE_VAL, HUGE_VAL};
+  out.hi = -out.lo;
+  for (uint32_t i = 0; i < surface_->nsurfel; ++i) {
+    out.lo = least(out.lo, node(i));
+    out.hi = most(out.hi, node(i));
+  }
+  return out;
+}
+
+Vec3 ToolShape::face_normal(uint32_t t) const {
+  const uint32_t *const c = &surface_->tri[3 * size_t{t}];
+  const Vec3 n = cross(node(c[1]) - node(c[0]), node(c[2]) - node(c[0]));
+  const double length = norm(n);
+  return length > 0 ? (1 / length) * n : Vec3{};
+}
+
+// A concave edge is left in no direction: corners and other edges come first. On a border of the cone an edge
+// counts, since the edge of one box that lies square on the face of another one crosses nothing else.
+ToolShape::Edge ToolShape::edge_of_mesh(uint32_t e) const {
+  const uint32_t *const end = &surface_->edge[2 * size_t{e}];
+  Edge out;
+  out.from = node(end[0]);
+  out.to = node(end[1]);
+  for (const size_t k : {0, 1}) {
+    const uint32_t t = surface_->edge_tri[2 * size_t{e} + k];
+    if (t == kNone) continue;
+    const uint32_t *const c = &surface_->tri[3 * size_t{t}];
+    const Vec3 middle = (1.0 / 3) * (node(c[0]) + node(c[1]) + node(c[2])), n = face_normal(t);
+    Vec3 into = cross(n, out.to - out.from);
+    if (dot(into, middle - out.from) < 0) into = -into;
+    const double length = norm(into);
+    out.beside[out.faces++] = length > 0 ? (1 / length) * into : Vec3{};
+  }
+  return out;
+}
+
+void ToolShape::look_at_mesh(const ToolBox &near) {
+  triangles_.clear();
+  for (uint32_t i = 0; i < surface_->nsurfel; ++i)
+    if (near.holds(node(i), node(i))) corners_.push_back(node(i));
+  for (uint32_t e = 0; e < surface_->nedge; ++e) {
+    const uint32_t *const end = &surface_->edge[2 * size_t{e}];
+    if (near.holds(node(end[0]), node(end[1]))) edges_.push_back(edge_of_mesh(e));
+  }
+  for (uint32_t t = 0; t < surface_->ntri; ++t) {
+    const uint32_t *const c = &surface_->tri[3 * size_t{t}];
+    const Vec3 lo = least(least(node(c[0]), node(c[1])), node(c[2]));
+    if (near.holds(lo, most(most(node(c[0]), node(c[1])), node(c[2])))) triangles_.push_back(t);
+  }
+}
+
+void ToolShape::look_at(const ToolBox &near) {
+  corners_.clear();
+  edges_.clear();
+  switch (shape_.view().shape) {
+    case Shape::mesh: return look_at_mesh(near);
+    case Shape::box:
+      for (uint32_t i = 0; i < 8; ++i) corners_.push_back(shape_.corner(i));
+      for (uint32_t i = 0; i < 12; ++i) {
+        Edge e;
+        uint32_t face[2];
+        shape_.edge(i, e.from, e.to, face);
+        // what is away from the edge in one face is away from the other one
+        e.beside[0] = -shape_.face_normal(face[1]);
+        e.beside[1] = -shape_.face_normal(face[0]);
+        e.faces = 2;
+        edges_.push_back(e);
+      }
+      return;
+    case Shape::capsule: {
+      Edge e;
+      e.from = shape_.end(0);
+      e.to = shape_.end(1);
+      edges_.push_back(e);
+      corners_.push_back(shape_.end(1));
+      [[fallthrough]];
+    }
+    default: corners_.push_back(shape_.end(0));
+  }
+}
+
+bool ToolShape::closest(Vec3 p, double limit, ObstaclePoint &out) const {
+  if (shape_.view().shape != Shape::mesh) {
+    out = shape_.closest(p);
+    return true;
+  }
+  double best = limit * limit;
+  bool found = false;
+  for (const uint32_t t : triangles_) {
+    const uint32_t *const c = &surface_->tri[3 * size_t{t}];
+    const TrianglePoint at = closest_on_triangle(p, node(c[0]), node(c[1]), node(c[2]));
+    if (!(at.distance2 <= best)) continue;
+    const Vec3 n = face_normal(t), way = p - at.point;
+    // of equal ones the triangle that faces it: its neighbors at an edge may look away
+    if (found && at.distance2 == best && std::fabs(dot(n, way)) <= std::fabs(dot(out.normal, p - out.point)))
+      continue;
+    found = true;
+    best = at.distance2;
+    out.point = at.point;
+    const double d = std::sqrt(at.distance2), side = dot(n, way);
+    out.face = 0;
+    out.distance = side < 0 ? -d : d;
+    out.normal = at.feature == TriangleFeature::face || !(d > 0) ? n : (1 / out.distance) * way;
+  }
+  return found;
+}
+
+}  // namespace dfm

@@ -1,0 +1,55 @@
+// A part of a tool, or a rigid body, as corners, edges and faces, of which those of two meet: spheres,
+// capsules and boxes, and triangles of a mesh. A sphere is one corner with a radius, a capsule two and an
+// edge between them.
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "geometry/obstacle_shape.h"
+#include "math/vec3.h"
+
+namespace dfm {
+
+// Axis-parallel.
+struct ToolBox {
+  Vec3 lo, hi;
+  bool holds(Vec3 from, Vec3 to) const;  // any of the box around these two
+};
+
+class ToolShape {
+ public:
+  struct Edge {
+    Vec3 from, to, beside[2];  // directions in the faces beside it, away from it
+    int faces = 0;             // 0: a capsule's axis, left in every direction
+    // Does the direction leave the shape here?
+    bool leaves(Vec3 n) const;
+  };
+
+  static bool takes_part(const ObstacleView &view);
+  explicit ToolShape(const ObstacleView &view);
+  Vec3 position() const { return shape_.view().position; }
+  double reach() const { return reach_; }  // m, of any point of it from position()
+  double round() const { return round_; }  // m, radius around corners and edges
+  ToolBox bounds() const;
+  // Finds the corners, edges and triangles near the box. Before the functions that follow.
+  void look_at(const ToolBox &near);
+  const std::vector<Vec3> &corners() const { return corners_; }
+  const std::vector<Edge> &edges() const { return edges_; }
+  // Of its surface; false: none, or a mesh is further away than `limit` on either side.
+  bool closest(Vec3 p, double limit, ObstaclePoint &out) const;
+
+ private:
+  void look_at_mesh(const ToolBox &near);
+  Edge edge_of_mesh(uint32_t edge) const;
+  Vec3 node(uint32_t i) const { return load3(&surface_->x[4 * size_t{i}]); }
+  Vec3 face_normal(uint32_t triangle) const;
+
+  ObstacleShape shape_;
+  const Surface *surface_;  // of a mesh
+  double reach_ = 0, round_ = 0;
+  std::vector<Vec3> corners_;
+  std::vector<Edge> edges_;
+  std::vector<uint32_t> triangles_;
+};
+
+}  // namespace dfm
