@@ -8,6 +8,7 @@ import concurrent.futures
 import json
 import os
 import pathlib
+import re
 import shlex
 import subprocess
 import sys
@@ -15,6 +16,14 @@ import sys
 
 def compile_commands(build):
     return json.loads((pathlib.Path(build) / "compile_commands.json").read_text())
+
+
+def sources(entry):
+    """The file that a command compiles, or those that it compiles together."""
+    path = pathlib.Path(entry["file"])
+    if path.parent.name != "Unity":
+        return [entry["file"]]
+    return re.findall(r'^#include "(.+)"', path.read_text(), re.M)
 
 
 def parse(entry):
@@ -31,7 +40,7 @@ def parse(entry):
 
 def main():
     configured, compiled = sys.argv[1:]
-    seen = {entry["file"] for entry in compile_commands(compiled)}
+    seen = {file for entry in compile_commands(compiled) for file in sources(entry)}
     tests = str(pathlib.Path(__file__).resolve().parent.parent / "tests")
     rest = []
     for entry in compile_commands(configured):

@@ -28,7 +28,10 @@ set(DFM_ABI_DIR plugins-${deform_abi})
 set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${deform_plugin_header})
 
 add_library(deform_flags INTERFACE)
-target_compile_options(deform_flags INTERFACE -ffp-contract=off -Wall -Wextra -Wshadow -Wno-unused-parameter)
+target_compile_options(deform_flags INTERFACE -ffp-contract=off -Wall -Wextra -Wno-unused-parameter)
+if(NOT DEFORM_UNITY)   # there a local name may be another file's own
+  target_compile_options(deform_flags INTERFACE -Wshadow)
+endif()
 if(DEFORM_WERROR)
   target_compile_options(deform_flags INTERFACE -Werror)
 elseif(NOT PROJECT_IS_TOP_LEVEL)
@@ -73,4 +76,46 @@ function(deform_precompile target)
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
     target_compile_options(${target} PRIVATE -Wno-array-bounds -Wno-stringop-overflow -Wno-restrict)
   endif()
+endfunction()
+
+# DEFORM_UNITY compiles files of a folder together, for a third of the work: what costs is headers and
+# templates, the same ones in each file. Builds in which nobody edits have it: those of the sanitizers and the
+# static one by clang. cmake/unity_groups.py keeps apart what collides, anew when a file changes. The release
+# build compiles each file by itself, so that a missing #include is an error there.
+if(DEFORM_UNITY)
+  include(DeformPython)
+endif()
+function(deform_unity target)
+  if(NOT DEFORM_UNITY)
+    return()
+  endif()
+  get_target_property(sources ${target} SOURCES)
+  get_target_property(folder ${target} SOURCE_DIR)
+  deform_unity_groups(${folder} ${sources})
+  set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
+endfunction()
+
+# Sets UNITY_GROUP of those of the sources (of FOLDER) that have no flags of their own.
+function(deform_unity_groups folder)
+  set(together "")
+  foreach(file IN LISTS ARGN)
+    get_filename_component(file ${file} ABSOLUTE BASE_DIR ${folder})
+    get_source_file_property(own ${file} COMPILE_OPTIONS)
+    if(file MATCHES "\\.cpp$" AND NOT file MATCHES "_kernel" AND NOT own)
+      list(APPEND together ${file})
+    endif()
+  endforeach()
+  set(root ${PROJECT_SOURCE_DIR})
+  set(seen libdeform/src libdeform/include bindings bindings/cli tests/support)
+  list(TRANSFORM seen PREPEND ${root}/)
+  list(JOIN seen ":" seen)
+  execute_process(COMMAND ${DEFORM_PYTHON} -B ${root}/cmake/unity_groups.py 18
+    "${seen}" ${together}
+    OUTPUT_VARIABLE groups OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)
+  string(REPLACE "\n" ";" groups "${groups}")
+  foreach(line IN LISTS groups)
+    string(REGEX MATCH "^([^ ]+) (.*)$" line "${line}")
+    set_source_files_properties("${CMAKE_MATCH_2}" PROPERTIES UNITY_GROUP ${CMAKE_MATCH_1})
+  endforeach()
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${together} ${root}/cmake/unity_groups.py)
 endfunction()

@@ -7,7 +7,6 @@
 namespace {
 
 using dfm::EffectRow;
-using dfm::Selection;
 
 // Of three parameters, "loss" is off where `rate` and `kind` are 0, "delay" where `kind` is.
 const dfm_param kRows[] = {{"volume", "", "1", 0, 9, 0, 0, 1, nullptr},
@@ -28,7 +27,7 @@ Left left(std::vector<const char *> list, std::vector<double> values,
   type.nparam = 3;
   list.push_back(nullptr);
   const dfm::Registry none;
-  const Selection selection(list.data(), none);
+  const dfm::Selection selection(list.data(), none);
   const auto works = [](const std::string &) { return true; };
   const bool changed = dfm::leave_out(type, kOff, selection, works, values, by_cell);
   return {changed, values, by_cell};
@@ -55,10 +54,10 @@ TEST(Selection, LeavesOutWhatDiffersByCell) {
 }
 
 TEST(Selection, WantsAllWithoutAList) {
-  EXPECT_TRUE(Selection().wants("volume"));
+  EXPECT_TRUE(dfm::Selection().wants("volume"));
   const dfm::Registry none;
   const char *const memory[] = {"memory", "cutting", nullptr};
-  const Selection listed(memory, none);
+  const dfm::Selection listed(memory, none);
   EXPECT_TRUE(listed.wants(dfm::kFriction)) << "memory is a law's";
   EXPECT_TRUE(listed.wants(dfm::kSelfContact)) << "what is cut lies on itself";
   EXPECT_FALSE(listed.wants("volume"));
