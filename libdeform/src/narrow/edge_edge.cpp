@@ -62,6 +62,14 @@ bool end_touches(const Surface &surface, uint32_t vertex, Vec3 from, Vec3 to, co
   return vertex_cone_has(surface, vertex, (1 / distance) * off);
 }
 
+// Is the crossing at `at` of an edge the contact of that edge's end, because the end makes none of its own?
+// So it is where vertices of both surfaces lie on each other.
+bool replaces_end(const Surface &surface, const uint32_t *ends, double at, Vec3 from, Vec3 to,
+                  const EdgeFaces &faces) {
+  if (at > kEnd && at < 1 - kEnd) return false;
+  return !end_touches(surface, ends[at > 0.5], from, to, faces);
+}
+
 // m, how far a surface rises at an edge (or dips, if it is concave) above the middle of a straight edge of
 // this length and direction that crosses it.
 double rise(const EdgeFaces &faces, Vec3 outward, Vec3 across, double length) {
@@ -73,7 +81,7 @@ double rise(const EdgeFaces &faces, Vec3 outward, Vec3 across, double length) {
 // m, how far a crossing may give way under load (doc/decisions/0416). Where one of the edges lies in a flat
 // face, the distance of the surfaces is linear along the other edge, so that the crossing is no minimum:
 // contacts of surfels and of rims hold the surfaces apart, and the crossing only repeats them. Not so where
-// both edges are rims. Faces of a cut touch at the rest distance of their surfaces, which were set back, and
+// both edges are rims, nor where it replaces the contact of a surfel. Faces of a cut touch at the rest distance of their surfaces, which were set back, and
 // must not come nearer.
 double give(const Surface &sa, const Surface &sb, double rise_a, double rise_b, double offset) {
   if (sa.back > 0 || sb.back > 0) return 0;
@@ -158,8 +166,9 @@ void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out) {
     add_node(c, pair.b->first_node + eb[0], edge_t - 1);
     add_node(c, pair.b->first_node + eb[1], -edge_t);
     place(c, p0 + edge_s * u, q0 + edge_t * w, normal, distance);
-    c.give = give(sa, sb, rise(fa, -normal, fb.along, std::sqrt(ww)),
-                  rise(fb, normal, fa.along, std::sqrt(uu)), pair.offset);
+    if (!replaces_end(sa, ea, edge_s, q0, q0 + w, fb) && !replaces_end(sb, eb, edge_t, p0, p0 + u, fa))
+      c.give = give(sa, sb, rise(fa, -normal, fb.along, std::sqrt(ww)),
+                    rise(fb, normal, fa.along, std::sqrt(uu)), pair.offset);
     out.push_back(c);
   }
   const auto patch = [&](const ContactPoint &c) {
