@@ -78,8 +78,9 @@ inline Pose inverse(const Pose &a) {
   return {rotate(conjugate(a.rotation), -1.0 * a.position), conjugate(a.rotation)};
 }
 
-// D v with D diagonal in the axes of q.
+// D v with D diagonal in the axes of q; of cubes and balls all axes are alike.
 inline Vec in_axes(Quat q, Vec d, Vec v) {
+  if (d.x == d.y && d.y == d.z) return d.x * v;
   const Vec b = rotate(conjugate(q), v);
   return rotate(q, {d.x * b.x, d.y * b.y, d.z * b.z});
 }
