@@ -197,34 +197,19 @@ class Runner {
     if (between > 0) out.push_back("surfaces cross: " + pairs(between) + " of two surfaces" + when);
     if (within > 0)
       out.push_back("a surface crosses itself: " + pairs(within) + when +
-                    (any_cut() ? "; sides of a cut that have slid over each other do not touch: set "
-                                 "\"separate\" of the body to make its parts bodies"
-                               : "; \"contact\": {\"self\": \"auto\"} prevents this"));
+                    (any_cut()
+                         ? "; take a shorter step, or set \"separate\" of the body that was cut to make "
+                           "its parts bodies"
+                         : "; \"contact\": {\"self\": \"auto\"} prevents this"));
     return out;
   }
 
  private:
   struct Mark { double wall, cpu; };
 
-  // Has a body other points or cells than it was made with?
   bool any_cut() const {
-    uint32_t n = 0;
-    dfm_world_bodies(world_, 0, nullptr, &n);
-    std::vector<dfm_body> bodies(n);
-    if (dfm_world_bodies(world_, n, bodies.data(), &n) != DFM_OK) return false;
-    return std::any_of(bodies.begin(), bodies.end(), [](dfm_body b) {
-      dfm_body_info info{};
-      info.size = sizeof info;
-      if (dfm_body_get_info(b, &info) != DFM_OK) return false;
-      std::vector<uint32_t> points(info.npoint), cells(info.ntet);
-      if (dfm_body_origins(b, info.npoint, points.data(), info.ntet, cells.data()) != DFM_OK) return false;
-      const auto moved = [](const std::vector<uint32_t> &of) {
-        for (uint32_t i = 0; i < of.size(); ++i)
-          if (of[i] != i) return true;
-        return false;
-      };
-      return moved(points) || moved(cells);
-    });
+    return std::any_of(scene_.bodies().begin(), scene_.bodies().end(),
+                       [](const BodyView &b) { return b.cut; });
   }
 
   double frame_interval() const {

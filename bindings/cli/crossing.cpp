@@ -201,6 +201,46 @@ bool pass_through(const Triangle a, const Triangle b) {
   return orientation(p[0], p[1], q[0], q[1]) < 0 && orientation(p[0], p[2], q[2], q[0]) < 0;
 }
 
+namespace {
+
+struct Vec { double x, y, z; };
+Vec between(const double a[3], const double b[3]) { return {b[0] - a[0], b[1] - a[1], b[2] - a[2]}; }
+double dot(Vec a, Vec b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+Vec cross(Vec a, Vec b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
+double size(Vec a) { return std::sqrt(dot(a, a)); }
+
+double edges_through(const Triangle from, const Triangle to) {
+  const Vec up = cross(between(to[0], to[1]), between(to[0], to[2]));
+  const double area = size(up);
+  double most = -1;
+  if (!(area > 0)) return most;
+  double side[3];
+  for (int i = 0; i < 3; ++i) side[i] = dot(up, between(to[0], from[i])) / area;
+  for (int i = 0; i < 3; ++i) {
+    const int j = (i + 1) % 3;
+    if (!(side[i] * side[j] < 0)) continue;
+    const double at = side[i] / (side[i] - side[j]);
+    double p[3], least = std::min(std::fabs(side[i]), std::fabs(side[j]));
+    for (int k = 0; k < 3; ++k) p[k] = from[i][k] + at * (from[j][k] - from[i][k]);
+    for (int k = 0; k < 3; ++k) {
+      const Vec edge = between(to[k], to[(k + 1) % 3]);
+      least = std::min(least, dot(cross(edge, between(to[k], p)), up) / (size(edge) * area));
+    }
+    most = std::max(most, least);
+  }
+  return most;
+}
+
+double longest_edge(const Triangle t) {
+  return std::max({size(between(t[0], t[1])), size(between(t[1], t[2])), size(between(t[2], t[0]))});
+}
+
+}  // namespace
+
+double depth(const Triangle a, const Triangle b) {
+  return std::max(edges_through(a, b), edges_through(b, a));
+}
+
 // ---- which pairs to test: a box tree over all triangles, median split -------------------------------------
 
 Found Counter::count(const std::vector<Surface> &surfaces, Touching touching,
@@ -309,8 +349,9 @@ void Counter::test(const Item &ia, const Item &ib) {
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j)
         if (ta[i] == tb[j] || std::memcmp(a[i], b[j], 3 * sizeof(double)) == 0) return;
-  if (touching_ == Touching::counts ? meet(a, b) : pass_through(a, b))
-    ++(ia.surface == ib.surface ? found_.within : found_.between);
+  if (!(touching_ == Touching::counts ? meet(a, b) : pass_through(a, b))) return;
+  if (sa.cut && sb.cut && depth(a, b) < kLaid * std::max(longest_edge(a), longest_edge(b))) return;
+  ++(ia.surface == ib.surface ? found_.within : found_.between);
 }
 
 }  // namespace crossing

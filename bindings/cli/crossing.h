@@ -18,17 +18,21 @@ using Triangle = const double *[3];
 // The closed triangles share at least one point (touching included). A triangle without area counts as its
 // edges; two of those never meet.
 bool meet(const Triangle a, const Triangle b);
+// How deep an edge of one goes through the other, in m: the shortest way of an end of the edge, or of where
+// it goes through, to the border of the other triangle or to its plane; below 0: none does. Rounded.
+double depth(const Triangle a, const Triangle b);
 // They meet along more than a point, and each has corners strictly on both sides of the other's plane: they
 // pass through each other rather than touch.
 bool pass_through(const Triangle a, const Triangle b);
 
 // obstacle: pairs of its triangles among themselves or with another obstacle's are nobody's affair.
+// cut: its cut faces lie on each other, or on those of its pieces.
 struct Surface {
   const double *xyz;
   uint32_t n;
   const uint32_t *tri;
   uint32_t ntri;
-  bool obstacle = false;
+  bool obstacle = false, cut = false;
 };
 
 // Committed states keep a distance between surfaces, so there any shared point counts; a start state is the
@@ -36,6 +40,9 @@ struct Surface {
 enum class Touching { counts, allowed };
 
 // Triangle pairs of two surfaces, and of one surface with itself.
+// Two that are `cut` cross only where the depth is above kLaid of the longest edge of the two triangles: cut
+// faces are kept apart to rest distances of contacts.
+inline constexpr double kLaid = 5e-3;
 struct Found {
   size_t between = 0, within = 0;
   size_t all() const { return between + within; }

@@ -120,8 +120,8 @@ void Checker::check(bool start_state) {
     const uint32_t inverted = body_measure(body).inverted;
     checks_.inverted_max = std::max(checks_.inverted_max, inverted);
     checks_.inverted_last += inverted;
-    surfaces_.push_back(
-        {positions_[b].data(), n, body.triangles.data(), uint32_t(body.triangles.size() / 3)});
+    surfaces_.push_back({positions_[b].data(), n, body.triangles.data(), uint32_t(body.triangles.size() / 3),
+                         false, body.cut});
   }
   for (const RigidView &rigid : scene_.rigids()) {
     const dfm_body_measure m = rigid_measure(rigid);

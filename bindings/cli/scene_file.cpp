@@ -35,6 +35,7 @@ void place_points(const ObstacleView &obstacle, std::vector<double> &out) {
 namespace {
 
 void read_shape(const dfm_body_info &info, BodyView &body) {
+  body.cut = body.npoint > 0;  // it had another shape before
   body.npoint = info.npoint;
   body.ntet = info.ntet;
   body.nsurfel = info.nsurfel;
@@ -42,6 +43,14 @@ void read_shape(const dfm_body_info &info, BodyView &body) {
   body.triangles.resize(3 * size_t(info.ntriangle));
   uint32_t n = 0;
   need(dfm_surface_triangles(body.handle, info.ntriangle, body.triangles.data(), &n));
+  std::vector<uint32_t> points(info.npoint), cells(info.ntet);
+  need(dfm_body_origins(body.handle, info.npoint, points.data(), info.ntet, cells.data()));
+  const auto moved = [](const std::vector<uint32_t> &of) {
+    for (uint32_t i = 0; i < of.size(); ++i)
+      if (of[i] != i) return true;
+    return false;
+  };
+  body.cut = body.cut || moved(points) || moved(cells);
 }
 
 }  // namespace
@@ -91,6 +100,7 @@ void SceneFile::renew_list() const {
   if (n == bodies_.size()) return;
   std::vector<dfm_body> handles(n);
   need(dfm_world_bodies(world_, n, handles.data(), &n));
+  const bool pieces = !bodies_.empty();  // a scene has all other bodies from the start
   bodies_.resize(std::min(bodies_.size(), handles.size()));
   for (size_t at = bodies_.size(); at < handles.size(); ++at) {
     dfm_body_info info = {};
@@ -101,6 +111,7 @@ void SceneFile::renew_list() const {
     body.name = info.name;
     body.model = info.model;
     read_shape(info, body);
+    body.cut = body.cut || pieces;
     names_[body.handle] = body.name;
     bodies_.push_back(std::move(body));
   }

@@ -14,6 +14,7 @@ struct BodyView {
   std::string name, model;
   uint32_t npoint = 0, ntet = 0, nsurfel = 0;
   double rest_volume = 0;
+  bool cut = false;                 // it has been cut, or is a piece that came off
   std::vector<uint32_t> triangles;  // [n,3] surfel numbers
 };
 

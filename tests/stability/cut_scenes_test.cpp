@@ -53,7 +53,8 @@ TEST(CutScenes, LiverCutJitteredRuns_LobeIsCarriedAway) {
   EXPECT_TRUE(run.finite());
   EXPECT_FALSE(run.has("liver.1"));
 }
-// Lips of slits within one body cross (doc/concepts/cutting.md, limits), so what is asked here is the tear.
+// Lips of slits within one body may cross by hundredths of an edge (decision 0401), so what is asked here is
+// the tear.
 TEST(CutScenes, TornDoughJitteredRuns_FallOnTheTable) {
   for (int seed = 1; seed <= (test::soaks() ? 10 : 3); ++seed) {
     const test::SceneRun run("torn_dough", {"--jitter", std::to_string(seed)});

@@ -199,17 +199,18 @@ namespace {
 constexpr double kTilt = 1e-3;   // share of the trace; distinguishes nearly parallel planes
 constexpr double kFarthest = 3;  // limit on the motion of a surfel relative to that of the planes
 
-// Each surfel of coincident faces moves to where their planes are set back by `back`: by the shortest w with
-// n.w = -back for each of them, in the least-squares sense.
-void set_back(Surface &s) {
-  const auto at = [&](uint32_t i) { return load3(&s.x[4 * size_t{i}]); };
+}  // namespace
+
+void ways_back(Surface &s, const double *x, const std::function<void(uint32_t surfel, Vec3 way)> &use) {
+  const auto at = [&](uint32_t i) { return load3(x + 4 * size_t{i}); };
   s.sums.assign(kBackSums * s.laid_surfel.size(), 0.0);
-  for (const uint32_t t : s.laid) {
-    const uint32_t *const c = &s.tri[3 * size_t{t}];
+  for (size_t l = 0; l < s.laid.size(); ++l) {
+    const uint32_t *const c = &s.tri[3 * size_t{s.laid[l]}];
     const Vec3 n = normalized(cross(at(c[1]) - at(c[0]), at(c[2]) - at(c[0])));
     const double add[kBackSums] = {n.x,       n.y,       n.z,       n.x * n.x, n.y * n.y,
                                    n.z * n.z, n.x * n.y, n.y * n.z, n.z * n.x};
     for (size_t k = 0; k < 3; ++k) {
+      if (s.laid_tip[l] >> k & 1) continue;
       const auto found = std::lower_bound(s.laid_surfel.begin(), s.laid_surfel.end(), c[k]);
       double *const sum = &s.sums[kBackSums * size_t(found - s.laid_surfel.begin())];
       for (size_t i = 0; i < kBackSums; ++i) sum[i] += add[i];
@@ -222,15 +223,12 @@ void set_back(Surface &s) {
     const Vec3 a{sum[3] + tilt, sum[6], sum[8]}, b{sum[6], sum[4] + tilt, sum[7]},
         c{sum[8], sum[7], sum[5] + tilt}, r = load3(sum);
     const double det = dot(a, cross(b, c));
-    Vec3 way = (1 / det) * Vec3{dot(r, cross(b, c)), dot(r, cross(c, a)), dot(r, cross(a, b))};
+    Vec3 way = (-1 / det) * Vec3{dot(r, cross(b, c)), dot(r, cross(c, a)), dot(r, cross(a, b))};
     const double far = norm(way);
     if (far > kFarthest) way = (kFarthest / far) * way;
-    double *const to = &s.x[4 * size_t{s.laid_surfel[i]}];
-    store3(to, load3(to) - s.back * way);
+    use(s.laid_surfel[i], way);
   }
 }
-
-}  // namespace
 
 void gather_surface(Surface &surface, const double *x, const double *v) {
   if (!surface.identity()) return gather_rows(surface, x, v, 0, surface.nsurfel);
@@ -242,7 +240,12 @@ void gather_surface(Surface &surface, const double *x, const double *v) {
     std::memcpy(&surface.x[to], x + from, kPoint);
     if (v) std::memcpy(&surface.v[to], v + from, kPoint);
   }
-  if (surface.back > 0) set_back(surface);
+  if (surface.slit) std::memcpy(surface.place.data(), surface.x.data(), kPoint * surface.nsurfel);
+  if (surface.back > 0)
+    ways_back(surface, surface.x.data(), [&](uint32_t surfel, Vec3 way) {
+      double *const to = &surface.x[4 * size_t{surfel}];
+      store3(to, load3(to) + surface.back * way);
+    });
 }
 
 }  // namespace dfm

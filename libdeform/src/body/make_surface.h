@@ -2,10 +2,12 @@
 // phyxels.
 #pragma once
 #include <cstdint>
+#include <functional>
 
 #include "body/coupling.h"
 #include "core/memory.h"
 #include "geometry/surface.h"
+#include "math/vec3.h"
 
 namespace dfm {
 
@@ -26,6 +28,11 @@ void wear_coupling(Coupling &&coupling, Surface &surface);
 // are added in its order, so that rows may be cut among threads: gather_rows does surfels [begin,end) of a
 // coupled surface.
 void gather_surface(Surface &surface, const double *x, const double *v);
+// The way by which each surfel of coincident faces is set back, in units of `back`, so that their planes are
+// set back by one: the shortest w with n.w = -1 for each of them, in the least-squares sense. At the tip of a
+// slit both sides ask for the opposite of each other, and neither counts.
+// x: [nsurfel,4]; may change in `use`.
+void ways_back(Surface &surface, const double *x, const std::function<void(uint32_t surfel, Vec3 way)> &use);
 void gather_rows(Surface &surface, const double *x, const double *v, uint32_t begin, uint32_t end);
 
 }  // namespace dfm

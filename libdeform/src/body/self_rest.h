@@ -13,6 +13,9 @@ namespace dfm {
 struct OpenedSurface {
   Array<uint32_t> origin;  // [nsurfel] point of the whole body: copies of a point have one number
   Array<uint32_t> twin;    // [ntri] triangle on the other side of the open face, or kNone
+  // [ntri] the side of a slit that a triangle belongs to, or kNone: triangles of open faces that hang
+  // together over their edges, but not over the edge at the tip of a slit, where a face meets its other side
+  Array<uint32_t> side;
   // [nsurfel] points of the body that a surfel has an edge with, ascending, from begin[s] to begin[s+1]; and
   // its own point
   Array<uint32_t> begin, near, point;
@@ -31,9 +34,11 @@ struct OpenedSurface {
 struct SelfRest {
   Array<double> x;  // [nsurfel,4] m, N times the phyxels at rest, in the mesh's frame
   OpenedSurface opened;
+  Array<double> way;  // [nsurfel,4] by which a surfel is set back in units of Surface::back; empty: none is
   // m: parts that are nearer than this through the material are the two sides of one layer of cells or two
   double thin = 0;
   Vec3 at(uint32_t surfel) const { return load3(&x[4 * size_t{surfel}]); }
+  Vec3 at(uint32_t surfel, double back) const { return at(surfel) + back * load3(&way[4 * size_t{surfel}]); }
 };
 
 // of d_c: parts that are nearer at rest coincide and have no side

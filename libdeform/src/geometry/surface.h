@@ -62,13 +62,16 @@ struct Surface {
   }
 
   // Triangles that coincided with others when a cut opened the face between them, and their surfels; `slit`:
-  // some coincide with others of this surface. x of a piece is set back there by half of the rest distance of
-  // contacts: copies of a point in one place would touch along the normals of all faces around them, which no
-  // motion satisfies (doc/decisions/0398).
+  // some coincide with others of this surface. x is set back there by half of the rest distance of contacts:
+  // copies of a point in one place would touch along the normals of all faces around them, which no motion
+  // satisfies (doc/decisions/0398).
   Array<uint32_t> laid, laid_surfel;
+  // [laid] bits 0-2: corner k lies at the tip of a slit: the face on the other side has the same surfel
+  Array<uint8_t> laid_tip;
   bool slit = false;
-  double back = 0;     // m
-  Array<double> sums;  // scratch, [laid_surfel,kBackSums]
+  double back = 0;      // m
+  Array<double> place;  // [nsurfel,4] m, x before it is set back; empty without a slit
+  Array<double> sums;   // scratch, [laid_surfel,kBackSums]
 
   // State, [nsurfel,4] (fourth component zero), m and m/s.
   Array<double> x, v;

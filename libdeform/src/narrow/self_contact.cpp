@@ -15,13 +15,15 @@
 //   - The side is that of the rest shape, so what is a little on the wrong one is led back. Near features
 //     side by side in one plane may fold either way: theirs is the side they are on.
 //
-// The two sides of an open face (a cut) lie on each other at rest, where the nearest triangle has no side.
-// There copies of one point touch, along the normal of the faces that were joined at them, as long as they
-// have not slid apart; other features of the two sides do not.
+// The two sides of an open face (a cut) lie on each other at rest. They are seen d_c / 2 further back each
+// (geometry/surface.h), so they are d_c apart and touch as two bodies do. Copies of one point that have not
+// slid apart make one contact, along the normal of the faces that were joined at them, and none with the
+// other features around them.
 #include "narrow/self_contact.h"
 
 #include <algorithm>
 #include <initializer_list>
+#include <span>
 
 #include "geometry/area.h"
 #include "geometry/closest.h"
@@ -54,13 +56,18 @@ constexpr double kNearer = 1e-9;
 constexpr double kThrough = 0.25;
 
 // of the median edge: copies of a point that have slid less along each other touch
-constexpr double kSlid = 0.5;
+constexpr double kSlid = 0.1;
+// of what they are apart at rest: how near features beside copies of one point may come
+constexpr double kBeside = 0.3;
+constexpr double kGuarded = 0.7;   // of d_c: features beside copies that rest nearer are left to contact
+constexpr double kAlong = 0.1;     // cosine to the normal of copies, at least
 constexpr double kDeep = 1e-2;     // of the median edge: what is less deep is held by all faces
 constexpr double kOpposed = -0.5;  // cosine between normals that push against each other
 
 // What a pair is at rest.
 struct Kin {
   double apart = 0;     // m it rests at
+  bool beside = false;  // copies of one point are among its corners
   double side = 0;      // 1: kept apart outside, -1: within, 0: where it is
   bool touches = true;  // false: it makes no contact
 };
@@ -76,7 +83,16 @@ class RestShape {
     const Vec3 p = rest_.at(surfel), a = rest_.at(c[0]), b = rest_.at(c[1]), d = rest_.at(c[2]);
     const TrianglePoint q = closest_on_triangle(p, a, b, d);
     const double distance = std::sqrt(q.distance2);
-    if (Kin k; across({surfel}, {c[0], c[1], c[2]}, distance, k)) return k;
+    const std::span<const uint32_t> fan{s_.fan.data() + s_.fan_begin[surfel],
+                                        s_.fan.data() + s_.fan_begin[surfel + 1]};
+    bool beside = false;
+    if (across({&surfel, 1}, fan, {c, 3}, {&t, 1}, distance, beside)) {
+      const double back = s_.back;
+      const Vec3 o = rest_.at(surfel, back);
+      return outside(
+          closest_on_triangle(o, rest_.at(c[0], back), rest_.at(c[1], back), rest_.at(c[2], back)).distance2,
+          beside);
+    }
     return kin(distance, dot(normalized(cross(b - a, d - a)), p - q.point) / distance);
   }
   Kin of_edges(uint32_t a, uint32_t b) const {
@@ -91,33 +107,57 @@ class RestShape {
       up += normalized(cross(rest_.at(c[1]) - rest_.at(c[0]), rest_.at(c[2]) - rest_.at(c[0])));
     }
     const double distance = norm(way);
-    if (Kin k; across({ea[0], ea[1]}, {eb[0], eb[1]}, distance, k)) return k;
+    bool beside = false;
+    if (across({ea, 2}, {&s_.edge_tri[2 * size_t{a}], 2}, {eb, 2}, {&s_.edge_tri[2 * size_t{b}], 2}, distance,
+               beside)) {
+      const double back = s_.back;
+      return outside(closest_segments(rest_.at(ea[0], back), rest_.at(ea[1], back), rest_.at(eb[0], back),
+                                      rest_.at(eb[1], back))
+                         .distance2,
+                     beside);
+    }
     return kin(distance, dot(normalized(up), way) / distance);
   }
 
  private:
-  // Of a body with open faces: what a pair is that no cells beside it join. Beside a slit copies of points
-  // alone touch; what lies far apart at rest is kept outside, and rests at no distance, since a slit that is
-  // closed leaves room for none.
-  bool across(std::initializer_list<uint32_t> a, std::initializer_list<uint32_t> b, double at_rest,
-              Kin &out) const {
-    if (!rest_.opened.any()) return false;
-    out = at_rest >= rest_.thin ? Kin{0, 1} : Kin{0, 0, false};
-    if (at_rest >= rest_.thin) return true;
-    bool joined = false;
+  // Of a body with open faces: whether a pair is on different sides of one, or has one in between.
+  // tris: the triangles around the features.
+  bool across(std::span<const uint32_t> a, std::span<const uint32_t> tris_a, std::span<const uint32_t> b,
+              std::span<const uint32_t> tris_b, double at_rest, bool &beside) const {
+    const OpenedSurface &opened = rest_.opened;
+    if (!opened.any()) return false;
     for (const uint32_t i : a)
-      for (const uint32_t j : b) {
-        if (rest_.opened.origin[i] == rest_.opened.origin[j]) return true;
-        joined = joined || rest_.opened.joined(i, j);
+      for (const uint32_t j : b)
+        if (opened.origin[i] == opened.origin[j]) return beside = true;
+    bool a_beside = false, b_beside = false;
+    for (const uint32_t t : tris_a) {
+      const uint32_t side = t == kNone ? kNone : opened.side[t];
+      a_beside = a_beside || side != kNone;
+      for (const uint32_t u : tris_b) {
+        if (u == kNone || opened.side[u] == kNone) continue;
+        b_beside = true;
+        if (side == opened.side[u]) return false;
       }
-    return !joined;
+    }
+    if ((a_beside && b_beside) || at_rest >= rest_.thin) return true;
+    for (const uint32_t i : a)
+      for (const uint32_t j : b)
+        if (opened.joined(i, j)) return false;
+    return true;
+  }
+  // Features beside copies of one point lie on each other at rest, d_c apart where they are set back. The
+  // copies keep them so; they themselves do it from a little nearer on, where copies slide along each other.
+  Kin outside(double at_rest2, bool beside) const {
+    const double apart = std::min(offset_, std::sqrt(at_rest2));
+    return {kBeside * apart, beside, 1};
   }
   // By the distance at rest and the cosine between the way across and the outward normal there.
   Kin kin(double at_rest, double facing) const {
-    if (!(at_rest > kClosedAtRest * offset_)) return {0, 0, false};
-    return {std::min(offset_, 0.5 * at_rest), at_rest >= rest_.thin || facing > kThrough ? 1.0
-                                              : facing < -kThrough                       ? -1.0
-                                                                                         : 0.0};
+    if (!(at_rest > kClosedAtRest * offset_)) return {0, false, 0, false};
+    return {std::min(offset_, 0.5 * at_rest), false,
+            at_rest >= rest_.thin || facing > kThrough ? 1.0
+            : facing < -kThrough                       ? -1.0
+                                                       : 0.0};
   }
   const Surface &s_;
   const SelfRest &rest_;
@@ -151,6 +191,7 @@ struct Self {
     return !tangled || (std::any_of(a.begin(), a.end(), tangled) && std::any_of(b.begin(), b.end(), tangled));
   }
   Vec3 x(uint32_t surfel) const { return pair.xa(surfel); }
+  Vec3 place(uint32_t surfel) const { return load3(&s.place[4 * size_t{surfel}]); }  // not set back
   Vec3 v(uint32_t surfel) const { return pair.va(surfel); }
   const uint32_t *corners(uint32_t t) const { return &s.tri[3 * size_t{t}]; }
   bool has(uint32_t t, uint32_t surfel) const {
@@ -165,7 +206,9 @@ struct Self {
     return normalized(cross(x(c[1]) - x(c[0]), x(c[2]) - x(c[0])));
   }
 
-  bool copies(uint32_t surfel, uint32_t t);
+  bool copies(uint32_t a, uint32_t b, Vec3 &normal, uint32_t &first) const;
+  void copies(uint32_t surfel, uint32_t t);
+  bool against_copies(std::span<const uint32_t> a, std::span<const uint32_t> b, Vec3 normal) const;
   void keep_shallow(size_t begin);
   bool yields(uint32_t t, double distance2, uint32_t other, uint32_t surfel) const;
   bool minimum(uint32_t surfel, uint32_t t, const TrianglePoint &at) const;
@@ -249,42 +292,59 @@ void Self::keep_shallow(size_t begin) {
   out.resize(to);
 }
 
-// Is a corner of t a copy of the surfel's point that has not slid along it? The first of the triangles around
-// the corner that were joined to the surfel's makes their contact.
-bool Self::copies(uint32_t surfel, uint32_t t) {
+// Are two surfels copies of one point that have not slid along each other? normal: of the faces that were
+// joined at them, from b to a; first: the lowest triangle of b's among those.
+bool Self::copies(uint32_t a, uint32_t b, Vec3 &normal, uint32_t &first) const {
   const OpenedSurface &opened = rest.opened();
-  const uint32_t *const c = corners(t);
-  const uint32_t *const at =
-      std::find_if(c, c + 3, [&](uint32_t corner) { return opened.origin[corner] == opened.origin[surfel]; });
-  if (at == c + 3) return false;
+  if (opened.origin[a] != opened.origin[b]) return false;
   Vec3 up;
-  uint32_t first = kNone;
-  for (uint32_t k = s.fan_begin[*at]; k < s.fan_begin[*at + 1]; ++k) {
+  first = kNone;
+  for (uint32_t k = s.fan_begin[b]; k < s.fan_begin[b + 1]; ++k) {
     const uint32_t twin = opened.twin[s.fan[k]];
-    if (twin == kNone || !has(twin, surfel)) continue;
+    if (twin == kNone || !has(twin, a)) continue;
     first = std::min(first, s.fan[k]);
     for (const double sign : {1.0, -1.0}) {
       const uint32_t *const n = corners(sign > 0 ? s.fan[k] : twin);
       up += sign * cross(x(n[1]) - x(n[0]), x(n[2]) - x(n[0]));
     }
   }
-  const Vec3 way = x(surfel) - x(*at), normal = normalized(up);
-  const double distance = dot(normal, way), slid = kSlid * s.median_edge;
-  if (norm2(way - distance * normal) > slid * slid) return false;
-  if (first != t || surfel < *at || !(norm2(normal) > 0)) return true;
+  normal = normalized(up);
+  const Vec3 way = place(a) - place(b);
+  const double slid = kSlid * s.median_edge;
+  return norm2(way - dot(normal, way) * normal) < slid * slid;
+}
+
+void Self::copies(uint32_t surfel, uint32_t t) {
+  const uint32_t *const c = corners(t);
+  Vec3 normal;
+  uint32_t first = kNone;
+  const uint32_t *const at =
+      std::find_if(c, c + 3, [&](uint32_t corner) { return copies(surfel, corner, normal, first); });
+  if (at == c + 3 || first != t || surfel < *at || !(norm2(normal) > 0)) return;
+  double distance = dot(normal, place(surfel) - place(*at));
+  if (std::fabs(distance) < kNearer * offset) distance = 0;
   const double reach = contact_reach(h, offset, norm(v(surfel) - v(*at)));
-  if (!(distance < reach && distance >= -depth)) return true;
+  if (!(distance < reach && distance >= -depth)) return;
   ContactPoint contact = blank(pair, kVertexFace, 0, surfel, t);
   add_node(contact, body.first_node + surfel, 1);
   add_node(contact, body.first_node + *at, -1);
-  place(contact, x(surfel), x(*at), normal, distance + offset);
+  narrow::place(contact, x(surfel), x(*at), normal, distance + offset);
   contact.area = 0.5 * facing_area(s, surfel, -normal);
   out.push_back(contact);
-  return true;
+}
+
+// Would a contact of features beside copies push against the one of the copies? No motion satisfies both.
+bool Self::against_copies(std::span<const uint32_t> a, std::span<const uint32_t> b, Vec3 normal) const {
+  Vec3 own;
+  uint32_t first = kNone;
+  for (const uint32_t i : a)
+    for (const uint32_t j : b)
+      if (copies(i, j, own, first) && dot(own, normal) < kAlong) return true;
+  return false;
 }
 
 void Self::vertex_face(uint32_t surfel, uint32_t t) {
-  if (rest.opened().any() && copies(surfel, t)) return;
+  if (rest.opened().any()) copies(surfel, t);
   const uint32_t *const c = corners(t);
   const Vec3 p = x(surfel), a = x(c[0]), u = x(c[1]) - a, w = x(c[2]) - a, n = cross(u, w);
   double speed2 = 0;
@@ -302,14 +362,16 @@ void Self::vertex_face(uint32_t surfel, uint32_t t) {
   const Kin k = rest.of_face(surfel, t);
   double side = k.side != 0 ? k.side : now;
   if (now != side && face && distance <= depth && !through({surfel}, {c[0], c[1], c[2]})) side = now;
-  if (!k.touches || !(now == side ? distance < reach : face && distance <= depth)) return;
+  const double within = k.beside ? k.apart + reach - 2 * offset : reach;
+  if (!k.touches || !(now == side ? distance < within : face && distance <= depth)) return;
   if (!face && !(distance > 1e-9 * s.median_edge)) return;
   const Vec3 normal = face ? side * up : (1 / distance) * (p - at.point);
   if (!(norm2(normal) > 0)) return;
+  if (k.beside && against_copies({&surfel, 1}, {c, 3}, normal)) return;
   ContactPoint contact = blank(pair, kVertexFace, 0, surfel, t);
   add_node(contact, body.first_node + surfel, 1);
   for (int i = 0; i < 3; ++i) add_node(contact, body.first_node + c[i], -at.weight[i]);
-  place(contact, p, at.point, normal, (now == side ? distance : -distance) + (offset - k.apart));
+  narrow::place(contact, p, at.point, normal, (now == side ? distance : -distance) + (offset - k.apart));
   contact.area = 0.5 * facing_area(s, surfel, -side * normal);
   out.push_back(contact);
 }
@@ -353,17 +415,18 @@ void Self::edge_edge(uint32_t a, uint32_t b) {
   Vec3 normal = (1 / std::sqrt(nn)) * n;
   if (dot(normal, up_b) < dot(normal, up_a)) normal = -normal;
   const double distance = dot(normal, r);
-  if (!(distance < reach && distance >= -edge_depth) ||
+  if (!(distance < (k.beside ? k.apart + reach - 2 * offset : reach) && distance >= -edge_depth) ||
       (distance < 0 && !through({ea[0], ea[1]}, {eb[0], eb[1]})))
     return;
   const double slack = kCone + std::min(0.3, reach / std::sqrt(std::min(uu, ww)));
   if (!fb.leans_out(normal, slack) || !fa.leans_out(-normal, slack)) return;
+  if (k.beside && against_copies({ea, 2}, {eb, 2}, normal)) return;
   ContactPoint c = blank(pair, kEdgeEdge, 1, a, b);
   add_node(c, body.first_node + ea[0], 1 - on_a);
   add_node(c, body.first_node + ea[1], on_a);
   add_node(c, body.first_node + eb[0], on_b - 1);
   add_node(c, body.first_node + eb[1], -on_b);
-  place(c, p0 + on_a * u, q0 + on_b * w, normal, distance + (offset - k.apart));
+  narrow::place(c, p0 + on_a * u, q0 + on_b * w, normal, distance + (offset - k.apart));
   out.push_back(c);
 }
 
@@ -428,7 +491,8 @@ void find_self_contacts(const BodyView &body, const SelfRest &rest, std::span<co
 double self_apart(const Surface &surface, const SelfRest &rest, ContactKind kind, uint32_t a, uint32_t b,
                   double offset) {
   const RestShape shape(surface, rest, offset);
-  return (kind == kEdgeEdge ? shape.of_edges(a, b) : shape.of_face(a, b)).apart;
+  const Kin k = kind == kEdgeEdge ? shape.of_edges(a, b) : shape.of_face(a, b);
+  return k.beside && k.apart < kGuarded * offset ? 0 : k.apart;
 }
 
 }  // namespace dfm

@@ -25,6 +25,7 @@ bool booked(const World &w, const StepContext &step, const ContactPoint &c) {
 constexpr double kShallow = 0.99;
 // Work is taken at the mean of the velocities at both ends of a sub-step. A depth decreases by a fifth per
 // sub-step, so in the sub-step before by 1.25 times as much.
+constexpr double kRounding = 2.220446049250313e-16;
 constexpr double kOpens = 0.5 * (1 + 1.25);
 // Such a law returns the energy that it has stored.
 bool remembers(const LawInstance *law) { return law->nstate > 0; }
@@ -62,21 +63,27 @@ double excess_of(const PairWork &p) { return std::max(p.rubbed, p.made); }
 
 // The energy to which the limit refers. Contact is accurate to a small part of the rest distance, so while
 // bodies at rest on each other have hardly begun to move, the work of their weight over that distance is
-// used. Unknown elastic energies are not part of the largest energy (energy_watch.cpp).
+// used, and at least the kinetic energy of a motion by the rounding of a coordinate in a sub-step. Unknown
+// elastic energies are not part of the largest energy (energy_watch.cpp).
 struct Scale {
   double joule;
   bool hidden;
   double limit(const World &w) const { return (w.def.energy_watch + (hidden ? 1 : 0)) * joule; }
 };
 Scale scale_of(const World &w, const PairWork &p) {
-  double mass = 0;
+  double mass = 0, extent = 0;
   bool hidden = false;
   for (const auto &b : w.bodies) {
     if (b->id != p.a && b->id != p.b) continue;
     mass += b->mass;
     hidden = hidden || !b->model.can(DFM_CAP_ENERGY);
+    for (const double x : b->p.x) extent = std::max(extent, std::fabs(x));
   }
-  return {std::max(w.stats.energy_max, mass * std::sqrt(norm2(w.gravity.now)) * w.offset), hidden};
+  const double h = w.stats.substeps > 0 ? w.time / double(w.stats.substeps) : 0;
+  const double rounding = h > 0 ? kRounding * extent / h : 0;
+  return {std::max({w.stats.energy_max, mass * std::sqrt(norm2(w.gravity.now)) * w.offset,
+                    mass * rounding * rounding}),
+          hidden};
 }
 
 const std::string &name_of(const World &w, uint64_t id) {

@@ -398,7 +398,7 @@ void prepare(World &w, const RestoredChoice *restored) {
   w.offset = restored ? restored->offset : choose_offset(w);
   if (!restored) check_offset(w);
   for (auto &b : w.bodies)
-    if (!b->surface.laid.empty()) b->surface.back = b->surface.slit ? 0 : 0.5 * w.offset;
+    if (!b->surface.laid.empty()) b->surface.back = 0.5 * w.offset;
   for (auto &b : w.bodies)
     if (w.def.sleep && b->anchor.empty()) b->anchor = b->p.x;
   step.active.reserve(nb);

@@ -14,6 +14,7 @@
 #include <algorithm>
 #include <array>
 
+#include "body/make_surface.h"
 #include "ccd/toi_guard_motion.h"
 #include "geometry/pierce.h"
 #include "narrow/self_contact.h"
@@ -59,10 +60,6 @@ SelfBody *self_body(StepContext &step, uint32_t slot) {
   return at != step.self_bodies.end() && (*at)->body->slot == slot ? at->get() : nullptr;
 }
 
-// The guard keeps a distance, and two sides of an open face have none: in a body with open faces only contact
-// resolves crossings.
-bool is_guarded(const SelfBody &b) { return !b.rest.opened.any(); }
-
 void find_tangled(SelfBody &b) {
   const Surface &s = b.body->surface;
   b.tangled.assign(s.nsurfel, 0);
@@ -76,9 +73,41 @@ void find_tangled(SelfBody &b) {
 
 using Corners = std::array<uint32_t, 3>;
 
+uint32_t root(Array<uint32_t> &parent, uint32_t i) {
+  while (parent[i] != i) i = parent[i] = parent[parent[i]];
+  return i;
+}
+
+// OpenedSurface::side. twin [ntri]: the triangle on the other side of the open face, or kNone.
+// Where two open faces meet at an edge that they have not split, four triangles do: around the edge one ends
+// where the next begins, and no face meets its own other side.
+void find_sides(const Surface &s, const Array<uint32_t> &twin, Array<uint32_t> &side) {
+  std::vector<std::pair<uint32_t, uint32_t>> of_edge;  // and a half edge: 3 t + k
+  for (uint32_t h = 0; h < 3 * s.ntri; ++h)
+    if (twin[h / 3] != kNone) of_edge.push_back({s.tri_edge[h], h});
+  std::sort(of_edge.begin(), of_edge.end());
+  Array<uint32_t> parent(s.ntri, 0u, side.get_allocator());
+  for (uint32_t t = 0; t < s.ntri; ++t) parent[t] = t;
+  const auto forward = [&](uint32_t h) { return s.tri[h] < s.tri[h - h % 3 + (h + 1) % 3]; };
+  for (size_t i = 0, j = 0; i < of_edge.size(); i = j) {
+    for (j = i; j < of_edge.size() && of_edge[j].first == of_edge[i].first;) ++j;
+    if (j > i + 4) continue;
+    for (size_t k = i; k < j; ++k)
+      for (size_t l = i; l < k; ++l) {
+        const uint32_t a = of_edge[k].second, b = of_edge[l].second;
+        if (forward(a) == forward(b) || twin[a / 3] == b / 3) continue;
+        const uint32_t ra = root(parent, a / 3), rb = root(parent, b / 3);
+        parent[std::max(ra, rb)] = std::min(ra, rb);
+      }
+  }
+  side.assign(s.ntri, kNone);
+  for (uint32_t t = 0; t < s.ntri; ++t)
+    if (twin[t] != kNone) side[t] = root(parent, t);
+}
+
 OpenedSurface opened_surface(const Memory &m, const Body &b) {
   OpenedSurface out;
-  use_memory(m, out.origin, out.twin, out.begin, out.near, out.point);
+  use_memory(m, out.origin, out.twin, out.side, out.begin, out.near, out.point);
   if (!b.surface.slit) return out;
   const Surface &s = b.surface;
   out.point = s.point;
@@ -97,6 +126,7 @@ OpenedSurface opened_surface(const Memory &m, const Body &b) {
     out.twin[by_corners[i].second] = by_corners[i - 1].second;
     out.twin[by_corners[i - 1].second] = by_corners[i].second;
   }
+  find_sides(s, out.twin, out.side);
   std::vector<std::vector<uint32_t>> near(b.p.n);
   for (size_t e = 0; e < b.edges.size(); e += 2) {
     near[b.edges[e]].push_back(b.edges[e + 1]);
@@ -118,8 +148,8 @@ bool is_tangled(SelfBody &b, uint32_t surfel) {
 
 }  // namespace
 
-SelfBody::SelfBody(const Memory &m, const Body &b) : id(b.id), shape(b.shape), body(&b), list(m, b.surface) {
-  const Surface &s = b.surface;
+SelfBody::SelfBody(const Memory &m, Body &b) : id(b.id), shape(b.shape), body(&b), list(m, b.surface) {
+  Surface &s = b.surface;
   rest.x = Array<double>(size_t{4} * s.nsurfel, 0.0, HookAllocator<double>(m));
   const auto at = [&](uint32_t phyxel) { return load3(&b.p.rest[size_t{3} * phyxel]); };
   for (uint32_t i = 0; i < s.nsurfel; ++i) {
@@ -131,6 +161,9 @@ SelfBody::SelfBody(const Memory &m, const Body &b) : id(b.id), shape(b.shape), b
   for (size_t e = 0; e < b.edges.size(); e += 2) cells.push_back(norm(at(b.edges[e]) - at(b.edges[e + 1])));
   rest.thin = 2 * std::max(s.median_edge, median(cells));
   rest.opened = opened_surface(m, b);
+  if (!rest.opened.any()) return;
+  rest.way = Array<double>(size_t{4} * s.nsurfel, 0.0, HookAllocator<double>(m));
+  ways_back(s, rest.x.data(), [&](uint32_t i, Vec3 way) { store3(&rest.way[4 * size_t{i}], way); });
 }
 
 uint8_t asks_self_contact(const World &w) {
@@ -202,8 +235,7 @@ void stage_self(World &w, StepContext &step) {
     SelfBody *const self = s.get();
     const Tangled tangled = [self](uint32_t surfel) { return is_tangled(*self, surfel); };
     find_self_contacts(view, s->rest, s->list.vertex_face(), s->list.edge_edge(), step.h, w.offset,
-                       w.plan.has(StageRole::guards) && is_guarded(*s) ? tangled : nullptr, step.lent,
-                       step.contacts);
+                       w.plan.has(StageRole::guards) ? tangled : nullptr, step.lent, step.contacts);
   }
   count_self(w, step);
 }
@@ -218,7 +250,6 @@ bool cover_self(World &w, StepContext &step) {
     if (!s->on &&
         s->watch->meets(step.h, w.offset, change, [&](uint32_t surfel) { return velocity_after(b, surfel); }))
       switch_to(*s, true);
-    if (!is_guarded(*s)) continue;
     if (s->on) s->list.cover(step.h, w.offset, change);
     fresh |= s->joined != (s->on ? s->list.renewals() : 0);
   }
@@ -227,8 +258,7 @@ bool cover_self(World &w, StepContext &step) {
 }
 
 bool join_self(StepContext &step, const Array<Candidate> *pairs, Array<Candidate> &to) {
-  if (std::none_of(step.self_bodies.begin(), step.self_bodies.end(),
-                   [](auto &s) { return s->on && is_guarded(*s); })) {
+  if (std::none_of(step.self_bodies.begin(), step.self_bodies.end(), [](auto &s) { return s->on; })) {
     for (auto &s : step.self_bodies) s->joined = 0;
     return false;
   }
@@ -237,7 +267,7 @@ bool join_self(StepContext &step, const Array<Candidate> *pairs, Array<Candidate
   for (auto &s : step.self_bodies) {
     const uint32_t slot = s->body->slot;
     s->joined = 0;
-    if (!s->on || !is_guarded(*s)) continue;
+    if (!s->on) continue;
     for (const SelfPair &p : s->list.vertex_face()) to.push_back({slot, slot, p.a, p.b, kVertexFace, 0});
     for (const SelfPair &p : s->list.edge_edge()) to.push_back({slot, slot, p.a, p.b, kEdgeEdge, 0});
     s->joined = s->list.renewals();

@@ -25,7 +25,7 @@ struct SelfBody {
   // [nsurfel] of a triangle that crosses another one at the start of the sub-step; where `looked`
   Array<uint8_t> tangled;
   bool looked = false;
-  SelfBody(const Memory &memory, const Body &b);
+  SelfBody(const Memory &memory, Body &b);
 };
 
 // DFM_SELF_*: the setting of the world (dfm_world_def.self_contact, or the effect in its list).

@@ -118,7 +118,7 @@ void name_features(const Body &b, const CutMesh &mesh, Surface &surface, CutReco
 }
 
 void find_laid(const Memory &m, const WholeBody &whole, const CutRecord &record, Surface &surface) {
-  use_memory(m, surface.laid, surface.laid_surfel, surface.sums);
+  use_memory(m, surface.laid, surface.laid_surfel, surface.laid_tip, surface.place, surface.sums);
   if (record.open.empty()) return;
   std::vector<Corners> open;
   for (const uint64_t face : record.open) {
@@ -129,20 +129,34 @@ void find_laid(const Memory &m, const WholeBody &whole, const CutRecord &record,
     if (common.size() == 3) open.push_back(sorted(common[0], common[1], common[2]));
   }
   std::sort(open.begin(), open.end());
-  std::vector<Corners> found;
+  std::vector<std::pair<Corners, uint32_t>> found;  // and the place in `laid`
   for (uint32_t t = 0; t < surface.ntri; ++t) {
     const auto point = [&](size_t k) { return record.point[surface.point[surface.tri[3 * size_t{t} + k]]]; };
     const Corners corners = sorted(point(0), point(1), point(2));
     if (!std::binary_search(open.begin(), open.end(), corners)) continue;
+    found.push_back({corners, static_cast<uint32_t>(surface.laid.size())});
     surface.laid.push_back(t);
-    found.push_back(corners);
     for (size_t k = 0; k < 3; ++k) surface.laid_surfel.push_back(surface.tri[3 * size_t{t} + k]);
   }
   std::sort(surface.laid_surfel.begin(), surface.laid_surfel.end());
   surface.laid_surfel.erase(std::unique(surface.laid_surfel.begin(), surface.laid_surfel.end()),
                             surface.laid_surfel.end());
   std::sort(found.begin(), found.end());
-  surface.slit = std::adjacent_find(found.begin(), found.end()) != found.end();
+  surface.laid_tip.assign(surface.laid.size(), 0);
+  for (size_t i = 1; i < found.size(); ++i) {
+    if (found[i].first != found[i - 1].first) continue;
+    surface.slit = true;
+    const uint32_t l = found[i].second, other = found[i - 1].second;
+    const uint32_t *const c = &surface.tri[3 * size_t{surface.laid[l]}],
+                          *const d = &surface.tri[3 * size_t{surface.laid[other]}];
+    for (uint32_t k = 0; k < 3; ++k)
+      for (uint32_t j = 0; j < 3; ++j) {
+        if (c[k] != d[j]) continue;
+        surface.laid_tip[l] = static_cast<uint8_t>(surface.laid_tip[l] | 1u << k);
+        surface.laid_tip[other] = static_cast<uint8_t>(surface.laid_tip[other] | 1u << j);
+      }
+  }
+  if (surface.slit) surface.place.assign(size_t{4} * surface.nsurfel, 0.0);
 }
 
 void take_names(const std::string &body, FeatureNames &names, Surface &surface, CutRecord &record) {

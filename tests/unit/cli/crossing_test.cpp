@@ -275,3 +275,26 @@ TEST(Counter, Obstacles_CountAgainstBodiesOnly) {
   EXPECT_EQ(count(false, true), 1u);
   EXPECT_EQ(count(true, true), 0u);
 }
+
+// Faces of a cut lie on each other, so a crossing of two of them counts from a depth on.
+TEST(Counter, CutSurfaces_CrossBeyondADepth) {
+  const uint32_t tri[3] = {0, 1, 2};
+  const double level[9] = {-1, -1, 0, 1, -1, 0, 0, 1, 0};
+  for (const double deep : {0.002, 0.1}) {
+    const double upright[9] = {-1, 0, 1, 1, 0, 1, 0, 0, -deep};
+    const double *a[3] = {upright, upright + 3, upright + 6}, *b[3] = {level, level + 3, level + 6};
+    EXPECT_NEAR(crossing::depth(a, b), deep, 1e-15);
+    EXPECT_NEAR(crossing::depth(b, a), deep, 1e-15);
+    Counter counter;
+    const auto count = [&](bool first, bool second) {
+      return counter
+          .count({{upright, 3, tri, 1, false, first}, {level, 3, tri, 1, false, second}}, Touching::counts)
+          .all();
+    };
+    EXPECT_EQ(count(false, true), 1u);
+    EXPECT_EQ(count(true, true), deep > crossing::kLaid * 2 ? 1u : 0u);
+  }
+  const double far[9] = {5, 0, -1, 6, 0, -1, 5, 0, 1};
+  const double *a[3] = {far, far + 3, far + 6}, *b[3] = {level, level + 3, level + 6};
+  EXPECT_LT(crossing::depth(a, b), 0);
+}
