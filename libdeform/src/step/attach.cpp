@@ -6,6 +6,7 @@
 #include "deform/attach.h"
 #include "state/world.h"
 #include "step/context.h"
+#include "step/move_obstacles.h"
 #include "step/rigid.h"
 #include "step/stages.h"
 
@@ -72,7 +73,7 @@ void add_bonds(World &w, StepContext &step, const Attachment &a) {
       if (feels(o)) {
         b.velocity = rigid_velocity(o, x - step.rigid_places[b.slot_b].center, step.h);
       } else if (step.obstacle_views[b.slot_b].moves()) {
-        const Pose end = o.end_pose(w.time, step.h, step.left);
+        const Pose end = end_pose(w, step, o);
         b.velocity = (1 / step.h) * (place(end, load3(&a.place[3 * i])) - held);
       }
     } else {

@@ -32,8 +32,8 @@ struct StageTime {
 };
 
 struct StepContext {
-  // s: length of the sub-step; from its start to the end of the step
-  double h = 0, left = 0;
+  // s: length of the sub-step; from its start to the end of the step, and of the planned sub-step
+  double h = 0, left = 0, rest = 0;
   Budget budget;
   Counting counting;
   std::vector<StageTime> stage_times;  // by row of the method's table

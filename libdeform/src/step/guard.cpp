@@ -23,6 +23,7 @@
 #include "narrow/detail.h"
 #include "state/world.h"
 #include "step/context.h"
+#include "step/move_obstacles.h"
 #include "step/stages.h"
 
 namespace dfm {
@@ -150,7 +151,7 @@ void set_fraction(World &w, StepContext &step, double fraction) {
     GuardPose &to = scene.poses[o];
     to = {v.position, v.rotation};
     if (!v.moves()) continue;
-    const Pose end = w.obstacles[o]->end_pose(w.time, step.h, step.left);
+    const Pose end = end_pose(w, step, *w.obstacles[o]);
     to = {end.position, end.rotation};
     if (fraction < 1)
       to = {v.position + fraction * (end.position - v.position), slerp(v.rotation, end.rotation, fraction)};
@@ -165,6 +166,11 @@ bool cross_at_start(StepContext &step, const Candidate &c) {
   return cross_at_start(step, swap ? c.slot_b : c.slot_a, swap ? c.slot_a : c.slot_b, c.obstacle);
 }
 
+// Of a body with itself that has open faces.
+bool of_slit(const World &w, const Candidate &c) {
+  return of_one_body(c) && w.bodies[c.slot_a]->surface.slit;
+}
+
 // The safe fraction of the way; 1: nothing comes too near.
 double find_hits(World &w, StepContext &step) {
   Guard &g = step.guard;
@@ -175,7 +181,8 @@ double find_hits(World &w, StepContext &step) {
   guard_pairs(g.scene, list, g.near, g.hits);
   std::erase_if(g.hits, [&](const GuardHit &hit) {
     const Candidate &c = list[hit.candidate];
-    return of_one_body(c) ? !(guarded_apart(w, step, c) > 0) : cross_at_start(step, c);
+    if (!of_one_body(c)) return cross_at_start(step, c);
+    return (g.lets_slits && of_slit(w, c)) || !(guarded_apart(w, step, c) > 0);
   });
   guard_obstacles(g.scene, list, g.near, g.hits);
   guard_ask_hits(w, step);
@@ -275,6 +282,12 @@ bool stage_guard(World &w, StepContext &step, uint32_t *trouble) {
     step.guard.again = true;
     return false;
   }
+  // Teeth of a slit that interlock may leave no way at all, where the rest of the world has one: what contact
+  // does not keep apart there crosses.
+  step.guard.lets_slits =
+      std::any_of(step.guard.hits.begin(), step.guard.hits.end(),
+                  [&](const GuardHit &hit) { return of_slit(w, (*step.guard.list)[hit.candidate]); });
+  if (step.guard.lets_slits) safe = find_hits(w, step);
   for (uint32_t k = 0; !step.guard.hits.empty(); ++k) {
     set_fraction(w, step, k < kFractions ? step.guard.motion * std::min(safe, 0.999) : 0);
     if (step.guard.motion == 0) break;

@@ -42,6 +42,7 @@ struct Guard {
   double planned = 0;                 // s, the sub-step before it was shortened
   uint32_t pieces = 0;                // cuts of this planned sub-step
   bool acted = false, again = false;  // in this sub-step; it must be repeated
+  bool lets_slits = false;            // hits across slits no longer count
   double cut = 1;                     // then: factor on its length
   double motion = 1;                  // < 1: fraction of the displacement that is taken
 
@@ -49,7 +50,7 @@ struct Guard {
     kept.clear();
     through.clear();
     cut = motion = 1;
-    acted = again = resolving = false;
+    acted = again = resolving = lets_slits = false;
   }
   void forget() { memory.forget(); }  // positions or d_c have changed other than by a step
 };

@@ -1,10 +1,15 @@
 // Poses of obstacles over a step.
 #pragma once
+#include "state/motion.h"
 
 namespace dfm {
 
+struct Obstacle;
 struct StepContext;
 struct World;
+
+// At the end of the sub-step.
+Pose end_pose(const World &w, const StepContext &step, const Obstacle &o);
 
 // Writes into step.obstacle_views the velocity and spin that lead from the present pose to that at the end of
 // the sub-step.

@@ -32,7 +32,7 @@ void each_held_place(const Body &b, double t, const std::function<void(uint32_t,
   }
 }
 
-void stage_motion(World &w, double h, Array<Driven> &driven) {
+void stage_motion(World &w, double h, double rest, Array<Driven> &driven) {
   // Held velocities are the only state that changes before a sub-step has succeeded; the previous values are
   // kept.
   const double end = w.prescribed.at(w.time + h);
@@ -53,9 +53,9 @@ void stage_motion(World &w, double h, Array<Driven> &driven) {
       }
       set(end);
     }
-    each_held_place(*b, end, [&](uint32_t point, Vec3 to) {
+    each_held_place(*b, w.prescribed.at(w.time + rest), [&](uint32_t point, Vec3 to) {
       const size_t at = size_t(point) * kStride;
-      const Vec3 v = (1 / h) * (to - load3(&b->p.x[at]));
+      const Vec3 v = (1 / rest) * (to - load3(&b->p.x[at]));
       for (int k = 0; k < 3; ++k)
         if (b->p.held[point] & (1 << k)) {
           driven.push_back({&b->p.v[at + size_t(k)], b->p.v[at + size_t(k)]});

@@ -58,7 +58,9 @@ using Active = std::span<const uint32_t>;  // slots of the bodies that stages wo
 // A held velocity component set by this sub-step.
 struct Driven { double *velocity, before; };
 
-void stage_motion(World &w, double h, Array<Driven> &driven);
+// Held points go straight to where they have to be at the end of the planned sub-step, `rest` from now, as
+// obstacles do (Obstacle::end_pose).
+void stage_motion(World &w, double h, double rest, Array<Driven> &driven);
 // b.p.load at time t; loads that nothing varies over time times share. Springs are not in it.
 void set_loads(Body &b, double t, double share);
 // Prescribed positions of moving held points at time t.

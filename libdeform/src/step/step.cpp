@@ -81,7 +81,7 @@ const ContactMethod &velocity_method() { return kVelocity; }
 namespace row {
 
 bool motion(World &w, StepContext &step, uint32_t *) {
-  stage_motion(w, step.h, step.driven);
+  stage_motion(w, step.h, step.rest, step.driven);
   return true;
 }
 bool model(World &w, StepContext &step, uint32_t *trouble) {
@@ -203,7 +203,7 @@ bool advance(World &w, StepContext &step, double end, double goal, bool last, ui
   step.guard.motion = 1;
   step.guard.planned = end - w.time;
   for (bool whole = false; !whole;) {
-    const double rest = step.h = end - w.time;
+    const double rest = step.rest = step.h = end - w.time;
     step.left = goal - w.time;
     // waking changes state that a later failure must restore
     if (step.h < step.left || (w.def.sleep && !all_idle(w, step))) keep_start(w, step);
