@@ -44,9 +44,9 @@ struct Obstacle {
   std::unique_ptr<VoxelGrid> grid;
   std::unique_ptr<SearchTree> search;  // rays
   Pose pose_at_time(double t) const;
-  // Of a sub-step, in a step whose remaining time from t is `left`. rest: s, to the end of the planned sub-step,
-  // of which this is a piece if h is less. It goes straight to where it has to be then: what it was held back
-  // earlier, it catches up in that time and not in the first piece, however short.
+  // Of a sub-step, in a step whose remaining time from t is `left`. rest: s, to the end of the planned
+  // sub-step, of which this is a piece if h is less. The obstacle goes straight to where it has to be then:
+  // what it was held back earlier, it catches up in that time and not in the first piece, however short.
   Pose end_pose(double t, double h, double left, double rest) const;
 };
 
