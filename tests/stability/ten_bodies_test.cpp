@@ -21,7 +21,8 @@ bool apart(const test::SceneRun &run) { return run.number("intersections_max") =
 }  // namespace
 
 TEST(TenBodies, DroppedInABox_ComeToRestWithoutCrossing) {
-  const test::SceneRun run("ten_bodies", {"--time", "4"});
+  // When the last bar has fallen over differs by a second between starts that differ by rounding.
+  const test::SceneRun run("ten_bodies", {"--time", "5"});
   run.expect_sound(100, "ten bodies");
   EXPECT_TRUE(apart(run));
   EXPECT_TRUE(inside_the_box(run));

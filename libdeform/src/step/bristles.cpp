@@ -116,8 +116,8 @@ Turn turn_of(const Body &b, uint8_t type, uint32_t feature, Vec3 t1, Vec3 t2) {
 
 Turn turn_of(const World &w, const StepContext &step, const Obstacle &o, Vec3 n) {
   if (!o.rigid && !o.has_target && !o.moves()) return {1, 0};
-  const double a = step.guard.motion *
-                   dot(n, spin_between(o.pose.rotation, end_pose(w, step, o).rotation, 1));
+  const double a =
+      step.guard.motion * dot(n, spin_between(o.pose.rotation, end_pose(w, step, o).rotation, 1));
   const double half = 0.5 * a * (1 + a * a / 12);  // tan(a / 2) up to a^5
   return unit_turn(1 - half * half, 2 * half);     // of length one, as the following halving requires
 }

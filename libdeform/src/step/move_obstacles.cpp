@@ -42,8 +42,7 @@ void view_obstacles(World &w, StepContext &step) {
 
 void move_obstacles(World &w, const StepContext &step, bool last) {
   for (auto &o : w.obstacles) {
-    if (o->has_target || o->moves())
-      o->pose = last && o->has_target ? o->target : end_pose(w, step, *o);
+    if (o->has_target || o->moves()) o->pose = last && o->has_target ? o->target : end_pose(w, step, *o);
     if (last) o->has_target = false;
   }
 }
