@@ -63,7 +63,7 @@ bool may_ask(const World &w, const StepContext &step, SolveIsland &own) {
 // The response by which a contact looks for the slip at which it comes to rest alone. Many contacts that hold
 // one body turn its slip round together and could not stop it one by one: asked by their own responses they
 // say "slide" one way and the other in turn, for ever. Beyond the cap each takes that of all. Where few of
-// them bear most of the load that one can lead round as well, so from then on two passes by one response
+// them bear most of the load that one can cycle as well, so from then on two passes by one response
 // that do not halve the residual are followed by passes with the other.
 constexpr double kHalves = 0.5;
 void choose_response(const World &w, SolveIsland &own) {
