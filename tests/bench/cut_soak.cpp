@@ -61,12 +61,19 @@ int main(int argc, char **argv) {
     table = argv[at++];
     go_on(table, seed, made);
   }
-  for (; at + 1 < argc; at += 2) {
-    if (!std::strcmp(argv[at], "--cuts")) wanted = std::strtoull(argv[at + 1], nullptr, 10);
-    if (!std::strcmp(argv[at], "--seed")) seed = std::strtoull(argv[at + 1], nullptr, 10);
-    if (!std::strcmp(argv[at], "--each")) each = std::strtoull(argv[at + 1], nullptr, 10);
-    if (!std::strcmp(argv[at], "--seconds")) seconds = std::atof(argv[at + 1]);
-    if (!std::strcmp(argv[at], "--commit")) commit = argv[at + 1];
+  for (; at < argc; at += 2) {
+    const char *const option = argv[at], *const value = at + 1 < argc ? argv[at + 1] : nullptr;
+    if (value && !std::strcmp(option, "--cuts")) wanted = std::strtoull(value, nullptr, 10);
+    else if (value && !std::strcmp(option, "--seed")) seed = std::strtoull(value, nullptr, 10);
+    else if (value && !std::strcmp(option, "--each")) each = std::strtoull(value, nullptr, 10);
+    else if (value && !std::strcmp(option, "--seconds")) seconds = std::atof(value);
+    else if (value && !std::strcmp(option, "--commit")) commit = value;
+    else {
+      std::fprintf(
+          stderr,
+          "usage: cut_soak [TABLE.csv] [--cuts N] [--seed N] [--each N] [--seconds S] [--commit HASH]\n");
+      return 2;
+    }
   }
   const auto now = [begin = std::chrono::steady_clock::now()] {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
