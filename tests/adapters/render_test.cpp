@@ -231,7 +231,7 @@ TEST_P(Pixels, PlaneWhoseBackFacesTheCamera_IsLeftOut) {
   EXPECT_GT(changed(draw(ramp), bare), 1500) << "of 19200";
 }
 
-TEST_P(Pixels, SolidShapes_StandWhereTheyAreTold) {
+TEST_P(Pixels, SolidShapes_AreDrawnAtTheGivenPose) {
   for (const char shape : {'b', 's', 'c'}) {
     Scene s = scene_of({});
     const Look red{{0.9f, 0.1f, 0.1f}, 1};
@@ -340,7 +340,7 @@ TEST(Renderer, BothBackends_Agree) {
   }
 }
 
-TEST(Renderer, SwitchedOff_SaysHowToSwitchOn) {
+TEST(Renderer, SwitchedOff_ReportsHowToSwitchOn) {
   std::string why;
   setenv("DEFORM_RENDER_BACKEND", "none", 1);
   EXPECT_FALSE(Renderer::create(Backend::automatic, 16, 16, &why));
@@ -544,7 +544,7 @@ TEST(Png, RoundTrip_KeepsEveryPixel) {
   EXPECT_NE(why.find(path), std::string::npos);
 }
 
-TEST(Png, UnwritablePlace_IsASentenceAndNoFile) {
+TEST(Png, UnwritablePlace_IsReportedAndNoFileIsWritten) {
   std::string why;
   EXPECT_FALSE(write_png("/nowhere/picture.png", blank(2, 2, 0), &why));
   EXPECT_EQ(why, "cannot write /nowhere/picture.png: No such file or directory");

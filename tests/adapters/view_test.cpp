@@ -342,7 +342,7 @@ TEST_F(Viewer, RecordedSession_IsReplayedToTheSameBitsAndShown) {
   EXPECT_GT(different(picture("last.png"), picture("turned.png")), 1000u);
 }
 
-TEST_F(Viewer, WhatCannotBe_IsOneSentence) {
+TEST_F(Viewer, ImpossibleInput_IsReportedInOneSentence) {
   const struct {
     const char *script, *sentence;
   } cases[] = {

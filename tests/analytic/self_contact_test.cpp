@@ -104,7 +104,7 @@ TEST(SelfContact, LegsThrownTogether_StayApartWhereItIsOnAndPassWhereItIsOff) {
   }
 }
 
-TEST(SelfContact, Report_SaysItselfOnBothSidesAndSumsToNothing) {
+TEST(SelfContact, Report_NamesItselfOnBothSidesAndSumsToZero) {
   const test::Context c;
   const dfm_world w = test::make_self_world(c);
   test::set_friction(w, 0.4);

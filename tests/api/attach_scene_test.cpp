@@ -113,13 +113,13 @@ TEST(AttachScene, Attached_LosesItsTail) {
   }
 }
 
-TEST(AttachScene, AWrongName_IsToldWithItsPlace) {
+TEST(AttachScene, AWrongName_IsReportedWithItsPlace) {
   const Opened s(scene(R"([{"to": "hok", "box": [[-1, -1, 0.199], [1, 1, 1]]}])"));
   EXPECT_EQ(s.status, DFM_E_ARG);
   test::says({"/bodies/0/attach/0/to", "\"hok\"", "\"hook\""});
 }
 
-TEST(AttachScene, WhatIsNoAttachment_IsToldWithItsPlace) {
+TEST(AttachScene, InvalidAttachment_IsReportedWithItsPlace) {
   for (const auto &[attach, said] : std::vector<std::pair<std::string, std::string>>{
            {R"([{"box": [[-1, -1, 0], [1, 1, 1]]}])", "to"},
            {R"([{"to": "hook"}])", "box"},

@@ -275,7 +275,7 @@ TEST(Attach, AStiffness_IsThatOfTheWhole) {
   }
 }
 
-TEST(Attach, ReleaseForce_LetsGoAndTells) {
+TEST(Attach, ReleaseForce_ReleasesAndReportsAnEvent) {
   World s;
   const dfm_obstacle hook = s.hook();
   const dfm_body beam = s.beam("msm");

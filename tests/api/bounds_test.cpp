@@ -116,7 +116,7 @@ TEST(Bounds, OffsetLargerThanATenthOfTheThinnestBody_IsRefused) {
   }
 }
 
-TEST(Bounds, ObstacleToldToMoveTooFast_IsRefusedAndTeleportThrowsNothing) {
+TEST(Bounds, ObstacleMotionThatIsTooFast_IsRefusedAndTeleportThrowsNothing) {
   test::Context c;
   const dfm_world w = test::make_world(c, {});
   test::BodyOptions o;

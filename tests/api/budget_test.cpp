@@ -101,7 +101,7 @@ TEST(Budget, UsedUpAnywhereInAStep_LeavesTheStateAsBefore) {
 
 // Sheets that hit at 100 m/s: sweeps beyond the usual cap and the guard's pieces are there to be left out.
 // Three times the speed of their waves: the energy watch, which would end some of these steps, is off.
-TEST(Budget, ThatCheapensAStep_IsToldAndIsTheSameWithAnyThreads) {
+TEST(Budget, ThatCheapensAStep_IsReportedAndIsTheSameWithAnyThreads) {
   uint64_t hash[2];
   for (const uint32_t threads : {1u, 4u}) {
     test::Context c(threads);

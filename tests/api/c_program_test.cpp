@@ -105,7 +105,7 @@ TEST(CProgram, HapticLoop_RunsBesideTheScene) {
   EXPECT_NE(none.out.find("it has no tools"), std::string::npos) << none.out;
 }
 
-TEST(CppProgram, Cpp_TellsOfTheMissingLawAndOfTheBalls) {
+TEST(CppProgram, Cpp_PrintsTheMissingLawAndTheBalls) {
   const test::CommandResult r = example("05_cpp");
   ASSERT_EQ(r.exit_code, 0) << r.out << r.err;
   unsigned contacts = 0;

@@ -340,7 +340,7 @@ TEST(PreSolve, OnSeveralThreads_IsAskedInTheSameOrderWithTheSameBits) {
   EXPECT_EQ(hash[0], hash[1]);
 }
 
-TEST(PreSolve, AnswersThatCannotBe_EndTheStepWithASentence) {
+TEST(PreSolve, ImpossibleAnswers_EndTheStepWithAnError) {
   OnFloor s;
   Choice choice;
   test::ok(dfm_world_set_pre_solve(s.w, &Choice::pre_solve, &choice));

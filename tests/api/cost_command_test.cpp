@@ -233,7 +233,7 @@ TEST(Cost, Page_HoldsChartAndPicturesInOneFile) {
 #endif
 }
 
-TEST(Cost, SecondCall_RunsNothingAndSaysTheSame) {
+TEST(Cost, SecondCall_RunsNothingAndReportsTheSame) {
   Study s = study("again", bar(R"("duration": 0.1, "step": 0.001)"), {"--axes", "time", "--budget", "300"});
   ASSERT_EQ(s.result.exit_code, 0) << s.result.err;
   EXPECT_GT(number(s.report, "runs_started"), 3);
@@ -360,7 +360,7 @@ TEST(Cost, StaticScene_IsStudiedWithoutTime) {
   EXPECT_GT(s.report.find("front")->items.size(), 1u);
 }
 
-TEST(Cost, WhatCannotBeStudied_IsOneSentence) {
+TEST(Cost, WhatCannotBeStudied_IsReportedInOneSentence) {
   const auto refused = [](const std::string &name, const std::string &scene, std::vector<std::string> words,
                           const std::string &part) {
     const Study s = study(name, scene, std::move(words));

@@ -234,7 +234,7 @@ void check_report(F ask, uint32_t first, const char *name) {
 }
 
 // A caller that says no size has a struct of 0.1, however long the library's own has become.
-TEST(DefSizes, ReportsOfAnOlderOrANewerHeader_SayWhatIsFilled) {
+TEST(DefSizes, ReportsOfAnOlderOrANewerHeader_ContainTheFilledSize) {
   test::Context c;
   const dfm_world w = test::make_world(c);
   const dfm_body b = test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 30, {});

@@ -230,7 +230,7 @@ TEST(Effects, ThatNoPluginKnows_AreRefusedWithTheNearest) {
 }
 
 // What parameters would have called for is told as bodies and laws come, and in the plan.
-TEST(Effects, ThatAreLeftOut_AreTold) {
+TEST(Effects, ThatAreLeftOut_AreReported) {
   Logged c;
   dfm_world w = 0;
   dfm_body b = 0;

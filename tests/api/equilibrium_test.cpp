@@ -268,7 +268,7 @@ TEST(Equilibrium, StaticSceneThatCannotBe_IsRefusedWhenItIsRead) {
   }
 }
 
-TEST(Equilibrium, ModelThatRefusesABody_IsOneSentence) {
+TEST(Equilibrium, ModelThatRefusesABody_IsReportedInOneSentence) {
   const std::string folder = test::scratch("model_refuses");
   const test::CommandResult r = test::deform(
       {"run", block_scene(folder, ""), "--out", folder + "/out", "--quiet", "--set",

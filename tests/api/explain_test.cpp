@@ -55,7 +55,7 @@ TEST(Explain, Step_NamesBoundAndSubSteps) {
   EXPECT_NE(result.out.find("the scene asks for 0.1 s: at least "), std::string::npos) << result.out;
 }
 
-TEST(Explain, Step_SaysWhetherStiffnessOrDampingBoundsIt) {
+TEST(Explain, Step_ReportsWhetherStiffnessOrDampingBoundsIt) {
   const auto damped = [](const std::string &name, const std::string &damping) {
     const std::string path =
         scene(name, R"("materials": {"m": {"young": 1e5, "damping": {)" + damping +
@@ -358,7 +358,7 @@ TEST(Explain, CostsOfASceneWithoutSteps_AreRefused) {
 }
 
 // How much of a body its modes hold is shown before a run and after it.
-TEST(Explain, ModesAndTheirShare_AreTold) {
+TEST(Explain, ModesAndTheirShare_AreReported) {
   const std::string path = one_model("modes", R"({"type": "modal", "params": {"modes": 7}})");
   const test::CommandResult plan = test::deform({"explain", path});
   EXPECT_NE(plan.out.find("  modes: 7  ("), std::string::npos) << plan.out;
@@ -372,7 +372,7 @@ TEST(Explain, ModesAndTheirShare_AreTold) {
   EXPECT_NE(summary.find(R"("share": 0.)"), std::string::npos) << summary;
 }
 
-TEST(Explain, ToolThatCutsAndTear_AreTold) {
+TEST(Explain, ToolThatCutsAndTear_AreReported) {
   const test::CommandResult result =
       test::deform({"explain", scene("cut",
                                      R"("materials": {"dough": {"young": 1e4, "tear": 0.4}},

@@ -151,7 +151,7 @@ TEST(Fields, OneMaterialForAllCells_IsTheBodysMaterial) {
   EXPECT_EQ(whole, none) << "0 is the body's material";
 }
 
-TEST(Fields, DensityByCell_IsLumpedAndMovesTheCentre) {
+TEST(Fields, DensityByCell_IsLumpedAndMovesTheCenter) {
   Block b;
   const std::vector<dfm_material> materials =
       halves<dfm_material>(b, b.material("light", 500, 1e5), b.material("heavy", 2000, 1e5));

@@ -144,7 +144,7 @@ TEST(FrictionBenchmark, Search_FindsTheBestSettingsWhichRunThen) {
 }
 
 // How far it is comes from the rows alone, so that a run that goes on counts what was done before.
-TEST(FrictionBenchmark, Progress_CountsRowsAndTellsWhatIsUnderWay) {
+TEST(FrictionBenchmark, Progress_CountsRowsAndNamesTheRowInWork) {
   const std::string folder = test::scratch("friction_benchmark_progress");
   std::filesystem::create_directories(folder + "/rows");
   test::write_file(folder + "/rows/scenes_sled.csv",
@@ -163,7 +163,7 @@ TEST(FrictionBenchmark, Progress_CountsRowsAndTellsWhatIsUnderWay) {
 }
 
 // From a folder that has no build/ of its own.
-TEST(FrictionBenchmark, CommandThatIsNotThere_IsOneSentence) {
+TEST(FrictionBenchmark, MissingCommand_IsReportedInOneSentence) {
   const test::CommandResult r =
       test::run({"/usr/bin/env", "-C", test::scratch("friction_benchmark_elsewhere"), DEFORM_TEST_PYTHON,
                  script("run.py"), "deform", "--command", "no/such/deform", "--only", "slope_slide"});
@@ -206,7 +206,7 @@ TEST(FrictionBenchmark, SpeedAtEqualError_IsOfTheCheapestThatPasses) {
             "| lift  | 3 s (good) | not at any setting run | one |\n\n<!-- end of table -->\nafter\n");
 }
 
-TEST(FrictionBenchmark, BenchPeersWithoutBullet_IsOneSentence) {
+TEST(FrictionBenchmark, BenchPeersWithoutBullet_ReportsOneSentence) {
   const test::CommandResult r =
       test::run({"/usr/bin/env", "PATH=/nowhere", DEFORM_TEST_PYTHON, script("../peers/bench_peers.py"),
                  DEFORM_COMMAND, test::scratch("bench_peers")});

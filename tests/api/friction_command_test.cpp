@@ -188,7 +188,7 @@ TEST(FrictionCommand, StrangeKeyForOurLaw_IsNamedWithTheNearest) {
   EXPECT_EQ(known.err, "");
 }
 
-TEST(FrictionCommand, LawWithAJump_HoldsAndIsTold) {
+TEST(FrictionCommand, LawWithAJump_HoldsAndIsReported) {
   std::string text = push("\"bias\": 2.0", "\"bias\": 0.9");
   const test::rig::Outcome held = test::rig::run(file("held.json", text), {"--law", tiny("tiny_sign")});
   for (const double x : held.rows.column("x")) EXPECT_EQ(x, 0);

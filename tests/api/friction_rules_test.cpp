@@ -146,7 +146,7 @@ TEST(FrictionRules, ARuleThatIsRemoved_LeavesItsContactsToTheNextOne) {
   EXPECT_NEAR(s.speed(), 0, 1e-2) << "pairs without a rule: Coulomb, 0.5";
 }
 
-TEST(FrictionRules, WhatIsRefused_SaysWhyAndChangesNothing) {
+TEST(FrictionRules, WhatIsRefused_GivesTheReasonAndChangesNothing) {
   Scene s;
   ASSERT_EQ(s.add("block", "floor", 0.5), DFM_OK);
   s.run(5);

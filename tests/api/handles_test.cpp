@@ -572,7 +572,7 @@ TEST(Handles, OfAnotherKind_AreRefusedByEveryCall_WithBothKindsNamed) {
   test::run(all[0].handle, 2e-3, 1e-3);  // and nothing was harmed
 }
 
-TEST(Handles, HandleKind_TellsWhatAReportNames) {
+TEST(Handles, HandleKind_IdentifiesWhatAReportNames) {
   test::Context c;
   uint64_t floor = 0;
   for (const Live &one : live(c)) {

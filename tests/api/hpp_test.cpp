@@ -126,7 +126,7 @@ TEST(Hpp, Files_AreReadAndWrittenWhole) {
   EXPECT_EQ(got, "text");
 }
 
-TEST(Hpp, Step_TellsADiscardedStepApart) {
+TEST(Hpp, Step_DistinguishesADiscardedStep) {
   const auto context = deform::Context::make(quiet());
   deform::WorldDef def;
   def.max_substeps = 1;

@@ -96,7 +96,7 @@ TEST(LabelsCommand, WithATable_MakesBodiesAnObstacleAndWhatHoldsThem) {
   EXPECT_EQ(number(test::read_file(out + "/run/summary.json"), "inverted_max"), 0);
 }
 
-TEST(LabelsCommand, WhatIsWrong_IsToldInOneSentence) {
+TEST(LabelsCommand, WrongInput_IsReportedInOneSentence) {
   const std::string volume = phantom("nodule", "6"), out = folder() + "/refused",
                     table = folder() + "/wrong.json";
   const auto refused = [&](const std::vector<std::string> &more, const std::string &words) {

@@ -240,7 +240,7 @@ TEST(Memory, FallingAsleepAndWaking_AllocatesNothing) {
   EXPECT_EQ(hooks.live_bytes, 0);
 }
 
-TEST(Memory, ParametersThatFindNoMemory_SayWhyAndChangeNothing) {
+TEST(Memory, ParametersThatFindNoMemory_ReportNoMemoryAndChangeNothing) {
   Hooks hooks;
   const dfm_context_def def = hooks.def();
   dfm_context *c = nullptr;
@@ -360,7 +360,7 @@ TEST(Memory, WhenTheNthAllocationFails_TheCallFailsCleanlyAndNothingLeaks) {
   EXPECT_GT(failures[3], 20) << "so do first steps in contact";
 }
 
-TEST(Memory, WhenRestoreHasNoMemory_ItSaysSoAndTheWorldGoesOn) {
+TEST(Memory, WhenRestoreHasNoMemory_ItReportsNoMemoryAndTheWorldContinues) {
   Hooks hooks;
   const dfm_context_def def = hooks.def();
   dfm_context *c = nullptr;

@@ -126,7 +126,7 @@ TEST(MeshCommand, MakeSurface_ByEndingOrByFlag) {
   EXPECT_TRUE(has(plain.out, "plain.obj: 42 points, 80 triangles, closed, least quality")) << plain.out;
 }
 
-TEST(MeshCommand, InfoOfASurface_TellsHolesGroupsAndRepairs) {
+TEST(MeshCommand, InfoOfASurface_ReportsHolesGroupsAndRepairs) {
   const std::string file = folder() + "/open.obj";
   test::write_file(
       file, "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 5 5 5\ng sole\nf 1 3 2\ng side\nf 1 2 4\nf 1 3 4\n");
@@ -147,7 +147,7 @@ TEST(MeshCommand, InfoOfASurface_TellsHolesGroupsAndRepairs) {
     EXPECT_TRUE(has(json.out, word)) << word << " not in\n" << json.out;
 }
 
-TEST(MeshCommand, ConvertCellsToASurface_WritesTheBoundaryAndSaysSo) {
+TEST(MeshCommand, ConvertCellsToASurface_WritesAndReportsTheBoundary) {
   const std::string ball = folder() + "/body.msh", skin = folder() + "/skin.stl";
   ASSERT_EQ(test::deform({"mesh", "make", "ball", "--out", ball, "--cells", "160", "--quiet"}).exit_code, 0);
   const auto r = test::deform({"mesh", "convert", ball, skin});
@@ -172,7 +172,7 @@ TEST(MeshCommand, ConvertSurfaces_ThereAndBackKeepsTheBytes) {
   EXPECT_EQ(test::read_file(a), test::read_file(e));
 }
 
-TEST(MeshCommand, ConvertWithGroups_SaysWhatIsLost) {
+TEST(MeshCommand, ConvertWithGroups_ReportsWhatIsLost) {
   const std::string file = folder() + "/groups.obj";
   test::write_file(file, "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\ng a\nf 1 2 3\ng b\nf 2 4 3\n");
   EXPECT_TRUE(has(test::deform({"mesh", "convert", file, folder() + "/groups.off"}).err,
@@ -188,7 +188,7 @@ TEST(MeshCommand, ConvertWithGroups_SaysWhatIsLost) {
 }
 
 // A triangle in glTF: read where the command is built with assimp, else a sentence that says how.
-TEST(MeshCommand, ConvertForeignFormat_ReadsItOrSaysHow) {
+TEST(MeshCommand, ConvertForeignFormat_ReadsItOrExplainsHow) {
   const std::string file = folder() + "/triangle.gltf", out = folder() + "/triangle.obj";
   test::write_file(file,
                    R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
@@ -260,7 +260,7 @@ TEST(MeshCommand, BadInput_ExitsTwoWithOneSentence) {
   expect_refused({"mesh"}, {"info"});
 }
 
-TEST(MeshApi, Read_TellsWarningsAndLends) {
+TEST(MeshApi, Read_ReportsWarningsAndLendsArrays) {
   test::LoggedContext c;
   dfm_tetmesh mesh = 0;
   ASSERT_EQ(dfm_tetmesh_read(c.context, own("cube_msh41_bin_be.msh").c_str(), &mesh), DFM_OK)

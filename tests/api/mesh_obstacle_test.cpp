@@ -54,7 +54,7 @@ const test::Triangles &hills() {
 
 }  // namespace
 
-TEST(MeshObstacle, WhatIsWrong_IsSaid) {
+TEST(MeshObstacle, WrongInput_IsReported) {
   test::Context context;
   const dfm_world w = test::make_world(context);
   const double nan = std::nan("");

@@ -39,7 +39,7 @@ dfm_obstacle thing(dfm_world w, uint32_t shape, double size, const test::Triangl
 
 }  // namespace
 
-TEST(Overlap, OfTwoBalls_IsFoundNamedAndToldOnce) {
+TEST(Overlap, OfTwoBalls_IsFoundNamedAndReportedOnce) {
   test::LoggedContext logged;
   dfm_context *const c = logged.context;
   const dfm_world w = test::make_world(c, {});

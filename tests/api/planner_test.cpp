@@ -89,7 +89,7 @@ TEST_F(PlannerScene, BlockUnderAProbe_TakesAModelThatDents) {
   EXPECT_TRUE(has(r.out, "'probe' touches it over about 0.054 m")) << r.out;
 }
 
-TEST_F(PlannerScene, BudgetThatCannotBeMet_IsSaidByTheRun) {
+TEST_F(PlannerScene, BudgetThatCannotBeMet_IsReportedByTheRun) {
   const test::CommandResult r =
       test::deform({"run", bar(R"("budget": {"ms_per_step": 1e-6},)"), "--out", folder() + "/out"});
   EXPECT_EQ(r.exit_code, 0) << r.err;
@@ -98,7 +98,7 @@ TEST_F(PlannerScene, BudgetThatCannotBeMet_IsSaidByTheRun) {
   EXPECT_TRUE(has(r.out, " ms per step\nbody ")) << r.out;
 }
 
-TEST_F(PlannerScene, WhatCannotBePlanned_IsOneSentence) {
+TEST_F(PlannerScene, WhatCannotBePlanned_IsReportedInOneSentence) {
   const std::string target = R"("accuracy": {"target": 0.1},)";
   expect_refused(bar(target + R"("budget": {"ms_per_step": 1},)"), {"/budget", "keep one"});
   expect_refused(bar(R"("accuracy": {"target": 2},)"), {"/accuracy/target"});

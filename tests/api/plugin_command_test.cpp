@@ -53,7 +53,7 @@ TEST(PluginCommand, Info_ShowsTheParameterTable) {
       << json.out;
 }
 
-TEST(PluginCommand, InfoOfAModel_SaysWhatItCan) {
+TEST(PluginCommand, InfoOfAModel_ListsItsCapabilities) {
   const auto r = test::deform({"plugin", "info", "msm"});
   EXPECT_EQ(r.exit_code, 0) << r.err;
   EXPECT_TRUE(has(r.out, "can      energy damping rotation_invariant plausible")) << r.out;

@@ -65,7 +65,7 @@ TEST(Replay, RecordedRun_PassesThroughTheSameBitsInEveryState) {
   EXPECT_TRUE(fs::exists(out + "/replay/summary.json"));
 }
 
-TEST(Replay, StateThatIsNotTheRecordedOne_IsToldWithItsTimeAndExitsWith1) {
+TEST(Replay, StateThatIsNotTheRecordedOne_IsReportedWithItsTimeAndExitsWith1) {
   const Folder f;
   const std::string out = f.path + "/run", index = out + "/recording/states.csv";
   ASSERT_EQ(f.run({"--out", out, "--record"}).exit_code, 0);
@@ -78,7 +78,7 @@ TEST(Replay, StateThatIsNotTheRecordedOne_IsToldWithItsTimeAndExitsWith1) {
   EXPECT_NE(again.err.find("at t = 0.04"), std::string::npos) << again.err;
 }
 
-TEST(Replay, WhatDoesNotFit_IsASentenceAndNothingIsLost) {
+TEST(Replay, WhatDoesNotFit_IsReportedAndNothingIsLost) {
   const Folder f;
   const std::string state = f.path + "/mid.state", out = f.path + "/run";
   ASSERT_EQ(f.run({"--out", out, "--record", "--save", "0.05", state}).exit_code, 0);
@@ -156,7 +156,7 @@ TEST(SaveScene, RunGoesOnFromIt_WithTheSameBitsProbesAndOutputs) {
   EXPECT_EQ(last_line("rest"), last_line("whole"));
 }
 
-TEST(SaveScene, WrongNames_AreASentenceBeforeTheFirstStep) {
+TEST(SaveScene, WrongNames_AreReportedBeforeTheFirstStep) {
   const Folder f;
   const auto refused = [&](const std::string &path, const char *part) {
     const test::CommandResult r = f.run({"--out", f.path + "/never", "--save-scene", path});

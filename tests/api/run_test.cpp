@@ -434,7 +434,7 @@ TEST(Run, Frames_WithoutABackendAreAWarning) {
   EXPECT_NE(value(r.summary, "warnings").find("no pictures"), std::string::npos);
 }
 
-TEST(Run, OptionWithoutItsValue_SaysWhatIsMissing) {
+TEST(Run, OptionWithoutItsValue_NamesWhatIsMissing) {
   EXPECT_EQ(test::deform({"run", "x.json", "--frames"}).err,
             "deform: --frames needs a value: FPS (see: deform run --help)\n");
   EXPECT_EQ(test::deform({"run", "x.json", "--save", "1"}).err,

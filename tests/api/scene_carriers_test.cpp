@@ -278,7 +278,7 @@ TEST(SceneAnisotropy, KeysAndDirections_BecomeTheModels) {
           .hash_after(20));
 }
 
-TEST(SceneAnisotropy, Mistakes_AreTold) {
+TEST(SceneAnisotropy, Mistakes_AreReported) {
   expect_refused("/bodies/0/anisotropy={}", {"/bodies/0/anisotropy", "either \"axis\" or \"field\""});
   expect_refused(R"(/bodies/0/anisotropy={"axis": [0, 0, 1], "field": "axes.csv"})",
                  {"/bodies/0/anisotropy", "either \"axis\" or \"field\""});
@@ -303,7 +303,7 @@ TEST(SceneAnisotropy, Mistakes_AreTold) {
 }
 
 // The sentence that refuses the body points to the log, so --quiet keeps the log's errors.
-TEST(SceneAnisotropy, WhatTheModelRefuses_IsToldToTheQuietToo) {
+TEST(SceneAnisotropy, WhatTheModelRefuses_IsReportedWithQuietToo) {
   const test::CommandResult result =
       test::deform({"explain", scene(), "--quiet", "--set",
                     R"(/bodies/0/model/params={"damper": "sls", "anisotropy_form": "A"})", "--set",
@@ -422,7 +422,7 @@ TEST(SceneFill, Outputs_AreOfTheFilesSurface) {
       << "the cells' points";
 }
 
-TEST(SceneFill, Mistakes_AreTold) {
+TEST(SceneFill, Mistakes_AreReported) {
   expect_refused("/bodies/0/fill={\"cells\": 5}", {"/bodies/0/fill", "holds tetrahedra already"});
   expect_refused({kBox, "/bodies/0/fill={\"cells\": 0}"}, {"/bodies/0/fill/cells", "from 1"});
   expect_refused({kBox, "/bodies/0/fill={\"cells\": 100000001}"},
@@ -448,7 +448,7 @@ TEST(SceneFill, Mistakes_AreTold) {
                  {"/bodies/0/fix/0/box", "no point"});
 }
 
-TEST(SceneSurface, Mistakes_AreTold) {
+TEST(SceneSurface, Mistakes_AreReported) {
   expect_refused(R"(/bodies/0/surface={"mesh": "missing.obj"})", {"/bodies/0/surface/mesh", "missing.obj"});
   expect_refused(R"(/bodies/0/surface={"from": "boundary", "mesh": "box.obj"})",
                  {"/bodies/0/surface/mesh", "either"});

@@ -96,7 +96,7 @@ TEST(SceneErrors, UnknownKeys_NameTheNearest) {
          {"/obstacles/0/radius=1", {"/obstacles/0/radius", "the shape plane has no \"radius\""}}});
 }
 
-TEST(SceneErrors, WrongTypes_SayWhatWasExpected) {
+TEST(SceneErrors, WrongTypes_NameWhatWasExpected) {
   check({{"/gravity=5", {"/gravity", "expected [x, y, z] in m/s2 or an object with keyframes"}},
          {"/bodies/0/model=msm", {"/model", "expected an object with type, params, precision"}},
          {"/contact/friction=0.5", {"/contact/friction", "\"law\": \"coulomb\"", "found number 0.5"}},
@@ -135,7 +135,7 @@ TEST(SceneErrors, Ranges_AreChecked) {
           {"/gravity/keyframes/1/t", "must increase"}}});
 }
 
-TEST(SceneErrors, Switches_SayWhatTheyLack) {
+TEST(SceneErrors, Switches_NameWhatIsMissing) {
   const std::string at = "/bodies/0/switch";
   check(
       {{"/bodies/0/switch=[{\"t\":1}]", {at + "/0", "type"}},
@@ -162,7 +162,7 @@ TEST(SceneErrors, Switches_SayWhatTheyLack) {
         {at + "/wait", "at least 0"}}});
 }
 
-TEST(SceneErrors, Springs_SayWhereTheyPullAndEnd) {
+TEST(SceneErrors, Springs_ReportWhereTheyPullAndEnd) {
   check({{"/bodies/0/springs=[{\"to\":[0,0,0],\"stiffness\":1}]",
           {"/bodies/0/springs/0", "point", "box", "group"}},
          {"/bodies/0/springs=[{\"point\":[0,0,0],\"stiffness\":1}]",
@@ -277,7 +277,7 @@ TEST(SceneApi, Errors_LeakNothing) {
   EXPECT_NE(std::string(dfm_last_error()).find("not available yet: /time/integrator"), std::string::npos);
 }
 
-TEST(SceneErrors, SelfContactAskedForAndRefused_SaysSo) {
+TEST(SceneErrors, SelfContactRequestedAndRefused_IsReported) {
   test::Context context;
   const char *set[] = {"/effects=[\"self_contact\"]", "/contact/self=false"};
   dfm_scene_options options = {sizeof options, 2, set, 0};
@@ -286,7 +286,7 @@ TEST(SceneErrors, SelfContactAskedForAndRefused_SaysSo) {
   EXPECT_NE(std::string(dfm_last_error()).find("/contact/self"), std::string::npos) << dfm_last_error();
 }
 
-TEST(SceneErrors, SelfContactThatIsNoneOfItsWords_SaysWhatItMayBe) {
+TEST(SceneErrors, UnknownValueOfSelfContact_ListsTheAllowedOnes) {
   test::Context context;
   const char *set[] = {"/contact/self=\"sometimes\""};
   dfm_scene_options options = {sizeof options, 1, set, 0};

@@ -73,7 +73,7 @@ dfm_body cube(dfm_context *c, dfm_world w, double z, const char *name = "cube") 
 
 class Gate : public ::testing::TestWithParam<uint32_t> {};
 
-TEST_P(Gate, ABodyThatFallsThrough_IsToldInAndOutAndFallsFreely) {
+TEST_P(Gate, ABodyThatFallsThrough_EntersLeavesAndFallsFreely) {
   test::Context c;
   const dfm_world w = test::make_world(c);
   const dfm_obstacle g = gate(w, GetParam(), -0.3);
@@ -152,7 +152,7 @@ TEST(Sensor, EndOfAnOverlap_IsReportedAtOnce) {
   EXPECT_TRUE(told(w).empty());
 }
 
-TEST(Sensor, MasksAndRules_SayWhatItSees) {
+TEST(Sensor, MasksAndRules_SelectWhatItDetects) {
   test::Context c;
   const dfm_world w = test::make_world(c, {0, 0, 0});
   const dfm_obstacle g = gate(w, DFM_SHAPE_BOX, 0);
@@ -204,7 +204,7 @@ TEST(Sensor, RigidBodiesObstaclesAndSoftSensors_AreSeenToo) {
   EXPECT_EQ(hit.obstacle, 0u);
 }
 
-TEST(Sensor, AfterARestore_TheSameEventsAreTold) {
+TEST(Sensor, AfterARestore_TheSameEventsAreReported) {
   test::Context c;
   const dfm_world w = test::make_world(c);
   gate(w, DFM_SHAPE_BOX, -0.3);
@@ -225,7 +225,7 @@ TEST(Sensor, AfterARestore_TheSameEventsAreTold) {
 }
 
 // A cube falls through a gate, past a rigid one, into a soft sensor.
-TEST(Sensor, InAScene_TheCommandWritesWhatItTells) {
+TEST(Sensor, InAScene_TheCommandWritesWhatItReports) {
   const std::string folder = test::scratch("sensor_scene");
   std::ofstream(folder + "/scene.json") << R"({
     "format": "deform-scene", "version": 1, "time": {"duration": 0.4, "step": 0.001},

@@ -507,7 +507,7 @@ TEST(Switches, AreMadeAtTheirTimes) {
   }
 }
 
-TEST(Switches, RefusedByMaxJump_LeaveTheModelAndAreTold) {
+TEST(Switches, RefusedByMaxJump_LeaveTheModelAndAreReported) {
   Slope s, plain;
   const dfm_switch list[] = {switch_at(0.01, "corotational_fem", 1e-12)};
   test::ok(dfm_body_set_switches(s.block, 1, list));
@@ -700,7 +700,7 @@ TEST(SwitchRule, OnTheLine_DoesNotChangeToAndFro) {
   }
 }
 
-TEST(SwitchRule, Refused_IsToldOnceAndTriedAgain) {
+TEST(SwitchRule, Refused_IsReportedOnceAndTriedAgain) {
   Ball b(1e-4);
   test::run(b.world, 0.2, 1e-3);
   b.rule.touching.type = "corotational_fem";

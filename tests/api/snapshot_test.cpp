@@ -229,7 +229,7 @@ TEST(Snapshot, DamagedCutOrForeign_IsRefusedAndChangesNothing) {
   EXPECT_EQ(dfm_world_restore(s.world, nullptr, 10), DFM_E_ARG);
 }
 
-TEST(Snapshot, IntoATooSmallBuffer_TellsTheSize) {
+TEST(Snapshot, IntoATooSmallBuffer_ReturnsTheNeededSize) {
   test::Context c;
   const test::Stack s = build(c);
   size_t bytes = 0, small = 10;

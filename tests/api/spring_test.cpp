@@ -50,7 +50,7 @@ struct Hung {
 
 // A body on a spring at its center of mass swings as a point mass: x = A cos(w t), w = sqrt(k/m), and the
 // scheme's own frequency differs by (w h)^2 / 24 only.
-TEST(Spring, AtTheCentreOfMass_SwingsAsAPointMass) {
+TEST(Spring, AtTheCenterOfMass_SwingsAsAPointMass) {
   Hung s;
   const double k = 40, w = std::sqrt(k / s.mass), x0 = s.x();
   s.spring(k, 0, {x0 - 0.02, s.x(1), s.x(2)});
@@ -160,7 +160,7 @@ TEST(Spring, ThatMakesNoSense_IsRefusedWithASentence) {
 
 // From the scene file: by box (its points' center of mass) and by a point inside a cell, to a place and
 // along keyframes.
-TEST(Spring, OfASceneFile_PullsWhereItSays) {
+TEST(Spring, OfASceneFile_PullsAtTheGivenPlace) {
   const std::string folder = test::scratch("spring_scene");
   ASSERT_EQ(test::deform({"mesh", "make", "beam", "--size", "0.1", "0.1", "0.1", "--cells", "60", "--out",
                           folder + "/cube.msh"})

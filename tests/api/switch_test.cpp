@@ -105,7 +105,7 @@ TEST(ModelOfAScene, ThatItsPoseExcludes_IsRefusedAsItIsRead) {
   }
 }
 
-TEST(SwitchOfAScene, AfterTheLastStep_IsToldAndListed) {
+TEST(SwitchOfAScene, AfterTheLastStep_IsReportedAndListed) {
   const auto change = [](const char *t) {
     return std::string(R"("switch": [{"t": )") + t + R"(, "type": "corotational_fem", "max_jump": 2}])";
   };
@@ -125,7 +125,7 @@ TEST(SwitchOfAScene, AfterTheLastStep_IsToldAndListed) {
 }
 
 // --time is the duration of that run.
-TEST(SwitchOfAScene, AfterTheEndOfAShorterRun_IsTold) {
+TEST(SwitchOfAScene, AfterTheEndOfAShorterRun_IsReported) {
   const std::string path = scene(kStep, R"("switch": [{"t": 0.005, "type": "corotational_fem"}])");
   EXPECT_EQ(run(path).err.find("is never made"), std::string::npos);
   const test::CommandResult r = test::deform({"run", path, "--time", "0.004", "--out", folder() + "/out"});
@@ -133,7 +133,7 @@ TEST(SwitchOfAScene, AfterTheEndOfAShorterRun_IsTold) {
   EXPECT_NE(r.err.find("/bodies/0/switch/0/t) is never made"), std::string::npos) << r.err;
 }
 
-TEST(SwitchOfAScene, ToTheModelThatTheBodyHas_IsTold) {
+TEST(SwitchOfAScene, ToTheModelThatTheBodyHas_IsReported) {
   const auto told = [](const std::string &change, const char *what) {
     const std::string log = run(scene(kStep, "\"switch\": " + change)).err;
     EXPECT_EQ(log.find("the same parameters") != std::string::npos, *what != 0) << change << log;
@@ -147,7 +147,7 @@ TEST(SwitchOfAScene, ToTheModelThatTheBodyHas_IsTold) {
   told(R"({"far": "msm", "touching": "msm"})", "so it changes nothing between them");
 }
 
-TEST(SwitchOfAScene, IntegratorOfAModelThatStepsItself_IsToldToBeUnused) {
+TEST(SwitchOfAScene, IntegratorOfAModelThatStepsItself_IsReportedAsUnused) {
   const auto told = [](const std::string &body) {
     return run(scene(kStep, body)).err.find("implicit_euler, is not used") != std::string::npos;
   };
@@ -164,7 +164,7 @@ TEST(SwitchOfAScene, OfAnotherKind_IsRefusedWithBothForms) {
 }
 
 // A model that steps itself has no bound; the ones that the body gets may have.
-TEST(SwitchOfAScene, Explain_TellsWhatBoundsTheStepLater) {
+TEST(SwitchOfAScene, Explain_ReportsWhatBoundsTheStepLater) {
   const std::string out =
       test::deform({"explain", scene(kStep, R"("model": {"type": "modal"}, )" + kRuleToModal)}).out;
   for (const char *part :
@@ -368,7 +368,7 @@ TEST(Switches, ThatCanNeverBeMade_AreRefusedWhole) {
 }
 
 // Two worlds that differ in a body's model alone differ in their hashes, and a snapshot carries that over.
-TEST(SetModel, Hash_TellsWhichModelABodyHasGot) {
+TEST(SetModel, Hash_DependsOnTheModelOfABody) {
   test::Context c;
   uint64_t hash[3];
   std::string taken;

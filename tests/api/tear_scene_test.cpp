@@ -46,7 +46,7 @@ TEST(TearScene, PiecesOfAnOrange_AreInTheTablesAndStates) {
 }
 
 // Where they were one, a piece and its body lie on each other, which is no overlap.
-TEST(TearScene, PartsOfALiver_AreNotToldToOverlap) {
+TEST(TearScene, PartsOfALiver_AreNotReportedAsOverlapping) {
   const std::string out = test::scratch("parts of a liver " + std::to_string(getpid()));
   const test::CommandResult r = test::deform(
       {"run", DEFORM_SOURCE_DIR "/examples/scenes/liver.json", "--time", "1.1", "--quiet", "--out", out});

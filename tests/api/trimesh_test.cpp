@@ -31,7 +31,7 @@ dfm_trimesh_info info_of(dfm_trimesh mesh) {
 
 }  // namespace
 
-TEST(TrimeshApi, Create_RepairsTellsAndLends) {
+TEST(TrimeshApi, Create_RepairsReportsAndLendsArrays) {
   test::LoggedContext c;
   dfm_trimesh mesh = 0;
   ASSERT_EQ(dfm_trimesh_create(c.context, 13, kPoints, 4, kTriangles, &mesh), DFM_OK) << dfm_last_error();

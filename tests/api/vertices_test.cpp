@@ -86,7 +86,7 @@ TEST(Vertices, FarFromTheOrigin_AreAsExactAsNearIt) {
     }
 }
 
-TEST(Vertices, Stick_TellsWhereContactsHold) {
+TEST(Vertices, Stick_MarksVerticesWhereContactsStick) {
   test::Context c;
   const test::Stack s = resting(c);
   const Arrays a(s.lower);

@@ -582,7 +582,7 @@ TEST(Step, ThatNeedsTooManySubSteps_IsDiscardedAndNothingChanges) {
   EXPECT_EQ(test::stats(w).last_substeps, 2u);
 }
 
-TEST(Step, WithACellInsideOut_SaysSo) {
+TEST(Step, WithAnInvertedCell_ReportsIt) {
   test::Context c;
   const dfm_world w = test::make_world(c);
   Tet t;

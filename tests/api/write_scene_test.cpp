@@ -251,7 +251,7 @@ TEST(WriteScene, Tools_AreWrittenWithKeysCouplingAndCuts) {
 
 // One sentence for each thing that a scene has no word for: without the flag it ends the call, and neither
 // the scene nor its folder is there.
-TEST(WriteScene, WhatASceneCannotSay_IsRefusedOrTold) {
+TEST(WriteScene, WhatASceneCannotSay_IsRefusedOrReported) {
   Made made;
   test::ok(dfm_world_set_may_touch(made.world, [](void *, uint64_t, uint64_t) { return true; }, nullptr));
   test::ok(dfm_world_set_pre_solve(made.world, [](void *, dfm_contact_choice *) {}, nullptr));
@@ -311,7 +311,7 @@ TEST(WriteScene, Materials_AreThoseOfEachBody) {
   EXPECT_EQ(dfm_world_hash(both), dfm_world_hash(made.world));
 }
 
-TEST(WriteScene, WrongArguments_GetOneSentence) {
+TEST(WriteScene, WrongArguments_AreReportedInOneSentence) {
   Made made;
   const auto refused = [&](const char *path, dfm_status status, const char *part) {
     EXPECT_EQ(dfm_world_write_scene(made.world, path, nullptr, nullptr), status);

@@ -21,7 +21,7 @@ void expect_usual() {
   EXPECT_STREQ(std::setlocale(LC_NUMERIC, nullptr), "C");
 }
 
-TEST(Boundary, LoadingThatChangesTheEnvironment_IsPutBackAndSaid) {
+TEST(Boundary, LoadingThatChangesTheEnvironment_IsRestoredAndReported) {
   Context c;
   ASSERT_EQ(dfm_plugin_load(c.c, tiny::plugin("tiny_rounds").c_str()), DFM_OK);
   expect_usual();

@@ -299,7 +299,7 @@ TEST(PluginCheck, Model_IsAskedEachOfItsOptionsAndNoRuleOfLaws) {
 
 // ---- the command ------------------------------------------------------------------------------------------
 
-TEST(PluginCheck, WithoutASanitizer_SkipsThatRuleAndSaysWhy) {
+TEST(PluginCheck, WithoutASanitizer_SkipsThatRuleAndGivesTheReason) {
   if (SANITIZED) return;
   const test::CommandResult r = check(shipped("friction_coulomb"), {"--only", "V10"});
   EXPECT_EQ(r.exit_code, 0);

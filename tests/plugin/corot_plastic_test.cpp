@@ -198,7 +198,7 @@ TEST(CorotPlastic, TangentOfEveryShape_IsNegativeSemidefiniteAndFinite) {
       }
 }
 
-TEST(CorotPlastic, Refusals_SayWhy) {
+TEST(CorotPlastic, Refusals_GiveTheReason) {
   const auto refused = [](const Params &p, const char *word) {
     Host host;
     Instance b(host, regular_tet(), p);

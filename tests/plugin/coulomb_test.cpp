@@ -46,7 +46,7 @@ Answer slide(const dfm_friction &ops, const Parameters &p, double fn, double vx,
   return ask(ops, p, fn, vx, vy, -s * vx / w, -s * vy / w, area);
 }
 
-TEST_F(Coulomb, SelfDescription_SaysWhatItIs) {
+TEST_F(Coulomb, SelfDescription_NamesItsKind) {
   const dfm_type *type = nullptr;
   ASSERT_EQ(dfm_law_type(law, &type), DFM_OK);
   EXPECT_STREQ(type->id, "org.deform.coulomb");

@@ -21,7 +21,7 @@ struct Dahl : testing::Test {
   rules::Draw draw() const { return {std::mt19937(11), 0.15 / 1e4}; }
 };
 
-TEST_F(Dahl, SelfDescription_SaysWhatItIs) {
+TEST_F(Dahl, SelfDescription_NamesItsKind) {
   const dfm_type *type = nullptr;
   ASSERT_EQ(dfm_law_type(c.open("dahl"), &type), DFM_OK);
   EXPECT_STREQ(type->id, "org.deform.dahl");

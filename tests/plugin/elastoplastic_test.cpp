@@ -29,7 +29,7 @@ struct Elastoplastic : testing::Test {
   static double g(double w) { return 9.8 * (0.15 + 0.05 * std::exp(-w * w / 1e-4)); }
 };
 
-TEST_F(Elastoplastic, SelfDescription_SaysWhatItIs) {
+TEST_F(Elastoplastic, SelfDescription_NamesItsKind) {
   const dfm_type *type = nullptr;
   ASSERT_EQ(dfm_law_type(handle, &type), DFM_OK);
   EXPECT_STREQ(type->id, "org.deform.elastoplastic");

@@ -36,7 +36,7 @@ struct Gms : testing::Test {
   static double g(double w) { return 9.8 * (0.15 + 0.05 * std::exp(-w * w / 1e-4)); }
 };
 
-TEST_F(Gms, SelfDescription_SaysWhatItIs) {
+TEST_F(Gms, SelfDescription_NamesItsKind) {
   const dfm_type *type = nullptr;
   ASSERT_EQ(dfm_law_type(handle, &type), DFM_OK);
   EXPECT_STREQ(type->id, "org.deform.gms");

@@ -59,7 +59,7 @@ TEST(LinearFemWorld, SwingTurnedWithGravity_IsTheTurnedSwing) {
 
 // What turns swells: told with body, cell and turn when its energy is asked for, and again where it has
 // doubled.
-TEST(LinearFemWorld, BodyThatTurns_TellsThatItLeavesItsRange) {
+TEST(LinearFemWorld, BodyThatTurns_ReportsThatItLeavesItsRange) {
   test::LoggedContext logged;
   const dfm_world world = test::make_world(logged.context, {0, 0, 0});
   test::BodyOptions o;

@@ -152,7 +152,7 @@ TEST(Loader, ForeignHost_IsRefusedByThePluginWithItsOwnWords) {
       << dfm_last_error();
 }
 
-TEST(Loader, PluginOfADraft_IsRefusedInOneSentenceThatSaysWhatToDo) {
+TEST(Loader, PluginOfADraft_IsRefusedInOneSentenceWithWhatToDo) {
   Context c;
   EXPECT_EQ(load(c, plugin("tiny_draft")), DFM_E_UNSUPPORTED);
   EXPECT_EQ(std::string(dfm_last_error()),
@@ -162,7 +162,7 @@ TEST(Loader, PluginOfADraft_IsRefusedInOneSentenceThatSaysWhatToDo) {
 }
 
 // One that asks in the words of the draft's header sees that this host is none of a draft.
-TEST(Loader, HostOfTheLibrary_SaysWhichAbisItSpeaks) {
+TEST(Loader, HostOfTheLibrary_ReportsItsAbis) {
   Context c;
   ASSERT_EQ(load(c, plugin("tiny_host")), DFM_OK);
   dfm_host future{};

@@ -28,7 +28,7 @@ struct Lugre : testing::Test {
   static double g(double w) { return 9.8 * (0.15 + 0.05 * std::exp(-w * w / 1e-4)); }
 };
 
-TEST_F(Lugre, SelfDescription_SaysWhatItIs) {
+TEST_F(Lugre, SelfDescription_NamesItsKind) {
   const dfm_type *type = nullptr;
   ASSERT_EQ(dfm_law_type(handle, &type), DFM_OK);
   EXPECT_STREQ(type->id, "org.deform.lugre");

@@ -330,7 +330,7 @@ TEST(Modal, PartlyHeldBodyThatItsPoseHasTurned_IsRefusedAndASaggingOneIsNot) {
   for (const double angle : {1e-4, 0.05, 0.5}) EXPECT_EQ(predicted(angle, 0), DFM_E_UNSUPPORTED) << angle;
 }
 
-TEST(Modal, MoreModesThanThereAre_AreSaidToHaveNoEffectWithTheNumberUsed) {
+TEST(Modal, MoreModesThanThereAre_AreReportedToHaveNoEffectWithTheNumberUsed) {
   const Mesh m = kuhn_bar(2, 1, 1, 0.05);
   Host host;
   const Stepper b(host, modal(), m, {{"modes", 1000}});
@@ -363,7 +363,7 @@ TEST(Modal, ModesAboveTheNyquistFrequency_AreNamedOnceAndKeepTheSag) {
 }
 
 // Once for each time that the body leaves the range and for each doubling, not in each period.
-TEST(Modal, StrainsOutOfRange_AreToldOnceEachTime) {
+TEST(Modal, StrainsOutOfRange_AreReportedOnceEachTime) {
   const Mesh m = kuhn_bar(8, 1, 1, 0.05);
   Host host;
   Stepper b(host, modal(), m, {{"young", 1e5}, {"damping_mass", 5}}, clamp_of(m));

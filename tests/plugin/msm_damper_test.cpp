@@ -349,7 +349,7 @@ TEST(MsmDamper, Voigt_HasNoStateAndCostsNoByte) {
   EXPECT_EQ(sls.state.size(), mesh.edges.size() / 2 + 1);
 }
 
-TEST(MsmDamper, HostWithoutTheExtension_IsToldWhatItLacks) {
+TEST(MsmDamper, HostWithoutTheExtension_GetsTheNameOfTheExtension) {
   Host host;
   Instance b(host, irregular_tet(), viscous(kMaxwell, 1));
   b.state.clear();

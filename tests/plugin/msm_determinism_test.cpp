@@ -120,7 +120,7 @@ TEST(MsmDeterminism, Compiler_NeverShowsInAnyOption) {
   EXPECT_EQ(fnv(all), 3791657580899702830ull);
 }
 
-TEST(MsmDeterminism, ForcedInstructionSet_IsTheOneUsedOrTheLogSaysWhyNot) {
+TEST(MsmDeterminism, ForcedInstructionSet_IsUsedOrTheLogGivesTheReason) {
   Host host;
   results(host, "sse2", irregular_tet(), {});
   EXPECT_TRUE(host.logged.empty());

@@ -485,7 +485,7 @@ TEST(ShapeMatching, AnswerWithoutAPrediction_IsRefusedInOneSentence) {
   EXPECT_NE(host.logged.find("was not predicted"), std::string::npos) << host.logged;
 }
 
-TEST(ShapeMatching, Type_SaysThatItIsPlausible) {
+TEST(ShapeMatching, Type_IsReportedAsPlausible) {
   EXPECT_TRUE(static_cast<const dfm_model *>(shape().ops)->caps & DFM_CAP_PLAUSIBLE);
   EXPECT_NE(std::string(shape().name).find("plausible"), std::string::npos);
 }
@@ -519,7 +519,7 @@ TEST(ShapeMatching, ClustersThatShareTooFewPoints_AreRefusedInOneSentence) {
 }
 
 // (w h)^2 = 4 at h = 2 * 0.01 s / ln(10^4).
-TEST(ShapeMatching, StepAtWhichClustersAreSofterThanAsked_IsToldOnce) {
+TEST(ShapeMatching, StepAtWhichClustersAreSofterThanRequested_IsReportedOnce) {
   const auto told = [](double clusters, double h) {
     Host host;
     Stepper b(host, shape(), kuhn_bar(4, 2, 2, 0.1), values({{"clusters", clusters}}));

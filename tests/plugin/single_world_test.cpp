@@ -125,7 +125,7 @@ TEST(Single, ChangeOfModel_TurnsItOnAndOff) {
   EXPECT_EQ(b.precision(), "single");
 }
 
-TEST(Single, ImplicitSteps_StayDoubleAndSaySo) {
+TEST(Single, ImplicitSteps_StayDoubleAndReportIt) {
   Beam b({{"precision", 1}}, 200, 1, "msm", DFM_INTEGRATOR_IMPLICIT_EULER),
       plain({}, 200, 1, "msm", DFM_INTEGRATOR_IMPLICIT_EULER);
   b.advance(5);

@@ -32,7 +32,7 @@ TEST_P(Cover, Row_Holds) {
 }
 
 // What is refused beyond the product, each in one sentence that names the model; the page has the table.
-TEST(CoverRefused, BeyondTheProduct_SaysWhichModelAndWhatInstead) {
+TEST(CoverRefused, BeyondTheProduct_NamesTheModelAndTheAlternative) {
   const auto refused = [](dfm_status s, std::initializer_list<const char *> parts) {
     EXPECT_EQ(s, DFM_E_UNSUPPORTED);
     test::says(parts);

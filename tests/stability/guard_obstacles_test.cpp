@@ -50,16 +50,16 @@ void rigid_struck(Shot &s) {  // it rests; what hits it moves it faster than its
 
 }  // namespace
 
-TEST(Guard, SheetOnClosedMeshAt100MetresPerSecond_NeverCross) { ten_times(closed_mesh, 2, 5e-4); }
-TEST(Guard, SoftBallOnTerrainAt30MetresPerSecond_NeverCross) { ten_times(terrain, 4, 1e-3); }
+TEST(Guard, SheetOnClosedMeshAt100MetersPerSecond_NeverCross) { ten_times(closed_mesh, 2, 5e-4); }
+TEST(Guard, SoftBallOnTerrainAt30MetersPerSecond_NeverCross) { ten_times(terrain, 4, 1e-3); }
 TEST(Guard, BladeSwungThroughBlock_NeverCrosses) { ten_times(blade, 3, 1e-3); }
-TEST(Guard, SpinningRigidSlabAt100MetresPerSecond_NeverCrossesSheet) { ten_times(rigid_slab, 2, 5e-4); }
+TEST(Guard, SpinningRigidSlabAt100MetersPerSecond_NeverCrossesSheet) { ten_times(rigid_slab, 2, 5e-4); }
 TEST(Guard, RigidPlateStruck_NeverCrosses) { ten_times(rigid_struck, 3, 1e-3); }
 
 // Voxels round off what is below a cell, so crossings with the triangles they came from say little: their
 // face may lie half a cell below the true one. What hangs over an edge swings under the wall, by 4 mm in this
 // time: 10 mm from the edges no surfel is behind the upper face. Without the guard some are.
-TEST(Guard, SoftSheetAgainstVoxelsAt90MetresPerSecond_StaysOnItsSide) {
+TEST(Guard, SoftSheetAgainstVoxelsAt90MetersPerSecond_StaysOnItsSide) {
   const Vec half{0.06, 0.06, 0.004};
   const uint32_t cells = 20000;
   const double cell = std::cbrt(8 * half[0] * half[1] * half[2] / cells);

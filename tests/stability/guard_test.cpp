@@ -39,10 +39,10 @@ void pile(Scene &s) {
 
 }  // namespace
 
-TEST(Guard, SheetOnSheetAt100MetresPerSecondJittered1To3_NeverCross) { ten_times(sheets, 2, 5e-4, 1, 3); }
-TEST(Guard, SheetOnSheetAt100MetresPerSecondJittered4To6_NeverCross) { ten_times(sheets, 2, 5e-4, 4, 6); }
-TEST(Guard, SheetOnSheetAt100MetresPerSecondJittered7To10_NeverCross) { ten_times(sheets, 2, 5e-4, 7, 10); }
-TEST(Guard, SheetOnBlockAt100MetresPerSecond_NeverCross) { ten_times(sheet_and_box, 3, 5e-4); }
+TEST(Guard, SheetOnSheetAt100MetersPerSecondJittered1To3_NeverCross) { ten_times(sheets, 2, 5e-4, 1, 3); }
+TEST(Guard, SheetOnSheetAt100MetersPerSecondJittered4To6_NeverCross) { ten_times(sheets, 2, 5e-4, 4, 6); }
+TEST(Guard, SheetOnSheetAt100MetersPerSecondJittered7To10_NeverCross) { ten_times(sheets, 2, 5e-4, 7, 10); }
+TEST(Guard, SheetOnBlockAt100MetersPerSecond_NeverCross) { ten_times(sheet_and_box, 3, 5e-4); }
 TEST(Guard, BallThroughNarrowGap_NeverCrosses) { ten_times(gap, 3, 1e-3); }
 TEST(Guard, CornerOnEdge_NeverCross) { ten_times(spike_on_wedge, 4, 1e-3); }
 TEST(Guard, PileDroppedHard_NeverCrosses) { ten_times(pile, 3, 1e-3); }

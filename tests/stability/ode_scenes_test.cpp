@@ -127,7 +127,7 @@ TEST(OdeGripper, JitteredRuns_AllLift) {
                                                        "/rigid/bodies/2/joints/0/motor/max=12"}))));
 }
 
-TEST_P(EngineScenes, BrakedCart_RestsOnItsTyresAsWithTheBuiltinHost) {
+TEST_P(EngineScenes, BrakedCart_RestsOnItsTiresAsWithTheBuiltinHost) {
   const std::vector<std::string> brakes = {"/rigid/bodies/3/joints/0/motor/velocity=0",
                                            "/rigid/bodies/4/joints/0/motor/velocity=0"};
   expect_as_builtin(GetParam(), "ode_cart", lasting(1, brakes),

@@ -53,10 +53,10 @@ dfm_world legs(dfm_context *c, uint32_t self) {
 
 }  // namespace
 
-TEST(SelfAuto, BallAt20MetresPerSecond_IsAsAlwaysOn) { is_as_always_on("ball", {0.05, 0, 0}, 20); }
-TEST(SelfAuto, BallAt50MetresPerSecond_IsAsAlwaysOn) { is_as_always_on("ball", {0.05, 0, 0}, 50); }
-TEST(SelfAuto, CubeAt30MetresPerSecond_IsAsAlwaysOn) { is_as_always_on("beam", {0.1, 0.1, 0.1}, 30); }
-TEST(SelfAuto, CubeAt50MetresPerSecond_IsAsAlwaysOn) { is_as_always_on("beam", {0.1, 0.1, 0.1}, 50); }
+TEST(SelfAuto, BallAt20MetersPerSecond_IsAsAlwaysOn) { is_as_always_on("ball", {0.05, 0, 0}, 20); }
+TEST(SelfAuto, BallAt50MetersPerSecond_IsAsAlwaysOn) { is_as_always_on("ball", {0.05, 0, 0}, 50); }
+TEST(SelfAuto, CubeAt30MetersPerSecond_IsAsAlwaysOn) { is_as_always_on("beam", {0.1, 0.1, 0.1}, 30); }
+TEST(SelfAuto, CubeAt50MetersPerSecond_IsAsAlwaysOn) { is_as_always_on("beam", {0.1, 0.1, 0.1}, 50); }
 
 TEST(SelfAuto, LegsThatMeetAndPart_AreOnWhileTheyAreNear) {
   const test::Context c;
@@ -93,7 +93,7 @@ TEST(SelfAuto, BodyThatDoesNotFold_IsNeverOnAndMovesAsWithout) {
   EXPECT_EQ(test::stats(automatic->world).self_max, 0u);
 }
 
-TEST(SelfAuto, Explain_SaysWhoAskedAndWhenItIsOn) {
+TEST(SelfAuto, Explain_ReportsWhoRequestedItAndWhenItIsOn) {
   const test::Context c;
   const std::string plan = test::explain(legs(c, DFM_SELF_AUTO));
   EXPECT_NE(plan.find("\"name\":\"self_contact\",\"asked_by\":\"contact.self auto\""), std::string::npos)

@@ -58,6 +58,6 @@ void stays_whole(const std::function<void(Shot &, double)> &setup, double speed,
 
 }  // namespace
 
-TEST(SelfViolence, BallAt50MetresPerSecond_NeverCrossesItself) { stays_whole(ball, 50, 5e-4); }
-TEST(SelfViolence, CubeAt50MetresPerSecond_NeverCrossesItself) { stays_whole(cube, 50, 5e-4); }
-TEST(SelfViolence, BallAt80MetresPerSecond_NeverCrossesItself) { stays_whole(ball, 80, 2e-3); }
+TEST(SelfViolence, BallAt50MetersPerSecond_NeverCrossesItself) { stays_whole(ball, 50, 5e-4); }
+TEST(SelfViolence, CubeAt50MetersPerSecond_NeverCrossesItself) { stays_whole(cube, 50, 5e-4); }
+TEST(SelfViolence, BallAt80MetersPerSecond_NeverCrossesItself) { stays_whole(ball, 80, 2e-3); }

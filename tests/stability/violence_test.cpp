@@ -113,18 +113,18 @@ void costs_little(const std::function<void(Shot &)> &setup, int steps, double dt
 
 }  // namespace
 
-TEST(Violence, SpikedBallsAt5MetresPerSecond_WorstStepIsBounded) {
+TEST(Violence, SpikedBallsAt5MetersPerSecond_WorstStepIsBounded) {
   costs_little([](Shot &s) { spikes(s, 5); }, 40, 1e-3);
 }
-TEST(Violence, SpikedBallsAt50MetresPerSecond_WorstStepIsBounded) {
+TEST(Violence, SpikedBallsAt50MetersPerSecond_WorstStepIsBounded) {
   costs_little([](Shot &s) { spikes(s, 50); }, 8, 1e-3);
 }
-TEST(Violence, TipIntoSheetAt50MetresPerSecond_WorstStepIsBounded) {
+TEST(Violence, TipIntoSheetAt50MetersPerSecond_WorstStepIsBounded) {
   costs_little([](Shot &s) { tip_into_sheet(s, 50); }, 8, 1e-3);
 }
 TEST(Violence, BallPressedBetweenWedgesWithSelfAuto_WorstStepIsBounded) {
   costs_little(between_wedges, 50, 1e-3, DFM_SELF_AUTO);
 }
-TEST(Violence, TipIntoSheetAt50MetresPerSecondWithSelfAuto_WorstStepIsBounded) {
+TEST(Violence, TipIntoSheetAt50MetersPerSecondWithSelfAuto_WorstStepIsBounded) {
   costs_little([](Shot &s) { tip_into_sheet(s, 50); }, 8, 1e-3, DFM_SELF_AUTO);
 }

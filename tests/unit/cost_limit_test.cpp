@@ -47,7 +47,7 @@ TEST(CostLimit, RunsThatConverge_GiveOrderAndLimit) {
 }
 
 // The error is said of the extrapolated figure, and holds.
-TEST(CostLimit, TwoTermsOfError_AreWithinWhatIsSaid) {
+TEST(CostLimit, TwoTermsOfError_AreWithinTheStatedBound) {
   const auto on = [&](double h) { return figure(200, [=](double t) { return t * h * h * (3 + 4 * h); }); };
   const Quantity fine = on(kSizes[0]), middle = on(kSizes[1]), coarse = on(kSizes[2]);
   Quantity limit;

@@ -193,7 +193,7 @@ TEST(BulletLifecycle, Restore_TakesTheBodiesBack) {
   EXPECT_EQ(later, position(box));
 }
 
-TEST(BulletLifecycle, WrongUse_IsOneSentence) {
+TEST(BulletLifecycle, WrongUse_IsReportedInOneSentence) {
   Bullet b;
   dfm_bullet other = 0;
   dfm_bullet_def d = dfm_bullet_def_default();

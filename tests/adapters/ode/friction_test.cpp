@@ -133,7 +133,7 @@ TEST(OdeFriction, OwnNearCallback_MayUseTheLaw) {
   EXPECT_GT(data.made, 3000);
 }
 
-TEST(OdeFriction, WrongLaw_IsOneSentenceAndChangesNothing) {
+TEST(OdeFriction, WrongLaw_IsReportedInOneSentenceAndChangesNothing) {
   Ode ode;
   EXPECT_LT(use(ode, "coulom", {}), 0);
   EXPECT_LT(use(ode, "coulomb", {{"nu", 1}}), 0);

@@ -471,7 +471,7 @@ TEST(OdeLifecycle, PlainWorldStep_IsRefused) {
   ode.step();
 }
 
-TEST(OdeLifecycle, WrongUse_IsOneSentence) {
+TEST(OdeLifecycle, WrongUse_IsReportedInOneSentence) {
   Ode ode;
   dfm_ode second = 0;
   dfm_ode_def d = dfm_ode_def_default();

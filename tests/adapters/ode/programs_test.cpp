@@ -26,7 +26,7 @@ TEST(OdePrograms, Gripper_LiftsTheBallAndHoldsIt) {
   EXPECT_LT(slip, 1);
 }
 
-TEST(OdePrograms, Cart_DrivesOverTheBumpAndStandsOnItsTyres) {
+TEST(OdePrograms, Cart_DrivesOverTheBumpAndStandsOnItsTires) {
   const test::CommandResult r = example("cart");
   ASSERT_EQ(r.exit_code, 0) << r.out << r.err;
   const size_t at = r.out.find("t 2.5 s: "), sum = r.out.find("the tyres carry ");

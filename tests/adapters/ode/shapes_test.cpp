@@ -134,7 +134,7 @@ INSTANTIATE_TEST_SUITE_P(All, OdeStand, ::testing::ValuesIn(kStands), name_of);
 INSTANTIATE_TEST_SUITE_P(All, OdeSolid, ::testing::ValuesIn(kStands, kStands + std::size(kStands) - 1),
                          name_of);
 
-TEST(OdeShapes, TrimeshesAreReadOnceAndAgainWhenTold) {
+TEST(OdeShapes, Trimeshes_AreReadOnceAndAgainOnRequest) {
   Ode ode;
   double points[8][4];
   std::copy(&kTable[0][0], &kTable[0][0] + 32, &points[0][0]);

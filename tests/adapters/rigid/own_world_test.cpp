@@ -106,7 +106,7 @@ void compare(dfm_context *c, With with, uint32_t type, Vec axis, double velocity
 // A motor that holds an arm still carries its weight at its lever, 0.3 m: about the axis, not about the arm's
 // center, where the hinge's own force turns too. `body` against `with`: where the arm is the second body, the
 // motor turns the other way round to carry it.
-TEST_P(OwnWorld, HingeThatHoldsAnArm_SaysItsMomentAboutTheHinge) {
+TEST_P(OwnWorld, HingeThatHoldsAnArm_ReportsItsMomentAboutTheHinge) {
   for (const char *host : {kEngine, "builtin"}) {
     const Rig rig(c, host, GetParam(), DFM_JOINT_HINGE, kAcross, 0, 50);
     run(rig.world, 0.05, 1e-3);
@@ -116,7 +116,7 @@ TEST_P(OwnWorld, HingeThatHoldsAnArm_SaysItsMomentAboutTheHinge) {
   }
 }
 
-TEST_P(OwnWorld, SliderThatHoldsAnArm_SaysItsForceAlongTheAxis) {
+TEST_P(OwnWorld, SliderThatHoldsAnArm_ReportsItsForceAlongTheAxis) {
   for (const char *host : {kEngine, "builtin"}) {
     const Rig rig(c, host, GetParam(), DFM_JOINT_SLIDER, kSkew, 0, 50);
     run(rig.world, 0.05, 1e-3);
@@ -146,7 +146,7 @@ TEST_P(OwnWorld, SliderMotor_MovesAsOnTheBuiltinHost) {
 }
 
 // One that cannot hold its speed does what it can, and says so with its sign.
-TEST_P(OwnWorld, MotorAtItsLimit_SaysItsLimit) {
+TEST_P(OwnWorld, MotorAtItsLimit_ReportsItsLimit) {
   for (const double sign : {1.0, -1.0}) {
     compare(c, GetParam(), DFM_JOINT_HINGE, kAcross, 100 * sign, 1.5, 0.4, {0.02, 0.05, 1e-6});
     compare(c, GetParam(), DFM_JOINT_SLIDER, kSkew, 100 * sign, 3, 0.4, {2e-3, 1e-3, 1e-6});
@@ -215,7 +215,7 @@ struct Machine {
 
 // After a restore joints say what they said then, before any step, in this world and in another one; and both
 // go on with the bits of the first run, with the contacts of rigid bodies with each other.
-TEST(OwnWorldSnapshot, Restored_SaysWhatTheJointsSaidAndGoesOnBitByBit) {
+TEST(OwnWorldSnapshot, Restored_ReportsTheSameJointsAndContinuesBitByBit) {
   Machine m;
   run(m.world, 0.15, 1e-3);
   ASSERT_GT(stats(m.world).contacts, 0u);
@@ -238,7 +238,7 @@ TEST(OwnWorldSnapshot, Restored_SaysWhatTheJointsSaidAndGoesOnBitByBit) {
 }
 
 // A state that is set counts at once.
-TEST(OwnWorldSnapshot, SetState_IsWhatTheJointSays) {
+TEST(OwnWorldSnapshot, SetState_IsWhatTheJointReports) {
   Context c;
   ok(register_engine());
   const Rig rig(c, kEngine, With::still, DFM_JOINT_SLIDER, {1, 0, 0}, 0, 50, {0, 0, 0});

@@ -240,7 +240,7 @@ TEST(ObstacleShape, Closest_MatchesSampledSurface) {
   }
 }
 
-TEST(ObstacleShape, CentresOfSymmetry_GiveUnitNormals) {
+TEST(ObstacleShape, CentersOfSymmetry_GiveUnitNormals) {
   for (const Shape kind : {Shape::sphere, Shape::box, Shape::capsule}) {
     ObstacleView o{};
     o.shape = kind;

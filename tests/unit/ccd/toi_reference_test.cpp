@@ -61,7 +61,7 @@ TEST_P(ToiReference, PublishedQueries_NoneMissedNoneLate) {
 
 // Same verdict, same bits: swapped edges, turned triangles, reversed edges; exact translations;
 // a power of two.
-TEST_P(ToiReference, Relabelled_SameBits) {
+TEST_P(ToiReference, Relabeled_SameBits) {
   for (const ToiQuery &q : reference_queries()) {
     const double t = ask(q, GetParam()).t;
     for (int k = 0; k < 3; ++k) {

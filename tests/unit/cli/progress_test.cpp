@@ -56,7 +56,7 @@ using std::chrono::milliseconds;
 }  // namespace
 
 // The line says where the time goes: steps per second alone would not.
-TEST(Progress, PicturesAreToldWithTheirTime) {
+TEST(Progress, Pictures_AreReportedWithTheirTime) {
   const Terminal terminal;
   if (!terminal.works()) GTEST_SKIP() << "this system gives no pseudo terminal";
   {
@@ -70,17 +70,17 @@ TEST(Progress, PicturesAreToldWithTheirTime) {
   EXPECT_NE(text.find("50 steps/s  3 pictures took 4 s of "), std::string::npos) << text;
 }
 
-TEST(Patience, LongCall_IsToldAndWiped) {
+TEST(Patience, LongCall_IsReportedAndItsLineCleared) {
   const std::string text = shown(true, milliseconds(20), milliseconds(300));
   if (text == "no terminal") GTEST_SKIP() << "this system gives no pseudo terminal";
   EXPECT_EQ(text.find("\rfilling a.obj, 0 s "), 0u) << text;
   EXPECT_EQ(text.rfind("\r\033[K"), text.size() - 4) << "the line is wiped at the end";
 }
 
-TEST(Patience, ShortCall_SaysNothing) {
+TEST(Patience, ShortCall_PrintsNothing) {
   EXPECT_EQ(shown(true, milliseconds(10000), milliseconds(30)).find("filling"), std::string::npos);
 }
 
-TEST(Patience, QuietCall_SaysNothing) {
+TEST(Patience, QuietCall_PrintsNothing) {
   EXPECT_EQ(shown(false, milliseconds(10), milliseconds(100)).find("filling"), std::string::npos);
 }

@@ -150,7 +150,7 @@ TEST_P(LatePoints, OfABodyThatIsMovedOrLoaded_AreThoseOfAStepThatMovesAll) {
   EXPECT_LT(apart(late, whole), 1e-8);
 }
 
-TEST_P(LatePoints, AfterABlowOfTheHost_MoveAsItSays) {
+TEST_P(LatePoints, AfterAnImpulseOfTheHost_MoveAccordingly) {
   const Probed w(GetParam());
   test::run(w.world, 0.05, 1e-3);
   const double point[] = {0.15, 0.1, 0.1}, impulse[] = {0, 0, -0.02};
@@ -225,7 +225,7 @@ TEST_P(LatePoints, PumpedBody_IsStopped) {
 
 // The probe presses a tenth of the height: the log says that this is more than small, though nobody asks for
 // a point.
-TEST_P(LatePoints, LargeGradient_IsToldWithoutAskingForPoints) {
+TEST_P(LatePoints, LargeGradient_IsReportedWithoutUpdatingPoints) {
   std::string log;
   dfm_context_def def = dfm_context_def_default();
   def.threads = 1;

@@ -249,7 +249,7 @@ TEST(ConvexSearch, ThroughATree_GivesTheBitsOfEveryTriangle) {
   }
 }
 
-TEST(ConvexSearch, WindingByRay_TellsInsideFromOutside) {
+TEST(ConvexSearch, WindingByRay_DistinguishesInsideFromOutside) {
   Soup soup;  // a cube of twelve triangles, looking outward
   const Vec3 x[8] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}, {0, 0, 1}, {1, 0, 1}, {0, 1, 1}, {1, 1, 1}};
   const int faces[12][3] = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},

@@ -37,7 +37,7 @@ TEST(Winding, ClosedSurface_OneInsideZeroOutside) {
   }
 }
 
-TEST(Winding, CubeWithoutAFace_FromItsCentreFiveSixths) {
+TEST(Winding, CubeWithoutAFace_FromItsCenterFiveSixths) {
   TriMesh cube = test::box_surface({-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5});
   test::remove(cube, 0);
   test::remove(cube, 0);

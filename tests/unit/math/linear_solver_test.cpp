@@ -169,7 +169,7 @@ TEST(LinearSolver, VectorWidths_SameBits) {
   }
 }
 
-TEST(LinearSolver, MatrixThatIsNotPositiveDefinite_IsToldAndNothingIsSolved) {
+TEST(LinearSolver, MatrixThatIsNotPositiveDefinite_IsReportedAndNothingIsSolved) {
   const std::vector<double> b(3 * 36, 1.0);
   for (double mass : {0.0, -0.5}) {  // free to move as a whole; and worse
     const Grid g = grid(4, 3, 3, mass);
@@ -238,7 +238,7 @@ TEST(PcgSolver, StartAtTheSolution_TakesNoIteration) {
   EXPECT_EQ(warm.iterations, 0u);
 }
 
-TEST(PcgSolver, LimitOfIterations_IsToldWithTheBestAnswer) {
+TEST(PcgSolver, LimitOfIterations_IsReportedWithTheBestAnswer) {
   const Grid g = grid(5, 4, 4, 0.01);
   const std::vector<double> b = noise(3 * g.n, 3);
   dfm::PcgSolver solver(dfm::Memory::standard(), nullptr, 3);
@@ -255,7 +255,7 @@ TEST(PcgSolver, LimitOfIterations_IsToldWithTheBestAnswer) {
 
 // Every allocation through the hooks is refused once: the failure is told, nothing is lost, and a later try
 // works.
-TEST(LinearSolver, RefusedMemory_IsToldAndNothingLeaks) {
+TEST(LinearSolver, RefusedMemory_IsReportedAndNothingLeaks) {
   struct Refusing {
     int64_t calls = 0, refuse = -1, live = 0;
     dfm::Memory memory{this,

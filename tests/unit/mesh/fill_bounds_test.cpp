@@ -31,7 +31,7 @@ std::string outcome(const TriMesh &surface, uint32_t cells) {
 
 }  // namespace
 
-TEST(FillBounds, CornersFarApart_EndInCellsOrASentence) {
+TEST(FillBounds, CornersFarApart_GiveCellsOrAnError) {
   const double f = 1.5e14;
   const std::string needle = outcome(tetrahedron({0, 0, 0}, {72, 0, 0}, {0, 72, 0}, {f, f, f}), 1000);
   EXPECT_NE(needle.find("m across"), std::string::npos) << needle;
@@ -54,7 +54,7 @@ TEST(FillBounds, PartsTooFarApart_AreRefused) {
   EXPECT_NE(sentence.find("too far apart"), std::string::npos) << sentence;
 }
 
-TEST(FillBounds, SpikesAndStrayCorners_EndInCellsOrASentence) {
+TEST(FillBounds, SpikesAndStrayCorners_GiveCellsOrAnError) {
   std::mt19937 draw(7);
   std::uniform_real_distribution<double> unit(-1, 1);
   for (const double reach : {1e2, 1e6, 1e20}) {
@@ -67,7 +67,7 @@ TEST(FillBounds, SpikesAndStrayCorners_EndInCellsOrASentence) {
   }
 }
 
-TEST(FillBounds, TangleOfTriangles_EndsInCellsOrASentence) {
+TEST(FillBounds, TangleOfTriangles_GivesCellsOrAnError) {
   std::mt19937 draw(11);
   std::uniform_real_distribution<double> unit(-1, 1);
   TriMesh tangle;

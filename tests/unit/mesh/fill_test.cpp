@@ -202,7 +202,7 @@ TEST(Fill, WantedNumber_IsMetWithinTenPercent) {
 
 // A cut cell carries its material as if it filled it evenly, so a body is a little too wide: by 0.6 % of its
 // inertia at 20,000 cells.
-TEST(Fill, Ball_MassCentreAndInertiaWithinOnePercent) {
+TEST(Fill, Ball_MassCenterAndInertiaWithinOnePercent) {
   const double r = 0.5;
   const TriMesh s = test::sphere_surface(r, 6, {0.3, -0.2, 0.1});
   const TetMesh m = fill_surface(s, 20000);
@@ -277,7 +277,7 @@ TEST(Fill, CavityAndSecondPiece_AreSeen) {
   EXPECT_EQ(dfm::mesh_statistics(fill_surface(two, 5000)).npiece, 2u);
 }
 
-TEST(Fill, HangingTriangles_AreLeftOutAndTold) {
+TEST(Fill, HangingTriangles_AreLeftOutAndReported) {
   TriMesh m = test::sphere_surface(0.5, 4);
   test::append(m, test::surface_of({{2, 0, 0}, {2.1, 0, 0}, {2, 0.1, 0}}, {{0, 1, 2}}));
   const TetMesh filled = fill_surface(m, 1000);
@@ -288,7 +288,7 @@ TEST(Fill, HangingTriangles_AreLeftOutAndTold) {
   EXPECT_NE(filled.warnings[1].find("enclose nothing"), std::string::npos) << filled.warnings[1];
 }
 
-TEST(Fill, NanometresKilometresAndFarAway_GiveTheSameCells) {
+TEST(Fill, NanometersKilometersAndFarAway_GiveTheSameCells) {
   const TetMesh unit = fill_surface(test::sphere_surface(1, 4), 1000);
   for (const double size : {1e-9, 1e5}) {
     const TetMesh m = fill_surface(test::sphere_surface(size, 4), 1000);

@@ -239,7 +239,7 @@ TEST(MeshRead, NumbersThatAreNone_AreRefusedWithTheirLine) {
   }
 }
 
-TEST(MeshRead, Locale_HasNoSay) {
+TEST(MeshRead, Locale_HasNoInfluence) {
   const char *set = std::setlocale(LC_ALL, "de_DE.UTF-8");
   const TetMesh m =
       read_text("locale.vtk", kVtk + "POINTS 4 double\n0 0 0\n1.5 0 0\n0 1 0\n0 0 1\n" + kOneCell);

@@ -30,7 +30,7 @@ void expect_unsupported(const std::string &name, const std::string &text,
 
 }  // namespace
 
-TEST(ReadDispatch, EndingThatLies_IsToldInAWarningAndTheFileRead) {
+TEST(ReadDispatch, WrongFileNameEnding_IsWarnedOfAndTheFileRead) {
   const RawMesh raw = parse("a.ply", kOff);
   EXPECT_EQ(raw.ntri(), 1u);
   ASSERT_EQ(raw.warnings.size(), 1u);

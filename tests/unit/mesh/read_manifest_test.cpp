@@ -182,7 +182,7 @@ TEST_F(SharedMeshes, EveryFileOfTheManifest_IsReadRepairedOrRefusedAsItSays) {
   EXPECT_EQ(done["foreign"], 15u);
 }
 
-TEST_F(SharedMeshes, Nasty_RepairsAndReportsAreTold) {
+TEST_F(SharedMeshes, DefectiveMeshes_AreRepairedAndReported) {
   const auto read = [&](const char *file) {
     return read_tet_mesh(Memory::standard(), folder + "nasty/" + file);
   };
@@ -226,7 +226,7 @@ TEST_F(SharedMeshes, ThesisCylinders_HaveTheirPublishedCounts) {
   }
 }
 
-TEST_F(SharedMeshes, NastySurfaces_RepairsAndReportsAreTold) {
+TEST_F(SharedMeshes, DefectiveSurfaces_AreRepairedAndReported) {
   const auto read = [&](const char *file) {
     return read_tri_mesh(Memory::standard(), folder + "nasty/" + file);
   };
@@ -238,7 +238,7 @@ TEST_F(SharedMeshes, NastySurfaces_RepairsAndReportsAreTold) {
   EXPECT_EQ(tri_mesh_statistics(read("self_intersecting.stl")).npiece, 2u);
 }
 
-TEST_F(SharedMeshes, FileWhoseEndingLies_IsReadForWhatItIs) {
+TEST_F(SharedMeshes, FileWithAWrongEnding_IsReadByItsContent) {
   const TetMesh mesh = read_tet_mesh(Memory::standard(), folder + "external/sofa/Bunny.vtk");
   EXPECT_EQ(mesh.npoint() + mesh.dropped_points, 1911u);
   EXPECT_EQ(mesh.ntet(), 5897u);

@@ -39,7 +39,7 @@ TEST(Plane, Surfels_HaveSignedDistanceAreaAndBelt) {
 
 // What sticks to a drum goes round with it at its own radius, not at the drum's; of a rigid body, what its
 // host adds to its spin counts to first order only.
-TEST(Obstacles, Turn_IsToldAtTheBodysPoint) {
+TEST(Obstacles, RotationVelocity_IsTakenAtTheBodysPoint) {
   Scene scene;
   scene.add(moved(box_mesh({1, 1, 1}, 2, 2, 2), {}, {0, 0, 1.0005}));
   scene.add(Shape::sphere, {0, 0, 0}).radius = 0.5;

@@ -119,7 +119,7 @@ TEST(Planner, DampingShortensTheExplicitStep) {
   EXPECT_NEAR(damped * damped * w2 + 2 * damped * free * w2, 4, 1e-9);
 }
 
-TEST(Planner, CoarseMesh_IsSaid) {
+TEST(Planner, CoarseMesh_IsReported) {
   BodyRegime b = bar();
   b.edge = 0.1;
   const PlannedWay plan = plan_accuracy({b}, measured(), accuracy(0.1));

@@ -85,7 +85,7 @@ TEST(Plan, OfRigidBodies_EndsThemBeforeImpulsesAreDistributed) {
   EXPECT_EQ(all[7], "distribute");
 }
 
-TEST(Plan, OfWhatIsPrescribed_SaysWhatMoves) {
+TEST(Plan, OfWhatIsPrescribed_NamesWhatMoves) {
   dfm::SceneFacts f = two_bodies();
   EXPECT_EQ(why_not(f, "motion"), "nothing is prescribed over time");
   f.loads_vary = true;

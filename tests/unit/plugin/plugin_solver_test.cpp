@@ -44,7 +44,7 @@ TEST(PluginSolver, Solutions_EqualDense) {
   for (size_t r = 0; r < 9; ++r) EXPECT_NEAR(w[9 * r + 4], unit[3 * sel[r / 3] + r % 3], 1e-12);
 }
 
-TEST(PluginSolver, MatrixThatIsNotPositiveDefinite_IsToldAndNothingIsSolved) {
+TEST(PluginSolver, MatrixThatIsNotPositiveDefinite_IsReportedAndNothingIsSolved) {
   const Loaded context;
   const auto solver = context.solver();
   const test::Grid g = test::grid(3, 3, 3, -1.0);

@@ -68,7 +68,7 @@ TEST(Set, PointerAndValue_ChangeTheTree) {
   EXPECT_EQ(tree, json::parse(R"({"a": {"b": [1, 7, [1, {}]]}, "new": {"deep": "word"}, "a/b": "x=y"})"));
 }
 
-TEST(Set, WrongPlace_IsASentence) {
+TEST(Set, WrongPlace_IsReported) {
   json tree = json::parse(R"({"a": [1, 2], "n": 3})");
   EXPECT_THROW(apply_set(tree, "a=1", "s"), dfm::Error);
   EXPECT_THROW(apply_set(tree, "/a", "s"), dfm::Error);

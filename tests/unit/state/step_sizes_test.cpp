@@ -123,7 +123,7 @@ TEST(StepSizes, BoundThatFallsInAStep_HalvesItsSubSteps) {
   EXPECT_GE(cut_finer(s, 1, 0), 1e15) << "no number of sub-steps is enough";
 }
 
-TEST(StepSizes, StateThatNoWorldComesTo_IsTold) {
+TEST(StepSizes, StateThatNoWorldReaches_IsReported) {
   EXPECT_TRUE(sound(StepSizes{}));
   for (int bad = 0; bad < 4; ++bad) {
     StepSizes s;
