@@ -134,7 +134,9 @@ typedef struct dfm_friction_out { /* a pointer that is NULL is not wanted */
   double *ft;
   /* [nstate,n] trial at t+dt, inside the cone of fn; host commits or drops it */
   double *state;
-  double *dft_dvt; /* [4,n] row-major 2x2, negative semidefinite part used (N s/m) */
+  /* [4,n] row-major 2x2 (N s/m). The symmetric part is used where it is negative semidefinite, the
+   * antisymmetric part whole */
+  double *dft_dvt;
   double *dft_dfn; /* [2,n] (1) */
   /* [n]   largest force the contact carries before gross slip (N); +inf none */
   double *limit;
