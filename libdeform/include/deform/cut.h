@@ -47,8 +47,8 @@ typedef struct dfm_cut_info {
   double kinetic, elastic;  /* J, before less after; elastic NAN where the model gives no energy */
   uint32_t pieces;          /* bodies that have come off it (dfm_body_set_separate) */
   uint32_t reserved2;
-  /* of a blade that opens faces of a material with "fracture_energy": J that it takes to open them; N on the
-   * blade, against its way: the force that does this work */
+  /* for a blade that opens faces of a material with "fracture_energy": the energy that opens them, J, and the
+   * force on the blade, opposite to its motion, that does this work, N */
   double fracture, force[3];
 } dfm_cut_info;
 /** Cuts a body. Points that stay keep their positions and velocities to the bit, and that part of their mass

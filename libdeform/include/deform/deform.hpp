@@ -41,7 +41,7 @@
 
 namespace deform {
 
-// The classes, with how they tell errors as a parameter: Throw or Values.
+// The classes. A parameter selects how they report errors: Throw or Values.
 namespace basic {
 
 // ---- materials, laws --------------------------------------------------------------------------------------
@@ -680,7 +680,7 @@ class Context : public Handle<dfm_context *, struct ContextKind> {
     call.rethrow();
     return E::done(s);
   }
-  // visit(const char *file, const char *reason) for every file that discovery passed over.
+  // visit(const char *file, const char *reason) for every file that discovery skipped.
   template <class F>
   auto visit_passed(F &&visit) const {
     typename E::template Call<std::remove_reference_t<F>> call{visit};

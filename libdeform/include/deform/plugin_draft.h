@@ -11,12 +11,12 @@ extern "C" {
 /* ---- models: cells other than tetrahedra ------------------------------------------------------------- */
 enum { DFM_CELL_POINT = 1, DFM_CELL_EDGE = 2, DFM_CELL_TRI = 4, DFM_CELL_HEX = 16 };
 /* ---- models: cells that go, points that are split ------------------------------------------------------ */
-/* Extension "dfm.topology/1" of a model: what an instance is for a body follows from its cells one by one, so
- * that an instance which create() makes of a part of the cells goes on from where this one is. A host cuts
- * the body by making that instance beside this one and taking the state over, slot by slot: of points, cells
- * and edges by these maps; an edge that was none before has the state of state_init(); a slot by instance is
- * copied. Both instances live until one of them is destroyed. It stays a draft until a model of another
- * author has it. */
+/* Extension "dfm.topology/1" of a model: an instance depends on the cells of the body one by one, so an
+ * instance that create() makes from a part of the cells can continue from the state of this one. A host cuts
+ * the body by creating that instance beside this one and copying the state, slot by slot: of points, cells
+ * and edges by these maps; a new edge has the state of state_init(); a slot by instance is copied. Both
+ * instances exist until one of them is destroyed. It stays a draft until a model of another author has
+ * it. */
 #define DFM_EXT_TOPOLOGY "dfm.topology/1"
 typedef struct dfm_topology_maps {
   uint32_t size, npoint, ncell, nedge; /* of the mesh now */
@@ -70,9 +70,9 @@ typedef struct dfm_direct {
   dfm_status (*inverse_at)(void *self, uint32_t nsel, const uint32_t *sel, double *w);
 } dfm_direct;
 /* ---- models: springs switched off --------------------------------------------------------------------- */
-/* Extension "dfm.spring_mask/1" of a model: springs by edge of the mesh, switched off and on. Like a
- * parameter, the mask is the host's to keep: it is no state. Off gives a spring's energy away; on again may
- * bring some. */
+/* Extension "dfm.spring_mask/1" of a model: springs by edge of the mesh, switched off and on. The host keeps
+ * the mask, as it keeps parameters: it is no state. Switching a spring off removes its energy; switching it
+ * on may add energy. */
 #define DFM_EXT_SPRING_MASK "dfm.spring_mask/1"
 typedef struct dfm_spring_mask {
   uint32_t size, reserved;

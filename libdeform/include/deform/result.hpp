@@ -1,5 +1,5 @@
-// deform/result.hpp -- what the classes of deform.hpp are made of: how errors are told, arguments that cost
-// nothing, handles that end what they own. Included by deform.hpp.
+// deform/result.hpp -- parts of the classes of deform.hpp: error reports, arguments without cost, handles
+// that destroy what they own. Included by deform.hpp.
 #ifndef DEFORM_RESULT_HPP
 #define DEFORM_RESULT_HPP
 #if !defined(__cplusplus) || __cplusplus < 202002L

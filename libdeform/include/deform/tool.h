@@ -51,8 +51,8 @@ typedef struct dfm_tool_def {
   const double *points;      /* mesh: [npoint,3] m; closed, or it acts on the side that its triangles face */
   const uint32_t *triangles; /* [ntriangle,3] counter-clockwise seen from outside; both are copied */
   double opening;            /* rad between the jaws at the start, 0 to 3 */
-  /* N/m and N s/m, N m/rad and N m s/rad, of the coupling. stiffness 0: none, the tool goes where it is put;
-   * else turn_stiffness too is above 0 */
+  /* N/m and N s/m, N m/rad and N m s/rad, of the coupling. stiffness 0: no coupling, the tool follows its
+   * pose exactly; else turn_stiffness must be above 0 too */
   double stiffness, damping, turn_stiffness, turn_damping;
   double mass, inertia; /* kg, kg m2 about any axis through the origin: of the tool, where it is coupled */
   /* s, 0 to 0.1, of a coupled tool: how much later than the next step the hand feels what answers its motion,
@@ -119,9 +119,9 @@ DFM_API dfm_status dfm_tool_set_opening(dfm_tool tool, double angle);
  * @return DFM_OK; DFM_E_ARG it has no keys, or a device moves it; DFM_E_HANDLE. Threads: Not during step.
  * Since 0.1. */
 DFM_API dfm_status dfm_tool_follow_keys(dfm_tool tool);
-/** Where its keys lead at a time, followed or not.
+/** Pose and opening that the keys give at a time, whether the tool follows them or not.
  * @param t        s
- * @param pose     out, may be NULL; of a tool without keys of this kind: where it was told to be
+ * @param pose     out, may be NULL; of a tool without keys of this kind: the last pose that was set
  * @param opening  out, rad, may be NULL; likewise
  * @return DFM_OK; DFM_E_ARG t is not finite, or the tool has no keys at all; DFM_E_HANDLE. Threads: Any
  * thread. Not during step. Since 0.1. */
@@ -142,8 +142,8 @@ DFM_API dfm_status dfm_tool_teleport(dfm_tool tool, const dfm_pose *pose);
  * @return DFM_OK (zero before the first step); DFM_E_ARG; DFM_E_HANDLE. Threads: Any thread. Not during
  * step. Since 0.1. */
 DFM_API dfm_status dfm_tool_force(dfm_tool tool, double force[3], double torque[3]);
-/** What a device has to put on the hand: the mean force of the coupling over the last step on the device, or
- * that of dfm_tool_force where there is no coupling.
+/** Force that a device exerts on the hand: the mean force of the coupling over the last step on the device,
+ * or that of dfm_tool_force where there is no coupling.
  * @param force   [3] N on the hand, in the device's frame as it stands now
  * @param torque  [3] N m on the hand, about the device's origin, in that frame
  * @return as dfm_tool_force. Threads: Any thread. Not during step. Since 0.1. */
@@ -153,7 +153,7 @@ typedef struct dfm_tool_state {
   uint32_t size, nkeys;        /* nkeys: 1: keys still move it */
   dfm_pose pose;               /* of the tool now */
   double velocity[3], spin[3]; /* m/s of its origin, rad/s; mean of the last sub-step; world frame */
-  dfm_pose device;             /* where it was told to be; equals pose without a coupling */
+  dfm_pose device;             /* the pose that was set; equals pose without a coupling */
   double opening;              /* rad */
   double time;                 /* s, of the last step; 0: none yet */
   double work; /* J that whoever moves it has put in since it was made: into the coupling, or without one into

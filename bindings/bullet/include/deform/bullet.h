@@ -60,32 +60,32 @@ DFM_API dfm_status dfm_bullet_attach(dfm_world world, const dfm_bullet_def *def,
  * it before either world is destroyed. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_bullet_detach(dfm_bullet bullet);
 /** stepSimulation(dt, max_sub_steps, fixed), with the status of its ticks. Each tick advances both worlds, in
- * the sub-steps that the soft bodies need: in each Bullet's own collision, the contact solve, and Bullet's
- * constraints with the impulses of that solve. A tick that fails leaves all bodies where the dfm_world is, at
- * the end of its last good sub-step; later ticks try again.
+ * the sub-steps that the soft bodies need. Each sub-step runs Bullet's collision, the contact solve, and
+ * Bullet's constraints with the impulses of that solve. A tick that fails leaves all bodies in the state of
+ * the dfm_world, at the end of its last good sub-step; later ticks try again.
  * @param ticks  out, what stepSimulation returned; may be NULL
  * @return as dfm_world_step, of the first tick that failed; DFM_E_UNSUPPORTED a shape that soft bodies cannot
  * touch (which, what to do): then the tick has moved nothing
  * Threads: One thread at a time per world. Since 0.1. */
 DFM_API dfm_status dfm_bullet_step(dfm_bullet bullet, double dt, int max_sub_steps, double fixed, int *ticks);
-/** Of the last tick, for who calls stepSimulation: what dfm_bullet_step would have said, its sentence in
- * dfm_last_error(). @param trouble  out, DFM_TROUBLE_* bits; may be NULL. Threads: Any thread. Not during
- * step. Since 0.1. */
+/** Status of the last tick, as of dfm_bullet_step, for programs that call stepSimulation themselves; its
+ * error is in dfm_last_error(). @param trouble  out, DFM_TROUBLE_* bits; may be NULL. Threads: Any thread.
+ * Not during step. Since 0.1. */
 DFM_API dfm_status dfm_bullet_last_tick(dfm_bullet bullet, uint32_t *trouble);
 DFM_API dfm_status dfm_bullet_get_stats(dfm_bullet bullet, dfm_bullet_stats *out);
 
-/** What stands for a leaf of an object's shape: reports, pair rules, rays and filters take it.
+/** The obstacle of a leaf of an object's shape, for reports, pair rules, rays and filters.
  * @param leaf  counted from 0, compounds opened in the order of their children; 0 of any other shape
  * @return DFM_OK; DFM_E_ARG the object is not in the world, takes no part or has fewer leaves;
  * DFM_E_UNSUPPORTED as dfm_bullet_step. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_bullet_obstacle(dfm_bullet bullet, const btCollisionObject *object, uint32_t leaf,
                                        dfm_obstacle *out);
-/** What stands for a body that moves by forces: a btRigidBody, whose dfm_rigid_state is not rounded to
+/** The rigid body of an object that moves by forces: a btRigidBody, whose dfm_rigid_state is not rounded to
  * btScalar, or a btMultiBodyLinkCollider. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_bullet_rigid(dfm_bullet bullet, const btCollisionObject *body, dfm_rigid *out);
 
-/** What Bullet does not know of an object. Its obstacles are made anew: their contacts end. Objects nobody
- * names are called "obstacleN". */
+/** Properties of an object that Bullet does not have. Setting them creates its obstacles again, so their
+ * contacts end. Objects without a name are called "obstacleN". */
 typedef struct dfm_bullet_object {
   uint32_t size, ignore; /* 1: soft bodies do not see it */
   const char *name;      /* NULL: none; leaves after the first: name.1, name.2 */
@@ -94,8 +94,8 @@ typedef struct dfm_bullet_object {
 /** @return DFM_OK; DFM_E_ARG the object is not in the world. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_bullet_set_object(dfm_bullet bullet, const btCollisionObject *object,
                                          const dfm_bullet_object *props);
-/** Reads an object's shape again, after a change of arrays in it that its sizes do not tell (refitTree,
- * heights, corners of a hull). Threads: Not during step. Since 0.1. */
+/** Reads an object's shape again, after a change of its arrays that leaves their sizes as they are
+ * (refitTree, heights, corners of a hull). Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_bullet_refresh(dfm_bullet bullet, const btCollisionObject *object);
 
 /** Surfaces of the soft bodies, and lines of dfm_debug_draw (what: DFM_DRAW_*, may be 0), by the world's own
@@ -103,11 +103,11 @@ DFM_API dfm_status dfm_bullet_refresh(dfm_bullet bullet, const btCollisionObject
  * during step. Since 0.1. */
 DFM_API dfm_status dfm_bullet_debug_draw(dfm_bullet bullet, uint32_t what);
 
-/** A body of the dfm_world from one of Bullet's soft bodies, which stays as it is: its nodes where they are
- * now, as the rest shape, moving at their mean velocity. Its tetrahedra, and nodes of infinite mass held;
- * where it has none, its faces, which must close, filled with about `cells` cells (dfm_tetmesh_fill).
- * Stiffness and mass are those of `like`'s material: Bullet's coefficients have no units to go by. (A .vtk
- * file of Bullet's is read by dfm_tetmesh_read.)
+/** Creates a body of the dfm_world from one of Bullet's soft bodies, which does not change. The present
+ * positions of its nodes are the rest shape; the body moves at their mean velocity. Cells are its tetrahedra;
+ * without any, its faces, which must close, are filled with about `cells` cells (dfm_tetmesh_fill). Nodes of
+ * infinite mass are held. Stiffness and mass are those of `like`'s material, because Bullet's coefficients
+ * have no units. (dfm_tetmesh_read reads a .vtk file of Bullet's.)
  * @param like  name, material, model, filter and so on; mesh, pose and velocity are not looked at
  * @return DFM_OK; DFM_E_ARG neither tetrahedra nor faces; as dfm_trimesh_create, dfm_tetmesh_fill,
  * dfm_body_create. Threads: Not during step. Since 0.1. */

@@ -62,17 +62,17 @@ static inline dfm_ode_def dfm_ode_def_default(void) {
  * is of single precision or of another version than the one that libdeform_ode was built with; DFM_E_HANDLE;
  * DFM_E_NOMEM. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_ode_attach(dfm_world world, const dfm_ode_def *def, dfm_ode *out);
-/** What stood for ODE's geoms leaves the dfm_world; ODE's world stays as it is. Call it before the dfm_world
- * or the dWorldID is destroyed; as late as from the destructors of statics. An adapter that nobody detaches
- * does nothing at the program's end.
+/** Removes the obstacles of ODE's geoms from the dfm_world; ODE's world does not change. Call it before the
+ * dfm_world or the dWorldID is destroyed, at the latest from the destructors of statics. An adapter that is
+ * not detached does nothing at the program's end.
  * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_ode_detach(dfm_ode ode);
-/** Advances both worlds by dt, in the sub-steps that the soft bodies need: in each ODE's own collision, the
- * contact solve, and dWorldStep or dWorldQuickStep with the impulses of that solve. Forces and torques that
- * bodies carry at the call act over all of dt.
- * A step that fails leaves all bodies where the dfm_world is, at the end of its last good sub-step; where
+/** Advances both worlds by dt, in the sub-steps that the soft bodies need. Each sub-step runs ODE's
+ * collision, the contact solve, and dWorldStep or dWorldQuickStep with the impulses of that solve. Forces and
+ * torques that bodies have at the call act over all of dt.
+ * A step that fails leaves all bodies in the state of the dfm_world, at the end of its last good sub-step; if
  * there was none, they keep their forces too.
- * @return as dfm_world_step; DFM_E_UNSUPPORTED a geom of a kind that ODE tells nothing about (which, what to
+ * @return as dfm_world_step; DFM_E_UNSUPPORTED a geom of a kind that ODE does not describe (which, what to
  * do). Then nothing has moved
  * Threads: One thread at a time per world. Since 0.1. */
 DFM_API dfm_status dfm_ode_step(dfm_ode ode, double dt);
@@ -80,26 +80,27 @@ DFM_API dfm_status dfm_ode_step(dfm_ode ode, double dt);
 DFM_API dfm_status dfm_ode_trouble(dfm_ode ode, uint32_t *trouble);
 DFM_API dfm_status dfm_ode_get_stats(dfm_ode ode, dfm_ode_stats *out);
 
-/** What stands for a geom: reports, pair rules, rays and filters take it. @return DFM_OK; DFM_E_ARG the
+/** The obstacle of a geom, for reports, pair rules, rays and filters. @return DFM_OK; DFM_E_ARG the
  * geom is not in the space or takes no part; DFM_E_UNSUPPORTED as dfm_ode_step. Threads: Not during
  * step. Since 0.1. */
 DFM_API dfm_status dfm_ode_obstacle(dfm_ode ode, dGeomID geom, dfm_obstacle *out);
-/** What stands for a body with at least one geom that takes part. Its dfm_rigid_state is in the world's
- * frame, about the center of mass that ODE has it at; its rotation is that of the principal axes of dMass.I,
- * the body's own where I is diagonal. Joints are ODE's: dfm_rigid_joint knows none of them, dJointGetFeedback
- * has their forces, in the world's frame, moments about each body's center of mass, of the last sub-step.
+/** The rigid body of an ODE body with at least one geom that takes part. Its dfm_rigid_state is in the
+ * world's frame, about ODE's center of mass; its rotation is that of the principal axes of dMass.I, which is
+ * the body's own where I is diagonal. Joints belong to ODE and are unknown to dfm_rigid_joint.
+ * dJointGetFeedback gives their forces in the last sub-step, in the world's frame, moments about each body's
+ * center of mass.
  * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_ode_rigid(dfm_ode ode, dBodyID body, dfm_rigid *out);
 
-/** The dfm_world's snapshot, and behind it what that does not hold: bodies without geoms that joints lead to,
- * and the states of dfm_ode_set_friction. Of the bodies with geoms the dfm_world's own snapshot has
- * everything, auto-disable included. buffer NULL: *bytes gets the size needed.
+/** The dfm_world's snapshot, followed by what it does not contain: bodies without geoms that joints connect,
+ * and the states of dfm_ode_set_friction. The dfm_world's own snapshot contains the whole state of bodies
+ * with geoms, auto-disable included. buffer NULL: *bytes gets the size needed.
  * @return DFM_OK; DFM_E_ARG too small (*bytes: the size); as dfm_ode_step. Threads: Not during
  * step. Since 0.1. */
 DFM_API dfm_status dfm_ode_snapshot(dfm_ode ode, void *buffer, size_t *bytes);
 /** Restores both worlds, with the same bodies, geoms in the same order, joints and law; the next steps
- * give the same bits. dfm_world_restore alone also takes the bodies with geoms back, and rigid contacts
- * forget their states.
+ * give the same bits. dfm_world_restore alone also restores the bodies with geoms, but the rigid contacts
+ * lose their states.
  * @return DFM_OK; DFM_E_FORMAT not of such a scene, or made under another law (nothing changed). Threads: Not
  * during step. Since 0.1. */
 DFM_API dfm_status dfm_ode_restore(dfm_ode ode, const void *buffer, size_t bytes);
@@ -109,19 +110,19 @@ DFM_API dfm_status dfm_ode_restore(dfm_ode ode, const void *buffer, size_t bytes
  * keeps it per contact (dfm_ode_snapshot).
  * @param law     as for dfm_law_open; NULL: dfm_ode_def.friction again
  * @param params  NULL: the law's defaults
- * @param area    m2 that one contact stands for, where the law's stiffness is per area
+ * @param area    m2 of one contact, where the law's stiffness is per area
  * @return DFM_OK; as dfm_law_open and dfm_law_pack. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_ode_set_friction(dfm_ode ode, dfm_context *context, const char *law,
                                         const dfm_params *params, double area);
-/** For a near callback of one's own: collides two geoms and makes their contact joints, in the group that
+/** For your own near callback: collides two geoms and makes their contact joints, in the group that
  * the adapter was attached with, with the friction of dfm_ode_set_friction. @param made  out, contact
  * joints; may be NULL
  * @return DFM_OK; DFM_E_ARG; DFM_E_HANDLE. Threads: from the near callback, that is: inside
  * dfm_ode_step. Since 0.1. */
 DFM_API dfm_status dfm_ode_contact(dfm_ode ode, dGeomID a, dGeomID b, int *made);
 
-/** What ODE does not know of a geom. Its obstacle is made anew: its contacts end. Geoms nobody names are
- * called "obstacleN". */
+/** Properties of a geom that ODE does not have. Setting them creates its obstacle again, so its contacts end.
+ * Geoms without a name are called "obstacleN". */
 typedef struct dfm_ode_geom {
   uint32_t size, ignore; /* 1: soft bodies do not see it */
   const char *name;      /* NULL: none */
