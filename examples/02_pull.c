@@ -1,5 +1,5 @@
-/* A soft block lies on a soft plate that is held from below; a force that grows pulls it. Prints the force at
- * which it begins to slide (Coulomb: mu times the weight), and what the events tell. */
+/* A soft block lies on a soft plate that is held from below; an increasing force pulls it. Prints the force
+ * at which it begins to slide (Coulomb: mu times the weight), and the events. */
 #include <deform/deform.h>
 #include <stdio.h>
 

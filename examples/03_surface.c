@@ -1,5 +1,6 @@
-/* A cube as exporters often leave it: each triangle with corners of its own, every third one turned. Reading
- * it as a surface joins and turns it; written as OBJ it comes back sound. Prints what was repaired. */
+/* A cube as exporters often write it: each triangle has separate corners, and every third one faces inward.
+ * Reading it as a surface joins and turns the triangles; the OBJ file that is written is closed. Prints what
+ * was repaired. */
 #include <deform/deform.h>
 #include <stdio.h>
 

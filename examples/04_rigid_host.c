@@ -1,6 +1,6 @@
-/* A rigid host of one's own: a table of five functions moves one box that may only go up and down, and
- * libdeform solves its contact with a soft ball together with the ball's own motion. Prints how the box comes
- * to rest and the force that the ball carries it with. */
+/* Your own rigid host: a table of five functions moves one box that can only go up and down, and libdeform
+ * solves its contact with a soft ball together with the motion of the ball. Prints how the box comes to rest
+ * and the force with which the ball carries it. */
 #include <deform/deform.h>
 #include <stdio.h>
 #include <string.h>

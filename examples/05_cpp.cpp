@@ -1,5 +1,5 @@
-// The C++ way in: the balls of 01_hello with handles that end what they own, arrays as spans, and errors in
-// both ways: thrown, and as a value where a failure is an answer.
+// The same in C++: the balls of 01_hello with handles that destroy what they own, arrays as spans, and errors
+// in both forms: as exceptions, and as a value where a failure is an expected result.
 #include <cstdio>
 #include <deform/deform.hpp>
 

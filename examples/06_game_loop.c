@@ -1,6 +1,6 @@
-/* Soft crates in a game loop: frames of a display that is not quite even, world steps of a fixed 1/60 s,
- * sleep, impacts for sounds, vertices for the renderer. Prints a line per simulated second: what a step costs
- * on this machine, what was heard, who sleeps.
+/* Soft crates in a game loop: display frames of slightly varying length, world steps of a fixed 1/60 s,
+ * sleep, impacts for sounds, vertices for the renderer. Prints a line per simulated second: the cost of a
+ * step on this machine, the number of sounds, the number of sleeping bodies.
  *   06_game_loop [YOUNG in Pa] [CELLS per crate] [SECONDS]      1e5, 200 and 4 where not given */
 #include <deform/deform.h>
 #include <stdio.h>

@@ -1,7 +1,7 @@
 /* Vertices for a graphics card: a soft ball falls on a floor, and each frame its vertices go into one block
- * of memory with a layout of ours, as they would into a mapped vertex buffer. Texture coordinates stand in
- * the same vertices and are written once. In place of a card a few lines below draw the last frame from that
- * block: light by the normals, red where contacts stick.
+ * of memory with the layout of this program, as into a mapped vertex buffer. Texture coordinates are in the
+ * same vertices and are written once. Instead of a graphics card, a few lines below draw the last frame from
+ * this block: light by the normals, red where contacts stick.
  *   07_draw [FILE]      a picture in the form PPM; draw.ppm where not given */
 #include <deform/deform.h>
 #include <stdio.h>

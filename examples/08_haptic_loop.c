@@ -1,9 +1,9 @@
-/* A loop of its own thread at a fixed rate, as a haptic device wants it, beside a scene that another thread
- * steps: the loop says where the hand is and takes the force, the scene reads the hand and writes the force.
- * Prints how late the loop woke up, how long a step took, and how old the motion was that a force answers.
+/* A loop in its own thread at a fixed rate, as a haptic device needs it, beside a scene that another thread
+ * steps: the loop writes the pose of the hand and reads the force, the scene reads the pose and writes the
+ * force. Prints how late the loop woke up, how long a step took, and the age of the motion behind a force.
  *   08_haptic_loop SCENE [TOOL] [SECONDS] [RATE in Hz]     the first tool, 2 and 1000 where not given
- * The hand here goes up and down by itself, 10 mm from where the tool is; a device's driver takes its
- * place. */
+ * The hand here is simulated: it moves up and down by 10 mm from the pose of the tool. Replace it by the
+ * driver of a device. */
 #define _POSIX_C_SOURCE 200809L
 #include <deform/deform.h>
 #include <math.h>

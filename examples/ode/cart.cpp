@@ -1,6 +1,6 @@
-// A cart in a world of ODE drives over a bump on four soft tyres and brakes. ODE has chassis, hubs, hinges,
-// motors and a crate that lies on the chassis; libdeform has the tyres, which nothing but contact holds on
-// their hubs. Prints where the cart is, twice per second.
+// A cart in a world of ODE drives over a bump on four soft tires and brakes. ODE has chassis, hubs, hinges,
+// motors and a crate that lies on the chassis; libdeform has the tires, which only contact holds on their
+// hubs. Prints where the cart is, twice per second.
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -114,7 +114,7 @@ int run() {
   def.space = ode.space;
   // ends before the worlds: declared after them
   const auto both = deform::attach_ode(soft, def);
-  std::array<deform::Rigid, 4> hubs;  // what stands for them in reports
+  std::array<deform::Rigid, 4> hubs;  // their handles in reports
   for (size_t i = 0; i < 4; ++i) hubs[i] = both.rigid(wheels[i].hub);
 
   constexpr int kDrive = 2 * kRate, kEnd = 11 * kRate / 4;
