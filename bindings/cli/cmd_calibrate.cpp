@@ -471,7 +471,7 @@ void add_calibrate(CLI::App &app, Globals &globals, int *exit_code) {
   };
   auto options = std::make_shared<Options>();
   CLI::App *sub = app.add_subcommand(
-      "calibrate", "measures what models cost on this machine and what they leave out, for the planner");
+      "calibrate", "measures costs and errors of the models on this machine, for the planner");
   sub->add_option("--out", options->out,
                   "file to write (default: $XDG_CONFIG_HOME/deform/costs.json, which the command then takes "
                   "for every scene with an accuracy or a budget)")

@@ -139,8 +139,9 @@ void print_cuts(const JsonValue &plan) {
                   b.get("name").c_str(), tears.c_str());
     if (may_tear || (list && !list->items.empty()))
       std::printf(
-          "  %-20s  a step that cuts or tears makes the body of %s cells anew; any other step looks at each "
-          "of them once\n",
+          "  %-20s  a step that cuts or tears rebuilds the body of %s cells; any other step checks each of "
+          "them "
+          "once\n",
           "", b.get("cells").c_str());
   }
 }

@@ -227,7 +227,8 @@ void add_plugin(CLI::App &app, Globals &globals, int *exit_code) {
   CLI::App *plugin = app.add_subcommand("plugin", "what plugins were found, what they offer");
   plugin->require_subcommand(1);
 
-  CLI::App *list_command = plugin->add_subcommand("list", "types found and where; files passed over and why");
+  CLI::App *list_command =
+      plugin->add_subcommand("list", "types found, with their files; files skipped, with the reason");
   auto directories = std::make_shared<std::vector<std::string>>();
   list_command->add_option("--dir", *directories, "also scan this directory")->type_name("DIR");
   list_command->callback([=, &globals] { *exit_code = list(globals, *directories); });

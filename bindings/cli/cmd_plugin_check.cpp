@@ -40,7 +40,7 @@ std::string file_of(const std::string &text, const Globals &globals) {
 
 void add_plugin_check(CLI::App &plugin, Globals &globals, int *exit_code) {
   CLI::App *sub = plugin.add_subcommand(
-      "check", "holds a plugin to the rules, each in a process of its own; exit 1 where one is broken");
+      "check", "checks a plugin by rules, each in a separate process; exit code 1 if one is broken");
   auto request = std::make_shared<check::Request>();
   sub->add_option("FILE", request->file, "plugin file, or short name or full id of a plugin that is found")
       ->required();
@@ -66,7 +66,7 @@ void add_plugin_check(CLI::App &plugin, Globals &globals, int *exit_code) {
 
 void add_plugin_check(CLI::App &plugin, Globals &, int *exit_code) {
   CLI::App *sub =
-      plugin.add_subcommand("check", "holds a plugin to the rules (not in this build, which loads no files)");
+      plugin.add_subcommand("check", "checks a plugin by rules (not in this build, which loads no files)");
   auto file = std::make_shared<std::string>();
   sub->add_option("FILE", *file, "plugin file")->required();
   sub->callback([=] {

@@ -36,7 +36,7 @@ void Drawing::set_color(const std::string &color) {
     if (!b.stress) b.stress.emplace(body, b.xyz);
     if (!b.stress->read(b.scalar))
       warn("body '" + body.name + "': model '" + body.model +
-           "' tells no stress, so pictures show it in its own color");
+           "' provides no stress, so pictures show it in its own color");
   }
 }
 

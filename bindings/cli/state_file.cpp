@@ -113,9 +113,10 @@ uint64_t scene_hash(const SceneFile &scene) {
 
 void refuse_static(const SceneFile &scene, const std::string &option) {
   if (scene.value("/time/mode") == "\"static\"")
-    throw Failure(kBadInput, option + ": " + scene.path() +
-                                 " looks for equilibria (\"mode\": \"static\"), which have no state to go on "
-                                 "from; leave the option out");
+    throw Failure(kBadInput,
+                  option + ": " + scene.path() +
+                      " searches equilibria (\"mode\": \"static\"), which have no state to continue "
+                      "from; omit the option");
 }
 
 void check_scene_path(const SceneFile &scene, const std::string &path) {

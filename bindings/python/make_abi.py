@@ -156,7 +156,7 @@ def main():
         if "--check" not in sys.argv[3:]:
             path.write_text(source)
         elif not path.exists() or path.read_text() != source:
-            sys.exit(f"{path} is not what the headers say; run bindings/python/make_abi.py {include} {out}")
+            sys.exit(f"{path} differs from the headers; run bindings/python/make_abi.py {include} {out}")
 
 
 if __name__ == "__main__":

@@ -294,7 +294,7 @@ void App::advance(double seconds) {
   while (stage_->simulation.time() < wanted_ - 1e-9) {
     if (!stage_->simulation.step()) {
       running_ = false;
-      message_ = stage_->simulation.trouble().empty() ? "The scene is at its end; space goes on."
+      message_ = stage_->simulation.trouble().empty() ? "The scene has ended; press space to continue."
                                                       : "Stopped: " + stage_->simulation.trouble();
       break;
     }

@@ -106,7 +106,7 @@ void App::add_probe() {
     saved_ = 0;
     strongest_[0] = strongest_[1] = 0;
     stage_->grip.take(int(stage_->grip.count()) - 1);
-    message_ = "The scene begins anew, with " + stage_->grip.name(stage_->grip.count() - 1) + " in hand.";
+    message_ = "The scene starts again, with " + stage_->grip.name(stage_->grip.count() - 1) + " in hand.";
   });
 }
 

@@ -321,7 +321,7 @@ dfm_status check(const double *p, char *why, size_t cap) {
     return DFM_E_ARG;
   }
   if ((nk == 0) != (nnu == 0) && nk + nnu != kUsual) {
-    std::snprintf(why, cap, "%s %u value%s and %s has none, which stands for four; give as many of each",
+    std::snprintf(why, cap, "%s %u value%s and %s has none, which means four; give as many of each",
                   nk ? "k has" : "nu has", nk ? nk : nnu, (nk ? nk : nnu) == 1 ? "" : "s", nk ? "nu" : "k");
     return DFM_E_ARG;
   }

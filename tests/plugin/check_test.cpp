@@ -151,7 +151,7 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"model_refuses_in_silence", "V04", "without a reason"},
         Case{"model_allocates", "V05", "calls malloc"}, Case{"model_writes_between", "V06", "stride"},
         Case{"model_asks_who_it_is", "V07", "in another process"},
-        Case{"model_hides_nan", "V08", "finite answers"}, Case{"model_leaks", "V09", "on the heap"},
+        Case{"model_hides_nan", "V08", "finite results"}, Case{"model_leaks", "V09", "on the heap"},
         Case{"model_rounds_upward", "V11", "add_forces leaves the rounding mode"},
         Case{"model_prints", "V12", "my model 1.0"}, Case{"model_shares_a_static", "V14", "\"shared\""},
         Case{"model_pulls_at_rest", "M01", "the rest pose has forces"},

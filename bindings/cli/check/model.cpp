@@ -285,7 +285,7 @@ double Body::longest_step() const {
     const double m = solid.mass[i], s = ksum[i], c = csum[i];
     if (!(s >= 0) || !(c >= 0) || !std::isfinite(s + c))
       broken(
-          "bound answers row sums of %g N/m and %g N s/m for point %u; return finite sums that are not "
+          "bound returns row sums of %g N/m and %g N s/m for point %u; return finite sums that are not "
           "negative",
           s, c, i);
     if (s > 0) h = std::min(h, (-c + std::sqrt(c * c + 4 * m * s)) / s);

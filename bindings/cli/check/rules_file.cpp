@@ -366,7 +366,7 @@ std::string metadata_complete(const Subject &subject) {
     const char *key, *text, *remedy;
   } fields[] = {{"name", type.name, "the name that lists show"},
                 {"version", type.version, "results are cited with it"},
-                {"licence", type.licence, "without one nobody may redistribute it"},
+                {"licence", type.licence, "without one it may not be redistributed"},
                 {"source", type.source, "the paper and equation that it implements"}};
   if (!type.id || !reverse_dns(type.id))
     broken("its id \"%s\" is not in reverse-DNS form; use a name like \"org.example.mylaw\"",

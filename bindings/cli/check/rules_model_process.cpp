@@ -404,7 +404,7 @@ std::string bad_point_returns(const Subject &subject) {
         for (const Numbers *out : {&step.f, &step.x_end, &step.v_end})
           for (const double a : *out) finite = finite && std::isfinite(a);
         if (std::isnan(bad) && place && finite && !refused)
-          broken("%s a position that is NaN gives finite answers; return a NaN, or DFM_DISCARD",
+          broken("%s a position that is NaN gives finite results; return a NaN, or DFM_DISCARD",
                  with(variant).c_str());
       }
   });

@@ -41,7 +41,7 @@ std::string why_cells_stay(const Subject &subject) {
       return "body '" + subject.bodies[i].name + "' has " + part +
              ", which belongs to the cells of its file and not to others";
     if (subject.find(body + "/surface/mesh"))
-      return "body '" + subject.bodies[i].name + "' wears a surface of its own";
+      return "body '" + subject.bodies[i].name + "' has a separate surface";
   }
   return "";
 }

@@ -233,16 +233,16 @@ std::string reference_text(const Study &study) {
   out += "; its own error " + percent(study.reference_headline) + " (" + how_known(study) + ")";
   if (study.converged) return out + ", at most a third of the best error shown";
   return out + "; NOT CONVERGED: more than a third of the best error shown, " + percent(study.best) +
-         ", so errors below " + percent(3 * study.reference_headline) + " are not told apart";
+         ", so errors below " + percent(3 * study.reference_headline) + " cannot be distinguished";
 }
 
 // Which budget says more, and what.
 std::string next_text(const Study &study) {
   if (study.finest && !(study.next_budget > 0))
     return "  no finer reference is tried with a larger --budget; more cells in the scene make it finer\n";
-  if (!(study.next_budget > 0)) return "  with a larger --budget the same call goes on from here\n";
+  if (!(study.next_budget > 0)) return "  with a larger --budget the same call continues from here\n";
   return "  the same call with --budget " + formatted("%.0f", std::ceil(study.next_budget)) +
-         " goes on from here; that is enough to " + study.next + "\n";
+         " continues from here; that is enough to " + study.next + "\n";
 }
 
 std::string pick_text(const Study &study) {

@@ -333,7 +333,7 @@ void Runs::run(const std::vector<Job *> &jobs, unsigned parallel, double keep) {
     while (next < jobs.size() || !children.empty()) {
       if (interrupted)
         throw Failure(kInterrupted, "interrupted; the runs that are done are kept in " + out_ +
-                                        ", and the same call goes on from there");
+                                        ", and the same call continues from there");
       while (next < jobs.size() && children.size() < parallel) {
         Job &job = *jobs[next++];
         job.limit = std::min(job.limit, left() - keep);

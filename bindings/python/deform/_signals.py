@@ -24,7 +24,7 @@ def _all() -> list[Any]:
 
 
 def _listen(reader: int, previous: int) -> None:
-    """Reads the numbers of signals; previous: who listened before (asyncio), -1: nobody."""
+    """Reads the numbers of signals; previous: the former wakeup descriptor (asyncio), -1: none."""
     while True:
         try:
             heard = os.read(reader, 64)

@@ -118,7 +118,7 @@ class ContactChoice:
 
     @property
     def substep(self) -> int:
-        """Solves since the world was made: tells sub-steps apart."""
+        """Solves since the world was created, as a number of the sub-step."""
         return self._of.substep
 
     @property
@@ -330,7 +330,7 @@ class Queries:
     # ---- functions that decide about contacts ----------------------------------------------------------
 
     def _thing(self, handle: int) -> Any:
-        """The object of a handle while the world is busy and answers nothing."""
+        """The object of a handle while the world is busy and cannot be queried."""
         assert self._known is not None
         return self._known[handle]
 
@@ -341,7 +341,7 @@ class Queries:
         return thing
 
     def _call(self, function: Callable[..., Any], *arguments: Any) -> Any:
-        """What a function of the user answers; what it raises ends the step, which raises it."""
+        """Result of a function of the user; an exception in it ends the step, which raises it."""
         if self._raised is None:
             try:
                 return function(*arguments)
@@ -383,7 +383,7 @@ class Queries:
         self._decide("may_touch", call)
 
     def ask_again(self, a: Body | Obstacle | None = None, b: Body | Obstacle | None = None) -> None:
-        """Forgets answers of the function of set_may_touch: of the pair, of all pairs of a, or of all."""
+        """Discards decisions of the function of set_may_touch: of the pair, of all pairs of a, or all."""
         self.free()
         if a is None and b is not None:
             raise ArgumentError("ask_again takes a, a and b, or neither", "DFM_E_ARG")

@@ -34,7 +34,7 @@ MATERIAL_ENTRIES = {"friction", "tear", "fracture_energy"}  # further ones are p
 
 
 class Trouble(enum.IntFlag):
-    """Bits that a step answers; none: all is well. Remedies: libdeform/doc and deform/world.h."""
+    """Bits that a step returns; none: no trouble. Remedies: libdeform/doc and deform/world.h."""
 
     SUBSTEPS = _abi.DFM_TROUBLE_SUBSTEPS
     UNCONVERGED = _abi.DFM_TROUBLE_UNCONVERGED
@@ -469,7 +469,7 @@ class World(Queries, Tools):
         return self._obstacle(out.value)
 
     def owner(self, handle: int) -> Body | Obstacle:
-        """What a handle of a report (contacts["body_a"], pairs["b"]) stands for."""
+        """The object of a handle in a report (contacts["body_a"], pairs["b"])."""
         if quick.dfm_handle_kind(int(handle)) == _abi.DFM_HANDLE_BODY:
             return self._body(int(handle))
         return self._obstacle(int(handle))
@@ -479,7 +479,7 @@ class World(Queries, Tools):
     def add_friction(self, a: str = "*", b: str = "*", law: Any = "coulomb", **params: Any) -> None:
         """A law between two sides: "*", "material=NAME", the name of a body or an obstacle, or "body:GROUP".
 
-        law: a name, or a deform.PythonLaw; params: of the law, by key ("mu" stands for mu_C and mu_S)."""
+        law: a name, or a deform.PythonLaw; params: of the law, by key ("mu" sets mu_C and mu_S)."""
         name = self.context.use_law(law)
         values = self.context.params("friction", name, params)
         sides = [encoded(a), encoded(b)]

@@ -161,7 +161,7 @@ void add_warnings(TetMesh &mesh, uint32_t crowded) {
   if (mesh.overlapping)
     warn(
         format("the mesh is tangled: across %u face%s both cells lie on the same side, so they overlap; mesh "
-               "the shape anew",
+               "the shape again",
                mesh.overlapping, plural(mesh.overlapping)));
   if (crowded)
     warn(format("%u face%s shared by more than two cells; the cells there overlap", crowded,

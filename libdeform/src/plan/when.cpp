@@ -97,10 +97,11 @@ StageChoice guard(const SceneFacts &f) {
   if (!touches(f)) return left_out(nobody(f));
   if (f.unguarded && f.effects_listed)
     return left_out(
-        "not in the list of effects: what moves further than contacts reach in one sub-step may cross");
+        "not in the list of effects: bodies that move farther than contacts reach in one sub-step may cross");
   if (f.unguarded)
     return left_out(
-        "switched off (contact.guard): what moves further than contacts reach in one sub-step may cross");
+        "switched off (contact.guard): bodies that move farther than contacts reach in one sub-step may "
+        "cross");
   return runs(
       "nothing crosses at the end of a sub-step: " + count(pairs(f), "pair", "pairs") +
       (f.self_bodies ? ", " + count(f.self_bodies, "body with itself", "bodies with themselves") : ""));

@@ -56,7 +56,7 @@ constexpr Stage kTable[] = {
 };
 
 constexpr Inability kUnable[] = {
-    {Ability::self_stepping, "a model that steps itself, whose vertices nobody else can move,"},
+    {Ability::self_stepping, "a model that steps itself, whose vertices this method cannot move,"},
     {Ability::own_surface, "a surface of its own, for which Zerbato (2010) moves no points of the body,"},
     {Ability::held_motion, "a motion of held points, which cannot go back,"},
     {Ability::voxels, "voxels, against which no time of impact is known,"},

@@ -376,8 +376,8 @@ void tell_what_is_left_out(SceneWriter &to) {
   const dfm_world_def usual = dfm_world_def_default();
   if (w.may_touch.call)
     to.note(
-        "a callback of the host decides which pairs may touch: the scene contains its answers so far, and "
-        "does not filter pairs that come later");
+        "a callback of the host decides which pairs may touch: the scene contains its decisions so far, "
+        "and does not filter later pairs");
   if (w.pre_solve.call)
     to.note("a callback of the host changes contacts before they are solved; a scene has none");
   const std::pair<const char *, bool> members[] = {{"max_sweeps", w.def.max_sweeps != usual.max_sweeps},
@@ -406,7 +406,7 @@ void tell_what_is_left_out(SceneWriter &to) {
           return;
         if (u.told.insert(type->id).second)
           u.to->remark(
-              format("'%s' comes from %s, which whoever runs the scene has to load: name its folder in "
+              format("'%s' comes from %s, which must be loaded to run the scene: name its folder in "
                      "DEFORM_PLUGIN_PATH",
                      type->id, path.c_str()));
       },

@@ -75,14 +75,15 @@ uint32_t tell_failed_solve(World &w, StepContext &step, const LawInstance *law, 
     set_last_error(
         format(
             "%s: the contact solve is not finite%s; %s", where.c_str(),
-            law ? (", so that law '" + std::string(law->type->id) + "' was asked at " + in.text).c_str() : "",
+            law ? (", so that law '" + std::string(law->type->id) + "' was evaluated at " + in.text).c_str()
+                : "",
             kDo)
             .c_str());
     return DFM_TROUBLE_NONFINITE;
   }
-  const std::string what =
-      at == kNone ? "refused to answer"
-                  : "answered with something not finite, or a limit below zero, when asked at " + in.text;
+  const std::string what = at == kNone
+                               ? "returned an error"
+                               : "returned a value that is not finite, or a limit below zero, at " + in.text;
   set_last_error(
       format("%s: friction law '%s' %s; %s", where.c_str(), law->type->id, what.c_str(), kDo).c_str());
   return DFM_TROUBLE_PLUGIN;

@@ -201,7 +201,7 @@ std::string tell_pair_gain(const World &w) {
         static_cast<unsigned long long>(w.step_count), sides.c_str(), law.c_str(), grown.c_str());
   return format(
       "step %llu, %s: their contact (law '%s'%s) has put in %s; take a shorter step, repair their "
-      "surfaces, or, where a model of a plugin steps itself, check its answers to impulses "
+      "surfaces, or, where a model of a plugin steps itself, check its response to impulses "
       "(energy_watch sets the limit, 0 switches the watch off)",
       static_cast<unsigned long long>(w.step_count), sides.c_str(), law.c_str(), models_of(w, *worst).c_str(),
       grown.c_str());

@@ -164,7 +164,7 @@ void carry_state(const Former &before, const CutMesh &mesh, Body &b) {
   const dfm_status s =
       now.call("carry", [&] { return table->carry(old.self, now.self, &maps, now.state.data()); });
   if (s != DFM_OK)
-    fail(s < 0 ? s : DFM_E_FATAL, "body '%s': model '%s' does not go on with the cells that are left: %s",
+    fail(s < 0 ? s : DFM_E_FATAL, "body '%s': model '%s' cannot continue with the remaining cells: %s",
          b.name.c_str(), now.type->id, *why.text() ? why.text() : dfm_status_name(s));
 }
 

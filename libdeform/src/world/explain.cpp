@@ -58,7 +58,7 @@ std::string precision(const Body &b) {
   const bool moves = b.dynamics->abilities().placed && b.integrator.used == DFM_INTEGRATOR_SYMPLECTIC_EULER;
   const char *const why = !b.model.single ? "the default"
                           : moves         ? "named; positions, contacts and the step's bound stay double"
-                                          : "single is named, and implicit steps take forces in double";
+                                          : "single was requested, but implicit steps take forces in double";
   return std::string("\"precision\":{\"used\":") + quote(b.model.single && moves ? "single" : "double") +
          ",\"why\":" + quote(why) + "}";
 }

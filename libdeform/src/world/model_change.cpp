@@ -165,7 +165,7 @@ void check_surface(World &w, Body &b) {
   if (b.slumber.asleep) gather_surface(b.surface, b.p.x.data(), b.p.v.data());
   if (!knows)
     fail(DFM_DISCARD,
-         "body '%s': model '%s' cannot go on from the present shape; change the model where the body is "
+         "body '%s': model '%s' cannot continue from the present shape; change the model where the body is "
          "nearer to its rest shape; nothing was changed",
          b.name.c_str(), b.model.type->id);
   if (most > kSurfaceStays * size_of(b))
