@@ -157,7 +157,7 @@ TEST_F(Viewer, UntouchedRun_EndsWithTheBitsOfDeformRun) {
   EXPECT_NEAR(number(viewed, "end.png", "t"), 0.2, 1e-9);
 }
 
-TEST_F(Viewer, StepAndRestart_GoOnAndBackToTheFirstBits) {
+TEST_F(Viewer, StepAndRestart_ContinueAndBackToTheFirstBits) {
   const test::CommandResult done = view(
       "0 shot a.png\n0.05 key s\n0.1 shot b.png\n0.15 key s\n0.2 shot c.png\n0.25 key r\n0.3 shot d.png\n");
   ASSERT_EQ(done.exit_code, 0) << done.err;
@@ -253,7 +253,7 @@ TEST_F(Viewer, ToolInHand_GoesWhereItIsLedAndBackToItsKeys) {
 
 // Any scene gets a ball by one key: led into the block it pushes it down, and feels it. A recording that
 // begins with it in hand is replayed.
-TEST_F(Viewer, AddedProbe_PressesAndFeels) {
+TEST_F(Viewer, AddedProbe_PressesAndReportsItsForce) {
   std::string script = "0.1 key space\n0.3 key space\n0.3 key b\n0.3 shot added.png\n0.35 key space\n";
   for (int i = 0; i < 24; ++i) script += "0.4 key down\n";
   script += "0.4 key v\n1.2 shot pressed.png\n1.2 key v\n";

@@ -118,7 +118,7 @@ TEST(Plastic, BarInEquilibriumBeyondYieldAndFree_KeepsThePermanentStrain) {
   EXPECT_NEAR(bar.strain(), permanent, 1e-6 * permanent);
 }
 
-TEST(Plastic, SnapshotAndDiscardedStepInTheFlow_GoOnToTheSameBits) {
+TEST(Plastic, SnapshotAndDiscardedStepInTheFlow_ContinueToTheSameBits) {
   for (const int32_t integrator : {DFM_INTEGRATOR_SYMPLECTIC_EULER, DFM_INTEGRATOR_IMPLICIT_EULER}) {
     Bar bar(integrator);
     bar.pull(1e-3);

@@ -202,7 +202,7 @@ TEST(SelfContact, RestShape_HasNoContactInAnyRigidMotion) {
   }
 }
 
-TEST(SelfContact, PlanHasItsStage_OnlyWhereAskedFor) {
+TEST(SelfContact, PlanHasItsStage_OnlyOnRequest) {
   const test::Context c;
   const dfm_world off = test::make_self_world(c, false), on = test::make_self_world(c, true);
   test::HookOptions o;

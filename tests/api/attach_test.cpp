@@ -346,7 +346,7 @@ TEST(Attach, EitherSide_MayGo) {
 }
 
 // Restored in a world that has no attachment it goes on with the same bits, and again in its own.
-TEST(Attach, Snapshot_GoesOnWithTheSameBits) {
+TEST(Attach, Snapshot_ContinuesWithTheSameBits) {
   const auto make = [](World &s, bool with) {
     const dfm_obstacle hook = s.hook();
     const dfm_body beam = s.beam("msm");

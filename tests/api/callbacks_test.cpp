@@ -74,7 +74,7 @@ struct OnFloor {
 
 }  // namespace
 
-TEST(MayTouch, AsksEachPairOnceAndKeepsTheAnswer) {
+TEST(MayTouch, IsCalledOncePerPairAndItsResultKept) {
   test::Context c;
   const test::Stack s = test::make_stack(c);
   Asked asked;
@@ -105,7 +105,7 @@ TEST(MayTouch, AsksEachPairOnceAndKeepsTheAnswer) {
   EXPECT_EQ(asked.pairs, all);
 }
 
-TEST(MayTouch, ANo_LetsThingsPassUntilAskedAgain) {
+TEST(MayTouch, ARefusal_LetsBodiesPassUntilTheNextCall) {
   test::Context c;
   const test::Stack s = test::make_stack(c);
   Asked asked;
@@ -190,7 +190,7 @@ TEST(PreSolve, SeesEveryContactWithItsSides) {
   EXPECT_EQ(choice.all.size(), before);
 }
 
-TEST(PreSolve, AnswersThatChangeNothing_LeaveTheBits) {
+TEST(PreSolve, ResultsThatChangeNothing_KeepTheBits) {
   uint64_t hash[2];
   for (const bool with : {false, true}) {
     OnFloor s("lugre");
@@ -321,7 +321,7 @@ TEST(PreSolve, LawByNumber_IsTheContactsLaw) {
   for (const dfm_contact &k : test::contacts(s.w)) EXPECT_EQ(k.law, none);
 }
 
-TEST(PreSolve, OnSeveralThreads_IsAskedInTheSameOrderWithTheSameBits) {
+TEST(PreSolve, OnSeveralThreads_IsCalledInTheSameOrderWithTheSameBits) {
   std::vector<double> seen[2];
   uint64_t hash[2];
   for (const uint32_t threads : {1u, 4u}) {

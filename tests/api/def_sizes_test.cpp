@@ -116,7 +116,7 @@ TEST(DefSizes, DefOfAnOlderHeader_HasTheDefaultsOfWhatItLacks) {
 
 // A def that its default function has not made says so in every call that takes one. One of a header before
 // there were cookies is taken as it is.
-TEST(DefSizes, DefThatNobodyFilledWithDefaults_IsRefused) {
+TEST(DefSizes, DefWithoutDefaults_IsRefused) {
   test::Context c;
   const dfm_world made = test::make_world(c);
   uint64_t out = 0;
@@ -159,7 +159,7 @@ TEST(DefSizes, DefThatNobodyFilledWithDefaults_IsRefused) {
   EXPECT_EQ(dfm_material_create(made, older.get(), &out), DFM_OK) << dfm_last_error();
 }
 
-TEST(DefSizes, FlagsThatNobodyKnows_AreRefused) {
+TEST(DefSizes, UnknownFlags_AreRefused) {
   test::Context c;
   const dfm_world made = test::make_world(c);
   uint64_t out = 0;
@@ -185,7 +185,7 @@ TEST(DefSizes, FlagsThatNobodyKnows_AreRefused) {
 }
 
 // What a newer program asks for and this library does not know is not passed over in silence.
-TEST(DefSizes, WishOfANewerHeader_IsRefused) {
+TEST(DefSizes, UnknownMemberOfANewerHeader_IsRefused) {
   test::Context c;
   const dfm_world_def whole = dfm_world_def_default();
   Aged<dfm_world_def> newer(whole, sizeof whole + 16);

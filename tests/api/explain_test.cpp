@@ -328,7 +328,7 @@ TEST(Explain, SwitchesOfAnEffect_SwitchItOff) {
   }
 }
 
-TEST(Explain, Costs_AreMeasuredWhereAskedFor) {
+TEST(Explain, Costs_AreMeasuredOnRequest) {
   const std::string path =
       one_model("costs", R"({"type": "msm", "params": {"damping_stiffness": 1e-4, "volume": 0}})",
                 R"(, "effects": ["damping"])");

@@ -97,7 +97,7 @@ void make_sparse(const std::string &path, uint64_t bytes) {
 }  // namespace
 
 TEST(FileAccess, Devices_AreRefusedByEveryReader) { try_all("/dev/zero", "is a device"); }
-TEST(FileAccess, PipesThatNobodyWrites_AreRefusedByEveryReader) { try_all(folder() + "/pipe", "is a pipe"); }
+TEST(FileAccess, PipesWithoutAWriter_AreRefusedByEveryReader) { try_all(folder() + "/pipe", "is a pipe"); }
 TEST(FileAccess, Directories_AreRefusedByEveryReader) { try_all(folder(), "is a directory"); }
 TEST(FileAccess, MissingFiles_AreRefusedByEveryReader) { try_all(folder() + "/absent.obj", "No such file"); }
 

@@ -269,7 +269,7 @@ TEST(FilterRules, ThatAreRemoved_LetTheMasksDecideAgain) {
   EXPECT_TRUE(test::contacts(s.w).empty());
 }
 
-TEST(FrictionRules, AfterARestore_GoOnAsWithoutIt) {
+TEST(FrictionRules, AfterARestore_ContinueAsWithoutIt) {
   const auto run = [](bool restored) {
     Scene s;
     EXPECT_EQ(s.add("*", "*", 0.5, "test.bristle"), DFM_OK);

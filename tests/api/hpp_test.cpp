@@ -326,7 +326,7 @@ TEST(Hpp, Tools_PressAndFeel) {
   EXPECT_TRUE(s.world.tools().empty());
 }
 
-TEST(Hpp, SceneAndLaw_AnswerAsInC) {
+TEST(Hpp, SceneAndLaw_ReturnTheSameAsInC) {
   const auto context = deform::Context::make(quiet());
   const std::string path = DEFORM_SOURCE_DIR "/examples/scenes/slope_block.json";
   const auto scene = context.open_scene(path);

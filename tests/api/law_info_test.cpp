@@ -110,7 +110,7 @@ TEST(LawInfo, ParamsGivenBack_MakeTheSameRule) {
   }
 }
 
-TEST(LawInfo, AfterTheRuleWasSetAnew_HasTheNewValue) {
+TEST(LawInfo, AfterTheRuleWasReplaced_HasTheNewValue) {
   test::Context c;
   const test::Stack s = test::make_stack(c, 0);
   for (const double mu : {0.2, 0.7}) {

@@ -60,7 +60,7 @@ TEST(LawMixture, ContactsWithoutMemory_KeepNone) {
   EXPECT_GT(bristled, 100);
 }
 
-TEST(LawMixture, SavedAndRestored_GoesOnWithTheSameBits) {
+TEST(LawMixture, SavedAndRestored_ContinuesWithTheSameBits) {
   for (const int until : {60, 150, 300}) {
     Mixture a, b;
     a.run(until);

@@ -289,7 +289,7 @@ TEST(MeshApi, Read_ReportsWarningsAndLendsArrays) {
   EXPECT_EQ(dfm_tetmesh_destroy(mesh), DFM_E_HANDLE);
 }
 
-TEST(MeshApi, OlderInfoStruct_IsFilledAsFarAsItGoes) {
+TEST(MeshApi, OlderInfoStruct_IsFilledUpToItsSize) {
   test::LoggedContext c;
   dfm_tetmesh mesh = 0;
   const double size[3] = {0.1, 0, 0};

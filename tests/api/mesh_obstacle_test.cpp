@@ -132,7 +132,7 @@ TEST(MeshObstacle, Ray_MeetsItWhereItIs) {
   }
 }
 
-TEST(MeshObstacle, SnapshotInMidContact_GoesOnWithTheSameBits) {
+TEST(MeshObstacle, SnapshotInMidContact_ContinuesWithTheSameBits) {
   Mixed a(1, hills()), b(1, hills());
   test::run(a.world, 0.15, 5e-4);
   ASSERT_GT(test::contacts(a.world).size(), 3u);

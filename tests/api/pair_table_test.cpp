@@ -176,7 +176,7 @@ TEST(PairTable, WrongGroups_AreRefused) {
   EXPECT_EQ(create({size, 1, &name, 1, 0, face, &group}), DFM_OK) << dfm_last_error();
 }
 
-TEST(PairTable, SnapshotInMidContact_GoesOnWithTheSameBits) {
+TEST(PairTable, SnapshotInMidContact_ContinuesWithTheSameBits) {
   const auto rules = [](Table &t) {
     test::ok(test::friction(t.world, "block:left", "*", 0.1));
     test::ok(test::friction(t.world, "block:right", "*", 0.3));

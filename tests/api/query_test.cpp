@@ -420,7 +420,7 @@ TEST(Query, OnSeveralThreads_GivesTheBitsOfOneAndTakesNoMemory) {
   EXPECT_EQ(test::heap_calls - heap, 0u);
 }
 
-TEST(Query, AnEmptyWorld_AnswersNothing) {
+TEST(Query, AnEmptyWorld_ReturnsNothing) {
   test::Context c;
   const dfm_world w = test::make_world(c);
   EXPECT_EQ(overlaps(w, sphere({0, 0, 0}, 1e9)), Things{});

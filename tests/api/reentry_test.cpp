@@ -413,7 +413,7 @@ TEST_F(Reentry, FromHooksOfCreation_IsBusy) {
       all, {});
 }
 
-TEST_F(Reentry, FromTheHostsAnswers_IsBusy) {
+TEST_F(Reentry, FromTheHostsFunctions_IsBusy) {
   double x = 0;
   walk([&] { return dfm_rigid_joint(s.rigid, 0, &x, &x, &x); }, both(s, false), {"host joint"});
   walk([&] { return dfm_rigid_set_motor(s.rigid, 0, 1, 1); }, both(s), {"host set_motor"});

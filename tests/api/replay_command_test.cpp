@@ -40,7 +40,7 @@ struct Folder {
 
 }  // namespace
 
-TEST(Replay, RunThatGoesOnFromASavedState_EndsWithTheBitsOfOneThatNeverStopped) {
+TEST(Replay, RunContinuedFromASavedState_EndsWithTheBitsOfOneThatNeverStopped) {
   const Folder f;
   // before the contact, in it, and after the change of model
   for (const char *at : {"0.01", "0.05", "0.1"}) {
@@ -127,7 +127,7 @@ TEST(Replay, StateOfALaterVersion_IsRefused) {
   EXPECT_NE(r.err.find("state format 2"), std::string::npos) << r.err;
 }
 
-TEST(SaveScene, RunGoesOnFromIt_WithTheSameBitsProbesAndOutputs) {
+TEST(SaveScene, RunContinuesFromIt_WithTheSameBitsProbesAndOutputs) {
   const Folder f;
   const std::string made = f.path + "/with a space/later.json";
   fs::create_directories(f.path + "/with a space");

@@ -88,7 +88,7 @@ dfm_world falling_on_ball(dfm_context *c, dfm_body *ball, dfm_rigid *plate) {
 
 }  // namespace
 
-TEST(RigidHost, SomebodyElses_TakesPartInTheSolve) {
+TEST(RigidHost, OfAnotherEngine_TakesPartInTheSolve) {
   static Lift counts;  // the table stays registered for the life of the process
   counts = {};
   const dfm_rigid_host table = lift_table(&counts);

@@ -124,7 +124,7 @@ TEST(RollbackWorld, UnknownMethod_IsRefused) {
   }
 }
 
-TEST(RollbackWorld, Plan_HasItsStagesOnlyWhereAskedFor) {
+TEST(RollbackWorld, Plan_HasItsStagesOnlyOnRequest) {
   const Thrown rolls, solves(DFM_METHOD_VELOCITY);
   const std::string with = test::explain(rolls.world), without = test::explain(solves.world);
   EXPECT_NE(with.find("{\"name\":\"rollback\",\"why\":\"contact.method rollback"), std::string::npos) << with;
@@ -137,7 +137,7 @@ TEST(RollbackWorld, Plan_HasItsStagesOnlyWhereAskedFor) {
 }
 
 // In mid-contact, with friction of the last sub-step on its way into the next one.
-TEST(RollbackWorld, Snapshot_GoesOnWithTheSameBits) {
+TEST(RollbackWorld, Snapshot_ContinuesWithTheSameBits) {
   Thrown a, b;
   test::run(a.world, 0.03, 1e-3);
   ASSERT_GT(test::stats(a.world).contacts, 3u);

@@ -332,7 +332,7 @@ TEST(SceneApi, OptionsAndSettingsOfAnOlderHeader_AreTaken) {
   EXPECT_EQ(settings.size, offsetof(dfm_scene_settings, every));
 }
 
-TEST(SceneApi, OpenScene_AnswersUntilItIsClosed) {
+TEST(SceneApi, OpenScene_IsValidUntilItIsClosed) {
   test::Context context;
   const char *set[] = {"/time/duration=0.5", "/output/color=speed"};
   dfm_scene_options options = {sizeof options, 2, set, 0};

@@ -276,7 +276,7 @@ TEST(Separate, LoadsHoldsAndAttachments_GoWithTheirPoints) {
   steps(s.w, 20);
 }
 
-TEST(Separate, Crumbs_StayOrGoAsAsked) {
+TEST(Separate, Crumbs_StayOrGoAsRequested) {
   for (const uint32_t what : {uint32_t{DFM_CRUMBS_STAY}, uint32_t{DFM_CRUMBS_REMOVE}}) {
     Cube s("corotational_fem");
     dfm_separate_def d = dfm_separate_def_default();

@@ -196,7 +196,7 @@ TEST(SetModel, AboveMaxJump_IsRefusedAndChangesNothing) {
 
 // Bodies that the library moves explicitly do not keep a body which has become stiff at their side:
 // integrators that were left to it are chosen anew.
-TEST(SetModel, ToAStifferBody_ChoosesIntegratorsAnew) {
+TEST(SetModel, ToAStifferBody_ChoosesIntegratorsAgain) {
   test::Context context;
   dfm_world_def d = dfm_world_def_default();
   d.step = 1.0 / 60;
@@ -326,7 +326,7 @@ TEST(SetModel, InMidContact_HoldsOnWithTheSameBristles) {
 }
 
 // The same model anew is no change at all: contacts, bristles and warm starts go on to the bit.
-TEST(SetModel, ToTheSameModelInMidContact_GoesOnToTheBit) {
+TEST(SetModel, ToTheSameModelInMidContact_ContinuesToTheBit) {
   Slope s, plain;
   for (int k = 0; k < 5; ++k) {
     test::run(s.world, 0.1, 1e-3);
@@ -410,7 +410,7 @@ TEST(SetModel, FieldsByCell_StayWithTheMesh) {
   test::ok(dfm_tetmesh_destroy(mesh));
 }
 
-TEST(SetModel, EffectThatTheSceneAsksFor_IsNotLostSilently) {
+TEST(SetModel, EffectThatTheSceneRequests_IsNotLostSilently) {
   test::Context c;
   const char *const effects[] = {"deform.plasticity", nullptr};
   dfm_world_def def = dfm_world_def_default();
@@ -681,7 +681,7 @@ TEST(SwitchRule, IntegratorOfOneModel_GoesWithIt) {
 }
 
 // It swings across the line in less than the wait, or less far than the hysteresis: one change.
-TEST(SwitchRule, OnTheLine_DoesNotChangeToAndFro) {
+TEST(SwitchRule, OnTheLine_DoesNotChangeBackAndForth) {
   for (const bool by_time : {false, true}) {
     Ball b(0.5, {0, 0, 0}, 0);
     b.rule.near_by.type = "corotational_fem";

@@ -118,7 +118,7 @@ TEST(Sleep, UnderARigidBody_DoesNotCome_AndARigidBodyThatArrivesWakes) {
   EXPECT_NEAR(test::state(rigid[1]).position[2], 0.11, 0.003) << "it lies on the block";
 }
 
-TEST(Sleep, OfOneBlock_BooksItsEnergyAndMomentumToRounding) {
+TEST(Sleep, OfOneBlock_ReportsItsEnergyAndMomentumToRounding) {
   dfm_world world[2];
   dfm_body body[2];
   const test::Context c;
@@ -454,7 +454,7 @@ TEST(Wake, AfterASnapshotOfSleepers_GivesTheSameBits) {
   EXPECT_EQ(go_on(other), here);
 }
 
-TEST(Sleep, Plan_ListsTheStageOnlyWhereItIsAskedFor) {
+TEST(Sleep, Plan_ListsTheStageOnlyOnRequest) {
   for (const bool on : {false, true}) {
     const Rest s(on);
     size_t bytes = 0;

@@ -150,7 +150,7 @@ TEST(Snapshot, OfAWorldChangedWhileRunning_HoldsTheChanges) {
   EXPECT_TRUE(changed_model) << "young of msm is a runtime parameter: " << dfm_last_error();
 }
 
-TEST(Snapshot, OfAHoldMeasure_GoesOnMeasuring) {
+TEST(Snapshot, OfAHoldMeasure_ContinuesMeasuring) {
   test::Context c;
   const test::Stack s = test::make_stack(c), fresh = test::make_stack(c);
   steps(s.world, 600);

@@ -233,7 +233,7 @@ TEST(ModelOfABody, WhatItLogs_NamesTheBody) {
 
 // A ball that nothing damps rolls in a model of small rotations, which makes it swell, and touches with one
 // that sees that as strain: each bounce would put in more than the last one.
-TEST(SwitchRule, ToAndFro_PumpsNoEnergyIntoAnUndampedBall) {
+TEST(SwitchRule, BackAndForth_PumpsNoEnergyIntoAnUndampedBall) {
   for (const double spin : {0.0, 5.0}) {
     test::LoggedContext logged;
     const dfm_world w = test::make_world(logged.context);
@@ -274,7 +274,7 @@ TEST(SwitchRule, ToAndFro_PumpsNoEnergyIntoAnUndampedBall) {
 }
 
 // What a body has lost since pays for what changes have put in: under its weight it may change for ever.
-TEST(SetModel, ToAndFroOfADampedBody_GoesOn) {
+TEST(SetModel, BackAndForthOfADampedBody_Continues) {
   for (const int32_t integrator : {DFM_INTEGRATOR_SYMPLECTIC_EULER, DFM_INTEGRATOR_IMPLICIT_EULER}) {
     test::Context c;
     const dfm_world w = test::make_world(c, {0, 0, -9.81}, integrator);

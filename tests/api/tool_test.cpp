@@ -115,7 +115,7 @@ TEST(Tool, ForceTimesTheStep_IsTheMomentumThatTheBodyGot) {
 }
 
 // As far as a static solve knows: what a tool feels that has come to rest is what holds the body.
-TEST(Tool, AtRest_FeelsTheWeightThatItCarries) {
+TEST(Tool, AtRest_ReportsTheWeightThatItCarries) {
   test::Context context;
   const dfm_world w = test::make_world(context);
   test::BodyOptions o;
@@ -244,7 +244,7 @@ TEST(Tool, GivenBackToItsKeys_FollowsThemAgain) {
 }
 
 // Tools and forces go on from a snapshot to the same bits, coupled and not, also in the middle of a motion.
-TEST(Tool, FromASnapshot_GoesOnToTheSameBits) {
+TEST(Tool, FromASnapshot_ContinuesToTheSameBits) {
   Scene s;
   dfm_tool_def d = tool_def("a", DFM_TOOL_SPHERE, {-0.0255, 0, 0});
   d.stiffness = 300;

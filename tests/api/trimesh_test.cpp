@@ -105,7 +105,7 @@ TEST(TrimeshApi, ReadCells_GivesTheirBoundary) {
   EXPECT_NEAR(info_of(skin).volume, info.volume, 1e-15);
 }
 
-TEST(TrimeshApi, OlderInfoStruct_IsFilledAsFarAsItGoes) {
+TEST(TrimeshApi, OlderInfoStruct_IsFilledUpToItsSize) {
   test::LoggedContext c;
   dfm_trimesh mesh = 0;
   ASSERT_EQ(dfm_trimesh_create(c.context, 13, kPoints, 4, kTriangles, &mesh), DFM_OK);

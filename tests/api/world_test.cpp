@@ -439,7 +439,7 @@ TEST(UserData, OfABody_IsKeptAndChanged) {
 
 // ---- coming and going while the world runs ----------------------------------------------------------------
 
-TEST(Running, ABodyRemovedInContact_EndsItsContactsAndTheOthersGoOn) {
+TEST(Running, ABodyRemovedInContact_EndsItsContactsAndTheOthersContinue) {
   test::Context c;
   const test::Stack s = test::make_stack(c);
   steps(s.world, 300);
@@ -528,7 +528,7 @@ TEST(Running, FiltersChangedInContact_LetGoAndCatchAgain) {
 
 // ---- steps that cannot be taken ---------------------------------------------------------------------------
 
-TEST(Step, WithALoadThatOverflows_DivergesAtTheLastGoodSubStepAndGoesOnWithoutIt) {
+TEST(Step, WithALoadThatOverflows_DivergesAtTheLastGoodSubStepAndContinuesWithoutIt) {
   test::Context c;
   const test::Stack s = test::make_stack(c);
   steps(s.world, 40);

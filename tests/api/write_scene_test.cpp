@@ -181,7 +181,7 @@ struct Made {
 
 }  // namespace
 
-TEST(WriteScene, WorldOfAProgram_GoesOnWithTheSameBits) {
+TEST(WriteScene, WorldOfAProgram_ContinuesWithTheSameBits) {
   Made made;
   steps(made.world, 50, 1e-4);
   const std::string path = folder_of("program") + "/program.json";

@@ -260,7 +260,7 @@ TEST(Ages, ShorterAndLongerModels_MoveLikeThatOfThisHeader) {
   EXPECT_NE(text.find("\"second\""), std::string::npos) << text << ": rows of facts that are longer";
 }
 
-TEST(Ages, StepperThatEndsWithCommit_AnswersOneByOne) {
+TEST(Ages, StepperThatEndsWithCommit_RespondsOneByOne) {
   World w("stepper");
   test::add_plane(w.world, "floor", {0, 0, -0.01});
   test::set_friction(w.world, 0.5);

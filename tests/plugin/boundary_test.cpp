@@ -74,7 +74,7 @@ TEST(Boundary, SettingsOfTheHost_StayItsOwn) {
   std::fesetround(FE_TONEAREST);
 }
 
-TEST(Boundary, RunningPlugin_CanBeAskedFor) {
+TEST(Boundary, RunningPlugin_CanBeQueried) {
   std::string seen;
   dfm_context_def def = dfm_context_def_default();
   def.user = &seen;

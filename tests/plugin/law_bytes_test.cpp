@@ -7,7 +7,7 @@
 
 namespace {
 
-TEST(LawBytes, AnyParametersAndMotions_GiveFiniteBoundedPassiveAnswers) {
+TEST(LawBytes, AnyParametersAndMotions_GiveFiniteBoundedPassiveResults) {
   const test::Context c;
   std::mt19937 random(3);
   for (uint32_t law = 0; law < std::size(law_bytes::kLaws); ++law)

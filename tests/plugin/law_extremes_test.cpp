@@ -53,7 +53,7 @@ class LawExtremes : public testing::TestWithParam<const char *> {};
 
 }  // namespace
 
-TEST_P(LawExtremes, InputsOfEveryScale_AnswersAreFiniteAndWithinTheirLimit) {
+TEST_P(LawExtremes, InputsOfEveryScale_ResultsAreFiniteAndWithinTheirLimit) {
   const Shelf narrow(GetParam(), "sse2"), wide(GetParam(), "avx512");
   Draw draw;
   for (uint32_t round = 0; round < kBatches; ++round) {

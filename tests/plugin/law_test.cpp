@@ -32,7 +32,7 @@ TEST_F(Law, OpenByPath_LoadsTheFile) {
   EXPECT_TRUE(says("law handle")) << dfm_last_error();
 }
 
-TEST_F(Law, OpenByPathOfSeveral_AsksForAnId) {
+TEST_F(Law, OpenByPathOfSeveral_RequiresAnId) {
   dfm_law law = 0;
   EXPECT_EQ(dfm_law_open(c.c, tiny::plugin("tiny_throw").c_str(), &law), DFM_E_ARG);
   EXPECT_TRUE(says("org.tiny.fails, org.tiny.guarded")) << dfm_last_error();
@@ -53,7 +53,7 @@ TEST(LawHandles, DestroyedContext_LeavesStaleHandles) {
   EXPECT_EQ(dfm_law_type(law, &type), DFM_E_HANDLE);
 }
 
-TEST_F(Law, ThrowingLaw_FailsAndTheHostGoesOn) {
+TEST_F(Law, ThrowingLaw_FailsAndTheHostContinues) {
   const dfm_law bare = law("tiny_throw", "throws");
   Batch b(4);
   EXPECT_EQ(dfm_law_eval(bare, &b.in, &b.out), DFM_E_FATAL);

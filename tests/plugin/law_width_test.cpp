@@ -42,32 +42,32 @@ TEST(LawWidth, Environment_ChoosesTheWidth) {
   }
 }
 
-TEST(LawWidth, Coulomb_HasOneAnswer) {
+TEST(LawWidth, Coulomb_GivesOneResult) {
   for (const double delta : {2.0, 1.0, 0.7}) all_widths("friction_coulomb", {0.3, 0.5, 0.01, delta, 0.4});
 }
 
-TEST(LawWidth, Karnopp_HasOneAnswer) {
+TEST(LawWidth, Karnopp_GivesOneResult) {
   for (const double delta : {2.0, 0.7}) all_widths("friction_karnopp", {0.3, 0.5, 0.01, delta, 0.4, 1e-3});
 }
 
-TEST(LawWidth, Dahl_HasOneAnswer) {
+TEST(LawWidth, Dahl_GivesOneResult) {
   for (const double alpha : {1.0, 2.5}) all_widths("friction_dahl", {0.15, 1e4, alpha});
 }
 
-TEST(LawWidth, Lugre_HasOneAnswer) {
+TEST(LawWidth, Lugre_GivesOneResult) {
   for (const double form : {0.0, 1.0, 2.0})
     for (const double delta : {2.0, 0.7})
       all_widths("friction_lugre", {0.15, 0.20, 0.01, delta, 1e4, 20, form, 0.01, 0.4});
 }
 
-TEST(LawWidth, Elastoplastic_HasOneAnswer) {
+TEST(LawWidth, Elastoplastic_GivesOneResult) {
   for (const double i : {1.0, 3.0})
     for (const double multiplier : {0.0, 1.0})
       all_widths("friction_elastoplastic",
                  {0.15, 0.20, 0.01, 1.3, 1e4, 20, 0, 0.01, 0.4, 0.7, i, multiplier});
 }
 
-TEST(LawWidth, Gms_HasOneAnswerWithAnyNumberOfElements) {
+TEST(LawWidth, Gms_GivesOneResultWithAnyNumberOfElements) {
   for (const double delta : {2.0, 0.7})
     for (const size_t n : {1, 2, 4, 7, 16}) all_widths("friction_gms", elements(n, delta));
 }

@@ -333,7 +333,7 @@ TEST(Meshless, StepBound_IsBelowTheTrueOneAndNotFarBelow) {
     }
 }
 
-TEST(Meshless, SpoiledShapes_HaveFiniteForces) {
+TEST(Meshless, DegenerateShapes_HaveFiniteForces) {
   for (const Strain strain : {kCorotational, kGreen})
     for (int how = 0; how < 4; ++how) {
       Given g;

@@ -80,7 +80,7 @@ TEST(MeshlessWorld, SnapshotInContact_ContinuesWithTheSameBits) {
 }
 
 // Points of the lattice that fills a surface, which hangs on them.
-TEST(MeshlessWorld, DemoScenes_AreSound) {
+TEST(MeshlessWorld, DemoScenes_MeetTheirCriteria) {
   test::expect_sound_demo("slope_block", "meshless", 0.4, 0);
   for (const char *scene : {"ball_incline", "two_materials", "fill_drop"})
     test::expect_sound_demo(scene, "meshless", 0.01, 0);

@@ -227,7 +227,7 @@ TEST(Modal, Commit_IsPredictAndRespond) {
 }
 
 // What impulses give to a free body is theirs.
-TEST(Modal, ImpulsesAtSurfels_AreBookedAsMomentum) {
+TEST(Modal, ImpulsesAtSurfels_AreCountedAsMomentum) {
   const Mesh m = kuhn_bar(4, 2, 2, 0.05);
   Host host;
   Stepper b(host, modal(), m);

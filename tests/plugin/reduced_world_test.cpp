@@ -79,7 +79,7 @@ TEST_P(ReducedWorld, UnderASoftBall_CarriesBothWeights) {
   test::expect_block_carries_ball(w.context, w.world, w.body, 1.5);
 }
 
-TEST_P(ReducedWorld, SavedInContact_GoesOnWithTheSameBits) {
+TEST_P(ReducedWorld, SavedInContact_ContinuesWithTheSameBits) {
   World a(GetParam(), "lugre", 0.5, {1, 0, -9.81}, 0.005), b(GetParam(), "lugre", 0.5, {1, 0, -9.81}, 0.005);
   test::run(a.world, 0.1, 1e-3);
   ASSERT_GT(normal_force(a.world), 0);

@@ -139,7 +139,7 @@ TEST(ShapeMatching, FreeStep_KeepsBothMomenta) {
   }
 }
 
-TEST(ShapeMatching, AnswerToImpulses_IsSymmetricAndNotNegative) {
+TEST(ShapeMatching, ResponseToImpulses_IsSymmetricAndNotNegative) {
   const Mesh mesh = kuhn_bar(2, 2, 1, 0.1, 0.2);
   std::vector<uint8_t> fixed(mesh.npoint(), 0);
   fixed[0] = 7;
@@ -159,7 +159,7 @@ TEST(ShapeMatching, AnswerToImpulses_IsSymmetricAndNotNegative) {
       }
 }
 
-TEST(ShapeMatching, AnswerOfSomeSurfels_IsThatOfAll) {
+TEST(ShapeMatching, ResponseOfSomeSurfels_IsThatOfAll) {
   Host host;
   Stepper b(host, shape(), kuhn_bar(2, 2, 1, 0.1, 0.2), values({{"clusters", 3}}), {}, true);
   b.shake(0.02, 1);
@@ -360,7 +360,7 @@ void spoil(Stepper &b, Start how, unsigned seed) {
   }
 }
 
-TEST(ShapeMatching, BodySpoiledInAnyWay_ComesBack) {
+TEST(ShapeMatching, BodyDeformedInAnyWay_Recovers) {
   const Mesh mesh = kuhn_bar(4, 2, 2, 0.1, 0.2);
   for (const Values &kind : all_kinds())
     for (Start how : {Start::scrambled, Start::plane, Start::line, Start::point, Start::inverted})
@@ -475,7 +475,7 @@ TEST(ShapeMatching, HeldEnd_CarriesTheBody) {
   EXPECT_NEAR(sag[0] / sag[1], 1, 1e-3);
 }
 
-TEST(ShapeMatching, AnswerWithoutAPrediction_IsRefusedInOneSentence) {
+TEST(ShapeMatching, ResponseWithoutAPrediction_IsRefusedInOneSentence) {
   Host host;
   Stepper b(host, shape(), regular_tet(), values());
   const dfm_kin k = b.kin(1e-3);

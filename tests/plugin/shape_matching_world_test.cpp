@@ -143,7 +143,7 @@ TEST(ShapeMatchingWorld, HoldOfALivingBody_IsRefusedInOneSentence) {
 }
 
 // A slope that tilts, a ball rolling down, two tubes, with the model alone named.
-TEST(ShapeMatchingWorld, DemoScenes_AreSound) {
+TEST(ShapeMatchingWorld, DemoScenes_MeetTheirCriteria) {
   for (const char *scene : {"slope_block", "ball_incline", "two_cylinders", "two_materials"})
     test::expect_sound_demo(scene, "shape_matching", 0.5, 2e-3);
   test::expect_sound_demo("fill_drop", "shape_matching", 0.1,

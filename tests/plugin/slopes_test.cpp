@@ -66,7 +66,7 @@ Slide slide(bool derivatives) {
 
 }  // namespace
 
-TEST(Slopes, LawWithoutDerivatives_IsAskedHardlyMoreThanTwiceAsOften) {
+TEST(Slopes, LawWithoutDerivatives_IsEvaluatedHardlyMoreThanTwiceAsOften) {
   const Slide with = slide(true), without = slide(false);
   EXPECT_GT(with.lanes, 1000u);
   EXPECT_LT(static_cast<double>(without.lanes), 2.5 * static_cast<double>(with.lanes))

@@ -154,7 +154,7 @@ TEST(Stepper, DroppedOnAFloor_RestsAtTheOffsetAndCarriesItsWeight) {
 }
 
 // All right-hand sides of a sub-step are asked in one call, with the same bits as one by one.
-TEST(Stepper, ThatRespondsToMany_IsAskedOncePerSolve) {
+TEST(Stepper, ThatRespondsToMany_IsCalledOncePerSolve) {
   uint64_t hash[2];
   for (const bool many : {false, true}) {
     offers_many = many;

@@ -40,7 +40,7 @@ bool is_explicit(dfm_world w) {
 
 }  // namespace
 
-TEST(Counting, SheetThatLands_GoesOnExplicitly) {
+TEST(Counting, SheetThatLands_ContinuesExplicitly) {
   const test::Context context;
   const dfm_world w = sheet(context);
   to(w, 0.002);
@@ -57,7 +57,7 @@ TEST(Counting, NamedIntegrator_Stays) {
   EXPECT_FALSE(is_explicit(w));
 }
 
-TEST(Counting, RestoredBeforeAndAfterTheChange_GoesOnWithTheSameBits) {
+TEST(Counting, RestoredBeforeAndAfterTheChange_ContinuesWithTheSameBits) {
   const test::Context one, many(3);
   const dfm_world first = sheet(one), second = sheet(many);
   to(first, 0.002);
@@ -77,7 +77,7 @@ TEST(Counting, RestoredBeforeAndAfterTheChange_GoesOnWithTheSameBits) {
 }
 
 // What lies still costs implicit steps little: the body finds back to them.
-TEST(Counting, SheetThatLies_IsImplicitAgain) {
+TEST(Counting, SheetAtRest_IsImplicitAgain) {
   const test::Context context;
   const dfm_world w = sheet(context);
   to(w, 0.03);

@@ -314,7 +314,7 @@ TEST(EnergyPair, LawThatDrives_IsStoppedAndNamed) {
     }
 }
 
-TEST(EnergyPair, LawThatIsRepairedAfterAStop_GoesOn) {
+TEST(EnergyPair, LawThatIsRepairedAfterAStop_Continues) {
   Sliding b(kDrives);
   ASSERT_EQ(b.run(2000), DFM_E_DIVERGED);
   ASSERT_EQ(b.run(1), DFM_E_DIVERGED) << "nothing has changed";
@@ -334,7 +334,7 @@ TEST(EnergyPair, Snapshot_HasTheSums) {
   EXPECT_EQ(dfm_world_time(b.world), end);
 }
 
-TEST(EnergyPair, ModelWhoseAnswerToImpulsesIsWrong_IsStoppedAndNamed) {
+TEST(EnergyPair, ModelWithAWrongResponse_IsStoppedAndNamed) {
   for (const int way : {kTwice, kBackwards}) {
     SCOPED_TRACE(kModelNames[way]);
     Falling b(kStepsModel, way);
@@ -356,7 +356,7 @@ TEST(EnergyPair, ModelWhoseForcesAreWrong_IsStoppedAndNamed) {
   }
 }
 
-TEST(EnergyPair, LawsAndModelsThatAreRight_GoOn) {
+TEST(EnergyPair, LawsAndModelsThatAreRight_Continue) {
   for (const int32_t integrator : kIntegrators) {
     Sliding b(kRight, integrator);
     EXPECT_EQ(b.run(1000), DFM_OK) << dfm_last_error();

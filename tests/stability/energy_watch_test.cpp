@@ -158,7 +158,7 @@ TEST(EnergyWatch, HostThatChangesEveryStep_CostsFewLooks) {
 }
 
 // The pressed points move in every sub-step until contact stops them; that is no new motion.
-TEST(EnergyWatch, BodyThatIsPressedAndStands_CostsFewLooks) {
+TEST(EnergyWatch, BodyThatIsPressedAndAtRest_NeedsFewChecks) {
   test::Context context;
   test::ok(dfm_plugin_register_static(context, dfm_plugin_entry_counting_looks, "counting_looks"));
   const dfm_world w = test::make_world(context, {0, 0, 0});

@@ -109,7 +109,7 @@ TEST(SceneTable, EveryContactScene_IsRunTenTimesWithJitter) {
 class ContactScene : public testing::TestWithParam<Row> {};
 
 // The same short run with and without contact: the first is sound, the second must not be.
-TEST_P(ContactScene, WithoutContact_IsNotSound) {
+TEST_P(ContactScene, WithoutContact_MissesItsCriteria) {
   const Row &row = GetParam();
   if (row.needs_shared && test::shared_dir().empty()) GTEST_SKIP() << "../shared is absent";
   if (row.needs_ode && !test::kHasOde) GTEST_SKIP() << "built without libdeform_ode";

@@ -73,7 +73,7 @@ TEST(SelfAuto, LegsThatMeetAndPart_AreOnWhileTheyAreNear) {
   EXPECT_EQ(test::stats(w).self_max, 1u);
 }
 
-TEST(SelfAuto, RestoredInTheMiddle_GoesOnWithTheSameBits) {
+TEST(SelfAuto, RestoredInTheMiddle_ContinuesWithTheSameBits) {
   auto first = thrown_at_plane("ball", {0.05, 0, 0}, 50, DFM_SELF_AUTO);
   auto second = thrown_at_plane("ball", {0.05, 0, 0}, 50, DFM_SELF_AUTO, 3);
   step(first->world, 2, 1e-3);

@@ -116,7 +116,7 @@ TEST(BulletLifecycle, BodyMovedByHand_IsThereAtOnce) {
 }
 
 // A table that a motion state tells where to be, over ticks of one call, carries a soft ball up with it.
-TEST(BulletLifecycle, KinematicBody_LiftsAndFeelsNothing) {
+TEST(BulletLifecycle, KinematicBody_LiftsAndGetsNoForce) {
   Bullet b;
   set_friction(b.soft, 0.8);
   Told told(at({0, 0, -0.1}));

@@ -127,7 +127,7 @@ TEST(OdeLifecycle, GeomsThatComeAndChange_AreSeenInTheNextStep) {
   EXPECT_LT(height(ball), 0.1);
 }
 
-TEST(OdeLifecycle, KinematicBody_LiftsAndFeelsNothing) {
+TEST(OdeLifecycle, KinematicBody_LiftsAndGetsNoForce) {
   Ode ode;
   const dBodyID lift = ode.box({0.2, 0.2, 0.05}, 1, {0, 0, -0.05});
   dBodySetKinematic(lift);
@@ -175,7 +175,7 @@ TEST(OdeLifecycle, BodyMovedByHand_IsThereAtOnce) {
   EXPECT_LT(height(s.ball), 0.12);
 }
 
-TEST(OdeLifecycle, DisabledBody_StandsUntilSomethingMeetsIt) {
+TEST(OdeLifecycle, DisabledBody_StaysUntilSomethingTouchesIt) {
   Ode ode;
   const dBodyID box = ode.box({0.1, 0.1, 0.1}, 1, {0, 0, 0});
   dBodyDisable(box);

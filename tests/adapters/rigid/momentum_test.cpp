@@ -37,7 +37,7 @@ TEST(Momentum, CollisionWithATumblingBox_KeepsBothMomenta) {
 
 // What the engine and the contact solve book is one impulse, not a force that comes a step later: the
 // momentum that the soft ball loses within one step has arrived in the rigid one at the end of that step.
-TEST(Momentum, EachStepOfAnImpact_BooksTheSameImpulseOnBothSides) {
+TEST(Momentum, EachStepOfAnImpact_ReportsTheSameImpulseOnBothSides) {
   Engine engine({0, 0, 0});
   const dfm_body ball = soft_ball(engine, {0, 0, 0.3}, {0, 0, -3});
   const auto target = engine.ball(0.1, 1, {0.02, 0, 0.09});
@@ -53,7 +53,7 @@ TEST(Momentum, EachStepOfAnImpact_BooksTheSameImpulseOnBothSides) {
   EXPECT_LT(most, 1e-14);
 }
 
-TEST(Momentum, BodyOfThreeShapes_AnswersAsOne) {
+TEST(Momentum, BodyOfThreeShapes_RespondsAsOne) {
   Engine engine({0, 0, 0});
   set_friction(engine.soft, 0.5);
   const dfm_body ball = soft_ball(engine, {0.1, 0, 0.3}, {0, 0.2, -2});

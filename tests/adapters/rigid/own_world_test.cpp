@@ -300,7 +300,7 @@ struct Heap {
 
 }  // namespace
 
-TEST(OwnWorldSnapshot, HeapThatFalls_GoesOnBitByBit) {
+TEST(OwnWorldSnapshot, HeapThatFalls_ContinuesBitByBit) {
   Heap m, fresh;
   run(m.world, 0.3, 2e-3);
   const std::string shot = snapshot(m.world);

@@ -264,7 +264,7 @@ TEST(ToiConservative, ExactTouches_AreNeverMissedAndNeverLate) {
   }
 }
 
-TEST(ToiConservative, BeforeTheAnswer_FeaturesAreApart) {
+TEST(ToiConservative, BeforeTheResult_FeaturesAreApart) {
   Random random(14);
   int hits = 0;
   for (int n = 0; n < 4000; ++n) {

@@ -166,7 +166,7 @@ TEST(Counter, BoxesApart_HaveNone) {
   EXPECT_EQ(count({a.surface(), b.surface()}, Touching::counts), 0u);
 }
 
-TEST(Counter, BoxOnBox_TouchingCountsOnlyWhereAsked) {
+TEST(Counter, BoxOnBox_TouchingCountsOnlyOnRequest) {
   const BoxMesh a(0, 0, 0), b(0.25, 0.25, 1);
   EXPECT_GT(count({a.surface(), b.surface()}, Touching::counts), 0u);
   EXPECT_EQ(count({a.surface(), b.surface()}, Touching::allowed), 0u);

@@ -132,7 +132,7 @@ TEST(Solver, OnePoint_SticksOrSlidesByTheClosedForm) {
   }
 }
 
-TEST(Solver, OnePointThatLeaves_FeelsNothing) {
+TEST(Solver, OnePointThatLeaves_GetsNoForce) {
   Problem p({4}, 0.6, {{-1, 0.3, 0.4}});
   p.pass(1);
   expect_near(p.impulse(0), {}, 0);
@@ -271,7 +271,7 @@ TEST(Solver, Residual_OfASolutionVanishes) {
 
 // Before: every sweep multiplied the impulses by the square of the slope, until they were infinite, and the
 // law was asked at a slip that is no number.
-TEST(Sweep, LawThatIsSteepWhereItWasAsked_StaysWithinItsLimit) {
+TEST(Sweep, LawThatIsSteepWhereItWasEvaluated_StaysWithinItsLimit) {
   for (const uint8_t mode : {1, 2}) {
     Groove g(10, 0.5, mode);
     for (int k = 0; k < 400; ++k) sweep(g.rows, g.rows.whole(), g.law, 1e-3);
@@ -285,7 +285,7 @@ TEST(Sweep, LawThatIsSteepWhereItWasAsked_StaysWithinItsLimit) {
 
 // A bristle that is not parallel to the slip turns as it grows, so its force answers a slip along one axis on
 // the other one as well, and not the same both ways. The impulse is on the law's tangent, all of it.
-TEST(Sweep, LawWhoseSlopeIsNotSymmetric_IsAnsweredOnItsTangent) {
+TEST(Sweep, LawWhoseSlopeIsNotSymmetric_IsSolvedOnItsTangent) {
   Groove g(0, 0, 2);
   const double h = 1e-3, ft[2] = {5, -3}, vt[2] = {0.1, 0.2}, slope[4] = {-200, -300, 100, -250};
   g.rows.wn[1] = 0;  // one wall only

@@ -195,7 +195,7 @@ TEST(WarmStart, TakesOverWhatTheContactOfTheKeyHas) {
   expect_near(load3(&now.tangents[0]), {1, 0, 0}, 0);
 }
 
-TEST(WarmStart, OfAContactThatTurnedOver_BeginsAnew) {
+TEST(WarmStart, OfAContactThatTurnedOver_StartsAgain) {
   ContactStore old = store_of({10}, 1);
   old.h = 1e-3;
   old.impulse = {1, 2, 3};

@@ -10,7 +10,7 @@ namespace {
 
 using dfm::Memory;
 
-TEST(Memory, BlocksOfAnySize_BeginWhereTheyAreAskedTo) {
+TEST(Memory, BlocksOfAnySize_AreAlignedAsRequested) {
   const Memory &m = Memory::standard();
   for (const size_t bytes :
        {size_t(0), size_t(1), size_t(1) << 12, (size_t(2) << 20) - 1, size_t(2) << 20, (size_t(5) << 20) + 3})

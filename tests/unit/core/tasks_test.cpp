@@ -43,7 +43,7 @@ TEST(Tasks, JobsAfterPausesOnThreeThreads_RunEachBlockOnce) {
   }
 }
 
-TEST(Tasks, AJobWithinAJobOnFourThreads_RunsWhereItIsAskedFor) {
+TEST(Tasks, AJobWithinAJobOnFourThreads_RunsOnTheCallingThread) {
   Tasks tasks(4, nullptr, nullptr);
   std::atomic<int> other{0};
   tasks.parallel_for(16, 1, [&](uint32_t, uint32_t) {

@@ -167,7 +167,7 @@ TEST_P(LatePoints, AfterAnImpulseOfTheHost_MoveAccordingly) {
   EXPECT_EQ(test::measure(w.body).speed_max, 0);
 }
 
-TEST_P(LatePoints, SavedAndRestored_GoOnWithTheSameBits) {
+TEST_P(LatePoints, SavedAndRestored_ContinueWithTheSameBits) {
   const Probed a(GetParam()), b(GetParam());
   test::run(a.world, 0.12, 1e-3);
   const std::string saved = test::snapshot(a.world);

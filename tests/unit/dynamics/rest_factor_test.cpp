@@ -138,7 +138,7 @@ TEST(RestFactor, PointsHeldInPart_AreNotServedWhereTheyTurn) {
 }
 
 // A fixed face that is touched does not give way.
-TEST(ImplicitPoints, HeldPoints_AnswerNoImpulse) {
+TEST(ImplicitPoints, HeldPoints_DoNotRespondToImpulses) {
   for (const char *model : {"corotational_fem", "linear_fem", "msm"}) {
     test::Context context;
     const dfm_world world = test::make_world(context, {0, 0, 0}, DFM_INTEGRATOR_IMPLICIT_EULER);

@@ -118,7 +118,7 @@ TEST(ConvexGap, SegmentsAndBoxes_MatchClosedForms) {
   }
 }
 
-TEST(ConvexGap, ShapesWithoutSize_GiveFiniteAnswers) {
+TEST(ConvexGap, ShapesWithoutSize_GiveFiniteResults) {
   const Vec3 p{1, 2, 3};
   EXPECT_FALSE(dfm::convex_gap(ball(p, 0), ball(p, 0)).apart);
   EXPECT_NEAR(dfm::convex_gap(ball(p, 0), dfm::convex_triangle({}, {}, {})).distance, dfm::norm(p), 1e-15);

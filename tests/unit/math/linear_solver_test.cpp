@@ -320,7 +320,7 @@ TEST(SolverChoice, AutomaticChoice_FactorsSmallAndConstantMatrices) {
 }
 
 // What is kept between calls must not show: a world that was restored asks for other points first.
-TEST(Ldlt, ResponseOfPoints_IsTheSameBitsWhateverWasAskedBefore) {
+TEST(Ldlt, ResponseOfPoints_IsTheSameBitsWhateverWasRequestedBefore) {
   const Grid g = grid(6, 5, 4, 0.05);
   dfm::LdltSolver kept(dfm::Memory::standard()), fresh(dfm::Memory::standard());
   for (dfm::LdltSolver *solver : {&kept, &fresh}) {

@@ -87,7 +87,7 @@ const Soup kTetrahedron{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
 
 }  // namespace
 
-TEST(FinishSurface, SoundBox_IsLeftAsItIs) {
+TEST(FinishSurface, ValidBox_IsUnchanged) {
   const Soup s = box({1, 2, 3}, {2, 4, 6});
   const TriMesh m = finished(s);
   EXPECT_EQ(all_warnings(m), "");

@@ -106,7 +106,7 @@ TEST(GenerateSurface, Tori_ApproachTheirVolume) {
               1, 2e-3);
 }
 
-TEST(GenerateTube, Cells_AreSoundAndFillTheRing) {
+TEST(GenerateTube, Cells_AreValidAndFillTheRing) {
   for (const uint32_t n : {1u, 500u, 3000u, 20000u})
     for (const double inner : {0.05, 0.1, 0.18}) {
       const TetMesh m = make_tube(standard(), inner, 0.2, 0.7, n);

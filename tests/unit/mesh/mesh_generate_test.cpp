@@ -62,7 +62,7 @@ uint64_t hash_of(const TetMesh &m) {
 
 }  // namespace
 
-TEST(MeshGenerate, Beams_AreSoundAndFillTheirBox) {
+TEST(MeshGenerate, Beams_AreValidAndFillTheirBox) {
   for (const uint32_t cells : {1u, 50u, 500u, 3000u, 20000u})
     for (const auto &[x, y, z] : {std::tuple{1.0, 0.1, 0.1}, std::tuple{0.1, 0.1, 0.1},
                                   std::tuple{1.0, 1.0, 0.1}, std::tuple{2e-9, 1e-9, 3e-9}}) {
@@ -81,7 +81,7 @@ TEST(MeshGenerate, Beams_AreSoundAndFillTheirBox) {
     }
 }
 
-TEST(MeshGenerate, Cylinders_AreSoundAndInscribed) {
+TEST(MeshGenerate, Cylinders_AreValidAndInscribed) {
   for (const uint32_t cells : {1u, 50u, 500u, 2700u, 15000u})
     for (const auto &[radius, length] :
          {std::pair{0.2, 1.0}, std::pair{1.0, 1.0}, std::pair{1.0, 0.2}, std::pair{0.02, 0.16}}) {
@@ -105,7 +105,7 @@ TEST(MeshGenerate, Cylinders_AreSoundAndInscribed) {
     }
 }
 
-TEST(MeshGenerate, Balls_AreSoundAndTheirSurfaceLiesOnTheSphere) {
+TEST(MeshGenerate, Balls_AreValidAndTheirSurfaceLiesOnTheSphere) {
   double last_gap = 1;
   for (const uint32_t cells : {1u, 160u, 1000u, 5000u, 20000u}) {
     SCOPED_TRACE(cells);

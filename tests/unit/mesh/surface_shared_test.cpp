@@ -22,7 +22,7 @@ struct Fate {
 
 }  // namespace
 
-TEST(SurfaceShared, NastyFiles_MeetTheirNotes) {
+TEST(SurfaceShared, DefectiveFiles_GiveTheExpectedResults) {
   if (meshes().empty()) GTEST_SKIP() << "../shared is not here";
   for (const Fate &f :
        {Fate{"nasty/degenerate_triangles.off", 92, 180, 1, 0, 0, 0, 0.002,

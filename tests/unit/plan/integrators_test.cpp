@@ -41,7 +41,7 @@ TEST(Integrators, NamedOnes_Stay) {
   EXPECT_EQ(chosen({named}), Bools{true});
 }
 
-TEST(Integrators, BesideAnExplicitBodyOfManySubSteps_NobodyIsImplicit) {
+TEST(Integrators, BesideAnExplicitBodyOfManySubSteps_NoBodyIsImplicit) {
   IntegratorOption named = body(1000);
   named.open = false;
   EXPECT_EQ(chosen({named, body(500)}), (Bools{false, false}));

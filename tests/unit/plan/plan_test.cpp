@@ -187,7 +187,7 @@ TEST(PlanEffects, OfTheContent_NameTheirProviders) {
   EXPECT_EQ(plan.effects[1].provided_by, "model.a, model.c");
 }
 
-TEST(PlanEffects, ThatNobodyProvides_AreRefusedWithThoseWhoCould) {
+TEST(PlanEffects, ThatNoPluginProvides_AreRefusedWithPossibleProviders) {
   const auto refusal = [](const dfm::SceneFacts &f) {
     try {
       dfm::make_plan(velocity().table, f);

@@ -73,7 +73,7 @@ TEST(Changes, OfALoad_MakeNoTableAndNoPlan) {
   EXPECT_EQ(r.after([&] { test::ok(dfm_body_remove_load(r.stack.upper, load)); }), kNothing);
 }
 
-TEST(Changes, OfALoadThatVaries_MakeThePlanOnceWhereTheMotionStageComesOrGoes) {
+TEST(Changes, OfALoadThatVaries_RebuildThePlanOnceWhereTheMotionStageComesOrGoes) {
   Running r;
   const dfm_scale_key keys[] = {{0, 0}, {1, 1}};
   uint32_t load = 0;
@@ -157,7 +157,7 @@ TEST(Changes, OfAParameterThatCallsForAnotherEffect_MakeAll) {
 }
 
 // The same bits as a world that makes all of it anew after each change.
-TEST(Changes, OfValues_LeadToTheSameStateAsMakingAllAnew) {
+TEST(Changes, OfValues_LeadToTheSameStateAsRebuildingAll) {
   Running a, b;
   uint32_t load_a = a.push(0), load_b = b.push(0);
   for (int i = 0; i < 200; ++i) {

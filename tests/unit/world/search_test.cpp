@@ -325,7 +325,7 @@ TEST(Queries, Untangled_SeeBodiesWhereTheyWerePut) {
   expect_now(s.world, "apart");
 }
 
-TEST(Queries, OnSeveralThreads_GiveTheSameAnswers) {
+TEST(Queries, OnSeveralThreads_GiveTheSameResults) {
   test::Context c;
   const test::Stack s = test::make_stack(c);
   add_ball(s.world);

@@ -232,7 +232,7 @@ TEST_F(DamagedSnapshot, WithAStepBoundThatNoSubStepCanHave_IsRefused) {
 }
 
 // Any bytes behind a checksum that holds.
-TEST_F(DamagedSnapshot, ForgedAtRandom_IsRefusedOrTheWorldGoesOn) {
+TEST_F(DamagedSnapshot, ForgedAtRandom_IsRefusedOrTheWorldContinues) {
   std::mt19937 random(11);
   int taken = 0;
   for (int i = 0; i < 1500; ++i) {
@@ -274,7 +274,7 @@ TEST_F(DamagedSnapshot, ThatClaimsMuchMemory_TakesNoMoreThanAFewTimesItsBytes) {
 }
 
 // Contacts of a removed body stay in the books until the next sub-step, also while others sleep.
-TEST_F(DamagedSnapshot, TakenRightAfterABodyWasRemoved_RestoresAndGoesOn) {
+TEST_F(DamagedSnapshot, TakenRightAfterABodyWasRemoved_RestoresAndContinues) {
   test::ok(restore(w, good.bytes));
   dfm_body upper = 0;
   test::ok(dfm_world_find_body(w, "upper", &upper));
