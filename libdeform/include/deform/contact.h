@@ -36,8 +36,8 @@ DFM_API dfm_status dfm_world_add_friction(dfm_world world, const dfm_friction_de
 DFM_API dfm_status dfm_world_set_friction(dfm_world world, const char *a, const char *b,
                                           const dfm_params *params);
 /** Removes a rule. Its contacts use the next rule that matches, or the law of pairs without a rule. If that
- * is another law, or has other parameters, their state starts anew. Bodies wake; the next step rebuilds the
- * tables.
+ * is another law, or has other parameters, their state starts at zero. Bodies wake; the next step rebuilds
+ * the tables.
  * @param a, b  the two sides of the rule, in either order
  * @return DFM_OK; DFM_E_ARG no rule for these sides (lists the rules). Threads: Not during
  * step. Since 0.1. */

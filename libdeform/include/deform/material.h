@@ -9,8 +9,8 @@ extern "C" {
 /** density kg/m3 (> 0), young Pa (> 0), poisson (-1..0.5), damping_mass 1/s, damping_stiffness s. A model
  * parameter that the body does not set is taken from the material's entry of the same key, else from the
  * model's default. `extra` holds such further entries, and three of the library: "friction", the coefficient
- * for pairs without a rule (dfm_friction_def); "tear", the largest strain (> 0) that the material bears in
- * any direction; "fracture_energy", J/m2 (0: none), the energy that a blade needs to open faces
+ * for pairs without a rule (dfm_friction_def); "tear", the largest strain (> 0) that the material withstands
+ * in any direction; "fracture_energy", J/m2 (0: none), the energy that a blade needs to open faces
  * (dfm_cut_info.fracture). At the end of a step a body of a material with "tear" splits the points beyond
  * that strain (doc/concepts/cutting.md); its model must be msm or corotational_fem. */
 typedef struct dfm_material_def {

@@ -84,7 +84,7 @@ DFM_API dfm_status dfm_obstacle_set_velocity_surface(dfm_obstacle obstacle, cons
 DFM_API dfm_status dfm_obstacle_set_filter(dfm_obstacle obstacle, uint32_t category, uint32_t collides_with);
 /** Changes the material of an obstacle, a rigid body or one of its shapes: rules of friction by
  * "material=NAME" and the material's entry "friction" apply from now on. If a contact gets another law, or
- * other parameters, its friction memory starts anew; its impulses continue.
+ * other parameters, its friction memory starts at zero; its impulses continue.
  * @param material  of the same world; 0: none
  * @return DFM_OK; DFM_E_HANDLE. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_obstacle_set_material(dfm_obstacle obstacle, dfm_material material);

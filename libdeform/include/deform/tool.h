@@ -55,8 +55,8 @@ typedef struct dfm_tool_def {
    * pose exactly; else turn_stiffness must be above 0 too */
   double stiffness, damping, turn_stiffness, turn_damping;
   double mass, inertia; /* kg, kg m2 about any axis through the origin: of the tool, where it is coupled */
-  /* s, 0 to 0.1, of a coupled tool: how much later than the next step the hand feels what answers its motion,
-   * by the device and its wires, both ways. port_work and PASSIVE count with it */
+  /* s, 0 to 0.1, of a coupled tool: delay of the device in both directions, beyond the next step, until the
+   * hand feels the response to its motion. port_work and PASSIVE include it */
   double late;
   uint32_t nkey, nopening;
   const dfm_pose_key *keys;          /* [nkey] poses over time, until the first dfm_tool_set_pose; copied */
@@ -183,14 +183,14 @@ DFM_API dfm_status dfm_tool_grab(dfm_tool tool, dfm_body body, double reach, dou
 /* ---- cutting ------------------------------------------------------------------------------------------- */
 
 /** Lets a tool cut bodies at the end of each step, as dfm_body_cut does (deform/cut.h). Replaces what was set
- * before. The parts that cut (of scissors the jaws) do not touch these bodies. An event DFM_EVENT_CUT tells
- * of each body that has been cut in a step (deform/contact.h).
- * SPLIT, of a blade and of scissors: faces open where the edge crosses the line between the middles of their
- * cells and moves forward, seen from the cells. REMOVE: cells go that the shape meets on its way; of a blade
- * and of scissors their boxes.
+ * before. The parts that cut (of scissors the jaws) do not touch these bodies. An event DFM_EVENT_CUT
+ * reports each body that was cut in a step (deform/contact.h).
+ * SPLIT (blade, scissors): faces open where the edge crosses the line between the middles of their cells and
+ * moves forward relative to the cells. REMOVE: the cells that the shape meets on its path are removed; blades
+ * and scissors act by their boxes.
  * @param how     DFM_CUT_REMOVE or DFM_CUT_SPLIT
  * @param most    of one body in one step: cells, those of the lowest numbers, or faces, those that the edge
- * has met first; 0: no limit. What is left is cut in the next steps: cells as long as the shape is in them,
+ * has met first; 0: no limit. The rest is cut in the next steps: cells as long as the shape is in them,
  * faces as long as they are less than one edge length of the body's surface behind the edge
  * @param n       number of bodies; 0: the tool cuts nothing
  * @param bodies  [n]
