@@ -8,11 +8,6 @@ namespace {
 using namespace test::tools;
 using test::Vec;
 
-dfm_pose pose(Vec at, Vec axis = {0, 0, 1}, double angle = 0) {
-  const double s = std::sin(0.5 * angle) / test::norm(axis);
-  return {{at[0], at[1], at[2]}, {s * axis[0], s * axis[1], s * axis[2], std::cos(0.5 * angle)}};
-}
-
 dfm_tool_def driven(const char *name, uint32_t shape, dfm_pose at, Vec half) {
   dfm_tool_def d = dfm_tool_def_default();
   d.name = name;
@@ -39,24 +34,6 @@ Vec force_on(dfm_tool t) {
 }
 void move(dfm_tool t, dfm_pose to) { test::ok(dfm_tool_set_pose(t, &to, nullptr)); }
 void step(dfm_world w, double dt = 1e-3) { test::ok(dfm_world_step(w, dt, nullptr)); }
-
-// The triangles of a box, and the tool that has them.
-struct BoxMesh {
-  double points[24];
-  uint32_t triangles[36] = {0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,
-                            2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5};
-  explicit BoxMesh(Vec half) {
-    for (size_t i = 0; i < 8; ++i)
-      for (size_t k = 0; k < 3; ++k) points[3 * i + k] = (i >> k & 1 ? 1 : -1) * half[k];
-  }
-  void put(dfm_tool_def &d) const {
-    d.shape = DFM_TOOL_MESH;
-    d.npoint = 8;
-    d.ntriangle = 12;
-    d.points = points;
-    d.triangles = triangles;
-  }
-};
 
 double energy(dfm_tool t) {
   dfm_tool_def d = dfm_tool_def_default();

@@ -26,10 +26,6 @@ Felt felt(dfm_tool t) {
           test::vec(s.pose.position)};
 }
 
-dfm_pose pose(Vec at, double about_y = 0) {
-  return {{at[0], at[1], at[2]}, {0, std::sin(0.5 * about_y), 0, std::cos(0.5 * about_y)}};
-}
-
 // A block of 40 mm that floats, and room for tools around it.
 struct Scene {
   test::Context context;
@@ -83,8 +79,8 @@ TEST(Tool, ForceTimesTheStep_IsTheMomentumThatTheBodyGot) {
       uint32_t substeps = 0;
       for (int i = 1; i <= 40; ++i) {
         const double s = i / 40.0;
-        const dfm_pose left = pose({-0.0305 + 3e-3 * s, 1e-3 * s, z + 1e-3 * s}, 0.1 * s);
-        const dfm_pose right = pose({0.0255 - 4e-3 * s, 0, z - 1e-3 * s}, -0.1 * s);
+        const dfm_pose left = pose({-0.0305 + 3e-3 * s, 1e-3 * s, z + 1e-3 * s}, {0, 1, 0}, 0.1 * s);
+        const dfm_pose right = pose({0.0255 - 4e-3 * s, 0, z - 1e-3 * s}, {0, 1, 0}, -0.1 * s);
         test::ok(dfm_tool_set_pose(tools[0], &left, nullptr));
         test::ok(dfm_tool_set_pose(tools[1], &right, nullptr));
         uint32_t trouble = 0;
@@ -171,7 +167,7 @@ TEST(Tool, GoesWhereItIsPut_InAnyNumberOfSubSteps) {
   dfm_rigid left = 0;
   test::ok(dfm_world_find_rigid(s.w, "grasper.left", &left));
   EXPECT_EQ(left, parts[1]);
-  const dfm_pose to = pose({0.01, 0.02, 0.07}, 0.3);
+  const dfm_pose to = pose({0.01, 0.02, 0.07}, {0, 1, 0}, 0.3);
   test::ok(dfm_tool_set_pose(t, &to, nullptr));
   test::ok(dfm_tool_set_opening(t, 0.1));
   test::ok(dfm_world_step(s.w, 1.0 / 60, nullptr));
@@ -183,7 +179,7 @@ TEST(Tool, GoesWhereItIsPut_InAnyNumberOfSubSteps) {
   // the jaws point along -z, half of the opening to each side, and the frame is turned by 0.3 about y
   for (const int side : {1, -1}) {
     const dfm_rigid_state jaw = test::state(parts[side > 0 ? 1 : 2]);
-    const dfm_pose turned = pose({0, 0, 0}, 0.3 - side * 0.05);
+    const dfm_pose turned = pose({0, 0, 0}, {0, 1, 0}, 0.3 - side * 0.05);
     const Vec center = rotate(turned.rotation, {side * 0.002, 0, -0.02});
     for (size_t k = 0; k < 3; ++k) EXPECT_NEAR(jaw.position[k], to.position[k] + center[k], 1e-12) << side;
   }
@@ -209,7 +205,7 @@ TEST(Tool, GivenBackToItsKeys_FollowsThemAgain) {
   Scene s;
   dfm_tool_def d = tool_def("key", DFM_TOOL_GRASPER, {0, 0, 0.1});
   for (double &half : d.half_size) half = 0.005;
-  const dfm_pose_key keys[] = {{0, pose({0, 0, 0.1})}, {0.1, pose({0.01, 0, 0.1}, 0.4)}};
+  const dfm_pose_key keys[] = {{0, pose({0, 0, 0.1})}, {0.1, pose({0.01, 0, 0.1}, {0, 1, 0}, 0.4)}};
   const dfm_scale_key openings[] = {{0, 0.5}, {0.1, 0.1}};
   d.keys = keys;
   d.nkey = 2;
@@ -251,7 +247,7 @@ TEST(Tool, FromASnapshot_ContinuesToTheSameBits) {
   d.damping = 1;
   d.turn_stiffness = 0.1;
   d.flags = DFM_TOOL_PASSIVE;
-  const dfm_pose_key keys[] = {{0, pose({-0.0255, 0, 0})}, {0.05, pose({-0.0205, 0.002, 0}, 0.2)}};
+  const dfm_pose_key keys[] = {{0, pose({-0.0255, 0, 0})}, {0.05, pose({-0.0205, 0.002, 0}, {0, 1, 0}, 0.2)}};
   d.keys = keys;
   d.nkey = 2;
   const dfm_tool a = make(s.w, d);

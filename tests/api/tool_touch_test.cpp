@@ -6,11 +6,6 @@ namespace {
 using namespace test::tools;
 using test::Vec;
 
-dfm_pose pose(Vec at, Vec axis = {0, 0, 1}, double angle = 0) {
-  const double s = std::sin(0.5 * angle) / test::norm(axis);
-  return {{at[0], at[1], at[2]}, {s * axis[0], s * axis[1], s * axis[2], std::cos(0.5 * angle)}};
-}
-
 struct Spring { double way, turn, damping; };  // N/m, N m/rad, of the critical one
 
 dfm_tool_def shape_def(const char *name, uint32_t shape, dfm_pose at, Spring spring = {500, 0.2, 1}) {

@@ -14,6 +14,40 @@ inline Vec rotate(const double q[4], Vec v) {
   return {v[0] + 2 * (q[3] * t[0] + s[0]), v[1] + 2 * (q[3] * t[1] + s[1]), v[2] + 2 * (q[3] * t[2] + s[2])};
 }
 
+// About the axis, rad.
+inline dfm_pose pose(Vec at, Vec axis = {0, 0, 1}, double angle = 0) {
+  const double s = std::sin(0.5 * angle) / test::norm(axis);
+  return {{at[0], at[1], at[2]}, {s * axis[0], s * axis[1], s * axis[2], std::cos(0.5 * angle)}};
+}
+
+// The triangles of a box, and the def that has them.
+struct BoxMesh {
+  double points[24];
+  uint32_t triangles[36] = {0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,
+                            2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5};
+  explicit BoxMesh(Vec half) {
+    for (size_t i = 0; i < 8; ++i)
+      for (size_t k = 0; k < 3; ++k) points[3 * i + k] = (i >> k & 1 ? 1 : -1) * half[k];
+  }
+  void put(dfm_tool_def &d) const {
+    d.shape = DFM_TOOL_MESH;
+    put_triangles(d);
+  }
+  void put(dfm_obstacle_def &d) const {
+    d.shape = DFM_SHAPE_MESH;
+    put_triangles(d);
+  }
+
+ private:
+  template <class Def>
+  void put_triangles(Def &d) const {
+    d.npoint = 8;
+    d.ntriangle = 12;
+    d.points = points;
+    d.triangles = triangles;
+  }
+};
+
 inline dfm_tool make(dfm_world w, const dfm_tool_def &d) {
   dfm_tool t = 0;
   test::ok(dfm_tool_create(w, &d, &t));

@@ -40,6 +40,10 @@ struct ContactState {
   };
   Array<Origin> origin;
 
+  void use(const Memory &m) {
+    use_memory(m, law, fn, vt, ft_stop, area, dwell, bristle, ft, dft_dvt, dft_dfn, limit, bristle_out, mode,
+               form, slip, scale, linear, origin);
+  }
   void resize(uint32_t count, uint32_t states) {
     n = count;
     nstate = states;
@@ -94,6 +98,17 @@ inline Slope dissipative_slope(const ContactState &s, uint32_t i) {
   // keep only bottom * p p^T of the symmetric part, p p^T = (top I - D) / (top - bottom)
   const double scale = bottom / (top - bottom);
   return {scale * (top - a), turn - scale * b, -turn - scale * b, scale * (top - c)};
+}
+
+// Of a smooth law, for a contact with this response, 1/kg.
+inline void linearize(ContactState &s, uint32_t i, double h, double wt) {
+  LinearLaw &l = s.linear[i];
+  l.slope = dissipative_slope(s, i);
+  l.m11 = 1 - h * wt * l.slope.a;
+  l.m22 = 1 - h * wt * l.slope.d;
+  l.m12 = -h * wt * l.slope.b;
+  l.m21 = -h * wt * l.slope.c;
+  l.det = l.m11 * l.m22 - l.m12 * l.m21;
 }
 
 }  // namespace dfm

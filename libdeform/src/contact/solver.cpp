@@ -43,15 +43,7 @@ void set_trial(const ContactRows &rows, const RowsPart &part, double h, const do
 
 void linearize(const ContactRows &rows, const RowsPart &part, double h, ContactState &s) {
   each_row(part.contacts, [&](uint32_t i) {
-    if (s.form[i] != kSmoothLaw) return;
-    const double wt = rows.wt[i];
-    LinearLaw &l = s.linear[i];
-    l.slope = dissipative_slope(s, i);
-    l.m11 = 1 - h * wt * l.slope.a;
-    l.m22 = 1 - h * wt * l.slope.d;
-    l.m12 = -h * wt * l.slope.b;
-    l.m21 = -h * wt * l.slope.c;
-    l.det = l.m11 * l.m22 - l.m12 * l.m21;
+    if (s.form[i] == kSmoothLaw) linearize(s, i, h, rows.wt[i]);
   });
 }
 

@@ -1,6 +1,7 @@
 #include "contact/store.h"
 
 #include <algorithm>
+#include <numeric>
 
 namespace dfm {
 
@@ -14,6 +15,13 @@ uint32_t ContactStore::find(uint64_t k) const {
   return it != by_key.end() && key[*it] == k ? *it : kNone;
 }
 
+void ContactStore::order() {
+  by_key.resize(n);
+  std::iota(by_key.begin(), by_key.end(), 0u);
+  std::sort(by_key.begin(), by_key.end(),
+            [&](uint32_t i, uint32_t j) { return key[i] != key[j] ? key[i] < key[j] : i < j; });
+}
+
 Vec3 transport(Vec3 t, Vec3 m, Vec3 n, bool *reset) {
   const double c = dot(m, n);
   *reset = c < -0.5;
@@ -23,14 +31,15 @@ Vec3 transport(Vec3 t, Vec3 m, Vec3 n, bool *reset) {
   return normalized(turned - dot(turned, n) * n);  // rounding only
 }
 
-void warm_start(const ContactStore &old, std::span<const ContactPoint> contacts, double h, ContactRows &rows,
-                ContactState &state, double *tangents, uint32_t *match, Tasks *tasks) {
+void warm_start(const ContactStore &old, std::span<const ContactPoint> contacts, double h,
+                Array<double> &impulse, ContactState &state, double *tangents, uint32_t *match,
+                Tasks *tasks) {
   const double scale = old.h > 0 ? h / old.h : 0;
-  rows.impulse.resize(size_t(contacts.size()) * 3);
+  impulse.resize(size_t(contacts.size()) * 3);
   each_row_in_blocks(static_cast<uint32_t>(contacts.size()), tasks, [&](uint32_t i) {
     const Vec3 n = load3(contacts[i].normal);
     const uint32_t m = match[i] = old.find(contacts[i].key);
-    double *const l = &rows.impulse[size_t(i) * 3];
+    double *const l = &impulse[size_t(i) * 3];
     l[0] = l[1] = l[2] = 0;
     for (uint32_t s = 0; s < state.nstate; ++s) state.bristle[size_t(s) * state.stride + i] = 0;
     state.dwell[i] = 0;

@@ -48,6 +48,7 @@ struct ContactStore {
 
   explicit ContactStore(const Memory &memory);
   uint32_t find(uint64_t key) const;  // index, or kNone
+  void order();                       // by_key, from key
 };
 
 // f(ColumnOf<..>, column of each store). Memory, reserved room, data of sleepers, the copy for the budget of
@@ -75,10 +76,11 @@ void each_column(F &&f, Store &...c) {
 }
 
 // Fresh contacts take over what their predecessors kept: the tangent turned with the normal (minimal
-// rotation), impulse times h/h_old, bristles where the law is the same. `tangents` [n,3] out; rows.impulse
+// rotation), impulse times h/h_old, bristles where the law is the same. `tangents` [n,3] out; impulse [n,3]
 // and state.bristle are filled. match [n] out: index or kNone. tasks: null: on this thread alone.
-void warm_start(const ContactStore &old, std::span<const ContactPoint> contacts, double h, ContactRows &rows,
-                ContactState &state, double *tangents, uint32_t *match, Tasks *tasks = nullptr);
+void warm_start(const ContactStore &old, std::span<const ContactPoint> contacts, double h,
+                Array<double> &impulse, ContactState &state, double *tangents, uint32_t *match,
+                Tasks *tasks = nullptr);
 
 // The tangent t of normal m rotated to normal n by the smallest rotation; a new tangent if the normals are
 // more than 120 degrees apart.

@@ -13,6 +13,7 @@ struct PairTables {
   std::vector<uint32_t> law;  // [body][body or obstacle] -> index into World::laws
   // as law -> first in zone_law [zone a][zone b], kNone: the pair has one law; empty: all have
   std::vector<uint32_t> zone_table, zone_law;
+  std::vector<uint32_t> tool_law;  // of tools with each other and with rigid bodies
   PairFilter filter;
   std::vector<LawInstance *> laws;
 };

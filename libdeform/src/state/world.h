@@ -154,6 +154,7 @@ struct World {
   std::unique_ptr<StepContext> steps;  // buffers: step/context.h
 
   ContactStore store;
+  ContactStore tool_store;  // of tools with each other and with rigid bodies (step/tool_touch.h)
   Report report;
   std::vector<PairWork> work;  // sorted by (a, b)
   std::vector<dfm_contact_event> events;

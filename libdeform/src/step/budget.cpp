@@ -140,10 +140,12 @@ void changing(Stream &s, World &w) {
     s.array(set->impulse);
     s.value(set->last_h);
   }
-  s.value(w.store.n);
-  s.value(w.store.nstate);
-  s.value(w.store.h);
-  each_column([&](const ContactColumn &, auto &column) { s.array(column); }, w.store);
+  for (auto *const store : {&w.store, &w.tool_store}) {
+    s.value(store->n);
+    s.value(store->nstate);
+    s.value(store->h);
+    each_column([&](const ContactColumn &, auto &column) { s.array(column); }, *store);
+  }
   s.value(w.report.n);
   s.value(w.report.h);
   each_report_column([&](size_t, auto &column) { s.array(column); }, w.report);
@@ -157,11 +159,12 @@ void changing(Stream &s, World &w) {
   s.length(w.events);  // steps only append to it, and the host may read it after many steps
 }
 
-// The two stores and the two reports are swapped at the end of sub-steps, so the saved data may have to fit
-// into the other one.
+// The stores and the reports are swapped with others at the end of sub-steps, so the saved data may have to
+// fit into the other ones.
 void reserve_others(World &w, StepContext &step) {
-  each_column([](const ContactColumn &, const auto &from, auto &to) { to.reserve(from.size()); }, w.store,
-              step.next_store);
+  const auto reserve = [](const ContactColumn &, const auto &from, auto &to) { to.reserve(from.size()); };
+  each_column(reserve, w.store, step.next_store);
+  each_column(reserve, w.tool_store, step.tools.next());
   each_report_column([](size_t, const auto &from, auto &to) { to.reserve(from.size()); }, w.report,
                      step.last_report);
 }

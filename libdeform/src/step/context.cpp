@@ -7,6 +7,7 @@ StepContext::StepContext(const Meters &meters)
       narrow(meters.detection.memory()),
       rows(meters.contacts.memory()),
       solve_islands(meters.contacts.memory()),
+      tools(meters.contacts.memory()),
       areas(meters.contacts.memory()),
       exchange(meters.contacts.memory()),
       renewal(meters.contacts.memory()),
@@ -18,9 +19,7 @@ StepContext::StepContext(const Meters &meters)
   use_memory(meters.contacts.memory(), lent, contacts, tolerance.normal, tolerance.tangent, disturbance,
              best_impulse, trial_response, tangents, match, sharing, aim, stands, ways, renewed, bonds,
              bond_impulse, chosen, mean, before);
-  use_memory(meters.contacts.memory(), state.law, state.fn, state.vt, state.ft_stop, state.area, state.dwell,
-             state.bristle, state.ft, state.dft_dvt, state.dft_dfn, state.limit, state.bristle_out,
-             state.mode, state.form, state.slip, state.scale, state.linear, state.origin);
+  state.use(meters.contacts.memory());
   use_memory(meters.detection.memory(), guard.joined, guard.near, guard.hits, guard.speed, guard.change,
              guard.kept, guard.blocks.pieces);
   GuardMemory &known = guard.memory;

@@ -142,6 +142,12 @@ void find_law(World &w, uint32_t a, uint32_t b, std::vector<uint32_t> &used) {
   to.zone_law.insert(to.zone_law.end(), laws_of.begin(), laws_of.end());
 }
 
+uint32_t law_of_obstacles(World &w, const Obstacle &a, const Obstacle &b) {
+  const FrictionRule *const rule =
+      best_rule(w.friction, {a.name, a.zone.group, a.zone.material}, {b.name, b.zone.group, b.zone.material});
+  return rule ? rule->law : default_law(w, a.zone.friction, b.zone.friction);
+}
+
 void set_zone_laws(const World &w, std::span<const ContactPoint> contacts, Array<uint32_t> &law) {
   const size_t nb = w.bodies.size(), width = nb + w.obstacles.size();
   for (uint32_t i = 0; i < contacts.size(); ++i) {
@@ -155,6 +161,13 @@ void set_zone_laws(const World &w, std::span<const ContactPoint> contacts, Array
 }
 
 void rename_law(World &w, const FrictionRule &rule, uint32_t to) {
+  ContactStore &tools = w.tool_store;
+  for (uint32_t m = 0; m < tools.n; ++m) {
+    if (tools.law[m] != rule.law) continue;
+    const uint32_t a = thing_of(w, tools.id_a[m]), b = thing_of(w, tools.id_b[m]);
+    if (a != kNone && b != kNone && rule_of(w, a, zone_at(w, a, 0), b, zone_at(w, b, 0)) == &rule)
+      tools.law[m] = to;
+  }
   ContactStore &s = w.store;
   for (uint32_t m = 0; m < s.n; ++m) {
     if (s.law[m] != rule.law) continue;

@@ -13,6 +13,7 @@ namespace dfm {
 
 struct FrictionRule;
 struct SceneFacts;
+struct Obstacle;
 struct World;
 
 // Index of the law with these values: an existing one, else a new one, at an index that `free` marks or at
@@ -25,6 +26,8 @@ uint32_t place_law(World &w, std::unique_ptr<LawInstance> law, std::span<const u
 
 // Fills the tables for things a and b (bodies by slot, then obstacles). used: their laws, out.
 void find_law(World &w, uint32_t a, uint32_t b, std::vector<uint32_t> &used);
+// The law of two obstacles, of which a tool is one.
+uint32_t law_of_obstacles(World &w, const Obstacle &a, const Obstacle &b);
 uint32_t pair_law(const World &w, uint32_t slot_a, bool obstacle, uint32_t slot_b);
 // law: of contacts between pairs that have a table of zones.
 void set_zone_laws(const World &w, std::span<const ContactPoint> contacts, Array<uint32_t> &law);

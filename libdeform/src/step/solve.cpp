@@ -92,8 +92,8 @@ void make_rows(World &w, StepContext &step) {
   fill_responses(w, step);
   step.tangents.resize(size_t(3) * n);
   step.match.resize(n);
-  warm_start(w.store, step.contacts, step.h, step.rows, step.state, step.tangents.data(), step.match.data(),
-             &w.context->tasks);
+  warm_start(w.store, step.contacts, step.h, step.rows.impulse, step.state, step.tangents.data(),
+             step.match.data(), &w.context->tasks);
   share_areas(w, step);
   fit_bristles(w, step);
   step.rows.recovery = w.def.recovery_speed;

@@ -8,7 +8,10 @@
 namespace dfm {
 namespace {
 
-constexpr double kAlong = 1e-9;  // of a normal that counts as on the border of the cone of an edge
+constexpr double kSame = 1e-9;  // of a squared distance: two that are equal but for rounding
+// Of a normal that counts as on the border of the cone of an edge: a rod that lies along a face touches it at
+// both of its borders, also where it is not quite parallel to it.
+constexpr double kAlong = 1e-3;
 
 Vec3 least(Vec3 a, Vec3 b) { return {std::min(a.x, b.x), std::min(a.y, b.y), std::min(a.z, b.z)}; }
 Vec3 most(Vec3 a, Vec3 b) { return {std::max(a.x, b.x), std::max(a.y, b.y), std::max(a.z, b.z)}; }
@@ -64,6 +67,7 @@ Vec3 ToolShape::face_normal(uint32_t t) const {
 ToolShape::Edge ToolShape::edge_of_mesh(uint32_t e) const {
   const uint32_t *const end = &surface_->edge[2 * size_t{e}];
   Edge out;
+  out.number = e;
   out.from = node(end[0]);
   out.to = node(end[1]);
   for (const size_t k : {0, 1}) {
@@ -82,7 +86,7 @@ ToolShape::Edge ToolShape::edge_of_mesh(uint32_t e) const {
 void ToolShape::look_at_mesh(const ToolBox &near) {
   triangles_.clear();
   for (uint32_t i = 0; i < surface_->nsurfel; ++i)
-    if (near.holds(node(i), node(i))) corners_.push_back(node(i));
+    if (near.holds(node(i), node(i))) corners_.push_back({node(i), i});
   for (uint32_t e = 0; e < surface_->nedge; ++e) {
     const uint32_t *const end = &surface_->edge[2 * size_t{e}];
     if (near.holds(node(end[0]), node(end[1]))) edges_.push_back(edge_of_mesh(e));
@@ -100,7 +104,7 @@ void ToolShape::look_at(const ToolBox &near) {
   switch (shape_.view().shape) {
     case Shape::mesh: return look_at_mesh(near);
     case Shape::box:
-      for (uint32_t i = 0; i < 8; ++i) corners_.push_back(shape_.corner(i));
+      for (uint32_t i = 0; i < 8; ++i) corners_.push_back({shape_.corner(i), i});
       for (uint32_t i = 0; i < 12; ++i) {
         Edge e;
         uint32_t face[2];
@@ -109,6 +113,7 @@ void ToolShape::look_at(const ToolBox &near) {
         e.beside[0] = -shape_.face_normal(face[1]);
         e.beside[1] = -shape_.face_normal(face[0]);
         e.faces = 2;
+        e.number = i;
         edges_.push_back(e);
       }
       return;
@@ -117,10 +122,10 @@ void ToolShape::look_at(const ToolBox &near) {
       e.from = shape_.end(0);
       e.to = shape_.end(1);
       edges_.push_back(e);
-      corners_.push_back(shape_.end(1));
+      corners_.push_back({shape_.end(1), 1});
       [[fallthrough]];
     }
-    default: corners_.push_back(shape_.end(0));
+    default: corners_.push_back({shape_.end(0), 0});
   }
 }
 
@@ -129,20 +134,21 @@ bool ToolShape::closest(Vec3 p, double limit, ObstaclePoint &out) const {
     out = shape_.closest(p);
     return true;
   }
-  double best = limit * limit;
+  double best = limit * limit, faced = 0;
   bool found = false;
   for (const uint32_t t : triangles_) {
     const uint32_t *const c = &surface_->tri[3 * size_t{t}];
     const TrianglePoint at = closest_on_triangle(p, node(c[0]), node(c[1]), node(c[2]));
-    if (!(at.distance2 <= best)) continue;
+    if (!(at.distance2 <= best * (found ? 1 + kSame : 1))) continue;
+    // Of equal ones the triangle that faces it most says on which side it is: its neighbors at an edge may
+    // look away, or along the way, where the side is one of rounding.
     const Vec3 n = face_normal(t), way = p - at.point;
-    // of equal ones the triangle that faces it: its neighbors at an edge may look away
-    if (found && at.distance2 == best && std::fabs(dot(n, way)) <= std::fabs(dot(out.normal, p - out.point)))
-      continue;
+    const double side = dot(n, way), d = std::sqrt(at.distance2);
+    if (found && at.distance2 >= best * (1 - kSame) && std::fabs(side) <= faced) continue;
     found = true;
     best = at.distance2;
+    faced = std::fabs(side);
     out.point = at.point;
-    const double d = std::sqrt(at.distance2), side = dot(n, way);
     out.face = 0;
     out.distance = side < 0 ? -d : d;
     out.normal = at.feature == TriangleFeature::face || !(d > 0) ? n : (1 / out.distance) * way;

@@ -21,6 +21,7 @@ class ToolShape {
   struct Edge {
     Vec3 from, to, beside[2];  // directions in the faces beside it, away from it
     int faces = 0;             // 0: a capsule's axis, left in every direction
+    uint32_t number = 0;
     // Does the direction leave the shape here?
     bool leaves(Vec3 n) const;
   };
@@ -33,7 +34,11 @@ class ToolShape {
   ToolBox bounds() const;
   // Finds the corners, edges and triangles near the box. Before the functions that follow.
   void look_at(const ToolBox &near);
-  const std::vector<Vec3> &corners() const { return corners_; }
+  struct Corner {
+    Vec3 at;
+    uint32_t number;
+  };
+  const std::vector<Corner> &corners() const { return corners_; }
   const std::vector<Edge> &edges() const { return edges_; }
   // Of its surface; false: none, or a mesh is further away than `limit` on either side.
   bool closest(Vec3 p, double limit, ObstaclePoint &out) const;
@@ -47,7 +52,7 @@ class ToolShape {
   ObstacleShape shape_;
   const Surface *surface_;  // of a mesh
   double reach_ = 0, round_ = 0;
-  std::vector<Vec3> corners_;
+  std::vector<Corner> corners_;
   std::vector<Edge> edges_;
   std::vector<uint32_t> triangles_;
 };

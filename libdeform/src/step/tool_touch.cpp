@@ -3,37 +3,32 @@
 #include <algorithm>
 #include <cmath>
 
-#include "friction/limit.h"
 #include "friction/pair_rules.h"
 #include "geometry/closest.h"
 #include "math/turn.h"
 #include "state/world.h"
 #include "step/context.h"
+#include "step/pair_table.h"
 
 namespace dfm {
 namespace {
 
-constexpr uint32_t kMostSweeps = 500;
-constexpr double kDone = 1e-13;     // of the largest speed that a row asks to change
-constexpr double kSame = 1e-9;      // of it: soft bodies need not be asked again
-constexpr double kOpens = 0.1;      // of d_c in a sub-step, where two tools are in each other
-constexpr double kJaw = 1e4;        // N/m, of a jaw at its tip
-constexpr double kFace = 1e5;       // N/m, of a place on the face of a jaw
-constexpr double kDent = 5e-4;      // m, into that face: deeper it is not a place of contact
-constexpr double kCross = 1e-6;     // sine between edges that have a normal
-constexpr uint32_t kMostBends = 4;  // solves with what turning adds, until it changes no more
+constexpr uint32_t kMostSweeps = 200;
+constexpr double kDone = 1e-13;      // of the largest speed that a row asks to change
+constexpr double kSame = 1e-9;       // of it: soft bodies need not be asked again
+constexpr double kOpens = 0.1;       // of d_c in a sub-step, where two tools are in each other
+constexpr double kJaw = 1e4;         // N/m, of a jaw at its tip
+constexpr double kFace = 1e5;        // N/m, of a place on the face of a jaw
+constexpr double kDent = 5e-4;       // m: edges that are further on the wrong side do not touch there
+constexpr double kCross = 1e-6;      // sine between edges that have a normal
+constexpr double kMostTurn = 0.5;    // rad in a sub-step, beyond which the series has no third order
+constexpr double kRises = 2;         // of what a sweep has left: the combination is void
+constexpr uint32_t kMostPasses = 6;  // over the laws, and what turning adds, until both change no more
 
 // Those of a host that is asked for velocities and impulses alone.
 bool plain(const RigidSet &set) { return set.of_tool || (set.host_name == "builtin" && set.njoint == 0); }
 
 PairSide side_of(const Obstacle &o) { return {o.name, o.zone.group, o.zone.material}; }
-
-// The limit of the pair's law over the normal force, at 1 N and without slip.
-double coefficient(const World &w, const Obstacle &a, const Obstacle &b) {
-  if (const FrictionRule *const rule = best_rule(w.friction, side_of(a), side_of(b)))
-    return limit_of(*w.laws[rule->law], 1);
-  return w.selection.wants(kFriction) ? std::sqrt(a.zone.friction * b.zone.friction) : 0;
-}
 
 Quat rotation_of(const dfm_rigid_state &s) {
   return {s.rotation[0], s.rotation[1], s.rotation[2], s.rotation[3]};
@@ -58,8 +53,14 @@ void add(Vec3 p, double *to) { store3(to, load3(to) + p); }
 
 }  // namespace
 
-void ToolTouch::prepare(const World &w) {
+ToolTouch::ToolTouch(const Memory &m) : batches_(m), anderson_(m), next_(m) {
+  use_memory(m, start_, tangents_, match_, points_, response_, weight_, step_, from_, now_);
+  state_.use(m);
+}
+
+void ToolTouch::prepare(World &w) {
   pairs_.clear();
+  w.pairs.tool_law.clear();
   if (w.tools.empty()) return;
   for (uint32_t i = 0; i < w.obstacles.size(); ++i)
     for (uint32_t j = i + 1; j < w.obstacles.size(); ++j) {
@@ -69,10 +70,9 @@ void ToolTouch::prepare(const World &w) {
         continue;
       bool touch = (a.def.category & b.def.collides_with) != 0 && (b.def.category & a.def.collides_with) != 0;
       if (const FilterRule *const rule = best_rule(w.filters, side_of(a), side_of(b))) touch = rule->collide;
-      // The spin of a free rigid body is that of a midpoint rule: what sticks to it would turn it to and fro.
-      const bool tools = a.rigid->of_tool && b.rigid->of_tool;
-      if (touch) pairs_.push_back({i, j, tools ? coefficient(w, a, b) : 0, tools});
+      if (touch) pairs_.push_back({i, j, law_of_obstacles(w, a, b), {a.id, b.id}});
     }
+  for (const Pair &pair : pairs_) w.pairs.tool_law.push_back(pair.law);
 }
 
 Vec3 ToolTouch::speed(const Row &row) const {
@@ -104,8 +104,8 @@ void ToolTouch::push(const Side &side, Vec3 impulse, Vec3 moment, std::vector<do
 }
 
 void ToolTouch::push(const Row &row, Vec3 p) {
-  push(row.a, p, cross(row.a.arm, p), &Moved::change, row.tools);
-  push(row.b, -p, -cross(row.b.arm, p), &Moved::change, row.tools);
+  push(row.a, p, cross(row.a.arm, p), &Moved::change, true);
+  push(row.b, -p, -cross(row.b.arm, p), &Moved::change, true);
 }
 
 // How the two part by this impulse, where nothing has been pushed yet.
@@ -139,14 +139,16 @@ void ToolTouch::list_jaws(Moved &m) const {
 }
 
 // A jaw that has been turned goes back to where it is told by a large angle, and what holds it takes that
-// back to first order. The way along the arc beyond it, h w x (w x r) / 2, would stay as creep.
+// back to first order. The way along the arc beyond it, h w x (w x r) / 2, would stay as creep: this part of
+// its motion counts to first order. With the frame it goes along the whole arc.
 void ToolTouch::straighten(Moved &m) const {
   const dfm_rigid_state &frame = m.set->state[0];
   for (const Moved::Jaw &jaw : m.jaws) {
     double *const v = &m.free[6 * size_t{jaw.part}];
     const Vec3 spin = load3(&m.free[3]), arm = load3(m.set->state[jaw.part].position) - load3(frame.position);
     const double rate = dot(jaw.axis, load3(v + 3) - spin);
-    store3(v, load3(&m.free[0]) + cross(spin, arm) + rate * jaw.lever);
+    const Vec3 carried = rotate(turned(Quat{}, h_ * spin), arm) - arm;
+    store3(v, load3(&m.free[0]) + (1 / h_) * carried + rate * jaw.lever);
     store3(v + 3, spin + rate * jaw.axis);
   }
 }
@@ -156,12 +158,51 @@ bool ToolTouch::soft(const Side &a, const Side &b) const {
   return is_jaw(a) || is_jaw(b);
 }
 
+// The impulses of a set: those of soft bodies, and of the rows.
+void ToolTouch::add_impulses(size_t k) {
+  RigidSet &set = *sides_[k].set;
+  std::copy(sides_[k].given.begin(), sides_[k].given.end(), set.impulse.begin());
+  for (const Row &row : rows_)
+    for (const Side *side : {&row.a, &row.b}) {
+      if (side->tool != k) continue;
+      const Vec3 p = side == &row.a ? row.given() : -row.given();
+      double *const to = &set.impulse[6 * size_t{side->part}];
+      add(p, to);
+      add(cross(side->arm, p), to + 3);
+    }
+}
+
+// The mean spin of a free rigid body is not linear in its impulses, because its moments turn with it. What
+// its host makes of the impulses so far, less what was taken for it, counts in the next pass: a thin body
+// would be turned to and fro by it. Largest change, m/s.
+double ToolTouch::follow_spin() {
+  double most = 0;
+  for (size_t k = 0; k < sides_.size(); ++k) {
+    Moved &m = sides_[k];
+    if (m.set->of_tool || !m.touched) continue;
+    add_impulses(k);
+    bool again = false;
+    if (m.set->end_state(again)) continue;  // it says so at the end of the sub-step
+    for (uint32_t i = 0; i < m.set->defs.size(); ++i) {
+      if (m.set->group[i] == DFM_RIGID_STILL) continue;
+      const size_t at = 6 * size_t{i} + 3;
+      const Quat turned = rotation_of(m.set->next[i]) * conjugate(rotation_of(m.set->state[i]));
+      const Vec3 change = (1 / h_) * rotation_vector(turned) - load3(&m.base[at]) - load3(&m.change[at]);
+      add(change, &m.base[at]);
+      add(change, &m.turn[at]);
+      most = std::max(most, m.reach[i] * norm(change));
+    }
+  }
+  return most;
+}
+
 // (exp(h w) - 1) r / h less its first term, to third order: what is held by a tool that turns would creep
 // outwards by it.
 Vec3 ToolTouch::bend(const Side &side) const {
   const Moved &m = sides_[side.tool];
   const size_t at = 6 * size_t{side.part} + 3;
   const Vec3 spin = load3(&m.base[at]) + load3(&m.change[at]);
+  if (h_ * h_ * norm2(spin) > kMostTurn * kMostTurn) return {};
   const Vec3 second = cross(spin, cross(spin, side.arm));
   return (0.5 * h_) * second + (h_ * h_ / 6) * cross(spin, second);
 }
@@ -172,7 +213,8 @@ double ToolTouch::fastest(const ToolShape &shape, const Side &side) const {
   return norm(load3(v)) + norm(load3(v + 3)) * arm;
 }
 
-void ToolTouch::add_row(const Pair &pair, Side a, Side b, Vec3 at, Vec3 normal, double gap, double reach) {
+void ToolTouch::add_row(const Pair &pair, Name name, Side a, Side b, Vec3 at, Vec3 normal, double gap,
+                        double reach) {
   if (!(gap - offset_ < reach)) return;
   a.arm = at - center(a);
   b.arm = at - center(b);
@@ -180,9 +222,11 @@ void ToolTouch::add_row(const Pair &pair, Side a, Side b, Vec3 at, Vec3 normal, 
   row.a = a;
   row.b = b;
   row.normal = normal;
-  row.mu = pair.mu;
-  row.tools = pair.tools;
-  if (pair.tools && soft(a, b)) {
+  row.law = pair.law;
+  row.pair[0] = pair.id[0];
+  row.pair[1] = pair.id[1];
+  row.key = key_of(pair.id, name);
+  if (soft(a, b)) {
     row.soft = 1 / (h_ * h_ * kFace);
     row.rate = (offset_ - gap) / h_;
   } else if (gap >= offset_) row.rate = -(gap - offset_) / h_;
@@ -190,16 +234,12 @@ void ToolTouch::add_row(const Pair &pair, Side a, Side b, Vec3 at, Vec3 normal, 
   const double w = dot(normal, answer_to(row, normal));
   if (!(w > 0)) return;  // neither gives way
   row.inverse = 1 / (w + row.soft);
-  if (row.mu > 0) {
-    row.tangent[0] = any_tangent(normal);
-    row.tangent[1] = cross(normal, row.tangent[0]);
-    const Vec3 first = answer_to(row, row.tangent[0]), second = answer_to(row, row.tangent[1]);
-    const double p = dot(row.tangent[0], first), q = dot(row.tangent[1], second),
-                 both = dot(row.tangent[0], second);
-    const double most = 0.5 * (p + q) + std::sqrt(0.25 * (p - q) * (p - q) + both * both);
-    if (most > 0) row.inverse_t = 1 / most;
-    else row.mu = 0;
-  }
+  row.tangent[0] = any_tangent(normal);
+  row.tangent[1] = cross(normal, row.tangent[0]);
+  const Vec3 first = answer_to(row, row.tangent[0]), second = answer_to(row, row.tangent[1]);
+  const double p = dot(row.tangent[0], first), q = dot(row.tangent[1], second),
+               both = dot(row.tangent[0], second);
+  row.response = 0.5 * (p + q) + std::sqrt(0.25 * (p - q) * (p - q) + both * both);
   rows_.push_back(row);
 }
 
@@ -215,18 +255,17 @@ void ToolTouch::add_rows(const Pair &pair, ToolShape &a, ToolShape &b, Side at_a
   a.look_at(near);
   b.look_at({of_a.lo - wide, of_a.hi + wide});
   ObstaclePoint o;
-  for (const Vec3 corner : a.corners()) {
+  for (const auto &[corner, number] : a.corners()) {
     if (!b.closest(corner, far + a.round(), o)) continue;
     const double gap = o.distance - a.round();
-    add_row(pair, at_a, at_b, o.point + 0.5 * gap * o.normal, o.normal, gap, reach);
+    add_row(pair, {kCornerOfA, number, 0}, at_a, at_b, o.point + 0.5 * gap * o.normal, o.normal, gap, reach);
   }
-  for (const Vec3 corner : b.corners()) {
+  for (const auto &[corner, number] : b.corners()) {
     if (!a.closest(corner, far + b.round(), o)) continue;
     const double gap = o.distance - b.round();
-    add_row(pair, at_a, at_b, o.point + 0.5 * gap * o.normal, -o.normal, gap, reach);
+    add_row(pair, {kCornerOfB, number, 0}, at_a, at_b, o.point + 0.5 * gap * o.normal, -o.normal, gap, reach);
   }
-  const double round = a.round() + b.round(),
-               deep = pair.tools && soft(at_a, at_b) ? std::max(far, kDent) : far;
+  const double round = a.round() + b.round();
   for (const ToolShape::Edge &p : a.edges())
     for (const ToolShape::Edge &q : b.edges()) {
       if (!segments_within(p.from, p.to, q.from, q.to, far + round)) continue;
@@ -236,8 +275,9 @@ void ToolTouch::add_rows(const Pair &pair, ToolShape &a, ToolShape &b, Side at_a
       Vec3 n;
       if (!between(p, q, on_a - on_b, n)) continue;
       const double gap = dot(n, on_a - on_b) - round;
-      if (gap < -deep) continue;
-      add_row(pair, at_a, at_b, on_b + (b.round() + 0.5 * gap) * n, n, gap, reach);
+      if (gap < -kDent) continue;
+      add_row(pair, {kEdges, p.number, q.number}, at_a, at_b, on_b + (b.round() + 0.5 * gap) * n, n, gap,
+              reach);
     }
 }
 
@@ -262,7 +302,8 @@ void ToolTouch::find(const World &w, const StepContext &step) {
 // Gauss-Seidel: the rows are few. Largest change, m/s.
 double ToolTouch::sweep() {
   double most = 0;
-  for (Row &row : rows_) {
+  for (uint32_t i = 0; i < rows_.size(); ++i) {
+    Row &row = rows_[i];
     const Vec3 u = speed(row);
     const double next =
         std::max(0.0, row.impulse + row.inverse * (row.rate - dot(row.normal, u) - row.soft * row.impulse));
@@ -272,42 +313,79 @@ double ToolTouch::sweep() {
       push(row, more * row.normal);
       most = std::max(most, std::fabs(more) / row.inverse);
     }
-    if (!(row.mu > 0) || (next == 0 && norm2(row.along) == 0)) continue;
-    const Vec3 slip = (more != 0 ? speed(row) : u) + row.bend;
-    Vec3 along;
-    for (const Vec3 t : row.tangent) along += (dot(t, row.along) - row.inverse_t * dot(t, slip)) * t;
-    const double size = norm(along), limit = row.mu * next;
-    if (size > limit) along = (limit / size) * along;
-    const Vec3 change = along - row.along;
-    if (norm2(change) == 0) continue;
-    row.along = along;
-    push(row, change);
-    most = std::max(most, norm(change) / row.inverse_t);
+    if (!(row.response > 0) || (next == 0 && row.along[0] == 0 && row.along[1] == 0)) continue;
+    const std::array<double, 2> t = next > 0 ? rub(i) : std::array<double, 2>{};
+    const double change[2] = {t[0] - row.along[0], t[1] - row.along[1]};
+    if (change[0] == 0 && change[1] == 0) continue;
+    std::copy(t.begin(), t.end(), row.along);
+    push(row, change[0] * row.tangent[0] + change[1] * row.tangent[1]);
+    most = std::max(most, row.response * std::sqrt(change[0] * change[0] + change[1] * change[1]));
   }
   return most;
 }
 
+void ToolTouch::take_impulses(Array<double> &to) const {
+  to.resize(3 * rows_.size());
+  for (size_t i = 0; i < rows_.size(); ++i)
+    store3(&to[3 * i], {rows_[i].impulse, rows_[i].along[0], rows_[i].along[1]});
+}
+
+// Light things between heavy ones, with more places than they have motions: sweeps alone are slow. Between
+// two of them Anderson's combination of the last few; the result is always what a plain sweep has left.
+void ToolTouch::sweep_until(double done) {
+  const size_t n = 3 * rows_.size();
+  weight_.resize(n);
+  step_.resize(n);
+  for (size_t i = 0; i < rows_.size(); ++i)
+    store3(&weight_[3 * i], {1 / rows_[i].inverse, rows_[i].response, rows_[i].response});
+  anderson_.start(n);
+  double last = HUGE_VAL;
+  for (uint32_t k = 1;; ++k) {
+    take_impulses(from_);
+    const double left = sweep();
+    if (!(left > done) || k == kMostSweeps) return;
+    take_impulses(now_);
+    for (size_t i = 0; i < n; ++i) step_[i] = now_[i] - from_[i];
+    if (left > kRises * last) anderson_.start(n);  // places have opened or begun to slip
+    last = left;
+    anderson_.next(from_.data(), step_.data(), weight_.data(), step_.data());
+    for (size_t i = 0; i < rows_.size(); ++i) {
+      Row &row = rows_[i];
+      Vec3 leap = load3(&from_[3 * i]) + load3(&step_[3 * i]) - load3(&now_[3 * i]);
+      leap.x = std::max(leap.x, -row.impulse);
+      row.impulse += leap.x;
+      row.along[0] += leap.y;
+      row.along[1] += leap.z;
+      push(row, leap.x * row.normal + leap.y * row.tangent[0] + leap.z * row.tangent[1]);
+    }
+  }
+}
+
+// Passes over the laws, as for soft bodies (step/solve_islands.cpp), with what turning adds beyond the first
+// order, which changes with the solution as well.
 void ToolTouch::solve() {
   double scale = 0;
   for (const Row &row : rows_)
     scale = std::max(
         scale, std::fabs(row.rate) + std::fabs(dot(row.normal, speed(row))) + row.impulse / row.inverse);
-  for (uint32_t round = 0; round < kMostBends; ++round) {
+  const double done = kDone * scale;
+  for (uint32_t pass = 0; pass < kMostPasses; ++pass) {
     double changed = 0;
     for (Row &row : rows_) {
-      if (!(row.mu > 0)) continue;
       const Vec3 now = bend(row.a) - bend(row.b);
       changed = std::max(changed, norm(now - row.bend));
       row.bend = now;
     }
-    if (round > 0 && !(changed > kDone * scale)) return;
-    for (uint32_t k = 0; k < kMostSweeps; ++k)
-      if (!(sweep() > kDone * scale)) break;
+    if (pass > 0) changed = std::max(changed, follow_spin());
+    changed = std::max(changed, ask_laws(done));
+    if (pass > 0 && !(changed > done)) return;
+    sweep_until(done);
   }
 }
 
 void ToolTouch::begin(World &w, StepContext &step) {
   rows_.clear();
+  if (next_.n > 0) keep_next();
   size_t n = 0;
   if (!pairs_.empty())
     for (auto &set : w.rigid_sets) n += plain(*set);
@@ -324,6 +402,10 @@ void ToolTouch::begin(World &w, StepContext &step) {
     m.free.assign(set->velocity.begin(), set->velocity.end());
     m.base = m.free;
     m.change.assign(width, 0.0);
+    m.turn.assign(width, 0.0);
+    m.given.assign(width, 0.0);
+    m.reach.assign(set->defs.size(), 0.0);
+    m.touched = false;
     m.response.assign(width * width, 0.0);
     for (uint32_t g = 0; g < set->ngroup; ++g) {
       const uint32_t bodies = step.rigid_groups[set->first_group + g], wide = 6 * bodies;
@@ -352,17 +434,24 @@ void ToolTouch::begin(World &w, StepContext &step) {
     sides_.clear();
     return;
   }
+  take_last(w);
+  for (const Row &row : rows_)
+    for (const Side *side : {&row.a, &row.b}) {
+      Moved &m = sides_[side->tool];
+      m.touched = true;
+      m.reach[side->part] = std::max(m.reach[side->part], norm(side->arm));
+    }
   solve();
   for (Row &row : rows_) row.before = row.given();
   for (Moved &m : sides_)
-    for (size_t i = 0; i < m.free.size(); ++i) m.set->velocity[i] = m.free[i] + m.change[i];
+    for (size_t i = 0; i < m.free.size(); ++i) m.set->velocity[i] = m.free[i] + m.change[i] + m.turn[i];
 }
 
 void ToolTouch::correct() {
   for (Moved &m : sides_) {
     m.free.assign(m.set->velocity.begin(), m.set->velocity.end());
     straighten(m);
-    for (size_t i = 0; i < m.free.size(); ++i) m.set->velocity[i] = m.free[i] + m.change[i];
+    for (size_t i = 0; i < m.free.size(); ++i) m.set->velocity[i] = m.free[i] + m.change[i] + m.turn[i];
   }
   for (Row &row : rows_) row.before = row.given();
 }
@@ -371,24 +460,20 @@ bool ToolTouch::answer() {
   if (rows_.empty()) return false;
   for (size_t k = 0; k < sides_.size(); ++k) {
     Moved &m = sides_[k];
-    m.base = m.free;
+    for (size_t i = 0; i < m.free.size(); ++i) m.base[i] = m.free[i] + m.turn[i];
+    m.given.assign(m.set->impulse.begin(), m.set->impulse.end());
     for (uint32_t i = 0; i < m.set->defs.size(); ++i) {
-      const double *const p = &m.set->impulse[6 * size_t{i}];
+      const double *const p = &m.given[6 * size_t{i}];
       push({k, i, {}}, load3(p), load3(p + 3), &Moved::base, false);
     }
   }
   solve();
+  for (size_t k = 0; k < sides_.size(); ++k) add_impulses(k);
+  keep_next();
   double scale = 0, most = 0;
   for (const Row &row : rows_) {
-    const Vec3 p = row.given();
-    scale = std::max(scale, std::fabs(row.rate) + norm(p) / row.inverse);
-    most = std::max(most, norm(p - row.before) / row.inverse);
-    for (const Side *side : {&row.a, &row.b}) {
-      const Vec3 q = side == &row.a ? p : -p;
-      double *const to = &sides_[side->tool].set->impulse[6 * size_t{side->part}];
-      add(q, to);
-      add(cross(side->arm, q), to + 3);
-    }
+    scale = std::max(scale, std::fabs(row.rate) + norm(row.given()) / row.inverse);
+    most = std::max(most, norm(row.given() - row.before) / row.inverse);
   }
   return most > kSame * scale;
 }

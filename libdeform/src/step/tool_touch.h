@@ -1,12 +1,12 @@
 // Contact of tools with each other (deform/tool.h) and with rigid bodies of the builtin host that have no
-// joints, where one of the two gives way. Spheres, capsules, boxes and triangles; Coulomb friction
-// between tools.
+// joints, where one of the two gives way. Spheres, capsules, boxes and triangles, with the law of the pair.
 //
 //   rows     u_n' >= -(gap - d_c) / h at the nearest places of two parts, p >= 0, one of both is zero; the
 //            impulse acts at one point of both, so that both momenta are kept to rounding
 //   energy   p u_n' <= 0 for gap >= d_c / 2: such a contact takes energy or none. What is nearer opens by at
 //            most a tenth of d_c in a sub-step
-//   friction |p_t| <= mu p, against the slip, with the limit of the pair's law; it takes energy or none
+//   friction the law of the pair, implicitly, at the slip and normal force of the solution (tool_rub.cpp);
+//            impulses and the state of the law last from sub-step to sub-step (World::tool_store)
 //   jaws     go where they are told, so what two of them hold would be pressed without a bound. Something
 //            rigid turns a jaw about its hinge by moment over stiffness, at the end of the sub-step (a spring
 //            without mass, backward Euler); soft bodies do not. Places on its face give way, too, by a
@@ -14,9 +14,14 @@
 //   order    first without soft bodies, which then see how the tools really move; their impulses come back
 //            into the same rows until neither changes the other
 #pragma once
+#include <array>
 #include <cstdint>
 #include <vector>
 
+#include "contact/contact_set.h"
+#include "contact/store.h"
+#include "friction/laws.h"
+#include "math/anderson.h"
 #include "math/vec3.h"
 #include "step/tool_shape.h"
 
@@ -29,8 +34,9 @@ struct World;
 
 class ToolTouch {
  public:
-  // After a change of things or rules: which obstacles may touch, and how they rub.
-  void prepare(const World &w);
+  explicit ToolTouch(const Memory &memory);
+  // After a change of things or rules: which obstacles may touch, and by which law.
+  void prepare(World &w);
   // Before the solve: the rows of this sub-step, and the sets' velocities with their impulses.
   void begin(World &w, StepContext &step);
   // The hosts were asked for their velocities anew.
@@ -40,6 +46,9 @@ class ToolTouch {
   bool answer();
   // Once the hosts have ended their sub-step: turns the ends of the jaws.
   void turn_jaws();
+  // At the end of a sub-step that stands: what lasts becomes the world's.
+  void keep(World &w) noexcept;
+  ContactStore &next() { return next_; }
 
  private:
   struct Side {
@@ -49,23 +58,27 @@ class ToolTouch {
   };
   struct Row {
     Side a, b;
-    Vec3 normal, tangent[2];    // from b to a
-    double rate;                // m/s, that u_n must reach
-    double soft;                // 1/kg, of the face of a jaw
-    double mu;                  // friction over normal force
-    double inverse, inverse_t;  // kg
-    bool tools;                 // both
-    double impulse;
-    Vec3 along;   // N s, friction on a
-    Vec3 bend;    // m/s, what turning adds to the slip beyond the first order
-    Vec3 before;  // the impulse on a that velocities have
-    Vec3 given() const { return impulse * normal + along; }
+    uint64_t key, pair[2];    // lasting names: of itself, of the two obstacles
+    Vec3 normal, tangent[2];  // from b to a
+    double rate;              // m/s, that u_n must reach
+    double soft;              // 1/kg, of the face of a jaw
+    double inverse;           // kg
+    double response;          // 1/kg, the largest one in the tangent plane; 0: does not rub
+    uint32_t law;
+    double impulse, along[2];  // N s on a: along the normal and the tangents
+    Vec3 bend;                 // m/s, what turning adds to the slip beyond the first order
+    Vec3 before;               // the impulse on a that velocities have
+    Vec3 given() const { return impulse * normal + along[0] * tangent[0] + along[1] * tangent[1]; }
   };
   struct Moved {
     RigidSet *set;
     std::vector<double> response, block;     // [6n,6n] 1/kg; of one group
     std::vector<double> free, base, change;  // [6n] m/s, rad/s
+    std::vector<double> turn;                // [6n] what impulses change beyond the response
+    std::vector<double> given;               // [6n] N s, N m s of soft bodies
+    std::vector<double> reach;               // [n] m, of its rows from its center
     bool responds;                           // the response is not zero
+    bool touched;                            // a row is its own
     struct Jaw {
       uint32_t part;
       Vec3 axis, lever;  // velocity of its center by a turn of one about the axis
@@ -77,9 +90,14 @@ class ToolTouch {
   };
   // Two obstacles that may touch, by their places in World::obstacles.
   struct Pair {
-    uint32_t a, b;
-    double mu;
-    bool tools;  // both are parts of tools
+    uint32_t a, b, law;
+    uint64_t id[2];
+  };
+  // What of the two meets.
+  enum Meeting : uint32_t { kCornerOfA, kCornerOfB, kEdges };
+  struct Name {
+    Meeting kind;
+    uint32_t first, second;
   };
   Vec3 speed(const Row &row) const;
   void push(const Row &row, Vec3 impulse);
@@ -87,20 +105,41 @@ class ToolTouch {
   Vec3 answer_to(const Row &row, Vec3 impulse);
   void find(const World &w, const StepContext &step);
   void add_rows(const Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b);
-  void add_row(const Pair &pair, Side a, Side b, Vec3 at, Vec3 normal, double gap, double reach);
+  void add_row(const Pair &pair, Name name, Side a, Side b, Vec3 at, Vec3 normal, double gap, double reach);
+  static uint64_t key_of(const uint64_t pair[2], Name name);
   double fastest(const ToolShape &shape, const Side &side) const;
   Vec3 center(const Side &side) const;
   void list_jaws(Moved &m) const;
   void straighten(Moved &m) const;
   Vec3 bend(const Side &side) const;
+  void add_impulses(size_t k);
+  double follow_spin();
   bool soft(const Side &a, const Side &b) const;
   double sweep();
+  void sweep_until(double done);
+  void take_impulses(Array<double> &to) const;
   void solve();
+  // tool_rub.cpp
+  void take_last(const World &w);
+  double ask_laws(double least);
+  Vec3 slip(const Row &row) const;
+  std::array<double, 2> rub(uint32_t i) const;
+  void keep_next();
 
   double h_ = 0, offset_ = 0;
   std::vector<Pair> pairs_;
   std::vector<Moved> sides_;
   std::vector<Row> rows_;
+  // By row.
+  ContactState state_;
+  LawBatches batches_;
+  std::vector<LawInstance *> laws_;  // of the world
+  Array<ContactPoint> points_;       // key and normal
+  Array<double> start_, tangents_, response_;
+  Anderson anderson_;
+  Array<double> weight_, step_, from_, now_;  // of it, [3 rows]
+  Array<uint32_t> match_;
+  ContactStore next_;
 };
 
 }  // namespace dfm

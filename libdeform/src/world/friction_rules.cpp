@@ -25,9 +25,10 @@ std::vector<uint8_t> free_laws(const World &w, const FrictionRule *but) {
   };
   for (const FrictionRule &r : w.friction)
     if (&r != but) use(r.law);
-  for (const auto *const list : {&w.pairs.law, &w.pairs.zone_law})
+  for (const auto *const list : {&w.pairs.law, &w.pairs.zone_law, &w.pairs.tool_law})
     std::for_each(list->begin(), list->end(), use);
-  std::for_each(w.store.law.begin(), w.store.law.end(), use);
+  for (const ContactStore *const store : {&w.store, &w.tool_store})
+    std::for_each(store->law.begin(), store->law.end(), use);
   return free;
 }
 

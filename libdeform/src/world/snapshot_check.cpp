@@ -48,6 +48,17 @@ bool good_contacts(const Staged &t, const Things &things) {
   return true;
 }
 
+bool good_tool_contacts(const Staged &t) {
+  const ContactStore &c = t.tool_store;
+  if ((c.n > 0 && !(c.h > 0)) || !c.due.empty() || !c.crossings.empty()) return false;
+  for (uint32_t i = 0; i < c.n; ++i) {
+    const Vec3 n = load3(&c.normal[3 * size_t{i}]), u = load3(&c.tangent[3 * size_t{i}]);
+    if (!(norm2(n) < 1.01 && norm2(u) < 1.01) || c.id_a[i] >= t.next_id || c.id_b[i] >= t.next_id)
+      return false;
+  }
+  return true;
+}
+
 bool good_work(const std::vector<PairWork> &work, const Things &things) {
   for (size_t i = 0; i < work.size(); ++i)
     if (!things.body(work[i].a) || !things.known(work[i].b) ||
@@ -100,6 +111,7 @@ bool good_report(const Staged &t, const World &w) {
 void check(const SnapshotReader &s, const Staged &t, const World &w) {
   if (!s.at_end()) s.refuse("the end", "no bytes after the last field");
   if (!good_contacts(t, {w})) s.refuse("contacts", "contacts of bodies and obstacles that are there");
+  if (!good_tool_contacts(t)) s.refuse("contacts of tools", "contacts that tools can have");
   if (!good_work(t.work, {w})) s.refuse("friction work", "pairs that are there, in order");
   if (!good_aside(t.overlaps.aside, {w}))
     s.refuse("pairs that are set aside", "bodies and obstacles that are there");

@@ -371,6 +371,9 @@ void fields(Stream &s, W &w, const World &like) {
   attachment_fields(s, w);
   rule_fields(s, w, w.laws.size());
   contact_fields(s, w.store, w.laws.size());
+  s.where("contacts of tools", "");
+  contact_fields(s, w.tool_store, w.laws.size());
+  s.where("", "");
   s.array("friction work", w.work, kAnyCount,
           must::Be{[](const PairWork &x) { return sound(x); }, "finite work, rises not below zero"});
   if (w.sleepers == 0) return;  // contacts that sleep are reported from what the last sub-step left

@@ -2,7 +2,6 @@
 // are exchanged, which cannot fail; if the derived tables cannot be made, they are exchanged back.
 #include <algorithm>
 #include <cstring>
-#include <numeric>
 
 #include "body/make_surface.h"
 #include "core/error.h"
@@ -66,16 +65,9 @@ std::vector<std::unique_ptr<LawInstance>> make_laws(const SnapshotReader &s, con
       }
     most = std::max(most, laws.back()->nstate);
   }
-  if (t.store.nstate > most) s.refuse("contact states", "no more than a law has");
+  if (std::max(t.store.nstate, t.tool_store.nstate) > most)
+    s.refuse("contact states", "no more than a law has");
   return laws;
-}
-
-// Derived data, therefore recomputed and not read.
-void order_contacts(ContactStore &c) {
-  c.by_key.resize(c.n);
-  std::iota(c.by_key.begin(), c.by_key.end(), 0u);
-  std::sort(c.by_key.begin(), c.by_key.end(),
-            [&](uint32_t i, uint32_t j) { return c.key[i] != c.key[j] ? c.key[i] < c.key[j] : i < j; });
 }
 
 // Makes the models that the world's bodies do not have, with the inputs in the snapshot.
@@ -233,6 +225,7 @@ void exchange(World &w, Staged &t) noexcept {
   std::swap(w.def.gravity, t.def.gravity);
   std::swap(w.def.sleep, t.def.sleep);
   std::swap(w.store, t.store);
+  std::swap(w.tool_store, t.tool_store);
   std::swap(w.report, t.report);
   std::swap(w.stats, t.stats);
   std::swap(w.time, t.time);
@@ -261,7 +254,8 @@ void world_restore(World &w, const void *data, size_t bytes) {
   for (StagedObstacle &o : staged.obstacles) o.material = o.zone.material;
   snapshot::check(s, staged, w);
   make_models(s, w, staged);
-  order_contacts(staged.store);
+  // derived data, therefore recomputed and not read
+  for (ContactStore *const store : {&staged.store, &staged.tool_store}) store->order();
   std::vector<std::unique_ptr<LawInstance>> laws = make_laws(s, w, staged);
   const double offset = w.offset;
   const uint32_t sleepers = w.sleepers;

@@ -77,13 +77,16 @@ struct Staged {
   std::vector<FrictionRule> friction;
   std::vector<FilterRule> filters;
   std::vector<Attachment> attachments;
-  ContactStore store;
+  ContactStore store, tool_store;
   struct { std::vector<PairAside> aside; } overlaps;
   std::vector<PairWork> work;
   Report report;
   std::vector<dfm_contact_event> events;  // none
   std::vector<Swap> swaps;                // none
-  explicit Staged(const World &w) : store(w.meters.contacts.memory()), report(w.meters.contacts.memory()) {
+  explicit Staged(const World &w)
+      : store(w.meters.contacts.memory()),
+        tool_store(w.meters.contacts.memory()),
+        report(w.meters.contacts.memory()) {
     const Memory &m = w.memory();
     def.method = w.def.method;
     bodies.resize(w.bodies.size());

@@ -36,6 +36,7 @@ World::World(dfm_context *c)
       meters(c->memory),
       steps(std::make_unique<StepContext>(meters)),
       store(meters.contacts.memory()),
+      tool_store(meters.contacts.memory()),
       report(meters.contacts.memory()) {
   use_memory(meters.contacts.memory(), step_impulses.pairs);
   stats.size = sizeof stats;

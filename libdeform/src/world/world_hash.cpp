@@ -16,11 +16,12 @@ uint64_t world_hash(const World &w) {
     h.add(set->state.data(), set->state.size() * sizeof(dfm_rigid_state));
     h.add(set->extra.data(), set->extra.size() * sizeof(double));
   }
-  each_column(
-      [&](const ContactColumn &column, const auto &values) {
-        if (column.hashed) h.add(values.data(), values.size() * sizeof(values[0]));
-      },
-      w.store);
+  for (const ContactStore *const store : {&w.store, &w.tool_store})
+    each_column(
+        [&](const ContactColumn &column, const auto &values) {
+          if (column.hashed) h.add(values.data(), values.size() * sizeof(values[0]));
+        },
+        *store);
   for (auto &b : w.bodies) h.add(b->method_values.data(), b->method_values.size() * sizeof(double));
   if (w.def.sleep)
     for (auto &b : w.bodies) {

@@ -63,7 +63,7 @@ struct Warm {
     std::copy(law.begin(), law.end(), state.law.begin());
     tangents.resize(3 * size_t{n});
     match.resize(n);
-    warm_start(old, contacts, h, rows, state, tangents.data(), match.data());
+    warm_start(old, contacts, h, rows.impulse, state, tangents.data(), match.data());
   }
   Vec3 impulse(uint32_t i) const { return load3(&rows.impulse[3 * size_t{i}]); }
   double bristle(uint32_t i, uint32_t s) const { return state.bristle[size_t{s} * state.stride + i]; }
