@@ -27,8 +27,8 @@ Adapter *adapter_of(const btDynamicsWorld *world) {
 
 const void *address(const btCollisionObject *o) { return o; }
 
-// Where something that moves as told is to be at the end of h: with the velocity that Bullet has made of what
-// it was told for a whole stepSimulation, and where it was put, where that is nearer.
+// Target of a body with a given motion at the end of h: by the velocity that Bullet has computed for a whole
+// stepSimulation, or the place where it was put, if that is nearer.
 Pose towards(const Pose &from, const Pose &to, Vec v, Vec w, double h) {
   const Vec way = to.position - from.position, turn = turn_of(to.rotation * conjugate(from.rotation));
   Pose out = to;
@@ -79,7 +79,7 @@ void Adapter::before_tick(btDynamicsWorld *world, btScalar h) {
     a->of_call_ = a->of_tick_;
     a->call_sentence_ = a->sentence_;
   }
-  // without bodies that take part nobody has stepped Bullet: the tick is its own
+  // without bodies that take part Bullet has not been stepped: the tick is its own
   if (a->of_tick_ < 0 || !a->engine_.members.empty())
     a->vacated_ = std::make_unique<Vacated>(*a->engine_.world);
 }

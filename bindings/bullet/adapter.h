@@ -91,7 +91,7 @@ class Adapter {
   std::vector<std::unique_ptr<Object>> objects_;  // in the order they came
   std::unordered_map<const btCollisionObject *, Object *> by_id_;
   std::unordered_map<const btCollisionObject *, Props> props_;
-  std::vector<Part> seen_;  // of the object that is looked at
+  std::vector<Part> seen_;  // of the present object
   Clock clock_;
   States states_;
   std::unique_ptr<Vacated> vacated_;

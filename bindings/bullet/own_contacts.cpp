@@ -29,7 +29,7 @@ std::pair<int, int> bodies_of(const btPersistentManifold &m) {
 }
 
 constexpr double kMost = 1e9;
-// A count or a number of a body as it was written; -1: none, in a snapshot that somebody else made.
+// A count or a number of a body as it was written; -1: none, in a snapshot from another program.
 int number(double x, double most) { return x >= 0 && x <= most ? int(x) : -1; }
 
 // What Bullet makes anew from these in each step (places in the world, directions of friction) is left out;

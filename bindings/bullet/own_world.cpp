@@ -169,7 +169,7 @@ void BulletWorld::make_joint(const Joint &joint, size_t number) {
     t.constraint = std::move(six);
   }
   t.constraint->setJointFeedback(&t.feedback);
-  world_.addConstraint(t.constraint.get(), true);  // who is joined does not collide
+  world_.addConstraint(t.constraint.get(), true);  // joined bodies do not collide
 }
 
 void BulletWorld::drive(size_t number, double velocity, double max, double h) {

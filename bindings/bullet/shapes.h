@@ -19,8 +19,8 @@ struct Part {
 bool parts_of(const btCollisionShape *shape, const Pose &local, std::vector<Part> &out,
               const btCollisionShape *&unknown);
 
-// True: these are the shape's leaves, as it is now. False: only parts_of() tells. Quick for a sphere, box or
-// capsule, of which most bodies have one.
+// True: these are the present leaves of the shape. False: only parts_of() can decide. Quick for a sphere, box
+// or capsule, of which most bodies have one.
 bool is_still(const btCollisionShape *shape, const std::vector<Part> &parts);
 
 // The leaf's kind, sizes and local pose. Arrays that are made here are put in `made`, and def points into

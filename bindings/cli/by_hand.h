@@ -37,7 +37,7 @@ class ByHand {
   bool pulls() const { return body_ != 0 || drag_.thing != 0; }
   // With which the spring pulls now, or what was dragged was pulled in the last step; N.
   void force(double out[3]) const;
-  double step() const { return step_; }  // s; 0: none was told
+  double step() const { return step_; }  // s; 0: none was given
   // Acts by which tools are led now: those of a recording that begins here.
   std::vector<JsonValue> tool_lines() const { return tools_.lines(); }
   // The world was put into another state: the spring is gone with the old one, and tools are led no more.

@@ -289,7 +289,7 @@ Dent dented(dfm_context *context, const std::string &model, int32_t integrator) 
 
 class Calibration {
  public:
-  // wanted: a terminal is told how far it is
+  // wanted: a terminal shows the progress
   Calibration(dfm_context *context, bool wanted, const std::vector<std::string> &only)
       : context_(context), wanted_(wanted) {
     need(dfm_plugin_visit(

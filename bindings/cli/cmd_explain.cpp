@@ -72,7 +72,7 @@ void print_facts(const JsonValue &plan) {
   }
 }
 
-// Whose energy nobody compares with the work that is done on it.
+// Bodies whose energy is not compared with the work done on them.
 void print_unwatched(const JsonValue &plan) {
   const JsonValue *bodies = plan.find("bodies");
   for (size_t i = 0; bodies && i < bodies->items.size(); ++i)

@@ -416,7 +416,7 @@ class Runner {
 
 int run_scene(RunOptions options, const Globals &globals, Comparison *comparison) {
   if (options.out.empty()) options.out = "out/" + std::filesystem::path(options.scene).stem().string();
-  if (options.time > 0) {  // the scene is read for that long: it tells what comes after its end
+  if (options.time > 0) {  // the scene is read for that long: it reports what comes after its end
     char text[64];
     std::snprintf(text, sizeof text, "/time/duration=%.17g", options.time);
     options.set.push_back(text);

@@ -25,7 +25,7 @@ double depth(const Triangle a, const Triangle b);
 // pass through each other rather than touch.
 bool pass_through(const Triangle a, const Triangle b);
 
-// obstacle: pairs of its triangles among themselves or with another obstacle's are nobody's affair.
+// obstacle: pairs of its triangles among themselves or with another obstacle's are not counted.
 // cut: its cut faces lie on each other, or on those of its pieces.
 struct Surface {
   const double *xyz;

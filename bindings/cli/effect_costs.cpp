@@ -21,7 +21,7 @@ constexpr unsigned kPairs = 11;
 // Of 11 independent differences the second least and the second largest enclose the median with a probability
 // of 1 - 2 (1 + 11) / 2^11 = 98.8 %, whatever their distribution.
 constexpr unsigned kOutside = 1;
-constexpr double kChunk = 0.03;  // s of processor time; shorter ones are told apart badly
+constexpr double kChunk = 0.03;  // s of processor time; shorter ones are hard to distinguish
 constexpr unsigned kMostSteps = 20000;
 
 double processor_time() { return double(std::clock()) / CLOCKS_PER_SEC; }

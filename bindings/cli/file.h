@@ -11,7 +11,7 @@ namespace cli {
 // All bytes of a file of at most `limit` bytes; `expected` says what is wanted, with its article.
 // Throws Failure.
 std::string read_file(const std::string &path, uint64_t limit, const char *expected);
-// To a temporary name first, then renamed: nobody reads half a file.
+// To a temporary name first, then renamed: a partial file is never read.
 void write_whole(const std::string &path, const std::string &text);
 
 using File = std::unique_ptr<FILE, int (*)(FILE *)>;

@@ -73,7 +73,7 @@ class OffScreen : public Frames {
   Drawing drawing_;
   std::optional<render::Bounds> extent_;
   std::optional<render::Camera> camera_;
-  double distance_ = 0;  // m, from the camera to what it looked at first
+  double distance_ = 0;  // m, from the camera to its first target
   uint32_t drawn_ = 0;
 };
 

@@ -11,7 +11,7 @@
 
 namespace cli {
 
-// What the law is told; vt is the mean slip of the step.
+// Inputs of the law; vt is the mean slip of the step.
 struct Slip { double dt = 0, fn = 1, vx = 0, vy = 0, stop_x = 0, stop_y = 0, dwell = 0; };
 
 // What it answered; f is resistive, f = -ft.

@@ -17,7 +17,7 @@ namespace {
 
 enum class Drawn { yes, no, cannot };  // cannot: no such interpreter, or it has no matplotlib
 
-// isolated: PYTHONHOME and PYTHONPATH are somebody else's settings for another interpreter.
+// isolated: PYTHONHOME and PYTHONPATH may be settings for another interpreter.
 Drawn draw_with(const std::string &python, bool isolated, const std::vector<std::string> &arguments) {
   std::vector<std::string> words = {python};
   if (isolated) words.push_back("-E");

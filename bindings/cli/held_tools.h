@@ -20,7 +20,7 @@ class HeldTools {
   void let(const JsonValue &line);
   void before_step(double h);
   void forget() { held_.clear(); }
-  // What somebody has to do who goes on from the present state.
+  // What a user must do to continue from the present state.
   std::vector<JsonValue> lines() const;
 
  private:

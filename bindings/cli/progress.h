@@ -22,7 +22,7 @@ class Progress {
   Clock::time_point begin_, next_;
 };
 
-// For one call that does not know its end before it has it: a terminal is told what is being done and for how
+// For one call that does not know its end before it has it: a terminal shows what is being done and for how
 // long, as long as this lives.
 class Patience {
  public:

@@ -51,7 +51,7 @@ class Comparison {
  public:
   explicit Comparison(const Recording &recording) : recording_(recording) {}
   void look(const SceneFile &scene);
-  // Does what was done by hand at this time, and returns how long the next step is: `own`, unless told.
+  // Does what was done by hand at this time, and returns how long the next step is: `own`, unless recorded.
   // 0: everything that was recorded has come.
   double prepare(const SceneFile &scene, double own);
   // Nothing where every state came and was the same; else what differed first.

@@ -48,8 +48,8 @@ void refuse_linked_folders(const std::string &folder) {
   }
 }
 
-// Files of an earlier run would read as results of this one. The summary goes first: without one nobody takes
-// the rest for a whole run. Files that a killed process was writing go too.
+// Files of an earlier run would look like results of this one. The summary is removed first: without it the
+// rest is not taken for a complete run. Files that a killed process was writing are removed too.
 void remove_earlier(const std::string &folder) {
   remove_matching(folder, "summary\\.json");
   remove_matching(

@@ -190,7 +190,7 @@ void OdeEngine::give_back() {
   for (const Saved &s : saved_) carry(s.body, s.force, s.torque);
 }
 
-// The sub-step before has ended for good, or been taken back.
+// The last sub-step has been committed or undone.
 void OdeEngine::close() {
   if (friction && stepped()) friction->settle(step_length());
   else if (friction) friction->drop();
@@ -236,7 +236,7 @@ void OdeEngine::flood(std::vector<size_t> open, F &&reach) {
   }
 }
 
-// Whatever hangs on something awake is awake, as in dWorldStep.
+// Bodies connected to an awake one are awake, as in dWorldStep.
 void OdeEngine::pull_awake() {
   for (Member *m : members) m->pulled = false;
   if (std::all_of(saved_.begin(), saved_.end(), [](const Saved &s) { return s.enabled; })) return;

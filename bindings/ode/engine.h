@@ -1,8 +1,8 @@
 // A dWorldID inside the contact solve (rigid_host/engine.h).
 //
 // Auto-disable is counted here, in sub-steps that count, by ODE's rule: ODE's own counters run on through
-// corrections and cannot be read. And what ODE would wake in its step because it hangs on something awake is
-// woken before the solve, which else would push what stands still.
+// corrections and cannot be read. Bodies that ODE would wake in its step because they are connected to an
+// awake body are woken before the solve, which would otherwise push bodies at rest.
 //
 // ODE's gyroscopic terms keep angular momentum to first order only. They are out of its step where the
 // caller has them on: free bodies are turned by the shared engine, and of jointed ones ODE solves I(q0) (w1 -

@@ -179,7 +179,7 @@ int RigidFriction::collide(dGeomID a, dGeomID b, double dt) {
     if (const Contact *old = match(mine.key, mine.place, taken)) take_over(mine, *old);
     const Vec u = velocity_at(body_a, mine.point) - velocity_at(body_b, mine.point);
     const double vt[2] = {dot(u, mine.tangent[0]), dot(u, mine.tangent[1])};
-    if (set_valued_ && !(mine.fn > 0)) mine.fn = 1;  // a coefficient needs some force to be told at
+    if (set_valued_ && !(mine.fn > 0)) mine.fn = 1;  // a coefficient needs some force for its evaluation
     const Answer answer = ask(mine, vt, dt);
     if (answer.good && set_valued_) {
       c.surface.mu = answer.limit / mine.fn;

@@ -57,7 +57,7 @@ class RigidFriction {
   // false: not saved under such a law
   bool read(const std::function<dGeomID(double)> &geom, const double *from, size_t count, Memory &out) const;
   void take(Memory &&memory) { last_ = std::move(memory); }
-  double h = 0;  // s, of the sub-step that begins; 0: nobody has said, the last one
+  double h = 0;  // s, of the sub-step that begins; 0: not given, the last one
 
  private:
   dfm_law law_ = 0;

@@ -68,7 +68,7 @@ dfm_status Adapter::snapshot(void *buffer, size_t *bytes) {
   TRY(sync());
   std::vector<double> numbers;
   const std::vector<dBodyID> hidden = hidden_bodies();
-  // wakes what hangs on it before the world tells who sleeps
+  // wakes connected bodies before the world reports which ones sleep
   for (auto &b : bodies_) numbers.push_back(dBodyIsEnabled(b->id));
   for (const dBodyID b : hidden) save(b, engine_.idle(b), numbers);
   const size_t of_bodies = numbers.size();

@@ -21,7 +21,7 @@ void caught(int number, const char *message, va_list args, dMessageFunction *the
     throw Assertion{text};
   }
   if (theirs) return theirs(number, message, args);
-  // ODE's own words where nobody has set a handler; it ends the process after them
+  // ODE's own message if no handler is set; it ends the process after them
   std::fprintf(stderr, "\nODE INTERNAL ERROR %d: ", number);
   std::vfprintf(stderr, message, args);
   std::fprintf(stderr, "\n");
@@ -46,7 +46,7 @@ Trap::~Trap() {
   const std::lock_guard lock(mutex);
   --inside;
   if (--traps > 0) return;
-  if (dGetDebugHandler() == on_debug) dSetDebugHandler(theirs_debug);  // else somebody has set one meanwhile
+  if (dGetDebugHandler() == on_debug) dSetDebugHandler(theirs_debug);  // else another one is set by now
   if (dGetErrorHandler() == on_error) dSetErrorHandler(theirs_error);
 }
 

@@ -155,7 +155,7 @@ Color palette(uint32_t i);
 // t is clamped to 0..1.
 Color map_color(ColorMap map, float t);
 
-// Through a temporary file and a rename, so that nobody reads half a picture. False: *why_not
+// Through a temporary file and a rename, so that a partial picture is never read. False: *why_not
 // is one sentence.
 bool write_png(const std::string &path, const Image &picture, std::string *why_not);
 bool read_png(const std::string &path, Image &picture, std::string *why_not);

@@ -137,7 +137,7 @@ void add_planes(const Scene &scene, Frame &frame, const Bounds &extent) {
   g.spacing = nice(0.45 * frame.extent);
   g.x = square_to(frame.up);
   g.y = cross(frame.up, g.x);
-  // The pattern hangs on the world, not on the scene's middle, so that it rests from frame to frame.
+  // The pattern is fixed to the world, not to the middle of the scene, so it does not move between frames.
   const Vec level = vec(floor->point) + frame.up * 1e-9;
   const Vec sight = scene.camera ? eye - frame.view.back * way : middle;
   const Vec foot = sight + frame.up * dot(frame.up, level - sight);
@@ -510,7 +510,7 @@ void GlRenderer::draw_shadows(const Frame &frame, const Mat4 &key, const std::ve
   gl_.Disable(GL_POLYGON_OFFSET_FILL);
 }
 
-// What a program of the colors is told once a picture.
+// Values that a color program gets once per picture.
 void GlRenderer::light(const Frame &frame, const Mat4 &key, const std::vector<Mat4> &sky,
                        const std::vector<Vec> &directions) const {
   const double distance = norm(frame.view.eye - frame.center);

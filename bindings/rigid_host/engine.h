@@ -71,7 +71,7 @@ struct Member {
   Kind kind = still;
   bool turns = false;      // its turn is computed here
   bool asleep = false;     // the engine has it asleep
-  bool kinematic = false;  // it moves as told
+  bool kinematic = false;  // it follows a given motion
   bool wakes = false;      // contact wakes it
   bool pulled = false;     // a joint or contact of the engine has woken it
   dfm_rigid_state start{};
@@ -132,7 +132,7 @@ class Engine {
   bool is_open() const { return open_; }
 
  protected:
-  // The sub-step's start is what the engine has now: the last one has ended for good or been taken back.
+  // The sub-step's start is what the engine has now: the last one has been committed or undone.
   virtual void prepare(const dfm_rigid_step &step) = 0;
   // All bodies as they were at the start of the sub-step. given: asleep or awake as before it, too.
   virtual void restore(bool given) = 0;

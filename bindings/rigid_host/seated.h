@@ -62,9 +62,9 @@ dfm_status unbind(dfm_obstacle &obstacle);
 // A shape without a body that the caller has moved: its surface comes along within the next step.
 dfm_status follow(dfm_obstacle &obstacle, Pose &known, const Pose &now);
 
-// Adapters by handle. Handles count up and are never used twice. Never destroyed: an adapter that nobody has
-// detached stands in worlds of the dfm_world and of the engine, which at the program's end may be gone before
-// it or stay longer than it, and what detaches as late as that must still find it.
+// Adapters by handle. Handles count up and are never used twice. Never destroyed: an adapter that was not
+// detached is in use by the dfm_world and by the engine. At the program's end these may be destroyed before
+// it or after it, and a late call that detaches it must still find it.
 template <class Adapter>
 class Registry {
  public:

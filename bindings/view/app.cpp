@@ -110,7 +110,7 @@ void App::attempt(const std::function<void()> &what) {
     what();
   } catch (const cli::Failure &failure) {
     message_ = failure.what();
-    if (script_) throw;  // nobody reads the window
+    if (script_) throw;  // no user reads the window
   }
 }
 

@@ -36,7 +36,7 @@ void Arrows::fill(const cli::SceneFile &scene, double size, const render::Camera
   cli::need(dfm_world_contacts(scene.world(), 0, nullptr, &n));
   contacts_.resize(n);
   if (n > 0) cli::need(dfm_world_contacts(scene.world(), n, contacts_.data(), &n));
-  // On the body that was made first, whichever side the contact is told for.
+  // On the body that was made first, whichever side the contact is reported for.
   const auto force = [](const dfm_contact &c) {
     const Vec normal = render::vec(c.normal), first = render::vec(c.tangent);
     const Vec on_a = normal * c.fn + first * c.ft[0] + cross(normal, first) * c.ft[1];

@@ -1,5 +1,5 @@
 // A viewer without hands: lines `t key|drag|slider|shot ARGS`, t in seconds of the frame clock. Empty lines
-// and what follows # are passed over.
+// and what follows # are skipped.
 //
 //   0.5 key space                       presses a key
 //   1.0 drag 640 360 700 300 0.5 0.2    moves the mouse with the left button down, from one pixel to another,

@@ -89,7 +89,7 @@ dfm_device SpaceMouse::device() {
   return out;
 }
 
-// False: nobody touches it.
+// False: not touched.
 bool SpaceMouse::listen() {
   Event e = {};
   while (library_->poll(&e) != 0) {

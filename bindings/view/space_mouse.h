@@ -34,7 +34,7 @@ class SpaceMouse {
   dfm_pose pose_ = {};
   double opening_ = 0, speed_ = 0, asked_ = -1;
   render::Vec right_, up_, back_;
-  int motion_[6] = {0, 0, 0, 0, 0, 0};  // as it was told last
+  int motion_[6] = {0, 0, 0, 0, 0, 0};  // the last values
   bool pressed_[2] = {false, false};
 };
 

@@ -13,7 +13,7 @@ namespace view {
 class Window {
  public:
   // Throws cli::Failure with one sentence where no window can be had here. hands: the user's mouse and keys
-  // count; else only what draw() is told.
+  // count; else only what draw() gets.
   static std::unique_ptr<Window> open(uint32_t width, uint32_t height, const std::string &title, bool hands);
   virtual ~Window() = default;
   // What the user did since the last call; waits for it for at most `wait` s.

@@ -5,7 +5,7 @@
 namespace msm {
 namespace {
 
-constexpr uint32_t kMostAround = 64;  // cells around an edge that are looked at together
+constexpr uint32_t kMostAround = 64;  // cells around an edge that are considered together
 constexpr uint32_t kTogether = 64;    // fans that may change places, so that those of a group are as long
 
 // Cells of one block at a time.
@@ -49,7 +49,7 @@ Finder::Side Finder::side_of(uint32_t slot, uint32_t a, uint32_t b) const {
   return swaps % 2 ? Side{p[at[3]], p[at[2]]} : Side{p[at[2]], p[at[3]]};
 }
 
-// The longest row of cells around an edge that nobody has taken, each beginning where the one before ends.
+// The longest row of cells around an edge that are in no fan yet, each beginning where the last one ends.
 uint32_t Finder::longest(const Around *cells, uint32_t n, uint32_t a, uint32_t b, Fan &fan) const {
   Side side[kMostAround];
   uint32_t slot[kMostAround], free = 0;

@@ -1,5 +1,5 @@
 // What the kernels in single precision read beside the points: the arrays of the blocks in floats, each at
-// the place that it has in double. Places, velocities and forces stay double for whoever calls.
+// the place that it has in double. Places, velocities and forces stay double for the caller.
 #include "../model_common/edges.h"
 #include "msm_fans.h"
 

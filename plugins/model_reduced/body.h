@@ -18,7 +18,7 @@ namespace reduced {
 // Displacement gradient in the frame up to which small displacements are taken for the true ones.
 constexpr double kLargestGradient = 0.1;
 constexpr double kForgotten = 1;  // s in the range of small displacements
-// Who tells where the body is: the points; they do, to a host that can see them later; the state.
+// What determines the body's position: the points; the points, for a host that sees them later; the state.
 enum class Lead { points, points_for_now, state };
 constexpr const char *kModalId = "org.deform.modal", *kCondensedId = "org.deform.condensed";
 
@@ -91,7 +91,7 @@ class Body {
   size_t at_pull() const { return kCoordinates + 2 * size_t(modes_.count); }
   size_t at_near() const { return at_pull() + 3; }
   size_t at_impulse() const { return at_near() + 3 * size_t(nnear_); }
-  uint32_t nnear_ = 0;  // points that a surfel hangs on, or that are held
+  uint32_t nnear_ = 0;  // points that a surfel depends on, or that are held
   uint32_t nfree_ = 0;  // of these, that are not held in all components
   // [npoint] of points in columns_, the free near ones first, then the other near ones; and back
   Buffer<uint32_t> place_, point_;
@@ -152,7 +152,7 @@ class Body {
   double turning_[9] = {};                                        // inverse inertia in the world
   double force_sum_[3] = {}, torque_[3] = {};
   bool named_ = false, checked_ = false;
-  double told_ = 0;     // the displacement gradient that was told; 0: none, or long ago
+  double told_ = 0;     // the displacement gradient that was reported; 0: none, or long ago
   double outside_ = 0;  // s, when it was last out of its range
   uint32_t since_look_ = 0;
 

@@ -98,7 +98,7 @@ class Krylov {
     return sum;
   }
   // The last block's columns by Gram and Schmidt's method, twice; r_ is what they were made of. A column of
-  // which nothing is left becomes zero: a pair of C's kernel, which nobody counts.
+  // which nothing is left becomes zero: a pair of C's kernel, which is not counted.
   void orthonormalize() {
     double *const u = last();
     r_.setZero(kLanes, kLanes);

@@ -1,7 +1,7 @@
-// A held body whose state tells where it is: q, q' and what follows at rest. A step then needs and moves the
-// points that a surfel hangs on or that are held, O(surface x modes), and with contact one column of C_rest
-// at those points for each component that is pushed. All other points are computed on demand: the same sums
-// over the whole matrix of modes, and over all columns that have not decayed.
+// A held body whose state determines its points: q, q' and what follows at rest. A step then needs and moves
+// the points that a surfel depends on or that are held, O(surface x modes), and with contact one column of
+// C_rest at those points for each component that is pushed. All other points are computed on demand: the same
+// sums over the whole matrix of modes, and over all columns that have not decayed.
 //
 // This applies while held points do not move and forces are a uniform acceleration; otherwise all points are
 // moved, as in step.cpp.
@@ -339,8 +339,8 @@ bool Body::holds_rest(const double *state) {
 }
 
 // What an edge of the surface stretches and turns is at most the displacement gradient of the cells that
-// it belongs to. Some edges are looked at in each step, all of them in kSweep steps, and all cells when
-// somebody asks for points.
+// it belongs to. Some edges are checked in each step, all of them in kSweep steps, and all cells when
+// points are requested.
 void Body::watch_near(const dfm_kin &k, bool touched) {
   near_time_ = k.t;
   if (k.t - outside_ > kForgotten + kSweep * k.dt) told_ = looked_ = 0;

@@ -297,8 +297,8 @@ bool Body::commit_all(const dfm_kin &k, const double *p_s, double *x, double *v)
 }
 
 // The displacement gradient is at most the sum of the modes' own: a look at the cells only where that is
-// large. It is told when it leaves the range, again where it has become twice as large since, and anew once
-// it has been back for a while: a body that swings out and back tells it once and not in each period.
+// large. It is reported when it leaves the range, again when it has doubled since, and again once
+// it has been back for a while: an oscillating body reports it once and not in each period.
 void Body::look_at_gradient(double time, const double *x, size_t stride) {
   double bound = 0;
   for (uint32_t k = 0; k < modes_.count; ++k) bound += std::fabs(q_to_[k]) * gradient_[k];

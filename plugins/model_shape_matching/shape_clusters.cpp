@@ -12,7 +12,7 @@
 namespace shape {
 
 namespace {
-// Points with all components held weigh so much more in a cluster's fit and momentum: it hangs on them.
+// Factor of the mass of fully held points in a cluster's fit and momentum: the cluster hangs on them.
 constexpr double kHeavy = 1e7;
 
 double distance2(const double *a, const double *b) {

@@ -216,7 +216,7 @@ namespace {
 
 // Level and presliding stiffness at one normal force: a displacement is made in one step, then held for some,
 // so that only what is elastic is left; the first decade of displacements that leaves a hundredth of the
-// level tells the stiffness.
+// level gives the stiffness.
 Scales measure(const Law &law, double fn) {
   Scales s;
   s.fn = fn;

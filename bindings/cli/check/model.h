@@ -121,7 +121,7 @@ class Body {
 std::string with(const Variant &variant);
 double length(const double *a);
 double largest(const Numbers &f);
-// Does Cholesky's factorization of shift I - m, [width,width], exist? Only half of m is looked at.
+// Does Cholesky's factorization of shift I - m, [width,width], exist? Only half of m is read.
 bool below(const std::vector<double> &m, size_t width, double shift);
 
 // Asks a rule for each variant; what it says where all keep it.

@@ -1,5 +1,5 @@
 // A plugin opened by the validator itself, not by the library: what the library would refuse at once must
-// stay open to be looked at, and the host it meets counts what it lends.
+// stay open for inspection, and its host counts what it lends.
 #pragma once
 #include <atomic>
 #include <map>

@@ -311,7 +311,7 @@ bool Runs::waits(Job &job) const {
   const bool goes_on = std::any_of(paused_.begin(), paused_.end(), same);
   const double need = job.outcome.predicted(subject_.duration) - (goes_on ? job.outcome.took : 0);
   const bool slice = job.work < std::numeric_limits<double>::max();  // need not come to its end
-  // how far a search for an equilibrium has come nobody can say: it is tried
+  // how far a search for an equilibrium has come is unknown: it is tried
   const bool too_long = need > job.limit && !(subject_.at_rest && std::isinf(need));
   return job.work <= job.outcome.limit || (!slice && too_long);
 }

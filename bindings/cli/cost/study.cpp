@@ -181,8 +181,8 @@ class Student {
     for (Job *job : jobs) job->work = std::numeric_limits<double>::max();
   }
 
-  // The finest meshes may have been made in their slice and no more: without a first record nobody knows what
-  // they would take, and the reference would be coarse for no reason.
+  // The finest meshes may have been made in their slice and no more: without a first record it is unknown
+  // what they would take, and the reference would be coarse for no reason.
   void know_ladder(double slice) {
     for (double work = 4 * slice; work <= kKnowShare * out_.options.budget; work *= 4) {
       std::vector<int> unknown;

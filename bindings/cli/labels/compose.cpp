@@ -52,7 +52,7 @@ class Composer {
   }
 
   // Ways in which the marked ones of the eight touch along an edge or at a corner alone. The three edges that
-  // leave the corner in positive direction are looked at with their own corners.
+  // leave the corner in positive direction are treated with their own corners.
   static int touching(uint32_t marks) {
     static const std::array<uint8_t, 256> kTable = [] {
       std::array<uint8_t, 256> out{};

@@ -215,7 +215,7 @@ class Net {
     return out;
   }
 
-  // The shorter diagonal divides a quadrilateral, of equal ones the first, whatever side is looked at.
+  // The shorter diagonal divides a quadrilateral, of equal ones the first, whatever side is considered.
   bool first_diagonal(const Quad &q) const {
     const Point d0 = meters(at_[q.corner[2]] - at_[q.corner[0]]),
                 d1 = meters(at_[q.corner[3]] - at_[q.corner[1]]);

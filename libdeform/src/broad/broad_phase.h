@@ -8,7 +8,7 @@
 // reach of a contact then. Lists contain a superset of the contacts, and narrow/ decides by the geometry of
 // the sub-step alone, so results never depend on when lists were built.
 //
-// On several threads bodies are looked at one by one, and pairs are listed in parts, a part of one surface
+// On several threads bodies are processed one by one, and pairs are listed in parts, a part of one surface
 // with all of the other, each into memory of its own. Lists are sorted, so parts do not show in them.
 #pragma once
 #include <cstdint>

@@ -2,7 +2,7 @@
 // straight line: the distance is a convex function of time, its slope is the normal's share of the motion,
 // and Newton's steps from the left never pass its first root. Edges and triangles meet the shape's edges,
 // axis, corners and centers as features that do not move. Joined distances of voxels are cubic along a
-// line from cell to cell; a face is looked at where it ends, and its lowest place, if that is below the
+// line from cell to cell; a face is tested where it ends, and its lowest place, if that is below the
 // floor, is a surfel.
 #include <optional>
 

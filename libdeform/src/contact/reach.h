@@ -22,7 +22,7 @@ inline double recovery_depth(const Surface &faces) { return 0.25 * faces.median_
 inline double edge_recovery_depth(const Surface &a, const Surface &b) {
   return 0.02 * std::min(a.median_edge, b.median_edge);
 }
-// Within one surface the rest shape tells which side is which, not the nearest face alone.
+// Within one surface the rest shape determines the sides, not the nearest face alone.
 inline double self_recovery_depth(const Surface &s) { return 0.1 * s.median_edge; }
 
 // Largest length of the differences of two arrays [n,4] whose fourth components are zero; y null: of x

@@ -27,7 +27,7 @@ void printable(const char *text, char *out, size_t capacity) noexcept;
 
 void set_last_error(const char *sentence) noexcept;  // thread-local
 const char *last_error() noexcept;
-// number of messages set by this thread: tells whether a called function gave a reason
+// number of messages set by this thread: shows whether a called function gave a reason
 uint64_t sentences() noexcept;
 
 // The valid name nearest to a wrong one (edit distance), for "did you mean"; empty if none is near.

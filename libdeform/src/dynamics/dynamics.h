@@ -100,7 +100,7 @@ class Dynamics {
   virtual uint32_t relative_work() const { return 1; }
 
   // Multiplications so far, roughly: differences are counts of what sub-steps have done. They depend on the
-  // states that it came through, not on what it still knows of earlier ones. 0: nobody counts.
+  // states that it came through, not on what it still knows of earlier ones. 0: not counted.
   virtual double effort() const { return 0; }
 
   // False: the model gives none.
@@ -139,7 +139,7 @@ class Dynamics {
   // point_velocity() is that without contact again, before a further solve: end_state() may have put the end
   // in its place.
   virtual void free_again(const SubStep &) {}
-  // After somebody has changed point_velocity().
+  // After other code has changed point_velocity().
   virtual void free_changed() {}
   // Bounds of the surfels' mean velocities and of what contact has changed of them, m/s, as the linear
   // response gives them: replaced by the true ones where the end need not agree with it. After end_state().

@@ -61,7 +61,7 @@ class LawBatches {
   const LawInstance *slopes(double h, ContactState &state);
   // The same, but a smooth law is asked where the contact would come to rest alone
   // (friction/local_solve.cpp): state.vt moves there.
-  //   wt     [n] 1/kg, how much slip an impulse makes at its own contact; with it ft_stop tells the slip
+  //   wt     [n] 1/kg, how much slip an impulse makes at its own contact; with it ft_stop gives the slip
   //          that others leave
   //   least, relative   m/s, 1: a contact's slip need not be known closer than least + relative of it
   const LawInstance *answer(double h, const double *wt, double least, double relative, ContactState &state);

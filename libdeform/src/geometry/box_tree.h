@@ -79,8 +79,8 @@ void near_nodes(const BoxTree &a, const BoxTree &b, double margin, size_t wanted
                 Array<PairOfTriangles> &out);
 
 // f(place in a, place in b, squared distance of the boxes) for all triangles whose boxes are no further apart
-// than margin; places count in the order of the leaves. stack is scratch. from: two nodes, below which alone
-// triangles are looked at.
+// than margin; places count in the order of the leaves. stack is scratch. from: two nodes; only
+// triangles below them are tested.
 template <class F>
 void near_pairs(const BoxTree &a, const BoxTree &b, double margin, Array<PairOfTriangles> &stack, F &&f,
                 PairOfTriangles from = {0, 0}) {

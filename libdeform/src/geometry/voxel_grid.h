@@ -29,9 +29,9 @@ class VoxelGrid {
   VoxelGrid(const Memory &memory, const double *points, uint32_t ntri, const uint32_t *tris, uint32_t cells);
 
   Value at(Vec3 p) const;
-  // False only if no place within `way` of p has a distance below limit - way: what lists are made by. Joined
-  // values change by no more than sqrt(3) of a way, since those at corners change by no more than it; and
-  // they are off the true distance by at most half the diagonal of what is joined.
+  // For lists of candidates. False only if no place within `way` of p has a distance below limit - way.
+  // Interpolated values change by at most sqrt(3) of a way, since those at corners change by at most a way;
+  // their error is at most half the diagonal of the interpolated cell.
   bool near(Vec3 p, double limit) const;
 
   // Lower bound of the distance near p: no place within `way` of p has a distance below clearance(p) - way.

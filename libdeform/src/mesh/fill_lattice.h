@@ -91,7 +91,7 @@ struct Lattice {
 struct FillCover {
   explicit FillCover(const Memory &memory) : cells(memory), kind(HookAllocator<CellKind>(memory)) {}
   KeySet cells;
-  // by number; outside for cells that were looked at only
+  // by number; outside for cells that were only tested
   Array<CellKind> kind;
   uint32_t kept = 0;
   // false: stopped, because of more than `limit` cells or too much work

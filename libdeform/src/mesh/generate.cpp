@@ -210,7 +210,7 @@ class BallBuilder {
     add_tet(mesh_, p[0], p[1], p[2], p[3]);
   }
 
-  // Four cells around the shortest diagonal; where lengths are equal the choice goes round with the place, so
+  // Four cells around the shortest diagonal; for equal lengths the choice alternates with the position, so
   // that none is preferred.
   void cut_octahedron(uint32_t f, const Lattice &base) {
     // base + two is opposite base + the others

@@ -1,6 +1,6 @@
 // Medit files (.mesh, ASCII): keywords, each with a count and rows of numbers from 1, the last of a row its
 // reference. References other than 0 are groups of the tetrahedra, triangles (and quadrilaterals, cut) and
-// edges. Keywords that a body has no use for are passed over.
+// edges. Keywords that a body does not need are skipped.
 #include "mesh/raw_mesh.h"
 
 namespace dfm {

@@ -1,6 +1,6 @@
 // OBJ: records of one line each (a backslash continues it): "v x y z", "f 1 2 3" with corners from 1, or from
 // -1 backwards, of which a texture and a normal may follow behind slashes. A triangle's group is what "g"
-// says, else "usemtl", else "o". All other records are passed over.
+// says, else "usemtl", else "o". All other records are skipped.
 #include "mesh/raw_mesh.h"
 
 namespace dfm {

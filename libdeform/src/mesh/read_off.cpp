@@ -18,7 +18,7 @@ class OffReader {
     read_keyword();
     const int64_t npoint = number("the number of vertices"), nface = number("the number of faces");
     if (in_.binary) number("the number of edges");
-    else in_.line();  // the number of edges, which nobody needs and some leave out
+    else in_.line();  // the number of edges, which is not needed and may be missing
     const uint32_t n = point_count(
         in_, in_.binary ? in_.count(npoint, 12, "vertices") : in_.text_count(npoint, 3, "vertices"),
         "vertices");

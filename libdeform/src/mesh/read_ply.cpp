@@ -1,6 +1,6 @@
 // PLY: a text head that declares elements and their properties, then the elements one after another as text
 // or as binary of either byte order. Of the vertices x y z are kept, of the faces the list of corners and a
-// whole-number property that numbers groups; all else is passed over.
+// whole-number property that numbers groups; all else is skipped.
 #include <bit>
 
 #include "mesh/raw_mesh.h"

@@ -284,7 +284,7 @@ class VtkReader {
   }
 
   // "name type [components]", "LOOKUP_TABLE name", or "name components tuples type" in a FIELD; then the
-  // values. Attributes are passed over but for those over the cells that number groups and hold shares. What
+  // values. Attributes are skipped, except those of cells that contain group numbers or shares. What
   // comes behind an unknown keyword is left unread.
   void read_attributes(bool of_cells) {
     int64_t n = in_.integer("the number of tuples");

@@ -12,7 +12,7 @@ namespace {
 // deflate.
 constexpr uint64_t kMaxUnpacking = 64, kFreeUnpacking = 4096, kMaxDeflation = 1032;
 
-// Bytes out of raw data or base64. White space is passed over; a padded group may stand anywhere, as writers
+// Bytes out of raw data or base64. White space is skipped; a padded group may be anywhere, as writers
 // encode lengths and data apart.
 class ByteSource {
  public:

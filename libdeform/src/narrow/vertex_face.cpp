@@ -6,7 +6,7 @@
 //      X   beside a concave edge: the other face's plane,           \       |        \____
 //          its weights extrapolated                                  \      |
 //
-// Whether p is outside is told by the nearest point: over a face by its side, over an edge by the sum of its
+// The nearest point decides whether p is outside: over a face by its side, over an edge by the sum of its
 // faces' normals, over a corner by the edge there that points to p most (the point of the corner's spherical
 // outline nearest to the direction of p lies on it). From inside, only the nearest face pushes back (with the
 // planes across concave edges): the far side of a thin body does not pull p through.
@@ -89,7 +89,7 @@ bool Group::reaches(Run run, Vec3 v, double widest2) const {
     const uint32_t *c = &pair.b->surface->tri[3 * size_t{candidate.feature_b}];
     const Vec3 a = pair.xb(c[0]), u = pair.xb(c[1]) - a, w = pair.xb(c[2]) - a, n = cross(u, w);
     const double s = dot(n, p - a), nn = norm2(n);
-    // A sliver's normal is rounding; it is looked at closer whatever it says.
+    // A sliver's normal is rounding; it is always examined further.
     if (nn <= 1e-12 * norm2(u) * norm2(w) || (s < 0 && s * s <= kLoose * depth2 * nn)) return true;
     if (!(s * s <= kLoose * widest2 * nn)) continue;
     const double reach = reach_to(v, c);
@@ -146,7 +146,7 @@ bool Group::local_minimum(const Near &n) const {
   return true;
 }
 
-// Not normalized; its side at n's closest point tells inside from outside.
+// Not normalized; its side at n's closest point distinguishes inside from outside.
 Vec3 Group::outward(const Near &n) const {
   if (n.feature == TriangleFeature::face) return n.normal;
   Vec3 sum;

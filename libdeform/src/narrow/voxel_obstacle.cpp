@@ -13,7 +13,7 @@ namespace {
 
 // of the longest edge: no place of a triangle is further from its nearest corner (1 / sqrt(3))
 constexpr double kFarthest = 0.58;
-constexpr double kFinest = 0.25;  // of a cell: the grid tells no more about where the lowest place is
+constexpr double kFinest = 0.25;  // of a cell: the grid does not resolve the lowest place better
 
 struct Face {  // in the grid's frame
   const VoxelGrid &grid;

@@ -13,7 +13,7 @@ namespace {
 // Longest edge of a surface that is filled, over that of its cells (doc/decisions/0391).
 constexpr double kLongestEdge = 2.5;
 
-// m. All cells of a lattice are alike, so the first one tells.
+// m. All cells of a lattice are alike, so the first one is enough.
 double longest_edge(const BodyMesh &mesh) {
   double longest = 0;
   for (int i = 0; i < 4; ++i)

@@ -50,7 +50,7 @@ struct SceneWriter {
   std::set<std::string> model_keys{};                                      // parameters of any loaded model
 
   void note(const char *text, ...) __attribute__((format(printf, 2, 3)));
-  // What whoever runs the scene has to know: refuses nothing, and is not counted.
+  // A remark for the user who runs the scene: refuses nothing, and is not counted.
   void remark(const std::string &sentence) const {
     if (options.note) options.note(sentence);
   }

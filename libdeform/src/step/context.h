@@ -111,7 +111,7 @@ struct StepContext {
   // trades places with the world's
   ContactStore next_store;
   Report last_report;
-  // sleep. With nobody asleep `active` holds all bodies.
+  // sleep. If no body sleeps, `active` contains all bodies.
   Islands islands;
   // slots of active bodies, ascending; slots woken in this sub-step
   Array<uint32_t> active, woken;

@@ -1,4 +1,4 @@
-// Does a body gain energy that nobody gave it? Every body that a force model moves has a balance: its energy
+// Does a body gain energy without a source? Every body that a force model moves has a balance: its energy
 // less the work that loads, motions and contact have done on it. The scheme keeps it, dampers lower it,
 // nothing real raises it. What is booked and why the bounds are what they are: doc/concepts/energy_watch.md.
 #pragma once

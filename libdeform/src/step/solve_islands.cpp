@@ -120,11 +120,11 @@ void sweep_once(const World &w, StepContext &step, SolveIsland &own, double leav
   solve_island_bonds(w, step, own);
 }
 
-// Of bodies that move in few ways sweeps hand loads over too slowly: what they have left at the cap goes on
-// in long strides. rho is 1000 over a contact's own response; less where a stride is not found so. The
-// strides of a part cost no more than so many times its sweeps up to the cap; what is left then is left to
-// the next sub-step, which begins there. Not of bodies that revise what they answer: impulses that move far
-// move them.
+// For bodies with few degrees of freedom, sweeps redistribute loads too slowly: at the limit of sweeps the
+// solve continues by proximal steps (decision 0225). rho is 1000 over a contact's own response; less if a
+// step fails with it. The steps of a part cost at most so many times its sweeps up to the limit; the rest is
+// left to the next sub-step, which starts there. Not for bodies that revise their response, because large
+// changes of impulses would change it.
 constexpr uint32_t kMostStrides = 12, kStridesOverCap = 32;
 constexpr double kRho = 1e3, kLeastRho = 10;
 void stride_on(const World &w, StepContext &step, SolveIsland &own, uint32_t part) {
@@ -169,7 +169,7 @@ void stride_on(const World &w, StepContext &step, SolveIsland &own) {
 // Nearly redundant contacts of bodies that revise (doc/decisions/0360). Normal forces that hold the bodies in
 // more places than these can move in agree only to a few 1e-8 m: a sweep takes a little load from a contact
 // that is that far open, gives it to others, and goes on so until the first has none, with friction behind.
-// What nobody needs is left out: once the polish is over, contacts whose normal velocity is within kLeave of
+// Unneeded work is left out: once the polish is over, contacts whose normal velocity is within kLeave of
 // what is allowed keep their normal impulses. At the cap as many sweeps are added, by momentum, from the best
 // state.
 constexpr double kLeave = 0.2;
@@ -393,7 +393,7 @@ void SolveIslands::join(const ContactRows &rows) {
   joined_.start(static_cast<uint32_t>(pairs_.size()));
   owner_.assign(pairs_.size() > 1 ? rows.ndof : 0, kNone);
   for (uint32_t k = 0; k < pairs_.size() && !owner_.empty(); ++k) {
-    bool points = false;  // of a pair without them the first row tells all
+    bool points = false;  // of a pair without them the first row is enough
     const auto move = [&](uint32_t dof) {
       const uint32_t block = rows.block[dof];
       points = points || block == kNone;

@@ -17,7 +17,7 @@ namespace {
 
 // The bound depends on the state (volume terms stiffen as cells grow, tilted springs as they stretch). 0.9 of
 // it is used, which pays for what a shape changes by about a twentieth of its lengths. So after 16 sub-steps,
-// sooner where the edges stretch faster, a look at the rates tells how much of that may be spent; where it is
+// sooner where the edges stretch faster, a check of the rates shows how much of that may be used; where it is
 // not, the bound holds on. A look sees rates at one instant, so it counts them for the time before and for
 // that to the next look, and the bound is asked for anew in every eighth.
 constexpr uint32_t kBoundEvery = 16;
@@ -28,7 +28,7 @@ uint32_t inverted_cells(const Body &b) {
 }
 
 void look_at_shape(Body &b) {
-  // of points that are late nobody knows until they are asked for
+  // points that are updated late are unknown until they are requested
   b.bound.inverted = b.dynamics->late() ? 0 : inverted_cells(b);
   b.bound.strain_rate = b.slumber.asleep ? 0 : b.dynamics->strain_rate();
 }

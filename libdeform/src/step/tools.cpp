@@ -29,7 +29,7 @@ ToolValues aimed(const Tool &tool, double end) {
   return v;
 }
 
-// Of whoever moves the tool, in the step that begins.
+// The work of the hand that moves the tool, in the step that begins.
 struct ToolForce { Vec3 force, torque; };
 struct Way { Vec3 path, turn; };
 Way way_of(const Tool &tool, const ToolValues &v) {

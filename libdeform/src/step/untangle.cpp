@@ -141,7 +141,7 @@ class Untangler {
       for (int k = 1; k <= kParts; ++k) tries.push_back({way.direction, way.length * k / kParts});
     std::stable_sort(tries.begin(), tries.end(),
                      [](const Way &l, const Way &r) { return l.length < r.length; });
-    // Evenly over all lengths, where there are more than may be looked at; the whole ways are among them.
+    // Evenly over all lengths, if there are more than may be tested; the whole ways are among them.
     std::vector<Way> kept;
     for (size_t i = 0; i < tries.size(); i += tries.size() / kMostLooks + 1) kept.push_back(tries[i]);
     kept.push_back(ways.front());
@@ -234,7 +234,7 @@ class Untangler {
         store3(&b.p.x[size_t(k) * kStride], load3(&b.p.x[size_t(k) * kStride]) + by);
       b.dynamics->points_changed();
       wake(w_, b);
-      forget_energy(b);  // the change of potential is nobody's work
+      forget_energy(b);  // the change of potential is not counted as work
       ++w_.placements;
       ++b.x_version;
     }
