@@ -7,7 +7,7 @@ asked by exports.py.
 
 baseline.py CC INCLUDE_DIR STORED SCRATCH          compares; exit 77 where only abidiff's part was passed over
 baseline.py CC INCLUDE_DIR STORED SCRATCH --self   spoils the stored headers in ways that must be found
-baseline.py CC INCLUDE_DIR STORED --write          writes STORED anew
+baseline.py CC INCLUDE_DIR STORED --write          writes STORED again
 """
 import pathlib
 import re
@@ -15,7 +15,7 @@ import shutil
 import subprocess
 import sys
 
-# plugin_draft.h is promised to nobody; elementary.h has inline functions alone, which become the plugin's.
+# plugin_draft.h is no promise; elementary.h has inline functions only, which become part of the plugin.
 LEFT_OUT = {"plugin_draft.h", "elementary.h", "deform.h"}
 TOLD = """
 An addition (a function, a constant, a member at the end of a struct): write the baseline anew with

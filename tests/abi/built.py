@@ -6,7 +6,7 @@ is looked at as it is installed, stripped.
 
 built.py READELF STORED_DIR LIBRARY...           compares; exit 77 where abidiff was not there
 built.py READELF STORED_DIR LIBRARY... --self    spoils what is stored in ways that must be found
-built.py READELF STORED_DIR LIBRARY... --write   stores anew: once per version, when nobody can lose anything
+built.py READELF STORED_DIR LIBRARY... --write   stores again: once per version, before its release
 """
 import atexit
 import pathlib

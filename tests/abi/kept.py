@@ -4,7 +4,7 @@ Each must keep the rules of the validator, answer its host (kept.cpp) to the bit
 where the host's structs have grown since, and do in a scene what it did.
 
 kept.py KEPT_PROGRAM DEFORM FOLDER SCRATCH           compares
-kept.py KEPT_PROGRAM DEFORM FOLDER SCRATCH --write   writes answers.csv and scenes.csv of FOLDER anew
+kept.py KEPT_PROGRAM DEFORM FOLDER SCRATCH --write   writes answers.csv and scenes.csv of FOLDER again
 """
 import csv
 import hashlib

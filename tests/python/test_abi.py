@@ -1,4 +1,4 @@
-"""What ctypes is told of the C interface is what the headers say, and what a C compiler makes of them."""
+"""The ctypes description of the C interface agrees with the headers, and with a C compiler."""
 import ctypes
 import inspect
 import os

@@ -91,7 +91,7 @@ def pixels(file):
 
 
 def save(picture, out):
-    """Writes a picture of 0 to 1 in 128 levels of each color, which nobody sees and which make it smaller."""
+    """Writes a picture of 0 to 1 in 128 levels of each color, which are not visible and make it smaller."""
     levels = (127 * np.clip(picture, 0, 1) + 0.5).astype(np.uint8)
     PIL.Image.fromarray(levels * 2 + levels // 64).save(out, optimize=True)
 

@@ -7,7 +7,7 @@ PROGRAM takes a few steps of each scene under callgrind (frozen.py: what is coun
 scene can have there are three: with it, with a list of effects that leaves it out, and one whose parameters
 never called for it. Checked, to 0.1 %: off by the list costs what never having had it costs, and gives the
 same state to the bit; the counts are those of effects.csv, where compiler, build type and flags are those
-stored. --update writes effects.csv anew. Exit 77: no valgrind.
+stored. --update writes effects.csv again. Exit 77: no valgrind.
 """
 import argparse
 import csv

@@ -11,7 +11,7 @@ out: they choose their functions by processor. Two checks, both to 0.1 %:
    so that this means something, one with an effect on, which must differ;
 2. the scene against the count in counts.csv, where compiler, build type and flags are those stored.
 
---update writes counts.csv anew and says what changed; the commit that does so says why. Exit 77: no valgrind.
+--update writes counts.csv again and prints what changed; the commit gives the reason. Exit 77: no valgrind.
 """
 import argparse
 import csv

@@ -10,7 +10,7 @@ Where search.py has found better settings than those that an entry names, they r
 A row: engine, version, configuration, case, its parameters, quantity, measured, expected, low, high, verdict
 (pass, fail, too_slow, error, or not_run where an engine has no such law), cost (seconds of processor time per
 simulated second), note. A row is written as soon as its case is done; rows that FILE already holds are not
-run again, so a run that was stopped goes on where it was.
+run again, so a stopped run continues where it was.
 """
 import argparse
 import csv
@@ -51,7 +51,7 @@ def main():
     parser.add_argument("--most", type=int, default=cases.MOST_SECONDS,
                         help="seconds of processor time for a case")
     parser.add_argument("--configuration", help="one configuration of the engine (for deform: a law)")
-    parser.add_argument("--out", help="CSV to write or to go on with; without it the rows are printed")
+    parser.add_argument("--out", help="CSV to write or to continue; without it the rows are printed")
     parser.add_argument("--found", default=found.TABLE, help="table of search.py")
     given = parser.parse_args()
     found.TABLE = given.found

@@ -11,7 +11,7 @@ drawn anew. --scenes: the scenes of ../peers on their coarse meshes, else the ca
 A row per trial goes to --out: settings, what was measured, score (how far the worst quantity lies from the
 middle of its band, in half bands: up to 1 passes), cost, processor time used. Of two trials within the bands
 the cheaper is better, else the nearer. A case ends after --trials, or when its trials have used --seconds; a
-trial ends after --most seconds, or earlier where it is hopeless. A search that was stopped goes on, and more
+trial ends after --most seconds, or earlier where it is hopeless. A stopped search continues, and more
 trials can be asked for later. run.py and run_scenes.py run the best as `found by search`.
 """
 import argparse

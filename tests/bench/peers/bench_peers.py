@@ -8,7 +8,7 @@ processor time for a run; into FOLDER/quick.
 
 MuJoCo goes into a virtual environment in FOLDER, Jolt into its node_modules; without npm Jolt is left out.
 Each engine runs in a process of its own, one thread each, JOBS of them side by side. Rows go to
-FOLDER/rows, tables and pictures beside; a run that was stopped goes on. A line tells which runs are under way
+FOLDER/rows, tables and pictures beside; a stopped run continues. A line shows which runs are under way
 and how long it will take. What is missing ends it with one sentence.
 """
 import argparse
@@ -146,7 +146,7 @@ def main():
         while not over.wait(2):
             watch.tell(set(under_way), set(ended))
 
-    print("bench-peers: %s (Ctrl-C stops it; the same command goes on)" % watch.line(()), flush=True)
+    print("bench-peers: %s (Ctrl-C stops it; the same command continues)" % watch.line(()), flush=True)
     teller = threading.Thread(target=tell, daemon=True)
     teller.start()
     with concurrent.futures.ThreadPoolExecutor(workers) as pool:

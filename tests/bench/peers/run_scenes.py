@@ -3,7 +3,7 @@
 
   run_scenes.py ENGINE --out FILE.csv [--command build/release/bin/deform] [--only CASE] [--cells N]
                 [--configuration NAME] [--coarse] [--most SECONDS]
-  run_scenes.py judge --out FILE.csv        judges the rows of FILE anew, after an answer has changed
+  run_scenes.py judge --out FILE.csv        judges the rows of FILE again, after an answer has changed
 
 ENGINE: NAME of a scenes_NAME.py here. Rows have the columns of friction/run.py; those that FILE holds are not
 run again. `cost`: seconds of processor time of the steps alone (without reading the mesh) per simulated

@@ -17,7 +17,7 @@ import sys
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, "friction"))
 import table
 
-LEVEL = 2  # factor of two times that tells nothing
+LEVEL = 2  # ratio of two times that is not significant
 COLORS = {"deform": "#2f6db3", "mujoco": "#c8553d", "bullet": "#3b8f5c"}
 
 

@@ -57,7 +57,7 @@ def pose_of(position, q):
 
 
 class Taken:
-    """Attributes of an element; what nobody asks for is reported at the end."""
+    """Attributes of an element; attributes that are not read are reported at the end."""
 
     def __init__(self, element, of, report):
         self.left = dict(element.attrib) if element is not None else {}
