@@ -477,7 +477,7 @@ TEST(Cut, FractureEnergy_IsTheForceOnTheBladeTimesItsWay) {
   EXPECT_GT(most, toughness * 0.06);
 }
 
-TEST(Cut, RandomCuts_KeepTheBalancesToTheEnd) {
+TEST(Cut, RandomCuts_KeepTheBooksToTheEnd) {
   std::mt19937 random(3);
   const auto share = [&] { return double(random() % 10001) / 10000; };
   for (const char *model : kModels) {

@@ -242,7 +242,7 @@ TEST(ToolCut, Snapshot_TakesBackACut_WhichThenGoesTheSameWay) {
   EXPECT_TRUE(test::snapshot(s.w) == end);
 }
 
-TEST(ToolCut, WhatIsSet_CanBeRead_AndRemoved) {
+TEST(ToolCut, WhatIsSet_CanBeAsked_AndTakenBack) {
   Cube s;
   const dfm_tool t = blade(s.w);
   uint32_t how = 9, most = 9, n = 9;
@@ -371,7 +371,7 @@ struct Tough {
 }  // namespace
 
 // A driven blade: the force of each step times its way is the energy of the faces that open in it.
-TEST(ToolCut, DrivenBlade_ReportsTheEnergyOfTheCut) {
+TEST(ToolCut, DrivenBlade_FeelsTheEnergyOfTheCut) {
   Tough s(0);
   s.down(-0.03, 0.2);
   EXPECT_EQ(parts(s.body), 2u);
@@ -395,7 +395,7 @@ TEST(ToolCut, CoupledBlade_PaysTheEnergyOfTheCut_AndIsHeldBack) {
 }
 
 // What the cut still takes holds the blade where the hand is too weak, without a creep.
-TEST(ToolCut, CoupledBlade_StopsWhereTheHandIsTooWeak) {
+TEST(ToolCut, CoupledBlade_StandsWhereTheHandIsTooWeak) {
   Tough s(200);
   s.down(0.005, 0.1);
   for (int i = 0; i < 3000; ++i) test::ok(dfm_world_step(s.w, 1e-3, nullptr));  // it turns about its edge
