@@ -256,6 +256,29 @@ std::string energy_json(const SceneFile &scene, const RunResult &run, const dfm_
   return out.add("unwatched", unwatched.text()).text();
 }
 
+struct AutoShare { double steps = 0, implicit = 0, changes = 0; };
+// Where the library may change integrators; steps 0: nowhere.
+AutoShare auto_share(const JsonValue &plan) {
+  AutoShare out;
+  const JsonValue *const own = plan.find("auto");
+  if (!own || !own->find("steps_s")) return out;
+  const auto value = [&](const char *key) { return std::strtod(own->get(key).c_str(), nullptr); };
+  out.steps = value("steps_s");
+  out.implicit = value("implicit_s");
+  out.changes = value("changes");
+  return out;
+}
+
+std::string auto_json(const JsonValue &plan) {
+  const AutoShare share = auto_share(plan);
+  if (!(share.steps > 0)) return "null";
+  JsonObject row;
+  row.add("steps_s", number(share.steps))
+      .add("implicit_s", number(share.implicit))
+      .add("implicit_share", number(share.implicit / share.steps));
+  return row.add("changes", number(share.changes)).text();
+}
+
 std::string stopped_json(const RunResult &run) {
   if (!run.stopped && !run.interrupted) return "null";
   JsonObject row;
@@ -312,6 +335,7 @@ std::string summary_json(const SceneFile &scene, const RunOptions &options, cons
       .add("guard", guard.text())
       .add("unconverged_steps", std::to_string(stats.unconverged));
   out.add("budget", budget.text());
+  out.add("auto", auto_json(plan));
   out.add("energy", energy_json(scene, run, stats));
   out.add("solver", solver.text())
       .add("hold", hold.text())
@@ -385,6 +409,11 @@ void print_table(const SceneFile &scene, const RunResult &run, const Checks &che
       "body with itself), inverted cells: %u\n",
       stats.contacts_max, run.contacts_mean, static_cast<unsigned long long>(checks.states),
       checks.intersections_max, checks.self_max, std::max(checks.inverted_max, stats.inverted_max));
+  JsonValue plan;
+  parse_json(scene.explain(), plan);
+  if (const AutoShare share = auto_share(plan); share.changes > 0)
+    std::printf("integrator auto: implicit for %.3g s of %.3g s (%.0f %%), explicit else; %.0f changes\n",
+                share.implicit, share.steps, 100 * share.implicit / share.steps, share.changes);
   print_swaps(scene, run);
 }
 

@@ -1,5 +1,6 @@
 // Small and stiff bodies that are left to the library begin implicitly, and go on explicitly where the count
 // of what their steps take says so (decision 0400).
+#include "logged_context.h"
 #include "support.h"
 #include "world.h"
 
@@ -88,4 +89,68 @@ TEST(Counting, SheetAtRest_IsImplicitAgain) {
     back = !is_explicit(w);
   }
   EXPECT_TRUE(back);
+}
+
+namespace {
+
+uint32_t count(const std::string &text, const std::string &word) {
+  uint32_t n = 0;
+  for (size_t at = 0; (at = text.find(word, at)) != std::string::npos; at += word.size()) ++n;
+  return n;
+}
+
+// Steps of 1/60 s; a cube of 35 points, 5 cm and 1e7 Pa in each third of them, onto each other: 382 explicit
+// sub-steps. They go on explicitly while they fall on each other.
+dfm_world cubes(dfm_context *context, int frames, int most = 8) {
+  dfm_world_def d = dfm_world_def_default();
+  d.gravity[2] = -9.81;
+  d.step = 1.0 / 60;
+  dfm_world w = 0;
+  test::ok(dfm_world_create(context, &d, &w));
+  test::add_plane(w, "floor");
+  for (int f = 0, made = 0; f < frames; ++f) {
+    if (f % 3 == 0 && made < most) {
+      test::BodyOptions o;
+      o.model = "msm";
+      o.young = 1e7;
+      o.damping_stiffness = 1e-4;
+      o.position = {0.02 * (made % 2), 0.02 * (made % 3), 0.01 + 0.055 * made};
+      test::make_body(context, w, "beam", {0.05, 0.05, 0.05}, 60, o);
+      ++made;
+    }
+    uint32_t trouble = 0;
+    test::ok(dfm_world_step(w, d.step, &trouble));
+  }
+  return w;
+}
+
+}  // namespace
+
+TEST(Counting, Explain_TellsWhatStepsWere) {
+  const test::Context context;
+  const dfm_world w = cubes(context, 60);
+  const std::string told = explained(w);
+  const size_t at = told.find("\"auto\":{");
+  ASSERT_NE(at, std::string::npos) << told;
+  double all = 0, implicit = 0;
+  unsigned changes = 0;
+  ASSERT_EQ(std::sscanf(told.c_str() + at, "\"auto\":{\"steps_s\":%lf,\"implicit_s\":%lf,\"changes\":%u",
+                        &all, &implicit, &changes),
+            3)
+      << told.substr(at);
+  EXPECT_NEAR(all, 1, 1e-9);
+  EXPECT_GE(changes, 1u);
+  EXPECT_GT(implicit, 0.03);
+  EXPECT_LT(implicit, 0.9);
+}
+
+// Decision 0418.
+TEST(Counting, OneWarningForAllBodies_AndALineForAllThatChange) {
+  test::LoggedContext context;
+  cubes(context.context, 60);
+  EXPECT_EQ(count(context.log, "which damps"), 1u) << context.log;
+  EXPECT_GE(count(context.log, "more are integrated by symplectic_euler"), 1u) << context.log;
+  EXPECT_GE(count(context.log, "and 7 more are integrated by implicit steps"), 1u)
+      << "cubes that come while others are explicit go back with them: " << context.log;
+  EXPECT_EQ(count(context.log, "\n"), 1 + count(context.log, "counted work"));
 }

@@ -361,9 +361,10 @@ static inline dfm_status dfm_world_profile(dfm_world world, uint32_t capacity, d
  * "effects":[{"name","works","used","switches":[{"key","now","off","off_value"}]}],
  * "facts":[{"key","label","unit","value"}], "changes":[{"name","when","integrator","stable_s","max_jump_J"}],
  * "attached":[{"to","surfels","stiffness","damping","release"}], "unwatched"}],
- * "step":{"stable_s","worst_body","worst_point","reason"}}. state: "asked" by the list of effects, or
- * "called for" by parameters; left_out: called for, but not in the list; laws: asked is the law that the
- * rules name. surface: "boundary" of the cells, or "own, COUPLING"; from: the source of values that differ by
+ * "step":{"stable_s","worst_body","worst_point","reason"}, "auto":{"steps_s","implicit_s","changes"}}.
+ * state: "asked" by the list of effects, "called for" by parameters; left_out: called for, not in the list;
+ * laws: asked: the law that the rules name; auto: null, or the time in which integrators may change, and what
+ * of it was implicit; surface: "boundary" of cells, or "own, COUPLING"; from: source of values that differ by
  * cell (field, materials, share); idle: parameters without effect, or with another one than their name says;
  * effects: effects of the model, whether they act and are used, and the parameters that together switch each
  * off (switchable: whether a law's effect can be); facts: numbers that the model computed at creation;

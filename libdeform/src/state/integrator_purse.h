@@ -14,6 +14,12 @@ struct IntegratorPurse {
   uint32_t tries = 0;  // of implicit time that were given up since it has last paid
   double units = 0;    // of work, as points and cells in an explicit sub-step
 };
+// What the steps of this world were, where the library may change integrators; not in snapshots.
+struct IntegratorTimes {
+  double all = 0, implicit = 0;  // s
+  uint64_t changes = 0;
+  bool told = false;  // a warning has said that bodies are implicit
+};
 inline bool sound(const IntegratorPurse &p) {
   return p.open <= 1 && p.tries <= kMostTries && std::isfinite(p.units);
 }

@@ -149,6 +149,7 @@ struct World {
   StepSizes sizes;
   EnergyWatch watch;
   IntegratorPurse purse;
+  IntegratorTimes integrator_times;
   std::atomic<bool> busy{false};  // a call of the API changes it (api/call.h)
 
   std::unique_ptr<StepContext> steps;  // buffers: step/context.h

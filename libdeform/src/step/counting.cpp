@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/error.h"
 #include "dynamics/relative_work.h"
 #include "plugin/context.h"
 #include "state/world.h"
@@ -21,7 +22,10 @@ constexpr double kTry = 1.0 / 30;    // s of explicit integration, whose work a 
 constexpr double kPutBy = 0.25;      // share of explicit work that is saved for the next trial
 constexpr double kMost = 4;          // largest credit, in trials
 constexpr double kSafeShare = 0.25;  // of the limit on sub-steps
-constexpr double kFilled = 1e300;    // units, for a step without limit
+// A host that gives the length of its steps waits for each of them: an implicit step may not count more than
+// so many times the explicit work of the same time, whatever was saved before.
+constexpr double kMostOfAStep = 3;
+constexpr double kFilled = 1e300;  // units, for a step without limit
 
 bool is(const Body &b, Counted what) { return b.integrator.counted == what; }
 bool any(const World &w, Counted what) {
@@ -47,9 +51,10 @@ double explicit_step(const World &w) {
 // Whether a step may be divided into explicit sub-steps of h. Their number grows while shapes change, and
 // near the limit on sub-steps implicit integration would have to take over during the motion. So it may not
 // be near the limit, unless the library chooses the steps, since the next one will be short.
+bool chosen_here(const World &w, double dt) { return dt == accurate_step(w.sizes); }
 bool may_be_cut(const World &w, double dt, double h) {
   const double n = dt / h;
-  return n <= kSafeShare * w.def.max_substeps || (dt == accurate_step(w.sizes) && n <= w.def.max_substeps);
+  return n <= kSafeShare * w.def.max_substeps || (chosen_here(w, dt) && n <= w.def.max_substeps);
 }
 
 double effort(const World &w) {
@@ -74,15 +79,22 @@ void turn(World &w, Counted from, Counted to) {
                          : implicit_choice(w, *b).second_order ? DFM_INTEGRATOR_TR_BDF2
                                                                : DFM_INTEGRATOR_IMPLICIT_EULER;
     b->bound.known = false;
-    w.context->logf(
-        DFM_LOG_INFO, "body '%s' is integrated by %s from %g s on, because its counted work is less that way",
-        b->name.c_str(), to == Counted::explicitly ? "symplectic_euler" : "implicit steps", w.time);
   }
+  if (made.empty()) return;
+  ++w.integrator_times.changes;
+  w.context->logf(DFM_LOG_INFO, "%s integrated by %s from %g s on, because counted work is less that way",
+                  names_of(made[0].first->name, made.size()).c_str(),
+                  to == Counted::explicitly ? "symplectic_euler" : "implicit steps", w.time);
   w.changed = true;
   w.sizes = {};  // another bound, and other errors
 }
 
 }  // namespace
+
+std::string names_of(const std::string &first, size_t count) {
+  if (count == 1) return format("body '%s' is", first.c_str());
+  return format("body '%s' and %zu more are", first.c_str(), count - 1);
+}
 
 ImplicitOptions implicit_choice(const World &w, const Body &b) {
   ImplicitOptions out = w.implicit;
@@ -98,8 +110,11 @@ void begin_count(World &w, StepContext &step, double dt) {
   c.on = true;
   c.before = effort(w);
   if (!w.purse.open) w.purse = {1, 0, kTry / h * units(w, true)};
-  if (any(w, Counted::implicit) && may_be_cut(w, dt, h))
-    c.most = kUnitWork * (dt / h * units(w, true) + std::max(0.0, w.purse.units));
+  if (!any(w, Counted::implicit) || !may_be_cut(w, dt, h)) return;
+  const double same = dt / h * units(w, true);
+  c.most = same + std::max(0.0, w.purse.units);
+  if (!chosen_here(w, dt)) c.most = std::min(c.most, kMostOfAStep * same);
+  c.most *= kUnitWork;
 }
 
 double body_effort(const World &w, const StepContext &step) { return effort(w) - step.counting.before; }
@@ -125,6 +140,8 @@ void take_up_implicit(World &w) {
 void end_count(World &w, StepContext &step, double dt, double substeps) {
   const Counting &c = step.counting;
   if (!c.on) return;
+  w.integrator_times.all += dt;
+  if (any(w, Counted::implicit)) w.integrator_times.implicit += dt;
   IntegratorPurse &purse = w.purse;
   const double h = explicit_step(w), all = units(w, true), one = kTry / h * all;
   if (any(w, Counted::implicit)) {

@@ -8,6 +8,8 @@
 // trial, the bodies become implicit again. So trials cost at most that share of the work of explicit
 // integration alone, and a body at rest, for which implicit steps are cheap, returns to them.
 #pragma once
+#include <cstddef>
+#include <string>
 
 namespace dfm {
 
@@ -26,6 +28,8 @@ struct Counting {
 void begin_count(World &w, StepContext &step, double dt);
 // After the step: may change the integrator of bodies.
 void end_count(World &w, StepContext &step, double dt, double substeps);
+// "body 'first' is", "body 'first' and 4 more are"
+std::string names_of(const std::string &first, size_t count);
 double body_effort(const World &w, const StepContext &step);  // since begin_count()
 
 }  // namespace dfm

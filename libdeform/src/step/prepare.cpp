@@ -2,6 +2,7 @@
 // entities for the stages.
 #include "state/world.h"
 #include "step/context.h"
+#include "step/counting.h"
 #include "step/method.h"
 #include "step/stages.h"
 
@@ -282,7 +283,9 @@ IntegratorOption option_of(const World &w, const Body &b) {
   if (!b.model.stepper && b.model.can(DFM_CAP_STIFFNESS))
     o.implicit_work = b.model.can(DFM_CAP_CONSTANT_STIFFNESS) ? kConstantWork : kImplicitWork;
   o.open = b.integrator.open;
-  o.implicit = b.integrator.used != DFM_INTEGRATOR_SYMPLECTIC_EULER;
+  // those that are explicit by count become implicit again together with all others
+  o.implicit =
+      b.integrator.used != DFM_INTEGRATOR_SYMPLECTIC_EULER || b.integrator.counted == Counted::explicitly;
   return o;
 }
 
@@ -298,29 +301,57 @@ void choose_integrators(World &w) {
   std::vector<IntegratorOption> options;
   for (const auto &b : w.bodies) options.push_back(option_of(w, *b));
   choose_integrators(options);
+  // Where bodies are explicit by count, one that comes later is so, too, and goes back with them: explicit
+  // for good, it would cut their implicit steps into its sub-steps.
+  const bool by_count = std::ranges::any_of(w.bodies, [](const auto &b) {
+    return !b->integrator.open && b->integrator.counted == Counted::explicitly;
+  });
+  // One warning for all bodies of a scheme, and none for those that come later: a game makes many.
+  struct Told {
+    const Body *first = nullptr;
+    size_t count = 0;
+    double substeps = 0, step = 0;  // of the stiffest
+  } told[2];
   for (size_t i = 0; i < options.size(); ++i) {
     Body &b = *w.bodies[i];
     if (!b.integrator.open) continue;
     const bool was = b.integrator.used != DFM_INTEGRATOR_SYMPLECTIC_EULER;
-    if (options[i].implicit != was) {
+    const bool now = options[i].implicit && !by_count;
+    if (now != was) {
       const ImplicitOptions chosen = implicit_choice(w, b);
       b.dynamics = make_dynamics(w.meters.dynamics.memory(), b.p, b.surface, b.model, b.edges,
-                                 options[i].implicit ? &chosen : nullptr);
-      b.integrator.used = !options[i].implicit  ? DFM_INTEGRATOR_SYMPLECTIC_EULER
+                                 now ? &chosen : nullptr);
+      b.integrator.used = !now                  ? DFM_INTEGRATOR_SYMPLECTIC_EULER
                           : chosen.second_order ? DFM_INTEGRATOR_TR_BDF2
                                                 : DFM_INTEGRATOR_IMPLICIT_EULER;
-      if (options[i].implicit)
-        w.context->logf(DFM_LOG_WARNING,
-                        "body '%s' is integrated by %s, which damps %s, as long as that takes less work than "
-                        "explicit integration by %.0f sub-steps of %.3g s per step; set its integrator to "
-                        "choose one",
-                        b.name.c_str(), chosen.second_order ? "tr_bdf2" : "implicit_euler",
-                        chosen.second_order ? "contacts and unresolved vibrations" : "motion",
-                        std::ceil(options[i].substeps), b.integrator.step);
+      if (now) {
+        Told &own = told[chosen.second_order];
+        if (!own.first) own.first = &b;
+        ++own.count;
+        if (options[i].substeps > own.substeps) {
+          own.substeps = options[i].substeps;
+          own.step = b.integrator.step;
+        }
+      }
     }
     b.integrator.open = false;
     b.integrator.chosen = true;
-    b.integrator.counted = options[i].implicit ? Counted::implicit : Counted::no;
+    b.integrator.counted = !options[i].implicit ? Counted::no
+                           : by_count           ? Counted::explicitly
+                                                : Counted::implicit;
+  }
+  if (w.integrator_times.told) return;
+  for (const bool second_order : {true, false}) {
+    const Told &own = told[second_order];
+    if (!own.first) continue;
+    w.integrator_times.told = true;
+    w.context->logf(
+        DFM_LOG_WARNING,
+        "%s integrated by %s, which damps %s, as long as that takes less work than explicit "
+        "integration by %.0f sub-steps of %.3g s per step; set the integrator of a body to choose "
+        "one",
+        names_of(own.first->name, own.count).c_str(), second_order ? "tr_bdf2" : "implicit_euler",
+        second_order ? "contacts and unresolved vibrations" : "motion", std::ceil(own.substeps), own.step);
   }
 }
 

@@ -268,7 +268,13 @@ std::string explain(const World &w) {
          (std::isfinite(w.bound.step) ? format("%.9g", w.bound.step) : std::string("null")) +
          ",\"worst_body\":" + (w.bound.body ? quote(w.bound.body->name) : "null") +
          ",\"worst_point\":" + std::to_string(w.bound.point) +
-         ",\"contact_offset_m\":" + format("%.9g", w.offset) + ",\"reason\":" + quote(reason(w)) + "}}";
+         ",\"contact_offset_m\":" + format("%.9g", w.offset) + ",\"reason\":" + quote(reason(w)) +
+         "},\"auto\":";
+  // Steps in which bodies could change integrators; null: none.
+  const IntegratorTimes &times = w.integrator_times;
+  out += times.all > 0 ? format("{\"steps_s\":%.9g,\"implicit_s\":%.9g,\"changes\":%llu}}", times.all,
+                                times.implicit, static_cast<unsigned long long>(times.changes))
+                       : std::string("null}");
   return out;
 }
 
