@@ -152,6 +152,7 @@ TEST(Run, Outputs_HaveTheirColumnsAndKeys) {
                           "inverted_max",
                           "limited_max",
                           "self_bodies_max",
+                          "auto",
                           "guard_steps",
                           "solver",
                           "passes",
