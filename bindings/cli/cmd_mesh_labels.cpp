@@ -15,6 +15,9 @@
 namespace cli {
 namespace {
 
+// Per cell; from here on contact of the surface, not the cells, decides what a step costs.
+constexpr uint32_t kManyTriangles = 2;
+
 std::string whole(uint64_t n) { return std::to_string(n); }
 
 std::string size_json(const std::array<uint32_t, 3> &n) {
@@ -99,7 +102,11 @@ void print_table(const labels::Report &r, const labels::Options &o) {
   std::printf("  closed: %s; pairs of triangles that cross: %zu; largest change of a volume: %.2g %%\n",
               r.open_edges ? "no" : "yes", r.crossing, 100 * r.largest_change);
   if (r.put_back) std::printf("  %zu vertices are smoothed less, so that no triangles cross\n", r.put_back);
-  std::printf("deform run %s\n", shown(o.out + "/scene.json").c_str());
+  for (const labels::ThingReport &t : r.things)
+    if (!t.obstacle && t.triangles > kManyTriangles * t.cells)
+      std::printf("  %s: contact takes time for each of its %u triangles; a larger --spacing makes fewer\n",
+                  shown(t.name).c_str(), t.triangles);
+  std::printf("deform run %s\n", shown_word(o.out + "/scene.json").c_str());
 }
 
 int from_labels(const Globals &globals, const labels::Options &options) {

@@ -1,6 +1,9 @@
 #include "shown.h"
 
+#include <algorithm>
+#include <cctype>
 #include <cstdio>
+#include <cstring>
 
 namespace cli {
 
@@ -18,6 +21,16 @@ std::string shown(const std::string &text) {
     i += second;
   }
   return out;
+}
+
+std::string shown_word(const std::string &text) {
+  const bool plain = !text.empty() && std::all_of(text.begin(), text.end(), [](unsigned char c) {
+    return std::isalnum(c) || c >= 0x80 || std::strchr("_-+./:,@%=", c);
+  });
+  if (plain) return shown(text);
+  std::string out = "'";
+  for (const char c : text) out += c == '\'' ? "'\\''" : std::string(1, c);
+  return shown(out + "'");
 }
 
 }  // namespace cli

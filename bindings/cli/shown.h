@@ -8,4 +8,8 @@ namespace cli {
 // or fakes a line.
 std::string shown(const std::string &text);
 
+// The same as one word of a shell's command line: in quotes where it has a space or another character that
+// a shell reads.
+std::string shown_word(const std::string &text);
+
 }  // namespace cli

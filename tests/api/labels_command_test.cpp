@@ -74,6 +74,20 @@ TEST(LabelsCommand, WithoutATable_MakesOneBodyOfRegionsThatRuns) {
     EXPECT_EQ(test::read_file(out + name), test::read_file(out + "/again" + name)) << name;
 }
 
+TEST(LabelsCommand, ManyTriangles_AreToldAndTheCommandCanBePasted) {
+  const std::string out = folder() + "/a folder's name";
+  const auto fine =
+      test::deform({"mesh", "from-labels", phantom("nodule", "4"), "--out", out, "--cells", "300"});
+  ASSERT_EQ(fine.exit_code, 0) << fine.err;
+  EXPECT_TRUE(has(fine.out, "a larger --spacing makes fewer")) << fine.out;
+  EXPECT_TRUE(has(fine.out, "a folder'\\''s name/scene.json'\n")) << fine.out;
+  EXPECT_TRUE(has(fine.out, "deform run '")) << fine.out;
+  const auto coarse =
+      test::deform({"mesh", "from-labels", phantom("nodule", "4"), "--out", out, "--cells", "20000"});
+  ASSERT_EQ(coarse.exit_code, 0) << coarse.err;
+  EXPECT_FALSE(has(coarse.out, "--spacing")) << coarse.out;
+}
+
 TEST(LabelsCommand, WithATable_MakesBodiesAnObstacleAndWhatHoldsThem) {
   const std::string table = folder() + "/table.json", out = folder() + "/organs";
   test::write_file(table, kTable);
