@@ -333,6 +333,15 @@ TEST(PluginCheck, OneRuleOfAFileThatDoesNotLoad_Fails) {
   EXPECT_EQ(rules_that("FAIL", r.out), std::vector<std::string>{"V02"}) << r.out;
 }
 
+// The one sentence that helps is not buried under thirty that say the same.
+TEST(PluginCheck, FileThatDoesNotLoad_SkipsTheOtherRulesInOneLine) {
+  const test::CommandResult r = check(broken("wrong_abi"));
+  EXPECT_EQ(rules_that("FAIL", r.out), std::vector<std::string>{"V02"}) << r.out;
+  EXPECT_LE(std::count(r.out.begin(), r.out.end(), '\n'), 8) << r.out;
+  EXPECT_NE(r.out.find("  the other rules are skipped: it does not load (V02 says why)\n"), std::string::npos)
+      << r.out;
+}
+
 TEST(PluginCheck, InThisProcess_GivesTheSameVerdicts) {
   for (const char *law : {"sound", "allocates", "writes_past_the_end", "wrong_sign"}) {
     const test::CommandResult apart = check(broken(law)), here = check(broken(law), {"--in-process"});

@@ -280,6 +280,29 @@ TEST(Loader, PluginPath_ComesBeforeTheLibrarysOwnDirectory) {
   dfm_context_destroy(context);
 }
 
+// Who wrote the plugin reads why its law is missing, not only that it is.
+TEST(Loader, SceneWithALawOfASkippedFile_SaysWhyItWasSkipped) {
+  const std::string dir = folder("path_skipped");
+  test::write_file(dir + "/org.tiny.absent.so", "this is no library\n");
+  const Environment path("DEFORM_PLUGIN_PATH", "/nowhere:" + dir);
+  dfm_context *context = nullptr;
+  ASSERT_EQ(dfm_context_create(nullptr, &context), DFM_OK);
+  dfm_world world = 0;
+  for (const char *law : {"org.tiny.absent", "org.tiny.other"}) {
+    test::write_file(dir + "/scene.json",
+                     R"({"format": "deform-scene", "version": 1, "time": {"duration": 1},
+                         "contact": {"friction": [{"between": ["*", "*"], "law": ")" +
+                         std::string(law) + "\"}]}}");
+    EXPECT_EQ(dfm_scene_load(context, (dir + "/scene.json").c_str(), &world), DFM_E_UNSUPPORTED);
+    EXPECT_TRUE(says("no loaded plugin offers the law \"" + std::string(law) + "\"")) << dfm_last_error();
+    // the file that speaks of it, else the first
+    EXPECT_TRUE(
+        says(std::string("; not loaded: ") + (law == std::string("org.tiny.absent") ? dir : "/nowhere")))
+        << dfm_last_error();
+  }
+  dfm_context_destroy(context);
+}
+
 TEST(Loader, WithoutAnySetting_FindsThePluginsOfTheBuild) {
   unsetenv("DEFORM_PLUGIN_PATH");
   dfm_context *context = nullptr;

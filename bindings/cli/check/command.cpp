@@ -164,6 +164,8 @@ class Rules {
     for (const Rule *rule : wanted_)
       if (!rule->by_type) one(report_.file, *rule, -1);
       else if (report_.types.empty()) add(report_.file, {rule, {Result::skip, kNotLoaded}, 0});
+    if (not_loaded_ && !globals_.json && !globals_.quiet)
+      std::printf("  the other rules are skipped: %s\n", kNotLoaded);
     // Rules of laws that cannot run for want of a law are not kept: the rule that says why is
     // asked beside them.
     const bool loads = std::any_of(wanted_.begin(), wanted_.end(),
@@ -206,7 +208,10 @@ class Rules {
   // A line is printed when it is there: who waits sees what is done.
   void add(std::vector<Line> &to, Line line) {
     to.push_back(std::move(line));
-    if (!globals_.json) print_line(to.back(), globals_.quiet);
+    // One line for all of them, so that the reason stays in sight.
+    const bool unloaded = to.back().verdict.result == Result::skip && to.back().verdict.detail == kNotLoaded;
+    not_loaded_ = not_loaded_ || unloaded;
+    if (!globals_.json && !unloaded) print_line(to.back(), globals_.quiet);
   }
   static constexpr int kEnough = 2;
   const Globals &globals_;
@@ -214,6 +219,7 @@ class Rules {
   const std::vector<const Rule *> &wanted_;
   Report report_;
   int late_ = 0;
+  bool not_loaded_ = false;
 };
 
 // ---- report -----------------------------------------------------------------------------------------------

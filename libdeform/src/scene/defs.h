@@ -253,9 +253,12 @@ class Types {
   std::vector<std::string> names(uint32_t kind) const;                 // short names
   std::vector<std::string> model_keys() const;                         // parameters of any model
   std::vector<const dfm_type *> models() const;
+  // A file that was not loaded and why: the one that speaks of this type, else the first; "": all were.
+  std::string passed_over(const std::string &name) const;
 
  private:
   std::vector<const dfm_type *> types_;
+  std::vector<std::string> passed_over_;
 };
 std::vector<const dfm_param *> rows_of(const dfm_type *type);
 const dfm_param *find_row(const dfm_type *type, const std::string &key);

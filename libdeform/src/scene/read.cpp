@@ -33,6 +33,12 @@ Types::Types(dfm_context *context) {
         static_cast<std::vector<const dfm_type *> *>(user)->push_back(type);
       },
       &types_);
+  dfm_plugin_visit_passed(
+      context,
+      [](void *user, const char *file, const char *reason) {
+        static_cast<std::vector<std::string> *>(user)->push_back(std::string(file) + ": " + reason);
+      },
+      &passed_over_);
 }
 
 const dfm_type *Types::find(uint32_t kind, const std::string &name) const {
@@ -48,6 +54,12 @@ std::vector<std::string> Types::names(uint32_t kind) const {
   for (const dfm_type *t : types_)
     if (t->kind == kind) out.push_back(short_name(t));
   return out;
+}
+
+std::string Types::passed_over(const std::string &name) const {
+  for (const std::string &line : passed_over_)
+    if (line.find(name) != std::string::npos) return line;
+  return passed_over_.empty() ? "" : passed_over_.front();
 }
 
 std::vector<const dfm_type *> Types::models() const {
@@ -163,10 +175,12 @@ const dfm_type *read_type(const Node &name, uint32_t kind, const Types &types) {
   const std::vector<std::string> loaded = types.names(kind);
   const char *what = kind == DFM_KIND_MODEL ? "model" : "law";
   const std::string near = nearest(wanted, loaded);
-  fail(DFM_E_UNSUPPORTED, "%s: %s: no loaded plugin offers the %s \"%s\"; loaded: %s%s", name.file().c_str(),
-       name.pointer().c_str(), what, wanted.c_str(),
+  const std::string passed = types.passed_over(wanted);
+  fail(DFM_E_UNSUPPORTED, "%s: %s: no loaded plugin offers the %s \"%s\"; loaded: %s%s%s",
+       name.file().c_str(), name.pointer().c_str(), what, wanted.c_str(),
        loaded.empty() ? "none (see: deform plugin list)" : join(loaded).c_str(),
-       near.empty() ? "" : ("; did you mean \"" + near + "\"?").c_str());
+       near.empty() ? "" : ("; did you mean \"" + near + "\"?").c_str(),
+       passed.empty() ? "" : ("; not loaded: " + passed).c_str());
 }
 
 // ---- small shared parts -----------------------------------------------------------------------------------
