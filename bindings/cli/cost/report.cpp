@@ -245,6 +245,17 @@ std::string next_text(const Study &study) {
          " continues from here; that is enough to " + study.next + "\n";
 }
 
+namespace {
+// The cheapest of the front whose error alone is within the target, if it is not the choice; -1: none.
+int cheaper_but_unproven(const Study &study) {
+  for (const size_t i : study.front) {
+    if (int(i) == study.pick) return -1;
+    if (study.rows[i].headline <= study.options.target) return int(i);
+  }
+  return -1;
+}
+}  // namespace
+
 std::string pick_text(const Study &study) {
   const std::string target = percent(study.options.target);
   if (study.pick < 0 && study.check < 0)
@@ -265,6 +276,13 @@ std::string pick_text(const Study &study) {
     out += "  proven for model and step; the mesh brings " + percent(study.own_mesh.mesh) +
            ", give or take the " + percent(study.reference_headline) +
            " of the reference: no mesh within this budget is fine enough to say more\n" + next_text(study);
+  else if (const int nearly = cheaper_but_unproven(study); study.proven && nearly >= 0)
+    out += "  cheaper, but proven only to " +
+           percent(study.rows[size_t(nearly)].headline + study.reference_headline) +
+           " with the reference's own error of " + percent(study.reference_headline) + ": " +
+           study.rows[size_t(nearly)].job.label + " (" + percent(study.rows[size_t(nearly)].headline) + ", " +
+           formatted("%.3g", study.rows[size_t(nearly)].cpu_per_s) + " cpu " + study.cost_unit + ")\n" +
+           next_text(study);
   else if (!study.proven)
     out += "  likely, not proven: with the reference's own error of " + percent(study.reference_headline) +
            " it may be above the target\n" + next_text(study);
