@@ -9,6 +9,8 @@
 #include <cctype>
 #include <cstdio>
 #include <filesystem>
+#include <regex>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -331,6 +333,24 @@ TEST(PluginCheck, OneRuleOfAFileThatDoesNotLoad_Fails) {
   const test::CommandResult r = check(broken("wrong_abi"), {"--only", "F03"});
   EXPECT_EQ(r.exit_code, 1) << r.out;
   EXPECT_EQ(rules_that("FAIL", r.out), std::vector<std::string>{"V02"}) << r.out;
+}
+
+// "31 rules" and "31 [rules](..)" stand in the pages.
+TEST(PluginCheck, NumbersOfRules_AreThoseOfThePages) {
+  std::set<std::string> counted;
+  for (const char *plugin : {"friction_coulomb", "model_msm"}) {
+    const test::CommandResult r = check(shipped(plugin));
+    counted.insert(std::to_string(rules_that("pass", r.out).size() + rules_that("skip", r.out).size()));
+  }
+  for (const char *page :
+       {"/README.md", "/libdeform/doc/howto/write-a-law.md", "/libdeform/doc/howto/write-a-model.md"}) {
+    const std::string text = test::read_file(DEFORM_SOURCE_DIR + std::string(page));
+    const std::regex number(R"((\d+) \[?rules)");
+    size_t found = 0;
+    for (std::sregex_iterator i(text.begin(), text.end(), number), end; i != end; ++i, ++found)
+      EXPECT_TRUE(counted.count((*i)[1])) << page << ": " << i->str();
+    EXPECT_GT(found, 0u) << page;
+  }
 }
 
 // The one sentence that helps is not buried under thirty that say the same.
