@@ -35,7 +35,8 @@ bool has(const std::string &text, const std::string &part) { return text.find(pa
 TEST(CostWords, CheaperChoiceThatTheReferenceCannotProve_IsNamedWithItsReason) {
   const std::string said = pick_text(two_choices(0.04));
   EXPECT_TRUE(has(said, "cheapest within 5.00 %: cells x2")) << said;
-  EXPECT_TRUE(has(said, "cheaper, but proven only to 7.00 % with the reference's own error of 4.00 %: long steps"))
+  EXPECT_TRUE(
+      has(said, "cheaper, but proven only to 7.00 % with the reference's own error of 4.00 %: long steps"))
       << said;
   EXPECT_TRUE(has(said, "--budget 120 goes on from here")) << said;
 }
