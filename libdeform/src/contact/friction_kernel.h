@@ -43,8 +43,11 @@ static inline double given(double l, const double *yields) {
 // (h fn)). Without that the sweeps can run away. Where fn is small dft_dfn is steep, by mu^2 sigma1/(4 sigma0
 // h) with micro-damping, and holds for a hair's breadth alone; each sweep then answers a normal impulse with
 // several times as much friction, that with a normal impulse beside it, and so on until nothing is finite.
-static inline Pair friction_impulse(const LawView &s, uint32_t i, double h, double wt, double l1, double l2,
-                                    double ln, double u1, double u2) {
+//
+// Inline in the loops of sweeps and residuals: each calls it once per contact and iteration.
+__attribute__((always_inline)) static inline Pair friction_impulse(const LawView &s, uint32_t i, double h,
+                                                                   double wt, double l1, double l2, double ln,
+                                                                   double u1, double u2) {
   const size_t n = s.stride;
   const double fn = s.fn[i];
   if (s.form[i] == kSetValuedLaw) {
