@@ -113,6 +113,7 @@ struct Slit {
 }  // namespace
 
 // Without contact beyond half an edge of slip, and of copies of points alone: a sixth of an edge deep.
+// With copies that hold for a tenth of an edge (decision 0401): up to 0.026.
 TEST(Slit, ShearedAndPressed_KeepsItsSidesApart) {
   for (const bool rabbit : {false, true})
     for (const char *model : kModels) {
@@ -122,7 +123,7 @@ TEST(Slit, ShearedAndPressed_KeepsItsSidesApart) {
         steps(s.w, 20);  // asks for no energy of contact
         deepest = std::max(deepest, s.deepest());
       }
-      EXPECT_LT(deepest, 0.03) << model << " " << rabbit;
+      EXPECT_LT(deepest, 0.004) << model << " " << rabbit;
       const dfm_body_measure end = test::measure(s.b);
       EXPECT_EQ(end.inverted, 0u);
       // back in its shape, at rest

@@ -196,8 +196,7 @@ void gather_rows(Surface &surface, const double *x, const double *v, uint32_t be
 
 namespace {
 
-constexpr double kTilt = 1e-3;   // share of the trace; distinguishes nearly parallel planes
-constexpr double kFarthest = 3;  // limit on the motion of a surfel relative to that of the planes
+constexpr double kTilt = 1e-3;  // share of the trace; distinguishes nearly parallel planes
 
 }  // namespace
 
@@ -225,7 +224,7 @@ void ways_back(Surface &s, const double *x, const std::function<void(uint32_t su
     const double det = dot(a, cross(b, c));
     Vec3 way = (-1 / det) * Vec3{dot(r, cross(b, c)), dot(r, cross(c, a)), dot(r, cross(a, b))};
     const double far = norm(way);
-    if (far > kFarthest) way = (kFarthest / far) * way;
+    if (far > kMostBack) way = (kMostBack / far) * way;
     use(s.laid_surfel[i], way);
   }
 }

@@ -33,16 +33,37 @@ double height(const double *const at[4], int split, Vec3 n) {
   return split == 2 ? std::min(d[0], d[1]) - far : d[0] - std::max(d[1], far);
 }
 
-// From the second feature to the first, as they start.
-Vec3 apart(const Features &f) {
+// From the second feature to the first, as they start; moved: the same sum of these ways of the corners.
+Vec3 apart(const Features &f, const Vec3 *way = nullptr, Vec3 *moved = nullptr) {
   Vec3 x[4];
   for (int k = 0; k < 4; ++k) x[k] = load3(f.start[k]);
+  double w[4];
   if (f.split == 2) {
     const auto c = closest_segments(x[0], x[1], x[2], x[3]);
-    return x[0] + c.s * (x[1] - x[0]) - x[2] - c.t * (x[3] - x[2]);
+    const double weights[4] = {1 - c.s, c.s, c.t - 1, -c.t};
+    std::copy(weights, weights + 4, w);
+  } else {
+    const auto c = closest_on_triangle(x[0], x[1], x[2], x[3]);
+    const double weights[4] = {1, -c.weight[0], -c.weight[1], -c.weight[2]};
+    std::copy(weights, weights + 4, w);
   }
-  const auto c = closest_on_triangle(x[0], x[1], x[2], x[3]);
-  return x[0] - c.weight[0] * x[1] - c.weight[1] * x[2] - c.weight[2] * x[3];
+  if (moved) *moved = w[0] * way[0] + w[1] * way[1] + w[2] * way[2] + w[3] * way[3];
+  return w[0] * x[0] + w[1] * x[1] + w[2] * x[2] + w[3] * x[3];
+}
+
+// Features beside copies rest at another distance, and the floor is in proportion to it; not above 0: none.
+double floor_share(const GuardScene &scene, const Features &f) {
+  double copies = HUGE_VAL;
+  const double *const place = f.side[0]->surface->place.data();
+  each_copies(f, [&](int i, int j) {
+    copies = std::min(copies,
+                      norm(load3(place + 4 * size_t{f.surfel(i)}) - load3(place + 4 * size_t{f.surfel(j)})));
+  });
+  if (!(copies < HUGE_VAL)) return 1;
+  Vec3 way[4], moved;
+  for (int k = 0; k < 4; ++k) way[k] = load3(f.start[k]) - load3(place + 4 * size_t{f.surfel(k)});
+  const Vec3 n = normalized(apart(f, way, &moved));
+  return rest_beside(dot(n, moved), copies, scene.offset) / scene.offset;
 }
 
 // Candidates per block; most end at the first comparison.
@@ -60,8 +81,10 @@ class NearPairs {
     const double now = kRounding * (run.way + run.travel), *const rest = memory_.rest.data();
     a_ = &scene_.side(list_[run.begin], false);
     b_ = &scene_.side(list_[run.begin], true);
+    const PairAtRest *const own =
+        a_ == b_ && a_->opened ? a_->pairs[run.kind == kEdgeEdge] - run.begin : nullptr;
     for (uint32_t i = begin; i < end; ++i)
-      if (!(now < rest[i])) look(i, run.way, now);
+      if (!(now < rest[i]) && !(own && held(own[i]))) look(i, run.way, now);
   }
 
  private:
@@ -84,6 +107,11 @@ class NearPairs {
       if (now < rest || stays_apart(f, n, height(f.start, f.split, n))) return;
     }
     near_.push_back(i);
+  }
+  bool held(const PairAtRest &pair) const {
+    for (const uint32_t c : pair.copies)
+      if (c != kNone && !a_->held[c]) return false;
+    return pair.beside();
   }
   bool stays_apart(Features &f, Vec3 n, double start) {
     if (!(start > floor_)) return false;
@@ -334,9 +362,10 @@ double guard_pairs(GuardScene &scene, const Array<Candidate> &list, std::span<co
     f.find_ends(scene);
     const PairMotion pair(f);
     GuardHit hit{i, 0, 0, 0, 0, {}};
-    if (pair.far_apart(scene.floor) || pair.plane_apart(scene.floor)) continue;
+    const double share = floor_share(scene, f), floor = share * scene.floor, margin = share * scene.margin;
+    if (!(share > 0) || pair.far_apart(floor) || pair.plane_apart(floor)) continue;
     const auto touch = [&](double d, double within) { return pair.touch(d, within); };
-    if (!narrow::judge(touch, [&] { return pair.distance(0); }, scene.floor, scene.margin, hit)) continue;
+    if (!narrow::judge(touch, [&] { return pair.distance(0); }, floor, margin, hit)) continue;
     out.push_back(hit);
     least = std::min(least, hit.safe);
   }

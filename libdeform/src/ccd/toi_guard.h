@@ -12,6 +12,7 @@
 #include <span>
 #include <vector>
 
+#include "body/self_rest.h"
 #include "core/memory.h"
 #include "core/tasks.h"
 #include "geometry/views.h"
@@ -48,7 +49,11 @@ struct GuardSide {
   double spread = 0;  // m, none differs by more
   // m, none moves by more beyond a rigid motion of all; of bodies that may touch themselves
   double deform = 0;
-  Array<double> end;  // [nsurfel,4], where `stamp` is the scene's round
+  const OpenedSurface *opened = nullptr;  // of a body with open faces
+  // of its vertex-face and edge-edge candidates, in their order
+  const PairAtRest *pairs[2] = {nullptr, nullptr};
+  std::vector<uint8_t> held;  // [copies] nothing around them comes too near
+  Array<double> end;          // [nsurfel,4], where `stamp` is the scene's round
   Array<uint32_t> stamp;
 };
 
@@ -60,6 +65,7 @@ struct GuardScene {
   std::vector<GuardPose> poses;  // of obstacles, at the end
   double h = 0, fraction = 1;    // s; of the way, that is taken
   double floor = 0, margin = 0;  // m: d_g, 0.1 (d_c - d_g)
+  double offset = 0;             // m, d_c
   uint32_t round = 0;            // ends of earlier rounds are out of date
 
   GuardSide &side(const Candidate &c, bool second) {

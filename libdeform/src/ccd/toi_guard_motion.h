@@ -51,6 +51,16 @@ struct Features {
   }
 };
 
+// use(i, j): for corners i and j that are copies of one point.
+template <class F>
+void each_copies(const Features &f, F &&use) {
+  const OpenedSurface *const opened = f.side[0]->opened;
+  if (f.side[0] != f.side[1] || !opened) return;
+  for (int i = 0; i < f.split; ++i)
+    for (int j = f.split; j < 4; ++j)
+      if (opened->origin[f.surfel(i)] == opened->origin[f.surfel(j)]) use(i, j);
+}
+
 // An obstacle in its own frame, where it stands still.
 struct ObstacleFrame {
   ObstacleShape shape;

@@ -19,6 +19,8 @@ struct NamedBy {
 };
 
 inline constexpr size_t kBackSums = 9;
+inline constexpr double kMostBack =
+    3;  // limit on the way of a surfel that is set back, in units of Surface::back
 
 struct Surface {
   uint32_t nsurfel = 0, ntri = 0, nedge = 0;

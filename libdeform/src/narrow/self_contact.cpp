@@ -17,8 +17,9 @@
 //
 // The two sides of an open face (a cut) lie on each other at rest. They are seen d_c / 2 further back each
 // (geometry/surface.h), so they are d_c apart and touch as two bodies do. Copies of one point that have not
-// slid apart make one contact, along the normal of the faces that were joined at them, and none with the
-// other features around them.
+// slid apart make one contact, along the normal of the faces that were joined at them, and hold the features
+// around them, which make none. From there on to where they have slid apart these rest where the material
+// touches, less what is left to the copies (body/self_rest.h, doc/decisions/0427).
 #include "narrow/self_contact.h"
 
 #include <algorithm>
@@ -55,22 +56,10 @@ constexpr double kNearer = 1e-9;
 // cosine to the outward normal beyond which a pair at rest looks through the material, or away from it
 constexpr double kThrough = 0.25;
 
-// of the median edge: copies of a point that have slid less along each other touch
-constexpr double kSlid = 0.1;
-// of what they are apart at rest: how near features beside copies of one point may come
-constexpr double kBeside = 0.3;
-constexpr double kGuarded = 0.7;   // of d_c: features beside copies that rest nearer are left to contact
-constexpr double kAlong = 0.1;     // cosine to the normal of copies, at least
 constexpr double kDeep = 1e-2;     // of the median edge: what is less deep is held by all faces
 constexpr double kOpposed = -0.5;  // cosine between normals that push against each other
 
-// What a pair is at rest.
-struct Kin {
-  double apart = 0;     // m it rests at
-  bool beside = false;  // copies of one point are among its corners
-  double side = 0;      // 1: kept apart outside, -1: within, 0: where it is
-  bool touches = true;  // false: it makes no contact
-};
+using Kin = PairAtRest;
 
 class RestShape {
  public:
@@ -85,13 +74,11 @@ class RestShape {
     const double distance = std::sqrt(q.distance2);
     const std::span<const uint32_t> fan{s_.fan.data() + s_.fan_begin[surfel],
                                         s_.fan.data() + s_.fan_begin[surfel + 1]};
-    bool beside = false;
-    if (across({&surfel, 1}, fan, {c, 3}, {&t, 1}, distance, beside)) {
+    if (across({&surfel, 1}, fan, {c, 3}, {&t, 1}, distance)) {
       const double back = s_.back;
       const Vec3 o = rest_.at(surfel, back);
       return outside(
-          closest_on_triangle(o, rest_.at(c[0], back), rest_.at(c[1], back), rest_.at(c[2], back)).distance2,
-          beside);
+          closest_on_triangle(o, rest_.at(c[0], back), rest_.at(c[1], back), rest_.at(c[2], back)).distance2);
     }
     return kin(distance, dot(normalized(cross(b - a, d - a)), p - q.point) / distance);
   }
@@ -107,28 +94,23 @@ class RestShape {
       up += normalized(cross(rest_.at(c[1]) - rest_.at(c[0]), rest_.at(c[2]) - rest_.at(c[0])));
     }
     const double distance = norm(way);
-    bool beside = false;
-    if (across({ea, 2}, {&s_.edge_tri[2 * size_t{a}], 2}, {eb, 2}, {&s_.edge_tri[2 * size_t{b}], 2}, distance,
-               beside)) {
+    if (across({ea, 2}, {&s_.edge_tri[2 * size_t{a}], 2}, {eb, 2}, {&s_.edge_tri[2 * size_t{b}], 2},
+               distance)) {
       const double back = s_.back;
       return outside(closest_segments(rest_.at(ea[0], back), rest_.at(ea[1], back), rest_.at(eb[0], back),
                                       rest_.at(eb[1], back))
-                         .distance2,
-                     beside);
+                         .distance2);
     }
     return kin(distance, dot(normalized(up), way) / distance);
   }
 
  private:
-  // Of a body with open faces: whether a pair is on different sides of one, or has one in between.
-  // tris: the triangles around the features.
+  // Of a body with open faces: whether a pair without copies is on different sides of one, or has one in
+  // between. tris: the triangles around the features.
   bool across(std::span<const uint32_t> a, std::span<const uint32_t> tris_a, std::span<const uint32_t> b,
-              std::span<const uint32_t> tris_b, double at_rest, bool &beside) const {
+              std::span<const uint32_t> tris_b, double at_rest) const {
     const OpenedSurface &opened = rest_.opened;
     if (!opened.any()) return false;
-    for (const uint32_t i : a)
-      for (const uint32_t j : b)
-        if (opened.origin[i] == opened.origin[j]) return beside = true;
     bool a_beside = false, b_beside = false;
     for (const uint32_t t : tris_a) {
       const uint32_t side = t == kNone ? kNone : opened.side[t];
@@ -145,19 +127,22 @@ class RestShape {
         if (opened.joined(i, j)) return false;
     return true;
   }
-  // Features beside copies of one point lie on each other at rest, d_c apart where they are set back. The
-  // copies keep them so; they themselves do it from a little nearer on, where copies slide along each other.
-  Kin outside(double at_rest2, bool beside) const {
-    const double apart = std::min(offset_, std::sqrt(at_rest2));
-    return {kBeside * apart, beside, 1};
+  Kin outside(double at_rest2) const {
+    Kin k;
+    k.apart = std::min(offset_, std::sqrt(at_rest2));
+    k.side = 1;
+    k.known = true;
+    return k;
   }
   // By the distance at rest and the cosine between the way across and the outward normal there.
   Kin kin(double at_rest, double facing) const {
-    if (!(at_rest > kClosedAtRest * offset_)) return {0, false, 0, false};
-    return {std::min(offset_, 0.5 * at_rest), false,
-            at_rest >= rest_.thin || facing > kThrough ? 1.0
-            : facing < -kThrough                       ? -1.0
-                                                       : 0.0};
+    Kin k;
+    k.known = true;
+    k.touches = at_rest > kClosedAtRest * offset_;
+    if (!k.touches) return k;
+    k.apart = std::min(offset_, 0.5 * at_rest);
+    k.side = at_rest >= rest_.thin || facing > kThrough ? 1 : facing < -kThrough ? -1 : 0;
+    return k;
   }
   const Surface &s_;
   const SelfRest &rest_;
@@ -170,11 +155,13 @@ struct Self {
   RestShape rest;
   double h, offset, depth, edge_depth;  // depth: m, recovery
   const Tangled &tangled;
+  const Array<CopiesNow> &copies_now;
+  const Array<double> &slack;
   Pair pair;
   Array<ContactPoint> &out;
 
   Self(const BodyView &b, const SelfRest &r, double step, double d_c, const Tangled &t,
-       Array<ContactPoint> &to)
+       const SelfPairs &pairs, Array<ContactPoint> &to)
       : body(b),
         s(*b.surface),
         rest(s, r, d_c),
@@ -183,6 +170,8 @@ struct Self {
         depth(self_recovery_depth(s)),
         edge_depth(edge_recovery_depth(s, s)),
         tangled(t),
+        copies_now(pairs.copies),
+        slack(pairs.slack),
         pair{b, &b, nullptr, step, d_c, 0},
         out(to) {}
 
@@ -206,15 +195,15 @@ struct Self {
     return normalized(cross(x(c[1]) - x(c[0]), x(c[2]) - x(c[0])));
   }
 
-  bool copies(uint32_t a, uint32_t b, Vec3 &normal, uint32_t &first) const;
   void copies(uint32_t surfel, uint32_t t);
-  bool against_copies(std::span<const uint32_t> a, std::span<const uint32_t> b, Vec3 normal) const;
+  bool held(const Kin &k) const;
+  double rests_at(const Kin &k, double set_back) const;
   void keep_shallow(size_t begin);
   bool yields(uint32_t t, double distance2, uint32_t other, uint32_t surfel) const;
   bool minimum(uint32_t surfel, uint32_t t, const TrianglePoint &at) const;
   Vec3 outward(uint32_t surfel, uint32_t t, const TrianglePoint &at) const;
-  void vertex_face(uint32_t surfel, uint32_t t);
-  void edge_edge(uint32_t a, uint32_t b);
+  void vertex_face(uint32_t surfel, uint32_t t, Kin &k);
+  void edge_edge(uint32_t a, uint32_t b, Kin &k);
   void name(size_t begin);
   void share_areas(size_t begin, size_t edges, Array<uint8_t> &lent);
 };
@@ -292,92 +281,96 @@ void Self::keep_shallow(size_t begin) {
   out.resize(to);
 }
 
-// Are two surfels copies of one point that have not slid along each other? normal: of the faces that were
-// joined at them, from b to a; first: the lowest triangle of b's among those.
-bool Self::copies(uint32_t a, uint32_t b, Vec3 &normal, uint32_t &first) const {
-  const OpenedSurface &opened = rest.opened();
-  if (opened.origin[a] != opened.origin[b]) return false;
-  Vec3 up;
-  first = kNone;
-  for (uint32_t k = s.fan_begin[b]; k < s.fan_begin[b + 1]; ++k) {
-    const uint32_t twin = opened.twin[s.fan[k]];
-    if (twin == kNone || !has(twin, a)) continue;
-    first = std::min(first, s.fan[k]);
-    for (const double sign : {1.0, -1.0}) {
-      const uint32_t *const n = corners(sign > 0 ? s.fan[k] : twin);
-      up += sign * cross(x(n[1]) - x(n[0]), x(n[2]) - x(n[0]));
-    }
-  }
-  normal = normalized(up);
-  const Vec3 way = place(a) - place(b);
-  const double slid = kSlid * s.median_edge;
-  return norm2(way - dot(normal, way) * normal) < slid * slid;
-}
-
+// The contact of two copies of a point that have not slid along each other.
 void Self::copies(uint32_t surfel, uint32_t t) {
-  const uint32_t *const c = corners(t);
-  Vec3 normal;
-  uint32_t first = kNone;
-  const uint32_t *const at =
-      std::find_if(c, c + 3, [&](uint32_t corner) { return copies(surfel, corner, normal, first); });
-  if (at == c + 3 || first != t || surfel < *at || !(norm2(normal) > 0)) return;
-  double distance = dot(normal, place(surfel) - place(*at));
-  if (std::fabs(distance) < kNearer * offset) distance = 0;
-  const double reach = contact_reach(h, offset, norm(v(surfel) - v(*at)));
-  if (!(distance < reach && distance >= -depth)) return;
-  ContactPoint contact = blank(pair, kVertexFace, 0, surfel, t);
-  add_node(contact, body.first_node + surfel, 1);
-  add_node(contact, body.first_node + *at, -1);
-  narrow::place(contact, x(surfel), x(*at), normal, distance + offset);
-  contact.area = 0.5 * facing_area(s, surfel, -normal);
-  out.push_back(contact);
+  const OpenedSurface &opened = rest.opened();
+  for (uint32_t k = opened.copies_begin[surfel]; k < opened.copies_begin[surfel + 1]; ++k) {
+    if (opened.copies[k].first != t) continue;
+    const uint32_t other = opened.copies[k].b;
+    const CopiesNow &now = copies_now[k];
+    if (!(now.slip < kNearCopies * offset)) return;
+    const double distance = now.gap;
+    const double reach = contact_reach(h, offset, norm(v(surfel) - v(other)));
+    if (!(distance < reach && distance >= -depth)) return;
+    ContactPoint contact = blank(pair, kVertexFace, 0, surfel, t);
+    add_node(contact, body.first_node + surfel, 1);
+    add_node(contact, body.first_node + other, -1);
+    narrow::place(contact, x(surfel), x(other), now.normal, distance + offset);
+    contact.area = 0.5 * facing_area(s, surfel, -now.normal);
+    out.push_back(contact);
+    return;
+  }
 }
 
-// Would a contact of features beside copies push against the one of the copies? No motion satisfies both.
-bool Self::against_copies(std::span<const uint32_t> a, std::span<const uint32_t> b, Vec3 normal) const {
-  Vec3 own;
-  uint32_t first = kNone;
-  for (const uint32_t i : a)
-    for (const uint32_t j : b)
-      if (copies(i, j, own, first) && dot(own, normal) < kAlong) return true;
-  return false;
+// Do the copies among the corners hold the pair for the whole sub-step (SelfPairs::slack)?
+bool Self::held(const Kin &k) const {
+  for (const uint32_t c : k.copies)
+    if (c != kNone && !(slack[c] > 2 * h * copies_now[c].speed)) return false;
+  return k.beside();
 }
 
-void Self::vertex_face(uint32_t surfel, uint32_t t) {
-  if (rest.opened().any()) copies(surfel, t);
+// m, set back: the distance at which the pair rests. Beside copies it is what setting back has added along
+// the normal, so that the material touches, less what is left to them.
+double Self::rests_at(const Kin &k, double set_back) const {
+  if (!k.beside()) return k.apart;
+  double apart = HUGE_VAL;
+  for (const uint32_t c : k.copies)
+    if (c != kNone) apart = std::min(apart, copies_now[c].apart);
+  return rest_beside(set_back, apart, offset);
+}
+
+void Self::vertex_face(uint32_t surfel, uint32_t t, Kin &k) {
+  if (rest.opened().any()) {
+    copies(surfel, t);
+    if (held(k)) return;
+  }
   const uint32_t *const c = corners(t);
   const Vec3 p = x(surfel), a = x(c[0]), u = x(c[1]) - a, w = x(c[2]) - a, n = cross(u, w);
   double speed2 = 0;
-  for (int k = 0; k < 3; ++k) speed2 = std::max(speed2, norm2(v(surfel) - v(c[k])));
+  for (int i = 0; i < 3; ++i) speed2 = std::max(speed2, norm2(v(surfel) - v(c[i])));
   const double reach = contact_reach(h, offset, std::sqrt(speed2));
   const double widest = std::max(reach, depth);
   const double along = dot(n, p - a);
   const double nn = norm2(n);
   if (along * along > widest * widest * (1 + kNearer) * nn && nn > 1e-12 * norm2(u) * norm2(w)) return;
+  if (!k.known) k = rest.of_face(surfel, t);
+  if (!k.touches || held(k)) return;
   const TrianglePoint at = closest(t, p);
   if (!(at.distance2 < widest * widest) || !minimum(surfel, t, at)) return;
   const bool face = at.feature == TriangleFeature::face;
   const Vec3 up = outward(surfel, t, at);
   const double distance = std::sqrt(at.distance2), now = (face ? along : dot(up, p - at.point)) < 0 ? -1 : 1;
-  const Kin k = rest.of_face(surfel, t);
+  const bool beside = k.beside();
   double side = k.side != 0 ? k.side : now;
-  if (now != side && face && distance <= depth && !through({surfel}, {c[0], c[1], c[2]})) side = now;
-  const double within = k.beside ? k.apart + reach - 2 * offset : reach;
-  if (!k.touches || !(now == side ? distance < within : face && distance <= depth)) return;
+  if (!beside && now != side && face && distance <= depth && !through({surfel}, {c[0], c[1], c[2]}))
+    side = now;
   if (!face && !(distance > 1e-9 * s.median_edge)) return;
-  const Vec3 normal = face ? side * up : (1 / distance) * (p - at.point);
+  Vec3 normal = face ? side * up : (1 / distance) * (p - at.point);
   if (!(norm2(normal) > 0)) return;
-  if (k.beside && against_copies({&surfel, 1}, {c, 3}, normal)) return;
+  double back = 0;
+  if (beside) {
+    Vec3 way = p - place(surfel);
+    for (int i = 0; i < 3; ++i) way -= at.weight[i] * (x(c[i]) - place(c[i]));
+    back = dot(normal, way);
+  }
+  const double apart = rests_at(k, back);
+  // as far as rounding of the set-back faces goes, what stands behind one need not have passed it
+  if (beside && now != side && face && distance <= depth && -distance < apart - offset &&
+      !through({surfel}, {c[0], c[1], c[2]}))
+    return;
+  const double within = beside ? apart + reach - 2 * offset : reach;
+  if (!(now == side ? distance < within : face && distance <= depth && -distance < within)) return;
   ContactPoint contact = blank(pair, kVertexFace, 0, surfel, t);
   add_node(contact, body.first_node + surfel, 1);
   for (int i = 0; i < 3; ++i) add_node(contact, body.first_node + c[i], -at.weight[i]);
-  narrow::place(contact, p, at.point, normal, (now == side ? distance : -distance) + (offset - k.apart));
+  narrow::place(contact, p, at.point, normal, (now == side ? distance : -distance) + (offset - apart));
   contact.area = 0.5 * facing_area(s, surfel, -side * normal);
   out.push_back(contact);
 }
 
 // As narrow/edge_edge.cpp, of one surface; from within, with the surface turned inside out.
-void Self::edge_edge(uint32_t a, uint32_t b) {
+void Self::edge_edge(uint32_t a, uint32_t b, Kin &k) {
+  if (held(k)) return;
   const uint32_t *const ea = &s.edge[2 * size_t{a}], *const eb = &s.edge[2 * size_t{b}];
   const Vec3 p0 = x(ea[0]), u = x(ea[1]) - p0, q0 = x(eb[0]), w = x(eb[1]) - q0, r = p0 - q0, n = cross(u, w);
   const double uu = norm2(u), ww = norm2(w), nn = norm2(n), nr = dot(n, r);
@@ -396,11 +389,14 @@ void Self::edge_edge(uint32_t a, uint32_t b) {
     for (int j = 0; j < 2; ++j) speed2 = std::max(speed2, norm2(v(ea[i]) - v(eb[j])));
   const double reach = contact_reach(h, offset, std::sqrt(speed2)), widest = std::max(reach, edge_depth);
   if (!(nr * nr < widest * widest * nn)) return;
-  if (place_on_edge(on_a, 2 * h * std::sqrt(speed2 / uu)) != kBetween ||
-      place_on_edge(on_b, 2 * h * std::sqrt(speed2 / ww)) != kBetween)
-    return;
-  const Kin k = rest.of_edges(a, b);
-  if (!k.touches) return;
+  const int place_a = place_on_edge(on_a, 2 * h * std::sqrt(speed2 / uu)),
+            place_b = place_on_edge(on_b, 2 * h * std::sqrt(speed2 / ww));
+  if (place_a == kNowhere || place_b == kNowhere) return;
+  if (!k.known) k = rest.of_edges(a, b);
+  if (!k.touches || held(k)) return;
+  // Setting back moves the ends of edges beside copies by as much as may leave crossings to them.
+  const bool beside = k.beside();
+  if (!beside && (place_a != kBetween || place_b != kBetween)) return;
   // An edge that is flat folds out where the blow bends its faces, by what they may move against each other
   // within the sub-step.
   const double bent = std::min(0.3, 2 * h * std::sqrt(speed2 / std::min(uu, ww))) - kConvex;
@@ -415,18 +411,22 @@ void Self::edge_edge(uint32_t a, uint32_t b) {
   Vec3 normal = (1 / std::sqrt(nn)) * n;
   if (dot(normal, up_b) < dot(normal, up_a)) normal = -normal;
   const double distance = dot(normal, r);
-  if (!(distance < (k.beside ? k.apart + reach - 2 * offset : reach) && distance >= -edge_depth) ||
-      (distance < 0 && !through({ea[0], ea[1]}, {eb[0], eb[1]})))
+  const auto way = [&](uint32_t surfel) { return x(surfel) - place(surfel); };
+  const double back = beside ? dot(normal, (1 - on_a) * way(ea[0]) + on_a * way(ea[1]) -
+                                               (1 - on_b) * way(eb[0]) - on_b * way(eb[1]))
+                             : 0;
+  const double apart = rests_at(k, back);
+  if (!(distance < (beside ? apart + reach - 2 * offset : reach) && distance >= -edge_depth) ||
+      (distance < (beside ? apart - offset : 0) && !through({ea[0], ea[1]}, {eb[0], eb[1]})))
     return;
-  const double slack = kCone + std::min(0.3, reach / std::sqrt(std::min(uu, ww)));
-  if (!fb.leans_out(normal, slack) || !fa.leans_out(-normal, slack)) return;
-  if (k.beside && against_copies({ea, 2}, {eb, 2}, normal)) return;
+  const double open = kCone + std::min(0.3, reach / std::sqrt(std::min(uu, ww)));
+  if (!fb.leans_out(normal, open) || !fa.leans_out(-normal, open)) return;
   ContactPoint c = blank(pair, kEdgeEdge, 1, a, b);
   add_node(c, body.first_node + ea[0], 1 - on_a);
   add_node(c, body.first_node + ea[1], on_a);
   add_node(c, body.first_node + eb[0], on_b - 1);
   add_node(c, body.first_node + eb[1], -on_b);
-  narrow::place(c, p0 + on_a * u, q0 + on_b * w, normal, distance + (offset - k.apart));
+  narrow::place(c, p0 + on_a * u, q0 + on_b * w, normal, distance + (offset - apart));
   out.push_back(c);
 }
 
@@ -473,26 +473,104 @@ void Self::share_areas(size_t begin, size_t edges, Array<uint8_t> &lent) {
   }
 }
 
+// Pairs with copies of one point among their corners.
+void find_copies(const OpenedSurface &opened, std::span<const uint32_t> a, std::span<const uint32_t> b,
+                 PairAtRest &out) {
+  uint32_t n = 0;
+  for (const uint32_t i : a)
+    for (const uint32_t j : b)
+      if (opened.origin[i] == opened.origin[j] && n < 2) out.copies[n++] = opened.copies_of(i, j);
+  if (n == 0) return;
+  out.side = 1;
+  out.known = true;
+}
+
 }  // namespace
 
-void find_self_contacts(const BodyView &body, const SelfRest &rest, std::span<const SelfPair> vertex_face,
-                        std::span<const SelfPair> edge_edge, double h, double offset, const Tangled &tangled,
-                        Array<uint8_t> &lent, Array<ContactPoint> &out) {
-  Self self(body, rest, h, offset, tangled, out);
+void SelfPairs::follow(const Surface &s, const SelfRest &rest, uint64_t list, double d_c) {
+  const OpenedSurface &opened = rest.opened;
+  if (renewals != list || offset != d_c) {
+    renewals = list;
+    offset = d_c;
+    of_face.assign(vertex_face.size(), {});
+    of_edges.assign(edge_edge.size(), {});
+    if (opened.any()) {
+      for (size_t i = 0; i < of_face.size(); ++i)
+        find_copies(opened, {&vertex_face[i].a, 1}, {&s.tri[3 * size_t{vertex_face[i].b}], 3}, of_face[i]);
+      for (size_t i = 0; i < of_edges.size(); ++i)
+        find_copies(opened, {&s.edge[2 * size_t{edge_edge[i].a}], 2},
+                    {&s.edge[2 * size_t{edge_edge[i].b}], 2}, of_edges[i]);
+    }
+  }
+  copies.resize(opened.copies.size());
+  slack.resize(copies.size());
+  const auto at = [&](uint32_t surfel) { return load3(&s.place[4 * size_t{surfel}]); };
+  const auto area = [&](uint32_t t) {
+    const uint32_t *const c = &s.tri[3 * size_t{t}];
+    const Vec3 a = load3(&s.x[4 * size_t{c[0]}]);
+    return cross(load3(&s.x[4 * size_t{c[1]}]) - a, load3(&s.x[4 * size_t{c[2]}]) - a);
+  };
+  for (size_t k = 0; k < copies.size(); ++k) {
+    const auto [a, b, first] = opened.copies[k];
+    CopiesNow &now = copies[k];
+    const Vec3 way = at(a) - at(b);
+    const double apart2 = norm2(way);
+    now.apart = now.slip = std::sqrt(apart2);
+    const Vec3 v = load3(&s.v[4 * size_t{a}]) - load3(&s.v[4 * size_t{b}]);
+    now.speed = norm(v);
+    slack[k] = kLeftToCopies * offset - now.apart;
+    if (first == kNone) continue;
+    Vec3 up;
+    double least = HUGE_VAL;
+    for (uint32_t f = s.fan_begin[b]; f < s.fan_begin[b + 1]; ++f) {
+      const uint32_t t = s.fan[f], twin = opened.twin[t];
+      if (twin == kNone) continue;
+      const uint32_t *const c = &s.tri[3 * size_t{twin}];
+      if (c[0] != a && c[1] != a && c[2] != a) continue;
+      const Vec3 n = area(t), m = area(twin);
+      up += n - m;
+      least = std::min({least, dot(normalized(n), way), -dot(normalized(m), way)});
+    }
+    now.normal = normalized(up);
+    now.gap = dot(now.normal, way);
+    if (std::fabs(now.gap) < kNearer * offset) now.gap = 0;
+    now.slip = norm2(now.normal) > 0 ? norm(way - now.gap * now.normal) : HUGE_VAL;
+    if (!(now.slip < kNearCopies * offset)) continue;
+    // their own contact takes the rest
+    now.speed = norm(v - std::min(0.0, dot(now.normal, v)) * now.normal);
+    slack[k] =
+        std::max(slack[k], std::min(0.5 * kLeftToCopies * offset + least, kNearCopies * offset - now.apart));
+  }
+}
+
+void find_self_contacts(const BodyView &body, const SelfRest &rest, double h, double offset,
+                        const Tangled &tangled, SelfPairs &pairs, Array<uint8_t> &lent,
+                        Array<ContactPoint> &out) {
+  Self self(body, rest, h, offset, tangled, pairs, out);
   const size_t begin = out.size();
-  for (const SelfPair &pair : vertex_face) self.vertex_face(pair.a, pair.b);
+  const std::span<const SelfPair> vf = pairs.vertex_face, ee = pairs.edge_edge;
+  for (size_t i = 0; i < vf.size(); ++i) self.vertex_face(vf[i].a, vf[i].b, pairs.of_face[i]);
   if (rest.opened.any()) self.keep_shallow(begin);
   const size_t edges = out.size();
-  for (const SelfPair &pair : edge_edge) self.edge_edge(pair.a, pair.b);
+  for (size_t i = 0; i < ee.size(); ++i) self.edge_edge(ee[i].a, ee[i].b, pairs.of_edges[i]);
   self.name(begin);
   self.share_areas(begin, edges, lent);
 }
 
 double self_apart(const Surface &surface, const SelfRest &rest, ContactKind kind, uint32_t a, uint32_t b,
                   double offset) {
+  if (rest.opened.any()) {
+    const std::span<const uint32_t> ca = kind == kEdgeEdge ? std::span(&surface.edge[2 * size_t{a}], 2)
+                                                           : std::span<const uint32_t>(&a, 1),
+                                    cb = kind == kEdgeEdge ? std::span(&surface.edge[2 * size_t{b}], 2)
+                                                           : std::span(&surface.tri[3 * size_t{b}], 3);
+    PairAtRest k;
+    find_copies(rest.opened, ca, cb, k);
+    if (k.beside()) return offset;
+  }
   const RestShape shape(surface, rest, offset);
   const Kin k = kind == kEdgeEdge ? shape.of_edges(a, b) : shape.of_face(a, b);
-  return k.beside && k.apart < kGuarded * offset ? 0 : k.apart;
+  return k.apart;
 }
 
 }  // namespace dfm

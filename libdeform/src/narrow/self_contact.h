@@ -15,6 +15,28 @@ namespace dfm {
 // only if a pair seems to have crossed.
 using Tangled = std::function<bool(uint32_t surfel)>;
 
+// How two copies of one point stand to each other at the start of the sub-step.
+struct CopiesNow {
+  Vec3 normal;       // mean of the faces that were joined at them, from b to a
+  double gap, slip;  // m, along it, across it
+  double apart;      // m
+  double speed;      // m/s, against each other
+};
+
+// The listed pairs of a body, and what detection keeps of them.
+struct SelfPairs {
+  std::span<const SelfPair> vertex_face, edge_edge;
+  Array<PairAtRest> of_face, of_edges;  // by pair; but for `copies` filled where one comes near
+  Array<CopiesNow> copies;
+  // [copies] m, by how much they may come together before features around them have to be asked
+  // (doc/decisions/0427)
+  Array<double> slack;
+  uint64_t renewals = 0;
+  double offset = 0;
+  // Of this sub-step. list: number of the present list.
+  void follow(const Surface &surface, const SelfRest &rest, uint64_t list, double d_c);
+};
+
 // Appends the contacts of one body, sorted by (kind, feature a, feature b); keys are unique within the
 // sub-step. slot_a == slot_b, and the nodes of both sides are the body's. `distance` is the true one plus
 // what the pair may be nearer than d_c at rest.
@@ -22,9 +44,9 @@ using Tangled = std::function<bool(uint32_t surfel)>;
 //   has come there another way, and stays; empty: it
 //            is led back
 //   lent     scratch that the caller keeps
-void find_self_contacts(const BodyView &body, const SelfRest &rest, std::span<const SelfPair> vertex_face,
-                        std::span<const SelfPair> edge_edge, double h, double offset, const Tangled &tangled,
-                        Array<uint8_t> &lent, Array<ContactPoint> &out);
+void find_self_contacts(const BodyView &body, const SelfRest &rest, double h, double offset,
+                        const Tangled &tangled, SelfPairs &pairs, Array<uint8_t> &lent,
+                        Array<ContactPoint> &out);
 
 // m, rest distance of two features of one surface: min(offset, half of their distance in the rest shape). 0
 // if they coincide there: no contact.

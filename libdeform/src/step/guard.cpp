@@ -96,6 +96,20 @@ void make_room(GuardSide &s, const Surface &surface) {
   }
 }
 
+// Which copies of points stay within their slack.
+void follow_copies(const SelfBody &b, double h, GuardSide &s) {
+  const Surface &surface = b.body->surface;
+  s.opened = &b.rest.opened;
+  s.pairs[0] = b.pairs.of_face.data();
+  s.pairs[1] = b.pairs.of_edges.data();
+  s.held.resize(b.pairs.copies.size());
+  const auto mean = [&](uint32_t surfel) { return load3(&s.mean[4 * size_t{surface.point[surfel]}]); };
+  for (size_t k = 0; k < s.held.size(); ++k) {
+    const OpenedSurface::Copies &c = s.opened->copies[k];
+    s.held[k] = b.pairs.slack[k] > h * norm(mean(c.a) - mean(c.b));
+  }
+}
+
 // How all sides move as the solve left them.
 void set_sides(World &w, StepContext &step) {
   GuardScene &scene = step.guard.scene;
@@ -105,6 +119,7 @@ void set_sides(World &w, StepContext &step) {
   scene.sides.resize(nb + w.obstacles.size());
   scene.poses.resize(w.obstacles.size());
   scene.h = step.h;
+  scene.offset = w.offset;
   scene.floor = 0.5 * w.offset;
   scene.margin = 0.1 * (w.offset - scene.floor);
   for (size_t i = 0; i < nb; ++i) {
@@ -121,10 +136,12 @@ void set_sides(World &w, StepContext &step) {
     }
     s.mean = b.dynamics->end().mean;
     s.local = nullptr;
+    s.opened = nullptr;
   }
   for (const auto &b : step.self_bodies) {
     GuardSide &s = scene.sides[b->body->slot];
     if (b->on) s.deform = step.h * (b->list.deforming() + step.guard.change[b->body->slot]);
+    if (b->on && b->rest.opened.any()) follow_copies(*b, step.h, s);
   }
   for (size_t o = 0; o < w.obstacles.size(); ++o) {
     const ObstacleView &v = step.obstacle_views[o];

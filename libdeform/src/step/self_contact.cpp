@@ -17,7 +17,6 @@
 #include "body/make_surface.h"
 #include "ccd/toi_guard_motion.h"
 #include "geometry/pierce.h"
-#include "narrow/self_contact.h"
 #include "state/world.h"
 #include "step/context.h"
 #include "step/pair_table.h"
@@ -105,9 +104,35 @@ void find_sides(const Surface &s, const Array<uint32_t> &twin, Array<uint32_t> &
     if (twin[t] != kNone) side[t] = root(parent, t);
 }
 
+// OpenedSurface::copies.
+void find_copies(const Surface &s, OpenedSurface &out) {
+  std::vector<std::pair<uint32_t, uint32_t>> by_origin;
+  for (uint32_t i = 0; i < s.nsurfel; ++i) by_origin.push_back({out.origin[i], i});
+  std::sort(by_origin.begin(), by_origin.end());
+  const auto first = [&](uint32_t a, uint32_t b) {
+    for (uint32_t f = s.fan_begin[b]; f < s.fan_begin[b + 1]; ++f) {
+      const uint32_t twin = out.twin[s.fan[f]];
+      if (twin == kNone) continue;
+      const uint32_t *const c = &s.tri[3 * size_t{twin}];
+      if (c[0] == a || c[1] == a || c[2] == a) return s.fan[f];
+    }
+    return kNone;
+  };
+  for (size_t i = 0; i < by_origin.size(); ++i)
+    for (size_t j = i; j-- > 0 && by_origin[j].first == by_origin[i].first;) {
+      const uint32_t a = by_origin[i].second, b = by_origin[j].second;
+      out.copies.push_back({a, b, first(a, b)});
+    }
+  std::sort(out.copies.begin(), out.copies.end(),
+            [](auto &l, auto &r) { return l.a != r.a ? l.a < r.a : l.b < r.b; });
+  out.copies_begin.assign(s.nsurfel + 1, 0);
+  for (const OpenedSurface::Copies &c : out.copies) ++out.copies_begin[c.a + 1];
+  for (uint32_t i = 0; i < s.nsurfel; ++i) out.copies_begin[i + 1] += out.copies_begin[i];
+}
+
 OpenedSurface opened_surface(const Memory &m, const Body &b) {
   OpenedSurface out;
-  use_memory(m, out.origin, out.twin, out.side, out.begin, out.near, out.point);
+  use_memory(m, out.origin, out.twin, out.side, out.begin, out.near, out.point, out.copies, out.copies_begin);
   if (!b.surface.slit) return out;
   const Surface &s = b.surface;
   out.point = s.point;
@@ -127,6 +152,7 @@ OpenedSurface opened_surface(const Memory &m, const Body &b) {
     out.twin[by_corners[i - 1].second] = by_corners[i].second;
   }
   find_sides(s, out.twin, out.side);
+  find_copies(s, out);
   std::vector<std::vector<uint32_t>> near(b.p.n);
   for (size_t e = 0; e < b.edges.size(); e += 2) {
     near[b.edges[e]].push_back(b.edges[e + 1]);
@@ -150,6 +176,7 @@ bool is_tangled(SelfBody &b, uint32_t surfel) {
 
 SelfBody::SelfBody(const Memory &m, Body &b) : id(b.id), shape(b.shape), body(&b), list(m, b.surface) {
   Surface &s = b.surface;
+  use_memory(m, pairs.of_face, pairs.of_edges, pairs.copies, pairs.slack);
   rest.x = Array<double>(size_t{4} * s.nsurfel, 0.0, HookAllocator<double>(m));
   const auto at = [&](uint32_t phyxel) { return load3(&b.p.rest[size_t{3} * phyxel]); };
   for (uint32_t i = 0; i < s.nsurfel; ++i) {
@@ -221,6 +248,12 @@ Vec3 velocity_after(const Body &b, uint32_t surfel) {
 
 }  // namespace
 
+void follow_list(SelfBody &s, double offset) {
+  s.pairs.vertex_face = s.list.vertex_face();
+  s.pairs.edge_edge = s.list.edge_edge();
+  s.pairs.follow(s.body->surface, s.rest, s.list.renewals(), offset);
+}
+
 void stage_self(World &w, StepContext &step) {
   if (!w.plan.has(StageRole::finds_contacts)) step.contacts.clear();
   const bool listed = w.plan.has(StageRole::lists_pairs);  // that stage has computed the speeds
@@ -234,8 +267,9 @@ void stage_self(World &w, StepContext &step) {
     s->list.update(step.h, w.offset);
     SelfBody *const self = s.get();
     const Tangled tangled = [self](uint32_t surfel) { return is_tangled(*self, surfel); };
-    find_self_contacts(view, s->rest, s->list.vertex_face(), s->list.edge_edge(), step.h, w.offset,
-                       w.plan.has(StageRole::guards) ? tangled : nullptr, step.lent, step.contacts);
+    follow_list(*s, w.offset);
+    find_self_contacts(view, s->rest, step.h, w.offset, w.plan.has(StageRole::guards) ? tangled : nullptr,
+                       s->pairs, step.lent, step.contacts);
   }
   count_self(w, step);
 }
@@ -250,7 +284,7 @@ bool cover_self(World &w, StepContext &step) {
     if (!s->on &&
         s->watch->meets(step.h, w.offset, change, [&](uint32_t surfel) { return velocity_after(b, surfel); }))
       switch_to(*s, true);
-    if (s->on) s->list.cover(step.h, w.offset, change);
+    if (s->on && s->list.cover(step.h, w.offset, change)) follow_list(*s, w.offset);
     fresh |= s->joined != (s->on ? s->list.renewals() : 0);
   }
   if (fresh) count_self(w, step);

@@ -4,7 +4,7 @@
 
 #include "broad/self_list.h"
 #include "broad/self_watch.h"
-#include "geometry/views.h"
+#include "narrow/self_contact.h"
 #include "plan/plan.h"
 
 namespace dfm {
@@ -18,6 +18,7 @@ struct SelfBody {
   const Body *body;
   SelfRest rest;
   SelfList list;
+  SelfPairs pairs;
   std::unique_ptr<SelfWatch> watch;  // decides when; null: always
   bool on = false;                   // in this sub-step
   // rebuild of `list` that is included in the guard's list; 0: not included
