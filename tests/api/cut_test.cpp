@@ -477,6 +477,43 @@ TEST(Cut, FractureEnergy_IsTheForceOnTheBladeTimesItsWay) {
   EXPECT_GT(most, toughness * 0.06);
 }
 
+// Across the layers of cells, single faces lean back over the blade's way, and their areas count below zero.
+TEST(Cut, FractureEnergy_IsNeverGivenBack) {
+  test::Context context;
+  const dfm_world w = test::make_world(context, {0, 0, 0});
+  dfm_tetmesh mesh = 0;
+  const double size[] = {0.1, 0.06, 0.08}, toughness = 250;
+  test::ok(dfm_tetmesh_make(context, "beam", size, 600, &mesh));
+  dfm_body_def d = dfm_body_def_default();
+  test::lend(mesh, d);
+  dfm_material_def m = dfm_material_def_default();
+  m.name = "tissue";
+  const dfm_param_value row{"fracture_energy", &toughness, 1};
+  m.extra = {sizeof(dfm_params), 1, &row};
+  test::ok(dfm_material_create(w, &m, &d.material));
+  d.name = "block";
+  dfm_body b = 0;
+  test::ok(dfm_body_create(w, &d, &b));
+  dfm_cut_def blade = plane(0, 0, DFM_CUT_SPLIT);
+  const double center[] = {0.05, 0.03, 0.04}, along[] = {0.2966, 0.0812, -0.9515},
+               way[] = {0.619, -0.7751, 0.1268};
+  double work = 0;
+  for (int k = 0; k < 200; ++k) {
+    for (int corner = 0; corner < 4; ++corner)
+      for (int c = 0; c < 3; ++c)
+        blade.blade[3 * corner + c] = center[c] + (corner == 0 || corner == 3 ? -along[c] : along[c]) +
+                                      (-0.1 + 0.001 * (corner < 2 ? k : k + 1)) * way[c];
+    const dfm_cut_info done = cut(b, blade);
+    EXPECT_GE(done.fracture, 0) << k;
+    double against = 0;
+    for (int c = 0; c < 3; ++c) against -= done.force[c] * way[c];
+    EXPECT_GE(against, 0) << k << ": the force holds back and never pulls";
+    work += done.fracture;
+  }
+  EXPECT_GT(work, 1.58);  // J, the signed sum of all faces
+  EXPECT_LT(work, 1.62);
+}
+
 TEST(Cut, RandomCuts_KeepTheBooksToTheEnd) {
   std::mt19937 random(3);
   const auto share = [&] { return double(random() % 10001) / 10000; };

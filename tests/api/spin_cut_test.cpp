@@ -97,6 +97,32 @@ TEST(SpinCut, MovingBlade_PartsACubeThatTurns) {
     }
 }
 
+// Cuts, copies of points and what follows from them keep angular momentum to rounding. What books.check()
+// allows above is contact between the two sides of the cut: its impulses act at two points that lie a rest
+// distance apart (decision 0040).
+TEST(SpinCut, CutsThemselves_KeepAngularMomentumToRounding) {
+  for (const char *model : kModels) {
+    Spin s(model, 2e4, {2, -3, 1}, 320);
+    test::ok(dfm_world_filter_pair(s.w, "cube", "cube", false));
+    const dfm_body_measure before = test::measure(s.b);
+    uint32_t points = 0;
+    for (int i = 0; i < 240; ++i) {
+      const double z = 0.12 - 1e-3 * i;
+      dfm_cut_def d = dfm_cut_def_default();
+      d.shape = DFM_CUT_BLADE;
+      d.how = DFM_CUT_SPLIT;
+      const double corner[4][3] = {{0, -0.5, z}, {0, 0.5, z}, {0, 0.5, z - 1e-3}, {0, -0.5, z - 1e-3}};
+      std::memcpy(d.blade, corner, sizeof corner);
+      points += cut(s.b, d).points;
+      steps(s.w, 1);
+    }
+    EXPECT_GT(points, 20u);
+    const dfm_body_measure after = test::measure(s.b);
+    const double *const l = before.angular, all = std::hypot(l[0], l[1], l[2]);
+    for (int k = 0; k < 3; ++k) EXPECT_NEAR(after.angular[k], before.angular[k], 1e-11 * all) << model;
+  }
+}
+
 TEST(SpinCut, ToolWithAnEdge_PartsACubeThatTurns) {
   for (const char *model : kModels) {
     Random random(5);

@@ -8,6 +8,14 @@
 //
 // The place gets -l: the surfels of a body by the weights with which their velocity is read, a rigid body at
 // the point of the surfel. So both momenta are conserved whatever the residual of the solve.
+//
+// A drag holds nothing: its surfel is material in front of an edge that cuts, and `along` the way of it.
+// Its impulse is l along, with s = -along.u the speed at which the edge goes on through the material:
+//
+//     0 <= l <= most;   l = most where s > 0, s = 0 where 0 < l < most, s <= 0 where l = 0;   l s <= due
+//
+// which is dry friction that stops a motion, begins none, and takes no more work than is due. Both sides get
+// the impulse at the same point, so that the material is dragged by what the edge feels (decision 0402).
 #pragma once
 #include <cstdint>
 
@@ -27,6 +35,10 @@ struct Bond {
   Vec3 rate;      // m/s
   double soft;    // 1/kg
   double give;    // share of the surfel's own response that is added to soft
+  // Of a drag: unit length; N s; J. Else `along` is zero.
+  Vec3 along;
+  double most, due;
+  bool drags() const { return along.x != 0 || along.y != 0 || along.z != 0; }
 };
 
 }  // namespace dfm

@@ -15,11 +15,36 @@ constexpr uint32_t kMostPasses = 100;
 // reduces the residual.
 constexpr double kNothingMoves = 1e-10;
 
+// Of w l: a drag that is slower than this through the material sticks, a faster one takes what work is due.
+constexpr double kSlips = 1e-9;
+
 // f(number in the part, row)
 template <class F>
 void each_bond(const RowsPart &part, F &&f) {
   uint32_t k = 0;
   each_row(part.bonds, [&](uint32_t row) { f(k++, row); });
+}
+
+// The impulse of a drag along its way, at the impulses that the others have. One unknown, it is found
+// in closed form: what stops the edge, the limit, or what takes the work that is due,
+//
+//     l (s - w l) = due with the speed s without it,   l = 2 due / (s + sqrt(s^2 - 4 w due))
+double drag_of(const ContactRows &rows, uint32_t row) {
+  const ContactRows::BondRow &b = rows.bond[row - rows.n];
+  const double now = dot(b.along, load3(&rows.impulse[size_t{3} * row]));
+  const double speed = b.w * now - dot(b.along, rows.velocity(row));
+  if (!(speed > 0)) return 0;
+  const double l = b.w > 0 ? std::min(b.most, speed / b.w) : b.most;
+  if (l * (speed - b.w * l) <= b.due) return l;
+  return 2 * b.due / (speed + std::sqrt(std::max(0.0, speed * speed - 4 * b.w * b.due)));
+}
+
+void solve_drag(ContactRows &rows, uint32_t row) {
+  double *const l = &rows.impulse[size_t{3} * row];
+  const Vec3 next = drag_of(rows, row) * rows.bond[row - rows.n].along, change = next - load3(l);
+  if (change.x == 0 && change.y == 0 && change.z == 0) return;
+  rows.apply(row, change);
+  store3(l, next);
 }
 
 struct Vectors {
@@ -35,9 +60,19 @@ Vectors vectors_in(Array<double> &scratch, size_t n) {
 // Preconditions by the inverse of each bond's own response.
 void scale(const ContactRows &rows, const RowsPart &part, const double *from, double *to) {
   each_bond(part, [&](uint32_t k, uint32_t row) {
-    const Vec3 r = load3(from + size_t{3} * k), *const inverse = rows.bond[row - rows.n].inverse;
-    store3(to + size_t{3} * k, {dot(inverse[0], r), dot(inverse[1], r), dot(inverse[2], r)});
+    const ContactRows::BondRow &b = rows.bond[row - rows.n];
+    const Vec3 r = load3(from + size_t{3} * k), *const inverse = b.inverse;
+    if (b.drags()) store3(to + size_t{3} * k, b.sticks ? (dot(b.along, r) / b.w) * b.along : Vec3{});
+    else store3(to + size_t{3} * k, {dot(inverse[0], r), dot(inverse[1], r), dot(inverse[2], r)});
   });
+}
+
+// Of a residual, what the bond's impulse is to bring to zero.
+Vec3 counted(const ContactRows::BondRow &b, Vec3 r) {
+  if (b.drags()) return b.sticks ? dot(b.along, r) * b.along : Vec3{};
+  for (int c = 0; c < 3; ++c)
+    if (b.inverse[c][c] == 0) r[c] = 0;
+  return r;
 }
 
 double product(const double *a, const double *b, size_t n) {
@@ -60,10 +95,8 @@ void respond(ContactRows &rows, const RowsPart &part, const double *z, double *v
   each_bond(part, [&](uint32_t k, uint32_t row) {
     const ContactRows::BondRow &b = rows.bond[row - rows.n];
     const Vec3 now = rows.velocity(row);
-    Vec3 change = now - load3(velocity + size_t{3} * k) + b.soft * load3(z + size_t{3} * k);
-    for (int c = 0; c < 3; ++c)
-      if (b.inverse[c][c] == 0) change[c] = 0;
-    store3(response + size_t{3} * k, change);
+    const Vec3 change = now - load3(velocity + size_t{3} * k) + b.soft * load3(z + size_t{3} * k);
+    store3(response + size_t{3} * k, counted(b, change));
     store3(velocity + size_t{3} * k, now);
   });
 }
@@ -83,21 +116,21 @@ void solve_one(ContactRows &rows, uint32_t row) {
 
 Vec3 bond_residual(const ContactRows &rows, uint32_t row) {
   const ContactRows::BondRow &b = rows.bond[row - rows.n];
-  Vec3 r = rows.velocity(row) + b.rate + b.soft * load3(&rows.impulse[size_t(3) * row]);
-  for (int c = 0; c < 3; ++c)
-    if (b.inverse[c][c] == 0) r[c] = 0;
-  return r;
+  const Vec3 l = load3(&rows.impulse[size_t{3} * row]);
+  if (b.drags()) return b.w * (drag_of(rows, row) * b.along - l);
+  return counted(b, rows.velocity(row) + b.rate + b.soft * l);
 }
 
-uint32_t solve_bonds(ContactRows &rows, const RowsPart &part, double tolerance, Array<double> &scratch) {
-  if (part.nbond == 1) {
-    solve_one(rows, part.bonds[0].first);
-    return 1;
-  }
+namespace {
+
+// All but drags that do not stick.
+uint32_t solve_held(ContactRows &rows, const RowsPart &part, double tolerance, Array<double> &scratch) {
   const size_t n = size_t{3} * part.nbond;
   const Vectors v = vectors_in(scratch, n);
   each_bond(part, [&](uint32_t k, uint32_t row) {
-    store3(v.residual + size_t{3} * k, -bond_residual(rows, row));
+    const ContactRows::BondRow &b = rows.bond[row - rows.n];
+    const Vec3 r = rows.velocity(row) + b.rate + b.soft * load3(&rows.impulse[size_t{3} * row]);
+    store3(v.residual + size_t{3} * k, -counted(b, r));
     store3(v.velocity + size_t{3} * k, rows.velocity(row));
   });
   if (!(largest(v.residual, part.nbond) > tolerance)) return 0;
@@ -132,6 +165,41 @@ uint32_t solve_bonds(ContactRows &rows, const RowsPart &part, double tolerance, 
     store3(l, load3(l) + change);
   });
   return passes + 1;
+}
+
+// Which drags stick is found by turns with what holds: those that are over a limit go to it and stick no
+// more. What is left then is a residual, and the sweeps go on with it.
+constexpr uint32_t kMostTurns = 8;
+
+}  // namespace
+
+uint32_t solve_bonds(ContactRows &rows, const RowsPart &part, double tolerance, Array<double> &scratch) {
+  uint32_t drags = 0, sticking = 0, passes = 0;
+  each_bond(part, [&](uint32_t, uint32_t row) { drags += rows.bond[row - rows.n].drags(); });
+  if (part.nbond == 1 && !drags) {
+    solve_one(rows, part.bonds[0].first);
+    return 1;
+  }
+  if (!drags) return solve_held(rows, part, tolerance, scratch);
+  for (uint32_t turn = 0; turn < kMostTurns; ++turn) {
+    bool same = turn > 0;
+    sticking = 0;
+    each_bond(part, [&](uint32_t, uint32_t row) {
+      ContactRows::BondRow &b = rows.bond[row - rows.n];
+      if (!b.drags()) return;
+      const bool left = norm(bond_residual(rows, row)) > tolerance;
+      same = same && !left;
+      if (left || turn == 0) solve_drag(rows, row);
+      const double l = dot(b.along, load3(&rows.impulse[size_t{3} * row]));
+      const double speed = -dot(b.along, rows.velocity(row));
+      b.sticks = b.w > 0 && l > 0 && l < b.most && std::fabs(speed) <= kSlips * b.w * l;
+      sticking += b.sticks;
+    });
+    ++passes;
+    if (same || (sticking == 0 && drags == part.nbond)) break;
+    passes += solve_held(rows, part, tolerance, scratch);
+  }
+  return passes;
 }
 
 }  // namespace dfm

@@ -61,7 +61,11 @@ void ContactRows::set_arms(std::span<const ContactPoint> contacts, std::span<con
     for (uint32_t k = 0; k < c.nnode; ++k) {
       while (c.node[k] < sources[s].first_node || c.node[k] >= sources[s].first_node + sources[s].nnode)
         s = (s + 1) % uint32_t(sources.size());
-      at += c.weight[k] * load3(&sources[s].surface->x[size_t(c.node[k] - sources[s].first_node) * 4]);
+      const uint32_t surfel = c.node[k] - sources[s].first_node;
+      const double *const x = sources[s].place
+                                  ? sources[s].place + size_t(sources[s].surface->point[surfel]) * 4
+                                  : &sources[s].surface->x[size_t(surfel) * 4];
+      at += c.weight[k] * load3(x);
     }
     store3(&arm[size_t(3) * i], at - r.center);
   };
@@ -313,6 +317,14 @@ void ContactRows::finish_bonds(std::span<const Bond> bonds) {
     BondRow &row = bond[k];
     row.rate = b.rate;
     row.soft = b.soft + b.give * std::max(w[0].x, wt[i]);
+    row.along = b.along;
+    row.most = b.most;
+    row.due = b.due;
+    row.sticks = false;
+    if (row.drags()) {
+      row.w = dot(b.along, diagonal(i, b.along));
+      continue;
+    }
     for (int c = 0; c < 3; ++c) w[c][c] += row.soft;
     invert(w, row.inverse);
   }

@@ -32,6 +32,8 @@ struct DofSource {
   // [npoint,4] 1/kg, Dynamics::diagonal(); null: surfels are the unknowns
   const double *diagonal = nullptr;
   const double *velocity = nullptr;  // without contact: [npoint,4] or, of surfels, surface->v
+  // [npoint,4] m, where phyxels stand, of a surface whose surfels are set back from them; else null
+  const double *place = nullptr;
 };
 
 // The rigid body that an obstacle is: its number in a group of bodies that answer each other's impulses.
@@ -87,6 +89,11 @@ struct ContactRows {
     Vec3 rate;
     double soft;
     Vec3 inverse[3];
+    Vec3 along;  // of a drag (contact/bond.h), else zero
+    double most, due;
+    double w;     // 1/kg, of a drag along it; zero: nothing moves
+    bool sticks;  // a drag at no limit
+    bool drags() const { return along.x != 0 || along.y != 0 || along.z != 0; }
   };
   Array<BondRow> bond;  // [nbond]
 

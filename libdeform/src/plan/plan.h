@@ -26,8 +26,8 @@ struct SceneFacts {
   unsigned coupled = 0, coupled_surfels = 0;    // bodies with a surface of their own, and its surfels
   unsigned body_pairs = 0, obstacle_pairs = 0;  // pairs that may touch, filters applied
   unsigned rigid_bodies = 0, rigid_joints = 0;
-  unsigned attachments = 0;
-  std::string rigid_hosts;  // names
+  unsigned attachments = 0, paid_cuts = 0;  // paid: a tool and a body that takes energy to be cut
+  std::string rigid_hosts;                  // names
   bool gravity_keys = false, loads_vary = false, held_move = false, obstacles_move = false, unguarded = false;
   struct Provider { std::string effect, plugin; };
   // by models and laws of the scene, with their present parameters

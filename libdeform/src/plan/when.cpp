@@ -27,11 +27,14 @@ std::string rigids(const SceneFacts &f) {
 }
 
 // Loads that act on bodies through their surfaces.
-bool acts(const SceneFacts &f) { return touches(f) || f.attachments; }
+bool acts(const SceneFacts &f) { return touches(f) || f.attachments || f.paid_cuts; }
 StageChoice of_contact(const SceneFacts &f) {
-  if (!f.attachments) return touches(f) ? runs(who(f)) : left_out(nobody(f));
-  const std::string attached = count(f.attachments, "attachment holds", "attachments hold");
-  return runs(touches(f) ? who(f) + ", " + attached : attached);
+  if (!acts(f)) return left_out(nobody(f));
+  std::vector<std::string> what;
+  if (touches(f)) what.push_back(who(f));
+  if (f.attachments) what.push_back(count(f.attachments, "attachment holds", "attachments hold"));
+  if (f.paid_cuts) what.push_back(count(f.paid_cuts, "body drags on a blade", "bodies drag on blades"));
+  return runs(join(what));
 }
 StageChoice of_pairs(const SceneFacts &f) {
   if (!touches(f)) return left_out(nobody(f));

@@ -34,6 +34,14 @@ struct BladeSide {
   double along, way, off;  // along the edge, 0 to 1; m on the blade's way; m from it
 };
 
+// Energy that a tool owes for what it has cut, at a point of the body beside the cut. It pays over the way
+// that follows, by a force on the point (step/cut_drag.h).
+struct CutDue {
+  double due, force;  // J; N
+  double way[3];      // unit length, of the edge through the material; in the frame of the tool's part
+  uint32_t point, unused = 0;  // no gap at the end: snapshots have its bytes
+};
+
 // Where a blade's edge has come to, and the body's points at that time: the blade's next way is taken
 // relative to the body's own.
 struct BladeTrack {
@@ -42,6 +50,9 @@ struct BladeTrack {
   Vec3 lead;               // m, way of late; zero where the blade itself says where it looks
   double way[2] = {};      // m, that both ends have come
   Array<BladeSide> sides;  // of cells near it, ascending
+  double credit = 0;       // J, zero or less: the sum of work since it was last the largest
+  uint64_t part = 0;       // id of the obstacle that is the tool's part, where it owes anything
+  Array<CutDue> dues;      // by point, ascending
 };
 
 struct CutRecord {

@@ -15,15 +15,6 @@ namespace {
 
 bool feels(const Obstacle &o) { return o.rigid && o.rigid->group[o.rigid_body] != DFM_RIGID_STILL; }
 
-// Mean velocity of a point of a rigid body at this arm without contact: its displacement over the sub-step to
-// third order in the initial spin, as for shapes (shape_velocity).
-Vec3 rigid_velocity(const Obstacle &o, Vec3 arm, double h) {
-  const double *const v = &o.rigid->first[6 * size_t{o.rigid_body}];
-  const Vec3 turn = load3(o.rigid->state[o.rigid_body].spin);
-  const Vec3 second = cross(turn, cross(turn, arm)), third = cross(turn, second);
-  return load3(v) + cross(load3(v + 3), arm) + (0.5 * h) * second + (h * h / 6) * third;
-}
-
 void set_nodes(const StepContext &step, const Attachment &a, size_t i, uint32_t slot_b, Bond &b) {
   const BodyView &other = step.body_views[slot_b];
   for (uint32_t k = 0; k < kAnchors; ++k) {
@@ -72,7 +63,7 @@ void add_bonds(World &w, StepContext &step, const Attachment &a) {
       b.slot_b = obstacle_slot_of(w, a.to);
       const Obstacle &o = *w.obstacles[b.slot_b];
       if (feels(o)) {
-        b.velocity = rigid_velocity(o, x - step.rigid_places[b.slot_b].center, step.h);
+        b.velocity = place_velocity(o, x, step);
       } else if (step.obstacle_views[b.slot_b].moves()) {
         const Pose end = end_pose(w, step, o);
         b.velocity = (1 / step.h) * (place(end, load3(&a.place[3 * i])) - held);
@@ -107,6 +98,15 @@ void part(World &w, const Attachment &a) {
 }
 
 }  // namespace
+
+// Its displacement over the sub-step to third order in the initial spin, as for shapes (shape_velocity).
+Vec3 place_velocity(const Obstacle &o, Vec3 x, const StepContext &step) {
+  const Vec3 arm = x - step.rigid_places[o.slot].center;
+  const double *const v = &o.rigid->first[6 * size_t{o.rigid_body}];
+  const Vec3 turn = load3(o.rigid->state[o.rigid_body].spin);
+  const Vec3 second = cross(turn, cross(turn, arm)), third = cross(turn, second);
+  return load3(v) + cross(load3(v + 3), arm) + (0.5 * step.h) * second + (step.h * step.h / 6) * third;
+}
 
 Pose attached_frame(const Obstacle &o) {
   if (!o.rigid) return o.pose;

@@ -24,6 +24,8 @@ void drop_attachments(World &w, uint64_t id);
 
 // Wakes bodies that sleep while the thing to which they are attached moves.
 void wake_attached(World &w, StepContext &step);
+// Mean velocity in this sub-step, without contact, of the place x of a rigid body.
+Vec3 place_velocity(const Obstacle &o, Vec3 x, const StepContext &step);
 // The frame of places on it: center of mass and axes of a rigid body; else the frame of the obstacle.
 Pose attached_frame(const Obstacle &o);
 // The present target of point i, m.

@@ -6,6 +6,7 @@
 #include "core/error.h"
 #include "plugin/on_behalf.h"
 #include "step/attach.h"
+#include "step/cut_drag.h"
 #include "step/change_work.h"
 #include "step/context.h"
 #include "step/energy_watch.h"
@@ -73,6 +74,7 @@ bool stage_commit(World &w, StepContext &step, uint32_t *trouble) {
   if (w.plan.touches()) {
     keep_contacts(w, step);
     keep_bonds(w, step);
+    keep_cut_drags(w, step);
     add_impulses(w);
   }
   return true;

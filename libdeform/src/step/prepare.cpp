@@ -14,6 +14,7 @@
 #include "friction/pair_rules.h"
 #include "plan/integrators.h"
 #include "state/bounds.h"
+#include "step/cut_drag.h"
 #include "step/energy_watch.h"
 #include "step/overlap.h"
 #include "step/pair_table.h"
@@ -221,6 +222,15 @@ bool parted(const World &w, uint32_t i, uint32_t thing) {
   });
 }
 
+unsigned paid_cuts(const World &w) {
+  unsigned out = 0;
+  for (auto &b : w.bodies)
+    out += tough(*b) && std::any_of(w.tools.begin(), w.tools.end(), [&](auto &t) {
+             return t->cuts.how == DFM_CUT_SPLIT && t->cuts_body(*b);
+           });
+  return out;
+}
+
 bool cut_through(const World &w, uint32_t i, uint32_t thing) {
   const size_t nb = w.bodies.size();
   return !w.tools.empty() && thing >= nb && passes_through(w, *w.bodies[i], *w.obstacles[thing - nb]);
@@ -414,6 +424,7 @@ void prepare(World &w, const RestoredChoice *restored) {
   facts.obstacles = static_cast<unsigned>(w.obstacles.size());
   facts.sleep = w.def.sleep != 0;
   facts.attachments = static_cast<unsigned>(w.attachments.size());
+  facts.paid_cuts = paid_cuts(w);
   put(prescribed(w), facts);
   step.exchange.clear();
   view_bodies(w, step, facts);

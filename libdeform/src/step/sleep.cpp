@@ -26,6 +26,7 @@
 #include "narrow/narrow_phase.h"
 #include "state/world.h"
 #include "step/context.h"
+#include "step/cut_drag.h"
 #include "step/stages.h"
 
 namespace dfm {
@@ -219,6 +220,8 @@ void stage_sleep(World &w, StepContext &step) {
     if (w.obstacles[slot]->rigid || step.obstacle_views[slot].moves())
       step.stirred[step.islands.of[slot_of(w, a.body)]] = 1;
   }
+  for (const uint32_t i : step.active)
+    if (has_dues(*w.bodies[i])) step.stirred[step.islands.of[i]] = 1;
   bool any = false;
   for (const uint32_t i : step.active)
     if (!step.stirred[step.islands.of[i]]) {

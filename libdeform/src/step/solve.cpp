@@ -17,6 +17,7 @@
 #include "step/attach.h"
 #include "step/bristles.h"
 #include "step/context.h"
+#include "step/cut_drag.h"
 #include "step/pair_table.h"
 #include "step/pre_solve.h"
 #include "step/rigid.h"
@@ -84,9 +85,15 @@ void make_rows(World &w, StepContext &step) {
       if (w.pairs.laws[step.state.law[i]]->nstate > 0) step.contacts[i].give = 0;
   take_choices(step);
   if (step.rigid_again) step.best_impulse.assign(step.rows.impulse.begin(), step.rows.impulse.end());
-  make_bonds(w, step, step.rigid_again || step.guard.resolving);
-  for (size_t i = 0; i < w.bodies.size(); ++i)  // where it stands has changed places with the last end
-    step.sources[i].velocity = w.bodies[i]->dynamics->contact_velocity();
+  const bool again = step.rigid_again || step.guard.resolving;
+  make_bonds(w, step, again);
+  make_cut_drags(w, step, again);
+  for (size_t i = 0; i < w.bodies.size(); ++i) {  // where it stands has changed places with the last end
+    const Body &b = *w.bodies[i];
+    step.sources[i].velocity = b.dynamics->contact_velocity();
+    const bool set_back = b.surface.identity() && (b.surface.slit || b.surface.back > 0);
+    step.sources[i].place = set_back ? b.p.x.data() : nullptr;
+  }
   step.rows.build(step.contacts, step.sources, {step.rigid_places, step.rigid_groups}, step.bonds);
   correct_rigids(w, step);
   fill_responses(w, step);
@@ -279,6 +286,8 @@ bool contacts_taken(World &w, StepContext &step) {
           slot != kNone && !w.bodies[slot]->slumber.asleep && !w.bodies[slot]->dynamics->take_contact())
         all = false;
   }
+  for (auto &b : w.bodies)
+    if (!b->slumber.asleep && has_dues(*b) && !b->dynamics->take_contact()) all = false;
   step.guard.again = step.guard.again || !all;
   return all;
 }

@@ -19,6 +19,7 @@
 #include "state/world.h"
 #include "step/attach.h"
 #include "step/context.h"
+#include "step/cut_drag.h"
 #include "step/energy_watch.h"
 #include "step/method.h"
 #include "step/move_obstacles.h"
@@ -210,6 +211,7 @@ bool advance(World &w, StepContext &step, double end, double goal, bool last, ui
     charge(w, step, 1);
     view_obstacles(w, step);
     wake_attached(w, step);
+    wake_cut(w, step);
     if (all_idle(w, step)) {
       w.stats.contacts_mean += (w.stats.contacts - w.stats.contacts_mean) / double(w.stats.substeps + 1);
       w.step_impulses.idle += step.h;

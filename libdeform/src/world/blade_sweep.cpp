@@ -102,17 +102,19 @@ BladeSweep::Frame::Frame(Vec3 a, Vec3 b, Vec3 towards) : origin(a), length(norm(
   }
 }
 
+bool BladeSweep::goes_on(const BladeTrack &t) const {
+  const auto same = [](Vec3 p, Vec3 q) { return p.x == q.x && p.y == q.y && p.z == q.z; };
+  return same(load3(t.edge), blade_.corner[0]) && same(load3(t.edge + 3), blade_.corner[1]);
+}
+
 BladeSweep::BladeSweep(Body &b, const CutShape &blade, const Vec3 *forward) : blade_(blade), track_(0) {
-  const auto goes_on = [&](const BladeTrack &t) {
-    const auto same = [](Vec3 p, Vec3 q) { return p.x == q.x && p.y == q.y && p.z == q.z; };
-    return same(load3(t.edge), blade.corner[0]) && same(load3(t.edge + 3), blade.corner[1]);
-  };
   while (track_ < b.blades.size() && !goes_on(b.blades[track_])) ++track_;
   const BladeTrack *const track = track_ < b.blades.size() ? &b.blades[track_] : nullptr;
   fresh_ = !track;
   if (track) {
     lead_ = track->lead;
     std::copy_n(track->way, 2, way_);
+    credit_ = track->credit;
     if (forward && std::max(way_[0], way_[1]) < kBegun * b.surface.median_edge) {
       fresh_ = true;  // it has stood, or gone sideways, so far
       way_[0] = way_[1] = 0;
@@ -326,11 +328,18 @@ void BladeSweep::compare(const Body &b, bool by_shape) {
   }
 }
 
-void BladeSweep::keep(Body &b) {
+double BladeSweep::energy(size_t n) {
+  for (size_t k = 0; k < n; ++k) credit_ += faces[k].work;
+  const double taken = std::max(0.0, credit_);
+  credit_ -= taken;
+  return taken;
+}
+
+BladeTrack &BladeSweep::keep(Body &b) {
   if (track_ == b.blades.size()) {
     if (b.blades.size() == kMostTracks) b.blades.erase(b.blades.begin());
     b.blades.emplace_back();
-    use_memory(b.world->memory(), b.blades.back().x, b.blades.back().sides);
+    use_memory(b.world->memory(), b.blades.back().x, b.blades.back().sides, b.blades.back().dues);
     track_ = b.blades.size() - 1;
   }
   BladeTrack &t = b.blades[track_];
@@ -338,6 +347,7 @@ void BladeSweep::keep(Body &b) {
   store3(t.edge + 3, blade_.corner[2]);
   t.x.assign(b.p.x.begin(), b.p.x.end());
   t.lead = lead_;
+  t.credit = credit_;
   std::copy_n(way_, 2, t.way);
   t.sides.clear();
   const double far = kKept * apart_;
@@ -348,6 +358,7 @@ void BladeSweep::keep(Body &b) {
     if (settled && n.ahead > apart_) continue;  // drawn back from
     t.sides.push_back(n.side);
   }
+  return t;
 }
 
 }  // namespace dfm

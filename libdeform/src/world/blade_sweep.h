@@ -10,7 +10,7 @@ namespace dfm {
 struct SweptFace {
   double order;   // along the way of the edge
   uint64_t face;  // between present cells (mesh/cut_mesh.h)
-  double work;    // J, that opening it takes
+  double work;    // J, that opening it takes: below zero where the face leans back over the blade's way
   Vec3 way;       // m, of the edge relative to the face
   double along;   // where the edge meets it: 0 one end, 1 the other
   bool operator<(const SweptFace &o) const { return order != o.order ? order < o.order : face < o.face; }
@@ -25,9 +25,15 @@ class BladeSweep {
   BladeSweep(Body &b, const CutShape &blade, const Vec3 *forward);
   // In the order in which the edge meets them; none of them is open.
   std::vector<SweptFace> faces;
+  bool goes_on(const BladeTrack &track) const;  // does it begin where this one has come to?
   bool near() const { return !near_.empty(); }  // is the body?
+  // J, zero or more: opening the first n of the faces. Faces of a rough cut count as the blade sees
+  // them, with a sign: the sum over a cut is what the blade has passed over, but on the way it may fall. What
+  // a cut has taken is the largest sum so far, so that none gives energy back. To be asked once, before
+  // keep().
+  double energy(size_t n);
   // The body remembers the edge, after faces have been opened and before anything else has changed.
-  void keep(Body &b);
+  BladeTrack &keep(Body &b);
 
  private:
   void find_near(const Body &b);
@@ -61,6 +67,7 @@ class BladeSweep {
   double step_[2] = {};  // m, of these in this call
   double strip_ = 0;     // m, behind the edge as it began, that is cut too
   double apart_ = 0;     // m, largest distance between the middles of two neighbors
+  double credit_ = 0;    // J, zero or less: the sum of work less its largest so far
 };
 
 }  // namespace dfm

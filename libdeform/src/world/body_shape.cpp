@@ -163,6 +163,28 @@ Former former(const Body &b) {
 
 namespace {
 
+// Copies of a point share what is due at it.
+void carry_dues(const CutMesh &mesh, const BladeTrack &from, BladeTrack &to) {
+  if (from.dues.empty()) return;
+  const auto at = [&](uint32_t point) {
+    const auto before = [](const CutDue &d, uint32_t p) { return d.point < p; };
+    const auto found = std::lower_bound(from.dues.begin(), from.dues.end(), point, before);
+    return found != from.dues.end() && found->point == point ? size_t(found - from.dues.begin())
+                                                             : from.dues.size();
+  };
+  std::vector<uint32_t> copies(from.dues.size() + 1);
+  for (const uint32_t p : mesh.point) ++copies[at(p)];
+  for (uint32_t i = 0; i < mesh.point.size(); ++i) {
+    const size_t k = at(mesh.point[i]);
+    if (k == from.dues.size()) continue;
+    CutDue due = from.dues[k];
+    due.point = i;
+    due.due /= copies[k];
+    due.force /= copies[k];
+    to.dues.push_back(due);
+  }
+}
+
 // The part of the present mesh of b, without what put() adds.
 std::unique_ptr<BodyShape> part_of(const Body &b, const CutMesh &mesh, Array<uint64_t> &&open) {
   const Memory &m = b.world->memory();
@@ -184,7 +206,7 @@ std::unique_ptr<BodyShape> part_of(const Body &b, const CutMesh &mesh, Array<uin
   if (!b.anchor.empty()) take_rows(b.anchor, mesh.point, kStride, out.anchor);
   for (const BladeTrack &t : b.blades) {
     BladeTrack &track = out.blades.emplace_back();
-    use_memory(m, track.x, track.sides);
+    use_memory(m, track.x, track.sides, track.dues);
     std::copy_n(t.edge, 6, track.edge);
     track.lead = t.lead;
     std::copy_n(t.way, 2, track.way);
@@ -195,6 +217,9 @@ std::unique_ptr<BodyShape> part_of(const Body &b, const CutMesh &mesh, Array<uin
       side.cell = uint32_t(at - mesh.cell.begin());
       track.sides.push_back(side);
     }
+    track.credit = t.credit;
+    track.part = t.part;
+    carry_dues(mesh, t, track);
   }
   take_cells(m, b.share, b.makeup, mesh, out);
   make_skin(m, mesh, out);

@@ -207,14 +207,13 @@ CutReport split_by_blade(Body &b, const CutShape &blade, uint32_t most) {
   const std::vector<SweptFace> &met = sweep.faces;
   const size_t n = most > 0 ? std::min<size_t>(most, met.size()) : met.size();
   Array<uint64_t> more{HookAllocator<uint64_t>(b.world->memory())};
-  double work = 0;
   Vec3 way;
   for (size_t k = 0; k < n; ++k) {
     more.push_back(met[k].face);
-    work += met[k].work;
     way += (1 / double(n)) * met[k].way;
   }
   CutReport out = open_faces(b, more);
+  const double work = sweep.energy(n);
   out.left = static_cast<uint32_t>(met.size() - n);
   out.fracture = work;
   if (norm2(way) > 0) out.force = (-work / norm2(way)) * way;

@@ -78,6 +78,16 @@ bool sound(const Array<BladeSide> &sides, size_t ncorner) {
   return true;
 }
 
+bool sound(const Array<CutDue> &dues, uint32_t npoint) {
+  for (size_t i = 0; i < dues.size(); ++i) {
+    const CutDue &d = dues[i];
+    if (d.point >= npoint || (i && d.point <= dues[i - 1].point) || !(d.due >= 0 && d.force >= 0) ||
+        !(std::isfinite(d.due) && std::isfinite(d.force) && std::isfinite(norm2(load3(d.way)))))
+      return false;
+  }
+  return true;
+}
+
 std::vector<Body *> all_bodies(const World &w) {
   std::vector<Body *> out;
   for (const auto *list : {&w.bodies, &w.emptied})

@@ -209,6 +209,10 @@ void body_fields(Stream &s, W &w, B &b, const Body &like) {
     for (auto &way : blade.way) s.value("blade's way", way, must::finite);
     s.array("sides of a blade", blade.sides, kAnyCount, must::any);
     s.must_hold("sides of a blade", "those of cells", [&] { return sound(blade.sides, like.tets.size()); });
+    s.value("blade's credit", blade.credit, must::finite);
+    s.value("blade's part", blade.part, must::any);
+    s.array("dues of a blade", blade.dues, kAnyCount, must::any);
+    s.must_hold("dues of a blade", "those of points", [&] { return sound(blade.dues, like.p.n); });
   });
   s.value("separates", b.separate.on, must::flag);
   s.value("crumbs go", b.separate.removes, must::flag);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <vector>
 
 #include "core/error.h"
@@ -65,77 +66,103 @@ struct Edge {
   }
 };
 
-// What an edge has opened in a body.
-struct Opened {
-  uint32_t n = 0;
-  double work = 0;  // J
-  double size = 0;  // J, without signs
-  Vec3 at, way;     // m, `size` times where on the edge, and the edge's way relative to the faces
+// The faces that an edge opens in a step, and what that takes.
+class Opening {
+ public:
+  // Before they open: the corners by which the cells see them.
+  Opening(const Body &b, const std::vector<SweptFace> &faces, double energy) {
+    double sum = 0;
+    for (const SweptFace &f : faces) sum += std::max(0.0, f.work);
+    if (!(energy > 0 && sum > 0)) return;
+    for (const SweptFace &f : faces) {
+      if (!(f.work > 0)) continue;
+      Part part{{}, f.work / sum * energy, f.way};
+      const size_t cells[2] = {size_t(f.face >> 32), size_t(f.face & kNone)};
+      for (const size_t side : {size_t{0}, size_t{1}})
+        for (size_t k = 0; k < 4; ++k) {
+          const size_t corner = 4 * cells[side] + k;
+          const auto other = b.tets.begin() + std::ptrdiff_t(4 * cells[1 - side]);
+          if (std::find(other, other + 4, b.tets[corner]) != other + 4) part.corners.push_back(corner);
+        }
+      parts_.push_back(std::move(part));
+    }
+  }
+  // After they have opened: the tool owes it at the points that these corners have now, as much at each. What
+  // is due at a point within the body would have to wait, so those at the surface come first.
+  void charge(const Body &b, const ToolPlace &place, BladeTrack &to) const {
+    const auto &surface = b.surface.point;
+    for (const Part &part : parts_) {
+      std::vector<uint32_t> points, outside;
+      for (const size_t corner : part.corners) points.push_back(b.tets[corner]);
+      std::copy_if(points.begin(), points.end(), std::back_inserter(outside),
+                   [&](uint32_t p) { return std::binary_search(surface.begin(), surface.end(), p); });
+      if (!outside.empty()) points.swap(outside);
+      const Vec3 way = rotate_back(place.rotation, normalized(part.way));
+      for (const uint32_t p : points) add(b, p, part.energy / double(points.size()), way, to);
+    }
+  }
+
+ private:
+  struct Part {
+    std::vector<size_t> corners;  // of all cells: a split changes their points, but no cell's number
+    double energy;
+    Vec3 way;
+  };
+  std::vector<Part> parts_;
+
+  static void add(const Body &b, uint32_t point, double energy, Vec3 way, BladeTrack &to) {
+    const auto before = [](const CutDue &d, uint32_t i) { return d.point < i; };
+    auto at = std::lower_bound(to.dues.begin(), to.dues.end(), point, before);
+    if (at == to.dues.end() || at->point != point) {
+      CutDue none{};
+      none.point = point;
+      at = to.dues.insert(at, none);
+    }
+    store3(at->way, normalized(at->due * load3(at->way) + energy * way));
+    at->due += energy;
+    at->force = at->due / b.surface.median_edge;
+  }
 };
 
-void add(const Edge &edge, const SweptFace &f, Opened &to) {
+// Points that the edge has been drawn back from are not at it any more, nor are those that it has left by a
+// jump: paying takes an edge one edge length on, and the wait for a point to come to the surface two.
+constexpr double kBack = 2, kJumped = 8;  // median edges
+void forget_far(const Body &b, const Edge &edge, const ToolPlace &place, BladeTrack &track) {
+  if (track.dues.empty()) return;
   const Vec3 *const c = edge.blade.corner;
-  const double size = std::fabs(f.work);
-  ++to.n;
-  to.work += f.work;
-  to.size += size;
-  to.at += size * ((1 - f.along) * c[3] + f.along * c[2]);
-  to.way += size * f.way;
-}
-
-// The tool owes the work of the faces. One that a hand leads by a spring pays it over the way that follows
-// (dynamics/rigid/tool_host.cpp); one that is driven pays at once: the force is what, over the way of this
-// step, takes the work.
-void charge(Tool &t, const Body &b, const Opened &opened, double dt) {
-  if (!(opened.size > 0)) return;
-  ToolValues v = t.values();
-  v.cut_due += opened.work;
-  const ToolPlace tool = place_of(t.set->state[0]);
-  const Vec3 at = (1 / opened.size) * opened.at, way = (1 / opened.size) * opened.way;
-  if (t.motion.coupled()) {
-    v.cut_length = b.surface.median_edge;
-    store3(v.cut_at, rotate_back(tool.rotation, at - tool.position));
-    store3(v.cut_way, rotate_back(tool.rotation, normalized(way)));
-  } else if (v.cut_due > 0 && norm2(way) > 0) {
-    const Vec3 p = (-dt * v.cut_due / norm2(way)) * way, turn = cross(at - tool.position, p);
-    store3(v.contact, load3(v.contact) + p);
-    store3(v.contact + 3, load3(v.contact + 3) + cross(at - load3(v.about), p));
-    for (int k = 0; k < 3; ++k) {
-      v.coupling[k] -= p[k];
-      v.coupling[3 + k] -= turn[k];
-      v.given[k] += p[k] / dt;
-      v.given[3 + k] += turn[k] / dt;
-    }
-    const ToolPlace from = t.cuts.from[0];
-    v.work -= (dot(p, tool.position - from.position) +
-               dot(turn, rotation_vector(tool.rotation * conjugate(from.rotation)))) /
-              dt;
-    v.cut_due = 0;
-  }
-  t.store(v);
+  const Vec3 along = normalized(c[2] - c[3]);
+  const double unit = b.surface.median_edge;
+  std::erase_if(track.dues, [&](const CutDue &d) {
+    const Vec3 r = load3(&b.p.x[size_t{kStride} * d.point]) - c[3];
+    return norm(r - dot(r, along) * along) > kJumped * unit ||
+           dot(r, rotate(place.rotation, load3(d.way))) > kBack * unit;
+  });
 }
 
 // How many faces have opened.
-uint32_t split(Tool &t, Body &b, double dt) {
+uint32_t split(const Tool &t, Body &b) {
   uint32_t n = 0;
   for (size_t part = t.first_cutting_part(); part < t.motion.parts.size(); ++part) {
     const Edge edge(t, part);
     BladeSweep sweep(b, edge.blade, edge.forward);
+    const uint64_t id = t.set->obstacle[part];
+    for (BladeTrack &track : b.blades)
+      if (track.part == id && !sweep.goes_on(track)) track.dues.clear();  // where it has been before a jump
     if (!sweep.near()) continue;
     std::vector<SweptFace> &met = sweep.faces;
     if (t.cuts.most > 0 && met.size() > t.cuts.most - n) met.resize(t.cuts.most - n);
-    Opened opened;
+    const Opening opening(b, met, sweep.energy(met.size()));
     if (!met.empty()) {
       Array<uint64_t> more{HookAllocator<uint64_t>(b.world->memory())};
-      for (const SweptFace &f : met) {
-        more.push_back(f.face);
-        add(edge, f, opened);
-      }
+      for (const SweptFace &f : met) more.push_back(f.face);
       open_faces(b, more);
-      n += opened.n;
+      n += uint32_t(met.size());
     }
-    sweep.keep(b);
-    charge(t, b, opened, dt);
+    BladeTrack &track = sweep.keep(b);
+    track.part = id;
+    const ToolPlace place = place_of(t.set->state[part]);
+    forget_far(b, edge, place, track);
+    opening.charge(b, place, track);
   }
   return n;
 }
@@ -273,7 +300,7 @@ void begin_cuts(World &w) {
       t->cuts.from[part] = place_of(t->set->state[part]);
 }
 
-void cut_by_tools(World &w, double dt) {
+void cut_by_tools(World &w) {
   for (size_t k = 0; k < w.tools.size(); ++k) {
     Tool &t = *w.tools[k];
     // by id, since a body without cells leaves the list; a body is cut with its pieces
@@ -284,7 +311,7 @@ void cut_by_tools(World &w, double dt) {
       const auto at = std::find_if(w.bodies.begin(), w.bodies.end(), [&](auto &b) { return b->id == id; });
       if (at == w.bodies.end()) continue;
       Body &b = **at;
-      const uint32_t n = t.cuts.how == DFM_CUT_SPLIT ? split(t, b, dt) : remove(t, b);
+      const uint32_t n = t.cuts.how == DFM_CUT_SPLIT ? split(t, b) : remove(t, b);
       if (n == 0) continue;
       separate_if_asked(b);
       reserve_events(w, 1);

@@ -9,9 +9,6 @@
 //                 device and contact put in, whatever k, c, m and h are: an implicit virtual coupling is
 //                 passive (Colgate, Stanley and Brown 1995; Adams and Hannaford 1999).
 //   parts         impulse p at a part's center r acts on the frame as (p, r x p)
-//   cutting       E, energy of cuts that a coupled tool has not paid yet, holds its edge back by E / l as dry
-//                 friction would, which stops a motion and begins none: the impulse is at most what stops the
-//                 edge in the sub-step, and its work goes off E (decision 0405)
 #include "dynamics/rigid/tool_host.h"
 
 #include <algorithm>
@@ -50,9 +47,6 @@ class ToolHost {
   };
   Ways ways(const dfm_rigid_step &step) const;
   Frame move(const dfm_rigid_step &step, const Ways &w, Vec3 p, Vec3 turn) const;
-  // What holds the edge back, N s, from how the tool would move without contact.
-  struct Drag { Vec3 impulse, arm; };
-  Drag drag(const dfm_rigid_step &step, const Ways &w) const;
   ToolPlace end_of(const dfm_rigid_step &step, const Ways &w, const Frame &mean) const;
   double mobility(double h) const {
     return motion_.coupled() ? 1 / (motion_.mass + h * motion_.damping + h * h * motion_.stiffness) : 0;
@@ -104,19 +98,6 @@ Frame ToolHost::move(const dfm_rigid_step &step, const Ways &w, Vec3 p, Vec3 tur
                               h * (motion_.turn_stiffness * turned_by + motion_.turn_damping * spin) + turn)};
 }
 
-ToolHost::Drag ToolHost::drag(const dfm_rigid_step &step, const Ways &w) const {
-  const ToolValues &v = w.values;
-  if (!motion_.coupled() || !(v.cut_due > 0)) return {};
-  const Vec3 arm = rotate(w.start.rotation, load3(v.cut_at));
-  const Vec3 ahead = rotate(w.start.rotation, load3(v.cut_way));
-  const Frame free = move(step, w, {}, {});
-  const double speed = dot(free.velocity + cross(free.spin, arm), ahead);
-  if (!(speed > 0)) return {};
-  const double gives = mobility(step.h) + turn_mobility(step.h) * norm2(cross(arm, ahead));
-  const double most = step.h * v.cut_due / std::max(v.cut_length, step.h * speed);
-  return {-std::min(speed / gives, most) * ahead, arm};
-}
-
 ToolPlace ToolHost::end_of(const dfm_rigid_step &step, const Ways &w, const Frame &mean) const {
   if (!motion_.coupled()) return w.device;
   return {w.start.position + step.h * mean.velocity, turned(w.start.rotation, step.h * mean.spin)};
@@ -125,8 +106,7 @@ ToolPlace ToolHost::end_of(const dfm_rigid_step &step, const Ways &w, const Fram
 // Mean velocities of the parts from their end poses: parts that rotate with the frame move along an arc.
 void ToolHost::predict(const dfm_rigid_step &step, double *velocity) const {
   const Ways w = ways(step);
-  const Drag held = drag(step, w);
-  const ToolPlace end = end_of(step, w, move(step, w, held.impulse, cross(held.arm, held.impulse)));
+  const ToolPlace end = end_of(step, w, move(step, w, {}, {}));
   for (size_t i = 0; i < motion_.parts.size(); ++i) {
     const ToolPlace from = place_of(step.state[i]), to = part_place(motion_.parts[i], end, w.opening);
     store3(velocity + 6 * i, (1 / step.h) * (to.position - from.position));
@@ -161,13 +141,9 @@ void ToolHost::commit(const dfm_rigid_step &step, const double *impulse, dfm_rig
     p += q;
     turn += load3(impulse + 6 * i + 3) + cross(arm(step, i), q);
   }
-  const Drag of_cuts = drag(step, w);
-  p += of_cuts.impulse;
-  turn += cross(of_cuts.arm, of_cuts.impulse);
   const Frame mean = move(step, w, p, turn);
   const ToolPlace end = end_of(step, w, mean);
   ToolValues v = w.values;
-  v.cut_due += dot(of_cuts.impulse, mean.velocity + cross(mean.spin, of_cuts.arm));
   const ToolPlace device = motion_.coupled() ? load_place(v.device) : w.start;
   const Vec3 way = w.device.position - device.position;
   const Vec3 turned_by = rotation_vector(w.device.rotation * conjugate(device.rotation));

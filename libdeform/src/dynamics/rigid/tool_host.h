@@ -50,9 +50,6 @@ struct ToolValues {
   double tank;                     // J, port_work, whose negative part decays over time
   double given[6];                 // N and N m on the hand after the last step, world frame
   double ngiven;                   // forces given so far, of a late device
-  double cut_due;                  // J, that cuts have taken and the tool has not paid yet
-  double cut_length;               // m, over which a coupled tool pays it
-  double cut_at[3], cut_way[3];    // m, unit length: where its edge cuts and where to, in the tool's frame
 };
 inline constexpr size_t kToolValues = sizeof(ToolValues) / sizeof(double);
 // After the values, for a late device: the last forces and their times. Force number k is in row k mod
