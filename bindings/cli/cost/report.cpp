@@ -246,6 +246,15 @@ std::string next_text(const Study &study) {
 }
 
 namespace {
+// Three meshes that converge at no order: the error of the finest is an estimate that nothing supports.
+bool shows_no_order(const Study &study) {
+  if (study.third < 0) return false;
+  for (const std::string &name : study.headline)
+    if (const auto found = study.limits.find(name); found != study.limits.end() && !found->second.used)
+      return true;
+  return false;
+}
+
 // The cheapest of the front whose error alone is within the target, if it is not the choice; -1: none.
 int cheaper_but_unproven(const Study &study) {
   for (const size_t i : study.front) {
@@ -276,6 +285,10 @@ std::string pick_text(const Study &study) {
     out += "  proven for model and step; the mesh brings " + percent(study.own_mesh.mesh) +
            ", give or take the " + percent(study.reference_headline) +
            " of the reference: no mesh within this budget is fine enough to say more\n" + next_text(study);
+  else if (study.proven && shows_no_order(study))
+    out += "  likely, not proven: the meshes show no order, so the reference's own error of " +
+           percent(study.reference_headline) + " may be larger; a finer mesh in the scene decides\n" +
+           next_text(study);
   else if (const int nearly = cheaper_but_unproven(study); study.proven && nearly >= 0)
     out += "  cheaper, but proven only to " +
            percent(study.rows[size_t(nearly)].headline + study.reference_headline) +
