@@ -202,7 +202,7 @@ int ask_rigid_ends(World &w, uint32_t *trouble) {
 bool stage_rigid_commit(World &w, StepContext &step, uint32_t *trouble) {
   for (uint32_t round = 0;; ++round) {
     sum_rigid_impulses(w, step);
-    const bool differ = step.tools.answer();
+    const bool differ = step.tools.answer(w, step);
     const int end = ask_rigid_ends(w, trouble);
     if (end == 0) return false;
     if ((end == 1 && !differ) || round == DFM_RIGID_MOST_AGAIN || !w.plan.touches() || step.rows.all() == 0)

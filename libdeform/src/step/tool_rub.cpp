@@ -60,6 +60,11 @@ void ToolTouch::take_last(const World &w) {
     row.impulse = start_[3 * size_t{i}];
     std::copy_n(&start_[3 * size_t{i} + 1], 2, row.along);
     push(row, row.given());
+    for (const Side *side : {&row.a, &row.b}) {
+      Moved &m = sides_[side->tool];
+      m.touched = true;
+      m.reach[side->part] = std::max(m.reach[side->part], norm(side->arm));
+    }
   }
   const RowRun all{0, n};
   batches_.gather(laws_, {&all, 1}, state_);

@@ -28,7 +28,7 @@ constexpr uint32_t kMostPasses = 6;  // over the laws, and what turning adds, un
 // Those of a host that is asked for velocities and impulses alone.
 bool plain(const RigidSet &set) { return set.of_tool || (set.host_name == "builtin" && set.njoint == 0); }
 
-PairSide side_of(const Obstacle &o) { return {o.name, o.zone.group, o.zone.material}; }
+PairSide names_of(const Obstacle &o) { return {o.name, o.zone.group, o.zone.material}; }
 
 Quat rotation_of(const dfm_rigid_state &s) {
   return {s.rotation[0], s.rotation[1], s.rotation[2], s.rotation[3]};
@@ -69,7 +69,8 @@ void ToolTouch::prepare(World &w) {
           b.sensor || !plain(*a.rigid) || !plain(*b.rigid))
         continue;
       bool touch = (a.def.category & b.def.collides_with) != 0 && (b.def.category & a.def.collides_with) != 0;
-      if (const FilterRule *const rule = best_rule(w.filters, side_of(a), side_of(b))) touch = rule->collide;
+      if (const FilterRule *const rule = best_rule(w.filters, names_of(a), names_of(b)))
+        touch = rule->collide;
       if (touch) pairs_.push_back({i, j, law_of_obstacles(w, a, b), {a.id, b.id}});
     }
   for (const Pair &pair : pairs_) w.pairs.tool_law.push_back(pair.law);
@@ -243,17 +244,23 @@ void ToolTouch::add_row(const Pair &pair, Name name, Side a, Side b, Vec3 at, Ve
   rows_.push_back(row);
 }
 
+// Finds what of each is this near to the box of the other. False: nothing.
+bool ToolTouch::look_at_each_other(ToolShape &a, ToolShape &b, double far) {
+  if (norm(a.position() - b.position()) - a.reach() - b.reach() > far) return false;
+  const Vec3 wide = {far, far, far};
+  const ToolBox of_a = a.bounds(), of_b = b.bounds();
+  const ToolBox near = {of_b.lo - wide, of_b.hi + wide};
+  if (!near.holds(of_a.lo, of_a.hi)) return false;
+  a.look_at(near);
+  b.look_at({of_a.lo - wide, of_a.hi + wide});
+  return true;
+}
+
 // Corners of each against the other, and edges that cross.
 void ToolTouch::add_rows(const Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b) {
   const double reach = 2 * h_ * (fastest(a, at_a) + fastest(b, at_b)) + offset_;
   const double far = reach + offset_;
-  if (norm(a.position() - b.position()) - a.reach() - b.reach() > far) return;
-  const Vec3 wide = {far, far, far};
-  const ToolBox of_a = a.bounds(), of_b = b.bounds();
-  const ToolBox near = {of_b.lo - wide, of_b.hi + wide};
-  if (!near.holds(of_a.lo, of_a.hi)) return;
-  a.look_at(near);
-  b.look_at({of_a.lo - wide, of_a.hi + wide});
+  if (!look_at_each_other(a, b, far)) return;
   ObstaclePoint o;
   for (const auto &[corner, number] : a.corners()) {
     if (!b.closest(corner, far + a.round(), o)) continue;
@@ -281,22 +288,30 @@ void ToolTouch::add_rows(const Pair &pair, ToolShape &a, ToolShape &b, Side at_a
     }
 }
 
-void ToolTouch::find(const World &w, const StepContext &step) {
-  const auto side = [&](const Obstacle &o) {
-    Side out{};
-    while (sides_[out.tool].set != o.rigid) ++out.tool;
-    out.part = o.rigid_body;
-    return out;
-  };
+ToolTouch::Side ToolTouch::side_of(const Obstacle &o) const {
+  Side out{};
+  while (sides_[out.tool].set != o.rigid) ++out.tool;
+  out.part = o.rigid_body;
+  return out;
+}
+
+// f(pair, the two shapes, their sides): of all that may touch, where one of the two gives way.
+void ToolTouch::each_pair(const World &w, const StepContext &step, const Visit &f) const {
   for (const Pair &pair : pairs_) {
     const Obstacle &a = *w.obstacles[pair.a], &b = *w.obstacles[pair.b];
     const ObstacleView &va = step.obstacle_views[a.slot], &vb = step.obstacle_views[b.slot];
     if (!ToolShape::takes_part(va) || !ToolShape::takes_part(vb)) continue;
-    const Side at_a = side(a), at_b = side(b);
+    const Side at_a = side_of(a), at_b = side_of(b);
     if (!sides_[at_a.tool].gives() && !sides_[at_b.tool].gives()) continue;
     ToolShape shape_a(va), shape_b(vb);
-    add_rows(pair, shape_a, shape_b, at_a, at_b);
+    f(pair, shape_a, shape_b, at_a, at_b);
   }
+}
+
+void ToolTouch::find(const World &w, const StepContext &step) {
+  each_pair(w, step, [&](const Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b) {
+    add_rows(pair, a, b, at_a, at_b);
+  });
 }
 
 // Gauss-Seidel: the rows are few. Largest change, m/s.
@@ -429,19 +444,14 @@ void ToolTouch::begin(World &w, StepContext &step) {
     straighten(m);
     m.base = m.free;
   }
+  tell_driven(w, step);
   find(w, step);
-  if (rows_.empty()) {
+  if (rows_.empty() && !add_hits(w, step)) {
     sides_.clear();
     return;
   }
   take_last(w);
-  for (const Row &row : rows_)
-    for (const Side *side : {&row.a, &row.b}) {
-      Moved &m = sides_[side->tool];
-      m.touched = true;
-      m.reach[side->part] = std::max(m.reach[side->part], norm(side->arm));
-    }
-  solve();
+  solve_past_hits(w, step);
   for (Row &row : rows_) row.before = row.given();
   for (Moved &m : sides_)
     for (size_t i = 0; i < m.free.size(); ++i) m.set->velocity[i] = m.free[i] + m.change[i] + m.turn[i];
@@ -456,7 +466,7 @@ void ToolTouch::correct() {
   for (Row &row : rows_) row.before = row.given();
 }
 
-bool ToolTouch::answer() {
+bool ToolTouch::answer(const World &w, const StepContext &step) {
   if (rows_.empty()) return false;
   for (size_t k = 0; k < sides_.size(); ++k) {
     Moved &m = sides_[k];
@@ -467,7 +477,7 @@ bool ToolTouch::answer() {
       push({k, i, {}}, load3(p), load3(p + 3), &Moved::base, false);
     }
   }
-  solve();
+  solve_past_hits(w, step);
   for (size_t k = 0; k < sides_.size(); ++k) add_impulses(k);
   keep_next();
   double scale = 0, most = 0;

@@ -16,6 +16,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "contact/contact_set.h"
@@ -43,7 +44,7 @@ class ToolTouch {
   void correct();
   // The sets' impulses are those of soft bodies: adds those of the rows. True: they differ from those that
   // the velocities have, so soft bodies have to be asked again.
-  bool answer();
+  bool answer(const World &w, const StepContext &step);
   // Once the hosts have ended their sub-step: turns the ends of the jaws.
   void turn_jaws();
   // At the end of a sub-step that stands: what lasts becomes the world's.
@@ -94,16 +95,26 @@ class ToolTouch {
     uint64_t id[2];
   };
   // What of the two meets.
-  enum Meeting : uint32_t { kCornerOfA, kCornerOfB, kEdges };
+  enum Meeting : uint32_t { kCornerOfA, kCornerOfB, kEdges, kHitEdges };
   struct Name {
     Meeting kind;
     uint32_t first, second;
+  };
+  struct Hit {
+    const Pair *pair;
+    Name name;
+    Side a, b;
+    Vec3 at, normal;
+    double gap;
   };
   Vec3 speed(const Row &row) const;
   void push(const Row &row, Vec3 impulse);
   void push(const Side &side, Vec3 impulse, Vec3 moment, std::vector<double> Moved::*to, bool turns_jaws);
   Vec3 answer_to(const Row &row, Vec3 impulse);
   void find(const World &w, const StepContext &step);
+  using Visit = std::function<void(const Pair &, ToolShape &, ToolShape &, Side, Side)>;
+  void each_pair(const World &w, const StepContext &step, const Visit &f) const;
+  static bool look_at_each_other(ToolShape &a, ToolShape &b, double far);
   void add_rows(const Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b);
   void add_row(const Pair &pair, Name name, Side a, Side b, Vec3 at, Vec3 normal, double gap, double reach);
   static uint64_t key_of(const uint64_t pair[2], Name name);
@@ -119,6 +130,14 @@ class ToolTouch {
   void sweep_until(double done);
   void take_impulses(Array<double> &to) const;
   void solve();
+  // tool_hits.cpp
+  Vec3 end_of(const Side &side, Vec3 p) const;
+  void find_hits(const Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b);
+  bool add_hits(const World &w, const StepContext &step);
+  void solve_past_hits(const World &w, const StepContext &step);
+  double depth(ToolShape &a, ToolShape &b) const;
+  void tell_driven(const World &w, const StepContext &step);
+  Side side_of(const Obstacle &o) const;
   // tool_rub.cpp
   void take_last(const World &w);
   double ask_laws(double least);
@@ -130,6 +149,8 @@ class ToolTouch {
   std::vector<Pair> pairs_;
   std::vector<Moved> sides_;
   std::vector<Row> rows_;
+  std::vector<Hit> hits_;
+  std::vector<std::array<uint64_t, 2>> told_;  // pairs of driven tools that have met
   // By row.
   ContactState state_;
   LawBatches batches_;

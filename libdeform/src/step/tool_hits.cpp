@@ -1,0 +1,135 @@
+// Tools that are so fast that the places where they are nearest at the start are not those where they meet:
+// after a solve the guard's time of impact (ccd/) is asked along the straight ways of capsules. What meets
+// becomes a row, linearized at its hit time, and all is solved again, at most four times.
+#include <algorithm>
+
+#include "ccd/toi_guard_motion.h"
+#include "core/error.h"
+#include "math/turn.h"
+#include "state/world.h"
+#include "step/context.h"
+#include "step/tool_touch.h"
+
+namespace dfm {
+namespace {
+
+constexpr uint32_t kMostHits = 4;  // further solves
+constexpr double kSlow = 5e-4;     // m in a sub-step: what moves by less is kept apart by its rows
+constexpr uint32_t kLooks = 16;    // pieces of an edge between which it is looked at
+constexpr double kWithin = 0.1;    // of the floor, that a hit may be found above it
+
+}  // namespace
+
+// With the velocities so far, at the end of the sub-step.
+Vec3 ToolTouch::end_of(const Side &side, Vec3 p) const {
+  const Moved &m = sides_[side.tool];
+  const size_t at = 6 * size_t{side.part};
+  const Vec3 from = center(side), way = load3(&m.base[at]) + load3(&m.change[at]),
+             spin = load3(&m.base[at + 3]) + load3(&m.change[at + 3]);
+  return from + h_ * way + rotate(turned(Quat{}, h_ * spin), p - from);
+}
+
+void ToolTouch::find_hits(const Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b) {
+  const double far = h_ * (fastest(a, at_a) + fastest(b, at_b));
+  if (far < kSlow || !look_at_each_other(a, b, 2 * far + offset_)) return;
+  const double floor = 0.5 * offset_;
+  narrow::PairMotion m;
+  m.edges = true;
+  m.round = a.round() + b.round();
+  const auto put = [&](size_t k, const Side &side, const ToolShape::Edge &e) {
+    store3(m.m[k].p0, e.from);
+    store3(m.m[k].p1, end_of(side, e.from));
+    store3(m.m[k + 1].p0, e.to);
+    store3(m.m[k + 1].p1, end_of(side, e.to));
+  };
+  const auto place = [&](size_t k, double s, double t) {
+    const auto at = [&](const dfm_motion &x) { return load3(x.p0) + t * (load3(x.p1) - load3(x.p0)); };
+    return at(m.m[k]) + s * (at(m.m[k + 1]) - at(m.m[k]));
+  };
+  for (const ToolShape::Edge &p : a.edges()) {
+    put(0, at_a, p);
+    for (const ToolShape::Edge &q : b.edges()) {
+      put(2, at_b, q);
+      if (m.far_apart(floor) || !(m.distance(0) > floor)) continue;
+      const ToiHit hit = m.touch(floor, kWithin * floor);
+      if (!(hit.t <= 1)) continue;
+      const Vec3 apart = place(0, hit.at[0], hit.t) - place(2, hit.at[1], hit.t);
+      if (!(norm(apart) > 0)) continue;
+      const Vec3 n = normalized(apart), on_a = place(0, hit.at[0], 0), on_b = place(2, hit.at[1], 0);
+      // along a normal of later they may overlap now: that asks for no speed outwards, which would be energy
+      const double gap = std::max(dot(n, on_a - on_b) - m.round, offset_);
+      hits_.push_back({&pair, {kHitEdges, p.number, q.number}, at_a, at_b, 0.5 * (on_a + on_b), n, gap});
+    }
+  }
+}
+
+// What meets on the way becomes rows, and no row has been pushed at. False: nothing.
+bool ToolTouch::add_hits(const World &w, const StepContext &step) {
+  hits_.clear();
+  each_pair(w, step, [&](const Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b) {
+    if (a.round() > 0 && b.round() > 0) find_hits(pair, a, b, at_a, at_b);
+  });
+  if (hits_.empty()) return false;
+  for (Moved &m : sides_) {
+    std::fill(m.change.begin(), m.change.end(), 0.0);
+    for (Moved::Jaw &jaw : m.jaws) jaw.moment = 0;
+  }
+  for (const Hit &hit : hits_) {
+    std::erase_if(rows_, [&](const Row &row) { return row.key == key_of(hit.pair->id, hit.name); });
+    add_row(*hit.pair, hit.name, hit.a, hit.b, hit.at, hit.normal, hit.gap, HUGE_VAL);
+  }
+  return true;
+}
+
+void ToolTouch::solve_past_hits(const World &w, const StepContext &step) {
+  for (uint32_t k = 0;; ++k) {
+    solve();
+    if (k == kMostHits || !add_hits(w, step)) return;
+    take_last(w);
+  }
+}
+
+// m, by how far one reaches into the other now, by its corners and along its edges; 0: not at all.
+double ToolTouch::depth(ToolShape &a, ToolShape &b) const {
+  if (!look_at_each_other(a, b, offset_)) return 0;
+  double deepest = 0;
+  ObstaclePoint o;
+  const auto look = [&](const ToolShape &in, Vec3 p, double round) {
+    if (in.closest(p, HUGE_VAL, o)) deepest = std::max(deepest, round - o.distance);
+  };
+  for (const auto &[own, other] : {std::pair(&a, &b), std::pair(&b, &a)}) {
+    for (const auto &corner : own->corners()) look(*other, corner.at, own->round());
+    for (const ToolShape::Edge &e : own->edges())
+      for (uint32_t k = 1; k < kLooks; ++k)
+        look(*other, e.from + (double(k) / kLooks) * (e.to - e.from), own->round());
+  }
+  return deepest;
+}
+
+// Two tools that are both driven go where they are told. That they are in each other, or pass, is said once.
+void ToolTouch::tell_driven(const World &w, const StepContext &step) {
+  const auto driven = [&](const Obstacle &o) {
+    return o.rigid->of_tool && !std::any_of(sides_.begin(), sides_.end(),
+                                            [&](const Moved &m) { return m.set == o.rigid && m.gives(); });
+  };
+  for (const Pair &pair : pairs_) {
+    const Obstacle &a = *w.obstacles[pair.a], &b = *w.obstacles[pair.b];
+    const auto same = [&](const auto &known) { return known[0] == pair.id[0] && known[1] == pair.id[1]; };
+    if (!driven(a) || !driven(b) || std::any_of(told_.begin(), told_.end(), same)) continue;
+    const ObstacleView &va = step.obstacle_views[a.slot], &vb = step.obstacle_views[b.slot];
+    if (!ToolShape::takes_part(va) || !ToolShape::takes_part(vb)) continue;
+    ToolShape shape_a(va), shape_b(vb);
+    const double deep = depth(shape_a, shape_b);
+    hits_.clear();
+    if (!(deep > offset_)) find_hits(pair, shape_a, shape_b, side_of(a), side_of(b));
+    if (!(deep > offset_) && hits_.empty()) continue;
+    told_.push_back({pair.id[0], pair.id[1]});
+    w.context->logf(DFM_LOG_WARNING,
+                    "tools '%s' and '%s' have met at %.6g s%s and pass each other, because both go exactly "
+                    "where they are told; give one of them a \"coupling\" (stiffness), or filter the pair",
+                    a.name.c_str(), b.name.c_str(), w.time,
+                    deep > offset_ ? format(" (%.3g m deep)", deep).c_str() : "");
+  }
+}
+
+}  // namespace dfm
