@@ -21,6 +21,7 @@ void *open_library(const char *variable, std::initializer_list<const char *> nam
 #include <GL/osmesa.h>
 
 #include <array>
+#include <mutex>
 
 namespace render {
 namespace {
@@ -51,10 +52,20 @@ const OsMesa &shared_osmesa() {
   return osmesa;
 }
 
+// Mesa 22.3 makes contexts with data of its own that it does not lock (helgrind names
+// OSMesaCreateContextAttribs), so one thread at a time makes or destroys one.
+std::mutex &making() {
+  static std::mutex mutex;
+  return mutex;
+}
+
 class OsMesaContext final : public Context {
  public:
   OsMesaContext(const OsMesa &osmesa, OSMesaContext context) : osmesa_(osmesa), context_(context) {}
-  ~OsMesaContext() override { osmesa_.destroy_context(context_); }
+  ~OsMesaContext() override {
+    const std::lock_guard lock(making());
+    osmesa_.destroy_context(context_);
+  }
   bool make_current() override {
     return osmesa_.make_current(context_, buffer_.data(), GL_UNSIGNED_BYTE, kSide, kSide);
   }
@@ -88,7 +99,10 @@ std::unique_ptr<Context> create_osmesa(std::string *why_not) {
                             OSMESA_CONTEXT_MINOR_VERSION,
                             3,
                             0};
-  const OSMesaContext context = osmesa.create_context(attributes, nullptr);
+  const OSMesaContext context = [&] {
+    const std::lock_guard lock(making());
+    return osmesa.create_context(attributes, nullptr);
+  }();
   if (!context) {
     *why_not = "OSMesa: no OpenGL 3.3 core context: install the libosmesa6 of Debian 12 or later";
     return nullptr;
