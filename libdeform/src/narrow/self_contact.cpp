@@ -490,8 +490,7 @@ void find_copies(const OpenedSurface &opened, std::span<const uint32_t> a, std::
 void SelfPairs::follow(const Surface &s, const SelfRest &rest, uint64_t list, double d_c) {
   const OpenedSurface &opened = rest.opened;
   if (renewals != list || offset != d_c) {
-    renewals = list;
-    offset = d_c;
+    renewals = 0;  // until the arrays are complete: an allocation may fail
     of_face.assign(vertex_face.size(), {});
     of_edges.assign(edge_edge.size(), {});
     if (opened.any()) {
@@ -501,9 +500,11 @@ void SelfPairs::follow(const Surface &s, const SelfRest &rest, uint64_t list, do
         find_copies(opened, {&s.edge[2 * size_t{edge_edge[i].a}], 2},
                     {&s.edge[2 * size_t{edge_edge[i].b}], 2}, of_edges[i]);
     }
+    copies.resize(opened.copies.size());
+    slack.resize(copies.size());
+    renewals = list;
+    offset = d_c;
   }
-  copies.resize(opened.copies.size());
-  slack.resize(copies.size());
   const auto at = [&](uint32_t surfel) { return load3(&s.place[4 * size_t{surfel}]); };
   const auto area = [&](uint32_t t) {
     const uint32_t *const c = &s.tri[3 * size_t{t}];
