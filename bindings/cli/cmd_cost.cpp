@@ -68,11 +68,11 @@ int cost_of(CostOptions options, Globals &globals) {
     }
   }
   if (options.apply.empty()) return kDone;
-  if (study.pick < 0)
-    return fail(
-        "--apply: no choice meets the target, so there is nothing to apply; give a larger --budget or a "
-        "larger --target");
+  if (const std::string why = cost::refusal_to_apply(study); !why.empty()) return fail(why);
   cost::write_applied(subject, study, options.apply);
+  if (study.mesh_stays)
+    warn("--apply: what is applied is proven for model and step on the scene's own mesh; " +
+         cost::mesh_doubt(study) + "; " + cost::next_step(study));
   return kDone;
 }
 
@@ -114,7 +114,8 @@ void add_cost(CLI::App &app, Globals &globals, int *exit_code) {
       ->take_all()
       ->allow_extra_args(false);
   sub->add_option("--out", options->out, "folder for the results (out/SCENE_cost)")->type_name("DIR");
-  sub->add_option("--apply", options->apply, "writes the scene with the cheapest choice within the target")
+  sub->add_option("--apply", options->apply,
+                  "writes the scene with the cheapest choice that is proven to be within the target")
       ->type_name("FILE");
   sub->callback([=, &globals] {
     // Runs are processes of one thread each; without the option as many at a time as there are processors.

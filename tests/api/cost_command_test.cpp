@@ -165,7 +165,12 @@ TEST(Cost, Report_HoldsToSchemaAndOrdersTheFront) {
   EXPECT_LT(number(here, "error"), 0.01) << "half the explicit step changes next to nothing";
   EXPECT_GT(number(here, "mesh_error"), 0.01) << "a bar of 90 cells is too stiff";
   EXPECT_EQ(reference.get("converged") == "true",
-            number(reference, "error") <= number(reference, "best_error_shown") / 3);
+            reference.get("bound") != "null" &&
+                number(reference, "bound") <= number(reference, "best_error_shown") / 3);
+  if (const JsonValue &pick = *s.report.find("pick"); pick.get("proven") == "true") {
+    EXPECT_NE(reference.get("bound"), "null");
+    EXPECT_LE(number(row(s.report, pick.get("index")), "headline") + number(reference, "bound"), 0.1);
+  }
   double cost = 0, error = 1e300;
   const auto &front = s.report.find("front")->items;
   ASSERT_GE(front.size(), 2u);
@@ -293,6 +298,22 @@ TEST(Cost, Apply_WritesASceneThatMeetsTheTarget) {
   EXPECT_LE(error, target);
   EXPECT_NEAR(error, number(chosen, "headline"), 0.02);
   EXPECT_LE(number(chosen, "cpu_s_per_s"), number(row(s.report, "0"), "cpu_s_per_s"));
+}
+
+// Whatever these meshes show: cost.json and --apply go by one verdict.
+TEST(Cost, Apply_WritesWhatIsProvenAndNothingElse) {
+  const std::string applied = test::scratch("cost_unproven") + "/applied.json";
+  fs::remove(applied);
+  const Study s = study("unproven", bar(R"("duration": 0.2, "step": 0.0002)"),
+                        {"--axes", "mesh", "--budget", "300", "--target", "0.02", "--apply", applied});
+  const JsonValue &pick = *s.report.find("pick");
+  const bool written =
+      pick.kind == JsonValue::object && (pick.get("proven") == "true" || pick.get("this_mesh") == "true");
+  EXPECT_EQ(fs::exists(applied), written) << s.result.err;
+  EXPECT_EQ(s.result.exit_code, written ? 0 : 2) << s.result.err;
+  if (!written) {
+    EXPECT_NE(s.result.err.find("--apply: "), std::string::npos) << s.result.err;
+  }
 }
 
 // As the planner has made it, not planned anew beside each change; what is applied asks the planner no more.

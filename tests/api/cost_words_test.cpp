@@ -19,7 +19,7 @@ Study two_choices(double reference_error) {
   study.rows[1].cpu_per_s = 20;
   study.front = {0, 1};
   study.reference = study.check = 1;
-  study.reference_headline = reference_error;
+  study.reference_headline = study.reference_bound = reference_error;
   study.pick = reference_error > 0.02 ? 1 : 0;
   study.proven = true;
   study.next = "take \"cells x4\" as the reference";
@@ -38,7 +38,7 @@ TEST(CostWords, CheaperChoiceThatTheReferenceCannotProve_IsNamedWithItsReason) {
   EXPECT_TRUE(
       has(said, "cheaper, but proven only to 7.00 % with the reference's own error of 4.00 %: long steps"))
       << said;
-  EXPECT_TRUE(has(said, "--budget 120 goes on from here")) << said;
+  EXPECT_TRUE(has(said, "--budget 120 continues from here")) << said;
 }
 
 TEST(CostWords, CheapestChoiceThatIsProven_HasNoOtherBesideIt) {
@@ -47,15 +47,40 @@ TEST(CostWords, CheapestChoiceThatIsProven_HasNoOtherBesideIt) {
   EXPECT_FALSE(has(said, "proven only")) << said;
 }
 
-// A rubber block of 600 cells with "own error 4.6 %" was 18 % above one of 4,860 cells.
-TEST(CostWords, ChoiceByMeshesWithoutAnOrder_IsNotCalledProven) {
+// A rubber block of 600 cells with "own error 4.6 %" was 18 % above one of 4,860 cells. Table, cost.json and
+// --apply say the same.
+TEST(CostWords, ChoiceThatNothingBounds_IsLikelyAndNotApplied) {
   Study study = two_choices(0.01);
-  study.headline = {"force"};
-  study.third = 0;
-  study.limits["force"].used = true;
   EXPECT_FALSE(has(pick_text(study), "not proven")) << pick_text(study);
-  study.limits["force"].used = false;
-  EXPECT_TRUE(has(pick_text(study), "likely, not proven: the meshes show no order")) << pick_text(study);
+  EXPECT_EQ(refusal_to_apply(study), "");
+  study.headline = {"force"};
+  study.limits["force"].basis = Basis::no_order;
+  study.limits["force"].error = 0.01;
+  study.limits["force"].bound = study.reference_bound = 0.3;
+  study.proven = false;
+  const std::string doubt =
+      "the meshes show no order, so the reference's own error of 1.00 % may be larger (at most 30.0 %)";
+  EXPECT_TRUE(has(pick_text(study), "likely, not proven: " + doubt)) << pick_text(study);
+  const std::string refusal = refusal_to_apply(study);
+  EXPECT_TRUE(has(refusal, "\"long steps\" is likely, not proven (" + doubt + "), so nothing is applied"))
+      << refusal;
+  EXPECT_TRUE(has(refusal, "--budget 120 continues from here; that is enough to take \"cells x4\""))
+      << refusal;
+  EXPECT_TRUE(has(reference_text(study), "NOT CONVERGED")) << reference_text(study);
+}
+
+TEST(CostWords, NoChoice_IsNotApplied) {
+  Study study = two_choices(0.01);
+  study.pick = -1;
+  EXPECT_TRUE(has(refusal_to_apply(study), "nothing to apply")) << refusal_to_apply(study);
+}
+
+// What is proven for model and step is written, and said to be no more.
+TEST(CostWords, ChoiceOnTheScenesOwnMesh_IsApplied) {
+  Study study = two_choices(0.01);
+  study.proven = false;
+  study.mesh_stays = true;
+  EXPECT_EQ(refusal_to_apply(study), "");
 }
 
 }  // namespace cli::cost

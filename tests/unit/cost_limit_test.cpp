@@ -41,7 +41,9 @@ TEST(CostLimit, RunsThatConverge_GiveOrderAndLimit) {
     EXPECT_TRUE(found.used);
     EXPECT_NEAR(found.order, order, 1e-6);
     EXPECT_LT(from_truth(limit), 1e-9);
-    EXPECT_LT(found.error, 1e-9) << "both extrapolations meet";
+    EXPECT_EQ(found.basis, Basis::order);
+    EXPECT_NEAR(found.error, 0.25 * from_truth(fine), 1e-9) << "both extrapolations meet, in any order";
+    EXPECT_EQ(found.bound, found.error);
     EXPECT_GT(from_truth(fine), 0.01);
   }
 }
@@ -74,6 +76,78 @@ TEST(CostLimit, RunsWithoutAnOrder_AreNotTakenOn) {
   EXPECT_FALSE(find_limit(fine, middle, nullptr, kSizes, 1, limit).used);
   const double alike[3] = {1, 1, 0};
   EXPECT_EQ(find_limit(fine, middle, nullptr, alike, 1, limit).error, error_of(middle, fine, 1));
+}
+
+// Slower than first order: the finest run stands, and the bound is by the order that the meshes show.
+TEST(CostLimit, RunsThatConvergeSlowly_AreBoundedByTheirOwnOrder) {
+  const auto on = [&](double h) { return figure(200, [=](double t) { return 0.1 * t * std::pow(h, 0.4); }); };
+  const Quantity fine = on(kSizes[0]), middle = on(kSizes[1]), coarse = on(kSizes[2]);
+  Quantity limit;
+  const Limit found = find_limit(fine, middle, &coarse, kSizes, 1, limit);
+  EXPECT_FALSE(found.used);
+  EXPECT_EQ(found.basis, Basis::slow_order);
+  EXPECT_NEAR(found.order, 0.4, 1e-6);
+  EXPECT_EQ(limit.values, fine.values);
+  EXPECT_NEAR(found.bound, 1.25 * from_truth(fine), 1e-9);
+  EXPECT_GT(found.error, error_of(middle, fine, 1) * 0.1 / 0.05) << "first order would say less than is true";
+}
+
+// Steps of one length, or longer ones, on finer and finer meshes have no limit that could be known.
+TEST(CostLimit, RunsThatStagnate_BoundNothing) {
+  for (const double last : {0.01, 0.02, -0.02}) {
+    const Quantity coarse = figure(200, [](double t) { return 0.01 * t; });
+    const Quantity middle = figure(200, [](double) { return 0.0; });
+    const Quantity fine = figure(200, [=](double t) { return -last * t; });
+    Quantity limit;
+    const Limit found = find_limit(fine, middle, &coarse, kSizes, 1, limit);
+    EXPECT_EQ(found.basis, Basis::no_fall) << last;
+    EXPECT_TRUE(std::isinf(found.bound)) << last;
+    EXPECT_GE(found.error, error_of(middle, fine, 1) * 2 - 1e-12) << last;
+  }
+}
+
+// The two finest may agree by accident: the coarse mesh says how far off they can be.
+TEST(CostLimit, RunsThatOscillate_AreBoundedByTheirLargestDistance) {
+  const Quantity coarse = figure(200, [](double t) { return 0.3 * t; });
+  const Quantity middle = figure(200, [](double) { return 0.0; });
+  const Quantity fine = figure(200, [](double t) { return 0.01 * t; });
+  Quantity limit;
+  const Limit found = find_limit(fine, middle, &coarse, kSizes, 1, limit);
+  EXPECT_EQ(found.basis, Basis::no_order);
+  EXPECT_EQ(limit.values, fine.values);
+  EXPECT_NEAR(found.error, error_of(coarse, fine, 1) / 1.5, 1e-12) << "first order from the coarse mesh";
+  EXPECT_NEAR(found.bound, 3 * error_of(coarse, middle, 1), 1e-12);
+}
+
+// Force of a block at nearly constant volume that slides: 72, 288 and 600 cells; 4,860 cells give 66.8 N.
+TEST(CostLimit, BlockWhoseTwoFinestAgreeByAccident_IsWithinTheStatedError) {
+  const double h[3] = {std::cbrt(1. / 600), std::cbrt(1. / 288), std::cbrt(1. / 72)};
+  const auto force = [](double newton) {
+    Quantity q;
+    q.family = "force";
+    for (int i = 0; i <= 10; ++i) {
+      q.t.push_back(0.1 * i);
+      q.values.push_back(newton * 0.1 * i);
+    }
+    return q;
+  };
+  const Quantity fine = force(78.7), middle = force(78.2), coarse = force(102.3), finer = force(66.8);
+  Quantity limit;
+  const Limit found = find_limit(fine, middle, &coarse, h, 78.7, limit);
+  EXPECT_FALSE(found.used);
+  EXPECT_GT(found.error, error_of(finer, fine, 78.7));
+  EXPECT_GT(found.bound, 0.3) << "no target of 5 % is proven by that";
+}
+
+TEST(CostLimit, TwoMeshes_BoundNothing) {
+  const Quantity fine = figure(200, [](double t) { return 0.01 * t; });
+  const Quantity middle = figure(200, [](double t) { return 0.02 * t; });
+  Quantity limit;
+  const Limit found = find_limit(fine, middle, nullptr, kSizes, 1, limit);
+  EXPECT_EQ(found.basis, Basis::two_meshes);
+  EXPECT_TRUE(std::isinf(found.bound));
+  const double alike[3] = {1, 1, 0};
+  EXPECT_EQ(find_limit(fine, middle, nullptr, alike, 1, limit).bound, error_of(middle, fine, 1));
 }
 
 TEST(CostLimit, Events_AreNotTakenOn) {

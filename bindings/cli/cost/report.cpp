@@ -57,11 +57,17 @@ std::string choice_json(const Subject &subject, const Study &study, size_t i) {
   return out.text();
 }
 
+const char *word_of(Basis basis) {
+  const char *const words[] = {"order", "slow order", "no order", "no fall", "two meshes", "same mesh"};
+  return words[size_t(basis)];
+}
+
 std::string limits_json(const Study &study) {
   JsonObject out;
   for (const auto &[name, limit] : study.limits) {
     JsonObject one;
     one.add("order", number(limit.order)).add("used", limit.used ? "true" : "false");
+    one.add("basis", quoted(word_of(limit.basis))).add("bound", number(limit.bound));
     out.add(name, one.text());
   }
   return out.text();
@@ -70,7 +76,8 @@ std::string limits_json(const Study &study) {
 std::string reference_json(const Study &study) {
   JsonObject out;
   out.add("choice", std::to_string(study.reference)).add("converged", study.converged ? "true" : "false");
-  out.add("error", number(study.reference_headline)).add("errors", error_json(study.reference_error));
+  out.add("error", number(study.reference_headline)).add("bound", number(study.reference_bound));
+  out.add("errors", error_json(study.reference_error));
   out.add("check", study.check >= 0 ? std::to_string(study.check) : "null");
   out.add("third", study.third >= 0 ? std::to_string(study.third) : "null").add("limits", limits_json(study));
   out.add("best_error_shown", number(study.best)).add("why", quoted(study.axes.reference_why));
@@ -194,13 +201,32 @@ std::string count_of(const Study &study, int row) {
   return formatted("%.0f", study.rows[size_t(row)].job.outcome.cells);
 }
 
-// By what the reference's own error is known, of the quantity in which it is largest.
-std::string how_known(const Study &study) {
+// Of the quantity that decides: in which the bound is largest, then the error.
+Limit deciding(const Study &study) {
   Limit worst;
-  for (const std::string &name : study.headline)
-    if (const auto found = study.limits.find(name);
-        found != study.limits.end() && !(found->second.error <= worst.error))
-      worst = found->second;
+  worst.bound = -1;
+  for (const std::string &name : study.headline) {
+    const auto found = study.limits.find(name);
+    if (found == study.limits.end()) continue;
+    const Limit &limit = found->second;
+    if (limit.bound > worst.bound || (limit.bound == worst.bound && !(limit.error <= worst.error)))
+      worst = limit;
+  }
+  return worst;
+}
+
+std::string why_unproven(const Study &study) {
+  switch (deciding(study).basis) {
+    case Basis::no_order: return "the meshes show no order";
+    case Basis::no_fall: return "the differences of the meshes do not fall";
+    case Basis::two_meshes: return "two meshes show no order";
+    default: return "";
+  }
+}
+
+// By what the reference's own error is known.
+std::string how_known(const Study &study) {
+  const Limit worst = deciding(study);
   const std::string check = study.rows[size_t(study.check)].job.label;
   const bool meshes = count_of(study, study.reference) != count_of(study, study.check);
   if (worst.used)
@@ -209,19 +235,31 @@ std::string how_known(const Study &study) {
            formatted("%.2g", worst.order) + " that they show";
   std::string out = "against " + check;
   if (!meshes) return out;
+  const std::string third = study.third >= 0 ? count_of(study, study.third) : "";
+  if (worst.basis == Basis::slow_order)
+    return out + ", taken on at the order " + formatted("%.2g", worst.order) + " that they show with " +
+           third + " cells, times 1.25";
   out += ", taken on at first order";
-  return study.third >= 0 ? out + ": with " + count_of(study, study.third) + " cells they show no order"
-                          : out;
+  if (third.empty()) return out;
+  out += worst.basis == Basis::no_fall ? ": with " + third + " cells the differences do not fall"
+                                       : ": with " + third + " cells they show no order";
+  if (std::isfinite(worst.bound))
+    out += ", bounded by " + percent(worst.bound) + ", three times their largest distance";
+  return out;
 }
 }  // namespace
+
+std::string mesh_doubt(const Study &study) {
+  return "the mesh brings " + percent(study.own_mesh.mesh) + ", give or take the " +
+         percent(study.reference_headline) + " of the reference";
+}
 
 std::string mesh_text(const Study &study) {
   const OnThisMesh &own = study.own_mesh;
   if (own.reference < 0) return "";
   return "on the scene's own mesh, model and step alone: against " +
-         study.rows[size_t(own.reference)].job.label + ", own error " + percent(own.own) +
-         "; the mesh brings " + percent(own.mesh) + ", give or take the " +
-         percent(study.reference_headline) + " of the reference";
+         study.rows[size_t(own.reference)].job.label + ", own error " + percent(own.own) + "; " +
+         mesh_doubt(study);
 }
 
 std::string reference_text(const Study &study) {
@@ -232,29 +270,27 @@ std::string reference_text(const Study &study) {
   if (study.check < 0) return out + "; NOT CONVERGED: no second run to check it with fits into the budget";
   out += "; its own error " + percent(study.reference_headline) + " (" + how_known(study) + ")";
   if (study.converged) return out + ", at most a third of the best error shown";
+  if (!std::isfinite(study.reference_bound))
+    return out + "; NOT CONVERGED: " + why_unproven(study) + ", so nothing bounds this error";
+  if (study.reference_headline <= study.best / 3)
+    return out + "; NOT CONVERGED: the bound is more than a third of the best error shown, " +
+           percent(study.best);
   return out + "; NOT CONVERGED: more than a third of the best error shown, " + percent(study.best) +
          ", so errors below " + percent(3 * study.reference_headline) + " cannot be distinguished";
 }
 
 // Which budget says more, and what.
-std::string next_text(const Study &study) {
+std::string next_step(const Study &study) {
   if (study.finest && !(study.next_budget > 0))
-    return "  no finer reference is tried with a larger --budget; more cells in the scene make it finer\n";
-  if (!(study.next_budget > 0)) return "  with a larger --budget the same call continues from here\n";
-  return "  the same call with --budget " + formatted("%.0f", std::ceil(study.next_budget)) +
-         " continues from here; that is enough to " + study.next + "\n";
+    return "no finer reference is tried with a larger --budget; more cells in the scene make it finer";
+  if (!(study.next_budget > 0)) return "with a larger --budget the same call continues from here";
+  return "the same call with --budget " + formatted("%.0f", std::ceil(study.next_budget)) +
+         " continues from here; that is enough to " + study.next;
 }
+
+std::string next_text(const Study &study) { return "  " + next_step(study) + "\n"; }
 
 namespace {
-// Three meshes that converge at no order: the error of the finest is an estimate that nothing supports.
-bool shows_no_order(const Study &study) {
-  if (study.third < 0) return false;
-  for (const std::string &name : study.headline)
-    if (const auto found = study.limits.find(name); found != study.limits.end() && !found->second.used)
-      return true;
-  return false;
-}
-
 // The cheapest of the front whose error alone is within the target, if it is not the choice; -1: none.
 int cheaper_but_unproven(const Study &study) {
   for (const size_t i : study.front) {
@@ -264,6 +300,15 @@ int cheaper_but_unproven(const Study &study) {
   return -1;
 }
 }  // namespace
+
+std::string doubt_text(const Study &study) {
+  const std::string own = "the reference's own error of " + percent(study.reference_headline);
+  if (study.rows[size_t(study.pick)].headline + study.reference_headline > study.options.target)
+    return "with " + own + " it may be above the target";
+  const std::string bound =
+      std::isfinite(study.reference_bound) ? " (at most " + percent(study.reference_bound) + ")" : "";
+  return why_unproven(study) + ", so " + own + " may be larger" + bound;
+}
 
 std::string pick_text(const Study &study) {
   const std::string target = percent(study.options.target);
@@ -282,23 +327,16 @@ std::string pick_text(const Study &study) {
          percent(study.mesh_stays ? study.own_mesh.error.at(size_t(study.pick)) : row.headline) + ", " +
          formatted("%.3g", row.cpu_per_s) + " cpu " + study.cost_unit + ")\n";
   if (study.mesh_stays)
-    out += "  proven for model and step; the mesh brings " + percent(study.own_mesh.mesh) +
-           ", give or take the " + percent(study.reference_headline) +
-           " of the reference: no mesh within this budget is fine enough to say more\n" + next_text(study);
-  else if (study.proven && shows_no_order(study))
-    out += "  likely, not proven: the meshes show no order, so the reference's own error of " +
-           percent(study.reference_headline) + " may be larger; a finer mesh in the scene decides\n" +
-           next_text(study);
+    out += "  proven for model and step; " + mesh_doubt(study) +
+           ": no mesh within this budget is fine enough to say more\n" + next_text(study);
   else if (const int nearly = cheaper_but_unproven(study); study.proven && nearly >= 0)
     out += "  cheaper, but proven only to " +
-           percent(study.rows[size_t(nearly)].headline + study.reference_headline) +
-           " with the reference's own error of " + percent(study.reference_headline) + ": " +
+           percent(study.rows[size_t(nearly)].headline + study.reference_bound) +
+           " with the reference's own error of " + percent(study.reference_bound) + ": " +
            study.rows[size_t(nearly)].job.label + " (" + percent(study.rows[size_t(nearly)].headline) + ", " +
            formatted("%.3g", study.rows[size_t(nearly)].cpu_per_s) + " cpu " + study.cost_unit + ")\n" +
            next_text(study);
-  else if (!study.proven)
-    out += "  likely, not proven: with the reference's own error of " + percent(study.reference_headline) +
-           " it may be above the target\n" + next_text(study);
+  else if (!study.proven) out += "  likely, not proven: " + doubt_text(study) + "\n" + next_text(study);
   bool any = false;
   for (const auto &[pointer, value] : row.job.set) {
     if (pointer.rfind("/output/", 0) == 0 || pointer == "/probes") continue;
@@ -307,6 +345,15 @@ std::string pick_text(const Study &study) {
   }
   if (!any) out += "  nothing has to be changed\n";
   return out;
+}
+
+std::string refusal_to_apply(const Study &study) {
+  if (study.pick < 0)
+    return "--apply: no choice meets the target, so there is nothing to apply; give a larger --budget or a "
+           "larger --target";
+  if (study.proven || study.mesh_stays) return "";
+  return "--apply: \"" + study.rows[size_t(study.pick)].job.label + "\" is likely, not proven (" +
+         doubt_text(study) + "), so nothing is applied; " + next_step(study);
 }
 
 std::string table_text(const Subject &subject, const Study &study) {

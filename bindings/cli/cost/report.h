@@ -22,6 +22,11 @@ Described describe(const Subject &subject, const Row &row);
 std::string mesh_text(const Study &study);  // of the scene's own mesh; "" where nothing is said
 std::string reference_text(const Study &study);
 std::string pick_text(const Study &study);
+std::string mesh_doubt(const Study &study);  // of a choice on the scene's own mesh
+std::string doubt_text(const Study &study);  // why a choice for all meshes is likely, not proven
+std::string next_step(const Study &study);   // which budget says more, and what
+// Why --apply writes nothing: there is no choice, or it is not proven; "" where it writes.
+std::string refusal_to_apply(const Study &study);
 // Choices that are not compared: one sentence for each reason, with who and why.
 std::vector<std::string> left_out(const Subject &subject, const Study &study);
 

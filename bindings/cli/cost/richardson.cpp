@@ -6,7 +6,10 @@
 namespace cli::cost {
 namespace {
 
-constexpr double kLeastOrder = 0.8, kMostOrder = 3, kOrderOfCells = 2;
+constexpr double kLeastOrder = 0.8, kMostOrder = 3, kOrderOfCells = 2, kSlowest = 1e-3;
+constexpr double kOfThree = 1.25, kWithoutOrder = 3;  // factors of safety
+constexpr double kLeastRatio = 1.001;                 // of sizes of cells: below, meshes are alike
+constexpr double kNothing = 1e-12;                    // a distance of two runs that is rounding
 constexpr double kSameWay = 0.9;  // least cosine of the angle between differences that point the same way
 
 // a + weight (a - b), at the times of a.
@@ -39,14 +42,19 @@ double cosine(const Quantity &a, const Quantity &b, const Quantity &c) {
   return uv / std::sqrt(uu * vv);
 }
 
-// p at which (h2^p - h1^p) / (h1^p - h0^p) is this; the quotient rises with p.
+// (h2^p - h1^p) / (h1^p - h0^p): by how much differences fall; rises with p.
+double quotient_of(double p, const double h[3]) {
+  return (std::pow(h[2] / h[1], p) - 1) / (1 - std::pow(h[0] / h[1], p));
+}
+
+// p with this quotient.
 double order_of(double quotient, const double h[3]) {
-  const auto at = [&](double p) { return (std::pow(h[2] / h[1], p) - 1) / (1 - std::pow(h[0] / h[1], p)); };
-  double least = 1e-3, most = 20;
-  if (!(quotient > at(least)) || !(quotient < at(most))) return std::numeric_limits<double>::quiet_NaN();
+  double least = kSlowest, most = 20;
+  if (!(quotient > quotient_of(least, h)) || !(quotient < quotient_of(most, h)))
+    return std::numeric_limits<double>::quiet_NaN();
   for (int i = 0; i < 60; ++i) {
     const double p = 0.5 * (least + most);
-    (at(p) < quotient ? least : most) = p;
+    (quotient_of(p, h) < quotient ? least : most) = p;
   }
   return least;
 }
@@ -61,16 +69,35 @@ Limit find_limit(const Quantity &fine, const Quantity &middle, const Quantity *c
   Limit out;
   limit = fine;
   const double apart = error_of(middle, fine, scale);
-  const bool alike = !(h[1] > h[0] * 1.001);
-  out.error = apart * (alike ? 1 : rest_of(h[0], h[1], 1));
-  if (fine.event) out.error = std::min(out.error, 1.0);
-  if (!coarse || fine.event || alike || !(h[2] > h[1] * 1.001) || !(apart > 0)) return out;
-  out.order = order_of(error_of(*coarse, middle, scale) / apart, h);
-  out.used = out.order >= kLeastOrder && out.order <= kMostOrder && cosine(fine, middle, *coarse) >= kSameWay;
-  if (!out.used) return out;
-  const double p = std::min(out.order, kOrderOfCells);
-  limit = beyond(fine, middle, rest_of(h[0], h[1], p));
-  out.error = error_of(beyond(middle, *coarse, rest_of(h[1], h[2], p)), limit, scale);
+  const auto of_event = [&](double e) { return fine.event ? std::min(e, 1.0) : e; };
+  if (!(h[1] > h[0] * kLeastRatio)) {
+    out.basis = Basis::same_mesh;
+    out.error = out.bound = of_event(apart);
+    return out;
+  }
+  out.error = of_event(apart * rest_of(h[0], h[1], 1));
+  if (!coarse || !(h[2] > h[1] * kLeastRatio)) return out;
+
+  const double before = error_of(*coarse, middle, scale), across = error_of(*coarse, fine, scale);
+  const double quotient = before / apart;
+  const bool same_way = !fine.event && apart > 0 && cosine(fine, middle, *coarse) >= kSameWay;
+  if (same_way) out.order = order_of(quotient, h);
+  out.used = out.order >= kLeastOrder && out.order <= kMostOrder;
+  if (out.used) {
+    const double p = std::min(out.order, kOrderOfCells), rest = rest_of(h[0], h[1], p);
+    limit = beyond(fine, middle, rest);
+    out.basis = Basis::order;
+    out.error = out.bound = std::max(error_of(beyond(middle, *coarse, rest_of(h[1], h[2], p)), limit, scale),
+                                     (kOfThree - 1) * rest * apart);
+  } else if (out.order < kLeastOrder) {
+    out.basis = Basis::slow_order;
+    out.error = out.bound = kOfThree * rest_of(h[0], h[1], out.order) * apart;
+  } else {
+    out.error = std::max(out.error, of_event(across * rest_of(h[0], h[2], 1)));
+    const bool falls = apart <= kNothing || quotient > quotient_of(kSlowest, h);
+    out.basis = falls ? Basis::no_order : Basis::no_fall;
+    if (falls) out.bound = std::max(out.error, of_event(kWithoutOrder * std::max({apart, before, across})));
+  }
   return out;
 }
 

@@ -57,6 +57,7 @@ struct Study {
   std::map<std::string, Limit> limits;            // by quantity: what the three say
   std::map<std::string, double> reference_error;  // of the reference
   double reference_headline = 0, best = 0;        // best: least error of the other choices
+  double reference_bound = 0;  // of reference_headline, as large as it may be; inf: nothing bounds it
   bool converged = false;
   const char *cost_unit = "s per s";  // of cpu_per_s; "s" of a static scene, whose run costs that
   std::vector<Separated> separated;
