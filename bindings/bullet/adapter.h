@@ -59,7 +59,7 @@ class Adapter {
   const btDynamicsWorld *bullet() const { return engine_.world; }
 
  private:
-  // All that makes an object's obstacles what they are, beside where it stands.
+  // All that makes an object's obstacles what they are, apart from its pose.
   struct Traits {
     double mass = 0;
     Vec moments, along, about;

@@ -314,7 +314,7 @@ void BulletEngine::take(Member &any, const dfm_rigid_state &given, const double 
   }
   m.restored = false;
   m.ended = given;
-  // prepare() has put back what stood there before, so that what was put last stands there still
+  // prepare() has restored the former pose, so the pose that was put last is still there
   if (same(given, m.put_state) && m.last_put.holds(s.transform, s.v, s.w)) return;
   m.put(given);
   s.transform = m.body->getWorldTransform();

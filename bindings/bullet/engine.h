@@ -23,7 +23,7 @@ namespace dfm_bullet_detail {
 
 class BulletEngine;
 
-// Where a body of Bullet stands and how it moves, to the bit.
+// Pose and velocity of a body of Bullet, to the bit.
 struct Stand {
   btTransform transform;
   btVector3 v, w;
@@ -43,7 +43,7 @@ struct BulletMember : AnyMember {
   btRigidBody *body = nullptr;
   bool touched = false;    // by a constraint or contact of Bullet's in this sub-step
   size_t saved = 0;        // where the engine keeps it
-  Stand last_put, marked;  // last_put: as what stands in Bullet what has been put there
+  Stand last_put, marked;  // last_put: what was put into Bullet, as Bullet stores it
   dfm_rigid_state put_state{};
 
   dfm_rigid_state state() const override;

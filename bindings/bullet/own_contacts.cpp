@@ -32,7 +32,7 @@ constexpr double kMost = 1e9;
 // A count or a number of a body as it was written; -1: none, in a snapshot from another program.
 int number(double x, double most) { return x >= 0 && x <= most ? int(x) : -1; }
 
-// What Bullet makes anew from these in each step (places in the world, directions of friction) is left out;
+// What Bullet computes from these in each step (places in the world, directions of friction) is left out;
 // so is what the bodies of a set do not have (rolling friction, restitution, softness).
 void write_point(const btManifoldPoint &p, std::vector<double> &out) {
   for (const btVector3 *v : {&p.m_localPointA, &p.m_localPointB, &p.m_normalWorldOnB})

@@ -34,7 +34,7 @@ class OverlapsOfNow : private SortedPairs, public btSimpleBroadphase {
 class OwnContacts {
  public:
   // The bodies' user indices are their numbers. Room for every pair of a small set, and for kPairsPerBody per
-  // body of a large one; what is beyond begins anew after a restore.
+  // body of a large one; what is beyond starts from zero after a restore.
   OwnContacts(btDispatcher &dispatcher, uint32_t moving, uint32_t fixed);
   uint32_t room() const { return room_; }
   void write(double *out, bool last);  // last: are_of_now() compares with them

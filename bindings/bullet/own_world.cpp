@@ -76,7 +76,7 @@ std::unique_ptr<btCollisionShape> shape_of(const dfm_rigid_def &def) {
   return std::make_unique<btEmptyShape>();
 }
 
-// How many bodies with a shape move, or stand.
+// Number of bodies with a shape that move, or that are fixed.
 uint32_t touching(const dfm_rigid_set_def &set, uint32_t fixed) {
   uint32_t n = 0;
   for (uint32_t i = 0; i < set.nbody; ++i) {

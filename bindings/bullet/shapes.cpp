@@ -1,6 +1,6 @@
 // Spheres, boxes, capsules and planes are the library's own, cylinders meshes of 64 sides. Every other convex
 // shape is the hull of its corners, without Bullet's margin around them, or of its farthest points in
-// kDirections directions where it is round. Concave shapes tell their triangles.
+// kDirections directions where it is round. Concave shapes give their triangles.
 #include "shapes.h"
 
 #include <BulletCollision/CollisionShapes/btConcaveShape.h>

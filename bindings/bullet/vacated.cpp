@@ -1,5 +1,5 @@
-// What stands in a vacated world for its broadphase and dispatcher: they have nothing, and are asked nothing
-// that needs an answer.
+// Placeholders for the broadphase and the dispatcher of a vacated world. They are empty, and no call to them
+// needs a result.
 #include <BulletCollision/BroadphaseCollision/btOverlappingPairCache.h>
 
 #include "adapter.h"

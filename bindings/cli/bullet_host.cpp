@@ -1,5 +1,5 @@
-// Both builds of Bullet stand beside the command, and one process may have one of them: the binding is opened
-// when the first scene asks for it, and these hosts hand all calls on to it.
+// Both builds of Bullet are installed beside the command, and a process can load only one: the binding is
+// opened when the first scene needs it, and these hosts forward all calls to it.
 #include "bullet_host.h"
 
 #include <dlfcn.h>

@@ -1,5 +1,5 @@
 // What the subcommands of `deform mesh` share: a quiet context with a mesh of either kind, and
-// how one is told.
+// its report.
 #pragma once
 #include <string>
 #include <vector>
@@ -20,8 +20,8 @@ struct MeshSession {
   MeshSession &operator=(const MeshSession &) = delete;
 };
 
-// Tells the mesh of the session. asked: all that is known, as a table; else one line and, on stderr, the
-// warnings. --json: everything. `notes` stand beside the warnings: what a conversion could not keep.
+// Reports the mesh of the session. asked: all that is known, as a table; else one line and, on stderr, the
+// warnings. --json: everything. `notes` come with the warnings: what a conversion could not keep.
 int report_mesh(const Globals &globals, const std::string &file, const MeshSession &session, bool asked,
                 const std::vector<std::string> &notes = {});
 

@@ -18,7 +18,7 @@ struct Group {
   bool by_triangles = false;
 };
 
-// What both kinds of mesh tell, under the same names.
+// What both kinds of mesh report, under the same names.
 struct Report {
   const char *kind = "";
   std::vector<std::pair<const char *, uint32_t>> counts;   // JSON key and number

@@ -10,8 +10,8 @@
 namespace cli {
 namespace {
 
-// Keys that the cases of the reference set carry for some law; a law that has no use for one of them is not
-// asked about it.
+// Keys that the cases of the reference set carry for some law; a law that does not use one of them
+// does not get it.
 const std::vector<std::string> kCaseKeys = {
     "F_C",    "F_S", "mu", "mu_C", "mu_S",  "v_s", "delta", "sigma", "sigma0", "sigma1", "sigma1_form",
     "sigma2", "v_d", "dv", "z_ba", "kappa", "i",   "alpha", "k",     "nu",     "C",      "multiplier"};
@@ -339,7 +339,7 @@ class StepSolver {
             kStopped,
             "friction does not balance the force at any speed, so the mass accelerates without limit");
     }
-    if (c.stopped && c.u != 0) c = at(0);  // its solution is rest, wherever it was asked
+    if (c.stopped && c.u != 0) c = at(0);  // its solution is rest, wherever it was evaluated
     if (a.u * c.u <= 0 && a.u != 0) cut_toward_rest(a, c);
     else if (falls_) cut_evenly(a, c);
     return newton(a, c);

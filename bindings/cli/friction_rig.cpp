@@ -15,7 +15,7 @@ namespace cli {
 namespace {
 
 constexpr double kTwoPi = 6.283185307179586476925286766559;
-// N s/m: what prescribes a motion gives way to nothing, so the force that would stop it is all but infinite
+// N s/m: a prescribed motion does not yield, so the force that would stop it is almost infinite
 constexpr double kFirmDrive = 1e18;
 constexpr double kMostSteps = 2e9;
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
@@ -128,8 +128,8 @@ class Rig {
   // Implicit Euler once over the whole step and once over its halves: 2 halves - whole is of second order and
   // still damps what is stiff (Deuflhard 1985, SIAM Review 27, p. 505; Hairer and Wanner, Solving ODEs II,
   // IV.9). The first order alone would damp a mass that rings on its bristles by a share of h omega / 2.
-  // Where there may be several solutions, or a jump held the mass, both need not have taken the same one: the
-  // halves stand. Force and bristles are taken as far as the law can carry them, and as the halves have them
+  // Where there may be several solutions, or a jump held the mass, both need not have taken the same one: use
+  // the halves. Force and bristles are taken as far as the law can carry them, and as the halves have them
   // where those differ from the whole in a flag.
   void extrapolated(double t, double t1) {
     const double middle = 0.5 * (t + t1), x = x_, v = v_.vx;

@@ -165,7 +165,7 @@ void Outputs::write_last() {
 
 // The numbers of the mesh file's nodes and where they are now. Of a filled body they are the first points of
 // the surface that it wears (those of split edges follow); where it wears another one, its own points are
-// numbered as they stand.
+// numbered in their order.
 FileNodes Outputs::file_nodes(size_t b) const {
   const BodyView &body = scene_.bodies()[b];
   const std::string key = "/bodies/" + std::to_string(b);
@@ -210,7 +210,7 @@ std::vector<double> Outputs::node_positions(const BodyView &body, const FileNode
   std::vector<double> x(3 * size_t(n));
   need(nodes.surface ? dfm_surface_positions(body.handle, n, x.data(), &n)
                      : dfm_body_get_state(body.handle, n, x.data(), nullptr, &n));
-  x.resize(3 * nodes.number.size());  // those of the file; others stand behind them
+  x.resize(3 * nodes.number.size());  // those of the file; others follow them
   return x;
 }
 

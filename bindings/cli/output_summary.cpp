@@ -192,7 +192,7 @@ std::string plugins_json(const SceneFile &scene) {
   return json_array(rows);
 }
 
-// "facts" of a body in the library's plan, by key; "" where its model tells none.
+// "facts" of a body in the library's plan, by key; "" if its model has none.
 std::string facts_json(const JsonValue &plan, const std::string &body) {
   const JsonValue *const bodies = plan.find("bodies");
   for (size_t b = 0; bodies && b < bodies->items.size(); ++b) {

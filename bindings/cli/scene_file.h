@@ -48,7 +48,7 @@ class SceneFile {
   // Lists the bodies of the world again if their number has changed: pieces of a cut come behind the bodies
   // of the scene, and are gone after an earlier state has been restored. Cheap enough for every step.
   void renew_list() const;
-  // Reads points, cells and surface of a body anew where a tear has changed them.
+  // Reads points, cells and surface of a body again if a tear has changed them.
   void renew(size_t body) const;
   const std::vector<ObstacleView> &obstacles() const { return obstacles_; }
   const std::vector<RigidView> &rigids() const { return rigids_; }

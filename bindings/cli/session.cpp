@@ -1,4 +1,4 @@
-// What every subcommand and the viewer stand on: global options, the context, warnings and errors.
+// What every subcommand and the viewer use: global options, the context, warnings and errors.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>

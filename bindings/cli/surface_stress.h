@@ -10,8 +10,8 @@ class SurfaceStress {
  public:
   // surfels: [nsurfel,3] m, as they are now. Each takes the phyxel that is nearest now.
   SurfaceStress(const BodyView &body, const std::vector<double> &surfels);
-  // Pa, von Mises: mean of the cells around each surfel's phyxel, by volume at rest. False: the model tells
-  // no stress, and `out` is as it was.
+  // Pa, von Mises: mean of the cells around each surfel's phyxel, by volume at rest. False: the model has
+  // no stress, and `out` is unchanged.
   bool read(std::vector<float> &out);
 
  private:

@@ -202,8 +202,8 @@ dfm_status Adapter::follow(Geom &g) {
 std::vector<dBodyID> Adapter::hidden_bodies() const {
   std::vector<dBodyID> found, open;
   for (auto &b : bodies_) open.push_back(b->id);
-  // Bodies whose geoms all stand aside (ignored, disabled, rays): ODE moves them, and what is solved again
-  // must take them back too.
+  // Bodies all of whose geoms are left out (ignored, disabled, rays): ODE moves them, and a repeated solve
+  // must reset them too.
   for (const Signature &s : signatures_)
     if (s.body && !by_body_.count(s.body) && std::find(found.begin(), found.end(), s.body) == found.end()) {
       found.push_back(s.body);

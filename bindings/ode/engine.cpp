@@ -307,8 +307,8 @@ void OdeEngine::take(Member &any, const dfm_rigid_state &given, const double *ex
   m.start = m.state();
 }
 
-// For the length of an ODE step, whichever way it ends: joints tell the engine what they do, and ODE keeps
-// its gyroscopic terms out.
+// For the length of an ODE step, whichever way it ends: joints report to the engine what they do, and ODE
+// leaves its gyroscopic terms out.
 class OdeEngine::Lent {
  public:
   explicit Lent(OdeEngine &engine) : engine_(engine) {
@@ -343,7 +343,7 @@ void OdeEngine::put_forces(double h) {
     dBodyAddTorque(m.body, t.x, t.y, t.z);
   }
   for (const Saved &s : saved_)
-    // its counters begin anew: tire() counts
+    // resets its counters: tire() counts
     if (dBodyIsEnabled(s.body) && dBodyGetAutoDisableFlag(s.body)) dBodyEnable(s.body);
 }
 

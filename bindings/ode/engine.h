@@ -7,7 +7,7 @@
 // ODE's gyroscopic terms keep angular momentum to first order only. They are out of its step where the
 // caller has them on: free bodies are turned by the shared engine, and of jointed ones ODE solves I(q0) (w1 -
 // w0) = impulses without these terms, after which w = I(q1)^-1 I(q0) w1. What a joint does at two anchors
-// that stand apart by its error is a couple; it is taken back from both of its bodies.
+// whose distance is its error is a couple; it is taken back from both of its bodies.
 #pragma once
 #include <functional>
 #include <ode/ode.h>

@@ -72,8 +72,8 @@ RigidFriction::Answer RigidFriction::ask(const Contact &c, const double vt[2], d
   std::vector<double> state(size_t{kLanes} * std::max(1u, nstate_)), next(state.size());
   v[0] = vt[0];
   v[kLanes] = vt[1];
-  // What would stop the slip within a step, with the lighter body's mass alone: tells laws that stick from
-  // those that slide.
+  // What would stop the slip within a step, with the lighter body's mass alone: distinguishes laws that stick
+  // from those that slide.
   double mass = 1e300;
   for (const dBodyID b : {c.a, c.b}) {
     if (!b || dBodyIsKinematic(b)) continue;

@@ -10,7 +10,7 @@
 
 namespace dfm_ode_detail {
 
-// All that makes a geom's obstacle what it is, beside where it stands: compared in each step, so it is cheap
+// All that makes a geom's obstacle what it is, apart from its pose: compared in each step, so it is cheap
 // and holds no arrays.
 struct Signature {
   int geom_class = -1, inner_class = -1;  // inner: of a geom transform

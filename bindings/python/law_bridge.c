@@ -1,4 +1,4 @@
-/* A plugin whose law is a Python class: it asks the process that DEFORM_PYTHON_LAW names, by a local socket,
+/* A plugin whose law is a Python class: it calls the process that DEFORM_PYTHON_LAW names, by a local socket,
  * for the law's description when it is loaded and for every evaluation. So the command (its validator, its
  * rig) meets a Python law as it meets any other plugin file. The other side is deform/law.py; both run on one
  * machine, so numbers travel as they lie in memory. */
@@ -156,7 +156,7 @@ static dfm_status check(const double *params, char *why, size_t cap) {
   return failed ? DFM_E_FATAL : status;
 }
 
-/* What the other side tells first: the type, its parameters, effects and state. */
+/* What the other side sends first: the type, its parameters, effects and state. */
 static void describe(void) {
   type.size = sizeof type;
   type.kind = DFM_KIND_FRICTION;

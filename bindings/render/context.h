@@ -1,5 +1,5 @@
-// A GL context without a window. The drawing code sees this and a table of functions; it cannot tell which
-// library stands behind.
+// A GL context without a window. The drawing code sees this and a table of functions; it does not know
+// which library provides them.
 #pragma once
 #include <memory>
 #include <string>

@@ -323,7 +323,7 @@ Bounds extent_of(const Scene &scene) {
   return box;
 }
 
-// A wall covers the box it stands beside; a ramp reaches farther, since things move along it.
+// A wall covers the box that is beside it; a ramp reaches farther, since things move along it.
 Slab slab_of(const Plane &p, const Vec &up, const Bounds &extent) {
   const Vec n = unit(vec(p.normal), up), across = unit(cross(up, n), square_to(n)), along = cross(n, across);
   const Vec lo = vec(extent.lo), hi = vec(extent.hi), middle = (lo + hi) * 0.5, half = (hi - lo) * 0.5;

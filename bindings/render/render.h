@@ -170,7 +170,7 @@ double text_width(double size, const std::string &text);
 void legend(Image &picture, ColorMap map, double min, double max, const std::string &title,
             const std::string &unit);
 
-// Pictures in a grid, row by row; rows may differ in length. `row_labels` stand to the left and
+// Pictures in a grid, row by row; rows may differ in length. `row_labels` are drawn to the left and
 // `column_labels` above; either may be empty.
 Image montage(const std::vector<std::vector<Image>> &rows, const std::vector<std::string> &row_labels,
               const std::vector<std::string> &column_labels, const std::string &title = "");

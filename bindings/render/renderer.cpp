@@ -373,7 +373,7 @@ GLuint GlRenderer::depth_map(GLenum target, int side, int layers) {
   else
     gl_.TexImage3D(target, 0, GL_DEPTH_COMPONENT24, side, side, layers, 0, GL_DEPTH_COMPONENT,
                    GL_UNSIGNED_INT, nullptr);
-  const float lit[4] = {1, 1, 1, 1};  // outside the map nothing stands in the way
+  const float lit[4] = {1, 1, 1, 1};  // outside the map nothing blocks the light
   gl_.TexParameterfv(target, GL_TEXTURE_BORDER_COLOR, lit);
   gl_.TexParameteri(target, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_BORDER);
   gl_.TexParameteri(target, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_BORDER);
@@ -591,7 +591,7 @@ void GlRenderer::read(Image &picture) {
   picture.width = width_;
   picture.height = height_;
   picture.rgb.resize(size_t(width_) * height_ * 3);
-  for (size_t y = 0; y < height_; ++y) {  // GL's rows stand on their head
+  for (size_t y = 0; y < height_; ++y) {  // GL's first row is the lowest
     const uint8_t *from = rgba_.data() + (height_ - 1 - y) * width_ * 4;
     uint8_t *to = picture.rgb.data() + y * width_ * 3;
     for (size_t x = 0; x < width_; ++x) std::memcpy(to + 3 * x, from + 4 * x, 3);

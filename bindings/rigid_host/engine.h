@@ -104,7 +104,7 @@ struct Member {
 
 class Engine {
  public:
-  bool in_step = false;           // members may be asked
+  bool in_step = false;           // members may be called
   std::vector<Member *> members;  // of all sets
 
   uint64_t steps = 0, corrections = 0;
@@ -127,7 +127,7 @@ class Engine {
   void push(Member &m, const double *impulse);
   // True: solve again.
   bool commit(Member &m, uint32_t number, dfm_rigid_state *state, double *extra, double h);
-  // states have been put into the engine from outside: the next predict begins anew
+  // states have been put into the engine from outside: the next predict starts again
   void reopen() { open_ = false; }
   bool is_open() const { return open_; }
 

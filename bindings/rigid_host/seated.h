@@ -50,7 +50,7 @@ struct Seated {
   dfm_status after(dfm_status of_step, States &now);
 };
 
-// The dfm_world's time and steps when both worlds agreed last: others tell that it has been restored.
+// The dfm_world's time and steps when both worlds last agreed: other values mean that it has been restored.
 struct Clock {
   double time = 0;
   uint64_t steps = 0;

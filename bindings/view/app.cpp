@@ -24,7 +24,7 @@ std::string folder_of(const Options &options, const std::string &scene) {
   return "out/" + std::filesystem::path(scene).stem().string() + "_view";
 }
 
-// As the off-screen pictures stand: the scene's own camera, or one that holds everything.
+// As for off-screen pictures: the scene's own camera, or one that holds everything.
 render::Camera first_camera(const cli::SceneFile &scene, const render::Scene &picture, double aspect) {
   render::Camera camera = render::auto_camera(picture, aspect);
   if (scene.settings().has_camera)

@@ -64,7 +64,7 @@ class App {
   void load();
   void record();
   void show_state(size_t i);  // of the recording that is shown
-  // Tells the user what the library refuses, in place of ending.
+  // Shows the user what the library refuses, instead of ending.
   void attempt(const std::function<void()> &what);
   bool draw();  // false: the window has no size
   void panels();
@@ -95,7 +95,7 @@ class App {
   bool running_ = false, quit_ = false, help_ = false, show_arrows_ = true, show_plots_ = true,
        show_panels_ = true;
   double speed_ = 1;                // simulated seconds per second
-  double wanted_ = 0;               // s of the scene, where the clock of the window stands
+  double wanted_ = 0;               // s of the scene, by the clock of the window
   double last_ = 0;                 // s, when the last frame began
   double frame_ms_ = 0, real_ = 0;  // smoothed; simulated seconds per second
   uint64_t frames_ = 0;

@@ -113,7 +113,7 @@ void Grip::tell() {
 }
 
 // The spring would swing all bodies six times a second, and the ball moves as lightly as a hundredth of them:
-// it gives way before it crushes what it meets.
+// it yields before it crushes what it meets.
 std::string tools_with_probe(const cli::SceneFile &scene, const render::Bounds &bodies) {
   if (scene.bodies().empty())
     throw cli::Failure(cli::kBadInput, "There is no soft body for a tool to touch.");

@@ -6,7 +6,7 @@
 //                                       in 0.5 s (0.5 by default), and holds it there for 0.2 s (0)
 //   1.0 drag right 640 360 700 300      the same with the right or the middle button
 //   2.0 slider mu:*:* 0.3               sets a slider by its name
-//   2.5 shot a.png                      writes the picture of that frame, after what else is due in it
+//   2.5 shot a.png                      writes the picture of that frame, after all other actions of it
 #pragma once
 #include <string>
 #include <vector>
@@ -31,7 +31,7 @@ class Script {
   Script() = default;
   // Throws cli::Failure: file, line, what was expected.
   explicit Script(const std::string &path);
-  // Inputs of the frame that ends at t, and the sliders and shots that are due.
+  // Inputs of the frame that ends at t, and the sliders and shots of this frame.
   void frame(double t, std::vector<Input> &inputs, std::vector<ScriptLine> &due);
   bool done() const { return next_ == lines_.size() && drags_.empty(); }
   const std::string &path() const { return path_; }

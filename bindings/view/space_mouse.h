@@ -1,4 +1,4 @@
-// A mouse of six degrees of freedom as a device of a tool (dfm_device): Debian's libspnav0, which asks the
+// A mouse of six degrees of freedom as a device of a tool (dfm_device): Debian's libspnav0, a client of the
 // daemon spacenavd, opened at run time.
 #pragma once
 #include <memory>
@@ -20,7 +20,7 @@ class SpaceMouse {
   // From where it leads on, and what its right, up and towards the user are; speed: m/s where it is pushed as
   // far as it goes.
   void lead(const dfm_pose &from, double opening, const render::View &axes, double speed);
-  // read() moves on for the time since it was asked last: DFM_DISCARD where the mouse is let alone. The two
+  // read() moves on for the time since its last call; DFM_DISCARD if the mouse is not touched. The two
   // buttons close and open jaws.
   dfm_device device();
 

@@ -179,7 +179,7 @@ class GlfwWindow final : public Window {
     in.y = y_;
     inputs_.push_back(in);
   }
-  // GLFW's callbacks carry no object that can be asked without GLFW's table; a program has one window.
+  // GLFW's callbacks carry no object that is accessible without GLFW's table; a program has one window.
   static GlfwWindow &of(GLFWwindow *) { return *one_; }
 
   void listen() {

@@ -18,7 +18,7 @@ namespace lanes {
 constexpr uint32_t kLanes = 8;
 
 // A pass over a block. Columns do not overlap, so lanes are independent; the compiler cannot detect that and
-// must be told.
+// needs a pragma.
 #ifdef __clang__
 // a build without optimization does not vectorize, which is no error
 #pragma clang diagnostic ignored "-Wpass-failed"

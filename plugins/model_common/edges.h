@@ -34,7 +34,7 @@ inline void find_rows(const uint32_t *edges, uint32_t nedge, uint32_t npoint, ui
   }
 }
 
-// Numbers of the edges of a cell, where all cells of a mesh ask.
+// Numbers of the edges of a cell, for all cells of a mesh.
 inline void find_edges_by_rows(const uint32_t *edges, const uint32_t *row, const uint32_t *cell,
                                uint32_t *out) {
   for (int n = 0; n < 6; ++n) {

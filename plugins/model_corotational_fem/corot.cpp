@@ -1,6 +1,6 @@
 // org.deform.corotational_fem: linear tetrahedra whose strain is measured in a frame that rotates with each
-// cell. Zerbato 2010, 2.1.2, (2.1)-(2.13), as corrected in doc/models/corotational_fem.md, which derives what
-// stands here.
+// cell. Zerbato 2010, 2.1.2, (2.1)-(2.13), as corrected in doc/models/corotational_fem.md, which derives
+// the equations used here.
 #include <string.h>
 
 #include "../model_common/entry.h"

@@ -81,7 +81,7 @@ struct Body : model::Blocks<Block> {
 
   // In block order.
   Buffer<uint32_t> cell_id;   // [groups,8], kNone for one that fills up
-  Buffer<uint32_t> place_of;  // [ncell] where a cell stands in that order
+  Buffer<uint32_t> place_of;  // [ncell] place of a cell in that order
   Buffer<double> damp, value, damp_value;
   Buffer<Group> group;
   Buffer<SlotGroup> slots;

@@ -20,7 +20,7 @@ struct Group {
   double mu2[kGroup], lambda[kGroup];  // 2 mu V, lambda V; 0 for a cell that fills up
   uint32_t p[kGroup][4];               // local points
 };
-// Where the blocks of a cell stand in the stiffness: its corners by themselves, then its edges in the order
+// Places of the blocks of a cell in the stiffness: its corners by themselves, then its edges in the order
 // of model_common/edges.h.
 struct SlotGroup { uint32_t slot[10][kGroup]; };
 // Transverse isotropy: unit axis at rest and the constants of model_common/material.h times the volume.

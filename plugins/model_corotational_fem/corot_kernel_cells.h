@@ -244,7 +244,7 @@ DEFORM_INLINE void add_fiber_stress(const FiberGroup &g, uint32_t at, const v4 *
   for (int k = 0; k < 6; ++k) s[k] = s[k] + more[k];
 }
 
-// -P g of corner k + 1 of the four cells, added there and handed back.
+// -P g of corner k + 1 of the four cells, added there and returned.
 DEFORM_INLINE void spread(const Block &b, const Four &q, int k, const v4 *stress, v4 *out) {
   const v4 gx = rest4(q, 3 * k), gy = rest4(q, 3 * k + 1), gz = rest4(q, 3 * k + 2);
   for (int i = 0; i < 3; ++i)

@@ -3,7 +3,7 @@
 // at the corners come of the displacement gradient H alone, so the largest quotient
 //   u.K_e u / u.u,   u.K_e u = V (lambda (tr H)^2 + 2 mu sym H : sym H),
 // is at the displacements of least u.u for their H, and that is tr(H A^-1 H^T), A = sum g_a g_a^T. Along the
-// axes of A, with eigenvalues a_i, each pair of shears stands alone, and the three stretches:
+// axes of A, with eigenvalues a_i, each pair of shears is independent, and so are the three stretches:
 //   kappa_e = V max( mu (a_i + a_j),  largest eigenvalue of [ lambda sqrt(a_i a_j) + 2 mu a_i delta_ij ] ).
 #include <algorithm>
 #include <cmath>

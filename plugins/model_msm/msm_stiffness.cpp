@@ -9,8 +9,8 @@
 // thick) they soften, where it has few they stiffen. It is the multiplicative algorithm for D-optimal designs
 // (Silvey, Titterington, Torsney 1978), whose fixed point has the
 // largest det C, and that is an isotropic C whenever one can be had (log det is concave). At that point m.S m
-// is 1 for each spring that keeps stiffness and less for the others (Kiefer, Wolfowitz 1960), which tells
-// when to stop. The weighted mean of the factor is 1, it is positive, turns with the body, and is 1 for a
+// is 1 for each spring that keeps stiffness and less for the others (Kiefer, Wolfowitz 1960), so
+// steps end there. The weighted mean of the factor is 1, it is positive, turns with the body, and is 1 for a
 // single cell and for an even spread of directions.
 // C belongs to the whole body: where nearly all edges lie in a plane or along a line, the few that do not (a
 // knob on a sheet) would take all that the rest lacks, a hundred times their stiffness and more. So the

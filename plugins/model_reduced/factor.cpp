@@ -26,7 +26,7 @@ bool Factor::ask_host(const dfm_host *host, const std::vector<uint32_t> &ij, con
   return true;
 }
 
-// The first [nrhs,n,3] of wide_, whose answers stand behind the room for kLanes of them.
+// The first [nrhs,n,3] of wide_, whose results are stored behind the room for kLanes of them.
 void Factor::solve_by_host(uint32_t nrhs) const {
   double *const b = wide_.data();
   if (direct_->solver->solve(self_, nrhs, b, b + kLanes * 3 * size_t(n_), 0) != DFM_OK)

@@ -12,7 +12,7 @@
 namespace reduced {
 namespace {
 
-// Below this share of the largest value a pair is one of C's kernel. Relative residual asked.
+// Below this share of the largest value a pair is one of C's kernel. Relative residual required.
 constexpr double kKernel = 1e-13, kAccuracy = 1e-13;
 constexpr double kNothing = 1e-10;  // of a vector that was left beside those before
 constexpr size_t kLook = 3;         // blocks between two looks at what has converged

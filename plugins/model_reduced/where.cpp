@@ -232,7 +232,7 @@ void Body::couple_rest() {
 // The velocity beside the center's is w_i = s x r_i + sum W_ik q'_k, found as the nearest by mass. With
 // C = sum m r x W, not zero where the body is deformed:  I s + C q' = L,  C^T s + q' = W^T M w.
 // C has to be that of all displacements: what it leaves out of C^T s is taken for rates of the modes, and
-// what it leaves out of C q' for spin, in each step anew, however short: energy without bound.
+// what it leaves out of C q' for spin, again in each step, however short: energy without bound.
 void Body::find_spin() {
   const uint32_t count = modes_.count;
   double left[9], right[3], inverted[9];

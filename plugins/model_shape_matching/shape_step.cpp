@@ -23,7 +23,7 @@ constexpr double kCrushed = 0.1;
 // mass times size squared: its arms are above rounding.
 constexpr double kTurned = 1e-13, kPoint = 1e-11;
 
-// Of (w h)^2 where clusters share a deviation: what any step stands (doc/models/shape_matching.md).
+// Of (w h)^2 where clusters share a deviation: the largest stable value (doc/models/shape_matching.md).
 constexpr double kMostLed = 4;
 
 double determinant(const double *a) {
@@ -131,7 +131,7 @@ Rates Body::rates_of(double h) const {
           dfm_exp(-params[kDampingMass] * h)};
 }
 
-// Clusters that move against each other are as stiff as asked while (w h)^2 is at most kMostLed.
+// Clusters that move against each other are as stiff as requested while (w h)^2 is at most kMostLed.
 void Body::tell_softened(double h) {
   const double longest = std::sqrt(kMostLed) * params[kReferenceStep] / -dfm_log(1 - params[kStiffness]);
   if (told_softened || ncluster == 1 || h <= longest) return;

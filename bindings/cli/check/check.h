@@ -33,14 +33,14 @@ struct Subject {
   Plugin *plugin = nullptr;
   const dfm_type *type = nullptr;
   uint32_t index = 0;   // of the type in the file
-  std::string command;  // this program, for rules that ask a second process
+  std::string command;  // this program, for rules that start a second process
   double limit = 10;    // s of processor time that the rule may take
 };
 
 struct Rule {
   const char *id, *title;
   bool by_type;  // runs once for each type, else once for the file
-  // null: not asked of that kind of type
+  // null: does not apply to that kind of type
   std::string (*law)(const Subject &);  // also what runs for the file
   std::string (*model)(const Subject &);
   std::string (*solver)(const Subject &);

@@ -8,7 +8,7 @@
 
 namespace cli::check {
 
-// Stands around every call into the plugin. What the call leaves changed in the floating-point environment is
+// Encloses every call into the plugin. What the call leaves changed in the floating-point environment is
 // noted, for V11, and put back, so that no other rule judges what it has spoilt.
 class Kept {
  public:

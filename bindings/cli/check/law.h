@@ -60,7 +60,7 @@ struct Lanes {
   std::vector<double> memory_;
 };
 
-// How large things are for this law, found by asking it. Rigs press with fn on 1 m2, their mass weighs fn.
+// Typical magnitudes of this law, found by evaluating it. Rigs press with fn on 1 m2, their mass weighs fn.
 struct Scales {
   double fn = 1;         // N
   double level = 0;      // N, largest force at rest, or the force at 1 m/s of a law that has none

@@ -42,7 +42,7 @@ enum class Held { nothing, one_side };
 Solid block(uint32_t x, uint32_t y, uint32_t z, Held held = Held::nothing);
 Solid small_block(Held held = Held::nothing);  // 48 points: arrays of 64-byte lines at every stride
 
-// Parameters that rules are asked with: the defaults, the defaults with damping, each word of each
+// Parameters with which rules are checked: the defaults, the defaults with damping, each word of each
 // enumeration. What create refuses is left out.
 struct Variant {
   std::string name;  // "the defaults", "energy = stvk"
@@ -117,14 +117,14 @@ class Body {
   std::string why_;
 };
 
-// Of a rule that asks several variants: named in its sentences.
+// Of a rule that checks several variants: named in its messages.
 std::string with(const Variant &variant);
 double length(const double *a);
 double largest(const Numbers &f);
 // Does Cholesky's factorization of shift I - m, [width,width], exist? Only half of m is read.
 bool below(const std::vector<double> &m, size_t width, double shift);
 
-// Asks a rule for each variant; what it says where all keep it.
+// Checks a rule for each variant; the result of a rule that all of them keep.
 template <class F>
 std::string for_variants(const Subject &subject, const F &rule) {
   const std::vector<Variant> all = variants(subject);

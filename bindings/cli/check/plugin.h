@@ -25,7 +25,7 @@ class Host {
   // How parallel_for cuts its work: by grains in order, not at all, by some grains in another order.
   enum class Cut { grains, whole, shuffled } cut = Cut::grains;
   std::atomic<uint64_t> parallel_calls{0};
-  bool parallel_in_watch = false;  // a model's step may hand out work; eval may not
+  bool parallel_in_watch = false;  // a model's step may use threads; eval may not
 
  private:
   dfm_host table_{};
@@ -40,7 +40,7 @@ class Plugin {
   ~Plugin();
   Plugin(const Plugin &) = delete;
   Plugin &operator=(const Plugin &) = delete;
-  // shutdown and unload; the host can still be asked what it lent
+  // shutdown and unload; the host still knows what it lent
   void close();
   Host &host() { return host_; }
   void *image() const { return image_; }

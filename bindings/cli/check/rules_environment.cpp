@@ -11,7 +11,7 @@
 namespace cli::check {
 namespace {
 
-// All that a world asks of a law, a NaN included: the way out of trouble counts too.
+// All calls of a law that a world makes, a NaN included: the way out of trouble counts too.
 void use(const Subject &subject) {
   refusal(law_of(subject), default_params(*subject.type));
   const Law law(subject, lively_params(subject));

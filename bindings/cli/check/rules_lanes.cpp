@@ -87,7 +87,7 @@ std::string same_bits(const Subject &subject) {
   const Law law(subject, lively_params(subject)), plain(subject, default_params(*subject.type));
   const Scales scales = scales_of(law);
   Random random(subject.seed);
-  // One batch is asked again after others with another step, other parameters and other inputs came between.
+  // One batch is evaluated again after others with another step, other parameters and other inputs.
   Lanes first(law, 200), between(plain, 33);
   settle(first, scales, random, kSteps[0]);
   settle(between, scales, random, kSteps[1]);

@@ -13,7 +13,7 @@
 namespace cli::check {
 namespace {
 
-// What a step of a world asks of a body, with the arrays for it: nothing is allocated between the calls.
+// The calls that a step of a world makes for a body, with their arrays: nothing is allocated between calls.
 class StepCalls {
  public:
   explicit StepCalls(Body &body)

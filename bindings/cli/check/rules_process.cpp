@@ -35,7 +35,7 @@ namespace cli::check {
 namespace {
 
 // Lanes of every kind: at rest and sliding, open and pressed, with states that grow as the batch
-// is asked again.
+// is evaluated again.
 void vary(Lanes &b, Random &random, double scale) {
   for (uint32_t i = 0; i < b.n; ++i) {
     const double w = i % 5 == 0 ? 0 : scale * random.logarithmic(1e-6, 10);
@@ -88,7 +88,7 @@ std::string eval_keeps_to_itself(const Subject &subject) {
 
 namespace {
 
-// A batch whose every array stands between fences. Filled from ordinary lanes, so that all else is equal.
+// A batch each of whose arrays lies between fences. Filled from ordinary lanes, so that all else is equal.
 class FencedBatch {
  public:
   FencedBatch(const Law &law, Lanes &lanes, Fenced::Place place)

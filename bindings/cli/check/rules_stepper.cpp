@@ -420,7 +420,7 @@ std::string cut_does_not_matter(const Subject &subject) {
   Host &host = subject.plugin->host();
   const Variant defaults = variants(subject).front();
   const bool forces = model_of(subject).add_forces != nullptr;
-  // large enough that work is handed out
+  // large enough that threads get work
   const Solid solid = forces ? block(12, 12, 12) : small_block();
   const auto answers = [&](Host::Cut cut) {
     host.cut = cut;

@@ -38,7 +38,7 @@ bool waits(pid_t child) {
   if (fd >= 0) close(fd);
   if (n <= 0) return false;
   line[n] = 0;
-  // the name of the program, which stands before it, may hold anything
+  // the name of the program comes before it and may contain anything
   const char *after = std::strrchr(line, ')');
   return after && after[1] == ' ' && after[2] == 'S';
 }

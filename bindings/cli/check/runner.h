@@ -16,7 +16,7 @@ struct Limits { double seconds = 10, still = 5; };
 // What a rule is about to do: named where its process ends without an answer.
 void stage(const char *format, ...) __attribute__((format(printf, 1, 2)));
 
-// The child's side: where stages and the verdict go; -1: this process is the one that was asked.
+// The child's side: where stages and the verdict go; -1: this process is not a child.
 void report_to(int descriptor);
 // Writes a failed verdict and ends the process: for signal handlers, so it formats nothing.
 [[noreturn]] void fail_now(const char *sentence);

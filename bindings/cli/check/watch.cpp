@@ -134,7 +134,7 @@ Watch::Watch() {
   }
 }
 
-// A lazily bound entry changes when it is first used, so what stands there is taken anew each time.
+// A lazily bound entry changes when it is first used, so its value is read again each time.
 void Watch::exchange(bool ours) {
   active = ours;
   for (Slot &slot : slots_) {

@@ -1,6 +1,6 @@
 // Catches what eval must not do: calls of the C library that allocate, open, print or read the environment,
 // and touches of memory outside the arrays. Calls are caught by exchanging addresses: every function that a
-// loaded object calls in another one stands in that object's table of addresses (global offset table), so
+// loaded object calls in another one is in that object's table of addresses (global offset table), so
 // while eval runs, the entries of those names, in the plugin and in every library under it, point to ours.
 // Nothing is forwarded: the first such call ends eval by a jump back to the rule. Not seen: bare system calls
 // in machine code, the variable `environ`, and a C library linked into the plugin.

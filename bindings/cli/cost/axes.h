@@ -8,7 +8,7 @@
 
 namespace cli::cost {
 
-// One choice and the axes that it stands on. One that differs from the scene in one thing stands on an
+// One choice and the axes that it is on. One that differs from the scene in one thing is on an
 // axis; "front": in several, to look for cheaper ways.
 struct Candidate {
   Knobs knobs;

@@ -85,7 +85,7 @@ class Chart {
     return kInks[found->second % std::size(kInks)];
   }
 
-  // What the reference cannot tell apart.
+  // What the reference cannot distinguish.
   void band() {
     if (!(t_.reference_headline > 0)) return;
     const double top = y_.at(t_.reference_headline);

@@ -17,7 +17,7 @@ struct Knobs {
 
 using Settings = std::vector<std::pair<std::string, std::string>>;  // pointer, JSON text
 
-// Surfaces of bodies that are filled anew, where the scene gives cells in a file: by body, "" elsewhere.
+// Surfaces of bodies that are filled again, if the scene gives cells in a file: by body, "" elsewhere.
 using Surfaces = std::vector<std::string>;
 
 Settings settings_of(const Subject &subject, const Surfaces &surfaces, const Knobs &knobs);

@@ -6,7 +6,7 @@
 
 namespace cli::cost {
 
-// Lists stand in it whole, because a merge patch cannot change a part of one. Null: nothing is chosen.
+// It contains whole lists, because a merge patch cannot change a part of one. Null: nothing is chosen.
 JsonValue scene_patch(const Subject &subject, const Study &study);
 // Writes the scene with the pick's changes to `path`. Files keep their places: names are made relative to
 // the new scene's folder, and surfaces that the study has written are copied beside it.

@@ -24,7 +24,7 @@ struct Limit {
 // correction: three figures of one number meet in any order, and the grid convergence index of three meshes
 // is 1.25 times the correction (Roache 1994).
 //
-// Else the finest run stands. Where p is less, 1.25 times the correction with that p is error and bound.
+// Else the finest run is the limit. If p is less, 1.25 times the correction with that p is error and bound.
 // Where there is no p, the error is an estimate, as if the finest converged in first order: from its distance
 // to each of the others, the larger. Then the bound is three times the largest distance of any two (Eca and
 // Hoekstra 2014), if differences fall from coarse to fine as those of a method with p > 0 do; two meshes, and

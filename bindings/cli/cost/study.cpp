@@ -195,8 +195,8 @@ class Student {
     }
   }
 
-  // Whether the row computes what the scene asks for in another way. Another law, self contact and guard ask
-  // for something else: what they change is shown, and they are not chosen.
+  // Whether the row computes what the scene asks for in another way. Another law, self contact and guard are
+  // other physics: what they change is shown, and they are not chosen.
   bool same_physics(int row) const {
     const Knobs &k = out_.rows[size_t(row)].candidate.knobs;
     return k.law.empty() && k.self.empty() && k.guard.empty();

@@ -101,8 +101,8 @@ void find_ends(dfm_body body, const JsonValue *pose, SubjectBody &out) {
   }
 }
 
-// A scene with an accuracy or a budget is studied as the planner has made it: beside a wish every change
-// would be planned anew.
+// A scene with an accuracy or a budget is studied with the planner's choice fixed: with the request in
+// place, every change would be planned again.
 void fix_plan(const SceneFile &scene, Subject &out) {
   for (const char *const wish : {"accuracy", "budget"}) {
     if (!out.find(std::string("/") + wish)) continue;

@@ -77,7 +77,7 @@ class Advance {
   }
 
   // f falls monotonically (times sign) from clear at lo to not clear at hi: a time before the crossing, as
-  // near to it as values can tell.
+  // near to it as values allow.
   double last_clear(double sign, double lo, double hi) {
     const Poly slope = c_.f.derivative();
     const double aim = clear_ + 0.5 * c_.error, enough = clear_ + c_.error;

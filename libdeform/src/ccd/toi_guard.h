@@ -113,7 +113,7 @@ struct GuardBlocks {
   std::vector<Array<uint32_t>> near;  // by piece
 };
 
-// The candidates that may come to the floor, ascending: all that the other functions need to be asked about.
+// The candidates that may come to the floor, ascending: the other functions need no others.
 // Nearly all of a list ends at the first comparison (way + travel < rest), nearly all others at a plane that
 // keeps the two features apart at the start and at the end. memory follows the list.
 //   blocks, tasks   the same for work on several threads; null: none. Throws std::bad_alloc where a block

@@ -37,7 +37,7 @@ ToiHit surfel_touch(const ObstacleShape &shape, Vec3 from, Vec3 way, double dist
   return {t, {1, 0, 0}, 0};
 }
 
-// Whether an edge or a triangle reaches into a box as it stands at the start: no axis separates the two.
+// Whether an edge or a triangle reaches into a box in its pose at the start: no axis separates the two.
 bool reaches_in(const ObstacleShape &box, std::span<const dfm_motion> corners) {
   const Vec3 half = box.view().half_size;
   const size_t n = corners.size();
@@ -166,7 +166,7 @@ class Judge {
   }
 
   GuardScene &scene_;
-  std::optional<ObstacleFrame> frame_;  // of the obstacle that was asked about last
+  std::optional<ObstacleFrame> frame_;  // of the obstacle of the last query
   uint32_t slot_ = kNone;
   double least_ = 1;
   Array<GuardHit> &out_;

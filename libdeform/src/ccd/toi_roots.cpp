@@ -99,7 +99,7 @@ class Roots {
     return n;
   }
 
-  // Roots of p in (0,1], and the places where it comes as near to zero as rounding can tell without
+  // Roots of p in (0,1], and the places where it comes as near to zero as rounding can show without
   // changing its sign.
   void add_roots(const Poly &p, double error) {
     double least, largest;
@@ -148,8 +148,8 @@ class Roots {
     return false;
   }
 
-  // Nearly every query. The cubic is monotonic between its turns, so its roots come in order: each is asked
-  // at once, and one after a touch is never looked for, nor one in a piece in which the corners stay on one
+  // Nearly every query. The cubic is monotonic between its turns, so its roots come in order: each is tested
+  // at once, and one after a touch is never searched, nor one in a piece in which the corners stay on one
   // side. False where a root is not certain: those are sharpened and sorted first.
   bool in_order() {
     const Poly &p = plane_.f;

@@ -15,7 +15,7 @@ constexpr uint32_t kMostPasses = 100;
 // reduces the residual.
 constexpr double kNothingMoves = 1e-10;
 
-// Of w l: a drag that is slower than this through the material sticks, a faster one takes what work is due.
+// Of w l: a drag slower than this through the material sticks, a faster one does the work that is left.
 constexpr double kSlips = 1e-9;
 
 // f(number in the part, row)
@@ -26,7 +26,7 @@ void each_bond(const RowsPart &part, F &&f) {
 }
 
 // The impulse of a drag along its way, at the impulses that the others have. One unknown, it is found
-// in closed form: what stops the edge, the limit, or what takes the work that is due,
+// in closed form: what stops the edge, the limit, or what does the work that is left (due),
 //
 //     l (s - w l) = due with the speed s without it,   l = 2 due / (s + sqrt(s^2 - 4 w due))
 double drag_of(const ContactRows &rows, uint32_t row) {

@@ -38,7 +38,7 @@ static inline double given(double l, const double *yields) {
 // parallel; without that part passes over the laws are no Newton steps and may go round
 // (doc/decisions/0406-slopes-of-laws-are-not-symmetric.md). The law's limit is kept: an elastic bristle that
 // breaks away then slides on the cone at once instead of overshooting it. A contact that stuck when its law
-// was asked is kept inside the limit in proportion to the normal impulse. One that slid is kept inside what
+// was evaluated is kept inside the limit in proportion to the normal impulse; one that slid, inside what
 // the limit can be at all: limit(fn) is concave (a cone and a bounded part), so never above limit max(1, ln /
 // (h fn)). Without that the sweeps can run away. Where fn is small dft_dfn is steep, by mu^2 sigma1/(4 sigma0
 // h) with micro-damping, and holds for a hair's breadth alone; each sweep then answers a normal impulse with

@@ -7,8 +7,8 @@
 // else changes (doc/decisions/0225).
 //
 // The proximal point method takes the same way in long strides (Rockafellar 1976). With l0 the impulses so
-// far, it solves the contact problem in which each contact gives way to its change of impulse by 1/rho beside
-// what the bodies do,
+// far, it solves the contact problem in which each contact is compliant to its change of impulse by 1/rho, in
+// addition to the response of the bodies,
 //     l = P(l0 - rho (u(l) + b)),       P: laws of normal contact and friction,
 // and begins again from there; its fixed points are those of the sweeps. Where rho is 1000 / w a stride is
 // worth about as many sweeps. Each is found by Newton's method in the r rates z of the motions alone,

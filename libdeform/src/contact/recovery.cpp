@@ -11,7 +11,7 @@ namespace {
 // Of a contact that opens alone: what contacts of one stack need together is a few times the sum of theirs.
 constexpr double kAllowed = 10;
 
-// m/s, the opening that is left after what the contact gives way under its load.
+// m/s, the opening that is left after the compliance of the contact under its load.
 double opening(const ContactRows &rows, uint32_t i) {
   return -(rows.rate[i] + given(rows.impulse[size_t(i) * 3], &rows.yields[size_t(i) * 2]));
 }

@@ -157,8 +157,8 @@ void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const 
       dof.push_back(d);
       weight.push_back(w);
     };
-    // The same by a table, for rows that are long. What it holds of other contacts is told by the
-    // row's own columns.
+    // The same by a table, for rows that are long. What it holds of other contacts follows from
+    // the row's own columns.
     auto add_far = [&](uint32_t d, double w) {
       if (d >= place_.size()) place_.resize(d + 1);
       const uint32_t at = place_[d];

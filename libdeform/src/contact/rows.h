@@ -32,7 +32,7 @@ struct DofSource {
   // [npoint,4] 1/kg, Dynamics::diagonal(); null: surfels are the unknowns
   const double *diagonal = nullptr;
   const double *velocity = nullptr;  // without contact: [npoint,4] or, of surfels, surface->v
-  // [npoint,4] m, where phyxels stand, of a surface whose surfels are set back from them; else null
+  // [npoint,4] m, positions of phyxels, of a surface whose surfels are set back from them; else null
   const double *place = nullptr;
 };
 
@@ -76,7 +76,7 @@ struct ContactRows {
   Array<double> frame;
   Array<double> drive;  // [all,3] obstacle velocity in the frame
   Array<double> rate;   // [n] m/s: gap / h; a depth 0.2 gap / h, at least -0.1 d_c / h
-  // [n,2] Of a contact that gives way under its load l (ContactPoint::give): the softness c, 1/kg, and the
+  // [n,2] Of a contact that is compliant under its load l (ContactPoint::give): the softness c, 1/kg, and the
   // largest effect m, m/s, of min(c l, m), which is added to u_n + rate. 0, 0 for all others.
   Array<double> yields;
   Array<double> wn, wt;  // [all] 1/kg: W_nn; largest eigenvalue of W_tt, of a bond the larger of W_yy, W_zz
@@ -163,7 +163,7 @@ struct ContactRows {
  private:
   // this sub-step's dof of a phyxel, of a surfel of a self-stepping body; kNone
   Array<uint32_t> dof_of_point_, dof_of_node_;
-  // where a dof of a coupled surface stands in the row being made
+  // the place of a dof of a coupled surface in the row being made
   Array<uint32_t> place_;
   Array<uint32_t> dof_of_group_;  // first dof of a rigid group
   const DenseKernels &kernels_;

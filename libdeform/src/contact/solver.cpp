@@ -28,7 +28,7 @@ void set_trial(const ContactRows &rows, const RowsPart &part, double h, const do
   each_row(part.contacts, [&](uint32_t i) {
     const Vec3 u = rows.velocity(i);
     const double *const l = &rows.impulse[size_t(i) * 3];
-    // A contact without impulse is asked at the normal force that would close it alone, and never below what
+    // The law of a contact without impulse gets the normal force that would close it, at least the one that
     // changes its velocity by 1e-6 m/s: its law's limit per normal force must be known, or a contact that
     // opens and closes would lose its friction in every other pass.
     s.fn[i] =
@@ -227,7 +227,7 @@ double tangent_residual(const ContactRows &rows, uint32_t i, Pair law) {
   return rows.wt[i] * std::sqrt(a * a + b * b);
 }
 
-// What the laws, asked at the present state, want contact i to carry. They are compared by the answer they
+// The force of contact i by its law at the present state. They are compared by the answer they
 // give together with the contact's own response, not by the bare force: the difference is then the velocity
 // that is left to correct. Where a set-valued law just slips, force and slip may differ in direction by much
 // while that is tiny; a smooth law with a steep slope c would count it 1 + h w_t c times.
@@ -304,7 +304,7 @@ Residual inner_residual(const ContactRows &rows, const ContactState &law, double
   });
 }
 
-// What a law says at the state in which it was asked, the sweeps make of it there.
+// At the state at which a law was evaluated, the sweeps have its value.
 Residual true_residual(const ContactRows &rows, const RowsPart &part, const ContactState &answer, double h,
                        const Tolerance &tolerance) {
   return inner_residual(rows, part, answer, h, tolerance);

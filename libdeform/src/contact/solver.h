@@ -1,5 +1,5 @@
 // Normal contact and friction of one sub-step: inner sweeps of block Gauss-Seidel on the laws as they were
-// linearized by the last outer pass. The outer loop (which asks the laws) is step/solve.cpp; the mathematics
+// linearized by the last outer pass. The outer loop, over the laws, is step/solve.cpp; the mathematics
 // is doc/concepts/contact.md.
 #pragma once
 #include "contact/contact_state.h"
@@ -27,8 +27,8 @@ void sweep(ContactRows &rows, const RowsPart &part, const ContactState &law, dou
 // contacts are nearly redundant (vertex-face beside edge-edge, two bodies' grids on each other) it converges
 // linearly and slowly. With f = G(lambda) - lambda of the last few sweeps, the next iterate is the
 // combination of their results whose f would be least, in the metric of the operator's diagonal; once the
-// active set stands this is GMRES on the linear system. The state that is used is always one that a plain
-// sweep has left.
+// active set is constant this is GMRES on the linear system. The state that is used is always one that a
+// plain sweep has left.
 class Acceleration {
  public:
   explicit Acceleration(const Memory &memory);
@@ -50,7 +50,7 @@ class Acceleration {
 
 // Momentum of the sweeps (Nesterov 1983), for what moves by the same step in every sweep: Anderson's method
 // sees no difference there that it could use. The next sweep starts beyond the last result, by (k - 1) / (k +
-// 2) of the last step; k starts anew where the sweep turns back (O'Donoghue and Candes 2015, section 3.2).
+// 2) of the last step; k restarts where the sweep turns back (O'Donoghue and Candes 2015, section 3.2).
 class Momentum {
  public:
   explicit Momentum(const Memory &memory);
@@ -80,7 +80,7 @@ Residual inner_residual(const ContactRows &rows, const RowsPart &part, const Con
 // the same of some contacts
 Residual inner_residual(const ContactRows &rows, const ContactState &law, double h,
                         const Tolerance &tolerance, std::span<const uint32_t> contacts);
-// laws asked at this state
+// with the laws evaluated at this state
 Residual true_residual(const ContactRows &rows, const RowsPart &part, const ContactState &answer, double h,
                        const Tolerance &tolerance);
 // of parts together

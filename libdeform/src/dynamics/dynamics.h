@@ -8,9 +8,9 @@
 //   take_contact  contacts are known: is the free motion one that goes with them?
 //   diagonal      what an impulse changes of that velocity, where points do not answer each other's impulses;
 //   response      else, between the touched surfels
-//   revise        the impulses of a solve are known: where both of these are not what they were taken for
-//                 there, they are found anew, and the solve goes on
-//   end_state     where it ends with the impulses that the solve has found; asked again after a further solve
+//   revise        the impulses of a solve are known: where both of these are not what they were assumed to
+//                 be there, they are computed again, and the solve continues
+//   end_state     where it ends with the impulses of the solve; called again after a further solve
 //   commit        the end becomes the present
 //
 // Why contact sees no more of a body: doc/decisions/0085-body-dynamics.md.

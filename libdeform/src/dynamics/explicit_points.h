@@ -32,8 +32,8 @@ class ExplicitPoints : public Dynamics {
   const Array<uint32_t> &edges_;
   const PointsKernels &loops_;
   Array<double> stiffness_, damping_;  // [npoint] row sums: N/m, N s/m
-  // The end is the free motion but for the few points that contact reaches: it stands in v_free, and what
-  // these had there before is kept.
+  // The end is the free motion but for the few points that contact reaches: it is stored in v_free, and the
+  // former values of these points are kept.
   bool ways_known_ = false;  // x_end follows from v_free
   bool in_place_ = false;
   Array<size_t> reached_;  // places in v_free

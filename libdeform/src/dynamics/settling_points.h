@@ -1,6 +1,6 @@
 // Points on their way to an equilibrium with contact, in steps of backward Euler from rest:
 //
-//   f(x) + loads + M g + contact = (M / h^2 + S) (x - x0)        S: of loads that give way, N/m
+//   f(x) + loads + M g + contact = (M / h^2 + S) (x - x0)        S: of compliant loads, N/m
 //
 // which is the condition of equilibrium once x stops changing. M / h^2 decides the length of a step, not
 // where steps end; it bounds the motion of bodies that nothing holds (the proximal point method, Rockafellar

@@ -59,7 +59,7 @@ class LawBatches {
   // Called only if the solve continues, because they cost three more evaluations. Slopes of an earlier pass
   // are kept if they have predicted the change of the force.
   const LawInstance *slopes(double h, ContactState &state);
-  // The same, but a smooth law is asked where the contact would come to rest alone
+  // The same, but a smooth law is evaluated where the contact would come to rest alone
   // (friction/local_solve.cpp): state.vt moves there.
   //   wt     [n] 1/kg, how much slip an impulse makes at its own contact; with it ft_stop gives the slip
   //          that others leave

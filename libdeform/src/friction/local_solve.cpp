@@ -2,14 +2,14 @@
 //
 // Seen from one contact, with what all others do held still, slip and friction force lie on the line v = m (f
 // - f_stop), m = h w_t; the law is a monotone curve f = ft(v), and the contact's answer is where they cross.
-// Newton on all contacts together asks the law at the present slip v instead and takes its tangent there.
+// Newton on all contacts together evaluates the law at the present slip v and takes its tangent there.
 // That works while the line is steeper than the curve; a stiff bristle is the other way round:
 //
-//      f |   line               a law saturates within a slip of R / (h sigma0 A). Asked at a slip beyond it
-//        | \    ________ law    says "R, whatever the slip", and the solve reverses the slip by m R; asked
-//        |  \ /                 there it says "-R", and so on: stick and slip take turns for ever once
+//      f |   line               a law saturates within a slip of R / (h sigma0 A). Evaluated at a slip beyond
+//        | \    ________ law    it the law is R, whatever the slip, and the solve reverses the slip by m R;
+//        |  \ /                 there the law is -R, and so on: stick and slip alternate without end once
 //        |   x                  h m sigma0 A > 2, at any accuracy of the sweeps.
-//        |__/_\_________ v      Asked at the crossing x, the answer as a function of f_stop is the resolvent
+//        |__/_\_________ v      Evaluated at the crossing x, it is as a function of f_stop the resolvent
 //        | /   \                of a monotone map: it never moves further than f_stop does (Rockafellar
 //          zero  v now          1976, prop. 1), as the projection of a set-valued law; and it has a slope
 //                               there which the passes use. Passes are then the semi-smooth Newton method

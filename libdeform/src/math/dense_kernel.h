@@ -6,7 +6,7 @@
 
 namespace dfm {
 
-constexpr uint32_t kLanes = 8;        // right-hand sides that stand beside each other
+constexpr uint32_t kLanes = 8;        // right-hand sides that are stored beside each other
 constexpr uint32_t kTileColumns = 4;  // columns of C that an update takes at a time
 constexpr uint32_t kTileRows = 16;    // rows: the most that any width takes at a time
 

@@ -14,7 +14,7 @@ namespace {
 // Multiplications of dense panels in the time of one of a triangular solve, which waits for memory.
 constexpr double kDense = 6;
 
-// Pivots below this share of the diagonal are rounding: the matrix is singular as far as doubles tell.
+// Pivots below this share of the diagonal are rounding: the matrix is singular in double precision.
 constexpr double kPivot = 64 * std::numeric_limits<double>::epsilon();
 constexpr uint32_t kBlock = 24;         // columns of a panel that are factored at a time
 constexpr uint32_t kChunk = 96;         // columns that one pass over an update takes

@@ -193,7 +193,7 @@ class Cursor {
     skip_space();
     return offset();
   }
-  bool continues() const {  // at a backslash that stands before the line's end
+  bool continues() const {  // at a backslash just before the line's end
     return *p_ == '\\' && end_ - p_ > 1 &&
            (p_[1] == '\n' || (p_[1] == '\r' && end_ - p_ > 2 && p_[2] == '\n'));
   }

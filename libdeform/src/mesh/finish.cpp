@@ -15,7 +15,7 @@
 namespace dfm {
 namespace {
 
-// rounding of coordinates over the shortest edge, from which a warning is due
+// rounding of coordinates over the shortest edge, from which on there is a warning
 constexpr double kCoarseCoordinates = 1e-8;
 
 struct CellShape { double volume6, edge_max, reach; };  // reach: largest coordinate

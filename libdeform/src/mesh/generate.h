@@ -52,7 +52,7 @@ Vec3 on_annulus(double inner, double outer, uint32_t k, uint32_t rings, uint32_t
 
 void add_point(TetMesh &mesh, Vec3 p);
 void add_tet(TetMesh &mesh, uint32_t a, uint32_t b, uint32_t c, uint32_t d);  // turned to positive volume
-// without groups, points numbered as they stand
+// without groups, points numbered in their order
 TetMesh finished(TetMesh mesh);
 
 // The icosahedron on the unit sphere.

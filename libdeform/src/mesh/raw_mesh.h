@@ -30,7 +30,7 @@ struct RawMesh {
   Array<uint32_t> tris;           // polygons are cut into triangles by the readers
   Array<uint32_t> tri_group;      // index into groups, kNoGroup without
   std::vector<MeshGroup> groups;  // points: of elements below dimension 3 only, in file order, with repeats
-  std::vector<std::string> warnings;  // one sentence each, to stand before those of repair
+  std::vector<std::string> warnings;  // one sentence each, printed before those of repair
   uint32_t npoint() const { return static_cast<uint32_t>(points.size() / 3); }
   uint32_t ntri() const { return static_cast<uint32_t>(tris.size() / 3); }
   uint32_t ntet() const { return static_cast<uint32_t>(tets.size() / 4); }
@@ -46,7 +46,7 @@ struct RawMesh {
   void add_polygon(const Cursor &at, const uint32_t *corners, size_t n, uint32_t in_group);
   // Triangles (i, i+1, i+2), every second one turned.
   void add_strip(const Cursor &at, const uint32_t *corners, size_t n, uint32_t in_group);
-  // Room for n more: readers that know a sound count ask once, and no array is grown by copying.
+  // Room for n more: readers that know a valid count call it once, and no array is grown by copying.
   void expect_tets(size_t n);
 
  private:

@@ -151,7 +151,7 @@ const Format &choose(const std::string &path, std::string_view bytes, RawMesh &r
   return *found;
 }
 
-// Warnings of the reader stand before those of the repair.
+// Warnings of the reader come before those of the repair.
 template <class Mesh>
 Mesh finish_with_warnings(Mesh (*finish)(const std::string &, RawMesh &&), const std::string &path,
                           RawMesh &&raw) {

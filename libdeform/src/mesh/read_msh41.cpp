@@ -1,4 +1,4 @@
-// MSH 4.1, ASCII and binary: nodes and elements in blocks, one per entity of the geometry; $Entities tells
+// MSH 4.1, ASCII and binary: nodes and elements in blocks, one per entity of the geometry; $Entities has
 // the physical groups of each. Counts and numbers are size_t of the writing machine (data size 8 or 4),
 // entity and type numbers are int.
 #include <algorithm>

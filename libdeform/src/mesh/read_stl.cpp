@@ -54,7 +54,7 @@ class StlReader {
     out_.tris.reserve(3 * n);
     out_.tri_group.reserve(n);
     for (uint64_t t = 0; t < n; ++t) {
-      in_.skip(12, "a triangle's normal");  // the corners tell it
+      in_.skip(12, "a triangle's normal");  // follows from the corners
       double x[3];
       for (int k = 0; k < 3; ++k) {
         for (double &c : x) c = in_.binary_real<float>("a corner's coordinate");
@@ -93,7 +93,7 @@ class StlReader {
         group_ = out_.named_group(in_, 2, name);
         fresh = false;
       }
-      in_.line();  // the normal: the corners tell it, and some files have none to tell
+      in_.line();  // the normal: follows from the corners, and some files have none
       keyword("outer", "a facet's normal");
       keyword("loop", "'outer'");
       for (int k = 0; k < 3; ++k) {

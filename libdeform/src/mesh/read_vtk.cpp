@@ -185,7 +185,7 @@ class VtkReader {
     return uint32_t(p);
   }
 
-  // Appends to the cells; type 0: CELL_TYPES will tell.
+  // Appends to the cells; type 0: given later by CELL_TYPES.
   void read_cells(uint8_t type) {
     if (!start_.empty()) start_.pop_back();
     read_rows();
@@ -421,7 +421,7 @@ class VtkReader {
     }
   }
 
-  // The two top bits of the first byte tell whether the length takes 1, 2, 4 or 8 bytes.
+  // The two top bits of the first byte give the size of the length: 1, 2, 4 or 8 bytes.
   size_t string_bytes() {
     const unsigned first = in_.value<uint8_t>("a string's length");
     const int more = first >> 6 == 3 ? 0 : first >> 6 == 2 ? 1 : first >> 6 == 1 ? 3 : 7;

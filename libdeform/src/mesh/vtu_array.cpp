@@ -227,7 +227,7 @@ VtuPlace vtu_place(Cursor &in, const XmlTag &tag) {
   place.components = std::max(1u, static_cast<uint32_t>(components));
   place.offset = static_cast<uint64_t>(offset);
   if (tag.empty) return place;
-  // Numbers stand before the first tag inside; information keys may follow.
+  // Numbers come before the first tag inside; information keys may follow.
   while (place.text.empty()) {
     place.text = in.rest().substr(0, in.rest().find('<'));
     if (place.text.find_first_not_of(" \t\r\n") == place.text.npos) place.text = {};

@@ -9,7 +9,7 @@
 
 namespace dfm {
 
-// Attributes of one XML tag, as they stand in the file.
+// Attributes of one XML tag, in the order of the file.
 class XmlTag {
  public:
   std::string_view name;  // without the slash
@@ -28,7 +28,7 @@ struct VtuPacking {
   bool compressed = false;
   bool appended_base64 = false;
   size_t file_bytes = 0;      // bounds what unpacking may take
-  std::string_view appended;  // what stands behind the underscore
+  std::string_view appended;  // what follows the underscore
 };
 
 // Where one array lies.

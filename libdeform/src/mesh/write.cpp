@@ -43,8 +43,8 @@ Array<double> shares(const TetMesh &mesh) {
   return out;
 }
 
-// Lengths of strings in binary legacy files: the top bits of the first byte tell how many bytes
-// the length takes.
+// Lengths of strings in binary legacy files: the top bits of the first byte give the size of
+// the length.
 void put_string(AtomicFile &out, const std::string &s) {
   if (s.size() < 64) out.put(static_cast<uint8_t>(0xc0 | s.size()));
   else out.put(big_endian(static_cast<uint16_t>(0x8000 | std::min<size_t>(s.size(), 0x3fff))));

@@ -95,7 +95,7 @@ void put_stl(AtomicFile &out, const TriMesh &mesh, const std::string &path) {
   }
 }
 
-// The formats of cells hold triangles too: a body without cells, whose triangles all stand in the file.
+// The formats of cells hold triangles too: a body without cells, all of whose triangles are in the file.
 TetMesh as_cells(const TriMesh &mesh) {
   TetMesh out(*mesh.memory);
   out.points = mesh.points;

@@ -78,7 +78,7 @@ double rise(const EdgeFaces &faces, Vec3 outward, Vec3 across, double length) {
   return 0.25 * length * std::fabs(turn) * norm(cross(faces.along, across));
 }
 
-// m, how far a crossing may give way under load (doc/decisions/0416). Where one of the edges lies in a flat
+// m, how far a crossing yields under load (doc/decisions/0416). Where one of the edges lies in a flat
 // face, the distance of the surfaces is linear along the other edge, so that the crossing is no minimum:
 // contacts of surfels and of rims hold the surfaces apart, and the crossing only repeats them. Not so where
 // both edges are rims, nor where it replaces the contact of a surfel. Faces of a cut touch at the rest

@@ -23,7 +23,7 @@ struct Face {  // in the grid's frame
 };
 
 // Compass search from a corner: steps along the edges' directions, halved where none leads down. Grids have
-// kinks, so no derivative is asked.
+// kinks, so no derivative is used.
 double lowest_place(const Face &face, double finest, double weight[3], double distance) {
   double best[3] = {weight[0], weight[1], weight[2]};
   for (double step = 0.5; step * face.longest >= finest; step *= 0.5) {

@@ -11,7 +11,7 @@
 //              in the next  (5.18)-(5.30)
 //
 // Why this ends, and in a state without contact: vertices of one island follow the true motion up to one
-// time, before any of their hits; pairs that go unequal fractions have been asked about just that motion; and
+// time, before any of their hits; pairs that go unequal fractions have been tested with just that motion; and
 // each round that finds a hit leaves fewer islands.
 #include "rollback/stages.h"
 
@@ -184,7 +184,7 @@ const Body &body_of_node(const World &w, const StepContext &step, uint32_t node,
   return *w.bodies[step.body_views[i].slot];
 }
 
-// What the laws are asked: slip on the way as it was predicted, normal force and the force that would end the
+// The arguments of the laws: slip on the predicted way, normal force and the force that would end the
 // slip from all forces but friction.
 void set_forces(World &w, StepContext &step) {
   for (uint32_t i = 0; i < step.rows.n; ++i) {

@@ -25,7 +25,7 @@ struct StepStopped {
   enum Why { work, time, asked, costly, too_fine } why;
 };
 
-// Worlds that were asked to stop. A signal may arrive while a lock is held, so no lock is used; 0: free.
+// Worlds that were requested to stop. A signal may arrive while a lock is held, so no lock is used; 0: free.
 constexpr size_t kMostRequests = 64;
 std::array<std::atomic<uint64_t>, kMostRequests> requests{};
 std::atomic<uint32_t> waiting{0};

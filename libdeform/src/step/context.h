@@ -103,7 +103,7 @@ struct StepContext {
 
   // distribute, guard
   std::vector<ImpulseSink> sinks;
-  bool ended = false;  // find_ends() has been asked since the last solve
+  bool ended = false;  // find_ends() has been called since the last solve
   Guard guard;
   // commit
   Array<double> mean;     // [dofs of rows,4] m/s, over the sub-step; of bodies

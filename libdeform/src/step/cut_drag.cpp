@@ -27,8 +27,8 @@ void each_debt(World &w, F &&f) {
     }
 }
 
-// Surfels stand in the order of their points. A point around which all cells hang together is none: what
-// is due there waits until the cut goes on.
+// Surfels are in the order of their points. A point all of whose cells still hang together is no surfel: its
+// energy is kept until the cut continues.
 uint32_t surfel_of(const Body &b, uint32_t point) {
   const auto at = std::lower_bound(b.surface.point.begin(), b.surface.point.end(), point);
   return at == b.surface.point.end() || *at != point ? kNone : uint32_t(at - b.surface.point.begin());

@@ -15,7 +15,7 @@ bool has_dues(const Body &b);
 
 // Appends the rows of this sub-step to the bonds; `again`: as make_bonds().
 void make_cut_drags(World &w, StepContext &step, bool again);
-// Takes off the dues what the completed sub-step has paid.
+// Subtracts the work of the completed sub-step from the energies due.
 void keep_cut_drags(World &w, StepContext &step);
 
 // Wakes bodies that sleep while the tool that owes them something moves.

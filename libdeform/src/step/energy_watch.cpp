@@ -26,8 +26,8 @@ constexpr uint32_t kSettles = 8;     // sub-steps
 constexpr double kRounding = 1e-12;  // of the sums that a balance is the difference of
 constexpr double kPositionDigits = 8 * 2.3e-16;
 // Of the largest energy so far: what a body that steps itself may have beyond what it has had and was given.
-// What such a model leaves out of the motion, so that its step is cheap, is energy that comes and goes. Where
-// nobody knows its elastic energy: its velocities are means over steps, and of an oscillation that a step
+// What such a model leaves out of the motion, so that its step is cheap, is energy that comes and goes. If
+// its elastic energy is unknown: its velocities are means over steps, and of an oscillation that a step
 // takes far, their energy comes and goes with the phase.
 constexpr double kOwnSteps = 0.25, kHidden = 1;
 constexpr double kNoLimit = 1e300;  // J, of a base: its energy may be anything
@@ -136,7 +136,7 @@ bool look(World &w, const StepContext &step, Body &b, EnergyLook &out) {
   const OnBehalf speaks(b.name);
   const auto ask = [&] { return b.model.ops->energy(b.model.self, &kin, &elastic); };
   if (!hides(b) && b.model.call("energy", ask) != DFM_OK) return false;
-  // it was asked between its prediction and its commit, which may share memory with the answer
+  // the call came between its prediction and its commit, which may share memory with the result
   double again = 0;
   if (steps_itself(b) && (!hides(b) || b.dynamics->late()) &&
       !b.dynamics->free_motion(sub_step_of(w, step), again))
@@ -384,7 +384,7 @@ bool watch_energy(World &w, StepContext &step, uint32_t *trouble) {
   if (worst.rise > worst.share * std::max(s.energy_max, total - worst.rise)) {
     s.energy_gain = std::max(s.energy_gain, gain);
     *trouble |= DFM_TROUBLE_ENERGY;
-    w.watch.age = kEvery;  // the next step is asked again
+    w.watch.age = kEvery;  // the next step is checked again
     set_last_error(
         format("step %llu, body '%s' of model '%s': its energy has grown by %.3g J beyond what loads, "
                "motions and "

@@ -13,7 +13,7 @@ struct StepContext;
 struct World;
 struct Body;
 
-// A body as it stands, J.
+// The present state of a body, J.
 struct EnergyLook {
   double kinetic = 0, elastic = 0, balance = 0, gives_back = 0, rounding = 0;
   bool known = false;  // else it is not watched, or its model did not answer

@@ -1,14 +1,14 @@
 // No crossing at the end of a sub-step, whatever the speed. Between distribute and commit the way of every
-// surfel is known: a straight line from x to x + h v. Every listed pair of features is asked, conservatively,
-// whether it comes as near as d_g = d_c / 2 on that way (ccd/toi_guard). If so:
+// surfel is known: a straight line from x to x + h v. Each listed pair of features is tested, conservatively,
+// for coming as near as d_g = d_c / 2 on that way (ccd/toi_guard). If so:
 //
 //   1  each hit becomes a contact, linearized at its hit time, and the solve runs again, warm
 //      at most 4 times
-//   2  the sub-step is taken anew, shorter: up to the safe part of the way, but no less than a quarter
+//   2  the sub-step is repeated, shorter: up to the safe part of the way, but no less than a quarter
 //      at most 8 times
 //   3  all that moves takes the safe fraction of its way; velocities stay, so no momentum is lost, only way
 //
-// What is not listed is not asked: broad/ covers the motion after the solve too (BroadPhase::cover). Why the
+// What is not listed is not tested: broad/ covers the motion after the solve too (BroadPhase::cover). Why the
 // order is this one and the cut is the whole world's: doc/decisions/0020-guard-cuts-time.md.
 #include "step/guard.h"
 
@@ -231,8 +231,8 @@ bool overloaded(const World &w, const StepContext &step) {
 }
 
 // No motion is left and contact has no answer: what closes on a body has met. Impulses that cannot help would
-// grow from sub-step to sub-step, and their rounding is motion out of nothing. Only what is told where to go
-// leaves no answer: what is free gives way.
+// grow from sub-step to sub-step, and their rounding is motion out of nothing. Only prescribed
+// motion leaves no answer: a free body yields.
 bool jammed(const World &w, const StepContext &step) {
   if (!(step.guard.motion < kNoWay && step.h > 0.5 * step.guard.planned && step.residual.due > 1))
     return false;
@@ -257,7 +257,7 @@ bool cross_at_start(StepContext &step, uint32_t slot_a, uint32_t slot_b, bool ob
   return yes;
 }
 
-// False: trouble, or guard.again: the sub-step is to be taken anew, guard.cut times as long.
+// False: trouble, or guard.again: the sub-step is to be repeated, guard.cut times as long.
 bool stage_guard(World &w, StepContext &step, uint32_t *trouble) {
   step.guard.kept.clear();
   double safe = 1;

@@ -13,7 +13,7 @@ void ask_pre_solve(World &w, StepContext &step);
 // The same for one more contact; returns whether it is accepted.
 bool ask_host(World &w, StepContext &step, const ContactPoint &c);
 
-// While rows are made: laws and scales, before stored contacts are matched; belts, once frames stand.
+// While rows are made: laws and scales, before stored contacts are matched; belts, once frames are known.
 void take_choices(StepContext &step);
 void run_belts(StepContext &step);
 

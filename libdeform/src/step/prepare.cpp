@@ -300,7 +300,7 @@ IntegratorOption option_of(const World &w, const Body &b) {
 }
 
 // Of bodies that have come since the last step and leave it to the library. Before the first step it is one
-// choice for all of them, in whatever order they came and whatever was asked in between.
+// choice for all of them, in whatever order they came and whatever was queried in between.
 void choose_integrators(World &w) {
   const auto open = [](const auto &b) { return b->integrator.open; };
   if (std::none_of(w.bodies.begin(), w.bodies.end(), open)) return;

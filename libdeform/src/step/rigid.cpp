@@ -122,8 +122,8 @@ void rigid_response(World &w, StepContext &step, const ContactRows::Block &block
 }
 
 // A host that says DFM_RIGID_AGAIN knows better now how its bodies move: the same contacts are solved once
-// more with its new velocities. Detection has been done with the first ones, so the difference stands in the
-// rows, as the rigid bodies' change of velocity before any impulse.
+// more with its new velocities. Detection has been done with the first ones, so the difference enters the
+// rows as the rigid bodies' change of velocity before any impulse.
 void correct_rigids(World &w, StepContext &step) {
   for (const ContactRows::Block &block : step.rows.blocks) {
     if (block.group == kNone) continue;

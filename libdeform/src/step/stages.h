@@ -42,7 +42,7 @@ void reopen_integrators(World &w);
 void set_gravity_now(World &w);  // from its keys, at the present time
 dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble);
 
-// The rows of the table: what a stage reads and writes of world and context stands in step.cpp.
+// The rows of the table: what a stage reads and writes of world and context is listed in step.cpp.
 namespace row {
 bool motion(World &w, StepContext &step, uint32_t *trouble);
 bool model(World &w, StepContext &step, uint32_t *trouble);

@@ -19,7 +19,7 @@ namespace {
 // it is used, which pays for what a shape changes by about a twentieth of its lengths. So after 16 sub-steps,
 // sooner where the edges stretch faster, a check of the rates shows how much of that may be used; where it is
 // not, the bound holds on. A look sees rates at one instant, so it counts them for the time before and for
-// that to the next look, and the bound is asked for anew in every eighth.
+// that to the next look, and every eighth look evaluates the bound again.
 constexpr uint32_t kBoundEvery = 16;
 constexpr double kBoundStrain = 0.05, kLeastStrain = kBoundStrain / 8;
 

@@ -9,6 +9,6 @@ struct World;
 inline constexpr double kBoundShare = 0.9;  // of the bound, that is used
 
 bool bound_due(const World &w);  // does the next sub-step look whether it still holds?
-void update_bound(World &w);     // w.bound, asked for anew where it may not
+void update_bound(World &w);     // w.bound, evaluated again where it may not
 
 }  // namespace dfm

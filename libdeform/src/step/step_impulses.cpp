@@ -31,7 +31,7 @@ void add(const World &w, double time, Array<StepImpulses::Pair> &pairs) {
     p.now = {};
     p.now_normal = 0;
   }
-  StepImpulses::Pair *pair = nullptr;  // contacts of a pair stand side by side
+  StepImpulses::Pair *pair = nullptr;  // contacts of a pair are adjacent
   for (uint32_t i = 0; i < w.report.n; ++i) {
     const double *const l = &w.report.impulse[size_t(3) * i], *const f = &w.report.frame[size_t(9) * i];
     if (!(l[0] > 0)) continue;

@@ -20,8 +20,8 @@ namespace dfm {
 namespace {
 
 constexpr double kArea = 1e-4;         // m2
-constexpr double kLeastChange = 1e-6;  // m/s: a law is asked at no smaller normal force than makes it
-constexpr double kAnswered = 1e-6;     // of the slip, that a smooth law may be asked beside it
+constexpr double kLeastChange = 1e-6;  // m/s: a law is evaluated at no smaller normal force than makes it
+constexpr double kAnswered = 1e-6;     // of the slip: how far beside it a smooth law may be evaluated
 
 }  // namespace
 
@@ -72,7 +72,7 @@ void ToolTouch::take_last(const World &w) {
 
 Vec3 ToolTouch::slip(const Row &row) const { return speed(row) + row.bend; }
 
-// Asks the laws at the present state. m/s, by how much what they say there differs from it.
+// Evaluates the laws at the present state. m/s, by how much their values differ from it.
 double ToolTouch::ask_laws(double least) {
   const uint32_t n = state_.n;
   const size_t stride = state_.stride;
@@ -115,7 +115,7 @@ std::array<double, 2> ToolTouch::rub(uint32_t i) const {
   return {a, b};
 }
 
-// Room for it is needed before the sub-step stands.
+// Memory for it is needed before the sub-step is final.
 void ToolTouch::keep_next() {
   ContactStore &to = next_;
   uint32_t n = 0;

@@ -1,5 +1,5 @@
-// What a step asks of tools: before its sub-steps where they are to be at its end, and after them what the
-// hand gets.
+// What a step does with tools: their poses at its end before the sub-steps, and the force on the hand after
+// them.
 #pragma once
 
 namespace dfm {

@@ -2,14 +2,14 @@
 // rows solved together per articulated group.
 //
 //   free      v = v0 + h g + p/m, w = mean spin of constant angular momentum (turn.h)
-//   joints    impulses x along the joints as they stand at the start, such that they are kept at the *end*:
+//   joints    impulses x along the joints as they are at the start, such that they are kept at the *end*:
 //             c(q0 + h v(x)) = c(q0). That is SHAKE (Ryckaert, Ciccotti, Berendsen 1977), leapfrog on the
-//             joints: a body swings on without losing speed. Asking J v = 0 at the start instead takes h w^2
+//             joints: a body swings on without losing speed. Requiring J v = 0 at the start takes h w^2
 //             / 2 of it per second.
 //   motors    a motor that can holds its speed: a row more. One that would need more than its limit pushes
 //             with the limit
 //   respond   M^-1 - M^-1 J^T (J M^-1 J^T)^-1 J M^-1 over a group, J the joints and the motors that hold
-//   revise    contact may take a motor to its limit or off it: which ones hold is decided anew, and
+//   revise    contact may take a motor to its limit or off it: which ones hold is decided again, and
 //             contact solved again
 //   commit    the same once more with the contact impulses
 //
@@ -248,7 +248,7 @@ double Builtin::move_by(const dfm_rigid_step &step, const Group &g, std::span<co
 }
 
 // Newton steps with the system of the start: each leaves about h w of the error. Where a joint cannot be kept
-// along its impulses (turned by a radian and more in one sub-step) the best of them stands, and correct()
+// along its impulses (turned by a radian and more in one sub-step) the best step is kept, and correct()
 // does the rest.
 void Builtin::solve(const dfm_rigid_step &step, const Group &g, const double *impulse) {
   start_from(step, g, impulse);
@@ -390,7 +390,7 @@ void Builtin::correct(const Group &g, std::span<dfm_rigid_state> state) {
   }
 }
 
-// From the start of the sub-step, so that it may be asked again with other impulses.
+// From the start of the sub-step, so that it may be called again with other impulses.
 void Builtin::commit(const dfm_rigid_step &step, const double *impulse, dfm_rigid_state *state,
                      double *extra) {
   std::copy(step.state, step.state + parts_.size(), state);
