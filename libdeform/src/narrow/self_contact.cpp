@@ -202,8 +202,14 @@ struct Self {
   bool yields(uint32_t t, double distance2, uint32_t other, uint32_t surfel) const;
   bool minimum(uint32_t surfel, uint32_t t, const TrianglePoint &at) const;
   Vec3 outward(uint32_t surfel, uint32_t t, const TrianglePoint &at) const;
-  void vertex_face(uint32_t surfel, uint32_t t, Kin &k);
-  void edge_edge(uint32_t a, uint32_t b, Kin &k);
+  // Opened: the body has open faces. Then `kept` is what the pair is at rest, filled here once. Else it is
+  // null, and what a pair is at rest is computed for the few that are near; whole bodies pay for no slits.
+  template <bool Opened>
+  void vertex_face(uint32_t surfel, uint32_t t, Kin *kept);
+  template <bool Opened>
+  void edge_edge(uint32_t a, uint32_t b, Kin *kept);
+  template <bool Opened>
+  void find(SelfPairs &pairs, Array<uint8_t> &lent);
   void name(size_t begin);
   void share_areas(size_t begin, size_t edges, Array<uint8_t> &lent);
 };
@@ -309,20 +315,20 @@ bool Self::held(const Kin &k) const {
   return k.beside();
 }
 
-// m, set back: the distance at which the pair rests. Beside copies it is what setting back has added along
+// m, set back: the distance at which a pair beside copies rests. It is what setting back has added along
 // the normal, so that the material touches, less what is left to them.
 double Self::rests_at(const Kin &k, double set_back) const {
-  if (!k.beside()) return k.apart;
   double apart = HUGE_VAL;
   for (const uint32_t c : k.copies)
     if (c != kNone) apart = std::min(apart, copies_now[c].apart);
   return rest_beside(set_back, apart, offset);
 }
 
-void Self::vertex_face(uint32_t surfel, uint32_t t, Kin &k) {
-  if (rest.opened().any()) {
+template <bool Opened>
+void Self::vertex_face(uint32_t surfel, uint32_t t, Kin *kept) {
+  if constexpr (Opened) {
     copies(surfel, t);
-    if (held(k)) return;
+    if (held(*kept)) return;
   }
   const uint32_t *const c = corners(t);
   const Vec3 p = x(surfel), a = x(c[0]), u = x(c[1]) - a, w = x(c[2]) - a, n = cross(u, w);
@@ -333,14 +339,18 @@ void Self::vertex_face(uint32_t surfel, uint32_t t, Kin &k) {
   const double along = dot(n, p - a);
   const double nn = norm2(n);
   if (along * along > widest * widest * (1 + kNearer) * nn && nn > 1e-12 * norm2(u) * norm2(w)) return;
-  if (!k.known) k = rest.of_face(surfel, t);
-  if (!k.touches || held(k)) return;
+  if constexpr (Opened) {
+    if (!kept->known) *kept = rest.of_face(surfel, t);
+    if (!kept->touches) return;
+  }
   const TrianglePoint at = closest(t, p);
   if (!(at.distance2 < widest * widest) || !minimum(surfel, t, at)) return;
+  const Kin k = Opened ? *kept : rest.of_face(surfel, t);
+  if (!k.touches) return;
   const bool face = at.feature == TriangleFeature::face;
   const Vec3 up = outward(surfel, t, at);
   const double distance = std::sqrt(at.distance2), now = (face ? along : dot(up, p - at.point)) < 0 ? -1 : 1;
-  const bool beside = k.beside();
+  const bool beside = Opened && k.beside();
   double side = k.side != 0 ? k.side : now;
   if (!beside && now != side && face && distance <= depth && !through({surfel}, {c[0], c[1], c[2]}))
     side = now;
@@ -353,7 +363,7 @@ void Self::vertex_face(uint32_t surfel, uint32_t t, Kin &k) {
     for (int i = 0; i < 3; ++i) way -= at.weight[i] * (x(c[i]) - place(c[i]));
     back = dot(normal, way);
   }
-  const double apart = rests_at(k, back);
+  const double apart = beside ? rests_at(k, back) : k.apart;
   // as far as rounding of the set-back faces goes, what stands behind one need not have passed it
   if (beside && now != side && face && distance <= depth && -distance < apart - offset &&
       !through({surfel}, {c[0], c[1], c[2]}))
@@ -369,8 +379,9 @@ void Self::vertex_face(uint32_t surfel, uint32_t t, Kin &k) {
 }
 
 // As narrow/edge_edge.cpp, of one surface; from within, with the surface turned inside out.
-void Self::edge_edge(uint32_t a, uint32_t b, Kin &k) {
-  if (held(k)) return;
+template <bool Opened>
+void Self::edge_edge(uint32_t a, uint32_t b, Kin *kept) {
+  if (Opened && held(*kept)) return;
   const uint32_t *const ea = &s.edge[2 * size_t{a}], *const eb = &s.edge[2 * size_t{b}];
   const Vec3 p0 = x(ea[0]), u = x(ea[1]) - p0, q0 = x(eb[0]), w = x(eb[1]) - q0, r = p0 - q0, n = cross(u, w);
   const double uu = norm2(u), ww = norm2(w), nn = norm2(n), nr = dot(n, r);
@@ -389,14 +400,15 @@ void Self::edge_edge(uint32_t a, uint32_t b, Kin &k) {
     for (int j = 0; j < 2; ++j) speed2 = std::max(speed2, norm2(v(ea[i]) - v(eb[j])));
   const double reach = contact_reach(h, offset, std::sqrt(speed2)), widest = std::max(reach, edge_depth);
   if (!(nr * nr < widest * widest * nn)) return;
-  const int place_a = place_on_edge(on_a, 2 * h * std::sqrt(speed2 / uu)),
-            place_b = place_on_edge(on_b, 2 * h * std::sqrt(speed2 / ww));
-  if (place_a == kNowhere || place_b == kNowhere) return;
-  if (!k.known) k = rest.of_edges(a, b);
-  if (!k.touches || held(k)) return;
   // Setting back moves the ends of edges beside copies by as much as may leave crossings to them.
-  const bool beside = k.beside();
-  if (!beside && (place_a != kBetween || place_b != kBetween)) return;
+  const bool beside = Opened && kept->beside();
+  const auto nowhere = [beside](int place) { return beside ? place == kNowhere : place != kBetween; };
+  if (nowhere(place_on_edge(on_a, 2 * h * std::sqrt(speed2 / uu))) ||
+      nowhere(place_on_edge(on_b, 2 * h * std::sqrt(speed2 / ww))))
+    return;
+  if (Opened && !kept->known) *kept = rest.of_edges(a, b);
+  const Kin k = Opened ? *kept : rest.of_edges(a, b);
+  if (!k.touches) return;
   // An edge that is flat folds out where the blow bends its faces, by what they may move against each other
   // within the sub-step.
   const double bent = std::min(0.3, 2 * h * std::sqrt(speed2 / std::min(uu, ww))) - kConvex;
@@ -415,7 +427,7 @@ void Self::edge_edge(uint32_t a, uint32_t b, Kin &k) {
   const double back = beside ? dot(normal, (1 - on_a) * way(ea[0]) + on_a * way(ea[1]) -
                                                (1 - on_b) * way(eb[0]) - on_b * way(eb[1]))
                              : 0;
-  const double apart = rests_at(k, back);
+  const double apart = beside ? rests_at(k, back) : k.apart;
   if (!(distance < (beside ? apart + reach - 2 * offset : reach) && distance >= -edge_depth) ||
       (distance < (beside ? apart - offset : 0) && !through({ea[0], ea[1]}, {eb[0], eb[1]})))
     return;
@@ -473,6 +485,20 @@ void Self::share_areas(size_t begin, size_t edges, Array<uint8_t> &lent) {
   }
 }
 
+template <bool Opened>
+void Self::find(SelfPairs &pairs, Array<uint8_t> &lent) {
+  const size_t begin = out.size();
+  const std::span<const SelfPair> vf = pairs.vertex_face, ee = pairs.edge_edge;
+  for (size_t i = 0; i < vf.size(); ++i)
+    vertex_face<Opened>(vf[i].a, vf[i].b, Opened ? &pairs.of_face[i] : nullptr);
+  if constexpr (Opened) keep_shallow(begin);
+  const size_t edges = out.size();
+  for (size_t i = 0; i < ee.size(); ++i)
+    edge_edge<Opened>(ee[i].a, ee[i].b, Opened ? &pairs.of_edges[i] : nullptr);
+  name(begin);
+  share_areas(begin, edges, lent);
+}
+
 // Pairs with copies of one point among their corners.
 void find_copies(const OpenedSurface &opened, std::span<const uint32_t> a, std::span<const uint32_t> b,
                  PairAtRest &out) {
@@ -491,9 +517,9 @@ void SelfPairs::follow(const Surface &s, const SelfRest &rest, uint64_t list, do
   const OpenedSurface &opened = rest.opened;
   if (renewals != list || offset != d_c) {
     renewals = 0;  // until the arrays are complete: an allocation may fail
-    of_face.assign(vertex_face.size(), {});
-    of_edges.assign(edge_edge.size(), {});
     if (opened.any()) {
+      of_face.assign(vertex_face.size(), {});
+      of_edges.assign(edge_edge.size(), {});
       for (size_t i = 0; i < of_face.size(); ++i)
         find_copies(opened, {&vertex_face[i].a, 1}, {&s.tri[3 * size_t{vertex_face[i].b}], 3}, of_face[i]);
       for (size_t i = 0; i < of_edges.size(); ++i)
@@ -548,14 +574,8 @@ void find_self_contacts(const BodyView &body, const SelfRest &rest, double h, do
                         const Tangled &tangled, SelfPairs &pairs, Array<uint8_t> &lent,
                         Array<ContactPoint> &out) {
   Self self(body, rest, h, offset, tangled, pairs, out);
-  const size_t begin = out.size();
-  const std::span<const SelfPair> vf = pairs.vertex_face, ee = pairs.edge_edge;
-  for (size_t i = 0; i < vf.size(); ++i) self.vertex_face(vf[i].a, vf[i].b, pairs.of_face[i]);
-  if (rest.opened.any()) self.keep_shallow(begin);
-  const size_t edges = out.size();
-  for (size_t i = 0; i < ee.size(); ++i) self.edge_edge(ee[i].a, ee[i].b, pairs.of_edges[i]);
-  self.name(begin);
-  self.share_areas(begin, edges, lent);
+  if (rest.opened.any()) self.find<true>(pairs, lent);
+  else self.find<false>(pairs, lent);
 }
 
 double self_apart(const Surface &surface, const SelfRest &rest, ContactKind kind, uint32_t a, uint32_t b,

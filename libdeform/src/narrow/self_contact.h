@@ -26,7 +26,8 @@ struct CopiesNow {
 // The listed pairs of a body, and what detection keeps of them.
 struct SelfPairs {
   std::span<const SelfPair> vertex_face, edge_edge;
-  Array<PairAtRest> of_face, of_edges;  // by pair; but for `copies` filled where one comes near
+  // by pair, of a body with open faces; but for `copies` filled where one comes near
+  Array<PairAtRest> of_face, of_edges;
   Array<CopiesNow> copies;
   // [copies] m, by how much they may come together before features around them have to be asked
   // (doc/decisions/0427)
