@@ -31,7 +31,9 @@ DFM_API int dfm_hello_loud(void);
 """
 GOOD = {
     "README.md": f"# Title\n\n```c\n{HELLO}```\n",
-    "LICENSE": "MIT\n", "CHANGELOG.md": "# Changes\n", "CMakePresets.json": "{}\n",
+    "LICENSE": "MIT\n", "CHANGELOG.md": "# Changes\n",
+    "CMakePresets.json": '{"testPresets": [{"name": "base"}, {"name": "asan", "filter": {"exclude": '
+                         '{"name": "it\\\\.Tree\\\\.(Finds_|IsSorted$)|Wide/.*_(a|b)$"}}}]}\n',
     "Makefile": "all:\n\techo\n",
     "CMakeLists.txt": "# no -ffast-math here\nadd_compile_options(-ffp-contract=off -mno-fma)\n",
     ".ci/run": "#!/bin/sh\n",
@@ -73,7 +75,9 @@ GOOD = {
     "libdeform/doc/reference/gallery.md": "![b](../images/b.png)\n\n`libdeform/doc/images/b.py`\n",
     "libdeform/doc/images/b.png": "b\n", "libdeform/doc/images/b.py": "", "libdeform/doc/images/d.py": "",
     "libdeform/src/core/page.h": "#pragma once\n// doc/howto/cpp.md, howto/engine.md, decision 0001\n",
-    "tests/unit/tree_test.cpp": '#include "broad/tree.h"\n',
+    "tests/unit/tree_test.cpp": '#include "broad/tree.h"\nTEST(Tree, Finds_All) {}\n'
+                                'TEST_F(Tree, IsSorted) {}\nTEST_P(Forest, Finds_) {}\n'
+                                'INSTANTIATE_TEST_SUITE_P(Wide, Forest, All);\n',
     "tests/api/hello_test.cpp": '#include "deform/deform.h"\n#include "support.h"\n',
 }
 # rule: [(file, text that is appended, or replaces it where it starts with "=")]
@@ -184,6 +188,10 @@ BAD = {
                 ("libdeform/include/deform/base.h", "\n/** Both. Threads: Any thread. */\n"
                                                     "DFM_API int dfm_said(void);\n"
                                                     "DFM_API int dfm_silent(void);\n")],
+    "presets": [("CMakePresets.json", f'={{"testPresets": [{{"name": "asan", "filter": {{"include": '
+                                      f'{{"name": "{name}"}}}}}}]}}\n')
+                for name in ("Tree|Gone", "Tree.(Finds|Loses)_", "(Tree|Wide/.*_a|Narrow/.*_a)",
+                             "Forest.Finds_$|Tree.Finds_$")],
     "walks": [("README.md", "`explain` in `tree.cpp`\n"), ("README.md", "`log` in\n`gone.cpp`\n")],
     "versions": [
         ("CMakeLists.txt", "project(deform VERSION 0.2.0)\n"), ("CHANGELOG.md", "## 0.2.0 (unreleased)\n"),

@@ -1,7 +1,8 @@
 """Rules about the tree: where things lie, what a text file looks like, what never stands in one."""
+import json
 import re
 
-from tree import CODE, line_of
+from tree import CODE, line_of, without_comments
 
 TOP = {"CMakeLists.txt", "libdeform", "plugins", "bindings", "examples", "tests", "cmake",
        "README.md", "CONTRIBUTING.md", "SECURITY.md", "LICENSE", "CHANGELOG.md", "CMakePresets.json",
@@ -104,4 +105,45 @@ def guides(tree):
                        f"this block stands in no file of {folder}; copy it from there")
 
 
-RULES = {"layout": layout, "text": text, "paths": paths, "readme": readme, "guides": guides}
+def _alternatives(pattern):
+    """The alternatives of a regular expression, those of its groups too: those of a|b(c|d) are a, bc, bd."""
+    group = re.search(r"(?<!\\)\(((?:[^()\\]|\\.)*)\)(?![?*+])", pattern)
+    depth, cuts = 0, [-1]
+    for match in re.finditer(r"\\.|[()|]", pattern):
+        depth += {"(": 1, ")": -1}.get(match.group(0), 0)
+        if match.group(0) == "|" and depth == 0:
+            cuts.append(match.start())
+    if len(cuts) > 1:
+        for start, end in zip(cuts, [*cuts[1:], len(pattern)]):
+            yield from _alternatives(pattern[start + 1:end])
+    elif group:
+        for inner in group.group(1).split("|"):
+            yield from _alternatives(pattern[:group.start()] + inner + pattern[group.end():])
+    else:
+        yield pattern
+
+
+def presets(tree):
+    """Each part of a name by which a test preset chooses tests is in the name of a test."""
+    path = "CMakePresets.json"
+    names = set()
+    for source in tree.select("tests/", ext=("_test.cpp",)):
+        content = without_comments(tree.text(source))
+        folder, suites = source.split("/")[1], {}
+        for prefix, suite in re.findall(r"INSTANTIATE_TEST_SUITE_P\(\s*(\w+),\s*(\w+)", content):
+            suites.setdefault(suite, []).append(prefix + "/")
+        for suite, name in re.findall(r"\bTEST(?:_F|_P)?\(\s*(\w+),\s*(\w+)", content):
+            names |= {f"{folder}.{prefix}{suite}.{name}" for prefix in suites.get(suite, [""])}
+    for preset in json.loads(tree.text(path)).get("testPresets", []):
+        for side in preset.get("filter", {}).values():
+            parts = (part.partition("/")[0] for part in _alternatives(side.get("name", "")))
+            for part in dict.fromkeys(parts):  # without parameters, which follow a slash
+                if not any(map(re.compile(part).search, names)):
+                    line = next((n for n, text in enumerate(tree.text(path).split("\n"), 1)
+                                 if f'"name": "{preset["name"]}"' in text), 1)
+                    yield (path, line, f"preset {preset['name']}: no test has {part} in its name; write the "
+                                       f"present name, or leave it out")
+
+
+RULES = {"layout": layout, "text": text, "paths": paths, "readme": readme, "guides": guides,
+         "presets": presets}
