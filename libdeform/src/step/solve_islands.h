@@ -42,7 +42,7 @@ struct SolveIsland {
   Residual residual;
   uint32_t passes = 0, sweeps = 0;
   bool slowed = false;  // its depths are opened more slowly
-  bool common = false;  // laws are evaluated with the response of all contacts together
+  bool common = false;  // laws are asked by the response of all contacts together
   uint32_t asked = 0;   // passes beyond the cap with the present response
   // of the last two passes (Residual::due)
   double due, due_before;
