@@ -123,14 +123,20 @@ dfm_status Adapter::restore(const void *buffer, size_t bytes) {
   if (head.magic == kMagic && (head.length != bytes || head.checksum != checksum_of(from, bytes)))
     return failed(DFM_E_FORMAT,
                   "the snapshot is cut short or damaged (length or checksum); nothing was restored");
-  if (head.magic != kMagic || head.world > rest || rest - head.world < fixed ||
-      (rest - head.world - fixed) / sizeof(double) != head.friction ||
-      (rest - head.world - fixed) % sizeof(double) != 0 || head.geoms != seen_.size() ||
-      head.members != bodies_.size() || head.bodies != hidden.size())
+  if (head.magic != kMagic)
+    return failed(DFM_E_FORMAT,
+                  "these %zu bytes are not a snapshot of dfm_ode_snapshot; nothing was restored", bytes);
+  if (head.geoms != seen_.size() || head.members != bodies_.size() || head.bodies != hidden.size())
     return failed(
         DFM_E_FORMAT,
-        "this is not a whole snapshot of dfm_ode_snapshot of a scene with %zu geoms and %zu bodies without",
-        seen_.size(), hidden.size());
+        "the snapshot belongs to another scene of ODE: it has %llu geoms, %llu bodies with geoms and "
+        "%llu without, and there are %zu, %zu and %zu; nothing was restored",
+        static_cast<unsigned long long>(head.geoms), static_cast<unsigned long long>(head.members),
+        static_cast<unsigned long long>(head.bodies), seen_.size(), bodies_.size(), hidden.size());
+  if (head.world > rest || rest - head.world < fixed ||
+      (rest - head.world - fixed) / sizeof(double) != head.friction ||
+      (rest - head.world - fixed) % sizeof(double) != 0)
+    return failed(DFM_E_FORMAT, "the snapshot is damaged: its parts do not add up; nothing was restored");
   const size_t first = bodies_.size(), behind = first + kPerBody * hidden.size();
   std::vector<double> numbers(behind + head.friction);
   std::memcpy(numbers.data(), from + sizeof head + head.world, numbers.size() * sizeof(double));

@@ -3,9 +3,11 @@
 #include <dlfcn.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <set>
 
 #include "check/groups.h"
 #include "check/plugin.h"
@@ -20,10 +22,11 @@ struct Line {
   const Rule *rule;
   Verdict verdict;
   double seconds;
-  bool late = false;
+  bool ended = false;  // by a crash or for its time, without a verdict
 };
 struct TypeName {
   uint32_t kind;
+  bool complete;  // has the functions that every use of it calls
   std::string id;
 };
 struct Report {
@@ -33,6 +36,11 @@ struct Report {
 };
 
 const char *const kNotLoaded = "it does not load (V02 says why)";
+const char *const kIncomplete = "functions are missing (V03 says which)";
+const char *const kEnded = "two rules crashed or did not return; fix them first";
+
+// The rules of a file that call the functions of its types.
+bool uses_types(const Rule &rule) { return std::string(rule.id) == "V09" || std::string(rule.id) == "V12"; }
 
 // ---- a rule of this file, in this process -----------------------------------------------------------------
 
@@ -79,13 +87,15 @@ std::string digest_text(const Request &request) {
                                                                                    : digest(subject)));
 }
 
-// "1 org.example.law" by lines: what the file offers.
+// "1 1 org.example.law" by lines: what the file offers, kind, whether it is complete, id.
 std::string listed(const std::string &file) {
   std::string out;
   try {
     const Plugin plugin(file);
     for (uint32_t i = 0; i < plugin.types().size(); ++i)
-      out += std::to_string(plugin.types()[i]->kind) + " " + name_of(*plugin.types()[i], i) + "\n";
+      out += std::to_string(plugin.types()[i]->kind) +
+             (missing_function(*plugin.types()[i]).empty() ? " 1 " : " 0 ") + name_of(*plugin.types()[i], i) +
+             "\n";
   } catch (const Broken &) {}
   return out;
 }
@@ -128,7 +138,7 @@ Line run_rule(const Request &request, const Rule &rule, int type) {
   const Answer a = fresh ? in_fresh_process(subject_of(request).command, arguments(request, rule.id, type),
                                             {request.limit})
                          : in_own_process([&] { answer(judge(request, rule, type)); }, {request.limit});
-  Line line{&rule, a.verdict, a.seconds, a.late};
+  Line line{&rule, a.verdict, a.seconds, a.late || !a.spoke};
   const std::string found = sanitizer_line(a.said);
   if (!a.spoke)
     line.verdict = {Result::fail,
@@ -153,7 +163,8 @@ void print_line(const Line &l, bool quiet) {
   std::fflush(stdout);
 }
 
-// Two rules that do not come back say enough: the rest would cost as long each.
+// What stops one rule stops most of them: a missing function, which V03 names, and an eval that crashes or
+// does not come back, which two rules have seen. The other rules are then skipped, and one line says why.
 class Rules {
  public:
   Rules(const Globals &globals, const Request &request, const std::vector<const Rule *> &wanted)
@@ -161,26 +172,31 @@ class Rules {
   Report run() {
     if (!globals_.json) std::printf("%s\n", request_.file.c_str());
     list_types();
+    const bool complete = std::all_of(report_.types.begin(), report_.types.end(),
+                                      [](const TypeName &type) { return type.complete; });
     for (const Rule *rule : wanted_)
-      if (!rule->by_type) one(report_.file, *rule, -1);
+      if (!rule->by_type)
+        one(report_.file, *rule, -1, !complete && uses_types(*rule) ? kIncomplete : nullptr);
       else if (report_.types.empty()) add(report_.file, {rule, {Result::skip, kNotLoaded}, 0});
-    if (not_loaded_ && !globals_.json && !globals_.quiet)
-      std::printf("  the other rules are skipped: %s\n", kNotLoaded);
+    say_skipped(kNotLoaded);
     // Rules of laws that cannot run for want of a law are not kept: the rule that says why is
-    // asked beside them.
-    const bool loads = std::any_of(wanted_.begin(), wanted_.end(),
-                                   [](const Rule *rule) { return rule == find_rule("V02"); });
-    if (report_.types.empty() && !loads) one(report_.file, *find_rule("V02"), -1);
+    // asked beside them. So are those that a missing function stops.
+    if (report_.types.empty() && !wants("V02")) one(report_.file, *find_rule("V02"), -1);
     for (size_t t = 0; t < report_.types.size(); ++t) {
+      const TypeName &type = report_.types[t];
       report_.by_type.emplace_back();
-      if (!globals_.json)
-        std::printf("%s %s\n", kind_name(report_.types[t].kind), report_.types[t].id.c_str());
+      if (!globals_.json) std::printf("%s %s\n", kind_name(type.kind), type.id.c_str());
+      const Rule *const names = find_rule("V03");
+      if (!type.complete && !wants("V03")) one(report_.by_type.back(), *names, static_cast<int>(t));
       for (const Rule *rule : wanted_)
-        if (rule->by_type && asked_of(*rule, report_.types[t].kind))
-          one(report_.by_type.back(), *rule, static_cast<int>(t));
-      if (!globals_.json && report_.types[t].kind == DFM_KIND_SOLVER)
+        if (rule->by_type && asked_of(*rule, type.kind))
+          one(report_.by_type.back(), *rule, static_cast<int>(t),
+              type.complete || rule == names ? nullptr : kIncomplete);
+      say_skipped(kIncomplete);
+      if (!globals_.json && type.kind == DFM_KIND_SOLVER)
         std::printf("  rules for solvers are not available yet\n");
     }
+    say_skipped(kEnded);
     return std::move(report_);
   }
 
@@ -193,33 +209,48 @@ class Rules {
       const Answer a =
           in_own_process([&] { answer({Result::pass, listed(request_.file)}); }, {request_.limit});
       types = a.verdict.detail;
-      late_ += a.late;
+      ended_ += a.late;
     }
-    for (size_t at = 0, end; (end = types.find('\n', at)) != std::string::npos; at = end + 1)
-      report_.types.push_back({static_cast<uint32_t>(std::stoul(types.substr(at))),
-                               types.substr(types.find(' ', at) + 1, end - types.find(' ', at) - 1)});
+    for (size_t at = 0, end; (end = types.find('\n', at)) != std::string::npos; at = end + 1) {
+      const size_t flag = types.find(' ', at) + 1;
+      report_.types.push_back({static_cast<uint32_t>(std::stoul(types.substr(at))), types[flag] == '1',
+                               types.substr(flag + 2, end - flag - 2)});
+    }
   }
-  void one(std::vector<Line> &to, const Rule &rule, int type) {
-    if (late_ >= kEnough)
-      return add(to, {&rule, {Result::skip, "not run: earlier rules did not return; fix them first"}, 0});
+  bool wants(const char *id) const {
+    return std::find(wanted_.begin(), wanted_.end(), find_rule(id)) != wanted_.end();
+  }
+  // why: not to be run at all
+  void one(std::vector<Line> &to, const Rule &rule, int type, const char *why = nullptr) {
+    if (!why && ended_ >= kEnough) why = kEnded;
+    if (why) return add(to, {&rule, {Result::skip, why}, 0});
     add(to, run_rule(request_, rule, type));
-    late_ += to.back().late;
+    ended_ += to.back().ended;
   }
   // A line is printed when it is there: who waits sees what is done.
   void add(std::vector<Line> &to, Line line) {
     to.push_back(std::move(line));
-    // One line for all of them, so that the reason stays in sight.
-    const bool unloaded = to.back().verdict.result == Result::skip && to.back().verdict.detail == kNotLoaded;
-    not_loaded_ = not_loaded_ || unloaded;
-    if (!globals_.json && !unloaded) print_line(to.back(), globals_.quiet);
+    const Verdict &verdict = to.back().verdict;
+    if (verdict.result == Result::skip)
+      for (const char *why : {kNotLoaded, kIncomplete, kEnded})
+        if (verdict.detail == why) {
+          skipped_.insert(why);
+          return;
+        }
+    if (!globals_.json) print_line(to.back(), globals_.quiet);
+  }
+  // One line for all rules that were skipped for this reason, so that what stopped them stays in sight.
+  void say_skipped(const char *why) {
+    if (skipped_.erase(why) && !globals_.json && !globals_.quiet)
+      std::printf("  the other rules are skipped: %s\n", why);
   }
   static constexpr int kEnough = 2;
   const Globals &globals_;
   const Request &request_;
   const std::vector<const Rule *> &wanted_;
   Report report_;
-  int late_ = 0;
-  bool not_loaded_ = false;
+  int ended_ = 0;  // rules that gave no verdict
+  std::set<std::string> skipped_;
 };
 
 // ---- report -----------------------------------------------------------------------------------------------

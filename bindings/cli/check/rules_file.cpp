@@ -229,7 +229,6 @@ void own_slots_sound(const dfm_slots *own, bool law, const char *from, const cha
 }
 
 void law_sound(const dfm_type &type, const dfm_friction &law) {
-  if (!law.eval) broken("a law without eval cannot be evaluated; set dfm_friction.eval");
   if (!law.prepare != !law.release) broken("it has only one of prepare and release; set both or neither");
   if (law.needs & ~31u) broken("needs has bits that this ABI does not know (%#x); use DFM_NEED_*", law.needs);
   if (law.flags & ~31u) broken("flags has bits that this ABI does not know (%#x); use DFM_FRIC_*", law.flags);
@@ -243,13 +242,11 @@ void law_sound(const dfm_type &type, const dfm_friction &law) {
                   "return constant tables");
 }
 
-// Functions that are required, and claims that name functions.
+// Numbers that must agree, and functions that some parameters and claims require.
 void model_sound(const dfm_type &type, const dfm_model &model) {
   constexpr uint32_t kCells = DFM_CELL_POINT | DFM_CELL_EDGE | DFM_CELL_TRI | DFM_CELL_TET | DFM_CELL_HEX;
   if (model.cells & ~kCells)
     broken("cells has bits that this ABI does not know (%#x); use DFM_CELL_*", model.cells & ~kCells);
-  if (model.add_forces && !model.bound)
-    broken("it adds forces but dfm_model.bound is NULL; set the function");
   for (uint32_t i = 0; i < type.nparam && !model.set_params; ++i)
     if (type.params[i].flags & DFM_PARAM_RUNTIME)
       broken(
@@ -261,16 +258,6 @@ void model_sound(const dfm_type &type, const dfm_model &model) {
                               DFM_CAP_ROTATION_INVARIANT | DFM_CAP_PLAUSIBLE | DFM_CAP_CONSTANT_STIFFNESS;
   if (model.caps & ~kKnown)
     broken("caps has bits that this ABI does not know (%#x); use DFM_CAP_*", model.caps & ~kKnown);
-  const struct {
-    uint32_t bit;
-    bool there;
-    const char *cap, *function;
-  } claims[] = {
-      {DFM_CAP_ENERGY, model.energy != nullptr, "DFM_CAP_ENERGY", "energy"},
-      {DFM_CAP_STIFFNESS, model.pattern && model.stiffness, "DFM_CAP_STIFFNESS", "pattern and stiffness"}};
-  for (const auto &c : claims)
-    if ((model.caps & c.bit) && !c.there)
-      broken("it claims %s without %s; set the function, or drop the claim", c.cap, c.function);
   if ((model.caps & DFM_CAP_CONSTANT_STIFFNESS) && !(model.caps & DFM_CAP_STIFFNESS))
     broken("it claims DFM_CAP_CONSTANT_STIFFNESS without DFM_CAP_STIFFNESS; claim both or none");
 }
@@ -360,8 +347,39 @@ void tables_sound(const Subject &subject) {
 
 }  // namespace
 
+std::string missing_function(const dfm_type &type) {
+  if (type.kind == DFM_KIND_FRICTION) {
+    return static_cast<const dfm_friction *>(type.ops)->eval
+               ? ""
+               : "a law without eval cannot be evaluated; set dfm_friction.eval";
+  }
+  if (type.kind == DFM_KIND_SOLVER) {
+    const auto &solver = *static_cast<const dfm_solver *>(type.ops);
+    return solver.analyse && solver.factor && solver.solve && solver.release
+               ? ""
+               : "a solver without analyse, factor, solve and release cannot be used; set all four";
+  }
+  const auto &model = *static_cast<const dfm_model *>(type.ops);
+  if (!model.create || !model.destroy) return "a model without create and destroy cannot be made; set both";
+  if (!model.add_forces && !model.extension)
+    return "a model without add_forces and without the extension \"dfm.stepper/1\" cannot move; give one";
+  if (model.add_forces && !model.bound) return "it adds forces but dfm_model.bound is NULL; set the function";
+  const struct {
+    uint32_t bit;
+    bool there;
+    const char *cap, *function;
+  } claims[] = {
+      {DFM_CAP_ENERGY, model.energy != nullptr, "DFM_CAP_ENERGY", "energy"},
+      {DFM_CAP_STIFFNESS, model.pattern && model.stiffness, "DFM_CAP_STIFFNESS", "pattern and stiffness"}};
+  for (const auto &c : claims)
+    if ((model.caps & c.bit) && !c.there)
+      return text("it claims %s without %s; set the function, or drop the claim", c.cap, c.function);
+  return "";
+}
+
 std::string metadata_complete(const Subject &subject) {
   const dfm_type &type = *subject.type;
+  if (const std::string lacks = missing_function(type); !lacks.empty()) broken("%s", lacks.c_str());
   const struct {
     const char *key, *text, *remedy;
   } fields[] = {{"name", type.name, "the name that lists show"},
@@ -383,17 +401,11 @@ std::string metadata_complete(const Subject &subject) {
     law_sound(type, law_of(subject));
   } else if (type.kind == DFM_KIND_SOLVER) {
     const auto &solver = *static_cast<const dfm_solver *>(type.ops);
-    if (!solver.analyse || !solver.factor || !solver.solve || !solver.release)
-      broken("a solver without analyse, factor, solve and release cannot be used; set all four");
     if (solver.flags & ~uint32_t(DFM_SOLVER_DIRECT))
       broken("flags has bits that this ABI does not know (%#x); use DFM_SOLVER_*",
              solver.flags & ~uint32_t(DFM_SOLVER_DIRECT));
   } else {
     const auto &model = *static_cast<const dfm_model *>(type.ops);
-    if (!model.create || !model.destroy)
-      broken("a model without create and destroy cannot be made; set both");
-    if (!model.add_forces && !model.extension)
-      broken("a model without add_forces and without the extension \"dfm.stepper/1\" cannot move; give one");
     if (model.cells == 0)
       broken("a model that accepts no kind of cell fits no mesh; set cells to DFM_CELL_*");
     slot_table_sound(model, false);

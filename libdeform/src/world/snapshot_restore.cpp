@@ -39,10 +39,11 @@ void check_head(const World &w, const unsigned char *data, size_t bytes) {
   if (head.checksum != snapshot_checksum(data, bytes))
     fail(DFM_E_FORMAT, "the snapshot is damaged (checksum); nothing was restored");
   if (head.structure != snapshot_structure(w))
-    fail(DFM_E_FORMAT,
-         "the snapshot belongs to another world: names, meshes, masses, materials, fields and obstacles must "
-         "be "
-         "the same; nothing was restored");
+    fail(
+        DFM_E_FORMAT,
+        "the snapshot belongs to another world: it needs the same bodies, obstacles, rigid bodies and tools, "
+        "created in the same order (what was destroyed and created again is not the same), with the same "
+        "names, meshes, masses, materials and fields; nothing was restored");
 }
 
 // Laws are in the order in which the run first needed them, and contacts refer to them by this index.

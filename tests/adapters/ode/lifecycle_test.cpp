@@ -460,6 +460,20 @@ TEST(OdeLifecycle, SnapshotThatIsDamaged_IsRefusedAndChangesNothing) {
   refused(forged(friction, 3), "another law");
 }
 
+// Of another scene: the sentence says what the snapshot has and what is there.
+TEST(OdeLifecycle, SnapshotOfAnotherScene_IsRefusedWithBothNumbers) {
+  Ode ode;
+  ode.ball(0.1, 1, {0, 0, 1});
+  ode.run(0.01);
+  const std::vector<unsigned char> shot = ode.snapshot();
+  ode.ball(0.1, 1, {0, 0, 2});
+  EXPECT_EQ(dfm_ode_restore(ode.adapter, shot.data(), shot.size()), DFM_E_FORMAT);
+  const std::string why = dfm_last_error();
+  EXPECT_NE(why.find("it has 1 geoms, 1 bodies with geoms and 0 without, and there are 2, 2 and 0"),
+            std::string::npos)
+      << why;
+}
+
 TEST(OdeLifecycle, PlainWorldStep_IsRefused) {
   Ode ode;
   ode.ball(0.1, 1, {0, 0, 1});

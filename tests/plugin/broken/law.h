@@ -1,6 +1,6 @@
 /* The rest of a broken law: eval, tables and entry. Hooks, each a macro with a sound default: EFFECTS and
  * FLAGS what it promises, LANE the update of one contact, BEFORE_EVAL a statement at the head of eval,
- * AFTER_LANE one after each contact, STEP the step it uses, CHECK, SLOTS, SOURCE; with OWN_ENTRY it
+ * AFTER_LANE one after each contact, STEP the step it uses, EVAL, CHECK, SLOTS, SOURCE; with OWN_ENTRY it
  * brings its entry. */
 #include "base.h"
 
@@ -27,6 +27,9 @@
 #endif
 #ifndef CHECK
 #define CHECK NULL
+#endif
+#ifndef EVAL
+#define EVAL eval
 #endif
 #ifndef SLOTS
 #define SLOTS {DFM_PER_CONTACT, 2, DFM_SLOT_TANGENT, 0}
@@ -75,7 +78,7 @@ static const dfm_friction ops = {sizeof(dfm_friction),
                                  FLAGS,
                                  sizeof slots / sizeof slots[0],
                                  slots,
-                                 eval,
+                                 EVAL,
                                  CHECK,
                                  NULL,
                                  NULL,

@@ -1,0 +1,3 @@
+/* V03: nothing to call. */
+#define EVAL NULL
+#include "law.h"
