@@ -168,6 +168,7 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"model_flies_off", "M03", "sum to"},
         Case{"model_brakes_the_free", "M03", "the momentum of a free body changes"},
         Case{"model_other_energy", "M04", "the energy falls by"},
+        Case{"model_forces_of_later_state", "M04", "not of state_out"},
         Case{"model_softer_stiffness", "M05", "off the differences"},
         Case{"model_indefinite", "M05", "a positive direction"},
         Case{"model_counts_points", "M09", "numbered otherwise"},

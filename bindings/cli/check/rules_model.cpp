@@ -222,8 +222,9 @@ std::string forces_are_the_gradient(const Subject &subject) {
           broken(
               "%s, points shaken by %g of an edge: along a random direction the forces do %.9g J/m of work "
               "and the energy falls by %.9g J/m; let the forces be the negative gradient of the energy, with "
-              "every term of both",
-              with(variant).c_str(), share, work, told);
+              "every term of both%s",
+              with(variant).c_str(), share, work, told,
+              body.state.empty() ? "" : " and both of dfm_kin.state, not of state_out");
       }
     }
   });

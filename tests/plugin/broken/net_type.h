@@ -2,8 +2,12 @@
 #ifndef CELLS
 #define CELLS DFM_CELL_TET
 #endif
+#ifndef SLOTS /* of its state; with NSLOT */
+#define NSLOT 0
+#define SLOTS NULL
+#endif
 static const dfm_model model = {
-    sizeof(dfm_model), CAPS,         CELLS,   0,         NULL,      create, destroy, NULL, NULL,
+    sizeof(dfm_model), CAPS,         CELLS,   NSLOT,     SLOTS,     create, destroy, NULL, NULL,
     ADDS_FORCES,       ASKED_ENERGY, pattern, stiffness, extension, 0,      0};
 static const char *const effects[] = {"damping", NULL};
 static const dfm_type type = {sizeof(dfm_type),
