@@ -162,11 +162,7 @@ class Runner {
       out.push_back(std::to_string(stats.cheapened) +
                     " steps came near their limit of work or time (max_work, max_time), so some refinements "
                     "of the contact solve were left out");
-    if (stats.unconverged > 0)
-      out.push_back("the contact solve stopped at its limit of sweeps in " +
-                    std::to_string(stats.unconverged) + " of " + std::to_string(stats.substeps) +
-                    " sub-steps (solver.residual_max is the largest error): take a shorter step, add damping "
-                    "to the material, or lower the ratio of masses or stiffnesses");
+    if (stats.unconverged > 0 && !often_unsolved()) out.push_back(unsolved());
     if (stats.limited_max > 0)
       out.push_back("up to " + std::to_string(stats.limited_max) +
                     " cells at once were stretched so far that their model limited their stiffness: refine "
@@ -190,6 +186,7 @@ class Runner {
           "a model that recovers (corotational_fem, shape_matching)");
     else if (!spoiled_ && trouble_ & DFM_TROUBLE_INVERTED)
       out.push_back("cells became inverted (inside out): refine the mesh or reduce the load");
+    if (often_unsolved()) out.push_back(unsolved());
     const size_t between = spoiled_ ? checks().between_last : checks().between_max;
     const size_t within = spoiled_ ? checks().self_last : checks().self_max;
     const std::string when = spoiled_ ? " in the last state" : " in one state";
@@ -206,6 +203,24 @@ class Runner {
 
  private:
   struct Mark { double wall, cpu; };
+
+  // Single solves that stop at their limit, as in an impact, are for the summary only.
+  bool often_unsolved() const {
+    const dfm_world_stats stats = world_stats(scene_);
+    return double(stats.unconverged) >= 0.01 * double(stats.substeps) && stats.unconverged > 0;
+  }
+
+  std::string unsolved() const {
+    const dfm_world_stats stats = world_stats(scene_);
+    char share[160];
+    std::snprintf(share, sizeof share, "in %llu of %llu sub-steps (%.2g %%), with errors of up to %.1e m/s",
+                  static_cast<unsigned long long>(stats.unconverged),
+                  static_cast<unsigned long long>(stats.substeps),
+                  100 * double(stats.unconverged) / double(stats.substeps), stats.residual_max);
+    return std::string("the contact solve stopped at its limit of sweeps ") + share +
+           ": forces of contact and friction are inexact there, and what should hold may creep; take a "
+           "shorter step, add damping to the material, or lower the ratio of masses or stiffnesses";
+  }
 
   bool any_cut() const {
     return std::any_of(scene_.bodies().begin(), scene_.bodies().end(),

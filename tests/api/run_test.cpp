@@ -264,6 +264,40 @@ TEST(Run, CrossingBodies_AreCounted) {
   EXPECT_NE(value(r.summary, "warnings").find("surfaces cross"), std::string::npos);
 }
 
+// A column of blocks that falls onto the floor at once: of its 200 solves seven stop at their limit, none in
+// the first two steps.
+TEST(Run, SolvesAtTheirLimit_AreSaidWithTheirShare) {
+  const std::string scene = folder() + "/column.json";
+  std::string bodies;
+  for (int i = 0; i < 5; ++i) {
+    char body[256];
+    std::snprintf(body, sizeof body,
+                  R"(%s{"name": "b%d", "mesh": {"make": "beam", "size": [0.1, 0.1, 0.1], "cells": 60},
+                  "material": "gel", "pose": {"position": [%g, %g, %g]}})",
+                  i ? "," : "", i, 0.003 * i, 0.002 * i, 0.0005 + 0.101 * i);
+    bodies += body;
+  }
+  const std::string text = R"({"format": "deform-scene", "version": 1,
+    "time": {"duration": 0.2, "step": 0.002},
+    "materials": {"gel": {"density": 1000, "young": 50000, "poisson": 0.3, "damping": {"stiffness": 0.001}}},
+    "obstacles": [{"name": "floor", "shape": "plane"}], "bodies": [)";
+  test::write_file(scene, text + bodies + "]}");
+  const auto go = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), {"run", scene, "--out", folder() + "/column"});
+    return test::deform(more);
+  };
+  const test::CommandResult often = go({});
+  EXPECT_EQ(often.exit_code, 0) << often.err;
+  const std::string summary = test::read_file(folder() + "/column/summary.json");
+  const std::string count = value(summary, "unconverged_steps") + " of " + value(summary, "substeps");
+  EXPECT_NE(often.err.find("limit of sweeps in " + count + " sub-steps ("), std::string::npos) << often.err;
+  EXPECT_NE(often.err.find("take a shorter step"), std::string::npos) << often.err;
+  EXPECT_NE(value(summary, "warnings").find("limit of sweeps in " + count), std::string::npos) << summary;
+  EXPECT_EQ(go({"--quiet"}).err, "");
+  const test::CommandResult never = go({"--time", "0.004"});
+  EXPECT_EQ(never.err.find("limit of sweeps"), std::string::npos) << never.err;
+}
+
 TEST(Run, LastStep_LandsOnTheEnd) {
   const Outcome r = run("end", {"--time", "0.00125", "--quiet"});
   EXPECT_EQ(value(r.summary, "steps"), "3");
