@@ -1,6 +1,8 @@
 // Text to tree. A scan before the JSON parser limits nesting (so that neither the parser nor later use of the
 // tree can exhaust the stack) and finds duplicate keys, which the parser would silently drop.
 #include <cctype>
+#include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <set>
 
@@ -97,6 +99,20 @@ bool is_not_finite(const std::string &text, size_t byte) {
   return word.rfind("nan", 0) == 0 || word.rfind("inf", 0) == 0;
 }
 
+// The first number outside strings that a double cannot hold, as [begin, end); empty if there is none.
+std::pair<size_t, size_t> too_large_number(const std::string &text) {
+  for (size_t i = 0; i < text.size(); ++i) {
+    if (text[i] == '"') {
+      i = string_end(text, i);
+    } else if (text[i] == '-' || std::isdigit(static_cast<unsigned char>(text[i]))) {
+      const size_t end = std::min(text.find_first_not_of("+-.0123456789eE", i), text.size());
+      if (!std::isfinite(std::strtod(text.substr(i, end - i).c_str(), nullptr))) return {i, end};
+      i = end - 1;
+    }
+  }
+  return {};
+}
+
 }  // namespace
 
 json parse_text(const std::string &text, const std::string &file) {
@@ -110,6 +126,11 @@ json parse_text(const std::string &text, const std::string &file) {
     fail(DFM_E_FORMAT, "%s:%zu:%zu: not JSON: %s%s", file.c_str(), p.line, p.column, reason(e.what()).c_str(),
          is_not_finite(text, e.byte) ? "; numbers must be finite" : "");
   } catch (const json::exception &e) {
+    if (const auto [begin, end] = too_large_number(text); end > begin) {
+      const Place p = place_of(text, begin);
+      fail(DFM_E_FORMAT, "%s:%zu:%zu: the number %.60s is too large; numbers are at most 1.8e308 in size",
+           file.c_str(), p.line, p.column, text.substr(begin, end - begin).c_str());
+    }
     fail(DFM_E_FORMAT, "%s: not JSON: %s", file.c_str(), reason(e.what()).c_str());
   }
 }
