@@ -1,12 +1,14 @@
 // Turns separate triangles into an oriented surface. Order matters: coincident points are merged (an STL file
-// repeats every corner), which makes neighbors; triangles without area are removed, and if one is flat along
-// a side of a neighbor, that neighbor is split, so that no slit opens; duplicates are removed; the rest is
-// oriented consistently and outward. Nothing is closed or smoothed. All thresholds are relative.
+// repeats every corner), which makes neighbors, and so are rims that differ by rounding; triangles without
+// area are removed, and if one is flat along a side of a neighbor, that neighbor is split, so that no slit
+// opens; duplicates are removed; the rest is oriented consistently and outward. Nothing else is closed, and
+// nothing is smoothed. All thresholds are relative.
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <cfloat>
 #include <cmath>
+#include <unordered_map>
 
 #include "core/error.h"
 #include "math/vec3.h"
@@ -19,7 +21,7 @@ namespace {
 
 constexpr int kSplitRounds = 16;  // a flat triangle next to a flat one waits for the next round
 
-struct Repairs { uint32_t split = 0, flat = 0, doubles = 0, walls = 0, twisted = 0; };
+struct Repairs { uint32_t rim = 0, split = 0, flat = 0, doubles = 0, walls = 0, twisted = 0; };
 using Corners3 = std::array<uint32_t, 3>;
 
 uint32_t count(const RawMesh &raw) { return uint32_t(raw.tris.size() / 3); }
@@ -84,6 +86,106 @@ uint32_t merge_points(RawMesh &raw) {
   for (uint32_t &p : raw.tris) p = into[p];
   return merged;
 }
+
+// ---- rims that differ by rounding -------------------------------------------------------------------------
+
+// Programs that compute a seam or a pole twice write coordinates that differ in the last digits: of a double,
+// of a single, or of a text with six digits (1e-5 of the value at most). A gap as narrow as that is no
+// opening. Only points on open edges are merged, within 1e-5 of the largest coordinate and a thousandth of
+// the open edges there, so that no shape is lost. Only the first point of a place is looked up, in file order
+constexpr double kRounding = 1e-5, kOfEdge = 1e-3;
+
+class Rims {
+ public:
+  explicit Rims(RawMesh &raw) : raw_(raw) {}
+
+  uint32_t merge() {
+    const Array<uint64_t> edges = open_edges();
+    double reach = 0, longest = 0;
+    for (const uint64_t e : edges) {
+      longest = std::max(longest, distance(first_end(e), second_end(e)));
+      for (int k = 0; k < 3; ++k)
+        reach = std::max(reach, std::fabs(raw_.points[3 * size_t(first_end(e)) + k]));
+    }
+    width_ = std::min(kRounding * reach, kOfEdge * longest);
+    if (!(width_ > 0)) return 0;
+    find_ends(edges);
+    uint32_t merged = 0;
+    std::unordered_map<uint32_t, uint32_t> into;
+    std::unordered_multimap<uint64_t, uint32_t> first;  // by cell of a grid of that width
+    std::vector<uint32_t> rim;
+    for (const auto &[p, length] : open_) rim.push_back(p);
+    std::sort(rim.begin(), rim.end());
+    for (const uint32_t p : rim) {
+      const uint32_t q = same_place(first, p);
+      if (q == kNoGroup) {
+        first.emplace(cell_of(p, {}), p);
+      } else {
+        into[p] = q;
+        ++merged;
+      }
+    }
+    for (uint32_t &p : raw_.tris)
+      if (const auto found = into.find(p); found != into.end()) p = found->second;
+    return merged;
+  }
+
+ private:
+  static uint32_t first_end(uint64_t edge) { return uint32_t(edge >> 32); }
+  static uint32_t second_end(uint64_t edge) { return uint32_t(edge); }
+
+  Array<uint64_t> open_edges() const {
+    const Array<TriEdge> edges = sorted_edges(*raw_.memory, count(raw_), raw_.tris.data());
+    Array<uint64_t> out{HookAllocator<uint64_t>(*raw_.memory)};
+    for (size_t i = 0, j = 0; i < edges.size(); i = j) {
+      while (j < edges.size() && edges[j].key == edges[i].key) ++j;
+      if (j - i == 1 && first_end(edges[i].key) != second_end(edges[i].key)) out.push_back(edges[i].key);
+    }
+    return out;
+  }
+
+  // Their ends, with the shortest of the edges there that is longer than rounding.
+  void find_ends(const Array<uint64_t> &edges) {
+    for (const uint64_t e : edges) {
+      const double length = distance(first_end(e), second_end(e));
+      for (const uint32_t p : {first_end(e), second_end(e)}) {
+        double &least = open_.try_emplace(p, DBL_MAX).first->second;
+        if (length > width_) least = std::min(least, length);
+      }
+    }
+  }
+
+  double distance(uint32_t a, uint32_t b) const {  // of the coordinates: a sum of squares may overflow
+    double most = 0;
+    for (int k = 0; k < 3; ++k)
+      most = std::max(most, std::fabs(raw_.points[3 * size_t(a) + k] - raw_.points[3 * size_t(b) + k]));
+    return most;
+  }
+
+  uint64_t cell_of(uint32_t p, const std::array<int, 3> &shift) const {
+    double at[3];
+    for (int k = 0; k < 3; ++k) at[k] = std::floor(raw_.points[3 * size_t(p) + k] / width_) + shift[k];
+    return place_hash(at);
+  }
+
+  // Cells of one hash may be different cells: the distance decides, and among several the first point.
+  uint32_t same_place(const std::unordered_multimap<uint64_t, uint32_t> &first, uint32_t p) const {
+    uint32_t best = kNoGroup;
+    for (int i = 0; i < 27; ++i) {
+      const auto [begin, end] = first.equal_range(cell_of(p, {i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1}));
+      for (auto it = begin; it != end; ++it) {
+        const uint32_t q = it->second;
+        const double edge = std::min(open_.at(p), open_.at(q));
+        if (q < best && distance(p, q) <= std::min(width_, kOfEdge * edge)) best = q;
+      }
+    }
+    return best;
+  }
+
+  RawMesh &raw_;
+  double width_ = 0;
+  std::unordered_map<uint32_t, double> open_;
+};
 
 // ---- boundary of cells ------------------------------------------------------------------------------------
 
@@ -301,9 +403,12 @@ void take_groups(RawMesh &raw, TriMesh &mesh) {
 void add_warnings(TriMesh &mesh, const Repairs &done) {
   const auto warn = [&](const std::string &text) { mesh.warnings.push_back(text); };
   const TriMeshStatistics s = tri_mesh_statistics(mesh);
-  if (mesh.merged_points)
-    warn(format("%u point%s %s merged with another at exactly the same place", mesh.merged_points,
-                plural(mesh.merged_points), was_were(mesh.merged_points)));
+  if (const uint32_t exact = mesh.merged_points - done.rim)
+    warn(format("%u point%s %s merged with another at exactly the same place", exact, plural(exact),
+                was_were(exact)));
+  if (done.rim)
+    warn(format("%u point%s on open edges %s merged with another that differs by rounding only", done.rim,
+                plural(done.rim), was_were(done.rim)));
   if (done.split)
     warn(format("%u triangle%s without area %s taken up by splitting the neighbor", done.split,
                 plural(done.split), was_were(done.split)));
@@ -346,10 +451,11 @@ TriMesh finish_surface(const std::string &path, RawMesh &&raw) {
          kCrowdedEdge / 3);
   check_points(path, raw.points);
   raw.tri_group.resize(count(raw), kNoGroup);
+  Repairs done;
   mesh.merged_points = merge_points(raw);
+  if (raw.tets.empty()) mesh.merged_points += done.rim = Rims(raw).merge();
   const uint32_t inner = raw.tets.empty() ? 0 : take_boundary(raw);
 
-  Repairs done;
   const uint32_t given = count(raw);
   done.flat = keep_triangles(raw, [&](uint32_t t) { return !has_double_corner(corners(raw, t)); });
   done.split = split_beside_flat(raw);

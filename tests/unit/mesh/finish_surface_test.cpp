@@ -127,11 +127,39 @@ TEST(FinishSurface, MinusZero_IsZero) {
   EXPECT_EQ(finished(s).npoint(), 8u);
 }
 
-// A neighbor one rounding away is another point: what lies apart in the file stays apart.
-TEST(FinishSurface, OneRoundingApart_IsNotMerged) {
+// A seam that was computed twice differs in its last digits: of a double, a single, or a text of six digits.
+TEST(FinishSurface, OneRoundingApart_IsMerged) {
+  for (const double scale : {1e-150, 1e-3, 1.0, 1e90})
+    for (const double apart : {1e-16, 1e-7, 4e-6}) {
+      Soup s = loose(box({0.5, 0.5, 0.5}, {1, 1, 1}));
+      uint32_t n = 0;
+      for (Vec3 &p : s.points) {
+        p = {std::min(p.x + apart * (n % 3), 1.0), std::min(p.y + apart * (n % 2), 1.0), p.z};
+        ++n;
+      }
+      const TriMesh m = finished(s, scale);
+      EXPECT_EQ(m.npoint(), 8u) << scale << ' ' << apart;
+      EXPECT_TRUE(tri_mesh_statistics(m).closed) << scale << ' ' << apart;
+      EXPECT_EQ(m.merged_points, 28u);
+    }
   Soup s = loose(box({}, {1, 1, 1}));
   s.points[1].x = std::nextafter(s.points[1].x, 2);
+  EXPECT_EQ(all_warnings(finished(s)),
+            "27 points were merged with another at exactly the same place\n"
+            "1 point on open edges was merged with another that differs by rounding only\n");
+}
+
+// A slit that is meant is wider; points that are no ends of open edges stay, however near.
+TEST(FinishSurface, FartherApart_IsNotMerged) {
+  Soup s = loose(box({}, {1, 1, 1}));
+  s.points[1].x += 3e-5;
   EXPECT_EQ(finished(s).npoint(), 9u);
+  const Soup near = joined(box({}, {1, 1, 1}), box({1 + 1e-9, 0, 0}, {2, 1, 1}));
+  EXPECT_EQ(finished(near).npoint(), 16u);
+  const Soup small = box({0.5, 0.5, 0.5}, {0.5 + 1e-6, 0.5 + 1e-6, 0.5 + 1e-6});  // smaller than the rounding
+  Soup open = joined(small, box({}, {1e-7, 1e-7, 1e-7}));
+  open.tris.erase(open.tris.begin());
+  EXPECT_EQ(finished(open).npoint(), 16u);
 }
 
 TEST(FinishSurface, TurnedAtRandom_FacesOutward) {
@@ -419,7 +447,8 @@ TEST(FinishSurface, NothingThere_IsRefusedWithASentence) {
 }
 
 TEST(FinishSurface, OutOfMemoryAnywhere_LeaksNothing) {
-  const Soup s = loose(joined(turned(box({}, {3, 3, 3}), 2), box({1, 1, 1}, {2, 2, 2})));
+  Soup s = loose(joined(turned(box({}, {3, 3, 3}), 2), box({1, 1, 1}, {2, 2, 2})));
+  s.points[0].x += 1e-9;
   for (size_t n = 1; n < 200; ++n) {
     test::CountedMemory memory;
     bool done = false;
