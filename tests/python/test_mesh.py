@@ -31,6 +31,16 @@ class Meshes(unittest.TestCase):
         self.assertEqual(len(mesh.warnings), 2)
         with self.assertRaisesRegex(deform.ArgumentError, "name point 7"):
             deform.TetMesh.from_arrays(points, [[0, 1, 2, 7]])
+        points[3][1] = np.nan
+        for kind, cells in ((deform.TetMesh, [[0, 1, 2, 3]]), (deform.TriMesh, [[0, 1, 2]])):
+            with self.assertRaisesRegex(deform.ArgumentError, r"points\[3\] is \(0.0, nan, 1.0\)"):
+                kind.from_arrays(points, cells)
+
+    def test_from_arrays_warns_of_arrays(self):
+        with self.assertLogs("deform", "WARNING") as said:
+            deform.TetMesh.from_arrays([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1, 3]])
+        self.assertEqual(said.output,
+                         ["WARNING:deform:from_arrays: 1 of 1 cells had negative volume and was turned"])
 
     def test_surface_filled_and_hung(self):
         surface = deform.TriMesh.make("torus", [0.2, 0.06], triangles=1500)

@@ -1,18 +1,19 @@
 """Contexts: what holds loaded plugins and worlds; parameters by key; what plugins say of themselves."""
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import difflib
 import logging
 import threading
 import weakref
 from dataclasses import dataclass
-from typing import Any, Iterable, Mapping
+from typing import Any, Iterable, Iterator, Mapping
 
 import numpy as np
 
 from . import _abi
-from ._library import ArgumentError, check, default, encoded, lib, quick
+from ._library import ArgumentError, Error, check, default, encoded, lib, quick
 
 _LOG = logging.getLogger("deform")
 _LEVELS = {_abi.DFM_LOG_DEBUG: logging.DEBUG, _abi.DFM_LOG_INFO: logging.INFO,
@@ -22,9 +23,26 @@ _VisitFn = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_cha
 _KINDS = {_abi.DFM_KIND_FRICTION: "friction", _abi.DFM_KIND_MODEL: "model", _abi.DFM_KIND_SOLVER: "solver"}
 
 
+_names = threading.local()
+
+
+@contextlib.contextmanager
+def called(file: str, name: str) -> Iterator[None]:
+    """While it lasts, errors and warnings of this thread name `name` in place of a file of our own."""
+    _names.swap = (file, name)
+    try:
+        yield
+    except Error as said:
+        raise type(said)(str(said).replace(file, name), said.status) from None
+    finally:
+        del _names.swap
+
+
 @_LogFn
 def _log(_user: int, level: int, sentence: bytes) -> None:
-    _LOG.log(_LEVELS.get(level, logging.ERROR), "%s", (sentence or b"").decode("utf-8", "replace"))
+    text = (sentence or b"").decode("utf-8", "replace")
+    swap = getattr(_names, "swap", None)
+    _LOG.log(_LEVELS.get(level, logging.ERROR), "%s", text.replace(*swap) if swap else text)
 
 
 def choice(what: str, given: str, allowed: Iterable[str]) -> str:

@@ -10,7 +10,7 @@ from typing import Any, Sequence
 import numpy as np
 
 from . import _abi
-from ._context import Context, default_context
+from ._context import Context, called, default_context
 from ._library import ArgumentError, check, encoded, lib, quick, sized
 
 
@@ -19,6 +19,10 @@ def points_of(points: Any, what: str = "points") -> np.ndarray:
     array = np.ascontiguousarray(points, dtype=np.float64)
     if array.ndim != 2 or array.shape[1] != 3:
         raise ArgumentError(f"{what} has the shape {array.shape}; expected (n, 3), in m", "DFM_E_ARG")
+    bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
+    if bad.size:
+        raise ArgumentError(f"{what}[{bad[0]}] is {tuple(array[bad[0]].tolist())}; it must be finite",
+                            "DFM_E_ARG")
     return array
 
 
@@ -217,7 +221,8 @@ class TetMesh(_Mesh):
                              + f"POINTS {len(p)} double\n".encode() + p.astype(">f8").tobytes()
                              + f"\nCELLS {len(t)} {rows.size}\n".encode() + rows.tobytes()
                              + f"\nCELL_TYPES {len(t)}\n".encode() + np.full(len(t), 10, ">i4").tobytes())
-            return cls.read(file)
+            with called(str(file), "from_arrays"):
+                return cls.read(file)
 
     @classmethod
     def from_meshio(cls, mesh: Any) -> TetMesh:
