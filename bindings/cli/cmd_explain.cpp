@@ -128,16 +128,25 @@ void print_cuts(const JsonValue &plan) {
     const JsonValue *const list = b.find("cuts");
     const std::string tears = b.get("tears_beyond");
     const bool may_tear = !tears.empty() && tears != "null";
+    bool each_step = may_tear;
     for (size_t k = 0; list && k < list->items.size(); ++k) {
       const JsonValue &c = list->items[k];
-      const std::string most = c.get("most") == "0" ? "" : ", " + c.get("most") + " in a step at most";
+      std::string most = c.get("most") == "0" ? "" : ", " + c.get("most");
+      if (c.find("at")) {
+        if (!most.empty()) most += " at most";
+        std::printf("  %-20s  cut at %s s by %s, which %s%s\n", b.get("name").c_str(), c.get("at").c_str(),
+                    c.get("by").c_str(), c.get("how").c_str(), most.c_str());
+        continue;
+      }
+      if (!most.empty()) most += " in a step at most";
+      each_step = true;
       std::printf("  %-20s  cut by %s, which %s%s\n", b.get("name").c_str(), c.get("by").c_str(),
                   c.get("how").c_str(), most.c_str());
     }
     if (may_tear)
       std::printf("  %-20s  tears beyond a strain of %s, 64 points in a step at most\n",
                   b.get("name").c_str(), tears.c_str());
-    if (may_tear || (list && !list->items.empty()))
+    if (each_step)
       std::printf(
           "  %-20s  a step that cuts or tears rebuilds the body of %s cells; any other step checks each of "
           "them "

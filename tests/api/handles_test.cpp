@@ -202,6 +202,7 @@ std::vector<Call> body_calls() {
          const dfm_cut_def d = dfm_cut_def_default();
          return dfm_body_cut(h, &d, nullptr);
        }},
+      {"body_plan_cut", [](uint64_t h) { return dfm_body_plan_cut(h, 0, nullptr); }},
       {"body_remove_cells", [](uint64_t h) { return dfm_body_remove_cells(h, 1, &index0, nullptr); }},
       {"body_separate", [](uint64_t h) { return dfm_body_separate(h, nullptr, nullptr); }},
       {"body_set_separate", [](uint64_t h) { return dfm_body_set_separate(h, nullptr); }},

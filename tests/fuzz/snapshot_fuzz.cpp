@@ -51,6 +51,13 @@ struct Scene {
       const double force[6] = {0.1};
       const dfm_sine wobble{{0.5, 0, 0}, 30, 0.2};
       if (k == 2) need(dfm_body_add_load(body, 2, points, force, 0, nullptr, &wobble, nullptr));
+      dfm_cut_def plane = dfm_cut_def_default();
+      plane.shape = DFM_CUT_PLANE;
+      plane.how = DFM_CUT_SPLIT;
+      plane.blade[2] = 0.15;
+      plane.blade[5] = 1;
+      for (const double t : {0.012005, 0.1})  // the first one in the step after the snapshot
+        if (k == 2) need(dfm_body_plan_cut(body, t, &plane));
       if (k == 1) {
         need(dfm_body_hold(body, 2, points, 7));
         need(dfm_body_move_held(body, 2, points, 0, nullptr, &wobble));

@@ -35,6 +35,19 @@ class Cuts(Scenery):
         self.assertEqual(sorted(set(from_points)), list(range(points)))
         self.assertEqual(sorted(from_cells), list(range(cells)))
 
+    def test_planes_cut_at_once_and_at_their_time(self):
+        self.body.plan_cut(2e-3, point=(0, 0, 0.001), normal=(0, 0, 2))
+        self.body.plan_cut(3e-3, "box", half_size=(0.01, 0.01, 0.01))
+        cells = self.body.ntet
+        self.world.step(1e-3)
+        self.assertEqual(self.body.cut("plane", point=(0.001, 0, 0), normal=(1, 0, 0)).parts, 2)
+        self.world.step(1e-3)
+        self.assertGreaterEqual(self.body.remove_cells([]).parts, 4)
+        self.assertEqual(self.body.ntet, cells)
+        self.body.plan_no_cuts()
+        self.world.step(2e-3)
+        self.assertEqual(self.body.ntet, cells)
+
     def test_arrays_follow_the_cut(self):
         body = self.body
         names = ("positions", "velocities", "normals", "forces", "triangles", "points", "stress",
@@ -78,6 +91,10 @@ class Cuts(Scenery):
     def test_what_is_wrong_is_said(self):
         for call in (lambda: self.body.cut(), lambda: self.body.cut("blad", corners=self.plane(0)),
                      lambda: self.body.cut("box", corners=self.plane(0)),
+                     lambda: self.body.cut("plane", point=(0, 0, 0)),
+                     lambda: self.body.cut("box", normal=(0, 0, 1), half_size=(1, 1, 1)),
+                     lambda: self.body.plan_cut(-1, point=(0, 0, 0), normal=(1, 0, 0)),
+                     lambda: self.body.plan_cut(1, point=(0, 0, 0), normal=(0, 0, 0)),
                      lambda: self.body.cut("box", how="split", half_size=(1, 1, 1)),
                      lambda: self.body.remove_cells([99999])):
             with self.assertRaises(deform.ArgumentError):

@@ -198,6 +198,7 @@ FUNCTIONS = {
     "dfm_sensor_things": (i32, [u64, u32, ptr, ptr]),
     "dfm_cut_def_default_sized": (None, [u32, ptr]),
     "dfm_body_cut": (i32, [u64, ptr, ptr]),
+    "dfm_body_plan_cut": (i32, [u64, f64, ptr]),
     "dfm_body_remove_cells": (i32, [u64, u32, ptr, ptr]),
     "dfm_body_origins": (i32, [u64, u32, ptr, u32, ptr]),
     "dfm_separate_def_default_sized": (None, [u32, ptr]),

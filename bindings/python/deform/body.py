@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from .world import World
 
 EVERYTHING = 0xFFFFFFFF
-CUT_SHAPES = {"ellipsoid": 0, "box": 1, "blade": 2}
+CUT_SHAPES = {"ellipsoid": 0, "box": 1, "blade": 2, "plane": 3}
 CUT_WAYS = {"remove": 0, "split": 1}
 
 
@@ -55,6 +55,27 @@ def vector(values: Any, what: str, width: int = 3) -> Any:
 def pose_of(position: Any, rotation: Any) -> _abi.dfm_pose:
     """position [3] m, rotation a quaternion x, y, z, w."""
     return _abi.dfm_pose(vector(position, "position"), vector(rotation, "rotation", 4))
+
+
+def cut_def(shape: str, corners: Any, point: Any, normal: Any, position: Any, rotation: Any, half_size: Any,
+            motion: Any, how: str | None, most: int) -> Any:
+    """Of Body.cut and Body.plan_cut."""
+    out = default(_abi.dfm_cut_def)
+    out.shape = CUT_SHAPES[choice("shape", shape, CUT_SHAPES)]
+    word = how if how is not None else "split" if shape in ("blade", "plane") else "remove"
+    out.how = CUT_WAYS[choice("how", word, CUT_WAYS)]
+    if (shape == "blade") != (corners is not None):
+        raise ArgumentError("a blade needs corners [4,3], and no other shape has them", "DFM_E_ARG")
+    if (shape == "plane") != (point is not None) or (shape == "plane") != (normal is not None):
+        raise ArgumentError("a plane needs point [3] and normal [3], no other shape has them", "DFM_E_ARG")
+    if corners is not None:
+        out.blade = vector(corners, "corners", 12)
+    if shape == "plane":
+        out.blade[0:3], out.blade[3:6] = vector(point, "point"), vector(normal, "normal")
+    out.pose = pose_of(position, rotation)
+    out.half_size, out.motion = vector(half_size, "half_size"), vector(motion, "motion")
+    out.most = most
+    return out
 
 
 def numbers_of(points: Any) -> np.ndarray:
@@ -381,32 +402,40 @@ class Body(_Part):
         check(quick.dfm_body_get_attachment(self.handle, number, ctypes.byref(out)))
         return out
 
-    def cut(self, shape: str = "blade", *, corners: Any = None, position: Any = (0, 0, 0),
-            rotation: Any = (0, 0, 0, 1), half_size: Any = (0, 0, 0), motion: Any = (0, 0, 0),
-            how: str | None = None, most: int = 0) -> CutInfo:
+    def cut(self, shape: str = "blade", *, corners: Any = None, point: Any = None, normal: Any = None,
+            position: Any = (0, 0, 0), rotation: Any = (0, 0, 0, 1), half_size: Any = (0, 0, 0),
+            motion: Any = (0, 0, 0), how: str | None = None, most: int = 0) -> CutInfo:
         """Cuts the body between two steps. Points and cells get new numbers (origins).
 
-        shape: a "blade" has corners [4,3] m in the world: an edge from 0 to 1, which has come to 3 and 2. An
-        "ellipsoid" or a "box" has half_size [3] m (semi-axes, half edges) at position [3] m with rotation (a
-        quaternion x, y, z, w), and goes by motion [3] m. how: "split" opens the faces that a blade crosses,
-        "remove" takes the cells that the shape meets; None: "split" of a blade. most: faces or cells, 0: all.
+        shape: a "blade" has corners [4,3] m in the world: an edge from 0 to 1, which has come to 3 and 2. A
+        "plane" through the whole body has a point [3] m and a normal [3]. An "ellipsoid" or a "box" has
+        half_size [3] m (semi-axes, half edges) at position [3] m with rotation (a quaternion x, y, z, w), and
+        goes by motion [3] m. how: "split" opens the faces that a blade or a plane crosses, "remove" takes the
+        cells that the shape meets; None: "split" of a blade and a plane. most: faces or cells, 0: all.
         UnsupportedError where the model needs all of its cells: msm and corotational_fem do not."""
-        definition = default(_abi.dfm_cut_def)
-        definition.shape = CUT_SHAPES[choice("shape", shape, CUT_SHAPES)]
-        word = how if how is not None else "split" if shape == "blade" else "remove"
-        definition.how = CUT_WAYS[choice("how", word, CUT_WAYS)]
-        if (shape == "blade") != (corners is not None):
-            raise ArgumentError("a blade needs corners [4,3], and no other shape has them", "DFM_E_ARG")
-        if corners is not None:
-            definition.blade = vector(corners, "corners", 12)
-        definition.pose = pose_of(position, rotation)
-        definition.half_size, definition.motion = vector(half_size, "half_size"), vector(motion, "motion")
-        definition.most = most
+        definition = cut_def(shape, corners, point, normal, position, rotation, half_size, motion, how, most)
         info = sized(_abi.dfm_cut_info)
         with self.world.alone():
             status = lib.dfm_body_cut(self.handle, ctypes.byref(definition), ctypes.byref(info))
         check(status)
         return CutInfo.of(info)
+
+    def plan_cut(self, t: float, shape: str = "plane", *, corners: Any = None, point: Any = None,
+                 normal: Any = None, position: Any = (0, 0, 0), rotation: Any = (0, 0, 0, 1),
+                 half_size: Any = (0, 0, 0), motion: Any = (0, 0, 0), how: str | None = None,
+                 most: int = 0) -> None:
+        """Plans a cut (see cut) of the body and of its pieces, at the end of the first step that ends at t s
+        or later."""
+        definition = cut_def(shape, corners, point, normal, position, rotation, half_size, motion, how, most)
+        with self.world.alone():
+            status = lib.dfm_body_plan_cut(self.handle, t, ctypes.byref(definition))
+        check(status)
+
+    def plan_no_cuts(self) -> None:
+        """No planned cut of the body and of its pieces is to come any more."""
+        with self.world.alone():
+            status = lib.dfm_body_plan_cut(self.handle, 0, None)
+        check(status)
 
     def remove_cells(self, cells: Any) -> CutInfo:
         """Takes cells away by their numbers [n], between two steps."""

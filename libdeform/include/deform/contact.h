@@ -189,8 +189,8 @@ typedef struct dfm_contact_event {
 /* RELEASE: an attachment ended, by its release force or with one of its sides; key is its number
  * (deform/attach.h). SENSOR: a thing entered or left a sensor (deform/sensor.h). TEAR: body a == b tore, by
  * "tear" of its material (deform/material.h); key is the number of points that were split. CUT: part b of a
- * tool cut body a (dfm_tool_set_cuts); key is the number of opened faces or removed cells. PIECE: a part of
- * body a became body b (dfm_body_separate); key is the number of its cells */
+ * tool cut body a (dfm_tool_set_cuts), or, if a == b, a planned cut (dfm_body_plan_cut); key is the number of
+ * opened faces or removed cells. PIECE: a part of body a is now body b (dfm_body_separate); key: its cells */
 enum {
   DFM_EVENT_BEGIN = 1,
   DFM_EVENT_END = 2,

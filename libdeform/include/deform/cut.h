@@ -8,11 +8,12 @@
 extern "C" {
 #endif
 /** dfm_cut_def.shape. ELLIPSOID (a sphere where its semi-axes are equal) and BOX stand at `pose` and are
- * swept along `motion`. BLADE is a quadrilateral: an edge, and where the edge has come to. */
-enum { DFM_CUT_ELLIPSOID = 0, DFM_CUT_BOX = 1, DFM_CUT_BLADE = 2 };
-/** dfm_cut_def.how. REMOVE: the cells that the shape meets go, with their mass. SPLIT, of a blade: faces
- * between cells open where the middles of their two cells lie on both sides of it, and points are split where
- * the cells around them hang together no more; no cell is divided, and no mass is lost. */
+ * swept along `motion`. BLADE is a quadrilateral: an edge, and where the edge has come to. PLANE goes through
+ * the whole body. */
+enum { DFM_CUT_ELLIPSOID = 0, DFM_CUT_BOX = 1, DFM_CUT_BLADE = 2, DFM_CUT_PLANE = 3 };
+/** dfm_cut_def.how. REMOVE: the cells that the shape meets go, with their mass. SPLIT, of a blade or
+ * plane: faces between cells open where the middles of the two lie on both sides of it, and points are split
+ * where the cells around them hang together no more; no cell is divided, and no mass is lost. */
 enum { DFM_CUT_REMOVE = 0, DFM_CUT_SPLIT = 1 };
 typedef struct dfm_cut_def {
   uint32_t size, flags; /* flags: 0 */
@@ -20,7 +21,9 @@ typedef struct dfm_cut_def {
   dfm_pose pose;        /* of ellipsoid and box, before the motion */
   double half_size[3];  /* m: semi-axes, or half the edges of the box; along the axes of the pose */
   double motion[3];     /* m, in the world: straight way of the ellipsoid or box */
-  double blade[12];     /* [4,3] m, in the world: edge from 0 to 1, which has come to 3 and 2 */
+  /* [4,3] m, in the world: edge from 0 to 1, which has come to 3 and 2. PLANE: [0] a point of it, [1] its
+   * normal, of any length above 0 */
+  double blade[12];
   /* REMOVE: cells that may go, those of the lowest numbers; SPLIT: faces that may open, in the order in which
    * the blade meets them; 0: all that are met */
   uint32_t most;
@@ -47,8 +50,8 @@ typedef struct dfm_cut_info {
   double kinetic, elastic;  /* J, before less after; elastic NAN where the model gives no energy */
   uint32_t pieces;          /* bodies that have come off it (dfm_body_set_separate) */
   uint32_t reserved2;
-  /* for a blade that opens faces of a material with "fracture_energy": the energy that opens them, J, and the
-   * force on the blade, opposite to its motion, that does this work, N */
+  /* for faces of a material with "fracture_energy": the energy that opens them, J, and the force on the
+   * blade, opposite to its motion, that does this work, N; 0 of a plane */
   double fracture, force[3];
 } dfm_cut_info;
 /** Cuts a body. Points that stay keep their positions and velocities to the bit, and that part of their mass
@@ -65,6 +68,15 @@ typedef struct dfm_cut_info {
  * or the contact method is ROLLBACK; DFM_E_NOMEM. After an error nothing has changed.
  * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_cut(dfm_body body, const dfm_cut_def *def, dfm_cut_info *out);
+/** Plans a cut as dfm_body_cut makes it, at the end of the first step that ends at t or later. It cuts pieces
+ * that have come off the body by then, too. Cuts of one time are made in the order of the calls. An event
+ * DFM_EVENT_CUT reports each that has met cells (deform/contact.h), a warning in the log one that has met
+ * none. Snapshots hold the cuts to come. Until the last one is made, the model of the body changes only to
+ * one that can be cut.
+ * @param t    s, finite, not before the time of the world
+ * @param def  copied; NULL: no cut of the body and of its pieces is to come any more
+ * @return as dfm_body_cut; DFM_E_ARG also t. Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_body_plan_cut(dfm_body body, double t, const dfm_cut_def *def);
 /** Removes cells by their numbers, as dfm_body_cut does. @param n number of entries; a cell may be named
  * twice. @param cells [n] @return as dfm_body_cut; DFM_E_ARG a cell does not exist.
  * Threads: Not during step. Since 0.1. */

@@ -29,6 +29,10 @@ class BodyCuts {
       return dfm_body_cut(body(), &def, &info);
     });
   }
+  auto plan_cut(double t, const dfm_cut_def &def) const {
+    return E::done(dfm_body_plan_cut(body(), t, &def));
+  }
+  auto plan_no_cuts() const { return E::done(dfm_body_plan_cut(body(), 0, nullptr)); }
   auto remove_cells(std::span<const uint32_t> cells) const {
     return produce<E, dfm_cut_info>([&](dfm_cut_info &info) {
       info.size = sizeof info;

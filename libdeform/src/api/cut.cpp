@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "api/objects.h"
+#include "world/planned_cut.h"
 #include "world/separate.h"
 #include "world/snapshot_cuts.h"
 
@@ -11,21 +12,28 @@ using namespace dfm;
 
 namespace {
 
+constexpr double kRounding = 1e-9;  // of the time of a world, which is a sum of steps
+
 bool finite(const double *x, size_t n) {
   return std::all_of(x, x + n, [](double value) { return std::isfinite(value); });
 }
 
 CutShape shape_of(const Body &b, const dfm_cut_def &def) {
   const char *const name = b.name.c_str();
-  if (def.shape > DFM_CUT_BLADE)
+  if (def.shape > DFM_CUT_PLANE)
     fail(DFM_E_ARG,
-         "body '%s': unknown shape of a cut, %u; use DFM_CUT_ELLIPSOID, DFM_CUT_BOX or DFM_CUT_BLADE", name,
-         def.shape);
+         "body '%s': unknown shape of a cut, %u; use DFM_CUT_ELLIPSOID, DFM_CUT_BOX, DFM_CUT_BLADE or "
+         "DFM_CUT_PLANE",
+         name, def.shape);
   if (def.how > DFM_CUT_SPLIT)
     fail(DFM_E_ARG, "body '%s': unknown way of cutting, %u; use DFM_CUT_REMOVE or DFM_CUT_SPLIT", name,
          def.how);
-  if (def.how == DFM_CUT_SPLIT && def.shape != DFM_CUT_BLADE)
-    fail(DFM_E_ARG, "body '%s': DFM_CUT_SPLIT opens faces along a blade; take the shape DFM_CUT_BLADE", name);
+  const bool flat = def.shape == DFM_CUT_BLADE || def.shape == DFM_CUT_PLANE;
+  if (def.how == DFM_CUT_SPLIT && !flat)
+    fail(DFM_E_ARG,
+         "body '%s': DFM_CUT_SPLIT opens faces along a blade or a plane; take the shape DFM_CUT_BLADE or "
+         "DFM_CUT_PLANE, or remove cells by DFM_CUT_REMOVE",
+         name);
   if (!finite(def.pose.position, 3) || !finite(def.pose.rotation, 4) || !finite(def.motion, 3) ||
       !finite(def.blade, 12))
     fail(DFM_E_ARG, "body '%s': pose, motion and blade of a cut must be finite", name);
@@ -37,7 +45,11 @@ CutShape shape_of(const Body &b, const dfm_cut_def &def) {
   s.half_size = load3(def.half_size);
   s.way = load3(def.motion);
   for (int k = 0; k < 4; ++k) s.corner[k] = load3(def.blade + 3 * k);
-  if (def.shape != DFM_CUT_BLADE)
+  const double length = norm(s.corner[1]);
+  if (def.shape == DFM_CUT_PLANE && !(length > 0 && std::isfinite(length)))
+    fail(DFM_E_ARG, "body '%s': the normal of a plane that cuts it has the length %g; give a direction", name,
+         length);
+  if (!flat)
     for (const double size : def.half_size)
       if (!(size > 0 && std::isfinite(size)))
         fail(DFM_E_ARG, "body '%s': half_size of a cut has %g m; all three must be positive and finite", name,
@@ -88,10 +100,26 @@ dfm_status dfm_body_cut(dfm_body body, const dfm_cut_def *def, dfm_cut_info *out
     const dfm_cut_def own = take_def(def, dfm_cut_def_default());
     check_flags(own, 0, "dfm_cut_def");
     const CutShape shape = shape_of(b, own);
-    CutReport report =
-        own.how == DFM_CUT_SPLIT ? split_by_blade(b, shape, own.most) : remove_by_shape(b, shape, own.most);
-    separate_if_asked(b, report);
+    const CutReport report = make_cut(b, shape, own.how, own.most);
     if (out) give(out, told(report));
+  });
+}
+
+dfm_status dfm_body_plan_cut(dfm_body body, double t, const dfm_cut_def *def) {
+  return as_status([&] {
+    Body &b = body_of(body);
+    exclusive(*b.world);
+    if (!def) return plan_no_cuts(b);
+    const double now = b.world->time;
+    if (!(t >= now - kRounding * now && std::isfinite(t)))
+      fail(
+          DFM_E_ARG,
+          "body '%s': a cut at %g s, and the time of the world is %g s; give a finite time that is not past, "
+          "or cut now by dfm_body_cut",
+          b.name.c_str(), t, now);
+    const dfm_cut_def own = take_def(def, dfm_cut_def_default());
+    check_flags(own, 0, "dfm_cut_def");
+    plan_cut(b, {t, own.how, own.most, shape_of(b, own)});
   });
 }
 

@@ -13,6 +13,7 @@
 #include "world/equilibrium.h"
 #include "world/explain.h"
 #include "world/model_change.h"
+#include "world/planned_cut.h"
 #include "world/sensors.h"
 #include "world/snapshot.h"
 #include "world/tear.h"
@@ -276,6 +277,7 @@ dfm_status dfm_world_step(dfm_world world, double dt, uint32_t *trouble) {
     const dfm_status s = step_within_budget(w, dt, &bits);
     if (trouble) *trouble = bits;
     if (s == DFM_OK) cut_by_tools(w);
+    if (s == DFM_OK) make_planned_cuts(w, dt);
     if (s == DFM_OK) tear_bodies(w);
     if (s == DFM_OK) look_at_sensors(w, true);
     if (s == DFM_OK) write_devices(w);

@@ -2,6 +2,7 @@
 //
 //   ellipsoid, box   at a pose, swept along a straight way
 //   blade            a quadrilateral: where an edge was, and where it is now
+//   plane            through a whole body: a blade takes its place when it cuts (world/planned_cut.h)
 #pragma once
 #include <cstdint>
 
@@ -9,7 +10,7 @@
 
 namespace dfm {
 
-enum class CutKind : uint32_t { ellipsoid = 0, box = 1, blade = 2 };
+enum class CutKind : uint32_t { ellipsoid = 0, box = 1, blade = 2, plane = 3 };
 
 struct CutShape {
   CutKind kind = CutKind::ellipsoid;
@@ -17,7 +18,7 @@ struct CutShape {
   Quat rotation;
   Vec3 half_size;  // m: semi-axes, or half the edges of the box
   Vec3 way;        // m, in the axes of the world
-  Vec3 corner[4];  // of the blade, m, in order around it, in the world
+  Vec3 corner[4];  // of the blade, m, in order around it, in the world; of a plane: a point, and its normal
 };
 
 // Corners in any order; one without volume counts as its hull. Touching counts as meeting.

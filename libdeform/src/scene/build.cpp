@@ -49,6 +49,7 @@ class Builder {
     check(dfm_world_stable_step(world_, &step, nullptr, nullptr), def_.effects_auto ? "/bodies" : "/effects");
     if (def_.equilibrium) check_static();
     for (Body &b : def_.bodies) check_model(b);
+    for (const Cut &c : def_.cuts) plan_cut(c);  // before changes of models, which ask for them
     for (Body &b : def_.bodies) add_switches(b);
     return {std::exchange(world_, 0), std::move(probes_)};
   }
@@ -574,6 +575,17 @@ class Builder {
       check(dfm_world_find_body(world_, t.cuts.bodies[i].c_str(), &bodies[i]), t.cuts.pointer);
     check(dfm_tool_set_cuts(tool, t.cuts.how, t.cuts.most, uint32_t(bodies.size()), bodies.data()),
           t.cuts.pointer);
+  }
+
+  void plan_cut(const Cut &c) const {
+    dfm_body body = 0;
+    check(dfm_world_find_body(world_, c.body.c_str(), &body), c.pointer);
+    check(dfm_body_plan_cut(body, c.t, &c.def), c.pointer);
+    if (c.t > def_.begin + def_.duration)
+      context_->logf(DFM_LOG_WARNING,
+                     "body '%s': its cut at %g s (%s/t) is never made, because the run ends before; give an "
+                     "earlier time, or a longer /time/duration",
+                     c.body.c_str(), c.t, c.pointer.c_str());
   }
 
   void add_friction(Friction &f) {

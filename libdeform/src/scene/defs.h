@@ -184,6 +184,13 @@ struct Tool {
   } cuts;
 };
 
+// Without a tool, at the end of the first step that ends at t or later.
+struct Cut {
+  std::string pointer, body;
+  double t = 0;
+  dfm_cut_def def = dfm_cut_def_default();
+};
+
 struct Material {
   std::string pointer, name, title;  // the key; the name in the world, empty: none
   double density = 1000, young = 1e5, poisson = 0.3, damping_mass = 0, damping_stiffness = 0;
@@ -233,6 +240,7 @@ struct Definition {
   std::vector<Obstacle> obstacles;
   Rigid rigid;
   std::vector<Tool> tools;
+  std::vector<Cut> cuts;
   std::vector<Friction> friction;
   std::vector<Filter> filters;
   std::vector<Probe> probes;

@@ -552,6 +552,7 @@ Definition read_scene(json &tree, const std::string &file, const Types &types) {
   def.obstacles = read_obstacles(scene, context);
   def.rigid = read_rigid(scene, context);
   def.tools = read_tools(scene, context);
+  def.cuts = read_cuts(scene, context, def);
   read_contact(scene, def, context);
   read_probes(scene, def);
   if (scene.has("accuracy") && scene.member("accuracy").has("quantity"))

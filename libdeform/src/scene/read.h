@@ -41,5 +41,6 @@ void read_solid(const Node &node, const std::string &shape, uint32_t &number, do
 Rigid read_rigid(const Node &scene, ReadContext &context);
 std::vector<dfm_pose_key> read_keys(const Node &motion, const dfm_pose &base);
 std::vector<Tool> read_tools(const Node &scene, ReadContext &context);
+std::vector<Cut> read_cuts(const Node &scene, const ReadContext &context, const Definition &def);
 
 }  // namespace dfm::scene

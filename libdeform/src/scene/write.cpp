@@ -427,6 +427,8 @@ Written write_root(SceneWriter &to) {
     if (!o->rigid) root["obstacles"].push_back(write_obstacle(to, *o));
   if (Written rigid = write_rigid(to); !rigid.is_null()) root["rigid"] = std::move(rigid);
   for (const auto &t : to.w.tools) root["tools"].push_back(write_tool(to, *t));
+  for (const auto &b : to.w.bodies)
+    if (!b->planned_cuts.empty()) write_cuts(to, *b, root["cuts"]);
   if (Written contact = write_contact(to); !contact.is_null()) root["contact"] = std::move(contact);
   if (Written solver = write_solver(to.w); !solver.is_null()) root["solver"] = std::move(solver);
   if (Written probes = write_probes(to); !probes.is_null()) root["probes"] = std::move(probes);

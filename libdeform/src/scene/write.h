@@ -32,7 +32,7 @@ struct WriteOptions {
 // notes: how many sentences there were. Throws Error; the scene file itself is written last, and as a whole.
 void write_scene(World &w, const std::string &path, const WriteOptions &options, uint32_t &notes);
 
-// ---- for its parts: write_body.cpp, write_things.cpp, write_tools.cpp ------------------------------------
+// ---- for its parts: write_body.cpp, write_things.cpp, write_tools.cpp, write_cuts.cpp --------------------
 
 struct SceneWriter {
   World &w;
@@ -79,5 +79,6 @@ Written write_body(SceneWriter &to, Body &b);
 Written write_obstacle(SceneWriter &to, const Obstacle &o);
 Written write_rigid(SceneWriter &to);  // null: there are none
 Written write_tool(SceneWriter &to, const Tool &t);
+void write_cuts(SceneWriter &to, const Body &b, Written &out);  // those to come, appended
 
 }  // namespace dfm::writing

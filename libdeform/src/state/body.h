@@ -105,9 +105,10 @@ struct Body {
   std::string whole_name;  // name of that body; its rules of friction and contact apply to this piece too
   bool undone = false;     // a piece that a restore has removed; it is in World::undone
   SeparateRule separate;
-  std::vector<BladeTrack> blades;  // of the last cuts
-  int32_t coupling = kNoCoupling;  // DFM_COUPLING_* of a surface of its own
-  double support = 0;              // of that coupling, as in the def
+  std::vector<PlannedCut> planned_cuts;  // by time
+  std::vector<BladeTrack> blades;        // of the last cuts
+  int32_t coupling = kNoCoupling;        // DFM_COUPLING_* of a surface of its own
+  double support = 0;                    // of that coupling, as in the def
   ModelInstance model;
   std::unique_ptr<Dynamics> dynamics;  // how it moves
   Integrator integrator;

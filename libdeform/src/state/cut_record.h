@@ -4,6 +4,7 @@
 
 #include "body/zones.h"
 #include "core/memory.h"
+#include "geometry/cut_shape.h"
 #include "geometry/surface.h"
 #include "state/model_choice.h"
 
@@ -53,6 +54,14 @@ struct BladeTrack {
   double credit = 0;       // J, zero or less: the sum of work since it was last the largest
   uint64_t part = 0;       // id of the obstacle that is the tool's part, where it owes anything
   Array<CutDue> dues;      // by point, ascending
+};
+
+// A cut to come (dfm_body_plan_cut).
+struct PlannedCut {
+  double t = 0;       // s
+  uint32_t how = 0;   // DFM_CUT_REMOVE or DFM_CUT_SPLIT
+  uint32_t most = 0;  // cells or faces; 0: all
+  CutShape shape;
 };
 
 struct CutRecord {

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "geometry/extent.h"
 #include "mesh/cut_mesh.h"
 #include "mesh/mesh.h"
 #include "plugin/on_behalf.h"
@@ -148,6 +149,26 @@ CutReport cut(Body &b, const Array<uint8_t> &removed, const Array<uint64_t> &mor
   return cut(b, removed, std::move(open), own);
 }
 
+// Of a plane: a blade in it that has the whole of the body in its first triangle, so that no line of the body
+// meets the edge between the two.
+CutShape through(const Body &b, const CutShape &shape) {
+  if (shape.kind != CutKind::plane) return shape;
+  Extent box;
+  for (uint32_t i = 0; i < b.p.n; ++i) box.add(load3(&b.p.x[size_t{kStride} * i]));
+  const Vec3 normal = normalized(shape.corner[1]), middle = 0.5 * (box.lo + box.hi);
+  const Vec3 other = std::fabs(normal.x) < 0.5 ? Vec3{1, 0, 0} : Vec3{0, 1, 0};
+  const Vec3 u = normalized(cross(normal, other)), v = cross(normal, u);
+  const double reach = norm(box.hi - box.lo);
+  CutShape out;
+  out.kind = CutKind::blade;
+  Vec3 *const c = out.corner;
+  c[1] = middle - dot(middle - shape.corner[0], normal) * normal - reach * (u + v);
+  c[0] = c[1] + 8 * reach * u;
+  c[2] = c[1] + 8 * reach * v;
+  c[3] = c[0] + (c[2] - c[1]);
+  return out;
+}
+
 }  // namespace
 
 double kinetic_of(const Body &b) {
@@ -183,7 +204,8 @@ CutReport remove_cells(Body &b, const Array<uint8_t> &removed) {
   return cut(b, removed, Array<uint64_t>(HookAllocator<uint64_t>(b.world->memory())));
 }
 
-CutReport remove_by_shape(Body &b, const CutShape &shape, uint32_t most) {
+CutReport remove_by_shape(Body &b, const CutShape &asked, uint32_t most) {
+  const CutShape shape = through(b, asked);
   Array<uint8_t> removed(b.ncell(), 0, HookAllocator<uint8_t>(b.world->memory()));
   uint32_t n = 0, left = 0;
   for (uint32_t c = 0; c < b.ncell(); ++c) {
@@ -202,7 +224,8 @@ CutReport remove_by_shape(Body &b, const CutShape &shape, uint32_t most) {
   return out;
 }
 
-CutReport split_by_blade(Body &b, const CutShape &blade, uint32_t most) {
+CutReport split_by_blade(Body &b, const CutShape &asked, uint32_t most) {
+  const CutShape blade = through(b, asked);
   BladeSweep sweep(b, blade, nullptr);
   const std::vector<SweptFace> &met = sweep.faces;
   const size_t n = most > 0 ? std::min<size_t>(most, met.size()) : met.size();
@@ -215,7 +238,9 @@ CutReport split_by_blade(Body &b, const CutShape &blade, uint32_t most) {
   CutReport out = open_faces(b, more);
   const double work = sweep.energy(n);
   out.left = static_cast<uint32_t>(met.size() - n);
+  out.opened = static_cast<uint32_t>(n);
   out.fracture = work;
+  if (asked.kind == CutKind::plane) return out;  // it comes from nowhere, and goes on nowhere
   if (norm2(way) > 0) out.force = (-work / norm2(way)) * way;
   sweep.keep(b);
   return out;

@@ -7,6 +7,7 @@ namespace dfm {
 
 struct CutReport {
   uint32_t removed = 0;             // cells
+  uint32_t opened = 0;              // faces
   uint32_t left = 0;                // cells that the shape meets and that its limit has left
   uint32_t copies = 0;              // of points
   uint32_t parts = 0;               // that the body consists of now
@@ -26,8 +27,8 @@ void check_may_cut(const Body &b, const ModelInstance &model);
 // The first `most` of the cells that the shape meets go.
 CutReport remove_by_shape(Body &b, const CutShape &shape, uint32_t most);
 CutReport remove_cells(Body &b, const Array<uint8_t> &removed);
-// Faces between cells whose middles lie on both sides of the blade open, the first `most` on its way. No cell
-// goes.
+// Faces between cells whose middles lie on both sides of the blade or plane open, the first `most` on its
+// way. No cell goes.
 CutReport split_by_blade(Body &b, const CutShape &blade, uint32_t most);
 
 // Opens faces between present cells: pairs (mesh/cut_mesh.h), in any order.

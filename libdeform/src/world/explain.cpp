@@ -182,6 +182,11 @@ std::string cuts(const Body &b) {
       rows.push_back("{\"by\":" + quote(t->name) +
                      ",\"how\":" + quote(t->cuts.how == DFM_CUT_SPLIT ? "opens faces" : "removes cells") +
                      format(",\"most\":%u}", t->cuts.most));
+  static const char *const shapes[] = {"an ellipsoid", "a box", "a blade", "a plane"};
+  for (const PlannedCut &c : b.planned_cuts)
+    rows.push_back("{\"by\":" + quote(shapes[size_t(c.shape.kind)]) + ",\"at\":" + format("%.9g", c.t) +
+                   ",\"how\":" + quote(c.how == DFM_CUT_SPLIT ? "opens faces" : "removes cells") +
+                   format(",\"most\":%u}", c.most));
   double least = HUGE_VAL;
   for (const Material &m : b.makeup.materials)
     for (size_t i = 0; i < m.extra_keys.size(); ++i)

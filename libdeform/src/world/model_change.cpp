@@ -240,7 +240,7 @@ void judge(World &w, Body &b, const ModelInstance &old, const ChangeBook &book, 
   check_jump(b, swap);
   check_unpaid(b, book, swap);
   check_surface(w, b);
-  if (b.tears || cut_by_any(b)) check_may_cut(b, b.model);
+  if (b.tears || cut_by_any(b) || !b.planned_cuts.empty()) check_may_cut(b, b.model);
 }
 
 // Keeps an instance for later changes; replaces an older one with the same inputs. There is room.
@@ -285,7 +285,7 @@ void rehearse(Body &b, ModelChoice &to, uint32_t &integrator, bool at_rest, bool
   const std::unique_ptr<BodyModel> made =
       make_body_model(w, b, type, std::move(origin), static_cast<int32_t>(integrator));
   check_springs(b, type, *made->dynamics);
-  if (b.tears || cut_by_any(b)) check_may_cut(b, made->instance);
+  if (b.tears || cut_by_any(b) || !b.planned_cuts.empty()) check_may_cut(b, made->instance);
   to.stable = stable_with(b, *made);
   if (named) warn_of_own_steps(w, b.name, made->instance, static_cast<int32_t>(to.integrator));
   if (!w.changed) check_effects(w, b, b.model, made->instance);

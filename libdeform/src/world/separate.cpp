@@ -206,6 +206,7 @@ Body &place_for_piece(World &w, const Body &of, uint64_t id, const std::string &
   b.piece_of = of.piece_of ? of.piece_of : of.id;
   b.whole_name = of.piece_of ? of.whole_name : of.name;
   b.separate = of.separate;
+  b.planned_cuts = of.planned_cuts;
   b.switches = of.switches;
   b.rule = of.rule;
   b.first_model = of.first_model;

@@ -78,6 +78,19 @@ bool sound(const Array<BladeSide> &sides, size_t ncorner) {
   return true;
 }
 
+bool sound(const std::vector<PlannedCut> &cuts) {
+  const auto earlier = [](const PlannedCut &a, const PlannedCut &b) { return a.t < b.t; };
+  return std::is_sorted(cuts.begin(), cuts.end(), earlier) &&
+         std::all_of(cuts.begin(), cuts.end(), [](const PlannedCut &c) {
+           const CutShape &s = c.shape;
+           const bool round = s.kind == CutKind::ellipsoid || s.kind == CutKind::box;
+           const bool sized = s.half_size.x > 0 && s.half_size.y > 0 && s.half_size.z > 0;
+           return round
+                      ? c.how == DFM_CUT_REMOVE && sized
+                      : s.kind == CutKind::blade || (norm2(s.corner[1]) > 0 && norm2(s.corner[1]) < HUGE_VAL);
+         });
+}
+
 bool sound(const Array<CutDue> &dues, uint32_t npoint) {
   for (size_t i = 0; i < dues.size(); ++i) {
     const CutDue &d = dues[i];

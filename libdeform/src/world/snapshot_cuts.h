@@ -70,5 +70,6 @@ std::vector<Body *> all_bodies(const World &w);
 // Of cells of a mesh that has ncorner corners of cells, ascending.
 bool sound(const Array<BladeSide> &sides, size_t ncorner);
 bool sound(const Array<CutDue> &dues, uint32_t npoint);
+bool sound(const std::vector<PlannedCut> &cuts);
 
 }  // namespace dfm

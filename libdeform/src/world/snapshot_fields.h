@@ -214,6 +214,20 @@ void body_fields(Stream &s, W &w, B &b, const Body &like) {
     s.array("dues of a blade", blade.dues, kAnyCount, must::any);
     s.must_hold("dues of a blade", "those of points", [&] { return sound(blade.dues, like.p.n); });
   });
+  s.list("cuts to come", b.planned_cuts, [&](auto &cut) {
+    s.value("cut's time", cut.t, must::not_negative);
+    s.value("cut's way", cut.how, must::at_most(uint32_t{DFM_CUT_SPLIT}));
+    s.value("cut's limit", cut.most, must::any);
+    s.value("cut's shape", cut.shape.kind,
+            must::Be{[](CutKind k) { return k <= CutKind::plane; }, "a shape that cuts"});
+    s.value("cut's rotation", cut.shape.rotation,
+            must::Be{[](const Quat &q) { return must::pose.is(Pose{{}, q}); }, "a unit quaternion"});
+    for (auto *x : {&cut.shape.position, &cut.shape.half_size, &cut.shape.way})
+      s.value("cut's place", *x, must::finite);
+    for (auto &x : cut.shape.corner) s.value("cut's corner", x, must::finite);
+  });
+  s.must_hold("cuts to come", "in order of time, and split by a blade or a plane",
+              [&] { return sound(b.planned_cuts); });
   s.value("separates", b.separate.on, must::flag);
   s.value("crumbs go", b.separate.removes, must::flag);
   s.value("fewest cells of a piece", b.separate.least, must::any);

@@ -182,6 +182,7 @@ void exchange(World &w, Staged &t) noexcept {
     std::swap(b.category, other.category);
     std::swap(b.collides_with, other.collides_with);
     std::swap(b.separate, other.separate);
+    b.planned_cuts.swap(other.planned_cuts);
     b.blades.swap(other.blades);
     std::swap(b.slumber, other.slumber);
     b.bound.known = false;

@@ -34,6 +34,7 @@ struct StagedBody {
   std::vector<HeldMotion> motions;
   uint32_t next_load = 1, category = 1, collides_with = ~0u;
   SeparateRule separate;
+  std::vector<PlannedCut> planned_cuts;
   std::vector<BladeTrack> blades;
   Slumber slumber;
   Array<double> surfel_impulse, anchor, method_values;

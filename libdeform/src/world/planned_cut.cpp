@@ -1,0 +1,107 @@
+#include "world/planned_cut.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "state/world.h"
+#include "step/stages.h"
+#include "world/separate.h"
+
+namespace dfm {
+namespace {
+
+constexpr double kOnTime = 1e-6;  // of a step: a cut may be early by this share
+
+// The body and its pieces; a piece has none.
+std::vector<Body *> with_pieces(Body &b) {
+  std::vector<Body *> out{&b};
+  for (auto &other : b.world->bodies)
+    if (other->piece_of == b.id) out.push_back(other.get());
+  return out;
+}
+
+// A cut, of whatever its body consists of by now. What has come off has as many cuts after it.
+struct Made {
+  uint64_t whole;
+  double t;
+  size_t after;
+  bool met;
+};
+
+void note(std::vector<Made> &all, const Body &b, double t, bool met) {
+  const uint64_t whole = b.piece_of ? b.piece_of : b.id;
+  const size_t after = b.planned_cuts.size();
+  for (Made &m : all)
+    if (m.whole == whole && m.t == t && m.after == after) {
+      m.met = m.met || met;
+      return;
+    }
+  all.push_back({whole, t, after, met});
+}
+
+void warn(const World &w, const std::vector<Made> &all) {
+  for (const Made &m : all) {
+    const auto whole = [&](auto &b) { return b->id == m.whole || b->piece_of == m.whole; };
+    const auto b = std::find_if(w.bodies.begin(), w.bodies.end(), whole);
+    if (m.met || b == w.bodies.end()) continue;
+    w.context->logf(DFM_LOG_WARNING,
+                    "body '%s': its cut at %g s has met nothing; give the place where the body is at that "
+                    "time, in the axes of the world",
+                    ((*b)->piece_of ? (*b)->whole_name : (*b)->name).c_str(), m.t);
+  }
+}
+
+}  // namespace
+
+CutReport make_cut(Body &b, const CutShape &shape, uint32_t how, uint32_t most) {
+  CutReport out = how == DFM_CUT_SPLIT ? split_by_blade(b, shape, most) : remove_by_shape(b, shape, most);
+  separate_if_asked(b, out);
+  return out;
+}
+
+void plan_cut(Body &b, const PlannedCut &cut) {
+  const std::vector<Body *> all = with_pieces(b);
+  for (Body *const part : all) {
+    check_may_cut(*part, part->model);
+    part->planned_cuts.reserve(part->planned_cuts.size() + 1);
+  }
+  for (Body *const part : all) {
+    auto &list = part->planned_cuts;
+    const auto later = [&](const PlannedCut &c) { return c.t > cut.t; };
+    list.insert(std::find_if(list.begin(), list.end(), later), cut);
+  }
+}
+
+void plan_no_cuts(Body &b) {
+  for (Body *const part : with_pieces(b)) part->planned_cuts.clear();
+}
+
+// Pieces take over the cuts that are still to come, so a cut leaves the list before it is made.
+void make_planned_cuts(World &w, double dt) {
+  const auto due = [&](const auto &b) {
+    return !b->planned_cuts.empty() && b->planned_cuts.front().t <= w.time + kOnTime * dt;
+  };
+  std::vector<Made> made;
+  while (true) {
+    const auto at = std::find_if(w.bodies.begin(), w.bodies.end(), due);
+    if (at == w.bodies.end()) break;
+    Body &b = **at;
+    const PlannedCut cut = b.planned_cuts.front();
+    b.planned_cuts.erase(b.planned_cuts.begin());
+    CutReport done;
+    try {
+      done = make_cut(b, cut.shape, cut.how, cut.most);
+    } catch (...) {
+      b.planned_cuts.insert(b.planned_cuts.begin(), cut);  // there is room
+      throw;
+    }
+    const uint32_t n = cut.how == DFM_CUT_SPLIT ? done.opened : done.removed;
+    note(made, b, cut.t, n > 0);
+    if (n == 0) continue;
+    reserve_events(w, 1);
+    add_event(w, DFM_EVENT_CUT, b.id, b.id, n, w.time);
+  }
+  warn(w, made);
+}
+
+}  // namespace dfm
