@@ -3,8 +3,10 @@
 //
 // real_time_bench SCENE [--model NAME] [--integrator NAME] [--cells N] [--time S] [--step S] [--set TEXT]
 //                 [--wander S] [--series FILE] [--against FILE] [--csv FILE --commit HASH]
-//                 [--histogram FILE] [--times FILE]
+//                 [--histogram FILE] [--times FILE] [--paced yes]
 //
+// --paced has the steps wait for the clock, and counts the clock's time from when each should have begun:
+// what a loop sees that runs with the time, with the other threads of its core.
 // --wander has the first obstacle go to and fro over the top of probe_block.json for so long, at the scene's
 // speed, on lanes side by side, over surfels that nothing has touched before. --series writes t, the force on
 // the first body (N) and the place of the first probe (m) at each millisecond; --against compares with such a
@@ -31,6 +33,19 @@ double cpu_seconds() {
   timespec t{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
   return double(t.tv_sec) + 1e-9 * double(t.tv_nsec);
+}
+
+double wall_seconds() {
+  timespec t{};
+  clock_gettime(CLOCK_MONOTONIC, &t);
+  return double(t.tv_sec) + 1e-9 * double(t.tv_nsec);
+}
+
+void sleep_until(double seconds) {
+  timespec t{};
+  t.tv_sec = time_t(seconds);
+  t.tv_nsec = long(1e9 * (seconds - double(t.tv_sec)));
+  clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &t, nullptr);
 }
 
 void ok(dfm_status status) {
@@ -60,14 +75,22 @@ bool has_cut(dfm_world world) {
 }
 
 // places: ask for the probe's place each ten milliseconds; a body whose inner points are late finds them.
-Run run(dfm_scene scene, dfm_world world, double duration, double step, bool places) {
+// paced: steps begin at the clock's multiples of the step, and their time is that of the clock from there to
+// their end, so what else runs on the core counts too.
+Run run(dfm_scene scene, dfm_world world, double duration, double step, bool places, bool paced) {
   Run out;
+  double next = wall_seconds();
   const long steps = std::lround(duration / step), every = std::max(1L, std::lround(1e-3 / step));
   double force[3] = {};
   for (long n = 0; n < steps; ++n) {
-    const double at = cpu_seconds();
+    if (paced) {
+      next += step;
+      if (const double now = wall_seconds(); now > next) next = now;
+      sleep_until(next);
+    }
+    const double at = paced ? next : cpu_seconds();
     ok(dfm_world_step(world, step, nullptr));
-    out.seconds.push_back(cpu_seconds() - at);
+    out.seconds.push_back((paced ? wall_seconds() : cpu_seconds()) - at);
     out.cut.push_back(has_cut(world) ? 1 : !out.cut.empty() && out.cut.back() == 1 ? 2 : 0);
     dfm_pair_impulse pair[16] = {};
     uint32_t pairs = 0;
@@ -179,12 +202,14 @@ int main(int argc, char **argv) {
   const char *series = nullptr, *against = nullptr, *csv_file = nullptr, *histogram = nullptr,
              *times = nullptr, *commit = "unknown";
   double duration = 0, step = 0;
+  bool paced = false;
   for (int i = 2; i + 1 < argc; i += 2) {
     const std::string key = argv[i], value = argv[i + 1];
     if (key == "--model") set.push_back("/bodies/0/model/type=\"" + (model = value) + '"');
     if (key == "--integrator") set.push_back("/time/integrator=\"" + (integrator = value) + '"');
     if (key == "--cells") set.push_back("/bodies/0/mesh/cells=" + value);
     if (key == "--set") set.push_back(value);
+    if (key == "--paced") paced = value == "yes";
     if (key == "--time") duration = std::atof(argv[i + 1]);
     if (key == "--step") step = std::atof(argv[i + 1]);
     if (key == "--series") series = argv[i + 1];
@@ -228,7 +253,7 @@ int main(int argc, char **argv) {
   dfm_stage_time before[32], after[32];
   uint32_t stages = 0;
   ok(dfm_world_profile(world, 32, before, &stages));
-  Run found = run(scene, world, duration, step, series || against);
+  Run found = run(scene, world, duration, step, series || against, paced);
   ok(dfm_world_profile(world, 32, after, &stages));
   if (series) {
     std::FILE *out = std::fopen(series, "w");

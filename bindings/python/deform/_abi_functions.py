@@ -204,6 +204,8 @@ FUNCTIONS = {
     "dfm_separate_def_default_sized": (None, [u32, ptr]),
     "dfm_body_separate": (i32, [u64, ptr, ptr]),
     "dfm_body_set_separate": (i32, [u64, ptr]),
+    "dfm_body_set_cut_delay": (i32, [u64, f64]),
+    "dfm_body_cut_delay": (i32, [u64, ptr, ptr]),
     "dfm_body_pieces": (i32, [u64, u32, ptr, ptr]),
     "dfm_tool_def_default_sized": (None, [u32, ptr]),
     "dfm_tool_create": (i32, [u64, ptr, ptr]),

@@ -127,6 +127,20 @@ DFM_API dfm_status dfm_body_separate(dfm_body body, const dfm_separate_def *def,
  * @return DFM_OK; DFM_E_ARG; DFM_E_UNSUPPORTED the body cannot be cut; DFM_E_STATE. Threads: Not during
  * step. Since 0.1. */
 DFM_API dfm_status dfm_body_set_separate(dfm_body body, const dfm_separate_def *def);
+/** How long after a tool has come through a face of the body (dfm_tool_set_cuts with DFM_CUT_SPLIT) the face
+ * opens. What the cut makes anew is made meanwhile, by a thread of low priority beside the steps, so that no
+ * step takes the time of a cut. A step that finds the thread late makes it itself; the result is the same to
+ * the bit. Faces that a tool comes through while others wait open `delay` after these. The work of cutting is
+ * the tool's in the step in which it comes through; DFM_EVENT_CUT comes as faces open. dfm_body_cut, tears
+ * and tools that remove cells do not wait.
+ * @param delay  s; 0: no thread, and faces open in the step in which a tool comes through, which is the
+ * default. Rounded to the nearest step
+ * @return DFM_OK; DFM_E_ARG; DFM_E_UNSUPPORTED the body cannot be cut; DFM_E_STATE faces wait, or the body
+ * has no cells. Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_body_set_cut_delay(dfm_body body, double delay);
+/** @param delay  s, may be NULL @param waiting  faces that wait now, may be NULL @return DFM_OK;
+ * DFM_E_HANDLE; DFM_E_STATE. Threads: Any thread. Not during step. Since 0.1. */
+DFM_API dfm_status dfm_body_cut_delay(dfm_body body, double *delay, uint32_t *waiting);
 /** The pieces that have come off a body since the host made it, and that are there, in order of creation.
  * Of a piece: those of the body that it came off.
  * @param pieces  [capacity], or NULL with capacity 0, which only counts

@@ -55,6 +55,10 @@ class BodyCuts {
     return E::done(dfm_body_set_separate(body(), &def));
   }
   auto keep_together() const { return E::done(dfm_body_set_separate(body(), nullptr)); }
+  auto set_cut_delay(double delay) const { return E::done(dfm_body_set_cut_delay(body(), delay)); }
+  auto cut_delay() const {
+    return produce<E, double>([&](double &delay) { return dfm_body_cut_delay(body(), &delay, nullptr); });
+  }
   auto pieces() const { return collect_handles<E, Self>(dfm_body_pieces, body()); }
 
  private:

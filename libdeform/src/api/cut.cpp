@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "api/objects.h"
+#include "world/cut_ahead.h"
 #include "world/planned_cut.h"
 #include "world/separate.h"
 #include "world/snapshot_cuts.h"
@@ -178,6 +179,22 @@ dfm_status dfm_body_set_separate(dfm_body body, const dfm_separate_def *def) {
     const SeparateRule rule = def ? rule_of(b, def) : SeparateRule{};
     if (rule.on) check_may_cut(b, b.model);
     b.separate = rule;
+  });
+}
+
+dfm_status dfm_body_set_cut_delay(dfm_body body, double delay) {
+  return as_status([&] {
+    Body &b = body_of(body);
+    exclusive(*b.world);
+    set_cut_delay(b, delay);
+  });
+}
+
+dfm_status dfm_body_cut_delay(dfm_body body, double *delay, uint32_t *waiting) {
+  return as_status([&] {
+    const CutsAhead &a = shown_body_of(body).ahead;
+    if (delay) *delay = a.delay;
+    if (waiting) *waiting = static_cast<uint32_t>(a.faces.size() + a.later.size());
   });
 }
 

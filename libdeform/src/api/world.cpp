@@ -276,7 +276,7 @@ dfm_status dfm_world_step(dfm_world world, double dt, uint32_t *trouble) {
     begin_cuts(w);
     const dfm_status s = step_within_budget(w, dt, &bits);
     if (trouble) *trouble = bits;
-    if (s == DFM_OK) cut_by_tools(w);
+    if (s == DFM_OK) cut_by_tools(w, dt);
     if (s == DFM_OK) make_planned_cuts(w, dt);
     if (s == DFM_OK) tear_bodies(w);
     if (s == DFM_OK) look_at_sensors(w, true);

@@ -206,6 +206,9 @@ void Tasks::run(uint32_t n, uint32_t grain, void (*fn)(void *, uint32_t, uint32_
   pool.close();
 }
 
+Tasks::Alone::Alone() : outer_(inside_worker) { inside_worker = true; }
+Tasks::Alone::~Alone() { inside_worker = outer_; }
+
 Tasks::Step::Step(Tasks &tasks) : pool_(tasks.pool_.get()) {
   if (pool_) ++pool_->stepping;
 }

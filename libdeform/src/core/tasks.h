@@ -30,6 +30,18 @@ class Tasks {
         &f);
   }
 
+  // While an object of this type exists, run() uses the caller's thread alone.
+  class Alone {
+   public:
+    Alone();
+    ~Alone();
+    Alone(const Alone &) = delete;
+    Alone &operator=(const Alone &) = delete;
+
+   private:
+    const bool outer_;
+  };
+
   // While an object of this type exists, workers that have had a job stay awake for the next one.
   class Step {
    public:

@@ -15,6 +15,8 @@ struct PointsKernels {
               const double *impulse, double *x_end, double *v_end);
   // how many of the cells [n,4] are inverted. x: [..,4]
   uint32_t (*inverted)(uint32_t n, const uint32_t *cells, const double *x);
+  // of the boxes around cells [n,4], the largest diagonal, squared
+  double (*largest_box)(uint32_t n, const uint32_t *cells, const double *x);
   // of edges [n,2] d between points at x that move at v: the largest |d.(v_j - v_i)| / d.d, 1/s
   double (*strain_rate)(uint32_t n, const uint32_t *edges, const double *x, const double *v);
 };

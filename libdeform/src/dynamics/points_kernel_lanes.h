@@ -120,6 +120,28 @@ uint32_t inverted(uint32_t n, const uint32_t *cells, const double *x) {
   return sum;
 }
 
+double largest_box(uint32_t n, const uint32_t *cells, const double *x) {
+  double most = 0;
+  for (uint32_t c = 0; c < n; ++c) {
+    const uint32_t *const corner = cells + 4 * size_t(c);
+    double square[4];
+    DEFORM_UNROLL
+    for (uint32_t p = 0; p < kParts; ++p) {
+      const auto at = [&](uint32_t k) __attribute__((always_inline)) {
+        return load(x + 4 * size_t(corner[k]) + p * kWidth);
+      };
+      const Vector a = at(0), b = at(1), e = at(2), f = at(3);
+      const Vector low1 = b < a ? b : a, low2 = f < e ? f : e, high1 = a < b ? b : a, high2 = e < f ? f : e;
+      const Vector low = low2 < low1 ? low2 : low1, high = high1 < high2 ? high2 : high1;
+      const Vector side = high - low, two = side * side;
+      for (uint32_t k = 0; k < kWidth; ++k) square[p * kWidth + k] = two[k];
+    }
+    const double sum = (square[0] + square[1]) + square[2];
+    most = most < sum ? sum : most;
+  }
+  return most;
+}
+
 double strain_rate(uint32_t n, const uint32_t *edges, const double *x, const double *v) {
   Vector most = {};
   each_lane(n, [&](const auto &edge, Mask) __attribute__((always_inline)) {
@@ -137,7 +159,7 @@ double strain_rate(uint32_t n, const uint32_t *edges, const double *x, const dou
   return out;
 }
 
-constexpr PointsKernels kKernels = {predict, end, inverted, strain_rate};
+constexpr PointsKernels kKernels = {predict, end, inverted, largest_box, strain_rate};
 
 }  // namespace
 }  // namespace dfm

@@ -43,6 +43,7 @@ class Builder {
     for (const Body &b : def_.bodies) {
       for (const Attach &a : b.attach) add_attachment(b, a);
       if (b.separate) add_separation(b);
+      if (b.cut_delay > 0) set_cut_delay(b);
     }
     // Makes the plan now, so that a missing effect is an error of the scene and not of its first step.
     double step = 0;
@@ -459,6 +460,11 @@ class Builder {
     dfm_body body = 0;
     check(dfm_world_find_body(world_, b.name.c_str(), &body), b.pointer);
     check(dfm_body_set_separate(body, &*b.separate), b.pointer + "/separate");
+  }
+  void set_cut_delay(const Body &b) const {
+    dfm_body body = 0;
+    check(dfm_world_find_body(world_, b.name.c_str(), &body), b.pointer);
+    check(dfm_body_set_cut_delay(body, b.cut_delay), b.pointer + "/cut_delay");
   }
   void add_attachment(const Body &b, const Attach &a) const {
     dfm_body body = 0;

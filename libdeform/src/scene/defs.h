@@ -138,6 +138,7 @@ struct Body {
   std::vector<Spring> springs;
   std::vector<Attach> attach;
   std::optional<dfm_separate_def> separate;
+  double cut_delay = 0;
   std::vector<Switch> switches;
   SwitchRule rule;
 };

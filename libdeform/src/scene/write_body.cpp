@@ -415,6 +415,11 @@ Written write_body(SceneWriter &to, Body &b) {
   write_attachments(to, b, out);
   if (b.separate.on)
     out["separate"] = {{"least_cells", b.separate.least}, {"crumbs", b.separate.removes ? "remove" : "stay"}};
+  if (b.ahead.delay > 0) out["cut_delay"] = b.ahead.delay;
+  if (!b.ahead.faces.empty())
+    to.note(
+        "body '%s': %zu faces that a tool has come through wait to be opened; in the scene they stay closed",
+        b.name.c_str(), b.ahead.faces.size() + b.ahead.later.size());
   write_switches(to, b, out);
   if (b.sensor) out["sensor"] = true;
   if (!b.cut.open.empty())

@@ -4,11 +4,13 @@
 #include <string>
 #include <vector>
 
+#include "body/self_rest.h"
 #include "body/zones.h"
 #include "deform/deform.h"
 #include "dynamics/dynamics.h"
 #include "state/change_book.h"
 #include "state/cut_record.h"
+#include "state/cuts_ahead.h"
 #include "state/energy_book.h"
 #include "state/model_choice.h"
 #include "state/motion.h"
@@ -94,6 +96,7 @@ struct Body {
   Phyxels p;
   uint64_t x_version = 1;  // increases whenever p.x may have changed
   Array<uint32_t> tets, edges;
+  Array<uint32_t> inner;  // [n,2] cells on both sides of inner faces; empty: no blade has come near yet
   uint32_t ncell() const { return static_cast<uint32_t>(tets.size() / 4); }
   Surface surface;
   SurfaceZones zones;
@@ -107,8 +110,9 @@ struct Body {
   SeparateRule separate;
   std::vector<PlannedCut> planned_cuts;  // by time
   std::vector<BladeTrack> blades;        // of the last cuts
-  int32_t coupling = kNoCoupling;        // DFM_COUPLING_* of a surface of its own
-  double support = 0;                    // of that coupling, as in the def
+  CutsAhead ahead;
+  int32_t coupling = kNoCoupling;  // DFM_COUPLING_* of a surface of its own
+  double support = 0;              // of that coupling, as in the def
   ModelInstance model;
   std::unique_ptr<Dynamics> dynamics;  // how it moves
   Integrator integrator;
@@ -144,7 +148,8 @@ struct Body {
   Slumber slumber;
   // [n,4] m, positions at the start of its calm; empty if sleep is off
   Array<double> anchor;
-  std::unique_ptr<SearchTree> search;  // rays and closest points
+  std::unique_ptr<SearchTree> search;   // rays and closest points
+  std::unique_ptr<SelfRest> self_rest;  // made with a cut; null: made when it is needed
 
   bool loads_vary() const;
   double impulse_time() const;  // s that surfel_impulse belongs to

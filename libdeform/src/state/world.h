@@ -31,6 +31,7 @@
 
 namespace dfm {
 
+class Aside;
 struct ContactMethod;
 struct StepContext;
 
@@ -165,6 +166,7 @@ struct World {
   uint32_t sleepers = 0;
 
   dfm_world_stats stats{};
+  std::unique_ptr<Aside> aside;  // null: nothing has been made beside the steps
 
   explicit World(dfm_context *c);
   ~World();

@@ -174,9 +174,9 @@ bool is_tangled(SelfBody &b, uint32_t surfel) {
 
 }  // namespace
 
-SelfBody::SelfBody(const Memory &m, Body &b) : id(b.id), shape(b.shape), body(&b), list(m, b.surface) {
+SelfRest self_rest_of(const Memory &m, Body &b) {
+  SelfRest rest;
   Surface &s = b.surface;
-  use_memory(m, pairs.of_face, pairs.of_edges, pairs.copies, pairs.slack);
   rest.x = Array<double>(size_t{4} * s.nsurfel, 0.0, HookAllocator<double>(m));
   const auto at = [&](uint32_t phyxel) { return load3(&b.p.rest[size_t{3} * phyxel]); };
   for (uint32_t i = 0; i < s.nsurfel; ++i) {
@@ -188,9 +188,20 @@ SelfBody::SelfBody(const Memory &m, Body &b) : id(b.id), shape(b.shape), body(&b
   for (size_t e = 0; e < b.edges.size(); e += 2) cells.push_back(norm(at(b.edges[e]) - at(b.edges[e + 1])));
   rest.thin = 2 * std::max(s.median_edge, median(cells));
   rest.opened = opened_surface(m, b);
-  if (!rest.opened.any()) return;
+  if (!rest.opened.any()) return rest;
   rest.way = Array<double>(size_t{4} * s.nsurfel, 0.0, HookAllocator<double>(m));
   ways_back(s, rest.x.data(), [&](uint32_t i, Vec3 way) { store3(&rest.way[4 * size_t{i}], way); });
+  return rest;
+}
+
+SelfBody::SelfBody(const Memory &m, Body &b)
+    : id(b.id),
+      shape(b.shape),
+      body(&b),
+      rest(b.self_rest ? std::move(*b.self_rest) : self_rest_of(m, b)),
+      list(m, b.surface) {
+  use_memory(m, pairs.of_face, pairs.of_edges, pairs.copies, pairs.slack);
+  b.self_rest.reset();
 }
 
 uint8_t asks_self_contact(const World &w) {

@@ -29,6 +29,9 @@ struct SelfBody {
   SelfBody(const Memory &memory, Body &b);
 };
 
+// What follows from the cells of the body (state/body.h: self_rest keeps it where it is made in advance).
+SelfRest self_rest_of(const Memory &memory, Body &b);
+
 // DFM_SELF_*: the setting of the world (dfm_world_def.self_contact, or the effect in its list).
 uint8_t asks_self_contact(const World &w);
 // For prepare(): fills step.self_bodies and the facts for the plan; finds the laws of bodies with themselves;

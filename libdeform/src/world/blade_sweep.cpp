@@ -22,6 +22,8 @@
 #include "mesh/cut_mesh.h"
 #include "state/material.h"
 #include "state/world.h"
+#include "dynamics/symplectic_euler.h"
+#include "world/cut.h"
 
 namespace dfm {
 namespace {
@@ -81,9 +83,11 @@ Vec3 area_between(const Body &b, uint32_t i, uint32_t j, Vec3 way) {
   return dot(area, way) < 0 ? -area : area;
 }
 
+// Or will be.
 bool is_open(const Body &b, uint32_t i, uint32_t j) {
-  return !b.cut.open.empty() &&
-         std::binary_search(b.cut.open.begin(), b.cut.open.end(), open_face(b.cut.cell[i], b.cut.cell[j]));
+  if (b.cut.open.empty() && b.ahead.faces.empty()) return false;
+  const uint64_t face = face_of_whole(b, i, j);
+  return std::binary_search(b.cut.open.begin(), b.cut.open.end(), face) || b.ahead.has(face);
 }
 
 double between(const double ends[2], double along) { return ends[0] + along * (ends[1] - ends[0]); }
@@ -124,6 +128,7 @@ BladeSweep::BladeSweep(Body &b, const CutShape &blade, const Vec3 *forward) : bl
   find_near(b);
   const bool looks = turn(b, forward);
   if (near_.empty()) return;
+  if (b.inner.empty()) b.inner = inner_faces(b);
   find_faces(b);
   const bool still = std::all_of(near_.begin(), near_.end(), [](const Near &n) {
     return n.was.x == n.is.x && n.was.y == n.is.y && n.was.z == n.is.z;
@@ -131,6 +136,15 @@ BladeSweep::BladeSweep(Body &b, const CutShape &blade, const Vec3 *forward) : bl
   if (looks) take_sides(track);
   if (looks || !forward) compare(b, !forward && (fresh_ || still));
   std::sort(faces.begin(), faces.end());
+}
+
+Array<uint32_t> inner_faces(const Body &b) {
+  Array<uint32_t> out{HookAllocator<uint32_t>(b.world->memory())};
+  each_inner_face(b.world->memory(), b.ncell(), b.tets.data(), [&](uint32_t i, uint32_t j) {
+    out.push_back(i);
+    out.push_back(j);
+  });
+  return out;
 }
 
 namespace {
@@ -163,21 +177,6 @@ Pair most(Pair a, Pair b) { return a < b ? b : a; }
 Four least(Four a, Four b) { return {least(a.xy, b.xy), least(a.z, b.z)}; }
 Four most(Four a, Four b) { return {most(a.xy, b.xy), most(a.z, b.z)}; }
 
-// Diagonal of the largest box around a cell, m.
-double largest_cell(const Body &b) {
-  double square = 0;
-  for (uint32_t c = 0; c < b.ncell(); ++c) {
-    const uint32_t *const p = &b.tets[size_t{4} * c];
-    const auto at = [&](size_t k) { return four_at(&b.p.x[size_t{kStride} * p[k]]); };
-    const Four x[4] = {at(0), at(1), at(2), at(3)};
-    const Four lo = least(least(x[0], x[1]), least(x[2], x[3]));
-    const Four hi = most(most(x[0], x[1]), most(x[2], x[3]));
-    const Pair a = hi.xy - lo.xy, z = hi.z - lo.z, a2 = a * a, z2 = z * z;
-    square = std::max(square, (a2[0] + a2[1]) + z2[0]);
-  }
-  return std::sqrt(square);
-}
-
 }  // namespace
 
 // Cells that may have been near the edge between the calls, alone: there is a call in each step, so what
@@ -196,7 +195,10 @@ void BladeSweep::find_near(const Body &b) {
   whole.add({lo.xy[0], lo.xy[1], lo.z[0]});
   whole.add({hi.xy[0], hi.xy[1], hi.z[0]});
   if (!way.meets(whole, kReach * b.surface.median_edge)) return;
-  const Beyond beyond{way.lo, way.hi, kKept * largest_cell(b)};
+  // of the diagonal of the largest box around a cell
+  const double reach =
+      kKept * std::sqrt(points_kernels().largest_box(b.ncell(), b.tets.data(), b.p.x.data()));
+  const Beyond beyond{way.lo, way.hi, reach};
   std::vector<uint8_t> side(b.p.n);
   for (uint32_t i = 0; i < b.p.n; ++i)
     side[i] = beyond(before + size_t{kStride} * i) & beyond(&b.p.x[size_t{kStride} * i]);
@@ -235,15 +237,14 @@ bool BladeSweep::turn(const Body &b, const Vec3 *forward) {
 }
 
 void BladeSweep::find_faces(const Body &b) {
-  std::vector<uint32_t> tets;
-  for (const Near &n : near_)
-    tets.insert(tets.end(), b.tets.begin() + std::ptrdiff_t{4} * n.cell,
-                b.tets.begin() + std::ptrdiff_t{4} * (n.cell + 1));
-  each_inner_face(b.world->memory(), static_cast<uint32_t>(near_.size()), tets.data(),
-                  [&](uint32_t i, uint32_t j) {
-                    apart_ = std::max(apart_, norm(near_[i].is - near_[j].is));
-                    if (!is_open(b, near_[i].cell, near_[j].cell)) pairs_.push_back({i, j});
-                  });
+  std::vector<uint32_t> near(b.ncell(), kNone);
+  for (size_t i = 0; i < near_.size(); ++i) near[near_[i].cell] = uint32_t(i);
+  for (size_t k = 0; k < b.inner.size(); k += 2) {
+    const uint32_t i = near[b.inner[k]], j = near[b.inner[k + 1]];
+    if (i == kNone || j == kNone) continue;
+    apart_ = std::max(apart_, norm(near_[i].is - near_[j].is));
+    if (!is_open(b, near_[i].cell, near_[j].cell)) pairs_.push_back({i, j});
+  }
 }
 
 void BladeSweep::take_sides(const BladeTrack *track) {

@@ -16,6 +16,9 @@ struct SweptFace {
   bool operator<(const SweptFace &o) const { return order != o.order ? order < o.order : face < o.face; }
 };
 
+// [n,2] cells on both sides of the inner faces of a body, in the order of the points of these (Body::inner).
+Array<uint32_t> inner_faces(const Body &b);
+
 // From the edge of corners 0 and 1 to that of 3 and 2. If the body remembers that an edge has come to the
 // first one, the way goes on from there.
 class BladeSweep {

@@ -222,6 +222,21 @@ void make_model(World &w, Body &b, const dfm_type &type, std::vector<double> val
 
 }  // namespace
 
+std::unique_ptr<BodyModel> make_body_instance(World &w, Body &b, const dfm_type &type, ModelOrigin origin) {
+  auto out = std::make_unique<BodyModel>();
+  out->origin = std::move(origin);
+  const OnBehalf speaks(b.name);
+  make_selected(w, b, type, values_for(w, b, type, out->origin.params, *out), *out);
+  return out;
+}
+
+void give_dynamics(World &w, Body &b, bool ask_bound) {
+  const auto implicit = implicit_of(w, b.name, static_cast<int32_t>(b.integrator.used), b.integrator);
+  b.dynamics = make_dynamics(w.meters.dynamics.memory(), b.p, b.surface, b.model, b.edges,
+                             implicit ? &*implicit : nullptr);
+  if (!implicit && ask_bound) ask_explicit_bound(w, *b.dynamics, b.integrator);
+}
+
 ModelParams keep_params(const dfm_type &type, const dfm_params &given) {
   const std::span<const dfm_param_value> rows(given.values, given.values ? given.n : 0);
   std::vector<dfm_param_value> own;

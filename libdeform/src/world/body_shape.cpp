@@ -8,6 +8,8 @@
 #include "mesh/mesh.h"
 #include "state/material.h"
 #include "state/world.h"
+#include "step/self_contact.h"
+#include "world/blade_sweep.h"
 #include "world/body_zones.h"
 #include "world/carry_state.h"
 #include "world/feature_names.h"
@@ -77,22 +79,30 @@ void make_skin(const Memory &m, const CutMesh &mesh, BodyShape &out) {
                out.surface);
 }
 
-// Makes the present model of the body for its present mesh. Keeps the chosen integrator.
-void make_model_again(Body &b, const Former &before, ModelOrigin origin) {
-  const Integrator was = before.integrator;
-  std::unique_ptr<BodyModel> made =
-      make_body_model(*b.world, b, *before.model.type, std::move(origin), static_cast<int32_t>(was.used));
-  made->integrator.chosen = was.chosen;
-  made->integrator.open = was.open;
-  made->integrator.counted = was.counted;
-  if (was.counted == Counted::implicit) made->integrator.step = was.step;
-  exchange(b, *made);
+// Keeps the chosen integrator.
+void keep_integrator(Body &b, const Integrator &was) {
+  b.integrator.chosen = was.chosen;
+  b.integrator.open = was.open;
+  b.integrator.counted = was.counted;
+  if (was.counted == Counted::implicit) b.integrator.step = was.step;
+}
+
+void keep_params(Body &b, const Former &before) {
   const std::vector<double> values = before.model.params;
   if (values == b.model.params) return;
   if (const dfm_status s = b.model.put_params(values, b.dynamics->claims()); s != DFM_OK)
     fail(s, "body '%s': model '%s' does not take its present parameters for the cells that are left",
          b.name.c_str(), b.model.type->id);
   b.model.params = values;
+}
+
+// Makes the present model of the body for its present mesh.
+void make_model_again(Body &b, const Former &before, ModelOrigin origin) {
+  const Integrator was = before.integrator;
+  exchange(b, *make_body_model(*b.world, b, *before.model.type, std::move(origin),
+                               static_cast<int32_t>(was.used)));
+  keep_integrator(b, was);
+  keep_params(b, before);
 }
 
 // Puts the shape into the body; the last steps may fail, which undoes it.
@@ -117,6 +127,7 @@ void exchange(Body &b, BodyShape &other) noexcept {
   std::swap(b.p, other.p);
   b.tets.swap(other.tets);
   b.edges.swap(other.edges);
+  b.inner.swap(other.inner);
   std::swap(b.surface, other.surface);
   std::swap(b.zones, other.zones);
   std::swap(b.cut, other.cut);
@@ -133,6 +144,7 @@ void exchange(Body &b, BodyShape &other) noexcept {
   b.spares.swap(other.spares);
   b.blades.swap(other.blades);
   b.search.swap(other.search);
+  b.self_rest.swap(other.self_rest);
   exchange(b, other.model);
   ++b.x_version;
 }
@@ -185,8 +197,8 @@ void carry_dues(const CutMesh &mesh, const BladeTrack &from, BladeTrack &to) {
   }
 }
 
-// The part of the present mesh of b, without what put() adds.
-std::unique_ptr<BodyShape> part_of(const Body &b, const CutMesh &mesh, Array<uint64_t> &&open) {
+// The part of the present mesh of b: what follows from its cells alone.
+std::unique_ptr<BodyShape> structure_of_part(const Body &b, const CutMesh &mesh, Array<uint64_t> &&open) {
   const Memory &m = b.world->memory();
   auto shape = std::make_unique<BodyShape>();
   BodyShape &out = *shape;
@@ -199,13 +211,26 @@ std::unique_ptr<BodyShape> part_of(const Body &b, const CutMesh &mesh, Array<uin
 
   size_points(m, out.p, static_cast<uint32_t>(mesh.point.size()));
   take_rows(b.p.rest, mesh.point, 3, out.p.rest);
-  take_rows(b.p.x, mesh.point, kStride, out.p.x);
-  take_rows(b.p.v, mesh.point, kStride, out.p.v);
-  take_rows(b.p.held, mesh.point, 1, out.p.held);
   use_memory(m, out.anchor, out.surfel_impulse);
-  if (!b.anchor.empty()) take_rows(b.anchor, mesh.point, kStride, out.anchor);
-  for (const BladeTrack &t : b.blades) {
-    BladeTrack &track = out.blades.emplace_back();
+  take_cells(m, b.share, b.makeup, mesh, out);
+  make_skin(m, mesh, out);
+  name_features(b, mesh, out.surface, out.cut);
+  find_laid(m, *out.cut.whole, out.cut, out.surface);
+  make_cut_zones(m, *out.cut.whole, out.cut, out.makeup, out.tets, out.surface, out.zones);
+  return shape;
+}
+
+// The state of its points and surfels, and where blades are.
+template <class Shape>
+void take_points(const Memory &m, const Shape &from, const CutMesh &mesh, const std::vector<uint32_t> &surfel,
+                 Phyxels &p, Array<double> &anchor, std::vector<BladeTrack> &blades, Surface &surface,
+                 Array<double> &surfel_impulse) {
+  take_rows(from.p.x, mesh.point, kStride, p.x);
+  take_rows(from.p.v, mesh.point, kStride, p.v);
+  take_rows(from.p.held, mesh.point, 1, p.held);
+  if (!from.anchor.empty()) take_rows(from.anchor, mesh.point, kStride, anchor);
+  for (const BladeTrack &t : from.blades) {
+    BladeTrack &track = blades.emplace_back();
     use_memory(m, track.x, track.sides, track.dues);
     std::copy_n(t.edge, 6, track.edge);
     track.lead = t.lead;
@@ -221,15 +246,17 @@ std::unique_ptr<BodyShape> part_of(const Body &b, const CutMesh &mesh, Array<uin
     track.part = t.part;
     carry_dues(mesh, t, track);
   }
-  take_cells(m, b.share, b.makeup, mesh, out);
-  make_skin(m, mesh, out);
-  name_features(b, mesh, out.surface, out.cut);
-  find_laid(m, *out.cut.whole, out.cut, out.surface);
-  out.surface.back = b.surface.back;
-  make_cut_zones(m, *out.cut.whole, out.cut, out.makeup, out.tets, out.surface, out.zones);
-  carry_surfels(b, mesh, out);
-  gather_surface(out.surface, out.p.x.data(), out.p.v.data());
-  return shape;
+  surface.back = from.surface.back;
+  carry_surfels(from.surfel_impulse, surfel, surfel_impulse);
+  gather_surface(surface, p.x.data(), p.v.data());
+}
+
+// The part of the present mesh of b, without what put() adds.
+std::unique_ptr<BodyShape> part_of(const Body &b, const CutMesh &mesh, Array<uint64_t> &&open) {
+  std::unique_ptr<BodyShape> out = structure_of_part(b, mesh, std::move(open));
+  take_points(b.world->memory(), b, mesh, surfels_before(b, mesh, out->surface), out->p, out->anchor,
+              out->blades, out->surface, out->surfel_impulse);
+  return out;
 }
 
 ModelOrigin origin_of(const Body &b, const CutMesh &mesh) {
@@ -240,17 +267,110 @@ ModelOrigin origin_of(const Body &b, const CutMesh &mesh) {
 
 }  // namespace
 
-std::unique_ptr<BodyShape> cut_body(Body &b, CutMesh &&mesh, Array<uint64_t> &&open, bool parts) {
-  std::unique_ptr<BodyShape> shape = part_of(b, mesh, std::move(open));
-  shape->surface.named = b.surface.named;
-  ModelOrigin origin = origin_of(b, mesh);
-  return put(b, std::move(shape), [&](BodyShape &had) {
-    Former before = former(had);
+std::unique_ptr<MadeShape> make_shape(const Body &b, CutMesh &&mesh, Array<uint64_t> &&open, bool ahead) {
+  World &w = *b.world;
+  auto out = std::make_unique<MadeShape>(MadeShape{std::move(mesh), nullptr, {}, {}, {}});
+  out->shape = structure_of_part(b, out->mesh, std::move(open));
+  BodyShape &shape = *out->shape;
+  shape.surface.named = b.surface.named;
+  shape.search = std::make_unique<SearchTree>(w.memory());
+  out->edge = edges_before(b.edges, out->mesh, shape.edges);
+  out->surfel = surfels_before(b, out->mesh, shape.surface);
+  out->features = FeatureMap(b.surface, shape.surface);
+
+  Body like;  // the model is made for a body
+  like.world = &w;
+  like.name = b.name;
+  like.material = b.material;
+  ModelOrigin origin = origin_of(b, out->mesh);
+  exchange(like, shape);
+  for (uint32_t i = 0; i < like.p.n; ++i)
+    std::copy_n(&like.p.rest[size_t{3} * i], 3, &like.p.x[size_t{kStride} * i]);
+  weigh(like);
+  exchange(like, *make_body_instance(w, like, *b.model.type, std::move(origin)));
+  like.integrator.used = b.integrator.used;
+  if (ahead) {
+    give_dynamics(w, like, true);
+    like.dynamics.reset();  // it refers to this body
+    like.inner = inner_faces(like);
+    like.self_rest = std::make_unique<SelfRest>(self_rest_of(w.meters.detection.memory(), like));
+  }
+  exchange(like, shape);
+  return out;
+}
+
+std::unique_ptr<BodyShape> take_shape(Body &b, MadeShape &made, bool parts, bool ahead) {
+  World &w = *b.world;
+  const CutMesh &mesh = made.mesh;
+  std::unique_ptr<BodyShape> shape = std::move(made.shape);
+  shape->shape = ++w.shapes;
+  exchange(b, *shape);
+  try {
+    Former before = former(*shape);
     before.parts = parts;
+    take_points(w.memory(), *shape, mesh, made.surfel, b.p, b.anchor, b.blades, b.surface, b.surfel_impulse);
+    update_inverse_mass(b.p);
     carry_loads(before, mesh, b);
-    make_model_again(b, before, std::move(origin));
-    carry_state(before, mesh, b);
-  });
+    const double step = b.integrator.step;
+    give_dynamics(w, b, !ahead);
+    if (ahead) b.integrator.step = step;
+    keep_integrator(b, before.integrator);
+    keep_params(b, before);
+    carry_state(before, mesh, made.edge, b);
+  } catch (...) {
+    exchange(b, *shape);
+    throw;
+  }
+  return shape;
+}
+
+std::unique_ptr<BodyShape> cut_body(Body &b, CutMesh &&mesh, Array<uint64_t> &&open, bool parts) {
+  return take_shape(b, *make_shape(b, std::move(mesh), std::move(open), false), parts, false);
+}
+
+namespace {
+
+// With the memory that it is in.
+template <class T>
+T copy(const T &x) {
+  return x;
+}
+
+}  // namespace
+
+std::unique_ptr<Body> structure_of(const Body &b) {
+  auto out = std::make_unique<Body>();
+  out->world = b.world;
+  out->id = b.id;
+  out->name = b.name;
+  out->material = b.material;
+  out->p.n = b.p.n;
+  out->p.rest = copy(b.p.rest);
+  out->p.mass = copy(b.p.mass);
+  out->tets = copy(b.tets);
+  out->edges = copy(b.edges);
+  out->surface = copy(b.surface);
+  out->zones = copy(b.zones);
+  out->cut = copy(b.cut);
+  out->shape = b.shape;
+  out->share = copy(b.share);
+  out->makeup = copy(b.makeup);
+  out->origin = b.origin;
+  out->integrator = b.integrator;
+  out->model.type = b.model.type;
+  return out;
+}
+
+std::unique_ptr<Body> structure_left(const Body &before, MadeShape &made) {
+  Body like;
+  like.world = before.world;
+  like.id = before.id;
+  like.name = before.name;
+  like.material = before.material;
+  exchange(like, *made.shape);
+  std::unique_ptr<Body> out = structure_of(like);
+  exchange(like, *made.shape);
+  return out;
 }
 
 void shape_piece(const Body &from, CutMesh &&mesh, Array<uint64_t> &&open, Body &piece) {
@@ -266,7 +386,7 @@ void shape_piece(const Body &from, CutMesh &&mesh, Array<uint64_t> &&open, Body 
     before.parts = true;
     carry_loads(before, mesh, piece);
     make_model_again(piece, before, std::move(origin));
-    carry_state(before, mesh, piece);
+    carry_state(before, mesh, edges_before(before.edges, mesh, piece.edges), piece);
   });
 }
 

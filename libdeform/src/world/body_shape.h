@@ -4,12 +4,13 @@
 #include "mesh/cut_mesh.h"
 #include "state/body.h"
 #include "world/body_model.h"
+#include "world/feature_map.h"
 
 namespace dfm {
 
 struct BodyShape {
   Phyxels p;
-  Array<uint32_t> tets, edges;
+  Array<uint32_t> tets, edges, inner;
   Surface surface;
   SurfaceZones zones;
   CutRecord cut;
@@ -23,6 +24,7 @@ struct BodyShape {
   std::vector<SpareModel> spares;
   std::vector<BladeTrack> blades;
   std::unique_ptr<SearchTree> search;
+  std::unique_ptr<SelfRest> self_rest;
   BodyModel model;
 };
 
@@ -51,6 +53,24 @@ struct FeatureNames {
 
 // The original body, for its record.
 std::shared_ptr<const WholeBody> whole_of(const Body &b);
+
+// A shape that a body may take, complete but for what steps change.
+struct MadeShape {
+  CutMesh mesh;  // numbers of `b` before
+  std::unique_ptr<BodyShape> shape;
+  std::vector<uint32_t> edge, surfel;  // previous numbers, or kNone
+  FeatureMap features;
+};
+// The shape of the mesh that a cut leaves. Reads what steps do not change, and nothing of the state: any
+// thread may do it, if no other one changes `b` meanwhile other than by steps. open: as below. ahead: with
+// all that the next step would make. Throws Error.
+std::unique_ptr<MadeShape> make_shape(const Body &b, CutMesh &&mesh, Array<uint64_t> &&open, bool ahead);
+// All that make_shape() reads of a body: of the present one, and of what is left of it.
+std::unique_ptr<Body> structure_of(const Body &b);
+std::unique_ptr<Body> structure_left(const Body &before, MadeShape &made);
+// Puts it into the body, with the state of the body, as cut_body() does. ahead: as it was made; the longest
+// explicit sub-step is that at rest then, and not that of now.
+std::unique_ptr<BodyShape> take_shape(Body &b, MadeShape &made, bool parts, bool ahead);
 
 // Gives `b` the mesh that a cut leaves, and returns the previous shape; exchange() with it undoes the cut.
 // open: faces of the whole body. State, loads, springs, motions and held points follow the points; the state

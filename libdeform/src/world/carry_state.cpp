@@ -1,6 +1,7 @@
 #include "world/carry_state.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "core/error.h"
 #include "plugin/context.h"
@@ -60,7 +61,8 @@ Spring carried(const Spring &s, const Copies &copies, bool parts) {
   return out;
 }
 
-// [nedge] number before, or kNone; edges are in lexicographic order
+}  // namespace
+
 std::vector<uint32_t> edges_before(const Array<uint32_t> &before, const CutMesh &mesh,
                                    const Array<uint32_t> &now) {
   std::vector<uint64_t> keys;
@@ -74,8 +76,6 @@ std::vector<uint32_t> edges_before(const Array<uint32_t> &before, const CutMesh 
   }
   return out;
 }
-
-}  // namespace
 
 void carry_loads(const Former &before, const CutMesh &mesh, Body &b) {
   const Copies copies(mesh, b, before.p.n);
@@ -121,7 +121,7 @@ std::optional<dfm_topology> topology_of(const ModelInstance &model) {
   return copy_table<dfm_topology>(table, kTopologyHead, model.type->id, "dfm_topology");
 }
 
-void carry_state(const Former &before, const CutMesh &mesh, Body &b) {
+void carry_state(const Former &before, const CutMesh &mesh, const std::vector<uint32_t> &edge, Body &b) {
   const ModelInstance &old = before.model;
   ModelInstance &now = b.model;
   const auto same = [](const dfm_slot &l, const dfm_slot &r) {
@@ -132,7 +132,6 @@ void carry_state(const Former &before, const CutMesh &mesh, Body &b) {
          "body '%s': model '%s' has another state for the cells that are left; report it to its "
          "author",
          b.name.c_str(), now.type->id);
-  const std::vector<uint32_t> edge = edges_before(before.edges, mesh, b.edges);
   size_t from = 0, to = 0;
   for (const dfm_slot &slot : now.slots) {
     const bool by_point = slot.unit == DFM_PER_POINT, by_cell = slot.unit == DFM_PER_CELL,
@@ -168,16 +167,17 @@ void carry_state(const Former &before, const CutMesh &mesh, Body &b) {
          b.name.c_str(), now.type->id, *why.text() ? why.text() : dfm_status_name(s));
 }
 
-void carry_surfels(const Body &before, const CutMesh &mesh, BodyShape &out) {
-  std::vector<uint32_t> surfel(before.p.n, kNone);
+std::vector<uint32_t> surfels_before(const Body &before, const CutMesh &mesh, const Surface &now) {
+  std::vector<uint32_t> surfel(before.p.n, kNone), out(now.nsurfel, kNone);
   for (uint32_t s = 0; s < before.surface.nsurfel; ++s) surfel[before.surface.point[s]] = s;
-  out.surfel_impulse.assign(size_t{3} * out.surface.nsurfel, 0.0);
-  for (uint32_t s = 0; s < out.surface.nsurfel; ++s) {
-    uint32_t &was = surfel[mesh.point[out.surface.point[s]]];
-    if (was == kNone) continue;
-    std::copy_n(&before.surfel_impulse[size_t{3} * was], 3, &out.surfel_impulse[size_t{3} * s]);
-    was = kNone;
-  }
+  for (uint32_t s = 0; s < now.nsurfel; ++s) out[s] = std::exchange(surfel[mesh.point[now.point[s]]], kNone);
+  return out;
+}
+
+void carry_surfels(const Array<double> &from, const std::vector<uint32_t> &surfel, Array<double> &to) {
+  to.assign(3 * surfel.size(), 0.0);
+  for (size_t s = 0; s < surfel.size(); ++s)
+    if (surfel[s] != kNone) std::copy_n(&from[size_t{3} * surfel[s]], 3, &to[3 * s]);
 }
 
 }  // namespace dfm

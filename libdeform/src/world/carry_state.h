@@ -12,9 +12,14 @@ namespace dfm {
 void carry_loads(const Former &before, const CutMesh &mesh, Body &b);
 // None: the model needs all of its cells.
 std::optional<dfm_topology> topology_of(const ModelInstance &model);
+// [nedge] previous numbers, kNone for new ones; edges are in lexicographic order.
+std::vector<uint32_t> edges_before(const Array<uint32_t> &before, const CutMesh &mesh,
+                                   const Array<uint32_t> &now);
 // The state of the model: slots by point, cell, edge and instance; new edges start in the initial state.
-void carry_state(const Former &before, const CutMesh &mesh, Body &b);
-// Impulses of surfels; copies have none.
-void carry_surfels(const Body &before, const CutMesh &mesh, BodyShape &out);
+void carry_state(const Former &before, const CutMesh &mesh, const std::vector<uint32_t> &edge, Body &b);
+// [nsurfel] previous numbers; kNone for new ones, and for copies but the first.
+std::vector<uint32_t> surfels_before(const Body &before, const CutMesh &mesh, const Surface &now);
+// Impulses of surfels; new ones have none.
+void carry_surfels(const Array<double> &from, const std::vector<uint32_t> &surfel, Array<double> &to);
 
 }  // namespace dfm

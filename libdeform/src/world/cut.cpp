@@ -28,6 +28,9 @@ namespace {
 
 constexpr double kRounding = 1e-12;  // of the mass of a point that copies share
 
+// Open faces, ascending: of the whole body, and those between present cells.
+struct OpenFaces { Array<uint64_t> whole, own; };
+
 void corners_of(const Body &b, uint32_t cell, Vec3 x[4]) {
   for (size_t k = 0; k < 4; ++k) x[k] = load3(&b.p.x[size_t{kStride} * b.tets[size_t{4} * cell + k]]);
 }
@@ -72,22 +75,12 @@ CutReport empty(Body &b) {
   return out;
 }
 
-// open: faces of the whole body that are open, ascending; those of the present body by its own numbers.
-CutReport cut(Body &b, const Array<uint8_t> &removed, Array<uint64_t> &&open,
-              const Array<uint64_t> &own_open) {
+// Exchanges the body with what a cut has left of it.
+std::unique_ptr<BodyShape> put(Body &b, MadeShape &made, bool ahead) {
   World &w = *b.world;
-  const Memory &m = w.memory();
-  CutReport out;
-  CutMesh mesh = make_cut_mesh(m, b.p.n, b.ncell(), b.tets.data(), removed, own_open);
-  if (mesh.cell.empty()) return empty(b);
-  out.removed = b.ncell() - static_cast<uint32_t>(mesh.cell.size());
-  const double elastic = elastic_energy(b), kinetic = kinetic_of(b);
-  const HostWork work(b);
-  CutMesh numbers(m);
-  numbers.point = Array<uint32_t>(mesh.point);
-  const std::unique_ptr<BodyShape> before = cut_body(b, std::move(mesh), std::move(open), false);
+  std::unique_ptr<BodyShape> before = take_shape(b, made, false, ahead);
   try {
-    Lasting lasting(w, {{b.id, b.slot, FeatureMap(before->surface, b.surface)}});
+    Lasting lasting(w, {{b.id, b.slot, made.features}});
     reserve_events(w, w.store.n + w.attachments.size());
     for (const Attachment &a : lasting.attachments)
       if (a.surfels.empty()) w.overlaps.place(a.body);  // what it held may touch now
@@ -99,54 +92,77 @@ CutReport cut(Body &b, const Array<uint8_t> &removed, Array<uint64_t> &&open,
       exchange(w, lasting);
       throw;
     }
+    const size_t attached = w.attachments.size();
     end_what_went(w, lasting);
+    if (w.attachments.size() != attached) w.changed = true;
   } catch (...) {
     exchange(b, *before);
     throw;
   }
   wake(w, b);
-  w.changed = true;  // without the attachments that have ended
-  tell_what_went(*before, numbers, b, out);
+  return before;
+}
+
+// open: faces of the whole body that are open, ascending; those of the present body by its own numbers.
+CutReport cut(Body &b, const Array<uint8_t> &removed, OpenFaces &&open) {
+  const Memory &m = b.world->memory();
+  CutReport out;
+  CutMesh mesh = make_cut_mesh(m, b.p.n, b.ncell(), b.tets.data(), removed, open.own);
+  if (mesh.cell.empty()) return empty(b);
+  out.removed = b.ncell() - static_cast<uint32_t>(mesh.cell.size());
+  const double elastic = elastic_energy(b), kinetic = kinetic_of(b);
+  const HostWork work(b);
+  const std::unique_ptr<MadeShape> made = make_shape(b, std::move(mesh), std::move(open.whole), false);
+  const std::unique_ptr<BodyShape> before = put(b, *made, false);
+  tell_what_went(*before, made->mesh, b, out);
   out.area = new_area(b, *before);
   out.kinetic = kinetic - kinetic_of(b);
   out.elastic = elastic - elastic_energy(b);
   out.parts = count_parts(m, b.p.n, b.ncell(), b.tets.data());
   std::vector<uint8_t> seen(before->p.n);
-  for (const uint32_t p : numbers.point) out.copies += std::exchange(seen[p], uint8_t{1});
+  for (const uint32_t p : made->mesh.point) out.copies += std::exchange(seen[p], uint8_t{1});
   return out;
 }
 
-// Faces that are open already and `more` (present cells), as those of the whole body and of the present one.
-CutReport cut(Body &b, const Array<uint8_t> &removed, const Array<uint64_t> &more) {
+void sort_out(Array<uint64_t> &list) {
+  std::sort(list.begin(), list.end());
+  list.erase(std::unique(list.begin(), list.end()), list.end());
+}
+
+// Faces that are open already and `more` (of the whole body).
+OpenFaces with_open(const Body &b, const Array<uint64_t> &more) {
   const HookAllocator<uint64_t> a(b.world->memory());
+  OpenFaces out{Array<uint64_t>(b.cut.open, a), Array<uint64_t>(a)};
+  out.whole.insert(out.whole.end(), more.begin(), more.end());
+  sort_out(out.whole);
+  for (const uint64_t face : out.whole) {
+    const uint32_t i = present_cell(b, uint32_t(face >> 32)), j = present_cell(b, uint32_t(face & kNone));
+    if (i != kNone && j != kNone) out.own.push_back(open_face(i, j));
+  }
+  sort_out(out.own);
+  return out;
+}
+
+// Opens `more` faces (present cells).
+CutReport cut(Body &b, const Array<uint8_t> &removed, const Array<uint64_t> &more) {
   const OnBehalf speaks(b.name);
   prepare(*b.world);
   check_may_cut(b, b.model);
-  Array<uint64_t> open(b.cut.open, a), own(more, a);
-  const auto whole = [&](uint64_t cell) { return b.cut.whole ? b.cut.cell[cell] : uint32_t(cell); };
-  for (const uint64_t face : more) open.push_back(open_face(whole(face >> 32), whole(face & kNone)));
-  const auto in_order = [](Array<uint64_t> &list) {
-    std::sort(list.begin(), list.end());
-    list.erase(std::unique(list.begin(), list.end()), list.end());
-  };
-  in_order(open);
-  const bool opens = open.size() > b.cut.open.size();
+  Array<uint64_t> whole(HookAllocator<uint64_t>(b.world->memory()));
+  for (const uint64_t face : more)
+    whole.push_back(face_of_whole(b, uint32_t(face >> 32), uint32_t(face & kNone)));
+  OpenFaces open = with_open(b, whole);
+  const bool opens = open.whole.size() > b.cut.open.size();
   if (!opens && std::find(removed.begin(), removed.end(), 1) == removed.end()) {
     CutReport none;
     none.parts = count_parts(b.world->memory(), b.p.n, b.ncell(), b.tets.data());
     return none;
   }
-  // cells keep their order, so numbers in the whole body are found by bisection
-  for (const uint64_t face : b.cut.open) {
-    const auto own_number = [&](uint64_t cell) {
-      const auto at = std::lower_bound(b.cut.cell.begin(), b.cut.cell.end(), uint32_t(cell));
-      return at != b.cut.cell.end() && *at == cell ? uint32_t(at - b.cut.cell.begin()) : kNone;
-    };
-    const uint32_t i = own_number(face >> 32), j = own_number(face & kNone);
-    if (i != kNone && j != kNone) own.push_back(open_face(i, j));
-  }
-  in_order(own);
-  return cut(b, removed, std::move(open), own);
+  return cut(b, removed, std::move(open));
+}
+
+Array<uint8_t> none_removed(const Body &b) {
+  return Array<uint8_t>(b.ncell(), 0, HookAllocator<uint8_t>(b.world->memory()));
 }
 
 // Of a plane: a blade in it that has the whole of the body in its first triangle, so that no line of the body
@@ -196,8 +212,32 @@ void check_may_cut(const Body &b, const ModelInstance &model) {
          name, model.type->id);
 }
 
-CutReport open_faces(Body &b, const Array<uint64_t> &faces) {
-  return cut(b, Array<uint8_t>(b.ncell(), 0, HookAllocator<uint8_t>(b.world->memory())), faces);
+uint32_t present_cell(const Body &b, uint32_t whole) {
+  if (!b.cut.whole) return whole < b.ncell() ? whole : kNone;
+  const auto at = std::lower_bound(b.cut.cell.begin(), b.cut.cell.end(), whole);
+  return at != b.cut.cell.end() && *at == whole ? uint32_t(at - b.cut.cell.begin()) : kNone;
+}
+
+uint64_t face_of_whole(const Body &b, uint32_t i, uint32_t j) {
+  const auto whole = [&](uint32_t cell) { return b.cut.whole ? b.cut.cell[cell] : cell; };
+  return open_face(whole(i), whole(j));
+}
+
+CutReport open_faces(Body &b, const Array<uint64_t> &faces) { return cut(b, none_removed(b), faces); }
+
+std::unique_ptr<MadeShape> make_opened(const Body &b, const Array<uint64_t> &faces) {
+  const Memory &m = b.world->memory();
+  OpenFaces open = with_open(b, faces);
+  CutMesh mesh = make_cut_mesh(m, b.p.n, b.ncell(), b.tets.data(), none_removed(b), open.own);
+  return make_shape(b, std::move(mesh), std::move(open.whole), true);
+}
+
+void put_opened(Body &b, MadeShape &made) {
+  const OnBehalf speaks(b.name);
+  prepare(*b.world);
+  check_may_cut(b, b.model);
+  const HostWork work(b);
+  put(b, made, true);
 }
 
 CutReport remove_cells(Body &b, const Array<uint8_t> &removed) {

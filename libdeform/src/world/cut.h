@@ -5,6 +5,8 @@
 
 namespace dfm {
 
+struct MadeShape;
+
 struct CutReport {
   uint32_t removed = 0;             // cells
   uint32_t opened = 0;              // faces
@@ -33,6 +35,14 @@ CutReport split_by_blade(Body &b, const CutShape &blade, uint32_t most);
 
 // Opens faces between present cells: pairs (mesh/cut_mesh.h), in any order.
 CutReport open_faces(Body &b, const Array<uint64_t> &faces);
+
+// The same in two parts (world/cut_ahead.h), with faces between cells of the whole body. The first reads what
+// steps do not change; the second takes it if the body has the same shape still.
+std::unique_ptr<MadeShape> make_opened(const Body &b, const Array<uint64_t> &faces);
+void put_opened(Body &b, MadeShape &made);
+
+uint32_t present_cell(const Body &b, uint32_t whole);           // kNone: it has gone
+uint64_t face_of_whole(const Body &b, uint32_t i, uint32_t j);  // between present cells
 
 // Kinetic energy, J.
 double kinetic_of(const Body &b);

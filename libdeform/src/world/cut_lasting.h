@@ -5,14 +5,9 @@
 
 #include "state/body.h"
 #include "state/world.h"
+#include "world/feature_map.h"
 
 namespace dfm {
-
-// Numbers now by numbers before, the first of copies; kNone: gone.
-struct FeatureMap {
-  std::vector<uint32_t> of[3];  // surfels, edges, triangles
-  FeatureMap(const Surface &before, const Surface &now);
-};
 
 // Where features may be: the body itself first, then its pieces.
 struct CutTarget {

@@ -14,6 +14,7 @@
 #include "world/body_shape.h"
 #include "world/change_energy.h"
 #include "world/create.h"
+#include "world/cut_ahead.h"
 #include "world/cut_lasting.h"
 #include "world/measure.h"
 
@@ -207,6 +208,7 @@ Body &place_for_piece(World &w, const Body &of, uint64_t id, const std::string &
   b.whole_name = of.piece_of ? of.whole_name : of.name;
   b.separate = of.separate;
   b.planned_cuts = of.planned_cuts;
+  inherit_cuts(of, b);
   b.switches = of.switches;
   b.rule = of.rule;
   b.first_model = of.first_model;

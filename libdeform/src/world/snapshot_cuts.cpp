@@ -101,6 +101,15 @@ bool sound(const Array<CutDue> &dues, uint32_t npoint) {
   return true;
 }
 
+bool sound(const std::vector<AheadFace> &faces, const Body &b) {
+  const size_t n = b.cut.whole ? b.cut.whole->tets.size() / 4 : b.ncell();
+  for (size_t i = 0; i < faces.size(); ++i) {
+    const uint64_t face = faces[i].face;
+    if ((face & kNone) >= n || face >> 32 >= (face & kNone) || (i && face <= faces[i - 1].face)) return false;
+  }
+  return true;
+}
+
 std::vector<Body *> all_bodies(const World &w) {
   std::vector<Body *> out;
   for (const auto *list : {&w.bodies, &w.emptied})

@@ -71,5 +71,7 @@ std::vector<Body *> all_bodies(const World &w);
 bool sound(const Array<BladeSide> &sides, size_t ncorner);
 bool sound(const Array<CutDue> &dues, uint32_t npoint);
 bool sound(const std::vector<PlannedCut> &cuts);
+// Between cells of the whole body, ascending.
+bool sound(const std::vector<AheadFace> &faces, const Body &b);
 
 }  // namespace dfm

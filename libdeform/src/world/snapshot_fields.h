@@ -228,6 +228,16 @@ void body_fields(Stream &s, W &w, B &b, const Body &like) {
   });
   s.must_hold("cuts to come", "in order of time, and split by a blade or a plane",
               [&] { return sound(b.planned_cuts); });
+  if (like.ahead.delay > 0) {
+    const auto faces = [&](const char *name, auto &list) {
+      s.array(name, list, kAnyCount, must::any);
+      s.must_hold(name, "faces between cells of the body as it was made, ascending",
+                  [&] { return sound(list, like); });
+    };
+    faces("faces that wait", b.ahead.faces);
+    faces("faces that wait longer", b.ahead.later);
+    s.value("faces open at", b.ahead.due, must::finite);
+  }
   s.value("separates", b.separate.on, must::flag);
   s.value("crumbs go", b.separate.removes, must::flag);
   s.value("fewest cells of a piece", b.separate.least, must::any);

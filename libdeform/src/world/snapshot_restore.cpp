@@ -184,6 +184,10 @@ void exchange(World &w, Staged &t) noexcept {
     std::swap(b.separate, other.separate);
     b.planned_cuts.swap(other.planned_cuts);
     b.blades.swap(other.blades);
+    b.ahead.faces.swap(other.ahead.faces);
+    b.ahead.later.swap(other.ahead.later);
+    b.ahead.job.swap(other.ahead.job);
+    std::swap(b.ahead.due, other.ahead.due);
     std::swap(b.slumber, other.slumber);
     b.bound.known = false;
     b.anchor.swap(other.anchor);

@@ -36,6 +36,7 @@ struct StagedBody {
   SeparateRule separate;
   std::vector<PlannedCut> planned_cuts;
   std::vector<BladeTrack> blades;
+  CutsAhead ahead;
   Slumber slumber;
   Array<double> surfel_impulse, anchor, method_values;
 };

@@ -60,6 +60,7 @@ uint64_t snapshot_structure(const World &w) {
     // for a body that has been cut: the original
     const WholeBody *const whole = b->cut.whole.get();
     h.add(b->id);
+    if (b->ahead.delay > 0) h.add(b->ahead.delay);
     h.add(whole ? whole->npoint : b->p.n);
     h.add(whole ? whole->nsurfel : b->surface.nsurfel);
     h.add(b->name.data(), b->name.size());

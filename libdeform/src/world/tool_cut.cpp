@@ -15,6 +15,7 @@
 #include "state/world.h"
 #include "step/stages.h"
 #include "world/blade_sweep.h"
+#include "world/cut_ahead.h"
 #include "world/separate.h"
 
 namespace dfm {
@@ -139,9 +140,9 @@ void forget_far(const Body &b, const Edge &edge, const ToolPlace &place, BladeTr
   });
 }
 
-// How many faces have opened.
+// How many faces have opened, in this step.
 uint32_t split(const Tool &t, Body &b) {
-  uint32_t n = 0;
+  uint32_t n = 0, all = 0;
   for (size_t part = t.first_cutting_part(); part < t.motion.parts.size(); ++part) {
     const Edge edge(t, part);
     BladeSweep sweep(b, edge.blade, edge.forward);
@@ -150,13 +151,18 @@ uint32_t split(const Tool &t, Body &b) {
       if (track.part == id && !sweep.goes_on(track)) track.dues.clear();  // where it has been before a jump
     if (!sweep.near()) continue;
     std::vector<SweptFace> &met = sweep.faces;
-    if (t.cuts.most > 0 && met.size() > t.cuts.most - n) met.resize(t.cuts.most - n);
+    if (t.cuts.most > 0 && met.size() > t.cuts.most - all) met.resize(t.cuts.most - all);
+    all += uint32_t(met.size());
     const Opening opening(b, met, sweep.energy(met.size()));
     if (!met.empty()) {
       Array<uint64_t> more{HookAllocator<uint64_t>(b.world->memory())};
       for (const SweptFace &f : met) more.push_back(f.face);
-      open_faces(b, more);
-      n += uint32_t(met.size());
+      if (b.ahead.delay > 0) {
+        open_later(b, more, t.set->obstacle[t.first_cutting_part()]);
+      } else {
+        open_faces(b, more);
+        n += uint32_t(met.size());
+      }
     }
     BladeTrack &track = sweep.keep(b);
     track.part = id;
@@ -291,7 +297,8 @@ void set_cuts(Tool &t, uint32_t how, uint32_t most, std::span<Body *const> bodie
 
 bool cut_by_any(const Body &b) {
   const auto &tools = b.world->tools;
-  return std::any_of(tools.begin(), tools.end(), [&](auto &t) { return t->cuts_body(b); });
+  return b.ahead.delay > 0 ||
+         std::any_of(tools.begin(), tools.end(), [&](auto &t) { return t->cuts_body(b); });
 }
 
 void begin_cuts(World &w) {
@@ -300,7 +307,7 @@ void begin_cuts(World &w) {
       t->cuts.from[part] = place_of(t->set->state[part]);
 }
 
-void cut_by_tools(World &w) {
+void cut_by_tools(World &w, double dt) {
   for (size_t k = 0; k < w.tools.size(); ++k) {
     Tool &t = *w.tools[k];
     // by id, since a body without cells leaves the list; a body is cut with its pieces
@@ -318,6 +325,8 @@ void cut_by_tools(World &w) {
       add_event(w, DFM_EVENT_CUT, id, t.set->obstacle[t.first_cutting_part()], n, w.time);
     }
   }
+  open_due(w, dt);
+  prepare_cuts(w);
 }
 
 }  // namespace dfm

@@ -17,6 +17,6 @@ bool cut_by_any(const Body &b);  // of its world's tools
 // Before a step: remembers where the tools that cut are. After it: cuts what their parts have met on the way.
 // The latter throws Error; bodies before the one that fails have been cut then.
 void begin_cuts(World &w);
-void cut_by_tools(World &w);
+void cut_by_tools(World &w, double dt);
 
 }  // namespace dfm

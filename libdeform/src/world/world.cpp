@@ -6,6 +6,7 @@
 
 #include <algorithm>
 
+#include "core/aside.h"
 #include "core/error.h"
 #include "friction/pair_rules.h"
 #include "state/bounds.h"

@@ -1,0 +1,167 @@
+// What a cut makes anew follows from the cells of the body and from which faces open, not from how the body
+// moves (make_shape). So it is the same whenever and by whomever it is made: by the thread beside the steps,
+// by the step itself where that thread is late, or anew after a restore. Only the exchange, with the state of
+// the body, belongs to the step (take_shape), and which step that is follows from the time alone.
+//
+// The thread works on a copy of the structure, and makes that for the next cut too, so that a step neither
+// waits for it nor copies the body.
+#include "world/cut_ahead.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <exception>
+#include <map>
+#include <vector>
+
+#include "core/aside.h"
+#include "core/error.h"
+#include "state/world.h"
+#include "step/stages.h"
+#include "world/body_shape.h"
+#include "world/cut.h"
+#include "world/separate.h"
+
+namespace dfm {
+
+struct CutJob : Aside::Job {
+  std::shared_ptr<const Body> from;
+  Array<uint64_t> faces;
+  std::unique_ptr<MadeShape> made;
+  std::shared_ptr<Body> next;  // the structure that is left
+  std::exception_ptr error;
+
+  explicit CutJob(const Body &b)
+      : from(b.ahead.structure), faces(HookAllocator<uint64_t>(b.world->memory())) {
+    for (const AheadFace &f : b.ahead.faces) faces.push_back(f.face);
+  }
+  void run() noexcept override {
+    try {
+      made = make_opened(*from, faces);
+      next = structure_left(*from, *made);
+    } catch (...) {
+      error = std::current_exception();
+    }
+  }
+};
+
+namespace {
+
+// A thread that is so late is not waited for.
+constexpr std::chrono::microseconds kPatience{2000};
+
+bool is_of(const Body &structure, const Body &b) {
+  const ModelOrigin &mine = structure.origin, &its = b.origin;
+  return structure.shape == b.shape && structure.model.type == b.model.type && mine.params == its.params &&
+         mine.held == its.held && mine.integrator == its.integrator &&
+         std::memcmp(&mine.frame, &its.frame, sizeof mine.frame) == 0 &&
+         structure.integrator.used == b.integrator.used;
+}
+
+void renew_structure(Body &b) {
+  CutsAhead &a = b.ahead;
+  if (a.structure && is_of(*a.structure, b)) return;
+  a.structure = structure_of(b);
+  a.job.reset();
+}
+
+bool is_there(const Body &b, const AheadFace &f) {
+  return present_cell(b, uint32_t(f.face >> 32)) != kNone &&
+         present_cell(b, uint32_t(f.face & kNone)) != kNone;
+}
+
+// The made cut, by whoever has made it.
+CutJob &finish(World &w, Body &b) {
+  CutsAhead &a = b.ahead;
+  renew_structure(b);
+  if (!a.job || !w.aside || !w.aside->finish(a.job, kPatience)) {
+    a.job = std::make_shared<CutJob>(b);
+    a.job->run();
+  }
+  return *a.job;
+}
+
+void open_faces_of(World &w, Body &b) {
+  CutsAhead &a = b.ahead;
+  std::map<uint64_t, uint32_t> by;
+  for (const AheadFace &f : a.faces) by[f.by] += is_there(b, f);
+  const uint64_t id = b.id;
+  reserve_events(w, by.size());
+  const bool any = std::any_of(by.begin(), by.end(), [](const auto &part) { return part.second > 0; });
+  if (any) {
+    CutJob &job = finish(w, b);
+    if (job.error) {
+      const std::exception_ptr error = job.error;
+      a.job.reset();
+      std::rethrow_exception(error);
+    }
+    put_opened(b, *job.made);
+    job.next->shape = b.shape;
+    a.structure = std::move(job.next);
+  }
+  a.job.reset();
+  a.faces.swap(a.later);
+  a.later.clear();
+  a.due += a.delay;
+  if (any) separate_if_asked(b);
+  for (const auto &[part, n] : by)
+    if (n > 0) add_event(w, DFM_EVENT_CUT, id, part, n, w.time);
+}
+
+}  // namespace
+
+void set_cut_delay(Body &b, double delay) {
+  const char *const name = b.name.c_str();
+  if (!(delay >= 0 && std::isfinite(delay)))
+    fail(DFM_E_ARG, "body '%s': cuts cannot wait for %g s; give the seconds until faces open, or 0", name,
+         delay);
+  if (!b.ahead.faces.empty())
+    fail(DFM_E_STATE,
+         "body '%s': %zu faces wait to be opened; set how long its cuts wait before a tool cuts it", name,
+         b.ahead.faces.size() + b.ahead.later.size());
+  if (delay > 0) check_may_cut(b, b.model);
+  b.ahead.delay = delay;
+  if (delay == 0) b.ahead = {};
+}
+
+void open_later(Body &b, std::span<const uint64_t> faces, uint64_t by) {
+  CutsAhead &a = b.ahead;
+  const bool first = a.faces.empty();
+  std::vector<AheadFace> &list = first ? a.faces : a.later;
+  std::vector<AheadFace> more(list);
+  for (const uint64_t face : faces)
+    more.push_back({face_of_whole(b, uint32_t(face >> 32), uint32_t(face & kNone)), by});
+  std::sort(more.begin(), more.end());
+  list.swap(more);
+  if (first) a.due = b.world->time + a.delay;
+}
+
+void open_due(World &w, double dt) {
+  std::vector<Body *> due;  // bodies that have cells keep their places; pieces come after
+  for (auto &b : w.bodies)
+    if (!b->ahead.faces.empty() && w.time + 0.5 * dt > b->ahead.due) due.push_back(b.get());
+  for (Body *const b : due) open_faces_of(w, *b);
+}
+
+void prepare_cuts(World &w) {
+  for (auto &b : w.bodies) {
+    CutsAhead &a = b->ahead;
+    if (!(a.delay > 0)) continue;
+    renew_structure(*b);
+    if (a.faces.empty() || a.job) continue;
+    if (!w.aside) w.aside = std::make_unique<Aside>();
+    a.job = std::make_shared<CutJob>(*b);
+    w.aside->start(a.job);
+  }
+}
+
+void inherit_cuts(const Body &from, Body &piece) {
+  CutsAhead &a = piece.ahead;
+  a = {};
+  a.delay = from.ahead.delay;
+  a.faces = from.ahead.faces;
+  a.later = from.ahead.later;
+  a.due = from.ahead.due;
+}
+
+}  // namespace dfm
