@@ -1,5 +1,7 @@
 // Cuts that are made beside the steps (dfm_body_set_cut_delay): when faces open, and that nothing else
 // depends on who makes the cut, and when.
+#include <atomic>
+#include <cstdlib>
 #include <thread>
 
 #include "deform/tool.h"
@@ -10,21 +12,59 @@ namespace {
 
 constexpr double kStep = 1e-3;
 
-// A tough cube of 40 mm about the origin that moves through empty space, or lies in a box with friction that
+// Memory of a context that is refused: to all threads but the one that steps, or to all.
+struct Refusing {
+  enum { none, beside, all };
+  std::atomic<int> to{none};
+  std::atomic<uint64_t> refused{0};
+  const std::thread::id steps = std::this_thread::get_id();
+  dfm_context *c = nullptr;
+  Refusing() {
+    dfm_context_def def = dfm_context_def_default();
+    def.user = this;
+    def.plugin_dir = DEFORM_PLUGIN_DIR;
+    def.log = [](void *, int32_t, const char *) {};
+    def.alloc = [](void *user, size_t bytes, size_t align) -> void * {
+      Refusing &r = *static_cast<Refusing *>(user);
+      if (r.to == all || (r.to == beside && std::this_thread::get_id() != r.steps)) {
+        ++r.refused;
+        return nullptr;
+      }
+      return std::aligned_alloc(align, (bytes + align - 1) / align * align + align);
+    };
+    def.release = [](void *, void *p, size_t, size_t) { std::free(p); };
+    EXPECT_EQ(dfm_context_create(&def, &c), DFM_OK) << dfm_last_error();
+  }
+  ~Refusing() { dfm_context_destroy(c); }
+};
+
+struct Options {
+  double delay;
+  const char *model = "msm";
+  uint32_t threads = 1;
+  bool floor = false, held = false;  // held: each point
+  double velocity = 0;               // m/s along x
+  double energy = 0;                 // J/m2 that a cut takes
+  dfm_context *in = nullptr;         // null: one of its own
+};
+
+// A cube of 40 mm about the origin that moves through empty space, or lies in a box with friction that
 // remembers; and a blade above it.
 struct Cube {
-  static constexpr double kEnergy = 100, kArea = 0.04 * 0.04;  // J/m2, m2
-  test::Context context;
+  static constexpr double kArea = 0.04 * 0.04;  // m2
+  test::Context own;
+  dfm_context *context;
   dfm_world w;
   dfm_body body = 0;
   dfm_tool blade = 0;
   double z = 0.05;
   uint64_t opened = 0, events = 0, largest = 0;
-  explicit Cube(double delay, const char *model = "msm", uint32_t threads = 1, bool floor = false,
-                double velocity = 0)
-      : context(threads), w(test::make_world(context, {0, 0, floor ? -9.81 : 0})) {
+  explicit Cube(const Options &o)
+      : own(o.threads),
+        context(o.in ? o.in : own.c),
+        w(test::make_world(context, {0, 0, o.floor ? -9.81 : 0})) {
     dfm_tetmesh mesh = 0;
-    const double size[] = {0.04, 0.04, 0.04}, energy = kEnergy;
+    const double size[] = {0.04, 0.04, 0.04};
     test::ok(dfm_tetmesh_make(context, "beam", size, 600, &mesh));
     dfm_body_def d = dfm_body_def_default();
     test::lend(mesh, d);
@@ -32,21 +72,23 @@ struct Cube {
     m.name = "tissue";
     m.young = 3e4;
     m.damping_stiffness = 2e-3;
-    const dfm_param_value row{"fracture_energy", &energy, 1};
+    const dfm_param_value row{"fracture_energy", &o.energy, 1};
     m.extra = {sizeof(dfm_params), 1, &row};
     test::ok(dfm_material_create(w, &m, &d.material));
     d.name = "cube";
-    d.model = model;
+    d.model = o.model;
     for (double &c : d.pose.position) c = -0.02;
-    d.velocity[0] = velocity;
+    d.velocity[0] = o.velocity;
+    const std::vector<uint8_t> fixed(d.npoint, 7);
+    if (o.held) d.fixed = fixed.data();
     test::ok(dfm_body_create(w, &d, &body));
-    if (floor) {
-      dfm_obstacle_def o = dfm_obstacle_def_default();
-      o.name = "floor";
-      o.shape = DFM_SHAPE_PLANE;
-      o.pose.position[2] = -0.02;
+    if (o.floor) {
+      dfm_obstacle_def below = dfm_obstacle_def_default();
+      below.name = "floor";
+      below.shape = DFM_SHAPE_PLANE;
+      below.pose.position[2] = -0.02;
       dfm_obstacle plane = 0;
-      test::ok(dfm_obstacle_create(w, &o, &plane));
+      test::ok(dfm_obstacle_create(w, &below, &plane));
       test::set_friction(w, 0.4, "lugre");
     }
     dfm_tool_def td = dfm_tool_def_default();
@@ -58,19 +100,21 @@ struct Cube {
     td.pose.position[2] = z;
     test::ok(dfm_tool_create(w, &td, &blade));
     test::ok(dfm_tool_set_cuts(blade, DFM_CUT_SPLIT, 0, 1, &body));
-    test::ok(dfm_body_set_cut_delay(body, delay));
+    test::ok(dfm_body_set_cut_delay(body, o.delay));
   }
-  void step(double speed = 1) {
+  void step(double speed = 1) { EXPECT_EQ(try_step(speed), DFM_OK) << dfm_last_error(); }
+  dfm_status try_step(double speed) {
     z -= speed * kStep;
     const dfm_pose p{{0.001, 0, z}, {0, 0, 0, 1}};
     test::ok(dfm_tool_set_pose(blade, &p, nullptr));
-    test::ok(dfm_world_step(w, kStep, nullptr));
+    const dfm_status status = dfm_world_step(w, kStep, nullptr);
     for (const dfm_contact_event &e : test::listed(dfm_world_events, w))
       if (e.kind == uint32_t{DFM_EVENT_CUT}) {
         EXPECT_EQ(e.a, body);
         opened += e.key;
         ++events;
       }
+    return status;
   }
   void steps(int n, double speed = 1) {
     for (int i = 0; i < n; ++i) step(speed);
@@ -99,7 +143,7 @@ const char *const kModels[] = {"msm", "corotational_fem"};
 }  // namespace
 
 TEST(CutDelay, Faces_OpenTheDelayAfterTheBlade_InOneStep) {
-  Cube s(0.010);
+  Cube s({.delay = 0.010});
   while (s.waiting() == 0) s.step();
   const uint32_t first = s.waiting();
   for (int i = 0; i < 9; ++i) {
@@ -119,11 +163,10 @@ TEST(CutDelay, Faces_OpenTheDelayAfterTheBlade_InOneStep) {
   EXPECT_GT(s.points(), whole);
 }
 
-// The same cut as without a delay, with its work, once; mass and momenta to rounding.
-TEST(CutDelay, Blade_PartsTheBody_AndPaysOnce) {
+TEST(CutDelay, Blade_PartsTheBody_WithoutMassMomentumOrForce) {
   for (const char *model : kModels)
     for (const double velocity : {0.0, 1e-3}) {
-      Cube s(0.008, model, 1, false, velocity);
+      Cube s({.delay = 0.008, .model = model, .velocity = velocity});
       const dfm_body_measure before = test::measure(s.body);
       s.steps(60);
       s.steps(20, 0);
@@ -135,19 +178,28 @@ TEST(CutDelay, Blade_PartsTheBody_AndPaysOnce) {
         EXPECT_NEAR(after.momentum[k], before.momentum[k], 1e-14 * before.mass);
         EXPECT_NEAR(after.angular[k], before.angular[k], 1e-14 * before.mass);
       }
+    }
+}
+
+// What is due at points within the body waits for the cut; in the end all is paid, and once.
+TEST(CutDelay, Blade_PaysForTheCut) {
+  for (const char *model : kModels)
+    for (const double delay : {0.008, 0.04}) {
+      Cube s({.delay = delay, .model = model, .held = true, .energy = 100});
+      s.steps(400, 0.2);
+      s.steps(50, 0.1);
+      EXPECT_EQ(s.parts(), 2u) << model;
       dfm_tool_state t{};
       t.size = sizeof t;
       test::ok(dfm_tool_get_state(s.blade, &t));
-      if (velocity == 0) {
-        EXPECT_NEAR(t.work, Cube::kEnergy * Cube::kArea, 1e-9 * Cube::kEnergy * Cube::kArea);
-      }
+      EXPECT_NEAR(t.work, 100 * Cube::kArea, 1e-9 * 100 * Cube::kArea) << model << ' ' << delay;
     }
 }
 
 // However many threads there are, and whether the one beside the steps is in time.
 TEST(CutDelay, OnOneTwoOrFourThreads_TheBitsAreTheSame_InTimeOrLate) {
   const auto run = [](uint32_t threads, bool hurry) {
-    Cube s(0.006, "msm", threads, true);
+    Cube s({.delay = 0.006, .threads = threads, .floor = true, .energy = 100});
     for (int i = 0; i < 70; ++i) {
       s.step(i < 60 ? 1 : 0);
       // most cuts are made by the time that they are needed, or only just begun
@@ -164,7 +216,7 @@ TEST(CutDelay, OnOneTwoOrFourThreads_TheBitsAreTheSame_InTimeOrLate) {
 
 TEST(CutDelay, Snapshot_WhileFacesWait_GoesOnTheSameWay) {
   for (const char *model : kModels) {
-    Cube s(0.012, model, 1, true);
+    Cube s({.delay = 0.012, .model = model, .floor = true, .energy = 100});
     while (s.events < 2) s.step();
     s.steps(5);
     ASSERT_GT(s.waiting(), 0u);
@@ -176,7 +228,7 @@ TEST(CutDelay, Snapshot_WhileFacesWait_GoesOnTheSameWay) {
     s.z = z;
     s.steps(20);
     EXPECT_TRUE(test::snapshot(s.w) == end) << model;
-    Cube other(0.012, model, 2, true);
+    Cube other({.delay = 0.012, .model = model, .threads = 2, .floor = true, .energy = 100});
     test::ok(dfm_world_restore(other.w, half.data(), half.size()));
     other.z = z;
     EXPECT_GT(other.waiting(), 0u);
@@ -187,7 +239,7 @@ TEST(CutDelay, Snapshot_WhileFacesWait_GoesOnTheSameWay) {
 
 // A cut by the host in between is not waited for, and what waits opens in what it has left.
 TEST(CutDelay, CutByTheHost_InBetween_LosesNoFace) {
-  Cube s(0.010);
+  Cube s({.delay = 0.010});
   while (s.waiting() == 0) s.step();
   s.steps(4);
   dfm_cut_def d = dfm_cut_def_default();
@@ -203,14 +255,129 @@ TEST(CutDelay, CutByTheHost_InBetween_LosesNoFace) {
   EXPECT_EQ(s.parts(), 2u);
 }
 
-TEST(CutDelay, WorldWithAFaceThatWaits_CanGo) {
-  Cube s(0.05);
+TEST(CutDelay, ModelChanged_InBetween_LosesNoFace) {
+  Cube s({.delay = 0.010});
   while (s.waiting() == 0) s.step();
-  s.step();
+  s.steps(4);
+  EXPECT_EQ(dfm_body_set_model(s.body, "shape_matching", nullptr), DFM_E_UNSUPPORTED);
+  test::ok(dfm_body_set_model(s.body, "corotational_fem", nullptr));
+  s.steps(60);
+  EXPECT_EQ(s.waiting(), 0u);
+  EXPECT_EQ(s.parts(), 2u);
+}
+
+// Pieces wait for the faces that they have.
+TEST(CutDelay, BodyThatFallsInPieces_InBetween_LosesNoFace) {
+  const auto set_up = [](Cube &s) {
+    const dfm_separate_def each = dfm_separate_def_default();
+    test::ok(dfm_body_set_separate(s.body, &each));
+    test::ok(dfm_world_filter_pair(s.w, "*", "*", false));
+  };
+  const auto pieces = [](const Cube &s) {
+    uint32_t n = 0;
+    test::ok(dfm_body_pieces(s.body, 0, nullptr, &n));
+    return n;
+  };
+  Cube s({.delay = 0.010}), other({.delay = 0.010});
+  set_up(s);
+  set_up(other);
+  while (s.waiting() == 0) s.step();
+  dfm_cut_def d = dfm_cut_def_default();  // into two halves across the blade
+  d.shape = DFM_CUT_BOX;
+  const double half[] = {0.05, 0.003, 0.05};
+  std::copy(half, half + 3, d.half_size);
+  test::ok(dfm_body_cut(s.body, &d, nullptr));
+  ASSERT_EQ(pieces(s), 1u);
+  dfm_body piece = 0;
+  uint32_t n = 0;
+  test::ok(dfm_body_pieces(s.body, 1, &piece, &n));
+  EXPECT_EQ(dfm_body_set_cut_delay(piece, 0.02), DFM_E_STATE);
+  test::says({"is a piece of 'cube'"});
+  const std::string half_way = test::snapshot(s.w);
+  const double z = s.z;
+  EXPECT_EQ(dfm_body_set_cut_delay(s.body, 0), DFM_E_STATE);
+  const auto go_on = [&](Cube &c) {
+    c.z = z;
+    for (int i = 0; i < 70; ++i) {
+      c.z -= kStep;
+      const dfm_pose p{{0.001, 0, c.z}, {0, 0, 0, 1}};
+      test::ok(dfm_tool_set_pose(c.blade, &p, nullptr));
+      test::ok(dfm_world_step(c.w, kStep, nullptr));
+    }
+    return test::snapshot(c.w);
+  };
+  const std::string end = go_on(s);
+  EXPECT_GE(pieces(s), 3u) << "each half is cut in two";
+  test::ok(dfm_world_restore(other.w, half_way.data(), half_way.size()));
+  EXPECT_TRUE(go_on(other) == end);
+  test::ok(dfm_world_restore(s.w, half_way.data(), half_way.size()));
+  EXPECT_TRUE(go_on(s) == end);
+}
+
+TEST(CutDelay, WorldWithAFaceThatWaits_CanGo) {
+  for (const bool begun : {false, true}) {
+    Cube s({.delay = 0.05});
+    while (s.waiting() == 0) s.step();
+    if (begun) std::this_thread::sleep_for(std::chrono::microseconds(200));
+  }
+}
+
+TEST(CutDelay, BodyWithAFaceThatWaits_CanGo) {
+  Cube s({.delay = 0.005});
+  while (s.waiting() == 0) s.step();
+  test::ok(dfm_body_destroy(s.body));
+  s.steps(10);
+  Cube emptied({.delay = 0.005});
+  while (emptied.waiting() == 0) emptied.step();
+  dfm_cut_def d = dfm_cut_def_default();
+  d.shape = DFM_CUT_BOX;
+  for (double &h : d.half_size) h = 1;
+  test::ok(dfm_body_cut(emptied.body, &d, nullptr));
+  emptied.steps(10);
+}
+
+// The step does what the thread cannot.
+TEST(CutDelay, NoMemoryForTheThread_TheBitsAreTheSame) {
+  const auto run = [](Refusing &r, int to) {
+    Cube s({.delay = 0.006, .floor = true, .energy = 100, .in = r.c});
+    r.to = to;
+    for (int i = 0; i < 60; ++i) {
+      s.step();
+      if (s.waiting() > 0) std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+    r.to = Refusing::none;
+    EXPECT_GT(s.events, 3u);
+    return test::snapshot(s.w);
+  };
+  Refusing plenty, little;
+  const std::string expected = run(plenty, Refusing::none);
+  EXPECT_TRUE(run(little, Refusing::beside) == expected);
+  EXPECT_GT(little.refused, 0u);
+}
+
+// A step that cannot open faces says so, and the next one does.
+TEST(CutDelay, NoMemoryForTheStep_FacesOpenInTheNext) {
+  Refusing r;
+  Cube s({.delay = 0.006, .in = r.c});
+  int failed = 0;
+  for (int i = 0; i < 80; ++i) {
+    if (s.waiting() > 0 && i % 3 == 0) {
+      r.to = Refusing::all;
+      const dfm_status status = s.try_step(i < 60 ? 1 : 0);
+      r.to = Refusing::none;
+      EXPECT_TRUE(status == DFM_OK || status == DFM_E_NOMEM) << dfm_last_error();
+      failed += status != DFM_OK;
+    } else {
+      s.step(i < 60 ? 1 : 0);
+    }
+  }
+  EXPECT_GT(failed, 3);
+  s.steps(10, 0);
+  EXPECT_EQ(s.waiting(), 0u);
 }
 
 TEST(CutDelay, WhatIsWrong_IsRefused) {
-  Cube s(0);
+  Cube s({.delay = 0});
   double delay = -1;
   EXPECT_EQ(dfm_body_set_cut_delay(s.body, -1), DFM_E_ARG);
   EXPECT_EQ(dfm_body_set_cut_delay(s.body, NAN), DFM_E_ARG);

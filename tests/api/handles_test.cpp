@@ -206,6 +206,8 @@ std::vector<Call> body_calls() {
       {"body_remove_cells", [](uint64_t h) { return dfm_body_remove_cells(h, 1, &index0, nullptr); }},
       {"body_separate", [](uint64_t h) { return dfm_body_separate(h, nullptr, nullptr); }},
       {"body_set_separate", [](uint64_t h) { return dfm_body_set_separate(h, nullptr); }},
+      {"body_set_cut_delay", [](uint64_t h) { return dfm_body_set_cut_delay(h, 0.01); }},
+      {"body_cut_delay", [](uint64_t h) { return dfm_body_cut_delay(h, nullptr, &count); }},
       {"body_pieces", [](uint64_t h) { return dfm_body_pieces(h, 0, nullptr, &count); }},
       {"body_origins", [](uint64_t h) { return dfm_body_origins(h, 0, nullptr, 0, nullptr); }},
       {"body_detach", [](uint64_t h) { return dfm_body_detach(h, 1); }},

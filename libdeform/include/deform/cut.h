@@ -135,8 +135,9 @@ DFM_API dfm_status dfm_body_set_separate(dfm_body body, const dfm_separate_def *
  * and tools that remove cells do not wait.
  * @param delay  s; 0: no thread, and faces open in the step in which a tool comes through, which is the
  * default. Rounded to the nearest step
- * @return DFM_OK; DFM_E_ARG; DFM_E_UNSUPPORTED the body cannot be cut; DFM_E_STATE faces wait, or the body
- * has no cells. Threads: Not during step. Since 0.1. */
+ * @return DFM_OK; DFM_E_ARG; DFM_E_UNSUPPORTED the body cannot be cut; DFM_E_STATE faces wait, the body has
+ * no cells, or it is a piece (set the delay of the body that it came off). Threads: Not during step. Since
+ * 0.1. */
 DFM_API dfm_status dfm_body_set_cut_delay(dfm_body body, double delay);
 /** @param delay  s, may be NULL @param waiting  faces that wait now, may be NULL @return DFM_OK;
  * DFM_E_HANDLE; DFM_E_STATE. Threads: Any thread. Not during step. Since 0.1. */

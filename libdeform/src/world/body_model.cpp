@@ -78,9 +78,9 @@ std::optional<ImplicitOptions> implicit_of(const World &w, const std::string &na
 }
 
 // The longest explicit sub-step of the body, for the choice of the integrator.
-void ask_explicit_bound(const World &w, Dynamics &dynamics, Integrator &out) {
+void ask_explicit_bound(const World &w, double time, Dynamics &dynamics, Integrator &out) {
   StepBound bound;
-  if (w.def.step == 0 || !dynamics.bound(w.time, [](double *, double *) {}, bound)) return;
+  if (w.def.step == 0 || !dynamics.bound(time, [](double *, double *) {}, bound)) return;
   out.step = kBoundShare * bound.step;
   out.point = bound.point;
 }
@@ -216,7 +216,7 @@ void make_model(World &w, Body &b, const dfm_type &type, std::vector<double> val
   } lent(b.model, out.instance);
   out.dynamics = make_dynamics(w.meters.dynamics.memory(), b.p, b.surface, b.model, b.edges,
                                implicit ? &*implicit : nullptr);
-  if (!implicit) ask_explicit_bound(w, *out.dynamics, out.integrator);
+  if (!implicit) ask_explicit_bound(w, w.time, *out.dynamics, out.integrator);
   if (!out.dynamics->abilities().placed) need_ability(w, Ability::self_stepping, "body", b.name);
 }
 
@@ -230,11 +230,11 @@ std::unique_ptr<BodyModel> make_body_instance(World &w, Body &b, const dfm_type 
   return out;
 }
 
-void give_dynamics(World &w, Body &b, bool ask_bound) {
+void give_dynamics(World &w, Body &b, const double *bound_at) {
   const auto implicit = implicit_of(w, b.name, static_cast<int32_t>(b.integrator.used), b.integrator);
   b.dynamics = make_dynamics(w.meters.dynamics.memory(), b.p, b.surface, b.model, b.edges,
                              implicit ? &*implicit : nullptr);
-  if (!implicit && ask_bound) ask_explicit_bound(w, *b.dynamics, b.integrator);
+  if (!implicit && bound_at) ask_explicit_bound(w, *bound_at, *b.dynamics, b.integrator);
 }
 
 ModelParams keep_params(const dfm_type &type, const dfm_params &given) {

@@ -23,10 +23,10 @@ ModelParams keep_params(const dfm_type &type, const dfm_params &given);
 std::unique_ptr<BodyModel> make_body_model(World &w, Body &b, const dfm_type &type, ModelOrigin origin,
                                            int32_t integrator);
 // The same in two parts, for a model whose points the library moves: the instance, which any thread may make
-// while other bodies step; and the dynamics of a body that has it, by the integrator that it uses. ask_bound:
-// and the longest explicit sub-step at its present state.
+// while other bodies step; and the dynamics of a body that has it, by the integrator that it uses. bound_at:
+// s, and the longest explicit sub-step at its present state then; null: not that.
 std::unique_ptr<BodyModel> make_body_instance(World &w, Body &b, const dfm_type &type, ModelOrigin origin);
-void give_dynamics(World &w, Body &b, bool ask_bound);
+void give_dynamics(World &w, Body &b, const double *bound_at);
 // Logs a message if an integrator is named for a body whose model steps itself.
 void warn_of_own_steps(const World &w, const std::string &body, const ModelInstance &model,
                        int32_t integrator);

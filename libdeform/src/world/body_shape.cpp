@@ -267,7 +267,8 @@ ModelOrigin origin_of(const Body &b, const CutMesh &mesh) {
 
 }  // namespace
 
-std::unique_ptr<MadeShape> make_shape(const Body &b, CutMesh &&mesh, Array<uint64_t> &&open, bool ahead) {
+std::unique_ptr<MadeShape> make_shape(const Body &b, CutMesh &&mesh, Array<uint64_t> &&open,
+                                      const double *due) {
   World &w = *b.world;
   auto out = std::make_unique<MadeShape>(MadeShape{std::move(mesh), nullptr, {}, {}, {}});
   out->shape = structure_of_part(b, out->mesh, std::move(open));
@@ -289,8 +290,8 @@ std::unique_ptr<MadeShape> make_shape(const Body &b, CutMesh &&mesh, Array<uint6
   weigh(like);
   exchange(like, *make_body_instance(w, like, *b.model.type, std::move(origin)));
   like.integrator.used = b.integrator.used;
-  if (ahead) {
-    give_dynamics(w, like, true);
+  if (due) {
+    give_dynamics(w, like, due);
     like.dynamics.reset();  // it refers to this body
     like.inner = inner_faces(like);
     like.self_rest = std::make_unique<SelfRest>(self_rest_of(w.meters.detection.memory(), like));
@@ -312,7 +313,7 @@ std::unique_ptr<BodyShape> take_shape(Body &b, MadeShape &made, bool parts, bool
     update_inverse_mass(b.p);
     carry_loads(before, mesh, b);
     const double step = b.integrator.step;
-    give_dynamics(w, b, !ahead);
+    give_dynamics(w, b, ahead ? nullptr : &w.time);
     if (ahead) b.integrator.step = step;
     keep_integrator(b, before.integrator);
     keep_params(b, before);
@@ -325,7 +326,7 @@ std::unique_ptr<BodyShape> take_shape(Body &b, MadeShape &made, bool parts, bool
 }
 
 std::unique_ptr<BodyShape> cut_body(Body &b, CutMesh &&mesh, Array<uint64_t> &&open, bool parts) {
-  return take_shape(b, *make_shape(b, std::move(mesh), std::move(open), false), parts, false);
+  return take_shape(b, *make_shape(b, std::move(mesh), std::move(open), nullptr), parts, false);
 }
 
 namespace {

@@ -62,9 +62,10 @@ struct MadeShape {
   FeatureMap features;
 };
 // The shape of the mesh that a cut leaves. Reads what steps do not change, and nothing of the state: any
-// thread may do it, if no other one changes `b` meanwhile other than by steps. open: as below. ahead: with
-// all that the next step would make. Throws Error.
-std::unique_ptr<MadeShape> make_shape(const Body &b, CutMesh &&mesh, Array<uint64_t> &&open, bool ahead);
+// thread may do it, if no other one changes `b` meanwhile other than by steps. open: as below. due: with
+// all that the step would make that begins at this time, s; null: without. Throws Error.
+std::unique_ptr<MadeShape> make_shape(const Body &b, CutMesh &&mesh, Array<uint64_t> &&open,
+                                      const double *due);
 // All that make_shape() reads of a body: of the present one, and of what is left of it.
 std::unique_ptr<Body> structure_of(const Body &b);
 std::unique_ptr<Body> structure_left(const Body &before, MadeShape &made);

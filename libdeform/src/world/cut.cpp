@@ -112,7 +112,7 @@ CutReport cut(Body &b, const Array<uint8_t> &removed, OpenFaces &&open) {
   out.removed = b.ncell() - static_cast<uint32_t>(mesh.cell.size());
   const double elastic = elastic_energy(b), kinetic = kinetic_of(b);
   const HostWork work(b);
-  const std::unique_ptr<MadeShape> made = make_shape(b, std::move(mesh), std::move(open.whole), false);
+  const std::unique_ptr<MadeShape> made = make_shape(b, std::move(mesh), std::move(open.whole), nullptr);
   const std::unique_ptr<BodyShape> before = put(b, *made, false);
   tell_what_went(*before, made->mesh, b, out);
   out.area = new_area(b, *before);
@@ -225,11 +225,11 @@ uint64_t face_of_whole(const Body &b, uint32_t i, uint32_t j) {
 
 CutReport open_faces(Body &b, const Array<uint64_t> &faces) { return cut(b, none_removed(b), faces); }
 
-std::unique_ptr<MadeShape> make_opened(const Body &b, const Array<uint64_t> &faces) {
+std::unique_ptr<MadeShape> make_opened(const Body &b, const Array<uint64_t> &faces, double due) {
   const Memory &m = b.world->memory();
   OpenFaces open = with_open(b, faces);
   CutMesh mesh = make_cut_mesh(m, b.p.n, b.ncell(), b.tets.data(), none_removed(b), open.own);
-  return make_shape(b, std::move(mesh), std::move(open.whole), true);
+  return make_shape(b, std::move(mesh), std::move(open.whole), &due);
 }
 
 void put_opened(Body &b, MadeShape &made) {

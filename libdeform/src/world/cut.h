@@ -37,8 +37,8 @@ CutReport split_by_blade(Body &b, const CutShape &blade, uint32_t most);
 CutReport open_faces(Body &b, const Array<uint64_t> &faces);
 
 // The same in two parts (world/cut_ahead.h), with faces between cells of the whole body. The first reads what
-// steps do not change; the second takes it if the body has the same shape still.
-std::unique_ptr<MadeShape> make_opened(const Body &b, const Array<uint64_t> &faces);
+// steps do not change; the second takes it if the body has the same shape still. due: s, when that is.
+std::unique_ptr<MadeShape> make_opened(const Body &b, const Array<uint64_t> &faces, double due);
 void put_opened(Body &b, MadeShape &made);
 
 uint32_t present_cell(const Body &b, uint32_t whole);           // kNone: it has gone

@@ -27,17 +27,18 @@ namespace dfm {
 struct CutJob : Aside::Job {
   std::shared_ptr<const Body> from;
   Array<uint64_t> faces;
+  double due;  // s, when they open: what follows from the time may not follow from when the job runs
   std::unique_ptr<MadeShape> made;
   std::shared_ptr<Body> next;  // the structure that is left
   std::exception_ptr error;
 
   explicit CutJob(const Body &b)
-      : from(b.ahead.structure), faces(HookAllocator<uint64_t>(b.world->memory())) {
+      : from(b.ahead.structure), faces(HookAllocator<uint64_t>(b.world->memory())), due(b.ahead.due) {
     for (const AheadFace &f : b.ahead.faces) faces.push_back(f.face);
   }
   void run() noexcept override {
     try {
-      made = make_opened(*from, faces);
+      made = make_opened(*from, faces, due);
       next = structure_left(*from, *made);
     } catch (...) {
       error = std::current_exception();
@@ -74,7 +75,8 @@ bool is_there(const Body &b, const AheadFace &f) {
 CutJob &finish(World &w, Body &b) {
   CutsAhead &a = b.ahead;
   renew_structure(b);
-  if (!a.job || !w.aside || !w.aside->finish(a.job, kPatience)) {
+  // what the thread has refused, perhaps for want of memory, is tried once more
+  if (!a.job || !w.aside || !w.aside->finish(a.job, kPatience) || a.job->error) {
     a.job = std::make_shared<CutJob>(b);
     a.job->run();
   }
@@ -115,13 +117,24 @@ void set_cut_delay(Body &b, double delay) {
   if (!(delay >= 0 && std::isfinite(delay)))
     fail(DFM_E_ARG, "body '%s': cuts cannot wait for %g s; give the seconds until faces open, or 0", name,
          delay);
-  if (!b.ahead.faces.empty())
+  if (b.piece_of)
     fail(DFM_E_STATE,
-         "body '%s': %zu faces wait to be opened; set how long its cuts wait before a tool cuts it", name,
-         b.ahead.faces.size() + b.ahead.later.size());
+         "body '%s' is a piece of '%s', and its cuts wait as long as those of that body; set it there", name,
+         b.whole_name.c_str());
   if (delay > 0) check_may_cut(b, b.model);
-  b.ahead.delay = delay;
-  if (delay == 0) b.ahead = {};
+  std::vector<Body *> all;  // it and its pieces
+  for (const auto *list : {&b.world->bodies, &b.world->emptied, &b.world->undone})
+    for (auto &other : *list)
+      if (other.get() == &b || other->piece_of == b.id) all.push_back(other.get());
+  for (const Body *const other : all)
+    if (!other->ahead.faces.empty())
+      fail(DFM_E_STATE,
+           "body '%s': %zu faces wait to be opened; set how long its cuts wait before a tool cuts it",
+           other->name.c_str(), other->ahead.faces.size() + other->ahead.later.size());
+  for (Body *const other : all) {
+    other->ahead = {};
+    other->ahead.delay = delay;
+  }
 }
 
 void open_later(Body &b, std::span<const uint64_t> faces, uint64_t by) {
