@@ -326,6 +326,23 @@ TEST(Hpp, Tools_PressAndFeel) {
   EXPECT_TRUE(s.world.tools().empty());
 }
 
+TEST(Hpp, Cuts_AreMadeAtOnceOrPlanned) {
+  const Scene s;
+  deform::CutDef plane;
+  plane.shape = DFM_CUT_PLANE;
+  plane.how = DFM_CUT_SPLIT;
+  plane.blade[3] = 1;
+  s.ball.set_separate(deform::SeparateDef());
+  s.ball.plan_cut(1e-3, plane);
+  EXPECT_TRUE(s.ball.pieces().empty());
+  EXPECT_TRUE(s.world.step(1e-3));
+  EXPECT_GE(s.ball.pieces().size(), 1u);
+  s.ball.plan_cut(2e-3, plane);
+  s.ball.plan_no_cuts();
+  EXPECT_THROW(s.ball.plan_cut(0, plane), deform::Error) << "it is past";
+  EXPECT_GE(s.ball.cut(plane).parts, 1u);
+}
+
 TEST(Hpp, SceneAndLaw_ReturnTheSameAsInC) {
   const auto context = deform::Context::make(quiet());
   const std::string path = DEFORM_SOURCE_DIR "/examples/scenes/slope_block.json";

@@ -309,6 +309,32 @@ TEST(PlannedCut, WhatIsWrong_IsRefusedInASentence) {
   EXPECT_EQ(parts(c.body), 2u);
 }
 
+// Once the last cut is made, each model will do.
+TEST(PlannedCut, SwitchOfTheModel_MayFollowTheCutOnly) {
+  const dfm_cut_def d = plane(0.001);
+  for (const double t : {0.003, 0.006}) {
+    const bool after = t > 0.005;
+    for (const bool first : {false, true}) {
+      Cube c;
+      dfm_switch to = dfm_switch_default();
+      to.t = t;
+      to.type = "linear_fem";
+      const dfm_status planned = first ? dfm_body_plan_cut(c.body, 0.005, &d) : DFM_OK;
+      EXPECT_EQ(planned, DFM_OK);
+      const dfm_status set = dfm_body_set_switches(c.body, 1, &to);
+      EXPECT_EQ(set, first && !after ? DFM_E_UNSUPPORTED : DFM_OK) << t;
+      if (!first) {
+        const dfm_status refused = dfm_body_plan_cut(c.body, 0.005, &d);
+        EXPECT_EQ(refused, after ? DFM_OK : DFM_E_UNSUPPORTED) << t;
+      }
+      if (!after) test::says({"cube", "linear_fem", "corotational_fem"});
+      test::run(c.w, 0.005, 1e-3);
+      EXPECT_EQ(cut_events(c.w).size(), first || after ? 1u : 0u);
+      test::run(c.w, 0.005, 1e-3);
+    }
+  }
+}
+
 // ---- scenes ---------------------------------------------------------------------------------------------
 
 namespace {

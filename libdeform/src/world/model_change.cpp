@@ -273,8 +273,9 @@ double stable_with(Body &b, BodyModel &made) {
   return known ? kBoundShare * bound.step : -1;
 }
 
-// A future change of a body that has this integrator until then. named: the change names its integrator.
-void rehearse(Body &b, ModelChoice &to, uint32_t &integrator, bool at_rest, bool named,
+// A future change, at t or at any time from then on, of a body that has this integrator until then. named:
+// the change names its integrator.
+void rehearse(Body &b, ModelChoice &to, double t, uint32_t &integrator, bool at_rest, bool named,
               std::vector<SpareModel> &spares) {
   World &w = *b.world;
   if (to.integrator != kSameIntegrator) integrator = to.integrator;
@@ -285,7 +286,8 @@ void rehearse(Body &b, ModelChoice &to, uint32_t &integrator, bool at_rest, bool
   const std::unique_ptr<BodyModel> made =
       make_body_model(w, b, type, std::move(origin), static_cast<int32_t>(integrator));
   check_springs(b, type, *made->dynamics);
-  if (b.tears || cut_by_any(b) || !b.planned_cuts.empty()) check_may_cut(b, made->instance);
+  if (b.tears || cut_by_any(b) || (!b.planned_cuts.empty() && b.planned_cuts.back().t > t))
+    check_may_cut(b, made->instance);
   to.stable = stable_with(b, *made);
   if (named) warn_of_own_steps(w, b.name, made->instance, static_cast<int32_t>(to.integrator));
   if (!w.changed) check_effects(w, b, b.model, made->instance);
@@ -369,10 +371,10 @@ void rehearse(Body &b, std::vector<Switch> &switches, std::vector<SwitchRule> &r
   std::vector<SpareModel> spares;
   spares.reserve(kSpares);
   uint32_t integrator = b.origin.integrator;
-  const auto one = [&](ModelChoice &to, const std::string &when, bool named = false) {
+  const auto one = [&](ModelChoice &to, double t, const std::string &when, bool named = false) {
     if (to.type.empty() || (!at_rest && is_made_so(b, to))) return;
     try {
-      rehearse(b, to, integrator, at_rest, named, spares);
+      rehearse(b, to, t, integrator, at_rest, named, spares);
     } catch (const Error &e) {
       if (e.status == DFM_E_NOMEM) throw;
       const std::string whose = format("body '%s': ", b.name.c_str());
@@ -381,11 +383,11 @@ void rehearse(Body &b, std::vector<Switch> &switches, std::vector<SwitchRule> &r
            when.c_str(), why);
     }
   };
-  for (Switch &s : switches) one(s.to, format("at %g s", s.t), s.to.integrator != kSameIntegrator);
+  for (Switch &s : switches) one(s.to, s.t, format("at %g s", s.t), s.to.integrator != kSameIntegrator);
   for (SwitchRule &r : rule) {
-    one(r.touching, "by the rule (touching)");
-    one(r.near, "by the rule (near)");
-    one(r.far, "by the rule (far)");
+    one(r.touching, b.world->time, "by the rule (touching)");
+    one(r.near, b.world->time, "by the rule (near)");
+    one(r.far, b.world->time, "by the rule (far)");
   }
   b.spares.swap(spares);
 }

@@ -5,6 +5,7 @@
 
 #include "state/world.h"
 #include "step/stages.h"
+#include "world/model_change.h"
 #include "world/separate.h"
 
 namespace dfm {
@@ -61,14 +62,23 @@ CutReport make_cut(Body &b, const CutShape &shape, uint32_t how, uint32_t most) 
 
 void plan_cut(Body &b, const PlannedCut &cut) {
   const std::vector<Body *> all = with_pieces(b);
-  for (Body *const part : all) {
+  std::vector<std::vector<PlannedCut>> lists;
+  for (const Body *const part : all) {
     check_may_cut(*part, part->model);
-    part->planned_cuts.reserve(part->planned_cuts.size() + 1);
-  }
-  for (Body *const part : all) {
-    auto &list = part->planned_cuts;
+    auto &list = lists.emplace_back(part->planned_cuts);
     const auto later = [&](const PlannedCut &c) { return c.t > cut.t; };
     list.insert(std::find_if(list.begin(), list.end(), later), cut);
+  }
+  const auto exchange = [&]() noexcept {
+    for (size_t i = 0; i < all.size(); ++i) all[i]->planned_cuts.swap(lists[i]);
+  };
+  exchange();
+  try {
+    for (Body *const part : all)  // changes before the cut lead to models that can be cut
+      if (!part->switches.empty() || !part->rule.empty()) rehearse(*part, part->switches, part->rule, false);
+  } catch (...) {
+    exchange();
+    throw;
   }
 }
 
