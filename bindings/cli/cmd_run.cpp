@@ -218,8 +218,10 @@ class Runner {
                   static_cast<unsigned long long>(stats.substeps),
                   100 * double(stats.unconverged) / double(stats.substeps), stats.residual_max);
     return std::string("the contact solve stopped at its limit of sweeps ") + share +
-           ": forces of contact and friction are inexact there, and what should hold may creep; take a "
-           "shorter step, add damping to the material, or lower the ratio of masses or stiffnesses";
+           ": forces of contact and friction are inexact there, and what should hold may creep; raise "
+           "\"max_sweeps\" of \"contact\" (50), take a shorter step, add damping to the material, or lower "
+           "the "
+           "ratio of masses or stiffnesses";
   }
 
   bool any_cut() const {

@@ -293,7 +293,10 @@ TEST(Run, SolvesAtTheirLimit_AreSaidWithTheirShare) {
   EXPECT_NE(often.err.find("limit of sweeps in " + count + " sub-steps ("), std::string::npos) << often.err;
   EXPECT_NE(often.err.find("take a shorter step"), std::string::npos) << often.err;
   EXPECT_NE(value(summary, "warnings").find("limit of sweeps in " + count), std::string::npos) << summary;
+  EXPECT_NE(often.err.find("raise \"max_sweeps\" of \"contact\""), std::string::npos) << often.err;
   EXPECT_EQ(go({"--quiet"}).err, "");
+  const test::CommandResult more = go({"--set", "/contact/max_sweeps=1000"});
+  EXPECT_EQ(more.err.find("limit of sweeps"), std::string::npos) << more.err;
   const test::CommandResult never = go({"--time", "0.004"});
   EXPECT_EQ(never.err.find("limit of sweeps"), std::string::npos) << never.err;
 }

@@ -130,6 +130,7 @@ struct Made {
   dfm_body block = 0, ball = 0;
   Made() {
     dfm_world_def def = dfm_world_def_default();
+    def.max_sweeps = 77;
     test::ok(dfm_world_create(context, &def, &world));
     dfm_obstacle_def o = dfm_obstacle_def_default();
     dfm_obstacle ground = 0, gone = 0;
@@ -186,6 +187,7 @@ TEST(WriteScene, WorldOfAProgram_ContinuesWithTheSameBits) {
   steps(made.world, 50, 1e-4);
   const std::string path = folder_of("program") + "/program.json";
   EXPECT_EQ(all(write(made.world, path, DFM_SCENE_SNAPSHOT)), "");
+  EXPECT_NE(test::read_file(path).find("\"max_sweeps\":77"), std::string::npos) << test::read_file(path);
   const dfm_world back = load(made.context, path);
   ASSERT_TRUE(back);
   const std::vector<unsigned char> bytes = read(folder_of("program") + "/program_files/snapshot.state");

@@ -166,7 +166,7 @@ class World(Queries, Tools):
     def __init__(self, gravity: Sequence[float] = (0, 0, -9.81), *, integrator: str = "auto",
                  method: str = "auto", step: float = 0, sleep: bool = False, self_contact: str = "off",
                  effects: Iterable[str] | None = None, contact_offset: float = 0, max_substeps: int = 10000,
-                 max_time: float = 0, untangle: bool = False, solver: str | None = None,
+                 max_sweeps: int = 50, max_time: float = 0, untangle: bool = False, solver: str | None = None,
                  threads: int = 1, context: Context | None = None):
         if context is None:
             context = default_context() if threads == 1 else Context(threads)
@@ -179,6 +179,7 @@ class World(Queries, Tools):
         words = None if effects is None else strings(effects)
         definition.effects = None if words is None else ctypes.addressof(words)
         definition.contact_offset, definition.max_substeps = contact_offset, max_substeps
+        definition.max_sweeps = max_sweeps
         definition.max_time = max_time
         definition.flags = _abi.DFM_WORLD_UNTANGLE if untangle else 0
         definition.solver = encoded(solver)

@@ -81,6 +81,7 @@ class Builder {
     if (def_.untangle) w.flags |= DFM_WORLD_UNTANGLE;
     w.recovery_speed = def_.recovery_speed;
     w.obstacle_speed = def_.obstacle_speed;
+    if (def_.max_sweeps > 0) w.max_sweeps = def_.max_sweeps;
     std::vector<const char *> effects;
     for (const std::string &e : def_.effects) effects.push_back(e.c_str());
     effects.push_back(nullptr);

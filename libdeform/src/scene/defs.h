@@ -231,7 +231,7 @@ struct Definition {
          energy_watch = dfm_world_def_default().energy_watch;
   std::string solver = "auto";  // of the implicit step
   double solver_tolerance = 0;
-  uint32_t solver_iterations = 0, newton = 0;
+  uint32_t solver_iterations = 0, newton = 0, max_sweeps = 0;
   uint32_t self = DFM_SELF_OFF;
   bool sleep = false, guard = true, untangle = false;
   bool effects_auto = true;

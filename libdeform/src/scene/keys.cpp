@@ -215,6 +215,7 @@ const Table &objects() {
         {"energy_watch", true},
         {"recovery_speed", true},
         {"obstacle_speed", true},
+        {"max_sweeps", true},
         {"friction", true},
         {"filter", true}}},
       {"friction", {{"between", true}, {"law", true}, {"params", true}}},

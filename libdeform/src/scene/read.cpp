@@ -457,6 +457,7 @@ void read_contact(const Node &scene, Definition &def, const ReadContext &context
   if (contact.has("offset")) def.offset = contact.member("offset").number(kPositive);
   if (contact.has("recovery_speed")) def.recovery_speed = contact.member("recovery_speed").number(kPositive);
   if (contact.has("obstacle_speed")) def.obstacle_speed = contact.member("obstacle_speed").number(kPositive);
+  if (contact.has("max_sweeps")) def.max_sweeps = read_count(contact.member("max_sweeps"), 1, 1e6);
   if (contact.has("friction") && !contact.value()["friction"].is_array())
     contact.member("friction")
         .fail(

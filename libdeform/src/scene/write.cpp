@@ -309,6 +309,7 @@ Written write_contact(SceneWriter &to) {
   else if (d.energy_watch != usual.energy_watch) out["energy_watch"] = d.energy_watch;
   if (d.recovery_speed > 0) out["recovery_speed"] = d.recovery_speed;
   if (d.obstacle_speed > 0) out["obstacle_speed"] = d.obstacle_speed;
+  if (d.max_sweeps != usual.max_sweeps) out["max_sweeps"] = d.max_sweeps;
   if (Written friction = write_friction(to); !friction.empty()) out["friction"] = std::move(friction);
   if (Written filter = write_filters(to); !filter.empty()) out["filter"] = std::move(filter);
   return out;
@@ -380,8 +381,7 @@ void tell_what_is_left_out(SceneWriter &to) {
         "and does not filter later pairs");
   if (w.pre_solve.call)
     to.note("a callback of the host changes contacts before they are solved; a scene has none");
-  const std::pair<const char *, bool> members[] = {{"max_sweeps", w.def.max_sweeps != usual.max_sweeps},
-                                                   {"max_passes", w.def.max_passes != usual.max_passes},
+  const std::pair<const char *, bool> members[] = {{"max_passes", w.def.max_passes != usual.max_passes},
                                                    {"max_substeps", w.def.max_substeps != usual.max_substeps},
                                                    {"sleep_speed", w.def.sleep_speed != usual.sleep_speed},
                                                    {"sleep_time", w.def.sleep_time != usual.sleep_time}};
