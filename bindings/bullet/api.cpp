@@ -51,7 +51,7 @@ dfm_status check_def(const dfm_bullet_def &d) {
         "Bullet %d with %zu; single precision is libdeform_bullet, double libdeform_bullet64",
         d.version, d.real_bytes, BT_BULLET_VERSION, sizeof(btScalar));
   if (const dfm_status s = check_bullet(); s != DFM_OK) return s;
-  if (!d.world) return missing("world");
+  if (!d.world) return failed(DFM_E_ARG, "dfm_bullet_def: world is NULL; set it to that of your scene");
   if (d.flags)
     return failed(DFM_E_ARG, "dfm_bullet_def: flags is %u; leave it 0, since no flag is defined", d.flags);
   return DFM_OK;

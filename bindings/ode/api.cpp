@@ -31,8 +31,9 @@ dfm_status check_def(const dfm_ode_def &d) {
                   "ODE %s with %zu; compile both against the same",
                   d.version ? d.version : "?", d.real_bytes, dODE_VERSION, sizeof(dReal));
   if (const dfm_status s = check_ode(); s != DFM_OK) return s;
-  if (!d.world) return missing("world");
-  if (!d.space) return missing("space");
+  if (!d.world || !d.space)
+    return failed(DFM_E_ARG, "dfm_ode_def: %s is NULL; set it to that of your scene",
+                  d.world ? "space" : "world");
   if (d.flags & ~uint32_t{DFM_ODE_QUICK})
     return failed(DFM_E_ARG, "dfm_ode_def: flags %u; only DFM_ODE_QUICK is known", d.flags);
   if (!(d.friction >= 0 && std::isfinite(d.friction)))

@@ -198,6 +198,7 @@ TEST(BulletLifecycle, WrongUse_IsReportedInOneSentence) {
   dfm_bullet other = 0;
   dfm_bullet_def d = dfm_bullet_def_default();
   EXPECT_EQ(dfm_bullet_attach(b.soft, &d, &other), DFM_E_ARG);
+  EXPECT_NE(std::string(dfm_last_error()).find("dfm_bullet_def: world is NULL"), std::string::npos);
   d.world = &b.world;
   EXPECT_EQ(dfm_bullet_attach(b.soft, &d, &other), DFM_E_STATE);
   d.real_bytes = kSingle ? 8 : 4;

@@ -493,9 +493,9 @@ TEST(OdeLifecycle, WrongUse_IsReportedInOneSentence) {
     EXPECT_EQ(dfm_ode_attach(ode.soft, &d, &second), expected);
     EXPECT_NE(std::string(dfm_last_error()).find(word), std::string::npos) << dfm_last_error();
   };
-  refused(DFM_E_ARG, "world");
+  refused(DFM_E_ARG, "dfm_ode_def: world is NULL");
   d.world = ode.world;
-  refused(DFM_E_ARG, "space");
+  refused(DFM_E_ARG, "dfm_ode_def: space is NULL");
   d.space = ode.space;
   refused(DFM_E_STATE, "already has an adapter");
   d.real_bytes = 4;
