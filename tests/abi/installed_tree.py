@@ -55,6 +55,27 @@ def install(build, source, scratch):
     return prefix, next(prefix.rglob("deform.pc")).parent.parent.relative_to(prefix)
 
 
+def asks_for_a_component_that_is_not_there(prefix, scratch, clean):
+    """CMake's own sentence says only that the package is not found."""
+    project = scratch / "component"
+    project.mkdir()
+    (project / "CMakeLists.txt").write_text("cmake_minimum_required(VERSION 3.22)\nproject(host C CXX)\n"
+                                            "find_package(deform REQUIRED COMPONENTS oed)\n")
+    done = subprocess.run(["cmake", "-S", project, "-B", project / "build", f"-DCMAKE_PREFIX_PATH={prefix}"],
+                          capture_output=True, text=True, env=clean)
+    if done.returncode == 0 or "deform has no component oed" not in done.stderr:
+        sys.exit(f"component oed: {done.returncode} {done.stderr}")
+
+
+def builds_from_a_prefix_with_a_space(prefix, libdir, source, scratch, clean):
+    """The line of packages.md, to the letter."""
+    spaced = prefix.rename(scratch / "moved here")
+    page = (pathlib.Path(source) / "libdeform/doc/howto/packages.md").read_text()
+    line = re.search(r'^eval "cc hello\.c .*$', page, re.M).group(0)
+    run("sh", "-ec", f"cd '{scratch}' && rm hello && {line} && ./hello",
+        env={**clean, "PKG_CONFIG_PATH": str(spaced / libdir / "pkgconfig")})
+
+
 def main():
     build, source, scratch, compiler = sys.argv[1:]
     here = pathlib.Path(__file__).resolve().parent / "stranger"
@@ -93,6 +114,8 @@ def main():
             sys.exit(f"{command} plugin list does not show {plugin}")
     if f"{build}/lib" in listed:  # the scratch prefix itself lies in the build folder
         sys.exit(f"the installed command found plugins of the build tree in {build}")
+    asks_for_a_component_that_is_not_there(prefix, scratch, clean)
+    builds_from_a_prefix_with_a_space(prefix, libdir, source, scratch, clean)
 
 
 if __name__ == "__main__":

@@ -81,9 +81,9 @@ std::string turns_with_frame(const Subject &subject) {
         worst = std::max(worst, error);
         if (!(error <= 1e-12))
           broken(
-              "the same history turned by %u degrees gives %.6g N instead of %.6g N (off by %.2g of it); use "
-              "lengths and dot products of the pairs, never their components",
-              i, b.ft(i), std::hypot(x, y), error);
+              "the same history turned by %u degrees gives (%.6g, %.6g) N instead of (%.6g, %.6g) N (off by "
+              "%.2g of it); use lengths and dot products of the pairs, never their components",
+              i, b.out_ft[i], b.out_ft[b.stride + i], ex, ey, error);
       }
       b.commit();
     }

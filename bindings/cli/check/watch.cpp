@@ -256,7 +256,10 @@ void Fenced::on_fault(int, void *info, void *context) {
   std::snprintf(sentence, sizeof sentence, "%s memory at %p, which belongs to none of its arrays", what,
                 static_cast<const void *>(at));
   if (reinterpret_cast<uintptr_t>(at) < page_size())
-    std::snprintf(sentence, sizeof sentence, "%s through a pointer that is NULL", what);
+    std::snprintf(sentence, sizeof sentence,
+                  "%s through a pointer that is NULL (as are inputs that it did not ask for and outputs that "
+                  "are not wanted)",
+                  what);
   for (const Fenced *f : all) {
     const unsigned char *begin = static_cast<const unsigned char *>(f->data_);
     if (at < f->pages_ || at >= f->pages_ + f->span_) continue;
