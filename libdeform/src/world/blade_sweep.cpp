@@ -243,7 +243,7 @@ void BladeSweep::find_faces(const Body &b) {
     const uint32_t i = near[b.inner[k]], j = near[b.inner[k + 1]];
     if (i == kNone || j == kNone) continue;
     apart_ = std::max(apart_, norm(near_[i].is - near_[j].is));
-    if (!is_open(b, near_[i].cell, near_[j].cell)) pairs_.push_back({i, j});
+    pairs_.push_back({i, j});
   }
 }
 
@@ -304,7 +304,7 @@ void BladeSweep::compare(const Body &b, bool by_shape) {
       CutShape own = blade_;
       const LineMotion moves(i.was, j.was, i.is, j.is);
       for (int k = 0; k < 2; ++k) own.corner[k] = moves(blade_.corner[k]);
-      if (!crosses_blade(own, i.is, j.is)) continue;
+      if (!crosses_blade(own, i.is, j.is) || is_open(b, i.cell, j.cell)) continue;
       const Vec3 *const c = own.corner;
       const Vec3 across = normalized(cross(c[2] - c[0], c[3] - c[1]));
       add(f, dot(across, j.is - i.is) < 0 ? -across : across, 0.5 * ((c[3] - c[0]) + (c[2] - c[1])), 0.5);
@@ -319,6 +319,7 @@ void BladeSweep::compare(const Body &b, bool by_shape) {
     const double along = at(a.along, o.along);
     if (!(along >= 0 && along <= 1) || at(a.way, o.way) < -strip_) continue;
     if (!(passed(a) && passed(o)) && at(i.ahead, j.ahead) > 0) continue;
+    if (is_open(b, i.cell, j.cell)) continue;  // last: few faces come so far
     for (BladeSide *s : {&a, &o})
       if (s->kind == SideKind::ahead) s->kind = SideKind::passed;  // its side is settled by now
     const Vec3 *const c = blade_.corner;
