@@ -5,6 +5,9 @@
 // are taken against the one that fits best: a body that falls or rolls keeps its lists. And features that
 // share a surfel are no pair: they always touch.
 #pragma once
+#include <algorithm>
+#include <cmath>
+
 #include "body/self_rest.h"
 #include "broad/rigid_fit.h"
 #include "core/memory.h"
@@ -28,11 +31,20 @@ class SelfList {
   double deforming() const { return motion_.speed; }
   // How often the lists were built.
   uint64_t renewals() const { return renewals_; }
-  // f(triangle, triangle) for pairs whose boxes may meet now; each pair once.
+  // f(other) for triangles whose boxes may meet that of this one now, and for itself.
   template <class F>
-  void near_triangles(F &&f) {
-    near_self_pairs(tree_, kDistanceRounding * 2 * moved_, stack_,
-                    [&](uint32_t p, uint32_t q, double) { f(tree_.triangles()[p], tree_.triangles()[q]); });
+  void near_triangle(uint32_t triangle, F &&f) {
+    Box own{{HUGE_VAL, HUGE_VAL, HUGE_VAL, 0},
+            {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL, 0}};  // where the tree has it
+    for (uint32_t c = 0; c < 3; ++c) {
+      const double *const x = &at_.x()[4 * size_t{surface_.tri[3 * size_t{triangle} + c]}];
+      for (int k = 0; k < 3; ++k) {
+        own.lo[k] = std::min(own.lo[k], x[k]);
+        own.hi[k] = std::max(own.hi[k], x[k]);
+      }
+    }
+    const double margin = kDistanceRounding * 2 * moved_, limit = margin * margin;
+    near_triangles(tree_, stack_, [&](const Box &b) { return box_distance2(own, b) <= limit; }, f);
   }
   // Ascending by (a, b).
   const Array<SelfPair> &vertex_face() const { return vf_; }

@@ -59,17 +59,6 @@ SelfBody *self_body(StepContext &step, uint32_t slot) {
   return at != step.self_bodies.end() && (*at)->body->slot == slot ? at->get() : nullptr;
 }
 
-void find_tangled(SelfBody &b) {
-  const Surface &s = b.body->surface;
-  b.tangled.assign(s.nsurfel, 0);
-  b.looked = true;
-  b.list.near_triangles([&](uint32_t t, uint32_t u) {
-    const uint32_t *const c = &s.tri[3 * size_t{t}], *const d = &s.tri[3 * size_t{u}];
-    if (share_a_corner(c, d) || !(edges_pierce(s, t, s, u) || edges_pierce(s, u, s, t))) return;
-    for (int k = 0; k < 3; ++k) b.tangled[c[k]] = b.tangled[d[k]] = 1;
-  });
-}
-
 using Corners = std::array<uint32_t, 3>;
 
 uint32_t root(Array<uint32_t> &parent, uint32_t i) {
@@ -167,9 +156,31 @@ OpenedSurface opened_surface(const Memory &m, const Body &b) {
   return out;
 }
 
+enum Crosses : uint8_t { unasked, no, yes };
+
+// Few triangles are asked about, where something is deeper than it should be: the whole surface would take
+// more than the rest of a step.
+bool crosses_another(SelfBody &b, uint32_t triangle) {
+  const Surface &s = b.body->surface;
+  if (b.crosses.empty()) b.crosses.assign(s.ntri, unasked);
+  if (b.crosses[triangle] != unasked) return b.crosses[triangle] == yes;
+  b.crosses[triangle] = no;
+  b.list.near_triangle(triangle, [&](uint32_t other) {
+    if (b.crosses[triangle] == yes ||
+        share_a_corner(&s.tri[3 * size_t{triangle}], &s.tri[3 * size_t{other}]) ||
+        !(edges_pierce(s, triangle, s, other) || edges_pierce(s, other, s, triangle)))
+      return;
+    b.crosses[triangle] = b.crosses[other] = yes;
+  });
+  return b.crosses[triangle] == yes;
+}
+
+// Of a triangle that crosses another one at the start of the sub-step.
 bool is_tangled(SelfBody &b, uint32_t surfel) {
-  if (!b.looked) find_tangled(b);
-  return b.tangled[surfel];
+  const Surface &s = b.body->surface;
+  const auto fan = s.fan.begin();
+  return std::any_of(fan + s.fan_begin[surfel], fan + s.fan_begin[surfel + 1],
+                     [&](uint32_t triangle) { return crosses_another(b, triangle); });
 }
 
 }  // namespace
@@ -270,7 +281,7 @@ void stage_self(World &w, StepContext &step) {
   const bool listed = w.plan.has(StageRole::lists_pairs);  // that stage has computed the speeds
   for (auto &s : step.self_bodies) {
     const BodyView &view = step.body_views[s->body->slot];
-    s->looked = false;
+    s->crosses.clear();
     if (view.asleep) continue;
     switch_to(*s, !s->watch ||
                       s->watch->near(step.h, w.offset, listed ? step.broad.speed(s->body->slot) : HUGE_VAL));

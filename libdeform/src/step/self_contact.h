@@ -23,9 +23,9 @@ struct SelfBody {
   bool on = false;                   // in this sub-step
   // rebuild of `list` that is included in the guard's list; 0: not included
   uint64_t joined = 0;
-  // [nsurfel] of a triangle that crosses another one at the start of the sub-step; where `looked`
-  Array<uint8_t> tangled;
-  bool looked = false;
+  // [ntri] whether it crosses another one at the start of the sub-step: Crosses, as far as it has been asked
+  // in this sub-step; empty: nothing has
+  Array<uint8_t> crosses;
   SelfBody(const Memory &memory, Body &b);
 };
 
