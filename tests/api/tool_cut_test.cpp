@@ -438,6 +438,17 @@ TEST(ToolCut, DrivenBlade_BendsTheBody) {
   }
 }
 
+// The sides of the slit lie on each other under the drag, with friction: contacts that hold the same points
+// more than once, whose slips no impulse takes away (decision 0426).
+TEST(ToolCut, SidesOfASlitUnderDrag_AreSolved_ImplicitSteps) {
+  Tough s(0, sides, "corotational_fem", DFM_INTEGRATOR_IMPLICIT_EULER);
+  s.down(0.015, 0.2);
+  dfm_world_stats stats{};
+  stats.size = sizeof stats;
+  test::ok(dfm_world_get_stats(s.w, &stats));
+  EXPECT_LT(double(stats.unconverged), 0.3 * double(stats.substeps)) << "else 0.43";
+}
+
 // Nothing holds the cube, and its sides do not touch (decision 0040 says what that does to angular
 // momentum): a slow blade takes it along, a fast one goes through and leaves it some momentum.
 TEST(ToolCut, FreeBody_IsDraggedByTheBlade_AndMomentumIsKept) {

@@ -13,15 +13,84 @@ constexpr double kStands = 0.5;
 // Factor on the remaining slip: sweeps end at half of the tolerance, and laws are evaluated once more.
 constexpr double kAllows = 2.5;
 
+// Of the largest weight of a contact: a point that has less adds less than 1 % to its response.
+constexpr double kHolds = 0.1;
+
 bool carries(const ContactRows &rows, uint32_t i) {
   return rows.wn[i] > 0 && rows.impulse[size_t(3) * i] > 0;
 }
 
+// f(dof) for the points that a contact holds against each other.
+template <class F>
+void each_held(const ContactRows &rows, uint32_t i, F &&f) {
+  double most = 0;
+  for (uint32_t j = rows.begin[i]; j < rows.begin[i + 1]; ++j)
+    most = std::max(most, std::fabs(rows.weight[j]));
+  for (uint32_t j = rows.begin[i]; j < rows.begin[i + 1]; ++j)
+    if (std::fabs(rows.weight[j]) > kHolds * most) f(rows.dof[j]);
+}
+
 }  // namespace
 
-Redundant::Redundant(const Memory &m) { use_memory(m, before_, left_, touched_); }
+Redundant::Redundant(const Memory &m) {
+  use_memory(m, before_, left_, touched_, within_, held_, root_, surplus_);
+}
 
-bool Redundant::found(const ContactRows &rows, const RowsPart &part) {
+// n points move against each other in n - 1 ways. First contacts that hold a point alone are taken away, for
+// they are in nobody's way, until all points that are left are held twice. Groups of these are counted.
+bool Redundant::found_at_cuts(const ContactRows &rows, const RowsPart &part, const uint8_t *cut) {
+  held_.assign(rows.ndof, 0);
+  root_.resize(rows.ndof);
+  surplus_.assign(rows.ndof, 0);
+  within_.assign(part.n, 0);
+  uint32_t k = 0;
+  const auto each_within = [&](auto &&f) {
+    k = 0;
+    each_row(part.contacts, [&](uint32_t i) {
+      if (within_[k++]) f(i);
+    });
+  };
+  each_row(part.contacts, [&](uint32_t i) {
+    within_[k++] = cut[i] && carries(rows, i);
+    if (within_[k - 1]) each_held(rows, i, [&](uint32_t d) { ++held_[d]; });
+  });
+  for (bool peeled = true; peeled;) {
+    peeled = false;
+    each_within([&](uint32_t i) {
+      bool alone = false;
+      each_held(rows, i, [&](uint32_t d) { alone = alone || held_[d] == 1; });
+      if (!alone) return;
+      each_held(rows, i, [&](uint32_t d) { --held_[d]; });
+      within_[k - 1] = 0;
+      peeled = true;
+    });
+  }
+  for (uint32_t d = 0; d < rows.ndof; ++d) root_[d] = d;
+  const auto root = [&](uint32_t d) {
+    while (root_[d] != d) d = root_[d] = root_[root_[d]];
+    return d;
+  };
+  each_within([&](uint32_t i) {
+    uint32_t first = kNone;
+    each_held(rows, i, [&](uint32_t d) {
+      if (first == kNone) first = root(d);
+      else root_[root(d)] = first;
+    });
+  });
+  const auto place = [&](uint32_t i) {
+    uint32_t at = kNone;
+    each_held(rows, i, [&](uint32_t d) { at = root(d); });
+    return at;
+  };
+  for (uint32_t d = 0; d < rows.ndof; ++d)
+    if (held_[d]) --surplus_[root(d)];
+  each_within([&](uint32_t i) { ++surplus_[place(i)]; });
+  bool any = false;
+  each_within([&](uint32_t i) { any = any || surplus_[place(i)] >= 0; });
+  return any;
+}
+
+bool Redundant::found(const ContactRows &rows, const RowsPart &part, const uint8_t *cut) {
   touched_.assign(rows.ndof, 0);
   uint32_t loaded = 0, dofs = 0;
   const auto touch = [&](uint32_t dof) {
@@ -36,7 +105,7 @@ bool Redundant::found(const ContactRows &rows, const RowsPart &part) {
     touch(rows.rigid[i]);
     touch(rows.rigid[i] + 1);
   });
-  return loaded > dofs;
+  return loaded > dofs || (cut && found_at_cuts(rows, part, cut));
 }
 
 void Redundant::note(const ContactRows &rows, const RowsPart &part) {

@@ -13,8 +13,10 @@ class Redundant {
   explicit Redundant(const Memory &memory);
   // Before the first solve of a sub-step.
   void start() { left_.clear(); }
-  // Whether there are more loaded contacts than dofs that they touch.
-  bool found(const ContactRows &rows, const RowsPart &part);
+  // Whether there are more loaded contacts than dofs that they touch; or more between cut faces than ways in
+  // which the points that they hold move against each other (doc/decisions/0426).
+  //   cut  [contacts of all parts] whether both sides have cut faces; null: none have
+  bool found(const ContactRows &rows, const RowsPart &part, const uint8_t *cut);
   // Velocities before a plain sweep.
   void note(const ContactRows &rows, const RowsPart &part);
   // After it: whether velocities have not changed. The remaining slip of each contact against its law, up to
@@ -28,6 +30,11 @@ class Redundant {
   Array<double> before_;    // [contacts of the part,3] m/s
   Array<double> left_;      // [contacts of the part] m/s, allowed; empty: none yet
   Array<uint8_t> touched_;  // [dofs]
+  Array<uint8_t> within_;   // [contacts of the part] hold only points that others hold, too
+  // [dofs] contacts that hold it; another dof of its group; of a group's first one: contacts beyond its dofs
+  Array<uint32_t> held_, root_;
+  Array<int32_t> surplus_;
+  bool found_at_cuts(const ContactRows &rows, const RowsPart &part, const uint8_t *cut);
 };
 
 }  // namespace dfm

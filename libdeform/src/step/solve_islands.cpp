@@ -198,7 +198,7 @@ void settle(const World &w, StepContext &step, SolveIsland &own, double &best) {
 constexpr uint32_t kAskStands = 4;
 bool asks_redundant(const World &w, const StepContext &step, SolveIsland &own) {
   return own.revises && own.sweeps >= kPolish && own.sweeps % kAskStands == 0 && !own.batches.remembers() &&
-         !w.prescribed.stands() && own.redundant.found(step.rows, own.part);
+         !w.prescribed.stands() && own.redundant.found(step.rows, own.part, step.solve_islands.of_cuts());
 }
 
 // A residual costs as much as a sweep, where points answer their own impulses alone. A sweep seldom leaves
@@ -384,8 +384,8 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
 }  // namespace
 
 SolveIslands::SolveIslands(const Memory &m) : memory_(m), joined_(m) {
-  use_memory(m, pairs_, owner_, met_, side_, body_of_, largest_, sides_, order_, contact_, bond_, block_,
-             begin_);
+  use_memory(m, pairs_, owner_, met_, side_, body_of_, largest_, sides_, of_cuts_, order_, contact_, bond_,
+             block_, begin_);
 }
 
 // Pairs that move the same unknown.
@@ -453,6 +453,17 @@ void SolveIslands::largest_by_body(Array<double> &values) {
   each([](double &value, double most) { value = most; });
 }
 
+void SolveIslands::find_cuts(const World &w, const StepContext &step) {
+  const auto cut = [&](uint32_t slot) {
+    const Surface &s = w.bodies[slot]->surface;
+    return s.slit || s.back > 0;
+  };
+  of_cuts_.clear();
+  if (std::none_of(w.bodies.begin(), w.bodies.end(), [&](auto &b) { return cut(b->slot); })) return;
+  for (const ContactPoint &c : step.contacts)
+    of_cuts_.push_back(!c.obstacle && cut(c.slot_a) && cut(c.slot_b));
+}
+
 // Rows of the same two sides follow each other, so that little is done for each row.
 void SolveIslands::find(const World &w, StepContext &step) {
   pairs_.clear();
@@ -470,6 +481,7 @@ void SolveIslands::find(const World &w, StepContext &step) {
   join(step.rows);
   sides_.resize(2 * size_t{step.rows.n});
   number_sides(w.bodies.size(), of_contacts);
+  find_cuts(w, step);
   while (islands_.size() < count_) islands_.emplace_back(memory_);
 
   const auto of = [&](const Pair &p) { return joined_.of[size_t(&p - pairs_.data())]; };

@@ -79,6 +79,8 @@ class SolveIslands {
   std::span<const uint32_t> by_size() const { return {order_.data(), count_}; }
   // [contacts,2] numbers of the two sides among all bodies of all islands; kNone: an obstacle
   const uint32_t *sides() const { return sides_.data(); }
+  // [contacts] whether both sides are faces of a cut, set back; null: none are
+  const uint8_t *of_cuts() const { return of_cuts_.empty() ? nullptr : of_cuts_.data(); }
   uint32_t side_count() const { return static_cast<uint32_t>(body_of_.size()); }
   bool shares_sides() const;                    // whether some body is in several islands
   void largest_by_body(Array<double> &values);  // [sides,2] each becomes the largest of its body
@@ -95,7 +97,8 @@ class SolveIslands {
   // [bodies] the last island it was met in, and its number there
   Array<uint32_t> met_, side_;
   Array<uint32_t> sides_, body_of_;  // body_of_: [sides]
-  Array<double> largest_;            // [bodies,2] scratch
+  Array<uint8_t> of_cuts_;
+  Array<double> largest_;  // [bodies,2] scratch
   Array<uint32_t> order_;
   // by island: runs of contacts, of bonds, and blocks
   Array<RowRun> contact_, bond_;
@@ -104,6 +107,7 @@ class SolveIslands {
   uint32_t count_ = 0;
   void join(const ContactRows &rows);
   void number_sides(size_t bodies, size_t of_contacts);
+  void find_cuts(const World &w, const StepContext &step);
 };
 
 // All islands that are open, each until the true residual of its laws is good enough. One in which a law has
