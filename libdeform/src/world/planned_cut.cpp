@@ -26,18 +26,18 @@ struct Made {
   uint64_t whole;
   double t;
   size_t after;
-  bool met;
+  bool splits, met;
 };
 
-void note(std::vector<Made> &all, const Body &b, double t, bool met) {
+void note(std::vector<Made> &all, const Body &b, const PlannedCut &cut, bool met) {
   const uint64_t whole = b.piece_of ? b.piece_of : b.id;
   const size_t after = b.planned_cuts.size();
   for (Made &m : all)
-    if (m.whole == whole && m.t == t && m.after == after) {
+    if (m.whole == whole && m.t == cut.t && m.after == after) {
       m.met = m.met || met;
       return;
     }
-  all.push_back({whole, t, after, met});
+  all.push_back({whole, cut.t, after, cut.how == DFM_CUT_SPLIT, met});
 }
 
 void warn(const World &w, const std::vector<Made> &all) {
@@ -45,10 +45,13 @@ void warn(const World &w, const std::vector<Made> &all) {
     const auto whole = [&](auto &b) { return b->id == m.whole || b->piece_of == m.whole; };
     const auto b = std::find_if(w.bodies.begin(), w.bodies.end(), whole);
     if (m.met || b == w.bodies.end()) continue;
-    w.context->logf(DFM_LOG_WARNING,
-                    "body '%s': its cut at %g s has met nothing; give the place where the body is at that "
-                    "time, in the axes of the world",
-                    ((*b)->piece_of ? (*b)->whole_name : (*b)->name).c_str(), m.t);
+    w.context->logf(
+        DFM_LOG_WARNING,
+        "body '%s': its cut at %g s has met no %s; give the place where the body is at that time, in "
+        "the axes of the world%s",
+        ((*b)->piece_of ? (*b)->whole_name : (*b)->name).c_str(), m.t,
+        m.splits ? "closed face between two cells" : "cell",
+        m.splits ? ", and no slice thinner than a cell" : "");
   }
 }
 
@@ -106,7 +109,7 @@ void make_planned_cuts(World &w, double dt) {
       throw;
     }
     const uint32_t n = cut.how == DFM_CUT_SPLIT ? done.opened : done.removed;
-    note(made, b, cut.t, n > 0);
+    note(made, b, cut, n > 0);
     if (n == 0) continue;
     reserve_events(w, 1);
     add_event(w, DFM_EVENT_CUT, b.id, b.id, n, w.time);

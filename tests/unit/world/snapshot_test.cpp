@@ -53,6 +53,15 @@ dfm_world build(dfm_context *c) {
   const dfm_vector_key ends[] = {{0, {0, 0, 0.3}}, {5, {0.1, 0, 0.3}}};
   const dfm_spring_def spring{sizeof spring, 2, pushed, nullptr, {0, 0, 0.3}, ends, 2, 0, 3, 0.1};
   test::ok(dfm_body_add_spring(upper, &spring, nullptr));
+  dfm_cut_def plane = dfm_cut_def_default(), box = plane;
+  plane.shape = DFM_CUT_PLANE;
+  plane.how = DFM_CUT_SPLIT;
+  plane.blade[3] = 1;
+  box.shape = DFM_CUT_BOX;
+  for (double &size : box.half_size) size = 0.03;
+  test::ok(dfm_body_plan_cut(lower, 0.03105, &plane));  // in the step after the snapshot
+  test::ok(dfm_body_plan_cut(upper, 1, &plane));
+  test::ok(dfm_body_plan_cut(upper, 2, &box));
   dfm_obstacle_def jaw = dfm_obstacle_def_default();
   const dfm_pose_key keys[] = {{0, {{-1, 0.05, 0.15}, {0, 0, 0, 1}}},
                                {1, {{-0.9, 0.05, 0.15}, {0, 0, 0.1, 1}}}};
