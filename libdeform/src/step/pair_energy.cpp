@@ -31,7 +31,9 @@ constexpr double kOpens = 0.5 * (1 + 1.25);
 bool remembers(const LawInstance *law) { return law->nstate > 0; }
 
 // J, of a contact in the sub-step. If the sides count their work differently (step/energy_watch.cpp),
-// velocities at the end of the sub-step are used; otherwise a common acceleration would count as work.
+// velocities at the end of the sub-step are used; otherwise a common acceleration would count as work. An
+// obstacle has one velocity in the sub-step, that of its end: with the mean of a body's velocities an
+// obstacle that stops would seem to do work.
 struct Made {
   double all = 0;       // without friction if the law has memory
   double recovery = 0;  // upper bound of the energy added by recovery of depths
@@ -44,11 +46,16 @@ Made made_by(const World &w, const StepContext &step, uint32_t i, bool ends) {
   const ContactState &law = step.state;
   const double *const l = &rows.impulse[size_t(3) * i], *const f = &rows.frame[size_t(9) * i];
   Vec3 u;
+  uint32_t body = kNone;
+  const double *end = nullptr;  // of that body, where its mean is another one
   for (uint32_t k = rows.begin[i]; k < rows.begin[i + 1]; ++k) {
     const uint32_t d = rows.dof[k];
-    const double *v = &step.mean[size_t{kStride} * d];
-    if (ends && w.bodies[rows.source[d]]->dynamics->abilities().energy)
-      v = w.bodies[rows.source[d]]->dynamics->end().v + size_t{kStride} * rows.point[d];
+    if (ends && rows.source[d] != body) {
+      body = rows.source[d];
+      const Dynamics &dynamics = *w.bodies[body]->dynamics;
+      end = dynamics.abilities().energy ? dynamics.end().v : nullptr;
+    }
+    const double *const v = end ? end + size_t{kStride} * rows.point[d] : &step.mean[size_t{kStride} * d];
     u += rows.weight[k] * load3(v);
   }
   u = Vec3{dot(load3(f), u), dot(load3(f + 3), u), dot(load3(f + 6), u)} - load3(&rows.drive[size_t(3) * i]);
@@ -139,7 +146,7 @@ void book_pairs(World &w, StepContext &step) {
     const uint64_t a = w.bodies[c.slot_a]->id;
     const uint64_t b = c.obstacle ? w.obstacles[c.slot_b]->id : w.bodies[c.slot_b]->id;
     const auto by_halves = [&](uint32_t slot) { return w.bodies[slot]->dynamics->abilities().energy; };
-    const bool ends = !c.obstacle && by_halves(c.slot_a) != by_halves(c.slot_b);
+    const bool ends = c.obstacle || by_halves(c.slot_a) != by_halves(c.slot_b);
     Made sum;
     bool touch = false, deep = false;
     for (uint32_t k = begin; k < i; ++k) {
