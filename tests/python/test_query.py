@@ -157,6 +157,14 @@ class Decisions(unittest.TestCase):
                     set_function(None)
                     world.step(1e-3)
 
+    def test_a_callback_that_uses_the_world_is_told_so(self):
+        with deform.World() as world:
+            world.add_obstacle("plane")
+            ball(world, "ball")
+            world.set_pre_solve(lambda contact: world.step(1e-3))
+            with self.assertRaisesRegex(deform.BusyError, "this is a callback of that step"):
+                world.run(0.05, dt=1e-3)
+
     def test_a_world_with_functions_ends_with_its_last_name(self):
         world = deform.World()
         world.set_pre_solve(lambda contact: None)

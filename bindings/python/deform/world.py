@@ -237,7 +237,10 @@ class World(Queries, Tools):
         return f"<deform.World: {len(self.bodies)} bodies, t = {self.time:.6g} s>"
 
     def free(self) -> None:
-        """Raises BusyError while another thread is inside a step."""
+        """Raises BusyError while another thread is inside a step, and in a callback of a step."""
+        if self._busy == get_ident():
+            raise BusyError("the world is inside a step, and this is a callback of that step, which can use "
+                            "only what it is given; look after the step", "DFM_E_BUSY")
         if self._busy:
             raise BusyError("the world is inside a step of another thread; look when that has returned",
                             "DFM_E_BUSY")
