@@ -63,7 +63,13 @@ StageChoice predict(const SceneFacts &f) {
 }
 
 StageChoice rigid_predict(const SceneFacts &f) {
-  return f.rigid_bodies ? runs(rigids(f)) : left_out("no rigid bodies");
+  if (!f.rigid_bodies) return left_out("no rigid bodies");
+  std::string why = rigids(f);
+  if (f.rigid_pairs)
+    why += "; " + count(f.rigid_pairs, "pair", "pairs") +
+           " of free rigid bodies with each other and with obstacles may touch";
+  if (!f.rigid_alone.empty()) why += "; these pass through obstacles: " + join(f.rigid_alone);
+  return runs(why);
 }
 
 StageChoice gather(const SceneFacts &f) {

@@ -431,7 +431,7 @@ void prepare(World &w, const RestoredChoice *restored) {
   view_obstacles_anew(w, step);
   view_rigids(w, facts);
   make_pair_tables(w, step, facts);
-  step.tools.prepare(w);
+  step.tools.prepare(w, facts);
   choose_plan(w, step, facts);
   if (!restored && !w.plan.touches()) end_contacts(w);
   if (!w.plan.has(StageRole::finds_contacts) && !facts.self_bodies) step.contacts.clear();

@@ -16,6 +16,7 @@ namespace {
 constexpr uint32_t kMostHits = 4;  // further solves
 constexpr double kSlow = 5e-4;     // m in a sub-step: what moves by less is kept apart by its rows
 constexpr uint32_t kLooks = 16;    // pieces of an edge between which it is looked at
+constexpr double kDeep = 0.02;     // of the smaller one's reach, that a host may leave unsaid
 constexpr double kWithin = 0.1;    // of the floor, that a hit may be found above it
 
 }  // namespace
@@ -30,8 +31,8 @@ Vec3 ToolTouch::end_of(const Side &side, Vec3 p) const {
 }
 
 void ToolTouch::find_hits(const Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b) {
-  const double far = h_ * (fastest(a, at_a) + fastest(b, at_b));
-  if (far < kSlow || !look_at_each_other(a, b, 2 * far + offset_)) return;
+  const double far = h_ * (fastest(a, at_a, b) + fastest(b, at_b, a));
+  if (far < kSlow || !look_at_each_other(a, b, 2 * far + offset_, !pair.frees)) return;
   const double floor = 0.5 * offset_;
   narrow::PairMotion m;
   m.edges = true;
@@ -58,7 +59,8 @@ void ToolTouch::find_hits(const Pair &pair, ToolShape &a, ToolShape &b, Side at_
       const Vec3 n = normalized(apart), on_a = place(0, hit.at[0], 0), on_b = place(2, hit.at[1], 0);
       // along a normal of later they may overlap now: that asks for no speed outwards, which would be energy
       const double gap = std::max(dot(n, on_a - on_b) - m.round, offset_);
-      hits_.push_back({&pair, {kHitEdges, p.number, q.number}, at_a, at_b, 0.5 * (on_a + on_b), n, gap});
+      hits_.push_back(
+          {&pair, {kHitEdges, p.number, q.number}, at_a, at_b, {0.5 * (on_a + on_b), on_a, on_b}, n, gap});
     }
   }
 }
@@ -76,7 +78,7 @@ bool ToolTouch::add_hits(const World &w, const StepContext &step) {
   }
   for (const Hit &hit : hits_) {
     std::erase_if(rows_, [&](const Row &row) { return row.key == key_of(hit.pair->id, hit.name); });
-    add_row(*hit.pair, hit.name, hit.a, hit.b, hit.at, hit.normal, hit.gap, HUGE_VAL);
+    add_row(*hit.pair, hit.name, hit.a, hit.b, hit.place, hit.normal, hit.gap, HUGE_VAL);
   }
   return true;
 }
@@ -91,7 +93,7 @@ void ToolTouch::solve_past_hits(const World &w, const StepContext &step) {
 
 // m, by how far one reaches into the other now, by its corners and along its edges; 0: not at all.
 double ToolTouch::depth(ToolShape &a, ToolShape &b) const {
-  if (!look_at_each_other(a, b, offset_)) return 0;
+  if (!look_at_each_other(a, b, offset_, true)) return 0;
   double deepest = 0;
   ObstaclePoint o;
   const auto look = [&](const ToolShape &in, Vec3 p, double round) {
@@ -106,22 +108,59 @@ double ToolTouch::depth(ToolShape &a, ToolShape &b) const {
   return deepest;
 }
 
+bool ToolTouch::told(const Pair &pair) const {
+  return std::any_of(told_.begin(), told_.end(),
+                     [&](const auto &known) { return known[0] == pair.id[0] && known[1] == pair.id[1]; });
+}
+
+// Rigid bodies that joints hold, or that another host moves, and what they pass through. Said once; a host of
+// its own may let things into each other by a little.
+void ToolTouch::tell_passing(const World &w, const StepContext &step) {
+  for (const Pair &pair : passing_) {
+    const Obstacle &a = *w.obstacles[pair.a], &b = *w.obstacles[pair.b];
+    const ObstacleView &va = step.obstacle_views[a.slot], &vb = step.obstacle_views[b.slot];
+    if (!ToolShape::takes_part(va) || !ToolShape::takes_part(vb)) continue;
+    ToolShape shape_a(va), shape_b(vb);
+    const double size = std::min(shape_a.endless() ? HUGE_VAL : shape_a.reach(),
+                                 shape_b.endless() ? HUGE_VAL : shape_b.reach());
+    const double deep = depth(shape_a, shape_b);
+    if (!(deep > offset_ + kDeep * size) || told(pair)) continue;
+    told_.push_back({pair.id[0], pair.id[1]});
+    const auto held = [](const Obstacle &o) {
+      return o.rigid && o.rigid->group[o.rigid_body] != DFM_RIGID_STILL &&
+             (o.rigid->host_name != "builtin" || o.rigid->njoint > 0);
+    };
+    const Obstacle &body = held(a) ? a : b, &other = held(a) ? b : a;
+    const bool ours = body.rigid->host_name == "builtin";
+    w.context->logf(
+        DFM_LOG_WARNING,
+        "rigid body '%s' is %.3g m deep in '%s' at %.6g s and goes through it, because %s; %s, or "
+        "filter the pair",
+        body.name.c_str(), deep, other.name.c_str(), w.time,
+        ours ? "the builtin host keeps bodies with joints apart from soft bodies only"
+             : format("host '%s' does not know of it", body.rigid->host_name.c_str()).c_str(),
+        ours ? "take a host with contact (ode, bullet) and make both its bodies"
+             : "make both bodies of this host (what stands: \"fixed\")");
+  }
+}
+
 // Two tools that are both driven go where they are told. That they are in each other, or pass, is said once.
 void ToolTouch::tell_driven(const World &w, const StepContext &step) {
   const auto driven = [&](const Obstacle &o) {
-    return o.rigid->of_tool && !std::any_of(sides_.begin(), sides_.end(),
-                                            [&](const Moved &m) { return m.set == o.rigid && m.gives(); });
+    return o.rigid && o.rigid->of_tool && !std::any_of(sides_.begin(), sides_.end(), [&](const Moved &m) {
+             return m.set == o.rigid && m.gives();
+           });
   };
   for (const Pair &pair : pairs_) {
     const Obstacle &a = *w.obstacles[pair.a], &b = *w.obstacles[pair.b];
-    const auto same = [&](const auto &known) { return known[0] == pair.id[0] && known[1] == pair.id[1]; };
-    if (!driven(a) || !driven(b) || std::any_of(told_.begin(), told_.end(), same)) continue;
+    if (!driven(a) || !driven(b) || told(pair)) continue;
     const ObstacleView &va = step.obstacle_views[a.slot], &vb = step.obstacle_views[b.slot];
     if (!ToolShape::takes_part(va) || !ToolShape::takes_part(vb)) continue;
     ToolShape shape_a(va), shape_b(vb);
     const double deep = depth(shape_a, shape_b);
     hits_.clear();
-    if (!(deep > offset_)) find_hits(pair, shape_a, shape_b, side_of(a), side_of(b));
+    if (!(deep > offset_))
+      find_hits(pair, shape_a, shape_b, side_of(a, pair.wall[0]), side_of(b, pair.wall[1]));
     if (!(deep > offset_) && hits_.empty()) continue;
     told_.push_back({pair.id[0], pair.id[1]});
     w.context->logf(DFM_LOG_WARNING,

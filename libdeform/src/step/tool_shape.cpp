@@ -12,6 +12,8 @@ constexpr double kSame = 1e-9;  // of a squared distance: two that are equal but
 // Of a normal that counts as on the border of the cone of an edge: a rod that lies along a face touches it at
 // both of its borders, also where it is not quite parallel to it.
 constexpr double kAlong = 1e-3;
+constexpr double kFlat = 1e-6;  // rad, between the faces of an edge that is none
+constexpr double kSharp = 0.1;  // sine, that the edges of a corner fall by from its mean normal
 
 Vec3 least(Vec3 a, Vec3 b) { return {std::min(a.x, b.x), std::min(a.y, b.y), std::min(a.z, b.z)}; }
 Vec3 most(Vec3 a, Vec3 b) { return {std::max(a.x, b.x), std::max(a.y, b.y), std::max(a.z, b.z)}; }
@@ -29,10 +31,7 @@ bool ToolShape::Edge::leaves(Vec3 n) const {
   return true;
 }
 
-bool ToolShape::takes_part(const ObstacleView &o) {
-  return o.shape == Shape::sphere || o.shape == Shape::capsule || o.shape == Shape::box ||
-         o.shape == Shape::mesh;
-}
+bool ToolShape::takes_part(const ObstacleView &o) { return o.shape != Shape::none; }
 
 ToolShape::ToolShape(const ObstacleView &view) : shape_(view), surface_(view.surface) {
   if (view.shape == Shape::sphere || view.shape == Shape::capsule) round_ = view.radius;
@@ -70,27 +69,40 @@ ToolShape::Edge ToolShape::edge_of_mesh(uint32_t e) const {
   out.number = e;
   out.from = node(end[0]);
   out.to = node(end[1]);
+  out.end[0] = end[0];
+  out.end[1] = end[1];
+  Vec3 normal[2];
   for (const size_t k : {0, 1}) {
     const uint32_t t = surface_->edge_tri[2 * size_t{e} + k];
     if (t == kNone) continue;
     const uint32_t *const c = &surface_->tri[3 * size_t{t}];
     const Vec3 middle = (1.0 / 3) * (node(c[0]) + node(c[1]) + node(c[2])), n = face_normal(t);
+    normal[k] = n;
     Vec3 into = cross(n, out.to - out.from);
     if (dot(into, middle - out.from) < 0) into = -into;
     const double length = norm(into);
     out.beside[out.faces++] = length > 0 ? (1 / length) * into : Vec3{};
   }
+  out.flat = out.faces == 2 && norm(normal[0] - normal[1]) < kFlat;
   return out;
 }
 
-void ToolShape::look_at_mesh(const ToolBox &near) {
+void ToolShape::look_at_mesh(const ToolBox &near, bool flat) {
   triangles_.clear();
-  for (uint32_t i = 0; i < surface_->nsurfel; ++i)
-    if (near.holds(node(i), node(i))) corners_.push_back({node(i), i});
   for (uint32_t e = 0; e < surface_->nedge; ++e) {
     const uint32_t *const end = &surface_->edge[2 * size_t{e}];
-    if (near.holds(node(end[0]), node(end[1]))) edges_.push_back(edge_of_mesh(e));
+    if (!near.holds(node(end[0]), node(end[1]))) continue;
+    const Edge edge = edge_of_mesh(e);
+    const bool counts = flat || !edge.flat;
+    (counts ? edges_ : flat_).push_back(edge);
+    if (!counts) continue;
+    for (const uint32_t i : edge.end)
+      if (near.holds(node(i), node(i))) corners_.push_back({node(i), i});
   }
+  std::sort(corners_.begin(), corners_.end(),
+            [](const Corner &a, const Corner &b) { return a.number < b.number; });
+  const auto same = [](const Corner &a, const Corner &b) { return a.number == b.number; };
+  corners_.erase(std::unique(corners_.begin(), corners_.end(), same), corners_.end());
   for (uint32_t t = 0; t < surface_->ntri; ++t) {
     const uint32_t *const c = &surface_->tri[3 * size_t{t}];
     const Vec3 lo = least(least(node(c[0]), node(c[1])), node(c[2]));
@@ -98,11 +110,12 @@ void ToolShape::look_at_mesh(const ToolBox &near) {
   }
 }
 
-void ToolShape::look_at(const ToolBox &near) {
+void ToolShape::look_at(const ToolBox &near, bool flat) {
   corners_.clear();
   edges_.clear();
+  flat_.clear();
   switch (shape_.view().shape) {
-    case Shape::mesh: return look_at_mesh(near);
+    case Shape::mesh: return look_at_mesh(near, flat);
     case Shape::box:
       for (uint32_t i = 0; i < 8; ++i) corners_.push_back({shape_.corner(i), i});
       for (uint32_t i = 0; i < 12; ++i) {
@@ -125,13 +138,35 @@ void ToolShape::look_at(const ToolBox &near) {
       corners_.push_back({shape_.end(1), 1});
       [[fallthrough]];
     }
-    default: corners_.push_back({shape_.end(0), 0});
+    case Shape::sphere: corners_.push_back({shape_.end(0), 0}); return;
+    default: return;
   }
 }
 
-bool ToolShape::closest(Vec3 p, double limit, ObstaclePoint &out) const {
+bool ToolShape::may_meet(const Corner &corner, Vec3 n) const {
+  if (shape_.view().shape != Shape::mesh) return true;
+  Vec3 out;
+  for (const uint32_t t : triangles_) {
+    const uint32_t *const c = &surface_->tri[3 * size_t{t}];
+    if (c[0] == corner.number || c[1] == corner.number || c[2] == corner.number) out += face_normal(t);
+  }
+  bool sharp = true, leads = true;
+  for (const std::vector<Edge> *const edges : {&edges_, &flat_})
+    for (const Edge &e : *edges) {
+      if (e.end[0] != corner.number && e.end[1] != corner.number) continue;
+      const Vec3 way = normalized(e.end[0] == corner.number ? e.to - e.from : e.from - e.to);
+      sharp = sharp && dot(out, way) < -kSharp * norm(out);
+      leads = leads && dot(n, way) < kAlong;
+    }
+  return sharp || leads;
+}
+
+bool ToolShape::closest(Vec3 p, double limit, ObstaclePoint &out, bool *face) const {
   if (shape_.view().shape != Shape::mesh) {
+    if (shape_.view().shape == Shape::voxels && !shape_.voxels_near(p, limit)) return false;
     out = shape_.closest(p);
+    if (face)
+      *face = shape_.view().shape != Shape::box || dot(out.normal, shape_.face_normal(out.face)) > 1 - kSame;
     return true;
   }
   double best = limit * limit, faced = 0;
@@ -151,6 +186,7 @@ bool ToolShape::closest(Vec3 p, double limit, ObstaclePoint &out) const {
     out.point = at.point;
     out.face = 0;
     out.distance = side < 0 ? -d : d;
+    if (face) *face = at.feature == TriangleFeature::face;
     out.normal = at.feature == TriangleFeature::face || !(d > 0) ? n : (1 / out.distance) * way;
   }
   return found;

@@ -1,6 +1,6 @@
 // A part of a tool, or a rigid body, as corners, edges and faces, of which those of two meet: spheres,
 // capsules and boxes, and triangles of a mesh. A sphere is one corner with a radius, a capsule two and an
-// edge between them.
+// edge between them. Planes and voxels have neither corners nor edges: those of others meet them.
 #pragma once
 #include <cstdint>
 #include <vector>
@@ -22,6 +22,8 @@ class ToolShape {
     Vec3 from, to, beside[2];  // directions in the faces beside it, away from it
     int faces = 0;             // 0: a capsule's axis, left in every direction
     uint32_t number = 0;
+    uint32_t end[2] = {};  // numbers of the corners
+    bool flat = false;     // its two faces are one: what touches it touches them, or their border
     // Does the direction leave the shape here?
     bool leaves(Vec3 n) const;
   };
@@ -29,22 +31,29 @@ class ToolShape {
   static bool takes_part(const ObstacleView &view);
   explicit ToolShape(const ObstacleView &view);
   Vec3 position() const { return shape_.view().position; }
-  double reach() const { return reach_; }  // m, of any point of it from position()
+  double reach() const { return reach_; }  // m, of any point of it from position(); not of a plane
+  bool endless() const { return shape_.view().shape == Shape::plane; }
   double round() const { return round_; }  // m, radius around corners and edges
-  ToolBox bounds() const;
-  // Finds the corners, edges and triangles near the box. Before the functions that follow.
-  void look_at(const ToolBox &near);
+  ToolBox bounds() const;                  // not of a plane
+  // Finds the corners, edges and triangles near the box. Before the functions that follow. flat: also edges
+  // within a face of a mesh, and corners of these alone. Where they touch others do as well, unless one thing
+  // is pressed into the other, as by jaws.
+  void look_at(const ToolBox &near, bool flat);
   struct Corner {
     Vec3 at;
     uint32_t number;
   };
   const std::vector<Corner> &corners() const { return corners_; }
   const std::vector<Edge> &edges() const { return edges_; }
-  // Of its surface; false: none, or a mesh is further away than `limit` on either side.
-  bool closest(Vec3 p, double limit, ObstaclePoint &out) const;
+  // May something in this direction be met by this corner? Where the surface is flat or hollow around it,
+  // only what the surface leads to: an edge or a corner of the other beside it is not in its way.
+  bool may_meet(const Corner &corner, Vec3 n) const;
+  // Of its surface; false: none, or a mesh is further away than `limit` on either side. face: it is no place
+  // on an edge or at a corner.
+  bool closest(Vec3 p, double limit, ObstaclePoint &out, bool *face = nullptr) const;
 
  private:
-  void look_at_mesh(const ToolBox &near);
+  void look_at_mesh(const ToolBox &near, bool flat);
   Edge edge_of_mesh(uint32_t edge) const;
   Vec3 node(uint32_t i) const { return load3(&surface_->x[4 * size_t{i}]); }
   Vec3 face_normal(uint32_t triangle) const;
@@ -53,7 +62,7 @@ class ToolShape {
   const Surface *surface_;  // of a mesh
   double reach_ = 0, round_ = 0;
   std::vector<Corner> corners_;
-  std::vector<Edge> edges_;
+  std::vector<Edge> edges_, flat_;
   std::vector<uint32_t> triangles_;
 };
 

@@ -13,7 +13,7 @@
 namespace dfm {
 namespace {
 
-constexpr uint32_t kMostSweeps = 200;
+constexpr uint32_t kMostSweeps = 60;
 constexpr double kDone = 1e-13;      // of the largest speed that a row asks to change
 constexpr double kSame = 1e-9;       // of it: soft bodies need not be asked again
 constexpr double kOpens = 0.1;       // of d_c in a sub-step, where two tools are in each other
@@ -21,12 +21,34 @@ constexpr double kJaw = 1e4;         // N/m, of a jaw at its tip
 constexpr double kFace = 1e5;        // N/m, of a place on the face of a jaw
 constexpr double kDent = 5e-4;       // m: edges that are further on the wrong side do not touch there
 constexpr double kCross = 1e-6;      // sine between edges that have a normal
-constexpr double kMostTurn = 0.5;    // rad in a sub-step, beyond which the series has no third order
-constexpr double kRises = 2;         // of what a sweep has left: the combination is void
+constexpr double kSmallTurn = 0.05;  // rad in a sub-step, up to which a series has less rounding
+constexpr uint32_t kSweeps = 6;      // between two leaps
+constexpr double kFaster = 0.5;      // of what the best sweep has left, by a leap: else the pass ends
 constexpr uint32_t kMostPasses = 6;  // over the laws, and what turning adds, until both change no more
 
-// Those of a host that is asked for velocities and impulses alone.
-bool plain(const RigidSet &set) { return set.of_tool || (set.host_name == "builtin" && set.njoint == 0); }
+bool builtin(const Obstacle &o) { return o.rigid && !o.rigid->of_tool && o.rigid->host_name == "builtin"; }
+bool of_tool(const Obstacle &o) { return o.rigid && o.rigid->of_tool; }
+
+// Moves by its momentum and what touches it alone.
+bool alone(const RigidSet &set, uint32_t body) {
+  return set.group[body] != DFM_RIGID_STILL &&
+         std::none_of(set.joints.begin(), set.joints.end(),
+                      [&](const dfm_joint_def &j) { return j.body == body || j.with == body; });
+}
+bool is_free(const Obstacle &o) { return builtin(o) && alone(*o.rigid, o.rigid_body); }
+// Stands still, or goes where it is told, whatever touches it.
+bool is_wall(const Obstacle &o) { return !o.rigid || o.rigid->group[o.rigid_body] == DFM_RIGID_STILL; }
+
+// Whether the rows of this file keep the two apart, filters aside.
+bool kept_apart(const Obstacle &a, const Obstacle &b) {
+  if (a.sensor || b.sensor || (a.rigid && a.rigid == b.rigid && a.rigid_body == b.rigid_body)) return false;
+  if (of_tool(a) && of_tool(b)) return a.rigid != b.rigid;
+  if (of_tool(a) || of_tool(b)) {
+    const Obstacle &other = of_tool(a) ? b : a;
+    return is_free(other) || (builtin(other) && is_wall(other));
+  }
+  return (is_free(a) && (is_free(b) || is_wall(b))) || (is_free(b) && is_wall(a));
+}
 
 PairSide names_of(const Obstacle &o) { return {o.name, o.zone.group, o.zone.material}; }
 
@@ -51,27 +73,66 @@ bool between(const ToolShape::Edge &p, const ToolShape::Edge &q, Vec3 apart, Vec
 
 void add(Vec3 p, double *to) { store3(to, load3(to) + p); }
 
+// Whether a rigid body that joints hold, or that another host moves, passes through something that neither
+// this file nor its host keeps it apart from. A host that has a world of its own knows what is in it.
+bool passes(const Obstacle &a, const Obstacle &b) {
+  if (a.sensor || b.sensor || of_tool(a) || of_tool(b)) return false;
+  const auto held = [](const Obstacle &o) { return !is_wall(o) && !is_free(o) && !o.rigid->elsewhere; };
+  if (!held(a) && !held(b)) return false;
+  if (a.rigid != b.rigid) return held(a) ? is_wall(b) || is_free(b) || held(b) : is_wall(a) || is_free(a);
+  return builtin(a) && a.rigid->group[a.rigid_body] != b.rigid->group[b.rigid_body] &&
+         std::none_of(a.rigid->joints.begin(), a.rigid->joints.end(), [&](const dfm_joint_def &j) {
+           return (j.body == a.rigid_body && j.with == b.rigid_body) ||
+                  (j.body == b.rigid_body && j.with == a.rigid_body);
+         });
+}
+
 }  // namespace
 
-ToolTouch::ToolTouch(const Memory &m) : batches_(m), anderson_(m), next_(m) {
-  use_memory(m, start_, tangents_, match_, points_, response_, weight_, step_, from_, now_);
+ToolTouch::ToolTouch(const Memory &m) : batches_(m), next_(m) {
+  use_memory(m, start_, tangents_, match_, points_, response_, best_);
   state_.use(m);
 }
 
-void ToolTouch::prepare(World &w) {
+void ToolTouch::prepare(World &w, SceneFacts &facts) {
   pairs_.clear();
+  passing_.clear();
+  sets_.clear();
+  walls_.clear();
   w.pairs.tool_law.clear();
-  if (w.tools.empty()) return;
+  if (w.rigid_sets.empty()) return;
+  const auto wall = [&](uint32_t slot) {
+    const Obstacle &o = *w.obstacles[slot];
+    if (of_tool(o) || is_free(o)) {
+      if (std::find(sets_.begin(), sets_.end(), o.rigid) == sets_.end()) sets_.push_back(o.rigid);
+      return kNone;
+    }
+    const auto at = std::find(walls_.begin(), walls_.end(), slot) - walls_.begin();
+    if (at == std::ssize(walls_)) walls_.push_back(slot);
+    return static_cast<uint32_t>(at);
+  };
   for (uint32_t i = 0; i < w.obstacles.size(); ++i)
     for (uint32_t j = i + 1; j < w.obstacles.size(); ++j) {
       const Obstacle &a = *w.obstacles[i], &b = *w.obstacles[j];
-      if (!a.rigid || !b.rigid || a.rigid == b.rigid || !(a.rigid->of_tool || b.rigid->of_tool) || a.sensor ||
-          b.sensor || !plain(*a.rigid) || !plain(*b.rigid))
-        continue;
+      const bool apart = kept_apart(a, b);
+      if (!apart && !passes(a, b)) continue;
       bool touch = (a.def.category & b.def.collides_with) != 0 && (b.def.category & a.def.collides_with) != 0;
       if (const FilterRule *const rule = best_rule(w.filters, names_of(a), names_of(b)))
         touch = rule->collide;
-      if (touch) pairs_.push_back({i, j, law_of_obstacles(w, a, b), {a.id, b.id}});
+      if (!touch) continue;
+      if (!apart) {
+        passing_.push_back({i, j, 0, {a.id, b.id}, true, {kNone, kNone}});
+        for (const Obstacle *const o : {&a, &b})
+          if (!is_wall(*o) && !is_free(*o) && (o == &a ? is_wall(b) : is_wall(a)) &&
+              std::find(facts.rigid_alone.begin(), facts.rigid_alone.end(), o->name) ==
+                  facts.rigid_alone.end())
+            facts.rigid_alone.push_back(o->name);
+        continue;
+      }
+      facts.rigid_pairs += !of_tool(a) && !of_tool(b);
+      const uint32_t wall_a = wall(i), wall_b = wall(j);
+      pairs_.push_back(
+          {i, j, law_of_obstacles(w, a, b), {a.id, b.id}, !of_tool(a) && !of_tool(b), {wall_a, wall_b}});
     }
   for (const Pair &pair : pairs_) w.pairs.tool_law.push_back(pair.law);
 }
@@ -81,6 +142,15 @@ Vec3 ToolTouch::speed(const Row &row) const {
     const double *const v = &sides_[side.tool].base[6 * size_t{side.part}];
     const double *const d = &sides_[side.tool].change[6 * size_t{side.part}];
     return load3(v) + load3(d) + cross(load3(v + 3) + load3(d + 3), side.arm);
+  };
+  return at(row.a) - at(row.b);
+}
+
+// What the rows have changed of it.
+Vec3 ToolTouch::change_of(const Row &row) const {
+  const auto at = [&](const Side &side) {
+    const double *const d = &sides_[side.tool].change[6 * size_t{side.part}];
+    return load3(d) + cross(load3(d + 3), side.arm);
   };
   return at(row.a) - at(row.b);
 }
@@ -98,10 +168,18 @@ void ToolTouch::push(const Side &side, Vec3 impulse, Vec3 moment, std::vector<do
       add(jaw.give * turns * jaw.axis, &v[6 * size_t{side.part} + 3]);
     }
   if (!m.responds) return;
-  const size_t width = v.size();
+  const uint32_t g = m.set->group[side.part];
+  if (g == DFM_RIGID_STILL || m.first[g] == kNone) return;
+  const size_t wide = m.wide[g], column = 6 * size_t{m.set->place[side.part]};
   const double p[6] = {impulse.x, impulse.y, impulse.z, moment.x, moment.y, moment.z};
-  for (size_t i = 0; i < width; ++i)
-    for (size_t k = 0; k < 6; ++k) v[i] += m.response[i * width + 6 * size_t{side.part} + k] * p[k];
+  const auto move = [&](size_t body) {
+    const double *const row = &m.response[m.first[g] + 6 * size_t{m.set->place[body]} * wide + column];
+    for (size_t r = 0; r < 6; ++r)
+      for (size_t c = 0; c < 6; ++c) v[6 * body + r] += row[r * wide + c] * p[c];
+  };
+  if (wide == 6) return move(side.part);
+  for (size_t i = 0; i < m.set->defs.size(); ++i)
+    if (m.set->group[i] == g) move(i);
 }
 
 void ToolTouch::push(const Row &row, Vec3 p) {
@@ -125,7 +203,8 @@ Vec3 ToolTouch::answer_to(const Row &row, Vec3 impulse) {
 }
 
 Vec3 ToolTouch::center(const Side &side) const {
-  return load3(sides_[side.tool].set->state[side.part].position);
+  const Moved &m = sides_[side.tool];
+  return m.set ? load3(m.set->state[side.part].position) : m.center[side.part];
 }
 
 // The hinge is the origin of part 0, about its y.
@@ -143,6 +222,7 @@ void ToolTouch::list_jaws(Moved &m) const {
 // back to first order. The way along the arc beyond it, h w x (w x r) / 2, would stay as creep: this part of
 // its motion counts to first order. With the frame it goes along the whole arc.
 void ToolTouch::straighten(Moved &m) const {
+  if (m.jaws.empty()) return;
   const dfm_rigid_state &frame = m.set->state[0];
   for (const Moved::Jaw &jaw : m.jaws) {
     double *const v = &m.free[6 * size_t{jaw.part}];
@@ -161,6 +241,7 @@ bool ToolTouch::soft(const Side &a, const Side &b) const {
 
 // The impulses of a set: those of soft bodies, and of the rows.
 void ToolTouch::add_impulses(size_t k) {
+  if (!sides_[k].set) return;
   RigidSet &set = *sides_[k].set;
   std::copy(sides_[k].given.begin(), sides_[k].given.end(), set.impulse.begin());
   for (const Row &row : rows_)
@@ -180,12 +261,12 @@ double ToolTouch::follow_spin() {
   double most = 0;
   for (size_t k = 0; k < sides_.size(); ++k) {
     Moved &m = sides_[k];
-    if (m.set->of_tool || !m.touched) continue;
+    if (!m.set || m.set->of_tool || !m.touched) continue;
     add_impulses(k);
     bool again = false;
     if (m.set->end_state(again)) continue;  // it says so at the end of the sub-step
     for (uint32_t i = 0; i < m.set->defs.size(); ++i) {
-      if (m.set->group[i] == DFM_RIGID_STILL) continue;
+      if (!(m.reach[i] > 0)) continue;
       const size_t at = 6 * size_t{i} + 3;
       const Quat turned = rotation_of(m.set->next[i]) * conjugate(rotation_of(m.set->state[i]));
       const Vec3 change = (1 / h_) * rotation_vector(turned) - load3(&m.base[at]) - load3(&m.change[at]);
@@ -197,31 +278,54 @@ double ToolTouch::follow_spin() {
   return most;
 }
 
-// (exp(h w) - 1) r / h less its first term, to third order: what is held by a tool that turns would creep
-// outwards by it.
-Vec3 ToolTouch::bend(const Side &side) const {
+Vec3 ToolTouch::spin(const Side &side) const {
   const Moved &m = sides_[side.tool];
   const size_t at = 6 * size_t{side.part} + 3;
-  const Vec3 spin = load3(&m.base[at]) + load3(&m.change[at]);
-  if (h_ * h_ * norm2(spin) > kMostTurn * kMostTurn) return {};
-  const Vec3 second = cross(spin, cross(spin, side.arm));
-  return (0.5 * h_) * second + (h_ * h_ / 6) * cross(spin, second);
+  return load3(&m.base[at]) + load3(&m.change[at]);
 }
 
-double ToolTouch::fastest(const ToolShape &shape, const Side &side) const {
+// (exp(h w) - 1) r / h less its first term: what is held by a tool that turns would creep outwards by it.
+Vec3 ToolTouch::bend(Vec3 spin, Vec3 arm) const {
+  if (h_ * h_ * norm2(spin) > kSmallTurn * kSmallTurn)
+    return (1 / h_) * (rotate(turned(Quat{}, h_ * spin), arm) - arm) - cross(spin, arm);
+  const Vec3 second = cross(spin, cross(spin, arm)), third = cross(spin, second), fourth = cross(spin, third);
+  return (h_ / 2) * second + (h_ * h_ / 6) * third + (h_ * h_ * h_ / 24) * fourth +
+         (h_ * h_ * h_ * h_ / 120) * cross(spin, fourth);
+}
+
+// Of the material at the place. Around a corner the place goes with the normal, which turns with the other
+// side: a ball that rolls has no bend, and a rod that turns with the jaws that hold it the one of a corner.
+Vec3 ToolTouch::bend(const Side &side, const Side &other) const {
+  const Vec3 own = spin(side), round = side.arm - side.bone;
+  Vec3 out = bend(own, side.bone);
+  if (norm2(round) == 0) return out;
+  const Vec3 first = cross(spin(other), round);
+  return out + cross(own, (0.5 * h_) * first + (h_ * h_ / 6) * cross(spin(other), first));
+}
+
+Vec3 ToolTouch::belt(const Side &side) const {
+  const Moved &m = sides_[side.tool];
+  return m.set ? Vec3{} : m.belt[side.part];
+}
+
+double ToolTouch::fastest(const ToolShape &shape, const Side &side, const ToolShape &other) const {
   const double *const v = &sides_[side.tool].free[6 * size_t{side.part}];
-  const double arm = norm(shape.position() - center(side)) + shape.reach();
+  const double arm = shape.endless() ? norm(other.position() - center(side)) + other.reach()
+                                     : norm(shape.position() - center(side)) + shape.reach();
   return norm(load3(v)) + norm(load3(v + 3)) * arm;
 }
 
-void ToolTouch::add_row(const Pair &pair, Name name, Side a, Side b, Vec3 at, Vec3 normal, double gap,
-                        double reach) {
+void ToolTouch::add_row(const Pair &pair, Name name, Side a, Side b, const Place &place, Vec3 normal,
+                        double gap, double reach) {
   if (!(gap - offset_ < reach)) return;
-  a.arm = at - center(a);
-  b.arm = at - center(b);
+  a.arm = place.at - center(a);
+  b.arm = place.at - center(b);
+  a.bone = pair.frees ? place.bone_a - center(a) : a.arm;
+  b.bone = pair.frees ? place.bone_b - center(b) : b.arm;
   Row row{};
   row.a = a;
   row.b = b;
+  row.frees = pair.frees;
   row.normal = normal;
   row.law = pair.law;
   row.pair[0] = pair.id[0];
@@ -245,32 +349,48 @@ void ToolTouch::add_row(const Pair &pair, Name name, Side a, Side b, Vec3 at, Ve
 }
 
 // Finds what of each is this near to the box of the other. False: nothing.
-bool ToolTouch::look_at_each_other(ToolShape &a, ToolShape &b, double far) {
+bool ToolTouch::look_at_each_other(ToolShape &a, ToolShape &b, double far, bool flat) {
+  if (a.endless() || b.endless()) {
+    const ToolShape &plane = a.endless() ? a : b;
+    ToolShape &body = a.endless() ? b : a;
+    ObstaclePoint o;
+    if (!plane.closest(body.position(), HUGE_VAL, o) || o.distance - body.reach() > far) return false;
+    const Vec3 wide = {HUGE_VAL, HUGE_VAL, HUGE_VAL};
+    body.look_at({-wide, wide}, flat);
+    return true;
+  }
   if (norm(a.position() - b.position()) - a.reach() - b.reach() > far) return false;
   const Vec3 wide = {far, far, far};
   const ToolBox of_a = a.bounds(), of_b = b.bounds();
   const ToolBox near = {of_b.lo - wide, of_b.hi + wide};
   if (!near.holds(of_a.lo, of_a.hi)) return false;
-  a.look_at(near);
-  b.look_at({of_a.lo - wide, of_a.hi + wide});
+  a.look_at(near, flat);
+  b.look_at({of_a.lo - wide, of_a.hi + wide}, flat);
   return true;
 }
 
 // Corners of each against the other, and edges that cross.
 void ToolTouch::add_rows(const Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b) {
-  const double reach = 2 * h_ * (fastest(a, at_a) + fastest(b, at_b)) + offset_;
+  const double reach = 2 * h_ * (fastest(a, at_a, b) + fastest(b, at_b, a)) + offset_;
   const double far = reach + offset_;
-  if (!look_at_each_other(a, b, far)) return;
+  if (!look_at_each_other(a, b, far, !pair.frees)) return;
   ObstaclePoint o;
-  for (const auto &[corner, number] : a.corners()) {
-    if (!b.closest(corner, far + a.round(), o)) continue;
+  // An edge or a corner is met where a corner leads: beside it lies what is not in the way, as the vertices
+  // of a floor beside the lower edge of a box that slides over it.
+  bool face = true;
+  for (const ToolShape::Corner &c : a.corners()) {
+    const auto &[corner, number] = c;
+    if (!b.closest(corner, far + a.round(), o, &face) || !(face || a.may_meet(c, -o.normal))) continue;
     const double gap = o.distance - a.round();
-    add_row(pair, {kCornerOfA, number, 0}, at_a, at_b, o.point + 0.5 * gap * o.normal, o.normal, gap, reach);
+    add_row(pair, {kCornerOfA, number, 0}, at_a, at_b,
+            {o.point + 0.5 * gap * o.normal, corner, o.point - b.round() * o.normal}, o.normal, gap, reach);
   }
-  for (const auto &[corner, number] : b.corners()) {
-    if (!a.closest(corner, far + b.round(), o)) continue;
+  for (const ToolShape::Corner &c : b.corners()) {
+    const auto &[corner, number] = c;
+    if (!a.closest(corner, far + b.round(), o, &face) || !(face || b.may_meet(c, -o.normal))) continue;
     const double gap = o.distance - b.round();
-    add_row(pair, {kCornerOfB, number, 0}, at_a, at_b, o.point + 0.5 * gap * o.normal, -o.normal, gap, reach);
+    add_row(pair, {kCornerOfB, number, 0}, at_a, at_b,
+            {o.point + 0.5 * gap * o.normal, o.point - a.round() * o.normal, corner}, -o.normal, gap, reach);
   }
   const double round = a.round() + b.round();
   for (const ToolShape::Edge &p : a.edges())
@@ -283,13 +403,18 @@ void ToolTouch::add_rows(const Pair &pair, ToolShape &a, ToolShape &b, Side at_a
       if (!between(p, q, on_a - on_b, n)) continue;
       const double gap = dot(n, on_a - on_b) - round;
       if (gap < -kDent) continue;
-      add_row(pair, {kEdges, p.number, q.number}, at_a, at_b, on_b + (b.round() + 0.5 * gap) * n, n, gap,
-              reach);
+      add_row(pair, {kEdges, p.number, q.number}, at_a, at_b,
+              {on_b + (b.round() + 0.5 * gap) * n, on_a, on_b}, n, gap, reach);
     }
 }
 
-ToolTouch::Side ToolTouch::side_of(const Obstacle &o) const {
+ToolTouch::Side ToolTouch::side_of(const Obstacle &o, uint32_t wall) const {
   Side out{};
+  if (wall != kNone) {
+    out.tool = sides_.size() - 1;
+    out.part = wall;
+    return out;
+  }
   while (sides_[out.tool].set != o.rigid) ++out.tool;
   out.part = o.rigid_body;
   return out;
@@ -301,7 +426,7 @@ void ToolTouch::each_pair(const World &w, const StepContext &step, const Visit &
     const Obstacle &a = *w.obstacles[pair.a], &b = *w.obstacles[pair.b];
     const ObstacleView &va = step.obstacle_views[a.slot], &vb = step.obstacle_views[b.slot];
     if (!ToolShape::takes_part(va) || !ToolShape::takes_part(vb)) continue;
-    const Side at_a = side_of(a), at_b = side_of(b);
+    const Side at_a = side_of(a, pair.wall[0]), at_b = side_of(b, pair.wall[1]);
     if (!sides_[at_a.tool].gives() && !sides_[at_b.tool].gives()) continue;
     ToolShape shape_a(va), shape_b(vb);
     f(pair, shape_a, shape_b, at_a, at_b);
@@ -320,8 +445,8 @@ double ToolTouch::sweep() {
   for (uint32_t i = 0; i < rows_.size(); ++i) {
     Row &row = rows_[i];
     const Vec3 u = speed(row);
-    const double next =
-        std::max(0.0, row.impulse + row.inverse * (row.rate - dot(row.normal, u) - row.soft * row.impulse));
+    const double next = std::max(
+        0.0, row.impulse + row.inverse * (row.rate - row.lift - dot(row.normal, u) - row.soft * row.impulse));
     const double more = next - row.impulse;
     if (more != 0) {
       row.impulse = next;
@@ -345,35 +470,37 @@ void ToolTouch::take_impulses(Array<double> &to) const {
     store3(&to[3 * i], {rows_[i].impulse, rows_[i].along[0], rows_[i].along[1]});
 }
 
-// Light things between heavy ones, with more places than they have motions: sweeps alone are slow. Between
-// two of them Anderson's combination of the last few; the result is always what a plain sweep has left.
-void ToolTouch::sweep_until(double done) {
-  const size_t n = 3 * rows_.size();
-  weight_.resize(n);
-  step_.resize(n);
-  for (size_t i = 0; i < rows_.size(); ++i)
-    store3(&weight_[3 * i], {1 / rows_[i].inverse, rows_[i].response, rows_[i].response});
-  anderson_.start(n);
-  double last = HUGE_VAL;
-  for (uint32_t k = 1;; ++k) {
-    take_impulses(from_);
-    const double left = sweep();
-    if (!(left > done) || k == kMostSweeps) return;
-    take_impulses(now_);
-    for (size_t i = 0; i < n; ++i) step_[i] = now_[i] - from_[i];
-    if (left > kRises * last) anderson_.start(n);  // places have opened or begun to slip
-    last = left;
-    anderson_.next(from_.data(), step_.data(), weight_.data(), step_.data());
-    for (size_t i = 0; i < rows_.size(); ++i) {
-      Row &row = rows_[i];
-      Vec3 leap = load3(&from_[3 * i]) + load3(&step_[3 * i]) - load3(&now_[3 * i]);
-      leap.x = std::max(leap.x, -row.impulse);
-      row.impulse += leap.x;
-      row.along[0] += leap.y;
-      row.along[1] += leap.z;
-      push(row, leap.x * row.normal + leap.y * row.tangent[0] + leap.z * row.tangent[1]);
-    }
+// The velocities that the rows' impulses make.
+void ToolTouch::push_all() {
+  for (Moved &m : sides_) {
+    std::fill(m.change.begin(), m.change.end(), 0.0);
+    for (Moved::Jaw &jaw : m.jaws) jaw.moment = 0;
   }
+  for (const Row &row : rows_) push(row, row.given());
+}
+
+// A few sweeps, and where they are slow, Newton's method and a few more: the result is what a plain sweep has
+// left, and the best one of all. More places than motions that stick have no solution while what turning adds
+// is that of the last pass: a pass ends where nothing is gained.
+void ToolTouch::sweep_until(double done) {
+  double best = HUGE_VAL, before = HUGE_VAL;
+  for (uint32_t k = 1;; ++k) {
+    const double left = sweep();
+    if (!(left > done)) return;
+    if (left < best) {
+      best = left;
+      take_impulses(best_);
+    }
+    if (k % kSweeps > 0) continue;
+    if (k == kMostSweeps || !(best < kFaster * before)) break;
+    before = best;
+    leap(done);
+  }
+  for (size_t i = 0; i < rows_.size(); ++i) {
+    rows_[i].impulse = best_[3 * i];
+    std::copy_n(&best_[3 * i + 1], 2, rows_[i].along);
+  }
+  push_all();
 }
 
 // Passes over the laws, as for soft bodies (step/solve_islands.cpp), with what turning adds beyond the first
@@ -387,9 +514,11 @@ void ToolTouch::solve() {
   for (uint32_t pass = 0; pass < kMostPasses; ++pass) {
     double changed = 0;
     for (Row &row : rows_) {
-      const Vec3 now = bend(row.a) - bend(row.b);
+      const Vec3 now = bend(row.a, row.b) + belt(row.a) - bend(row.b, row.a) - belt(row.b);
       changed = std::max(changed, norm(now - row.bend));
       row.bend = now;
+      if (row.frees)
+        row.lift = dot(row.normal, bend(spin(row.a), row.a.bone) - bend(spin(row.b), row.b.bone));
     }
     if (pass > 0) changed = std::max(changed, follow_spin());
     changed = std::max(changed, ask_laws(done));
@@ -398,52 +527,64 @@ void ToolTouch::solve() {
   }
 }
 
-void ToolTouch::begin(World &w, StepContext &step) {
-  rows_.clear();
-  if (next_.n > 0) keep_next();
-  size_t n = 0;
-  if (!pairs_.empty())
-    for (auto &set : w.rigid_sets) n += plain(*set);
-  sides_.resize(n > 1 ? n : 0);
-  if (sides_.empty()) return;
-  h_ = step.h;
-  offset_ = w.offset;
-  n = 0;
-  for (auto &set : w.rigid_sets) {
-    if (!plain(*set)) continue;
-    Moved &m = sides_[n++];
-    const size_t width = set->velocity.size();
-    m.set = set.get();
-    m.free.assign(set->velocity.begin(), set->velocity.end());
-    m.base = m.free;
-    m.change.assign(width, 0.0);
-    m.turn.assign(width, 0.0);
-    m.given.assign(width, 0.0);
-    m.reach.assign(set->defs.size(), 0.0);
-    m.touched = false;
-    m.response.assign(width * width, 0.0);
-    for (uint32_t g = 0; g < set->ngroup; ++g) {
-      const uint32_t bodies = step.rigid_groups[set->first_group + g], wide = 6 * bodies;
-      m.block.assign(size_t{wide} * wide, 0.0);
-      if (!set->respond(g, bodies, m.block.data())) continue;
-      for (uint32_t i = 0; i < set->defs.size(); ++i)
-        for (uint32_t j = 0; j < set->defs.size(); ++j) {
-          if (set->group[i] != g || set->group[j] != g) continue;
-          for (size_t r = 0; r < 6; ++r)
-            for (size_t c = 0; c < 6; ++c)
-              m.response[(6 * i + r) * width + 6 * j + c] =
-                  m.block[(6 * set->place[i] + r) * wide + 6 * set->place[j] + c];
-        }
-    }
-  }
-  for (Moved &m : sides_) {
-    m.responds = std::any_of(m.response.begin(), m.response.end(), [](double x) { return x != 0; });
+// Velocities and responses of the sets that take part, and how everything else goes.
+void ToolTouch::take_sets(World &w, StepContext &step) {
+  sides_.resize(sets_.size() + !walls_.empty());
+  for (size_t k = 0; k < sides_.size(); ++k) {
+    Moved &m = sides_[k];
+    m.set = k < sets_.size() ? sets_[k] : nullptr;
+    const size_t n = m.set ? m.set->defs.size() : walls_.size();
+    m.free.assign(6 * n, 0.0);
+    m.change.assign(6 * n, 0.0);
+    m.turn.assign(6 * n, 0.0);
+    m.given.assign(6 * n, 0.0);
+    m.reach.assign(n, 0.0);
+    m.touched = m.responds = false;
     m.jaws.clear();
+    m.response.clear();
+    if (!m.set) {
+      m.center.resize(n);
+      m.belt.resize(n);
+      for (size_t i = 0; i < n; ++i) {
+        const ObstacleView &v = step.obstacle_views[walls_[i]];
+        m.center[i] = v.position;
+        m.belt[i] = v.belt;
+        store3(&m.free[6 * i], v.velocity);
+        store3(&m.free[6 * i + 3], v.spin);
+      }
+      m.base = m.free;
+      continue;
+    }
+    RigidSet &set = *m.set;
+    std::copy(set.velocity.begin(), set.velocity.end(), m.free.begin());
+    m.first.assign(set.ngroup, kNone);
+    m.wide.assign(set.ngroup, 0);
+    for (uint32_t i = 0; i < n; ++i) {
+      const uint32_t g = set.group[i];
+      if (g == DFM_RIGID_STILL || m.wide[g] > 0 || !(set.of_tool || alone(set, i))) continue;
+      const uint32_t bodies = step.rigid_groups[set.first_group + g];
+      m.wide[g] = 6 * size_t{bodies};
+      const size_t at = m.response.size();
+      m.response.resize(at + m.wide[g] * m.wide[g], 0.0);
+      if (set.respond(g, bodies, &m.response[at])) m.first[g] = at;
+    }
+    m.responds = std::any_of(m.response.begin(), m.response.end(), [](double x) { return x != 0; });
     for (const auto &t : w.tools)
       if (t->set == m.set && t->has_jaws()) list_jaws(m);
     straighten(m);
     m.base = m.free;
   }
+}
+
+void ToolTouch::begin(World &w, StepContext &step) {
+  rows_.clear();
+  if (next_.n > 0) keep_next();
+  sides_.clear();
+  offset_ = w.offset;
+  if (!passing_.empty()) tell_passing(w, step);
+  if (pairs_.empty()) return;
+  h_ = step.h;
+  take_sets(w, step);
   tell_driven(w, step);
   find(w, step);
   if (rows_.empty() && !add_hits(w, step)) {
@@ -453,16 +594,22 @@ void ToolTouch::begin(World &w, StepContext &step) {
   take_last(w);
   solve_past_hits(w, step);
   for (Row &row : rows_) row.before = row.given();
+  give_velocities();
+}
+
+void ToolTouch::give_velocities() {
   for (Moved &m : sides_)
-    for (size_t i = 0; i < m.free.size(); ++i) m.set->velocity[i] = m.free[i] + m.change[i] + m.turn[i];
+    for (size_t i = 0; m.set && i < m.free.size(); ++i)
+      m.set->velocity[i] = m.free[i] + m.change[i] + m.turn[i];
 }
 
 void ToolTouch::correct() {
   for (Moved &m : sides_) {
+    if (!m.set) continue;
     m.free.assign(m.set->velocity.begin(), m.set->velocity.end());
     straighten(m);
-    for (size_t i = 0; i < m.free.size(); ++i) m.set->velocity[i] = m.free[i] + m.change[i] + m.turn[i];
   }
+  give_velocities();
   for (Row &row : rows_) row.before = row.given();
 }
 
@@ -470,11 +617,12 @@ bool ToolTouch::answer(const World &w, const StepContext &step) {
   if (rows_.empty()) return false;
   for (size_t k = 0; k < sides_.size(); ++k) {
     Moved &m = sides_[k];
+    if (!m.set) continue;
     for (size_t i = 0; i < m.free.size(); ++i) m.base[i] = m.free[i] + m.turn[i];
     m.given.assign(m.set->impulse.begin(), m.set->impulse.end());
     for (uint32_t i = 0; i < m.set->defs.size(); ++i) {
       const double *const p = &m.given[6 * size_t{i}];
-      push({k, i, {}}, load3(p), load3(p + 3), &Moved::base, false);
+      push({k, i, {}, {}}, load3(p), load3(p + 3), &Moved::base, false);
     }
   }
   solve_past_hits(w, step);

@@ -1,10 +1,14 @@
-// Contact of tools with each other (deform/tool.h) and with rigid bodies of the builtin host that have no
-// joints, where one of the two gives way. Spheres, capsules, boxes and triangles, with the law of the pair.
+// Contact of things that are rigid on both sides, where one of the two gives way: tools (deform/tool.h) and
+// free bodies (those of the builtin host that no joint holds) with each other, and free bodies with what
+// stands or goes its way (obstacles, fixed bodies). Spheres, capsules, boxes and triangles, with the law of
+// the pair; of obstacles also planes and voxels, which only corners touch.
 //
 //   rows     u_n' >= -(gap - d_c) / h at the nearest places of two parts, p >= 0, one of both is zero; the
 //            impulse acts at one point of both, so that both momenta are kept to rounding
 //   energy   p u_n' <= 0 for gap >= d_c / 2: such a contact takes energy or none. What is nearer opens by at
 //            most a tenth of d_c in a sub-step
+//   turning  of a free body counts to third order, along the normal too: to first order alone a body that
+//            topples would sink by (h w)^2 r / 2 in a sub-step, and it rises by a tenth of d_c
 //   friction the law of the pair, implicitly, at the slip and normal force of the solution (tool_rub.cpp);
 //            impulses and the state of the law last from sub-step to sub-step (World::tool_store)
 //   jaws     go where they are told, so what two of them hold would be pressed without a bound. Something
@@ -22,7 +26,6 @@
 #include "contact/contact_set.h"
 #include "contact/store.h"
 #include "friction/laws.h"
-#include "math/anderson.h"
 #include "math/vec3.h"
 #include "step/tool_shape.h"
 
@@ -30,6 +33,7 @@ namespace dfm {
 
 struct Obstacle;
 struct RigidSet;
+struct SceneFacts;
 struct StepContext;
 struct World;
 
@@ -37,7 +41,7 @@ class ToolTouch {
  public:
   explicit ToolTouch(const Memory &memory);
   // After a change of things or rules: which obstacles may touch, and by which law.
-  void prepare(World &w);
+  void prepare(World &w, SceneFacts &facts);
   // Before the solve: the rows of this sub-step, and the sets' velocities with their impulses.
   void begin(World &w, StepContext &step);
   // The hosts were asked for their velocities anew.
@@ -55,7 +59,8 @@ class ToolTouch {
   struct Side {
     size_t tool;  // place in sides_
     uint32_t part;
-    Vec3 arm;
+    Vec3 arm;   // of the place, from its center
+    Vec3 bone;  // of a round shape between free bodies: of the corner or axis inside; else arm
   };
   struct Row {
     Side a, b;
@@ -67,13 +72,17 @@ class ToolTouch {
     double response;          // 1/kg, the largest one in the tangent plane; 0: does not rub
     uint32_t law;
     double impulse, along[2];  // N s on a: along the normal and the tangents
-    Vec3 bend;                 // m/s, what turning adds to the slip beyond the first order
+    Vec3 bend;                 // m/s, what turning adds to the slip beyond the first order, and belts
+    bool frees;                // of no tool
+    double lift;               // m/s, what turning adds to the speed along the normal, of free bodies
     Vec3 before;               // the impulse on a that velocities have
     Vec3 given() const { return impulse * normal + along[0] * tangent[0] + along[1] * tangent[1]; }
   };
   struct Moved {
-    RigidSet *set;
-    std::vector<double> response, block;     // [6n,6n] 1/kg; of one group
+    RigidSet *set;                           // nullptr: things that stand or go their way
+    std::vector<Vec3> center, belt;          // [n] of these things; m/s
+    std::vector<double> response;            // [6 bodies,6 bodies] 1/kg, of one group after another
+    std::vector<size_t> first, wide;         // [groups] where it begins (kNone: none), 6 bodies
     std::vector<double> free, base, change;  // [6n] m/s, rad/s
     std::vector<double> turn;                // [6n] what impulses change beyond the response
     std::vector<double> given;               // [6n] N s, N m s of soft bodies
@@ -93,6 +102,8 @@ class ToolTouch {
   struct Pair {
     uint32_t a, b, law;
     uint64_t id[2];
+    bool frees;        // none is of a tool
+    uint32_t wall[2];  // number among walls_; kNone: it is in a set
   };
   // What of the two meets.
   enum Meeting : uint32_t { kCornerOfA, kCornerOfB, kEdges, kHitEdges };
@@ -100,11 +111,14 @@ class ToolTouch {
     Meeting kind;
     uint32_t first, second;
   };
+  // bone_a, bone_b: corners, or points of edges or faces, without the radius around them
+  struct Place { Vec3 at, bone_a, bone_b; };
   struct Hit {
     const Pair *pair;
     Name name;
     Side a, b;
-    Vec3 at, normal;
+    Place place;
+    Vec3 normal;
     double gap;
   };
   Vec3 speed(const Row &row) const;
@@ -114,15 +128,19 @@ class ToolTouch {
   void find(const World &w, const StepContext &step);
   using Visit = std::function<void(const Pair &, ToolShape &, ToolShape &, Side, Side)>;
   void each_pair(const World &w, const StepContext &step, const Visit &f) const;
-  static bool look_at_each_other(ToolShape &a, ToolShape &b, double far);
+  static bool look_at_each_other(ToolShape &a, ToolShape &b, double far, bool flat);
   void add_rows(const Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b);
-  void add_row(const Pair &pair, Name name, Side a, Side b, Vec3 at, Vec3 normal, double gap, double reach);
+  void add_row(const Pair &pair, Name name, Side a, Side b, const Place &place, Vec3 normal, double gap,
+               double reach);
   static uint64_t key_of(const uint64_t pair[2], Name name);
-  double fastest(const ToolShape &shape, const Side &side) const;
+  double fastest(const ToolShape &shape, const Side &side, const ToolShape &other) const;
   Vec3 center(const Side &side) const;
   void list_jaws(Moved &m) const;
   void straighten(Moved &m) const;
-  Vec3 bend(const Side &side) const;
+  Vec3 bend(const Side &side, const Side &other) const;
+  Vec3 bend(Vec3 spin, Vec3 arm) const;
+  Vec3 spin(const Side &side) const;
+  Vec3 belt(const Side &side) const;
   void add_impulses(size_t k);
   double follow_spin();
   bool soft(const Side &a, const Side &b) const;
@@ -130,6 +148,25 @@ class ToolTouch {
   void sweep_until(double done);
   void take_impulses(Array<double> &to) const;
   void solve();
+  Vec3 change_of(const Row &row) const;
+  void push_all();
+  // tool_newton.cpp
+  struct Motion {
+    size_t tool, at, size;  // at: first of its unknowns
+    uint32_t group, jaw, part, island;
+    Vec3 center;
+  };
+  struct Lever {
+    uint32_t motion;
+    double by[3][6];  // m/s along normal and tangents, by its unknowns
+  };
+  std::array<uint32_t, 2> movers_of(const Side &side);
+  uint32_t island_of(uint32_t motion);
+  void list_motions();
+  std::array<double, 2> rub_at(uint32_t i, double yields, const double last[3], double normal, double u1,
+                               double u2) const;
+  bool newton(uint32_t island, double done);
+  void leap(double done);
   // tool_hits.cpp
   Vec3 end_of(const Side &side, Vec3 p) const;
   void find_hits(const Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b);
@@ -137,7 +174,11 @@ class ToolTouch {
   void solve_past_hits(const World &w, const StepContext &step);
   double depth(ToolShape &a, ToolShape &b) const;
   void tell_driven(const World &w, const StepContext &step);
-  Side side_of(const Obstacle &o) const;
+  void tell_passing(const World &w, const StepContext &step);
+  bool told(const Pair &pair) const;
+  Side side_of(const Obstacle &o, uint32_t wall) const;
+  void take_sets(World &w, StepContext &step);
+  void give_velocities();
   // tool_rub.cpp
   void take_last(const World &w);
   double ask_laws(double least);
@@ -146,19 +187,24 @@ class ToolTouch {
   void keep_next();
 
   double h_ = 0, offset_ = 0;
-  std::vector<Pair> pairs_;
+  std::vector<Pair> pairs_,
+      passing_;                   // passing: nothing keeps the two apart, and nobody says that this is meant
+  std::vector<RigidSet *> sets_;  // that take part
+  std::vector<uint32_t> walls_;   // places in World::obstacles of those in no set of these
   std::vector<Moved> sides_;
   std::vector<Row> rows_;
   std::vector<Hit> hits_;
-  std::vector<std::array<uint64_t, 2>> told_;  // pairs of driven tools that have met
+  std::vector<Motion> motions_;
+  std::vector<Lever> levers_;
+  std::vector<uint32_t> first_lever_;          // [rows+1]
+  std::vector<std::array<uint64_t, 2>> told_;  // pairs that have met and pass each other
   // By row.
   ContactState state_;
   LawBatches batches_;
   std::vector<LawInstance *> laws_;  // of the world
   Array<ContactPoint> points_;       // key and normal
   Array<double> start_, tangents_, response_;
-  Anderson anderson_;
-  Array<double> weight_, step_, from_, now_;  // of it, [3 rows]
+  Array<double> best_;  // [3 rows] impulses
   Array<uint32_t> match_;
   ContactStore next_;
 };

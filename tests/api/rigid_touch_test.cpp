@@ -1,0 +1,363 @@
+// Free rigid bodies of the builtin host on obstacles and on each other: they rest without creep, slide and
+// roll as the formulas say, and pass through nothing.
+#include "logged_context.h"
+#include "obstacle.h"
+#include "tool.h"
+
+namespace {
+
+using namespace test::tools;
+using test::Vec;
+
+constexpr double kG = 9.81;
+constexpr double kStep[] = {1e-3, 1.0 / 60};
+
+dfm_obstacle make(dfm_world w, dfm_obstacle_def d, const char *name, Vec at = {}) {
+  d.name = name;
+  std::copy(at.begin(), at.end(), d.pose.position);
+  dfm_obstacle o = 0;
+  test::ok(dfm_obstacle_create(w, &d, &o));
+  return o;
+}
+
+dfm_obstacle_def box_def(Vec half) {
+  dfm_obstacle_def d = dfm_obstacle_def_default();
+  d.shape = DFM_SHAPE_BOX;
+  std::copy(half.begin(), half.end(), d.half_size);
+  return d;
+}
+
+// A floor whose top is the plane z = 0.
+const char *const kFloors[] = {"plane", "box", "triangles", "voxels", "fixed body"};
+void put_floor(dfm_world w, const std::string &kind) {
+  dfm_obstacle_def d = box_def({0.5, 0.5, 0.05});
+  if (kind == "plane") {
+    test::add_plane(w, "floor");
+  } else if (kind == "box") {
+    make(w, d, "floor", {0, 0, -0.05});
+  } else if (kind == "fixed body") {
+    dfm_rigid_def r = test::box("floor", {0.5, 0.5, 0.05}, 1, {0, 0, -0.05});
+    r.fixed = 1;
+    test::create(w, {r});
+  } else if (kind == "triangles") {
+    const test::Triangles m = test::height_field(0.5, 9, [](double, double) { return 0.0; });
+    make(w, test::mesh_def("floor", m), "floor");
+  } else {
+    const test::Triangles m = test::box_surface({0.5, 0.5, 0.05}, 1);
+    d = test::mesh_def("floor", m, DFM_SHAPE_VOXELS);
+    d.cells = 20000;
+    make(w, d, "floor", {0, 0, -0.05});
+  }
+}
+
+const char *const kThings[] = {"box", "ball", "capsule", "triangles"};
+// Its lowest point is at z = low; a capsule lies along y.
+dfm_rigid put(dfm_world w, const std::string &kind, double low, const char *name = "thing", double mass = 1) {
+  const Vec half = {0.05, 0.06, 0.04};
+  dfm_rigid_def d = test::box(name, half, mass, {0.013, -0.021, low + half[2]});
+  if (kind == "box") return test::create(w, {d})[0];
+  if (kind == "triangles") {
+    const test::Triangles m = test::box_surface(half, 2);
+    d.shape = DFM_SHAPE_NONE;
+    for (size_t k = 0; k < 3; ++k) d.inertia[k] = mass / 3 * (test::dot(half, half) - half[k] * half[k]);
+    const dfm_rigid r = test::create(w, {d})[0];
+    const dfm_obstacle_def of = test::mesh_def((std::string(name) + ".surface").c_str(), m);
+    dfm_obstacle shape = 0;
+    test::ok(dfm_rigid_add_shape(r, &of, &shape));
+    return r;
+  }
+  d.shape = kind == "ball" ? DFM_SHAPE_SPHERE : DFM_SHAPE_CAPSULE;
+  d.radius = half[2];
+  d.half_length = 0.03;
+  const dfm_pose lies = pose({0.013, -0.021, low + half[2]}, {1, 0, 0}, std::acos(0.0));
+  if (kind == "capsule") d.pose = lies;
+  return test::create(w, {d})[0];
+}
+
+void push(dfm_rigid r, Vec velocity, Vec spin = {}) {
+  dfm_rigid_state s = test::state(r);
+  std::copy(velocity.begin(), velocity.end(), s.velocity);
+  std::copy(spin.begin(), spin.end(), s.spin);
+  test::ok(dfm_rigid_set_state(r, &s));
+}
+
+void go(dfm_world w, double dt, double time) {
+  for (int i = 0; i < std::lround(time / dt); ++i)
+    ASSERT_EQ(dfm_world_step(w, dt, nullptr), DFM_OK) << dfm_last_error();
+}
+
+// m, of its center and of what is 5 cm from it
+double moved(const dfm_rigid_state &a, const dfm_rigid_state &b) {
+  double turn = 0;
+  for (size_t k = 0; k < 4; ++k) turn = std::max(turn, std::fabs(a.rotation[k] - b.rotation[k]));
+  return test::apart(test::vec(a.position), test::vec(b.position)) + 0.1 * turn;
+}
+
+}  // namespace
+
+// Dropped from 2 cm, all of them lie on every kind of floor and stay where they are.
+TEST(RigidTouch, WhatLies_DoesNotCreep) {
+  for (const char *floor : kFloors)
+    for (const char *thing : kThings)
+      for (const double dt : kStep) {
+        SCOPED_TRACE(std::string(thing) + " on " + floor + " " + std::to_string(dt));
+        test::Context context;
+        const dfm_world w = test::make_world(context, {0, 0, -kG});
+        put_floor(w, floor);
+        const dfm_rigid r = put(w, thing, 0.02);
+        go(w, dt, 1);
+        const dfm_rigid_state start = test::state(r);
+        go(w, dt, 5);
+        EXPECT_LT(moved(start, test::state(r)), 1e-12);
+        EXPECT_NEAR(test::state(r).position[2], 0.04, 3e-6);
+      }
+}
+
+// On a slope: below the angle of friction it stays, above it slides with g (sin a - mu cos a).
+TEST(RigidTouch, OnASlope_FrictionHoldsUpToMu) {
+  const double mu = 0.4;
+  for (const char *law : {"coulomb", "karnopp", "dahl", "lugre", "elastoplastic", "gms"})
+    for (const double slope : {0.9 * mu, 1.5 * mu}) {
+      SCOPED_TRACE(std::string(law) + " " + std::to_string(slope));
+      const double c = 1 / std::sqrt(1 + slope * slope), s = slope * c, dt = 1e-3;
+      test::Context context;
+      const dfm_world w = test::make_world(context, {kG * s, 0, -kG * c});
+      test::set_friction(w, mu, law);
+      test::add_plane(w, "floor");
+      const dfm_rigid r = put(w, "box", 1e-6);
+      go(w, dt, 0.2);
+      const dfm_rigid_state start = test::state(r);
+      go(w, dt, 0.5);
+      const bool springs = law[0] == 'd' || law[0] == 'l' || law[0] == 'e' || law[0] == 'g';
+      if (slope < mu) {
+        EXPECT_LT(moved(start, test::state(r)), springs ? 1e-4 : 1e-12) << "bristles swing";
+      } else {
+        const double a = kG * (s - mu * c);
+        EXPECT_NEAR(test::state(r).velocity[0], 0.7 * a, (springs ? 0.02 : 0.001) * a) << "m/s";
+      }
+    }
+}
+
+// Thrown along a floor a box goes v^2 / (2 mu g).
+TEST(RigidTouch, ABoxThatSlides_StopsWhereItShould) {
+  for (const char *floor : kFloors) {
+    SCOPED_TRACE(floor);
+    test::Context context;
+    const dfm_world w = test::make_world(context, {0, 0, -kG});
+    test::set_friction(w, 0.5);
+    put_floor(w, floor);
+    const dfm_rigid r = put(w, "box", 1e-6);
+    go(w, 1e-3, 0.01);
+    const double x = test::state(r).position[0];
+    push(r, {1, 0, 0});
+    go(w, 1e-3, 1);
+    const double way = 1 / (2 * 0.5 * kG);
+    EXPECT_NEAR(test::state(r).position[0] - x, way, 1.1e-3 * 0.5) << "a sub-step ends at its new velocity";
+    EXPECT_LT(test::norm(test::vec(test::state(r).velocity)), 1e-12);
+  }
+}
+
+// A ball rolls down with 5/7 of g sin a where friction can turn it, and its place on the floor does not slip.
+TEST(RigidTouch, ABall_RollsDownASlope) {
+  for (const double dt : kStep) {
+    SCOPED_TRACE(dt);
+    const double a = 0.3, g = kG * std::sin(a);
+    test::Context context;
+    const dfm_world w = test::make_world(context, {g, 0, -kG * std::cos(a)});
+    test::add_plane(w, "floor");
+    const dfm_rigid r = put(w, "ball", 1e-6);
+    go(w, dt, 1);
+    const dfm_rigid_state s = test::state(r);
+    EXPECT_NEAR(s.velocity[0], 5.0 / 7 * g, 2e-3 * g);
+    EXPECT_NEAR(s.spin[1] * 0.04, s.velocity[0], 1e-4 * s.velocity[0]);
+    EXPECT_NEAR(s.position[2], 0.04, 3e-6);
+  }
+}
+
+// A box on a turntable stays where it is on it, up to the speed at which friction cannot hold it.
+TEST(RigidTouch, OnATurntable_NothingCreepsOutward) {
+  for (const double dt : kStep) {
+    SCOPED_TRACE(dt);
+    test::Context context;
+    const dfm_world w = test::make_world(context, {0, 0, -kG});
+    test::set_friction(w, 0.5);
+    const dfm_obstacle table = make(w, box_def({0.3, 0.3, 0.01}), "table", {0, 0, -0.01});
+    dfm_rigid_def d = test::box("box", {0.03, 0.03, 0.03}, 1, {0.15, 0, 0.03 + 1e-6});
+    const dfm_rigid r = test::create(w, {d})[0];
+    double start = 0, most = 0, spin = 0, angle = 0;
+    for (int i = 0; i * dt < 5; ++i) {
+      spin = std::min(spin + dt * 4, 3.0);
+      angle += spin * dt;
+      const dfm_pose to = pose({0, 0, -0.01}, {0, 0, 1}, angle);
+      test::ok(dfm_obstacle_move_to(table, &to));
+      ASSERT_EQ(dfm_world_step(w, dt, nullptr), DFM_OK) << dfm_last_error();
+      const dfm_rigid_state s = test::state(r);
+      const double far = std::hypot(s.position[0], s.position[1]);
+      if (i * dt < 1) start = far;
+      most = std::max(most, std::fabs(far - start));
+    }
+    EXPECT_LT(most, 1e-6) << "m, in ten turns";
+  }
+}
+
+// A belt takes a box along to its own speed; a plate lifts it.
+TEST(RigidTouch, WhatMoves_TakesItAlong) {
+  test::Context context;
+  const dfm_world w = test::make_world(context, {0, 0, -kG});
+  dfm_obstacle_def d = box_def({5, 0.2, 0.01});
+  d.velocity_surface[0] = 0.5;
+  const dfm_obstacle plate = make(w, d, "belt", {0, 0, -0.01});
+  const dfm_rigid r = put(w, "box", 1e-6);
+  go(w, 1e-3, 1);
+  EXPECT_NEAR(test::state(r).velocity[0], 0.5, 1e-9);
+  for (int i = 1; i <= 500; ++i) {
+    const dfm_pose to = pose({0, 0, -0.01 + 2e-4 * i});
+    test::ok(dfm_obstacle_move_to(plate, &to));
+    ASSERT_EQ(dfm_world_step(w, 1e-3, nullptr), DFM_OK) << dfm_last_error();
+  }
+  EXPECT_NEAR(test::state(r).velocity[2], 0.2, 1e-9);
+  EXPECT_NEAR(test::state(r).position[2], 0.14, 3e-6);
+}
+
+// A tower of five, and it stays; both momenta of two boxes that meet in the air.
+TEST(RigidTouch, ATower_Stands) {
+  for (const double dt : kStep) {
+    SCOPED_TRACE(dt);
+    test::Context context;
+    const dfm_world w = test::make_world(context, {0, 0, -kG});
+    test::add_plane(w, "floor");
+    std::vector<dfm_rigid_def> boxes;
+    const char *const names[] = {"a", "b", "c", "d", "e"};
+    for (size_t i = 0; i < 5; ++i)
+      boxes.push_back(test::box(names[i], {0.05, 0.05, 0.02}, 1.0 + double(i),
+                                {0.004 * double(i % 2), 0, 0.02 + double(i) * 0.041}));
+    const std::vector<dfm_rigid> r = test::create(w, boxes);
+    go(w, dt, 1);
+    std::vector<dfm_rigid_state> start;
+    for (const dfm_rigid one : r) start.push_back(test::state(one));
+    go(w, dt, 5);
+    for (size_t i = 0; i < r.size(); ++i) {
+      EXPECT_LT(moved(start[i], test::state(r[i])), 1e-12) << i;
+      EXPECT_NEAR(test::state(r[i]).position[2], 0.02 + 0.04 * double(i), 1e-5);
+    }
+  }
+}
+
+TEST(RigidTouch, TwoBoxesThatMeet_KeepBothMomenta) {
+  test::Context context;
+  const dfm_world w = test::make_world(context, {0, 0, 0});
+  dfm_rigid_def a = test::box("a", {0.05, 0.04, 0.03}, 1),
+                b = test::box("b", {0.03, 0.06, 0.05}, 3, {0.2, 0.03, 0.02});
+  a.velocity[0] = 2;
+  a.spin[1] = 3;
+  b.spin[0] = -2;
+  b.spin[2] = 4;
+  const std::vector<dfm_rigid> r = test::create(w, {a, b});
+  const auto sum = [&](double &kinetic) {
+    test::Momenta out;
+    for (const dfm_rigid one : r) {
+      test::add(out, test::rigid_measure(one));
+      kinetic += test::rigid_measure(one).kinetic;
+    }
+    return out;
+  };
+  double had = 0, has = 0;
+  const test::Momenta before = sum(had);
+  go(w, 1e-3, 0.5);
+  const test::Momenta after = sum(has);
+  EXPECT_LT(test::apart(before.linear, after.linear), 1e-13);
+  EXPECT_LT(test::apart(before.angular, after.angular), 1e-12);
+  EXPECT_LT(has, had);
+  EXPECT_GT(test::state(r[1]).velocity[0], 0.1) << "pushed";
+}
+
+// Thrown about in a box of planes at up to 6 m/s: no corner is ever deep in a wall, and no energy comes from
+// nowhere.
+TEST(RigidTouch, Tumbling_StaysInside) {
+  for (const double dt : kStep) {
+    test::Context context;
+    const dfm_world w = test::make_world(context, {0, 0, -kG});
+    test::add_plane(w, "floor");
+    const double s = std::sqrt(0.5);
+    test::add_plane(w, "left", {-0.3, 0, 0}, {0, s, 0, s});
+    test::add_plane(w, "right", {0.3, 0, 0}, {0, -s, 0, s});
+    test::add_plane(w, "front", {0, -0.3, 0}, {-s, 0, 0, s});
+    test::add_plane(w, "back", {0, 0.3, 0}, {s, 0, 0, s});
+    uint64_t seed = 7;
+    const auto next = [&] {
+      seed = seed * 6364136223846793005ull + 1442695040888963407ull;
+      return 2 * (double(seed >> 11) / 9007199254740992.0) - 1;
+    };
+    double deepest = 0, made = 0;
+    const Vec half = {0.05, 0.04, 0.03};
+    const dfm_rigid r = test::create(w, {test::box("box", half, 1, {0, 0, 0.2})})[0];
+    for (int run = 0; run < 20; ++run) {
+      dfm_rigid_state start = test::state(r);
+      for (double &x : start.position) x = 0.15 * next();
+      start.position[2] += 0.3;
+      test::ok(dfm_rigid_set_state(r, &start));
+      const double turn = 0.1 / dt < 20 ? 0.06 / dt : 20;  // rad/s
+      push(r, {6 * next(), 6 * next(), 6 * next()}, {turn * next(), turn * next(), turn * next()});
+      const auto energy = [&] { return test::rigid_measure(r).kinetic + kG * test::state(r).position[2]; };
+      double last = energy();
+      for (int i = 0; i * dt < 1.5; ++i) {
+        ASSERT_EQ(dfm_world_step(w, dt, nullptr), DFM_OK) << dfm_last_error();
+        const dfm_rigid_state now = test::state(r);
+        for (int k = 0; k < 8; ++k) {
+          const Vec arm = rotate(now.rotation, {k & 1 ? half[0] : -half[0], k & 2 ? half[1] : -half[1],
+                                                k & 4 ? half[2] : -half[2]});
+          deepest = std::max({deepest, -(now.position[2] + arm[2]), std::fabs(now.position[0] + arm[0]) - 0.3,
+                              std::fabs(now.position[1] + arm[1]) - 0.3});
+        }
+        // falling ends a sub-step at its new velocity: m g^2 h^2 / 2 less than it had
+        made = std::max(made, energy() - last);
+        last = energy();
+      }
+    }
+    EXPECT_LT(deepest, 1e-4);
+    EXPECT_LT(made, 1e-3);
+  }
+}
+
+// What lies on a floor is the same after a snapshot is read again, and filters part it from the floor.
+TEST(RigidTouch, SnapshotsAndFilters_Count) {
+  test::Context context;
+  const dfm_world w = test::make_world(context, {1, 0, -kG});
+  test::set_friction(w, 0.3, "lugre");
+  test::add_plane(w, "floor");
+  const dfm_rigid r = put(w, "box", 0.001);
+  go(w, 1e-3, 0.2);
+  const std::string data = test::snapshot(w);
+  go(w, 1e-3, 0.2);
+  const uint64_t hash = dfm_world_hash(w);
+  test::ok(dfm_world_restore(w, data.data(), data.size()));
+  go(w, 1e-3, 0.2);
+  EXPECT_EQ(dfm_world_hash(w), hash);
+  test::ok(dfm_obstacle_set_filter(r, 1, 0));
+  go(w, 1e-3, 0.2);
+  EXPECT_LT(test::state(r).position[2], -0.1);
+}
+
+// A body on a hinge goes through a floor: one sentence says so, and the plan names it before.
+TEST(RigidTouch, WhatPassesThroughAFloor_IsTold) {
+  test::LoggedContext context;
+  const dfm_world w = test::make_world(context.context, {0, 0, -kG});
+  test::add_plane(w, "floor");
+  const std::vector<dfm_rigid_def> bodies = {test::box("cart", {0.05, 0.05, 0.05}, 1, {0, 0, 0.1}),
+                                             test::box("arm", {0.05, 0.05, 0.05}, 1, {0, 0, 0.3})};
+  test::create(w, bodies, {test::joint(DFM_JOINT_HINGE, 1, 0, {0, 0, 0.2}, {0, 1, 0})});
+  const std::vector<dfm_rigid_def> free = {test::box("free", {0.05, 0.05, 0.05}, 1, {1, 0, 0.1})};
+  test::create(w, free);
+  size_t size = 0;
+  test::ok(dfm_world_explain(w, nullptr, &size));
+  std::string plan(size, 0);
+  test::ok(dfm_world_explain(w, plan.data(), &size));
+  EXPECT_NE(plan.find("these pass through obstacles: cart, arm"), std::string::npos) << plan;
+  go(w, 1e-2, 0.5);
+  const size_t first = context.log.find("rigid body 'cart' is ");
+  EXPECT_NE(first, std::string::npos) << context.log;
+  EXPECT_NE(context.log.find("deep in 'floor'"), std::string::npos);
+  EXPECT_NE(context.log.find("take a host with contact"), std::string::npos);
+  EXPECT_EQ(context.log.find("rigid body 'cart' is ", first + 1), std::string::npos) << "once";
+  EXPECT_EQ(context.log.find("'free'"), std::string::npos) << context.log;
+}
