@@ -319,6 +319,35 @@ TEST(RigidTouch, Tumbling_StaysInside) {
   }
 }
 
+// Twelve things of three kinds fall on a heap between walls: none goes through the floor or a wall.
+TEST(RigidTouch, AHeap_StaysBetweenItsWalls) {
+  for (const double dt : {1.0 / 60}) {
+    SCOPED_TRACE(dt);
+    test::Context context;
+    const dfm_world w = test::make_world(context, {0, 0, -kG});
+    test::add_plane(w, "floor");
+    const double s = std::sqrt(0.5);
+    test::add_plane(w, "left", {-0.15, 0, 0}, {0, s, 0, s});
+    test::add_plane(w, "right", {0.15, 0, 0}, {0, -s, 0, s});
+    test::add_plane(w, "front", {0, -0.15, 0}, {-s, 0, 0, s});
+    test::add_plane(w, "back", {0, 0.15, 0}, {s, 0, 0, s});
+    std::vector<dfm_rigid> things;
+    for (int i = 0; i < 12; ++i) {
+      const std::string name = "thing" + std::to_string(i);
+      things.push_back(put(w, kThings[i % 3], 0.1 + 0.13 * i, name.c_str(), 1 + 0.3 * (i % 4)));
+      push(things.back(), {0.1 * (i % 3 - 1), 0.1 * (i % 5 - 2), 0}, {0.5 * (i % 4), 0.3 * i, 1});
+    }
+    go(w, dt, 4);
+    for (const dfm_rigid r : things) {
+      const dfm_rigid_state now = test::state(r);
+      EXPECT_GT(now.position[2], 0.039);
+      EXPECT_LT(now.position[2], 0.4);
+      EXPECT_LT(std::max(std::fabs(now.position[0]), std::fabs(now.position[1])), 0.111);
+      EXPECT_LT(test::norm(test::vec(now.velocity)), 0.3);
+    }
+  }
+}
+
 // What lies on a floor is the same after a snapshot is read again, and filters part it from the floor.
 TEST(RigidTouch, SnapshotsAndFilters_Count) {
   test::Context context;

@@ -16,8 +16,20 @@ namespace {
 constexpr uint32_t kMostHits = 4;  // further solves
 constexpr double kSlow = 5e-4;     // m in a sub-step: what moves by less is kept apart by its rows
 constexpr uint32_t kLooks = 16;    // pieces of an edge between which it is looked at
-constexpr double kDeep = 0.02;     // of the smaller one's reach, that a host may leave unsaid
-constexpr double kWithin = 0.1;    // of the floor, that a hit may be found above it
+// Whether balls around the two do not meet, or the ball of one and a plane.
+bool balls_apart(const ObstacleView &a, const ObstacleView &b) {
+  const auto reach = [](const ObstacleView &v) {
+    return v.shape == Shape::box ? norm(v.half_size) : v.extent + v.radius + v.half_length;
+  };
+  if (a.shape == Shape::plane && b.shape == Shape::plane) return true;
+  if (a.shape == Shape::plane) return dot(rotate(a.rotation, {0, 0, 1}), b.position - a.position) > reach(b);
+  if (b.shape == Shape::plane) return balls_apart(b, a);
+  const double far = reach(a) + reach(b);
+  return norm2(a.position - b.position) > far * far;
+}
+
+constexpr double kDeep = 0.02;   // of the smaller one's reach, that a host may leave unsaid
+constexpr double kWithin = 0.1;  // of the floor, that a hit may be found above it
 
 }  // namespace
 
@@ -119,12 +131,13 @@ void ToolTouch::tell_passing(const World &w, const StepContext &step) {
   for (const Pair &pair : passing_) {
     const Obstacle &a = *w.obstacles[pair.a], &b = *w.obstacles[pair.b];
     const ObstacleView &va = step.obstacle_views[a.slot], &vb = step.obstacle_views[b.slot];
-    if (!ToolShape::takes_part(va) || !ToolShape::takes_part(vb)) continue;
+    if (!ToolShape::takes_part(va) || !ToolShape::takes_part(vb) || balls_apart(va, vb) || told(pair))
+      continue;
     ToolShape shape_a(va), shape_b(vb);
     const double size = std::min(shape_a.endless() ? HUGE_VAL : shape_a.reach(),
                                  shape_b.endless() ? HUGE_VAL : shape_b.reach());
     const double deep = depth(shape_a, shape_b);
-    if (!(deep > offset_ + kDeep * size) || told(pair)) continue;
+    if (!(deep > offset_ + kDeep * size)) continue;
     told_.push_back({pair.id[0], pair.id[1]});
     const auto held = [](const Obstacle &o) {
       return o.rigid && o.rigid->group[o.rigid_body] != DFM_RIGID_STILL &&

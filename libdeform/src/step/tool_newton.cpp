@@ -21,6 +21,7 @@ namespace {
 constexpr double kYields = 100;  // rho, in units of 1 / response of the row
 constexpr uint32_t kMostRounds = 12;
 constexpr uint32_t kMostNewton = 16;  // steps in a round
+constexpr double kFaster = 0.5;       // of what a round changes, by the next one: else they end
 constexpr size_t kMostMotions = 120;  // of an island: the system is dense
 constexpr double kBeside = 1e-7;      // of an argument, for slopes of friction
 
@@ -198,6 +199,7 @@ bool ToolTouch::newton(uint32_t island, double done) {
   system = mass;
   x = left;
   bool works = solve_dense(n, system.data(), x.data());
+  double before = HUGE_VAL;
   bool converged = false;
   for (uint32_t round = 0; works && round < kMostRounds && !converged; ++round) {
     bool settled = false;
@@ -276,6 +278,8 @@ bool ToolTouch::newton(uint32_t island, double done) {
         l.last[c] = l.now[c];
       }
     converged = moved <= done;
+    if (!(moved < kFaster * before)) break;
+    before = moved;
   }
   for (size_t k = 0; k < mine.size(); ++k) {
     Row &row = rows_[mine[k]];
