@@ -20,6 +20,7 @@
 #include <memory>
 #include <string>
 
+#include "body/backing.h"
 #include "body/phyxels.h"
 #include "core/tasks.h"
 #include "dynamics/model.h"
@@ -54,6 +55,8 @@ enum class Revision {
   diverged,  // no solution was found: the sub-step is too long
   failed     // the model cannot
 };
+
+enum class Backs { never, later, now };
 
 // Options of implicit points.
 struct ImplicitOptions {
@@ -125,6 +128,14 @@ class Dynamics {
   // If diagonal() is null: the response of n distinct surfels to impulses at them, [3n,3n] 1/kg: one column
   // per unit impulse; symmetric up to rounding. Returns false if the model fails.
   virtual bool response(const SubStep &, uint32_t, const uint32_t *, double *) { return false; }
+  // Whether response() is known where contacts press back (body/backing.h): later: after the next revise(),
+  // which then changes the response. If now: back() says by how much they do, backed_response() gives the
+  // change of their velocities [n,3] by impulses [n,3]. Both return false if they fail.
+  virtual Backs backs() { return Backs::never; }
+  virtual bool back(const Backing &) { return false; }
+  virtual bool backed_response(const Backing &, const double * /*impulse*/, double * /*change*/) {
+    return false;
+  }
   // Takes the impulses at the surfels [nsurfel,3]; point_velocity() and response() then return the new
   // values.
   virtual Revision revise(const SubStep &, const double *, bool /*last*/) { return Revision::none; }

@@ -67,7 +67,7 @@ ImplicitPoints::ImplicitPoints(const Memory &memory, Phyxels &points, Surface &s
       ways_(memory) {
   use_memory(memory, stage_x_, stage_v_, middle_, load_before_);
   use_memory(memory, x_, v_, before_, residual_, push_, change_, springs_, dampers_, scale_, weight_, held_,
-             column_, points_, between_);
+             column_, points_, between_, backed_base_);
   x_.assign(size_t{kStride} * points.n, 0.0);
   v_ = before_ = x_;
   if (options_.second_order) stage_x_ = stage_v_ = middle_ = load_before_ = x_;
@@ -186,6 +186,8 @@ bool ImplicitPoints::linearize(const SubStep &now) {
     }
   });
   Array<double> &blocks = stiffness_.blocks();
+  base_known_ = backs_;
+  if (backs_) std::copy(blocks.begin(), blocks.end(), backed_base_.begin());
   hold_components(stiffness_.pattern(), p_.held.data(), blocks.data());
   // a constant matrix must not depend on the positions at the time when it was made
   if (stiffness_.constant()) exact_->place(p_.rest.data(), 3);
@@ -253,7 +255,7 @@ bool ImplicitPoints::start(const SubStep &now) {
   error_ = 0;
   least_error_ = HUGE_VAL;
   revisions_ = 0;
-  ended_ = false;
+  ended_ = backs_ = base_known_ = base_due_ = false;
   return residual_at(now, p_.v_free.data(), nullptr);
 }
 
@@ -403,6 +405,34 @@ bool ImplicitPoints::response(const SubStep &, uint32_t n, const uint32_t *surfe
   return true;
 }
 
+// The factor of the rest state is not that of a sparse matrix, so A itself is factored.
+Backs ImplicitPoints::backs() {
+  if (!abilities().revises || !(rest_ || exact_->direct())) return Backs::never;
+  try {
+    if (!backed_) {
+      std::unique_ptr<LinearSolver> solver = new_solver();
+      if (!solver->direct()) return Backs::never;
+      backed_ = std::make_unique<BackedMatrix>(memory_, stiffness_.pattern(), std::move(solver));
+    }
+    backed_base_.resize(stiffness_.blocks().size());
+  } catch (const std::bad_alloc &) {  // on any thread that moves this body
+    return Backs::never;
+  }
+  backs_ = true;
+  base_due_ = by_rest_ || !base_known_;
+  return base_due_ ? Backs::later : Backs::now;
+}
+
+bool ImplicitPoints::back(const Backing &contacts) {
+  effort_ += backed_->factor_work();
+  return backed_->factor(backed_base_.data(), p_.held.data(), surface_, contacts);
+}
+
+bool ImplicitPoints::backed_response(const Backing &contacts, const double *impulse, double *change) {
+  effort_ += backed_->solve_work();
+  return backed_->solve(p_.held.data(), surface_, contacts, impulse, change);
+}
+
 void ImplicitPoints::spread_impulses(const double *surfel_impulse, double scale, Array<double> &to) const {
   for (uint32_t s = 0; s < surface_.nsurfel; ++s) {
     const Vec3 q = load3(&surfel_impulse[3 * size_t{s}]);
@@ -440,7 +470,8 @@ Revision ImplicitPoints::revise(const SubStep &now, const double *surfel_impulse
   // without forces there is no correction; without an earlier revision there is no state to return halfway to
   if (!known && !(before > 0 && before < HUGE_VAL)) return Revision::diverged;
   const double allowed = allowed_error(p_.v_end, kShare);
-  if (error_ <= allowed || ((last || revisions_ >= kRevisions) && error_ <= kTolerated * allowed)) {
+  const bool due = std::exchange(base_due_, false);
+  if (!due && (error_ <= allowed || ((last || revisions_ >= kRevisions) && error_ <= kTolerated * allowed))) {
     revisions_ = 0;
     error_ = 0;
     least_error_ = HUGE_VAL;
@@ -460,7 +491,7 @@ Revision ImplicitPoints::revise(const SubStep &now, const double *surfel_impulse
   // the error.
   Array<double> &v = p_.v_free;
   ended_ = false;
-  if (error_ <= kContracts * moved || (error_ <= kDiverges * moved && patient(error_ / moved))) {
+  if (!due && (error_ <= kContracts * moved || (error_ <= kDiverges * moved && patient(error_ / moved)))) {
     accelerate(v);
     corrected_ = largest(change_);
     add(v, 1);

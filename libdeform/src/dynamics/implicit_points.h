@@ -18,6 +18,7 @@
 #include <memory>
 #include <utility>
 
+#include "dynamics/backed_matrix.h"
 #include "dynamics/dynamics.h"
 #include "dynamics/relative_work.h"
 #include "dynamics/rest_factor.h"
@@ -53,6 +54,9 @@ class ImplicitPoints : public Dynamics {
   bool free_motion(const SubStep &now, double &kinetic) override;
   const double *point_velocity() const override { return p_.v_free.data(); }
   bool response(const SubStep &now, uint32_t n, const uint32_t *surfel, double *answers) override;
+  Backs backs() override;
+  bool back(const Backing &contacts) override;
+  bool backed_response(const Backing &contacts, const double *impulse, double *change) override;
   Revision revise(const SubStep &now, const double *surfel_impulse, bool last) override;
   bool end_state(const SubStep &now, const double *surfel_impulse, bool touched) override;
   EndState end() const override { return {p_.v_end.data(), mean()}; }
@@ -75,10 +79,14 @@ class ImplicitPoints : public Dynamics {
  private:
   ModelStiffness stiffness_;
   Memory memory_;
-  std::unique_ptr<RestFactor> rest_;     // null if the solver is not direct, or only one solve is allowed
-  std::unique_ptr<LinearSolver> exact_;  // of A itself; null until it is needed
-  bool by_rest_ = false;                 // which of the two represents A
-  uint32_t slow_ = 0;                    // iterations with rest_ that did not halve the residual
+  std::unique_ptr<RestFactor> rest_;      // null if the solver is not direct, or only one solve is allowed
+  std::unique_ptr<LinearSolver> exact_;   // of A itself; null until it is needed
+  std::unique_ptr<BackedMatrix> backed_;  // null until contacts press back
+  Array<double> backed_base_;             // [nb,9] kg, the A of exact_ with held components as others
+  // In this sub-step: contacts are to press back; backed_base_ is known; the next revision makes it.
+  bool backs_ = false, base_known_ = false, base_due_ = false;
+  bool by_rest_ = false;  // which of the two represents A
+  uint32_t slow_ = 0;     // iterations with rest_ that did not halve the residual
   Anderson ways_;
   // The present stage: its h (s); its times as shares of the sub-step; x0, v0 ([npoint,4] m, m/s). Loads and
   // gravity are interpolated linearly between start and end.

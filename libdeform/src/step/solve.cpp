@@ -225,6 +225,8 @@ const SolveIsland *solve_revised(World &w, StepContext &step, Revised &revised) 
   for (SolveIsland &own : all) {
     own.all_passes = own.all_sweeps = own.again = own.capped = 0;
     own.redundant.start();
+    own.stalls = false;
+    own.backs = true;
   }
   if (step.bodies_revise) revise_warm(w, step);
   for (SolveIsland &own : all) own.open = true;

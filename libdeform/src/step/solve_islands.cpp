@@ -39,8 +39,8 @@ bool may_sweep(const World &w, const StepContext &step, SolveIsland &own, const 
 // next one goes on from there.
 constexpr uint32_t kPolish = 20;
 bool good(const StepContext &step, SolveIsland &own, const Residual &left, double most) {
-  return left.relative <= most ||
-         (left.due <= most && (own.sweeps >= kPolish || spares(step, own.spent, Thrift::polish)));
+  return left.relative <= most || (left.due <= most && (own.sweeps >= kPolish || own.stalls ||
+                                                        spares(step, own.spent, Thrift::polish)));
 }
 
 // Beyond this times the best residual sweeps are running away: with a jam of strong friction block
@@ -201,6 +201,41 @@ bool asks_redundant(const World &w, const StepContext &step, SolveIsland &own) {
          !w.prescribed.stands() && own.redundant.found(step.rows, own.part, step.solve_islands.of_cuts());
 }
 
+// Many contacts that bear on one implicit body (contact/tresca.h). Sweeps that have come to their cap without
+// a result are followed by it, and in further solves of the sub-step, which are much like the first one, this
+// many sweeps are enough to see that it is needed again.
+constexpr uint32_t kStalled = 3;
+constexpr double kBackedMost = 0.1;  // of the tolerance: what is left over is what bodies revise by
+class BodyBacked final : public BackedResponse {
+ public:
+  explicit BodyBacked(Dynamics &body) : body_(body) {}
+  bool factor(const Backing &contacts) override { return body_.back(contacts); }
+  bool solve(const Backing &contacts, const double *impulse, double *change) override {
+    return body_.backed_response(contacts, impulse, change);
+  }
+
+ private:
+  Dynamics &body_;
+};
+Backs solve_backed(const World &w, StepContext &step, SolveIsland &own, double most) {
+  if (!own.revises || !own.backs || own.sweeps < (own.stalls ? kStalled : w.def.max_sweeps) ||
+      spares(step, own.spent, Thrift::sweeps))
+    return Backs::never;
+  own.backs = Tresca::serves(step.rows, own.part, step.state);
+  if (!own.backs) return Backs::never;
+  Dynamics &body = *w.bodies[step.rows.blocks[own.part.blocks[0]].source]->dynamics;
+  const Backs when = body.backs();
+  own.backs = when == Backs::now || (when == Backs::later && !own.stalls);  // once
+  own.stalls = own.backs;
+  if (when != Backs::now) return own.backs ? when : Backs::never;
+  BodyBacked backed(body);
+  own.backs = own.stalls =
+      own.tresca.solve(step.rows, own.part, step.state, step.h, own.tolerance, kBackedMost, most, backed);
+  own.spent.effort += own.tresca.products() * own.effort;
+  spend(w, step, own.spent, uint64_t{own.tresca.products()} * own.part.all());
+  return own.backs ? Backs::now : Backs::never;
+}
+
 // A residual costs as much as a sweep, where points answer their own impulses alone. A sweep seldom leaves
 // less than a quarter of it, and seldom less than a half where the ones before left more than 0.7: it is
 // looked at again when it could be good at the earliest. Not once the polish is over, where the best state
@@ -263,6 +298,10 @@ bool sweep_until_good(const World &w, StepContext &step, SolveIsland &own) {
       best = left.due;
       keep_best(step, own);
     }
+    const Backs backs = solve_backed(w, step, own, kMost);
+    if (backs == Backs::now) return true;
+    own.waits = backs == Backs::later;
+    if (own.waits) break;
     if (!may_sweep(w, step, own, left, cap)) break;
     // what stands is seen from one plain sweep to the next
     asks = asks_redundant(w, step, own);
@@ -278,6 +317,7 @@ bool sweep_until_good(const World &w, StepContext &step, SolveIsland &own) {
   };
   each_row(own.part.contacts, go_back);
   each_row(own.part.bonds, go_back);
+  if (own.waits) return best <= 1;
   if (best > kMost && own.revises) settle(w, step, own, best);
   if (strides_help(own, best)) stride_on(w, step, own);
   return best <= 1;
@@ -339,7 +379,7 @@ void solve_passes(const World &w, StepContext &step, SolveIsland &own) {
     if (!ask(w, step, own)) return;
     own.residual = true_residual(step.rows, own.part, step.state, step.h, own.tolerance);
     own.due_before = std::exchange(own.due, own.residual.due);
-    if (good(step, own, own.residual, 1) || own.passes > w.def.max_passes ||
+    if (good(step, own, own.residual, 1) || own.waits || own.passes > w.def.max_passes ||
         !(may_sweep(w, step, own, own.residual, w.def.max_sweeps) || may_ask(w, step, own)))
       return;
     if (!ask_slopes(step, own)) return;
@@ -568,7 +608,7 @@ const SolveIsland *solve_islands(World &w, StepContext &step) {
     if (!own.open) continue;
     rows += own.part.all();
     own.start();
-    own.slowed = false;
+    own.slowed = own.waits = false;
     own.limit.reserve(own.part.n);
     own.spent = {0, 0, own.part.all(), Thrift::none, 0};
     own.residual = {};

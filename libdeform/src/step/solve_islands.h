@@ -13,6 +13,7 @@
 #include "contact/proximal.h"
 #include "contact/redundant.h"
 #include "contact/solver.h"
+#include "contact/tresca.h"
 #include "friction/laws.h"
 #include "step/budget.h"
 #include "step/islands.h"
@@ -35,6 +36,7 @@ struct SolveIsland {
   Momentum momentum;
   Proximal proximal;
   Redundant redundant;
+  Tresca tresca;
   Tolerance tolerance;
   Array<double> scratch;  // of solve_bonds()
   Array<double> limit;    // [contacts of the part] N s, fixed limits of friction
@@ -42,6 +44,9 @@ struct SolveIsland {
   Residual residual;
   uint32_t passes = 0, sweeps = 0;
   bool slowed = false;  // its depths are opened more slowly
+  bool stalls = false;  // sweeps have ended at the cap in this sub-step, and another method has not
+  bool waits = false;   // for another response, by which that method is possible
+  bool backs = true;    // that method may be tried
   bool common = false;  // laws are asked by the response of all contacts together
   uint32_t asked = 0;   // passes beyond the cap with the present response
   // of the last two passes (Residual::due)
@@ -55,7 +60,7 @@ struct SolveIsland {
   uint32_t all_passes = 0, all_sweeps = 0, again = 0, capped = 0;
 
   explicit SolveIsland(const Memory &m)
-      : batches(m), acceleration(m), momentum(m), proximal(m), redundant(m) {
+      : batches(m), acceleration(m), momentum(m), proximal(m), redundant(m), tresca(m) {
     use_memory(m, scratch, limit);
     start();
   }
