@@ -5,6 +5,8 @@
 
 #include <ode/ode.h>
 
+#include <cctype>
+
 #include "deform/deform.h"
 #include "deform/ode_host.h"
 #include "support.h"
@@ -24,6 +26,14 @@ test::CommandResult run(const Mutation &m, const std::string &more = "/output/ev
 }
 
 class MutatedOdeScene : public testing::TestWithParam<Mutation> {};
+
+// letters and figures of scene and assignment
+std::string name_of(const testing::TestParamInfo<Mutation> &info) {
+  std::string name = std::string(info.param.scene) + info.param.assignment;
+  for (char &c : name)
+    if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
+  return name;
+}
 
 void ignore(int, const char *, va_list) {}
 
@@ -54,7 +64,8 @@ INSTANTIATE_TEST_SUITE_P(Seen, MutatedOdeScene,
                                          Mutation{"ode_chain", "/rigid/bodies/1/joints/0/anchor/0=1e30"},
                                          Mutation{"ode_cart", "/rigid/bodies/0/spin=[1e6,1e6,1e6]"},
                                          Mutation{"ode_gripper", "/rigid/bodies/0/mass=1e30"},
-                                         Mutation{"ode_seesaw", "/gravity/2=-1e200"}));
+                                         Mutation{"ode_seesaw", "/gravity/2=-1e200"}),
+                         name_of);
 
 TEST(OdeHost, BodyThatItCannotTake_IsRefusedWithItsReason) {
   const test::CommandResult r = run({"ode_bed", "/rigid/bodies/0/pose/position/0=1e15"});
