@@ -486,7 +486,7 @@ TEST(CutScene, CutsThatMeetNothingOrComeTooLate_AreWarnedOf) {
     EXPECT_EQ(r.exit_code, 0) << r.err;
     return r.err;
   };
-  EXPECT_EQ(told(kPlane).find("warning"), std::string::npos);
+  EXPECT_EQ(told(kPlane).find("its cut at"), std::string::npos);
   const std::string beside =
       R"({"body": "cube", "t": 0.01, "shape": "plane", "point": [0, 0, 1], "normal": [0, 0, 2]})";
   const std::string missed = told(kPlane + (", " + beside));
