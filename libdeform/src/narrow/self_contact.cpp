@@ -402,7 +402,7 @@ void Self::edge_edge(uint32_t a, uint32_t b, Kin *kept) {
   if (!(nr * nr < widest * widest * nn)) return;
   // Setting back moves the ends of edges beside copies by as much as may leave crossings to them.
   const bool beside = Opened && kept->beside();
-  const auto nowhere = [beside](int place) { return beside ? place == kNowhere : place != kBetween; };
+  const auto nowhere = [&](int place) { return beside ? place == kNowhere : place != kBetween; };
   if (nowhere(place_on_edge(on_a, 2 * h * std::sqrt(speed2 / uu))) ||
       nowhere(place_on_edge(on_b, 2 * h * std::sqrt(speed2 / ww))))
     return;
