@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <thread>
 
+#include "cut_scenes.h"
 #include "deform/tool.h"
 #include "rigid.h"
 #include "support.h"
@@ -63,25 +64,17 @@ struct Cube {
       : own(o.threads),
         context(o.in ? o.in : own.c),
         w(test::make_world(context, {0, 0, o.floor ? -9.81 : 0})) {
-    dfm_tetmesh mesh = 0;
-    const double size[] = {0.04, 0.04, 0.04};
-    test::ok(dfm_tetmesh_make(context, "beam", size, 600, &mesh));
-    dfm_body_def d = dfm_body_def_default();
-    test::lend(mesh, d);
-    dfm_material_def m = dfm_material_def_default();
-    m.name = "tissue";
-    m.young = 3e4;
-    m.damping_stiffness = 2e-3;
-    const dfm_param_value row{"fracture_energy", &o.energy, 1};
-    m.extra = {sizeof(dfm_params), 1, &row};
-    test::ok(dfm_material_create(w, &m, &d.material));
-    d.name = "cube";
-    d.model = o.model;
-    for (double &c : d.pose.position) c = -0.02;
-    d.velocity[0] = o.velocity;
-    const std::vector<uint8_t> fixed(d.npoint, 7);
-    if (o.held) d.fixed = fixed.data();
-    test::ok(dfm_body_create(w, &d, &body));
+    test::cutting::Tough cube{.size = {0.04, 0.04, 0.04},
+                              .cells = 600,
+                              .energy = o.energy,
+                              .name = "cube",
+                              .model = o.model,
+                              .corner = -0.02,
+                              .velocity = o.velocity};
+    if (o.held) cube.held = [](const double *) { return true; };
+    cube.material.young = 3e4;
+    cube.material.damping_stiffness = 2e-3;
+    body = test::cutting::make(context, w, cube);
     if (o.floor) {
       dfm_obstacle_def below = dfm_obstacle_def_default();
       below.name = "floor";
@@ -124,18 +117,8 @@ struct Cube {
     test::ok(dfm_body_cut_delay(body, nullptr, &n));
     return n;
   }
-  uint32_t points() const {
-    dfm_body_info i{};
-    i.size = sizeof i;
-    test::ok(dfm_body_get_info(body, &i));
-    return i.npoint;
-  }
-  uint32_t parts() const {
-    dfm_cut_info info{};
-    info.size = sizeof info;
-    test::ok(dfm_body_remove_cells(body, 0, nullptr, &info));
-    return info.parts;
-  }
+  uint32_t points() const { return test::cutting::info(body).npoint; }
+  uint32_t parts() const { return test::cutting::parts(body); }
 };
 
 const char *const kModels[] = {"msm", "corotational_fem"};
@@ -312,6 +295,38 @@ TEST(CutDelay, BodyThatFallsInPieces_InBetween_LosesNoFace) {
   EXPECT_TRUE(go_on(other) == end);
   test::ok(dfm_world_restore(s.w, half_way.data(), half_way.size()));
   EXPECT_TRUE(go_on(s) == end);
+}
+
+// Faces that waited in a piece wait no more once a restore has taken the piece back, or it has no cells left.
+TEST(CutDelay, PieceThatIsGone_HoldsNoDelay) {
+  Cube s({.delay = 0.010});
+  const dfm_separate_def each = dfm_separate_def_default();
+  test::ok(dfm_body_set_separate(s.body, &each));
+  test::ok(dfm_world_filter_pair(s.w, "*", "*", false));
+  const std::string whole = test::snapshot(s.w);
+  const double z = s.z;
+  for (const bool restored : {true, false}) {
+    s.z = z;
+    while (s.waiting() == 0) s.step();
+    dfm_cut_def d = dfm_cut_def_default();  // into two halves across the blade
+    d.shape = DFM_CUT_BOX;
+    const double half[] = {0.05, 0.003, 0.05};
+    std::copy(half, half + 3, d.half_size);
+    test::cutting::cut(s.body, d);
+    const std::vector<dfm_body> pieces = test::listed(dfm_body_pieces, s.body);
+    ASSERT_EQ(pieces.size(), 1u);
+    uint32_t waiting = 0;
+    test::ok(dfm_body_cut_delay(pieces[0], nullptr, &waiting));
+    ASSERT_GT(waiting, 0u);
+    if (restored) {
+      test::cutting::restore(s.w, whole);
+    } else {
+      test::cutting::cut(pieces[0], test::cutting::sphere({0, 0, 0}, 1));
+      s.steps(30, 0);
+    }
+    EXPECT_EQ(s.waiting(), 0u);
+    EXPECT_EQ(dfm_body_set_cut_delay(s.body, 0.010), DFM_OK) << dfm_last_error();
+  }
 }
 
 TEST(CutDelay, WorldWithAFaceThatWaits_CanGo) {

@@ -442,23 +442,11 @@ TEST(Cut, MovingBlade_WithJitter_PartsTheCubeEachTime) {
   }
 }
 
-// Cuts of every kind at random places while two cubes lie on each other, until nothing is left.
 TEST(Cut, FractureEnergy_IsTheForceOnTheBladeTimesItsWay) {
   test::Context context;
   const dfm_world w = test::make_world(context, {0, 0, 0});
-  dfm_tetmesh mesh = 0;
-  const double size[] = {0.1, 0.06, 0.08}, toughness = 250;
-  test::ok(dfm_tetmesh_make(context, "beam", size, 600, &mesh));
-  dfm_body_def d = dfm_body_def_default();
-  test::lend(mesh, d);
-  dfm_material_def m = dfm_material_def_default();
-  m.name = "tissue";
-  const dfm_param_value row{"fracture_energy", &toughness, 1};
-  m.extra = {sizeof(dfm_params), 1, &row};
-  test::ok(dfm_material_create(w, &m, &d.material));
-  d.name = "block";
-  dfm_body b = 0;
-  test::ok(dfm_body_create(w, &d, &b));
+  const double toughness = 250;
+  const dfm_body b = make(context, w, {.size = {0.1, 0.06, 0.08}, .cells = 600, .energy = toughness});
   dfm_cut_def blade = plane(0, 0, DFM_CUT_SPLIT);
   double work = 0, most = 0, z = 0.09;
   const double step = 0.001;
@@ -481,19 +469,7 @@ TEST(Cut, FractureEnergy_IsTheForceOnTheBladeTimesItsWay) {
 TEST(Cut, FractureEnergy_IsNeverGivenBack) {
   test::Context context;
   const dfm_world w = test::make_world(context, {0, 0, 0});
-  dfm_tetmesh mesh = 0;
-  const double size[] = {0.1, 0.06, 0.08}, toughness = 250;
-  test::ok(dfm_tetmesh_make(context, "beam", size, 600, &mesh));
-  dfm_body_def d = dfm_body_def_default();
-  test::lend(mesh, d);
-  dfm_material_def m = dfm_material_def_default();
-  m.name = "tissue";
-  const dfm_param_value row{"fracture_energy", &toughness, 1};
-  m.extra = {sizeof(dfm_params), 1, &row};
-  test::ok(dfm_material_create(w, &m, &d.material));
-  d.name = "block";
-  dfm_body b = 0;
-  test::ok(dfm_body_create(w, &d, &b));
+  const dfm_body b = make(context, w, {.size = {0.1, 0.06, 0.08}, .cells = 600, .energy = 250});
   dfm_cut_def blade = plane(0, 0, DFM_CUT_SPLIT);
   const double center[] = {0.05, 0.03, 0.04}, along[] = {0.2966, 0.0812, -0.9515},
                way[] = {0.619, -0.7751, 0.1268};
@@ -514,6 +490,7 @@ TEST(Cut, FractureEnergy_IsNeverGivenBack) {
   EXPECT_LT(work, 1.62);
 }
 
+// Cuts of every kind at random places while two cubes lie on each other, until nothing is left.
 TEST(Cut, RandomCuts_KeepTheBooksToTheEnd) {
   std::mt19937 random(3);
   const auto share = [&] { return double(random() % 10001) / 10000; };

@@ -1,10 +1,13 @@
 // Cuts by time and without a tool: planes, the other shapes, events, pieces, snapshots, the key "cuts".
 #include <unistd.h>
 
+#include "cut_scenes.h"
 #include "support.h"
 #include "world.h"
 
 namespace {
+
+using test::cutting::parts;
 
 // A cube of 40 mm about the origin, at rest in empty space.
 struct Cube {
@@ -32,19 +35,7 @@ dfm_cut_def plane(double z, std::array<double, 3> normal = {0, 0, 1}) {
   return d;
 }
 
-uint32_t parts(dfm_body b) {
-  dfm_cut_info info{};
-  info.size = sizeof info;
-  test::ok(dfm_body_remove_cells(b, 0, nullptr, &info));
-  return info.parts;
-}
-
-uint32_t cells(dfm_body b) {
-  dfm_body_info i{};
-  i.size = sizeof i;
-  test::ok(dfm_body_get_info(b, &i));
-  return i.ntet;
-}
+uint32_t cells(dfm_body b) { return test::cutting::info(b).ntet; }
 
 std::vector<dfm_contact_event> cut_events(dfm_world w) {
   uint32_t n = 0;

@@ -3,11 +3,14 @@
 
 #include <set>
 
+#include "cut_scenes.h"
 #include "deform/tool.h"
 #include "rigid.h"
 #include "support.h"
 
 namespace {
+
+using test::cutting::parts;
 
 // A cube of 40 mm about the origin, at rest in empty space.
 struct Cube {
@@ -55,18 +58,7 @@ void move(dfm_world w, dfm_tool t, std::array<double, 3> from, std::array<double
     test::ok(dfm_world_step(w, 1e-3, &trouble));
   }
 }
-uint32_t parts(dfm_body b) {
-  dfm_cut_info info{};
-  info.size = sizeof info;
-  test::ok(dfm_body_remove_cells(b, 0, nullptr, &info));
-  return info.parts;
-}
-uint32_t cells(dfm_body b) {
-  dfm_body_info i{};
-  i.size = sizeof i;
-  test::ok(dfm_body_get_info(b, &i));
-  return i.ntet;
-}
+uint32_t cells(dfm_body b) { return test::cutting::info(b).ntet; }
 // Sum of the keys of the cut events since the last call, and the largest one.
 struct Told { uint64_t sum = 0, most = 0, n = 0; };
 Told told(dfm_world w, dfm_body b, dfm_tool t) {
@@ -150,14 +142,7 @@ TEST(ToolCut, BodyThatMovesIntoABlade_IsCut) {
   Cube s;
   const dfm_tool t = blade(s.w);
   cuts(t, DFM_CUT_SPLIT, s.body);
-  dfm_body_info i{};
-  i.size = sizeof i;
-  test::ok(dfm_body_get_info(s.body, &i));
-  std::vector<double> x(3 * size_t{i.npoint}), v(x.size());
-  uint32_t n = 0;
-  test::ok(dfm_body_get_state(s.body, i.npoint, x.data(), v.data(), &n));
-  for (size_t k = 2; k < v.size(); k += 3) v[k] = 1;
-  test::ok(dfm_body_set_state(s.body, i.npoint, x.data(), v.data()));
+  test::set_velocity(s.body, {0, 0, 1});
   for (int k = 0; k < 70; ++k) test::ok(dfm_world_step(s.w, 1e-3, nullptr));
   EXPECT_EQ(parts(s.body), 2u);
 }
@@ -315,23 +300,14 @@ struct Tough {
   explicit Tough(double stiffness, Held held, const char *model = "corotational_fem",
                  uint32_t integrator = DFM_INTEGRATOR_SYMPLECTIC_EULER, double turn = 5)
       : w(test::make_world(context, {0, 0, 0}, integrator)) {
-    dfm_tetmesh mesh = 0;
-    const double size[] = {0.04, 0.04, 0.04}, energy = kEnergy;
-    test::ok(dfm_tetmesh_make(context, "beam", size, 320, &mesh));
-    dfm_body_def d = dfm_body_def_default();
-    test::lend(mesh, d);
-    dfm_material_def m = dfm_material_def_default();
-    m.name = "tissue";
-    const dfm_param_value row{"fracture_energy", &energy, 1};
-    m.extra = {sizeof(dfm_params), 1, &row};
-    test::ok(dfm_material_create(w, &m, &d.material));
-    d.name = "cube";
-    for (double &c : d.pose.position) c = -0.02;
-    d.model = model;
-    std::vector<uint8_t> fixed(d.npoint);
-    for (uint32_t i = 0; i < d.npoint; ++i) fixed[i] = held(d.points + 3 * size_t{i}) ? 7 : 0;
-    d.fixed = fixed.data();
-    test::ok(dfm_body_create(w, &d, &body));
+    body = test::cutting::make(context, w,
+                               {.size = {0.04, 0.04, 0.04},
+                                .cells = 320,
+                                .energy = kEnergy,
+                                .name = "cube",
+                                .model = model,
+                                .corner = -0.02,
+                                .held = held});
     dfm_tool_def td = dfm_tool_def_default();
     td.name = "knife";
     td.shape = DFM_TOOL_BLADE;
@@ -419,12 +395,7 @@ TEST(ToolCut, DrivenBlade_BendsTheBody) {
     s.down(0.02, 0.2);
     double lowest = 0;
     const auto sag = [&] {
-      dfm_body_info i{};
-      i.size = sizeof i;
-      test::ok(dfm_body_get_info(s.body, &i));
-      std::vector<double> x(3 * size_t{i.npoint}), v(x.size());
-      uint32_t n = 0;
-      test::ok(dfm_body_get_state(s.body, i.npoint, x.data(), v.data(), &n));
+      const std::vector<double> x = test::cutting::State(s.body).x;
       for (size_t k = 2; k < x.size(); k += 3) lowest = std::min(lowest, x[k] + 0.02);
     };
     for (double z = 0.015; z > -0.045; z -= 0.005) {

@@ -230,12 +230,7 @@ TEST(ToolLift, ABrickBetweenAToolAndASoftBlock_HandsTheForceOn) {
   test::Context context;
   const dfm_world w = test::make_world(context, {0, 0, 0});
   test::set_friction(w, 0.5);
-  test::BodyOptions o;
-  o.young = 3e4;
-  o.damping_stiffness = 2e-3;
-  o.damping_mass = 20;
-  o.position = {-0.02, -0.02, -0.04};
-  const dfm_body block = test::make_body(context, w, "beam", {0.04, 0.04, 0.04}, 250, o);
+  const dfm_body block = soft_block(context, w, 20);
   test::hold_bottom(block);
   const dfm_rigid brick =
       test::create(w, {test::box("brick", {0.015, 0.015, 0.005}, 0.05, {0, 0, 0.0055})})[0];

@@ -176,11 +176,7 @@ TEST(ToolTouch, RigidAndSoftBodiesBeside_GetTheirShare) {
   test::Context context;
   const dfm_world w = test::make_world(context, {0, 0, 0});
   test::set_friction(w, 0.4);
-  test::BodyOptions o;
-  o.young = 3e4;
-  o.damping_stiffness = 2e-3;
-  o.position = {-0.02, -0.02, -0.04};
-  const dfm_body block = test::make_body(context, w, "beam", {0.04, 0.04, 0.04}, 250, o);
+  const dfm_body block = soft_block(context, w);
   dfm_rigid_def brick = test::box("brick", {0.02, 0.02, 0.02}, 0.1, {0, 0.06, 0.05});
   const dfm_rigid_set_def set = {sizeof set, 1, 0, 0, &brick, nullptr, nullptr};
   dfm_rigid stone = 0;

@@ -23,6 +23,13 @@ inline dfm_body_info info(dfm_body b) {
   return i;
 }
 
+// Parts that hang together.
+inline uint32_t parts(dfm_body b) {
+  dfm_cut_info i = ask();
+  test::ok(dfm_body_remove_cells(b, 0, nullptr, &i));
+  return i.parts;
+}
+
 struct State {
   std::vector<double> x, v;
   explicit State(dfm_body b) {
@@ -33,6 +40,40 @@ struct State {
     test::ok(dfm_body_get_state(b, n, x.data(), v.data(), &n));
   }
 };
+
+// A beam of a material that takes energy to be cut.
+struct Tough {
+  std::array<double, 3> size;
+  uint32_t cells;
+  double energy;  // J/m2
+  const char *name = "block", *model = nullptr;
+  double corner = 0;                        // m, along each axis
+  bool (*held)(const double *x) = nullptr;  // by places in the mesh; null: no point
+  double velocity = 0;                      // m/s along x
+  dfm_material_def material = dfm_material_def_default();
+};
+
+inline dfm_body make(dfm_context *c, dfm_world w, Tough o) {
+  dfm_tetmesh mesh = 0;
+  test::ok(dfm_tetmesh_make(c, "beam", o.size.data(), o.cells, &mesh));
+  dfm_body_def d = dfm_body_def_default();
+  test::lend(mesh, d);
+  o.material.name = "tissue";
+  const dfm_param_value row{"fracture_energy", &o.energy, 1};
+  o.material.extra = {sizeof(dfm_params), 1, &row};
+  test::ok(dfm_material_create(w, &o.material, &d.material));
+  d.name = o.name;
+  d.model = o.model;
+  for (double &x : d.pose.position) x = o.corner;
+  d.velocity[0] = o.velocity;
+  std::vector<uint8_t> fixed(d.npoint);
+  for (uint32_t i = 0; i < d.npoint; ++i) fixed[i] = o.held && o.held(d.points + 3 * size_t{i}) ? 7 : 0;
+  if (o.held) d.fixed = fixed.data();
+  dfm_body body = 0;
+  test::ok(dfm_body_create(w, &d, &body));
+  test::ok(dfm_tetmesh_destroy(mesh));
+  return body;
+}
 
 inline dfm_cut_def sphere(std::array<double, 3> at, double radius) {
   dfm_cut_def d = dfm_cut_def_default();

@@ -48,6 +48,16 @@ struct BoxMesh {
   }
 };
 
+// A soft cube of 40 mm, its top in the plane z = 0; damping_mass: 1/s.
+inline dfm_body soft_block(dfm_context *c, dfm_world w, double damping_mass = 0) {
+  test::BodyOptions o;
+  o.young = 3e4;
+  o.damping_stiffness = 2e-3;
+  o.damping_mass = damping_mass;
+  o.position = {-0.02, -0.02, -0.04};
+  return test::make_body(c, w, "beam", {0.04, 0.04, 0.04}, 250, o);
+}
+
 inline dfm_tool make(dfm_world w, const dfm_tool_def &d) {
   dfm_tool t = 0;
   test::ok(dfm_tool_create(w, &d, &t));

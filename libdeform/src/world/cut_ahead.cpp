@@ -127,7 +127,7 @@ void set_cut_delay(Body &b, double delay) {
     for (auto &other : *list)
       if (other.get() == &b || other->piece_of == b.id) all.push_back(other.get());
   for (const Body *const other : all)
-    if (!other->ahead.faces.empty())
+    if (!other->ahead.faces.empty() && !other->emptied && !other->undone)
       fail(DFM_E_STATE,
            "body '%s': %zu faces wait to be opened; set how long its cuts wait before a tool cuts it",
            other->name.c_str(), other->ahead.faces.size() + other->ahead.later.size());
