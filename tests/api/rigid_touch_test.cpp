@@ -296,7 +296,7 @@ TEST(RigidTouch, Tumbling_StaysInside) {
       for (double &x : start.position) x = 0.15 * next();
       start.position[2] += 0.3;
       test::ok(dfm_rigid_set_state(r, &start));
-      const double turn = 0.1 / dt < 20 ? 0.06 / dt : 20;  // rad/s
+      const double turn = 30;  // rad/s
       push(r, {6 * next(), 6 * next(), 6 * next()}, {turn * next(), turn * next(), turn * next()});
       const auto energy = [&] { return test::rigid_measure(r).kinetic + kG * test::state(r).position[2]; };
       double last = energy();
@@ -389,4 +389,40 @@ TEST(RigidTouch, WhatPassesThroughAFloor_IsTold) {
   EXPECT_NE(context.log.find("take a host with contact"), std::string::npos);
   EXPECT_EQ(context.log.find("rigid body 'cart' is ", first + 1), std::string::npos) << "once";
   EXPECT_EQ(context.log.find("'free'"), std::string::npos) << context.log;
+}
+
+// Thrown with a fast spin onto a plane at 60 Hz: a corner goes along its arc, and none is deep in the plane.
+// Energy is compared where free flight keeps it: not at 200 rad/s, 3 rad in a sub-step.
+TEST(RigidTouch, FastSpin_LeavesNothingInTheFloor) {
+  const double dt = 1.0 / 60;
+  for (const double spin : {40.0, 200.0})
+    for (const Vec half : {Vec{0.05, 0.05, 0.05}, Vec{0.05, 0.04, 0.03}, Vec{0.1, 0.03, 0.02}}) {
+      SCOPED_TRACE(std::to_string(spin) + " rad/s " + std::to_string(half[0]));
+      double deepest = 0, made = 0;
+      for (int run = 0; run < 24; ++run) {
+        test::Context context;
+        const dfm_world w = test::make_world(context, {0, 0, -kG});
+        test::add_plane(w, "floor");
+        const dfm_rigid r = test::create(w, {test::box("box", half, 1, {0, 0, 0.2 + 0.01 * run})})[0];
+        const double a = 0.5 * run, c = std::cos(a), s = std::sin(a);
+        push(r, {0.2, 0.1, -2}, {spin * c, spin * s * std::cos(3 * a), spin * s * std::sin(3 * a)});
+        const auto energy = [&] { return test::rigid_measure(r).kinetic + kG * test::state(r).position[2]; };
+        double last = energy();
+        for (int i = 0; i * dt < 1.5; ++i) {
+          ASSERT_EQ(dfm_world_step(w, dt, nullptr), DFM_OK) << dfm_last_error();
+          const dfm_rigid_state now = test::state(r);
+          for (int k = 0; k < 8; ++k) {
+            const Vec arm = rotate(now.rotation, {k & 1 ? half[0] : -half[0], k & 2 ? half[1] : -half[1],
+                                                  k & 4 ? half[2] : -half[2]});
+            deepest = std::max(deepest, -(now.position[2] + arm[2]));
+          }
+          made = std::max(made, energy() - last);
+          last = energy();
+        }
+      }
+      EXPECT_LT(deepest, 1e-5) << "m";
+      if (spin < 50) {
+        EXPECT_LT(made, 1e-6) << "J";
+      }
+    }
 }

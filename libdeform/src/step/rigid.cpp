@@ -85,7 +85,7 @@ bool stage_rigid_predict(World &w, StepContext &step, uint32_t *trouble) {
   step.rigid_again = false;
   for (auto &set : w.rigid_sets) set->begin(sub_step_of(w, step));
   if (!ask_rigids(w, trouble)) return false;
-  step.tools.begin(w, step);
+  if (!step.tools.begin(w, step)) return false;
   for (auto &set : w.rigid_sets) set->first.assign(set->velocity.begin(), set->velocity.end());
   for (auto &o : w.obstacles) {
     if (!o->rigid || o->rigid->group[o->rigid_body] == DFM_RIGID_STILL) continue;
@@ -214,6 +214,7 @@ bool stage_rigid_commit(World &w, StepContext &step, uint32_t *trouble) {
     if (!stage_solve(w, step, trouble)) return false;
   }
   step.rigid_again = false;
+  if (!step.tools.follows_arcs(step)) return false;
   step.tools.turn_jaws();
   // From here on (guard) their true motion is used.
   for (auto &o : w.obstacles) {

@@ -7,6 +7,7 @@
 #include "geometry/closest.h"
 #include "math/turn.h"
 #include "state/world.h"
+#include "step/budget.h"
 #include "step/context.h"
 #include "step/pair_table.h"
 
@@ -14,17 +15,20 @@ namespace dfm {
 namespace {
 
 constexpr uint32_t kMostSweeps = 60;
-constexpr double kDone = 1e-13;      // of the largest speed that a row asks to change
-constexpr double kSame = 1e-9;       // of it: soft bodies need not be asked again
-constexpr double kOpens = 0.1;       // of d_c in a sub-step, where two tools are in each other
-constexpr double kJaw = 1e4;         // N/m, of a jaw at its tip
-constexpr double kFace = 1e5;        // N/m, of a place on the face of a jaw
-constexpr double kDent = 5e-4;       // m: edges that are further on the wrong side do not touch there
-constexpr double kCross = 1e-6;      // sine between edges that have a normal
-constexpr double kSmallTurn = 0.05;  // rad in a sub-step, up to which a series has less rounding
-constexpr uint32_t kSweeps = 6;      // between two leaps
-constexpr double kFaster = 0.5;      // of what the best sweep has left, by a leap: else the pass ends
-constexpr uint32_t kMostPasses = 6;  // over the laws, and what turning adds, until both change no more
+constexpr double kDone = 1e-13;            // of the largest speed that a row asks to change
+constexpr double kSame = 1e-9;             // of it: soft bodies need not be asked again
+constexpr double kOpens = 0.1;             // of d_c in a sub-step, where two tools are in each other
+constexpr double kJaw = 1e4;               // N/m, of a jaw at its tip
+constexpr double kFace = 1e5;              // N/m, of a place on the face of a jaw
+constexpr double kDent = 5e-4;             // m: edges that are further on the wrong side do not touch there
+constexpr double kCross = 1e-6;            // sine between edges that have a normal
+constexpr double kSmallTurn = 0.05;        // rad in a sub-step, up to which a series has less rounding
+constexpr double kArc = 0.2;               // rad in a sub-step, of a free body that touches
+constexpr double kAims = 0.9;              // of kArc, where a sub-step is repeated
+constexpr double kLeastPiece = 1.0 / 256;  // of a planned sub-step
+constexpr uint32_t kSweeps = 6;            // between two leaps
+constexpr double kFaster = 0.5;            // of what the best sweep has left, by a leap: else the pass ends
+constexpr uint32_t kMostPasses = 6;        // over the laws, and what turning adds, until both change no more
 
 bool builtin(const Obstacle &o) { return o.rigid && !o.rigid->of_tool && o.rigid->host_name == "builtin"; }
 bool of_tool(const Obstacle &o) { return o.rigid && o.rigid->of_tool; }
@@ -576,25 +580,54 @@ void ToolTouch::take_sets(World &w, StepContext &step) {
   }
 }
 
-void ToolTouch::begin(World &w, StepContext &step) {
+// The way of a corner is an arc, and passes over it (solve) converge by a factor of about h w each; from
+// about a radian on they do not, a corner ends in a floor, and energy comes from nowhere. False: a free body
+// that touches turns so far in this sub-step, which is to be repeated shorter. The arc leaves its tangent by
+// at most (h w)^2 r / 2: what stays clear by that does not touch.
+bool ToolTouch::follows_arcs(StepContext &step) const {
+  double turn = 0;
+  for (const Row &row : rows_) {
+    if (!row.frees) continue;
+    double most = 0, leaves = 0;
+    for (const Side *side : {&row.a, &row.b}) {
+      const double r = norm(side->bone), way = h_ * norm(cross(spin(*side), side->bone));
+      if (!(way > kArc * r)) continue;
+      most = std::max(most, way / r);
+      leaves += 0.5 * way * way / r;
+    }
+    const double room = std::max(0.0, -h_ * row.rate);
+    const double closes = std::min(0.0, h_ * dot(row.normal, speed(row)));
+    if (row.impulse > 0 || room + closes < leaves) turn = std::max(turn, most);
+  }
+  if (!(turn > 0) || !(step.h > kLeastPiece * step.guard.planned) || spares(step, Thrift::pieces))
+    return true;
+  step.guard.again = true;
+  step.guard.cut = kAims * kArc / turn;
+  return false;
+}
+
+bool ToolTouch::begin(World &w, StepContext &step) {
   rows_.clear();
   if (next_.n > 0) keep_next();
   sides_.clear();
   offset_ = w.offset;
   if (!passing_.empty()) tell_passing(w, step);
-  if (pairs_.empty()) return;
+  if (pairs_.empty()) return true;
   h_ = step.h;
   take_sets(w, step);
   tell_driven(w, step);
   find(w, step);
   if (rows_.empty() && !add_hits(w, step)) {
     sides_.clear();
-    return;
+    return true;
   }
+  if (!follows_arcs(step)) return false;
   take_last(w);
   solve_past_hits(w, step);
+  if (!follows_arcs(step)) return false;
   for (Row &row : rows_) row.before = row.given();
   give_velocities();
+  return true;
 }
 
 void ToolTouch::give_velocities() {

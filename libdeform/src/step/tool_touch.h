@@ -42,13 +42,16 @@ class ToolTouch {
   explicit ToolTouch(const Memory &memory);
   // After a change of things or rules: which obstacles may touch, and by which law.
   void prepare(World &w, SceneFacts &facts);
-  // Before the solve: the rows of this sub-step, and the sets' velocities with their impulses.
-  void begin(World &w, StepContext &step);
+  // Before the solve: the rows of this sub-step, and the sets' velocities with their impulses. False: it has
+  // to be repeated shorter (Guard::again).
+  bool begin(World &w, StepContext &step);
   // The hosts were asked for their velocities anew.
   void correct();
   // The sets' impulses are those of soft bodies: adds those of the rows. True: they differ from those that
   // the velocities have, so soft bodies have to be asked again.
   bool answer(const World &w, const StepContext &step);
+  // Whether the sub-step is short enough for the spin of what touches. False: as begin().
+  bool follows_arcs(StepContext &step) const;
   // Once the hosts have ended their sub-step: turns the ends of the jaws.
   void turn_jaws();
   // At the end of a sub-step that stands: what lasts becomes the world's.
