@@ -1,7 +1,9 @@
 #include "own_world.h"
 
 #include <algorithm>
+#include <exception>
 #include <memory>
+#include <mutex>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -183,8 +185,13 @@ OdeWorld::~OdeWorld() {
   if (!broken_.empty()) {
     // ODE left its world locked and half stepped: destroying it would end the process. A static list still
     // points to its objects, so that leak checkers do not report them.
+    static std::mutex mutex;  // worlds may be destroyed on several threads
     static auto *const left = new std::vector<std::tuple<dWorldID, dSpaceID, dJointGroupID>>;
-    left->emplace_back(engine_.world, space_, engine_.contacts);
+    try {
+      const std::lock_guard lock(mutex);
+      left->emplace_back(engine_.world, space_, engine_.contacts);
+    } catch (const std::exception &) {  // no memory for the list: leaked, and reported
+    }
     return;
   }
   engine_.end();
