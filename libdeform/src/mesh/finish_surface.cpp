@@ -92,7 +92,7 @@ uint32_t merge_points(RawMesh &raw) {
 // Programs that compute a seam or a pole twice write coordinates that differ in the last digits: of a double,
 // of a single, or of a text with six digits (1e-5 of the value at most). A gap as narrow as that is no
 // opening. Only points on open edges are merged, within 1e-5 of the largest coordinate and a thousandth of
-// the open edges there, so that no shape is lost. Only the first point of a place is looked up, in file order
+// the open edges there, so that no shape is lost. The first point of a place, in file order, is looked up.
 constexpr double kRounding = 1e-5, kOfEdge = 1e-3;
 
 class Rims {
@@ -104,8 +104,8 @@ class Rims {
     double reach = 0, longest = 0;
     for (const uint64_t e : edges) {
       longest = std::max(longest, distance(first_end(e), second_end(e)));
-      for (int k = 0; k < 3; ++k)
-        reach = std::max(reach, std::fabs(raw_.points[3 * size_t(first_end(e)) + k]));
+      for (const uint32_t p : {first_end(e), second_end(e)})
+        for (int k = 0; k < 3; ++k) reach = std::max(reach, std::fabs(raw_.points[3 * size_t(p) + k]));
     }
     width_ = std::min(kRounding * reach, kOfEdge * longest);
     if (!(width_ > 0)) return 0;

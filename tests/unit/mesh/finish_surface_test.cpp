@@ -149,6 +149,14 @@ TEST(FinishSurface, OneRoundingApart_IsMerged) {
             "1 point on open edges was merged with another that differs by rounding only\n");
 }
 
+// The coordinate by which rounding is measured counts wherever its point stands in the file.
+TEST(FinishSurface, OneRoundingApart_OfALargeCoordinateThatComesLast_IsMerged) {
+  Soup s;
+  s.points = {{0, 0, 0}, {0.1, 0, 0}, {0, 0.1, 0}, {0.1 + 3e-6, 0, 0}, {0, 0.1, 0}, {1, 1, 0}};
+  s.tris = {{0, 1, 2}, {3, 5, 4}};
+  EXPECT_EQ(finished(s).npoint(), 4u);
+}
+
 // A slit that is meant is wider; points that are no ends of open edges stay, however near.
 TEST(FinishSurface, FartherApart_IsNotMerged) {
   Soup s = loose(box({}, {1, 1, 1}));
