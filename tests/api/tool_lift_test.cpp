@@ -252,3 +252,36 @@ TEST(ToolLift, ABrickBetweenAToolAndASoftBlock_HandsTheForceOn) {
   EXPECT_NEAR(s.position[0], 0.002, 3e-4) << "carried along by friction";
   EXPECT_LT(std::fabs(s.velocity[0]) + std::fabs(s.velocity[2]), 1e-4);
 }
+
+// The list of pairs is made anew after a restore: how long it is shows in no snapshot.
+TEST(ToolLift, SnapshotOfABrickBetweenAToolAndASoftBlock_GoesOnToTheSameBytes) {
+  const auto made = [](dfm_context *c) {
+    const dfm_world w = test::make_world(c);
+    test::set_friction(w, 0.4);
+    test::add_plane(w, "floor", {0, 0, -0.04});
+    soft_block(c, w, 5);
+    test::create(w, {test::box("brick", {0.015, 0.015, 0.005}, 0.05, {0, 0, 0.0055})});
+    dfm_tool_def d = dfm_tool_def_default();
+    d.name = "finger";
+    d.pose = pose({0, 0, 0.017});
+    const dfm_pose to = pose({0.002, 0, 0.011});
+    test::ok(dfm_tool_set_pose(make(w, d), &to, nullptr));
+    return w;
+  };
+  const auto go = [](dfm_world w, int n) {
+    for (int i = 0; i < n; ++i) ASSERT_EQ(dfm_world_step(w, 1e-3, nullptr), DFM_OK) << dfm_last_error();
+  };
+  test::Context context;
+  const dfm_world w = made(context), other = made(context);
+  go(w, 5);
+  const std::string half = test::snapshot(w);
+  go(w, 60);
+  EXPECT_GT(test::stats(w).pairs_tested, 0u);
+  const std::string end = test::snapshot(w);
+  for (const dfm_world again : {w, other}) {
+    test::ok(dfm_world_restore(again, half.data(), half.size()));
+    EXPECT_TRUE(test::snapshot(again) == half);
+    go(again, 60);
+    EXPECT_TRUE(test::snapshot(again) == end);
+  }
+}

@@ -176,7 +176,6 @@ void keep_contacts(World &w, StepContext &step) {
 
   w.stats.contacts = touching;
   w.stats.sticking = sticking;
-  w.stats.pairs_tested = static_cast<uint32_t>(step.broad.candidates().size());
   w.stats.contacts_max = std::max(w.stats.contacts_max, touching);
   w.stats.contacts_mean += (touching - w.stats.contacts_mean) / double(w.stats.substeps + 1);
 }
