@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <filesystem>
 #include <memory>
 #include <thread>
 
@@ -15,6 +14,7 @@
 #include "cost/report.h"
 #include "file.h"
 #include "messages.h"
+#include "out_folder.h"
 #include "run_folder.h"
 
 namespace cli {
@@ -38,8 +38,7 @@ std::vector<std::string> split(const std::vector<std::string> &lists) {
 }
 
 int cost_of(CostOptions options, Globals &globals) {
-  if (options.out.empty())
-    options.out = "out/" + std::filesystem::path(options.scene).stem().string() + "_cost";
+  if (options.out.empty()) options.out = out_folder(options.scene, "cost");
   options.study.axes = split(options.study.axes);
   const cost::Subject subject = cost::read_subject(options.scene, globals);
   make_folder(options.out);

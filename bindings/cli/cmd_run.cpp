@@ -22,6 +22,7 @@
 #include "json_text.h"
 #include "leaving.h"
 #include "messages.h"
+#include "out_folder.h"
 #include "output.h"
 #include "planned.h"
 #include "progress.h"
@@ -432,7 +433,7 @@ class Runner {
 }  // namespace
 
 int run_scene(RunOptions options, const Globals &globals, Comparison *comparison) {
-  if (options.out.empty()) options.out = "out/" + std::filesystem::path(options.scene).stem().string();
+  if (options.out.empty()) options.out = out_folder(options.scene, "run");
   if (options.time > 0) {  // the scene is read for that long: it reports what comes after its end
     char text[64];
     std::snprintf(text, sizeof text, "/time/duration=%.17g", options.time);
@@ -484,7 +485,9 @@ void add_run(CLI::App &app, Globals &globals, int *exit_code) {
   };
   CLI::App *sub = app.add_subcommand("run", "simulates a scene and writes figures and pictures");
   sub->add_option("SCENE", options->scene, "scene file (JSON)")->required();
-  sub->add_option("--out", options->out, "folder for the results (out/SCENE)")->type_name("DIR");
+  sub->add_option("--out", options->out,
+                  "folder for the results (out/SCENE; of a FOLDER/scene.json out/FOLDER_run)")
+      ->type_name("DIR");
   sub->add_option("--time", options->time, "seconds to simulate, instead of the scene's")
       ->check(positive)
       ->type_name("T");

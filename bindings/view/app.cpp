@@ -9,6 +9,7 @@
 
 #include "json_text.h"
 #include "messages.h"
+#include "out_folder.h"
 #include "run.h"
 #include "run_folder.h"
 #include "state_file.h"
@@ -21,7 +22,7 @@ constexpr double kBudget = 0.022;    // s of a frame that may go into steps, so 
 
 std::string folder_of(const Options &options, const std::string &scene) {
   if (!options.out.empty()) return options.out;
-  return "out/" + std::filesystem::path(scene).stem().string() + "_view";
+  return cli::out_folder(scene, "view");
 }
 
 // As for off-screen pictures: the scene's own camera, or one that holds everything.

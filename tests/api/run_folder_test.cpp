@@ -138,6 +138,26 @@ TEST(SceneText, BytesBehindANul_AreRefused) {
   expect_sentence(test::deform({"friction", dir + "/case.json"}), {"case.json:1: this is not JSON"});
 }
 
+// `deform mesh from-labels` calls each scene scene.json: without --out each goes by its folder's name, and
+// what has another name by its own.
+TEST(RunFolder, ScenesOfOneName_DoNotShareTheDefaultFolder) {
+  const std::string dir = fresh("defaults");
+  for (const char *scene : {"liver/scene.json", "kidney/scene.json", "kidney/block.json"}) {
+    fs::create_directories(fs::path(dir + "/" + scene).parent_path());
+    test::write_file(dir + "/" + scene, kScene);
+  }
+  const fs::path before = fs::current_path();
+  fs::current_path(dir);
+  for (const char *scene : {"liver/scene.json", "./kidney/../kidney/scene.json", "kidney/block.json"})
+    EXPECT_EQ(test::deform({"run", scene, "--quiet"}).exit_code, 0) << scene;
+  fs::current_path(dir + "/liver");
+  EXPECT_EQ(test::deform({"run", "scene.json", "--quiet"}).exit_code, 0);
+  fs::current_path(before);
+  for (const char *out : {"out/liver_run", "out/kidney_run", "out/block", "liver/out/liver_run"})
+    EXPECT_TRUE(fs::exists(dir + "/" + out + "/summary.json")) << out;
+  EXPECT_FALSE(fs::exists(dir + "/out/scene"));
+}
+
 TEST(SceneText, KeysDoubledByEscapes_AreRefused) {
   const std::string dir = fresh("doubled");
   std::string twice = kScene;
