@@ -10,7 +10,8 @@ namespace {
 
 std::string percent(const JsonValue &row, const char *key) {
   char text[32];
-  std::snprintf(text, sizeof text, "%.2g %%", 100 * std::strtod(row.get(key).c_str(), nullptr));
+  const double share = 100 * std::strtod(row.get(key).c_str(), nullptr);
+  std::snprintf(text, sizeof text, share < 99.5 ? "%.2g %%" : "%.0f %%", share);
   return text;
 }
 double value(const JsonValue &row, const char *key) { return std::strtod(row.get(key).c_str(), nullptr); }
@@ -22,9 +23,14 @@ void print_way(const JsonValue &way, const char *begin) {
     models += (i ? ", " : "") + bodies->items[i].get("model");
   if (bodies && bodies->items.size() > 4) models += ", ...";
   const std::string scheme = bodies && !bodies->items.empty() ? bodies->items[0].get("integrator") : "";
-  std::printf("%s%-38s  %-16s  step %-9.9s  error %-8s  %.3g s per s, %.3g ms per step\n", begin,
-              models.c_str(), scheme.c_str(), way.get("step").c_str(), percent(way, "error").c_str(),
-              value(way, "cpu_s_per_s"), value(way, "ms_per_step"));
+  char step[32] = "auto", each[32] = "1/60 s";
+  if (value(way, "step") > 0) {
+    std::snprintf(step, sizeof step, "%.3g ms", 1e3 * value(way, "step"));
+    std::snprintf(each, sizeof each, "step");
+  }
+  std::printf("%s%-38s  %-16s  step %-9s  error %-8s  %.3g s of processor per second, %.3g ms per %s\n",
+              begin, models.c_str(), scheme.c_str(), step, percent(way, "error").c_str(),
+              value(way, "cpu_s_per_s"), value(way, "ms_per_step"), each);
 }
 
 }  // namespace
@@ -46,6 +52,8 @@ void print_planned(const std::string &json) {
   for (size_t i = 0; ways && i < ways->items.size(); ++i) print_way(ways->items[i], "  possible: ");
   if (way) {
     print_way(*way, plan.get("meets") == "true" ? "  chosen:   " : "  nearest:  ");
+    if (const std::string missed = plan.get("missed"); !missed.empty())
+      std::printf("  missed:   %s; deform cost measures what each costs\n", missed.c_str());
     const JsonValue *const bodies = way->find("bodies");
     for (size_t i = 0; bodies && i < bodies->items.size(); ++i) {
       const JsonValue &b = bodies->items[i];
@@ -69,11 +77,9 @@ void print_choice(const std::string &json) {
 std::string planned_sentence(const std::string &json) {
   JsonValue plan;
   if (json.empty() || !parse_json(json, plan) || plan.get("meets") == "true") return "";
-  const JsonValue *const way = plan.find("predicted");
-  return "the planner finds no settings that meet the goal of the scene; it uses the nearest ones, with a "
-         "predicted error of " +
-         (way ? percent(*way, "error") + " and " + way->get("ms_per_step") + " ms per step" : "?") +
-         " (see: deform explain)";
+  return "planner: " + plan.get("missed") +
+         "; the nearest choice is simulated (see: deform explain; deform cost "
+         "measures)";
 }
 
 }  // namespace cli

@@ -93,9 +93,42 @@ TEST_F(PlannerScene, BudgetThatCannotBeMet_IsReportedByTheRun) {
   const test::CommandResult r =
       test::deform({"run", bar(R"("budget": {"ms_per_step": 1e-6},)"), "--out", folder() + "/out"});
   EXPECT_EQ(r.exit_code, 0) << r.err;
-  EXPECT_TRUE(has(r.err, "the planner finds no settings that meet the goal of the scene")) << r.err;
+  for (const char *word : {"planner: the budget of 1e-06 ms per step is not met", "a larger budget",
+                           "the nearest choice is simulated", "deform cost"})
+    EXPECT_TRUE(has(r.err, word)) << "no '" << word << "' in: " << r.err;
   EXPECT_EQ(r.out.find("planner, nearest: "), 0u) << "what is simulated: " << r.out;
   EXPECT_TRUE(has(r.out, " ms per step\nbody ")) << r.out;
+}
+
+// A mesh of few cells across cannot bend to within 2 %: that is told with the figures of the choice.
+TEST_F(PlannerScene, TargetThatCannotBeMet_IsToldByRunAndExplain) {
+  const std::string scene = bar(R"("accuracy": {"target": 0.02},)");
+  const test::CommandResult r = test::deform({"run", scene, "--out", folder() + "/out"});
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  const test::CommandResult told = test::deform({"explain", scene});
+  for (const std::string *text : {&r.err, &told.out})
+    for (const char *word : {"the target of 2 % is not met: body 'bar' has a predicted error of", "mesh ",
+                             " times as many cells", "deform cost"})
+      EXPECT_TRUE(has(*text, word)) << "no '" << word << "' in: " << *text;
+  EXPECT_TRUE(has(told.out, "  nearest: ")) << told.out;
+  EXPECT_FALSE(has(told.out, "  chosen: ")) << told.out;
+}
+
+// A silicone finger whose explicit steps would be 2 us.
+TEST_F(PlannerScene, StiffFingerUnderAProbe_MovesImplicitly) {
+  const std::string path = folder() + "/finger.json";
+  test::write_file(path, R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.5},
+ "accuracy": {"target": 0.05, "quantity": "tip"},
+ "materials": {"silicone": {"density": 1070, "young": 2e5, "poisson": 0.4, "damping": {"stiffness": 0.003}}},
+ "bodies": [{"name": "finger", "material": "silicone",
+   "mesh": {"make": "beam", "size": [0.1, 0.02, 0.02], "cells": 2000},
+   "fix": [{"box": [[-1, -1, -1], [1e-6, 1, 1]]}]}],
+ "obstacles": [{"name": "rod", "shape": "sphere", "radius": 0.01, "motion": {"keyframes": [
+   {"t": 0, "position": [0.09, 0.01, 0.031]}, {"t": 0.3, "position": [0.09, 0.01, 0.005]}]}}],
+ "probes": [{"name": "tip", "body": "finger", "point": [0.1, 0.01, 0.01]}]})");
+  const test::CommandResult r = test::deform({"explain", path});
+  ASSERT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_TRUE(has(r.out, "--set /time/integrator=tr_bdf2")) << r.out;
 }
 
 TEST_F(PlannerScene, WhatCannotBePlanned_IsReportedInOneSentence) {

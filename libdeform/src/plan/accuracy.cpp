@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/error.h"
 
@@ -60,6 +61,16 @@ double mesh_error(const BodyRegime &b) {
   return at_most((b.held ? kBending : kElse) / (cells * cells), 1);
 }
 
+// rad of the lowest mode that TR-BDF2 passes by backward Euler, because the body touches something. A held
+// body that a probe presses longer than half a period follows the probe and no longer swings freely; so half
+// a period counts for each time that something comes to it. What its own load carries onto something bounces
+// there, as often as it swings.
+double touched_turns(const BodyRegime &b, const Estimate &e) {
+  const double turns = e.frequency * e.lasts;
+  const bool bounces = b.below > 0 && b.below <= e.sag + b.depth;
+  return !b.held || b.meets_body || bounces ? turns : std::min(turns, kPi * b.presses);
+}
+
 // The error of the scheme in the lowest mode until damping has ended it; the distance that a body moves
 // between two detections; and the share of a rebound that backward Euler removes.
 double time_error(Scheme scheme, bool steps_itself, double h, const BodyRegime &b, const Estimate &e) {
@@ -67,8 +78,10 @@ double time_error(Scheme scheme, bool steps_itself, double h, const BodyRegime &
   double oscillation = 0;
   if (steps_itself && !b.touches) oscillation = 0;  // exact by mode
   else if (scheme == Scheme::explicit_euler && !steps_itself) oscillation = wh * wh / 24 * turns;
-  else if (scheme == Scheme::tr_bdf2 && !b.touches) oscillation = 0.0404 * wh * wh * turns;  // Bank 1985
-  else oscillation = -std::expm1(-0.5 * wh * turns);  // backward Euler: the amplitude that it takes away
+  else if (scheme == Scheme::tr_bdf2) {
+    oscillation = 0.0404 * wh * wh * turns;  // Bank 1985
+    if (b.touches) oscillation -= std::expm1(-0.5 * wh * touched_turns(b, e));
+  } else oscillation = -std::expm1(-0.5 * wh * turns);  // backward Euler: the amplitude that it takes away
   const double scale = std::max({e.sag, b.travel, b.depth, 1e-12});
   const double share = e.sag / scale;  // of what moves, that oscillates
   const double event = b.touches ? std::max(b.speed, b.approach) * h / scale : 0;
@@ -112,13 +125,20 @@ BodyWay way_of(const MeasuredModel &m, Scheme scheme, double h, const Try &t, co
 }
 
 double sum(const BodyWay &w) { return w.model_error + w.time_error; }
+double whole(const BodyWay &w) { return sum(w) + w.mesh_error; }
+
+// The errors of model and time that a choice may have: what the mesh leaves of the target. Where the mesh has
+// more than half of it, as much as the mesh: less would cost much and change the sum little.
+bool within(const BodyWay &w, double target) {
+  return sum(w) <= std::max(target - w.mesh_error, std::min(w.mesh_error, target));
+}
 
 // Smaller is better. With a target: choices that meet it are ordered by cost, the others by error. With a
 // budget the other way round.
 bool better(const BodyWay &a, const BodyWay &b, const Wish &wish, double budget) {
   const bool errs = wish.target > 0;
-  const bool am = errs ? sum(a) <= wish.target : a.cpu_s_per_s <= budget;
-  const bool bm = errs ? sum(b) <= wish.target : b.cpu_s_per_s <= budget;
+  const bool am = errs ? within(a, wish.target) : a.cpu_s_per_s <= budget;
+  const bool bm = errs ? within(b, wish.target) : b.cpu_s_per_s <= budget;
   if (am != bm) return am;
   return am == errs ? a.cpu_s_per_s < b.cpu_s_per_s : sum(a) < sum(b);
 }
@@ -136,7 +156,8 @@ class Planner {
       if (scheme == Scheme::explicit_euler) try_scheme(scheme, wish_.step);
       else if (wish_.step > 0) try_scheme(scheme, wish_.step);
       else
-        for (int k = 0; k < 6; ++k) try_scheme(scheme, kFrame / (1 << k));
+        for (int k = 0; k < (wish_.target > 0 ? kTargetSteps : kBudgetSteps); ++k)
+          try_scheme(scheme, kFrame / (1 << k));
     }
     std::sort(out_.considered.begin(), out_.considered.end(),
               [](const Way &a, const Way &b) { return a.cpu_s_per_s < b.cpu_s_per_s; });
@@ -145,6 +166,7 @@ class Planner {
       out_.found = true;
       if (first || wins(w, out_.way)) out_.way = w;
     }
+    if (out_.found && wish_.target > 0 && !met(out_.way)) take_whole_target();
     // skip choices that cost more than another without a smaller error
     double least = 2;
     std::erase_if(out_.considered, [&](const Way &w) {
@@ -152,19 +174,47 @@ class Planner {
       least = std::min(least, reach(w));
       return behind;
     });
-    if (out_.found) out_.meets = meets(out_.way);
+    if (out_.found) out_.meets = wish_.target > 0 ? met(out_.way) : meets(out_.way);
     say();
+    if (out_.found && !out_.meets) out_.missed = wish_.target > 0 ? target_missed() : budget_missed();
     return out_;
   }
 
  private:
+  // Implicit steps from 1/60 s down by halves. A target may ask for short ones, 33 us, before explicit steps
+  // cost less; in a budget per step a shorter one costs nothing, but per second.
+  static constexpr int kTargetSteps = 10, kBudgetSteps = 6;
+  // A target that is missed by less than the digits of a prediction is met.
+  static constexpr double kAsPrinted = 1.005;
+  // A mesh whose error is half of the target instead of all of it has 2^1.5 as many cells, and costs 4 times
+  // as much by explicit time.
+  static constexpr double kFinerMesh = 4;
+
+  bool met(const Way &w) const { return whole(worst(w).first) <= kAsPrinted * wish_.target; }
+
+  // The cheapest choice that meets the target together with the mesh, if it costs no more than a finer mesh;
+  // else it is named.
+  void take_whole_target() {
+    for (const Way &w : out_.considered) {
+      if (!met(w)) continue;
+      if (w.cpu_s_per_s <= (1 + 1e-9) * kFinerMesh * out_.way.cpu_s_per_s) out_.way = w;
+      else
+        dearer_ = format(" or %s%s, at %.3g s of processor per second", scheme_name(w.bodies[0].scheme),
+                         w.step > 0 ? format(" with a time.step of %.3g ms", 1e3 * w.step).c_str() : "",
+                         w.cpu_s_per_s);
+      return;
+    }
+  }
+
   double reach(const Way &w) const {
     double most = 0;
     for (const BodyWay &b : w.bodies) most = std::max(most, sum(b));
     return most;
   }
   bool meets(const Way &w) const {
-    return wish_.target > 0 ? reach(w) <= wish_.target : ms_per_step(w) <= wish_.ms_per_step;
+    if (!(wish_.target > 0)) return ms_per_step(w) <= wish_.ms_per_step;
+    return std::all_of(w.bodies.begin(), w.bodies.end(),
+                       [&](const BodyWay &b) { return within(b, wish_.target); });
   }
   bool wins(const Way &a, const Way &b) const {
     const bool am = meets(a), bm = meets(b);
@@ -226,13 +276,82 @@ class Planner {
           e.frequency / (2 * kPi), e.lasts, b.held ? "; held" : "; free",
           b.touches ? ", may touch something" : ", touches nothing"));
       if (dented(b)) out_.assumed.push_back(dent(b));
-      const double mesh = mesh_error(b) * wish_.weight, limit = wish_.target > 0 ? wish_.target : 1;
-      if (mesh > limit)
+      const double mesh = mesh_error(b) * wish_.weight;
+      if (wish_.target > 0 && mesh > wish_.target)
         out_.assumed.push_back(
-            format("body '%s': its mesh alone makes an error of about %.2g; about %.1f times as many cells "
-                   "would make %.2g",
-                   b.name.c_str(), mesh, std::pow(mesh / limit, 1.5), limit));
+            format("body '%s': its mesh alone makes an error of about %.3g %%, which no model "
+                   "and no step makes less",
+                   b.name.c_str(), 100 * mesh));
     }
+  }
+
+  // The body with the largest error, and its number.
+  static std::pair<BodyWay, size_t> worst(const Way &w) {
+    size_t most = 0;
+    for (size_t i = 1; i < w.bodies.size(); ++i)
+      if (whole(w.bodies[i]) > whole(w.bodies[most])) most = i;
+    return {w.bodies[most], most};
+  }
+
+  static std::string joined(const std::vector<std::string> &parts, const char *last) {
+    std::string out;
+    for (size_t i = 0; i < parts.size(); ++i)
+      out += (i == 0 ? "" : i + 1 == parts.size() ? last : ", ") + parts[i];
+    return out;
+  }
+
+  // Of linear cells: the error goes with the square of their edges.
+  static std::string more_cells(double mesh, double allowed) {
+    return format("about %.2g times as many cells", 1.05 * std::pow(mesh / allowed, 1.5));
+  }
+
+  std::string target_missed() const {
+    const auto [w, i] = worst(out_.way);
+    const BodyRegime &b = *tries_[i].body;
+    const double target = wish_.target;
+    std::vector<std::string> needs;
+    if (w.model_error > 0.5 * target)
+      needs.push_back(b.model.empty() ? "a model with smaller measured errors"
+                                      : "another model (leave model.type out and the planner chooses)");
+    const bool named = wish_.step > 0 || b.scheme >= 0;
+    if (w.time_error > 0.5 * target && named)
+      needs.push_back("other steps (leave time.step and time.integrator out and the planner chooses)");
+    else if (w.time_error > 0.5 * target && !within(w, target))
+      needs.push_back(
+          format("a time.step of at most %.2g ms", 1e3 * out_.way.substep * 0.5 * target / w.time_error));
+    // then a half is left to model and time
+    if (w.mesh_error > 0.5 * target) needs.push_back(more_cells(w.mesh_error, 0.5 * target));
+    if (needs.empty()) needs.push_back(named ? "a shorter time.step and a finer mesh" : "a finer mesh");
+    return format(
+        "the target of %.3g %% is not met: body '%s' has a predicted error of %.3g %% (model %.2g %%, "
+        "time %.2g %%, mesh %.2g %%); to meet it takes %s%s, or a larger target",
+        100 * target, b.name.c_str(), at_most(100 * whole(w), 100), 100 * w.model_error, 100 * w.time_error,
+        100 * w.mesh_error, joined(needs, " and ").c_str(), dearer_.c_str());
+  }
+
+  std::string budget_missed() const {
+    constexpr double kFewPoints = 50;
+    const Way &way = out_.way;
+    double points = 0;
+    bool named = false;
+    for (const Try &t : tries_) {
+      points += t.body->points;
+      named = named || !t.body->model.empty() || t.body->scheme >= 0;
+    }
+    // More cells make explicit steps shorter too; those of other schemes cost at least as much as they have
+    // points.
+    const double per_step = wish_.ms_per_step / ms_per_step(way);
+    const double share = way.step > 0 && wish_.step <= 0 ? per_step : std::pow(per_step, 0.75);
+    std::vector<std::string> needs;
+    if (named) needs.push_back("another model or integrator (leave model.type and time.integrator out)");
+    if (share * points > kFewPoints * double(tries_.size()))
+      needs.push_back(format("at most about %.2g times as many cells", share));
+    needs.push_back("a larger budget");
+    return format(
+        "the budget of %.3g ms per step is not met: the cheapest choice takes a predicted %.3g ms per %s, "
+        "with an error of %.3g %%; to meet it takes %s",
+        wish_.ms_per_step, ms_per_step(way), way.step > 0 ? "step" : "1/60 s", at_most(100 * way.error, 100),
+        joined(needs, " or ").c_str());
   }
 
   // What each model that may be chosen leaves out of a dent.
@@ -242,19 +361,20 @@ class Planner {
       const bool named = b.model == m.id;
       if (!named && (!b.model.empty() || std::find(b.models.begin(), b.models.end(), m.id) == b.models.end()))
         continue;
-      errors +=
-          format("%s%s %.2g (places %.2g)", errors.empty() ? "" : ", ", m.id.c_str(), m.dent_force, m.dents);
+      errors += format("%s%s %.3g %% (places %.3g %%)", errors.empty() ? "" : ", ", m.id.c_str(),
+                       100 * m.dent_force, 100 * m.dents);
     }
     return format(
         "body '%s': %s touches it over about %.2g m, less than its thickness of %.2g m, and dents "
         "it; relative errors of the force of such a contact, measured on one dent: %s%s",
         b.name.c_str(), b.met.c_str(), b.contact, b.thickness, errors.c_str(),
-        wish_.force ? "" : "; the quantity asked for goes by places alone");
+        wish_.force ? "" : "; of these only the error of places counts for the quantity that is asked for");
   }
 
   const Measured &measured_;
   Wish wish_;
   std::vector<Try> tries_;
+  std::string dearer_;  // a choice that meets the target and costs more than a finer mesh
   PlannedWay out_;
 };
 

@@ -68,6 +68,8 @@ struct BodyRegime {
   std::string met;            // whose contact that is
   // m/s, of what comes to it, and m, how deep that goes in, or where that is not known, how far it moves
   double approach = 0, depth = 0;
+  double presses = HUGE_VAL;        // how often something comes to it at most; infinite: that is not known
+  double below = HUGE_VAL;          // m, from it down to what it would fall on
   std::string model;                // that the scene names; empty: to be chosen
   int scheme = -1;                  // that the scene names; -1: to be chosen
   std::vector<std::string> models;  // that may be chosen
@@ -113,10 +115,11 @@ struct Way {
 
 struct PlannedWay {
   bool found = false;  // false: no model can be chosen, because no measurement applies
-  bool meets = false;  // target or budget
+  bool meets = false;  // target, by the errors of model, time and mesh, or budget
   Way way;
   std::vector<Way> considered;       // the Pareto front: by cost, each with less error than all cheaper ones
   std::vector<std::string> assumed;  // sentences
+  std::string missed;                // if it does not meet: what is predicted and what would meet
 };
 PlannedWay plan_accuracy(const std::vector<BodyRegime> &bodies, const Measured &measured, const Wish &wish);
 

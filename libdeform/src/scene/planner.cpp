@@ -173,15 +173,18 @@ class Reader {
   // The effect of a moving obstacle on a body: its speed, and the depth to which it enters.
   void add_approach(size_t i, const Obstacle &o, BodyRegime &r) const {
     const bool round = o.def.shape == DFM_SHAPE_SPHERE || o.def.shape == DFM_SHAPE_CAPSULE;
-    double way = 0, depth = 0;
+    double way = 0, depth = 0, comes = 0;
     for (size_t k = 0; k < o.keys.size(); ++k) {
       if (round) depth = std::max(depth, depth_in(boxes_[i], o.keys[k].pose.position, o.def.radius));
       if (k == 0) continue;
       double by[3];
       for (int c = 0; c < 3; ++c) by[c] = o.keys[k].pose.position[c] - o.keys[k - 1].pose.position[c];
       way += length(by);
+      comes += length(by) > 0;
       r.approach = std::max(r.approach, length(by) / (o.keys[k].t - o.keys[k - 1].t));
     }
+    if (o.def.sine.frequency > 0) comes = HUGE_VAL;
+    r.presses += comes;
     const double swing = length(o.def.sine.amplitude);
     r.approach = std::max(r.approach, 2 * kPi * o.def.sine.frequency * swing);
     r.depth = std::max(r.depth, depth > 0 ? depth : way + swing);
@@ -259,7 +262,9 @@ class Reader {
     const double thrown = length(b.velocity);
     const double falls = g_ > 0 ? 0.5 * g_ * def_.duration * def_.duration : 0;
     double fall = HUGE_VAL;
+    r.presses = def_.rigid.bodies.empty() && !one_is_thrown() ? 0 : HUGE_VAL;
     find_contacts(i, falls, fall, r);
+    r.below = fall;
     const double s = r.held ? HUGE_VAL : fall;
     r.touches = s <= falls || r.meets_body || something_moves();
     r.speed = thrown + 0.5 * length(b.spin) * r.length;
@@ -347,23 +352,26 @@ json plan_scene(dfm_context *context, const Definition &def, const Types &types,
   // The allowed creep of a resting contact over the whole time is a tenth of the error.
   double scale = HUGE_VAL;
   for (const BodyRegime &b : bodies)
-    if (b.touches) scale = std::min(scale, std::max(estimate(b, def.duration).sag, b.travel));
+    if (b.touches) scale = std::min(scale, std::max({estimate(b, def.duration).sag, b.travel, b.depth}));
   const double creep = 0.1 * wanted.target * scale / def.duration;
-  if (wanted.target > 0 && !(def.tolerance > 0) && creep < kDefaultTolerance) {
+  if (creep > 0 && !(def.tolerance > 0) && creep < kDefaultTolerance) {
     const double tolerance = std::max(creep, kLeastTolerance);
     write("/contact/tolerance", tolerance);
     plan.assumed.push_back(
-        format("contact tolerance %.2g m/s: in %g s that is a tenth of the error, at %.3g m", tolerance,
-               def.duration, scale));
+        format("contact tolerance %.2g m/s: what rests creeps in %g s by at most a tenth of the target, of a "
+               "displacement of %.3g m",
+               tolerance, def.duration, scale));
   }
   json considered = json::array();
   for (const Way &w : plan.considered) considered.push_back(way_json(w, def));
-  return {{"costs", measured.machine},
-          {"meets", plan.meets},
-          {"set", set},
-          {"predicted", way_json(plan.way, def)},
-          {"assumed", plan.assumed},
-          {"considered", considered}};
+  json out = {{"costs", measured.machine},
+              {"meets", plan.meets},
+              {"set", set},
+              {"predicted", way_json(plan.way, def)},
+              {"assumed", plan.assumed},
+              {"considered", considered}};
+  if (!plan.missed.empty()) out["missed"] = plan.missed;
+  return out;
 }
 
 }  // namespace dfm::scene
