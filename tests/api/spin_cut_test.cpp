@@ -61,12 +61,6 @@ struct Books {
   }
 };
 
-uint32_t parts(dfm_body b) {
-  dfm_cut_info i = ask();
-  test::ok(dfm_body_remove_cells(b, 0, nullptr, &i));
-  return i.parts;
-}
-
 }  // namespace
 
 TEST(SpinCut, MovingBlade_PartsACubeThatTurns) {
