@@ -130,8 +130,9 @@ std::array<double, 2> ToolTouch::rub_at(uint32_t i, double yields, const double 
   return {a, b};
 }
 
-// One island. False: it did not converge, and impulses are as they were.
-bool ToolTouch::newton(uint32_t island, double done) {
+// Places of the island's motions among its unknowns x [n]: m/s and rad/s, by which impulses change them.
+// False: it has none, or too many.
+bool ToolTouch::number_unknowns(uint32_t island) {
   size_t n = 0;
   for (uint32_t i = 0; i < motions_.size(); ++i)
     if (island_of(i) == island) {
@@ -139,38 +140,47 @@ bool ToolTouch::newton(uint32_t island, double done) {
       n += motions_[i].size;
     }
   if (n == 0 || n > kMostMotions) return false;
-  std::vector<uint32_t> mine;
-  for (uint32_t i = 0; i < rows_.size(); ++i)
-    if (first_lever_[i + 1] > first_lever_[i] && island_of(levers_[first_lever_[i]].motion) == island)
-      mine.push_back(i);
-  // masses, and velocities without the impulses of the rows
-  std::vector<double> mass(n * n, 0.0), system(n * n), x(n, 0.0), left(n), inverse, unit;
+  newton_.n = n;
+  newton_.mass.assign(n * n, 0.0);
+  newton_.system.resize(n * n);
+  newton_.x.assign(n, 0.0);
+  newton_.left.resize(n);
+  return true;
+}
+
+// M: of a free thing the inverse of its response, of a jaw one over what it gives. False: not invertible.
+bool ToolTouch::set_masses(uint32_t island) {
+  const size_t n = newton_.n;
   for (const Motion &m : motions_) {
     if (island_of(static_cast<uint32_t>(&m - motions_.data())) != island) continue;
     const Moved &side = sides_[m.tool];
     if (m.jaw != kNone) {
-      mass[m.at * n + m.at] = 1 / side.jaws[m.jaw].give;
+      newton_.mass[m.at * n + m.at] = 1 / side.jaws[m.jaw].give;
       continue;
     }
     const size_t wide = side.wide[m.group], at = side.first[m.group];
     for (size_t c = 0; c < 6; ++c) {
-      inverse.assign(36, 0.0);
+      double response[36], column[6] = {};
       for (size_t r = 0; r < 6; ++r)
-        for (size_t k = 0; k < 6; ++k) inverse[6 * r + k] = side.response[at + r * wide + k];
-      unit.assign(6, 0.0);
-      unit[c] = 1;
-      if (!solve_dense(6, inverse.data(), unit.data())) return false;
-      for (size_t r = 0; r < 6; ++r) mass[(m.at + r) * n + m.at + c] = unit[r];
+        for (size_t k = 0; k < 6; ++k) response[6 * r + k] = side.response[at + r * wide + k];
+      column[c] = 1;
+      if (!solve_dense(6, response, column)) return false;
+      for (size_t r = 0; r < 6; ++r) newton_.mass[(m.at + r) * n + m.at + c] = column[r];
     }
   }
-  struct Local {
-    double start[3], last[3], now[3], rho[3];
-    LinearLaw law;
-  };
-  std::vector<Local> local(mine.size());
-  for (size_t k = 0; k < mine.size(); ++k) {
-    const Row &row = rows_[mine[k]];
-    Local &l = local[k];
+  return true;
+}
+
+// The island's rows: velocities without impulses, the impulses so far, and rho. Of smooth laws the tangent is
+// that for 1 / rho in place of the response until the island is solved.
+void ToolTouch::start_rows(uint32_t island) {
+  newton_.rows.clear();
+  for (uint32_t i = 0; i < rows_.size(); ++i) {
+    if (first_lever_[i + 1] == first_lever_[i] || island_of(levers_[first_lever_[i]].motion) != island)
+      continue;
+    const Row &row = rows_[i];
+    NewtonRow l{};
+    l.row = i;
     const Vec3 all = speed(row), own = all - change_of(row);
     const double bent[3] = {row.lift, dot(row.tangent[0], row.bend), dot(row.tangent[1], row.bend)};
     const Vec3 axes[3] = {row.normal, row.tangent[0], row.tangent[1]};
@@ -181,113 +191,148 @@ bool ToolTouch::newton(uint32_t island, double done) {
     }
     l.rho[0] = kYields * row.inverse;
     l.rho[1] = l.rho[2] = row.response > 0 ? kYields / row.response : 0;
-    l.law = state_.linear[mine[k]];
-    if (row.response > 0 && state_.form[mine[k]] == kSmoothLaw)
-      linearize(state_, mine[k], h_, row.response / kYields);
+    l.law = state_.linear[i];
+    if (row.response > 0 && state_.form[i] == kSmoothLaw) linearize(state_, i, h_, row.response / kYields);
+    newton_.rows.push_back(l);
   }
-  // starts from the velocities that the impulses so far make
-  const auto gather = [&] {
-    std::fill(left.begin(), left.end(), 0.0);
-    for (size_t k = 0; k < mine.size(); ++k)
-      for (uint32_t j = first_lever_[mine[k]]; j < first_lever_[mine[k] + 1]; ++j) {
-        const Motion &m = motions_[levers_[j].motion];
-        for (size_t c = 0; c < 3; ++c)
-          for (size_t d = 0; d < m.size; ++d) left[m.at + d] += levers_[j].by[c][d] * local[k].now[c];
-      }
-  };
-  gather();
-  system = mass;
-  x = left;
-  bool works = solve_dense(n, system.data(), x.data());
-  double before = HUGE_VAL;
-  bool converged = false;
-  for (uint32_t round = 0; works && round < kMostRounds && !converged; ++round) {
-    bool settled = false;
-    for (uint32_t step = 0; works && step < kMostNewton && !settled; ++step) {
-      system = mass;
-      for (size_t k = 0; k < mine.size(); ++k) {
-        const Row &row = rows_[mine[k]];
-        Local &l = local[k];
-        double u[3];
-        std::copy(l.start, l.start + 3, u);
-        const uint32_t begin = first_lever_[mine[k]], end = first_lever_[mine[k] + 1];
-        for (uint32_t j = begin; j < end; ++j) {
-          const Motion &m = motions_[levers_[j].motion];
-          for (size_t c = 0; c < 3; ++c)
-            for (size_t d = 0; d < m.size; ++d) u[c] += levers_[j].by[c][d] * x[m.at + d];
-        }
-        const double stiff = 1 / (1 / l.rho[0] + row.soft);
-        double slope[3][3] = {};  // of the impulses by -u
-        l.now[0] = std::max(0.0, stiff * (l.last[0] / l.rho[0] + row.rate - u[0]));
-        if (l.now[0] > 0) slope[0][0] = stiff;
-        l.now[1] = l.now[2] = 0;
-        if (l.now[0] > 0 && row.response > 0) {
-          const double yields = 1 / l.rho[1];
-          const auto at = [&](double normal, double u1, double u2) {
-            return rub_at(mine[k], yields, l.last, normal, u1, u2);
-          };
-          const std::array<double, 2> t = at(l.now[0], u[1], u[2]);
-          l.now[1] = t[0];
-          l.now[2] = t[1];
-          const double by = kBeside * (std::fabs(u[1]) + std::fabs(u[2]) + yields * l.now[0]);
-          const double more = kBeside * l.now[0];
-          const std::array<double, 2> d1 = at(l.now[0], u[1] + by, u[2]), d2 = at(l.now[0], u[1], u[2] + by),
-                                      dn = at(l.now[0] + more, u[1], u[2]);
-          for (size_t c = 0; c < 2; ++c) {
-            slope[c + 1][1] = (t[c] - d1[c]) / by;
-            slope[c + 1][2] = (t[c] - d2[c]) / by;
-            slope[c + 1][0] = (dn[c] - t[c]) / more * stiff;
-          }
-        }
-        for (uint32_t j = begin; j < end; ++j)
-          for (uint32_t i = begin; i < end; ++i) {
-            const Motion &mj = motions_[levers_[j].motion], &mi = motions_[levers_[i].motion];
-            for (size_t c = 0; c < 3; ++c)
-              for (size_t e = 0; e < 3; ++e) {
-                if (slope[c][e] == 0) continue;
-                for (size_t d = 0; d < mj.size; ++d)
-                  for (size_t f = 0; f < mi.size; ++f)
-                    system[(mj.at + d) * n + mi.at + f] +=
-                        levers_[j].by[c][d] * slope[c][e] * levers_[i].by[e][f];
-              }
-          }
-      }
-      gather();
-      for (size_t r = 0; r < n; ++r)
-        for (size_t c = 0; c < n; ++c) left[r] -= mass[r * n + c] * x[c];
-      works = solve_dense(n, system.data(), left.data());
-      double most = 0;
-      for (size_t k = 0; works && k < mine.size(); ++k) {
-        double u[3] = {};
-        for (uint32_t j = first_lever_[mine[k]]; j < first_lever_[mine[k] + 1]; ++j) {
-          const Motion &m = motions_[levers_[j].motion];
-          for (size_t c = 0; c < 3; ++c)
-            for (size_t d = 0; d < m.size; ++d) u[c] += levers_[j].by[c][d] * left[m.at + d];
-        }
-        most = std::max({most, std::fabs(u[0]), std::fabs(u[1]), std::fabs(u[2])});
-      }
-      for (size_t r = 0; r < n; ++r) x[r] += left[r];
-      works = works && std::isfinite(most);
-      settled = most <= done;
+}
+
+// u += J x at a row, J its levers.
+void ToolTouch::add_motion(uint32_t row, const std::vector<double> &x, double u[3]) const {
+  for (uint32_t j = first_lever_[row]; j < first_lever_[row + 1]; ++j) {
+    const Motion &m = motions_[levers_[j].motion];
+    for (size_t c = 0; c < 3; ++c)
+      for (size_t d = 0; d < m.size; ++d) u[c] += levers_[j].by[c][d] * x[m.at + d];
+  }
+}
+
+// left = sum of J^T p over the rows.
+void ToolTouch::gather_impulses() {
+  std::fill(newton_.left.begin(), newton_.left.end(), 0.0);
+  for (const NewtonRow &l : newton_.rows)
+    for (uint32_t j = first_lever_[l.row]; j < first_lever_[l.row + 1]; ++j) {
+      const Motion &m = motions_[levers_[j].motion];
+      for (size_t c = 0; c < 3; ++c)
+        for (size_t d = 0; d < m.size; ++d) newton_.left[m.at + d] += levers_[j].by[c][d] * l.now[c];
     }
-    works = works && settled;
-    double moved = 0;
-    for (Local &l : local)
-      for (size_t c = 0; c < 3; ++c) {
-        if (l.rho[c] > 0) moved = std::max(moved, std::fabs(l.now[c] - l.last[c]) / l.rho[c]);
-        l.last[c] = l.now[c];
-      }
-    converged = moved <= done;
-    if (!(moved < kFaster * before)) break;
+}
+
+// The impulses p(u) of a row that yields, at velocity u:
+//   p_n = max(0, (p_n_last / rho + rate - u_n) / (1 / rho + soft)),   p_t by the law at u_t and p_n
+// and their slopes -dp/du, those of friction by differences.
+void ToolTouch::answer_at(NewtonRow &l, const double u[3], double slope[3][3]) const {
+  const Row &row = rows_[l.row];
+  const double stiff = 1 / (1 / l.rho[0] + row.soft);
+  l.now[0] = std::max(0.0, stiff * (l.last[0] / l.rho[0] + row.rate - u[0]));
+  if (l.now[0] > 0) slope[0][0] = stiff;
+  l.now[1] = l.now[2] = 0;
+  if (!(l.now[0] > 0 && row.response > 0)) return;
+  const double yields = 1 / l.rho[1];
+  const auto at = [&](double normal, double u1, double u2) {
+    return rub_at(l.row, yields, l.last, normal, u1, u2);
+  };
+  const std::array<double, 2> t = at(l.now[0], u[1], u[2]);
+  l.now[1] = t[0];
+  l.now[2] = t[1];
+  const double by = kBeside * (std::fabs(u[1]) + std::fabs(u[2]) + yields * l.now[0]);
+  const double more = kBeside * l.now[0];
+  const std::array<double, 2> d1 = at(l.now[0], u[1] + by, u[2]), d2 = at(l.now[0], u[1], u[2] + by),
+                              dn = at(l.now[0] + more, u[1], u[2]);
+  for (size_t c = 0; c < 2; ++c) {
+    slope[c + 1][1] = (t[c] - d1[c]) / by;
+    slope[c + 1][2] = (t[c] - d2[c]) / by;
+    slope[c + 1][0] = (dn[c] - t[c]) / more * stiff;
+  }
+}
+
+// system += J^T slope J
+void ToolTouch::add_slopes(uint32_t row, const double slope[3][3]) {
+  const uint32_t begin = first_lever_[row], end = first_lever_[row + 1];
+  for (uint32_t j = begin; j < end; ++j)
+    for (uint32_t i = begin; i < end; ++i) {
+      const Motion &mj = motions_[levers_[j].motion], &mi = motions_[levers_[i].motion];
+      for (size_t c = 0; c < 3; ++c)
+        for (size_t e = 0; e < 3; ++e) {
+          if (slope[c][e] == 0) continue;
+          for (size_t d = 0; d < mj.size; ++d)
+            for (size_t f = 0; f < mi.size; ++f)
+              newton_.system[(mj.at + d) * newton_.n + mi.at + f] +=
+                  levers_[j].by[c][d] * slope[c][e] * levers_[i].by[e][f];
+        }
+    }
+}
+
+// One step toward M x = sum of J^T p(start + J x): (M + sum of J^T slope J) dx = sum of J^T p - M x. Returns
+// the largest change of a row's velocity, m/s; negative or not finite: no step.
+double ToolTouch::newton_step() {
+  const size_t n = newton_.n;
+  std::vector<double> &x = newton_.x, &left = newton_.left;
+  newton_.system = newton_.mass;
+  for (NewtonRow &l : newton_.rows) {
+    double u[3], slope[3][3] = {};
+    std::copy(l.start, l.start + 3, u);
+    add_motion(l.row, x, u);
+    answer_at(l, u, slope);
+    add_slopes(l.row, slope);
+  }
+  gather_impulses();
+  for (size_t r = 0; r < n; ++r)
+    for (size_t c = 0; c < n; ++c) left[r] -= newton_.mass[r * n + c] * x[c];
+  if (!solve_dense(n, newton_.system.data(), left.data())) return -1;
+  double most = 0;
+  for (const NewtonRow &l : newton_.rows) {
+    double u[3] = {};
+    add_motion(l.row, left, u);
+    most = std::max({most, std::fabs(u[0]), std::fabs(u[1]), std::fabs(u[2])});
+  }
+  for (size_t r = 0; r < n; ++r) x[r] += left[r];
+  return most;
+}
+
+// Ends a round: p_last = p. Returns by how much rows have yielded in it, m/s.
+double ToolTouch::end_round() {
+  double moved = 0;
+  for (NewtonRow &l : newton_.rows)
+    for (size_t c = 0; c < 3; ++c) {
+      if (l.rho[c] > 0) moved = std::max(moved, std::fabs(l.now[c] - l.last[c]) / l.rho[c]);
+      l.last[c] = l.now[c];
+    }
+  return moved;
+}
+
+// Newton steps until none changes a velocity by more than `done`.
+bool ToolTouch::solve_round(double done) {
+  for (uint32_t step = 0; step < kMostNewton; ++step) {
+    const double most = newton_step();
+    if (!(most >= 0 && std::isfinite(most))) return false;
+    if (most <= done) return true;
+  }
+  return false;
+}
+
+// One island. False: it did not converge, and impulses are as they were.
+bool ToolTouch::newton(uint32_t island, double done) {
+  if (!number_unknowns(island) || !set_masses(island)) return false;
+  start_rows(island);
+  // starts from the velocities that the impulses so far make
+  gather_impulses();
+  newton_.system = newton_.mass;
+  newton_.x = newton_.left;
+  bool works = solve_dense(newton_.n, newton_.system.data(), newton_.x.data());
+  double before = HUGE_VAL;
+  for (uint32_t round = 0; works && round < kMostRounds; ++round) {
+    works = solve_round(done);
+    const double moved = end_round();
+    if (moved <= done || !(moved < kFaster * before)) break;
     before = moved;
   }
-  for (size_t k = 0; k < mine.size(); ++k) {
-    Row &row = rows_[mine[k]];
-    state_.linear[mine[k]] = local[k].law;
+  for (const NewtonRow &l : newton_.rows) {
+    Row &row = rows_[l.row];
+    state_.linear[l.row] = l.law;
     if (!works) continue;
-    row.impulse = local[k].now[0];
-    row.along[0] = local[k].now[1];
-    row.along[1] = local[k].now[2];
+    row.impulse = l.now[0];
+    row.along[0] = l.now[1];
+    row.along[1] = l.now[2];
   }
   return works;
 }

@@ -168,6 +168,28 @@ class ToolTouch {
   void list_motions();
   std::array<double, 2> rub_at(uint32_t i, double yields, const double last[3], double normal, double u1,
                                double u2) const;
+  struct NewtonRow {
+    uint32_t row;
+    // along normal and tangents: m/s without impulses, with bend and lift; N s of the last round, and now; kg
+    double start[3], last[3], now[3], rho[3];
+    LinearLaw law;  // to come back to
+  };
+  // Of one island; kept for its memory.
+  struct NewtonScratch {
+    size_t n = 0;  // unknowns
+    std::vector<NewtonRow> rows;
+    std::vector<double> mass, system, x, left;  // [n,n], [n,n], [n], [n]
+  };
+  bool number_unknowns(uint32_t island);
+  bool set_masses(uint32_t island);
+  void start_rows(uint32_t island);
+  void add_motion(uint32_t row, const std::vector<double> &x, double u[3]) const;
+  void gather_impulses();
+  void answer_at(NewtonRow &l, const double u[3], double slope[3][3]) const;
+  void add_slopes(uint32_t row, const double slope[3][3]);
+  double newton_step();
+  double end_round();
+  bool solve_round(double done);
   bool newton(uint32_t island, double done);
   void leap(double done);
   // tool_hits.cpp
@@ -199,7 +221,8 @@ class ToolTouch {
   std::vector<Hit> hits_;
   std::vector<Motion> motions_;
   std::vector<Lever> levers_;
-  std::vector<uint32_t> first_lever_;          // [rows+1]
+  std::vector<uint32_t> first_lever_;  // [rows+1]
+  NewtonScratch newton_;
   std::vector<std::array<uint64_t, 2>> told_;  // pairs that have met and pass each other
   // By row.
   ContactState state_;
