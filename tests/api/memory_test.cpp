@@ -6,6 +6,7 @@
 #include "coupled.h"
 #include "heap_calls.h"
 #include "obstacle.h"
+#include "rigid.h"
 
 namespace {
 
@@ -191,6 +192,32 @@ TEST(Memory, ASettledCoupledStep_AllocatesNothing) {
   EXPECT_EQ(hooks.calls - hook_calls, 0) << "calls of the allocation hook";
   EXPECT_EQ(test::heap_calls - heap, 0u) << "calls of operator new";
   EXPECT_GT(test::stats(w).sticking, 3u);
+  dfm_context_destroy(c);
+  EXPECT_EQ(hooks.live_bytes, 0);
+}
+
+// Free rigid bodies on a plane, on triangles and on each other, solved by Newton's method.
+TEST(Memory, ASettledStepOfRigidBodies_AllocatesNothing) {
+  Hooks hooks;
+  const dfm_context_def def = hooks.def();
+  dfm_context *c = nullptr;
+  ASSERT_EQ(dfm_context_create(&def, &c), DFM_OK) << dfm_last_error();
+  const dfm_world w = test::make_world(c, {1, 0.5, -9.81});
+  test::add_plane(w, "floor");
+  const test::Triangles floor = test::height_field(0.5, 9, [](double, double) { return 0.0; });
+  dfm_obstacle_def d = test::mesh_def("triangles", floor);
+  d.pose.position[2] = 1;
+  dfm_obstacle o = 0;
+  test::ok(dfm_obstacle_create(w, &d, &o));
+  test::create(w, {test::box("a", {0.05, 0.06, 0.04}, 1, {0, 0, 0.05}),
+                   test::box("b", {0.05, 0.04, 0.04}, 2, {0.01, 0, 0.14}),
+                   test::box("c", {0.05, 0.06, 0.04}, 1, {0, 0, 1.05})});
+  test::run(w, 0.5, 1e-3);
+  const int64_t hook_calls = hooks.calls;
+  const uint64_t heap = test::heap_calls;
+  for (int i = 0; i < 200; ++i) ASSERT_EQ(dfm_world_step(w, 1e-3, nullptr), DFM_OK);
+  EXPECT_EQ(hooks.calls - hook_calls, 0) << "calls of the allocation hook";
+  EXPECT_EQ(test::heap_calls - heap, 0u) << "calls of operator new";
   dfm_context_destroy(c);
   EXPECT_EQ(hooks.live_bytes, 0);
 }

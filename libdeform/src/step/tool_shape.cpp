@@ -33,8 +33,13 @@ bool ToolShape::Edge::leaves(Vec3 n) const {
 
 bool ToolShape::takes_part(const ObstacleView &o) { return o.shape != Shape::none; }
 
-ToolShape::ToolShape(const ObstacleView &view) : shape_(view), surface_(view.surface) {
-  if (view.shape == Shape::sphere || view.shape == Shape::capsule) round_ = view.radius;
+void ToolShape::take(const ObstacleView &view) {
+  shape_ = ObstacleShape(view);
+  surface_ = view.surface;
+  round_ = view.shape == Shape::sphere || view.shape == Shape::capsule ? view.radius : 0;
+  for (auto *list : {&edges_, &flat_}) list->clear();
+  corners_.clear();
+  triangles_.clear();
   reach_ = (view.shape == Shape::sphere ? 0 : shape_.extent()) + round_;
 }
 

@@ -29,7 +29,9 @@ class ToolShape {
   };
 
   static bool takes_part(const ObstacleView &view);
-  explicit ToolShape(const ObstacleView &view);
+  ToolShape() : ToolShape(ObstacleView{}) {}
+  explicit ToolShape(const ObstacleView &view) : shape_(view) { take(view); }
+  void take(const ObstacleView &view);  // another one, in the same memory
   Vec3 position() const { return shape_.view().position; }
   double reach() const { return reach_; }  // m, of any point of it from position(); not of a plane
   bool endless() const { return shape_.view().shape == Shape::plane; }

@@ -425,15 +425,16 @@ ToolTouch::Side ToolTouch::side_of(const Obstacle &o, uint32_t wall) const {
 }
 
 // f(pair, the two shapes, their sides): of all that may touch, where one of the two gives way.
-void ToolTouch::each_pair(const World &w, const StepContext &step, const Visit &f) const {
+void ToolTouch::each_pair(const World &w, const StepContext &step, const Visit &f) {
   for (const Pair &pair : pairs_) {
     const Obstacle &a = *w.obstacles[pair.a], &b = *w.obstacles[pair.b];
     const ObstacleView &va = step.obstacle_views[a.slot], &vb = step.obstacle_views[b.slot];
     if (!ToolShape::takes_part(va) || !ToolShape::takes_part(vb)) continue;
     const Side at_a = side_of(a, pair.wall[0]), at_b = side_of(b, pair.wall[1]);
     if (!sides_[at_a.tool].gives() && !sides_[at_b.tool].gives()) continue;
-    ToolShape shape_a(va), shape_b(vb);
-    f(pair, shape_a, shape_b, at_a, at_b);
+    shapes_[0].take(va);
+    shapes_[1].take(vb);
+    f(pair, shapes_[0], shapes_[1], at_a, at_b);
   }
 }
 
@@ -609,7 +610,6 @@ bool ToolTouch::follows_arcs(StepContext &step) const {
 bool ToolTouch::begin(World &w, StepContext &step) {
   rows_.clear();
   if (next_.n > 0) keep_next();
-  sides_.clear();
   offset_ = w.offset;
   if (!passing_.empty()) tell_passing(w, step);
   if (pairs_.empty()) return true;
@@ -617,10 +617,7 @@ bool ToolTouch::begin(World &w, StepContext &step) {
   take_sets(w, step);
   tell_driven(w, step);
   find(w, step);
-  if (rows_.empty() && !add_hits(w, step)) {
-    sides_.clear();
-    return true;
-  }
+  if (rows_.empty() && !add_hits(w, step)) return true;
   if (!follows_arcs(step)) return false;
   take_last(w);
   solve_past_hits(w, step);
@@ -637,6 +634,7 @@ void ToolTouch::give_velocities() {
 }
 
 void ToolTouch::correct() {
+  if (rows_.empty()) return;
   for (Moved &m : sides_) {
     if (!m.set) continue;
     m.free.assign(m.set->velocity.begin(), m.set->velocity.end());

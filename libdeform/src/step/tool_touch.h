@@ -130,7 +130,7 @@ class ToolTouch {
   Vec3 answer_to(const Row &row, Vec3 impulse);
   void find(const World &w, const StepContext &step);
   using Visit = std::function<void(const Pair &, ToolShape &, ToolShape &, Side, Side)>;
-  void each_pair(const World &w, const StepContext &step, const Visit &f) const;
+  void each_pair(const World &w, const StepContext &step, const Visit &f);
   static bool look_at_each_other(ToolShape &a, ToolShape &b, double far, bool flat);
   void add_rows(const Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b);
   void add_row(const Pair &pair, Name name, Side a, Side b, const Place &place, Vec3 normal, double gap,
@@ -216,7 +216,8 @@ class ToolTouch {
       passing_;                   // passing: nothing keeps the two apart, and nobody says that this is meant
   std::vector<RigidSet *> sets_;  // that take part
   std::vector<uint32_t> walls_;   // places in World::obstacles of those in no set of these
-  std::vector<Moved> sides_;
+  std::vector<Moved> sides_;      // valid where there are rows; kept for their memory, as shapes_ are
+  ToolShape shapes_[2];
   std::vector<Row> rows_;
   std::vector<Hit> hits_;
   std::vector<Motion> motions_;
