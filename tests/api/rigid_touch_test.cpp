@@ -426,3 +426,62 @@ TEST(RigidTouch, FastSpin_LeavesNothingInTheFloor) {
       }
     }
 }
+
+// A body of voxels has no corners that could meet a plane: one sentence says so, and the plan names it.
+TEST(RigidTouch, VoxelsOnAPlane_AreTold) {
+  test::LoggedContext context;
+  const dfm_world w = test::make_world(context.context, {0, 0, -kG});
+  test::add_plane(w, "floor");
+  dfm_rigid_def d = test::box("lump", {0.05, 0.05, 0.05}, 1, {0, 0, 0.1});
+  d.shape = DFM_SHAPE_NONE;
+  for (double &moment : d.inertia) moment = 2e-3;
+  const dfm_rigid r = test::create(w, {d})[0];
+  const test::Triangles m = test::box_surface({0.05, 0.05, 0.05}, 1);
+  dfm_obstacle_def of = test::mesh_def("lump.grid", m, DFM_SHAPE_VOXELS);
+  of.cells = 1000;
+  dfm_obstacle shape = 0;
+  test::ok(dfm_rigid_add_shape(r, &of, &shape));
+  size_t size = 0;
+  test::ok(dfm_world_explain(w, nullptr, &size));
+  std::string plan(size, 0);
+  test::ok(dfm_world_explain(w, plan.data(), &size));
+  EXPECT_NE(plan.find("these pass through obstacles: lump.grid"), std::string::npos) << plan;
+  go(w, 1e-2, 0.5);
+  const size_t first = context.log.find("the center of 'lump.grid' is ");
+  EXPECT_NE(first, std::string::npos) << context.log;
+  EXPECT_NE(context.log.find("deep in 'floor'"), std::string::npos);
+  EXPECT_EQ(context.log.find("the center of", first + 1), std::string::npos) << "once";
+}
+
+// Twenty boxes that fall on a heap: no step has more energy than the one before, from the fall to rest.
+TEST(RigidTouch, AHeapOfBoxes_MakesNoEnergy) {
+  const double dt = 1.0 / 60;
+  test::Context context;
+  const dfm_world w = test::make_world(context, {0, 0, -kG});
+  test::add_plane(w, "floor");
+  std::vector<dfm_rigid> r;
+  for (int i = 0; i < 20; ++i) {
+    const std::string name = "box" + std::to_string(i);
+    dfm_rigid_def d = test::box(name.c_str(), {0.05, 0.04, 0.03}, 1 + 0.2 * (i % 4),
+                                {0.13 * (i % 3 - 1), 0.11 * (i / 3 % 3 - 1), 0.06 + 0.13 * (i / 9)});
+    d.spin[0] = i % 5 - 2;
+    d.spin[2] = i % 3;
+    r.push_back(test::create(w, {d})[0]);
+  }
+  const auto energy = [&] {
+    double sum = 0;
+    for (size_t i = 0; i < r.size(); ++i)
+      sum +=
+          test::rigid_measure(r[i]).kinetic + (1 + 0.2 * double(i % 4)) * kG * test::state(r[i]).position[2];
+    return sum;
+  };
+  const double start = energy();
+  double last = start, made = 0;
+  for (int i = 0; i * dt < 2; ++i) {
+    ASSERT_EQ(dfm_world_step(w, dt, nullptr), DFM_OK) << dfm_last_error();
+    made = std::max(made, energy() - last);
+    last = energy();
+  }
+  EXPECT_LT(made, 1e-6 * start) << "J in a step";
+  EXPECT_LT(last, 0.8 * start) << "they have fallen";
+}

@@ -28,6 +28,16 @@ bool balls_apart(const ObstacleView &a, const ObstacleView &b) {
   return norm2(a.position - b.position) > far * far;
 }
 
+// m, of the center of a shape without corners within another such one; 0: it is outside.
+double center_depth(const ToolShape &a, const ToolShape &b) {
+  double deepest = 0;
+  ObstaclePoint o;
+  for (const auto &[own, other] : {std::pair(&a, &b), std::pair(&b, &a)})
+    if (!own->endless() && other->closest(own->position(), HUGE_VAL, o))
+      deepest = std::max(deepest, -o.distance);
+  return deepest;
+}
+
 constexpr double kDeep = 0.02;   // of the smaller one's reach, that a host may leave unsaid
 constexpr double kWithin = 0.1;  // of the floor, that a hit may be found above it
 
@@ -136,9 +146,20 @@ void ToolTouch::tell_passing(const World &w, const StepContext &step) {
     ToolShape shape_a(va), shape_b(vb);
     const double size = std::min(shape_a.endless() ? HUGE_VAL : shape_a.reach(),
                                  shape_b.endless() ? HUGE_VAL : shape_b.reach());
-    const double deep = depth(shape_a, shape_b);
+    const bool corners = shape_a.has_corners() || shape_b.has_corners();
+    const double deep = corners ? depth(shape_a, shape_b) : center_depth(shape_a, shape_b);
     if (!(deep > offset_ + kDeep * size)) continue;
     told_.push_back({pair.id[0], pair.id[1]});
+    if (!corners) {
+      const Obstacle &body = a.rigid && a.rigid->group[a.rigid_body] != DFM_RIGID_STILL ? a : b;
+      w.context->logf(
+          DFM_LOG_WARNING,
+          "the center of '%s' is %.3g m deep in '%s' at %.6g s and goes through it, because rigid "
+          "bodies meet planes and voxels with their corners, which voxels have none of; give it "
+          "triangles or boxes as its shape, or filter the pair",
+          body.name.c_str(), deep, (&body == &a ? b : a).name.c_str(), w.time);
+      continue;
+    }
     const auto held = [](const Obstacle &o) {
       return o.rigid && o.rigid->group[o.rigid_body] != DFM_RIGID_STILL &&
              (o.rigid->host_name != "builtin" || o.rigid->njoint > 0);

@@ -35,6 +35,7 @@ class ToolShape {
   Vec3 position() const { return shape_.view().position; }
   double reach() const { return reach_; }  // m, of any point of it from position(); not of a plane
   bool endless() const { return shape_.view().shape == Shape::plane; }
+  bool has_corners() const { return !endless() && shape_.view().shape != Shape::voxels; }
   double round() const { return round_; }  // m, radius around corners and edges
   ToolBox bounds() const;                  // not of a plane
   // Finds the corners, edges and triangles near the box. Before the functions that follow. flat: also edges

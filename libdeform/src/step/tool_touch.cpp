@@ -54,6 +54,9 @@ bool kept_apart(const Obstacle &a, const Obstacle &b) {
   return (is_free(a) && (is_free(b) || is_wall(b))) || (is_free(b) && is_wall(a));
 }
 
+// Planes and voxels have neither corners nor edges, so two of them have no rows.
+bool without_corners(const Obstacle &o) { return o.def.shape == DFM_SHAPE_PLANE || o.grid; }
+
 PairSide names_of(const Obstacle &o) { return {o.name, o.zone.group, o.zone.material}; }
 
 Quat rotation_of(const dfm_rigid_state &s) {
@@ -118,8 +121,9 @@ void ToolTouch::prepare(World &w, SceneFacts &facts) {
   for (uint32_t i = 0; i < w.obstacles.size(); ++i)
     for (uint32_t j = i + 1; j < w.obstacles.size(); ++j) {
       const Obstacle &a = *w.obstacles[i], &b = *w.obstacles[j];
-      const bool apart = kept_apart(a, b);
-      if (!apart && !passes(a, b)) continue;
+      const bool cornerless = kept_apart(a, b) && without_corners(a) && without_corners(b);
+      const bool apart = kept_apart(a, b) && !cornerless;
+      if (!apart && !cornerless && !passes(a, b)) continue;
       bool touch = (a.def.category & b.def.collides_with) != 0 && (b.def.category & a.def.collides_with) != 0;
       if (const FilterRule *const rule = best_rule(w.filters, names_of(a), names_of(b)))
         touch = rule->collide;
@@ -127,7 +131,7 @@ void ToolTouch::prepare(World &w, SceneFacts &facts) {
       if (!apart) {
         passing_.push_back({i, j, 0, {a.id, b.id}, true, {kNone, kNone}});
         for (const Obstacle *const o : {&a, &b})
-          if (!is_wall(*o) && !is_free(*o) && (o == &a ? is_wall(b) : is_wall(a)) &&
+          if (!is_wall(*o) && (cornerless || !is_free(*o)) && (o == &a ? is_wall(b) : is_wall(a)) &&
               std::find(facts.rigid_alone.begin(), facts.rigid_alone.end(), o->name) ==
                   facts.rigid_alone.end())
             facts.rigid_alone.push_back(o->name);
