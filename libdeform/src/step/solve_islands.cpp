@@ -202,9 +202,8 @@ bool asks_redundant(const World &w, const StepContext &step, SolveIsland &own) {
 }
 
 // Many contacts that bear on one implicit body (contact/tresca.h). Sweeps that have come to their cap without
-// a result are followed by it, and in further solves of the sub-step, which are much like the first one, this
-// many sweeps are enough to see that it is needed again.
-constexpr uint32_t kStalled = 3;
+// a result are followed by it. Further solves of the sub-step are much like the first one and begin with it:
+// sweeps that stall leave errors which the body revises by, and which they do not take back.
 constexpr double kBackedMost = 0.1;  // of the tolerance: what is left over is what bodies revise by
 class BodyBacked final : public BackedResponse {
  public:
@@ -218,7 +217,7 @@ class BodyBacked final : public BackedResponse {
   Dynamics &body_;
 };
 Backs solve_backed(const World &w, StepContext &step, SolveIsland &own, double most) {
-  if (!own.revises || !own.backs || own.sweeps < (own.stalls ? kStalled : w.def.max_sweeps) ||
+  if (!own.revises || !own.backs || own.sweeps < (own.stalls ? 0 : w.def.max_sweeps) ||
       spares(step, own.spent, Thrift::sweeps))
     return Backs::never;
   own.backs = Tresca::serves(step.rows, own.part, step.state);
@@ -231,10 +230,14 @@ Backs solve_backed(const World &w, StepContext &step, SolveIsland &own, double m
   BodyBacked backed(body);
   own.backs = own.stalls =
       own.tresca.solve(step.rows, own.part, step.state, step.h, own.tolerance, kBackedMost, most, backed);
+  own.stuck = !own.backs;
   own.spent.effort += own.tresca.products() * own.effort;
   spend(w, step, own.spent, uint64_t{own.tresca.products()} * own.part.all());
   return own.backs ? Backs::now : Backs::never;
 }
+
+// Where neither sweeps nor that method lead to a result, a body that moves less far does it.
+bool gives_up(const StepContext &step, const SolveIsland &own) { return own.stuck && may_shorten(step); }
 
 // A residual costs as much as a sweep, where points answer their own impulses alone. A sweep seldom leaves
 // less than a quarter of it, and seldom less than a half where the ones before left more than 0.7: it is
@@ -273,6 +276,11 @@ bool sweep_until_good(const World &w, StepContext &step, SolveIsland &own) {
   keep_best(step, own);
   own.acceleration.start(rows, own.part);
   constexpr double kMost = 0.5;  // of the tolerance
+  if (own.stalls) {
+    if (inner_residual(rows, own.part, step.state, step.h, own.tolerance).due <= kMost) return true;
+    if (solve_backed(w, step, own, kMost) == Backs::now) return true;
+    if (gives_up(step, own)) return false;
+  }
   bool asks = false;
   Looks looks;
   for (double before = leave_of(own);;) {
@@ -300,6 +308,7 @@ bool sweep_until_good(const World &w, StepContext &step, SolveIsland &own) {
     }
     const Backs backs = solve_backed(w, step, own, kMost);
     if (backs == Backs::now) return true;
+    if (gives_up(step, own)) return false;
     own.waits = backs == Backs::later;
     if (own.waits) break;
     if (!may_sweep(w, step, own, left, cap)) break;
@@ -375,7 +384,10 @@ void start_island(const World &w, StepContext &step, SolveIsland &own) {
 void solve_passes(const World &w, StepContext &step, SolveIsland &own) {
   for (;;) {
     // at least one sweep on a warm start is part of the method
-    if (!sweep_until_good(w, step, own)) hold_work_back(w, step, own);
+    if (!sweep_until_good(w, step, own)) {
+      if (gives_up(step, own)) return;
+      hold_work_back(w, step, own);
+    }
     if (!ask(w, step, own)) return;
     own.residual = true_residual(step.rows, own.part, step.state, step.h, own.tolerance);
     own.due_before = std::exchange(own.due, own.residual.due);
@@ -407,7 +419,7 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
   const double slow = kSlowOpening * w.offset / step.guard.planned;
   for (bool last = false;;) {
     solve_passes(w, step, own);
-    if (own.bad || last || !opens_dearly(step.rows, own.part, slow)) return;
+    if (own.bad || last || gives_up(step, own) || !opens_dearly(step.rows, own.part, slow)) return;
     const OpeningWork opening = opening_work(step.rows, own.part, slow);
     if (!(opening.put_in > opening.allowed)) return;
     const double work = work_of_opening(step.rows, own.part, opening.put_in);

@@ -47,6 +47,7 @@ struct SolveIsland {
   bool stalls = false;  // sweeps have ended at the cap in this sub-step, and another method has not
   bool waits = false;   // for another response, by which that method is possible
   bool backs = true;    // that method may be tried
+  bool stuck = false;   // it was, and has found nothing
   bool common = false;  // laws are asked by the response of all contacts together
   uint32_t asked = 0;   // passes beyond the cap with the present response
   // of the last two passes (Residual::due)
@@ -114,6 +115,9 @@ class SolveIslands {
   void number_sides(size_t bodies, size_t of_contacts);
   void find_cuts(const World &w, const StepContext &step);
 };
+
+// Whether a sub-step without a result can be taken anew, half as long.
+bool may_shorten(const StepContext &step);
 
 // All islands that are open, each until the true residual of its laws is good enough. One in which a law has
 // failed, or null.
