@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <string_view>
 #include <utility>
 
 #include "json_text.h"
@@ -368,6 +369,22 @@ std::string joules(double energy) {
   return text;
 }
 
+// Why a run is slow, where contact is why and its mesh can be made coarser: slower than a fifth of real time,
+// half of it in contact of a hundred points.
+void print_contact_share(const SceneFile &scene, const RunResult &run, uint32_t contacts_max) {
+  constexpr double kSlow = 5, kLeast = 0.2, kShare = 0.5, kMany = 100;
+  if (run.wall < kLeast || run.wall < kSlow * (run.simulated - run.begun) || run.contacts_mean < kMany)
+    return;
+  double contact = 0;
+  for (const dfm_stage_time &s : profile(scene))
+    if (std::string_view(s.name) == "contact+friction") contact += s.seconds;
+  if (contact < kShare * run.wall) return;
+  std::printf(
+      "contact takes %.0f %% of the time, with up to %u points at once: fewer cells where bodies touch "
+      "make it faster, most of all in bodies with implicit integration; --profile lists the stages\n",
+      100 * std::min(1.0, contact / run.wall), contacts_max);
+}
+
 void print_swaps(const SceneFile &scene, const RunResult &run) {
   constexpr size_t kMost = 20;
   for (size_t i = 0; i < run.swaps.size() && i < kMost; ++i) {
@@ -414,6 +431,7 @@ void print_table(const SceneFile &scene, const RunResult &run, const Checks &che
   if (const AutoShare share = auto_share(plan); share.changes > 0)
     std::printf("integrator auto: implicit for %.3g s of %.3g s (%.0f %%), explicit else; %.0f changes\n",
                 share.implicit, share.steps, 100 * share.implicit / share.steps, share.changes);
+  print_contact_share(scene, run, stats.contacts_max);
   print_swaps(scene, run);
 }
 
