@@ -27,6 +27,8 @@ test::CommandResult run(const Mutation &m, const std::string &more = "/output/ev
 
 class MutatedOdeScene : public testing::TestWithParam<Mutation> {};
 
+void PrintTo(const Mutation &m, std::ostream *out) { *out << m.scene; }
+
 // letters and figures of scene and assignment
 std::string name_of(const testing::TestParamInfo<Mutation> &info) {
   std::string name = std::string(info.param.scene) + info.param.assignment;
