@@ -18,7 +18,7 @@ StepContext::StepContext(const Meters &meters)
              stirred);
   use_memory(meters.contacts.memory(), lent, contacts, tolerance.normal, tolerance.tangent, disturbance,
              best_impulse, trial_response, tangents, match, sharing, aim, stands, ways, renewed, bonds,
-             bond_impulse, chosen, mean, before);
+             bond_impulse, chosen, mean, pairs_made, before);
   state.use(meters.contacts.memory());
   use_memory(meters.detection.memory(), guard.joined, guard.near, guard.hits, guard.speed, guard.change,
              guard.kept, guard.blocks.pieces);

@@ -19,6 +19,7 @@
 #include "step/guard.h"
 #include "step/islands.h"
 #include "step/method.h"
+#include "step/pair_energy.h"
 #include "step/self_contact.h"
 #include "step/solve_islands.h"
 #include "step/stages.h"
@@ -106,7 +107,8 @@ struct StepContext {
   bool ended = false;  // find_ends() has been called since the last solve
   Guard guard;
   // commit
-  Array<double> mean;     // [dofs of rows,4] m/s, over the sub-step; of bodies
+  Array<double> mean;  // [dofs of rows,4] m/s, over the sub-step; of bodies
+  Array<PairMade> pairs_made;
   Array<uint8_t> before;  // [contacts] touched in the last sub-step
   // trades places with the world's
   ContactStore next_store;

@@ -161,7 +161,8 @@ void keep_contacts(World &w, StepContext &step) {
     touching += to.touching[i];
     sticking += l[0] > 0 && step.state.mode[i] == 1;
     if (l[1] != 0 || l[2] != 0)
-      work_of(w, a, b).friction += l[1] * w.report.slip[2 * i] + l[2] * w.report.slip[2 * i + 1];
+      work_of(w, {a, b, step.contacts[i].obstacle != 0}).friction +=
+          l[1] * w.report.slip[2 * i] + l[2] * w.report.slip[2 * i + 1];
   }
   follow_load(w, step);
   turn_frames(w, step);

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
+#include <utility>
 
 #include "core/error.h"
 #include "state/world.h"
@@ -65,6 +67,31 @@ Made made_by(const World &w, const StepContext &step, uint32_t i, bool ends) {
   return {l[0] * u.x + along, kOpens * l[0] * std::max(0.0, -rows.rate[i]), smooth ? step.h * asked : 0};
 }
 
+// An island that is not solved: its impulses err, and what the contacts of one pair do too much those of
+// others take back through the bodies that they share. Its contacts together can have made no more than the
+// sum, of which each pair that has made something gets its share.
+void share_in_islands(StepContext &step) {
+  Array<PairMade> &pairs = step.pairs_made;
+  for (const SolveIsland &island : step.solve_islands.all()) {
+    if (!(island.residual.due > 1)) continue;
+    const auto each = [&](auto &&f) {
+      for (const RowRun &run : island.part.contacts) {
+        auto at = std::lower_bound(pairs.begin(), pairs.end(), run.first,
+                                   [](const PairMade &p, uint32_t first) { return p.contact < first; });
+        for (; at != pairs.end() && at->contact < run.first + run.n; ++at) f(*at);
+      }
+    };
+    double all = 0, gained = 0;
+    each([&](const PairMade &p) {
+      all += p.made;
+      gained += std::max(0.0, p.made);
+    });
+    if (!(gained > 0)) continue;
+    const double share = std::max(0.0, all) / gained;
+    each([&](PairMade &p) { p.made = std::min(p.made, share * std::max(0.0, p.made)); });
+  }
+}
+
 // The sum that is compared with the limit of the watch.
 double excess_of(const PairWork &p) { return std::max(p.rubbed, p.made); }
 
@@ -112,7 +139,8 @@ std::string law_of(const World &w, const PairWork &p) {
   double most = 0;
   for (uint32_t m = 0; m < w.store.n; ++m) {
     const double normal = w.store.impulse[size_t(3) * m];
-    if (w.store.id_a[m] != p.a || w.store.id_b[m] != p.b || !(normal >= most)) continue;
+    const uint64_t a = w.store.id_a[m], b = w.store.id_b[m];
+    if (!((a == p.a && b == p.b) || (a == p.b && b == p.a)) || !(normal >= most)) continue;
     most = normal;
     law = w.pairs.laws[w.store.law[m]];
   }
@@ -128,42 +156,58 @@ std::string models_of(const World &w, const PairWork &p) {
 
 }  // namespace
 
-PairWork &work_of(World &w, uint64_t a, uint64_t b) {
+PairWork &work_of(World &w, PairIds ids) {
+  const auto [a, b] = ids;
   auto it = std::lower_bound(w.work.begin(), w.work.end(), std::pair(a, b),
                              [](const PairWork &p, auto &k) { return std::pair(p.a, p.b) < k; });
   if (it == w.work.end() || it->a != a || it->b != b) it = w.work.insert(it, {a, b, 0});
   return *it;
 }
 
+// Contacts of a pair come from both sides and are not next to each other. Where a solve is far from a
+// solution, those of one side may do much work that those of the other take back.
 void book_pairs(World &w, StepContext &step) {
   const std::span<const ContactPoint> all = step.contacts;
+  Array<PairMade> &pairs = step.pairs_made;
+  pairs.clear();
   for (uint32_t i = 0; i < all.size();) {
     const ContactPoint &c = all[i];
     const uint32_t begin = i;
     while (++i < all.size() && all[i].slot_a == c.slot_a && all[i].slot_b == c.slot_b &&
            all[i].obstacle == c.obstacle) {}
     if (!booked(w, step, c)) continue;
-    const uint64_t a = w.bodies[c.slot_a]->id;
-    const uint64_t b = c.obstacle ? w.obstacles[c.slot_b]->id : w.bodies[c.slot_b]->id;
     const auto by_halves = [&](uint32_t slot) { return w.bodies[slot]->dynamics->abilities().energy; };
     const bool ends = c.obstacle || by_halves(c.slot_a) != by_halves(c.slot_b);
-    Made sum;
-    bool touch = false, deep = false;
+    PairMade sum;
+    sum.contact = begin;
+    sum.ids = {w.bodies[c.slot_a]->id, c.obstacle ? w.obstacles[c.slot_b]->id : w.bodies[c.slot_b]->id,
+               c.obstacle != 0};
+    bool touch = false;
     for (uint32_t k = begin; k < i; ++k) {
       if (!(step.rows.impulse[size_t(3) * k] > 0)) continue;
       const Made one = made_by(w, step, k, ends);
-      sum.all += one.all;
-      sum.recovery += one.recovery;
+      sum.made += one.all - one.recovery;
       sum.friction += one.friction;
       touch = true;
-      deep = deep || all[k].distance < kShallow * w.offset;
+      sum.deep = sum.deep || all[k].distance < kShallow * w.offset;
     }
-    if (!touch) continue;
-    PairWork &pair = work_of(w, a, b);
+    if (touch) pairs.push_back(sum);
+  }
+  share_in_islands(step);
+  std::sort(pairs.begin(), pairs.end(), [](const PairMade &l, const PairMade &r) {
+    return std::tuple(l.ids.a, l.ids.b, l.contact) < std::tuple(r.ids.a, r.ids.b, r.contact);
+  });
+  for (size_t k = 0; k < pairs.size();) {
+    PairMade sum = pairs[k];
+    for (++k; k < pairs.size() && pairs[k].ids.a == sum.ids.a && pairs[k].ids.b == sum.ids.b; ++k) {
+      sum.made += pairs[k].made;
+      sum.friction += pairs[k].friction;
+      sum.deep = sum.deep || pairs[k].deep;
+    }
+    PairWork &pair = work_of(w, sum.ids);
     pair.rubbed += sum.friction;
-    if (!pair.apart) pair.apart = !deep;
-    if (!pair.apart) continue;
-    pair.made += sum.all - sum.recovery;
+    if (!pair.apart) pair.apart = !sum.deep;
+    if (pair.apart) pair.made += sum.made;
   }
   const bool stores = std::any_of(w.pairs.laws.begin(), w.pairs.laws.end(), remembers);
   for (PairWork &p : w.work) {

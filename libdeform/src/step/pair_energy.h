@@ -12,7 +12,24 @@ struct World;
 struct Body;
 struct PairWork;
 
-PairWork &work_of(World &w, uint64_t a, uint64_t b);  // of ids; adds one if there is none
+// The ids of two sides, a body first; of two bodies the lower one. They touch by surfels of either of them,
+// and these contacts are one pair, whatever side comes first.
+struct PairIds {
+  uint64_t a = 0, b = 0;
+  PairIds() = default;
+  PairIds(uint64_t body, uint64_t other, bool obstacle)
+      : a(!obstacle && other < body ? other : body), b(a == body ? other : body) {}
+};
+
+// What contacts of one pair that follow each other have done in a sub-step.
+struct PairMade {
+  PairIds ids;
+  uint32_t contact = 0;           // the first one
+  bool deep = false;              // some of them is nearer than the rest distance
+  double made = 0, friction = 0;  // J, beyond what recovery puts in; of the law
+};
+
+PairWork &work_of(World &w, PairIds ids);  // adds one if there is none
 // Called at the end of the sub-step, after the work of contact on bodies has been added: step.mean has the
 // mean velocities of the dofs.
 void book_pairs(World &w, StepContext &step);

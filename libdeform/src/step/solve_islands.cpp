@@ -335,12 +335,13 @@ bool sweep_until_good(const World &w, StepContext &step, SolveIsland &own) {
 // A solve that did not converge may leave impulses that do work: with much friction in a jam each sweep adds
 // to it. If the contacts of an island do more work than their bias velocities explain, the island is solved
 // again with fixed friction limits, first without friction, which cannot add energy
-// (contact/fixed_limits.h, doc/decisions/0425-contact-does-no-work-of-its-own.md).
-constexpr double kExcess = 0.1;       // of the work that the impulses would do without a response
+// (contact/fixed_limits.h, doc/decisions/0425-contact-does-no-work-of-its-own.md). most: of the work that the
+// impulses would do without a response.
+constexpr double kExcess = 0.1;
 constexpr uint32_t kFixedSweeps = 8;  // without friction, and as many with friction
-void hold_work_back(const World &w, StepContext &step, SolveIsland &own) {
+bool hold_work_back(const World &w, StepContext &step, SolveIsland &own, double most) {
   const ExcessWork excess = excess_work(step.rows, own.part);
-  if (excess.work <= kExcess * excess.scale) return;
+  if (excess.work <= most * excess.scale) return false;
   drop_impulses(step.rows, own.part);
   own.limit.assign(own.part.n, 0.0);
   for (uint32_t k = 0; k < 2 * kFixedSweeps; ++k) {
@@ -351,6 +352,7 @@ void hold_work_back(const World &w, StepContext &step, SolveIsland &own) {
     ++own.sweeps;
     solve_island_bonds(w, step, own);
   }
+  return true;
 }
 
 // A pass asks the laws at the state so far. False: one has failed.
@@ -386,7 +388,7 @@ void solve_passes(const World &w, StepContext &step, SolveIsland &own) {
     // at least one sweep on a warm start is part of the method
     if (!sweep_until_good(w, step, own)) {
       if (gives_up(step, own)) return;
-      hold_work_back(w, step, own);
+      hold_work_back(w, step, own, kExcess);
     }
     if (!ask(w, step, own)) return;
     own.residual = true_residual(step.rows, own.part, step.state, step.h, own.tolerance);
@@ -403,6 +405,15 @@ void solve_passes(const World &w, StepContext &step, SolveIsland &own) {
 // what is allowed, since the work goes with their square, then with none, which add no energy
 // (contact/recovery.h, doc/decisions/0411-opening-depths-does-little-work.md).
 constexpr double kSlowOpening = 0.03;  // of the rest distance in a sub-step: this is always allowed
+double share_of_opening(const ContactRows &rows, const RowsPart &part, double slow) {
+  const OpeningWork opening = opening_work(rows, part, slow);
+  if (!(opening.put_in > opening.allowed)) return 1;
+  const double work = work_of_opening(rows, part, opening.put_in);
+  return work > opening.allowed ? std::sqrt(opening.allowed / work) : 1;
+}
+
+// Such impulses are large and nearly cancel: what they do at velocities within the tolerance is not little.
+// An island that opens depths at a cost may do no work of its own, solved or not (doc/decisions/0431).
 void solve_island(const World &w, StepContext &step, SolveIsland &own) {
   if (own.bad || own.thrown) return;
   const double gap_margin = normal_at_rest(w, step.h), least = tangent_at_rest(w, step.h);
@@ -419,13 +430,17 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
   const double slow = kSlowOpening * w.offset / step.guard.planned;
   for (bool last = false;;) {
     solve_passes(w, step, own);
-    if (own.bad || last || gives_up(step, own) || !opens_dearly(step.rows, own.part, slow)) return;
-    const OpeningWork opening = opening_work(step.rows, own.part, slow);
-    if (!(opening.put_in > opening.allowed)) return;
-    const double work = work_of_opening(step.rows, own.part, opening.put_in);
-    if (!(work > opening.allowed)) return;
+    if (own.bad || gives_up(step, own)) return;
+    const bool dear = opens_dearly(step.rows, own.part, slow);
+    if (!dear && !own.slowed) return;
+    const double share = dear && !last ? share_of_opening(step.rows, own.part, slow) : 1;
+    if (!(share < 1)) {
+      if (hold_work_back(w, step, own, 0) && ask(w, step, own))
+        own.residual = true_residual(step.rows, own.part, step.state, step.h, own.tolerance);
+      return;
+    }
     last = own.slowed;
-    slow_opening(step.rows, own.part, last ? 0 : std::sqrt(opening.allowed / work));
+    slow_opening(step.rows, own.part, last ? 0 : share);
     own.slowed = true;
     drop_impulses(step.rows, own.part);
     own.start();
