@@ -21,6 +21,7 @@ void reserve_contacts(World &w, StepContext &step) {
   each_column([&](const ContactColumn &column, auto &values) { values.reserve(column.entries(n, S)); }, to);
   each_report_column([&](size_t width, auto &column) { column.reserve(width * n); }, next);
   step.mean.reserve(size_t{kStride} * step.rows.ndof);
+  step.pairs_made.reserve(step.rows.n);
   step.before.resize(n);
   w.work.reserve(std::min(w.work.size() + n, w.bodies.size() * (w.bodies.size() + w.obstacles.size())));
   reserve_events(w, size_t(n) + w.store.n + w.attachments.size());
