@@ -57,10 +57,7 @@ TEST(AttachScene, RopeBetweenHookAndBrick_CarriesBoth) {
     EXPECT_EQ(a.release, i ? 500 : 0);
     EXPECT_NEAR(a.force[2], i ? -brick : weight + brick, 0.02 * (weight + brick));
   }
-  size_t bytes = 0;
-  test::ok(dfm_world_explain(s.world, nullptr, &bytes));
-  std::string text(bytes, ' ');
-  test::ok(dfm_world_explain(s.world, text.data(), &bytes));
+  const std::string text = test::explain(s.world);
   EXPECT_NE(text.find("\"attached\":[{\"to\":\"hook\","), std::string::npos);
   EXPECT_NE(text.find("2 attachments hold"), std::string::npos);
 }

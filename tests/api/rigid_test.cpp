@@ -208,10 +208,7 @@ TEST(RigidBodies, ReportsNameThem) {
   ok(dfm_world_events(w, n, events.data(), &n));
   EXPECT_TRUE(std::any_of(events.begin(), events.end(),
                           [&](auto &e) { return e.kind == DFM_EVENT_BEGIN && e.b == plate; }));
-  size_t bytes = 0;
-  ok(dfm_world_explain(w, nullptr, &bytes));
-  std::string text(bytes, '\0');
-  ok(dfm_world_explain(w, text.data(), &bytes));
+  const std::string text = test::explain(w);
   for (const char *part :
        {"rigid predict", "rigid commit", "1 rigid body and 1 joint of host builtin", "two_way_rigid"})
     EXPECT_NE(text.find(part), std::string::npos) << part;

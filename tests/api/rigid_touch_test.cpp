@@ -377,10 +377,7 @@ TEST(RigidTouch, WhatPassesThroughAFloor_IsTold) {
   test::create(w, bodies, {test::joint(DFM_JOINT_HINGE, 1, 0, {0, 0, 0.2}, {0, 1, 0})});
   const std::vector<dfm_rigid_def> free = {test::box("free", {0.05, 0.05, 0.05}, 1, {1, 0, 0.1})};
   test::create(w, free);
-  size_t size = 0;
-  test::ok(dfm_world_explain(w, nullptr, &size));
-  std::string plan(size, 0);
-  test::ok(dfm_world_explain(w, plan.data(), &size));
+  const std::string plan = test::explain(w);
   EXPECT_NE(plan.find("these pass through obstacles: cart, arm"), std::string::npos) << plan;
   go(w, 1e-2, 0.5);
   const size_t first = context.log.find("rigid body 'cart' is ");
@@ -441,10 +438,7 @@ TEST(RigidTouch, VoxelsOnAPlane_AreTold) {
   of.cells = 1000;
   dfm_obstacle shape = 0;
   test::ok(dfm_rigid_add_shape(r, &of, &shape));
-  size_t size = 0;
-  test::ok(dfm_world_explain(w, nullptr, &size));
-  std::string plan(size, 0);
-  test::ok(dfm_world_explain(w, plan.data(), &size));
+  const std::string plan = test::explain(w);
   EXPECT_NE(plan.find("these pass through obstacles: lump.grid"), std::string::npos) << plan;
   go(w, 1e-2, 0.5);
   const size_t first = context.log.find("the center of 'lump.grid' is ");

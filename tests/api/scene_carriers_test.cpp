@@ -122,13 +122,7 @@ struct Loaded {
     test::ok(dfm_body_get_state(body, n, x.data(), nullptr, &n));
     return x;
   }
-  std::string explain() const {
-    size_t bytes = 0;
-    test::ok(dfm_world_explain(world, nullptr, &bytes));
-    std::string text(bytes, '\0');
-    test::ok(dfm_world_explain(world, text.data(), &bytes));
-    return text;
-  }
+  std::string explain() const { return test::explain(world); }
   uint64_t hash_after(int steps) {
     for (int i = 0; i < steps; ++i) test::ok(dfm_world_step(world, 1e-3, nullptr));
     return dfm_world_hash(world);

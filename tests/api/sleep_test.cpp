@@ -50,10 +50,7 @@ int until_asleep(dfm_world w, dfm_body b, int most = 6000) {
 }
 
 double offset(dfm_world w) {  // d_c
-  size_t bytes = 0;
-  test::ok(dfm_world_explain(w, nullptr, &bytes));
-  std::string text(bytes, '\0');
-  test::ok(dfm_world_explain(w, text.data(), &bytes));
+  const std::string text = test::explain(w);
   return std::stod(text.substr(text.find("contact_offset_m") + 18));
 }
 
@@ -457,10 +454,7 @@ TEST(Wake, AfterASnapshotOfSleepers_GivesTheSameBits) {
 TEST(Sleep, Plan_ListsTheStageOnlyOnRequest) {
   for (const bool on : {false, true}) {
     const Rest s(on);
-    size_t bytes = 0;
-    test::ok(dfm_world_explain(s.world, nullptr, &bytes));
-    std::string text(bytes, '\0');
-    test::ok(dfm_world_explain(s.world, text.data(), &bytes));
+    const std::string text = test::explain(s.world);
     const size_t at = text.find("{\"name\":\"sleep\""), absent = text.find("\"absent\"");
     ASSERT_NE(at, std::string::npos);
     EXPECT_EQ(at < absent, on);
@@ -480,10 +474,7 @@ TEST(Sleep, OfAScene_IsItsContactKey) {
             DFM_OK)
       << dfm_last_error();
   test::ok(dfm_scene_world(scene, &w));
-  size_t bytes = 0;
-  test::ok(dfm_world_explain(w, nullptr, &bytes));
-  std::string text(bytes, '\0');
-  test::ok(dfm_world_explain(w, text.data(), &bytes));
+  const std::string text = test::explain(w);
   EXPECT_LT(text.find("{\"name\":\"sleep\""), text.find("\"absent\""));
   test::ok(dfm_scene_close(scene));
 }

@@ -19,13 +19,7 @@ struct Cube {
   dfm_body body;
   explicit Cube(const char *model = "corotational_fem", uint32_t cells = 320)
       : w(test::make_world(context, {0, 0, 0})) {
-    test::BodyOptions o;
-    o.name = "cube";
-    o.model = model;
-    o.young = 3e4;
-    o.damping_stiffness = 2e-3;
-    o.position = {-0.02, -0.02, -0.02};
-    body = test::make_body(context, w, "beam", {0.04, 0.04, 0.04}, cells, o);
+    body = test::cutting::cube(context, w, model, cells);
   }
 };
 

@@ -103,6 +103,4 @@ inline std::vector<uint32_t> surface_triangles(dfm_body b) { return listed(dfm_s
 // The body's own boundary as a surface of its own: the same thing through the matrix.
 inline Skin boundary_skin(dfm_body b) { return {surface_positions(b), surface_triangles(b)}; }
 
-inline std::string explain(dfm_world w) { return written(dfm_world_explain, w); }
-
 }  // namespace test

@@ -41,6 +41,17 @@ struct State {
   }
 };
 
+// Of 40 mm about the origin.
+inline dfm_body cube(dfm_context *c, dfm_world w, const char *model, uint32_t cells = 320) {
+  test::BodyOptions o;
+  o.name = "cube";
+  o.model = model;
+  o.young = 3e4;
+  o.damping_stiffness = 2e-3;
+  o.position = {-0.02, -0.02, -0.02};
+  return test::make_body(c, w, "beam", {0.04, 0.04, 0.04}, cells, o);
+}
+
 // A beam of a material that takes energy to be cut.
 struct Tough {
   std::array<double, 3> size;

@@ -213,4 +213,6 @@ inline dfm_body_def clamped_beam(dfm_context *context, uint32_t cells, std::vect
   return d;
 }
 
+inline std::string explain(dfm_world w) { return written(dfm_world_explain, w); }
+
 }  // namespace test

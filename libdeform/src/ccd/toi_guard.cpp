@@ -81,10 +81,9 @@ class NearPairs {
     const double now = kRounding * (run.way + run.travel), *const rest = memory_.rest.data();
     a_ = &scene_.side(list_[run.begin], false);
     b_ = &scene_.side(list_[run.begin], true);
-    const PairAtRest *const own =
-        a_ == b_ && a_->opened ? a_->pairs[run.kind == kEdgeEdge] - run.begin : nullptr;
+    const PairAtRest *const own = a_ == b_ && a_->opened ? a_->pairs[run.kind == kEdgeEdge] : nullptr;
     for (uint32_t i = begin; i < end; ++i)
-      if (!(now < rest[i]) && !(own && held(own[i]))) look(i, run.way, now);
+      if (!(now < rest[i]) && !(own && held(own[i - run.begin]))) look(i, run.way, now);
   }
 
  private:
