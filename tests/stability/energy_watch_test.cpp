@@ -138,6 +138,38 @@ TEST(EnergyWatch, UndampedBodyThatBounces_IsNoGain) {
   }
 }
 
+// A blow shortens the sub-steps while contact presses the body: what that changes of the balance does not
+// depend on the impulses of contact, nor on the pieces that the guard has just cut.
+TEST(EnergyWatch, BallThatFallsOnASoftPad_IsNoGain) {
+  struct Fall {
+    double young, radius, mass, from;
+    int cells;
+  };
+  const Fall falls[] = {{5e4, 0.03, 0.3, 0.25, 600},  // shorter sub-steps
+                        {2e5, 0.03, 0.3, 0.25, 5000},
+                        {1e5, 0.03, 0.3, 0.12, 600},
+                        {1e4, 0.03, 0.3, 1.024, 1500},  // shorter after a piece that the guard has cut
+                        {1e4, 0.05, 1, 1.04, 200}};
+  for (const Fall &f : falls) {
+    const std::string out = test::scratch("energy_watch_ball"), scene = out + "/scene.json";
+    test::write_file(scene, R"({"format": "deform-scene", "version": 1, "time": {"duration": 1},
+    "materials": {"soft": {"density": 1000, "young": )" +
+                                std::to_string(f.young) + R"(, "poisson": 0.3}},
+    "bodies": [{"name": "pad", "mesh": {"make": "beam", "size": [0.2, 0.2, 0.05], "cells": )" +
+                                std::to_string(f.cells) + R"(}, "material": "soft",
+                "pose": {"position": [-0.1, -0.1, 0.001]}}],
+    "rigid": {"bodies": [{"name": "ball", "shape": "sphere", "radius": )" +
+                                std::to_string(f.radius) + R"(, "mass": )" + std::to_string(f.mass) +
+                                R"(, "pose": {"position": [0.02, 0.01, )" +
+                                std::to_string(0.051 + f.radius + f.from) +
+                                R"(]}}]},
+    "obstacles": [{"name": "floor", "shape": "plane"}],
+    "contact": {"friction": [{"between": ["*", "*"], "law": "coulomb", "params": {"mu": 0.5}}]}})");
+    const test::CommandResult r = test::deform({"run", scene, "--out", out + "/run", "--quiet"});
+    EXPECT_EQ(r.exit_code, 0) << f.young << " Pa, " << f.mass << " kg from " << f.from << " m: " << r.err;
+  }
+}
+
 // A base costs eight looks. A host that changes something before every step would have a new
 // one all the time.
 TEST(EnergyWatch, HostThatChangesEveryStep_CostsFewLooks) {

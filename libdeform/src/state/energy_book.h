@@ -21,8 +21,9 @@ struct EnergyWatch {
   uint32_t credit = kMostCredit;
   uint32_t age = ~0u;  // sub-steps since the last check
   double last_h = 0;   // s, of the last sub-step
-  // the step bound changes the size of the next sub-step; not lasting state: set in each step
-  bool new_size = false;
+  // s, planned size of the sub-steps until the library changed it for the next one; 0: it did not. Not state:
+  // set in each step
+  double size_before = 0;
   // the last look has stopped the run because of a pair: what the host changes then starts sums anew; not
   // state
   bool told = false;

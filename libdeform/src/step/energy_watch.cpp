@@ -73,17 +73,18 @@ double work_of_holders(const World &w, const StepContext &step, const Body &b, b
 
 // Another size h of the sub-steps makes of G = .. + v.M v* / 2 another quantity that the scheme keeps, which
 // is larger by (h2 - h1) v.f / 2. The changes that the library makes itself are few, so what they bring is
-// bounded and no instability.
+// bounded and no instability. f is taken from the forces, since v* may hold the impulses of contact by now.
+// Pieces that the guard cuts do not count: what they bring they take away again.
 double work_of_new_size(const World &w, const StepContext &step, const Body &b) {
-  if (!w.watch.new_size || !(w.watch.last_h > 0)) return 0;
+  if (!(w.watch.size_before > 0 && w.watch.last_h > 0)) return 0;
   const bool load_booked = books_loads(b);
   const Phyxels &p = b.p;
   double sum = 0;
   for (uint32_t i = 0; i < p.n; ++i)
     for (size_t k = 0, at = size_t(i) * kStride; k < 3; ++k, ++at)
       if (p.moves(at))
-        sum += p.v[at] * (p.mass[i] * (p.v_free[at] - p.v[at]) - (load_booked ? step.h * p.load[at] : 0));
-  return 0.5 * (1 - w.watch.last_h / step.h) * sum;
+        sum += p.v[at] * (p.f[at] + p.mass[i] * w.gravity.now[int(k)] - (load_booked ? p.load[at] : 0));
+  return 0.5 * (step.guard.planned - w.watch.size_before) * sum;
 }
 
 double rounding_of(const Body &b, double h, double potential, double kinetic, double elastic, double reach) {
@@ -381,7 +382,8 @@ bool watch_energy(World &w, StepContext &step, uint32_t *trouble) {
   }
   if (w.watch.age == ~0u) s.energy_start = total;
   w.watch.age = 0;
-  if (worst.rise > worst.share * std::max(s.energy_max, total - worst.rise)) {
+  const double largest = std::max(s.energy_max, total - worst.rise);
+  if (worst.rise > worst.share * largest) {
     s.energy_gain = std::max(s.energy_gain, gain);
     *trouble |= DFM_TROUBLE_ENERGY;
     w.watch.age = kEvery;  // the next step is checked again
@@ -393,7 +395,7 @@ bool watch_energy(World &w, StepContext &step, uint32_t *trouble) {
                "give the material stiffness damping; where the model is a plugin's, check its forces "
                "(energy_watch sets the limit, 0 switches the watch off)",
                static_cast<unsigned long long>(w.step_count), worst.body->name.c_str(),
-               worst.body->model.type->id, worst.rise, 100 * worst.share, s.energy_max)
+               worst.body->model.type->id, worst.rise, 100 * worst.share, largest)
             .c_str());
     return false;
   }
@@ -425,11 +427,11 @@ void book_energy(World &w, StepContext &step, double motion) {
       continue;
     }
     if (!step.driven.empty()) b.energy.work += work_of_holders(w, step, b, true);
-    if (books(b) && step.guard.planned == step.h) b.energy.work += work_of_new_size(w, step, b);
+    if (books(b)) b.energy.work += work_of_new_size(w, step, b);
     if (books(b) && (motion < 1 || books_loads(b))) book_body(w, step, b, motion);
   }
   w.watch.last_h = motion * step.h;
-  w.watch.new_size = w.watch.new_size && step.guard.planned != step.h;
+  w.watch.size_before = 0;
   if (w.watch.age <= kEvery) w.watch.age = std::min(w.watch.age + ages, kEvery);
   w.watch.credit = std::min(w.watch.credit + ages, kMostCredit);
 }

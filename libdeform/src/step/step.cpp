@@ -143,7 +143,7 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
   const StepSizes before = w.sizes;
   const uint32_t n =
       static_cast<uint32_t>(std::min<double>(w.def.max_substeps, choose_pieces(w.sizes, dt, w.bound.step)));
-  w.watch.new_size = earned(before, w.sizes, w.bound.step);
+  w.watch.size_before = earned(before, w.sizes, w.bound.step) ? before.cut.size : 0;
   plan_work(w, step, n);
   begin_count(w, step, dt);
   if (n > 1) *trouble |= DFM_TROUBLE_SUBSTEPS;
@@ -171,11 +171,11 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
         return DFM_E_DIVERGED;
       }
       if (more > cut - k) {
+        if (!(w.watch.size_before > 0)) w.watch.size_before = span / cut;
         from = w.time;
         span = goal - w.time;
         cut = static_cast<uint32_t>(more);
         k = 0;
-        w.watch.new_size = true;
         *trouble |= DFM_TROUBLE_SUBSTEPS;
       }
     }
