@@ -1,8 +1,9 @@
 // What more threads can give a scene, from one thread: a host's parallel_for that runs the blocks of each job
 // one after the other and takes their times. Per stage: microseconds of a step, the share of it that comes in
 // blocks, jobs, blocks, microseconds on two threads; then the factor that n threads would give, the blocks of
-// each job taken in turn by whoever is free, with `handout` microseconds for each job. Steps that took three
-// times the median were disturbed by other work of the machine, and are left out.
+// each job taken in turn by whoever is free, with `handout` microseconds for each job. What this program does
+// between blocks counts for nothing. Steps that took three times the median were disturbed by other work of
+// the machine, and are left out.
 //   thread_shares SCENE SECONDS [HANDOUT]
 #include <algorithm>
 #include <chrono>
@@ -47,7 +48,7 @@ struct Shares {
   std::vector<Zone> zones{{"outside stages"}}, step;
   size_t at = 0;
   double begun = 0;
-  double look = cost_of_a_look(), paid = 0;  // us; for all looks at blocks
+  double look = cost_of_a_look(), paid = 0;  // us; for what is not the library's work
   double handout = 0.5;
   std::vector<double> times;
   std::vector<double> saved[kCounts];  // by count, then by step: what threads save of it
@@ -68,6 +69,7 @@ struct Shares {
                   void *task) {
     Shares &s = *static_cast<Shares *>(user);
     if (n <= grain) return fn(task, 0, n);
+    const double entered = now();
     Zone &zone = s.zones[s.at];
     double total = 0;
     std::vector<double> free[kCounts];
@@ -76,7 +78,6 @@ struct Shares {
       const double start = now();
       fn(task, from, std::min(n, from + grain));
       const double took = std::max(0.0, since(start) - s.look);
-      s.paid += 2 * s.look;
       total += took;
       for (auto &threads : free) *std::min_element(threads.begin(), threads.end()) += took;
       ++zone.blocks;
@@ -86,6 +87,7 @@ struct Shares {
     zone.saved += total - *std::max_element(free[1].begin(), free[1].end()) - s.handout;
     for (size_t k = 1; k < kCounts; ++k)
       s.saved[k].back() += total - *std::max_element(free[k].begin(), free[k].end()) - s.handout;
+    s.paid += std::max(0.0, since(entered) - total);
   }
 };
 

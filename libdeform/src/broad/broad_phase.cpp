@@ -49,7 +49,7 @@ struct Features {  // corners of a surface as listed
   Vec3 edge(uint32_t e, int k) const { return point(surface.edge[2 * size_t{e} + k]); }
 };
 
-constexpr size_t kLook = 2000;  // surfels per block of work
+constexpr size_t kLook = 1000;  // surfels per block of work
 
 // f(i) for all i < n on the threads of tasks. An exception must not leave a worker.
 template <class F>

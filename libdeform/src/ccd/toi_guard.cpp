@@ -241,14 +241,11 @@ void GuardMemory::follow(const Array<Candidate> &list, Tasks *tasks) {
   features.resize(n);
   rest.resize(n);
   normal.resize(3 * n);
-  for (uint32_t i = 0; i < n; ++i) {
+  for (size_t i = 0; i < n;) {
     const Candidate &c = list[i];
-    features[i] = uint64_t{c.feature_a} << 32 | c.feature_b;
-    const Run *const last = runs.empty() ? nullptr : &runs.back();
-    if (!last || last->slot_a != c.slot_a || last->slot_b != c.slot_b || last->obstacle != c.obstacle ||
-        last->kind != c.kind)
-      runs.push_back({i, i, c.slot_a, c.slot_b, c.obstacle, c.kind, 0, 0});
-    runs.back().end = i + 1;
+    const size_t end = end_of_run(list, i);
+    runs.push_back({uint32_t(i), uint32_t(end), c.slot_a, c.slot_b, c.obstacle, c.kind, 0, 0});
+    i = end;
   }
   // Runs come in one order in all lists, pairs in a run by their features.
   size_t next = 0;
@@ -265,7 +262,7 @@ void GuardMemory::follow(const Array<Candidate> &list, Tasks *tasks) {
     next = size_t{before[r]} + 1;
   }
   const auto carry = [&](uint32_t begin, uint32_t end) {
-    for (uint32_t r = begin; r < end; ++r) carry_over(runs[r], before[r]);
+    for (uint32_t r = begin; r < end; ++r) carry_over(list, runs[r], before[r]);
   };
   const uint32_t all = static_cast<uint32_t>(runs.size());
   if (tasks && n > 2 * kBlock)
@@ -273,7 +270,7 @@ void GuardMemory::follow(const Array<Candidate> &list, Tasks *tasks) {
   else carry(0, all);
 }
 
-void GuardMemory::carry_over(Run &run, uint32_t from) {
+void GuardMemory::carry_over(const Array<Candidate> &list, Run &run, uint32_t from) {
   uint32_t j = 0, last = 0;
   if (from != kNone) {
     run.way = old_runs[from].way;
@@ -281,6 +278,7 @@ void GuardMemory::carry_over(Run &run, uint32_t from) {
     last = old_runs[from].end;
   }
   for (uint32_t i = run.begin; i < run.end; ++i) {
+    features[i] = uint64_t{list[i].feature_a} << 32 | list[i].feature_b;
     while (j < last && old_features[j] < features[i]) ++j;
     const bool known = j < last && old_features[j] == features[i];
     rest[i] = known ? old_rest[j] : -1;

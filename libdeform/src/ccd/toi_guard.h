@@ -103,7 +103,8 @@ struct GuardMemory {
   void keep() {
     for (Run &r : runs) r.way += r.travel;
   }
-  void carry_over(Run &run, uint32_t from);  // place in old_runs, or kNone
+  // from: place in old_runs, or kNone
+  void carry_over(const Array<Candidate> &list, Run &run, uint32_t from);
 };
 
 // The list divided into blocks for workers, and their results. The division depends on the list alone.

@@ -4,17 +4,50 @@
 
 namespace dfm {
 
+namespace {
+
+const ImpulseSink &sink_of(std::span<const ImpulseSink> sinks, uint32_t node) {
+  return *(std::upper_bound(sinks.begin(), sinks.end(), node,
+                            [](uint32_t value, const ImpulseSink &s) { return value < s.first_node; }) -
+           1);
+}
+
+// Of a surfel that is a point: the point's impulse is the surfel's.
+void pass_on(const ImpulseSink &s, uint32_t surfel) {
+  if (s.phyxel && s.surface->identity())
+    store3(s.phyxel + size_t(4) * s.surface->point[surfel], load3(s.surfel + size_t(3) * surfel));
+}
+
+void zero(std::span<const ImpulseSink> sinks, const GivenNodes &given) {
+  if (given.known) {
+    for (const uint32_t node : given.list) {
+      const ImpulseSink &s = sink_of(sinks, node);
+      store3(s.surfel + size_t(3) * (node - s.first_node), {});
+      pass_on(s, node - s.first_node);
+    }
+    return;
+  }
+  for (const ImpulseSink &s : sinks) {
+    std::fill(s.surfel, s.surfel + size_t(3) * s.nnode, 0.0);
+    for (uint32_t j = 0; j < s.nnode; ++j) pass_on(s, j);
+  }
+}
+
+}  // namespace
+
 void distribute(std::span<const ContactPoint> contacts, const double *frame, const double *impulse,
-                std::span<const ImpulseSink> sinks, std::span<const Bond> bonds, const double *bond_impulse) {
-  for (const ImpulseSink &s : sinks) std::fill(s.surfel, s.surfel + size_t(3) * s.nnode, 0.0);
+                std::span<const ImpulseSink> sinks, GivenNodes &given, std::span<const Bond> bonds,
+                const double *bond_impulse) {
+  zero(sinks, given);
+  given.known = false;  // until all that follows is in the list
+  given.list.clear();
   const auto add = [&](const auto &c, Vec3 p) {
     for (uint32_t k = 0; k < c.nnode; ++k) {
       const uint32_t node = c.node[k];
-      auto sink = std::upper_bound(sinks.begin(), sinks.end(), node,
-                                   [](uint32_t value, const ImpulseSink &s) { return value < s.first_node; });
-      --sink;
-      double *const to = sink->surfel + size_t(3) * (node - sink->first_node);
+      const ImpulseSink &sink = sink_of(sinks, node);
+      double *const to = sink.surfel + size_t(3) * (node - sink.first_node);
       store3(to, load3(to) + c.weight[k] * p);
+      given.list.push_back(node);
     }
   };
   for (size_t i = 0; i < contacts.size(); ++i) {
@@ -24,16 +57,13 @@ void distribute(std::span<const ContactPoint> contacts, const double *frame, con
     add(contacts[i], p);
   }
   for (size_t k = 0; k < bonds.size(); ++k) add(bonds[k], load3(bond_impulse + 3 * k));
-  for (const ImpulseSink &s : sinks) {
-    if (!s.phyxel) continue;
-    const Surface &surface = *s.surface;
-    if (!surface.identity()) {
-      scatter_surface(surface, s.surfel, s.npoint, s.phyxel);
-      continue;
-    }
-    for (uint32_t j = 0; j < s.nnode; ++j)
-      store3(s.phyxel + size_t(4) * surface.point[j], load3(s.surfel + size_t(3) * j));
+  for (const uint32_t node : given.list) {
+    const ImpulseSink &s = sink_of(sinks, node);
+    pass_on(s, node - s.first_node);
   }
+  for (const ImpulseSink &s : sinks)
+    if (s.phyxel && !s.surface->identity()) scatter_surface(*s.surface, s.surfel, s.npoint, s.phyxel);
+  given.known = true;
 }
 
 void scatter_surface(const Surface &surface, const double *surfel, uint32_t npoint, double *phyxel) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "math/width.h"
 
@@ -104,7 +105,8 @@ void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const 
     return lo;
   };
   // Pass 1: touched surfels of self-stepping bodies, ascending, one block each.
-  dof_of_node_.assign(nnode, kNone);
+  if (std::ranges::any_of(sources, [](const DofSource &s) { return !s.diagonal; }))
+    dof_of_node_.assign(nnode, kNone);
   for (uint32_t s = 0; s < sources.size(); ++s) {
     if (sources[s].diagonal) continue;
     const uint32_t first = ndof;
@@ -130,7 +132,8 @@ void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const 
   }
   // Pass 2: contacts to dofs. A coupled surfel expands to its phyxels; a phyxel that comes twice in one
   // contact is merged.
-  dof_of_point_.assign(npoint, kNone);
+  if (!std::exchange(points_free_, false) || dof_of_point_.size() != npoint)
+    dof_of_point_.assign(npoint, kNone);
   auto dof_of = [&](uint32_t s, uint32_t phyxel) {
     uint32_t &d = dof_of_point_[sources[s].first_point + phyxel];
     if (d == kNone) {
@@ -194,11 +197,13 @@ void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const 
       continue;
     }
     const DofSource &s = sources[source[d]];
+    if (block[d] == kNone) dof_of_point_[s.first_point + point[d]] = kNone;
     for (uint32_t k = 0; k < 4; ++k) {
       y[size_t(d) * 4 + k] = s.velocity[size_t(point[d]) * 4 + k];
       alone[size_t(d) * 4 + k] = s.diagonal ? s.diagonal[size_t(point[d]) * 4 + k] : 0;
     }
   }
+  points_free_ = true;
 }
 
 // What the impulse a on the soft body, -a on the rigid one, changes of the velocity between them on

@@ -163,6 +163,7 @@ struct ContactRows {
  private:
   // this sub-step's dof of a phyxel, of a surfel of a self-stepping body; kNone
   Array<uint32_t> dof_of_point_, dof_of_node_;
+  bool points_free_ = false;  // all of dof_of_point_ are kNone
   // the place of a dof of a coupled surface in the row being made
   Array<uint32_t> place_;
   Array<uint32_t> dof_of_group_;  // first dof of a rigid group

@@ -1,6 +1,9 @@
 // The input of the detection stages: plain views of bodies and obstacles, filled by step/ in each sub-step.
 #pragma once
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
+#include <span>
 
 #include "geometry/surface.h"
 #include "math/vec3.h"
@@ -60,6 +63,24 @@ struct Candidate {
   // surfel and triangle of the mesh, two edges, vertex of the mesh and triangle of a (kind 2)
   uint8_t kind, obstacle;
 };
+
+// One pair of sides, one kind.
+inline bool same_run(const Candidate &l, const Candidate &r) {
+  return l.slot_a == r.slot_a && l.slot_b == r.slot_b && l.obstacle == r.obstacle && l.kind == r.kind;
+}
+// Runs are long, and no two have the same sides and kind: steps that double, then halves of the last one.
+inline size_t end_of_run(std::span<const Candidate> list, size_t begin) {
+  size_t in = begin, step = 1;
+  while (in + step < list.size() && same_run(list[in + step], list[begin])) {
+    in += step;
+    step *= 2;
+  }
+  const auto first = list.begin() + std::ptrdiff_t(in) + 1;
+  const auto last = list.begin() + std::ptrdiff_t(std::min(in + step, list.size()));
+  return size_t(
+      std::partition_point(first, last, [&](const Candidate &c) { return same_run(c, list[begin]); }) -
+      list.begin());
+}
 
 // For a Candidate or a ContactPoint: whether a body touches itself.
 template <class Pair>

@@ -21,15 +21,8 @@ std::span<const Crossing> of_pair(std::span<const Crossing> all, uint64_t id_a, 
   return {begin, std::upper_bound(begin, all.end(), Crossing{id_a, id_b, kNone, kNone})};
 }
 
-// Surfels of one body that have contacts with one other side: a sorted run of the list.
-struct Owners {
-  const ContactPoint *begin, *end;
-  bool has(uint32_t surfel) const {
-    const ContactPoint *at = std::lower_bound(
-        begin, end, surfel, [](const ContactPoint &c, uint32_t s) { return c.feature_a < s; });
-    return at != end && at->feature_a == surfel;
-  }
-};
+// Contacts of surfels of one body with one other side: a run of the list.
+using Owners = std::span<const ContactPoint>;
 
 // An edge or triangle contact takes the area of the nearest of its corners without a contact with the other
 // side; no area is given twice; 0 if none is free (doc/concepts/detection.md). lender: the node that gave its
@@ -83,29 +76,38 @@ class Areas {
         [&](const ContactPoint &c, const Place &w) { return !before(w, place_of(c)) && c.type_a == 0; });
     return {begin, end};
   }
+  void mark(const BodyView &body, Owners owners, uint8_t as) {
+    for (const ContactPoint &c : owners) lent_[body.first_node + c.feature_a] = as;
+  }
 
   void share(size_t begin, size_t end) {
     const Place pair = place_of(contacts_[begin]);
     const BodyView &a = *find_slot(bodies_, contacts_[begin].slot_a);
     const BodyView *b = pair.obstacle ? nullptr : find_slot(bodies_, contacts_[begin].slot_b);
     const Owners of_a = owners(pair), of_b = b ? owners({pair.id_b, pair.id_a, false}) : Owners{};
+    mark(a, of_a, 1);
+    if (b) mark(*b, of_b, 1);
     for (size_t i = begin; i < end; ++i) {
       ContactPoint &c = contacts_[i];
       double nearest = 0;
+      const BodyView *lender = nullptr;
       for (int k = 0; k < c.nnode; ++k) {
-        const bool side_a = c.node[k] - a.first_node < a.surface->nsurfel;
-        const BodyView &own = side_a ? a : *b;
+        if (lent_[c.node[k]]) continue;
+        const BodyView &own = c.node[k] - a.first_node < a.surface->nsurfel ? a : *b;
         const uint32_t surfel = c.node[k] - own.first_node;
         const double d2 = norm2(load3(&own.surface->x[4 * size_t{surfel}]) - load3(c.point));
-        if ((c.lender && !(d2 < nearest)) || (side_a ? of_a : of_b).has(surfel)) continue;
-        if (lent_[c.node[k]]) continue;
+        if (lender && !(d2 < nearest)) continue;
         nearest = d2;
+        lender = &own;
         c.lender = c.node[k] + 1;
-        c.area =
-            facing_area(*own.surface, surfel, side_a ? -load3(c.normal) : load3(c.normal)) * (b ? 0.5 : 1.0);
       }
-      if (c.lender) lent_[c.lender - 1] = 1;
+      if (!lender) continue;
+      const Vec3 out = lender == &a ? -load3(c.normal) : load3(c.normal);
+      c.area = facing_area(*lender->surface, c.lender - 1 - lender->first_node, out) * (b ? 0.5 : 1.0);
+      lent_[c.lender - 1] = 1;
     }
+    mark(a, of_a, 0);
+    if (b) mark(*b, of_b, 0);
     for (size_t i = begin; i < end; ++i)
       if (contacts_[i].lender) lent_[contacts_[i].lender - 1] = 0;
   }
@@ -113,7 +115,7 @@ class Areas {
   std::span<const BodyView> bodies_;
   std::span<const ObstacleView> obstacles_;
   Array<ContactPoint> &contacts_;
-  Array<uint8_t> &lent_;  // per node: has lent its area in the pair at hand
+  Array<uint8_t> &lent_;  // per node: has a contact or has lent its area, in the pair at hand
 };
 
 }  // namespace
@@ -155,24 +157,6 @@ struct Finder {
     (c.kind == 0 ? narrow::surfel_obstacle : c.kind == 1 ? narrow::edge_obstacle : triangle)(pair, run, out);
   }
 };
-
-bool same_run(const Candidate &l, const Candidate &r) {
-  return l.slot_a == r.slot_a && l.slot_b == r.slot_b && l.obstacle == r.obstacle && l.kind == r.kind;
-}
-
-// Runs are long, and no two have the same sides and kind: steps that double, then halves of the last one.
-size_t end_of_run(const Array<Candidate> &list, size_t begin) {
-  size_t in = begin, step = 1;
-  while (in + step < list.size() && same_run(list[in + step], list[begin])) {
-    in += step;
-    step *= 2;
-  }
-  const auto first = list.begin() + std::ptrdiff_t(in) + 1;
-  const auto last = list.begin() + std::ptrdiff_t(std::min(in + step, list.size()));
-  return size_t(
-      std::partition_point(first, last, [&](const Candidate &c) { return same_run(c, list[begin]); }) -
-      list.begin());
-}
 
 // Candidates that are worth a block of their own: some five microseconds.
 constexpr size_t kBlock = 96;

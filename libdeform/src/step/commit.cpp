@@ -26,11 +26,14 @@ bool reads_points(const World &w, const Body &b) {
 bool find_ends(World &w, StepContext &step, uint32_t *trouble) {
   const SubStep now = sub_step_of(w, step);
   const bool touched = w.plan.has(StageRole::gives_impulses) && step.rows.all() > 0;
+  const bool guarded = w.plan.has(StageRole::guards);
+  if (guarded) step.guard.common.assign(w.bodies.size(), {});
   FirstFailure failed;
   w.context->tasks.parallel_for(
       static_cast<uint32_t>(step.active.size()), 1, [&](uint32_t begin, uint32_t end) {
         for (const uint32_t i : std::span(step.active).subspan(begin, end - begin)) {
           Body &b = *w.bodies[i];
+          if (guarded) look_at_motion(w, step, i);
           const OnBehalf speaks(b.name);
           if (!b.dynamics->end_state(now, b.surfel_impulse.data(), touched)) failed.note(i);
         }

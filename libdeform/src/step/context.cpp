@@ -18,10 +18,10 @@ StepContext::StepContext(const Meters &meters)
              stirred);
   use_memory(meters.contacts.memory(), lent, contacts, tolerance.normal, tolerance.tangent, disturbance,
              best_impulse, trial_response, tangents, match, sharing, aim, stands, ways, renewed, bonds,
-             bond_impulse, chosen, mean, pairs_made, before);
+             bond_impulse, chosen, mean, pairs_made, before, goes_on, given.list);
   state.use(meters.contacts.memory());
   use_memory(meters.detection.memory(), guard.joined, guard.near, guard.hits, guard.speed, guard.change,
-             guard.kept, guard.blocks.pieces);
+             guard.common, guard.kept, guard.blocks.pieces);
   GuardMemory &known = guard.memory;
   use_memory(meters.detection.memory(), known.runs, known.old_runs, known.features, known.old_features,
              known.rest, known.old_rest, known.normal, known.old_normal, known.before);

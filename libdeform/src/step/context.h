@@ -104,12 +104,15 @@ struct StepContext {
 
   // distribute, guard
   std::vector<ImpulseSink> sinks;
+  GivenNodes given;
   bool ended = false;  // find_ends() has been called since the last solve
   Guard guard;
   // commit
   Array<double> mean;  // [dofs of rows,4] m/s, over the sub-step; of bodies
   Array<PairMade> pairs_made;
   Array<uint8_t> before;  // [contacts] touched in the last sub-step
+  // [contacts of the store] number of the contact that goes on from it, or kNone
+  Array<uint32_t> goes_on;
   // trades places with the world's
   ContactStore next_store;
   Report last_report;

@@ -35,15 +35,17 @@ constexpr double kLight = 299792458;  // m/s
 constexpr double kNoWay = 0.02;       // of the way of a sub-step: less than this is none
 constexpr double kSlow = 0.01;        // of d_g: what moves by less needs no closer look at how it does
 
-// The mean of the surfels' predicted velocities, and how far any of them is from it.
-void split_motion(const Surface &s, Vec3 &mean, double &spread) {
+Guard::Common common_motion(const Surface &s) {
   Vec3 sum;
   for (uint32_t i = 0; i < s.nsurfel; ++i) sum += load3(&s.v[size_t{4} * i]);
-  mean = (1.0 / s.nsurfel) * sum;
+  const Vec3 mean = (1.0 / s.nsurfel) * sum;
   double most = 0;
   for (uint32_t i = 0; i < s.nsurfel; ++i) most = std::max(most, norm2(load3(&s.v[size_t{4} * i]) - mean));
-  spread = std::sqrt(most);
+  return {mean, std::sqrt(most)};
 }
+
+// m, d_g
+double floor_of(const World &w) { return 0.5 * w.offset; }
 
 // Only what contacts have touched moves otherwise than predicted.
 void bound_speeds(World &w, StepContext &step) {
@@ -120,7 +122,7 @@ void set_sides(World &w, StepContext &step) {
   scene.poses.resize(w.obstacles.size());
   scene.h = step.h;
   scene.offset = w.offset;
-  scene.floor = 0.5 * w.offset;
+  scene.floor = floor_of(w);
   scene.margin = 0.1 * (w.offset - scene.floor);
   for (size_t i = 0; i < nb; ++i) {
     const Body &b = *w.bodies[i];
@@ -130,9 +132,10 @@ void set_sides(World &w, StepContext &step) {
     s.travel = s.spread = step.h * step.guard.speed[i];
     s.drift = {};
     if (s.travel > kSlow * scene.floor) {
-      split_motion(b.surface, s.drift, s.spread);
-      s.drift = step.h * s.drift;
-      s.spread = step.h * (s.spread + step.guard.change[i]);
+      Guard::Common &common = step.guard.common[i];
+      if (common.spread < 0) common = common_motion(b.surface);
+      s.drift = step.h * common.mean;
+      s.spread = step.h * (common.spread + step.guard.change[i]);
     }
     s.mean = b.dynamics->end().mean;
     s.local = nullptr;
@@ -255,6 +258,11 @@ bool cross_at_start(StepContext &step, uint32_t slot_a, uint32_t slot_b, bool ob
   });
   g.through.push_back({slot_a, slot_b, obstacle, yes});
   return yes;
+}
+
+void look_at_motion(const World &w, StepContext &step, uint32_t i) {
+  if (w.plan.has(StageRole::lists_pairs) && step.h * step.broad.speed(i) > kSlow * floor_of(w))
+    step.guard.common[i] = common_motion(w.bodies[i]->surface);
 }
 
 // False: trouble, or guard.again: the sub-step is to be repeated, guard.cut times as long.

@@ -22,6 +22,11 @@ struct Guard {
   // m/s by body slot: bounds of the surfels' speeds after the solve; of what the solve has
   // changed of a phyxel's
   Array<double> speed, change;
+  struct Common {
+    Vec3 mean;           // m/s
+    double spread = -1;  // m/s, no surfel differs by more from the mean; < 0: not known
+  };
+  Array<Common> common;     // [bodies] of the surfels' velocities without contact
   uint64_t lists = 0;       // number of rebuilds of broad/ when `memory` began
   uint64_t placements = 0;  // World::placements that `memory` knows of
   struct Through {
@@ -58,6 +63,8 @@ struct Guard {
 // Whether two surfaces cross at the start of the sub-step. Each pair is tested once per sub-step. slot_a <
 // slot_b if both are bodies.
 bool cross_at_start(StepContext &step, uint32_t slot_a, uint32_t slot_b, bool obstacle);
+// Finds guard.common of body i, beside its end, if it moves so far that the guard asks for it.
+void look_at_motion(const World &w, StepContext &step, uint32_t i);
 // guard_hits.cpp: the earliest hits as contacts of the sub-step, among those that it has.
 void guard_add_hits(World &w, StepContext &step);
 // Drops hits whose contacts the host rejects (PreSolve).

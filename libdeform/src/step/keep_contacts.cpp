@@ -23,6 +23,7 @@ void reserve_contacts(World &w, StepContext &step) {
   step.mean.reserve(size_t{kStride} * step.rows.ndof);
   step.pairs_made.reserve(step.rows.n);
   step.before.resize(n);
+  step.goes_on.reserve(w.store.n);
   w.work.reserve(std::min(w.work.size() + n, w.bodies.size() * (w.bodies.size() + w.obstacles.size())));
   reserve_events(w, size_t(n) + w.store.n + w.attachments.size());
   reserve_impulses(w, n);
@@ -55,7 +56,8 @@ void list_crossings(World &w, StepContext &step) {
     if (c.type_a == 1 && step.next_store.touching[i])
       list.push_back({step.next_store.id_a[i], step.next_store.id_b[i], c.feature_a, c.feature_b});
   }
-  std::sort(list.begin(), list.end());
+  // of pairs of bodies they come so
+  if (!std::is_sorted(list.begin(), list.end())) std::sort(list.begin(), list.end());
 }
 
 namespace {
@@ -102,7 +104,6 @@ void keep_contact(World &w, StepContext &step, uint32_t i) {
   to.id_a[i] = w.bodies[c.slot_a]->id;
   to.id_b[i] = c.obstacle ? w.obstacles[c.slot_b]->id : w.bodies[c.slot_b]->id;
   to.law[i] = step.state.law[i];
-  to.by_key[i] = i;
   store3(&to.normal[size_t(3) * i], load3(&step.rows.frame[size_t(9) * i]));
   store3(&to.tangent[size_t(3) * i], load3(&step.rows.frame[size_t(9) * i + 3]));
   store3(&to.impulse[size_t(3) * i], next_start(w, step, i));
@@ -128,6 +129,29 @@ void keep_contact(World &w, StepContext &step, uint32_t i) {
   w.report.slip[2 * i] = v1;
   w.report.slip[2 * i + 1] = v2;
   w.report.mode[i] = step.state.mode[i];
+}
+
+// The contacts in the order of their keys: those that go on, in the order of the store, and what has come.
+void order_keys(const World &w, StepContext &step) {
+  constexpr uint32_t kFew = 16;
+  ContactStore &to = step.next_store;
+  Array<uint32_t> &now = step.goes_on, &order = to.by_key;
+  now.assign(w.store.n, kNone);
+  for (uint32_t i = 0; i < to.n; ++i)
+    if (step.match[i] != kNone) now[step.match[i]] = i;
+  const auto before = [&](uint32_t i, uint32_t j) { return to.key[i] < to.key[j]; };
+  auto end = order.begin();
+  for (const uint32_t m : w.store.by_key)
+    if (now[m] != kNone) *end++ = now[m];
+  const bool few = order.end() - end <= kFew;
+  for (uint32_t i = 0; i < to.n; ++i) {
+    if (step.match[i] != kNone && now[step.match[i]] == i) continue;
+    const auto at = few ? std::upper_bound(order.begin(), end, i, before) : end;
+    std::copy_backward(at, end, end + 1);
+    *at = i;
+    ++end;
+  }
+  if (!few) std::sort(order.begin(), order.end(), before);
 }
 
 }  // namespace
@@ -167,11 +191,11 @@ void keep_contacts(World &w, StepContext &step) {
   }
   follow_load(w, step);
   turn_frames(w, step);
-  std::sort(to.by_key.begin(), to.by_key.end(),
-            [&](uint32_t i, uint32_t j) { return to.key[i] < to.key[j]; });
+  order_keys(w, step);
   if (w.sleepers) carry_sleepers(w, step, &touching, &sticking);
   for (uint32_t m = 0; m < w.store.n; ++m)
-    if (w.store.touching[m] && !sleeps(w, step, m) && to.find(w.store.key[m]) == kNone)
+    if (w.store.touching[m] && step.goes_on[m] == kNone && !sleeps(w, step, m) &&
+        to.find(w.store.key[m]) == kNone)
       add_event(w, DFM_EVENT_END, w.store.id_a[m], w.store.id_b[m], w.store.key[m], w.time + step.h);
   list_crossings(w, step);
   std::swap(w.store, step.next_store);

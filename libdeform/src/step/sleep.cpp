@@ -88,6 +88,7 @@ void gather_active(World &w) {
   StepContext &step = *w.steps;
   step.active.clear();
   step.sinks.clear();
+  step.given.known = false;
   for (uint32_t i = 0; i < w.bodies.size(); ++i) {
     Body &b = *w.bodies[i];
     step.body_views[i].asleep = b.slumber.asleep;

@@ -69,7 +69,7 @@ bool may_shorten(const StepContext &step) { return step.h > kLeastPiece * step.g
 
 void give_impulses(StepContext &step) {
   const ContactRows &rows = step.rows;
-  distribute(step.contacts, rows.frame.data(), rows.impulse.data(), step.sinks, step.bonds,
+  distribute(step.contacts, rows.frame.data(), rows.impulse.data(), step.sinks, step.given, step.bonds,
              rows.impulse.data() + size_t{3} * rows.n);
 }
 

@@ -60,7 +60,7 @@ class Pair {
   void distribute() {
     const ImpulseSink sinks[2] = {{0, kSurfels, kPoints, &a_, surfel_a.data(), point_a.data()},
                                   {kSurfels, kSurfels, kSurfels, &b_, surfel_b.data(), nullptr}};
-    dfm::distribute(contacts, frame.data(), impulse.data(), sinks);
+    dfm::distribute(contacts, frame.data(), impulse.data(), sinks, given);
   }
   Vec3 world_impulse(size_t i) const {
     const double *const f = &frame[9 * i];
@@ -97,6 +97,7 @@ class Pair {
   std::vector<double> surfel_a = std::vector<double>(3 * kSurfels, 7.0);
   std::vector<double> surfel_b = std::vector<double>(3 * kSurfels, 7.0);
   Array<double> point_a = Array<double>(4 * kPoints, 0.0);
+  GivenNodes given;
 
  private:
   std::mt19937 random_{3};
