@@ -1,5 +1,7 @@
 // Scenes whose state hash must be the same on every build, cut and processor.
 #pragma once
+#include <ostream>
+
 #include "coupled.h"
 #include "hook.h"
 #include "obstacle.h"
@@ -300,6 +302,8 @@ struct Scene {
   dfm_world (*build)(dfm_context *);
   int steps;
 };
+// CTest's name of a test has it; without this, addresses.
+inline void PrintTo(const Scene &scene, std::ostream *out) { *out << scene.name; }
 inline const Scene all[] = {{"ball_on_floor", [](dfm_context *c) { return ball_on_floor(c); }, 150},
                             {"crossing_beams", [](dfm_context *c) { return crossing_beams(c); }, 150},
                             {"ten_in_a_box", [](dfm_context *c) { return ten_in_a_box(c); }, 80},
