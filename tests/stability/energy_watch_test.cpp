@@ -170,6 +170,28 @@ TEST(EnergyWatch, BallThatFallsOnASoftPad_IsNoGain) {
   }
 }
 
+// A blow compresses cells, which stiffen, before sixteen sub-steps are over: then the bound is looked at.
+TEST(EnergyWatch, SoftBallThatIsThrown_IsNoGain) {
+  struct Throw {
+    double down;
+    int cells;
+  };
+  for (const Throw &t : {Throw{2, 2000}, Throw{10, 300}, Throw{10, 2000}}) {
+    const std::string out = test::scratch("energy_watch_throw"), scene = out + "/scene.json";
+    test::write_file(scene, R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.4},
+    "materials": {"soft": {"density": 1000, "young": 1e4, "poisson": 0.3}},
+    "bodies": [{"name": "ball", "mesh": {"make": "ball", "radius": 0.05, "cells": )" +
+                                std::to_string(t.cells) +
+                                R"(}, "material": "soft", "pose": {"position": [0, 0, 0.1]},
+                "velocity": [1, 0, )" +
+                                std::to_string(-t.down) + R"(]}],
+    "obstacles": [{"name": "floor", "shape": "plane"}],
+    "contact": {"friction": [{"between": ["*", "*"], "law": "coulomb", "params": {"mu": 0.5}}]}})");
+    const test::CommandResult r = test::deform({"run", scene, "--out", out + "/run", "--quiet"});
+    EXPECT_EQ(r.exit_code, 0) << t.cells << " cells, " << t.down << " m/s: " << r.err;
+  }
+}
+
 // A base costs eight looks. A host that changes something before every step would have a new
 // one all the time.
 TEST(EnergyWatch, HostThatChangesEveryStep_CostsFewLooks) {

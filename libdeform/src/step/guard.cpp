@@ -25,6 +25,7 @@
 #include "step/context.h"
 #include "step/move_obstacles.h"
 #include "step/stages.h"
+#include "step/step_bound.h"
 
 namespace dfm {
 namespace {
@@ -70,6 +71,31 @@ void bound_speeds(World &w, StepContext &step) {
     g.change[i] = b.surface.weight_sum * std::sqrt(g.change[i]);
     speed = b.surface.identity() ? std::max(speed, before) : before + g.change[i];
     b.dynamics->bound_ends(speed, g.change[i]);
+  }
+}
+
+// A blow: contact changes the velocity of a point so much in this sub-step that its edges stretch by more
+// than what the bound allows for, and faster than at the last look. What a weight at rest changes is only the
+// predicted velocity.
+bool struck(const StepContext &step, const Body &b, uint32_t slot, double way) {
+  const ContactRows &rows = step.rows;
+  for (uint32_t d = 0; d < rows.ndof; ++d)
+    if (rows.source[d] == slot) {
+      const size_t at = size_t{kStride} * rows.point[d];
+      if (norm(load3(&rows.y[size_t{kStride} * d]) - load3(&b.p.v[at])) * step.h > way) return true;
+    }
+  return false;
+}
+
+void look_after_blows(World &w, const StepContext &step) {
+  if (step.rows.ndof == 0) return;
+  for (const uint32_t i : step.active) {
+    const Body &b = *w.bodies[i];
+    const double way = kBoundStrain * b.surface.median_edge;
+    if (!(step.h * step.guard.change[i] > way) || !std::isfinite(b.bound.found.step)) continue;
+    if (!b.dynamics->diagonal() || !struck(step, b, i, way)) continue;
+    bound_is_due(w);
+    return;
   }
 }
 
@@ -282,7 +308,10 @@ bool stage_guard(World &w, StepContext &step, uint32_t *trouble) {
     guard_near(step.guard.scene, *step.guard.list, step.guard.memory, step.guard.near, &step.guard.blocks,
                &w.context->tasks);
     safe = find_hits(w, step);
-    if (step.guard.hits.empty()) return true;
+    if (step.guard.hits.empty()) {
+      look_after_blows(w, step);
+      return true;
+    }
     step.guard.acted = true;
     if (w.sleepers > 0 && wake_hit(w, step)) {
       step.guard.again = true;
@@ -323,6 +352,7 @@ bool stage_guard(World &w, StepContext &step, uint32_t *trouble) {
     return false;
   }
   w.stats.guard_lost += (1 - step.guard.motion) * step.h;
+  look_after_blows(w, step);
   return true;
 }
 

@@ -21,7 +21,7 @@ namespace {
 // not, the bound holds on. A look sees rates at one instant, so it counts them for the time before and for
 // that to the next look, and every eighth look evaluates the bound again.
 constexpr uint32_t kBoundEvery = 16;
-constexpr double kBoundStrain = 0.05, kLeastStrain = kBoundStrain / 8;
+constexpr double kLeastStrain = kBoundStrain / 8;
 
 uint32_t inverted_cells(const Body &b) {
   return points_kernels().inverted(b.ncell(), b.tets.data(), b.p.x.data());
@@ -96,6 +96,8 @@ bool holds(World &w) {
 }  // namespace
 
 bool bound_due(const World &w) { return w.bound.age >= kBoundEvery; }
+
+void bound_is_due(World &w) { w.bound.age = std::max(w.bound.age, kBoundEvery); }
 
 void update_bound(World &w) {
   ask_each(w, [](Body &b) {
