@@ -255,6 +255,7 @@ bool BroadPhase::renew_tree(Side &side) {
   if (!side.usable) return false;
   std::copy(s.x.begin(), s.x.end(), side.x.begin());
   side.refits += !side.tree.empty();
+  if (side.tree.empty() && s.tree) side.tree.take(*s.tree);
   side.rebuilds += side.tree.renew(s.tri, side.x.data());
   return true;
 }

@@ -59,6 +59,45 @@ double RigidReference::displaced(const Surface &s) {
   return std::sqrt(most);
 }
 
+uint32_t RigidReference::set_again(const Surface &s, double far, std::span<uint8_t> marked) {
+  const Vec3 now = mean_place(s);
+  uint32_t count = 0;
+  for (uint32_t i = 0; i < s.nsurfel; ++i) {
+    double *const then = &x_[4 * size_t{i}];
+    const Vec3 place = load3(&s.x[4 * size_t{i}]) - now;
+    if (!marked[i] && norm2(place - rotate(turn_, load3(then) - center_)) <= far * far) continue;
+    marked[i] = 1;
+    ++count;
+    store3(then, rotate_back(turn_, place) + center_);
+  }
+  return count;
+}
+
+// Any positions do for those that are marked; where they are now they count as unmoved.
+void RigidReference::follow(const RigidReference &before, std::span<const uint32_t> now, const Surface &s,
+                            std::span<const uint8_t> marked) {
+  x_.assign(4 * size_t{s.nsurfel}, 0.0);
+  Vec3 then, place;  // means over the others
+  uint32_t n = 0;
+  for (size_t i = 0; i < now.size(); ++i) {
+    if (now[i] == kNone || marked[now[i]]) continue;
+    std::copy_n(&before.x_[4 * i], 4, &x_[4 * size_t{now[i]}]);
+    then += load3(&before.x_[4 * i]);
+    place += load3(&s.x[4 * size_t{now[i]}]);
+    ++n;
+  }
+  then = (1.0 / std::max(n, 1u)) * then;
+  place = (1.0 / std::max(n, 1u)) * place;
+  turn_ = before.turn_;
+  center_ = {};
+  for (uint32_t i = 0; i < s.nsurfel; ++i) {
+    double *const x = &x_[4 * size_t{i}];
+    if (marked[i]) store3(x, rotate_back(turn_, load3(&s.x[4 * size_t{i}]) - place) + then);
+    center_ += load3(x);
+  }
+  center_ = (1.0 / s.nsurfel) * center_;
+}
+
 // Velocities are v = mean + omega x r + rest.
 DeformingMotion deforming_motion(const Surface &s, double h) {
   const Vec3 center = mean_place(s);
@@ -75,10 +114,10 @@ DeformingMotion deforming_motion(const Surface &s, double h) {
   return {norm(f.theta), std::sqrt(most)};
 }
 
-double longest_edge(const Surface &s) {
+double longest_edge(const Surface &s, const double *x) {
   double most = 0;
-  const auto x = [&](size_t k) { return load3(&s.x[4 * size_t{s.edge[k]}]); };
-  for (size_t e = 0; e < 2 * size_t{s.nedge}; e += 2) most = std::max(most, norm2(x(e) - x(e + 1)));
+  const auto at = [&](size_t k) { return load3(x + 4 * size_t{s.edge[k]}); };
+  for (size_t e = 0; e < 2 * size_t{s.nedge}; e += 2) most = std::max(most, norm2(at(e) - at(e + 1)));
   return std::sqrt(most);
 }
 

@@ -1,5 +1,7 @@
 // The non-rigid part of the motion of a surface: only this part can bring parts of the surface together.
 #pragma once
+#include <span>
+
 #include "core/memory.h"
 #include "geometry/surface.h"
 #include "math/vec3.h"
@@ -14,6 +16,13 @@ class RigidReference {
   // m, largest since set(), beyond the rigid motion that fits best
   double displaced(const Surface &surface);
   const Array<double> &x() const { return x_; }
+  // Takes anew, at their present places, the surfels that are marked or have moved by more than `far` (m)
+  // beyond the rigid motion that displaced() has found, and marks them. Returns how many these are.
+  uint32_t set_again(const Surface &surface, double far, std::span<uint8_t> marked);
+  // Continues `before` for a surface that a cut has remade. now: numbers of its surfels by those before, or
+  // kNone; marked surfels are taken at their present places.
+  void follow(const RigidReference &before, std::span<const uint32_t> now, const Surface &surface,
+              std::span<const uint8_t> marked);
 
  private:
   Array<double> x_;  // [nsurfel,4]
@@ -24,6 +33,7 @@ class RigidReference {
 // rad/s; m/s, largest beyond the rigid motion that fits best
 struct DeformingMotion { double turn = 0, speed = 0; };
 DeformingMotion deforming_motion(const Surface &surface, double h);
-double longest_edge(const Surface &surface);  // m, now
+// m, at the positions x [nsurfel,4]
+double longest_edge(const Surface &surface, const double *x);
 
 }  // namespace dfm

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "contact/reach.h"
 #include "geometry/closest.h"
@@ -13,11 +14,21 @@ constexpr double kSkinLeast = 0.02;  // of the median edge
 // if wider, every surfel would list the triangles of the second ring around it
 constexpr double kSkinMost = 0.2;
 constexpr double kSpeedGrowth = 1.25;
+// of the surfels: a part of the lists is renewed up to here. It takes twice as much for each triangle, and
+// the other parts are out of date earlier.
+constexpr double kMostAnew = 0.25;
+
+bool before(const SelfPair &l, const SelfPair &r) { return l.a != r.a ? l.a < r.a : l.b < r.b; }
+
+void sort_pairs(Array<SelfPair> &list, size_t from) {
+  if (!std::is_sorted(list.begin() + std::ptrdiff_t(from), list.end(), before))
+    std::sort(list.begin() + std::ptrdiff_t(from), list.end(), before);
+}
 
 }  // namespace
 
 SelfList::SelfList(const Memory &m, const Surface &surface) : surface_(surface), tree_(m), at_(m) {
-  use_memory(m, vf_, ee_, stack_);
+  use_memory(m, vf_, ee_, scratch_, stack_, anew_[0], anew_[1], anew_[2]);
 }
 
 // What one of two features adds to the reach of their contact. Two vertices of a pair are no further apart
@@ -40,71 +51,179 @@ bool SelfList::update(double h, double offset) {
   motion_ = deforming_motion(s, h);
   if (margin_ >= 0) {
     moved_ = at_.displaced(s);
-    if (kDistanceRounding * (moved_ + share(h, offset, 1)) <= margin_) return false;
+    if (!begun_ && kDistanceRounding * (moved_ + share(h, offset, 1)) <= margin_) return false;
   }
-  renew(h, offset, 0);
+  if (!renew_part(h, offset, 0)) renew(h, offset, 0);
   return true;
 }
 
 bool SelfList::cover(double h, double offset, double change) {
   if (surface_.ntri == 0 || kDistanceRounding * (moved_ + covers(h, offset, change)) <= margin_) return false;
-  renew(h, offset, change);
+  if (!renew_part(h, offset, change)) renew(h, offset, change);
   return true;
+}
+
+double SelfList::skin_for(double now, double offset) const {
+  const double edge = surface_.median_edge;
+  if (wide_) return kSkinMost * edge;
+  return std::clamp(skin_steps_ * 0.5 * (now - offset), kSkinLeast * edge, kSkinMost * edge);
 }
 
 void SelfList::renew(double h, double offset, double change) {
   const Surface &s = surface_;
   margin_ = -1;  // until the lists are complete: a failed allocation leaves invalid lists
+  begun_ = false;
   at_.set(s);
-  longest_ = longest_edge(s);
+  longest_ = longest_edge(s, s.x.data());
   moved_ = 0;
+  if (tree_.empty() && s.tree) tree_.take(*s.tree);
   tree_.renew(s.tri, s.x.data());
   const double now = std::max(share(h, offset, kSpeedGrowth), covers(h, offset, kSpeedGrowth * change));
-  const double edge = s.median_edge;
-  const double skin =
-      wide_ ? kSkinMost * edge
-            : std::clamp(skin_steps_ * 0.5 * (now - offset), kSkinLeast * edge, kSkinMost * edge);
-  const double margin = kDistanceRounding * now + skin;
+  const double margin = kDistanceRounding * now + skin_for(now, offset);
   limit_ = kDistanceRounding * 2 * margin + self_recovery_depth(s);
   list(limit_);
   margin_ = margin;
   ++renewals_;
 }
 
-void SelfList::list(double limit) {
+// False: the lists are to be renewed as a whole, because too much has moved, or because the margin no longer
+// suits the motion.
+bool SelfList::renew_part(double h, double offset, double change) {
+  const Surface &s = surface_;
+  if (margin_ < 0) return false;
+  const double margin = std::exchange(margin_, -1);  // as in renew()
+  const double now = std::max(share(h, offset, kSpeedGrowth), covers(h, offset, kSpeedGrowth * change));
+  const double room = margin / kDistanceRounding - now, wanted = skin_for(now, offset);
+  if (!begun_)
+    for (const auto &[list, n] : {std::pair(&anew_[0], s.nsurfel), {&anew_[1], s.nedge}, {&anew_[2], s.ntri}})
+      list->assign(n, 0);
+  begun_ = false;
+  if (!(room >= 0.5 * wanted && room <= 4 * wanted)) return false;
+  if (at_.set_again(s, 0.5 * room, anew_[0]) > kMostAnew * s.nsurfel) return false;
+  mark_features();
+  longest_ = longest_edge(s, at_.x().data());
+  moved_ = at_.displaced(s);
+  if (tree_.empty() && s.tree) tree_.take(*s.tree);
+  tree_.renew(s.tri, at_.x().data());
+  list_anew(limit_);
+  ++renewals_;
+  if (!(kDistanceRounding * (moved_ + share(h, offset, 1)) <= margin &&
+        kDistanceRounding * (moved_ + covers(h, offset, change)) <= margin))
+    return false;
+  margin_ = margin;
+  ++parts_;
+  return true;
+}
+
+// An edge with a marked surfel, and a triangle with a marked surfel or edge, are marked.
+void SelfList::mark_features() {
+  const Surface &s = surface_;
+  auto &[surfels, edges, triangles] = anew_;
+  for (size_t e = 0; e < s.nedge; ++e) edges[e] |= surfels[s.edge[2 * e]] | surfels[s.edge[2 * e + 1]];
+  for (size_t t = 0; t < s.ntri; ++t)
+    for (size_t k = 3 * t; k < 3 * t + 3; ++k) triangles[t] |= surfels[s.tri[k]] | edges[s.tri_edge[k]];
+}
+
+void SelfList::follow(const SelfList &list, const FeatureMap &features, std::span<const uint8_t> moved) {
+  const Surface &s = surface_;
+  if (list.margin_ < 0 || s.ntri == 0) return;
+  const uint32_t counts[3] = {s.nsurfel, s.nedge, s.ntri};
+  for (size_t kind = 0; kind < 3; ++kind) {
+    anew_[kind].assign(counts[kind], 1);
+    for (const uint32_t now : features.of[kind])
+      if (now != kNone) anew_[kind][now] = 0;
+  }
+  for (uint32_t i = 0; i < s.nsurfel; ++i) anew_[0][i] |= moved[i];
+  at_.follow(list.at_, features.of[0], s, anew_[0]);
+  const auto take = [](const Array<SelfPair> &from, const std::vector<uint32_t> &a,
+                       const std::vector<uint32_t> &b, bool swap, Array<SelfPair> &to) {
+    for (const SelfPair &pair : from) {
+      const SelfPair now{a[pair.a], b[pair.b]};
+      if (now.a == kNone || now.b == kNone) continue;
+      to.push_back(swap && now.b < now.a ? SelfPair{now.b, now.a} : now);
+    }
+    sort_pairs(to, 0);
+  };
+  take(list.vf_, features.of[0], features.of[2], false, vf_);
+  take(list.ee_, features.of[1], features.of[1], true, ee_);
+  wide_ = list.wide_;
+  skin_steps_ = list.skin_steps_;
+  longest_ = longest_edge(s, at_.x().data());
+  limit_ = list.limit_;  // the median edge may be another one now
+  margin_ = std::min(list.margin_, (limit_ - self_recovery_depth(s)) / (2 * kDistanceRounding));
+  begun_ = true;
+}
+
+// Pairs of features of two triangles. wanted(kind of a, a, kind of b, b) by kinds of anew_.
+template <class Wanted>
+void SelfList::add(uint32_t a, uint32_t b, double limit, const Wanted &wanted) {
   const Surface &s = surface_;
   const auto corner = [&](uint32_t t, uint32_t k) { return s.tri[3 * size_t{t} + k % 3]; };
-  const auto at = [&](uint32_t surfel) { return load3(&s.x[4 * size_t{surfel}]); };
+  const auto at = [&](uint32_t surfel) { return load3(&at_.x()[4 * size_t{surfel}]); };
   const auto vertices = [&](uint32_t from, uint32_t face) {
     const uint32_t c0 = corner(face, 0), c1 = corner(face, 1), c2 = corner(face, 2);
     for (uint32_t k = 0; k < 3; ++k) {
       const uint32_t p = corner(from, k);
-      if (s.tri_owns[from] >> k & 1 && p != c0 && p != c1 && p != c2 &&
+      if (s.tri_owns[from] >> k & 1 && p != c0 && p != c1 && p != c2 && wanted(0, p, 2, face) &&
           triangle_within(at(p), at(c0), at(c1), at(c2), limit))
         vf_.push_back({p, face});
     }
   };
+  vertices(a, b);
+  vertices(b, a);
+  const uint32_t own_a = s.tri_owns[a] >> 3, own_b = s.tri_owns[b] >> 3;
+  if (!own_a || !own_b) return;
+  for (uint32_t k = 0; k < 3; ++k)
+    for (uint32_t l = 0; l < 3; ++l) {
+      if (!(own_a >> k & own_b >> l & 1)) continue;
+      const uint32_t e = s.tri_edge[3 * size_t{a} + k], f = s.tri_edge[3 * size_t{b} + l];
+      const uint32_t i = corner(a, k), j = corner(a, k + 1), m = corner(b, l), n = corner(b, l + 1);
+      if (i == m || i == n || j == m || j == n || !wanted(1, e, 1, f) ||
+          !segments_within(at(i), at(j), at(m), at(n), limit))
+        continue;
+      ee_.push_back({std::min(e, f), std::max(e, f)});
+    }
+}
+
+void SelfList::list(double limit) {
   vf_.clear();
   ee_.clear();
+  const auto all = [](int, uint32_t, int, uint32_t) { return true; };
   near_self_pairs(tree_, limit, stack_, [&](uint32_t place_a, uint32_t place_b, double) {
-    const uint32_t a = tree_.triangles()[place_a], b = tree_.triangles()[place_b];
-    vertices(a, b);
-    vertices(b, a);
-    const uint32_t own_a = s.tri_owns[a] >> 3, own_b = s.tri_owns[b] >> 3;
-    if (!own_a || !own_b) return;
-    for (uint32_t k = 0; k < 3; ++k)
-      for (uint32_t l = 0; l < 3; ++l) {
-        if (!(own_a >> k & own_b >> l & 1)) continue;
-        const uint32_t i = corner(a, k), j = corner(a, k + 1), m = corner(b, l), n = corner(b, l + 1);
-        if (i == m || i == n || j == m || j == n || !segments_within(at(i), at(j), at(m), at(n), limit))
-          continue;
-        const uint32_t e = s.tri_edge[3 * size_t{a} + k], f = s.tri_edge[3 * size_t{b} + l];
-        ee_.push_back({std::min(e, f), std::max(e, f)});
-      }
+    add(tree_.triangles()[place_a], tree_.triangles()[place_b], limit, all);
   });
-  const auto before = [](const SelfPair &l, const SelfPair &r) { return l.a != r.a ? l.a < r.a : l.b < r.b; };
   std::sort(vf_.begin(), vf_.end(), before);
   std::sort(ee_.begin(), ee_.end(), before);
+}
+
+// Replaces the pairs of marked features. Each of them has a marked triangle that owns it or is it.
+void SelfList::list_anew(double limit) {
+  const auto marked = [this](int kind, uint32_t feature) { return anew_[kind][feature] != 0; };
+  std::erase_if(vf_, [&](const SelfPair &p) { return marked(0, p.a) || marked(2, p.b); });
+  std::erase_if(ee_, [&](const SelfPair &p) { return marked(1, p.a) || marked(1, p.b); });
+  const size_t faces = vf_.size(), edges = ee_.size();
+  const auto wanted = [&](int kind_a, uint32_t a, int kind_b, uint32_t b) {
+    return marked(kind_a, a) || marked(kind_b, b);
+  };
+  for (uint32_t place = 0; place < tree_.triangles().size(); ++place) {
+    const uint32_t t = tree_.triangles()[place];
+    if (!marked(2, t)) continue;
+    const Box &own = tree_.triangle_boxes()[place];
+    near_triangles(
+        tree_, stack_, [&](const Box &b) { return box_distance2(own, b) <= limit * limit; },
+        [&](uint32_t other) {
+          if (other != t && !(marked(2, other) && other < t)) add(t, other, limit, wanted);
+        });
+  }
+  const auto join = [this](Array<SelfPair> &list, size_t kept) {
+    std::sort(list.begin() + std::ptrdiff_t(kept), list.end(), before);
+    scratch_.resize(list.size());
+    std::merge(list.begin(), list.begin() + std::ptrdiff_t(kept), list.begin() + std::ptrdiff_t(kept),
+               list.end(), scratch_.begin(), before);
+    list.swap(scratch_);
+  };
+  join(vf_, faces);
+  join(ee_, edges);
 }
 
 }  // namespace dfm

@@ -4,10 +4,16 @@
 // Two differences. A rigid motion of all surfels brings no two of them together, so displacements and speeds
 // are taken against the one that fits best: a body that falls or rolls keeps its lists. And features that
 // share a surfel are no pair: they always touch.
+//
+// Where few surfels have moved far, or a cut has remade part of the surface, only pairs of features that have
+// one of those surfels are found anew (doc/decisions/0437). The lists then refer to positions of different
+// times. They hold because the rule above holds for any positions: listed is what is near there, and
+// displacements are measured from there.
 #pragma once
 #include <algorithm>
 #include <cmath>
 
+#include "body/feature_map.h"
 #include "body/self_rest.h"
 #include "broad/rigid_fit.h"
 #include "core/memory.h"
@@ -27,10 +33,14 @@ class SelfList {
   // After update(), at the same positions: the same lists, rebuilt if they do not cover the motion of the
   // sub-step after its solve. change: m/s, largest change of a surfel's velocity by the solve.
   bool cover(double h, double offset, double change);
+  // Continues the lists of a surface from before a cut. moved [nsurfel]: surfels that are not where they
+  // were; features that the cut has made need no mark. Before the first update().
+  void follow(const SelfList &before, const FeatureMap &features, std::span<const uint8_t> moved);
   // m/s: no surfel was faster than that at the last update(), beyond the rigid motion that fits best.
   double deforming() const { return motion_.speed; }
-  // How often the lists were built.
+  // How often the lists were built, whole or in part.
   uint64_t renewals() const { return renewals_; }
+  uint64_t parts() const { return parts_; }  // how often in part
   // f(other) for triangles whose boxes may meet that of this one now, and for itself.
   template <class F>
   void near_triangle(uint32_t triangle, F &&f) {
@@ -61,18 +71,28 @@ class SelfList {
   static constexpr double kDistanceRounding = 1 + 1e-9;  // margins hold in spite of rounded distances
   double share(double h, double offset, double growth) const;
   double covers(double h, double offset, double change) const;
+  double skin_for(double now, double offset) const;
   void renew(double h, double offset, double change);
+  bool renew_part(double h, double offset, double change);
+  void mark_features();
   void list(double limit);
+  void list_anew(double limit);
+  template <class Wanted>
+  void add(uint32_t a, uint32_t b, double limit, const Wanted &wanted);
   const Surface &surface_;
   double skin_steps_ = 24, margin_ = -1;  // negative: no lists yet
   BoxTree tree_;
-  RigidReference at_;               // when the lists were made
+  RigidReference at_;               // positions that the lists refer to
   double longest_ = 0, moved_ = 0;  // m, edge of that time; what displaced() said at the last update()
   double limit_ = 0;                // m, with which the lists were built
   bool wide_ = false;
   DeformingMotion motion_;
-  uint64_t renewals_ = 0;
+  uint64_t renewals_ = 0, parts_ = 0;
   Array<SelfPair> vf_, ee_;
+  // surfels, edges, triangles whose pairs are found anew; `begun`: follow() has marked some
+  Array<uint8_t> anew_[3];
+  bool begun_ = false;
+  Array<SelfPair> scratch_;
   Array<PairOfTriangles> stack_;
 };
 

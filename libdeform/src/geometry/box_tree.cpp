@@ -64,6 +64,16 @@ void BoxTree::build(std::span<const uint32_t> corners, const double *x) {
   area_built_ = area_;
 }
 
+void BoxTree::take(const BoxTree &other) {
+  node_.clear();  // no tree, should an allocation fail
+  box_.assign(other.box_.begin(), other.box_.end());
+  tri_box_.assign(other.tri_box_.begin(), other.tri_box_.end());
+  tri_.assign(other.tri_.begin(), other.tri_.end());
+  node_.assign(other.node_.begin(), other.node_.end());
+  area_ = other.area_;
+  area_built_ = other.area_built_;
+}
+
 bool BoxTree::renew(std::span<const uint32_t> corners, const double *x) {
   if (!empty()) refit(corners, x);
   if (!empty() && quality() <= kQualityLimit) return false;

@@ -50,6 +50,8 @@ class BoxTree {
   // Refits the boxes; builds the tree if there is none or its boxes have grown too much. Returns whether it
   // was built.
   bool renew(std::span<const uint32_t> corners, const double *x);
+  // Takes the topology of a tree over the same triangles.
+  void take(const BoxTree &other);
   // Sum of the boxes' areas over its value after build().
   double quality() const { return area_built_ > 0 ? area_ / area_built_ : 1; }
 

@@ -3,10 +3,13 @@
 // every sub-step from the phyxels (N x_p).
 #pragma once
 #include <cstdint>
+#include <memory>
 
 #include "core/memory.h"
 
 namespace dfm {
+
+class BoxTree;
 
 inline constexpr uint32_t kNone = UINT32_MAX;
 inline constexpr uint32_t kFeatureKinds = 4;  // surfels, edges, triangles, patches
@@ -74,6 +77,10 @@ struct Surface {
   double back = 0;      // m
   Array<double> place;  // [nsurfel,4] m, x before it is set back; empty without a slit
   Array<double> sums;   // scratch, [laid_surfel,kBackSums]
+
+  // Over the triangles at rest, where the surface was made in advance: saves those who need a tree over the
+  // present ones the search for its topology. Null: there is none.
+  std::shared_ptr<const BoxTree> tree;
 
   // State, [nsurfel,4] (fourth component zero), m and m/s.
   Array<double> x, v;

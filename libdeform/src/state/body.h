@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "body/feature_map.h"
 #include "body/self_rest.h"
 #include "body/zones.h"
 #include "deform/deform.h"
@@ -150,6 +151,12 @@ struct Body {
   Array<double> anchor;
   std::unique_ptr<SearchTree> search;   // rays and closest points
   std::unique_ptr<SelfRest> self_rest;  // made with a cut; null: made when it is needed
+  // until prepare() has seen it: the surface before the last cut, and where its features are now
+  struct FormerSurface {
+    uint64_t shape;
+    FeatureMap features;
+  };
+  std::unique_ptr<FormerSurface> former_surface;
 
   bool loads_vary() const;
   double impulse_time() const;  // s that surfel_impulse belongs to

@@ -183,6 +183,19 @@ bool is_tangled(SelfBody &b, uint32_t surfel) {
                      [&](uint32_t triangle) { return crosses_another(b, triangle); });
 }
 
+// The lists of the surface before a cut are continued. The cut moves the surfels that it sets back anew.
+void follow_cut(const World &w, const SelfBody &before, const FeatureMap &features, SelfBody &now) {
+  constexpr double kSame = 1e-6;  // ways are of length one or so
+  Array<uint8_t> moved(now.body->surface.nsurfel, 0, HookAllocator<uint8_t>(w.meters.detection.memory()));
+  const auto way = [](const SelfRest &rest, size_t i) {
+    return rest.way.empty() ? Vec3{} : load3(&rest.way[4 * i]);
+  };
+  for (uint32_t i = 0; i < features.of[0].size(); ++i)
+    if (const uint32_t to = features.of[0][i]; to != kNone)
+      moved[to] = norm2(way(now.rest, to) - way(before.rest, i)) > kSame * kSame;
+  now.list.follow(before.list, features, moved);
+}
+
 }  // namespace
 
 SelfRest self_rest_of(const Memory &m, Body &b) {
@@ -227,6 +240,7 @@ void choose_self_bodies(World &w, StepContext &step, SceneFacts &facts, std::vec
   std::vector<std::unique_ptr<SelfBody>> before;
   before.swap(step.self_bodies);
   for (auto &b : w.bodies) {
+    const std::unique_ptr<Body::FormerSurface> former = std::move(b->former_surface);
     const uint8_t when =
         w.selection.wants(kSelfContact) ? rule_of(w, *b, needed_by(*b, asked)) : uint8_t{DFM_SELF_OFF};
     if (promises(*b) || when == DFM_SELF_OFF) continue;
@@ -237,6 +251,9 @@ void choose_self_bodies(World &w, StepContext &step, SceneFacts &facts, std::vec
                                    ? std::move(*same)
                                    : std::make_unique<SelfBody>(w.meters.detection.memory(), *b));
     SelfBody &self = *step.self_bodies.back();
+    if (former)
+      for (const auto &s : before)
+        if (s && s->id == b->id && s->shape == former->shape) follow_cut(w, *s, former->features, self);
     if (when == DFM_SELF_ON) self.watch.reset();
     else if (!self.watch)
       self.watch = std::make_unique<SelfWatch>(w.meters.detection.memory(), b->surface, self.rest, self.list);

@@ -5,6 +5,7 @@
 
 #include "body/make_surface.h"
 #include "core/error.h"
+#include "geometry/box_tree.h"
 #include "mesh/mesh.h"
 #include "state/material.h"
 #include "state/world.h"
@@ -251,6 +252,12 @@ void take_points(const Memory &m, const Shape &from, const CutMesh &mesh, const 
   gather_surface(surface, p.x.data(), p.v.data());
 }
 
+std::shared_ptr<const BoxTree> tree_at_rest(const Memory &m, const Body &b) {
+  auto tree = std::make_shared<BoxTree>(m);
+  tree->build(b.surface.tri, b.self_rest->x.data());
+  return tree;
+}
+
 // The part of the present mesh of b, without what put() adds.
 std::unique_ptr<BodyShape> part_of(const Body &b, const CutMesh &mesh, Array<uint64_t> &&open) {
   std::unique_ptr<BodyShape> out = structure_of_part(b, mesh, std::move(open));
@@ -295,6 +302,7 @@ std::unique_ptr<MadeShape> make_shape(const Body &b, CutMesh &&mesh, Array<uint6
     like.dynamics.reset();  // it refers to this body
     like.inner = inner_faces(like);
     like.self_rest = std::make_unique<SelfRest>(self_rest_of(w.meters.detection.memory(), like));
+    like.surface.tree = tree_at_rest(w.meters.detection.memory(), like);
   }
   exchange(like, shape);
   return out;
@@ -318,6 +326,7 @@ std::unique_ptr<BodyShape> take_shape(Body &b, MadeShape &made, bool parts, bool
     keep_integrator(b, before.integrator);
     keep_params(b, before);
     carry_state(before, mesh, made.edge, b);
+    b.former_surface.reset(new Body::FormerSurface{shape->shape, made.features});
   } catch (...) {
     exchange(b, *shape);
     throw;

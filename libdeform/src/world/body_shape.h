@@ -1,10 +1,10 @@
 // All data of a body that depend on its set of points and cells. A cut, and a restore across a cut, make a
 // new shape and exchange it with that of the body, so that a cut is complete or has no effect.
 #pragma once
+#include "body/feature_map.h"
 #include "mesh/cut_mesh.h"
 #include "state/body.h"
 #include "world/body_model.h"
-#include "world/feature_map.h"
 
 namespace dfm {
 

@@ -3,9 +3,9 @@
 #pragma once
 #include <vector>
 
+#include "body/feature_map.h"
 #include "state/body.h"
 #include "state/world.h"
-#include "world/feature_map.h"
 
 namespace dfm {
 

@@ -57,7 +57,138 @@ size_t expect_covers(const Surface &s, const SelfList &list, double h, double of
   return needed;
 }
 
+// Every pair that is nearer than the list says it covers, once, in order.
+size_t expect_lists_all(const Surface &s, const SelfList &list, const char *when) {
+  const auto sorted = [](const Array<SelfPair> &pairs) {
+    return std::is_sorted(pairs.begin(), pairs.end(),
+                          [](auto &l, auto &r) { return l.a != r.a ? l.a < r.a : l.b < r.b; });
+  };
+  EXPECT_TRUE(sorted(list.vertex_face()) && sorted(list.edge_edge())) << when;
+  const auto set_of = [](const Array<SelfPair> &pairs) {
+    std::set<std::pair<uint32_t, uint32_t>> out;
+    for (const SelfPair &p : pairs) EXPECT_TRUE(out.insert({p.a, p.b}).second) << "a pair comes once";
+    return out;
+  };
+  const auto faces = set_of(list.vertex_face()), edges = set_of(list.edge_edge());
+  const double limit2 = list.covered() * list.covered();
+  size_t needed = 0;
+  for (uint32_t p = 0; p < s.nsurfel; ++p)
+    for (uint32_t t = 0; t < s.ntri; ++t) {
+      const uint32_t *c = &s.tri[3 * t];
+      if (c[0] == p || c[1] == p || c[2] == p ||
+          !(closest_on_triangle(at(s, p), at(s, c[0]), at(s, c[1]), at(s, c[2])).distance2 < limit2))
+        continue;
+      ++needed;
+      EXPECT_TRUE(faces.count({p, t})) << when << ": surfel " << p << " and triangle " << t;
+    }
+  for (uint32_t e = 0; e < s.nedge; ++e)
+    for (uint32_t f = e + 1; f < s.nedge; ++f) {
+      const uint32_t *a = &s.edge[2 * e], *b = &s.edge[2 * f];
+      if (a[0] == b[0] || a[0] == b[1] || a[1] == b[0] || a[1] == b[1] ||
+          !(closest_segments(at(s, a[0]), at(s, a[1]), at(s, b[0]), at(s, b[1])).distance2 < limit2))
+        continue;
+      ++needed;
+      EXPECT_TRUE(edges.count({e, f})) << when << ": edges " << e << " and " << f;
+    }
+  return needed;
+}
+
+// A sheet that is rolled nearly to a tube and turns as a whole, with a dent that travels over it.
+void dent(Surface &s, uint32_t n, double when, double h) {
+  for (uint32_t i = 0; i < s.nsurfel; ++i) {
+    const uint32_t point = i % ((n + 1) * (n + 1));  // copies follow
+    const double u = point % (n + 1), v = point / (n + 1), a = 3.1 * (2 * u / n - 1), r = n / 6.2;
+    const double du = u - 2 - 0.01 * when, dv = v - 0.5 * n, deep = 0.8 * std::exp(-du * du - dv * dv);
+    const Vec3 x{(r - deep) * std::sin(a), v, -(r - deep) * std::cos(a)};
+    const double turn = 1e-3 * when;
+    const Vec3 before = at(s, i), now{std::cos(turn) * x.x - std::sin(turn) * x.y + 0.01 * when,
+                                      std::sin(turn) * x.x + std::cos(turn) * x.y, x.z};
+    store3(&s.x[4 * size_t{i}], now);
+    store3(&s.v[4 * size_t{i}], when > 0 ? (1 / h) * (now - before) : Vec3{});
+  }
+}
+
 }  // namespace
+
+TEST(SelfList, LocalMotion_RenewsAPart) {
+  constexpr uint32_t kSquares = 14;
+  Surface s = sheet(kSquares);
+  SelfList list(Memory::standard(), s);
+  size_t needed = 0;
+  for (int step = 0; step < 600 && !HasFailure(); ++step) {
+    dent(s, kSquares, step, 0.01);
+    if (list.update(0.01, 1e-3))
+      needed += expect_lists_all(s, list, ("step " + std::to_string(step)).c_str());
+    else if (step % 20 == 0) needed += expect_lists_all(s, list, "kept");
+  }
+  EXPECT_GT(needed, 1000u);
+  EXPECT_GT(list.parts(), 10u) << "of " << list.renewals();
+  EXPECT_LE(list.renewals() - list.parts(), list.parts());
+}
+
+// Cut along a line from one side to the middle: copies of its points follow the others, and the triangles on
+// its right have them.
+TEST(SelfList, Cut_ContinuesTheLists) {
+  constexpr uint32_t kSquares = 14, kLine = 7, kDeep = 8, kPoints = (kSquares + 1) * (kSquares + 1);
+  const Surface whole = sheet(kSquares);
+  std::vector<double> points;
+  for (uint32_t i = 0; i < kPoints; ++i) points.insert(points.end(), {double(i % 15), double(i / 15), 0});
+  const auto on_line = [](uint32_t p) { return p % (kSquares + 1) == kLine && p / (kSquares + 1) < kDeep; };
+  std::vector<uint32_t> tris(whole.tri.begin(), whole.tri.end()), copy(kPoints, kNone);
+  for (uint32_t p = 0; p < kPoints; ++p) {
+    if (!on_line(p)) continue;
+    copy[p] = uint32_t(points.size() / 3);
+    points.insert(points.end(), {double(p % 15), double(p / 15), 0});
+  }
+  FeatureMap map;
+  for (auto &of : map.of) of.clear();
+  for (uint32_t t = 0; t < whole.ntri; ++t) {
+    double middle = 0;
+    for (uint32_t k = 0; k < 3; ++k) middle += tris[3 * t + k] % (kSquares + 1) / 3.0;
+    bool split = false;
+    for (uint32_t k = 0; k < 3; ++k)
+      if (uint32_t &p = tris[3 * t + k]; middle > kLine && on_line(p)) {
+        p = copy[p];
+        split = true;
+      }
+    map.of[2].push_back(split && t % 2 ? kNone : t);  // names may go to either side
+  }
+  Surface s;
+  make_surface(Memory::standard(), uint32_t(points.size() / 3), points.data(), tris.data(),
+               uint32_t(tris.size() / 3), s);
+  ASSERT_EQ(s.nsurfel, kPoints + kDeep);
+  for (uint32_t p = 0; p < kPoints; ++p) map.of[0].push_back(p);
+  for (uint32_t e = 0; e < whole.nedge; ++e) {
+    uint32_t now = kNone;
+    for (uint32_t f = 0; f < s.nedge; ++f)
+      if (s.edge[2 * f] == whole.edge[2 * e] && s.edge[2 * f + 1] == whole.edge[2 * e + 1]) now = f;
+    map.of[1].push_back(now);
+  }
+  for (const bool moved : {false, true}) {
+    Surface before = whole;
+    SelfList first(Memory::standard(), before), second(Memory::standard(), s);
+    for (int step = 0; step < 100; ++step) {
+      dent(before, kSquares, step, 0.01);
+      first.update(0.01, 1e-3);
+    }
+    Array<uint8_t> marks(s.nsurfel, 0);
+    for (uint32_t i = 0; moved && i < s.nsurfel; ++i) marks[i] = i >= kPoints || on_line(i);
+    const auto set_back = [&] {
+      for (uint32_t i = 0; i < s.nsurfel; ++i)
+        if (marks[i]) s.x[4 * size_t{i}] += i < kPoints ? -0.05 : 0.05;
+    };
+    dent(s, kSquares, 99, 0.01);
+    set_back();
+    second.follow(first, map, marks);
+    dent(s, kSquares, 99, 0.01);
+    dent(s, kSquares, 100, 0.01);
+    set_back();
+    EXPECT_TRUE(second.update(0.01, 1e-3));
+    EXPECT_EQ(second.parts(), 1u);
+    EXPECT_EQ(second.renewals(), 1u);
+    EXPECT_GT(expect_lists_all(s, second, "after the cut"), 100u);
+  }
+}
 
 TEST(SelfList, RandomFolding_IsCoveredWithAndWithoutRenewal) {
   Surface s = sheet(9);
