@@ -71,8 +71,8 @@ bool is_there(const Body &b, const AheadFace &f) {
          present_cell(b, uint32_t(f.face & kNone)) != kNone;
 }
 
-// The made cut, by whoever has made it.
-CutJob &finish(World &w, Body &b) {
+// The made cut, by whoever has made it. It is for one use: an exchange that fails leaves nothing of it.
+std::shared_ptr<CutJob> finish(World &w, Body &b) {
   CutsAhead &a = b.ahead;
   renew_structure(b);
   // what the thread has refused, perhaps for want of memory, is tried once more
@@ -80,7 +80,7 @@ CutJob &finish(World &w, Body &b) {
     a.job = std::make_shared<CutJob>(b);
     a.job->run();
   }
-  return *a.job;
+  return std::move(a.job);
 }
 
 void open_faces_of(World &w, Body &b) {
@@ -91,15 +91,11 @@ void open_faces_of(World &w, Body &b) {
   reserve_events(w, by.size());
   const bool any = std::any_of(by.begin(), by.end(), [](const auto &part) { return part.second > 0; });
   if (any) {
-    CutJob &job = finish(w, b);
-    if (job.error) {
-      const std::exception_ptr error = job.error;
-      a.job.reset();
-      std::rethrow_exception(error);
-    }
-    put_opened(b, *job.made);
-    job.next->shape = b.shape;
-    a.structure = std::move(job.next);
+    const std::shared_ptr<CutJob> job = finish(w, b);
+    if (job->error) std::rethrow_exception(job->error);
+    put_opened(b, *job->made);
+    job->next->shape = b.shape;
+    a.structure = std::move(job->next);
   }
   a.job.reset();
   a.faces.swap(a.later);
