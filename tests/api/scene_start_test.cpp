@@ -203,7 +203,7 @@ TEST(SceneStart, BodyAboveTheBackOfAnOpenMesh_IsWarnedOf) {
 }
 
 // A mesh in millimeters that is read as meters, and the same with its scale.
-TEST(SceneStart, OwnWeightAboveTheModulus_IsWarnedOf) {
+TEST(SceneStart, OwnWeightAboveHalfTheModulus_IsWarnedOf) {
   const std::string folder = test::scratch("scene_start_weight_" + std::to_string(getpid()));
   const auto log = [&](const char *scale, const char *more = "\"model\": {\"type\": \"msm\"}") {
     test::write_file(

@@ -303,6 +303,27 @@ TEST(Loader, SceneWithALawOfASkippedFile_SaysWhyItWasSkipped) {
   dfm_context_destroy(context);
 }
 
+// The variable is named to who has a plugin in a folder of his own and forgot it.
+TEST(Loader, SceneWithAModelOfNoFolder_NamesTheVariable) {
+  unsetenv("DEFORM_PLUGIN_PATH");
+  const std::string dir = folder("path_unset");
+  dfm_context *context = nullptr;
+  ASSERT_EQ(dfm_context_create(nullptr, &context), DFM_OK);
+  dfm_world world = 0;
+  const auto refused_with = [&](const std::string &model) {
+    test::write_file(dir + "/scene.json",
+                     R"({"format": "deform-scene", "version": 1, "time": {"duration": 1},
+                         "bodies": [{"name": "b", "mesh": {"make": "beam", "size": [1, 1, 1]},
+                                     "model": {"type": ")" +
+                         model + R"("}}]})");
+    EXPECT_EQ(dfm_scene_load(context, (dir + "/scene.json").c_str(), &world), DFM_E_UNSUPPORTED);
+    return says("set DEFORM_PLUGIN_PATH to the folder of its plugin");
+  };
+  EXPECT_TRUE(refused_with("com.example.mymodel")) << dfm_last_error();
+  EXPECT_FALSE(refused_with("mms")) << dfm_last_error();
+  dfm_context_destroy(context);
+}
+
 TEST(Loader, WithoutAnySetting_FindsThePluginsOfTheBuild) {
   unsetenv("DEFORM_PLUGIN_PATH");
   dfm_context *context = nullptr;
