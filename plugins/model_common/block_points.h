@@ -10,6 +10,9 @@ struct BlockPoints {
   const uint32_t *point;  // [local] number of the point in the host's arrays
   double *p;  // [local,8] x y z 0 vx vy vz 0: a point with its velocity is one cache line; owned by the pass
   double *f;  // [local,4]
+  // A point's place in the host's arrays is asked for while the point of so many before is worked on. Points
+  // of a block lie in short runs there, which the processor does not foresee.
+  uint32_t ahead;
 };
 
 // Slots in the f of all blocks: a halo point of another block, and the corresponding own point.

@@ -17,6 +17,7 @@ struct Blocks {
   static constexpr uint32_t kNone = ~0u;
   // largest number of pieces of a pass: enough for the workers that one body can use
   static constexpr uint32_t kPieces = 32;
+  static constexpr uint32_t kAhead = 64;
 
   const dfm_host *host = nullptr;
   uint32_t npoint = 0, nblock = 0;
@@ -121,6 +122,7 @@ struct Blocks {
     out.local = owned + nhalo;
     out.point = points;
     out.f = f.data() + 4 * size_t(slot_begin[b]);
+    out.ahead = nblock > 1 ? kAhead : kNone / 2;  // one block lies in the cache
     return out;
   }
 

@@ -3,7 +3,6 @@
 // as corrected in doc/models/msm.md, which derives the constants.
 #include <stdio.h>
 
-#include "deform/plugin_draft.h"
 #include "msm_body.h"
 
 namespace msm {
@@ -139,6 +138,15 @@ dfm_status add_single_forces(void *self, const dfm_kin *k, double *f) {
   return DFM_OK;
 }
 
+uint32_t parts(const void *self) { return static_cast<const Body *>(self)->nblock; }
+
+dfm_status part_forces(void *self, const dfm_kin *k, uint32_t single, dfm_take_part_fn take, void *user) {
+  Body &body = *static_cast<Body *>(self);
+  if (single && !body.has_single()) return DFM_E_STATE;
+  return Ops::with_state(self, k, [&](Body &b) { b.part_forces(*k, single != 0, take, user); });
+}
+
+const dfm_part_forces kPartForces = {sizeof(dfm_part_forces), 0, parts, part_forces};
 const dfm_f32 kSingle = {sizeof(dfm_f32), 0, prepare_single, add_single_forces};
 const dfm_topology kTopology = {sizeof(dfm_topology), 0, nullptr};
 const dfm_limited kLimited = {sizeof(dfm_limited), 0, limited};
@@ -158,6 +166,7 @@ const void *extension(const void *self, const char *id) {
   if (!strcmp(id, DFM_EXT_LIMITED)) return &kLimited;
   if (!strcmp(id, DFM_EXT_SPRING_MASK)) return &kSpringMask;
   if (!strcmp(id, DFM_EXT_F32)) return &kSingle;
+  if (!strcmp(id, DFM_EXT_PART_FORCES)) return &kPartForces;
   if (!strcmp(id, DFM_EXT_TOPOLOGY)) return &kTopology;
   return nullptr;
 }

@@ -46,7 +46,8 @@ void merge_pass(void *user, uint32_t begin, uint32_t end) {
     body.merge_block(*body.kernels, n);
     if (body.drag_on)
       body.kernels->drag(b, body.mass.data(), drags, body.params[kDampingMass], call.k->v, call.k->stride);
-    body.kernels->store(b, call.f, call.k->stride);
+    if (call.take) call.take(call.user, n, b.owned, b.point, b.f);
+    else body.kernels->store(b, call.f, call.k->stride);
   }
 }
 
@@ -90,16 +91,25 @@ bool Body::lacks_state(const dfm_kin &k) const {
 }
 
 void Body::add_forces(const dfm_kin &k, double *f_out) {
-  const Branch branch = branch_at(k);
-  Call call{this, &k, f_out, has_branch() ? &branch : nullptr};
-  if (has_branch() && k.state_out) k.state_out[nedge] = branch.next;
-  for_each_block(ncell >= kParallelCells, force_pass, &call);
-  for_each_block(ncell >= kParallelMergeCells, merge_pass, &call);
+  Call call{this, &k, f_out};
+  sum_forces(call, false);
 }
 
 void Body::add_single_forces(const dfm_kin &k, double *f_out) {
-  Call call{this, &k, f_out, nullptr};
-  for_each_block(ncell >= kParallelCells, single_pass, &call);
+  Call call{this, &k, f_out};
+  sum_forces(call, true);
+}
+
+void Body::part_forces(const dfm_kin &k, bool in_single, dfm_take_part_fn take, void *user) {
+  Call call{this, &k, nullptr, nullptr, take, user};
+  sum_forces(call, in_single);
+}
+
+void Body::sum_forces(Call &call, bool in_single) {
+  const Branch branch = branch_at(*call.k);
+  if (has_branch()) call.branch = &branch;
+  if (has_branch() && call.k->state_out) call.k->state_out[nedge] = branch.next;
+  for_each_block(ncell >= kParallelCells, in_single ? single_pass : force_pass, &call);
   for_each_block(ncell >= kParallelMergeCells, merge_pass, &call);
 }
 

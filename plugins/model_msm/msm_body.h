@@ -1,7 +1,7 @@
 // A mass-spring body: the springs and cells of a mesh, cut into blocks that fit the first-level cache, and
 // the ops on them.
 #pragma once
-#include <deform/plugin.h>
+#include <deform/plugin_draft.h>
 
 #include <algorithm>
 #include <cstdint>
@@ -88,6 +88,8 @@ struct Single {
     limit.swap(o.limit);
   }
 };
+
+struct Call;
 
 struct Body : model::Blocks<Block> {
   using Row = Param;
@@ -184,6 +186,8 @@ struct Body : model::Blocks<Block> {
 
   void add_forces(const dfm_kin &k, double *f_out);
   void add_single_forces(const dfm_kin &k, double *f_out);  // after prepare_single()
+  // the same, block by block; in_single: after prepare_single()
+  void part_forces(const dfm_kin &k, bool in_single, dfm_take_part_fn take, void *user);
   void bound(const dfm_kin &k, double *ksum, double *csum);
   bool lacks_state(const dfm_kin &k) const;
   double energy(const dfm_kin &k) const;
@@ -223,6 +227,7 @@ struct Body : model::Blocks<Block> {
   void fill_stiffness();
   void fill_single();
   void find_weights(Room &room);
+  void sum_forces(Call &call, bool in_single);
   double spring_energy(uint32_t e, const dfm_kin &k, const Branch &branch) const;
   struct SpringTangent { double along, across; };  // N/m
   SpringTangent spring_tangent(uint32_t e, double square, const Branch &branch) const;
@@ -234,8 +239,10 @@ struct Body : model::Blocks<Block> {
 struct Call {
   Body *body;
   const dfm_kin *k;
-  double *f;
-  const Branch *branch;
+  double *f = nullptr;
+  const Branch *branch = nullptr;
+  dfm_take_part_fn take = nullptr;  // in place of f
+  void *user = nullptr;
 };
 
 // Best kernels of this processor, or those that DEFORM_SIMD names.

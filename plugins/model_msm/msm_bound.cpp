@@ -85,7 +85,7 @@ void Body::find_weights(Room &room) {
   dfm_kin at_rest{};
   at_rest.x = rest_point.data();
   at_rest.stride = 3;
-  RowCall diagonal{{this, &at_rest, nullptr, nullptr}, own.data(), nullptr};
+  RowCall diagonal{{this, &at_rest}, own.data(), nullptr};
   for_each_block(ncell >= kParallelCells, row_pass, static_cast<Call *>(&diagonal));
   for_each_block(ncell >= kParallelMergeCells, merge_row_pass, &diagonal);
   if (volume_on)
@@ -141,7 +141,7 @@ void Body::find_weights(Room &room) {
 }
 
 void Body::bound(const dfm_kin &k, double *ksum, double *csum) {
-  RowCall call{{this, &k, nullptr, nullptr}, ksum, csum};
+  RowCall call{{this, &k}, ksum, csum};
   for_each_block(ncell >= kParallelCells, row_pass, static_cast<Call *>(&call));
   for_each_block(ncell >= kParallelMergeCells, merge_row_pass, &call);
 }

@@ -5,6 +5,10 @@
 #include "msm_body.h"
 
 namespace msm {
+namespace {
+constexpr double kNoLimit = 1e150;  // of a cell that fills up a block
+}
+
 void Body::take_mesh(const dfm_mesh &m) {
   npoint = m.npoint;
   ncell = m.ncell;
@@ -129,11 +133,11 @@ size_t Body::fill_springs(const Layout &l, Block &out, uint32_t b, size_t quads_
   for (uint32_t r = l.begin[b]; r < l.begin[b + 1]; ++r)
     for (uint32_t s = l.row[r]; s < l.row[r + 1]; s += 4, ++quads_at) {
       Quad &q = quad[quads_at];
-      q.i = l.local[r];
+      q.i = uint16_t(l.local[r]);
       for (uint32_t n = 0; n < 4; ++n) {
         const bool real = s + n < l.row[r + 1];
         const uint32_t e = l.edge[real ? s + n : l.row[r]];
-        q.j[n] = l.local[high_rank(l, e)];
+        q.j[n] = uint16_t(l.local[high_rank(l, e)]);
         spring_edge[4 * quads_at + n] = real ? e : kNone;
         rest[4 * quads_at + n] = real ? edge_length[e] : 0;
       }
@@ -153,14 +157,16 @@ size_t Body::fill_cells(const Layout &l, Block &out, uint32_t b, size_t cells_at
   out.volume6 = volume6.data() + cells_at;
   out.collapse = collapse.data() + cells_at;
   out.limit = limit.data() + cells_at;
+  out.least_limit = kNoLimit;
   out.cells = (l.cell_begin[b + 1] - l.cell_begin[b] + 7) / 8 * 8;
   for (uint32_t n = 0; n < out.cells; ++n, ++cells_at) {
     const bool real = l.cell_begin[b] + n < l.cell_begin[b + 1];
     const uint32_t c = l.cell_order[l.cell_begin[b] + (real ? n : 0)];
-    for (int a = 0; a < 4; ++a) cell[cells_at].p[a] = l.local[l.rank[cells[4 * size_t(c) + a]]];
+    for (int a = 0; a < 4; ++a) cell[cells_at].p[a] = uint16_t(l.local[l.rank[cells[4 * size_t(c) + a]]]);
     cell_id[cells_at] = real ? c : kNone;
     volume6[cells_at] = cell_volume6[c];
-    limit[cells_at] = real ? limit_of(c) : 1e150;
+    limit[cells_at] = real ? limit_of(c) : kNoLimit;
+    out.least_limit = std::min(out.least_limit, limit[cells_at]);
   }
   return cells_at;
 }
@@ -172,6 +178,9 @@ void Body::build_blocks() {
   order_cells(l);
   // Sizes, then one allocation per array, then the data of each block.
   create_points(l, [&](uint32_t b) { return spring_halo(l, b); });
+  if (largest > kMostLocal)
+    throw "a part of 1024 points has springs to more than 64,000 others; check the mesh for points that "
+          "share an edge with very many others";
   size_t nquad = 0, ncells = 0;
   for (uint32_t b = 0; b < nblock; ++b) {
     for (uint32_t r = l.begin[b]; r < l.begin[b + 1]; ++r) nquad += (l.row[r + 1] - l.row[r] + 3) / 4;

@@ -36,7 +36,7 @@ Finder::Finder(const Body &body) : body_(body) {
 
 // The two points of a cell beside a and b, so that a, b, from, to is an even permutation of its list.
 Finder::Side Finder::side_of(uint32_t slot, uint32_t a, uint32_t b) const {
-  const uint32_t *p = body_.cell[slot].p;
+  const uint16_t *p = body_.cell[slot].p;
   int at[4], n = 2;
   for (int k = 0; k < 4; ++k) {
     if (p[k] == a) at[0] = k;

@@ -11,8 +11,8 @@
 //           collapse) with 6V kept between -6V0 and 18V0, and taken from a cell whose edges have grown beyond
 //           a limit as doc/models/msm.md says
 //           F_n = p g_n,  F_0 = -((F_1 + F_2) + F_3), four cells at a time, corner after corner in the order
-//           1 2 3 0; four cells without pressure are left out, which changes no bit: sums that begin at +0
-//           never become -0
+//           1 2 3 0; four cells without pressure are left out, and so is the second term where none of them
+//           has lost so much, which changes no bit: sums that begin at +0 never become -0
 // so that the instruction set never shows in a result. Plain data only: kernel files see no STL and nothing
 // with external inline code.
 #pragma once
@@ -22,10 +22,12 @@
 
 namespace msm {
 
+// Large bodies wait for memory, so numbers of points within a block have 16 bits.
+constexpr uint32_t kMostLocal = 65536;
 // Four springs that leave the same point. Short rows are filled with springs of stiffness zero.
-struct Quad { uint32_t i, reserved, j[4]; };
+struct Quad { uint16_t i, j[4]; };
 // A cell: local points, orientation as given.
-struct Cell { uint32_t p[4]; };
+struct Cell { uint16_t p[4]; };
 
 // One block of the body.
 struct Block : model::BlockPoints {
@@ -45,6 +47,7 @@ struct Block : model::BlockPoints {
   const double *collapse;        // [cells] kC/(36 V0)
   uint32_t *limited;             // cells beyond it, counted by cell_rows; those that fill up have none
   const double *limit;           // [cells] kLimit times the sum of the squared edges at rest, m^2
+  double least_limit;            // of them: below it none is read
 };
 
 // A spring with a dashpot in series beside it, for one step: p = r + kept e is the stretch of the branch's

@@ -44,6 +44,7 @@ template <Form kForm, Damping kDamping>
 static void springs8(const Block &b, double damp) {
   for (uint32_t n = 0; n < b.quads; n += 2) {
     const Quad &q = b.quad[n], &r = b.quad[n + 1];
+    fetch_quads(b, n);
     const __m512d pq = point8(b, q.i), pr = point8(b, r.i);
     const __m512d d0 = _mm512_sub_pd(point8(b, q.j[0]), pq), d1 = _mm512_sub_pd(point8(b, q.j[1]), pq);
     const __m512d d2 = _mm512_sub_pd(point8(b, q.j[2]), pq), d3 = _mm512_sub_pd(point8(b, q.j[3]), pq);
@@ -167,9 +168,14 @@ DEFORM_INLINE __m512d pressure_of(const Block &b, uint32_t t, __m512d now) {
   const __m512d below = _mm512_mul_pd(_mm512_set1_pd(kCollapseBelow), rest);
   now = _mm512_max_pd(now, _mm512_mul_pd(_mm512_set1_pd(kLeastVolume), rest));
   now = _mm512_min_pd(now, _mm512_mul_pd(_mm512_set1_pd(kMostVolume), rest));
+  const __m512d pressure = _mm512_mul_pd(_mm512_load_pd(b.bulk + t), _mm512_sub_pd(rest, now));
+  if (!_mm512_cmp_pd_mask(below, now, _CMP_GT_OQ)) return pressure;
   const __m512d lost = _mm512_max_pd(_mm512_sub_pd(below, now), _mm512_setzero_pd());
-  return _mm512_add_pd(_mm512_mul_pd(_mm512_load_pd(b.bulk + t), _mm512_sub_pd(rest, now)),
-                       _mm512_mul_pd(_mm512_load_pd(b.collapse + t), lost));
+  return _mm512_add_pd(pressure, _mm512_mul_pd(_mm512_load_pd(b.collapse + t), lost));
+}
+DEFORM_INLINE bool any_far(const Block &b, uint32_t t, __m512d q) {
+  return _mm512_cmp_pd_mask(q, _mm512_set1_pd(b.least_limit), _CMP_GT_OQ) &&
+         _mm512_cmp_pd_mask(q, _mm512_load_pd(b.limit + t), _CMP_GT_OQ);
 }
 DEFORM_INLINE __m512d squares(const Edges8 &e1, const Edges8 &e2, const Edges8 &e3) {
   const Edges8 sum = sum3(e1, e2, e3);
@@ -210,11 +216,12 @@ DEFORM_INLINE void stretched_forces(const Block &b, uint32_t t, __m512d q, __m51
 static void volume_cells8(const Block &b) {
   for (uint32_t t = 0; t < b.cells; t += 8) {
     const Cell *c = b.cell + t;
+    fetch_cells(b, t);
     auto [e1, e2, e3, g1, g2, g3] = shape8(b, c);
     const __m512d volume6 = dot(e1, g1);
     const __m512d q = squares(e1, e2, e3);
     __m512d pressure = _mm512_set1_pd(1);
-    if (_mm512_cmp_pd_mask(q, _mm512_load_pd(b.limit + t), _CMP_GT_OQ)) {
+    if (any_far(b, t, q)) {
       stretched_forces(b, t, q, volume6, e1, e2, e3, g1, g2, g3);
     } else {
       pressure = pressure_of(b, t, volume6);

@@ -67,10 +67,18 @@ static inline double cell_energies(const Block &b, const double *x, uint32_t str
 // f -= c m v of the points that the block owns; by_point is NULL where c is the same for all.
 static inline void drag_points(const model::BlockPoints &b, const double *mass, const double *by_point,
                                double all, const double *v, uint32_t stride) {
-  for (uint32_t n = 0; n < b.owned; ++n) {
+  const auto one = [&](uint32_t n) __attribute__((always_inline)) {
     const size_t i = b.point[n];
     take_from(b, n, splat((by_point ? by_point[i] : all) * mass[i]) * load_xyz(v + size_t(stride) * i));
+  };
+  uint32_t n = 0;
+  for (; n + b.ahead < b.owned; ++n) {
+    const size_t next = b.point[n + b.ahead];
+    fetch(v + size_t(stride) * next);
+    fetch(mass + next);
+    one(n);
   }
+  for (; n < b.owned; ++n) one(n);
 }
 
 #define MSM_ENERGIES spring_energies, cell_energies, drag_points

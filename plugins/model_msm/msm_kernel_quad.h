@@ -39,10 +39,24 @@ DEFORM_INLINE void spread_springs(const Block &b, const Quad &q, v4 scale, v4 d0
   take_from(b, q.j[3], f3);
 }
 
+// Quads and cells of a large body come from memory as several streams: the processor alone does not run ahead
+// of them by as much as an answer takes.
+DEFORM_INLINE void fetch_quads(const Block &b, uint32_t n) {
+  fetch(b.quad + n + 48);
+  fetch(b.rest + 4 * size_t(n) + 128);
+  fetch(b.stiffness + 4 * size_t(n) + 128);
+}
+DEFORM_INLINE void fetch_cells(const Block &b, uint32_t t) {
+  fetch(b.cell + t + 64);
+  fetch(b.volume6 + t + 64);
+  fetch(b.bulk + t + 64);
+}
+
 template <Form kForm, Damping kDamping>
 static inline void springs(const Block &b, double damp) {
   for (uint32_t n = 0; n < b.quads; ++n) {
     const Quad &q = b.quad[n];
+    if (n % 2 == 0) fetch_quads(b, n);
     const v4 xi = point4(b, q.i);
     const v4 d0 = point4(b, q.j[0]) - xi;
     const v4 d1 = point4(b, q.j[1]) - xi;
@@ -141,8 +155,12 @@ DEFORM_INLINE void spread(const Block &b, const Cell *c, int n, v4 pressure, con
 DEFORM_INLINE v4 pressure_of(const Block &b, uint32_t t, v4 now) {
   const v4 rest = load4(b.volume6 + t);
   now = min4(max4(now, splat(kLeastVolume) * rest), splat(kMostVolume) * rest);
-  return load4(b.bulk + t) * (rest - now) +
-         load4(b.collapse + t) * max4(splat(kCollapseBelow) * rest - now, splat(0));
+  const v4 pressure = load4(b.bulk + t) * (rest - now), lost = splat(kCollapseBelow) * rest - now;
+  return any_above(lost, splat(0)) ? pressure + load4(b.collapse + t) * max4(lost, splat(0)) : pressure;
+}
+// Is one of four cells beyond its limit?
+DEFORM_INLINE bool any_far(const Block &b, uint32_t t, v4 q) {
+  return any_above(q, splat(b.least_limit)) && any_above(q, load4(b.limit + t));
 }
 // Sum of the squares of the six edges.
 DEFORM_INLINE v4 squares(const Edges4 &e1, const Edges4 &e2, const Edges4 &e3) {
@@ -176,6 +194,7 @@ DEFORM_INLINE void stretched_forces(const Block &b, uint32_t t, v4 q, v4 now, co
 
 static inline void volume_cells(const Block &b) {
   for (uint32_t t = 0; t < b.cells; t += 4) {
+    if (t % 8 == 0) fetch_cells(b, t);
     const Cell *c = b.cell + t;
     Edges4 e1, e2, e3, g1, g2, g3;
     gather_all(b, c, e1, e2, e3);
@@ -184,7 +203,7 @@ static inline void volume_cells(const Block &b) {
     cross(e1, e2, g3);
     const v4 now = dot(e1, g1), q = squares(e1, e2, e3);
     v4 pressure = splat(1);
-    if (any_above(q, load4(b.limit + t))) {
+    if (any_far(b, t, q)) {
       stretched_forces(b, t, q, now, e1, e2, e3, g1, g2, g3);
     } else {
       pressure = pressure_of(b, t, now);

@@ -107,11 +107,20 @@ def counted(command, content):
                 json.loads((pathlib.Path(folder) / "run" / "summary.json").read_text()))
 
 
+def commit_of_source():
+    """Of the tree that this file lies in; with + where it has changes."""
+    def git(*words):
+        return subprocess.run(["git", "-C", str(pathlib.Path(__file__).parent), *words], capture_output=True,
+                              text=True).stdout.strip()
+    commit = git("rev-parse", "--short=8", "HEAD")
+    return commit + "+" * bool(git("status", "--porcelain", "--untracked-files=no")) if commit else "unknown"
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("command")
     parser.add_argument("out")
-    parser.add_argument("--commit", default="unknown")
+    parser.add_argument("--commit", default=commit_of_source())
     parser.add_argument("--compiler", default="unknown")
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--only", default="")
@@ -128,7 +137,7 @@ def main():
 
     if options.only in ("", "body"):
         for on_floor in (False, True):
-            for cells, steps in ((1000, 4000), (10000, 600), (100000, 80), (1000000, 10)):
+            for cells, steps in ((1000, 4000), (10000, 600), (100000, 240), (1000000, 60)):
                 early, late = (run(options.command, beam(cells, on_floor, n * steps), options.repeats)
                                for n in (1, 3))
                 real = late["bodies"]["beam"]["cells"]

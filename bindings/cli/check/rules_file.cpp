@@ -330,6 +330,9 @@ void tables_sound(const Subject &subject) {
   const auto *single = static_cast<const dfm_f32 *>(body.extension(DFM_EXT_F32));
   if (single && !(single->prepare && single->add_forces))
     broken("dfm_f32 lacks prepare or add_forces; set both, or return NULL");
+  const auto *by_part = static_cast<const dfm_part_forces *>(body.extension(DFM_EXT_PART_FORCES));
+  if (by_part && !(by_part->parts && by_part->forces))
+    broken("dfm_part_forces lacks parts or forces; set both, or return NULL");
   if (stepper && !(stepper->predict && stepper->respond && stepper->commit))
     broken("dfm_stepper lacks predict, respond or commit; set the three");
   if (stepper && stepper->size >= offsetof(dfm_stepper, fetch) + sizeof(void *) && stepper->fetch)

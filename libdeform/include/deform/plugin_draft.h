@@ -50,6 +50,23 @@ typedef struct dfm_f32 {
    * the same bits for the same k. Writes k->state_out as dfm_model.add_forces does. */
   dfm_status (*add_forces)(void *self, const dfm_kin *k, double *f);
 } dfm_f32;
+/* ---- models: forces part by part ---------------------------------------------------------------------- */
+/* Extension "dfm.part_forces/1" of a model: the forces of add_forces once more, not added to an array of all
+ * points but given away part by part, each as soon as it is complete, so that the host moves the points of a
+ * part while they are in the cache. Each point is in one part; parts do not change while the instance lives.
+ * It stays a draft until a second model has it. */
+#define DFM_EXT_PART_FORCES "dfm.part_forces/1"
+/* n points of part number `part` and what add_forces would add to them, f[n,4] N, the fourth zero. The
+ * instance calls it once for each part, on any of its workers, several at once. */
+typedef void (*dfm_take_part_fn)(void *user, uint32_t part, uint32_t n, const uint32_t *point,
+                                 const double *f);
+typedef struct dfm_part_forces {
+  uint32_t size, reserved;
+  uint32_t (*parts)(const void *self); /* [setup] how many there are */
+  /* [step] Reads k, and writes k->state_out, as dfm_model.add_forces does; the host may write neither of them
+   * until it returns. single: 1 for the forces of dfm_f32.add_forces, else 0 */
+  dfm_status (*forces)(void *self, const dfm_kin *k, uint32_t single, dfm_take_part_fn take, void *user);
+} dfm_part_forces;
 /* ---- services of a host: a direct solver --------------------------------------------------------------- */
 /* Service "dfm.direct/1" of a host, asked for by dfm_host.extension: the host's own direct solver of
  * symmetric positive definite matrices of 3x3 blocks, for a model whose body is made with a factor. NULL:

@@ -119,7 +119,8 @@ class Dynamics {
   virtual bool take_contact() { return true; }
   // Return false if the model fails, or (free_motion) a velocity is not finite or above `fastest`. kinetic:
   // J, of the free motion; unchanged if it is not known.
-  virtual bool add_forces(const SubStep &) { return true; }
+  // keep: points().f is read after this sub-step; else forces may be used up as they come.
+  virtual bool add_forces(const SubStep &, bool /*keep*/) { return true; }
   virtual bool free_motion(const SubStep &now, double &kinetic) = 0;
 
   // [npoint,4] 1/kg, change of velocity per impulse at the same point; null: the unknowns of contact are the
@@ -161,6 +162,9 @@ class Dynamics {
   // For a body whose scheme damps: writes the forces at the end into points().f, including loads of the
   // sub-step. Returns false if the model fails. After end_state().
   virtual bool end_forces(const SubStep &) { return false; }
+  // points().f is that of the last add_forces(), whether it was kept or not. Before commit(). Returns false
+  // if the model fails.
+  virtual bool see_forces(const SubStep &) { return true; }
   // fraction: share of the displacement that is taken; velocities are those of the end.
   virtual void commit(const SubStep &now, double fraction) = 0;
 

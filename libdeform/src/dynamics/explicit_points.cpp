@@ -2,10 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "dynamics/symplectic_euler.h"
 
 namespace dfm {
+namespace {
+constexpr uint32_t kAhead = 48;  // points: as long as memory takes to answer
+}
 
 ExplicitPoints::ExplicitPoints(const Memory &memory, Phyxels &points, Surface &surface, ModelInstance &model,
                                const Array<uint32_t> &edges)
@@ -14,7 +18,8 @@ ExplicitPoints::ExplicitPoints(const Memory &memory, Phyxels &points, Surface &s
       loops_(points_kernels()),
       stiffness_(points.n, 0.0, HookAllocator<double>(memory)),
       damping_(points.n, 0.0, HookAllocator<double>(memory)) {
-  use_memory(memory, reached_, before_);
+  use_memory(memory, part_kinetic_, reached_, before_);
+  if (model.part_forces) part_kinetic_.resize(model.part_forces->parts(model.self));
 }
 
 bool ExplicitPoints::bound(double time, const AddRowSums &outside, StepBound &out) {
@@ -43,14 +48,32 @@ double ExplicitPoints::strain_rate() const {
   return loops_.strain_rate(uint32_t(edges_.size() / 2), edges_.data(), p_.x.data(), p_.v.data());
 }
 
-bool ExplicitPoints::add_forces(const SubStep &now) {
+bool ExplicitPoints::add_forces(const SubStep &now, bool keep) {
+  moved_ = !keep && !part_kinetic_.empty();
+  return moved_ ? move_parts(now) : find_forces(now);
+}
+
+bool ExplicitPoints::find_forces(const SubStep &now) {
   std::copy(p_.load.begin(), p_.load.end(), p_.f.begin());
   const dfm_kin k = kin(now.time, now.h, true);
   return model_.add_forces(k, p_.f.data()) == DFM_OK;
 }
 
+bool ExplicitPoints::move_parts(const SubStep &now) {
+  const double gravity[kStride] = {now.gravity.x, now.gravity.y, now.gravity.z, 0};
+  FreeMotion motion = free_motion_of(p_, gravity, now.h);
+  if (part_kinetic_.size() > 1) motion.ahead = kAhead;  // one part lies in the cache
+  const auto move = [&](uint32_t part, uint32_t n, const uint32_t *point, const double *f) {
+    part_kinetic_[part] = loops_.predict_part(motion, n, point, p_.load.data(), f);
+  };
+  return model_.add_part_forces(kin(now.time, now.h, true), move) == DFM_OK;
+}
+
+bool ExplicitPoints::see_forces(const SubStep &now) { return !moved_ || find_forces(now); }
+
 bool ExplicitPoints::free_motion(const SubStep &now, double &kinetic) {
-  kinetic = predict(loops_, p_, now.gravity, now.h);
+  kinetic = moved_ ? std::accumulate(part_kinetic_.begin(), part_kinetic_.end(), 0.0)
+                   : predict(loops_, p_, now.gravity, now.h);
   ways_known_ = true;
   in_place_ = false;
   reached_.clear();

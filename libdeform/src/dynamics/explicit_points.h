@@ -1,4 +1,6 @@
 // Points that the library moves by symplectic Euler, each with its own mass, under the forces of a model.
+// Where the model gives its forces part by part, the points of a part move as soon as it comes: forces and
+// free motion are one pass (doc/decisions/0442-forces-part-by-part.md).
 #pragma once
 #include "dynamics/dynamics.h"
 #include "dynamics/points_kernel.h"
@@ -15,12 +17,13 @@ class ExplicitPoints : public Dynamics {
   }
   bool bound(double time, const AddRowSums &outside, StepBound &out) override;
   double strain_rate() const override;
-  bool add_forces(const SubStep &now) override;
+  bool add_forces(const SubStep &now, bool keep) override;
   bool free_motion(const SubStep &now, double &kinetic) override;
   const double *diagonal() const override { return p_.inv_mass.data(); }
   const double *point_velocity() const override { return p_.v_free.data(); }
   bool end_state(const SubStep &now, const double *surfel_impulse, bool touched) override;
   void free_again(const SubStep &now) override;
+  bool see_forces(const SubStep &now) override;
   void free_changed() override { ways_known_ = false; }
   EndState end() const override {
     const double *const v = in_place_ ? p_.v_free.data() : p_.v_end.data();
@@ -32,12 +35,18 @@ class ExplicitPoints : public Dynamics {
   const Array<uint32_t> &edges_;
   const PointsKernels &loops_;
   Array<double> stiffness_, damping_;  // [npoint] row sums: N/m, N s/m
+  // Where the model gives its forces part by part, the points of a part move as it comes. [part] J
+  Array<double> part_kinetic_;
+  bool moved_ = false;
   // The end is the free motion but for the few points that contact reaches: it is stored in v_free, and the
   // former values of these points are kept.
   bool ways_known_ = false;  // x_end follows from v_free
   bool in_place_ = false;
   Array<size_t> reached_;  // places in v_free
   Array<double> before_;   // [reached,3] m/s
+
+  bool find_forces(const SubStep &now);  // in points().f
+  bool move_parts(const SubStep &now);
 };
 
 }  // namespace dfm

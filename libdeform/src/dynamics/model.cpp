@@ -15,6 +15,7 @@ namespace {
 constexpr size_t kStepperHead = offsetof(dfm_stepper, commit) + sizeof(void *);
 constexpr size_t kLatePoints = offsetof(dfm_late_points, look) + sizeof(void *);
 constexpr size_t kOneFunction = 2 * sizeof(uint32_t) + sizeof(void *);
+constexpr size_t kPartForces = offsetof(dfm_part_forces, forces) + sizeof(void *);
 constexpr size_t kF32Head = offsetof(dfm_f32, add_forces) + sizeof(void *);
 
 }  // namespace
@@ -64,9 +65,10 @@ void ModelInstance::create(const dfm_type &t, const dfm_host &h, const dfm_mesh 
 }
 
 std::optional<std::vector<dfm_slot>> ModelInstance::ask_extensions() {
-  const void *tables[8] = {};
-  const char *const ids[] = {"dfm.stepper/1", DFM_EXT_SLOTS, DFM_EXT_EFFECTS, DFM_EXT_IDLE,
-                             DFM_EXT_LIMITED, DFM_EXT_CAPS,  DFM_EXT_F32,     DFM_EXT_LATE_POINTS};
+  const void *tables[9] = {};
+  const char *const ids[] = {"dfm.stepper/1", DFM_EXT_SLOTS,       DFM_EXT_EFFECTS,
+                             DFM_EXT_IDLE,    DFM_EXT_LIMITED,     DFM_EXT_CAPS,
+                             DFM_EXT_F32,     DFM_EXT_LATE_POINTS, DFM_EXT_PART_FORCES};
   if (ops->extension)
     call("extension", [&] {
       for (size_t i = 0; i < std::size(ids); ++i) tables[i] = ops->extension(self, ids[i]);
@@ -81,6 +83,8 @@ std::optional<std::vector<dfm_slot>> ModelInstance::ask_extensions() {
   limited = copy_table<dfm_limited>(tables[4], kOneFunction, type->id, "dfm_limited");
   claims = copy_table<dfm_caps>(tables[5], kOneFunction, type->id, "dfm_caps");
   f32 = copy_table<dfm_f32>(tables[6], kF32Head, type->id, "dfm_f32");
+  part_forces = copy_table<dfm_part_forces>(tables[8], kPartForces, type->id, "dfm_part_forces");
+  if (part_forces && !(part_forces->parts && part_forces->forces)) part_forces.reset();
   late = copy_table<dfm_late_points>(tables[7], kLatePoints, type->id, "dfm_late_points");
   if (late && !(stepper && late->commit && late->points && late->look)) late.reset();
   if (ask_caps() != DFM_OK)
@@ -147,6 +151,7 @@ void ModelInstance::swap(ModelInstance &other) noexcept {
   std::swap(limited, other.limited);
   std::swap(claims, other.claims);
   std::swap(f32, other.f32);
+  std::swap(part_forces, other.part_forces);
   std::swap(single, other.single);
   std::swap(caps_, other.caps_);
   std::swap(self, other.self);

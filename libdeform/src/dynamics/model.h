@@ -19,14 +19,15 @@ struct ModelInstance {
   const dfm_model *ops = nullptr;
   const dfm_host *host = nullptr;
   // The extensions of the instance, in the sizes of this library.
-  std::optional<dfm_stepper> stepper;   // none: a force model, which the library integrates
-  std::optional<dfm_late_points> late;  // none: a step moves all points
-  std::optional<dfm_effects> effects;   // none: all effects that the type promises are active
-  std::optional<dfm_idle> idle;         // none: every parameter has an effect
-  std::optional<dfm_limited> limited;   // none: the model limits nothing, or does not report it
-  std::optional<dfm_caps> claims;       // none: the claims of the type hold with all parameters
-  std::optional<dfm_f32> f32;           // none: double precision only
-  bool single = false;                  // add_forces() computes in single precision
+  std::optional<dfm_stepper> stepper;          // none: a force model, which the library integrates
+  std::optional<dfm_late_points> late;         // none: a step moves all points
+  std::optional<dfm_effects> effects;          // none: all effects that the type promises are active
+  std::optional<dfm_idle> idle;                // none: every parameter has an effect
+  std::optional<dfm_limited> limited;          // none: the model limits nothing, or does not report it
+  std::optional<dfm_caps> claims;              // none: the claims of the type hold with all parameters
+  std::optional<dfm_f32> f32;                  // none: double precision only
+  std::optional<dfm_part_forces> part_forces;  // none: forces come for all points at once
+  bool single = false;                         // forces are computed in single precision
   void *self = nullptr;
   std::vector<double> params;
   std::vector<dfm_slot> slots;     // of its state
@@ -55,11 +56,21 @@ struct ModelInstance {
   // parameters of the type only.
   uint32_t caps() const { return caps_; }
   bool can(uint32_t cap) const { return (caps_ & cap) == cap; }
-  // From now on add_forces() computes in single precision; throws Error if the model does not support it.
+  // From now on forces are computed in single precision; throws Error if the model does not support it.
   void use_single();
   dfm_status add_forces(const dfm_kin &k, double *f) const noexcept {
     return call("add_forces",
                 [&] { return single ? f32->add_forces(self, &k, f) : ops->add_forces(self, &k, f); });
+  }
+  // With part_forces only: take(part, n, point, f) for each part, on any worker.
+  template <class Take>
+  dfm_status add_part_forces(const dfm_kin &k, const Take &take) const noexcept {
+    const dfm_take_part_fn give = [](void *user, uint32_t part, uint32_t n, const uint32_t *point,
+                                     const double *f) {
+      (*static_cast<const Take *>(user))(part, n, point, f);
+    };
+    return call("part_forces",
+                [&] { return part_forces->forces(self, &k, single, give, const_cast<Take *>(&take)); });
   }
   // Changes values of RUNTIME rows; the caller sets `params`. After an error nothing has changed.
   // DFM_E_UNSUPPORTED: with these values the model would lack what is `needed` (DFM_CAP_*), or it accepts no

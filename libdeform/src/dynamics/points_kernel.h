@@ -5,11 +5,23 @@
 
 namespace dfm {
 
+// Where points go without contact: free = v + h (w (f + mass g)), x_end = x + h free.
+struct FreeMotion {
+  double h;
+  const double *gravity;  // [4]
+  const double *mass, *v, *w, *x;
+  double *free, *x_end;
+  // A point's memory is asked for while the point of so many before is worked on: those of a part lie in
+  // short runs, which the processor does not foresee. The number of all points: it is not.
+  uint32_t ahead;
+};
+
 struct PointsKernels {
-  // free = v + h (w (f + mass g)), x_end = x + h free, of all points [n,4]; returns the kinetic energy at
-  // free, J. gravity: [4]
-  double (*predict)(uint32_t n, double h, const double *gravity, const double *mass, const double *v,
-                    const double *w, const double *f, const double *x, double *free, double *x_end);
+  // of all points [n,4]; f: [n,4] N. Returns the kinetic energy at free, J.
+  double (*predict)(const FreeMotion &motion, uint32_t n, const double *f);
+  // of the points that are named: f = load + more, load [..,4] of all points, more [n,4] of these
+  double (*predict_part)(const FreeMotion &motion, uint32_t n, const uint32_t *point, const double *load,
+                         const double *more);
   // v_end = free + w impulse (impulse null: free), x_end = x + h v_end
   void (*end)(uint32_t n, double h, const double *x, const double *free, const double *w,
               const double *impulse, double *x_end, double *v_end);

@@ -10,34 +10,69 @@ namespace {
 
 constexpr uint32_t kParts = 4 / kWidth;  // vectors that hold a point
 
-double predict(uint32_t n, double h, const double *gravity, const double *mass, const double *v,
-               const double *w, const double *f, const double *x, double *free, double *x_end) {
-  const Vector step = splat(h), none = {};
+// index(k): the number of point k; fetch(k): asks for its memory; force(k, at, p): vector p of its force,
+// which lies at `at` in arrays of all.
+template <class Index, class Fetch, class Force>
+DEFORM_INLINE double move_freely(const FreeMotion &m, uint32_t n, const Index &index, const Fetch &fetch,
+                                 const Force &force) {
+  const Vector step = splat(m.h), none = {};
   Vector g[kParts], square[2][kParts] = {};  // two sums, so that one addition does not wait for the other
   DEFORM_UNROLL
-  for (uint32_t p = 0; p < kParts; ++p) g[p] = load(gravity + p * kWidth);
-  const auto one = [&](uint32_t i, uint32_t sum) __attribute__((always_inline)) {
-    const Vector m = splat(mass[i]);
+  for (uint32_t p = 0; p < kParts; ++p) g[p] = load(m.gravity + p * kWidth);
+  const auto one = [&](uint32_t k, uint32_t sum) __attribute__((always_inline)) {
+    const size_t i = index(k);
+    const Vector mass = splat(m.mass[i]);
     DEFORM_UNROLL
     for (uint32_t p = 0; p < kParts; ++p) {
-      const size_t at = 4 * size_t(i) + p * kWidth;
+      const size_t at = 4 * i + p * kWidth;
       // none: +0 of -0, as an impulse of zero would make it
-      const Vector u = (load(v + at) + step * (load(w + at) * (load(f + at) + m * g[p]))) + none;
-      store(free + at, u);
-      store(x_end + at, load(x + at) + step * u);
-      square[sum][p] += m * (u * u);
+      const Vector u = (load(m.v + at) + step * (load(m.w + at) * (force(k, at, p) + mass * g[p]))) + none;
+      store(m.free + at, u);
+      store(m.x_end + at, load(m.x + at) + step * u);
+      square[sum][p] += mass * (u * u);
     }
   };
-  uint32_t i = 0;
-  for (; i + 2 <= n; i += 2) {
-    one(i, 0);
-    one(i + 1, 1);
+  uint32_t k = 0;
+  for (; k + 2 + m.ahead <= n; k += 2) {
+    fetch(k + m.ahead);
+    fetch(k + 1 + m.ahead);
+    one(k, 0);
+    one(k + 1, 1);
   }
-  if (i < n) one(i, 0);
+  for (; k + 2 <= n; k += 2) {
+    one(k, 0);
+    one(k + 1, 1);
+  }
+  if (k < n) one(k, 0);
   double sum[4];
   DEFORM_UNROLL
   for (uint32_t p = 0; p < kParts; ++p) store(sum + p * kWidth, square[0][p] + square[1][p]);
   return 0.5 * ((sum[0] + sum[1]) + sum[2]);
+}
+
+double predict(const FreeMotion &m, uint32_t n, const double *f) {
+  return move_freely(
+      m, n, [](uint32_t k) __attribute__((always_inline)) { return size_t(k); },
+      [](uint32_t) __attribute__((always_inline)) {},
+      [&](uint32_t, size_t at, uint32_t) __attribute__((always_inline)) { return load(f + at); });
+}
+
+double predict_part(const FreeMotion &m, uint32_t n, const uint32_t *point, const double *loads,
+                    const double *more) {
+  const auto fetch = [&](uint32_t k) __attribute__((always_inline)) {
+    const size_t at = 4 * size_t(point[k]);
+    __builtin_prefetch(m.v + at);
+    __builtin_prefetch(m.w + at);
+    __builtin_prefetch(m.x + at);
+    __builtin_prefetch(loads + at);
+    __builtin_prefetch(m.free + at, 1);
+    __builtin_prefetch(m.x_end + at, 1);
+  };
+  return move_freely(
+      m, n, [&](uint32_t k) __attribute__((always_inline)) { return size_t(point[k]); }, fetch,
+      [&](uint32_t k, size_t at, uint32_t p) __attribute__((always_inline)) {
+        return load(loads + at) + load(more + 4 * size_t(k) + p * kWidth);
+      });
 }
 
 void end(uint32_t n, double h, const double *x, const double *free, const double *w, const double *impulse,
@@ -159,7 +194,7 @@ double strain_rate(uint32_t n, const uint32_t *edges, const double *x, const dou
   return out;
 }
 
-constexpr PointsKernels kKernels = {predict, end, inverted, largest_box, strain_rate};
+constexpr PointsKernels kKernels = {predict, predict_part, end, inverted, largest_box, strain_rate};
 
 }  // namespace
 }  // namespace dfm

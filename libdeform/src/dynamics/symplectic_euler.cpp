@@ -20,8 +20,12 @@ const PointsKernels &points_kernels() {
 
 double predict(const PointsKernels &loops, Phyxels &p, Vec3 gravity, double h) {
   const double g[kStride] = {gravity.x, gravity.y, gravity.z, 0};
-  return loops.predict(p.n, h, g, p.mass.data(), p.v.data(), p.inv_mass.data(), p.f.data(), p.x.data(),
-                       p.v_free.data(), p.x_end.data());
+  return loops.predict(free_motion_of(p, g, h), p.n, p.f.data());
+}
+
+FreeMotion free_motion_of(Phyxels &p, const double *gravity, double h) {
+  return {h,          gravity,         p.mass.data(),  p.v.data(), p.inv_mass.data(),
+          p.x.data(), p.v_free.data(), p.x_end.data(), p.n};
 }
 
 void find_end(const PointsKernels &loops, Phyxels &p, bool touched, double h) {

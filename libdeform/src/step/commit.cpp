@@ -51,10 +51,17 @@ bool find_ends(World &w, StepContext &step, uint32_t *trouble) {
 
 bool stage_commit(World &w, StepContext &step, uint32_t *trouble) {
   if (!step.ended && !find_ends(w, step, trouble)) return false;
-  if (step.guard.motion < 1)
-    for (const uint32_t i : step.active) w.bodies[i]->dynamics->see_ends();
-  book_energy(w, step, step.guard.motion);
   const SubStep now = sub_step_of(w, step);
+  if (step.guard.motion < 1)
+    for (const uint32_t i : step.active) {
+      Body &b = *w.bodies[i];
+      const OnBehalf speaks(b.name);
+      b.dynamics->see_ends();
+      if (b.dynamics->see_forces(now)) continue;  // for the work that the way left out would have done
+      *trouble |= tell_no_forces(w, b);
+      return false;
+    }
+  book_energy(w, step, step.guard.motion);
   double accurate = std::numeric_limits<double>::infinity();
   for (const uint32_t i : step.active)
     accurate = std::min(accurate, w.bodies[i]->dynamics->accurate_step(now));

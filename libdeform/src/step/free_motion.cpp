@@ -46,20 +46,24 @@ bool stage_model(World &w, Active active, const SubStep &now, uint32_t *trouble)
   const auto forces = [&](uint32_t begin, uint32_t end) {
     for (const uint32_t i : active.subspan(begin, end - begin)) {
       const OnBehalf speaks(w.bodies[i]->name);
-      if (!w.bodies[i]->dynamics->add_forces(now)) failed.note(i);
+      // work of what holds driven points is booked with the forces there
+      if (!w.bodies[i]->dynamics->add_forces(now, !w.bodies[i]->motions.empty())) failed.note(i);
     }
   };
   const uint32_t n = static_cast<uint32_t>(active.size());
   if (fewer_than_threads_and_large(w, active)) forces(0, n);
   else w.context->tasks.parallel_for(n, 1, [&](uint32_t begin, uint32_t end) { forces(begin, end); });
   if (failed.body == kNone) return true;
-  *trouble |= DFM_TROUBLE_PLUGIN;
-  const Body &b = *w.bodies[failed.body];
+  *trouble |= tell_no_forces(w, *w.bodies[failed.body]);
+  return false;
+}
+
+uint32_t tell_no_forces(const World &w, const Body &b) {
   set_last_error(format("step %llu, body '%s': model '%s' could not compute its forces; take a smaller step "
                         "or change the model",
                         static_cast<unsigned long long>(w.step_count), b.name.c_str(), b.model.type->id)
                      .c_str());
-  return false;
+  return DFM_TROUBLE_PLUGIN;
 }
 
 namespace {

@@ -52,22 +52,27 @@ constexpr Stage kTable[] = {
 };
 constexpr ContactMethod kVelocity{"velocity", kTable};
 
-// Runs a row of the method's table, with timing and tracing.
-bool run(size_t row, World &w, StepContext &step, uint32_t *trouble) {
+using Clock = std::chrono::steady_clock;
+
+// Runs a row of the method's table, with timing and tracing. since: the end of the row before; then of this
+// one.
+bool run(size_t row, World &w, StepContext &step, uint32_t *trouble, Clock::time_point &since) {
   const Stage &stage = w.method->table[row];
   struct Timer {
     const Stage &stage;
     World &w;
     StageTime &time;
-    std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
+    Clock::time_point &since;
     ~Timer() {
       w.context->trace_end(stage.name);
-      time.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+      const Clock::time_point now = Clock::now();
+      time.seconds += std::chrono::duration<double>(now - since).count();
       ++time.calls;
+      since = now;
     }
   };
   w.context->trace_begin(stage.name);
-  const Timer timer{stage, w, step.stage_times[row]};
+  const Timer timer{stage, w, step.stage_times[row], since};
   return stage.run(w, step, trouble);
 }
 
@@ -259,8 +264,9 @@ bool sub_step(World &w, StepContext &step, uint32_t *trouble) {
   step.guard.start();
   step.ended = false;
   charge(w, step, body_work(w, step) + surface_work(w, step));
+  Clock::time_point since = Clock::now();
   for (const PlannedStage &planned : w.plan.stages)
-    if (!run(planned.row, w, step, trouble)) return false;
+    if (!run(planned.row, w, step, trouble, since)) return false;
   keep_rigids(w, step);
   return undo.kept = true;
 }

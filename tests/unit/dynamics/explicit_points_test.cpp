@@ -24,7 +24,7 @@ struct Falling {
     test::run(world, 1e-3, 1e-3);
     body = test::inside(world).bodies[0].get();
     double kinetic = 0;
-    EXPECT_TRUE(body->dynamics->add_forces(now) && body->dynamics->free_motion(now, kinetic));
+    EXPECT_TRUE(body->dynamics->add_forces(now, false) && body->dynamics->free_motion(now, kinetic));
   }
   std::vector<double> impulses(unsigned seed, uint32_t every) const {
     std::vector<double> q(3 * size_t{body->surface.nsurfel});
@@ -37,6 +37,35 @@ struct Falling {
     EXPECT_TRUE(body->dynamics->end_state(now, q.data(), true));
   }
 };
+
+// The model gives its forces part by part, or, where they are read later, for all points at once.
+TEST(ExplicitPoints, PartsAndWhole_LeadToTheSameBits) {
+  struct Moved {
+    test::Context context;
+    dfm_world world = test::make_world(context);
+    dfm::Body *body = nullptr;
+    dfm::SubStep now{0, 1e-4, {0, 0, -9.81}, HUGE_VAL, {}};
+    double kinetic = 0;
+    explicit Moved(bool keep) {
+      test::BodyOptions o;
+      o.velocity = {1, 2, -3};
+      test::make_body(context, world, "beam", {0.4, 0.1, 0.1}, 9000, o);
+      test::run(world, 1e-3, 1e-3);
+      body = test::inside(world).bodies[0].get();
+      std::fill(body->p.f.begin(), body->p.f.end(), 0.0);
+      for (size_t k = 0; k < body->p.load.size(); ++k)
+        body->p.load[k] = k % 4 == 3 ? 0 : 1e-3 * double(k % 7);
+      EXPECT_TRUE(body->dynamics->add_forces(now, keep) && body->dynamics->free_motion(now, kinetic));
+    }
+  };
+  const Moved whole(true), parts(false);
+  EXPECT_EQ(whole.body->p.v_free, parts.body->p.v_free);
+  EXPECT_EQ(whole.body->p.x_end, parts.body->p.x_end);
+  EXPECT_NEAR(whole.kinetic, parts.kinetic, 1e-12 * whole.kinetic);
+  EXPECT_NE(whole.body->p.f, parts.body->p.f);
+  EXPECT_TRUE(whole.body->dynamics->see_forces(whole.now) && parts.body->dynamics->see_forces(parts.now));
+  EXPECT_EQ(whole.body->p.f, parts.body->p.f);
+}
 
 TEST(ExplicitPoints, ASecondEnd_IsThatOfItsImpulsesAlone) {
   const Falling once, twice;
