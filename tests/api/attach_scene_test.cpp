@@ -1,8 +1,7 @@
 // The key `attach` of a scene's bodies.
 #include <unistd.h>
 
-#include "support.h"
-#include "world.h"
+#include "opened.h"
 
 namespace {
 
@@ -18,22 +17,10 @@ std::string scene(const std::string &attach, const std::string &surface = "") {
       "pose": {"position": [0.04, 0.04, 0.48]}}]}})";
 }
 
-struct Opened {
-  test::Context context;
-  dfm_scene scene = 0;
-  dfm_world world = 0;
-  dfm_status status;
-  explicit Opened(const std::string &text) {
-    const std::string path = test::scratch("attach_scene_" + std::to_string(getpid())) + "/scene.json";
-    test::write_file(path, text);
-    status = dfm_scene_open(context, path.c_str(), nullptr, &scene);
-    if (scene) test::ok(dfm_scene_world(scene, &world));
-  }
-  ~Opened() {
-    if (scene) dfm_scene_close(scene);
-  }
-  Opened(const Opened &) = delete;
-  Opened &operator=(const Opened &) = delete;
+struct Opened : test::Opened {
+  explicit Opened(const std::string &text)
+      : test::Opened(
+            test::written(test::scratch("attach_scene_" + std::to_string(getpid())) + "/scene.json", text)) {}
 };
 
 }  // namespace

@@ -58,7 +58,7 @@ struct Cube {
   dfm_world w;
   dfm_body body = 0;
   dfm_tool blade = 0;
-  double z = 0.05;
+  double z = test::cutting::knife().pose.position[2];
   uint64_t opened = 0, events = 0, largest = 0;
   explicit Cube(const Options &o)
       : own(o.threads),
@@ -84,13 +84,7 @@ struct Cube {
       test::ok(dfm_obstacle_create(w, &below, &plane));
       test::set_friction(w, 0.4, "lugre");
     }
-    dfm_tool_def td = dfm_tool_def_default();
-    td.name = "knife";
-    td.shape = DFM_TOOL_BLADE;
-    const double half[] = {0.0005, 0.03, 0.02};
-    std::copy(half, half + 3, td.half_size);
-    td.pose.position[0] = 0.001;
-    td.pose.position[2] = z;
+    const dfm_tool_def td = test::cutting::knife();
     test::ok(dfm_tool_create(w, &td, &blade));
     test::ok(dfm_tool_set_cuts(blade, DFM_CUT_SPLIT, 0, 1, &body));
     test::ok(dfm_body_set_cut_delay(body, o.delay));

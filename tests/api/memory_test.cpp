@@ -37,6 +37,17 @@ struct Hooks {
   }
 };
 
+// Counts allocations since it was made.
+struct Calls {
+  const Hooks &hooks;
+  const int64_t by_hook = hooks.calls;
+  const uint64_t by_new = test::heap_calls;
+  void expect_none() const {
+    EXPECT_EQ(hooks.calls - by_hook, 0) << "calls of the allocation hook";
+    EXPECT_EQ(test::heap_calls - by_new, 0u) << "calls of operator new";
+  }
+};
+
 }  // namespace
 
 TEST(Memory, ASettledStep_AllocatesNothing) {
@@ -53,8 +64,7 @@ TEST(Memory, ASettledStep_AllocatesNothing) {
     ASSERT_EQ(test::pairs(s.world).size(), 2u) << "the bodies rest on each other and on the floor";
     test::events(s.world);
     std::vector<dfm_contact_event> events(65536);
-    const int64_t hook_calls = hooks.calls;
-    const uint64_t heap = test::heap_calls;
+    const Calls before{hooks};
     uint64_t sticking = 0;
     dfm_status bad = DFM_OK;
     auto check = [&](dfm_status status) {
@@ -77,11 +87,11 @@ TEST(Memory, ASettledStep_AllocatesNothing) {
     }
     EXPECT_EQ(bad, DFM_OK) << dfm_last_error();
     EXPECT_GT(sticking, 5000u);
-    EXPECT_EQ(hooks.calls - hook_calls, 0) << "calls of the allocation hook";
-    EXPECT_EQ(test::heap_calls - heap, 0u) << "calls of operator new";
+    before.expect_none();
     size_t bytes = 0;
     test::ok(dfm_world_snapshot(s.world, nullptr, &bytes));
-    EXPECT_GT(test::heap_calls, heap) << "the library's calls are not counted: the zero above shows nothing";
+    EXPECT_GT(test::heap_calls, before.by_new)
+        << "the library's calls are not counted: the zero above shows nothing";
   }
   dfm_context_destroy(c);
   EXPECT_EQ(hooks.live_bytes, 0);
@@ -121,14 +131,12 @@ TEST(Memory, ASettledStepOnTrianglesAndVoxels_AllocatesNothing) {
     test::ok(dfm_obstacle_create(w, &d, &obstacle));
     for (int i = 0; i < 2000; ++i) ASSERT_EQ(dfm_world_step(w, 1e-3, nullptr), DFM_OK) << dfm_last_error();
     ASSERT_EQ(test::pairs(w).size(), 2u) << "one on the hills, one on the slab";
-    const int64_t hook_calls = hooks.calls;
-    const uint64_t heap = test::heap_calls;
+    const Calls before{hooks};
     dfm_status bad = DFM_OK;
     for (int i = 0; i < 1000; ++i)
       if (const dfm_status s = dfm_world_step(w, 1e-3, nullptr); s != DFM_OK) bad = s;
     EXPECT_EQ(bad, DFM_OK);
-    EXPECT_EQ(hooks.calls - hook_calls, 0);
-    EXPECT_EQ(test::heap_calls - heap, 0u);
+    before.expect_none();
   }
   dfm_context_destroy(c);
   EXPECT_EQ(hooks.live_bytes, 0);
@@ -157,14 +165,12 @@ TEST(Memory, ASettledRollbackStep_AllocatesNothing) {
     for (int i = 0; i < 1000; ++i) ASSERT_EQ(dfm_world_step(w, 1e-3, nullptr), DFM_OK) << dfm_last_error();
     ASSERT_EQ(test::pairs(w).size(), 2u);
     test::events(w);
-    const int64_t hook_calls = hooks.calls;
-    const uint64_t heap = test::heap_calls;
+    const Calls before{hooks};
     dfm_status bad = DFM_OK;
     for (int i = 0; i < 500; ++i)
       if (const dfm_status status = dfm_world_step(w, 1e-3, nullptr); status != DFM_OK) bad = status;
     EXPECT_EQ(bad, DFM_OK) << dfm_last_error();
-    EXPECT_EQ(hooks.calls - hook_calls, 0) << "calls of the allocation hook";
-    EXPECT_EQ(test::heap_calls - heap, 0u) << "calls of operator new";
+    before.expect_none();
   }
   dfm_context_destroy(c);
   EXPECT_EQ(hooks.live_bytes, 0);
@@ -186,11 +192,9 @@ TEST(Memory, ASettledCoupledStep_AllocatesNothing) {
   o.surface = &surface;
   test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 60, o);
   test::run(w, 0.5, 1e-3);
-  const int64_t hook_calls = hooks.calls;
-  const uint64_t heap = test::heap_calls;
+  const Calls before{hooks};
   for (int i = 0; i < 200; ++i) ASSERT_EQ(dfm_world_step(w, 1e-3, nullptr), DFM_OK);
-  EXPECT_EQ(hooks.calls - hook_calls, 0) << "calls of the allocation hook";
-  EXPECT_EQ(test::heap_calls - heap, 0u) << "calls of operator new";
+  before.expect_none();
   EXPECT_GT(test::stats(w).sticking, 3u);
   dfm_context_destroy(c);
   EXPECT_EQ(hooks.live_bytes, 0);
@@ -213,11 +217,9 @@ TEST(Memory, ASettledStepOfRigidBodies_AllocatesNothing) {
                    test::box("b", {0.05, 0.04, 0.04}, 2, {0.01, 0, 0.14}),
                    test::box("c", {0.05, 0.06, 0.04}, 1, {0, 0, 1.05})});
   test::run(w, 0.5, 1e-3);
-  const int64_t hook_calls = hooks.calls;
-  const uint64_t heap = test::heap_calls;
+  const Calls before{hooks};
   for (int i = 0; i < 200; ++i) ASSERT_EQ(dfm_world_step(w, 1e-3, nullptr), DFM_OK);
-  EXPECT_EQ(hooks.calls - hook_calls, 0) << "calls of the allocation hook";
-  EXPECT_EQ(test::heap_calls - heap, 0u) << "calls of operator new";
+  before.expect_none();
   dfm_context_destroy(c);
   EXPECT_EQ(hooks.live_bytes, 0);
 }
@@ -257,11 +259,9 @@ TEST(Memory, FallingAsleepAndWaking_AllocatesNothing) {
     return slept && woke;
   };
   for (int i = 0; i < 3; ++i) round();  // buffers find their size
-  const int64_t hook_calls = hooks.calls;
-  const uint64_t heap = test::heap_calls;
+  const Calls before{hooks};
   EXPECT_TRUE(round());
-  EXPECT_EQ(hooks.calls - hook_calls, 0) << "calls of the allocation hook";
-  EXPECT_EQ(test::heap_calls - heap, 0u) << "calls of operator new";
+  before.expect_none();
   EXPECT_EQ(dfm_body_wake(near), DFM_OK);
   dfm_context_destroy(c);
   EXPECT_EQ(hooks.live_bytes, 0);

@@ -2,22 +2,15 @@
 #include <unistd.h>
 
 #include "cut_scenes.h"
-#include "support.h"
-#include "world.h"
+#include "opened.h"
 
 namespace {
 
 using test::cutting::parts;
 
-// A cube of 40 mm about the origin, at rest in empty space.
-struct Cube {
-  test::Context context;
-  dfm_world w;
-  dfm_body body;
-  explicit Cube(const char *model = "corotational_fem", uint32_t threads = 1)
-      : context(threads), w(test::make_world(context, {0, 0, 0})) {
-    body = test::cutting::cube(context, w, model);
-  }
+struct Cube : test::cutting::CubeAtRest {
+  using CubeAtRest::CubeAtRest;
+  void plan(double t, const dfm_cut_def &d) { test::ok(dfm_body_plan_cut(body, t, &d)); }
 };
 
 dfm_cut_def plane(double z, std::array<double, 3> normal = {0, 0, 1}) {
@@ -28,6 +21,8 @@ dfm_cut_def plane(double z, std::array<double, 3> normal = {0, 0, 1}) {
   std::copy(normal.begin(), normal.end(), d.blade + 3);
   return d;
 }
+
+const dfm_cut_def kAcross = plane(0.001), kAlong = plane(0, {1, 0, 0});
 
 uint32_t cells(dfm_body b) { return test::cutting::info(b).ntet; }
 
@@ -104,7 +99,7 @@ TEST(PlaneCut, PlaneBeside_CutsNothing) {
 TEST(PlannedCut, Cut_IsMadeAtTheEndOfTheStepThatReachesItsTime) {
   Cube c;
   const dfm_cut_def d = plane(0.001);
-  test::ok(dfm_body_plan_cut(c.body, 0.005, &d));
+  c.plan(0.005, d);
   test::run(c.w, 0.004, 1e-3);
   EXPECT_EQ(parts(c.body), 1u);
   EXPECT_TRUE(cut_events(c.w).empty());
@@ -123,9 +118,8 @@ TEST(PlannedCut, Cut_IsMadeAtTheEndOfTheStepThatReachesItsTime) {
 TEST(PlannedCut, LaterCutsReachPieces_AndNoneIsMadeTwice) {
   Cube c;
   separate(c.body);
-  const dfm_cut_def across = plane(0.001), along = plane(0, {1, 0, 0});
-  test::ok(dfm_body_plan_cut(c.body, 0.002, &along));
-  test::ok(dfm_body_plan_cut(c.body, 0.001, &across));
+  c.plan(0.002, kAlong);
+  c.plan(0.001, kAcross);
   test::run(c.w, 0.001, 1e-3);
   EXPECT_EQ(pieces(c.body), 1u);
   test::run(c.w, 0.003, 1e-3);
@@ -136,9 +130,8 @@ TEST(PlannedCut, LaterCutsReachPieces_AndNoneIsMadeTwice) {
 TEST(PlannedCut, TwoOfOneStep_AreBothMade) {
   Cube c;
   separate(c.body);
-  const dfm_cut_def across = plane(0.001), along = plane(0, {1, 0, 0});
-  test::ok(dfm_body_plan_cut(c.body, 0, &across));
-  test::ok(dfm_body_plan_cut(c.body, 0.0005, &along));
+  c.plan(0, kAcross);
+  c.plan(0.0005, kAlong);
   test::run(c.w, 0.001, 1e-3);
   EXPECT_EQ(pieces(c.body), 3u);
 }
@@ -146,9 +139,8 @@ TEST(PlannedCut, TwoOfOneStep_AreBothMade) {
 TEST(PlannedCut, Null_TakesThemBack) {
   Cube c;
   separate(c.body);
-  const dfm_cut_def d = plane(0.001), along = plane(0, {1, 0, 0});
-  test::ok(dfm_body_plan_cut(c.body, 0.001, &along));
-  test::ok(dfm_body_plan_cut(c.body, 0.002, &d));
+  c.plan(0.001, kAlong);
+  c.plan(0.002, kAcross);
   test::run(c.w, 0.001, 1e-3);
   EXPECT_EQ(pieces(c.body), 1u);
   test::ok(dfm_body_plan_cut(c.body, 0, nullptr));  // of the piece, too
@@ -159,9 +151,8 @@ TEST(PlannedCut, Null_TakesThemBack) {
 TEST(PlannedCut, PlannedAfterAPieceHasComeOff_CutsThePieceToo) {
   Cube c;
   separate(c.body);
-  const dfm_cut_def across = plane(0.001), along = plane(0, {1, 0, 0});
-  test::ok(dfm_body_cut(c.body, &across, nullptr));
-  test::ok(dfm_body_plan_cut(c.body, 0.001, &along));
+  test::ok(dfm_body_cut(c.body, &kAcross, nullptr));
+  c.plan(0.001, kAlong);
   test::run(c.w, 0.001, 1e-3);
   EXPECT_EQ(pieces(c.body), 3u);
 }
@@ -171,7 +162,7 @@ TEST(PlannedCut, StepsOfAnySize_CutInTheStepThatHasTheTime) {
   for (const double dt : {1e-4, 3e-4, 7e-4, 1e-3, 4e-3}) {
     Cube c;
     const dfm_cut_def d = plane(0.001);
-    test::ok(dfm_body_plan_cut(c.body, 0.0035, &d));
+    c.plan(0.0035, d);
     double t = 0;
     while (cut_events(c.w).empty() && t < 0.1) {
       test::ok(dfm_world_step(c.w, dt, nullptr));
@@ -185,11 +176,10 @@ TEST(PlannedCut, StepsOfAnySize_CutInTheStepThatHasTheTime) {
 TEST(PlannedCut, ManyThreads_CutToTheSameBits) {
   std::string one;
   for (const uint32_t threads : {1u, 2u, 4u}) {
-    Cube c("corotational_fem", threads);
+    Cube c("corotational_fem", 320, threads);
     separate(c.body);
-    const dfm_cut_def across = plane(0.001), along = plane(0, {1, 0, 0});
-    test::ok(dfm_body_plan_cut(c.body, 0.002, &across));
-    test::ok(dfm_body_plan_cut(c.body, 0.002, &along));
+    c.plan(0.002, kAcross);
+    c.plan(0.002, kAlong);
     test::run(c.w, 0.01, 1e-3);
     EXPECT_EQ(pieces(c.body), 3u);
     if (one.empty()) one = test::snapshot(c.w);
@@ -234,8 +224,8 @@ TEST(PlannedCut, BodyWithoutCells_HasNoneLeft) {
   all.shape = DFM_CUT_BOX;
   std::fill_n(all.half_size, 3, 1.0);
   const dfm_cut_def d = plane(0.001);
-  test::ok(dfm_body_plan_cut(c.body, 0.002, &d));
-  test::ok(dfm_body_plan_cut(c.body, 0.001, &all));
+  c.plan(0.002, d);
+  c.plan(0.001, all);
   test::run(c.w, 0.001, 1e-3);
   const std::vector<dfm_contact_event> events = cut_events(c.w);
   ASSERT_EQ(events.size(), 1u);
@@ -248,9 +238,8 @@ TEST(PlannedCut, BodyWithoutCells_HasNoneLeft) {
 TEST(PlannedCut, SnapshotsBeforeAndAfter_GoOnToTheBit) {
   Cube c;
   separate(c.body);
-  const dfm_cut_def across = plane(0.001), along = plane(0, {1, 0, 0});
-  test::ok(dfm_body_plan_cut(c.body, 0.003, &across));
-  test::ok(dfm_body_plan_cut(c.body, 0.006, &along));
+  c.plan(0.003, kAcross);
+  c.plan(0.006, kAlong);
   test::run(c.w, 0.001, 1e-3);
   const std::string before = test::snapshot(c.w);
   test::run(c.w, 0.003, 1e-3);
@@ -287,7 +276,7 @@ TEST(PlannedCut, WhatIsWrong_IsRefusedInASentence) {
   EXPECT_EQ(dfm_body_plan_cut(modal.body, 1, &d), DFM_E_UNSUPPORTED);
   test::says({"cube", "corotational_fem"});
   // until the cut is made, the model stays one that can be cut
-  test::ok(dfm_body_plan_cut(c.body, 0.02, &d));
+  c.plan(0.02, d);
   EXPECT_EQ(dfm_body_set_model(c.body, "modal", nullptr), DFM_E_UNSUPPORTED);
   test::says({"cut", "corotational_fem"});
   test::run(c.w, 0.01, 1e-3);
@@ -336,19 +325,8 @@ std::string scene(const std::string &cuts, const std::string &body = R"("separat
          body + R"(}], "cuts": )" + cuts + "}";
 }
 
-struct Opened {
-  test::Context context;
-  dfm_scene scene = 0;
-  dfm_world world = 0;
-  dfm_status status;
-  explicit Opened(const std::string &path) : status(dfm_scene_open(context, path.c_str(), nullptr, &scene)) {
-    if (scene) test::ok(dfm_scene_world(scene, &world));
-  }
-  ~Opened() {
-    if (scene) dfm_scene_close(scene);
-  }
-  Opened(const Opened &) = delete;
-  Opened &operator=(const Opened &) = delete;
+struct Opened : test::Opened {
+  using test::Opened::Opened;
   dfm_body cube() const {
     dfm_body out = 0;
     test::ok(dfm_world_find_body(world, "cube", &out));

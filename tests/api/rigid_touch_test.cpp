@@ -50,6 +50,16 @@ void put_floor(dfm_world w, const std::string &kind) {
   }
 }
 
+// A floor and four walls, `half` from the middle.
+void add_pit(dfm_world w, double half) {
+  const double s = std::sqrt(0.5);
+  test::add_plane(w, "floor");
+  test::add_plane(w, "left", {-half, 0, 0}, {0, s, 0, s});
+  test::add_plane(w, "right", {half, 0, 0}, {0, -s, 0, s});
+  test::add_plane(w, "front", {0, -half, 0}, {-s, 0, 0, s});
+  test::add_plane(w, "back", {0, half, 0}, {s, 0, 0, s});
+}
+
 const char *const kThings[] = {"box", "ball", "capsule", "triangles"};
 // Its lowest point is at z = low; a capsule lies along y.
 dfm_rigid put(dfm_world w, const std::string &kind, double low, const char *name = "thing", double mass = 1) {
@@ -277,12 +287,7 @@ TEST(RigidTouch, Tumbling_StaysInside) {
   for (const double dt : kStep) {
     test::Context context;
     const dfm_world w = test::make_world(context, {0, 0, -kG});
-    test::add_plane(w, "floor");
-    const double s = std::sqrt(0.5);
-    test::add_plane(w, "left", {-0.3, 0, 0}, {0, s, 0, s});
-    test::add_plane(w, "right", {0.3, 0, 0}, {0, -s, 0, s});
-    test::add_plane(w, "front", {0, -0.3, 0}, {-s, 0, 0, s});
-    test::add_plane(w, "back", {0, 0.3, 0}, {s, 0, 0, s});
+    add_pit(w, 0.3);
     uint64_t seed = 7;
     const auto next = [&] {
       seed = seed * 6364136223846793005ull + 1442695040888963407ull;
@@ -325,12 +330,7 @@ TEST(RigidTouch, AHeap_StaysBetweenItsWalls) {
     SCOPED_TRACE(dt);
     test::Context context;
     const dfm_world w = test::make_world(context, {0, 0, -kG});
-    test::add_plane(w, "floor");
-    const double s = std::sqrt(0.5);
-    test::add_plane(w, "left", {-0.15, 0, 0}, {0, s, 0, s});
-    test::add_plane(w, "right", {0.15, 0, 0}, {0, -s, 0, s});
-    test::add_plane(w, "front", {0, -0.15, 0}, {-s, 0, 0, s});
-    test::add_plane(w, "back", {0, 0.15, 0}, {s, 0, 0, s});
+    add_pit(w, 0.15);
     std::vector<dfm_rigid> things;
     for (int i = 0; i < 12; ++i) {
       const std::string name = "thing" + std::to_string(i);

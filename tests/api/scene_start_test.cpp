@@ -4,8 +4,7 @@
 
 #include <algorithm>
 
-#include "support.h"
-#include "world.h"
+#include "opened.h"
 
 namespace {
 
@@ -20,27 +19,13 @@ std::string scene(const std::string &start, const std::string &further = "") {
          R"(}], "contact": {"filter": [{"between": ["*", "*"], "collide": false}]}})";
 }
 
-struct Opened {
-  test::Context context;
-  dfm_scene scene = 0;
-  dfm_status status = DFM_OK;
-  explicit Opened(const std::string &text, uint64_t jitter = 0) {
-    const std::string path = test::scratch("scene_start_" + std::to_string(getpid())) + "/scene.json";
-    test::write_file(path, text);
-    dfm_scene_options options{};
-    options.size = sizeof options;
-    options.jitter_seed = jitter;
-    status = dfm_scene_open(context, path.c_str(), &options, &scene);
-  }
-  ~Opened() {
-    if (scene) dfm_scene_close(scene);
-  }
-  Opened(const Opened &) = delete;
-  Opened &operator=(const Opened &) = delete;
+struct Opened : test::Opened {
+  explicit Opened(const std::string &text, uint64_t jitter = 0)
+      : test::Opened(
+            test::written(test::scratch("scene_start_" + std::to_string(getpid())) + "/scene.json", text),
+            jitter) {}
   dfm_body body(const char *name) const {
-    dfm_world world = 0;
     dfm_body out = 0;
-    test::ok(dfm_scene_world(scene, &world));
     test::ok(dfm_world_find_body(world, name, &out));
     return out;
   }

@@ -5,6 +5,7 @@
 
 #include "cut_scenes.h"
 #include "deform/tool.h"
+#include "opened.h"
 #include "rigid.h"
 #include "support.h"
 
@@ -12,16 +13,7 @@ namespace {
 
 using test::cutting::parts;
 
-// A cube of 40 mm about the origin, at rest in empty space.
-struct Cube {
-  test::Context context;
-  dfm_world w;
-  dfm_body body;
-  explicit Cube(const char *model = "corotational_fem", uint32_t cells = 320)
-      : w(test::make_world(context, {0, 0, 0})) {
-    body = test::cutting::cube(context, w, model, cells);
-  }
-};
+using Cube = test::cutting::CubeAtRest;
 
 dfm_tool make(dfm_world w, uint32_t shape, std::array<double, 3> half, std::array<double, 3> at,
               double radius = 0) {
@@ -302,13 +294,7 @@ struct Tough {
                                 .model = model,
                                 .corner = -0.02,
                                 .held = held});
-    dfm_tool_def td = dfm_tool_def_default();
-    td.name = "knife";
-    td.shape = DFM_TOOL_BLADE;
-    const double half[] = {0.0005, 0.03, 0.02};
-    std::copy(half, half + 3, td.half_size);
-    td.pose.position[0] = 0.001;
-    td.pose.position[2] = 0.05;
+    dfm_tool_def td = test::cutting::knife();
     td.stiffness = stiffness;
     td.turn_stiffness = stiffness > 0 ? turn : 0;
     td.damping = stiffness > 0 ? 2 : 0;
@@ -503,22 +489,8 @@ std::string scene(const std::string &cuts,
                                {"t": 0.06, "position": [0.001, 0, -0.01]}]}}]})";
 }
 
-struct Opened {
-  test::Context context;
-  dfm_scene scene = 0;
-  dfm_world world = 0;
-  dfm_status status;
-  explicit Opened(const std::string &text) {
-    const std::string path = folder() + "/scene.json";
-    test::write_file(path, text);
-    status = dfm_scene_open(context, path.c_str(), nullptr, &scene);
-    if (scene) test::ok(dfm_scene_world(scene, &world));
-  }
-  ~Opened() {
-    if (scene) dfm_scene_close(scene);
-  }
-  Opened(const Opened &) = delete;
-  Opened &operator=(const Opened &) = delete;
+struct Opened : test::Opened {
+  explicit Opened(const std::string &text) : test::Opened(test::written(folder() + "/scene.json", text)) {}
 };
 
 }  // namespace

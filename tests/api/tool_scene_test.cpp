@@ -1,8 +1,7 @@
 // The key "tools" of scenes: shapes, keyframes, a recorded hand, couplings, and what is refused.
 #include <unistd.h>
 
-#include "support.h"
-#include "world.h"
+#include "opened.h"
 
 namespace {
 
@@ -17,21 +16,9 @@ std::string scene(const std::string &tools, const std::string &body = "") {
          body + R"(}], "tools": )" + tools + "}";
 }
 
-struct Opened {
-  test::Context context;
-  dfm_scene scene = 0;
-  dfm_world world = 0;
-  dfm_status status;
-  explicit Opened(const std::string &text, const std::string &path = folder() + "/scene.json") {
-    if (!text.empty()) test::write_file(path, text);
-    status = dfm_scene_open(context, path.c_str(), nullptr, &scene);
-    if (scene) test::ok(dfm_scene_world(scene, &world));
-  }
-  ~Opened() {
-    if (scene) dfm_scene_close(scene);
-  }
-  Opened(const Opened &) = delete;
-  Opened &operator=(const Opened &) = delete;
+struct Opened : test::Opened {
+  explicit Opened(const std::string &text, const std::string &path = folder() + "/scene.json")
+      : test::Opened(text.empty() ? path : test::written(path, text)) {}
   dfm_tool_state state(const char *name) const {
     dfm_tool tool = 0;
     test::ok(dfm_world_find_tool(world, name, &tool));

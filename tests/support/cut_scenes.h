@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "deform/tool.h"
 #include "stack.h"
 
 namespace test::cutting {
@@ -50,6 +51,28 @@ inline dfm_body cube(dfm_context *c, dfm_world w, const char *model, uint32_t ce
   o.damping_stiffness = 2e-3;
   o.position = {-0.02, -0.02, -0.02};
   return test::make_body(c, w, "beam", {0.04, 0.04, 0.04}, cells, o);
+}
+
+// That cube, at rest in empty space.
+struct CubeAtRest {
+  test::Context context;
+  dfm_world w;
+  dfm_body body;
+  explicit CubeAtRest(const char *model = "corotational_fem", uint32_t cells = 320, uint32_t threads = 1)
+      : context(threads), w(test::make_world(context, {0, 0, 0})), body(cube(context, w, model, cells)) {}
+};
+
+// A blade above it, with its edge down, that goes through it beside the middle.
+inline dfm_tool_def knife() {
+  dfm_tool_def d = dfm_tool_def_default();
+  d.name = "knife";
+  d.shape = DFM_TOOL_BLADE;
+  d.half_size[0] = 0.0005;
+  d.half_size[1] = 0.03;
+  d.half_size[2] = 0.02;
+  d.pose.position[0] = 0.001;
+  d.pose.position[2] = 0.05;
+  return d;
 }
 
 // A beam of a material that takes energy to be cut.
