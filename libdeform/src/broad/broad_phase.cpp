@@ -49,7 +49,7 @@ struct Features {  // corners of a surface as listed
   Vec3 edge(uint32_t e, int k) const { return point(surface.edge[2 * size_t{e} + k]); }
 };
 
-constexpr size_t kLook = 1000;  // surfels per block of work
+constexpr size_t kLook = 1000;  // surfels that are worth a job
 
 // f(i) for all i < n on the threads of tasks. An exception must not leave a worker.
 template <class F>
@@ -218,9 +218,10 @@ void BroadPhase::look(Body &b, bool asleep, double h, double offset) {
 bool BroadPhase::find_dirty(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
                             double h, double offset, Tasks *tasks) {
   bool any = false;
-  size_t surfels = 1;
+  size_t surfels = 0;
   for (const BodyView &b : bodies) surfels += b.surface->nsurfel;
-  each(bodies.size(), 1 + kLook * bodies.size() / surfels, tasks,
+  // body by body, as in the other stages: who has moved a body has it in the cache
+  each(bodies.size(), surfels < kLook ? bodies.size() : 1, tasks,
        [&](size_t i) { look(bodies_[i], bodies[i].asleep, h, offset); });
   for (const Body &b : bodies_) any |= b.dirty;
   for (size_t o = 0; o < things_.size(); ++o) {

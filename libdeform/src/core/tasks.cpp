@@ -33,15 +33,16 @@ void run_host_block(void *task, uint32_t begin, uint32_t end) {
 }  // namespace
 
 // Waits for `ready` without sleeping, until `most` has passed: waking a thread takes 50 microseconds, as long
-// as the work of a small body. After a short time it yields, so that other threads of its core can run.
-// Returns false if it is not ready yet; then sleep.
+// as the work of a small body. After a short time it yields now and then, so that other threads of its core
+// can run: seldom, because a yield takes as long as some looks, and a thread beside it on the same core is
+// slowed by it. Returns false if it is not ready yet; then sleep.
 template <class Ready, class Most>
 bool spin(Ready ready, Most most) {
   using Clock = std::chrono::steady_clock;
-  constexpr auto kMoment = std::chrono::microseconds(20);
+  constexpr auto kMoment = std::chrono::microseconds(20), kUntilYield = std::chrono::microseconds(5);
   constexpr int kLooks = 32;  // between two looks at the clock
   const Clock::time_point start = Clock::now();
-  for (;;) {
+  for (auto due = kMoment;;) {
     for (int i = 0; i < kLooks; ++i) {
       if (ready()) return true;
 #if defined(__x86_64__)
@@ -50,16 +51,20 @@ bool spin(Ready ready, Most most) {
     }
     const auto passed = Clock::now() - start;
     if (passed > most()) return ready();
-    if (passed > kMoment) std::this_thread::yield();
+    if (passed <= due) continue;
+    std::this_thread::yield();
+    due = std::chrono::duration_cast<std::chrono::microseconds>(passed) + kUntilYield;
   }
 }
 
 constexpr std::chrono::microseconds kWithinStep{2000}, kBetweenSteps{200}, kCrowded{2};
 
-// Blocks of `grain` are divided into one run per thread. Each thread first takes the blocks of its own run
-// (in each job the same bodies, which are still in the cache of its core), then blocks that are left in other
-// runs. The owner waits only for workers that have entered the job: a worker that sleeps, or whose core is
-// busy, does not delay it. Between the jobs of a step workers spin so that they do not fall asleep.
+// A job has a team: as many threads as are of use, always the same ones, so that each finds the bodies that
+// it had in the last job in the cache of its core. Blocks of `grain` are divided into one run per member. Each
+// member first takes the blocks of its own run, then blocks that are left in other runs. The owner waits only
+// for workers that have entered the job: a worker that sleeps, or whose core is busy, does not delay it.
+// Between the jobs of a step workers spin so that they do not fall asleep. Who is not called looks at a line
+// of its own only, which no job touches.
 struct Tasks::Pool {
   static constexpr uint64_t kOpen = uint64_t{1} << 31, kInside = kOpen - 1;
   static constexpr int kNumber = 32;  // bits below a job's number
@@ -67,12 +72,11 @@ struct Tasks::Pool {
   // held by the thread that owns the job: worlds of one context may step on several threads
   std::mutex taken;
   std::mutex mutex;
-  std::condition_variable start, done;
+  std::condition_variable done;
   std::vector<std::thread> workers;
   // number of the job, whether it is open, number of workers inside; the job is written before it opens
   std::atomic<uint64_t> gate{0};
   std::atomic<bool> stop{false};
-  std::atomic<uint32_t> asleep{0};    // workers in start
   std::atomic<bool> waiting{false};   // the owner is in done
   std::atomic<uint32_t> stepping{0};  // number of worlds in a step
   bool crowded = false;  // more threads than processors: a spinning thread would keep others from working
@@ -81,25 +85,32 @@ struct Tasks::Pool {
     std::atomic<uint32_t> next{0};
     uint32_t end = 0;
   };
-  uint32_t n = 0, grain = 1, runs = 0;
-  std::vector<Run> run;  // by thread, the owner's first
+  struct alignas(64) Seat {           // of a worker
+    std::atomic<uint64_t> called{0};  // number of the last job that calls it
+    std::atomic<bool> asleep{false};  // in start
+    std::condition_variable start;
+  };
+  uint32_t n = 0, grain = 1, team = 0;
+  std::vector<Run> run;    // by member, the owner's first
+  std::vector<Seat> seat;  // by member; the owner's is not used
   void (*fn)(void *, uint32_t, uint32_t) = nullptr;
   void *task = nullptr;
 
+  explicit Pool(uint32_t threads) : run(threads), seat(threads) {}
   // Also runs if a worker could not be started and the pool was never complete.
   ~Pool() {
     {
       const std::lock_guard lock(mutex);
       stop = true;
     }
-    start.notify_all();
+    for (Seat &s : seat) s.start.notify_one();
     for (auto &worker : workers) worker.join();
   }
 
   void drain(uint32_t own) {
     const Inside inside;
-    for (uint32_t k = 0; k < runs; ++k) {
-      Run &r = run[(own + k) % runs];
+    for (uint32_t k = 0; k < team; ++k) {
+      Run &r = run[(own + k) % team];
       while (r.next.load(std::memory_order_relaxed) < r.end) {
         const uint32_t block = r.next.fetch_add(1, std::memory_order_relaxed);
         if (block >= r.end) break;
@@ -109,26 +120,33 @@ struct Tasks::Pool {
     }
   }
 
+  // Each member wakes at most two others: a call to the system takes microseconds.
+  void wake_next(uint32_t own) {
+    for (uint32_t k = 2 * own + 1; k < team && k <= 2 * own + 2; ++k) {
+      if (!seat[k].asleep.load()) continue;
+      { const std::lock_guard lock(mutex); }  // a worker that says that it sleeps is waiting in start now
+      seat[k].start.notify_one();
+    }
+  }
+
   void work(uint32_t own) {
+    Seat &here = seat[own];
     uint64_t seen = 0;
-    const auto ready = [&] {
-      const uint64_t now = gate.load();
-      return stop.load() || ((now & kOpen) && now >> kNumber != seen);
-    };
+    const auto ready = [&] { return here.called.load() != seen || stop.load(); };
     const auto most = [&] {
       return crowded ? kCrowded : stepping.load(std::memory_order_relaxed) ? kWithinStep : kBetweenSteps;
     };
     for (;;) {
       if (!spin(ready, most)) {
         std::unique_lock lock(mutex);
-        ++asleep;
-        start.wait(lock, ready);
-        --asleep;
+        here.asleep = true;
+        here.start.wait(lock, ready);
+        here.asleep = false;
       }
       if (stop.load()) return;
-      uint64_t now = gate.load();
-      if (!(now & kOpen) || now >> kNumber == seen || !gate.compare_exchange_strong(now, now + 1)) continue;
-      seen = now >> kNumber;
+      seen = here.called.load();
+      if (!enter(seen)) continue;
+      wake_next(own);
       drain(own);
       if (((gate.fetch_sub(1) - 1) & (kOpen | kInside)) != 0 || !waiting.load()) continue;
       const std::lock_guard lock(mutex);
@@ -136,20 +154,25 @@ struct Tasks::Pool {
     }
   }
 
+  // False: the job is over.
+  bool enter(uint64_t number) {
+    for (uint64_t now = gate.load(); (now & kOpen) && now >> kNumber == number;)
+      if (gate.compare_exchange_weak(now, now + 1)) return true;
+    return false;
+  }
+
   // No worker is inside, and the job is written.
   void open() {
     const uint32_t blocks = 1 + (n - 1) / grain;
-    runs = std::min(blocks, static_cast<uint32_t>(run.size()));
-    for (uint64_t k = 0; k < runs; ++k) {
-      run[k].next.store(static_cast<uint32_t>(k * blocks / runs), std::memory_order_relaxed);
-      run[k].end = static_cast<uint32_t>((k + 1) * blocks / runs);
+    team = useful(blocks, static_cast<uint32_t>(run.size()));
+    for (uint64_t k = 0; k < team; ++k) {
+      run[k].next.store(static_cast<uint32_t>(k * blocks / team), std::memory_order_relaxed);
+      run[k].end = static_cast<uint32_t>((k + 1) * blocks / team);
     }
-    gate.store(((gate.load() >> kNumber) + 1) << kNumber | kOpen);
-    const uint32_t sleepers = asleep.load(), all = static_cast<uint32_t>(workers.size());
-    const uint32_t wanted = std::min(blocks - 1, all), awake = all - std::min(sleepers, all);
-    if (wanted <= awake) return;
-    { const std::lock_guard lock(mutex); }  // a worker that has counted itself is waiting in start now
-    for (uint32_t k = awake; k < wanted; ++k) start.notify_one();
+    const uint64_t number = ((gate.load() >> kNumber) + 1) & (~uint64_t{0} >> kNumber);
+    gate.store(number << kNumber | kOpen);
+    for (uint32_t k = 1; k < team; ++k) seat[k].called.store(number);
+    wake_next(0);
   }
 
   void close() {
@@ -163,15 +186,23 @@ struct Tasks::Pool {
   }
 };
 
+// A team of m takes W / m for its work and c m to enter and to leave, one after the other: the best m is
+// sqrt(W / c). Callers choose a grain of 2 us and more, and c is about 0.15 us.
+uint32_t Tasks::useful(uint32_t blocks, uint32_t threads) {
+  const uint32_t most = std::min(blocks, threads);
+  uint32_t team = 1;
+  while (team < most && uint64_t{team} * team < uint64_t{13} * blocks) ++team;
+  return team;
+}
+
 Tasks::Tasks(uint32_t threads, HostFor host_for, void *host_user)
     : threads_(threads ? threads : std::max(1u, std::thread::hardware_concurrency())),
       host_for_(host_for),
       host_user_(host_user) {
   if (host_for_ || threads_ == 1) return;
-  pool_ = std::make_unique<Pool>();
+  pool_ = std::make_unique<Pool>(threads_);
   const uint32_t processors = std::thread::hardware_concurrency();
   pool_->crowded = processors > 0 && threads_ > processors;
-  pool_->run = std::vector<Pool::Run>(threads_);
   pool_->workers.reserve(threads_ - 1);
   for (uint32_t i = 1; i < threads_; ++i)
     pool_->workers.emplace_back([pool = pool_.get(), i] { pool->work(i); });

@@ -20,6 +20,10 @@ class Tasks {
   // whether run() may use more than the caller's thread
   bool parallel() const { return host_for_ || pool_; }
 
+  // How many threads a job of so many blocks calls. A job of few blocks leaves the others alone, so that many
+  // threads are not slower than few.
+  static uint32_t useful(uint32_t blocks, uint32_t threads);
+
   // Calls fn(begin, end) over [0,n), divided at multiples of grain, and waits for the end. A call from a
   // worker runs serially in that worker.
   void run(uint32_t n, uint32_t grain, void (*fn)(void *, uint32_t, uint32_t), void *task);

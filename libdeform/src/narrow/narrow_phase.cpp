@@ -167,6 +167,7 @@ NarrowBlocks::NarrowBlocks(const Memory &m)
     : memory_(&m), pieces_(HookAllocator<Piece>(m)), speed_(HookAllocator<double>(m)) {}
 
 double NarrowBlocks::speed(std::span<const BodyView> bodies, size_t i) {
+  if (speed_.size() != bodies.size()) speed_.assign(bodies.size(), -1.0);
   if (speed_[i] < 0) speed_[i] = largest_speed(*bodies[i].surface);
   return speed_[i];
 }
@@ -193,7 +194,6 @@ void find_contacts(std::span<const BodyView> bodies, std::span<const ObstacleVie
   for (const BodyView &b : bodies) find.nnode = std::max(find.nnode, b.first_node + b.surface->nsurfel);
   const bool parts = blocks && tasks && tasks->parallel() && candidates.size() > 2 * kBlock;
   if (parts) blocks->start();
-  if (blocks) blocks->forget_speeds(bodies.size());
   const BodyView *fast = nullptr;
   double speed = 0;
   for (size_t i = 0; i < candidates.size();) {
@@ -211,6 +211,7 @@ void find_contacts(std::span<const BodyView> bodies, std::span<const ObstacleVie
     else find(narrow::Run(&c, end - begin), speed, out);
   }
   if (parts) blocks->run(*tasks, candidates, find, out);
+  if (blocks) blocks->forget_speeds();
   Areas(bodies, obstacles, out, lent).share();
 }
 

@@ -28,9 +28,13 @@ class NarrowBlocks {
  public:
   explicit NarrowBlocks(const Memory &memory);
   void start() { pieces_.clear(); }
-  // m/s, bound over the surfels of body view i; found once between two calls of forget_speeds(n).
-  void forget_speeds(size_t n) { speed_.assign(n, -1.0); }
+  // m/s, bound over the surfels of body view i: as told since the last find_contacts(), or found once in it.
+  void tell_speed(std::span<const BodyView> bodies, size_t i, double speed) {
+    if (speed_.size() != bodies.size()) speed_.assign(bodies.size(), -1.0);
+    speed_[i] = speed;
+  }
   double speed(std::span<const BodyView> bodies, size_t i);
+  void forget_speeds() { speed_.clear(); }
   // A run of the list: all candidates of one pair and kind.
   void add(const Array<Candidate> &list, size_t begin, size_t end, double speed);
   // find(candidates, speed, contacts) for each block, re-entrant. Throws std::bad_alloc where one has no

@@ -7,6 +7,7 @@
 #include "plugin/on_behalf.h"
 #include "step/attach.h"
 #include "step/cut_drag.h"
+#include "step/by_body.h"
 #include "step/change_work.h"
 #include "step/context.h"
 #include "step/energy_watch.h"
@@ -30,7 +31,8 @@ bool find_ends(World &w, StepContext &step, uint32_t *trouble) {
   if (guarded) step.guard.common.assign(w.bodies.size(), {});
   FirstFailure failed;
   w.context->tasks.parallel_for(
-      static_cast<uint32_t>(step.active.size()), 1, [&](uint32_t begin, uint32_t end) {
+      static_cast<uint32_t>(step.active.size()), bodies_together(w, step.active, kPointsToMove),
+      [&](uint32_t begin, uint32_t end) {
         for (const uint32_t i : std::span(step.active).subspan(begin, end - begin)) {
           Body &b = *w.bodies[i];
           if (guarded) look_at_motion(w, step, i);
@@ -67,7 +69,8 @@ bool stage_commit(World &w, StepContext &step, uint32_t *trouble) {
     accurate = std::min(accurate, w.bodies[i]->dynamics->accurate_step(now));
   w.sizes.accurate = std::isfinite(accurate) ? accurate : 0;
   w.context->tasks.parallel_for(
-      static_cast<uint32_t>(step.active.size()), 1, [&](uint32_t begin, uint32_t end) {
+      static_cast<uint32_t>(step.active.size()), bodies_together(w, step.active, kPointsToMove),
+      [&](uint32_t begin, uint32_t end) {
         for (const uint32_t i : std::span(step.active).subspan(begin, end - begin)) {
           Body &b = *w.bodies[i];
           ready_change_work(b, now);

@@ -7,6 +7,7 @@
 #include "plugin/context.h"
 #include "plugin/on_behalf.h"
 #include "state/bounds.h"
+#include "step/by_body.h"
 #include "step/context.h"
 #include "step/first_failure.h"
 #include "step/stages.h"
@@ -52,7 +53,9 @@ bool stage_model(World &w, Active active, const SubStep &now, uint32_t *trouble)
   };
   const uint32_t n = static_cast<uint32_t>(active.size());
   if (fewer_than_threads_and_large(w, active)) forces(0, n);
-  else w.context->tasks.parallel_for(n, 1, [&](uint32_t begin, uint32_t end) { forces(begin, end); });
+  else
+    w.context->tasks.parallel_for(n, bodies_together(w, active, kPointsToPull),
+                                  [&](uint32_t begin, uint32_t end) { forces(begin, end); });
   if (failed.body == kNone) return true;
   *trouble |= tell_no_forces(w, *w.bodies[failed.body]);
   return false;
@@ -84,7 +87,7 @@ bool tells_why(const World &w, const Body &b, const SubStep &now) {
 bool stage_predict(World &w, Active active, const SubStep &now, Array<double> &kinetic, uint32_t *trouble) {
   const bool touches = w.plan.touches();
   FirstFailure failed;
-  w.context->tasks.parallel_for(static_cast<uint32_t>(active.size()), 1, [&](uint32_t begin, uint32_t end) {
+  const auto move = [&](uint32_t begin, uint32_t end) {
     for (const uint32_t i : active.subspan(begin, end - begin)) {
       Body &b = *w.bodies[i];
       const OnBehalf speaks(b.name);
@@ -92,7 +95,10 @@ bool stage_predict(World &w, Active active, const SubStep &now, Array<double> &k
       if (touches && b.surface.identity())
         gather_surface(b.surface, b.p.x.data(), b.dynamics->point_velocity());
     }
-  });
+  };
+  w.context->tasks.parallel_for(static_cast<uint32_t>(active.size()),
+                                bodies_together(w, active, kPointsToMove),
+                                [&](uint32_t begin, uint32_t end) { move(begin, end); });
   if (failed.body == kNone) return true;
   const Body &b = *w.bodies[failed.body];
   if (tells_why(w, b, now)) {

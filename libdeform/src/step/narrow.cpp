@@ -83,6 +83,8 @@ bool stage_narrow(World &w, StepContext &step, uint32_t *trouble) {
     ~Restored() { gather_active(w); }
   };
   for (;;) {
+    step.narrow.forget_speeds();
+    for (const uint32_t i : step.active) step.narrow.tell_speed(step.body_views, i, step.broad.speed(i));
     find_contacts(step.body_views, step.obstacle_views, step.broad.candidates(), step.h, w.offset,
                   w.store.crossings, step.lent, step.contacts, &step.narrow, &w.context->tasks);
     turn_false_depths(w, step);

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <mutex>
 #include <random>
+#include <set>
 #include <thread>
 #include <vector>
 
@@ -61,6 +63,32 @@ TEST(Tasks, TwoOwnersOnTwoThreads_DoNotDisturbEachOther) {
   std::thread beside(work);
   work();
   beside.join();
+}
+
+// Threads that a job calls: no more than blocks, and no more than pay for being called.
+TEST(Tasks, AJobOfFewBlocksOnManyThreads_CallsFewOfThem) {
+  EXPECT_EQ(Tasks::useful(1, 64), 1u);
+  EXPECT_EQ(Tasks::useful(2, 64), 2u);
+  EXPECT_EQ(Tasks::useful(10, 4), 4u);
+  EXPECT_LT(Tasks::useful(30, 64), 24u);
+  EXPECT_EQ(Tasks::useful(1000, 64), 64u);
+  for (uint32_t blocks = 1; blocks < 300; ++blocks)
+    EXPECT_GE(Tasks::useful(blocks + 1, 64), Tasks::useful(blocks, 64)) << blocks;
+}
+
+// Of eight threads a job of two blocks always has the same two: data stay in the caches of their cores.
+TEST(Tasks, JobsOfTwoBlocksOnEightThreads_RunOnTheSameTwo) {
+  Tasks tasks(8, nullptr, nullptr);
+  std::mutex mutex;
+  std::set<std::thread::id> seen;
+  for (int job = 0; job < 500; ++job) {
+    if (job % 50 == 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    tasks.parallel_for(2, 1, [&](uint32_t, uint32_t) {
+      const std::lock_guard lock(mutex);
+      seen.insert(std::this_thread::get_id());
+    });
+  }
+  EXPECT_LE(seen.size(), 2u);
 }
 
 // A job does not end before its last block has, also where that takes so long that the owner sleeps.
