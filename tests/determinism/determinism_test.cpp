@@ -68,6 +68,31 @@ TEST_P(Determinism, AHostThatCutsAndShuffles_GivesTheSameHash) {
   EXPECT_TRUE(host.calls > 60 || few.name != std::string("ten_in_a_box")) << "the hook was not used";
 }
 
+// Passes over few points are shorter than a job takes to start: only the forces are one.
+TEST(Jobs, OfTwoBodiesOfFewPoints_AreOnePerSubStep) {
+  RudeHost host;
+  dfm_context_def def = dfm_context_def_default();
+  def.user = &host;
+  def.parallel_for = RudeHost::parallel_for;
+  def.plugin_dir = DEFORM_PLUGIN_DIR;
+  dfm_context *c = nullptr;
+  ASSERT_EQ(dfm_context_create(&def, &c), DFM_OK) << dfm_last_error();
+  const dfm_world w = test::make_world(c);
+  test::BodyOptions o;
+  o.integrator = DFM_INTEGRATOR_SYMPLECTIC_EULER;
+  for (const double x : {0.0, 0.1}) {
+    o.position = {x, 0, 0};
+    test::make_body(c, w, "beam", {0.02, 0.02, 0.02}, 20, o);
+  }
+  scenes::advance(w, 10);
+  const uint64_t calls = host.calls, before = test::stats(w).substeps;
+  scenes::advance(w, 60);
+  const double substeps = double(test::stats(w).substeps - before);
+  EXPECT_LT(double(host.calls - calls), 1.2 * substeps);
+  EXPECT_GT(substeps, 59);
+  dfm_context_destroy(c);
+}
+
 // Lists of pairs that are renewed every sub-step, or hold for long, hold the same contacts.
 TEST_P(Determinism, LivesOfCandidateLists_DoNotShow) {
   const uint64_t usual = scenes::run(GetParam());

@@ -47,6 +47,7 @@ void distribute(std::span<const ContactPoint> contacts, const double *frame, con
       const ImpulseSink &sink = sink_of(sinks, node);
       double *const to = sink.surfel + size_t(3) * (node - sink.first_node);
       store3(to, load3(to) + c.weight[k] * p);
+      pass_on(sink, node - sink.first_node);
       given.list.push_back(node);
     }
   };
@@ -57,10 +58,6 @@ void distribute(std::span<const ContactPoint> contacts, const double *frame, con
     add(contacts[i], p);
   }
   for (size_t k = 0; k < bonds.size(); ++k) add(bonds[k], load3(bond_impulse + 3 * k));
-  for (const uint32_t node : given.list) {
-    const ImpulseSink &s = sink_of(sinks, node);
-    pass_on(s, node - s.first_node);
-  }
   for (const ImpulseSink &s : sinks)
     if (s.phyxel && !s.surface->identity()) scatter_surface(*s.surface, s.surfel, s.npoint, s.phyxel);
   given.known = true;

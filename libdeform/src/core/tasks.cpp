@@ -60,9 +60,9 @@ bool spin(Ready ready, Most most) {
 constexpr std::chrono::microseconds kWithinStep{2000}, kBetweenSteps{200}, kCrowded{2};
 
 // A job has a team: as many threads as are of use, always the same ones, so that each finds the bodies that
-// it had in the last job in the cache of its core. Blocks of `grain` are divided into one run per member. Each
-// member first takes the blocks of its own run, then blocks that are left in other runs. The owner waits only
-// for workers that have entered the job: a worker that sleeps, or whose core is busy, does not delay it.
+// it had in the last job in the cache of its core. Blocks of `grain` are divided into one run per member.
+// Each member first takes the blocks of its own run, then blocks that are left in other runs. The owner waits
+// only for workers that have entered the job: a worker that sleeps, or whose core is busy, does not delay it.
 // Between the jobs of a step workers spin so that they do not fall asleep. Who is not called looks at a line
 // of its own only, which no job touches.
 struct Tasks::Pool {

@@ -10,8 +10,9 @@ namespace dfm {
 // Points of explicit bodies whose motion, of 8 ns each, or whose forces, of some 0.1 us, are worth a job.
 inline constexpr uint32_t kPointsToMove = 250, kPointsToPull = 20;
 
-// How many of the active bodies a block has. Explicit bodies of few points, `worth` in all, are no work for two
-// threads. Otherwise each body is a block, so that in all stages the same threads have the same bodies.
+// How many of the active bodies a block has. Explicit bodies of few points, less than `worth` in all, are no
+// work for two threads. Otherwise each body is a block, so that in all stages the same threads have the same
+// bodies.
 inline uint32_t bodies_together(const World &w, std::span<const uint32_t> active, uint32_t worth) {
   uint32_t points = 0;
   for (const uint32_t i : active) {
