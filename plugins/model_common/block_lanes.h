@@ -21,23 +21,32 @@ DEFORM_INLINE void add_to(const BlockPoints &b, uint32_t n, v4 a) {
 // Asks for the cache line of p, which may lie behind the end of an array.
 DEFORM_INLINE void fetch(const void *p) { __builtin_prefetch(p); }
 
-// Copies x (and v, unless NULL) of the block's points in and clears f.
-static inline void load_block(const BlockPoints &b, const double *x, const double *v, uint32_t stride) {
-  const auto one = [&](uint32_t n) __attribute__((always_inline)) {
-    const size_t at = size_t(stride) * b.point[n];
-    store4(b.p + 8 * size_t(n), load_xyz(x + at));
-    if (v) store4(b.p + 8 * size_t(n) + 4, load_xyz(v + at));
-    store4(b.f + 4 * size_t(n), splat(0));
-  };
-  uint32_t n = 0;
-  for (; n + b.ahead < b.local; ++n) {
+// one(n) for all points of the block that is loaded. At its end it is the next block's that are asked for:
+// the lists of points, and the sums, of all blocks lie end to end.
+template <class One>
+DEFORM_INLINE void each_loaded(const BlockPoints &b, const double *x, const double *v, uint32_t stride,
+                               const One &one) {
+  if (!b.ahead) {
+    for (uint32_t n = 0; n < b.local; ++n) one(n);
+    return;
+  }
+  for (uint32_t n = 0; n < b.local; ++n) {
     const size_t next = size_t(stride) * b.point[n + b.ahead];
     fetch(x + next);
     if (v) fetch(v + next);
     fetch(b.f + 4 * size_t(n + b.ahead));
     one(n);
   }
-  for (; n < b.local; ++n) one(n);
+}
+
+// Copies x (and v, unless NULL) of the block's points in and clears f.
+static inline void load_block(const BlockPoints &b, const double *x, const double *v, uint32_t stride) {
+  each_loaded(b, x, v, stride, [&](uint32_t n) __attribute__((always_inline)) {
+    const size_t at = size_t(stride) * b.point[n];
+    store4(b.p + 8 * size_t(n), load_xyz(x + at));
+    if (v) store4(b.p + 8 * size_t(n) + 4, load_xyz(v + at));
+    store4(b.f + 4 * size_t(n), splat(0));
+  });
 }
 
 template <int kLanes>

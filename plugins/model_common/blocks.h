@@ -99,7 +99,7 @@ struct Blocks {
     }
     grain = (nblock + kPieces - 1) / kPieces;
     block.create(host, nblock);
-    point.create(host, slot_begin[nblock]);
+    point.create(host, size_t(slot_begin[nblock]) + kAhead);
     p.create(host, 8 * size_t(largest) * ((nblock + grain - 1) / grain));
     f.create(host, 4 * size_t(slot_begin[nblock]));
     std::fill(l.mark.data(), l.mark.data() + npoint, kNone);
@@ -122,7 +122,7 @@ struct Blocks {
     out.local = owned + nhalo;
     out.point = points;
     out.f = f.data() + 4 * size_t(slot_begin[b]);
-    out.ahead = nblock > 1 ? kAhead : kNone / 2;  // one block lies in the cache
+    out.ahead = nblock > 1 ? kAhead : 0;
     return out;
   }
 

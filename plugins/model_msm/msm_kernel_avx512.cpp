@@ -44,7 +44,7 @@ template <Form kForm, Damping kDamping>
 static void springs8(const Block &b, double damp) {
   for (uint32_t n = 0; n < b.quads; n += 2) {
     const Quad &q = b.quad[n], &r = b.quad[n + 1];
-    fetch_quads(b, n);
+    if (b.ahead) fetch_quads(b, n);
     const __m512d pq = point8(b, q.i), pr = point8(b, r.i);
     const __m512d d0 = _mm512_sub_pd(point8(b, q.j[0]), pq), d1 = _mm512_sub_pd(point8(b, q.j[1]), pq);
     const __m512d d2 = _mm512_sub_pd(point8(b, q.j[2]), pq), d3 = _mm512_sub_pd(point8(b, q.j[3]), pq);
@@ -216,7 +216,7 @@ DEFORM_INLINE void stretched_forces(const Block &b, uint32_t t, __m512d q, __m51
 static void volume_cells8(const Block &b) {
   for (uint32_t t = 0; t < b.cells; t += 8) {
     const Cell *c = b.cell + t;
-    fetch_cells(b, t);
+    if (b.ahead) fetch_cells(b, t);
     auto [e1, e2, e3, g1, g2, g3] = shape8(b, c);
     const __m512d volume6 = dot(e1, g1);
     const __m512d q = squares(e1, e2, e3);

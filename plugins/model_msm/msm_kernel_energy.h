@@ -71,14 +71,17 @@ static inline void drag_points(const model::BlockPoints &b, const double *mass, 
     const size_t i = b.point[n];
     take_from(b, n, splat((by_point ? by_point[i] : all) * mass[i]) * load_xyz(v + size_t(stride) * i));
   };
-  uint32_t n = 0;
-  for (; n + b.ahead < b.owned; ++n) {
-    const size_t next = b.point[n + b.ahead];
+  if (!b.ahead) {
+    for (uint32_t n = 0; n < b.owned; ++n) one(n);
+    return;
+  }
+  for (uint32_t n = 0; n < b.owned; ++n) {
+    const uint32_t place = n + b.ahead;  // after its own points come the halo, then those of the next block
+    const size_t next = b.point[place < b.owned ? place : place - b.owned + b.local];
     fetch(v + size_t(stride) * next);
     fetch(mass + next);
     one(n);
   }
-  for (; n < b.owned; ++n) one(n);
 }
 
 #define MSM_ENERGIES spring_energies, cell_energies, drag_points

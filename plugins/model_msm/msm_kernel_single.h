@@ -109,14 +109,14 @@ static inline float load_points(const SingleBlock &b, const double *x, const dou
   const v4 origin = of(x, 0), drift = v ? of(v, 0) : splat(0);
   v4 most = splat(0), unsound = splat(0);
   const v4 guess = splat(power_of_two(30 - *b.above));
-  for (uint32_t n = 0; n < b.local; ++n) {
+  each_loaded(b, x, v, stride, [&](uint32_t n) __attribute__((always_inline)) {
     const v4 a = of(x, n) - origin;
     store4_whole(b.at[n].x, a * guess);
     most = max4(most, abs4(a));
     unsound = unsound + (a - a);
     if (v) store4_single(b.at[n].v, of(v, n) - drift);
     store4(b.f + 4 * size_t(n), splat(0));
-  }
+  });
   alignas(32) double far[4], bad[4];
   store4(far, most);
   store4(bad, unsound);

@@ -137,7 +137,7 @@ def main():
 
     if options.only in ("", "body"):
         for on_floor in (False, True):
-            for cells, steps in ((1000, 4000), (10000, 600), (100000, 240), (1000000, 60)):
+            for cells, steps in ((1000, 4000), (10000, 600), (100000, 240), (1000000, 100)):
                 early, late = (run(options.command, beam(cells, on_floor, n * steps), options.repeats)
                                for n in (1, 3))
                 real = late["bodies"]["beam"]["cells"]
