@@ -6,6 +6,8 @@
 #include <vector>
 
 #include "../world/inside.h"
+#include "step/context.h"
+#include "step/stages.h"
 #include "support.h"
 #include "world.h"
 
@@ -65,6 +67,30 @@ TEST(ExplicitPoints, PartsAndWhole_LeadToTheSameBits) {
   EXPECT_NE(whole.body->p.f, parts.body->p.f);
   EXPECT_TRUE(whole.body->dynamics->see_forces(whole.now) && parts.body->dynamics->see_forces(parts.now));
   EXPECT_EQ(whole.body->p.f, parts.body->p.f);
+}
+
+// Where the guard takes a part of the way, what the inner forces would have done on the rest is booked.
+TEST(ExplicitPoints, APartOfTheWay_BooksTheWorkOfForcesThatWereNotKept) {
+  const auto booked = [](bool keep) {
+    const Falling f;
+    dfm::World &w = test::inside(f.world);
+    dfm::StepContext &step = *w.steps;
+    std::fill(f.body->p.f.begin(), f.body->p.f.end(), 0.0);
+    double kinetic = 0;
+    EXPECT_TRUE(f.body->dynamics->add_forces(f.now, keep) && f.body->dynamics->free_motion(f.now, kinetic));
+    f.end(f.impulses(1, 2));
+    step.active = {0};
+    step.h = f.now.h;
+    step.guard.motion = 0.5;
+    step.ended = true;
+    const double before = f.body->energy.work;
+    uint32_t trouble = 0;
+    EXPECT_TRUE(dfm::stage_commit(w, step, &trouble));
+    return f.body->energy.work - before;
+  };
+  const double work = booked(true);
+  EXPECT_EQ(booked(false), work);
+  EXPECT_NE(work, 0);
 }
 
 TEST(ExplicitPoints, ASecondEnd_IsThatOfItsImpulsesAlone) {

@@ -1,6 +1,7 @@
 // What the loops over points answer, at each width, against one cell and one edge at a time.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 #include <vector>
@@ -54,9 +55,60 @@ void check(const dfm::PointsKernels &kernels) {
   }
 }
 
+// [n,4] each, the fourth component zero.
+struct Moving {
+  static constexpr uint32_t kPoints = 101;
+  std::vector<double> x, v, w, load, more, f, mass;
+  std::vector<uint32_t> order;
+
+  Moving() {
+    std::mt19937 random(5);
+    for (std::vector<double> *a : {&x, &v, &w, &load, &more})
+      for (uint32_t k = 0; k < 4 * kPoints; ++k)
+        a->push_back(k % 4 == 3 ? 0 : double(random()) / 4294967296.0 - 0.5);
+    for (uint32_t k = 0; k < 4 * kPoints; ++k) f.push_back(load[k] + more[k]);
+    for (uint32_t i = 0; i < kPoints; ++i) {
+      mass.push_back(1 + double(i % 7));
+      order.push_back(i * 30 % kPoints);
+    }
+  }
+  // free and x_end, one behind the other; parts: of so many points in that order, 0: all at once
+  std::vector<double> ends(const dfm::PointsKernels &kernels, uint32_t parts, uint32_t ahead) const {
+    const double gravity[] = {0.5, -2, -9.81, 0};
+    std::vector<double> out(size_t{8} * kPoints);
+    const dfm::FreeMotion motion = {1e-2,     gravity,  mass.data(), v.data(),
+                                    w.data(), x.data(), out.data(),  out.data() + size_t{4} * kPoints,
+                                    ahead};
+    double kinetic = parts ? 0 : kernels.predict(motion, kPoints, f.data());
+    for (uint32_t at = 0; parts && at < kPoints; at += parts) {
+      const uint32_t n = std::min(parts, kPoints - at);
+      std::vector<double> own;
+      for (uint32_t k = at; k < at + n; ++k)
+        own.insert(own.end(), &more[size_t{4} * order[k]], &more[size_t{4} * order[k]] + 4);
+      kinetic += kernels.predict_part(motion, n, &order[at], load.data(), own.data());
+    }
+    double exact = 0;
+    for (uint32_t k = 0; k < 4 * kPoints; ++k) exact += 0.5 * mass[k / 4] * (out[k] * out[k]);
+    EXPECT_NEAR(kinetic, exact, 1e-12 * exact);
+    return out;
+  }
+};
+
 }  // namespace
 
 TEST(PointsKernels, InvertedCellsAndStrainRates_AreThoseOfOneAtATime) {
   check(dfm::points_kernels_sse2());
   if (dfm::doubles_at_once() >= 4) check(dfm::points_kernels_avx2());
+}
+
+TEST(PointsKernels, PartsInAnyOrder_EndWhereAllPointsDo) {
+  const Moving m;
+  const std::vector<double> all = m.ends(dfm::points_kernels_sse2(), 0, Moving::kPoints);
+  std::vector<const dfm::PointsKernels *> widths = {&dfm::points_kernels_sse2()};
+  if (dfm::doubles_at_once() >= 4) widths.push_back(&dfm::points_kernels_avx2());
+  for (const dfm::PointsKernels *kernels : widths)
+    for (uint32_t parts : {0u, 1u, 2u, 33u, 200u})
+      for (uint32_t ahead : {1u, 4u, Moving::kPoints})
+        EXPECT_EQ(m.ends(*kernels, parts, parts ? ahead : Moving::kPoints), all) << parts;
+  EXPECT_GT(std::fabs(all[2]), 1e-3);
 }
