@@ -239,7 +239,7 @@ void gather_surface(Surface &surface, const double *x, const double *v) {
     std::memcpy(&surface.x[to], x + from, kPoint);
     if (v) std::memcpy(&surface.v[to], v + from, kPoint);
   }
-  if (surface.slit) std::memcpy(surface.place.data(), surface.x.data(), kPoint * surface.nsurfel);
+  if (!surface.place.empty()) std::memcpy(surface.place.data(), surface.x.data(), kPoint * surface.nsurfel);
   if (surface.back > 0)
     ways_back(surface, surface.x.data(), [&](uint32_t surfel, Vec3 way) {
       double *const to = &surface.x[4 * size_t{surfel}];

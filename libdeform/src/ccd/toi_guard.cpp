@@ -10,6 +10,7 @@
 #include "geometry/closest.h"
 #include "geometry/obstacle_shape.h"
 #include "geometry/voxel_grid.h"
+#include "narrow/parts.h"
 
 namespace dfm {
 namespace {
@@ -53,6 +54,13 @@ Vec3 apart(const Features &f, const Vec3 *way = nullptr, Vec3 *moved = nullptr) 
 
 // Features beside copies rest at another distance, and the floor is in proportion to it; not above 0: none.
 double floor_share(const GuardScene &scene, const Features &f) {
+  const GuardSide &a = *f.side[0], &b = *f.side[1];
+  if (&a != &b && a.whole && a.whole == b.whole) {
+    const size_t split = size_t(f.split);
+    return rest_of_parts(*a.surface, {f.corner[0], split}, *b.surface, {f.corner[1], 4 - split},
+                         normalized(apart(f)), scene.offset) /
+           scene.offset;
+  }
   double copies = HUGE_VAL;
   const double *const place = f.side[0]->surface->place.data();
   each_copies(f, [&](int i, int j) {

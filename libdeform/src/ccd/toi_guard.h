@@ -40,6 +40,7 @@ struct GuardPose {
 struct GuardSide {
   const Surface *surface = nullptr;
   bool still = false;
+  uint64_t whole = 0;            // of a part of a body that was cut: id of that body (narrow/parts.h)
   const double *mean = nullptr;  // [n,4] m/s of the phyxels: end = start + h mean
   // or: [nsurfel,3] a mesh in its frame, which ends at `pose`
   const double *local = nullptr;

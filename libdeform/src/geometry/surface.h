@@ -47,6 +47,8 @@ struct Surface {
       if (feature < n.below[kind]) return n.id;
     return own;
   }
+  // Id of the body, made by the host, that this one is or was a part of; own: the body's.
+  uint64_t whole(uint64_t own) const { return named.empty() ? own : named.front().id; }
   Array<uint32_t> fan_begin, fan;  // [nsurfel+1], triangles around each surfel, ascending
   double median_edge = 0;          // m, rest
 
@@ -74,9 +76,10 @@ struct Surface {
   // [laid] bits 0-2: corner k lies at the tip of a slit: the face on the other side has the same surfel
   Array<uint8_t> laid_tip;
   bool slit = false;
-  double back = 0;      // m
-  Array<double> place;  // [nsurfel,4] m, x before it is set back; empty without a slit
-  Array<double> sums;   // scratch, [laid_surfel,kBackSums]
+  double back = 0;         // m
+  Array<double> place;     // [nsurfel,4] m, x before it is set back; empty without such triangles
+  Array<uint32_t> origin;  // [nsurfel] point of the body as it was made; empty without such triangles
+  Array<double> sums;      // scratch, [laid_surfel,kBackSums]
 
   // Over the triangles at rest, where the surface was made in advance: saves those who need a tree over the
   // present ones the search for its topology. Null: there is none.

@@ -11,6 +11,7 @@
 #include "geometry/obstacle_shape.h"
 #include "geometry/views.h"
 #include "geometry/voxel_grid.h"
+#include "narrow/parts.h"
 
 namespace dfm::narrow {
 
@@ -37,6 +38,7 @@ struct Pair {
   double h, offset;
   double speed_b;                         // m/s, bound over body b's surfels
   std::span<const Crossing> crossings{};  // of this pair, in their order
+  bool parts = false;                     // of one body, made by a cut (narrow/parts.h)
 
   Vec3 xa(uint32_t s) const { return load3(&a.surface->x[4 * size_t{s}]); }
   Vec3 va(uint32_t s) const { return load3(&a.surface->v[4 * size_t{s}]); }
@@ -102,6 +104,15 @@ inline void place(ContactPoint &c, Vec3 on_a, Vec3 on_b, Vec3 normal, double dis
   store3(c.point, 0.5 * (on_a + on_b));
   store3(c.normal, normal);
   c.distance = distance;
+}
+
+// Lets a contact between two such parts rest where they touched as one: `distance` of what rests nearer than
+// d_c grows by the difference. False: it is out of reach then.
+inline bool rests(const Pair &pair, double reach, ContactPoint &c) {
+  if (!pair.parts) return true;
+  c.distance += pair.offset - rest_of_parts(*pair.a.surface, *pair.b->surface, c.kind, c.feature_a,
+                                            c.feature_b, load3(c.normal), pair.offset);
+  return c.distance < reach;
 }
 
 // Each works on one run: all candidates of one pair and kind.

@@ -166,6 +166,7 @@ void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out) {
     add_node(c, pair.b->first_node + eb[0], edge_t - 1);
     add_node(c, pair.b->first_node + eb[1], -edge_t);
     place(c, p0 + edge_s * u, q0 + edge_t * w, normal, distance);
+    if (!rests(pair, reach, c)) continue;
     if (!replaces_end(sa, ea, edge_s, q0, q0 + w, fb) && !replaces_end(sb, eb, edge_t, p0, p0 + u, fa))
       c.give = give(sa, sb, rise(fa, -normal, fb.along, std::sqrt(ww)),
                     rise(fb, normal, fa.along, std::sqrt(uu)), pair.offset);

@@ -141,7 +141,14 @@ struct Finder {
     const BodyView &a = *find_slot(bodies, c.slot_a);
     if (!c.obstacle) {
       const BodyView *const b = find_slot(bodies, c.slot_b);
-      const narrow::Pair pair{a, b, nullptr, h, offset, speed, of_pair(crossings, a.id, b->id)};
+      const narrow::Pair pair{a,
+                              b,
+                              nullptr,
+                              h,
+                              offset,
+                              speed,
+                              of_pair(crossings, a.id, b->id),
+                              parts_of_one(*a.surface, a.id, *b->surface, b->id)};
       return (c.kind == 0 ? narrow::vertex_face : narrow::edge_edge)(pair, run, out);
     }
     const ObstacleView &view = *find_slot(obstacles, c.slot_b);

@@ -273,7 +273,7 @@ void Group::emit(Near &n, Vec3 normal, double distance, const double weight[3],
   add_node(c, pair.a.first_node + surfel, 1);
   for (int k = 0; k < 3; ++k) add_node(c, pair.b->first_node + corners(n)[k], -weight[k]);
   place(c, p, p - distance * normal, normal, distance);
-  out.push_back(c);
+  if (rests(pair, n.reach, c)) out.push_back(c);
   n.emitted = true;
   n.emitted_normal = normal;
 }

@@ -155,6 +155,7 @@ void set_sides(World &w, StepContext &step) {
     GuardSide &s = scene.sides[i];
     make_room(s, b.surface);
     s.still = b.slumber.asleep;
+    s.whole = b.surface.origin.empty() ? 0 : b.surface.whole(b.id);
     s.travel = s.spread = step.h * step.guard.speed[i];
     s.drift = {};
     if (s.travel > kSlow * scene.floor) {

@@ -6,6 +6,7 @@
 #include "ccd/toi_guard_motion.h"
 #include "math/turn.h"
 #include "narrow/detail.h"
+#include "narrow/parts.h"
 #include "state/world.h"
 #include "step/context.h"
 #include "step/guard.h"
@@ -200,6 +201,13 @@ void choose_hits(StepContext &step) {
   if (hits.size() > kMostHits) hits.resize(kMostHits);
 }
 
+// Of two bodies.
+double rests_at(const World &w, const StepContext &step, const ContactPoint &c) {
+  const BodyView &a = step.body_views[c.slot_a], &b = step.body_views[c.slot_b];
+  if (!parts_of_one(*a.surface, a.id, *b.surface, b.id)) return w.offset;
+  return rest_of_parts(*a.surface, *b.surface, c.kind, c.feature_a, c.feature_b, load3(c.normal), w.offset);
+}
+
 }  // namespace
 
 void guard_ask_hits(World &w, StepContext &step) {
@@ -239,7 +247,9 @@ void guard_add_hits(World &w, StepContext &step) {
     // A pair that starts nearer than d_c comes no nearer; the difference to 0.8 d_c closes in the planned
     // length of the sub-step.
     const Candidate &pair = (*g.list)[hit.candidate];
-    const double apart = of_one_body(pair) ? guarded_apart(w, step, pair) : w.offset;
+    const double apart = of_one_body(pair) ? guarded_apart(w, step, pair)
+                         : pair.obstacle   ? w.offset
+                                           : rests_at(w, step, c);
     const double target =
         hit.start < apart ? hit.start + std::max(0.0, 0.8 * apart - hit.start) * (step.h / g.planned) : apart;
     c.distance += w.offset - apart;

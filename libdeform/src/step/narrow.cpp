@@ -7,6 +7,7 @@
 #include "geometry/area.h"
 #include "geometry/closest.h"
 #include "narrow/narrow_phase.h"
+#include "narrow/parts.h"
 #include "state/world.h"
 #include "step/context.h"
 #include "step/stages.h"
@@ -34,6 +35,15 @@ bool edges_cross(const StepContext &step, const ContactPoint &c) {
   return true;
 }
 
+// m, how much nearer than d_c the contact rests, which is part of its `distance`.
+double nearer_at_rest(const StepContext &step, double offset, const ContactPoint &c) {
+  if (c.obstacle) return 0;
+  const BodyView &a = step.body_views[c.slot_a], &b = step.body_views[c.slot_b];
+  if (!parts_of_one(*a.surface, a.id, *b.surface, b.id)) return 0;
+  return offset -
+         rest_of_parts(*a.surface, *b.surface, c.kind, c.feature_a, c.feature_b, load3(c.normal), offset);
+}
+
 // A contact of a surfel and a face, on the side of the face where the surfel is. False: the surfel is not
 // over the face itself, or out of reach.
 bool turn_over(const StepContext &step, double offset, ContactPoint &c) {
@@ -49,8 +59,10 @@ bool turn_over(const StepContext &step, double offset, ContactPoint &c) {
     return false;
   double speed2 = 0;
   for (int k = 0; k < 3; ++k) speed2 = std::max(speed2, norm2(v(points, surfel) - v(faces, corner[k])));
-  c.distance = -c.distance;
+  const auto nearer = [&] { return nearer_at_rest(step, offset, c); };
+  const double true_distance = c.distance - nearer();
   store3(c.normal, -load3(c.normal));
+  c.distance = nearer() - true_distance;
   if (!face_of_a) c.area = (c.obstacle ? 1 : 0.5) * facing_area(a, surfel, -load3(c.normal));
   return c.distance < contact_reach(step.h, offset, std::sqrt(speed2));
 }

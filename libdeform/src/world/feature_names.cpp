@@ -118,7 +118,8 @@ void name_features(const Body &b, const CutMesh &mesh, Surface &surface, CutReco
 }
 
 void find_laid(const Memory &m, const WholeBody &whole, const CutRecord &record, Surface &surface) {
-  use_memory(m, surface.laid, surface.laid_surfel, surface.laid_tip, surface.place, surface.sums);
+  use_memory(m, surface.laid, surface.laid_surfel, surface.laid_tip, surface.place, surface.sums,
+             surface.origin);
   if (record.open.empty()) return;
   std::vector<Corners> open;
   for (const uint64_t face : record.open) {
@@ -156,7 +157,9 @@ void find_laid(const Memory &m, const WholeBody &whole, const CutRecord &record,
         surface.laid_tip[other] = static_cast<uint8_t>(surface.laid_tip[other] | 1u << j);
       }
   }
-  if (surface.slit) surface.place.assign(size_t{4} * surface.nsurfel, 0.0);
+  if (surface.laid.empty()) return;
+  surface.place.assign(size_t{4} * surface.nsurfel, 0.0);
+  for (const uint32_t p : surface.point) surface.origin.push_back(record.point[p]);
 }
 
 void take_names(const std::string &body, FeatureNames &names, Surface &surface, CutRecord &record) {
