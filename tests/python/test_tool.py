@@ -48,6 +48,41 @@ class Cuts(Scenery):
         self.world.step(2e-3)
         self.assertEqual(self.body.ntet, cells)
 
+    def test_parts_become_bodies(self):
+        body, mass = self.body, self.body.measure.mass
+        body.cut("plane", point=(0.001, 0, 0), normal=(1, 0, 0))
+        self.assertEqual(len(self.world.bodies), 1)
+        cells = body.ntet
+        self.assertEqual(body.separate().parts, 1)
+        self.assertEqual([b.name for b in self.world.bodies], ["cube", "cube.1"])
+        self.assertEqual(sum(b.ntet for b in self.world.bodies), cells)
+        masses = [float(b.measure.mass) for b in self.world.bodies]
+        self.assertAlmostEqual(sum(masses), float(mass), delta=1e-15)
+        body.set_separate(least_cells=4, crumbs="remove")
+        body.cut("plane", point=(0, 0.001, 0), normal=(0, 1, 0))
+        self.assertEqual(len(self.world.bodies), 3)
+        body.set_separate(None)
+        body.cut("plane", point=(0, 0, 0.001), normal=(0, 0, 1))
+        self.assertEqual(len(self.world.bodies), 3)
+        for call in (lambda: body.separate(0), lambda: body.set_separate(crumbs="gone")):
+            with self.assertRaises(deform.ArgumentError):
+                call()
+
+    def test_a_bar_tears(self):
+        bar = self.world.add_body(deform.TetMesh.beam([0.2, 0.04, 0.04], cells=200), name="bar",
+                                  position=(0, 1, 0), model="corotational_fem",
+                                  material={"young": 2e4, "tear": 0.3, "damping_mass": 20})
+        ends = bar.rest_points[:, 0]
+        left, right = np.flatnonzero(ends < 1e-6), np.flatnonzero(ends > 0.2 - 1e-6)
+        bar.hold(left)
+        bar.hold(right)
+        bar.move_held(right, [0, 0.5], [[0, 0, 0], [0.15, 0, 0]])
+        points = bar.npoint
+        for _ in range(500):
+            self.world.step(1e-3)
+        self.assertGreater(bar.npoint, points)
+        self.assertTrue(np.isfinite(bar.points).all())
+
     def test_arrays_follow_the_cut(self):
         body = self.body
         names = ("positions", "velocities", "normals", "forces", "triangles", "points", "stress",

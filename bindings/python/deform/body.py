@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 EVERYTHING = 0xFFFFFFFF
 CUT_SHAPES = {"ellipsoid": 0, "box": 1, "blade": 2, "plane": 3}
 CUT_WAYS = {"remove": 0, "split": 1}
+CRUMBS = {"stay": 0, "remove": 1}
 
 
 @dataclass
@@ -42,6 +43,16 @@ class CutInfo:
     def of(cls, info: _abi.dfm_cut_info) -> CutInfo:
         return cls(info.cells, info.left, info.points, info.parts, info.area, info.mass,
                    np.array(info.momentum), info.kinetic, info.elastic)
+
+
+def separate_def(least_cells: int, crumbs: str) -> Any:
+    """Of Body.separate and Body.set_separate."""
+    if not 1 <= least_cells < 1 << 32:
+        raise ArgumentError(f"least_cells is {least_cells}; expected 1 or more", "DFM_E_ARG")
+    out = default(_abi.dfm_separate_def)
+    out.least_cells = int(least_cells)
+    out.crumbs = CRUMBS[choice("crumbs", crumbs, CRUMBS)]
+    return out
 
 
 def vector(values: Any, what: str, width: int = 3) -> Any:
@@ -435,6 +446,24 @@ class Body(_Part):
         """No planned cut of the body and of its pieces is to come any more."""
         with self.world.alone():
             status = lib.dfm_body_plan_cut(self.handle, 0, None)
+        check(status)
+
+    def separate(self, least_cells: int = 1, crumbs: str = "stay") -> CutInfo:
+        """Makes parts that hang together no more bodies of their own: each but the heaviest that has
+        least_cells or more. They are named "NAME.1", "NAME.2" and so on, and world.bodies has them. crumbs,
+        the smaller parts: "stay" parts of this body, or "remove", which takes them with their mass."""
+        rule, info = separate_def(least_cells, crumbs), sized(_abi.dfm_cut_info)
+        with self.world.alone():
+            status = lib.dfm_body_separate(self.handle, ctypes.byref(rule), ctypes.byref(info))
+        check(status)
+        return CutInfo.of(info)
+
+    def set_separate(self, least_cells: int | None = 1, crumbs: str = "stay") -> None:
+        """From now on each cut and each tear is followed by a separation (see separate); with least_cells
+        None parts stay in one body."""
+        rule = None if least_cells is None else ctypes.byref(separate_def(least_cells, crumbs))
+        with self.world.alone():
+            status = lib.dfm_body_set_separate(self.handle, rule)
         check(status)
 
     def remove_cells(self, cells: Any) -> CutInfo:
