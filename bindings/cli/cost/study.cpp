@@ -53,6 +53,7 @@ class Student {
     time_alone();
     find_fronts();
     choose();
+    find_next();  // what this call has spent since is missing in the next one
     out_.started = runs_.started();
     out_.used = out_.options.budget - runs_.left();
   }
@@ -256,6 +257,8 @@ class Student {
   // of a pair go on at the same time where there are two processors.
   void find_next() {
     const double used = out_.options.budget - runs_.left();
+    out_.next.clear();
+    out_.next_budget = 0;
     const auto consider = [&](int fine, int coarse, double share, const std::string &what) {
       double need = 0;
       for (const int row : {fine, coarse}) {
@@ -263,7 +266,8 @@ class Student {
         if (failed(row) || !std::isfinite(predicted(row))) return;
         need = runs_.parallel() > 1 ? std::max(need, predicted(row)) : need + predicted(row);
       }
-      const double budget = 1.1 * (used + need / share);  // forecasts are no better than that
+      // the next call's slices come first; forecasts are no better than a tenth
+      const double budget = 1.1 * (used + need / share) / (1 - kSliceShare);
       if (need <= 0 || (out_.next_budget > 0 && budget >= out_.next_budget)) return;
       out_.next = what;
       out_.next_budget = std::max(budget, 1.1 * out_.options.budget);
