@@ -20,7 +20,7 @@ help:
 	@echo "make bench            the figures: kernels and full steps"
 	@echo "make bench-peers      beside MuJoCo, Bullet and Jolt: speed at equal error, build/peers/"
 	@echo "                      PEERS=quick: coarse scenes and the sliding block only, some minutes"
-	@echo "make soak             jittered starts, the suite, combinations, what holds: hours; can be stopped"
+	@echo "make soak             jittered starts, suite, combinations, holds, first scenes: hours; can stop"
 	@echo "make lint             layout, includes, headers, text"
 	@echo "make format           clang-format on all C and C++ files, one version everywhere"
 	@echo "make tidy             clang-tidy on the library, where it is installed"
@@ -93,6 +93,8 @@ soak: setup-bench build/bench/build.ninja build/release/build.ninja
 	nice -n 19 build/bench/bin/cut_soak tests/bench/results/cut_soak.csv
 	nice -n 19 build/bench/bin/suite_soak tests/bench/results/suite_soak.csv
 	nice -n 19 build/bench/bin/hold_soak tests/bench/results/hold_soak.csv
+	nice -n 19 $(PYTHON) -B tests/bench/first_scenes/first_scenes.py build/release/bin/deform \
+	  tests/bench/results/first_scenes.csv --scenes 1000
 
 fuzz: setup-fuzz build/fuzz/build.ninja
 	$(BUILD) fuzz --target run_fuzz
