@@ -187,6 +187,25 @@ TEST(SceneStart, BodyAboveTheBackOfAnOpenMesh_IsWarnedOf) {
   EXPECT_EQ(log("down.obj", -1).find("on the back of obstacle"), std::string::npos) << "it falls away";
 }
 
+// A sheet of a hundred cells needs fifty times as many, which is slow for no visible reason.
+TEST(SceneStart, ThinSheetOfManyMoreCellsThanAskedFor_IsWarnedOf) {
+  const std::string folder = test::scratch("scene_start_sheet_" + std::to_string(getpid()));
+  const auto log = [&](const char *size, const char *cells) {
+    test::write_file(folder + "/scene.json",
+                     std::string(R"({"format": "deform-scene", "version": 1, "time": {"duration": 1e-6},
+    "bodies": [{"name": "sheet", "mesh": {"make": "beam", "size": )") +
+                         size + R"(, "cells": )" + cells + "}}]}");
+    const test::CommandResult r = test::deform({"run", folder + "/scene.json", "--out", folder + "/out"});
+    EXPECT_EQ(r.exit_code, 0) << r.err;
+    return r.err;
+  };
+  const std::string thin = log("[0.4, 0.4, 0.01]", "100");
+  EXPECT_NE(thin.find("body 'sheet': its beam has 4800 tetrahedra, not about 100"), std::string::npos)
+      << thin;
+  EXPECT_EQ(log("[0.4, 0.4, 0.01]", "4000").find("not about"), std::string::npos);
+  EXPECT_EQ(log("[0.4, 0.4, 0.04]", "100").find("not about"), std::string::npos) << "300 are as good as 100";
+}
+
 // A mesh in millimeters that is read as meters, and the same with its scale.
 TEST(SceneStart, OwnWeightAboveHalfTheModulus_IsWarnedOf) {
   const std::string folder = test::scratch("scene_start_weight_" + std::to_string(getpid()));

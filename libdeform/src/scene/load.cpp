@@ -10,6 +10,8 @@
 namespace dfm::scene {
 namespace {
 
+// So many tetrahedra more than a scene asks for cost little.
+constexpr uint32_t kCellsOfNoMatter = 1000;
 // Longest edge of a surface that is filled, over that of its cells (doc/decisions/0391).
 constexpr double kLongestEdge = 2.5;
 
@@ -70,7 +72,17 @@ std::string MeshFiles::make(const Body &b) {
   const std::string name =
       format("/dev/null/%s %a %a %a %u", m.kind.c_str(), m.size[0], m.size[1], m.size[2], m.cells);
   dfm_tetmesh &mesh = cells_[name];
-  if (!mesh) check(dfm_tetmesh_make(context_, m.kind.c_str(), m.size, m.cells, &mesh), b.pointer + "/mesh");
+  if (mesh) return name;
+  check(dfm_tetmesh_make(context_, m.kind.c_str(), m.size, m.cells, &mesh), b.pointer + "/mesh");
+  dfm_tetmesh_info info = {};
+  info.size = sizeof info;
+  check(dfm_tetmesh_get_info(mesh, &info), b.pointer + "/mesh");
+  if (info.ntet > 2 * uint64_t{m.cells} && info.ntet > m.cells + kCellsOfNoMatter)
+    context_->logf(
+        DFM_LOG_WARNING,
+        "body '%s': its %s has %u tetrahedra, not about %u: cells are about as long as thick, and no "
+        "fewer of them fit into its thickness; make it thicker for fewer",
+        b.name.c_str(), m.kind.c_str(), info.ntet, m.cells);
   return name;
 }
 

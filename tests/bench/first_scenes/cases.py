@@ -534,7 +534,8 @@ def switches(rng):
         s.doc["time"]["integrator"] = "tr_bdf2"
         s.doc["time"]["step"] = pick(rng, 1 / 60, 0.01, 0.002)
     elif what == "rollback":
-        s.doc["contact"] = {"method": "rollback"}  # which takes no laws with memory
+        s.doc["contact"] = {"method": "rollback"}  # which takes neither laws with memory nor rigid bodies
+        s.doc.pop("rigid", None)
     elif what == "guard":
         c["guard"] = False
     elif what == "accuracy":

@@ -11,8 +11,9 @@ failed: the run stopped (exit), is not finite, two surfaces cross, a body's cent
 floor, faster than anything falls, or takes over a minute of processor time for a second (slow; two minutes
 from 2,000 cells on), a block sinks by another amount than its weight, slides or holds against Coulomb's law,
 a ball does not come back, a grasper does not lift. noted: what the run itself warns of: contact solves at
-their limit of sweeps (from 5 % on), a surface that crosses itself without self contact, a body of half or one
-and a half times its volume, and creep above 1 um/s of contacts that stick. Exits with 1 if a scene failed.
+their limit of sweeps (from 5 % on), a surface that crosses itself without self contact, a body that its own
+weight presses flat or that has half or one and a half times its volume, vibrations that the step drops, and
+creep above 1 um/s of contacts that stick. Exits with 1 if a scene failed.
 """
 import argparse
 import collections
@@ -31,7 +32,7 @@ import time
 
 from cases import G, make
 
-NOTED = ("unconverged", "folds", "volume", "creeps")
+NOTED = ("unconverged", "folds", "volume", "creeps", "collapses", "step too long to bounce")
 COLUMNS = ("seed", "case", "models", "step", "cells", "exit", "simulated_s", "cpu_s_per_s", "unconverged",
            "crossing", "self_crossing", "creep_um_per_s", "expected", "failed", "noted", "says", "machine",
            "compiler", "commit")
@@ -103,6 +104,7 @@ def judge(scene, code, summary, out):
         yield f"exit {code}"
     if not summary:
         return
+    told = lambda words: any(words in warning for warning in summary["warnings"])
     cells = sum(body.get("cells", 0) for body in summary["bodies"].values())
     if summary["cpu_s"] > (60 if cells < 2000 else 120) * max(summary["simulated_s"], 1e-9):
         yield "slow"
@@ -125,11 +127,13 @@ def judge(scene, code, summary, out):
         rows = rows_of(out, name)
         if scene.floor is not None and "gravity" not in scene.doc and rows and \
                 min(row["com_z"] for row in rows) < scene.floor:
-            yield "below floor"
+            yield "collapses" if told("own weight") else "below floor"
         if any(math.hypot(row["vel_x"], row["vel_y"], row["vel_z"]) > 3 * G * row["t"] + 10 for row in rows):
             yield "too fast"
     if code == 0:
-        yield from against_physics(scene, out)
+        for problem in against_physics(scene, out):
+            dropped = problem == "rebounds wrongly" and told("Nyquist")
+            yield "step too long to bounce" if dropped else problem
 
 
 def row_of(command, seed, options, folder):
