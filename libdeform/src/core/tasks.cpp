@@ -79,7 +79,7 @@ struct Tasks::Pool {
   std::atomic<bool> stop{false};
   std::atomic<bool> waiting{false};   // the owner is in done
   std::atomic<uint32_t> stepping{0};  // number of worlds in a step
-  bool crowded = false;  // more threads than processors: a spinning thread would keep others from working
+  bool crowded = false;               // one processor: a spinning thread would keep the other from working
 
   struct alignas(64) Run {  // of blocks; each has its own cache line
     std::atomic<uint32_t> next{0};
@@ -200,11 +200,13 @@ Tasks::Tasks(uint32_t threads, HostFor host_for, void *host_user)
       host_for_(host_for),
       host_user_(host_user) {
   if (host_for_ || threads_ == 1) return;
-  pool_ = std::make_unique<Pool>(threads_);
+  // More threads than processors would have to sleep between jobs: they are of no use. Two are made anyway.
   const uint32_t processors = std::thread::hardware_concurrency();
-  pool_->crowded = processors > 0 && threads_ > processors;
-  pool_->workers.reserve(threads_ - 1);
-  for (uint32_t i = 1; i < threads_; ++i)
+  const uint32_t members = processors ? std::min(threads_, std::max(2u, processors)) : threads_;
+  pool_ = std::make_unique<Pool>(members);
+  pool_->crowded = processors > 0 && members > processors;
+  pool_->workers.reserve(members - 1);
+  for (uint32_t i = 1; i < members; ++i)
     pool_->workers.emplace_back([pool = pool_.get(), i] { pool->work(i); });
 }
 

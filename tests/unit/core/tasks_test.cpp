@@ -91,6 +91,21 @@ TEST(Tasks, JobsOfTwoBlocksOnEightThreads_RunOnTheSameTwo) {
   EXPECT_LE(seen.size(), 2u);
 }
 
+// More threads than processors are of no use, and would wake and sleep in each job.
+TEST(Tasks, JobsOnMoreThreadsThanProcessors_UseAsManyAsProcessors) {
+  const uint32_t processors = std::thread::hardware_concurrency();
+  if (!processors) GTEST_SKIP() << "the number of processors is not known";
+  Tasks tasks(processors + 6, nullptr, nullptr);
+  std::mutex mutex;
+  std::set<std::thread::id> seen;
+  for (int job = 0; job < 50; ++job)
+    tasks.parallel_for(1000, 1, [&](uint32_t, uint32_t) {
+      const std::lock_guard lock(mutex);
+      seen.insert(std::this_thread::get_id());
+    });
+  EXPECT_LE(seen.size(), std::max(2u, processors));
+}
+
 // A job does not end before its last block has, also where that takes so long that the owner sleeps.
 TEST(Tasks, ALongBlockOnTwoThreads_IsWaitedFor) {
   Tasks tasks(2, nullptr, nullptr);
