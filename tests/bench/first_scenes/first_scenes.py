@@ -136,6 +136,10 @@ def judge(scene, code, summary, out):
             yield "step too long to bounce" if dropped else problem
 
 
+def short(value):
+    return f"{value:.4g}" if isinstance(value, float) else value
+
+
 def row_of(command, seed, options, folder):
     case, scene = make(seed)
     folder = folder / f"{seed:04d}_{case.replace(':', '_')}"
@@ -154,15 +158,15 @@ def row_of(command, seed, options, folder):
         "seed": seed,
         "case": case,
         "models": "+".join(sorted({b.get("model", {}).get("type", "msm") for b in scene.doc["bodies"]})),
-        "step": scene.doc["time"].get("step", "default"),
+        "step": short(scene.doc["time"].get("step", "default")),
         "cells": sum(body.get("cells", 0) for body in get("bodies", {}).values()),
         "exit": code,
-        "simulated_s": get("simulated_s"),
-        "cpu_s_per_s": f"{rate:.3g}" if summary else None,
-        "unconverged": f"{share:.3g}",
+        "simulated_s": short(get("simulated_s")),
+        "cpu_s_per_s": short(rate) if summary else None,
+        "unconverged": short(share),
         "crossing": get("intersections_between_max"),
         "self_crossing": get("intersections_self_max"),
-        "creep_um_per_s": get("hold", {}).get("creep_max_um_per_s"),
+        "creep_um_per_s": short(get("hold", {}).get("creep_max_um_per_s")),
         "expected": "; ".join(expected),
         "failed": "; ".join(p for p in problems if p not in NOTED),
         "noted": "; ".join(p for p in problems if p in NOTED),
