@@ -32,9 +32,11 @@ namespace {
 
 constexpr uint32_t kSolves = 4, kCuts = 8, kFractions = 40;
 constexpr double kLeastCut = 0.25;
-constexpr double kLight = 299792458;  // m/s
-constexpr double kNoWay = 0.02;       // of the way of a sub-step: less than this is none
-constexpr double kSlow = 0.01;        // of d_g: what moves by less needs no closer look at how it does
+constexpr double kHardBlow = 0.08, kSoftBlow = 0.05;  // strain by a blow: repeated finer; then at most
+constexpr double kFinest = 4;                         // sub-steps that it makes of one
+constexpr double kLight = 299792458;                  // m/s
+constexpr double kNoWay = 0.02;                       // of the way of a sub-step: less than this is none
+constexpr double kSlow = 0.01;  // of d_g: what moves by less needs no closer look at how it does
 
 Guard::Common common_motion(const Surface &s) {
   Vec3 sum;
@@ -74,29 +76,53 @@ void bound_speeds(World &w, StepContext &step) {
   }
 }
 
-// A blow: contact changes the velocity of a point so much in this sub-step that its edges stretch by more
-// than what the bound allows for, and faster than at the last look. What a weight at rest changes is only the
-// predicted velocity.
-bool struck(const StepContext &step, const Body &b, uint32_t slot, double way) {
+// What contact does to a body in a sub-step.
+struct Blow {
+  double strain = 0;   // largest change of a velocity, times h, over an edge
+  double kinetic = 0;  // J, what it adds to the points
+};
+
+Blow blow_on(const StepContext &step, const Body &b, uint32_t slot) {
   const ContactRows &rows = step.rows;
-  for (uint32_t d = 0; d < rows.ndof; ++d)
-    if (rows.source[d] == slot) {
-      const size_t at = size_t{kStride} * rows.point[d];
-      if (norm(load3(&rows.y[size_t{kStride} * d]) - load3(&b.p.v[at])) * step.h > way) return true;
-    }
-  return false;
+  Blow out;
+  double most = 0;
+  for (uint32_t d = 0; d < rows.ndof; ++d) {
+    if (rows.source[d] != slot) continue;
+    const Vec3 y = load3(&rows.y[size_t{kStride} * d]);
+    most = std::max(most, norm2(y - load3(&b.p.v[size_t{kStride} * rows.point[d]])));
+    out.kinetic +=
+        0.5 * b.p.mass[rows.point[d]] * (norm2(y) - norm2(load3(&rows.y_free[size_t{kStride} * d])));
+  }
+  out.strain = step.h * std::sqrt(most) / b.surface.median_edge;
+  return out;
 }
 
-void look_after_blows(World &w, const StepContext &step) {
-  if (step.rows.ndof == 0) return;
+// A blow: contact changes the velocity of a point so much in this sub-step that its edges stretch by more
+// than what the bound allows for, and faster than at the last look. What a weight at rest changes is only the
+// predicted velocity. False: the sub-step is to be repeated finer, and those after it are finer as well. The
+// scheme keeps energy as far as the trapezoid of the forces is their work. Where an edge is strained by s at
+// once it is not, by about s^2 of the energy that contact brings: too much where that is more than the body
+// has.
+bool withstands_blows(World &w, StepContext &step) {
+  if (step.rows.ndof == 0) return true;
+  Guard &g = step.guard;
+  double hard = 0;
   for (const uint32_t i : step.active) {
     const Body &b = *w.bodies[i];
-    const double way = kBoundStrain * b.surface.median_edge;
-    if (!(step.h * step.guard.change[i] > way) || !std::isfinite(b.bound.found.step)) continue;
-    if (!b.dynamics->diagonal() || !struck(step, b, i, way)) continue;
-    bound_is_due(w);
-    return;
+    if (!(step.h * g.change[i] > kBoundStrain * b.surface.median_edge)) continue;
+    if (!b.dynamics->diagonal() || !std::isfinite(b.bound.found.step)) continue;
+    const Blow blow = blow_on(step, b, i);
+    if (blow.strain > kBoundStrain) bound_is_due(w);
+    if (blow.kinetic > step.free_kinetic[i]) hard = std::max(hard, blow.strain);
   }
+  if (!(hard > kHardBlow) || step.h != g.planned || g.finer > 1 || spares(step, Thrift::pieces)) return true;
+  double parts = 1;
+  while (hard > parts * kSoftBlow && 2 * parts <= g.most_finer && parts < kFinest) parts *= 2;
+  if (parts == 1) return true;
+  g.finer = parts;
+  g.cut = 1 / parts;
+  g.again = g.refines = true;
+  return false;
 }
 
 // All pairs that may come near: candidates of two sides, behind them those of bodies with themselves.
@@ -309,10 +335,7 @@ bool stage_guard(World &w, StepContext &step, uint32_t *trouble) {
     guard_near(step.guard.scene, *step.guard.list, step.guard.memory, step.guard.near, &step.guard.blocks,
                &w.context->tasks);
     safe = find_hits(w, step);
-    if (step.guard.hits.empty()) {
-      look_after_blows(w, step);
-      return true;
-    }
+    if (step.guard.hits.empty()) return withstands_blows(w, step);
     step.guard.acted = true;
     if (w.sleepers > 0 && wake_hit(w, step)) {
       step.guard.again = true;
@@ -353,8 +376,7 @@ bool stage_guard(World &w, StepContext &step, uint32_t *trouble) {
     return false;
   }
   w.stats.guard_lost += (1 - step.guard.motion) * step.h;
-  look_after_blows(w, step);
-  return true;
+  return withstands_blows(w, step);
 }
 
 }  // namespace dfm

@@ -186,8 +186,16 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
     }
     const bool last = k + 1 == cut;
     const double end = last ? goal : from + span * (double(k + 1) / cut);
+    step.guard.most_finer = double(w.def.max_substeps - done) / (cut - k);
     if (!advance(w, step, end, goal, last, trouble)) return DFM_E_DIVERGED;
     pass(w.sizes);
+    if (step.guard.finer > 1) {
+      cut = (cut - k) * static_cast<uint32_t>(step.guard.finer) - 1;
+      k = ~0u;  // the next one is the first of them
+      from = w.time;
+      span = goal - w.time;
+      *trouble |= DFM_TROUBLE_SUBSTEPS;
+    }
   }
   w.stats.last_substeps = done;
   w.stats.substeps_max = std::max(w.stats.substeps_max, done);
@@ -206,10 +214,10 @@ namespace {
 // step, which ends at `goal`.
 bool advance(World &w, StepContext &step, double end, double goal, bool last, uint32_t *trouble) {
   step.guard.pieces = 0;
-  step.guard.motion = 1;
-  step.guard.planned = end - w.time;
+  step.guard.motion = step.guard.finer = 1;
+  double planned = step.guard.planned = end - w.time;
   for (bool whole = false; !whole;) {
-    const double rest = step.rest = step.h = end - w.time;
+    step.rest = step.h = end - w.time;
     step.left = goal - w.time;
     // waking changes state that a later failure must restore
     if (step.h < step.left || (w.def.sleep && !all_idle(w, step))) keep_start(w, step);
@@ -221,7 +229,12 @@ bool advance(World &w, StepContext &step, double end, double goal, bool last, ui
       w.stats.contacts_mean += (w.stats.contacts - w.stats.contacts_mean) / double(w.stats.substeps + 1);
       w.step_impulses.idle += step.h;
     } else if (!piece(w, step, trouble)) return false;
-    whole = step.h == rest;
+    if (step.guard.planned != planned) {
+      planned = step.guard.planned;
+      end = w.time + planned;
+      last = false;
+    }
+    whole = step.h == step.rest;
     if (step.guard.motion < 1) move_obstacles_by(w, step, step.guard.motion);
     else move_obstacles(w, step, whole && last);
     w.time = whole ? end : w.time + step.h;
@@ -229,6 +242,14 @@ bool advance(World &w, StepContext &step, double end, double goal, bool last, ui
     ++w.bound.age;
   }
   return true;
+}
+
+// A blow: planned sub-steps are shorter from this one on, so it is no piece.
+void refine(World &w, StepContext &step) {
+  Guard &g = step.guard;
+  cut_finer(w.sizes, g.planned, g.planned / g.finer);
+  if (!(w.watch.size_before > 0)) w.watch.size_before = g.planned;
+  g.planned = step.rest = g.planned / g.finer;
 }
 
 // Repeats until bodies and contacts are consistent, and h is short enough for the guard.
@@ -239,6 +260,7 @@ bool piece(World &w, StepContext &step, uint32_t *trouble) {
   begin_bodies(w, step);
   while (!sub_step(w, step, trouble)) {
     if (!step.guard.again) return false;
+    if (step.guard.refines) refine(w, step);
     step.h *= step.guard.cut;
     keep_start(w, step);
     *trouble = before;
