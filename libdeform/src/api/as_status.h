@@ -5,14 +5,17 @@
 
 #include "api/call.h"
 #include "core/error.h"
+#include "core/float_env.h"
 #include "deform/base.h"
 
 namespace dfm {
 
-// Runs f and turns an exception into a status and the message of dfm_last_error().
+// Runs f in the usual floating-point environment, and turns an exception into a status and the message of
+// dfm_last_error().
 template <class F>
 dfm_status as_status(F &&f) noexcept {
   Call call;
+  const UsualFloatEnv usual;
   try {
     if constexpr (std::is_same_v<std::invoke_result_t<F>, dfm_status>) {
       return f();

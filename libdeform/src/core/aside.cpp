@@ -1,6 +1,5 @@
 #include "core/aside.h"
 
-#include <algorithm>
 #include <condition_variable>
 #include <deque>
 #include <mutex>
@@ -9,6 +8,7 @@
 #include <sched.h>
 #endif
 
+#include "core/float_env.h"
 #include "core/tasks.h"
 
 namespace dfm {
@@ -25,8 +25,8 @@ void take_what_is_left() noexcept {
 }  // namespace
 
 struct Aside::Room {
-  std::mutex mutex;
-  std::condition_variable begin, end;
+  std::mutex mutex;  // of the list
+  std::condition_variable begin;
   std::deque<std::shared_ptr<Job>> jobs;
   bool stop = false;
   std::thread thread;
@@ -34,21 +34,29 @@ struct Aside::Room {
   void work() {
     take_what_is_left();
     const Tasks::Alone alone;  // the workers belong to the steps
-    for (std::unique_lock lock(mutex);;) {
-      begin.wait(lock, [&] { return stop || !jobs.empty(); });
-      if (stop) return;
-      std::shared_ptr<Job> job = std::move(jobs.front());
-      jobs.pop_front();
-      job->state_ = Job::runs;
-      lock.unlock();
+    const UsualFloatEnv usual;
+    for (;;) {
+      std::shared_ptr<Job> job;  // may be the last that holds it: it goes without the lock
+      {
+        std::unique_lock lock(mutex);
+        begin.wait(lock, [&] { return stop || !jobs.empty(); });
+        if (stop) return;
+        job = std::move(jobs.front());
+        jobs.pop_front();
+      }
+      Job::State state = Job::waits;
+      if (!job->state_.compare_exchange_strong(state, Job::runs)) continue;
       job->run();
-      lock.lock();
       job->state_ = Job::done;
-      end.notify_all();
-      lock.unlock();
-      job.reset();  // outside, as it may be the last who holds it
-      lock.lock();
     }
+  }
+
+  // The thread has the lock for less than a microsecond, or has been stopped.
+  std::unique_lock<std::mutex> locked() {
+    const auto until = std::chrono::steady_clock::now() + std::chrono::microseconds(50);
+    std::unique_lock lock(mutex, std::try_to_lock);
+    while (!lock && std::chrono::steady_clock::now() < until) lock.try_lock();
+    return lock;
   }
 };
 
@@ -67,7 +75,8 @@ void Aside::start(std::shared_ptr<Job> job) noexcept {
   try {
     if (!room_->thread.joinable()) room_->thread = std::thread([this] { room_->work(); });
     {
-      const std::lock_guard lock(room_->mutex);
+      const std::unique_lock lock = room_->locked();
+      if (!lock) return;
       room_->jobs.push_back(std::move(job));
     }
     room_->begin.notify_one();
@@ -76,12 +85,13 @@ void Aside::start(std::shared_ptr<Job> job) noexcept {
 }
 
 bool Aside::finish(const std::shared_ptr<Job> &job, std::chrono::microseconds most) {
-  std::unique_lock lock(room_->mutex);
-  if (job->state_ == Job::waits) {
-    std::erase(room_->jobs, job);
-    return false;
-  }
-  return room_->end.wait_for(lock, most, [&] { return job->state_ == Job::done; });
+  Job::State state = Job::waits;
+  if (job->state_.compare_exchange_strong(state, Job::left)) return false;
+  const auto until = std::chrono::steady_clock::now() + most;
+  // asleep, since the thread may need this core
+  while (job->state_ == Job::runs && std::chrono::steady_clock::now() < until)
+    std::this_thread::sleep_for(std::chrono::microseconds(20));
+  return job->state_ == Job::done;
 }
 
 }  // namespace dfm

@@ -8,6 +8,8 @@
 #include <thread>
 #include <vector>
 
+#include "core/float_env.h"
+
 namespace dfm {
 namespace {
 
@@ -15,6 +17,7 @@ thread_local bool inside_worker = false;
 
 struct Inside {
   const bool outer = inside_worker;
+  const UsualFloatEnv usual;  // a worker has that of the thread that made the context, a host's its own
   Inside() { inside_worker = true; }
   ~Inside() { inside_worker = outer; }
 };
