@@ -59,18 +59,18 @@ double RigidReference::displaced(const Surface &s) {
   return std::sqrt(most);
 }
 
-uint32_t RigidReference::set_again(const Surface &s, double far, std::span<uint8_t> marked) {
+bool RigidReference::set_again(const Surface &s, double far, uint32_t most, std::span<uint8_t> marked) {
   const Vec3 now = mean_place(s);
   uint32_t count = 0;
   for (uint32_t i = 0; i < s.nsurfel; ++i) {
     double *const then = &x_[4 * size_t{i}];
     const Vec3 place = load3(&s.x[4 * size_t{i}]) - now;
     if (!marked[i] && norm2(place - rotate(turn_, load3(then) - center_)) <= far * far) continue;
+    if (++count > most) return false;
     marked[i] = 1;
-    ++count;
     store3(then, rotate_back(turn_, place) + center_);
   }
-  return count;
+  return true;
 }
 
 // Any positions do for those that are marked; where they are now they count as unmoved.

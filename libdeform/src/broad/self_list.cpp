@@ -99,7 +99,7 @@ bool SelfList::renew_part(double h, double offset, double change) {
       list->assign(n, 0);
   begun_ = false;
   if (!(room >= 0.5 * wanted && room <= 4 * wanted)) return false;
-  if (at_.set_again(s, 0.5 * room, anew_[0]) > kMostAnew * s.nsurfel) return false;
+  if (!at_.set_again(s, 0.5 * room, uint32_t(kMostAnew * s.nsurfel), anew_[0])) return false;
   mark_features();
   longest_ = longest_edge(s, at_.x().data());
   moved_ = at_.displaced(s);
@@ -159,7 +159,8 @@ template <class Wanted>
 void SelfList::add(uint32_t a, uint32_t b, double limit, const Wanted &wanted) {
   const Surface &s = surface_;
   const auto corner = [&](uint32_t t, uint32_t k) { return s.tri[3 * size_t{t} + k % 3]; };
-  const auto at = [&](uint32_t surfel) { return load3(&at_.x()[4 * size_t{surfel}]); };
+  const double *const x = at_.x().data();
+  const auto at = [x](uint32_t surfel) { return load3(x + 4 * size_t{surfel}); };
   const auto vertices = [&](uint32_t from, uint32_t face) {
     const uint32_t c0 = corner(face, 0), c1 = corner(face, 1), c2 = corner(face, 2);
     for (uint32_t k = 0; k < 3; ++k) {
@@ -176,11 +177,10 @@ void SelfList::add(uint32_t a, uint32_t b, double limit, const Wanted &wanted) {
   for (uint32_t k = 0; k < 3; ++k)
     for (uint32_t l = 0; l < 3; ++l) {
       if (!(own_a >> k & own_b >> l & 1)) continue;
-      const uint32_t e = s.tri_edge[3 * size_t{a} + k], f = s.tri_edge[3 * size_t{b} + l];
       const uint32_t i = corner(a, k), j = corner(a, k + 1), m = corner(b, l), n = corner(b, l + 1);
-      if (i == m || i == n || j == m || j == n || !wanted(1, e, 1, f) ||
-          !segments_within(at(i), at(j), at(m), at(n), limit))
-        continue;
+      if (i == m || i == n || j == m || j == n) continue;
+      const uint32_t e = s.tri_edge[3 * size_t{a} + k], f = s.tri_edge[3 * size_t{b} + l];
+      if (!wanted(1, e, 1, f) || !segments_within(at(i), at(j), at(m), at(n), limit)) continue;
       ee_.push_back({std::min(e, f), std::max(e, f)});
     }
 }
