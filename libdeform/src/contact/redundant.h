@@ -17,6 +17,7 @@ class Redundant {
   // which the points that they hold move against each other (doc/decisions/0426).
   //   cut  [contacts of all parts] whether both sides have cut faces; null: none have
   bool found(const ContactRows &rows, const RowsPart &part, const uint8_t *cut);
+  bool found_at_cuts(const ContactRows &rows, const RowsPart &part, const uint8_t *cut);  // the latter
   // Velocities before a plain sweep.
   void note(const ContactRows &rows, const RowsPart &part);
   // After it: whether velocities have not changed. The remaining slip of each contact against its law, up to
@@ -34,7 +35,6 @@ class Redundant {
   // [dofs] contacts that hold it; another dof of its group; of a group's first one: contacts beyond its dofs
   Array<uint32_t> held_, root_;
   Array<int32_t> surplus_;
-  bool found_at_cuts(const ContactRows &rows, const RowsPart &part, const uint8_t *cut);
 };
 
 }  // namespace dfm

@@ -194,11 +194,15 @@ void settle(const World &w, StepContext &step, SolveIsland &own, double &best) {
 
 // Whether velocities still move is asked after every so many sweeps, once the polish is over, and of laws
 // without memory: what is left over stretches bristles. Not while an equilibrium is searched for, which is as
-// good as its contacts.
+// good as its contacts. Of bodies that do not revise, between cut faces (doc/decisions/0445).
 constexpr uint32_t kAskStands = 4;
 bool asks_redundant(const World &w, const StepContext &step, SolveIsland &own) {
-  return own.revises && own.sweeps >= kPolish && own.sweeps % kAskStands == 0 && !own.batches.remembers() &&
-         !w.prescribed.stands() && own.redundant.found(step.rows, own.part, step.solve_islands.of_cuts());
+  const uint8_t *const cut = step.solve_islands.of_cuts();
+  if (!(own.revises || cut) || own.sweeps < kPolish || own.sweeps % kAskStands != 0 ||
+      own.batches.remembers() || w.prescribed.stands())
+    return false;
+  return own.revises ? own.redundant.found(step.rows, own.part, cut)
+                     : own.redundant.found_at_cuts(step.rows, own.part, cut);
 }
 
 // Many contacts that bear on one implicit body (contact/tresca.h). Sweeps that have come to their cap without
