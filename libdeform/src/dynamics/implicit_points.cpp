@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 #include <new>
+#include <utility>
 
 #include "core/error.h"
 #include "dynamics/line_search.h"
@@ -75,7 +76,8 @@ ImplicitPoints::ImplicitPoints(const Memory &memory, Phyxels &points, Surface &s
     a->assign(size_t{3} * points.n, 0.0);
   held_.assign(points.n, 0);
   stiffness_.create(model, points.n);
-  forces_ = kUnitWork * stiffness_.pattern().nb;  // points and edges, about as many as points and cells
+  // points and edges, about as many as points and cells
+  forces_ = kUnitWork * units_of_a_cell(model.type->id) * stiffness_.pattern().nb;
   if (options_.second_order && options_.newton == 1 && !stiffness_.constant())
     fail(DFM_E_UNSUPPORTED,
          "the integrator tr_bdf2 needs more than one Newton iteration with model '%s'; choose "
@@ -175,6 +177,7 @@ bool ImplicitPoints::linearize(const SubStep &now) {
   k.x = x_.data();
   k.v = v_.data();
   effort_ += kStiffnessForces * forces_ + exact_->factor_work();
+  fresh_ = !stiffness_.constant();
   if (!stiffness_.evaluate(model_, k, -stage_.h * stage_.h, -stage_.h)) return false;
   stiffness_.each_own([&](uint32_t i, double *block) {
     for (size_t c = 0; c < 3; ++c) {
@@ -215,6 +218,7 @@ bool ImplicitPoints::solve(const Array<double> &b, Array<double> &x) {
 bool ImplicitPoints::restricted(uint32_t count, const uint32_t *points, double *w) {
   SolveInfo info;
   effort_ += kCopies * 9.0 * count * count;
+  if (!by_rest_ && std::exchange(fresh_, false)) effort_ += exact_->restricted_work(count, points);
   if (by_rest_ ? !rest_->restricted(count, points, w)
                : !exact_->restricted(count, points, options_.tolerance, w, info))
     return false;

@@ -86,6 +86,7 @@ class ImplicitPoints : public Dynamics {
   // In this sub-step: contacts are to press back; backed_base_ is known; the next revision makes it.
   bool backs_ = false, base_known_ = false, base_due_ = false;
   bool by_rest_ = false;  // which of the two represents A
+  bool fresh_ = false;    // the factor of exact_ is of this sub-step, and no response has been made of it
   uint32_t slow_ = 0;     // iterations with rest_ that did not halve the residual
   Anderson ways_;
   // The present stage: its h (s); its times as shares of the sub-step; x0, v0 ([npoint,4] m, m/s). Loads and

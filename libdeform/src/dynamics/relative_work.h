@@ -7,7 +7,17 @@ namespace dfm {
 // constant matrix. Source: doc/decisions/0170-integrators-by-cost.md.
 inline constexpr unsigned kImplicitWork = 50, kConstantWork = 20;
 // Multiplications of a triangular solve in the time that an explicit sub-step takes for a point or a cell
-// (doc/decisions/0400-auto-goes-by-counts.md).
-inline constexpr double kUnitWork = 40;
+// (doc/decisions/0447-auto-counts-contact.md).
+inline constexpr double kUnitWork = 25;
+
+// The same of other work in a sub-step, in units of a point or a cell of springs: by instructions and by
+// processor time. A model's cells, for models of the library.
+double units_of_a_cell(const char *model);
+// A contact: its candidates, rows, two answers of a law, one sweep, guard and store. Between two bodies there
+// are some ten candidates for each contact.
+inline constexpr double kObstacleContactUnits = 30, kBodyContactUnits = 80;
+// Of each contact in a further sweep, with its share of a residual; the second value is for surfels that
+// answer each other's impulses.
+inline constexpr double kSweptUnits = 2, kSweptBlockUnits = 8;
 
 }  // namespace dfm

@@ -29,7 +29,7 @@ size_t rounded(size_t n) { return (n + kTileRows - 1) / kTileRows * kTileRows; }
 
 LdltSolver::LdltSolver(const Memory &memory, Tasks *tasks)
     : kernels_(dense_kernels()), tasks_(tasks), nodes_(memory) {
-  use_memory(memory, entry_begin_, waiting_, row_, column_, fresh_, reach_begin_, reach_);
+  use_memory(memory, entry_begin_, waiting_, row_, column_, fresh_, below_, reach_begin_, reach_);
   use_memory(memory, value_, pivot_, inverse_, floor_, stack_, left_, right_, panels_);
   use_memory(memory, root_, reached_, product_);
   use_memory(memory, entry_);
@@ -79,6 +79,7 @@ void LdltSolver::find_places(const BlockPattern &pattern) {
   left_.resize(pack);
   right_.resize(pack);
   value_.resize(nodes_.value_begin[ns]);
+  below_.reserve(ns);
   factor_work_ = 0;
   for (uint32_t s = 0; s < ns; ++s) {
     const double high = 3.0 * nodes_.height(s), low = 3.0 * nodes_.below(s);
@@ -357,6 +358,21 @@ void LdltSolver::learn() {
     double *const tiles = &product_[size_t{p} * (p + 1) / 2 * kLanes * kLanes];
     for (uint32_t q = 0; q <= p; ++q) gram(p, q, tiles + size_t{q} * kLanes * kLanes);
   });
+}
+
+// A column of Y has values in the supernodes from its point to the root. They take a substitution with the
+// panel of each, and a product with all columns that have values there, by the lower triangle.
+double LdltSolver::restricted_work(uint32_t nsel, const uint32_t *sel) {
+  below_.assign(nodes_.count(), 0);
+  for (uint32_t k = 0; k < nsel; ++k)
+    for (uint32_t s = nodes_.owner[nodes_.place[sel[k]]]; s != Supernodes::kNone; s = nodes_.parent[s])
+      ++below_[s];
+  double sum = 0;
+  for (uint32_t s = 0; s < nodes_.count(); ++s) {
+    const double columns = 3.0 * below_[s], wide = 3.0 * nodes_.width(s), low = 3.0 * nodes_.below(s);
+    sum += columns * wide * (0.5 * wide + low + 0.5 * columns);
+  }
+  return sum / kDense;
 }
 
 // W = S P^T L^-T D^-1 L^-1 P S^T = Y^T Y with Y = D^-1/2 L^-1 P S^T: forward substitution is enough. It is

@@ -22,6 +22,7 @@ class LdltSolver final : public LinearSolver {
   bool restricted(uint32_t nsel, const uint32_t *sel, double tolerance, double *w, SolveInfo &info) override;
   double factor_work() const override { return factor_work_; }
   double solve_work() const override { return 2 * double(value_.size()); }
+  double restricted_work(uint32_t nsel, const uint32_t *sel) override;
   void forget_restricted();  // gives back what restricted() keeps for points that are asked for again
   size_t factor_doubles() const { return value_.size(); }  // entries of L that are stored
 
@@ -65,6 +66,7 @@ class LdltSolver final : public LinearSolver {
   Array<uint32_t> row_;     // [columns] row of Y^T's unit vector in the order of elimination; kNone: empty
   Array<uint32_t> column_;  // [n] first column of a point, kNone
   Array<uint32_t> fresh_;   // scratch: points that are not known yet
+  Array<uint32_t> below_;   // scratch: [supernodes] selected points in the subtree
   Array<double> root_;      // 1/sqrt(D)
   Array<uint32_t> reach_begin_, reach_;  // supernodes that a panel reaches
   Array<size_t> reached_begin_;

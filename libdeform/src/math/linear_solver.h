@@ -35,6 +35,8 @@ class LinearSolver {
   // alone; those of dense panels, which take less time, as fewer. 0: not known.
   virtual double factor_work() const { return 0; }
   virtual double solve_work() const { return 0; }
+  // Multiplications of a restricted() that follows a factor(), of what is not as many for every solver.
+  virtual double restricted_work(uint32_t, const uint32_t *) { return 0; }
 };
 
 // restricted() for a solver that can only solve: one right-hand side per column, several at a time.

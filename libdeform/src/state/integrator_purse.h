@@ -12,7 +12,7 @@ inline constexpr uint32_t kMostTries = 5;
 struct IntegratorPurse {
   uint32_t open = 0;   // it has been filled for the first time
   uint32_t tries = 0;  // of implicit time that were given up since it has last paid
-  double units = 0;    // of work, as points and cells in an explicit sub-step
+  double credit = 0;   // s of explicit time
 };
 // What the steps of this world were, where the library may change integrators; not in snapshots.
 struct IntegratorTimes {
@@ -21,7 +21,7 @@ struct IntegratorTimes {
   bool told = false;  // a warning has said that bodies are implicit
 };
 inline bool sound(const IntegratorPurse &p) {
-  return p.open <= 1 && p.tries <= kMostTries && std::isfinite(p.units);
+  return p.open <= 1 && p.tries <= kMostTries && std::isfinite(p.credit);
 }
 
 }  // namespace dfm

@@ -249,7 +249,7 @@ void charge(World &w, StepContext &step, uint64_t units) {
   if (b.end > 0 && now() > b.end) throw StepStopped{StepStopped::time};
   if (waiting.load(std::memory_order_relaxed) != 0 && take_request(w.handle))
     throw StepStopped{StepStopped::asked};
-  if (const Counting &c = step.counting; c.most > 0 && c.contact + body_effort(w, step) > c.most)
+  if (const Counting &c = step.counting; c.most > 0 && costs_too_much(c, c.contact + body_effort(w, step)))
     throw StepStopped{StepStopped::costly};
 }
 
@@ -267,7 +267,7 @@ void spend(const World &w, const StepContext &step, Spent &spent, uint64_t units
   if (b.end > 0 && now() > b.end) throw StepStopped{StepStopped::time};
   if (requested(w.handle)) throw StepStopped{StepStopped::asked};
   const Counting &c = step.counting;
-  if (c.most > 0 && c.contact + c.bodies + spent.effort * double(spent.all) / double(spent.own) > c.most)
+  if (costs_too_much(c, c.contact + c.bodies + spent.effort * double(spent.all) / double(spent.own)))
     throw StepStopped{StepStopped::costly};
 }
 
@@ -339,7 +339,7 @@ dfm_status step_within_budget(World &w, double dt, uint32_t *trouble) {
         if (why != StepStopped::costly && why != StepStopped::too_fine) throw;
       }
       return_to_start(w, step);
-      if (why == StepStopped::costly) give_up_implicit(w);
+      if (why == StepStopped::costly) give_up_implicit(w, step.counting.most_time);
       else take_up_implicit(w);
       b.kept = false;
       b.start.clear();

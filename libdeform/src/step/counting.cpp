@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "contact/reach.h"
 #include "core/error.h"
 #include "dynamics/relative_work.h"
 #include "plugin/context.h"
@@ -18,14 +19,16 @@
 namespace dfm {
 namespace {
 
-constexpr double kTry = 1.0 / 30;    // s of explicit integration, whose work a trial may cost
-constexpr double kPutBy = 0.25;      // share of explicit work that is saved for the next trial
-constexpr double kMost = 4;          // largest credit, in trials
+// s of explicit time, by its work:
+constexpr double kTry = 1.0 / 30;    // what a trial may cost
+constexpr double kFirst = 2 * kTry;  // credit at the start
+constexpr double kMost = 4 * kTry;   // largest credit
+constexpr double kPutBy = 0.25;      // share of explicit time that is saved for the next trial
+// A host that gives the length of its steps waits for each of them: an implicit step may count this share of
+// the explicit work of the same time, whatever was saved before.
+constexpr double kShareOfAStep = 0.5;
 constexpr double kSafeShare = 0.25;  // of the limit on sub-steps
-// A host that gives the length of its steps waits for each of them: an implicit step may not count more than
-// so many times the explicit work of the same time, whatever was saved before.
-constexpr double kMostOfAStep = 3;
-constexpr double kFilled = 1e300;  // units, for a step without limit
+constexpr double kFilled = 1e300;    // s, for a step without limit
 
 bool is(const Body &b, Counted what) { return b.integrator.counted == what; }
 bool any(const World &w, Counted what) {
@@ -36,7 +39,8 @@ bool any(const World &w, Counted what) {
 double units(const World &w, bool all) {
   double sum = 0;
   for (const auto &b : w.bodies)
-    if (!b->slumber.asleep && (all || !is(*b, Counted::implicit))) sum += double(b->p.n) + double(b->ncell());
+    if (!b->slumber.asleep && (all || !is(*b, Counted::implicit)))
+      sum += units_of_a_cell(b->model.type->id) * (double(b->p.n) + double(b->ncell()));
   return sum;
 }
 
@@ -109,19 +113,38 @@ void begin_count(World &w, StepContext &step, double dt) {
   if (!(h > 0 && std::isfinite(h))) return;
   c.on = true;
   c.before = effort(w);
-  if (!w.purse.open) w.purse = {1, 0, kTry / h * units(w, true)};
+  if (!w.purse.open) w.purse = {1, 0, kFirst};
   if (!any(w, Counted::implicit) || !may_be_cut(w, dt, h)) return;
-  const double same = dt / h * units(w, true);
-  c.most = same + std::max(0.0, w.purse.units);
-  if (!chosen_here(w, dt)) c.most = std::min(c.most, kMostOfAStep * same);
-  c.most *= kUnitWork;
+  c.most_time = chosen_here(w, dt) ? dt + std::clamp(w.purse.credit, 0.0, kMost) : kShareOfAStep * dt;
+  c.most_touching = kUnitWork * c.most_time / h;
+  c.most = c.most_touching * units(w, true);
+}
+
+// Explicit sub-steps are so short that they have contacts only where surfaces are as near as at rest.
+void count_contacts(const World &w, StepContext &step) {
+  Counting &c = step.counting;
+  if (!c.on) return;
+  double all = 0, near = 0;
+  for (const ContactPoint &p : step.contacts) {
+    const double units = p.obstacle ? kObstacleContactUnits : kBodyContactUnits;
+    all += units;
+    if (p.distance < contact_reach(0, w.offset, 0)) near += units;
+  }
+  c.touching = near;
+  c.contact += kUnitWork * all;
+}
+
+bool costs_too_much(const Counting &c, double multiplications) {
+  return c.most > 0 && multiplications > c.most + c.most_touching * c.touching;
 }
 
 double body_effort(const World &w, const StepContext &step) { return effort(w) - step.counting.before; }
 
-void give_up_implicit(World &w) {
+void give_up_implicit(World &w, double time) {
   turn(w, Counted::implicit, Counted::explicitly);
-  w.purse.units = 0;
+  w.purse.credit -= time;
+  if (w.purse.credit > 0) return;  // one step was dear, not implicit time
+  w.purse.credit = 0;
   w.purse.tries = std::min(w.purse.tries + 1, kMostTries);
 }
 
@@ -134,7 +157,7 @@ void take_up_implicit(World &w) {
   for (const auto &b : w.bodies)  // parameters may have changed
     if (is(*b, Counted::explicitly) && !b->model.can(DFM_CAP_STIFFNESS)) b->integrator.counted = Counted::no;
   turn(w, Counted::explicitly, Counted::implicit);
-  w.purse.units = kFilled;
+  w.purse.credit = kFilled;
 }
 
 void end_count(World &w, StepContext &step, double dt, double substeps) {
@@ -143,18 +166,19 @@ void end_count(World &w, StepContext &step, double dt, double substeps) {
   w.integrator_times.all += dt;
   if (any(w, Counted::implicit)) w.integrator_times.implicit += dt;
   IntegratorPurse &purse = w.purse;
-  const double h = explicit_step(w), all = units(w, true), one = kTry / h * all;
   if (any(w, Counted::implicit)) {
+    const double rate = (units(w, true) + c.touching) / explicit_step(w);  // units of explicit time in 1 s
     const double taken = (body_effort(w, step) + c.contact) / kUnitWork + substeps * units(w, false);
-    purse.units = std::min(purse.units + dt / h * all - taken, kMost * one);
-    if (purse.units == kMost * one) purse.tries = 0;
-    if (purse.units < 0 && c.most > 0) give_up_implicit(w);
+    purse.credit = std::min(purse.credit + dt - (rate > 0 ? taken / rate : 0), kMost);
+    if (purse.credit == kMost) purse.tries = 0;
+    if (purse.credit < 0 && c.most > 0) give_up_implicit(w, 0);
     return;
   }
-  purse.units += kPutBy * substeps * all;
-  if (purse.units < std::ldexp(one, int(purse.tries))) return;
+  purse.credit += kPutBy * dt;
+  if (purse.credit < std::ldexp(kTry, int(purse.tries))) return;
+  const double left = purse.tries > 0 ? kTry : purse.credit;
   take_up_implicit(w);
-  purse.units = one;
+  purse.credit = left;
 }
 
 }  // namespace dfm

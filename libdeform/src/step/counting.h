@@ -2,11 +2,12 @@
 // counted and not timed, so that every run of a scene changes integrators at the same steps. One unit is a
 // point or cell in an explicit sub-step, kUnitWork multiplications.
 //
-// A credit of work decides. Implicit steps add what they save compared with the explicit sub-steps of the
-// same time, and subtract what they cost more. When the credit is used up, the bodies become explicit, from
-// the start of the step that used it up. Explicit steps add a share of their work; when that pays for a
-// trial, the bodies become implicit again. So trials cost at most that share of the work of explicit
-// integration alone, and a body at rest, for which implicit steps are cheap, returns to them.
+// A credit decides, in seconds of explicit time: one is the work of explicit sub-steps, with the present
+// contacts, for a second of simulated time. Implicit steps add what they save, and subtract what they cost
+// more. When the credit is used up, the bodies become explicit, from the start of the step that used it
+// up. Explicit steps add a share of their time; when that pays for a trial, the bodies become implicit again.
+// So trials cost at most that share of explicit time alone, and a body at rest, for which implicit steps are
+// cheap, returns to them.
 #pragma once
 #include <cstddef>
 #include <string>
@@ -22,7 +23,10 @@ struct Counting {
   double before = 0;   // multiplications: effort of all bodies before the step
   double contact = 0;  // of its contact solves
   double bodies = 0;   // of its bodies, when the solve of the islands began
-  double most = 0;     // limit above which the step is repeated explicitly; 0: none
+  // The step is repeated explicitly if it counts more than explicit time of most_time s, multiplications: the
+  // limit without contacts, what each unit of `touching` adds; 0: no limit.
+  double most_time = 0, most = 0, most_touching = 0;
+  double touching = 0;  // units of the contacts of the last sub-step in an explicit one
 };
 
 void begin_count(World &w, StepContext &step, double dt);
@@ -31,5 +35,7 @@ void end_count(World &w, StepContext &step, double dt, double substeps);
 // "body 'first' is", "body 'first' and 4 more are"
 std::string names_of(const std::string &first, size_t count);
 double body_effort(const World &w, const StepContext &step);  // since begin_count()
+void count_contacts(const World &w, StepContext &step);       // once they are known, in each sub-step
+bool costs_too_much(const Counting &count, double multiplications);
 
 }  // namespace dfm

@@ -327,6 +327,7 @@ bool retry_shorter(World &w, StepContext &step, uint32_t *trouble) {
 bool stage_solve(World &w, StepContext &step, uint32_t *trouble) {
   ask_pre_solve(w, step);
   if (!contacts_taken(w, step)) return false;
+  count_contacts(w, step);
   step.passes = step.sweeps = 0;
   step.residual = {};
   make_rows(w, step);

@@ -9,6 +9,7 @@
 #include "contact/bonds.h"
 #include "contact/fixed_limits.h"
 #include "contact/recovery.h"
+#include "dynamics/relative_work.h"
 #include "state/world.h"
 #include "step/context.h"
 #include "step/tolerance.h"
@@ -110,8 +111,6 @@ void solve_island_bonds(const World &w, StepContext &step, SolveIsland &own) {
   spend(w, step, own.spent, uint64_t{passes} * own.part.nbond);
 }
 
-// Multiplications of a sweep by the pairs of touched surfels that answer each other: three columns of four.
-constexpr double kSweepWork = 12;
 void sweep_once(const World &w, StepContext &step, SolveIsland &own, double leave) {
   own.spent.effort += own.effort;
   spend(w, step, own.spent, own.part.all());
@@ -452,6 +451,23 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
   }
 }
 
+// Multiplications of a sweep, in the time of those of a triangular solve. An impulse at a surfel moves all
+// touched surfels of its body: three columns of four by vectors, which wait for memory where the response is
+// larger than a cache (doc/decisions/0447-auto-counts-contact.md).
+constexpr double kPairWork = 1.5, kFarPairWork = 6;
+constexpr uint32_t kFar = 100;  // surfels: 1 MB
+double work_of_sweep(const ContactRows &rows, const RowsPart &part, bool blocks) {
+  double sum = kUnitWork * (blocks ? kSweptBlockUnits : kSweptUnits) * part.all();
+  if (!blocks) return sum;
+  each_row(part.contacts, [&](uint32_t i) {
+    for (uint32_t j = rows.begin[i]; j < rows.begin[i + 1]; ++j) {
+      const uint32_t block = rows.block[rows.dof[j]], count = block == kNone ? 0 : rows.blocks[block].count;
+      sum += (count > kFar ? kFarPairWork : kPairWork) * count;
+    }
+  });
+  return sum;
+}
+
 }  // namespace
 
 SolveIslands::SolveIslands(const Memory &m) : memory_(m), joined_(m) {
@@ -610,14 +626,15 @@ void SolveIslands::find(const World &w, StepContext &step) {
     order_[k] = k;
     own.part.blocks = slice(block_, k);
     own.revises = own.rigid = false;
-    own.effort = 0;
+    bool soft = false;
     for (const uint32_t b : own.part.blocks) {
       const bool rigid = blocks[b].group != kNone;
-      if (!rigid) own.effort += kSweepWork * blocks[b].count * blocks[b].count;
+      soft = soft || !rigid;
       step.revised[b] = !rigid && w.bodies[blocks[b].source]->dynamics->abilities().revises;
       own.rigid = own.rigid || rigid;
       own.revises = own.revises || step.revised[b];
     }
+    own.effort = work_of_sweep(step.rows, own.part, soft);
     own.batches.gather(w.pairs.laws, own.part.contacts, step.state);
   }
   std::sort(order_.begin(), order_.end(), [&](uint32_t l, uint32_t r) {

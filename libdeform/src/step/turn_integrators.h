@@ -6,8 +6,9 @@ namespace dfm {
 
 struct World;
 
-// Implicit steps cost too much: explicit ones from now on.
-void give_up_implicit(World &w);
+// Implicit steps cost too much: explicit ones from now on. time: s of explicit time whose work has been done
+// for a step that was given up.
+void give_up_implicit(World &w, double time);
 // Explicit time would take more sub-steps than a step may have: implicit steps, whatever this one costs.
 void take_up_implicit(World &w);
 // Whether the latter has anybody to move.
