@@ -47,8 +47,9 @@ bool stage_model(World &w, Active active, const SubStep &now, uint32_t *trouble)
   const auto forces = [&](uint32_t begin, uint32_t end) {
     for (const uint32_t i : active.subspan(begin, end - begin)) {
       const OnBehalf speaks(w.bodies[i]->name);
-      // work of what holds driven points is booked with the forces there
-      if (!w.bodies[i]->dynamics->add_forces(now, !w.bodies[i]->motions.empty())) failed.note(i);
+      // booked with them: work of what holds driven points, and what another size of sub-steps changes
+      const bool keep = !w.bodies[i]->motions.empty() || w.watch.size_before > 0;
+      if (!w.bodies[i]->dynamics->add_forces(now, keep)) failed.note(i);
     }
   };
   const uint32_t n = static_cast<uint32_t>(active.size());
