@@ -104,15 +104,23 @@ uint32_t count(const std::string &text, const std::string &word) {
   return n;
 }
 
-// Steps of 1/60 s; a cube of 35 points, 5 cm and 1e7 Pa in each third of them, onto each other: 382 explicit
-// sub-steps. They go on explicitly while they fall on each other.
-dfm_world cubes(dfm_context *context, int frames, int most = 8) {
+constexpr double kFrame = 1.0 / 60;  // s
+
+// A world that is stepped by frames, with a floor.
+dfm_world frames_over_a_floor(dfm_context *context) {
   dfm_world_def d = dfm_world_def_default();
   d.gravity[2] = -9.81;
-  d.step = 1.0 / 60;
+  d.step = kFrame;
   dfm_world w = 0;
   test::ok(dfm_world_create(context, &d, &w));
   test::add_plane(w, "floor");
+  return w;
+}
+
+// Steps of 1/60 s; a cube of 35 points, 5 cm and 1e7 Pa in each third of them, onto each other: 382 explicit
+// sub-steps. They go on explicitly while they fall on each other.
+dfm_world cubes(dfm_context *context, int frames, int most = 8) {
+  const dfm_world w = frames_over_a_floor(context);
   for (int f = 0, made = 0; f < frames; ++f) {
     if (f % 3 == 0 && made < most) {
       test::BodyOptions o;
@@ -124,7 +132,7 @@ dfm_world cubes(dfm_context *context, int frames, int most = 8) {
       ++made;
     }
     uint32_t trouble = 0;
-    test::ok(dfm_world_step(w, d.step, &trouble));
+    test::ok(dfm_world_step(w, kFrame, &trouble));
   }
   return w;
 }
@@ -161,12 +169,7 @@ namespace {
 // Four boxes fall on each other: a landing takes more implicit work than explicit time does, and the stack
 // that then stands a tenth of it.
 dfm_world boxes(dfm_context *context) {
-  dfm_world_def d = dfm_world_def_default();
-  d.gravity[2] = -9.81;
-  d.step = 1.0 / 60;
-  dfm_world w = 0;
-  test::ok(dfm_world_create(context, &d, &w));
-  test::add_plane(w, "floor");
+  const dfm_world w = frames_over_a_floor(context);
   for (int k = 0; k < 4; ++k) {
     test::BodyOptions o;
     o.model = "msm";
@@ -187,7 +190,7 @@ TEST(Counting, StackOfBoxes_IsImplicit) {
   const dfm_world w = boxes(context);
   for (int k = 0; k < 30; ++k) {
     uint32_t trouble = 0;
-    test::ok(dfm_world_step(w, 1.0 / 60, &trouble));
+    test::ok(dfm_world_step(w, kFrame, &trouble));
   }
   const Told steps = told(w);
   EXPECT_GT(steps.implicit, 0.6 * steps.all) << steps.changes << " changes";
