@@ -220,7 +220,7 @@ bool BroadPhase::find_dirty(std::span<const BodyView> bodies, std::span<const Ob
   bool any = false;
   size_t surfels = 0;
   for (const BodyView &b : bodies) surfels += b.surface->nsurfel;
-  // body by body, as in the other stages: who has moved a body has it in the cache
+  // body by body, as in the other stages: the thread that has moved a body has it in the cache of its core
   each(bodies.size(), surfels < kLook ? bodies.size() : 1, tasks,
        [&](size_t i) { look(bodies_[i], bodies[i].asleep, h, offset); });
   for (const Body &b : bodies_) any |= b.dirty;

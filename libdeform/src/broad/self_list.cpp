@@ -14,8 +14,8 @@ constexpr double kSkinLeast = 0.02;  // of the median edge
 // if wider, every surfel would list the triangles of the second ring around it
 constexpr double kSkinMost = 0.2;
 constexpr double kSpeedGrowth = 1.25;
-// of the surfels: a part of the lists is renewed up to here. It takes twice as much for each triangle, and
-// the other parts are out of date earlier.
+// share of the surfels above which the whole lists are renewed: a part takes twice as long for each triangle,
+// and what is left is out of date earlier
 constexpr double kMostAnew = 0.25;
 
 bool before(const SelfPair &l, const SelfPair &r) { return l.a != r.a ? l.a < r.a : l.b < r.b; }

@@ -51,7 +51,7 @@ struct Aside::Room {
     }
   }
 
-  // The thread has the lock for less than a microsecond, or has been stopped.
+  // Not locked: the thread, which holds the lock for less than a microsecond, has been suspended meanwhile.
   std::unique_lock<std::mutex> locked() {
     const auto until = std::chrono::steady_clock::now() + std::chrono::microseconds(50);
     std::unique_lock lock(mutex, std::try_to_lock);

@@ -1,6 +1,6 @@
 // A thread of low priority that does jobs beside the steps, one after the other. A job has inputs of its own
-// and gives the same result whoever does it: who needs one that is not done does it himself. On a full
-// machine the thread may be stopped anywhere for long, so no step waits for a lock that it holds.
+// and gives the same result on every thread: a step does itself what is not done in time. On a busy machine
+// the thread may be suspended anywhere for long, so no step waits for a lock that it holds.
 #pragma once
 #include <atomic>
 #include <chrono>
@@ -23,9 +23,9 @@ class Aside {
 
   Aside();
   ~Aside();  // waits for the job that runs; the others are dropped
-  // Where no thread can be made, or it has stopped while it took a job, this one does not begin.
+  // The job does not begin if no thread can be made, or if the thread is suspended while it holds the list.
   void start(std::shared_ptr<Job> job) noexcept;
-  // Whether it is done, `most` from now at the latest. false: it will not begin any more, but may run still.
+  // Waits for it, `most` at the longest. false: it is not done; it will not begin, but may still be running.
   bool finish(const std::shared_ptr<Job> &job, std::chrono::microseconds most);
 
  private:

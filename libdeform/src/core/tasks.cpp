@@ -37,8 +37,8 @@ void run_host_block(void *task, uint32_t begin, uint32_t end) {
 
 // Waits for `ready` without sleeping, until `most` has passed: waking a thread takes 50 microseconds, as long
 // as the work of a small body. After a short time it yields now and then, so that other threads of its core
-// can run: seldom, because a yield takes as long as some looks, and a thread beside it on the same core is
-// slowed by it. Returns false if it is not ready yet; then sleep.
+// can run: seldom, because a yield is a call to the system, which also slows another thread of the same core.
+// Returns false if it is not ready yet; then sleep.
 template <class Ready, class Most>
 bool spin(Ready ready, Most most) {
   using Clock = std::chrono::steady_clock;
@@ -66,8 +66,8 @@ constexpr std::chrono::microseconds kWithinStep{2000}, kBetweenSteps{200}, kCrow
 // it had in the last job in the cache of its core. Blocks of `grain` are divided into one run per member.
 // Each member first takes the blocks of its own run, then blocks that are left in other runs. The owner waits
 // only for workers that have entered the job: a worker that sleeps, or whose core is busy, does not delay it.
-// Between the jobs of a step workers spin so that they do not fall asleep. Who is not called looks at a line
-// of its own only, which no job touches.
+// Between the jobs of a step workers spin so that they do not fall asleep. Each worker waits at a cache line
+// of its own, so jobs that do not call it do not disturb it.
 struct Tasks::Pool {
   static constexpr uint64_t kOpen = uint64_t{1} << 31, kInside = kOpen - 1;
   static constexpr int kNumber = 32;  // bits below a job's number
@@ -203,7 +203,7 @@ Tasks::Tasks(uint32_t threads, HostFor host_for, void *host_user)
       host_for_(host_for),
       host_user_(host_user) {
   if (host_for_ || threads_ == 1) return;
-  // More threads than processors would have to sleep between jobs: they are of no use. Two are made anyway.
+  // More threads than processors would have to sleep between jobs: they are of no use. Two are always made.
   const uint32_t processors = std::thread::hardware_concurrency();
   const uint32_t members = processors ? std::min(threads_, std::max(2u, processors)) : threads_;
   pool_ = std::make_unique<Pool>(members);

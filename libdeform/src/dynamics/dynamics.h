@@ -119,7 +119,7 @@ class Dynamics {
   virtual bool take_contact() { return true; }
   // Return false if the model fails, or (free_motion) a velocity is not finite or above `fastest`. kinetic:
   // J, of the free motion; unchanged if it is not known.
-  // keep: points().f is read after this sub-step; else forces may be used up as they come.
+  // keep: points().f holds the forces until commit(); else they may be used up as they come.
   virtual bool add_forces(const SubStep &, bool /*keep*/) { return true; }
   virtual bool free_motion(const SubStep &now, double &kinetic) = 0;
 

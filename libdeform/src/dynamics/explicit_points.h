@@ -35,9 +35,9 @@ class ExplicitPoints : public Dynamics {
   const Array<uint32_t> &edges_;
   const PointsKernels &loops_;
   Array<double> stiffness_, damping_;  // [npoint] row sums: N/m, N s/m
-  // Where the model gives its forces part by part, the points of a part move as it comes. [part] J
+  // [part] J, of the free motion; empty where the model gives its forces for all points at once
   Array<double> part_kinetic_;
-  bool moved_ = false;
+  bool moved_ = false;  // in this sub-step points have moved part by part, and their forces are not kept
   // The end is the free motion but for the few points that contact reaches: it is stored in v_free, and the
   // former values of these points are kept.
   bool ways_known_ = false;  // x_end follows from v_free

@@ -11,8 +11,8 @@ struct FreeMotion {
   const double *gravity;  // [4]
   const double *mass, *v, *w, *x;
   double *free, *x_end;
-  // A point's memory is asked for while the point of so many before is worked on: those of a part lie in
-  // short runs, which the processor does not foresee. The number of all points: it is not.
+  // A point's memory is asked for this many points ahead: the points of a part lie in short runs, which the
+  // processor does not foresee. The number of all points or more: it is not asked for.
   uint32_t ahead;
 };
 

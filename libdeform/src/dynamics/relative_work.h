@@ -10,8 +10,8 @@ inline constexpr unsigned kImplicitWork = 50, kConstantWork = 20;
 // (doc/decisions/0447-auto-counts-contact.md).
 inline constexpr double kUnitWork = 25;
 
-// The same of other work in a sub-step, in units of a point or a cell of springs: by instructions and by
-// processor time. A model's cells, for models of the library.
+// Other work in a sub-step, in units of a point or a cell of springs, from counts of instructions and from
+// processor time. A point or a cell of a model, by its id:
 double units_of_a_cell(const char *model);
 // A contact: its candidates, rows, two answers of a law, one sweep, guard and store. Between two bodies there
 // are some ten candidates for each contact.

@@ -47,7 +47,7 @@ struct Surface {
       if (feature < n.below[kind]) return n.id;
     return own;
   }
-  // Id of the body, made by the host, that this one is or was a part of; own: the body's.
+  // Id of the body, made by the host, that this one is or comes from; own: the id of this one.
   uint64_t whole(uint64_t own) const { return named.empty() ? own : named.front().id; }
   Array<uint32_t> fan_begin, fan;  // [nsurfel+1], triangles around each surfel, ascending
   double median_edge = 0;          // m, rest
@@ -81,8 +81,8 @@ struct Surface {
   Array<uint32_t> origin;  // [nsurfel] point of the body as it was made; empty without such triangles
   Array<double> sums;      // scratch, [laid_surfel,kBackSums]
 
-  // Over the triangles at rest, where the surface was made in advance: saves those who need a tree over the
-  // present ones the search for its topology. Null: there is none.
+  // Over the triangles at rest, where the surface was made in advance: trees over the present triangles take
+  // its topology instead of a search for one. Null: there is none.
   std::shared_ptr<const BoxTree> tree;
 
   // State, [nsurfel,4] (fourth component zero), m and m/s.

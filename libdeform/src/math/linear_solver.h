@@ -35,7 +35,7 @@ class LinearSolver {
   // alone; those of dense panels, which take less time, as fewer. 0: not known.
   virtual double factor_work() const { return 0; }
   virtual double solve_work() const { return 0; }
-  // Multiplications of a restricted() that follows a factor(), of what is not as many for every solver.
+  // Multiplications of the first restricted() after a factor(), by the solver's structure; 0: not known.
   virtual double restricted_work(uint32_t, const uint32_t *) { return 0; }
 };
 

@@ -10,8 +10,8 @@
 namespace dfm::scene {
 namespace {
 
-// So many tetrahedra more than a scene asks for cost little.
-constexpr uint32_t kCellsOfNoMatter = 1000;
+// Tetrahedra beyond what a scene asks for that cost little.
+constexpr uint32_t kCheapCells = 1000;
 // Longest edge of a surface that is filled, over that of its cells (doc/decisions/0391).
 constexpr double kLongestEdge = 2.5;
 
@@ -77,7 +77,7 @@ std::string MeshFiles::make(const Body &b) {
   dfm_tetmesh_info info = {};
   info.size = sizeof info;
   check(dfm_tetmesh_get_info(mesh, &info), b.pointer + "/mesh");
-  if (info.ntet > 2 * uint64_t{m.cells} && info.ntet > m.cells + kCellsOfNoMatter)
+  if (info.ntet > 2 * uint64_t{m.cells} && info.ntet > m.cells + kCheapCells)
     context_->logf(
         DFM_LOG_WARNING,
         "body '%s': its %s has %u tetrahedra, not about %u: cells are about as long as thick, and no "

@@ -7,7 +7,7 @@
 
 namespace dfm {
 
-// Points of explicit bodies whose motion, of 8 ns each, or whose forces, of some 0.1 us, are worth a job.
+// Fewer points in all explicit bodies are no job for their motion (8 ns a point), or their forces (0.1 us).
 inline constexpr uint32_t kPointsToMove = 250, kPointsToPull = 20;
 
 // How many of the active bodies a block has. Explicit bodies of few points, less than `worth` in all, are no

@@ -2,9 +2,9 @@
 // counted and not timed, so that every run of a scene changes integrators at the same steps. One unit is a
 // point or cell in an explicit sub-step, kUnitWork multiplications.
 //
-// A credit decides, in seconds of explicit time: one is the work of explicit sub-steps, with the present
-// contacts, for a second of simulated time. Implicit steps add what they save, and subtract what they cost
-// more. When the credit is used up, the bodies become explicit, from the start of the step that used it
+// A credit decides. It is counted in seconds of explicit time: the work of explicit sub-steps, with the
+// present contacts, for a second of simulated time. Implicit steps add what they save and subtract what they
+// cost more. When the credit is used up, the bodies become explicit, from the start of the step that used it
 // up. Explicit steps add a share of their time; when that pays for a trial, the bodies become implicit again.
 // So trials cost at most that share of explicit time alone, and a body at rest, for which implicit steps are
 // cheap, returns to them.
@@ -23,8 +23,8 @@ struct Counting {
   double before = 0;   // multiplications: effort of all bodies before the step
   double contact = 0;  // of its contact solves
   double bodies = 0;   // of its bodies, when the solve of the islands began
-  // The step is repeated explicitly if it counts more than explicit time of most_time s, multiplications: the
-  // limit without contacts, what each unit of `touching` adds; 0: no limit.
+  // The step is repeated explicitly if it takes more multiplications than explicit time of most_time s would:
+  // `most`, and most_touching more for each unit of `touching`. 0: no limit.
   double most_time = 0, most = 0, most_touching = 0;
   double touching = 0;  // units of the contacts of the last sub-step in an explicit one
 };

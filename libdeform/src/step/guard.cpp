@@ -32,8 +32,8 @@ namespace {
 
 constexpr uint32_t kSolves = 4, kCuts = 8, kFractions = 40;
 constexpr double kLeastCut = 0.25;
-constexpr double kHardBlow = 0.08, kSoftBlow = 0.05;  // strain by a blow: repeated finer; then at most
-constexpr double kFinest = 4;                         // sub-steps that it makes of one
+constexpr double kHardBlow = 0.08, kSoftBlow = 0.05;  // strain: repeated finer above; then at most
+constexpr double kFinest = 4;                         // sub-steps that a blow makes of one
 constexpr double kLight = 299792458;                  // m/s
 constexpr double kNoWay = 0.02;                       // of the way of a sub-step: less than this is none
 constexpr double kSlow = 0.01;  // of d_g: what moves by less needs no closer look at how it does
@@ -97,12 +97,12 @@ Blow blow_on(const StepContext &step, const Body &b, uint32_t slot) {
   return out;
 }
 
-// A blow: contact changes the velocity of a point so much in this sub-step that its edges stretch by more
-// than what the bound allows for, and faster than at the last look. What a weight at rest changes is only the
-// predicted velocity. False: the sub-step is to be repeated finer, and those after it are finer as well. The
-// scheme keeps energy as far as the trapezoid of the forces is their work. Where an edge is strained by s at
-// once it is not, by about s^2 of the energy that contact brings: too much where that is more than the body
-// has.
+// A blow is a change of a point's velocity by contact that strains an edge in this sub-step by more than the
+// bound allows for. It is measured from the velocity at the start: what carries a weight at rest changes only
+// the predicted one. After a blow the next sub-step checks the bound. False: this sub-step is to be repeated
+// finer, and those after it are finer as well. The scheme keeps energy as far as the trapezoid of the forces
+// is their work; with an edge strained by s at once the error is about s^2 of the energy that contact brings,
+// which is too much only if contact brings more than the body has (doc/decisions/0436).
 bool withstands_blows(World &w, StepContext &step) {
   if (step.rows.ndof == 0) return true;
   Guard &g = step.guard;
@@ -375,8 +375,9 @@ bool stage_guard(World &w, StepContext &step, uint32_t *trouble) {
     *trouble |= tell_jam(w, step);
     return false;
   }
+  if (!withstands_blows(w, step)) return false;
   w.stats.guard_lost += (1 - step.guard.motion) * step.h;
-  return withstands_blows(w, step);
+  return true;
 }
 
 }  // namespace dfm

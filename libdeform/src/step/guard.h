@@ -45,10 +45,10 @@ struct Guard {
   bool resolving = false;  // a solve that starts from `kept`
 
   double planned = 0;                 // s, the sub-step before it was shortened
-  double finer = 1, most_finer = 1;   // a blow divides it and all that follow by this; limit of it
+  double finer = 1, most_finer = 1;   // sub-steps that a blow makes of it and of each later one; limit
   uint32_t pieces = 0;                // cuts of this planned sub-step
   bool acted = false, again = false;  // in this sub-step; it must be repeated
-  bool refines = false;               // then: by `finer`, and so are those that follow
+  bool refines = false;               // then: because of a blow, as the first of `finer` sub-steps
   bool lets_slits = false;            // hits across slits no longer count
   double cut = 1;                     // then: factor on its length
   double motion = 1;                  // < 1: fraction of the displacement that is taken

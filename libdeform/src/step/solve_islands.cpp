@@ -193,7 +193,7 @@ void settle(const World &w, StepContext &step, SolveIsland &own, double &best) {
 
 // Whether velocities still move is asked after every so many sweeps, once the polish is over, and of laws
 // without memory: what is left over stretches bristles. Not while an equilibrium is searched for, which is as
-// good as its contacts. Of bodies that do not revise, between cut faces (doc/decisions/0445).
+// good as its contacts. Bodies that do not revise ask between cut faces only (doc/decisions/0445).
 constexpr uint32_t kAskStands = 4;
 bool asks_redundant(const World &w, const StepContext &step, SolveIsland &own) {
   const uint8_t *const cut = step.solve_islands.of_cuts();
@@ -451,7 +451,7 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
   }
 }
 
-// Multiplications of a sweep, in the time of those of a triangular solve. An impulse at a surfel moves all
+// Multiplications of a triangular solve that take as long as a sweep. An impulse at a surfel moves all
 // touched surfels of its body: three columns of four by vectors, which wait for memory where the response is
 // larger than a cache (doc/decisions/0447-auto-counts-contact.md).
 constexpr double kPairWork = 1.5, kFarPairWork = 6;
