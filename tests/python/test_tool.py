@@ -64,7 +64,8 @@ class Cuts(Scenery):
         body.set_separate(None)
         body.cut("plane", point=(0, 0, 0.001), normal=(0, 0, 1))
         self.assertEqual(len(self.world.bodies), 3)
-        for call in (lambda: body.separate(0), lambda: body.set_separate(crumbs="gone")):
+        for call in (lambda: body.separate(0), lambda: body.separate(1.5),
+                     lambda: body.set_separate(crumbs="gone")):
             with self.assertRaises(deform.ArgumentError):
                 call()
 

@@ -47,8 +47,8 @@ class CutInfo:
 
 def separate_def(least_cells: int, crumbs: str) -> Any:
     """Of Body.separate and Body.set_separate."""
-    if not 1 <= least_cells < 1 << 32:
-        raise ArgumentError(f"least_cells is {least_cells}; expected 1 or more", "DFM_E_ARG")
+    if not (1 <= least_cells < 1 << 32 and least_cells == int(least_cells)):
+        raise ArgumentError(f"least_cells is {least_cells}; expected a whole number from 1 on", "DFM_E_ARG")
     out = default(_abi.dfm_separate_def)
     out.least_cells = int(least_cells)
     out.crumbs = CRUMBS[choice("crumbs", crumbs, CRUMBS)]
