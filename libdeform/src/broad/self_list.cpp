@@ -126,7 +126,8 @@ void SelfList::mark_features() {
 
 void SelfList::follow(const SelfList &list, const FeatureMap &features, std::span<const uint8_t> moved) {
   const Surface &s = surface_;
-  if (list.margin_ < 0 || s.ntri == 0) return;
+  // begun: it has not been completed since the cut before
+  if (list.margin_ < 0 || list.begun_ || s.ntri == 0) return;
   const uint32_t counts[3] = {s.nsurfel, s.nedge, s.ntri};
   for (size_t kind = 0; kind < 3; ++kind) {
     anew_[kind].assign(counts[kind], 1);

@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <numeric>
 #include <random>
 #include <set>
 
@@ -164,6 +166,11 @@ TEST(SelfList, Cut_ContinuesTheLists) {
       if (s.edge[2 * f] == whole.edge[2 * e] && s.edge[2 * f + 1] == whole.edge[2 * e + 1]) now = f;
     map.of[1].push_back(now);
   }
+  FeatureMap same;  // of a cut elsewhere, right after
+  for (size_t kind = 0; kind < 3; ++kind) {
+    same.of[kind].resize((std::array{s.nsurfel, s.nedge, s.ntri})[kind]);
+    std::iota(same.of[kind].begin(), same.of[kind].end(), 0u);
+  }
   for (const bool moved : {false, true}) {
     Surface before = whole;
     SelfList first(Memory::standard(), before), second(Memory::standard(), s);
@@ -180,6 +187,8 @@ TEST(SelfList, Cut_ContinuesTheLists) {
     dent(s, kSquares, 99, 0.01);
     set_back();
     second.follow(first, map, marks);
+    SelfList third(Memory::standard(), s);
+    third.follow(second, same, Array<uint8_t>(s.nsurfel, 0));
     dent(s, kSquares, 99, 0.01);
     dent(s, kSquares, 100, 0.01);
     set_back();
@@ -187,6 +196,8 @@ TEST(SelfList, Cut_ContinuesTheLists) {
     EXPECT_EQ(second.parts(), 1u);
     EXPECT_EQ(second.renewals(), 1u);
     EXPECT_GT(expect_lists_all(s, second, "after the cut"), 100u);
+    EXPECT_TRUE(third.update(0.01, 1e-3));
+    EXPECT_GT(expect_lists_all(s, third, "after two cuts at once"), 100u);
   }
 }
 
