@@ -264,8 +264,8 @@ TEST(Run, CrossingBodies_AreCounted) {
   EXPECT_NE(value(r.summary, "warnings").find("surfaces cross"), std::string::npos);
 }
 
-// A column of blocks that falls onto the floor at once: of its 200 solves seven stop at their limit, none in
-// the first two steps.
+// A column of blocks that falls onto the floor at once. Four of its 200 solves are not done after 50 sweeps,
+// one is not at the defaults, and half of them are not where 20 are the most.
 TEST(Run, SolvesAtTheirLimit_AreSaidWithTheirShare) {
   const std::string scene = folder() + "/column.json";
   std::string bodies;
@@ -286,7 +286,8 @@ TEST(Run, SolvesAtTheirLimit_AreSaidWithTheirShare) {
     more.insert(more.begin(), {"run", scene, "--out", folder() + "/column"});
     return test::deform(more);
   };
-  const test::CommandResult often = go({});
+  const std::string few = "/contact/max_sweeps=1";
+  const test::CommandResult often = go({"--set", few});
   EXPECT_EQ(often.exit_code, 0) << often.err;
   const std::string summary = test::read_file(folder() + "/column/summary.json");
   const std::string count = value(summary, "unconverged_steps") + " of " + value(summary, "substeps");
@@ -294,11 +295,9 @@ TEST(Run, SolvesAtTheirLimit_AreSaidWithTheirShare) {
   EXPECT_NE(often.err.find("take a shorter step"), std::string::npos) << often.err;
   EXPECT_NE(value(summary, "warnings").find("limit of sweeps in " + count), std::string::npos) << summary;
   EXPECT_NE(often.err.find("raise \"max_sweeps\" of \"contact\""), std::string::npos) << often.err;
-  EXPECT_EQ(go({"--quiet"}).err, "");
-  const test::CommandResult more = go({"--set", "/contact/max_sweeps=1000"});
-  EXPECT_EQ(more.err.find("limit of sweeps"), std::string::npos) << more.err;
-  const test::CommandResult never = go({"--time", "0.004"});
-  EXPECT_EQ(never.err.find("limit of sweeps"), std::string::npos) << never.err;
+  EXPECT_EQ(go({"--quiet", "--set", few}).err, "");
+  const test::CommandResult usual = go({});
+  EXPECT_EQ(usual.err.find("limit of sweeps"), std::string::npos) << usual.err;
 }
 
 TEST(Run, LastStep_LandsOnTheEnd) {

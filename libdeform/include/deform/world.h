@@ -41,7 +41,7 @@ typedef struct dfm_world_def {
   double contact_offset;
   /* m/s, slip that a sticking contact may have; 0: min(1e-6, 0.01 (d_c-d_g)/h); doc/decisions/0004 */
   double contact_tolerance;
-  /* per sub-step; 50. Up to eight times as many if bodies would otherwise pass through each other */
+  /* per sub-step; 50. Up to 20 times as many where these cost little (doc/concepts/contact.md) */
   uint32_t max_sweeps;
   uint32_t max_passes;   /* outer passes per sub-step; 20 */
   uint32_t max_substeps; /* a step that needs more returns DFM_DISCARD; 10000 */

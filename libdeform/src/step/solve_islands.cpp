@@ -29,10 +29,28 @@ constexpr double kRememberedShare = 0.05, kRememberedRest = 1e-3;
 // residual would eat more than a tenth of the rest distance within the sub-step, up to kBeyondCap times as
 // many are done (many surfels on few phyxels, struck hard).
 constexpr uint32_t kBeyondCap = 8, kFewSweeps = 8;  // kFewSweeps: where the step has to save
+
+// Where points answer their own impulses alone, contacts that share points may take hundreds of sweeps, which
+// cost little beside the forces of the bodies. After kAccelerated sweeps these go on by momentum, beyond the
+// cap up to kMostBeyond times as many while all rows together are swept at most kFreeShare times per unit of
+// the sub-step's work without contact. That the residual does not fall says nothing: it stays where it is for
+// hundreds of sweeps while loads move to other contacts (doc/decisions/0455-sweeps-go-on-by-momentum.md).
+constexpr uint32_t kAccelerated = 50, kMostBeyond = 20, kLookBeyond = 4;
+constexpr double kFreeShare = 32;
+bool glides(const SolveIsland &own) { return !(own.effort > 0 || own.revises || own.batches.remembers()); }
+double affordable_sweeps(const World &w, const StepContext &step, const SolveIsland &own) {
+  if (!glides(own)) return 0;
+  const double share =
+      kFreeShare * double(body_work(w, step) + surface_work(w, step)) / double(own.spent.all);
+  return std::min(share, double(kMostBeyond) * w.def.max_sweeps);
+}
+
 bool may_sweep(const World &w, const StepContext &step, SolveIsland &own, const Residual &residual,
                uint32_t cap) {
   if (own.sweeps >= kFewSweeps && spares(step, own.spent, Thrift::sweeps)) return false;
   if (own.sweeps < cap) return true;
+  if (own.affordable < 0) own.affordable = affordable_sweeps(w, step, own);
+  if (own.sweeps < own.affordable) return true;
   return residual.normal * step.h > 0.1 * w.offset && own.sweeps < uint64_t{kBeyondCap} * w.def.max_sweeps;
 }
 
@@ -97,6 +115,19 @@ void copy_impulses(const RowsPart &part, const Array<double> &from, Array<double
 }
 void keep_best(StepContext &step, const SolveIsland &own) {
   copy_impulses(own.part, step.rows.impulse, step.best_impulse);
+}
+// The same, and unknowns with them.
+void go_to_best(StepContext &step, const SolveIsland &own) {
+  ContactRows &rows = step.rows;
+  const auto go = [&](uint32_t i) {
+    double *const l = &rows.impulse[size_t(i) * 3];
+    const Vec3 best = load3(&step.best_impulse[size_t(i) * 3]), change = best - load3(l);
+    if (change.x == 0 && change.y == 0 && change.z == 0) return;
+    rows.apply(i, change);
+    store3(l, best);
+  };
+  each_row(own.part.contacts, go);
+  each_row(own.part.bonds, go);
 }
 void take_best(StepContext &step, const SolveIsland &own) {
   copy_impulses(own.part, step.best_impulse, step.rows.impulse);
@@ -284,7 +315,7 @@ bool sweep_until_good(const World &w, StepContext &step, SolveIsland &own) {
     if (solve_backed(w, step, own, kMost) == Backs::now) return true;
     if (gives_up(step, own)) return false;
   }
-  bool asks = false;
+  bool asks = false, momentum = false;
   Looks looks;
   for (double before = leave_of(own);;) {
     const double leave = leave_of(own);
@@ -292,6 +323,10 @@ bool sweep_until_good(const World &w, StepContext &step, SolveIsland &own) {
     before = leave;
     if (asks) own.redundant.note(rows, own.part);
     sweep_once(w, step, own, leave);
+    if (momentum && own.sweeps % kLookBeyond) {
+      own.momentum.follow(rows, own.part);
+      continue;
+    }
     if (!looks.due(step, own, cap)) {
       own.acceleration.follow(rows, own.part);
       continue;
@@ -309,26 +344,29 @@ bool sweep_until_good(const World &w, StepContext &step, SolveIsland &own) {
       best = left.due;
       keep_best(step, own);
     }
+    if (glides(own) && own.sweeps >= kAccelerated && best <= 1) break;
     const Backs backs = solve_backed(w, step, own, kMost);
     if (backs == Backs::now) return true;
     if (gives_up(step, own)) return false;
     own.waits = backs == Backs::later;
     if (own.waits) break;
     if (!may_sweep(w, step, own, left, cap)) break;
+    if (momentum) {
+      own.momentum.follow(rows, own.part);
+      continue;
+    }
+    momentum = glides(own) && own.sweeps >= kAccelerated;
+    if (momentum) {
+      go_to_best(step, own);
+      own.momentum.start(rows, own.part);
+      continue;
+    }
     // what stands is seen from one plain sweep to the next
     asks = asks_redundant(w, step, own);
     own.acceleration.follow(rows, own.part, !asks);
   }
   if (std::isinf(best)) return false;
-  const auto go_back = [&](uint32_t i) {
-    double *const l = &rows.impulse[size_t(i) * 3];
-    const Vec3 change = load3(&step.best_impulse[size_t(i) * 3]) - load3(l);
-    if (change.x == 0 && change.y == 0 && change.z == 0) return;
-    rows.apply(i, change);
-    store3(l, load3(&step.best_impulse[size_t(i) * 3]));
-  };
-  each_row(own.part.contacts, go_back);
-  each_row(own.part.bonds, go_back);
+  go_to_best(step, own);
   if (own.waits) return best <= 1;
   if (best > kMost && own.revises) settle(w, step, own, best);
   if (strides_help(own, best)) stride_on(w, step, own);

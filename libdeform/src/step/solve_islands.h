@@ -43,13 +43,14 @@ struct SolveIsland {
   // of the last solve
   Residual residual;
   uint32_t passes = 0, sweeps = 0;
-  bool slowed = false;  // its depths are opened more slowly
-  bool stalls = false;  // sweeps have ended at the cap in this sub-step, and another method has not
-  bool waits = false;   // for another response, by which that method is possible
-  bool backs = true;    // that method may be tried
-  bool stuck = false;   // it was, and has found nothing
-  bool common = false;  // laws are asked by the response of all contacts together
-  uint32_t asked = 0;   // passes beyond the cap with the present response
+  bool slowed = false;     // its depths are opened more slowly
+  bool stalls = false;     // sweeps have ended at the cap in this sub-step, and another method has not
+  bool waits = false;      // for another response, by which that method is possible
+  bool backs = true;       // that method may be tried
+  bool stuck = false;      // it was, and has found nothing
+  bool common = false;     // laws are asked by the response of all contacts together
+  uint32_t asked = 0;      // passes beyond the cap with the present response
+  double affordable = -1;  // sweeps beyond the cap; < 0: not known yet
   // of the last two passes (Residual::due)
   double due, due_before;
   Spent spent;
@@ -69,6 +70,7 @@ struct SolveIsland {
   void start() {
     passes = sweeps = asked = 0;
     common = false;
+    affordable = -1;
     due = due_before = std::numeric_limits<double>::infinity();
   }
 };
