@@ -9,6 +9,7 @@
 #include "body/make_surface.h"
 #include "core/error.h"
 #include "state/world.h"
+#include "step/blow.h"
 #include "step/context.h"
 #include "step/stages.h"
 #include "step/turn_integrators.h"
@@ -22,7 +23,7 @@ constexpr double kNoPolishAt = 0.25, kFewSweepsAt = 0.5, kNoPiecesAt = 0.75;
 constexpr uint64_t kAutomaticFactor = 1000;
 
 struct StepStopped {
-  enum Why { work, time, asked, costly, too_fine } why;
+  enum Why { work, time, asked, costly, too_fine, struck } why;
 };
 
 // Worlds that were requested to stop. A signal may arrive while a lock is held, so no lock is used; 0: free.
@@ -287,6 +288,7 @@ void charge(World &w, StepContext &step, const Spent &spent) {
 }
 
 void end_explicit_step() { throw StepStopped{StepStopped::too_fine}; }
+void end_struck_step() { throw StepStopped{StepStopped::struck}; }
 
 void keep_start(World &w, StepContext &step) {
   Budget &b = step.budget;
@@ -318,7 +320,8 @@ dfm_status step_within_budget(World &w, double dt, uint32_t *trouble) {
   StepContext &step = *w.steps;
   Budget &b = step.budget;
   b.work = b.limit = 0;
-  b.kept = false;
+  b.kept = b.struck = false;
+  b.offered = chosen_by_library(w, dt) ? dt : 0;
   b.used = Thrift::none;
   b.stats = w.stats;
   b.span = w.def.max_time;
@@ -336,11 +339,13 @@ dfm_status step_within_budget(World &w, double dt, uint32_t *trouble) {
         return run_step(w, step, dt, trouble);
       } catch (const StepStopped &stopped) {
         why = stopped.why;
-        if (why != StepStopped::costly && why != StepStopped::too_fine) throw;
+        if (why < StepStopped::costly) throw;
       }
       return_to_start(w, step);
-      if (why == StepStopped::costly) give_up_implicit(w, step.counting.most_time);
+      if (why == StepStopped::struck) begin_blow(w, dt);
+      else if (why == StepStopped::costly) give_up_implicit(w, step.counting.most_time);
       else take_up_implicit(w);
+      b.struck = b.struck || why == StepStopped::struck;
       b.kept = false;
       b.start.clear();
       Keep again{b.start};

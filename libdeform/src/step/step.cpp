@@ -18,6 +18,7 @@
 #include "state/bounds.h"
 #include "state/world.h"
 #include "step/attach.h"
+#include "step/blow.h"
 #include "step/context.h"
 #include "step/cut_drag.h"
 #include "step/energy_watch.h"
@@ -204,7 +205,7 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
   ++w.step_count;
   w.stats.steps = w.step_count;
   w.stats.time = w.time;
-  end_count(w, step, dt, done);
+  if (!goes_on_after_blow(w, dt)) end_count(w, step, dt, done);
   return DFM_OK;
 }
 

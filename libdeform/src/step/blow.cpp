@@ -1,0 +1,98 @@
+#include "step/blow.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "math/vec3.h"
+#include "plugin/context.h"
+#include "state/world.h"
+#include "step/context.h"
+#include "step/turn_integrators.h"
+
+namespace dfm {
+namespace {
+
+// A body in contact is struck if its mean velocity changes by more than so many times what gravity makes in
+// the sub-step, if that is more than this share of an edge in way (ten times the error that the steps of
+// implicit bodies are allowed), and if the points lose more than this share of what a perfectly inelastic
+// impact takes. At rest the mean velocity stays, and friction on a slope or in a slide changes it by about
+// gravity's part.
+constexpr double kWeights = 2, kWay = 0.05, kLost = 0.5;
+// How long a blow may last, in the explicit steps of the body for each edge along it. A sphere is in contact
+// for 2.3 (c/v)^(1/5) times the time that a wave takes through it (Hertz), at most 9 times for speeds v above
+// a thousandth of the wave speed c, and an edge takes a wave up to four stable steps.
+constexpr double kEdges = 36;
+constexpr double kSame = 1e-6;  // relative: a step of the announced length
+
+bool is_implicit(const Body &b) { return b.integrator.counted == Counted::implicit && !b.slumber.asleep; }
+
+// m, of its bounding box
+double extent(const Body &b) {
+  Vec3 low{HUGE_VAL, HUGE_VAL, HUGE_VAL}, high = -1.0 * low;
+  for (uint32_t i = 0; i < b.p.n; ++i)
+    for (int k = 0; k < 3; ++k) {
+      low[k] = std::min(low[k], b.p.x[size_t{kStride} * i + size_t(k)]);
+      high[k] = std::max(high[k], b.p.x[size_t{kStride} * i + size_t(k)]);
+    }
+  return norm(high - low);
+}
+
+bool touched(const Body &b) {
+  return std::ranges::any_of(b.surfel_impulse, [](double p) { return p != 0; });
+}
+
+bool struck(const World &w, const StepContext &step, const Body &b) {
+  const double *const end = b.dynamics->end().v;
+  Vec3 gained;
+  double mass = 0, lost = 0;
+  for (uint32_t i = 0; i < b.p.n; ++i) {
+    const Vec3 from = load3(&b.p.v[size_t{kStride} * i]), to = load3(&end[size_t{kStride} * i]);
+    gained += b.p.mass[i] * (to - from);
+    lost += 0.5 * b.p.mass[i] * (norm2(from) - norm2(to));
+    mass += b.p.mass[i];
+  }
+  const double change = norm((1 / mass) * gained);
+  return change > kWeights * step.h * norm(w.gravity.now) && step.h * change > kWay * b.surface.median_edge &&
+         lost > kLost * 0.5 * mass * (change * change);
+}
+
+}  // namespace
+
+bool chosen_by_library(const World &w, double dt) {
+  return !(std::fabs(dt - w.def.step) <= kSame * w.def.step) && dt <= accurate_step(w.sizes);
+}
+
+void look_for_blow(const World &w, const StepContext &step) {
+  const Budget &budget = step.budget;
+  if (!step.counting.on || budget.struck || !(budget.offered > 0) || step.rows.n == 0) return;
+  for (const uint32_t i : step.active) {
+    const Body &b = *w.bodies[i];
+    if (!is_implicit(b) || !touched(b) || !struck(w, step, b)) continue;
+    if (budget.offered / b.integrator.step <= w.def.max_substeps) end_struck_step();
+  }
+}
+
+void begin_blow(World &w, double dt) {
+  double lasts = 0;
+  for (const auto &b : w.bodies)
+    if (is_implicit(*b))
+      lasts = std::max(lasts, kEdges * extent(*b) / b->surface.median_edge * b->integrator.step);
+  const IntegratorPurse before = w.purse;
+  give_up_implicit(w, 0);
+  w.purse = before;
+  w.purse.struck_until = w.time + dt + lasts;
+  w.context->logf(DFM_LOG_INFO, "a body was struck: explicit steps until %g s", w.purse.struck_until);
+}
+
+bool goes_on_after_blow(World &w, double dt) {
+  IntegratorPurse now = w.purse;
+  if (!(now.struck_until > 0)) return false;
+  w.integrator_times.all += dt;
+  if (w.time < now.struck_until) return true;
+  take_up_implicit(w);
+  now.struck_until = 0;
+  w.purse = now;
+  return true;
+}
+
+}  // namespace dfm

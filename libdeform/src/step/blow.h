@@ -1,0 +1,24 @@
+// A blow on a body that the library has made implicit, in a step that the library has chosen: contact takes
+// the velocity of the body in one sub-step, and with it the energy that would throw it back. Such a step is
+// repeated explicitly, and explicit time lasts until the blow is over; doc/decisions/0456-blows-by-auto.md.
+#pragma once
+
+namespace dfm {
+
+struct StepContext;
+struct World;
+
+// Whether the library has chosen the length of the next step. Steps of the announced length are the host's;
+// others that are no longer than the offered one follow the errors of implicit bodies.
+bool chosen_by_library(const World &w, double dt);
+// Before a sub-step is committed: ends the step if one of its bodies has been struck.
+void look_for_blow(const World &w, const StepContext &step);
+// From the state before the step: explicit until the blow is over.
+void begin_blow(World &w, double dt);
+// After a step: whether it belongs to a blow, whose steps are not counted. The last one makes bodies implicit
+// again.
+bool goes_on_after_blow(World &w, double dt);
+// Ends the present step for that reason.
+[[noreturn]] void end_struck_step();
+
+}  // namespace dfm
