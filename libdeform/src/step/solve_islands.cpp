@@ -37,7 +37,7 @@ constexpr uint32_t kBeyondCap = 8, kFewSweeps = 8;  // kFewSweeps: where the ste
 // hundreds of sweeps while loads move to other contacts (doc/decisions/0455-sweeps-go-on-by-momentum.md).
 constexpr uint32_t kAccelerated = 50, kMostBeyond = 20, kLookBeyond = 4;
 constexpr double kFreeShare = 32;
-bool glides(const SolveIsland &own) { return !(own.effort > 0 || own.revises || own.batches.remembers()); }
+bool glides(const SolveIsland &own) { return !(own.soft || own.revises || own.batches.remembers()); }
 double affordable_sweeps(const World &w, const StepContext &step, const SolveIsland &own) {
   if (!glides(own)) return 0;
   const double share =
@@ -663,16 +663,15 @@ void SolveIslands::find(const World &w, StepContext &step) {
     SolveIsland &own = islands_[k];
     order_[k] = k;
     own.part.blocks = slice(block_, k);
-    own.revises = own.rigid = false;
-    bool soft = false;
+    own.revises = own.rigid = own.soft = false;
     for (const uint32_t b : own.part.blocks) {
       const bool rigid = blocks[b].group != kNone;
-      soft = soft || !rigid;
+      own.soft = own.soft || !rigid;
       step.revised[b] = !rigid && w.bodies[blocks[b].source]->dynamics->abilities().revises;
       own.rigid = own.rigid || rigid;
       own.revises = own.revises || step.revised[b];
     }
-    own.effort = work_of_sweep(step.rows, own.part, soft);
+    own.effort = work_of_sweep(step.rows, own.part, own.soft);
     own.batches.gather(w.pairs.laws, own.part.contacts, step.state);
   }
   std::sort(order_.begin(), order_.end(), [&](uint32_t l, uint32_t r) {

@@ -30,6 +30,7 @@ struct SolveIsland {
   RowsPart part;
   bool revises = false;  // some body of it looks again at what the solve has made of it
   bool rigid = false;    // some body of it is of a rigid host
+  bool soft = false;     // points of some body of it answer each other
   double effort = 0;     // of a sweep (Spent)
   LawBatches batches;
   Acceleration acceleration;
