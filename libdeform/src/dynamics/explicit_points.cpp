@@ -1,6 +1,7 @@
 #include "dynamics/explicit_points.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <numeric>
 
@@ -63,10 +64,13 @@ bool ExplicitPoints::move_parts(const SubStep &now) {
   const double gravity[kStride] = {now.gravity.x, now.gravity.y, now.gravity.z, 0};
   FreeMotion motion = free_motion_of(p_, gravity, now.h);
   if (part_kinetic_.size() > 1) motion.ahead = kAhead;  // one part lies in the cache
+  std::atomic<size_t> given{0};  // a model that leaves out a part, or gives one it does not have, has failed
   const auto move = [&](uint32_t part, uint32_t n, const uint32_t *point, const double *f) {
+    if (part >= part_kinetic_.size()) return;
     part_kinetic_[part] = loops_.predict_part(motion, n, point, p_.load.data(), f);
+    given.fetch_add(1, std::memory_order_relaxed);
   };
-  return model_.add_part_forces(kin(now.time, now.h, true), move) == DFM_OK;
+  return model_.add_part_forces(kin(now.time, now.h, true), move) == DFM_OK && given == part_kinetic_.size();
 }
 
 bool ExplicitPoints::see_forces(const SubStep &now) { return !moved_ || find_forces(now); }

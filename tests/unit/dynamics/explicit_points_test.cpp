@@ -69,6 +69,23 @@ TEST(ExplicitPoints, PartsAndWhole_LeadToTheSameBits) {
   EXPECT_EQ(whole.body->p.f, parts.body->p.f);
 }
 
+// Of a plugin's model: a part that it does not have would be written beyond the end of an array.
+TEST(ExplicitPoints, ModelThatGivesOtherParts_HasFailed) {
+  const Falling f;
+  dfm::Dynamics &points = *f.body->dynamics;
+  dfm_part_forces &parts = *f.body->model.part_forces;
+  EXPECT_TRUE(points.add_forces(f.now, false));
+  parts.forces = [](void *, const dfm_kin *, uint32_t, dfm_take_part_fn take, void *user) {
+    take(user, 1 << 20, 0, nullptr, nullptr);
+    return dfm_status(DFM_OK);
+  };
+  EXPECT_FALSE(points.add_forces(f.now, false));
+  parts.forces = [](void *, const dfm_kin *, uint32_t, dfm_take_part_fn, void *) {
+    return dfm_status(DFM_OK);
+  };
+  EXPECT_FALSE(points.add_forces(f.now, false));
+}
+
 // Where the guard takes a part of the way, what the inner forces would have done on the rest is booked.
 TEST(ExplicitPoints, APartOfTheWay_BooksTheWorkOfForcesThatWereNotKept) {
   const auto booked = [](bool keep) {
