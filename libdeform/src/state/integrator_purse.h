@@ -10,9 +10,11 @@ inline constexpr uint32_t kMostTries = 5;
 
 // Lasts: a restored world goes on with it.
 struct IntegratorPurse {
-  uint32_t open = 0;        // it has been filled for the first time
-  uint32_t tries = 0;       // of implicit time that were given up since it has last paid
-  double credit = 0;        // s of explicit time
+  uint32_t open = 0;   // it has been filled for the first time
+  uint32_t tries = 0;  // of implicit time that were given up since it has last paid
+  double credit = 0;   // s of explicit time
+  // s of explicit time: work of single steps that were given up, less what implicit steps have saved since
+  double lost = 0;
   double struck_until = 0;  // s, time until which bodies are explicit because of a blow; 0: none
 };
 // What the steps of this world were, where the library may change integrators; not in snapshots.
@@ -22,8 +24,8 @@ struct IntegratorTimes {
   bool told = false;  // a warning has said that bodies are implicit
 };
 inline bool sound(const IntegratorPurse &p) {
-  return p.open <= 1 && p.tries <= kMostTries && std::isfinite(p.credit) && p.struck_until >= 0 &&
-         std::isfinite(p.struck_until);
+  return p.open <= 1 && p.tries <= kMostTries && std::isfinite(p.credit) && p.lost >= 0 &&
+         std::isfinite(p.lost) && p.struck_until >= 0 && std::isfinite(p.struck_until);
 }
 
 }  // namespace dfm

@@ -142,10 +142,15 @@ double body_effort(const World &w, const StepContext &step) { return effort(w) -
 
 void give_up_implicit(World &w, double time) {
   turn(w, Counted::implicit, Counted::explicitly);
-  w.purse.credit -= time;
-  if (w.purse.credit > 0) return;  // one step was dear, not implicit time
-  w.purse.credit = 0;
-  w.purse.tries = std::min(w.purse.tries + 1, kMostTries);
+  IntegratorPurse &purse = w.purse;
+  purse.credit -= time;
+  if (purse.credit > 0) {  // this step cost too much, which says little about the next
+    purse.lost = std::min(purse.lost + time, kMost);
+    purse.credit = std::min(purse.credit, kTry - (purse.lost - time));
+    return;
+  }
+  purse.credit = 0;
+  purse.tries = std::min(purse.tries + 1, kMostTries);
 }
 
 bool may_take_up_implicit(const World &w) {
@@ -169,7 +174,9 @@ void end_count(World &w, StepContext &step, double dt, double substeps) {
   if (any(w, Counted::implicit)) {
     const double rate = (units(w, true) + c.touching) / explicit_step(w);  // units of explicit time in 1 s
     const double taken = (body_effort(w, step) + c.contact) / kUnitWork + substeps * units(w, false);
-    purse.credit = std::min(purse.credit + dt - (rate > 0 ? taken / rate : 0), kMost);
+    const double saved = dt - (rate > 0 ? taken / rate : 0);
+    purse.credit = std::min(purse.credit + saved, kMost);
+    purse.lost = std::max(0.0, purse.lost - std::max(0.0, saved));
     if (purse.credit == kMost) purse.tries = 0;
     if (purse.credit < 0 && c.most > 0) give_up_implicit(w, 0);
     return;

@@ -8,6 +8,10 @@
 // up. Explicit steps add a share of their time; when that pays for a trial, the bodies become implicit again.
 // So trials cost at most that share of explicit time alone, and a body at rest, for which implicit steps are
 // cheap, returns to them.
+//
+// A step of a length that the host gives may cost too much while credit is left. It alone is repeated
+// explicitly, but where one such step follows another, the credit from before says nothing about the next:
+// after the first one explicit steps must put by again what was lost since implicit steps last saved as much.
 #pragma once
 #include <cstddef>
 #include <string>
