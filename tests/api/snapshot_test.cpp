@@ -229,28 +229,6 @@ TEST(Snapshot, DamagedCutOrForeign_IsRefusedAndChangesNothing) {
   EXPECT_EQ(dfm_world_restore(s.world, nullptr, 10), DFM_E_ARG);
 }
 
-// The same body created again is another one, and the sentence says so.
-TEST(Snapshot, AfterABodyWasDestroyedAndCreatedAgain_IsRefusedWithThatReason) {
-  test::Context c;
-  const dfm_world w = test::make_world(c, {0, 0, -9.81});
-  dfm_body_def def = dfm_body_def_default();
-  const double points[] = {0, 0, 0, 0.1, 0, 0, 0, 0.1, 0, 0, 0, 0.1};
-  const uint32_t tets[] = {0, 1, 2, 3};
-  def.name = "cell";
-  def.npoint = 4;
-  def.ntet = 1;
-  def.points = points;
-  def.tets = tets;
-  dfm_body body = 0;
-  test::ok(dfm_body_create(w, &def, &body));
-  const std::string taken = snapshot(w);
-  test::ok(dfm_body_destroy(body));
-  test::ok(dfm_body_create(w, &def, &body));
-  EXPECT_EQ(restore(w, taken), DFM_E_FORMAT);
-  EXPECT_NE(std::string(dfm_last_error()).find("destroyed and created again"), std::string::npos)
-      << dfm_last_error();
-}
-
 TEST(Snapshot, IntoATooSmallBuffer_ReturnsTheNeededSize) {
   test::Context c;
   const test::Stack s = build(c);

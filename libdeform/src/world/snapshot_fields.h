@@ -23,6 +23,7 @@
 #include "world/snapshot_models.h"
 #include "world/snapshot_staged.h"
 #include "world/snapshot_stream.h"
+#include "world/snapshot_things.h"
 
 namespace dfm::snapshot {
 
@@ -90,8 +91,6 @@ inline bool good_stats(const dfm_world_stats &s) {
          must::all_finite(s.guard_lost);
 }
 
-// far more than any run makes, and far below an overflow
-inline constexpr uint64_t kMostIds = uint64_t{1} << 48;
 inline uint64_t last_id(const World &w) {
   uint64_t last = w.obstacles.empty() ? 0 : w.obstacles.back()->id;
   for (const auto *list : {&w.bodies, &w.emptied})
@@ -369,7 +368,9 @@ void fields(Stream &s, W &w, const World &like) {
   at = 0;
   s.members("obstacles", w.obstacles, like.obstacles.size(), [&](auto &entry) {
     auto &o = object(entry);
-    s.where("obstacle", like.obstacles[at++]->name);
+    const Obstacle &l = *like.obstacles[at++];
+    s.where("obstacle", l.name);
+    if (!(l.rigid && l.rigid->njoint)) s.value("first pose", o.def.pose, must::given_pose);
     s.value("pose", o.pose, must::pose);
     s.value("target", o.target, must::pose);
     s.value("has a target", o.has_target, must::flag);

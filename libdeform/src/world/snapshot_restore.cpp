@@ -14,12 +14,13 @@
 #include "world/snapshot_cuts.h"
 #include "world/snapshot_fields.h"
 #include "world/snapshot_structure.h"
+#include "world/snapshot_things.h"
 
 namespace dfm {
 namespace {
 
-// Checks that it is complete, of this version, undamaged, and of a matching world.
-void check_head(const World &w, const unsigned char *data, size_t bytes) {
+// Checks that it is complete, of this version and undamaged. Returns the hash that the world must have.
+uint64_t check_head(const unsigned char *data, size_t bytes) {
   SnapshotHead head{};
   std::memcpy(&head, data, std::min(bytes, sizeof head));
   if (bytes < sizeof head.magic || std::memcmp(head.magic, kSnapshotMagic, sizeof head.magic - 1) != 0)
@@ -38,12 +39,7 @@ void check_head(const World &w, const unsigned char *data, size_t bytes) {
          static_cast<unsigned long long>(head.length), bytes);
   if (head.checksum != snapshot_checksum(data, bytes))
     fail(DFM_E_FORMAT, "the snapshot is damaged (checksum); nothing was restored");
-  if (head.structure != snapshot_structure(w))
-    fail(
-        DFM_E_FORMAT,
-        "the snapshot belongs to another world: it needs the same bodies, obstacles, rigid bodies and tools, "
-        "created in the same order (what was destroyed and created again is not the same), with the same "
-        "names, meshes, masses, materials and fields; nothing was restored");
+  return head.structure;
 }
 
 // Laws are in the order in which the run first needed them, and contacts refer to them by this index.
@@ -199,6 +195,7 @@ void exchange(World &w, Staged &t) noexcept {
   for (size_t i = 0; i < w.obstacles.size(); ++i) {
     Obstacle &o = *w.obstacles[i];
     StagedObstacle &other = t.obstacles[i];
+    if (!(o.rigid && o.rigid->njoint)) std::swap(o.def.pose, other.def.pose);
     std::swap(o.pose, other.pose);
     std::swap(o.target, other.target);
     std::swap(o.has_target, other.has_target);
@@ -250,8 +247,15 @@ void exchange(World &w, Staged &t) noexcept {
 
 void world_restore(World &w, const void *data, size_t bytes) {
   const unsigned char *const p = static_cast<const unsigned char *>(data);
-  check_head(w, p, bytes);
+  const uint64_t structure = check_head(p, bytes);
   SnapshotReader s(p + sizeof(SnapshotHead), p + bytes);
+  ThingRows things;
+  thing_fields(s, things);
+  SnapshotIds ids(w, things);
+  if (structure != rest_of_structure(w))
+    fail(DFM_E_FORMAT,
+         "the snapshot belongs to another world: sets of rigid bodies, tools, contact method or self contact "
+         "differ; create them as they were when it was taken; nothing was restored");
   std::vector<CutRow> cuts;
   cut_fields(s, cuts);
   SnapshotShapes shapes(w, cuts);
@@ -285,6 +289,7 @@ void world_restore(World &w, const void *data, size_t bytes) {
     throw;
   }
   shapes.keep();
+  ids.keep();
 }
 
 }  // namespace dfm

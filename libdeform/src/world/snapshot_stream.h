@@ -4,6 +4,7 @@
 //   bytes 0  "dfmsnap" 0 | u32 version | u32 0 | u64 length of all | u64 hash of what must be the same in
 //   both worlds | u64 checksum | fields
 #pragma once
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -88,6 +89,12 @@ inline constexpr Be pose{[](const Pose &p) {
                            return all_finite(p.position) && rotation.is(q);
                          },
                          "a finite position and a unit quaternion"};
+inline constexpr Be given_pose{[](const dfm_pose &p) {
+                                 const double none[4] = {};
+                                 return all_finite(p.position) &&
+                                        (std::equal(none, none + 4, p.rotation) || rotation.is(p.rotation));
+                               },
+                               "a finite position and a unit quaternion, or zeros"};
 inline constexpr Be flag{[](auto x) { return x == 0 || x == 1; }, "0 or 1"};
 inline auto below(uint64_t n) {
   return Be{[n](uint64_t x) { return x < n; }, "a number of something that is there"};

@@ -39,7 +39,7 @@ void makeup(Hash &h, const Makeup &m) {
 
 // The def in a unique form: a rotation of length zero means none (dfm_pose), and sizes that the shape does
 // not use get their defaults.
-dfm_obstacle_def told(const dfm_obstacle_def &d) {
+dfm_obstacle_def unique_form(const dfm_obstacle_def &d) {
   static const double none[4] = {};
   const dfm_obstacle_def usual = dfm_obstacle_def_default();
   dfm_obstacle_def out = d;
@@ -53,56 +53,58 @@ dfm_obstacle_def told(const dfm_obstacle_def &d) {
 
 }  // namespace
 
-uint64_t snapshot_structure(const World &w) {
+uint64_t make_of(const Body &b) {
   Hash h;
-  for (const Body *const b : all_bodies(w)) {
-    if (b->piece_of) continue;
-    // for a body that has been cut: the original
-    const WholeBody *const whole = b->cut.whole.get();
-    h.add(b->id);
-    if (b->ahead.delay > 0) h.add(b->ahead.delay);
-    h.add(whole ? whole->npoint : b->p.n);
-    h.add(whole ? whole->nsurfel : b->surface.nsurfel);
-    h.add(b->name.data(), b->name.size());
-    h.add(b->material.data(), b->material.size());
-    const Array<uint32_t> &tets = whole ? whole->tets : b->tets;
-    const Array<double> &rest = whole ? whole->rest : b->p.rest, &mass = whole ? whole->mass : b->p.mass;
-    h.add(tets.data(), tets.size() * sizeof(uint32_t));
-    h.add(rest.data(), rest.size() * sizeof(double));
-    h.add(mass.data(), mass.size() * sizeof(double));
-    makeup(h, whole ? whole->makeup : b->makeup);
-    const SurfaceZones &zones = whole ? whole->zones : b->zones;
-    const Surface &s = b->surface;
-    h.add(s.row.data(), s.row.size() * sizeof(uint32_t));
-    h.add(s.col.data(), s.col.size() * sizeof(uint32_t));
-    h.add(s.weight.data(), s.weight.size() * sizeof(double));
-    h.add(s.rest.data(), s.rest.size() * sizeof(double));
-    if (!s.identity()) h.add(s.tri.data(), s.tri.size() * sizeof(uint32_t));
-    zone(h, zones.list[0]);
-    if (zones.of.empty()) continue;
-    for (const auto &z : zones.list) zone(h, z);
-    h.add(zones.of.data(), zones.of.size() * sizeof(uint32_t));
+  // for a body that has been cut: the original
+  const WholeBody *const whole = b.cut.whole.get();
+  if (b.ahead.delay > 0) h.add(b.ahead.delay);
+  h.add(whole ? whole->npoint : b.p.n);
+  h.add(whole ? whole->nsurfel : b.surface.nsurfel);
+  h.add(b.material.data(), b.material.size());
+  const Array<uint32_t> &tets = whole ? whole->tets : b.tets;
+  const Array<double> &rest = whole ? whole->rest : b.p.rest, &mass = whole ? whole->mass : b.p.mass;
+  h.add(tets.data(), tets.size() * sizeof(uint32_t));
+  h.add(rest.data(), rest.size() * sizeof(double));
+  h.add(mass.data(), mass.size() * sizeof(double));
+  makeup(h, whole ? whole->makeup : b.makeup);
+  const SurfaceZones &zones = whole ? whole->zones : b.zones;
+  const Surface &s = b.surface;
+  h.add(s.row.data(), s.row.size() * sizeof(uint32_t));
+  h.add(s.col.data(), s.col.size() * sizeof(uint32_t));
+  h.add(s.weight.data(), s.weight.size() * sizeof(double));
+  h.add(s.rest.data(), s.rest.size() * sizeof(double));
+  if (!s.identity()) h.add(s.tri.data(), s.tri.size() * sizeof(uint32_t));
+  zone(h, zones.list[0]);
+  if (zones.of.empty()) return h.value;
+  for (const auto &z : zones.list) zone(h, z);
+  h.add(zones.of.data(), zones.of.size() * sizeof(uint32_t));
+  return h.value;
+}
+
+uint64_t make_of(const Obstacle &o) {
+  Hash h;
+  const dfm_obstacle_def d = unique_form(o.def);
+  h.add(d.shape);
+  // Anchors of joints are places in the world, so they depend on it. Else the snapshot has it.
+  if (o.rigid && o.rigid->njoint) h.add(d.pose);
+  h.add(d.half_size);
+  h.add(d.radius);
+  h.add(d.half_length);
+  if (!o.points.empty()) {
+    h.add(o.points.data(), o.points.size() * sizeof(double));
+    h.add(o.triangles.data(), o.triangles.size() * sizeof(uint32_t));
+    h.add(d.cells);
   }
-  for (auto &o : w.obstacles) {
-    const dfm_obstacle_def d = told(o->def);
-    h.add(o->id);
-    h.add(d.shape);
-    if (!o->rigid || !o->rigid->of_tool) h.add(d.pose);  // that of a tool follows from its keys
-    h.add(d.half_size);
-    h.add(d.radius);
-    h.add(d.half_length);
-    if (!o->points.empty()) {
-      h.add(o->points.data(), o->points.size() * sizeof(double));
-      h.add(o->triangles.data(), o->triangles.size() * sizeof(uint32_t));
-      h.add(d.cells);
-    }
-    h.add(o->name.data(), o->name.size());
-    if (o->added) {
-      h.add(o->rigid_body);
-      h.add(o->local.position);
-      h.add(o->local.rotation);
-    }
+  if (o.added) {
+    h.add(o.rigid_body);
+    h.add(o.local.position);
+    h.add(o.local.rotation);
   }
+  return h.value;
+}
+
+uint64_t rest_of_structure(const World &w) {
+  Hash h;
   for (auto &set : w.rigid_sets) {
     h.add(set->host_name.data(), set->host_name.size());
     h.add(set->njoint);
@@ -125,6 +127,20 @@ uint64_t snapshot_structure(const World &w) {
   }
   if (w.method->point_values) h.add(w.def.method);
   if (const uint8_t asked = asks_self_contact(w)) h.add(asked);
+  return h.value;
+}
+
+uint64_t snapshot_structure(const World &w) {
+  Hash h;
+  const auto add = [&](const auto &thing) {
+    h.add(thing.id);
+    h.add(thing.name.data(), thing.name.size());
+    h.add(make_of(thing));
+  };
+  for (const Body *const b : all_bodies(w))
+    if (!b->piece_of) add(*b);
+  for (auto &o : w.obstacles) add(*o);
+  h.add(rest_of_structure(w));
   return h.value;
 }
 

@@ -1,12 +1,20 @@
-// A hash of what must be equal in the world that a snapshot is restored into: its bodies and obstacles and
-// their materials. Models are not part of it: a snapshot contains them.
+// What must be equal in the world that a snapshot is restored into, as hashes. Models are not part of it: a
+// snapshot contains them.
 #pragma once
 #include <cstdint>
 
 namespace dfm {
 
+struct Body;
+struct Obstacle;
 struct World;
 
+// Of one of them, without its id and name.
+uint64_t make_of(const Body &b);
+uint64_t make_of(const Obstacle &o);
+// Of the rest: sets of rigid bodies, tools, contact method and self contact.
+uint64_t rest_of_structure(const World &w);
+// Of all, with ids and names: for a world that was written as a scene and read again.
 uint64_t snapshot_structure(const World &w);
 
 }  // namespace dfm
