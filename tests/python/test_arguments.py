@@ -33,6 +33,44 @@ class Arguments(unittest.TestCase):
             self.refused(r"force has the shape \(2,\); expected \(3,\), or \(1, 3\)",
                          lambda: ball.add_load([0], (1, 2)))
 
+    def test_misspelled_attribute_is_an_error(self):
+        with deform.World() as world:
+            ball = world.add_body(deform.TetMesh.ball(0.1, cells=100))
+            for thing in (world, ball, world.add_obstacle("plane"), world.add_tool("sphere", radius=0.01)):
+                with self.assertRaises(AttributeError):
+                    thing.gravty = (0, 0, 0)
+                thing.user = "mine"
+            self.assertEqual(world.bodies[0].user, "mine")
+
+    def test_things_are_not_given_by_other_kinds(self):
+        with deform.World() as world:
+            ball = world.add_body(deform.TetMesh.ball(0.1, cells=100), name="ball")
+            tool = world.add_tool("sphere", radius=0.01, position=(0, 0, 1))
+            for given in ("floor", None, 3):
+                self.refused("attach needs a body, an obstacle or a rigid body, not",
+                             lambda given=given: ball.attach(given))
+                self.refused("a material is made by .*, not",
+                             lambda given=given: world.add_obstacle("plane", material=given or "floor"))
+            self.refused("grab needs a body, not 'ball'", lambda: tool.grab("ball"))
+            for given in ("ball", ["ball"]):
+                self.refused("set_cuts needs a list of bodies, not 'ball'",
+                             lambda given=given: tool.set_cuts(given))
+            self.refused("a side of a rule is .*, not 3", lambda: world.add_friction(ball, 3))
+            self.refused("'b' is not a body, obstacle or material of this world; known",
+                         lambda: world.add_friction("b", "*"))
+
+    def test_sides_of_rules_are_things_or_names(self):
+        with deform.World() as world:
+            rubber = world.add_material("rubber")
+            ball = world.add_body(deform.TetMesh.ball(0.1, cells=100), name="ball", material=rubber)
+            floor = world.add_obstacle("plane", name="floor", material={"friction": 0.2})
+            world.add_friction(ball, floor, mu=0.5)
+            world.set_friction("ball", floor, mu=0.6)
+            world.add_friction(rubber, "*", mu=0.1)
+            world.filter_pair(ball, floor, False)
+            world.remove_friction(ball, "floor")
+            self.refused("needs a name", lambda: world.add_friction(world.add_material(), "*"))
+
     def test_material_has_entries_that_something_reads(self):
         mesh = deform.TetMesh.ball(0.1, cells=100)
         with deform.World() as world:

@@ -98,13 +98,23 @@ def numbers_of(points: Any) -> np.ndarray:
     return np.ascontiguousarray(given, dtype=np.uint32)
 
 
+def handle_of(thing: Any, kind: Any, expected: str) -> int:
+    """The handle of something of this kind; ArgumentError with what was expected if it is something else."""
+    if not isinstance(thing, kind):
+        raise ArgumentError(f"{expected}, not {thing!r}", "DFM_E_ARG")
+    return int(thing.handle)
+
+
 class _Part:
-    """What lives in a world under a handle."""
+    """What lives in a world under a handle. `user` is yours; a misspelled attribute is an error."""
+
+    __slots__ = ("__weakref__", "_columns", "handle", "name", "user", "world")
 
     def __init__(self, world: World, handle: int, name: str):
         self.world = world
         self.handle = handle
         self.name = name
+        self.user: Any = None
         self._columns: dict[str, Any] = {}
 
     def _look(self, key: str, make: Any) -> Any:
@@ -153,6 +163,8 @@ class Body(_Part):
     keeps a state). They are read-only, are never freed beneath you, and keep their last values when the
     world is gone; a new look at a world that is gone raises HandleError, one during a step BusyError.
     """
+
+    __slots__ = ("_info",)
 
     def __init__(self, world: World, handle: int):
         self._info = sized(_abi.dfm_body_info)
@@ -368,7 +380,7 @@ class Body(_Part):
         meanwhile.
         Returns the number of the attachment."""
         definition = default(_abi.dfm_attach_def)
-        definition.to = to.handle
+        definition.to = handle_of(to, _Part, "attach needs a body, an obstacle or a rigid body")
         definition.flags = _abi.DFM_ATTACH_TOUCH if touch else 0
         keep = []
         for name, values in (("point", points), ("surfel", surfels)):
@@ -518,6 +530,8 @@ class Body(_Part):
 class Obstacle(_Part):
     """A rigid thing that feels nothing: plane, sphere, box, capsule, mesh. Made by World.add_obstacle."""
 
+    __slots__ = ()
+
     @property
     def pose(self) -> tuple[np.ndarray, np.ndarray]:
         """position [3] m, rotation [4], a quaternion x, y, z, w."""
@@ -572,6 +586,8 @@ class Obstacle(_Part):
 
 class Rigid(Obstacle):
     """A rigid body that soft bodies push. Made by World.add_rigid."""
+
+    __slots__ = ()
 
     def _state(self) -> _abi.dfm_rigid_state:
         out = _abi.dfm_rigid_state()

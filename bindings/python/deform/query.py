@@ -245,6 +245,8 @@ class _Asked:
 class Queries:
     """What World has of deform/query.h, deform/callback.h and dfm_world_write_scene."""
 
+    __slots__ = ("_known", "_raised")
+
     handle: int
     _raised: BaseException | None
     _known: dict[int, Any] | None

@@ -2,14 +2,14 @@
 from __future__ import annotations
 
 import ctypes
-from typing import TYPE_CHECKING, Any, Sequence
+from typing import TYPE_CHECKING, Any, Mapping, Sequence
 
 import numpy as np
 
 from . import _abi
 from ._context import choice, number_of
 from ._library import ArgumentError, check, default, encoded, lib, quick, sized
-from .body import CUT_WAYS, EVERYTHING, Body, Obstacle, numbers_of, pose_of, vector
+from .body import CUT_WAYS, EVERYTHING, Body, Obstacle, handle_of, numbers_of, pose_of, vector
 
 if TYPE_CHECKING:
     from .mesh import TriMesh
@@ -22,7 +22,10 @@ TOOL_SHAPES = {"sphere": 0, "capsule": 1, "box": 2, "mesh": 3, "grasper": 4, "sc
 class Tool:
     """A rigid thing that is moved once per step and feels what it touches. Made by World.add_tool."""
 
+    __slots__ = ("handle", "name", "user", "world")
+
     def __init__(self, world: World, handle: int, name: str):
+        self.user: Any = None
         self.world, self.handle, self.name = world, handle, name
 
     def __repr__(self) -> str:
@@ -110,7 +113,8 @@ class Tool:
         Body.attachment and Body.detach; none where nothing is in reach."""
         out, n = (ctypes.c_uint32 * 3)(), ctypes.c_uint32()
         self.world.free()
-        check(quick.dfm_tool_grab(self.handle, body.handle, reach, release, 3, out, ctypes.byref(n)))
+        grabbed = handle_of(body, Body, "grab needs a body")
+        check(quick.dfm_tool_grab(self.handle, grabbed, reach, release, 3, out, ctypes.byref(n)))
         return list(out[:n.value])
 
     def set_cuts(self, bodies: Sequence[Body], how: str | None = None, most: int = 0) -> None:
@@ -123,7 +127,11 @@ class Tool:
             bodies = [bodies]
         if how is None:
             how = "split" if self._shape() in (TOOL_SHAPES["blade"], TOOL_SHAPES["scissors"]) else "remove"
-        handles = (ctypes.c_uint64 * max(len(bodies), 1))(*(body.handle for body in bodies))
+        expected = "set_cuts needs a list of bodies"
+        if isinstance(bodies, str):
+            raise ArgumentError(f"{expected}, not {bodies!r}", "DFM_E_ARG")
+        given = [handle_of(body, Body, expected) for body in bodies]
+        handles = (ctypes.c_uint64 * max(len(given), 1))(*given)
         self.world.free()
         check(lib.dfm_tool_set_cuts(self.handle, CUT_WAYS[choice("how", how, CUT_WAYS)], most, len(bodies),
                                     ctypes.byref(handles)))
@@ -154,13 +162,15 @@ class Tool:
 class Tools:
     """The part of World that has tools."""
 
+    __slots__ = ()
+
     def add_tool(self: Any, shape: str = "sphere", *, name: str | None = None,
                  position: Sequence[float] = (0, 0, 0), rotation: Sequence[float] = (0, 0, 0, 1),
                  radius: float = 0, half_size: Sequence[float] = (0, 0, 0), half_length: float = 0,
                  mesh: TriMesh | None = None, opening: float = 0, stiffness: float = 0, damping: float = 0,
                  turn_stiffness: float = 0, turn_damping: float = 0, mass: float = 0.05,
                  inertia: float = 1e-5, late: float = 0, passive: bool = False,
-                 material: Material | None = None, category: int = 1,
+                 material: Material | Mapping[str, Any] | None = None, category: int = 1,
                  collides_with: int = EVERYTHING) -> Tool:
         """A "sphere" (radius), "capsule" (radius, half_length, along z), "box" or "ellipsoid" (half_size
         [3]), "mesh", "blade" (half_size [3]: x its thickness, its edge along y at -z), "grasper" or
@@ -180,7 +190,7 @@ class Tools:
         definition.turn_stiffness, definition.turn_damping = turn_stiffness, turn_damping
         definition.mass, definition.inertia, definition.late = mass, inertia, late
         definition.flags = _abi.DFM_TOOL_PASSIVE if passive else 0
-        definition.material = material.handle if material is not None else 0
+        definition.material = self._material(material)
         definition.category, definition.collides_with = category, collides_with
         if (shape == "mesh") != (mesh is not None):
             raise ArgumentError('a tool of the shape "mesh" needs a mesh, and no other tool has one',

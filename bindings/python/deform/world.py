@@ -18,7 +18,7 @@ from ._arrays import Report, Rows
 from ._context import Context, Params, choice, default_context, number_of, strings
 from ._library import (ArgumentError, BusyError, check, default, encoded, error, lib, quick, read_text, sized)
 from ._signals import watch
-from .body import EVERYTHING, Body, Obstacle, Rigid, pose_of, vector
+from .body import EVERYTHING, Body, Obstacle, Rigid, handle_of, pose_of, vector
 from .mesh import TetMesh, TriMesh, cells_of, points_of
 from .query import Queries
 from .tool import Tools
@@ -47,8 +47,25 @@ class Trouble(enum.IntFlag):
     INTERRUPTED = _abi.DFM_TROUBLE_INTERRUPTED
 
 
+_MATERIAL = "a material is made by add_material, or given as a dict of its entries, as {'young': 2e5}"
+
+
+def _side(given: Any) -> bytes:
+    """A side of a rule: its text, or the name of the thing."""
+    if isinstance(given, Material) and given.name is None:
+        raise ArgumentError("a material needs a name to be a side of a rule; give it one in add_material",
+                            "DFM_E_ARG")
+    name = f"material={given.name}" if isinstance(given, Material) else getattr(given, "name", given)
+    if not isinstance(name, str):
+        raise ArgumentError("a side of a rule is a body, an obstacle, a tool, a material, or a text, not "
+                            f"{given!r}", "DFM_E_ARG")
+    return name.encode()
+
+
 class Material:
     """A named parameter set of a world. Made by World.add_material."""
+
+    __slots__ = ("handle", "name", "world")
 
     def __init__(self, world: World, handle: int, name: str | None):
         self.world, self.handle, self.name = world, handle, name
@@ -113,7 +130,7 @@ class RigidDef:
         out.radius, out.half_length = self.radius, self.half_length
         for key in ("half_size", "inertia", "velocity", "spin"):
             setattr(out, key, vector(getattr(self, key), key))
-        out.material = self.material.handle if self.material is not None else 0
+        out.material = 0 if self.material is None else handle_of(self.material, Material, _MATERIAL)
         return out
 
 
@@ -161,6 +178,8 @@ class World(Queries, Tools):
     arrays keep their last values, and everything else raises HandleError.
     """
 
+    __slots__ = ("__weakref__", "_asked", "_bits", "_bits_at", "_bodies", "_busy", "_finalize", "_functions",
+                 "_lists", "_owner", "context", "handle", "user")
     _finalize: Any
 
     def __init__(self, gravity: Sequence[float] = (0, 0, -9.81), *, integrator: str = "auto",
@@ -192,6 +211,7 @@ class World(Queries, Tools):
         self._finalize = None
         self.context, self.handle = context, handle
         self._owner = owner
+        self.user: Any = None
         self._busy = 0  # the thread that is inside a call
         self._asked = False  # to stop, by a signal
         self._bits = ctypes.c_uint32(0)
@@ -287,6 +307,13 @@ class World(Queries, Tools):
         check(lib.dfm_material_create(self.handle, ctypes.byref(definition), ctypes.byref(out)))
         return Material(self, out.value, name)
 
+    def _material(self, material: Material | Mapping[str, Any] | None) -> int:
+        if material is None:
+            return 0
+        if isinstance(material, Mapping):
+            material = self.add_material(**material)
+        return handle_of(material, Material, _MATERIAL)
+
     def _check_entries(self, extra: Mapping[str, Any]) -> None:
         if all(key in MATERIAL_ENTRIES for key in extra):
             return
@@ -341,12 +368,7 @@ class World(Queries, Tools):
         values = self.context.params("model", model or "msm", params or {})
         definition.name, definition.model = encoded(name), encoded(model)
         definition.model_params = values.struct
-        if isinstance(material, Mapping):
-            material = self.add_material(**material)
-        if material is not None and not isinstance(material, Material):
-            raise TypeError(f"a material is made by add_material or given as a dict of its entries, as "
-                            f"{{'young': 2e5}}; not {material!r}")
-        definition.material = material.handle if material is not None else 0
+        definition.material = self._material(material)
         definition.pose = pose_of(position, rotation)
         definition.velocity, definition.spin = vector(velocity, "velocity"), vector(spin, "spin")
         if fixed is not None:
@@ -382,7 +404,8 @@ class World(Queries, Tools):
                      normal: Sequence[float] | None = None, radius: float = 0,
                      half_size: Sequence[float] = (0, 0, 0), half_length: float = 0,
                      mesh: TriMesh | None = None, cells: int = 0,
-                     velocity_surface: Sequence[float] = (0, 0, 0), material: Material | None = None,
+                     velocity_surface: Sequence[float] = (0, 0, 0),
+                     material: Material | Mapping[str, Any] | None = None,
                      category: int = 1, collides_with: int = EVERYTHING, scale: float = 1) -> Obstacle:
         """A "plane" (through position, with a normal), "sphere" (radius), "box" (half_size [3]), "capsule"
         (radius, half_length, along z), "mesh" or "voxels" (mesh, whose points times scale are in m). m.
@@ -398,7 +421,7 @@ class World(Queries, Tools):
         definition.half_size = vector(half_size, "half_size")
         definition.velocity_surface = vector(velocity_surface, "velocity_surface")
         definition.category, definition.collides_with = category, collides_with
-        definition.material = material.handle if material is not None else 0
+        definition.material = self._material(material)
         if mesh is not None:
             p, t = _scaled(mesh.points, scale), mesh.triangles
             definition.npoint, definition.ntriangle = len(p), len(t)
@@ -480,13 +503,14 @@ class World(Queries, Tools):
 
     # ---- friction --------------------------------------------------------------------------------------
 
-    def add_friction(self, a: str = "*", b: str = "*", law: Any = "coulomb", **params: Any) -> None:
-        """A law between two sides: "*", "material=NAME", the name of a body or an obstacle, or "body:GROUP".
+    def add_friction(self, a: Any = "*", b: Any = "*", law: Any = "coulomb", **params: Any) -> None:
+        """A law between two sides: a body, an obstacle, a tool or a material, or a text: "*",
+        "material=NAME", the name of a body or an obstacle, or "body:GROUP".
 
         law: a name, or a deform.PythonLaw; params: of the law, by key ("mu" sets mu_C and mu_S)."""
         name = self.context.use_law(law)
         values = self.context.params("friction", name, params)
-        sides = [encoded(a), encoded(b)]
+        sides = [_side(a), _side(b)]
         definition = sized(_abi.dfm_friction_def)
         between = (ctypes.c_char_p * 2)(*sides)
         definition.between[:] = (ctypes.c_void_p * 2).from_buffer(between)[:]
@@ -494,21 +518,21 @@ class World(Queries, Tools):
         self.free()
         check(lib.dfm_world_add_friction(self.handle, ctypes.byref(definition)))
 
-    def set_friction(self, a: str, b: str, **params: Any) -> None:
+    def set_friction(self, a: Any, b: Any, **params: Any) -> None:
         """Changes parameters of a rule while the world runs; those that are not given keep their values."""
         self.free()
         values = Params(params)
-        check(lib.dfm_world_set_friction(self.handle, a.encode(), b.encode(), ctypes.byref(values.struct)))
+        check(lib.dfm_world_set_friction(self.handle, _side(a), _side(b), ctypes.byref(values.struct)))
 
-    def remove_friction(self, a: str, b: str) -> None:
+    def remove_friction(self, a: Any, b: Any) -> None:
         """Takes back what add_friction or set_friction said of the two; less specific rules count again."""
         self.free()
-        check(lib.dfm_world_remove_friction(self.handle, a.encode(), b.encode()))
+        check(lib.dfm_world_remove_friction(self.handle, _side(a), _side(b)))
 
-    def filter_pair(self, a: str, b: str, collide: bool) -> None:
+    def filter_pair(self, a: Any, b: Any, collide: bool) -> None:
         """Lets two named sides pass (False) or touch (True)."""
         self.free()
-        check(lib.dfm_world_filter_pair(self.handle, a.encode(), b.encode(), collide))
+        check(lib.dfm_world_filter_pair(self.handle, _side(a), _side(b), collide))
 
     # ---- time ------------------------------------------------------------------------------------------
 

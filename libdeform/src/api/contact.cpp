@@ -62,7 +62,7 @@ std::string side(World &w, const char *text, bool grouped) {
            "'%s': groups of a surface choose friction, not whether it touches; name the whole body", text);
     return found;
   }
-  const std::string near = nearest(s, names);
+  const std::string near = nearest(s, {names.begin() + 1, names.end()});  // "*" is near any short name
   fail(DFM_E_ARG, "'%s' is not a body, obstacle or material of this world%s; known: %s", text,
        near.empty() ? "" : (", did you mean '" + near + "'?").c_str(), join(names).c_str());
 }
