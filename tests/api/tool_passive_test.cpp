@@ -3,20 +3,44 @@
 #include <deque>
 #include <random>
 
-#include "rigid.h"
+#include "tool.h"
 
 namespace {
 
 constexpr double kStep = 1e-3;
 
-// A block on a table, and a ball above it that hangs on a device.
+// A block on a table, or an obstacle, and a ball above it that hangs on a device.
 struct Scene {
   test::Context context;
   dfm_world w = test::make_world(context, {0, 0, 0});
-  dfm_body block;
+  dfm_body block = 0;
   dfm_tool tool = 0;
   Scene(double young, double stiffness, double damping, uint32_t flags, double late = 0) {
-    test::set_friction(w, 0.5);
+    add_block(young);
+    add_ball(stiffness, damping, flags, late);
+  }
+  Scene(uint32_t shape, double stiffness, double damping, uint32_t flags, double late = 0) {
+    const test::tools::BoxMesh table({0.1, 0.1, 0.05});
+    dfm_obstacle_def d = dfm_obstacle_def_default();
+    d.name = "table";
+    d.shape = shape;
+    if (shape == DFM_SHAPE_MESH) {
+      table.put(d);
+      d.pose.position[2] = -0.05;
+    }
+    dfm_obstacle made = 0;
+    test::ok(dfm_obstacle_create(w, &d, &made));
+    add_ball(stiffness, damping, flags, late);
+  }
+  dfm_tool_state state() const {
+    dfm_tool_state s{};
+    s.size = sizeof s;
+    test::ok(dfm_tool_get_state(tool, &s));
+    return s;
+  }
+
+ private:
+  void add_block(double young) {
     test::BodyOptions o;
     o.name = "block";
     o.young = young;
@@ -26,6 +50,9 @@ struct Scene {
     o.model = "corotational_fem";
     block = test::make_body(context, w, "beam", {0.06, 0.06, 0.03}, 60, o);
     test::hold_bottom(block);
+  }
+  void add_ball(double stiffness, double damping, uint32_t flags, double late) {
+    test::set_friction(w, 0.5);
     dfm_tool_def d = dfm_tool_def_default();
     d.name = "ball";
     d.radius = 0.01;
@@ -37,12 +64,6 @@ struct Scene {
     d.flags = flags;
     d.late = late;
     test::ok(dfm_tool_create(w, &d, &tool));
-  }
-  dfm_tool_state state() const {
-    dfm_tool_state s{};
-    s.size = sizeof s;
-    test::ok(dfm_tool_get_state(tool, &s));
-    return s;
   }
 };
 
@@ -175,4 +196,26 @@ TEST(ToolPassive, ALateDevice_IsQuietWhereSoft_AndHeldBackWhereHard) {
   EXPECT_GT(wild.swing, 0.1);
   EXPECT_GT(bound.port_least, -0.5);
   EXPECT_LT(bound.swing, 0.01);
+}
+
+// The same devices against a plane and against triangles, which give way to nothing.
+TEST(ToolPassive, AgainstAnObstacle_TheHandGetsNoMoreThanOnABody) {
+  for (const uint32_t table : {DFM_SHAPE_PLANE, DFM_SHAPE_MESH}) {
+    SCOPED_TRACE(table);
+    for (const double stiffness : {300.0, 1000.0}) {
+      Scene s(table, stiffness, 1.0, DFM_TOOL_PASSIVE);
+      const Pressed p = press(s, 1.5, 0, 0.3);
+      EXPECT_GE(p.port_least, 0);
+      EXPECT_GT(p.hand.given, 5e-4);
+      EXPECT_LT(p.swing, 1e-6);
+      EXPECT_GT(s.state().pose.position[2], 0.01 - 1e-9);
+    }
+    Scene soft(table, 300, 1.0, DFM_TOOL_PASSIVE, 0.01), held(table, 3000, 1.0, DFM_TOOL_PASSIVE, 0.01);
+    const Pressed quiet = press(soft, 2, 10), bound = press(held, 2, 10);
+    EXPECT_GE(quiet.port_least, 0);
+    EXPECT_LT(quiet.swing, 1e-4);
+    EXPECT_LT(quiet.apart, 1e-12);
+    EXPECT_GT(bound.port_least, -0.5);
+    EXPECT_LT(bound.swing, 0.01);
+  }
 }

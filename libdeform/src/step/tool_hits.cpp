@@ -38,10 +38,22 @@ double center_depth(const ToolShape &a, const ToolShape &b) {
   return deepest;
 }
 
-constexpr double kDeep = 0.02;   // of the smaller one's reach, that a host may leave unsaid
-constexpr double kWithin = 0.1;  // of the floor, that a hit may be found above it
+bool cuts(const World &w, const Obstacle &o) {
+  return std::any_of(w.tools.begin(), w.tools.end(),
+                     [&](const auto &t) { return t->set == o.rigid && !t->cuts.bodies.empty(); });
+}
+
+constexpr double kDeep = 0.02;    // of the smaller one's reach, that is left unsaid
+constexpr double kWithin = 0.1;   // of the floor, that a hit may be found above it
+constexpr uint64_t kSeldom = 16;  // steps, of which one looks whether a driven tool is inside triangles
 
 }  // namespace
+
+// Whether so deep that it is said.
+bool ToolTouch::inside(const ToolShape &a, const ToolShape &b, double deep) const {
+  const double smaller = std::min(a.endless() ? HUGE_VAL : a.reach(), b.endless() ? HUGE_VAL : b.reach());
+  return deep > offset_ + kDeep * smaller;
+}
 
 // With the velocities so far, at the end of the sub-step.
 Vec3 ToolTouch::end_of(const Side &side, Vec3 p) const {
@@ -54,7 +66,7 @@ Vec3 ToolTouch::end_of(const Side &side, Vec3 p) const {
 
 void ToolTouch::find_hits(const Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b) {
   const double far = h_ * (fastest(a, at_a, b) + fastest(b, at_b, a));
-  if (far < kSlow || !look_at_each_other(a, b, 2 * far + offset_, !pair.frees)) return;
+  if (far < kSlow || !look_at_each_other(a, b, 2 * far + offset_, pair.jaw)) return;
   const double floor = 0.5 * offset_;
   narrow::PairMotion m;
   m.edges = true;
@@ -113,8 +125,9 @@ void ToolTouch::solve_past_hits(const World &w, const StepContext &step) {
   }
 }
 
-// m, by how far one reaches into the other now, by its corners and along its edges; 0: not at all.
-double ToolTouch::depth(ToolShape &a, ToolShape &b) const {
+// m, by how far one reaches into the other now, by its corners, and along its edges if asked for; 0: not at
+// all.
+double ToolTouch::depth(ToolShape &a, ToolShape &b, bool edges) const {
   if (!look_at_each_other(a, b, offset_, true)) return 0;
   double deepest = 0;
   ObstaclePoint o;
@@ -123,6 +136,7 @@ double ToolTouch::depth(ToolShape &a, ToolShape &b) const {
   };
   for (const auto &[own, other] : {std::pair(&a, &b), std::pair(&b, &a)}) {
     for (const auto &corner : own->corners()) look(*other, corner.at, own->round());
+    if (!edges) continue;
     for (const ToolShape::Edge &e : own->edges())
       for (uint32_t k = 1; k < kLooks; ++k)
         look(*other, e.from + (double(k) / kLooks) * (e.to - e.from), own->round());
@@ -144,11 +158,9 @@ void ToolTouch::tell_passing(const World &w, const StepContext &step) {
     if (!ToolShape::takes_part(va) || !ToolShape::takes_part(vb) || balls_apart(va, vb) || told(pair))
       continue;
     ToolShape shape_a(va), shape_b(vb);
-    const double size = std::min(shape_a.endless() ? HUGE_VAL : shape_a.reach(),
-                                 shape_b.endless() ? HUGE_VAL : shape_b.reach());
     const bool corners = shape_a.has_corners() || shape_b.has_corners();
-    const double deep = corners ? depth(shape_a, shape_b) : center_depth(shape_a, shape_b);
-    if (!(deep > offset_ + kDeep * size)) continue;
+    const double deep = corners ? depth(shape_a, shape_b, true) : center_depth(shape_a, shape_b);
+    if (!inside(shape_a, shape_b, deep)) continue;
     told_.push_back({pair.id[0], pair.id[1]});
     if (!corners) {
       const Obstacle &body = a.rigid && a.rigid->group[a.rigid_body] != DFM_RIGID_STILL ? a : b;
@@ -178,23 +190,54 @@ void ToolTouch::tell_passing(const World &w, const StepContext &step) {
   }
 }
 
-// Two tools that are both driven go where they are told. That they are in each other, or pass, is said once.
+// Once a sentence about two things of which the rows make no end: a tool that goes where it is told, through
+// what stands, and what was put into something that keeps it out.
+void ToolTouch::tell_deep(const World &w, const Pair &pair, double deep, bool driven) {
+  if (told(pair)) return;
+  told_.push_back({pair.id[0], pair.id[1]});
+  const bool first = pair.wall[0] != kNone;
+  const Obstacle &own = *w.obstacles[first ? pair.b : pair.a], &other = *w.obstacles[first ? pair.a : pair.b];
+  if (driven)
+    w.context->logf(DFM_LOG_WARNING,
+                    "tool '%s' is %.3g m deep in '%s' at %.6g s and goes through it, because it goes exactly "
+                    "where it is told; give it a \"coupling\" (stiffness), or filter the pair",
+                    own.name.c_str(), deep, other.name.c_str(), w.time);
+  else
+    w.context->logf(
+        DFM_LOG_WARNING,
+        "'%s' is %.3g m deep in '%s' at %.6g s, which contact opens by %.2g m in a sub-step only; "
+        "place it outside, or filter the pair",
+        own.name.c_str(), deep, other.name.c_str(), w.time, kOpens * offset_);
+}
+
+// Tools that go where they are told, and meet what does so as well, or what stands: they go through it. That
+// of a tool that cuts is no news: its edge goes into the table under what it cuts.
 void ToolTouch::tell_driven(const World &w, const StepContext &step) {
-  const auto driven = [&](const Obstacle &o) {
-    return o.rigid && o.rigid->of_tool && !std::any_of(sides_.begin(), sides_.end(), [&](const Moved &m) {
-             return m.set == o.rigid && m.gives();
-           });
+  const auto yields = [&](const Side &side, const Obstacle &to) {
+    const Moved &m = sides_[side.tool];
+    return m.responds ||
+           (m.gives(to) && std::any_of(m.jaws.begin(), m.jaws.end(),
+                                       [&](const Moved::Jaw &jaw) { return jaw.part == side.part; }));
   };
   for (const Pair &pair : pairs_) {
     const Obstacle &a = *w.obstacles[pair.a], &b = *w.obstacles[pair.b];
-    if (!driven(a) || !driven(b) || told(pair)) continue;
+    const bool wall_a = pair.wall[0] != kNone, wall_b = pair.wall[1] != kNone;
+    const Side at_a = side_of(a, pair.wall[0]), at_b = side_of(b, pair.wall[1]);
+    if ((!wall_a && yields(at_a, b)) || (!wall_b && yields(at_b, a)) || told(pair)) continue;
     const ObstacleView &va = step.obstacle_views[a.slot], &vb = step.obstacle_views[b.slot];
     if (!ToolShape::takes_part(va) || !ToolShape::takes_part(vb)) continue;
+    const bool mesh = va.surface || vb.surface;
+    if (wall_a || wall_b) {
+      if (cuts(w, wall_a ? b : a) || balls_apart(va, vb) || (mesh && w.step_count % kSeldom != 0)) continue;
+      ToolShape shape_a(va), shape_b(vb);
+      const double deep = depth(shape_a, shape_b, !mesh);
+      if (inside(shape_a, shape_b, deep)) tell_deep(w, pair, deep, true);
+      continue;
+    }
     ToolShape shape_a(va), shape_b(vb);
-    const double deep = depth(shape_a, shape_b);
+    const double deep = depth(shape_a, shape_b, true);
     hits_.clear();
-    if (!(deep > offset_))
-      find_hits(pair, shape_a, shape_b, side_of(a, pair.wall[0]), side_of(b, pair.wall[1]));
+    if (!(deep > offset_)) find_hits(pair, shape_a, shape_b, at_a, at_b);
     if (!(deep > offset_) && hits_.empty()) continue;
     told_.push_back({pair.id[0], pair.id[1]});
     w.context->logf(DFM_LOG_WARNING,

@@ -17,7 +17,6 @@ namespace {
 constexpr uint32_t kMostSweeps = 60;
 constexpr double kDone = 1e-13;            // of the largest speed that a row asks to change
 constexpr double kSame = 1e-9;             // of it: soft bodies need not be asked again
-constexpr double kOpens = 0.1;             // of d_c in a sub-step, where two tools are in each other
 constexpr double kJaw = 1e4;               // N/m, of a jaw at its tip
 constexpr double kFace = 1e5;              // N/m, of a place on the face of a jaw
 constexpr double kDent = 5e-4;             // m: edges that are further on the wrong side do not touch there
@@ -32,6 +31,8 @@ constexpr uint32_t kMostPasses = 6;        // over the laws, and what turning ad
 
 bool builtin(const Obstacle &o) { return o.rigid && !o.rigid->of_tool && o.rigid->host_name == "builtin"; }
 bool of_tool(const Obstacle &o) { return o.rigid && o.rigid->of_tool; }
+// Part 0 is the frame.
+bool is_jaw(const Obstacle &o) { return of_tool(o) && o.rigid_body > 0; }
 
 // Moves by its momentum and what touches it alone.
 bool alone(const RigidSet &set, uint32_t body) {
@@ -49,7 +50,7 @@ bool kept_apart(const Obstacle &a, const Obstacle &b) {
   if (of_tool(a) && of_tool(b)) return a.rigid != b.rigid;
   if (of_tool(a) || of_tool(b)) {
     const Obstacle &other = of_tool(a) ? b : a;
-    return is_free(other) || (builtin(other) && is_wall(other));
+    return is_free(other) || is_wall(other);
   }
   return (is_free(a) && (is_free(b) || is_wall(b))) || (is_free(b) && is_wall(a));
 }
@@ -129,7 +130,7 @@ void ToolTouch::prepare(World &w, SceneFacts &facts) {
         touch = rule->collide;
       if (!touch) continue;
       if (!apart) {
-        passing_.push_back({i, j, 0, {a.id, b.id}, true, {kNone, kNone}});
+        passing_.push_back({i, j, 0, {a.id, b.id}, true, false, {kNone, kNone}});
         for (const Obstacle *const o : {&a, &b})
           if (!is_wall(*o) && (cornerless || !is_free(*o)) && (o == &a ? is_wall(b) : is_wall(a)) &&
               std::find(facts.rigid_alone.begin(), facts.rigid_alone.end(), o->name) ==
@@ -137,10 +138,10 @@ void ToolTouch::prepare(World &w, SceneFacts &facts) {
             facts.rigid_alone.push_back(o->name);
         continue;
       }
-      facts.rigid_pairs += !of_tool(a) && !of_tool(b);
+      const bool frees = !of_tool(a) && !of_tool(b), jaw = is_jaw(a) || is_jaw(b);
+      facts.rigid_pairs += frees;
       const uint32_t wall_a = wall(i), wall_b = wall(j);
-      pairs_.push_back(
-          {i, j, law_of_obstacles(w, a, b), {a.id, b.id}, !of_tool(a) && !of_tool(b), {wall_a, wall_b}});
+      pairs_.push_back({i, j, law_of_obstacles(w, a, b), {a.id, b.id}, frees, jaw, {wall_a, wall_b}});
     }
   for (const Pair &pair : pairs_) w.pairs.tool_law.push_back(pair.law);
 }
@@ -162,6 +163,8 @@ Vec3 ToolTouch::change_of(const Row &row) const {
   };
   return at(row.a) - at(row.b);
 }
+
+bool ToolTouch::Moved::gives(const Obstacle &to) const { return responds || (to.rigid && !jaws.empty()); }
 
 void ToolTouch::push(const Side &side, Vec3 impulse, Vec3 moment, std::vector<double> Moved::*to,
                      bool turns_jaws) {
@@ -228,23 +231,23 @@ void ToolTouch::list_jaws(Moved &m) const {
 
 // A jaw that has been turned goes back to where it is told by a large angle, and what holds it takes that
 // back to first order. The way along the arc beyond it, h w x (w x r) / 2, would stay as creep: this part of
-// its motion counts to first order. With the frame it goes along the whole arc.
+// its motion counts to first order. With the frame it goes along the whole arc; where the frame gives way,
+// by the spin that it ends with, not by the one without contact (bend).
 void ToolTouch::straighten(Moved &m) const {
   if (m.jaws.empty()) return;
   const dfm_rigid_state &frame = m.set->state[0];
   for (const Moved::Jaw &jaw : m.jaws) {
     double *const v = &m.free[6 * size_t{jaw.part}];
     const Vec3 spin = load3(&m.free[3]), arm = load3(m.set->state[jaw.part].position) - load3(frame.position);
-    const double rate = dot(jaw.axis, load3(v + 3) - spin);
-    const Vec3 carried = rotate(turned(Quat{}, h_ * spin), arm) - arm;
+    // about the hinge, as seen from the frame
+    const Quat own = rotation_of(m.set->state[jaw.part]), to = turned(own, h_ * load3(v + 3));
+    const Quat seen = conjugate(turned(rotation_of(frame), h_ * spin)) * to,
+               before = conjugate(rotation_of(frame)) * own;
+    const double rate = (1 / h_) * rotation_vector(seen * conjugate(before)).y;
+    const Vec3 carried = m.responds ? h_ * cross(spin, arm) : rotate(turned(Quat{}, h_ * spin), arm) - arm;
     store3(v, load3(&m.free[0]) + (1 / h_) * carried + rate * jaw.lever);
     store3(v + 3, spin + rate * jaw.axis);
   }
-}
-
-bool ToolTouch::soft(const Side &a, const Side &b) const {
-  const auto is_jaw = [&](const Side &s) { return s.part > 0 && !sides_[s.tool].jaws.empty(); };
-  return is_jaw(a) || is_jaw(b);
 }
 
 // The impulses of a set: those of soft bodies, and of the rows.
@@ -304,6 +307,11 @@ Vec3 ToolTouch::bend(Vec3 spin, Vec3 arm) const {
 // Of the material at the place. Around a corner the place goes with the normal, which turns with the other
 // side: a ball that rolls has no bend, and a rod that turns with the jaws that hold it the one of a corner.
 Vec3 ToolTouch::bend(const Side &side, const Side &other) const {
+  const Moved &m = sides_[side.tool];
+  if (m.set && m.responds && !m.jaws.empty()) {
+    const Side frame{side.tool, 0, {}, {}};
+    return bend(spin(frame), side.bone + center(side) - center(frame));
+  }
   const Vec3 own = spin(side), round = side.arm - side.bone;
   Vec3 out = bend(own, side.bone);
   if (norm2(round) == 0) return out;
@@ -328,18 +336,19 @@ void ToolTouch::add_row(const Pair &pair, Name name, Side a, Side b, const Place
   if (!(gap - offset_ < reach)) return;
   a.arm = place.at - center(a);
   b.arm = place.at - center(b);
-  a.bone = pair.frees ? place.bone_a - center(a) : a.arm;
-  b.bone = pair.frees ? place.bone_b - center(b) : b.arm;
+  a.bone = pair.jaw ? a.arm : place.bone_a - center(a);
+  b.bone = pair.jaw ? b.arm : place.bone_b - center(b);
   Row row{};
   row.a = a;
   row.b = b;
   row.frees = pair.frees;
+  row.jaw = pair.jaw;
   row.normal = normal;
   row.law = pair.law;
   row.pair[0] = pair.id[0];
   row.pair[1] = pair.id[1];
   row.key = key_of(pair.id, name);
-  if (soft(a, b)) {
+  if (pair.jaw) {
     row.soft = 1 / (h_ * h_ * kFace);
     row.rate = (offset_ - gap) / h_;
   } else if (gap >= offset_) row.rate = -(gap - offset_) / h_;
@@ -377,11 +386,12 @@ bool ToolTouch::look_at_each_other(ToolShape &a, ToolShape &b, double far, bool 
   return true;
 }
 
-// Corners of each against the other, and edges that cross.
-void ToolTouch::add_rows(const Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b) {
+// Corners of each against the other, and edges that cross. m, by how far a corner is inside; 0: by nothing.
+double ToolTouch::add_rows(const Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b) {
   const double reach = 2 * h_ * (fastest(a, at_a, b) + fastest(b, at_b, a)) + offset_;
   const double far = reach + offset_;
-  if (!look_at_each_other(a, b, far, !pair.frees)) return;
+  if (!look_at_each_other(a, b, far, pair.jaw)) return 0;
+  double deepest = 0;
   ObstaclePoint o;
   // An edge or a corner is met where a corner leads: beside it lies what is not in the way, as the vertices
   // of a floor beside the lower edge of a box that slides over it.
@@ -390,6 +400,7 @@ void ToolTouch::add_rows(const Pair &pair, ToolShape &a, ToolShape &b, Side at_a
     const auto &[corner, number] = c;
     if (!b.closest(corner, far + a.round(), o, &face) || !(face || a.may_meet(c, -o.normal))) continue;
     const double gap = o.distance - a.round();
+    deepest = std::max(deepest, -gap);
     add_row(pair, {kCornerOfA, number, 0}, at_a, at_b,
             {o.point + 0.5 * gap * o.normal, corner, o.point - b.round() * o.normal}, o.normal, gap, reach);
   }
@@ -397,6 +408,7 @@ void ToolTouch::add_rows(const Pair &pair, ToolShape &a, ToolShape &b, Side at_a
     const auto &[corner, number] = c;
     if (!a.closest(corner, far + b.round(), o, &face) || !(face || b.may_meet(c, -o.normal))) continue;
     const double gap = o.distance - b.round();
+    deepest = std::max(deepest, -gap);
     add_row(pair, {kCornerOfB, number, 0}, at_a, at_b,
             {o.point + 0.5 * gap * o.normal, o.point - a.round() * o.normal, corner}, -o.normal, gap, reach);
   }
@@ -414,6 +426,7 @@ void ToolTouch::add_rows(const Pair &pair, ToolShape &a, ToolShape &b, Side at_a
       add_row(pair, {kEdges, p.number, q.number}, at_a, at_b,
               {on_b + (b.round() + 0.5 * gap) * n, on_a, on_b}, n, gap, reach);
     }
+  return deepest;
 }
 
 ToolTouch::Side ToolTouch::side_of(const Obstacle &o, uint32_t wall) const {
@@ -435,7 +448,7 @@ void ToolTouch::each_pair(const World &w, const StepContext &step, const Visit &
     const ObstacleView &va = step.obstacle_views[a.slot], &vb = step.obstacle_views[b.slot];
     if (!ToolShape::takes_part(va) || !ToolShape::takes_part(vb)) continue;
     const Side at_a = side_of(a, pair.wall[0]), at_b = side_of(b, pair.wall[1]);
-    if (!sides_[at_a.tool].gives() && !sides_[at_b.tool].gives()) continue;
+    if (!sides_[at_a.tool].gives(b) && !sides_[at_b.tool].gives(a)) continue;
     shapes_[0].take(va);
     shapes_[1].take(vb);
     f(pair, shapes_[0], shapes_[1], at_a, at_b);
@@ -444,7 +457,8 @@ void ToolTouch::each_pair(const World &w, const StepContext &step, const Visit &
 
 void ToolTouch::find(const World &w, const StepContext &step) {
   each_pair(w, step, [&](const Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b) {
-    add_rows(pair, a, b, at_a, at_b);
+    const double deep = add_rows(pair, a, b, at_a, at_b);
+    if (!pair.jaw && inside(a, b, deep)) tell_deep(w, pair, deep, false);
   });
 }
 
@@ -586,13 +600,13 @@ void ToolTouch::take_sets(World &w, StepContext &step) {
 }
 
 // The way of a corner is an arc, and passes over it (solve) converge by a factor of about h w each; from
-// about a radian on they do not, a corner ends in a floor, and energy comes from nowhere. False: a free body
+// about a radian on they do not, a corner ends in a floor, and energy comes from nowhere. False: something
 // that touches turns so far in this sub-step, which is to be repeated shorter. The arc leaves its tangent by
 // at most (h w)^2 r / 2: what stays clear by that does not touch.
 bool ToolTouch::follows_arcs(StepContext &step) const {
   double turn = 0;
   for (const Row &row : rows_) {
-    if (!row.frees) continue;
+    if (row.jaw) continue;
     double most = 0, leaves = 0;
     for (const Side *side : {&row.a, &row.b}) {
       const double r = norm(side->bone), way = h_ * norm(cross(spin(*side), side->bone));

@@ -1,20 +1,23 @@
 // Contact of things that are rigid on both sides, where one of the two gives way: tools (deform/tool.h) and
-// free bodies (those of the builtin host that no joint holds) with each other, and free bodies with what
-// stands or goes its way (obstacles, fixed bodies). Spheres, capsules, boxes and triangles, with the law of
-// the pair; of obstacles also planes and voxels, which only corners touch.
+// free bodies (those of the builtin host that no joint holds), with each other and with what stands or goes
+// its way (obstacles, fixed bodies). A coupled tool gives way by its spring, a free body by its mass; a tool
+// that goes where it is told is a wall. Spheres, capsules, boxes and triangles, with the law of the pair; of
+// obstacles also planes and voxels, which only corners touch.
 //
 //   rows     u_n' >= -(gap - d_c) / h at the nearest places of two parts, p >= 0, one of both is zero; the
 //            impulse acts at one point of both, so that both momenta are kept to rounding
 //   energy   p u_n' <= 0 for gap >= d_c / 2: such a contact takes energy or none. What is nearer opens by at
 //            most a tenth of d_c in a sub-step
 //   turning  of a free body counts to third order, along the normal too: to first order alone a body that
-//            topples would sink by (h w)^2 r / 2 in a sub-step, and it rises by a tenth of d_c
+//            topples would sink by (h w)^2 r / 2 in a sub-step, and it rises by a tenth of d_c. Not of tools:
+//            it would give them p (h w)^2 r / 2 of energy, and their springs hold them upright
 //   friction the law of the pair, implicitly, at the slip and normal force of the solution (tool_rub.cpp);
 //            impulses and the state of the law last from sub-step to sub-step (World::tool_store)
 //   jaws     go where they are told, so what two of them hold would be pressed without a bound. Something
 //            rigid turns a jaw about its hinge by moment over stiffness, at the end of the sub-step (a spring
 //            without mass, backward Euler); soft bodies do not. Places on its face give way, too, by a
-//            hundredth of a millimeter per newton: how rigid things share a load has no other answer
+//            hundredth of a millimeter per newton: how rigid things share a load has no other answer.
+//            Without a coupling jaws go into obstacles, as their tool does
 //   order    first without soft bodies, which then see how the tools really move; their impulses come back
 //            into the same rows until neither changes the other
 #pragma once
@@ -63,7 +66,7 @@ class ToolTouch {
     size_t tool;  // place in sides_
     uint32_t part;
     Vec3 arm;   // of the place, from its center
-    Vec3 bone;  // of a round shape between free bodies: of the corner or axis inside; else arm
+    Vec3 bone;  // of a round shape: of the corner or axis inside; else, and beside a jaw, arm
   };
   struct Row {
     Side a, b;
@@ -76,7 +79,7 @@ class ToolTouch {
     uint32_t law;
     double impulse, along[2];  // N s on a: along the normal and the tangents
     Vec3 bend;                 // m/s, what turning adds to the slip beyond the first order, and belts
-    bool frees;                // of no tool
+    bool frees, jaw;           // none is of a tool; one is a jaw
     double lift;               // m/s, what turning adds to the speed along the normal, of free bodies
     Vec3 before;               // the impulse on a that velocities have
     Vec3 given() const { return impulse * normal + along[0] * tangent[0] + along[1] * tangent[1]; }
@@ -99,13 +102,14 @@ class ToolTouch {
       double moment;     // N m s, of the rows
     };
     std::vector<Jaw> jaws;
-    bool gives() const { return responds || !jaws.empty(); }
+    // Jaws of a tool that goes where it is told give way to tools and bodies: its keys lead it along a table.
+    bool gives(const Obstacle &to) const;
   };
   // Two obstacles that may touch, by their places in World::obstacles.
   struct Pair {
     uint32_t a, b, law;
     uint64_t id[2];
-    bool frees;        // none is of a tool
+    bool frees, jaw;   // none is of a tool; one is a jaw
     uint32_t wall[2];  // number among walls_; kNone: it is in a set
   };
   // What of the two meets.
@@ -132,7 +136,7 @@ class ToolTouch {
   using Visit = std::function<void(const Pair &, ToolShape &, ToolShape &, Side, Side)>;
   void each_pair(const World &w, const StepContext &step, const Visit &f);
   static bool look_at_each_other(ToolShape &a, ToolShape &b, double far, bool flat);
-  void add_rows(const Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b);
+  double add_rows(const Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b);
   void add_row(const Pair &pair, Name name, Side a, Side b, const Place &place, Vec3 normal, double gap,
                double reach);
   static uint64_t key_of(const uint64_t pair[2], Name name);
@@ -146,7 +150,6 @@ class ToolTouch {
   Vec3 belt(const Side &side) const;
   void add_impulses(size_t k);
   double follow_spin();
-  bool soft(const Side &a, const Side &b) const;
   double sweep();
   void sweep_until(double done);
   void take_impulses(Array<double> &to) const;
@@ -197,10 +200,12 @@ class ToolTouch {
   void find_hits(const Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b);
   bool add_hits(const World &w, const StepContext &step);
   void solve_past_hits(const World &w, const StepContext &step);
-  double depth(ToolShape &a, ToolShape &b) const;
+  double depth(ToolShape &a, ToolShape &b, bool edges) const;
   void tell_driven(const World &w, const StepContext &step);
+  void tell_deep(const World &w, const Pair &pair, double deep, bool driven);
   void tell_passing(const World &w, const StepContext &step);
   bool told(const Pair &pair) const;
+  bool inside(const ToolShape &a, const ToolShape &b, double deep) const;
   Side side_of(const Obstacle &o, uint32_t wall) const;
   void take_sets(World &w, StepContext &step);
   void give_velocities();
@@ -210,6 +215,8 @@ class ToolTouch {
   Vec3 slip(const Row &row) const;
   std::array<double, 2> rub(uint32_t i) const;
   void keep_next();
+
+  static constexpr double kOpens = 0.1;  // of d_c in a sub-step, where two things are in each other
 
   double h_ = 0, offset_ = 0;
   std::vector<Pair> pairs_,
