@@ -1,12 +1,14 @@
 // Memory: a settled step allocates nothing; every allocation may fail; what the hooks gave comes back.
 #include <atomic>
 #include <cstdlib>
+#include <filesystem>
 
 #include "bristle_law.h"
 #include "coupled.h"
 #include "heap_calls.h"
 #include "obstacle.h"
 #include "rigid.h"
+#include "support.h"
 
 namespace {
 
@@ -299,17 +301,23 @@ TEST(Memory, ParametersThatFindNoMemory_ReportNoMemoryAndChangeNothing) {
 }
 
 // Everything from the context to a step in contact, with the allocator failing at the n-th call, for all n
-// that are ever reached.
+// that are ever reached. The folder has the plugins that the scene uses: each context loads what is there.
 TEST(Memory, WhenTheNthAllocationFails_TheCallFailsCleanlyAndNothingLeaks) {
   const test::Triangles slab = test::box_surface({0.2, 0.2, 0.05}, 1);
   int failures[4] = {};
   bool through = false;
   const test::Skin skin = test::ball_skin(0.049, 1);
   const dfm_surface_def surface = skin.def(DFM_COUPLING_MLS, 1.5);
+  const std::string plugins = test::scratch("memory_plugins");
+  for (const char *file : {"/model_msm.so", "/friction_coulomb.so"}) {
+    std::filesystem::remove(plugins + file);
+    std::filesystem::create_symlink(std::string(DEFORM_PLUGIN_DIR) + file, plugins + file);
+  }
   for (int64_t n = 0; !through && n < 20000; ++n) {
     Hooks hooks;
     hooks.fail_from = n;
-    const dfm_context_def def = hooks.def();
+    dfm_context_def def = hooks.def();
+    def.plugin_dir = plugins.c_str();
     dfm_context *c = nullptr;
     dfm_world world = 0;
     dfm_tetmesh mesh = 0;
