@@ -40,6 +40,22 @@ def follow(guide, prefix, libdir, scratch):
     return folder
 
 
+def copy_from_spaces(guide, prefix, libdir, scratch):
+    """The first block of a guide, which copies a template, where the prefix has a space."""
+    spaced = scratch / "a prefix"
+    spaced.mkdir(exist_ok=True)
+    if not (spaced / "tree").exists():
+        (spaced / "tree").symlink_to(prefix)
+    folder = scratch / f"{guide.stem} beside"
+    folder.mkdir()
+    block = re.search(r"^```sh\n(.*?)^```", guide.read_text(), re.M | re.S)[1]
+    env = {**clean_environment(), "PKG_CONFIG_PATH": str(spaced / "tree" / libdir / "pkgconfig")}
+    here = os.getcwd()
+    os.chdir(folder)
+    run("sh", "-ec", block, env=env)
+    os.chdir(here)
+
+
 def judge_law(folder):
     """What the guide of laws leaves behind: a law that holds a block in a scene, and its run on the rig."""
     summary = json.loads((folder / "out" / "summary.json").read_text())
@@ -87,6 +103,8 @@ def main():
             print(f"{guide.name} passed over: this build has no {needs[1]}")
             continue
         folder = follow(guide, prefix, libdir, scratch)
+        if "templatedir" in guide.read_text():
+            copy_from_spaces(guide, prefix, libdir, scratch)
         if guide.stem == "write-a-law":
             judge_law(folder)
         if guide.stem == "write-a-model":
