@@ -216,40 +216,46 @@ static inline void fans(const SingleBlock &b, float unit, float damp) {
       const vf square1 = dot(e1, e1);
       const size_t slot = ray_at + half, cell = cell_at + half;
       Three at_b = zero - pull<kTilts, kDamping>(b, slot, square1, rate_of(axis.rate, e1), damp) * e1;
-      Three e2, normal2, at_ring;  // of the ring point before
-      vf square2;
-      for (uint32_t k = 0; k <= cells; ++k) {
+      // The points of the ring one after another: e2, normal2 and at_ring are of the one before.
+      const auto ring_point = [&](uint32_t k, Three &e, vf &square) __attribute__((always_inline)) {
         const Ray ray = ray_to(2 + k);
-        const Three e3 = metres(ray.whole, unit);
-        const vf square3 = dot(e3, e3);
-        Three here = zero - pull<kTilts, kDamping>(b, slot + kFans * (1 + size_t(k)), square3,
-                                                   rate_of(ray.rate, e3), damp) *
-                                e3;
+        e = metres(ray.whole, unit);
+        square = dot(e, e);
+        return zero -
+               pull<kTilts, kDamping>(b, slot + kFans * (1 + size_t(k)), square, rate_of(ray.rate, e), damp) *
+                   e;
+      };
+      Three e2, normal2 = zero;
+      vf square2;
+      Three at_ring = ring_point(0, e2, square2);
+      if constexpr (kCells) normal2 = cross(e1, e2);
+      for (uint32_t k = 1; k <= cells; ++k) {
+        Three e3;
+        vf square3;
+        Three here = ring_point(k, e3, square3);
         if constexpr (kCells) {
           const Three normal3 = cross(e1, e3);
-          if (k > 0) {
-            const size_t t = cell + kFans * (k - 1);
-            Three g1 = cross(e2, e3), g2 = zero - normal3, g3 = normal2;
-            const vf now = dot(e1, g1);
-            const Three sum = (e1 + e2) + e3;
-            const vf q = 4.0f * ((square1 + square2) + square3) - dot(sum, sum);
-            if (any(q > load(b.limit + t))) {
-              stretched_forces(b, t, q, now, e1, e2, e3, g1, g2, g3);
-            } else {
-              const vf pressure = pressure_of(b, t, now);
-              g1 = pressure * g1;
-              g2 = pressure * g2;
-              g3 = pressure * g3;
-            }
-            at_b = at_b + g1;
-            at_ring = at_ring + g2;
-            here = here + g3;
+          const size_t t = cell + kFans * (k - 1);
+          Three g1 = cross(e2, e3), g2 = zero - normal3, g3 = normal2;
+          const vf now = dot(e1, g1);
+          const Three sum = (e1 + e2) + e3;
+          const vf q = 4.0f * ((square1 + square2) + square3) - dot(sum, sum);
+          if (any(q > load(b.limit + t))) {
+            stretched_forces(b, t, q, now, e1, e2, e3, g1, g2, g3);
+          } else {
+            const vf pressure = pressure_of(b, t, now);
+            g1 = pressure * g1;
+            g2 = pressure * g2;
+            g3 = pressure * g3;
           }
+          at_b = at_b + g1;
+          at_ring = at_ring + g2;
+          here = here + g3;
           e2 = e3;
           square2 = square3;
           normal2 = normal3;
         }
-        if (k > 0) store_rows(at_ring, out + 4 * kLanes * k);
+        store_rows(at_ring, out + 4 * kLanes * k);
         at_ring = here;
       }
       store_rows(at_ring, out + 4 * kLanes * (cells + 1));
