@@ -86,7 +86,11 @@ void Aside::start(std::shared_ptr<Job> job) noexcept {
 
 bool Aside::finish(const std::shared_ptr<Job> &job, std::chrono::microseconds most) {
   Job::State state = Job::waits;
-  if (job->state_.compare_exchange_strong(state, Job::left)) return false;
+  if (job->state_.compare_exchange_strong(state, Job::left)) {
+    // Its memory is not held until the thread comes to it.
+    if (const std::unique_lock lock = room_->locked()) std::erase(room_->jobs, job);
+    return false;
+  }
   const auto until = std::chrono::steady_clock::now() + most;
   // asleep, since the thread may need this core
   while (job->state_ == Job::runs && std::chrono::steady_clock::now() < until)

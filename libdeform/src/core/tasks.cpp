@@ -206,6 +206,7 @@ Tasks::Tasks(uint32_t threads, HostFor host_for, void *host_user)
   // More threads than processors would have to sleep between jobs: they are of no use. Two are always made.
   const uint32_t processors = std::thread::hardware_concurrency();
   const uint32_t members = processors ? std::min(threads_, std::max(2u, processors)) : threads_;
+  threads_ = members;  // what threads() says: those that there are
   pool_ = std::make_unique<Pool>(members);
   pool_->crowded = processors > 0 && members > processors;
   pool_->workers.reserve(members - 1);

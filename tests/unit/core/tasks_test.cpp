@@ -104,6 +104,7 @@ TEST(Tasks, JobsOnMoreThreadsThanProcessors_UseAsManyAsProcessors) {
       seen.insert(std::this_thread::get_id());
     });
   EXPECT_LE(seen.size(), std::max(2u, processors));
+  EXPECT_EQ(tasks.threads(), std::max(2u, processors));
 }
 
 // A job does not end before its last block has, also where that takes so long that the owner sleeps.
