@@ -188,7 +188,10 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"model_single_without_forces", "V03", "lacks prepare or add_forces"},
         Case{"model_single_otherwise", "M22", "off those in double"},
         Case{"model_single_rounds", "M22", "sum to"},
-        Case{"model_single_refuses_in_silence", "M22", "without a reason"}),
+        Case{"model_single_refuses_in_silence", "M22", "without a reason"},
+        Case{"model_gives_a_part_beyond", "M23", "part 2, and"},
+        Case{"model_leaves_out_a_part", "M23", "part 1 0 times"},
+        Case{"model_parts_otherwise", "M23", "off those of add_forces"}),
     [](const auto &one) { return std::string(one.param.law); });
 
 TEST(BrokenLaw, EveryBrokenLaw_IsInTheTable) {
@@ -217,8 +220,8 @@ TEST(BrokenLaw, CorrectTemplates_PassEveryRule) {
   EXPECT_EQ(forces.exit_code, 0) << forces.out << forces.err;
   EXPECT_EQ(steps.exit_code, 0) << steps.out << steps.err;
   EXPECT_EQ(rules_that("skip", forces.out),
-            SANITIZED ? (std::vector<std::string>{"M14", "M18", "M19", "M20", "M22"})
-                      : (std::vector<std::string>{"V10", "M14", "M18", "M19", "M20", "M22"}))
+            SANITIZED ? (std::vector<std::string>{"M14", "M18", "M19", "M20", "M22", "M23"})
+                      : (std::vector<std::string>{"V10", "M14", "M18", "M19", "M20", "M22", "M23"}))
       << forces.out;
   for (const char *rule : {"M03", "M10", "M14", "M16", "M18", "M19"})
     EXPECT_NE(steps.out.find(std::string(rule) + " pass"), std::string::npos) << steps.out;

@@ -317,7 +317,7 @@ int run(const Globals &globals, const Request &request) {
   for (const std::string &id : request.only) {
     const Rule *rule = find_rule(id);
     if (!rule)
-      return fail("--only: there is no rule \"" + id + "\"; rules are V01 to V14, F01 to F17 and M01 to M22");
+      return fail("--only: there is no rule \"" + id + "\"; rules are V01 to V14, F01 to F17 and M01 to M23");
     wanted.push_back(rule);
   }
   for (const Rule &rule : rules())

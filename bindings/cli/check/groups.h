@@ -71,6 +71,7 @@ std::string collapsed_cells_stay_finite(const Subject &);
 std::string cell_energy_sums(const Subject &);
 // rules_single.cpp
 std::string single_is_close(const Subject &);
+std::string parts_are_the_whole(const Subject &);
 // rules_stepper.cpp: how it goes on, and bodies that step themselves
 uint64_t digest_of_model(const Subject &);
 std::string state_is_the_hosts(const Subject &);

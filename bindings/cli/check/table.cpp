@@ -78,6 +78,8 @@ const std::vector<Rule> &rules() {
       {"M20", "constant stiffness is constant", true, none, constant_stiffness_is_constant, none},
       {"M21", "dampers take energy, and are claimed", true, none, dampers_take_energy, none},
       {"M22", "forces in single precision are those in double, nearly", true, none, single_is_close, none},
+      {"M23", "forces given part by part are those of all points at once", true, none, parts_are_the_whole,
+       none},
   };
   return table;
 }

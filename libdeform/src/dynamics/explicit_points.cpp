@@ -1,7 +1,6 @@
 #include "dynamics/explicit_points.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <numeric>
 
@@ -9,8 +8,9 @@
 
 namespace dfm {
 namespace {
-constexpr uint32_t kAhead = 48;  // points: as long as memory takes to answer
-}
+constexpr uint32_t kAhead = 48;   // points: as long as memory takes to answer
+constexpr double kNotGiven = -1;  // J, of a part: no kinetic energy is that
+}  // namespace
 
 ExplicitPoints::ExplicitPoints(const Memory &memory, Phyxels &points, Surface &surface, ModelInstance &model,
                                const Array<uint32_t> &edges)
@@ -20,7 +20,13 @@ ExplicitPoints::ExplicitPoints(const Memory &memory, Phyxels &points, Surface &s
       stiffness_(points.n, 0.0, HookAllocator<double>(memory)),
       damping_(points.n, 0.0, HookAllocator<double>(memory)) {
   use_memory(memory, part_kinetic_, reached_, before_);
-  if (model.part_forces) part_kinetic_.resize(model.part_forces->parts(model.self));
+  uint32_t parts = 0;  // after a failure: none, and forces come for all points at once
+  if (model.part_forces)
+    model.call("parts", [&] {
+      parts = model.part_forces->parts(model.self);
+      return DFM_OK;
+    });
+  part_kinetic_.resize(parts);
 }
 
 bool ExplicitPoints::bound(double time, const AddRowSums &outside, StepBound &out) {
@@ -64,13 +70,14 @@ bool ExplicitPoints::move_parts(const SubStep &now) {
   const double gravity[kStride] = {now.gravity.x, now.gravity.y, now.gravity.z, 0};
   FreeMotion motion = free_motion_of(p_, gravity, now.h);
   if (part_kinetic_.size() > 1) motion.ahead = kAhead;  // one part lies in the cache
-  std::atomic<size_t> given{0};  // a model that leaves out a part, or gives one it does not have, has failed
+  std::fill(part_kinetic_.begin(), part_kinetic_.end(), kNotGiven);
   const auto move = [&](uint32_t part, uint32_t n, const uint32_t *point, const double *f) {
     if (part >= part_kinetic_.size()) return;
     part_kinetic_[part] = loops_.predict_part(motion, n, point, p_.load.data(), f);
-    given.fetch_add(1, std::memory_order_relaxed);
   };
-  return model_.add_part_forces(kin(now.time, now.h, true), move) == DFM_OK && given == part_kinetic_.size();
+  // A model that leaves out a part has failed.
+  return model_.add_part_forces(kin(now.time, now.h, true), move) == DFM_OK &&
+         std::find(part_kinetic_.begin(), part_kinetic_.end(), kNotGiven) == part_kinetic_.end();
 }
 
 bool ExplicitPoints::see_forces(const SubStep &now) { return !moved_ || find_forces(now); }

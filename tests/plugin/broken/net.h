@@ -252,6 +252,9 @@ static const dfm_cell_energy by_cell = {sizeof(dfm_cell_energy), 0, cell_energy}
 #ifndef STEPS_ITSELF
 static const void *extension(const void *self, const char *id) {
   (void)self;
+#ifdef BY_PART
+  if (!strcmp(id, DFM_EXT_PART_FORCES)) return BY_PART;
+#endif
 #ifdef SINGLE
   if (!strcmp(id, DFM_EXT_F32)) return SINGLE;
 #endif

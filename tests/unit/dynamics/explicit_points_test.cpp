@@ -35,6 +35,10 @@ struct Falling {
       if (k / 3 % every == 0) q[k] = 1e-3 * double(random()) / 4294967296.0;
     return q;
   }
+  void make_dynamics() const {
+    dfm::Body &b = *body;
+    b.dynamics = dfm::make_dynamics(test::inside(world).memory(), b.p, b.surface, b.model, b.edges, nullptr);
+  }
   void end(const std::vector<double> &q) const {
     EXPECT_TRUE(body->dynamics->end_state(now, q.data(), true));
   }
@@ -84,6 +88,22 @@ TEST(ExplicitPoints, ModelThatGivesOtherParts_HasFailed) {
     return dfm_status(DFM_OK);
   };
   EXPECT_FALSE(points.add_forces(f.now, false));
+  // Of three parts the first one three times.
+  parts.parts = [](const void *) -> uint32_t { return 3; };
+  parts.forces = [](void *, const dfm_kin *, uint32_t, dfm_take_part_fn take, void *user) {
+    for (int i = 0; i < 3; ++i) take(user, 0, 0, nullptr, nullptr);
+    return dfm_status(DFM_OK);
+  };
+  f.make_dynamics();
+  EXPECT_FALSE(f.body->dynamics->add_forces(f.now, false));
+}
+
+// Of a plugin's model: its exception is a failure of the call, and forces then come for all points at once.
+TEST(ExplicitPoints, ModelThatThrowsWhereItIsAskedForItsParts_IsMovedWithoutThem) {
+  const Falling f;
+  f.body->model.part_forces->parts = [](const void *) -> uint32_t { throw 1; };
+  f.make_dynamics();
+  EXPECT_TRUE(f.body->dynamics->add_forces(f.now, false));
 }
 
 // Where the guard takes a part of the way, what the inner forces would have done on the rest is booked.
