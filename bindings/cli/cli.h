@@ -4,12 +4,9 @@
 
 #include "deform/deform.h"
 
-// <CLI/CLI.hpp>, 4 s of every compiler's time, is for the files that define subcommands
-namespace CLI {
-class App;
-}
-
 namespace cli {
+
+class Command;
 
 // Exit codes of interfaces: 0 done, 2 bad usage or input, 3 the simulation stopped itself. Beside them: 1 a
 // check was made and found something, 4 a plugin ended the process (leaving.h), 130 a signal did.
@@ -31,16 +28,16 @@ int fail(const std::string &sentence);
 dfm_context *make_context(const Globals &globals);
 
 // Each adds its subcommand; the callback stores its exit code in *exit_code.
-void add_run(CLI::App &app, Globals &globals, int *exit_code);
-void add_replay(CLI::App &app, Globals &globals, int *exit_code);
-void add_explain(CLI::App &app, Globals &globals, int *exit_code);
-void add_calibrate(CLI::App &app, Globals &globals, int *exit_code);
-void add_mesh(CLI::App &app, Globals &globals, int *exit_code);
-void add_plugin(CLI::App &app, Globals &globals, int *exit_code);
-void add_plugin_check(CLI::App &plugin, Globals &globals, int *exit_code);
-void add_ccd(CLI::App &app, Globals &globals, int *exit_code);
-void add_friction(CLI::App &app, Globals &globals, int *exit_code);
-void add_cost(CLI::App &app, Globals &globals, int *exit_code);
-void add_view(CLI::App &app, Globals &globals, int *exit_code);
+void add_run(Command app, Globals &globals, int *exit_code);
+void add_replay(Command app, Globals &globals, int *exit_code);
+void add_explain(Command app, Globals &globals, int *exit_code);
+void add_calibrate(Command app, Globals &globals, int *exit_code);
+void add_mesh(Command app, Globals &globals, int *exit_code);
+void add_plugin(Command app, Globals &globals, int *exit_code);
+void add_plugin_check(Command plugin, Globals &globals, int *exit_code);
+void add_ccd(Command app, Globals &globals, int *exit_code);
+void add_friction(Command app, Globals &globals, int *exit_code);
+void add_cost(Command app, Globals &globals, int *exit_code);
+void add_view(Command app, Globals &globals, int *exit_code);
 
 }  // namespace cli

@@ -1,6 +1,4 @@
 // deform calibrate: what the loaded models cost on this machine, and what they leave out, for the planner.
-#include <CLI/CLI.hpp>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -10,6 +8,7 @@
 #include <memory>
 #include <utility>
 
+#include "arguments.h"
 #include "costs_file.h"
 #include "file.h"
 #include "json_text.h"
@@ -464,24 +463,22 @@ int calibrate(std::string out, const std::vector<std::string> &models, Globals &
 
 }  // namespace
 
-void add_calibrate(CLI::App &app, Globals &globals, int *exit_code) {
+void add_calibrate(Command app, Globals &globals, int *exit_code) {
   struct Options {
     std::string out;
     std::vector<std::string> models;
   };
   auto options = std::make_shared<Options>();
-  CLI::App *sub = app.add_subcommand(
-      "calibrate", "measures costs and errors of the models on this machine, for the planner");
-  sub->add_option("--out", options->out,
-                  "file to write (default: $XDG_CONFIG_HOME/deform/costs.json, which the command then takes "
-                  "for every scene with an accuracy or a budget)")
-      ->type_name("FILE");
-  sub->add_option("--model", options->models,
-                  "measure this model alone; may be repeated (default: all loaded)")
-      ->type_name("ID")
-      ->take_all()
-      ->allow_extra_args(false);
-  sub->callback([=, &globals] { *exit_code = calibrate(options->out, options->models, globals); });
+  Command sub =
+      app.command("calibrate", "measures costs and errors of the models on this machine, for the planner");
+  sub.option("--out", options->out,
+             "file to write (default: $XDG_CONFIG_HOME/deform/costs.json, which the command then takes "
+             "for every scene with an accuracy or a budget)")
+      .type_name("FILE");
+  sub.option("--model", options->models, "measure this model alone; may be repeated (default: all loaded)")
+      .type_name("ID")
+      .repeated();
+  sub.calls([=, &globals] { *exit_code = calibrate(options->out, options->models, globals); });
 }
 
 }  // namespace cli

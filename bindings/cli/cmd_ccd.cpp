@@ -1,6 +1,4 @@
 // deform ccd QUERIES.csv: times of impact of the point-triangle and edge-edge queries of a file.
-#include <CLI/CLI.hpp>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -10,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "arguments.h"
 #include "file.h"
 #include "json_text.h"
 #include "messages.h"
@@ -235,22 +234,20 @@ int ccd(const CcdOptions &options, const Globals &globals) {
 
 }  // namespace
 
-void add_ccd(CLI::App &app, Globals &globals, int *exit_code) {
+void add_ccd(Command app, Globals &globals, int *exit_code) {
   const auto options = std::make_shared<CcdOptions>();
-  CLI::App *sub = app.add_subcommand("ccd", "times of impact of point-triangle and edge-edge queries");
-  sub->add_option(
-         "QUERIES", options->file,
-         "CSV with the columns id, kind (vf or ee), p0_t0_x to p3_t1_z; hit and toi_hi are compared with")
-      ->required();
-  sub->add_option("--root", options->root, "bisection, regula_falsi, brent or conservative")
-      ->capture_default_str()
-      ->type_name("FINDER");
-  sub->add_option("--csv", options->csv, "answers: id,hit,t,evaluations (t inf for a miss)")
-      ->type_name("OUT");
-  sub->add_option("--tolerance", options->tolerance,
-                  "conservative: a distance, as a share of the extent; else a width of t; 0: 1e-12");
-  sub->add_option("--separation", options->separation, "touching is a distance of at most that, m");
-  sub->callback([=, &globals] { *exit_code = ccd(*options, globals); });
+  Command sub = app.command("ccd", "times of impact of point-triangle and edge-edge queries");
+  sub.option("QUERIES", options->file,
+             "CSV with the columns id, kind (vf or ee), p0_t0_x to p3_t1_z; hit and toi_hi are compared with")
+      .required();
+  sub.option("--root", options->root, "bisection, regula_falsi, brent or conservative")
+      .with_default()
+      .type_name("FINDER");
+  sub.option("--csv", options->csv, "answers: id,hit,t,evaluations (t inf for a miss)").type_name("OUT");
+  sub.option("--tolerance", options->tolerance,
+             "conservative: a distance, as a share of the extent; else a width of t; 0: 1e-12");
+  sub.option("--separation", options->separation, "touching is a distance of at most that, m");
+  sub.calls([=, &globals] { *exit_code = ccd(*options, globals); });
 }
 
 }  // namespace cli

@@ -1,12 +1,11 @@
 // deform cost SCENE: what accuracy costs on this scene.
-#include <CLI/CLI.hpp>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <memory>
 #include <thread>
 
+#include "arguments.h"
 #include "cost/chart.h"
 #include "cost/meshes.h"
 #include "cost/page.h"
@@ -77,49 +76,38 @@ int cost_of(CostOptions options, Globals &globals) {
 
 }  // namespace
 
-void add_cost(CLI::App &app, Globals &globals, int *exit_code) {
+void add_cost(Command app, Globals &globals, int *exit_code) {
   auto options = std::make_shared<CostOptions>();
-  const auto positive = [](const std::string &text) {
-    char *end = nullptr;
-    const double x = std::strtod(text.c_str(), &end);
-    return *end == 0 && x > 0 && std::isfinite(x)
-               ? std::string()
-               : "expected a finite number above 0, found \"" + text + "\"";
-  };
-  CLI::App *sub = app.add_subcommand(
+  Command sub = app.command(
       "cost", "what accuracy costs on a scene: models, steps, meshes, contact against a fine reference");
-  sub->add_option("SCENE", options->scene, "scene file (JSON)")->required();
-  sub->add_option(
-         "--budget", options->study.budget,
-         "time limit in seconds for all runs in DIR; a later call with a larger limit continues there")
-      ->check(positive)
-      ->capture_default_str()
-      ->type_name("SECONDS");
-  sub->add_option("--target", options->study.target, "relative error for which the cheapest choice is sought")
-      ->check(positive)
-      ->capture_default_str()
-      ->type_name("ERROR");
-  sub->add_option(
-         "--quantity", options->study.quantities,
-         "what is compared: a probe, or com, force, work, volume, energy, touch, slip, liftoff, rest "
-         "(all of them are in the files); may be repeated (all probes)")
-      ->type_name("NAME")
-      ->take_all()
-      ->allow_extra_args(false);
-  sub->add_option("--axes", options->study.axes,
-                  "what varies, with commas: model, time, mesh, volume, contact, law, self, guard, "
-                  "precision (all)")
-      ->type_name("LIST")
-      ->take_all()
-      ->allow_extra_args(false);
-  sub->add_option("--out", options->out, "folder for the results (out/SCENE_cost)")->type_name("DIR");
-  sub->add_option("--apply", options->apply,
-                  "writes the scene with the cheapest choice that is proven to be within the target")
-      ->type_name("FILE");
-  sub->callback([=, &globals] {
+  sub.option("SCENE", options->scene, "scene file (JSON)").required();
+  sub.option("--budget", options->study.budget,
+             "time limit in seconds for all runs in DIR; a later call with a larger limit continues there")
+      .positive()
+      .with_default()
+      .type_name("SECONDS");
+  sub.option("--target", options->study.target, "relative error for which the cheapest choice is sought")
+      .positive()
+      .with_default()
+      .type_name("ERROR");
+  sub.option("--quantity", options->study.quantities,
+             "what is compared: a probe, or com, force, work, volume, energy, touch, slip, liftoff, rest "
+             "(all of them are in the files); may be repeated (all probes)")
+      .type_name("NAME")
+      .repeated();
+  sub.option("--axes", options->study.axes,
+             "what varies, with commas: model, time, mesh, volume, contact, law, self, guard, "
+             "precision (all)")
+      .type_name("LIST")
+      .repeated();
+  sub.option("--out", options->out, "folder for the results (out/SCENE_cost)").type_name("DIR");
+  sub.option("--apply", options->apply,
+             "writes the scene with the cheapest choice that is proven to be within the target")
+      .type_name("FILE");
+  sub.calls([=, &globals] {
     // Runs are processes of one thread each; without the option as many at a time as there are processors.
     const unsigned all = std::max(1u, std::thread::hardware_concurrency());
-    options->parallel = sub->count("--threads") && globals.threads ? globals.threads : all;
+    options->parallel = sub.given("--threads") && globals.threads ? globals.threads : all;
     *exit_code = cost_of(*options, globals);
   });
 }

@@ -1,11 +1,10 @@
 // deform explain SCENE.json: the plan of a step, and why.
-#include <CLI/CLI.hpp>
-
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
 
+#include "arguments.h"
 #include "effect_costs.h"
 #include "json_text.h"
 #include "messages.h"
@@ -261,18 +260,16 @@ int explain(const Options &options, Globals &globals) {
 
 }  // namespace
 
-void add_explain(CLI::App &app, Globals &globals, int *exit_code) {
+void add_explain(Command app, Globals &globals, int *exit_code) {
   auto options = std::make_shared<Options>();
-  CLI::App *sub =
-      app.add_subcommand("explain", "the plan: effects, stages that run, stages left out and why");
-  sub->add_option("SCENE", options->scene, "scene file (JSON)")->required();
-  sub->add_option("--set", options->set, "change a value of the scene")
-      ->type_name("/json/pointer=value")
-      ->take_all()
-      ->allow_extra_args(false);
-  sub->add_flag("--costs", options->costs,
-                "also measure, by steps with and without it, what each effect of a body costs here");
-  sub->callback([=, &globals] { *exit_code = explain(*options, globals); });
+  Command sub = app.command("explain", "the plan: effects, stages that run, stages left out and why");
+  sub.option("SCENE", options->scene, "scene file (JSON)").required();
+  sub.option("--set", options->set, "change a value of the scene")
+      .type_name("/json/pointer=value")
+      .repeated();
+  sub.flag("--costs", options->costs,
+           "also measure, by steps with and without it, what each effect of a body costs here");
+  sub.calls([=, &globals] { *exit_code = explain(*options, globals); });
 }
 
 }  // namespace cli

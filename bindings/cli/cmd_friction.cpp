@@ -1,6 +1,4 @@
 // deform friction CASE.json: a friction law on a rig.
-#include <CLI/CLI.hpp>
-
 #include <unistd.h>
 
 #include <cmath>
@@ -10,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "arguments.h"
 #include "file.h"
 #include "friction_plot.h"
 #include "friction_rig.h"
@@ -139,21 +138,19 @@ int friction(const FrictionOptions &options, const Globals &globals) {
 
 }  // namespace
 
-void add_friction(CLI::App &app, Globals &globals, int *exit_code) {
+void add_friction(Command app, Globals &globals, int *exit_code) {
   const auto options = std::make_shared<FrictionOptions>();
-  CLI::App *sub = app.add_subcommand(
+  Command sub = app.command(
       "friction", "runs a friction law on a rig: a driven mass, a prescribed slip, a spring, ramps");
-  sub->add_option("CASE", options->file,
-                  "JSON with law, params, input, output_times (libdeform/doc/reference/friction_rig.md)")
-      ->required();
-  sub->add_option("--law", options->law,
-                  "short name, full id, or path of a plugin file; otherwise the case's")
-      ->type_name("ID");
-  sub->add_option("--step", options->step, "longest step, s")->capture_default_str()->type_name("H");
-  sub->add_option("--csv", options->csv, "the case's columns at its output times")->type_name("OUT");
-  sub->add_option("--plot", options->plot, "a picture of them (python3 with matplotlib)")
-      ->type_name("OUT.png");
-  sub->callback([=, &globals] { *exit_code = friction(*options, globals); });
+  sub.option("CASE", options->file,
+             "JSON with law, params, input, output_times (libdeform/doc/reference/friction_rig.md)")
+      .required();
+  sub.option("--law", options->law, "short name, full id, or path of a plugin file; otherwise the case's")
+      .type_name("ID");
+  sub.option("--step", options->step, "longest step, s").with_default().type_name("H");
+  sub.option("--csv", options->csv, "the case's columns at its output times").type_name("OUT");
+  sub.option("--plot", options->plot, "a picture of them (python3 with matplotlib)").type_name("OUT.png");
+  sub.calls([=, &globals] { *exit_code = friction(*options, globals); });
 }
 
 }  // namespace cli

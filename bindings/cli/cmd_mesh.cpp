@@ -2,12 +2,11 @@
 // phantom KIND
 #include "cmd_mesh.h"
 
-#include <CLI/CLI.hpp>
-
 #include <algorithm>
 #include <cctype>
 #include <memory>
 
+#include "arguments.h"
 #include "progress.h"
 
 namespace cli {
@@ -170,71 +169,66 @@ int make(const Globals &globals, const Shape &shape) {
   return report_mesh(globals, shape.out, s, false);
 }
 
-void add_make(CLI::App *mesh, Globals &globals, int *exit_code) {
+void add_make(Command mesh, Globals &globals, int *exit_code) {
   struct Kind { const char *name, *about; };
-  CLI::App *command = mesh->add_subcommand(
-      "make", "a cylinder, beam, ball, tube or torus, of near-isotropic cells or as a surface");
-  command->require_subcommand(1);
+  Command command =
+      mesh.command("make", "a cylinder, beam, ball, tube or torus, of near-isotropic cells or as a surface");
+  command.needs_subcommand();
   for (const Kind &kind :
        {Kind{"cylinder", "axis z, base at the origin"}, Kind{"beam", "edges from the origin"},
         Kind{"ball", "about the origin"}, Kind{"tube", "a cylinder with a hole; axis z, base at the origin"},
         Kind{"torus", "a surface; about the origin, axis z"}}) {
     const std::string name = kind.name;
-    CLI::App *sub = command->add_subcommand(name, kind.about);
+    Command sub = command.command(name, kind.about);
     const auto shape = std::make_shared<Shape>();
     shape->kind = name;
     if (name == "ball" || name == "torus") shape->radius = 0.1;
-    sub->add_option("--out", shape->out,
-                    "file to write: cells as .msh (MSH 4.1), .msh2 (MSH 2.2), .mesh, .vtk or .vtu, a surface "
-                    "as .obj, .ply, .stl or .off")
-        ->required()
-        ->type_name("FILE");
-    sub->add_option("--cells", shape->cells, "about how many tetrahedra, or triangles of a surface")
-        ->capture_default_str()
-        ->type_name("N");
-    if (name == "beam")
-      sub->add_option("--size", shape->edges, "edges x y z, m")->expected(3)->capture_default_str();
+    sub.option("--out", shape->out,
+               "file to write: cells as .msh (MSH 4.1), .msh2 (MSH 2.2), .mesh, .vtk or .vtu, a surface "
+               "as .obj, .ply, .stl or .off")
+        .required()
+        .type_name("FILE");
+    sub.option("--cells", shape->cells, "about how many tetrahedra, or triangles of a surface")
+        .with_default()
+        .type_name("N");
+    if (name == "beam") sub.option("--size", shape->edges, "edges x y z, m").values(3).with_default();
     else
-      sub->add_option("--radius", shape->radius,
-                      name == "tube"    ? "outer, m"
-                      : name == "torus" ? "of the tube, m"
-                                        : "m")
-          ->capture_default_str();
-    if (name == "tube") sub->add_option("--inner", shape->inner, "inner radius, m")->capture_default_str();
-    if (name == "torus")
-      sub->add_option("--ring", shape->ring, "radius of the ring, m")->capture_default_str();
-    if (name == "cylinder" || name == "tube")
-      sub->add_option("--length", shape->length, "m")->capture_default_str();
-    sub->add_flag("--surface", shape->surface, "the surface alone, also as .vtk or .vtu");
-    sub->callback([=, &globals] { *exit_code = make(globals, *shape); });
+      sub.option("--radius", shape->radius,
+                 name == "tube"    ? "outer, m"
+                 : name == "torus" ? "of the tube, m"
+                                   : "m")
+          .with_default();
+    if (name == "tube") sub.option("--inner", shape->inner, "inner radius, m").with_default();
+    if (name == "torus") sub.option("--ring", shape->ring, "radius of the ring, m").with_default();
+    if (name == "cylinder" || name == "tube") sub.option("--length", shape->length, "m").with_default();
+    sub.flag("--surface", shape->surface, "the surface alone, also as .vtk or .vtu");
+    sub.calls([=, &globals] { *exit_code = make(globals, *shape); });
   }
 }
 
 }  // namespace
 
-void add_mesh(CLI::App &app, Globals &globals, int *exit_code) {
-  CLI::App *mesh = app.add_subcommand("mesh", "counts, quality and defects of meshes; generators; formats");
-  mesh->require_subcommand(1);
+void add_mesh(Command app, Globals &globals, int *exit_code) {
+  Command mesh = app.command("mesh", "counts, quality and defects of meshes; generators; formats");
+  mesh.needs_subcommand();
   const auto first = std::make_shared<std::string>(), second = std::make_shared<std::string>();
 
-  CLI::App *info_command =
-      mesh->add_subcommand("info", "counts, quality, groups and what had to be repaired");
-  info_command->add_option("FILE", *first, kIn)->required();
-  info_command->callback([=, &globals] { *exit_code = info(globals, *first); });
+  Command info_command = mesh.command("info", "counts, quality, groups and what had to be repaired");
+  info_command.option("FILE", *first, kIn).required();
+  info_command.calls([=, &globals] { *exit_code = info(globals, *first); });
 
   add_make(mesh, globals, exit_code);
 
-  CLI::App *convert_command = mesh->add_subcommand("convert",
-                                                   "reads IN and writes OUT in the format of its file name "
-                                                   "ending; a surface format gets the boundary of the cells");
+  Command convert_command = mesh.command("convert",
+                                         "reads IN and writes OUT in the format of its file name "
+                                         "ending; a surface format gets the boundary of the cells");
   convert_command
-      ->add_option("IN", *first, std::string(kIn) + "; glTF, FBX, COLLADA and others where built with assimp")
-      ->required();
+      .option("IN", *first, std::string(kIn) + "; glTF, FBX, COLLADA and others where built with assimp")
+      .required();
   convert_command
-      ->add_option("OUT", *second,
-                   ".msh (MSH 4.1), .msh2 (MSH 2.2), .mesh, .vtk, .vtu, .obj, .ply, .stl or .off")
-      ->required();
-  convert_command->callback([=, &globals] { *exit_code = convert(globals, *first, *second); });
+      .option("OUT", *second, ".msh (MSH 4.1), .msh2 (MSH 2.2), .mesh, .vtk, .vtu, .obj, .ply, .stl or .off")
+      .required();
+  convert_command.calls([=, &globals] { *exit_code = convert(globals, *first, *second); });
 
   add_mesh_fill(mesh, globals, exit_code);
   add_mesh_labels(mesh, globals, exit_code);

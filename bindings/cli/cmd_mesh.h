@@ -41,7 +41,7 @@ std::string mesh_ending(const std::string &path);  // lower case, without the do
 // with session.surface 0: not such a format.
 bool import_surface(const std::string &path, MeshSession &session, std::string &sentence);
 
-void add_mesh_fill(CLI::App *mesh, Globals &globals, int *exit_code);
-void add_mesh_labels(CLI::App *mesh, Globals &globals, int *exit_code);
+void add_mesh_fill(Command mesh, Globals &globals, int *exit_code);
+void add_mesh_labels(Command mesh, Globals &globals, int *exit_code);
 
 }  // namespace cli

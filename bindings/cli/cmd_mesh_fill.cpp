@@ -1,12 +1,11 @@
 // deform mesh fill SURFACE --out FILE --cells N
-#include <CLI/CLI.hpp>
-
 #include <chrono>
 #include <cstdio>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "arguments.h"
 #include "cmd_mesh.h"
 #include "json_text.h"
 #include "progress.h"
@@ -121,23 +120,19 @@ struct FillOptions {
 
 }  // namespace
 
-void add_mesh_fill(CLI::App *mesh, Globals &globals, int *exit_code) {
-  CLI::App *command = mesh->add_subcommand(
+void add_mesh_fill(Command mesh, Globals &globals, int *exit_code) {
+  Command command = mesh.command(
       "fill", "fills a closed surface with tetrahedra; in a scene, the body key \"fill\" does the same");
   const auto options = std::make_shared<FillOptions>();
   command
-      ->add_option("SURFACE", options->surface,
-                   "OBJ, PLY, STL, OFF, or any file with triangles that mesh info or mesh convert reads")
-      ->required();
-  command
-      ->add_option("--out", options->out,
-                   "file to write: .msh (MSH 4.1), .msh2 (MSH 2.2), .mesh, .vtk or .vtu")
-      ->required()
-      ->type_name("FILE");
-  command->add_option("--cells", options->cells, "about how many tetrahedra")
-      ->capture_default_str()
-      ->type_name("N");
-  command->callback(
+      .option("SURFACE", options->surface,
+              "OBJ, PLY, STL, OFF, or any file with triangles that mesh info or mesh convert reads")
+      .required();
+  command.option("--out", options->out, "file to write: .msh (MSH 4.1), .msh2 (MSH 2.2), .mesh, .vtk or .vtu")
+      .required()
+      .type_name("FILE");
+  command.option("--cells", options->cells, "about how many tetrahedra").with_default().type_name("N");
+  command.calls(
       [=, &globals] { *exit_code = fill(globals, options->surface, options->out, options->cells); });
 }
 

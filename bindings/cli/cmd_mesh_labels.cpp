@@ -1,9 +1,8 @@
 // deform mesh from-labels VOLUME --out DIR | phantom KIND --out FILE
-#include <CLI/CLI.hpp>
-
 #include <cstdio>
 #include <memory>
 
+#include "arguments.h"
 #include "cmd_mesh.h"
 #include "file.h"
 #include "json_text.h"
@@ -161,39 +160,36 @@ struct Given {
 
 }  // namespace
 
-void add_mesh_labels(CLI::App *mesh, Globals &globals, int *exit_code) {
+void add_mesh_labels(Command mesh, Globals &globals, int *exit_code) {
   const auto given = std::make_shared<Given>();
-  CLI::App *command = mesh->add_subcommand(
-      "from-labels",
-      "a segmented scan (a volume of labels) as closed surfaces, bodies, obstacles and a scene");
+  Command command =
+      mesh.command("from-labels",
+                   "a segmented scan (a volume of labels) as closed surfaces, bodies, obstacles and a scene");
   command
-      ->add_option("VOLUME", given->options.volume,
-                   ".nrrd, .nhdr, .mha or .mhd with one whole number per voxel")
-      ->required();
-  command->add_option("--out", given->options.out, "folder to write into: scene.json, labels.json, meshes")
-      ->required()
-      ->type_name("DIR");
+      .option("VOLUME", given->options.volume, ".nrrd, .nhdr, .mha or .mhd with one whole number per voxel")
+      .required();
+  command.option("--out", given->options.out, "folder to write into: scene.json, labels.json, meshes")
+      .required()
+      .type_name("DIR");
   command
-      ->add_option("--table", given->options.table,
-                   "JSON file that says what becomes of each label; without it one is written")
-      ->type_name("FILE");
+      .option("--table", given->options.table,
+              "JSON file that says what becomes of each label; without it one is written")
+      .type_name("FILE");
   command
-      ->add_option(
+      .option(
           "--spacing", given->spacing,
           "mm: voxels are joined up to about this length; 0: never; auto: 96 voxels along the longest edge")
-      ->capture_default_str()
-      ->type_name("MM");
-  command->add_option("--cells", given->options.cells, "about how many tetrahedra, of all bodies together")
-      ->capture_default_str()
-      ->type_name("N");
-  command->add_option("--smooth", given->options.passes, "passes of smoothing; 0: corners of voxels")
-      ->capture_default_str()
-      ->type_name("N");
-  command
-      ->add_option("--unit", given->unit,
-                   "of the lengths in the file, whatever it says: um, mm, cm, m or inch")
-      ->type_name("UNIT");
-  command->callback([=, &globals] {
+      .with_default()
+      .type_name("MM");
+  command.option("--cells", given->options.cells, "about how many tetrahedra, of all bodies together")
+      .with_default()
+      .type_name("N");
+  command.option("--smooth", given->options.passes, "passes of smoothing; 0: corners of voxels")
+      .with_default()
+      .type_name("N");
+  command.option("--unit", given->unit, "of the lengths in the file, whatever it says: um, mm, cm, m or inch")
+      .type_name("UNIT");
+  command.calls([=, &globals] {
     labels::Options &o = given->options;
     if (!given->unit.empty() && (o.unit = labels::unit_of(given->unit)) == 0) {
       *exit_code = fail("--unit: unknown unit of length \"" + given->unit +
@@ -215,15 +211,13 @@ void add_mesh_labels(CLI::App *mesh, Globals &globals, int *exit_code) {
     *exit_code = from_labels(globals, o);
   });
 
-  CLI::App *phantom_command = mesh->add_subcommand(
+  Command phantom_command = mesh.command(
       "phantom", "a volume of labels made from ellipsoids and cylinders, with the volumes that these have");
-  phantom_command->add_option("KIND", given->kind, "abdomen, or nodule: a block of gel with a ball in it")
-      ->required();
-  phantom_command->add_option("--out", given->out, "file to write, .nrrd")->required()->type_name("FILE");
-  phantom_command->add_option("--voxel", given->voxel, "edge of a voxel, mm")
-      ->capture_default_str()
-      ->type_name("MM");
-  phantom_command->callback(
+  phantom_command.option("KIND", given->kind, "abdomen, or nodule: a block of gel with a ball in it")
+      .required();
+  phantom_command.option("--out", given->out, "file to write, .nrrd").required().type_name("FILE");
+  phantom_command.option("--voxel", given->voxel, "edge of a voxel, mm").with_default().type_name("MM");
+  phantom_command.calls(
       [=, &globals] { *exit_code = phantom(globals, given->kind, given->voxel, given->out); });
 }
 

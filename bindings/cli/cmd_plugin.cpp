@@ -1,12 +1,11 @@
 // deform plugin list | info ID | check FILE
-#include <CLI/CLI.hpp>
-
 #include <cstdio>
 #include <cstring>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "arguments.h"
 #include "cli.h"
 #include "json_text.h"
 #include "messages.h"
@@ -223,22 +222,22 @@ int info(const Globals &globals, const std::string &id) {
 
 }  // namespace
 
-void add_plugin(CLI::App &app, Globals &globals, int *exit_code) {
-  CLI::App *plugin = app.add_subcommand("plugin", "what plugins were found, what they offer");
-  plugin->require_subcommand(1);
+void add_plugin(Command app, Globals &globals, int *exit_code) {
+  Command plugin = app.command("plugin", "what plugins were found, what they offer");
+  plugin.needs_subcommand();
 
-  CLI::App *list_command =
-      plugin->add_subcommand("list", "types found, with their files; files skipped, with the reason");
+  Command list_command =
+      plugin.command("list", "types found, with their files; files skipped, with the reason");
   auto directories = std::make_shared<std::vector<std::string>>();
-  list_command->add_option("--dir", *directories, "also scan this directory")->type_name("DIR");
-  list_command->callback([=, &globals] { *exit_code = list(globals, *directories); });
+  list_command.option("--dir", *directories, "also scan this directory").type_name("DIR");
+  list_command.calls([=, &globals] { *exit_code = list(globals, *directories); });
 
-  CLI::App *info_command = plugin->add_subcommand("info", "metadata, effects and parameters of a type");
+  Command info_command = plugin.command("info", "metadata, effects and parameters of a type");
   auto id = std::make_shared<std::string>();
-  info_command->add_option("ID", *id, "short name, full id, or path of a plugin file")->required();
-  info_command->callback([=, &globals] { *exit_code = info(globals, *id); });
+  info_command.option("ID", *id, "short name, full id, or path of a plugin file").required();
+  info_command.calls([=, &globals] { *exit_code = info(globals, *id); });
 
-  add_plugin_check(*plugin, globals, exit_code);
+  add_plugin_check(plugin, globals, exit_code);
 }
 
 }  // namespace cli

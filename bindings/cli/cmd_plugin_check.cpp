@@ -1,12 +1,11 @@
 // deform plugin check FILE: the command line of the validator (check/).
-#include <CLI/CLI.hpp>
-
 #include <cstring>
 #include <filesystem>
 #include <memory>
 #include <string>
 #include <utility>
 
+#include "arguments.h"
 #include "cli.h"
 #ifdef DEFORM_HAVE_CHECK
 #include "check/command.h"
@@ -38,25 +37,25 @@ std::string file_of(const std::string &text, const Globals &globals) {
 
 }  // namespace
 
-void add_plugin_check(CLI::App &plugin, Globals &globals, int *exit_code) {
-  CLI::App *sub = plugin.add_subcommand(
+void add_plugin_check(Command plugin, Globals &globals, int *exit_code) {
+  Command sub = plugin.command(
       "check", "checks a plugin by rules, each in a separate process; exit code 1 if one is broken");
   auto request = std::make_shared<check::Request>();
-  sub->add_option("FILE", request->file, "plugin file, or short name or full id of a plugin that is found")
-      ->required();
-  sub->add_option("--seed", request->seed, "of the random inputs")->type_name("N");
-  sub->add_option("--only", request->only, "run this rule alone; may be repeated")->type_name("ID");
-  sub->add_option("--limit", request->limit, "processor time that a rule may take, s")
-      ->check(CLI::PositiveNumber)
-      ->type_name("SECONDS");
-  sub->add_flag("--in-process", request->in_process,
-                "run the rules in this process, for a debugger: what crashes ends the command");
+  sub.option("FILE", request->file, "plugin file, or short name or full id of a plugin that is found")
+      .required();
+  sub.option("--seed", request->seed, "of the random inputs").type_name("N");
+  sub.option("--only", request->only, "run this rule alone; may be repeated").type_name("ID");
+  sub.option("--limit", request->limit, "processor time that a rule may take, s")
+      .positive()
+      .type_name("SECONDS");
+  sub.flag("--in-process", request->in_process,
+           "run the rules in this process, for a debugger: what crashes ends the command");
   // What the command says to its own processes.
-  sub->add_option("--rule", request->rule)->group("");
-  sub->add_option("--type", request->type)->group("");
-  sub->add_option("--digest", request->digest)->group("");
-  sub->add_option("--report-to", request->report)->group("");
-  sub->callback([=, &globals] {
+  sub.option("--rule", request->rule).hidden();
+  sub.option("--type", request->type).hidden();
+  sub.option("--digest", request->digest).hidden();
+  sub.option("--report-to", request->report).hidden();
+  sub.calls([=, &globals] {
     request->file = file_of(request->file, globals);
     *exit_code = check::run(globals, *request);
   });
@@ -64,12 +63,11 @@ void add_plugin_check(CLI::App &plugin, Globals &globals, int *exit_code) {
 
 #else
 
-void add_plugin_check(CLI::App &plugin, Globals &, int *exit_code) {
-  CLI::App *sub =
-      plugin.add_subcommand("check", "checks a plugin by rules (not in this build, which loads no files)");
+void add_plugin_check(Command plugin, Globals &, int *exit_code) {
+  Command sub = plugin.command("check", "checks a plugin by rules (not in this build, which loads no files)");
   auto file = std::make_shared<std::string>();
-  sub->add_option("FILE", *file, "plugin file")->required();
-  sub->callback([=] {
+  sub.option("FILE", *file, "plugin file").required();
+  sub.calls([=] {
     *exit_code = fail(
         "\"plugin check\" opens plugin files, and this command was built to load none "
         "(DEFORM_PLUGINS_STATIC); check " +

@@ -1,9 +1,8 @@
 // deform replay DIR: the run that `deform run --record` recorded, simulated again or shown again.
-#include <CLI/CLI.hpp>
-
 #include <cstdio>
 #include <memory>
 
+#include "arguments.h"
 #include "frames.h"
 #include "messages.h"
 #include "recording.h"
@@ -82,21 +81,18 @@ int replay(ReplayOptions options, const Globals &globals) {
 
 }  // namespace
 
-void add_replay(CLI::App &app, Globals &globals, int *exit_code) {
+void add_replay(Command app, Globals &globals, int *exit_code) {
   auto options = std::make_shared<ReplayOptions>();
-  CLI::App *sub = app.add_subcommand(
+  Command sub = app.command(
       "replay", "simulates a recorded run again, with the same bits, or shows its recorded states");
-  sub->add_option("DIR", options->folder, "results of `deform run --record`")->required();
-  sub->add_option("--out", options->out, "folder for the results (DIR/replay)")->type_name("DIR");
-  sub->add_option("--frames", options->frame_rate, "pictures per simulated second")
-      ->check(CLI::PositiveNumber)
-      ->type_name("FPS");
-  sub->add_option("--set", options->set, "change a value under /output, such as the camera")
-      ->type_name("/json/pointer=value")
-      ->take_all()
-      ->allow_extra_args(false);
-  sub->add_flag("--states", options->shown_only, "pictures of the recorded states, nothing is simulated");
-  sub->callback([=, &globals] { *exit_code = replay(*options, globals); });
+  sub.option("DIR", options->folder, "results of `deform run --record`").required();
+  sub.option("--out", options->out, "folder for the results (DIR/replay)").type_name("DIR");
+  sub.option("--frames", options->frame_rate, "pictures per simulated second").positive().type_name("FPS");
+  sub.option("--set", options->set, "change a value under /output, such as the camera")
+      .type_name("/json/pointer=value")
+      .repeated();
+  sub.flag("--states", options->shown_only, "pictures of the recorded states, nothing is simulated");
+  sub.calls([=, &globals] { *exit_code = replay(*options, globals); });
 }
 
 }  // namespace cli

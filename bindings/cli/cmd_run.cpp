@@ -1,5 +1,4 @@
 // deform run SCENE.json: simulates and writes what interfaces promise.
-#include <CLI/CLI.hpp>
 #include <unistd.h>
 
 #include <csignal>
@@ -17,6 +16,7 @@
 #include <memory>
 #include <optional>
 
+#include "arguments.h"
 #include "frames.h"
 #include "impulses.h"
 #include "json_text.h"
@@ -474,48 +474,37 @@ int run_scene(RunOptions options, const Globals &globals, Comparison *comparison
   return result.interrupted ? int(kInterrupted) : int(kDone);
 }
 
-void add_run(CLI::App &app, Globals &globals, int *exit_code) {
+void add_run(Command app, Globals &globals, int *exit_code) {
   auto options = std::make_shared<RunOptions>();
-  const auto positive = [](const std::string &text) {
-    char *end = nullptr;
-    const double x = std::strtod(text.c_str(), &end);
-    return *end == 0 && x > 0 && std::isfinite(x)
-               ? std::string()
-               : "expected a finite number above 0, found \"" + text + "\"";
-  };
-  CLI::App *sub = app.add_subcommand("run", "simulates a scene and writes figures and pictures");
-  sub->add_option("SCENE", options->scene, "scene file (JSON)")->required();
-  sub->add_option("--out", options->out,
-                  "folder for the results (out/SCENE; of a FOLDER/scene.json out/FOLDER_run)")
-      ->type_name("DIR");
-  sub->add_option("--time", options->time, "seconds to simulate, instead of the scene's")
-      ->check(positive)
-      ->type_name("T");
-  sub->add_option("--set", options->set, "change a value of the scene")
-      ->type_name("/json/pointer=value")
-      ->take_all()
-      ->allow_extra_args(false);
-  sub->add_option("--frames", options->frame_rate, "pictures per simulated second")
-      ->check(positive)
-      ->type_name("FPS");
-  sub->add_flag("--profile", options->profile, "time spent in each stage");
-  sub->add_option("--jitter", options->jitter,
-                  "small random changes of the start state; the same seed gives the same run")
-      ->type_name("SEED");
-  sub->add_flag("--check", options->check,
-                "count crossing triangles in every step, not only in recorded states");
+  Command sub = app.command("run", "simulates a scene and writes figures and pictures");
+  sub.option("SCENE", options->scene, "scene file (JSON)").required();
+  sub.option("--out", options->out,
+             "folder for the results (out/SCENE; of a FOLDER/scene.json out/FOLDER_run)")
+      .type_name("DIR");
+  sub.option("--time", options->time, "seconds to simulate, instead of the scene's")
+      .positive()
+      .type_name("T");
+  sub.option("--set", options->set, "change a value of the scene")
+      .type_name("/json/pointer=value")
+      .repeated();
+  sub.option("--frames", options->frame_rate, "pictures per simulated second").positive().type_name("FPS");
+  sub.flag("--profile", options->profile, "time spent in each stage");
+  sub.option("--jitter", options->jitter,
+             "small random changes of the start state; the same seed gives the same run")
+      .type_name("SEED");
+  sub.flag("--check", options->check, "count crossing triangles in every step, not only in recorded states");
   auto saves = std::make_shared<std::vector<std::pair<double, std::string>>>();
-  sub->add_option("--save", *saves,
-                  "write the state of the first step at or after time T to FILE; may be repeated")
-      ->type_name("T FILE");
-  sub->add_option("--save-scene", options->save_scene,
-                  "write the world at the end of the run as a scene of its own")
-      ->type_name("FILE");
-  sub->add_option("--from", options->from,
-                  "continue from a state that --save or --record wrote, to the end of the scene or of --time")
-      ->type_name("FILE");
-  sub->add_flag("--record", options->record, "keep every recorded state, for `deform replay`");
-  sub->callback([=, &globals] {
+  sub.option("--save", *saves,
+             "write the state of the first step at or after time T to FILE; may be repeated")
+      .type_name("T FILE");
+  sub.option("--save-scene", options->save_scene,
+             "write the world at the end of the run as a scene of its own")
+      .type_name("FILE");
+  sub.option("--from", options->from,
+             "continue from a state that --save or --record wrote, to the end of the scene or of --time")
+      .type_name("FILE");
+  sub.flag("--record", options->record, "keep every recorded state, for `deform replay`");
+  sub.calls([=, &globals] {
     for (const auto &[at, path] : *saves) {
       if (!(at >= 0) || !std::isfinite(at))
         throw Failure(kBadInput, "--save: expected a finite time of 0 s or more, found " + number(at));

@@ -1,5 +1,4 @@
 // deform view SCENE.json: starts deform-view, the program with the window, which lies beside the command.
-#include <CLI/CLI.hpp>
 #include <unistd.h>
 
 #include <cerrno>
@@ -7,6 +6,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "arguments.h"
 #include "messages.h"
 
 namespace fs = std::filesystem;
@@ -55,27 +55,24 @@ struct ViewOptions {
 
 }  // namespace
 
-void add_view(CLI::App &app, Globals &globals, int *) {
+void add_view(Command app, Globals &globals, int *) {
   auto options = std::make_shared<ViewOptions>();
-  CLI::App *sub = app.add_subcommand("view", "a window on a scene, with mouse, sliders and plots");
-  sub->add_option("SCENE", options->scene, "scene file (JSON); not needed with --replay");
-  sub->add_option("--replay", options->replay, "show the states that `deform run --record` kept")
-      ->type_name("DIR");
-  sub->add_option("--script", options->script, "no hands: lines `t key|drag|slider|shot ARGS`")
-      ->type_name("FILE");
-  sub->add_option("--from", options->from, "begin with a state that `deform run --save` or the viewer wrote")
-      ->type_name("FILE");
-  sub->add_option("--out", options->out, "folder for pictures, states and recordings (out/SCENE_view)")
-      ->type_name("DIR");
-  sub->add_option("--set", options->set, "change a value of the scene")
-      ->type_name("/json/pointer=value")
-      ->take_all()
-      ->allow_extra_args(false);
-  sub->add_option("--size", options->size, "of the window in pixels (1280x720)")->type_name("WxH");
-  sub->add_option("--detail", options->detail,
-                  "light: full or fast (fast where OpenGL runs on the processor, else full)")
-      ->check(CLI::IsMember({"full", "fast"}));
-  sub->callback([=, &globals] { become_viewer(*options, globals); });
+  Command sub = app.command("view", "a window on a scene, with mouse, sliders and plots");
+  sub.option("SCENE", options->scene, "scene file (JSON); not needed with --replay");
+  sub.option("--replay", options->replay, "show the states that `deform run --record` kept").type_name("DIR");
+  sub.option("--script", options->script, "no hands: lines `t key|drag|slider|shot ARGS`").type_name("FILE");
+  sub.option("--from", options->from, "begin with a state that `deform run --save` or the viewer wrote")
+      .type_name("FILE");
+  sub.option("--out", options->out, "folder for pictures, states and recordings (out/SCENE_view)")
+      .type_name("DIR");
+  sub.option("--set", options->set, "change a value of the scene")
+      .type_name("/json/pointer=value")
+      .repeated();
+  sub.option("--size", options->size, "of the window in pixels (1280x720)").type_name("WxH");
+  sub.option("--detail", options->detail,
+             "light: full or fast (fast where OpenGL runs on the processor, else full)")
+      .one_of({"full", "fast"});
+  sub.calls([=, &globals] { become_viewer(*options, globals); });
 }
 
 }  // namespace cli

@@ -8,6 +8,7 @@
 #include <exception>
 #include <new>
 
+#include "arguments.h"
 #include "cli.h"
 #include "leaving.h"
 #include "messages.h"
@@ -125,18 +126,19 @@ int run(int argc, char **argv) {
   int exit_code = cli::kDone;
   CLI::App app{"Deformable bodies in contact with real friction.", "deform"};
   app.set_version_flag("--version", dfm_version(nullptr, nullptr, nullptr));
+  const cli::Command top(&app);
   app.require_subcommand(1);
-  cli::add_run(app, cli::globals, &exit_code);
-  cli::add_replay(app, cli::globals, &exit_code);
-  cli::add_explain(app, cli::globals, &exit_code);
-  cli::add_calibrate(app, cli::globals, &exit_code);
-  cli::add_mesh(app, cli::globals, &exit_code);
-  cli::add_plugin(app, cli::globals, &exit_code);
-  cli::add_ccd(app, cli::globals, &exit_code);
-  cli::add_friction(app, cli::globals, &exit_code);
-  cli::add_cost(app, cli::globals, &exit_code);
-  cli::add_view(app, cli::globals, &exit_code);
-  cli::add_montage(app, &exit_code);
+  cli::add_run(top, cli::globals, &exit_code);
+  cli::add_replay(top, cli::globals, &exit_code);
+  cli::add_explain(top, cli::globals, &exit_code);
+  cli::add_calibrate(top, cli::globals, &exit_code);
+  cli::add_mesh(top, cli::globals, &exit_code);
+  cli::add_plugin(top, cli::globals, &exit_code);
+  cli::add_ccd(top, cli::globals, &exit_code);
+  cli::add_friction(top, cli::globals, &exit_code);
+  cli::add_cost(top, cli::globals, &exit_code);
+  cli::add_view(top, cli::globals, &exit_code);
+  cli::add_montage(top, &exit_code);
   cli::add_common(&app);
   try {
     app.parse(argc, argv);

@@ -44,6 +44,6 @@ std::string nearest(const std::string &word, const std::vector<std::string> &val
 // Exit code of a run that a signal ended in order, as shells give it for SIGINT.
 enum { kInterrupted = 130 };
 
-void add_montage(CLI::App &app, int *exit_code);  // pictures in rows, for `make demo`; not listed in --help
+void add_montage(Command app, int *exit_code);  // pictures in rows, for `make demo`; not listed in --help
 
 }  // namespace cli

@@ -1,9 +1,8 @@
 // deform montage: pictures of several runs in labeled rows. `make demo` calls it; it is not part of the
 // command's promised surface.
-#include <CLI/CLI.hpp>
-
 #include <memory>
 
+#include "arguments.h"
 #include "messages.h"
 
 #ifdef DEFORM_HAVE_RENDER
@@ -50,18 +49,18 @@ int montage(const Options &) { return fail("montage: this deform was built witho
 
 }  // namespace
 
-void add_montage(CLI::App &app, int *exit_code) {
+void add_montage(Command app, int *exit_code) {
   auto options = std::make_shared<Options>();
-  CLI::App *sub = app.add_subcommand("montage", "pictures in labeled rows");
-  sub->group("");
-  CLI::Option *row = sub->add_option("--row", options->rows, "LABEL FILE...; may be repeated")
-                         ->required()
-                         ->type_name("LABEL FILE...");
-  row->inject_separator();
-  sub->add_option("--columns", options->columns, "labels above the columns");
-  sub->add_option("--title", options->title, "title");
-  sub->add_option("--out", options->out, "picture to write (PNG)")->required();
-  sub->callback([=] { *exit_code = montage(*options); });
+  Command sub = app.command("montage", "pictures in labeled rows");
+  sub.hide();
+  sub.option("--row", options->rows, "LABEL FILE...; may be repeated")
+      .required()
+      .type_name("LABEL FILE...")
+      .separated();
+  sub.option("--columns", options->columns, "labels above the columns");
+  sub.option("--title", options->title, "title");
+  sub.option("--out", options->out, "picture to write (PNG)").required();
+  sub.calls([=] { *exit_code = montage(*options); });
 }
 
 }  // namespace cli
