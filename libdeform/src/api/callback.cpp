@@ -1,6 +1,7 @@
 #include "deform/callback.h"
 
 #include "api/objects.h"
+#include "state/obstacle.h"
 #include "step/stages.h"
 
 using namespace dfm;

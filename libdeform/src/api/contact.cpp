@@ -4,7 +4,9 @@
 #include <cmath>
 
 #include "api/objects.h"
+#include "friction/laws.h"
 #include "friction/pair_rules.h"
+#include "state/obstacle.h"
 #include "step/context.h"
 #include "step/stages.h"
 #include "step/step_impulses.h"

@@ -1,6 +1,7 @@
 #include "deform/id.h"
 
 #include "core/handle.h"
+#include "state/obstacle.h"
 #include "state/world.h"
 
 using namespace dfm;

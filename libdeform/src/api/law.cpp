@@ -9,6 +9,7 @@
 
 #include "api/objects.h"
 #include "plugin/call.h"
+#include "plugin/context.h"
 #include "plugin/params.h"
 #include "step/context.h"
 #include "step/stages.h"

@@ -3,6 +3,8 @@
 #include "api/as_status.h"
 #include "api/structs.h"
 #include "core/handle.h"
+#include "plugin/context.h"
+#include "state/obstacle.h"
 #include "state/world.h"
 
 namespace dfm {

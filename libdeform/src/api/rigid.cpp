@@ -1,6 +1,7 @@
 #include "deform/rigid.h"
 
 #include "api/objects.h"
+#include "state/obstacle.h"
 #include "step/context.h"
 #include "step/rigid.h"
 #include "step/stages.h"

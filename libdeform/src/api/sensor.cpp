@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "api/objects.h"
+#include "state/obstacle.h"
 #include "step/stages.h"
 #include "world/sensors.h"
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "api/objects.h"
+#include "state/tool.h"
 #include "world/tool.h"
 #include "world/tool_cut.h"
 

@@ -4,7 +4,10 @@
 #include <cmath>
 
 #include "api/objects.h"
+#include "plugin/context.h"
 #include "rollback/rollback.h"
+#include "state/obstacle.h"
+#include "state/tool.h"
 #include "step/context.h"
 #include "step/method.h"
 #include "step/stages.h"

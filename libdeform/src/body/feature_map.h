@@ -14,4 +14,10 @@ struct FeatureMap {
   FeatureMap(const Surface &before, const Surface &now);
 };
 
+// The surface before a cut, and where its features are now.
+struct FormerSurface {
+  uint64_t shape;
+  FeatureMap features;
+};
+
 }  // namespace dfm

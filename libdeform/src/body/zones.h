@@ -11,6 +11,8 @@
 
 namespace dfm {
 
+inline constexpr double kDefaultFriction = 0.5;  // of a material that has no entry "friction"
+
 struct SurfaceZones {
   struct Zone {
     std::string group, material;  // either may be empty

@@ -3,6 +3,10 @@
 #include <algorithm>
 #include <numeric>
 
+#include "contact/contact_state.h"
+#include "contact/rows_part.h"
+#include "geometry/surface.h"
+
 namespace dfm {
 
 ContactStore::ContactStore(const Memory &m) {

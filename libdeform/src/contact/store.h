@@ -3,10 +3,14 @@
 #pragma once
 #include <span>
 
-#include "contact/contact_state.h"
-#include "contact/rows.h"
+#include "contact/contact_set.h"
+#include "core/memory.h"
+#include "math/vec3.h"
 
 namespace dfm {
+
+struct ContactState;
+class Tasks;
 
 // Description of a column for code that handles all columns. `values`: valid values in a snapshot.
 enum class ColumnValues : uint8_t { any, finite, not_negative, flag, law };

@@ -20,13 +20,14 @@
 #include <memory>
 #include <string>
 
-#include "body/backing.h"
 #include "body/phyxels.h"
-#include "core/tasks.h"
 #include "dynamics/model.h"
 #include "geometry/surface.h"
 
 namespace dfm {
+
+struct Backing;
+class Tasks;
 
 struct SubStep {
   double time = 0, h = 0;     // s: its start, its length

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "plugin/context.h"
 #include "plugin/tables.h"
 
 namespace dfm {

@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "plugin/call.h"
+#include "plugin/context.h"
 #include "plugin/params.h"
 #include "plugin/registry.h"
 #include "plugin/tables.h"

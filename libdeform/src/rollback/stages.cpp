@@ -19,10 +19,13 @@
 
 #include "body/make_surface.h"
 #include "core/error.h"
+#include "friction/laws.h"
+#include "plugin/context.h"
 #include "rollback/equations.h"
 #include "rollback/impact_time.h"
 #include "state/world.h"
 #include "step/context.h"
+#include "step/solve_islands.h"
 #include "step/stages.h"
 
 namespace dfm::rollback {
@@ -280,7 +283,7 @@ bool stage_rollback(World &w, StepContext &step, uint32_t *trouble) {
   find_points(w, step);
   make_rows(w, step);
   set_forces(w, step);
-  for (SolveIsland &island : step.solve_islands.all())
+  for (SolveIsland &island : step.solve_islands->all())
     if (const LawInstance *bad = island.batches.evaluate(step.h, step.state)) {
       *trouble |= tell_failed_solve(w, step, bad, island.batches.failed());
       return false;

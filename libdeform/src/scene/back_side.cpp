@@ -2,8 +2,10 @@
 
 #include <cmath>
 
+#include "body/obstacle_mesh.h"
 #include "math/turn.h"
 #include "plugin/context.h"
+#include "state/obstacle.h"
 
 namespace dfm::scene {
 namespace {

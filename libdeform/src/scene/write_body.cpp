@@ -8,8 +8,10 @@
 
 #include "core/error.h"
 #include "mesh/tri_mesh.h"
+#include "plugin/context.h"
 #include "scene/start.h"
 #include "scene/write.h"
+#include "state/obstacle.h"
 #include "step/attach.h"
 #include "world/body_model.h"
 

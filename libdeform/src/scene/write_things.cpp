@@ -3,8 +3,10 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "dynamics/rigid/rigid_set.h"
 #include "mesh/tri_mesh.h"
 #include "scene/write.h"
+#include "state/obstacle.h"
 
 namespace dfm::writing {
 namespace {

@@ -4,6 +4,8 @@
 
 #include "mesh/tri_mesh.h"
 #include "scene/write.h"
+#include "state/obstacle.h"
+#include "state/tool.h"
 
 namespace dfm::writing {
 namespace {

@@ -4,8 +4,6 @@
 #include <string>
 #include <vector>
 
-#include "body/feature_map.h"
-#include "body/self_rest.h"
 #include "body/zones.h"
 #include "deform/deform.h"
 #include "dynamics/dynamics.h"
@@ -15,11 +13,13 @@
 #include "state/energy_book.h"
 #include "state/model_choice.h"
 #include "state/motion.h"
-#include "state/search_tree.h"
 #include "state/sleep.h"
 
 namespace dfm {
 
+class SearchTree;
+struct FormerSurface;
+struct SelfRest;
 struct World;
 
 // An entry of a material, or a field (material empty), that the body's model has no parameter for.
@@ -152,12 +152,10 @@ struct Body {
   std::unique_ptr<SearchTree> search;   // rays and closest points
   std::unique_ptr<SelfRest> self_rest;  // made with a cut; null: made when it is needed
   // until prepare() has seen it: the surface before the last cut, and where its features are now
-  struct FormerSurface {
-    uint64_t shape;
-    FeatureMap features;
-  };
   std::unique_ptr<FormerSurface> former_surface;
 
+  Body();
+  ~Body();
   bool loads_vary() const;
   double impulse_time() const;  // s that surfel_impulse belongs to
 };

@@ -4,8 +4,11 @@
 #include <cmath>
 #include <cstdio>
 
+#include "body/obstacle_mesh.h"
 #include "core/error.h"
 #include "geometry/obstacle_shape.h"
+#include "geometry/voxel_grid.h"
+#include "state/obstacle.h"
 #include "state/world.h"
 
 namespace dfm {

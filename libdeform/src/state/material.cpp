@@ -7,6 +7,7 @@
 
 #include "core/error.h"
 #include "core/handle.h"
+#include "plugin/context.h"
 #include "plugin/params.h"
 #include "state/world.h"
 

@@ -4,19 +4,17 @@
 #include <string>
 #include <vector>
 
-#include "body/obstacle_mesh.h"
 #include "body/zones.h"
 #include "deform/deform.h"
-#include "geometry/voxel_grid.h"
 #include "state/motion.h"
-#include "state/search_tree.h"
 
 namespace dfm {
 
+struct ObstacleMesh;
 struct RigidSet;
+class SearchTree;
+class VoxelGrid;
 struct World;
-
-inline constexpr double kDefaultFriction = 0.5;  // of a material that has no entry "friction"
 
 struct Obstacle {
   World *world = nullptr;
@@ -43,6 +41,9 @@ struct Obstacle {
   std::unique_ptr<ObstacleMesh> mesh;
   std::unique_ptr<VoxelGrid> grid;
   std::unique_ptr<SearchTree> search;  // rays
+
+  Obstacle();
+  ~Obstacle();
   Pose pose_at_time(double t) const;
   // Of a sub-step, in a step whose remaining time from t is `left`. rest: s, to the end of the planned
   // sub-step, of which this is a piece if h is less. The obstacle goes straight to where it has to be then:

@@ -10,30 +10,29 @@
 
 #include "contact/report.h"
 #include "contact/store.h"
-#include "dynamics/rigid/rigid_set.h"
-#include "friction/laws.h"
 #include "plan/plan.h"
-#include "plugin/context.h"
 #include "plugin/selection.h"
 #include "state/attachment.h"
 #include "state/body.h"
 #include "state/energy_book.h"
 #include "state/impulses.h"
 #include "state/integrator_purse.h"
-#include "state/material.h"
 #include "state/meters.h"
-#include "state/obstacle.h"
 #include "state/overlaps.h"
 #include "state/pair_tables.h"
 #include "state/step_sizes.h"
-#include "state/tool.h"
 #include "state/world_bound.h"
 
 namespace dfm {
 
 class Aside;
 struct ContactMethod;
+struct LawInstance;
+struct Material;
+struct Obstacle;
+struct RigidSet;
 struct StepContext;
+struct Tool;
 
 struct FrictionRule {
   std::string between[2];

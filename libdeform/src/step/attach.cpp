@@ -4,6 +4,7 @@
 
 #include "core/error.h"
 #include "deform/attach.h"
+#include "state/obstacle.h"
 #include "state/world.h"
 #include "step/context.h"
 #include "step/move_obstacles.h"

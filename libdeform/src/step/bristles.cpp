@@ -15,6 +15,9 @@
 
 #include <algorithm>
 
+#include "contact/contact_state.h"
+#include "friction/laws.h"
+#include "state/obstacle.h"
 #include "state/world.h"
 #include "step/context.h"
 #include "step/move_obstacles.h"

@@ -8,10 +8,15 @@
 
 #include "body/make_surface.h"
 #include "core/error.h"
+#include "dynamics/rigid/rigid_set.h"
+#include "plugin/context.h"
+#include "state/obstacle.h"
+#include "state/tool.h"
 #include "state/world.h"
 #include "step/blow.h"
 #include "step/context.h"
 #include "step/stages.h"
+#include "step/tool_touch.h"
 #include "step/turn_integrators.h"
 
 namespace dfm {
@@ -165,7 +170,7 @@ void changing(Stream &s, World &w) {
 void reserve_others(World &w, StepContext &step) {
   const auto reserve = [](const ContactColumn &, const auto &from, auto &to) { to.reserve(from.size()); };
   each_column(reserve, w.store, step.next_store);
-  each_column(reserve, w.tool_store, step.tools.next());
+  each_column(reserve, w.tool_store, step.tools->next());
   each_report_column([](size_t, const auto &from, auto &to) { to.reserve(from.size()); }, w.report,
                      step.last_report);
 }

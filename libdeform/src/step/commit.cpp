@@ -4,13 +4,14 @@
 #include <limits>
 
 #include "core/error.h"
+#include "plugin/context.h"
 #include "plugin/on_behalf.h"
 #include "step/attach.h"
 #include "step/blow.h"
-#include "step/cut_drag.h"
 #include "step/by_body.h"
 #include "step/change_work.h"
 #include "step/context.h"
+#include "step/cut_drag.h"
 #include "step/energy_watch.h"
 #include "step/first_failure.h"
 #include "step/stages.h"

@@ -1,13 +1,17 @@
 #include "step/context.h"
 
+#include "step/self_contact.h"
+#include "step/solve_islands.h"
+#include "step/tool_touch.h"
+
 namespace dfm {
 
 StepContext::StepContext(const Meters &meters)
     : broad(meters.detection.memory()),
       narrow(meters.detection.memory()),
       rows(meters.contacts.memory()),
-      solve_islands(meters.contacts.memory()),
-      tools(meters.contacts.memory()),
+      solve_islands(std::make_unique<SolveIslands>(meters.contacts.memory())),
+      tools(std::make_unique<ToolTouch>(meters.contacts.memory())),
       areas(meters.contacts.memory()),
       exchange(meters.contacts.memory()),
       renewal(meters.contacts.memory()),
@@ -26,5 +30,7 @@ StepContext::StepContext(const Meters &meters)
   use_memory(meters.detection.memory(), known.runs, known.old_runs, known.features, known.old_features,
              known.rest, known.old_rest, known.normal, known.old_normal, known.before);
 }
+
+StepContext::~StepContext() = default;
 
 }  // namespace dfm

@@ -6,6 +6,7 @@
 
 #include "broad/broad_phase.h"
 #include "contact/areas.h"
+#include "contact/contact_state.h"
 #include "contact/distribute.h"
 #include "contact/exchange.h"
 #include "contact/renewal.h"
@@ -20,12 +21,13 @@
 #include "step/islands.h"
 #include "step/method.h"
 #include "step/pair_energy.h"
-#include "step/self_contact.h"
-#include "step/solve_islands.h"
 #include "step/stages.h"
-#include "step/tool_touch.h"
 
 namespace dfm {
+
+struct SelfBody;
+class SolveIslands;
+class ToolTouch;
 
 struct StageTime {
   double seconds = 0;
@@ -66,7 +68,7 @@ struct StepContext {
   Array<Bond> bonds;
   Array<double> bond_impulse;  // [bonds,3] N s, initial values of the next solve of this sub-step
   ContactState state;
-  SolveIslands solve_islands;
+  std::unique_ptr<SolveIslands> solve_islands;
   struct { Array<double> normal, tangent; } tolerance;  // [contacts] of all islands
   Residual residual;                                    // the worst of all islands
   uint32_t passes = 0, sweeps = 0;                      // of the island with the most
@@ -83,11 +85,11 @@ struct StepContext {
     double scale;  // of friction
     Vec3 belt;     // m/s
   };
-  Array<Chosen> chosen;             // [contacts] by the host (PreSolve); empty without a callback
-  Array<uint8_t> near;              // [bodies] had contacts in the last sub-step
-  Array<uint8_t> touching;          // [bodies] touch something, between steps
-  const Body *unsettled = nullptr;  // a body without a solution for its contacts
-  ToolTouch tools;                  // with each other
+  Array<Chosen> chosen;              // [contacts] by the host (PreSolve); empty without a callback
+  Array<uint8_t> near;               // [bodies] had contacts in the last sub-step
+  Array<uint8_t> touching;           // [bodies] touch something, between steps
+  const Body *unsettled = nullptr;   // a body without a solution for its contacts
+  std::unique_ptr<ToolTouch> tools;  // with each other
   // a rigid host has revised its response, and the solve continues from its last impulses
   bool rigid_again = false;
   AreaShares areas;
@@ -123,6 +125,7 @@ struct StepContext {
   Array<uint8_t> stirred;  // [island]
 
   explicit StepContext(const Meters &meters);
+  ~StepContext();
 };
 
 }  // namespace dfm

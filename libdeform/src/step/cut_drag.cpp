@@ -3,6 +3,8 @@
 #include <algorithm>
 
 #include "state/material.h"
+#include "state/obstacle.h"
+#include "state/tool.h"
 #include "state/world.h"
 #include "step/attach.h"
 #include "step/context.h"

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "plugin/context.h"
 #include "plugin/on_behalf.h"
 #include "state/world.h"
 #include "step/context.h"

@@ -2,7 +2,10 @@
 #include <cmath>
 #include <string>
 
+#include "contact/contact_state.h"
 #include "core/error.h"
+#include "friction/laws.h"
+#include "state/obstacle.h"
 #include "state/world.h"
 #include "step/context.h"
 #include "step/stages.h"

@@ -16,14 +16,19 @@
 #include <cmath>
 #include <utility>
 
+#include "body/obstacle_mesh.h"
 #include "contact/reach.h"
+#include "dynamics/rigid/rigid_set.h"
 #include "geometry/obstacle_shape.h"
 #include "geometry/pierce.h"
 #include "math/turn.h"
 #include "narrow/detail.h"
+#include "plugin/context.h"
+#include "state/obstacle.h"
 #include "state/world.h"
 #include "step/context.h"
 #include "step/move_obstacles.h"
+#include "step/self_contact.h"
 #include "step/stages.h"
 #include "step/step_bound.h"
 

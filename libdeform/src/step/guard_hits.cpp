@@ -4,13 +4,16 @@
 #include <array>
 
 #include "ccd/toi_guard_motion.h"
+#include "dynamics/rigid/rigid_set.h"
 #include "math/turn.h"
 #include "narrow/detail.h"
 #include "narrow/parts.h"
+#include "state/obstacle.h"
 #include "state/world.h"
 #include "step/context.h"
 #include "step/guard.h"
 #include "step/pre_solve.h"
+#include "step/self_contact.h"
 #include "step/stages.h"
 
 namespace dfm {

@@ -2,6 +2,9 @@
 // friction, and the report.
 #include <algorithm>
 
+#include "friction/laws.h"
+#include "plugin/context.h"
+#include "state/obstacle.h"
 #include "state/world.h"
 #include "step/bristles.h"
 #include "step/context.h"

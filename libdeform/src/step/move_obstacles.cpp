@@ -1,6 +1,8 @@
 #include "math/turn.h"
 #include "step/move_obstacles.h"
 
+#include "body/obstacle_mesh.h"
+#include "state/obstacle.h"
 #include "step/context.h"
 #include "step/rigid.h"
 

@@ -8,6 +8,7 @@
 #include "geometry/closest.h"
 #include "narrow/narrow_phase.h"
 #include "narrow/parts.h"
+#include "plugin/context.h"
 #include "state/world.h"
 #include "step/context.h"
 #include "step/stages.h"

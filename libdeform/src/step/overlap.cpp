@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <memory>
 
+#include "body/obstacle_mesh.h"
 #include "contact/reach.h"
 #include "core/error.h"
+#include "plugin/context.h"
 #include "state/world.h"
 #include "step/context.h"
 #include "step/overlap_sides.h"

@@ -7,7 +7,9 @@
 #include <limits>
 
 #include "body/make_surface.h"
+#include "body/obstacle_mesh.h"
 #include "geometry/closest.h"
+#include "geometry/voxel_grid.h"
 
 namespace dfm {
 namespace {

@@ -6,10 +6,12 @@
 #include <utility>
 
 #include "core/error.h"
+#include "state/obstacle.h"
 #include "state/world.h"
 #include "step/context.h"
 #include "step/energy_watch.h"
 #include "step/pair_table.h"
+#include "step/solve_islands.h"
 #include "step/stages.h"
 
 namespace dfm {
@@ -72,7 +74,7 @@ Made made_by(const World &w, const StepContext &step, uint32_t i, bool ends) {
 // sum, of which each pair that has made something gets its share.
 void share_in_islands(StepContext &step) {
   Array<PairMade> &pairs = step.pairs_made;
-  for (const SolveIsland &island : step.solve_islands.all()) {
+  for (const SolveIsland &island : step.solve_islands->all()) {
     if (!(island.residual.due > 1)) continue;
     const auto each = [&](auto &&f) {
       for (const RowRun &run : island.part.contacts) {

@@ -7,7 +7,9 @@
 #include <cmath>
 
 #include "friction/pair_rules.h"
+#include "plugin/context.h"
 #include "plugin/params.h"
+#include "state/obstacle.h"
 #include "state/world.h"
 #include "step/context.h"
 #include "step/pair_table.h"

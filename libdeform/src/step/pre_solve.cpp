@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "state/obstacle.h"
 #include "state/world.h"
 #include "step/context.h"
 #include "step/pair_table.h"

@@ -9,16 +9,23 @@
 #include <algorithm>
 #include <utility>
 
+#include "body/obstacle_mesh.h"
 #include "core/error.h"
 #include "dynamics/relative_work.h"
 #include "friction/pair_rules.h"
+#include "geometry/voxel_grid.h"
 #include "plan/integrators.h"
+#include "plugin/context.h"
 #include "state/bounds.h"
+#include "state/obstacle.h"
+#include "state/tool.h"
 #include "step/cut_drag.h"
 #include "step/energy_watch.h"
 #include "step/overlap.h"
 #include "step/pair_table.h"
 #include "step/rigid.h"
+#include "step/self_contact.h"
+#include "step/tool_touch.h"
 #include "step/tools.h"
 
 namespace dfm {
@@ -431,7 +438,7 @@ void prepare(World &w, const RestoredChoice *restored) {
   view_obstacles_anew(w, step);
   view_rigids(w, facts);
   make_pair_tables(w, step, facts);
-  step.tools.prepare(w, facts);
+  step.tools->prepare(w, facts);
   choose_plan(w, step, facts);
   if (!restored && !w.plan.touches()) end_contacts(w);
   if (!w.plan.has(StageRole::finds_contacts) && !facts.self_bodies) step.contacts.clear();

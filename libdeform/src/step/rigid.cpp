@@ -6,11 +6,14 @@
 #include <cmath>
 #include <new>
 
+#include "body/obstacle_mesh.h"
 #include "core/error.h"
 #include "math/turn.h"
+#include "state/obstacle.h"
 #include "state/world.h"
 #include "step/context.h"
 #include "step/stages.h"
+#include "step/tool_touch.h"
 
 namespace dfm {
 namespace {
@@ -85,7 +88,7 @@ bool stage_rigid_predict(World &w, StepContext &step, uint32_t *trouble) {
   step.rigid_again = false;
   for (auto &set : w.rigid_sets) set->begin(sub_step_of(w, step));
   if (!ask_rigids(w, trouble)) return false;
-  if (!step.tools.begin(w, step)) return false;
+  if (!step.tools->begin(w, step)) return false;
   for (auto &set : w.rigid_sets) set->first.assign(set->velocity.begin(), set->velocity.end());
   for (auto &o : w.obstacles) {
     if (!o->rigid || o->rigid->group[o->rigid_body] == DFM_RIGID_STILL) continue;
@@ -202,7 +205,7 @@ int ask_rigid_ends(World &w, uint32_t *trouble) {
 bool stage_rigid_commit(World &w, StepContext &step, uint32_t *trouble) {
   for (uint32_t round = 0;; ++round) {
     sum_rigid_impulses(w, step);
-    const bool differ = step.tools.answer(w, step);
+    const bool differ = step.tools->answer(w, step);
     const int end = ask_rigid_ends(w, trouble);
     if (end == 0) return false;
     if ((end == 1 && !differ) || round == DFM_RIGID_MOST_AGAIN || !w.plan.touches() || step.rows.all() == 0)
@@ -210,12 +213,12 @@ bool stage_rigid_commit(World &w, StepContext &step, uint32_t *trouble) {
     step.rigid_again = true;
     ++w.stats.rigid_again;
     if (!ask_rigids(w, trouble)) return false;
-    step.tools.correct();
+    step.tools->correct();
     if (!stage_solve(w, step, trouble)) return false;
   }
   step.rigid_again = false;
-  if (!step.tools.follows_arcs(step)) return false;
-  step.tools.turn_jaws();
+  if (!step.tools->follows_arcs(step)) return false;
+  step.tools->turn_jaws();
   // From here on (guard) their true motion is used.
   for (auto &o : w.obstacles) {
     if (!o->rigid || o->rigid->group[o->rigid_body] == DFM_RIGID_STILL) continue;
@@ -230,7 +233,7 @@ bool stage_rigid_commit(World &w, StepContext &step, uint32_t *trouble) {
 }
 
 void keep_rigids(World &w, StepContext &step) {
-  step.tools.keep(w);
+  step.tools->keep(w);
   for (auto &set : w.rigid_sets) set->commit(sub_step_of(w, step), step.guard.motion);
   if (!w.rigid_sets.empty())
     for (auto &o : w.obstacles)

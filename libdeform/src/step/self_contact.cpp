@@ -17,6 +17,7 @@
 #include "body/make_surface.h"
 #include "ccd/toi_guard_motion.h"
 #include "geometry/pierce.h"
+#include "plugin/registry.h"
 #include "state/world.h"
 #include "step/context.h"
 #include "step/pair_table.h"
@@ -240,7 +241,7 @@ void choose_self_bodies(World &w, StepContext &step, SceneFacts &facts, std::vec
   std::vector<std::unique_ptr<SelfBody>> before;
   before.swap(step.self_bodies);
   for (auto &b : w.bodies) {
-    const std::unique_ptr<Body::FormerSurface> former = std::move(b->former_surface);
+    const std::unique_ptr<FormerSurface> former = std::move(b->former_surface);
     const uint8_t when =
         w.selection.wants(kSelfContact) ? rule_of(w, *b, needed_by(*b, asked)) : uint8_t{DFM_SELF_OFF};
     if (promises(*b) || when == DFM_SELF_OFF) continue;

@@ -23,7 +23,9 @@
 
 #include "body/make_surface.h"
 #include "contact/reach.h"
+#include "dynamics/rigid/rigid_set.h"
 #include "narrow/narrow_phase.h"
+#include "state/obstacle.h"
 #include "state/world.h"
 #include "step/context.h"
 #include "step/cut_drag.h"

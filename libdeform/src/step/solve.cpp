@@ -13,6 +13,7 @@
 #include "body/make_surface.h"
 #include "contact/solver.h"
 #include "core/error.h"
+#include "plugin/context.h"
 #include "state/world.h"
 #include "step/attach.h"
 #include "step/bristles.h"
@@ -21,6 +22,7 @@
 #include "step/pair_table.h"
 #include "step/pre_solve.h"
 #include "step/rigid.h"
+#include "step/solve_islands.h"
 #include "step/stages.h"
 #include "step/tolerance.h"
 
@@ -118,7 +120,7 @@ void make_rows(World &w, StepContext &step) {
   if (step.guard.resolving) guard_impulses(step);
   if (!step.guard.kept.empty()) guard_rates(step);
   if (step.rigid_again) step.rows.impulse.assign(step.best_impulse.begin(), step.best_impulse.end());
-  step.solve_islands.find(w, step);
+  step.solve_islands->find(w, step);
 }
 
 namespace {
@@ -186,7 +188,7 @@ void forget_revisions(World &w, StepContext &step, const SolveIsland &own) {
 // The open islands whose bodies revise, each by itself; own.revised says what has come of it. warm: by the
 // impulses of the last sub-step.
 void revise_islands(World &w, StepContext &step, bool warm) {
-  const std::span<SolveIsland> all = step.solve_islands.all();
+  const std::span<SolveIsland> all = step.solve_islands->all();
   bool any = false, responses = false;
   for (SolveIsland &own : all) {
     any = any || (own.open && own.revises);
@@ -212,7 +214,7 @@ void revise_islands(World &w, StepContext &step, bool warm) {
 // these hold it in; around its free motion the first solve would let it fall, and friction with memory slide,
 // from where the sweeps do not find back.
 void revise_warm(World &w, StepContext &step) {
-  const std::span<SolveIsland> all = step.solve_islands.all();
+  const std::span<SolveIsland> all = step.solve_islands->all();
   for (SolveIsland &own : all) own.open = own.revises;
   for (uint32_t k = 0; k < kWarmRevisions; ++k) {
     revise_islands(w, step, true);
@@ -228,7 +230,7 @@ void revise_warm(World &w, StepContext &step) {
 // With what rigid hosts and bodies answer differently by the impulses that are found: the same problem again,
 // from these impulses. An island is done once none of its bodies answers differently.
 const SolveIsland *solve_revised(World &w, StepContext &step, Revised &revised) {
-  const std::span<SolveIsland> all = step.solve_islands.all();
+  const std::span<SolveIsland> all = step.solve_islands->all();
   for (SolveIsland &own : all) {
     own.all_passes = own.all_sweeps = own.again = own.capped = 0;
     own.redundant.start();
@@ -280,7 +282,7 @@ const SolveIsland *solve_revised(World &w, StepContext &step, Revised &revised) 
 void add_up(StepContext &step) {
   step.passes = step.sweeps = 0;
   step.residual = {};
-  for (const SolveIsland &own : step.solve_islands.all()) {
+  for (const SolveIsland &own : step.solve_islands->all()) {
     step.passes = std::max(step.passes, own.all_passes);
     step.sweeps = std::max(step.sweeps, own.all_sweeps);
     step.residual = larger(step.residual, own.residual);

@@ -10,6 +10,7 @@
 #include "contact/fixed_limits.h"
 #include "contact/recovery.h"
 #include "dynamics/relative_work.h"
+#include "plugin/context.h"
 #include "state/world.h"
 #include "step/context.h"
 #include "step/tolerance.h"
@@ -227,7 +228,7 @@ void settle(const World &w, StepContext &step, SolveIsland &own, double &best) {
 // good as its contacts. Bodies that do not revise ask between cut faces only (doc/decisions/0445).
 constexpr uint32_t kAskStands = 4;
 bool asks_redundant(const World &w, const StepContext &step, SolveIsland &own) {
-  const uint8_t *const cut = step.solve_islands.of_cuts();
+  const uint8_t *const cut = step.solve_islands->of_cuts();
   if (!(own.revises || cut) || own.sweeps < kPolish || own.sweeps % kAskStands != 0 ||
       own.batches.remembers() || w.prescribed.stands())
     return false;
@@ -419,7 +420,7 @@ bool ask_slopes(StepContext &step, SolveIsland &own) {
 // The laws at the warm start, and what it leaves at the bodies.
 void start_island(const World &w, StepContext &step, SolveIsland &own) {
   if (ask(w, step, own) && ask_slopes(step, own))
-    find_disturbance(step.rows, own.part, step.state, step.h, step.solve_islands.sides(),
+    find_disturbance(step.rows, own.part, step.state, step.h, step.solve_islands->sides(),
                      step.disturbance.data());
 }
 
@@ -465,7 +466,7 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
           ? ToleranceBounds{least, least, least}
           : ToleranceBounds{least, memory || own.revises ? kRememberedRest * least : gap_margin,
                             memory ? kRememberedShare * gap_margin : gap_margin};
-  set_tolerance(step.rows, own.part, step.contacts, step.h, bounds, step.solve_islands.sides(),
+  set_tolerance(step.rows, own.part, step.contacts, step.h, bounds, step.solve_islands->sides(),
                 step.disturbance.data(), own.tolerance);
   own.redundant.allow(own.part, own.tolerance);
   const double slow = kSlowOpening * w.offset / step.guard.planned;
@@ -686,8 +687,8 @@ const SolveIsland *solve_islands(World &w, StepContext &step) {
   step.tolerance.tangent.resize(n);
   step.trial_response.resize(n);
   step.best_impulse.resize(3 * size_t{step.rows.all()});
-  step.disturbance.resize(2 * size_t{step.solve_islands.side_count()});
-  const std::span<SolveIsland> all = step.solve_islands.all();
+  step.disturbance.resize(2 * size_t{step.solve_islands->side_count()});
+  const std::span<SolveIsland> all = step.solve_islands->all();
   uint64_t rows = 0;
   for (SolveIsland &own : all) {
     if (!own.open) continue;
@@ -703,10 +704,10 @@ const SolveIsland *solve_islands(World &w, StepContext &step) {
     own.tolerance.tangent = step.tolerance.tangent.data();
   }
   for (SolveIsland &own : all) own.spent.all = rows;
-  const std::span<const uint32_t> order = step.solve_islands.by_size();
+  const std::span<const uint32_t> order = step.solve_islands->by_size();
   if (step.counting.most > 0) step.counting.bodies = body_effort(w, step);
   // one job for both, unless islands share a body: then its tolerances follow from all of them
-  const bool shared = step.solve_islands.shares_sides();
+  const bool shared = step.solve_islands->shares_sides();
   const auto run = [&](bool starts, bool solves) {
     w.context->tasks.parallel_for(static_cast<uint32_t>(order.size()), 1, [&](uint32_t begin, uint32_t end) {
       for (uint32_t k = begin; k < end; ++k) {
@@ -723,7 +724,7 @@ const SolveIsland *solve_islands(World &w, StepContext &step) {
   };
   run(true, !shared);
   if (shared) {
-    step.solve_islands.largest_by_body(step.disturbance);
+    step.solve_islands->largest_by_body(step.disturbance);
     run(false, true);
   }
   for (const SolveIsland &own : all)

@@ -1,7 +1,9 @@
 #include "step/stage_costs.h"
 
 #include "core/error.h"
+#include "dynamics/rigid/rigid_set.h"
 #include "step/context.h"
+#include "step/self_contact.h"
 
 namespace dfm::cost {
 namespace {

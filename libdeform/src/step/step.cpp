@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "plugin/context.h"
 #include "state/bounds.h"
 #include "state/world.h"
 #include "step/attach.h"

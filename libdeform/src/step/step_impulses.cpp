@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "state/obstacle.h"
 #include "state/world.h"
 #include "step/context.h"
 #include "step/stages.h"

@@ -5,7 +5,10 @@
 
 #include "ccd/toi_guard_motion.h"
 #include "core/error.h"
+#include "dynamics/rigid/rigid_set.h"
 #include "math/turn.h"
+#include "plugin/context.h"
+#include "state/obstacle.h"
 #include "state/world.h"
 #include "step/context.h"
 #include "step/tool_touch.h"

@@ -12,6 +12,7 @@
 #include <cmath>
 
 #include "contact/friction_kernel.h"
+#include "dynamics/rigid/rigid_set.h"
 #include "state/world.h"
 #include "step/tool_touch.h"
 

@@ -3,9 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dynamics/rigid/rigid_set.h"
 #include "friction/pair_rules.h"
 #include "geometry/closest.h"
 #include "math/turn.h"
+#include "state/obstacle.h"
+#include "state/tool.h"
 #include "state/world.h"
 #include "step/budget.h"
 #include "step/context.h"

@@ -4,6 +4,8 @@
 
 #include "math/turn.h"
 #include "state/bounds.h"
+#include "state/obstacle.h"
+#include "state/tool.h"
 #include "state/world.h"
 #include "step/rigid.h"
 

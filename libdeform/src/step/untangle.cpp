@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "core/error.h"
+#include "plugin/context.h"
 #include "state/spring.h"
 #include "state/world.h"
 #include "step/context.h"

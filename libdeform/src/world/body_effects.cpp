@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "core/error.h"
+#include "plugin/registry.h"
 #include "plugin/tables.h"
 #include "state/world.h"
 

@@ -8,6 +8,7 @@
 
 #include "core/error.h"
 #include "core/hash.h"
+#include "plugin/context.h"
 #include "plugin/on_behalf.h"
 #include "plugin/params.h"
 #include "plugin/registry.h"

@@ -8,6 +8,7 @@
 #include "geometry/box_tree.h"
 #include "mesh/mesh.h"
 #include "state/material.h"
+#include "state/search_tree.h"
 #include "state/world.h"
 #include "step/self_contact.h"
 #include "world/blade_sweep.h"
@@ -326,7 +327,7 @@ std::unique_ptr<BodyShape> take_shape(Body &b, MadeShape &made, bool parts, bool
     keep_integrator(b, before.integrator);
     keep_params(b, before);
     carry_state(before, mesh, made.edge, b);
-    b.former_surface.reset(new Body::FormerSurface{shape->shape, made.features});
+    b.former_surface.reset(new FormerSurface{shape->shape, made.features});
   } catch (...) {
     exchange(b, *shape);
     throw;

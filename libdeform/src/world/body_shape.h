@@ -2,8 +2,10 @@
 // new shape and exchange it with that of the body, so that a cut is complete or has no effect.
 #pragma once
 #include "body/feature_map.h"
+#include "body/self_rest.h"
 #include "mesh/cut_mesh.h"
 #include "state/body.h"
+#include "state/search_tree.h"
 #include "world/body_model.h"
 
 namespace dfm {

@@ -5,6 +5,7 @@
 #include "body/make_surface.h"
 #include "core/error.h"
 #include "mesh/mesh.h"
+#include "plugin/context.h"
 #include "state/world.h"
 
 namespace dfm {

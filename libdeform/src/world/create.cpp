@@ -5,12 +5,17 @@
 #include <algorithm>
 #include <cmath>
 
+#include "body/obstacle_mesh.h"
 #include "core/error.h"
 #include "core/handle.h"
 #include "friction/pair_rules.h"
+#include "geometry/voxel_grid.h"
 #include "mesh/mesh.h"
+#include "plugin/context.h"
 #include "state/bounds.h"
 #include "state/material.h"
+#include "state/obstacle.h"
+#include "state/search_tree.h"
 #include "step/attach.h"
 #include "step/context.h"
 #include "step/method.h"

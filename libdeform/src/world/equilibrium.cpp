@@ -7,6 +7,8 @@
 
 #include "core/error.h"
 #include "dynamics/equilibrium.h"
+#include "dynamics/rigid/rigid_set.h"
+#include "state/obstacle.h"
 #include "state/world.h"
 #include "step/energy_watch.h"
 #include "step/method.h"

@@ -4,7 +4,10 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "friction/laws.h"
 #include "state/material.h"
+#include "state/obstacle.h"
+#include "state/tool.h"
 #include "step/context.h"
 #include "step/energy_watch.h"
 #include "step/method.h"

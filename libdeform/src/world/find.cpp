@@ -4,8 +4,10 @@
 #include <cmath>
 #include <cstring>
 
+#include "body/obstacle_mesh.h"
 #include "geometry/convex_search.h"
 #include "geometry/obstacle_shape.h"
+#include "state/obstacle.h"
 #include "world/queries.h"
 
 namespace dfm {

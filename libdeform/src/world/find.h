@@ -4,6 +4,7 @@
 #include "deform/query.h"
 #include "geometry/convex_gap.h"
 #include "geometry/triangle_search.h"
+#include "state/obstacle.h"
 #include "state/world.h"
 
 namespace dfm {

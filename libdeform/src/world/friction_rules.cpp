@@ -6,7 +6,9 @@
 
 #include "core/error.h"
 #include "friction/pair_rules.h"
+#include "plugin/context.h"
 #include "plugin/params.h"
+#include "state/obstacle.h"
 #include "state/world.h"
 #include "step/context.h"
 #include "step/method.h"

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "dynamics/rigid/rigid_set.h"
 #include "state/bounds.h"
 #include "state/world.h"
 #include "step/context.h"

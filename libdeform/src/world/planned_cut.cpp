@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "plugin/context.h"
 #include "state/world.h"
 #include "step/stages.h"
 #include "world/model_change.h"

@@ -4,6 +4,8 @@
 
 #include "geometry/closest.h"
 #include "geometry/views.h"
+#include "state/obstacle.h"
+#include "state/search_tree.h"
 #include "state/world.h"
 
 namespace dfm {

@@ -4,6 +4,7 @@
 
 #include "core/error.h"
 #include "state/bounds.h"
+#include "state/obstacle.h"
 #include "state/world.h"
 #include "step/method.h"
 #include "step/rigid.h"

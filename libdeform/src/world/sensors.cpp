@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "friction/pair_rules.h"
+#include "state/obstacle.h"
 #include "step/stages.h"
 #include "world/find.h"
 

@@ -16,6 +16,7 @@
 #include "dynamics/at_rest.h"
 #include "dynamics/settling_points.h"
 #include "state/bounds.h"
+#include "state/obstacle.h"
 #include "state/world.h"
 #include "step/budget.h"
 #include "step/context.h"

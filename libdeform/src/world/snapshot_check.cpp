@@ -2,6 +2,9 @@
 #include <algorithm>
 #include <cstring>
 
+#include "body/obstacle_mesh.h"
+#include "dynamics/rigid/rigid_set.h"
+#include "state/obstacle.h"
 #include "state/world.h"
 #include "world/snapshot_fields.h"
 

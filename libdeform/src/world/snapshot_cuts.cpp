@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "core/error.h"
+#include "state/obstacle.h"
 #include "state/world.h"
 #include "world/separate.h"
 

@@ -17,7 +17,10 @@
 #include <vector>
 
 #include "core/error.h"
+#include "dynamics/rigid/rigid_set.h"
+#include "friction/laws.h"
 #include "plugin/params.h"
+#include "state/obstacle.h"
 #include "state/world.h"
 #include "step/method.h"
 #include "world/snapshot_models.h"

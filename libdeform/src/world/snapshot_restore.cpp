@@ -5,6 +5,9 @@
 
 #include "body/make_surface.h"
 #include "core/error.h"
+#include "dynamics/rigid/rigid_set.h"
+#include "friction/laws.h"
+#include "plugin/context.h"
 #include "plugin/params.h"
 #include "state/world.h"
 #include "step/stages.h"

@@ -4,11 +4,15 @@
 #include <cstring>
 
 #include "core/hash.h"
+#include "dynamics/rigid/rigid_set.h"
+#include "state/obstacle.h"
+#include "state/tool.h"
 #include "state/world.h"
-#include "world/snapshot_cuts.h"
-#include "step/method.h"
-#include "step/stages.h"
 #include "step/context.h"
+#include "step/method.h"
+#include "step/self_contact.h"
+#include "step/stages.h"
+#include "world/snapshot_cuts.h"
 
 namespace dfm {
 namespace {

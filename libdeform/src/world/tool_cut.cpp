@@ -12,6 +12,8 @@
 #include "geometry/extent.h"
 #include "math/turn.h"
 #include "mesh/cut_mesh.h"
+#include "state/obstacle.h"
+#include "state/tool.h"
 #include "state/world.h"
 #include "step/stages.h"
 #include "world/blade_sweep.h"

@@ -8,29 +8,20 @@
 
 #include "core/aside.h"
 #include "core/error.h"
+#include "dynamics/rigid/rigid_set.h"
+#include "friction/laws.h"
 #include "friction/pair_rules.h"
+#include "plugin/context.h"
 #include "state/bounds.h"
+#include "state/material.h"
+#include "state/obstacle.h"
+#include "state/tool.h"
 #include "step/energy_watch.h"
 #include "step/overlap.h"
 #include "step/pair_table.h"
 #include "step/rigid.h"
 
 namespace dfm {
-
-bool Body::loads_vary() const {
-  return !springs.empty() || std::any_of(loads.begin(), loads.end(), [](const Load &l) {
-    return !l.keys.empty() || l.sine.amplitude[0] != 0;
-  });
-}
-
-double Body::impulse_time() const { return slumber.asleep ? slumber.h : world->report.h; }
-
-Pose Obstacle::pose_at_time(double t) const {
-  Pose p = keys.empty() ? to_pose(def.pose) : pose_at(keys, t);
-  if (def.sine.frequency != 0 || def.sine.phase != 0)
-    p.position += sine_at(def.sine, t) * load3(def.sine.amplitude);
-  return p;
-}
 
 World::World(dfm_context *c)
     : context(c),

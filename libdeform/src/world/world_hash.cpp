@@ -1,5 +1,6 @@
 // What the results of later steps depend on, in one number.
 #include "core/hash.h"
+#include "dynamics/rigid/rigid_set.h"
 #include "state/world.h"
 #include "world/body_model.h"
 #include "world/snapshot.h"

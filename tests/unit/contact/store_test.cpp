@@ -11,6 +11,8 @@
 #include <set>
 
 #include "../world/inside.h"
+#include "contact/contact_state.h"
+#include "contact/rows.h"
 #include "math/turn.h"
 #include "near.h"
 #include "world.h"

@@ -1,8 +1,9 @@
 // How fast a bond closes what it is open by.
+#include "../world/inside.h"
+#include "state/obstacle.h"
 #include "step/attach.h"
 #include "step/context.h"
 #include "world.h"
-#include "../world/inside.h"
 
 // The guard may cut a sub-step to pieces of any length. What a bond is open by closes within the planned
 // sub-step: within a piece of a nanosecond, ten micrometers are 10 km/s.

@@ -9,6 +9,7 @@
 #include "core/handle.h"
 #include "obstacle.h"
 #include "stack.h"
+#include "state/obstacle.h"
 #include "state/world.h"
 #include "world/queries.h"
 
