@@ -31,6 +31,7 @@ constexpr double kPositionDigits = 8 * 2.3e-16;
 // its elastic energy is unknown: its velocities are means over steps, and of an oscillation that a step
 // takes far, their energy comes and goes with the phase.
 constexpr double kOwnSteps = 0.25, kHidden = 1;
+constexpr char kFlow[] = "deform.plasticity";
 constexpr double kNoLimit = 1e300;  // J, of a base: its energy may be anything
 // An implicit sub-step costs that much more, so the same shares of the time allow as many more looks.
 constexpr uint32_t kAges = 32;
@@ -111,7 +112,8 @@ bool look_at_sums(const World &w, const StepContext &step, const Body &b, Energy
 }
 
 // The energy that the scheme keeps, U(x) - F.x + v.M v_free / 2, and half of the energy of the kick, by which
-// it may rise as stiff modes calm down.
+// it may rise as stiff modes calm down. U of a body that flows is that after the flow at x: what flow
+// dissipates is still in U until the sub-step is committed.
 bool look(World &w, const StepContext &step, Body &b, EnergyLook &out) {
   if (look_at_sums(w, step, b, out)) return true;
   const Phyxels &p = b.p;
@@ -134,7 +136,8 @@ bool look(World &w, const StepContext &step, Body &b, EnergyLook &out) {
     }
   }
   double elastic = 0;
-  const dfm_kin kin = b.dynamics->kin(w.time, 0);
+  dfm_kin kin = b.dynamics->kin(w.time, 0);
+  if (!ends && b.model.works(kFlow)) kin.state = b.model.state_out.data();
   const OnBehalf speaks(b.name);
   const auto ask = [&] { return b.model.ops->energy(b.model.self, &kin, &elastic); };
   if (!hides(b) && b.model.call("energy", ask) != DFM_OK) return false;
