@@ -22,6 +22,9 @@ namespace {
 constexpr uint32_t kParallelCells = 10000, kGrain = 512;
 // Range of small displacements: tangent of the rotation, largest strain.
 constexpr double kLargestTurn = 0.27, kLargestStrain = 0.3;
+// Of warnings about it. From 15 degrees so much farther is 47.
+constexpr uint32_t kMostWarnings = 2;
+constexpr double kMuchFarther = 4;
 
 // The angle of a tangent to half a degree, for a sentence.
 double degrees_of(double tangent) {
@@ -265,10 +268,12 @@ void Body::look_at(uint32_t c, const dfm_kin &k, const Tetrahedron &t, Farthest 
   if (beyond > most.beyond) most = {beyond, std::sqrt(turn), strain, c};
 }
 
-// Warns when a cell leaves the range, and again when it is twice as far out.
+// Warns when a cell leaves the range, and once more when it is much farther out.
 void Body::tell(const Farthest &most) {
-  if (!(most.beyond > 1) || !(most.beyond > 2 * told)) return;
+  if (!(most.beyond > 1) || warnings == kMostWarnings) return;
+  if (warnings > 0 && !(most.beyond > kMuchFarther * told)) return;
   told = most.beyond;
+  ++warnings;
   char text[320];
   std::snprintf(text, sizeof text,
                 "%s: cell %u is turned by %.0f degrees and strained by %.0f %% against the rest shape: "

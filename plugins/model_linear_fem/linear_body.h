@@ -55,6 +55,7 @@ struct Body {
   Buffer<double> ksum, csum;    // [npoint] of the bound
   bool damping_on = false, drag_on = false;
   double told = 0;  // excess over the range at the last warning
+  uint32_t warnings = 0;
 
   // The cell that is farthest from small displacements: of the limits, tangent of its turn, strain.
   struct Farthest {
