@@ -9,6 +9,7 @@
 #include "math/turn.h"
 #include "plugin/context.h"
 #include "state/obstacle.h"
+#include "state/tool.h"
 #include "state/world.h"
 #include "step/context.h"
 #include "step/tool_touch.h"

@@ -3,6 +3,10 @@
 #include <algorithm>
 
 #include "core/error.h"
+#include "dynamics/rigid/rigid_set.h"
+#include "state/obstacle.h"
+#include "state/tool.h"
+#include "state/world.h"
 #include "step/context.h"
 #include "world/snapshot_cuts.h"
 #include "world/snapshot_structure.h"
