@@ -12,7 +12,7 @@ enum { kEndedByPlugin = 4 };
 void guard_leaving();                            // first thing in main()
 int leave(int exit_code);                        // the command has decided; returns exit_code
 void results_lie_in(const std::string &folder);  // for the sentence; empty: nowhere
-// After a signal that asks for an end: unless came_back() is called the process ends by itself,
+// After a signal to end: unless came_back() is called the process ends by itself,
 // after kGraceInPlugin s where a plugin is at work by then, and after kGrace s in any case. For
 // handlers of signals.
 void expect_return();

@@ -1,4 +1,4 @@
-// What of a voxel obstacle a body must never reach. The grid rounds off what it stands for by up to
+// The part of a voxel obstacle that a body must never reach. The grid rounds off the shape by up to
 // half a cell, so a body that lies on it may cut the triangles it was made from; half a cell further
 // in, nothing may.
 #pragma once

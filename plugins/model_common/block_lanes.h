@@ -18,10 +18,10 @@ DEFORM_INLINE void add_to(const BlockPoints &b, uint32_t n, v4 a) {
   store4(f, load4(f) + a);
 }
 
-// Asks for the cache line of p, which may lie behind the end of an array.
+// Prefetches the cache line of p, which may lie behind the end of an array.
 DEFORM_INLINE void fetch(const void *p) { __builtin_prefetch(p); }
 
-// one(n) for all points of the block that is loaded, while points further on are asked for: near its end
+// one(n) for all points of the block that is loaded, while points further on are prefetched: near its end
 // those of the next block, since the lists of points, and the sums, of all blocks lie end to end.
 template <class One>
 DEFORM_INLINE void each_loaded(const BlockPoints &b, const double *x, const double *v, uint32_t stride,

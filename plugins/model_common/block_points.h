@@ -10,8 +10,8 @@ struct BlockPoints {
   const uint32_t *point;  // [local + ahead] number of the point in the host's arrays
   double *p;  // [local,8] x y z 0 vx vy vz 0: a point with its velocity is one cache line; owned by the pass
   double *f;  // [local,4]
-  // A point's place in the host's arrays is asked for this many points ahead. Points of a block lie in short
-  // runs there, which the processor does not foresee. 0: the body lies in the cache.
+  // A point's place in the host's arrays is prefetched this many points ahead. Points of a block lie in short
+  // runs there, which the processor does not predict. 0: no prefetch, since the body fits into the cache.
   uint32_t ahead;
 };
 

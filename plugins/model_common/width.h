@@ -10,7 +10,7 @@ namespace model {
 
 enum Width { kSse2, kAvx2, kAvx512 };
 
-// The widest that this processor has, or what DEFORM_SIMD asks for. `who` begins the sentence in the log.
+// The widest that this processor has, or that of DEFORM_SIMD. `who` begins the sentence in the log.
 inline Width choose_width(const dfm_host *host, const char *who) {
   const bool avx2 = __builtin_cpu_supports("avx2");
   const bool avx512 = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&

@@ -70,7 +70,7 @@ struct Body : model::Blocks<Block> {
   // Where the volume change is that of the points (corot_nodal.cpp): [npoint,2] what divides the sums of the
   // cells' shares in it and in its rate, and the quotients (point_change) at the last dilate().
   Buffer<double> bulk, point_change;
-  // Points around each point, which the tangent joins; made when the pattern is asked for.
+  // Points around each point, which the tangent joins; made when the pattern is first needed.
   struct Patches {
     Buffer<uint32_t> begin, point;           // [npoint + 1], points of the cells around a point, ascending
     Buffer<uint32_t> pair_begin, pair_slot;  // [npoint + 1], places of the pairs of a patch in the blocks

@@ -22,7 +22,7 @@
 // the symmetric part of A less a matrix of norm at most d |A|/sqrt 2, which adds |D| (sqrt 2 d + d^2/2);
 // and stress : d2S adds |stress| (6 sqrt(1 + d^2)/p + 6 s^2/p^3), p the least sum of two stretches, s the
 // largest one: d2S = X solves S X + X S = 2 Q, Q = dS [w]x S - S [w]x dS + S [w]x^T [w]x S, |w| <= |A|/p.
-// With the volume change of the points (corot_nodal.cpp) the square of their mean stands for the mean of the
+// With the volume change of the points (corot_nodal.cpp) the square of their mean replaces the mean of the
 // squares of their cells, which is no less (Jensen): the rows at rest hold. The pressure of c is that of the
 // points.
 // Plastic cells (corot_plastic.h) have s = s(e) - 2 mu p with the flow's moduli in place of D, which are no

@@ -170,7 +170,7 @@ inline double Body::between(uint32_t surfel, size_t component, uint32_t point, s
   return sum;
 }
 
-// Held: all of it that a step can ask for. It is the inverse at these points, which the forward half of a
+// Held: all of it that a step can need. It is the inverse at these points, which the forward half of a
 // solve gives (Factor::inverse_at), less what the modes hold.
 void Body::find_near_response() {
   const size_t rows = 3 * size_t(nfree_), count = modes_.count;

@@ -6,7 +6,7 @@
 
 namespace reduced {
 
-// Modes of a body for which no parameter asks for a number, and the most that it may have.
+// Default number of modes of a body, and the most that it may have.
 constexpr uint32_t kDefaultModes = 40, kMostModes = 1024;
 
 struct Modes {

@@ -13,7 +13,7 @@ namespace {
 // scene asks for beyond these (fibers, relaxation, plastic flow) is another body without it.
 const char *const kOwnMeans[] = {"volume", "damping", "large_rotation"};
 
-// What the bodies ask for and the model does not offer; "" where it offers all.
+// What the bodies need and the model does not offer; "" where it offers all.
 std::string lacks(const Subject &subject, const Offered &model) {
   for (const SubjectBody &body : subject.bodies)
     for (const std::string &effect : body.effects) {

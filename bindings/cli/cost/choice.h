@@ -26,6 +26,6 @@ std::string label_of(const Knobs &knobs);
 // What the scene says, in words for a table; of several, all.
 std::string models_of(const Subject &subject);
 std::string laws_of(const Subject &subject);
-std::string precision_of(const Subject &subject);  // single where any body asks for it
+std::string precision_of(const Subject &subject);  // single if any body has this setting
 
 }  // namespace cli::cost

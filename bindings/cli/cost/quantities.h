@@ -30,7 +30,7 @@ double error_of(const Quantity &q, const Quantity &reference, double scale);
 // rates: 0 where there are none.
 void value_at(const Quantity &q, double t, double *values, double *rates);
 
-// Names of quantities that a word stands for: a quantity, or a family.
+// The quantities that a word names: one, or a family.
 std::vector<std::string> named(const Quantities &all, const std::string &word);
 
 }  // namespace cli::cost

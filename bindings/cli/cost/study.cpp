@@ -196,7 +196,7 @@ class Student {
     }
   }
 
-  // Whether the row computes what the scene asks for in another way. Another law, self contact and guard are
+  // Whether the row computes the same scene in another way. Another law, self contact and guard are
   // other physics: what they change is shown, and they are not chosen.
   bool same_physics(int row) const {
     const Knobs &k = out_.rows[size_t(row)].candidate.knobs;

@@ -13,7 +13,7 @@
 namespace cli::cost {
 
 struct StudyOptions {
-  std::vector<std::string> quantities, axes;  // as asked for; empty: probes, all axes
+  std::vector<std::string> quantities, axes;  // as given; empty: probes, all axes
   double target = 0.05, budget = 60;
 };
 
@@ -21,7 +21,7 @@ struct Row {
   Candidate candidate;
   Job job;
   std::map<std::string, double> error;  // by quantity, relative; NaN where it cannot be said
-  double headline = 0;                  // the largest of the quantities asked for; NaN: none
+  double headline = 0;                  // the largest of the given quantities; NaN: none
   double cpu_per_s = 0;                 // s of processor time for a simulated one, or for an equilibrium
   bool alone = false;                   // timed with nothing beside it
   std::string picture;                  // file: the scene at its end; "" where there is none
@@ -52,7 +52,7 @@ struct Study {
   std::vector<Row> rows;  // the scene as it is comes first
   std::map<std::string, double> scales;
   std::map<std::string, std::string> units;
-  std::vector<std::string> quantities, headline;  // all; those asked for
+  std::vector<std::string> quantities, headline;  // all; the given ones
   int reference = -1, check = -1, third = -1;     // rows: the finest, and those that it is checked by
   std::map<std::string, Limit> limits;            // by quantity: what the three say
   std::map<std::string, double> reference_error;  // of the reference

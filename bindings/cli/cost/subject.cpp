@@ -59,7 +59,7 @@ std::array<double, 4> inverse_rotation(const JsonValue *pose) {
 }
 
 // Two points of the surface that lie far from each other: the farthest one from the center of mass, and
-// the farthest one from it. They stand in for probes where the scene has none.
+// the farthest one from it. They replace probes where the scene has none.
 void find_ends(dfm_body body, const JsonValue *pose, SubjectBody &out) {
   uint32_t n = 0;
   need(dfm_surface_positions(body, 0, nullptr, &n));

@@ -20,8 +20,8 @@ inline const uint32_t *corners_of(const Surface &s, int kind, const uint32_t &fe
   return kind == 2 ? &s.tri[3 * size_t{feature}] : kind == 1 ? &s.edge[2 * size_t{feature}] : &feature;
 }
 
-// Where the corners of a pair of surfaces start, and end once they are asked for: the first `split` are the
-// first feature's.
+// Start positions of the corners of a pair of features, and their end positions once those are needed. The
+// first `split` corners belong to the first feature.
 struct Features {
   const double *start[4], *end[4];
   GuardSide *side[2];
@@ -61,7 +61,7 @@ void each_copies(const Features &f, F &&use) {
       if (opened->origin[f.surfel(i)] == opened->origin[f.surfel(j)]) use(i, j);
 }
 
-// An obstacle in its own frame, where it stands still.
+// An obstacle in its own frame, in which it does not move.
 struct ObstacleFrame {
   ObstacleShape shape;
   GuardPose from, to;

@@ -59,7 +59,7 @@ class AreaExchange {
   Array<Corner> corners_, last_;
   Array<Corner> fresh_;
   Array<Triangle> triangles_;
-  // [n] as listed; share of its triangles that a contact stands for; fn/A
+  // [n] as listed; share of its triangles that a contact represents; fn/A
   Array<double> area_, part_, pressure_;
   const Corner *find(uint32_t node, uint32_t other) const;
   void measure(std::span<const ContactPoint> contacts, std::span<const DofSource> sources);

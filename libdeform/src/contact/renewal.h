@@ -34,8 +34,8 @@ class Renewal {
   explicit Renewal(const Memory &memory);
   // impulse: [n,3] of the last sub-step, normal part first.
   void list(std::span<const ContactPoint> contacts, const double *impulse);
-  // Of the contacts listed. stands: [n] 1: has an area that it keeps; aim: [n] m2; area: [n] in and out, of
-  // those that stand. Allocates nothing.
+  // For the listed contacts. stands: [n] 1: it keeps its area; aim: [n] m2, its area by the load;
+  // area: [n] m2 in and out, of those with stands = 1. Allocates nothing.
   void fill(const uint8_t *stands, const double *aim, double *area);
   // How far a contact has slid on and how far its bristles are out, m.
   struct Way { double slid, out; };

@@ -11,8 +11,8 @@ struct FreeMotion {
   const double *gravity;  // [4]
   const double *mass, *v, *w, *x;
   double *free, *x_end;
-  // A point's memory is asked for this many points ahead: the points of a part lie in short runs, which the
-  // processor does not foresee. The number of all points or more: it is not asked for.
+  // A point's memory is prefetched this many points ahead: the points of a part lie in short runs, which the
+  // processor does not predict. The number of all points or more: no prefetch.
   uint32_t ahead;
 };
 

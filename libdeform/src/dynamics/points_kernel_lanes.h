@@ -10,7 +10,7 @@ namespace {
 
 constexpr uint32_t kParts = 4 / kWidth;  // vectors that hold a point
 
-// index(k): the number of point k; fetch(k): asks for its memory; force(k, at, p): vector p of its force,
+// index(k): the number of point k; fetch(k): prefetches its memory; force(k, at, p): vector p of its force,
 // which lies at `at` in arrays of all.
 template <class Index, class Fetch, class Force>
 DEFORM_INLINE double move_freely(const FreeMotion &m, uint32_t n, const Index &index, const Fetch &fetch,

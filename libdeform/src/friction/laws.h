@@ -26,7 +26,7 @@ struct LawInstance {
   std::vector<uint8_t> tangent;  // [nstate] 1: a component of a vector in the tangent plane
   bool turns = false;            // any
   bool by_default = false;       // used for pairs without a rule
-  // The parameters that were asked for, of which the list of effects may have left out some.
+  // The parameters as the rule gives them; the list of effects may have removed some of them.
   const dfm_type *asked_type = nullptr;
   std::vector<double> asked;
 

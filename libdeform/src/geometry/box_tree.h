@@ -107,7 +107,7 @@ void near_pairs(const BoxTree &a, const BoxTree &b, double margin, Array<PairOfT
             f(p, near_a[k], d2);
       }
     } else if (n.count || (!m.count && m.right - i >= n.right - j)) {
-      // the left child of a larger node first: its extent in the array stands for its size
+      // the left child of a larger node first: its extent in the array is the measure of its size
       stack.push_back({i + 1, j});
       stack.push_back({m.right, j});
     } else {

@@ -72,7 +72,7 @@ class Distances {
     }
     return boxes;
   }
-  // The winding number is asked for in a box of size one.
+  // The winding number is computed in a box of size one.
   const double *make_scaled(uint32_t ntri) {
     uint32_t most = 0;
     for (size_t i = 0; i < 3 * size_t{ntri}; ++i) most = std::max(most, tris_[i]);

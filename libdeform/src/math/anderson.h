@@ -19,7 +19,7 @@ class Anderson {
  public:
   explicit Anderson(const Memory &memory);
   void start(size_t n);
-  // f: the change that the map asks for at x. d (output, may be f): from x to the next iterate; equal to f in
+  // f: the change by the map at x. d (output, may be f): from x to the next iterate; equal to f in
   // the first call. weight [n]: weights of the norm.
   void next(const double *x, const double *f, const double *weight, double *d);
 

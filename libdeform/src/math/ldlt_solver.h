@@ -23,7 +23,7 @@ class LdltSolver final : public LinearSolver {
   double factor_work() const override { return factor_work_; }
   double solve_work() const override { return 2 * double(value_.size()); }
   double restricted_work(uint32_t nsel, const uint32_t *sel) override;
-  void forget_restricted();  // gives back what restricted() keeps for points that are asked for again
+  void forget_restricted();  // frees the cache of restricted(), which is for points that recur
   size_t factor_doubles() const { return value_.size(); }  // entries of L that are stored
 
  private:

@@ -13,7 +13,7 @@ struct SolverChoice {
   uint32_t max_iterations = 0;  // of an iterative solver, per right-hand side; 0: as many as there are rows
 };
 
-// The name that "auto" stands for: the factorization where it serves many steps and fits into memory.
+// The solver that "auto" selects: the factorization where it serves many steps and fits into memory.
 const char *solver_name(const SolverChoice &choice);
 // One of the library's own; null where it has none of that name.
 std::unique_ptr<LinearSolver> own_solver(const SolverChoice &choice, const Memory &memory, Tasks *tasks);

@@ -5,7 +5,7 @@
 namespace dfm {
 
 // Neighboring columns of L with (almost) the same rows form a supernode, stored as a dense panel. All counts
-// are points; each stands for three rows or columns.
+// are points; each is three rows or columns.
 //
 //            begin  end
 //             | \      |      pivots: the columns of the supernode, a unit lower triangle

@@ -1,4 +1,4 @@
-// Legacy VTK, VTU and Medit out of a tetrahedral mesh, and which writer a file name asks for.
+// Writes tetrahedral meshes as legacy VTK, VTU and Medit; the file name selects the writer.
 #include <algorithm>
 #include <bit>
 #include <cctype>

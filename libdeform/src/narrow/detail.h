@@ -21,7 +21,7 @@ using Run = std::span<const Candidate>;
 constexpr double kFlat = 1e-3;  // slack of the cones of normals against the edges of a box
 // 2 degrees: slack of an edge's cone of normals, so that contacts do not flicker at its border
 constexpr double kCone = 0.035;
-// sine between two edges below which vertex-face contacts stand for them
+// sine between two edges below which vertex-face contacts replace their contact
 constexpr double kParallel = 1e-3;
 // share of an edge by which it may count as longer for what slides in over its ends
 constexpr double kPast = 0.25;

@@ -28,7 +28,8 @@ class NarrowBlocks {
  public:
   explicit NarrowBlocks(const Memory &memory);
   void start() { pieces_.clear(); }
-  // m/s, bound over the surfels of body view i: as told since the last find_contacts(), or found once in it.
+  // m/s, bound over the surfels of body view i: set by tell_speed() since the last find_contacts(), or
+  // computed once in it.
   void tell_speed(std::span<const BodyView> bodies, size_t i, double speed) {
     if (speed_.size() != bodies.size()) speed_.assign(bodies.size(), -1.0);
     speed_[i] = speed;

@@ -30,8 +30,8 @@ double reach_of(const Pair &pair, std::span<const uint32_t> nodes, Vec3 o) {
 
 namespace {
 
-// One edge of the body with what it needs against a shape; the faces beside it are found when
-// first asked for.
+// One edge of the body with its data for a query against a shape; the faces beside it are found at first
+// use.
 struct Edge {
   const Pair &pair;
   uint32_t number;

@@ -69,8 +69,8 @@ bool ends_in_so(const std::string &name) {
   return name.size() > 3 && name.compare(name.size() - 3, 3, ".so") == 0;
 }
 
-// While code of a plugin runs that no world asked for: its initializers and its entry. What makes the host
-// misread or miscompute afterwards, the floating-point environment and the decimal point, is put back.
+// Lives while initializers and the entry function of a plugin run. Restores the floating-point environment
+// and the decimal point afterwards, since a changed one would make the host misread or miscompute numbers.
 class Visit {
  public:
   Visit(const dfm_host &host, const std::string &file)

@@ -53,7 +53,7 @@ class Builder {
     check(dfm_world_stable_step(world_, &step, nullptr, nullptr), def_.effects_auto ? "/bodies" : "/effects");
     if (def_.equilibrium) check_static();
     for (Body &b : def_.bodies) check_model(b);
-    for (const Cut &c : def_.cuts) plan_cut(c);  // before changes of models, which ask for them
+    for (const Cut &c : def_.cuts) plan_cut(c);  // before changes of models, which check them
     for (Body &b : def_.bodies) add_switches(b);
     return {std::exchange(world_, 0), std::move(probes_)};
   }

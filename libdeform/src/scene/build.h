@@ -4,7 +4,7 @@
 
 namespace dfm::scene {
 
-// Owns the world until it is handed over, so that a scene that fails halfway leaves nothing behind.
+// Owns the world until the scene takes it, so that a scene that fails halfway leaves nothing behind.
 struct Built {
   dfm_world world = 0;
   std::vector<ProbePoint> probes;

@@ -10,7 +10,7 @@
 namespace dfm::scene {
 namespace {
 
-// Tetrahedra beyond what a scene asks for that cost little.
+// Cells that may exceed the number in the scene, since so few cost little.
 constexpr uint32_t kCheapCells = 1000;
 // Longest edge of a surface that is filled, over that of its cells (doc/decisions/0391).
 constexpr double kLongestEdge = 2.5;
@@ -181,7 +181,7 @@ void MeshFiles::take_skin(dfm_trimesh mesh, const Body &b, const std::string &po
 }
 
 // Contact with a plane acts at the points of the surface. If triangles were much larger than cells, the body
-// would stand on a few cells, crush them, and sink through the floor between them.
+// would rest on a few cells, crush them, and sink through the floor between them.
 void MeshFiles::split_skin(BodyMesh &out) {
   Skin &skin = out.skin;
   Triangles s;

@@ -62,7 +62,7 @@ Locator::Locator(const BodyMesh &mesh) : mesh_(mesh) {
       hi[k] = std::max(hi[k], mesh.points[3 * i + k]);
     }
   }
-  // About one bin a cell, as cubes; a bin is never thinner than a body's thinnest extent asks for.
+  // About one cubic bin per cell; a bin is never thinner than the thinnest extent of the body requires.
   const double extent = std::max({hi[0] - lo_[0], hi[1] - lo_[1], hi[2] - lo_[2]});
   double volume = 1;
   for (int k = 0; k < 3; ++k) volume *= std::max(hi[k] - lo_[k], 1e-3 * extent) / extent;

@@ -60,7 +60,7 @@ double fall_to_plane(const Box &box, const double down[3], const dfm_pose &plane
   return toward > 1e-9 ? least / toward : HUGE_VAL;
 }
 
-// The same to a box: along the axis that `down` follows most, where they stand over each other.
+// The same distance to a box: along the axis closest to `down`, where the two overlap seen along it.
 double fall_to_box(const Box &box, const double down[3], const Box &other) {
   int axis = 0;
   for (int k = 1; k < 3; ++k)

@@ -99,7 +99,7 @@ Rigid read_rigid(const Node &scene, ReadContext &context) {
     out.bodies.push_back(read_rigid_body(node, context));
     names.push_back(out.bodies.back().name);
   }
-  // Joints may name bodies that stand further down.
+  // Joints may name bodies that come later in the list.
   for (size_t i = 0; i < nodes.size(); ++i)
     for (const Node &joint : nodes[i].items("joints"))
       out.bodies[i].joints.push_back(read_joint(joint, out.bodies[i], names));

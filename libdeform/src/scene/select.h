@@ -33,7 +33,7 @@ struct BodyMesh {
   // [ntet] mass per volume of each cell relative to the others; empty: the same
   std::vector<double> cell_weight;
   double lo[3] = {}, hi[3] = {}, size = 0;         // of the scaled points; size: diagonal
-  mutable std::shared_ptr<const Locator> locator;  // made when first asked for
+  mutable std::shared_ptr<const Locator> locator;  // made at first use
 };
 
 // Points to hold: by physical group of the cells or of the skin (then the corners of the cells that hold its

@@ -1,5 +1,5 @@
-// A soft body as a scene says it: its mesh at rest, in files of their own, how it stands and moves now, and
-// what is prescribed for it.
+// Writes a soft body as part of a scene: its rest mesh (in separate files), its present positions and
+// velocities, and what is prescribed for it.
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -205,7 +205,7 @@ void write_switches(SceneWriter &to, const Body &b, Written &out) {
   if (r.far.max_jump < HUGE_VAL) rule["max_jump"] = r.far.max_jump;
 }
 
-// ---- how it stands ----------------------------------------------------------------------------------------
+// ---- present state ----------------------------------------------------------------------------------------
 
 Vec3 made_at(const Body &b, uint32_t point) {
   const Quat &q = b.origin.frame.rotation;

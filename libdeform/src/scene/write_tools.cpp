@@ -58,7 +58,7 @@ void write_sizes(SceneWriter &to, const Tool &t, Written &out) {
 }
 
 void write_motion(const Tool &t, const ToolValues &v, Written &out) {
-  // keys go on from where they are; without keys the tool stands
+  // keys go on from where they are; without keys the tool does not move
   const ToolPlace now = t.motion.coupled() ? load_place(v.device) : place_of(t.set->state[0]);
   if (const Written pose = pose_of(v.keyed != 0 ? t.def.pose : standing(now)); !pose.is_null())
     out["pose"] = pose;

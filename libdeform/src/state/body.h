@@ -53,7 +53,7 @@ struct HeldMotion {
 inline constexpr int32_t kNoCoupling = -1;
 
 // By which integrator a body moves. step: s, the longest explicit sub-step of the body as its model was made;
-// infinite: none, or not asked for.
+// infinite: none, or not computed.
 // counted: the library has chosen implicit time, and how the body moves now by the count of what steps take.
 enum class Counted : uint32_t { no, implicit, explicitly };
 struct Integrator {
@@ -65,7 +65,7 @@ struct Integrator {
   Counted counted = Counted::no;
 };
 
-// What the list of effects has left out of a model: the values that were asked for, all rows end to end
+// What the list of effects has left out of a model: the values as they were given, all rows end to end
 // (empty: nothing is left out), and, [nparam], the rows whose differences between cells are left out.
 struct Withheld {
   std::vector<double> asked;

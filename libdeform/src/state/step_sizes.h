@@ -3,11 +3,12 @@
 //
 // Symplectic Euler keeps a nearby energy that depends on the size of the step. Each change of size moves a
 // body from one such energy to another, and near the bound, where the nearby energy of the stiffest mode is
-// nearly degenerate, by a large share of what that mode holds. Changes that follow the motion pump. So a
-// step of length H is cut into n = 1, 2, 3 or (4, 5, 6, 7) 2^k sub-steps, steps that the library chooses
-// have 4, 5, 6 or
-// 7 times a power of two seconds, the size goes down at once where the bound asks for it, and up only after
-//   patience that doubles each time.
+// nearly degenerate, by a large share of the energy of that mode. If changes of size follow the motion,
+// they pump energy into it. Therefore
+//   - a step of length H is cut into n = 1, 2, 3 or (4, 5, 6, 7) 2^k sub-steps;
+//   - steps that the library chooses have 4, 5, 6 or 7 times a power of two seconds;
+//   - the size goes down at once where the bound requires it, and up only after a waiting time (patience)
+//     that doubles each time.
 #pragma once
 #include <cstdint>
 #include <string>

@@ -3,9 +3,8 @@
 //   normal turns    contact/store.cpp, transport(): by the smallest rotation that takes it along
 //   surfaces spin   here: about the normal, by half of what each of the two turns
 //   area changes    here: sigma0 A z is kept where A grows, z where A shrinks
-//   bristles slide  here: areas go where the load asks for them (contact/areas.h, contact/exchange.h), as far
-//   as sliding renews the bristles
-//                   (contact/renewal.h)
+//   bristles slide  here: areas follow the load (contact/areas.h, contact/exchange.h), as far as sliding
+//                   renews the bristles (contact/renewal.h)
 //
 // A surface's turn about n within the sub-step is what its points near the contact did, x -> x': with r from
 // their middle, in the plane of n,
@@ -39,7 +38,7 @@ Turn unit_turn(double c, double s) {
 
 // How a surface turns in the plane of two directions: of the points around a contact's feature, seen from one
 // of them, which keeps digits where coordinates are large. Around a corner the next corner of each triangle
-// stands for both triangles that have it; with the middle of the triangles' corners r_m, q_m and their number
+// represents both triangles that have it; with the middle of the triangles' corners r_m, q_m and their number
 // N that is
 //     sum over corners of (r - r_m)(q - q_m) = 2 (sum over the ring of r q - 2/N (sum r)(sum q))
 class Neighborhood {

@@ -9,7 +9,7 @@ struct Body;
 struct World;
 
 double moving_energy(const Body &b);  // J, kinetic energy of the free components
-// Before the commit: forces at the end, where the holders of driven points have to be asked for their work.
+// Before the commit: forces at the end, where the work at driven points follows from them.
 void ready_change_work(Body &b, const SubStep &now);
 // After it: forces times the way that their points went.
 void book_change_work(const World &w, Body &b, double h);

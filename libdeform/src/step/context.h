@@ -97,7 +97,7 @@ struct StepContext {
   // law of contacts whose areas follow the load, else kNone
   Array<uint32_t> sharing;
   bool shares = false;  // whether any law uses area
-  Array<double> aim;    // [contacts] m2, what they should stand for, if so
+  Array<double> aim;    // [contacts] m2, areas by the load, if so
   Renewal renewal;
   Array<uint8_t> stands;  // [contacts] is loaded, and keeps its area
   Array<Renewal::Way> ways;

@@ -188,7 +188,7 @@ bool revise_rigids(World &w, StepContext &step) {
   return any;
 }
 
-// 1: all have ended their step; 2: a host asks for another solve; 0: failed.
+// 1: all have ended their step; 2: a host requests another solve; 0: failed.
 int ask_rigid_ends(World &w, uint32_t *trouble) {
   const uint64_t said = sentences();
   bool again = false;

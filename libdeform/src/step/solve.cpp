@@ -2,7 +2,7 @@
 // what is kept. The outer loop over the laws around the inner sweeps is solve_islands.cpp.
 //
 //   warm start: last impulses of the same keys, times h/h_old, applied before the first sweep
-//   repeat   ask all laws once, in batches, at the present slip and normal force
+//   repeat   evaluate all laws once, in batches, at the present slip and normal force
 //            residual of the true laws below tolerance: done
 //            sweep the linearized laws until their own residual is below tolerance
 #include <algorithm>
@@ -96,7 +96,7 @@ void make_rows(World &w, StepContext &step) {
   const bool again = step.rigid_again || step.guard.resolving;
   make_bonds(w, step, again);
   make_cut_drags(w, step, again);
-  for (size_t i = 0; i < w.bodies.size(); ++i) {  // where it stands has changed places with the last end
+  for (size_t i = 0; i < w.bodies.size(); ++i) {  // the present state and the last end may have been swapped
     const Body &b = *w.bodies[i];
     step.sources[i].velocity = b.dynamics->contact_velocity();
     const bool set_back = b.surface.identity() && (b.surface.slit || b.surface.back > 0);
@@ -357,7 +357,7 @@ bool stage_solve(World &w, StepContext &step, uint32_t *trouble) {
   }
   step.bond_impulse.assign(step.rows.impulse.begin() + std::ptrdiff_t{3} * step.rows.n,
                            step.rows.impulse.end());
-  // laws may have been asked beside the slips that were solved for
+  // laws may have been evaluated at slips that differ from the solution
   std::swap(step.state.vt, step.state.slip);
   if (step.residual.due > 1) {
     *trouble |= DFM_TROUBLE_UNCONVERGED;

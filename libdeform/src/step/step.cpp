@@ -1,14 +1,16 @@
 // One step, from top to bottom:
 //
-//   bound                            when it is due: sizes of the sub-steps (step_bound.cpp, step_sizes.cpp)
-//   sub-steps                        run_step(): equal ones, cut finer where the bound has fallen
-//     pieces                         advance(), piece(): shorter where the guard asks for it
+//   bound                            if it is due: sizes of the sub-steps (step_bound.cpp, step_sizes.cpp)
+//   sub-steps                        run_step(): equal ones, more of them if the bound has fallen
+//     pieces                         advance(), piece(): shorter where the guard requires it
 //       stages                       sub_step(): all rows of the method's table that the plan has
 //                                    chosen, or none
-//         waking                     narrow runs model to broad again for who has been woken (narrow.cpp)
-//         a rigid host's revision    solve, again, where a motor lets go; rigid commit, where a host asks for
-//                                    another solve (rigid.cpp)
-//         hits                       guard runs solve and distribute again with what would cross (guard.cpp)
+//         waking                     narrow runs model to broad again for bodies that it has woken
+//                                    (narrow.cpp)
+//         a rigid host's revision    solve again if a motor reaches its limit, or if a host requests it in
+//                                    rigid commit (rigid.cpp)
+//         hits                       guard runs solve and distribute again with the pairs that would cross
+//                                    (guard.cpp)
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -56,7 +58,7 @@ constexpr ContactMethod kVelocity{"velocity", kTable};
 
 using Clock = std::chrono::steady_clock;
 
-// Runs a row of the method's table, with timing and tracing. since: the end of the row before; then of this
+// Runs a row of the method's table, with timing and tracing. since: in, end of the row before; out, of this
 // one.
 bool run(size_t row, World &w, StepContext &step, uint32_t *trouble, Clock::time_point &since) {
   const Stage &stage = w.method->table[row];
@@ -159,7 +161,8 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
   begin_impulses(w.step_impulses);
   begin_tools(w, dt);
   const double goal = w.time + dt;
-  // `cut` equal sub-steps since `from`; the rest of the step is divided further if the bound has fallen
+  // `cut` equal sub-steps fill `span` from `from` on; the rest of the step is divided anew if the bound has
+  // fallen
   double from = w.time, span = dt;
   uint32_t cut = n, done = 0;
   for (uint32_t k = 0; k < cut; ++k, ++done) {
@@ -212,8 +215,8 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
 
 namespace {
 
-// One planned sub-step, up to `end`: as a whole, or in the pieces that the guard cuts it into. last: of the
-// step, which ends at `goal`.
+// One planned sub-step, up to `end`: as a whole, or in pieces if the guard shortens it. last: it is the last
+// of the step, which ends at `goal`.
 bool advance(World &w, StepContext &step, double end, double goal, bool last, uint32_t *trouble) {
   step.guard.pieces = 0;
   step.guard.motion = step.guard.finer = 1;
@@ -246,7 +249,8 @@ bool advance(World &w, StepContext &step, double end, double goal, bool last, ui
   return true;
 }
 
-// A blow: planned sub-steps are shorter from this one on, so it is no piece.
+// After a hard blow (doc/decisions/0436) planned sub-steps are shorter from this one on. So this one is a
+// whole sub-step, not a piece.
 void refine(World &w, StepContext &step) {
   Guard &g = step.guard;
   cut_finer(w.sizes, g.planned, g.planned / g.finer);

@@ -4,7 +4,7 @@
 //   pass     laws answer at the present slip and normal force; sweeps solve their tangents, as for bodies
 //   end      the state that a law has given at the solution lasts, with the impulses
 //
-// A place where two rigid things meet has no area. Laws that count by area are asked for one square
+// A place where two rigid things meet has no area. Laws that use the area get one square
 // centimeter.
 #include <algorithm>
 #include <cmath>

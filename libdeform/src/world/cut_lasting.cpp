@@ -65,7 +65,7 @@ void carry(const Attachment &a, const std::vector<CutTarget> &targets, std::vect
     if (targets.size() > 1) out[t].release *= share;
     if (t > begin) out[t].total = {};
   }
-  // one that holds nothing is told of only where nothing is left of the whole
+  // an attachment without points is reported only if none of its parts has any
   const auto holds = [](const Attachment &x) { return !x.surfels.empty(); };
   const auto first = out.begin() + std::ptrdiff_t(begin);
   const bool any = std::any_of(first, out.end(), holds);

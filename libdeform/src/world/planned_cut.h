@@ -4,7 +4,7 @@
 
 namespace dfm {
 
-// Cuts the body now, and separates its parts if it asks for that. Throws Error.
+// Cuts the body now, and separates its parts if the body has this setting. Throws Error.
 CutReport make_cut(Body &b, const CutShape &shape, uint32_t how, uint32_t most);
 
 // Of the body, and of the pieces that it has by now. Throws Error if one of them cannot be cut, and then

@@ -4,7 +4,7 @@
 
 namespace dfm {
 
-// Updates all sensors at the present positions. tell: changes become events.
+// Updates all sensors at the present positions. tell: add an event for each change.
 void look_at_sensors(World &w, bool tell);
 // Ends all overlaps of a thing that is removed, or is no longer a sensor.
 void leave_sensors(World &w, uint64_t id);

@@ -1,5 +1,5 @@
-// A blade opens faces along its edge (world/blade_sweep.h). It looks to where its edge is, so a blade that
-// stands still or is drawn back cuts nothing, and what leans on it from the side stays whole (decision 0403).
+// A blade opens faces along its edge (world/blade_sweep.h), in the direction of the edge only. A blade that
+// does not move or moves back cuts nothing, and what touches its side stays whole (decision 0403).
 #include "world/tool_cut.h"
 
 #include <algorithm>

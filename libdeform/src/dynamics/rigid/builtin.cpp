@@ -114,7 +114,7 @@ Builtin::Builtin(const dfm_rigid_set_def &set, uint32_t *group) {
   }
   for (uint32_t i = 0; i < set.njoint; ++i) joints_.push_back(make_joint(set.joints[i], bodies));
   // Bodies that joints tie together, still ones apart: what hangs on a wall on both of its sides is two
-  // groups. The lowest number stands for a group.
+  // groups. The lowest number represents a group.
   std::vector<uint32_t> root(n);
   for (uint32_t i = 0; i < n; ++i) root[i] = i;
   auto find = [&](uint32_t i) {
