@@ -98,7 +98,9 @@ TEST(SceneErrors, UnknownKeys_NameTheNearest) {
 
 TEST(SceneErrors, WrongTypes_NameWhatWasExpected) {
   check({{"/gravity=5", {"/gravity", "expected [x, y, z] in m/s2 or an object with keyframes"}},
-         {"/bodies/0/model=msm", {"/model", "expected an object with type, params, precision"}},
+         {"/bodies/0/model=msm",
+          {"/model", "expected an object with type, params, precision",
+           "found string \"msm\"; write {\"type\": \"msm\"}"}},
          {"/contact/friction=0.5", {"/contact/friction", "\"law\": \"coulomb\"", "found number 0.5"}},
          {"/gravity=[0,0]", {"/gravity", "three numbers"}},
          {"/gravity=[0,0,\"down\"]", {"/gravity/2", "number"}},

@@ -74,6 +74,8 @@ class Arguments(unittest.TestCase):
     def test_material_has_entries_that_something_reads(self):
         mesh = deform.TetMesh.ball(0.1, cells=100)
         with deform.World() as world:
+            self.refused(r"material '\(unnamed\)': young is -1 Pa; it must be positive",
+                         lambda: world.add_body(mesh, material={"young": -1}))
             self.refused("no loaded model has a parameter 'yung'.* did you mean 'young'",
                          lambda: world.add_body(mesh, material={"yung": 1e6}))
             self.refused("load the plugin that has it", lambda: world.add_material("x", qqqqqq=1))

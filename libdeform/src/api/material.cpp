@@ -27,7 +27,7 @@ dfm_status dfm_material_create(dfm_world world, const dfm_material_def *def, dfm
     check_flags(m->def, 0, "dfm_material_def");
     m->world = &w;
     m->name = m->def.name ? m->def.name : "";
-    const char *const name = m->name.c_str();
+    const char *const name = m->name.empty() ? "(unnamed)" : m->name.c_str();
     auto positive = [&](double v, const char *key, const char *unit) {
       if (!(v > 0 && std::isfinite(v)))
         fail(DFM_E_ARG, "material '%s': %s is %g %s; it must be positive and finite", name, key, v, unit);

@@ -1,5 +1,6 @@
 #include "scene/node.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdarg>
 #include <cstdio>
@@ -61,8 +62,13 @@ std::string Node::kind_found() const {
 
 void Node::object(const std::string &kind, const std::vector<std::string> &further) const {
   const std::vector<Key> &keys = keys_of(kind);
-  if (!value_->is_object())
-    fail("expected an object with %s, found %s", join(delivered(keys)).c_str(), kind_found().c_str());
+  if (!value_->is_object()) {
+    const bool typed = value_->is_string() && std::any_of(keys.begin(), keys.end(), [](const Key &k) {
+                         return k.name == std::string("type");
+                       });
+    fail("expected an object with %s, found %s%s", join(delivered(keys)).c_str(), kind_found().c_str(),
+         typed ? ("; write {\"type\": " + excerpt(*value_) + "}").c_str() : "");
+  }
   for (auto it = value_->begin(); it != value_->end(); ++it) {
     const Key *known = nullptr;
     for (const Key &k : keys)
