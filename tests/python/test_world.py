@@ -105,6 +105,23 @@ class Building(unittest.TestCase):
             with self.assertRaisesRegex(deform.ArgumentError, "did you mean 'hinge'"):
                 world.add_rigids([deform.RigidDef()], [deform.JointDef("hing", 0)])
 
+    def test_snapshot_restores_into_a_world_built_anew_after_a_body_was_removed(self):
+        mesh = deform.TetMesh.ball(0.1, cells=100)
+        with deform.World() as world, deform.World() as anew:
+            world.add_body(mesh).remove()
+            world.add_body(mesh, position=(1, 0, 0), name="one")
+            world.add_body(mesh, position=(2, 0, 0))
+            world.run(0.1, dt=0.01)
+            kept = world.snapshot()
+            unnamed, one = anew.add_body(mesh), anew.add_body(mesh, name="one")
+            anew.restore(kept)
+            self.assertEqual([body.name for body in anew.bodies], ["one", "body3"])
+            self.assertEqual((one.name, unnamed.name), ("one", "body3"))
+            self.assertAlmostEqual(unnamed.measure.com[0], 2, 6)
+            world.run(0.1, dt=0.01)
+            anew.run(0.1, dt=0.01)
+            self.assertEqual(world.hash, anew.hash)
+
     def test_snapshot_gives_the_same_bits_again(self):
         with deform.World() as world:
             world.add_obstacle("plane")

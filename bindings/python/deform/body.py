@@ -171,6 +171,11 @@ class Body(_Part):
         check(quick.dfm_body_get_info(handle, ctypes.byref(self._info)))
         super().__init__(world, handle, self._info.name.decode())
 
+    def _renew_name(self) -> None:
+        """For World.restore."""
+        if quick.dfm_body_get_info(self.handle, ctypes.byref(self._info)) == 0:
+            self.name = self._info.name.decode()
+
     def _number(self, what: str) -> int:
         """Of now, or of the last look where the body is gone."""
         quick.dfm_body_get_info(self.handle, ctypes.byref(self._info))

@@ -705,9 +705,11 @@ class World(Queries, Tools):
 
     def restore(self, snapshot: bytes) -> None:
         """Back to a snapshot of this world, or of one with the same contents: the next steps give the same
-        bits."""
+        bits. Contents are found by their names, or by their order where they have none."""
         self.free()
         check(quick.dfm_world_restore(self.handle, snapshot, len(snapshot)))
+        for body in list(self._bodies.values()):
+            body._renew_name()  # a name that the library has made may be another one
 
     # ---- pictures --------------------------------------------------------------------------------------
 
