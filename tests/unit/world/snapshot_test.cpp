@@ -228,6 +228,32 @@ TEST_F(DamagedSnapshot, ForgedFieldByField_IsRefusedUnderItsName) {
   EXPECT_EQ(take(w).bytes, state);
 }
 
+// A restore gives an obstacle that was created again its former id before it reads the rest.
+TEST_F(DamagedSnapshot, ForgedForAWorldOfOtherIds_IsRefusedAndChangesNothing) {
+  dfm_obstacle jaw = 0;
+  test::ok(dfm_world_find_obstacle(w, "jaw", &jaw));
+  test::ok(dfm_obstacle_destroy(jaw));
+  dfm_obstacle_def again = dfm_obstacle_def_default();
+  again.name = "jaw";
+  again.shape = DFM_SHAPE_BOX;
+  for (double &size : again.half_size) size = 0.1;
+  test::ok(dfm_obstacle_create(w, &again, &jaw));
+  hash = dfm_world_hash(w);
+  state = take(w).bytes;
+  for (const dfm::SnapshotField &f : good.map) {
+    if (!f.checked || (f.kind != 'd' && f.kind != 'u')) continue;
+    Bytes bad = good.bytes;
+    if (f.kind == 'd') put(bad, f.at, std::numeric_limits<double>::quiet_NaN());
+    else put(bad, f.at + f.bytes - 1, static_cast<unsigned char>(0xff));
+    seal(bad);
+    refused(bad, f.name, f.name);
+    ASSERT_EQ(take(w).bytes, state) << f.name;
+  }
+  test::ok(restore(w, good.bytes));
+  EXPECT_EQ(take(w).bytes, good.bytes);
+  use(w);
+}
+
 TEST_F(DamagedSnapshot, WithAStepBoundThatNoSubStepCanHave_IsRefused) {
   for (const dfm::SnapshotField &f : good.map) {
     if (std::string(f.name) != "step bound") continue;
