@@ -181,7 +181,7 @@ class Planner {
   }
 
  private:
-  // Implicit steps from 1/60 s down by halves. A target may require short ones, 33 us, before explicit steps
+  // Implicit steps from 1/60 s down by halves. A target may ask for short ones, 33 us, before explicit steps
   // cost less; in a budget per step a shorter one costs nothing, but per second.
   static constexpr int kTargetSteps = 10, kBudgetSteps = 6;
   // A target that is missed by less than the digits of a prediction is met.
