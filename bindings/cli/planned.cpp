@@ -1,5 +1,6 @@
 #include "planned.h"
 
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 
@@ -24,10 +25,9 @@ void print_way(const JsonValue &way, const char *begin) {
   if (bodies && bodies->items.size() > 4) models += ", ...";
   const std::string scheme = bodies && !bodies->items.empty() ? bodies->items[0].get("integrator") : "";
   char step[32] = "auto", each[32] = "1/60 s";
-  if (value(way, "step") > 0) {
-    std::snprintf(step, sizeof step, "%.3g ms", 1e3 * value(way, "step"));
-    std::snprintf(each, sizeof each, "step");
-  }
+  const double h = value(way, "step");
+  if (h > 0) std::snprintf(step, sizeof step, "%.3g ms", 1e3 * h);
+  if (std::fabs(h - value(way, "frame_s")) < 1e-6 * h) std::snprintf(each, sizeof each, "step");
   std::printf("%s%-38s  %-16s  step %-9s  error %-8s  %.3g s of processor per second, %.3g ms per %s\n",
               begin, models.c_str(), scheme.c_str(), step, percent(way, "error").c_str(),
               value(way, "cpu_s_per_s"), value(way, "ms_per_step"), each);

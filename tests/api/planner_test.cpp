@@ -93,7 +93,7 @@ TEST_F(PlannerScene, BudgetThatCannotBeMet_IsReportedByTheRun) {
   const test::CommandResult r =
       test::deform({"run", bar(R"("budget": {"ms_per_step": 1e-6},)"), "--out", folder() + "/out"});
   EXPECT_EQ(r.exit_code, 0) << r.err;
-  for (const char *word : {"planner: the budget of 1e-06 ms per step is not met", "a larger budget",
+  for (const char *word : {"planner: the budget of 1e-06 ms per 1/60 s is not met", "a larger budget",
                            "the nearest choice is simulated", "deform cost"})
     EXPECT_TRUE(has(r.err, word)) << "no '" << word << "' in: " << r.err;
   EXPECT_EQ(r.out.find("planner, nearest: "), 0u) << "what is simulated: " << r.out;
@@ -146,6 +146,8 @@ TEST_F(PlannerScene, Calibrate_WritesWhatScenesTake) {
   const test::CommandResult r = test::deform({"calibrate", "--model", "modal", "--quiet"});
   ASSERT_EQ(r.exit_code, 0) << r.err;
   EXPECT_TRUE(has(r.out, folder() + "/deform/costs.json")) << r.out;
+  const std::string costs = test::read_file(folder() + "/deform/costs.json");
+  EXPECT_TRUE(has(costs, "\"version\": 4") && has(costs, "\"short_ns_per_point\"")) << costs;
   const test::CommandResult planned = test::deform({"explain", bar(R"("accuracy": {"target": 0.2},)")});
   EXPECT_TRUE(has(planned.out, "--set /bodies/0/model/type=modal")) << planned.out;
   // costs of one model: a scene that names another cannot be planned by them
@@ -154,5 +156,8 @@ TEST_F(PlannerScene, Calibrate_WritesWhatScenesTake) {
   test::write_file(folder() + "/deform/costs.json",
                    R"({"format": "deform-costs", "version": 3, "machine": 3})");
   expect_refused(bar(R"("accuracy": {"target": 0.2},)"), {"costs.json", "/machine"});
+  test::write_file(folder() + "/deform/costs.json",
+                   R"({"format": "deform-costs", "version": 2, "machine": "old", "models": []})");
+  expect_refused(bar(R"("accuracy": {"target": 0.2},)"), {"costs.json", "/version", "calibrate again"});
   std::remove((folder() + "/deform/costs.json").c_str());
 }

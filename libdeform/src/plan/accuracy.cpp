@@ -10,23 +10,31 @@ namespace dfm {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kFrame = 1.0 / 60;  // s
+constexpr double kFrame = 1.0 / 60;  // s, where the scene names no step
 // Of the proven step: 0.9 is used, and of that the next size below of four to the octave, in the mean over
 // all sizes sum (1 - a/b) / ln 2 over the four pairs of neighbors a < b.
 constexpr double kOffered = 0.9 * 0.9155;
 
 double at_most(double x, double most) { return x < most ? x : most; }
 
+// Between the two steps along a power law, beyond them as at the nearer one.
+double ns_at(const CostAt &cost, double h) {
+  if (!(cost.short_ns > 0)) return cost.ns;
+  const double along = std::log(h / kCostStep) / std::log(kShortCostStep / kCostStep);
+  return cost.ns * std::pow(cost.short_ns / cost.ns, std::clamp(along, 0.0, 1.0));
+}
+
 // Between measured sizes along a power law, beyond them along the last one; a body of more points is not
 // cheaper as a whole.
-double ns_per_point(const std::vector<CostAt> &costs, double points) {
-  if (costs.size() == 1) return costs[0].ns;
+double ns_per_point(const std::vector<CostAt> &costs, double points, double h) {
+  if (costs.size() == 1) return ns_at(costs[0], h);
   size_t k = 1;
   while (k + 1 < costs.size() && costs[k].points < points) ++k;
   const CostAt &a = costs[k - 1], &b = costs[k];
-  const double slope = std::max(std::log(b.ns / a.ns) / std::log(b.points / a.points), -1.0);
+  const double from = ns_at(a, h);
+  const double slope = std::max(std::log(ns_at(b, h) / from) / std::log(b.points / a.points), -1.0);
   // below the smallest size the cost per point is constant, since small bodies fit the caches
-  return a.ns * std::pow(std::max(points, costs[0].points) / a.points, slope);
+  return from * std::pow(std::max(points, costs[0].points) / a.points, slope);
 }
 
 const std::vector<CostAt> &costs_of(const MeasuredModel &m, Scheme scheme, const BodyRegime &b) {
@@ -120,7 +128,7 @@ BodyWay way_of(const MeasuredModel &m, Scheme scheme, double h, const Try &t, co
   w.model_error = model_error(m, *t.body, t.e, wish);
   w.time_error = at_most(wish.weight * time_error(own, m.steps_itself, h, *t.body, t.e), 1);
   w.mesh_error = at_most(wish.weight * mesh_error(*t.body), 1);
-  w.cpu_s_per_s = 1e-9 * ns_per_point(costs_of(m, own, *t.body), t.body->points) * t.body->points / h;
+  w.cpu_s_per_s = 1e-9 * ns_per_point(costs_of(m, own, *t.body), t.body->points, h) * t.body->points / h;
   return w;
 }
 
@@ -156,8 +164,7 @@ class Planner {
       if (scheme == Scheme::explicit_euler) try_scheme(scheme, wish_.step);
       else if (wish_.step > 0) try_scheme(scheme, wish_.step);
       else
-        for (int k = 0; k < (wish_.target > 0 ? kTargetSteps : kBudgetSteps); ++k)
-          try_scheme(scheme, kFrame / (1 << k));
+        for (int k = 0; k < kSteps; ++k) try_scheme(scheme, kFrame / (1 << k));
     }
     std::sort(out_.considered.begin(), out_.considered.end(),
               [](const Way &a, const Way &b) { return a.cpu_s_per_s < b.cpu_s_per_s; });
@@ -181,9 +188,8 @@ class Planner {
   }
 
  private:
-  // Implicit steps from 1/60 s down by halves. A target may ask for short ones, 33 us, before explicit steps
-  // cost less; in a budget per step a shorter one costs nothing, but per second.
-  static constexpr int kTargetSteps = 10, kBudgetSteps = 6;
+  // Implicit steps from 1/60 s down by halves, to 33 us: so short ones may cost less than explicit time.
+  static constexpr int kSteps = 10;
   // A target that is missed by less than the digits of a prediction is met.
   static constexpr double kAsPrinted = 1.005;
   // A mesh whose error is half of the target instead of all of it has 2^1.5 as many cells, and costs 4 times
@@ -226,7 +232,7 @@ class Planner {
   void try_scheme(Scheme scheme, double step) {
     std::vector<const MeasuredModel *> models;
     double h = step > 0 ? step : kFrame;
-    const double budget = wish_.ms_per_step * 1e-3 / (wish_.step > 0 ? wish_.step : kFrame) / tries_.size();
+    const double budget = wish_.ms_per_step * 1e-3 / frame() / tries_.size();
     bool bounded = false;
     for (const Try &t : tries_) {
       const MeasuredModel *best = nullptr;
@@ -252,6 +258,7 @@ class Planner {
     if (!used && scheme == Scheme::tr_bdf2) return;  // the same as with implicit_euler: all step themselves
     Way way;
     way.step = scheme == Scheme::explicit_euler && bounded ? step : h_of(step);
+    way.frame = frame();
     // sub-steps are equal parts of the step
     way.substep = step > 0 ? step / std::ceil(step / h - 1e-9) : h;
     for (size_t i = 0; i < tries_.size(); ++i) {
@@ -262,6 +269,7 @@ class Planner {
     }
     out_.considered.push_back(way);
   }
+  double frame() const { return h_of(wish_.step); }
   static double h_of(double step) { return step > 0 ? step : kFrame; }
 
   void say() {
@@ -348,10 +356,10 @@ class Planner {
       needs.push_back(format("at most about %.2g times as many cells", share));
     needs.push_back("a larger budget");
     return format(
-        "the budget of %.3g ms per step is not met: the cheapest choice takes a predicted %.3g ms per %s, "
-        "with an error of %.3g %%; to meet it takes %s",
-        wish_.ms_per_step, ms_per_step(way), way.step > 0 ? "step" : "1/60 s", at_most(100 * way.error, 100),
-        joined(needs, " or ").c_str());
+        "the budget of %.3g ms per %s is not met: the cheapest choice takes a predicted %.3g ms, with an "
+        "error of %.3g %%; to meet it takes %s",
+        wish_.ms_per_step, wish_.step > 0 ? "step" : "1/60 s", ms_per_step(way),
+        at_most(100 * way.error, 100), joined(needs, " or ").c_str());
   }
 
   // What each model that may be chosen leaves out of a dent.
@@ -428,7 +436,7 @@ Estimate estimate(const BodyRegime &b, double duration) {
   return e;
 }
 
-double ms_per_step(const Way &way) { return 1e3 * way.cpu_s_per_s * (way.step > 0 ? way.step : kFrame); }
+double ms_per_step(const Way &way) { return 1e3 * way.cpu_s_per_s * way.frame; }
 
 PlannedWay plan_accuracy(const std::vector<BodyRegime> &bodies, const Measured &measured, const Wish &wish) {
   return Planner(bodies, measured, wish).run();

@@ -19,8 +19,12 @@ enum class Scheme { explicit_euler, implicit_euler, tr_bdf2 };
 inline constexpr size_t kSchemes = 3;
 const char *scheme_name(Scheme scheme);  // as a scene names it
 
+// s, the steps at which costs are measured: implicit time and models that step themselves at both, because a
+// shorter step takes fewer iterations.
+inline constexpr double kCostStep = 1.0 / 60, kShortCostStep = kCostStep / 16;
 struct CostAt {
   double points = 0, ns = 0;  // of a body; processor time of one sub-step per point
+  double short_ns = 0;        // the same at the short step; 0: not measured
 };
 
 // What a body touches, which determines the cost of a sub-step: nothing; the ground; a probe that presses it
@@ -106,7 +110,8 @@ struct BodyWay {
   double cpu_s_per_s = 0;
 };
 struct Way {
-  double step = 0;  // s, of the scene; for an explicit scheme 0: "auto"
+  double step = 0;   // s, of the scene; for an explicit scheme 0: "auto"
+  double frame = 0;  // s, for which a budget counts: the step that the scene names, else 1/60 s
   double substep = 0;
   std::vector<BodyWay> bodies;
   double error = 0;  // largest sum of the three over the bodies
@@ -123,7 +128,7 @@ struct PlannedWay {
 };
 PlannedWay plan_accuracy(const std::vector<BodyRegime> &bodies, const Measured &measured, const Wish &wish);
 
-// Milliseconds of a step of the scene, or of 1/60 s where the step follows stability.
+// Milliseconds of a frame.
 double ms_per_step(const Way &way);
 
 }  // namespace dfm

@@ -307,6 +307,7 @@ json way_json(const Way &way, const Definition &def) {
           {"substep_s", way.substep},
           {"error", way.error},
           {"cpu_s_per_s", way.cpu_s_per_s},
+          {"frame_s", way.frame},
           {"ms_per_step", ms_per_step(way)},
           {"bodies", bodies}};
 }

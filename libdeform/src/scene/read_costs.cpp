@@ -13,6 +13,7 @@ std::vector<CostAt> read_sizes(const Node &sizes) {
     const double points = size.at("points").number(kPositive);
     if (!out.empty() && !(points > out.back().points)) size.at("points").fail("sizes must increase");
     out.push_back({points, size.at("ns_per_point").number(kPositive)});
+    if (size.has("short_ns_per_point")) out.back().short_ns = size.at("short_ns_per_point").number(kPositive);
   }
   if (out.empty()) sizes.fail("expected at least one size");
   return out;
@@ -49,8 +50,9 @@ Measured read_costs() {
   const Node root(&tree, "", &file);
   if (root.at("format").text() != "deform-costs")
     root.at("format").fail("expected \"deform-costs\", a file of deform calibrate");
-  if (root.at("version").number() != 3)
-    root.at("version").fail("this reader knows version 3: run deform calibrate again");
+  const double version = root.at("version").number();  // 3: without costs of short steps
+  if (version != 3 && version != 4)
+    root.at("version").fail("this reader knows versions 3 and 4: run deform calibrate again");
   Measured out;
   out.machine = root.at("machine").text();
   for (const Node &model : root.at("models").items()) out.models.push_back(read_model(model));

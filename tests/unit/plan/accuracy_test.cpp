@@ -116,6 +116,44 @@ TEST(Planner, Budget_TakesTheBestThatIsWithinIt) {
   EXPECT_EQ(none.way.bodies[0].model, "cartoon");  // the cheapest
 }
 
+// Where no step is named, a shorter one costs more, since it is a frame that counts.
+TEST(Planner, Budget_CountsForAFrame) {
+  BodyRegime b = bar();
+  b.models = {"elements"};
+  b.scheme = static_cast<int>(Scheme::implicit_euler);
+  const PlannedWay much = plan_accuracy({b}, measured(), budget(1000));
+  ASSERT_TRUE(much.meets);
+  EXPECT_LT(much.way.step, 1e-4) << "the shortest that is tried";
+  EXPECT_NEAR(ms_per_step(much.way), 1e3 * much.way.cpu_s_per_s / 60, 1e-9);
+  const PlannedWay some = plan_accuracy({b}, measured(), budget(0.26 * ms_per_step(much.way)));
+  ASSERT_TRUE(some.meets);
+  EXPECT_NEAR(some.way.step, 4 * much.way.step, 1e-12);
+  Wish wish = budget(1000);
+  wish.step = 1e-3;
+  const PlannedWay named = plan_accuracy({b}, measured(), wish);
+  EXPECT_NEAR(ms_per_step(named.way), named.way.cpu_s_per_s, 1e-9) << "a named step is a frame";
+}
+
+// Costs of implicit steps at 1/60 s and at a sixteenth of it: between them along a power law.
+TEST(Planner, ShortSteps_CostWhatIsMeasuredForThem) {
+  BodyRegime b = bar();
+  b.models = {"elements"};
+  b.scheme = static_cast<int>(Scheme::implicit_euler);
+  Measured costs = measured();
+  for (auto &sizes : costs.models[1].costs[1])
+    for (dfm::CostAt &size : sizes) size.short_ns = size.ns / 4;
+  const auto ns = [&](double step) {
+    Wish wish = budget(1000);
+    wish.step = step;
+    return 1e9 * step * plan_accuracy({b}, costs, wish).way.cpu_s_per_s / b.points;
+  };
+  EXPECT_NEAR(ns(dfm::kCostStep), 5000, 1e-6);
+  EXPECT_NEAR(ns(dfm::kCostStep / 4), 2500, 1e-6);
+  EXPECT_NEAR(ns(dfm::kShortCostStep), 1250, 1e-6);
+  EXPECT_NEAR(ns(dfm::kShortCostStep / 8), 1250, 1e-6) << "no less below";
+  EXPECT_NEAR(ns(2 * dfm::kCostStep), 5000, 1e-6) << "no more above";
+}
+
 TEST(Planner, WhatTheSceneNames_Stays) {
   BodyRegime b = bar();
   b.model = "cartoon";
