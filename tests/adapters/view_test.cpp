@@ -1,13 +1,20 @@
 // `deform view` by its scripts, under Xvfb: what it draws is looked at pixel by pixel, what it simulates by
 // state hashes. A machine without Xvfb passes these tests over.
+#include <dlfcn.h>
 #include <gtest/gtest.h>
+#include <poll.h>
 #include <signal.h>
+#include <sys/socket.h>
+#include <sys/un.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
+#include <atomic>
 #include <cmath>
 #include <cstdlib>
+#include <thread>
 
 #include "render/render.h"
 #include "support.h"
@@ -289,6 +296,95 @@ TEST_F(Viewer, SpaceMouse_LeadsTheToolInHand) {
   EXPECT_NEAR((to[1] - from[1]) / (to[0] - from[0]), 0.45, 0.1) << "half as far away as to the right";
   EXPECT_NEAR(vector(done, "c.png", "at")[0], to[0], 1e-3) << "nobody pushes any more";
   EXPECT_EQ(none.exit_code, 0) << "without the library it is not there, and nothing else changes";
+  const test::CommandResult again = test::deform({"replay", folder_, "--out", folder_ + "/again"});
+  EXPECT_EQ(again.exit_code, 0) << again.err;
+}
+
+// The daemon of 6-DOF mice, for one client, with protocol 1 of libspnav: the client sends its request for the
+// protocol, which is given back; an event is eight numbers: 0, the motion (x, y, z, rx, ry, rz) and a period,
+// or 1 (2) and the number of a button that is pressed (released).
+class Spacenavd {
+ public:
+  explicit Spacenavd(const std::string &path) : path_(path) {
+    unlink(path.c_str());
+    sockaddr_un at{};
+    at.sun_family = AF_UNIX;
+    std::snprintf(at.sun_path, sizeof at.sun_path, "%s", path.c_str());
+    listens_ = socket(AF_UNIX, SOCK_STREAM, 0);
+    there_ = bind(listens_, reinterpret_cast<sockaddr *>(&at), sizeof at) == 0 && listen(listens_, 1) == 0;
+  }
+  ~Spacenavd() {
+    shutdown(listens_, SHUT_RDWR);
+    if (thread_.joinable()) thread_.join();
+    close(listens_);
+    unlink(path_.c_str());
+  }
+  bool there() const { return there_; }
+  // Sends `first` to the client, and once the file is there `then`.
+  void serve(std::vector<std::array<int32_t, 8>> first, std::string file,
+             std::vector<std::array<int32_t, 8>> then) {
+    thread_ = std::thread([this, first = std::move(first), file = std::move(file), then = std::move(then)] {
+      const int client = accept(listens_, nullptr, nullptr);
+      if (client < 0) return;
+      uint32_t asked = 0;
+      if (recv(client, &asked, sizeof asked, MSG_WAITALL) == sizeof asked) asked_ = asked;
+      const auto tell = [&](const void *what, size_t size) {
+        return send(client, what, size, MSG_NOSIGNAL) == ssize_t(size);
+      };
+      bool lives = tell(&asked, sizeof asked);
+      for (const auto &event : first) lives = lives && tell(event.data(), sizeof event);
+      pollfd ends{client, POLLIN, 0};
+      char byte;
+      // until the client goes
+      for (bool told = false; lives && !(poll(&ends, 1, 5) > 0 && recv(client, &byte, 1, 0) == 0);) {
+        if (told || access(file.c_str(), R_OK) != 0) continue;
+        told = true;
+        for (const auto &event : then) lives = lives && tell(event.data(), sizeof event);
+      }
+      close(client);
+    });
+  }
+  uint32_t asked() const { return asked_; }
+
+ private:
+  std::string path_;
+  int listens_ = -1;
+  bool there_ = false;
+  std::atomic<uint32_t> asked_ = 0;
+  std::thread thread_;
+};
+
+// The real libspnav, and a daemon of the test behind it: the mouse is pushed to the right and away, then let
+// go while its button opens the jaws.
+TEST_F(Viewer, SpaceMouseByLibspnav_LeadsTheToolInHand) {
+  void *const library = dlopen("libspnav.so.0", RTLD_NOW | RTLD_LOCAL);
+  if (!library && access("/etc/debian_version", R_OK) != 0) GTEST_SKIP() << "no libspnav on this system";
+  ASSERT_NE(library, nullptr) << "cmake/deps.txt lists libspnav0, and it is not here: cmake/setup.sh doors";
+  dlclose(library);
+  const std::string socket =
+      "/tmp/deform_spnav_" + std::to_string(getpid());  // a path of 107 letters at most
+  Spacenavd daemon(socket);
+  ASSERT_TRUE(daemon.there());
+  unlink((folder_ + "/b.png").c_str());
+  daemon.serve({{0, 150, 0, 75, 0, 0, 0, 16}}, folder_ + "/b.png",
+               {{0, 0, 0, 0, 0, 0, 0, 16}, {1, 1, 0, 0, 0, 0, 0, 0}});
+  setenv("SPNAV_SOCKET", socket.c_str(), 1);
+  setenv("DEFORM_VIEW_SPNAV", "libspnav.so.0", 1);  // a script has no mouse otherwise
+  const test::CommandResult done = view(
+      "0 key space\n0 key v\n0.1 key tab\n0.1 shot a.png\n1.6 shot b.png\n2 shot c.png\n2.6 shot d.png\n"
+      "2.6 key v\n",
+      {"--set", "/time/duration=4", "--set",
+       R"(/tools=[{"name": "jaws", "shape": "grasper", "half_size": [0.004, 0.01, 0.02], "opening_deg": 20,
+               "pose": {"position": [0.05, -0.05, 0.2]}}])"});
+  unsetenv("SPNAV_SOCKET");
+  unsetenv("DEFORM_VIEW_SPNAV");
+  ASSERT_EQ(done.exit_code, 0) << done.err;
+  EXPECT_EQ(daemon.asked() >> 16, 0x7faau) << "a request of libspnav";
+  const std::vector<double> from = vector(done, "a.png", "at"), to = vector(done, "b.png", "at");
+  EXPECT_GT(to[0] - from[0], 0.05) << done.out;
+  EXPECT_NEAR((to[1] - from[1]) / (to[0] - from[0]), 0.45, 0.1) << "half as far away as to the right";
+  EXPECT_NEAR(vector(done, "d.png", "at")[0], vector(done, "c.png", "at")[0], 1e-6) << "let go";
+  EXPECT_GT(different(picture("c.png"), picture("d.png")), 10u) << "the jaws open";
   const test::CommandResult again = test::deform({"replay", folder_, "--out", folder_ + "/again"});
   EXPECT_EQ(again.exit_code, 0) << again.err;
 }
