@@ -1,4 +1,8 @@
 """Tools, cuts, and arrays of bodies that have been cut."""
+import contextlib
+import io
+import pathlib
+import re
 import unittest
 
 import numpy as np
@@ -10,6 +14,29 @@ def cube(world, **options):
     return world.add_body(deform.TetMesh.beam((0.04, 0.04, 0.04), cells=320), name="cube",
                           position=(-0.02, -0.02, -0.02), model="corotational_fem",
                           material={"young": 3e4, "damping_stiffness": 2e-3}, **options)
+
+
+class Rotation(unittest.TestCase):
+    def test_is_a_unit_quaternion_about_the_axis(self):
+        np.testing.assert_allclose(deform.rotation((0, 0, 3), 90), (0, 0, 0.5 ** 0.5, 0.5 ** 0.5), atol=1e-15)
+        np.testing.assert_allclose(deform.rotation((1, 1, -1), 120), (0.5, 0.5, -0.5, 0.5), atol=1e-15)
+        for axis, degrees in (((0, 0, 0), 90), ((0, 0, 1), float("nan")), ((0, 1), 90)):
+            with self.assertRaises(deform.ArgumentError):
+                deform.rotation(axis, degrees)
+
+
+class Page(unittest.TestCase):
+    """The program of doc/concepts/tools.md."""
+
+    def test_graspers_hand_over(self):
+        page = pathlib.Path(__file__).parents[2] / "libdeform/doc/concepts/tools.md"
+        program = re.search(r"^```python\n(.*?)^```", page.read_text(), re.M | re.S)[1]
+        names = {}
+        with contextlib.redirect_stdout(io.StringIO()):
+            exec(program, names)
+        self.addCleanup(names["world"].close)
+        self.assertAlmostEqual(names["cube"].measure.com[2], 0.082, delta=2e-3)
+        self.assertEqual(names["first"].force[0].tolist(), [0, 0, 0])
 
 
 class Scenery(unittest.TestCase):

@@ -13,7 +13,7 @@ from ._context import Context, Parameter, PluginType, default_context
 from ._library import (ArgumentError, BusyError, Discarded, Diverged, Error, FileError, FormatError,
                        HandleError, OutOfMemory, StateError, UnsupportedError, include_dir, quick as _quick,
                        template_dir)
-from .body import Body, CutInfo, Obstacle, Rigid
+from .body import Body, CutInfo, Obstacle, Rigid, rotation
 from ._command import command, cost, explain
 from .rig import friction, plot_friction
 from .law import Law, PythonLaw
@@ -32,4 +32,4 @@ __all__ = ["ArgumentError", "Body", "BusyError", "ContactChoice", "Context", "Cu
            "Picture", "PluginType", "PythonLaw", "Rigid", "RigidDef", "Run", "Scene", "Shape",
            "StateError", "TetMesh", "Tool", "TriMesh", "Trouble", "UnsupportedError", "World",
            "command", "cost", "default_context", "explain", "friction", "include_dir",
-           "plot_friction", "run", "template_dir"]
+           "plot_friction", "rotation", "run", "template_dir"]

@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import ctypes
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Mapping, Sequence
 
@@ -61,6 +62,19 @@ def vector(values: Any, what: str, width: int = 3) -> Any:
     if array.size != width:
         raise ArgumentError(f"{what} has {array.size} numbers; expected {width}", "DFM_E_ARG")
     return (ctypes.c_double * width)(*array)
+
+
+def rotation(axis: Sequence[float], degrees: float) -> tuple[float, float, float, float]:
+    """The quaternion x, y, z, w of a turn about an axis [3] of any length, as every argument `rotation` here
+    takes it."""
+    along = tuple(vector(axis, "axis"))
+    length = math.hypot(*along)
+    if not 0 < length < math.inf or not math.isfinite(degrees):
+        raise ArgumentError(f"a turn by {degrees} degrees about the axis {along}; both must be finite, the "
+                            "axis not zero", "DFM_E_ARG")
+    half = math.radians(degrees) / 2
+    x, y, z = (math.sin(half) * c / length for c in along)
+    return x, y, z, math.cos(half)
 
 
 def pose_of(position: Any, rotation: Any) -> _abi.dfm_pose:

@@ -135,7 +135,7 @@ DFM_API dfm_status dfm_tool_teleport(dfm_tool tool, const dfm_pose *pose);
 
 /** What the world did to the tool in the last step: contact, friction, attachments and the force of its cuts
  * (materials with `fracture_energy`), on all parts. Impulses are summed over all sub-steps and divided by the
- * length H of the step: without cuts, H times the force is the momentum that bodies gave to the tool, and H
+ * length H of the step: without cuts, H times the force is the momentum that the world gave it, and H
  * times the torque the angular momentum, to rounding. The force of a cut does its work on the tool alone.
  * @param force   [3] N on the tool, in its frame as it stands now
  * @param torque  [3] N m on the tool, about its origin as it stands now, in that frame
