@@ -6,6 +6,7 @@
 #include <functional>
 
 #include "bristle_law.h"
+#include "cut_scenes.h"
 #include "hook.h"
 #include "obstacle.h"
 #include "rigid.h"
@@ -173,6 +174,96 @@ TEST(RefusedMemory, InAStepWithARigidHost_LeavesTheWorldAsItWas) { walk_all(rigi
 TEST(RefusedMemory, InAStepOfALawThatRemembers_LeavesTheWorldAsItWas) { walk_all(bristles, 40); }
 
 TEST(RefusedMemory, InAStepThatChangesAModel_LeavesTheWorldAsItWas) { walk_all(changing, 40); }
+
+namespace {
+
+constexpr double kCutStep = 1e-3;  // s
+
+// A cube that moves by a third of a cell in each step, and that a plane cuts in the second one.
+dfm_world flies(dfm_context *c, dfm_body *body) {
+  const dfm_world w = test::make_world(c, {0, 0, 0});
+  test::BodyOptions o;
+  o.name = "cube";
+  o.model = "corotational_fem";
+  o.young = 3e4;
+  o.damping_stiffness = 2e-3;
+  o.position = {-0.02, -0.02, -0.032};
+  o.velocity = {0, 0, 6};
+  *body = test::make_body(c, w, "beam", {0.04, 0.04, 0.04}, 40, o);
+  const dfm_separate_def rule = dfm_separate_def_default();
+  test::ok(dfm_body_set_separate(*body, &rule));
+  return w;
+}
+
+uint32_t cuts_told(dfm_world w) {
+  uint32_t n = 0;
+  for (const dfm_contact_event &e : test::listed(dfm_world_events, w)) n += e.kind == DFM_EVENT_CUT;
+  return n;
+}
+
+uint32_t pieces_of(dfm_body b) {
+  uint32_t n = 0;
+  test::ok(dfm_body_pieces(b, 0, nullptr, &n));
+  return n;
+}
+
+struct CutRun {
+  bool came = false;                       // did it come to the n-th allocation?
+  uint32_t refused = 0, waited = 0;        // steps that were refused; cuts whose pieces had to wait
+  std::array<double, 3> cut{0, 0, 0.001};  // a place on the plane
+};
+
+// Without the n-th allocation of the step that cuts. However it ends, the cut is made once and told once, and
+// the piece comes off.
+void cut_without(dfm_context *c, int64_t n, bool restores, CutRun &run) {
+  dfm_body b = 0;
+  dfm_world w = flies(c, &b);
+  dfm_cut_def d = dfm_cut_def_default();
+  d.shape = DFM_CUT_PLANE;
+  d.how = DFM_CUT_SPLIT;
+  std::copy(run.cut.begin(), run.cut.end(), d.blade);
+  d.blade[5] = 1;
+  test::ok(dfm_body_plan_cut(b, 2 * kCutStep, &d));
+  test::ok(dfm_world_step(w, kCutStep, nullptr));
+  Refusal::arm(n);
+  const dfm_status status = dfm_world_step(w, kCutStep, nullptr);
+  run.came = Refusal::disarm();
+  EXPECT_TRUE(status == DFM_OK || status == DFM_E_NOMEM) << "allocation " << n << ": " << dfm_last_error();
+  run.refused += status != DFM_OK;
+  uint32_t told = cuts_told(w);
+  if (told > 0 && pieces_of(b) == 0) {
+    ++run.waited;
+    EXPECT_EQ(status, DFM_OK) << "allocation " << n << ": the step has been made";
+    if (restores) {  // where parts wait is in snapshots
+      const std::string now = test::snapshot(w);
+      test::ok(dfm_world_destroy(w));
+      w = flies(c, &b);
+      test::ok(dfm_world_restore(w, now.data(), now.size()));
+      EXPECT_EQ(test::snapshot(w), now) << "allocation " << n;
+    }
+  }
+  for (int i = 0; i < 3; ++i) {
+    test::ok(dfm_world_step(w, kCutStep, nullptr));
+    told += cuts_told(w);
+  }
+  EXPECT_EQ(told, 1u) << "allocation " << n;
+  EXPECT_EQ(pieces_of(b), 1u) << "allocation " << n << ": one cut, one piece";
+  test::ok(dfm_world_destroy(w));
+}
+
+}  // namespace
+
+TEST(RefusedMemory, InAStepThatCuts_MakesAndTellsTheCutOnce) {
+  dfm_context *const c = make_context();
+  CutRun run;
+  cut_without(c, int64_t(1) << 40, false, run);
+  ASSERT_FALSE(run.came || HasFailure());
+  const int64_t all = Refusal::calls;
+  for (int64_t n = 0; n < all && !HasFailure(); ++n) cut_without(c, n, n % 16 == 0, run);
+  EXPECT_GT(run.refused, 100u);
+  EXPECT_GT(run.waited, 50u);
+  dfm_context_destroy(c);
+}
 
 namespace {
 

@@ -121,8 +121,9 @@ static inline dfm_separate_def dfm_separate_def_default(void) {
  * @return DFM_OK, also where there is one part only; DFM_E_ARG `crumbs`; DFM_E_UNSUPPORTED as dfm_body_cut;
  * DFM_E_STATE; DFM_E_NOMEM. After an error nothing has changed. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_separate(dfm_body body, const dfm_separate_def *def, dfm_cut_info *out);
-/** From now on each cut and each tear of the body (deform/material.h) is followed by a separation. Snapshots
- * hold this setting.
+/** From now on each cut and each tear of the body (deform/material.h) is followed by a separation. If there
+ * is no memory for the pieces, the cut is made and reported, the parts stay in the body with a warning in the
+ * log, and each of the next steps tries again. Snapshots hold this setting, and whether parts wait.
  * @param def  copied; NULL: parts stay in one body, which is the default
  * @return DFM_OK; DFM_E_ARG; DFM_E_UNSUPPORTED the body cannot be cut; DFM_E_STATE. Threads: Not during
  * step. Since 0.1. */

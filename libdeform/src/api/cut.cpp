@@ -176,8 +176,9 @@ dfm_status dfm_body_set_separate(dfm_body body, const dfm_separate_def *def) {
   return as_status([&] {
     Body &b = body_of(body);
     exclusive(*b.world);
-    const SeparateRule rule = def ? rule_of(b, def) : SeparateRule{};
+    SeparateRule rule = def ? rule_of(b, def) : SeparateRule{};
     if (rule.on) check_may_cut(b, b.model);
+    rule.waits = rule.on && b.separate.waits;
     b.separate = rule;
   });
 }

@@ -18,6 +18,7 @@
 #include "world/model_change.h"
 #include "world/planned_cut.h"
 #include "world/sensors.h"
+#include "world/separate.h"
 #include "world/snapshot.h"
 #include "world/tear.h"
 #include "world/tool.h"
@@ -279,6 +280,7 @@ dfm_status dfm_world_step(dfm_world world, double dt, uint32_t *trouble) {
     begin_cuts(w);
     const dfm_status s = step_within_budget(w, dt, &bits);
     if (trouble) *trouble = bits;
+    if (s == DFM_OK) separate_what_waits(w);
     if (s == DFM_OK) cut_by_tools(w, dt);
     if (s == DFM_OK) make_planned_cuts(w, dt);
     if (s == DFM_OK) tear_bodies(w);

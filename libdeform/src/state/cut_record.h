@@ -15,6 +15,7 @@ struct SeparateRule {
   bool on = false;
   bool removes = false;  // parts of fewer cells than `least` are removed; else they stay
   uint32_t least = 1;    // cells
+  bool waits = false;    // parts have found no memory to become bodies: each step tries again
 };
 
 // A body as it was made.

@@ -50,8 +50,9 @@ double new_area(const Body &b, const BodyShape &before) {
   return sum;
 }
 
-void tell_what_went(const BodyShape &before, const CutMesh &mesh, const Body &b, CutReport &out) {
-  std::vector<double> lost(before.p.mass.begin(), before.p.mass.end());
+// lost: the masses before.
+void tell_what_went(const BodyShape &before, const CutMesh &mesh, const Body &b, std::vector<double> &lost,
+                    CutReport &out) {
   for (uint32_t i = 0; i < b.p.n; ++i) lost[mesh.point[i]] -= b.p.mass[i];
   for (uint32_t i = 0; i < before.p.n; ++i) {
     const double mass = std::fabs(lost[i]) > kRounding * before.p.mass[i] ? lost[i] : 0;
@@ -111,17 +112,19 @@ CutReport cut(Body &b, const Array<uint8_t> &removed, OpenFaces &&open) {
   CutMesh mesh = make_cut_mesh(m, b.p.n, b.ncell(), b.tets.data(), removed, open.own);
   if (mesh.cell.empty()) return empty(b);
   out.removed = b.ncell() - static_cast<uint32_t>(mesh.cell.size());
+  // all that takes memory comes before the cut is made, since a cut that is made has to be told
+  out.parts = count_parts(m, uint32_t(mesh.point.size()), uint32_t(mesh.cell.size()), mesh.tets.data());
+  std::vector<uint8_t> seen(b.p.n);
+  for (const uint32_t p : mesh.point) out.copies += std::exchange(seen[p], uint8_t{1});
+  std::vector<double> mass(b.p.mass.begin(), b.p.mass.end());
   const double elastic = elastic_energy(b), kinetic = kinetic_of(b);
   const HostWork work(b);
   const std::unique_ptr<MadeShape> made = make_shape(b, std::move(mesh), std::move(open.whole), nullptr);
   const std::unique_ptr<BodyShape> before = put(b, *made, false);
-  tell_what_went(*before, made->mesh, b, out);
+  tell_what_went(*before, made->mesh, b, mass, out);
   out.area = new_area(b, *before);
   out.kinetic = kinetic - kinetic_of(b);
   out.elastic = elastic - elastic_energy(b);
-  out.parts = count_parts(m, b.p.n, b.ncell(), b.tets.data());
-  std::vector<uint8_t> seen(before->p.n);
-  for (const uint32_t p : made->mesh.point) out.copies += std::exchange(seen[p], uint8_t{1});
   return out;
 }
 
@@ -187,6 +190,8 @@ CutShape through(const Body &b, const CutShape &shape) {
 }
 
 }  // namespace
+
+void reserve_cut_events(World &w, size_t n) { reserve_events(w, w.store.n + w.attachments.size() + n); }
 
 double kinetic_of(const Body &b) {
   double sum = 0;
@@ -283,7 +288,8 @@ CutReport split_by_blade(Body &b, const CutShape &asked, uint32_t most) {
   out.fracture = work;
   if (asked.kind == CutKind::plane) return out;  // it comes from nowhere, and goes on nowhere
   if (norm2(way) > 0) out.force = (-work / norm2(way)) * way;
-  sweep.keep(b);
+  // without memory, the next blade that comes to where this one is begins anew
+  found_memory([&] { sweep.keep(b); });
   return out;
 }
 

@@ -1,5 +1,8 @@
 // Cells leave a body between two steps, and faces between cells open (doc/concepts/cutting.md).
 #pragma once
+#include <new>
+
+#include "core/error.h"
 #include "geometry/cut_shape.h"
 #include "state/body.h"
 
@@ -43,6 +46,23 @@ void put_opened(Body &b, MadeShape &made);
 
 uint32_t present_cell(const Body &b, uint32_t whole);           // kNone: it has gone
 uint64_t face_of_whole(const Body &b, uint32_t i, uint32_t j);  // between present cells
+
+// Room for as many events behind those of what a cut ends, so that what a cut has done can be told.
+void reserve_cut_events(World &w, size_t n);
+
+// Whether f had the memory that it needs.
+template <class F>
+bool found_memory(F &&f) {
+  try {
+    f();
+    return true;
+  } catch (const std::bad_alloc &) {
+    return false;
+  } catch (const Error &e) {
+    if (e.status != DFM_E_NOMEM) throw;
+    return false;
+  }
+}
 
 // Kinetic energy, J.
 double kinetic_of(const Body &b);

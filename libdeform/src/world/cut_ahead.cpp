@@ -88,7 +88,7 @@ void open_faces_of(World &w, Body &b) {
   std::map<uint64_t, uint32_t> by;
   for (const AheadFace &f : a.faces) by[f.by] += is_there(b, f);
   const uint64_t id = b.id;
-  reserve_events(w, by.size());
+  reserve_cut_events(w, by.size());
   const bool any = std::any_of(by.begin(), by.end(), [](const auto &part) { return part.second > 0; });
   if (any) {
     const std::shared_ptr<CutJob> job = finish(w, b);
@@ -101,9 +101,9 @@ void open_faces_of(World &w, Body &b) {
   a.faces.swap(a.later);
   a.later.clear();
   a.due += a.delay;
-  if (any) separate_if_asked(b);
   for (const auto &[part, n] : by)
     if (n > 0) add_event(w, DFM_EVENT_CUT, id, part, n, w.time);
+  if (any) separate_if_asked(b);
 }
 
 }  // namespace

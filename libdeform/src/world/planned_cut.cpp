@@ -58,8 +58,16 @@ void warn(const World &w, const std::vector<Made> &all) {
 
 }  // namespace
 
+namespace {
+
+CutReport cut_alone(Body &b, const CutShape &shape, uint32_t how, uint32_t most) {
+  return how == DFM_CUT_SPLIT ? split_by_blade(b, shape, most) : remove_by_shape(b, shape, most);
+}
+
+}  // namespace
+
 CutReport make_cut(Body &b, const CutShape &shape, uint32_t how, uint32_t most) {
-  CutReport out = how == DFM_CUT_SPLIT ? split_by_blade(b, shape, most) : remove_by_shape(b, shape, most);
+  CutReport out = cut_alone(b, shape, how, most);
   separate_if_asked(b, out);
   return out;
 }
@@ -90,7 +98,9 @@ void plan_no_cuts(Body &b) {
   for (Body *const part : with_pieces(b)) part->planned_cuts.clear();
 }
 
-// Pieces take over the cuts that are still to come, so a cut leaves the list before it is made.
+// Pieces take over the cuts that are still to come, so a cut leaves the list before it is made. One that
+// finds no memory is still to come. One that is made is told before its parts become pieces, since these may
+// have to wait.
 void make_planned_cuts(World &w, double dt) {
   const auto due = [&](const auto &b) {
     return !b->planned_cuts.empty() && b->planned_cuts.front().t <= w.time + kOnTime * dt;
@@ -104,7 +114,9 @@ void make_planned_cuts(World &w, double dt) {
     b.planned_cuts.erase(b.planned_cuts.begin());
     CutReport done;
     try {
-      done = make_cut(b, cut.shape, cut.how, cut.most);
+      reserve_cut_events(w, 1);
+      made.reserve(made.size() + 1);
+      done = cut_alone(b, cut.shape, cut.how, cut.most);
     } catch (...) {
       b.planned_cuts.insert(b.planned_cuts.begin(), cut);  // there is room
       throw;
@@ -112,8 +124,8 @@ void make_planned_cuts(World &w, double dt) {
     const uint32_t n = cut.how == DFM_CUT_SPLIT ? done.opened : done.removed;
     note(made, b, cut, n > 0);
     if (n == 0) continue;
-    reserve_events(w, 1);
     add_event(w, DFM_EVENT_CUT, b.id, b.id, n, w.time);
+    separate_if_asked(b, done);
   }
   warn(w, made);
 }

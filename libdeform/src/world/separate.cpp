@@ -120,7 +120,10 @@ void separate(Body &b, const SeparateRule &rule, CutReport &out) {
   check_may_cut(b, b.model);
   const Parts parts = parts_of(b, rule);
   out.parts = static_cast<uint32_t>(std::count(parts.to.begin(), parts.to.end(), kStays));
-  if (out.parts == parts.n) return;
+  if (out.parts == parts.n) {
+    b.separate.waits = false;
+    return;
+  }
 
   wake(w, b);
   const double elastic = elastic_energy(b), kinetic = kinetic_of(b);
@@ -166,6 +169,7 @@ void separate(Body &b, const SeparateRule &rule, CutReport &out) {
     throw;
   }
   w.changed = true;  // without the attachments that have ended
+  b.separate.waits = false;
   out.pieces += parts.pieces;
   double kinetic_now = kinetic_of(b), elastic_now = elastic_energy(b);
   for (Body *const p : pieces) {
@@ -178,14 +182,37 @@ void separate(Body &b, const SeparateRule &rule, CutReport &out) {
   tell_crumbs(b, rule, parts);
 }
 
+namespace {
+
+void separate_or_wait(Body &b, CutReport &out) {
+  CutReport told = out;
+  if (found_memory([&] { separate(b, b.separate, told); })) {
+    out = told;
+    return;
+  }
+  if (!std::exchange(b.separate.waits, true))
+    b.world->context->logf(
+        DFM_LOG_WARNING,
+        "body '%s': there is no memory to make its parts bodies of their own; they stay in "
+        "it, and the next steps try again",
+        b.name.c_str());
+}
+
+}  // namespace
+
 void separate_if_asked(Body &b, CutReport &out) {
-  if (b.separate.on && !b.emptied && out.parts > 1) separate(b, b.separate, out);
+  if (b.separate.on && !b.emptied && out.parts > 1) separate_or_wait(b, out);
 }
 
 void separate_if_asked(Body &b) {
-  if (!b.separate.on || b.emptied) return;
   CutReport told;
-  separate(b, b.separate, told);
+  if (b.separate.on && !b.emptied) separate_or_wait(b, told);
+}
+
+void separate_what_waits(World &w) {
+  const size_t n = w.bodies.size();  // new pieces come after
+  for (size_t i = 0; i < n; ++i)
+    if (w.bodies[i]->separate.waits) separate_if_asked(*w.bodies[i]);
 }
 
 Body &place_for_piece(World &w, const Body &of, uint64_t id, const std::string &name) {
@@ -209,6 +236,7 @@ Body &place_for_piece(World &w, const Body &of, uint64_t id, const std::string &
   b.piece_of = of.piece_of ? of.piece_of : of.id;
   b.whole_name = of.piece_of ? of.whole_name : of.name;
   b.separate = of.separate;
+  b.separate.waits = false;
   b.planned_cuts = of.planned_cuts;
   inherit_cuts(of, b);
   b.switches = of.switches;

@@ -7,9 +7,12 @@ namespace dfm {
 // Each part but the heaviest becomes a body; those of fewer cells than the rule's `least` stay with the
 // heaviest, or go. Adds to what `out` tells of the cut before. Throws Error, and then nothing has changed.
 void separate(Body &b, const SeparateRule &rule, CutReport &out);
-// As the body's own rule says, if it does.
+// As the body's own rule says, if it does. Parts that find no memory stay in the body, and its rule keeps
+// that they wait: the cut before has been made and told, and is not made again.
 void separate_if_asked(Body &b, CutReport &out);
 void separate_if_asked(Body &b);
+// Tries again where parts wait.
+void separate_what_waits(World &w);
 
 // A piece without a shape, under this id and name, in World::undone: the one that had the id before a restore
 // took it back, or a new one. `of` made it, or is the body that the host made.

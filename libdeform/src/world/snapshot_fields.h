@@ -243,6 +243,9 @@ void body_fields(Stream &s, W &w, B &b, const Body &like) {
   s.value("separates", b.separate.on, must::flag);
   s.value("crumbs go", b.separate.removes, must::flag);
   s.value("fewest cells of a piece", b.separate.least, must::any);
+  s.value("parts wait for memory", b.separate.waits, must::flag);
+  s.must_hold("parts wait for memory", "parts of a body that separates",
+              [&] { return !b.separate.waits || b.separate.on; });
   s.value("asleep", b.slumber.asleep, must::flag);
   s.value("calm", b.slumber.calm, must::not_negative);
   s.value("asleep since", b.slumber.since, must::not_negative);

@@ -205,8 +205,8 @@ void tear_bodies(World &w) {
     if (!b.tears || b.slumber.asleep) continue;
     const Array<uint64_t> faces = Tear(b).faces();
     if (faces.empty()) continue;
+    reserve_cut_events(w, 1);
     CutReport done = open_faces(b, faces);
-    reserve_events(w, 1);
     add_event(w, DFM_EVENT_TEAR, b.id, b.id, done.copies, w.time);
     separate_if_asked(b, done);
   }

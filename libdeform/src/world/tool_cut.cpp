@@ -142,9 +142,9 @@ void forget_far(const Body &b, const Edge &edge, const ToolPlace &place, BladeTr
   });
 }
 
-// How many faces have opened, in this step.
-uint32_t split(const Tool &t, Body &b) {
-  uint32_t n = 0, all = 0;
+// n: how many faces have opened, in this step.
+void split(const Tool &t, Body &b, uint32_t &n) {
+  uint32_t all = 0;
   for (size_t part = t.first_cutting_part(); part < t.motion.parts.size(); ++part) {
     const Edge edge(t, part);
     BladeSweep sweep(b, edge.blade, edge.forward);
@@ -172,7 +172,6 @@ uint32_t split(const Tool &t, Body &b) {
     forget_far(b, edge, place, track);
     opening.charge(b, place, track);
   }
-  return n;
 }
 
 // ---- solids ---------------------------------------------------------------------------------------------
@@ -229,25 +228,24 @@ std::vector<Solid> solids_of(const Tool &t) {
   return out;
 }
 
-// How many cells have gone.
-uint32_t remove(const Tool &t, Body &b) {
+// n: how many cells have gone.
+void remove(const Tool &t, Body &b, uint32_t &n) {
   const std::vector<Solid> solids = solids_of(t);
   const Extent whole = box_of(b);
-  if (std::none_of(solids.begin(), solids.end(), [&](const Solid &s) { return s.box.meets(whole); }))
-    return 0;
+  if (std::none_of(solids.begin(), solids.end(), [&](const Solid &s) { return s.box.meets(whole); })) return;
   Array<uint8_t> removed(b.ncell(), 0, HookAllocator<uint8_t>(b.world->memory()));
-  uint32_t n = 0;
-  for (size_t c = 0; c < b.ncell() && (t.cuts.most == 0 || n < t.cuts.most); ++c) {
+  uint32_t met = 0;
+  for (size_t c = 0; c < b.ncell() && (t.cuts.most == 0 || met < t.cuts.most); ++c) {
     const Extent box = box_of(b, c);
     Vec3 x[4];
     for (size_t k = 0; k < 4; ++k) x[k] = load3(&b.p.x[point_of(b, c, k)]);
     const auto meets = [&](const Solid &s) { return s.box.meets(box) && meets_tetrahedron(s.shape, x); };
     if (!std::any_of(solids.begin(), solids.end(), meets)) continue;
     removed[c] = 1;
-    ++n;
+    ++met;
   }
-  if (n > 0) remove_cells(b, removed);
-  return n;
+  if (met > 0) remove_cells(b, removed);
+  n = met;
 }
 
 void check_shape(const Tool &t, uint32_t how) {
@@ -320,11 +318,21 @@ void cut_by_tools(World &w, double dt) {
       const auto at = std::find_if(w.bodies.begin(), w.bodies.end(), [&](auto &b) { return b->id == id; });
       if (at == w.bodies.end()) continue;
       Body &b = **at;
-      const uint32_t n = t.cuts.how == DFM_CUT_SPLIT ? split(t, b) : remove(t, b);
-      if (n == 0) continue;
-      separate_if_asked(b);
-      reserve_events(w, 1);
-      add_event(w, DFM_EVENT_CUT, id, t.set->obstacle[t.first_cutting_part()], n, w.time);
+      reserve_cut_events(w, 1);
+      uint32_t n = 0;
+      const auto tell = [&] {
+        if (n > 0) add_event(w, DFM_EVENT_CUT, id, t.set->obstacle[t.first_cutting_part()], n, w.time);
+      };
+      try {
+        if (t.cuts.how == DFM_CUT_SPLIT) split(t, b, n);
+        else remove(t, b, n);
+      } catch (...) {  // the second edge of scissors, where the first has opened faces
+        tell();
+        b.separate.waits = b.separate.waits || (n > 0 && b.separate.on);
+        throw;
+      }
+      tell();
+      if (n > 0) separate_if_asked(b);
     }
   }
   open_due(w, dt);
