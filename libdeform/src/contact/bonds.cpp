@@ -181,6 +181,10 @@ uint32_t solve_bonds(ContactRows &rows, const RowsPart &part, double tolerance, 
     return 1;
   }
   if (!drags) return solve_held(rows, part, tolerance, scratch);
+  if (drags == part.nbond && part.alone) {  // each has its point
+    each_bond(part, [&](uint32_t, uint32_t row) { solve_drag(rows, row); });
+    return 1;
+  }
   for (uint32_t turn = 0; turn < kMostTurns; ++turn) {
     bool same = turn > 0;
     sticking = 0;

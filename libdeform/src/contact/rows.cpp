@@ -374,7 +374,6 @@ void ContactRows::finish(std::span<const ContactPoint> contacts, const double *t
 }
 
 void ContactRows::turn_frames() {
-  if (!alone_all()) return;
   constexpr size_t kMore = 4;  // doubles that a whole vector at the last contact may see
   frame.resize(size_t(all()) * 9 + kMore);
   drive.resize(size_t(all()) * 3 + kMore);

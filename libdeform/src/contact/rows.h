@@ -126,8 +126,9 @@ struct ContactRows {
               double offset, std::span<const Bond> bonds = {}, Tasks *tasks = nullptr);
   void turn_frames();  // once `frame` and `drive` are known, for the kernels; finish() has done it
 
-  // All dofs answer their own impulses only: the contacts' loops run in the kernels.
-  bool alone_all() const { return blocks.empty() && rigid.empty(); }
+  // Do all unknowns of the part answer their own impulses only? The contacts' loops then run in the kernels.
+  // So do those with rigid bodies that no impulse moves: the path of a tool is given.
+  bool is_alone(const RowsPart &part) const;
   const ContactKernels &kernels() const { return loops_; }
   RowsView view(RowRun contacts) const;
   RowsPart whole();  // all of them; valid until the next call
@@ -192,6 +193,7 @@ struct ContactRows {
     return {w[0] * p.x, w[1] * p.y, w[2] * p.z};
   }
   void response_apply(const Block &b, uint32_t k, Vec3 p);
+  bool stands(const Block &b) const;
   Vec3 rigid_diagonal(uint32_t i, Vec3 a) const;
   Vec3 diagonal(uint32_t i, Vec3 direction) const;
   void finish_bonds(std::span<const Bond> bonds);

@@ -22,12 +22,26 @@ RowsView ContactRows::view(RowRun r) const {
           yields.data() + 2 * i};
 }
 
+bool ContactRows::stands(const Block &b) const {
+  if (b.group == kNone) return false;
+  const auto zero = [](double value) { return value == 0; };
+  const double *const answers = &response_[b.response], *const now = &y[size_t(4) * b.first];
+  return std::all_of(answers, answers + size_t(12) * b.count * b.count, zero) &&
+         std::all_of(now, now + size_t(4) * b.count, zero);
+}
+
+bool ContactRows::is_alone(const RowsPart &part) const {
+  return std::ranges::all_of(part.blocks, [&](uint32_t b) { return stands(blocks[b]); });
+}
+
 RowsPart ContactRows::whole() {
   every_row_[0] = {0, n};
   every_row_[1] = {n, nbond};
   every_block_.resize(blocks.size());
   for (uint32_t b = 0; b < every_block_.size(); ++b) every_block_[b] = b;
-  return {{&every_row_[0], 1}, {&every_row_[1], nbond ? size_t{1} : 0}, every_block_, n, nbond};
+  RowsPart out{{&every_row_[0], 1}, {&every_row_[1], nbond ? size_t{1} : 0}, every_block_, n, nbond};
+  out.alone = is_alone(out);
+  return out;
 }
 
 void ContactRows::apply_last() {

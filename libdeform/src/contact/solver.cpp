@@ -75,7 +75,7 @@ void sweep_answers(ContactRows &rows, const RowsPart &part, const LawView &law, 
 }  // namespace
 
 void sweep(ContactRows &rows, const RowsPart &part, const ContactState &law, double h, double leave) {
-  if (rows.alone_all())
+  if (part.alone && !(leave > 0))
     for (const RowRun &run : part.contacts)
       rows.kernels().sweep(rows.view(run), law.view(run.first), h, rows.y.data(),
                            rows.impulse.data() + size_t(3) * run.first);
@@ -99,7 +99,7 @@ void leap(ContactRows &rows, const RowsPart &part, const double *jumps) {
     double *const l = &rows.impulse[size_t(3) * i];
     store3(l, load3(l) + jump);
   };
-  if (rows.alone_all())
+  if (part.alone)
     for (const RowRun &run : part.contacts) {
       rows.kernels().leap(rows.view(run), jumps, rows.y.data(), rows.impulse.data() + size_t(3) * run.first);
       jumps += size_t(3) * run.n;
@@ -287,7 +287,7 @@ Residual larger(const Residual &a, const Residual &b) {
 Residual inner_residual(const ContactRows &rows, const RowsPart &part, const ContactState &law, double h,
                         const Tolerance &tolerance) {
   Residual r;
-  if (rows.alone_all())
+  if (part.alone)
     for (const RowRun &run : part.contacts)
       r = larger(r, rows.kernels().residual(
                         rows.view(run), law.view(run.first),

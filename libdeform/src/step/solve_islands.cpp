@@ -693,6 +693,7 @@ const SolveIsland *solve_islands(World &w, StepContext &step) {
   for (SolveIsland &own : all) {
     if (!own.open) continue;
     rows += own.part.all();
+    own.part.alone = step.rows.is_alone(own.part);
     own.start();
     own.slowed = own.waits = false;
     own.limit.reserve(own.part.n);

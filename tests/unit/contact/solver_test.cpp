@@ -184,6 +184,34 @@ TEST(Solver, CoupledContactsThatStick_MatchTheDenseSolution) {
   }
 }
 
+// A rigid body that no impulse moves, as a tool on a given path, ties no contacts together: the loops that
+// know points alone give the same bits.
+TEST(Solver, ContactWithARigidBodyThatStands_IsSolvedAmongPoints) {
+  const std::vector<Vec3> taken = {{2, -0.1, 0.3}, {1, -0.5, 0.5}, {1, 0.4, 1}};
+  EXPECT_FALSE(RowsCase({3, 4, 6}).rows.whole().alone) << "it answers";
+  Problem quick({3, 4, 6}, 0.3, {{}, {}, {}}), slow({3, 4, 6}, 0.3, {{}, {}, {}});
+  for (Problem *const p : {&quick, &slow}) {
+    for (const ContactRows::Block &block : p->rows.blocks)
+      p->rows.set_response(block,
+                           [&](double *matrix) { std::fill_n(matrix, 9 * block.count * block.count, 0.0); });
+    for (uint32_t i = 0; i < 3; ++i) p->rows.apply(i, -taken[i]);
+    p->ask();
+  }
+  RowsPart points = quick.rows.whole(), any = slow.rows.whole();
+  ASSERT_FALSE(points.blocks.empty());
+  ASSERT_TRUE(points.alone);
+  any.alone = false;
+  const test::SameTolerance tolerance{3, 0.5, 0.25, 4 * 0.5};
+  for (int k = 0; k < 20; ++k) {
+    sweep(quick.rows, points, quick.state, RowsCase::kStep);
+    sweep(slow.rows, any, slow.state, RowsCase::kStep);
+    ASSERT_EQ(quick.rows.impulse, slow.rows.impulse) << k;
+    EXPECT_EQ(inner_residual(quick.rows, points, quick.state, RowsCase::kStep, tolerance).due,
+              inner_residual(slow.rows, any, slow.state, RowsCase::kStep, tolerance).due);
+  }
+  EXPECT_GT(quick.impulse(0).x, 0);
+}
+
 // Signorini's and Coulomb's conditions at every contact, with velocities by the dense operator: an impulse
 // only pushes, and only where the contact closes; friction is within its cone, and on its edge against the
 // slip where there is any.
