@@ -140,6 +140,27 @@ TEST(CutDelay, Faces_OpenTheDelayAfterTheBlade_InOneStep) {
   EXPECT_GT(s.points(), whole);
 }
 
+// The step that opens faces has the time for it; the one after has the pairs of the new surface to find.
+TEST(CutDelay, StableStepOfANewShape_IsKnownAsFacesOpen) {
+  Cube s({.delay = 0.005});
+  double before = 0;
+  uint32_t opened = 0, changed = 0;
+  for (int i = 0; i < 60; ++i) {
+    const uint64_t events = s.events;
+    s.step();
+    const double now = test::stats(s.w).stable_step;
+    if (s.events > events) {
+      ++opened;
+      changed += now != before;
+      s.step();
+      EXPECT_EQ(test::stats(s.w).stable_step, now) << "opening " << opened;
+    }
+    before = test::stats(s.w).stable_step;
+  }
+  EXPECT_GT(opened, 2u);
+  EXPECT_GT(changed, 0u);
+}
+
 TEST(CutDelay, Blade_PartsTheBody_WithoutMassMomentumOrForce) {
   for (const char *model : kModels)
     for (const double velocity : {0.0, 1e-3}) {

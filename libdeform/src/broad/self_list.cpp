@@ -1,6 +1,7 @@
 #include "broad/self_list.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <utility>
 
@@ -162,11 +163,12 @@ void SelfList::add(uint32_t a, uint32_t b, double limit, const Wanted &wanted) {
   const auto corner = [&](uint32_t t, uint32_t k) { return s.tri[3 * size_t{t} + k % 3]; };
   const double *const x = at_.x().data();
   const auto at = [x](uint32_t surfel) { return load3(x + 4 * size_t{surfel}); };
+  // most triangles own few features: only these are looked at
   const auto vertices = [&](uint32_t from, uint32_t face) {
-    const uint32_t c0 = corner(face, 0), c1 = corner(face, 1), c2 = corner(face, 2);
-    for (uint32_t k = 0; k < 3; ++k) {
-      const uint32_t p = corner(from, k);
-      if (s.tri_owns[from] >> k & 1 && p != c0 && p != c1 && p != c2 && wanted(0, p, 2, face) &&
+    for (uint32_t left = s.tri_owns[from] & 7u; left; left &= left - 1) {
+      const uint32_t p = corner(from, uint32_t(std::countr_zero(left)));
+      const uint32_t c0 = corner(face, 0), c1 = corner(face, 1), c2 = corner(face, 2);
+      if (p != c0 && p != c1 && p != c2 && wanted(0, p, 2, face) &&
           triangle_within(at(p), at(c0), at(c1), at(c2), limit))
         vf_.push_back({p, face});
     }
@@ -174,16 +176,17 @@ void SelfList::add(uint32_t a, uint32_t b, double limit, const Wanted &wanted) {
   vertices(a, b);
   vertices(b, a);
   const uint32_t own_a = s.tri_owns[a] >> 3, own_b = s.tri_owns[b] >> 3;
-  if (!own_a || !own_b) return;
-  for (uint32_t k = 0; k < 3; ++k)
-    for (uint32_t l = 0; l < 3; ++l) {
-      if (!(own_a >> k & own_b >> l & 1)) continue;
-      const uint32_t i = corner(a, k), j = corner(a, k + 1), m = corner(b, l), n = corner(b, l + 1);
+  for (uint32_t left_a = own_a; left_a; left_a &= left_a - 1) {
+    const uint32_t k = uint32_t(std::countr_zero(left_a)), i = corner(a, k), j = corner(a, k + 1);
+    const uint32_t e = s.tri_edge[3 * size_t{a} + k];
+    for (uint32_t left_b = own_b; left_b; left_b &= left_b - 1) {
+      const uint32_t l = uint32_t(std::countr_zero(left_b)), m = corner(b, l), n = corner(b, l + 1);
       if (i == m || i == n || j == m || j == n) continue;
-      const uint32_t e = s.tri_edge[3 * size_t{a} + k], f = s.tri_edge[3 * size_t{b} + l];
+      const uint32_t f = s.tri_edge[3 * size_t{b} + l];
       if (!wanted(1, e, 1, f) || !segments_within(at(i), at(j), at(m), at(n), limit)) continue;
       ee_.push_back({std::min(e, f), std::max(e, f)});
     }
+  }
 }
 
 void SelfList::list(double limit) {

@@ -149,23 +149,9 @@ Array<uint32_t> inner_faces(const Body &b) {
 
 namespace {
 
-// On which sides of a box a point lies: one bit for beyond its high and one for below its low end, by axis.
-// A cell whose points have a bit in common does not meet the box.
-struct Beyond {
-  Vec3 lo, hi;
-  double reach;
-  uint8_t operator()(const double *x) const {
-    uint8_t out = 0;
-    for (int k = 0; k < 3; ++k) {
-      out |= uint8_t(uint8_t(hi[k] + reach < x[k]) << k);
-      out |= uint8_t(uint8_t(x[k] + reach < lo[k]) << (3 + k));
-    }
-    return out;
-  }
-};
-
 // Points have a fourth value that is zero, so that one is two pairs.
 using Pair = double __attribute__((vector_size(16)));
+using Bits = int64_t __attribute__((vector_size(16)));
 struct Four { Pair xy, z; };
 Four four_at(const double *x) {
   Four out;
@@ -176,6 +162,26 @@ Pair least(Pair a, Pair b) { return b < a ? b : a; }
 Pair most(Pair a, Pair b) { return a < b ? b : a; }
 Four least(Four a, Four b) { return {least(a.xy, b.xy), least(a.z, b.z)}; }
 Four most(Four a, Four b) { return {most(a.xy, b.xy), most(a.z, b.z)}; }
+
+// On which sides of a box that is `reach` larger a point lies: one bit for beyond its high and one for below
+// its low end, by axis. A cell whose points have a bit in common does not meet the box.
+class Beyond {
+ public:
+  Beyond(const Extent &box, double reach)
+      : lo_{{box.lo.x, box.lo.y}, {box.lo.z, -HUGE_VAL}},
+        hi_{{box.hi.x + reach, box.hi.y + reach}, {box.hi.z + reach, HUGE_VAL}},
+        reach_{reach, reach} {}
+  uint8_t operator()(const double *x) const {
+    const Four at = four_at(x);
+    const Bits xy = ((hi_.xy < at.xy) & Bits{1, 2}) | ((at.xy + reach_ < lo_.xy) & Bits{8, 16});
+    const Bits z = ((hi_.z < at.z) & Bits{4, 0}) | ((at.z + reach_ < lo_.z) & Bits{32, 0});
+    return uint8_t(xy[0] | xy[1] | z[0]);
+  }
+
+ private:
+  Four lo_, hi_;
+  Pair reach_;
+};
 
 }  // namespace
 
@@ -198,15 +204,23 @@ void BladeSweep::find_near(const Body &b) {
   // of the diagonal of the largest box around a cell
   const double reach =
       kKept * std::sqrt(points_kernels().largest_box(b.ncell(), b.tets.data(), b.p.x.data()));
-  const Beyond beyond{way.lo, way.hi, reach};
+  const Beyond beyond(way, reach);
   std::vector<uint8_t> side(b.p.n);
+  const double *const now = b.p.x.data();
   for (uint32_t i = 0; i < b.p.n; ++i)
-    side[i] = beyond(before + size_t{kStride} * i) & beyond(&b.p.x[size_t{kStride} * i]);
-  for (uint32_t c = 0; c < b.ncell(); ++c) {
-    const uint32_t *const p = &b.tets[size_t{4} * c];
-    if (side[p[0]] & side[p[1]] & side[p[2]] & side[p[3]]) continue;
+    side[i] = beyond(before + size_t{kStride} * i) & beyond(now + size_t{kStride} * i);
+  std::vector<uint32_t> cells(b.ncell());
+  size_t n = 0;
+  const uint32_t *p = b.tets.data();
+  for (uint32_t c = 0; c < b.ncell(); ++c, p += 4) {
+    cells[n] = c;
+    n += (side[p[0]] & side[p[1]] & side[p[2]] & side[p[3]]) == 0;
+  }
+  near_.reserve(n);
+  for (size_t k = 0; k < n; ++k) {
+    const uint32_t c = cells[k];
     const BladeSide none{c, SideKind::none, 0, 0, 0};
-    near_.push_back({c, middle_of(b, before, c), middle_of(b, b.p.x.data(), c), 0, none});
+    near_.push_back({c, middle_of(b, before, c), middle_of(b, now, c), 0, none});
   }
 }
 
@@ -237,14 +251,21 @@ bool BladeSweep::turn(const Body &b, const Vec3 *forward) {
 }
 
 void BladeSweep::find_faces(const Body &b) {
-  std::vector<uint32_t> near(b.ncell(), kNone);
-  for (size_t i = 0; i < near_.size(); ++i) near[near_[i].cell] = uint32_t(i);
-  for (size_t k = 0; k < b.inner.size(); k += 2) {
-    const uint32_t i = near[b.inner[k]], j = near[b.inner[k + 1]];
-    if (i == kNone || j == kNone) continue;
-    apart_ = std::max(apart_, norm(near_[i].is - near_[j].is));
+  std::vector<uint8_t> is_near(b.ncell());  // small, as each face asks for two
+  std::vector<uint32_t> place(b.ncell());
+  for (size_t i = 0; i < near_.size(); ++i) {
+    is_near[near_[i].cell] = 1;
+    place[near_[i].cell] = uint32_t(i);
+  }
+  pairs_.reserve(2 * near_.size());  // a cell has four faces, a face two cells
+  double apart2 = 0;
+  for (const uint32_t *k = b.inner.data(), *const end = k + b.inner.size(); k != end; k += 2) {
+    if (!(is_near[k[0]] & is_near[k[1]])) continue;
+    const uint32_t i = place[k[0]], j = place[k[1]];
+    apart2 = std::max(apart2, norm2(near_[i].is - near_[j].is));
     pairs_.push_back({i, j});
   }
+  apart_ = std::sqrt(apart2);
 }
 
 void BladeSweep::take_sides(const BladeTrack *track) {

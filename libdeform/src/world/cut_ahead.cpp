@@ -18,6 +18,7 @@
 #include "core/error.h"
 #include "state/world.h"
 #include "step/stages.h"
+#include "step/step_bound.h"
 #include "world/body_shape.h"
 #include "world/cut.h"
 #include "world/separate.h"
@@ -106,6 +107,17 @@ void open_faces_of(World &w, Body &b) {
   if (any) separate_if_asked(b);
 }
 
+// The stable step of the new shape is due before the next step, at the same positions. It takes longer than
+// the exchange, and the next step has the new pairs of the surface to find.
+void look_ahead(World &w) {
+  if (!bound_due(w)) return;
+  try {
+    update_bound(w);
+  } catch (...) {
+    w.bound.age = kNone;  // the next step says what is wrong
+  }
+}
+
 }  // namespace
 
 void set_cut_delay(Body &b, double delay) {
@@ -150,6 +162,7 @@ void open_due(World &w, double dt) {
   for (auto &b : w.bodies)
     if (!b->ahead.faces.empty() && w.time + 0.5 * dt > b->ahead.due) due.push_back(b.get());
   for (Body *const b : due) open_faces_of(w, *b);
+  if (!due.empty()) look_ahead(w);
 }
 
 void prepare_cuts(World &w) {
