@@ -374,6 +374,7 @@ void ContactRows::finish(std::span<const ContactPoint> contacts, const double *t
 }
 
 void ContactRows::turn_frames() {
+  if (ndof > 0 && std::find(block.begin(), block.end(), kNone) == block.end()) return;  // no part is alone
   constexpr size_t kMore = 4;  // doubles that a whole vector at the last contact may see
   frame.resize(size_t(all()) * 9 + kMore);
   drive.resize(size_t(all()) * 3 + kMore);
