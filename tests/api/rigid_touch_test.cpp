@@ -479,3 +479,51 @@ TEST(RigidTouch, AHeapOfBoxes_MakesNoEnergy) {
   EXPECT_LT(made, 1e-6 * start) << "J in a step";
   EXPECT_LT(last, 0.8 * start) << "they have fallen";
 }
+
+// Twenty boxes that fall into a shaft of six times their size jam, turn and carry each other: no corner goes
+// into a wall or the floor, and no step makes energy.
+TEST(RigidTouch, BoxesInAShaft_StayInside) {
+  const double half = 0.15;
+  test::Context context;
+  const dfm_world w = test::make_world(context, {0, 0, -kG});
+  add_pit(w, half);
+  const Vec size = {0.05, 0.06, 0.04};
+  std::vector<dfm_rigid> r;
+  for (int i = 0; i < 20; ++i) {
+    const std::string name = "box" + std::to_string(i);
+    dfm_rigid_def d =
+        test::box(name.c_str(), size, 1 + 0.3 * (i % 4), {0.013 + 0.002 * (i % 5), -0.021, 0.1 + 0.13 * i});
+    d.velocity[0] = 0.1 * (i % 3 - 1);
+    d.velocity[1] = 0.1 * (i % 5 - 2);
+    d.spin[0] = 0.5 * (i % 4);
+    d.spin[1] = 0.06 * i;
+    d.spin[2] = 1;
+    r.push_back(test::create(w, {d})[0]);
+  }
+  const auto energy = [&] {
+    double sum = 0;
+    for (size_t i = 0; i < r.size(); ++i)
+      sum +=
+          test::rigid_measure(r[i]).kinetic + (1 + 0.3 * double(i % 4)) * kG * test::state(r[i]).position[2];
+    return sum;
+  };
+  const double start = energy();
+  double last = start, made = 0, deepest = 0;
+  for (int i = 0; i < 80; ++i) {
+    ASSERT_EQ(dfm_world_step(w, 1.0 / 60, nullptr), DFM_OK) << dfm_last_error();
+    made = std::max(made, energy() - last);
+    last = energy();
+    for (const dfm_rigid b : r) {
+      const dfm_rigid_state now = test::state(b);
+      for (int k = 0; k < 8; ++k) {
+        const Vec arm = rotate(now.rotation, {k & 1 ? size[0] : -size[0], k & 2 ? size[1] : -size[1],
+                                              k & 4 ? size[2] : -size[2]});
+        deepest = std::max({deepest, -(now.position[2] + arm[2]), std::fabs(now.position[0] + arm[0]) - half,
+                            std::fabs(now.position[1] + arm[1]) - half});
+      }
+    }
+  }
+  EXPECT_LT(deepest, 2e-5) << "m";
+  EXPECT_LT(made, 1e-6 * start) << "J in a step";
+  EXPECT_LT(last, 0.4 * start) << "they have fallen";
+}

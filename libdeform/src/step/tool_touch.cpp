@@ -19,7 +19,9 @@ namespace {
 
 constexpr uint32_t kMostSweeps = 60;
 constexpr double kDone = 1e-13;            // of the largest speed that a row asks to change
+constexpr double kSharper = 1e-3;          // of what a pass changes: its sweeps need no less
 constexpr double kSame = 1e-9;             // of it: soft bodies need not be asked again
+constexpr double kOpenUpTo = 1;            // m/s: what a load could change that keeps a place from opening
 constexpr double kJaw = 1e4;               // N/m, of a jaw at its tip
 constexpr double kFace = 1e5;              // N/m, of a place on the face of a jaw
 constexpr double kDent = 5e-4;             // m: edges that are further on the wrong side do not touch there
@@ -300,8 +302,14 @@ Vec3 ToolTouch::spin(const Side &side) const {
 
 // (exp(h w) - 1) r / h less its first term: what is held by a tool that turns would creep outwards by it.
 Vec3 ToolTouch::bend(Vec3 spin, Vec3 arm) const {
+  const bool large = h_ * h_ * norm2(spin) > kSmallTurn * kSmallTurn;
+  return bend(spin, large ? turned(Quat{}, h_ * spin) : Quat{}, arm);
+}
+
+// turn: by the spin in the sub-step.
+Vec3 ToolTouch::bend(Vec3 spin, const Quat &turn, Vec3 arm) const {
   if (h_ * h_ * norm2(spin) > kSmallTurn * kSmallTurn)
-    return (1 / h_) * (rotate(turned(Quat{}, h_ * spin), arm) - arm) - cross(spin, arm);
+    return (1 / h_) * (rotate(turn, arm) - arm) - cross(spin, arm);
   const Vec3 second = cross(spin, cross(spin, arm)), third = cross(spin, second), fourth = cross(spin, third);
   return (h_ / 2) * second + (h_ * h_ / 6) * third + (h_ * h_ * h_ / 24) * fourth +
          (h_ * h_ * h_ * h_ / 120) * cross(spin, fourth);
@@ -320,6 +328,22 @@ Vec3 ToolTouch::bend(const Side &side, const Side &other) const {
   if (norm2(round) == 0) return out;
   const Vec3 first = cross(spin(other), round);
   return out + cross(own, (0.5 * h_) * first + (h_ * h_ / 6) * cross(spin(other), first));
+}
+
+// The derivative of the one above by the spin, along `by`, to second order.
+Vec3 ToolTouch::bend_slope(Vec3 spin, Vec3 arm, Vec3 by) const {
+  const Vec3 first = cross(spin, by),
+             goes = arm + h_ * (cross(spin, arm) + (0.5 * h_) * cross(spin, cross(spin, arm)));
+  return cross(by + (0.5 * h_) * first + (h_ * h_ / 6) * cross(spin, first), goes) - cross(by, arm);
+}
+
+// What turning adds to a row's speeds, by the present spins. m/s, by how much it has changed.
+double ToolTouch::follow_arc(Row &row) const {
+  const Vec3 now = bend(row.a, row.b) + belt(row.a) - bend(row.b, row.a) - belt(row.b);
+  const double changed = norm(now - row.bend);
+  row.bend = now;
+  if (row.frees) row.lift = dot(row.normal, bend(spin(row.a), row.a.bone) - bend(spin(row.b), row.b.bone));
+  return changed;
 }
 
 Vec3 ToolTouch::belt(const Side &side) const {
@@ -359,6 +383,7 @@ void ToolTouch::add_row(const Pair &pair, Name name, Side a, Side b, const Place
   const double w = dot(normal, answer_to(row, normal));
   if (!(w > 0)) return;  // neither gives way
   row.inverse = 1 / (w + row.soft);
+  if (row.frees && row.rate > 0) row.opens = kOpens * offset_ / (h_ * kOpenUpTo * row.inverse);
   row.tangent[0] = any_tangent(normal);
   row.tangent[1] = cross(normal, row.tangent[0]);
   const Vec3 first = answer_to(row, row.tangent[0]), second = answer_to(row, row.tangent[1]);
@@ -471,8 +496,11 @@ double ToolTouch::sweep() {
   for (uint32_t i = 0; i < rows_.size(); ++i) {
     Row &row = rows_[i];
     const Vec3 u = speed(row);
-    const double next = std::max(
-        0.0, row.impulse + row.inverse * (row.rate - row.lift - dot(row.normal, u) - row.soft * row.impulse));
+    const double free = row.rate - row.lift - dot(row.normal, u);
+    double next = std::max(0.0, row.impulse + row.inverse * (free - row.soft * row.impulse));
+    if (row.opens > 0)
+      next = std::max({0.0, (row.impulse + row.inverse * free) / (1 + row.inverse * row.opens),
+                       row.impulse + row.inverse * (free - row.rate)});
     const double more = next - row.impulse;
     if (more != 0) {
       row.impulse = next;
@@ -537,19 +565,16 @@ void ToolTouch::solve() {
     scale = std::max(
         scale, std::fabs(row.rate) + std::fabs(dot(row.normal, speed(row))) + row.impulse / row.inverse);
   const double done = kDone * scale;
+  double before = HUGE_VAL;
+  newton_.yields = 0;
   for (uint32_t pass = 0; pass < kMostPasses; ++pass) {
     double changed = 0;
-    for (Row &row : rows_) {
-      const Vec3 now = bend(row.a, row.b) + belt(row.a) - bend(row.b, row.a) - belt(row.b);
-      changed = std::max(changed, norm(now - row.bend));
-      row.bend = now;
-      if (row.frees)
-        row.lift = dot(row.normal, bend(spin(row.a), row.a.bone) - bend(spin(row.b), row.b.bone));
-    }
+    for (Row &row : rows_) changed = std::max(changed, follow_arc(row));
     if (pass > 0) changed = std::max(changed, follow_spin());
     changed = std::max(changed, ask_laws(done));
-    if (pass > 0 && !(changed > done)) return;
-    sweep_until(done);
+    if (pass > 0 && (!(changed > done) || !(changed < kFaster * before))) return;
+    if (pass > 0) before = changed;
+    sweep_until(std::max(done, kSharper * changed));
   }
 }
 

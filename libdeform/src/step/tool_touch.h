@@ -74,6 +74,7 @@ class ToolTouch {
     Vec3 normal, tangent[2];  // from b to a
     double rate;              // m/s, that u_n must reach
     double soft;              // 1/kg, of the face of a jaw
+    double opens;             // 1/kg: of the rate, if above zero, the load takes back min(opens p, rate)
     double inverse;           // kg
     double response;          // 1/kg, the largest one in the tangent plane; 0: does not rub
     uint32_t law;
@@ -146,6 +147,9 @@ class ToolTouch {
   void straighten(Moved &m) const;
   Vec3 bend(const Side &side, const Side &other) const;
   Vec3 bend(Vec3 spin, Vec3 arm) const;
+  Vec3 bend(Vec3 spin, const Quat &turn, Vec3 arm) const;
+  Vec3 bend_slope(Vec3 spin, Vec3 arm, Vec3 by) const;
+  double follow_arc(Row &row) const;
   Vec3 spin(const Side &side) const;
   Vec3 belt(const Side &side) const;
   void add_impulses(size_t k);
@@ -161,10 +165,15 @@ class ToolTouch {
     size_t tool, at, size;  // at: first of its unknowns
     uint32_t group, jaw, part, island;
     Vec3 center;
+    bool solved;  // of an island
+    Vec3 spin;    // rad/s, so far
+    Quat turn;    // by it in the sub-step
   };
   struct Lever {
     uint32_t motion;
-    double by[3][6];  // m/s along normal and tangents, by its unknowns
+    bool of_a;          // else of b
+    double by[3][6];    // m/s along normal and tangents, by its unknowns
+    double bent[3][3];  // what turning adds to it beyond the first order, by the spin so far
   };
   std::array<uint32_t, 2> movers_of(const Side &side);
   uint32_t island_of(uint32_t motion);
@@ -175,24 +184,38 @@ class ToolTouch {
     uint32_t row;
     // along normal and tangents: m/s without impulses, with bend and lift; N s of the last round, and now; kg
     double start[3], last[3], now[3], rho[3];
+    bool arcs[3];   // bend and lift follow the spin, and are not in `start`
     LinearLaw law;  // to come back to
   };
   // Of one island; kept for its memory.
   struct NewtonScratch {
-    size_t n = 0;  // unknowns
+    size_t n = 0;       // unknowns
+    double yields = 0;  // of the last rounds of this solve; 0: none yet
     std::vector<NewtonRow> rows;
-    std::vector<double> mass, system, x, left;  // [n,n], [n,n], [n], [n]
+    std::vector<uint32_t> order;      // [motions], by which they are eliminated
+    std::vector<uint8_t> joined;      // [motions,motions] while that is found
+    std::vector<size_t> first, live;  // [n] place of the motion that an unknown is of; scratch
+    std::vector<double> mass, system, x, left, from, force, good;  // [n,n], [n,n], [n], ...
   };
+  void order_motions(uint32_t island);
+  void put_masses();
+  void turn_motions();
   bool number_unknowns(uint32_t island);
   bool set_masses(uint32_t island);
   void start_rows(uint32_t island);
+  void set_rho(double yields);
   void add_motion(uint32_t row, const std::vector<double> &x, double u[3]) const;
+  void add_arc(const NewtonRow &l, double u[3], bool slopes);
+  void impulse_at(NewtonRow &l, const double u[3]) const;
+  double force_along(const std::vector<double> &way);
+  void shorten(double at_start);
   void gather_impulses();
   void answer_at(NewtonRow &l, const double u[3], double slope[3][3]) const;
   void add_slopes(uint32_t row, const double slope[3][3]);
   double newton_step();
   double end_round();
   bool solve_round(double done);
+  bool solve_rounds(double done);
   bool newton(uint32_t island, double done);
   void leap(double done);
   // tool_hits.cpp
