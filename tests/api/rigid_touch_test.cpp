@@ -527,3 +527,23 @@ TEST(RigidTouch, BoxesInAShaft_StayInside) {
   EXPECT_LT(made, 1e-6 * start) << "J in a step";
   EXPECT_LT(last, 0.4 * start) << "they have fallen";
 }
+
+// A rod and a plate that fly and turn by more than a radian in a step keep their energy and angular momentum.
+TEST(RigidTouch, FastSpinInFreeFlight_KeepsEnergy) {
+  for (const Vec half : {Vec{0.1, 0.03, 0.02}, Vec{0.1, 0.08, 0.01}})
+    for (const double spin : {20.0, 80.0, 170.0}) {
+      SCOPED_TRACE(std::to_string(spin) + " rad/s " + std::to_string(half[1]));
+      test::Context context;
+      const dfm_world w = test::make_world(context, {});
+      const dfm_rigid r = test::create(w, {test::box("thing", half, 1)})[0];
+      push(r, {}, {0.6 * spin, 0.64 * spin, 0.48 * spin});
+      const dfm_body_measure start = test::rigid_measure(r);
+      for (int i = 0; i < 120; ++i) {
+        ASSERT_EQ(dfm_world_step(w, 1.0 / 60, nullptr), DFM_OK) << dfm_last_error();
+        const dfm_body_measure now = test::rigid_measure(r);
+        EXPECT_NEAR(now.kinetic, start.kinetic, 0.02 * start.kinetic);
+        EXPECT_LT(test::apart(test::vec(now.angular), test::vec(start.angular)),
+                  1e-11 * test::norm(test::vec(start.angular)));
+      }
+    }
+}

@@ -19,6 +19,7 @@
 #include "core/error.h"
 #include "dynamics/rigid/host.h"
 #include "dynamics/rigid/joints.h"
+#include "math/free_spin.h"
 #include "math/turn.h"
 
 namespace dfm {
@@ -153,7 +154,7 @@ void Builtin::free_motion(const dfm_rigid_step &step, const Group &g) {
     const Quat q = rotation_of(s);
     momentum_[i] = in_axes(q, parts_[i].moments, load3(s.spin));
     store3(&free_[6 * size_t{i}], load3(s.velocity) + step.h * load3(step.gravity));
-    store3(&free_[6 * size_t{i} + 3], mean_spin(q, parts_[i].inverse_moments, momentum_[i], step.h));
+    store3(&free_[6 * size_t{i} + 3], free_spin(q, parts_[i].inverse_moments, momentum_[i], step.h));
   }
 }
 
@@ -202,7 +203,7 @@ void Builtin::start_from(const dfm_rigid_step &step, const Group &g, const doubl
   }
   for (const uint32_t i : g.parts)
     store3(&base_[6 * size_t{i} + 3],
-           mean_spin(rotation_of(step.state[i]), parts_[i].inverse_moments, base_momentum_[i], step.h));
+           free_spin(rotation_of(step.state[i]), parts_[i].inverse_moments, base_momentum_[i], step.h));
 }
 
 // end_ and end_momentum_ with the rows' impulses x. target_: by how much more their rates must change.
@@ -225,7 +226,7 @@ double Builtin::move_by(const dfm_rigid_step &step, const Group &g, std::span<co
   }
   for (const uint32_t i : g.parts) {
     const Quat q = rotation_of(step.state[i]);
-    const Vec3 w = mean_spin(q, parts_[i].inverse_moments, end_momentum_[i], step.h);
+    const Vec3 w = free_spin(q, parts_[i].inverse_moments, end_momentum_[i], step.h);
     store3(&end_[6 * size_t{i} + 3], w);
     dfm_rigid_state &to = moved_[i];
     store3(to.position, load3(step.state[i].position) + step.h * load3(&end_[6 * size_t{i}]));
