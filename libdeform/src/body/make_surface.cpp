@@ -3,8 +3,12 @@
 #include "body/make_surface.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
+#include <initializer_list>
+#include <span>
 
+#include "geometry/closest.h"
 #include "math/vec3.h"
 
 namespace dfm {
@@ -196,36 +200,120 @@ void gather_rows(Surface &surface, const double *x, const double *v, uint32_t be
 
 namespace {
 
-constexpr double kTilt = 1e-3;  // share of the trace; distinguishes nearly parallel planes
+// distance of the hull of normals from 0 below which it says less and less of a direction
+constexpr double kNarrow = 0.05;
+constexpr double kMostBack = 3;  // limit on the way of a surfel of a slit, in units of Surface::back
+
+// The corners of a simplex whose hull has the point nearest to 0, and that point.
+struct Nearest {
+  Vec3 corner[4], point;
+  int n = 0;
+
+  void keep(std::initializer_list<int> which) {
+    Vec3 kept[3];
+    n = 0;
+    for (const int k : which) kept[n++] = corner[k];
+    std::copy_n(kept, n, corner);
+  }
+  void add(Vec3 p) {
+    corner[n++] = p;
+    if (n == 1) point = p;
+    else if (n == 2) of_edge();
+    else if (n == 3) of_triangle();
+    else of_tetrahedron();
+  }
+  void of_edge() {
+    const double t = closest_on_segment({}, corner[0], corner[1]);
+    point = corner[0] + t * (corner[1] - corner[0]);
+    if (t == 0) keep({0});
+    else if (t == 1) keep({1});
+  }
+  void of_triangle() {
+    const TrianglePoint at = closest_on_triangle({}, corner[0], corner[1], corner[2]);
+    point = at.point;
+    const int f = int(at.feature);
+    if (f >= 4) keep({f - 4});
+    else if (f > 0) keep({f - 1, f % 3});
+  }
+  void of_tetrahedron() {
+    constexpr int kFace[4][4] = {{0, 1, 2, 3}, {0, 3, 1, 2}, {0, 2, 3, 1}, {1, 3, 2, 0}};
+    bool inside = true;
+    double least = HUGE_VAL;
+    const int *nearest = kFace[0];
+    for (const auto &f : kFace) {
+      const Vec3 a = corner[f[0]], b = corner[f[1]], c = corner[f[2]];
+      inside = inside && tet_volume(a, b, c, corner[f[3]]) * tet_volume(a, b, c, {}) > 0;
+      const double d2 = closest_on_triangle({}, a, b, c).distance2;
+      if (d2 < least) nearest = f;
+      least = std::min(least, d2);
+    }
+    point = {};
+    if (inside) return;
+    keep({nearest[0], nearest[1], nearest[2]});
+    of_triangle();
+  }
+};
+
+// The point of the hull of these normals that is nearest to 0: n.c >= c.c for each of them (Gilbert 1966).
+Vec3 nearest_of_normals(const double *normals, std::span<const uint32_t> which) {
+  constexpr int kMost = 32;
+  constexpr double kSame = 1e-9;
+  Nearest hull;
+  for (int k = 0; k < kMost; ++k) {
+    double least = HUGE_VAL;
+    Vec3 next;
+    for (const uint32_t l : which) {
+      const Vec3 n = load3(normals + 3 * size_t{l});
+      const double height = dot(n, hull.point);
+      if (!(norm2(n) > 0) || !(height < least)) continue;
+      least = height;
+      next = n;
+    }
+    if (!(least < HUGE_VAL) || (k > 0 && !(least < norm2(hull.point) - kSame))) break;
+    hull.add(next);
+  }
+  return hull.point;
+}
+
+// The shortest w with n.w = -1, in the least-squares sense; no longer than kMostBack.
+Vec3 least_squares_of(const double *normals, std::span<const uint32_t> which) {
+  constexpr double kTilt = 1e-3;  // share of the trace; distinguishes nearly parallel planes
+  double sum[9] = {};
+  for (const uint32_t l : which) {
+    const Vec3 n = load3(normals + 3 * size_t{l});
+    const double add[9] = {n.x, n.y, n.z, n.x * n.x, n.y * n.y, n.z * n.z, n.x * n.y, n.y * n.z, n.z * n.x};
+    for (size_t k = 0; k < 9; ++k) sum[k] += add[k];
+  }
+  const double tilt = kTilt * (sum[3] + sum[4] + sum[5]);
+  if (!(tilt > 0)) return {};
+  const Vec3 a{sum[3] + tilt, sum[6], sum[8]}, b{sum[6], sum[4] + tilt, sum[7]},
+      c{sum[8], sum[7], sum[5] + tilt}, r = load3(sum);
+  const double det = dot(a, cross(b, c));
+  const Vec3 way = (-1 / det) * Vec3{dot(r, cross(b, c)), dot(r, cross(c, a)), dot(r, cross(a, b))};
+  const double far = norm(way);
+  return far > kMostBack ? (kMostBack / far) * way : way;
+}
 
 }  // namespace
 
 void ways_back(Surface &s, const double *x, const std::function<void(uint32_t surfel, Vec3 way)> &use) {
   const auto at = [&](uint32_t i) { return load3(x + 4 * size_t{i}); };
-  s.sums.assign(kBackSums * s.laid_surfel.size(), 0.0);
   for (size_t l = 0; l < s.laid.size(); ++l) {
     const uint32_t *const c = &s.tri[3 * size_t{s.laid[l]}];
-    const Vec3 n = normalized(cross(at(c[1]) - at(c[0]), at(c[2]) - at(c[0])));
-    const double add[kBackSums] = {n.x,       n.y,       n.z,       n.x * n.x, n.y * n.y,
-                                   n.z * n.z, n.x * n.y, n.y * n.z, n.z * n.x};
-    for (size_t k = 0; k < 3; ++k) {
-      if (s.laid_tip[l] >> k & 1) continue;
-      const auto found = std::lower_bound(s.laid_surfel.begin(), s.laid_surfel.end(), c[k]);
-      double *const sum = &s.sums[kBackSums * size_t(found - s.laid_surfel.begin())];
-      for (size_t i = 0; i < kBackSums; ++i) sum[i] += add[i];
-    }
+    store3(&s.laid_normal[3 * l], normalized(cross(at(c[1]) - at(c[0]), at(c[2]) - at(c[0]))));
   }
   for (size_t i = 0; i < s.laid_surfel.size(); ++i) {
-    const double *const sum = &s.sums[kBackSums * i];
-    const double tilt = kTilt * (sum[3] + sum[4] + sum[5]);
-    if (!(tilt > 0)) continue;
-    const Vec3 a{sum[3] + tilt, sum[6], sum[8]}, b{sum[6], sum[4] + tilt, sum[7]},
-        c{sum[8], sum[7], sum[5] + tilt}, r = load3(sum);
-    const double det = dot(a, cross(b, c));
-    Vec3 way = (-1 / det) * Vec3{dot(r, cross(b, c)), dot(r, cross(c, a)), dot(r, cross(a, b))};
-    const double far = norm(way);
-    if (far > kMostBack) way = (kMostBack / far) * way;
-    use(s.laid_surfel[i], way);
+    const std::span<const uint32_t> around{s.laid_around.data() + s.laid_begin[i],
+                                           s.laid_around.data() + s.laid_begin[i + 1]};
+    if (around.empty()) continue;
+    if (std::any_of(around.begin(), around.end(), [&](uint32_t l) { return s.laid_tip[l] & kOfSlit; })) {
+      use(s.laid_surfel[i], least_squares_of(s.laid_normal.data(), around));
+      continue;
+    }
+    const Vec3 c = nearest_of_normals(s.laid_normal.data(), around);
+    const double margin = norm(c);
+    if (!(margin > 0)) continue;
+    use(s.laid_surfel[i], (-1 / std::max(margin, kNarrow)) * c);
   }
 }
 

@@ -28,9 +28,11 @@ void wear_coupling(Coupling &&coupling, Surface &surface);
 // are added in its order, so that rows may be cut among threads: gather_rows does surfels [begin,end) of a
 // coupled surface.
 void gather_surface(Surface &surface, const double *x, const double *v);
-// The way by which each surfel of coincident faces is set back, in units of `back`, so that their planes are
-// set back by one: the shortest w with n.w = -1 for each of them, in the least-squares sense. At the tip of a
-// slit both sides ask for the opposite of each other, and neither counts.
+// The way by which each surfel of coincident faces is set back, in units of `back` (doc/decisions/0446).
+// Between two bodies: of length one, in the direction that goes most steeply into the material, seen from
+// that face around it where it does so least; shorter only where the normals hardly lie in one half-space.
+// At a slit: the shortest w with n.w = -1 for each face, in the least-squares sense. At the tip of a slit
+// both sides ask for the opposite of each other, and neither counts.
 // x: [nsurfel,4]; may change in `use`.
 void ways_back(Surface &surface, const double *x, const std::function<void(uint32_t surfel, Vec3 way)> &use);
 void gather_rows(Surface &surface, const double *x, const double *v, uint32_t begin, uint32_t end);

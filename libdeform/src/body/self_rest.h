@@ -53,9 +53,9 @@ struct SelfRest {
   Vec3 at(uint32_t surfel, double back) const { return at(surfel) + back * load3(&way[4 * size_t{surfel}]); }
 };
 
-// of d_c: how far setting back moves two features against each other, each by kMostBack / 2 at most. Copies
-// of a point that have slid by less make one contact, and hold the features around them.
-inline constexpr double kNearCopies = kMostBack;
+// of d_c: how far setting back moves two features against each other, each by half of it at most. Copies of a
+// point that have slid by less make one contact, and hold the features around them.
+inline constexpr double kNearCopies = 3;
 // of d_c: as much nearer than the material touches features may come while copies hold them
 inline constexpr double kLeftToCopies = 0.5;
 // m, distance at which features rest that have copies of one point among their corners; doc/decisions/0427.

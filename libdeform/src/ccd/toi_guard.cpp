@@ -226,6 +226,7 @@ class NearObstacle {
 Vec3 GuardScene::end_of(const GuardSide &s, uint32_t surfel) const {
   const Vec3 x = load3(&s.surface->x[4 * size_t{surfel}]);
   if (s.still) return x;
+  if (s.stamp[surfel] == round) return load3(&s.end[4 * size_t{surfel}]);
   // its pose is at the fraction already
   if (s.local) return s.pose.position + rotate(s.pose.rotation, load3(&s.local[3 * size_t{surfel}]));
   Vec3 way;
@@ -235,8 +236,8 @@ Vec3 GuardScene::end_of(const GuardSide &s, uint32_t surfel) const {
 }
 
 void GuardScene::find_end(GuardSide &s, uint32_t surfel) {
-  s.stamp[surfel] = round;
   store3(&s.end[4 * size_t{surfel}], end_of(s, surfel));
+  s.stamp[surfel] = round;
 }
 
 void GuardMemory::follow(const Array<Candidate> &list, Tasks *tasks) {

@@ -54,7 +54,9 @@ struct GuardSide {
   // of its vertex-face and edge-edge candidates, in their order
   const PairAtRest *pairs[2] = {nullptr, nullptr};
   std::vector<uint8_t> held;  // [copies] nothing around them comes too near
-  Array<double> end;          // [nsurfel,4], where `stamp` is the scene's round
+  // [nsurfel,4], where `stamp` is the scene's round; of surfels that are set back known from the beginning of
+  // the round, as they are set back there
+  Array<double> end;
   Array<uint32_t> stamp;
 };
 

@@ -21,9 +21,7 @@ struct NamedBy {
   bool operator==(const NamedBy &) const = default;
 };
 
-inline constexpr size_t kBackSums = 9;
-inline constexpr double kMostBack =
-    3;  // limit on the way of a surfel that is set back, in units of Surface::back
+inline constexpr uint8_t kOfSlit = 8;  // of Surface::laid_tip
 
 struct Surface {
   uint32_t nsurfel = 0, ntri = 0, nedge = 0;
@@ -73,13 +71,17 @@ struct Surface {
   // copies of a point in one place would touch along the normals of all faces around them, which no motion
   // satisfies (doc/decisions/0398).
   Array<uint32_t> laid, laid_surfel;
-  // [laid] bits 0-2: corner k lies at the tip of a slit: the face on the other side has the same surfel
+  // [laid] bits 0-2: corner k lies at the tip of a slit: the face on the other side has the same surfel; bit
+  // 3: it is of a slit
   Array<uint8_t> laid_tip;
   bool slit = false;
   double back = 0;         // m
   Array<double> place;     // [nsurfel,4] m, x before it is set back; empty without such triangles
   Array<uint32_t> origin;  // [nsurfel] point of the body as it was made; empty without such triangles
-  Array<double> sums;      // scratch, [laid_surfel,kBackSums]
+  // around a surfel of laid_surfel, from begin[i] to begin[i+1]: places in `laid`, without those that have
+  // their tip there
+  Array<uint32_t> laid_begin, laid_around;
+  Array<double> laid_normal;  // scratch, [laid,3]
 
   // Over the triangles at rest, where the surface was made in advance: trees over the present triangles take
   // its topology instead of a search for one. Null: there is none.

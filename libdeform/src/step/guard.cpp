@@ -16,6 +16,7 @@
 #include <cmath>
 #include <utility>
 
+#include "body/make_surface.h"
 #include "body/obstacle_mesh.h"
 #include "contact/reach.h"
 #include "dynamics/rigid/rigid_set.h"
@@ -219,11 +220,44 @@ void set_sides(World &w, StepContext &step) {
   }
 }
 
+// Surfels that are set back end where the faces around them, as they then stand, set them back. m, the most
+// that this differs from their straight way.
+double set_back_ends(GuardScene &scene, GuardSide &side, Surface &s) {
+  double most = 0;
+  const auto straight = [&](uint32_t i) {
+    Vec3 way;
+    s.each_phyxel(i, [&](uint32_t p, double weight) { way += weight * load3(&side.mean[4 * size_t{p}]); });
+    return scene.fraction * scene.h * way;
+  };
+  for (const uint32_t t : s.laid)
+    for (size_t k = 0; k < 3; ++k) {
+      const uint32_t i = s.tri[3 * size_t{t} + k];
+      if (std::exchange(side.stamp[i], scene.round) == scene.round) continue;
+      store3(&side.end[4 * size_t{i}], load3(&s.place[4 * size_t{i}]) + straight(i));
+    }
+  ways_back(s, side.end.data(), [&](uint32_t i, Vec3 way) {
+    double *const end = &side.end[4 * size_t{i}];
+    store3(end, load3(end) + s.back * way);
+    most = std::max(most, norm2(load3(end) - load3(&s.x[4 * size_t{i}]) - straight(i)));
+  });
+  return std::sqrt(most);
+}
+
 // Everything goes this fraction of its way.
 void set_fraction(World &w, StepContext &step, double fraction) {
   GuardScene &scene = step.guard.scene;
   step.guard.motion = scene.fraction = fraction;
   ++scene.round;
+  for (size_t i = 0; i < w.bodies.size(); ++i) {
+    GuardSide &side = scene.sides[i];
+    Surface &surface = w.bodies[i]->surface;
+    if (side.still || !(surface.back > 0)) continue;
+    const double turned = set_back_ends(scene, side, surface);
+    if (fraction < 1) continue;
+    side.travel += turned;
+    side.spread += turned;
+    side.deform += turned;
+  }
   for (size_t o = 0; o < w.obstacles.size(); ++o) {
     const ObstacleView &v = step.obstacle_views[o];
     GuardPose &to = scene.poses[o];
@@ -237,10 +271,45 @@ void set_fraction(World &w, StepContext &step, double fraction) {
   }
 }
 
+bool are_parts(const StepContext &step, const Candidate &c) {
+  const GuardSide &a = step.guard.scene.sides[c.slot_a], &b = step.guard.scene.sides[c.slot_b];
+  return a.whole && a.whole == b.whole;
+}
+
+// The same for parts of one body, by feature: their teeth may cross in one place and not in another.
+bool triangles_cross(StepContext &step, const Candidate &c, bool swap) {
+  const uint32_t low = swap ? c.slot_b : c.slot_a, high = swap ? c.slot_a : c.slot_b;
+  if (!cross_at_start(step, low, high, false)) return false;
+  Guard &g = step.guard;
+  const Surface &a = *step.body_views[low].surface, &b = *step.body_views[high].surface;
+  const auto first = [&](uint32_t slot_a, uint32_t slot_b) {
+    return std::lower_bound(g.crossed.begin(), g.crossed.end(), Guard::Crossed{slot_a, slot_b, 0, 0});
+  };
+  if (const auto at = first(low, high); at == g.crossed.end() || at->a != low || at->b != high) {
+    step.broad.near_triangles_of(low, high, false, [&](uint32_t s, uint32_t t) {
+      if (edges_pierce(a, s, b, t) || edges_pierce(b, t, a, s)) g.crossed.push_back({low, high, s, t});
+    });
+    std::sort(g.crossed.begin(), g.crossed.end());
+  }
+  const auto has = [](const Surface &s, uint32_t t, int kind, uint32_t feature) {
+    const uint32_t *const corner = &s.tri[3 * size_t{t}], *const e = &s.tri_edge[3 * size_t{t}];
+    if (kind == 2) return t == feature;
+    return kind == 0 ? corner[0] == feature || corner[1] == feature || corner[2] == feature
+                     : e[0] == feature || e[1] == feature || e[2] == feature;
+  };
+  const int kind_a = c.kind == kEdgeEdge ? 1 : 0, kind_b = c.kind == kEdgeEdge ? 1 : 2;
+  for (auto at = first(low, high); at != g.crossed.end() && at->a == low && at->b == high; ++at)
+    if (has(a, at->s, swap ? kind_b : kind_a, swap ? c.feature_b : c.feature_a) &&
+        has(b, at->t, swap ? kind_a : kind_b, swap ? c.feature_a : c.feature_b))
+      return true;
+  return false;
+}
+
 // Two surfaces that cross at the start (as given by the user) are let out: what is through cannot be kept
 // out, and to guard it would keep it in.
 bool cross_at_start(StepContext &step, const Candidate &c) {
   const bool swap = !c.obstacle && c.slot_b < c.slot_a;
+  if (!c.obstacle && are_parts(step, c)) return triangles_cross(step, c, swap);
   return cross_at_start(step, swap ? c.slot_b : c.slot_a, swap ? c.slot_a : c.slot_b, c.obstacle);
 }
 

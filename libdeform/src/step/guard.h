@@ -34,6 +34,12 @@ struct Guard {
     bool obstacle, yes;
   };
   std::vector<Through> through;  // tested pairs: whether they cross at the start
+  // Of parts of one body: triangles that cross there, of the lower slot first; ascending by the slots
+  struct Crossed {
+    uint32_t a, b, s, t;
+    auto operator<=>(const Crossed &) const = default;
+  };
+  std::vector<Crossed> crossed;
   struct Kept {
     uint64_t key;
     Vec3 impulse;
@@ -56,6 +62,7 @@ struct Guard {
   void start() {
     kept.clear();
     through.clear();
+    crossed.clear();
     cut = motion = 1;
     acted = again = refines = resolving = lets_slits = false;
   }

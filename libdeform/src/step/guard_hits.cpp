@@ -61,13 +61,21 @@ class HitContact {
   }
 
  private:
+  // Of its way, what is not its velocity: its faces turn, and it is set back elsewhere.
+  Vec3 set_back(const GuardSide &side, uint32_t surfel, Vec3 way) const {
+    if (side.still || !(side.surface->back > 0)) return {};
+    side.surface->each_phyxel(surfel, [&](uint32_t p, double weight) {
+      way -= weight * step_.h * load3(&side.mean[4 * size_t{p}]);
+    });
+    return way;
+  }
   // Adds weight times a surfel to one side.
   void add(ContactPoint &out, uint32_t slot, uint32_t surfel, double weight) {
     const BodyView &b = step_.body_views[slot];
     const Vec3 x = load3(&b.surface->x[4 * size_t{surfel}]);
     const Vec3 end = load3(step_.guard.scene.end(step_.guard.scene.sides[slot], surfel));
     narrow::add_node(out, b.first_node + surfel, weight);
-    start_ += weight * x;
+    start_ += weight * (x + set_back(step_.guard.scene.sides[slot], surfel, end - x));
     const Vec3 at = x + hit_.t * (end - x);
     now_ += weight * at;
     (weight < 0 ? on_b_ : on_a_) += std::fabs(weight) * at;

@@ -118,8 +118,8 @@ void name_features(const Body &b, const CutMesh &mesh, Surface &surface, CutReco
 }
 
 void find_laid(const Memory &m, const WholeBody &whole, const CutRecord &record, Surface &surface) {
-  use_memory(m, surface.laid, surface.laid_surfel, surface.laid_tip, surface.place, surface.sums,
-             surface.origin);
+  use_memory(m, surface.laid, surface.laid_surfel, surface.laid_tip, surface.place, surface.origin,
+             surface.laid_begin, surface.laid_around, surface.laid_normal);
   if (record.open.empty()) return;
   std::vector<Corners> open;
   for (const uint64_t face : record.open) {
@@ -148,6 +148,7 @@ void find_laid(const Memory &m, const WholeBody &whole, const CutRecord &record,
     if (found[i].first != found[i - 1].first) continue;
     surface.slit = true;
     const uint32_t l = found[i].second, other = found[i - 1].second;
+    for (const uint32_t side : {l, other}) surface.laid_tip[side] |= kOfSlit;
     const uint32_t *const c = &surface.tri[3 * size_t{surface.laid[l]}],
                           *const d = &surface.tri[3 * size_t{surface.laid[other]}];
     for (uint32_t k = 0; k < 3; ++k)
@@ -158,6 +159,19 @@ void find_laid(const Memory &m, const WholeBody &whole, const CutRecord &record,
       }
   }
   if (surface.laid.empty()) return;
+  surface.laid_normal.assign(3 * surface.laid.size(), 0.0);
+  std::vector<std::pair<uint32_t, uint32_t>> around;  // surfel, triangle of `laid`
+  for (uint32_t l = 0; l < surface.laid.size(); ++l)
+    for (uint32_t k = 0; k < 3; ++k)
+      if (!(surface.laid_tip[l] >> k & 1))
+        around.push_back({surface.tri[3 * size_t{surface.laid[l]} + k], l});
+  std::sort(around.begin(), around.end());
+  for (const uint32_t surfel : surface.laid_surfel) {
+    const auto at = std::lower_bound(around.begin(), around.end(), std::pair(surfel, 0u));
+    surface.laid_begin.push_back(static_cast<uint32_t>(at - around.begin()));
+  }
+  surface.laid_begin.push_back(static_cast<uint32_t>(around.size()));
+  for (const auto &a : around) surface.laid_around.push_back(a.second);
   surface.place.assign(size_t{4} * surface.nsurfel, 0.0);
   for (const uint32_t p : surface.point) surface.origin.push_back(record.point[p]);
 }
