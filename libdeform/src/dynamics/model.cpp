@@ -162,7 +162,7 @@ void ModelInstance::swap(ModelInstance &other) noexcept {
   state_out.swap(other.state_out);
 }
 
-bool ModelInstance::works(const std::string &effect) const {
+bool ModelInstance::works(std::string_view effect) const {
   if (!effects || !effects->active) return true;
   const char *const *active = nullptr;
   call("effects", [&] {

@@ -4,6 +4,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/memory.h"
@@ -77,7 +78,7 @@ struct ModelInstance {
   // changes.
   dfm_status put_params(const std::vector<double> &values, uint32_t needed) noexcept;
   // Whether the present parameters call for this effect of the type.
-  bool works(const std::string &effect) const;
+  bool works(std::string_view effect) const;
   std::vector<EffectRow> effect_rows() const;  // the model's extension "dfm.effect_rows/1"
   // Why the parameter of this row has no effect now; empty if it has one.
   std::string idle_reason(uint32_t row) const;
