@@ -291,3 +291,80 @@ TEST(SavedGame, AnswersOfTheHost_StayThoseOfTheSamePairs) {
   EXPECT_EQ(asked, 0) << "all pairs have been asked";
   EXPECT_EQ(dfm_world_hash(anew), later);
 }
+
+namespace {
+
+// Both halves of what the blade of dfm_cut_def says; the second one becomes a body.
+void halve(dfm_body body, double x) {
+  const dfm_separate_def rule = dfm_separate_def_default();
+  test::ok(dfm_body_set_separate(body, &rule));
+  dfm_cut_def plane = dfm_cut_def_default();
+  plane.shape = DFM_CUT_PLANE;
+  plane.how = DFM_CUT_SPLIT;
+  plane.blade[0] = x;
+  plane.blade[3] = 1;
+  test::ok(dfm_body_cut(body, &plane, nullptr));
+}
+
+dfm_body found(dfm_world w, const char *name) {
+  dfm_body out = 0;
+  test::ok(dfm_world_find_body(w, name, &out));
+  return out;
+}
+
+}  // namespace
+
+// A rewind takes the piece of one body back, and the next piece, of another body, has its number.
+TEST(SavedGame, RewoundAndCutOtherwise_LoadsEachOfTheTwoCourses) {
+  test::Context c;
+  const dfm_world w = empty(c);
+  test::add_plane(w, "floor");
+  const dfm_body left = crate(c, w, "left", {0, 0, 0.01}), right = crate(c, w, "right", {0.3, 0, 0.01});
+  steps(w, 5);
+  const std::string start = snapshot(w);
+  std::string saved[2];
+  uint64_t later[2];
+  for (int k = 0; k < 2; ++k) {
+    halve(k == 0 ? left : right, k == 0 ? 0.05 : 0.35);
+    steps(w, 5);
+    saved[k] = snapshot(w);
+    steps(w, 20);
+    later[k] = dfm_world_hash(w);
+    ASSERT_EQ(restore(w, start), DFM_OK) << dfm_last_error();
+  }
+  std::string bad = saved[0];
+  bad.back() ^= 1;
+  for (const int k : {0, 1, 1, 0}) {
+    expect_refused(w, bad, "damaged");
+    ASSERT_EQ(restore(w, saved[k]), DFM_OK) << k << ": " << dfm_last_error();
+    EXPECT_EQ(snapshot(w), saved[k]);
+    found(w, k == 0 ? "left.1" : "right.1");
+    steps(w, 20);
+    EXPECT_EQ(dfm_world_hash(w), later[k]) << k;
+  }
+}
+
+// What is left of a body that was destroyed is a body of its own, with the mesh of the whole.
+TEST(SavedGame, WithAPieceWhoseBodyIsGone_LoadsIntoAWorldBuiltAnew) {
+  test::Context c;
+  const dfm_world w = empty(c);
+  test::add_plane(w, "floor");
+  const dfm_body dough = crate(c, w, "dough", {0, 0, 0.01});
+  crate(c, w, "other", {0.3, 0, 0.05});
+  steps(w, 5);
+  halve(dough, 0.04);
+  steps(w, 5);
+  test::ok(dfm_body_destroy(dough));
+  steps(w, 5);
+  const std::string saved = snapshot(w);
+  steps(w, 40);
+  const uint64_t later = dfm_world_hash(w);
+  const dfm_world anew = empty(c);
+  crate(c, anew, "dough.1", {0, 0, 0.01});
+  crate(c, anew, "other", {0.3, 0, 0.05});
+  test::add_plane(anew, "floor");
+  ASSERT_EQ(restore(anew, saved), DFM_OK) << dfm_last_error();
+  EXPECT_EQ(snapshot(anew), saved);
+  steps(anew, 40);
+  EXPECT_EQ(dfm_world_hash(anew), later);
+}

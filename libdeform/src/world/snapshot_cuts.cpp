@@ -8,6 +8,7 @@
 #include "state/obstacle.h"
 #include "state/world.h"
 #include "world/separate.h"
+#include "world/snapshot_things.h"
 
 namespace dfm {
 namespace {
@@ -65,6 +66,10 @@ CutMesh mesh_of(const Memory &m, const WholeBody &whole) {
   out.cell.resize(whole.tets.size() / 4);
   std::iota(out.cell.begin(), out.cell.end(), 0u);
   return out;
+}
+
+void sort_undone(World &w) noexcept {
+  std::sort(w.undone.begin(), w.undone.end(), [](const auto &l, const auto &r) { return l->id < r->id; });
 }
 
 }  // namespace
@@ -149,18 +154,31 @@ Body &SnapshotShapes::whole_body(Body &b) {
   refuse(b, "a piece: expected one of a body of this world");
 }
 
-// Adds the pieces of the snapshot and removes the others; their shapes follow later.
+// Of a piece that a restore has removed.
+void SnapshotShapes::change_id(Body &b, uint64_t id) {
+  undo_.push_back({&b, b.id, b.emptied, b.undone, nullptr});
+  b.id = id;
+  sort_undone(w_);
+}
+
+// Adds the pieces of the snapshot and removes the others; their shapes follow later. After a rewind, a piece
+// of another body may have the id of one in the snapshot: it is set aside under another id.
 void SnapshotShapes::find_pieces(const std::vector<CutRow> &rows) {
   const std::vector<Body *> bodies = all_bodies(w_);
   reserve_places(w_, rows.size());
-  undo_.reserve(2 * (bodies.size() + rows.size()));
+  undo_.reserve(3 * (bodies.size() + rows.size()));
   const auto move = [&](Body &b, bool undone) {
-    undo_.push_back({&b, b.emptied, b.undone, nullptr});
+    undo_.push_back({&b, b.id, b.emptied, b.undone, nullptr});
     set_place(w_, b, b.emptied && undone, undone);
   };
-  for (Body *const b : bodies)
-    if (b->piece_of && std::none_of(rows.begin(), rows.end(), [&](const CutRow &r) { return r.id == b->id; }))
-      move(*b, true);
+  for (Body *const b : bodies) {
+    if (!b->piece_of) continue;
+    const auto row = std::find_if(rows.begin(), rows.end(), [&](const CutRow &r) { return r.id == b->id; });
+    const bool there = row != rows.end();
+    if (there && row->piece_of == b->piece_of && row->name == b->name) continue;
+    move(*b, true);
+    if (there && b->id < kMostIds) change_id(*b, kMostIds + b->id);
+  }
   for (const CutRow &r : rows) {
     const auto has_id = [&](const Body *b) { return b->id == r.id; };
     const std::vector<Body *> now = all_bodies(w_);
@@ -173,6 +191,13 @@ void SnapshotShapes::find_pieces(const std::vector<CutRow> &rows) {
            "the snapshot is damaged: piece '%s': expected one of a body of this world, with a name of its "
            "own; nothing was restored",
            r.name.c_str());
+    const auto aside = std::find_if(w_.undone.begin(), w_.undone.end(), [&](const auto &p) {
+      return p->id == kMostIds + r.id && p->piece_of == r.piece_of && p->name == r.name;
+    });
+    const auto is_free = [&] {
+      return std::none_of(w_.undone.begin(), w_.undone.end(), [&](const auto &p) { return p->id == r.id; });
+    };
+    if (aside != w_.undone.end() && is_free()) change_id(**aside, r.id);
     move(place_for_piece(w_, **whole, r.id, r.name), false);
   }
 }
@@ -180,7 +205,7 @@ void SnapshotShapes::find_pieces(const std::vector<CutRow> &rows) {
 void SnapshotShapes::put(Body &b, CutRow *row) {
   const Memory &m = w_.memory();
   const bool emptied = row && row->emptied;
-  undo_.push_back({&b, b.emptied, b.undone, nullptr});
+  undo_.push_back({&b, b.id, b.emptied, b.undone, nullptr});
   if (row && row->piece_of != b.piece_of) refuse(b, "a piece: expected it of another body");
   set_place(w_, b, emptied, false);
   if ((emptied && b.dynamics) || (row ? has_shape(b, *row) : !b.cut.whole)) return;
@@ -221,6 +246,10 @@ void SnapshotShapes::take_back() noexcept {
   for (; !undo_.empty(); undo_.pop_back()) {
     Undo &u = undo_.back();
     if (u.shape) exchange(*u.body, *u.shape);
+    if (u.body->id != u.id) {
+      u.body->id = u.id;
+      sort_undone(w_);
+    }
     set_place(w_, *u.body, u.emptied, u.undone);
   }
 }

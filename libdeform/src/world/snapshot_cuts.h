@@ -53,9 +53,11 @@ class SnapshotShapes {
  private:
   struct Undo {
     Body *body;
+    uint64_t id;
     bool emptied, undone;
     std::unique_ptr<BodyShape> shape;  // null: unchanged
   };
+  void change_id(Body &b, uint64_t id);
   void find_pieces(const std::vector<CutRow> &rows);
   Body &whole_body(Body &b);
   void put(Body &b, CutRow *row);
