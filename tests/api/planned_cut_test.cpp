@@ -235,6 +235,22 @@ TEST(PlannedCut, BodyWithoutCells_HasNoneLeft) {
   test::says({"cube", "no cells left"});
 }
 
+// Where two planes meet, teeth of pieces rest at a distance of zero, but for rounding. To keep these apart
+// the guard took all motion away.
+TEST(PlannedCut, PiecesOfTwoPlanes_AreNotHeldByTheGuard) {
+  Cube c;
+  separate(c.body);
+  c.plan(0.003, kAcross);
+  c.plan(0.006, kAlong);
+  test::run(c.w, 0.008, 1e-3);
+  EXPECT_EQ(pieces(c.body), 3u);
+  const double before = test::measure(c.body).com[2], down[] = {0, 0, -9.81};
+  test::ok(dfm_world_set_gravity(c.w, down));
+  test::run(c.w, 0.02, 1e-3);
+  EXPECT_NEAR(before - test::measure(c.body).com[2], 0.5 * 9.81 * 0.02 * 0.02, 5e-5);
+  EXPECT_EQ(test::stats(c.w).guard_lost, 0);
+}
+
 TEST(PlannedCut, SnapshotsBeforeAndAfter_GoOnToTheBit) {
   Cube c;
   separate(c.body);

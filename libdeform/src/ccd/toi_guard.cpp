@@ -52,14 +52,18 @@ Vec3 apart(const Features &f, const Vec3 *way = nullptr, Vec3 *moved = nullptr) 
   return w[0] * x[0] + w[1] * x[1] + w[2] * x[2] + w[3] * x[3];
 }
 
+// Of the contact offset: a smaller rest distance is zero but for rounding, and cannot be kept.
+constexpr double kLeastShare = 1e-6;
+
 // Features beside copies rest at another distance, and the floor is in proportion to it; not above 0: none.
 double floor_share(const GuardScene &scene, const Features &f) {
   const GuardSide &a = *f.side[0], &b = *f.side[1];
   if (&a != &b && a.whole && a.whole == b.whole) {
     const size_t split = size_t(f.split);
-    return rest_of_parts(*a.surface, {f.corner[0], split}, *b.surface, {f.corner[1], 4 - split},
-                         normalized(apart(f)), scene.offset) /
-           scene.offset;
+    const double share = rest_of_parts(*a.surface, {f.corner[0], split}, *b.surface, {f.corner[1], 4 - split},
+                                       normalized(apart(f)), scene.offset) /
+                         scene.offset;
+    return share > kLeastShare ? share : 0;
   }
   double copies = HUGE_VAL;
   const double *const place = f.side[0]->surface->place.data();
