@@ -306,6 +306,85 @@ TEST(Separate, Crumbs_StayOrGoAsRequested) {
   }
 }
 
+namespace {
+
+// A cube in parts of 248, 168 and 352 cells along x: the one in the middle is a crumb between the others.
+struct CrumbBetween {
+  Cube s{"corotational_fem", {0, 0, 0}, 625};
+  dfm_separate_def rule = dfm_separate_def_default();
+  CrumbBetween() {
+    rule.least_cells = 200;
+    cut(s.b, plane(0, 0.034, DFM_CUT_SPLIT));
+    cut(s.b, plane(0, 0.051, DFM_CUT_SPLIT));
+  }
+  // Moves the part of so many cells along x.
+  void move(uint32_t ncell, double by) const {
+    const uint32_t npoint = info(s.b).npoint, ntet = info(s.b).ntet;
+    std::vector<uint32_t> tets(size_t{4} * ntet), part(npoint), cells(npoint);
+    test::ok(dfm_body_get_rest(s.b, 0, nullptr, ntet, tets.data()));
+    for (uint32_t i = 0; i < npoint; ++i) part[i] = i;
+    for (bool changed = true; changed;) {
+      changed = false;
+      for (size_t c = 0; c < tets.size(); c += 4)
+        for (size_t k = 0; k < 16; ++k) {
+          uint32_t &own = part[tets[c + k / 4]];
+          changed = changed || part[tets[c + k % 4]] < own;
+          own = std::min(own, part[tets[c + k % 4]]);
+        }
+    }
+    for (size_t c = 0; c < tets.size(); c += 4) ++cells[part[tets[c]]];
+    State now(s.b);
+    uint32_t moved = 0;
+    for (uint32_t i = 0; i < npoint; ++i) {
+      if (cells[part[i]] != ncell) continue;
+      now.x[size_t{3} * i] += by;
+      ++moved;
+    }
+    ASSERT_GT(moved, 0u);
+    test::ok(dfm_body_set_state(s.b, npoint, now.x.data(), now.v.data()));
+  }
+  dfm_cut_info part() {
+    dfm_cut_info out = ask();
+    test::ok(dfm_body_separate(s.b, &rule, &out));
+    return out;
+  }
+};
+
+}  // namespace
+
+TEST(Separate, CrumbThatStays_GoesWithThePartNextToIt) {
+  for (const bool with_piece : {true, false}) {
+    CrumbBetween c;
+    if (with_piece) c.move(352, 0.005);
+    else c.move(248, -0.005);
+    const std::string before = test::snapshot(c.s.w);
+    const Sum whole = sum_of({c.s.b});
+    const dfm_cut_info done = c.part();
+    EXPECT_EQ(done.pieces, 1u);
+    EXPECT_EQ(done.parts, with_piece ? 1u : 2u);
+    const dfm_body piece = pieces(c.s.b).at(0);
+    EXPECT_EQ(info(piece).ntet, with_piece ? 416u : 248u);
+    EXPECT_EQ(parts(piece), with_piece ? 2u : 1u);
+    EXPECT_EQ(info(piece).ntet + info(c.s.b).ntet, 768u);
+    const Sum sum = sum_of({c.s.b, piece});
+    EXPECT_NEAR(sum.mass, whole.mass, 2e-14);
+    for (int k = 0; k < 3; ++k) {
+      EXPECT_NEAR(sum.momentum[k], whole.momentum[k], 1e-14);
+      EXPECT_NEAR(sum.angular[k], whole.angular[k], 1e-14);
+    }
+    const std::string after = test::snapshot(c.s.w);
+    steps(c.s.w, 5);
+    const std::string later = test::snapshot(c.s.w);
+    restore(c.s.w, before);
+    c.part();
+    EXPECT_EQ(test::snapshot(c.s.w), after);
+    Cube fresh("corotational_fem", {0, 0, 0}, 625);
+    restore(fresh.w, after);
+    steps(fresh.w, 5);
+    EXPECT_EQ(test::snapshot(fresh.w), later);
+  }
+}
+
 TEST(Separate, RulesOfTheBody_HoldForItsPieces) {
   test::Context context;
   const dfm_world w = test::make_world(context, {0, 0, -9.81});

@@ -175,3 +175,18 @@ TEST(CutPieces, JellyCutInTwo_NothingPassesThrough) {
     "contact": {"friction": [{"between": ["*", "*"], "law": "dahl", "params": {"mu": 0.5}}]}})"),
             0u);
 }
+
+// A bar of dough is pulled until it tears at both ends. Splinters that hang in the teeth of an end were parts
+// of the middle, whose contact with that end was off as a whole (doc/decisions/0448): 164 pairs.
+TEST(CutPieces, SplintersOfATornBar_StayWithTheEndTheyHangOn) {
+  EXPECT_EQ(crossings("torn_bar", R"({"format": "deform-scene", "version": 1,
+    "time": {"duration": 0.9, "step": 0.0005},
+    "materials": {"dough": {"density": 1000, "young": 1e4, "tear": 0.5, "damping": {"stiffness": 0.003}}},
+    "bodies": [{"name": "dough", "mesh": {"make": "beam", "size": [0.2, 0.05, 0.04], "cells": 1000},
+      "material": "dough", "pose": {"position": [-0.1, -0.025, 0.2]}, "separate": {"least_cells": 8},
+      "fix": [{"box": [[-0.001, -1, -1], [0.001, 1, 1]]},
+              {"box": [[0.199, -1, -1], [0.201, 1, 1]], "motion": {"keyframes": [
+                {"t": 0, "position": [0, 0, 0]}, {"t": 1, "position": [0.1, 0, 0]}]}}]}],
+    "obstacles": [{"name": "floor", "shape": "plane"}]})"),
+            0u);
+}

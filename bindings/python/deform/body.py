@@ -482,7 +482,7 @@ class Body(_Part):
     def separate(self, least_cells: int = 1, crumbs: str = "stay") -> CutInfo:
         """Makes parts that hang together no more bodies of their own: each but the heaviest that has
         least_cells or more. They are named "NAME.1", "NAME.2" and so on, and world.bodies has them. crumbs,
-        the smaller parts: "stay" parts of this body, or "remove", which takes them with their mass."""
+        the smaller parts: "stay" with the part next to them, or "remove": they go with their mass."""
         rule, info = separate_def(least_cells, crumbs), sized(_abi.dfm_cut_info)
         with self.world.alone():
             status = lib.dfm_body_separate(self.handle, ctypes.byref(rule), ctypes.byref(info))

@@ -87,8 +87,8 @@ DFM_API dfm_status dfm_body_remove_cells(dfm_body body, uint32_t n, const uint32
  * Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_origins(dfm_body body, uint32_t capacity_points, uint32_t *points,
                                     uint32_t capacity_cells, uint32_t *cells);
-/** dfm_separate_def.crumbs: what parts of fewer than least_cells do. STAY: they remain parts of the body.
- * REMOVE: they go, with their mass. Since 0.1. */
+/** dfm_separate_def.crumbs: what parts of fewer than least_cells do. STAY: each remains with the part next to
+ * it, in its piece or in the body. REMOVE: they go, with their mass. Since 0.1. */
 enum { DFM_CRUMBS_STAY = 0, DFM_CRUMBS_REMOVE = 1 };
 /** How parts of a body that hang together no more become bodies of their own. Since 0.1. */
 typedef struct dfm_separate_def {

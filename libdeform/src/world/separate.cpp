@@ -32,6 +32,56 @@ struct Parts {
   uint32_t n = 0, pieces = 0;
 };
 
+// Two parts with an open face between them; away2: 9 times the square of the distance of its sides now, m2.
+struct Opened {
+  double away2;
+  uint32_t a, b;
+  auto operator<=>(const Opened &) const = default;
+};
+
+std::vector<Opened> opened_between(const Body &b, const Array<uint32_t> &part) {
+  std::vector<Opened> out;
+  const auto cell_of = [&](uint32_t whole) {  // kNone: not of this body
+    const auto at = std::lower_bound(b.cut.cell.begin(), b.cut.cell.end(), whole);
+    return at != b.cut.cell.end() && *at == whole ? uint32_t(at - b.cut.cell.begin()) : kNone;
+  };
+  for (const uint64_t face : b.cut.open) {
+    const uint32_t c = cell_of(uint32_t(face >> 32)), d = cell_of(uint32_t(face));
+    if (c == kNone || d == kNone || part[c] == part[d]) continue;
+    Vec3 way;
+    for (size_t i = 0; i < 4; ++i)
+      for (size_t j = 0; j < 4; ++j) {
+        const uint32_t p = b.tets[4 * size_t{c} + i], q = b.tets[4 * size_t{d} + j];
+        if (b.cut.point[p] != b.cut.point[q]) continue;
+        way += load3(&b.p.x[size_t{kStride} * p]) - load3(&b.p.x[size_t{kStride} * q]);
+      }
+    out.push_back({norm2(way), part[c], part[d]});
+  }
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+// Crumbs that stay go with the part that lies nearest to them, across open faces, one by one from the
+// smallest distance on. What lies in the teeth of a part would otherwise be of another body than they are: it
+// would cross them, and contact of the two whole bodies would be off until they are apart.
+void lead_crumbs(const Body &b, const SeparateRule &rule, size_t heaviest, Parts &parts) {
+  std::vector<uint32_t> set(parts.n);
+  for (uint32_t i = 0; i < parts.n; ++i) set[i] = i;
+  const auto first = [&](uint32_t i) {
+    while (set[i] != i) i = set[i] = set[set[i]];
+    return i;
+  };
+  const auto leads = [&](uint32_t i) { return i == heaviest || parts.cells[i] >= rule.least; };
+  for (const Opened &face : opened_between(b, parts.of)) {
+    const uint32_t i = first(face.a), j = first(face.b);
+    if (i == j || (leads(i) && leads(j))) continue;
+    if (leads(i) || (!leads(j) && i < j)) set[j] = i;
+    else set[i] = j;
+  }
+  for (uint32_t i = 0; i < parts.n; ++i)
+    if (leads(first(i))) parts.to[i] = parts.to[first(i)];
+}
+
 Parts parts_of(const Body &b, const SeparateRule &rule) {
   const Memory &m = b.world->memory();
   Parts out{Array<uint32_t>(HookAllocator<uint32_t>(m)), {}, {}};
@@ -52,6 +102,7 @@ Parts parts_of(const Body &b, const SeparateRule &rule) {
     const bool small = out.cells[i] < rule.least;
     out.to.push_back(i == heaviest ? kStays : !small ? out.pieces++ : rule.removes ? kGoes : kStays);
   }
+  if (!rule.removes && out.pieces > 0) lead_crumbs(b, rule, heaviest, out);
   return out;
 }
 
@@ -108,7 +159,7 @@ void tell_crumbs(const Body &b, const SeparateRule &rule, const Parts &parts) {
   b.world->context->logf(DFM_LOG_INFO, "body '%s': %u %s of fewer than %u cells %s", b.name.c_str(), n,
                          n == 1 ? "part" : "parts", rule.least,
                          rule.removes ? "have been removed with their mass"
-                                      : "stay with it, and do not become bodies of their own");
+                                      : "stay with the parts next to them, and are no bodies of their own");
 }
 
 }  // namespace
