@@ -85,6 +85,32 @@ dfm_world rigid_host(dfm_context *c) {
   return w;
 }
 
+// A free box and a body of triangles fall on triangles, beside a soft body: trees and lists of what is near.
+dfm_world rigid_on_triangles(dfm_context *c) {
+  const dfm_world w = test::make_world(c);
+  const test::Triangles slab = test::height_field(0.5, 12, [](double, double) { return 0.0; });
+  test::add_mesh(w, "slab", slab);
+  test::BodyOptions o;
+  o.young = 2e5;
+  o.damping_stiffness = 1e-3;
+  o.position = {0, 0, 8e-4};  // it is there in the last steps
+  o.velocity = {0, 0, -1};
+  test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 10, o);
+  dfm_rigid_def falling = test::box("free", {0.05, 0.05, 0.02}, 0.2, {0.3, 0, 0.0203});
+  falling.velocity[2] = -1;
+  test::create(w, {falling});
+  dfm_rigid_def lump = test::box("lump", {0.05, 0.05, 0.02}, 0.2, {-0.3, 0, 0.0203});
+  lump.velocity[2] = -1;
+  lump.shape = DFM_SHAPE_NONE;
+  for (double &moment : lump.inertia) moment = 1e-3;
+  const dfm_rigid r = test::create(w, {lump})[0];
+  const test::Triangles surface = test::box_surface({0.05, 0.05, 0.02}, 2);
+  const dfm_obstacle_def of = test::mesh_def("lump.surface", surface);
+  dfm_obstacle shape = 0;
+  test::ok(dfm_rigid_add_shape(r, &of, &shape));
+  return w;
+}
+
 // A law that remembers, two materials in contact, triangles below.
 dfm_world bristles(dfm_context *c) {
   const dfm_world w = test::make_world(c, {2, 0, -9.81});
@@ -171,6 +197,9 @@ TEST(RefusedMemory, InAStepWithSelfContact_LeavesTheWorldAsItWas) { walk_all(sel
 TEST(RefusedMemory, InAStepWithSelfContactOnAuto_LeavesTheWorldAsItWas) { walk_all(self_auto, 40); }
 TEST(RefusedMemory, InAStepThatFallsAsleepAndWakes_LeavesTheWorldAsItWas) { walk_all(sleepers, 40); }
 TEST(RefusedMemory, InAStepWithARigidHost_LeavesTheWorldAsItWas) { walk_all(rigid_host, 40); }
+TEST(RefusedMemory, InAStepOfRigidBodiesOnTriangles_LeavesTheWorldAsItWas) {
+  walk_all(rigid_on_triangles, 40);
+}
 TEST(RefusedMemory, InAStepOfALawThatRemembers_LeavesTheWorldAsItWas) { walk_all(bristles, 40); }
 
 TEST(RefusedMemory, InAStepThatChangesAModel_LeavesTheWorldAsItWas) { walk_all(changing, 40); }

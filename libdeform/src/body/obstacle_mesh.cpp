@@ -6,12 +6,18 @@
 #include "body/obstacle_mesh.h"
 
 #include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <utility>
 
 #include "body/make_surface.h"
 #include "geometry/convex.h"
+#include "geometry/tree_walk.h"
 
 namespace dfm {
 namespace {
+
+constexpr double kSlack = 1e-8;  // of all lengths, by which a box is widened against rounding
 
 bool is_closed(const Surface &s) {
   // Three sides a triangle, two an edge: with no place empty every edge has exactly two, one each way.
@@ -63,11 +69,71 @@ void ObstacleMesh::place(Vec3 at, Quat turned, Vec3 velocity, Vec3 spin) {
     rotation = turned;
     for (uint32_t s = 0; s < surface.nsurfel; ++s)
       store3(&surface.x[4 * size_t{s}], at + rotate(turned, load3(&local[3 * size_t{s}])));
+    bounded_ = false;
   }
   if (!moves && !moving) return;
   for (uint32_t s = 0; s < surface.nsurfel; ++s)
     store3(&surface.v[4 * size_t{s}], velocity + cross(spin, load3(&surface.x[4 * size_t{s}]) - at));
   moving = moves;
+}
+
+void ObstacleMesh::make_tree(const Memory &memory) {
+  Array<double> x(size_t{4} * surface.nsurfel, 0.0, HookAllocator<double>(memory));
+  for (uint32_t s = 0; s < surface.nsurfel; ++s) store3(&x[4 * size_t{s}], load3(&local[3 * size_t{s}]));
+  auto made = std::make_unique<BoxTree>(memory);
+  made->build(surface.tri, x.data());
+  tree = std::move(made);
+}
+
+uint64_t ObstacleMesh::triangles_near(Vec3 lo, Vec3 hi, std::vector<uint32_t> &out) const {
+  out.clear();
+  const Vec3 axis[] = {rotate_back(rotation, {1, 0, 0}), rotate_back(rotation, {0, 1, 0}),
+                       rotate_back(rotation, {0, 0, 1})};  // of the world, in the obstacle's frame
+  const double slack = kSlack * (norm(position) + extent);
+  struct Span { double lo, hi; };
+  const auto around = [&](const Box &box, int k) -> Span {
+    const Vec3 a = axis[k], from = load3(box.lo), to = load3(box.hi), wide = to - from;
+    const double middle = position[k] + 0.5 * dot(a, from + to);
+    const double half =
+        0.5 * (std::fabs(a.x) * wide.x + std::fabs(a.y) * wide.y + std::fabs(a.z) * wide.z) + slack;
+    return {middle - half, middle + half};
+  };
+  uint64_t looks = 0;
+  const auto near = [&](const Box &box) {
+    ++looks;
+    for (int k = 0; k < 3; ++k)
+      if (const Span s = around(box, k); !(s.lo <= hi[k] && s.hi >= lo[k])) return false;
+    return true;
+  };
+  const auto within = [&](const Box &box) {
+    for (int k = 0; k < 3; ++k)
+      if (const Span s = around(box, k); !(s.lo >= lo[k] && s.hi <= hi[k])) return false;
+    return true;
+  };
+  if (!tree || within(tree->root())) {
+    out.resize(surface.ntri);
+    std::iota(out.begin(), out.end(), 0u);
+    return looks;
+  }
+  walk(*tree, near, [&](uint32_t place) {
+    out.push_back(tree->triangles()[place]);
+    return true;
+  });
+  std::sort(out.begin(), out.end());
+  return looks;
+}
+
+const ObstacleMesh::Bounds &ObstacleMesh::bounds() {
+  if (bounded_) return bounds_;
+  Vec3 lo = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, hi = -lo;
+  for (uint32_t s = 0; s < surface.nsurfel; ++s) {
+    const Vec3 p = load3(&surface.x[4 * size_t{s}]);
+    lo = {std::min(lo.x, p.x), std::min(lo.y, p.y), std::min(lo.z, p.z)};
+    hi = {std::max(hi.x, p.x), std::max(hi.y, p.y), std::max(hi.z, p.z)};
+  }
+  bounds_ = {lo, hi};
+  bounded_ = true;
+  return bounds_;
 }
 
 }  // namespace dfm

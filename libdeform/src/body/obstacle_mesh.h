@@ -2,8 +2,11 @@
 // nodes have no degrees of freedom, so that detection treats it like the surface of a body.
 #pragma once
 #include <cstdint>
+#include <memory>
+#include <vector>
 
 #include "core/memory.h"
+#include "geometry/box_tree.h"
 #include "geometry/surface.h"
 #include "math/vec3.h"
 
@@ -24,6 +27,21 @@ struct ObstacleMesh {
                const uint32_t *tris);
   // Sets the pose at the start of a sub-step and the rates over it. Costs nothing without motion.
   void place(Vec3 position, Quat rotation, Vec3 velocity, Vec3 spin);
+
+  // For what searches the mesh in every sub-step (step/tool_shape.h). A tree in the obstacle's frame holds
+  // for all poses, so a mesh that moves costs no refit.
+  std::unique_ptr<const BoxTree> tree;  // null: triangles_near() gives them all
+  void make_tree(const Memory &memory);
+  // All triangles whose own boxes in the world overlap this one, and some beside them, ascending. Boxes are
+  // parallel to the axes of the world. Returns how many boxes of the tree it has looked at.
+  uint64_t triangles_near(Vec3 lo, Vec3 hi, std::vector<uint32_t> &out) const;
+  // Of x, axis-parallel; computed once in each place.
+  struct Bounds { Vec3 lo, hi; };
+  const Bounds &bounds();
+
+ private:
+  Bounds bounds_;
+  bool bounded_ = false;  // bounds_ are those of x
 };
 
 }  // namespace dfm

@@ -3,6 +3,7 @@
 // becomes a row, linearized at its hit time, and all is solved again, at most four times.
 #include <algorithm>
 
+#include "body/obstacle_mesh.h"
 #include "ccd/toi_guard_motion.h"
 #include "core/error.h"
 #include "dynamics/rigid/rigid_set.h"
@@ -161,7 +162,7 @@ void ToolTouch::tell_passing(const World &w, const StepContext &step) {
     const ObstacleView &va = step.obstacle_views[a.slot], &vb = step.obstacle_views[b.slot];
     if (!ToolShape::takes_part(va) || !ToolShape::takes_part(vb) || balls_apart(va, vb) || told(pair))
       continue;
-    ToolShape shape_a(va), shape_b(vb);
+    ToolShape shape_a(va, a.mesh.get()), shape_b(vb, b.mesh.get());
     const bool corners = shape_a.has_corners() || shape_b.has_corners();
     const double deep = corners ? depth(shape_a, shape_b, true) : center_depth(shape_a, shape_b);
     if (!inside(shape_a, shape_b, deep)) continue;
@@ -233,12 +234,12 @@ void ToolTouch::tell_driven(const World &w, const StepContext &step) {
     const bool mesh = va.surface || vb.surface;
     if (wall_a || wall_b) {
       if (cuts(w, wall_a ? b : a) || balls_apart(va, vb) || (mesh && w.step_count % kSeldom != 0)) continue;
-      ToolShape shape_a(va), shape_b(vb);
+      ToolShape shape_a(va, a.mesh.get()), shape_b(vb, b.mesh.get());
       const double deep = depth(shape_a, shape_b, !mesh);
       if (inside(shape_a, shape_b, deep)) tell_deep(w, pair, deep, true);
       continue;
     }
-    ToolShape shape_a(va), shape_b(vb);
+    ToolShape shape_a(va, a.mesh.get()), shape_b(vb, b.mesh.get());
     const double deep = depth(shape_a, shape_b, true);
     hits_.clear();
     if (!(deep > offset_)) find_hits(pair, shape_a, shape_b, at_a, at_b);

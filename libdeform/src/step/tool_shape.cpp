@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
+#include "body/obstacle_mesh.h"
 #include "geometry/closest.h"
 
 namespace dfm {
@@ -14,6 +16,7 @@ constexpr double kSame = 1e-9;  // of a squared distance: two that are equal but
 constexpr double kAlong = 1e-3;
 constexpr double kFlat = 1e-6;  // rad, between the faces of an edge that is none
 constexpr double kSharp = 0.1;  // sine, that the edges of a corner fall by from its mean normal
+constexpr double kSteep = 0.1;  // component of a normal, of which a plane bounds an axis
 
 Vec3 least(Vec3 a, Vec3 b) { return {std::min(a.x, b.x), std::min(a.y, b.y), std::min(a.z, b.z)}; }
 Vec3 most(Vec3 a, Vec3 b) { return {std::max(a.x, b.x), std::max(a.y, b.y), std::max(a.z, b.z)}; }
@@ -33,28 +36,40 @@ bool ToolShape::Edge::leaves(Vec3 n) const {
 
 bool ToolShape::takes_part(const ObstacleView &o) { return o.shape != Shape::none; }
 
-void ToolShape::take(const ObstacleView &view) {
+void ToolShape::take(const ObstacleView &view, ObstacleMesh *mesh) {
   shape_ = ObstacleShape(view);
+  mesh_ = mesh;
   surface_ = view.surface;
   round_ = view.shape == Shape::sphere || view.shape == Shape::capsule ? view.radius : 0;
-  for (auto *list : {&edges_, &flat_}) list->clear();
+  edges_.clear();
   corners_.clear();
   triangles_.clear();
   reach_ = (view.shape == Shape::sphere ? 0 : shape_.extent()) + round_;
 }
 
 ToolBox ToolShape::bounds() const {
-  ToolBox out;
-  if (shape_.view().shape != Shape::mesh) {
-    double lo[3], hi[3];
-    shape_.bounds(lo, hi);
-    return {load3(lo), load3(hi)};
+  if (shape_.view().shape == Shape::mesh) {
+    const ObstacleMesh::Bounds &of = mesh_->bounds();
+    return {of.lo, of.hi};
   }
-  out.lo = {HUGE_VAL, HUGE_VAL, HUGE_VAL};
-  out.hi = -out.lo;
-  for (uint32_t i = 0; i < surface_->nsurfel; ++i) {
-    out.lo = least(out.lo, node(i));
-    out.hi = most(out.hi, node(i));
+  double lo[3], hi[3];
+  shape_.bounds(lo, hi);
+  return {load3(lo), load3(hi)};
+}
+
+// A box around what of its bounds is there: along each axis, as far as the rest of the bounds lets it be.
+ToolBox ToolShape::under(Vec3 normal, double height) const {
+  const ToolBox all = bounds();
+  ToolBox out = all;
+  const double n[3] = {normal.x, normal.y, normal.z};
+  const double slack = kSame * (std::fabs(height) + norm(all.lo) + norm(all.hi));
+  double least_of[3], sum = 0;
+  for (int k = 0; k < 3; ++k) sum += least_of[k] = std::min(n[k] * all.lo[k], n[k] * all.hi[k]);
+  for (int k = 0; k < 3; ++k) {
+    if (std::fabs(n[k]) < kSteep) continue;  // it bounds little, and by a large quotient
+    const double end = (height + slack - (sum - least_of[k])) / n[k];
+    if (n[k] > 0) out.hi[k] = std::min(out.hi[k], end);
+    else out.lo[k] = std::max(out.lo[k], end);
   }
   return out;
 }
@@ -92,15 +107,29 @@ ToolShape::Edge ToolShape::edge_of_mesh(uint32_t e) const {
   return out;
 }
 
+// All ascending, as a search through the whole mesh would list them. An edge is listed with the first of its
+// triangles, which is near wherever the edge is.
 void ToolShape::look_at_mesh(const ToolBox &near, bool flat) {
-  triangles_.clear();
-  for (uint32_t e = 0; e < surface_->nedge; ++e) {
-    const uint32_t *const end = &surface_->edge[2 * size_t{e}];
-    if (!near.holds(node(end[0]), node(end[1]))) continue;
+  mesh_->triangles_near(near.lo, near.hi, triangles_);
+  std::erase_if(triangles_, [&](uint32_t t) {
+    const uint32_t *const c = &surface_->tri[3 * size_t{t}];
+    const Vec3 lo = least(least(node(c[0]), node(c[1])), node(c[2]));
+    return !near.holds(lo, most(most(node(c[0]), node(c[1])), node(c[2])));
+  });
+  near_edges_.clear();
+  for (const uint32_t t : triangles_)
+    for (size_t k = 0; k < 3; ++k) {
+      const uint32_t e = surface_->tri_edge[3 * size_t{t} + k];
+      const uint32_t *const beside = &surface_->edge_tri[2 * size_t{e}];
+      const uint32_t *const end = &surface_->edge[2 * size_t{e}];
+      if ((beside[0] == kNone ? beside[1] : beside[0]) == t && near.holds(node(end[0]), node(end[1])))
+        near_edges_.push_back(e);
+    }
+  std::sort(near_edges_.begin(), near_edges_.end());
+  for (const uint32_t e : near_edges_) {
     const Edge edge = edge_of_mesh(e);
-    const bool counts = flat || !edge.flat;
-    (counts ? edges_ : flat_).push_back(edge);
-    if (!counts) continue;
+    if (!flat && edge.flat) continue;
+    edges_.push_back(edge);
     for (const uint32_t i : edge.end)
       if (near.holds(node(i), node(i))) corners_.push_back({node(i), i});
   }
@@ -108,17 +137,11 @@ void ToolShape::look_at_mesh(const ToolBox &near, bool flat) {
             [](const Corner &a, const Corner &b) { return a.number < b.number; });
   const auto same = [](const Corner &a, const Corner &b) { return a.number == b.number; };
   corners_.erase(std::unique(corners_.begin(), corners_.end(), same), corners_.end());
-  for (uint32_t t = 0; t < surface_->ntri; ++t) {
-    const uint32_t *const c = &surface_->tri[3 * size_t{t}];
-    const Vec3 lo = least(least(node(c[0]), node(c[1])), node(c[2]));
-    if (near.holds(lo, most(most(node(c[0]), node(c[1])), node(c[2])))) triangles_.push_back(t);
-  }
 }
 
 void ToolShape::look_at(const ToolBox &near, bool flat) {
   corners_.clear();
   edges_.clear();
-  flat_.clear();
   switch (shape_.view().shape) {
     case Shape::mesh: return look_at_mesh(near, flat);
     case Shape::box:
@@ -148,18 +171,22 @@ void ToolShape::look_at(const ToolBox &near, bool flat) {
   }
 }
 
+void ToolShape::look_under(Vec3 normal, double height, bool flat) {
+  look_at(shape_.view().shape == Shape::mesh ? under(normal, height) : ToolBox{}, flat);
+}
+
 bool ToolShape::may_meet(const Corner &corner, Vec3 n) const {
   if (shape_.view().shape != Shape::mesh) return true;
+  const uint32_t *const begin = &surface_->fan_begin[corner.number];
+  const std::span around(&surface_->fan[begin[0]], begin[1] - begin[0]);
   Vec3 out;
-  for (const uint32_t t : triangles_) {
-    const uint32_t *const c = &surface_->tri[3 * size_t{t}];
-    if (c[0] == corner.number || c[1] == corner.number || c[2] == corner.number) out += face_normal(t);
-  }
+  for (const uint32_t t : around) out += face_normal(t);
   bool sharp = true, leads = true;
-  for (const std::vector<Edge> *const edges : {&edges_, &flat_})
-    for (const Edge &e : *edges) {
-      if (e.end[0] != corner.number && e.end[1] != corner.number) continue;
-      const Vec3 way = normalized(e.end[0] == corner.number ? e.to - e.from : e.from - e.to);
+  for (const uint32_t t : around)
+    for (size_t k = 0; k < 3; ++k) {
+      const uint32_t *const end = &surface_->edge[2 * size_t{surface_->tri_edge[3 * size_t{t} + k]}];
+      if (end[0] != corner.number && end[1] != corner.number) continue;
+      const Vec3 way = normalized(node(end[end[0] == corner.number]) - corner.at);
       sharp = sharp && dot(out, way) < -kSharp * norm(out);
       leads = leads && dot(n, way) < kAlong;
     }

@@ -10,6 +10,8 @@
 
 namespace dfm {
 
+struct ObstacleMesh;
+
 // Axis-parallel.
 struct ToolBox {
   Vec3 lo, hi;
@@ -29,9 +31,10 @@ class ToolShape {
   };
 
   static bool takes_part(const ObstacleView &view);
-  ToolShape() : ToolShape(ObstacleView{}) {}
-  explicit ToolShape(const ObstacleView &view) : shape_(view) { take(view); }
-  void take(const ObstacleView &view);  // another one, in the same memory
+  ToolShape() : ToolShape(ObstacleView{}, nullptr) {}
+  // mesh: that of the view, if it has one
+  ToolShape(const ObstacleView &view, ObstacleMesh *mesh) : shape_(view) { take(view, mesh); }
+  void take(const ObstacleView &view, ObstacleMesh *mesh);  // another one, in the same memory
   Vec3 position() const { return shape_.view().position; }
   double reach() const { return reach_; }  // m, of any point of it from position(); not of a plane
   bool endless() const { return shape_.view().shape == Shape::plane; }
@@ -42,6 +45,8 @@ class ToolShape {
   // within a face of a mesh, and corners of these alone. Where they touch others do as well, unless one thing
   // is pressed into the other, as by jaws.
   void look_at(const ToolBox &near, bool flat);
+  // The same near a plane: what has dot(normal, x) <= height.
+  void look_under(Vec3 normal, double height, bool flat);
   struct Corner {
     Vec3 at;
     uint32_t number;
@@ -57,16 +62,18 @@ class ToolShape {
 
  private:
   void look_at_mesh(const ToolBox &near, bool flat);
+  ToolBox under(Vec3 normal, double height) const;
   Edge edge_of_mesh(uint32_t edge) const;
   Vec3 node(uint32_t i) const { return load3(&surface_->x[4 * size_t{i}]); }
   Vec3 face_normal(uint32_t triangle) const;
 
   ObstacleShape shape_;
-  const Surface *surface_;  // of a mesh
+  ObstacleMesh *mesh_;
+  const Surface *surface_;  // of the mesh
   double reach_ = 0, round_ = 0;
   std::vector<Corner> corners_;
-  std::vector<Edge> edges_, flat_;
-  std::vector<uint32_t> triangles_;
+  std::vector<Edge> edges_;
+  std::vector<uint32_t> triangles_, near_edges_;
 };
 
 }  // namespace dfm

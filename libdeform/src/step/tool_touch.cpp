@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "body/obstacle_mesh.h"
 #include "dynamics/rigid/rigid_set.h"
 #include "friction/pair_rules.h"
 #include "geometry/closest.h"
@@ -149,6 +150,11 @@ void ToolTouch::prepare(World &w, SceneFacts &facts) {
       pairs_.push_back({i, j, law_of_obstacles(w, a, b), {a.id, b.id}, frees, jaw, {wall_a, wall_b}});
     }
   for (const Pair &pair : pairs_) w.pairs.tool_law.push_back(pair.law);
+  for (const auto *const list : {&pairs_, &passing_})
+    for (const Pair &pair : *list)
+      for (const uint32_t slot : {pair.a, pair.b})
+        if (ObstacleMesh *const mesh = w.obstacles[slot]->mesh.get(); mesh && !mesh->tree)
+          mesh->make_tree(w.meters.obstacles.memory());
 }
 
 Vec3 ToolTouch::speed(const Row &row) const {
@@ -400,8 +406,7 @@ bool ToolTouch::look_at_each_other(ToolShape &a, ToolShape &b, double far, bool 
     ToolShape &body = a.endless() ? b : a;
     ObstaclePoint o;
     if (!plane.closest(body.position(), HUGE_VAL, o) || o.distance - body.reach() > far) return false;
-    const Vec3 wide = {HUGE_VAL, HUGE_VAL, HUGE_VAL};
-    body.look_at({-wide, wide}, flat);
+    body.look_under(o.normal, dot(o.normal, body.position()) - o.distance + far, flat);
     return true;
   }
   if (norm(a.position() - b.position()) - a.reach() - b.reach() > far) return false;
@@ -477,8 +482,8 @@ void ToolTouch::each_pair(const World &w, const StepContext &step, const Visit &
     if (!ToolShape::takes_part(va) || !ToolShape::takes_part(vb)) continue;
     const Side at_a = side_of(a, pair.wall[0]), at_b = side_of(b, pair.wall[1]);
     if (!sides_[at_a.tool].gives(b) && !sides_[at_b.tool].gives(a)) continue;
-    shapes_[0].take(va);
-    shapes_[1].take(vb);
+    shapes_[0].take(va, a.mesh.get());
+    shapes_[1].take(vb, b.mesh.get());
     f(pair, shapes_[0], shapes_[1], at_a, at_b);
   }
 }
