@@ -263,6 +263,7 @@ void cut_without(dfm_context *c, int64_t n, bool restores, CutRun &run) {
   if (told > 0 && pieces_of(b) == 0) {
     ++run.waited;
     EXPECT_EQ(status, DFM_OK) << "allocation " << n << ": the step has been made";
+    EXPECT_EQ(dfm_body_set_model(b, "shape_matching", nullptr), DFM_E_UNSUPPORTED) << dfm_last_error();
     if (restores) {  // where parts wait is in snapshots
       const std::string now = test::snapshot(w);
       test::ok(dfm_world_destroy(w));

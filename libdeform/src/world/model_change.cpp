@@ -240,7 +240,7 @@ void judge(World &w, Body &b, const ModelInstance &old, const ChangeBook &book, 
   check_jump(b, swap);
   check_unpaid(b, book, swap);
   check_surface(w, b);
-  if (b.tears || cut_by_any(b) || !b.planned_cuts.empty()) check_may_cut(b, b.model);
+  if (b.tears || cut_by_any(b) || !b.planned_cuts.empty() || b.separate.waits) check_may_cut(b, b.model);
 }
 
 // Keeps an instance for later changes; replaces an older one with the same inputs. There is room.
