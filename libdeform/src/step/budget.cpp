@@ -26,6 +26,7 @@ namespace {
 constexpr double kNoPolishAt = 0.25, kFewSweepsAt = 0.5, kNoPiecesAt = 0.75;
 // Default limit: this factor times the cost of the planned sub-steps without contact.
 constexpr uint64_t kAutomaticFactor = 1000;
+constexpr uint64_t kRigidWork = 10;  // of a rigid body, in the automatic limit
 
 struct StepStopped {
   enum Why { work, time, asked, costly, too_fine, struck } why;
@@ -242,10 +243,13 @@ uint64_t surface_work(const World &w, const StepContext &step) {
   return sum;
 }
 
+// Fast free bodies may need hundreds of pieces where they meet, also in a world without soft bodies.
 void plan_work(World &w, StepContext &step, uint32_t substeps) {
-  step.budget.limit = w.def.max_work
-                          ? w.def.max_work
-                          : kAutomaticFactor * substeps * (body_work(w, step) + surface_work(w, step));
+  uint64_t rigid = 0;
+  for (const auto &set : w.rigid_sets) rigid += kRigidWork * set->defs.size();
+  step.budget.limit =
+      w.def.max_work ? w.def.max_work
+                     : kAutomaticFactor * substeps * (body_work(w, step) + surface_work(w, step) + rigid);
 }
 
 void charge(World &w, StepContext &step, uint64_t units) {

@@ -53,6 +53,24 @@ class ToolShape {
   };
   const std::vector<Corner> &corners() const { return corners_; }
   const std::vector<Edge> &edges() const { return edges_; }
+  // f(a, b, c), counter-clockwise seen from outside: triangles near the box, or all of a box; none of others.
+  template <class F>
+  void each_triangle(F &&f) const {
+    for (const uint32_t t : triangles_) {
+      const uint32_t *const c = &surface_->tri[3 * size_t{t}];
+      f(node(c[0]), node(c[1]), node(c[2]));
+    }
+    if (shape_.view().shape != Shape::box) return;
+    for (uint32_t k = 0; k < 3; ++k)
+      for (uint32_t side = 0; side < 2; ++side) {
+        // with k, u and v a right-handed frame
+        const uint32_t u = 1u << (k + 1) % 3, v = 1u << (k + 2) % 3, at = side << k;
+        const Vec3 p = shape_.corner(at), q = shape_.corner(at | u | v);
+        const Vec3 r = shape_.corner(at | (side ? u : v)), s = shape_.corner(at | (side ? v : u));
+        f(p, r, q);
+        f(p, q, s);
+      }
+  }
   // May something in this direction be met by this corner? Where the surface is flat or hollow around it,
   // only what the surface leads to: an edge or a corner of the other beside it is not in its way.
   bool may_meet(const Corner &corner, Vec3 n) const;

@@ -31,9 +31,10 @@ constexpr double kSmallTurn = 0.05;        // rad in a sub-step, up to which a s
 constexpr double kArc = 0.2;               // rad in a sub-step, of a free body that touches
 constexpr double kAims = 0.9;              // of kArc, where a sub-step is repeated
 constexpr double kLeastPiece = 1.0 / 256;  // of a planned sub-step
-constexpr uint32_t kSweeps = 6;            // between two leaps
-constexpr double kFaster = 0.5;            // of what the best sweep has left, by a leap: else the pass ends
-constexpr uint32_t kMostPasses = 6;        // over the laws, and what turning adds, until both change no more
+constexpr double kNear = 0.5;        // of the least thickness: a row with an impulse is no longer than this
+constexpr uint32_t kSweeps = 6;      // between two leaps
+constexpr double kFaster = 0.5;      // of what the best sweep has left, by a leap: else the pass ends
+constexpr uint32_t kMostPasses = 6;  // over the laws, and what turning adds, until both change no more
 
 bool builtin(const Obstacle &o) { return o.rigid && !o.rigid->of_tool && o.rigid->host_name == "builtin"; }
 bool of_tool(const Obstacle &o) { return o.rigid && o.rigid->of_tool; }
@@ -85,6 +86,16 @@ bool between(const ToolShape::Edge &p, const ToolShape::Edge &q, Vec3 apart, Vec
   return q.leaves(n) && p.leaves(-n);
 }
 
+// Of the rotation vectors that end in the same attitude, whole turns apart, the one nearest to `like`: a ball
+// that rolls fast turns more than once in a sub-step.
+Vec3 nearest_turn(Vec3 turn, Vec3 like) {
+  constexpr double kWhole = 2 * 3.14159265358979323846;
+  const double angle = norm(turn), length = norm(like);
+  if (!(length > 0.5 * kWhole)) return turn;
+  const Vec3 axis = angle > 1e-6 ? (1 / angle) * turn : (1 / length) * like;
+  return turn + kWhole * std::round((dot(axis, like) - dot(axis, turn)) / kWhole) * axis;
+}
+
 void add(Vec3 p, double *to) { store3(to, load3(to) + p); }
 
 // Whether a rigid body that joints hold, or that another host moves, passes through something that neither
@@ -111,6 +122,7 @@ ToolTouch::ToolTouch(const Memory &m) : batches_(m), next_(m) {
 void ToolTouch::prepare(World &w, SceneFacts &facts) {
   pairs_.clear();
   passing_.clear();
+  thinnest_ = HUGE_VAL;
   sets_.clear();
   walls_.clear();
   w.pairs.tool_law.clear();
@@ -136,7 +148,7 @@ void ToolTouch::prepare(World &w, SceneFacts &facts) {
         touch = rule->collide;
       if (!touch) continue;
       if (!apart) {
-        passing_.push_back({i, j, 0, {a.id, b.id}, true, false, {kNone, kNone}});
+        passing_.push_back({i, j, 0, {a.id, b.id}, true, false, {kNone, kNone}, 0});
         for (const Obstacle *const o : {&a, &b})
           if (!is_wall(*o) && (cornerless || !is_free(*o)) && (o == &a ? is_wall(b) : is_wall(a)) &&
               std::find(facts.rigid_alone.begin(), facts.rigid_alone.end(), o->name) ==
@@ -147,7 +159,15 @@ void ToolTouch::prepare(World &w, SceneFacts &facts) {
       const bool frees = !of_tool(a) && !of_tool(b), jaw = is_jaw(a) || is_jaw(b);
       facts.rigid_pairs += frees;
       const uint32_t wall_a = wall(i), wall_b = wall(j);
-      pairs_.push_back({i, j, law_of_obstacles(w, a, b), {a.id, b.id}, frees, jaw, {wall_a, wall_b}});
+      pairs_.push_back({i,
+                        j,
+                        law_of_obstacles(w, a, b),
+                        {a.id, b.id},
+                        frees,
+                        jaw,
+                        {wall_a, wall_b},
+                        frees ? std::min(thickness(a), thickness(b)) : HUGE_VAL});
+      thinnest_ = std::min(thinnest_, pairs_.back().thin);
     }
   for (const Pair &pair : pairs_) w.pairs.tool_law.push_back(pair.law);
   for (const auto *const list : {&pairs_, &passing_})
@@ -291,7 +311,8 @@ double ToolTouch::follow_spin() {
       if (!(m.reach[i] > 0)) continue;
       const size_t at = 6 * size_t{i} + 3;
       const Quat turned = rotation_of(m.set->next[i]) * conjugate(rotation_of(m.set->state[i]));
-      const Vec3 change = (1 / h_) * rotation_vector(turned) - load3(&m.base[at]) - load3(&m.change[at]);
+      const Vec3 taken = load3(&m.base[at]) + load3(&m.change[at]);
+      const Vec3 change = (1 / h_) * nearest_turn(rotation_vector(turned), h_ * taken) - taken;
       add(change, &m.base[at]);
       add(change, &m.turn[at]);
       most = std::max(most, m.reach[i] * norm(change));
@@ -376,6 +397,7 @@ void ToolTouch::add_row(const Pair &pair, Name name, Side a, Side b, const Place
   row.b = b;
   row.frees = pair.frees;
   row.jaw = pair.jaw;
+  row.far = gap > kNear * pair.thin;
   row.normal = normal;
   row.law = pair.law;
   row.pair[0] = pair.id[0];
@@ -637,9 +659,13 @@ void ToolTouch::take_sets(World &w, StepContext &step) {
 // that touches turns so far in this sub-step, which is to be repeated shorter. The arc leaves its tangent by
 // at most (h w)^2 r / 2: what stays clear by that does not touch.
 bool ToolTouch::follows_arcs(StepContext &step) const {
-  double turn = 0;
+  double turn = 0, arrives = 1;
   for (const Row &row : rows_) {
     if (row.jaw) continue;
+    if (row.far && row.impulse > 0) {
+      const double closes = -h_ * dot(row.normal, speed(row) - change_of(row)), gap = offset_ - h_ * row.rate;
+      arrives = std::min(arrives, closes > gap ? kAims * gap / closes : 0.5);
+    }
     double most = 0, leaves = 0;
     for (const Side *side : {&row.a, &row.b}) {
       const double r = norm(side->bone), way = h_ * norm(cross(spin(*side), side->bone));
@@ -651,10 +677,12 @@ bool ToolTouch::follows_arcs(StepContext &step) const {
     const double closes = std::min(0.0, h_ * dot(row.normal, speed(row)));
     if (row.impulse > 0 || room + closes < leaves) turn = std::max(turn, most);
   }
-  if (!(turn > 0) || !(step.h > kLeastPiece * step.guard.planned) || spares(step, Thrift::pieces))
+  if ((!(turn > 0) && arrives == 1) || !(step.h > kLeastPiece * step.guard.planned) ||
+      spares(step, Thrift::pieces))
     return true;
   step.guard.again = true;
-  step.guard.cut = kAims * kArc / turn;
+  step.guard.cut = arrives;
+  if (turn > 0) step.guard.cut = std::min(arrives, kAims * kArc / turn);
   return false;
 }
 

@@ -55,7 +55,10 @@ class ToolTouch {
   bool answer(const World &w, const StepContext &step);
   // Whether the sub-step is short enough for the spin of what touches. False: as begin().
   bool follows_arcs(StepContext &step) const;
-  // Once the hosts have ended their sub-step: turns the ends of the jaws.
+  // Once the hosts have ended their sub-step: whether no fast free body has gone through something. False: as
+  // begin().
+  bool stays_out(const World &w, StepContext &step);
+  // Turns the ends of the jaws.
   void turn_jaws();
   // At the end of a sub-step that stands: what lasts becomes the world's.
   void keep(World &w) noexcept;
@@ -81,6 +84,7 @@ class ToolTouch {
     double impulse, along[2];  // N s on a: along the normal and the tangents
     Vec3 bend;                 // m/s, what turning adds to the slip beyond the first order, and belts
     bool frees, jaw;           // none is of a tool; one is a jaw
+    bool far;                  // the gap is large beside the thickness of the two
     double lift;               // m/s, what turning adds to the speed along the normal, of free bodies
     Vec3 before;               // the impulse on a that velocities have
     Vec3 given() const { return impulse * normal + along[0] * tangent[0] + along[1] * tangent[1]; }
@@ -112,6 +116,7 @@ class ToolTouch {
     uint64_t id[2];
     bool frees, jaw;   // none is of a tool; one is a jaw
     uint32_t wall[2];  // number among walls_; kNone: it is in a set
+    double thin;       // m, least thickness of the two
   };
   // What of the two meets.
   enum Meeting : uint32_t { kCornerOfA, kCornerOfB, kEdges, kHitEdges };
@@ -218,6 +223,8 @@ class ToolTouch {
   bool solve_rounds(double done);
   bool newton(uint32_t island, double done);
   void leap(double done);
+  // tool_swept.cpp
+  static double thickness(const Obstacle &o);
   // tool_hits.cpp
   Vec3 end_of(const Side &side, Vec3 p) const;
   void find_hits(const Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b);
@@ -242,6 +249,8 @@ class ToolTouch {
   static constexpr double kOpens = 0.1;  // of d_c in a sub-step, where two things are in each other
 
   double h_ = 0, offset_ = 0;
+  std::vector<double> ways_;  // [obstacles] m, of any point in the sub-step
+  double thinnest_ = 0;       // m, of the pairs of free bodies
   std::vector<Pair> pairs_,
       passing_;                   // passing: nothing keeps the two apart, and nobody says that this is meant
   std::vector<RigidSet *> sets_;  // that take part
