@@ -185,8 +185,8 @@ bool ToolTouch::stays_out(const World &w, StepContext &step) {
     const Obstacle &a = *w.obstacles[pair.a], &b = *w.obstacles[pair.b];
     const ObstacleView &va = step.obstacle_views[a.slot], &vb = step.obstacle_views[b.slot];
     if (!ToolShape::takes_part(va) || !ToolShape::takes_part(vb)) continue;
-    shapes_[0].take(va);
-    shapes_[1].take(vb);
+    shapes_[0].take(va, a.mesh.get());
+    shapes_[1].take(vb, b.mesh.get());
     ToolShape &of_a = shapes_[0], &of_b = shapes_[1];
     if (of_a.endless() || of_b.endless() || !of_a.has_corners() || !of_b.has_corners()) continue;
     const Way at_a = way_of(a), at_b = way_of(b);

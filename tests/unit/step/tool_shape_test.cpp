@@ -74,7 +74,8 @@ void same_bits(Vec3 a, Vec3 b) {
 }
 
 test::Triangles hills(uint32_t n, double half) {
-  return test::height_field(half, n, [](double x, double y) { return 0.1 * std::sin(5 * x) * std::cos(4 * y); });
+  return test::height_field(half, n,
+                            [](double x, double y) { return 0.1 * std::sin(5 * x) * std::cos(4 * y); });
 }
 
 dfm::ObstacleMesh mesh_of(const test::Triangles &m) {
@@ -164,7 +165,9 @@ void compare(dfm::ObstacleMesh &with, dfm::ObstacleMesh &without, const ToolBox 
 TEST(ToolShape, ThroughTheTree_FindsWhatASearchThroughEveryTriangleFinds) {
   Random random;
   size_t found = 0;
-  for (const test::Triangles &m : {hills(12, 0.5), test::height_field(0.5, 8, [](double, double) { return 0.0; }, 0),
+  for (const test::Triangles &m : {hills(12, 0.5),
+                                   test::height_field(
+                                       0.5, 8, [](double, double) { return 0.0; }, 0),
                                    test::box_surface({0.2, 0.3, 0.1}, 3)}) {
     dfm::ObstacleMesh with = mesh_of(m), without = mesh_of(m);
     with.make_tree(dfm::Memory::standard());
