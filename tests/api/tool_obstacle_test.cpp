@@ -11,7 +11,7 @@ namespace {
 using namespace test::tools;
 using test::Vec;
 
-constexpr double kStiff = 500, kHalf[3] = {0.012, 0.015, 0.02};
+constexpr double kStiff = 500, kHalfSize[3] = {0.012, 0.015, 0.02};
 
 struct Shape {
   const char *name;
@@ -31,7 +31,7 @@ constexpr Shape kShapes[] = {
 bool jaws(const Shape &s) { return s.shape == DFM_TOOL_GRASPER || s.shape == DFM_TOOL_SCISSORS; }
 
 const test::tools::BoxMesh &box_mesh() {
-  static const BoxMesh mesh({kHalf[0], kHalf[1], kHalf[2]});
+  static const BoxMesh mesh({kHalfSize[0], kHalfSize[1], kHalfSize[2]});
   return mesh;
 }
 
@@ -42,7 +42,7 @@ dfm_tool_def def_of(const Shape &shape, Vec at, double critical = 1) {
   d.pose = pose(at);
   d.radius = jaws(shape) ? 0 : 0.01;
   d.half_length = 0.02;
-  for (int k = 0; k < 3; ++k) d.half_size[k] = kHalf[k];
+  for (int k = 0; k < 3; ++k) d.half_size[k] = kHalfSize[k];
   if (shape.shape == DFM_TOOL_MESH) box_mesh().put(d);
   d.stiffness = kStiff;
   d.turn_stiffness = 0.2;
