@@ -9,7 +9,8 @@
 namespace dfm_bullet_detail {
 namespace {
 
-// Which adapter a world has: its callbacks are handed the world alone, and the user's info is the user's.
+// Finds the adapter of a Bullet world. Bullet's callbacks get the world alone, and its user info belongs to
+// the user.
 struct Worlds {
   std::mutex mutex;
   std::unordered_map<const btDynamicsWorld *, Adapter *> all;

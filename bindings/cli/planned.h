@@ -6,7 +6,7 @@
 
 namespace cli {
 
-std::string planned_json(const SceneFile &scene);  // "" where the scene asks for neither
+std::string planned_json(const SceneFile &scene);  // "" if the scene names neither
 void print_planned(const std::string &json);       // nothing where it is ""
 void print_choice(const std::string &json);        // the line of that which names what is simulated
 // One sentence for a run; "" where there is nothing to say.

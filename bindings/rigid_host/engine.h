@@ -8,12 +8,12 @@
 //   commit    the engine's step, in which the impulses change v by M^-1 p exactly. b for the next sub-step is
 //             what v differs by from v0 + h (F/m + g) + M^-1 p. Where contact changed a jointed body
 //             otherwise than foreseen by more than kResidual, the bodies are put back, contact is solved
-//             again with the new b, and the engine steps once more; again, where a motor or a joint acts so
+//             again with the new b, and the engine steps once more; more often if a motor or a joint acts so
 //             suddenly that once is not enough.
 //
-// A body that sleeps stands still in the solve; when it fell asleep all forces on it were in balance. Would
-// it, with what contact has changed since, move faster by now than bodies do that are idle, it wakes, and
-// contact is solved again with its mass. Changes are forgotten within kForget.
+// A sleeping body does not move in the solve; when it fell asleep all forces on it were in balance. If the
+// changes of its contact forces since then would make it move faster than an idle body, it wakes, and contact
+// is solved again with its mass. Changes decay within kForget.
 //
 // Angular momentum: engines keep it to first order only. Free bodies are turned here instead, by the midpoint
 // Lie scheme (Krysl 2005).

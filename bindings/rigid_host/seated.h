@@ -1,4 +1,4 @@
-// What adapters of attached worlds share: bodies and obstacles that stand for the engine's, and the handles
+// What adapters of attached worlds share: bodies and obstacles that represent the engine's, and the handles
 // by which callers name an adapter.
 #pragma once
 #include <memory>
@@ -57,7 +57,7 @@ struct Clock {
   dfm_status ask(dfm_world world, bool &restored);
 };
 
-// The caller may have destroyed what stands for a shape: then the shape takes no further part.
+// The caller may have destroyed the obstacle that represents a shape: then the shape takes no further part.
 dfm_status unbind(dfm_obstacle &obstacle);
 // A shape without a body that the caller has moved: its surface comes along within the next step.
 dfm_status follow(dfm_obstacle &obstacle, Pose &known, const Pose &now);

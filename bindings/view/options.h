@@ -1,4 +1,4 @@
-// What `deform view` was asked for.
+// The options of `deform view`.
 #pragma once
 #include <cstdint>
 #include <string>

@@ -179,8 +179,8 @@ class Rules {
         one(report_.file, *rule, -1, !complete && uses_types(*rule) ? kIncomplete : nullptr);
       else if (report_.types.empty()) add(report_.file, {rule, {Result::skip, kNotLoaded}, 0});
     say_skipped(kNotLoaded);
-    // Rules of laws that cannot run for want of a law are not kept: the rule that says why is
-    // asked beside them. So are those that a missing function stops.
+    // Rules that cannot run because there is no law are left out: the rule that reports the reason runs
+    // beside them. So are those that a missing function stops.
     if (report_.types.empty() && !wants("V02")) one(report_.file, *find_rule("V02"), -1);
     for (size_t t = 0; t < report_.types.size(); ++t) {
       const TypeName &type = report_.types[t];

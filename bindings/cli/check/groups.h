@@ -56,7 +56,7 @@ std::string model_same_bits(const Subject &);
 std::string bad_point_returns(const Subject &);
 std::string instances_share_nothing(const Subject &);
 std::string step_writes_no_static(const Subject &);
-// all that a world asks of a model
+// all that a world requires of a model
 void use_model(const Subject &);
 // rules_model.cpp: its forces at one state
 std::string rest_pose_is_free(const Subject &);

@@ -88,7 +88,7 @@ class Body {
   Numbers forces() const;                                   // [npoint,stride]
   double energy() const;                                    // J
   std::vector<double> stiffness(double a, double b) const;  // [3 npoint, 3 npoint]
-  // Where the host lets a step be h, h^2 ksum + 2 h csum <= 4 m holds in every row; 0: none asks for it.
+  // In every row h^2 ksum + 2 h csum <= 4 m holds for the step h that the host allows; 0: no row needs it.
   double longest_step() const;
   void shake(double amount, double speed, Random &random);
   void turn(const double *axis, double angle, const double *shift);

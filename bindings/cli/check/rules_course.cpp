@@ -158,9 +158,9 @@ std::string opposes_slip(const Subject &subject) {
 
 // ---- F17 --------------------------------------------------------------------------------------------------
 
-// One history of slip, swinging and steady, cut into steps of 1e-3 to 1e-6 s: at the same times the forces
-// must draw near one another. The swing turns between these times: where it does, the mean slip of a step is
-// as small as the step, and a force that goes by the logarithm of the slip differs for every step.
+// One history of slip, oscillating and steady, in steps of 1e-3 to 1e-6 s: at the same times the forces must
+// converge. The oscillation reverses between these times: where it reverses, the mean slip of a step is as
+// small as the step, and a force that depends on the logarithm of the slip differs for every step.
 std::string converges_with_step(const Subject &subject) {
   const Law law(subject, lively_params(subject));
   const Scales s = scales_of(law);

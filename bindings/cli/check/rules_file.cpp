@@ -262,7 +262,7 @@ void model_sound(const dfm_type &type, const dfm_model &model) {
     broken("it claims DFM_CAP_CONSTANT_STIFFNESS without DFM_CAP_STIFFNESS; claim both or none");
 }
 
-// A table of one function: what stands behind size and reserved.
+// A table of one function: the bytes after size and reserved.
 bool lacks_its_function(const void *table) {
   void (*function)(void) = nullptr;
   std::memcpy(&function, static_cast<const char *>(table) + 2 * sizeof(uint32_t), sizeof function);
@@ -297,7 +297,7 @@ void tables_sound(const Subject &subject) {
   const struct {
     const char *id, *name;
     size_t head;
-    uint32_t row;  // least size of its rows, which stands where others have reserved
+    uint32_t row;  // least size of its rows, stored where others have `reserved`
     bool one;      // function, and nothing else
   } known[] = {
       {"dfm.stepper/1", "dfm_stepper", offsetof(dfm_stepper, commit) + sizeof(void *), 0, false},
@@ -455,7 +455,7 @@ void row_sane(const dfm_type &type, uint32_t i) {
   }
 }
 
-// What the law's check does with a pointer to little room: it must end the sentence inside.
+// What the law's check does with a small buffer: it must end the sentence inside.
 void asks_check(const dfm_friction &law, const std::vector<double> &params) {
   char room[96];
   for (size_t cap : {size_t(16), size_t(1), size_t(0)}) {
@@ -476,7 +476,7 @@ void library_refuses(const Subject &subject) {
   std::string folder = (std::filesystem::temp_directory_path() / "deform_check_XXXXXX").string();
   if (!mkdtemp(folder.data())) return;
   dfm_context_def def = dfm_context_def_default();
-  // with nothing in it: no other plugin is to be asked
+  // with nothing in it: no other plugin may be loaded
   def.plugin_dir = folder.c_str();
   dfm_context *made = nullptr;
   const dfm_status created = dfm_context_create(&def, &made);

@@ -35,7 +35,7 @@ double force_scale(Body &body, Random &random) {
   return most;
 }
 
-// What a body that steps itself makes of a rest pose that stands somewhere: nothing.
+// A body that steps itself must not depend on where its rest pose lies.
 void rests(Body &body, const char *where, const Variant &variant) {
   const Numbers before = body.x;
   const std::vector<double> u = body.predict(Numbers(body.x.size(), 0.0));

@@ -188,7 +188,7 @@ void asks_fenced(const Law &law, Lanes &lanes, Fenced::Place place) {
   batch.look();
 }
 
-// Every output may be NULL: alone, or all but one. What is asked for must not depend on what else is.
+// Every output may be NULL: alone, or all but one. An output must not depend on which others are requested.
 void asks_with_nulls(const Law &law, Lanes &whole) {
   const char *names[] = {"ft", "state", "dft_dvt", "dft_dfn", "limit", "mode", "stored"};
   for (int k = 0; k < 14; ++k) {

@@ -463,7 +463,7 @@ dfm_status dfm_world_get_stats(dfm_world world, dfm_world_stats *out) {
     dfm_world_stats s = w.stats;
     s.rebuilds = w.steps->broad.stats().rebuilds;
     s.refits = w.steps->broad.stats().refits;
-    // not in snapshots: lists are made anew after a restore, and may then be shorter
+    // not in snapshots: lists are rebuilt after a restore, and may then be shorter
     s.pairs_tested = static_cast<uint32_t>(w.steps->broad.candidates().size());
     s.threads = w.context->tasks.threads();
     s.time = w.time;

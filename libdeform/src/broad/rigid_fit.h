@@ -16,9 +16,9 @@ class RigidReference {
   // m, largest since set(), beyond the rigid motion that fits best
   double displaced(const Surface &surface);
   const Array<double> &x() const { return x_; }
-  // Takes anew, at their present places, the surfels that are marked or have moved by more than `far` (m)
-  // beyond the rigid motion that displaced() has found, and marks them. False: these are more than `most`,
-  // and set() has to follow.
+  // Stores the present places of the surfels that are marked or have moved by more than `far` (m) beyond the
+  // rigid motion that displaced() has found, and marks them. False: these are more than `most`, and set()
+  // must follow.
   bool set_again(const Surface &surface, double far, uint32_t most, std::span<uint8_t> marked);
   // Continues `before` for a surface that a cut has remade. now: numbers of its surfels by those before, or
   // kNone; marked surfels are taken at their present places.

@@ -1,14 +1,14 @@
-// Which features of one surface may touch each other: lists with a skin, as those of two bodies
-// (broad_phase.h), of a tree against itself.
+// Which features of one surface may touch each other: lists with a skin, as for two bodies (broad_phase.h),
+// of a tree against itself.
 //
-// Two differences. A rigid motion of all surfels brings no two of them together, so displacements and speeds
-// are taken against the one that fits best: a body that falls or rolls keeps its lists. And features that
-// share a surfel are no pair: they always touch.
+// There are two differences. A rigid motion of all surfels brings no two of them together, so displacements
+// and speeds are measured relative to the rigid motion that fits best: a body that falls or rolls keeps its
+// lists. And features that share a surfel are no pair, because they always touch.
 //
-// Where few surfels have moved far, or a cut has remade part of the surface, only pairs of features that have
-// one of those surfels are found anew (doc/decisions/0437). The lists then refer to positions of different
-// times. They hold because the rule above holds for any positions: listed is what is near there, and
-// displacements are measured from there.
+// If few surfels have moved far, or a cut has changed part of the surface, only pairs with one of those
+// surfels are searched again (doc/decisions/0437). The lists then refer to positions of different times.
+// They are still complete, because the rule holds for any reference positions: pairs that were near at the
+// reference positions are listed, and displacements are measured from there.
 #pragma once
 #include <algorithm>
 #include <cmath>

@@ -1,9 +1,9 @@
-// The guard against closed forms and voxels. A convex shape that stands still, seen by a surfel on a
-// straight line: the distance is a convex function of time, its slope is the normal's share of the motion,
-// and Newton's steps from the left never pass its first root. Edges and triangles meet the shape's edges,
-// axis, corners and centers as features that do not move. Joined distances of voxels are cubic along a
-// line from cell to cell; a face is tested where it ends, and its lowest place, if that is below the
-// floor, is a surfel.
+// The guard against closed forms and voxels. For a surfel that moves on a straight line relative to a convex
+// shape at rest, the distance is a convex function of time, its slope is the motion along the normal, and
+// Newton's steps from the left never pass its first root. Edges and triangles meet the shape's edges, axis,
+// corners and centers as features that do not move. Interpolated distances of voxels are cubic along a line
+// from cell to cell; a face is tested at its end, and its lowest place, if that is below the floor, is
+// treated as a surfel.
 #include <optional>
 
 #include "ccd/toi_guard_motion.h"

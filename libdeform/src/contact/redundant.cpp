@@ -36,8 +36,8 @@ Redundant::Redundant(const Memory &m) {
   use_memory(m, before_, left_, touched_, within_, held_, root_, surplus_);
 }
 
-// n points move against each other in n - 1 ways. First contacts that hold a point alone are taken away, for
-// they are in nobody's way, until all points that are left are held twice. Groups of these are counted.
+// n points have n - 1 relative motions. Contacts that hold a point alone are removed first, because they are
+// independent of the others, until all remaining points are held twice. The groups of these are counted.
 bool Redundant::found_at_cuts(const ContactRows &rows, const RowsPart &part, const uint8_t *cut) {
   held_.assign(rows.ndof, 0);
   root_.resize(rows.ndof);

@@ -249,16 +249,16 @@ namespace {
 // contact that comes with a little depth (an edge of a face that bends) would be struck away, come back
 // deeper, and never rest.
 constexpr double kCloses = 0.2;
-// The last of the distance is no tolerance to spend: a point that slides over a face that turns comes nearer
-// by slip times turn in every sub-step, which the contact's straight motion does not see. Deeper than 0.4 d_c
-// the whole of a further depth is closed in the sub-step: (1 - kCloses) 0.4 of d_c is what may stay.
+// The last part of the distance must be kept: a point that slides over a turning face comes nearer by slip
+// times rotation in every sub-step, which the straight motion of the contact does not include. Deeper than
+// 0.4 d_c the whole of a further depth is closed in the sub-step: (1 - kCloses) 0.4 of d_c may remain.
 constexpr double kStays = 0.32;
-// Softness of contacts that give, in units of W_nn. While a crossing gives, it then bears a hundredth of what
-// its own response asks for, next to nothing. With 3 it shared the load with the surfels beside it, through a
-// spring as soft as the contacts themselves, and sweeps took twice as many to agree on the shares
+// Compliance of contacts that give way, in units of W_nn. A crossing that gives way then bears a hundredth of
+// what its own response would need, nearly nothing. With 3 it shared the load with the surfels beside it,
+// through a spring as soft as the contacts themselves, and sweeps took twice as many to agree on the shares
 // (doc/decisions/0422).
 constexpr double kSoft = 100;
-// Surfaces that are through each other already (a start state) take their time: so much of d_c per sub-step.
+// Surfaces that cross at the start are opened slowly: by this share of d_c per sub-step.
 constexpr double kOpens = 0.1;
 
 // m/s at which contact may approach, or has to open. most: m, the largest depth that one sub-step closes.

@@ -1,4 +1,4 @@
-// The matrix of an implicit step with the stiffness of contacts that press back, factored anew for each
+// The matrix of an implicit step with the stiffness of contacts that press back, factored again for each
 // (body/backing.h).
 #pragma once
 #include <memory>

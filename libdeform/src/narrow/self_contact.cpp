@@ -1,25 +1,26 @@
 // A surfel p against the other triangles of its own surface, and edges against edges.
 //
 //        p                The surface around p is at distance 0 of it, so a triangle's nearest point is a
-//    ____|\____    /      minimum of the distance only if no triangle beside it, those of p among them, is
-//              \__/ F     nearer: flat and convex parts have none, however fine they are.
+//    ____|\____    /      minimum of the distance only if no triangle beside it (those of p among them) is
+//              \__/ F     nearer. Flat and convex parts have no such minima, however fine they are.
 //
 // In a fold the nearest point lies inside a face, over an edge or over a corner, as between two bodies.
 //
-// Every pair that is near is looked at in the rest shape as well:
-//   - It rests at o = min(d_c, half of its distance at rest) instead of d_c: what is near at rest, as in a
-//     sharp fold, carries nothing there.
-//   - Near features that look at each other through the material at rest are the two sides of something thin.
-//     They are kept apart from within, by the same rule for the surface turned inside out: what would pass
-//     there turns cells inside out. Seen from outside they make no contact; it would keep them so.
-//   - The side is that of the rest shape, so what is a little on the wrong one is led back. Near features
-//     side by side in one plane may fold either way: theirs is the side they are on.
+// Every near pair is also compared with the rest shape:
+//   - Its rest gap is o = min(d_c, half of its distance at rest) instead of d_c: features that are near each
+//     other at rest, as in a sharp fold, have no contact force there.
+//   - Near features that face each other through the material at rest are the two sides of something thin.
+//     They are kept apart from inside, by the same rule for the surface turned inside out: what passed there
+//     would invert cells. Seen from outside they make no contact, which would hold them in that state.
+//   - The side is that of the rest shape, so a feature slightly on the wrong side is led back. Near features
+//     that lie beside each other in one plane may fold either way: their side is the present one.
 //
-// The two sides of an open face (a cut) lie on each other at rest. They are seen d_c / 2 further back each
-// (geometry/surface.h), so they are d_c apart and touch as two bodies do. Copies of one point that have not
-// slid apart make one contact, along the normal of the faces that were joined at them, and hold the features
-// around them, which make none. From there on to where they have slid apart these rest where the material
-// touches, less what is left to the copies (body/self_rest.h, doc/decisions/0427).
+// The two sides of an open face (a cut) coincide at rest. Each is seen d_c / 2 further back
+// (geometry/surface.h), so they are d_c apart and touch as two bodies do. Two copies of one point that have
+// not slid apart make one contact, along the normal of the faces that were joined at them. The features
+// around them make none, because that contact holds them; from there to where the copies have slid apart,
+// features rest where the material touches, less what is left to the copies (body/self_rest.h,
+// doc/decisions/0427).
 #include "narrow/self_contact.h"
 
 #include <algorithm>
@@ -175,7 +176,7 @@ struct Self {
         pair{b, &b, nullptr, step, d_c, 0},
         out(to) {}
 
-  // Is what stands on the wrong side really through?
+  // Whether features on the wrong side of each other really cross.
   bool through(std::initializer_list<uint32_t> a, std::initializer_list<uint32_t> b) const {
     return !tangled || (std::any_of(a.begin(), a.end(), tangled) && std::any_of(b.begin(), b.end(), tangled));
   }
@@ -202,8 +203,9 @@ struct Self {
   bool yields(uint32_t t, double distance2, uint32_t other, uint32_t surfel) const;
   bool minimum(uint32_t surfel, uint32_t t, const TrianglePoint &at) const;
   Vec3 outward(uint32_t surfel, uint32_t t, const TrianglePoint &at) const;
-  // Opened: the body has open faces. Then `kept` is what the pair is at rest, filled here once. Else it is
-  // null, and what a pair is at rest is computed for the few that are near; whole bodies pay for no slits.
+  // Opened: the body has open faces. Then `kept` is the state of the pair at rest, stored here once.
+  // Otherwise it is null, and the state at rest is computed for the few pairs that are near, so that bodies
+  // without cuts store nothing.
   template <bool Opened>
   void vertex_face(uint32_t surfel, uint32_t t, Kin *kept);
   template <bool Opened>
@@ -214,8 +216,8 @@ struct Self {
   void share_areas(size_t begin, size_t edges, Array<uint8_t> &lent);
 };
 
-// Does t leave the feature that it shares with `other` to it: because p is of it, or nearer to it, or over
-// its face, or because it comes first?
+// Whether t leaves the feature that it shares with `other` to it, because p belongs to `other`, or is nearer
+// to it, or over its face, or because `other` comes first.
 bool Self::yields(uint32_t t, double distance2, uint32_t other, uint32_t surfel) const {
   if (has(other, surfel)) return true;
   const TrianglePoint o = closest(other, x(surfel));
@@ -237,8 +239,8 @@ bool Self::minimum(uint32_t surfel, uint32_t t, const TrianglePoint &at) const {
   return true;
 }
 
-// Not normalized; its side at the closest point tells outside from inside. At a corner that of the edge there
-// that points to p most.
+// Not normalized. The side of its plane at the closest point separates outside from inside. At a corner, that
+// of the edge there which points most to p.
 Vec3 Self::outward(uint32_t surfel, uint32_t t, const TrianglePoint &at) const {
   const int f = int(at.feature);
   if (f == 0) return normal(t);
@@ -266,8 +268,8 @@ Vec3 Self::outward(uint32_t surfel, uint32_t t, const TrianglePoint &at) const {
   return sum;
 }
 
-// A surfel that is through two faces which push it against each other, as in the tip of a cell, leaves by the
-// nearer one. Contacts of a surfel stand together.
+// A surfel that is behind two faces which push in opposite directions, as in the tip of a cell, leaves
+// through the nearer one. Contacts of a surfel are neighbors in the list.
 void Self::keep_shallow(size_t begin) {
   const auto depth_of = [&](const ContactPoint &c) { return offset - c.distance; };
   const double clearly = kDeep * s.median_edge;
@@ -364,7 +366,7 @@ void Self::vertex_face(uint32_t surfel, uint32_t t, Kin *kept) {
     back = dot(normal, way);
   }
   const double apart = beside ? rests_at(k, back) : k.apart;
-  // as far as rounding of the set-back faces goes, what stands behind one need not have passed it
+  // within the rounding of the set-back faces, a feature behind one need not have crossed it
   if (beside && now != side && face && distance <= depth && -distance < apart - offset &&
       !through({surfel}, {c[0], c[1], c[2]}))
     return;

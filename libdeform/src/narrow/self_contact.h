@@ -15,7 +15,7 @@ namespace dfm {
 // only if a pair seems to have crossed.
 using Tangled = std::function<bool(uint32_t surfel)>;
 
-// How two copies of one point stand to each other at the start of the sub-step.
+// Relative position of two copies of one point at the start of the sub-step.
 struct CopiesNow {
   Vec3 normal;       // mean of the faces that were joined at them, from b to a
   double gap, slip;  // m, along it, across it
@@ -29,7 +29,7 @@ struct SelfPairs {
   // by pair, of a body with open faces; but for `copies` filled where one comes near
   Array<PairAtRest> of_face, of_edges;
   Array<CopiesNow> copies;
-  // [copies] m, by how much they may come together before features around them have to be asked
+  // [copies] m, by how much they may approach before features around them have to be tested
   // (doc/decisions/0427)
   Array<double> slack;
   uint64_t renewals = 0;

@@ -24,8 +24,8 @@ struct EnergyWatch {
   // s, planned size of the sub-steps until the library changed it for the next one; 0: it did not. Not state:
   // set in each step
   double size_before = 0;
-  // the last look has stopped the run because of a pair: what the host changes then starts sums anew; not
-  // state
+  // the last check has stopped the run because of a pair: if the host then changes something, the sums start
+  // again; not state
   bool told = false;
 };
 

@@ -29,11 +29,11 @@ struct Budget {
   dfm_world_stats stats{};  // before the step
 };
 
-// One step within its budget. Returns the results of World::step(), or DFM_DISCARD if the budget is used up
+// One step within its budget. Returns the results of run_step(), or DFM_DISCARD if the budget is used up
 // or a stop was requested; the state is then that before the step.
 dfm_status step_within_budget(World &w, double dt, uint32_t *trouble);
 
-// Called by World::step(): the step will have this number of sub-steps.
+// Called by run_step(): the step will have this number of sub-steps.
 void plan_work(World &w, StepContext &step, uint32_t substeps);
 // Adds units and throws if the step must end here. Called by the stepping thread only, never while threads of
 // a stage run.

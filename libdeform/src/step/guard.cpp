@@ -220,8 +220,8 @@ void set_sides(World &w, StepContext &step) {
   }
 }
 
-// Surfels that are set back end where the faces around them, as they then stand, set them back. m, the most
-// that this differs from their straight way.
+// Surfels that are set back end where the faces around them set them back at the end. Returns m, the largest
+// distance between these ends and those of their straight ways.
 double set_back_ends(GuardScene &scene, GuardSide &side, Surface &s) {
   double most = 0;
   const auto straight = [&](uint32_t i) {
@@ -350,9 +350,9 @@ bool wake_hit(World &w, StepContext &step) {
   return w.sleepers < before;
 }
 
-// An impulse that alone would move its point faster than light has others against it that grow with it: what
-// it stands for has no answer, and its rounding is motion out of nothing. What was put inside something else
-// has no answer either, and is led out of it (concepts/overlaps.md).
+// An impulse that alone would move its point faster than light is opposed by others that grow with it: the
+// problem that it belongs to has no solution, and its rounding error becomes motion. Overlapping bodies at
+// the start have no solution either, but are led apart (concepts/overlaps.md).
 bool overloaded(const World &w, const StepContext &step) {
   if (!(step.residual.due > 1) || !w.overlaps.found.empty()) return false;
   for (uint32_t i = 0; i < step.rows.n; ++i)

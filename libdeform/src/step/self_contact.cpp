@@ -159,8 +159,8 @@ OpenedSurface opened_surface(const Memory &m, const Body &b) {
 
 enum Crosses : uint8_t { unasked, no, yes };
 
-// Few triangles are asked about, where something is deeper than it should be: the whole surface would take
-// more than the rest of a step.
+// Tested for few triangles only, where something is deeper than it should be: testing the whole surface would
+// take longer than the rest of a step.
 bool crosses_another(SelfBody &b, uint32_t triangle) {
   const Surface &s = b.body->surface;
   if (b.crosses.empty()) b.crosses.assign(s.ntri, unasked);
@@ -184,7 +184,7 @@ bool is_tangled(SelfBody &b, uint32_t surfel) {
                      [&](uint32_t triangle) { return crosses_another(b, triangle); });
 }
 
-// The lists of the surface before a cut are continued. The cut moves the surfels that it sets back anew.
+// Continues the lists of the surface before a cut. The cut moves the surfels that it sets back again.
 void follow_cut(const World &w, const SelfBody &before, const FeatureMap &features, SelfBody &now) {
   constexpr double kSame = 1e-6;  // ways are of length one or so
   Array<uint8_t> moved(now.body->surface.nsurfel, 0, HookAllocator<uint8_t>(w.meters.detection.memory()));

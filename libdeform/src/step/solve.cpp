@@ -61,8 +61,8 @@ constexpr uint32_t kMostCapped = 20;
 // Bodies that they hold, soft without them, answer it by more than they have to be right to. That error falls
 // by a factor of hundreds in most of these solves, and no more after as many of them.
 constexpr uint32_t kMostStalled = 6;
-// A sub-step in which a body does not come to a state with its contacts is taken anew, half as long, down to
-// this share of the planned one.
+// A sub-step in which the forces and contacts of a body do not agree is repeated with half its length, down
+// to this share of the planned one.
 constexpr double kLeastPiece = 1.0 / 256;
 
 }  // namespace
@@ -133,7 +133,7 @@ void finish_rows(World &w, StepContext &step) {
   if (!step.guard.kept.empty()) guard_rates(step);
 }
 
-// The body's velocities without contact, anew.
+// Takes the body's velocities without contact again.
 void take_velocities(Body &b, StepContext &step, const ContactRows::Block &block) {
   gather_surface(b.surface, b.p.x.data(), b.dynamics->point_velocity());
   for (uint32_t k = 0; k < block.count; ++k)
@@ -289,7 +289,7 @@ void add_up(StepContext &step) {
   }
 }
 
-// Else the sub-step is to be taken anew, with the motion that goes with contacts.
+// False: the sub-step is to be repeated, with the integrator that contacts need.
 bool contacts_taken(World &w, StepContext &step) {
   bool all = true;
   for (const ContactPoint &c : step.contacts) {
@@ -309,7 +309,7 @@ bool contacts_taken(World &w, StepContext &step) {
   return all;
 }
 
-// Shorter, a body moves less far from where its forces are known.
+// In a shorter sub-step a body moves less far from where its forces are known.
 bool retry_shorter(World &w, StepContext &step, uint32_t *trouble) {
   if (may_shorten(step)) {
     step.guard.again = true;

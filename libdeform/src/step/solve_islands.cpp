@@ -18,24 +18,26 @@
 namespace dfm {
 namespace {
 
-// Where laws remember, errors of the normal force do not average out: each time a force falls by one, the
-// cone cuts off a part of the bristle that does not come back when it rises; and a point that shakes under a
-// bristle of share s stretches it by (1 - s) of each way forth and slackens it by (1 + s) of each way back.
-// What is held creeps by both. This share of the normal tolerance then holds while bodies shake, and at rest
-// this share of the tangential one (doc/decisions/0028). So it does for bodies whose end is solved for: stiff
-// ones sag by less than the normal tolerance in a long step.
+// Laws with memory accumulate errors of the normal force instead of averaging them out. Whenever the force
+// falls, the friction cone cuts off a part of the bristle, which does not come back when the force rises. A
+// point that oscillates under a bristle of share s stretches it by (1 - s) of each way forth and slackens it
+// by (1 + s) of each way back. Both make a held contact creep. Islands with such laws therefore use this
+// share of the normal tolerance while bodies move, and this share of the tangential one at rest
+// (doc/decisions/0028). So do bodies whose end state is solved for: stiff ones sag by less than the normal
+// tolerance in a long step.
 constexpr double kRememberedShare = 0.05, kRememberedRest = 1e-3;
 
-// The cap on sweeps bounds the cost of what is not exact, not of what lets bodies through: where a normal
-// residual would eat more than a tenth of the rest distance within the sub-step, up to kBeyondCap times as
-// many are done (many surfels on few phyxels, struck hard).
-constexpr uint32_t kBeyondCap = 8, kFewSweeps = 8;  // kFewSweeps: where the step has to save
+// The limit of sweeps may leave a solve inexact, but must not let bodies pass through each other. If a normal
+// residual would consume more than a tenth of the rest distance within the sub-step, up to kBeyondCap times
+// as many sweeps are made (many surfels on few phyxels, at a hard impact).
+constexpr uint32_t kBeyondCap = 8, kFewSweeps = 8;  // kFewSweeps: at least, on a short budget
 
-// Where points answer their own impulses alone, contacts that share points may take hundreds of sweeps, which
-// cost little beside the forces of the bodies. After kAccelerated sweeps these go on by momentum, beyond the
-// cap up to kMostBeyond times as many while all rows together are swept at most kFreeShare times per unit of
-// the sub-step's work without contact. That the residual does not fall says nothing: it stays where it is for
-// hundreds of sweeps while loads move to other contacts (doc/decisions/0455-sweeps-go-on-by-momentum.md).
+// Impulses at explicit bodies move single points, so a sweep costs little beside the forces of the bodies,
+// but contacts that share points may need hundreds of sweeps. After kAccelerated sweeps the solve continues
+// with momentum, beyond the limit up to kMostBeyond times as many sweeps, while all rows together are swept
+// at most kFreeShare times per unit of the sub-step's work without contact. A residual that does not fall is
+// no reason to stop: it can stay the same for hundreds of sweeps while loads move to other contacts
+// (doc/decisions/0455-sweeps-go-on-by-momentum.md).
 constexpr uint32_t kAccelerated = 50, kMostBeyond = 20, kLookBeyond = 4;
 constexpr double kFreeShare = 32;
 bool glides(const SolveIsland &own) { return !(own.soft || own.revises || own.batches.remembers()); }
@@ -55,22 +57,23 @@ bool may_sweep(const World &w, const StepContext &step, SolveIsland &own, const 
   return residual.normal * step.h > 0.1 * w.offset && own.sweeps < uint64_t{kBeyondCap} * w.def.max_sweeps;
 }
 
-// What goes beyond what must be reached is polish, and this many sweeps of a sub-step are enough for it: the
-// next one goes on from there.
+// Residual::relative is stricter than what is required (Residual::due). Sweeps that only improve the former
+// are polish. A sub-step spends at most this many sweeps on it, because the next sub-step continues from
+// there.
 constexpr uint32_t kPolish = 20;
 bool good(const StepContext &step, SolveIsland &own, const Residual &left, double most) {
   return left.relative <= most || (left.due <= most && (own.sweeps >= kPolish || own.stalls ||
                                                         spares(step, own.spent, Thrift::polish)));
 }
 
-// Beyond this times the best residual sweeps are running away: with a jam of strong friction block
-// Gauss-Seidel need not converge, and where laws are affine nothing else stops it before numbers end.
+// Sweeps diverge if the residual exceeds this times the best one: block Gauss-Seidel need not converge in a
+// jam with strong friction, and if the laws are affine, nothing else stops it before numbers overflow.
 constexpr double kRunsAway = 1e6;
 
-// A law that is no projection is known by its tangent, so what is solved is only as right as the slip is near
-// at which the law was asked. Where nearly redundant normal forces take all sweeps of the first pass, that
-// slip is the one before contact: bodies would be left with friction that no law gives, and pushed by it.
-// Beyond the cap laws are asked again, with so many sweeps each time (doc/decisions/0201).
+// A law with memory is linearized, so the solution is accurate only near the slip at which the law was
+// evaluated. Where nearly redundant normal forces use up all sweeps of the first pass, that slip is the one
+// before contact: the bodies would keep, and be pushed by, friction that no law gives. Beyond the limit of
+// sweeps the laws are therefore evaluated again, followed by this many sweeps each time (doc/decisions/0201).
 constexpr uint32_t kPassSweeps = 20;
 bool asks_beyond(const World &w, const SolveIsland &own) {
   return own.sweeps >= w.def.max_sweeps && own.batches.remembers();
@@ -80,11 +83,12 @@ bool may_ask(const World &w, const StepContext &step, SolveIsland &own) {
          own.sweeps < uint64_t{kBeyondCap} * w.def.max_sweeps && !spares(step, own.spent, Thrift::sweeps);
 }
 
-// The response by which a contact looks for the slip at which it comes to rest alone. Many contacts that hold
-// one body turn its slip round together and could not stop it one by one: asked by their own responses they
-// say "slide" one way and the other in turn, for ever. Beyond the cap each takes that of all. Where few of
-// them bear most of the load that one can cycle as well, so from then on two passes by one response
-// that do not halve the residual are followed by passes with the other.
+// The response with which a contact estimates the slip at which it would come to rest alone. If many contacts
+// hold one body, each with its own response reverses the body's slip instead of stopping it, and the laws say
+// "slide" in one direction and the other in turn, forever. Beyond the limit of sweeps each contact uses the
+// summed response of all loaded contacts. Where few of them bear most of the load, that can cycle as well:
+// from then on, two passes with one response that do not halve the residual are followed by passes with the
+// other response.
 constexpr double kHalves = 0.5;
 void choose_response(const World &w, SolveIsland &own) {
   if (!asks_beyond(w, own)) return;
@@ -105,7 +109,7 @@ const double *trial_response(StepContext &step, const SolveIsland &own) {
   return step.trial_response.data();
 }
 
-// The island's rows of [3 rows] columns.
+// Copies the island's rows of columns of size [3 rows].
 void copy_impulses(const RowsPart &part, const Array<double> &from, Array<double> &to) {
   const auto copy = [&](std::span<const RowRun> runs) {
     for (const RowRun &r : runs)
@@ -117,7 +121,7 @@ void copy_impulses(const RowsPart &part, const Array<double> &from, Array<double
 void keep_best(StepContext &step, const SolveIsland &own) {
   copy_impulses(own.part, step.rows.impulse, step.best_impulse);
 }
-// The same, and unknowns with them.
+// Back to the best impulses; velocities change by the difference.
 void go_to_best(StepContext &step, const SolveIsland &own) {
   ContactRows &rows = step.rows;
   const auto go = [&](uint32_t i) {
@@ -152,10 +156,10 @@ void sweep_once(const World &w, StepContext &step, SolveIsland &own, double leav
 }
 
 // For bodies with few degrees of freedom, sweeps redistribute loads too slowly: at the limit of sweeps the
-// solve continues by proximal steps (decision 0225). rho is 1000 over a contact's own response; less if a
-// step fails with it. The steps of a part cost at most so many times its sweeps up to the limit; the rest is
-// left to the next sub-step, which starts there. Not for bodies that revise their response, because large
-// changes of impulses would change it.
+// solve continues with proximal steps (decision 0225). rho is 1000 over a contact's own response, and less if
+// a step fails with it. The steps of a part cost at most kStridesOverCap times its sweeps up to the limit;
+// the next sub-step continues from there. Bodies that revise their response take no such steps, because large
+// changes of impulses would change the response.
 constexpr uint32_t kMostStrides = 12, kStridesOverCap = 32;
 constexpr double kRho = 1e3, kLeastRho = 10;
 void stride_on(const World &w, StepContext &step, SolveIsland &own, uint32_t part) {
@@ -184,8 +188,8 @@ void stride_on(const World &w, StepContext &step, SolveIsland &own, uint32_t par
   }
   proximal.put(step.rows, step.best_impulse.data());
 }
-// Of laws that remember, the first pass knows the tangent at the slip before contact, and later ones are as
-// far off as the law was: strides that answer a tangent more closely than that are lost with it.
+// Laws with memory are linearized at the slip before contact in the first pass, and at that of the pass
+// before in later ones. Solving a linearization to less than this share of its own error would be wasted.
 constexpr double kTangentShare = 0.1;
 bool strides_help(const SolveIsland &own, double left) {
   return left > 1 &&
@@ -197,12 +201,12 @@ void stride_on(const World &w, StepContext &step, SolveIsland &own) {
   for (uint32_t part = 0; part < parts; ++part) stride_on(w, step, own, part);
 }
 
-// Nearly redundant contacts of bodies that revise (doc/decisions/0360). Normal forces that hold the bodies in
-// more places than these can move in agree only to a few 1e-8 m: a sweep takes a little load from a contact
-// that is that far open, gives it to others, and goes on so until the first has none, with friction behind.
-// Unneeded work is left out: once the polish is over, contacts whose normal velocity is within kLeave of
-// what is allowed keep their normal impulses. At the cap as many sweeps are added, by momentum, from the best
-// state.
+// Nearly redundant contacts of bodies that revise their response (doc/decisions/0360). Normal forces that
+// hold a body in more places than it can move in are consistent only to a few 1e-8 m: each sweep takes a
+// little load from a contact that is that far open and gives it to others, until the first has no load, and
+// friction follows. So once the polish is over, contacts whose normal velocity is within kLeave of the
+// tolerance keep their normal impulses. At the limit of sweeps, as many sweeps are added, with momentum, from
+// the best state.
 constexpr double kLeave = 0.2;
 double leave_of(const SolveIsland &own) {
   return own.revises && own.sweeps >= kPolish ? kLeave * own.tolerance.most_normal : 0;
@@ -223,9 +227,10 @@ void settle(const World &w, StepContext &step, SolveIsland &own, double &best) {
   take_best(step, own);
 }
 
-// Whether velocities still move is asked after every so many sweeps, once the polish is over, and of laws
-// without memory: what is left over stretches bristles. Not while an equilibrium is searched for, which is as
-// good as its contacts. Bodies that do not revise ask between cut faces only (doc/decisions/0445).
+// Whether velocities have stopped changing is checked after every kAskStands sweeps, once the polish is over.
+// Laws with memory are left out, because the remaining slip stretches bristles, and so is static mode, whose
+// contacts must be solved. Bodies that do not revise their response are checked between cut faces only
+// (doc/decisions/0445).
 constexpr uint32_t kAskStands = 4;
 bool asks_redundant(const World &w, const StepContext &step, SolveIsland &own) {
   const uint8_t *const cut = step.solve_islands->of_cuts();
@@ -236,10 +241,10 @@ bool asks_redundant(const World &w, const StepContext &step, SolveIsland &own) {
                      : own.redundant.found_at_cuts(step.rows, own.part, cut);
 }
 
-// Many contacts that bear on one implicit body (contact/tresca.h). Sweeps that have come to their cap without
-// a result are followed by it. Further solves of the sub-step are much like the first one and begin with it:
-// sweeps that stall leave errors which the body revises by, and which they do not take back.
-constexpr double kBackedMost = 0.1;  // of the tolerance: what is left over is what bodies revise by
+// Many contacts on one implicit body (contact/tresca.h). This method is tried when sweeps reach their limit
+// without a result. Later solves of the sub-step resemble the first one and begin with this method: sweeps
+// that stall leave errors by which the body revises its response, and do not undo them.
+constexpr double kBackedMost = 0.1;  // of the tolerance: bodies revise their response by the rest
 class BodyBacked final : public BackedResponse {
  public:
   explicit BodyBacked(Dynamics &body) : body_(body) {}
@@ -271,13 +276,15 @@ Backs solve_backed(const World &w, StepContext &step, SolveIsland &own, double m
   return own.backs ? Backs::now : Backs::never;
 }
 
-// Where neither sweeps nor that method lead to a result, a body that moves less far does it.
+// If neither sweeps nor that method find a result, the sub-step is repeated, shorter: the body then moves
+// less far.
 bool gives_up(const StepContext &step, const SolveIsland &own) { return own.stuck && may_shorten(step); }
 
-// A residual costs as much as a sweep, where points answer their own impulses alone. A sweep seldom leaves
-// less than a quarter of it, and seldom less than a half where the ones before left more than 0.7: it is
-// looked at again when it could be good at the earliest. Not once the polish is over, where the best state
-// is looked for (doc/decisions/0419-islands-by-unknowns.md).
+// Decides after which sweeps the residual is computed. For explicit bodies it costs as much as a sweep. A
+// sweep seldom reduces the residual to less than a quarter, and seldom to less than a half if the sweeps
+// before left more than 0.7 of it; so the residual is computed when it could be small enough at the earliest.
+// After the polish it is computed each time, because the best state is searched for
+// (doc/decisions/0419-islands-by-unknowns.md).
 class Looks {
  public:
   bool due(const StepContext &step, const SolveIsland &own, uint32_t cap) const {
@@ -302,8 +309,8 @@ class Looks {
   uint32_t at_ = 0, next_ = 0;
 };
 
-// Sweeps on the laws as they were last answered. At the cap the best state seen is taken, not the last one.
-// Returns whether the result is good enough.
+// Sweeps with the laws as they were last evaluated. At the limit of sweeps the best state is taken, not the
+// last one. Returns whether the result is good enough.
 bool sweep_until_good(const World &w, StepContext &step, SolveIsland &own) {
   ContactRows &rows = step.rows;
   const uint32_t cap = asks_beyond(w, own) ? own.sweeps + kPassSweeps : w.def.max_sweeps;
@@ -362,7 +369,7 @@ bool sweep_until_good(const World &w, StepContext &step, SolveIsland &own) {
       own.momentum.start(rows, own.part);
       continue;
     }
-    // what stands is seen from one plain sweep to the next
+    // whether velocities have stopped changing shows between two plain sweeps
     asks = asks_redundant(w, step, own);
     own.acceleration.follow(rows, own.part, !asks);
   }
@@ -397,14 +404,13 @@ bool hold_work_back(const World &w, StepContext &step, SolveIsland &own, double 
   return true;
 }
 
-// A pass asks the laws at the state so far. False: one has failed.
+// Begins a pass: evaluates the laws at the present state. Returns false if a law has failed.
 bool ask(const World &w, StepContext &step, SolveIsland &own) {
   spend(w, step, own.spent, 4 * uint64_t{own.part.all()});
   choose_response(w, own);
   const double *const response = trial_response(step, own);
   set_trial(step.rows, own.part, step.h, response, step.state);
-  // The sweeps take the next Newton step from there: what is asked a hundredth off is answered to a
-  // ten-thousandth.
+  // The sweeps are the next Newton step: from a slip with an error of 1e-2 they reach one of 1e-4.
   if ((own.bad = own.batches.answer(step.h, response, 0.1 * tangent_at_rest(w, step.h), 1e-2, step.state)))
     return false;
   if (own.batches.smooth()) linearize(step.rows, own.part, step.h, step.state);
@@ -417,7 +423,7 @@ bool ask_slopes(StepContext &step, SolveIsland &own) {
   return true;
 }
 
-// The laws at the warm start, and what it leaves at the bodies.
+// Evaluates the laws at the warm start, and finds the disturbance that it leaves at each body.
 void start_island(const World &w, StepContext &step, SolveIsland &own) {
   if (ask(w, step, own) && ask_slopes(step, own))
     find_disturbance(step.rows, own.part, step.state, step.h, step.solve_islands->sides(),
@@ -442,10 +448,10 @@ void solve_passes(const World &w, StepContext &step, SolveIsland &own) {
   }
 }
 
-// Depths are opened at velocities that cost little. Where contacts oppose each other they cost much, and the
-// island is solved again with slower ones, from zero impulses: with so much slower ones that they should cost
-// what is allowed, since the work goes with their square, then with none, which add no energy
-// (contact/recovery.h, doc/decisions/0411-opening-depths-does-little-work.md).
+// Penetration depths are opened at bias velocities that do little work. Where contacts oppose each other the
+// work is large, and the island is solved again from zero impulses with lower bias velocities: first so low
+// that the work, which grows with their square, should be what is allowed; then with none, which adds no
+// energy (contact/recovery.h, doc/decisions/0411-opening-depths-does-little-work.md).
 constexpr double kSlowOpening = 0.03;  // of the rest distance in a sub-step: this is always allowed
 double share_of_opening(const ContactRows &rows, const RowsPart &part, double slow) {
   const OpeningWork opening = opening_work(rows, part, slow);
@@ -454,13 +460,14 @@ double share_of_opening(const ContactRows &rows, const RowsPart &part, double sl
   return work > opening.allowed ? std::sqrt(opening.allowed / work) : 1;
 }
 
-// Such impulses are large and nearly cancel: what they do at velocities within the tolerance is not little.
-// An island that opens depths at a cost may do no work of its own, solved or not (doc/decisions/0431).
+// Impulses of contacts that oppose each other are large and nearly cancel, so they do noticeable work even at
+// velocities within the tolerance. An island in which bias velocities do much work must therefore do none
+// beyond it, whether its solve has converged or not (doc/decisions/0431).
 void solve_island(const World &w, StepContext &step, SolveIsland &own) {
   if (own.bad || own.thrown) return;
   const double gap_margin = normal_at_rest(w, step.h), least = tangent_at_rest(w, step.h);
   const bool memory = own.batches.remembers();
-  // an equilibrium is as good as its contacts: nothing is left to a next sub-step
+  // static mode: no later sub-step corrects what this solve leaves
   const ToleranceBounds bounds =
       w.prescribed.stands()
           ? ToleranceBounds{least, least, least}
@@ -490,9 +497,9 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
   }
 }
 
-// Multiplications of a triangular solve that take as long as a sweep. An impulse at a surfel moves all
-// touched surfels of its body: three columns of four by vectors, which wait for memory where the response is
-// larger than a cache (doc/decisions/0447-auto-counts-contact.md).
+// The work of a sweep, in multiplications of a triangular solve that take as long. An impulse at a surfel
+// moves all touched surfels of its body: three columns, read four numbers at a time, which wait for memory if
+// the response is larger than a cache (doc/decisions/0447-auto-counts-contact.md).
 constexpr double kPairWork = 1.5, kFarPairWork = 6;
 constexpr uint32_t kFar = 100;  // surfels: 1 MB
 double work_of_sweep(const ContactRows &rows, const RowsPart &part, bool blocks) {
@@ -514,12 +521,12 @@ SolveIslands::SolveIslands(const Memory &m) : memory_(m), joined_(m) {
              block_, begin_);
 }
 
-// Pairs that move the same unknown.
+// Joins pairs that move the same unknown.
 void SolveIslands::join(const ContactRows &rows) {
   joined_.start(static_cast<uint32_t>(pairs_.size()));
   owner_.assign(pairs_.size() > 1 ? rows.ndof : 0, kNone);
   for (uint32_t k = 0; k < pairs_.size() && !owner_.empty(); ++k) {
-    bool points = false;  // of a pair without them the first row is enough
+    bool points = false;  // if a pair moves none, its first row is enough
     const auto move = [&](uint32_t dof) {
       const uint32_t block = rows.block[dof];
       points = points || block == kNone;
@@ -538,7 +545,7 @@ void SolveIslands::join(const ContactRows &rows) {
   count_ = joined_.count;
 }
 
-// A body in two islands is two sides.
+// Numbers the bodies on both sides of contacts. A body in two islands gets two numbers.
 void SolveIslands::number_sides(size_t bodies, size_t of_contacts) {
   met_.assign(bodies, kNone);
   side_.resize(bodies);
@@ -590,7 +597,7 @@ void SolveIslands::find_cuts(const World &w, const StepContext &step) {
     of_cuts_.push_back(!c.obstacle && cut(c.slot_a) && cut(c.slot_b));
 }
 
-// Rows of the same two sides follow each other, so that little is done for each row.
+// Contacts of the same two bodies are neighbors in the list, so most work is done once for each pair.
 void SolveIslands::find(const World &w, StepContext &step) {
   pairs_.clear();
   const auto add = [&](const auto &all, uint32_t first) {

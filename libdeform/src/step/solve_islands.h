@@ -1,8 +1,8 @@
-// Islands of the contact solve: contacts and bonds that feel each other's impulses within the sub-step,
-// because they share an unknown: a point, or a body whose points answer each other. Rows of the same two
-// sides stay together. Each island is solved by itself, with its own acceleration and end of sweeps; what
-// the warm start leaves at a body sets the tolerances in all of its islands. So the answer of bodies that
-// touch each other is the one of a world in which they are alone, and several threads may solve several
+// Islands of the contact solve: contacts and bonds that affect each other within the sub-step, because they
+// share an unknown: a point, or a body whose points respond to each other's impulses. Rows of the same two
+// bodies stay together. Each island is solved by itself, with its own acceleration and its own number of
+// sweeps; the disturbance that the warm start leaves at a body sets the tolerances in all of its islands. So
+// bodies that touch each other move as if they were alone in the world, and several threads may solve several
 // islands.
 #pragma once
 #include <exception>
@@ -23,14 +23,14 @@ namespace dfm {
 struct StepContext;
 struct World;
 
-// What an island does for its bodies' sake between two solves (solve.cpp).
+// How the bodies of an island have changed their response after a solve (solve.cpp).
 enum class Revised { nothing, something, diverged, failed };
 
 struct SolveIsland {
   RowsPart part;
-  bool revises = false;  // some body of it looks again at what the solve has made of it
+  bool revises = false;  // some body of it revises its response after a solve
   bool rigid = false;    // some body of it is of a rigid host
-  bool soft = false;     // points of some body of it answer each other
+  bool soft = false;     // points of some body of it respond to each other's impulses
   double effort = 0;     // of a sweep (Spent)
   LawBatches batches;
   Acceleration acceleration;
@@ -44,14 +44,14 @@ struct SolveIsland {
   // of the last solve
   Residual residual;
   uint32_t passes = 0, sweeps = 0;
-  bool slowed = false;     // its depths are opened more slowly
-  bool stalls = false;     // sweeps have ended at the cap in this sub-step, and another method has not
-  bool waits = false;      // for another response, by which that method is possible
-  bool backs = true;       // that method may be tried
-  bool stuck = false;      // it was, and has found nothing
-  bool common = false;     // laws are asked by the response of all contacts together
-  uint32_t asked = 0;      // passes beyond the cap with the present response
-  double affordable = -1;  // sweeps beyond the cap; < 0: not known yet
+  bool slowed = false;     // its bias velocities have been lowered
+  bool stalls = false;     // in this sub-step sweeps reached their limit, and Tresca did not fail
+  bool waits = false;      // for the response that Tresca needs
+  bool backs = true;       // Tresca may be tried
+  bool stuck = false;      // it was tried, and found no result
+  bool common = false;     // laws use the response of all contacts together
+  uint32_t asked = 0;      // passes beyond the limit of sweeps with the present response
+  double affordable = -1;  // sweeps beyond the limit; < 0: not known yet
   // of the last two passes (Residual::due)
   double due, due_before;
   Spent spent;
@@ -67,7 +67,7 @@ struct SolveIsland {
     use_memory(m, scratch, limit);
     start();
   }
-  // From the first pass on.
+  // Begins with the first pass.
   void start() {
     passes = sweeps = asked = 0;
     common = false;
@@ -79,14 +79,15 @@ struct SolveIsland {
 class SolveIslands {
  public:
   explicit SolveIslands(const Memory &memory);
-  // Of the contacts and bonds of the sub-step and their rows, whose laws are known.
+  // Finds the islands of the sub-step's contacts and bonds. Their rows and laws must be known.
   void find(const World &w, StepContext &step);
   // In the order of their first rows.
   std::span<SolveIsland> all() { return {islands_.data(), count_}; }
   std::span<const SolveIsland> all() const { return {islands_.data(), count_}; }
-  // Numbers of islands, those with the most rows first: no thread comes to a large one when others are done.
+  // Indices of islands, those with the most rows first: otherwise a thread might begin a large island when
+  // the others are done.
   std::span<const uint32_t> by_size() const { return {order_.data(), count_}; }
-  // [contacts,2] numbers of the two sides among all bodies of all islands; kNone: an obstacle
+  // [contacts,2] numbers of the two bodies among those of all islands; kNone: an obstacle
   const uint32_t *sides() const { return sides_.data(); }
   // [contacts] whether both sides are faces of a cut, set back; null: none are
   const uint8_t *of_cuts() const { return of_cuts_.empty() ? nullptr : of_cuts_.data(); }
@@ -119,11 +120,11 @@ class SolveIslands {
   void find_cuts(const World &w, const StepContext &step);
 };
 
-// Whether a sub-step without a result can be taken anew, half as long.
+// Whether a sub-step without a result can be repeated with half its length.
 bool may_shorten(const StepContext &step);
 
-// All islands that are open, each until the true residual of its laws is good enough. One in which a law has
-// failed, or null.
+// Solves all open islands until the true residual of their laws is good enough. Returns an island in which a
+// law has failed, or null.
 const SolveIsland *solve_islands(World &w, StepContext &step);
 
 }  // namespace dfm

@@ -1,6 +1,6 @@
-// Tools that are so fast that the places where they are nearest at the start are not those where they meet:
-// after a solve the guard's time of impact (ccd/) is asked along the straight ways of capsules. What meets
-// becomes a row, linearized at its hit time, and all is solved again, at most four times.
+// Tools so fast that they do not meet where they are nearest at the start of the sub-step. After a solve the
+// guard's time of impact (ccd/) is computed along the straight paths of capsules. A pair that meets becomes a
+// row, linearized at its hit time, and all rows are solved again, at most four times.
 #include <algorithm>
 
 #include "body/obstacle_mesh.h"
@@ -20,8 +20,8 @@ namespace {
 
 constexpr uint32_t kMostHits = 4;  // further solves
 constexpr double kSlow = 5e-4;     // m in a sub-step: what moves by less is kept apart by its rows
-constexpr uint32_t kLooks = 16;    // pieces of an edge between which it is looked at
-// Whether balls around the two do not meet, or the ball of one and a plane.
+constexpr uint32_t kLooks = 16;    // pieces of an edge whose ends are tested
+// Whether the bounding spheres of the two, or that of one and a plane, do not meet.
 bool balls_apart(const ObstacleView &a, const ObstacleView &b) {
   const auto reach = [](const ObstacleView &v) {
     return v.shape == Shape::box ? norm(v.half_size) : v.extent + v.radius + v.half_length;
@@ -33,7 +33,7 @@ bool balls_apart(const ObstacleView &a, const ObstacleView &b) {
   return norm2(a.position - b.position) > far * far;
 }
 
-// m, of the center of a shape without corners within another such one; 0: it is outside.
+// m, depth of the center of a shape without corners inside another one; 0: it is outside.
 double center_depth(const ToolShape &a, const ToolShape &b) {
   double deepest = 0;
   ObstaclePoint o;
@@ -48,19 +48,19 @@ bool cuts(const World &w, const Obstacle &o) {
                      [&](const auto &t) { return t->set == o.rigid && !t->cuts.bodies.empty(); });
 }
 
-constexpr double kDeep = 0.02;    // of the smaller one's reach, that is left unsaid
-constexpr double kWithin = 0.1;   // of the floor, that a hit may be found above it
-constexpr uint64_t kSeldom = 16;  // steps, of which one looks whether a driven tool is inside triangles
+constexpr double kDeep = 0.02;    // of the smaller one's reach: a smaller depth is not reported
+constexpr double kWithin = 0.1;   // of the floor: a hit may be found this far above it
+constexpr uint64_t kSeldom = 16;  // steps between two tests of driven tools against triangles
 
 }  // namespace
 
-// Whether so deep that it is said.
+// Whether the depth is reported.
 bool ToolTouch::inside(const ToolShape &a, const ToolShape &b, double deep) const {
   const double smaller = std::min(a.endless() ? HUGE_VAL : a.reach(), b.endless() ? HUGE_VAL : b.reach());
   return deep > offset_ + kDeep * smaller;
 }
 
-// With the velocities so far, at the end of the sub-step.
+// The place of p at the end of the sub-step, by the present velocities.
 Vec3 ToolTouch::end_of(const Side &side, Vec3 p) const {
   const Moved &m = sides_[side.tool];
   const size_t at = 6 * size_t{side.part};
@@ -96,7 +96,8 @@ void ToolTouch::find_hits(const Pair &pair, ToolShape &a, ToolShape &b, Side at_
       const Vec3 apart = place(0, hit.at[0], hit.t) - place(2, hit.at[1], hit.t);
       if (!(norm(apart) > 0)) continue;
       const Vec3 n = normalized(apart), on_a = place(0, hit.at[0], 0), on_b = place(2, hit.at[1], 0);
-      // along a normal of later they may overlap now: that asks for no speed outwards, which would be energy
+      // The normal is that of the hit, so the two may overlap along it now: that must not push them apart,
+      // which would add energy.
       const double gap = std::max(dot(n, on_a - on_b) - m.round, offset_);
       hits_.push_back(
           {&pair, {kHitEdges, p.number, q.number}, at_a, at_b, {0.5 * (on_a + on_b), on_a, on_b}, n, gap});
@@ -104,7 +105,7 @@ void ToolTouch::find_hits(const Pair &pair, ToolShape &a, ToolShape &b, Side at_
   }
 }
 
-// What meets on the way becomes rows, and no row has been pushed at. False: nothing.
+// Pairs that meet on the way become rows, and no row has an impulse yet. Returns false if there are none.
 bool ToolTouch::add_hits(const World &w, const StepContext &step) {
   hits_.clear();
   each_pair(w, step, [&](const Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b) {
@@ -130,8 +131,7 @@ void ToolTouch::solve_past_hits(const World &w, const StepContext &step) {
   }
 }
 
-// m, by how far one reaches into the other now, by its corners, and along its edges if asked for; 0: not at
-// all.
+// m, how deep one reaches into the other now, by its corners and, if `edges`, along its edges; 0: not at all.
 double ToolTouch::depth(ToolShape &a, ToolShape &b, bool edges) const {
   if (!look_at_each_other(a, b, offset_, true)) return 0;
   double deepest = 0;
@@ -154,8 +154,8 @@ bool ToolTouch::told(const Pair &pair) const {
                      [&](const auto &known) { return known[0] == pair.id[0] && known[1] == pair.id[1]; });
 }
 
-// Rigid bodies that joints hold, or that another host moves, and what they pass through. Said once; a host of
-// its own may let things into each other by a little.
+// Warns, once for each pair, of rigid bodies that have joints or belong to another host, and pass through
+// something. A host with a world of its own may let bodies overlap by a little.
 void ToolTouch::tell_passing(const World &w, const StepContext &step) {
   for (const Pair &pair : passing_) {
     const Obstacle &a = *w.obstacles[pair.a], &b = *w.obstacles[pair.b];
@@ -195,8 +195,8 @@ void ToolTouch::tell_passing(const World &w, const StepContext &step) {
   }
 }
 
-// Once a sentence about two things of which the rows make no end: a tool that goes where it is told, through
-// what stands, and what was put into something that keeps it out.
+// Warns, once for each pair, of what the rows do not end: a tool without a coupling that passes through an
+// obstacle, and something placed inside what keeps it out.
 void ToolTouch::tell_deep(const World &w, const Pair &pair, double deep, bool driven) {
   if (told(pair)) return;
   told_.push_back({pair.id[0], pair.id[1]});
@@ -215,8 +215,8 @@ void ToolTouch::tell_deep(const World &w, const Pair &pair, double deep, bool dr
         own.name.c_str(), deep, other.name.c_str(), w.time, kOpens * offset_);
 }
 
-// Tools that go where they are told, and meet what does so as well, or what stands: they go through it. That
-// of a tool that cuts is no news: its edge goes into the table under what it cuts.
+// Warns of tools without a coupling that pass through each other or through obstacles. Tools that cut are
+// left out: their edge goes into the table under what they cut.
 void ToolTouch::tell_driven(const World &w, const StepContext &step) {
   const auto yields = [&](const Side &side, const Obstacle &to) {
     const Moved &m = sides_[side.tool];

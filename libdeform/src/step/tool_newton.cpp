@@ -501,7 +501,7 @@ bool ToolTouch::newton(uint32_t island, double done) {
   return works;
 }
 
-// All impulses anew, by Newton's method.
+// Finds all impulses again, by Newton's method.
 void ToolTouch::leap(double done) {
   list_motions();
   bool any = false;

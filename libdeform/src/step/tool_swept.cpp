@@ -32,7 +32,7 @@ struct Way {
   double most = 0;
 };
 
-// Seen from the other shape, which stands as at the start.
+// In the frame of the other shape, which stays where it is at the start.
 Vec3 end_seen(const Way &own, const Way &other, Vec3 p) {
   const Vec3 at =
       own.to.position + rotate(own.to.rotation, rotate_back(own.from.rotation, p - own.from.position));

@@ -19,9 +19,9 @@ namespace dfm {
 namespace {
 
 constexpr uint32_t kMostSweeps = 60;
-constexpr double kDone = 1e-13;            // of the largest speed that a row asks to change
-constexpr double kSharper = 1e-3;          // of what a pass changes: its sweeps need no less
-constexpr double kSame = 1e-9;             // of it: soft bodies need not be asked again
+constexpr double kDone = 1e-13;            // of the largest speed that a row is to change
+constexpr double kSharper = 1e-3;          // of the change by a pass: tolerance of its sweeps
+constexpr double kSame = 1e-9;             // of it: soft bodies need not be solved again
 constexpr double kOpenUpTo = 1;            // m/s: what a load could change that keeps a place from opening
 constexpr double kJaw = 1e4;               // N/m, of a jaw at its tip
 constexpr double kFace = 1e5;              // N/m, of a place on the face of a jaw
@@ -41,14 +41,14 @@ bool of_tool(const Obstacle &o) { return o.rigid && o.rigid->of_tool; }
 // Part 0 is the frame.
 bool is_jaw(const Obstacle &o) { return of_tool(o) && o.rigid_body > 0; }
 
-// Moves by its momentum and what touches it alone.
+// Whether only its momentum and its contacts move it.
 bool alone(const RigidSet &set, uint32_t body) {
   return set.group[body] != DFM_RIGID_STILL &&
          std::none_of(set.joints.begin(), set.joints.end(),
                       [&](const dfm_joint_def &j) { return j.body == body || j.with == body; });
 }
 bool is_free(const Obstacle &o) { return builtin(o) && alone(*o.rigid, o.rigid_body); }
-// Stands still, or goes where it is told, whatever touches it.
+// Does not yield, whatever touches it.
 bool is_wall(const Obstacle &o) { return !o.rigid || o.rigid->group[o.rigid_body] == DFM_RIGID_STILL; }
 
 // Whether the rows of this file keep the two apart, filters aside.
@@ -70,8 +70,8 @@ PairSide names_of(const Obstacle &o) { return {o.name, o.zone.group, o.zone.mate
 Quat rotation_of(const dfm_rigid_state &s) {
   return {s.rotation[0], s.rotation[1], s.rotation[2], s.rotation[3]};
 }
-// The normal of two edges, from q to p, where both are left along it. On the wrong side of each other they
-// keep it: it is that of the two directions.
+// The normal of two edges, from q to p, if both edges are left along it. It follows from the two directions
+// alone, so it stays the same for edges that have passed each other.
 bool between(const ToolShape::Edge &p, const ToolShape::Edge &q, Vec3 apart, Vec3 &n) {
   n = cross(p.to - p.from, q.to - q.from);
   const double sine = norm(n), d = norm(apart);
@@ -98,8 +98,8 @@ Vec3 nearest_turn(Vec3 turn, Vec3 like) {
 
 void add(Vec3 p, double *to) { store3(to, load3(to) + p); }
 
-// Whether a rigid body that joints hold, or that another host moves, passes through something that neither
-// this file nor its host keeps it apart from. A host that has a world of its own knows what is in it.
+// Whether a rigid body that has joints, or belongs to another host, passes through something, because neither
+// this file nor its host keeps the two apart. A host with a world of its own knows what is in that world.
 bool passes(const Obstacle &a, const Obstacle &b) {
   if (a.sensor || b.sensor || of_tool(a) || of_tool(b)) return false;
   const auto held = [](const Obstacle &o) { return !is_wall(o) && !is_free(o) && !o.rigid->elsewhere; };
@@ -186,7 +186,7 @@ Vec3 ToolTouch::speed(const Row &row) const {
   return at(row.a) - at(row.b);
 }
 
-// What the rows have changed of it.
+// The part of it that the rows have added.
 Vec3 ToolTouch::change_of(const Row &row) const {
   const auto at = [&](const Side &side) {
     const double *const d = &sides_[side.tool].change[6 * size_t{side.part}];
@@ -229,7 +229,7 @@ void ToolTouch::push(const Row &row, Vec3 p) {
   push(row.b, -p, -cross(row.b.arm, p), &Moved::change, true);
 }
 
-// How the two part by this impulse, where nothing has been pushed yet.
+// The relative velocity that this impulse makes. No other impulse may have been applied before.
 Vec3 ToolTouch::answer_to(const Row &row, Vec3 impulse) {
   push(row, impulse);
   std::vector<double> &va = sides_[row.a.tool].change, &vb = sides_[row.b.tool].change;
@@ -260,10 +260,10 @@ void ToolTouch::list_jaws(Moved &m) const {
   }
 }
 
-// A jaw that has been turned goes back to where it is told by a large angle, and what holds it takes that
-// back to first order. The way along the arc beyond it, h w x (w x r) / 2, would stay as creep: this part of
-// its motion counts to first order. With the frame it goes along the whole arc; where the frame gives way,
-// by the spin that it ends with, not by the one without contact (bend).
+// A jaw that has been turned returns to its angle by a large rotation, and what it holds undoes that to first
+// order. The displacement along the arc beyond it, h w x (w x r) / 2, would remain as creep, so this part of
+// the motion counts to first order. The jaw follows the frame along the whole arc; if the frame yields, by
+// the spin at the end of the sub-step, not by the one without contact (bend).
 void ToolTouch::straighten(Moved &m) const {
   if (m.jaws.empty()) return;
   const dfm_rigid_state &frame = m.set->state[0];
@@ -281,7 +281,7 @@ void ToolTouch::straighten(Moved &m) const {
   }
 }
 
-// The impulses of a set: those of soft bodies, and of the rows.
+// The impulses of a set: those of soft bodies and those of the rows.
 void ToolTouch::add_impulses(size_t k) {
   if (!sides_[k].set) return;
   RigidSet &set = *sides_[k].set;
@@ -296,9 +296,9 @@ void ToolTouch::add_impulses(size_t k) {
     }
 }
 
-// The mean spin of a free rigid body is not linear in its impulses, because its moments turn with it. What
-// its host makes of the impulses so far, less what was taken for it, counts in the next pass: a thin body
-// would be turned to and fro by it. Largest change, m/s.
+// The mean spin of a free rigid body is not linear in its impulses, because its moments of inertia turn with
+// it. The difference between the spin that its host computes from the present impulses and the one assumed
+// here counts in the next pass; otherwise a thin body would oscillate. Returns the largest change, m/s.
 double ToolTouch::follow_spin() {
   double most = 0;
   for (size_t k = 0; k < sides_.size(); ++k) {
@@ -306,7 +306,7 @@ double ToolTouch::follow_spin() {
     if (!m.set || m.set->of_tool || !m.touched) continue;
     add_impulses(k);
     bool again = false;
-    if (m.set->end_state(again)) continue;  // it says so at the end of the sub-step
+    if (m.set->end_state(again)) continue;  // the host reports this at the end of the sub-step
     for (uint32_t i = 0; i < m.set->defs.size(); ++i) {
       if (!(m.reach[i] > 0)) continue;
       const size_t at = 6 * size_t{i} + 3;
@@ -327,7 +327,7 @@ Vec3 ToolTouch::spin(const Side &side) const {
   return load3(&m.base[at]) + load3(&m.change[at]);
 }
 
-// (exp(h w) - 1) r / h less its first term: what is held by a tool that turns would creep outwards by it.
+// (exp(h w) - 1) r / h less its first term. Without it, what a turning tool holds would creep outwards.
 Vec3 ToolTouch::bend(Vec3 spin, Vec3 arm) const {
   const bool large = h_ * h_ * norm2(spin) > kSmallTurn * kSmallTurn;
   return bend(spin, large ? turned(Quat{}, h_ * spin) : Quat{}, arm);
@@ -342,8 +342,9 @@ Vec3 ToolTouch::bend(Vec3 spin, const Quat &turn, Vec3 arm) const {
          (h_ * h_ * h_ * h_ / 120) * cross(spin, fourth);
 }
 
-// Of the material at the place. Around a corner the place goes with the normal, which turns with the other
-// side: a ball that rolls has no bend, and a rod that turns with the jaws that hold it the one of a corner.
+// For the material at the place. On a rounded corner the place moves with the normal, which turns with the
+// other side: a rolling ball has no bend, and a rod that turns with the jaws that hold it has that of a
+// corner.
 Vec3 ToolTouch::bend(const Side &side, const Side &other) const {
   const Moved &m = sides_[side.tool];
   if (m.set && m.responds && !m.jaws.empty()) {
@@ -357,14 +358,14 @@ Vec3 ToolTouch::bend(const Side &side, const Side &other) const {
   return out + cross(own, (0.5 * h_) * first + (h_ * h_ / 6) * cross(spin(other), first));
 }
 
-// The derivative of the one above by the spin, along `by`, to second order.
+// Derivative of bend(spin, arm) with respect to the spin, along `by`, to second order.
 Vec3 ToolTouch::bend_slope(Vec3 spin, Vec3 arm, Vec3 by) const {
   const Vec3 first = cross(spin, by),
              goes = arm + h_ * (cross(spin, arm) + (0.5 * h_) * cross(spin, cross(spin, arm)));
   return cross(by + (0.5 * h_) * first + (h_ * h_ / 6) * cross(spin, first), goes) - cross(by, arm);
 }
 
-// What turning adds to a row's speeds, by the present spins. m/s, by how much it has changed.
+// Updates what turning adds to the speeds of a row, from the present spins. Returns the change, m/s.
 double ToolTouch::follow_arc(Row &row) const {
   const Vec3 now = bend(row.a, row.b) + belt(row.a) - bend(row.b, row.a) - belt(row.b);
   const double changed = norm(now - row.bend);
@@ -409,7 +410,7 @@ void ToolTouch::add_row(const Pair &pair, Name name, Side a, Side b, const Place
   } else if (gap >= offset_) row.rate = -(gap - offset_) / h_;
   else if (gap < 0.5 * offset_) row.rate = std::min(0.5 * offset_ - gap, kOpens * offset_) / h_;
   const double w = dot(normal, answer_to(row, normal));
-  if (!(w > 0)) return;  // neither gives way
+  if (!(w > 0)) return;  // neither yields
   row.inverse = 1 / (w + row.soft);
   if (row.frees && row.rate > 0) row.opens = kOpens * offset_ / (h_ * kOpenUpTo * row.inverse);
   row.tangent[0] = any_tangent(normal);
@@ -421,7 +422,8 @@ void ToolTouch::add_row(const Pair &pair, Name name, Side a, Side b, const Place
   rows_.push_back(row);
 }
 
-// Finds what of each is this near to the box of the other. False: nothing.
+// Finds the features of each shape that are this near to the box of the other. Returns false if there are
+// none.
 bool ToolTouch::look_at_each_other(ToolShape &a, ToolShape &b, double far, bool flat) {
   if (a.endless() || b.endless()) {
     const ToolShape &plane = a.endless() ? a : b;
@@ -441,15 +443,16 @@ bool ToolTouch::look_at_each_other(ToolShape &a, ToolShape &b, double far, bool 
   return true;
 }
 
-// Corners of each against the other, and edges that cross. m, by how far a corner is inside; 0: by nothing.
+// Adds rows of the corners of each against the other, and of edges that cross. Returns m, the depth of the
+// deepest corner; 0: none is inside.
 double ToolTouch::add_rows(const Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b) {
   const double reach = 2 * h_ * (fastest(a, at_a, b) + fastest(b, at_b, a)) + offset_;
   const double far = reach + offset_;
   if (!look_at_each_other(a, b, far, pair.jaw)) return 0;
   double deepest = 0;
   ObstaclePoint o;
-  // An edge or a corner is met where a corner leads: beside it lies what is not in the way, as the vertices
-  // of a floor beside the lower edge of a box that slides over it.
+  // A corner meets an edge or a corner of the other only on its leading side. Other near features are not in
+  // the way, such as the vertices of a floor beside the lower edge of a box that slides over it.
   bool face = true;
   for (const ToolShape::Corner &c : a.corners()) {
     const auto &[corner, number] = c;
@@ -496,7 +499,7 @@ ToolTouch::Side ToolTouch::side_of(const Obstacle &o, uint32_t wall) const {
   return out;
 }
 
-// f(pair, the two shapes, their sides): of all that may touch, where one of the two gives way.
+// Calls f(pair, the two shapes, their sides) for all pairs that may touch and of which one yields.
 void ToolTouch::each_pair(const World &w, const StepContext &step, const Visit &f) {
   for (const Pair &pair : pairs_) {
     const Obstacle &a = *w.obstacles[pair.a], &b = *w.obstacles[pair.b];
@@ -517,7 +520,7 @@ void ToolTouch::find(const World &w, const StepContext &step) {
   });
 }
 
-// Gauss-Seidel: the rows are few. Largest change, m/s.
+// One sweep of Gauss-Seidel; the rows are few. Returns the largest change, m/s.
 double ToolTouch::sweep() {
   double most = 0;
   for (uint32_t i = 0; i < rows_.size(); ++i) {
@@ -551,7 +554,7 @@ void ToolTouch::take_impulses(Array<double> &to) const {
     store3(&to[3 * i], {rows_[i].impulse, rows_[i].along[0], rows_[i].along[1]});
 }
 
-// The velocities that the rows' impulses make.
+// Computes the velocities from the impulses of the rows.
 void ToolTouch::push_all() {
   for (Moved &m : sides_) {
     std::fill(m.change.begin(), m.change.end(), 0.0);
@@ -560,9 +563,9 @@ void ToolTouch::push_all() {
   for (const Row &row : rows_) push(row, row.given());
 }
 
-// A few sweeps, and where they are slow, Newton's method and a few more: the result is what a plain sweep has
-// left, and the best one of all. More places than motions that stick have no solution while what turning adds
-// is that of the last pass: a pass ends where nothing is gained.
+// Sweeps; where they converge slowly, Newton's method after every few of them. The result is that of a plain
+// sweep, the best one. If more places stick than there are motions, there is no solution until the terms of
+// turning are those of this pass: so a pass ends when nothing is gained.
 void ToolTouch::sweep_until(double done) {
   double best = HUGE_VAL, before = HUGE_VAL;
   for (uint32_t k = 1;; ++k) {
@@ -584,8 +587,8 @@ void ToolTouch::sweep_until(double done) {
   push_all();
 }
 
-// Passes over the laws, as for soft bodies (step/solve_islands.cpp), with what turning adds beyond the first
-// order, which changes with the solution as well.
+// Passes over the laws, as for soft bodies (step/solve_islands.cpp). The terms of turning beyond the first
+// order depend on the solution as well, and are updated in each pass.
 void ToolTouch::solve() {
   double scale = 0;
   for (const Row &row : rows_)
@@ -605,7 +608,7 @@ void ToolTouch::solve() {
   }
 }
 
-// Velocities and responses of the sets that take part, and how everything else goes.
+// Takes velocities and responses of the sets that take part, and the motion of everything else.
 void ToolTouch::take_sets(World &w, StepContext &step) {
   sides_.resize(sets_.size() + !walls_.empty());
   for (size_t k = 0; k < sides_.size(); ++k) {
@@ -654,10 +657,10 @@ void ToolTouch::take_sets(World &w, StepContext &step) {
   }
 }
 
-// The way of a corner is an arc, and passes over it (solve) converge by a factor of about h w each; from
-// about a radian on they do not, a corner ends in a floor, and energy comes from nowhere. False: something
-// that touches turns so far in this sub-step, which is to be repeated shorter. The arc leaves its tangent by
-// at most (h w)^2 r / 2: what stays clear by that does not touch.
+// A corner moves along an arc. The passes of solve() over it converge by a factor of about h w each; from
+// about a radian on they do not, the corner ends inside a floor, and energy is created. False: something that
+// touches turns so far that the sub-step must be repeated, shorter. The arc leaves its tangent by at most (h
+// w)^2 r / 2: what stays farther away than that does not touch.
 bool ToolTouch::follows_arcs(StepContext &step) const {
   double turn = 0, arrives = 1;
   for (const Row &row : rows_) {

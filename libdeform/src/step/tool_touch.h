@@ -1,25 +1,26 @@
-// Contact of things that are rigid on both sides, where one of the two gives way: tools (deform/tool.h) and
-// free bodies (those of the builtin host that no joint holds), with each other and with what stands or goes
-// its way (obstacles, fixed bodies). A coupled tool gives way by its spring, a free body by its mass; a tool
-// that goes where it is told is a wall. Spheres, capsules, boxes and triangles, with the law of the pair; of
-// obstacles also planes and voxels, which only corners touch.
+// Contact between two rigid things, at least one of which can yield: tools (deform/tool.h) and free bodies
+// (those of the builtin host that no joint holds), with each other and with whatever does not yield
+// (obstacles, fixed bodies). A coupled tool yields by its spring, a free body by its mass; a tool without a
+// coupling follows its poses exactly and does not yield. Shapes are spheres, capsules, boxes and triangles;
+// obstacles may also be planes and voxels, which only corners touch.
 //
 //   rows     u_n' >= -(gap - d_c) / h at the nearest places of two parts, p >= 0, one of both is zero; the
 //            impulse acts at one point of both, so that both momenta are kept to rounding
-//   energy   p u_n' <= 0 for gap >= d_c / 2: such a contact takes energy or none. What is nearer opens by at
+//   energy   p u_n' <= 0 for gap >= d_c / 2: such a contact takes energy or none. A smaller gap opens by at
 //            most a tenth of d_c in a sub-step
-//   turning  of a free body counts to third order, along the normal too: to first order alone a body that
-//            topples would sink by (h w)^2 r / 2 in a sub-step, and it rises by a tenth of d_c. Not of tools:
-//            it would give them p (h w)^2 r / 2 of energy, and their springs hold them upright
+//   turning  The rotation of a free body counts to third order, along the normal too: to first order alone a
+//            body that topples would sink by (h w)^2 r / 2 in a sub-step, which contact then opens by a tenth
+//            of d_c. Not so for tools: it would give them p (h w)^2 r / 2 of energy, and their springs hold
+//            them upright
 //   friction the law of the pair, implicitly, at the slip and normal force of the solution (tool_rub.cpp);
 //            impulses and the state of the law last from sub-step to sub-step (World::tool_store)
-//   jaws     go where they are told, so what two of them hold would be pressed without a bound. Something
+//   jaws     follow their angle exactly, so the force on what two of them hold would have no bound. Something
 //            rigid turns a jaw about its hinge by moment over stiffness, at the end of the sub-step (a spring
-//            without mass, backward Euler); soft bodies do not. Places on its face give way, too, by a
-//            hundredth of a millimeter per newton: how rigid things share a load has no other answer.
-//            Without a coupling jaws go into obstacles, as their tool does
-//   order    first without soft bodies, which then see how the tools really move; their impulses come back
-//            into the same rows until neither changes the other
+//            without mass, backward Euler); soft bodies do not. The face of a jaw yields as well, by a
+//            hundredth of a millimeter per newton; otherwise it would be undefined how rigid things share a
+//            load. Jaws of a tool without a coupling pass through obstacles, as the tool does
+//   order    The rows are solved first without soft bodies, whose contacts then use the resulting motion of
+//            tools; the impulses of soft bodies come back into the same rows, until neither changes the other
 #pragma once
 #include <array>
 #include <cstdint>
@@ -43,24 +44,24 @@ struct World;
 class ToolTouch {
  public:
   explicit ToolTouch(const Memory &memory);
-  // After a change of things or rules: which obstacles may touch, and by which law.
+  // Called after a change of bodies or rules: finds which pairs may touch, and their laws.
   void prepare(World &w, SceneFacts &facts);
-  // Before the solve: the rows of this sub-step, and the sets' velocities with their impulses. False: it has
-  // to be repeated shorter (Guard::again).
+  // Called before the solve: finds and solves the rows of this sub-step, and changes the sets' velocities by
+  // their impulses. Returns false if the sub-step must be repeated, shorter (Guard::again).
   bool begin(World &w, StepContext &step);
-  // The hosts were asked for their velocities anew.
+  // Called after the hosts have predicted their velocities again.
   void correct();
-  // The sets' impulses are those of soft bodies: adds those of the rows. True: they differ from those that
-  // the velocities have, so soft bodies have to be asked again.
+  // Called when the sets hold the impulses of soft bodies: solves the rows again and adds their impulses.
+  // Returns whether these differ from those in the velocities, so that soft bodies must be solved again.
   bool answer(const World &w, const StepContext &step);
-  // Whether the sub-step is short enough for the spin of what touches. False: as begin().
+  // Whether the sub-step is short enough for the spin of what touches. False: as for begin().
   bool follows_arcs(StepContext &step) const;
-  // Once the hosts have ended their sub-step: whether no fast free body has gone through something. False: as
-  // begin().
+  // Called after the hosts have ended their sub-step: whether no fast free body has passed through something.
+  // False: as for begin().
   bool stays_out(const World &w, StepContext &step);
   // Turns the ends of the jaws.
   void turn_jaws();
-  // At the end of a sub-step that stands: what lasts becomes the world's.
+  // Called at the end of an accepted sub-step: moves what lasts to the world.
   void keep(World &w) noexcept;
   ContactStore &next() { return next_; }
 
@@ -90,7 +91,7 @@ class ToolTouch {
     Vec3 given() const { return impulse * normal + along[0] * tangent[0] + along[1] * tangent[1]; }
   };
   struct Moved {
-    RigidSet *set;                           // nullptr: things that stand or go their way
+    RigidSet *set;                           // nullptr: things that do not yield
     std::vector<Vec3> center, belt;          // [n] of these things; m/s
     std::vector<double> response;            // [6 bodies,6 bodies] 1/kg, of one group after another
     std::vector<size_t> first, wide;         // [groups] where it begins (kNone: none), 6 bodies
@@ -107,7 +108,8 @@ class ToolTouch {
       double moment;     // N m s, of the rows
     };
     std::vector<Jaw> jaws;
-    // Jaws of a tool that goes where it is told give way to tools and bodies: its keys lead it along a table.
+    // Whether contact with `to` changes the motion of this side. The jaws of a tool without a coupling yield
+    // to tools and bodies, but not to obstacles: its poses may lead it along a table.
     bool gives(const Obstacle &to) const;
   };
   // Two obstacles that may touch, by their places in World::obstacles.
@@ -118,7 +120,7 @@ class ToolTouch {
     uint32_t wall[2];  // number among walls_; kNone: it is in a set
     double thin;       // m, least thickness of the two
   };
-  // What of the two meets.
+  // Which features of the two meet.
   enum Meeting : uint32_t { kCornerOfA, kCornerOfB, kEdges, kHitEdges };
   struct Name {
     Meeting kind;
@@ -252,7 +254,7 @@ class ToolTouch {
   std::vector<double> ways_;  // [obstacles] m, of any point in the sub-step
   double thinnest_ = 0;       // m, of the pairs of free bodies
   std::vector<Pair> pairs_,
-      passing_;                   // passing: nothing keeps the two apart, and nobody says that this is meant
+      passing_;                   // passing: nothing keeps the two apart, and no filter excludes them
   std::vector<RigidSet *> sets_;  // that take part
   std::vector<uint32_t> walls_;   // places in World::obstacles of those in no set of these
   std::vector<Moved> sides_;      // valid where there are rows; kept for their memory, as shapes_ are

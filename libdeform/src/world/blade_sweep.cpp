@@ -1,16 +1,16 @@
-// A cut must have no gaps where the body moves between two steps of the blade. So it is cells that take a
-// side, and faces follow: each cell takes the side of the blade on which its middle lies as the edge comes
-// past it, and keeps it, and a face opens if the sides of its cells differ. Around each edge of the mesh the
-// number of faces that open is even then, whatever the body does; where each face asks by itself whether the
-// blade has crossed it, two that ask in different steps may disagree (decision 0404).
+// A cut must have no gaps, even if the body moves between two steps of the blade. So cells take a side, and
+// faces follow: each cell takes the side of the blade on which its center lies when the edge passes it, and
+// keeps it; a face opens if the sides of its two cells differ. Around each edge of the mesh the number of
+// faces that open is then even, however the body moves. If each face tested by itself whether the blade has
+// crossed it, two faces tested in different steps could disagree (decision 0404).
 //
 //                forward
 //       . |  .      ^        ahead: may still change sides
 //   ------+---------+-edge-- passed: has its side. The face between two of different sides opens where the
-//    .    |   .              line between their middles meets the blade's way behind the edge and between
+//    .    |   .              line between their centers meets the blade's way behind the edge and between
 //      +  | -                its ends.
 //
-// A cell that the edge has left far behind, or to its side, has none any more: the blade may come again.
+// A cell that the edge has left far behind, or far to its side, loses its side: the blade may come again.
 #include "world/blade_sweep.h"
 
 #include <algorithm>
@@ -31,8 +31,8 @@ namespace {
 constexpr size_t kMostTracks = 8;  // blades that cut a body by turns
 // of the largest distance between neighbors: how far from the edge sides are kept
 constexpr double kKept = 2;
-// of the median edge: a blade that has come so far forward has begun to cut, and a body that is so far from
-// it is not looked at
+// of the median edge: a blade that has moved forward this far has begun to cut; a body this far from it is
+// skipped
 constexpr double kBegun = 1e-3, kReach = 8;
 
 Vec3 middle_of(const Body &b, const double *x, uint32_t cell) {
@@ -40,7 +40,7 @@ Vec3 middle_of(const Body &b, const double *x, uint32_t cell) {
   return 0.25 * ((at(0) + at(1)) + (at(2) + at(3)));
 }
 
-// What takes the line from a to b, as it was, to where it is: the smallest rotation, and a scale.
+// The motion of the line from a to b: the smallest rotation, and a scale.
 class LineMotion {
  public:
   LineMotion(Vec3 a0, Vec3 b0, Vec3 a1, Vec3 b1) : from_(0.5 * (a0 + b0)), to_(0.5 * (a1 + b1)) {
@@ -224,7 +224,7 @@ void BladeSweep::find_near(const Body &b) {
   }
 }
 
-// Where the blade looks. false: nobody knows.
+// The blade's forward direction. Returns false if it is unknown.
 bool BladeSweep::turn(const Body &b, const Vec3 *forward) {
   const Vec3 *const c = blade_.corner;
   for (const Near &n : near_) drift_ += (1 / double(near_.size())) * (n.is - n.was);
@@ -232,10 +232,10 @@ bool BladeSweep::turn(const Body &b, const Vec3 *forward) {
   if (forward) {
     std::copy_n(forward, 2, looks);
   } else {
-    // The way of late, over about an edge: the body may tremble, and the blade be slow.
+    // The recent motion, over about the length of an edge: the body may vibrate while the blade is slow.
     const Vec3 way = 0.5 * ((c[3] - c[0]) + (c[2] - c[1])) - drift_;
     const Vec3 lead = dfm_exp(-norm(way) / b.surface.median_edge) * lead_ + way;
-    if (dot(lead, lead_) < 0) {  // it has turned back, and begins anew
+    if (dot(lead, lead_) < 0) {  // it has turned back, and begins again
       fresh_ = true;
       way_[0] = way_[1] = 0;
     }
@@ -251,7 +251,7 @@ bool BladeSweep::turn(const Body &b, const Vec3 *forward) {
 }
 
 void BladeSweep::find_faces(const Body &b) {
-  std::vector<uint8_t> is_near(b.ncell());  // small, as each face asks for two
+  std::vector<uint8_t> is_near(b.ncell());  // small, as each face reads two
   std::vector<uint32_t> place(b.ncell());
   for (size_t i = 0; i < near_.size(); ++i) {
     is_near[near_[i].cell] = 1;

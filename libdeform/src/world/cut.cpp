@@ -112,7 +112,7 @@ CutReport cut(Body &b, const Array<uint8_t> &removed, OpenFaces &&open) {
   CutMesh mesh = make_cut_mesh(m, b.p.n, b.ncell(), b.tets.data(), removed, open.own);
   if (mesh.cell.empty()) return empty(b);
   out.removed = b.ncell() - static_cast<uint32_t>(mesh.cell.size());
-  // all that takes memory comes before the cut is made, since a cut that is made has to be told
+  // all memory is taken before the cut is made, because a cut that is made must be reported
   out.parts = count_parts(m, uint32_t(mesh.point.size()), uint32_t(mesh.cell.size()), mesh.tets.data());
   std::vector<uint8_t> seen(b.p.n);
   for (const uint32_t p : mesh.point) out.copies += std::exchange(seen[p], uint8_t{1});
@@ -288,7 +288,7 @@ CutReport split_by_blade(Body &b, const CutShape &asked, uint32_t most) {
   out.fracture = work;
   if (asked.kind == CutKind::plane) return out;  // it comes from nowhere, and goes on nowhere
   if (norm2(way) > 0) out.force = (-work / norm2(way)) * way;
-  // without memory, the next blade that comes to where this one is begins anew
+  // without memory, the next blade that comes here begins again
   found_memory([&] { sweep.keep(b); });
   return out;
 }

@@ -47,7 +47,7 @@ void put_opened(Body &b, MadeShape &made);
 uint32_t present_cell(const Body &b, uint32_t whole);           // kNone: it has gone
 uint64_t face_of_whole(const Body &b, uint32_t i, uint32_t j);  // between present cells
 
-// Room for as many events behind those of what a cut ends, so that what a cut has done can be told.
+// Reserves this many events after those of what a cut ends, so that the result of a cut can be reported.
 void reserve_cut_events(World &w, size_t n);
 
 // Whether f had the memory that it needs.

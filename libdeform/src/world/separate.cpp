@@ -1,6 +1,6 @@
-// A separation takes three steps that may fail, beside what the world has: the pieces are made from the
-// present state, the body is made anew from the cells that stay, and what the world keeps by features
-// (contacts, attachments) is told where these have gone. Then all is put in place at once.
+// A separation takes three steps that may fail: the pieces are made from the present state; the body is built
+// again from the cells that stay; contacts and attachments, which the world stores by features, are mapped to
+// the new features. Until then the world is unchanged; after that all is exchanged at once.
 #include "world/separate.h"
 
 #include <algorithm>

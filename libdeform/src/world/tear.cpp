@@ -1,7 +1,8 @@
-// A point stands for the cells around it: its strain is the mean of their left Cauchy-Green tensors
-// B = F F^T, weighted by their rest volumes. Where sqrt(largest eigenvalue) - 1 is above what the material
-// bears, the point is split by the plane across that eigenvector: the faces between cells on both sides of it
-// open. So each split adds a copy of a point, whatever the mesh, and no cell is divided (decision 0383).
+// A point represents the cells around it: its strain is the mean of their left Cauchy-Green tensors B = F
+// F^T, weighted by their rest volumes. Where sqrt(largest eigenvalue) - 1 exceeds the strain at which the
+// material tears, the point is split by the plane normal to that eigenvector: the faces between cells on
+// different sides of it open. So each split adds a copy of a point, on any mesh, and no cell is divided
+// (decision 0383).
 #include "world/tear.h"
 
 #include <algorithm>
