@@ -286,8 +286,44 @@ Masses::Masses(const Law &law, const Scales &scales, uint32_t n)
   if (law.needs(DFM_NEED_FN)) std::fill_n(lanes.fn, n, scales.fn);
 }
 
-// The root of r(v) = m (v - v0)/h - f - ft(v), by bracket and Illinois steps, in all lanes at once. With
-// FT_STOP the law itself says where it holds.
+// Until two values of r differ in sign, a step by the slope; then a step of the Illinois method.
+void Masses::Root::take(double r, int round) {
+  if (round == 0) {
+    a = at;
+    ra = r;
+    at = a - r / slope;
+  } else if (!bracket) {
+    if ((r > 0) != (ra > 0)) {
+      bracket = true;
+      b = at;
+      rb = r;
+    } else {
+      // a wider step: the friction stiffens what the mass alone would do
+      slope *= 0.5;
+      a = at;
+      ra = r;
+      at -= r / slope;
+    }
+  } else if ((r > 0) == (rb > 0)) {
+    b = at;
+    rb = r;
+    ra = side == 1 ? 0.5 * ra : ra;
+    side = 1;
+  } else {
+    a = at;
+    ra = r;
+    rb = side == 2 ? 0.5 * rb : rb;
+    side = 2;
+  }
+  if (!bracket) return;
+  double next = b - rb * (b - a) / (rb - ra);
+  if (round % 8 == 7 || !std::isfinite(next)) next = 0.5 * (a + b);
+  done = next == a || next == b || std::fabs(b - a) <= 4e-16 * std::max(std::fabs(a), std::fabs(b));
+  at = next;
+}
+
+// The root of r(v) = m (v - v0)/h - f - ft(v), in all lanes at once. With FT_STOP the law itself says where
+// it holds.
 void Masses::step(const std::vector<double> &force, double h) {
   const uint32_t n = lanes.n;
   roots_.resize(n);
@@ -325,40 +361,7 @@ void Masses::step(const std::vector<double> &force, double h) {
         continue;
       }
       all = false;
-      if (round == 0) {
-        q.a = q.at;
-        q.ra = r;
-        q.at = q.a - r / q.slope;
-      } else if (!q.bracket) {
-        if ((r > 0) != (q.ra > 0)) {
-          q.bracket = true;
-          q.b = q.at;
-          q.rb = r;
-        } else {
-          // a wider step: the friction stiffens what the mass alone would do
-          q.slope *= 0.5;
-          q.a = q.at;
-          q.ra = r;
-          q.at -= r / q.slope;
-        }
-      } else if ((r > 0) == (q.rb > 0)) {
-        q.b = q.at;
-        q.rb = r;
-        q.ra = q.side == 1 ? 0.5 * q.ra : q.ra;
-        q.side = 1;
-      } else {
-        q.a = q.at;
-        q.ra = r;
-        q.rb = q.side == 2 ? 0.5 * q.rb : q.rb;
-        q.side = 2;
-      }
-      if (!q.bracket) continue;
-      double next = q.b - q.rb * (q.b - q.a) / (q.rb - q.ra);
-      if (round % 8 == 7 || !std::isfinite(next)) next = 0.5 * (q.a + q.b);
-      if (next == q.a || next == q.b ||
-          std::fabs(q.b - q.a) <= 4e-16 * std::max(std::fabs(q.a), std::fabs(q.b)))
-        q.done = true;
-      q.at = next;
+      q.take(r, round);
     }
     if (all) break;
   }

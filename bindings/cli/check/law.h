@@ -84,10 +84,12 @@ struct Masses {
   std::vector<double> x, v, resist;  // resist: -ft of the last step
 
  private:
+  // The search of one lane: r is known at a, and at b once the root lies between; next try `at`.
   struct Root {
     double a, b, ra, rb, at, slope;
     bool done, bracket, held;
     int side;
+    void take(double r, int round);  // r: at `at`
   };
   std::vector<Root> roots_;
 };

@@ -199,16 +199,47 @@ Answer in_fresh_process(const std::string &command, std::vector<std::string> arg
   return in_own_process(become, limits);
 }
 
+namespace {
+
+void open_pipe(int ends[2]) {
+  if (pipe2(ends, O_CLOEXEC) != 0)
+    throw Failure(
+        kBadInput,
+        "no pipe could be opened for the process of a rule; close programs or raise the limit of open files");
+}
+
+// What the child writes: its reports, and what comes on its standard streams, of which the start is kept.
+class Heard {
+ public:
+  explicit Heard(Answer &out) : out_(out) {}
+  void take_report(const char *bytes, ssize_t n) {
+    pending_.append(bytes, static_cast<size_t>(n));
+    read_reports(out_, pending_);
+  }
+  void take_output(const char *bytes, ssize_t n) {
+    if (out_.said.size() < 65536) out_.said.append(bytes, static_cast<size_t>(n));
+  }
+
+ private:
+  Answer &out_;
+  std::string pending_;
+};
+
+// What the child wrote before it ended; a process that it left behind is not waited for.
+template <class Take>
+void read_rest(int fd, Take take) {
+  char buffer[4096];
+  fcntl(fd, F_SETFL, O_NONBLOCK);
+  for (ssize_t n; (n = read(fd, buffer, sizeof buffer)) > 0;) take(buffer, n);
+  close(fd);
+}
+
+}  // namespace
+
 Answer in_own_process(const std::function<void()> &work, const Limits &limits) {
   int reports[2], output[2];
-  if (pipe2(reports, O_CLOEXEC) != 0)
-    throw Failure(
-        kBadInput,
-        "no pipe could be opened for the process of a rule; close programs or raise the limit of open files");
-  if (pipe2(output, O_CLOEXEC) != 0)
-    throw Failure(
-        kBadInput,
-        "no pipe could be opened for the process of a rule; close programs or raise the limit of open files");
+  open_pipe(reports);
+  open_pipe(output);
   // or the child would print what waits here once more
   std::fflush(nullptr);
   const pid_t child = fork();
@@ -219,7 +250,7 @@ Answer in_own_process(const std::function<void()> &work, const Limits &limits) {
     throw Failure(kBadInput,
                   "the system cannot start another process for a rule; close programs, or use --in-process");
   Answer out;
-  std::string pending;
+  Heard heard(out);
   pollfd ends[2] = {{reports[0], POLLIN, 0}, {output[0], POLLIN, 0}};
   clockid_t clock;
   const bool timed = clock_getcpuclockid(child, &clock) == 0;
@@ -233,13 +264,9 @@ Answer in_own_process(const std::function<void()> &work, const Limits &limits) {
     for (int k = 0; k < 2; ++k) {
       if (!(ends[k].revents & (POLLIN | POLLHUP | POLLERR))) continue;
       const ssize_t n = read(ends[k].fd, buffer, sizeof buffer);
-      // at its end: poll passes over negative descriptors
-      if (n <= 0) {
-        ends[k].fd = -1 - ends[k].fd;
-      } else if (k == 0) {
-        pending.append(buffer, static_cast<size_t>(n));
-        read_reports(out, pending);
-      } else if (out.said.size() < 65536) out.said.append(buffer, static_cast<size_t>(n));
+      if (n <= 0) ends[k].fd = -1;  // at its end: poll passes over negative descriptors
+      else if (k == 0) heard.take_report(buffer, n);
+      else heard.take_output(buffer, n);
     }
     if (const double used = timed ? clock_of(clock) : -1; used >= 0) out.seconds = used;
     const double clock_now = clock_of(CLOCK_MONOTONIC);
@@ -256,17 +283,8 @@ Answer in_own_process(const std::function<void()> &work, const Limits &limits) {
     }
     ended = waitpid(child, &status, WNOHANG) == child;
   }
-  // what it wrote before it ended; a process it left behind is not waited for
-  for (int k = 0; k < 2; ++k) {
-    const int fd = ends[k].fd < 0 ? -1 - ends[k].fd : ends[k].fd;
-    fcntl(fd, F_SETFL, O_NONBLOCK);
-    for (ssize_t n; (n = read(fd, buffer, sizeof buffer)) > 0;) {
-      if (k == 0) pending.append(buffer, static_cast<size_t>(n));
-      else if (out.said.size() < 65536) out.said.append(buffer, static_cast<size_t>(n));
-    }
-    close(fd);
-  }
-  read_reports(out, pending);
+  read_rest(reports[0], [&](const char *bytes, ssize_t n) { heard.take_report(bytes, n); });
+  read_rest(output[0], [&](const char *bytes, ssize_t n) { heard.take_output(bytes, n); });
   kill(-child, SIGKILL);
   if (!out.spoke)
     out.ending = waited     ? text("did not come back: it has waited for %g s for something that never comes",

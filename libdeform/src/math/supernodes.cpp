@@ -73,6 +73,56 @@ bool worth_merging(uint64_t columns, uint64_t zeros, uint64_t all) {
   return columns <= 2 ? share < 0.8 : columns <= 6 ? share < 0.5 : columns <= 16 ? share < 0.2 : share < 0.05;
 }
 
+// A supernode while they are found: columns begin..end-1, the rows below them, and the zeros that it stores.
+struct Node {
+  uint32_t begin, end, zeros;
+  std::vector<uint32_t> rows;
+};
+
+// Merges the last supernode with its child, if that ends where it begins and the cost falls.
+bool merge_last(std::vector<Node> &nodes) {
+  if (nodes.size() < 2) return false;
+  Node &own = nodes.back();
+  const Node &child = nodes[nodes.size() - 2];
+  if (child.rows.empty() || child.rows[0] < own.begin || child.rows[0] >= own.end) return false;
+  const uint64_t wide = own.end - child.begin, child_wide = child.end - child.begin;
+  const uint64_t fresh = child_wide * ((own.end - own.begin) + own.rows.size() - child.rows.size());
+  const uint64_t zeros = own.zeros + child.zeros + fresh;
+  const uint64_t all = wide * (wide + 1) / 2 + wide * own.rows.size();
+  if (fresh && !worth_merging(wide, zeros, all)) return false;
+  own.zeros = uint32_t(zeros);
+  own.begin = child.begin;
+  nodes.erase(nodes.end() - 2);
+  return true;
+}
+
+// Rows of a column: those of the matrix and those of its children in the elimination tree. later: neighbors
+// in the matrix, above: the parent of a column.
+std::vector<Node> find_nodes(const Graph &later, const std::vector<uint32_t> &above) {
+  const uint32_t n = uint32_t(above.size());
+  std::vector<std::vector<uint32_t>> children(n);
+  for (uint32_t j = 0; j < n; ++j)
+    if (above[j] != kNone) children[above[j]].push_back(j);
+  std::vector<Node> nodes;
+  std::vector<uint32_t> node_of(n), seen(n, kNone), found;
+  const auto add = [&](uint32_t j, uint32_t row) {
+    if (row == j || seen[row] == j) return;
+    seen[row] = j;
+    found.push_back(row);
+  };
+  for (uint32_t j = 0; j < n; ++j) {
+    found.clear();
+    for (uint32_t e = later.begin[j]; e < later.begin[j + 1]; ++e) add(j, later.other[e]);
+    for (const uint32_t c : children[j])
+      for (const uint32_t row : nodes[node_of[c]].rows) add(j, row);
+    std::sort(found.begin(), found.end());
+    nodes.push_back({j, j + 1, 0, found});
+    while (merge_last(nodes)) {}
+    for (uint32_t k = nodes.back().begin; k <= j; ++k) node_of[k] = uint32_t(nodes.size() - 1);
+  }
+  return nodes;
+}
+
 }  // namespace
 
 Supernodes::Supernodes(const Memory &memory) {
@@ -89,58 +139,13 @@ void Supernodes::build(const BlockPattern &pattern) {
 void Supernodes::build(const BlockPattern &pattern, const uint32_t *order) {
   const uint32_t n = pattern.n;
   place.resize(n);
-  {
-    for (uint32_t k = 0; k < n; ++k) place[order[k]] = k;
-    const std::vector<uint32_t> position = postorder(elimination_tree(neighbors(pattern, place, false)));
-    for (uint32_t i = 0; i < n; ++i) place[i] = position[place[i]];
-  }
+  for (uint32_t k = 0; k < n; ++k) place[order[k]] = k;
+  const std::vector<uint32_t> position = postorder(elimination_tree(neighbors(pattern, place, false)));
+  for (uint32_t i = 0; i < n; ++i) place[i] = position[place[i]];
   const std::vector<uint32_t> above = elimination_tree(neighbors(pattern, place, false));
   const Graph later = neighbors(pattern, place, true);
 
-  // Rows of a column: those of the matrix and those of its children. A column whose rows are those of the
-  // next column, and the next column itself, joins it at once.
-  struct Node {
-    uint32_t begin, end, zeros;
-    std::vector<uint32_t> rows;
-  };
-  std::vector<std::vector<uint32_t>> children(n);
-  for (uint32_t j = 0; j < n; ++j)
-    if (above[j] != kNone) children[above[j]].push_back(j);
-  std::vector<Node> nodes;
-  std::vector<uint32_t> node_of(n), seen(n, kNone), found;
-  const auto add = [&](uint32_t j, uint32_t row) {
-    if (row == j || seen[row] == j) return;
-    seen[row] = j;
-    found.push_back(row);
-  };
-  const auto merge = [&](Node &into) {  // the preceding node, which is its child
-    Node &child = nodes[nodes.size() - 2];
-    into.begin = child.begin;
-    nodes.erase(nodes.end() - 2);
-  };
-  for (uint32_t j = 0; j < n; ++j) {
-    found.clear();
-    for (uint32_t e = later.begin[j]; e < later.begin[j + 1]; ++e) add(j, later.other[e]);
-    for (const uint32_t c : children[j])
-      for (const uint32_t row : nodes[node_of[c]].rows) add(j, row);
-    std::sort(found.begin(), found.end());
-    nodes.push_back({j, j + 1, 0, found});
-    // Merge the child that ends where this node begins, as long as this reduces the cost.
-    while (nodes.size() > 1) {
-      Node &own = nodes.back();
-      const Node &child = nodes[nodes.size() - 2];
-      if (child.rows.empty() || child.rows[0] < own.begin || child.rows[0] >= own.end) break;
-      const uint64_t wide = own.end - child.begin, child_wide = child.end - child.begin;
-      const uint64_t fresh = child_wide * ((own.end - own.begin) + own.rows.size() - child.rows.size());
-      const uint64_t zeros = own.zeros + child.zeros + fresh;
-      const uint64_t all = wide * (wide + 1) / 2 + wide * own.rows.size();
-      if (fresh && !worth_merging(wide, zeros, all)) break;
-      own.zeros = uint32_t(zeros);
-      merge(nodes.back());
-    }
-    for (uint32_t k = nodes.back().begin; k <= j; ++k) node_of[k] = uint32_t(nodes.size() - 1);
-  }
-
+  const std::vector<Node> nodes = find_nodes(later, above);
   const uint32_t ns = uint32_t(nodes.size());
   begin.resize(size_t{ns} + 1);
   row_begin.resize(size_t{ns} + 1);
@@ -158,6 +163,11 @@ void Supernodes::build(const BlockPattern &pattern, const uint32_t *order) {
     value_begin[s + 1] = value_begin[s] + 9 * size_t{width(s)} * height(s);
     for (uint32_t k = node.begin; k < node.end; ++k) owner[k] = s;
   }
+  link_parents();
+}
+
+void Supernodes::link_parents() {
+  const uint32_t ns = count();
   relative.resize(rows.size());
   stack = 0;
   size_t used = 0;

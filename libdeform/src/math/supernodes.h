@@ -37,6 +37,9 @@ struct Supernodes {
   Array<uint32_t> relative;   // as rows: the place of a row in the parent, pivots first
   Array<size_t> value_begin;  // [count + 1] of the panels [3 width][3 height], column after column
   size_t stack = 0;           // doubles that the updates of children need at most
+
+ private:
+  void link_parents();  // parent, relative and stack, from the rest
 };
 
 }  // namespace dfm

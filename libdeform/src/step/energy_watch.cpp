@@ -338,11 +338,10 @@ void change_gravity(World &w, Vec3 gravity) {
   }
 }
 
-bool watch_energy(World &w, StepContext &step, uint32_t *trouble) {
-  // pieces of a sub-step are not compared with whole ones
-  if (!watching(w) || step.guard.planned != step.h) return true;
-  double moving = 0;
-  for (const uint32_t i : step.active) moving += watched(*w.bodies[i]) ? step.free_kinetic[i] : 0;
+namespace {
+
+// Whether the energies are to be computed: after kEvery sub-steps, and earlier if a body moves much faster.
+bool check_due(const World &w, const StepContext &step) {
   const double limit = w.def.energy_watch * w.stats.energy_max;
   bool due = w.watch.age >= kEvery || pair_over(w);
   for (const uint32_t i : step.active) {
@@ -352,31 +351,34 @@ bool watch_energy(World &w, StepContext &step, uint32_t *trouble) {
     due = due || (watched(*w.bodies[i]) &&
                   (e.known == kSettles ? faster : wants_base && w.watch.credit >= kLookCosts));
   }
-  dfm_world_stats &s = w.stats;
-  if (!due) {
-    s.energy_max = std::max(s.energy_max, moving);
-    return true;
-  }
-  w.watch.credit -= std::min(w.watch.credit, kLookCosts);
+  return due;
+}
+
+// The energies of all watched bodies, J, and what they have gained beyond what their books explain.
+struct Balance {
   double total = 0, gain = 0;
   struct {
     const Body *body = nullptr;
-    double rise = 0, share = 0;
+    double rise = 0, share = 0;  // share: of the largest energy, that is allowed
   } worst;
+};
+Balance take_balance(World &w, StepContext &step) {
+  Balance out;
+  auto &worst = out.worst;
   look_at_all(w, step);
   for (size_t k = 0; k < step.active.size(); ++k) {
     Body &b = *w.bodies[step.active[k]];
     const EnergyLook &now = step.looks[k];
     if (!now.known) continue;
     EnergyBook &e = b.energy;
-    total += now.kinetic + now.elastic;
+    out.total += now.kinetic + now.elastic;
     if (unbooked(w, b)) continue;
     const bool settled = e.known == kSettles, hidden = hides(b);
     const double rise = now.balance - e.base - now.rounding, share = w.def.energy_watch + allowed(b);
     // before the first look `base` is what a hidden energy may be
     const double level = now.balance + now.gives_back + (hidden && !e.known ? e.base : 0);
-    if (settled && rise > 0) gain += rise;
-    if (settled && rise > share * s.energy_max && rise > worst.rise) worst = {&b, rise, share};
+    if (settled && rise > 0) out.gain += rise;
+    if (settled && rise > share * w.stats.energy_max && rise > worst.rise) worst = {&b, rise, share};
     // what a hidden energy takes it may give back
     if (!settled) e.base = e.known ? std::max(e.base, level) : level;
     else if (!hidden) e.base = std::min(e.base, level);
@@ -384,35 +386,49 @@ bool watch_energy(World &w, StepContext &step, uint32_t *trouble) {
     // what contact takes away again included: it is compared with the same of later sub-steps
     e.kinetic = step.free_kinetic[step.active[k]];
   }
-  if (w.watch.age == ~0u) s.energy_start = total;
+  return out;
+}
+
+// Ends the run, with this sentence. The next step is checked again.
+bool stop_for_energy(World &w, uint32_t *trouble, const std::string &why) {
+  *trouble |= DFM_TROUBLE_ENERGY;
+  w.watch.age = kEvery;
+  set_last_error(why.c_str());
+  return false;
+}
+
+}  // namespace
+
+bool watch_energy(World &w, StepContext &step, uint32_t *trouble) {
+  // pieces of a sub-step are not compared with whole ones
+  if (!watching(w) || step.guard.planned != step.h) return true;
+  double moving = 0;
+  for (const uint32_t i : step.active) moving += watched(*w.bodies[i]) ? step.free_kinetic[i] : 0;
+  dfm_world_stats &s = w.stats;
+  if (!check_due(w, step)) {
+    s.energy_max = std::max(s.energy_max, moving);
+    return true;
+  }
+  w.watch.credit -= std::min(w.watch.credit, kLookCosts);
+  const Balance now = take_balance(w, step);
+  const auto &worst = now.worst;
+  if (w.watch.age == ~0u) s.energy_start = now.total;
   w.watch.age = 0;
-  const double largest = std::max(s.energy_max, total - worst.rise);
-  if (worst.rise > worst.share * largest) {
-    s.energy_gain = std::max(s.energy_gain, gain);
-    *trouble |= DFM_TROUBLE_ENERGY;
-    w.watch.age = kEvery;  // the next step is checked again
-    set_last_error(
+  s.energy_gain = std::max(s.energy_gain, now.gain);
+  const double largest = std::max(s.energy_max, now.total - worst.rise);
+  if (worst.rise > worst.share * largest)
+    return stop_for_energy(
+        w, trouble,
         format("step %llu, body '%s' of model '%s': its energy has grown by %.3g J beyond what loads, "
-               "motions and "
-               "contact have put in (limit: %g %% of %.3g J, the largest energy so far); take a shorter "
-               "step, or "
-               "give the material stiffness damping; where the model is a plugin's, check its forces "
-               "(energy_watch sets the limit, 0 switches the watch off)",
+               "motions and contact have put in (limit: %g %% of %.3g J, the largest energy so far); take a "
+               "shorter step, or give the material stiffness damping; where the model is a plugin's, check "
+               "its forces (energy_watch sets the limit, 0 switches the watch off)",
                static_cast<unsigned long long>(w.step_count), worst.body->name.c_str(),
-               worst.body->model.type->id, worst.rise, 100 * worst.share, largest)
-            .c_str());
-    return false;
-  }
-  s.energy_max = std::max({s.energy_max, total, moving});
-  s.energy_gain = std::max(s.energy_gain, gain);
+               worst.body->model.type->id, worst.rise, 100 * worst.share, largest));
+  s.energy_max = std::max({s.energy_max, now.total, moving});
   const std::string pair = tell_pair_gain(w);
-  if ((w.watch.told = !pair.empty())) {
-    *trouble |= DFM_TROUBLE_ENERGY;
-    w.watch.age = kEvery;
-    set_last_error(pair.c_str());
-    return false;
-  }
-  return true;
+  w.watch.told = !pair.empty();
+  return w.watch.told ? stop_for_energy(w, trouble, pair) : true;
 }
 
 void book_energy(World &w, StepContext &step, double motion) {

@@ -126,6 +126,60 @@ bool sleep(World &w, StepContext &step, uint32_t *) {
 
 }  // namespace row
 
+namespace {
+
+// Sub-steps that a step of dt needs, at the present bound (infinite if there is none).
+double least_sub_steps(const World &w, double dt) { return std::ceil(dt / w.bound.step - 1e-9); }
+
+// The step needs more than max_substeps, and nothing has moved yet. Bodies may become implicit instead.
+dfm_status refuse_step(World &w, double dt, uint32_t *trouble) {
+  if (may_take_up_implicit(w)) end_explicit_step();
+  const Body *const b = w.bound.body;
+  const bool implicit = b && !b->model.stepper && b->model.can(DFM_CAP_STIFFNESS);
+  set_last_error(
+      format("a step of %g s needs %g sub-steps of %g s (max_substeps %u): %ssoften or coarsen body '%s', "
+             "whose point %u bounds the step, lower its damping, or take a shorter step",
+             dt, least_sub_steps(w, dt), w.bound.step, w.def.max_substeps,
+             implicit ? "let bodies move by tr_bdf2 or implicit_euler, " : "", b ? b->name.c_str() : "?",
+             w.bound.point)
+          .c_str());
+  *trouble |= DFM_TROUBLE_SUBSTEPS;
+  return DFM_DISCARD;
+}
+// The bound has fallen so far within the step that the rest of it needs too many.
+dfm_status refuse_rest(World &w, double goal) {
+  if (may_take_up_implicit(w)) end_explicit_step();
+  set_last_error(format("step %llu: the shape of body '%s' has changed so much that the rest of the "
+                        "step needs %g sub-steps of %g s (max_substeps %u); take a shorter step",
+                        static_cast<unsigned long long>(w.step_count),
+                        w.bound.body ? w.bound.body->name.c_str() : "?",
+                        std::ceil((goal - w.time) / w.bound.step), w.bound.step, w.def.max_substeps)
+                     .c_str());
+  return DFM_E_DIVERGED;
+}
+
+// The rest of a step, from `from` to `goal`, in `n` equal sub-steps, of which the first `taken` are done.
+struct Division {
+  double from, span, goal;
+  uint32_t n, taken;
+
+  Division(double now, double dt, uint32_t count) : from(now), span(dt), goal(now + dt), n(count), taken(0) {}
+  // Into `count` sub-steps from now on.
+  void again(double now, uint32_t count) {
+    from = now;
+    span = goal - now;
+    n = count;
+    taken = 0;
+  }
+  bool over() const { return taken == n; }
+  uint32_t left() const { return n - taken; }
+  double size() const { return span / n; }
+  bool last() const { return taken + 1 == n; }
+  double next() const { return last() ? goal : from + span * (double(taken + 1) / n); }  // s, its end
+};
+
+}  // namespace
+
 dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
   drop_released(w);
   prepare(w);
@@ -134,21 +188,7 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
   release_overlaps(w);
   if (!std::exchange(w.overlaps.told, true)) *trouble |= DFM_TROUBLE_OVERLAP;
   if (bound_due(w)) update_bound(w);
-  const double needed = std::ceil(dt / w.bound.step - 1e-9);  // bound.step is infinite without a bound
-  if (!(needed <= w.def.max_substeps)) {
-    if (may_take_up_implicit(w)) end_explicit_step();
-    const Body *const b = w.bound.body;
-    const bool implicit = b && !b->model.stepper && b->model.can(DFM_CAP_STIFFNESS);
-    set_last_error(
-        format("a step of %g s needs %g sub-steps of %g s (max_substeps %u): %ssoften or coarsen body '%s', "
-               "whose point %u bounds the step, lower its damping, or take a shorter step",
-               dt, needed, w.bound.step, w.def.max_substeps,
-               implicit ? "let bodies move by tr_bdf2 or implicit_euler, " : "", b ? b->name.c_str() : "?",
-               w.bound.point)
-            .c_str());
-    *trouble |= DFM_TROUBLE_SUBSTEPS;
-    return DFM_DISCARD;
-  }
+  if (!(least_sub_steps(w, dt) <= w.def.max_substeps)) return refuse_step(w, dt, trouble);
   const StepSizes before = w.sizes;
   const uint32_t n =
       static_cast<uint32_t>(std::min<double>(w.def.max_substeps, choose_pieces(w.sizes, dt, w.bound.step)));
@@ -160,45 +200,25 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
 
   begin_impulses(w.step_impulses);
   begin_tools(w, dt);
-  const double goal = w.time + dt;
-  // `cut` equal sub-steps fill `span` from `from` on; the rest of the step is divided anew if the bound has
-  // fallen
-  double from = w.time, span = dt;
-  uint32_t cut = n, done = 0;
-  for (uint32_t k = 0; k < cut; ++k, ++done) {
+  uint32_t done = 0;
+  for (Division rest(w.time, dt, n); !rest.over(); ++done) {
     if (bound_due(w)) {
       update_bound(w);
       if (w.bound.inverted) *trouble |= DFM_TROUBLE_INVERTED;
-      const double more = (cut - k) * cut_finer(w.sizes, span / cut, w.bound.step);
-      if (!(done + more <= w.def.max_substeps)) {
-        if (may_take_up_implicit(w)) end_explicit_step();
-        set_last_error(format("step %llu: the shape of body '%s' has changed so much that the rest of the "
-                              "step needs %g sub-steps of %g s (max_substeps %u); take a shorter step",
-                              static_cast<unsigned long long>(w.step_count),
-                              w.bound.body ? w.bound.body->name.c_str() : "?",
-                              std::ceil((goal - w.time) / w.bound.step), w.bound.step, w.def.max_substeps)
-                           .c_str());
-        return DFM_E_DIVERGED;
-      }
-      if (more > cut - k) {
-        if (!(w.watch.size_before > 0)) w.watch.size_before = span / cut;
-        from = w.time;
-        span = goal - w.time;
-        cut = static_cast<uint32_t>(more);
-        k = 0;
+      const double more = rest.left() * cut_finer(w.sizes, rest.size(), w.bound.step);
+      if (!(done + more <= w.def.max_substeps)) return refuse_rest(w, rest.goal);
+      if (more > rest.left()) {
+        if (!(w.watch.size_before > 0)) w.watch.size_before = rest.size();
+        rest.again(w.time, static_cast<uint32_t>(more));
         *trouble |= DFM_TROUBLE_SUBSTEPS;
       }
     }
-    const bool last = k + 1 == cut;
-    const double end = last ? goal : from + span * (double(k + 1) / cut);
-    step.guard.most_finer = double(w.def.max_substeps - done) / (cut - k);
-    if (!advance(w, step, end, goal, last, trouble)) return DFM_E_DIVERGED;
+    step.guard.most_finer = double(w.def.max_substeps - done) / rest.left();
+    if (!advance(w, step, rest.next(), rest.goal, rest.last(), trouble)) return DFM_E_DIVERGED;
     pass(w.sizes);
-    if (step.guard.finer > 1) {
-      cut = (cut - k) * static_cast<uint32_t>(step.guard.finer) - 1;
-      k = ~0u;  // the next one is the first of them
-      from = w.time;
-      span = goal - w.time;
+    ++rest.taken;
+    if (step.guard.finer > 1) {  // after a hard blow, also the one that has been taken
+      rest.again(w.time, (rest.left() + 1) * static_cast<uint32_t>(step.guard.finer) - 1);
       *trouble |= DFM_TROUBLE_SUBSTEPS;
     }
   }

@@ -89,6 +89,8 @@ void place_phyxels(Body &b, const dfm_body_def &def) {
   }
 }
 
+Array<double> zeros(const Memory &m, size_t n) { return Array<double>(n, 0.0, HookAllocator<double>(m)); }
+
 // Copies, valid after the def and its materials are gone.
 void keep_makeup(World &w, Body &b, const dfm_body_def &def, const CellMaterials &cells) {
   for (const Material *m : cells.list) b.makeup.materials.push_back(*m);
@@ -101,10 +103,53 @@ void keep_makeup(World &w, Body &b, const dfm_body_def &def, const CellMaterials
   }
 }
 
+// Points at rest, without mass and place, and cells.
+void take_points(World &w, Body &b, const dfm_body_def &def) {
+  const Memory &m = w.memory();
+  Phyxels &p = b.p;
+  p.n = def.npoint;
+  p.rest = Array<double>(def.points, def.points + size_t(3) * p.n, HookAllocator<double>(m));
+  for (Array<double> *a : {&p.x, &p.v, &p.v_free, &p.x_end, &p.v_end, &p.f, &p.load, &p.impulse, &p.inv_mass})
+    *a = zeros(m, size_t(kStride) * p.n);
+  p.mass = zeros(m, p.n);
+  p.held = Array<uint8_t>(p.n, 0, HookAllocator<uint8_t>(m));
+  if (def.fixed)
+    for (uint32_t i = 0; i < p.n; ++i) p.held[i] = def.fixed[i] & 7;
+  b.tets = Array<uint32_t>(def.tets, def.tets + size_t(4) * def.ntet, HookAllocator<uint32_t>(m));
+  if (def.cell_share)
+    b.share = Array<double>(def.cell_share, def.cell_share + def.ntet, HookAllocator<double>(m));
+}
+
+void take_model(World &w, Body &b, const dfm_body_def &def, const CellMaterials &materials) {
+  const dfm_type &type = w.context->registry.find(DFM_KIND_MODEL, def.model ? def.model : "msm");
+  check_fields(type, def, b.name);
+  keep_makeup(w, b, def, materials);
+  ModelOrigin origin{keep_params(type, def.model_params),
+                     to_pose(def.pose),
+                     static_cast<uint32_t>(def.integrator),
+                     {b.p.held.begin(), b.p.held.end()}};
+  const std::unique_ptr<BodyModel> made = make_body_model(w, b, type, std::move(origin), def.integrator);
+  exchange(b, *made);
+  b.first_model = model_hash(b);
+}
+
+// The body is complete: from here on it is the world's. Whatever may fail comes first.
+void add_to_world(World &w, std::unique_ptr<Body> owned) {
+  Body &b = *owned;
+  w.bodies.reserve(w.bodies.size() + 1);
+  reserve_sleep(w, *w.steps, static_cast<uint32_t>(w.bodies.size() + 1));
+  w.overlaps.place(w.next_id);
+  b.id = w.next_id;
+  b.handle = handle_create(Kind::body, &b);
+  ++w.next_id;
+  w.bodies.push_back(std::move(owned));
+  w.tearing += b.tears;
+  w.changed = true;
+}
+
 }  // namespace
 
 Body &create_body(World &w, const dfm_body_def &def) {
-  StepContext &step = *w.steps;
   auto owned = std::make_unique<Body>();
   Body &b = *owned;
   b.world = &w;
@@ -124,27 +169,14 @@ Body &create_body(World &w, const dfm_body_def &def) {
   b.collides_with = def.collides_with;
   b.user = def.user;
 
-  const Memory &m = w.memory();
-  auto make = [&](Array<double> &a, size_t n) { a = Array<double>(n, 0.0, HookAllocator<double>(m)); };
-  Phyxels &p = b.p;
-  p.n = def.npoint;
-  p.rest = Array<double>(def.points, def.points + size_t(3) * p.n, HookAllocator<double>(m));
-  for (Array<double> *a : {&p.x, &p.v, &p.v_free, &p.x_end, &p.v_end, &p.f, &p.load, &p.impulse, &p.inv_mass})
-    make(*a, size_t(kStride) * p.n);
-  make(p.mass, p.n);
-  p.held = Array<uint8_t>(p.n, 0, HookAllocator<uint8_t>(m));
-  if (def.fixed)
-    for (uint32_t i = 0; i < p.n; ++i) p.held[i] = def.fixed[i] & 7;
-  b.tets = Array<uint32_t>(def.tets, def.tets + size_t(4) * def.ntet, HookAllocator<uint32_t>(m));
-  if (def.cell_share)
-    b.share = Array<double>(def.cell_share, def.cell_share + def.ntet, HookAllocator<double>(m));
+  take_points(w, b, def);
   lump_body(b, def, materials);
-  update_inverse_mass(p);
+  update_inverse_mass(b.p);
   place_phyxels(b, def);
-  const double far = largest_coordinate(p.x.data(), p.n, kStride);
+  const double far = largest_coordinate(b.p.x.data(), b.p.n, kStride);
   check_velocity("body", b.name.c_str(), load3(def.velocity), load3(def.spin), far);
 
-  b.edges = unique_edges(m, def.ntet, b.tets.data());
+  b.edges = unique_edges(w.memory(), def.ntet, b.tets.data());
   make_body_surface(b, def.surface);
   check_resolved(b.name.c_str(), far, b.surface.median_edge);
   if (def.surface) {
@@ -152,33 +184,15 @@ Body &create_body(World &w, const dfm_body_def &def) {
     b.support = def.surface->support;
   }
   make_zones(b, def, materials, plain);
-  make(b.surfel_impulse, size_t(3) * b.surface.nsurfel);
+  b.surfel_impulse = zeros(w.memory(), size_t(3) * b.surface.nsurfel);
 
-  const dfm_type &type = w.context->registry.find(DFM_KIND_MODEL, def.model ? def.model : "msm");
-  check_fields(type, def, b.name);
-  keep_makeup(w, b, def, materials);
-  ModelOrigin origin{keep_params(type, def.model_params),
-                     to_pose(def.pose),
-                     static_cast<uint32_t>(def.integrator),
-                     {p.held.begin(), p.held.end()}};
-  const std::unique_ptr<BodyModel> made = make_body_model(w, b, type, std::move(origin), def.integrator);
-  exchange(b, *made);
-  b.first_model = model_hash(b);
+  take_model(w, b, def, materials);
   if (!b.surface.identity()) need_ability(w, Ability::own_surface, "body", b.name);
-  if (w.method->point_values) make(b.method_values, size_t(kStride) * p.n);
-
+  if (w.method->point_values) b.method_values = zeros(w.memory(), size_t(kStride) * b.p.n);
   b.tears = may_tear(b);
   if (b.tears) check_may_cut(b, b.model);
 
-  w.bodies.reserve(w.bodies.size() + 1);
-  reserve_sleep(w, step, static_cast<uint32_t>(w.bodies.size() + 1));
-  w.overlaps.place(w.next_id);
-  b.id = w.next_id;
-  b.handle = handle_create(Kind::body, &b);
-  ++w.next_id;
-  w.bodies.push_back(std::move(owned));
-  w.tearing += b.tears;
-  w.changed = true;
+  add_to_world(w, std::move(owned));
   warn_of_idle(b);
   warn_of_own_steps(w, b.name, b.model, def.integrator);
   for (const LeftOut &o : left_out_of(b)) warn_of(*w.context, o);
