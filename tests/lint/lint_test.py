@@ -70,8 +70,12 @@ GOOD = {
     "libdeform/doc/howto/cpp.md": "```c\nint nowhere;\n```\n",
     "libdeform/doc/README.md": "# Pages\n\n`dfm_hello`, `tree.cpp`, `core/error.h` "
                                "[engine](howto/engine.md#engine), [c++](howto/cpp.md), [top](#pages), "
-                               "[gallery](reference/gallery.md), [out](https://example.org/a.md)\n",
+                               "[gallery](reference/gallery.md), [scenes](reference/scenes.md), "
+                               "[out](https://example.org/a.md)\n",
     "libdeform/doc/decisions/0001-handles.md": "# Handles\n",
+    "libdeform/doc/reference/scenes.md": "`time.step`: s\n",
+    "libdeform/schema/deform-scene.schema.json": '{"$defs": {"time": {"properties": {"step": {}, "later": '
+                                                 '{"description": "not available yet"}}}, "word": {}}}\n',
     "libdeform/doc/reference/gallery.md": "![b](../images/b.png)\n\n`libdeform/doc/images/b.py`\n",
     "libdeform/doc/images/b.png": "b\n", "libdeform/doc/images/b.py": "", "libdeform/doc/images/d.py": "",
     "libdeform/src/core/page.h": "#pragma once\n// doc/howto/cpp.md, howto/engine.md, decision 0001\n",
@@ -117,6 +121,9 @@ BAD = {
                   ("libdeform/src/core/error.h", "// doc/decisions/0002\n")],
     "names": [("README.md", "`dfm_gone()`\n"), ("README.md", "in `broad/gone.cpp`\n"),
               ("libdeform/doc/howto/cpp.md", "`DFM_GONE`\n")],
+    "scene_keys": [("libdeform/doc/reference/scenes.md", "=step is no code\n"),
+                   ("libdeform/schema/deform-scene.schema.json",
+                    '={"$defs": {"time": {"properties": {"step": {}, "stop": {"type": "number"}}}}}\n')],
     "pictures": [("libdeform/doc/images/c.png", "=c\n"),
                  ("libdeform/doc/reference/gallery.md", "=![b](../images/b.png)\n\n`b.py`\n"),
                  ("libdeform/doc/reference/gallery.md",

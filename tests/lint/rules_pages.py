@@ -1,4 +1,6 @@
-"""Rules about pages: what is cited is here, and every page is in the reading order."""
+"""Rules about pages: what is cited is here, every page is in the reading order, and every scene key is on
+one."""
+import json
 import posixpath
 import re
 
@@ -120,5 +122,23 @@ def walks(tree):
                 yield path, line_of(content, match.start()), f"{match.group(1)} is not in {file}"
 
 
-RULES = {"walks": walks, "names": names, "links": links, "citations": citations,
+def scene_keys(tree):
+    """Each key of a scene is in code on some page, unless its feature does not exist yet."""
+    schema = "libdeform/schema/deform-scene.schema.json"
+    if schema not in tree.paths:
+        return
+    written = set()
+    for path in tree.select(PAGES, ext=(".md",)):
+        if not path.startswith(HISTORY):
+            for code in re.findall(r"^```.*?^```|`[^`\n]+`", tree.text(path), flags=re.M | re.S):
+                written |= set(re.findall(r"\w+", code))
+    for kind, what in json.loads(tree.text(schema))["$defs"].items():
+        for key, value in what.get("properties", {}).items():
+            if key not in written and value.get("description") != "not available yet":
+                line = line_of(tree.text(schema), tree.text(schema).index(f'"{key}"'))
+                yield (schema, line, f"no page names the key \"{key}\" of \"{kind}\"; describe it in "
+                       f"{PAGES}reference/scenes.md")
+
+
+RULES = {"walks": walks, "names": names, "scene_keys": scene_keys, "links": links, "citations": citations,
          "reading_order": reading_order, "pictures": pictures}
