@@ -1,5 +1,6 @@
-"""Scenes in which tools cut, and one that tears. The tools' paths are moved by up to 1 mm: three times, ten
-times with DEFORM_SOAK. Mass is kept, parts are counted, nothing is lost through the table."""
+"""Scenes in which tools cut, and one that tears. The tools' paths are moved by up to 1 mm: twice, ten times
+with DEFORM_SOAK (stability.CutScenes has the paths as they are). Mass is kept, parts are counted, nothing is
+lost through the table."""
 import json
 import os
 import pathlib
@@ -10,7 +11,7 @@ import numpy as np
 import deform
 
 SCENES = pathlib.Path(os.environ["DEFORM_SOURCE"]) / "examples" / "scenes"
-SEEDS = 10 if os.environ.get("DEFORM_SOAK") else 3
+SEEDS = 10 if os.environ.get("DEFORM_SOAK") else 2
 
 
 def moved(tools, seed):
@@ -19,7 +20,7 @@ def moved(tools, seed):
     out = {}
     for i, tool in enumerate(tools):
         keys = tool["motion"]["keyframes"]
-        by = random.uniform(-1e-3, 1e-3, 3) if seed else np.zeros(3)
+        by = random.uniform(-1e-3, 1e-3, 3)
         out[f"/tools/{i}/motion/keyframes"] = [{**key, "position": list(by + key["position"])}
                                                for key in keys]
     return out
@@ -29,7 +30,7 @@ class CutScenes(unittest.TestCase):
     def pieces(self, name, end, pieces, normal):
         path = SCENES / f"{name}.json"
         tools = json.loads(path.read_text())["tools"]
-        for seed in range(SEEDS):
+        for seed in range(1, SEEDS + 1):
             with self.subTest(name, seed=seed), \
                     deform.Scene(path, set=moved(tools, seed)) as scene:
                 mass = float(scene.world.bodies[0].measure.mass)

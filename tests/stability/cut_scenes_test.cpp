@@ -21,7 +21,7 @@ bool both_slide(const test::SceneRun &run) {
   return way(run, "cheese.1", 0) > 0.05 && way(run, "cheese.2", 0) > 0.02;
 }
 // With the hand.
-bool carried(const test::SceneRun &run) { return way(run, "liver.1", 0) > 0.012; }
+bool carried(const test::SceneRun &run) { return way(run, "liver.1", 0) > 0.01; }
 
 constexpr const char *kHalfWay = "/tools/1/motion/keyframes/2/position=[0.015, 0, 0.06]";
 
@@ -44,11 +44,13 @@ TEST(CutScenes, LiverJitteredRuns_LobeIsPulled) {
 // Just cut, the two faces lie on each other to micrometers, which the count of crossings sees.
 TEST(CutScenes, LiverCutJitteredRuns_LobeIsCarriedAway) {
   for (int seed = 1; seed <= (test::soaks() ? 10 : 3); ++seed) {
-    const test::SceneRun run("liver", {"--time", "1.5", "--jitter", std::to_string(seed)});
+    const test::SceneRun run("liver", {"--time", "1.4", "--jitter", std::to_string(seed)});
     EXPECT_TRUE(run.finite());
     EXPECT_LE(run.number("intersections_max"), 60) << "seed " << seed;
     EXPECT_TRUE(carried(run)) << "seed " << seed;
   }
+}
+TEST(CutScenes, LiverCutHalfWay_KeepsItsLobe) {
   const test::SceneRun run("liver", {"--time", "1.1", "--set", kHalfWay});
   EXPECT_TRUE(run.finite());
   EXPECT_FALSE(run.has("liver.1"));
