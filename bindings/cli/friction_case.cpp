@@ -38,6 +38,36 @@ const std::vector<DriveForm> kDrives = {
 const double kPathSpeed = 1e-5;  // m/s, of a quasi-static path whose case gives none
 const int kPathRows = 20;        // of a straight piece, where the case lists no x
 
+// Keys of a case, and of the reference set, which describe it.
+const std::vector<std::string> kKeys = {"id",
+                                        "about",
+                                        "law",
+                                        "mass",
+                                        "gravity",
+                                        "normal_force",
+                                        "params",
+                                        "input",
+                                        "initial",
+                                        "output_times",
+                                        "T",
+                                        "dt",
+                                        "columns",
+                                        "v_q",
+                                        "set",
+                                        "rows",
+                                        "scenario",
+                                        "equation",
+                                        "summary",
+                                        "method",
+                                        "reference_abs_error",
+                                        "events",
+                                        "path",
+                                        "definition",
+                                        "prototype_error",
+                                        "maxwell_slip",
+                                        "memory",
+                                        "meaning"};
+
 constexpr uint64_t kMaxBytes = uint64_t(64) << 20;
 
 class CaseReader {
@@ -65,6 +95,7 @@ class CaseReader {
     c.mass = positive("mass", c.drive == Drive::force || c.drive == Drive::spring || c.drive == Drive::ramps);
     c.gravity = positive("gravity", false);
     read_params(c);
+    read_normal_force(c);
     refuse_other_loads(c);
     for (const std::string &key : form.needed) c.input[key] = needed(key);
     for (const std::string &key : form.optional)
@@ -82,6 +113,7 @@ class CaseReader {
       if (c.drive == Drive::ramps && !(rate > 0))
         refuse("/input/rates", "holds " + number(rate) + ", expected rates above 0 N/s");
     read_columns(c, form);
+    warn_of_keys(form);
     return c;
   }
 
@@ -136,6 +168,49 @@ class CaseReader {
     const double x = number_at(*v, "/" + std::string(key));
     if (!(x > 0)) refuse("/" + std::string(key), "is " + v->text + ", expected a number above 0");
     return x;
+  }
+
+  void read_normal_force(FrictionCase &c) const {
+    if (c.drive == Drive::loaded) {
+      if (root_.find("normal_force"))
+        refuse("/normal_force",
+               "is given by /input/F0 for input.kind \"" + c.kind + "\"; remove one of them");
+      return;
+    }
+    c.normal_force = positive("normal_force", false);
+    if (c.normal_force > 0 && c.gravity > 0)
+      refuse("/normal_force", "and /gravity both give the normal force; remove one of them");
+    const bool given = c.normal_force > 0 || (c.mass > 0 && c.gravity > 0);
+    for (const CaseParam &p : c.params)
+      if (!given && (p.key == "mu" || p.key.rfind("mu_", 0) == 0))
+        return warn(file_ + ": /params/" + p.key +
+                    " is a coefficient, and no normal force is given, so it is 1 N; give \"normal_force\" in "
+                    "N, or \"mass\" and \"gravity\"");
+  }
+
+  // A number that nothing reads, as a normal force under another name, would give wrong forces in silence.
+  void warn_of_keys(const DriveForm &form) const {
+    std::vector<std::string> numbers = {"kind", "T", "dt", "form", "tag", "cycles"};
+    numbers.insert(numbers.end(), form.needed.begin(), form.needed.end());
+    numbers.insert(numbers.end(), form.optional.begin(), form.optional.end());
+    const std::string kind = input_->get("kind");
+    if (kind == "displacement_path") numbers.insert(numbers.end(), {"path", "x", "segment", "v_q"});
+    if (kind == "force_ramps") numbers.push_back("rates");
+    if (kind == "sine_velocity_sine_load") numbers.push_back("a");
+    warn_of_keys_in(root_, "/", kKeys, "");
+    warn_of_keys_in(*input_, "/input/", numbers, " for input.kind \"" + kind + "\"");
+  }
+  void warn_of_keys_in(const JsonValue &of, const std::string &pointer, const std::vector<std::string> &known,
+                       const std::string &where) const {
+    for (const JsonMember &m : of.members) {
+      if (std::find(known.begin(), known.end(), m.name) != known.end()) continue;
+      const std::string near = nearest(m.name, known);
+      warn(file_ + ": " + pointer + m.name + " is not read" + where +
+           (m.name == "F0" || m.name.find("normal") != std::string::npos
+                ? "; the normal force is /normal_force"
+            : near.empty() ? ""
+                           : "; did you mean \"" + near + "\"?"));
+    }
   }
 
   void read_kind(FrictionCase &c) {
@@ -203,18 +278,23 @@ class CaseReader {
     one("zy", c.z0[1]);
   }
 
+  // Of the case or, as in the reference set, of its input.
+  const JsonValue *time_key(const char *key) const {
+    const JsonValue *v = root_.find(key);
+    return v ? v : input_->find(key);
+  }
   void read_times(FrictionCase &c) const {
     if (const JsonValue *times = root_.find("output_times")) {
       c.times = numbers_at(*times, "/output_times");
-    } else if (input_->find("T") && input_->find("dt")) {
-      const double last = needed("T"), dt = needed("dt");
-      if (!(last >= 0)) refuse("/input/T", "is " + number(last) + " s, expected an end at 0 or later");
+    } else if (time_key("T") && time_key("dt")) {
+      const double last = number_at(*time_key("T"), "/T"), dt = number_at(*time_key("dt"), "/dt");
+      if (!(last >= 0)) refuse("/T", "is " + number(last) + " s, expected an end at 0 or later");
       if (!(dt > 0) || !(last / dt < 1e7))
-        refuse("/input/dt", "is not a time between rows, expected T/dt below 1e7");
+        refuse("/dt", "is not a time between rows, expected T/dt below 1e7");
       for (int i = 0; i <= int(last / dt + 0.5); ++i) c.times.push_back(i * dt);
     } else {
       refuse("/output_times",
-             "is missing, expected the times of the rows in s" + instead(root_, "output_times"));
+             "is missing, expected the times of the rows in s, or T and dt" + instead(root_, "output_times"));
     }
     for (size_t i = 0; i < c.times.size(); ++i)
       if (!(c.times[i] >= (i ? c.times[i - 1] : 0.0)) || (i && c.times[i] == c.times[i - 1]))

@@ -19,7 +19,7 @@ struct CaseParam {
 struct FrictionCase {
   std::string file, id, law, kind;
   Drive drive = Drive::force;
-  double mass = 0, gravity = 0;  // 0 where the case gives none
+  double mass = 0, gravity = 0, normal_force = 0;  // 0 where the case gives none
   double x0 = 0, v0 = 0, z0[2] = {};
   std::map<std::string, double> input;  // the numbers of the drive, the optional ones too
   std::vector<CaseParam> params;        // without those that are null

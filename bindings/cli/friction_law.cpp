@@ -145,6 +145,7 @@ RigLaw::RigLaw(const Globals &globals, const FrictionCase &rig, const std::strin
     throw Failure(kBadInput, (law.empty() ? rig.file + ": /law: " : "--law: ") + dfm_last_error());
   need(dfm_law_type(law_, &type_));
   if (rig.drive == Drive::loaded) fn_ = rig.input.at("F0");
+  else if (rig.normal_force > 0) fn_ = rig.normal_force;
   else if (rig.mass > 0 && rig.gravity > 0) fn_ = rig.mass * rig.gravity;
   if (!(fn_ > 0))
     throw Failure(kBadInput,
