@@ -48,6 +48,7 @@ std::string report_json(const labels::Report &r, const std::string &out) {
                          .add("cells", whole(t.cells))
                          .add("quality_min", number(t.quality_min))
                          .add("quality_mean", number(t.quality_mean))
+                         .add("farthest", number(t.farthest))
                          .text());
   for (const labels::Border &b : r.borders)
     borders.push_back(JsonObject()
@@ -95,6 +96,10 @@ void print_table(const labels::Report &r, const labels::Options &o) {
       std::printf(
           "  %s: %u cells, %u triangles; quality of cells %.2f at least, %.2f on average (1: regular)\n",
           shown(t.name).c_str(), t.cells, t.triangles, t.quality_min, t.quality_mean);
+  for (const labels::ThingReport &t : r.things)
+    if (t.farthest > 0)
+      std::printf("  %s: the boundary of its cells is its surface, within %.2g mm of that of its labels\n",
+                  shown(t.name).c_str(), 1e3 * t.farthest);
   for (const labels::Border &b : r.borders)
     std::printf("  %s is %s %s at %u points of their border\n", shown(b.a).c_str(),
                 b.held ? "held by" : "attached to", shown(b.b).c_str(), b.points);

@@ -110,6 +110,52 @@ TEST(LabelsCommand, WithATable_MakesBodiesAnObstacleAndWhatHoldsThem) {
   EXPECT_EQ(number(test::read_file(out + "/run/summary.json"), "inverted_max"), 0);
 }
 
+TEST(LabelsCommand, BodiesThatAreCut_HaveCellsThatFollowTheirLabels) {
+  const std::string table = folder() + "/cut_table.json", out = folder() + "/cut organs";
+  std::string text = kTable;
+  const auto put = [&text](const std::string &before, const std::string &words) {
+    text.insert(text.find(before), words);
+  };
+  text.replace(text.find("\"linear_fem\"}"), 13,
+               "\"corotational_fem\"}, \"surface\": {\"from\": \"boundary\"}");
+  put("\"trunk\": {\"cells\"", "\"kidney_right\": {\"cells\": 200, \"surface\": {\"from\": \"boundary\"}}, ");
+  put("\"gravity\"",
+      R"("cuts": [{"body": "trunk", "t": 0.01, "shape": "plane", "point": [0, 0, 0], "normal": [0, 0, 1]}],
+            )");
+  test::write_file(table, text);
+  const auto made = test::deform(
+      {"mesh", "from-labels", phantom("abdomen", "12"), "--table", table, "--out", out, "--json"});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  const std::string scene = test::read_file(out + "/scene.json");
+  for (const char *word :
+       {"\"surface\": {\"from\": \"boundary\"}", "\"group\": \"to_trunk\"", "\"group\": \"to_spine\""})
+    EXPECT_TRUE(has(scene, word)) << word << " not in\n" << scene;
+  EXPECT_FALSE(has(scene, "trunk.obj")) << scene;
+  // as many cells as were asked for, with the volume of the labels, none flat
+  for (const auto &[name, cells] : {std::pair<const char *, double>{"trunk", 900}, {"kidney_right", 200}}) {
+    const auto info = test::deform({"mesh", "info", out + "/" + name + ".vtk", "--json"});
+    ASSERT_EQ(info.exit_code, 0) << info.err;
+    EXPECT_NEAR(number(info.out, "tets"), cells, 0.25 * cells) << name;
+    EXPECT_GE(number(info.out, "quality\": \\{\"min"), 0.3 - 1e-9) << name;
+    double wanted = 0;
+    const std::regex label(R"re("body": ")re" + std::string(name) +
+                           R"re("[^}]*?"voxel_volume": ([-+.\deE]+))re");
+    for (std::sregex_iterator m(made.out.begin(), made.out.end(), label), end; m != end; ++m)
+      wanted += std::stod((*m)[1]);
+    EXPECT_NEAR(number(info.out, "volume") / wanted, 1, 0.02) << name;
+  }
+  const auto run = test::deform({"run", out + "/scene.json", "--out", out + "/run", "--quiet"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_FALSE(has(run.err, "met nothing")) << run.err;
+  EXPECT_EQ(number(test::read_file(out + "/run/summary.json"), "inverted_max"), 0);
+  // the table that was written makes the same bodies
+  const auto again = test::deform({"mesh", "from-labels", phantom("abdomen", "12"), "--table",
+                                   out + "/labels.json", "--out", out + "/again", "--quiet"});
+  ASSERT_EQ(again.exit_code, 0) << again.err;
+  for (const char *name : {"/scene.json", "/trunk.vtk", "/kidney_right.vtk"})
+    EXPECT_EQ(test::read_file(out + name), test::read_file(out + "/again" + name)) << name;
+}
+
 TEST(LabelsCommand, WrongInput_IsReportedInOneSentence) {
   const std::string volume = phantom("nodule", "6"), out = folder() + "/refused",
                     table = folder() + "/wrong.json";
@@ -135,6 +181,9 @@ TEST(LabelsCommand, WrongInput_IsReportedInOneSentence) {
   with_table(begin + R"("labels": {"1": {"colour": "red"}}})", "/labels/1/colour: no such key");
   with_table(begin + R"("labels": {"1": {"skip": true}, "2": {"skip": true}}})", "no label is left");
   with_table(begin + R"("labels": )", "wrong.json:1");
+  with_table(begin + R"("labels": {"1": {"material": "gel", "name": "gel"}},)"
+                     R"( "bodies": {"gel": {"surface": {"mesh": "a.obj"}}}})",
+             "/bodies/gel/surface: expected {\"from\": \"boundary\"}, for a body that is cut or torn");
   with_table("[]", "expected an object");
   const std::string whole = test::read_file(volume), cut = folder() + "/cut.nrrd",
                     none = folder() + "/none.nrrd";

@@ -4,8 +4,10 @@
 #include <charconv>
 #include <cmath>
 #include <map>
+#include <utility>
 
 #include "file.h"
+#include "label_fit.h"
 #include "messages.h"
 #include "run_folder.h"
 
@@ -19,6 +21,7 @@ using cli::quoted;
 
 constexpr double kCellsAcross = 96;  // by default the labels are at most so many voxels long
 constexpr uint32_t kFewestCells = 200;
+constexpr int kRefills = 2;  // until about the wanted number of cells is left
 constexpr size_t kFewVoxels = 27;
 
 struct Handles {
@@ -202,7 +205,7 @@ class Maker {
     r.points = uint32_t(shell.from.size());
     r.triangles = uint32_t(shell.beyond.size());
     for (size_t p = 2; p < shell.points.size(); p += 3) lowest_ = std::min(lowest_, shell.points[p]);
-    if (!t.obstacle) add_borders(thing, shell, group, fill(t, shell, r));
+    if (!t.obstacle) add_borders(thing, shell, group, fill(t, shell, group, r));
     report_.things.push_back(r);
   }
 
@@ -258,27 +261,81 @@ class Maker {
     return std::max(kFewestCells, uint32_t(o_.cells * volume_of(t) / all));
   }
 
+  struct Cells {
+    std::vector<double> points, share;
+    std::vector<uint32_t> tets, faces;  // faces: at neighbors, of a body whose surface is its cells' boundary
+    std::vector<std::string> beyond;    // group of each face
+  };
+
+  static Cells cells_in(dfm_tetmesh mesh, const dfm_tetmesh_info &info) {
+    const double *points = nullptr, *share = nullptr;
+    const uint32_t *tets = nullptr;
+    if (dfm_tetmesh_data(mesh, &points, &tets, nullptr) < 0 || dfm_tetmesh_share(mesh, &share) < 0) return {};
+    Cells out;
+    out.points.assign(points, points + 3 * size_t(info.npoint));
+    out.tets.assign(tets, tets + 4 * size_t(info.ntet));
+    out.share.assign(share, share + info.ntet);
+    return out;
+  }
+
+  // Makes them cells whose boundary can be the surface; none where the body is too thin.
+  static void fit(const Shell &shell, const std::vector<std::string> &group, double edge, Cells &cells,
+                  ThingReport &r) {
+    const Fitted made = fit_cells(shell, cells.points, cells.tets, cells.share, edge);
+    cells.points = made.points;
+    cells.tets = made.tets;
+    cells.share.assign(made.tets.size() / 4, 1.0);
+    for (size_t f = 0; f < made.under.size(); ++f) {
+      const std::string &name = group[made.under[f]];
+      if (name.rfind("to_", 0) != 0) continue;
+      cells.beyond.push_back(name);
+      cells.faces.insert(cells.faces.end(), &made.faces[3 * f], &made.faces[3 * f] + 3);
+    }
+    r.triangles = uint32_t(made.under.size());
+    r.quality_min = made.quality_min;
+    r.quality_mean = made.quality_mean;
+    r.farthest = made.farthest;
+  }
+
   // Returns the median edge of its cells, m.
-  double fill(const Thing &t, const Shell &shell, ThingReport &r) {
+  double fill(const Thing &t, const Shell &shell, const std::vector<std::string> &group, ThingReport &r) {
     Handles h;
     const auto need = [&](dfm_status status) {
       if (status < 0) refuse(o_.volume, "the body %s: %s", t.name.c_str(), dfm_last_error());
     };
     need(dfm_trimesh_create(context_, uint32_t(shell.from.size()), shell.points.data(),
                             uint32_t(shell.beyond.size()), shell.triangles.data(), &h.surface));
-    need(dfm_tetmesh_fill(h.surface, cells_of(t), &h.cells));
+    Cells cells;
     dfm_tetmesh_info info = {};
     info.size = sizeof info;
-    need(dfm_tetmesh_get_info(h.cells, &info));
+    const uint32_t wanted = cells_of(t);
+    uint32_t asked = wanted;
+    for (int again = kRefills;; --again) {
+      need(dfm_tetmesh_fill(h.surface, asked, &h.cells));
+      need(dfm_tetmesh_get_info(h.cells, &info));
+      cells = cells_in(h.cells, info);
+      r.quality_min = info.quality_min;
+      r.quality_mean = info.quality_mean;
+      if (!t.own_boundary) break;
+      fit(shell, group, info.edge_median, cells, r);
+      if (again == 0 || cells.share.size() >= 0.9 * wanted) break;
+      // cells that are mostly outside have gone, fewer of each hundred the smaller they are
+      asked = uint32_t(asked * std::pow(wanted / std::max(wanted / 8.0, double(cells.share.size())), 0.8));
+      need(dfm_tetmesh_destroy(std::exchange(h.cells, 0)));
+    }
     if (info.warnings[0]) warn("the body " + t.name + ": " + info.warnings);
-    const double *points = nullptr, *share = nullptr;
-    const uint32_t *tets = nullptr;
-    need(dfm_tetmesh_data(h.cells, &points, &tets, nullptr));
-    need(dfm_tetmesh_share(h.cells, &share));
-    std::vector<double> volume(info.ntet);
-    for (uint32_t c = 0; c < info.ntet; ++c) volume[c] = share[c] * cell_volume(points, tets + 4 * size_t(c));
-    const std::vector<size_t> of_cell = labels_of(t, points, tets, volume);
-    for (uint32_t c = 0; c < info.ntet; ++c) {
+    if (cells.share.empty())
+      refuse(
+          o_.volume,
+          "the body %s is thinner than a cell, so no cells have a boundary like it; give it more cells, or "
+          "leave out its \"surface\"",
+          t.name.c_str());
+    r.cells = uint32_t(cells.share.size());
+    std::vector<double> volume(r.cells);
+    for (uint32_t c = 0; c < r.cells; ++c)
+      volume[c] = cells.share[c] * cell_volume(cells.points.data(), &cells.tets[4 * size_t(c)]);
+    const std::vector<size_t> of_cell = labels_of(t, cells.points.data(), cells.tets.data(), volume);
+    for (uint32_t c = 0; c < r.cells; ++c) {
       LabelReport &label = report_.labels[of_cell[c]];
       ++label.cells;
       label.cell_volume += volume[c];
@@ -296,10 +353,7 @@ class Maker {
              " is smaller than a cell and has none; give more cells by --cells or in "
              "the table");
     }
-    write_vtk(o_.out + "/" + t.name + ".vtk", t, info, points, tets, share, of_cell);
-    r.cells = info.ntet;
-    r.quality_min = info.quality_min;
-    r.quality_mean = info.quality_mean;
+    write_vtk(o_.out + "/" + t.name + ".vtk", t, cells, of_cell);
     return info.edge_median;
   }
 
@@ -428,38 +482,54 @@ class Maker {
     return best;
   }
 
-  void write_vtk(const std::string &path, const Thing &t, const dfm_tetmesh_info &info, const double *points,
-                 const uint32_t *tets, const double *share, const std::vector<size_t> &of_cell) const {
-    const std::string npoint = std::to_string(info.npoint), ncell = std::to_string(info.ntet),
-                      ngroup = std::to_string(t.entries.size());
+  void write_vtk(const std::string &path, const Thing &t, const Cells &cells,
+                 const std::vector<size_t> &of_cell) const {
+    // groups: a label's cells by its entry, then the faces at neighbors
+    std::map<std::string, size_t> borders;
+    for (const std::string &name : cells.beyond) borders.emplace(name, 0);
+    size_t last = table_.entries.size();
+    for (auto &[name, number] : borders) number = ++last;
+    const size_t ntet = cells.share.size(), nface = cells.beyond.size();
+    const std::string ncell = std::to_string(ntet + nface),
+                      ngroup = std::to_string(t.entries.size() + borders.size());
     std::string text =
         "# vtk DataFile Version 3.0\ncells of a body, in groups by label\nASCII\n"
         "DATASET UNSTRUCTURED_GRID\nFIELD FieldData 2\ngroup_number 2 " +
         ngroup + " int\n";
     for (const size_t e : t.entries) text += "3 " + std::to_string(e + 1) + "\n";
+    for (const auto &[name, number] : borders) text += "2 " + std::to_string(number) + "\n";
     text += "group_name 1 " + ngroup + " string\n";
     for (const size_t e : t.entries) text += table_.entries[e].name + "\n";
-    text += "POINTS " + npoint + " double\n";
-    for (size_t i = 0; i < 3 * size_t(info.npoint); i += 3)
-      text += number(points[i]) + " " + number(points[i + 1]) + " " + number(points[i + 2]) + "\n";
-    text += "CELLS " + ncell + " " + std::to_string(5 * size_t(info.ntet)) + "\n";
-    for (size_t c = 0; c < info.ntet; ++c) {
-      text += "4";
-      for (size_t i = 0; i < 4; ++i) text += " " + std::to_string(tets[4 * c + i]);
+    for (const auto &[name, number] : borders) text += name + "\n";
+    text += "POINTS " + std::to_string(cells.points.size() / 3) + " double\n";
+    for (size_t i = 0; i < cells.points.size(); i += 3)
+      text += number(cells.points[i]) + " " + number(cells.points[i + 1]) + " " +
+              number(cells.points[i + 2]) + "\n";
+    text += "CELLS " + ncell + " " + std::to_string(5 * ntet + 4 * nface) + "\n";
+    const auto row = [&text](const uint32_t *corner, size_t n) {
+      text += std::to_string(n);
+      for (size_t i = 0; i < n; ++i) text += " " + std::to_string(corner[i]);
       text += "\n";
-    }
+    };
+    for (size_t c = 0; c < ntet; ++c) row(&cells.tets[4 * c], 4);
+    for (size_t f = 0; f < nface; ++f) row(&cells.faces[3 * f], 3);
     text += "CELL_TYPES " + ncell + "\n";
-    for (size_t c = 0; c < info.ntet; ++c) text += "10\n";
+    for (size_t c = 0; c < ntet; ++c) text += "10\n";
+    for (size_t f = 0; f < nface; ++f) text += "5\n";
     text += "CELL_DATA " + ncell + "\nSCALARS group int 1\nLOOKUP_TABLE default\n";
     for (const size_t e : of_cell) text += std::to_string(e + 1) + "\n";
-    text += "SCALARS share double 1\nLOOKUP_TABLE default\n";
-    for (size_t c = 0; c < info.ntet; ++c) text += number(share[c]) + "\n";
+    for (const std::string &name : cells.beyond) text += std::to_string(borders[name]) + "\n";
+    if (!t.own_boundary) {
+      text += "SCALARS share double 1\nLOOKUP_TABLE default\n";
+      for (const double share : cells.share) text += number(share) + "\n";
+    }
     cli::write_whole(path, text);
   }
 
   std::string body_json(const Thing &t) const {
     JsonObject out, surface;
-    surface.add("mesh", quoted(t.name + ".obj"));
+    if (t.own_boundary) surface.add("from", "\"boundary\"");
+    else surface.add("mesh", quoted(t.name + ".obj"));
     out.add("name", quoted(t.name)).add("mesh", quoted(t.name + ".vtk")).add("surface", surface.text());
     if (t.entries.size() == 1) out.add("material", quoted(table_.entries[t.entries[0]].material));
     else {

@@ -31,6 +31,7 @@ struct ThingReport {
   bool obstacle = false;
   uint32_t points = 0, triangles = 0, cells = 0;
   double quality_min = 0, quality_mean = 0;  // mean ratio of its cells, 1 for a regular tetrahedron
+  double farthest = 0;  // m, of its cells' boundary from the surface of its labels, where it has the former
 };
 struct Border {
   std::string a, b;

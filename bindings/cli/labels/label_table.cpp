@@ -191,9 +191,19 @@ class Reader {
       t.more = m.value;
       for (size_t i = 0; i < t.more.members.size(); ++i) {
         const JsonMember &key = t.more.members[i];
-        for (const char *ours : {"name", "mesh", "surface", "material", "materials_by_group", "fill"})
+        for (const char *ours : {"name", "mesh", "material", "materials_by_group", "fill"})
           if (key.name == ours)
             refuse(path_, "%s/%s: is written from the labels; remove it here", pointer.c_str(), ours);
+        if (key.name == "surface") {
+          if (key.value.members.size() != 1 || key.value.get("from") != "boundary")
+            refuse(path_,
+                   "%s/surface: expected {\"from\": \"boundary\"}, for a body that is cut or torn; any other "
+                   "surface is written from the labels: remove it here",
+                   pointer.c_str());
+          t.own_boundary = true;
+          t.more.members.erase(t.more.members.begin() + long(i--));
+          continue;
+        }
         if (key.name != "cells") continue;
         int64_t cells = 0;
         if (!to_number(key.value.text, cells) || cells < 1 || cells > kMostCells)
@@ -292,8 +302,9 @@ std::string table_text(const Table &table, const Volume &volume) {
     labels.add(std::to_string(volume.value[e.label]), entry.text());
   }
   for (const Thing &t : table.things) {
-    if (t.obstacle || (t.cells == 0 && t.more.members.empty())) continue;
+    if (t.obstacle || (t.cells == 0 && !t.own_boundary && t.more.members.empty())) continue;
     cli::JsonObject body;
+    if (t.own_boundary) body.add("surface", "{\"from\": \"boundary\"}");
     if (t.cells) body.add("cells", std::to_string(t.cells));
     for (const JsonMember &m : t.more.members) body.add(m.name, cli::json_text(m.value));
     bodies.add(t.name, body.text());

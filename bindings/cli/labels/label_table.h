@@ -16,6 +16,7 @@ struct Thing {
   bool obstacle = false;
   std::vector<size_t> entries;  // of Table::entries
   uint32_t cells = 0;           // 0: its share of all
+  bool own_boundary = false;    // its surface is the boundary of its cells, so that it can be cut
   cli::JsonValue more;          // further keys of the body in the scene; object or null
 };
 struct Table {
