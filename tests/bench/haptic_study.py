@@ -38,13 +38,13 @@ def machine():
 
 
 def steps_of(folder, model, cells, seconds, work):
-    """Milliseconds of each step, and how many points the body has."""
+    """Milliseconds of each step, and how many points the body has. The file has a column of units, too."""
     times = pathlib.Path(work) / "times.txt"
     done = subprocess.run([folder / "real_time_bench", SCENE, "--model", model, "--cells", str(cells),
                            "--time", str(seconds), "--times", times], check=True, capture_output=True,
                           text=True)
     points = int(re.search(r"ms: (\d+) points", done.stdout).group(1))
-    return [float(x) for x in times.read_text().split()], points
+    return [float(line.split()[0]) for line in times.read_text().splitlines()], points
 
 
 def loop_of(folder, seconds):

@@ -11,8 +11,8 @@
 // speed, on lanes side by side, over surfels that nothing has touched before. --series writes t, the force on
 // the first body (N) and the place of the first probe (m) at each millisecond; --against compares with such a
 // file: the largest difference over the largest value. --histogram adds rows to a CSV file: steps by time.
-// --times writes the milliseconds of each step, one a line. Where tools cut, steps that cut, and the step
-// after each of them, which makes its tables anew, are told apart from the others.
+// --times writes the milliseconds and the units of work of each step, one step a line. Where tools cut, steps
+// that cut, and the step after each of them, which makes its tables anew, are told apart from the others.
 #include <time.h>
 
 #include <algorithm>
@@ -264,7 +264,8 @@ int main(int argc, char **argv) {
   }
   if (times) {
     std::FILE *out = std::fopen(times, "w");
-    for (const double t : found.seconds) std::fprintf(out, "%.4f\n", 1e3 * t);
+    for (size_t n = 0; n < found.seconds.size(); ++n)
+      std::fprintf(out, "%.4f %llu\n", 1e3 * found.seconds[n], (unsigned long long)found.work[n]);
     std::fclose(out);
   }
   double error[2] = {NAN, NAN};
@@ -295,6 +296,12 @@ int main(int argc, char **argv) {
       (unsigned long long)found.work[found.work.size() / 2],
       (unsigned long long)found.work[found.work.size() * 999 / 1000], (unsigned long long)found.work.back(),
       found.last.passes_max, found.last.sweeps_max, (unsigned long long)found.last.unconverged);
+  std::printf(
+      "    steps simplified %llu, discarded %llu; guard: solves %llu, cuts %llu, motion lost %.3g ms; "
+      "largest gain of energy %.3g J, most energy %.3g J\n",
+      (unsigned long long)found.last.cheapened, (unsigned long long)found.last.discarded,
+      (unsigned long long)found.last.guard_solves, (unsigned long long)found.last.guard_cuts,
+      1e3 * found.last.guard_lost, found.last.energy_gain, found.last.energy_max);
   if (std::any_of(found.cut.begin(), found.cut.end(), [](uint8_t k) { return k != 0; })) {
     print_kind(found, 0, "without a cut", step);
     print_kind(found, 2, "after a cut", step);

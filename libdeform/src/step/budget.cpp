@@ -22,14 +22,18 @@
 namespace dfm {
 namespace {
 
-// Shares of the budget at which the step begins to go without polish, sweeps and guard pieces.
+// Shares at which the step begins to go without polish, sweeps and guard pieces: of max_time, and of a budget
+// that is not divided.
 constexpr double kNoPolishAt = 0.25, kFewSweepsAt = 0.5, kNoPiecesAt = 0.75;
+// Shares of its sub-step's units at which a contact solve goes without polish, and ends; the rest is left to
+// solves that the guard repeats.
+constexpr double kPolishShare = 0.5, kSolveShare = 0.9;
 // Default limit: this factor times the cost of the planned sub-steps without contact.
 constexpr uint64_t kAutomaticFactor = 1000;
 constexpr uint64_t kRigidWork = 10;  // of a rigid body, in the automatic limit
 
 struct StepStopped {
-  enum Why { work, time, asked, costly, too_fine, struck } why;
+  enum Why { work, least, time, asked, costly, too_fine, struck } why;
 };
 
 // Worlds that were requested to stop. A signal may arrive while a lock is held, so no lock is used; 0: free.
@@ -59,11 +63,38 @@ bool requested(uint64_t world) noexcept {
          std::any_of(requests.begin(), requests.end(), [&](const auto &r) { return r.load() == world; });
 }
 
-double used_share(const StepContext &step, uint64_t more) {
+double used_time(const Budget &b) { return b.end > 0 ? 1 - (b.end - now()) / b.span : 0; }
+
+// What a contact solve should have at least, per row: the laws at the warm start, 8 sweeps, 16 that hold the
+// work of an unconverged solve back, the laws at the result, and at the best one. Of the present solve, the
+// end. And the barest one, with one sweep and two that hold its work back.
+constexpr uint64_t kFairSolve = 36, kEndOfSolve = 24, kBareSolve = 12;
+// What the guard needs: the check of the way, and one of the safe part of it.
+constexpr uint64_t kLeastChecks = 2;
+
+uint64_t checks(const World &w, const StepContext &step, uint64_t number) {
+  return w.plan.has(StageRole::guards) ? number * surface_work(w, step) : 0;
+}
+
+// What a sub-step needs that has as many contacts as the last one.
+uint64_t sub_step_work(const World &w, const StepContext &step, uint64_t solve) {
+  return 1 + body_work(w, step) + surface_work(w, step) + checks(w, step, kLeastChecks) +
+         solve * step.budget.rows;
+}
+uint64_t fair_work(const World &w, const StepContext &step) { return sub_step_work(w, step, kFairSolve); }
+uint64_t bare_work(const World &w, const StepContext &step) { return sub_step_work(w, step, kBareSolve); }
+
+uint64_t pieces_to_come(const StepContext &step) {
+  return uint64_t{step.budget.to_come} + (step.h < step.rest);
+}
+
+bool holds(StepContext &step, uint64_t units) {
   const Budget &b = step.budget;
-  double share = b.limit ? double(b.work + more) / double(b.limit) : 0;
-  if (b.end > 0) share = std::max(share, 1 - (b.end - now()) / b.span);
-  return share;
+  const bool is_left =
+      b.divided ? b.work + units <= b.limit : !(double(b.work) > kNoPiecesAt * double(b.limit));
+  if (is_left && !(used_time(b) > kNoPiecesAt)) return true;
+  step.budget.used = Thrift::pieces;
+  return false;
 }
 
 // One list of what a step changes is used for saving and restoring. Room: memory for restoring is reserved in
@@ -219,6 +250,14 @@ void tell(const World &w, const StepContext &step, StepStopped::Why why, double 
                                  "state is as before it; take a shorter step, or give it more time",
                                  number, dt, w.def.max_time)
                               .c_str());
+  if (why == StepStopped::least)
+    return set_last_error(
+        format("step %llu: %g s of simulated time need at least %llu units of work, and "
+               "max_work is %llu; raise it, take a shorter step, or coarsen or soften body '%s', whose step "
+               "bound is the smallest; the state is as before the step",
+               number, dt, static_cast<unsigned long long>(step.budget.least),
+               static_cast<unsigned long long>(step.budget.limit), body)
+            .c_str());
   set_last_error(format("step %llu: %g s of simulated time need more than %llu units of work (max_work), in "
                         "contact or in body '%s', whose step bound is the smallest; the state is as before "
                         "it; take a shorter step, reduce the speed of the impact, or raise max_work",
@@ -247,9 +286,21 @@ uint64_t surface_work(const World &w, const StepContext &step) {
 void plan_work(World &w, StepContext &step, uint32_t substeps) {
   uint64_t rigid = 0;
   for (const auto &set : w.rigid_sets) rigid += kRigidWork * set->defs.size();
-  step.budget.limit =
-      w.def.max_work ? w.def.max_work
-                     : kAutomaticFactor * substeps * (body_work(w, step) + surface_work(w, step) + rigid);
+  Budget &b = step.budget;
+  b.rows = w.store.n;
+  b.least = substeps * bare_work(w, step);
+  b.limit = w.def.max_work
+                ? w.def.max_work
+                : kAutomaticFactor * substeps * (body_work(w, step) + surface_work(w, step) + rigid);
+  b.divided = w.def.max_work && !step.bodies_revise;
+  if (b.least > b.limit) throw StepStopped{StepStopped::least};
+}
+
+void plan_more_work(const World &w, StepContext &step, uint32_t done, uint32_t more) {
+  Budget &b = step.budget;
+  const uint64_t each = bare_work(w, step);
+  b.least = (done + more) * each;
+  if (b.least <= b.limit) b.limit = std::max(b.limit, b.work + more * each);
 }
 
 void charge(World &w, StepContext &step, uint64_t units) {
@@ -263,11 +314,40 @@ void charge(World &w, StepContext &step, uint64_t units) {
     throw StepStopped{StepStopped::costly};
 }
 
-bool spares(StepContext &step, Thrift what) {
-  Spent nothing;
-  const bool so = spares(step, nothing, what);
-  step.budget.used = std::max(step.budget.used, nothing.used);
-  return so;
+void share_work(const World &w, StepContext &step) {
+  Budget &b = step.budget;
+  b.rows = step.rows.all();
+  const uint64_t follow = pieces_to_come(step);
+  if (!b.divided) {
+    b.polish_end = uint64_t(kNoPolishAt * double(b.limit));
+    b.solve_end = uint64_t(kFewSweepsAt * double(b.limit));
+    b.bare_end = b.limit;
+    return;
+  }
+  const auto left_by = [&](uint64_t kept) { return b.limit > b.work + kept ? b.limit - b.work - kept : 0; };
+  const uint64_t guard = checks(w, step, kLeastChecks);
+  const uint64_t left = left_by(follow * fair_work(w, step) + guard + kEndOfSolve * b.rows);
+  const double share = double(left) / double(1 + follow);
+  b.polish_end = b.work + uint64_t(kPolishShare * share);
+  b.solve_end = b.work + uint64_t(kSolveShare * share);
+  b.bare_end = b.work + left_by(follow * bare_work(w, step) + guard);
+}
+
+bool may_repeat(const World &w, StepContext &step) {
+  return holds(step, (2 + uint64_t{step.budget.to_come}) * fair_work(w, step));
+}
+
+bool may_refine(const World &w, StepContext &step, double finer) {
+  return holds(step, (1 + uint64_t{step.budget.to_come}) * uint64_t(finer) * fair_work(w, step));
+}
+
+bool may_solve_again(const World &w, StepContext &step, size_t hits) {
+  return holds(step, pieces_to_come(step) * fair_work(w, step) + checks(w, step, 1 + kLeastChecks) +
+                         kFairSolve * (step.budget.rows + hits));
+}
+
+bool may_check(const World &w, StepContext &step) {
+  return !step.budget.divided || holds(step, pieces_to_come(step) * fair_work(w, step) + checks(w, step, 1));
 }
 
 void spend(const World &w, const StepContext &step, Spent &spent, uint64_t units) {
@@ -282,12 +362,23 @@ void spend(const World &w, const StepContext &step, Spent &spent, uint64_t units
 }
 
 bool spares(const StepContext &step, Spent &spent, Thrift what) {
-  const double from = what == Thrift::polish   ? kNoPolishAt
-                      : what == Thrift::sweeps ? kFewSweepsAt
-                                               : kNoPiecesAt;
-  if (!(used_share(step, spent.work * spent.all / spent.own) > from)) return false;
+  const Budget &b = step.budget;
+  const bool polish = what == Thrift::polish;
+  if (!(b.work + spent.work * spent.all / spent.own > (polish ? b.polish_end : b.solve_end)) &&
+      !(used_time(b) > (polish ? kNoPolishAt : kFewSweepsAt)))
+    return false;
   spent.used = std::max(spent.used, what);
   return true;
+}
+
+bool fits(const Spent &spent, uint64_t before, uint64_t units, uint64_t end) {
+  return before + (spent.work + units) * spent.all / spent.own <= end;
+}
+bool holds(const StepContext &step, const Spent &spent, uint64_t units) {
+  return fits(spent, step.budget.work, units, step.budget.solve_end);
+}
+bool holds_barely(const StepContext &step, const Spent &spent, uint64_t units) {
+  return fits(spent, step.budget.work, units, step.budget.bare_end);
 }
 
 void charge(World &w, StepContext &step, const Spent &spent) {

@@ -18,6 +18,16 @@ enum class Thrift { none, polish, sweeps, pieces };
 
 struct Budget {
   uint64_t work = 0, limit = 0;  // units of the present step; limit 0: not planned yet
+  uint64_t least = 0;            // units that it needs
+  // Whether the limit is divided: each sub-step has its share, beside what the others need. The default limit
+  // is not, because it ends steps that would not end; nor is one of bodies that revise, because nobody knows
+  // how many solves these need.
+  bool divided = false;
+  uint32_t to_come = 0;  // planned sub-steps after the present one
+  uint64_t rows = 0;     // of the present sub-step's contacts; of the last one until they are known
+  // units of the present step at which the present contact solve goes without polish, and ends
+  uint64_t polish_end = 0, solve_end = 0;
+  uint64_t bare_end = 0;  // beyond it the rest of the step finds less than it cannot go without
   // s of the steady clock at which the time of the step is used up; 0: no limit
   double end = 0;
   double span = 0;             // s, from the start of the step to `end`
@@ -33,8 +43,14 @@ struct Budget {
 // or a stop was requested; the state is then that before the step.
 dfm_status step_within_budget(World &w, double dt, uint32_t *trouble);
 
-// Called by run_step(): the step will have this number of sub-steps.
+// Called by run_step(): the step will have this number of sub-steps. Throws if the limit is the host's and
+// does not hold them.
 void plan_work(World &w, StepContext &step, uint32_t substeps);
+// The step needs more sub-steps than planned to stay stable: `done` and `more`. If the limit would have held
+// all of them, what others have used of it does not end the step.
+void plan_more_work(const World &w, StepContext &step, uint32_t done, uint32_t more);
+// Before a contact solve: its share of what the rest of the step does not need.
+void share_work(const World &w, StepContext &step);
 // Adds units and throws if the step must end here. Called by the stepping thread only, never while threads of
 // a stage run.
 void charge(World &w, StepContext &step, uint64_t units);
@@ -50,12 +66,21 @@ struct Spent {
 // Adds units. Throws if the step must end here, as charge() will for the spent units.
 void spend(const World &w, const StepContext &step, Spent &spent, uint64_t units);
 bool spares(const StepContext &step, Spent &spent, Thrift what);
+// Whether the share of the solve holds so many units more.
+bool holds(const StepContext &step, const Spent &spent, uint64_t units);
+// Whether the step holds them at all.
+bool holds_barely(const StepContext &step, const Spent &spent, uint64_t units);
 void charge(World &w, StepContext &step, const Spent &spent);  // after all islands, by the stepping thread
 // Units of one pass over the bodies that are awake: points and cells; surfels.
 uint64_t body_work(const World &w, const StepContext &step);
 uint64_t surface_work(const World &w, const StepContext &step);
-// Whether the step leaves this out by now. If so, it counts as used.
-bool spares(StepContext &step, Thrift what);
+// Whether the budget holds these, beside the least work of what follows. If not, the step has left something
+// out: the present sub-step repeated as a shorter piece; as one of `finer` for each that is planned; its
+// contact solve repeated; another check by the guard.
+bool may_repeat(const World &w, StepContext &step);
+bool may_refine(const World &w, StepContext &step, double finer);
+bool may_solve_again(const World &w, StepContext &step, size_t hits);
+bool may_check(const World &w, StepContext &step);
 // Everything that steps change; between two steps the saved state is restored. Bodies and their dynamics are
 // the same.
 void write_down(World &w, StepContext &step, std::vector<unsigned char> &out);

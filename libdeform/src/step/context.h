@@ -72,7 +72,7 @@ struct StepContext {
   struct { Array<double> normal, tangent; } tolerance;  // [contacts] of all islands
   Residual residual;                                    // the worst of all islands
   uint32_t passes = 0, sweeps = 0;                      // of the island with the most
-  Array<double> disturbance, best_impulse, trial_response;
+  Array<double> disturbance, best_impulse, best_pass, trial_response;
   Array<uint8_t> revised;  // [blocks of rows] the response of the body has changed with its impulses
   Array<double> tangents;
   // [contacts] index of the contact in the store of the last sub-step, or kNone

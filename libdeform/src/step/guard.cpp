@@ -121,9 +121,10 @@ bool withstands_blows(World &w, StepContext &step) {
     if (blow.strain > kBoundStrain) bound_is_due(w);
     if (blow.kinetic > step.free_kinetic[i]) hard = std::max(hard, blow.strain);
   }
-  if (!(hard > kHardBlow) || step.h != g.planned || g.finer > 1 || spares(step, Thrift::pieces)) return true;
+  if (!(hard > kHardBlow) || step.h != g.planned || g.finer > 1) return true;
   double parts = 1;
   while (hard > parts * kSoftBlow && 2 * parts <= g.most_finer && parts < kFinest) parts *= 2;
+  while (parts > 1 && !may_refine(w, step, parts)) parts /= 2;
   if (parts == 1) return true;
   g.finer = parts;
   g.cut = 1 / parts;
@@ -366,9 +367,24 @@ bool overloaded(const World &w, const StepContext &step) {
 bool jammed(const World &w, const StepContext &step) {
   if (!(step.guard.motion < kNoWay && step.h > 0.5 * step.guard.planned && step.residual.due > 1))
     return false;
+  // contact may have an answer that the budget has not let it find
+  if (step.budget.divided && step.budget.used >= Thrift::sweeps) return false;
   for (size_t o = 0; o < w.obstacles.size(); ++o)
     if (!w.obstacles[o]->rigid && step.obstacle_views[o].moves()) return true;
   return !step.driven.empty();
+}
+
+// The fraction of the way that leaves no hit, by checks as far as the budget holds them; else none. safe: the
+// one that the last check found, of hits that include those across slits.
+void take_safe_part(World &w, StepContext &step, bool lets_slits, double safe) {
+  step.guard.lets_slits = lets_slits;
+  if (lets_slits) safe = may_check(w, step) ? find_hits(w, step) : 0;
+  for (uint32_t k = 0; !step.guard.hits.empty(); ++k) {
+    const bool goes_on = k < kFractions && safe > 0 && may_check(w, step);
+    set_fraction(w, step, goes_on ? step.guard.motion * std::min(safe, 0.999) : 0);
+    if (step.guard.motion == 0) break;
+    safe = find_hits(w, step);
+  }
 }
 
 }  // namespace
@@ -411,11 +427,11 @@ bool stage_guard(World &w, StepContext &step, uint32_t *trouble) {
     safe = find_hits(w, step);
     if (step.guard.hits.empty()) return withstands_blows(w, step);
     step.guard.acted = true;
-    if (w.sleepers > 0 && wake_hit(w, step)) {
+    if (w.sleepers > 0 && may_repeat(w, step) && wake_hit(w, step)) {
       step.guard.again = true;
       return false;
     }
-    if (solve == kSolves || spares(step, Thrift::pieces)) break;
+    if (solve == kSolves || !may_solve_again(w, step, step.guard.hits.size())) break;
     guard_add_hits(w, step);
     if (step.residual.due > 1) --w.stats.unconverged;  // counted once, by the last solve
     for (const uint32_t i : step.active) w.bodies[i]->dynamics->free_again(sub_step_of(w, step));
@@ -427,7 +443,7 @@ bool stage_guard(World &w, StepContext &step, uint32_t *trouble) {
     ++w.stats.guard_solves;
     row::distribute(w, step, trouble);
   }
-  if (step.guard.pieces < kCuts && !spares(step, Thrift::pieces)) {
+  if (step.guard.pieces < kCuts && may_repeat(w, step)) {
     ++step.guard.pieces;
     ++w.stats.guard_cuts;
     step.guard.cut = std::max(safe, kLeastCut);
@@ -435,15 +451,16 @@ bool stage_guard(World &w, StepContext &step, uint32_t *trouble) {
     return false;
   }
   // Teeth of a slit that interlock may leave no way at all, where the rest of the world has one: what contact
-  // does not keep apart there crosses.
-  step.guard.lets_slits =
-      std::any_of(step.guard.hits.begin(), step.guard.hits.end(),
-                  [&](const GuardHit &hit) { return of_slit(w, (*step.guard.list)[hit.candidate]); });
-  if (step.guard.lets_slits) safe = find_hits(w, step);
-  for (uint32_t k = 0; !step.guard.hits.empty(); ++k) {
-    set_fraction(w, step, k < kFractions ? step.guard.motion * std::min(safe, 0.999) : 0);
-    if (step.guard.motion == 0) break;
-    safe = find_hits(w, step);
+  // does not keep apart there crosses. Where pieces are left out to save work, only if there is no way.
+  const auto hits_slits = [&] {
+    return std::any_of(step.guard.hits.begin(), step.guard.hits.end(),
+                       [&](const GuardHit &hit) { return of_slit(w, (*step.guard.list)[hit.candidate]); });
+  };
+  const bool slits = hits_slits(), saves = step.guard.pieces < kCuts;
+  if (!(slits && saves)) take_safe_part(w, step, slits, safe);
+  else if (take_safe_part(w, step, false, safe); step.guard.motion < kNoWay && may_check(w, step)) {
+    set_fraction(w, step, 1);
+    take_safe_part(w, step, true, safe);
   }
   if (jammed(w, step)) {
     *trouble |= tell_jam(w, step);

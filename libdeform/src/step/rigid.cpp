@@ -217,7 +217,7 @@ bool stage_rigid_commit(World &w, StepContext &step, uint32_t *trouble) {
     if (!stage_solve(w, step, trouble)) return false;
   }
   step.rigid_again = false;
-  if (!step.tools->follows_arcs(step) || !step.tools->stays_out(w, step)) return false;
+  if (!step.tools->follows_arcs(w, step) || !step.tools->stays_out(w, step)) return false;
   step.tools->turn_jaws();
   // From here on (guard) their true motion is used.
   for (auto &o : w.obstacles) {

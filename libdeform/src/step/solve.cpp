@@ -340,6 +340,7 @@ bool stage_solve(World &w, StepContext &step, uint32_t *trouble) {
     reserve_contacts(w, step);
     return true;
   }
+  share_work(w, step);
   Revised revised = Revised::nothing;
   const SolveIsland *const bad = solve_revised(w, step, revised);
   add_up(step);

@@ -48,9 +48,18 @@ double affordable_sweeps(const World &w, const StepContext &step, const SolveIsl
   return std::min(share, double(kMostBeyond) * w.def.max_sweeps);
 }
 
+// Whether another sweep would take what the end of the solve needs.
+constexpr uint64_t kBareEnd = 8;  // per row: two sweeps that hold work back, the laws, one sweep
+bool out_of_work(const StepContext &step, SolveIsland &own) {
+  if (holds_barely(step, own.spent, kBareEnd * own.part.all())) return false;
+  own.spent.used = std::max(own.spent.used, Thrift::sweeps);
+  return true;
+}
+
 bool may_sweep(const World &w, const StepContext &step, SolveIsland &own, const Residual &residual,
                uint32_t cap) {
   if (own.sweeps >= kFewSweeps && spares(step, own.spent, Thrift::sweeps)) return false;
+  if (out_of_work(step, own)) return false;
   if (own.sweeps < cap) return true;
   if (own.affordable < 0) own.affordable = affordable_sweeps(w, step, own);
   if (own.sweeps < own.affordable) return true;
@@ -75,6 +84,13 @@ constexpr double kRunsAway = 1e6;
 // before contact: the bodies would keep, and be pushed by, friction that no law gives. Beyond the limit of
 // sweeps the laws are therefore evaluated again, followed by this many sweeps each time (doc/decisions/0201).
 constexpr uint32_t kPassSweeps = 20;
+// Where the budget does not hold all sweeps, no pass may use up what the others need
+// (doc/decisions/0460-a-budget-never-ends-a-loop.md).
+bool is_tight(const World &w, const StepContext &step, const SolveIsland &own) {
+  const uint64_t most = uint64_t{kBeyondCap} * w.def.max_sweeps;
+  return step.budget.divided && own.batches.remembers() && own.sweeps < most &&
+         !holds(step, own.spent, (most - own.sweeps) * own.part.all());
+}
 bool asks_beyond(const World &w, const SolveIsland &own) {
   return own.sweeps >= w.def.max_sweeps && own.batches.remembers();
 }
@@ -290,7 +306,8 @@ class Looks {
   bool due(const StepContext &step, const SolveIsland &own, uint32_t cap) const {
     if (own.sweeps >= std::min({next_, kPolish, cap}) || !own.part.blocks.empty()) return true;
     Spent spent = own.spent;
-    return own.sweeps >= kFewSweeps && spares(step, spent, Thrift::sweeps);
+    return (own.sweeps >= kFewSweeps && spares(step, spent, Thrift::sweeps)) ||
+           !holds_barely(step, spent, kBareEnd * own.part.all());
   }
   void note(uint32_t sweeps, const Residual &left, double most) {
     const int size = std::ilogb(left.due / most);  // in halves
@@ -313,7 +330,8 @@ class Looks {
 // last one. Returns whether the result is good enough.
 bool sweep_until_good(const World &w, StepContext &step, SolveIsland &own) {
   ContactRows &rows = step.rows;
-  const uint32_t cap = asks_beyond(w, own) ? own.sweeps + kPassSweeps : w.def.max_sweeps;
+  const bool tight = is_tight(w, step, own);
+  const uint32_t cap = tight || asks_beyond(w, own) ? own.sweeps + kPassSweeps : w.def.max_sweeps;
   double best = std::numeric_limits<double>::infinity();
   keep_best(step, own);
   own.acceleration.start(rows, own.part);
@@ -358,7 +376,7 @@ bool sweep_until_good(const World &w, StepContext &step, SolveIsland &own) {
     if (gives_up(step, own)) return false;
     own.waits = backs == Backs::later;
     if (own.waits) break;
-    if (!may_sweep(w, step, own, left, cap)) break;
+    if ((tight && own.sweeps >= cap) || !may_sweep(w, step, own, left, cap)) break;
     if (momentum) {
       own.momentum.follow(rows, own.part);
       continue;
@@ -393,8 +411,10 @@ bool hold_work_back(const World &w, StepContext &step, SolveIsland &own, double 
   if (excess.work <= most * excess.scale) return false;
   drop_impulses(step.rows, own.part);
   own.limit.assign(own.part.n, 0.0);
-  for (uint32_t k = 0; k < 2 * kFixedSweeps; ++k) {
-    if (k == kFixedSweeps) fix_limits(step.rows, own.part, step.state, own.limit);
+  uint32_t each = kFixedSweeps;
+  while (each > 1 && !holds_barely(step, own.spent, (2 * each + 4) * own.part.all())) each /= 2;
+  for (uint32_t k = 0; k < 2 * each; ++k) {
+    if (k == each) fix_limits(step.rows, own.part, step.state, own.limit);
     own.spent.effort += own.effort;
     spend(w, step, own.spent, own.part.all());
     sweep_fixed(step.rows, own.part, own.limit.data());
@@ -430,6 +450,16 @@ void start_island(const World &w, StepContext &step, SolveIsland &own) {
                      step.disturbance.data());
 }
 
+// A solve that its budget has ended need not end with its best pass.
+void end_at_best_pass(const World &w, StepContext &step, SolveIsland &own) {
+  if (own.spent.used < Thrift::sweeps || !(own.residual.due > own.best_due) ||
+      !holds_barely(step, own.spent, 4 * own.part.all()))
+    return;
+  copy_impulses(own.part, step.best_pass, step.rows.impulse);
+  step.rows.restore(own.part);
+  if (ask(w, step, own)) own.residual = true_residual(step.rows, own.part, step.state, step.h, own.tolerance);
+}
+
 // Passes until the true residual is good enough, or a law has failed.
 void solve_passes(const World &w, StepContext &step, SolveIsland &own) {
   for (;;) {
@@ -441,9 +471,13 @@ void solve_passes(const World &w, StepContext &step, SolveIsland &own) {
     if (!ask(w, step, own)) return;
     own.residual = true_residual(step.rows, own.part, step.state, step.h, own.tolerance);
     own.due_before = std::exchange(own.due, own.residual.due);
+    if (own.residual.due < own.best_due) {
+      own.best_due = own.residual.due;
+      copy_impulses(own.part, step.rows.impulse, step.best_pass);
+    }
     if (good(step, own, own.residual, 1) || own.waits || own.passes > w.def.max_passes ||
         !(may_sweep(w, step, own, own.residual, w.def.max_sweeps) || may_ask(w, step, own)))
-      return;
+      return end_at_best_pass(w, step, own);
     if (!ask_slopes(step, own)) return;
   }
 }
@@ -694,6 +728,7 @@ const SolveIsland *solve_islands(World &w, StepContext &step) {
   step.tolerance.tangent.resize(n);
   step.trial_response.resize(n);
   step.best_impulse.resize(3 * size_t{step.rows.all()});
+  step.best_pass.resize(3 * size_t{step.rows.all()});
   step.disturbance.resize(2 * size_t{step.solve_islands->side_count()});
   const std::span<SolveIsland> all = step.solve_islands->all();
   uint64_t rows = 0;

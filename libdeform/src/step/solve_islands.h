@@ -54,6 +54,7 @@ struct SolveIsland {
   double affordable = -1;  // sweeps beyond the limit; < 0: not known yet
   // of the last two passes (Residual::due)
   double due, due_before;
+  double best_due;  // of all passes; its impulses are in StepContext::best_pass
   Spent spent;
   const LawInstance *bad = nullptr;  // that has failed
   std::exception_ptr thrown;
@@ -72,7 +73,7 @@ struct SolveIsland {
     passes = sweeps = asked = 0;
     common = false;
     affordable = -1;
-    due = due_before = std::numeric_limits<double>::infinity();
+    due = due_before = best_due = std::numeric_limits<double>::infinity();
   }
 };
 

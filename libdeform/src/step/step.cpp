@@ -210,9 +210,11 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
       if (more > rest.left()) {
         if (!(w.watch.size_before > 0)) w.watch.size_before = rest.size();
         rest.again(w.time, static_cast<uint32_t>(more));
+        plan_more_work(w, step, done, rest.n);
         *trouble |= DFM_TROUBLE_SUBSTEPS;
       }
     }
+    step.budget.to_come = rest.left() - 1;
     step.guard.most_finer = double(w.def.max_substeps - done) / rest.left();
     if (!advance(w, step, rest.next(), rest.goal, rest.last(), trouble)) return DFM_E_DIVERGED;
     pass(w.sizes);
@@ -273,6 +275,7 @@ bool advance(World &w, StepContext &step, double end, double goal, bool last, ui
 // whole sub-step, not a piece.
 void refine(World &w, StepContext &step) {
   Guard &g = step.guard;
+  step.budget.to_come = (step.budget.to_come + 1) * uint32_t(g.finer) - 1;
   cut_finer(w.sizes, g.planned, g.planned / g.finer);
   if (!(w.watch.size_before > 0)) w.watch.size_before = g.planned;
   g.planned = step.rest = g.planned / g.finer;
@@ -311,6 +314,7 @@ bool sub_step(World &w, StepContext &step, uint32_t *trouble) {
   step.driven.clear();
   step.guard.start();
   step.ended = false;
+  step.budget.rows = w.store.n;
   charge(w, step, body_work(w, step) + surface_work(w, step));
   Clock::time_point since = Clock::now();
   for (const PlannedStage &planned : w.plan.stages)

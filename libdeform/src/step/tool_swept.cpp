@@ -196,8 +196,7 @@ bool ToolTouch::stays_out(const World &w, StepContext &step) {
                       faces_crossed(of_b, at_b, of_a, at_a, deep, pair.thin),
                       edges_crossed(of_a, at_a, of_b, at_b, deep)});
   }
-  if (!(first <= 1) || !(step.h > kLeastPiece * step.guard.planned) || spares(step, Thrift::pieces))
-    return true;
+  if (!(first <= 1) || !(step.h > kLeastPiece * step.guard.planned) || !may_repeat(w, step)) return true;
   step.guard.again = true;
   step.guard.cut = std::max(kLeastCut, kAims * first);
   return false;

@@ -661,7 +661,7 @@ void ToolTouch::take_sets(World &w, StepContext &step) {
 // about a radian on they do not, the corner ends inside a floor, and energy is created. False: something that
 // touches turns so far that the sub-step must be repeated, shorter. The arc leaves its tangent by at most (h
 // w)^2 r / 2: what stays farther away than that does not touch.
-bool ToolTouch::follows_arcs(StepContext &step) const {
+bool ToolTouch::follows_arcs(const World &w, StepContext &step) const {
   double turn = 0, arrives = 1;
   for (const Row &row : rows_) {
     if (row.jaw) continue;
@@ -680,8 +680,7 @@ bool ToolTouch::follows_arcs(StepContext &step) const {
     const double closes = std::min(0.0, h_ * dot(row.normal, speed(row)));
     if (row.impulse > 0 || room + closes < leaves) turn = std::max(turn, most);
   }
-  if ((!(turn > 0) && arrives == 1) || !(step.h > kLeastPiece * step.guard.planned) ||
-      spares(step, Thrift::pieces))
+  if ((!(turn > 0) && arrives == 1) || !(step.h > kLeastPiece * step.guard.planned) || !may_repeat(w, step))
     return true;
   step.guard.again = true;
   step.guard.cut = arrives;
@@ -700,10 +699,10 @@ bool ToolTouch::begin(World &w, StepContext &step) {
   tell_driven(w, step);
   find(w, step);
   if (rows_.empty() && !add_hits(w, step)) return true;
-  if (!follows_arcs(step)) return false;
+  if (!follows_arcs(w, step)) return false;
   take_last(w);
   solve_past_hits(w, step);
-  if (!follows_arcs(step)) return false;
+  if (!follows_arcs(w, step)) return false;
   for (Row &row : rows_) row.before = row.given();
   give_velocities();
   return true;

@@ -55,7 +55,7 @@ class ToolTouch {
   // Returns whether these differ from those in the velocities, so that soft bodies must be solved again.
   bool answer(const World &w, const StepContext &step);
   // Whether the sub-step is short enough for the spin of what touches. False: as for begin().
-  bool follows_arcs(StepContext &step) const;
+  bool follows_arcs(const World &w, StepContext &step) const;
   // Called after the hosts have ended their sub-step: whether no fast free body has passed through something.
   // False: as for begin().
   bool stays_out(const World &w, StepContext &step);
