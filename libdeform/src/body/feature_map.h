@@ -1,11 +1,14 @@
 // Where the features of a surface are after a cut.
 #pragma once
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "geometry/surface.h"
 
 namespace dfm {
+
+class SelfList;
 
 // Numbers now by numbers before, the first of copies; kNone: gone.
 struct FeatureMap {
@@ -18,6 +21,7 @@ struct FeatureMap {
 struct FormerSurface {
   uint64_t shape;
   FeatureMap features;
+  std::shared_ptr<const SelfList> list;  // of its pairs, made beside the steps; null: none
 };
 
 }  // namespace dfm

@@ -58,6 +58,13 @@ bool SelfList::update(double h, double offset) {
   return true;
 }
 
+void SelfList::update_ahead(double h, double offset) {
+  constexpr double kWider = 2;  // half of it is left to the motion until then
+  skin_steps_ *= kWider;
+  update(h, offset);
+  skin_steps_ /= kWider;
+}
+
 bool SelfList::cover(double h, double offset, double change) {
   if (surface_.ntri == 0 || kDistanceRounding * (moved_ + covers(h, offset, change)) <= margin_) return false;
   if (!renew_part(h, offset, change)) renew(h, offset, change);

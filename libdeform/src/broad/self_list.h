@@ -33,6 +33,8 @@ class SelfList {
   // After update(), at the same positions: the same lists, rebuilt if they do not cover the motion of the
   // sub-step after its solve. change: m/s, largest change of a surfel's velocity by the solve.
   bool cover(double h, double offset, double change);
+  // In place of the first update(), of a surface that moves on until another one follows: with a wider skin.
+  void update_ahead(double h, double offset);
   // Continues the lists of a surface from before a cut. moved [nsurfel]: surfels that are not where they
   // were; features that the cut has made need no mark. Before the first update().
   void follow(const SelfList &before, const FeatureMap &features, std::span<const uint8_t> moved);

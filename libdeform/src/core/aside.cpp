@@ -5,7 +5,9 @@
 #include <mutex>
 #include <thread>
 #if defined(__linux__)
+#include <pthread.h>
 #include <sched.h>
+#include <time.h>
 #endif
 
 #include "core/float_env.h"
@@ -21,6 +23,34 @@ void take_what_is_left() noexcept {
   sched_setscheduler(0, SCHED_IDLE, &none);  // of this thread; refused: it works at the usual priority
 #endif
 }
+
+// How much of the time another thread works.
+class Worked {
+ public:
+#if defined(__linux__)
+  explicit Worked(std::thread &thread)
+      : known_(pthread_getcpuclockid(thread.native_handle(), &clock_) == 0), since_(now()) {}
+  // Has it worked for half of this time or more since the last call?
+  bool half_of(std::chrono::nanoseconds time) {
+    const auto before = since_;
+    since_ = now();
+    return known_ && 2 * (since_ - before) >= time;
+  }
+
+ private:
+  std::chrono::nanoseconds now() {
+    timespec t{};
+    known_ = known_ && clock_gettime(clock_, &t) == 0;
+    return std::chrono::seconds(t.tv_sec) + std::chrono::nanoseconds(t.tv_nsec);
+  }
+  clockid_t clock_{};
+  bool known_;
+  std::chrono::nanoseconds since_;
+#else
+  explicit Worked(std::thread &) {}
+  bool half_of(std::chrono::nanoseconds) { return false; }  // nobody knows
+#endif
+};
 
 }  // namespace
 
@@ -84,17 +114,24 @@ void Aside::start(std::shared_ptr<Job> job) noexcept {
   }
 }
 
-bool Aside::finish(const std::shared_ptr<Job> &job, std::chrono::microseconds most) {
+bool Aside::finish(const std::shared_ptr<Job> &job, std::chrono::microseconds patience) {
   Job::State state = Job::waits;
   if (job->state_.compare_exchange_strong(state, Job::left)) {
     // Its memory is not held until the thread comes to it.
     if (const std::unique_lock lock = room_->locked()) std::erase(room_->jobs, job);
     return false;
   }
-  const auto until = std::chrono::steady_clock::now() + most;
-  // asleep, since the thread may need this core
-  while (job->state_ == Job::runs && std::chrono::steady_clock::now() < until)
-    std::this_thread::sleep_for(std::chrono::microseconds(20));
+  if (job->state_ == Job::done) return true;
+  using Clock = std::chrono::steady_clock;
+  Worked worked(room_->thread);
+  auto since = Clock::now();
+  while (job->state_ == Job::runs) {
+    std::this_thread::sleep_for(std::chrono::microseconds(20));  // the thread may need this core
+    const auto now = Clock::now();
+    if (now - since < patience) continue;
+    if (!worked.half_of(now - since)) break;
+    since = now;
+  }
   return job->state_ == Job::done;
 }
 

@@ -25,8 +25,10 @@ class Aside {
   ~Aside();  // waits for the job that runs; the others are dropped
   // The job does not begin if no thread can be made, or if the thread is suspended while it holds the list.
   void start(std::shared_ptr<Job> job) noexcept;
-  // Waits for it, `most` at the longest. false: it is not done; it will not begin, but may still be running.
-  bool finish(const std::shared_ptr<Job> &job, std::chrono::microseconds most);
+  // Waits for it while it runs: as long as the thread has a core for half of each `patience`, since what is
+  // left takes less than the whole would, and otherwise for one. false: it is not done; it will not begin,
+  // but may still be running.
+  bool finish(const std::shared_ptr<Job> &job, std::chrono::microseconds patience);
 
  private:
   struct Room;

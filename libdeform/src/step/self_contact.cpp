@@ -184,17 +184,19 @@ bool is_tangled(SelfBody &b, uint32_t surfel) {
                      [&](uint32_t triangle) { return crosses_another(b, triangle); });
 }
 
-// Continues the lists of the surface before a cut. The cut moves the surfels that it sets back again.
-void follow_cut(const World &w, const SelfBody &before, const FeatureMap &features, SelfBody &now) {
+// Continues the lists of the surface before a cut. The cut moves the surfels that it sets back again. ways: as
+// SelfRest::way, before it.
+void follow_cut(const World &w, const SelfList &before, const Array<double> &ways, const FeatureMap &features,
+                SelfBody &now) {
   constexpr double kSame = 1e-6;  // ways are of length one or so
   Array<uint8_t> moved(now.body->surface.nsurfel, 0, HookAllocator<uint8_t>(w.meters.detection.memory()));
-  const auto way = [](const SelfRest &rest, size_t i) {
-    return rest.way.empty() ? Vec3{} : load3(&rest.way[4 * i]);
+  const auto way = [](const Array<double> &all, size_t i) {
+    return all.empty() ? Vec3{} : load3(&all[4 * i]);
   };
   for (uint32_t i = 0; i < features.of[0].size(); ++i)
     if (const uint32_t to = features.of[0][i]; to != kNone)
-      moved[to] = norm2(way(now.rest, to) - way(before.rest, i)) > kSame * kSame;
-  now.list.follow(before.list, features, moved);
+      moved[to] = norm2(way(now.rest.way, to) - way(ways, i)) > kSame * kSame;
+  now.list.follow(before, features, moved);
 }
 
 }  // namespace
@@ -233,6 +235,13 @@ uint8_t asks_self_contact(const World &w) {
   return w.selection.lists(kSelfContact) ? uint8_t{DFM_SELF_ON} : static_cast<uint8_t>(w.def.self_contact);
 }
 
+bool lists_after_cut(const World &w, const Body &b) {
+  const std::vector<std::unique_ptr<SelfBody>> &all = w.steps->self_bodies;
+  return !b.cut.whole && w.selection.wants(kSelfContact) && !promises(b) &&
+         rule_of(w, b, DFM_SELF_AUTO) != DFM_SELF_OFF &&
+         std::none_of(all.begin(), all.end(), [&](auto &s) { return s->id == b.id; });
+}
+
 void choose_self_bodies(World &w, StepContext &step, SceneFacts &facts, std::vector<uint32_t> &used) {
   facts.self = w.def.self_contact == DFM_SELF_ON;
   const bool always = !self_asked_by(facts).empty();
@@ -252,9 +261,13 @@ void choose_self_bodies(World &w, StepContext &step, SceneFacts &facts, std::vec
                                    ? std::move(*same)
                                    : std::make_unique<SelfBody>(w.meters.detection.memory(), *b));
     SelfBody &self = *step.self_bodies.back();
-    if (former)
-      for (const auto &s : before)
-        if (s && s->id == b->id && s->shape == former->shape) follow_cut(w, *s, former->features, self);
+    if (former) {
+      const auto own = std::find_if(before.begin(), before.end(), [&](auto &s) {
+        return s && s->id == b->id && s->shape == former->shape;
+      });
+      if (own != before.end()) follow_cut(w, (*own)->list, (*own)->rest.way, former->features, self);
+      else if (former->list) follow_cut(w, *former->list, {}, former->features, self);
+    }
     if (when == DFM_SELF_ON) self.watch.reset();
     else if (!self.watch)
       self.watch = std::make_unique<SelfWatch>(w.meters.detection.memory(), b->surface, self.rest, self.list);

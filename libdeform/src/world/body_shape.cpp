@@ -278,7 +278,7 @@ ModelOrigin origin_of(const Body &b, const CutMesh &mesh) {
 std::unique_ptr<MadeShape> make_shape(const Body &b, CutMesh &&mesh, Array<uint64_t> &&open,
                                       const double *due) {
   World &w = *b.world;
-  auto out = std::make_unique<MadeShape>(MadeShape{std::move(mesh), nullptr, {}, {}, {}});
+  auto out = std::make_unique<MadeShape>(MadeShape{std::move(mesh), nullptr, {}, {}, {}, nullptr});
   out->shape = structure_of_part(b, out->mesh, std::move(open));
   BodyShape &shape = *out->shape;
   shape.surface.named = b.surface.named;
@@ -327,7 +327,7 @@ std::unique_ptr<BodyShape> take_shape(Body &b, MadeShape &made, bool parts, bool
     keep_integrator(b, before.integrator);
     keep_params(b, before);
     carry_state(before, mesh, made.edge, b);
-    b.former_surface.reset(new FormerSurface{shape->shape, made.features});
+    b.former_surface.reset(new FormerSurface{shape->shape, made.features, std::move(made.list)});
   } catch (...) {
     exchange(b, *shape);
     throw;

@@ -62,6 +62,7 @@ struct MadeShape {
   std::unique_ptr<BodyShape> shape;
   std::vector<uint32_t> edge, surfel;  // previous numbers, or kNone
   FeatureMap features;
+  std::shared_ptr<const SelfList> list;  // of the surface before, for lists that nobody else has; or null
 };
 // The shape of the mesh that a cut leaves. Reads what steps do not change, and nothing of the state: any
 // thread may do it, if no other one changes `b` meanwhile other than by steps. open: as below. due: with

@@ -14,9 +14,12 @@
 #include <map>
 #include <vector>
 
+#include "broad/self_list.h"
 #include "core/aside.h"
 #include "core/error.h"
 #include "state/world.h"
+#include "step/context.h"
+#include "step/self_contact.h"
 #include "step/stages.h"
 #include "step/step_bound.h"
 #include "world/body_shape.h"
@@ -25,6 +28,35 @@
 
 namespace dfm {
 
+// The pairs of the whole surface that may touch each other, which the first cut of a body needs. They are
+// listed where the body is as it begins to wait; the step that follows the cut finds anew what has moved far
+// since (doc/decisions/0437). Who uses other lists gets the same bits, so no step makes these.
+struct ListJob : Aside::Job {
+  std::shared_ptr<const Body> from;
+  Surface surface;
+  SelfList list;
+  double h, offset;
+  bool made = false;
+
+  ListJob(const World &w, const Body &b)
+      : from(b.ahead.structure), list(w.meters.detection.memory(), surface), h(w.steps->h), offset(w.offset) {
+    use_memory(w.meters.detection.memory(), surface.x, surface.v);
+    surface.x = b.surface.x;
+    surface.v = b.surface.v;
+  }
+  void run() noexcept override {
+    try {
+      const Array<double> x = std::move(surface.x), v = std::move(surface.v);
+      surface = from->surface;
+      surface.x = x;
+      surface.v = v;
+      list.update_ahead(h, offset);
+      made = true;
+    } catch (...) {  // the step after the cut lists them
+    }
+  }
+};
+
 struct CutJob : Aside::Job {
   std::shared_ptr<const Body> from;
   Array<uint64_t> faces;
@@ -32,6 +64,7 @@ struct CutJob : Aside::Job {
   std::unique_ptr<MadeShape> made;
   std::shared_ptr<Body> next;  // the structure that is left
   std::exception_ptr error;
+  std::shared_ptr<ListJob> list;  // of a body that has no lists of itself yet; null: none
 
   explicit CutJob(const Body &b)
       : from(b.ahead.structure), faces(HookAllocator<uint64_t>(b.world->memory())), due(b.ahead.due) {
@@ -49,7 +82,8 @@ struct CutJob : Aside::Job {
 
 namespace {
 
-// A thread that is so late is not waited for.
+// A thread that has had no core for so long is not waited for. One that has is: where a program steps faster
+// than its clock, the delay is shorter than what a cut takes.
 constexpr std::chrono::microseconds kPatience{2000};
 
 bool is_of(const Body &structure, const Body &b) {
@@ -78,9 +112,13 @@ std::shared_ptr<CutJob> finish(World &w, Body &b) {
   renew_structure(b);
   // what the thread has refused, perhaps for want of memory, is tried once more
   if (!a.job || !w.aside || !w.aside->finish(a.job, kPatience) || a.job->error) {
+    const std::shared_ptr<ListJob> list = a.job ? a.job->list : nullptr;
     a.job = std::make_shared<CutJob>(b);
+    a.job->list = list;
     a.job->run();
   }
+  if (const auto &list = a.job->list; list && w.aside->finish(list, kPatience) && list->made && a.job->made)
+    a.job->made->list = {list, &list->list};
   return std::move(a.job);
 }
 
@@ -173,6 +211,9 @@ void prepare_cuts(World &w) {
     if (a.faces.empty() || a.job) continue;
     if (!w.aside) w.aside = std::make_unique<Aside>();
     a.job = std::make_shared<CutJob>(*b);
+    std::shared_ptr<ListJob> &list = a.job->list;  // first, since it is short
+    if (lists_after_cut(w, *b) && found_memory([&] { list = std::make_shared<ListJob>(w, *b); }))
+      w.aside->start(list);
     w.aside->start(a.job);
   }
 }

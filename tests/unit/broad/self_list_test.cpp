@@ -171,12 +171,14 @@ TEST(SelfList, Cut_ContinuesTheLists) {
     same.of[kind].resize((std::array{s.nsurfel, s.nedge, s.ntri})[kind]);
     std::iota(same.of[kind].begin(), same.of[kind].end(), 0u);
   }
-  for (const bool moved : {false, true}) {
+  // the lists before the cut are those of now, or were made once, ahead of it
+  for (const auto &[moved, ahead] : {std::pair(false, false), {true, false}, {false, true}, {true, true}}) {
     Surface before = whole;
     SelfList first(Memory::standard(), before), second(Memory::standard(), s);
     for (int step = 0; step < 100; ++step) {
       dent(before, kSquares, step, 0.01);
-      first.update(0.01, 1e-3);
+      if (!ahead) first.update(0.01, 1e-3);
+      else if (step == 70) first.update_ahead(0.01, 1e-3);
     }
     Array<uint8_t> marks(s.nsurfel, 0);
     for (uint32_t i = 0; moved && i < s.nsurfel; ++i) marks[i] = i >= kPoints || on_line(i);

@@ -2,6 +2,7 @@
 #include "core/aside.h"
 
 #include <gtest/gtest.h>
+#include <time.h>
 
 #include <atomic>
 #include <chrono>
@@ -33,6 +34,53 @@ TEST(Aside, JobThatIsLeft_IsDroppedBeforeTheThreadComesToIt) {
   EXPECT_TRUE(kept.expired());
   first->end = true;
   while (!aside.finish(first, 1s)) {}
+}
+
+// On machines that tell how much of the time a thread works.
+#if defined(__linux__)
+struct Computes final : dfm::Aside::Job {
+  static double own_time() {
+    timespec t{};
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+    return double(t.tv_sec) + 1e-9 * double(t.tv_nsec);
+  }
+  std::atomic<double> took{0};
+  void run() noexcept override {
+    const double begin = own_time();
+    while (took < 0.01) took = own_time() - begin;
+  }
+};
+
+// It is waited for beyond the patience while it has a core, and no longer where others take that.
+TEST(Aside, JobThatRuns_IsWaitedFor) {
+  bool waited = false;
+  for (int i = 0; i < 4 && !waited; ++i) {
+    const auto job = std::make_shared<Computes>();
+    dfm::Aside aside;
+    aside.start(job);
+    while (!(job->took > 0)) std::this_thread::sleep_for(100us);
+    const auto begin = std::chrono::steady_clock::now();
+    const double had = job->took;
+    const bool done = aside.finish(job, 1ms);
+    const double did = job->took - had;
+    const std::chrono::duration<double> time = std::chrono::steady_clock::now() - begin;
+    waited = done && time > 4ms;
+    if (!done) {  // it had less than half of the last millisecond
+      EXPECT_LT(did, time.count() - 4e-4);
+    }
+  }
+  if (!waited) GTEST_SKIP() << "the machine has no core for a thread of the lowest priority";
+}
+#endif
+
+TEST(Aside, JobThatSleeps_IsNotWaitedFor) {
+  const auto job = std::make_shared<Waits>();
+  dfm::Aside aside;
+  aside.start(job);
+  while (!job->begun) std::this_thread::sleep_for(1ms);
+  EXPECT_FALSE(aside.finish(job, 5ms));
+  job->end = true;
+  while (!aside.finish(job, 1s)) {}
 }
 
 }  // namespace
