@@ -1,5 +1,6 @@
 // Things that are through each other when they are made or put somewhere: found, named, listed; and what the
 // steps after cost and do.
+#include <cmath>
 #include <cstring>
 
 #include "logged_context.h"
@@ -165,6 +166,69 @@ TEST(Overlap, OfBodyInsideBody_IsFoundAndOfBodyInRoomIsNot) {
   const test::Triangles room = test::inside_out(test::box_surface({0.5, 0.5, 0.5}, 1));
   thing(w, DFM_SHAPE_MESH, 0, &room);
   EXPECT_EQ(overlaps(w).size(), 0u);  // of what was made since: the room
+  dfm_world_destroy(w);
+}
+
+namespace {
+
+// A cube on one of its edges, filled with coarse cells, which reach out of its surface.
+// `along` is the place of its center along the normal of a face.
+dfm_pose tilted(double along) {
+  const double at = along / std::sqrt(2.0), half = 3.14159265358979323846 / 8;
+  return {{at, 0, at}, {0, std::sin(half), 0, std::cos(half)}};
+}
+dfm_body filled_cube(dfm_context *c, dfm_world w, const char *name, double along) {
+  const double size[3] = {0.2, 0.2, 0.2};
+  dfm_trimesh skin = 0;
+  dfm_tetmesh mesh = 0;
+  test::ok(dfm_trimesh_make(c, "beam", size, 400, &skin));
+  test::ok(dfm_tetmesh_fill(skin, 100, &mesh));
+  dfm_body_def d = dfm_body_def_default();
+  test::lend(mesh, d);
+  test::ok(dfm_tetmesh_share(mesh, &d.cell_share));
+  dfm_surface_def s = {};
+  s.size = sizeof s;
+  dfm_trimesh_info info = {};
+  info.size = sizeof info;
+  test::ok(dfm_trimesh_get_info(skin, &info));
+  test::ok(dfm_trimesh_data(skin, &s.points, &s.triangles, nullptr));
+  s.npoint = info.npoint;
+  s.ntriangle = info.ntriangle;
+  d.surface = &s;
+  d.name = name;
+  d.pose = tilted(along);
+  dfm_body b = 0;
+  test::ok(dfm_body_create(w, &d, &b));
+  test::ok(dfm_tetmesh_destroy(mesh));
+  test::ok(dfm_trimesh_destroy(skin));
+  return b;
+}
+
+}  // namespace
+
+TEST(Overlap, OfFilledBodiesSideBySide_IsNoneThoughTheirCellsReachOut) {
+  test::Context c;
+  const dfm_world w = test::make_world(c, {});
+  const dfm_body low = filled_cube(c, w, "low", 0);
+  const dfm_body high = filled_cube(c, w, "high", 0.203);
+  const test::Triangles box = test::box_surface({0.1, 0.1, 0.1}, 2);
+  const dfm_obstacle o = thing(w, DFM_SHAPE_MESH, 0, &box);
+  const dfm_pose below = tilted(-0.203);
+  test::ok(dfm_obstacle_teleport(o, &below));
+  EXPECT_EQ(overlaps(w).size(), 0u);
+  test::set_velocity(high, {-0.7, 0, -0.7});
+  test::run(w, 0.05, 1e-3);
+  EXPECT_LT(test::measure(low).velocity[2], -0.2);
+  EXPECT_EQ(overlaps(w).size(), 0u);
+  dfm_world_destroy(w);
+}
+
+TEST(Overlap, OfFilledBodiesInOnePlace_IsFound) {
+  test::Context c;
+  const dfm_world w = test::make_world(c, {});
+  filled_cube(c, w, "a", 0);
+  filled_cube(c, w, "b", 0);
+  EXPECT_EQ(overlaps(w).size(), 1u);
   dfm_world_destroy(w);
 }
 

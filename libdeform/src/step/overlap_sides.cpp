@@ -72,9 +72,9 @@ void count_enclosed(const OverlapSkin &a, OverlapSkin &b, double least, Crossed 
 }
 
 // Coincident surfaces neither cross nor contain surfels of each other; places inside the bodies decide.
-void probe_inner(const OverlapSkin &a, OverlapSkin &b, double least, Crossed &out) {
+void probe_inner(OverlapSkin &a, OverlapSkin &b, double least, Crossed &out) {
   for (const Vec3 p : a.inner()) {
-    if (!may_hold(b, p) || !b.inside(p)) continue;
+    if (!may_hold(b, p) || !b.inside(p) || !a.covers(p)) continue;
     const double depth = b.distance(p);
     if (depth > least) {
       out.through = out.coincide = true;
@@ -169,17 +169,22 @@ const BoxTree &OverlapSkin::tree() {
   return *tree_;
 }
 
-bool OverlapSkin::inside(Vec3 p) {
-  if (!closed_) return false;
+double OverlapSkin::turns(Vec3 p) {
   if (!winding_) {
     Array<double> points{HookAllocator<double>(*memory_)};
     for (uint32_t s = 0; s < nsurfel(); ++s)
       for (int k = 0; k < 3; ++k) points.push_back(scale_ * (x(s)[k] - origin_[k]));
     winding_ = std::make_unique<WindingTree>(*memory_, points.data(), surface_->ntri, surface_->tri.data());
   }
-  const double turns = winding_->at(scale_ * (p - origin_));
-  return outward_ ? turns > 0.5 : turns > -0.5;
+  return winding_->at(scale_ * (p - origin_));
 }
+
+bool OverlapSkin::inside(Vec3 p) {
+  if (!closed_) return false;
+  return outward_ ? turns(p) > 0.5 : turns(p) > -0.5;
+}
+
+bool OverlapSkin::covers(Vec3 p) { return surface_->identity() || std::fabs(turns(p)) > 0.5; }
 
 double OverlapSkin::distance(Vec3 p) {
   double best = norm2(p - x(0));

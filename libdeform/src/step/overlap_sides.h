@@ -26,19 +26,23 @@ class OverlapSkin {
   Vec3 corner(uint32_t t, int k) const { return x(surface_->tri[3 * size_t{t} + size_t(k)]); }
   Vec3 lo() const { return lo_; }
   Vec3 hi() const { return hi_; }
-  // places inside that lie on no surface; of a body
+  // middles of cells, of a body: on no surface, and inside its own where covers() says so
   const std::vector<Vec3> &inner() const { return inner_; }
   // m, difference between its triangles and the surface for contact (voxels)
   double slack() const { return slack_; }
   bool room() const { return closed_ && !outward_; }  // material is outside its triangles
 
   const BoxTree &tree();
-  bool inside(Vec3 p);      // in its material; never in an open surface's
+  bool inside(Vec3 p);  // in its material; never in an open surface's
+  // Whether the middle of one of its cells is within its surface. Cells that a separate surface only grazes
+  // reach out of it, by up to their size where the body was filled.
+  bool covers(Vec3 p);
   double distance(Vec3 p);  // m, to its surface
   void shift(Vec3 by);
 
  private:
   void finish();
+  double turns(Vec3 p);  // winding number
   const Memory *memory_;
   Surface own_;
   const Surface *surface_;
