@@ -24,7 +24,10 @@ namespace dfm {
 namespace {
 
 constexpr uint32_t kMostCells = 100'000'000;
-constexpr double kShareFloor = 0.1;    // of the fullest cell around
+constexpr double kShareFloor = 0.1;  // of the fullest cell around
+// A layer of cells of which a part s is material bends like one of its thickness and s times the modulus, so
+// 1/s^2 times too stiffly. It is told from a factor of four on, if a tenth of the material is concerned.
+constexpr double kThin = 0.5, kTellThin = 0.1;
 constexpr double kOpening = 0.1;       // openings up to this part of the closed area are filled across
 constexpr double kDeviations = 4;      // sampled and summed volume agree within so many standard deviations
 constexpr double kCloseEnough = 1.02;  // number of cells over the wanted one, or the reverse
@@ -232,8 +235,9 @@ struct Around {
 
 // Raises light cells to the least share at the expense of the full cells around them (those with at least
 // half of the largest share); no cell gives more than half of its share. If no cell around has material, as
-// along a hair thinner than the samples, all cells of the body give.
-void raise_to_floor(const Memory &memory, Filling &f) {
+// along a hair thinner than the samples, all cells of the body give. Returns the part of the material that is
+// where no cell around has more than kThin of its volume in it.
+double raise_to_floor(const Memory &memory, Filling &f) {
   const Around around(memory, f);
   double first = 0, second = 0;
   for (const double s : f.share) {
@@ -244,9 +248,10 @@ void raise_to_floor(const Memory &memory, Filling &f) {
   const size_t n = f.size();
   Array<double> fullest(n, 0.0, HookAllocator<double>(memory)), need = fullest, from = fullest,
                                                                 gift = fullest, part = fullest;
-  double common = 0;
+  double common = 0, thin = 0;
   for (size_t c = 0; c < n; ++c) {
     around.each(f, c, [&](size_t d) { fullest[c] = std::max(fullest[c], f.share[d]); });
+    if (fullest[c] < kThin) thin += f.share[c];
     need[c] = std::max(0.0, kShareFloor * std::max(fullest[c], kShareFloor * typical) - f.share[c]);
     if (need[c] > 0 && fullest[c] < kShareFloor * typical) {
       common += need[c];
@@ -278,6 +283,7 @@ void raise_to_floor(const Memory &memory, Filling &f) {
     const double factor = first / (first + common);
     for (double &s : f.share) s *= factor;
   }
+  return thin / first;
 }
 
 // ---- sentences --------------------------------------------------------------------------------------------
@@ -309,7 +315,7 @@ void refuse_unfit(const TriMesh &surface, const FillSurface &s, uint32_t cells) 
 }
 
 void tell(const FillSurface &s, const Filling &f, double half_pitch, uint32_t cells, bool settled,
-          double sampled, uint32_t empty, TetMesh &out) {
+          double sampled, uint32_t empty, double thin, TetMesh &out) {
   const double cube = s.size * s.size * s.size, unit = kLatticeCell * half_pitch * half_pitch * half_pitch;
   if (!s.closed)
     out.warnings.push_back(
@@ -330,6 +336,11 @@ void tell(const FillSurface &s, const Filling &f, double half_pitch, uint32_t ce
     out.warnings.push_back(
         format("%zu cells instead of %u: this is the nearest number that the lattice gives for this surface",
                f.size(), cells));
+  if (thin > kTellThin)
+    out.warnings.push_back(format(
+        "%.0f %% of the material is in parts thinner than half a cell, which are at least four times too "
+        "stiff in bending: ask for more cells than %u, or give a mesh with tetrahedra",
+        100 * thin, cells));
 }
 
 }  // namespace
@@ -352,7 +363,7 @@ TetMesh fill_surface(const TriMesh &surface, uint32_t cells) {
          "nothing lies inside the surface (%u triangles, %.3g m across); it should enclose a volume, its "
          "triangles counter-clockwise from outside",
          surface.ntri(), s.size);
-  raise_to_floor(s.memory, f);
+  const double thin = raise_to_floor(s.memory, f);
 
   TetMesh out(s.memory);
   const double length = half_pitch * s.size;
@@ -365,7 +376,7 @@ TetMesh fill_surface(const TriMesh &surface, uint32_t cells) {
   out.share = std::move(f.share);
   out.tet_group.assign(out.ntet(), kNoGroup);
   for (uint32_t i = 0; i < out.npoint(); ++i) out.file_point.push_back(i);
-  tell(s, f, half_pitch, cells, settled, sampled, empty, out);
+  tell(s, f, half_pitch, cells, settled, sampled, empty, thin, out);
   return out;
 }
 
