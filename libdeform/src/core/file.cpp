@@ -120,6 +120,10 @@ AtomicFile::AtomicFile(const std::string &path) : path_(path) {
     if (fd >= 0) close(fd);
     if (fd >= 0 && kind_ == Kind::named) unlink(temporary_.c_str());
     errno = code;
+    const size_t slash = path.rfind('/');
+    if (code == ENOENT && slash != std::string::npos)
+      fail(DFM_E_IO, "%s: cannot be written: %s; make the folder '%s' first", path.c_str(),
+           std::strerror(code), path.substr(0, slash).c_str());
     fail_io("cannot be written");
   }
 }
