@@ -621,6 +621,17 @@ class World(Queries, Tools):
         self.free()
         check(quick.dfm_world_set_gravity(self.handle, vector(gravity, "gravity")))
 
+    def set_budget(self, max_time: float = 0, max_work: float | None = 0) -> None:
+        """Limits of one step from now on. max_time: s by the clock, 0: none. max_work: units of work, counted
+        in stats.work, the same on every machine; 0: automatic, None: no limit. A step that nears a limit is
+        simplified (Trouble.BUDGET); one that reaches it raises Discarded, and nothing has changed."""
+        self.free()
+        most = 2**64 - 1
+        if max_work is not None and not 0 <= max_work <= most:
+            raise ArgumentError(f"max_work is {max_work}; expected 0 to {most}, or None for no limit",
+                                "DFM_E_ARG")
+        check(quick.dfm_world_set_budget(self.handle, max_time, most if max_work is None else int(max_work)))
+
     # ---- reports ---------------------------------------------------------------------------------------
 
     def _list(self, key: str, make: Any) -> Any:
