@@ -4,6 +4,7 @@
 #include <deque>
 #include <mutex>
 #include <thread>
+#include <utility>
 #if defined(__linux__)
 #include <pthread.h>
 #include <sched.h>
@@ -50,6 +51,12 @@ class Worked {
   explicit Worked(std::thread &) {}
   bool half_of(std::chrono::nanoseconds) { return false; }  // nobody knows
 #endif
+};
+
+struct Dropped : Aside::Job {
+  std::shared_ptr<void> what;
+  explicit Dropped(std::shared_ptr<void> &&w) : what(std::move(w)) {}
+  void run() noexcept override { what.reset(); }
 };
 
 }  // namespace
@@ -133,6 +140,16 @@ bool Aside::finish(const std::shared_ptr<Job> &job, std::chrono::microseconds pa
     since = now;
   }
   return job->state_ == Job::done;
+}
+
+void Aside::drop(std::shared_ptr<void> what) noexcept {
+  if (dropped_) finish(dropped_, std::chrono::microseconds(0));
+  dropped_.reset();
+  try {
+    dropped_ = std::make_shared<Dropped>(std::move(what));
+    start(dropped_);
+  } catch (...) {  // no memory: it goes here
+  }
 }
 
 }  // namespace dfm

@@ -29,10 +29,14 @@ class Aside {
   // left takes less than the whole would, and otherwise for one. false: it is not done; it will not begin,
   // but may still be running.
   bool finish(const std::shared_ptr<Job> &job, std::chrono::microseconds patience);
+  // Frees it on the thread: large things take long, and a step has no time. The one before goes here if it is
+  // still there, so that a thread that does not come to them holds one.
+  void drop(std::shared_ptr<void> what) noexcept;
 
  private:
   struct Room;
   std::unique_ptr<Room> room_;
+  std::shared_ptr<Job> dropped_;
 };
 
 }  // namespace dfm

@@ -130,11 +130,12 @@ void open_faces_of(World &w, Body &b) {
   reserve_cut_events(w, by.size());
   const bool any = std::any_of(by.begin(), by.end(), [](const auto &part) { return part.second > 0; });
   if (any) {
-    const std::shared_ptr<CutJob> job = finish(w, b);
+    std::shared_ptr<CutJob> job = finish(w, b);
     if (job->error) std::rethrow_exception(job->error);
     put_opened(b, *job->made);
     job->next->shape = b.shape;
     a.structure = std::move(job->next);
+    if (w.aside) w.aside->drop(std::move(job));  // with the structure before
   }
   a.job.reset();
   a.faces.swap(a.later);

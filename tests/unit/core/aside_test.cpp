@@ -36,6 +36,26 @@ TEST(Aside, JobThatIsLeft_IsDroppedBeforeTheThreadComesToIt) {
   while (!aside.finish(first, 1s)) {}
 }
 
+TEST(Aside, WhatIsDropped_GoesOnTheThread_OneAtATime) {
+  const auto first = std::make_shared<Waits>();
+  dfm::Aside aside;
+  aside.start(first);
+  while (!first->begun) std::this_thread::sleep_for(1ms);
+  std::thread::id freed_by[2];
+  std::atomic<int> freed{0};
+  for (std::thread::id &by : freed_by)
+    aside.drop(std::shared_ptr<int>(new int, [&](int *p) {
+      delete p;
+      by = std::this_thread::get_id();
+      ++freed;
+    }));
+  EXPECT_EQ(freed, 1);
+  EXPECT_EQ(freed_by[0], std::this_thread::get_id());
+  first->end = true;
+  while (freed < 2) std::this_thread::sleep_for(1ms);
+  EXPECT_NE(freed_by[1], std::this_thread::get_id());
+}
+
 // On machines that tell how much of the time a thread works.
 #if defined(__linux__)
 struct Computes final : dfm::Aside::Job {
