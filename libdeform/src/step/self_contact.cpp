@@ -184,8 +184,8 @@ bool is_tangled(SelfBody &b, uint32_t surfel) {
                      [&](uint32_t triangle) { return crosses_another(b, triangle); });
 }
 
-// Continues the lists of the surface before a cut. The cut moves the surfels that it sets back again. ways: as
-// SelfRest::way, before it.
+// Continues the lists of the surface before a cut. The cut moves the surfels that it sets back again. ways:
+// as SelfRest::way, before the cut.
 void follow_cut(const World &w, const SelfList &before, const Array<double> &ways, const FeatureMap &features,
                 SelfBody &now) {
   constexpr double kSame = 1e-6;  // ways are of length one or so
