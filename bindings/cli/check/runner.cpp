@@ -156,14 +156,6 @@ void answer(const Verdict &verdict) {
     send(verdict.result == Result::pass ? 'P' : verdict.result == Result::fail ? 'F' : 'S', verdict.detail);
 }
 
-void fail_now(const char *sentence) {
-  const char letter = 'F';
-  const int to = report >= 0 ? report : STDERR_FILENO;
-  if ((report >= 0 && write(to, &letter, 1) != 1) || write(to, sentence, std::strlen(sentence) + 1) < 0)
-    _exit(1);
-  _exit(1);
-}
-
 Verdict run_here(const Rule &rule, const Subject &subject) {
   try {
     const uint32_t kind = subject.type ? subject.type->kind : uint32_t(DFM_KIND_FRICTION);

@@ -18,8 +18,6 @@ void stage(const char *format, ...) __attribute__((format(printf, 1, 2)));
 
 // The child's side: where stages and the verdict go; -1: this process is not a child.
 void report_to(int descriptor);
-// Writes a failed verdict and ends the process: for signal handlers, so it formats nothing.
-[[noreturn]] void fail_now(const char *sentence);
 
 struct Answer {
   bool spoke = false;  // the process gave a verdict

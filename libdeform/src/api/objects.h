@@ -2,6 +2,7 @@
 #pragma once
 #include "api/as_status.h"
 #include "api/structs.h"
+#include "core/error.h"
 #include "core/handle.h"
 #include "plugin/context.h"
 #include "state/obstacle.h"
@@ -49,6 +50,20 @@ inline World &whole(World &w) {
   for (auto &b : w.bodies) b->dynamics->see_points();
   return w;
 }
+// The handle of the one with this name among those for which counts() is true. what: "tool", for the error.
+template <class All, class Counts>
+uint64_t find_named(const All &all, const char *what, const char *name, Counts counts) {
+  std::vector<std::string> names;
+  for (const auto &x : all) {
+    if (!counts(*x)) continue;
+    if (x->name == name) return x->handle;
+    names.push_back(x->name);
+  }
+  const std::string near = nearest(name, names);
+  fail(DFM_E_ARG, "there is no %s '%s'%s", what, name,
+       near.empty() ? "" : ("; did you mean '" + near + "'?").c_str());
+}
+
 inline Obstacle &obstacle_of(dfm_obstacle h) { return part_of<Obstacle>(Kind::obstacle, h); }
 inline Material &material_of(dfm_material h) { return part_of<Material>(Kind::material, h); }
 

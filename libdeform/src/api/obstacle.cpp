@@ -131,14 +131,6 @@ dfm_status dfm_world_find_obstacle(dfm_world world, const char *name, dfm_obstac
     World &w = world_of(world);
     need(name, "name");
     need(out, "out");
-    const Obstacle *const o = w.find_obstacle(name);
-    if (!o) {
-      std::vector<std::string> names;
-      for (auto &x : w.obstacles) names.push_back(x->name);
-      const std::string near = nearest(name, names);
-      fail(DFM_E_ARG, "there is no obstacle '%s'%s", name,
-           near.empty() ? "" : ("; did you mean '" + near + "'?").c_str());
-    }
-    *out = o->handle;
+    *out = find_named(w.obstacles, "obstacle", name, [](const Obstacle &) { return true; });
   });
 }

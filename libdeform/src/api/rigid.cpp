@@ -117,18 +117,7 @@ dfm_status dfm_world_find_rigid(dfm_world world, const char *name, dfm_rigid *ou
     World &w = world_of(world);
     need(name, "name");
     need(out, "out");
-    std::vector<std::string> names;
-    for (auto &o : w.obstacles) {
-      if (!o->rigid || o->added) continue;
-      if (o->name == name) {
-        *out = o->handle;
-        return;
-      }
-      names.push_back(o->name);
-    }
-    const std::string near = nearest(name, names);
-    fail(DFM_E_ARG, "there is no rigid body '%s'%s", name,
-         near.empty() ? "" : ("; did you mean '" + near + "'?").c_str());
+    *out = find_named(w.obstacles, "rigid body", name, [](const Obstacle &o) { return o.rigid && !o.added; });
   });
 }
 

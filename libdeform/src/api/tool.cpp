@@ -58,17 +58,7 @@ dfm_status dfm_world_find_tool(dfm_world world, const char *name, dfm_tool *out)
     World &w = world_of(world);
     need(name, "name");
     need(out, "out");
-    std::vector<std::string> names;
-    for (auto &t : w.tools) {
-      if (t->name == name) {
-        *out = t->handle;
-        return;
-      }
-      names.push_back(t->name);
-    }
-    const std::string near = nearest(name, names);
-    fail(DFM_E_ARG, "there is no tool '%s'%s", name,
-         near.empty() ? "" : ("; did you mean '" + near + "'?").c_str());
+    *out = find_named(w.tools, "tool", name, [](const Tool &) { return true; });
   });
 }
 
