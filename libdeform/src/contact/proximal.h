@@ -27,14 +27,14 @@ namespace dfm {
 class Proximal {
  public:
   explicit Proximal(const Memory &memory);
-  // The parts of these rows. leave: [blocks of all] 1: a part with this block is none of them; nor is one
-  // with points that answer their own impulses alone.
+  // Finds the parts of these rows. leave: [blocks of all] 1: a part with this block is left out, and so is
+  // one with points that respond to their own impulses alone.
   uint32_t find_parts(const ContactRows &rows, const RowsPart &of, std::span<const uint8_t> leave);
   std::span<const uint32_t> contacts(uint32_t part) const;
   // Returns false if its bodies have too many motions.
   bool take(const ContactRows &rows, uint32_t part);
-  // One stride of the part taken from the rows' impulses, which change; rho: over each contact's own 1 /
-  // response. False: it was not found, and nothing has changed.
+  // One stride of the part taken, from the rows' impulses, which change; rho: over each contact's own 1 /
+  // response. False: no result was found, and nothing has changed.
   bool stride(ContactRows &rows, const ContactState &law, double h, double rho);
   // The part taken, as it is with these impulses [3 rows.n].
   void put(ContactRows &rows, const double *impulse) const;

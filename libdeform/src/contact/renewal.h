@@ -34,10 +34,10 @@ class Renewal {
   explicit Renewal(const Memory &memory);
   // impulse: [n,3] of the last sub-step, normal part first.
   void list(std::span<const ContactPoint> contacts, const double *impulse);
-  // For the listed contacts. stands: [n] 1: it keeps its area; aim: [n] m2, its area by the load;
-  // area: [n] m2 in and out, of those with stands = 1. Allocates nothing.
+  // For the listed contacts. stands: [n] 1: the contact keeps its area; aim: [n] m2, its area by the load;
+  // area: [n] m2 in and out, for contacts with stands = 1. Allocates nothing.
   void fill(const uint8_t *stands, const double *aim, double *area);
-  // How far a contact has slid on and how far its bristles are out, m.
+  // The slid distance of a contact and the deflection of its bristles, m.
   struct Way { double slid, out; };
   // impulse: [n,3] of this sub-step of h; ways, dwell: [n]; renewed: [n] out, r of the contact's patch.
   // Allocates nothing.

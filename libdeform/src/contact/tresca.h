@@ -29,8 +29,9 @@ class Tresca {
   // Whether the part is one that this can solve: contacts of one block with obstacles, without bonds, with
   // laws that project.
   static bool serves(const ContactRows &rows, const RowsPart &part, const ContactState &law);
-  // Impulses whose residual (Residual::due) is at most `most`, or at most `enough` where no more can be had,
-  // from the present ones. False: not found; impulses are then as they were, or better.
+  // Finds impulses whose residual (Residual::due) is at most `most`, or at most `enough` if it cannot be
+  // lowered further, from the present ones. Returns false if there are none; the impulses are then as they
+  // were, or better.
   bool solve(ContactRows &rows, const RowsPart &part, const ContactState &law, double h,
              const Tolerance &tolerance, double most, double enough, BackedResponse &body);
   // of the last solve: products with the response

@@ -1,6 +1,7 @@
-// A blow on a body that the library has made implicit, in a step that the library has chosen: contact takes
-// the velocity of the body in one sub-step, and with it the energy that would throw it back. Such a step is
-// repeated explicitly, and explicit time lasts until the blow is over; doc/decisions/0456-blows-by-auto.md.
+// A hard blow on a body that the library has made implicit, in a step whose length the library has chosen:
+// contact takes the velocity of the body in one sub-step, and with it the energy that would throw it back.
+// Such a step is repeated explicitly, and the body stays explicit until the blow is over;
+// doc/decisions/0456-blows-by-auto.md.
 #pragma once
 
 namespace dfm {
@@ -13,7 +14,7 @@ struct World;
 bool chosen_by_library(const World &w, double dt);
 // Before a sub-step is committed: ends the step if one of its bodies has been struck.
 void look_for_blow(const World &w, const StepContext &step);
-// From the state before the step: explicit until the blow is over.
+// Begins again from the state before the step, explicitly until the blow is over.
 void begin_blow(World &w, double dt);
 // After a step: whether it belongs to a blow, whose steps are not counted. The last one makes bodies implicit
 // again.

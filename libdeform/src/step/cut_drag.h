@@ -1,6 +1,6 @@
-// What a tool owes for its cuts it pays over the way that follows: rows of the contact solve, each between a
-// point of the body beside the cut and the part cutting (contact/bond.h, decision 0402). Both get the impulse
-// at the point.
+// A tool pays the energy of its cuts along the way that follows, by rows of the contact solve: each is
+// between a point of the body beside the cut and the part of the tool that cuts (contact/bond.h, decision
+// 0402). Both get the impulse at that point.
 #pragma once
 
 namespace dfm {
@@ -9,7 +9,7 @@ struct Body;
 struct StepContext;
 struct World;
 
-// Takes energy to be cut: a material of it has "fracture_energy" above 0.
+// Whether cutting the body takes energy: one of its materials has "fracture_energy" above 0.
 bool tough(const Body &b);
 bool has_dues(const Body &b);
 
@@ -18,7 +18,7 @@ void make_cut_drags(World &w, StepContext &step, bool again);
 // Subtracts the work of the completed sub-step from the energies due.
 void keep_cut_drags(World &w, StepContext &step);
 
-// Wakes bodies that sleep while the tool that owes them something moves.
+// Wakes bodies that sleep while a tool moves that has not paid for its cuts in them.
 void wake_cut(World &w, StepContext &step);
 
 }  // namespace dfm

@@ -51,7 +51,7 @@ struct Guard {
   bool resolving = false;  // a solve that starts from `kept`
 
   double planned = 0;                 // s, the sub-step before it was shortened
-  double finer = 1, most_finer = 1;   // sub-steps that a blow makes of it and of each later one; limit
+  double finer = 1, most_finer = 1;   // sub-steps into which a hard blow divides it and each later one; limit
   uint32_t pieces = 0;                // cuts of this planned sub-step
   bool acted = false, again = false;  // in this sub-step; it must be repeated
   bool refines = false;               // then: because of a blow, as the first of `finer` sub-steps
@@ -72,13 +72,13 @@ struct Guard {
 // Whether two surfaces cross at the start of the sub-step. Each pair is tested once per sub-step. slot_a <
 // slot_b if both are bodies.
 bool cross_at_start(StepContext &step, uint32_t slot_a, uint32_t slot_b, bool obstacle);
-// Finds guard.common of body i, beside its end, if it moves so far that the guard asks for it.
+// Finds guard.common of body i, beside its end, if it moves so far that the guard needs it.
 void look_at_motion(const World &w, StepContext &step, uint32_t i);
 // guard_hits.cpp: the earliest hits as contacts of the sub-step, among those that it has.
 void guard_add_hits(World &w, StepContext &step);
 // Drops hits whose contacts the host rejects (PreSolve).
 void guard_ask_hits(World &w, StepContext &step);
-// In the middle of a solve's preparation, where guard.resolving: impulses, and rates of hits, of `kept`.
+// Called while a solve is prepared, if guard.resolving: takes the impulses and the rates of hits from `kept`.
 void guard_impulses(StepContext &step);
 void guard_rates(StepContext &step);
 

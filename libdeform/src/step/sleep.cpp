@@ -1,18 +1,18 @@
 // Sleep and waking.
 //
-//   end of a sub-step    a body whose points are all slower than sleep_speed, and within half of d_c of where
-//                        they were when its calm began, stays calm. Speed alone would let slow drift pass,
-//                        and never let a stiff body sleep that shivers by a nanometer an island sleeps when
-//                        all its bodies have been calm for sleep_time, none of its contacts slides or meets
-//                        an obstacle that moves or a rigid host's body, and nothing that is prescribed for
-//                        its bodies lies ahead
+//   end of a sub-step    A body is calm while all its points are slower than sleep_speed and within half of
+//                        d_c of where they were when it became calm. Speed alone would let slow drift pass,
+//                        and would keep a stiff body awake that vibrates by a nanometer. An island falls
+//                        asleep when all its bodies have been calm for sleep_time, none of its contacts
+//                        slides or touches a moving obstacle or a rigid host's body, and no prescribed motion
+//                        or load of its bodies is still to come
 //   asleep               x, contacts and their forces stay, v = 0; no stage works on the body. Detection
-//                        keeps its shape as a partner: pairs of which at least one side is awake, or an
-//                        obstacle that moves, are looked at as ever
-//   waking               a contact between such a pair, even one that is still open, wakes the whole island
-//                        before the sub-step goes on: the woken take the stages that the others have passed,
-//                        and detection looks again. So a woken body meets what comes with all of its own
-//                        dynamics, warm started by the contacts that it had when it fell asleep
+//                        keeps its shape as a partner: pairs with at least one side awake, or with a moving
+//                        obstacle, are tested as before
+//   waking               A contact of such a pair, even one that is still open, wakes the whole island before
+//                        the sub-step continues: the woken bodies run the stages that the others have passed,
+//                        and detection runs again. So a woken body responds with its full dynamics, warm
+//                        started by the contacts that it had when it fell asleep
 //
 // All decisions depend on the state alone, in the order of ids.
 #include "state/sleep.h"
@@ -165,8 +165,8 @@ void wake_touching(World &w, uint64_t obstacle) {
       wake(w, *w.bodies[i]);
 }
 
-// Whether nothing moves and nothing will, so that the sub-step would change nothing. The motion of a rigid
-// host's bodies is known to the host only.
+// Whether nothing moves and nothing will, so that the sub-step would change nothing. Only a rigid host knows
+// the motion of its bodies.
 bool all_idle(const World &w, const StepContext &step) {
   return w.sleepers > 0 && step.active.empty() && w.rigid_sets.empty() &&
          std::none_of(step.obstacle_views.begin(), step.obstacle_views.end(),
@@ -255,7 +255,7 @@ void fall_asleep(World &w, StepContext &step, Body &b, double end) {
   b.bound.known = false;
 }
 
-// Contacts of those who sleep go on behind the ones of this sub-step, in the order of their keys. last_report
+// Contacts of sleeping bodies are appended to those of this sub-step, in the order of their keys. last_report
 // belongs to `store`.
 void carry_sleepers(World &w, StepContext &step, uint32_t *touching, uint32_t *sticking) {
   ContactStore &to = step.next_store;
@@ -282,7 +282,7 @@ void carry_sleepers(World &w, StepContext &step, uint32_t *touching, uint32_t *s
           to.bristle.push_back(s < w.store.nstate ? w.store.bristle[size_t(w.store.nstate) * m + s] : 0);
     to.n += end - from;
   };
-  // While the same ones sleep they are the old store's tail, and go over as a whole.
+  // While the same bodies sleep, their contacts are the tail of the old store, and are taken over as a whole.
   uint32_t tail = w.store.n;
   while (tail > 0 && sleeps(w, step, tail - 1) &&
          (tail == w.store.n || w.store.key[tail - 1] < w.store.key[tail]))
@@ -313,21 +313,21 @@ void carry_sleepers(World &w, StepContext &step, uint32_t *touching, uint32_t *s
     to.by_key[k] = m == to.n || (i < own && to.key[step.match[i]] < to.key[m]) ? step.match[i++] : m++;
 }
 
-// Is a contact of the old store one of sleepers, which goes on as it is?
+// Whether a contact of the old store belongs to sleeping bodies and stays as it is.
 bool sleeps(const World &w, const StepContext &step, uint32_t m) {
   if (w.sleepers == 0) return false;
   const uint32_t slot = step.last_report.contacts[m].slot_a;
   return slot != kNone && w.bodies[slot]->slumber.asleep;
 }
 
-// Contacts that sleep stick: a hold that begins now counts them from now on.
+// Contacts of sleeping bodies stick: a hold that begins now counts them from now on.
 void hold_sleepers(World &w) {
   for (uint32_t m = 0; m < w.store.n; ++m)
     w.store.held[m] = w.store.impulse[size_t(3) * m] > 0 && asleep(w, w.store.id_a[m]);
 }
 
-// Before the world forgets a body or an obstacle: whom it touched wakes, and the contacts of those who sleep
-// on name slots that move up.
+// Called before a body or an obstacle is removed from the world: bodies that touched it wake, and higher
+// slots in the contacts of sleeping bodies move down by one.
 void close_slot(World &w, uint64_t id, bool obstacle) {
   const auto thing =
       std::find_if(w.obstacles.begin(), w.obstacles.end(), [&](auto &o) { return o->id == id; });

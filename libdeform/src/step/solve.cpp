@@ -1,5 +1,5 @@
-// contact <-> friction (doc/concepts/contact.md): rows, what bodies answer otherwise by their impulses, and
-// what is kept. The outer loop over the laws around the inner sweeps is solve_islands.cpp.
+// contact <-> friction (doc/concepts/contact.md): the rows, the revision of bodies whose response depends on
+// the impulses, and what is kept. The outer loop over the laws around the sweeps is in solve_islands.cpp.
 //
 //   warm start: last impulses of the same keys, times h/h_old, applied before the first sweep
 //   repeat   evaluate all laws once, in batches, at the present slip and normal force
@@ -29,7 +29,7 @@
 namespace dfm {
 namespace {
 
-// Responses between the touched surfels of bodies whose points answer each other.
+// Responses between the touched surfels of bodies whose points respond to each other's impulses.
 void fill_response(World &w, StepContext &step, const ContactRows::Block &block) {
   const Body &b = *w.bodies[block.source];
   step.block_surfels.resize(block.count);
@@ -48,18 +48,18 @@ void fill_responses(World &w, StepContext &step) {
   }
 }
 
-constexpr uint32_t kMostRevisions = 6;  // of what rigid hosts take for granted, within a sub-step
-// Revisions of bodies by the last impulses before the first solve: a few, because the solve moves bodies
-// anyway where they do not rest. Further solves at most, once bodies are content, of what the cap on sweeps
-// has cut off.
+constexpr uint32_t kMostRevisions = 6;  // of the responses of rigid hosts, within a sub-step
+// Revisions of bodies with the last impulses before the first solve: a few, because the solve moves bodies
+// that do not rest anyway. And the largest number of further solves, once no body has anything to revise, of
+// islands that the limit of sweeps has ended.
 constexpr uint32_t kWarmRevisions = 4, kMostAgain = 6;
-// A solve that ends at its cap, or goes on beyond it by momentum, leaves impulses that drift, and bodies
-// follow them: each finds something to change after the other, and none of it is an error that falls. After
-// so many such solves a body is as right as it will be where it lies within what it tolerates.
+// A solve that ends at its limit of sweeps, or continues beyond it with momentum, leaves impulses that drift,
+// and bodies follow them: one after the other they revise their response, without any error that falls. After
+// this many such solves a body is accepted if its error is within its tolerance.
 constexpr uint32_t kMostCapped = 20;
-// The same of contacts that sweeps stall on (contact/tresca.h), which leave a tenth of their tolerance.
-// Bodies that they hold, soft without them, answer it by more than they have to be right to. That error falls
-// by a factor of hundreds in most of these solves, and no more after as many of them.
+// The same for contacts that sweeps stall on (contact/tresca.h), which leave a tenth of their tolerance.
+// Bodies that are held only by them respond by more than their accuracy requires. That error falls by a
+// factor of hundreds in most of these solves, and no further after this many.
 constexpr uint32_t kMostStalled = 6;
 // A sub-step in which the forces and contacts of a body do not agree is repeated with half its length, down
 // to this share of the planned one.
@@ -75,7 +75,7 @@ void give_impulses(StepContext &step) {
              rows.impulse.data() + size_t{3} * rows.n);
 }
 
-// Contacts as rows, with what they kept from the last sub-step: its impulses, not applied yet.
+// Makes rows of the contacts, with the impulses of the last sub-step, which are not applied yet.
 void make_rows(World &w, StepContext &step) {
   const uint32_t n = static_cast<uint32_t>(step.contacts.size());
   uint32_t nstate = 0;
@@ -87,7 +87,8 @@ void make_rows(World &w, StepContext &step) {
     step.state.area[i] = c.area;
   }
   if (!w.pairs.zone_table.empty()) set_zone_laws(w, step.contacts, step.state.law);
-  // Laws with memory count by area. A crossing has its share of it, so it has to bear its share of the load.
+  // The force of laws with memory is proportional to area. A crossing has its part of the area, so it has to
+  // carry its part of the load.
   if (nstate > 0)
     for (uint32_t i = 0; i < n; ++i)
       if (w.pairs.laws[step.state.law[i]]->nstate > 0) step.contacts[i].give = 0;
@@ -141,9 +142,9 @@ void take_velocities(Body &b, StepContext &step, const ContactRows::Block &block
                 &step.rows.y_free[size_t{kStride} * (block.first + k)]);
 }
 
-// Bodies of an island whose forces are not linear in the velocity look at what the impulses, which have been
-// given to them, have made of them. What they answer then is put in the place of what they answered before;
-// impulses stay. responses: some body's response is another one.
+// Revises the bodies of an island whose forces are not linear in the velocity: the new response to the
+// present impulses replaces the old one; the impulses stay. responses: whether the response matrix of a body
+// has changed.
 Revised revise_bodies(World &w, StepContext &step, const SolveIsland &own, bool last, bool &responses) {
   Revised out = Revised::nothing;
   for (const uint32_t number : own.part.blocks) {
@@ -172,7 +173,7 @@ Revised revise_bodies(World &w, StepContext &step, const SolveIsland &own, bool 
   return out;
 }
 
-// Back to the free motion, where the last impulses lead to no state: they need not hold together any more.
+// Back to the free motion, if no state was found for the last impulses: they need not be consistent any more.
 void forget_revisions(World &w, StepContext &step, const SolveIsland &own) {
   for (const uint32_t number : own.part.blocks) {
     const ContactRows::Block &block = step.rows.blocks[number];
@@ -185,7 +186,7 @@ void forget_revisions(World &w, StepContext &step, const SolveIsland &own) {
   }
 }
 
-// The open islands whose bodies revise, each by itself; own.revised says what has come of it. warm: by the
+// Revises the bodies of the open islands, each island by itself; own.revised holds the result. warm: with the
 // impulses of the last sub-step.
 void revise_islands(World &w, StepContext &step, bool warm) {
   const std::span<SolveIsland> all = step.solve_islands->all();
@@ -210,9 +211,9 @@ void revise_islands(World &w, StepContext &step, bool warm) {
     if (own.open && own.revised != Revised::nothing) step.rows.restore(own.part);
 }
 
-// At first the impulses are those of the last sub-step. A body at rest is linear enough around the state that
-// these hold it in; around its free motion the first solve would let it fall, and friction with memory slide,
-// from where the sweeps do not find back.
+// The first revisions use the impulses of the last sub-step. A body at rest is nearly linear around the state
+// in which these hold it. Linearized around its free motion, the first solve would let it fall and make
+// friction with memory slide, and the sweeps would not reverse that.
 void revise_warm(World &w, StepContext &step) {
   const std::span<SolveIsland> all = step.solve_islands->all();
   for (SolveIsland &own : all) own.open = own.revises;
@@ -227,8 +228,8 @@ void revise_warm(World &w, StepContext &step) {
   }
 }
 
-// With what rigid hosts and bodies answer differently by the impulses that are found: the same problem again,
-// from these impulses. An island is done once none of its bodies answers differently.
+// Solves again, from the present impulses, until rigid hosts and bodies respond as the solve assumed. An
+// island is done once none of its bodies has anything to revise.
 const SolveIsland *solve_revised(World &w, StepContext &step, Revised &revised) {
   const std::span<SolveIsland> all = step.solve_islands->all();
   for (SolveIsland &own : all) {
@@ -253,7 +254,7 @@ const SolveIsland *solve_revised(World &w, StepContext &step, Revised &revised) 
         revised = Revised::diverged;
         return nullptr;
       }
-    // A motor holds or lets go.
+    // a motor has reached its limit, or no longer does
     if (hosts < kMostRevisions && !step.rows.rigid.empty() && revise_rigids(w, step)) {
       finish_rows(w, step);
       ++hosts;
@@ -278,7 +279,7 @@ const SolveIsland *solve_revised(World &w, StepContext &step, Revised &revised) 
   }
 }
 
-// Of all islands: the worst residual, the passes and sweeps of the one that took most.
+// Takes the largest residual of all islands, and the passes and sweeps of the island that needed most.
 void add_up(StepContext &step) {
   step.passes = step.sweeps = 0;
   step.residual = {};
