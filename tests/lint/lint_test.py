@@ -58,7 +58,8 @@ GOOD = {
                                     "using json = nlohmann::json;\n",
     "plugins/model_msm/model_msm.cpp": '#include "deform/plugin.h"\n#include "spring.h"\n#include <vector>\n',
     "plugins/model_msm/spring.h": "#pragma once\n",
-    "plugins/friction_b/b.cpp": '#include "../friction_common/curve.h"\n',
+    "plugins/friction_b/b.cpp": '#include "../friction_common/curve.h"\nchar id[] = "org.deform.bee";\n',
+    "libdeform/doc/laws/bee.md": "# bee\n", "tests/support/law_bytes.h": "// bee\n",
     "plugins/friction_common/curve.h": "#pragma once\n",
     "plugins/model_common/half.h": "#pragma once\n",
     "plugins/model_msm/spring_kernel_avx2.cpp": "#include <immintrin.h>\n#include \"spring.h\"\n"
@@ -71,6 +72,7 @@ GOOD = {
     "libdeform/doc/README.md": "# Pages\n\n`dfm_hello`, `tree.cpp`, `core/error.h` "
                                "[engine](howto/engine.md#engine), [c++](howto/cpp.md), [top](#pages), "
                                "[gallery](reference/gallery.md), [scenes](reference/scenes.md), "
+                               "[bee](laws/bee.md), "
                                "[out](https://example.org/a.md)\n",
     "libdeform/doc/decisions/0001-handles.md": "# Handles\n",
     "libdeform/doc/reference/scenes.md": "`time.step`: s\n",
@@ -121,6 +123,8 @@ BAD = {
                   ("libdeform/src/core/error.h", "// doc/decisions/0002\n")],
     "names": [("README.md", "`dfm_gone()`\n"), ("README.md", "in `broad/gone.cpp`\n"),
               ("libdeform/doc/howto/cpp.md", "`DFM_GONE`\n")],
+    "shipped": [("plugins/friction_c/c.c", '=char id[] = "org.deform.sea";\n'),
+                ("tests/support/law_bytes.h", "=// none\n")],
     "scene_keys": [("libdeform/doc/reference/scenes.md", "=step is no code\n"),
                    ("libdeform/schema/deform-scene.schema.json",
                     '={"$defs": {"time": {"properties": {"step": {}, "stop": {"type": "number"}}}}}\n')],

@@ -140,5 +140,23 @@ def scene_keys(tree):
                        f"{PAGES}reference/scenes.md")
 
 
-RULES = {"walks": walks, "names": names, "scene_keys": scene_keys, "links": links, "citations": citations,
+def shipped(tree):
+    """A law or model of the library has a page, a line on the page that compares them, and a place in the
+    tests that run all of them."""
+    lists = {"laws": ("libdeform/doc/laws/choosing.md", "tests/support/cover_rows.h",
+                      "tests/support/law_bytes.h"),
+             "models": ("libdeform/doc/models/compared.md", "tests/support/cover_rows.h")}
+    for path in tree.select("plugins/friction_", "plugins/model_"):
+        kind = "laws" if path.startswith("plugins/friction_") else "models"
+        for match in re.finditer(r'"org\.deform\.(\w+)"', tree.text(path)):
+            name, line = match.group(1), line_of(tree.text(path), match.start())
+            if f"{PAGES}{kind}/{name}.md" not in tree.paths:
+                yield path, line, f"there is no page {PAGES}{kind}/{name}.md (CONTRIBUTING.md, How to add)"
+            for needed in lists[kind]:
+                if needed in tree.paths and not re.search(rf"\b{name}\b", tree.text(needed)):
+                    yield path, line, f"{name} is not in {needed} (CONTRIBUTING.md, How to add)"
+
+
+RULES = {"walks": walks, "names": names, "scene_keys": scene_keys, "shipped": shipped,
+         "links": links, "citations": citations,
          "reading_order": reading_order, "pictures": pictures}
