@@ -185,6 +185,33 @@ void print_kind(const Run &run, uint8_t kind, const char *what, double step) {
               t.size(), 1e3 * t[t.size() / 2], 1e3 * t[t.size() * 999 / 1000], 1e3 * t.back(), late);
 }
 
+// What a unit of contact takes: of steps without a cut, the hundredth with the most units against those
+// around the median. Then the units that fit into nine tenths of a step; the rest counts no units.
+void print_max_work(const Run &run, double step) {
+  std::vector<std::pair<double, double>> steps;  // units, s
+  for (size_t n = 0; n < run.seconds.size(); ++n)
+    if (run.cut[n] == 0) steps.emplace_back(double(run.work[n]), run.seconds[n]);
+  if (steps.size() < 100) return;
+  std::sort(steps.begin(), steps.end());
+  const auto mean = [&](size_t from, size_t to) {
+    std::pair<double, double> sum;
+    for (size_t k = from; k < to; ++k) {
+      sum.first += steps[k].first / double(to - from);
+      sum.second += steps[k].second / double(to - from);
+    }
+    return sum;
+  };
+  const size_t n = steps.size();
+  const auto usual = mean(n * 45 / 100, n * 55 / 100), hard = mean(n * 99 / 100, n);
+  const double more = hard.first - usual.first, longer = hard.second - usual.second;
+  if (!(more > 0.05 * usual.first) || !(longer > 0)) return;
+  const double fits = usual.first + (0.9 * step - usual.second) * more / longer;
+  std::printf("    hard steps take %.0f ns for each unit beyond the usual %.0f: ", 1e9 * longer / more,
+              usual.first);
+  if (fits > usual.first) std::printf("\"max_work\": %.0f for steps of %g ms\n", fits, 1e3 * step);
+  else std::printf("no \"max_work\" makes these steps as short as %g ms\n", 1e3 * step);
+}
+
 std::vector<Sample> read(const char *path) {
   std::vector<Sample> out;
   std::ifstream in(path);
@@ -289,6 +316,7 @@ int main(int argc, char **argv) {
   std::printf("    slowest:");
   for (size_t n = 0; n < most; ++n) std::printf(" %.2f (%zu)", 1e3 * found.seconds[slow[n]], slow[n] + 1);
   std::printf(" ms (step)\n");
+  print_max_work(found, step);
   std::sort(found.work.begin(), found.work.end());
   std::printf(
       "    units of work: median %llu, 99.9 %% %llu, most %llu; at most %u passes, %u sweeps, "
