@@ -111,6 +111,26 @@ std::string stop(pid_t child, int signal, const std::string &out) {
 
 }  // namespace
 
+// A crate falls on a floor, no soft body is near.
+TEST(Run, OfRigidBodies_HasTheirContacts) {
+  const std::string dir = test::scratch("run_rigid_" + std::to_string(getpid()));
+  test::write_file(dir + "/scene.json", R"({
+    "format": "deform-scene", "version": 1,
+    "time": {"duration": 0.5, "step": 0.001}, "bodies": [],
+    "obstacles": [{"name": "floor", "shape": "plane"}],
+    "rigid": {"host": "builtin", "bodies": [{"name": "crate", "shape": "box", "half_size": [0.05, 0.06, 0.04],
+      "mass": 2, "pose": {"position": [0, 0, 0.06]}}]},
+    "output": {"every": 0.1}})");
+  const auto result = test::deform({"run", dir + "/scene.json", "--quiet", "--out", dir + "/out"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto rows = test::read_csv(dir + "/out/contacts.csv");
+  ASSERT_EQ(rows.size(), 1u + 5) << "in the air at first";
+  EXPECT_EQ(rows[5][1], "crate");
+  EXPECT_EQ(rows[5][2], "floor");
+  EXPECT_NEAR(std::stod(rows[5][5]), 2 * 9.81, 1e-6);
+  EXPECT_NE(test::read_file(dir + "/out/summary.json").find("crate/floor"), std::string::npos);
+}
+
 TEST(Run, Outputs_HaveTheirColumnsAndKeys) {
   const Outcome r = run("outputs", {});
   ASSERT_EQ(r.result.exit_code, 0) << r.result.err;

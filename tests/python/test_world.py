@@ -62,6 +62,19 @@ class Building(unittest.TestCase):
             met = {(world.owner(e["a"]), world.owner(e["b"])) for e in world.events}
             self.assertIn((body, rigid), met)
 
+    def test_crate_on_a_floor_is_in_the_reports(self):
+        with deform.World() as world:
+            floor = world.add_obstacle("plane", name="floor")
+            crate = world.add_rigid("box", mass=2, half_size=(0.05, 0.06, 0.04), position=(0, 0, 0.06))
+            world.run(0.5, dt=1e-3)
+            pair, = world.impulses
+            self.assertEqual((world.owner(pair["a"]), world.owner(pair["b"])), (crate, floor))
+            self.assertAlmostEqual(pair["impulse"][2], 2 * 9.81e-3, delta=1e-9)
+            self.assertAlmostEqual(world.pairs[0]["normal"], 2 * 9.81, delta=1e-6)
+            self.assertAlmostEqual(world.contacts["fn"].sum(), 2 * 9.81, delta=1e-6)
+            self.assertEqual({world.owner(c["body_a"]) for c in world.contacts}, {crate})
+            self.assertEqual([e["kind"] for e in world.events], [1])
+
     def test_ball_hangs_on_a_hook_and_is_let_go(self):
         with deform.World() as world:
             hook = world.add_obstacle("box", name="hook", half_size=(0.1, 0.1, 0.02), position=(0, 0, 0.12))

@@ -646,7 +646,7 @@ class World(Queries, Tools):
     def contacts(self) -> np.ndarray:
         """All contacts of the last sub-step, a structured array [n], a view: body_a, body_b, point [3] m,
         normal [3], tangent [3], gap m, area m2, fn N, ft [2] N, slip [2] m/s, bristle [2] m, flags, key,
-        kind, law."""
+        kind, law. Of two rigid things (kind 3) body_a is a rigid body or a part of a tool."""
         return self._list("contacts", lambda: Rows(quick.dfm_world_contacts_sized, self.handle,
                                                    _abi.dfm_contact))
 
@@ -668,9 +668,10 @@ class World(Queries, Tools):
     def events(self) -> np.ndarray:
         """What has begun and ended since the last look, a structured array [n], a view: kind, a, b, key, t s.
 
-        kind: 1 and 2, a contact has begun and ended; 3, an attachment has ended (key: its number); 4 and 5,
-        something (b) has come into a sensor (a) and left it; 6, body a has torn (key: points that
-        were split); 7, part b of a tool has cut body a (key: faces or cells)."""
+        kind: 1 and 2, a contact of a soft body, or the touch of two rigid things, has begun and ended; 3, an
+        attachment has ended (key: its number); 4 and 5, something (b) has come into a sensor (a) and left
+        it; 6, body a has torn (key: points that were split); 7, part b of a tool has cut body a (key: faces
+        or cells)."""
         return self._list("events", lambda: Rows(quick.dfm_world_events_sized, self.handle,
                                                  _abi.dfm_contact_event))
 

@@ -54,8 +54,14 @@ DFM_API dfm_status dfm_world_remove_filter(dfm_world world, const char *a, const
 
 /** dfm_contact.kind. VERTEX_FACE: a surfel of side a on a triangle of side b. EDGE_EDGE: an
  * edge of each side. PRIMITIVE: a surfel, an edge or a triangle of side a (flags) on an obstacle or a rigid
- * body. Since 0.1. */
-enum { DFM_CONTACT_VERTEX_FACE = 0, DFM_CONTACT_EDGE_EDGE = 1, DFM_CONTACT_PRIMITIVE = 2 };
+ * body. RIGID: a place where two rigid things meet: rigid bodies, parts of tools, obstacles. Side a is one
+ * that gives way, and where both do, the one that was made first. Since 0.1. */
+enum {
+  DFM_CONTACT_VERTEX_FACE = 0,
+  DFM_CONTACT_EDGE_EDGE = 1,
+  DFM_CONTACT_PRIMITIVE = 2,
+  DFM_CONTACT_RIGID = 3
+};
 /** dfm_contact.flags. STICKING: it carries load and its law sticks. BEGAN: it began to touch in the last
  * sub-step. EDGE_A, TRIANGLE_A: feature_a is the number of an edge, of a triangle; without these, of a
  * surfel. The edges of a surface are those of dfm_surface_triangles, each once, as pairs i < j of surfels in
@@ -66,18 +72,19 @@ enum { DFM_CONTACT_STICKING = 1, DFM_CONTACT_BEGAN = 2, DFM_CONTACT_EDGE_A = 4, 
  * tangent, [1] along normal x tangent. */
 typedef struct dfm_contact {
   uint32_t size, flags; /* flags: DFM_CONTACT_STICKING, BEGAN, EDGE_A, TRIANGLE_A */
-  /* body_b 0: an obstacle, which does not respond; key: constant while the contact lasts */
+  /* body_a: a soft body; RIGID: a rigid body or a part of a tool. body_b 0: an obstacle, which does not
+   * respond. key: constant while the contact lasts */
   uint64_t body_a, body_b, key;
   /* surfel, edge or triangle number on each side; PRIMITIVE: feature_b is the index of the obstacle or rigid
-   * body in dfm_world_obstacles, from 0 */
+   * body in dfm_world_obstacles, from 0; RIGID: both are such indices */
   uint32_t feature_a, feature_b;
-  /* DFM_CONTACT_VERTEX_FACE, EDGE_EDGE or PRIMITIVE; number of its friction law (dfm_world_law_info) */
+  /* DFM_CONTACT_VERTEX_FACE, ...; number of its friction law (dfm_world_law_info) */
   uint32_t kind, law;
   double point[3];              /* m, world */
   double normal[3], tangent[3]; /* unit; normal from b to a */
   /* m, distance of the surfaces minus the rest distance d_c; 0 at rest */
   double gap;
-  /* m2, area of the surface that the contact represents, for forces per area */
+  /* m2, area of the surface that the contact represents, for forces per area; RIGID: 0 */
   double area;
   double fn, ft[2];  /* N, mean over the sub-step */
   double slip[2];    /* m/s, of a relative to b */
@@ -88,7 +95,8 @@ typedef struct dfm_contact {
  * Threads: Any thread. Not during step. */
 DFM_API dfm_status dfm_world_contacts_sized(dfm_world world, uint32_t row_size, uint32_t capacity,
                                             dfm_contact *out, uint32_t *n);
-/** All contacts of the last sub-step, in key order. @param capacity of out in contacts; 0 with out
+/** All contacts of the last sub-step: those of soft bodies in key order, then RIGID ones that carry load, in
+ * key order. @param capacity of out in contacts; 0 with out
  * NULL only counts.
  * @return DFM_OK; DFM_E_ARG capacity too small (out untouched, *n set); DFM_E_HANDLE. Threads: Any thread.
  * Not during step. Since 0.1. */
@@ -115,7 +123,8 @@ typedef struct dfm_law_info {
  * step. Since 0.1. */
 DFM_API dfm_status dfm_world_law_info(dfm_world world, uint32_t law, dfm_law_info *info);
 
-/** Resultants per touching pair of the last sub-step. b: body or obstacle handle (both are 64-bit values). */
+/** Resultants per touching pair of the last sub-step. a, b: body or obstacle handles (both are 64-bit
+ * values). a is a soft body, or, of two rigid things, side a of dfm_contact. */
 typedef struct dfm_pair_report {
   /* law: that of the first contact in key order; other contacts of the pair may have other laws */
   uint32_t size, count, sticking, law;
@@ -183,14 +192,17 @@ static inline dfm_status dfm_world_pair_impulses(dfm_world world, uint32_t capac
 
 typedef struct dfm_contact_event {
   uint32_t size, kind; /* DFM_EVENT_* */
-  uint64_t a, b, key;  /* handles of body and body or obstacle; key of the contact, 0 of a sensor */
-  double t;            /* s, simulated time */
+  /* handles as in dfm_pair_report; key of the contact, 0 of a sensor and of two rigid things */
+  uint64_t a, b, key;
+  double t; /* s, simulated time */
 } dfm_contact_event;
-/* RELEASE: an attachment ended, by its release force or with one of its sides; key is its number
- * (deform/attach.h). SENSOR: a thing entered or left a sensor (deform/sensor.h). TEAR: body a == b tore, by
- * "tear" of its material (deform/material.h); key is the number of points that were split. CUT: part b of a
- * tool cut body a (dfm_tool_set_cuts), or, if a == b, a planned cut (dfm_body_plan_cut); key is the number of
- * opened faces or removed cells. PIECE: a part of body a is now body b (dfm_body_separate); key: its cells */
+/* BEGIN, END: a contact of a soft body began or ended to touch, so a pair may have several; two rigid things
+ * begin and end as a whole. RELEASE: an attachment ended, by its release force or with one of its sides; key
+ * is its number (deform/attach.h). SENSOR: a thing entered or left a sensor (deform/sensor.h). TEAR: body
+ * a == b tore, by "tear" of its material (deform/material.h); key is the number of points that were split.
+ * CUT: part b of a tool cut body a (dfm_tool_set_cuts), or, if a == b, a planned cut (dfm_body_plan_cut); key
+ * is the number of opened faces or removed cells. PIECE: a part of body a is now body b (dfm_body_separate);
+ * key: its cells */
 enum {
   DFM_EVENT_BEGIN = 1,
   DFM_EVENT_END = 2,

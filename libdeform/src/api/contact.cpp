@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "api/objects.h"
+#include "dynamics/rigid/rigid_set.h"
 #include "friction/laws.h"
 #include "friction/pair_rules.h"
 #include "state/obstacle.h"
@@ -111,6 +112,83 @@ dfm_contact report(const World &w, uint32_t i) {
   return out;
 }
 
+uint32_t slot_of_obstacle(const World &w, uint64_t id) {
+  const auto at = std::find_if(w.obstacles.begin(), w.obstacles.end(), [&](auto &o) { return o->id == id; });
+  return static_cast<uint32_t>(at - w.obstacles.begin());
+}
+
+dfm_contact report(const World &w, const RigidContact &c) {
+  const double h = w.rigid_report.h;
+  dfm_contact out{};
+  if (c.sticks) out.flags |= DFM_CONTACT_STICKING;
+  if (c.began) out.flags |= DFM_CONTACT_BEGAN;
+  out.feature_a = slot_of_obstacle(w, c.a);
+  out.feature_b = slot_of_obstacle(w, c.b);
+  const Obstacle &a = *w.obstacles[out.feature_a], &b = *w.obstacles[out.feature_b];
+  out.body_a = a.handle;
+  out.body_b = b.rigid ? b.handle : 0;
+  out.key = c.key;
+  out.kind = DFM_CONTACT_RIGID;
+  out.law = c.law;
+  store3(out.point, c.point);
+  store3(out.normal, c.normal);
+  store3(out.tangent, c.tangent);
+  out.gap = c.gap;
+  out.fn = c.impulse[0] / h;
+  for (int k = 0; k < 2; ++k) {
+    out.ft[k] = c.impulse[1 + k] / h;
+    out.slip[k] = c.slip[k];
+    out.bristle[k] = c.bristle[k];
+  }
+  return out;
+}
+
+// Resultants on a by id. Pairs are few: rows of a pair follow each other.
+struct PairRow {
+  uint64_t a, b;  // ids: the order of creation
+  dfm_pair_report report;
+};
+
+dfm_pair_report &row_of(const World &w, std::vector<PairRow> &pairs, uint64_t a, uint64_t b,
+                        const dfm_pair_report &first) {
+  auto at = std::lower_bound(pairs.begin(), pairs.end(), std::pair(a, b),
+                             [](const PairRow &p, auto &k) { return std::pair(p.a, p.b) < k; });
+  if (at == pairs.end() || at->a != a || at->b != b) {
+    dfm_pair_report p = first;
+    for (const PairWork &work : w.work)
+      if ((work.a == a && work.b == b) || (work.a == b && work.b == a)) p.friction_work += work.friction;
+    at = pairs.insert(at, {a, b, p});
+  }
+  return at->report;
+}
+
+// The center of mass at the time of the contact points: at the start of the sub-step.
+Vec3 center_of(const World &w, uint64_t id, double h) {
+  const Obstacle &o = *w.obstacles[slot_of_obstacle(w, id)];
+  if (!o.rigid) return o.pose.position;
+  const dfm_rigid_state &s = o.rigid->state[o.rigid_body];
+  return load3(s.position) - h * load3(s.velocity);
+}
+
+void add_rigid_pairs(const World &w, std::vector<PairRow> &pairs) {
+  const double h = w.rigid_report.h;
+  for (const RigidContact &c : w.rigid_report.contacts) {
+    dfm_pair_report first{};
+    first.a = w.handle_of(c.a);
+    first.b = w.handle_of(c.b);
+    first.law = c.law;
+    dfm_pair_report &p = row_of(w, pairs, c.a, c.b, first);
+    const Vec3 force = (1 / h) * c.force(), friction = force - (c.impulse[0] / h) * c.normal;
+    ++p.count;
+    p.sticking += c.sticks;
+    p.normal += c.impulse[0] / h;
+    store3(p.force, load3(p.force) + force);
+    store3(p.friction, load3(p.friction) + friction);
+    store3(p.moment, load3(p.moment) + cross(c.point - center_of(w, c.a, h), force));
+    p.slip_max = std::max(p.slip_max, std::sqrt(c.slip[0] * c.slip[0] + c.slip[1] * c.slip[1]));
+  }
+}
+
 // Body or obstacle of this world.
 uint64_t id_of(const World &w, uint64_t handle, const char *what) {
   for (auto &b : w.bodies)
@@ -194,10 +272,14 @@ dfm_status dfm_world_contacts_sized(dfm_world world, uint32_t row_size, uint32_t
     const World &w = settled(world_of(world));
     uint32_t count = 0;
     for (uint32_t i = 0; i < w.report.n; ++i) count += touching(w, i);
-    if (!room(count, capacity, out, n)) return;
+    std::vector<const RigidContact *> rigid;
+    for (const RigidContact &c : w.rigid_report.contacts) rigid.push_back(&c);
+    if (!room(count + static_cast<uint32_t>(rigid.size()), capacity, out, n)) return;
     if (w.report.n)
       for (uint32_t i : w.store.by_key)
         if (touching(w, i)) rows.add(report(w, i));
+    std::sort(rigid.begin(), rigid.end(), [](auto *c, auto *d) { return c->key < d->key; });
+    for (const RigidContact *c : rigid) rows.add(report(w, *c));
   });
 }
 
@@ -224,12 +306,7 @@ dfm_status dfm_world_pairs_sized(dfm_world world, uint32_t row_size, uint32_t ca
   return as_status([&] {
     Rows<dfm_pair_report> rows(out, row_size, "dfm_pair_report");
     World &w = settled(world_of(world));
-    // ids: the order of creation
-    struct Pair {
-      uint64_t a, b;
-      dfm_pair_report report;
-    };
-    std::vector<Pair> pairs;
+    std::vector<PairRow> pairs;
     std::vector<Vec3> com(w.bodies.size());
     std::vector<uint8_t> known(w.bodies.size());
     for (uint32_t i = 0; i < w.report.n; ++i) {
@@ -243,19 +320,11 @@ dfm_status dfm_world_pairs_sized(dfm_world world, uint32_t row_size, uint32_t ca
         std::swap(s.a, s.b);
         std::swap(ia, ib);
       }
-      auto at = std::lower_bound(pairs.begin(), pairs.end(), std::pair(ia, ib),
-                                 [](const Pair &p, auto &k) { return std::pair(p.a, p.b) < k; });
-      if (at == pairs.end() || at->a != ia || at->b != ib) {
-        dfm_pair_report p{};
-        p.a = s.a;
-        p.b = s.b;
-        p.law = w.store.law[i];
-        for (const PairWork &work : w.work)
-          if ((work.a == ia && work.b == ib) || (work.a == ib && work.b == ia))
-            p.friction_work += work.friction;
-        at = pairs.insert(at, {ia, ib, p});
-      }
-      dfm_pair_report *const it = &at->report;
+      dfm_pair_report first{};
+      first.a = s.a;
+      first.b = s.b;
+      first.law = w.store.law[i];
+      dfm_pair_report *const it = &row_of(w, pairs, ia, ib, first);
       const uint32_t body = turned ? c.slot_b : c.slot_a;
       // the center at the time of the contact points: at the start of the sub-step
       if (!known[body]) {
@@ -278,8 +347,9 @@ dfm_status dfm_world_pairs_sized(dfm_world world, uint32_t row_size, uint32_t ca
       const double *const slip = &w.report.slip[size_t(2) * i];
       if (l[0] > 0) it->slip_max = std::max(it->slip_max, std::sqrt(slip[0] * slip[0] + slip[1] * slip[1]));
     }
+    add_rigid_pairs(w, pairs);
     if (!room(static_cast<uint32_t>(pairs.size()), capacity, out, n)) return;
-    for (const Pair &p : pairs) rows.add(p.report);
+    for (const PairRow &p : pairs) rows.add(p.report);
   });
 }
 
@@ -304,6 +374,13 @@ dfm_status dfm_world_pair_wrench(dfm_world world, uint64_t a, uint64_t b, const 
       const Vec3 one = scale * (l[0] * load3(f) + l[1] * load3(f + 3) + l[2] * load3(f + 6));
       sum += one;
       turn += cross(load3(w.report.contacts[i].point) - about, one);
+    }
+    for (const RigidContact &c : w.rigid_report.contacts) {
+      const bool straight = c.a == ia && c.b == ib;
+      if (!straight && !(c.a == ib && c.b == ia)) continue;
+      const Vec3 one = ((straight ? 1 : -1) / w.rigid_report.h) * c.force();
+      sum += one;
+      turn += cross(c.point - about, one);
     }
     if (force) store3(force, sum);
     if (moment) store3(moment, turn);

@@ -20,6 +20,7 @@
 #include "state/meters.h"
 #include "state/overlaps.h"
 #include "state/pair_tables.h"
+#include "state/rigid_report.h"
 #include "state/step_sizes.h"
 #include "state/world_bound.h"
 
@@ -42,8 +43,9 @@ struct FilterRule {
   std::string between[2];
   bool collide;
 };
-// Of a pair of ids, a body first, J. Two are sums of the watch on energies (step/pair_energy.h), over
-// sub-steps since each was last zero, and never below; that of friction over all, where laws remember.
+// Of a pair of ids, a body first, or of two rigid things as in RigidReport, J. Two are sums of the watch on
+// energies (step/pair_energy.h), over sub-steps since each was last zero, and never below; that of friction
+// over all, where laws remember.
 struct PairWork {
   uint64_t a, b;
   double friction;     // work over the run
@@ -157,6 +159,7 @@ struct World {
   ContactStore store;
   ContactStore tool_store;  // of tools with each other and with rigid bodies (step/tool_touch.h)
   Report report;
+  RigidReport rigid_report;
   std::vector<PairWork> work;  // sorted by (a, b)
   std::vector<dfm_contact_event> events;
   std::vector<Swap> swaps;  // not yet read by the host

@@ -187,6 +187,9 @@ void changing(Stream &s, World &w) {
   s.value(w.report.n);
   s.value(w.report.h);
   each_report_column([&](size_t, auto &column) { s.array(column); }, w.report);
+  s.value(w.rigid_report.h);
+  s.array(w.rigid_report.contacts);
+  s.array(w.rigid_report.touching);
   for (Attachment &a : w.attachments) {
     s.array(a.impulse);
     s.value(a.h);
@@ -205,6 +208,8 @@ void reserve_others(World &w, StepContext &step) {
   each_column(reserve, w.tool_store, step.tools->next());
   each_report_column([](size_t, const auto &from, auto &to) { to.reserve(from.size()); }, w.report,
                      step.last_report);
+  step.tools->next_report().contacts.reserve(w.rigid_report.contacts.size());
+  step.tools->next_report().touching.reserve(w.rigid_report.touching.size());
 }
 
 // Data that the step changes at its start, before it is known whether more must be saved.

@@ -12,6 +12,7 @@
 #include "step/stages.h"
 #include "step/step_impulses.h"
 #include "step/tolerance.h"
+#include "step/tool_touch.h"
 
 namespace dfm {
 
@@ -27,9 +28,17 @@ void reserve_contacts(World &w, StepContext &step) {
   step.pairs_made.reserve(step.rows.n);
   step.before.resize(n);
   step.goes_on.reserve(w.store.n);
-  w.work.reserve(std::min(w.work.size() + n, w.bodies.size() * (w.bodies.size() + w.obstacles.size())));
-  reserve_events(w, size_t(n) + w.store.n + w.attachments.size());
-  reserve_impulses(w, n);
+  reserve_reports(w, step);
+}
+
+void reserve_reports(World &w, const StepContext &step) {
+  const size_t rigid = step.tools->next_report().touching.size();
+  size_t contacts = 0;
+  if (w.plan.touches()) contacts = step.rows.n + (w.sleepers ? size_t{w.store.n} : 0);
+  const size_t pairs = w.bodies.size() * (w.bodies.size() + w.obstacles.size());
+  w.work.reserve(w.work.size() + std::min(contacts, pairs) + rigid);
+  reserve_events(w, contacts + w.store.n + w.attachments.size() + step.tools->most_events(w));
+  reserve_impulses(w, contacts, rigid);
 }
 
 void reserve_events(World &w, size_t more) {

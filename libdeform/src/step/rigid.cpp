@@ -219,6 +219,7 @@ bool stage_rigid_commit(World &w, StepContext &step, uint32_t *trouble) {
   step.rigid_again = false;
   if (!step.tools->follows_arcs(w, step) || !step.tools->stays_out(w, step)) return false;
   step.tools->turn_jaws();
+  reserve_reports(w, step);
   // From here on (guard) their true motion is used.
   for (auto &o : w.obstacles) {
     if (!o->rigid || o->rigid->group[o->rigid_body] == DFM_RIGID_STILL) continue;

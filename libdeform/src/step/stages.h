@@ -99,7 +99,9 @@ uint32_t tell_failed_solve(World &w, StepContext &step, const LawInstance *law, 
 // The sentence where the guard has left no way and contact has no answer. Gives the trouble bit.
 uint32_t tell_jam(World &w, StepContext &step);
 void reserve_contacts(World &w, StepContext &step);  // memory for keep_contacts()
-void keep_contacts(World &w, StepContext &step);     // store, events, hold, work, report; allocates nothing
+// Of lists to which keep_contacts() and keep_rigids() add.
+void reserve_reports(World &w, const StepContext &step);
+void keep_contacts(World &w, StepContext &step);  // store, events, hold, work, report; allocates nothing
 // all, with their events, if the plan has no stage for contacts
 void end_contacts(World &w);
 void reserve_events(World &w, size_t more);

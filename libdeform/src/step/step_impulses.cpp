@@ -25,13 +25,28 @@ StepImpulses::Pair &pair_of(Array<StepImpulses::Pair> &pairs, uint64_t a, uint64
   return *at;
 }
 
-// The report's forces for `time`, s, added to pairs; a peak is the mean over this time.
-void add(const World &w, double time, Array<StepImpulses::Pair> &pairs) {
-  const double scale = w.report.h > 0 ? time / w.report.h : 0;
+void begin(Array<StepImpulses::Pair> &pairs) {
   for (StepImpulses::Pair &p : pairs) {
     p.now = {};
     p.now_normal = 0;
   }
+}
+
+void end(double time, Array<StepImpulses::Pair> &pairs) {
+  for (StepImpulses::Pair &p : pairs) {
+    if (!(p.now_normal > 0)) continue;
+    p.impulse += p.now;
+    p.normal += p.now_normal;
+    p.touching += time;
+    p.peak_normal = std::max(p.peak_normal, p.now_normal / time);
+    p.peak_force = std::max(p.peak_force, norm(p.now) / time);
+  }
+}
+
+// The report's forces for `time`, s, added to pairs; a peak is the mean over this time.
+void add(const World &w, double time, Array<StepImpulses::Pair> &pairs) {
+  const double scale = w.report.h > 0 ? time / w.report.h : 0;
+  begin(pairs);
   StepImpulses::Pair *pair = nullptr;  // contacts of a pair are adjacent
   for (uint32_t i = 0; i < w.report.n; ++i) {
     const double *const l = &w.report.impulse[size_t(3) * i], *const f = &w.report.frame[size_t(9) * i];
@@ -47,14 +62,7 @@ void add(const World &w, double time, Array<StepImpulses::Pair> &pairs) {
     pair->now_normal += normal;
     pair->place += normal * load3(c.point);
   }
-  for (StepImpulses::Pair &p : pairs) {
-    if (!(p.now_normal > 0)) continue;
-    p.impulse += p.now;
-    p.normal += p.now_normal;
-    p.touching += time;
-    p.peak_normal = std::max(p.peak_normal, p.now_normal / time);
-    p.peak_force = std::max(p.peak_force, norm(p.now) / time);
-  }
+  end(time, pairs);
 }
 
 }  // namespace
@@ -64,12 +72,25 @@ void begin_impulses(StepImpulses &s) {
   s.idle = 0;
 }
 
-void reserve_impulses(World &w, uint32_t contacts) {
-  Array<StepImpulses::Pair> &pairs = w.step_impulses.pairs;
-  pairs.reserve(std::min(pairs.size() + contacts, w.bodies.size() * (w.bodies.size() + w.obstacles.size())));
+void reserve_impulses(World &w, size_t contacts, size_t pairs) {
+  Array<StepImpulses::Pair> &list = w.step_impulses.pairs;
+  const size_t most = w.bodies.size() * (w.bodies.size() + w.obstacles.size());
+  list.reserve(list.size() + std::min(contacts, most) + pairs);
 }
 
 void add_impulses(World &w) { add(w, w.report.h, w.step_impulses.pairs); }
+
+void add_rigid_impulses(World &w) {
+  Array<StepImpulses::Pair> &pairs = w.step_impulses.pairs;
+  begin(pairs);
+  for (const RigidContact &c : w.rigid_report.contacts) {
+    StepImpulses::Pair &pair = pair_of(pairs, c.a, c.b);
+    pair.now += c.force();
+    pair.now_normal += c.impulse[0];
+    pair.place += c.impulse[0] * c.point;
+  }
+  end(w.rigid_report.h, pairs);
+}
 
 void list_impulses(const World &w, Array<StepImpulses::Pair> &out) {
   out = w.step_impulses.pairs;

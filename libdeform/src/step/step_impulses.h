@@ -9,8 +9,10 @@ namespace dfm {
 struct World;
 
 void begin_impulses(StepImpulses &s);
-void reserve_impulses(World &w, uint32_t contacts);  // so that add_impulses() cannot fail
-void add_impulses(World &w);                         // of the sub-step that the report holds
+// So that these cannot fail: contacts of bodies, pairs of rigid things
+void reserve_impulses(World &w, size_t contacts, size_t pairs);
+void add_impulses(World &w);        // of the sub-step that the report holds
+void add_rigid_impulses(World &w);  // of the one that the report of rigid things holds
 void list_impulses(const World &w, Array<StepImpulses::Pair> &out);
 
 }  // namespace dfm

@@ -151,6 +151,7 @@ void ToolTouch::keep_next() {
 
 void ToolTouch::keep(World &w) noexcept {
   if (w.tool_store.n > 0 || next_.n > 0) std::swap(w.tool_store, next_);
+  report(w);
 }
 
 }  // namespace dfm

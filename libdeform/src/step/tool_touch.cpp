@@ -114,7 +114,7 @@ bool passes(const Obstacle &a, const Obstacle &b) {
 
 }  // namespace
 
-ToolTouch::ToolTouch(const Memory &m) : batches_(m), next_(m) {
+ToolTouch::ToolTouch(const Memory &m) : batches_(m), next_(m), next_report_(m) {
   use_memory(m, start_, tangents_, match_, points_, response_, best_);
   state_.use(m);
 }
@@ -148,7 +148,7 @@ void ToolTouch::prepare(World &w, SceneFacts &facts) {
         touch = rule->collide;
       if (!touch) continue;
       if (!apart) {
-        passing_.push_back({i, j, 0, {a.id, b.id}, true, false, {kNone, kNone}, 0});
+        passing_.push_back({i, j, 0, {a.id, b.id}, true, false, false, {kNone, kNone}, 0});
         for (const Obstacle *const o : {&a, &b})
           if (!is_wall(*o) && (cornerless || !is_free(*o)) && (o == &a ? is_wall(b) : is_wall(a)) &&
               std::find(facts.rigid_alone.begin(), facts.rigid_alone.end(), o->name) ==
@@ -165,6 +165,7 @@ void ToolTouch::prepare(World &w, SceneFacts &facts) {
                         {a.id, b.id},
                         frees,
                         jaw,
+                        b_first(a, b),
                         {wall_a, wall_b},
                         frees ? std::min(thickness(a), thickness(b)) : HUGE_VAL});
       thinnest_ = std::min(thinnest_, pairs_.back().thin);
@@ -398,6 +399,9 @@ void ToolTouch::add_row(const Pair &pair, Name name, Side a, Side b, const Place
   row.b = b;
   row.frees = pair.frees;
   row.jaw = pair.jaw;
+  row.b_first = pair.b_first;
+  row.at = place.at;
+  row.gap = gap;
   row.far = gap > kNear * pair.thin;
   row.normal = normal;
   row.law = pair.law;
@@ -691,6 +695,8 @@ bool ToolTouch::follows_arcs(const World &w, StepContext &step) const {
 bool ToolTouch::begin(World &w, StepContext &step) {
   rows_.clear();
   if (next_.n > 0) keep_next();
+  next_report_.contacts.clear();
+  next_report_.touching.clear();
   offset_ = w.offset;
   if (!passing_.empty()) tell_passing(w, step);
   if (pairs_.empty()) return true;
@@ -740,6 +746,7 @@ bool ToolTouch::answer(const World &w, const StepContext &step) {
   solve_past_hits(w, step);
   for (size_t k = 0; k < sides_.size(); ++k) add_impulses(k);
   keep_next();
+  list_contacts(w);
   double scale = 0, most = 0;
   for (const Row &row : rows_) {
     scale = std::max(scale, std::fabs(row.rate) + norm(row.given()) / row.inverse);

@@ -31,6 +31,7 @@
 #include "contact/store.h"
 #include "friction/laws.h"
 #include "math/vec3.h"
+#include "state/rigid_report.h"
 #include "step/tool_shape.h"
 
 namespace dfm {
@@ -64,6 +65,10 @@ class ToolTouch {
   // Called at the end of an accepted sub-step: moves what lasts to the world.
   void keep(World &w) noexcept;
   ContactStore &next() { return next_; }
+  // tool_report.cpp: for events, lists of contacts and sums of pairs
+  static bool b_first(const Obstacle &a, const Obstacle &b);
+  RigidReport &next_report() { return next_report_; }
+  size_t most_events(const World &w) const;  // that keep() adds
 
  private:
   struct Side {
@@ -86,6 +91,9 @@ class ToolTouch {
     Vec3 bend;                 // m/s, what turning adds to the slip beyond the first order, and belts
     bool frees, jaw;           // none is of a tool; one is a jaw
     bool far;                  // the gap is large beside the thickness of the two
+    bool b_first;              // reports have b first
+    Vec3 at;                   // m, of the place
+    double gap;                // m
     double lift;               // m/s, what turning adds to the speed along the normal, of free bodies
     Vec3 before;               // the impulse on a that velocities have
     Vec3 given() const { return impulse * normal + along[0] * tangent[0] + along[1] * tangent[1]; }
@@ -117,6 +125,7 @@ class ToolTouch {
     uint32_t a, b, law;
     uint64_t id[2];
     bool frees, jaw;   // none is of a tool; one is a jaw
+    bool b_first;      // reports have b first
     uint32_t wall[2];  // number among walls_; kNone: it is in a set
     double thin;       // m, least thickness of the two
   };
@@ -247,6 +256,10 @@ class ToolTouch {
   Vec3 slip(const Row &row) const;
   std::array<double, 2> rub(uint32_t i) const;
   void keep_next();
+  // tool_report.cpp
+  void list_contact(uint32_t row);
+  void list_contacts(const World &w);
+  void report(World &w) noexcept;
 
   static constexpr double kOpens = 0.1;  // of d_c in a sub-step, where two things are in each other
 
@@ -275,6 +288,12 @@ class ToolTouch {
   Array<double> best_;  // [3 rows] impulses
   Array<uint32_t> match_;
   ContactStore next_;
+  RigidReport next_report_;
 };
+
+// Ends what the thing touches. At the removal of a thing.
+void leave_rigid_contacts(World &w, uint64_t id);
+// The pairs that these contacts are of.
+void find_touching(const World &w, const ContactStore &of, Array<RigidPair> &out);
 
 }  // namespace dfm

@@ -20,6 +20,7 @@
 #include "step/context.h"
 #include "step/method.h"
 #include "step/stages.h"
+#include "step/tool_touch.h"
 #include "world/body_effects.h"
 #include "world/body_model.h"
 #include "world/body_surface.h"
@@ -348,6 +349,7 @@ void leave_contacts(World &w, uint64_t id, bool obstacle) {
       if (s.touching[i]) add_event(w, DFM_EVENT_END, s.id_a[i], s.id_b[i], s.key[i], w.time);
       s.touching[i] = 0;
     }
+  leave_rigid_contacts(w, id);
   std::erase_if(w.work, [&](const PairWork &p) { return p.a == id || p.b == id; });
   w.changed = true;
 }

@@ -64,7 +64,7 @@ bool good_tool_contacts(const Staged &t) {
 
 bool good_work(const std::vector<PairWork> &work, const Things &things) {
   for (size_t i = 0; i < work.size(); ++i)
-    if (!things.body(work[i].a) || !things.known(work[i].b) ||
+    if (!things.known(work[i].a) || !things.known(work[i].b) ||
         (i && !(std::pair(work[i - 1].a, work[i - 1].b) < std::pair(work[i].a, work[i].b))))
       return false;
   return true;

@@ -11,6 +11,7 @@
 #include "plugin/params.h"
 #include "state/world.h"
 #include "step/stages.h"
+#include "step/tool_touch.h"
 #include "world/body_model.h"
 #include "world/obstacle_change.h"
 #include "world/snapshot.h"
@@ -233,6 +234,7 @@ void exchange(World &w, Staged &t) noexcept {
   std::swap(w.store, t.store);
   std::swap(w.tool_store, t.tool_store);
   std::swap(w.report, t.report);
+  std::swap(w.rigid_report, t.rigid_report);
   std::swap(w.stats, t.stats);
   std::swap(w.time, t.time);
   std::swap(w.step_count, t.step_count);
@@ -269,6 +271,7 @@ void world_restore(World &w, const void *data, size_t bytes) {
   make_models(s, w, staged);
   // derived data, therefore recomputed and not read
   for (ContactStore *const store : {&staged.store, &staged.tool_store}) store->order();
+  find_touching(w, staged.tool_store, staged.rigid_report.touching);
   std::vector<std::unique_ptr<LawInstance>> laws = make_laws(s, w, staged);
   const double offset = w.offset;
   const uint32_t sleepers = w.sleepers;

@@ -83,12 +83,14 @@ struct Staged {
   struct { std::vector<PairAside> aside; } overlaps;
   std::vector<PairWork> work;
   Report report;
+  RigidReport rigid_report;               // pairs that touch alone
   std::vector<dfm_contact_event> events;  // none
   std::vector<Swap> swaps;                // none
   explicit Staged(const World &w)
       : store(w.meters.contacts.memory()),
         tool_store(w.meters.contacts.memory()),
-        report(w.meters.contacts.memory()) {
+        report(w.meters.contacts.memory()),
+        rigid_report(w.meters.contacts.memory()) {
     const Memory &m = w.memory();
     def.method = w.def.method;
     bodies.resize(w.bodies.size());

@@ -29,7 +29,8 @@ World::World(dfm_context *c)
       steps(std::make_unique<StepContext>(meters)),
       store(meters.contacts.memory()),
       tool_store(meters.contacts.memory()),
-      report(meters.contacts.memory()) {
+      report(meters.contacts.memory()),
+      rigid_report(meters.contacts.memory()) {
   use_memory(meters.contacts.memory(), step_impulses.pairs);
   stats.size = sizeof stats;
   use_method(*this, velocity_method());
