@@ -24,7 +24,8 @@ SAME_TYPE(dfm_param_value, key, const char *);
 SAME_TYPE(dfm_params, values, const dfm_param_value *);
 _Static_assert(sizeof(dfm_world) == 8 && sizeof(dfm_body) == 8 && sizeof(dfm_law) == 8,
                "handles are 64-bit values");
-_Static_assert(DFM_CONTACT_VERTEX_FACE == 0 && DFM_CONTACT_EDGE_EDGE == 1 && DFM_CONTACT_PRIMITIVE == 2,
+_Static_assert(DFM_CONTACT_VERTEX_FACE == 0 && DFM_CONTACT_EDGE_EDGE == 1 && DFM_CONTACT_PRIMITIVE == 2 &&
+                   DFM_CONTACT_RIGID == 3,
                "kinds");
 _Static_assert(DFM_CONTACT_STICKING == 1 && DFM_CONTACT_BEGAN == 2, "flags");
 

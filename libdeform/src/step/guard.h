@@ -57,14 +57,16 @@ struct Guard {
   bool refines = false;               // then: because of a blow, as the first of `finer` sub-steps
   bool lets_slits = false;            // hits across slits no longer count
   double cut = 1;                     // then: factor on its length
-  double motion = 1;                  // < 1: fraction of the displacement that is taken
+  bool fast = false;                  // then: because a rigid thing goes or turns too far
+  double piece = 0;   // s, at which the next piece begins after such a cut; 0: the rest of the sub-step
+  double motion = 1;  // < 1: fraction of the displacement that is taken
 
   void start() {
     kept.clear();
     through.clear();
     crossed.clear();
     cut = motion = 1;
-    acted = again = refines = resolving = lets_slits = false;
+    acted = again = refines = resolving = lets_slits = fast = false;
   }
   void forget() { memory.forget(); }  // positions or d_c have changed other than by a step
 };

@@ -242,10 +242,12 @@ namespace {
 bool advance(World &w, StepContext &step, double end, double goal, bool last, uint32_t *trouble) {
   step.guard.pieces = 0;
   step.guard.motion = step.guard.finer = 1;
+  step.guard.piece = 0;
   double planned = step.guard.planned = end - w.time;
   for (bool whole = false; !whole;) {
     step.rest = step.h = end - w.time;
     step.left = goal - w.time;
+    if (step.guard.piece > 0) step.h = std::min(step.guard.piece, step.rest);
     // waking changes state that a later failure must restore
     if (step.h < step.left || (w.def.sleep && !all_idle(w, step))) keep_start(w, step);
     charge(w, step, 1);
@@ -287,8 +289,10 @@ bool piece(World &w, StepContext &step, uint32_t *trouble) {
   const uint64_t unconverged = w.stats.unconverged;
   step.guard.acted = false;
   begin_bodies(w, step);
+  bool fast = false;
   while (!sub_step(w, step, trouble)) {
     if (!step.guard.again) return false;
+    fast |= step.guard.fast;
     if (step.guard.refines) refine(w, step);
     step.h *= step.guard.cut;
     keep_start(w, step);
@@ -296,6 +300,9 @@ bool piece(World &w, StepContext &step, uint32_t *trouble) {
     w.stats.unconverged = unconverged;
     view_obstacles(w, step);
   }
+  // What had to be cut for a fast rigid thing is likely to have to be again: the next piece does not begin
+  // with all that is left.
+  if (fast || step.guard.piece > 0) step.guard.piece = 2 * step.h;
   w.stats.guard_steps += step.guard.acted;
   step.guard.memory.keep();
   return true;

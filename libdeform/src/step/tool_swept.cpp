@@ -197,7 +197,7 @@ bool ToolTouch::stays_out(const World &w, StepContext &step) {
                       edges_crossed(of_a, at_a, of_b, at_b, deep)});
   }
   if (!(first <= 1) || !(step.h > kLeastPiece * step.guard.planned) || !may_repeat(w, step)) return true;
-  step.guard.again = true;
+  step.guard.again = step.guard.fast = true;
   step.guard.cut = std::max(kLeastCut, kAims * first);
   return false;
 }

@@ -686,7 +686,7 @@ bool ToolTouch::follows_arcs(const World &w, StepContext &step) const {
   }
   if ((!(turn > 0) && arrives == 1) || !(step.h > kLeastPiece * step.guard.planned) || !may_repeat(w, step))
     return true;
-  step.guard.again = true;
+  step.guard.again = step.guard.fast = true;
   step.guard.cut = arrives;
   if (turn > 0) step.guard.cut = std::min(arrives, kAims * kArc / turn);
   return false;
