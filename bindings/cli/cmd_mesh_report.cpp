@@ -52,6 +52,26 @@ void take_common(Report &r, const Info &i) {
   r.warnings = lines_of(i.warnings);
 }
 
+// m3, what a filled mesh has of material: its cells reach out of the surface. Negative: it was not filled.
+double material_of(dfm_tetmesh mesh, uint32_t ntet) {
+  const double *share = nullptr, *x = nullptr;
+  const uint32_t *tets = nullptr;
+  if (dfm_tetmesh_share(mesh, &share) < 0 || !share || dfm_tetmesh_data(mesh, &x, &tets, nullptr) < 0)
+    return -1;
+  double sum = 0;
+  for (uint32_t t = 0; t < ntet; ++t) {
+    double e[3][3];
+    for (int i = 0; i < 3; ++i)
+      for (int k = 0; k < 3; ++k)
+        e[i][k] = x[size_t{3} * tets[4 * t + i + 1] + k] - x[size_t{3} * tets[4 * t] + k];
+    sum += share[t] / 6 *
+           (e[0][0] * (e[1][1] * e[2][2] - e[1][2] * e[2][1]) +
+            e[0][1] * (e[1][2] * e[2][0] - e[1][0] * e[2][2]) +
+            e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0]));
+  }
+  return sum;
+}
+
 bool describe_cells(dfm_tetmesh mesh, Report &r) {
   dfm_tetmesh_info i = {};
   i.size = sizeof i;
@@ -73,6 +93,10 @@ bool describe_cells(dfm_tetmesh mesh, Report &r) {
   count("edges", i.nedge);
   count("pieces", i.npiece);
   r.lines.emplace_back("volume", text("%.10g m3", i.volume));
+  if (const double material = material_of(mesh, i.ntet); material >= 0) {
+    r.measures.push_back({"material_volume", material});
+    r.lines.emplace_back("of it material", text("%.10g m3", material));
+  }
   r.defects = {{"turned", i.turned},
                {"dropped_points", i.dropped_points},
                {"dropped_cells", i.dropped_cells},

@@ -72,6 +72,7 @@ TEST(MeshFillCommand, Surface_BecomesAFileOfCells) {
     EXPECT_NE(made.out.find(key), std::string::npos) << key << "\n" << made.out;
   const test::CommandResult info = test::deform({"mesh", "info", folder + "/organ.vtu"});
   EXPECT_EQ(info.exit_code, 0) << info.err;
+  EXPECT_NE(info.out.find("of it material"), std::string::npos) << info.out;
   const test::CommandResult table =
       test::deform({"mesh", "fill", data + "rabbit.obj", "--out", folder + "/rabbit.vtk", "--cells", "500"});
   EXPECT_NE(table.out.find("the surface is clean"), std::string::npos) << table.out;

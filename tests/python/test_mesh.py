@@ -46,6 +46,9 @@ class Meshes(unittest.TestCase):
         surface = deform.TriMesh.make("torus", [0.2, 0.06], triangles=1500)
         mesh = deform.TetMesh.fill(surface, cells=800)
         self.assertIsNotNone(mesh.share)
+        self.assertAlmostEqual(mesh.volume / surface.volume, 1, delta=1e-9)
+        self.assertIn(f"{surface.volume:.6g} m3", repr(mesh))
+        self.assertGreater(mesh.info.volume, 1.2 * surface.volume)
         with deform.World(gravity=(0, 0, 0)) as world:
             body = world.add_body(mesh, surface=surface, coupling="mls")
             self.assertEqual(body.nsurfel, surface.info.npoint)

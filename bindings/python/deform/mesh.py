@@ -175,6 +175,17 @@ class TetMesh(_Mesh):
         return _borrowed(self._keeper, self._arrays()[1], (self.info.ntet, 4), ctypes.c_uint32)
 
     @property
+    def volume(self) -> float:
+        """m3; of a mesh that was filled, of its material. Its cells reach out of the surface; their volume is
+        info.volume."""
+        share = self.share
+        if share is None:
+            return float(self.info.volume)
+        corners = self.points[self.tets]
+        a, b, c = (corners[:, k] - corners[:, 0] for k in (1, 2, 3))
+        return float(share @ np.einsum("ij,ij->i", a, np.cross(b, c)) / 6)
+
+    @property
     def share(self) -> np.ndarray | None:
         """[ntet] how much of each cell is material, of a mesh that was filled; else None."""
         out = ctypes.c_void_p()
@@ -236,7 +247,7 @@ class TetMesh(_Mesh):
 
     def __repr__(self) -> str:
         info = self.info
-        return f"<deform.TetMesh: {info.npoint} points, {info.ntet} tetrahedra, {info.volume:.6g} m3>"
+        return f"<deform.TetMesh: {info.npoint} points, {info.ntet} tetrahedra, {self.volume:.6g} m3>"
 
 
 def _meshio_cells(mesh: Any, kind: str) -> tuple[np.ndarray, np.ndarray]:
