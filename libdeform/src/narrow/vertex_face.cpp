@@ -20,6 +20,7 @@ namespace dfm::narrow {
 namespace {
 
 constexpr uint32_t kMost = 96;  // triangles kept per surfel; beyond that the nearest ones
+constexpr int kWalk = 8;        // triangles around a corner, seldom more, from an edge to where p is
 constexpr double kLoose = 1 + 1e-9;
 // relative: a triangle beside the feature counts as nearer only beyond this
 constexpr double kNearer = 1e-9;
@@ -57,6 +58,7 @@ struct Group {
   uint32_t steepest(const Near &n) const;
   bool plane_weights(const Near &n, double weight[3]) const;
   bool faces(const Near &n, Vec3 surface) const;
+  bool past_border(uint32_t tri, uint32_t across) const;
   bool reachable_across(const Near &n, double weight[3]) const;
   void emit(Near &n, Vec3 normal, double distance, const double weight[3], Array<ContactPoint> &out) const;
   void resolve(Array<ContactPoint> &out);
@@ -237,6 +239,30 @@ bool Group::faces(const Near &n, Vec3 surface) const {
   return dot(n.normal, surface - pair.xb(corners(n)[0])) >= -tiny;
 }
 
+// Does the surface end between the triangle's edge `across` and p? From triangle to triangle toward p: is
+// there a convex edge that p is past? Then p lies beside the surface, as below the front face of a block, not
+// in a groove of it.
+bool Group::past_border(uint32_t tri, uint32_t across) const {
+  const Surface &s = *pair.b->surface;
+  for (int steps = 0; steps < kWalk; ++steps) {
+    const uint32_t *c = &s.tri[3 * size_t{tri}];
+    const Vec3 normal = cross(pair.xb(c[1]) - pair.xb(c[0]), pair.xb(c[2]) - pair.xb(c[0]));
+    uint32_t next = kNone;
+    for (int k = 0; k < 3; ++k) {
+      const uint32_t edge = s.tri_edge[3 * size_t{tri} + k];
+      const Vec3 from = pair.xb(c[k]);
+      if (edge == across || !(dot(cross(normal, pair.xb(c[(k + 1) % 3]) - from), p - from) < 0)) continue;
+      if (edge_convex(s, edge)) return true;
+      if (next == kNone) next = edge;
+    }
+    if (next == kNone) return false;
+    const uint32_t *sides = &s.edge_tri[2 * size_t{next}];
+    tri = sides[0] == tri ? sides[1] : sides[0];
+    across = next;
+  }
+  return false;
+}
+
 // p projects beside the face, across concave edges only and no further than it can travel. Flat edges do not
 // count: sliding over them within the reach costs less than a tenth of the rest distance.
 bool Group::reachable_across(const Near &n, double weight[3]) const {
@@ -262,6 +288,7 @@ bool Group::reachable_across(const Near &n, double weight[3]) const {
     // rise / height: sine of the fold
     const double rise = dot(n.normal, o) * length, height = norm(cross(along, o));
     if (!(rise * n.reach > 0.1 * pair.offset * height)) return false;
+    if (past_border(beyond, s.tri_edge[3 * size_t{n.tri} + k])) return false;
     across = true;
   }
   return across;

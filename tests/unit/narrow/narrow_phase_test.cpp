@@ -230,6 +230,45 @@ TEST(VertexFace, OverTheTopOfAFoldedWall_OnlyTheTopHolds) {
   EXPECT_EQ(of_tip(before, 1, 0).size(), 2u);
 }
 
+// A block whose front face, at x = 0, has a shallow groove from bottom to top at y = 0. A surfel below the
+// front face, beside the groove, passes under the block: the other side's plane bounds nothing there.
+TEST(VertexFace, BelowAGroovedFrontFace_NoPlaneOfItHolds) {
+  for (const bool turned : {false, true}) {
+    const Vec3 low[3] = {{0, -1, 0}, {0.02, 0, 0}, {0, 1, 0}},
+               high[3] = {{0, -1, 1}, {0.02, 0, 1}, {0, 1, 1}};
+    const Vec3 back[4] = {{3, -1, 0}, {3, 1, 0}, {3, -1, 1}, {3, 1, 1}};
+    Welder w;
+    w.triangle(low[0], high[0], turned ? low[1] : high[1]);
+    w.triangle(turned ? high[0] : low[0], high[1], low[1]);
+    w.triangle(low[1], high[1], high[2]);  // touches the bottom by one corner
+    w.triangle(low[1], high[2], low[2]);
+    for (int i = 0; i < 2; ++i) {
+      w.triangle(low[i], low[i + 1], back[0]);
+      w.triangle(high[i + 1], high[i], back[2]);
+    }
+    w.triangle(low[2], back[1], back[0]);
+    w.triangle(high[2], back[2], back[3]);
+    w.triangle(back[0], back[1], back[3]);
+    w.triangle(back[0], back[3], back[2]);
+    w.triangle(low[0], back[0], back[2]);
+    w.triangle(low[0], back[2], high[0]);
+    w.triangle(low[2], high[2], back[3]);
+    w.triangle(low[2], back[3], back[1]);
+    Scene scene;
+    scene.add(w.mesh);
+    // the tip points up, under the leading edge
+    scene.add(probe({0.0188, -2e-3, -1e-3}, turn({0, 1, 0}, 3.14159265358979)), {2, 0, 0});
+    for (const ContactPoint &k : of_tip(scene, 1, 0))
+      EXPECT_LT(k.normal[2], -0.5) << turned << ": " << k.normal[0] << " " << k.normal[1] << " "
+                                   << k.normal[2];
+    // In front of the face, the other side of the groove is there in advance.
+    Scene before;
+    before.add(w.mesh);
+    before.add(probe({0.0188, -2e-3, 0.5}, turn({0, 1, 0}, 1.5707963)), {2, 0, 0});
+    EXPECT_EQ(of_tip(before, 1, 0).size(), 2u);
+  }
+}
+
 TEST(VertexFace, SlightlyInside_IsPushedOutThroughTheNearestFace) {
   Scene scene;
   scene.add(box_mesh({1, 1, 1}, 4, 4, 4));
