@@ -190,3 +190,71 @@ TEST(CutPieces, SplintersOfATornBar_StayWithTheEndTheyHangOn) {
     "obstacles": [{"name": "floor", "shape": "plane"}]})"),
             0u);
 }
+
+namespace {
+
+// The half beyond the plane x = at lies mirrored in the other one.
+void fold(dfm_body b, double at) {
+  State s(b);
+  for (size_t i = 0; i < s.x.size(); i += 3) s.x[i] = std::min(s.x[i], 2 * at - s.x[i]);
+  test::ok(dfm_body_set_state(b, uint32_t(s.x.size() / 3), s.x.data(), nullptr));
+}
+
+void put_where_it_is(dfm_body b) {
+  const State s(b);
+  test::ok(dfm_body_set_state(b, uint32_t(s.x.size() / 3), s.x.data(), nullptr));
+}
+
+}  // namespace
+
+// Sides of a slit that cross when a part comes off are a result of contact: the pair keeps it. A piece that a
+// host puts there would be thrown out (doc/decisions/0464).
+TEST(CutPieces, CrossedWhenTheyPart_KeepContactUnlessPlaced) {
+  const Ball ball("corotational_fem", 0);
+  cut(ball.b, plane(0, 0.005, DFM_CUT_SPLIT));
+  fold(ball.b, 0.005);
+  ASSERT_TRUE(test::listed(dfm_world_overlaps, ball.w).empty());
+  dfm_cut_info out = ask();
+  test::ok(dfm_body_separate(ball.b, nullptr, &out));
+  ASSERT_GE(out.pieces, 1u);
+  const auto parted = test::listed(dfm_world_overlaps, ball.w);
+  ASSERT_FALSE(parted.empty());
+  for (const dfm_overlap &o : parted) {
+    EXPECT_GT(o.crossings, 10u);
+    EXPECT_FALSE(o.flags & DFM_OVERLAP_ASIDE);
+  }
+  put_where_it_is(ball.all().front());
+  const auto placed = test::listed(dfm_world_overlaps, ball.w);
+  ASSERT_FALSE(placed.empty());
+  EXPECT_TRUE(placed.front().flags & DFM_OVERLAP_ASIDE);
+}
+
+// Sides of a slit cross before the part comes off at 0.33 s. Contact of the two pieces was off from there on:
+// 46 pairs.
+TEST(CutPieces, SidesOfASlitThatCrossed_ComeApartAsPieces) {
+  EXPECT_EQ(crossings("torn_slit", R"({"format": "deform-scene", "version": 1,
+    "time": {"duration": 0.5, "step": 0.01},
+    "materials": {"dough": {"density": 1000, "young": 3e4, "tear": 0.2}},
+    "bodies": [{"name": "dough", "mesh": {"make": "beam", "size": [0.2, 0.05, 0.04], "cells": 500},
+      "material": "dough", "pose": {"position": [-0.1, -0.025, 0.2]}, "separate": {"least_cells": 8},
+      "fix": [{"box": [[-0.001, -1, -1], [0.001, 1, 1]]},
+              {"box": [[0.199, -1, -1], [0.201, 1, 1]], "motion": {"keyframes": [
+                {"t": 0, "position": [0, 0, 0]}, {"t": 1, "position": [0.1, 0, 0]}]}}]}],
+    "obstacles": [{"name": "floor", "shape": "plane"}]})"),
+            0u);
+}
+
+// Splinters that leave each other no way ended the run at 0.995 s ("squeezed until nothing can move"), though
+// nothing closes on them.
+TEST(CutPieces, SplintersThatJam_EndNoRun) {
+  EXPECT_EQ(crossings("torn_jam", R"({"format": "deform-scene", "version": 1,
+    "time": {"duration": 1, "step": 0.001},
+    "materials": {"dough": {"density": 1000, "young": 1e5, "tear": 0.5}},
+    "bodies": [{"name": "dough", "mesh": {"make": "beam", "size": [0.2, 0.05, 0.04], "cells": 1000},
+      "material": "dough", "pose": {"position": [-0.1, -0.025, 0.2]}, "separate": {"least_cells": 8},
+      "fix": [{"box": [[-0.001, -1, -1], [0.001, 1, 1]]},
+              {"box": [[0.199, -1, -1], [0.201, 1, 1]], "motion": {"keyframes": [
+                {"t": 0, "position": [0, 0, 0]}, {"t": 1, "position": [0.1, 0, 0]}]}}]}],
+    "obstacles": [{"name": "floor", "shape": "plane"}]})"),
+            0u);
+}

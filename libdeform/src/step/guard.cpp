@@ -314,9 +314,9 @@ bool cross_at_start(StepContext &step, const Candidate &c) {
   return cross_at_start(step, swap ? c.slot_b : c.slot_a, swap ? c.slot_a : c.slot_b, c.obstacle);
 }
 
-// Of a body with itself that has open faces.
-bool of_slit(const World &w, const Candidate &c) {
-  return of_one_body(c) && w.bodies[c.slot_a]->surface.slit;
+// Of a body with itself that has open faces, or of two parts of one body.
+bool of_cut(const World &w, const StepContext &step, const Candidate &c) {
+  return of_one_body(c) ? w.bodies[c.slot_a]->surface.slit : !c.obstacle && are_parts(step, c);
 }
 
 // The safe fraction of the way; 1: nothing comes too near.
@@ -329,8 +329,8 @@ double find_hits(World &w, StepContext &step) {
   guard_pairs(g.scene, list, g.near, g.hits);
   std::erase_if(g.hits, [&](const GuardHit &hit) {
     const Candidate &c = list[hit.candidate];
-    if (!of_one_body(c)) return cross_at_start(step, c);
-    return (g.lets_slits && of_slit(w, c)) || !(guarded_apart(w, step, c) > 0);
+    if (g.lets_slits && of_cut(w, step, c)) return true;
+    return of_one_body(c) ? !(guarded_apart(w, step, c) > 0) : cross_at_start(step, c);
   });
   guard_obstacles(g.scene, list, g.near, g.hits);
   guard_ask_hits(w, step);
@@ -450,14 +450,14 @@ bool stage_guard(World &w, StepContext &step, uint32_t *trouble) {
     step.guard.again = true;
     return false;
   }
-  // Teeth of a slit that interlock may leave no way at all, where the rest of the world has one: what contact
+  // Teeth of a cut that interlock may leave no way at all, where the rest of the world has one: what contact
   // does not keep apart there crosses. Where pieces are left out to save work, only if there is no way.
-  const auto hits_slits = [&] {
+  const auto hits_cuts = [&] {
     return std::any_of(step.guard.hits.begin(), step.guard.hits.end(),
-                       [&](const GuardHit &hit) { return of_slit(w, (*step.guard.list)[hit.candidate]); });
+                       [&](const GuardHit &hit) { return of_cut(w, step, (*step.guard.list)[hit.candidate]); });
   };
-  const bool slits = hits_slits(), saves = step.guard.pieces < kCuts;
-  if (!(slits && saves)) take_safe_part(w, step, slits, safe);
+  const bool cuts = hits_cuts(), saves = step.guard.pieces < kCuts;
+  if (!(cuts && saves)) take_safe_part(w, step, cuts, safe);
   else if (take_safe_part(w, step, false, safe); step.guard.motion < kNoWay && may_check(w, step)) {
     set_fraction(w, step, 1);
     take_safe_part(w, step, true, safe);

@@ -16,8 +16,9 @@
 namespace dfm {
 namespace {
 
-constexpr uint64_t kReleaseEvery = 16;  // steps: interval at which excluded pairs are tested
-constexpr size_t kSentences = 8;        // number of pairs that the log names individually
+constexpr uint64_t kReleaseEvery = 16;          // steps: interval at which excluded pairs are tested
+constexpr uint64_t kPiece = uint64_t{1} << 63;  // added to ids in Overlaps::placed by place_piece()
+constexpr size_t kSentences = 8;                // number of pairs that the log names individually
 
 // Whether the overlap is too deep for contact to resolve. Closed shapes and voxels resolve any depth;
 // triangles only small ones.
@@ -33,19 +34,27 @@ uint64_t other_id(const World &w, const OverlapPair &p) {
   return p.obstacle ? w.obstacles[p.b]->id : w.bodies[p.b]->id;
 }
 
+bool parts_of_one(const World &w, const OverlapPair &p) {
+  const auto whole = [](const Body &b) { return b.piece_of ? b.piece_of : b.id; };
+  return !p.obstacle && whole(*w.bodies[p.a]) == whole(*w.bodies[p.b]);
+}
+
 // Parts of what was one body lie on each other where they were one, with the faces of the cut set back by
 // half of the rest distance each (doc/decisions/0398). What is within that is how they lie, and no overlap.
 bool lie_on_cut(const World &w, const OverlapPair &p, const Crossed &c) {
-  const auto whole = [](const Body &b) { return b.piece_of ? b.piece_of : b.id; };
-  return !p.obstacle && whole(*w.bodies[p.a]) == whole(*w.bodies[p.b]) && c.depth <= w.offset &&
-         !deep(w, p, c);
+  return parts_of_one(w, p) && c.depth <= w.offset && !deep(w, p, c);
 }
 
 std::vector<Overlap> find_overlaps(World &w) {
   std::vector<uint64_t> &placed = w.overlaps.placed;
   std::sort(placed.begin(), placed.end());
-  const auto asked = [&](uint64_t id) {
+  const auto was_placed = [&](uint64_t id) {
     return w.overlaps.all || std::binary_search(placed.begin(), placed.end(), id);
+  };
+  const auto asked = [&](uint64_t id) { return was_placed(id) || was_placed(id | kPiece); };
+  // Sides of a slit that cross when a part comes off keep the contact that they had (doc/decisions/0464).
+  const auto kept = [&](const OverlapPair &p, uint64_t a, uint64_t b) {
+    return parts_of_one(w, p) && !was_placed(a) && !was_placed(b);
   };
   std::vector<Overlap> out;
   OverlapSides sides(w);
@@ -54,7 +63,7 @@ std::vector<Overlap> find_overlaps(World &w) {
     if ((!asked(a) && !asked(b)) || !sides.may_touch(p)) return;
     const Crossed c = sides.look(p, w.offset, false);
     if (c.through && !lie_on_cut(w, p, c))
-      out.push_back({a, b, p.obstacle, c.crossings, c.enclosed, c.depth, deep(w, p, c)});
+      out.push_back({a, b, p.obstacle, c.crossings, c.enclosed, c.depth, deep(w, p, c) && !kept(p, a, b)});
   };
   for (uint32_t i = 0; i < w.bodies.size(); ++i) {
     for (uint32_t j = i + 1; j < w.bodies.size(); ++j) look({i, j, false});
@@ -98,6 +107,8 @@ void take_back(World &w, const Overlap &f) {
 }
 
 }  // namespace
+
+void place_piece(World &w, uint64_t id) { w.overlaps.place(id | kPiece); }
 
 void settle_overlaps(World &w) {
   Overlaps &o = w.overlaps;

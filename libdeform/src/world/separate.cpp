@@ -12,6 +12,7 @@
 #include "plugin/on_behalf.h"
 #include "state/obstacle.h"
 #include "state/world.h"
+#include "step/overlap.h"
 #include "step/stages.h"
 #include "world/body_shape.h"
 #include "world/change_energy.h"
@@ -188,7 +189,7 @@ void separate(Body &b, const SeparateRule &rule, CutReport &out) {
     Share share = share_of(b, parts, i);
     shape_piece(b, std::move(share.mesh), std::move(share.open), piece);
     pieces.push_back(&piece);
-    w.overlaps.place(piece.id);
+    place_piece(w, piece.id);
   }
   tell_what_goes(b, parts, out);
   Share rest = share_of(b, parts, kStays);
