@@ -83,6 +83,10 @@ uint64_t sub_step_work(const World &w, const StepContext &step, uint64_t solve) 
 }
 uint64_t fair_work(const World &w, const StepContext &step) { return sub_step_work(w, step, kFairSolve); }
 uint64_t bare_work(const World &w, const StepContext &step) { return sub_step_work(w, step, kBareSolve); }
+// No sub-step takes less, whatever becomes of its contacts.
+uint64_t sure_work(const World &w, const StepContext &step) {
+  return 1 + body_work(w, step) + surface_work(w, step) + checks(w, step, 1);
+}
 
 uint64_t pieces_to_come(const StepContext &step) {
   return uint64_t{step.budget.to_come} + (step.h < step.rest);
@@ -298,7 +302,7 @@ void plan_work(World &w, StepContext &step, uint32_t substeps) {
                 ? w.def.max_work
                 : kAutomaticFactor * substeps * (body_work(w, step) + surface_work(w, step) + rigid);
   b.divided = w.def.max_work && !step.bodies_revise;
-  if (b.least > b.limit) throw StepStopped{StepStopped::least};
+  if (substeps * sure_work(w, step) > b.limit) throw StepStopped{StepStopped::least};
 }
 
 void plan_more_work(const World &w, StepContext &step, uint32_t done, uint32_t more) {

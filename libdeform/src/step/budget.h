@@ -18,7 +18,7 @@ enum class Thrift { none, polish, sweeps, pieces };
 
 struct Budget {
   uint64_t work = 0, limit = 0;  // units of the present step; limit 0: not planned yet
-  uint64_t least = 0;            // units that it needs
+  uint64_t least = 0;            // units that it needs with as many contacts as the last sub-step
   // Whether the limit is divided: each sub-step has its share, beside what the others need. The default limit
   // is not, because it ends steps that would not end; nor is one of bodies that revise, because nobody knows
   // how many solves these need.
@@ -44,7 +44,7 @@ struct Budget {
 dfm_status step_within_budget(World &w, double dt, uint32_t *trouble);
 
 // Called by run_step(): the step will have this number of sub-steps. Throws if the limit is the host's and
-// does not hold them.
+// does not hold them even without contacts.
 void plan_work(World &w, StepContext &step, uint32_t substeps);
 // The step needs more sub-steps than planned to stay stable: `done` and `more`. If the limit would have held
 // all of them, what others have used of it does not end the step.
