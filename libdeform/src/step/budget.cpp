@@ -269,8 +269,11 @@ void tell(const World &w, const StepContext &step, StepStopped::Why why, double 
             .c_str());
   set_last_error(format("step %llu: %g s of simulated time need more than %llu units of work (max_work), in "
                         "contact or in body '%s', whose step bound is the smallest; the state is as before "
-                        "it; take a shorter step, reduce the speed of the impact, or raise max_work",
-                        number, dt, static_cast<unsigned long long>(step.budget.limit), body)
+                        "it; take a shorter step, reduce the speed of the impact, or raise max_work, to at "
+                        "least about %llu",
+                        number, dt, static_cast<unsigned long long>(step.budget.limit), body,
+                        static_cast<unsigned long long>(
+                            std::max(step.budget.least, step.budget.limit + step.budget.limit / 10)))
                      .c_str());
 }
 
