@@ -146,6 +146,7 @@ void SelfList::follow(const SelfList &list, const FeatureMap &features, std::spa
   at_.follow(list.at_, features.of[0], s, anew_[0]);
   const auto take = [](const Array<SelfPair> &from, const std::vector<uint32_t> &a,
                        const std::vector<uint32_t> &b, bool swap, Array<SelfPair> &to) {
+    to.reserve(from.size());
     for (const SelfPair &pair : from) {
       const SelfPair now{a[pair.a], b[pair.b]};
       if (now.a == kNone || now.b == kNone) continue;

@@ -1,6 +1,7 @@
 #include "world/carry_state.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "core/error.h"
@@ -78,6 +79,8 @@ std::vector<uint32_t> edges_before(const Array<uint32_t> &before, const CutMesh 
 }
 
 void carry_loads(const Former &before, const CutMesh &mesh, Body &b) {
+  const bool loaded = std::ranges::any_of(before.p.load, [](double f) { return f != 0 || std::signbit(f); });
+  if (!loaded && before.loads.empty() && before.springs.empty() && before.motions.empty()) return;
   const Copies copies(mesh, b, before.p.n);
   for (const Load &l : before.loads) {
     Load out = l;
