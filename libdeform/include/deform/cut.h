@@ -7,9 +7,9 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-/** dfm_cut_def.shape. ELLIPSOID (a sphere where its semi-axes are equal) and BOX stand at `pose` and are
- * swept along `motion`. BLADE is a quadrilateral: an edge, and where the edge has come to. PLANE goes through
- * the whole body. */
+/** dfm_cut_def.shape. ELLIPSOID (a sphere where its semi-axes are equal) and BOX are at `pose` and are
+ * swept along `motion`. BLADE is a quadrilateral: an edge, and the place to which it has moved. PLANE goes
+ * through the whole body. */
 enum { DFM_CUT_ELLIPSOID = 0, DFM_CUT_BOX = 1, DFM_CUT_BLADE = 2, DFM_CUT_PLANE = 3 };
 /** dfm_cut_def.how. REMOVE: the cells that the shape meets go, with their mass. SPLIT, of a blade or
  * plane: faces between cells open where the middles of the two lie on both sides of it, and points are split
@@ -87,10 +87,10 @@ DFM_API dfm_status dfm_body_remove_cells(dfm_body body, uint32_t n, const uint32
  * Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_origins(dfm_body body, uint32_t capacity_points, uint32_t *points,
                                     uint32_t capacity_cells, uint32_t *cells);
-/** dfm_separate_def.crumbs: what parts of fewer than least_cells do. STAY: each remains with the part next to
+/** dfm_separate_def.crumbs, for parts of fewer than least_cells. STAY: each remains with the part next to
  * it, in its piece or in the body. REMOVE: they go, with their mass. Since 0.1. */
 enum { DFM_CRUMBS_STAY = 0, DFM_CRUMBS_REMOVE = 1 };
-/** How parts of a body that hang together no more become bodies of their own. Since 0.1. */
+/** How parts of a body that are no longer connected become bodies of their own. Since 0.1. */
 typedef struct dfm_separate_def {
   uint32_t size, flags; /* flags: 0 */
   uint32_t least_cells; /* a part of fewer cells does not become a body; 1: each does */
@@ -128,13 +128,13 @@ DFM_API dfm_status dfm_body_separate(dfm_body body, const dfm_separate_def *def,
  * @return DFM_OK; DFM_E_ARG; DFM_E_UNSUPPORTED the body cannot be cut; DFM_E_STATE. Threads: Not during
  * step. Since 0.1. */
 DFM_API dfm_status dfm_body_set_separate(dfm_body body, const dfm_separate_def *def);
-/** How long after a tool has come through a face of the body (dfm_tool_set_cuts with DFM_CUT_SPLIT) the face
- * opens. What the cut makes anew is made meanwhile, by a thread of low priority beside the steps, so that no
- * step takes the time of a cut. A step that finds the thread late makes it itself; the result is the same to
- * the bit. Faces that a tool comes through while others wait open `delay` after these. The work of cutting is
- * the tool's in the step in which it comes through; DFM_EVENT_CUT comes as faces open. dfm_body_cut, tears
- * and tools that remove cells do not wait.
- * @param delay  s; 0: no thread, and faces open in the step in which a tool comes through, which is the
+/** How long after a tool has passed through a face of the body (dfm_tool_set_cuts with DFM_CUT_SPLIT) the
+ * face opens. Meanwhile a thread of low priority builds the new body beside the steps, so that no step takes
+ * the time of a cut. A step that finds the thread late builds it itself; the result is the same to the bit.
+ * Faces that a tool passes through while others wait open `delay` after these. DFM_EVENT_CUT is reported when
+ * faces open; at points inside the body the tool does the work of cutting after that. dfm_body_cut, tears and
+ * tools that remove cells have no delay.
+ * @param delay  s; 0: no thread, and faces open in the step in which a tool passes through, which is the
  * default. Rounded to the nearest step
  * @return DFM_OK; DFM_E_ARG; DFM_E_UNSUPPORTED the body cannot be cut; DFM_E_STATE faces wait, the body has
  * no cells, or it is a piece (set the delay of the body that it came off). Threads: Not during step. Since

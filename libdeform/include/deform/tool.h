@@ -4,7 +4,7 @@
  * A tool has a frame and one or more parts, which are rigid bodies (deform/rigid.h): contact, friction,
  * attachments, filters and reports take them as they take any rigid body. It moves to the pose that it is
  * given for the end of each step. Where its stiffness is above 0, the pose is that of a device and pulls at
- * the tool through a spring and a damper (virtual coupling): the tool then has a mass, gives way to what it
+ * the tool through a spring and a damper (virtual coupling): the tool then has a mass, yields to what it
  * meets, and the device feels the spring. Tools have no weight. */
 #ifndef DEFORM_TOOL_H
 #define DEFORM_TOOL_H
@@ -102,7 +102,7 @@ DFM_API dfm_status dfm_tool_parts(dfm_tool tool, uint32_t capacity, dfm_rigid *o
 /* ---- moved once per step ------------------------------------------------------------------------------- */
 
 /** Where the tool, or the device that it is coupled to, is at the end of the next step; it goes there at
- * constant rate, and stands still in steps for which nothing is said. Replaces keys.
+ * constant rate, and does not move in steps for which no pose is set. Replaces keys.
  * @param pose      world frame
  * @param velocity  [6] m/s and rad/s at that time, world frame, as the device measures it: what the damper of
  * the coupling sees. NULL: that of the way there. Without a coupling it has no effect.
@@ -135,16 +135,16 @@ DFM_API dfm_status dfm_tool_teleport(dfm_tool tool, const dfm_pose *pose);
 
 /** What the world did to the tool in the last step: contact, friction, attachments and the force of its cuts
  * (materials with `fracture_energy`), on all parts. Impulses are summed over all sub-steps and divided by the
- * length H of the step: without cuts, H times the force is the momentum that the world gave it, and H
- * times the torque the angular momentum, to rounding. The force of a cut does its work on the tool alone.
- * @param force   [3] N on the tool, in its frame as it stands now
- * @param torque  [3] N m on the tool, about its origin as it stands now, in that frame
+ * length H of the step: H times the force is the momentum that the world gave it, and H times the torque
+ * the angular momentum, to rounding. The body that is cut gets the opposite of the force of the cut.
+ * @param force   [3] N on the tool, in its present frame
+ * @param torque  [3] N m on the tool, about its present origin, in that frame
  * @return DFM_OK (zero before the first step); DFM_E_ARG; DFM_E_HANDLE. Threads: Any thread. Not during
  * step. Since 0.1. */
 DFM_API dfm_status dfm_tool_force(dfm_tool tool, double force[3], double torque[3]);
 /** Force that a device exerts on the hand: the mean force of the coupling over the last step on the device,
  * or that of dfm_tool_force where there is no coupling.
- * @param force   [3] N on the hand, in the device's frame as it stands now
+ * @param force   [3] N on the hand, in the device's present frame
  * @param torque  [3] N m on the hand, about the device's origin, in that frame
  * @return as dfm_tool_force. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_tool_feedback(dfm_tool tool, double force[3], double torque[3]);
@@ -222,7 +222,7 @@ typedef struct dfm_device {
   uint32_t size, flags; /* flags: 0 */
   void *user;
   /** Before a step. @param t s, the end of the step that begins. @param out its size is set, flags are 0.
-   * @return DFM_OK; DFM_DISCARD nothing new: the tool's device stands still; negative: the step is refused
+   * @return DFM_OK; DFM_DISCARD nothing new: the tool's device does not move; negative: the step is refused
    * with this status and nothing changes */
   dfm_status (*read)(void *user, double t, dfm_device_sample *out);
   /** After a step: the force, N, and torque, N m, on the hand, about the device's origin, world frame.
