@@ -16,28 +16,28 @@ namespace {
 
 // An energy costs about as much as two sub-steps.
 constexpr uint32_t kEvery = 512;
-// So a look for every so many sub-steps costs less than 1 %.
+// So one check in this many sub-steps costs less than 1 %.
 constexpr uint32_t kLookCosts = 256;
-// Of the energy of the kick: a third is what stiff modes give back on average as they calm down, and a look
+// Share of the energy of the kick: stiff modes return a third of it on average as they calm down, and a check
 // sees it at one instant.
 constexpr double kGivesBack = 0.5;
-// Stiff modes that hold their energy as motion alone show it in the kick within a quarter of their period: so
-// long a base is being taken.
+// Stiff modes whose energy is all motion show it in the kick within a quarter of their period: the base is
+// taken over this time.
 constexpr uint32_t kSettles = 8;     // sub-steps
 constexpr double kRounding = 1e-12;  // of the sums that a balance is the difference of
 constexpr double kPositionDigits = 8 * 2.3e-16;
-// Of the largest energy so far: what a body that steps itself may have beyond what it has had and was given.
-// What such a model leaves out of the motion, so that its step is cheap, is energy that comes and goes. If
-// its elastic energy is unknown: its velocities are means over steps, and of an oscillation that a step
-// takes far, their energy comes and goes with the phase.
+// Share of the largest energy so far that a body that steps itself may gain. What such a model leaves out of
+// the motion to keep its step cheap is energy that comes and goes. If its elastic energy is unknown: its
+// velocities are means over steps, and the energy of an oscillation that is fast for the step varies with its
+// phase.
 constexpr double kOwnSteps = 0.25, kHidden = 1;
 constexpr char kFlow[] = "deform.plasticity";
 constexpr double kNoLimit = 1e300;  // J, of a base: its energy may be anything
-// An implicit sub-step costs that much more, so the same shares of the time allow as many more looks.
+// An implicit sub-step costs that much more, so the same share of the time allows as many more checks.
 constexpr uint32_t kAges = 32;
 
-// Booked is the work of impulses: contacts that act on bodies in another way leave nothing to balance
-// the energy with.
+// The work of impulses is booked; a contact method that acts on bodies in another way leaves nothing to
+// balance the energy with.
 bool watching(const World &w) {
   return w.def.energy_watch > 0 && w.plan.has(StageRole::gives_impulses) == w.plan.touches();
 }
@@ -46,8 +46,8 @@ bool steps_itself(const Body &b) { return b.model.stepper.has_value(); }
 // at the end of the sub-step.
 bool at_end(const Body &b) { return b.dynamics->abilities().damps || steps_itself(b); }
 bool books(const Body &b) { return b.dynamics->abilities().energy || at_end(b); }
-// Its elastic energy is not known, but that there is none below zero: what moves has come from what moved at
-// first and from what was put in.
+// Its elastic energy is unknown, but not below zero: the kinetic energy comes from that at the start and from
+// the work done since.
 bool hides(const Body &b) { return steps_itself(b) && !b.model.can(DFM_CAP_ENERGY); }
 double allowed(const Body &b) { return hides(b) ? kHidden : steps_itself(b) ? kOwnSteps : 0; }
 bool watched(const Body &b) { return books(b) && (b.model.can(DFM_CAP_ENERGY) || hides(b)); }
@@ -60,8 +60,8 @@ bool unbooked(const World &w, const Body &b) {
   return b.dynamics->abilities().parts && (books_loads(b) || !b.motions.empty() || !w.gravity.keys.empty());
 }
 
-// What holders of driven points do, by the trapezoid of the force: the force at the start of this sub-step
-// counts for half of the way of the one before, and, where `now`, for half of this one's.
+// The work of the holders of driven points, by the trapezoid of the force: the force at the start of this
+// sub-step counts for half of the displacement of the one before, and, if `now`, for half of this one's.
 double work_of_holders(const World &w, const StepContext &step, const Body &b, bool now) {
   double sum = 0;
   for (const Driven &d : step.driven) {
@@ -95,7 +95,7 @@ double rounding_of(const Body &b, double h, double potential, double kinetic, do
          b.mass * drift * drift;
 }
 
-// Of a body whose model sums over its points, so that a look takes no longer than another step.
+// For a body whose model sums over its points, so that a check takes no longer than a step.
 bool look_at_sums(const World &w, const StepContext &step, const Body &b, EnergyLook &out) {
   if (!steps_itself(b) || hides(b) || books_loads(b)) return false;
   if (std::any_of(b.p.load.begin(), b.p.load.end(), [](double f) { return f != 0; })) return false;
@@ -195,11 +195,12 @@ void book_contact(World &w, StepContext &step) {
   }
 }
 
-// How a body turns in a sub-step that takes its points along chords.
+// The rotation of a body in a sub-step that moves its points along chords.
 struct Turning {
   Vec3 velocity, spin;  // m/s of the center of mass, rad/s
   double half = 0;      // s, of the sub-step
-  // What a point's velocity at the end of its arc has beyond the mean one, which is that of the chord. m/s
+  // The difference between a point's velocity at the end of its arc and the mean one, which is that of the
+  // chord. m/s
   Vec3 arc(Vec3 v) const { return half * cross(spin, v - velocity); }
 };
 
@@ -375,11 +376,11 @@ Balance take_balance(World &w, StepContext &step) {
     if (unbooked(w, b)) continue;
     const bool settled = e.known == kSettles, hidden = hides(b);
     const double rise = now.balance - e.base - now.rounding, share = w.def.energy_watch + allowed(b);
-    // before the first look `base` is what a hidden energy may be
+    // before the first check `base` is what a hidden energy may be
     const double level = now.balance + now.gives_back + (hidden && !e.known ? e.base : 0);
     if (settled && rise > 0) out.gain += rise;
     if (settled && rise > share * w.stats.energy_max && rise > worst.rise) worst = {&b, rise, share};
-    // what a hidden energy takes it may give back
+    // a hidden energy may give back what it takes
     if (!settled) e.base = e.known ? std::max(e.base, level) : level;
     else if (!hidden) e.base = std::min(e.base, level);
     e.known += !settled;

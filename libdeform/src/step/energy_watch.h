@@ -1,6 +1,7 @@
-// Does a body gain energy without a source? Every body that a force model moves has a balance: its energy
-// less the work that loads, motions and contact have done on it. The scheme keeps it, dampers lower it,
-// nothing real raises it. What is booked and why the bounds are what they are: doc/concepts/energy_watch.md.
+// Detects bodies that gain energy without a source. Every body that a force model moves has a balance: its
+// energy less the work that loads, motions and contact have done on it. The scheme keeps it, dampers lower
+// it, and nothing real raises it. What is booked, and the reasons for the bounds:
+// doc/concepts/energy_watch.md.
 #pragma once
 #include <cstdint>
 
@@ -19,20 +20,20 @@ struct EnergyLook {
   bool known = false;  // else it is not watched, or its model did not answer
 };
 
-// Gravity that varies: sets the present one, and books what that does to the potentials.
+// Sets the present gravity, if it varies, and books what the change does to the potentials.
 void change_gravity(World &w, Vec3 gravity);
-// Why the watch does not look at the body; empty where it does.
+// Why the watch does not check the body; empty if it does.
 const char *unwatched(const World &w, const Body &b);
-// Its energy counts in the largest one.
+// Whether its energy counts in the largest one.
 bool has_balance(const Body &b);
-// After predict. False: a body, or the contact of a pair, has gained too much; the sentence says which.
+// Called after predict. False: a body, or the contact of a pair, has gained too much; the message says which.
 bool watch_energy(World &w, StepContext &step, uint32_t *trouble);
-// Before commit: what this sub-step puts into the bodies.
+// Called before commit: books what this sub-step puts into the bodies.
 void book_energy(World &w, StepContext &step, double motion);
-// The host changes what only it can: the next look takes a new base.
+// Called if the host changes the body: the next check takes a new base.
 void forget_energy(Body &b);
-// The same where the host gives the body another shape: what energy it then has is not known where its model
-// gives none, and nothing is said about it any more.
+// The same if the host changes the shape of the body. If its model gives no energy, that of the new shape is
+// unknown, and the body is not watched any more.
 void lose_energy(Body &b);
 void forget_energy(World &w);
 

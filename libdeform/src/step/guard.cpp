@@ -1,15 +1,16 @@
-// No crossing at the end of a sub-step, whatever the speed. Between distribute and commit the way of every
-// surfel is known: a straight line from x to x + h v. Each listed pair of features is tested, conservatively,
-// for coming as near as d_g = d_c / 2 on that way (ccd/toi_guard). If so:
+// No crossing at the end of a sub-step, at any speed. Between distribute and commit the path of every surfel
+// is known: a straight line from x to x + h v. Each listed pair of features is tested, conservatively, for
+// coming as near as d_g = d_c / 2 on that path (ccd/toi_guard). If it does:
 //
-//   1  each hit becomes a contact, linearized at its hit time, and the solve runs again, warm
+//   1  each hit becomes a contact, linearized at its hit time, and the solve runs again, warm started,
 //      at most 4 times
-//   2  the sub-step is repeated, shorter: up to the safe part of the way, but no less than a quarter
+//   2  the sub-step is repeated, shorter: up to the safe fraction of the path, but no less than a quarter,
 //      at most 8 times
-//   3  all that moves takes the safe fraction of its way; velocities stay, so no momentum is lost, only way
+//   3  everything takes the safe fraction of its path; velocities stay, so motion is lost, but no momentum
 //
-// What is not listed is not tested: broad/ covers the motion after the solve too (BroadPhase::cover). Why the
-// order is this one and the cut is the whole world's: doc/decisions/0020-guard-cuts-time.md.
+// Pairs that are not listed are not tested: broad/ covers the motion after the solve too (BroadPhase::cover).
+// Reasons for this order, and for shortening the sub-step of the whole world:
+// doc/decisions/0020-guard-cuts-time.md.
 #include "step/guard.h"
 
 #include <algorithm>
@@ -56,7 +57,7 @@ Guard::Common common_motion(const Surface &s) {
 // m, d_g
 double floor_of(const World &w) { return 0.5 * w.offset; }
 
-// Only what contacts have touched moves otherwise than predicted.
+// Only bodies with contacts move otherwise than predicted.
 void bound_speeds(World &w, StepContext &step) {
   Guard &g = step.guard;
   g.speed.assign(w.bodies.size(), 0.0);
@@ -69,7 +70,7 @@ void bound_speeds(World &w, StepContext &step) {
     g.speed[i] = std::max(g.speed[i], norm2(y));
     g.change[i] = std::max(g.change[i], norm2(change));
   }
-  // else nothing has looked at the speeds before the solve
+  // otherwise the speeds were not found before the solve
   const bool listed = w.plan.has(StageRole::lists_pairs);
   for (const uint32_t i : step.active) {
     const Body &b = *w.bodies[i];
@@ -104,11 +105,12 @@ Blow blow_on(const StepContext &step, const Body &b, uint32_t slot) {
 }
 
 // A blow is a change of a point's velocity by contact that strains an edge in this sub-step by more than the
-// bound allows for. It is measured from the velocity at the start: what carries a weight at rest changes only
-// the predicted one. After a blow the next sub-step checks the bound. False: this sub-step is to be repeated
-// finer, and those after it are finer as well. The scheme keeps energy as far as the trapezoid of the forces
-// is their work; with an edge strained by s at once the error is about s^2 of the energy that contact brings,
-// which is too much only if contact brings more than the body has (doc/decisions/0436).
+// bound allows for. It is measured from the velocity at the start, because the support of a resting weight
+// changes only the predicted velocity. After a blow the next sub-step checks the bound. False: this sub-step
+// is to be repeated with shorter ones, and later ones are shorter as well. The scheme keeps energy as far as
+// the trapezoid of the forces is their work; if an edge is strained by s at once, the error is about s^2 of
+// the energy that contact brings, which is too much only if contact brings more than the body has
+// (doc/decisions/0436).
 bool withstands_blows(World &w, StepContext &step) {
   if (step.rows.ndof == 0) return true;
   Guard &g = step.guard;
@@ -132,7 +134,7 @@ bool withstands_blows(World &w, StepContext &step) {
   return false;
 }
 
-// All pairs that may come near: candidates of two sides, behind them those of bodies with themselves.
+// All pairs that may come near: candidates of two sides, followed by those of bodies with themselves.
 void follow_lists(World &w, StepContext &step) {
   Guard &g = step.guard;
   const bool pairs = w.plan.has(StageRole::lists_pairs);
@@ -157,7 +159,7 @@ void make_room(GuardSide &s, const Surface &surface) {
   }
 }
 
-// Which copies of points stay within their slack.
+// Finds which copies of points stay within their slack.
 void follow_copies(const SelfBody &b, double h, GuardSide &s) {
   const Surface &surface = b.body->surface;
   s.opened = &b.rest.opened;
@@ -171,7 +173,7 @@ void follow_copies(const SelfBody &b, double h, GuardSide &s) {
   }
 }
 
-// How all sides move as the solve left them.
+// Finds how all sides move with the velocities of the solve.
 void set_sides(World &w, StepContext &step) {
   GuardScene &scene = step.guard.scene;
   const size_t nb = w.bodies.size();
@@ -244,7 +246,7 @@ double set_back_ends(GuardScene &scene, GuardSide &side, Surface &s) {
   return std::sqrt(most);
 }
 
-// Everything goes this fraction of its way.
+// Moves everything by this fraction of its path.
 void set_fraction(World &w, StepContext &step, double fraction) {
   GuardScene &scene = step.guard.scene;
   step.guard.motion = scene.fraction = fraction;
@@ -306,20 +308,20 @@ bool triangles_cross(StepContext &step, const Candidate &c, bool swap) {
   return false;
 }
 
-// Two surfaces that cross at the start (as given by the user) are let out: what is through cannot be kept
-// out, and to guard it would keep it in.
+// Two surfaces that cross at the start (as placed by the user) are not guarded: guarding them would keep them
+// crossed.
 bool cross_at_start(StepContext &step, const Candidate &c) {
   const bool swap = !c.obstacle && c.slot_b < c.slot_a;
   if (!c.obstacle && are_parts(step, c)) return triangles_cross(step, c, swap);
   return cross_at_start(step, swap ? c.slot_b : c.slot_a, swap ? c.slot_a : c.slot_b, c.obstacle);
 }
 
-// Of a body with itself that has open faces, or of two parts of one body.
+// For pairs of a body with itself that has open faces, or of two parts of one body.
 bool of_cut(const World &w, const StepContext &step, const Candidate &c) {
   return of_one_body(c) ? w.bodies[c.slot_a]->surface.slit : !c.obstacle && are_parts(step, c);
 }
 
-// The safe fraction of the way; 1: nothing comes too near.
+// The safe fraction of the path; 1: nothing comes too near.
 double find_hits(World &w, StepContext &step) {
   Guard &g = step.guard;
   g.hits.clear();
@@ -339,7 +341,7 @@ double find_hits(World &w, StepContext &step) {
   return least;
 }
 
-// Sleepers that are hit before a contact has woken them.
+// Wakes sleeping bodies that are hit before a contact has woken them.
 bool wake_hit(World &w, StepContext &step) {
   const uint32_t before = w.sleepers;
   for (const GuardHit &hit : step.guard.hits) {
@@ -361,9 +363,9 @@ bool overloaded(const World &w, const StepContext &step) {
   return false;
 }
 
-// No motion is left and contact has no answer: what closes on a body has met. Impulses that cannot help would
-// grow from sub-step to sub-step, and their rounding is motion out of nothing. Only prescribed
-// motion leaves no answer: a free body yields.
+// No motion is left, and the contact solve has no solution: the bodies are jammed. Impulses that cannot help
+// would grow from sub-step to sub-step, and their rounding error would become motion. Only prescribed motion
+// can cause this, because a free body yields.
 bool jammed(const World &w, const StepContext &step) {
   if (!(step.guard.motion < kNoWay && step.h > 0.5 * step.guard.planned && step.residual.due > 1))
     return false;

@@ -1,11 +1,11 @@
 // Friction of tools: the laws of their pairs, and what lasts from one sub-step to the next.
 //
 //   start    impulses of the same keys, times h / h_old, and the state of the law; turned with the normal
-//   pass     laws answer at the present slip and normal force; sweeps solve their tangents, as for bodies
+//   pass     laws are evaluated at the present slip and normal force; sweeps solve their tangents, as for
+//            bodies
 //   end      the state that a law has given at the solution lasts, with the impulses
 //
-// A place where two rigid things meet has no area. Laws that use the area get one square
-// centimeter.
+// A place where two rigid things meet has no area. Laws that use the area get one square centimeter.
 #include <algorithm>
 #include <cmath>
 
@@ -33,7 +33,7 @@ uint64_t ToolTouch::key_of(const uint64_t pair[2], Name name) {
   return h.value;
 }
 
-// The frames of the rows, and their impulses so far, which velocities then have.
+// Sets the frames of the rows and their initial impulses, and adds these to the velocities.
 void ToolTouch::take_last(const World &w) {
   const uint32_t n = static_cast<uint32_t>(rows_.size());
   laws_.resize(w.laws.size());
@@ -72,7 +72,7 @@ void ToolTouch::take_last(const World &w) {
 
 Vec3 ToolTouch::slip(const Row &row) const { return speed(row) + row.bend; }
 
-// Evaluates the laws at the present state. m/s, by how much their values differ from it.
+// Evaluates the laws at the present state. Returns m/s, by how much their values differ from it.
 double ToolTouch::ask_laws(double least) {
   const uint32_t n = state_.n;
   const size_t stride = state_.stride;

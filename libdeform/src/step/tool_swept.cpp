@@ -1,7 +1,7 @@
-// Free bodies that are so fast that they could be through something thin within a sub-step: rows are made
-// where two things are nearest at its start, and where they turn or slide far they meet elsewhere. After a
-// solve the ways of corners, edges and centers are looked at; where one crosses the other thing, the sub-step
-// is repeated shorter, so that it ends before and rows are made near by.
+// Free bodies so fast that they could pass through something thin within a sub-step. Rows are made where two
+// things are nearest at the start of the sub-step; things that turn or slide far meet elsewhere. After a
+// solve the paths of corners, edges and centers are tested; if one crosses the other thing, the sub-step is
+// repeated shorter, so that it ends before the crossing and rows are made near it.
 #include <algorithm>
 #include <cmath>
 
@@ -26,7 +26,7 @@ constexpr double kAims = 0.9;      // of the way to where it would cross
 constexpr double kLeastCut = 0.1;  // of a sub-step, by which it is repeated
 constexpr double kLeastPiece = 1.0 / 4096;  // of a planned sub-step
 
-// How a shape goes in the sub-step, and how far any of its points.
+// The motion of a shape in the sub-step, and the longest path of its points.
 struct Way {
   Pose from, to;
   double most = 0;
@@ -40,7 +40,7 @@ Vec3 end_seen(const Way &own, const Way &other, Vec3 p) {
          rotate(other.from.rotation, rotate_back(other.to.rotation, at - other.to.position));
 }
 
-// The part of the way from p to q after which it goes through the triangle; above 1: it does not.
+// The fraction of the path from p to q at which it passes through the triangle; above 1: it does not.
 double crossing(Vec3 p, Vec3 q, Vec3 a, Vec3 b, Vec3 c, bool both_ways) {
   const Vec3 n = cross(b - a, c - a);
   const double from = dot(n, p - a), to = dot(n, q - a);
@@ -52,7 +52,7 @@ double crossing(Vec3 p, Vec3 q, Vec3 a, Vec3 b, Vec3 c, bool both_ways) {
   return t;
 }
 
-// The first part of its way after which something of `own` goes through the surface of `other`.
+// The smallest fraction of its path at which something of `own` passes through the surface of `other`.
 double faces_crossed(const ToolShape &own, const Way &way, const ToolShape &other, const Way &still,
                      double deep, double thin) {
   double first = HUGE_VAL;
@@ -63,7 +63,7 @@ double faces_crossed(const ToolShape &own, const Way &way, const ToolShape &othe
     store3(m.m[0].p0, p);
     store3(m.m[0].p1, q);
     const double core = kCore * own.round();
-    // What is in it already, by little, starts at the surface and may stay as deep.
+    // What is slightly inside already starts at the surface, and may stay as deep.
     ObstaclePoint from, to;
     Vec3 start = p;
     double allowed = deep;
@@ -133,7 +133,7 @@ double edges_crossed(const ToolShape &own, const Way &way, const ToolShape &othe
 
 }  // namespace
 
-// m; of an open mesh infinite: it has no inside, and what is thrown at it decides.
+// m; infinite for an open mesh, which has no inside.
 double ToolTouch::thickness(const Obstacle &o) {
   const dfm_obstacle_def &d = o.def;
   if (o.mesh) {
