@@ -247,7 +247,9 @@ bool advance(World &w, StepContext &step, double end, double goal, bool last, ui
   for (bool whole = false; !whole;) {
     step.rest = step.h = end - w.time;
     step.left = goal - w.time;
-    if (step.guard.piece > 0) step.h = std::min(step.guard.piece, step.rest);
+    // only where the budget of the step has room for one piece more
+    if (step.guard.piece > 0 && step.guard.piece < step.rest && may_repeat(w, step))
+      step.h = step.guard.piece;
     // waking changes state that a later failure must restore
     if (step.h < step.left || (w.def.sleep && !all_idle(w, step))) keep_start(w, step);
     charge(w, step, 1);
