@@ -455,8 +455,9 @@ bool stage_guard(World &w, StepContext &step, uint32_t *trouble) {
   // Teeth of a cut that interlock may leave no way at all, where the rest of the world has one: what contact
   // does not keep apart there crosses. Where pieces are left out to save work, only if there is no way.
   const auto hits_cuts = [&] {
-    return std::any_of(step.guard.hits.begin(), step.guard.hits.end(),
-                       [&](const GuardHit &hit) { return of_cut(w, step, (*step.guard.list)[hit.candidate]); });
+    return std::any_of(step.guard.hits.begin(), step.guard.hits.end(), [&](const GuardHit &hit) {
+      return of_cut(w, step, (*step.guard.list)[hit.candidate]);
+    });
   };
   const bool cuts = hits_cuts(), saves = step.guard.pieces < kCuts;
   if (!(cuts && saves)) take_safe_part(w, step, cuts, safe);
