@@ -1,5 +1,6 @@
 #include "core/aside.h"
 
+#include <algorithm>
 #include <condition_variable>
 #include <deque>
 #include <mutex>
@@ -131,10 +132,13 @@ bool Aside::finish(const std::shared_ptr<Job> &job, std::chrono::microseconds pa
   if (job->state_ == Job::done) return true;
   using Clock = std::chrono::steady_clock;
   Worked worked(room_->thread);
-  auto since = Clock::now();
+  const auto begin = Clock::now();
+  auto since = begin, now = begin;
   while (job->state_ == Job::runs) {
-    std::this_thread::sleep_for(std::chrono::microseconds(20));  // the thread may need this core
-    const auto now = Clock::now();
+    // asleep, since the thread may need this core; longer each time, since waking up takes time too
+    constexpr Clock::duration kShort = std::chrono::microseconds(20), kLong = std::chrono::microseconds(500);
+    std::this_thread::sleep_for(std::clamp((now - begin) / 4, kShort, kLong));
+    now = Clock::now();
     if (now - since < patience) continue;
     if (!worked.half_of(now - since)) break;
     since = now;
