@@ -412,11 +412,11 @@ void ToolTouch::add_row(const Pair &pair, Name name, Side a, Side b, const Place
     row.soft = 1 / (h_ * h_ * kFace);
     row.rate = (offset_ - gap) / h_;
   } else if (gap >= offset_) row.rate = -(gap - offset_) / h_;
-  else if (gap < 0.5 * offset_) row.rate = std::min(0.5 * offset_ - gap, kOpens * offset_) / h_;
+  else if (gap < 0.5 * offset_) row.rate = std::min(0.5 * offset_ - gap, kOpens * offset_) / planned_;
   const double w = dot(normal, answer_to(row, normal));
   if (!(w > 0)) return;  // neither yields
   row.inverse = 1 / (w + row.soft);
-  if (row.frees && row.rate > 0) row.opens = kOpens * offset_ / (h_ * kOpenUpTo * row.inverse);
+  if (row.frees && row.rate > 0) row.opens = kOpens * offset_ / (planned_ * kOpenUpTo * row.inverse);
   row.tangent[0] = any_tangent(normal);
   row.tangent[1] = cross(normal, row.tangent[0]);
   const Vec3 first = answer_to(row, row.tangent[0]), second = answer_to(row, row.tangent[1]);
@@ -701,6 +701,7 @@ bool ToolTouch::begin(World &w, StepContext &step) {
   if (!passing_.empty()) tell_passing(w, step);
   if (pairs_.empty()) return true;
   h_ = step.h;
+  planned_ = step.guard.planned;
   take_sets(w, step);
   tell_driven(w, step);
   find(w, step);

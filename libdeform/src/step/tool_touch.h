@@ -7,7 +7,7 @@
 //   rows     u_n' >= -(gap - d_c) / h at the nearest places of two parts, p >= 0, one of both is zero; the
 //            impulse acts at one point of both, so that both momenta are kept to rounding
 //   energy   p u_n' <= 0 for gap >= d_c / 2: such a contact takes energy or none. A smaller gap opens by at
-//            most a tenth of d_c in a sub-step
+//            most a tenth of d_c in a planned sub-step, and no faster in the pieces of one
 //   turning  The rotation of a free body counts to third order, along the normal too: to first order alone a
 //            body that topples would sink by (h w)^2 r / 2 in a sub-step, which contact then opens by a tenth
 //            of d_c. Not so for tools: it would give them p (h w)^2 r / 2 of energy, and their springs hold
@@ -264,6 +264,7 @@ class ToolTouch {
   static constexpr double kOpens = 0.1;  // of d_c in a sub-step, where two things are in each other
 
   double h_ = 0, offset_ = 0;
+  double planned_ = 0;        // s, the sub-step before it was shortened
   std::vector<double> ways_;  // [obstacles] m, of any point in the sub-step
   double thinnest_ = 0;       // m, of the pairs of free bodies
   std::vector<Pair> pairs_,
