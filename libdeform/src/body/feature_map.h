@@ -19,7 +19,7 @@ struct FeatureMap {
 
 // The surface before a cut, and where its features are now.
 struct FormerSurface {
-  uint64_t shape;
+  uint64_t shape, now;  // numbers of both; the body has another one where the cut was taken back
   FeatureMap features;
   std::shared_ptr<const SelfList> list;  // of its pairs, made beside the steps; null: none
 };

@@ -261,7 +261,7 @@ void choose_self_bodies(World &w, StepContext &step, SceneFacts &facts, std::vec
                                    ? std::move(*same)
                                    : std::make_unique<SelfBody>(w.meters.detection.memory(), *b));
     SelfBody &self = *step.self_bodies.back();
-    if (former) {
+    if (former && former->now == b->shape) {
       const auto own = std::find_if(before.begin(), before.end(), [&](auto &s) {
         return s && s->id == b->id && s->shape == former->shape;
       });

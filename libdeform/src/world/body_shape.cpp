@@ -327,7 +327,7 @@ std::unique_ptr<BodyShape> take_shape(Body &b, MadeShape &made, bool parts, bool
     keep_integrator(b, before.integrator);
     keep_params(b, before);
     carry_state(before, mesh, made.edge, b);
-    b.former_surface.reset(new FormerSurface{shape->shape, made.features, std::move(made.list)});
+    b.former_surface.reset(new FormerSurface{shape->shape, b.shape, made.features, std::move(made.list)});
   } catch (...) {
     exchange(b, *shape);
     throw;
