@@ -288,7 +288,8 @@ bool Group::reachable_across(const Near &n, double weight[3]) const {
     // rise / height: sine of the fold
     const double rise = dot(n.normal, o) * length, height = norm(cross(along, o));
     if (!(rise * n.reach > 0.1 * pair.offset * height)) return false;
-    if (past_border(beyond, s.tri_edge[3 * size_t{n.tri} + k])) return false;
+    // A cut leaves convex edges everywhere, and planes beyond them hold its teeth.
+    if (!s.slit && past_border(beyond, s.tri_edge[3 * size_t{n.tri} + k])) return false;
     across = true;
   }
   return across;
