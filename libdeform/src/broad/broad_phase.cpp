@@ -15,6 +15,9 @@ namespace {
 constexpr double kRounding = 1 + 1e-9;  // margins hold despite rounded distances
 constexpr double kSkinLeast = 0.02;     // of the median edge: a resting body keeps its lists
 constexpr double kSkinMost = 0.5;       // beyond half an edge, lists grow faster than they last
+// Beside a surface that is this many times finer, its edges count: its own skin is used up so soon that the
+// pair is listed again in nearly every sub-step, each time with all that lies in the skin of the coarse one.
+constexpr double kMuchFiner = 4;
 // factor by which speeds may increase before the margin of the reach is used up
 constexpr double kSpeedGrowth = 1.25;
 
@@ -212,7 +215,7 @@ void BroadPhase::look(Body &b, bool asleep, double h, double offset) {
   if (b.dirty || stays) return;
   b.moved = largest_norm(b.surface->nsurfel, b.surface->x.data(), b.x.data());
   b.speed = largest_speed(*b.surface);
-  b.dirty = !(kRounding * (b.moved + reach_share(h, offset, b.speed)) <= b.margin);
+  b.dirty = b.skin > b.skin_most || !(kRounding * (b.moved + reach_share(h, offset, b.speed)) <= b.margin);
 }
 
 bool BroadPhase::find_dirty(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
@@ -276,12 +279,26 @@ void BroadPhase::renew_body(Body &body, double h, double offset) {
   if (!renew_tree(body)) return;
   const Surface &s = *body.surface;
   const double speed = body.speed = largest_speed(s);
-  const double skin =
+  const double alone =
       std::clamp(skin_steps_ * h * speed, kSkinLeast * s.median_edge, kSkinMost * s.median_edge);
-  body.margin = kRounding * std::max(reach_share(h, offset, kSpeedGrowth * speed),
-                                     2 * offset + kSpeedGrowth * h * body.expected) +
-                skin;
+  const double reach = kRounding * std::max(reach_share(h, offset, kSpeedGrowth * speed),
+                                            2 * offset + kSpeedGrowth * h * body.expected);
+  body.skin = std::min(alone, body.skin_most);
+  body.margin = reach + body.skin;
+  body.margin_most = reach + alone;
   body.moved = 0;
+}
+
+// Two bodies whose lists may meet with the skins that they would have alone: a skin that has become thin does
+// not grow again beside the same body.
+void BroadPhase::limit_skins(Body &a, Body &b) {
+  const double fine = std::min(a.surface->median_edge, b.surface->median_edge);
+  Body &coarse = a.surface->median_edge > fine ? a : b;
+  if (!(coarse.surface->median_edge > kMuchFiner * fine)) return;
+  const double wide = a.margin_most + b.margin_most + recovery_depth(*coarse.surface);
+  if (!(box_distance2(a.tree.root(), b.tree.root()) <= wide * wide)) return;
+  coarse.skin_most =
+      std::min(coarse.skin_most, std::max(kSkinMost * fine, kSkinLeast * coarse.surface->median_edge));
 }
 
 void BroadPhase::bound_bodies() {
@@ -310,18 +327,22 @@ void BroadPhase::find_pairs(std::span<const BodyView> bodies, std::span<const Ob
     if (!bodies_[s.a].dirty && !(s.obstacle ? things_[s.b].dirty : bodies_[s.b].dirty))
       next_segments_.push_back(s);
   order_.clear();
-  for (uint32_t i = 0; i < bodies_.size(); ++i)
-    if (bodies_[i].usable) order_.push_back(i);
+  for (uint32_t i = 0; i < bodies_.size(); ++i) {
+    if (!bodies_[i].usable) continue;
+    order_.push_back(i);
+    if (bodies_[i].dirty) bodies_[i].skin_most = kSkinMost * bodies_[i].surface->median_edge;
+  }
   const auto low = [&](uint32_t i) {
-    return bodies_[i].tree.root().lo[0] - bodies_[i].margin - recovery_depth(*bodies_[i].surface);
+    return bodies_[i].tree.root().lo[0] - bodies_[i].margin_most - recovery_depth(*bodies_[i].surface);
   };
   std::sort(order_.begin(), order_.end(),
             [&](uint32_t i, uint32_t j) { return low(i) != low(j) ? low(i) < low(j) : i < j; });
   for (size_t p = 0; p < order_.size(); ++p) {
-    const Body &a = bodies_[order_[p]];
-    const double high = a.tree.root().hi[0] + a.margin + recovery_depth(*a.surface);
+    Body &a = bodies_[order_[p]];
+    const double high = a.tree.root().hi[0] + a.margin_most + recovery_depth(*a.surface);
     for (size_t q = p + 1; q < order_.size() && low(order_[q]) <= high; ++q)
       if ((a.dirty || bodies_[order_[q]].dirty) && filter.may_touch(bodies[order_[p]], bodies[order_[q]])) {
+        limit_skins(a, bodies_[order_[q]]);
         const bool ordered = a.id < bodies_[order_[q]].id;
         pairs_.push_back({order_[ordered ? p : q], order_[ordered ? q : p], false});
       }

@@ -11,6 +11,7 @@
 // On several threads bodies are processed one by one, and pairs are listed in parts, a part of one surface
 // with all of the other, each into memory of its own. Lists are sorted, so parts do not show in them.
 #pragma once
+#include <cmath>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -92,6 +93,9 @@ class BroadPhase {
   struct Body : Side {
     uint64_t id = 0;
     uint32_t slot = 0, category = 0, collides_with = 0;
+    // m, the share of the margin that is spent on motion to come; the most that it should be beside what is
+    // near; the margin with the skin that it would have alone
+    double skin = 0, skin_most = HUGE_VAL, margin_most = 0;
     using Side::Side;
   };
   struct Thing : Side {   // an obstacle; surface and tree of a mesh only
@@ -138,6 +142,7 @@ class BroadPhase {
              const PairFilter &filter, double h, double offset, Tasks *tasks);
   void renew_body(Body &body, double h, double offset);
   void renew_thing(Thing &thing, const ObstacleView &now, double h, double offset);
+  static void limit_skins(Body &a, Body &b);
   void bound_bodies();
   void find_pairs(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
                   const PairFilter &filter, Tasks *tasks);

@@ -402,6 +402,31 @@ TEST(BroadPhase, OnlyTheMovingBody_IsListedAgain) {
   EXPECT_EQ(broad.stats().refits, broad.stats().renewals - 1) << "only the fast body's tree is renewed";
 }
 
+// A fine ball and a box of twelve large triangles fly at each other. The skin of the box by itself would be a
+// tenth of its edges, beside which lie most edges of the ball.
+TEST(BroadPhase, LargeTrianglesBesideFineOnes_HaveThinSkins) {
+  Scene scene;
+  scene.h = 6e-4;
+  scene.offset = 1e-4;
+  scene.add(moved(sphere_mesh(0.15, 4), {}, {0.1, 0.1, 0.31}), {0, 0, -6});
+  scene.add(moved(box_mesh({0.3, 0.3, 0.3}, 1, 1, 1), turn({1, 2, 0}, 0.3), {}), {1, 0, 4});
+  BroadPhase broad(Memory::standard()), from_nothing(Memory::standard());
+  std::mt19937 random(1);
+  size_t most = 0, contacts = 0;
+  for (int step = 0; step < 30; ++step) {
+    broad.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset);
+    from_nothing.clear();
+    from_nothing.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset);
+    const auto found = scene.contacts(broad.candidates());
+    ASSERT_TRUE(same_bits(found, scene.contacts(from_nothing.candidates()))) << "step " << step;
+    most = std::max(most, broad.candidates().size());
+    contacts += found.size();
+    advance(scene, random, 0);
+  }
+  EXPECT_GT(contacts, 1000u);
+  EXPECT_LT(most, 5000u) << "pairs; 10,013 with the skin that the box has alone";
+}
+
 TEST(BroadPhase, Filter_DecidesByMasksAndNamedPairs) {
   Scene scene;
   for (int i = 0; i < 3; ++i) scene.add(moved(box_mesh({1, 1, 1}, 1, 1, 1), {}, {0, 0, 1.001 * i}));
