@@ -228,7 +228,8 @@ bool BroadPhase::find_dirty(std::span<const BodyView> bodies, std::span<const Ob
        [&](size_t i) { look(bodies_[i], bodies[i].asleep, h, offset); });
   for (const Body &b : bodies_) any |= b.dirty;
   for (size_t o = 0; o < things_.size(); ++o) {
-    things_[o].dirty = things_[o].dirty || !holds(things_[o], obstacles[o], h, offset);
+    Thing &t = things_[o];
+    t.dirty = t.dirty || t.skin > t.skin_most || !holds(t, obstacles[o], h, offset);
     any |= things_[o].dirty;
   }
   return any;
@@ -269,9 +270,11 @@ void BroadPhase::renew_thing(Thing &t, const ObstacleView &now, double h, double
   if (t.surface) renew_tree(t);
   const double extent =
       now.shape == Shape::plane ? norm(center_ - now.position) + radius_ : ObstacleShape(now).extent();
-  t.margin =
-      kRounding * reach_share(h, offset, (kSpeedGrowth + 0.5 * skin_steps_) * obstacle_speed(now, extent)) +
-      offset;
+  const double speed = t.speed = obstacle_speed(now, extent), alone = skin_steps_ * h * speed;
+  const double reach = kRounding * reach_share(h, offset, kSpeedGrowth * speed) + offset;
+  t.skin = std::min(alone, t.skin_most);
+  t.margin = reach + kRounding * t.skin;
+  t.margin_most = reach + kRounding * alone;
 }
 
 // The skin lasts for skin_steps_ of the present motion, a function of the state alone.
@@ -289,16 +292,20 @@ void BroadPhase::renew_body(Body &body, double h, double offset) {
   body.moved = 0;
 }
 
-// Two bodies whose lists may meet with the skins that they would have alone: a skin that has become thin does
-// not grow again beside the same body.
-void BroadPhase::limit_skins(Body &a, Body &b) {
-  const double fine = std::min(a.surface->median_edge, b.surface->median_edge);
-  Body &coarse = a.surface->median_edge > fine ? a : b;
-  if (!(coarse.surface->median_edge > kMuchFiner * fine)) return;
+// Two surfaces whose lists may meet with the skins that they would have alone: a skin that has become thin
+// does not grow again beside the same partner.
+void BroadPhase::limit_skins(Side &a, Side &b) {
+  const bool first = a.surface->median_edge > b.surface->median_edge;
+  Side &coarse = first ? a : b;
+  const Side &fine = first ? b : a;
+  const double edge = coarse.surface->median_edge;
+  if (!(edge > kMuchFiner * fine.surface->median_edge)) return;
   const double wide = a.margin_most + b.margin_most + recovery_depth(*coarse.surface);
   if (!(box_distance2(a.tree.root(), b.tree.root()) <= wide * wide)) return;
+  // it need not last longer than that of the fine one
+  const double share = fine.speed > 0 ? std::max(1.0, coarse.speed / fine.speed) : HUGE_VAL;
   coarse.skin_most =
-      std::min(coarse.skin_most, std::max(kSkinMost * fine, kSkinLeast * coarse.surface->median_edge));
+      std::min(coarse.skin_most, std::max(share * kSkinMost * fine.surface->median_edge, kSkinLeast * edge));
 }
 
 void BroadPhase::bound_bodies() {
@@ -332,6 +339,8 @@ void BroadPhase::find_pairs(std::span<const BodyView> bodies, std::span<const Ob
     order_.push_back(i);
     if (bodies_[i].dirty) bodies_[i].skin_most = kSkinMost * bodies_[i].surface->median_edge;
   }
+  for (Thing &t : things_)
+    if (t.dirty) t.skin_most = HUGE_VAL;
   const auto low = [&](uint32_t i) {
     return bodies_[i].tree.root().lo[0] - bodies_[i].margin_most - recovery_depth(*bodies_[i].surface);
   };
@@ -347,8 +356,10 @@ void BroadPhase::find_pairs(std::span<const BodyView> bodies, std::span<const Ob
         pairs_.push_back({order_[ordered ? p : q], order_[ordered ? q : p], false});
       }
     for (uint32_t o = 0; o < things_.size(); ++o)
-      if ((a.dirty || things_[o].dirty) && filter.may_touch(bodies[order_[p]], obstacles[o]))
+      if ((a.dirty || things_[o].dirty) && filter.may_touch(bodies[order_[p]], obstacles[o])) {
+        if (things_[o].usable) limit_skins(a, things_[o]);
         pairs_.push_back({order_[p], o, true});
+      }
   }
   list_pairs(tasks);
 }

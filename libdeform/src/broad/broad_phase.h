@@ -82,7 +82,10 @@ class BroadPhase {
     double margin = -1;  // negative: no lists yet
     // since the lists were made, at the last update(); largest at that time
     double moved = 0, speed = 0;
-    double expected = 0;                // speed that cover() requires of the lists
+    double expected = 0;  // speed that cover() requires of the lists
+    // m, the share of the margin that is spent on motion to come; the most that it should be beside what is
+    // near; the margin with the skin that it would have alone
+    double skin = 0, skin_most = HUGE_VAL, margin_most = 0;
     bool dirty = true, usable = false;  // usable: all positions finite
     bool asleep = false;                // at the last update; unchanged positions if it still sleeps
     uint32_t refits = 0, rebuilds = 0;  // of the tree, not in stats_ yet
@@ -93,9 +96,6 @@ class BroadPhase {
   struct Body : Side {
     uint64_t id = 0;
     uint32_t slot = 0, category = 0, collides_with = 0;
-    // m, the share of the margin that is spent on motion to come; the most that it should be beside what is
-    // near; the margin with the skin that it would have alone
-    double skin = 0, skin_most = HUGE_VAL, margin_most = 0;
     using Side::Side;
   };
   struct Thing : Side {   // an obstacle; surface and tree of a mesh only
@@ -142,7 +142,7 @@ class BroadPhase {
              const PairFilter &filter, double h, double offset, Tasks *tasks);
   void renew_body(Body &body, double h, double offset);
   void renew_thing(Thing &thing, const ObstacleView &now, double h, double offset);
-  static void limit_skins(Body &a, Body &b);
+  static void limit_skins(Side &a, Side &b);
   void bound_bodies();
   void find_pairs(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
                   const PairFilter &filter, Tasks *tasks);
