@@ -116,13 +116,32 @@ Turn turn_of(const Body &b, uint8_t type, uint32_t feature, Vec3 t1, Vec3 t2) {
   return near.turn(shares / corners);
 }
 
-Turn turn_of(const World &w, const StepContext &step, const Obstacle &o, Vec3 n) {
-  if (!o.rigid && !o.has_target && !o.moves()) return {1, 0};
-  const double a =
-      step.guard.motion * dot(n, spin_between(o.pose.rotation, end_pose(w, step, o).rotation, 1));
-  const double half = 0.5 * a * (1 + a * a / 12);  // tan(a / 2) up to a^5
-  return unit_turn(1 - half * half, 2 * half);     // of length one, as the following halving requires
-}
+// How obstacles turn in the plane of n. Contacts of one obstacle follow each other, so its spin is found once
+// for all of them: a look at keyframes takes longer than the rest of a contact's turn.
+class ObstacleTurn {
+ public:
+  ObstacleTurn(const World &w, const StepContext &step) : w_(w), step_(step) {}
+
+  Turn about(Vec3 n, uint32_t slot) {
+    if (slot != slot_) {
+      slot_ = slot;
+      const Obstacle &o = *w_.obstacles[slot];
+      moves_ = o.rigid || o.has_target || o.moves();
+      if (moves_) spin_ = spin_between(o.pose.rotation, end_pose(w_, step_, o).rotation, 1);
+    }
+    if (!moves_) return {1, 0};
+    const double a = step_.guard.motion * dot(n, spin_);
+    const double half = 0.5 * a * (1 + a * a / 12);  // tan(a / 2) up to a^5
+    return unit_turn(1 - half * half, 2 * half);     // of length one, as the following halving requires
+  }
+
+ private:
+  const World &w_;
+  const StepContext &step_;
+  uint32_t slot_ = kNone;
+  bool moves_ = false;
+  Vec3 spin_;
+};
 
 }  // namespace
 
@@ -207,6 +226,7 @@ void fit_bristles(World &w, StepContext &step) {
 
 void turn_frames(World &w, StepContext &step) {
   ContactStore &to = step.next_store;
+  ObstacleTurn obstacle(w, step);
   for (uint32_t i = 0; i < step.rows.n; ++i) {
     const LawInstance &law = *w.pairs.laws[step.state.law[i]];
     if (!law.turns || !to.touching[i]) continue;
@@ -215,7 +235,7 @@ void turn_frames(World &w, StepContext &step) {
     const Vec3 side = cross(n, t);
     const Turn a = turn_of(*w.bodies[c.slot_a], c.type_a, c.feature_a, t, side);
     const Turn b = c.obstacle
-                       ? turn_of(w, step, *w.obstacles[c.slot_b], n)
+                       ? obstacle.about(n, c.slot_b)
                        : turn_of(*w.bodies[c.slot_b], c.kind == kEdgeEdge ? 1 : 2, c.feature_b, t, side);
     // half of the sum
     const Turn both{a.c * b.c - a.s * b.s, a.c * b.s + a.s * b.c}, mean = unit_turn(1 + both.c, both.s);
