@@ -374,6 +374,9 @@ TEST(CutDelay, NoMemoryForTheThread_TheBitsAreTheSame) {
     for (int i = 0; i < 60; ++i) {
       s.step();
       if (s.waiting() > 0) std::this_thread::sleep_for(std::chrono::milliseconds(2));
+      // on a machine without a free core: until the thread has asked for memory once
+      for (int k = 0; k < 100 && to == Refusing::beside && s.waiting() > 0 && r.refused == 0; ++k)
+        std::this_thread::sleep_for(std::chrono::milliseconds(5));
     }
     r.to = Refusing::none;
     EXPECT_GT(s.events, 3u);
