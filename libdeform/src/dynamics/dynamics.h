@@ -163,8 +163,8 @@ class Dynamics {
   // For a body whose scheme damps: writes the forces at the end into points().f, including loads of the
   // sub-step. Returns false if the model fails. After end_state().
   virtual bool end_forces(const SubStep &) { return false; }
-  // points().f is that of the last add_forces(), whether it was kept or not. Before commit(). Returns false
-  // if the model fails.
+  // points().f is that of the last add_forces(), whether it was kept or not: but for rounding, and for held
+  // components. After end_state(), before commit(). Returns false if the model fails.
   virtual bool see_forces(const SubStep &) { return true; }
   // fraction: share of the displacement that is taken; velocities are those of the end.
   virtual void commit(const SubStep &now, double fraction) = 0;

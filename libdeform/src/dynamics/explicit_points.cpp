@@ -80,7 +80,25 @@ bool ExplicitPoints::move_parts(const SubStep &now) {
          std::find(part_kinetic_.begin(), part_kinetic_.end(), kNotGiven) == part_kinetic_.end();
 }
 
-bool ExplicitPoints::see_forces(const SubStep &now) { return !moved_ || find_forces(now); }
+// A motion of parts has left its forces in what it has changed of the velocities: the model need not compute
+// them again. Held components have none.
+bool ExplicitPoints::see_forces(const SubStep &now) {
+  if (!moved_) return true;
+  if (!ways_known_) return find_forces(now);  // other code has changed the free motion
+  for (uint32_t i = 0; i < p_.n; ++i)
+    for (size_t k = 0, at = size_t(i) * kStride; k < 3; ++k, ++at)
+      p_.f[at] = p_.moves(at) ? force_of(at, p_.v_free[at], now) : 0;
+  // contact moves these
+  for (size_t m = 0; m < reached_.size(); ++m)
+    for (size_t k = 0, at = reached_[m]; k < 3; ++k, ++at)
+      if (p_.moves(at)) p_.f[at] = force_of(at, before_[3 * m + k], now);
+  return true;
+}
+
+double ExplicitPoints::force_of(size_t at, double free, const SubStep &now) const {
+  const double m = p_.mass[at / kStride];
+  return (free - p_.v[at]) * (m / now.h) - m * now.gravity[int(at % kStride)];
+}
 
 bool ExplicitPoints::free_motion(const SubStep &now, double &kinetic) {
   kinetic = moved_ ? std::accumulate(part_kinetic_.begin(), part_kinetic_.end(), 0.0)

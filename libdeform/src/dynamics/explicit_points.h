@@ -46,6 +46,8 @@ class ExplicitPoints : public Dynamics {
   Array<double> before_;   // [reached,3] m/s
 
   bool find_forces(const SubStep &now);  // in points().f
+  // N, that leads to this velocity without contact
+  double force_of(size_t at, double free, const SubStep &now) const;
   bool move_parts(const SubStep &now);
 };
 
