@@ -369,9 +369,10 @@ double guarded_apart(World &w, StepContext &step, const Candidate &c) {
   const auto any = [&](const uint32_t *corner, int n) {
     return std::any_of(corner, corner + n, [&](uint32_t surfel) { return is_tangled(b, surfel); });
   };
-  const bool a_is = any(narrow::corners_of(s, edges ? 1 : 0, c.feature_a), edges ? 2 : 1);
-  const bool b_is = any(narrow::corners_of(s, edges ? 1 : 2, c.feature_b), edges ? 2 : 3);
-  return a_is && b_is ? 0 : self_apart(s, b.rest, ContactKind(c.kind), c.feature_a, c.feature_b, w.offset);
+  if (any(narrow::corners_of(s, edges ? 1 : 0, c.feature_a), edges ? 2 : 1) &&
+      any(narrow::corners_of(s, edges ? 1 : 2, c.feature_b), edges ? 2 : 3))
+    return 0;
+  return self_apart(s, b.rest, ContactKind(c.kind), c.feature_a, c.feature_b, w.offset);
 }
 
 }  // namespace dfm
