@@ -173,9 +173,9 @@ class _Part:
 class Body(_Part):
     """A deformable body. Made by World.add_body.
 
-    Its arrays are views that the next look at the same property fills anew (`a = body.positions.copy()`
-    keeps a state). They are read-only, are never freed beneath you, and keep their last values when the
-    world is gone; a new look at a world that is gone raises HandleError, one during a step BusyError.
+    Its arrays are views of the library's answers. An array that you keep keeps its values: a later look gives
+    other memory. They are read-only, are never freed beneath you, and stay when the world is gone; a new look
+    at a world that is gone raises HandleError, one during a step BusyError.
     """
 
     __slots__ = ("_info",)
