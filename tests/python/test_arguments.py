@@ -1,8 +1,12 @@
 """A wrong argument is refused with a sentence that says what was expected, before anything has changed."""
+import copy
 import math
 import pathlib
+import pickle
 import tempfile
 import unittest
+
+import numpy as np
 
 import deform
 
@@ -97,6 +101,79 @@ class Arguments(unittest.TestCase):
             world.add_obstacle("mesh", mesh=surface, scale=1e-3)
             hit = world.query_ray((0, 0, -1), (0, 0, 1))
             self.assertAlmostEqual(hit.distance, 0.9, places=2)
+
+    def test_masks_hold_points_and_components(self):
+        """A mask of points held their x alone before."""
+        mesh = deform.TetMesh.beam([0.2, 0.1, 0.1], cells=100)
+        low = mesh.points[:, 2] < 1e-9
+        each = np.stack([low, low, ~low], axis=1)
+        with deform.World() as world:
+            by_mask = world.add_body(mesh, fixed=low)
+            by_bits = world.add_body(mesh, fixed=np.where(low, 7.0, 0.0), position=(0, 1, 0))
+            apart = world.add_body(mesh, fixed=each, position=(0, 2, 0))
+            world.run(0.02, dt=1e-3)
+            for body in (by_mask, by_bits):
+                np.testing.assert_array_equal(body.point_velocities[low], 0)
+                self.assertGreater(np.abs(body.point_velocities[~low]).max(), 0)
+            np.testing.assert_array_equal(apart.point_velocities[~low, 2], 0)
+            self.assertGreater(np.abs(apart.point_velocities[low, 2]).max(), 0)
+            for wrong in ([0, 1, 2], np.full(len(low), 8), np.full(len(low), 0.5), "x", each.astype(int)):
+                self.refused("fixed has the shape .*True where a point is held",
+                             lambda wrong=wrong: world.add_body(mesh, fixed=wrong))
+            self.refused("axes is 'xyw'; expected", lambda: by_mask.hold([0], "xyw"))
+            self.assertEqual(len(world.bodies), 3)
+
+    def test_values_of_another_kind_are_named(self):
+        mesh = deform.TetMesh.ball(0.1, cells=100)
+        with deform.World() as world:
+            def body(**options):
+                world.add_body(mesh, **options)
+            for sentence, function in (
+                    ("position is '0 0 1'; expected 3 numbers", lambda: body(position="0 0 1")),
+                    ("gravity is None; expected 3 numbers", lambda: world.set_gravity(None)),
+                    ("young of a material is '1e5'; expected a number",
+                     lambda: body(material={"young": "1e5"})),
+                    (r"no entry of a material \(damping_mass, .*young\)", lambda: world.add_material(E=1e5)),
+                    (r"scale is \(1, 1, 2\); expected a number", lambda: body(scale=(1, 1, 2))),
+                    (r"field 'young' has the shape \(7,\); expected \(\d+,\)",
+                     lambda: body(fields={"young": np.ones(7)})),
+                    ("surface is a deform.TriMesh or the path of its file, not a ndarray",
+                     lambda: body(surface=np.zeros((3, 3)))),
+                    ("mesh of an obstacle is a deform.TriMesh .*, not a TetMesh",
+                     lambda: world.add_obstacle("mesh", mesh=mesh)),
+                    ("restore takes the bytes .*, not a str", lambda: world.restore("saved")),
+                    ("a scene is given by the path of its file, not by a dict",
+                     lambda: deform.run({"a": 1}))):
+                self.refused(sentence, function)
+            self.assertEqual((len(world.bodies), len(world.obstacles)), (0, 0))
+
+    def test_surfaces_are_read_from_files(self):
+        with tempfile.TemporaryDirectory(suffix=" with space") as name, deform.World() as world:
+            file = pathlib.Path(name) / "ball.obj"
+            deform.TriMesh.make("ball", [0.1], triangles=200).write(file)
+            world.add_obstacle("mesh", mesh=file)
+            body = world.add_body(deform.TetMesh.ball(0.1, cells=100), surface=str(file), position=(0, 0, 1))
+            self.assertAlmostEqual(world.query_ray((0, 0, -1), (0, 0, 1)).distance, 0.9, places=2)
+            self.assertGreater(body.nsurfel, 90)
+
+    def test_worlds_are_saved_and_not_pickled(self):
+        mesh = deform.TetMesh.ball(0.1, cells=100)
+        self.assertIs(copy.deepcopy(mesh), mesh)
+        with deform.World() as world:
+            ball = world.add_body(mesh, name="ball")
+            for thing, way in ((world, "World.snapshot"), (ball, "World.find_body"), (mesh, "its arrays"),
+                               (world.add_material("rubber"), "its entries")):
+                with self.assertRaisesRegex(TypeError, f"not pickled or copied; .*{way}"):
+                    pickle.dumps(thing)
+            for thing in (world, ball):
+                with self.assertRaisesRegex(TypeError, "not pickled or copied"):
+                    copy.copy(thing)
+            saved, start = world.snapshot(), world.hash
+            for buffer in (saved, bytearray(saved), memoryview(saved), np.frombuffer(saved, np.uint8)):
+                world.step(1e-3)
+                world.restore(buffer)
+                self.assertEqual(world.hash, start)
+            self.assertEqual(pickle.loads(pickle.dumps(ball.positions)).shape, ball.positions.shape)
 
     def test_mesh_says_what_makes_one(self):
         points, tets = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]]

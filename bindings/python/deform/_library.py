@@ -82,6 +82,16 @@ _CLASSES = {_abi.DFM_DISCARD: Discarded, _abi.DFM_E_ARG: ArgumentError, _abi.DFM
             _abi.DFM_E_FORMAT: FormatError, _abi.DFM_E_DIVERGED: Diverged, _abi.DFM_E_BUSY: BusyError}
 
 
+class OfThisProcess:
+    """What lives in the library and cannot be pickled or copied. `_instead`: what a user can do."""
+
+    __slots__ = ()
+    _instead = ""
+
+    def __reduce__(self) -> Any:
+        raise TypeError(f"{self!r} belongs to this process, and is not pickled or copied; {self._instead}")
+
+
 def _path() -> pathlib.Path:
     given = os.environ.get("DEFORM_LIBRARY")
     path = pathlib.Path(given) if given else NATIVE / "lib" / "libdeform.so.0"

@@ -11,7 +11,7 @@ import numpy as np
 from . import _abi
 from ._arrays import Column, Report
 from ._context import choice, number_of
-from ._library import ArgumentError, check, default, lib, quick, sized
+from ._library import ArgumentError, OfThisProcess, check, default, lib, quick, sized
 from .mesh import points_of
 
 if TYPE_CHECKING:
@@ -58,10 +58,40 @@ def separate_def(least_cells: int, crumbs: str) -> Any:
 
 def vector(values: Any, what: str, width: int = 3) -> Any:
     """`width` numbers as a C array."""
-    array = np.asarray(values, dtype=np.float64).ravel()
+    try:
+        if values is None:
+            raise TypeError
+        array = np.asarray(values, dtype=np.float64).ravel()
+    except (TypeError, ValueError):
+        raise ArgumentError(f"{what} is {values!r}; expected {width} numbers", "DFM_E_ARG") from None
     if array.size != width:
         raise ArgumentError(f"{what} has {array.size} numbers; expected {width}", "DFM_E_ARG")
     return (ctypes.c_double * width)(*array)
+
+
+def real(value: Any, what: str) -> float:
+    """A number that is not given as a text."""
+    try:
+        if isinstance(value, (str, bytes)):
+            raise TypeError
+        return float(value)
+    except (TypeError, ValueError):
+        raise ArgumentError(f"{what} is {value!r}; expected a number", "DFM_E_ARG") from None
+
+
+def held_bits(fixed: Any, npoint: int) -> np.ndarray:
+    """[npoint] bits 1 x, 2 y, 4 z of components that are held."""
+    given = np.asarray(fixed)
+    if given.dtype == bool and given.shape == (npoint,):
+        return np.where(given, 7, 0).astype(np.uint8)
+    if given.dtype == bool and given.shape == (npoint, 3):
+        return (given @ np.array([1, 2, 4])).astype(np.uint8)
+    if given.shape != (npoint,) or given.dtype.kind not in "iuf" or not np.isin(given, range(8)).all():
+        raise ArgumentError(f"fixed has the shape {given.shape} and the type {given.dtype}; expected "
+                            f"({npoint},): True where a point is held, or bits 1 x, 2 y, 4 z; or "
+                            f"({npoint}, 3): True where a component is held; Body.hold takes numbers of "
+                            "points", "DFM_E_ARG")
+    return np.ascontiguousarray(given, dtype=np.uint8)
 
 
 def rotation(axis: Sequence[float], degrees: float) -> tuple[float, float, float, float]:
@@ -119,10 +149,11 @@ def handle_of(thing: Any, kind: Any, expected: str) -> int:
     return int(thing.handle)
 
 
-class _Part:
+class _Part(OfThisProcess):
     """What lives in a world under a handle. `user` is yours; a misspelled attribute is an error."""
 
     __slots__ = ("__weakref__", "_columns", "handle", "name", "user", "world")
+    _instead = "give its name, and find it by World.find_body or find_obstacle; its arrays can be pickled"
 
     def __init__(self, world: World, handle: int, name: str):
         self.world = world
@@ -311,7 +342,9 @@ class Body(_Part):
 
     def hold(self, points: Any, axes: str = "xyz") -> None:
         """Holds components ("xyz", "z", "": none, which releases) of points, given by their numbers."""
-        bits = sum(1 << "xyz".index(a) for a in axes)
+        if not isinstance(axes, str) or not set(axes) <= set("xyz"):
+            raise ArgumentError(f"axes is {axes!r}; expected a text of the letters x, y and z", "DFM_E_ARG")
+        bits = sum(1 << "xyz".index(a) for a in set(axes))
         numbers = numbers_of(points)
         self.world.free()
         check(quick.dfm_body_hold(self.handle, numbers.size, numbers.ctypes.data, bits))

@@ -11,7 +11,7 @@ import numpy as np
 
 from . import _abi
 from ._context import Context, called, default_context
-from ._library import ArgumentError, check, encoded, lib, quick, sized
+from ._library import ArgumentError, OfThisProcess, check, encoded, lib, quick, sized
 
 
 def points_of(points: Any, what: str = "points") -> np.ndarray:
@@ -66,7 +66,8 @@ def _groups(names: int | None, count: int) -> list[str]:
     return [(word or b"").decode() for word in words]
 
 
-class _Mesh:
+class _Mesh(OfThisProcess):
+    _instead = "give its arrays (points and cells), or the path of its file"
     _info_kind: Any
     _get_info: Any
     _cell_width: int
@@ -78,6 +79,12 @@ class _Mesh:
                                 "another of its functions, not by calling the class", "DFM_E_ARG")
         self._keeper = _Keeper(handle, destroy, context)
         self._context = context
+
+    def __copy__(self) -> Any:
+        return self  # meshes do not change
+
+    def __deepcopy__(self, _memo: Any) -> Any:
+        return self
 
     @property
     def handle(self) -> int:
@@ -327,3 +334,14 @@ class TriMesh(_Mesh):
     def __repr__(self) -> str:
         info = self.info
         return f"<deform.TriMesh: {info.npoint} points, {info.ntriangle} triangles, {info.area:.6g} m2>"
+
+
+def surface_of(mesh: Any, what: str) -> TriMesh:
+    """A TriMesh, or the one in a file."""
+    if isinstance(mesh, (str, bytes)) or hasattr(mesh, "__fspath__"):
+        return TriMesh.read(mesh)
+    if not isinstance(mesh, TriMesh):
+        raise ArgumentError(f"{what} is a deform.TriMesh or the path of its file, not a "
+                            f"{type(mesh).__name__}; TriMesh.from_arrays(points, triangles) makes one",
+                            "DFM_E_ARG")
+    return mesh

@@ -13,7 +13,7 @@ import numpy as np
 from . import _abi
 from ._arrays import row_type
 from ._context import Context, default_context
-from ._library import ArgumentError, check, encoded, lib, quick, read_text, sized
+from ._library import ArgumentError, OfThisProcess, check, encoded, lib, quick, read_text, sized
 from .picture import Picture, Solid, body_values, draw, palette, scaled, solids
 from .query import write_scene
 from .world import Trouble, World
@@ -37,15 +37,20 @@ def _close(handle: int, _context: Context) -> None:
     quick.dfm_scene_close(handle)
 
 
-class Scene:
+class Scene(OfThisProcess):
     """A scene file (JSON), loaded: its `world`, `settings` and `probes`.
 
     set: values to change, by JSON pointer: {"/contact/friction/0/params/mu": 0.4}. jitter: a number above 0
     changes the start a little, the same number always by the same. threads: on which a step may run.
     """
 
+    _instead = "give the path of its file"
+
     def __init__(self, path: Any, set: Mapping[str, Any] | None = None, jitter: int = 0, threads: int = 1,
                  context: Context | None = None):
+        if isinstance(path, Mapping):
+            raise ArgumentError("a scene is given by the path of its file, not by a dict; write it first: "
+                                "pathlib.Path('scene.json').write_text(json.dumps(scene))", "DFM_E_ARG")
         if context is None:
             context = default_context() if threads == 1 else Context(threads)
         words = [encoded(f"{pointer}={json.dumps(value)}") for pointer, value in (set or {}).items()]

@@ -16,10 +16,11 @@ import numpy as np
 from . import _abi
 from ._arrays import Report, Rows
 from ._context import Context, Params, choice, default_context, number_of, strings
-from ._library import (ArgumentError, BusyError, check, default, encoded, error, lib, quick, read_text, sized)
+from ._library import (ArgumentError, BusyError, OfThisProcess, check, default, encoded, error, lib, quick,
+                       read_text, sized)
 from ._signals import watch
-from .body import EVERYTHING, Body, Obstacle, Rigid, handle_of, pose_of, vector
-from .mesh import TetMesh, TriMesh, cells_of, points_of
+from .body import EVERYTHING, Body, Obstacle, Rigid, handle_of, held_bits, pose_of, real, vector
+from .mesh import TetMesh, TriMesh, cells_of, points_of, surface_of
 from .query import Queries
 from .tool import Tools
 
@@ -62,16 +63,18 @@ def _side(given: Any) -> bytes:
     return name.encode()
 
 
-class Material:
+class Material(OfThisProcess):
     """A named parameter set of a world. Made by World.add_material."""
 
     __slots__ = ("handle", "name", "world")
+    _instead = "give its entries, a dict"
 
     def __init__(self, world: World, handle: int, name: str | None):
         self.world, self.handle, self.name = world, handle, name
 
 
 def _scaled(points: np.ndarray, scale: float) -> np.ndarray:
+    scale = real(scale, "scale")
     if not (np.isfinite(scale) and scale > 0):
         raise ArgumentError(f"scale is {scale}; expected a finite number above 0", "DFM_E_ARG")
     return points if scale == 1 else np.ascontiguousarray(points * scale)
@@ -157,7 +160,7 @@ class JointDef:
         return out
 
 
-class World(Queries, Tools):
+class World(Queries, Tools, OfThisProcess):
     """A world of soft bodies: build it, step it, look at it. SI units.
 
         with deform.World() as world:
@@ -181,6 +184,8 @@ class World(Queries, Tools):
     __slots__ = ("__weakref__", "_asked", "_bits", "_bits_at", "_bodies", "_busy", "_finalize", "_functions",
                  "_lists", "_owner", "context", "handle", "user")
     _finalize: Any
+    _instead = ("World.snapshot() gives bytes, which restore() of a world with the same contents takes, and "
+                "World.write_scene a file")
 
     def __init__(self, gravity: Sequence[float] = (0, 0, -9.81), *, integrator: str = "auto",
                  method: str = "auto", step: float = 0, sleep: bool = False, self_contact: str = "off",
@@ -299,8 +304,9 @@ class World(Queries, Tools):
         self._check_entries(extra)
         values = Params(extra)
         definition.name = encoded(name)
-        definition.density, definition.young, definition.poisson = density, young, poisson
-        definition.damping_mass, definition.damping_stiffness = damping_mass, damping_stiffness
+        for key, value in (("density", density), ("young", young), ("poisson", poisson),
+                           ("damping_mass", damping_mass), ("damping_stiffness", damping_stiffness)):
+            setattr(definition, key, real(value, f"{key} of a material"))
         definition.extra = values.struct
         out = ctypes.c_uint64()
         self.free()
@@ -322,7 +328,9 @@ class World(Queries, Tools):
         for key in extra:
             if key not in known:
                 near = difflib.get_close_matches(key, known | MATERIAL_MEMBERS, 1)
-                meant = f", did you mean '{near[0]}'?" if near else "; load the plugin that has it first"
+                entries = ", ".join(sorted(MATERIAL_MEMBERS | MATERIAL_ENTRIES))
+                meant = (f", did you mean '{near[0]}'?" if near else
+                         f" ({entries}); load the plugin that has it first")
                 raise ArgumentError(f"no loaded model has a parameter '{key}', and it is no entry of a "
                                     f"material{meant}", "DFM_E_ARG")
 
@@ -331,16 +339,17 @@ class World(Queries, Tools):
                  material: Material | Mapping[str, Any] | None = None,
                  position: Sequence[float] = (0, 0, 0), rotation: Sequence[float] = (0, 0, 0, 1),
                  velocity: Sequence[float] = (0, 0, 0), spin: Sequence[float] = (0, 0, 0), fixed: Any = None,
-                 surface: TriMesh | None = None, coupling: str = "barycentric",
+                 surface: TriMesh | str | None = None, coupling: str = "barycentric",
                  fields: Mapping[str, Any] | None = None, integrator: str = "auto", category: int = 1,
                  collides_with: int = EVERYTHING, scale: float = 1) -> Body:
         """A body of a mesh (a TetMesh or the path of its file), or of points [n,3] m and tets [m,4].
 
         model: "msm" (default), "corotational_fem", ...; params: of the model, by key. material: of
         add_material, or its entries as a dict. position [3] m, rotation [4] (a quaternion x, y, z, w),
-        velocity [3] m/s, spin [3] rad/s. fixed: [n] held components of each point, bits 1 x, 2 y, 4 z.
-        surface: a finer one that hangs on the cells. fields: model parameters that differ by cell, [m] or
-        [m,width] by key. scale: of the points of mesh and surface, 0.001 where they are in millimeters.
+        velocity [3] m/s, spin [3] rad/s. fixed: [n] True for points that are held, or bits 1 x, 2 y, 4 z of
+        components that are; or [n,3] True for these. surface: a finer one that hangs on the cells, a TriMesh
+        or the path of its file. fields: model parameters that differ by cell, [m] or [m,width] by key. scale:
+        of the points of mesh and surface, 0.001 where they are in millimeters.
         """
         if isinstance(mesh, (str, bytes)) or hasattr(mesh, "__fspath__"):
             mesh = TetMesh.read(mesh)
@@ -372,12 +381,11 @@ class World(Queries, Tools):
         definition.pose = pose_of(position, rotation)
         definition.velocity, definition.spin = vector(velocity, "velocity"), vector(spin, "spin")
         if fixed is not None:
-            held = np.ascontiguousarray(fixed, dtype=np.uint8)
-            if held.shape != (len(x),):
-                raise ArgumentError(f"fixed has the shape {held.shape}; expected ({len(x)},)", "DFM_E_ARG")
+            held = held_bits(fixed, len(x))
             definition.fixed = held.ctypes.data
             keep.append(held)
         if surface is not None:
+            surface = surface_of(surface, "surface")
             hung = _abi.dfm_surface_def(ctypes.sizeof(_abi.dfm_surface_def),
                                         _word("coupling", coupling, COUPLINGS))
             sp, st = _scaled(surface.points, scale), surface.triangles
@@ -387,7 +395,11 @@ class World(Queries, Tools):
             keep += [hung, sp, st]
         rows = (_abi.dfm_cell_field * max(len(fields or {}), 1))()
         for row, (key, given) in zip(rows, (fields or {}).items()):
-            field = np.ascontiguousarray(given, dtype=np.float64).reshape(len(cells), -1)
+            field = np.ascontiguousarray(given, dtype=np.float64)
+            if field.size == 0 or field.size % len(cells) != 0:
+                raise ArgumentError(f"field '{key}' has the shape {field.shape}; expected ({len(cells)},): a "
+                                    "value for each cell", "DFM_E_ARG")
+            field = field.reshape(len(cells), -1)
             row.key, row.values, row.width = key.encode(), field.ctypes.data, field.shape[1]
             keep.append(field)
         definition.nfield, definition.fields = len(fields or {}), ctypes.addressof(rows)
@@ -403,12 +415,13 @@ class World(Queries, Tools):
                      position: Sequence[float] = (0, 0, 0), rotation: Sequence[float] | None = None,
                      normal: Sequence[float] | None = None, radius: float = 0,
                      half_size: Sequence[float] = (0, 0, 0), half_length: float = 0,
-                     mesh: TriMesh | None = None, cells: int = 0,
+                     mesh: TriMesh | str | None = None, cells: int = 0,
                      velocity_surface: Sequence[float] = (0, 0, 0),
                      material: Material | Mapping[str, Any] | None = None,
                      category: int = 1, collides_with: int = EVERYTHING, scale: float = 1) -> Obstacle:
         """A "plane" (through position, with a normal), "sphere" (radius), "box" (half_size [3]), "capsule"
-        (radius, half_length, along z), "mesh" or "voxels" (mesh, whose points times scale are in m). m.
+        (radius, half_length, along z), "mesh" or "voxels" (mesh, a TriMesh or the path of its file, whose
+        points times scale are in m). m.
         velocity_surface: of a belt, [3] m/s."""
         definition = default(_abi.dfm_obstacle_def)
         definition.shape = _word("shape", shape, SHAPES)
@@ -423,6 +436,7 @@ class World(Queries, Tools):
         definition.category, definition.collides_with = category, collides_with
         definition.material = self._material(material)
         if mesh is not None:
+            mesh = surface_of(mesh, "the mesh of an obstacle")
             p, t = _scaled(mesh.points, scale), mesh.triangles
             definition.npoint, definition.ntriangle = len(p), len(t)
             definition.points, definition.triangles, definition.cells = p.ctypes.data, t.ctypes.data, cells
@@ -715,11 +729,17 @@ class World(Queries, Tools):
         check(quick.dfm_world_snapshot(self.handle, buffer, ctypes.byref(size)))
         return buffer.raw[:size.value]
 
-    def restore(self, snapshot: bytes) -> None:
-        """Back to a snapshot of this world, or of one with the same contents: the next steps give the same
-        bits. Contents are found by their names, or by their order where they have none."""
+    def restore(self, snapshot: Any) -> None:
+        """Back to a snapshot (bytes, or any buffer of bytes) of this world, or of one with the same contents:
+        the next steps give the same bits. Contents are found by their names, or by their order where they
+        have none."""
+        try:
+            taken = bytes(memoryview(snapshot))
+        except TypeError:
+            raise ArgumentError("restore takes the bytes that World.snapshot() has returned, not a "
+                                f"{type(snapshot).__name__}", "DFM_E_ARG") from None
         self.free()
-        check(quick.dfm_world_restore(self.handle, snapshot, len(snapshot)))
+        check(quick.dfm_world_restore(self.handle, taken, len(taken)))
         for body in list(self._bodies.values()):
             body._renew_name()  # a name that the library has made may be another one
 
