@@ -292,6 +292,7 @@ dfm_status Adapter::tick(double h) {
   dfm_status status = DFM_OK;
   {
     engine_.gather();
+    engine_.callers_step = h;
     const Stepping stepping(engine_, world_);
     status = dfm_world_step(world_, h, &trouble_);
   }

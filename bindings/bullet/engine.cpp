@@ -60,6 +60,26 @@ dfm_rigid_state state_of(const Pose &p, Vec v, Vec w) {
   return s;
 }
 
+// Bullet corrects by the share of the caller's tick that a sub-step is.
+class SharedCorrection {
+ public:
+  SharedCorrection(btContactSolverInfo &info, double share)
+      : info_(info), of_joints_(info.m_erp), of_contacts_(info.m_erp2) {
+    info_.m_erp *= static_cast<btScalar>(share);
+    info_.m_erp2 *= static_cast<btScalar>(share);
+  }
+  ~SharedCorrection() {
+    info_.m_erp = of_joints_;
+    info_.m_erp2 = of_contacts_;
+  }
+  SharedCorrection(const SharedCorrection &) = delete;
+  SharedCorrection &operator=(const SharedCorrection &) = delete;
+
+ private:
+  btContactSolverInfo &info_;
+  btScalar of_joints_, of_contacts_;
+};
+
 }  // namespace
 
 void Stand::take(const btRigidBody &body) {
@@ -357,8 +377,11 @@ void BulletEngine::run(double h) {
   }
   for (LinkMember *m : links_) m->push((1 / h) * m->impulse.v, (1 / h) * m->impulse.w);
   if (!std::exchange(has_islands_, false)) (world->*Opened::find_islands())();
-  world->getSolverInfo().m_timeStep = step;
-  world->solveConstraints(world->getSolverInfo());
+  {
+    const SharedCorrection shared(world->getSolverInfo(), callers_step > h ? h / callers_step : 1);
+    world->getSolverInfo().m_timeStep = step;
+    world->solveConstraints(world->getSolverInfo());
+  }
   (world->*Opened::integrate())(step);
   for (size_t i = 0; i < saved_.size(); ++i) saved_[i].body->setFlags(flags_[i]);
   for (BulletMember *m : bodies_) finish(*m, h);

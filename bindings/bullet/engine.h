@@ -78,6 +78,9 @@ struct LinkMember : AnyMember {
 class BulletEngine : public Engine {
  public:
   btDiscreteDynamicsWorld *world = nullptr;
+  // s, a tick of the caller's, by which Bullet's world is set up: it corrects errors by a share per tick,
+  // which per sub-step would be a speed that grows as sub-steps get shorter; 0: each sub-step is one
+  double callers_step = 0;
   bool falls = false;  // every body under `gravity`, which is not in its forces
   Vec gravity;
   std::function<void()> collided = [] {};  // between Bullet's collision and its islands

@@ -231,6 +231,7 @@ dfm_status Adapter::step(double dt) {
   dfm_status status = DFM_OK;
   {
     engine_.gather(hidden_bodies());
+    engine_.callers_step = dt;
     const Stepping stepping(engine_, world_);
     status = dfm_world_step(world_, dt, &trouble);
   }

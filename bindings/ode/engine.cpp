@@ -43,8 +43,8 @@ bool damped(dBodyID b) {
 }
 
 // ODE's rule, with one sample: only bodies with joints (contacts are some) fall asleep. Who sleeps keeps what
-// it has counted. True: idle for long enough.
-bool tire(dBodyID b, double h, const OdeEngine::Idle &idle, OdeEngine::Idle &next) {
+// it has counted. share: of a step that the sub-step h is. True: idle for long enough.
+bool tire(dBodyID b, double h, double share, const OdeEngine::Idle &idle, OdeEngine::Idle &next) {
   next = idle;
   if (!dBodyIsEnabled(b)) return false;
   next = {};
@@ -53,8 +53,9 @@ bool tire(dBodyID b, double h, const OdeEngine::Idle &idle, OdeEngine::Idle &nex
     return false;
   if (norm(load(dBodyGetLinearVel(b))) > dBodyGetAutoDisableLinearThreshold(b)) return false;
   if (norm(load(dBodyGetAngularVel(b))) > dBodyGetAutoDisableAngularThreshold(b)) return false;
-  next = {idle[0] + 1, idle[1] + h};
-  return next[0] >= dBodyGetAutoDisableSteps(b) && next[1] >= dBodyGetAutoDisableTime(b);
+  next = {idle[0] + share, idle[1] + h};
+  constexpr double kRounding = 1e-6;  // of a sum of shares
+  return next[0] >= dBodyGetAutoDisableSteps(b) - kRounding && next[1] >= dBodyGetAutoDisableTime(b);
 }
 
 }  // namespace
@@ -259,7 +260,7 @@ void OdeEngine::rest(double h) {
   for (size_t i = 0; i < saved_.size(); ++i) {
     Saved &s = saved_[i];
     Member *const m = i < members.size() ? members[i] : nullptr;
-    any |= due[i] = tire(s.body, h, m ? m->idle : s.idle, m ? m->next_idle : s.next_idle);
+    any |= due[i] = tire(s.body, h, share_of_step(h), m ? m->idle : s.idle, m ? m->next_idle : s.next_idle);
   }
   if (!any) return;
   std::vector<size_t> awake;
@@ -307,11 +308,12 @@ void OdeEngine::take(Member &any, const dfm_rigid_state &given, const double *ex
   m.start = m.state();
 }
 
-// For the length of an ODE step, whichever way it ends: joints report to the engine what they do, and ODE
-// leaves its gyroscopic terms out.
+// For the length of an ODE step, whichever way it ends: joints report to the engine what they do, ODE leaves
+// its gyroscopic terms out, and it corrects by the share of the caller's step that this one is.
 class OdeEngine::Lent {
  public:
-  explicit Lent(OdeEngine &engine) : engine_(engine) {
+  Lent(OdeEngine &engine, double h) : engine_(engine), correction_(dWorldGetERP(engine.world)) {
+    dWorldSetERP(engine.world, correction_ * engine.share_of_step(h));
     for (Tie &t : engine.ties_) {
       t.callers = dJointGetFeedback(t.joint);
       dJointSetFeedback(t.joint, &t.own);
@@ -319,6 +321,7 @@ class OdeEngine::Lent {
     for (const Saved &s : engine.saved_) dBodySetGyroscopicMode(s.body, 0);
   }
   ~Lent() {
+    dWorldSetERP(engine_.world, correction_);
     for (const Saved &s : engine_.saved_) dBodySetGyroscopicMode(s.body, s.gyroscopic);
     for (const Tie &t : engine_.ties_) {
       dJointSetFeedback(t.joint, t.callers);
@@ -330,6 +333,7 @@ class OdeEngine::Lent {
 
  private:
   OdeEngine &engine_;
+  dReal correction_;
 };
 
 void OdeEngine::put_forces(double h) {
@@ -349,7 +353,7 @@ void OdeEngine::put_forces(double h) {
 
 void OdeEngine::run(double h) {
   {
-    const Lent lent(*this);
+    const Lent lent(*this, h);
     (quick ? dWorldQuickStep : dWorldStep)(world, h);
   }
   for (size_t i = 0; i < members.size(); ++i) member(i).has_ended = false;

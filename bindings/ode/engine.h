@@ -1,8 +1,11 @@
 // A dWorldID inside the contact solve (rigid_host/engine.h).
 //
 // Auto-disable is counted here, in sub-steps that count, by ODE's rule: ODE's own counters run on through
-// corrections and cannot be read. Bodies that ODE would wake in its step because they are connected to an
-// awake body are woken before the solve, which would otherwise push bodies at rest.
+// corrections and cannot be read. Its count of steps is one of the caller's steps: in ten short sub-steps a
+// body that begins to fall would not yet be faster than the idle speed. For the same reason ODE corrects per
+// caller's step: its share of a depth per sub-step would be a speed that grows as sub-steps get shorter.
+// Bodies that ODE would wake in its step because they are connected to an awake body are woken before the
+// solve, which would otherwise push bodies at rest.
 //
 // ODE's gyroscopic terms keep angular momentum to first order only. They are out of its step where the
 // caller has them on: free bodies are turned by the shared engine, and of jointed ones ODE solves I(q0) (w1 -
@@ -59,6 +62,9 @@ class OdeEngine : public Engine {
  public:
   dWorldID world = nullptr;
   bool quick = false;
+  // s, the caller's step, by which ODE's world is set up: a step of ODE's, for its auto-disable and its
+  // correction of errors; 0: each sub-step is one
+  double callers_step = 0;
   dJointGroupID contacts = nullptr;
   std::vector<dSpaceID> spaces;  // collided at the start of each sub-step, each in itself
   dNearCallback *near_callback = nullptr;
@@ -67,7 +73,7 @@ class OdeEngine : public Engine {
   RigidFriction *friction = nullptr;
 
   void gather(const std::vector<dBodyID> &bodies_without_geoms);  // before begin()
-  using Idle = std::array<double, 2>;                             // sub-steps, s
+  using Idle = std::array<double, 2>;                             // caller's steps, s
   // of one without geoms, between steps; what members count is in their `extra`
   Idle idle(dBodyID body) const;
   void set_idle(dBodyID body, Idle idle) { idle_[body] = idle; }
@@ -111,6 +117,7 @@ class OdeEngine : public Engine {
   std::unordered_map<dBodyID, Idle> idle_;
   std::vector<Vec> turn_;  // per body of saved_, N m s
 
+  double share_of_step(double h) const { return callers_step > h ? h / callers_step : 1; }
   OdeMember &member(size_t i) const { return *static_cast<OdeMember *>(members[i]); }
   void turn_jointed(double h);
   void find_ties();

@@ -168,6 +168,25 @@ TEST(BulletLifecycle, BoxAtRestOnASoftBed_FallsAsleep) {
   EXPECT_LT(apart(there, position(box)), 1e-6);
 }
 
+// Bullet closes a share of a depth in each step. In short sub-steps that share would be a speed of many m/s.
+TEST(BulletLifecycle, BoxInTheFloor_IsNotThrownInShortSubSteps) {
+  for (const double young : {1e4, 2e6}) {
+    Bullet b;
+    b.body(b.shape<btStaticPlaneShape>(btVector3(0, 0, 1), btScalar(0)), 0);
+    const btRigidBody *const box = b.box({0.15, 0.15, 0.15}, 10, {5, 0, 0.145});
+    soft_ball(b, {0, 0, 5}, {}, young);
+    double fastest = 0;
+    for (int i = 0; i < 30; ++i) {
+      b.step(1.0 / 60);
+      fastest = std::max(fastest, velocity(box)[2]);
+    }
+    EXPECT_GT(stats(b.soft).last_substeps, young > 1e5 ? 200u : 4u);
+    EXPECT_LT(fastest, 0.1);  // 0.081 in one step of Bullet's
+    EXPECT_NEAR(position(box)[2], 0.15, 2e-3);
+    EXPECT_EQ(b.world.getSolverInfo().m_erp2, btScalar(0.2));
+  }
+}
+
 TEST(BulletLifecycle, LockedAxes_DoNotMove) {
   Bullet b({0, 0, 0});
   btRigidBody *const target = b.box({0.1, 0.1, 0.1}, 1, {0.03, 0.02, 0});

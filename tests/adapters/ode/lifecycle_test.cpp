@@ -240,6 +240,41 @@ TEST(OdeLifecycle, AutoDisabledPlate_SleepsUnderABallAndWakesWithoutIt) {
   EXPECT_TRUE(woke);
 }
 
+// ODE counts steps until it disables a body that is slow. Where a stiff soft body divides the step into
+// hundreds, ten of them pass before a body that begins to fall is faster than the threshold.
+TEST(OdeLifecycle, LinkedBodiesThatBeginToFall_StayAwakeInShortSubSteps) {
+  Ode ode;
+  dWorldSetAutoDisableFlag(ode.world, 1);
+  const dBodyID a = ode.ball(0.1, 10, {5, 0, 2}), b = ode.ball(0.1, 10, {5.3, 0, 2});
+  const dJointID link = dJointCreateBall(ode.world, nullptr);
+  dJointAttach(link, a, b);
+  dJointSetBallAnchor(link, 5.15, 0, 2);
+  soft_ball(ode, {0, 0, 5}, {}, 2e6);
+  ode.run(0.2, 1.0 / 60);
+  ASSERT_GT(stats(ode.soft).last_substeps, 200u);
+  EXPECT_TRUE(dBodyIsEnabled(a));
+  EXPECT_NEAR(position(a)[2], 2 - 0.5 * 9.81 * 0.04, 0.02);
+}
+
+// ODE closes a share of a depth in each step. In short sub-steps that share would be a speed of many m/s.
+TEST(OdeLifecycle, BoxInTheFloor_IsNotThrownInShortSubSteps) {
+  for (const double young : {1e4, 2e6}) {
+    Ode ode;
+    dCreatePlane(ode.space, 0, 0, 1, 0);
+    const dBodyID box = ode.box({0.15, 0.15, 0.15}, 10, {5, 0, 0.145});
+    soft_ball(ode, {0, 0, 5}, {}, young);
+    double fastest = 0;
+    for (int i = 0; i < 30; ++i) {
+      ode.step(1.0 / 60);
+      fastest = std::max(fastest, velocity(box)[2]);
+    }
+    EXPECT_GT(stats(ode.soft).last_substeps, young > 1e5 ? 200u : 4u);
+    EXPECT_LT(fastest, 0.2 * 0.005 * 60);  // as in one step of ODE
+    EXPECT_NEAR(position(box)[2], 0.15, 1e-3);
+    EXPECT_EQ(dWorldGetERP(ode.world), 0.2);
+  }
+}
+
 // What hangs on something awake does not sleep, idle as it is: asleep it would stand still in the solve while
 // ODE moves it without its load.
 TEST(OdeLifecycle, PlateWithASwingingPendulum_StaysAwakeUntilThatHangsStill) {
