@@ -218,12 +218,10 @@ void print(const CcdOptions &options, const Globals &globals, size_t n, const Ta
 }
 
 int ccd(const CcdOptions &options, const Globals &globals) {
-  if (std::find(kRoots.begin(), kRoots.end(), options.root) == kRoots.end()) {
-    const std::string near = nearest(options.root, kRoots);
+  if (std::find(kRoots.begin(), kRoots.end(), options.root) == kRoots.end())
     throw Failure(kBadInput, "--root is \"" + options.root +
                                  "\", expected bisection, regula_falsi, brent or conservative" +
-                                 (near.empty() ? "" : "; did you mean \"" + near + "\"?"));
-  }
+                                 did_you_mean(options.root, kRoots));
   const QueryFile file(options.file);
   std::string rows = "id,hit,t,evaluations\n";
   const Tally tally = answer(options, file.queries(), rows);

@@ -206,9 +206,7 @@ int info(const Globals &globals, const std::string &id) {
       names.push_back(t.type->id);
       if (const char *dot = std::strrchr(t.type->id, '.')) names.push_back(dot + 1);
     }
-    const std::string near = nearest(id, names);
-    return fail("no plugin \"" + id + "\" is loaded" +
-                (near.empty() ? "" : ", did you mean \"" + near + "\"") + "; loaded: " + joined(ids));
+    return fail("no plugin \"" + id + "\" is loaded" + did_you_mean(id, names) + "; loaded: " + joined(ids));
   }
   if (globals.json) {
     std::vector<std::string> all;

@@ -204,12 +204,10 @@ class CaseReader {
                        const std::string &where) const {
     for (const JsonMember &m : of.members) {
       if (std::find(known.begin(), known.end(), m.name) != known.end()) continue;
-      const std::string near = nearest(m.name, known);
       warn(file_ + ": " + pointer + m.name + " is not read" + where +
            (m.name == "F0" || m.name.find("normal") != std::string::npos
                 ? "; the normal force is /normal_force"
-            : near.empty() ? ""
-                           : "; did you mean \"" + near + "\"?"));
+                : did_you_mean(m.name, known)));
     }
   }
 
@@ -227,9 +225,8 @@ class CaseReader {
     if (found == kinds.end()) {
       std::string all;
       for (const std::string &k : kinds) all += (all.empty() ? "" : ", ") + k;
-      const std::string near = nearest(c.kind, kinds);
       refuse("/input/kind", (c.kind.empty() ? "is missing" : "is \"" + c.kind + "\"") + ", expected one of " +
-                                all + (near.empty() ? "" : "; did you mean \"" + near + "\"?"));
+                                all + did_you_mean(c.kind, kinds));
     }
     c.drive = Drive(found - kinds.begin());
   }

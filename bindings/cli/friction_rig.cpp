@@ -237,9 +237,8 @@ class Rig {
       if (std::find(known.begin(), known.end(), name) == known.end()) {
         std::string all;
         for (const std::string &k : known) all += (all.empty() ? "" : " ") + k;
-        const std::string near = nearest(name, known);
         throw Failure(kBadInput, case_.file + ": /columns names \"" + name + "\", expected some of " + all +
-                                     (near.empty() ? "" : "; did you mean \"" + near + "\"?"));
+                                     did_you_mean(name, known));
       }
   }
 

@@ -41,6 +41,8 @@ class Quiet {
 const char *kind_name(uint32_t kind);
 // The valid name nearest to a wrong one, for "did you mean"; empty when nothing is near.
 std::string nearest(const std::string &word, const std::vector<std::string> &valid);
+// The end of a sentence about a wrong word: `; did you mean "NEAR"?`; empty when nothing is near.
+std::string did_you_mean(const std::string &word, const std::vector<std::string> &valid);
 // Exit code of a run that a signal ended in order, as shells give it for SIGINT.
 enum { kInterrupted = 130 };
 

@@ -61,6 +61,11 @@ std::string nearest(const std::string &word, const std::vector<std::string> &val
   return best;
 }
 
+std::string did_you_mean(const std::string &word, const std::vector<std::string> &valid) {
+  const std::string near = nearest(word, valid);
+  return near.empty() ? "" : "; did you mean \"" + near + "\"?";
+}
+
 int fail(const std::string &sentence) {
   std::fflush(stdout);
   std::fprintf(stderr, "deform: %s\n", shown(sentence).c_str());

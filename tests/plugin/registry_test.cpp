@@ -110,7 +110,7 @@ TEST(Registry, UnknownName_ListsWhatIsLoadedAndTheNearest) {
   ASSERT_EQ(dfm_plugin_load(c.c, plugin("tiny_old").c_str()), DFM_OK);
   dfm_law law = 0;
   EXPECT_EQ(dfm_law_open(c.c, "darg", &law), DFM_E_UNSUPPORTED);
-  EXPECT_STREQ(dfm_last_error(), "no law \"darg\" is loaded, did you mean \"drag\"; loaded: drag, old");
+  EXPECT_STREQ(dfm_last_error(), "no law \"darg\" is loaded; did you mean \"drag\"?; loaded: drag, old");
   // a part of a name is nearer to that name than a short one with few letters in common
   EXPECT_EQ(dfm_law_open(c.c, "tiny.d", &law), DFM_E_UNSUPPORTED);
   EXPECT_NE(std::string(dfm_last_error()).find("did you mean \"org.tiny.drag\""), std::string::npos)

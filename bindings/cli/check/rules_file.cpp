@@ -177,11 +177,10 @@ void effects_known(const dfm_type &type) {
   const std::vector<std::string> known(std::begin(kEffects), std::end(kEffects));
   for (const char *const *e = type.effects; e && *e; ++e) {
     if (std::strchr(*e, '.') || std::find(known.begin(), known.end(), *e) != known.end()) continue;
-    const std::string near = nearest(*e, known);
     broken(
-        "it promises \"%s\", which is not the name of an effect%s%s%s; write an effect of your own as "
+        "it promises \"%s\", which is not the name of an effect%s; write an effect of your own as "
         "\"vendor.word\"",
-        *e, near.empty() ? "" : "; did you mean \"", near.c_str(), near.empty() ? "" : "\"");
+        *e, did_you_mean(*e, known).c_str());
   }
 }
 

@@ -295,9 +295,8 @@ Axes find_axes(const Subject &subject, const std::string &mesh_left_out,
     if (std::find(axis_names().begin(), axis_names().end(), name) == axis_names().end()) {
       std::string all;
       for (const std::string &n : axis_names()) all += (all.empty() ? "" : ", ") + n;
-      const std::string near = nearest(name, axis_names());
       throw Failure(kBadInput, "--axes: there is no axis \"" + name + "\", expected " + all +
-                                   (near.empty() ? "" : "; did you mean \"" + near + "\"?"));
+                                   did_you_mean(name, axis_names()));
     }
   return Finder(subject, wanted).find(mesh_left_out);
 }

@@ -407,9 +407,8 @@ class Student {
       if (names.empty()) {
         std::string all;
         for (const std::string &name : out_.quantities) all += (all.empty() ? "" : ", ") + name;
-        const std::string near = nearest(word, out_.quantities);
         throw Failure(kBadInput, "--quantity: there is no \"" + word + "\" in this scene, expected one of " +
-                                     all + (near.empty() ? "" : "; did you mean \"" + near + "\"?"));
+                                     all + did_you_mean(word, out_.quantities));
       }
       out_.headline.insert(out_.headline.end(), names.begin(), names.end());
     }

@@ -81,9 +81,8 @@ class Reader {
   void known(const JsonValue &v, const std::string &pointer, const std::vector<std::string> &keys) const {
     for (const JsonMember &m : v.members) {
       if (std::find(keys.begin(), keys.end(), m.name) != keys.end()) continue;
-      const std::string near = cli::nearest(m.name, keys);
       refuse(path_, "%s/%s: no such key%s", pointer.c_str(), escaped(m.name).c_str(),
-             near.empty() ? "" : ("; did you mean \"" + near + "\"?").c_str());
+             cli::did_you_mean(m.name, keys).c_str());
     }
   }
   std::string text(const JsonValue &v, const char *key, const std::string &pointer) const {
@@ -158,9 +157,8 @@ class Reader {
     if (!e.material.empty() && !out_.materials.find(e.material)) {
       std::vector<std::string> names;
       for (const JsonMember &k : out_.materials.members) names.push_back(k.name);
-      const std::string near = cli::nearest(e.material, names);
       refuse(path_, "%s/material: /materials has no \"%s\"%s", pointer.c_str(), e.material.c_str(),
-             near.empty() ? "" : ("; did you mean \"" + near + "\"?").c_str());
+             cli::did_you_mean(e.material, names).c_str());
     }
     for (const Entry &other : out_.entries)
       if (other.name == e.name)
@@ -213,9 +211,8 @@ class Reader {
       }
       return;
     }
-    const std::string near = cli::nearest(m.name, names);
     refuse(path_, "%s: no label is a part of the body \"%s\"%s", pointer.c_str(), m.name.c_str(),
-           near.empty() ? "" : ("; did you mean \"" + near + "\"?").c_str());
+           cli::did_you_mean(m.name, names).c_str());
   }
 
   const std::string &path_;

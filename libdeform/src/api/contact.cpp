@@ -38,9 +38,8 @@ std::string group_side(World &w, const std::string &text) {
     if (!b) continue;
     const std::vector<std::string> known = groups_of(*b);
     if (std::find(known.begin(), known.end(), group) != known.end()) return text;
-    const std::string near = nearest(group, known);
     fail(DFM_E_ARG, "'%s': no triangle of the surface of '%s' is in a group '%s'%s; %s", text.c_str(),
-         name.c_str(), group.c_str(), near.empty() ? "" : (", did you mean '" + near + "'?").c_str(),
+         name.c_str(), group.c_str(), did_you_mean(group, known, '\'').c_str(),
          known.empty() ? "it has no groups" : ("groups: " + join(known)).c_str());
   }
   return {};
@@ -65,9 +64,9 @@ std::string side(World &w, const char *text, bool grouped) {
            "'%s': groups of a surface choose friction, not whether it touches; name the whole body", text);
     return found;
   }
-  const std::string near = nearest(s, {names.begin() + 1, names.end()});  // "*" is near any short name
+  const std::vector<std::string> given(names.begin() + 1, names.end());  // "*" is near any short name
   fail(DFM_E_ARG, "'%s' is not a body, obstacle or material of this world%s; known: %s", text,
-       near.empty() ? "" : (", did you mean '" + near + "'?").c_str(), join(names).c_str());
+       did_you_mean(s, given, '\'').c_str(), join(names).c_str());
 }
 
 // Whether a force acts between a and b. Contacts without force are not reported.

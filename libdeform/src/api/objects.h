@@ -4,6 +4,7 @@
 #include "api/structs.h"
 #include "core/error.h"
 #include "core/handle.h"
+#include "core/names.h"
 #include "plugin/context.h"
 #include "state/obstacle.h"
 #include "state/world.h"
@@ -59,9 +60,7 @@ uint64_t find_named(const All &all, const char *what, const char *name, Counts c
     if (x->name == name) return x->handle;
     names.push_back(x->name);
   }
-  const std::string near = nearest(name, names);
-  fail(DFM_E_ARG, "there is no %s '%s'%s", what, name,
-       near.empty() ? "" : ("; did you mean '" + near + "'?").c_str());
+  fail(DFM_E_ARG, "there is no %s '%s'%s", what, name, did_you_mean(name, names, '\'').c_str());
 }
 
 inline Obstacle &obstacle_of(dfm_obstacle h) { return part_of<Obstacle>(Kind::obstacle, h); }

@@ -124,9 +124,8 @@ void check_effects(const World &w) {
   known.erase(std::unique(known.begin(), known.end()), known.end());
   for (const char *const *word = w.def.effects; word && *word; ++word) {
     if (std::find(known.begin(), known.end(), *word) != known.end()) continue;
-    const std::string near = nearest(*word, known);
-    fail(DFM_E_ARG, "effect '%s' is asked for, but no loaded plugin provides it%s%s%s; provided: %s", *word,
-         near.empty() ? "" : ", did you mean '", near.c_str(), near.empty() ? "" : "'", join(known).c_str());
+    fail(DFM_E_ARG, "effect '%s' is asked for, but no loaded plugin provides it%s; provided: %s", *word,
+         did_you_mean(*word, known, '\'').c_str(), join(known).c_str());
   }
 }
 
@@ -433,9 +432,8 @@ dfm_status dfm_world_find_body(dfm_world world, const char *name, dfm_body *out)
     if (!b) {
       std::vector<std::string> names;
       for (auto &x : w.bodies) names.push_back(x->name);
-      const std::string near = nearest(name, names);
-      fail(DFM_E_ARG, "no body is named '%s'%s; bodies: %s", name,
-           near.empty() ? "" : (", did you mean '" + near + "'?").c_str(), join(names).c_str());
+      fail(DFM_E_ARG, "no body is named '%s'%s; bodies: %s", name, did_you_mean(name, names, '\'').c_str(),
+           join(names).c_str());
     }
     *out = b->handle;
   });

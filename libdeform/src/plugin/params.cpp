@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "core/error.h"
+#include "core/names.h"
 #include "plugin/registry.h"
 
 namespace dfm {
@@ -44,10 +45,8 @@ void check_keys(const dfm_type &type, std::span<const dfm_param_value> given) {
     for (uint32_t k = 0; k < type.nparam; ++k) known |= stands_for(type, given[i].key, type.params[k].key);
     if (!known) {
       const auto keys = keys_of(type);
-      const std::string near = nearest(given[i].key, keys);
-      fail(DFM_E_ARG, "%s has no parameter \"%s\"%s%s%s; it has %s", type.id, given[i].key,
-           near.empty() ? "" : ", did you mean \"", near.c_str(), near.empty() ? "" : "\"",
-           keys.empty() ? "none" : join(keys).c_str());
+      fail(DFM_E_ARG, "%s has no parameter \"%s\"%s; it has %s", type.id, given[i].key,
+           did_you_mean(given[i].key, keys).c_str(), keys.empty() ? "none" : join(keys).c_str());
     }
     for (size_t k = 0; k < i; ++k)
       if (std::strcmp(given[i].key, given[k].key) == 0)

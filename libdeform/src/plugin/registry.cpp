@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "core/error.h"
+#include "core/names.h"
 #include "plugin/call.h"
 #include "plugin/tables.h"
 
@@ -259,14 +260,13 @@ const dfm_type &Registry::find(uint32_t kind, std::string_view name) const {
     names.push_back(type->id);
     listed.push_back(short_name(*type));
   }
-  const std::string near = nearest(wrong, names);
   const char *what = kind_name(kind);
   if (listed.empty())
     fail(DFM_E_UNSUPPORTED,
          "no %s \"%s\": no plugin with a %s is loaded; set DEFORM_PLUGIN_PATH or see \"deform plugin list\"",
          what, wrong.c_str(), what);
-  fail(DFM_E_UNSUPPORTED, "no %s \"%s\" is loaded%s%s%s; loaded: %s", what, wrong.c_str(),
-       near.empty() ? "" : ", did you mean \"", near.c_str(), near.empty() ? "" : "\"", join(listed).c_str());
+  fail(DFM_E_UNSUPPORTED, "no %s \"%s\" is loaded%s; loaded: %s", what, wrong.c_str(),
+       did_you_mean(wrong, names).c_str(), join(listed).c_str());
 }
 
 std::vector<const dfm_type *> Registry::list(uint32_t kind) const {

@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "core/handle.h"
+#include "core/names.h"
 #include "dynamics/rigid/host.h"
 #include "plugin/context.h"
 #include "scene/back_side.h"
@@ -178,13 +179,11 @@ class Builder {
     for (uint32_t g = 0; g < mesh.ngroup; ++g)
       if (cells[g]) names.push_back(mesh.group_names[g]);
     for (const GroupMaterial &m : b.by_group) {
-      if (std::find(names.begin(), names.end(), m.group) == names.end()) {
-        const std::string near = nearest(m.group, names);
+      if (std::find(names.begin(), names.end(), m.group) == names.end())
         fail(DFM_E_ARG, "%s: %s: the mesh has no physical group of cells \"%s\"%s%s", def_.file.c_str(),
              m.pointer.c_str(), m.group.c_str(),
              names.empty() ? "; it has none at all" : ("; it has: " + join(names)).c_str(),
-             near.empty() ? "" : ("; did you mean \"" + near + "\"?").c_str());
-      }
+             did_you_mean(m.group, names).c_str());
       for (uint32_t g = 0; g < mesh.ngroup; ++g)
         if (cells[g] && m.group == mesh.group_names[g]) of_group[g] = material(m.material);
     }
@@ -455,9 +454,8 @@ class Builder {
       if (o->name == a.to) return o->handle;
       names.push_back(o->name);
     }
-    const std::string near = nearest(a.to, names);
     fail(DFM_E_ARG, "%s: %s/to: there is no body, obstacle or rigid body \"%s\"%s", def_.file.c_str(),
-         a.pointer.c_str(), a.to.c_str(), near.empty() ? "" : ("; did you mean \"" + near + "\"?").c_str());
+         a.pointer.c_str(), a.to.c_str(), did_you_mean(a.to, names).c_str());
   }
 
   void add_separation(const Body &b) const {

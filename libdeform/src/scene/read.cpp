@@ -5,6 +5,7 @@
 #include <cstring>
 #include <filesystem>
 
+#include "core/names.h"
 #include "scene/keys.h"
 #include "state/step_sizes.h"
 
@@ -174,14 +175,13 @@ const dfm_type *read_type(const Node &name, uint32_t kind, const Types &types) {
   if (const dfm_type *type = types.find(kind, wanted)) return type;
   const std::vector<std::string> loaded = types.names(kind);
   const char *what = kind == DFM_KIND_MODEL ? "model" : "law";
-  const std::string near = nearest(wanted, loaded);
+  const std::string meant = did_you_mean(wanted, loaded);
   const std::string passed = types.passed_over(wanted);
   // A name in reverse-DNS form that nothing resembles is that of a plugin in a folder of its own.
-  const bool elsewhere = near.empty() && passed.empty() && wanted.find('.') != std::string::npos;
+  const bool elsewhere = meant.empty() && passed.empty() && wanted.find('.') != std::string::npos;
   fail(DFM_E_UNSUPPORTED, "%s: %s: no loaded plugin offers the %s \"%s\"; loaded: %s%s%s%s",
        name.file().c_str(), name.pointer().c_str(), what, wanted.c_str(),
-       loaded.empty() ? "none (see: deform plugin list)" : join(loaded).c_str(),
-       near.empty() ? "" : ("; did you mean \"" + near + "\"?").c_str(),
+       loaded.empty() ? "none (see: deform plugin list)" : join(loaded).c_str(), meant.c_str(),
        passed.empty() ? "" : ("; not loaded: " + passed).c_str(),
        elsewhere ? "; set DEFORM_PLUGIN_PATH to the folder of its plugin" : "");
 }

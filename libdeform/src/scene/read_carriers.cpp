@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/names.h"
 #include "scene/keys.h"
 #include "scene/read.h"
 
@@ -23,10 +24,10 @@ void read_fields(const Node &node, const dfm_type *model, Body &b) {
     const Node value = node.member(entry.key());
     const dfm_param *row = find_row(model, entry.key());
     if (!row || !(row->flags & DFM_PARAM_PER_CELL)) {
-      const std::string near = row ? "" : nearest(entry.key(), valid);
+      const std::string meant = row ? "" : did_you_mean(entry.key(), valid);
       const std::string has = valid.empty() ? "it has none" : "it has: " + join(valid);
       value.fail("%s has no parameter \"%s\" that may differ by cell%s; %s", model->id, entry.key().c_str(),
-                 near.empty() ? "" : ("; did you mean \"" + near + "\"?").c_str(), has.c_str());
+                 meant.c_str(), has.c_str());
     }
     if (std::find(b.params.keys.begin(), b.params.keys.end(), entry.key()) != b.params.keys.end())
       value.fail("\"%s\" is given in the model's params too; keep one", entry.key().c_str());
@@ -54,12 +55,9 @@ void read_anisotropy_params(const Node &params, const dfm_type *model, Body &b) 
     const Node value = params.member(entry.key());
     const dfm_param *row = find_row(model, kPrefix + entry.key());
     if (!row) row = find_row(model, entry.key());
-    if (!row) {
-      const std::string near = nearest(entry.key(), valid);
+    if (!row)
       value.fail("%s has no anisotropy parameter \"%s\"%s; it has: %s", model->id, entry.key().c_str(),
-                 near.empty() ? "" : ("; did you mean \"" + near + "\"?").c_str(),
-                 valid.empty() ? "none" : join(valid).c_str());
-    }
+                 did_you_mean(entry.key(), valid).c_str(), valid.empty() ? "none" : join(valid).c_str());
     if (std::string(row->key) == kAxis)
       value.fail("the direction is given by \"axis\" or \"field\" beside \"params\"");
     if (std::find(b.params.keys.begin(), b.params.keys.end(), row->key) != b.params.keys.end())

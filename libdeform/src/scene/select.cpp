@@ -5,6 +5,7 @@
 #include <map>
 
 #include "core/error.h"
+#include "core/names.h"
 #include "math/vec3.h"
 #include "mesh/mesh.h"
 
@@ -63,11 +64,10 @@ uint32_t find_group(const std::string &group, const char *const *names, uint32_t
 [[noreturn]] void no_group(const Selection &where, const BodyMesh &mesh, const std::string &file) {
   std::vector<std::string> names(mesh.group_names, mesh.group_names + mesh.ngroup);
   names.insert(names.end(), mesh.skin.group_names, mesh.skin.group_names + mesh.skin.ngroup);
-  const std::string near = nearest(where.group, names);
   fail(DFM_E_ARG, "%s: %s/group: the mesh has no physical group \"%s\"%s%s", file.c_str(),
        where.pointer.c_str(), where.group.c_str(),
        names.empty() ? "; it has none at all" : ("; it has: " + join(names)).c_str(),
-       near.empty() ? "" : ("; did you mean \"" + near + "\"?").c_str());
+       did_you_mean(where.group, names).c_str());
 }
 
 // Triangles of the skin by group, or those with three corners in the box.

@@ -7,6 +7,7 @@
 
 #include "core/error.h"
 #include "core/handle.h"
+#include "core/names.h"
 #include "plugin/context.h"
 #include "plugin/params.h"
 #include "state/world.h"
@@ -91,12 +92,10 @@ std::vector<std::string> keys_by_cell(const dfm_type &type) {
   const std::vector<std::string> keys = keys_by_cell(type);
   bool row = false;
   for (uint32_t i = 0; i < type.nparam; ++i) row = row || std::strcmp(type.params[i].key, key) == 0;
-  const std::string near = row ? "" : nearest(key, keys);
+  const std::string meant = row ? ", it holds for the whole body" : did_you_mean(key, keys, '\'');
   const std::string has = keys.empty() ? "it takes no parameter by cell" : "by cell it takes: " + join(keys);
   fail(DFM_E_ARG, "body '%s': field '%s': %s has no such parameter by cell%s; %s", body.c_str(), key, type.id,
-       near.empty() ? (row ? ", it holds for the whole body" : "")
-                    : (", did you mean '" + near + "'?").c_str(),
-       has.c_str());
+       meant.c_str(), has.c_str());
 }
 
 void check_field_values(const dfm_param &row, const dfm_cell_field &f, uint32_t ntet,

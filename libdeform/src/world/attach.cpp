@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/names.h"
 #include "state/world.h"
 #include "step/attach.h"
 #include "step/energy_watch.h"
@@ -52,11 +53,9 @@ std::vector<uint8_t> selected(const Body &b, const dfm_attach_def &def) {
         if (b.zones.of.empty() || b.zones.of[t] == z)
           for (size_t k = 0; k < 3; ++k) out[s.tri[3 * size_t{t} + k]] = 1;
     }
-    if (!known) {
-      const std::string near = nearest(def.group, groups);
+    if (!known)
       fail(DFM_E_ARG, "the surface of body '%s' has no group '%s'%s", name, def.group,
-           near.empty() ? "" : ("; did you mean '" + near + "'?").c_str());
-    }
+           did_you_mean(def.group, groups, '\'').c_str());
   }
   for (uint32_t i = 0; def.box && i < s.nsurfel; ++i) {
     const Vec3 x = surfel_vector(b, b.p.x, i);

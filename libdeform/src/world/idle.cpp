@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "core/error.h"
+#include "core/names.h"
 #include "plugin/context.h"
 #include "state/world.h"
 
@@ -30,8 +31,7 @@ std::string meant(const Body &b, const std::string &key) {
     if (has_row(*model, key)) return {};
   std::vector<std::string> known = {"density", "friction", kTearKey, kToughnessKey};
   for (uint32_t i = 0; i < b.model.type->nparam; ++i) known.push_back(b.model.type->params[i].key);
-  const std::string near = nearest(key, known);
-  return near.empty() ? "" : ", did you mean '" + near + "'?";
+  return did_you_mean(key, known, '\'');
 }
 
 const CellField *field_of(const Body &b, const char *key) {

@@ -5,6 +5,7 @@
 #include <mutex>
 
 #include "core/error.h"
+#include "core/names.h"
 #include "dynamics/rigid/tool_host.h"
 #include "deform/obstacle.h"
 
@@ -46,10 +47,8 @@ dfm_rigid_host find_host(const std::string &name) {
   if (found != all.tables.end()) return found->second;
   std::vector<std::string> names{"builtin"};
   for (const auto &[known, table] : all.tables) names.push_back(known);
-  const std::string near = nearest(name, names);
   fail(DFM_E_ARG, "no rigid host '%s' is registered%s; there %s: %s", name.c_str(),
-       near.empty() ? "" : (", did you mean '" + near + "'?").c_str(), names.size() == 1 ? "is" : "are",
-       join(names).c_str());
+       did_you_mean(name, names, '\'').c_str(), names.size() == 1 ? "is" : "are", join(names).c_str());
 }
 
 double solid_volume(const dfm_rigid_def &d) {
