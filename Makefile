@@ -2,14 +2,17 @@
 # and runs; a second call installs and rebuilds nothing. The rest is for those who work on the library.
 PREFIX ?= /usr/local
 SCENE ?= examples/scenes/two_cylinders.json
+# How many compilers or tests run at a time; a compiler needs half a gigabyte of memory.
 JOBS ?= $(shell nproc)
 # What bench-peers runs: all or quick
 PEERS ?= all
-SETUP = @cmake/setup.sh
-BUILD = @cmake --build --preset
+SETUP = @cmake/fresh.sh && cmake/setup.sh
+BUILD = @cmake --build -j $(JOBS) --preset
 # The set-up's own, as in cmake/DeformPython.cmake.
 PYTHON ?= $(firstword $(wildcard /usr/bin/python3) python3)
 
+# The doors share build folders: `make -j demo test` runs one after the other. JOBS is for the compilers.
+.NOTPARALLEL:
 .PHONY: help demo test bench soak lint format tidy asan tsan fuzz install clean setup setup-bench setup-fuzz
 .PHONY: view bench-peers deb docs setup-docs setup-peers wheel
 

@@ -62,7 +62,7 @@ def table(runs):
             ("creep of holding contacts (um/s)", lambda r: "none hold" if r["creep_um_per_s"] is None
              else f"{r['creep_um_per_s']:.3g}"),
             ("crossing triangle pairs", lambda r: str(r["intersections_max"])),
-            ("steps per second", lambda r: f"{r['steps_per_second']:.0f}")]
+            ("steps per second, median", lambda r: f"{r['steps_per_second']:.0f}")]
     print()
     print(f"{'':34}" + "".join(f"{label:>24}" for label in runs))
     for name, cell in rows:
