@@ -1,6 +1,7 @@
 #!/bin/sh
-# fresh.sh -- lets the doors configure again where CMake would refuse to go on: a build folder that was configured
-# for another source folder (the tree was moved or copied) or by another generator than Ninja. Objects stay.
+# fresh.sh -- lets the doors configure again where CMake would refuse to continue: in a build folder that was
+# configured for another source folder (the tree was moved or copied) or by another generator than Ninja.
+# Objects stay.
 set -eu
 cd "$(dirname "$0")/.."
 for name in release bench fuzz asan tsan; do
