@@ -1,4 +1,7 @@
 """Worlds from arrays, steps, errors, ends, threads."""
+import gc
+import os
+import signal
 import subprocess
 import sys
 import textwrap
@@ -317,6 +320,30 @@ class Threads(unittest.TestCase):
         work(4)
         self.assertEqual(len(hashes), 5)
         self.assertEqual(len(set(hashes.values())), 1)
+
+    @unittest.skipUnless(hasattr(os, "fork"), "this system has no fork")
+    def test_a_child_of_fork_steps_and_ends(self):
+        """The child, as multiprocessing makes it on Linux, has no thread of the pool, and waited for them for
+        ever."""
+        def made(threads):
+            world = deform.World(threads=threads)
+            world.add_obstacle("plane")
+            world.add_body(deform.TetMesh.ball(0.1, cells=3000), position=(0, 0, 0.1))
+            world.step(1e-3)
+            return world
+        world, alone = made(3), made(1)
+        alone.step(1e-3)
+        child = os.fork()
+        if child == 0:
+            signal.alarm(30)
+            world.step(1e-3)
+            same = world.hash == alone.hash
+            del world
+            gc.collect()
+            os._exit(0 if same else 1)
+        self.assertEqual(os.waitpid(child, 0)[1], 0)
+        world.step(1e-3)
+        self.assertEqual(world.hash, alone.hash)
 
     def test_threads_of_a_world_do_not_change_its_bits(self):
         hashes = set()

@@ -13,6 +13,7 @@
 #endif
 
 #include "core/float_env.h"
+#include "core/forks.h"
 #include "core/tasks.h"
 
 namespace dfm {
@@ -68,6 +69,7 @@ struct Aside::Room {
   std::deque<std::shared_ptr<Job>> jobs;
   bool stop = false;
   std::thread thread;
+  const uint32_t of_process = forks();  // whose thread it is
 
   void work() {
     take_what_is_left();
@@ -101,6 +103,10 @@ struct Aside::Room {
 Aside::Aside() : room_(std::make_unique<Room>()) {}
 
 Aside::~Aside() {
+  if (room_->of_process != forks()) {  // the thread cannot be joined, nor what it waits for destroyed
+    (void)room_.release();
+    return;
+  }
   {
     const std::lock_guard lock(room_->mutex);
     room_->stop = true;
@@ -110,6 +116,7 @@ Aside::~Aside() {
 }
 
 void Aside::start(std::shared_ptr<Job> job) noexcept {
+  if (room_->of_process != forks()) return;
   try {
     if (!room_->thread.joinable()) room_->thread = std::thread([this] { room_->work(); });
     {

@@ -23,7 +23,8 @@ class Aside {
 
   Aside();
   ~Aside();  // waits for the job that runs; the others are dropped
-  // The job does not begin if no thread can be made, or if the thread is suspended while it holds the list.
+  // The job does not begin if no thread can be made, if the thread is suspended while it holds the list, or
+  // in a child of fork(), where the thread is not.
   void start(std::shared_ptr<Job> job) noexcept;
   // Waits for it while it runs: as long as the thread has a core for half of each `patience`, since what is
   // left takes less than the whole would, and otherwise for one. false: it is not done; it will not begin,

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/float_env.h"
+#include "core/forks.h"
 
 namespace dfm {
 namespace {
@@ -80,9 +81,10 @@ struct Tasks::Pool {
   // number of the job, whether it is open, number of workers inside; the job is written before it opens
   std::atomic<uint64_t> gate{0};
   std::atomic<bool> stop{false};
-  std::atomic<bool> waiting{false};   // the owner is in done
-  std::atomic<uint32_t> stepping{0};  // number of worlds in a step
-  bool crowded = false;               // one processor: a spinning thread would keep the other from working
+  std::atomic<bool> waiting{false};     // the owner is in done
+  std::atomic<uint32_t> stepping{0};    // number of worlds in a step
+  const uint32_t of_process = forks();  // whose threads they are
+  bool crowded = false;                 // one processor: a spinning thread would keep the other from working
 
   struct alignas(64) Run {  // of blocks; each has its own cache line
     std::atomic<uint32_t> next{0};
@@ -214,7 +216,10 @@ Tasks::Tasks(uint32_t threads, HostFor host_for, void *host_user)
     pool_->workers.emplace_back([pool = pool_.get(), i] { pool->work(i); });
 }
 
-Tasks::~Tasks() = default;
+// In a child of fork() the workers cannot be joined, and a condition that they wait for cannot be destroyed.
+Tasks::~Tasks() {
+  if (pool_ && pool_->of_process != forks()) (void)pool_.release();
+}
 
 void Tasks::run(uint32_t n, uint32_t grain, void (*fn)(void *, uint32_t, uint32_t), void *task) {
   grain = std::max(1u, grain);
@@ -229,6 +234,10 @@ void Tasks::run(uint32_t n, uint32_t grain, void (*fn)(void *, uint32_t, uint32_
     return;
   }
   Pool &pool = *pool_;
+  if (pool.of_process != forks()) {  // a worker may have held a lock when the process was forked
+    fn(task, 0, n);
+    return;
+  }
   const std::unique_lock own(pool.taken, std::try_to_lock);
   if (!own) {  // results do not depend on the division, so this thread does the work instead of waiting
     fn(task, 0, n);

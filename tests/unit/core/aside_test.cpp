@@ -2,6 +2,10 @@
 #include "core/aside.h"
 
 #include <gtest/gtest.h>
+#if defined(__unix__)
+#include <sys/wait.h>
+#include <unistd.h>
+#endif
 #include <time.h>
 
 #include <atomic>
@@ -86,6 +90,32 @@ TEST(Aside, JobThatRuns_IsWaitedFor) {
   if (!done) {
     EXPECT_LT(did, time.count() - 4e-4);
   }
+}
+#endif
+
+#if defined(__unix__)
+// The child has the list, but not the thread: it does the job itself, and ends.
+TEST(Aside, InAChildOfFork_BeginsNothingAndIsNotWaitedFor) {
+  const auto first = std::make_shared<Waits>();
+  dfm::Aside *aside = new dfm::Aside;
+  aside->start(first);
+  while (!first->begun) std::this_thread::sleep_for(1ms);
+  first->end = true;
+  while (!aside->finish(first, 1s)) {}
+  const pid_t child = fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    alarm(10);  // ends a child that waits for what is not there
+    const auto job = std::make_shared<Waits>();
+    aside->start(job);
+    const bool done = aside->finish(job, 1ms);
+    delete aside;
+    _exit(done || job->begun ? 1 : 0);
+  }
+  int status = -1;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  EXPECT_EQ(status, 0);
+  delete aside;
 }
 #endif
 

@@ -1,10 +1,15 @@
 #include "core/tasks.h"
 
 #include <gtest/gtest.h>
+#if defined(__unix__)
+#include <sys/wait.h>
+#include <unistd.h>
+#endif
 
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <memory>
 #include <mutex>
 #include <random>
 #include <set>
@@ -54,6 +59,33 @@ TEST(Tasks, AJobWithinAJobOnFourThreads_RunsOnTheCallingThread) {
   });
   EXPECT_EQ(other, 0);
 }
+
+#if defined(__unix__)
+// The child has the pool, but none of its threads.
+TEST(Tasks, InAChildOfFork_RunsAndEndsWithoutWorkers) {
+  auto tasks = std::make_unique<Tasks>(3, nullptr, nullptr);
+  for (const int pause : {0, 50, 1000}) {  // workers spin, fall asleep, sleep
+    expect_once(*tasks, 50, 1, "in the parent");
+    std::this_thread::sleep_for(std::chrono::microseconds(pause));
+    const pid_t child = fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) {
+      alarm(10);  // ends a child that waits for what is not there
+      uint32_t sum = 0;
+      const auto owner = std::this_thread::get_id();
+      tasks->parallel_for(50, 1, [&](uint32_t begin, uint32_t end) {
+        sum += std::this_thread::get_id() == owner ? end - begin : 1000;
+      });
+      tasks.reset();
+      _exit(sum == 50 ? 0 : 1);
+    }
+    int status = -1;
+    ASSERT_EQ(waitpid(child, &status, 0), child);
+    EXPECT_EQ(status, 0) << "pause " << pause << " us";
+  }
+  expect_once(*tasks, 50, 1, "in the parent, afterwards");
+}
+#endif
 
 TEST(Tasks, TwoOwnersOnTwoThreads_DoNotDisturbEachOther) {
   Tasks tasks(3, nullptr, nullptr);
