@@ -29,6 +29,12 @@ struct PointsKernels {
   uint32_t (*inverted)(uint32_t n, const uint32_t *cells, const double *x);
   // of the boxes around cells [n,4], the largest diagonal, squared
   double (*largest_box)(uint32_t n, const uint32_t *cells, const double *x);
+  // the least and the largest component of n points, n > 0
+  void (*bounds)(uint32_t n, const double *x, double low[4], double high[4]);
+  // out [n,4]: the middles of the cells [n] of tets [..,4]
+  void (*middles)(uint32_t n, const uint32_t *cells, const uint32_t *tets, const double *x, double *out);
+  // of pairs [n,2] of points, the largest distance, squared
+  double (*farthest)(uint32_t n, const uint32_t *pairs, const double *x);
   // of edges [n,2] d between points at x that move at v: the largest |d.(v_j - v_i)| / d.d, 1/s
   double (*strain_rate)(uint32_t n, const uint32_t *edges, const double *x, const double *v);
 };

@@ -177,6 +177,50 @@ double largest_box(uint32_t n, const uint32_t *cells, const double *x) {
   return most;
 }
 
+void bounds(uint32_t n, const double *x, double low[4], double high[4]) {
+  DEFORM_UNROLL
+  for (uint32_t p = 0; p < kParts; ++p) {
+    Vector least = load(x + p * kWidth), most = least;
+    for (uint32_t i = 1; i < n; ++i) {
+      const Vector at = load(x + 4 * size_t(i) + p * kWidth);
+      least = at < least ? at : least;
+      most = most < at ? at : most;
+    }
+    store(low + p * kWidth, least);
+    store(high + p * kWidth, most);
+  }
+}
+
+void middles(uint32_t n, const uint32_t *cells, const uint32_t *tets, const double *x, double *out) {
+  const Vector quarter = splat(0.25);
+  for (uint32_t c = 0; c < n; ++c, out += 4) {
+    const uint32_t *const corner = tets + 4 * size_t(cells[c]);
+    DEFORM_UNROLL
+    for (uint32_t p = 0; p < kParts; ++p) {
+      const auto at = [&](uint32_t k) __attribute__((always_inline)) {
+        return load(x + 4 * size_t(corner[k]) + p * kWidth);
+      };
+      store(out + p * kWidth, quarter * ((at(0) + at(1)) + (at(2) + at(3))));
+    }
+  }
+}
+
+double farthest(uint32_t n, const uint32_t *pairs, const double *x) {
+  Vector most = {};
+  each_lane(n, [&](const auto &pair, Mask) __attribute__((always_inline)) {
+    const auto end = [&](uint32_t side) __attribute__((always_inline)) {
+      return [=](uint32_t k)
+                 __attribute__((always_inline)) { return x + 4 * size_t(pairs[2 * pair(k) + side]); };
+    };
+    const auto d = differences(end(0), end(1));
+    const Vector square = dot(d, d);
+    most = square > most ? square : most;
+  });
+  double out = 0;
+  for (uint32_t k = 0; k < kWidth; ++k) out = most[k] > out ? most[k] : out;
+  return out;
+}
+
 double strain_rate(uint32_t n, const uint32_t *edges, const double *x, const double *v) {
   Vector most = {};
   each_lane(n, [&](const auto &edge, Mask) __attribute__((always_inline)) {
@@ -194,7 +238,8 @@ double strain_rate(uint32_t n, const uint32_t *edges, const double *x, const dou
   return out;
 }
 
-constexpr PointsKernels kKernels = {predict, predict_part, end, inverted, largest_box, strain_rate};
+constexpr PointsKernels kKernels = {predict, predict_part, end,      inverted,   largest_box,
+                                    bounds,  middles,      farthest, strain_rate};
 
 }  // namespace
 }  // namespace dfm

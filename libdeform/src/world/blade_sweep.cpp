@@ -35,11 +35,6 @@ constexpr double kKept = 2;
 // skipped
 constexpr double kBegun = 1e-3, kReach = 8;
 
-Vec3 middle_of(const Body &b, const double *x, uint32_t cell) {
-  const auto at = [&](size_t k) { return load3(x + size_t{kStride} * b.tets[size_t{4} * cell + k]); };
-  return 0.25 * ((at(0) + at(1)) + (at(2) + at(3)));
-}
-
 // The motion of the line from a to b: the smallest rotation, and a scale.
 class LineMotion {
  public:
@@ -127,14 +122,12 @@ BladeSweep::BladeSweep(Body &b, const CutShape &blade, const Vec3 *forward) : bl
   if (forward) strip_ = b.surface.median_edge;
   find_near(b);
   const bool looks = turn(b, forward);
-  if (near_.empty()) return;
+  if (!near()) return;
   if (b.inner.empty()) b.inner = inner_faces(b);
   find_faces(b);
-  const bool still = std::all_of(near_.begin(), near_.end(), [](const Near &n) {
-    return n.was.x == n.is.x && n.was.y == n.is.y && n.was.z == n.is.z;
-  });
+  kind_.assign(cells_.size(), SideKind::none);
   if (looks) take_sides(track);
-  if (looks || !forward) compare(b, !forward && (fresh_ || still));
+  if (looks || !forward) compare(b, !forward && (fresh_ || still()));
   std::sort(faces.begin(), faces.end());
 }
 
@@ -158,10 +151,6 @@ Four four_at(const double *x) {
   std::memcpy(&out, x, sizeof out);
   return out;
 }
-Pair least(Pair a, Pair b) { return b < a ? b : a; }
-Pair most(Pair a, Pair b) { return a < b ? b : a; }
-Four least(Four a, Four b) { return {least(a.xy, b.xy), least(a.z, b.z)}; }
-Four most(Four a, Four b) { return {most(a.xy, b.xy), most(a.z, b.z)}; }
 
 // On which sides of a box that is `reach` larger a point lies: one bit for beyond its high and one for below
 // its low end, by axis. A cell whose points have a bit in common does not meet the box.
@@ -189,45 +178,55 @@ class Beyond {
 // is done for all cells of the body is little.
 void BladeSweep::find_near(const Body &b) {
   const double *const before = track_ < b.blades.size() ? b.blades[track_].x.data() : b.p.x.data();
+  const double *const now = b.p.x.data();
+  const PointsKernels &kernels = points_kernels();
   Extent way, whole;
   for (const Vec3 c : blade_.corner) way.add(c);
-  Four lo = four_at(before), hi = lo;
-  for (uint32_t i = 0; i < b.p.n; ++i)
-    for (const double *all : {before, b.p.x.data()}) {
-      const Four x = four_at(all + size_t{kStride} * i);
-      lo = least(lo, x);
-      hi = most(hi, x);
-    }
-  whole.add({lo.xy[0], lo.xy[1], lo.z[0]});
-  whole.add({hi.xy[0], hi.xy[1], hi.z[0]});
+  for (const double *const x : {before, now}) {
+    double low[kStride], high[kStride];
+    kernels.bounds(b.p.n, x, low, high);
+    whole.add(load3(low));
+    whole.add(load3(high));
+  }
   if (!way.meets(whole, kReach * b.surface.median_edge)) return;
   // of the diagonal of the largest box around a cell
-  const double reach =
-      kKept * std::sqrt(points_kernels().largest_box(b.ncell(), b.tets.data(), b.p.x.data()));
+  const double reach = kKept * std::sqrt(kernels.largest_box(b.ncell(), b.tets.data(), now));
   const Beyond beyond(way, reach);
   std::vector<uint8_t> side(b.p.n);
-  const double *const now = b.p.x.data();
   for (uint32_t i = 0; i < b.p.n; ++i)
     side[i] = beyond(before + size_t{kStride} * i) & beyond(now + size_t{kStride} * i);
-  std::vector<uint32_t> cells(b.ncell());
-  size_t n = 0;
+  cells_.resize(b.ncell());
+  place_.resize(b.ncell());
+  uint32_t n = 0;
   const uint32_t *p = b.tets.data();
   for (uint32_t c = 0; c < b.ncell(); ++c, p += 4) {
-    cells[n] = c;
-    n += (side[p[0]] & side[p[1]] & side[p[2]] & side[p[3]]) == 0;
+    const bool is_near = (side[p[0]] & side[p[1]] & side[p[2]] & side[p[3]]) == 0;
+    cells_[n] = c;
+    place_[c] = is_near ? n : kNone;
+    n += is_near;
   }
-  near_.reserve(n);
-  for (size_t k = 0; k < n; ++k) {
-    const uint32_t c = cells[k];
-    const BladeSide none{c, SideKind::none, 0, 0, 0};
-    near_.push_back({c, middle_of(b, before, c), middle_of(b, now, c), 0, none});
-  }
+  cells_.resize(n);
+  was_ = std::make_unique_for_overwrite<double[]>(size_t{kStride} * n);
+  is_ = std::make_unique_for_overwrite<double[]>(size_t{kStride} * n);
+  kernels.middles(n, cells_.data(), b.tets.data(), before, was_.get());
+  kernels.middles(n, cells_.data(), b.tets.data(), now, is_.get());
+}
+
+bool BladeSweep::still() const {
+  for (size_t i = 0; i < kStride * cells_.size(); i += kStride)
+    for (size_t k = i; k < i + 3; ++k)
+      if (was_[k] != is_[k]) return false;
+  return true;
 }
 
 // The blade's forward direction. Returns false if it is unknown.
 bool BladeSweep::turn(const Body &b, const Vec3 *forward) {
   const Vec3 *const c = blade_.corner;
-  for (const Near &n : near_) drift_ += (1 / double(near_.size())) * (n.is - n.was);
+  const double share = 1 / double(cells_.size());
+  Vec3 drift;
+  for (size_t i = 0; i < kStride * cells_.size(); i += kStride)
+    drift += share * (load3(&is_[i]) - load3(&was_[i]));
+  drift_ = drift;
   Vec3 looks[2];
   if (forward) {
     std::copy_n(forward, 2, looks);
@@ -251,101 +250,112 @@ bool BladeSweep::turn(const Body &b, const Vec3 *forward) {
 }
 
 void BladeSweep::find_faces(const Body &b) {
-  std::vector<uint8_t> is_near(b.ncell());  // small, as each face reads two
-  std::vector<uint32_t> place(b.ncell());
-  for (size_t i = 0; i < near_.size(); ++i) {
-    is_near[near_[i].cell] = 1;
-    place[near_[i].cell] = uint32_t(i);
-  }
-  pairs_.reserve(2 * near_.size());  // a cell has four faces, a face two cells
-  double apart2 = 0;
-  for (const uint32_t *k = b.inner.data(), *const end = k + b.inner.size(); k != end; k += 2) {
-    if (!(is_near[k[0]] & is_near[k[1]])) continue;
+  const size_t n = b.inner.size() / 2;
+  // a cell has four faces, a face two cells; and one more, which is written before it is known
+  pairs_ = std::make_unique_for_overwrite<Face[]>(2 * cells_.size() + 1);
+  const uint32_t *k = b.inner.data();
+  const uint32_t *const place = place_.data();
+  Face *to = pairs_.get();
+  for (size_t f = 0; f < n; ++f, k += 2) {
     const uint32_t i = place[k[0]], j = place[k[1]];
-    apart2 = std::max(apart2, norm2(near_[i].is - near_[j].is));
-    pairs_.push_back({i, j});
+    *to = {i, j};
+    to += int32_t(i | j) >= 0;  // none is kNone
   }
-  apart_ = std::sqrt(apart2);
+  npair_ = uint32_t(to - pairs_.get());
+  static_assert(sizeof(Face) == 2 * sizeof(uint32_t));
+  apart_ = std::sqrt(points_kernels().farthest(npair_, &pairs_[0].i, is_.get()));
 }
 
+// Few cells are at the edge, so of the others no more is found than that they are not.
 void BladeSweep::take_sides(const BladeTrack *track) {
-  if (track && !fresh_) {
-    size_t k = 0;
-    for (Near &n : near_) {
-      while (k < track->sides.size() && track->sides[k].cell < n.cell) ++k;
-      if (k < track->sides.size() && track->sides[k].cell == n.cell) n.side = track->sides[k];
-    }
-  }
-  struct Place { double along, ahead, off; };
-  const auto place = [](const Frame &f, Vec3 x) {
-    const Vec3 r = x - f.origin;
-    return Place{dot(r, f.along) / f.length, dot(r, f.forward), dot(r, f.normal)};
-  };
+  const size_t n = cells_.size();
+  ahead_ = std::make_unique_for_overwrite<double[]>(n);
+  sides_ = std::make_unique_for_overwrite<BladeSide[]>(n);
+  if (track && !fresh_)
+    for (const BladeSide &side : track->sides)
+      if (side.cell < place_.size() && place_[side.cell] != kNone) {
+        const uint32_t i = place_[side.cell];
+        kind_[i] = side.kind;
+        sides_[i] = side;
+      }
+  const Frame from = from_, to = to_;
   const double far = kKept * apart_;
-  for (Near &n : near_) {
-    const Place was = place(from_, n.was), is = place(to_, n.is);
-    BladeSide &side = n.side;
-    n.ahead = is.ahead;
-    if (side.kind == SideKind::passed || side.kind == SideKind::behind) continue;
-    const bool was_ahead = was.ahead > 0 || side.kind == SideKind::ahead;
-    if (is.ahead > 0) {
-      const double way = between(way_, is.along) + between(step_, is.along) + is.ahead;
-      side = {n.cell, SideKind::ahead, is.along, way, is.off};
-    } else if (was_ahead) {
-      const double share = was.ahead > 0 ? was.ahead / (was.ahead - is.ahead) : 0;
-      const double along = was.along + share * (is.along - was.along);
-      const double way = between(way_, along) + share * between(step_, along);
-      side = {n.cell, SideKind::passed, along, way, was.off + share * (is.off - was.off)};
-    } else if (fresh_ && -was.ahead < far) {
-      side = {n.cell, SideKind::behind, was.along, was.ahead, was.off};
-    } else {
-      side.kind = SideKind::none;
+  const auto along = [](const Frame &f, Vec3 r) { return dot(r, f.along) / f.length; };
+  for (size_t i = 0; i < n; ++i) {
+    const Vec3 is = load3(&is_[kStride * i]) - to.origin;
+    const double ahead = ahead_[i] = dot(is, to.forward);
+    SideKind &kind = kind_[i];
+    if (kind == SideKind::passed || kind == SideKind::behind) continue;
+    BladeSide &side = sides_[i];
+    const double off = dot(is, to.normal);
+    const uint32_t cell = cells_[i];
+    if (ahead > 0) {
+      kind = SideKind::none;
+      if (std::fabs(off) > far) continue;
+      const double is_along = along(to, is);
+      const double way = between(way_, is_along) + between(step_, is_along) + ahead;
+      side = {cell, kind = SideKind::ahead, is_along, way, off};
+      continue;
     }
-    if (std::fabs(side.off) > far) side.kind = SideKind::none;
+    const Vec3 was = load3(&was_[kStride * i]) - from.origin;
+    const double was_ahead = dot(was, from.forward), was_off = dot(was, from.normal);
+    if (was_ahead > 0 || kind == SideKind::ahead) {
+      const double was_along = along(from, was);
+      const double share = was_ahead > 0 ? was_ahead / (was_ahead - ahead) : 0;
+      const double at = was_along + share * (along(to, is) - was_along);
+      const double way = between(way_, at) + share * between(step_, at);
+      side = {cell, kind = SideKind::passed, at, way, was_off + share * (off - was_off)};
+    } else if (fresh_ && -was_ahead < far) {
+      side = {cell, kind = SideKind::behind, along(from, was), was_ahead, was_off};
+    }
+    if (kind != SideKind::none && std::fabs(side.off) > far) kind = SideKind::none;
   }
   for (int k = 0; k < 2; ++k) way_[k] += step_[k];
 }
 
 // by_shape: where the body has not moved, or nothing is known of it, the blade's quadrilateral decides.
 void BladeSweep::compare(const Body &b, bool by_shape) {
+  const auto was = [&](uint32_t i) { return load3(&was_[size_t{kStride} * i]); };
+  const auto is = [&](uint32_t i) { return load3(&is_[size_t{kStride} * i]); };
   const auto add = [&](const Face &f, Vec3 across, Vec3 way, double along) {
-    const Near &i = near_[f.i], &j = near_[f.j];
+    const uint32_t i = cells_[f.i], j = cells_[f.j];
     // of the face as the blade sees it: together they are the area that it has passed over, however rough
-    const double area = dot(area_between(b, i.cell, j.cell, j.is - i.is), across);
-    const double energy = 0.5 * (toughness(b, i.cell) + toughness(b, j.cell));
-    faces.push_back({dot(way, i.is + j.is), open_face(i.cell, j.cell), energy * area, way, along});
+    const double area = dot(area_between(b, i, j, is(f.j) - is(f.i)), across);
+    const double energy = 0.5 * (toughness(b, i) + toughness(b, j));
+    faces.push_back({dot(way, is(f.i) + is(f.j)), open_face(i, j), energy * area, way, along});
   };
-  const bool begins = strip_ > 0 && std::max(way_[0], way_[1]) > kBegun * strip_;
-  const auto passed = [&](const BladeSide &s) {
-    return s.kind == SideKind::passed || (begins && s.kind == SideKind::behind);
-  };
-  for (const Face &f : pairs_) {
-    Near &i = near_[f.i], &j = near_[f.j];
-    if (by_shape) {
+  if (by_shape) {
+    for (const Face &f : pairs()) {
       CutShape own = blade_;
-      const LineMotion moves(i.was, j.was, i.is, j.is);
+      const LineMotion moves(was(f.i), was(f.j), is(f.i), is(f.j));
       for (int k = 0; k < 2; ++k) own.corner[k] = moves(blade_.corner[k]);
-      if (!crosses_blade(own, i.is, j.is) || is_open(b, i.cell, j.cell)) continue;
+      if (!crosses_blade(own, is(f.i), is(f.j)) || is_open(b, cells_[f.i], cells_[f.j])) continue;
       const Vec3 *const c = own.corner;
-      const Vec3 across = normalized(cross(c[2] - c[0], c[3] - c[1]));
-      add(f, dot(across, j.is - i.is) < 0 ? -across : across, 0.5 * ((c[3] - c[0]) + (c[2] - c[1])), 0.5);
-      continue;
+      const Vec3 across = normalized(cross(c[2] - c[0], c[3] - c[1])), way = is(f.j) - is(f.i);
+      add(f, dot(across, way) < 0 ? -across : across, 0.5 * ((c[3] - c[0]) + (c[2] - c[1])), 0.5);
     }
-    BladeSide &a = i.side, &o = j.side;
-    if (a.kind == SideKind::none || o.kind == SideKind::none || !(passed(a) || passed(o)) ||
-        (a.off < 0) == (o.off < 0))
-      continue;
+    return;
+  }
+  const bool begins = strip_ > 0 && std::max(way_[0], way_[1]) > kBegun * strip_;
+  const auto passed = [&](SideKind kind) {
+    return kind == SideKind::passed || (begins && kind == SideKind::behind);
+  };
+  for (const Face &f : pairs()) {
+    SideKind &kind_a = kind_[f.i], &kind_o = kind_[f.j];
+    if (kind_a == SideKind::none || kind_o == SideKind::none) continue;
+    const BladeSide &a = sides_[f.i], &o = sides_[f.j];
+    if (!(passed(kind_a) || passed(kind_o)) || (a.off < 0) == (o.off < 0)) continue;
     const double share = std::fabs(a.off) / (std::fabs(a.off) + std::fabs(o.off));
     const auto at = [&](double of_a, double of_o) { return of_a + share * (of_o - of_a); };
     const double along = at(a.along, o.along);
     if (!(along >= 0 && along <= 1) || at(a.way, o.way) < -strip_) continue;
-    if (!(passed(a) && passed(o)) && at(i.ahead, j.ahead) > 0) continue;
-    if (is_open(b, i.cell, j.cell)) continue;  // last: few faces come so far
-    for (BladeSide *s : {&a, &o})
-      if (s->kind == SideKind::ahead) s->kind = SideKind::passed;  // its side is settled by now
+    if (!(passed(kind_a) && passed(kind_o)) && at(ahead_[f.i], ahead_[f.j]) > 0) continue;
+    if (is_open(b, cells_[f.i], cells_[f.j])) continue;  // last: few faces come so far
+    for (SideKind *kind : {&kind_a, &kind_o})
+      if (*kind == SideKind::ahead) *kind = SideKind::passed;  // its side is settled by now
     const Vec3 *const c = blade_.corner;
     const Vec3 of_edge = (1 - along) * (c[3] - c[0]) + along * (c[2] - c[1]);
-    const Vec3 way = of_edge - 0.5 * (i.is - i.was + j.is - j.was);
+    const Vec3 way = of_edge - 0.5 * (is(f.i) - was(f.i) + is(f.j) - was(f.j));
     add(f, o.off < a.off ? -to_.normal : to_.normal, way, along);
     faces.back().order = at(a.way, o.way);
   }
@@ -374,12 +384,15 @@ BladeTrack &BladeSweep::keep(Body &b) {
   std::copy_n(way_, 2, t.way);
   t.sides.clear();
   const double far = kKept * apart_;
-  for (const Near &n : near_) {
-    const bool settled = n.side.kind == SideKind::passed || n.side.kind == SideKind::behind;
-    const double off = to_.length > 0 ? dot(n.is - to_.origin, to_.normal) : 0;
-    if (n.side.kind == SideKind::none || n.ahead < -far || std::fabs(off) > far) continue;
-    if (settled && n.ahead > apart_) continue;  // drawn back from
-    t.sides.push_back(n.side);
+  for (size_t i = 0; i < kind_.size(); ++i) {
+    const SideKind kind = kind_[i];
+    if (kind == SideKind::none || ahead_[i] < -far) continue;
+    const double off = to_.length > 0 ? dot(load3(&is_[kStride * i]) - to_.origin, to_.normal) : 0;
+    if (std::fabs(off) > far) continue;
+    const bool settled = kind == SideKind::passed || kind == SideKind::behind;
+    if (settled && ahead_[i] > apart_) continue;  // drawn back from
+    t.sides.push_back(sides_[i]);
+    t.sides.back().kind = kind;
   }
   return t;
 }

@@ -1,5 +1,7 @@
 // Faces between cells that a moving edge passes, while the body moves too.
 #pragma once
+#include <memory>
+#include <span>
 #include <vector>
 
 #include "geometry/cut_shape.h"
@@ -28,8 +30,8 @@ class BladeSweep {
   BladeSweep(Body &b, const CutShape &blade, const Vec3 *forward);
   // In the order in which the edge meets them; none of them is open.
   std::vector<SweptFace> faces;
-  bool goes_on(const BladeTrack &track) const;  // does it begin where this one has come to?
-  bool near() const { return !near_.empty(); }  // is the body?
+  bool goes_on(const BladeTrack &track) const;   // does it begin where this one has come to?
+  bool near() const { return !cells_.empty(); }  // is the body?
   // J, zero or more: opening the first n of the faces. Faces of a rough cut count as the blade sees
   // them, with a sign: the sum over a cut is what the blade has passed over, but on the way it may fall. What
   // a cut has taken is the largest sum so far, so that none gives energy back. To be asked once, before
@@ -39,11 +41,15 @@ class BladeSweep {
   BladeTrack &keep(Body &b);
 
  private:
+  struct Face { uint32_t i, j; };  // of cells_
+
   void find_near(const Body &b);
   bool turn(const Body &b, const Vec3 *forward);
   void find_faces(const Body &b);
   void take_sides(const BladeTrack *track);
   void compare(const Body &b, bool by_shape);
+  bool still() const;
+  std::span<const Face> pairs() const { return {pairs_.get(), npair_}; }
 
   struct Frame {
     Vec3 origin, along, forward, normal;
@@ -51,19 +57,19 @@ class BladeSweep {
     Frame() = default;
     Frame(Vec3 a, Vec3 b, Vec3 towards);
   };
-  struct Near {
-    uint32_t cell;
-    Vec3 was, is;      // its middle
-    double ahead = 0;  // m, of the edge now
-    BladeSide side{};
-  };
-  struct Face { uint32_t i, j; };  // of near_
 
   CutShape blade_;
   size_t track_;
   bool fresh_ = true;
-  std::vector<Near> near_;
-  std::vector<Face> pairs_;
+  // Of the cells near the edge, ascending. There may be thousands, and few are at the edge: what is looked at
+  // for all of them is little, and together in memory.
+  std::vector<uint32_t> cells_, place_;  // place_ [ncell]: of each cell in cells_, or kNone
+  std::unique_ptr<double[]> was_, is_;   // [cells_,4] m, their middles
+  std::unique_ptr<double[]> ahead_;      // m, of the edge now
+  std::vector<SideKind> kind_;
+  std::unique_ptr<BladeSide[]> sides_;  // of those that have one
+  std::unique_ptr<Face[]> pairs_;
+  uint32_t npair_ = 0;
   Vec3 drift_, lead_;  // m: mean motion of the cells; way of the edge, of late
   Frame from_, to_;
   double way_[2] = {};   // m, that the ends have come forward since the track began

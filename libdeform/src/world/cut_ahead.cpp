@@ -178,9 +178,12 @@ void set_cut_delay(Body &b, double delay) {
       fail(DFM_E_STATE,
            "body '%s': %zu faces wait to be opened; set how long its cuts wait before a tool cuts it",
            other->name.c_str(), other->ahead.faces.size() + other->ahead.later.size());
-  for (Body *const other : all) {
-    other->ahead = {};
-    other->ahead.delay = delay;
+  std::vector<std::shared_ptr<const Body>> structures;  // now: the first step has no time for it
+  for (const Body *const other : all) structures.push_back(delay > 0 ? structure_of(*other) : nullptr);
+  for (size_t i = 0; i < all.size(); ++i) {
+    all[i]->ahead = {};
+    all[i]->ahead.delay = delay;
+    all[i]->ahead.structure = std::move(structures[i]);
   }
 }
 

@@ -285,6 +285,9 @@ void set_cuts(Tool &t, uint32_t how, uint32_t most, std::span<Body *const> bodie
   }
   std::sort(ids.begin(), ids.end());
   ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+  if (how == DFM_CUT_SPLIT)  // now, since it takes longer than a step
+    for (Body *const b : bodies)
+      if (b->inner.empty()) b->inner = inner_faces(*b);
   t.cuts.from.resize(t.motion.parts.size());
   for (auto &o : w.obstacles)
     if (o->rigid == t.set) w.overlaps.place(o->id);  // what it was in without touching it
