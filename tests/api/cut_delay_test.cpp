@@ -17,7 +17,7 @@ constexpr double kStep = 1e-3;
 struct Refusing {
   enum { none, beside, all };
   std::atomic<int> to{none};
-  std::atomic<uint64_t> refused{0};
+  std::atomic<uint64_t> refused{0}, largest{0};  // largest: bytes that were given at a time
   const std::thread::id steps = std::this_thread::get_id();
   dfm_context *c = nullptr;
   Refusing() {
@@ -31,6 +31,7 @@ struct Refusing {
         ++r.refused;
         return nullptr;
       }
+      for (uint64_t most = r.largest; bytes > most && !r.largest.compare_exchange_weak(most, bytes);) {}
       return std::aligned_alloc(align, (bytes + align - 1) / align * align + align);
     };
     def.release = [](void *, void *p, size_t, size_t) { std::free(p); };
@@ -141,6 +142,21 @@ TEST(CutDelay, Faces_OpenTheDelayAfterTheBlade_InOneStep) {
 }
 
 // The step that opens faces has the time for it; the one after has the pairs of the new surface to find.
+// What a first cut needs of the body follows from its cells: it is made before the first step, which would
+// take longer than others by it.
+TEST(CutDelay, FirstStep_MakesNothingOfTheSizeOfTheCells) {
+  Refusing r;
+  Cube s({.delay = 0.006, .in = r.c});
+  const uint64_t cells = test::cutting::info(s.body).ntet * 4 * sizeof(uint32_t);
+  EXPECT_GT(r.largest, cells);
+  r.largest = 0;
+  s.step();
+  EXPECT_LT(r.largest, cells);
+  s.steps(60);
+  EXPECT_GT(s.opened, 0u);
+  EXPECT_GT(r.largest, cells);
+}
+
 TEST(CutDelay, StableStepOfANewShape_IsKnownAsFacesOpen) {
   Cube s({.delay = 0.005});
   double before = 0;

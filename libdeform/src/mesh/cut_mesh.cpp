@@ -29,10 +29,10 @@ uint32_t corner_of(const uint32_t *tets, uint32_t cell, uint32_t point) {
 // split [npoint] out: 1: an open face has it.
 Array<uint32_t> join_corners(const Memory &memory, uint32_t npoint, uint32_t ntet, const uint32_t *tets,
                              const Array<uint8_t> &removed, const Array<uint64_t> &open,
-                             Array<uint8_t> &split) {
+                             const Array<uint32_t> &inner, Array<uint8_t> &split) {
   Array<uint32_t> parent = own_parents(memory, size_t{4} * ntet);
   split.assign(npoint, 0);
-  each_inner_face(memory, ntet, tets, [&](uint32_t a, uint32_t b) {
+  const auto join_across = [&](uint32_t a, uint32_t b) {
     if (removed[a] || removed[b]) return;
     const bool opened = std::binary_search(open.begin(), open.end(), open_face(a, b));
     for (int k = 0; k < 4; ++k) {
@@ -41,7 +41,10 @@ Array<uint32_t> join_corners(const Memory &memory, uint32_t npoint, uint32_t nte
       if (opened) split[point] = 1;
       else join(parent, 4 * a + uint32_t(k), other);
     }
-  });
+  };
+  if (inner.empty()) each_inner_face(memory, ntet, tets, join_across);
+  else
+    for (size_t f = 0; f < inner.size(); f += 2) join_across(inner[f], inner[f + 1]);
   return parent;
 }
 
@@ -52,15 +55,26 @@ CutMesh::CutMesh(const Memory &memory)
       point(HookAllocator<uint32_t>(memory)),
       cell(HookAllocator<uint32_t>(memory)) {}
 
+Array<uint32_t> inner_faces(const Array<TetFace> &faces) {
+  Array<uint32_t> out{HookAllocator<uint32_t>(faces.get_allocator())};
+  out.reserve(faces.size());
+  each_inner_face(faces, [&](uint32_t i, uint32_t j) {
+    out.push_back(i);
+    out.push_back(j);
+  });
+  return out;
+}
+
 CutMesh make_cut_mesh(const Memory &memory, uint32_t npoint, uint32_t ntet, const uint32_t *tets,
-                      const Array<uint8_t> &removed, const Array<uint64_t> &open) {
+                      const Array<uint8_t> &removed, const Array<uint64_t> &open,
+                      const Array<uint32_t> &inner) {
   CutMesh out(memory);
   const HookAllocator<uint32_t> a(memory);
   Array<uint32_t> number(npoint, UINT32_MAX, a), copy(a);
   Array<uint8_t> split{HookAllocator<uint8_t>(memory)};
   Array<uint32_t> parent(a);
   if (!open.empty()) {
-    parent = join_corners(memory, npoint, ntet, tets, removed, open, split);
+    parent = join_corners(memory, npoint, ntet, tets, removed, open, inner, split);
     copy.assign(size_t{4} * ntet, UINT32_MAX);
   }
   for (uint32_t t = 0; t < ntet; ++t) {

@@ -23,20 +23,26 @@ struct CutMesh {
 // removed [ntet]: 1: removed. open: open faces, ascending; those of removed cells have no effect. Around a
 // point with an open face, the cells that are connected by other faces share one copy of it; the first copy
 // is that of the lowest cell. Other points are not split, even if cells share only that point. Points without
-// cells are removed.
+// cells are removed. inner: inner_faces() of the mesh, or empty where nobody has them.
 CutMesh make_cut_mesh(const Memory &memory, uint32_t npoint, uint32_t ntet, const uint32_t *tets,
-                      const Array<uint8_t> &removed, const Array<uint64_t> &open);
+                      const Array<uint8_t> &removed, const Array<uint64_t> &open,
+                      const Array<uint32_t> &inner);
 
 // Calls use(cell, cell) for the two sides of each inner face, the lower cell first, in the order of the
-// points of the faces. Skips faces of more than two cells.
+// points of the faces. Skips faces of more than two cells. faces: sorted
 template <class Use>
-void each_inner_face(const Memory &memory, uint32_t ntet, const uint32_t *tets, Use &&use) {
-  const Array<TetFace> faces = sorted_faces(memory, ntet, tets);
+void each_inner_face(const Array<TetFace> &faces, Use &&use) {
   for (size_t i = 0, j = 0; i < faces.size(); i = j) {
     for (j = i + 1; j < faces.size() && faces[j].same_corners(faces[i]);) ++j;
     if (j == i + 2) use(faces[i].owner >> 2, faces[i + 1].owner >> 2);
   }
 }
+template <class Use>
+void each_inner_face(const Memory &memory, uint32_t ntet, const uint32_t *tets, Use &&use) {
+  each_inner_face(sorted_faces(memory, ntet, tets), use);
+}
+// [n,2] these cells.
+Array<uint32_t> inner_faces(const Array<TetFace> &faces);
 
 // [ntet] part of each cell; cells that share a point are in the same part; parts are numbered by their lowest
 // cells.

@@ -19,5 +19,7 @@ struct TetFace {
 };
 
 Array<TetFace> sorted_faces(const Memory &memory, uint32_t ntet, const uint32_t *tets);
+// [n,3] those of one cell, outward, in the order of the cells. faces: all of tets, sorted
+Array<uint32_t> boundary_triangles(const Array<TetFace> &faces, const uint32_t *tets);
 
 }  // namespace dfm

@@ -56,8 +56,12 @@ Array<TetFace> sorted_faces(const Memory &memory, uint32_t ntet, const uint32_t 
 }
 
 Array<uint32_t> boundary_triangles(const Memory &memory, uint32_t ntet, const uint32_t *tets) {
-  const Array<TetFace> faces = sorted_faces(memory, ntet, tets);
-  Array<uint32_t> owner{HookAllocator<uint32_t>(memory)};
+  return boundary_triangles(sorted_faces(memory, ntet, tets), tets);
+}
+
+Array<uint32_t> boundary_triangles(const Array<TetFace> &faces, const uint32_t *tets) {
+  const HookAllocator<uint32_t> memory(faces.get_allocator());
+  Array<uint32_t> owner(memory);
   for (size_t i = 0; i < faces.size();) {
     size_t j = i + 1;
     while (j < faces.size() && faces[j].same_corners(faces[i])) ++j;
@@ -65,7 +69,7 @@ Array<uint32_t> boundary_triangles(const Memory &memory, uint32_t ntet, const ui
     i = j;
   }
   std::sort(owner.begin(), owner.end());
-  Array<uint32_t> triangles{HookAllocator<uint32_t>(memory)};
+  Array<uint32_t> triangles(memory);
   triangles.reserve(owner.size() * 3);
   for (const uint32_t face : owner)
     for (const uint32_t corner : kTetFace[face & 3])

@@ -132,12 +132,7 @@ BladeSweep::BladeSweep(Body &b, const CutShape &blade, const Vec3 *forward) : bl
 }
 
 Array<uint32_t> inner_faces(const Body &b) {
-  Array<uint32_t> out{HookAllocator<uint32_t>(b.world->memory())};
-  each_inner_face(b.world->memory(), b.ncell(), b.tets.data(), [&](uint32_t i, uint32_t j) {
-    out.push_back(i);
-    out.push_back(j);
-  });
-  return out;
+  return inner_faces(sorted_faces(b.world->memory(), b.ncell(), b.tets.data()));
 }
 
 namespace {

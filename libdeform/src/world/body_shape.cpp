@@ -42,9 +42,12 @@ void size_points(const Memory &m, Phyxels &p, uint32_t n) {
 template <class List, class From>
 void take_rows(const From &from, const Array<uint32_t> &number, size_t width, List &to) {
   to.resize(width * number.size());
-  for (size_t i = 0; i < number.size(); ++i)
-    std::copy_n(from.begin() + std::ptrdiff_t(width * number[i]), width,
-                to.begin() + std::ptrdiff_t(width * i));
+  const auto take = [&](auto n) {
+    for (size_t i = 0; i < number.size(); ++i)
+      for (size_t k = 0; k < n; ++k) to[n * i + k] = from[n * number[i] + k];
+  };
+  if (width == kStride) take(std::integral_constant<size_t, kStride>());  // known: no loop within a row
+  else take(width);
 }
 
 // Data by cell: share, materials, fields.
@@ -71,11 +74,14 @@ void weigh(Body &b) {
   update_inverse_mass(b.p);
 }
 
-void make_skin(const Memory &m, const CutMesh &mesh, BodyShape &out) {
+// inner: with the list of inner faces, which takes the same sorted faces.
+void make_skin(const Memory &m, const CutMesh &mesh, bool inner, BodyShape &out) {
   const uint32_t ntet = static_cast<uint32_t>(mesh.cell.size());
   out.tets = Array<uint32_t>(mesh.tets);
   out.edges = unique_edges(m, ntet, out.tets.data());
-  const Array<uint32_t> boundary = boundary_triangles(m, ntet, out.tets.data());
+  const Array<TetFace> faces = sorted_faces(m, ntet, out.tets.data());
+  if (inner) out.inner = inner_faces(faces);
+  const Array<uint32_t> boundary = boundary_triangles(faces, out.tets.data());
   out.surface = blank_surface(m);
   make_surface(m, out.p.n, out.p.rest.data(), boundary.data(), static_cast<uint32_t>(boundary.size() / 3),
                out.surface);
@@ -200,7 +206,8 @@ void carry_dues(const CutMesh &mesh, const BladeTrack &from, BladeTrack &to) {
 }
 
 // The part of the present mesh of b: what follows from its cells alone.
-std::unique_ptr<BodyShape> structure_of_part(const Body &b, const CutMesh &mesh, Array<uint64_t> &&open) {
+std::unique_ptr<BodyShape> structure_of_part(const Body &b, const CutMesh &mesh, Array<uint64_t> &&open,
+                                             bool inner) {
   const Memory &m = b.world->memory();
   auto shape = std::make_unique<BodyShape>();
   BodyShape &out = *shape;
@@ -215,7 +222,7 @@ std::unique_ptr<BodyShape> structure_of_part(const Body &b, const CutMesh &mesh,
   take_rows(b.p.rest, mesh.point, 3, out.p.rest);
   use_memory(m, out.anchor, out.surfel_impulse);
   take_cells(m, b.share, b.makeup, mesh, out);
-  make_skin(m, mesh, out);
+  make_skin(m, mesh, inner, out);
   name_features(b, mesh, out.surface, out.cut);
   find_laid(m, *out.cut.whole, out.cut, out.surface);
   make_cut_zones(m, *out.cut.whole, out.cut, out.makeup, out.tets, out.surface, out.zones);
@@ -261,7 +268,7 @@ std::shared_ptr<const BoxTree> tree_at_rest(const Memory &m, const Body &b) {
 
 // The part of the present mesh of b, without what put() adds.
 std::unique_ptr<BodyShape> part_of(const Body &b, const CutMesh &mesh, Array<uint64_t> &&open) {
-  std::unique_ptr<BodyShape> out = structure_of_part(b, mesh, std::move(open));
+  std::unique_ptr<BodyShape> out = structure_of_part(b, mesh, std::move(open), false);
   take_points(b.world->memory(), b, mesh, surfels_before(b, mesh, out->surface), out->p, out->anchor,
               out->blades, out->surface, out->surfel_impulse);
   return out;
@@ -279,7 +286,7 @@ std::unique_ptr<MadeShape> make_shape(const Body &b, CutMesh &&mesh, Array<uint6
                                       const double *due) {
   World &w = *b.world;
   auto out = std::make_unique<MadeShape>(MadeShape{std::move(mesh), nullptr, {}, {}, {}, nullptr});
-  out->shape = structure_of_part(b, out->mesh, std::move(open));
+  out->shape = structure_of_part(b, out->mesh, std::move(open), due != nullptr);
   BodyShape &shape = *out->shape;
   shape.surface.named = b.surface.named;
   shape.search = std::make_unique<SearchTree>(w.memory());
@@ -301,7 +308,6 @@ std::unique_ptr<MadeShape> make_shape(const Body &b, CutMesh &&mesh, Array<uint6
   if (due) {
     give_dynamics(w, like, due);
     like.dynamics.reset();  // it refers to this body
-    like.inner = inner_faces(like);
     like.self_rest = std::make_unique<SelfRest>(self_rest_of(w.meters.detection.memory(), like));
     like.surface.tree = tree_at_rest(w.meters.detection.memory(), like);
   }
@@ -360,6 +366,7 @@ std::unique_ptr<Body> structure_of(const Body &b) {
   out->p.mass = copy(b.p.mass);
   out->tets = copy(b.tets);
   out->edges = copy(b.edges);
+  out->inner = copy(b.inner);
   out->surface = copy(b.surface);
   out->zones = copy(b.zones);
   out->cut = copy(b.cut);
@@ -413,7 +420,7 @@ std::unique_ptr<BodyShape> restore_shape(Body &b, const Body &like, std::shared_
   use_memory(m, out.anchor, out.surfel_impulse);
   if (b.world->def.sleep) out.anchor = out.p.x;
   take_cells(m, whole->share, whole->makeup, mesh, out);
-  make_skin(m, mesh, out);
+  make_skin(m, mesh, false, out);
   out.surfel_impulse.assign(size_t{3} * out.surface.nsurfel, 0.0);
   if (names) {
     out.cut.whole = whole;

@@ -109,7 +109,7 @@ std::unique_ptr<BodyShape> put(Body &b, MadeShape &made, bool ahead) {
 CutReport cut(Body &b, const Array<uint8_t> &removed, OpenFaces &&open) {
   const Memory &m = b.world->memory();
   CutReport out;
-  CutMesh mesh = make_cut_mesh(m, b.p.n, b.ncell(), b.tets.data(), removed, open.own);
+  CutMesh mesh = make_cut_mesh(m, b.p.n, b.ncell(), b.tets.data(), removed, open.own, b.inner);
   if (mesh.cell.empty()) return empty(b);
   out.removed = b.ncell() - static_cast<uint32_t>(mesh.cell.size());
   // all memory is taken before the cut is made, because a cut that is made must be reported
@@ -234,7 +234,7 @@ CutReport open_faces(Body &b, const Array<uint64_t> &faces) { return cut(b, none
 std::unique_ptr<MadeShape> make_opened(const Body &b, const Array<uint64_t> &faces, double due) {
   const Memory &m = b.world->memory();
   OpenFaces open = with_open(b, faces);
-  CutMesh mesh = make_cut_mesh(m, b.p.n, b.ncell(), b.tets.data(), none_removed(b), open.own);
+  CutMesh mesh = make_cut_mesh(m, b.p.n, b.ncell(), b.tets.data(), none_removed(b), open.own, b.inner);
   return make_shape(b, std::move(mesh), std::move(open.whole), &due);
 }
 

@@ -196,31 +196,41 @@ void make_cut_zones(const Memory &m, const WholeBody &whole, const CutRecord &re
   const TriangleList skin(static_cast<uint32_t>(whole.tri.size() / 3),
                           [&](size_t k) { return whole.tri[k]; });
   const auto point = [&](size_t k) { return surface.point[surface.tri[k]]; };
-  const TriangleList own(surface.ntri, point);
   out.list = whole.zones.list;
   use_memory(m, out.of);
   out.of.assign(surface.ntri, 0);
   bool one = true;
-  for (size_t c = 0; c < tets.size(); c += 4)
-    for (const auto &f : kTetFace) {
-      const Corners face = sorted(tets[c + f[0]], tets[c + f[1]], tets[c + f[2]]);
-      const uint32_t t = own.find(face);
-      if (t == kNone) continue;
-      const uint32_t was =
-          skin.find(sorted(record.point[face[0]], record.point[face[1]], record.point[face[2]]));
-      if (was != kNone) {
-        out.of[t] = whole.zones.of.empty() ? 0 : whole.zones.of[was];
-      } else {
-        const Material &made_of = makeup.materials[makeup.of.empty() ? 0 : makeup.of[c / 4]];
-        const auto same = [&](const SurfaceZones::Zone &z) {
-          return z.group == kCutGroup && z.material == made_of.name;
-        };
-        const auto at = std::find_if(out.list.begin(), out.list.end(), same);
-        out.of[t] = uint32_t(at - out.list.begin());
-        if (at == out.list.end()) out.list.push_back({kCutGroup, made_of.name, friction_of(made_of)});
-      }
-      one = one && out.of[t] == 0;
+  const auto of_material = [&](const Material &made_of) {
+    const auto same = [&](const SurfaceZones::Zone &z) {
+      return z.group == kCutGroup && z.material == made_of.name;
+    };
+    const auto at = std::find_if(out.list.begin(), out.list.end(), same);
+    const uint32_t zone = uint32_t(at - out.list.begin());
+    if (at == out.list.end()) out.list.push_back({kCutGroup, made_of.name, friction_of(made_of)});
+    return zone;
+  };
+  // whose: the material of the cell that has it
+  const auto find_zone = [&](uint32_t t, const Corners &face, const Material &whose) {
+    const uint32_t was =
+        skin.find(sorted(record.point[face[0]], record.point[face[1]], record.point[face[2]]));
+    if (was == kNone) out.of[t] = of_material(whose);
+    else out.of[t] = whole.zones.of.empty() ? 0 : whole.zones.of[was];
+    one = one && out.of[t] == 0;
+  };
+  if (makeup.of.empty()) {  // of one material: the cells need not be looked at
+    for (uint32_t t = 0; t < surface.ntri; ++t) {
+      const size_t k = 3 * size_t{t};
+      find_zone(t, sorted(point(k), point(k + 1), point(k + 2)), makeup.materials[0]);
     }
+  } else {
+    const TriangleList own(surface.ntri, point);
+    for (size_t c = 0; c < tets.size(); c += 4)
+      for (const auto &f : kTetFace) {
+        const Corners face = sorted(tets[c + f[0]], tets[c + f[1]], tets[c + f[2]]);
+        if (const uint32_t t = own.find(face); t != kNone)
+          find_zone(t, face, makeup.materials[makeup.of[c / 4]]);
+      }
+  }
   if (one && out.list.size() == 1) out.of.clear();
 }
 

@@ -118,7 +118,7 @@ Share share_of(const Body &b, const Parts &parts, uint32_t to) {
   Array<uint8_t> removed(ncell, 0, HookAllocator<uint8_t>(m));
   for (uint32_t c = 0; c < ncell; ++c) removed[c] = parts.to[parts.of[c]] != to;
   const Array<uint64_t> none{HookAllocator<uint64_t>(m)};
-  Share out{make_cut_mesh(m, b.p.n, ncell, b.tets.data(), removed, none), Array<uint64_t>(none)};
+  Share out{make_cut_mesh(m, b.p.n, ncell, b.tets.data(), removed, none, b.inner), Array<uint64_t>(none)};
   std::vector<uint32_t> whole;  // ascending
   for (const uint32_t c : out.mesh.cell) whole.push_back(b.cut.whole ? b.cut.cell[c] : c);
   const auto has = [&](uint64_t cell) {

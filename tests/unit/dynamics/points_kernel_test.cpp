@@ -52,6 +52,34 @@ void check(const dfm::PointsKernels &kernels) {
     }
     EXPECT_EQ(kernels.inverted(rows, c.cells.data(), c.x.data()), inverted) << rows;
     EXPECT_EQ(kernels.strain_rate(rows, c.edges.data(), c.x.data(), c.v.data()), rate) << rows;
+
+    std::vector<uint32_t> every_other;
+    std::vector<double> middles, found(2 * size_t(rows) + 4);
+    double farthest = 0;
+    for (uint32_t r = 0; r < rows; ++r) {
+      const uint32_t *t = &c.cells[4 * size_t(r)], *e = &c.edges[2 * size_t(r)];
+      farthest = std::max(farthest, norm2(c.at(c.x, e[0]) - c.at(c.x, e[1])));
+      if (r % 2) continue;
+      every_other.push_back(r);
+      const dfm::Vec3 m = 0.25 * ((c.at(c.x, t[0]) + c.at(c.x, t[1])) + (c.at(c.x, t[2]) + c.at(c.x, t[3])));
+      middles.insert(middles.end(), {m.x, m.y, m.z, 0});
+    }
+    kernels.middles(uint32_t(every_other.size()), every_other.data(), c.cells.data(), c.x.data(),
+                    found.data());
+    found.resize(middles.size());
+    EXPECT_EQ(found, middles) << rows;
+    EXPECT_EQ(kernels.farthest(rows, c.edges.data(), c.x.data()), farthest) << rows;
+    double low[4], high[4];
+    kernels.bounds(rows + 1, c.x.data(), low, high);
+    for (uint32_t a = 0; a < 4; ++a) {
+      double least = c.x[a], most = least;
+      for (uint32_t i = 0; i <= rows; ++i) {
+        least = std::min(least, c.x[4 * size_t(i) + a]);
+        most = std::max(most, c.x[4 * size_t(i) + a]);
+      }
+      EXPECT_EQ(low[a], least) << rows;
+      EXPECT_EQ(high[a], most) << rows;
+    }
   }
 }
 
@@ -96,7 +124,7 @@ struct Moving {
 
 }  // namespace
 
-TEST(PointsKernels, InvertedCellsAndStrainRates_AreThoseOfOneAtATime) {
+TEST(PointsKernels, WhatIsAskedOfCellsAndEdges_IsThatOfOneAtATime) {
   check(dfm::points_kernels_sse2());
   if (dfm::doubles_at_once() >= 4) check(dfm::points_kernels_avx2());
 }
