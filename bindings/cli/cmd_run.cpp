@@ -185,8 +185,7 @@ class Runner {
           std::to_string(checks().inverted_last) +
           " cells inverted by \"start\" are still inverted at the end: simulate a longer time, or use "
           "a model that recovers (corotational_fem, shape_matching)");
-    else if (!spoiled_ && trouble_ & DFM_TROUBLE_INVERTED)
-      out.push_back("cells became inverted (inside out): refine the mesh or reduce the load");
+    else if (!spoiled_ && trouble_ & DFM_TROUBLE_INVERTED) out.push_back(inverted());
     if (often_unsolved()) out.push_back(unsolved());
     const size_t between = spoiled_ ? checks().between_last : checks().between_max;
     const size_t within = spoiled_ ? checks().self_last : checks().self_max;
@@ -223,6 +222,22 @@ class Runner {
            "\"max_sweeps\" of \"contact\" (50), take a shorter step, add damping to the material, or lower "
            "the "
            "ratio of masses or stiffnesses";
+  }
+
+  // A load that the material bears inverts few cells, where the mesh is coarse for it; one that it does not
+  // bear inverts many, or takes much of the volume.
+  std::string inverted() const {
+    const Checks &seen = checks();
+    const std::string what = "cells became inverted (inside out)";
+    if (seen.inverted_there == 0) return what + " between two records: reduce the load, or refine the mesh";
+    char where[240];
+    std::snprintf(where, sizeof where, ": up to %u of %u cells of body '%.100s', at %.0f %% of its volume; ",
+                  seen.inverted_there, seen.cells_there, seen.inverted_body.c_str(), 100 * seen.volume_there);
+    if (seen.inverted_there * 20 < seen.cells_there && seen.volume_there > 0.8)
+      return what + where + "refine the mesh or reduce the load";
+    return what + where +
+           "its material is too soft for the load, which a finer mesh does not change: give it a larger "
+           "\"young\", or reduce what presses on it";
   }
 
   bool any_cut() const {

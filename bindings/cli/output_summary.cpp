@@ -118,7 +118,14 @@ void Checker::check(bool start_state) {
     positions_[b].resize(3 * size_t(body.nsurfel));
     need(dfm_surface_positions(body.handle, body.nsurfel, positions_[b].data(), &n));
     for (double x : positions_[b]) reach = std::max(reach, std::fabs(x));
-    const uint32_t inverted = body_measure(body).inverted;
+    const dfm_body_measure measured = body_measure(body);
+    const uint32_t inverted = measured.inverted;
+    if (inverted > checks_.inverted_there) {
+      checks_.inverted_body = body.name;
+      checks_.inverted_there = inverted;
+      checks_.cells_there = body.ntet;
+      checks_.volume_there = measured.volume / measured.rest_volume;
+    }
     checks_.inverted_max = std::max(checks_.inverted_max, inverted);
     checks_.inverted_last += inverted;
     surfaces_.push_back({positions_[b].data(), n, body.triangles.data(), uint32_t(body.triangles.size() / 3),

@@ -129,7 +129,7 @@ dfm_status dfm_body_create(dfm_world world, const dfm_body_def *def, dfm_body *o
     dfm_surface_groups groups;
     take_pointed(own.surface, surface);
     take_pointed(own.groups, groups);
-    const Body &made = create_body(w, own);
+    Body &made = create_body(w, own);
     warn_of_own_weight(w, made);
     *out = made.handle;
   });

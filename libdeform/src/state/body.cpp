@@ -1,6 +1,7 @@
 #include "state/body.h"
 
 #include <algorithm>
+#include <cstring>
 
 #include "body/feature_map.h"
 #include "body/self_rest.h"
@@ -17,6 +18,15 @@ bool Body::loads_vary() const {
   return !springs.empty() || std::any_of(loads.begin(), loads.end(), [](const Load &l) {
     return !l.keys.empty() || l.sine.amplitude[0] != 0;
   });
+}
+
+double Body::young() const {
+  for (const CellField &f : fields)
+    if (f.key == "young") return *std::max_element(f.values.begin(), f.values.end());
+  size_t at = 0;
+  for (uint32_t i = 0; i < model.type->nparam; at += model.type->params[i++].width)
+    if (!std::strcmp(model.type->params[i].key, "young")) return model.params[at];
+  return 0;
 }
 
 double Body::impulse_time() const { return slumber.asleep ? slumber.h : world->report.h; }

@@ -84,6 +84,14 @@ struct SpareModel {
   }
 };
 
+// The pressure of what touches a body, a running mean (step/squeezed.h).
+struct Squeezed {
+  double pressure = 0, at = 0;  // Pa; s, of the last look
+  double since = 0;             // s, of the last look at which it was small
+  double weight = 0;            // Pa, its own, if it has been told of
+  bool told = false;
+};
+
 struct Body {
   World *world = nullptr;
   uint64_t id = 0, handle = 0;
@@ -146,6 +154,7 @@ struct Body {
     uint32_t inverted = 0;
     double strain_rate = 0;  // 1/s, of the edge that stretches fastest
   } bound;
+  Squeezed squeezed;
   Slumber slumber;
   // [n,4] m, positions at the start of its calm; empty if sleep is off
   Array<double> anchor;
@@ -157,6 +166,7 @@ struct Body {
   Body();
   ~Body();
   bool loads_vary() const;
+  double young() const;         // Pa, the largest of all cells; 0: the model has no such parameter
   double impulse_time() const;  // s that surfel_impulse belongs to
 };
 

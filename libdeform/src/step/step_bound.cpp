@@ -11,6 +11,7 @@
 #include "state/spring.h"
 #include "state/world.h"
 #include "step/first_failure.h"
+#include "step/squeezed.h"
 
 namespace dfm {
 namespace {
@@ -104,6 +105,7 @@ void update_bound(World &w) {
     look_at_shape(b);
     return true;
   });
+  tell_squeezed(w);
   if (holds(w)) return;
   w.bound.step = std::numeric_limits<double>::infinity();
   w.bound.body = nullptr;
