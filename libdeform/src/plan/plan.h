@@ -28,8 +28,8 @@ struct SceneFacts {
   unsigned rigid_bodies = 0, rigid_joints = 0;
   unsigned attachments = 0, paid_cuts = 0;  // paid: a tool and a body that takes energy to be cut
   std::string rigid_hosts;                  // names
-  unsigned rigid_pairs = 0;                 // of free rigid bodies, with each other and with obstacles
-  std::vector<std::string> rigid_alone;  // rigid bodies that would meet obstacles and touch soft bodies only
+  unsigned rigid_pairs = 0;  // of rigid bodies of the builtin host, with each other and with obstacles
+  std::vector<std::string> rigid_alone;  // rigid bodies that pass through obstacles
   bool gravity_keys = false, loads_vary = false, held_move = false, obstacles_move = false, unguarded = false;
   struct Provider { std::string effect, plugin; };
   // by models and laws of the scene, with their present parameters

@@ -67,7 +67,7 @@ StageChoice rigid_predict(const SceneFacts &f) {
   std::string why = rigids(f);
   if (f.rigid_pairs)
     why += "; " + count(f.rigid_pairs, "pair", "pairs") +
-           " of free rigid bodies with each other and with obstacles may touch";
+           " of rigid bodies with each other and with obstacles may touch";
   if (!f.rigid_alone.empty()) why += "; these pass through obstacles: " + join(f.rigid_alone);
   return runs(why);
 }

@@ -165,11 +165,13 @@ bool revise_rigids(World &w, StepContext &step) {
   for (auto &set : w.rigid_sets) {
     if (!set->host.revise) continue;
     bool changed = false;
+    step.tools->add_to_impulses(*set);
     if (!set->revise(changed))
       fail(DFM_E_FATAL, "rigid host '%s' does not answer contact on '%s' and those with it",
            set->host_name.c_str(), set->defs[0].name);
     if (!changed) continue;
     any = true;
+    step.tools->add_to_revised(*set);
     for (const ContactRows::Block &block : step.rows.blocks) {
       if (block.group == kNone || block.group < set->first_group ||
           block.group >= set->first_group + set->ngroup)

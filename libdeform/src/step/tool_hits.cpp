@@ -154,8 +154,8 @@ bool ToolTouch::told(const Pair &pair) const {
                      [&](const auto &known) { return known[0] == pair.id[0] && known[1] == pair.id[1]; });
 }
 
-// Warns, once for each pair, of rigid bodies that have joints or belong to another host, and pass through
-// something. A host with a world of its own may let bodies overlap by a little.
+// Warns, once for each pair, of rigid bodies of other hosts that pass through something. A host with a world
+// of its own may let bodies overlap by a little.
 void ToolTouch::tell_passing(const World &w, const StepContext &step) {
   for (const Pair &pair : passing_) {
     const Obstacle &a = *w.obstacles[pair.a], &b = *w.obstacles[pair.b];
@@ -178,20 +178,14 @@ void ToolTouch::tell_passing(const World &w, const StepContext &step) {
       continue;
     }
     const auto held = [](const Obstacle &o) {
-      return o.rigid && o.rigid->group[o.rigid_body] != DFM_RIGID_STILL &&
-             (o.rigid->host_name != "builtin" || o.rigid->njoint > 0);
+      return o.rigid && o.rigid->group[o.rigid_body] != DFM_RIGID_STILL && o.rigid->host_name != "builtin";
     };
     const Obstacle &body = held(a) ? a : b, &other = held(a) ? b : a;
-    const bool ours = body.rigid->host_name == "builtin";
-    w.context->logf(
-        DFM_LOG_WARNING,
-        "rigid body '%s' is %.3g m deep in '%s' at %.6g s and goes through it, because %s; %s, or "
-        "filter the pair",
-        body.name.c_str(), deep, other.name.c_str(), w.time,
-        ours ? "the builtin host keeps bodies with joints apart from soft bodies only"
-             : format("host '%s' does not know of it", body.rigid->host_name.c_str()).c_str(),
-        ours ? "take a host with contact (ode, bullet) and make both its bodies"
-             : "make both bodies of this host (what stands: \"fixed\")");
+    w.context->logf(DFM_LOG_WARNING,
+                    "rigid body '%s' is %.3g m deep in '%s' at %.6g s and goes through it, because host '%s' "
+                    "does not know of it; make both bodies of this host (what stands: \"fixed\"), or filter "
+                    "the pair",
+                    body.name.c_str(), deep, other.name.c_str(), w.time, body.rigid->host_name.c_str());
   }
 }
 

@@ -47,7 +47,12 @@ std::array<uint32_t, 2> ToolTouch::movers_of(const Side &side) {
     fresh.jaw = jaw;
     fresh.island = static_cast<uint32_t>(motions_.size());
     fresh.size = jaw == kNone ? 6 : 1;
-    if (jaw == kNone) {
+    if (jaw == kNone && m.jointed[group]) {
+      find_basis(m, group);
+      fresh.jointed = true;
+      fresh.size = m.rank[group];
+      fresh.part = side.part;
+    } else if (jaw == kNone) {
       uint32_t first = side.part;
       while (m.set->place[first] != 0 || m.set->group[first] != group) first = first > 0 ? first - 1 : 0;
       fresh.center = load3(m.set->state[first].position);
@@ -72,6 +77,7 @@ uint32_t ToolTouch::island_of(uint32_t motion) {
 void ToolTouch::list_motions() {
   motions_.clear();
   levers_.clear();
+  lever_values_.clear();
   first_lever_.clear();
   for (const Row &row : rows_) {
     first_lever_.push_back(static_cast<uint32_t>(levers_.size()));
@@ -81,19 +87,28 @@ void ToolTouch::list_motions() {
       const double sign = side == &row.a ? 1 : -1;
       for (const uint32_t mover : movers) {
         if (mover == kNone) continue;
-        Lever lever{mover, side == &row.a, {}, {}};
         const Motion &own = motions_[mover];
+        levers_.push_back({mover, side == &row.a, lever_values_.size()});
+        lever_values_.resize(lever_values_.size() + 6 * own.size, 0.0);
         const Vec3 axes[3] = {row.normal, row.tangent[0], row.tangent[1]};
         for (size_t k = 0; k < 3; ++k) {
-          if (own.jaw == kNone) {
-            store3(lever.by[k], sign * axes[k]);
-            store3(lever.by[k] + 3, sign * cross(center(*side) + side->arm - own.center, axes[k]));
+          double *const to = &lever_values_[levers_.back().values + k * own.size];
+          if (own.jointed) {
+            const Moved &m = sides_[side->tool];
+            const double *const basis = basis_of(m, side->part);
+            const Vec3 turn = cross(side->arm, axes[k]);
+            for (size_t d = 0; d < own.size; ++d)
+              for (int e = 0; e < 3; ++e)
+                to[d] += sign * (axes[k][e] * basis[size_t(e) * m.wide[own.group] + d] +
+                                 turn[e] * basis[(3 + size_t(e)) * m.wide[own.group] + d]);
+          } else if (own.jaw == kNone) {
+            store3(to, sign * axes[k]);
+            store3(to + 3, sign * cross(center(*side) + side->arm - own.center, axes[k]));
           } else {
             const Moved::Jaw &jaw = sides_[side->tool].jaws[own.jaw];
-            lever.by[k][0] = sign * (dot(jaw.lever, axes[k]) + dot(jaw.axis, cross(side->arm, axes[k])));
+            to[0] = sign * (dot(jaw.lever, axes[k]) + dot(jaw.axis, cross(side->arm, axes[k])));
           }
         }
-        levers_.push_back(lever);
         const uint32_t root = island_of(mover);
         if (joined == kNone) joined = root;
         motions_[std::max(joined, root)].island = std::min(joined, root);
@@ -161,6 +176,7 @@ bool ToolTouch::number_unknowns(uint32_t island) {
   for (const uint32_t i : newton_.order) {
     motions_[i].at = n;
     n += motions_[i].size;
+    while (motions_[i].jointed && newton_.first.size() < n) newton_.first.push_back(newton_.first.size());
     newton_.first.resize(n, motions_[i].at);
   }
   if (n == 0) return false;
@@ -168,6 +184,7 @@ bool ToolTouch::number_unknowns(uint32_t island) {
   newton_.mass.assign(6 * n, 0.0);
   newton_.x.assign(n, 0.0);
   newton_.left.resize(n);
+  newton_.slopes.resize(3 * n);
   return true;
 }
 
@@ -178,6 +195,10 @@ bool ToolTouch::set_masses(uint32_t island) {
     const Moved &side = sides_[m.tool];
     if (m.jaw != kNone) {
       newton_.mass[6 * m.at] = 1 / side.jaws[m.jaw].give;
+      continue;
+    }
+    if (m.jointed) {
+      for (size_t d = 0; d < m.size; ++d) newton_.mass[6 * (m.at + d)] = 1;
       continue;
     }
     const size_t wide = side.wide[m.group], at = side.first[m.group];
@@ -234,7 +255,7 @@ void ToolTouch::add_motion(uint32_t row, const std::vector<double> &x, double u[
   for (uint32_t j = first_lever_[row]; j < first_lever_[row + 1]; ++j) {
     const Motion &m = motions_[levers_[j].motion];
     for (size_t c = 0; c < 3; ++c)
-      for (size_t d = 0; d < m.size; ++d) u[c] += levers_[j].by[c][d] * x[m.at + d];
+      for (size_t d = 0; d < m.size; ++d) u[c] += by(levers_[j], c)[d] * x[m.at + d];
   }
 }
 
@@ -242,7 +263,7 @@ void ToolTouch::add_motion(uint32_t row, const std::vector<double> &x, double u[
 void ToolTouch::turn_motions() {
   for (const uint32_t i : newton_.order) {
     Motion &m = motions_[i];
-    if (m.size < 6) continue;
+    if (m.jaw != kNone || m.jointed) continue;
     m.spin = load3(&sides_[m.tool].base[6 * size_t{m.part} + 3]) + load3(&newton_.x[m.at + 3]);
     m.turn = turned(Quat{}, h_ * m.spin);
   }
@@ -256,17 +277,28 @@ void ToolTouch::add_arc(const NewtonRow &l, double u[3], bool slopes) {
   const auto add_side = [&](const Side &side, Lever *lever) {
     const double sign = &side == &row.a ? 1 : -1;
     const Motion *const m = lever ? &motions_[lever->motion] : nullptr;
-    const Vec3 w = m ? m->spin : load3(&sides_[side.tool].base[6 * size_t{side.part} + 3]);
-    const Vec3 more = m ? bend(w, m->turn, side.bone) : bend(w, side.bone);
+    const Vec3 w = m ? spin_of(*m, side) : load3(&sides_[side.tool].base[6 * size_t{side.part} + 3]);
+    const Vec3 more = m && !m->jointed ? bend(w, m->turn, side.bone) : bend(w, side.bone);
     for (size_t c = 0; c < 3; ++c)
       if (l.arcs[c]) u[c] += sign * dot(axes[c], more);
     if (!lever || !slopes) return;
+    if (m->jointed)
+      for (size_t c = 0; c < 3; ++c) std::fill_n(bent(*lever, c), m->size, 0.0);
     for (size_t d = 0; d < 3; ++d) {
       Vec3 unit;
       unit[int(d)] = 1;
-      const Vec3 by = bend_slope(w, side.bone, unit);
-      for (size_t c = 0; c < 3; ++c)
-        if (l.arcs[c]) lever->bent[c][d] = sign * dot(axes[c], by);
+      const Vec3 slope = bend_slope(w, side.bone, unit);
+      for (size_t c = 0; c < 3; ++c) {
+        if (!l.arcs[c]) continue;
+        const double along = sign * dot(axes[c], slope);
+        if (!m->jointed) {
+          bent(*lever, c)[3 + d] = along;
+          continue;
+        }
+        const Moved &of = sides_[side.tool];
+        const double *const basis = basis_of(of, side.part) + (3 + d) * of.wide[m->group];
+        for (size_t e = 0; e < m->size; ++e) bent(*lever, c)[e] += along * basis[e];
+      }
     }
   };
   Lever *of[2] = {};
@@ -283,7 +315,7 @@ void ToolTouch::gather_impulses() {
     for (uint32_t j = first_lever_[l.row]; j < first_lever_[l.row + 1]; ++j) {
       const Motion &m = motions_[levers_[j].motion];
       for (size_t c = 0; c < 3; ++c)
-        for (size_t d = 0; d < m.size; ++d) newton_.left[m.at + d] += levers_[j].by[c][d] * l.now[c];
+        for (size_t d = 0; d < m.size; ++d) newton_.left[m.at + d] += by(levers_[j], c)[d] * l.now[c];
     }
 }
 
@@ -331,14 +363,31 @@ void ToolTouch::add_slopes(uint32_t row, const double slope[3][3]) {
   for (uint32_t j = begin; j < end; ++j)
     for (uint32_t i = begin; i < end; ++i) {
       const Motion &mj = motions_[levers_[j].motion], &mi = motions_[levers_[i].motion];
+      if (mj.jointed || mi.jointed) {  // many unknowns: slope J first
+        for (size_t f = 0; f < mi.size; ++f)
+          for (size_t c = 0; c < 3; ++c) {
+            double sum = 0;
+            for (size_t e = 0; e < 3; ++e)
+              sum += slope[c][e] * (by(levers_[i], e)[f] + bent(levers_[i], e)[f]);
+            newton_.slopes[3 * f + c] = sum;
+          }
+        for (size_t d = 0; d < mj.size; ++d) {
+          double *const to = &newton_.system[(mj.at + d) * lu_row(newton_.n) + mi.at];
+          const double k[3] = {by(levers_[j], 0)[d], by(levers_[j], 1)[d], by(levers_[j], 2)[d]};
+          for (size_t f = 0; f < mi.size; ++f) {
+            const double *const at = &newton_.slopes[3 * f];
+            to[f] += k[0] * at[0] + k[1] * at[1] + k[2] * at[2];
+          }
+        }
+        continue;
+      }
       for (size_t c = 0; c < 3; ++c)
         for (size_t e = 0; e < 3; ++e) {
           if (slope[c][e] == 0) continue;
           for (size_t d = 0; d < mj.size; ++d)
             for (size_t f = 0; f < mi.size; ++f)
               newton_.system[(mj.at + d) * lu_row(newton_.n) + mi.at + f] +=
-                  levers_[j].by[c][d] * slope[c][e] *
-                  (levers_[i].by[e][f] + (f < 3 ? 0 : levers_[i].bent[e][f - 3]));
+                  by(levers_[j], c)[d] * slope[c][e] * (by(levers_[i], e)[f] + bent(levers_[i], e)[f]);
         }
     }
 }

@@ -23,7 +23,6 @@ constexpr double kDone = 1e-13;            // of the largest speed that a row is
 constexpr double kSharper = 1e-3;          // of the change by a pass: tolerance of its sweeps
 constexpr double kSame = 1e-9;             // of it: soft bodies need not be solved again
 constexpr double kOpenUpTo = 1;            // m/s: what a load could change that keeps a place from opening
-constexpr double kJaw = 1e4;               // N/m, of a jaw at its tip
 constexpr double kFace = 1e5;              // N/m, of a place on the face of a jaw
 constexpr double kDent = 5e-4;             // m: edges that are further on the wrong side do not touch there
 constexpr double kCross = 1e-6;            // sine between edges that have a normal
@@ -35,19 +34,15 @@ constexpr double kNear = 0.5;        // of the least thickness: a row with an im
 constexpr uint32_t kSweeps = 6;      // between two leaps
 constexpr double kFaster = 0.5;      // of what the best sweep has left, by a leap: else the pass ends
 constexpr uint32_t kMostPasses = 6;  // over the laws, and what turning adds, until both change no more
+constexpr uint32_t kMostRevisions = 6;  // of motors, by contact
 
 bool builtin(const Obstacle &o) { return o.rigid && !o.rigid->of_tool && o.rigid->host_name == "builtin"; }
 bool of_tool(const Obstacle &o) { return o.rigid && o.rigid->of_tool; }
 // Part 0 is the frame.
 bool is_jaw(const Obstacle &o) { return of_tool(o) && o.rigid_body > 0; }
 
-// Whether only its momentum and its contacts move it.
-bool alone(const RigidSet &set, uint32_t body) {
-  return set.group[body] != DFM_RIGID_STILL &&
-         std::none_of(set.joints.begin(), set.joints.end(),
-                      [&](const dfm_joint_def &j) { return j.body == body || j.with == body; });
-}
-bool is_free(const Obstacle &o) { return builtin(o) && alone(*o.rigid, o.rigid_body); }
+// Whether contact moves it, as far as its joints allow.
+bool is_free(const Obstacle &o) { return builtin(o) && o.rigid->group[o.rigid_body] != DFM_RIGID_STILL; }
 // Does not yield, whatever touches it.
 bool is_wall(const Obstacle &o) { return !o.rigid || o.rigid->group[o.rigid_body] == DFM_RIGID_STILL; }
 
@@ -98,18 +93,13 @@ Vec3 nearest_turn(Vec3 turn, Vec3 like) {
 
 void add(Vec3 p, double *to) { store3(to, load3(to) + p); }
 
-// Whether a rigid body that has joints, or belongs to another host, passes through something, because neither
-// this file nor its host keeps the two apart. A host with a world of its own knows what is in that world.
+// Whether a rigid body of another host passes through something, because neither this file nor its host keeps
+// the two apart. A host with a world of its own knows what is in that world.
 bool passes(const Obstacle &a, const Obstacle &b) {
-  if (a.sensor || b.sensor || of_tool(a) || of_tool(b)) return false;
+  if (a.sensor || b.sensor || of_tool(a) || of_tool(b) || a.rigid == b.rigid) return false;
   const auto held = [](const Obstacle &o) { return !is_wall(o) && !is_free(o) && !o.rigid->elsewhere; };
   if (!held(a) && !held(b)) return false;
-  if (a.rigid != b.rigid) return held(a) ? is_wall(b) || is_free(b) || held(b) : is_wall(a) || is_free(a);
-  return builtin(a) && a.rigid->group[a.rigid_body] != b.rigid->group[b.rigid_body] &&
-         std::none_of(a.rigid->joints.begin(), a.rigid->joints.end(), [&](const dfm_joint_def &j) {
-           return (j.body == a.rigid_body && j.with == b.rigid_body) ||
-                  (j.body == b.rigid_body && j.with == a.rigid_body);
-         });
+  return held(a) ? is_wall(b) || is_free(b) || held(b) : is_wall(a) || is_free(a);
 }
 
 }  // namespace
@@ -127,6 +117,7 @@ void ToolTouch::prepare(World &w, SceneFacts &facts) {
   walls_.clear();
   w.pairs.tool_law.clear();
   if (w.rigid_sets.empty()) return;
+  offset_ = w.offset;
   const auto wall = [&](uint32_t slot) {
     const Obstacle &o = *w.obstacles[slot];
     if (of_tool(o) || is_free(o)) {
@@ -146,7 +137,7 @@ void ToolTouch::prepare(World &w, SceneFacts &facts) {
       bool touch = (a.def.category & b.def.collides_with) != 0 && (b.def.category & a.def.collides_with) != 0;
       if (const FilterRule *const rule = best_rule(w.filters, names_of(a), names_of(b)))
         touch = rule->collide;
-      if (!touch) continue;
+      if (!touch || belong_together(w, a, b)) continue;
       if (!apart) {
         passing_.push_back({i, j, 0, {a.id, b.id}, true, false, false, {kNone, kNone}, 0});
         for (const Obstacle *const o : {&a, &b})
@@ -250,43 +241,15 @@ Vec3 ToolTouch::center(const Side &side) const {
   return m.set ? load3(m.set->state[side.part].position) : m.center[side.part];
 }
 
-// The hinge is the origin of part 0, about its y.
-void ToolTouch::list_jaws(Moved &m) const {
-  const dfm_rigid_state &frame = m.set->state[0];
-  const Vec3 axis = rotate(rotation_of(frame), {0, 1, 0});
-  for (uint32_t i = 1; i < m.set->defs.size(); ++i) {
-    const Vec3 arm = load3(m.set->state[i].position) - load3(frame.position);
-    const double length = 2 * m.set->defs[i].half_size[2];
-    m.jaws.push_back({i, axis, cross(axis, arm), 1 / (h_ * h_ * kJaw * length * length), 0});
-  }
-}
-
-// A jaw that has been turned returns to its angle by a large rotation, and what it holds undoes that to first
-// order. The displacement along the arc beyond it, h w x (w x r) / 2, would remain as creep, so this part of
-// the motion counts to first order. The jaw follows the frame along the whole arc; if the frame yields, by
-// the spin at the end of the sub-step, not by the one without contact (bend).
-void ToolTouch::straighten(Moved &m) const {
-  if (m.jaws.empty()) return;
-  const dfm_rigid_state &frame = m.set->state[0];
-  for (const Moved::Jaw &jaw : m.jaws) {
-    double *const v = &m.free[6 * size_t{jaw.part}];
-    const Vec3 spin = load3(&m.free[3]), arm = load3(m.set->state[jaw.part].position) - load3(frame.position);
-    // about the hinge, as seen from the frame
-    const Quat own = rotation_of(m.set->state[jaw.part]), to = turned(own, h_ * load3(v + 3));
-    const Quat seen = conjugate(turned(rotation_of(frame), h_ * spin)) * to,
-               before = conjugate(rotation_of(frame)) * own;
-    const double rate = (1 / h_) * rotation_vector(seen * conjugate(before)).y;
-    const Vec3 carried = m.responds ? h_ * cross(spin, arm) : rotate(turned(Quat{}, h_ * spin), arm) - arm;
-    store3(v, load3(&m.free[0]) + (1 / h_) * carried + rate * jaw.lever);
-    store3(v + 3, spin + rate * jaw.axis);
-  }
-}
-
 // The impulses of a set: those of soft bodies and those of the rows.
 void ToolTouch::add_impulses(size_t k) {
   if (!sides_[k].set) return;
   RigidSet &set = *sides_[k].set;
   std::copy(sides_[k].given.begin(), sides_[k].given.end(), set.impulse.begin());
+  add_rows_to(k, set);
+}
+
+void ToolTouch::add_rows_to(size_t k, RigidSet &set) const {
   for (const Row &row : rows_)
     for (const Side *side : {&row.a, &row.b}) {
       if (side->tool != k) continue;
@@ -298,8 +261,9 @@ void ToolTouch::add_impulses(size_t k) {
 }
 
 // The mean spin of a free rigid body is not linear in its impulses, because its moments of inertia turn with
-// it. The difference between the spin that its host computes from the present impulses and the one assumed
-// here counts in the next pass; otherwise a thin body would oscillate. Returns the largest change, m/s.
+// it; the mean velocities of bodies with joints are not either, because joints hold at the end of the
+// sub-step. The difference between what the host computes from the present impulses and what was assumed here
+// counts in the next pass; otherwise a thin body would oscillate. Returns the largest change, m/s.
 double ToolTouch::follow_spin() {
   double most = 0;
   for (size_t k = 0; k < sides_.size(); ++k) {
@@ -311,6 +275,13 @@ double ToolTouch::follow_spin() {
     for (uint32_t i = 0; i < m.set->defs.size(); ++i) {
       if (!(m.reach[i] > 0)) continue;
       const size_t at = 6 * size_t{i} + 3;
+      if (m.jointed[m.set->group[i]]) {
+        const Vec3 goes = load3(m.set->next[i].position) - load3(m.set->state[i].position);
+        const Vec3 change = (1 / h_) * goes - load3(&m.base[at - 3]) - load3(&m.change[at - 3]);
+        add(change, &m.base[at - 3]);
+        add(change, &m.turn[at - 3]);
+        most = std::max(most, norm(change));
+      }
       const Quat turned = rotation_of(m.set->next[i]) * conjugate(rotation_of(m.set->state[i]));
       const Vec3 taken = load3(&m.base[at]) + load3(&m.change[at]);
       const Vec3 change = (1 / h_) * nearest_turn(rotation_vector(turned), h_ * taken) - taken;
@@ -413,17 +384,28 @@ void ToolTouch::add_row(const Pair &pair, Name name, Side a, Side b, const Place
     row.rate = (offset_ - gap) / h_;
   } else if (gap >= offset_) row.rate = -(gap - offset_) / h_;
   else if (gap < 0.5 * offset_) row.rate = std::min(0.5 * offset_ - gap, kOpens * offset_) / planned_;
-  const double w = dot(normal, answer_to(row, normal));
-  if (!(w > 0)) return;  // neither yields
-  row.inverse = 1 / (w + row.soft);
-  if (row.frees && row.rate > 0) row.opens = kOpens * offset_ / (planned_ * kOpenUpTo * row.inverse);
   row.tangent[0] = any_tangent(normal);
   row.tangent[1] = cross(normal, row.tangent[0]);
+  set_answers(row);
+  if (!(row.inverse > 0)) return;  // neither yields
+  rows_.push_back(row);
+}
+
+// How the two sides yield along the normal (inverse 0: they do not) and in the tangent plane.
+void ToolTouch::set_answers(Row &row) {
+  const double w = dot(row.normal, answer_to(row, row.normal));
+  const bool held = !(w > rounding_of(row, row.normal));
+  row.inverse = row.response = 0;
+  if (!row.jaw) row.soft = held && motor_holds(row) ? give_of_motor(row) : 0;
+  if (held && !(row.soft > 0)) return;
+  row.inverse = 1 / (w + row.soft);
+  if (held) return;
+  if (row.frees && row.rate > 0) row.opens = kOpens * offset_ / (planned_ * kOpenUpTo * row.inverse);
   const Vec3 first = answer_to(row, row.tangent[0]), second = answer_to(row, row.tangent[1]);
   const double p = dot(row.tangent[0], first), q = dot(row.tangent[1], second),
                both = dot(row.tangent[0], second);
   row.response = 0.5 * (p + q) + std::sqrt(0.25 * (p - q) * (p - q) + both * both);
-  rows_.push_back(row);
+  if (!(row.response > rounding_of(row, row.tangent[0]))) row.response = 0;
 }
 
 // Finds the features of each shape that are this near to the box of the other. Returns false if there are
@@ -453,6 +435,7 @@ double ToolTouch::add_rows(const Pair &pair, ToolShape &a, ToolShape &b, Side at
   const double reach = 2 * h_ * (fastest(a, at_a, b) + fastest(b, at_b, a)) + offset_;
   const double far = reach + offset_;
   if (!look_at_each_other(a, b, far, pair.jaw)) return 0;
+  for (const Side *side : {&at_a, &at_b}) take_response(*side);
   double deepest = 0;
   ObstaclePoint o;
   // A corner meets an edge or a corner of the other only on its leading side. Other near features are not in
@@ -601,10 +584,16 @@ void ToolTouch::solve() {
   const double done = kDone * scale;
   double before = HUGE_VAL;
   newton_.yields = 0;
+  uint32_t revisions = 0;
   for (uint32_t pass = 0; pass < kMostPasses; ++pass) {
     double changed = 0;
+    if (pass > 0 && revisions < kMostRevisions && (decide_motors() || press_harder())) {
+      ++revisions;
+      pass = 0;
+    }
     for (Row &row : rows_) changed = std::max(changed, follow_arc(row));
     if (pass > 0) changed = std::max(changed, follow_spin());
+    for (Moved &m : sides_) m.stale = m.stale || revisions == kMostRevisions;
     changed = std::max(changed, ask_laws(done));
     if (pass > 0 && (!(changed > done) || !(changed < kFaster * before))) return;
     if (pass > 0) before = changed;
@@ -624,9 +613,11 @@ void ToolTouch::take_sets(World &w, StepContext &step) {
     m.turn.assign(6 * n, 0.0);
     m.given.assign(6 * n, 0.0);
     m.reach.assign(n, 0.0);
-    m.touched = m.responds = false;
+    m.touched = m.responds = m.drives = m.stale = false;
     m.jaws.clear();
     m.response.clear();
+    m.basis.clear();
+    m.jointed.clear();
     if (!m.set) {
       m.center.resize(n);
       m.belt.resize(n);
@@ -644,16 +635,16 @@ void ToolTouch::take_sets(World &w, StepContext &step) {
     std::copy(set.velocity.begin(), set.velocity.end(), m.free.begin());
     m.first.assign(set.ngroup, kNone);
     m.wide.assign(set.ngroup, 0);
+    list_joints(m);
+    bool later = false;
     for (uint32_t i = 0; i < n; ++i) {
       const uint32_t g = set.group[i];
-      if (g == DFM_RIGID_STILL || m.wide[g] > 0 || !(set.of_tool || alone(set, i))) continue;
-      const uint32_t bodies = step.rigid_groups[set.first_group + g];
-      m.wide[g] = 6 * size_t{bodies};
-      const size_t at = m.response.size();
-      m.response.resize(at + m.wide[g] * m.wide[g], 0.0);
-      if (set.respond(g, bodies, &m.response[at])) m.first[g] = at;
+      if (g == DFM_RIGID_STILL || m.wide[g] > 0) continue;
+      m.wide[g] = 6 * size_t{step.rigid_groups[set.first_group + g]};
+      if (m.jointed[g]) later = true;  // where something is near
+      else ask_response(m, g);
     }
-    m.responds = std::any_of(m.response.begin(), m.response.end(), [](double x) { return x != 0; });
+    m.responds = later || std::any_of(m.response.begin(), m.response.end(), [](double x) { return x != 0; });
     for (const auto &t : w.tools)
       if (t->set == m.set && t->has_jaws()) list_jaws(m);
     straighten(m);
@@ -702,6 +693,7 @@ bool ToolTouch::begin(World &w, StepContext &step) {
   if (pairs_.empty()) return true;
   h_ = step.h;
   planned_ = step.guard.planned;
+  strong_ = 1;
   take_sets(w, step);
   tell_driven(w, step);
   find(w, step);
@@ -727,9 +719,22 @@ void ToolTouch::correct() {
     if (!m.set) continue;
     m.free.assign(m.set->velocity.begin(), m.set->velocity.end());
     straighten(m);
+    if (!m.drives) continue;
+    ask_again(m);
+    renew_rows();
   }
   give_velocities();
   for (Row &row : rows_) row.before = row.given();
+}
+
+// base: what the set does without the rows.
+void ToolTouch::set_base(size_t k) {
+  Moved &m = sides_[k];
+  for (size_t i = 0; i < m.free.size(); ++i) m.base[i] = m.free[i] + m.turn[i];
+  for (uint32_t i = 0; i < m.set->defs.size(); ++i) {
+    const double *const p = &m.given[6 * size_t{i}];
+    push({k, i, {}, {}}, load3(p), load3(p + 3), &Moved::base, false);
+  }
 }
 
 bool ToolTouch::answer(const World &w, const StepContext &step) {
@@ -737,12 +742,9 @@ bool ToolTouch::answer(const World &w, const StepContext &step) {
   for (size_t k = 0; k < sides_.size(); ++k) {
     Moved &m = sides_[k];
     if (!m.set) continue;
-    for (size_t i = 0; i < m.free.size(); ++i) m.base[i] = m.free[i] + m.turn[i];
     m.given.assign(m.set->impulse.begin(), m.set->impulse.end());
-    for (uint32_t i = 0; i < m.set->defs.size(); ++i) {
-      const double *const p = &m.given[6 * size_t{i}];
-      push({k, i, {}, {}}, load3(p), load3(p + 3), &Moved::base, false);
-    }
+    if (m.drives && m.touched) take_host(k);
+    else set_base(k);
   }
   solve_past_hits(w, step);
   for (size_t k = 0; k < sides_.size(); ++k) add_impulses(k);
@@ -754,26 +756,6 @@ bool ToolTouch::answer(const World &w, const StepContext &step) {
     most = std::max(most, norm(row.given() - row.before) / row.inverse);
   }
   return most > kSame * scale;
-}
-
-void ToolTouch::turn_jaws() {
-  if (rows_.empty()) return;
-  for (Moved &m : sides_)
-    for (const Moved::Jaw &jaw : m.jaws) {
-      if (jaw.moment == 0) continue;
-      const dfm_rigid_state &frame = m.set->next[0];
-      dfm_rigid_state &s = m.set->next[jaw.part];
-      const Vec3 axis = rotate(rotation_of(frame), {0, 1, 0});
-      const double rate = jaw.give * jaw.moment;
-      const Quat by = turned(Quat{}, h_ * rate * axis);
-      const Vec3 arm = load3(s.position) - load3(frame.position), now = rotate(by, arm);
-      store3(s.position, load3(frame.position) + now);
-      const Quat q = by * rotation_of(s);
-      const double values[] = {q.x, q.y, q.z, q.w};
-      std::copy(values, values + 4, s.rotation);
-      add((1 / h_) * (now - arm), s.velocity);
-      add(rate * axis, s.spin);
-    }
 }
 
 }  // namespace dfm

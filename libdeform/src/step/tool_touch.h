@@ -1,8 +1,8 @@
-// Contact between two rigid things, at least one of which can yield: tools (deform/tool.h) and free bodies
-// (those of the builtin host that no joint holds), with each other and with whatever does not yield
-// (obstacles, fixed bodies). A coupled tool yields by its spring, a free body by its mass; a tool without a
-// coupling follows its poses exactly and does not yield. Shapes are spheres, capsules, boxes and triangles;
-// obstacles may also be planes and voxels, which only corners touch.
+// Contact between two rigid things, at least one of which can yield: tools (deform/tool.h) and bodies of the
+// builtin host, with each other and with whatever does not yield (obstacles, fixed bodies). A coupled tool
+// yields by its spring, a body by its mass and as its joints allow; a tool without a coupling follows its
+// poses exactly and does not yield. Shapes are spheres, capsules, boxes and triangles; obstacles may also be
+// planes and voxels, which only corners touch.
 //
 //   rows     u_n' >= -(gap - d_c) / h at the nearest places of two parts, p >= 0, one of both is zero; the
 //            impulse acts at one point of both, so that both momenta are kept to rounding
@@ -19,6 +19,7 @@
 //            without mass, backward Euler); soft bodies do not. The face of a jaw yields as well, by a
 //            hundredth of a millimeter per newton; otherwise it would be undefined how rigid things share a
 //            load. Jaws of a tool without a coupling pass through obstacles, as the tool does
+//   joints   bodies that joints connect are one group, whose response contains the joints (tool_joints.cpp)
 //   order    The rows are solved first without soft bodies, whose contacts then use the resulting motion of
 //            tools; the impulses of soft bodies come back into the same rows, until neither changes the other
 #pragma once
@@ -55,6 +56,10 @@ class ToolTouch {
   // Called when the sets hold the impulses of soft bodies: solves the rows again and adds their impulses.
   // Returns whether these differ from those in the velocities, so that soft bodies must be solved again.
   bool answer(const World &w, const StepContext &step);
+  // Called where the motors of a set are decided again because of soft bodies: adds the impulses of the rows
+  // to set.impulse, and their velocities to set.revised if the motors have changed.
+  void add_to_impulses(RigidSet &set) const;
+  void add_to_revised(RigidSet &set);
   // Whether the sub-step is short enough for the spin of what touches. False: as for begin().
   bool follows_arcs(const World &w, StepContext &step) const;
   // Called after the hosts have ended their sub-step: whether no fast free body has passed through something.
@@ -99,16 +104,22 @@ class ToolTouch {
     Vec3 given() const { return impulse * normal + along[0] * tangent[0] + along[1] * tangent[1]; }
   };
   struct Moved {
-    RigidSet *set;                           // nullptr: things that do not yield
-    std::vector<Vec3> center, belt;          // [n] of these things; m/s
-    std::vector<double> response;            // [6 bodies,6 bodies] 1/kg, of one group after another
-    std::vector<size_t> first, wide;         // [groups] where it begins (kNone: none), 6 bodies
+    RigidSet *set;                    // nullptr: things that do not yield
+    std::vector<Vec3> center, belt;   // [n] of these things; m/s
+    std::vector<double> response;     // [6 bodies,6 bodies] 1/kg, of one group after another
+    std::vector<size_t> first, wide;  // [groups] where it begins (kNone: none), 6 bodies
+    std::vector<uint8_t> jointed;     // [groups]
+    // response = basis basis^T for groups with joints: [6 bodies,rank], of one group after another
+    std::vector<double> basis;
+    std::vector<size_t> basis_first, rank;   // [groups] where it begins (kNone: not computed yet)
     std::vector<double> free, base, change;  // [6n] m/s, rad/s
     std::vector<double> turn;                // [6n] what impulses change beyond the response
     std::vector<double> given;               // [6n] N s, N m s of soft bodies
     std::vector<double> reach;               // [n] m, of its rows from its center
     bool responds;                           // the response is not zero
     bool touched;                            // a row is its own
+    bool drives;                             // it has motors
+    bool stale;                              // the host may have decided about motors since
     struct Jaw {
       uint32_t part;
       Vec3 axis, lever;  // velocity of its center by a turn of one about the axis
@@ -169,6 +180,9 @@ class ToolTouch {
   Vec3 spin(const Side &side) const;
   Vec3 belt(const Side &side) const;
   void add_impulses(size_t k);
+  void add_rows_to(size_t k, RigidSet &set) const;
+  void set_base(size_t k);
+  void set_answers(Row &row);
   double follow_spin();
   double sweep();
   void sweep_until(double done);
@@ -181,16 +195,24 @@ class ToolTouch {
     size_t tool, at, size;  // at: first of its unknowns
     uint32_t group, jaw, part, island;
     Vec3 center;
-    bool solved;  // of an island
-    Vec3 spin;    // rad/s, so far
-    Quat turn;    // by it in the sub-step
+    bool solved;   // of an island
+    bool jointed;  // its unknowns are those of the basis of its group
+    Vec3 spin;     // rad/s, so far
+    Quat turn;     // by it in the sub-step
   };
   struct Lever {
     uint32_t motion;
-    bool of_a;          // else of b
-    double by[3][6];    // m/s along normal and tangents, by its unknowns
-    double bent[3][3];  // what turning adds to it beyond the first order, by the spin so far
+    bool of_a;      // else of b
+    size_t values;  // in lever_values_, where they begin
   };
+  // [3,size] m/s along normal and tangents by the unknowns of its motion; and what turning adds to it beyond
+  // the first order, by the spin so far.
+  const double *by(const Lever &lever, size_t c) const {
+    return &lever_values_[lever.values + c * motions_[lever.motion].size];
+  }
+  double *bent(const Lever &lever, size_t c) {
+    return &lever_values_[lever.values + (3 + c) * motions_[lever.motion].size];
+  }
   std::array<uint32_t, 2> movers_of(const Side &side);
   uint32_t island_of(uint32_t motion);
   void list_motions();
@@ -212,10 +234,12 @@ class ToolTouch {
     std::vector<uint8_t> joined;      // [motions,motions] while that is found
     std::vector<size_t> first, live;  // [n] place of the motion that an unknown is of; scratch
     std::vector<double> mass, system, x, left, from, force, good;  // [n,n], [n,n], [n], ...
+    std::vector<double> slopes;                                    // [n,3]
   };
   void order_motions(uint32_t island);
   void put_masses();
   void turn_motions();
+  Vec3 spin_of(const Motion &motion, const Side &side) const;
   bool number_unknowns(uint32_t island);
   bool set_masses(uint32_t island);
   void start_rows(uint32_t island);
@@ -234,6 +258,23 @@ class ToolTouch {
   bool solve_rounds(double done);
   bool newton(uint32_t island, double done);
   void leap(double done);
+  // tool_joints.cpp
+  bool belong_together(const World &w, const Obstacle &a, const Obstacle &b);
+  static void list_joints(Moved &m);
+  static void ask_response(Moved &m, uint32_t group);
+  void take_response(const Side &side);
+  double answer_without_joints(const Side &side, Vec3 along) const;
+  bool jointed(const Side &side) const;
+  double rounding_of(const Row &row, Vec3 along) const;
+  bool motor_holds(const Row &row) const;
+  double give_of_motor(const Row &row) const;
+  void renew_rows();
+  bool press_harder();
+  void ask_again(Moved &m);
+  static void find_basis(Moved &m, uint32_t group);
+  const double *basis_of(const Moved &m, uint32_t part) const;
+  void take_host(size_t k);
+  bool decide_motors();
   // tool_swept.cpp
   static double thickness(const Obstacle &o);
   // tool_hits.cpp
@@ -266,6 +307,7 @@ class ToolTouch {
   double h_ = 0, offset_ = 0;
   double planned_ = 0;        // s, the sub-step before it was shortened
   std::vector<double> ways_;  // [obstacles] m, of any point in the sub-step
+  double strong_ = 1;         // of the answer without joints, that places give where a motor holds
   double thinnest_ = 0;       // m, of the pairs of free bodies
   std::vector<Pair> pairs_,
       passing_;                   // passing: nothing keeps the two apart, and no filter excludes them
@@ -277,6 +319,7 @@ class ToolTouch {
   std::vector<Hit> hits_;
   std::vector<Motion> motions_;
   std::vector<Lever> levers_;
+  std::vector<double> lever_values_;
   std::vector<uint32_t> first_lever_;  // [rows+1]
   NewtonScratch newton_;
   std::vector<std::array<uint64_t, 2>> told_;  // pairs that have met and pass each other
