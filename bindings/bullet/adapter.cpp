@@ -80,7 +80,7 @@ void Adapter::before_tick(btDynamicsWorld *world, btScalar h) {
     a->of_call_ = a->of_tick_;
     a->call_sentence_ = a->sentence_;
   }
-  // without bodies that take part Bullet has not been stepped: the tick is its own
+  // without bodies that take part, the adapter has not stepped Bullet: the tick does it
   if (a->of_tick_ < 0 || !a->engine_.members.empty())
     a->vacated_ = std::make_unique<Vacated>(*a->engine_.world);
 }
@@ -124,7 +124,7 @@ Adapter::Traits Adapter::traits_of(const btCollisionObject *object) const {
 
 dfm_status Adapter::sync() { return look(0); }
 
-// Most worlds list their objects in the order in which they came.
+// Most worlds list their objects in the order in which they were added.
 Adapter::Object *Adapter::known(const btCollisionObject *object, int place) const {
   if (size_t(place) < objects_.size() && objects_[size_t(place)]->id == object)
     return objects_[size_t(place)].get();
@@ -132,7 +132,7 @@ Adapter::Object *Adapter::known(const btCollisionObject *object, int place) cons
   return at == by_id_.end() ? nullptr : at->second;
 }
 
-// Refuses before anything has changed.
+// Returns an error before anything has changed.
 dfm_status Adapter::check() const {
   const btCollisionObjectArray &all = engine_.world->getCollisionObjectArray();
   std::vector<Part> parts;
@@ -148,10 +148,10 @@ dfm_status Adapter::check() const {
   return DFM_OK;
 }
 
-// To the bit: they have no padding.
+// Compares bytes: Traits has no padding.
 bool Adapter::same(const Traits &a, const Traits &b) { return std::memcmp(&a, &b, sizeof a) == 0; }
 
-// Is the shape what the object's obstacles have been made of?
+// Whether the obstacles of the object were made of this shape.
 bool Adapter::has_parts(const Object &o, const btCollisionShape *shape) {
   if (!o.traits.takes_part) return o.parts.empty();
   if (is_still(shape, o.parts)) return true;
@@ -160,7 +160,7 @@ bool Adapter::has_parts(const Object &o, const btCollisionShape *shape) {
   return parts_of(shape, {}, seen_, unknown) && o.parts == seen_;
 }
 
-// Nothing that is out of the world is touched: objects are known alive because the world lists them.
+// Reads only objects that the world lists: any other one may have been deleted by its owner.
 dfm_status Adapter::look(double h) {
   const Timer timer(sync_seconds_);
   TRY(check());
@@ -263,7 +263,7 @@ dfm_status Adapter::bind(const btCollisionObject *id) {
   o.pose = from_bullet(id->getWorldTransform());
   const btCollisionShape *unknown = nullptr;
   if (o.traits.takes_part) parts_of(id->getCollisionShape(), {}, o.parts, unknown);
-  objects_.push_back(std::move(made));  // so that what follows is dropped again where it ends halfway
+  objects_.push_back(std::move(made));  // so that the parts made from here on are dropped with it on failure
   by_id_[id] = &o;
   o.found = o.stale = true;
   if (o.traits.moves && !o.parts.empty()) TRY(bind_body(o));
@@ -272,7 +272,7 @@ dfm_status Adapter::bind(const btCollisionObject *id) {
   return DFM_OK;
 }
 
-// What no force moves, moved by the caller: its surface comes along within the next step.
+// An object that forces do not move was moved by the caller: its surface follows within the next step.
 dfm_status Adapter::follow(Object &o, double h) {
   if (o.body || o.obstacles.empty() || h == 0) return DFM_OK;
   const Pose target = from_bullet(o.id->getWorldTransform());

@@ -1,5 +1,5 @@
-// A world of Bullet joined to a dfm_world: each tick looks at its objects first, and what it finds changed
-// there is changed here.
+// A world of Bullet joined to a dfm_world: each tick first compares its objects with the last tick, and makes
+// the same changes in the dfm_world.
 //
 // A tick of stepSimulation calls back before and after it. Before it the adapter steps the dfm_world, and
 // with it Bullet, by the engine. What the tick does between the two callbacks is done already: it finds an
@@ -18,7 +18,7 @@
 
 namespace dfm_bullet_detail {
 
-// A world without content, as long as this lives.
+// Empties a world for its lifetime.
 class Vacated {
  public:
   explicit Vacated(btDiscreteDynamicsWorld &world);
@@ -33,7 +33,7 @@ class Vacated {
   btAlignedObjectArray<btActionInterface *> actions_;
   btAlignedObjectArray<btPersistentManifold *> predictive_;
   btAlignedObjectArray<btCollisionObject *> objects_;
-  btMultiBodyDynamicsWorld *multi_;  // null: it is none
+  btMultiBodyDynamicsWorld *multi_;  // null: the world has no multibodies
   btAlignedObjectArray<btMultiBody *> multi_bodies_;
   btAlignedObjectArray<btMultiBodyConstraint *> multi_constraints_;
   btDispatcher *dispatcher_;
@@ -59,7 +59,7 @@ class Adapter {
   const btDynamicsWorld *bullet() const { return engine_.world; }
 
  private:
-  // All that makes an object's obstacles what they are, apart from its pose.
+  // All properties that an object's obstacles follow from, except its pose.
   struct Traits {
     double mass = 0;
     Vec moments, along, about;
@@ -74,13 +74,13 @@ class Adapter {
     Traits traits;
     std::vector<Part> parts;
     std::vector<dfm_obstacle> obstacles;  // empty: takes no part
-    Pose pose;                            // of one that forces do not move: where its obstacles were sent
+    Pose pose;                            // of an object that forces do not move: target of its obstacles
     std::vector<Pose> local;              // of its leaves
     std::vector<Pose> sent;
     std::unique_ptr<Body> body;
     bool found = false, stale = false;
   };
-  struct Props {  // what the caller has said; kept while the object is in the world
+  struct Props {  // set by the caller; kept while the object is in the world
     bool ignore = false;
     std::string name;
     dfm_material material = 0;

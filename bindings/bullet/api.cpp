@@ -14,8 +14,8 @@ const EngineKind &bullet_kind() {
   return kind;
 }
 
-// Names that take a btScalar differ between the builds, all others are the same: with both in one process the
-// calls of one reach the other.
+// The two builds of Bullet share all symbols whose arguments contain no btScalar: with both in one process,
+// calls of one build would reach the other.
 dfm_status check_bullet() {
   if (!dlsym(RTLD_DEFAULT, "_ZN11btRigidBody12applyDampingEf") ||
       !dlsym(RTLD_DEFAULT, "_ZN11btRigidBody12applyDampingEd"))
@@ -36,7 +36,7 @@ dfm_status with(dfm_bullet handle, F &&f) noexcept {
   return dfm_rigid_detail::with<Adapter>(bullet_kind(), handle, f);
 }
 
-// Ends of structs in 0.1: what a caller has that says no more (deform/base.h, "structs of another version").
+// Ends of structs in 0.1, the smallest that a caller may have (deform/base.h, "structs of another version").
 constexpr uint32_t kFirstDef = offsetof(dfm_bullet_def, version) + sizeof(uint32_t);
 constexpr uint32_t kFirstStats = offsetof(dfm_bullet_stats, bullet_seconds) + sizeof(double);
 

@@ -13,7 +13,7 @@ void draw_line(void *drawer, const double a[3], const double b[3], uint32_t rgb)
                                                 btVector3(part(16), part(8), part(0)));
 }
 
-// Every edge once: a closed surface has it in two triangles, once in rising order.
+// Draws each edge once: a closed surface has it in two triangles, in one of them in ascending order.
 dfm_status draw_surface(dfm_body body, btIDebugDraw &drawer) {
   uint32_t points = 0, triangles = 0;
   TRY(dfm_surface_positions(body, 0, nullptr, &points));

@@ -12,9 +12,9 @@ namespace dfm_bullet_detail {
 namespace {
 
 constexpr double kIdleSpeed = 0.01, kIdleSpin = 0.05;  // m/s, rad/s
-// of an axis about which a body does not turn, per kg: its inverse is none beside others
+// moment of inertia per kg about an axis without rotation: its inverse is negligible
 constexpr double kHuge = 1e12;  // m2
-// roundings of btScalar below which a motion beside the velocity is none
+// roundings of btScalar; a motion beside the velocity that is smaller counts as none
 constexpr double kRoundings = 8, kEpsilon = std::numeric_limits<btScalar>::epsilon();
 constexpr int kGyroscopic = BT_ENABLE_GYROSCOPIC_FORCE_EXPLICIT | BT_ENABLE_GYROSCOPIC_FORCE_IMPLICIT_WORLD |
                             BT_ENABLE_GYROSCOPIC_FORCE_IMPLICIT_BODY;
@@ -29,7 +29,7 @@ bool may_sleep(const btRigidBody *b) {
 void put_in(btRigidBody *b, const btTransform &t, const btVector3 &v, const btVector3 &w) {
   b->setLinearVelocity(v);
   b->setAngularVelocity(w);
-  b->setCenterOfMassTransform(t);  // and its inertia, and what motion states go on from
+  b->setCenterOfMassTransform(t);  // also sets its inertia, and the place from which motion states continue
 }
 
 // The rest of the motion from a to b in h beside velocities v and w: 0 within rounding.
@@ -111,7 +111,7 @@ void BulletMember::put(const dfm_rigid_state &s) {
   put_state = s;
 }
 
-// Bullet's inertia is diagonal in the body's own frame; an axis of none is one that does not turn.
+// Bullet's inertia is diagonal in the body's own frame; 0 marks an axis without rotation.
 void BulletMember::read() {
   inertia.mass = 1.0 / body->getInvMass();
   const Vec inverse_moments = from_bullet(body->getInvInertiaDiagLocal());
@@ -155,7 +155,7 @@ void LinkMember::read() {
   inertia.moments = from_bullet(link < 0 ? body->getBaseInertia() : body->getLinkInertia(link));
 }
 
-// Weight and forces of the caller reach it through its joints: all but gravity is in what these did last.
+// Weight and forces of the caller act on it through its joints, whose last effect contains all but gravity.
 Facts LinkMember::facts() const {
   Facts f;
   f.enabled = body->isAwake();
@@ -176,7 +176,7 @@ void LinkMember::push(Vec force, Vec torque) {
   }
 }
 
-// Are the bodies those of the last time? Looks at addresses alone, so that nothing that is gone is touched.
+// Whether the bodies are those of the last call. Compares addresses only: some may have been deleted.
 bool BulletEngine::is_gathered() {
   const btAlignedObjectArray<btRigidBody *> &all = world->getNonStaticRigidBodies();
   bool same = gathered_ == members && listed_.size() == size_t(all.size());
@@ -256,7 +256,7 @@ void BulletEngine::prepare(const dfm_rigid_step &step) {
   pull_awake();
 }
 
-// Who has a contact or a constraint, and whom something kinematic wakes by touching it.
+// Finds bodies that have a contact or a constraint, and those that a kinematic body wakes by touch.
 void BulletEngine::find_touched() {
   for (Saved &s : saved_) s.touched = false;
   const auto touch = [&](const btCollisionObject *a, const btCollisionObject *b) {
@@ -285,7 +285,7 @@ void BulletEngine::find_touched() {
     if (s.member) s.member->touched = s.touched;
 }
 
-// Whatever is in one island with something awake is awake, as Bullet has it when it builds its islands.
+// Wakes all bodies in one island with an awake body, as Bullet does when it builds its islands.
 void BulletEngine::pull_awake() {
   bool sleepers = false;
   for (const Saved &s : saved_) {
@@ -350,8 +350,8 @@ void BulletEngine::put_forces(double) {
     if (m->wakes) m->body->wakeUp();
 }
 
-// Of what predictUnconstraintMotion does, the constraints see the velocities alone: integrateTransforms does
-// not read the predicted transforms, and whatever puts a body somewhere sets them again.
+// Constraints read only the velocities that predictUnconstraintMotion computes: integrateTransforms does not
+// read the predicted transforms, and every call that places a body sets them again.
 void BulletEngine::predict_again(double h) {
   if (predicted_ != h) {
     (world->*Opened::predict())(static_cast<btScalar>(h));

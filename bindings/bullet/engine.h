@@ -6,11 +6,11 @@
 // constraints ends where the solve has it, to the bit. What Bullet moves beside its velocities (split
 // impulses, continuous collision) is seen as the rest of its motion, where that is above rounding.
 //
-// Sleep is Bullet's, by islands and gDeactivationTime. Its thresholds (0.8 m/s) are those of heaps of rigid
-// bodies: here a sleeper wakes at kIdleSpeed and kIdleSpin, and what soft bodies touch and is faster than
-// that does not fall asleep.
+// Bodies fall asleep by Bullet's rules: islands and gDeactivationTime. Its thresholds (0.8 m/s) are made for
+// heaps of rigid bodies: here a sleeping body wakes at kIdleSpeed and kIdleSpin, and a faster body that soft
+// bodies touch does not fall asleep.
 //
-// Gyroscopic terms are out of Bullet's solve where the body has them on; see ode/engine.h.
+// Bullet's gyroscopic terms are switched off during its solve; see ode/engine.h.
 #pragma once
 #include <functional>
 #include <unordered_map>
@@ -32,7 +32,7 @@ struct Stand {
   bool holds(const btTransform &t, const btVector3 &v_now, const btVector3 &w_now) const;
 };
 
-// What the engine has of a member before it knows which kind that is.
+// What all kinds of members share.
 struct AnyMember : Member {
   explicit AnyMember(bool of_multibody) : is_link(of_multibody) {}
   const bool is_link;
@@ -57,8 +57,8 @@ struct BulletMember : AnyMember {
   void read();  // mass, moments, axes that are free
 };
 
-// A link of a multibody, or its base (-1): jointed to the others like bodies by constraints, and like those
-// in the solve with its own mass and what the joints did last.
+// A link of a multibody, or its base (-1). In the solve it is like a body with constraints: its own mass, and
+// the last effect of its joints.
 struct LinkMember : AnyMember {
   LinkMember() : AnyMember(true) {}
   btMultiBody *body = nullptr;
@@ -66,7 +66,7 @@ struct LinkMember : AnyMember {
   Vec gravity;
 
   dfm_rigid_state state() const override;
-  void put(const dfm_rigid_state &) override {}  // its joints say where it is
+  void put(const dfm_rigid_state &) override {}  // its joints determine its place
   const dfm_rigid_state &end() override { return ended; }
   bool enabled() const override { return body->isAwake(); }
   Facts facts() const override;
@@ -95,7 +95,7 @@ class BulletEngine : public Engine {
   void run(double h) override;
   void turned(Member &m, Quat to, Vec spin) override;
   void rest(double h) override;
-  void give_back() override {}  // they have never been taken
+  void give_back() override {}  // forces were never taken from the bodies
   void close() override {}
 
  private:
@@ -116,7 +116,7 @@ class BulletEngine : public Engine {
   std::vector<std::pair<btVector3, btVector3>> before_actions_;
   MultiState multi_;
   double predicted_ = 0;      // s: damped_v and damped_w are v and w after this time; 0: they are not known
-  bool has_islands_ = false;  // Bullet's islands are those of now, and not sorted yet
+  bool has_islands_ = false;  // Bullet's islands are up to date, but not sorted yet
   std::vector<Saved> saved_;  // every body that may move, members first
 
   std::vector<BulletMember *> bodies_;  // of members

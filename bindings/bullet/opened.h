@@ -1,4 +1,4 @@
-// Bullet as the adapter's parts see it: its vectors, and what btDiscreteDynamicsWorld keeps to its own class.
+// Conversions of Bullet's vectors, and access to protected functions of btDiscreteDynamicsWorld.
 #pragma once
 #include <BulletDynamics/Featherstone/btMultiBody.h>
 #include <BulletDynamics/Featherstone/btMultiBodyDynamicsWorld.h>
@@ -23,8 +23,8 @@ inline btTransform to_bullet(const Pose &p) {
   return btTransform(to_bullet(p.rotation), to_bullet(p.position));
 }
 
-// The stages of a tick (btDiscreteDynamicsWorld::internalSingleStepSimulation) are protected, and virtual: a
-// class that derives from the world may name them, and calls reach what the caller's world is. Never made.
+// The stages of a tick (btDiscreteDynamicsWorld::internalSingleStepSimulation) are protected and virtual. A
+// derived class may name them, and calls reach the class of the caller's world. No object of it is made.
 struct Opened : btDiscreteDynamicsWorld {
   using Stage = void (btDiscreteDynamicsWorld::*)(btScalar);
   static Stage predict() { return &Opened::predictUnconstraintMotion; }

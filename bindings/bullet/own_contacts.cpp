@@ -29,11 +29,11 @@ std::pair<int, int> bodies_of(const btPersistentManifold &m) {
 }
 
 constexpr double kMost = 1e9;
-// A count or a number of a body as it was written; -1: none, in a snapshot from another program.
+// A count, or the number of a body, from a snapshot; -1: it is out of range (a snapshot of another program).
 int number(double x, double most) { return x >= 0 && x <= most ? int(x) : -1; }
 
-// What Bullet computes from these in each step (places in the world, directions of friction) is left out;
-// so is what the bodies of a set do not have (rolling friction, restitution, softness).
+// Leaves out what Bullet computes anew in each step (places in the world, directions of friction) and what
+// the bodies of a set do not have (rolling friction, restitution, softness).
 void write_point(const btManifoldPoint &p, std::vector<double> &out) {
   for (const btVector3 *v : {&p.m_localPointA, &p.m_localPointB, &p.m_normalWorldOnB})
     out.insert(out.end(), {double(v->x()), double(v->y()), double(v->z())});
@@ -132,7 +132,7 @@ void OwnContacts::collided(btCollisionWorld &world) {
   sort();
 }
 
-// Every pair has its manifold by now, with points of this collision alone.
+// Here every pair has its manifold, with points of this collision only.
 void OwnContacts::fill() {
   sort();
   btPersistentManifold **const manifolds = dispatcher_.getInternalManifoldPointer();
@@ -155,7 +155,7 @@ void OwnContacts::fill() {
   }
 }
 
-// The solver takes them in the order of this list.
+// Sorts the list of manifolds: the solver uses its order.
 void OwnContacts::sort() {
   btPersistentManifold **const manifolds = dispatcher_.getInternalManifoldPointer();
   const int n = dispatcher_.getNumManifolds();

@@ -2,11 +2,11 @@
 // of the bodies: a step is then a function of these alone, also after a restore and where a sub-step is
 // repeated. Three things of Bullet's depend on how the world came to where it is, and each is replaced:
 //
-//   which pairs there are   a box of btDbvtBroadphase is larger than the body by what that did earlier, and
-//                           Bullet joins islands by pairs: here a pair is two boxes of now that overlap
-//   the order of pairs and  that of their making: here by the numbers of the bodies
+//   which pairs there are   a box of btDbvtBroadphase is enlarged by earlier motion of the body, and Bullet
+//                           joins islands by pairs; here a pair is two present boxes that overlap
+//   the order of pairs and  Bullet: order of creation; here: by the numbers of the bodies
 //   manifolds
-//   points of a manifold    they stay from step to step: kept, and put back where the world is another one
+//   points of a manifold    they last from step to step: kept as numbers, put back after a restore
 #pragma once
 #include <vector>
 
@@ -14,7 +14,7 @@
 
 namespace dfm_bullet_detail {
 
-struct SortedPairs { btSortedOverlappingPairCache pairs; };  // made before what is handed its address
+struct SortedPairs { btSortedOverlappingPairCache pairs; };  // made before the base that gets its address
 
 // All pairs of boxes that overlap now, by sweeping along x; in the order of the bodies.
 class OverlapsOfNow : private SortedPairs, public btSimpleBroadphase {

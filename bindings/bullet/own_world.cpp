@@ -54,7 +54,7 @@ class BulletWorld : public OwnWorld {
   btDefaultCollisionConfiguration configuration_;
   btCollisionDispatcher dispatcher_;
   OverlapsOfNow broadphase_;
-  // Directly, as dWorldStep: what sweeps leave open would be drift that grows with chains and mass ratios.
+  // Direct, as dWorldStep: the error that sweeps leave is drift, which grows with chains and mass ratios.
   btDantzigSolver direct_;
   btMLCPSolver solver_;
   btDiscreteDynamicsWorld world_;

@@ -1,5 +1,5 @@
-// The host "bullet" (rigid_host/host.h): its table, and sets that bring nothing but their defs (scenes), each
-// a btDiscreteDynamicsWorld of its own with these bodies and joints.
+// The host "bullet" (rigid_host/host.h): its table, and sets that consist of definitions only (from scenes).
+// Each such set is a btDiscreteDynamicsWorld of its own.
 #pragma once
 #include "rigid_host/host.h"
 

@@ -26,7 +26,7 @@ class Collector : public btTriangleCallback {
   Welder welder;
 };
 
-// Bullet's contact has two sides, the library's that to which triangles face: of heights it is up.
+// Turns triangles upward: Bullet touches both sides of them, the library the side to which they face.
 void face_up(Triangles &t, int up) {
   for (size_t i = 0; i < t.corners.size(); i += 3) {
     const auto at = [&](size_t k) { return load(&t.points[size_t{3} * t.corners[i + k]]); };
@@ -38,7 +38,7 @@ void face_up(Triangles &t, int up) {
 
 Triangles of_concave(const btConcaveShape &shape) {
   Collector collector;
-  btVector3 low, high;  // its own: a heightfield counts in them, and larger ones overflow there
+  btVector3 low, high;  // of the shape: a heightfield counts in these bounds, and larger ones overflow
   shape.getAabb(btTransform::getIdentity(), low, high);
   shape.processAllTriangles(&collector, low, high);
   Triangles t = collector.welder.take();
@@ -88,7 +88,7 @@ Triangles of_convex(const btConvexShape &shape) {
   return t;
 }
 
-// From z to the axis that the shape is along.
+// Turns z to the axis along which the shape lies.
 Quat along(int axis) {
   const double h = std::sqrt(0.5);
   return axis == 0 ? Quat{0, h, 0, h} : axis == 1 ? Quat{-h, 0, 0, h} : Quat{};
@@ -140,7 +140,7 @@ bool Part::operator==(const Part &o) const {
 bool is_still(const btCollisionShape *shape, const std::vector<Part> &parts) {
   if (parts.size() != 1 || parts[0].shape != shape || parts[0].type != shape->getShapeType()) return false;
   const double *const size = parts[0].size;
-  switch (parts[0].type) {  // their sizes are those after scaling
+  switch (parts[0].type) {  // sizes include the scaling
     case BOX_SHAPE_PROXYTYPE: {
       const btVector3 now = static_cast<const btBoxShape *>(shape)->getHalfExtentsWithMargin();
       return size[0] == now.x() && size[1] == now.y() && size[2] == now.z();

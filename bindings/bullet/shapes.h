@@ -7,7 +7,7 @@
 
 namespace dfm_bullet_detail {
 
-// One leaf, and all that makes its obstacle what it is: compared in each step, so it holds no arrays.
+// One leaf, with all properties that its obstacle follows from. Compared in each step, so without arrays.
 struct Part {
   const btCollisionShape *shape = nullptr;
   int type = -1, revision = 0;
@@ -19,8 +19,8 @@ struct Part {
 bool parts_of(const btCollisionShape *shape, const Pose &local, std::vector<Part> &out,
               const btCollisionShape *&unknown);
 
-// True: these are the present leaves of the shape. False: only parts_of() can decide. Quick for a sphere, box
-// or capsule, of which most bodies have one.
+// True: these are the present leaves of the shape. False: only parts_of() can decide. A quick test for the
+// sphere, box or capsule that most bodies have.
 bool is_still(const btCollisionShape *shape, const std::vector<Part> &parts);
 
 // The leaf's kind, sizes and local pose. Arrays that are made here are put in `made`, and def points into

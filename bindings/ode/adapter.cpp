@@ -49,7 +49,7 @@ dfm_status Adapter::sync() {
   return status;
 }
 
-// Refuses before anything has changed.
+// Returns an error before anything has changed.
 dfm_status Adapter::check(const std::vector<Signature> &signatures) const {
   for (size_t i = 0; i < seen_.size(); ++i) {
     const Part part = part_of(signatures[i]);
@@ -75,8 +75,8 @@ dfm_status Adapter::check(const std::vector<Signature> &signatures) const {
   return DFM_OK;
 }
 
-// Nothing that ODE has destroyed is touched: geoms are known alive because the space lists them, bodies
-// because a geom names them.
+// Reads only geoms that the space lists and bodies that these geoms name: others may have been destroyed by
+// the caller.
 dfm_status Adapter::look() {
   seen_.clear();
   signatures_.clear();
@@ -236,8 +236,8 @@ dfm_status Adapter::step(double dt) {
     status = dfm_world_step(world_, dt, &trouble);
   }
   ++steps_;
-  // what the bodies say of it comes after the step's own verdict, and one of them does not keep
-  // it from the next
+  // the status of the step comes first, then those of the bodies; an error of one body does not keep the
+  // others from being updated
   dfm_status told = states_.ask(world_);
   for (auto &b : bodies_) {
     const dfm_status of_body = b->after(status, states_);

@@ -1,5 +1,5 @@
-// An ODE world and space joined to a dfm_world: each step looks at the space first, and what it finds changed
-// there is changed here.
+// An ODE world and space joined to a dfm_world: each step first compares the space with the last step, and
+// makes the same changes in the dfm_world.
 #pragma once
 #include <memory>
 #include <string>
@@ -44,11 +44,11 @@ class Adapter {
   struct Geom {
     dGeomID id;
     Signature signature;
-    Pose pose;                  // without a body: where its obstacle was sent
+    Pose pose;                  // of a geom without a body: target of its obstacle
     dfm_obstacle obstacle = 0;  // 0: takes no part
     bool found = false;
   };
-  struct Props {  // what the caller has said; kept while the geom is in the space
+  struct Props {  // set by the caller; kept while the geom is in the space
     bool ignore = false;
     std::string name;
     dfm_material material = 0;

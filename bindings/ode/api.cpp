@@ -15,7 +15,7 @@ dfm_status with(dfm_ode handle, F &&f) noexcept {
   return dfm_rigid_detail::with<Adapter>(ode_kind(), handle, f);
 }
 
-// Ends of structs in 0.1: what a caller has that says no more (deform/base.h, "structs of another version").
+// Ends of structs in 0.1, the smallest that a caller may have (deform/base.h, "structs of another version").
 constexpr uint32_t kFirstDef = offsetof(dfm_ode_def, version) + sizeof(const char *);
 constexpr uint32_t kFirstStats = offsetof(dfm_ode_stats, ode_seconds) + sizeof(double);
 

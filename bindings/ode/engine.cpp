@@ -42,8 +42,8 @@ bool damped(dBodyID b) {
          dBodyGetMaxAngularSpeed(b) < dInfinity;
 }
 
-// ODE's rule, with one sample: only bodies with joints (contacts are some) fall asleep. Who sleeps keeps what
-// it has counted. share: of a step that the sub-step h is. True: idle for long enough.
+// ODE's rule, with one sample: only bodies with joints (contacts are joints, too) fall asleep. A sleeping
+// body keeps its counters. share: of a step that the sub-step h is. True: idle for long enough.
 bool tire(dBodyID b, double h, double share, const OdeEngine::Idle &idle, OdeEngine::Idle &next) {
   next = idle;
   if (!dBodyIsEnabled(b)) return false;
@@ -253,7 +253,7 @@ void OdeEngine::pull_awake() {
   });
 }
 
-// A body sleeps when all that it hangs together with has idled for long enough.
+// A body falls asleep when all bodies connected to it have been idle for long enough.
 void OdeEngine::rest(double h) {
   std::vector<uint8_t> due(saved_.size(), 0);
   bool any = false;
@@ -308,8 +308,8 @@ void OdeEngine::take(Member &any, const dfm_rigid_state &given, const double *ex
   m.start = m.state();
 }
 
-// For the length of an ODE step, whichever way it ends: joints report to the engine what they do, ODE leaves
-// its gyroscopic terms out, and it corrects by the share of the caller's step that this one is.
+// During an ODE step, also if it ends by an exception, joints report their forces to the engine, ODE's
+// gyroscopic terms are off, and ODE corrects by the share of the caller's step that this one is.
 class OdeEngine::Lent {
  public:
   Lent(OdeEngine &engine, double h) : engine_(engine), correction_(dWorldGetERP(engine.world)) {

@@ -1,16 +1,16 @@
 // A dWorldID inside the contact solve (rigid_host/engine.h).
 //
-// Auto-disable is counted here, in sub-steps that count, by ODE's rule: ODE's own counters run on through
+// Auto-disable is counted here by ODE's rule, without repeated sub-steps: ODE's own counters continue through
 // corrections and cannot be read. Its count of steps is one of the caller's steps: in ten short sub-steps a
 // body that begins to fall would not yet be faster than the idle speed. For the same reason ODE corrects per
 // caller's step: its share of a depth per sub-step would be a speed that grows as sub-steps get shorter.
 // Bodies that ODE would wake in its step because they are connected to an awake body are woken before the
 // solve, which would otherwise push bodies at rest.
 //
-// ODE's gyroscopic terms keep angular momentum to first order only. They are out of its step where the
-// caller has them on: free bodies are turned by the shared engine, and of jointed ones ODE solves I(q0) (w1 -
-// w0) = impulses without these terms, after which w = I(q1)^-1 I(q0) w1. What a joint does at two anchors
-// whose distance is its error is a couple; it is taken back from both of its bodies.
+// ODE's gyroscopic terms keep angular momentum to first order only, so its step runs without them. The shared
+// engine turns free bodies. For jointed bodies ODE solves I(q0) (w1 - w0) = impulses, and then w =
+// I(q1)^-1 I(q0) w1. A joint acts at two anchors whose distance is its error; the couple that results is
+// taken back from both of its bodies.
 #pragma once
 #include <functional>
 #include <ode/ode.h>
@@ -40,7 +40,7 @@ class OdeEngine;
 struct OdeMember : Member {
   dBodyID body = nullptr;
   size_t saved = 0;        // where the engine keeps it
-  bool has_ended = false;  // `ended` is what ODE has
+  bool has_ended = false;  // `ended` is the state in ODE
 
   dfm_rigid_state state() const override;
   const dfm_rigid_state &end() override;
@@ -66,7 +66,7 @@ class OdeEngine : public Engine {
   // correction of errors; 0: each sub-step is one
   double callers_step = 0;
   dJointGroupID contacts = nullptr;
-  std::vector<dSpaceID> spaces;  // collided at the start of each sub-step, each in itself
+  std::vector<dSpaceID> spaces;  // at the start of each sub-step the geoms of each space are collided
   dNearCallback *near_callback = nullptr;
   void *near_data = nullptr;
   std::function<void()> collided = [] {};  // after these collisions
@@ -77,7 +77,7 @@ class OdeEngine : public Engine {
   // of one without geoms, between steps; what members count is in their `extra`
   Idle idle(dBodyID body) const;
   void set_idle(dBodyID body, Idle idle) { idle_[body] = idle; }
-  // N, N m: what the caller has on it
+  // N, N m: forces of the caller
   const auto &carried(const OdeMember &m) const { return saved_[m.saved]; }
 
  protected:
@@ -122,7 +122,7 @@ class OdeEngine : public Engine {
   void turn_jointed(double h);
   void find_ties();
   void pull_awake();
-  // along joints that hold; reach: goes on from there?
+  // along joints that hold; reach: whether to continue from a body
   template <class F>
   void flood(std::vector<size_t> from, F &&reach);
 };

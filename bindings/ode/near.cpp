@@ -9,7 +9,7 @@ namespace dfm_ode_detail {
 namespace {
 
 constexpr uint32_t kMost = 64;
-// m: farther apart than this, contacts of two sub-steps are not one
+// m: contacts of two sub-steps that are farther apart are different contacts
 constexpr double kSamePlace = 0.01;
 
 Vec velocity_at(dBodyID b, Vec p) {
@@ -72,8 +72,8 @@ RigidFriction::Answer RigidFriction::ask(const Contact &c, const double vt[2], d
   std::vector<double> state(size_t{kLanes} * std::max(1u, nstate_)), next(state.size());
   v[0] = vt[0];
   v[kLanes] = vt[1];
-  // What would stop the slip within a step, with the lighter body's mass alone: distinguishes laws that stick
-  // from those that slide.
+  // The force that would stop the slip within a step, with the mass of the lighter body alone: distinguishes
+  // laws that stick from those that slide.
   double mass = 1e300;
   for (const dBodyID b : {c.a, c.b}) {
     if (!b || dBodyIsKinematic(b)) continue;
@@ -137,7 +137,7 @@ const RigidFriction::Contact *RigidFriction::match(const Key &key, Vec place,
   return &pair->second[best];
 }
 
-// The frame goes along with the surface, so that what lies in its axes stays there.
+// The frame moves with the surface, so that components in its axes stay valid.
 void RigidFriction::take_over(Contact &c, const Contact &old) const {
   const Vec t = old.tangent[0] - dot(old.tangent[0], c.normal) * c.normal;
   if (norm(t) > 0.1) {
@@ -149,7 +149,7 @@ void RigidFriction::take_over(Contact &c, const Contact &old) const {
 }
 
 int RigidFriction::collide(dGeomID a, dGeomID b, double dt) {
-  // ODE turns the joint over where its first body is the world; then motion and slip were the other side's
+  // ODE swaps the bodies of a joint if the first one is the world; motion and slip then change their signs
   if (!dGeomGetBody(a)) std::swap(a, b);
   const dBodyID body_a = dGeomGetBody(a), body_b = dGeomGetBody(b);
   dContact contacts[kMost];
@@ -274,7 +274,7 @@ bool RigidFriction::read(const std::function<dGeomID(double)> &geom, const doubl
 void near_callback(void *data, dGeomID a, dGeomID b) {
   RigidFriction &n = *static_cast<RigidFriction *>(data);
   if (dGeomIsSpace(a) || dGeomIsSpace(b)) {
-    dSpaceCollide2(a, b, data, near_callback);  // what lies inside one space is collided once, by the engine
+    dSpaceCollide2(a, b, data, near_callback);  // pairs within one space: the engine collides them, once
     return;
   }
   const dBodyID body_a = dGeomGetBody(a), body_b = dGeomGetBody(b);

@@ -36,7 +36,7 @@ class RigidFriction {
   using Memory = std::map<Key, std::vector<Contact>>;
   dWorldID world = nullptr;
   dJointGroupID group = nullptr;
-  double coefficient = 0.5;  // where no law is set
+  double coefficient = 0.5;  // if no law is set
   uint32_t most = 8;
   ~RigidFriction();
   RigidFriction() = default;
@@ -46,9 +46,9 @@ class RigidFriction {
   dfm_status set_law(dfm_context *context, const char *law, const dfm_params *params, double area);
   void clear_law();
   int collide(dGeomID a, dGeomID b, double h);  // contact joints made
-  // after ODE's step, while the joints live: forces and states for the next sub-step
+  // after ODE's step, while its joints exist: keeps forces and states for the next sub-step
   void settle(double h);
-  // a sub-step that failed: its contacts end with their joints, their bodies may go next
+  // after a sub-step that failed: drops its contacts, since their bodies may be destroyed next
   void drop() { now_.clear(); }
   void forget() { last_.clear(); }
   // What the contacts keep, as numbers. number: of a geom, -1 where it has none (its contacts are left out);

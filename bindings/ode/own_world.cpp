@@ -37,8 +37,8 @@ class OdeWorld : public OwnWorld {
   void call(const std::function<void()> &f) override;
 
  private:
-  // (Handed nothing as its first body ODE swaps the two by itself, and turns round what it says of the joint,
-  // but not its motor.)
+  // (If the first body is the world, ODE swaps the two by itself. It then reverses the joint's readings, but
+  // not its motor.)
   struct Tie {
     dJointID id = nullptr;
     dJointFeedback feedback{};  // on ODE's first body, about its center of mass
@@ -53,7 +53,7 @@ class OdeWorld : public OwnWorld {
   // made in the order of the bodies, so that a step is a function of their states.
   std::vector<std::pair<dGeomID, dGeomID>> pairs_;
 
-  // what ODE said when it stopped in the middle of a call; its world is not touched after that
+  // ODE's message when it stopped in the middle of a call; its world is not used after that
   std::string broken_;
 
   void make_world(const dfm_rigid_set_def &set);

@@ -1,5 +1,5 @@
-// The host "ode" (rigid_host/host.h): its table, and sets that bring nothing but their defs (scenes), each a
-// dWorldID of its own with these bodies and joints.
+// The host "ode" (rigid_host/host.h): its table, and sets that consist of definitions only (from scenes).
+// Each such set is a dWorldID of its own.
 #pragma once
 #include <ode/ode.h>
 

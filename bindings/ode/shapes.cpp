@@ -42,7 +42,7 @@ void sizes(dGeomID g, Signature &s) {
   }
 }
 
-// ODE moves each corner by the same operations, so those of one place are equal to the bit.
+// ODE moves every corner by the same operations, so corners at one place are equal to the bit.
 Triangles read_trimesh(dGeomID g) {
   Welder welder;
   const Pose back = inverse(ode_pose(g));
@@ -114,7 +114,7 @@ Part part_of(const Signature &s) {
     case dConvexClass:
     case dHeightfieldClass: return Part::needs_arrays;
     case dRayClass:
-    case -1: return Part::none;  // -1: a transform that holds nothing yet
+    case -1: return Part::none;  // -1: a transform without a geom
     default: return Part::unknown;
   }
 }

@@ -10,8 +10,8 @@
 
 namespace dfm_ode_detail {
 
-// All that makes a geom's obstacle what it is, apart from its pose: compared in each step, so it is cheap
-// and holds no arrays.
+// All properties that a geom's obstacle follows from, except its pose. Compared in each step, so without
+// arrays.
 struct Signature {
   int geom_class = -1, inner_class = -1;  // inner: of a geom transform
   double size[3] = {};

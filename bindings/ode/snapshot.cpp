@@ -1,6 +1,6 @@
-// What the dfm_world's own snapshot does not hold of an ODE scene, behind it: bodies without geoms that
-// joints lead to, and what friction between rigid bodies remembers. Everything else that a later step depends
-// on is the world's: states, what joints did last, who sleeps and for how long it has idled.
+// A snapshot of an ODE scene is that of the dfm_world, followed by what that lacks: bodies without geoms that
+// joints lead to, and the memory of friction between rigid bodies. The dfm_world has everything else that a
+// later step depends on: states, the last effect of joints, which bodies sleep, and idle times.
 //
 //   magic, version, bytes of all, checksum, bytes of the world's, geoms in the space, bodies with them,
 //   bodies without, numbers of friction, seed the world's | of bodies with geoms: enabled? | of those
@@ -33,7 +33,7 @@ uint64_t checksum_of(const unsigned char *data, size_t bytes) {
 
 bool flag(double x) { return x == 0 || x == 1; }
 
-// As save() writes it: finite, its quaternion of length one, enabled or not, idle for no negative time.
+// Valid as written by save(): finite, a unit quaternion, enabled 0 or 1, an idle time of 0 or more.
 bool good_body(const double *p) {
   double poison = 0;
   for (size_t i = 0; i < kPerBody; ++i) poison += 0.0 * p[i];
@@ -168,7 +168,7 @@ dfm_status Adapter::restore(const void *buffer, size_t bytes) {
   near_.take(std::move(friction));
   dRandSetSeed(static_cast<unsigned long>(head.seed));
   keeps_friction_ = true;
-  clock_.time = -1;  // no world's time: the next look takes it for restored
+  clock_.time = -1;  // the time of no world: the next step sees that the world was restored
   return sync();
 }
 

@@ -9,8 +9,8 @@
 namespace dfm_ode_detail {
 namespace {
 
-thread_local int inside = 0;  // calls of ours on this thread
-std::mutex mutex;             // over what follows
+thread_local int inside = 0;  // number of our calls on this thread
+std::mutex mutex;             // guards the variables below
 int traps = 0;
 dMessageFunction *theirs_debug = nullptr, *theirs_error = nullptr;
 
@@ -46,7 +46,7 @@ Trap::~Trap() {
   const std::lock_guard lock(mutex);
   --inside;
   if (--traps > 0) return;
-  if (dGetDebugHandler() == on_debug) dSetDebugHandler(theirs_debug);  // else another one is set by now
+  if (dGetDebugHandler() == on_debug) dSetDebugHandler(theirs_debug);  // else another one was set
   if (dGetErrorHandler() == on_error) dSetErrorHandler(theirs_error);
 }
 

@@ -1,8 +1,8 @@
 // Assertions of ODE end the process. Inside the worlds that the library makes itself (host "ode" of a scene)
-// they end in an error of ours instead: ODE's handlers are replaced for the length of a call, and theirs
-// throws, on the thread that is in the call. On every other thread, and outside such calls, the handlers that
-// a host program has set are called as ever. What ODE was doing is left half done, so a world that was in it
-// must neither be stepped nor destroyed any more.
+// they become an error of the library instead: ODE's handlers are replaced during a call, and the new ones
+// throw on the thread of the call. On other threads, and outside such calls, the handlers of the host program
+// are called as before. ODE's work is left unfinished, so its world must neither be stepped nor destroyed
+// after that.
 #pragma once
 #include <string>
 

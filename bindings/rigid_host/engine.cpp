@@ -116,7 +116,7 @@ void Engine::begin(double time) {
 void Engine::end(double time) {
   if (open_ && time == t_) {
     restore(true);
-    stepped_ = false;  // what friction has seen of it does not count
+    stepped_ = false;  // friction forgets what it has seen of it
   }
   if (time == begun_) give_back();
   close();
@@ -126,7 +126,7 @@ void Engine::end(double time) {
 }
 
 void Engine::open(const dfm_rigid_step &step) {
-  if (open_ && step.t == t_) {  // tried again, from the same states
+  if (open_ && step.t == t_) {  // repeated from the same states
     if (stepped_) restore(false);
   } else {
     Timer timer(engine_seconds);
@@ -146,11 +146,11 @@ void Engine::classify(Member &m, const dfm_rigid_step &step, const double *extra
   m.kinematic = f.kinematic;
   m.kind = !moves ? Member::still : f.plain ? Member::free : Member::jointed;
   m.turns = m.kind == Member::free && f.turns;
-  // the engine turns it: what it makes of it is in b
+  // the engine turns it; the difference is in b
   if (m.kind == Member::free && !m.turns) m.kind = Member::jointed;
   m.bias = {load(extra), load(extra + 3)};
   const bool was_asleep = extra[12] != 0;
-  // by the caller; who is only pulled goes back to sleep at once when it idles
+  // woken by the caller; a body that was only pulled sleeps again as soon as it is idle
   const bool woken = was_asleep && f.enabled && !m.pulled;
   m.idle = woken ? std::array<double, 2>{} : std::array<double, 2>{extra[13], extra[14]};
   m.impulse = {};
@@ -238,8 +238,8 @@ void Engine::turn_free(double h) {
   }
 }
 
-// What constraints added to a jointed body beside its own answer to contact; the share of contact's change
-// that was not foreseen, by energy.
+// What constraints added to the motion of a jointed body beside its response to contact. Returns the share of
+// the change by contact that was not predicted, by energy.
 double Engine::judge(Member &m, double h) {
   m.next_bias = m.kind == Member::still ? m.bias : Motion{};
   if (m.kind != Member::jointed || !m.enabled()) return 0;

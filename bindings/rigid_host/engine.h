@@ -46,11 +46,11 @@ Pose in_principal_frame(const Inertia &inertia, const Pose &in_body);
 
 class Engine;
 
-// What the engine has a body do in the sub-step that begins.
+// What acts on a body in the sub-step that begins.
 struct Facts {
   bool enabled = true, kinematic = false;
   bool plain = true;  // no joint, contact or damping of the engine's
-  bool turns = true;  // where it is plain: turned here
+  bool turns = true;  // if plain: turned here
   Vec force, torque;  // of the caller, N and N m
   Vec gravity;        // m/s2
 };
@@ -69,7 +69,7 @@ struct Member {
 
   // Of this sub-step.
   Kind kind = still;
-  bool turns = false;      // its turn is computed here
+  bool turns = false;      // its rotation is computed here
   bool asleep = false;     // the engine has it asleep
   bool kinematic = false;  // it follows a given motion
   bool wakes = false;      // contact wakes it
@@ -80,7 +80,7 @@ struct Member {
   Vec turn_momentum;       // angular, at the start plus h T
   Motion impulse;
   dfm_rigid_state ended{};
-  Motion drift;                               // of one that sleeps: what it would move at by now
+  Motion drift;                               // of a sleeping body: the velocity that it would have
   std::array<double, 2> idle{}, next_idle{};  // sub-steps, s
 
   virtual ~Member() = default;

@@ -1,5 +1,5 @@
-// The table by which an engine's bodies take part, shared by adapters: for bodies of a world that the caller
-// attached, and for sets that bring nothing but their defs.
+// The table by which the bodies of an engine take part, shared by adapters: for bodies of a world that the
+// caller attached, and for sets that consist of definitions only.
 #pragma once
 #include <functional>
 
@@ -14,7 +14,7 @@ struct Seat {
   static constexpr uint64_t kMagic = 0x6465666f726d6f64ull;
   uint64_t magic = kMagic;
   Member *member = nullptr;
-  bool leaves = false;                 // its adapter takes it away
+  bool leaves = false;                 // its adapter removes it
   std::function<dfm_status()> refuse;  // dfm_rigid_destroy: the sentence that says what to call instead
 };
 

@@ -7,7 +7,7 @@
 namespace dfm_rigid_detail {
 namespace {
 
-// As `state` has it; the world's is that of the origin.
+// The pose in `state`; for the world that of the origin.
 Pose pose_of(uint32_t number, const dfm_rigid_state *state) {
   if (number == DFM_RIGID_WORLD) return {};
   const double *const q = state[number].rotation;
@@ -27,12 +27,12 @@ dfm_rigid_state state_of(const dfm_rigid_def &def) {
   return s;
 }
 
-// What an engine can be given: where a double still resolves a contact (1e-7 m at the bound), and far from
-// where its squares overflow.
+// Largest values that an engine gets: a double still resolves a contact (1e-7 m at the bound), and squares
+// are far from overflow.
 constexpr double kReach = 1e9, kFast = 1e9;  // m; m/s and rad/s
 
-// What overlaps is pushed apart at share * depth / h: a constant share would throw bodies about where the
-// guard cuts a step into short sub-steps. Below this length of a sub-step that speed is as at this length.
+// Overlaps are pushed apart at a speed of share * depth / h. A constant share would throw bodies where the
+// guard divides a step into short sub-steps; so below kFullShare the speed is that at kFullShare.
 constexpr double kShare = 0.2, kFullShare = 1e-3;  // both engines' default; s
 
 }  // namespace
@@ -93,8 +93,8 @@ void OwnWorld::add_joint(const dfm_joint_def &def) {
   if (joint.made) make_joint(joint, joints_.size() - 1);
 }
 
-// What the joint did along its own axis in the sub-step that began at `state` is the motor's doing: alone it
-// is free there. A hinge's is the moment about its anchor, where what the hinge holds with has none.
+// The motor's effort: what the joint did along its axis, in which it is free without a motor, in the sub-step
+// that began at `state`. For a hinge, the moment about its anchor, about which its holding force has none.
 double OwnWorld::effort(size_t number, const dfm_rigid_state *state) const {
   const Joint &j = joints_[number];
   if (!j.made) return 0;
@@ -157,8 +157,8 @@ bool OwnWorld::commit(const dfm_rigid_step &step, dfm_rigid_state *state, double
   // Asked for another round, the engine goes back by itself; the world then gives the same start
   // state as before.
   if (again) return true;
-  // As the world has them: an engine that has turned a body by itself has it by a rounding elsewhere, and its
-  // next collisions would not be those after a restore.
+  // The states of the dfm_world: an engine that has turned a body by itself differs by a rounding, and its
+  // next collisions would differ from those after a restore.
   for (const uint32_t i : moving_) {
     given_[i] = state[i];
     members_[i]->put(state[i]);
@@ -174,7 +174,7 @@ dfm_status OwnWorld::set_motor(uint32_t joint, double velocity, double max, doub
   return DFM_OK;
 }
 
-// From what the world has, not from the engine's joint, which after a restore is still where it was.
+// From the state of the world: after a restore the engine's joint still has the former one.
 dfm_status OwnWorld::joint(const dfm_rigid_state *state, const double *extra, uint32_t joint,
                            double *position, double *rate, double *effort) {
   if (joint >= joints_.size() || joints_[joint].type > DFM_JOINT_SLIDER) return DFM_E_ARG;

@@ -1,5 +1,5 @@
-// A host's set that brings nothing but its defs (scenes): a world of the engine's own with these bodies and
-// joints. What every engine answers alike: checks of states, joints' readings, motors.
+// A host's set that consists of definitions only (from a scene): a world of the engine with these bodies and
+// joints. Here is what all engines share: checks of states, readings of joints, motors.
 #pragma once
 #include <string>
 #include <vector>
@@ -24,7 +24,7 @@ class OwnWorld : public Host {
   // The engine's first body is one that moves: `body`, or `with` where `body` is fixed.
   struct Joint {
     uint32_t type = 0, body = 0, with = 0;  // numbers in the set; with: DFM_RIGID_WORLD for the world
-    bool made = false;                      // else both stand still
+    bool made = false;                      // false: both bodies are fixed
     bool swapped = false;                   // the engine's first body is `with`
     Vec anchor, axis;                       // world, as created; axis: unit
     Vec anchor_body, anchor_with;           // in the frames of the two

@@ -15,7 +15,7 @@ struct SeparateRule {
   bool on = false;
   bool removes = false;  // parts of fewer cells than `least` are removed; else they stay
   uint32_t least = 1;    // cells
-  bool waits = false;    // parts have found no memory to become bodies: each step tries again
+  bool waits = false;    // no memory to make bodies of the parts: each step tries again
 };
 
 // A body as it was made.
@@ -27,8 +27,8 @@ struct WholeBody {
   SurfaceZones zones;
 };
 
-// On which side of a blade's way the middle of a cell lies. ahead: of the edge, so far; passed: as the edge
-// came past it; behind: the edge as it began.
+// How the side of a blade's way on which the middle of a cell lies is known. ahead: the edge has not reached
+// it; passed: from when the edge passed it; behind: the cell was behind the edge at the start.
 enum class SideKind : uint32_t { none = 0, ahead = 1, passed = 2, behind = 3 };
 struct BladeSide {
   uint32_t cell;
@@ -44,20 +44,20 @@ struct CutDue {
   uint32_t point, unused = 0;  // no gap at the end: snapshots have its bytes
 };
 
-// Where a blade's edge has come to, and the body's points at that time: the blade's next way is taken
-// relative to the body's own.
+// The last place of a blade's edge, and the points of the body at that time: the next way of the blade is
+// measured relative to the motion of the body.
 struct BladeTrack {
   double edge[6] = {};     // m
   Array<double> x;         // [npoint,4] m
   Vec3 lead;               // m, way of late; zero where the blade itself says where it looks
-  double way[2] = {};      // m, that both ends have come
+  double way[2] = {};      // m, that each end has moved
   Array<BladeSide> sides;  // of cells near it, ascending
   double credit = 0;       // J, zero or less: the sum of work since it was last the largest
   uint64_t part = 0;       // id of the obstacle that is the tool's part, where it owes anything
   Array<CutDue> dues;      // by point, ascending
 };
 
-// A cut to come (dfm_body_plan_cut).
+// A planned cut (dfm_body_plan_cut).
 struct PlannedCut {
   double t = 0;       // s
   uint32_t how = 0;   // DFM_CUT_REMOVE or DFM_CUT_SPLIT

@@ -14,7 +14,7 @@
 namespace dfm {
 namespace {
 
-// Of what a sub-step has paid: so little that is left is rounding.
+// Share of what a sub-step has paid; a smaller rest is rounding.
 constexpr double kRounding = 1e-9;
 
 // f(body, track, slot of the part) where a tool owes something and still cuts the body.
@@ -29,7 +29,7 @@ void each_debt(World &w, F &&f) {
     }
 }
 
-// Surfels are in the order of their points. A point all of whose cells still hang together is no surfel: its
+// Surfels are in the order of their points. A point whose cells are all still connected is no surfel: its
 // energy is kept until the cut continues.
 uint32_t surfel_of(const Body &b, uint32_t point) {
   const auto at = std::lower_bound(b.surface.point.begin(), b.surface.point.end(), point);

@@ -10,13 +10,13 @@
 namespace dfm {
 namespace {
 
-constexpr double kSame = 1e-9;  // of a squared distance: two that are equal but for rounding
-// Of a normal that counts as on the border of the cone of an edge: a rod that lies along a face touches it at
-// both of its borders, also where it is not quite parallel to it.
+constexpr double kSame = 1e-9;  // relative: squared distances that differ by less are equal
+// Component of a normal; with a smaller one it counts as on the border of the cone of an edge. So a rod along
+// a face touches both borders of the face, also if it is not quite parallel to it.
 constexpr double kAlong = 1e-3;
-constexpr double kFlat = 1e-6;  // rad, between the faces of an edge that is none
-constexpr double kSharp = 0.1;  // sine, that the edges of a corner fall by from its mean normal
-constexpr double kSteep = 0.1;  // component of a normal, of which a plane bounds an axis
+constexpr double kFlat = 1e-6;  // rad: faces that differ by less have no edge between them
+constexpr double kSharp = 0.1;  // sine: by more, all edges of a sharp corner fall from its mean normal
+constexpr double kSteep = 0.1;  // component of a normal; with a smaller one a plane bounds no axis
 
 Vec3 least(Vec3 a, Vec3 b) { return {std::min(a.x, b.x), std::min(a.y, b.y), std::min(a.z, b.z)}; }
 Vec3 most(Vec3 a, Vec3 b) { return {std::max(a.x, b.x), std::max(a.y, b.y), std::max(a.z, b.z)}; }
@@ -57,7 +57,7 @@ ToolBox ToolShape::bounds() const {
   return {load3(lo), load3(hi)};
 }
 
-// A box around what of its bounds is there: along each axis, as far as the rest of the bounds lets it be.
+// Box around that part of the bounds of the shape that lies at dot(normal, x) <= height.
 ToolBox ToolShape::under(Vec3 normal, double height) const {
   const ToolBox all = bounds();
   ToolBox out = all;
@@ -66,7 +66,7 @@ ToolBox ToolShape::under(Vec3 normal, double height) const {
   double least_of[3], sum = 0;
   for (int k = 0; k < 3; ++k) sum += least_of[k] = std::min(n[k] * all.lo[k], n[k] * all.hi[k]);
   for (int k = 0; k < 3; ++k) {
-    if (std::fabs(n[k]) < kSteep) continue;  // it bounds little, and by a large quotient
+    if (std::fabs(n[k]) < kSteep) continue;  // the bound would be far away, and a quotient with a large error
     const double end = (height + slack - (sum - least_of[k])) / n[k];
     if (n[k] > 0) out.hi[k] = std::min(out.hi[k], end);
     else out.lo[k] = std::max(out.lo[k], end);
@@ -81,8 +81,8 @@ Vec3 ToolShape::face_normal(uint32_t t) const {
   return length > 0 ? (1 / length) * n : Vec3{};
 }
 
-// A concave edge is left in no direction: corners and other edges come first. On a border of the cone an edge
-// counts, since the edge of one box that lies square on the face of another one crosses nothing else.
+// No motion leaves the shape at a concave edge: corners and other edges touch first. A normal on the border
+// of the cone counts, since the edge of a box that lies square on a face of another box crosses nothing else.
 ToolShape::Edge ToolShape::edge_of_mesh(uint32_t e) const {
   const uint32_t *const end = &surface_->edge[2 * size_t{e}];
   Edge out;
@@ -207,8 +207,8 @@ bool ToolShape::closest(Vec3 p, double limit, ObstaclePoint &out, bool *face) co
     const uint32_t *const c = &surface_->tri[3 * size_t{t}];
     const TrianglePoint at = closest_on_triangle(p, node(c[0]), node(c[1]), node(c[2]));
     if (!(at.distance2 <= best * (found ? 1 + kSame : 1))) continue;
-    // Of equal ones the triangle that faces it most says on which side it is: its neighbors at an edge may
-    // look away, or along the way, where the side is one of rounding.
+    // Among equally near triangles, the one that faces p most decides on which side p is: its neighbors at an
+    // edge may face away, or be seen edge-on, where rounding would decide.
     const Vec3 n = face_normal(t), way = p - at.point;
     const double side = dot(n, way), d = std::sqrt(at.distance2);
     if (found && at.distance2 >= best * (1 - kSame) && std::fabs(side) <= faced) continue;

@@ -1,6 +1,6 @@
-// A part of a tool, or a rigid body, as corners, edges and faces, of which those of two meet: spheres,
-// capsules and boxes, and triangles of a mesh. A sphere is one corner with a radius, a capsule two and an
-// edge between them. Planes and voxels have neither corners nor edges: those of others meet them.
+// The shape of a part of a tool, or of a rigid body, as corners, edges and faces; contacts are between those
+// of two shapes. A sphere is one corner with a radius, a capsule two corners and the edge between them. A
+// plane and voxels have neither corners nor edges: only those of the other shape touch them.
 #pragma once
 #include <cstdint>
 #include <vector>
@@ -15,18 +15,18 @@ struct ObstacleMesh;
 // Axis-parallel.
 struct ToolBox {
   Vec3 lo, hi;
-  bool holds(Vec3 from, Vec3 to) const;  // any of the box around these two
+  bool holds(Vec3 from, Vec3 to) const;  // whether it meets the box around these two points
 };
 
 class ToolShape {
  public:
   struct Edge {
     Vec3 from, to, beside[2];  // directions in the faces beside it, away from it
-    int faces = 0;             // 0: a capsule's axis, left in every direction
+    int faces = 0;             // 0: the axis of a capsule, which has no faces
     uint32_t number = 0;
     uint32_t end[2] = {};  // numbers of the corners
-    bool flat = false;     // its two faces are one: what touches it touches them, or their border
-    // Does the direction leave the shape here?
+    bool flat = false;     // its faces lie in one plane: what touches it touches them or their border
+    // Whether a motion along n leaves the shape here.
     bool leaves(Vec3 n) const;
   };
 
@@ -34,18 +34,18 @@ class ToolShape {
   ToolShape() : ToolShape(ObstacleView{}, nullptr) {}
   // mesh: that of the view, if it has one
   ToolShape(const ObstacleView &view, ObstacleMesh *mesh) : shape_(view) { take(view, mesh); }
-  void take(const ObstacleView &view, ObstacleMesh *mesh);  // another one, in the same memory
+  void take(const ObstacleView &view, ObstacleMesh *mesh);  // replaces the shape; uses the same memory
   Vec3 position() const { return shape_.view().position; }
   double reach() const { return reach_; }  // m, of any point of it from position(); not of a plane
   bool endless() const { return shape_.view().shape == Shape::plane; }
   bool has_corners() const { return !endless() && shape_.view().shape != Shape::voxels; }
   double round() const { return round_; }  // m, radius around corners and edges
   ToolBox bounds() const;                  // not of a plane
-  // Finds the corners, edges and triangles near the box. Before the functions that follow. flat: also edges
-  // within a face of a mesh, and corners of these alone. Where they touch others do as well, unless one thing
-  // is pressed into the other, as by jaws.
+  // Finds the corners, edges and triangles near the box; call it before the functions below. flat: also edges
+  // within a face of a mesh, and corners of such edges only. Where these touch, other features touch as well,
+  // unless one thing is pressed into the other, as by jaws.
   void look_at(const ToolBox &near, bool flat);
-  // The same near a plane: what has dot(normal, x) <= height.
+  // The same for what lies at dot(normal, x) <= height.
   void look_under(Vec3 normal, double height, bool flat);
   struct Corner {
     Vec3 at;
@@ -71,11 +71,11 @@ class ToolShape {
         f(p, q, s);
       }
   }
-  // May something in this direction be met by this corner? Where the surface is flat or hollow around it,
-  // only what the surface leads to: an edge or a corner of the other beside it is not in its way.
+  // Whether this corner may touch something in direction n. Where the surface around it is flat or hollow,
+  // only if every edge of the corner falls away from n: an edge of the other shape beside it does not count.
   bool may_meet(const Corner &corner, Vec3 n) const;
-  // Of its surface; false: none, or a mesh is further away than `limit` on either side. face: it is no place
-  // on an edge or at a corner.
+  // The closest point of the surface; false: none, or a mesh is farther away than `limit` on either side.
+  // face: out, whether the point lies within a face, not on an edge or at a corner.
   bool closest(Vec3 p, double limit, ObstaclePoint &out, bool *face = nullptr) const;
 
  private:

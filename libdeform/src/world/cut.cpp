@@ -1,6 +1,6 @@
-// A cut finds which cells go and which faces open, makes the body that is left beside the one that is there
-// (world/body_shape.h), and exchanges the two. Contacts are found again by the names of their features, which
-// those that are left keep; nothing is done to them here but to end those whose feature has gone.
+// A cut finds which cells are removed and which faces open, makes the shape that is left beside the present
+// one (world/body_shape.h), and exchanges the two. Remaining features keep their names, by which the next
+// step finds their contacts again. Contacts whose feature is gone end here.
 #include "world/cut.h"
 
 #include <algorithm>
@@ -36,7 +36,7 @@ void corners_of(const Body &b, uint32_t cell, Vec3 x[4]) {
   for (size_t k = 0; k < 4; ++k) x[k] = load3(&b.p.x[size_t{kStride} * b.tets[size_t{4} * cell + k]]);
 }
 
-// m2 at rest of triangles that are no part of the surface before.
+// Area at rest, m2, of the triangles that the surface did not have before.
 double new_area(const Body &b, const BodyShape &before) {
   uint32_t next = before.cut.whole ? before.cut.next_name[2] : before.surface.ntri;
   double sum = 0;
@@ -85,7 +85,7 @@ std::unique_ptr<BodyShape> put(Body &b, MadeShape &made, bool ahead) {
     Lasting lasting(w, {{b.id, b.slot, made.features}});
     reserve_events(w, w.store.n + w.attachments.size());
     for (const Attachment &a : lasting.attachments)
-      if (a.surfels.empty()) w.overlaps.place(a.body);  // what it held may touch now
+      if (a.surfels.empty()) w.overlaps.place(a.body);  // what it held together may touch now
     exchange(w, lasting);
     w.changed = true;
     try {
@@ -169,8 +169,8 @@ Array<uint8_t> none_removed(const Body &b) {
   return Array<uint8_t>(b.ncell(), 0, HookAllocator<uint8_t>(b.world->memory()));
 }
 
-// Of a plane: a blade in it that has the whole of the body in its first triangle, so that no line of the body
-// meets the edge between the two.
+// Turns a plane into a blade in it, so large that the whole body lies within the first of the blade's two
+// triangles: no line of the body meets the edge between them.
 CutShape through(const Body &b, const CutShape &shape) {
   if (shape.kind != CutKind::plane) return shape;
   Extent box;
@@ -286,9 +286,9 @@ CutReport split_by_blade(Body &b, const CutShape &asked, uint32_t most) {
   out.left = static_cast<uint32_t>(met.size() - n);
   out.opened = static_cast<uint32_t>(n);
   out.fracture = work;
-  if (asked.kind == CutKind::plane) return out;  // it comes from nowhere, and goes on nowhere
+  if (asked.kind == CutKind::plane) return out;  // a plane has no way: no force, and nothing to continue
   if (norm2(way) > 0) out.force = (-work / norm2(way)) * way;
-  // without memory, the next blade that comes here begins again
+  // without memory for it, the next blade here starts anew
   found_memory([&] { sweep.keep(b); });
   return out;
 }

@@ -7,7 +7,7 @@
 namespace dfm {
 namespace {
 
-// A feature in the target that has it; target kNone: it has gone.
+// Where a feature is now; target kNone: it is gone.
 struct Found { uint32_t target = kNone, feature = kNone; };
 Found find(const std::vector<CutTarget> &targets, size_t kind, uint32_t feature) {
   for (uint32_t t = 0; t < targets.size(); ++t)
@@ -15,8 +15,8 @@ Found find(const std::vector<CutTarget> &targets, size_t kind, uint32_t feature)
   return {};
 }
 
-// Of one attachment: the places that are still there, those of each target by themselves. The stiffness of
-// the whole is that of its places.
+// Divides an attachment: each target gets those of its places that are still there. The stiffness of the
+// whole is the sum over its places.
 void carry(const Attachment &a, const std::vector<CutTarget> &targets, std::vector<Attachment> &out) {
   const uint64_t id = targets[0].id;
   const bool own = a.body == id, anchored = !a.obstacle && a.to == id;
@@ -73,7 +73,7 @@ void carry(const Attachment &a, const std::vector<CutTarget> &targets, std::vect
   else out.erase(std::remove_if(first, out.end(), [&](auto &x) { return !holds(x); }), out.end());
 }
 
-// Where a side of a contact or of a crossing of edges is now; false: it has gone.
+// Gives a side of a contact, or of a crossing of edges, its present numbers; false: it is gone.
 bool renumber(ContactPoint &c, const std::vector<CutTarget> &targets) {
   const uint32_t slot = targets[0].slot;
   bool there = true;

@@ -1,5 +1,5 @@
-// What the world keeps by numbers of a body's surface features, with those that they have after a cut or in
-// the piece that they have gone to.
+// Contacts and attachments name surface features of bodies by number. Here they are with the numbers that
+// the features have after a cut, in the body or in the piece that has them now.
 #pragma once
 #include <vector>
 
@@ -9,7 +9,7 @@
 
 namespace dfm {
 
-// Where features may be: the body itself first, then its pieces.
+// A body that may have the features after the cut: the body itself first, then its pieces.
 struct CutTarget {
   uint64_t id;
   uint32_t slot;
@@ -21,14 +21,14 @@ struct Lasting {
   Array<Crossing> crossings;
   Array<ContactPoint> contacts;  // of the report
   Array<uint64_t> id_a, id_b;    // of the store
-  std::vector<uint8_t> ended;    // [contacts of the store] its feature has gone
+  std::vector<uint8_t> ended;    // [contacts of the store] 1: its feature is gone
 
   // Of the body whose id and slot the first target has.
   Lasting(const World &w, const std::vector<CutTarget> &targets);
 };
 
 void exchange(World &w, Lasting &other) noexcept;
-// Contacts whose feature has gone, and attachments that hold nothing any more. Room for the events is there.
+// Ends contacts whose feature is gone and attachments without points; reserve_cut_events() came before.
 void end_what_went(World &w, const Lasting &lasting);
 
 }  // namespace dfm

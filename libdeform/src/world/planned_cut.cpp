@@ -22,7 +22,7 @@ std::vector<Body *> with_pieces(Body &b) {
   return out;
 }
 
-// A cut, of whatever its body consists of by now. What has come off has as many cuts after it.
+// One planned cut, made through a body and all its pieces. after: how many planned cuts they have left.
 struct Made {
   uint64_t whole;
   double t;
@@ -98,9 +98,9 @@ void plan_no_cuts(Body &b) {
   for (Body *const part : with_pieces(b)) part->planned_cuts.clear();
 }
 
-// Pieces take over the cuts that are still to come, so a cut leaves the list before it is made. One that
-// finds no memory is still to come. One that is made is told before its parts become pieces, since these may
-// have to wait.
+// Pieces take over the cuts of the list, so a cut leaves the list before it is made; without memory it is put
+// back. Its event is reported before its parts become pieces, because these may have to wait for memory of
+// their own.
 void make_planned_cuts(World &w, double dt) {
   const auto due = [&](const auto &b) {
     return !b->planned_cuts.empty() && b->planned_cuts.front().t <= w.time + kOnTime * dt;
