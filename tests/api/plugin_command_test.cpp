@@ -1,6 +1,8 @@
 // deform plugin list | info | check as a user calls it.
 #include <gtest/gtest.h>
 
+#include <cstdio>
+
 #include "support.h"
 
 namespace {
@@ -87,6 +89,26 @@ TEST(PluginCommand, UnknownId_ExitsTwoAndListsWhatThereIs) {
   EXPECT_EQ(test::deform({"plugin", "info", "/nowhere/x.so"}).exit_code, 2);
   EXPECT_EQ(test::deform({"plugin", "info"}).exit_code, 2);
   EXPECT_EQ(test::deform({"plugin"}).exit_code, 2);
+}
+
+// Of a check of this plugin, rules that it skips included.
+int rule_count(const char *name) {
+  const std::string file = std::string(DEFORM_PLUGIN_DIR) + "/" + name + ".so";
+  const std::string out = test::deform({"plugin", "check", file}).out;
+  const size_t last = out.rfind('\n', out.size() - 2) + 1;
+  int passed = 0, failed = 0, skipped = 0;
+  EXPECT_EQ(std::sscanf(out.c_str() + last, "%d passed, %d failed, %d skipped", &passed, &failed, &skipped),
+            3)
+      << out;
+  return passed + failed + skipped;
+}
+
+TEST(PluginCommand, CheckHasAsManyRules_AsTheReadmeSays) {
+  const std::string readme = test::read_file(std::string(DEFORM_SOURCE_DIR) + "/README.md");
+  const std::string laws = std::to_string(rule_count("friction_none"));
+  const std::string models = std::to_string(rule_count("model_shape_matching"));
+  EXPECT_TRUE(has(readme, "`deform plugin check` applies " + laws + " rules")) << laws;
+  EXPECT_TRUE(has(readme, "**Own models**: " + models + " rules")) << models;
 }
 
 }  // namespace

@@ -58,7 +58,7 @@ CutShape shape_of(const Body &b, const dfm_cut_def &def) {
   return s;
 }
 
-dfm_cut_info told(const CutReport &r) {
+dfm_cut_info info_of(const CutReport &r) {
   dfm_cut_info out{};
   out.cells = r.removed;
   out.left = r.left;
@@ -102,7 +102,7 @@ dfm_status dfm_body_cut(dfm_body body, const dfm_cut_def *def, dfm_cut_info *out
     check_flags(own, 0, "dfm_cut_def");
     const CutShape shape = shape_of(b, own);
     const CutReport report = make_cut(b, shape, own.how, own.most);
-    if (out) give(out, told(report));
+    if (out) give(out, info_of(report));
   });
 }
 
@@ -138,7 +138,7 @@ dfm_status dfm_body_remove_cells(dfm_body body, uint32_t n, const uint32_t *cell
     }
     CutReport report = remove_cells(b, removed);
     separate_if_asked(b, report);
-    if (out) give(out, told(report));
+    if (out) give(out, info_of(report));
   });
 }
 
@@ -168,7 +168,7 @@ dfm_status dfm_body_separate(dfm_body body, const dfm_separate_def *def, dfm_cut
     const SeparateRule rule = rule_of(b, def);
     CutReport report;
     separate(b, rule, report);
-    if (out) give(out, told(report));
+    if (out) give(out, info_of(report));
   });
 }
 

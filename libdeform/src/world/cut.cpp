@@ -51,7 +51,7 @@ double new_area(const Body &b, const BodyShape &before) {
 }
 
 // lost: the masses before.
-void tell_what_went(const BodyShape &before, const CutMesh &mesh, const Body &b, std::vector<double> &lost,
+void sum_up_removed(const BodyShape &before, const CutMesh &mesh, const Body &b, std::vector<double> &lost,
                     CutReport &out) {
   for (uint32_t i = 0; i < b.p.n; ++i) lost[mesh.point[i]] -= b.p.mass[i];
   for (uint32_t i = 0; i < before.p.n; ++i) {
@@ -121,7 +121,7 @@ CutReport cut(Body &b, const Array<uint8_t> &removed, OpenFaces &&open) {
   const HostWork work(b);
   const std::unique_ptr<MadeShape> made = make_shape(b, std::move(mesh), std::move(open.whole), nullptr);
   const std::unique_ptr<BodyShape> before = put(b, *made, false);
-  tell_what_went(*before, made->mesh, b, mass, out);
+  sum_up_removed(*before, made->mesh, b, mass, out);
   out.area = new_area(b, *before);
   out.kinetic = kinetic - kinetic_of(b);
   out.elastic = elastic - elastic_energy(b);

@@ -237,9 +237,9 @@ void separate(Body &b, const SeparateRule &rule, CutReport &out) {
 namespace {
 
 void separate_or_wait(Body &b, CutReport &out) {
-  CutReport told = out;
-  if (found_memory([&] { separate(b, b.separate, told); })) {
-    out = told;
+  CutReport report = out;
+  if (found_memory([&] { separate(b, b.separate, report); })) {
+    out = report;
     return;
   }
   if (!std::exchange(b.separate.waits, true))
@@ -257,8 +257,8 @@ void separate_if_asked(Body &b, CutReport &out) {
 }
 
 void separate_if_asked(Body &b) {
-  CutReport told;
-  if (b.separate.on && !b.emptied) separate_or_wait(b, told);
+  CutReport report;
+  if (b.separate.on && !b.emptied) separate_or_wait(b, report);
 }
 
 void separate_what_waits(World &w) {
