@@ -1,13 +1,20 @@
 #!/bin/sh
 # setup.sh SET... -- installs the packages of those sets of deps.txt that are missing, and nothing where all
 # are there. As another user than root it prints the line to run and stops: a build has no business with
-# somebody's password.
+# somebody's password. On other systems it names the packages until the tree is configured.
 set -eu
 list=$(dirname "$0")/deps.txt
 rows=$(for set in "$@"; do sed -n "s/^$set  *//p" "$list"; done)
 names=$(echo "$rows" | sed 's/ .*//')
 if ! command -v dpkg-query >/dev/null; then
-  echo "deform: this is not a Debian system; make sure that it has what these packages hold:" $names >&2
+  lacks=
+  for program in cmake ninja cc c++; do
+    command -v $program >/dev/null || lacks="$lacks $program"
+  done
+  if [ -n "$lacks" ] || [ ! -e "$(dirname "$0")/../build/release/build.ninja" ]; then
+    echo "deform: this is not a Debian system; make sure that it has what these packages hold:" $names >&2
+  fi
+  [ -z "$lacks" ] || { echo "deform: not found:$lacks; install them, then call make again" >&2; exit 1; }
   exit 0
 fi
 present=$(dpkg-query -W -f '${db:Status-Status} ${Package}\n' $names 2>/dev/null |

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """cmake/fresh.sh: a build folder of a tree that was moved, or of another generator, is configured again; one
-that fits, and one that the user made, stay as they are.
+that fits, and one that the user made, stay as they are. cmake/setup.sh on a system that is not Debian's names
+the packages and the programs that are missing.
 
 doors_test.py SOURCE_DIR
 """
@@ -11,7 +12,7 @@ import sys
 import tempfile
 import unittest
 
-FRESH = "cmake/fresh.sh"
+FRESH, SETUP, LIST = "cmake/fresh.sh", "cmake/setup.sh", "cmake/deps.txt"
 
 
 class Doors(unittest.TestCase):
@@ -20,7 +21,8 @@ class Doors(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         self.root = pathlib.Path(folder.name) / "tree"
         (self.root / "cmake").mkdir(parents=True)
-        shutil.copy(SOURCE / FRESH, self.root / FRESH)
+        for name in (FRESH, SETUP, LIST):
+            shutil.copy(SOURCE / name, self.root / name)
 
     def configured(self, name, source, generator="Ninja"):
         """What a configured build folder holds, as far as it matters here."""
@@ -37,6 +39,30 @@ class Doors(unittest.TestCase):
 
     def names(self, build):
         return sorted(path.name for path in build.iterdir())
+
+    def set_up_elsewhere(self, *programs):
+        """On a system without dpkg that has a few programs of a shell and these."""
+        folder = self.root.parent / "bin"
+        folder.mkdir(exist_ok=True)
+        for program in ("sed", "dirname"):
+            if not (folder / program).exists():
+                (folder / program).symlink_to(shutil.which(program))
+        for program in programs:
+            (folder / program).write_text("#!/bin/sh\n")
+            (folder / program).chmod(0o755)
+        return subprocess.run([self.root / SETUP, "doors"], env={"PATH": str(folder)}, capture_output=True,
+                              text=True)
+
+    def test_another_system(self):
+        bare = self.set_up_elsewhere("cmake", "cc")
+        self.assertEqual(bare.returncode, 1)
+        self.assertIn("deform: not found: ninja c++; install them", bare.stderr)
+        ready = self.set_up_elsewhere("ninja", "c++")
+        self.assertEqual(ready.returncode, 0)
+        self.assertIn("not a Debian system", ready.stderr)
+        self.assertIn("libeigen3-dev", ready.stderr)
+        self.configured("release", self.root)
+        self.assertEqual(self.set_up_elsewhere().stderr, "")
 
     def test_a_moved_tree(self):
         build = self.configured("release", self.root.parent / "where it was")
