@@ -16,6 +16,7 @@
 #include "step/blow.h"
 #include "step/context.h"
 #include "step/stages.h"
+#include "step/step_bound.h"
 #include "step/tool_touch.h"
 #include "step/turn_integrators.h"
 
@@ -69,24 +70,28 @@ double used_time(const Budget &b) { return b.end > 0 ? 1 - (b.end - now()) / b.s
 // work of an unconverged solve back, the laws at the result, and at the best one. Of the present solve, the
 // end. And the barest one, with one sweep and two that hold its work back.
 constexpr uint64_t kFairSolve = 36, kEndOfSolve = 24, kBareSolve = 12;
-// What the guard needs: the check of the way, and one of the safe part of it.
-constexpr uint64_t kLeastChecks = 2;
+// What the guard should have: the check of the way, and one of the safe part of it, without which nothing
+// moves. The barest sub-step has the first alone.
+constexpr uint64_t kFairChecks = 2, kBareChecks = 1;
+// A stable step is evaluated as fast as this share of the points and cells moves.
+constexpr double kBoundShareOfWork = 0.5;
 
 uint64_t checks(const World &w, const StepContext &step, uint64_t number) {
   return w.plan.has(StageRole::guards) ? number * surface_work(w, step) : 0;
 }
 
 // What a sub-step needs that has as many contacts as the last one.
-uint64_t sub_step_work(const World &w, const StepContext &step, uint64_t solve) {
-  return 1 + body_work(w, step) + surface_work(w, step) + checks(w, step, kLeastChecks) +
-         solve * step.budget.rows;
+uint64_t sub_step_work(const World &w, const StepContext &step, uint64_t number, uint64_t solve) {
+  return 1 + body_work(w, step) + surface_work(w, step) + checks(w, step, number) + solve * step.budget.rows;
 }
-uint64_t fair_work(const World &w, const StepContext &step) { return sub_step_work(w, step, kFairSolve); }
-uint64_t bare_work(const World &w, const StepContext &step) { return sub_step_work(w, step, kBareSolve); }
+uint64_t fair_work(const World &w, const StepContext &step) {
+  return sub_step_work(w, step, kFairChecks, kFairSolve);
+}
+uint64_t bare_work(const World &w, const StepContext &step) {
+  return sub_step_work(w, step, kBareChecks, kBareSolve);
+}
 // No sub-step takes less, whatever becomes of its contacts.
-uint64_t sure_work(const World &w, const StepContext &step) {
-  return 1 + body_work(w, step) + surface_work(w, step) + checks(w, step, 1);
-}
+uint64_t sure_work(const World &w, const StepContext &step) { return sub_step_work(w, step, kBareChecks, 0); }
 
 uint64_t pieces_to_come(const StepContext &step) {
   return uint64_t{step.budget.to_come} + (step.h < step.rest);
@@ -315,6 +320,11 @@ void plan_more_work(const World &w, StepContext &step, uint32_t done, uint32_t m
   if (b.least <= b.limit) b.limit = std::max(b.limit, b.work + more * each);
 }
 
+// Whoever asks for the stable step between two steps has it evaluated there; that changes no later result.
+void allow_for_bound(const World &w, StepContext &step) {
+  if (bound_is_new(w)) step.budget.aside += uint64_t(kBoundShareOfWork * double(body_work(w, step)));
+}
+
 void charge(World &w, StepContext &step, uint64_t units) {
   Budget &b = step.budget;
   b.work += units;
@@ -337,25 +347,27 @@ void share_work(const World &w, StepContext &step) {
     return;
   }
   const auto left_by = [&](uint64_t kept) { return b.limit > b.work + kept ? b.limit - b.work - kept : 0; };
-  const uint64_t guard = checks(w, step, kLeastChecks);
-  const uint64_t left = left_by(follow * fair_work(w, step) + guard + kEndOfSolve * b.rows);
+  const uint64_t left =
+      left_by(b.aside + follow * fair_work(w, step) + checks(w, step, kFairChecks) + kEndOfSolve * b.rows);
   const double share = double(left) / double(1 + follow);
   b.polish_end = b.work + uint64_t(kPolishShare * share);
   b.solve_end = b.work + uint64_t(kSolveShare * share);
-  b.bare_end = b.work + left_by(follow * bare_work(w, step) + guard);
+  b.bare_end = b.work + left_by(follow * bare_work(w, step) + checks(w, step, kBareChecks));
 }
 
 bool may_repeat(const World &w, StepContext &step) {
-  return holds(step, (2 + uint64_t{step.budget.to_come}) * fair_work(w, step));
+  return holds(step, step.budget.aside + (2 + uint64_t{step.budget.to_come}) * fair_work(w, step));
 }
 
 bool may_refine(const World &w, StepContext &step, double finer) {
-  return holds(step, (1 + uint64_t{step.budget.to_come}) * uint64_t(finer) * fair_work(w, step));
+  const uint64_t pieces = (1 + uint64_t{step.budget.to_come}) * uint64_t(finer);
+  return holds(step, step.budget.aside + pieces * fair_work(w, step));
 }
 
 bool may_solve_again(const World &w, StepContext &step, size_t hits) {
-  return holds(step, pieces_to_come(step) * fair_work(w, step) + checks(w, step, 1 + kLeastChecks) +
-                         kFairSolve * (step.budget.rows + hits));
+  const Budget &b = step.budget;
+  return holds(step, b.aside + pieces_to_come(step) * fair_work(w, step) + checks(w, step, 1 + kFairChecks) +
+                         kFairSolve * (b.rows + hits));
 }
 
 bool may_check(const World &w, StepContext &step) {
@@ -431,7 +443,7 @@ void put_back(World &w, StepContext &step, const std::vector<unsigned char> &fro
 dfm_status step_within_budget(World &w, double dt, uint32_t *trouble) {
   StepContext &step = *w.steps;
   Budget &b = step.budget;
-  b.work = b.limit = 0;
+  b.work = b.limit = b.aside = 0;
   b.kept = b.struck = false;
   b.offered = chosen_by_library(w, dt) ? dt : 0;
   b.used = Thrift::none;
@@ -462,7 +474,7 @@ dfm_status step_within_budget(World &w, double dt, uint32_t *trouble) {
       b.start.clear();
       Keep again{b.start};
       changed_at_once(again, w);
-      b.work = b.limit = 0;
+      b.work = b.limit = b.aside = 0;
       *trouble = before;
     }
   };

@@ -18,7 +18,9 @@ enum class Thrift { none, polish, sweeps, pieces };
 
 struct Budget {
   uint64_t work = 0, limit = 0;  // units of the present step; limit 0: not planned yet
-  uint64_t least = 0;            // units that it needs with as many contacts as the last sub-step
+  // Units that the step takes beside them, from what is free: that of the stable step.
+  uint64_t aside = 0;
+  uint64_t least = 0;  // units that it needs with as many contacts as the last sub-step
   // Whether the limit is divided: each sub-step has its share, beside what the others need. The default limit
   // is not, because it ends steps that would not end; nor is one of bodies that revise, because nobody knows
   // how many solves these need.
@@ -49,6 +51,8 @@ void plan_work(World &w, StepContext &step, uint32_t substeps);
 // The step needs more sub-steps than planned to stay stable: `done` and `more`. If the limit would have held
 // all of them, what others have used of it does not end the step.
 void plan_more_work(const World &w, StepContext &step, uint32_t done, uint32_t more);
+// At the start of each sub-step.
+void allow_for_bound(const World &w, StepContext &step);
 // Before a contact solve: its share of what the rest of the step does not need.
 void share_work(const World &w, StepContext &step);
 // Adds units and throws if the step must end here. Called by the stepping thread only, never while threads of

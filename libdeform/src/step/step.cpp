@@ -214,6 +214,7 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
         *trouble |= DFM_TROUBLE_SUBSTEPS;
       }
     }
+    allow_for_bound(w, step);
     step.budget.to_come = rest.left() - 1;
     step.guard.most_finer = double(w.def.max_substeps - done) / rest.left();
     if (!advance(w, step, rest.next(), rest.goal, rest.last(), trouble)) return DFM_E_DIVERGED;

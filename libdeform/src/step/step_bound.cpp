@@ -94,9 +94,19 @@ bool holds(World &w) {
   return true;
 }
 
+// Sub-steps that count as past where the strain until the next look is more than the bound pays for.
+uint32_t age_at_first(double strain) {
+  const double looks = kBoundStrain / strain;  // until it is spent
+  return looks >= 1 || !(strain > 0)
+             ? 0
+             : kBoundEvery - static_cast<uint32_t>(std::max(1.0, kBoundEvery * looks));
+}
+
 }  // namespace
 
 bool bound_due(const World &w) { return w.bound.age >= kBoundEvery; }
+
+bool bound_is_new(const World &w) { return w.bound.age == age_at_first(w.bound.strain); }
 
 void bound_is_due(World &w) { w.bound.age = std::max(w.bound.age, kBoundEvery); }
 
@@ -127,10 +137,7 @@ void update_bound(World &w) {
   w.stats.inverted_max = std::max(w.stats.inverted_max, w.bound.inverted);
   w.stats.limited_max = std::max(w.stats.limited_max, limited);
   w.bound.strain = strain_of_16(w);
-  const double looks = kBoundStrain / w.bound.strain;  // until it is spent
-  w.bound.age = looks >= 1 || !(w.bound.strain > 0)
-                    ? 0
-                    : kBoundEvery - static_cast<uint32_t>(std::max(1.0, kBoundEvery * looks));
+  w.bound.age = age_at_first(w.bound.strain);
 }
 
 }  // namespace dfm
