@@ -17,6 +17,7 @@
 #include <optional>
 
 #include "arguments.h"
+#include "attachments.h"
 #include "frames.h"
 #include "impulses.h"
 #include "json_text.h"
@@ -107,6 +108,7 @@ class Runner {
         checker_(scene),
         impulses_(scene),
         sensors_(scene, options.out),
+        attachments_(scene, options.out),
         tools_(scene, options.out),
         record_(scene.settings().every),
         frame_(frame_interval()),
@@ -284,6 +286,7 @@ class Runner {
 
   void record() {
     outputs_.record();
+    attachments_.record();
     tools_.record();
     if (recorder_) recorder_->add();
   }
@@ -433,6 +436,7 @@ class Runner {
   Checker checker_;
   Impulses impulses_;
   Sensors sensors_;
+  Attachments attachments_;
   Tools tools_;
   Schedule record_, frame_;
   std::unique_ptr<Frames> frames_;

@@ -49,11 +49,48 @@ TEST(AttachScene, RopeBetweenHookAndBrick_CarriesBoth) {
   EXPECT_NE(text.find("2 attachments hold"), std::string::npos);
 }
 
+// A tensile test: clamps are attachments, and attachments.csv has their forces: E A e, and 2 % more at this
+// length, since the ends cannot contract.
+TEST(AttachScene, ClampsOfATensileTest_ReportTheForce) {
+  const std::string folder = test::scratch("attach_clamps_" + std::to_string(getpid()));
+  test::written(folder + "/pull.json", R"({"format": "deform-scene", "version": 1,
+    "time": {"duration": 2, "step": 0.005}, "output": {"every": 0.5}, "gravity": [0, 0, 0],
+    "materials": {"gel": {"young": 1e5, "poisson": 0.25, "damping": {"stiffness": 0.005}}},
+    "bodies": [{"name": "bar", "mesh": {"make": "beam", "size": [0.2, 0.05, 0.05], "cells": 100},
+      "model": {"type": "corotational_fem"}, "material": "gel",
+      "attach": [{"to": "left clamp", "box": [[-1, -1, -1], [1e-6, 1, 1]]},
+                 {"to": "right clamp", "box": [[0.199999, -1, -1], [1, 1, 1]]}]}],
+    "obstacles": [
+      {"name": "left clamp", "shape": "box", "half_size": [0.01, 0.05, 0.05],
+       "pose": {"position": [-0.0101, 0.025, 0.025]}},
+      {"name": "right clamp", "shape": "box", "half_size": [0.01, 0.05, 0.05],
+       "pose": {"position": [0.2101, 0.025, 0.025]},
+       "motion": {"keyframes": [{"t": 0, "position": [0.2101, 0.025, 0.025]},
+                                {"t": 0.2, "position": [0.2201, 0.025, 0.025]}]}}]})");
+  for (const char *mode : {"dynamic", "static"}) {
+    const std::string out = folder + "/" + mode;
+    const test::CommandResult r = test::deform({"run", folder + "/pull.json", "--quiet", "--out", out,
+                                                "--set", std::string("/time/mode=\"") + mode + "\"", "--set",
+                                                "/time/step=" + std::string(*mode == 's' ? "0.5" : "0.005")});
+    ASSERT_EQ(r.exit_code, 0) << r.err;
+    const auto rows = test::read_csv(out + "/attachments.csv");
+    ASSERT_EQ(rows.size(), 1u + 2u * 5u) << mode;
+    EXPECT_EQ(rows[0][7], "force_x");
+    const auto &left = rows[rows.size() - 2], &right = rows.back();
+    EXPECT_EQ(left[1] + " " + left[2] + " " + left[3], "bar 1 left clamp");
+    EXPECT_EQ(right[1] + " " + right[2] + " " + right[3], "bar 2 right clamp");
+    const double exact = 1e5 * 0.05 * 0.05 * 0.05;
+    EXPECT_NEAR(std::stod(right[7]), 1.015 * exact, 0.02 * exact) << mode;
+    EXPECT_NEAR(std::stod(left[7]), -std::stod(right[7]), 1e-3 * exact) << mode;
+    EXPECT_NEAR(std::stod(right[4]), 0.21, 1e-6);
+  }
+}
+
 // Most of a fine surface on coarse cells is held: more bonds than the cells' points have motions.
 TEST(AttachScene, FineSurfaceOnCoarseCells_IsHeldExactly) {
   const Opened s(R"({"format": "deform-scene", "version": 1, "time": {"duration": 1, "step": 0.002},
     "bodies": [{"name": "rabbit", "mesh": ")" DEFORM_SOURCE_DIR
-                 R"(/examples/data/rabbit.obj", "fill": {"cells": 300},
+                 R"(/examples/data/rabbit.obj", "fill": {"cells": 800},
       "attach": [{"to": "hook", "box": [[-1, -1, 0.03], [1, 1, 1]]}]}],
     "obstacles": [{"name": "hook", "shape": "sphere", "radius": 0.01, "pose": {"position": [0, 0, 1]}}]})");
   ASSERT_EQ(s.status, DFM_OK) << dfm_last_error();
