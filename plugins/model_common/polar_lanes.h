@@ -17,7 +17,7 @@ constexpr double kPolarDivisor = 0.25;       // least divisor over t^3; 16/27 at
 constexpr double kPolarStep = 1e-6;          // largest last step over t: its cube is below rounding
 constexpr double kPolarLeastSquare = 1e-80;  // of F; below it powers of t lose digits
 
-// What comes with the rotation; a lane of it is accurate where divisor > kPolarDivisor cube, |step| <
+// Intermediate results of the rotation; a lane is accurate where divisor > kPolarDivisor cube, |step| <
 // kPolarStep trace and n > kPolarLeastSquare. Ops has the type V of a vector and splat(double), root(V).
 template <class Ops>
 struct Polar {

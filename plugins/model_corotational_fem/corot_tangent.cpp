@@ -63,7 +63,7 @@ struct Shape {
   }
 };
 
-// All but the axes of S and what comes of them.
+// Fills in everything except the axes of S and what follows from them.
 void frame_at(const Group &group, uint32_t lane, const double *const *x, Shape &out) {
   double f[9];
   for (int k = 0; k < 9; ++k) out.g[k / 3 + 1][k % 3] = group.g[k][lane];
@@ -89,7 +89,7 @@ void shape_at(const Group &group, uint32_t lane, const double *const *x, Shape &
 
 // Second derivative of an energy of the gradient in the axes of S (Smith, de Goes and Kim 2019, Analytic
 // eigensystems for isotropic distortion energies): a 3 x 3 block for the stretches, and for each pair i < j
-// its turn (i against j) and its shear. What is negative is cut off.
+// its turn (i against j) and its shear. Negative values are set to zero.
 struct Modes { double stretch[3][3], turn[3], shear[3]; };  // pair k: the axes other than k
 void modes_of(uint32_t energy, const double *s, double mu2, double lambda, Modes &out) {
   const double n = (s[0] * s[0] + s[1] * s[1]) + s[2] * s[2], det = s[0] * s[1] * s[2];
@@ -283,7 +283,7 @@ void Body::add_exact(const dfm_kin &k, uint32_t c, double a, double b, double *b
   each_block(slots[place / kGroup], lane, blk, add_block);
 }
 
-// What the flow of a cell takes from its blocks of the usual tangent.
+// Subtracts from the blocks of the elastic tangent what the plastic flow of the cell takes.
 void Body::add_softening(const dfm_kin &k, uint32_t c, double a, double *blk) const {
   const size_t place = place_of[c];
   const uint32_t lane = uint32_t(place % kGroup);

@@ -41,7 +41,7 @@ DEFORM_INLINE Edges4 corners(const Block &b, const Cell *c, int n, const double 
 }
 DEFORM_INLINE Edges4 operator-(const Edges4 &a, const Edges4 &b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 
-// Of the cells that fill up a block there is none: they have no stiffness.
+// Cells that fill up a block have no stiffness, so their energy is zero.
 static inline double cell_energies(const Block &b, const double *x, uint32_t stride, double sum) {
   for (uint32_t t = 0; t < b.cells; t += 4) {
     const Cell *c = b.cell + t;

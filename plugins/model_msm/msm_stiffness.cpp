@@ -15,7 +15,7 @@
 // C belongs to the whole body: where nearly all edges lie in a plane or along a line, the few that do not (a
 // knob on a sheet) would take all that the rest lacks, a hundred times their stiffness and more. So the
 // factor is at most 3. A spring of a direction that a stretched mesh has too much of would vanish: the factor
-// is at least 1/8, so that no point loses its hold. What the limits take is given back in the next step:
+// is at least 1/8, so that no point loses its hold. The next step gives back what the limits take:
 // otherwise each step would soften the whole body.
 #include <algorithm>
 

@@ -119,8 +119,8 @@ void Body::diagonal(const dfm_kin &k, uint32_t n, const uint32_t *surfel, double
     }
 }
 
-// Columns of C_rest for those surfels that have none yet, eight at a time. What was found stays: it
-// depends on the body alone. A held body needs them only where impulses move all of its points.
+// Computes columns of C_rest for those surfels that have none yet, eight at a time. They are kept, since they
+// depend on the body alone. A held body needs them only where impulses move all of its points.
 void Body::find_columns(uint32_t n, const uint32_t *surfel) {
   size_t wanted[kLanes], many = 0;
   for (uint32_t c = 0; c < n; ++c)

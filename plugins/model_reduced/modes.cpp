@@ -66,7 +66,7 @@ struct Search {
       energy.push_back(sum);
     }
   }
-  // What the first k modes hold of it, for all k.
+  // The share of it that the first k modes represent, for all k.
   std::vector<double> shares() const {
     double all = 0, sum = 0;
     for (const double e : energy) all += e;

@@ -1,5 +1,5 @@
-// The lowest modes of a body: K w = l M w, W^T M W = 1, M the masses of the points. Rigid motions of a
-// floating body are none of them.
+// The lowest modes of a body: K w = l M w, W^T M W = 1, M the masses of the points. They do not
+// include the rigid motions of a floating body.
 #pragma once
 #include "basis.h"
 #include "elastic.h"

@@ -158,8 +158,8 @@ void Body::advance_coordinates() {
   }
 }
 
-// What the modes do not hold of the displacements goes to where the forces have it at rest; of a modal
-// body, to zero.
+// Displacements that are no sum of modes move to their static solution under the forces; in a modal body, to
+// zero.
 void Body::advance_modes() {
   advance_coordinates();
   const double *const in[] = {q_to_.data(), qd_to_.data()};

@@ -212,7 +212,7 @@ void Body::project(const dfm_kin &k, const double *f) {
   }
 }
 
-// What the displacements s beside the modes have of C = sum m r x W, into coupling_: by rows a,
+// The part of the displacements s beside the modes in C = sum m r x W, into coupling_: by rows a,
 // sum m (s x W)_a = sum m (e_a x s) . W.
 void Body::couple_rest() {
   double *const turned[] = {mu_.data(), u_to_.data(), w_to_.data()};  // free until the modes have advanced
@@ -257,8 +257,8 @@ void Body::find_spin() {
     qd_[l] -= (row[0][l] * spin_[0] + row[1][l] * spin_[1]) + row[2][l] * spin_[2];
 }
 
-// What the modes do not hold of the displacements, where there is any: of a condensed body, of one that was
-// deformed by another model, or that contact has turned.
+// Keeps the displacements that are no sum of modes, if there are any: in a condensed body, after other models
+// have deformed the body, or after contact has turned it.
 void Body::keep_rest() {
   double all = 0, held = 0;
   for (size_t j = 0; j < size(); ++j) all += mu_[j] * u_[j];

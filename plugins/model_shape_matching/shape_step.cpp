@@ -110,8 +110,8 @@ void nearest_of_volume(const double *moments, const Cluster &c, double *out) {
   multiply(kept, c.root_inverse, out);
 }
 
-// From the center. What the center's rounding leaves out counts: a cluster that has fallen into one point is
-// not to take rounding for its shape.
+// Vector from the center, whose rounding error is subtracted: a cluster that has collapsed to one point must
+// not take rounding for its shape.
 void arm_of(const Frame &f, const double *x, double *out) {
   for (int a = 0; a < 3; ++a) out[a] = (x[a] - f.center[a]) - f.remainder[a];
 }

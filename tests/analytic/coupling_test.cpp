@@ -282,7 +282,7 @@ TEST(Coupled, SurfaceFile_HoldsTheTrueDisplacement) {
   }
 }
 
-// What is wrong with a surface is one sentence, and no body comes into being.
+// An error in a surface is one sentence, and no body is created.
 TEST(Coupled, WrongSurfaces_AreRefusedInOneSentence) {
   test::Context context;
   const dfm_world w = test::make_world(context);

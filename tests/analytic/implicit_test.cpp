@@ -252,7 +252,7 @@ TEST(ImplicitEuler, FreeBar_GainsNoEnergy) {
   }
 }
 
-// Several bodies on several threads; a world that is restored goes on with the same bits.
+// Several bodies on several threads; a world that is restored continues with the same bits.
 TEST(ImplicitContact, StackOnThreads_KeepsItsBits) {
   for (const int32_t integrator : {kImplicit, kSecond}) {
     std::array<uint64_t, 2> hash{};
@@ -272,8 +272,8 @@ TEST(ImplicitContact, StackOnThreads_KeepsItsBits) {
   }
 }
 
-// No bound holds an implicit step. What is offered follows the error: short steps while the body swings, the
-// longest when it rests.
+// No stability bound limits an implicit step. The step that is offered follows the error: short steps while
+// the body swings, the longest when it rests.
 TEST(ImplicitEuler, OfferedStep_GrowsAsTheBodyComesToRest) {
   for (const int32_t integrator : {kImplicit, kSecond}) {
     test::Context context;

@@ -258,7 +258,7 @@ TEST(StaticContact, WithoutAnEquilibrium_NothingChanges) {
   const std::string before = test::snapshot(w);
   EXPECT_EQ(find(w), DFM_E_DIVERGED);
   EXPECT_TRUE(test::snapshot(w) == before);
-  // and it goes on as one that was never asked
+  // and it continues like a world without the call
   const uint64_t asked = (test::run(w, 0.02, 1e-3), dfm_world_hash(w));
   test::ok(dfm_world_restore(w, before.data(), before.size()));
   test::run(w, 0.02, 1e-3);

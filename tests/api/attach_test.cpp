@@ -345,7 +345,7 @@ TEST(Attach, EitherSide_MayGo) {
   }
 }
 
-// Restored in a world that has no attachment it goes on with the same bits, and again in its own.
+// Restored in a world that has no attachment it continues with the same bits, and again in its own.
 TEST(Attach, Snapshot_ContinuesWithTheSameBits) {
   const auto make = [](World &s, bool with) {
     const dfm_obstacle hook = s.hook();
@@ -421,7 +421,7 @@ TEST(Attach, ADiscardedStep_LeavesItAsItWas) {
   EXPECT_EQ(dfm_world_hash(a.w), dfm_world_hash(b.w));
 }
 
-// What is held above and pressed on a floor below is one problem: both loads balance the weight.
+// A body held above and pressed on a floor below is one problem: both loads balance the weight.
 TEST(Attach, PressedOnAFloor_HolderAndFloorShareTheLoad) {
   for (const Case &c : {kCases[0], kCases[2]}) {
     SCOPED_TRACE(std::string(c.model) + " " + std::to_string(c.integrator));

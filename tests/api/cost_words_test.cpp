@@ -75,7 +75,7 @@ TEST(CostWords, NoChoice_IsNotApplied) {
   EXPECT_TRUE(has(refusal_to_apply(study), "nothing to apply")) << refusal_to_apply(study);
 }
 
-// What is proven for model and step is written, and said to be no more.
+// The result states what is proven for model and step, and that nothing else is.
 TEST(CostWords, ChoiceOnTheScenesOwnMesh_IsApplied) {
   Study study = two_choices(0.01);
   study.proven = false;

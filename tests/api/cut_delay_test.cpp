@@ -195,7 +195,7 @@ TEST(CutDelay, Blade_PartsTheBody_WithoutMassMomentumOrForce) {
     }
 }
 
-// What is due at points within the body waits for the cut; in the end all is paid, and once.
+// Energy due at inner points waits for the cut; in the end all of it is paid exactly once.
 TEST(CutDelay, Blade_PaysForTheCut) {
   for (const char *model : kModels)
     for (const double delay : {0.008, 0.04}) {

@@ -249,7 +249,7 @@ TEST(Equilibrium, StaticSceneWithContact_ReportsContactsOfItsEquilibria) {
   EXPECT_GE(std::strtod(summary.c_str() + at + 8, nullptr), 4) << "corners of the block: " << summary;
 }
 
-// What is refused is refused as bad input, before a folder is made.
+// Errors are reported as bad input, before a folder is made.
 TEST(Equilibrium, StaticSceneThatCannotBe_IsRefusedWhenItIsRead) {
   const std::string folder = test::scratch("static_refused");
   const char *const rigid = R"(, "rigid": {"host": "builtin", "bodies": [{"name": "stone", "shape": "sphere",

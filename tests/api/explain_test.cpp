@@ -207,7 +207,7 @@ TEST(World, StepOfTheDef_IsWhatAutoGoesBy) {
   }
 }
 
-// What is asked between two bodies does not close the choice for the first one: it is one choice for all of
+// A query between two creations does not fix the choice for the first body: it is one choice for all of
 // them before the first step.
 TEST(World, QueriesBetweenBodies_DoNotChangeTheChoice) {
   test::Context context;

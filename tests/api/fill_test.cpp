@@ -95,7 +95,7 @@ struct FromFile {
 
 }  // namespace
 
-// What is filled here and loaded there weighs the same, or the loss is told.
+// A mesh that is filled, written and loaded has the same mass, or a message names the loss.
 TEST(MeshFillCommand, Shares_SurviveInVtkAndVtu_AndTheirLossIsReported) {
   const std::string folder = test::scratch("fill_command_shares");
   const std::string organ = std::string(DEFORM_SOURCE_DIR) + "/examples/data/organ.obj";

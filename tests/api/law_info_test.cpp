@@ -86,7 +86,7 @@ TEST(LawInfo, OfAPairWithoutARule_IsTheDefaultLaw) {
   EXPECT_EQ(value(info, "mu_C"), std::vector<double>{0.5});
 }
 
-// What is read can be given back: the same law, the same bits.
+// A law made from the values that were read gives the same bits.
 TEST(LawInfo, ParamsGivenBack_MakeTheSameRule) {
   for (const char *const law : {"coulomb", "karnopp", "dahl", "lugre", "elastoplastic", "gms", "none"}) {
     SCOPED_TRACE(law);

@@ -12,7 +12,7 @@ std::string scene_of(const std::string &mesh) {
          mesh + R"(, "spin": [1, 2, 3]}], "output": {"every": 1}})";
 }
 
-// What is written to the terminal and the hash of the state, without its run's folder.
+// The output in the terminal without the name of the folder, and the hash of the state.
 struct Outcome {
   test::CommandResult result;
   std::string hash;

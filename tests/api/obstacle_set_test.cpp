@@ -58,7 +58,7 @@ TEST(ObstacleSet, Find_GivesTheHandleOrTheNearestName) {
   EXPECT_EQ(found, s.table);
   EXPECT_EQ(dfm_world_find_obstacle(s.world, "tabel", &found), DFM_E_ARG);
   test::says({"'tabel'", "'table'"});
-  EXPECT_EQ(dfm_world_find_obstacle(s.world, "block", &found), DFM_E_ARG);  // a body is none
+  EXPECT_EQ(dfm_world_find_obstacle(s.world, "block", &found), DFM_E_ARG);  // a body is no obstacle
   EXPECT_EQ(dfm_world_find_obstacle(s.world, nullptr, &found), DFM_E_ARG);
 }
 
@@ -188,7 +188,7 @@ TEST(ObstacleSet, Material_ChangesTheFriction) {
   test::says({"floor", "another world"});
 }
 
-// All of it is state: a world as it was made takes it over from the snapshot and goes on with the same bits.
+// All of it is state: a fresh world takes it over from the snapshot and continues with the same bits.
 TEST(ObstacleSet, Snapshot_HoldsBeltFilterAndMaterial) {
   const auto prepared = [](OnATable &s) {
     dfm_material_def m = dfm_material_def_default();

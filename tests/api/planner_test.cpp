@@ -38,7 +38,7 @@ void expect_refused(const std::string &scene, const std::vector<std::string> &wo
   for (const std::string &word : words) EXPECT_TRUE(has(r.err, word)) << "no '" << word << "' in: " << r.err;
 }
 
-// What is measured on whoever runs the tests shall not decide them.
+// Costs measured on the machine of the tests must not decide their results.
 class PlannerScene : public testing::Test {
  protected:
   void SetUp() override { setenv("XDG_CONFIG_HOME", folder().c_str(), 1); }

@@ -10,7 +10,7 @@
 
 namespace {
 
-// What the hooks do when they are called, and how often each was.
+// What the hooks do when they are called, and how often each was called.
 std::function<void()> attack;
 bool attacking = false;
 std::map<std::string, int> called;

@@ -163,7 +163,7 @@ TEST(RigidBodies, HashAndSnapshotOnThreads_CoverThem) {
   ASSERT_EQ(dfm_world_restore(b, data.data(), data.size()), DFM_OK) << dfm_last_error();
   run(b, 0.2, 1e-3);
   EXPECT_EQ(dfm_world_hash(b), end);
-  // What the hash sees: a pose, and a motor that is told something else.
+  // The hash depends on a pose and on the target of a motor.
   ok(dfm_world_restore(b, data.data(), data.size()));
   dfm_rigid_state s = state(other);
   const uint64_t there = dfm_world_hash(b);

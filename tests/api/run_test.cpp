@@ -348,7 +348,7 @@ TEST(Run, Json_IsTheSummary) {
   EXPECT_EQ(r.result.out, r.summary);
 }
 
-// What nobody has measured is not 0.
+// A value that was not measured is not 0.
 TEST(Run, BodiesThatTheEnergyWatchDoesNotLookAt_AreNamed) {
   const Outcome all = run("watched", {"--quiet", "--time", "0.005"});
   EXPECT_EQ(value(all.summary, "unwatched"), "{}");

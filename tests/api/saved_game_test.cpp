@@ -344,7 +344,7 @@ TEST(SavedGame, RewoundAndCutOtherwise_LoadsEachOfTheTwoCourses) {
   }
 }
 
-// What is left of a body that was destroyed is a body of its own, with the mesh of the whole.
+// Pieces of a destroyed body are bodies of their own, with the mesh of the whole body.
 TEST(SavedGame, WithAPieceWhoseBodyIsGone_LoadsIntoAWorldBuiltAnew) {
   test::Context c;
   const dfm_world w = empty(c);

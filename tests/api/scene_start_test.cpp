@@ -141,7 +141,7 @@ TEST(SceneStart, Mistakes_AreRefusedWithTheirPlace) {
   }
 }
 
-// What was asked for in the start is no fault; what is left of it at the end is.
+// Overlaps that the start asks for are no error; overlaps that remain at its end are.
 TEST(SceneStart, InsideOut_IsWarnedOfWhereItLasts) {
   const std::string folder = test::scratch("scene_start_run_" + std::to_string(getpid()));
   test::write_file(folder + "/scene.json",

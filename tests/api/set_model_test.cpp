@@ -745,7 +745,7 @@ TEST(SwitchRule, IsPartOfASnapshot_AndOfNoThread) {
   }
 }
 
-// Who sleeps is left alone: a change would wake it.
+// A sleeping body is left alone: a change would wake it.
 TEST(SwitchRule, OfASleeper_WaitsUntilItWakes) {
   Slope s(DFM_INTEGRATOR_SYMPLECTIC_EULER, 1, true);
   test::run(s.world, 2.0, 1e-3);

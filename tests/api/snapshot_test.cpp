@@ -119,7 +119,7 @@ TEST(Snapshot, TakenAtAnyStep_ContinuesWithTheSameBits) {
   }
 }
 
-// What the host changed while the world ran belongs to the state.
+// Changes by the host during the run belong to the state.
 TEST(Snapshot, OfAWorldChangedWhileRunning_HoldsTheChanges) {
   test::Context c;
   const test::Stack s = build(c), fresh = build(c);

@@ -193,7 +193,7 @@ TEST(SwitchOfAScene, Explain_ListsIt) {
 
 namespace {
 
-// Who counts how often a modal model is made, by the line that each of them logs.
+// Counts how often a modal model is made, by the line that each one logs.
 struct Counted {
   int made = 0;
   dfm_context *c = nullptr;

@@ -94,7 +94,7 @@ TEST(ToolCut, BladeThroughACube_PartsIt_WithoutMassMomentumOrForce) {
   }
 }
 
-// What the limit leaves is cut in the steps that follow.
+// Faces beyond the limit are cut in the steps that follow.
 TEST(ToolCut, Limit_HoldsInEachStep_AndNothingIsForgotten) {
   Cube whole, s;
   const dfm_tool free = blade(whole.w), t = blade(s.w);
@@ -337,7 +337,7 @@ struct Tough {
       EXPECT_GE(f[2], -1e-12) << "it holds back and never pulls";
     }
   }
-  // What the body has is what the tool has given.
+  // The momentum of the body is the impulse of the tool.
   void same_momenta(double turning = 1e-12) const {
     const dfm_body_measure m = test::measure(body);
     for (size_t k = 0; k < 3; ++k) {
@@ -446,7 +446,7 @@ TEST(ToolCut, CoupledBlade_PaysTheEnergyOfTheCut_AndIsHeldBack) {
   }
 }
 
-// What the cut still takes holds the blade where the hand is too weak, without a creep.
+// A hand that is too weak for the rest of the cut leaves the blade where it is, without creep.
 TEST(ToolCut, CoupledBlade_StandsWhereTheHandIsTooWeak) {
   Tough s(200, all);
   s.down(0.005, 0.1);
@@ -458,7 +458,7 @@ TEST(ToolCut, CoupledBlade_StandsWhereTheHandIsTooWeak) {
   EXPECT_EQ(parts(s.body), 1u);
 }
 
-// What is due is part of a snapshot.
+// The energy due is part of a snapshot.
 TEST(ToolCut, SnapshotOfABladeThatOwes_GoesOnTheSameWay) {
   Tough s(0, sides);
   s.down(0.03, 0.2);

@@ -149,7 +149,7 @@ TEST(ToolLift, ByEveryLaw_NothingCreeps) {
 }
 
 // A held needle, whose moments differ 50 times, is turned and tilted and carried about, and a snapshot in the
-// middle of it goes on with the same bits.
+// middle of it continues with the same bits.
 TEST(ToolLift, ANeedleThatIsTurned_StaysInTheJaws) {
   for (const double dt : {1e-3, 1.0 / 120}) {
     SCOPED_TRACE(dt);

@@ -198,7 +198,7 @@ TEST(WriteScene, WorldOfAProgram_ContinuesWithTheSameBits) {
   EXPECT_LT(apart(alone, made.world), 1e-6);
 }
 
-// Tools of each kind, one led by keys, one coupled, one that cuts: the scene has them, and goes on alike.
+// Tools of each kind, one led by keys, one coupled, one that cuts: the scene has them, and continues alike.
 TEST(WriteScene, Tools_AreWrittenWithKeysCouplingAndCuts) {
   const std::string folder = folder_of("tools"), path = folder + "/tools.json";
   test::write_file(path, R"({"format": "deform-scene", "version": 1, "gravity": [0, 0, 0],

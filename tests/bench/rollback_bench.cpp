@@ -1,4 +1,4 @@
-// What the roll-back does to sliding, bouncing, momentum and normal force, beside the velocity method, at two
+// Effect of the roll-back on sliding, bouncing, momentum and normal force, beside the velocity method, at two
 // steps. libdeform/doc/concepts/rollback.md holds what it prints.
 #include <cstdio>
 

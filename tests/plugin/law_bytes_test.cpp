@@ -1,4 +1,4 @@
-// What the fuzzer asks of every law, from random bytes: tests/fuzz/law_fuzz.cpp goes on where this ends.
+// The checks of the fuzzer for every law, on a few random bytes; tests/fuzz/law_fuzz.cpp runs many more.
 #include "law_bytes.h"
 
 #include <random>

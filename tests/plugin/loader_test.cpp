@@ -161,7 +161,7 @@ TEST(Loader, PluginOfADraft_IsRefusedInOneSentenceWithWhatToDo) {
                 "since ABI 1; rebuild it against this library's deform/plugin.h");
 }
 
-// One that asks in the words of the draft's header sees that this host is none of a draft.
+// A plugin built with the header of the draft sees that this host is not of the draft.
 TEST(Loader, HostOfTheLibrary_ReportsItsAbis) {
   Context c;
   ASSERT_EQ(load(c, plugin("tiny_host")), DFM_OK);
@@ -280,7 +280,7 @@ TEST(Loader, PluginPath_ComesBeforeTheLibrarysOwnDirectory) {
   dfm_context_destroy(context);
 }
 
-// Who wrote the plugin reads why its law is missing, not only that it is.
+// The author of a plugin reads why its law is missing, not only that it is.
 TEST(Loader, SceneWithALawOfASkippedFile_SaysWhyItWasSkipped) {
   const std::string dir = folder("path_skipped");
   test::write_file(dir + "/org.tiny.absent.so", "this is no library\n");

@@ -82,7 +82,7 @@ TEST(Modal, FrequenciesOfAFineBar_AreNearTheContinuum) {
 }
 
 // The cube's cells turn into each other about its diagonal: eigenvalues are double to the last digits, where
-// Lanczos's method sees one vector. What it finds is what a dense solver finds.
+// Lanczos's method sees one vector. It finds the same modes as a dense solver.
 TEST(Modal, DoubleModesOfACube_AreBothFound) {
   const Mesh m = kuhn_bar(5, 5, 5, 0.02);
   const std::vector<double> few = modes_of(m, {{"modes", 24}}), all = modes_of(m, {{"modes", 300}});

@@ -99,7 +99,7 @@ TEST_P(ReducedWorld, OnAnyNumberOfThreads_HasTheSameBits) {
   EXPECT_EQ(dfm_world_hash(a.world), dfm_world_hash(b.world));
 }
 
-// What is held is known from creation on.
+// Held points are known from creation on.
 TEST_P(ReducedWorld, HeldLater_IsRefused) {
   World w(GetParam(), "coulomb", 0.5, {0, 0, -9.81}, 0.1);
   const uint32_t points[] = {0, 1};

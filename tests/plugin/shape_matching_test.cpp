@@ -449,7 +449,7 @@ TEST(ShapeMatching, StretchAboveTheYieldStrain_Stays) {
   EXPECT_NEAR(set_after(1.3, {{"plastic_yield", 1}}), 0, 1e-6);
 }
 
-// What is held stays where it is told to be, and the rest hangs on it by the same length at any step.
+// Held points stay at their prescribed places, and the rest hangs at the same distance at any step.
 TEST(ShapeMatching, HeldEnd_CarriesTheBody) {
   const Mesh mesh = kuhn_bar(4, 2, 2, 0.1);
   std::vector<uint8_t> fixed(mesh.npoint(), 0);

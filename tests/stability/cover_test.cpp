@@ -31,7 +31,7 @@ TEST_P(Cover, Row_Holds) {
   else EXPECT_FALSE(seen.wrong.empty()) << columns(row) << " holds now, take it out of cover_known.h";
 }
 
-// What is refused beyond the product, each in one sentence that names the model; the page has the table.
+// Combinations that are refused, each in one sentence that names the model; the page has the table.
 TEST(CoverRefused, BeyondTheProduct_NamesTheModelAndTheAlternative) {
   const auto refused = [](dfm_status s, std::initializer_list<const char *> parts) {
     EXPECT_EQ(s, DFM_E_UNSUPPORTED);

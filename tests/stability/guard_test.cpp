@@ -99,7 +99,7 @@ TEST(Guard, ThreadsAndRepetition_SameHash) {
   EXPECT_EQ(hash[0], hash[2]);
 }
 
-// What the guard remembers of a pair holds for the motion of steps alone. Two runs begin apart, one so far
+// The guard's memory of a pair is valid for the motion of steps only. Two runs begin apart, one so far
 // that its pairs are not listed; both are then given the same state by dfm_body_set_state(), from which
 // they go on alike.
 TEST(Guard, StateSetBetweenSteps_ForgetsHowFarApartPairsWere) {

@@ -133,7 +133,7 @@ std::vector<Row> contact_rows() {
 INSTANTIATE_TEST_SUITE_P(Shipped, ContactScene, testing::ValuesIn(contact_rows()),
                          [](const auto &i) { return std::string(i.param.scene); });
 
-// What the guard is for: whole flights.
+// The task of the guard: whole flights.
 TEST(GuardShot, JitteredRuns_DoNotCross) {
   test::expect_jittered("guard_shot", 1, 10, {}, row_of("guard_shot").least_contacts,
                         [](const test::SceneRun &run) { return run.number("guard_steps") > 0; });

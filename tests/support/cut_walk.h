@@ -126,7 +126,7 @@ class CutWalk {
       const dfm_status status = dfm_world_step(w_, 1e-3, &trouble);
       ++out_.steps;
       if (status == DFM_DISCARD ||
-          status == DFM_E_DIVERGED) {  // in the last good state: it goes on with a cut
+          status == DFM_E_DIVERGED) {  // in the last good state, from which a cut continues
         ++out_.refused;
         look();
         break;
@@ -271,7 +271,7 @@ class CutWalk {
     expect_kept(done);
   }
 
-  // Of all bodies: what has gone is what the cut tells.
+  // Over all bodies: the mass that was removed is the mass that the cut reports.
   void expect_kept(const dfm_cut_info &done) {
     const Sum now = sum();
     if (std::fabs(now.mass + done.mass - sum_.mass) > 1e-12 * sum_.mass) {

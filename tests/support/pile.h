@@ -1,4 +1,4 @@
-// Random piles: 5 to 20 bodies of all kinds fall into a box, told by a seed alone. What is walked with them
+// Random piles: 5 to 20 bodies of all kinds fall into a box, given by a seed alone. What is walked with them
 // is whether a law's solve stays finite.
 #pragma once
 #include <random>

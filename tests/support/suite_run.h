@@ -80,7 +80,7 @@ inline double cpu_now() {
   return double(t.tv_sec) + 1e-9 * double(t.tv_nsec);
 }
 
-// A vector of the scene, or zero where it is none.
+// A vector of the scene, or zero if the key is missing.
 inline std::array<double, 3> scene_vector(dfm_scene scene, const char *pointer) {
   std::array<double, 3> out{};
   size_t bytes = 0;

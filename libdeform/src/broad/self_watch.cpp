@@ -66,8 +66,8 @@ bool SelfWatch::meets(double h, double offset, double change, const std::functio
   return any_near(offset, {h, 2 * h * (list_.deforming() + change), 2 * h * (speed_ + change), velocity});
 }
 
-// What is not listed is not near: update() and cover() list all that is within the reach of a contact, or
-// deeper than what is led back.
+// A pair that is not listed is not near: update() and cover() list all pairs within the reach of a contact,
+// and those that are deeper than what contacts push back.
 bool SelfWatch::any_near(double offset, const Ask &ask) {
   const Surface &s = surface_;
   const Array<SelfPair> &faces = list_.vertex_face(), &edges = list_.edge_edge();

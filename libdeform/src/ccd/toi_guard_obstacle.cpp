@@ -152,8 +152,8 @@ class Judge {
     GuardHit hit{candidate, part, 0, 0, 0, {}};
     const auto touch = [&](double d, double within) { return m.touch(d, within); };
     const bool trips = narrow::judge(touch, [&] { return m.distance(0); }, scene_.floor, scene_.margin, hit);
-    // What is in the box already comes out of it past its edges and corners: kept off them it would be kept
-    // in, against contacts that lead it out.
+    // A feature inside the box must leave it past the edges and corners of the box: a guard at these would
+    // hold it inside, against the contacts that lead it out.
     const bool box = frame_->shape.view().shape == Shape::box;
     if (trips && box && reaches_in(frame_->shape, {m.m + (m.edges ? 0 : 1), m.edges ? 2u : 3u})) return;
     keep(trips, hit);

@@ -10,7 +10,7 @@
 // the point of the surfel. So both momenta are conserved whatever the residual of the solve.
 //
 // A drag holds nothing: its surfel is material in front of an edge that cuts, and `along` the way of it.
-// Its impulse is l along, with s = -along.u the speed at which the edge goes on through the material:
+// Its impulse is l along, with s = -along.u the speed at which the edge moves through the material:
 //
 //     0 <= l <= most;   l = most where s > 0, s = 0 where 0 < l < most, s <= 0 where l = 0;   l s <= due
 //

@@ -167,8 +167,8 @@ uint32_t solve_held(ContactRows &rows, const RowsPart &part, double tolerance, A
   return passes + 1;
 }
 
-// Which drags stick is found by turns with what holds: those that are over a limit go to it and stick no
-// more. What is left then is a residual, and the sweeps go on with it.
+// Solves of the bonds; between them, drags above their limit are set to it and no longer stick. After these
+// solves the rest is a residual, which the sweeps reduce further.
 constexpr uint32_t kMostTurns = 8;
 
 }  // namespace

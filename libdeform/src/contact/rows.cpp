@@ -160,8 +160,8 @@ void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const 
       dof.push_back(d);
       weight.push_back(w);
     };
-    // The same by a table, for rows that are long. What it holds of other contacts follows from
-    // the row's own columns.
+    // The same by a table, for long rows. Entries of other contacts are recognized: they do not match the
+    // columns of this row.
     auto add_far = [&](uint32_t d, double w) {
       if (d >= place_.size()) place_.resize(d + 1);
       const uint32_t at = place_[d];
@@ -206,8 +206,8 @@ void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const 
   points_free_ = true;
 }
 
-// What the impulse a on the soft body, -a on the rigid one, changes of the velocity between them on
-// the rigid side.
+// The rigid body's share in the change of relative velocity by the impulse a on the soft body and -a on the
+// rigid one.
 Vec3 ContactRows::rigid_diagonal(uint32_t i, Vec3 a) const {
   const Block &b = blocks[block[rigid[i]]];
   const Vec3 r = load3(&arm[size_t(3) * i]), m = dfm::cross(r, a);
@@ -465,7 +465,7 @@ void ContactRows::push_rigid(const Block &b) {
 
 namespace {
 
-// What is left of a response when the largest diagonal is this share of what it was is rounding.
+// When the largest diagonal of a response has fallen to this share, the rest is rounding.
 constexpr double kRounding = 1e-13;
 
 }  // namespace

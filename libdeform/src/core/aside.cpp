@@ -51,7 +51,7 @@ class Worked {
   std::chrono::nanoseconds since_;
 #else
   explicit Worked(std::thread &) {}
-  bool half_of(std::chrono::nanoseconds) { return false; }  // nobody knows
+  bool half_of(std::chrono::nanoseconds) { return false; }  // unknown on this system
 #endif
 };
 

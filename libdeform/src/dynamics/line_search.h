@@ -14,10 +14,10 @@ double product(const Values &a, const Values &b) {
   return sum;
 }
 
-// Goes along a way: all of it, or less where what is sought would be pushed back by more than half of what
-// pushed it on. start: the slope at its beginning, above zero. move(share) goes on by that share of the way;
-// slope(value) writes the slope there, or returns false where it is not known, and the way is then halved.
-// False: it is not known at the end either.
+// Moves along a direction by the whole way, or by less where the slope at the end would be negative and more
+// than half as large as at the start. start: the slope at the beginning, above zero. move(share) moves on by
+// a share of the way; slope(value) writes the slope there, or returns false if it is unknown: then the way is
+// halved. False: the slope is unknown at the end, too.
 template <class Move, class Slope>
 bool search_line(double start, uint32_t cuts, const Move &move, const Slope &slope) {
   constexpr double kOvershoot = 0.5;

@@ -71,8 +71,8 @@ double mesh_error(const BodyRegime &b) {
 
 // rad of the lowest mode that TR-BDF2 passes by backward Euler, because the body touches something. A held
 // body that a probe presses longer than half a period follows the probe and no longer swings freely; so half
-// a period counts for each time that something comes to it. What its own load carries onto something bounces
-// there, as often as it swings.
+// a period counts for each new touch. A body whose own load presses it onto something bounces there as often
+// as it swings.
 double touched_turns(const BodyRegime &b, const Estimate &e) {
   const double turns = e.frequency * e.lasts;
   const bool bounces = b.below > 0 && b.below <= e.sag + b.depth;

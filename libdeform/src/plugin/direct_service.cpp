@@ -28,7 +28,7 @@ struct Direct {
 
 Direct &direct(void *self) { return *static_cast<Direct *>(self); }
 
-// What goes wrong is a status, and said in the log of the host.
+// Runs f; turns an exception into a status and a line in the log of the host.
 template <class F>
 dfm_status guarded(const dfm_host &host, F &&f) noexcept {
   try {

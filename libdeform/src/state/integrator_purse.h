@@ -8,7 +8,7 @@ namespace dfm {
 
 inline constexpr uint32_t kMostTries = 5;
 
-// Lasts: a restored world goes on with it.
+// Part of snapshots: a restored world continues with it.
 struct IntegratorPurse {
   uint32_t open = 0;   // it has been filled for the first time
   uint32_t tries = 0;  // of implicit time that were given up since it has last paid
@@ -17,7 +17,7 @@ struct IntegratorPurse {
   double lost = 0;
   double struck_until = 0;  // s, time until which bodies are explicit because of a blow; 0: none
 };
-// What the steps of this world were, where the library may change integrators; not in snapshots.
+// Simulated time by integrator, where the library may change integrators; not in snapshots.
 struct IntegratorTimes {
   double all = 0, implicit = 0;  // s
   uint64_t changes = 0;

@@ -99,7 +99,7 @@ Vec3 next_start(const World &w, const StepContext &step, uint32_t i) {
   return before.x > 0 && keeps_velocity(step.rows, i) ? 0.5 * (before + l) : l;
 }
 
-// What the next sub-step knows of contact i, and what is reported of it.
+// Stores contact i for the next sub-step and for the report.
 void keep_contact(World &w, StepContext &step, uint32_t i) {
   const uint32_t S = step.state.nstate;
   ContactStore &to = step.next_store;

@@ -68,9 +68,9 @@ bool turn_over(const StepContext &step, double offset, ContactPoint &c) {
   return c.distance < contact_reach(step.h, offset, std::sqrt(speed2));
 }
 
-// Where two surfaces do not cross, nothing has come through one of them. What is behind a face lies outside
-// all the same: the face looks inward, because its surface is folded through itself. To lead it out through
-// the face is what the guard prevents, and the impulses of the two would grow without bound
+// Where two surfaces do not cross, no point has passed through one of them. So a point behind a face lies
+// outside: the face looks inward, because its surface is folded through itself. A contact that leads the
+// point through the face works against the guard, and the impulses of both would grow without bound
 // (doc/decisions/0413-depths-that-cannot-be.md).
 void turn_false_depths(World &w, StepContext &step) {
   if (!w.plan.has(StageRole::guards)) return;

@@ -40,7 +40,7 @@ bool parts_of_one(const World &w, const OverlapPair &p) {
 }
 
 // Parts of what was one body lie on each other where they were one, with the faces of the cut set back by
-// half of the rest distance each (doc/decisions/0398). What is within that is how they lie, and no overlap.
+// half of the rest distance each (doc/decisions/0398). A depth within that is their normal place, no overlap.
 bool lie_on_cut(const World &w, const OverlapPair &p, const Crossed &c) {
   return parts_of_one(w, p) && c.depth <= w.offset && !deep(w, p, c);
 }

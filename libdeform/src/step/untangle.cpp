@@ -72,7 +72,7 @@ class Untangler {
   }
   bool overlap(const OverlapPair &p) { return sides_.look(p, w_.offset, true).through; }
 
-  // What overlaps now of those that have moved.
+  // Pairs that overlap now and of which a side has moved.
   std::vector<OverlapPair> through() {
     std::vector<OverlapPair> out;
     for (uint32_t i = 0; i < w_.bodies.size(); ++i) {

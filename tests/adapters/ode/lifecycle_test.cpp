@@ -212,7 +212,7 @@ TEST(OdeLifecycle, DisabledBoxOnASoftBed_WakesWhenItsLoadChanges) {
 }
 
 // ODE lets only bodies with joints fall asleep: here those of the contact with its plane. What they carried
-// goes on being carried.
+// stays carried.
 TEST(OdeLifecycle, AutoDisabledPlate_SleepsUnderABallAndWakesWithoutIt) {
   Ode ode;
   dWorldSetAutoDisableFlag(ode.world, 1);
@@ -367,7 +367,7 @@ TEST(OdeLifecycle, MassOfALiveBody_CountsFromTheNextStep) {
   EXPECT_LT(apart(start.linear, end.linear), 1e-12 * start.size);
 }
 
-// A restored world goes on as it did the first time, and takes ODE's bodies with it.
+// A restored world continues as it did the first time, and takes ODE's bodies with it.
 TEST(OdeLifecycle, Restore_TakesTheBodiesBack) {
   Ode ode;
   soft_bed(ode);

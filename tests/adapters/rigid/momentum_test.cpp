@@ -35,7 +35,7 @@ TEST(Momentum, CollisionWithATumblingBox_KeepsBothMomenta) {
   EXPECT_EQ(engine.stats().corrections, 0u);
 }
 
-// What the engine and the contact solve book is one impulse, not a force that comes a step later: the
+// The engine and the contact solve account for one impulse, not a force that comes a step later: the
 // momentum that the soft ball loses within one step has arrived in the rigid one at the end of that step.
 TEST(Momentum, EachStepOfAnImpact_ReportsTheSameImpulseOnBothSides) {
   Engine engine({0, 0, 0});

@@ -1,5 +1,5 @@
-/* A net whose forces are given in two parts: the last point, and all others. A file that includes this defines
- * give_last, which breaks a promise. */
+/* A net whose forces are given in two parts: the last point, and all others. A file that includes this
+ * defines give_last, which breaks a promise. */
 #include "deform/plugin.h"
 #include "deform/plugin_draft.h"
 static uint32_t parts(const void *self);

@@ -12,7 +12,7 @@ using namespace test;
 
 constexpr double kTolerance = 1e-12;  // the default, a share of the extent over the step
 
-// What is wrong with an answer; "" where nothing is.
+// What is wrong with a result; "" if nothing is.
 std::string judge(const ToiQuery &q, int method, const ToiAnswer &a) {
   if (std::isnan(a.t)) return "refused";
   const bool hit = a.t <= 1;

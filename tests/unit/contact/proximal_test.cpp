@@ -85,7 +85,7 @@ struct Equal {
 
 }  // namespace
 
-// What is no farther off than may be left keeps its load; beyond that it is handed over as ever.
+// Contacts within the allowed residual keep their load; others get a new one, as always.
 TEST(Sweep, LoadWithinWhatMayBeLeft_Stays) {
   Equal stays, moves;
   const Array<double> impulse(stays.rows.impulse);

@@ -341,7 +341,7 @@ TEST(Sweep, RestoredVelocities_AreThoseOfTheImpulses) {
   EXPECT_NEAR(norm(load3(g.rows.y.data()) - now), 0, 1e-15);
 }
 
-// What is no number is not passed over: a residual of zero would call it solved.
+// NaN is not ignored: a residual of zero would count as solved.
 TEST(Sweep, ImpulseThatIsNoNumber_IsNotConverged) {
   Groove g(0.2, 0.5, 2);
   g.rows.impulse[0] = NAN;

@@ -1,4 +1,4 @@
-// What the loops over points answer, at each width, against one cell and one edge at a time.
+// Results of the loops over points, at each width, against one cell and one edge at a time.
 #include <gtest/gtest.h>
 
 #include <algorithm>

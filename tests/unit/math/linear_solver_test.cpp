@@ -319,7 +319,7 @@ TEST(SolverChoice, AutomaticChoice_FactorsSmallAndConstantMatrices) {
   EXPECT_EQ(dfm::own_solver({"lu", 1, false, 0}, dfm::Memory::standard(), nullptr), nullptr);
 }
 
-// What is kept between calls must not show: a world that was restored asks for other points first.
+// Data kept between calls must not change results: a world that was restored asks for other points first.
 TEST(Ldlt, ResponseOfPoints_IsTheSameBitsWhateverWasRequestedBefore) {
   const Grid g = grid(6, 5, 4, 0.05);
   dfm::LdltSolver kept(dfm::Memory::standard()), fresh(dfm::Memory::standard());

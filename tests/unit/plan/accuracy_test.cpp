@@ -190,7 +190,7 @@ TEST(Planner, DampingShortensTheExplicitStep) {
   EXPECT_NEAR(damped * damped * w2 + 2 * damped * free * w2, 4, 1e-9);
 }
 
-// What the mesh leaves of the target is for model and time; if that is nothing, the choice says so.
+// Model and time share the part of the target that the mesh leaves; if there is none, the choice says so.
 TEST(Planner, CoarseMesh_MissesTheTargetInASentence) {
   BodyRegime b = bar();
   b.edge = 0.1;

@@ -213,7 +213,7 @@ TEST(PlanEffects, ThatNoPluginProvides_AreRefusedWithPossibleProviders) {
   EXPECT_EQ(refusal(empty), "");
 }
 
-// What is cut or folds comes to lie on itself, so these effects call for self contact.
+// A body that is cut or folds touches itself, so these effects call for self contact.
 TEST(PlanEffects, ThatFold_CallForSelfContact) {
   dfm::SceneFacts f;
   f.bodies = 1;

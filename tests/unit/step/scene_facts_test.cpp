@@ -1,4 +1,4 @@
-// What is known of a scene does not grow with its pairs: a thousand bodies are half a million of them.
+// Facts of a scene do not grow with its pairs: a thousand bodies have half a million pairs.
 #include <gtest/gtest.h>
 
 #include "../world/inside.h"
