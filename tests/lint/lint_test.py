@@ -74,7 +74,8 @@ GOOD = {
                                "[gallery](reference/gallery.md), [scenes](reference/scenes.md), "
                                "[bee](laws/bee.md), "
                                "[out](https://example.org/a.md)\n",
-    "libdeform/doc/decisions/0001-handles.md": "# Handles\n",
+    "libdeform/doc/decisions/0001-handles.md": "# 0001 Handles\n",
+    "libdeform/doc/decisions/README.md": "# Decisions\n\n- [0001](0001-handles.md) Handles\n",
     "libdeform/doc/reference/scenes.md": "`time.step`: s\n",
     "libdeform/schema/deform-scene.schema.json": '{"$defs": {"time": {"properties": {"step": {}, "later": '
                                                  '{"description": "not available yet"}}}, "word": {}}}\n',
@@ -132,7 +133,9 @@ BAD = {
                  ("libdeform/doc/reference/gallery.md", "=![b](../images/b.png)\n\n`b.py`\n"),
                  ("libdeform/doc/reference/gallery.md",
                   "=![b](../images/b.png)\n\n`libdeform/doc/images/d.py`\n")],
-    "reading_order": [("libdeform/doc/concepts/new.md", "=# New\n")],
+    "reading_order": [("libdeform/doc/concepts/new.md", "=# New\n"),
+                      ("libdeform/doc/decisions/0002-more.md", "=# 0002 More\n"),
+                      ("libdeform/doc/decisions/0001-handles.md", "=# 0001 Other handles\n")],
     "layers": [("libdeform/src/core/error.h", '#include "math/vec3.h"\n'),
                ("libdeform/src/broad/tree.cpp", '#include "narrow/pair.h"\n'),
                ("libdeform/src/broad/tree.cpp", '#include "../core/error.h"\n'),

@@ -54,7 +54,7 @@ def citations(tree):
 
 
 def reading_order(tree):
-    """Every page is in the list of pages."""
+    """Every page is in the list of pages, every decision in theirs, under its title."""
     order = PAGES + "README.md"
     if order not in tree.paths:
         return
@@ -63,6 +63,13 @@ def reading_order(tree):
     for path in tree.select(PAGES, ext=(".md",)):
         if path != order and not path.startswith(PAGES + "decisions/") and path not in listed:
             yield path, 1, f"is not in {order}; say there in a line what it answers"
+    index = PAGES + "decisions/README.md"
+    entries = tree.text(index).splitlines() if index in tree.paths else None
+    for path in tree.select(PAGES + "decisions/", ext=(".md",)):
+        match = re.match(r"# (\d{4}) (.+)", tree.text(path))
+        entry = match and f"- [{match.group(1)}]({posixpath.basename(path)}) {match.group(2)}"
+        if entries is not None and entry and entry not in entries:
+            yield path, 1, f"is not in {index}; add under its subject: {entry}"
 
 
 def pictures(tree):
