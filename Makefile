@@ -34,6 +34,7 @@ help:
 	@echo "make deb              Debian packages of the same, build/release/packages/"
 	@echo "make docs             the pages, the API and search as a site: build/site/index.html"
 	@echo "make clean            removes build/ and out/"
+	@echo "JOBS=N                with any of them: compilers or tests at a time (default: one per processor)"
 
 setup:
 	$(SETUP) doors
