@@ -1,9 +1,14 @@
 #!/bin/sh
 # fresh.sh -- lets the doors configure again where CMake would refuse to continue: in a build folder that was
 # configured for another source folder (the tree was moved or copied) or by another generator than Ninja.
-# Objects stay.
+# Objects stay. A folder in which nothing can be built ends with a sentence.
 set -eu
 cd "$(dirname "$0")/.."
+here=$(pwd)
+if [ ! -w . ] && [ ! -w build ]; then
+  echo "deform: $here is not writable for $(id -un); copy it or build elsewhere: cmake -S $here -B FOLDER" >&2
+  exit 1
+fi
 for name in release bench fuzz asan tsan; do
   cache=build/$name/CMakeCache.txt
   [ -f "$cache" ] || continue

@@ -5,6 +5,7 @@ the packages and the programs that are missing.
 
 doors_test.py SOURCE_DIR
 """
+import os
 import pathlib
 import shutil
 import subprocess
@@ -73,6 +74,14 @@ class Doors(unittest.TestCase):
         build = self.configured("asan", self.root, "Unix Makefiles")
         self.assertIn("build/asan was configured by Unix Makefiles", self.fresh())
         self.assertEqual(self.names(build), ["object.o"])
+
+    @unittest.skipIf(os.geteuid() == 0, "root may write everywhere")
+    def test_a_tree_of_somebody_else(self):
+        self.root.chmod(0o555)
+        self.addCleanup(self.root.chmod, 0o755)
+        done = subprocess.run([self.root / FRESH], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("is not writable for", done.stderr)
 
     def test_what_stays(self):
         link = self.root.parent / "link"
