@@ -253,8 +253,9 @@ void BladeSweep::find_faces(const Body &b) {
   Face *to = pairs_.get();
   for (size_t f = 0; f < n; ++f, k += 2) {
     const uint32_t i = place[k[0]], j = place[k[1]];
-    *to = {i, j};
-    to += int32_t(i | j) >= 0;  // none is kNone
+    to->i = i;
+    to->j = j;
+    to += 1 - ((i | j) >> 31);  // none is kNone
   }
   npair_ = uint32_t(to - pairs_.get());
   static_assert(sizeof(Face) == 2 * sizeof(uint32_t));
@@ -275,9 +276,11 @@ void BladeSweep::take_sides(const BladeTrack *track) {
       }
   const Frame from = from_, to = to_;
   const double far = kKept * apart_;
+  const bool fresh = fresh_;
+  const double *was_at = was_.get(), *is_at = is_.get();
   const auto along = [](const Frame &f, Vec3 r) { return dot(r, f.along) / f.length; };
   for (size_t i = 0; i < n; ++i) {
-    const Vec3 is = load3(&is_[kStride * i]) - to.origin;
+    const Vec3 is = load3(is_at + kStride * i) - to.origin;
     const double ahead = ahead_[i] = dot(is, to.forward);
     SideKind &kind = kind_[i];
     if (kind == SideKind::passed || kind == SideKind::behind) continue;
@@ -292,18 +295,20 @@ void BladeSweep::take_sides(const BladeTrack *track) {
       side = {cell, kind = SideKind::ahead, is_along, way, off};
       continue;
     }
-    const Vec3 was = load3(&was_[kStride * i]) - from.origin;
-    const double was_ahead = dot(was, from.forward), was_off = dot(was, from.normal);
+    const Vec3 was = load3(was_at + kStride * i) - from.origin;
+    const double was_ahead = dot(was, from.forward);
+    if (!(was_ahead > 0 || kind == SideKind::ahead || (fresh && -was_ahead < far))) continue;
+    const double was_off = dot(was, from.normal);
     if (was_ahead > 0 || kind == SideKind::ahead) {
       const double was_along = along(from, was);
       const double share = was_ahead > 0 ? was_ahead / (was_ahead - ahead) : 0;
       const double at = was_along + share * (along(to, is) - was_along);
       const double way = between(way_, at) + share * between(step_, at);
       side = {cell, kind = SideKind::passed, at, way, was_off + share * (off - was_off)};
-    } else if (fresh_ && -was_ahead < far) {
+    } else {
       side = {cell, kind = SideKind::behind, along(from, was), was_ahead, was_off};
     }
-    if (kind != SideKind::none && std::fabs(side.off) > far) kind = SideKind::none;
+    if (std::fabs(side.off) > far) kind = SideKind::none;
   }
   for (int k = 0; k < 2; ++k) way_[k] += step_[k];
 }
