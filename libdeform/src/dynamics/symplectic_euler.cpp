@@ -40,16 +40,20 @@ void shorten(Phyxels &p, const double *mean, double h) {
 }
 
 double stable_step(const Phyxels &p, const double *ksum, const double *csum, uint32_t *worst) {
-  double best = std::numeric_limits<double>::infinity();
+  constexpr double kBeyond = 1 + 1e-9;  // more than rounding
+  double best = std::numeric_limits<double>::infinity(), q = 0;
   *worst = p.n;
   for (uint32_t i = 0; i < p.n; ++i) {
     if ((p.held[i] & 7) == 7) continue;  // a held point does not move
     const double k = ksum[i], c = csum[i], m = p.mass[i];
+    // q = 4 / (kBeyond best): where 4 k < q (m q - 2 c), c + sqrt(c^2 + 4 m k) < m q, so h > best.
+    if (4 * k < q * (m * q - 2 * c)) continue;
     // h = 4m / (c + sqrt(c^2 + 4 m k)): the same root without cancellation, and defined for k = 0
     const double bottom = c + std::sqrt(c * c + 4 * m * k);
     const double h = bottom > 0 ? 4 * m / bottom : std::numeric_limits<double>::infinity();
     if (h < best) {
       best = h;
+      q = 4 / (kBeyond * best);
       *worst = i;
     }
   }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "dynamics/points_kernel.h"
+#include "dynamics/symplectic_euler.h"
 #include "math/vec3.h"
 #include "math/width.h"
 
@@ -127,6 +128,38 @@ struct Moving {
 TEST(PointsKernels, WhatIsAskedOfCellsAndEdges_IsThatOfOneAtATime) {
   check(dfm::points_kernels_sse2());
   if (dfm::doubles_at_once() >= 4) check(dfm::points_kernels_avx2());
+}
+
+// Points that cannot bound the step are left out early, which changes no bit.
+TEST(StableStep, IsThatOfTheFormulaAtThePointThatBounds) {
+  for (unsigned seed = 0; seed < 200; ++seed) {
+    std::mt19937 random(seed);
+    dfm::Phyxels p;
+    p.n = 60;
+    std::vector<double> k(p.n), c(p.n);
+    const auto number = [&](uint32_t spread) {  // zero, close to one, or of any size
+      const double size =
+          spread == 0 ? 1 + 1e-12 * double(random() % 1000) : std::exp(double(random() % spread));
+      return random() % 7 == 0 ? 0 : size;
+    };
+    for (uint32_t i = 0; i < p.n; ++i) {
+      p.mass.push_back(number(seed % 3 * 5));
+      p.held.push_back(uint8_t(random() % 9 == 0 ? 7 : 0));
+      k[i] = seed % 5 == 4 ? 0 : number(seed % 4 * 10);
+      c[i] = seed % 7 == 6 ? 0 : number(seed % 5 * 10);
+    }
+    double best = HUGE_VAL;
+    uint32_t at = p.n, worst = 0;
+    for (uint32_t i = 0; i < p.n; ++i) {
+      const double bottom = c[i] + std::sqrt(c[i] * c[i] + 4 * p.mass[i] * k[i]);
+      const double h = bottom > 0 ? 4 * p.mass[i] / bottom : HUGE_VAL;
+      if (p.held[i] == 7 || !(h < best)) continue;
+      best = h;
+      at = i;
+    }
+    EXPECT_EQ(dfm::stable_step(p, k.data(), c.data(), &worst), best) << seed;
+    EXPECT_EQ(worst, at) << seed;
+  }
 }
 
 TEST(PointsKernels, PartsInAnyOrder_EndWhereAllPointsDo) {
