@@ -39,6 +39,8 @@ const dfm_param kParams[kParamCount] = {
      1e12, kAuto, kRun | kUnlessGiven, 1, nullptr},
     {"plastic_limit", "accumulated equivalent plastic strain at which the flow ends; 0: none", "1", 0, 1e6, 0,
      kRun | kCell, 1, nullptr},
+    {"collapse", "pressure of a cell without volume against collapse, over young; 0: none", "1", 0, 1e3, 0,
+     kRun, 1, nullptr},
     {"anisotropy_young", "Young's modulus along the axis; auto, -1: young", "Pa", kAuto, 1e13, kAuto,
      kRun | kCell | kUnlessGiven, 1, nullptr},
     {"anisotropy_poisson",

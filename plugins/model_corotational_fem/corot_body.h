@@ -29,6 +29,7 @@ enum Param : uint32_t {
   kHardening,
   kCreep,
   kPlasticLimit,
+  kCollapse,
   kYoungAlong,
   kPoissonAlong,
   kShearAlong,
@@ -159,6 +160,7 @@ struct Body : model::Blocks<Block> {
   double direct_energy(const dfm_kin &k, size_t place) const;
   void cell_elasticity(size_t place, double (*d)[6]) const;  // times the volume
   bool soften_cell(const dfm_kin &k, uint32_t c, const double (*s)[3], double (*d)[6], bool &flows) const;
+  void add_collapse(size_t place, const double *const *x, const double (*g)[3], double a, double *blk) const;
   void add_softening(const dfm_kin &k, uint32_t c, double a, double *blk) const;
   void add_exact(const dfm_kin &k, uint32_t c, double a, double b, double *blk) const;
   void fill_material(Room &room);

@@ -63,6 +63,7 @@ struct Block : model::BlockPoints {
   double *state_out;
   const uint32_t *cell;
   double flow, per_flow;
+  double collapse, least;  // least: kFlat, or less than any volume where no cell resists collapse
   const SlotGroup *slots;
   double *value;       // [groups,8] what `energies` and `twists` write
   double *damp_value;  // [groups,8] what `twists` writes of dampers; NULL without
@@ -95,6 +96,10 @@ constexpr double kLeastPair = 0.1;
 
 // The volume, over that at rest, that a flatter cell counts as having in its Cauchy stress.
 constexpr double kLeastVolume = 1e-3;
+
+// The volume, over that at rest, below which a cell resists collapse (corot_collapse.h), and by how much it
+// may fall until the next bound.
+constexpr double kFlat = 0.5, kFalls = 0.1;
 
 const Kernels *kernels_sse2();
 const Kernels *kernels_avx2();

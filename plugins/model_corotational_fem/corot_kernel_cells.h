@@ -6,6 +6,7 @@
 #include "../model_common/block_lanes.h"
 #include "../model_common/polar_lanes.h"
 #include "corot_kernel.h"
+#include "corot_collapse.h"
 #include "corot_plastic.h"
 
 namespace corot {
@@ -389,6 +390,14 @@ DEFORM_INLINE void direct_stress(const Four &q, const v4 *f, const model::Polar<
   }
 }
 
+// Is one of four cells so flat that it resists collapse?
+DEFORM_INLINE bool resists(const Block &b, const model::Polar<Wide> &o) {
+  return __builtin_expect(mask_above(splat(b.least), o.det) != 0, 0);
+}
+DEFORM_INLINE Collapse<Wide> collapse_of(const Block &b, const Four &q, v4 det) {
+  return collapse_of<Wide>(b.collapse, det, load4(q.group->mu2 + q.at), load4(q.group->lambda + q.at));
+}
+
 // P V of four cells; f is lost where there are dampers.
 template <Energy kEnergy, bool kFiber, bool kDamped, bool kMore>
 DEFORM_INLINE void piola(const Block &b, uint32_t n, const Four &q, v4 *f, const v4 *r,
@@ -401,6 +410,10 @@ DEFORM_INLINE void piola(const Block &b, uint32_t n, const Four &q, v4 *f, const
     full(stress, all);
     if (kFiber || kDamped || (kMore && b.plastic)) add_others<kFiber, kDamped, kMore>(b, n, q, r, e, f, all);
     turn(r, all, p);
+    if (resists(b, o)) {
+      const v4 pressure = collapse_of(b, q, o.det).pressure;
+      for (int k = 0; k < 9; ++k) p[k] = p[k] - pressure * o.cofactor[k];
+    }
   } else {
     direct_stress<kEnergy>(q, f, o, p);
     if constexpr (kDamped) {
@@ -518,6 +531,7 @@ static inline void cell_energies(const Block &b) {
                      v4 sum = splat(0.5) * own + mixed;
                      if (kMore && b.nodal) sum = nodal_energy(b, q, e);
                      if (kMore && b.plastic) sum = sum + plastic_energy(b, n, q, e);
+                     if (resists(b, o)) sum = sum + collapse_of(b, q, o.det).energy;
                      store4(b.value + size_t(kGroup) * n + at, sum);
                    });
 }
@@ -545,6 +559,16 @@ DEFORM_INLINE v4 direct_stiffness(uint32_t energy, const Four &q, const model::P
   const v4 area = max4(most_of(pairs, pairs * pairs - splat(2) * (o.n * (o.det * o.det))), zero);
   const v4 by = choose_above(pressure, zero, splat(2) * pressure, zero - pressure);
   return ((m - m / n1) + (splat(2) * (m * longest)) / (n1 * n1)) + (l * area + by * sqrt4(longest));
+}
+
+// Of cells that resist collapse or soon will: C (dJ)^2 - p d2J at most, times the volume.
+DEFORM_INLINE v4 collapse_stiffness(const Block &b, const Four &q, const model::Polar<Wide> &o) {
+  const v4 zero = splat(0), square = splat(0.5) * (o.constant + o.n * o.n);  // |C|^2
+  const v4 longest = max4(most_of(o.n, square), zero), pairs = splat(0.5) * (o.n * o.n - square);
+  const v4 area = max4(most_of(pairs, pairs * pairs - splat(2) * (o.n * (o.det * o.det))), zero);
+  const Collapse<Wide> flat = collapse_of(b, q, o.det - splat(kFalls));
+  return choose_above(splat(kFlat + kFalls), o.det, flat.stiffness * area + flat.pressure * sqrt4(longest),
+                      zero);
 }
 
 // What the rows of the bound count beyond the rest shape; corot_bound.cpp derives it. From the trace t of
@@ -596,6 +620,7 @@ static inline void cell_twists(const Block &b) {
         twist = twist + (splat(2.8285) * (size * (splat(1) + uneven))) / least;
       }
     }
+    if (mask_above(splat(b.least + kFalls), o.det) != 0) twist = twist + collapse_stiffness(b, q, o);
     const size_t place = size_t(kGroup) * n + at;
     store4(b.value + place, twist);
     if (!b.damp) return;
@@ -667,9 +692,20 @@ static inline void cell_tangents(const Block &b, double a, double damp, double *
     const v4 mu2 = load4(q.group->mu2 + at), mu = splat(0.5) * (by * mu2);
     // where `nodal` the volume change has blocks of its own
     const v4 lambda = by * (b.nodal ? splat(-1.0 / 3) * mu2 : load4(q.group->lambda + at));
+    const bool flat = resists(b, o);
+    v4 dyad = splat(0), area[4][3];  // cof F g of the corners
+    if (flat) {
+      dyad = choose_above(splat(kFlat), o.det, splat(a) * collapse_of(b, q, o.det).stiffness, splat(0));
+      for (int c = 0; c < 4; ++c)
+        for (int k = 0; k < 3; ++k)
+          area[c][k] = (o.cofactor[3 * k] * t.g[c][0] + o.cofactor[3 * k + 1] * t.g[c][1]) +
+                       o.cofactor[3 * k + 2] * t.g[c][2];
+    }
     for (int m = 0; m < 10; ++m) {
       v4 one[9];
       block_of<kFiber>(t, kFirst[m], kSecond[m], lambda, mu, one);
+      for (int k = 0; flat && k < 9; ++k)
+        one[k] = one[k] + dyad * (area[kFirst[m]][k / 3] * area[kSecond[m]][k % 3]);
       alignas(32) double last[4];
       transpose(one[0], one[1], one[2], one[3]);
       transpose(one[4], one[5], one[6], one[7]);

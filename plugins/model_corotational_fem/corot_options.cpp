@@ -125,6 +125,8 @@ void Body::fill_material(Room &room) {
     block[b].nodal = nodal();
     block[b].plastic = plastic() ? plastic_group.data() + groups_at : nullptr;
     block[b].cell = cell_id.data() + kGroup * groups_at;
+    block[b].collapse = params[kCollapse];
+    block[b].least = params[kCollapse] > 0 && choice(kEnergy) == kLinear ? kFlat : -1e300;
     block[b].rotate_all = choice(kRotation) != kPolar;
     groups_at += block[b].groups;
   }
@@ -157,6 +159,7 @@ void Body::find_effects() {
 const char *Body::idle(Param which) const {
   if ((which == kHardening || which == kCreep || which == kPlasticLimit) && !(largest_of(kYield) > 0))
     return "yield is 0";
+  if (which == kCollapse && choice(kEnergy) != kLinear) return "energy is not corotational";
   if (which == kAxis && !has_fibers())
     return "anisotropy_young, anisotropy_poisson and anisotropy_shear are all auto";
   return nullptr;

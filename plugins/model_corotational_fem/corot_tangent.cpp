@@ -11,6 +11,7 @@
 #include "../model_common/edges.h"
 #include "../model_common/rotation.h"
 #include "corot_body.h"
+#include "corot_collapse.h"
 #include "corot_plastic.h"
 
 namespace corot {
@@ -281,6 +282,25 @@ void Body::add_exact(const dfm_kin &k, uint32_t c, double a, double b, double *b
     take_turned(shape.r, in_frame, out);
   };
   each_block(slots[place / kGroup], lane, blk, add_block);
+  if (!direct && params[kCollapse] > 0) add_collapse(place, x, shape.g, a, blk);
+}
+
+// The second derivative of the energy against collapse, without that of the volume, which is not definite.
+void Body::add_collapse(size_t place, const double *const *x, const double (*g)[3], double a,
+                        double *blk) const {
+  const uint32_t lane = uint32_t(place % kGroup);
+  const Group &own = group[place / kGroup];
+  double grad[9], area[4][3], cofactor[9];
+  gradient_of(own, lane, x, grad);
+  for (int k = 0; k < 3; ++k) cross(grad + 3 * ((k + 1) % 3), grad + 3 * ((k + 2) % 3), cofactor + 3 * k);
+  const double det = (grad[0] * cofactor[0] + grad[1] * cofactor[1]) + grad[2] * cofactor[2];
+  if (!(det < kFlat)) return;
+  const double by =
+      a * collapse_of<Single>(params[kCollapse], det, own.mu2[lane], own.lambda[lane]).stiffness;
+  for (int m = 0; m < 4; ++m) turn(cofactor, g[m], area[m]);
+  each_block(slots[place / kGroup], lane, blk, [&](int m, int n, double *out) {
+    for (int k = 0; k < 9; ++k) out[k] -= by * (area[m][k / 3] * area[n][k % 3]);
+  });
 }
 
 // Subtracts from the blocks of the elastic tangent what the plastic flow of the cell takes.

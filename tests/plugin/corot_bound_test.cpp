@@ -36,6 +36,8 @@ TEST(CorotBound, RowSums_BoundTheTrueSpectrumInEveryShape) {
            {{{"locking", {1}}, {"poisson", {0.49}}, {"damping_stiffness", {0.004}}}, {}},
            {{{"locking", {1}}}, uneven},
            {{{"yield", {1e3}}}, {}},
+           {{{"collapse", {15}}}, {}},
+           {{{"collapse", {60}}, {"poisson", {0.45}}, {"damping_stiffness", {0.004}}}, uneven},
            {{{"yield", {1e3}}, {"poisson", {0.45}}, {"damping_stiffness", {0.004}}}, {}},
            {{}, uneven}})
     for (const double size : {1.0, 0.3, 2.0, -1.0, 10.0, -30.0}) {

@@ -70,6 +70,40 @@ TEST(CorotForces, GramSchmidt_LeavesATorque) {
   EXPECT_GT(norm(torque), 1e-3 * scale);
 }
 
+// Pressed to a third of the volume, flat, and turned inside out.
+TEST(CorotForces, ForceAgainstCollapse_IsTheGradientOfTheEnergyAndBeginsAtHalfTheVolume) {
+  for (Params p : {Params{{"poisson", {0.4}}}, kFibers, kNodal})
+    for (const double height : {0.3, 0.02, -0.2}) {
+      Host host;
+      const auto press = [&](Instance &b) {
+        for (uint32_t i = 0; i < b.size(); ++i) {
+          const Vec x = b.mesh.at(i);
+          b.set(b.x, i, {x[0], x[1], height * x[2]});
+        }
+      };
+      Instance without(host, kuhn_bar(3, 2, 2, 0.1, 0.2), p);
+      p["collapse"] = {15};
+      Instance b(host, kuhn_bar(3, 2, 2, 0.1, 0.2), p);
+      press(b);
+      press(without);
+      EXPECT_GT(b.energy(), 1.01 * without.energy()) << height;
+      b.shake(0.001, 0);
+      expect_force_is_gradient(b, 1e-7, 1e-5, std::to_string(height));
+      b.forces();
+      expect_no_force_or_torque(b, std::to_string(height));
+      for (Instance *one : {&b, &without}) {
+        for (uint32_t i = 0; i < b.size(); ++i) {
+          const Vec x = b.mesh.at(i);
+          one->set(one->x, i, {x[0], 1.1 * x[1], 0.5 * x[2]});
+        }
+        one->forces();
+      }
+      EXPECT_EQ(std::memcmp(b.f, without.f, sizeof(double) * 4 * b.size()), 0);
+      EXPECT_EQ(b.energy(), without.energy());
+      p.erase("collapse");
+    }
+}
+
 TEST(CorotForces, Force_IsTheGradientOfTheEnergy) {
   for (const Params &p : {Params{{"poisson", {0.4}}}, kFibers, kNeoHookean, kVenant, kNodal,
                           Params{{"energy", {1}}, {"poisson", {-0.9}}}})

@@ -139,7 +139,8 @@ TEST(CorotStiffness, ExactDampers_AreDifferencesByVelocity) {
 TEST(CorotStiffness, EveryShape_IsNegativeSemidefiniteAndFinite) {
   for (const Params &p :
        {Params{}, exact(), kFibers, exact(kFibers), Params{{"poisson", {0.49}}}, exact({{"poisson", {0.49}}}),
-        exact({{"energy", {1}}}), exact({{"energy", {2}}}), kNodal, exact(kNodal)})
+        exact({{"energy", {1}}}), exact({{"energy", {2}}}), kNodal, exact(kNodal), Params{{"collapse", {15}}},
+        exact({{"collapse", {15}}}), exact(with(kFibers, "collapse", 15))})
     for (const double size : {1.0, 0.3, 2.0, 0.0, -1.0, 10.0, -30.0}) {
       Host host;
       Instance b(host, kuhn_bar(2, 2, 1, 0.1, 0.2), with(p, "damping_stiffness", 0.01));
