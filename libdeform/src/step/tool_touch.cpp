@@ -266,6 +266,7 @@ void ToolTouch::add_rows_to(size_t k, RigidSet &set) const {
 // counts in the next pass; otherwise a thin body would oscillate. Returns the largest change, m/s.
 double ToolTouch::follow_spin() {
   double most = 0;
+  off_joints_ = 0;
   for (size_t k = 0; k < sides_.size(); ++k) {
     Moved &m = sides_[k];
     if (!m.set || m.set->of_tool || !m.touched) continue;
@@ -288,6 +289,7 @@ double ToolTouch::follow_spin() {
       add(change, &m.base[at]);
       add(change, &m.turn[at]);
       most = std::max(most, m.reach[i] * norm(change));
+      if (m.jointed[m.set->group[i]]) off_joints_ = std::max(off_joints_, h_ * most);
     }
   }
   return most;
@@ -584,6 +586,7 @@ void ToolTouch::solve() {
   const double done = kDone * scale;
   double before = HUGE_VAL;
   newton_.yields = 0;
+  off_joints_ = 0;
   uint32_t revisions = 0;
   for (uint32_t pass = 0; pass < kMostPasses; ++pass) {
     double changed = 0;
@@ -655,7 +658,8 @@ void ToolTouch::take_sets(World &w, StepContext &step) {
 // A corner moves along an arc. The passes of solve() over it converge by a factor of about h w each; from
 // about a radian on they do not, the corner ends inside a floor, and energy is created. False: something that
 // touches turns so far that the sub-step must be repeated, shorter. The arc leaves its tangent by at most (h
-// w)^2 r / 2: what stays farther away than that does not touch.
+// w)^2 r / 2: what stays farther away than that does not touch. Where joints turn one body by the motion of
+// another, what the passes have left is taken instead.
 bool ToolTouch::follows_arcs(const World &w, StepContext &step) const {
   double turn = 0, arrives = 1;
   for (const Row &row : rows_) {
@@ -675,6 +679,7 @@ bool ToolTouch::follows_arcs(const World &w, StepContext &step) const {
     const double closes = std::min(0.0, h_ * dot(row.normal, speed(row)));
     if (row.impulse > 0 || room + closes < leaves) turn = std::max(turn, most);
   }
+  if (off_joints_ > offset_) arrives = std::min(arrives, 0.5);
   if ((!(turn > 0) && arrives == 1) || !(step.h > kLeastPiece * step.guard.planned) || !may_repeat(w, step))
     return true;
   step.guard.again = step.guard.fast = true;

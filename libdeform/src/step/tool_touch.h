@@ -307,6 +307,7 @@ class ToolTouch {
   double h_ = 0, offset_ = 0;
   double planned_ = 0;        // s, the sub-step before it was shortened
   std::vector<double> ways_;  // [obstacles] m, of any point in the sub-step
+  double off_joints_ = 0;     // m, that places of bodies with joints may be off after a solve
   double strong_ = 1;         // of the answer without joints, that places give where a motor holds
   double thinnest_ = 0;       // m, of the pairs of free bodies
   std::vector<Pair> pairs_,

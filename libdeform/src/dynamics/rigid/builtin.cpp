@@ -29,6 +29,7 @@ constexpr double kDrift = 1e-10;  // m and rad: what a joint may be off by at th
 constexpr uint32_t kMostCorrections = 12;
 constexpr uint32_t kMostSteps = 12;   // toward joints that are kept
 constexpr double kLeastRate = 1e-11;  // m/s and rad/s: what a joint may move apart at
+constexpr double kFar = 0.25;         // rad in a sub-step, of a body without its joints
 constexpr size_t kMotor = 3;          // values of extra per joint: speed, limit, effort of the last sub-step
 
 Quat rotation_of(const dfm_rigid_state &s) {
@@ -84,6 +85,7 @@ class Builtin {
   void assemble(const dfm_rigid_step &step, Group &g);
   void start_from(const dfm_rigid_step &step, const Group &g, const double *impulse);
   double move_by(const dfm_rigid_step &step, const Group &g, std::span<const double> x);
+  bool turns_far(const dfm_rigid_step &step, const Group &g) const;
   void solve(const dfm_rigid_step &step, const Group &g, const double *impulse);
   void decide(const dfm_rigid_step &step, Group &g, const double *impulse);
   void correct(const Group &g, std::span<dfm_rigid_state> state);
@@ -248,11 +250,25 @@ double Builtin::move_by(const dfm_rigid_step &step, const Group &g, std::span<co
   return worst;
 }
 
+// Whether the impulses without those of its joints would turn a body of the group far.
+bool Builtin::turns_far(const dfm_rigid_step &step, const Group &g) const {
+  return std::any_of(g.parts.begin(), g.parts.end(), [&](uint32_t i) {
+    return step.h * step.h * norm2(load3(&base_[6 * size_t{i} + 3])) > kFar * kFar;
+  });
+}
+
 // Newton steps with the system of the start: each leaves about h w of the error. Where a joint cannot be kept
 // along its impulses (turned by a radian and more in one sub-step) the best step is kept, and correct()
 // does the rest.
 void Builtin::solve(const dfm_rigid_step &step, const Group &g, const double *impulse) {
   start_from(step, g, impulse);
+  if (turns_far(step, g)) {
+    // Newton starts from momenta that satisfy the joints to first order: the turn that a body would make
+    // without its joints is not linear in them, and ends on joints that are a whole turn off.
+    for (const uint32_t i : g.parts)
+      store3(&base_[6 * size_t{i} + 3],
+             in_axes(rotation_of(step.state[i]), parts_[i].inverse_moments, base_momentum_[i]));
+  }
   best_.resize(g.rows.size());
   for (size_t k = 0; k < g.rows.size(); ++k)
     best_[k] = (k < g.nhold ? 0 : step.extra[kMotor * g.holding[k - g.nhold]]) - row_rate(g.rows[k], base_);
