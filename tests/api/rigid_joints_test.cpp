@@ -330,6 +330,51 @@ TEST(RigidJoints, OneGroup_TouchesItself) {
   EXPECT_EQ(context.log.find("deep in"), std::string::npos) << context.log;
 }
 
+// A driven tool and a coupled one open a door, do not go into it, and feel what it is pushed with.
+TEST(RigidJoints, Tools_OpenADoor) {
+  for (const double stiffness : {0.0, 1000.0}) {
+    SCOPED_TRACE(stiffness);
+    test::Context context;
+    const dfm_world w = test::make_world(context, {0, 0, 0});
+    test::set_friction(w, 0);
+    const Vec half = {0.2, 0.02, 0.15};
+    const dfm_rigid door =
+        test::create(w, {test::box("door", half, 1, {0.2, 0, 0})},
+                     {test::joint(DFM_JOINT_HINGE, 0, DFM_RIGID_WORLD, {0, 0, 0}, {0, 0, 1})})[0];
+    dfm_tool_def d = dfm_tool_def_default();
+    d.name = "hand";
+    d.shape = DFM_TOOL_SPHERE;
+    d.radius = 0.01;
+    d.stiffness = stiffness;
+    d.damping = stiffness > 0 ? 14 : 0;
+    d.turn_stiffness = stiffness > 0 ? 2 : 0;
+    d.turn_damping = stiffness > 0 ? 0.009 : 0;
+    d.pose = pose({0.3, -0.05, 0});
+    dfm_tool tool = 0;
+    test::ok(dfm_tool_create(w, &d, &tool));
+    double deepest = 0, pushed = 0;
+    for (int i = 1; i <= 500; ++i) {
+      const dfm_pose to = pose({0.3, -0.05 + 0.1 * i / 500, 0});
+      test::ok(dfm_tool_set_pose(tool, &to, nullptr));
+      test::ok(dfm_world_step(w, 1e-3, nullptr));
+      dfm_tool_state s{};
+      s.size = sizeof s;
+      test::ok(dfm_tool_get_state(tool, &s));
+      const dfm_rigid_state now = test::state(door);
+      const Vec normal = rotate(now.rotation, {0, -1, 0});
+      const Vec apart = {s.pose.position[0] - now.position[0], s.pose.position[1] - now.position[1], 0};
+      deepest = std::max(deepest, 0.03 - test::dot(apart, normal));
+      double force[3], torque[3];
+      test::ok(dfm_tool_force(tool, force, torque));
+      pushed = std::max(pushed, test::norm(test::vec(force)));
+      EXPECT_NEAR(pressed(w), test::norm(test::vec(force)), 1e-9 * (1 + pressed(w)));
+    }
+    EXPECT_LT(deepest, 1e-6);
+    EXPECT_GT(pushed, 0.1);
+    EXPECT_GT(test::reading(door, 0).position, 0.1);
+  }
+}
+
 // Four boxes on three joints of each type, thrown into a pit: no corner goes through a wall, and an impulse
 // at one end makes no energy, beyond what swings in flight as well (SHAKE keeps the mean).
 TEST(RigidJoints, WhatIsThrownIntoAPit_StaysThere) {
