@@ -169,9 +169,24 @@ class InPython(unittest.TestCase):
             deform.Law(Raises)(fn=[1], vt=[[0], [0]], dt=1e-3)
         self.assertIsInstance(caught.exception.__cause__, RuntimeError)
 
+    def test_forces_that_nothing_reads(self):
+        """A law that returned its force, or wrote it to another name, was one without friction."""
+        def returns(self, x, out):
+            return -0.3 * x.fn * x.vt
+
+        def misnames(self, x, out):
+            out.force = -0.3 * x.fn * x.vt
+        for evaluate, sentence in ((returns, "returned a ndarray, .*write the force into out.ft"),
+                                   (misnames, "set out.force, which nothing reads; out has ft, state")):
+            law = type("Law", (Bristle,), {"id": f"com.example.{evaluate.__name__}", "evaluate": evaluate})
+            with self.subTest(law.id), self.assertRaises(deform.Error) as caught:
+                deform.Law(law)(fn=[1], vt=[[0], [0]], dt=1e-3)
+            self.assertRegex(str(caught.exception.__cause__), sentence)
+
     def test_descriptions_that_cannot_be(self):
         for wrong in ({"id": "bristle"}, {"id": "com.example.a", "state": ["vector"]},
                       {"id": "com.example.b", "needs": ["speed"]},
+                      {"id": "com.example.d", "parameters": [("mu", 0.3)]},
                       {"id": "com.example.c", "parameters": [deform.Parameter("mu", "", "1", 1, 0, 2)]}):
             with self.subTest(wrong), self.assertRaises(deform.Error):
                 deform.Law(type("Wrong", (Bristle,), wrong))

@@ -106,7 +106,14 @@ class PythonLaw:
                               np.where(fn > 0, 2, 0).astype(np.uint8))
         shapes = {key: array.shape for key, array in vars(out).items()}
         with np.errstate(all="ignore"):  # a lane may hold what is not finite; it must not leave its lane
-            self.evaluate(x, out)
+            returned: Any = self.evaluate(x, out)  # type: ignore[func-returns-value]
+        if returned is not None:
+            raise ArgumentError(f"{self.id}: evaluate returned a {type(returned).__name__}, which nothing "
+                                "reads; write the force into out.ft[:], and return nothing", "DFM_E_ARG")
+        unread = [key for key in vars(out) if key not in shapes]
+        if unread:
+            raise ArgumentError(f"{self.id}: evaluate set out.{unread[0]}, which nothing reads; out has "
+                                f"{', '.join(shapes)}", "DFM_E_ARG")
         for key, shape in shapes.items():
             if np.shape(getattr(out, key)) != shape:
                 raise ArgumentError(f"{self.id}: evaluate left out.{key} with the shape "
@@ -184,6 +191,10 @@ class Bridge:
         if not law.id or "." not in law.id:
             raise ArgumentError(f"a law needs an id in reverse-DNS form, such as 'com.example.tanh', not "
                                 f"'{law.id}'", "DFM_E_ARG")
+        for given in law.parameters:
+            if not isinstance(given, Parameter):
+                raise ArgumentError(f"{law.id}: parameters has {given!r}; expected rows deform.Parameter(key, "
+                                    "label, unit, min, max, default)", "DFM_E_ARG")
         rows = (_abi.dfm_param * max(len(law.parameters), 1))()
         for row, given in zip(rows, law.parameters):
             row.key, row.label, row.unit = (encoded(t) for t in (given.key, given.label, given.unit))
