@@ -133,7 +133,8 @@ class FencedBatch {
   }
   dfm_friction_in &in() { return *static_cast<dfm_friction_in *>(in_.data()); }
   dfm_friction_out &out() { return *static_cast<dfm_friction_out *>(out_.data()); }
-  // Bytes that changed beside what eval may write: between the columns, and around the arrays.
+  // Bytes that changed beside what eval may write, between the columns and around the arrays, and lanes that
+  // it has not written.
   void look() const {
     long offset = 0;
     const size_t lanes = (lanes_.n + 7) & ~7u;
@@ -149,6 +150,15 @@ class FencedBatch {
                 "eval writes lane %zu of %s, column %zu, in a batch of %u, beyond n rounded up to 8; loop to "
                 "in->n",
                 i / o.bytes, o.name, c, lanes_.n);
+      for (size_t c = 0; c < o.width; ++c)
+        for (size_t i = 0; i < lanes_.n; ++i) {
+          const unsigned char *const lane = p + (c * lanes_.stride + i) * o.bytes;
+          if (std::all_of(lane, lane + o.bytes, [](unsigned char byte) { return byte == kPaint; }))
+            broken(
+                "eval leaves lane %zu of %s, column %zu, as it was, so the host would read what lies there; "
+                "write every output whose pointer is not NULL",
+                i, o.name, c);
+        }
     }
   }
 

@@ -193,8 +193,8 @@ class Bridge:
                                 f"'{law.id}'", "DFM_E_ARG")
         for given in law.parameters:
             if not isinstance(given, Parameter):
-                raise ArgumentError(f"{law.id}: parameters has {given!r}; expected rows deform.Parameter(key, "
-                                    "label, unit, min, max, default)", "DFM_E_ARG")
+                raise ArgumentError(f"{law.id}: parameters has {given!r}; expected rows "
+                                    "deform.Parameter(key, label, unit, min, max, default)", "DFM_E_ARG")
         rows = (_abi.dfm_param * max(len(law.parameters), 1))()
         for row, given in zip(rows, law.parameters):
             row.key, row.label, row.unit = (encoded(t) for t in (given.key, given.label, given.unit))

@@ -16,6 +16,9 @@
 #ifndef DAMPER
 #define DAMPER 0.05 /* N s/m, of each edge */
 #endif
+#ifndef DAMPER_KEY
+#define DAMPER_KEY "damper"
+#endif
 #ifndef REST_LENGTH
 #define REST_LENGTH(length) (length)
 #endif
@@ -63,7 +66,7 @@
 #define ROW_FLAGS 0
 #endif
 static const dfm_param rows[] = {{"stiffness", "of each edge", "N/m", 1.0, 1e4, 500.0, ROW_FLAGS, 1, NULL},
-                                 {"damper", "of each edge", "N s/m", 0.0, 10.0, DAMPER, 0, 1, NULL}};
+                                 {DAMPER_KEY, "of each edge", "N s/m", 0.0, 10.0, DAMPER, 0, 1, NULL}};
 
 typedef struct Net {
   const dfm_host *host;
