@@ -5,6 +5,7 @@ import pathlib
 import pickle
 import tempfile
 import unittest
+from unittest import mock
 
 import numpy as np
 
@@ -27,6 +28,16 @@ class Arguments(unittest.TestCase):
             for dt in (0, -1e-3, math.nan):
                 self.refused("a step of .* s; it must be positive", lambda dt=dt: world.run(0.1, dt=dt))
             self.assertEqual(world.time, 0)
+
+    def test_a_run_of_very_many_stable_steps_is_warned_of(self):
+        with deform.World() as world:
+            world.add_body(deform.TetMesh.ball(0.1, cells=100), material={"young": 7e10})
+            with self.assertLogs("deform", "WARNING") as said, self.assertRaises(KeyboardInterrupt):
+                with mock.patch.object(deform.World, "step", side_effect=KeyboardInterrupt):
+                    world.run(10)
+            self.assertRegex(said.output[0], "run takes .* steps of .* s, the stable step: give dt")
+            with self.assertNoLogs("deform", "WARNING"):
+                world.run(1e-4)
 
     def test_points_are_numbers_of_points_and_forces_fit_them(self):
         with deform.World() as world:

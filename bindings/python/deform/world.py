@@ -6,6 +6,7 @@ import ctypes
 import difflib
 import enum
 import json
+import logging
 import weakref
 from dataclasses import dataclass
 from threading import get_ident
@@ -24,6 +25,7 @@ from .mesh import TetMesh, TriMesh, cells_of, points_of, surface_of
 from .query import Queries
 from .tool import Tools
 
+_LOG = logging.getLogger("deform")
 METHODS = {"auto": 0, "velocity": 1, "implicit": 2, "rollback": 3}
 INTEGRATORS = {"auto": 0, "symplectic_euler": 1, "implicit_euler": 2, "tr_bdf2": 3}
 SELF_CONTACT = {"off": 0, "on": 1, "auto": 2}
@@ -582,11 +584,16 @@ class World(Queries, Tools, OfThisProcess):
         return ended
 
     def run(self, duration: float, dt: float | None = None) -> Trouble:
-        """Steps until `duration` s have passed, by dt or, where none is given, by the stable step."""
+        """Steps until `duration` s have passed, by dt or, where none is given, by the stable step, with a
+        warning where that takes more than 100,000 steps."""
         if not 0 <= duration < np.inf:
             raise ArgumentError(f"a duration of {duration} s; it must be finite and not negative",
                                 "DFM_E_ARG")
         seen, end = _NO_TROUBLE, self.time + duration
+        if dt is None and duration > 1e5 * self.stable_step:
+            _LOG.warning("run takes %.3g steps of %.3g s, the stable step: give dt for longer steps, with "
+                         "the integrator 'auto' or 'tr_bdf2' for stiff bodies",
+                         duration / self.stable_step, self.stable_step)
         while True:
             left, step = end - self.time, self.stable_step if dt is None else dt
             if dt is None and not np.isfinite(step):
