@@ -310,6 +310,7 @@ class Rig {
     if (case_.drive == Drive::spring) spring_figures();
   }
 
+  static constexpr double kSlow = 0.01;  // of the pull: laws without exact rest stick below it
   // Stick-slip: a cycle begins where the mass overtakes what pulls the spring.
   void watch(double before) {
     const double pull = in("V");
@@ -317,8 +318,11 @@ class Rig {
       const double h = last_ < t_ ? t_ - last_ : 0;
       overtakes_.push_back(t_ - h * (v_.vx - pull) / (v_.vx - before));
     }
-    if (before == 0 && v_.vx != 0) releases_.push_back(last_);
-    if (before != 0 && v_.vx == 0) sticks_.push_back(t_);
+    // A bristle never rests exactly.
+    const double rest = law_.jumps_at_rest() ? 0 : kSlow * std::fabs(pull);
+    const bool rested = std::fabs(before) <= rest, rests = std::fabs(v_.vx) <= rest;
+    if (rested && !rests) releases_.push_back(last_);
+    if (!rested && rests) sticks_.push_back(t_);
     if (!overtakes_.empty()) {
       const double f = force(t_);
       spring_max_ = std::max(spring_max_, f);

@@ -2,6 +2,8 @@
 // several solutions a step takes.
 #include <gtest/gtest.h>
 
+#include <sstream>
+
 #include "friction_rig.h"
 
 namespace {
@@ -19,6 +21,16 @@ std::string file(const std::string &name, const std::string &text) {
   const std::string path = test::scratch("friction_rig") + "/" + name;
   test::write_file(path, text);
   return path;
+}
+
+// The numbers of `"KEY": [..]` in a line of JSON.
+std::vector<double> list(const std::string &json, const std::string &key) {
+  const size_t at = json.find("\"" + key + "\": [");
+  if (at == std::string::npos) return {};
+  std::istringstream text(json.substr(json.find('[', at) + 1));
+  std::vector<double> out;
+  for (double x; text >> x; text.get()) out.push_back(x);
+  return out;
 }
 
 }  // namespace
@@ -63,6 +75,24 @@ TEST(FrictionRig, StickSlip_HasThePeriodOfTheClosedForm) {
     before = error;
   }
   EXPECT_LT(before, 5e-4);
+}
+
+// The stick-slip of Canudas de Wit et al. 1995, k 2 N/m, V 0.1 m/s. Times at which the speed passes V/100 are
+// from an integration to 1e-8 (Radau). Speeds of a bristle are never 0: one release, at 0 s, and no
+// stick were reported.
+TEST(FrictionRig, StickSlipOfLuGre_IsReleasedAndSticks) {
+  const std::string path = file("lugre_stick_slip.json", R"({"law": "lugre", "mass": 1, "gravity": 9.81,
+    "params": {"F_C": 1, "F_S": 1.5, "v_s": 0.001, "sigma0": 1e5, "sigma1": 316.227766, "sigma2": 0.4},
+    "input": {"kind": "spring_pull", "k": 2, "V": 0.1, "T": 20, "dt": 0.05}})");
+  const Outcome out = run(path);
+  const std::vector<double> release = list(out.figures, "release_times"),
+                            stick = list(out.figures, "stick_times");
+  ASSERT_EQ(release.size(), 2u) << out.figures;
+  ASSERT_EQ(stick.size(), 2u) << out.figures;
+  EXPECT_NEAR(release[0], 7.43761, 5e-4);
+  EXPECT_NEAR(release[1], 13.80033, 5e-4);
+  EXPECT_NEAR(stick[0], 10.26276, 5e-4);
+  EXPECT_NEAR(stick[1], 16.62548, 5e-4);
 }
 
 // Set-valued laws break away at F_S at every rate, and the rig finds it between its steps.
