@@ -368,3 +368,49 @@ TEST(SavedGame, WithAPieceWhoseBodyIsGone_LoadsIntoAWorldBuiltAnew) {
   steps(anew, 40);
   EXPECT_EQ(dfm_world_hash(anew), later);
 }
+
+// A contact of a free rigid body with something rigid goes with the body, also where it was the last of its
+// kind in the world.
+TEST(SavedGame, WithoutTheRigidBodyThatTouched_LoadsIntoAWorldBuiltAnew) {
+  test::Context c;
+  const dfm_world w = empty(c);
+  test::add_plane(w, "floor");
+  const dfm_rigid weight = test::create(w, {test::box("weight", {0.05, 0.05, 0.05}, 1, {1, 0, 0.06})}, {})[0];
+  steps(w, 60);
+  uint32_t contacts = 0;
+  test::ok(dfm_world_contacts(w, 0, nullptr, &contacts));
+  ASSERT_GT(contacts, 0u);
+  test::ok(dfm_rigid_destroy(weight));
+  const std::string saved = snapshot(w);
+  const dfm_world anew = empty(c);
+  test::add_plane(anew, "floor");
+  ASSERT_EQ(restore(anew, saved), DFM_OK) << dfm_last_error();
+  EXPECT_EQ(snapshot(anew), saved);
+  for (int k = 0; k < 3; ++k) {
+    steps(w, 1);
+    steps(anew, 1);
+    EXPECT_EQ(dfm_world_hash(anew), dfm_world_hash(w)) << k;
+    EXPECT_EQ(snapshot(anew), snapshot(w)) << k;
+  }
+}
+
+// A piece without cells goes with the body that it came off: no list shows it, so nobody would destroy it.
+TEST(SavedGame, RewoundToBeforeABodyWhosePieceLostItsCells_Loads) {
+  test::Context c;
+  const dfm_world w = empty(c);
+  test::add_plane(w, "floor");
+  crate(c, w, "other", {0.3, 0, 0.05});
+  steps(w, 5);
+  const std::string saved = snapshot(w);
+  const dfm_body dough = crate(c, w, "dough", {0, 0, 0.01});
+  steps(w, 5);
+  halve(dough, 0.04);
+  const dfm_body piece = found(w, "dough.1");
+  dfm_cut_def all = dfm_cut_def_default();
+  std::fill_n(all.half_size, 3, 1.0);
+  test::ok(dfm_body_cut(piece, &all, nullptr));
+  steps(w, 5);
+  test::ok(dfm_body_destroy(dough));
+  EXPECT_EQ(restore(w, saved), DFM_OK) << dfm_last_error();
+  EXPECT_EQ(dfm_body_destroy(piece), DFM_E_HANDLE);
+}

@@ -26,6 +26,28 @@ void ContactStore::order() {
             [&](uint32_t i, uint32_t j) { return key[i] != key[j] ? key[i] < key[j] : i < j; });
 }
 
+void ContactStore::drop(uint64_t id) {
+  uint32_t left = 0;
+  for (uint32_t i = 0; i < n; ++i) {
+    if (id_a[i] == id || id_b[i] == id) continue;
+    const auto move = [&](const ContactColumn &column, auto &values) {
+      const size_t width = column.entries(1, nstate);
+      if (values.size() == width * n)
+        std::copy_n(values.data() + width * i, width, values.data() + width * left);
+    };
+    if (left < i) each_column(move, *this);
+    ++left;
+  }
+  if (left == n) return;
+  const auto shorten = [&](const ContactColumn &column, auto &values) {
+    const size_t width = column.entries(1, nstate);
+    if (values.size() == width * n) values.resize(width * left);
+  };
+  each_column(shorten, *this);
+  n = left;
+  order();
+}
+
 Vec3 transport(Vec3 t, Vec3 m, Vec3 n, bool *reset) {
   const double c = dot(m, n);
   *reset = c < -0.5;

@@ -53,6 +53,7 @@ struct ContactStore {
   explicit ContactStore(const Memory &memory);
   uint32_t find(uint64_t key) const;  // index, or kNone
   void order();                       // by_key, from key
+  void drop(uint64_t id);             // contacts of a thing that goes; for stores without due and crossings
 };
 
 // f(ColumnOf<..>, column of each store). Memory, reserved room, data of sleepers, the copy for the budget of

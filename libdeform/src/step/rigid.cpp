@@ -236,7 +236,7 @@ bool stage_rigid_commit(World &w, StepContext &step, uint32_t *trouble) {
 }
 
 void keep_rigids(World &w, StepContext &step) {
-  step.tools->keep(w);
+  if (!w.rigid_sets.empty()) step.tools->keep(w);  // else stage_rigid_predict() has not made anything
   for (auto &set : w.rigid_sets) set->commit(sub_step_of(w, step), step.guard.motion);
   if (!w.rigid_sets.empty())
     for (auto &o : w.obstacles)

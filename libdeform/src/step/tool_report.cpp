@@ -111,6 +111,7 @@ void leave_rigid_contacts(World &w, uint64_t id) {
     if (gone(p)) add_event(w, DFM_EVENT_END, p.a, p.b, 0, w.time);
   std::erase_if(r.touching, gone);
   std::erase_if(r.contacts, gone);
+  w.tool_store.drop(id);
 }
 
 void find_touching(const World &w, const ContactStore &of, Array<RigidPair> &out) {

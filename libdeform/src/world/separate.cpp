@@ -304,17 +304,15 @@ Body &place_for_piece(World &w, const Body &of, uint64_t id, const std::string &
 }
 
 void orphan_pieces(World &w, const Body &whole) {
-  for (auto *list : {&w.bodies, &w.emptied})
-    for (auto &p : *list) {
-      if (p->piece_of != whole.id) continue;
-      p->piece_of = 0;
-      p->whole_name.clear();
-    }
-  std::erase_if(w.undone, [&](auto &p) {
-    if (p->piece_of != whole.id) return false;
-    handle_destroy(p->handle);
-    return true;
-  });
+  for (auto &p : w.bodies) {
+    if (p->piece_of != whole.id) continue;
+    p->piece_of = 0;
+    p->whole_name.clear();
+  }
+  const auto is_piece = [&](const auto &p) { return p->piece_of == whole.id; };
+  for (auto *list : {&w.emptied, &w.undone})
+    for (auto at = list->begin(); (at = std::find_if(list->begin(), list->end(), is_piece)) != list->end();)
+      destroy_body(**at);
 }
 
 }  // namespace dfm

@@ -19,6 +19,7 @@ void separate_what_waits(World &w);
 // undid it, or a new one. `of` made it, or is the body that the host made.
 Body &place_for_piece(World &w, const Body &of, uint64_t id, const std::string &name);
 // Called when the body that the host made is destroyed: its pieces become bodies like any other.
+// Those without cells go with it: no list has them, so that the host could not find what a restore refuses.
 void orphan_pieces(World &w, const Body &whole);
 
 }  // namespace dfm
