@@ -414,3 +414,50 @@ TEST(SavedGame, RewoundToBeforeABodyWhosePieceLostItsCells_Loads) {
   EXPECT_EQ(restore(w, saved), DFM_OK) << dfm_last_error();
   EXPECT_EQ(dfm_body_destroy(piece), DFM_E_HANDLE);
 }
+
+// What a tool cuts is state: a rewind takes it back, and a world built anew has it.
+TEST(SavedGame, WithAToolThatCuts_LoadsWhatItCuts) {
+  test::Context c;
+  const auto build = [&](dfm_world w) {
+    test::add_plane(w, "floor");
+    crate(c, w, "dough", {0, 0, 0.01});
+    dfm_tool_def d = dfm_tool_def_default();
+    d.name = "punch";
+    const dfm_pose_key keys[] = {{0, {{0.05, 0.05, 0.3}, {0, 0, 0, 1}}},
+                                 {0.5, {{0.05, 0.05, 0.05}, {0, 0, 0, 1}}}};
+    d.radius = 0.02;
+    d.nkey = 2;
+    d.keys = keys;
+    dfm_tool tool = 0;
+    test::ok(dfm_tool_create(w, &d, &tool));
+    return tool;
+  };
+  const auto cut_bodies = [](dfm_tool tool) {
+    uint32_t n = 0;
+    test::ok(dfm_tool_cuts(tool, nullptr, nullptr, 0, nullptr, &n));
+    return n;
+  };
+  const dfm_world w = empty(c), anew = empty(c);
+  const dfm_tool punch = build(w), other = build(anew);
+  steps(w, 5);
+  const std::string blunt = snapshot(w);
+  const dfm_body dough = found(w, "dough");
+  test::ok(dfm_tool_set_cuts(punch, DFM_CUT_REMOVE, 2, 1, &dough));
+  steps(w, 5);
+  const std::string sharp = snapshot(w);
+  uint64_t later[2];
+  for (const bool cuts : {false, true}) {
+    ASSERT_EQ(restore(w, cuts ? sharp : blunt), DFM_OK) << dfm_last_error();
+    EXPECT_EQ(cut_bodies(punch), uint32_t(cuts));
+    steps(w, 120);
+    later[cuts] = dfm_world_hash(w);
+  }
+  EXPECT_NE(later[0], later[1]);
+  for (const bool cuts : {true, false}) {
+    ASSERT_EQ(restore(anew, cuts ? sharp : blunt), DFM_OK) << dfm_last_error();
+    EXPECT_EQ(cut_bodies(other), uint32_t(cuts));
+    EXPECT_EQ(snapshot(anew), cuts ? sharp : blunt);
+    steps(anew, 120);
+    EXPECT_EQ(dfm_world_hash(anew), later[cuts]);
+  }
+}

@@ -9,6 +9,7 @@
 #include "state/world.h"
 #include "world/separate.h"
 #include "world/snapshot_things.h"
+#include "world/tool_cut.h"
 
 namespace dfm {
 namespace {
@@ -103,6 +104,19 @@ bool sound(const Array<CutDue> &dues, uint32_t npoint) {
     if (d.point >= npoint || (i && d.point <= dues[i - 1].point) || !(d.due >= 0 && d.force >= 0) ||
         !(std::isfinite(d.due) && std::isfinite(d.force) && std::isfinite(norm2(load3(d.way)))))
       return false;
+  }
+  return true;
+}
+
+bool sound(const Tool::Cuts &cuts, const Tool &tool) {
+  if (cuts.how > DFM_CUT_SPLIT) return false;
+  for (size_t i = 1; i < cuts.bodies.size(); ++i)
+    if (cuts.bodies[i] <= cuts.bodies[i - 1]) return false;
+  if (cuts.bodies.empty()) return true;
+  try {
+    check_tool_cuts(tool, cuts.how);
+  } catch (const Error &) {
+    return false;
   }
   return true;
 }

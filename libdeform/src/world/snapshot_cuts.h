@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "state/tool.h"
 #include "world/body_shape.h"
 #include "world/snapshot_stream.h"
 
@@ -73,6 +74,8 @@ std::vector<Body *> all_bodies(const World &w);
 bool sound(const Array<BladeSide> &sides, size_t ncorner);
 bool sound(const Array<CutDue> &dues, uint32_t npoint);
 bool sound(const std::vector<PlannedCut> &cuts);
+// Of a tool that can cut in this way.
+bool sound(const Tool::Cuts &cuts, const Tool &tool);
 // Between cells of the whole body, ascending.
 bool sound(const std::vector<AheadFace> &faces, const Body &b);
 

@@ -23,6 +23,7 @@
 #include "state/obstacle.h"
 #include "state/world.h"
 #include "step/method.h"
+#include "world/snapshot_cuts.h"
 #include "world/snapshot_models.h"
 #include "world/snapshot_staged.h"
 #include "world/snapshot_stream.h"
@@ -401,6 +402,17 @@ void fields(Stream &s, W &w, const World &like) {
                      "finite states and unit quaternions"});
     s.array("host's values", r.extra, l.extra.size(), must::finite);
     s.array("impulse", r.total, l.total.size(), must::finite);
+  });
+  at = 0;
+  s.members("tools", w.tools, like.tools.size(), [&](auto &entry) {
+    auto &cuts = object(entry).cuts;
+    const Tool &l = *like.tools[at++];
+    s.where("tool", l.name);
+    s.value("way of cutting", cuts.how, must::any);
+    s.value("most of a cut", cuts.most, must::any);
+    s.array("bodies that it cuts", cuts.bodies, kAnyCount, must::any);
+    s.must_hold("bodies that it cuts", "ascending numbers, of a tool that cuts in this way",
+                [&] { return sound(cuts, l); });
   });
   s.where("", "");
   attachment_fields(s, w);

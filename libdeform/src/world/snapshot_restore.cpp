@@ -221,6 +221,7 @@ void exchange(World &w, Staged &t) noexcept {
     set.total.swap(other.total);
     std::swap(set.last_h, other.last_h);
   }
+  for (size_t i = 0; i < w.tools.size(); ++i) std::swap(w.tools[i]->cuts, t.tools[i].cuts);
   w.friction.swap(t.friction);
   w.filters.swap(t.filters);
   w.attachments.swap(t.attachments);
@@ -267,6 +268,9 @@ void world_restore(World &w, const void *data, size_t bytes) {
   Staged staged(w);
   snapshot::fields(s, staged, w);
   for (StagedObstacle &o : staged.obstacles) o.material = o.zone.material;
+  for (size_t i = 0; i < w.tools.size(); ++i)
+    if (Tool::Cuts &by = staged.tools[i].cuts; !by.bodies.empty())
+      by.from.resize(w.tools[i]->motion.parts.size());  // the next step fills it in
   snapshot::check(s, staged, w);
   make_models(s, w, staged);
   // derived data, therefore recomputed and not read

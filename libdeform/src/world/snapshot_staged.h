@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "state/tool.h"
 #include "state/world.h"
 #include "world/body_model.h"
 
@@ -56,6 +57,7 @@ struct StagedRigids {
   Array<double> extra, total;
   double last_h = 0;
 };
+struct StagedTool { Tool::Cuts cuts; };
 struct StagedLaw {
   std::string id;
   std::vector<double> params;
@@ -75,6 +77,7 @@ struct Staged {
   std::vector<StagedBody> bodies;
   std::vector<StagedObstacle> obstacles;
   std::vector<StagedRigids> rigid_sets;
+  std::vector<StagedTool> tools;
   std::vector<StagedLaw> laws;
   std::vector<FrictionRule> friction;
   std::vector<FilterRule> filters;
@@ -96,6 +99,7 @@ struct Staged {
     bodies.resize(w.bodies.size());
     obstacles.resize(w.obstacles.size());
     rigid_sets.resize(w.rigid_sets.size());
+    tools.resize(w.tools.size());
     for (StagedBody &b : bodies)
       use_memory(m, b.p.x, b.p.v, b.p.load, b.p.held, b.model.state, b.surfel_impulse, b.anchor,
                  b.method_values);

@@ -86,7 +86,8 @@ std::vector<T *> find_things(const std::vector<T *> &things, const std::vector<T
       differs(word_for(*x), x->name, "was not there when it was taken", "destroy it before you restore");
   for (size_t i = 0; i < rows.size(); ++i)
     if (rows[i].made != make_of(*out[i]))
-      differs(word_for(*out[i]), out[i]->name, "has another shape, mesh, material, mass or fields there",
+      differs(word_for(*out[i]), out[i]->name,
+              "has another shape, mesh, material, mass, cut delay or fields there",
               "create it as it was when the snapshot was taken");
   return out;
 }

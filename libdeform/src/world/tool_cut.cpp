@@ -248,7 +248,9 @@ void remove(const Tool &t, Body &b, uint32_t &n) {
   n = met;
 }
 
-void check_shape(const Tool &t, uint32_t how) {
+}  // namespace
+
+void check_tool_cuts(const Tool &t, uint32_t how) {
   const char *const name = t.name.c_str();
   if (how > DFM_CUT_SPLIT)
     fail(DFM_E_ARG, "tool '%s' has the unknown way of cutting %u; use DFM_CUT_REMOVE or DFM_CUT_SPLIT", name,
@@ -270,11 +272,9 @@ void check_shape(const Tool &t, uint32_t how) {
          name, t.def.half_size[0], t.def.half_size[1]);
 }
 
-}  // namespace
-
 void set_cuts(Tool &t, uint32_t how, uint32_t most, std::span<Body *const> bodies) {
   World &w = *t.world;
-  check_shape(t, how);
+  check_tool_cuts(t, how);
   std::vector<uint64_t> ids;
   for (const Body *const b : bodies) {
     if (b->world != &w)

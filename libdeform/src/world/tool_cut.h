@@ -12,6 +12,8 @@ struct World;
 // how: DFM_CUT_*; most: cells or faces of a body in a step, 0: no limit; no bodies: it cuts nothing. Throws
 // Error, and then nothing has changed.
 void set_cuts(Tool &tool, uint32_t how, uint32_t most, std::span<Body *const> bodies);
+// Throws Error unless its shape can cut in this way.
+void check_tool_cuts(const Tool &tool, uint32_t how);
 bool cut_by_any(const Body &b);  // of its world's tools
 
 // Before a step: remembers where the tools that cut are. After it: cuts what their parts have met on the way.
