@@ -21,6 +21,7 @@ void use_method(World &w, const ContactMethod &method) {
   std::vector<StageTime> times(method.table.size());
   std::unique_ptr<MethodBuffers> buffers = method.buffers ? method.buffers(w.memory()) : nullptr;
   w.method = &method;
+  w.steps->facts = {};  // the plan is one for another table
   w.steps->stage_times = std::move(times);
   w.steps->method = std::move(buffers);
 }

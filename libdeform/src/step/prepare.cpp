@@ -7,6 +7,7 @@
 #include "step/stages.h"
 
 #include <algorithm>
+#include <tuple>
 #include <utility>
 
 #include "body/obstacle_mesh.h"
@@ -372,7 +373,28 @@ void choose_integrators(World &w) {
   }
 }
 
-void choose_plan(World &w, StepContext &step, SceneFacts &facts) {
+// All that a plan is made of.
+bool same(const SceneFacts &a, const SceneFacts &b) {
+  const auto numbers = [](const SceneFacts &f) {
+    return std::tie(f.bodies, f.self_stepping, f.obstacles, f.coupled, f.coupled_surfels, f.body_pairs,
+                    f.obstacle_pairs, f.rigid_bodies, f.rigid_joints, f.attachments, f.paid_cuts,
+                    f.rigid_hosts, f.rigid_pairs, f.rigid_alone);
+  };
+  const auto flags = [](const SceneFacts &f) {
+    return std::tie(f.gravity_keys, f.loads_vary, f.held_move, f.obstacles_move, f.unguarded,
+                    f.effects_listed, f.sleep, f.self, f.self_auto, f.self_bodies, f.self_cut, f.asked);
+  };
+  const auto provided = [](const std::vector<SceneFacts::Provider> &l,
+                           const std::vector<SceneFacts::Provider> &r) {
+    return std::ranges::equal(l, r,
+                              [](auto &x, auto &y) { return x.effect == y.effect && x.plugin == y.plugin; });
+  };
+  return numbers(a) == numbers(b) && flags(a) == flags(b) && provided(a.offered, b.offered) &&
+         provided(a.idle, b.idle) && provided(a.available, b.available);
+}
+
+// planned: the facts of the present plan.
+void choose_plan(World &w, StepContext &step, SceneFacts &facts, const SceneFacts &planned) {
   for (const dfm_type *t : w.context->registry.list()) offer(*t, facts.available);
   for (const dfm_type *t : w.context->registry.list(DFM_KIND_FRICTION)) {
     if (!is_frictionless(law_of(*t))) facts.available.push_back({kFriction, t->id});
@@ -388,6 +410,7 @@ void choose_plan(World &w, StepContext &step, SceneFacts &facts) {
   if (guards(*w.method) && !facts.unguarded && (touch || (facts.bodies && facts.effects_listed)))
     facts.offered.push_back({kGuard, "contact"});
   if (facts.self_bodies) need_ability(w, Ability::self_contact);
+  if (same(facts, planned)) return;
   w.plan = make_plan(w.method->table, facts);
   ++step.made.plans;
 }
@@ -426,7 +449,13 @@ void prepare(World &w, const RestoredChoice *restored) {
   choose_integrators(w);
   const uint32_t nb = static_cast<uint32_t>(w.bodies.size());
   SceneFacts &facts = step.facts;
-  facts = {};
+  const SceneFacts planned = std::exchange(facts, {});
+  struct Unplanned {  // where this fails before there is a plan, the next call makes one
+    SceneFacts *facts;
+    ~Unplanned() {
+      if (facts) *facts = {};
+    }
+  } unplanned{&facts};
   facts.bodies = nb;
   facts.obstacles = static_cast<unsigned>(w.obstacles.size());
   facts.sleep = w.def.sleep != 0;
@@ -439,7 +468,8 @@ void prepare(World &w, const RestoredChoice *restored) {
   view_rigids(w, facts);
   make_pair_tables(w, step, facts);
   step.tools->prepare(w, facts);
-  choose_plan(w, step, facts);
+  choose_plan(w, step, facts, planned);
+  unplanned.facts = nullptr;
   if (!restored && !w.plan.touches()) end_contacts(w);
   if (!w.plan.has(StageRole::finds_contacts) && !facts.self_bodies) step.contacts.clear();
 
