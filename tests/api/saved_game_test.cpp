@@ -369,6 +369,13 @@ TEST(SavedGame, WithAPieceWhoseBodyIsGone_LoadsIntoAWorldBuiltAnew) {
   EXPECT_EQ(dfm_world_hash(anew), later);
 }
 
+TEST(SavedGame, BodyOfAnEmptyWorld_IsNotFoundInOneSentence) {
+  test::Context c;
+  dfm_body body = 0;
+  EXPECT_EQ(dfm_world_find_body(empty(c), "dough", &body), DFM_E_ARG);
+  EXPECT_STREQ(dfm_last_error(), "no body is named 'dough'; the world has none");
+}
+
 // A contact of a free rigid body with something rigid goes with the body, also where it was the last of its
 // kind in the world.
 TEST(SavedGame, WithoutTheRigidBodyThatTouched_LoadsIntoAWorldBuiltAnew) {

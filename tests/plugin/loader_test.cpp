@@ -244,6 +244,7 @@ TEST(Loader, Scan_TakesPluginsInNameOrderAndGivesAReasonForTheRest) {
   EXPECT_EQ(c.ids(), (Ids{"org.tiny.drag", "org.tiny.old"}));
   EXPECT_EQ(c.file_of("org.tiny.drag"), dir + "/tiny_law.so");  // before tiny_taken.so
   EXPECT_NE(c.reason("tiny_taken.so").find("is taken by"), std::string::npos);
+  EXPECT_NE(c.reason("tiny_taken.so").find("into a new context"), std::string::npos);  // nothing unloads
   EXPECT_NE(c.reason("tiny_foreign.so").find("ABI 7"), std::string::npos);
   EXPECT_NE(c.reason("tiny_noentry.so").find("dfm_plugin_entry"), std::string::npos);
   EXPECT_NE(c.reason("tiny_throw_entry.so").find("threw"), std::string::npos);

@@ -432,6 +432,7 @@ dfm_status dfm_world_find_body(dfm_world world, const char *name, dfm_body *out)
     if (!b) {
       std::vector<std::string> names;
       for (auto &x : w.bodies) names.push_back(x->name);
+      if (names.empty()) fail(DFM_E_ARG, "no body is named '%s'; the world has none", name);
       fail(DFM_E_ARG, "no body is named '%s'%s; bodies: %s", name, did_you_mean(name, names, '\'').c_str(),
            join(names).c_str());
     }

@@ -227,7 +227,8 @@ void Registry::add(const dfm_plugin &plugin, const std::string &file) {
     for (const auto *list : {&types_, &fresh})
       for (const auto &other : *list)
         if (std::strcmp(other->type.id, entry->type.id) == 0)
-          fail(DFM_E_STATE, "id \"%s\" is taken by %s; unload that one, or give this plugin another id",
+          fail(DFM_E_STATE,
+               "id \"%s\" is taken by %s; give this plugin another id, or load it into a new context",
                entry->type.id, other->file.c_str());
     fresh.push_back(std::move(entry));
   }
