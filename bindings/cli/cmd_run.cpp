@@ -237,6 +237,10 @@ class Runner {
                   seen.inverted_there, seen.cells_there, seen.inverted_body.c_str(), 100 * seen.volume_there);
     if (seen.inverted_there * 20 < seen.cells_there && seen.volume_there > 0.8)
       return what + where + "refine the mesh or reduce the load";
+    if (seen.inverted_model == "org.deform.linear_fem")
+      return what + where +
+             "linear_fem holds for small strains and rotations only: use corotational_fem, or reduce the "
+             "load";
     return what + where +
            "its material is too soft for the load, which a finer mesh does not change: give it a larger "
            "\"young\", or reduce what presses on it";

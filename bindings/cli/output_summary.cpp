@@ -122,6 +122,7 @@ void Checker::check(bool start_state) {
     const uint32_t inverted = measured.inverted;
     if (inverted > checks_.inverted_there) {
       checks_.inverted_body = body.name;
+      checks_.inverted_model = body.model;
       checks_.inverted_there = inverted;
       checks_.cells_there = body.ntet;
       checks_.volume_there = measured.volume / measured.rest_volume;

@@ -85,7 +85,7 @@ struct Checks {
   size_t between_last = 0, self_last = 0;  // of the last state
   uint32_t inverted_last = 0;
   // of the body and the state with the most inverted cells
-  std::string inverted_body;
+  std::string inverted_body, inverted_model;
   uint32_t inverted_there = 0, cells_there = 0;
   double volume_there = 1;  // over that at rest
   bool finite = true, too_far = false;

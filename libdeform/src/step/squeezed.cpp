@@ -42,6 +42,8 @@ void tell_squeezed(World &w) {
   for (auto &one : w.bodies) {
     Body &b = *one;
     if (b.squeezed.told || b.slumber.asleep || b.surfel_impulse.empty()) continue;
+    // The sides of a cut, and pieces, press on each other in ways that this sum says nothing of.
+    if (b.shape != 0 || b.piece_of != 0) continue;
     const double young = b.young();
     if (!(young > 0)) continue;
     Squeezed &s = b.squeezed;
