@@ -330,6 +330,28 @@ TEST(RigidJoints, OneGroup_TouchesItself) {
   EXPECT_EQ(context.log.find("deep in"), std::string::npos) << context.log;
 }
 
+// A door whose hinge lies in its post opens; the hinge connects the two. A crate behind it stops it.
+TEST(RigidJoints, ADoorInItsPost_Opens) {
+  for (const double dt : kStep) {
+    SCOPED_TRACE(dt);
+    test::LoggedContext context;
+    const dfm_world w = test::make_world(context.context, {0, 0, -kG});
+    add_box(w, "post", {0.03, 0.03, 0.6}, {-0.02, 0, 0.6});
+    add_box(w, "stop", {0.05, 0.05, 0.2}, {0, 0.5, 0.2});
+    const Vec half = {0.4, 0.02, 0.5};
+    const auto door =
+        test::create(w, {test::box("door", half, 10, {0.4, 0, 0.52})},
+                     {test::joint(DFM_JOINT_HINGE, 0, DFM_RIGID_WORLD, {0, 0, 0.5}, {0, 0, 1})});
+    test::ok(dfm_rigid_set_motor(door[0], 0, 1, 20));
+    go(w, dt, 2);
+    const double angle = test::reading(door[0], 0).position;
+    EXPECT_GT(angle, 1.3);
+    EXPECT_LT(angle, 1.57);
+    EXPECT_NEAR(test::reading(door[0], 0).effort, 20, 1e-6);
+    EXPECT_EQ(context.log, "");
+  }
+}
+
 // A driven tool and a coupled one open a door, do not go into it, and feel what it is pushed with.
 TEST(RigidJoints, Tools_OpenADoor) {
   for (const double stiffness : {0.0, 1000.0}) {

@@ -22,15 +22,39 @@ namespace {
 
 constexpr double kHeld = 1e-9;     // of the answer without joints: less is rounding, joints allow no motion
 constexpr double kStronger = 0.1;  // of what a place yields where a motor holds that is not at its limit yet
-constexpr double kRank = 1e-12;    // of the answer without joints: what is left out of the basis
+constexpr double kMostStrong = 1e-6;  // of it: no place gives less
+constexpr double kDriven = 0.01;      // sine: a motor moves a place along a direction
+constexpr double kNever = 1e3;        // m/s, to part by: such a place has no impulse
+constexpr double kRank = 1e-12;       // of the answer without joints: what is left out of the basis
 
 bool gives_way(const RigidSet &set, uint32_t body) { return set.group[body] != DFM_RIGID_STILL; }
+
+bool is_simple(const ObstacleView &v) {
+  return v.shape == Shape::sphere || v.shape == Shape::capsule || v.shape == Shape::box;
+}
+
+// Whether a joint to the world has its anchor in this obstacle, as both were created: a door in its post. The
+// anchor of a slider may be anywhere.
+bool hangs_on(const World &w, const Obstacle &body, const Obstacle &obstacle) {
+  ObstacleView v = w.steps->obstacle_views[obstacle.slot];
+  if (!is_simple(v)) return false;
+  v.position = load3(obstacle.def.pose.position);
+  v.rotation = unit_quat(obstacle.def.pose.rotation);
+  const ToolShape shape(v, nullptr);
+  return std::any_of(body.rigid->joints.begin(), body.rigid->joints.end(), [&](const dfm_joint_def &j) {
+    ObstaclePoint o;
+    return j.body == body.rigid_body && j.with == DFM_RIGID_WORLD && j.type != DFM_JOINT_SLIDER &&
+           shape.closest(load3(j.anchor), HUGE_VAL, o) && o.distance < w.offset;
+  });
+}
 
 }  // namespace
 
 // Bodies of one set that are no contact partners: those that a joint connects, and those that their joints
 // let overlap as created, such as the ends of a chain of short thick links.
 bool ToolTouch::belong_together(const World &w, const Obstacle &a, const Obstacle &b) {
+  if (a.rigid && !b.rigid) return hangs_on(w, a, b);
+  if (b.rigid && !a.rigid) return hangs_on(w, b, a);
   if (!a.rigid || a.rigid != b.rigid || a.rigid->of_tool) return false;
   const RigidSet &set = *a.rigid;
   const auto names = [&](const dfm_joint_def &j, uint32_t body) { return j.body == body || j.with == body; };
@@ -53,10 +77,7 @@ bool ToolTouch::belong_together(const World &w, const Obstacle &a, const Obstacl
     return v;
   };
   const ObstacleView va = created(a), vb = created(b);
-  const auto simple = [](const ObstacleView &v) {
-    return v.shape == Shape::sphere || v.shape == Shape::capsule || v.shape == Shape::box;
-  };
-  if (!simple(va) || !simple(vb)) return false;
+  if (!is_simple(va) || !is_simple(vb)) return false;
   ToolShape shape_a(va, nullptr), shape_b(vb, nullptr);
   return depth(shape_a, shape_b, true) > 0;
 }
@@ -116,7 +137,27 @@ double ToolTouch::rounding_of(const Row &row, Vec3 along) const {
 // A place that does not yield because a motor holds has a row nevertheless. It gives at first as a free body
 // would, then less and less (press_harder), until its impulse takes the motor to its limit.
 bool ToolTouch::motor_holds(const Row &row) const {
-  return (jointed(row.a) && sides_[row.a.tool].drives) || (jointed(row.b) && sides_[row.b.tool].drives);
+  return is_driven(row.a, row.normal) || is_driven(row.b, row.normal);
+}
+
+// Whether a motor of its group moves the place along this direction. If none does, joints hold it as well,
+// such as a door that lies in a post beside its hinge, and no impulse takes a motor to its limit.
+bool ToolTouch::is_driven(const Side &side, Vec3 along) const {
+  if (!jointed(side) || !sides_[side.tool].drives) return false;
+  const RigidSet &set = *sides_[side.tool].set;
+  const Vec3 at = center(side) + side.arm;
+  return std::any_of(set.joints.begin(), set.joints.end(), [&](const dfm_joint_def &j) {
+    const uint32_t body = gives_way(set, j.body) || j.with == DFM_RIGID_WORLD ? j.body : j.with;
+    if (!j.motor || set.group[body] != set.group[side.part]) return false;
+    const dfm_pose &was = set.defs[body].pose;
+    const dfm_rigid_state &s = set.state[body];
+    const Quat turn =
+        Quat{s.rotation[0], s.rotation[1], s.rotation[2], s.rotation[3]} * conjugate(unit_quat(was.rotation));
+    const Vec3 axis = rotate(turn, normalized(load3(j.axis)));
+    if (j.type == DFM_JOINT_SLIDER) return std::fabs(dot(axis, along)) > kDriven;
+    const Vec3 arm = at - load3(s.position) - rotate(turn, load3(j.anchor) - load3(was.position));
+    return std::fabs(dot(axis, cross(arm, along))) > kDriven * norm(arm);
+  });
 }
 
 double ToolTouch::give_of_motor(const Row &row) const {
@@ -132,10 +173,16 @@ void ToolTouch::renew_rows() {
   }
   for (uint32_t i = 0; i < rows_.size(); ++i) {
     Row &row = rows_[i];
-    if (!motor_holds(row)) continue;
+    if (!(jointed(row.a) && sides_[row.a.tool].drives) && !(jointed(row.b) && sides_[row.b.tool].drives))
+      continue;
     set_answers(row);
+    if (!(row.inverse > 0)) {  // no longer moved by anything: nothing is asked of it
+      row.inverse = kHeld / rounding_of(row, row.normal);
+      row.rate = -kNever;
+      row.impulse = row.opens = 0;
+    }
     if (i < response_.size()) response_[i] = row.response;
-    if (!(row.response > 0)) row.along[0] = row.along[1] = 0;
+    if (!(row.response > 0 && row.impulse > 0)) row.along[0] = row.along[1] = 0;
   }
   push_all();
 }
@@ -178,8 +225,10 @@ bool ToolTouch::decide_motors() {
 
 // Where motors hold against rows: their places give less.
 bool ToolTouch::press_harder() {
-  if (std::none_of(rows_.begin(), rows_.end(),
-                   [](const Row &row) { return !row.jaw && row.soft > 0 && row.impulse > 0; }))
+  if (strong_ < kMostStrong ||
+      std::none_of(
+          rows_.begin(), rows_.end(),
+          [](const Row &row) { return !row.jaw && row.soft > 0 && row.impulse > 0; }))
     return false;
   strong_ *= kStronger;
   renew_rows();

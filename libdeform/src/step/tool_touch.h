@@ -267,6 +267,7 @@ class ToolTouch {
   bool jointed(const Side &side) const;
   double rounding_of(const Row &row, Vec3 along) const;
   bool motor_holds(const Row &row) const;
+  bool is_driven(const Side &side, Vec3 along) const;
   double give_of_motor(const Row &row) const;
   void renew_rows();
   bool press_harder();
