@@ -24,6 +24,7 @@
 #include "step/rigid.h"
 #include "step/solve_islands.h"
 #include "step/stages.h"
+#include "step/stuck_slip.h"
 #include "step/tolerance.h"
 
 namespace dfm {
@@ -116,6 +117,8 @@ void make_rows(World &w, StepContext &step) {
   step.rows.finish(step.contacts, step.tangents.data(), step.h, step.guard.planned, w.offset, step.bonds,
                    &w.context->tasks);
   run_belts(step);
+  step.asked_back.assign(size_t(2) * n, 0.0);
+  step.owed.assign(size_t(3) * n, 0.0);
   std::copy(step.bond_impulse.begin(), step.bond_impulse.end(),
             step.rows.impulse.begin() + std::ptrdiff_t{3} * step.rows.n);
   if (step.guard.resolving) guard_impulses(step);
@@ -361,6 +364,7 @@ bool stage_solve(World &w, StepContext &step, uint32_t *trouble) {
                            step.rows.impulse.end());
   // laws may have been evaluated at slips that differ from the solution
   std::swap(step.state.vt, step.state.slip);
+  find_owed(w, step);
   if (step.residual.due > 1) {
     *trouble |= DFM_TROUBLE_UNCONVERGED;
     ++w.stats.unconverged;

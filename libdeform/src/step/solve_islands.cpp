@@ -13,6 +13,7 @@
 #include "plugin/context.h"
 #include "state/world.h"
 #include "step/context.h"
+#include "step/stuck_slip.h"
 #include "step/tolerance.h"
 
 namespace dfm {
@@ -510,6 +511,7 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
   set_tolerance(step.rows, own.part, step.contacts, step.h, bounds, step.solve_islands->sides(),
                 step.disturbance.data(), own.tolerance);
   own.redundant.allow(own.part, own.tolerance);
+  ask_slip_back(w, step, own);
   const double slow = kSlowOpening * w.offset / step.guard.planned;
   for (bool last = false;;) {
     solve_passes(w, step, own);
@@ -758,7 +760,9 @@ const SolveIsland *solve_islands(World &w, StepContext &step) {
         if (!own.open) continue;
         try {
           if (starts) start_island(w, step, own);
-          if (solves) solve_island(w, step, own);
+          if (!solves) continue;
+          solve_island(w, step, own);
+          restore_drive(step, own);
         } catch (...) {
           own.thrown = std::current_exception();
         }

@@ -49,6 +49,7 @@ struct SolveIsland {
   bool waits = false;      // for the response that Tresca needs
   bool backs = true;       // Tresca may be tried
   bool stuck = false;      // it was tried, and found no result
+  bool owes = false;       // contacts of it owe slip (stuck_slip.h)
   bool common = false;     // laws use the response of all contacts together
   uint32_t asked = 0;      // passes beyond the limit of sweeps with the present response
   double affordable = -1;  // sweeps beyond the limit; < 0: not known yet
