@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "deform/plugin.hpp"
+#include "rigid.h"
 #include "stack.h"
 
 namespace {
@@ -166,6 +167,31 @@ TEST(StepFailure, OfALaw_EndsTheStepAndKeepsTheState) {
     EXPECT_TRUE(way != Way::throws || h.log.find("test.bad_law: eval threw") != std::string::npos) << h.log;
     law_way = Way::behave;
     test::run(s.world, 0.01, 1e-3);
+  }
+}
+
+TEST(StepFailure, OfALawBetweenRigidThings_EndsTheStepAndKeepsTheState) {
+  Host h;
+  const dfm_world w = test::make_world(h.c);
+  test::add_plane(w, "floor");
+  test::create(w, {test::box("crate", {0.1, 0.1, 0.1}, 1, {0, 0, 0.1})}, {});
+  dfm_friction_def f{};
+  f.size = sizeof f;
+  f.between[0] = f.between[1] = "*";
+  f.law = "test.bad_law";
+  test::ok(dfm_world_add_friction(w, &f));
+  test::run(w, 0.05, 1e-3);
+  for (const Way way : {Way::throws, Way::fails, Way::nan_force, Way::nan_limit, Way::negative_limit}) {
+    SCOPED_TRACE(int(way));
+    const uint64_t before = dfm_world_hash(w);
+    uint32_t trouble = 0;
+    law_way = way;
+    EXPECT_EQ(dfm_world_step(w, 1e-3, &trouble), DFM_E_DIVERGED);
+    EXPECT_TRUE(trouble & DFM_TROUBLE_PLUGIN);
+    says({"step ", "'test.bad_law'"});
+    EXPECT_EQ(dfm_world_hash(w), before);
+    law_way = Way::behave;
+    test::run(w, 0.01, 1e-3);
   }
 }
 

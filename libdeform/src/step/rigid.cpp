@@ -36,6 +36,26 @@ bool host_failed(const World &w, const RigidSet &set, const HostFault &fault, ui
   return false;
 }
 
+// Solves rigid contact. False: a friction law has failed, which ends the step as between soft bodies.
+template <class F>
+bool solved(const World &w, uint32_t *trouble, const F &solve) {
+  try {
+    solve();
+    return true;
+  } catch (const ToolTouch::LawFailed &e) {
+    *trouble |= DFM_TROUBLE_PLUGIN;
+    const std::string at =
+        std::isnan(e.force) ? ""
+                            : format(" at a normal force of %.9g N and a slip of %.9g m/s", e.force, e.slip);
+    set_last_error(
+        format("step %llu: friction law '%s' gave no valid force where rigid things touch%s; take a "
+               "smaller step, reduce speeds and loads or change the law",
+               static_cast<unsigned long long>(w.step_count), e.law->type->id, at.c_str())
+            .c_str());
+    return false;
+  }
+}
+
 }  // namespace
 
 Obstacle &rigid_obstacle(World &w, uint64_t id) {
@@ -88,7 +108,8 @@ bool stage_rigid_predict(World &w, StepContext &step, uint32_t *trouble) {
   step.rigid_again = false;
   for (auto &set : w.rigid_sets) set->begin(sub_step_of(w, step));
   if (!ask_rigids(w, trouble)) return false;
-  if (!step.tools->begin(w, step)) return false;
+  bool goes_on = false;
+  if (!solved(w, trouble, [&] { goes_on = step.tools->begin(w, step); }) || !goes_on) return false;
   for (auto &set : w.rigid_sets) set->first.assign(set->velocity.begin(), set->velocity.end());
   for (auto &o : w.obstacles) {
     if (!o->rigid || o->rigid->group[o->rigid_body] == DFM_RIGID_STILL) continue;
@@ -207,7 +228,8 @@ int ask_rigid_ends(World &w, uint32_t *trouble) {
 bool stage_rigid_commit(World &w, StepContext &step, uint32_t *trouble) {
   for (uint32_t round = 0;; ++round) {
     sum_rigid_impulses(w, step);
-    const bool differ = step.tools->answer(w, step);
+    bool differ = false;
+    if (!solved(w, trouble, [&] { differ = step.tools->answer(w, step); })) return false;
     const int end = ask_rigid_ends(w, trouble);
     if (end == 0) return false;
     if ((end == 1 && !differ) || round == DFM_RIGID_MOST_AGAIN || !w.plan.touches() || step.rows.all() == 0)

@@ -89,11 +89,12 @@ double ToolTouch::ask_laws(double least) {
   }
   const LawInstance *bad = batches_.answer(h_, response_.data(), least, kAnswered, state_);
   if (!bad) bad = batches_.slopes(h_, state_);
-  if (bad)
-    fail(DFM_E_FATAL,
-         "friction law '%s' gave no finite force where a tool touches something rigid; change "
-         "its parameters",
-         bad->type->id);
+  if (bad) {
+    const uint32_t i = batches_.failed();
+    if (i == kNone) throw LawFailed{bad, NAN, NAN};
+    const double a = state_.vt[i], b = state_.vt[stride + i];
+    throw LawFailed{bad, state_.fn[i], std::sqrt(a * a + b * b)};
+  }
   double most = 0;
   for (uint32_t i = 0; i < n; ++i) {
     const Row &row = rows_[i];

@@ -48,6 +48,12 @@ class ToolTouch {
   explicit ToolTouch(const Memory &memory);
   // Called after a change of bodies or rules: finds which pairs may touch, and their laws.
   void prepare(World &w, SceneFacts &facts);
+  // Thrown by what solves rows: a law failed, returned a value that is not finite, or a limit below zero.
+  struct LawFailed {
+    const LawInstance *law;
+    double force, slip;  // N, m/s, at which the law was evaluated; nan: unknown
+  };
+
   // Called before the solve: finds and solves the rows of this sub-step, and changes the sets' velocities by
   // their impulses. Returns false if the sub-step must be repeated, shorter (Guard::again).
   bool begin(World &w, StepContext &step);
