@@ -63,7 +63,7 @@ struct Block : model::BlockPoints {
   double *state_out;
   const uint32_t *cell;
   double flow, per_flow;
-  double collapse, least;  // least: kFlat, or less than any volume where no cell resists collapse
+  double collapse;  // 0 where no cell resists collapse
   const SlotGroup *slots;
   double *value;       // [groups,8] what `energies` and `twists` write
   double *damp_value;  // [groups,8] what `twists` writes of dampers; NULL without

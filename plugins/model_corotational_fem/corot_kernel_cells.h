@@ -390,16 +390,16 @@ DEFORM_INLINE void direct_stress(const Four &q, const v4 *f, const model::Polar<
   }
 }
 
-// Is one of four cells so flat that it resists collapse?
-DEFORM_INLINE bool resists(const Block &b, const model::Polar<Wide> &o) {
-  return __builtin_expect(mask_above(splat(b.least), o.det) != 0, 0);
+// Is one of four cells so flat that it resists collapse? Asked only in kernels for blocks whose cells can.
+DEFORM_INLINE bool resists(const model::Polar<Wide> &o, double flat = kFlat) {
+  return __builtin_expect(mask_above(splat(flat), o.det) != 0, 0);
 }
 DEFORM_INLINE Collapse<Wide> collapse_of(const Block &b, const Four &q, v4 det) {
   return collapse_of<Wide>(b.collapse, det, load4(q.group->mu2 + q.at), load4(q.group->lambda + q.at));
 }
 
 // P V of four cells; f is lost where there are dampers.
-template <Energy kEnergy, bool kFiber, bool kDamped, bool kMore>
+template <Energy kEnergy, bool kFiber, bool kDamped, bool kMore, bool kCollapse>
 DEFORM_INLINE void piola(const Block &b, uint32_t n, const Four &q, v4 *f, const v4 *r,
                          const model::Polar<Wide> &o, v4 *p) {
   v4 e[6], stress[6], all[9];
@@ -410,7 +410,7 @@ DEFORM_INLINE void piola(const Block &b, uint32_t n, const Four &q, v4 *f, const
     full(stress, all);
     if (kFiber || kDamped || (kMore && b.plastic)) add_others<kFiber, kDamped, kMore>(b, n, q, r, e, f, all);
     turn(r, all, p);
-    if (resists(b, o)) {
+    if (kCollapse && resists(o)) {
       const v4 pressure = collapse_of(b, q, o.det).pressure;
       for (int k = 0; k < 9; ++k) p[k] = p[k] - pressure * o.cofactor[k];
     }
@@ -426,14 +426,14 @@ DEFORM_INLINE void piola(const Block &b, uint32_t n, const Four &q, v4 *f, const
   }
 }
 
-template <Energy kEnergy, bool kFiber, bool kDamped, bool kMore = false>
+template <Energy kEnergy, bool kFiber, bool kDamped, bool kMore = false, bool kCollapse = false>
 static inline void cell_forces(const Block &b) {
   each_four<kEnergy == kLinear || kDamped>(
       b, [&](uint32_t n, uint32_t at, v4 *f, const v4 *r, const model::Polar<Wide> &o)
              __attribute__((always_inline)) {
                const Four q = {b.group + n, at};
                v4 p[9], sum[4], other[4];
-               piola<kEnergy, kFiber, kDamped, kMore>(b, n, q, f, r, o, p);
+               piola<kEnergy, kFiber, kDamped, kMore, kCollapse>(b, n, q, f, r, o, p);
                spread(b, q, 0, p, sum);
                for (int k = 1; k < 3; ++k) {
                  spread(b, q, k, p, other);
@@ -468,27 +468,28 @@ static inline void dilate(const Block &b) {
                    });
 }
 
-static inline void forces(const Block &b) {
-  const bool damped = b.damp != nullptr;
-  if (b.energy == kNeoHookean)
-    return damped ? cell_forces<kNeoHookean, false, true>(b) : cell_forces<kNeoHookean, false, false>(b);
-  if (b.energy == kVenant)
-    return damped ? cell_forces<kVenant, false, true>(b) : cell_forces<kVenant, false, false>(b);
-  if (b.nodal || b.plastic)
-    return damped ? cell_forces<kLinear, false, true, true>(b) : cell_forces<kLinear, false, false, true>(b);
-  if (b.fiber) return damped ? cell_forces<kLinear, true, true>(b) : cell_forces<kLinear, true, false>(b);
-  return damped ? cell_forces<kLinear, false, true>(b) : cell_forces<kLinear, false, false>(b);
+// Fibers go with neither `nodal` nor plastic flow, and only the linear energy with any of these.
+template <bool kDamped>
+static inline void forces_with(const Block &b) {
+  if (b.energy == kNeoHookean) return cell_forces<kNeoHookean, false, kDamped>(b);
+  if (b.energy == kVenant) return cell_forces<kVenant, false, kDamped>(b);
+  if (b.collapse > 0)
+    return b.fiber ? cell_forces<kLinear, true, kDamped, false, true>(b)
+                   : cell_forces<kLinear, false, kDamped, true, true>(b);
+  if (b.nodal || b.plastic) return cell_forces<kLinear, false, kDamped, true>(b);
+  return b.fiber ? cell_forces<kLinear, true, kDamped>(b) : cell_forces<kLinear, false, kDamped>(b);
 }
+static inline void forces(const Block &b) { return b.damp ? forces_with<true>(b) : forces_with<false>(b); }
 
 // Cauchy stress P F^T / J times V, without dampers, J no less than kLeastVolume in size.
-template <Energy kEnergy, bool kFiber, bool kMore = false>
+template <Energy kEnergy, bool kFiber, bool kMore = false, bool kCollapse = false>
 static inline void cell_stresses(const Block &b, const uint32_t *cells, double *out) {
   each_four<kEnergy == kLinear>(b, [&](uint32_t n, uint32_t at, v4 *f, const v4 *r,
                                        const model::Polar<Wide> &o) __attribute__((always_inline)) {
     const Four q = {b.group + n, at};
     v4 p[9];
     alignas(32) double one[6][4];
-    piola<kEnergy, kFiber, false, kMore>(b, n, q, f, r, o, p);
+    piola<kEnergy, kFiber, false, kMore, kCollapse>(b, n, q, f, r, o, p);
     const v4 over = splat(1) / max4(abs4(o.det), splat(kLeastVolume));
     constexpr int kRow[6] = {0, 1, 2, 0, 1, 2}, kCol[6] = {0, 1, 2, 1, 2, 0};
     for (int k = 0; k < 6; ++k) {
@@ -504,6 +505,9 @@ static inline void cell_stresses(const Block &b, const uint32_t *cells, double *
 static inline void stresses(const Block &b, const uint32_t *cells, double *out) {
   if (b.energy == kNeoHookean) return cell_stresses<kNeoHookean, false>(b, cells, out);
   if (b.energy == kVenant) return cell_stresses<kVenant, false>(b, cells, out);
+  if (b.collapse > 0)
+    return b.fiber ? cell_stresses<kLinear, true, false, true>(b, cells, out)
+                   : cell_stresses<kLinear, false, true, true>(b, cells, out);
   if (b.nodal || b.plastic) return cell_stresses<kLinear, false, true>(b, cells, out);
   return b.fiber ? cell_stresses<kLinear, true>(b, cells, out) : cell_stresses<kLinear, false>(b, cells, out);
 }
@@ -517,7 +521,7 @@ DEFORM_INLINE v4 nodal_energy(const Block &b, const Four &q, const v4 *e) {
   const v4 shape = load4(q.group->mu2 + q.at) * square_of<Wide>(way);
   return splat(0.5) * (shape + bulk4(q) * corner_mean<0, true>(b, q));
 }
-template <bool kFiber, bool kMore = false>
+template <bool kFiber, bool kMore = false, bool kCollapse = false>
 static inline void cell_energies(const Block &b) {
   each_four(b, [&](uint32_t n, uint32_t at, v4 *f, const v4 *r, const model::Polar<Wide> &o)
                    __attribute__((always_inline)) {
@@ -531,11 +535,13 @@ static inline void cell_energies(const Block &b) {
                      v4 sum = splat(0.5) * own + mixed;
                      if (kMore && b.nodal) sum = nodal_energy(b, q, e);
                      if (kMore && b.plastic) sum = sum + plastic_energy(b, n, q, e);
-                     if (resists(b, o)) sum = sum + collapse_of(b, q, o.det).energy;
+                     if (kCollapse && resists(o)) sum = sum + collapse_of(b, q, o.det).energy;
                      store4(b.value + size_t(kGroup) * n + at, sum);
                    });
 }
 static inline void energies(const Block &b) {
+  if (b.collapse > 0)
+    return b.fiber ? cell_energies<true, false, true>(b) : cell_energies<false, true, true>(b);
   if (b.nodal || b.plastic) return cell_energies<false, true>(b);
   return b.fiber ? cell_energies<true>(b) : cell_energies<false>(b);
 }
@@ -575,7 +581,7 @@ DEFORM_INLINE v4 collapse_stiffness(const Block &b, const Four &q, const model::
 // the stretch and n = |F|^2: the mean stretch m = t/3 and the variance n/3 - m^2 enclose each stretch
 // within sqrt(2 variance) of m, the sum of two of them within 2 m -+ that, and the square of the difference
 // of two below 6 variances.
-template <bool kFiber>
+template <bool kFiber, bool kCollapse>
 static inline void cell_twists(const Block &b) {
   each_four(b, [&](uint32_t n, uint32_t at, v4 *f, const v4 *r,
                    const model::Polar<Wide> &o) __attribute__((always_inline)) {
@@ -620,7 +626,7 @@ static inline void cell_twists(const Block &b) {
         twist = twist + (splat(2.8285) * (size * (splat(1) + uneven))) / least;
       }
     }
-    if (mask_above(splat(b.least + kFalls), o.det) != 0) twist = twist + collapse_stiffness(b, q, o);
+    if (kCollapse && resists(o, kFlat + kFalls)) twist = twist + collapse_stiffness(b, q, o);
     const size_t place = size_t(kGroup) * n + at;
     store4(b.value + place, twist);
     if (!b.damp) return;
@@ -630,7 +636,10 @@ static inline void cell_twists(const Block &b) {
                (stiff * (kFiber ? splat(1.4143) * sqrt4(uneven) + splat(0.5) * uneven : uneven)));
   });
 }
-static inline void twists(const Block &b) { return b.fiber ? cell_twists<true>(b) : cell_twists<false>(b); }
+static inline void twists(const Block &b) {
+  if (b.collapse > 0) return b.fiber ? cell_twists<true, true>(b) : cell_twists<false, true>(b);
+  return b.fiber ? cell_twists<true, false>(b) : cell_twists<false, false>(b);
+}
 
 // Blocks of R K_e R^T with q_a = R g_a: lambda q_a q_b^T + mu (q_b q_a^T + g_a.g_b I); with p the turned
 // axis and c_a = a.g_a the fibers add what the stress of fiber_stress does at corner a for the strain of a
@@ -661,7 +670,7 @@ DEFORM_INLINE void block_of(const Turned &t, int a, int b, v4 lambda, v4 mu, v4 
       out[3 * i + j] = i == j ? sum + same : sum;
     }
 }
-template <bool kFiber>
+template <bool kFiber, bool kCollapse>
 static inline void cell_tangents(const Block &b, double a, double damp, double *blk) {
   constexpr int kFirst[10] = {0, 1, 2, 3, 0, 0, 0, 1, 1, 2}, kSecond[10] = {0, 1, 2, 3, 1, 2, 3, 2, 3, 3};
   each_four(b, [&](uint32_t n, uint32_t at, v4 *f, const v4 *r,
@@ -692,7 +701,7 @@ static inline void cell_tangents(const Block &b, double a, double damp, double *
     const v4 mu2 = load4(q.group->mu2 + at), mu = splat(0.5) * (by * mu2);
     // where `nodal` the volume change has blocks of its own
     const v4 lambda = by * (b.nodal ? splat(-1.0 / 3) * mu2 : load4(q.group->lambda + at));
-    const bool flat = resists(b, o);
+    const bool flat = kCollapse && resists(o);
     v4 dyad = splat(0), area[4][3];  // cof F g of the corners
     if (flat) {
       dyad = choose_above(splat(kFlat), o.det, splat(a) * collapse_of(b, q, o.det).stiffness, splat(0));
@@ -720,7 +729,9 @@ static inline void cell_tangents(const Block &b, double a, double damp, double *
   });
 }
 static inline void tangents(const Block &b, double a, double damp, double *blk) {
-  return b.fiber ? cell_tangents<true>(b, a, damp, blk) : cell_tangents<false>(b, a, damp, blk);
+  if (b.collapse > 0)
+    return b.fiber ? cell_tangents<true, true>(b, a, damp, blk) : cell_tangents<false, true>(b, a, damp, blk);
+  return b.fiber ? cell_tangents<true, false>(b, a, damp, blk) : cell_tangents<false, false>(b, a, damp, blk);
 }
 
 constexpr Kernels kKernels = {load_block, dilate,   forces,     stresses,   energies,

@@ -125,8 +125,7 @@ void Body::fill_material(Room &room) {
     block[b].nodal = nodal();
     block[b].plastic = plastic() ? plastic_group.data() + groups_at : nullptr;
     block[b].cell = cell_id.data() + kGroup * groups_at;
-    block[b].collapse = params[kCollapse];
-    block[b].least = params[kCollapse] > 0 && choice(kEnergy) == kLinear ? kFlat : -1e300;
+    block[b].collapse = choice(kEnergy) == kLinear ? params[kCollapse] : 0;
     block[b].rotate_all = choice(kRotation) != kPolar;
     groups_at += block[b].groups;
   }
