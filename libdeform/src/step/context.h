@@ -75,8 +75,9 @@ struct StepContext {
   Array<double> disturbance, best_impulse, best_pass, trial_response;
   Array<uint8_t> revised;  // [blocks of rows] the response of the body has changed with its impulses
   Array<double> tangents;
-  Array<double> asked_back;  // [contacts,2] m/s, slip that the solve takes back (stuck_slip.h)
-  Array<double> owed;        // [contacts,3] m, slip since the contact sticks (stuck_slip.h)
+  // both empty where no law holds places (stuck_slip.h)
+  Array<double> asked_back;  // [contacts,2] m/s, slip that the solve takes back; of islands that owe
+  Array<double> owed;        // [contacts,3] m, slip since the contact sticks
   // [contacts] index of the contact in the store of the last sub-step, or kNone
   Array<uint32_t> match;
   Array<uint32_t> block_surfels;  // responses of bodies whose points answer each other

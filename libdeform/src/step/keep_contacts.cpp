@@ -130,7 +130,6 @@ void keep_contact(World &w, StepContext &step, uint32_t i) {
   // since.
   const bool first = w.time <= w.hold.start, carried = !first && m != kNone && w.store.held[m];
   const bool holds = w.hold.on && stick && (first || carried);
-  store3(&to.owed[size_t(3) * i], load3(&step.owed[size_t(3) * i]));
   to.path[2 * i] = holds ? (carried ? w.store.path[2 * m] : 0) + step.h * v1 : 0;
   to.path[2 * i + 1] = holds ? (carried ? w.store.path[2 * m + 1] : 0) + step.h * v2 : 0;
   to.touching[i] = now;
@@ -181,6 +180,8 @@ void keep_contacts(World &w, StepContext &step) {
         if (column.width != kOwnLength) values.resize(column.entries(n, S));
       },
       to);
+  if (step.owed.empty()) std::fill(to.owed.begin(), to.owed.end(), 0.0);
+  else std::copy(step.owed.begin(), step.owed.end(), to.owed.begin());
   w.report.n = n;
   w.report.h = step.h;
   w.report.contacts.resize(n);

@@ -117,8 +117,7 @@ void make_rows(World &w, StepContext &step) {
   step.rows.finish(step.contacts, step.tangents.data(), step.h, step.guard.planned, w.offset, step.bonds,
                    &w.context->tasks);
   run_belts(step);
-  step.asked_back.assign(size_t(2) * n, 0.0);
-  step.owed.assign(size_t(3) * n, 0.0);
+  reset_owed(w, step);
   std::copy(step.bond_impulse.begin(), step.bond_impulse.end(),
             step.rows.impulse.begin() + std::ptrdiff_t{3} * step.rows.n);
   if (step.guard.resolving) guard_impulses(step);

@@ -22,6 +22,7 @@
 #include "step/stuck_slip.h"
 
 #include <algorithm>
+#include <bit>
 
 #include "contact/rows_part.h"
 #include "friction/laws.h"
@@ -60,7 +61,11 @@ void each_pair(const StepContext &step, const RowsPart &part, F &&f) {
     }
 }
 
-bool any(const double *e) { return e[0] != 0 || e[1] != 0 || e[2] != 0; }
+// In integers: most contacts of a sliding body owe nothing, and each is asked several times.
+bool any(const double *e) {
+  const auto bits = [e](int k) { return std::bit_cast<uint64_t>(e[k]); };
+  return (bits(0) | bits(1) | bits(2)) << 1 != 0;
+}
 
 // The motion in the plane of the contacts that comes nearest to what they owe.
 struct Common {
@@ -72,31 +77,31 @@ struct Common {
 
 // owed: [contacts,3]
 Common common_motion(const StepContext &step, const double *owed, uint32_t first, uint32_t end) {
-  Common out;
+  uint32_t n = 0;
+  Vec3 center, axis, way;
   const auto each = [&](auto &&f) {
     for (uint32_t i = first; i < end; ++i)
       if (const double *const e = owed + 3 * size_t{i}; any(e)) f(i, load3(step.contacts[i].point), load3(e));
   };
   each([&](uint32_t i, Vec3 x, Vec3 e) {
-    ++out.n;
-    out.center += x;
-    out.axis += load3(&step.rows.frame[size_t{9} * i]);
-    out.way += e;
+    ++n;
+    center += x;
+    axis += load3(&step.rows.frame[size_t{9} * i]);
+    way += e;
   });
-  if (out.n == 0) return out;
-  const double size = norm(out.axis);
-  out.center = (1.0 / out.n) * out.center;
-  out.way = (1.0 / out.n) * out.way;
-  if (!(size > 0)) return out;
-  out.axis = (1 / size) * out.axis;
+  if (n == 0) return {};
+  const double size = norm(axis);
+  center = (1.0 / n) * center;
+  way = (1.0 / n) * way;
+  if (!(size > 0)) return {n, center, axis, way, 0};
+  axis = (1 / size) * axis;
   double along = 0, all = 0;
   each([&](uint32_t, Vec3 x, Vec3 e) {
-    const Vec3 r = cross(out.axis, x - out.center);
+    const Vec3 r = cross(axis, x - center);
     along += dot(r, e);
     all += dot(r, r);
   });
-  if (all > 0) out.turn = along / all;
-  return out;
+  return {n, center, axis, way, all > 0 ? along / all : 0};
 }
 
 Vec3 at_most(double most, Vec3 v) {
@@ -106,37 +111,49 @@ Vec3 at_most(double most, Vec3 v) {
 
 }  // namespace
 
+void reset_owed(const World &w, StepContext &step) {
+  const size_t n = holds_places(w) ? step.contacts.size() : 0;
+  step.asked_back.resize(2 * n);
+  step.owed.assign(3 * n, 0.0);
+}
+
 // Bodies that revise, and cut faces, have contacts with slips that no impulse removes, which the solve allows
 // (contact/redundant.h): these would be owed for ever.
 void ask_slip_back(const World &w, StepContext &step, SolveIsland &own) {
   own.owes = false;
-  if (own.revises || !holds_places(w)) return;
-  const double rate = kShare / step.guard.planned;
-  double *const owed = step.owed.data();
+  if (own.revises || step.owed.empty()) return;
+  double *const owed = step.owed.data(), *const asked = step.asked_back.data();
+  bool owes = false;
   each_row(own.part.contacts, [&](uint32_t i) {
     const uint32_t m = step.match[i];
     if (m == kNone || w.store.law[m] != step.state.law[i]) return;
     const double *const e = &w.store.owed[3 * size_t{m}];
-    std::copy_n(e, 3, owed + 3 * size_t{i});
-    own.owes = own.owes || any(e);
+    store3(owed + 3 * size_t{i}, load3(e));
+    owes = owes || any(e);
   });
-  if (!own.owes) return;
+  own.owes = owes;
+  if (!owes) return;
+  const double rate = kShare / step.guard.planned;
   each_pair(step, own.part, [&](uint32_t first, uint32_t end) {
     const Common common = common_motion(step, owed, first, end);
-    if (common.n == 0) return;
+    if (common.n == 0) {
+      std::fill(asked + 2 * size_t{first}, asked + 2 * size_t{end}, 0.0);
+      return;
+    }
     for (uint32_t i = first; i < end; ++i) {
       double *const e = owed + 3 * size_t{i};
       const double r = own.tolerance.tangent[i];
       const Vec3 with = common.at(load3(step.contacts[i].point));
       if (!any(e)) {
         store3(e, with);
+        asked[2 * size_t{i}] = asked[2 * size_t{i} + 1] = 0;
         continue;
       }
       const Vec3 back =
           at_most(kMostCommon * r, rate * with) + at_most(kMostOwn * r, rate * (load3(e) - with));
       for (size_t k = 0; k < 2; ++k) {
         const double along = dot(load3(&step.rows.frame[size_t{9} * i + 3 + 3 * k]), back);
-        step.asked_back[2 * size_t{i} + k] = along;
+        asked[2 * size_t{i} + k] = along;
         step.rows.drive[3 * size_t{i} + 1 + k] -= along;
       }
     }
@@ -153,7 +170,7 @@ void restore_drive(StepContext &step, const SolveIsland &own) {
 
 // What goes beyond the tolerance is a slide: the contact sticks where it has come to.
 void find_owed(const World &w, StepContext &step) {
-  if (!holds_places(w)) return;
+  if (step.owed.empty()) return;
   ContactState &s = step.state;
   const uint8_t *const cut = step.solve_islands->of_cuts();
   for (const SolveIsland &own : step.solve_islands->all()) {

@@ -7,6 +7,8 @@ struct SolveIsland;
 struct StepContext;
 struct World;
 
+// Before the solves: nothing is owed yet. Without laws that hold places StepContext::owed is empty.
+void reset_owed(const World &w, StepContext &step);
 // Once the tolerances of an island are known: part of what its contacts owe is added to the slip that the
 // solve makes zero.
 void ask_slip_back(const World &w, StepContext &step, SolveIsland &own);
