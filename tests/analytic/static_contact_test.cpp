@@ -350,6 +350,46 @@ TEST(StaticContact, TrayThatMoves_CarriesTheCube) {
   }
 }
 
+// The foot of the sphere on a face moves by more than the corner that gives way under it. Without friction
+// nothing else holds the contact there, and the path to it does not matter.
+TEST(StaticContact, SphereInAHeldBlock_IsFoundOnAnyPath) {
+  for (const char *model : {"linear_fem", "corotational_fem", "msm"}) {
+    double first = 0;
+    for (const uint32_t load_steps : {1u, 5u}) {
+      test::Context context;
+      const dfm_world w = offset_world(context, {0, 0, 0});
+      const dfm_body b =
+          test::make_body(context, w, "beam", {0.2, 0.2, 0.1}, 4000, cube("block", 1e5, 0, model));
+      hold(b, 0, 7);
+      const auto start = test::measure(b);
+      const double depth = 4e-3, radius = 0.05;
+      dfm_pose_key keys[2] = {};
+      for (dfm_pose_key &key : keys)
+        key.pose = {{start.com[0], start.com[1], 0.1 + radius + 5e-4}, {0, 0, 0, 1}};
+      keys[1].t = 1;
+      keys[1].pose.position[2] = 0.1 + radius - depth;
+      dfm_obstacle_def d = dfm_obstacle_def_default();
+      d.shape = DFM_SHAPE_SPHERE;
+      d.radius = radius;
+      d.nkey = 2;
+      d.keys = keys;
+      dfm_obstacle ball = 0;
+      test::ok(dfm_obstacle_create(w, &d, &ball));
+      test::set_friction(w, 0, "none");
+      dfm_equilibrium_info info{};
+      info.size = sizeof info;
+      ASSERT_EQ(find(w, 1, load_steps, &info), DFM_OK) << model << ": " << dfm_last_error();
+      EXPECT_LE(info.residual, 1e-6);
+      EXPECT_LT(info.iterations, 50 * load_steps);
+      const double force = -pair_of(w, b, ball).force[2];
+      if (load_steps == 1) first = force;
+      // contacts may be off by 0.01 of the rest distance, 1.3e-4 of the depth
+      EXPECT_NEAR(force / first, 1, 3e-4) << model;
+      dfm_world_destroy(w);
+    }
+  }
+}
+
 // Rows of squeezed_ball_fe, which are a converged linear solution with contact.
 TEST(StaticContact, BallBetweenPlates_TakesTheForceOfTheReference) {
   if (test::shared_dir().empty()) GTEST_SKIP() << "../shared is absent";

@@ -70,7 +70,9 @@ class ImplicitPoints : public Dynamics {
   Array<double> softness_;  // [npoint] N/m, stiffness of loads; empty: none
 
   bool solve(const Array<double> &b, Array<double> &x);
-  double largest_diagonal() const;  // kg, of A
+  double largest_diagonal() const;             // kg, of A
+  double own_stiffness(uint32_t point) const;  // N/m, largest diagonal entry of the model's, in the present A
+  void softness_changed() { factor_h_ = 0; }   // A is made again
   // v_free: Newton's first correction of the velocities at the start, as a whole
   bool take_first_way(const SubStep &now);
   // adds scale times the impulses at the surfels [nsurfel,3] to the free points [npoint,3]

@@ -1,6 +1,7 @@
 #include "dynamics/settling_points.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace dfm {
 
@@ -8,16 +9,36 @@ SettlingPoints::SettlingPoints(const Memory &memory, Phyxels &points, Surface &s
                                const ImplicitOptions &options, const std::vector<double> &softness,
                                double error)
     : ImplicitPoints(memory, points, surface, model, options), error_allowed_(error) {
-  use_memory(memory, softness_, last_, next_, guess_, surfels_, load_, impulse_, taken_);
+  use_memory(memory, softness_, last_, next_, guess_, surfels_, load_, impulse_, taken_, springs_of_loads_,
+             own_);
   for (Array<double> *a : {&last_, &next_, &impulse_, &taken_}) a->assign(size_t{3} * points.n, 0.0);
   guess_.assign(size_t{kStride} * points.n, 0.0);
   surfels_.assign(size_t{kStride} * surface.nsurfel, 0.0);
   softness_.assign(softness.begin(), softness.end());
+  springs_of_loads_ = softness_;
+  own_.assign(points.n, 0.0);
 }
 
 void SettlingPoints::start_from(const double *surfel_impulse, double h) {
   std::fill(last_.begin(), last_.end(), 0.0);
   if (h > 0) spread_impulses(surfel_impulse, 1 / h, last_);
+}
+
+void SettlingPoints::slow_touched(double times) {
+  if (times == 0 && slowed_ == 0) return;
+  if (times == 0) std::fill(own_.begin(), own_.end(), 0.0);
+  else
+    for (uint32_t i = 0; i < p_.n; ++i) {
+      const double *const push = &last_[size_t{3} * i];
+      if (own_[i] == 0 && (push[0] != 0 || push[1] != 0 || push[2] != 0)) own_[i] = own_stiffness(i);
+    }
+  slowed_ = times;
+  bool changed = false;
+  for (uint32_t i = 0; i < p_.n; ++i) {
+    const double before = std::exchange(softness_[i], springs_of_loads_[i] + times * own_[i]);
+    changed = changed || softness_[i] != before;
+  }
+  if (changed) softness_changed();
 }
 
 // The scheme is stable at any step, also with loads that depend on positions.

@@ -47,7 +47,11 @@ constexpr uint32_t kSteps = 500;  // of a round
 constexpr uint32_t kWaits = 50;   // steps to wait for rest before keys advance
 constexpr uint32_t kRounds = 4;   // of relaxation
 constexpr uint32_t kRefused = 8;  // consecutive failed steps
-constexpr double kAway = 10;      // of its size: a body in contact that has moved so far keeps sliding
+// A body whose step goes back by more than this share of the step before is slowed where it is touched; if it
+// goes on by more than that, it is slowed less, by this factor. Limit on the share that counts.
+constexpr double kOvershoots = 0.5, kSpeedsUp = 0.5, kMostOvershoot = 2;
+constexpr double kMostSlowed = 1e3;
+constexpr double kAway = 10;  // of its size: a body in contact that has moved so far keeps sliding
 
 struct Station { double time, share; };
 
@@ -122,6 +126,8 @@ class Settling {
     double net = 0, all = 0;     // N, sum of external forces, sum of their norms
     double pull = 0;             // m/s2, acceleration by this sum
     bool touches = false;
+    std::vector<double> way{}, way_before{};  // [npoint,4] m, of the last two steps; empty: unknown
+    double slowed = 0;                        // SettlingPoints::slow_touched
   };
 
   One make(Body &b) const {
@@ -171,6 +177,9 @@ class Settling {
       set_loads(*one.body, w_.prescribed.at(w_.time), to.share);
       one.reach = one.edge;
       one.slid = 0;
+      one.slowed = 0;
+      one.points->slow_touched(0);
+      one.way.clear();
     }
     for (uint32_t round = 0;; ++round) {
       const uint32_t steps = come_to_rest(to);
@@ -220,6 +229,8 @@ class Settling {
         one.slid = there && one.touches ? one.slid + one.moved : 0;
         rests = rests && one.moved <= kMoves * one.size && balanced(one);
       }
+      if (there)
+        for (One &one : bodies_) slow_overshoot(one, whole);
       if (rests && there) return steps;
       goes_on = goes_on || rests || ++before == kWaits;
       // sweeps of additional solves by the guard count too; many sweeps that converge are no reason to shrink
@@ -227,6 +238,31 @@ class Settling {
       longest = easy ? std::min(kLongest, 2 * h) : fair ? h : 0.5 * h;
       if (there) check_progress(steps, h);
     }
+  }
+
+  // Each step solves for the impulses of contacts whose places and normals are those before it. Where a body
+  // gives way, they turn: the foot of a sphere on a face moves away from the corner that it has pressed down.
+  // If its next place overshoots by more than it was off, long steps go to and fro for ever. They converge if
+  // the touched points go only a part of the way, 1 / (1 + slowed):
+  // doc/decisions/0491-contacts-that-overshoot.md. overshoot: the factor between the ways of the last two
+  // steps, if they are opposite.
+  void slow_overshoot(One &one, bool whole) {
+    one.way_before.swap(one.way);
+    if (!whole) return one.way.clear();
+    const Array<double> &x = one.body->p.x;
+    one.way.resize(x.size());
+    for (size_t at = 0; at < x.size(); ++at) one.way[at] = x[at] - one.last[at];
+    if (one.way_before.size() != one.way.size()) return;
+    double both = 0, square = 0;
+    for (size_t at = 0; at < x.size(); ++at) {
+      both += one.way[at] * one.way_before[at];
+      square += one.way_before[at] * one.way_before[at];
+    }
+    const double overshoot = square > 0 ? -both / square : 0;
+    if (overshoot > kOvershoots)
+      one.slowed = std::min(one.slowed + (1 + one.slowed) * std::min(overshoot, kMostOvershoot), kMostSlowed);
+    else if (overshoot < -kOvershoots) one.slowed *= kSpeedsUp;
+    if (one.slowed > 0) one.points->slow_touched(one.slowed);
   }
 
   // Returns false if it failed; the world is then at the end of its last completed part.
@@ -371,12 +407,20 @@ class Settling {
     refuse(*std::max_element(bodies_.begin(), bodies_.end(), worse), steps, h);
   }
 
+  // A body that is held cannot slide away.
+  static const char *advice(const One &one) {
+    const Array<uint8_t> &held = one.body->p.held;
+    const bool hangs = std::any_of(held.begin(), held.end(), [](uint8_t bits) { return bits == 7; });
+    return hangs ? "use more load_steps, or run the world in time with damping (integrator tr_bdf2) until it "
+                   "rests"
+                 : "hold it (fix), raise the friction, or run the world in time";
+  }
+
   [[noreturn]] void refuse(const One &one, uint32_t steps, double h) const {
     fail(DFM_E_DIVERGED,
          "body '%s' finds no rest at %g of the loads: the last of %u steps from rest (%g s) has moved it by "
-         "%g m, and %g N at a point are not balanced (the largest load or reaction is %g N); hold it (fix), "
-         "raise the friction, or run the world in time",
-         one.body->name.c_str(), w_.prescribed.share, steps, h, one.moved, one.left, one.scale);
+         "%g m, and %g N at a point are not balanced (the largest load or reaction is %g N); %s",
+         one.body->name.c_str(), w_.prescribed.share, steps, h, one.moved, one.left, one.scale, advice(one));
   }
 
   // The result becomes the present state; the steps of the search leave no trace.
