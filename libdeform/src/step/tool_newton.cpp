@@ -459,7 +459,7 @@ double ToolTouch::newton_step() {
     add_motion(l.row, x, u);
     add_arc(l, u, true);
     answer_at(l, u, slope);
-    add_slopes(l.row, slope);
+    if (l.now[0] > 0) add_slopes(l.row, slope);
   }
   gather_impulses();
   for (size_t r = 0; r < n; ++r)
