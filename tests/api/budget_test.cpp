@@ -1,6 +1,8 @@
 // What a step may cost: discarded as a whole, cheapened in a known order, stopped from outside.
 #include <atomic>
 #include <chrono>
+#include <cmath>
+#include <ctime>
 #include <thread>
 
 #include "rigid.h"
@@ -250,6 +252,44 @@ TEST(Budget, OfTooLittleTime_DiscardsTheStep) {
   b.set_work(0);
   test::ok(dfm_world_step(b.world, kStep, nullptr));
   EXPECT_EQ(dfm_world_set_budget(b.world, -1, 0), DFM_E_ARG);
+}
+
+// One sub-step of three thrown chains may take most of a second.
+TEST(Budget, OfTimeForChainsThatHitAFloor_EndsTheStepSoon) {
+  test::Context c;
+  const dfm_world w = test::make_world(c, {0, 0, -9.81});
+  test::set_friction(w, 0.4, "coulomb");
+  test::add_plane(w, "floor");
+  for (uint32_t s = 0; s < 3; ++s) {
+    std::vector<dfm_rigid_def> links;
+    std::vector<dfm_joint_def> joints;
+    for (uint32_t i = 0; i < 8; ++i) {
+      const double x = 0.1 * i, y = 0.05 * s, z = 0.5 + 0.1 * s;
+      links.push_back(test::box(nullptr, {0.042, 0.012, 0.012}, 0.1 * (1 + i % 3), {x, y, z}));
+      if (i) joints.push_back(test::joint(DFM_JOINT_BALL, i, i - 1, {x - 0.05, y, z}, {0, 1, 0}));
+    }
+    const std::vector<dfm_rigid> chain = test::create(w, links, joints);
+    for (uint32_t i = 0; i < 8; ++i) {
+      dfm_rigid_state state = test::state(chain[i]);
+      state.velocity[1] = std::sin(0.5 * i + s);
+      state.velocity[2] = std::cos(0.7 * i);
+      test::ok(dfm_rigid_set_state(chain[i], &state));
+    }
+  }
+  test::ok(dfm_world_set_budget(w, 0.02, UINT64_MAX));
+  double most = 0;
+  uint64_t discarded = 0;
+  for (int k = 0; k < 40 && discarded < 3; ++k) {
+    const uint64_t before = dfm_world_hash(w);
+    const std::clock_t from = std::clock();  // of this process: others may have the processor
+    const dfm_status status = dfm_world_step(w, 1.0 / 60, nullptr);
+    most = std::max(most, double(std::clock() - from) / CLOCKS_PER_SEC);
+    if (status != DFM_DISCARD) continue;
+    ++discarded;
+    EXPECT_EQ(dfm_world_hash(w), before);
+  }
+  EXPECT_GT(discarded, 0u);
+  EXPECT_LT(most, 0.2);
 }
 
 TEST(Interrupt, BetweenSteps_StopsTheNextOneOnce) {

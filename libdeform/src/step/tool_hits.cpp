@@ -123,9 +123,9 @@ bool ToolTouch::add_hits(const World &w, const StepContext &step) {
   return true;
 }
 
-void ToolTouch::solve_past_hits(const World &w, const StepContext &step) {
+void ToolTouch::solve_past_hits(World &w, StepContext &step) {
   for (uint32_t k = 0;; ++k) {
-    solve();
+    solve(w, step);
     if (k == kMostHits || !add_hits(w, step)) return;
     take_last(w);
   }

@@ -578,7 +578,7 @@ void ToolTouch::sweep_until(double done) {
 
 // Passes over the laws, as for soft bodies (step/solve_islands.cpp). The terms of turning beyond the first
 // order depend on the solution as well, and are updated in each pass.
-void ToolTouch::solve() {
+void ToolTouch::solve(World &w, StepContext &step) {
   double scale = 0;
   for (const Row &row : rows_)
     scale = std::max(
@@ -590,6 +590,7 @@ void ToolTouch::solve() {
   uint32_t revisions = 0;
   for (uint32_t pass = 0; pass < kMostPasses; ++pass) {
     double changed = 0;
+    charge(w, step, 0);  // a pass takes long where joints connect many bodies
     if (pass > 0 && revisions < kMostRevisions && (decide_motors() || press_harder())) {
       ++revisions;
       pass = 0;
@@ -742,7 +743,7 @@ void ToolTouch::set_base(size_t k) {
   }
 }
 
-bool ToolTouch::answer(const World &w, const StepContext &step) {
+bool ToolTouch::answer(World &w, StepContext &step) {
   if (rows_.empty()) return false;
   for (size_t k = 0; k < sides_.size(); ++k) {
     Moved &m = sides_[k];

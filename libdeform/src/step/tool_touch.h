@@ -61,7 +61,7 @@ class ToolTouch {
   void correct();
   // Called when the sets hold the impulses of soft bodies: solves the rows again and adds their impulses.
   // Returns whether these differ from those in the velocities, so that soft bodies must be solved again.
-  bool answer(const World &w, const StepContext &step);
+  bool answer(World &w, StepContext &step);
   // Called where the motors of a set are decided again because of soft bodies: adds the impulses of the rows
   // to set.impulse, and their velocities to set.revised if the motors have changed.
   void add_to_impulses(RigidSet &set) const;
@@ -193,7 +193,7 @@ class ToolTouch {
   double sweep();
   void sweep_until(double done);
   void take_impulses(Array<double> &to) const;
-  void solve();
+  void solve(World &w, StepContext &step);
   Vec3 change_of(const Row &row) const;
   void push_all();
   // tool_newton.cpp
@@ -288,7 +288,7 @@ class ToolTouch {
   Vec3 end_of(const Side &side, Vec3 p) const;
   void find_hits(const Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b);
   bool add_hits(const World &w, const StepContext &step);
-  void solve_past_hits(const World &w, const StepContext &step);
+  void solve_past_hits(World &w, StepContext &step);
   double depth(ToolShape &a, ToolShape &b, bool edges) const;
   void tell_driven(const World &w, const StepContext &step);
   void tell_deep(const World &w, const Pair &pair, double deep, bool driven);
