@@ -11,8 +11,9 @@
 // speed, on lanes side by side, over surfels that nothing has touched before. --series writes t, the force on
 // the first body (N) and the place of the first probe (m) at each millisecond; --against compares with such a
 // file: the largest difference over the largest value. --histogram adds rows to a CSV file: steps by time.
-// --times writes the milliseconds and the units of work of each step, one step a line. Where tools cut, steps
-// that cut, and the step after each of them, which makes its tables anew, are told apart from the others.
+// --times writes for each step a line with its milliseconds, its units of work, whether it is a step that cuts
+// (1) or the one after (2), and the milliseconds of each stage. Where tools cut, steps that cut, and the step
+// after each of them, which makes its tables anew, are told apart from the others.
 #include <time.h>
 
 #include <algorithm>
@@ -61,9 +62,19 @@ struct Run {
   std::vector<uint64_t> work;  // units of each step, which no load of the machine changes
   dfm_world_stats last{};
   std::vector<uint8_t> cut;  // 1: the step has cut; 2: the one before it has
+  std::vector<std::vector<double>> stages;  // s, of each step
   std::vector<Sample> series;
   double contacts = 0;
 };
+
+// s, all stages since the world was made
+std::vector<dfm_stage_time> profile(dfm_world world) {
+  std::vector<dfm_stage_time> out(32);
+  uint32_t n = 0;
+  ok(dfm_world_profile(world, uint32_t(out.size()), out.data(), &n));
+  out.resize(n);
+  return out;
+}
 
 bool has_cut(dfm_world world) {
   static std::vector<dfm_contact_event> events(4096);
@@ -82,6 +93,7 @@ Run run(dfm_scene scene, dfm_world world, double duration, double step, bool pla
   double next = wall_seconds();
   const long steps = std::lround(duration / step), every = std::max(1L, std::lround(1e-3 / step));
   double force[3] = {};
+  std::vector<dfm_stage_time> before = profile(world);
   for (long n = 0; n < steps; ++n) {
     if (paced) {
       next += step;
@@ -92,6 +104,10 @@ Run run(dfm_scene scene, dfm_world world, double duration, double step, bool pla
     ok(dfm_world_step(world, step, nullptr));
     out.seconds.push_back((paced ? wall_seconds() : cpu_seconds()) - at);
     out.cut.push_back(has_cut(world) ? 1 : !out.cut.empty() && out.cut.back() == 1 ? 2 : 0);
+    const std::vector<dfm_stage_time> now = profile(world);
+    out.stages.emplace_back();
+    for (size_t i = 0; i < now.size(); ++i) out.stages.back().push_back(now[i].seconds - before[i].seconds);
+    before = now;
     dfm_pair_impulse pair[16] = {};
     uint32_t pairs = 0;
     ok(dfm_world_pair_impulses(world, 16, pair, &pairs));
@@ -277,11 +293,7 @@ int main(int argc, char **argv) {
   info.size = sizeof info;
   ok(dfm_body_get_info(body, &info));
 
-  dfm_stage_time before[32], after[32];
-  uint32_t stages = 0;
-  ok(dfm_world_profile(world, 32, before, &stages));
   Run found = run(scene, world, duration, step, series || against, paced);
-  ok(dfm_world_profile(world, 32, after, &stages));
   if (series) {
     std::FILE *out = std::fopen(series, "w");
     for (const Sample &s : found.series)
@@ -291,8 +303,12 @@ int main(int argc, char **argv) {
   }
   if (times) {
     std::FILE *out = std::fopen(times, "w");
-    for (size_t n = 0; n < found.seconds.size(); ++n)
-      std::fprintf(out, "%.4f %llu\n", 1e3 * found.seconds[n], (unsigned long long)found.work[n]);
+    for (size_t n = 0; n < found.seconds.size(); ++n) {
+      std::fprintf(out, "%.4f %llu %u", 1e3 * found.seconds[n], (unsigned long long)found.work[n],
+                   unsigned(found.cut[n]));
+      for (const double seconds : found.stages[n]) std::fprintf(out, " %.4f", 1e3 * seconds);
+      std::fprintf(out, "\n");
+    }
     std::fclose(out);
   }
   double error[2] = {NAN, NAN};
@@ -335,9 +351,12 @@ int main(int argc, char **argv) {
     print_kind(found, 2, "after a cut", step);
     print_kind(found, 1, "that cut", step);
   }
-  for (uint32_t i = 0; i < stages; ++i)
-    std::printf("    %-18s %8.4f ms\n", after[i].name,
-                1e3 * (after[i].seconds - before[i].seconds) / double(found.seconds.size()));
+  const std::vector<dfm_stage_time> stages = profile(world);
+  for (size_t i = 0; i < stages.size(); ++i) {
+    double sum = 0;
+    for (const std::vector<double> &of : found.stages) sum += of[i];
+    std::printf("    %-18s %8.4f ms\n", stages[i].name, 1e3 * sum / double(found.seconds.size()));
+  }
   if (histogram) {
     char row[200];
     std::snprintf(row, sizeof row, "%s,%s,%s,%s,%u,%.1f", bench::machine().c_str(), bench::compiler(), commit,

@@ -23,6 +23,7 @@ namespace {
 // that to the next look, and every eighth look evaluates the bound again.
 constexpr uint32_t kBoundEvery = 16;
 constexpr double kLeastStrain = kBoundStrain / 8;
+constexpr uint32_t kMostEstimated = 4;  // sub-steps at an estimated bound
 
 uint32_t inverted_cells(const Body &b) {
   return points_kernels().inverted(b.ncell(), b.tets.data(), b.p.x.data());
@@ -138,6 +139,16 @@ void update_bound(World &w) {
   w.stats.limited_max = std::max(w.stats.limited_max, limited);
   w.bound.strain = strain_of_16(w);
   w.bound.age = age_at_first(w.bound.strain);
+}
+
+bool estimate_bound(World &w, const WorldBound &before, double share, double dt) {
+  const double step = std::min(share, 1.0) * before.step, n = std::ceil(dt / step - 1e-9);
+  if (before.age >= kBoundEvery || !std::isfinite(step) || !(step > 0) || !(n <= kMostEstimated)) return false;
+  w.bound = before;
+  w.bound.step = w.stats.stable_step = step;
+  w.bound.strain = kBoundStrain;  // all that the bound allows for, so the next check evaluates it
+  w.bound.age = std::max(before.age, kBoundEvery - static_cast<uint32_t>(n));
+  return true;
 }
 
 }  // namespace dfm

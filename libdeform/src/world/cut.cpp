@@ -238,12 +238,12 @@ std::unique_ptr<MadeShape> make_opened(const Body &b, const Array<uint64_t> &fac
   return make_shape(b, std::move(mesh), std::move(open.whole), &due);
 }
 
-void put_opened(Body &b, MadeShape &made) {
+std::unique_ptr<BodyShape> put_opened(Body &b, MadeShape &made) {
   const OnBehalf speaks(b.name);
   prepare(*b.world);
   check_may_cut(b, b.model);
   const HostWork work(b);
-  put(b, made, true);
+  return put(b, made, true);
 }
 
 CutReport remove_cells(Body &b, const Array<uint8_t> &removed) {

@@ -8,6 +8,7 @@
 
 namespace dfm {
 
+struct BodyShape;
 struct MadeShape;
 
 struct CutReport {
@@ -42,7 +43,7 @@ CutReport open_faces(Body &b, const Array<uint64_t> &faces);
 // The same in two calls (world/cut_ahead.h), with faces between cells of the whole body. The first reads only
 // what steps do not change; the body must have the same shape in the second. due: s, time of the second.
 std::unique_ptr<MadeShape> make_opened(const Body &b, const Array<uint64_t> &faces, double due);
-void put_opened(Body &b, MadeShape &made);
+std::unique_ptr<BodyShape> put_opened(Body &b, MadeShape &made);
 
 uint32_t present_cell(const Body &b, uint32_t whole);           // kNone: it was removed
 uint64_t face_of_whole(const Body &b, uint32_t i, uint32_t j);  // between present cells

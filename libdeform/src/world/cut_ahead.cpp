@@ -63,6 +63,7 @@ struct CutJob : Aside::Job {
   double due;  // s, when they open: what follows from the time may not follow from when the job runs
   std::unique_ptr<MadeShape> made;
   std::shared_ptr<Body> next;  // the structure that is left
+  std::unique_ptr<BodyShape> before;  // what the body was, once it has been cut; the thread frees it
   std::exception_ptr error;
   std::shared_ptr<ListJob> list;  // of a body that has no lists of itself yet; null: none
 
@@ -132,10 +133,10 @@ void open_faces_of(World &w, Body &b) {
   if (any) {
     std::shared_ptr<CutJob> job = finish(w, b);
     if (job->error) std::rethrow_exception(job->error);
-    put_opened(b, *job->made);
+    job->before = put_opened(b, *job->made);
     job->next->shape = b.shape;
     a.structure = std::move(job->next);
-    if (w.aside) w.aside->drop(std::move(job));  // with the structure before
+    if (w.aside) w.aside->drop(std::move(job));  // with the structure and the shape before
   }
   a.job.reset();
   a.faces.swap(a.later);
@@ -146,10 +147,11 @@ void open_faces_of(World &w, Body &b) {
   if (any) separate_if_asked(b);
 }
 
-// The stable step of the new shape is due before the next step, at the same positions. It takes longer than
-// the exchange, and the next step has the new pairs of the surface to find.
-void look_ahead(World &w) {
-  if (!bound_due(w)) return;
+// The stable step of the new shapes. Evaluating it takes longer than the exchange, and the next step finds the
+// new pairs of the surfaces, so the step after that one evaluates it (doc/decisions/0496). Where there is no
+// estimate, it is evaluated now, at the positions at which the next step begins.
+void give_bound(World &w, const WorldBound &before, double share, double dt) {
+  if (!bound_due(w) || estimate_bound(w, before, share, dt)) return;
   try {
     update_bound(w);
   } catch (...) {
@@ -203,8 +205,16 @@ void open_due(World &w, double dt) {
   std::vector<Body *> due;  // bodies that have cells keep their places; pieces come after
   for (auto &b : w.bodies)
     if (!b->ahead.faces.empty() && w.time + 0.5 * dt > b->ahead.due) due.push_back(b.get());
-  for (Body *const b : due) open_faces_of(w, *b);
-  if (!due.empty()) look_ahead(w);
+  if (due.empty()) return;
+  const WorldBound before = w.bound;
+  const size_t bodies = w.bodies.size();
+  double share = 1;
+  for (Body *const b : due) {
+    const double at_rest = b->integrator.step;
+    open_faces_of(w, *b);
+    share = std::min(share, b->integrator.step / at_rest);
+  }
+  give_bound(w, before, w.bodies.size() == bodies ? share : 0, dt);
 }
 
 void prepare_cuts(World &w) {
