@@ -11,9 +11,9 @@
 // speed, on lanes side by side, over surfels that nothing has touched before. --series writes t, the force on
 // the first body (N) and the place of the first probe (m) at each millisecond; --against compares with such a
 // file: the largest difference over the largest value. --histogram adds rows to a CSV file: steps by time.
-// --times writes for each step a line with its milliseconds, its units of work, whether it is a step that cuts
-// (1) or the one after (2), and the milliseconds of each stage. Where tools cut, steps that cut, and the step
-// after each of them, which makes its tables anew, are told apart from the others.
+// --times writes for each step a line with its milliseconds, its units of work, whether it is a step that
+// cuts (1) or the one after (2), and the milliseconds of each stage. Where tools cut, steps that cut, and the
+// step after each of them, which makes its tables anew, are told apart from the others.
 #include <time.h>
 
 #include <algorithm>
@@ -61,7 +61,7 @@ struct Run {
   std::vector<double> seconds;
   std::vector<uint64_t> work;  // units of each step, which no load of the machine changes
   dfm_world_stats last{};
-  std::vector<uint8_t> cut;  // 1: the step has cut; 2: the one before it has
+  std::vector<uint8_t> cut;                 // 1: the step has cut; 2: the one before it has
   std::vector<std::vector<double>> stages;  // s, of each step
   std::vector<Sample> series;
   double contacts = 0;

@@ -62,7 +62,8 @@ bool stage_commit(World &w, StepContext &step, uint32_t *trouble) {
       Body &b = *w.bodies[i];
       const OnBehalf speaks(b.name);
       b.dynamics->see_ends();
-      if (b.dynamics->see_forces(now)) continue;  // for the work that the way left out would have done
+      if (b.dynamics->see_forces(now))
+        continue;  // for the work over the part of the motion that the guard has left out
       *trouble |= tell_no_forces(w, b);
       return false;
     }

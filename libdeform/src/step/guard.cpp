@@ -39,10 +39,11 @@ namespace {
 
 constexpr uint32_t kSolves = 4, kCuts = 8, kFractions = 40;
 constexpr double kLeastCut = 0.25;
-constexpr double kHardBlow = 0.08, kSoftBlow = 0.05;  // strain: repeated finer above; then at most
+constexpr double kHardBlow = 0.08, kSoftBlow = 0.05;  // strain: above the first a sub-step is repeated finer,
+                                                      // until it is below the second
 constexpr double kFinest = 4;                         // sub-steps that a blow makes of one
 constexpr double kLight = 299792458;                  // m/s
-constexpr double kNoWay = 0.02;                       // of the way of a sub-step: less than this is none
+constexpr double kNoWay = 0.02;                       // of the motion of a sub-step: less counts as none
 constexpr double kSlow = 0.01;  // of d_g: what moves by less needs no closer look at how it does
 
 Guard::Common common_motion(const Surface &s) {

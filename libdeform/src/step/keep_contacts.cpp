@@ -68,7 +68,7 @@ void list_crossings(World &w, StepContext &step) {
     if (c.type_a == 1 && step.next_store.touching[i])
       list.push_back({step.next_store.id_a[i], step.next_store.id_b[i], c.feature_a, c.feature_b});
   }
-  // of pairs of bodies they come so
+  // contacts between bodies are in this order already
   if (!std::is_sorted(list.begin(), list.end())) std::sort(list.begin(), list.end());
 }
 
@@ -84,11 +84,11 @@ bool keeps_velocity(const ContactRows &rows, uint32_t i) {
   return true;
 }
 
-// The impulse that the next sub-step starts from. A solve leaves a velocity within its tolerance. A later one
-// that stops it gives an impulse for that beside the force, once. Started from all of it, the next sub-step
-// would push as far the other way, within tolerance, and so on: what rests would shake at the tolerance for
-// ever. So where a contact sticks at rest half of a change is taken over, and such an impulse dies out
-// (doc/decisions/0326-half-of-a-change-at-rest.md).
+// The impulse that the next sub-step starts from. A solve leaves a velocity within its tolerance. The solve
+// that stops this velocity adds an impulse for it to that of the force, once. If the next sub-step started
+// from the sum, it would give the same velocity with the opposite sign, and so on: a body at rest would
+// oscillate at the tolerance for ever. So a contact that sticks at rest takes over half of a change, and the
+// extra impulse decays (doc/decisions/0326-half-of-a-change-at-rest.md).
 Vec3 next_start(const World &w, const StepContext &step, uint32_t i) {
   const Vec3 l = load3(&step.rows.impulse[size_t(3) * i]);
   const uint32_t m = step.match[i];
@@ -119,7 +119,7 @@ void keep_contact(World &w, StepContext &step, uint32_t i) {
   store3(&to.normal[size_t(3) * i], load3(&step.rows.frame[size_t(9) * i]));
   store3(&to.tangent[size_t(3) * i], load3(&step.rows.frame[size_t(9) * i + 3]));
   store3(&to.impulse[size_t(3) * i], next_start(w, step, i));
-  // its law wrote no more: the rest of the columns belongs to other laws
+  // the law of this contact has `own` values of state; the other columns belong to laws with more
   const uint32_t own = now ? w.pairs.laws[step.state.law[i]]->nstate : 0;
   for (uint32_t s = 0; s < S; ++s)
     to.bristle[size_t(S) * i + s] = s < own ? step.state.bristle_out[size_t(s) * step.state.stride + i] : 0;
@@ -143,7 +143,7 @@ void keep_contact(World &w, StepContext &step, uint32_t i) {
   w.report.mode[i] = step.state.mode[i];
 }
 
-// The contacts in the order of their keys: those that go on, in the order of the store, and what has come.
+// The contacts in the order of their keys: those that go on, in the order of the store, merged with new ones.
 void order_keys(const World &w, StepContext &step) {
   constexpr uint32_t kFew = 16;
   ContactStore &to = step.next_store;

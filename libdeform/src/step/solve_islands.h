@@ -57,7 +57,7 @@ struct SolveIsland {
   double due, due_before;
   double best_due;  // of all passes; its impulses are in StepContext::best_pass
   Spent spent;
-  const LawInstance *bad = nullptr;  // that has failed
+  const LawInstance *bad = nullptr;  // the law that has failed
   std::exception_ptr thrown;
   // of all solves of the sub-step
   bool open = true;  // it is to be solved

@@ -31,8 +31,9 @@ struct RestoredChoice {
 // Updates plan, pair tables, offset and views of the entities; does nothing if nothing has changed. Throws
 // Error.
 void prepare(World &w, const RestoredChoice *restored = nullptr);
-// Second order where the equations are solved: backward Euler takes the swing out of a body within a period
-// at the steps that implicit time is for (doc/decisions/0395-auto-is-of-second-order.md).
+// An integrator of second order where the equations are solved: at the steps that implicit time is for,
+// backward Euler damps the oscillation of a body within one period
+// (doc/decisions/0395-auto-is-of-second-order.md).
 ImplicitOptions implicit_choice(const World &w, const Body &b);
 // After a change of values that no table depends on: loads, motions, gravity, parameters of a model or of
 // a law. The step bound is recomputed, the energy balance restarts, and the next prepare() checks the plan.
@@ -42,7 +43,8 @@ void reopen_integrators(World &w);
 void set_gravity_now(World &w);  // from its keys, at the present time
 dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble);
 
-// The rows of the table: what a stage reads and writes of world and context is listed in step.cpp.
+// The rows of the table in step.cpp that pass to a stage the parts of world and context that it reads and
+// writes; doc/concepts/architecture.md lists these parts.
 namespace row {
 bool motion(World &w, StepContext &step, uint32_t *trouble);
 bool model(World &w, StepContext &step, uint32_t *trouble);
@@ -93,10 +95,11 @@ void keep_rigids(World &w, StepContext &step);  // after the sub-step has succee
 
 // solve.cpp
 void make_rows(World &w, StepContext &step);  // makes rows from contacts, with their stored data
-// To dfm_last_error(): the law failed at this contact, or kNone; null: something is not finite. Which trouble
-// that is.
+// Sets the last error. law: failed at this contact, or kNone; null: a value is not finite. Returns the
+// trouble bit.
 uint32_t tell_failed_solve(World &w, StepContext &step, const LawInstance *law, uint32_t contact);
-// The sentence where the guard has left no way and contact has no answer. Gives the trouble bit.
+// Sets the last error: the guard allows no further motion, and the contact solve has no solution. Returns the
+// trouble bit.
 uint32_t tell_jam(World &w, StepContext &step);
 void reserve_contacts(World &w, StepContext &step);  // memory for keep_contacts()
 // Of lists to which keep_contacts() and keep_rigids() add.

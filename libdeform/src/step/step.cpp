@@ -220,7 +220,7 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
     if (!advance(w, step, rest.next(), rest.goal, rest.last(), trouble)) return DFM_E_DIVERGED;
     pass(w.sizes);
     ++rest.taken;
-    if (step.guard.finer > 1) {  // after a hard blow, also the one that has been taken
+    if (step.guard.finer > 1) {  // after a hard impact: this sub-step was a finer one, too
       rest.again(w.time, (rest.left() + 1) * static_cast<uint32_t>(step.guard.finer) - 1);
       *trouble |= DFM_TROUBLE_SUBSTEPS;
     }
@@ -303,8 +303,8 @@ bool piece(World &w, StepContext &step, uint32_t *trouble) {
     w.stats.unconverged = unconverged;
     view_obstacles(w, step);
   }
-  // What had to be cut for a fast rigid thing is likely to have to be again: the next piece does not begin
-  // with all that is left.
+  // A piece that was shortened for a fast rigid body is likely to be followed by another one: the next piece
+  // begins with twice its length, not with all that is left.
   if (fast || step.guard.piece > 0) step.guard.piece = 2 * step.h;
   w.stats.guard_steps += step.guard.acted;
   step.guard.memory.keep();

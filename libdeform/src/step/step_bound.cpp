@@ -143,7 +143,8 @@ void update_bound(World &w) {
 
 bool estimate_bound(World &w, const WorldBound &before, double share, double dt) {
   const double step = std::min(share, 1.0) * before.step, n = std::ceil(dt / step - 1e-9);
-  if (before.age >= kBoundEvery || !std::isfinite(step) || !(step > 0) || !(n <= kMostEstimated)) return false;
+  if (before.age >= kBoundEvery || !std::isfinite(step) || !(step > 0)) return false;
+  if (!(n <= kMostEstimated)) return false;
   w.bound = before;
   w.bound.step = w.stats.stable_step = step;
   w.bound.strain = kBoundStrain;  // all that the bound allows for, so the next check evaluates it

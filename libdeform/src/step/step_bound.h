@@ -16,9 +16,9 @@ bool bound_is_new(const World &w);  // has it looked since the last sub-step?
 void bound_is_due(World &w);        // the next one does
 void update_bound(World &w);        // w.bound, evaluated again where it may not
 
-// After bodies have been cut: estimates w.bound for the next step, of dt (s), after which it is evaluated. before:
-// w.bound before the cut. share: the bound at rest of the cut bodies over that before. false: no estimate,
-// since the bound before does not hold on, or the next step takes more than a few sub-steps.
+// After bodies have been cut: estimates w.bound for the next step, of dt (s), after which it is evaluated.
+// before: w.bound before the cut. share: the bound at rest of the cut bodies over that before. false: no
+// estimate, since the bound before is due for a check, or the next step takes more than a few sub-steps.
 bool estimate_bound(World &w, const WorldBound &before, double share, double dt);
 
 }  // namespace dfm

@@ -62,7 +62,7 @@ struct CutJob : Aside::Job {
   Array<uint64_t> faces;
   double due;  // s, when they open: what follows from the time may not follow from when the job runs
   std::unique_ptr<MadeShape> made;
-  std::shared_ptr<Body> next;  // the structure that is left
+  std::shared_ptr<Body> next;         // the structure that is left
   std::unique_ptr<BodyShape> before;  // what the body was, once it has been cut; the thread frees it
   std::exception_ptr error;
   std::shared_ptr<ListJob> list;  // of a body that has no lists of itself yet; null: none
@@ -147,9 +147,9 @@ void open_faces_of(World &w, Body &b) {
   if (any) separate_if_asked(b);
 }
 
-// The stable step of the new shapes. Evaluating it takes longer than the exchange, and the next step finds the
-// new pairs of the surfaces, so the step after that one evaluates it (doc/decisions/0496). Where there is no
-// estimate, it is evaluated now, at the positions at which the next step begins.
+// The stable step of the new shapes. Evaluating it takes longer than the exchange, and the next step finds
+// the new pairs of the surfaces, so the step after that one evaluates it (doc/decisions/0496). Where there is
+// no estimate, it is evaluated now, at the positions at which the next step begins.
 void give_bound(World &w, const WorldBound &before, double share, double dt) {
   if (!bound_due(w) || estimate_bound(w, before, share, dt)) return;
   try {
