@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "messages.h"
 
@@ -16,6 +17,7 @@ Drawing::Drawing(const SceneFile &scene, const std::string &color) : scene_(scen
 }
 
 void Drawing::make(const BodyView &body, Buffers &b) {
+  b.of = body.handle;
   b.xyz.resize(3 * size_t(body.nsurfel));
   b.vectors.resize(3 * size_t(body.nsurfel));
   b.scalar.assign(body.nsurfel, 0.f);
@@ -66,12 +68,17 @@ render::Bounds Drawing::place_of_bodies() const {
 void Drawing::add_bodies(render::Scene &out) {
   float top = 0;
   scene_.renew_list();
-  buffers_.resize(std::min(buffers_.size(), scene_.bodies().size()));
-  while (buffers_.size() < scene_.bodies().size()) {  // pieces of a cut
-    const BodyView &body = scene_.bodies()[buffers_.size()];
-    Buffers &b = buffers_.emplace_back();
-    make(body, b);
-    if (color_ == "stress") b.stress.emplace(body, b.xyz);
+  if (!std::ranges::equal(buffers_, scene_.bodies(), {}, &Buffers::of, &BodyView::handle)) {  // cuts
+    std::vector<Buffers> before = std::exchange(buffers_, {});
+    for (const BodyView &body : scene_.bodies()) {
+      if (const auto old = std::ranges::find(before, body.handle, &Buffers::of); old != before.end()) {
+        buffers_.push_back(std::move(*old));
+        continue;
+      }
+      Buffers &b = buffers_.emplace_back();
+      make(body, b);
+      if (color_ == "stress") b.stress.emplace(body, b.xyz);
+    }
   }
   for (size_t i = 0; i < buffers_.size(); ++i) {
     const BodyView &body = scene_.bodies()[i];
@@ -89,7 +96,7 @@ void Drawing::add_bodies(render::Scene &out) {
   scale_ = std::max(scale_, top);
   for (size_t i = 0; i < buffers_.size(); ++i) {
     Buffers &b = buffers_[i];
-    const render::Color own = render::palette(uint32_t(i));
+    const render::Color own = render::palette(scene_.bodies()[i].number);
     render::Surface s;
     s.xyz = b.xyz.data();
     s.n = uint32_t(b.xyz.size() / 3);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <limits>
+#include <numeric>
 
 #include "json_text.h"
 #include "messages.h"
@@ -174,12 +176,16 @@ FileNodes Outputs::file_nodes(size_t b) const {
     throw Failure(kBadInput, "body \"" + body.name + "\" has no mesh file");
   if (mesh.kind == JsonValue::object) {  // made, not read: its points are the body's
     FileNodes own;
+    own.body = body.handle;
+    own.name = body.name;
     for (uint32_t i = 0; i < body.npoint; ++i) own.number.push_back(i);
-    own.start = node_positions(body, own);
+    own.start = node_positions(own);
     return own;
   }
   const std::string path = (fs::path(scene_.path()).parent_path() / mesh.text).string();
   FileNodes out;
+  out.body = body.handle;
+  out.name = body.name;
   dfm_tetmesh cells = 0;
   dfm_trimesh surface = 0;
   need(dfm_mesh_read(scene_.context(), path.c_str(), &cells, &surface));
@@ -199,40 +205,59 @@ FileNodes Outputs::file_nodes(size_t b) const {
     out.number.assign(file_point, file_point + body.npoint);
     dfm_tetmesh_destroy(cells);
   }
-  out.start = node_positions(body, out);
+  out.start = node_positions(out);
   return out;
 }
 
-std::vector<double> Outputs::node_positions(const BodyView &body, const FileNodes &nodes) const {
+// Where the nodes are now, [n,3]: NAN where a cut has taken the node. A cut gives points new numbers, pieces
+// take points along, and of the copies of a point the first one counts.
+std::vector<double> Outputs::node_positions(const FileNodes &nodes) {
+  std::vector<double> out(3 * nodes.number.size(), std::numeric_limits<double>::quiet_NaN());
   uint32_t n = 0;
-  need(nodes.surface ? dfm_surface_positions(body.handle, 0, nullptr, &n)
-                     : dfm_body_get_state(body.handle, 0, nullptr, nullptr, &n));
-  std::vector<double> x(3 * size_t(n));
-  need(nodes.surface ? dfm_surface_positions(body.handle, n, x.data(), &n)
-                     : dfm_body_get_state(body.handle, n, x.data(), nullptr, &n));
-  x.resize(3 * nodes.number.size());  // those of the file; others follow them
-  return x;
+  std::vector<dfm_body> bodies{nodes.body};
+  need(dfm_body_pieces(nodes.body, 0, nullptr, &n));
+  bodies.resize(1 + n);
+  if (n > 0) need(dfm_body_pieces(nodes.body, n, bodies.data() + 1, &n));
+  for (const dfm_body body : bodies) {
+    dfm_body_info info = {};
+    info.size = sizeof info;
+    need(dfm_body_get_info(body, &info));
+    if (info.ntet == 0) continue;
+    const uint32_t points = nodes.surface ? info.nsurfel : info.npoint;
+    std::vector<double> x(3 * size_t(points));
+    std::vector<uint32_t> origins(points);
+    if (nodes.surface) {  // such a body is not cut
+      need(dfm_surface_positions(body, points, x.data(), &n));
+      std::iota(origins.begin(), origins.end(), 0u);
+    } else {
+      need(dfm_body_get_state(body, points, x.data(), nullptr, &n));
+      need(dfm_body_origins(body, points, origins.data(), 0, nullptr));
+    }
+    for (size_t i = 0; i < points; ++i)
+      if (const size_t to = 3 * size_t(origins[i]); to < out.size() && std::isnan(out[to]))
+        std::copy_n(&x[3 * i], 3, &out[to]);  // points behind them are not in the file
+  }
+  return out;
 }
 
 void Outputs::write_nodes() {
   if (nodes_.empty()) return;
   make_folder(folder_ + "/nodes");
-  for (size_t b = 0; b < nodes_.size(); ++b) {
-    const BodyView &body = scene_.bodies()[b];
-    const FileNodes &nodes = nodes_[b];
-    const std::vector<double> now = node_positions(body, nodes);
+  for (const FileNodes &nodes : nodes_) {
+    const std::vector<double> now = node_positions(nodes);
     std::vector<uint32_t> order(nodes.number.size());
     for (uint32_t i = 0; i < order.size(); ++i) order[i] = i;
     std::sort(order.begin(), order.end(),
               [&](uint32_t i, uint32_t j) { return nodes.number[i] < nodes.number[j]; });
     std::string text = "node,ux,uy,uz\n";
     for (const uint32_t i : order) {
+      if (std::isnan(now[3 * size_t(i)])) continue;
       text += std::to_string(nodes.number[i]);
       for (int k = 0; k < 3; ++k)
         text += "," + csv_number(now[3 * size_t(i) + k] - nodes.start[3 * size_t(i) + k]);
       text += "\n";
     }
-    write_whole(folder_ + "/nodes/" + body.name + ".csv", text);
+    write_whole(folder_ + "/nodes/" + nodes.name + ".csv", text);
   }
 }
 

@@ -32,6 +32,8 @@ class Csv {
 // A body's nodes by the numbers of its mesh file; `surface`: they are points of its surface,
 // not of its cells.
 struct FileNodes {
+  dfm_body body = 0;
+  std::string name;
   bool surface = false;
   std::vector<uint32_t> number;
   std::vector<double> start;  // where they were at the start
@@ -47,7 +49,7 @@ class Outputs {
 
  private:
   FileNodes file_nodes(size_t body) const;
-  std::vector<double> node_positions(const BodyView &body, const FileNodes &nodes) const;
+  static std::vector<double> node_positions(const FileNodes &nodes);
   void write_body(double t, uint64_t handle, const std::string &name, const dfm_body_measure &m);
   void write_bodies(double t);
   void write_contacts(double t);

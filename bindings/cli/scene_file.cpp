@@ -1,6 +1,7 @@
 #include "scene_file.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "costs_file.h"
 #include "messages.h"
@@ -97,21 +98,26 @@ SceneFile::SceneFile(const Globals &globals, const std::string &path, const std:
 void SceneFile::renew_list() const {
   uint32_t n = 0;
   need(dfm_world_bodies(world_, 0, nullptr, &n));
-  if (n == bodies_.size()) return;
-  std::vector<dfm_body> handles(n);
-  need(dfm_world_bodies(world_, n, handles.data(), &n));
-  const bool pieces = !bodies_.empty();  // a scene has all other bodies from the start
-  bodies_.resize(std::min(bodies_.size(), handles.size()));
-  for (size_t at = bodies_.size(); at < handles.size(); ++at) {
+  handles_.resize(n);
+  if (n > 0) need(dfm_world_bodies(world_, n, handles_.data(), &n));
+  if (std::ranges::equal(handles_, bodies_, {}, {}, &BodyView::handle)) return;
+  const bool pieces = !names_.empty();  // a scene has all other bodies from the start
+  std::vector<BodyView> before = std::exchange(bodies_, {});
+  for (const dfm_body handle : handles_) {
+    if (const auto old = std::ranges::find(before, handle, &BodyView::handle); old != before.end()) {
+      bodies_.push_back(std::move(*old));
+      continue;
+    }
     dfm_body_info info = {};
     info.size = sizeof info;
-    need(dfm_body_get_info(handles[at], &info));
+    need(dfm_body_get_info(handle, &info));
     BodyView body;
-    body.handle = handles[at];
+    body.handle = handle;
     body.name = info.name;
     body.model = info.model;
     read_shape(info, body);
     body.cut = body.cut || pieces;
+    body.number = numbers_.try_emplace(handle, uint32_t(numbers_.size())).first->second;
     names_[body.handle] = body.name;
     bodies_.push_back(std::move(body));
   }

@@ -12,6 +12,7 @@ namespace cli {
 struct BodyView {
   dfm_body handle = 0;
   std::string name, model;
+  uint32_t number = 0;  // in the order in which bodies have come; it stays the same throughout a run
   uint32_t npoint = 0, ntet = 0, nsurfel = 0;
   double rest_volume = 0;
   bool cut = false;                 // it has been cut, or is a piece that came off
@@ -45,8 +46,8 @@ class SceneFile {
   const std::string &path() const { return path_; }
   const dfm_scene_settings &settings() const { return settings_; }
   const std::vector<BodyView> &bodies() const { return bodies_; }
-  // Lists the bodies of the world again if their number has changed: pieces of a cut come behind the bodies
-  // of the scene, and are gone after an earlier state has been restored. Cheap enough for every step.
+  // Lists the bodies of the world again if others are there: pieces of a cut come, bodies of which a cut has
+  // taken all cells go, and a restored state brings the bodies that it has. Cheap enough for every step.
   void renew_list() const;
   // Reads points, cells and surface of a body again if a tear has changed them.
   void renew(size_t body) const;
@@ -66,6 +67,8 @@ class SceneFile {
   std::vector<ObstacleView> obstacles_;
   std::vector<RigidView> rigids_;
   mutable std::map<uint64_t, std::string> names_;
+  mutable std::map<uint64_t, uint32_t> numbers_;
+  mutable std::vector<dfm_body> handles_;
 };
 
 }  // namespace cli

@@ -497,6 +497,92 @@ TEST(CutScene, Explain_NamesTheCut) {
   EXPECT_NE(r.out.find("cut at 0.005 s by a plane, which opens faces"), std::string::npos) << r.out;
 }
 
+namespace {
+
+// Where each probe is, in the order of the scene.
+std::vector<std::array<double, 3>> probes(dfm_scene s, uint32_t n) {
+  std::vector<std::array<double, 3>> out(n);
+  for (uint32_t i = 0; i < n; ++i) test::ok(dfm_scene_probe(s, i, nullptr, out[i].data(), nullptr));
+  return out;
+}
+
+size_t rows(const std::string &table, const std::string &word) {
+  size_t n = 0;
+  for (size_t at = 0; (at = table.find(word, at)) != std::string::npos; ++at) ++n;
+  return n;
+}
+
+// A bar without forces, 0.2 m long, with probes in it 1 cm from both ends, and a second body.
+std::string bar(const std::string &cuts, const std::string &more = "") {
+  return R"({"format": "deform-scene", "version": 1, "gravity": [0, 0, 0],
+    "time": {"duration": 0.02, "step": 0.001},
+    "bodies": [{"name": "bar", "mesh": {"make": "beam", "size": [0.2, 0.02, 0.02], "cells": 300})" +
+         more + R"(}, {"name": "rest", "mesh": {"make": "ball", "radius": 0.01, "cells": 60},
+      "pose": {"position": [0, 1, 0]}}],
+    "probes": [{"name": "near", "body": "bar", "point": [0.01, 0.01, 0.01]},
+               {"name": "far", "body": "bar", "point": [0.19, 0.01, 0.01]},
+               {"name": "rest", "body": "rest", "point": [0, 0, 0]}],
+    "output": {"every": 0.01, "nodes": true, "states": true},
+    "cuts": [)" +
+         cuts + "]}";
+}
+
+constexpr char kHalf[] = R"({"body": "bar", "t": 0.005, "shape": "box", "half_size": [0.05, 0.1, 0.1],
+  "pose": {"position": [0.04, 0, 0]}})";
+constexpr char kAll[] = R"({"body": "bar", "t": 0.005, "shape": "sphere", "radius": 0.5})";
+constexpr char kAcrossBar[] =
+    R"({"body": "bar", "t": 0.002, "shape": "plane", "point": [0.1, 0, 0], "normal": [1, 0, 0]})";
+
+}  // namespace
+
+// Nothing moves, so each probe stays where it was or is gone with its cell.
+TEST(CutScene, Probe_FollowsItsCell) {
+  const std::string parted = std::string(kAcrossBar) + ", " + kHalf,
+                    taken = std::string(kAcrossBar) + ", " + kAll;
+  const struct {
+    std::string cuts, more;
+    bool near, far;
+  } cases[] = {{kHalf, "", false, true},
+               {kAcrossBar, "", true, true},
+               {kAcrossBar, R"(, "separate": {})", true, true},
+               {parted, R"(, "separate": {})", false, true},
+               {taken, R"(, "separate": {})", false, false},
+               {kAll, "", false, false}};
+  for (const auto &c : cases) {
+    const Opened s(written(bar(c.cuts, c.more)));
+    ASSERT_EQ(s.status, DFM_OK) << dfm_last_error();
+    const auto before = probes(s.scene, 3);
+    test::run(s.world, 0.01, 1e-3);
+    const auto now = probes(s.scene, 3);
+    const bool there[] = {c.near, c.far, true};
+    for (size_t i = 0; i < 3; ++i)
+      for (size_t k = 0; k < 3; ++k) {
+        if (there[i]) EXPECT_NEAR(now[i][k], before[i][k], 1e-12) << c.cuts << c.more << i;
+        else EXPECT_TRUE(std::isnan(now[i][k])) << c.cuts << c.more << i;
+      }
+  }
+}
+
+TEST(CutScene, BodyWithoutCells_TheRunGoesOn) {
+  for (const char *cut : {kAll, kHalf}) {
+    const std::string out = folder() + "/all gone";
+    const test::CommandResult r = test::deform({"run", written(bar(cut)), "--out", out});
+    EXPECT_EQ(r.exit_code, 0) << r.err;
+    EXPECT_NE(r.out.find("\nrest "), std::string::npos) << r.out;
+    const std::string bodies = test::read_file(out + "/bodies.csv");
+    EXPECT_EQ(rows(bodies, ",rest,"), 3u) << bodies;
+    EXPECT_EQ(rows(bodies, ",bar,"), cut == kHalf ? 3u : 1u) << bodies;
+    // rows of the nodes that are left, none of which has moved
+    const std::string nodes = test::read_file(out + "/nodes/bar.csv");
+    for (size_t at = nodes.find('\n') + 1; at < nodes.size(); at = nodes.find('\n', at) + 1) {
+      double u[3];
+      ASSERT_EQ(std::sscanf(&nodes[at], "%*u,%lf,%lf,%lf", u, u + 1, u + 2), 3) << &nodes[at];
+      for (const double x : u) EXPECT_NEAR(x, 0, 1e-12) << nodes;
+    }
+    EXPECT_EQ(rows(nodes, "\n") > 1, cut == kHalf) << nodes;
+  }
+}
+
 // Recorded and replayed, and continued from states before, between and after the cuts: the same bits.
 TEST(CutScene, RunThatCuts_IsReplayedAndContinuedToTheBit) {
   const std::string dir = folder(), path = dir + "/a scene.json";

@@ -61,6 +61,25 @@ class Scenes(unittest.TestCase):
                 np.testing.assert_array_equal(run.probe(name)[-1], position)
                 self.assertEqual((run.probe(name).shape, velocity.shape), ((3, 3), (3,)))
 
+    def test_body_that_is_cut_away(self):
+        scene = {"format": "deform-scene", "version": 1, "gravity": [0, 0, 0],
+                 "time": {"duration": 0.004, "step": 0.001},
+                 "bodies": [{"name": name, "mesh": {"make": "ball", "radius": 0.01, "cells": 60},
+                             "pose": {"position": [0, y, 0]}} for name, y in (("first", 0), ("second", 1))],
+                 "probes": [{"name": name, "body": name, "point": [0, 0, 0]} for name in ("first", "second")],
+                 "cuts": [{"body": "first", "t": 0.002, "shape": "sphere", "radius": 0.5}]}
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "cut.json"
+            path.write_text(json.dumps(scene))
+            run = deform.run(path, every=0.001)
+        there = [True, True, False, False, False]
+        self.assertEqual([len(frame.positions["first"]) > 0 for frame in run.frames], there)
+        self.assertEqual([len(frame.triangles["first"]) > 0 for frame in run.frames], there)
+        self.assertEqual(len(run.positions("second")), 5)
+        self.assertEqual(np.isnan(run.probe("first")).all(axis=1).tolist(), [not t for t in there])
+        np.testing.assert_allclose(run.probe("second"), np.tile([0, 1, 0], (5, 1)), atol=1e-9)
+        self.assertEqual(run.picture(-1).rgb.shape[2], 3)
+
     def test_errors_name_their_place(self):
         with self.assertRaisesRegex(deform.FileError, "nowhere.json"):
             deform.run("nowhere.json")

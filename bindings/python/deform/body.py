@@ -133,12 +133,12 @@ def cut_def(shape: str, corners: Any, point: Any, normal: Any, position: Any, ro
     return out
 
 
-def numbers_of(points: Any) -> np.ndarray:
-    """Numbers of points as the library takes them."""
-    given = np.atleast_1d(np.asarray(points))
+def numbers_of(numbers: Any, what: str = "points") -> np.ndarray:
+    """Numbers of points, or of `what`, as the library takes them."""
+    given = np.atleast_1d(np.asarray(numbers))
     if given.ndim != 1 or (given.size and (given.dtype.kind not in "iu" or given.min() < 0)):
-        raise ArgumentError("points must be a list of whole numbers from 0 on, numbers of points of the body",
-                            "DFM_E_ARG")
+        raise ArgumentError(f"{what} must be a list of whole numbers from 0 on, numbers of {what} of the "
+                            "body", "DFM_E_ARG")
     return np.ascontiguousarray(given, dtype=np.uint32)
 
 
@@ -532,7 +532,7 @@ class Body(_Part):
 
     def remove_cells(self, cells: Any) -> CutInfo:
         """Takes cells away by their numbers [n], between two steps."""
-        numbers, info = numbers_of(cells), sized(_abi.dfm_cut_info)
+        numbers, info = numbers_of(cells, "cells"), sized(_abi.dfm_cut_info)
         with self.world.alone():
             status = lib.dfm_body_remove_cells(self.handle, numbers.size, numbers.ctypes.data,
                                                ctypes.byref(info))

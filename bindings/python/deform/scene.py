@@ -92,7 +92,7 @@ class Scene(OfThisProcess):
 
     @property
     def probes(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-        """Position [3] m and velocity [3] m/s of each probe, by name."""
+        """Position [3] m and velocity [3] m/s of each probe, by name; nan once a cut has taken its cell."""
         out = sized(_abi.dfm_scene_settings)
         check(quick.dfm_scene_get_settings(self.handle, ctypes.byref(out)))
         found = {}
@@ -162,25 +162,24 @@ class Run:
         return run
 
     def add(self, probes: Mapping[str, np.ndarray] | None = None) -> None:
-        """Records the world as it is now. Bodies that were made since are left out."""
+        """Records the world as it is now. Bodies that were made since are left out; a body that is gone, or
+        of which a cut has taken all cells, has no surface."""
         world = self.world
         bodies = {body.name: body for body in world.bodies if body.name in self.triangles}
-        missing = [name for name in self.triangles if name not in bodies]
-        if missing:
-            raise ArgumentError(f"body '{missing[0]}' is gone: begin another film", "DFM_E_ARG")
         stats = world.stats
         self.steps = int(stats.steps)
         self.frames.append(Frame(
-            world.time, {name: bodies[name].positions.astype(np.float32) for name in self.triangles},
-            {name: body_values(bodies[name], self.color) for name in self.triangles}, solids(world),
-            dict(probes or {}), int(stats.contacts), int(stats.sticking),
-            {name: self._surface(body) for name, body in bodies.items()}))
+            world.time, {name: bodies[name].positions.astype(np.float32) if name in bodies
+                         else np.empty((0, 3), np.float32) for name in self.triangles},
+            {name: body_values(bodies[name], self.color) if name in bodies else None
+             for name in self.triangles}, solids(world), dict(probes or {}), int(stats.contacts),
+            int(stats.sticking), {name: self._surface(name, bodies.get(name)) for name in self.triangles}))
 
-    def _surface(self, body: Any) -> np.ndarray:
+    def _surface(self, name: str, body: Any) -> np.ndarray:
         """Triangles now: those of the frame before where no cut has changed them."""
         last = self.frames[-1].triangles if self.frames else self.triangles
-        now = body.triangles
-        return last[body.name] if np.array_equal(last[body.name], now) else now.copy()
+        now = np.empty((0, 3), np.uint32) if body is None else body.triangles
+        return last[name] if np.array_equal(last[name], now) else now.copy()
 
     @property
     def times(self) -> np.ndarray:

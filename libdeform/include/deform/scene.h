@@ -46,7 +46,7 @@ typedef struct dfm_scene_settings {
 /** @return DFM_OK; DFM_E_HANDLE. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_scene_get_settings(dfm_scene scene, dfm_scene_settings *out);
 /** Position, m, and velocity, m/s, of a probe: fixed weights on the points of the cell (or nearest cell) that
- * contained its point at rest.
+ * contained its point at rest; NaN once a cut has taken the cell.
  * @param probe 0 .. nprobe - 1. @return DFM_OK; DFM_E_ARG no such probe; DFM_E_HANDLE.
  * Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_scene_probe(dfm_scene scene, uint32_t probe, const char **name, double position[3],

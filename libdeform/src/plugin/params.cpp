@@ -16,8 +16,9 @@ std::string range_of(const dfm_param &row) {
     for (const char *const *n = row.names; n && *n; ++n) names.push_back(*n);
     return "one of " + join(names);
   }
-  return format("%s in [%g, %g] %s", row.flags & DFM_PARAM_INTEGER ? "a whole number" : "a number", row.min,
-                row.max, std::strcmp(row.unit, "1") == 0 ? "" : row.unit);
+  const char *const kind = row.flags & DFM_PARAM_INTEGER ? "a whole number" : "a number";
+  const std::string range = format("%s in [%g, %g]", kind, row.min, row.max);
+  return std::strcmp(row.unit, "1") == 0 ? range : range + " " + row.unit;
 }
 
 std::vector<std::string> keys_of(const dfm_type &type) {
@@ -63,7 +64,7 @@ void check_value(const dfm_type &type, const dfm_param &row, const dfm_param_val
     const double x = value.value[k];
     const bool whole = !(row.flags & (DFM_PARAM_INTEGER | DFM_PARAM_ENUM)) || x == std::floor(x);
     if (!(x >= row.min && x <= row.max) || !whole)
-      fail(DFM_E_ARG, "%s: parameter \"%s\" is %g, %s expected", type.id, value.key, x,
+      fail(DFM_E_ARG, "%s: parameter \"%s\" is %g; expected %s", type.id, value.key, x,
            range_of(row).c_str());
   }
 }

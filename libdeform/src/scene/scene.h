@@ -11,7 +11,8 @@ namespace dfm::scene {
 struct ProbePoint {
   std::string name;
   dfm_body body = 0;
-  uint32_t points[4] = {};
+  uint32_t cell = 0, points[4] = {};  // numbers when the body was made
+  uint32_t npoint = 0, ntet = 0;      // of the body then
   double weights[4] = {};
 };
 
@@ -28,10 +29,12 @@ class Scene {
   const Definition &definition() const { return definition_; }
   size_t probe_count() const { return probes_.size(); }
   const ProbePoint &probe(size_t i) const { return probes_[i]; }
+  // NAN once a cut has taken the probe's cell.
   void probe_state(size_t i, double position[3], double velocity[3]);
   std::string value(const std::string &pointer) const;  // JSON text; throws where nothing is
 
  private:
+  static bool find_cell(const ProbePoint &p, dfm_body body, uint32_t points[4]);
   struct Tree;  // keeps the JSON library out of this header
   dfm_context *context_;
   dfm_world world_ = 0;

@@ -6,6 +6,7 @@
 #include "body/obstacle_mesh.h"
 #include "contact/reach.h"
 #include "core/error.h"
+#include "dynamics/rigid/rigid_set.h"
 #include "plugin/context.h"
 #include "state/world.h"
 #include "step/context.h"
@@ -90,9 +91,10 @@ void warn(const World &w, const Overlap &o) {
       DFM_LOG_WARNING,
       "body '%s' and %s '%s' overlap by %.3g m (%u pairs of triangles cross, %u surface points inside): %s",
       body_of_id(w, o.a)->name.c_str(),
-      !thing         ? "body"
-      : thing->rigid ? "rigid body"
-                     : "obstacle",
+      !thing                  ? "body"
+      : !thing->rigid         ? "obstacle"
+      : thing->rigid->of_tool ? "tool"
+                              : "rigid body",
       name.c_str(), o.depth, o.crossings, o.enclosed,
       o.aside ? "contact between them is off until they are apart; move one of them, or set \"untangle\""
               : "contact pushes them apart slowly; move one of them, or set \"untangle\"");

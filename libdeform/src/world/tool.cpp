@@ -70,6 +70,9 @@ void check_sizes(const dfm_tool_def &d, const char *name) {
   for (const double s : d.half_size)
     if (boxes && !(s > 0 && std::isfinite(s)))
       fail(DFM_E_ARG, "tool '%s': half_size %g m; all three must be positive and finite", name, s);
+  if ((d.shape == DFM_TOOL_SPHERE || d.shape == DFM_TOOL_CAPSULE) &&
+      !(d.radius > 0 && std::isfinite(d.radius)))
+    fail(DFM_E_ARG, "tool '%s': radius %g m; it must be positive and finite", name, d.radius);
   if (!(d.radius >= 0 && std::isfinite(d.radius)) || !(d.half_length >= 0 && std::isfinite(d.half_length)))
     fail(DFM_E_ARG, "tool '%s': radius %g m and half_length %g m must be finite and not negative", name,
          d.radius, d.half_length);
