@@ -162,10 +162,15 @@ class Run:
         return run
 
     def add(self, probes: Mapping[str, np.ndarray] | None = None) -> None:
-        """Records the world as it is now. Bodies that were made since are left out; a body that is gone, or
-        of which a cut has taken all cells, has no surface."""
+        """Records the world as it is now. Bodies that were made since are left out; a body of which a cut has
+        taken all cells has no surface. ArgumentError: a body was removed."""
         world = self.world
         bodies = {body.name: body for body in world.bodies if body.name in self.triangles}
+        for name in self.triangles:
+            handle = ctypes.c_uint64()
+            if name not in bodies and quick.dfm_world_find_body(world.handle, name.encode(),
+                                                                ctypes.byref(handle)) != _abi.DFM_OK:
+                raise ArgumentError(f"body '{name}' is gone: begin another film", "DFM_E_ARG")
         stats = world.stats
         self.steps = int(stats.steps)
         self.frames.append(Frame(
