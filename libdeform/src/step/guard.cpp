@@ -105,6 +105,18 @@ Blow blow_on(const StepContext &step, const Body &b, uint32_t slot) {
   return out;
 }
 
+// Does a contact press on the body of this slot that did not press in the last sub-step?
+bool meets(const World &w, const StepContext &step, uint32_t slot) {
+  for (uint32_t i = 0; i < step.rows.n; ++i) {
+    const ContactPoint &c = step.contacts[i];
+    if (c.slot_a != slot && (c.obstacle || c.slot_b != slot)) continue;
+    if (!(step.rows.impulse[3 * size_t{i}] > 0)) continue;
+    const uint32_t before = step.match[i];
+    if (before == kNone || !w.store.touching[before]) return true;
+  }
+  return false;
+}
+
 // A blow is a change of a point's velocity by contact that strains an edge in this sub-step by more than the
 // bound allows for. It is measured from the velocity at the start, because the support of a resting weight
 // changes only the predicted velocity. After a blow the next sub-step checks the bound. False: this sub-step
@@ -118,6 +130,7 @@ bool withstands_blows(World &w, StepContext &step) {
   double hard = 0;
   for (const uint32_t i : step.active) {
     const Body &b = *w.bodies[i];
+    if (g.change[i] > 0 && gravity_exceeds_bound(w, b) && meets(w, step, i)) check_before_gravity_does(w, b);
     if (!(step.h * g.change[i] > kBoundStrain * b.surface.median_edge)) continue;
     if (!b.dynamics->diagonal() || !std::isfinite(b.bound.found.step)) continue;
     const Blow blow = blow_on(step, b, i);

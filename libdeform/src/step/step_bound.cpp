@@ -103,7 +103,25 @@ uint32_t age_at_first(double strain) {
              : kBoundEvery - static_cast<uint32_t>(std::max(1.0, kBoundEvery * looks));
 }
 
+// Strain of an edge of which one end falls freely for n sub-steps of h while the other is held: the speed
+// after k sub-steps is g h k, the displacement after n of them g h^2 n (n + 1) / 2.
+double strain_of_fall(const World &w, const Body &b, double n) {
+  const double h = w.bound.step;
+  return norm(w.gravity.now) * h * h / b.surface.median_edge * (0.5 * n * (n + 1));
+}
+
 }  // namespace
+
+bool gravity_exceeds_bound(const World &w, const Body &b) {
+  return w.bound.age + 1 < kBoundEvery && b.dynamics->diagonal() && std::isfinite(w.bound.step) &&
+         strain_of_fall(w, b, kBoundEvery - w.bound.age) > kBoundStrain;
+}
+
+void check_before_gravity_does(World &w, const Body &b) {
+  uint32_t n = 1;
+  while (strain_of_fall(w, b, n + 1) <= kBoundStrain) ++n;
+  w.bound.age = std::max(w.bound.age, kBoundEvery - n);
+}
 
 bool bound_due(const World &w) { return w.bound.age >= kBoundEvery; }
 
