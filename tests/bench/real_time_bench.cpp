@@ -11,9 +11,9 @@
 // speed, on lanes side by side, over surfels that nothing has touched before. --series writes t, the force on
 // the first body (N) and the place of the first probe (m) at each millisecond; --against compares with such a
 // file: the largest difference over the largest value. --histogram adds rows to a CSV file: steps by time.
-// --times writes for each step a line with its milliseconds, its units of work, whether it is a step that
-// cuts (1) or the one after (2), and the milliseconds of each stage. Where tools cut, steps that cut, and the
-// step after each of them, which makes its tables anew, are told apart from the others.
+// --times writes a line of names, and then for each step its milliseconds, its units of work, whether it cuts
+// (1) or follows one that does (2), and the milliseconds of each stage. Where tools cut, steps that cut, and
+// the step after each of them, which makes its tables anew, are told apart from the others.
 #include <time.h>
 
 #include <algorithm>
@@ -22,6 +22,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -61,18 +62,19 @@ struct Run {
   std::vector<double> seconds;
   std::vector<uint64_t> work;  // units of each step, which no load of the machine changes
   dfm_world_stats last{};
-  std::vector<uint8_t> cut;                 // 1: the step has cut; 2: the one before it has
-  std::vector<std::vector<double>> stages;  // s, of each step
+  std::vector<uint8_t> cut;                           // 1: the step has cut; 2: the one before it has
+  std::vector<std::map<std::string, double>> stages;  // s, of each step, by name: a cut may change the plan
   std::vector<Sample> series;
   double contacts = 0;
 };
 
-// s, all stages since the world was made
-std::vector<dfm_stage_time> profile(dfm_world world) {
-  std::vector<dfm_stage_time> out(32);
+// s, of each stage since the world was made
+std::map<std::string, double> profile(dfm_world world) {
+  dfm_stage_time stages[32];
   uint32_t n = 0;
-  ok(dfm_world_profile(world, uint32_t(out.size()), out.data(), &n));
-  out.resize(n);
+  ok(dfm_world_profile(world, 32, stages, &n));
+  std::map<std::string, double> out;
+  for (uint32_t i = 0; i < n; ++i) out[stages[i].name] = stages[i].seconds;
   return out;
 }
 
@@ -93,7 +95,7 @@ Run run(dfm_scene scene, dfm_world world, double duration, double step, bool pla
   double next = wall_seconds();
   const long steps = std::lround(duration / step), every = std::max(1L, std::lround(1e-3 / step));
   double force[3] = {};
-  std::vector<dfm_stage_time> before = profile(world);
+  std::map<std::string, double> before = profile(world);
   for (long n = 0; n < steps; ++n) {
     if (paced) {
       next += step;
@@ -104,9 +106,9 @@ Run run(dfm_scene scene, dfm_world world, double duration, double step, bool pla
     ok(dfm_world_step(world, step, nullptr));
     out.seconds.push_back((paced ? wall_seconds() : cpu_seconds()) - at);
     out.cut.push_back(has_cut(world) ? 1 : !out.cut.empty() && out.cut.back() == 1 ? 2 : 0);
-    const std::vector<dfm_stage_time> now = profile(world);
+    const std::map<std::string, double> now = profile(world);
     out.stages.emplace_back();
-    for (size_t i = 0; i < now.size(); ++i) out.stages.back().push_back(now[i].seconds - before[i].seconds);
+    for (const auto &[name, seconds] : now) out.stages.back()[name] = seconds - before[name];
     before = now;
     dfm_pair_impulse pair[16] = {};
     uint32_t pairs = 0;
@@ -294,6 +296,7 @@ int main(int argc, char **argv) {
   ok(dfm_body_get_info(body, &info));
 
   Run found = run(scene, world, duration, step, series || against, paced);
+  const std::map<std::string, double> stages = profile(world);
   if (series) {
     std::FILE *out = std::fopen(series, "w");
     for (const Sample &s : found.series)
@@ -303,10 +306,13 @@ int main(int argc, char **argv) {
   }
   if (times) {
     std::FILE *out = std::fopen(times, "w");
+    std::fprintf(out, "# ms, units, cut");
+    for (const auto &[stage, sum] : stages) std::fprintf(out, ", %s", stage.c_str());
+    std::fprintf(out, "\n");
     for (size_t n = 0; n < found.seconds.size(); ++n) {
       std::fprintf(out, "%.4f %llu %u", 1e3 * found.seconds[n], (unsigned long long)found.work[n],
                    unsigned(found.cut[n]));
-      for (const double seconds : found.stages[n]) std::fprintf(out, " %.4f", 1e3 * seconds);
+      for (const auto &[stage, sum] : stages) std::fprintf(out, " %.4f", 1e3 * found.stages[n][stage]);
       std::fprintf(out, "\n");
     }
     std::fclose(out);
@@ -351,12 +357,8 @@ int main(int argc, char **argv) {
     print_kind(found, 2, "after a cut", step);
     print_kind(found, 1, "that cut", step);
   }
-  const std::vector<dfm_stage_time> stages = profile(world);
-  for (size_t i = 0; i < stages.size(); ++i) {
-    double sum = 0;
-    for (const std::vector<double> &of : found.stages) sum += of[i];
-    std::printf("    %-18s %8.4f ms\n", stages[i].name, 1e3 * sum / double(found.seconds.size()));
-  }
+  for (const auto &[stage, sum] : stages)
+    std::printf("    %-18s %8.4f ms\n", stage.c_str(), 1e3 * sum / double(found.seconds.size()));
   if (histogram) {
     char row[200];
     std::snprintf(row, sizeof row, "%s,%s,%s,%s,%u,%.1f", bench::machine().c_str(), bench::compiler(), commit,

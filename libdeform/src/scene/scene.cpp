@@ -55,41 +55,43 @@ Scene::~Scene() {
 
 dfm_world Scene::release_world() { return std::exchange(world_, 0); }
 
+namespace {
+
+void need(const ProbePoint &p, dfm_status status) {
+  if (status < 0) fail(status, "probe \"%s\": %s", p.name.c_str(), dfm_last_error());
+}
+
 // The four points of a probe's cell as they are numbered now: a cut gives cells and points new numbers.
 // False: the body does not have the cell.
-bool Scene::find_cell(const ProbePoint &p, dfm_body body, uint32_t points[4]) {
-  const auto need = [&](dfm_status status) {
-    if (status < 0) fail(status, "probe \"%s\": %s", p.name.c_str(), dfm_last_error());
-  };
+bool find_cell(const ProbePoint &p, dfm_body body, uint32_t points[4]) {
   dfm_body_info info = {};
   info.size = sizeof info;
-  need(dfm_body_get_info(body, &info));
+  need(p, dfm_body_get_info(body, &info));
   if (body == p.body && info.ntet == p.ntet && info.npoint == p.npoint) {
     std::copy_n(p.points, 4, points);
     return true;
   }
   if (info.ntet == 0) return false;
   std::vector<uint32_t> origins(info.ntet), cells(4 * size_t(info.ntet));
-  need(dfm_body_origins(body, 0, nullptr, info.ntet, origins.data()));
-  need(dfm_body_get_rest(body, 0, nullptr, info.ntet, cells.data()));
+  need(p, dfm_body_origins(body, 0, nullptr, info.ntet, origins.data()));
+  need(p, dfm_body_get_rest(body, 0, nullptr, info.ntet, cells.data()));
   const auto at = std::find(origins.begin(), origins.end(), p.cell);
   if (at == origins.end()) return false;
   std::copy_n(cells.begin() + 4 * (at - origins.begin()), 4, points);
   return true;
 }
 
+}  // namespace
+
 void Scene::probe_state(size_t i, double position[3], double velocity[3]) {
   const ProbePoint &p = probes_[i];
-  const auto need = [&](dfm_status status) {
-    if (status < 0) fail(status, "probe \"%s\": %s", p.name.c_str(), dfm_last_error());
-  };
   dfm_body body = p.body;
   uint32_t n = 0, points[4];
   bool found = find_cell(p, body, points);
   if (!found) {
-    need(dfm_body_pieces(p.body, 0, nullptr, &n));
+    need(p, dfm_body_pieces(p.body, 0, nullptr, &n));
     std::vector<dfm_body> pieces(n);
-    if (n > 0) need(dfm_body_pieces(p.body, n, pieces.data(), &n));
+    if (n > 0) need(p, dfm_body_pieces(p.body, n, pieces.data(), &n));
     for (size_t k = 0; k < pieces.size() && !found; ++k) found = find_cell(p, body = pieces[k], points);
   }
   if (!found) {
@@ -97,10 +99,10 @@ void Scene::probe_state(size_t i, double position[3], double velocity[3]) {
     std::fill_n(velocity, 3, std::numeric_limits<double>::quiet_NaN());
     return;
   }
-  need(dfm_body_get_state(body, 0, nullptr, nullptr, &n));
+  need(p, dfm_body_get_state(body, 0, nullptr, nullptr, &n));
   x_.resize(3 * size_t(n));
   v_.resize(3 * size_t(n));
-  need(dfm_body_get_state(body, n, x_.data(), v_.data(), &n));
+  need(p, dfm_body_get_state(body, n, x_.data(), v_.data(), &n));
   for (int k = 0; k < 3; ++k) {
     position[k] = velocity[k] = 0;
     for (int c = 0; c < 4; ++c) {

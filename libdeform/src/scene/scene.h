@@ -34,7 +34,6 @@ class Scene {
   std::string value(const std::string &pointer) const;  // JSON text; throws where nothing is
 
  private:
-  static bool find_cell(const ProbePoint &p, dfm_body body, uint32_t points[4]);
   struct Tree;  // keeps the JSON library out of this header
   dfm_context *context_;
   dfm_world world_ = 0;

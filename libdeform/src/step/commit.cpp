@@ -62,8 +62,8 @@ bool stage_commit(World &w, StepContext &step, uint32_t *trouble) {
       Body &b = *w.bodies[i];
       const OnBehalf speaks(b.name);
       b.dynamics->see_ends();
-      if (b.dynamics->see_forces(now))
-        continue;  // for the work over the part of the motion that the guard has left out
+      // for the work over the part of the motion that the guard has left out
+      if (b.dynamics->see_forces(now)) continue;
       *trouble |= tell_no_forces(w, b);
       return false;
     }

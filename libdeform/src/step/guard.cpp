@@ -130,7 +130,7 @@ bool withstands_blows(World &w, StepContext &step) {
   double hard = 0;
   for (const uint32_t i : step.active) {
     const Body &b = *w.bodies[i];
-    if (g.change[i] > 0 && gravity_exceeds_bound(w, b) && meets(w, step, i)) check_before_gravity_does(w, b);
+    if (g.change[i] > 0 && gravity_exceeds_bound(w, b) && meets(w, step, i)) bring_check_forward(w, b);
     if (!(step.h * g.change[i] > kBoundStrain * b.surface.median_edge)) continue;
     if (!b.dynamics->diagonal() || !std::isfinite(b.bound.found.step)) continue;
     const Blow blow = blow_on(step, b, i);

@@ -117,7 +117,7 @@ bool gravity_exceeds_bound(const World &w, const Body &b) {
          strain_of_fall(w, b, kBoundEvery - w.bound.age) > kBoundStrain;
 }
 
-void check_before_gravity_does(World &w, const Body &b) {
+void bring_check_forward(World &w, const Body &b) {
   uint32_t n = 1;
   while (strain_of_fall(w, b, n + 1) <= kBoundStrain) ++n;
   w.bound.age = std::max(w.bound.age, kBoundEvery - n);

@@ -15,12 +15,12 @@ inline constexpr double kBoundStrain = 0.05;
 bool bound_due(const World &w);     // does the next sub-step look whether it still holds?
 bool bound_is_new(const World &w);  // has it looked since the last sub-step?
 void bound_is_due(World &w);        // the next one does
+void update_bound(World &w);        // w.bound, evaluated again where it may not
+
 // Behind a new contact that holds a body up, gravity strains its edges at a growing rate, which the last
 // check did not see. Can this strain exceed what the bound allows for before the next check?
 bool gravity_exceeds_bound(const World &w, const Body &b);
-// Then the next check is due before it does.
-void check_before_gravity_does(World &w, const Body &b);
-void update_bound(World &w);  // w.bound, evaluated again where it may not
+void bring_check_forward(World &w, const Body &b);  // so that it cannot
 
 // After bodies have been cut: estimates w.bound for the next step, of dt (s), after which it is evaluated.
 // before: w.bound before the cut. share: the bound at rest of the cut bodies over that before. false: no
