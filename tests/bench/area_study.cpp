@@ -1,6 +1,6 @@
-// The sum of contact areas between two meshes, over the area of the patch, by how the meshes lie on each other
-// (doc/concepts/friction_memory.md): a block at 16 places on a pad, up to 5 mm apart, at rest, pulled by a
-// tenth of what it holds, and then pressed. Prints a row per place and the range of all.
+// The sum of contact areas between two meshes, over the area of the patch, by how the meshes lie on each
+// other (doc/concepts/friction_memory.md): a block at 16 places on a pad, up to 5 mm apart, at rest, pulled
+// by a tenth of what it holds, and then pressed. Prints a row per place and the range of all.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
