@@ -10,6 +10,8 @@
 
 using namespace test::step_energy;
 
+extern "C" const dfm_plugin *dfm_plugin_entry_counting_looks(const dfm_host *, uint32_t, uint32_t);
+
 namespace {
 
 const std::string kBar = DEFORM_SOURCE_DIR "/examples/data/bar.msh";
@@ -28,18 +30,35 @@ dfm_status no_energy(void *, const dfm_kin *, double *joule) {
   return DFM_OK;
 }
 
-struct Shaken {
+// Forces along the velocities: they do work, and no energy pays for it.
+uint32_t pushed = 0;  // points
+dfm_status create_pushed(const dfm_host *, const dfm_mesh *mesh, void **self) {
+  pushed = mesh->npoint;
+  *self = &pushed;
+  return DFM_OK;
+}
+dfm_status push_forward(void *, const dfm_kin *k, double *f) {
+  for (size_t at = 0; at < size_t(pushed) * k->stride; ++at) f[at] += 1e-3 * k->v[at];
+  return DFM_OK;
+}
+
+// A body that is pushed forward.
+struct Pushed {
   test::Context context;
-  Setting s;
-  std::mt19937 random{1};
-  double stable = 0;
-  explicit Shaken(const char *motion = "wrung") : s(make(context, {"bar", kBar, motion, 1})) {
-    test::ok(dfm_world_stable_step(s.world, &stable, nullptr, nullptr));
+  dfm_world world = 0;
+  dfm_body body = 0;
+  explicit Pushed(double watch = 0.01) {
+    test::ok(dfm_plugin_register_static(context, dfm_plugin_entry_counting_looks, "counting_looks"));
+    dfm_world_def d = dfm_world_def_default();
+    d.energy_watch = watch;
+    d.gravity[2] = 0;
+    test::ok(dfm_world_create(context, &d, &world));
+    test::BodyOptions o;
+    o.model = "test.pushed";
+    body = test::make_body(context, world, "beam", {0.1, 0.1, 0.1}, 60, o);
+    test::set_velocity(body, {0, 0, 1});
   }
-  // A step of random length: each is stable, their sequence pumps.
-  dfm_status step(uint32_t *trouble) {
-    return dfm_world_step(s.world, stable * (0.8 + 0.2 * double(random()) / 4294967296.0), trouble);
-  }
+  dfm_status step(uint32_t *trouble) { return dfm_world_step(world, 1e-3, trouble); }
 };
 
 }  // namespace
@@ -57,13 +76,18 @@ extern "C" const dfm_plugin *dfm_plugin_entry_counting_looks(const dfm_host *hos
   ops.energy = no_energy;
   static const dfm_type type =
       dfm::plugin::type(DFM_KIND_MODEL, "test.counting_looks", "points", "1", "MIT", "test", effects, &ops);
-  static const dfm_type *const types[] = {&type};
-  static const dfm_plugin plugin{sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 1, types, nullptr};
+  static dfm_model pushes = ops;
+  pushes.create = create_pushed;
+  pushes.add_forces = push_forward;
+  static const dfm_type pushed_type =
+      dfm::plugin::type(DFM_KIND_MODEL, "test.pushed", "points", "1", "MIT", "test", effects, &pushes);
+  static const dfm_type *const types[] = {&type, &pushed_type};
+  static const dfm_plugin plugin{sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 2, types, nullptr};
   return &plugin;
 }
 
-TEST(EnergyWatch, StepsOfRandomLength_EndBeforeTheEnergyHasGrownByATenth) {
-  Shaken b;
+TEST(EnergyWatch, ModelThatPushesForward_EndsBeforeTheEnergyHasGrownByATenth) {
+  Pushed b;
   uint32_t trouble = 0;
   dfm_status status = DFM_OK;
   int i = 0;
@@ -73,15 +97,16 @@ TEST(EnergyWatch, StepsOfRandomLength_EndBeforeTheEnergyHasGrownByATenth) {
   const std::string why = dfm_last_error();
   for (const char *word : {"body1", "step", "energy", "limit: 1 %", "shorter step"})
     EXPECT_NE(why.find(word), std::string::npos) << why;
-  const dfm_world_stats stats = test::stats(b.s.world);
+  const dfm_world_stats stats = test::stats(b.world);
   EXPECT_GT(stats.energy_gain, 0.01 * stats.energy_max);
-  const dfm_body_measure m = test::measure(b.s.body);
+  EXPECT_LT(stats.energy_gain, 0.1 * stats.energy_max);
+  const dfm_body_measure m = test::measure(b.body);
   EXPECT_LT(m.kinetic + m.elastic, 1.2 * stats.energy_max) << "the state is a good one";
-  const uint64_t hash = dfm_world_hash(b.s.world);
+  const uint64_t hash = dfm_world_hash(b.world);
   EXPECT_EQ(b.step(nullptr), DFM_E_DIVERGED) << "the cause is still there";
-  EXPECT_EQ(dfm_world_hash(b.s.world), hash);
-  test::set_velocity(b.s.body, {0, 0, 0});
-  EXPECT_EQ(dfm_world_step(b.s.world, 0.5 * b.stable, nullptr), DFM_OK) << "a new state is a new beginning";
+  EXPECT_EQ(dfm_world_hash(b.world), hash);
+  test::set_velocity(b.body, {0, 0, 0});
+  EXPECT_EQ(b.step(nullptr), DFM_OK) << "a new state is a new beginning";
 }
 
 TEST(EnergyWatch, SwitchedOff_StopsNothing) {
@@ -93,29 +118,31 @@ TEST(EnergyWatch, SwitchedOff_StopsNothing) {
     d.energy_watch = bad;
     EXPECT_EQ(dfm_world_create(context, &d, &w), DFM_E_ARG);
   }
-  d.energy_watch = 0;
-  d.gravity[2] = 0;
-  test::ok(dfm_world_create(context, &d, &w));
-  test::BodyOptions o;
-  o.spin = {0, 0, 40};
-  test::make_body(context, w, "beam", {0.2, 0.05, 0.05}, 60, o);
-  double stable = 0;
-  test::ok(dfm_world_stable_step(w, &stable, nullptr, nullptr));
-  std::mt19937 random(1);
-  for (int i = 0; i < 4000; ++i)
-    ASSERT_EQ(dfm_world_step(w, stable * (0.8 + 0.2 * double(random()) / 4294967296.0), nullptr), DFM_OK);
-  EXPECT_EQ(test::stats(w).energy_gain, 0);
+  Pushed b(0);
+  for (int i = 0; i < 4000; ++i) ASSERT_EQ(b.step(nullptr), DFM_OK);
+  EXPECT_EQ(test::stats(b.world).energy_gain, 0);
 }
 
-TEST(EnergyWatch, StepsOfRandomLengthAndGentlerMotions_EndBeforeTheEnergyHasGrownByATwentieth) {
-  for (const char *motion : {"ring", "spin"}) {
-    Shaken b(motion);
-    int i = 0;
-    while (i < 20000 && b.step(nullptr) == DFM_OK) ++i;
-    EXPECT_LT(i, 20000) << motion;
-    const dfm_world_stats stats = test::stats(b.s.world);
-    EXPECT_GT(stats.energy_gain, 0.01 * stats.energy_max) << motion;
-    EXPECT_LT(stats.energy_gain, 0.05 * stats.energy_max) << motion << " after " << i << " steps";
+// Each of these lengths is stable by itself. Without the damping that such changes call for, their sequence
+// adds energy to the stiff modes until the watch stops the run.
+TEST(EnergyWatch, StepsOfRandomLength_AddNoEnergy) {
+  for (const char *motion : {"wrung", "ring", "spin"}) {
+    test::Context context;
+    const Setting s = make(context, {"bar", kBar, motion, 1});
+    double stable = 0;
+    test::ok(dfm_world_stable_step(s.world, &stable, nullptr, nullptr));
+    std::mt19937 random(1);
+    const dfm_body_measure before = test::measure(s.body);
+    for (int i = 0; i < 20000; ++i)
+      ASSERT_EQ(dfm_world_step(s.world, stable * (0.8 + 0.2 * double(random()) / 4294967296.0), nullptr),
+                DFM_OK)
+          << motion << ", step " << i << ": " << dfm_last_error();
+    const dfm_body_measure after = test::measure(s.body);
+    EXPECT_LT(after.kinetic + after.elastic, 1.001 * (before.kinetic + before.elastic)) << motion;
+    for (int k = 0; k < 3; ++k) {
+      EXPECT_NEAR(after.momentum[k], before.momentum[k], 1e-12) << motion;
+      EXPECT_NEAR(after.angular[k], before.angular[k], 1e-9 * std::fabs(before.angular[2]) + 1e-15) << motion;
+    }
   }
 }
 

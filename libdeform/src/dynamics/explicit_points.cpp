@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "body/rigid_motion.h"
 #include "dynamics/symplectic_euler.h"
 
 namespace dfm {
@@ -152,6 +153,39 @@ void ExplicitPoints::commit(const SubStep &now, double fraction) {
   p_.x.swap(p_.x_end);
   p_.v.swap(in_place_ ? p_.v_free : p_.v_end);
   model_.commit_state();
+}
+
+// K v = (f(x - e v) - f(x + e v)) / 2 e, v the velocity less the rigid motion: that strains nothing, but in a
+// strained body it would seem to. f, x_end and v_end are free until the next sub-step.
+void ExplicitPoints::damp(double time, double c, double ahead) {
+  const auto place = [&](uint32_t i) { return load3(&p_.x[size_t(i) * kStride]); };
+  const bool held = std::any_of(p_.held.begin(), p_.held.end(), [](uint8_t bits) { return bits != 0; });
+  const auto rigid_part = [&](const Array<double> &v) {
+    return held ? RigidMotion{} : rigid_motion(p_.n, p_.mass.data(), place, [&](uint32_t i) {
+      return load3(&v[size_t(i) * kStride]);
+    });
+  };
+  const auto forces_along = [&](double e, const RigidMotion &rigid, Array<double> &f) {
+    for (uint32_t i = 0; i < p_.n; ++i) {
+      const size_t at = size_t(i) * kStride;
+      store3(&p_.x_end[at], place(i) + e * (load3(&p_.v[at]) - rigid.at(place(i))));
+    }
+    std::fill(f.begin(), f.end(), 0.0);
+    dfm_kin k = kin(time, 0);
+    k.x = p_.x_end.data();
+    return model_.add_forces(k, f.data()) == DFM_OK;
+  };
+  const RigidMotion rigid = rigid_part(p_.v);
+  if (!forces_along(ahead, rigid, p_.f) || !forces_along(-ahead, rigid, p_.v_end))
+    return;  // the next call tells
+  Array<double> &change = p_.f;
+  for (size_t at = 0; at < change.size(); ++at)
+    change[at] = p_.inv_mass[at] * (c / (2 * ahead)) * (p_.f[at] - p_.v_end[at]);
+  const RigidMotion turn = rigid_part(change);
+  for (uint32_t i = 0; i < p_.n; ++i) {
+    const size_t at = size_t(i) * kStride;
+    store3(&p_.v[at], load3(&p_.v[at]) + (load3(&change[at]) - turn.at(place(i))));
+  }
 }
 
 }  // namespace dfm

@@ -30,6 +30,7 @@ class ExplicitPoints : public Dynamics {
     return {v, v};
   }
   void commit(const SubStep &now, double fraction) override;
+  void damp(double time, double c, double ahead) override;
 
  private:
   const Array<uint32_t> &edges_;

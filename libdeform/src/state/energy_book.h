@@ -21,8 +21,8 @@ struct EnergyWatch {
   uint32_t credit = kMostCredit;
   uint32_t age = ~0u;  // sub-steps since the last check
   double last_h = 0;   // s, of the last sub-step
-  // s, planned size of the sub-steps until the library changed it for the next one; 0: it did not. Not state:
-  // set in each step
+  // s, planned size of the sub-steps before it changed for the next one; 0: it did not. Not state: set in
+  // each step
   double size_before = 0;
   // the last check has stopped the run because of a pair: if the host then changes something, the sums start
   // again; not state

@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "core/error.h"
 
 namespace dfm {
 namespace {
 
+using std::numbers::pi;
 constexpr double kRounding = 1e-9;  // relative, of the quotient of two sizes
 // sizes within this factor are the same rung: half the distance to the nearest rung, a factor of 8/7 away
 constexpr double kSame = 1.06;
@@ -16,6 +18,13 @@ constexpr double kRise = 0.9;
 // s, for implicit bodies: the first step, before an error is known, and the longest step
 constexpr double kFirstOffer = 1e-3, kLongestOffer = 1.0 / 30;
 constexpr uint32_t kLeastCalm = 64;  // sub-steps: four evaluations of the bound
+// share of the stable step that sub-steps may have while a host changes its steps: room for damping
+constexpr double kVarying = 0.75;
+// s: changes that are further apart do not follow the rhythm of a mode for long
+constexpr double kLongestRhythm = 0.1;
+// A due impulse is divided among sub-steps, so that it meets each mode in several phases: at most this share,
+// but at least this one of the stable step squared.
+constexpr double kDampingShare = 0.25, kLeastDamping = 1e-3;
 
 // The smallest of 1, 2, 3 and (4, 5, 6, 7) 2^k that is not below x.
 double count_above(double x) {
@@ -73,10 +82,9 @@ double accurate_step(const StepSizes &s) {
   return rung_below(s.accurate > 0 ? std::min(s.accurate, kLongestOffer) : kFirstOffer);
 }
 
-double choose_pieces(StepSizes &s, double dt, double stable) {
-  settle_offer(s.offer, stable);
-  if (std::isinf(stable)) return 1;
-  Rung &r = s.cut;
+namespace {
+
+void settle_cut(Rung &r, double dt, double stable) {
   // If a step differs little from the last one, or is a multiple of its sub-steps, their size is kept.
   const double ratio = dt / r.size, same = r.size > 0 ? count_above(ratio / kSame) : 0;
   if (same > 0 && same <= ratio * kSame) {
@@ -85,7 +93,57 @@ double choose_pieces(StepSizes &s, double dt, double stable) {
   } else {
     take(r, dt / pieces(dt, stable));
   }
-  return std::nearbyint(dt / r.size);
+}
+
+// Whether a change is one of the rare ones, forced by the bound or allowed after the patience.
+bool earned(const StepSizes &before, const StepSizes &now, double stable) {
+  const Rung &r = before.cut;
+  if (now.offer.size != before.offer.size) return true;
+  const double gain = now.cut.size / r.size;
+  return gain < 1 ? r.size > stable * (1 + kRounding)
+                  : r.calm >= kLeastCalm && r.calm * (gain * gain) >= r.patience;
+}
+
+bool changed_by_host(const StepSizes &before, const StepSizes &now, double stable) {
+  return before.cut.size > 0 && differ(now.cut.size, before.cut.size) && !earned(before, now, stable);
+}
+
+// A change by d adds to the energy of a mode of frequency w at most the share w d / 2 / (1 - w h / 2); damping
+// takes w^2 c. A mode gains repeatedly only if it turns by pi / 2 or more between two changes: so c is the
+// largest quotient for w from pi / (2 T) to 2 / stable. That lies at one of the ends.
+double damping_of_change(double was, double is, double stable, double since) {
+  const double longest = std::max(was, is), time = std::max(longest, std::min(since, kLongestRhythm));
+  const double slow = 2 / pi * time / (1 - pi / 4 * longest / time);
+  const double fast = 0.5 * stable / (1 - std::min(kRise, longest / stable));
+  return 0.5 * std::fabs(is - was) * std::max(slow, fast);
+}
+
+}  // namespace
+
+double choose_pieces(StepSizes &s, double dt, double stable) {
+  const StepSizes before = s;
+  settle_offer(s.offer, stable);
+  if (std::isinf(stable)) return 1;
+  double most = s.steady < kSteady ? kVarying * stable : stable;
+  settle_cut(s.cut, dt, most);
+  if (changed_by_host(before, s, most)) {
+    if (most == stable) {  // until now it was steady
+      s.cut = before.cut;
+      settle_cut(s.cut, dt, kVarying * stable);
+    }
+    s.damping += damping_of_change(before.cut.size, s.cut.size, stable, s.steady);
+    s.steady = 0;
+  }
+  return std::nearbyint(dt / s.cut.size);
+}
+
+double damping_due(StepSizes &s, double h, double stable) {
+  if (!(s.damping > 0) || !std::isfinite(stable)) return 0;
+  const double square = stable * stable;
+  const double room = std::max(0.0, 0.25 * (square - h * h));
+  const double due = std::min({s.damping, std::max(kDampingShare * s.damping, kLeastDamping * square), room});
+  s.damping -= due;
+  return due;
 }
 
 double cut_finer(StepSizes &s, double size, double stable) {
@@ -95,21 +153,18 @@ double cut_finer(StepSizes &s, double size, double stable) {
   return parts;
 }
 
-bool earned(const StepSizes &before, const StepSizes &now, double stable) {
-  const Rung &r = before.cut;
-  if (now.cut.size == r.size || !(r.size > 0)) return false;
-  if (now.offer.size != before.offer.size) return true;
-  const double gain = now.cut.size / r.size;
-  return gain < 1 ? r.size > stable * (1 + kRounding)
-                  : r.calm >= kLeastCalm && r.calm * (gain * gain) >= r.patience;
-}
+bool differ(double size, double other) { return std::fabs(size - other) > kRounding * other; }
 
-void pass(StepSizes &s) {
+void pass(StepSizes &s, double h) {
   pass(s.cut);
   pass(s.offer);
+  s.steady = std::min(kSteady, s.steady + h);
 }
 
-bool sound(const StepSizes &s) { return s.accurate >= 0 && sound(s.cut) && sound(s.offer); }
+bool sound(const StepSizes &s) {
+  return s.accurate >= 0 && sound(s.cut) && sound(s.offer) && s.steady >= 0 && s.steady <= kSteady &&
+         s.damping >= 0 && std::isfinite(s.damping);
+}
 
 std::string short_step(double dt, double floor) {
   return format(

@@ -8,7 +8,8 @@
 //   - a step of length H is cut into n = 1, 2, 3 or (4, 5, 6, 7) 2^k sub-steps;
 //   - steps that the library chooses have 4, 5, 6 or 7 times a power of two seconds;
 //   - the size goes down at once where the bound requires it, and up only after a waiting time (patience)
-//     that doubles each time.
+//     that doubles each time;
+//   - a host that changes the length of its steps pays with damping: doc/decisions/0497-steps-of-a-host.md.
 #pragma once
 #include <cstdint>
 #include <string>
@@ -20,6 +21,9 @@ inline constexpr uint32_t kFirstPatience = 256, kMostPatience = 65536;  // sub-s
 // A step is refused if the rounding of positions (16 digits) over that step exceeds a quarter of the
 // tolerance of contact (1e-6 m/s): 1 ns for each meter of distance from the origin, and at least 1 ns.
 inline constexpr double kShortestStep = 1e-9;  // s
+
+// s: how long the size must stay the same before sub-steps may be as long as the bound allows again
+inline constexpr double kSteady = 1;
 
 struct Rung {
   double size = 0;    // s; 0: none yet
@@ -34,6 +38,8 @@ struct StepSizes {
   Rung offer;  // of the step that dfm_world_stable_step returns, whatever step the host takes
   // s, the step that the errors of the last sub-step of implicit bodies allow; 0: there was none
   double accurate = 0;
+  double steady = kSteady;  // s since the host last changed the size of the sub-steps
+  double damping = 0;       // s2, impulse of stiffness damping that these changes still call for
 };
 
 // stable: s, the longest sub-step allowed now (infinite: any).
@@ -44,13 +50,14 @@ double offered_step(const StepSizes &s, double stable);
 double accurate_step(const StepSizes &s);
 // number of sub-steps of the step dt, which may be too many for an integer
 double choose_pieces(StepSizes &s, double dt, double stable);
+// The impulse of stiffness damping c (s2: v -= c M^-1 K v) to be done after a sub-step of h; it counts as
+// done.
+double damping_due(StepSizes &s, double h, double stable);
 // within a step, when the bound has fallen below size: into how many parts each sub-step is divided
 double cut_finer(StepSizes &s, double size, double stable);
-// Whether a change of the sub-step size is one of the rare ones, forced by the bound or allowed after the
-// patience. Changes by the host are not.
-bool earned(const StepSizes &before, const StepSizes &now, double stable);
-void pass(StepSizes &s);         // a sub-step has been taken
-bool sound(const StepSizes &s);  // whether a world could have reached it
+bool differ(double size, double other);  // by more than rounding
+void pass(StepSizes &s, double h);       // a sub-step of h has been taken
+bool sound(const StepSizes &s);          // whether a world could have reached it
 
 std::string short_step(double dt, double floor);  // the sentence that refuses it
 

@@ -15,6 +15,7 @@
 #include "step/energy_watch.h"
 #include "step/first_failure.h"
 #include "step/stages.h"
+#include "step/step_bound.h"
 #include "step/step_impulses.h"
 
 namespace dfm {
@@ -23,6 +24,22 @@ namespace {
 // Between this sub-step and the next.
 bool reads_points(const World &w, const Body &b) {
   return w.def.sleep || b.changes.open || !b.switches.empty() || !b.rule.empty() || !w.overlaps.found.empty();
+}
+
+constexpr double kAlong = 0.1;  // of the stable step: a way on which strains change little
+
+// What a host's changes of the step put into bodies (doc/decisions/0497-steps-of-a-host.md).
+void damp_changes_of_size(World &w, const StepContext &step) {
+  const double stable = w.bound.step / kBoundShare, c = damping_due(w.sizes, step.guard.planned, stable);
+  if (!(c > 0)) return;
+  w.context->tasks.parallel_for(
+      static_cast<uint32_t>(step.active.size()), bodies_together(w, step.active, kPointsToPull),
+      [&](uint32_t begin, uint32_t end) {
+        for (const uint32_t i : std::span(step.active).subspan(begin, end - begin)) {
+          const OnBehalf speaks(w.bodies[i]->name);
+          w.bodies[i]->dynamics->damp(w.time + step.h, c, kAlong * stable);
+        }
+      });
 }
 }  // namespace
 
@@ -94,6 +111,7 @@ bool stage_commit(World &w, StepContext &step, uint32_t *trouble) {
     keep_cut_drags(w, step);
     add_impulses(w);
   }
+  damp_changes_of_size(w, step);
   return true;
 }
 

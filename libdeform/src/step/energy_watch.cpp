@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "body/rigid_motion.h"
 #include "plugin/context.h"
 #include "plugin/on_behalf.h"
 #include "state/world.h"
@@ -74,9 +75,10 @@ double work_of_holders(const World &w, const StepContext &step, const Body &b, b
 }
 
 // Another size h of the sub-steps makes of G = .. + v.M v* / 2 another quantity that the scheme keeps, which
-// is larger by (h2 - h1) v.f / 2. The changes that the library makes itself are few, so what they bring is
-// bounded and no instability. f is taken from the forces, since v* may hold the impulses of contact by now.
-// Pieces that the guard cuts do not count: what they bring they take away again.
+// is larger by (h2 - h1) v.f / 2. That is no instability: the changes that the library makes are few, and
+// what those of a host bring is taken out by damping (state/step_sizes.h). f is taken from the forces, since
+// v* may hold the impulses of contact by now. Pieces that the guard cuts do not count: what they bring they
+// take away again.
 double work_of_new_size(const World &w, const StepContext &step, const Body &b) {
   if (!(w.watch.size_before > 0 && w.watch.last_h > 0)) return 0;
   const bool load_booked = books_loads(b);
@@ -208,36 +210,10 @@ struct Turning {
 Turning turning_of(const Body &b, double h) {
   const Phyxels &p = b.p;
   const double *const end = b.dynamics->end().v;
-  double mass = 0;
-  Vec3 center{}, velocity{}, momentum{};
-  double s[6] = {};
-  const auto middle = [&](uint32_t i) {
-    return load3(&p.x[size_t(i) * kStride]) + 0.5 * h * load3(end + size_t(i) * kStride);
-  };
-  for (uint32_t i = 0; i < p.n; ++i) {
-    mass += p.mass[i];
-    center += p.mass[i] * middle(i);
-    velocity += p.mass[i] * load3(end + size_t(i) * kStride);
-  }
-  center = (1 / mass) * center;
-  velocity = (1 / mass) * velocity;
-  for (uint32_t i = 0; i < p.n; ++i) {
-    const Vec3 r = middle(i) - center;
-    momentum += p.mass[i] * cross(r, load3(end + size_t(i) * kStride) - velocity);
-    const double all = dot(r, r);
-    s[0] += p.mass[i] * (all - r.x * r.x);
-    s[1] += p.mass[i] * (all - r.y * r.y);
-    s[2] += p.mass[i] * (all - r.z * r.z);
-    s[3] -= p.mass[i] * r.y * r.z;
-    s[4] -= p.mass[i] * r.z * r.x;
-    s[5] -= p.mass[i] * r.x * r.y;
-  }
-  const Vec3 a{s[0], s[5], s[4]}, c{s[5], s[1], s[3]}, e{s[4], s[3], s[2]};
-  const double det = dot(a, cross(c, e));
-  // points on a line have no spin about it
-  if (!(det > 0)) return {velocity, {}, 0.5 * h};
-  const Vec3 spin = momentum.x * cross(c, e) + momentum.y * cross(e, a) + momentum.z * cross(a, c);
-  return {velocity, (1 / det) * spin, 0.5 * h};
+  const auto velocity = [&](uint32_t i) { return load3(end + size_t(i) * kStride); };
+  const auto middle = [&](uint32_t i) { return load3(&p.x[size_t(i) * kStride]) + 0.5 * h * velocity(i); };
+  const RigidMotion motion = rigid_motion(p.n, p.mass.data(), middle, velocity);
+  return {motion.velocity, motion.spin, 0.5 * h};
 }
 
 // Of a sub-step of backward Euler, r the residual that Newton's method leaves:

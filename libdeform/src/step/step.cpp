@@ -189,10 +189,10 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
   if (!std::exchange(w.overlaps.told, true)) *trouble |= DFM_TROUBLE_OVERLAP;
   if (bound_due(w)) update_bound(w);
   if (!(least_sub_steps(w, dt) <= w.def.max_substeps)) return refuse_step(w, dt, trouble);
-  const StepSizes before = w.sizes;
+  const double size_before = w.sizes.cut.size;
   const uint32_t n =
       static_cast<uint32_t>(std::min<double>(w.def.max_substeps, choose_pieces(w.sizes, dt, w.bound.step)));
-  w.watch.size_before = earned(before, w.sizes, w.bound.step) ? before.cut.size : 0;
+  w.watch.size_before = differ(w.sizes.cut.size, size_before) ? size_before : 0;
   plan_work(w, step, n);
   begin_count(w, step, dt);
   if (n > 1) *trouble |= DFM_TROUBLE_SUBSTEPS;
@@ -217,8 +217,9 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
     allow_for_bound(w, step);
     step.budget.to_come = rest.left() - 1;
     step.guard.most_finer = double(w.def.max_substeps - done) / rest.left();
+    const double from = w.time;
     if (!advance(w, step, rest.next(), rest.goal, rest.last(), trouble)) return DFM_E_DIVERGED;
-    pass(w.sizes);
+    pass(w.sizes, w.time - from);
     ++rest.taken;
     if (step.guard.finer > 1) {  // after a hard impact: this sub-step was a finer one, too
       rest.again(w.time, (rest.left() + 1) * static_cast<uint32_t>(step.guard.finer) - 1);
@@ -325,7 +326,8 @@ bool sub_step(World &w, StepContext &step, uint32_t *trouble) {
   step.guard.start();
   step.ended = false;
   step.budget.rows = w.store.n;
-  charge(w, step, body_work(w, step) + surface_work(w, step));
+  const uint64_t damping = w.sizes.damping > 0 ? 2 : 0;  // evaluations of the forces
+  charge(w, step, (1 + damping) * body_work(w, step) + surface_work(w, step));
   Clock::time_point since = Clock::now();
   for (const PlannedStage &planned : w.plan.stages)
     if (!run(planned.row, w, step, trouble, since)) return false;

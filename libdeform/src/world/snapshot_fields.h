@@ -346,6 +346,8 @@ void fields(Stream &s, W &w, const World &like) {
     s.value("patience", r->patience, must::any);
   }
   s.value("accurate step", w.sizes.accurate, must::not_negative);
+  s.value("time of steady steps", w.sizes.steady, must::not_negative);
+  s.value("damping of changed steps", w.sizes.damping, must::not_negative);
   s.value("work put by", w.purse,
           must::Be{[](const IntegratorPurse &x) { return sound(x); }, "a finite sum"});
   s.must_hold("step size", "sizes that the library chooses", [&] { return sound(w.sizes); });

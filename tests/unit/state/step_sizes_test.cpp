@@ -2,9 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <random>
+#include <vector>
 
 using namespace dfm;
 
@@ -22,7 +25,7 @@ void step(StepSizes &s, double dt, double stable, Count &c) {
   const double size = dt / n;
   if (c.last > 0 && std::fabs(size - c.last) > 1e-9 * size) ++c.changes;
   c.last = size;
-  for (uint64_t i = 0; i < uint64_t(n); ++i) pass(s);
+  for (uint64_t i = 0; i < uint64_t(n); ++i) pass(s, size);
   c.substeps += uint64_t(n);
 }
 
@@ -109,7 +112,7 @@ TEST(StepSizes, FramesThatDifferALittle_KeepTheirNumberOfSubSteps) {
     const double n = choose_pieces(s, dt, stable);
     changed += last > 0 && n != last;
     last = n;
-    for (int k = 0; k < int(n); ++k) pass(s);
+    for (int k = 0; k < int(n); ++k) pass(s, dt / n);
   }
   EXPECT_LE(changed, 8);
 }
@@ -123,14 +126,85 @@ TEST(StepSizes, BoundThatFallsInAStep_HalvesItsSubSteps) {
   EXPECT_GE(cut_finer(s, 1, 0), 1e15) << "no number of sub-steps is enough";
 }
 
+// Steps of a host: in turn, in rhythm, and at random. Symplectic Euler moves single modes, from slow ones to
+// the stiffest that the bound allows; each takes the damping that is due.
+TEST(StepSizes, ThatAHostVaries_PutNoEnergyIntoAnyMode) {
+  std::mt19937 random(7);
+  const auto uniform = [&] { return double(random()) / 4294967296.0; };
+  struct Host {
+    const char *name;
+    std::function<double(int)> dt;
+  };
+  const std::vector<Host> hosts{
+      {"a third more or less", [&](int) { return (0.7 + 0.6 * uniform()) / 240; }},
+      {"short and uneven", [&](int) { return (0.7 + 0.6 * uniform()) / 2000; }},
+      {"a tenth more or less", [&](int) { return (0.9 + 0.2 * uniform()) / 60; }},
+      {"any", [&](int) { return std::pow(10, -4.5 + 3 * uniform()); }},
+      {"a late one at times", [&](int) { return uniform() < 0.05 ? 0.1 : 1.0 / 144; }},
+      {"two in turn", [](int k) { return k % 2 ? 1.0 / 240 : 1.0 / 280; }},
+      {"nearly the same two in turn", [](int k) { return k % 2 ? 4.4e-3 : 4e-3; }},
+      {"long ones in turn", [](int k) { return k % 2 ? 0.016 : 0.017; }},
+      {"three in turn", [](int k) { return k % 3 ? 0.017 : 0.016; }},
+      {"sevens in turn", [](int k) { return k / 7 % 2 ? 1.0 / 240 : 1.0 / 280; }},
+      {"a long one, a short one", [](int k) { return k % 3 == 0   ? 0.016
+                                                     : k % 3 == 1 ? 1e-3
+                                                                  : 1e-4; }}};
+  constexpr int kModes = 200;
+  for (const double bound : {5e-3, 1.3e-3, 6e-4})  // s, of the stiffest mode: 2 / w
+    for (const Host &host : hosts) {
+      StepSizes s;
+      std::vector<double> w(kModes), x(kModes), v(kModes), energy(kModes);
+      for (int m = 0; m < kModes; ++m) {
+        w[m] = std::pow(0.999 * 2 / bound, m / (kModes - 1.0));
+        const double phase = 6.283 * uniform();
+        x[m] = std::cos(phase) / w[m];
+        v[m] = std::sin(phase);
+        energy[m] = 0.5;
+      }
+      double h = 0;
+      for (double t = 0, k = 0; t < 6; ++k) {
+        const double dt = host.dt(int(k)), n = choose_pieces(s, dt, 0.9 * bound);
+        h = dt / n;
+        for (int i = 0; i < int(n); ++i) {
+          const double c = damping_due(s, h, bound);
+          for (int m = 0; m < kModes; ++m) {
+            v[m] -= w[m] * w[m] * (c * v[m] + h * x[m]);
+            x[m] += h * v[m];
+          }
+          pass(s, h);
+        }
+        t += dt;
+      }
+      double most = 0;
+      for (int m = 0; m < kModes; ++m) {
+        const double u = w[m] * x[m], kept = 0.5 * (v[m] * v[m] + u * u - h * w[m] * u * v[m]);
+        most = std::max(most, kept / energy[m]);
+      }
+      // A size has an energy of its own, up to 1 / (1 - w h / 2) times that at the start.
+      EXPECT_LT(most, 3) << host.name << ", bound " << bound;
+    }
+}
+
+// A step that varies once costs damping once, and one that is steady none.
+TEST(StepSizes, ThatStaySteady_CallForNoDamping) {
+  StepSizes s;
+  for (int i = 0; i < 100; ++i) {
+    const double stable = 1e-3 * (1 + 0.3 * std::sin(0.1 * i));
+    choose_pieces(s, i < 50 ? 1.0 / 60 : 1.0 / 60 * 2, stable);
+    EXPECT_EQ(damping_due(s, 1e-4, stable), 0) << i;
+  }
+}
+
 TEST(StepSizes, StateThatNoWorldReaches_IsReported) {
   EXPECT_TRUE(sound(StepSizes{}));
-  for (int bad = 0; bad < 4; ++bad) {
+  for (int bad = 0; bad < 6; ++bad) {
     StepSizes s;
     if (bad == 0) s.cut.size = NAN;
     if (bad == 1) s.offer.size = -1;
     if (bad == 2) s.cut.patience = 0;
     if (bad == 3) s.offer.calm = kMostPatience + 1;
+    if (bad == 4) s.steady = 2 * kSteady;
+    if (bad == 5) s.damping = -1;
     EXPECT_FALSE(sound(s)) << bad;
   }
 }
