@@ -168,8 +168,8 @@ class Dynamics {
   virtual bool see_forces(const SubStep &) { return true; }
   // fraction: share of the displacement that is taken; velocities are those of the end.
   virtual void commit(const SubStep &now, double fraction) = 0;
-  // After commit(): takes c M^-1 K v from the velocities, c in s2, K the stiffness of the model, constant over
-  // `ahead` (s) of the motion. Momentum and angular momentum stay.
+  // After commit(): takes c M^-1 K v from the velocities, c in s2, K the stiffness of the model, which is
+  // taken as constant over `ahead` (s) of the motion. Momentum and angular momentum stay.
   virtual void damp(double /*time*/, double /*c*/, double /*ahead*/) {}
 
   // Computes the points that steps may leave out because no surfel depends on them. Call before reading

@@ -108,9 +108,9 @@ bool changed_by_host(const StepSizes &before, const StepSizes &now, double stabl
   return before.cut.size > 0 && differ(now.cut.size, before.cut.size) && !earned(before, now, stable);
 }
 
-// A change by d adds to the energy of a mode of frequency w at most the share w d / 2 / (1 - w h / 2); damping
-// takes w^2 c. A mode gains repeatedly only if it turns by pi / 2 or more between two changes: so c is the
-// largest quotient for w from pi / (2 T) to 2 / stable. That lies at one of the ends.
+// A change by d adds to the energy of a mode of frequency w at most the share w d / 2 / (1 - w h / 2);
+// damping takes w^2 c. A mode gains repeatedly only if it turns by pi / 2 or more between two changes: so c
+// is the largest quotient for w from pi / (2 T) to 2 / stable. That lies at one of the ends.
 double damping_of_change(double was, double is, double stable, double since) {
   const double longest = std::max(was, is), time = std::max(longest, std::min(since, kLongestRhythm));
   const double slow = 2 / pi * time / (1 - pi / 4 * longest / time);
