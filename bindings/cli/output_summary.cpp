@@ -130,7 +130,7 @@ void Checker::check(bool start_state) {
     checks_.inverted_max = std::max(checks_.inverted_max, inverted);
     checks_.inverted_last += inverted;
     surfaces_.push_back({positions_[b].data(), n, body.triangles.data(), uint32_t(body.triangles.size() / 3),
-                         false, body.cut});
+                         false, body.cut, body.whole});
   }
   for (const RigidView &rigid : scene_.rigids()) {
     const dfm_body_measure m = rigid_measure(rigid);
@@ -155,10 +155,30 @@ void Checker::check(bool start_state) {
   }
   const crossing::Found found = counter_.count(
       surfaces_, start_state ? crossing::Touching::allowed : crossing::Touching::counts, joined());
+  keep(found);
+}
+
+void Checker::keep(const crossing::Found &found) {
+  const auto name = [&](uint32_t surface) {
+    const size_t nb = scene_.bodies().size();
+    return surface < nb ? scene_.bodies()[surface].name : solids_[surface - nb].name;
+  };
+  const auto name_both = [&](const uint32_t of[2], std::string to[2]) {
+    to[0] = name(of[0]);
+    to[1] = name(of[1]);
+  };
+  const size_t others = found.between - found.parts;
+  if (others > checks_.others_max) name_both(found.crossing, checks_.crossing);
+  if (found.parts > checks_.parts_max) name_both(found.parted, checks_.parted);
+  if (found.within > checks_.self_max) checks_.crossed = name(found.crossed);
   checks_.intersections_max = std::max(checks_.intersections_max, found.all());
   checks_.between_max = std::max(checks_.between_max, found.between);
+  checks_.parts_max = std::max(checks_.parts_max, found.parts);
+  checks_.others_max = std::max(checks_.others_max, others);
   checks_.self_max = std::max(checks_.self_max, found.within);
   checks_.between_last = found.between;
+  checks_.parts_last = found.parts;
+  checks_.others_last = others;
   checks_.self_last = found.within;
 }
 
