@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <map>
 #include <string_view>
 #include <utility>
 
@@ -397,6 +398,28 @@ std::string joules(double energy) {
   return text;
 }
 
+// Of a body that has shattered most pieces are of a few cells, and each is a body.
+void print_shattered(const SceneFile &scene) {
+  constexpr size_t kMany = 64;
+  std::map<dfm_body, size_t> parts;  // by the body that the scene has made
+  for (const BodyView &body : scene.bodies()) ++parts[body.whole];
+  for (const auto &[whole, n] : parts) {
+    if (n < kMany) continue;
+    const std::string name = quoted(scene.name_of(whole));
+    size_t b = 0;
+    const auto value = [&](const char *of) { return scene.value("/bodies/" + std::to_string(b) + of); };
+    while (!value("/model").empty() || !value("/mesh").empty())
+      if (value("/name") == name) break;
+      else ++b;
+    const std::string least = value("/separate/least_cells");
+    std::printf(
+        "body %s has come apart into %zu bodies; where that is slow, \"least_cells\" above %s%s in its "
+        "\"separate\", or a larger \"tear\", makes fewer\n",
+        name.c_str(), n, least.empty() ? "1" : least.c_str(),
+        value("/separate/crumbs") == "\"remove\"" ? "" : " with \"crumbs\": \"remove\"");
+  }
+}
+
 // Why a run is slow, where contact is why and its mesh can be made coarser: slower than a fifth of real time,
 // half of it in contact of a hundred points.
 void print_contact_share(const SceneFile &scene, const RunResult &run, uint32_t contacts_max) {
@@ -460,6 +483,7 @@ void print_table(const SceneFile &scene, const RunResult &run, const Checks &che
     std::printf("integrator auto: implicit for %.3g s of %.3g s (%.0f %%), explicit else; %.0f changes\n",
                 share.implicit, share.steps, 100 * share.implicit / share.steps, share.changes);
   print_contact_share(scene, run, stats.contacts_max);
+  print_shattered(scene);
   print_swaps(scene, run);
 }
 

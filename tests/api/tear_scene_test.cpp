@@ -59,7 +59,8 @@ TEST(TearScene, PartsOfALiver_AreNotReportedAsOverlapping) {
 namespace {
 
 // A ball of glass that strikes a floor and falls into many parts; what the command says.
-std::string shattered(const std::string &name, const std::string &duration, const std::string &separate) {
+test::CommandResult shattered(const std::string &name, const std::string &duration,
+                              const std::string &separate) {
   const std::string folder = test::scratch(name + " " + std::to_string(getpid()));
   test::write_file(folder + "/scene.json", R"({"format": "deform-scene", "version": 1,
     "time": {"duration": )" + duration + R"(, "step": 0.001}, "contact": {"untangle": true},
@@ -72,7 +73,7 @@ std::string shattered(const std::string &name, const std::string &duration, cons
     "obstacles": [{"name": "floor", "shape": "plane"}], "output": {"every": 0.002}})");
   const test::CommandResult r = test::deform({"run", folder + "/scene.json", "--out", folder + "/out"});
   EXPECT_EQ(r.exit_code, 0) << r.err;
-  return r.err;
+  return r;
 }
 
 constexpr const char *kTeeth = "teeth of a cut or tear are as large as the cells";
@@ -81,8 +82,9 @@ constexpr const char *kTeeth = "teeth of a cut or tear are as large as the cells
 
 // Nobody has put pieces in each other, and nothing of them can be moved: one sentence says what they are.
 TEST(TearScene, PiecesOfABallThatShatters_AreToldOnceAndNotToBeMoved) {
-  const std::string log =
+  const test::CommandResult r =
       shattered("pieces of a ball", "0.03", R"("separate": {"least_cells": 1, "crumbs": "stay"},)");
+  const std::string &log = r.err;
   const std::string said = "parts of body 'ball' came off with their faces in each other, by up to ";
   size_t times = 0;
   for (size_t at = log.find(said); at != std::string::npos; at = log.find(said, at + 1)) ++times;
@@ -91,10 +93,12 @@ TEST(TearScene, PiecesOfABallThatShatters_AreToldOnceAndNotToBeMoved) {
   EXPECT_NE(log.find(kTeeth), std::string::npos) << log;
   for (const char *not_to_be_done : {"move one of them", "untangle", "overlap by"})
     EXPECT_EQ(log.find(not_to_be_done), std::string::npos) << log;
+  EXPECT_NE(r.out.find("body \"ball\" has come apart into "), std::string::npos) << r.out;
+  EXPECT_NE(r.out.find("\"least_cells\" above 1 with \"crumbs\": \"remove\""), std::string::npos) << r.out;
 }
 
 TEST(TearScene, TornBodyThatCrossesItself_IsAdvisedToSeparate) {
-  const std::string log = shattered("torn ball", "0.06", "");
+  const std::string log = shattered("torn ball", "0.06", "").err;
   EXPECT_NE(log.find("a surface crosses itself"), std::string::npos) << log;
   EXPECT_NE(log.find("set \"separate\" of body 'ball'"), std::string::npos) << log;
 }
