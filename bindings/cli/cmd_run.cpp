@@ -93,6 +93,11 @@ bool asks_for_spoiled_start(const SceneFile &scene) {
   return false;
 }
 
+// The faces of a cut or a tear are those of cells.
+constexpr const char *kTeeth =
+    "teeth of a cut or tear are as large as the cells; a mesh with layers of cells along the cut has none, "
+    "smaller cells have smaller ones";
+
 class Runner {
  public:
   Runner(const SceneFile &scene, const RunOptions &options, const Globals &globals, Comparison *comparison)
@@ -189,17 +194,22 @@ class Runner {
           "a model that recovers (corotational_fem, shape_matching)");
     else if (!spoiled_ && trouble_ & DFM_TROUBLE_INVERTED) out.push_back(inverted());
     if (often_unsolved()) out.push_back(unsolved());
-    const size_t between = spoiled_ ? checks().between_last : checks().between_max;
-    const size_t within = spoiled_ ? checks().self_last : checks().self_max;
+    const Checks &seen = checks();
+    const size_t others = spoiled_ ? seen.others_last : seen.others_max;
+    const size_t parts = spoiled_ ? seen.parts_last : seen.parts_max;
+    const size_t within = spoiled_ ? seen.self_last : seen.self_max;
     const std::string when = spoiled_ ? " in the last state" : " in one state";
     const auto pairs = [](auto most) { return "up to " + std::to_string(most) + " triangle pairs"; };
-    if (between > 0) out.push_back("surfaces cross: " + pairs(between) + " of two surfaces" + when);
+    const auto both = [](const std::string of[2]) { return "'" + of[0] + "' and '" + of[1] + "'"; };
+    if (others > 0)
+      out.push_back("surfaces cross: " + pairs(others) + " of two surfaces" + when + " (" +
+                    both(seen.crossing) + ")");
+    if (parts > 0)
+      out.push_back("parts of a body cross where they came off: " + pairs(parts) + " of two parts" + when +
+                    " (" + both(seen.parted) + "): " + kTeeth);
     if (within > 0)
-      out.push_back("a surface crosses itself: " + pairs(within) + when +
-                    (any_cut()
-                         ? "; take a shorter step, or set \"separate\" of the body that was cut to make "
-                           "its parts bodies"
-                         : "; \"contact\": {\"self\": \"auto\"} prevents this"));
+      out.push_back("a surface crosses itself: " + pairs(within) + " of body '" + seen.crossed + "'" + when +
+                    crossed_itself());
     return out;
   }
 
@@ -214,6 +224,7 @@ class Runner {
 
   std::string unsolved() const {
     const dfm_world_stats stats = world_stats(scene_);
+    const std::string sweeps = scene_.value("/contact/max_sweeps");
     char share[160];
     std::snprintf(share, sizeof share, "in %llu of %llu sub-steps (%.2g %%), with errors of up to %.1e m/s",
                   static_cast<unsigned long long>(stats.unconverged),
@@ -221,9 +232,9 @@ class Runner {
                   100 * double(stats.unconverged) / double(stats.substeps), stats.residual_max);
     return std::string("the contact solve stopped at its limit of sweeps ") + share +
            ": forces of contact and friction are inexact there, and what should hold may creep; raise "
-           "\"max_sweeps\" of \"contact\" (50), take a shorter step, add damping to the material, or lower "
-           "the "
-           "ratio of masses or stiffnesses";
+           "\"max_sweeps\" of \"contact\" (" +
+           (sweeps.empty() ? "50" : sweeps) +
+           "), take a shorter step, add damping to the material, or lower the ratio of masses or stiffnesses";
   }
 
   // A load that the material bears inverts few cells, where the mesh is coarse for it; one that it does not
@@ -246,9 +257,24 @@ class Runner {
            "\"young\", or reduce what presses on it";
   }
 
-  bool any_cut() const {
-    return std::any_of(scene_.bodies().begin(), scene_.bodies().end(),
-                       [](const BodyView &b) { return b.cut; });
+  // What helps against a surface that crosses itself, as far as the scene does not ask for it yet.
+  std::string crossed_itself() const {
+    const auto at = std::ranges::find(scene_.bodies(), checks().crossed, &BodyView::name);
+    const bool cut = at != scene_.bodies().end() && at->cut;
+    if (!cut) {
+      const std::string self = scene_.value("/contact/self");
+      return self.empty() || self == "false"
+                 ? "; \"contact\": {\"self\": \"auto\"} prevents this"
+                 : "; self contact cannot part what crosses itself at rest, of which deform mesh info tells; "
+                   "else take a shorter step";
+    }
+    const std::string &whole = scene_.name_of(at->whole);
+    for (size_t b = 0; !scene_.value("/bodies/" + std::to_string(b)).empty(); ++b) {
+      const std::string body = "/bodies/" + std::to_string(b);
+      if (scene_.value(body + "/name") == '"' + whole + '"' && !scene_.value(body + "/separate").empty())
+        return std::string(", where it is cut or torn: ") + kTeeth;
+    }
+    return "; take a shorter step, or set \"separate\" of body '" + whole + "' to make its parts bodies";
   }
 
   double frame_interval() const {

@@ -351,7 +351,19 @@ void Counter::test(const Item &ia, const Item &ib) {
         if (ta[i] == tb[j] || std::memcmp(a[i], b[j], 3 * sizeof(double)) == 0) return;
   if (!(touching_ == Touching::counts ? meet(a, b) : pass_through(a, b))) return;
   if (sa.cut && sb.cut && depth(a, b) < kLaid * std::max(longest_edge(a), longest_edge(b))) return;
-  ++(ia.surface == ib.surface ? found_.within : found_.between);
+  if (ia.surface == ib.surface) {
+    if (found_.within++ == 0) found_.crossed = ia.surface;
+    return;
+  }
+  ++found_.between;
+  const bool parts = sa.whole != 0 && sa.whole == sb.whole;
+  const bool first = parts ? found_.parts == 0 : found_.between == found_.parts + 1;
+  uint32_t *const names = parts ? found_.parted : found_.crossing;
+  if (first) {
+    names[0] = std::min(ia.surface, ib.surface);
+    names[1] = std::max(ia.surface, ib.surface);
+  }
+  found_.parts += parts;
 }
 
 }  // namespace crossing

@@ -26,13 +26,15 @@ double depth(const Triangle a, const Triangle b);
 bool pass_through(const Triangle a, const Triangle b);
 
 // obstacle: pairs of its triangles among themselves or with another obstacle's are not counted.
-// cut: its cut faces lie on each other, or on those of its pieces.
+// cut: its cut faces lie on each other, or on those of its pieces. whole: the same for parts of one body; 0:
+// of none.
 struct Surface {
   const double *xyz;
   uint32_t n;
   const uint32_t *tri;
   uint32_t ntri;
   bool obstacle = false, cut = false;
+  uint64_t whole = 0;
 };
 
 // Committed states keep a distance between surfaces, so there any shared point counts; a start state is the
@@ -43,8 +45,10 @@ enum class Touching { counts, allowed };
 // Two that are `cut` cross only where the depth is above kLaid of the longest edge of the two triangles: cut
 // faces are kept apart to rest distances of contacts.
 inline constexpr double kLaid = 5e-3;
+// parts: those of two parts of one body, of `between`. Which surfaces cross: of the first pair of each kind.
 struct Found {
-  size_t between = 0, within = 0;
+  size_t between = 0, within = 0, parts = 0;
+  uint32_t crossed = 0, crossing[2] = {0, 0}, parted[2] = {0, 0};
   size_t all() const { return between + within; }
 };
 

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <map>
 #include <string_view>
 #include <utility>
 
@@ -130,7 +131,7 @@ void Checker::check(bool start_state) {
     checks_.inverted_max = std::max(checks_.inverted_max, inverted);
     checks_.inverted_last += inverted;
     surfaces_.push_back({positions_[b].data(), n, body.triangles.data(), uint32_t(body.triangles.size() / 3),
-                         false, body.cut});
+                         false, body.cut, body.whole});
   }
   for (const RigidView &rigid : scene_.rigids()) {
     const dfm_body_measure m = rigid_measure(rigid);
@@ -155,10 +156,30 @@ void Checker::check(bool start_state) {
   }
   const crossing::Found found = counter_.count(
       surfaces_, start_state ? crossing::Touching::allowed : crossing::Touching::counts, joined());
+  keep(found);
+}
+
+void Checker::keep(const crossing::Found &found) {
+  const auto name = [&](uint32_t surface) {
+    const size_t nb = scene_.bodies().size();
+    return surface < nb ? scene_.bodies()[surface].name : solids_[surface - nb].name;
+  };
+  const auto name_both = [&](const uint32_t of[2], std::string to[2]) {
+    to[0] = name(of[0]);
+    to[1] = name(of[1]);
+  };
+  const size_t others = found.between - found.parts;
+  if (others > checks_.others_max) name_both(found.crossing, checks_.crossing);
+  if (found.parts > checks_.parts_max) name_both(found.parted, checks_.parted);
+  if (found.within > checks_.self_max) checks_.crossed = name(found.crossed);
   checks_.intersections_max = std::max(checks_.intersections_max, found.all());
   checks_.between_max = std::max(checks_.between_max, found.between);
+  checks_.parts_max = std::max(checks_.parts_max, found.parts);
+  checks_.others_max = std::max(checks_.others_max, others);
   checks_.self_max = std::max(checks_.self_max, found.within);
   checks_.between_last = found.between;
+  checks_.parts_last = found.parts;
+  checks_.others_last = others;
   checks_.self_last = found.within;
 }
 
@@ -377,6 +398,28 @@ std::string joules(double energy) {
   return text;
 }
 
+// Of a body that has shattered most pieces are of a few cells, and each is a body.
+void print_shattered(const SceneFile &scene) {
+  constexpr size_t kMany = 64;
+  std::map<dfm_body, size_t> parts;  // by the body that the scene has made
+  for (const BodyView &body : scene.bodies()) ++parts[body.whole];
+  for (const auto &[whole, n] : parts) {
+    if (n < kMany) continue;
+    const std::string name = quoted(scene.name_of(whole));
+    size_t b = 0;
+    const auto value = [&](const char *of) { return scene.value("/bodies/" + std::to_string(b) + of); };
+    while (!value("/model").empty() || !value("/mesh").empty())
+      if (value("/name") == name) break;
+      else ++b;
+    const std::string least = value("/separate/least_cells");
+    std::printf(
+        "body %s has come apart into %zu bodies; where that is slow, \"least_cells\" above %s%s in its "
+        "\"separate\", or a larger \"tear\", makes fewer\n",
+        name.c_str(), n, least.empty() ? "1" : least.c_str(),
+        value("/separate/crumbs") == "\"remove\"" ? "" : " with \"crumbs\": \"remove\"");
+  }
+}
+
 // Why a run is slow, where contact is why and its mesh can be made coarser: slower than a fifth of real time,
 // half of it in contact of a hundred points.
 void print_contact_share(const SceneFile &scene, const RunResult &run, uint32_t contacts_max) {
@@ -440,6 +483,7 @@ void print_table(const SceneFile &scene, const RunResult &run, const Checks &che
     std::printf("integrator auto: implicit for %.3g s of %.3g s (%.0f %%), explicit else; %.0f changes\n",
                 share.implicit, share.steps, 100 * share.implicit / share.steps, share.changes);
   print_contact_share(scene, run, stats.contacts_max);
+  print_shattered(scene);
   print_swaps(scene, run);
 }
 

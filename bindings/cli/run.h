@@ -83,6 +83,10 @@ struct Checks {
   size_t between_max = 0, self_max = 0;
   uint32_t inverted_max = 0;
   size_t between_last = 0, self_last = 0;  // of the last state
+  // of pairs between surfaces: those of two parts of one body, and all others
+  size_t parts_max = 0, parts_last = 0, others_max = 0, others_last = 0;
+  // in the state with the most pairs: two surfaces that cross, two that are parts, one that crosses itself
+  std::string crossing[2], parted[2], crossed;
   uint32_t inverted_last = 0;
   // of the body and the state with the most inverted cells
   std::string inverted_body, inverted_model;
@@ -101,6 +105,7 @@ class Checker {
 
  private:
   std::vector<std::array<uint32_t, 2>> joined() const;
+  void keep(const crossing::Found &found);
 
   const SceneFile &scene_;
   // obstacles of triangles, and the cores of voxels

@@ -117,9 +117,24 @@ void SceneFile::renew_list() const {
     body.model = info.model;
     read_shape(info, body);
     body.cut = body.cut || pieces;
+    body.whole = handle;
     body.number = numbers_.try_emplace(handle, uint32_t(numbers_.size())).first->second;
     names_[body.handle] = body.name;
     bodies_.push_back(std::move(body));
+  }
+  if (pieces) find_wholes();
+}
+
+void SceneFile::find_wholes() const {
+  std::vector<dfm_body> pieces;
+  for (const BodyView &body : bodies_) {
+    if (!body.cut || body.whole != body.handle) continue;
+    uint32_t n = 0;
+    need(dfm_body_pieces(body.handle, 0, nullptr, &n));
+    pieces.resize(n);
+    if (n > 0) need(dfm_body_pieces(body.handle, n, pieces.data(), &n));
+    for (BodyView &piece : bodies_)
+      if (std::ranges::find(pieces, piece.handle) != pieces.end()) piece.whole = body.handle;
   }
 }
 

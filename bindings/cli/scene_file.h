@@ -16,6 +16,7 @@ struct BodyView {
   uint32_t npoint = 0, ntet = 0, nsurfel = 0;
   double rest_volume = 0;
   bool cut = false;                 // it has been cut, or is a piece that came off
+  dfm_body whole = 0;               // a piece: the body that the scene has made; else the body itself
   std::vector<uint32_t> triangles;  // [n,3] surfel numbers
 };
 
@@ -58,6 +59,7 @@ class SceneFile {
   std::string explain() const;
 
  private:
+  void find_wholes() const;
   std::unique_ptr<dfm_context, decltype(&dfm_context_destroy)> context_;  // owns scene and world
   std::string path_;
   dfm_scene scene_ = 0;

@@ -154,3 +154,71 @@ TEST(AttachScene, InvalidAttachment_IsReportedWithItsPlace) {
     test::says({"/bodies/0/attach/0", said.c_str()});
   }
 }
+
+namespace {
+
+// A bar of 20 cm whose left end hangs on a jaw beside it, over a floor.
+std::string held_bar(double floor, const std::string &attach, const std::string &jaw) {
+  return R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.6, "step": 0.001},
+    "materials": {"gel": {"young": 5e4, "damping": {"mass": 0.5, "stiffness": 0.001}}},
+    "bodies": [{"name": "bar", "mesh": {"make": "beam", "size": [0.2, 0.05, 0.05], "cells": 400},
+      "model": {"type": "corotational_fem"}, "material": "gel", "pose": {"position": [0, 0, 0.1]},
+      "attach": [{"to": "jaw", "box": [[-1, -1, -1], [0.001, 1, 1]])" +
+         attach + R"(}]}],
+    "obstacles": [{"name": "floor", "shape": "plane", "point": [0, 0, )" +
+         std::to_string(floor) + R"(]},
+      {"name": "jaw", "shape": "box", "half_size": [0.02, 0.05, 0.05],
+       "pose": {"position": [-0.03, 0.025, 0.125]})" +
+         jaw + R"(}]})";
+}
+constexpr const char *kDown = R"(, "motion": {"keyframes": [{"t": 0, "position": [-0.03, 0.025, 0.125]},
+  {"t": 1, "position": [-0.03, 0.025, -0.1]}]})";
+
+test::CommandResult run_of(const std::string &text) {
+  const std::string folder = test::scratch("held bar " + std::to_string(getpid()));
+  test::write_file(folder + "/scene.json", text);
+  return test::deform({"run", folder + "/scene.json", "--out", folder + "/out"});
+}
+
+constexpr const char *kCause = "its attachment to 'jaw' holds ";
+constexpr const char *kRemedy = "give the attachment a \"stiffness\"";
+
+}  // namespace
+
+// Contact would push out what the attachment holds in place: neither can be satisfied.
+TEST(AttachScene, PointsInAnObstacle_AreToldAtTheStart) {
+  const test::CommandResult r = run_of(held_bar(0.12, "", ""));
+  EXPECT_NE(r.err.find("body 'bar' and obstacle 'floor' overlap by"), std::string::npos) << r.err;
+  EXPECT_NE(r.err.find(kCause), std::string::npos) << r.err;
+  EXPECT_NE(r.err.find(kRemedy), std::string::npos) << r.err;
+  EXPECT_EQ(r.err.find("untangle"), std::string::npos) << r.err;
+}
+
+TEST(AttachScene, PointsPressedOnAnObstacle_EndTheRunWithTheirCause) {
+  const test::CommandResult r = run_of(held_bar(0, "", kDown));
+  EXPECT_EQ(r.exit_code, 3);
+  EXPECT_NE(r.err.find("body 'bar' on obstacle 'floor': squeezed until nothing can move"), std::string::npos)
+      << r.err;
+  EXPECT_NE(r.err.find(kCause), std::string::npos) << r.err;
+  EXPECT_NE(r.err.find(kRemedy), std::string::npos) << r.err;
+}
+
+// What the sentences advise.
+TEST(AttachScene, PointsOfASpringInOrOnAnObstacle_Yield) {
+  const std::string spring = R"(, "stiffness": 2e4)";
+  for (const std::string &text : {held_bar(0.12, spring, ""), held_bar(0, spring, kDown)}) {
+    const test::CommandResult r = run_of(text);
+    EXPECT_EQ(r.exit_code, 0) << r.err;
+    EXPECT_EQ(r.err.find(kCause), std::string::npos) << r.err;
+  }
+}
+
+// It would be drawn back to where it was.
+TEST(AttachScene, UntangledBodyThatIsAttached_StaysAndIsTold) {
+  std::string text = held_bar(0.12, "", "");
+  text.insert(text.find("\"materials\""), R"("contact": {"untangle": true}, )");
+  const test::CommandResult r = run_of(text);
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_NE(r.err.find("untangle cannot separate 'bar' and 'floor'"), std::string::npos) << r.err;
+  EXPECT_NE(r.err.find(kCause), std::string::npos) << r.err;
+}

@@ -55,3 +55,64 @@ TEST(TearScene, PartsOfALiver_AreNotReportedAsOverlapping) {
   EXPECT_NE(summary.find("\"liver.1\""), std::string::npos);
   EXPECT_EQ(summary.find("overlap by"), std::string::npos) << summary;
 }
+
+namespace {
+
+// A ball of glass that strikes a floor and falls into many parts; what the command says.
+test::CommandResult shattered(const std::string &name, const std::string &duration,
+                              const std::string &separate) {
+  const std::string folder = test::scratch(name + " " + std::to_string(getpid()));
+  test::write_file(folder + "/scene.json", R"({"format": "deform-scene", "version": 1,
+    "time": {"duration": )" + duration + R"(, "step": 0.001}, "contact": {"untangle": true},
+    "materials": {"glass": {"density": 1000, "young": 1e5, "poisson": 0.3, "tear": 0.08,
+                            "damping": {"mass": 0.5, "stiffness": 0.001}}},
+    "bodies": [{"name": "ball", "mesh": {"make": "ball", "radius": 0.1, "cells": 500}, "material": "glass",
+      "model": {"type": "corotational_fem"}, )" +
+                                               separate + R"(
+      "pose": {"position": [0, 0, 0.12]}, "velocity": [0, 0, -3]}],
+    "obstacles": [{"name": "floor", "shape": "plane"}], "output": {"every": 0.002}})");
+  const test::CommandResult r = test::deform({"run", folder + "/scene.json", "--out", folder + "/out"});
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  return r;
+}
+
+constexpr const char *kTeeth = "teeth of a cut or tear are as large as the cells";
+
+}  // namespace
+
+// Nobody has put pieces in each other, and nothing of them can be moved: one sentence says what they are.
+TEST(TearScene, PiecesOfABallThatShatters_AreToldOnceAndNotToBeMoved) {
+  const test::CommandResult r =
+      shattered("pieces of a ball", "0.03", R"("separate": {"least_cells": 1, "crumbs": "stay"},)");
+  const std::string &log = r.err;
+  const std::string said = "parts of body 'ball' came off with their faces in each other, by up to ";
+  size_t times = 0;
+  for (size_t at = log.find(said); at != std::string::npos; at = log.find(said, at + 1)) ++times;
+  EXPECT_GE(times, 1u) << log;
+  EXPECT_LE(times, 4u) << "again only where they are twice as deep\n" << log;
+  EXPECT_NE(log.find(kTeeth), std::string::npos) << log;
+  for (const char *not_to_be_done : {"move one of them", "untangle", "overlap by"})
+    EXPECT_EQ(log.find(not_to_be_done), std::string::npos) << log;
+  EXPECT_NE(r.out.find("body \"ball\" has come apart into "), std::string::npos) << r.out;
+  EXPECT_NE(r.out.find("\"least_cells\" above 1 with \"crumbs\": \"remove\""), std::string::npos) << r.out;
+}
+
+TEST(TearScene, TornBodyThatCrossesItself_IsAdvisedToSeparate) {
+  const std::string log = shattered("torn ball", "0.06", "").err;
+  EXPECT_NE(log.find("a surface crosses itself"), std::string::npos) << log;
+  EXPECT_NE(log.find("set \"separate\" of body 'ball'"), std::string::npos) << log;
+}
+
+// The same of a rough cut in a scene that separates: what is left to be done is another mesh.
+TEST(TearScene, CutBodyThatCrossesItself_IsNotAdvisedToSeparateWhereItDoes) {
+  const std::string out = test::scratch("rough cut " + std::to_string(getpid()));
+  const std::string mesh = R"(/bodies/0/mesh={"make": "ball", "radius": 0.04, "cells": 2500})";
+  const test::CommandResult r =
+      test::deform({"run", DEFORM_SOURCE_DIR "/examples/scenes/orange.json", "--time", "0.35", "--set",
+                    "/output/every=0.01", "--set", mesh, "--out", out});
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_NE(r.err.find("a surface crosses itself"), std::string::npos) << r.err;
+  EXPECT_NE(r.err.find("triangle pairs of body 'orange"), std::string::npos) << r.err;
+  EXPECT_NE(r.err.find(kTeeth), std::string::npos) << r.err;
+  EXPECT_EQ(r.err.find("set \"separate\""), std::string::npos) << r.err;
+}

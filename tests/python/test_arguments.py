@@ -158,6 +158,98 @@ class Arguments(unittest.TestCase):
                 self.refused(sentence, function)
             self.assertEqual((len(world.bodies), len(world.obstacles)), (0, 0))
 
+    def test_texts_and_lists_are_no_numbers(self):
+        """NumPy and float() read texts, and None as nan."""
+        mesh = deform.TetMesh.ball(0.1, cells=100)
+        with deform.World() as world:
+            body = world.add_body(mesh, name="ball")
+            tool = world.add_tool("sphere", radius=0.01, position=(0, 0, 1))
+            start = world.hash
+            for sentence, function in (
+                    ("dt is '1'; expected a number", lambda: world.step("1")),
+                    (r"dt is \[0.1, 0.2\]; expected a number", lambda: world.step([0.1, 0.2])),
+                    ("dt is None; expected a number", lambda: world.step(None)),
+                    ("duration is '1'; expected a number", lambda: world.run("1")),
+                    ("dt is '1'; expected a number", lambda: world.run(1, dt="1")),
+                    ("max_time is '1'; expected a number", lambda: world.set_budget("1")),
+                    ("gravity is .*'0', '0', '-9'.*; expected 3 numbers",
+                     lambda: world.set_gravity(["0", "0", "-9"])),
+                    (r"gravity is \[None, 0, 0\]; expected 3 numbers",
+                     lambda: world.set_gravity([None, 0, 0])),
+                    ("radius is '1'; expected a number", lambda: world.add_obstacle("sphere", radius="1")),
+                    ("mass is '1'; expected a number", lambda: world.add_rigid("sphere", mass="1")),
+                    ("stiffness is '1'; expected a number", lambda: world.add_tool(radius=1, stiffness="1")),
+                    ("release is '5'; expected a number",
+                     lambda: body.attach(world.add_obstacle(), box=[[-1] * 3, [1] * 3], release="5")),
+                    ("reach is '1'; expected a number", lambda: tool.grab(body, reach="1")),
+                    ("force is .*; expected 3 numbers", lambda: body.add_load([0], ["0", "0", "1"])),
+                    ("velocities is .*; expected an array", lambda: body.set_state(velocities=[["a"] * 3])),
+                    ("t is '1'; expected a number",
+                     lambda: body.plan_cut("1", point=(0, 0, 0), normal=(0, 0, 1))),
+                    ("least_cells is '8'; expected a whole number", lambda: body.set_separate("8")),
+                    ("cells is '100'; expected a whole number", lambda: deform.TetMesh.ball(0.1, "100")),
+                    ("a size of the mesh is '0.1'; expected", lambda: deform.TetMesh.ball("0.1")),
+                    ("threads is '2'; expected a whole number", lambda: deform.World(threads="2")),
+                    ("step is '1'; expected a number", lambda: deform.World(step="1")),
+                    ("radius is '1'; expected a number", lambda: deform.Shape.sphere("1")),
+                    ("name is 3; expected a text", lambda: world.find_body(3)),
+                    ("name is None; expected a text", lambda: world.find_tool(None)),
+                    ("parameter 'mu' is None; expected a number", lambda: world.add_friction(mu=None)),
+                    ("dt is '1'; expected a number", lambda: deform.Law("coulomb")([1], [[0], [0]], "1")),
+                    ("vt is .*; expected an array", lambda: deform.Law("coulomb")([1], "fast", 1)),
+                    ("max_distance is '1'; expected", lambda: world.query_closest((0, 0, 0), "1"))):
+                with self.subTest(sentence):
+                    self.refused(sentence, function)
+                    with self.assertRaises(TypeError):
+                        function()
+            self.assertEqual(world.hash, start)
+            self.assertEqual(world.time, 0)
+            world.step(np.float32(1e-3))
+            world.step(np.array(1e-3))
+
+    def test_whole_numbers_are_whole_and_not_negative(self):
+        """ctypes takes a negative number for one of four billions."""
+        mesh, surface = deform.TetMesh.ball(0.1, cells=100), deform.TriMesh.make("ball", [0.1], 200)
+        with deform.World() as world:
+            body = world.add_body(mesh)
+            for sentence, function in (
+                    ("most is -1; expected a whole number from 0",
+                     lambda: body.cut("plane", point=(0, 0, 0), normal=(0, 0, 1), most=-1)),
+                    ("most is 1.5; expected a whole number from 0",
+                     lambda: body.cut("plane", point=(0, 0, 0), normal=(0, 0, 1), most=1.5)),
+                    ("cells is -5; expected a whole number from 0",
+                     lambda: world.add_obstacle("voxels", mesh=surface, cells=-5)),
+                    ("cells is nan; expected a whole number", lambda: deform.TetMesh.ball(1, math.nan)),
+                    ("max_sweeps is -1; expected", lambda: deform.World(max_sweeps=-1)),
+                    ("load_steps is 0; expected a whole number from 1", lambda: world.equilibrium(0)),
+                    ("load is -1; expected a whole number", lambda: body.remove_load(-1))):
+                with self.subTest(sentence):
+                    self.refused(sentence, function)
+
+    def test_sizes_that_cannot_be_are_named(self):
+        mesh = deform.TetMesh.ball(0.1, cells=100)
+        with deform.World() as world:
+            body = world.add_body(mesh)
+            for sentence, function in (
+                    ("radius", lambda: world.add_obstacle("sphere", radius=-1)),
+                    ("radius", lambda: world.add_obstacle("sphere", radius=math.nan)),
+                    ("half_size", lambda: world.add_obstacle("box", half_size=(1, -1, 1))),
+                    ("mass", lambda: world.add_rigid("sphere", mass=-1)),
+                    ("radius", lambda: world.add_tool("sphere", radius=math.nan)),
+                    ("radius", lambda: deform.TetMesh.ball(-1)),
+                    ("half_size|axes|radius", lambda: body.cut("sphere", radius=-1)),
+                    ("half_size|axes|radius", lambda: body.cut("sphere", radius=math.nan)),
+                    ("a sphere needs a radius", lambda: body.cut("sphere")),
+                    ("a sphere needs a radius, and no other", lambda: body.cut("plane", radius=1)),
+                    ("an ellipsoid and a box need half_size", lambda: body.cut("box")),
+                    (r"vt has the shape \(3,\); expected \(2, 2\)",
+                     lambda: deform.Law("coulomb")([1, 1], [0, 0, 0], 1)),
+                    (r"fn has the shape \(1, 2\); expected", lambda: deform.Law("coulomb")([[1, 1]], 0, 1)),
+                    ("dt|step", lambda: world.step(math.nan)),
+                    ("dt|step", lambda: world.step(-1e-3))):
+                with self.subTest(sentence):
+                    self.refused(sentence, function)
+
     def test_surfaces_are_read_from_files(self):
         with tempfile.TemporaryDirectory(suffix=" with space") as name, deform.World() as world:
             file = pathlib.Path(name) / "ball.obj"

@@ -75,6 +75,50 @@ class Cuts(Scenery):
         self.world.step(2e-3)
         self.assertEqual(self.body.ntet, cells)
 
+    def test_a_sphere_takes_what_it_meets(self):
+        cells = self.body.ntet
+        done = self.body.cut("sphere", radius=0.008, position=(0.02, 0.02, 0.02))
+        self.assertGreater(done.cells, 0)
+        self.assertEqual(self.body.ntet, cells - done.cells)
+        with deform.World(gravity=(0, 0, 0)) as other:
+            same = cube(other)
+            same.cut("ellipsoid", half_size=(0.008, 0.008, 0.008), position=(0.02, 0.02, 0.02))
+            np.testing.assert_array_equal(same.tets, self.body.tets)
+        self.body.plan_cut(1e-3, "sphere", radius=0.008, position=(-0.02, -0.02, -0.02))
+        left = self.body.ntet
+        self.world.step(1e-3)
+        self.assertLess(self.body.ntet, left)
+
+    def test_faces_open_when_the_delay_is_over(self):
+        self.assertEqual((self.body.cut_delay, self.body.cuts_waiting), (0, 0))
+        self.body.set_cut_delay(0.01)
+        self.assertEqual(self.body.cut_delay, 0.01)
+        knife = self.world.add_tool("blade", half_size=(0.0005, 0.1, 0.1), position=(0.001, 0, 0.15))
+        knife.set_cuts([self.body])
+        points, waited = self.body.npoint, 0
+        for k in range(20):
+            knife.set_pose((0.001, 0, 0.15 - 0.002 * (k + 1)))
+            self.world.step(1e-3)
+            waited = max(waited, self.body.cuts_waiting)
+            if k < 5:
+                self.assertEqual(self.body.npoint, points)
+        self.assertGreater(waited, 0)
+        for _ in range(40):
+            knife.set_pose((0.001, 0, 0.11))
+            self.world.step(1e-3)
+        self.assertGreater(self.body.npoint, points)
+        self.assertEqual(self.body.cuts_waiting, 0)
+        with self.assertRaisesRegex(deform.ArgumentError, "cuts cannot wait for -1 s"):
+            self.body.set_cut_delay(-1)
+
+    def test_pieces_are_listed(self):
+        self.assertEqual(self.body.pieces, [])
+        self.body.set_separate()
+        self.body.cut("plane", point=(0.001, 0, 0), normal=(1, 0, 0))
+        (piece,) = self.body.pieces
+        self.assertEqual(piece.name, "cube.1")
+        self.assertEqual(piece.pieces, [piece])
+
     def test_parts_become_bodies(self):
         body, mass = self.body, self.body.measure.mass
         body.cut("plane", point=(0.001, 0, 0), normal=(1, 0, 0))

@@ -1,9 +1,11 @@
 """Worlds from arrays, steps, errors, ends, threads."""
 import gc
 import os
+import pathlib
 import signal
 import subprocess
 import sys
+import tempfile
 import textwrap
 import threading
 import time
@@ -168,6 +170,109 @@ class Building(unittest.TestCase):
             self.assertIn("coulomb", [t.short_name for t in world.context.types])
 
 
+class Rest(unittest.TestCase):
+    """What of the C interface has no test of its own above."""
+
+    def setUp(self):
+        self.world = deform.World(gravity=(0, 0, 0))
+        self.addCleanup(self.world.close)
+
+    def test_springs_pull_to_places(self):
+        body = ball(self.world)
+        points = np.arange(body.npoint)
+        fast = body.add_spring(points, (0, 0, 1), 100, 1)
+        at = np.array(body.measure.com)
+        np.testing.assert_allclose(body.spring_force(fast), 100 * (np.array([0, 0, 1]) - at), atol=1e-9)
+        body.set_spring_target(fast, (0, 0, 2))
+        self.world.step(1e-3)
+        self.assertGreater(body.measure.velocity[2], 0)
+        body.remove_spring(fast)
+        weighted = body.add_spring([0, 1], [(0, 0, 0), (1, 0, 0)], 10, weights=[1, 0], times=[0, 1])
+        way = np.array([self.world.time, 0, 0]) - body.points[0]
+        np.testing.assert_allclose(body.spring_force(weighted), 10 * way, atol=1e-9)
+        for wrong, sentence in ((lambda: body.add_spring([0], (0, 0, 0), -1), "stiffness"),
+                                (lambda: body.add_spring([0], (0, 0, 0), "1"), "stiffness is '1'"),
+                                (lambda: body.add_spring([0, 1], (0, 0, 0), 1, weights=[1]), "weights has"),
+                                (lambda: body.add_spring([0], [(0, 0, 0)], 1, times=[0, 1]), "times has"),
+                                (lambda: body.spring_force(fast), "no spring")):
+            with self.subTest(sentence), self.assertRaisesRegex(deform.ArgumentError, sentence):
+                wrong()
+
+    def test_overlaps_are_listed_and_taken_apart(self):
+        a, b = ball(self.world), self.world.add_body(deform.TetMesh.ball(0.1, 300), position=(0.1, 0, 0))
+        with self.assertLogs("deform", "WARNING"):
+            (pair,) = self.world.overlaps
+        self.assertEqual((pair["a"], pair["b"]), (a.handle, b.handle))
+        self.assertGreater(pair["depth"], 0.01)
+        self.assertEqual(self.world.untangle(), 0)
+        self.assertEqual(len(self.world.find_overlaps()), 0)
+        self.assertGreater(np.linalg.norm(b.measure.com - a.measure.com), 0.19)
+
+    def test_gravity_follows_its_keys(self):
+        body = ball(self.world)
+        self.world.set_gravity_keys([0, 0.1], [(0, 0, 0), (0, 0, -10)])
+        self.world.run(0.1, dt=1e-3)
+        self.assertAlmostEqual(body.measure.velocity[2], -0.5, delta=0.02)
+        self.world.set_gravity_keys([], [])
+        with self.assertRaisesRegex(deform.ArgumentError, r"times has the shape \(1,\); expected \(2,\)"):
+            self.world.set_gravity_keys([0], [(0, 0, 0), (0, 0, 1)])
+
+    def test_sleep_filters_laws_and_loads_of_pairs(self):
+        world = self.world
+        world.set_gravity((0, 0, -9.81))
+        floor = world.add_obstacle("plane", name="floor")
+        body = world.add_body(deform.TetMesh.beam([0.1, 0.1, 0.1], 60), name="cube",
+                              material={"young": 1e5, "damping_mass": 20})
+        world.add_friction(body, floor, mu=0.3)
+        world.hold_begin()
+        world.run(1, dt=1e-3)
+        force, moment = world.wrench(body, floor)
+        self.assertAlmostEqual(force[2], 9.81 * body.measure.mass, delta=0.1)
+        np.testing.assert_allclose(world.wrench(floor, body)[0], -force)
+        self.assertEqual(moment.shape, (3,))
+        law, params = world.law(world.pairs["law"][0])
+        self.assertEqual((law, params["mu_C"]), ("org.deform.coulomb", 0.3))
+        creep, count = world.hold
+        self.assertEqual((count, np.isnan(creep)), (count, count == 0))
+        world.set_sleep()
+        world.run(2, dt=1e-3)
+        self.assertTrue(body.asleep)
+        world.set_sleep(False)
+        self.assertFalse(body.asleep)
+        world.filter_pair(body, floor, False)
+        world.run(0.02, dt=1e-3)
+        self.assertEqual(len(world.contacts), 0)
+        world.remove_filter(body, floor)
+        world.run(0.02, dt=1e-3)
+        self.assertGreater(len(world.contacts), 0)
+        with self.assertRaisesRegex(deform.ArgumentError, "filter"):
+            world.remove_filter(body, floor)
+
+    def test_rigid_bodies_by_name_and_what_they_weigh(self):
+        box = self.world.add_rigid("box", half_size=(0.1, 0.1, 0.1), mass=2, name="crate", velocity=(1, 0, 0))
+        self.world.add_tool("sphere", radius=0.01, position=(0, 0, 1))
+        self.assertEqual(self.world.rigids, [box])
+        self.assertEqual(self.world.find_rigid("crate"), box)
+        self.assertAlmostEqual(box.measure.kinetic, 1)
+        self.assertEqual(box.measure.mass, 2)
+        np.testing.assert_array_equal(box.wrench[0], 0)
+        with self.assertRaisesRegex(deform.ArgumentError, "crate"):
+            self.world.find_rigid("crat")
+
+    def test_memory_and_time_by_part(self):
+        body = ball(self.world)
+        self.world.step(1e-3)
+        memory = self.world.memory
+        self.assertGreater(memory["bodies"], 1000)
+        self.assertEqual(memory["total"], sum(v for k, v in memory.items() if k != "total"))
+        self.assertGreaterEqual(self.world.profile["model"][1], 1)
+        np.testing.assert_array_equal(body.points[body.surface_points], body.positions)
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "surface.vtu"
+            body.write_surface(path)
+            self.assertIn("force", path.read_text(errors="replace"))
+
+
 class Errors(unittest.TestCase):
     def test_library_sentence_is_the_exception(self):
         with deform.World() as world:
@@ -195,7 +300,7 @@ class Errors(unittest.TestCase):
             for wrong, sentence in ((lambda: world.add_body(mesh, material="rubber"), "given as a dict"),
                                     (lambda: world.add_body(deform.TriMesh.make("ball", [1])), "TetMesh"),
                                     (lambda: world.add_friction(law=3), "a law is a name"),
-                                    (lambda: world.step("soon"), "float")):
+                                    (lambda: world.step("soon"), "dt is .soon.; expected a number")):
                 with self.subTest(sentence), self.assertRaisesRegex((TypeError, ValueError), sentence):
                     wrong()
             world.step(np.float32(1e-3))

@@ -13,7 +13,8 @@ from ._context import Context, Parameter, PluginType, default_context
 from ._library import (ArgumentError, BusyError, Discarded, Diverged, Error, FileError, FormatError,
                        HandleError, OutOfMemory, StateError, UnsupportedError, include_dir, quick as _quick,
                        template_dir)
-from .body import Body, CutInfo, Obstacle, Rigid, rotation
+from .body import Body, Obstacle, Rigid, rotation
+from .cut import CutInfo
 from ._command import command, cost, explain
 from .rig import friction, plot_friction
 from .law import Law, PythonLaw

@@ -14,6 +14,7 @@ import numpy as np
 
 from . import _abi
 from ._library import ArgumentError, Error, check, default, encoded, lib, quick
+from ._values import array_of
 
 _LOG = logging.getLogger("deform")
 _LEVELS = {_abi.DFM_LOG_DEBUG: logging.DEBUG, _abi.DFM_LOG_INFO: logging.INFO,
@@ -137,7 +138,7 @@ class Params:
                     raise ArgumentError(f"parameter '{key}' is the text '{value}'; expected a number",
                                         "DFM_E_ARG")
                 value = names[key].index(choice(f"parameter '{key}':", value, names[key]))
-            array = np.atleast_1d(np.asarray(value, dtype=np.float64)).ravel()
+            array = np.atleast_1d(array_of(value, f"parameter '{key}'", "a number")).ravel()
             self._keep.append(array)
             row.key, row.value, row.width = key.encode(), array.ctypes.data, array.size
         self._rows = rows

@@ -3,7 +3,6 @@ from __future__ import annotations
 
 import ctypes
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Mapping, Sequence
 
 import numpy as np
@@ -12,6 +11,8 @@ from . import _abi
 from ._arrays import Column, Report
 from ._context import choice, number_of
 from ._library import ArgumentError, OfThisProcess, check, default, lib, quick, sized
+from ._values import array_of, pose_of, real, text, vector, whole
+from .cut import CutInfo, cut_def, separate_def
 from .mesh import points_of
 
 if TYPE_CHECKING:
@@ -19,64 +20,6 @@ if TYPE_CHECKING:
     from .world import World
 
 EVERYTHING = 0xFFFFFFFF
-CUT_SHAPES = {"ellipsoid": 0, "box": 1, "blade": 2, "plane": 3}
-CUT_WAYS = {"remove": 0, "split": 1}
-CRUMBS = {"stay": 0, "remove": 1}
-
-
-@dataclass
-class CutInfo:
-    """What a cut has done: cells that have gone, `left` by its limit, points that were copied, parts that
-    the body consists of now, area of the new surface m2 (both sides, at rest); mass kg, momentum [3] N s,
-    kinetic and elastic energy J that have gone (elastic nan where the model tells none)."""
-
-    cells: int
-    left: int
-    points: int
-    parts: int
-    area: float
-    mass: float
-    momentum: np.ndarray
-    kinetic: float
-    elastic: float
-
-    @classmethod
-    def of(cls, info: _abi.dfm_cut_info) -> CutInfo:
-        return cls(info.cells, info.left, info.points, info.parts, info.area, info.mass,
-                   np.array(info.momentum), info.kinetic, info.elastic)
-
-
-def separate_def(least_cells: int, crumbs: str) -> Any:
-    """Of Body.separate and Body.set_separate."""
-    if not (1 <= least_cells < 1 << 32 and least_cells == int(least_cells)):
-        raise ArgumentError(f"least_cells is {least_cells}; expected a whole number from 1 on", "DFM_E_ARG")
-    out = default(_abi.dfm_separate_def)
-    out.least_cells = int(least_cells)
-    out.crumbs = CRUMBS[choice("crumbs", crumbs, CRUMBS)]
-    return out
-
-
-def vector(values: Any, what: str, width: int = 3) -> Any:
-    """`width` numbers as a C array."""
-    try:
-        if values is None:
-            raise TypeError
-        array = np.asarray(values, dtype=np.float64).ravel()
-    except (TypeError, ValueError):
-        raise ArgumentError(f"{what} is {values!r}; expected {width} numbers", "DFM_E_ARG") from None
-    if array.size != width:
-        raise ArgumentError(f"{what} has {array.size} numbers; expected {width}", "DFM_E_ARG")
-    return (ctypes.c_double * width)(*array)
-
-
-def real(value: Any, what: str) -> float:
-    """A number that is not given as a text."""
-    try:
-        if isinstance(value, (str, bytes)):
-            raise TypeError
-        return float(value)
-    except (TypeError, ValueError):
-        raise ArgumentError(f"{what} is {value!r}; expected a number", "DFM_E_ARG") from None
 
 
 def held_bits(fixed: Any, npoint: int) -> np.ndarray:
@@ -99,6 +42,7 @@ def rotation(axis: Sequence[float], degrees: float) -> tuple[float, float, float
     takes it."""
     along = tuple(vector(axis, "axis"))
     length = math.hypot(*along)
+    degrees = real(degrees, "degrees")
     if not 0 < length < math.inf or not math.isfinite(degrees):
         raise ArgumentError(f"a turn by {degrees} degrees about the axis {along}; both must be finite, the "
                             "axis not zero", "DFM_E_ARG")
@@ -107,30 +51,17 @@ def rotation(axis: Sequence[float], degrees: float) -> tuple[float, float, float
     return x, y, z, math.cos(half)
 
 
-def pose_of(position: Any, rotation: Any) -> _abi.dfm_pose:
-    """position [3] m, rotation a quaternion x, y, z, w."""
-    return _abi.dfm_pose(vector(position, "position"), vector(rotation, "rotation", 4))
-
-
-def cut_def(shape: str, corners: Any, point: Any, normal: Any, position: Any, rotation: Any, half_size: Any,
-            motion: Any, how: str | None, most: int) -> Any:
-    """Of Body.cut and Body.plan_cut."""
-    out = default(_abi.dfm_cut_def)
-    out.shape = CUT_SHAPES[choice("shape", shape, CUT_SHAPES)]
-    word = how if how is not None else "split" if shape in ("blade", "plane") else "remove"
-    out.how = CUT_WAYS[choice("how", word, CUT_WAYS)]
-    if (shape == "blade") != (corners is not None):
-        raise ArgumentError("a blade needs corners [4,3], and no other shape has them", "DFM_E_ARG")
-    if (shape == "plane") != (point is not None) or (shape == "plane") != (normal is not None):
-        raise ArgumentError("a plane needs point [3] and normal [3], no other shape has them", "DFM_E_ARG")
-    if corners is not None:
-        out.blade = vector(corners, "corners", 12)
-    if shape == "plane":
-        out.blade[0:3], out.blade[3:6] = vector(point, "point"), vector(normal, "normal")
-    out.pose = pose_of(position, rotation)
-    out.half_size, out.motion = vector(half_size, "half_size"), vector(motion, "motion")
-    out.most = most
-    return out
+def vector_keys(times: Any, values: Any, what: str) -> Any:
+    """values [n,3] at times [n] s, as the library takes them."""
+    at, path = array_of(times, "times", "a number for each key"), points_of(values, what)
+    if at.shape != (len(path),):
+        raise ArgumentError(f"times has the shape {at.shape}; expected ({len(path)},), as many as {what}",
+                            "DFM_E_ARG")
+    keys = (_abi.dfm_vector_key * max(len(path), 1))()
+    for key, t, value in zip(keys, at, path):
+        key.t = t
+        key.value[:] = value
+    return keys
 
 
 def numbers_of(numbers: Any, what: str = "points") -> np.ndarray:
@@ -276,6 +207,13 @@ class Body(_Part):
         return self._look("triangles", lambda: Column(quick.dfm_surface_triangles, self.handle,
                                                       self.ntriangle, 3, np.uint32))
 
+    @property
+    def surface_points(self) -> np.ndarray:
+        """Numbers of the points of the body under its surface points, [nsurfel]; a view. UnsupportedError of
+        a body with a surface of its own."""
+        return self._look("surface_points", lambda: Column(quick.dfm_surface_points, self.handle,
+                                                           self.nsurfel, 0, np.uint32))
+
     def _state(self, which: int) -> np.ndarray:
         def fill(handle: int, rows: int, address: int, count: Any) -> int:
             pair = (address, None) if which == 0 else (None, address)
@@ -352,10 +290,11 @@ class Body(_Part):
     def move_held(self, points: Any, times: Sequence[float], positions: Any) -> None:
         """Moves held points together along positions [n,3] m at times [n] s, relative to the first."""
         numbers, path = numbers_of(points), points_of(positions, "positions")
-        if len(times) != len(path):
-            raise ArgumentError(f"{len(times)} times for {len(path)} positions", "DFM_E_ARG")
+        at = array_of(times, "times", "a number for each position")
+        if at.shape != (len(path),):
+            raise ArgumentError(f"{at.size} times for {len(path)} positions", "DFM_E_ARG")
         keys = (_abi.dfm_pose_key * len(path))()
-        for key, t, p in zip(keys, times, path):
+        for key, t, p in zip(keys, at, path):
             key.t = t
             key.pose.position[:] = p
         self.world.free()
@@ -365,7 +304,7 @@ class Body(_Part):
     def add_load(self, points: Any, force: Any) -> int:
         """A lasting force [3] N on each of the points, or [n,3] N on each its own. Returns its number."""
         numbers, out = numbers_of(points), ctypes.c_uint32()
-        given = np.asarray(force, np.float64)
+        given = array_of(force, "force", "3 numbers, or 3 for each point")
         if given.shape not in ((3,), (numbers.size, 3)):
             raise ArgumentError(f"force has the shape {given.shape}; expected (3,), or ({numbers.size}, 3): "
                                 "one for each point", "DFM_E_ARG")
@@ -378,7 +317,50 @@ class Body(_Part):
     def remove_load(self, load: int) -> None:
         """Ends a load by the number that add_load returned."""
         self.world.free()
-        check(quick.dfm_body_remove_load(self.handle, load))
+        check(quick.dfm_body_remove_load(self.handle, whole(load, "load")))
+
+    def add_spring(self, points: Any, to: Any, stiffness: float, damping: float = 0, *, weights: Any = None,
+                   times: Any = None) -> int:
+        """A spring without a rest length from points of the body to a place in the world. Returns its number.
+
+        points: their numbers; the spring pulls at their mean by weights [n], or at their center of mass.
+        to: [3] m; or [n,3] m at times [n] s. stiffness N/m, damping N s/m. It limits the stable step."""
+        chosen, definition = numbers_of(points), sized(_abi.dfm_spring_def)
+        definition.npoint, definition.points = chosen.size, chosen.ctypes.data
+        keep: Any = None
+        if weights is not None:
+            keep = np.ascontiguousarray(array_of(weights, "weights", "a number for each point"))
+            if keep.shape != (chosen.size,):
+                raise ArgumentError(f"weights has the shape {keep.shape}; expected ({chosen.size},): one for "
+                                    "each point", "DFM_E_ARG")
+            definition.weights = keep.ctypes.data
+        if times is None:
+            definition.to = vector(to, "to")
+        else:
+            keys = vector_keys(times, to, "to")
+            definition.nkey, definition.keys = len(keys), ctypes.addressof(keys)
+        definition.stiffness, definition.damping = real(stiffness, "stiffness"), real(damping, "damping")
+        out = ctypes.c_uint32()
+        self.world.free()
+        check(quick.dfm_body_add_spring(self.handle, ctypes.byref(definition), ctypes.byref(out)))
+        return out.value
+
+    def set_spring_target(self, spring: int, to: Any) -> None:
+        """Moves the end of a spring to a place [3] m, at which it stays."""
+        self.world.free()
+        check(quick.dfm_body_set_spring_target(self.handle, whole(spring, "spring"), vector(to, "to")))
+
+    def spring_force(self, spring: int) -> np.ndarray:
+        """Force of a spring on the body now, [3] N."""
+        out = (ctypes.c_double * 3)()
+        self.world.free()
+        check(quick.dfm_body_get_spring_force(self.handle, whole(spring, "spring"), out))
+        return np.array(out)
+
+    def remove_spring(self, spring: int) -> None:
+        """Ends a spring by the number that add_spring returned."""
+        self.world.free()
+        check(quick.dfm_body_remove_spring(self.handle, whole(spring, "spring")))
 
     def apply_impulse(self, point: Any, impulse: Any) -> None:
         """An impulse [3] N s at a point [3] m, on the nearest surface triangle."""
@@ -395,7 +377,7 @@ class Body(_Part):
         """Gives the body another model between two steps; positions and velocities stay."""
         values = self.world.context.params("model", model, params or {})
         with self.world.alone():
-            status = lib.dfm_body_set_model(self.handle, model.encode(), ctypes.byref(values.struct))
+            status = lib.dfm_body_set_model(self.handle, text(model, "model"), ctypes.byref(values.struct))
         self.world.accept(status)
 
     @property
@@ -446,9 +428,10 @@ class Body(_Part):
             corners = vector(box, "box", 6)
             keep.append(corners)
             definition.box = ctypes.addressof(corners)
-        definition.group = group.encode() if group is not None else None
-        definition.max_distance, definition.release = max_distance, release
-        definition.stiffness, definition.damping = stiffness, damping
+        definition.group = None if group is None else text(group, "group")
+        for key, value in (("max_distance", max_distance), ("release", release), ("stiffness", stiffness),
+                           ("damping", damping)):
+            setattr(definition, key, real(value, key))
         number = ctypes.c_uint32()
         self.world.free()
         check(lib.dfm_body_attach(self.handle, ctypes.byref(definition), ctypes.byref(number)))
@@ -457,7 +440,7 @@ class Body(_Part):
     def detach(self, attachment: int) -> None:
         """Ends an attachment."""
         self.world.free()
-        check(lib.dfm_body_detach(self.handle, attachment))
+        check(lib.dfm_body_detach(self.handle, whole(attachment, "attachment")))
 
     @property
     def attachments(self) -> list[int]:
@@ -474,21 +457,24 @@ class Body(_Part):
         last sub-step), impulse [3] N s since it was made, stretch m."""
         out = sized(_abi.dfm_attachment)
         self.world.free()
-        check(quick.dfm_body_get_attachment(self.handle, number, ctypes.byref(out)))
+        check(quick.dfm_body_get_attachment(self.handle, whole(number, "number"), ctypes.byref(out)))
         return out
 
     def cut(self, shape: str = "blade", *, corners: Any = None, point: Any = None, normal: Any = None,
-            position: Any = (0, 0, 0), rotation: Any = (0, 0, 0, 1), half_size: Any = (0, 0, 0),
-            motion: Any = (0, 0, 0), how: str | None = None, most: int = 0) -> CutInfo:
+            position: Any = (0, 0, 0), rotation: Any = (0, 0, 0, 1), half_size: Any = None,
+            radius: float | None = None, motion: Any = (0, 0, 0), how: str | None = None,
+            most: int = 0) -> CutInfo:
         """Cuts the body between two steps. Points and cells get new numbers (origins).
 
         shape: a "blade" has corners [4,3] m in the world: an edge from 0 to 1, which has come to 3 and 2. A
-        "plane" through the whole body has a point [3] m and a normal [3]. An "ellipsoid" or a "box" has
-        half_size [3] m (semi-axes, half edges) at position [3] m with rotation (a quaternion x, y, z, w), and
-        goes by motion [3] m. how: "split" opens the faces that a blade or a plane crosses, "remove" takes the
-        cells that the shape meets; None: "split" of a blade and a plane. most: faces or cells, 0: all.
+        "plane" through the whole body has a point [3] m and a normal [3]. A "sphere" has a radius m, an
+        "ellipsoid" or a "box" has half_size [3] m (semi-axes, half edges), at position [3] m with rotation (a
+        quaternion x, y, z, w), and goes by motion [3] m. how: "split" opens the faces that a blade
+        or a plane crosses, "remove" takes the cells that the shape meets; None: "split" of a blade and a
+        plane. most: faces or cells, 0: all.
         UnsupportedError where the model needs all of its cells: msm and corotational_fem do not."""
-        definition = cut_def(shape, corners, point, normal, position, rotation, half_size, motion, how, most)
+        definition = cut_def(shape, corners, point, normal, position, rotation, half_size, motion, how, most,
+                             radius)
         info = sized(_abi.dfm_cut_info)
         with self.world.alone():
             status = lib.dfm_body_cut(self.handle, ctypes.byref(definition), ctypes.byref(info))
@@ -497,13 +483,14 @@ class Body(_Part):
 
     def plan_cut(self, t: float, shape: str = "plane", *, corners: Any = None, point: Any = None,
                  normal: Any = None, position: Any = (0, 0, 0), rotation: Any = (0, 0, 0, 1),
-                 half_size: Any = (0, 0, 0), motion: Any = (0, 0, 0), how: str | None = None,
-                 most: int = 0) -> None:
+                 half_size: Any = None, radius: float | None = None, motion: Any = (0, 0, 0),
+                 how: str | None = None, most: int = 0) -> None:
         """Plans a cut (see cut) of the body and of its pieces, at the end of the first step that ends at t s
         or later."""
-        definition = cut_def(shape, corners, point, normal, position, rotation, half_size, motion, how, most)
+        definition = cut_def(shape, corners, point, normal, position, rotation, half_size, motion, how, most,
+                             radius)
         with self.world.alone():
-            status = lib.dfm_body_plan_cut(self.handle, t, ctypes.byref(definition))
+            status = lib.dfm_body_plan_cut(self.handle, real(t, "t"), ctypes.byref(definition))
         check(status)
 
     def plan_no_cuts(self) -> None:
@@ -539,6 +526,40 @@ class Body(_Part):
         check(status)
         return CutInfo.of(info)
 
+    def set_cut_delay(self, delay: float = 0) -> None:
+        """From now on faces that the edge of a tool passes open `delay` s later, and a second thread makes
+        the cut body meanwhile; 0: at the end of the step in which it passes them."""
+        seconds = real(delay, "delay")
+        with self.world.alone():
+            status = lib.dfm_body_set_cut_delay(self.handle, seconds)
+        check(status)
+
+    @property
+    def cut_delay(self) -> float:
+        """s, of set_cut_delay."""
+        out = ctypes.c_double()
+        self.world.free()
+        check(quick.dfm_body_cut_delay(self.handle, ctypes.byref(out), None))
+        return out.value
+
+    @property
+    def cuts_waiting(self) -> int:
+        """Number of faces that an edge has passed, and that open when the cut delay is over."""
+        out = ctypes.c_uint32()
+        self.world.free()
+        check(quick.dfm_body_cut_delay(self.handle, None, ctypes.byref(out)))
+        return out.value
+
+    @property
+    def pieces(self) -> list[Body]:
+        """Bodies that have come off it (set_separate), in order of creation; of a piece, those of the body
+        that it came off."""
+        self.world.free()
+        n = number_of(quick.dfm_body_pieces, self.handle)
+        out = (ctypes.c_uint64 * max(n, 1))()
+        check(quick.dfm_body_pieces(self.handle, n, ctypes.byref(out), None) if n else 0)
+        return [body for body in map(self.world.owner, out[:n]) if isinstance(body, Body)]
+
     @property
     def origins(self) -> tuple[np.ndarray, np.ndarray]:
         """Where points [npoint] and cells [ntet] come from: their numbers when the body was made. Copies of
@@ -566,6 +587,11 @@ class Body(_Part):
         """Its points and cells as *.vtu."""
         self.world.free()
         check(lib.dfm_debug_write_body(self.handle, str(path).encode()))
+
+    def write_surface(self, path: Any) -> None:
+        """Its surface with displacements, velocities and contact forces as *.vtu."""
+        self.world.free()
+        check(lib.dfm_debug_write_surface(self.handle, str(path).encode()))
 
     def remove(self) -> None:
         """Takes the body out of its world; its contacts end. Arrays keep their last values."""
@@ -682,13 +708,29 @@ class Rigid(Obstacle):
         motor's effort (N m or N)."""
         out = [ctypes.c_double() for _ in range(3)]
         self.world.free()
-        check(quick.dfm_rigid_joint(self.handle, number, *map(ctypes.byref, out)))
+        check(quick.dfm_rigid_joint(self.handle, whole(number, "number"), *map(ctypes.byref, out)))
         return out[0].value, out[1].value, out[2].value
 
     def set_motor(self, velocity: float, max: float, number: int = 0) -> None:
         """Motor of a joint of its set: rad/s and N m, or m/s and N; max 0: off."""
         self.world.free()
-        check(quick.dfm_rigid_set_motor(self.handle, number, velocity, max))
+        check(quick.dfm_rigid_set_motor(self.handle, whole(number, "number"), real(velocity, "velocity"),
+                                        real(max, "max")))
+
+    @property
+    def measure(self) -> Any:
+        """Sums as a record, a view, as Body.measure: mass kg, com [3] m, velocity [3] m/s, momentum, angular,
+        kinetic J, volume m3, speed_max m/s; elastic is 0."""
+        return self._look("measure", lambda: Report(quick.dfm_rigid_get_measure, self.handle,
+                                                    _abi.dfm_body_measure))
+
+    @property
+    def wrench(self) -> tuple[np.ndarray, np.ndarray]:
+        """Of contact in the last sub-step, means: force [3] N, moment [3] N m about the center of mass."""
+        force, moment = (ctypes.c_double * 3)(), (ctypes.c_double * 3)()
+        self.world.free()
+        check(quick.dfm_rigid_contact_wrench(self.handle, force, moment))
+        return np.array(force), np.array(moment)
 
     def remove(self) -> None:
         """Takes the whole set that it came with out of the world."""

@@ -20,6 +20,7 @@ import numpy as np
 from . import _abi
 from ._context import Context, Parameter, Params, PluginType, default_context, read_type
 from ._library import PATH, ArgumentError, Error, check, command_path, encoded, lib, quick
+from ._values import array_of, real
 from ._command import Table
 
 NEEDS = {"fn": _abi.DFM_NEED_FN, "vt": _abi.DFM_NEED_VT, "ft_stop": _abi.DFM_NEED_FT_STOP,
@@ -386,24 +387,31 @@ class Law:
         """Evaluates n contacts: fn [n] N, vt [2,n] m/s, dt s, state [nstate,n], ft_stop [2,n] N (the force
         that would stop the slip; not given: far beyond what friction can do), area [n] m2, dwell [n] s;
         parameters by key. Returns ft [2,n] N, state [nstate,n], limit [n] N, mode [n], stored [n] J."""
-        normal = np.ascontiguousarray(np.atleast_1d(fn), dtype=np.float64)
-        n = normal.size
+        normal = np.ascontiguousarray(np.atleast_1d(array_of(fn, "fn", "a number for each contact")))
+        n, dt = normal.size, real(dt, "dt")
 
-        def column(values: Any, rows: int) -> np.ndarray:
-            array = np.asarray(values, dtype=np.float64)
-            return np.ascontiguousarray(np.broadcast_to(array, (rows, n) if rows > 1 else (n,)))
+        def column(values: Any, rows: int, what: str) -> np.ndarray:
+            array, shape = array_of(values, what, "an array of numbers"), (rows, n) if rows > 1 else (n,)
+            try:
+                return np.ascontiguousarray(np.broadcast_to(array, shape))
+            except ValueError:
+                raise ArgumentError(f"{what} has the shape {array.shape}; expected {shape}",
+                                    "DFM_E_ARG") from None
+        if normal.ndim != 1:
+            raise ArgumentError(f"fn has the shape {normal.shape}; expected (n,)", "DFM_E_ARG")
 
         values = Params(params)
         packed = np.empty(sum(row.width for row in self.type.parameters))
         count = ctypes.c_uint32()
         check(quick.dfm_law_pack(self.handle, ctypes.byref(values.struct), packed.size, packed.ctypes.data,
                                  ctypes.byref(count)))
-        slip, lane, dwelt = column(vt, 2), column(area, 1), column(dwell, 1)
+        slip, lane, dwelt = column(vt, 2, "vt"), column(area, 1, "area"), column(dwell, 1, "dwell")
         if ft_stop is None:
             speed = np.hypot(*slip)
             ft_stop = -slip / np.where(speed > 0, speed, 1) * 1e6 * np.maximum(normal, 1)
-        stop = column(ft_stop, 2)
-        before = np.zeros((self.nstate, n)) if state is None else np.ascontiguousarray(state, np.float64)
+        stop = column(ft_stop, 2, "ft_stop")
+        before = np.zeros((self.nstate, n)) if state is None else np.ascontiguousarray(
+            array_of(state, "state", "an array of numbers"))
         if before.shape != (self.nstate, n):
             raise ArgumentError(f"state has the shape {before.shape}; expected ({self.nstate}, {n})",
                                 "DFM_E_ARG")

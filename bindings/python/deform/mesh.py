@@ -12,11 +12,12 @@ import numpy as np
 from . import _abi
 from ._context import Context, called, default_context
 from ._library import ArgumentError, OfThisProcess, check, encoded, lib, quick, sized
+from ._values import array_of, real, whole
 
 
 def points_of(points: Any, what: str = "points") -> np.ndarray:
     """[n,3] m, contiguous float64."""
-    array = np.ascontiguousarray(points, dtype=np.float64)
+    array = np.ascontiguousarray(array_of(points, what, "an array (n, 3) of numbers"))
     if array.ndim != 2 or array.shape[1] != 3:
         raise ArgumentError(f"{what} has the shape {array.shape}; expected (n, 3), in m", "DFM_E_ARG")
     bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
@@ -58,7 +59,8 @@ def _borrowed(keeper: Any, address: int | None, shape: tuple[int, ...], kind: An
 
 
 def _size(values: Sequence[float]) -> Any:
-    return (ctypes.c_double * 3)(*values, *([0.0] * (3 - len(values))))
+    numbers = [real(value, "a size of the mesh") for value in values]
+    return (ctypes.c_double * 3)(*numbers, *([0.0] * (3 - len(numbers))))
 
 
 def _groups(names: int | None, count: int) -> list[str]:
@@ -123,7 +125,8 @@ class TetMesh(_Mesh):
     @classmethod
     def _made(cls, kind: str, size: Sequence[float], cells: int) -> TetMesh:
         context, out = default_context(), ctypes.c_uint64()
-        check(lib.dfm_tetmesh_make(context.address, kind.encode(), _size(size), cells, ctypes.byref(out)))
+        check(lib.dfm_tetmesh_make(context.address, kind.encode(), _size(size), whole(cells, "cells", 1),
+                                  ctypes.byref(out)))
         return cls(out.value, context)
 
     @classmethod
@@ -159,7 +162,7 @@ class TetMesh(_Mesh):
         if not isinstance(surface, TriMesh):
             surface = TriMesh.read(surface)
         out = ctypes.c_uint64()
-        check(lib.dfm_tetmesh_fill(surface.handle, cells, ctypes.byref(out)))
+        check(lib.dfm_tetmesh_fill(surface.handle, whole(cells, "cells", 1), ctypes.byref(out)))
         return cls(out.value, surface._context)
 
     def write(self, path: Any) -> None:
@@ -299,7 +302,8 @@ class TriMesh(_Mesh):
         """A closed surface: "ball" [radius], "cylinder" [radius, length], "beam" [x, y, z], "tube" [inner,
         outer, length] or "torus" [ring radius, tube radius]; m."""
         context, out = default_context(), ctypes.c_uint64()
-        check(lib.dfm_trimesh_make(context.address, kind.encode(), _size(size), triangles, ctypes.byref(out)))
+        check(lib.dfm_trimesh_make(context.address, kind.encode(), _size(size),
+                                  whole(triangles, "triangles", 1), ctypes.byref(out)))
         return cls(out.value, context)
 
     def write(self, path: Any) -> None:

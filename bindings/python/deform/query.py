@@ -11,7 +11,8 @@ import numpy as np
 from . import _abi
 from ._context import choice
 from ._library import ArgumentError, check, default, lib, quick, sized
-from .body import EVERYTHING, Body, Obstacle, pose_of, vector
+from ._values import pose_of, real, vector, whole
+from .body import EVERYTHING, Body, Obstacle
 from .mesh import points_of
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ class Shape:
     def sphere(cls, radius: float = 0, position: Any = (0, 0, 0)) -> Shape:
         """radius: m."""
         out = cls(_abi.DFM_SHAPE_SPHERE, position, (0, 0, 0, 1))
-        out.struct.radius = radius
+        out.struct.radius = real(radius, "radius")
         return out
 
     @classmethod
@@ -50,7 +51,7 @@ class Shape:
             radius: float = 0) -> Shape:
         """half_size: [3] m. radius: m by which the shape reaches beyond the box, and which rounds it."""
         out = cls(_abi.DFM_SHAPE_BOX, position, rotation)
-        out.struct.half_size, out.struct.radius = vector(half_size, "half_size"), radius
+        out.struct.half_size, out.struct.radius = vector(half_size, "half_size"), real(radius, "radius")
         return out
 
     @classmethod
@@ -58,7 +59,8 @@ class Shape:
                 rotation: Any = (0, 0, 0, 1)) -> Shape:
         """radius: m; half_length: m, half of the axis between the centers of its caps, along z."""
         out = cls(_abi.DFM_SHAPE_CAPSULE, position, rotation)
-        out.struct.radius, out.struct.half_length = radius, half_length
+        out.struct.radius = real(radius, "radius")
+        out.struct.half_length = real(half_length, "half_length")
         return out
 
     @classmethod
@@ -68,7 +70,7 @@ class Shape:
         out = cls(_abi.DFM_SHAPE_CONVEX, position, rotation)
         out._points = points_of(points)
         out.struct.npoint, out.struct.points = len(out._points), out._points.ctypes.data
-        out.struct.radius = radius
+        out.struct.radius = real(radius, "radius")
         return out
 
 
@@ -171,7 +173,7 @@ class ContactChoice:
 
     @friction_scale.setter
     def friction_scale(self, value: float) -> None:
-        self._of.friction_scale = value
+        self._of.friction_scale = real(value, "friction_scale")
 
     @property
     def law(self) -> int:
@@ -179,7 +181,7 @@ class ContactChoice:
 
     @law.setter
     def law(self, value: int) -> None:
-        self._of.law = value
+        self._of.law = whole(value, "law")
 
     @property
     def surface_velocity(self) -> np.ndarray:
@@ -205,7 +207,8 @@ class Filter:
         self.struct.what = 0
         for kind in kinds:
             self.struct.what |= KINDS[choice("kind", kind, KINDS)]
-        self.struct.category, self.struct.collides_with = category, collides_with
+        self.struct.category = whole(category, "category")
+        self.struct.collides_with = whole(collides_with, "collides_with")
         self.accept = accept
 
 
@@ -272,7 +275,8 @@ class Queries:
         None: nothing is met."""
         asked, out = self._ask(filter), sized(_abi.dfm_query_hit)
         asked.done(quick.dfm_world_query_ray(self.handle, vector(origin, "origin"),
-                                             vector(direction, "direction"), max_distance, asked.at,
+                                             vector(direction, "direction"),
+                                             real(max_distance, "max_distance"), asked.at,
                                              ctypes.byref(out)))
         return self._hit(out)
 
@@ -284,7 +288,8 @@ class Queries:
         while True:
             out = (_abi.dfm_query_hit * capacity)()
             asked.done(quick.dfm_world_query_ray_all_sized(
-                self.handle, vector(origin, "origin"), vector(direction, "direction"), max_distance, asked.at,
+                self.handle, vector(origin, "origin"), vector(direction, "direction"),
+                real(max_distance, "max_distance"), asked.at,
                 ctypes.sizeof(_abi.dfm_query_hit), capacity, ctypes.byref(out), ctypes.byref(n)))
             if n.value <= capacity:
                 return [hit for hit in map(self._hit, out[:n.value]) if hit is not None]
@@ -294,7 +299,8 @@ class Queries:
                       filter: Filter | None = None) -> Hit | None:
         """The closest point of all surfaces within max_distance m of a point [3] m, or None."""
         asked, out = self._ask(filter), sized(_abi.dfm_query_hit)
-        asked.done(quick.dfm_world_query_closest(self.handle, vector(point, "point"), max_distance, asked.at,
+        asked.done(quick.dfm_world_query_closest(self.handle, vector(point, "point"),
+                                                 real(max_distance, "max_distance"), asked.at,
                                                  ctypes.byref(out)))
         return self._hit(out)
 
@@ -430,7 +436,7 @@ def write_scene(function: Any, handle: int, path: str | os.PathLike[str], durati
     sentences: list[str] = []
     note = _NoteFn(lambda _user, sentence: sentences.append(sentence.decode()))
     definition = default(_abi.dfm_scene_write_def)
-    definition.duration, definition.step = duration, step
+    definition.duration, definition.step = real(duration, "duration"), real(step, "step")
     definition.flags = ((_abi.DFM_SCENE_SNAPSHOT if snapshot else 0)
                         | (_abi.DFM_SCENE_PARTIAL if partial else 0))
     definition.note = ctypes.cast(note, ctypes.c_void_p).value

@@ -14,6 +14,7 @@ from . import _abi
 from ._arrays import row_type
 from ._context import Context, default_context
 from ._library import ArgumentError, OfThisProcess, check, encoded, lib, quick, read_text, sized
+from ._values import real
 from .picture import Picture, Solid, body_values, draw, palette, scaled, solids
 from .query import write_scene
 from .world import Trouble, World
@@ -118,7 +119,7 @@ class Scene(OfThisProcess):
         duration, every: s, instead of the scene's. watch: called after each step; it may look at the
         world."""
         for what, value in (("duration", duration), ("every", every)):
-            if value is not None and not 0 <= value < math.inf:
+            if value is not None and not 0 <= real(value, what) < math.inf:
                 raise ArgumentError(f"{what} is {value} s; it must be finite and not negative", "DFM_E_ARG")
         return _Runner(self, duration, every, watch).run()
 

@@ -9,7 +9,9 @@ import numpy as np
 from . import _abi
 from ._context import choice, number_of
 from ._library import ArgumentError, check, default, encoded, lib, quick, sized
-from .body import CUT_WAYS, EVERYTHING, Body, Obstacle, handle_of, numbers_of, pose_of, vector
+from ._values import pose_of, real, text, vector, whole
+from .body import EVERYTHING, Body, Obstacle, handle_of, numbers_of
+from .cut import CUT_WAYS
 
 if TYPE_CHECKING:
     from .mesh import TriMesh
@@ -49,12 +51,26 @@ class Tool:
     def set_opening(self, angle: float) -> None:
         """Angle between the jaws at the end of the next step, rad, 0 to 3."""
         self.world.free()
-        check(quick.dfm_tool_set_opening(self.handle, angle))
+        check(quick.dfm_tool_set_opening(self.handle, real(angle, "angle")))
 
     def teleport(self, position: Any, rotation: Any = (0, 0, 0, 1)) -> None:
         """Puts it there at once, at rest, without a motion."""
         self.world.free()
         check(quick.dfm_tool_teleport(self.handle, ctypes.byref(pose_of(position, rotation))))
+
+    def keys_at(self, t: float) -> tuple[np.ndarray, np.ndarray, float]:
+        """Where its keys, of a scene, want it at t s, whether it follows them or not: position [3] m,
+        rotation (a quaternion x, y, z, w) and opening rad. ArgumentError of a tool without keys."""
+        pose, opening = _abi.dfm_pose(), ctypes.c_double()
+        self.world.free()
+        check(quick.dfm_tool_keys_at(self.handle, real(t, "t"), ctypes.byref(pose), ctypes.byref(opening)))
+        return np.array(pose.position), np.array(pose.rotation), opening.value
+
+    def follow_keys(self) -> None:
+        """Its keys, of a scene, lead it again from the next step on, after set_pose and set_opening; far from
+        where they want it (keys_at), bring it near first."""
+        self.world.free()
+        check(quick.dfm_tool_follow_keys(self.handle))
 
     def _felt(self, function: Any) -> tuple[np.ndarray, np.ndarray]:
         force, torque = (ctypes.c_double * 3)(), (ctypes.c_double * 3)()
@@ -114,7 +130,8 @@ class Tool:
         out, n = (ctypes.c_uint32 * 3)(), ctypes.c_uint32()
         self.world.free()
         grabbed = handle_of(body, Body, "grab needs a body")
-        check(quick.dfm_tool_grab(self.handle, grabbed, reach, release, 3, out, ctypes.byref(n)))
+        check(quick.dfm_tool_grab(self.handle, grabbed, real(reach, "reach"), real(release, "release"), 3,
+                                  out, ctypes.byref(n)))
         return list(out[:n.value])
 
     def set_cuts(self, bodies: Sequence[Body], how: str | None = None, most: int = 0) -> None:
@@ -133,8 +150,8 @@ class Tool:
         given = [handle_of(body, Body, expected) for body in bodies]
         handles = (ctypes.c_uint64 * max(len(given), 1))(*given)
         self.world.free()
-        check(lib.dfm_tool_set_cuts(self.handle, CUT_WAYS[choice("how", how, CUT_WAYS)], most, len(bodies),
-                                    ctypes.byref(handles)))
+        check(lib.dfm_tool_set_cuts(self.handle, CUT_WAYS[choice("how", how, CUT_WAYS)],
+                                    whole(most, "most"), len(given), ctypes.byref(handles)))
 
     def _shape(self) -> int:
         out = sized(_abi.dfm_tool_def)
@@ -185,13 +202,15 @@ class Tools:
         definition.name = encoded(name)
         definition.pose = pose_of(position, rotation)
         definition.half_size = vector(half_size, "half_size")
-        definition.radius, definition.half_length, definition.opening = radius, half_length, opening
-        definition.stiffness, definition.damping = stiffness, damping
-        definition.turn_stiffness, definition.turn_damping = turn_stiffness, turn_damping
-        definition.mass, definition.inertia, definition.late = mass, inertia, late
+        for key, value in (("radius", radius), ("half_length", half_length), ("opening", opening),
+                           ("stiffness", stiffness), ("damping", damping), ("turn_stiffness", turn_stiffness),
+                           ("turn_damping", turn_damping), ("mass", mass), ("inertia", inertia),
+                           ("late", late)):
+            setattr(definition, key, real(value, key))
         definition.flags = _abi.DFM_TOOL_PASSIVE if passive else 0
         definition.material = self._material(material)
-        definition.category, definition.collides_with = category, collides_with
+        definition.category = whole(category, "category")
+        definition.collides_with = whole(collides_with, "collides_with")
         if (shape == "mesh") != (mesh is not None):
             raise ArgumentError('a tool of the shape "mesh" needs a mesh, and no other tool has one',
                                 "DFM_E_ARG")
@@ -219,5 +238,5 @@ class Tools:
         """The tool of that name; ArgumentError names the nearest one."""
         out = ctypes.c_uint64()
         self.free()
-        check(quick.dfm_world_find_tool(self.handle, name.encode(), ctypes.byref(out)))
+        check(quick.dfm_world_find_tool(self.handle, text(name, "name"), ctypes.byref(out)))
         return self._tool(out.value)

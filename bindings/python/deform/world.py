@@ -5,7 +5,6 @@ import contextlib
 import ctypes
 import difflib
 import enum
-import json
 import logging
 import weakref
 from dataclasses import dataclass
@@ -18,11 +17,13 @@ from . import _abi
 from ._arrays import Report, Rows
 from ._context import Context, Params, choice, default_context, number_of, strings
 from ._library import (ArgumentError, BusyError, OfThisProcess, check, default, encoded, error, lib, quick,
-                       read_text, sized)
+                       sized)
 from ._signals import watch
-from .body import EVERYTHING, Body, Obstacle, Rigid, handle_of, held_bits, pose_of, real, vector
+from ._values import array_of, pose_of, real, text, vector, whole
+from .body import EVERYTHING, Body, Obstacle, Rigid, handle_of, held_bits, vector_keys
 from .mesh import TetMesh, TriMesh, cells_of, points_of, surface_of
 from .query import Queries
+from .report import Reports
 from .tool import Tools
 
 _LOG = logging.getLogger("deform")
@@ -88,7 +89,7 @@ def _word(what: str, given: str, table: Mapping[str, int]) -> int:
 
 def _turn(normal: Any) -> list[float]:
     """The quaternion that turns z to the normal."""
-    n = np.asarray(normal, dtype=np.float64)
+    n = array_of(normal, "normal", "3 numbers")
     length = float(np.linalg.norm(n))
     if n.shape != (3,) or not length > 0:
         raise ArgumentError("normal needs three numbers that are not all zero", "DFM_E_ARG")
@@ -130,9 +131,10 @@ class RigidDef:
     def struct(self) -> _abi.dfm_rigid_def:
         out = default(_abi.dfm_rigid_def)
         out.shape = _word("shape", self.shape, {k: SHAPES[k] for k in ("sphere", "box", "capsule")})
-        out.name, out.mass, out.fixed = encoded(self.name), self.mass, self.fixed
+        out.name, out.fixed = encoded(self.name), self.fixed
         out.pose = pose_of(self.position, self.rotation)
-        out.radius, out.half_length = self.radius, self.half_length
+        for key in ("mass", "radius", "half_length"):
+            setattr(out, key, real(getattr(self, key), key))
         for key in ("half_size", "inertia", "velocity", "spin"):
             setattr(out, key, vector(getattr(self, key), key))
         out.material = 0 if self.material is None else handle_of(self.material, Material, _MATERIAL)
@@ -154,15 +156,15 @@ class JointDef:
 
     def struct(self) -> _abi.dfm_joint_def:
         out = sized(_abi.dfm_joint_def)
-        out.type, out.body = _word("joint", self.type, JOINTS), self.body
-        setattr(out, "with", 0xFFFFFFFF if self.to is None else self.to)
+        out.type, out.body = _word("joint", self.type, JOINTS), whole(self.body, "body")
+        setattr(out, "with", 0xFFFFFFFF if self.to is None else whole(self.to, "to"))
         out.anchor, out.axis = vector(self.anchor, "anchor"), vector(self.axis, "axis")
         if self.motor is not None:
-            out.motor, (out.velocity, out.max) = 1, self.motor
+            out.motor, (out.velocity, out.max) = 1, vector(self.motor, "motor", 2)
         return out
 
 
-class World(Queries, Tools, OfThisProcess):
+class World(Queries, Reports, Tools, OfThisProcess):
     """A world of soft bodies: build it, step it, look at it. SI units.
 
         with deform.World() as world:
@@ -195,18 +197,20 @@ class World(Queries, Tools, OfThisProcess):
                  max_sweeps: int = 50, max_time: float = 0, untangle: bool = False, solver: str | None = None,
                  threads: int = 1, context: Context | None = None):
         if context is None:
+            threads = whole(threads, "threads")
             context = default_context() if threads == 1 else Context(threads)
         definition = default(_abi.dfm_world_def)
         definition.gravity = vector(gravity, "gravity")
         definition.integrator = _word("integrator", integrator, INTEGRATORS)
         definition.method = _word("method", method, METHODS)
-        definition.step, definition.sleep = step, int(sleep)
+        definition.step, definition.sleep = real(step, "step"), int(sleep)
         definition.self_contact = _word("self_contact", self_contact, SELF_CONTACT)
         words = None if effects is None else strings(effects)
         definition.effects = None if words is None else ctypes.addressof(words)
-        definition.contact_offset, definition.max_substeps = contact_offset, max_substeps
-        definition.max_sweeps = max_sweeps
-        definition.max_time = max_time
+        definition.contact_offset = real(contact_offset, "contact_offset")
+        definition.max_substeps = whole(max_substeps, "max_substeps")
+        definition.max_sweeps = whole(max_sweeps, "max_sweeps")
+        definition.max_time = real(max_time, "max_time")
         definition.flags = _abi.DFM_WORLD_UNTANGLE if untangle else 0
         definition.solver = encoded(solver)
         out = ctypes.c_uint64()
@@ -397,7 +401,7 @@ class World(Queries, Tools, OfThisProcess):
             keep += [hung, sp, st]
         rows = (_abi.dfm_cell_field * max(len(fields or {}), 1))()
         for row, (key, given) in zip(rows, (fields or {}).items()):
-            field = np.ascontiguousarray(given, dtype=np.float64)
+            field = np.ascontiguousarray(array_of(given, f"field '{key}'", "a number for each cell"))
             if field.size == 0 or field.size % len(cells) != 0:
                 raise ArgumentError(f"field '{key}' has the shape {field.shape}; expected ({len(cells)},): a "
                                     "value for each cell", "DFM_E_ARG")
@@ -406,7 +410,8 @@ class World(Queries, Tools, OfThisProcess):
             keep.append(field)
         definition.nfield, definition.fields = len(fields or {}), ctypes.addressof(rows)
         definition.integrator = _word("integrator", integrator, INTEGRATORS)
-        definition.category, definition.collides_with = category, collides_with
+        definition.category = whole(category, "category")
+        definition.collides_with = whole(collides_with, "collides_with")
         out = ctypes.c_uint64()
         with self.alone():
             status = lib.dfm_body_create(self.handle, ctypes.byref(definition), ctypes.byref(out))
@@ -432,11 +437,13 @@ class World(Queries, Tools, OfThisProcess):
             raise ArgumentError("an obstacle is turned by rotation or by normal, not by both", "DFM_E_ARG")
         turned = _turn(normal) if normal is not None else rotation if rotation is not None else (0, 0, 0, 1)
         definition.pose = pose_of(position, turned)
-        definition.radius, definition.half_length = radius, half_length
+        definition.radius = real(radius, "radius")
+        definition.half_length = real(half_length, "half_length")
         definition.half_size = vector(half_size, "half_size")
         definition.velocity_surface = vector(velocity_surface, "velocity_surface")
-        definition.category, definition.collides_with = category, collides_with
-        definition.material = self._material(material)
+        definition.category = whole(category, "category")
+        definition.collides_with = whole(collides_with, "collides_with")
+        definition.material, cells = self._material(material), whole(cells, "cells")
         if mesh is not None:
             mesh = surface_of(mesh, "the mesh of an obstacle")
             p, t = _scaled(mesh.points, scale), mesh.triangles
@@ -493,6 +500,12 @@ class World(Queries, Tools, OfThisProcess):
         return [self._body(h) for h in self._handles(quick.dfm_world_bodies)]
 
     @property
+    def rigids(self) -> list[Rigid]:
+        """Rigid bodies in order of creation, without the parts of tools."""
+        found = [self._obstacle(h) for h in self._handles(quick.dfm_world_rigids)]
+        return [rigid for rigid in found if isinstance(rigid, Rigid)]
+
+    @property
     def obstacles(self) -> list[Obstacle]:
         """In order of creation, rigid bodies among them."""
         return [self._obstacle(h) for h in self._handles(quick.dfm_world_obstacles)]
@@ -501,15 +514,22 @@ class World(Queries, Tools, OfThisProcess):
         """The body of that name; ArgumentError names the nearest one."""
         out = ctypes.c_uint64()
         self.free()
-        check(quick.dfm_world_find_body(self.handle, name.encode(), ctypes.byref(out)))
+        check(quick.dfm_world_find_body(self.handle, text(name, "name"), ctypes.byref(out)))
         return self._body(out.value)
 
     def find_obstacle(self, name: str) -> Obstacle:
         """The obstacle or rigid body of that name; ArgumentError names the nearest one."""
         out = ctypes.c_uint64()
         self.free()
-        check(quick.dfm_world_find_obstacle(self.handle, name.encode(), ctypes.byref(out)))
+        check(quick.dfm_world_find_obstacle(self.handle, text(name, "name"), ctypes.byref(out)))
         return self._obstacle(out.value)
+
+    def find_rigid(self, name: str) -> Rigid:
+        """The rigid body of that name; ArgumentError names the nearest one."""
+        out = ctypes.c_uint64()
+        self.free()
+        check(quick.dfm_world_find_rigid(self.handle, text(name, "name"), ctypes.byref(out)))
+        return Rigid(self, out.value, name)
 
     def owner(self, handle: int) -> Body | Obstacle:
         """The object of a handle in a report (contacts["body_a"], pairs["b"])."""
@@ -550,6 +570,11 @@ class World(Queries, Tools, OfThisProcess):
         self.free()
         check(lib.dfm_world_filter_pair(self.handle, _side(a), _side(b), collide))
 
+    def remove_filter(self, a: Any, b: Any) -> None:
+        """Takes back what filter_pair said of the two."""
+        self.free()
+        check(lib.dfm_world_remove_filter(self.handle, _side(a), _side(b)))
+
     # ---- time ------------------------------------------------------------------------------------------
 
     def step(self, dt: float) -> Trouble:
@@ -558,7 +583,7 @@ class World(Queries, Tools, OfThisProcess):
         Raises Diverged where a sub-step could not be taken (the world stays at the last good one) and
         Discarded where the step was given up and nothing has changed. Releases the interpreter's lock.
         Ctrl-C in the main thread ends the step at once: KeyboardInterrupt, and nothing has changed."""
-        seconds = float(dt)
+        seconds = dt if type(dt) is float else real(dt, "dt")
         if self._busy:
             self.free()
         self._busy = get_ident()
@@ -586,6 +611,8 @@ class World(Queries, Tools, OfThisProcess):
     def run(self, duration: float, dt: float | None = None) -> Trouble:
         """Steps until `duration` s have passed, by dt or, where none is given, by the stable step, with a
         warning where that takes more than 100,000 steps."""
+        duration = real(duration, "duration")
+        dt = None if dt is None else real(dt, "dt")
         if not 0 <= duration < np.inf:
             raise ArgumentError(f"a duration of {duration} s; it must be finite and not negative",
                                 "DFM_E_ARG")
@@ -610,8 +637,9 @@ class World(Queries, Tools, OfThisProcess):
 
         load_steps: on the way from load_from to load_to, shares of gravity and loads; time: s that pass."""
         definition = default(_abi.dfm_equilibrium_def)
-        definition.load_steps, definition.time = load_steps, time
-        definition.load_from, definition.load_to = load_from, load_to
+        definition.load_steps, definition.time = whole(load_steps, "load_steps", 1), real(time, "time")
+        definition.load_from = real(load_from, "load_from")
+        definition.load_to = real(load_to, "load_to")
         with self.alone():
             status = lib.dfm_world_equilibrium(self.handle, ctypes.byref(definition), None)
         if status == _abi.DFM_DISCARD and self._asked:  # by a signal whose handler has not raised
@@ -642,12 +670,24 @@ class World(Queries, Tools, OfThisProcess):
         self.free()
         check(quick.dfm_world_set_gravity(self.handle, vector(gravity, "gravity")))
 
+    def set_gravity_keys(self, times: Any, gravity: Any) -> None:
+        """Gravity [n,3] m/s2 at times [n] s, linear between them; [] and [] end it."""
+        keys = vector_keys(times, gravity if np.size(gravity) else np.empty((0, 3)), "gravity")
+        self.free()
+        check(quick.dfm_world_set_gravity_keys(self.handle, np.size(times), ctypes.byref(keys)))
+
+    def set_sleep(self, sleep: bool = True) -> None:
+        """Lets islands at rest sleep from now on; False: wakes all bodies and keeps them awake."""
+        self.free()
+        check(quick.dfm_world_set_sleep(self.handle, bool(sleep)))
+
     def set_budget(self, max_time: float = 0, max_work: float | None = 0) -> None:
         """Limits of one step from now on. max_time: s by the clock, 0: none. max_work: units of work, counted
         in stats.work, the same on every machine; 0: automatic, None: no limit. A step that nears a limit is
         simplified (Trouble.BUDGET); one that reaches it raises Discarded, and nothing has changed."""
         self.free()
-        most = 2**64 - 1
+        most, max_time = 2**64 - 1, real(max_time, "max_time")
+        max_work = None if max_work is None else real(max_work, "max_work")
         if max_work is not None and not 0 <= max_work <= most:
             raise ArgumentError(f"max_work is {max_work}; expected 0 to {most}, or None for no limit",
                                 "DFM_E_ARG")
@@ -703,17 +743,6 @@ class World(Queries, Tools, OfThisProcess):
         return self._list("stats", lambda: Report(quick.dfm_world_get_stats, self.handle,
                                                   _abi.dfm_world_stats))
 
-    @property
-    def hash(self) -> int:
-        """Of the whole state: equal for equal bits."""
-        self.free()
-        return int(quick.dfm_world_hash(self.handle))
-
-    def explain(self) -> dict[str, Any]:
-        """The plan: effects, stages and why, laws, bodies, what bounds the step."""
-        self.free()
-        return json.loads(read_text(quick.dfm_world_explain, self.handle))
-
     def ray(self, origin: Sequence[float], direction: Sequence[float],
             max_distance: float = np.inf) -> dict[str, Any] | None:
         """The first surface that a ray meets: owner, triangle, distance m, point [3] m, normal [3]; or
@@ -721,7 +750,7 @@ class World(Queries, Tools, OfThisProcess):
         self.free()
         out = sized(_abi.dfm_ray_hit)
         check(quick.dfm_world_ray(self.handle, vector(origin, "origin"), vector(direction, "direction"),
-                                  max_distance, ctypes.byref(out)))
+                                  real(max_distance, "max_distance"), ctypes.byref(out)))
         if not (out.body or out.obstacle):
             return None
         return {"owner": self.owner(out.body or out.obstacle), "triangle": out.triangle,

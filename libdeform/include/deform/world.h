@@ -126,8 +126,9 @@ enum {
   /* a cell is inverted (checked when the step bound is computed): refine the mesh, or lower the load */
   DFM_TROUBLE_INVERTED = 8,
   DFM_TROUBLE_PLUGIN = 16, /* a plugin failed: see the log */
-  /* set once, by the step after something was created or placed inside something else: dfm_world_overlaps
-   * lists the pairs; move one of each (doc/concepts/overlaps.md) */
+  /* set once, by the step after something was created or placed inside something else, or parts of a body
+   * came off with their teeth in each other: dfm_world_overlaps lists the pairs; move one of each, unless
+   * they are such parts, which contact moves apart (doc/concepts/overlaps.md) */
   DFM_TROUBLE_OVERLAP = 32,
   /* a body gained energy without a cause (status DFM_E_DIVERGED): take a shorter step, or add stiffness
    * damping */
@@ -236,7 +237,8 @@ DFM_API dfm_status dfm_world_find_overlaps(dfm_world world, uint32_t *n);
 
 /** Moves overlapping bodies apart, as DFM_WORLD_UNTANGLE does for new ones: whole bodies are translated by
  * the shortest displacement found, which adds neither elastic energy nor velocity. Bodies with held points,
- * obstacles and rigid bodies stay. Pairs that cannot be separated stay, and the log says why.
+ * attached bodies, parts of one body, obstacles and rigid bodies stay. Pairs that cannot be separated stay,
+ * and the log says why.
  * @param left  out, pairs that still overlap; may be NULL. @return DFM_OK; DFM_E_HANDLE; DFM_E_BUSY. Threads:
  * Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_untangle(dfm_world world, uint32_t *left);

@@ -2,6 +2,7 @@
 #pragma once
 #include <algorithm>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 namespace dfm {
@@ -15,6 +16,7 @@ struct Overlap {
   double depth = 0;        // m, largest distance of such a surfel from the other surface
   bool aside = false;      // too deep for contact to resolve: excluded from contact until the two are apart
   bool separated = false;  // untangle() has separated it
+  uint64_t whole = 0;      // id of the body of which both are parts, and lie as contact has left them; else 0
 };
 struct PairAside { uint64_t a, b, obstacle; };
 
@@ -26,6 +28,8 @@ struct Overlaps {
   std::vector<Overlap> found;  // by the last search
   std::vector<PairAside> aside;
   bool told = true;  // a step has reported it
+  // m by the body of which both are parts: the largest depth that the log has told
+  std::vector<std::pair<uint64_t, double>> told_of_parts;
   bool is_aside(uint64_t a, uint64_t b, bool obstacle) const {
     return std::any_of(aside.begin(), aside.end(), [&](const PairAside &p) {
       return p.a == a && p.b == b && (p.obstacle != 0) == obstacle;

@@ -8,6 +8,7 @@
 #include "state/obstacle.h"
 #include "state/world.h"
 #include "step/context.h"
+#include "step/held_in.h"
 #include "step/stages.h"
 
 namespace dfm {
@@ -96,9 +97,13 @@ uint32_t tell_jam(World &w, StepContext &step) {
   uint32_t worst = kNone;
   for (uint32_t i = 0; i < step.rows.n; ++i)
     if (worst == kNone || step.rows.impulse[3 * size_t{i}] > step.rows.impulse[3 * size_t{worst}]) worst = i;
-  set_last_error(format("step %llu, %s: squeezed until nothing can move; open what closes on it, move that "
-                        "more slowly, or make the body stiffer",
-                        static_cast<unsigned long long>(w.step_count), sides(w, step, worst).c_str())
+  const ContactPoint *const c = worst < step.contacts.size() ? &step.contacts[worst] : nullptr;
+  const std::string held = c && c->obstacle ? tell_held_at(w, c->slot_a, c->slot_b) : std::string();
+  set_last_error(format("step %llu, %s: squeezed until nothing can move; %s",
+                        static_cast<unsigned long long>(w.step_count), sides(w, step, worst).c_str(),
+                        held.empty()
+                            ? "open what closes on it, move that more slowly, or make the body stiffer"
+                            : held.c_str())
                      .c_str());
   return DFM_TROUBLE_UNCONVERGED;
 }

@@ -10,6 +10,7 @@
 #include "plugin/context.h"
 #include "state/world.h"
 #include "step/context.h"
+#include "step/held_in.h"
 #include "step/overlap_sides.h"
 #include "step/stages.h"
 #include "step/untangle.h"
@@ -20,6 +21,7 @@ namespace {
 constexpr uint64_t kReleaseEvery = 16;          // steps: interval at which excluded pairs are tested
 constexpr uint64_t kPiece = uint64_t{1} << 63;  // added to ids in Overlaps::placed by place_piece()
 constexpr size_t kSentences = 8;                // number of pairs that the log names individually
+constexpr double kTellAgain = 2;                // times the depth of parts that the log has told
 
 // Whether the overlap is too deep for contact to resolve. Closed shapes and voxels resolve any depth;
 // triangles only small ones.
@@ -35,9 +37,10 @@ uint64_t other_id(const World &w, const OverlapPair &p) {
   return p.obstacle ? w.obstacles[p.b]->id : w.bodies[p.b]->id;
 }
 
+uint64_t whole_of(const Body &b) { return b.piece_of ? b.piece_of : b.id; }
+
 bool parts_of_one(const World &w, const OverlapPair &p) {
-  const auto whole = [](const Body &b) { return b.piece_of ? b.piece_of : b.id; };
-  return !p.obstacle && whole(*w.bodies[p.a]) == whole(*w.bodies[p.b]);
+  return !p.obstacle && whole_of(*w.bodies[p.a]) == whole_of(*w.bodies[p.b]);
 }
 
 // Parts of what was one body lie on each other where they were one, with the faces of the cut set back by
@@ -63,8 +66,11 @@ std::vector<Overlap> find_overlaps(World &w) {
     const uint64_t a = w.bodies[p.a]->id, b = other_id(w, p);
     if ((!asked(a) && !asked(b)) || !sides.may_touch(p)) return;
     const Crossed c = sides.look(p, w.offset, false);
-    if (c.through && !lie_on_cut(w, p, c))
-      out.push_back({a, b, p.obstacle, c.crossings, c.enclosed, c.depth, deep(w, p, c) && !kept(p, a, b)});
+    if (!c.through || lie_on_cut(w, p, c)) return;
+    out.push_back({a, b, p.obstacle, c.crossings, c.enclosed, c.depth, deep(w, p, c) && !kept(p, a, b)});
+    // after a restore all counts as placed, and nobody has moved anything
+    if (kept(p, a, b) || (parts_of_one(w, p) && w.overlaps.look_only))
+      out.back().whole = whole_of(*w.bodies[p.a]);
   };
   for (uint32_t i = 0; i < w.bodies.size(); ++i) {
     for (uint32_t j = i + 1; j < w.bodies.size(); ++j) look({i, j, false});
@@ -84,7 +90,25 @@ const Obstacle *obstacle_of_id(const World &w, uint64_t id) {
   return nullptr;
 }
 
-void warn(const World &w, const Overlap &o) {
+// The name under which the user has made it: a piece has come during the run, and cannot be put elsewhere.
+const std::string &made_name(const Body &b) { return b.piece_of ? b.whole_name : b.name; }
+
+std::string remedy(World &w, OverlapSides &sides, const Overlap &o, bool untangled) {
+  const Body &a = *body_of_id(w, o.a);
+  const Obstacle *const thing = o.obstacle ? obstacle_of_id(w, o.b) : nullptr;
+  if (const HeldIn held = held_in(w, sides, {a.slot, thing ? thing->slot : 0, o.obstacle}, w.offset); held.by)
+    return tell_held_in(w, held, thing->name);
+  const std::string what =
+      o.aside ? "contact between them is off until they are apart" : "contact pushes them apart slowly";
+  const Body *const b = thing ? nullptr : body_of_id(w, o.b);
+  const bool came = a.piece_of || (b && b->piece_of);
+  const std::string where = came ? format("move '%s' or '%s' at the start", made_name(a).c_str(),
+                                          (thing ? thing->name : made_name(*b)).c_str())
+                                 : "move one of them";
+  return what + "; " + where + (untangled ? "" : ", or set \"untangle\"");
+}
+
+void warn(World &w, OverlapSides &sides, const Overlap &o, bool untangled) {
   const Obstacle *const thing = o.obstacle ? obstacle_of_id(w, o.b) : nullptr;
   const std::string &name = thing ? thing->name : body_of_id(w, o.b)->name;
   w.context->logf(
@@ -95,9 +119,38 @@ void warn(const World &w, const Overlap &o) {
       : !thing->rigid         ? "obstacle"
       : thing->rigid->of_tool ? "tool"
                               : "rigid body",
-      name.c_str(), o.depth, o.crossings, o.enclosed,
-      o.aside ? "contact between them is off until they are apart; move one of them, or set \"untangle\""
-              : "contact pushes them apart slowly; move one of them, or set \"untangle\"");
+      name.c_str(), o.depth, o.crossings, o.enclosed, remedy(w, sides, o, untangled).c_str());
+}
+
+// Parts that came off with the teeth of their faces in each other. Nobody has put them there, and contact
+// leads them apart, so one sentence for all parts of a body is enough, until they are much deeper.
+void warn_of_parts(World &w, const std::vector<Overlap> &found) {
+  std::vector<uint64_t> wholes;
+  for (const Overlap &o : found)
+    if (o.whole && std::find(wholes.begin(), wholes.end(), o.whole) == wholes.end())
+      wholes.push_back(o.whole);
+  for (const uint64_t whole : wholes) {
+    const Overlap *deepest = nullptr;
+    size_t n = 0;
+    for (const Overlap &o : found) {
+      if (o.whole != whole) continue;
+      ++n;
+      if (!deepest || o.depth > deepest->depth) deepest = &o;
+    }
+    auto &told = w.overlaps.told_of_parts;
+    auto at = std::find_if(told.begin(), told.end(), [&](const auto &t) { return t.first == whole; });
+    if (at == told.end()) at = told.insert(at, {whole, 0.0});
+    if (!(deepest->depth > kTellAgain * at->second)) continue;
+    at->second = deepest->depth;
+    const Body &a = *body_of_id(w, deepest->a), &b = *body_of_id(w, deepest->b);
+    w.context->logf(
+        DFM_LOG_WARNING,
+        "parts of body '%s' came off with their faces in each other, by up to %.3g m ('%s' and '%s'; %zu "
+        "%s): teeth of a cut or tear are as large as the cells; contact moves them apart slowly, smaller "
+        "cells or layers of cells along a cut make smaller teeth",
+        made_name(a.piece_of ? a : b).c_str(), deepest->depth, a.name.c_str(), b.name.c_str(), n,
+        n == 1 ? "pair" : "pairs");
+  }
 }
 
 // It has separated: contact is on again.
@@ -116,16 +169,28 @@ void settle_overlaps(World &w) {
   Overlaps &o = w.overlaps;
   if (!o.due()) return;
   std::vector<Overlap> found = find_overlaps(w);
-  if ((w.def.flags & DFM_WORLD_UNTANGLE || o.untangle) && !o.look_only) untangle(w, found);
+  const bool untangles = w.def.flags & DFM_WORLD_UNTANGLE || o.untangle;
+  if (untangles && !o.look_only) {
+    // parts of one body are where contact has left them, and it goes on to move them apart
+    const auto parts =
+        std::stable_partition(found.begin(), found.end(), [](auto &f) { return f.whole == 0; });
+    std::vector<Overlap> kept(parts, found.end());
+    found.erase(parts, found.end());
+    untangle(w, found);
+    found.insert(found.end(), kept.begin(), kept.end());
+  }
   std::vector<Overlap> left;
   for (const Overlap &f : found) {
     if (!f.separated) left.push_back(f);
     else take_back(w, f);
   }
-  for (size_t i = 0; i < left.size() && i < kSentences; ++i) warn(w, left[i]);
-  if (left.size() > kSentences)
-    w.context->logf(DFM_LOG_WARNING, "%zu more pairs overlap; dfm_world_overlaps lists them",
-                    left.size() - kSentences);
+  OverlapSides sides(w);
+  size_t n = 0;
+  for (const Overlap &f : left)
+    if (!f.whole && n++ < kSentences) warn(w, sides, f, untangles);
+  if (n > kSentences)
+    w.context->logf(DFM_LOG_WARNING, "%zu more pairs overlap; dfm_world_overlaps lists them", n - kSentences);
+  warn_of_parts(w, left);
   for (const Overlap &f : left) {
     if (!f.aside || o.look_only || o.is_aside(f.a, f.b, f.obstacle)) continue;
     o.aside.push_back({f.a, f.b, f.obstacle});

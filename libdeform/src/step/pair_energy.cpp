@@ -10,6 +10,7 @@
 #include "state/world.h"
 #include "step/context.h"
 #include "step/energy_watch.h"
+#include "step/held_in.h"
 #include "step/pair_table.h"
 #include "step/solve_islands.h"
 #include "step/stages.h"
@@ -225,7 +226,7 @@ bool pair_over(const World &w) {
   });
 }
 
-std::string tell_pair_gain(const World &w) {
+std::string tell_pair_gain(World &w) {
   const PairWork *worst = nullptr;
   double most = 1, limit = 0;
   for (const PairWork &p : w.work) {
@@ -252,12 +253,16 @@ std::string tell_pair_gain(const World &w) {
         "step %llu, %s: friction law '%s' has put in %s; its force must point against the slip: "
         "change the law or its parameters (energy_watch sets the limit, 0 switches the watch off)",
         static_cast<unsigned long long>(w.step_count), sides.c_str(), law.c_str(), grown.c_str());
-  return format(
-      "step %llu, %s: their contact (law '%s'%s) has put in %s; take a shorter step, repair their "
-      "surfaces, or, where a model of a plugin steps itself, check its response to impulses "
-      "(energy_watch sets the limit, 0 switches the watch off)",
-      static_cast<unsigned long long>(w.step_count), sides.c_str(), law.c_str(), models_of(w, *worst).c_str(),
-      grown.c_str());
+  const uint32_t a = slot_of(w, worst->a), o = is_body(w, worst->b) ? kNone : obstacle_slot_of(w, worst->b);
+  const std::string held = a != kNone && o != kNone ? tell_held_at(w, a, o) : std::string();
+  return format("step %llu, %s: their contact (law '%s'%s) has put in %s; %s",
+                static_cast<unsigned long long>(w.step_count), sides.c_str(), law.c_str(),
+                models_of(w, *worst).c_str(), grown.c_str(),
+                held.empty()
+                    ? "take a shorter step, repair their surfaces, or, where a model of a plugin steps "
+                      "itself, check its response to impulses (energy_watch sets the limit, 0 switches "
+                      "the watch off)"
+                    : held.c_str());
 }
 
 void forget_pairs(World &w, uint64_t id) {

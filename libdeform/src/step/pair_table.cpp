@@ -125,8 +125,7 @@ uint32_t pair_law(const World &w, uint32_t slot_a, bool obstacle, uint32_t slot_
   return w.pairs.law[slot_a * width + (obstacle ? nb : 0) + slot_b];
 }
 
-void find_law(World &w, uint32_t a, uint32_t b, std::vector<uint32_t> &used) {
-  const size_t width = w.bodies.size() + w.obstacles.size();
+PairLaw find_law(World &w, uint32_t a, uint32_t b, std::vector<uint32_t> &used) {
   const uint32_t na = zone_count(w, a), nb = zone_count(w, b);
   std::vector<uint32_t> laws_of;
   bool same = true;
@@ -135,13 +134,23 @@ void find_law(World &w, uint32_t a, uint32_t b, std::vector<uint32_t> &used) {
       laws_of.push_back(law_of_zones(w, a, i, b, j));
       same = same && laws_of.back() == laws_of[0];
     }
-  PairTables &to = w.pairs;
-  to.law[a * width + b] = laws_of[0];
   used.assign(laws_of.begin(), same ? laws_of.begin() + 1 : laws_of.end());
-  if (same) return;
+  PairLaw out{laws_of[0]};
+  if (!same) {
+    out.zones = static_cast<uint32_t>(w.pairs.zone_law.size());
+    w.pairs.zone_law.insert(w.pairs.zone_law.end(), laws_of.begin(), laws_of.end());
+  }
+  put_law(w, a, b, out);
+  return out;
+}
+
+void put_law(World &w, uint32_t a, uint32_t b, const PairLaw &known) {
+  const size_t width = w.bodies.size() + w.obstacles.size();
+  PairTables &to = w.pairs;
+  to.law[a * width + b] = known.law;
+  if (known.zones == kNone) return;
   if (to.zone_table.empty()) to.zone_table.assign(w.bodies.size() * width, kNone);
-  to.zone_table[a * width + b] = static_cast<uint32_t>(to.zone_law.size());
-  to.zone_law.insert(to.zone_law.end(), laws_of.begin(), laws_of.end());
+  to.zone_table[a * width + b] = known.zones;
 }
 
 uint32_t law_of_obstacles(World &w, const Obstacle &a, const Obstacle &b) {

@@ -24,8 +24,15 @@ uint32_t add_law(World &w, const char *name, std::span<const dfm_param_value> va
 std::unique_ptr<LawInstance> make_law(const World &w, const dfm_type &type, std::vector<double> asked);
 uint32_t place_law(World &w, std::unique_ptr<LawInstance> law, std::span<const uint8_t> free);
 
+// What the tables hold for a pair: its law, and of zones that differ the place of their laws in zone_law.
+struct PairLaw {
+  uint32_t law = kNone, zones = kNone;
+  bool found() const { return law != kNone; }
+};
 // Fills the tables for things a and b (bodies by slot, then obstacles). used: their laws, out.
-void find_law(World &w, uint32_t a, uint32_t b, std::vector<uint32_t> &used);
+PairLaw find_law(World &w, uint32_t a, uint32_t b, std::vector<uint32_t> &used);
+// The same with what find_law has returned for two things of the same kinds (step/pair_kinds.h).
+void put_law(World &w, uint32_t a, uint32_t b, const PairLaw &known);
 // The law of two obstacles, of which a tool is one.
 uint32_t law_of_obstacles(World &w, const Obstacle &a, const Obstacle &b);
 uint32_t pair_law(const World &w, uint32_t slot_a, bool obstacle, uint32_t slot_b);

@@ -23,6 +23,7 @@
 #include "step/cut_drag.h"
 #include "step/energy_watch.h"
 #include "step/overlap.h"
+#include "step/pair_kinds.h"
 #include "step/pair_table.h"
 #include "step/rigid.h"
 #include "step/self_contact.h"
@@ -244,7 +245,18 @@ bool cut_through(const World &w, uint32_t i, uint32_t thing) {
   return !w.tools.empty() && thing >= nb && passes_through(w, *w.bodies[i], *w.obstacles[thing - nb]);
 }
 
-// Filters, then laws. The default law is made only when a pair needs it.
+// By slot: does any attachment hold the body or hold something at it? Few do, of many pieces.
+std::vector<uint8_t> attached_bodies(const World &w) {
+  std::vector<uint8_t> out;
+  for (const auto &b : w.bodies)
+    out.push_back(std::any_of(w.attachments.begin(), w.attachments.end(), [&](const Attachment &x) {
+      return x.body == b->id || (!x.obstacle && x.to == b->id);
+    }));
+  return out;
+}
+
+// Filters, then laws. The default law is made only when a pair needs it. This runs after each cut and each
+// separation for all pairs, so what depends on their kinds alone is found once for each two kinds.
 void make_pair_tables(World &w, StepContext &step, SceneFacts &facts) {
   const uint32_t nb = static_cast<uint32_t>(w.bodies.size());
   const uint32_t width = nb + static_cast<uint32_t>(w.obstacles.size());
@@ -259,25 +271,35 @@ void make_pair_tables(World &w, StepContext &step, SceneFacts &facts) {
   std::vector<PairAnswer> answers;  // kept, or given now
   std::vector<uint32_t> used;
   std::vector<uint8_t> told;  // by law: its effects are listed once, however many pairs use it
+  const std::vector<uint8_t> attached = attached_bodies(w);
+  std::vector<Partner> things;
+  for (uint32_t i = 0; i < width; ++i) things.push_back(partner_of(w, step, i));
+  PairKinds kinds(w);
   for (uint32_t i = 0; i < nb; ++i) {
-    const Partner a = partner_of(w, step, i);
+    const Partner &a = things[i];
     for (uint32_t j = 0; j < width; ++j) {
       if (j == i) continue;
       const bool is_body = j < nb;
-      const Partner b = partner_of(w, step, j);
+      const Partner &b = things[j];
+      PairKinds::Pair &pair = kinds.of(i, j);
       bool touch = (a.category & b.collides_with) && (b.category & a.collides_with);
-      if (const FilterRule *rule = best_rule(w.filters, a.side, b.side)) {
-        if (!is_body || i < j) w.pairs.filter.set(a.id, b.id, !is_body, rule->collide);
-        touch = rule->collide;
+      if (pair.filter) {
+        if (!is_body || i < j) w.pairs.filter.set(a.id, b.id, !is_body, pair.filter->collide);
+        touch = pair.filter->collide;
       }
-      if (touch && (parted(w, i, j) || cut_through(w, i, j) || refused(w, step, i, j, a, b, answers))) {
+      if (touch && ((attached[i] && parted(w, i, j)) || cut_through(w, i, j) ||
+                    refused(w, step, i, j, a, b, answers))) {
         if (!is_body || i < j) w.pairs.filter.set(a.id, b.id, !is_body, false);
         touch = false;
       }
       if (!touch || !b.has_shape) continue;
       if (is_body) facts.body_pairs += i < j;
       else ++facts.obstacle_pairs;
-      find_law(w, i, j, used);
+      if (pair.law.found()) {
+        put_law(w, i, j, pair.law);
+        continue;
+      }
+      pair.law = find_law(w, i, j, used);
       told.resize(w.laws.size());
       for (uint32_t law : used)
         if (!std::exchange(told[law], uint8_t{1})) offer_law(*w.laws[law], facts);

@@ -36,7 +36,11 @@ class Untangler {
     std::iota(group_.begin(), group_.end(), 0u);
     for (auto &b : w.bodies) {
       const bool held = std::any_of(b->p.held.begin(), b->p.held.end(), [](uint8_t h) { return h != 0; });
-      movable_.push_back(!held && b->dynamics->abilities().placed);
+      // what is attached to it would draw it back to where it was
+      const bool attached = std::any_of(w.attachments.begin(), w.attachments.end(), [&](const Attachment &x) {
+        return !x.released && x.obstacle && x.body == b->id && x.stiffness == 0 && x.damping == 0;
+      });
+      movable_.push_back(!held && !attached && b->dynamics->abilities().placed);
     }
   }
 
@@ -206,11 +210,11 @@ class Untangler {
 
   void tell_failure(const OverlapPair &p) const {
     const std::string &b = p.obstacle ? w_.obstacles[p.b]->name : w_.bodies[p.b]->name;
-    w_.context->logf(
-        DFM_LOG_WARNING, "untangle cannot separate '%s' and '%s': %s", w_.bodies[p.a]->name.c_str(),
-        b.c_str(),
-        moves(p) ? "it finds no free place for them, so they stay where they are"
-                 : "neither may be moved as a whole, since points of them are held or they step themselves");
+    w_.context->logf(DFM_LOG_WARNING, "untangle cannot separate '%s' and '%s': %s",
+                     w_.bodies[p.a]->name.c_str(), b.c_str(),
+                     moves(p) ? "it finds no free place for them, so they stay where they are"
+                              : "neither may be moved as a whole, since points of them are held or attached, "
+                                "or they step themselves");
   }
 
   double potential(const Body &b, Vec3 by) const {

@@ -1,0 +1,58 @@
+#include "step/held_in.h"
+
+#include <algorithm>
+
+#include "core/error.h"
+#include "dynamics/rigid/rigid_set.h"
+#include "state/attachment.h"
+#include "state/obstacle.h"
+#include "state/tool.h"
+#include "state/world.h"
+#include "step/attach.h"
+#include "step/stages.h"
+
+namespace dfm {
+namespace {
+
+// A tool goes where its hand or path puts it, unless a spring couples the two.
+bool yields(const World &w, const Obstacle &o) {
+  if (!o.rigid) return false;
+  if (!o.rigid->of_tool) return !o.rigid->defs[o.rigid_body].fixed;
+  return std::any_of(w.tools.begin(), w.tools.end(),
+                     [&](const auto &t) { return t->set == o.rigid && t->def.stiffness > 0; });
+}
+
+}  // namespace
+
+HeldIn held_in(const World &w, OverlapSides &sides, const OverlapPair &p, double deeper) {
+  HeldIn most;
+  if (!p.obstacle || yields(w, *w.obstacles[p.b])) return most;
+  for (const Attachment &a : w.attachments) {
+    if (a.released || !a.obstacle || a.body != w.bodies[p.a]->id || a.to == w.obstacles[p.b]->id) continue;
+    if (a.stiffness > 0 || a.damping > 0 || yields(w, *w.obstacles[obstacle_slot_of(w, a.to)])) continue;
+    uint32_t n = 0;
+    // where it holds them, which a body that is torn to and fro may have left by now
+    for (size_t i = 0; i < a.surfels.size(); ++i) n += sides.depth(p, attached_place(w, a, i)) > deeper;
+    if (n > most.points) most = {&a, n};
+  }
+  return most;
+}
+
+std::string tell_held_in(const World &w, const HeldIn &held, const std::string &in) {
+  const std::string &to = w.obstacles[obstacle_slot_of(w, held.by->to)]->name;
+  return format(
+      "its attachment to '%s' holds %u %s there, so that contact cannot push %s out; attach only "
+      "what is outside of '%s', keep '%s' away from it, or give the attachment a \"stiffness\"",
+      to.c_str(), held.points, held.points == 1 ? "point" : "points", held.points == 1 ? "it" : "them",
+      in.c_str(), to.c_str());
+}
+
+std::string tell_held_at(World &w, uint32_t a, uint32_t b) {
+  if (w.attachments.empty()) return {};
+  OverlapSides sides(w);
+  // a contact bears at the rest distance, and what is pressed on it may lag by as much
+  const HeldIn held = held_in(w, sides, {a, b, true}, -2 * w.offset);
+  return held.by ? tell_held_in(w, held, w.obstacles[b]->name) : std::string();
+}
+
+}  // namespace dfm
