@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <new>
 #include <utility>
 
@@ -19,6 +20,8 @@ namespace {
 // ImplicitOptions. Contact at rest is solved to 1e-6 m/s. The remaining error is of first order; for a scheme
 // of second order it must be small compared with the error of that order.
 constexpr double kShare = 1e-3, kStagedShare = 1e-6;
+// What rounding leaves in a position, over the largest coordinate.
+constexpr double kRounding = 2 * std::numeric_limits<double>::epsilon();
 // If a correction is not at most half of the one before, a new matrix is needed.
 constexpr double kContracts = 0.5;
 // The factor of the rest state may fail to do so this often in a sub-step.
@@ -235,10 +238,14 @@ bool ImplicitPoints::restricted(uint32_t count, const uint32_t *points, double *
 // Whether the factor of the rest state is still good enough, if it left this share of the residual.
 bool ImplicitPoints::patient(double left) { return by_rest_ && (left <= kContracts || ++slow_ <= kPatience); }
 
+// Far from the origin the rounding of positions, over the length of the stage, is all that is left.
 double ImplicitPoints::allowed_error(const Array<double> &v, double share) const {
-  double most = 0;
-  for (size_t j = 0; j < v.size(); ++j) most = std::max(most, std::fabs(v[j] - p_.v[j]));
-  return options_.rest + share * most;
+  double most = 0, far = 0;
+  for (size_t j = 0; j < v.size(); ++j) {
+    most = std::max(most, std::fabs(v[j] - p_.v[j]));
+    far = std::max(far, std::fabs(p_.x[j]));
+  }
+  return std::max(options_.rest, kRounding * far / stage_.h) + share * most;
 }
 
 // Moves from v, whose residual is known, along change_. The residual is then that of the new v.
