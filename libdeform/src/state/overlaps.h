@@ -15,6 +15,7 @@ struct Overlap {
   double depth = 0;        // m, largest distance of such a surfel from the other surface
   bool aside = false;      // too deep for contact to resolve: excluded from contact until the two are apart
   bool separated = false;  // untangle() has separated it
+  bool of_cut = false;     // of two parts of one body, which nobody has placed
 };
 struct PairAside { uint64_t a, b, obstacle; };
 

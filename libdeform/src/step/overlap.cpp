@@ -63,8 +63,11 @@ std::vector<Overlap> find_overlaps(World &w) {
     const uint64_t a = w.bodies[p.a]->id, b = other_id(w, p);
     if ((!asked(a) && !asked(b)) || !sides.may_touch(p)) return;
     const Crossed c = sides.look(p, w.offset, false);
-    if (c.through && !lie_on_cut(w, p, c))
-      out.push_back({a, b, p.obstacle, c.crossings, c.enclosed, c.depth, deep(w, p, c) && !kept(p, a, b)});
+    if (!c.through || lie_on_cut(w, p, c)) return;
+    Overlap o = {a, b, p.obstacle, c.crossings, c.enclosed, c.depth};
+    o.of_cut = kept(p, a, b);
+    o.aside = !o.of_cut && deep(w, p, c);
+    out.push_back(o);
   };
   for (uint32_t i = 0; i < w.bodies.size(); ++i) {
     for (uint32_t j = i + 1; j < w.bodies.size(); ++j) look({i, j, false});
@@ -96,8 +99,9 @@ void warn(const World &w, const Overlap &o) {
       : thing->rigid->of_tool ? "tool"
                               : "rigid body",
       name.c_str(), o.depth, o.crossings, o.enclosed,
-      o.aside ? "contact between them is off until they are apart; move one of them, or set \"untangle\""
-              : "contact pushes them apart slowly; move one of them, or set \"untangle\"");
+      o.of_cut  ? "they were one body, and contact pushes the faces of the cut apart slowly"
+      : o.aside ? "contact between them is off until they are apart; move one of them, or set \"untangle\""
+                : "contact pushes them apart slowly; move one of them, or set \"untangle\"");
 }
 
 // It has separated: contact is on again.
