@@ -194,12 +194,7 @@ class Runner {
     const std::string when = spoiled_ ? " in the last state" : " in one state";
     const auto pairs = [](auto most) { return "up to " + std::to_string(most) + " triangle pairs"; };
     if (between > 0) out.push_back("surfaces cross: " + pairs(between) + " of two surfaces" + when);
-    if (within > 0)
-      out.push_back("a surface crosses itself: " + pairs(within) + when +
-                    (any_cut()
-                         ? "; take a shorter step, or set \"separate\" of the body that was cut to make "
-                           "its parts bodies"
-                         : "; \"contact\": {\"self\": \"auto\"} prevents this"));
+    if (within > 0) out.push_back("a surface crosses itself: " + pairs(within) + when + against_self());
     return out;
   }
 
@@ -244,6 +239,18 @@ class Runner {
     return what + where +
            "its material is too soft for the load, which a finer mesh does not change: give it a larger "
            "\"young\", or reduce what presses on it";
+  }
+
+  // What to do about a surface that crosses itself. Self contact keeps apart only what is apart at the start.
+  std::string against_self() const {
+    if (!spoiled_ && checks().self_first > 0)
+      return ", " + std::to_string(checks().self_first) +
+             " at the start: its mesh is like this; mend it, or take the surface of the cells (\"surface\": "
+             "{\"from\": \"boundary\"})";
+    if (any_cut())
+      return "; take a shorter step, or set \"separate\" of the body that was cut to make its parts bodies";
+    return scene_.value("/contact/self") == "false" ? "; \"contact\": {\"self\": \"auto\"} prevents this"
+                                                    : "; take a shorter step";
   }
 
   bool any_cut() const {

@@ -158,6 +158,7 @@ void Checker::check(bool start_state) {
   checks_.intersections_max = std::max(checks_.intersections_max, found.all());
   checks_.between_max = std::max(checks_.between_max, found.between);
   checks_.self_max = std::max(checks_.self_max, found.within);
+  if (start_state) checks_.self_first = found.within;
   checks_.between_last = found.between;
   checks_.self_last = found.within;
 }
