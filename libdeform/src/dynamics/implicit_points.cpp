@@ -30,6 +30,8 @@ constexpr uint32_t kPatience = 4;
 // ratio to the least correction at which the iteration counts as diverged.
 constexpr uint32_t kRevisions = 20;
 constexpr double kTolerated = 100, kDiverges = 100;
+// What such a rest may displace in a sub-step, over the median edge of the surface: its strain is energy.
+constexpr double kDisplaced = 0.02;
 // An end that moves by more than this times the last correction has new impulses: the history of corrections
 // does not apply there.
 constexpr double kElsewhere = 3;
@@ -488,7 +490,8 @@ Revision ImplicitPoints::revise(const SubStep &now, const double *surfel_impulse
   if (!known && !(before > 0 && before < HUGE_VAL)) return Revision::diverged;
   const double allowed = allowed_error(p_.v_end, kShare);
   const bool due = std::exchange(base_due_, false);
-  if (!due && (error_ <= allowed || ((last || revisions_ >= kRevisions) && error_ <= kTolerated * allowed))) {
+  const double tolerated = std::min(kTolerated * allowed, kDisplaced * surface_.median_edge / now.h);
+  if (!due && (error_ <= allowed || ((last || revisions_ >= kRevisions) && error_ <= tolerated))) {
     revisions_ = 0;
     error_ = 0;
     least_error_ = HUGE_VAL;
