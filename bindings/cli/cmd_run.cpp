@@ -257,16 +257,20 @@ class Runner {
            "\"young\", or reduce what presses on it";
   }
 
-  // What helps against a surface that crosses itself, as far as the scene does not ask for it yet.
+  // What helps against a surface that crosses itself, as far as the scene does not ask for it yet. Self
+  // contact keeps apart only what is apart at the start.
   std::string crossed_itself() const {
+    if (!spoiled_ && checks().self_first > 0)
+      return ", " + std::to_string(checks().self_first) +
+             " at the start: its mesh is like this; mend it, or take the surface of the cells (\"surface\": "
+             "{\"from\": \"boundary\"})";
     const auto at = std::ranges::find(scene_.bodies(), checks().crossed, &BodyView::name);
     const bool cut = at != scene_.bodies().end() && at->cut;
     if (!cut) {
       const std::string self = scene_.value("/contact/self");
       return self.empty() || self == "false"
                  ? "; \"contact\": {\"self\": \"auto\"} prevents this"
-                 : "; self contact cannot part what crosses itself at rest, of which deform mesh info tells; "
-                   "else take a shorter step";
+                 : "; take a shorter step";
     }
     const std::string &whole = scene_.name_of(at->whole);
     for (size_t b = 0; !scene_.value("/bodies/" + std::to_string(b)).empty(); ++b) {

@@ -81,6 +81,7 @@ struct Checks {
   // pairs of one state: all, and by whether two surfaces cross or one crosses itself
   size_t intersections_max = 0;
   size_t between_max = 0, self_max = 0;
+  size_t self_first = 0;  // of the start state
   uint32_t inverted_max = 0;
   size_t between_last = 0, self_last = 0;  // of the last state
   // of pairs between surfaces: those of two parts of one body, and all others

@@ -5,7 +5,7 @@
 
 namespace {
 
-constexpr double kG = 9.81, kFrame = 1.0 / 60, kOffset = 5e-5;
+constexpr double kG = 9.81, kFrame = 1.0 / 60, kOffset = 5e-5, kTenDegrees = 0.17453292519943295;
 constexpr int32_t kImplicit = DFM_INTEGRATOR_IMPLICIT_EULER, kSecond = DFM_INTEGRATOR_TR_BDF2;
 
 test::BodyOptions cube(const char *name, double young, double z) {
@@ -105,6 +105,52 @@ TEST(ImplicitContact, SlopeOf26Point5Degrees_SlidesAt049AndHoldsAt05) {
     if (mu < 0.495) EXPECT_GT(way, 0.5 * 0.5 * 0.0753 * 0.25) << model << ", step " << h;
     else EXPECT_LT(std::fabs(way), 0.5e-6 * 0.5) << model << ", step " << h;
   }
+}
+
+// Positions there round by 1.2e-10 m, in a step of 2 ms more than Newton's method leaves in a body at rest.
+TEST(ImplicitContact, StackOnASlopeAThousandKilometersAway_TakesNoMoreWork) {
+  for (const int32_t integrator : {kImplicit, kSecond}) {
+    const auto run = [&](double far) {
+      test::Context context;
+      const dfm_world w = test::make_world(context, {kG * 0.342, 0, -kG * 0.94}, integrator);
+      test::add_plane(w, "floor");
+      test::BodyOptions lower = cube("lower", 1e5, 5e-4), upper = cube("upper", 1e5, 0.0515);
+      lower.position = {far - 0.05, -far - 0.05, 5e-4};
+      upper.position = {far - 0.03, -far - 0.03, 0.0515};
+      test::make_body(context, w, "beam", {0.1, 0.1, 0.05}, 150, lower);
+      test::make_body(context, w, "beam", {0.06, 0.06, 0.04}, 150, upper);
+      test::run(w, 0.3, 2e-3);
+      return test::stats(w);
+    };
+    const dfm_world_stats here = run(0), there = run(1e6);
+    EXPECT_LE(there.work_max, 2 * here.work_max) << "integrator " << integrator;
+    EXPECT_LE(there.passes_max, 2 * here.passes_max) << "integrator " << integrator;
+  }
+}
+
+// A host whose frames differ: 0.1 ms, then 100 ms, while the beam lands. Of that step the revisions left a
+// tenth of the change of velocity, which bent the beam by 1 cm.
+TEST(ImplicitContact, BeamThatLandsInALongStep_GainsNoEnergy) {
+  for (const char *model : {"msm", "corotational_fem"})
+    for (const double before : {5e-5, 1e-4, 2e-4, 5e-4}) {
+      test::Context context;
+      const dfm_world w = test::make_world(context, {0, 0, -kG}, kImplicit);
+      test::add_plane(w, "floor");
+      test::BodyOptions o = cube("beam", 1e5, 0.3);
+      o.model = model;
+      o.damping_stiffness = 0;
+      o.rotation = {0, std::sin(kTenDegrees), 0, std::cos(kTenDegrees)};
+      const dfm_body b = test::make_body(context, w, "beam", {0.3, 0.05, 0.05}, 200, o);
+      const auto energy = [&] {
+        const dfm_body_measure m = test::measure(b);
+        return m.kinetic + m.elastic + m.mass * kG * m.com[2];
+      };
+      const double start = energy();
+      for (const double h : {1e-4, 0.1, 0.033, 0.008, 0.008, 0.016, 0.016, 0.016, 0.016, before, 0.1}) {
+        test::ok(dfm_world_step(w, h, nullptr));
+        EXPECT_LT(energy(), 1.001 * start) << model << ", " << before << " s, then " << h << " s";
+      }
+    }
 }
 
 TEST(ImplicitContact, TwoCubesThatCollide_KeepTheirMomentum) {

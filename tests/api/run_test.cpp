@@ -4,6 +4,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <array>
 #include <chrono>
 #include <filesystem>
 #include <map>
@@ -282,6 +283,34 @@ TEST(Run, CrossingBodies_AreCounted) {
   ASSERT_EQ(r.result.exit_code, 0) << r.result.err;
   EXPECT_GT(std::stoi(value(r.summary, "intersections_max")), 0);
   EXPECT_NE(value(r.summary, "warnings").find("surfaces cross"), std::string::npos);
+}
+
+// Two cubes in one file that overlap. Self contact keeps apart what is apart at the start: it is no remedy.
+TEST(Run, MeshThatCrossesItself_IsSaidToBeTheReason) {
+  std::string cubes;
+  for (const double x : {0.0, 0.06})
+    for (const double a : {0.0, 0.1})
+      for (const double b : {0.0, 0.1})
+        for (const double c : {0.0, 0.1})
+          cubes += "v " + std::to_string(x + a) + " " + std::to_string(b) + " " + std::to_string(c) + "\n";
+  for (const int first : {1, 9})
+    for (const auto &q : {std::array{0, 1, 3, 2}, std::array{4, 6, 7, 5}, std::array{0, 4, 5, 1},
+                          std::array{2, 3, 7, 6}, std::array{0, 2, 6, 4}, std::array{1, 5, 7, 3}}) {
+      cubes += "f";
+      for (const int corner : q) cubes += " " + std::to_string(first + corner);
+      cubes += "\n";
+    }
+  test::write_file(folder() + "/cubes.obj", cubes);
+  test::write_file(folder() + "/cubes.json", R"({"format": "deform-scene", "version": 1,
+    "time": {"duration": 0.004, "step": 0.002},
+    "bodies": [{"name": "cubes", "mesh": "cubes.obj", "fill": {"cells": 200}}]})");
+  for (const std::string self : {"false", "\"auto\"", "true"}) {
+    const test::CommandResult r = test::deform({"run", folder() + "/cubes.json", "--out", folder() + "/cubes",
+                                                "--set", "/contact={\"self\": " + self + "}"});
+    ASSERT_EQ(r.exit_code, 0) << r.err;
+    EXPECT_NE(r.err.find("at the start: its mesh is like this"), std::string::npos) << self << r.err;
+    EXPECT_EQ(r.err.find("prevents this"), std::string::npos) << self << r.err;
+  }
 }
 
 // A column of blocks that falls onto the floor at once. Four of its 200 solves are not done after 50 sweeps,

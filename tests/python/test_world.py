@@ -1,5 +1,6 @@
 """Worlds from arrays, steps, errors, ends, threads."""
 import gc
+import json
 import os
 import pathlib
 import signal
@@ -49,6 +50,20 @@ class Building(unittest.TestCase):
             np.testing.assert_allclose(body.points[:3, 2], [2.5, 2.5, 2.5])  # what is held stays
             np.testing.assert_allclose(body.points[3], [0, 0, 3])
             np.testing.assert_allclose(body.point_velocities, 0)
+
+    def test_what_messages_name_can_be_set(self):
+        with deform.World(energy_watch=0, recovery_speed=0.2, obstacle_speed=1) as world, \
+                tempfile.TemporaryDirectory() as folder:
+            ball(world)
+            path = pathlib.Path(folder) / "world.json"
+            world.write_scene(path)
+            contact = json.loads(path.read_text())["contact"]
+            self.assertEqual((contact["energy_watch"], contact["recovery_speed"]), (False, 0.2))
+            world.add_tool("sphere", radius=0.01, position=(0, 0, 1)).set_pose((0, 0, 1.1))
+            with self.assertRaisesRegex(deform.ArgumentError, "at most 1 m/s"):
+                world.step(0.05)
+        with self.assertRaisesRegex(deform.ArgumentError, "energy_watch is -1"):
+            deform.World(energy_watch=-1)
 
     def test_enumerated_parameter_by_name(self):
         with deform.World() as world:

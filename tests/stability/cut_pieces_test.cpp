@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "cut_scenes.h"
+#include "logged_context.h"
 #include "support.h"
 
 namespace {
@@ -12,7 +13,8 @@ using namespace test::cutting;
 
 // A ball of irregular cells; a plane leaves teeth in it as large as they are.
 struct Ball {
-  test::Context context;
+  test::LoggedContext made;
+  dfm_context *context = made.context;
   dfm_world w;
   dfm_body b;
   explicit Ball(const char *model, double gravity, double spin = 0)
@@ -223,10 +225,13 @@ TEST(CutPieces, CrossedWhenTheyPart_KeepContactUnlessPlaced) {
     EXPECT_GT(o.crossings, 10u);
     EXPECT_FALSE(o.flags & DFM_OVERLAP_ASIDE);
   }
+  EXPECT_NE(ball.made.log.find("came off with their faces in each other"), std::string::npos) << ball.made.log;
+  EXPECT_EQ(ball.made.log.find("move one of them"), std::string::npos) << ball.made.log;
   put_where_it_is(ball.all().front());
   const auto placed = test::listed(dfm_world_overlaps, ball.w);
   ASSERT_FALSE(placed.empty());
   EXPECT_TRUE(placed.front().flags & DFM_OVERLAP_ASIDE);
+  EXPECT_NE(ball.made.log.find("move one of them"), std::string::npos) << ball.made.log;
 }
 
 // Sides of a slit cross before the part comes off at 0.33 s. Contact of the two pieces was off from there on:

@@ -3,6 +3,9 @@
 
 #include <cmath>
 
+#include <filesystem>
+#include <fstream>
+
 #include "cost/richardson.h"
 
 using namespace cli::cost;
@@ -161,4 +164,29 @@ TEST(CostLimit, Events_AreNotTakenOn) {
   EXPECT_FALSE(found.used);
   EXPECT_NEAR(found.error, 0.04, 1e-12);
   EXPECT_EQ(find_limit(early, never, nullptr, kSizes, 1, limit).error, 1);
+}
+
+// The two runs lose it at different records.
+TEST(CostQuantities, ProbeThatACutTakes_IsComparedUntilThen) {
+  const auto folder = [](const std::string &name, double off, int last) {
+    const std::filesystem::path to = testing::TempDir() + "deform_cost_" + name;
+    std::filesystem::create_directories(to);
+    std::ofstream probes(to / "probes.csv"), bodies(to / "bodies.csv"), contacts(to / "contacts.csv");
+    probes << "t,probe,x,y,z,vx,vy,vz\n";
+    bodies << "t,body,com_x,com_y,com_z,vel_x,vel_y,vel_z,kinetic_J,elastic_J,volume\n";
+    contacts << "t,body_a,body_b,contacts,sticking,normal_N,friction_N\n";
+    for (int i = 0; i <= 10; ++i) {
+      const double t = 0.1 * i;
+      const std::string x = i <= last ? std::to_string(t + off) + ",0,0,1,0,0" : "nan,nan,nan,nan,nan,nan";
+      probes << t << ",tip," << x << "\n";
+      bodies << t << ",b,0,0,0,0,0,0,0,0,1\n";
+    }
+    return to.string();
+  };
+  const Quantities truth = read_quantities(folder("truth", 0, 6));
+  const Quantities other = read_quantities(folder("other", 0.02, 4));
+  const Quantity &of = truth.at("tip");
+  EXPECT_DOUBLE_EQ(of.t.back(), 0.6);
+  EXPECT_NEAR(error_of(other.at("tip"), of, 1), 0.02, 1e-6);
+  EXPECT_NEAR(error_of(of, other.at("tip"), 1), 0.02, 1e-6) << "the later records of the other side";
 }

@@ -15,6 +15,7 @@ namespace cli::cost {
 namespace {
 
 constexpr double kNever = std::numeric_limits<double>::quiet_NaN();
+constexpr double kSameTime = 1e-9;  // relative: sums of steps of different lengths
 
 using Row = std::vector<std::string>;
 struct Table {
@@ -63,6 +64,7 @@ void read_probes(const Table &probes, Quantities &out) {
                                                  "touch", "slip",  "rest", "probe"};
   for (const Row &row : probes.rows) {
     const std::string &name = probes.text(row, "probe");
+    if (!std::isfinite(probes.number(row, "x"))) continue;  // a cut has taken its cell
     Quantity &q = of(out, families.count(name) ? "probe." + name : name, "probe", "m", 3);
     q.t.push_back(probes.number(row, "t"));
     for (const char *c : {"x", "y", "z"}) q.values.push_back(probes.number(row, c));
@@ -199,9 +201,11 @@ double error_of(const Quantity &q, const Quantity &reference, double scale) {
     return one ? std::fabs(q.values[0] - reference.values[0]) / scale : 0;
   }
   if (q.t.empty() || reference.t.empty() || !(scale > 0)) return kNever;
-  // Weighted by time: records lie unevenly where steps are long.
+  // Weighted by time: records lie unevenly where steps are long. After the end of either there is nothing to
+  // compare: a cut has taken what it is of.
+  const double end = reference.t.back() + kSameTime * std::fabs(reference.t.back());
   double sum = 0, weight = 0, now[3], rates[3];
-  for (size_t i = 0; i < q.t.size(); ++i) {
+  for (size_t i = 0; i < q.t.size() && q.t[i] <= end; ++i) {
     const double before = i > 0 ? q.t[i - 1] : q.t[i], after = i + 1 < q.t.size() ? q.t[i + 1] : q.t[i];
     value_at(reference, q.t[i], now, rates);
     for (unsigned k = 0; k < q.width; ++k) {

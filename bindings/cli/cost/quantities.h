@@ -17,13 +17,14 @@ struct Quantity {
 };
 using Quantities = std::map<std::string, Quantity>;
 
-// Of a finished run.
+// Of a finished run. A probe ends with the last record before a cut takes its cell.
 Quantities read_quantities(const std::string &folder);
 
 // What differences are divided by: of positions the root mean square of how far the reference moves, at
 // least `least`; of other figures the largest value; of events the duration.
 double scale_of(const Quantity &reference, double least, double duration);
-// Root mean square of the difference over time, divided by scale; NaN where it cannot be said.
+// Root mean square of the difference over the time that both have, divided by scale; NaN where it cannot be
+// said.
 double error_of(const Quantity &q, const Quantity &reference, double scale);
 
 // [width], at a time between two records: cubic by values and rates where there are rates, else straight.

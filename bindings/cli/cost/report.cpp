@@ -359,8 +359,11 @@ std::string refusal_to_apply(const Study &study) {
 std::string table_text(const Subject &subject, const Study &study) {
   std::string out = shown(subject.path) + ": what accuracy costs\n";
   std::string names;
-  for (size_t i = 0; i < study.headline.size() && i < 6; ++i)
+  for (size_t i = 0; i < study.headline.size() && i < 6; ++i) {
     names += (names.empty() ? "" : ", ") + study.headline[i];
+    if (const auto end = study.until.find(study.headline[i]); end != study.until.end())
+      names += " (until a cut takes it after " + formatted("%.4g", end->second) + " s)";
+  }
   if (study.headline.size() > 6) names += ", ...";
   out += "error of " + names + (study.headline.size() > 1 ? " (the largest)" : "") +
          (subject.at_rest ? ": of the end, " : ": root mean square over time, ") +

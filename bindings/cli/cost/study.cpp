@@ -323,10 +323,14 @@ class Student {
       if (row.compared) figures_[i] = read_quantities(row.job.folder);
     }
     truth_ = figures_[size_t(out_.reference)];
+    double last_record = 0;
+    for (const auto &[name, q] : truth_)
+      if (!q.t.empty()) last_record = std::max(last_record, q.t.back());
     for (const auto &[name, q] : truth_) {
       out_.quantities.push_back(name);
       out_.scales[name] = scale_of(q, 1e-3 * size, s_.duration);
       out_.units[name] = q.unit;
+      if (q.family == "probe" && q.t.back() < last_record) out_.until[name] = q.t.back();
     }
     name_headline(truth_);
     find_limits();

@@ -53,6 +53,7 @@ struct Study {
   std::map<std::string, double> scales;
   std::map<std::string, std::string> units;
   std::vector<std::string> quantities, headline;  // all; the given ones
+  std::map<std::string, double> until;            // s: the last record of a probe that a cut has taken
   int reference = -1, check = -1, third = -1;     // rows: the finest, and those that it is checked by
   std::map<std::string, Limit> limits;            // by quantity: what the three say
   std::map<std::string, double> reference_error;  // of the reference

@@ -177,8 +177,11 @@ class World(Queries, Reports, Tools, OfThisProcess):
     gravity: [3] m/s2. integrator: "auto", "symplectic_euler", "implicit_euler", "tr_bdf2"; step: s, how long
     steps are to be, for "auto" to choose by. sleep: islands at rest sleep. self_contact: "off", "on",
     "auto". effects: names that select what is simulated, None: what parameters call for. contact_offset: m,
-    rest distance of surfaces, 0: from the meshes. threads: on which a step may run. context: loaded plugins
-    to share; by default one for all worlds of one thread.
+    rest distance of surfaces, 0: from the meshes. energy_watch: a step stops if a body has gained this share
+    of its energy without a cause, 0: never. recovery_speed: m/s at which penetrating surfaces separate, 0: a
+    tenth of the rest distance in a sub-step. obstacle_speed: m/s, a step in which an obstacle would move
+    faster is refused, 0: 200. threads: on which a step may run. context: loaded plugins to share; by default
+    one for all worlds of one thread.
 
     A world may be stepped in any thread, one at a time; two worlds step at once in two threads, since a step
     releases the interpreter's lock. At the end of a `with` block, or by close(), the world is gone: its
@@ -195,6 +198,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
                  method: str = "auto", step: float = 0, sleep: bool = False, self_contact: str = "off",
                  effects: Iterable[str] | None = None, contact_offset: float = 0, max_substeps: int = 10000,
                  max_sweeps: int = 50, max_time: float = 0, untangle: bool = False, solver: str | None = None,
+                 energy_watch: float = 0.01, recovery_speed: float = 0, obstacle_speed: float = 0,
                  threads: int = 1, context: Context | None = None):
         if context is None:
             threads = whole(threads, "threads")
@@ -211,6 +215,9 @@ class World(Queries, Reports, Tools, OfThisProcess):
         definition.max_substeps = whole(max_substeps, "max_substeps")
         definition.max_sweeps = whole(max_sweeps, "max_sweeps")
         definition.max_time = real(max_time, "max_time")
+        definition.energy_watch = real(energy_watch, "energy_watch")
+        definition.recovery_speed = real(recovery_speed, "recovery_speed")
+        definition.obstacle_speed = real(obstacle_speed, "obstacle_speed")
         definition.flags = _abi.DFM_WORLD_UNTANGLE if untangle else 0
         definition.solver = encoded(solver)
         out = ctypes.c_uint64()

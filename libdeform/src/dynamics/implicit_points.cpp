@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <new>
 #include <utility>
 
@@ -19,6 +20,8 @@ namespace {
 // ImplicitOptions. Contact at rest is solved to 1e-6 m/s. The remaining error is of first order; for a scheme
 // of second order it must be small compared with the error of that order.
 constexpr double kShare = 1e-3, kStagedShare = 1e-6;
+// What rounding leaves in a position, over the largest coordinate.
+constexpr double kRounding = 2 * std::numeric_limits<double>::epsilon();
 // If a correction is not at most half of the one before, a new matrix is needed.
 constexpr double kContracts = 0.5;
 // The factor of the rest state may fail to do so this often in a sub-step.
@@ -27,6 +30,8 @@ constexpr uint32_t kPatience = 4;
 // ratio to the least correction at which the iteration counts as diverged.
 constexpr uint32_t kRevisions = 20;
 constexpr double kTolerated = 100, kDiverges = 100;
+// What such a rest may displace in a sub-step, over the median edge of the surface: its strain is energy.
+constexpr double kDisplaced = 0.02;
 // An end that moves by more than this times the last correction has new impulses: the history of corrections
 // does not apply there.
 constexpr double kElsewhere = 3;
@@ -235,10 +240,14 @@ bool ImplicitPoints::restricted(uint32_t count, const uint32_t *points, double *
 // Whether the factor of the rest state is still good enough, if it left this share of the residual.
 bool ImplicitPoints::patient(double left) { return by_rest_ && (left <= kContracts || ++slow_ <= kPatience); }
 
+// Far from the origin the rounding of positions, over the length of the stage, is all that is left.
 double ImplicitPoints::allowed_error(const Array<double> &v, double share) const {
-  double most = 0;
-  for (size_t j = 0; j < v.size(); ++j) most = std::max(most, std::fabs(v[j] - p_.v[j]));
-  return options_.rest + share * most;
+  double most = 0, far = 0;
+  for (size_t j = 0; j < v.size(); ++j) {
+    most = std::max(most, std::fabs(v[j] - p_.v[j]));
+    far = std::max(far, std::fabs(p_.x[j]));
+  }
+  return std::max(options_.rest, kRounding * far / stage_.h) + share * most;
 }
 
 // Moves from v, whose residual is known, along change_. The residual is then that of the new v.
@@ -481,7 +490,8 @@ Revision ImplicitPoints::revise(const SubStep &now, const double *surfel_impulse
   if (!known && !(before > 0 && before < HUGE_VAL)) return Revision::diverged;
   const double allowed = allowed_error(p_.v_end, kShare);
   const bool due = std::exchange(base_due_, false);
-  if (!due && (error_ <= allowed || ((last || revisions_ >= kRevisions) && error_ <= kTolerated * allowed))) {
+  const double tolerated = std::min(kTolerated * allowed, kDisplaced * surface_.median_edge / now.h);
+  if (!due && (error_ <= allowed || ((last || revisions_ >= kRevisions) && error_ <= tolerated))) {
     revisions_ = 0;
     error_ = 0;
     least_error_ = HUGE_VAL;

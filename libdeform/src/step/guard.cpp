@@ -45,6 +45,9 @@ constexpr double kFinest = 4;                         // sub-steps that a blow m
 constexpr double kLight = 299792458;                  // m/s
 constexpr double kNoWay = 0.02;                       // of the motion of a sub-step: less counts as none
 constexpr double kSlow = 0.01;  // of d_g: what moves by less needs no closer look at how it does
+// Of a body that steps itself: way that contact moves its points along a straight line, over its size, above
+// which a sub-step is repeated finer; sub-steps that are made of one.
+constexpr double kStraight = 0.1, kFinestOwn = 32;
 
 Guard::Common common_motion(const Surface &s) {
   Vec3 sum;
@@ -117,6 +120,25 @@ bool meets(const World &w, const StepContext &step, uint32_t slot) {
   return false;
 }
 
+// m, of the diagonal of its bounding box
+double extent(const Surface &s) {
+  Vec3 low{HUGE_VAL, HUGE_VAL, HUGE_VAL}, high = -1.0 * low;
+  for (uint32_t i = 0; i < s.nsurfel; ++i)
+    for (int c = 0; c < 3; ++c) {
+      low[c] = std::min(low[c], s.x[size_t{4} * i + size_t(c)]);
+      high[c] = std::max(high[c], s.x[size_t{4} * i + size_t(c)]);
+    }
+  return norm(high - low);
+}
+
+// A body that steps itself turns its frame without contact; what contact changes is added along straight
+// lines. A spin w that contact stops leaves 1 - cos(h w) of the size as strain; way over size is about h w.
+double straight_way(const StepContext &step, const Body &b, uint32_t slot) {
+  if (!b.model.stepper || !b.model.can(DFM_CAP_ENERGY)) return 0;
+  const double way = step.h * step.guard.change[slot];
+  return way > kStraight * b.surface.median_edge ? way / extent(b.surface) : 0;
+}
+
 // A blow is a change of a point's velocity by contact that strains an edge in this sub-step by more than the
 // bound allows for. It is measured from the velocity at the start, because the support of a resting weight
 // changes only the predicted velocity. After a blow the next sub-step checks the bound. False: this sub-step
@@ -127,9 +149,10 @@ bool meets(const World &w, const StepContext &step, uint32_t slot) {
 bool withstands_blows(World &w, StepContext &step) {
   if (step.rows.ndof == 0) return true;
   Guard &g = step.guard;
-  double hard = 0;
+  double hard = 0, straight = 0;
   for (const uint32_t i : step.active) {
     const Body &b = *w.bodies[i];
+    straight = std::max(straight, straight_way(step, b, i));
     if (g.change[i] > 0 && gravity_exceeds_bound(w, b) && meets(w, step, i)) bring_check_forward(w, b);
     if (!(step.h * g.change[i] > kBoundStrain * b.surface.median_edge)) continue;
     if (!b.dynamics->diagonal() || !std::isfinite(b.bound.found.step)) continue;
@@ -137,8 +160,9 @@ bool withstands_blows(World &w, StepContext &step) {
     if (blow.strain > kBoundStrain) bound_is_due(w);
     if (blow.kinetic > step.free_kinetic[i]) hard = std::max(hard, blow.strain);
   }
-  if (!(hard > kHardBlow) || step.h != g.planned || g.finer > 1) return true;
+  if (!(hard > kHardBlow || straight > kStraight) || step.h != g.planned || g.finer > 1) return true;
   double parts = 1;
+  while (straight > parts * kStraight && 2 * parts <= g.most_finer && parts < kFinestOwn) parts *= 2;
   while (hard > parts * kSoftBlow && 2 * parts <= g.most_finer && parts < kFinest) parts *= 2;
   while (parts > 1 && !may_refine(w, step, parts)) parts /= 2;
   if (parts == 1) return true;
