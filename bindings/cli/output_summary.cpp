@@ -157,6 +157,7 @@ void Checker::check(bool start_state) {
   const crossing::Found found = counter_.count(
       surfaces_, start_state ? crossing::Touching::allowed : crossing::Touching::counts, joined());
   keep(found);
+  if (start_state) checks_.self_first = found.within;
 }
 
 void Checker::keep(const crossing::Found &found) {
@@ -177,7 +178,6 @@ void Checker::keep(const crossing::Found &found) {
   checks_.parts_max = std::max(checks_.parts_max, found.parts);
   checks_.others_max = std::max(checks_.others_max, others);
   checks_.self_max = std::max(checks_.self_max, found.within);
-  if (start_state) checks_.self_first = found.within;
   checks_.between_last = found.between;
   checks_.parts_last = found.parts;
   checks_.others_last = others;

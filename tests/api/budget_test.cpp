@@ -119,6 +119,30 @@ TEST(Budget, BelowTheLeastWork_IsToldAndLeavesTheStateAsBefore) {
   EXPECT_GT(test::stats(plain.world).contacts_max, 4u);
 }
 
+// Implicit bodies have no step bound that a sentence could name.
+TEST(Budget, OfImplicitBodies_IsToldWithoutAStepBound) {
+  test::Context context;
+  const dfm_world w = test::make_world(context, {0, 0, -9.81}, DFM_INTEGRATOR_IMPLICIT_EULER);
+  test::add_plane(w, "floor");
+  test::BodyOptions o;
+  o.position = {0, 0, 1e-3};
+  o.velocity = {0, 0, -3};
+  test::make_body(context, w, "beam", {0.1, 0.1, 0.05}, 60, o);
+  for (const uint64_t units : {1, 1000, 2000, 4000}) {
+    test::ok(dfm_world_set_budget(w, 0, units));
+    const std::string start = test::snapshot(w);
+    if (dfm_world_step(w, kStep, nullptr) != DFM_OK) {
+      const std::string told = dfm_last_error();
+      EXPECT_NE(told.find("max_work"), std::string::npos) << told;
+      EXPECT_EQ(told.find('?'), std::string::npos) << told;
+      EXPECT_EQ(told.find("step bound"), std::string::npos) << told;
+    } else {
+      EXPECT_GT(units, 1u);
+    }
+    test::ok(dfm_world_restore(w, start.data(), start.size()));
+  }
+}
+
 // Twice the least work of all sub-steps, with 12 units for each contact, or more: solves that do not converge
 // and ways that cross cost accuracy, never the step, and no step takes more.
 TEST(Budget, OfSolvesThatDoNotConverge_IsKeptAndRefusesNoStep) {

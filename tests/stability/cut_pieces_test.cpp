@@ -225,7 +225,8 @@ TEST(CutPieces, CrossedWhenTheyPart_KeepContactUnlessPlaced) {
     EXPECT_GT(o.crossings, 10u);
     EXPECT_FALSE(o.flags & DFM_OVERLAP_ASIDE);
   }
-  EXPECT_NE(ball.made.log.find("came off with their faces in each other"), std::string::npos) << ball.made.log;
+  EXPECT_NE(ball.made.log.find("came off with their faces in each other"), std::string::npos)
+      << ball.made.log;
   EXPECT_EQ(ball.made.log.find("move one of them"), std::string::npos) << ball.made.log;
   put_where_it_is(ball.all().front());
   const auto placed = test::listed(dfm_world_overlaps, ball.w);

@@ -258,7 +258,8 @@ void tell(const World &w, const StepContext &step, StepStopped::Why why, double 
   if (why == StepStopped::asked)
     return set_last_error(
         format("step %llu was interrupted; the state is as before the step", number).c_str());
-  const char *const body = w.bound.body ? w.bound.body->name.c_str() : "?";
+  // none where all bodies move implicitly, or step themselves
+  const char *const body = w.bound.body ? w.bound.body->name.c_str() : nullptr;
   if (why == StepStopped::time)
     return set_last_error(format("step %llu: %g s of simulated time took longer than max_time (%g s); the "
                                  "state is as before it; take a shorter step, or give it more time",
@@ -267,19 +268,21 @@ void tell(const World &w, const StepContext &step, StepStopped::Why why, double 
   if (why == StepStopped::least)
     return set_last_error(
         format("step %llu: %g s of simulated time need at least %llu units of work, and "
-               "max_work is %llu; raise it, take a shorter step, or coarsen or soften body '%s', whose step "
-               "bound is the smallest; the state is as before the step",
+               "max_work is %llu; raise it, take a shorter step, or %s; the state is as before the step",
                number, dt, static_cast<unsigned long long>(step.budget.least),
-               static_cast<unsigned long long>(step.budget.limit), body)
+               static_cast<unsigned long long>(step.budget.limit),
+               body ? format("coarsen or soften body '%s', whose step bound is the smallest", body).c_str()
+                    : "coarsen the bodies")
             .c_str());
-  set_last_error(format("step %llu: %g s of simulated time need more than %llu units of work (max_work), in "
-                        "contact or in body '%s', whose step bound is the smallest; the state is as before "
-                        "it; take a shorter step, reduce the speed of the impact, or raise max_work, to at "
-                        "least about %llu",
-                        number, dt, static_cast<unsigned long long>(step.budget.limit), body,
-                        static_cast<unsigned long long>(
-                            std::max(step.budget.least, step.budget.limit + step.budget.limit / 10)))
-                     .c_str());
+  set_last_error(
+      format("step %llu: %g s of simulated time need more than %llu units of work (max_work), in "
+             "contact%s; the state is as before it; take a shorter step, reduce the speed of the "
+             "impact, or raise max_work, to at least about %llu",
+             number, dt, static_cast<unsigned long long>(step.budget.limit),
+             body ? format(" or in body '%s', whose step bound is the smallest", body).c_str() : "",
+             static_cast<unsigned long long>(
+                 std::max(step.budget.least, step.budget.limit + step.budget.limit / 10)))
+          .c_str());
 }
 
 }  // namespace
