@@ -225,11 +225,13 @@ class Runner {
   std::string unsolved() const {
     const dfm_world_stats stats = world_stats(scene_);
     const std::string sweeps = scene_.value("/contact/max_sweeps");
+    // the solve of a sub-step that ends the run counts, the sub-step does not
+    const uint64_t substeps = std::max(stats.substeps, stats.unconverged);
     char share[160];
-    std::snprintf(share, sizeof share, "in %llu of %llu sub-steps (%.2g %%), with errors of up to %.1e m/s",
+    std::snprintf(share, sizeof share, "in %llu of %llu sub-steps (%.3g %%), with errors of up to %.1e m/s",
                   static_cast<unsigned long long>(stats.unconverged),
-                  static_cast<unsigned long long>(stats.substeps),
-                  100 * double(stats.unconverged) / double(stats.substeps), stats.residual_max);
+                  static_cast<unsigned long long>(substeps),
+                  100 * double(stats.unconverged) / double(substeps), stats.residual_max);
     const std::string said =
         std::string("the contact solve stopped at its limit of sweeps ") + share +
         ": forces of contact and friction are inexact there, and what should hold may creep; ";
