@@ -225,15 +225,21 @@ class Runner {
   std::string unsolved() const {
     const dfm_world_stats stats = world_stats(scene_);
     const std::string sweeps = scene_.value("/contact/max_sweeps");
+    // the solve of a sub-step that ends the run counts, the sub-step does not
+    const uint64_t substeps = std::max(stats.substeps, stats.unconverged);
     char share[160];
-    std::snprintf(share, sizeof share, "in %llu of %llu sub-steps (%.2g %%), with errors of up to %.1e m/s",
+    std::snprintf(share, sizeof share, "in %llu of %llu sub-steps (%.3g %%), with errors of up to %.1e m/s",
                   static_cast<unsigned long long>(stats.unconverged),
-                  static_cast<unsigned long long>(stats.substeps),
-                  100 * double(stats.unconverged) / double(stats.substeps), stats.residual_max);
-    return std::string("the contact solve stopped at its limit of sweeps ") + share +
-           ": forces of contact and friction are inexact there, and what should hold may creep; raise "
-           "\"max_sweeps\" of \"contact\" (" +
-           (sweeps.empty() ? "50" : sweeps) +
+                  static_cast<unsigned long long>(substeps),
+                  100 * double(stats.unconverged) / double(substeps), stats.residual_max);
+    const std::string said =
+        std::string("the contact solve stopped at its limit of sweeps ") + share +
+        ": forces of contact and friction are inexact there, and what should hold may creep; ";
+    if (any_cut())
+      return said +
+             "where teeth of a cut or torn body jam, more sweeps and shorter steps do not help: give its "
+             "material stiffness damping, or more of it";
+    return said + "raise \"max_sweeps\" of \"contact\" (" + (sweeps.empty() ? "50" : sweeps) +
            "), take a shorter step, add damping to the material, or lower the ratio of masses or stiffnesses";
   }
 
@@ -255,6 +261,11 @@ class Runner {
     return what + where +
            "its material is too soft for the load, which a finer mesh does not change: give it a larger "
            "\"young\", or reduce what presses on it";
+  }
+
+  bool any_cut() const {
+    return std::any_of(scene_.bodies().begin(), scene_.bodies().end(),
+                       [](const BodyView &b) { return b.cut; });
   }
 
   // What helps against a surface that crosses itself, as far as the scene does not ask for it yet. Self

@@ -222,6 +222,7 @@ class Arguments(unittest.TestCase):
                     ("cells is nan; expected a whole number", lambda: deform.TetMesh.ball(1, math.nan)),
                     ("max_sweeps is -1; expected", lambda: deform.World(max_sweeps=-1)),
                     ("load_steps is 0; expected a whole number from 1", lambda: world.equilibrium(0)),
+                    ("collides_with is -1; expected", lambda: body.set_filter(1, -1)),
                     ("load is -1; expected a whole number", lambda: body.remove_load(-1))):
                 with self.subTest(sentence):
                     self.refused(sentence, function)

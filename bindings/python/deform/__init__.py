@@ -23,7 +23,8 @@ from .picture import Picture
 from .query import ContactChoice, Filter, Hit, Shape
 from .scene import Run, Scene, run
 from .tool import Tool
-from .world import JointDef, Material, RigidDef, Trouble, World
+from .rigid_set import JointDef, Material, RigidDef
+from .world import Trouble, World
 
 __version__: str = _quick.dfm_version(None, None, None).decode()
 

@@ -56,6 +56,11 @@ def choice(what: str, given: str, allowed: Iterable[str]) -> str:
     raise ArgumentError(f"{what} '{given}' is not known{said} known: {', '.join(words)}", "DFM_E_ARG")
 
 
+def word(what: str, given: str, table: Mapping[str, int]) -> int:
+    """The number of a word in a table; as choice() else."""
+    return table[choice(what, given, table)]
+
+
 def strings(words: Iterable[str]) -> Any:
     """A NULL-terminated array of C strings, which it keeps alive."""
     encoded_words = [encoded(w) for w in words]

@@ -390,7 +390,8 @@ class Body(_Part):
     def set_filter(self, category: int = 1, collides_with: int = EVERYTHING) -> None:
         """A pair touches if each one's category is among the bits that the other collides with."""
         self.world.free()
-        check(quick.dfm_body_set_filter(self.handle, category, collides_with))
+        check(quick.dfm_body_set_filter(self.handle, whole(category, "category"),
+                                        whole(collides_with, "collides_with")))
 
     def set_sensor(self, sensor: bool = True) -> None:
         """Makes it a sensor, which reports what overlaps it and pushes nothing; False: it touches again."""
@@ -642,7 +643,8 @@ class Obstacle(_Part):
     def set_filter(self, category: int = 1, collides_with: int = EVERYTHING) -> None:
         """A pair touches if each one's category is among the bits that the other collides with."""
         self.world.free()
-        check(quick.dfm_obstacle_set_filter(self.handle, category, collides_with))
+        check(quick.dfm_obstacle_set_filter(self.handle, whole(category, "category"),
+                                            whole(collides_with, "collides_with")))
 
     def set_material(self, material: Any = None) -> None:
         """Its material, of World.add_material, for friction by material; None: no material."""

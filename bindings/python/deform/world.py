@@ -7,7 +7,6 @@ import difflib
 import enum
 import logging
 import weakref
-from dataclasses import dataclass
 from threading import get_ident
 from typing import Any, Iterable, Iterator, Mapping, Sequence
 
@@ -15,7 +14,7 @@ import numpy as np
 
 from . import _abi
 from ._arrays import Report, Rows
-from ._context import Context, Params, choice, default_context, number_of, strings
+from ._context import Context, Params, choice, default_context, number_of, strings, word
 from ._library import (ArgumentError, BusyError, OfThisProcess, check, default, encoded, error, lib, quick,
                        sized)
 from ._signals import watch
@@ -23,6 +22,7 @@ from ._values import array_of, pose_of, real, text, vector, whole
 from .body import EVERYTHING, Body, Obstacle, Rigid, handle_of, held_bits, vector_keys
 from .mesh import TetMesh, TriMesh, cells_of, points_of, surface_of
 from .query import Queries
+from .rigid_set import MATERIAL, SHAPES, JointDef, Material, RigidDef
 from .report import Reports
 from .tool import Tools
 
@@ -30,8 +30,6 @@ _LOG = logging.getLogger("deform")
 METHODS = {"auto": 0, "velocity": 1, "implicit": 2, "rollback": 3}
 INTEGRATORS = {"auto": 0, "symplectic_euler": 1, "implicit_euler": 2, "tr_bdf2": 3}
 SELF_CONTACT = {"off": 0, "on": 1, "auto": 2}
-SHAPES = {"plane": 0, "sphere": 1, "box": 2, "capsule": 3, "mesh": 4, "voxels": 5}
-JOINTS = {"hinge": 0, "slider": 1, "ball": 2, "fixed": 3}
 COUPLINGS = {"barycentric": 0, "mls": 1}
 MATERIAL_MEMBERS = {"density", "young", "poisson", "damping_mass", "damping_stiffness"}
 MATERIAL_ENTRIES = {"friction", "tear", "fracture_energy"}  # further ones are parameters of models
@@ -51,7 +49,6 @@ class Trouble(enum.IntFlag):
     INTERRUPTED = _abi.DFM_TROUBLE_INTERRUPTED
 
 
-_MATERIAL = "a material is made by add_material, or given as a dict of its entries, as {'young': 2e5}"
 
 
 def _side(given: Any) -> bytes:
@@ -66,25 +63,11 @@ def _side(given: Any) -> bytes:
     return name.encode()
 
 
-class Material(OfThisProcess):
-    """A named parameter set of a world. Made by World.add_material."""
-
-    __slots__ = ("handle", "name", "world")
-    _instead = "give its entries, a dict"
-
-    def __init__(self, world: World, handle: int, name: str | None):
-        self.world, self.handle, self.name = world, handle, name
-
-
 def _scaled(points: np.ndarray, scale: float) -> np.ndarray:
     scale = real(scale, "scale")
     if not (np.isfinite(scale) and scale > 0):
         raise ArgumentError(f"scale is {scale}; expected a finite number above 0", "DFM_E_ARG")
     return points if scale == 1 else np.ascontiguousarray(points * scale)
-
-
-def _word(what: str, given: str, table: Mapping[str, int]) -> int:
-    return table[choice(what, given, table)]
 
 
 def _turn(normal: Any) -> list[float]:
@@ -106,62 +89,6 @@ def _destroy(handle: int, _keep: Any) -> None:
 
 _NO_TROUBLE = Trouble(0)
 _step = lib.dfm_world_step
-
-
-@dataclass
-class RigidDef:
-    """A rigid "sphere" (radius), "box" (half_size [3]) or "capsule" (radius, half_length, along z), m; mass
-    kg; inertia [3] kg m2 (all zero: solid); position [3] m, rotation [4] (x, y, z, w), velocity [3] m/s,
-    spin [3] rad/s. fixed: it never moves."""
-
-    shape: str = "sphere"
-    mass: float = 1.0
-    name: str | None = None
-    position: Sequence[float] = (0, 0, 0)
-    rotation: Sequence[float] = (0, 0, 0, 1)
-    radius: float = 0.5
-    half_size: Sequence[float] = (0, 0, 0)
-    half_length: float = 0
-    inertia: Sequence[float] = (0, 0, 0)
-    velocity: Sequence[float] = (0, 0, 0)
-    spin: Sequence[float] = (0, 0, 0)
-    material: Material | None = None
-    fixed: bool = False
-
-    def struct(self) -> _abi.dfm_rigid_def:
-        out = default(_abi.dfm_rigid_def)
-        out.shape = _word("shape", self.shape, {k: SHAPES[k] for k in ("sphere", "box", "capsule")})
-        out.name, out.fixed = encoded(self.name), self.fixed
-        out.pose = pose_of(self.position, self.rotation)
-        for key in ("mass", "radius", "half_length"):
-            setattr(out, key, real(getattr(self, key), key))
-        for key in ("half_size", "inertia", "velocity", "spin"):
-            setattr(out, key, vector(getattr(self, key), key))
-        out.material = 0 if self.material is None else handle_of(self.material, Material, _MATERIAL)
-        return out
-
-
-@dataclass
-class JointDef:
-    """A "hinge", "slider", "ball" or "fixed" joint of body number `body` of a set with number `to`, or with
-    the world (None). anchor [3] m and axis [3], world frame. motor: (velocity rad/s or m/s, max N m or N),
-    of hinge and slider."""
-
-    type: str
-    body: int
-    to: int | None = None
-    anchor: Sequence[float] = (0, 0, 0)
-    axis: Sequence[float] = (0, 0, 1)
-    motor: tuple[float, float] | None = None
-
-    def struct(self) -> _abi.dfm_joint_def:
-        out = sized(_abi.dfm_joint_def)
-        out.type, out.body = _word("joint", self.type, JOINTS), whole(self.body, "body")
-        setattr(out, "with", 0xFFFFFFFF if self.to is None else whole(self.to, "to"))
-        out.anchor, out.axis = vector(self.anchor, "anchor"), vector(self.axis, "axis")
-        if self.motor is not None:
-            out.motor, (out.velocity, out.max) = 1, vector(self.motor, "motor", 2)
-        return out
 
 
 class World(Queries, Reports, Tools, OfThisProcess):
@@ -205,10 +132,10 @@ class World(Queries, Reports, Tools, OfThisProcess):
             context = default_context() if threads == 1 else Context(threads)
         definition = default(_abi.dfm_world_def)
         definition.gravity = vector(gravity, "gravity")
-        definition.integrator = _word("integrator", integrator, INTEGRATORS)
-        definition.method = _word("method", method, METHODS)
+        definition.integrator = word("integrator", integrator, INTEGRATORS)
+        definition.method = word("method", method, METHODS)
         definition.step, definition.sleep = real(step, "step"), int(sleep)
-        definition.self_contact = _word("self_contact", self_contact, SELF_CONTACT)
+        definition.self_contact = word("self_contact", self_contact, SELF_CONTACT)
         words = None if effects is None else strings(effects)
         definition.effects = None if words is None else ctypes.addressof(words)
         definition.contact_offset = real(contact_offset, "contact_offset")
@@ -331,7 +258,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
             return 0
         if isinstance(material, Mapping):
             material = self.add_material(**material)
-        return handle_of(material, Material, _MATERIAL)
+        return handle_of(material, Material, MATERIAL)
 
     def _check_entries(self, extra: Mapping[str, Any]) -> None:
         if all(key in MATERIAL_ENTRIES for key in extra):
@@ -400,7 +327,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
         if surface is not None:
             surface = surface_of(surface, "surface")
             hung = _abi.dfm_surface_def(ctypes.sizeof(_abi.dfm_surface_def),
-                                        _word("coupling", coupling, COUPLINGS))
+                                        word("coupling", coupling, COUPLINGS))
             sp, st = _scaled(surface.points, scale), surface.triangles
             hung.npoint, hung.ntriangle, hung.points = len(sp), len(st), sp.ctypes.data
             hung.triangles = st.ctypes.data
@@ -416,7 +343,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
             row.key, row.values, row.width = key.encode(), field.ctypes.data, field.shape[1]
             keep.append(field)
         definition.nfield, definition.fields = len(fields or {}), ctypes.addressof(rows)
-        definition.integrator = _word("integrator", integrator, INTEGRATORS)
+        definition.integrator = word("integrator", integrator, INTEGRATORS)
         definition.category = whole(category, "category")
         definition.collides_with = whole(collides_with, "collides_with")
         out = ctypes.c_uint64()
@@ -438,7 +365,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
         points times scale are in m). m.
         velocity_surface: of a belt, [3] m/s."""
         definition = default(_abi.dfm_obstacle_def)
-        definition.shape = _word("shape", shape, SHAPES)
+        definition.shape = word("shape", shape, SHAPES)
         definition.name = encoded(name)
         if rotation is not None and normal is not None:
             raise ArgumentError("an obstacle is turned by rotation or by normal, not by both", "DFM_E_ARG")

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/error.h"
+#include "deform/attach.h"
 #include "dynamics/rigid/rigid_set.h"
 #include "state/attachment.h"
 #include "state/obstacle.h"
@@ -27,8 +28,10 @@ bool yields(const World &w, const Obstacle &o) {
 HeldIn held_in(const World &w, OverlapSides &sides, const OverlapPair &p, double deeper) {
   HeldIn most;
   if (!p.obstacle || yields(w, *w.obstacles[p.b])) return most;
+  const uint64_t id = w.obstacles[p.b]->id;
   for (const Attachment &a : w.attachments) {
-    if (a.released || !a.obstacle || a.body != w.bodies[p.a]->id || a.to == w.obstacles[p.b]->id) continue;
+    if (a.released || !a.obstacle || a.body != w.bodies[p.a]->id) continue;
+    if (a.to == id && !(a.flags & DFM_ATTACH_TOUCH)) continue;
     if (a.stiffness > 0 || a.damping > 0 || yields(w, *w.obstacles[obstacle_slot_of(w, a.to)])) continue;
     uint32_t n = 0;
     // where it holds them, which a body that is torn to and fro may have left by now
@@ -38,13 +41,17 @@ HeldIn held_in(const World &w, OverlapSides &sides, const OverlapPair &p, double
   return most;
 }
 
-std::string tell_held_in(const World &w, const HeldIn &held, const std::string &in) {
-  const std::string &to = w.obstacles[obstacle_slot_of(w, held.by->to)]->name;
-  return format(
-      "its attachment to '%s' holds %u %s there, so that contact cannot push %s out; attach only "
-      "what is outside of '%s', keep '%s' away from it, or give the attachment a \"stiffness\"",
-      to.c_str(), held.points, held.points == 1 ? "point" : "points", held.points == 1 ? "it" : "them",
-      in.c_str(), to.c_str());
+std::string tell_held_in(const World &w, const HeldIn &held, uint32_t b) {
+  const Obstacle &in = *w.obstacles[b], &to = *w.obstacles[obstacle_slot_of(w, held.by->to)];
+  const bool one = held.points == 1;
+  const std::string holds =
+      format("its attachment to '%s' holds %u %s there, so that contact cannot push %s out; ",
+             to.name.c_str(), held.points, one ? "point" : "points", one ? "it" : "them");
+  if (&in == &to) return holds + "leave out \"touch\", or give the attachment a \"stiffness\"";
+  return holds + format(
+                     "attach only what is outside of '%s', keep '%s' away from it, or give the attachment a "
+                     "\"stiffness\"",
+                     in.name.c_str(), to.name.c_str());
 }
 
 std::string tell_held_at(World &w, uint32_t a, uint32_t b) {
@@ -52,7 +59,7 @@ std::string tell_held_at(World &w, uint32_t a, uint32_t b) {
   OverlapSides sides(w);
   // a contact bears at the rest distance, and what is pressed on it may lag by as much
   const HeldIn held = held_in(w, sides, {a, b, true}, -2 * w.offset);
-  return held.by ? tell_held_in(w, held, w.obstacles[b]->name) : std::string();
+  return held.by ? tell_held_in(w, held, b) : std::string();
 }
 
 }  // namespace dfm

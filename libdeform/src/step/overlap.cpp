@@ -97,7 +97,7 @@ std::string remedy(World &w, OverlapSides &sides, const Overlap &o, bool untangl
   const Body &a = *body_of_id(w, o.a);
   const Obstacle *const thing = o.obstacle ? obstacle_of_id(w, o.b) : nullptr;
   if (const HeldIn held = held_in(w, sides, {a.slot, thing ? thing->slot : 0, o.obstacle}, w.offset); held.by)
-    return tell_held_in(w, held, thing->name);
+    return tell_held_in(w, held, thing->slot);
   const std::string what =
       o.aside ? "contact between them is off until they are apart" : "contact pushes them apart slowly";
   const Body *const b = thing ? nullptr : body_of_id(w, o.b);
