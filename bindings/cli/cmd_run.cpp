@@ -279,9 +279,8 @@ class Runner {
     const bool cut = at != scene_.bodies().end() && at->cut;
     if (!cut) {
       const std::string self = scene_.value("/contact/self");
-      return self.empty() || self == "false"
-                 ? "; \"contact\": {\"self\": \"auto\"} prevents this"
-                 : "; take a shorter step";
+      return self.empty() || self == "false" ? "; \"contact\": {\"self\": \"auto\"} prevents this"
+                                             : "; take a shorter step";
     }
     const std::string &whole = scene_.name_of(at->whole);
     for (size_t b = 0; !scene_.value("/bodies/" + std::to_string(b)).empty(); ++b) {

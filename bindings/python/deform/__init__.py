@@ -21,9 +21,9 @@ from .law import Law, PythonLaw
 from .mesh import TetMesh, TriMesh
 from .picture import Picture
 from .query import ContactChoice, Filter, Hit, Shape
+from .rigid_set import JointDef, Material, RigidDef
 from .scene import Run, Scene, run
 from .tool import Tool
-from .rigid_set import JointDef, Material, RigidDef
 from .world import Trouble, World
 
 __version__: str = _quick.dfm_version(None, None, None).decode()

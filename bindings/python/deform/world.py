@@ -49,8 +49,6 @@ class Trouble(enum.IntFlag):
     INTERRUPTED = _abi.DFM_TROUBLE_INTERRUPTED
 
 
-
-
 def _side(given: Any) -> bytes:
     """A side of a rule: its text, or the name of the thing."""
     if isinstance(given, Material) and given.name is None:
