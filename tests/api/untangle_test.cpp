@@ -164,9 +164,13 @@ TEST(Untangle, HeldBodyStaysAndTheOtherGoes_TwoHeldOnesAreNamed) {
     ASSERT_EQ(found.size(), 1u);
     EXPECT_EQ((found[0].flags & DFM_OVERLAP_SEPARATED) == 0, both);
     EXPECT_NEAR(test::measure(a).com[0], 0, 1e-9);
-    if (both) EXPECT_NE(logged.log.find("untangle cannot separate"), std::string::npos) << logged.log;
+    if (both) {
+      EXPECT_NE(logged.log.find("untangle cannot separate"), std::string::npos) << logged.log;
+    }
     EXPECT_EQ(logged.log.find("set \"untangle\""), std::string::npos) << "it is set\n" << logged.log;
-    if (!both) EXPECT_GT(test::measure(b).com[0], 0.19);
+    if (!both) {
+      EXPECT_GT(test::measure(b).com[0], 0.19);
+    }
     uint32_t trouble = 0;
     test::ok(dfm_world_step(w, 1e-3, &trouble));
     EXPECT_EQ((trouble & DFM_TROUBLE_OVERLAP) != 0, both);
