@@ -232,7 +232,7 @@ TEST(CutPieces, CrossedWhenTheyPart_KeepContactUnlessPlaced) {
   const auto placed = test::listed(dfm_world_overlaps, ball.w);
   ASSERT_FALSE(placed.empty());
   EXPECT_TRUE(placed.front().flags & DFM_OVERLAP_ASIDE);
-  EXPECT_NE(ball.made.log.find("move one of them"), std::string::npos) << ball.made.log;
+  EXPECT_NE(ball.made.log.find("contact between them is off"), std::string::npos) << ball.made.log;
 }
 
 // Sides of a slit cross before the part comes off at 0.33 s. Contact of the two pieces was off from there on:
