@@ -60,8 +60,8 @@ Quantity &of(Quantities &all, const std::string &name, const char *family, const
 }
 
 void read_probes(const Table &probes, Quantities &out) {
-  static const std::set<std::string> families = {"com",   "force", "work", "volume", "energy",
-                                                 "touch", "slip",  "rest", "probe"};
+  static const std::set<std::string> families = {"com",   "force", "work", "volume",  "energy",
+                                                 "touch", "slip",  "rest", "liftoff", "probe"};
   for (const Row &row : probes.rows) {
     const std::string &name = probes.text(row, "probe");
     if (!std::isfinite(probes.number(row, "x"))) continue;  // a cut has taken its cell

@@ -41,7 +41,7 @@ static inline dfm_cut_def dfm_cut_def_default(void) {
 /** What a cut has done. */
 typedef struct dfm_cut_info {
   uint32_t size, cells; /* cells that have gone */
-  uint32_t left;        /* cells that the shape meets and that `most` has left */
+  uint32_t left;        /* cells, of DFM_CUT_SPLIT faces, that the shape meets and that `most` has left */
   uint32_t points;      /* copies of points that have been made */
   uint32_t parts;       /* that the body consists of now, cells that share a point hanging together */
   uint32_t reserved;

@@ -3,8 +3,8 @@
  *
  * A set of rigid bodies belongs to one host. The world keeps their states. In each sub-step the host says how
  * they would move without contact, how they respond to impulses, and where they end. Contact is solved with
- * these responses, so both sides receive the same impulses. Rigid bodies touch soft bodies only; contact with
- * each other and with obstacles is left to the host. */
+ * these responses, so both sides receive the same impulses. Those of the host "builtin" touch obstacles and
+ * each other as well; of other hosts they touch soft bodies only, and the rest is left to the host. */
 #ifndef DEFORM_RIGID_H
 #define DEFORM_RIGID_H
 #include "deform/base.h"

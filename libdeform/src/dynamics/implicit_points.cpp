@@ -240,8 +240,8 @@ bool ImplicitPoints::restricted(uint32_t count, const uint32_t *points, double *
 // Whether the factor of the rest state is still good enough, if it left this share of the residual.
 bool ImplicitPoints::patient(double left) { return by_rest_ && (left <= kContracts || ++slow_ <= kPatience); }
 
-// Far from the origin the rounding of positions, over the length of the stage, is all that is left. Where that
-// counts, a body is small against its distance, so its first point stands for all.
+// Far from the origin the rounding of positions, over the length of the stage, is all that is left. Where
+// that counts, a body is small against its distance, so its first point stands for all.
 double ImplicitPoints::allowed_error(const Array<double> &v, double share) const {
   double most = 0, far = 0;
   for (size_t j = 0; j < v.size(); ++j) most = std::max(most, std::fabs(v[j] - p_.v[j]));

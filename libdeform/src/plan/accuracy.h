@@ -36,8 +36,8 @@ const char *meets_name(Meets meets);  // as a file of costs names it
 struct MeasuredModel {
   std::string id;  // short name
   bool steps_itself = false;
-  // Relative errors of positions against corotational_fem on the same mesh: a bar that bends by 2 % and by
-  // half of its length, a bar that turns, a block that lies on a plane, a held block that a small sphere
+  // Relative errors of positions against corotational_fem on the same mesh: a bar that bends by 0.02 and by
+  // 0.8 of its length, a bar that turns, a block that lies on a plane, a held block that a small sphere
   // dents.
   double bends_little = 0, bends_far = 0, turns = 0, lies = 0, dents = 0;
   double dent_force = 0;  // relative error of the sphere's force at the same depths

@@ -102,9 +102,11 @@ std::string remedy(World &w, OverlapSides &sides, const Overlap &o, bool untangl
       o.aside ? "contact between them is off until they are apart" : "contact pushes them apart slowly";
   const Body *const b = thing ? nullptr : body_of_id(w, o.b);
   const bool came = a.piece_of || (b && b->piece_of);
-  const std::string where = came ? format("move '%s' or '%s' at the start", made_name(a).c_str(),
-                                          (thing ? thing->name : made_name(*b)).c_str())
-                                 : "move one of them";
+  const std::string &first = made_name(a), &second = thing ? thing->name : made_name(*b);
+  const std::string where = !came ? "move one of them"
+                            : first == second
+                                ? format("move '%s' at the start", first.c_str())
+                                : format("move '%s' or '%s' at the start", first.c_str(), second.c_str());
   return what + "; " + where + (untangled ? "" : ", or set \"untangle\"");
 }
 

@@ -4,9 +4,9 @@
 
 namespace dfm {
 
-// Each part but the heaviest becomes a body. Parts of fewer cells than the rule's `least` stay with the
-// heaviest, or are removed. Adds to `out`, the report of the cut before. Throws Error, and then nothing has
-// changed.
+// Each part but the heaviest becomes a body. Parts of fewer cells than the rule's `least` stay with the part
+// that is nearest, or are removed. Adds to `out`, the report of the cut before. Throws Error, and then
+// nothing has changed.
 void separate(Body &b, const SeparateRule &rule, CutReport &out);
 // Separates as the body's own rule says, if it has one. If memory runs out, the parts stay in the body, and
 // the rule notes that they wait: the cut before has been made and reported, and is not made again.
