@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 """Random undamped bodies that fall while the host varies its steps: how many runs the energy watch stops.
 
-varied_steps_study.py [--runs N] [--first SEED]     needs the Python package, or PYTHONPATH=bindings/python and
-                                                    DEFORM_LIBRARY=build/release/lib/libdeform.so
+varied_steps_study.py [--runs N] [--first SEED]
+
+Needs the Python package, or PYTHONPATH=bindings/python and DEFORM_LIBRARY=build/release/lib/libdeform.so.
 Prints each run that stops or gains more than 2 %, and at the end their number
 (doc/decisions/0497-steps-of-a-host.md).
 """
