@@ -42,10 +42,7 @@ struct Fall {
     time += dt;
     return dfm_world_step(world, dt, nullptr);
   }
-  double energy() const {
-    const dfm_body_measure m = test::measure(body);
-    return m.kinetic + m.elastic + 9.81 * m.mass * m.com[2];
-  }
+  double energy() const { return test::total_energy(body); }
 };
 
 }  // namespace

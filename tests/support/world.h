@@ -177,6 +177,11 @@ inline dfm_body_measure measure(dfm_body b) {
   ok(dfm_body_get_measure(b, &m));
   return m;
 }
+// J, kinetic, elastic and of its weight over z = 0.
+inline double total_energy(dfm_body b, double g = 9.81) {
+  const dfm_body_measure m = measure(b);
+  return m.kinetic + m.elastic + m.mass * g * m.com[2];
+}
 
 inline dfm_world_stats stats(dfm_world w) {
   dfm_world_stats s{};

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/error.h"
 #include "body/rigid_motion.h"
+#include "core/error.h"
 #include "plugin/context.h"
 #include "plugin/on_behalf.h"
 #include "state/world.h"
