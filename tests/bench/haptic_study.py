@@ -90,6 +90,18 @@ def draw(runs, loop, where, note):
     figure.savefig(where, dpi=110)
 
 
+def write_rows(path, rows):
+    """Replaces the rows of this machine and commit, and keeps all others."""
+    head = "machine,commit,load,what,points,n,median_ms,p999_ms,most_ms,above_1_ms".split(",")
+    kept = []
+    if path.exists():
+        with open(path, newline="") as file:
+            kept = [row for row in list(csv.reader(file))[1:] if row[:2] != rows[0][:2]]
+    with open(path, "w", newline="") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerows([head] + kept + rows)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -118,10 +130,7 @@ def main():
     print(last)
     results = arguments.out or HERE / "results"
     results.mkdir(parents=True, exist_ok=True)
-    with open(results / "haptic.csv", "w", newline="") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow("machine,commit,load,what,points,n,median_ms,p999_ms,most_ms,above_1_ms".split(","))
-        table.writerows(rows)
+    write_rows(results / "haptic.csv", rows)
     highest = max(float(row[2]) for row in rows)
     draw(runs, loop, (arguments.out or ROOT / "libdeform/doc/images") / "haptic.png",
          f"{machine()}, commit {arguments.commit}, load of the machine up to {highest:.0f}")

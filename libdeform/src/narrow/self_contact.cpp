@@ -411,7 +411,7 @@ void Self::edge_edge(uint32_t a, uint32_t b, Kin *kept) {
   if (Opened && !kept->known) *kept = rest.of_edges(a, b);
   const Kin k = Opened ? *kept : rest.of_edges(a, b);
   if (!k.touches) return;
-  // An edge that is flat folds out where the blow bends its faces, by what they may move against each other
+  // An edge that is flat folds out where the impact bends its faces, by what they may move against each other
   // within the sub-step.
   const double bent = std::min(0.3, 2 * h * std::sqrt(speed2 / std::min(uu, ww))) - kConvex;
   const auto sticks_out = [&](uint32_t e, double side) {

@@ -428,10 +428,10 @@ Estimate estimate(const BodyRegime &b, double duration) {
     e.strain = at_most(weight, 1);
     deflection = 0.5 * e.strain;
   }
-  const double blow = b.touches ? b.speed / c : 0;
-  e.strain = at_most(std::max(e.strain, blow), 1);
-  e.rotation = at_most(std::max(b.held ? 4.0 / 3 * deflection : e.strain, blow), kPi / 2);
-  e.sag = std::max(deflection, blow) * b.length;
+  const double impact = b.touches ? b.speed / c : 0;
+  e.strain = at_most(std::max(e.strain, impact), 1);
+  e.rotation = at_most(std::max(b.held ? 4.0 / 3 * deflection : e.strain, impact), kPi / 2);
+  e.sag = std::max(deflection, impact) * b.length;
   e.lasts = rate > 0 ? std::min(duration, 3 / rate) : duration;
   return e;
 }

@@ -41,7 +41,7 @@ constexpr uint32_t kSolves = 4, kCuts = 8, kFractions = 40;
 constexpr double kLeastCut = 0.25;
 constexpr double kHardBlow = 0.08, kSoftBlow = 0.05;  // strain: above the first a sub-step is repeated finer,
                                                       // until it is below the second
-constexpr double kFinest = 4;                         // sub-steps that a blow makes of one
+constexpr double kFinest = 4;                         // sub-steps that an impact makes of one
 constexpr double kLight = 299792458;                  // m/s
 constexpr double kNoWay = 0.02;                       // of the motion of a sub-step: less counts as none
 constexpr double kSlow = 0.01;  // of d_g: what moves by less needs no closer look at how it does
@@ -88,14 +88,14 @@ void bound_speeds(World &w, StepContext &step) {
 }
 
 // What contact does to a body in a sub-step.
-struct Blow {
+struct Impact {
   double strain = 0;   // largest change of a velocity, times h, over an edge
   double kinetic = 0;  // J, what it adds to the points
 };
 
-Blow blow_on(const StepContext &step, const Body &b, uint32_t slot) {
+Impact impact_on(const StepContext &step, const Body &b, uint32_t slot) {
   const ContactRows &rows = step.rows;
-  Blow out;
+  Impact out;
   double most = 0;
   for (uint32_t d = 0; d < rows.ndof; ++d) {
     if (rows.source[d] != slot) continue;
@@ -139,13 +139,13 @@ double straight_way(const StepContext &step, const Body &b, uint32_t slot) {
   return way > kStraight * b.surface.median_edge ? way / extent(b.surface) : 0;
 }
 
-// A blow is a change of a point's velocity by contact that strains an edge in this sub-step by more than the
-// bound allows for. It is measured from the velocity at the start, because the support of a resting weight
-// changes only the predicted velocity. After a blow the next sub-step checks the bound. False: this sub-step
-// is to be repeated with shorter ones, and later ones are shorter as well. The scheme keeps energy as far as
-// the trapezoid of the forces is their work; if an edge is strained by s at once, the error is about s^2 of
-// the energy that contact brings, which is too much only if contact brings more than the body has
-// (doc/decisions/0436).
+// An impact is a change of a point's velocity by contact that strains an edge in this sub-step by more than
+// the bound allows for. It is measured from the velocity at the start, because the support of a resting
+// weight changes only the predicted velocity. After an impact the next sub-step checks the bound. False:
+// this sub-step is to be repeated with shorter ones, and later ones are shorter as well. The scheme keeps
+// energy as far as the trapezoid of the forces is their work; if an edge is strained by s at once, the error
+// is about s^2 of the energy that contact brings, which is too much only if contact brings more than the
+// body has (doc/decisions/0436).
 bool withstands_blows(World &w, StepContext &step) {
   if (step.rows.ndof == 0) return true;
   Guard &g = step.guard;
@@ -156,9 +156,9 @@ bool withstands_blows(World &w, StepContext &step) {
     if (g.change[i] > 0 && gravity_exceeds_bound(w, b) && meets(w, step, i)) bring_check_forward(w, b);
     if (!(step.h * g.change[i] > kBoundStrain * b.surface.median_edge)) continue;
     if (!b.dynamics->diagonal() || !std::isfinite(b.bound.found.step)) continue;
-    const Blow blow = blow_on(step, b, i);
-    if (blow.strain > kBoundStrain) bound_is_due(w);
-    if (blow.kinetic > step.free_kinetic[i]) hard = std::max(hard, blow.strain);
+    const Impact impact = impact_on(step, b, i);
+    if (impact.strain > kBoundStrain) bound_is_due(w);
+    if (impact.kinetic > step.free_kinetic[i]) hard = std::max(hard, impact.strain);
   }
   if (!(hard > kHardBlow || straight > kStraight) || step.h != g.planned || g.finer > 1) return true;
   double parts = 1;

@@ -635,6 +635,22 @@ void SolveIslands::find_cuts(const World &w, const StepContext &step) {
 
 // Contacts of the same two bodies are neighbors in the list, so most work is done once for each pair.
 void SolveIslands::find(const World &w, StepContext &step) {
+  const size_t of_contacts = find_pairs(step);
+  join(step.rows);
+  sides_.resize(2 * size_t{step.rows.n});
+  number_sides(w.bodies.size(), of_contacts);
+  find_cuts(w, step);
+  while (islands_.size() < count_) islands_.emplace_back(memory_);
+  give_rows(of_contacts);
+  sort_blocks(step.rows.blocks);
+  prepare(w, step);
+  std::sort(order_.begin(), order_.end(), [&](uint32_t l, uint32_t r) {
+    const uint32_t a = islands_[l].part.all(), b = islands_[r].part.all();
+    return a != b ? a > b : l < r;
+  });
+}
+
+size_t SolveIslands::find_pairs(const StepContext &step) {
   pairs_.clear();
   const auto add = [&](const auto &all, uint32_t first) {
     for (uint32_t i = 0; i < all.size();) {
@@ -647,32 +663,27 @@ void SolveIslands::find(const World &w, StepContext &step) {
   add(step.contacts, 0);
   const size_t of_contacts = pairs_.size();
   add(step.bonds, step.rows.n);
-  join(step.rows);
-  sides_.resize(2 * size_t{step.rows.n});
-  number_sides(w.bodies.size(), of_contacts);
-  find_cuts(w, step);
-  while (islands_.size() < count_) islands_.emplace_back(memory_);
+  return of_contacts;
+}
 
+// begin_[k] is then the end of island k's, where that of the next one begins.
+void SolveIslands::split(std::span<const Pair> pairs, Array<RowRun> &out) {
   const auto of = [&](const Pair &p) { return joined_.of[size_t(&p - pairs_.data())]; };
-  // begin_[k] is then the end of island k's, where that of the next one begins
-  const auto split = [&](std::span<const Pair> pairs, Array<RowRun> &out) {
-    begin_.assign(size_t{count_} + 1, 0);
-    uint32_t last = kNone;
-    for (const Pair &p : pairs)
-      if (const uint32_t k = of(p); k != std::exchange(last, k)) ++begin_[k + 1];
-    for (uint32_t k = 0; k < count_; ++k) begin_[k + 1] += begin_[k];
-    out.resize(begin_[count_]);
-    last = kNone;
-    for (const Pair &p : pairs) {
-      const uint32_t k = of(p);
-      if (k != std::exchange(last, k)) out[begin_[k]++] = p.rows;
-      else out[begin_[k] - 1].n += p.rows.n;
-    }
-  };
-  const auto slice = [&](const auto &all, uint32_t k) {
-    const uint32_t begin = k ? begin_[k - 1] : 0;
-    return std::span(all.data() + begin, begin_[k] - begin);
-  };
+  begin_.assign(size_t{count_} + 1, 0);
+  uint32_t last = kNone;
+  for (const Pair &p : pairs)
+    if (const uint32_t k = of(p); k != std::exchange(last, k)) ++begin_[k + 1];
+  for (uint32_t k = 0; k < count_; ++k) begin_[k + 1] += begin_[k];
+  out.resize(begin_[count_]);
+  last = kNone;
+  for (const Pair &p : pairs) {
+    const uint32_t k = of(p);
+    if (k != std::exchange(last, k)) out[begin_[k]++] = p.rows;
+    else out[begin_[k] - 1].n += p.rows.n;
+  }
+}
+
+void SolveIslands::give_rows(size_t of_contacts) {
   const auto rows_of = [](std::span<const RowRun> runs) {
     uint32_t n = 0;
     for (const RowRun &r : runs) n += r.n;
@@ -690,8 +701,9 @@ void SolveIslands::find(const World &w, StepContext &step) {
     part.bonds = slice(bond_, k);
     part.nbond = rows_of(part.bonds);
   }
+}
 
-  const Array<ContactRows::Block> &blocks = step.rows.blocks;
+void SolveIslands::sort_blocks(const Array<ContactRows::Block> &blocks) {
   const auto of_block = [&](const ContactRows::Block &b) {
     return owner_.empty() ? 0 : joined_.of[owner_[b.first]];
   };
@@ -700,7 +712,10 @@ void SolveIslands::find(const World &w, StepContext &step) {
   for (uint32_t k = 0; k < count_; ++k) begin_[k + 1] += begin_[k];
   block_.resize(blocks.size());
   for (uint32_t b = 0; b < blocks.size(); ++b) block_[begin_[of_block(blocks[b])]++] = b;
+}
 
+void SolveIslands::prepare(const World &w, StepContext &step) {
+  const Array<ContactRows::Block> &blocks = step.rows.blocks;
   step.revised.resize(blocks.size());
   order_.resize(count_);
   for (uint32_t k = 0; k < count_; ++k) {
@@ -718,10 +733,6 @@ void SolveIslands::find(const World &w, StepContext &step) {
     own.effort = work_of_sweep(step.rows, own.part, own.soft);
     own.batches.gather(w.pairs.laws, own.part.contacts, step.state);
   }
-  std::sort(order_.begin(), order_.end(), [&](uint32_t l, uint32_t r) {
-    const uint32_t a = islands_[l].part.all(), b = islands_[r].part.all();
-    return a != b ? a > b : l < r;
-  });
 }
 
 const SolveIsland *solve_islands(World &w, StepContext &step) {

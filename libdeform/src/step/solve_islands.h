@@ -120,6 +120,19 @@ class SolveIslands {
   void join(const ContactRows &rows);
   void number_sides(size_t bodies, size_t of_contacts);
   void find_cuts(const World &w, const StepContext &step);
+  size_t find_pairs(const StepContext &step);  // returns how many are of contacts
+  // Rows of these pairs by island.
+  void split(std::span<const Pair> pairs, Array<RowRun> &out);
+  // What an island has of `all`, whose ends by island are begin_.
+  template <class T>
+  std::span<const T> slice(const Array<T> &all, uint32_t island) const {
+    const uint32_t begin = island ? begin_[island - 1] : 0;
+    return {all.data() + begin, begin_[island] - begin};
+  }
+  // Each island gets its contacts and bonds.
+  void give_rows(size_t of_contacts);
+  void sort_blocks(const Array<ContactRows::Block> &blocks);  // by island
+  void prepare(const World &w, StepContext &step);            // each island, with its blocks and laws
 };
 
 // Whether a sub-step without a result can be repeated with half its length.
