@@ -128,7 +128,7 @@ TEST(EnergyImplicit, StiffBallThatRolls_HasNoGain) {
   }
 }
 
-// In the last sub-step of 33 ms, with contact, Newton's method found an end at which the beam was turned over,
+// In the last sub-step of 33 ms, with contact, Newton's method found an end at which the beam was turned over
 // by half a turn about its axis: contact took 2 J from it along the way, inner forces gave 3.3 J, and the
 // watch stopped the run at rest.
 TEST(EnergyImplicit, BeamThatLandsWithinALongStep_IsNotTurnedOver) {
