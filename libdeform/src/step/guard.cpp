@@ -144,7 +144,7 @@ double straight_way(const StepContext &step, const Body &b, uint32_t slot) {
 }
 
 // The equation of backward Euler may have further solutions in which the body, or a part of it, is turned
-// over within the sub-step: cells that an early iteration inverts take on another rotation. Contact then does
+// over within the sub-step: cells that an early iteration inverts may take on another rotation. Contact does
 // much negative work along the way, and inner forces as much positive work, which no elastic energy pays for.
 // So such an end gains energy, which the scheme cannot do as long as cells turn by little
 // (doc/decisions/0498). Returns the way that it moves a point beyond where its velocity leads, over kTurns
