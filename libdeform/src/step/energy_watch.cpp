@@ -216,6 +216,25 @@ Turning turning_of(const Body &b, double h) {
   return {motion.velocity, motion.spin, 0.5 * h};
 }
 
+// At the ends of the arcs, see book_end(). way: [npoint,4] m/s
+double work_of_contact(const World &w, const StepContext &step, const Body &b, const double *way) {
+  const Phyxels &p = b.p;
+  double contact = 0;
+  if (w.plan.touches()) {
+    const Turning turning = steps_itself(b) ? Turning{} : turning_of(b, step.h);
+    for (uint32_t s = 0; s < b.surface.nsurfel; ++s) {
+      const double *const q = &b.surfel_impulse[3 * size_t(s)];
+      if (q[0] == 0 && q[1] == 0 && q[2] == 0) continue;
+      b.surface.each_phyxel(s, [&](uint32_t point, double weight) {
+        const Vec3 arc = turning.arc(load3(way + size_t(point) * kStride));
+        for (size_t k = 0, at = size_t(point) * kStride; k < 3; ++k, ++at)
+          if (p.moves(at)) contact += weight * q[k] * (way[at] + arc[int(k)]);
+      });
+    }
+  }
+  return contact;
+}
+
 // Of a sub-step of backward Euler, r the residual that Newton's method leaves:
 //
 //   M (v' - v) = h (f' + loads + m g) + p + r,  x' = x + h v'
@@ -235,19 +254,8 @@ void book_end(World &w, StepContext &step, Body &b, double motion) {
   const bool load_booked = books_loads(b), driven = !step.driven.empty() && !b.motions.empty();
   const double *const end = b.dynamics->end().v;
   const double *const way = steps_itself(b) ? b.dynamics->end().mean : end;
-  double contact = 0, loads = 0, gained = 0, held = 0;
-  if (w.plan.touches()) {
-    const Turning turning = steps_itself(b) ? Turning{} : turning_of(b, step.h);
-    for (uint32_t s = 0; s < b.surface.nsurfel; ++s) {
-      const double *const q = &b.surfel_impulse[3 * size_t(s)];
-      if (q[0] == 0 && q[1] == 0 && q[2] == 0) continue;
-      b.surface.each_phyxel(s, [&](uint32_t point, double weight) {
-        const Vec3 arc = turning.arc(load3(way + size_t(point) * kStride));
-        for (size_t k = 0, at = size_t(point) * kStride; k < 3; ++k, ++at)
-          if (p.moves(at)) contact += weight * q[k] * (way[at] + arc[int(k)]);
-      });
-    }
-  }
+  double loads = 0, gained = 0, held = 0;
+  const double contact = work_of_contact(w, step, b, way);
   const bool forces = driven && b.dynamics->end_forces(sub_step_of(w, step));
   const bool by_point = load_booked || driven || motion < 1;
   for (uint32_t i = 0; by_point && i < p.n; ++i)
@@ -284,6 +292,34 @@ void book_body(World &w, StepContext &step, Body &b, double motion) {
 }  // namespace
 
 bool has_balance(const Body &b) { return watched(b); }
+
+double gain_at_end(const World &w, const StepContext &step, const Body &b) {
+  if (!b.dynamics->abilities().damps || steps_itself(b) || !b.model.can(DFM_CAP_ENERGY)) return 0;
+  if (!b.motions.empty() || b.model.works(kFlow)) return 0;
+  const Phyxels &p = b.p;
+  const EndState ends = b.dynamics->end();
+  double had = 0, gained = 0;
+  for (uint32_t i = 0; i < p.n; ++i)
+    for (size_t k = 0, at = size_t(i) * kStride; k < 3; ++k, ++at) {
+      if (!p.moves(at)) continue;
+      const double before = p.v[at], after = ends.v[at], m = p.mass[i];
+      had += 0.5 * m * (before * before);
+      gained += 0.5 * m * (after * after - before * before) -
+                step.h * ends.mean[at] * (p.load[at] + m * w.gravity.now[int(k)]);
+    }
+  gained -= work_of_contact(w, step, b, ends.v);
+  double elastic = 0, elastic_end = 0;
+  dfm_kin kin = b.dynamics->kin(w.time, 0);
+  const OnBehalf speaks(b.name);
+  const auto ask = [&](double &u) {
+    return b.model.call("energy", [&] { return b.model.ops->energy(b.model.self, &kin, &u); }) == DFM_OK;
+  };
+  if (!ask(elastic)) return 0;
+  kin.x = p.x_end.data();
+  kin.v = p.v_end.data();
+  if (!ask(elastic_end)) return 0;
+  return (gained + elastic_end - elastic) / (had + elastic);
+}
 
 const char *unwatched(const World &w, const Body &b) {
   if (!(w.def.energy_watch > 0)) return "energy_watch is 0";

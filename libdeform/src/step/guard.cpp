@@ -29,6 +29,7 @@
 #include "state/obstacle.h"
 #include "state/world.h"
 #include "step/context.h"
+#include "step/energy_watch.h"
 #include "step/move_obstacles.h"
 #include "step/self_contact.h"
 #include "step/stages.h"
@@ -45,6 +46,9 @@ constexpr double kFinest = 4;                         // sub-steps that an impac
 constexpr double kLight = 299792458;                  // m/s
 constexpr double kNoWay = 0.02;                       // of the motion of a sub-step: less counts as none
 constexpr double kSlow = 0.01;  // of d_g: what moves by less needs no closer look at how it does
+// Of an implicit body in contact: edges that it moves a point beyond where its velocity leads, and the share
+// of its energy that the sub-step adds; above both a sub-step is repeated finer.
+constexpr double kTurns = 0.5, kGains = 0.01;
 // Of a body that steps itself: way that contact moves its points along a straight line, over its size, above
 // which a sub-step is repeated finer; sub-steps that are made of one.
 constexpr double kStraight = 0.1, kFinestOwn = 32;
@@ -139,6 +143,22 @@ double straight_way(const StepContext &step, const Body &b, uint32_t slot) {
   return way > kStraight * b.surface.median_edge ? way / extent(b.surface) : 0;
 }
 
+// The equation of backward Euler may have further solutions in which the body, or a part of it, is turned
+// over within the sub-step: cells that an early iteration inverts may take on another rotation. Contact does
+// much negative work along the way, and inner forces as much positive work, which no elastic energy pays for.
+// So such an end gains energy, which the scheme cannot do as long as cells turn by little
+// (doc/decisions/0498). Returns the way that it moves a point beyond where its velocity leads, over kTurns
+// edges; 0: it is no such end.
+double turned_over(const World &w, const StepContext &step, const Body &b, uint32_t slot) {
+  if (!b.dynamics->abilities().damps || b.model.stepper || !(step.guard.change[slot] > 0)) return 0;
+  const double *const end = b.dynamics->end().v;
+  double most = 0;
+  for (uint32_t i = 0; i < b.p.n; ++i)
+    most = std::max(most, norm2(load3(end + size_t{kStride} * i) - load3(&b.p.v[size_t{kStride} * i])));
+  const double share = step.h * std::sqrt(most) / (kTurns * b.surface.median_edge);
+  return share > 1 && gain_at_end(w, step, b) > kGains ? share : 0;
+}
+
 // An impact is a change of a point's velocity by contact that strains an edge in this sub-step by more than
 // the bound allows for. It is measured from the velocity at the start, because the support of a resting
 // weight changes only the predicted velocity. After an impact the next sub-step checks the bound. False:
@@ -152,7 +172,7 @@ bool withstands_blows(World &w, StepContext &step) {
   double hard = 0, straight = 0;
   for (const uint32_t i : step.active) {
     const Body &b = *w.bodies[i];
-    straight = std::max(straight, straight_way(step, b, i));
+    straight = std::max({straight, straight_way(step, b, i), kStraight * turned_over(w, step, b, i)});
     if (g.change[i] > 0 && gravity_exceeds_bound(w, b) && meets(w, step, i)) bring_check_forward(w, b);
     if (!(step.h * g.change[i] > kBoundStrain * b.surface.median_edge)) continue;
     if (!b.dynamics->diagonal() || !std::isfinite(b.bound.found.step)) continue;
