@@ -55,9 +55,9 @@ static int step(dfm_world world, const dfm_body *crates, int *sounds, double *lo
   TRY(dfm_world_pair_impulses(world, PAIRS, impacts, &n));
   for (uint32_t i = 0; i < n; ++i) {
     /* A load at rest gives weight times step each time; what is well above its mean over the
-     * contact is a blow. */
-    const double blow = impacts[i].peak_normal * kStep;
-    if (blow > kAudible && impacts[i].peak_normal * impacts[i].touching > 2 * impacts[i].normal_impulse)
+     * contact is an impact. */
+    const double impulse = impacts[i].peak_normal * kStep;
+    if (impulse > kAudible && impacts[i].peak_normal * impacts[i].touching > 2 * impacts[i].normal_impulse)
       ++*sounds;
     if (impacts[i].peak_normal > *loudest) *loudest = impacts[i].peak_normal;
   }

@@ -60,7 +60,7 @@ TEST(PairImpulses, OfEachFrame_AreTheMomentumThatTheBodyGot) {
 }
 
 // The last sub-step of such a step has no contact, so the report of contacts is empty.
-TEST(PairImpulses, OfABlowThatEndsWithinTheStep_AreKept) {
+TEST(PairImpulses, OfAnImpactThatEndsWithinTheStep_AreKept) {
   Throw t;
   const dfm_body_measure before = test::measure(t.ball);
   test::ok(dfm_world_step(t.world, 0.1, nullptr));
@@ -74,7 +74,7 @@ TEST(PairImpulses, OfABlowThatEndsWithinTheStep_AreKept) {
   EXPECT_TRUE(impulses(t.world).empty());  // of the last step alone
 }
 
-// The blow in one long step and in as many short ones. A stiff body far away bounds the sub-steps, so that
+// The impact in one long step and in as many short ones. A stiff body far away bounds the sub-steps, so that
 // they are equal whatever the ball does: then nothing but rounding differs.
 TEST(PairImpulses, SumAndPeak_AreThoseOfTheSameTimeInManySteps) {
   Throw whole, parts;

@@ -89,7 +89,7 @@ void check_momenta(dfm_world w, const std::vector<dfm_rigid> &bodies, double dt,
 
 }  // namespace
 
-// Dropped askew: blows, rocking, rest.
+// Dropped askew: impacts, rocking, rest.
 TEST(RigidReports, ImpulsesOfPairs_AreTheMomentumThatABodyGets) {
   for (const char *const floor : kFloors)
     for (const double dt : kStep) {

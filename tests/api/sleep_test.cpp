@@ -364,7 +364,7 @@ TEST(Wake, ByAnObstacleOnKeys_ComesWhenItReachesTheBody) {
 }
 
 // A ball dropped on a stack that sleeps, beside the same one awake all along: within half of d_c
-// after the blow.
+// after the impact.
 TEST(Wake, ByAFallingBody_GivesTheMotionWithoutSleep) {
   std::vector<double> lower[2], ball[2];
   double d_c = 0;

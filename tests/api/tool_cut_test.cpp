@@ -362,7 +362,7 @@ TEST(ToolCut, DrivenBlade_FeelsTheEnergyOfTheCut) {
     EXPECT_NEAR(s.work, cut, 1e-9 * cut) << model;
     EXPECT_NEAR(s.state().work, s.work, 1e-9 * s.work) << "who moves it has put it in";
     EXPECT_GT(s.most, s.kEnergy * 0.04);
-    EXPECT_LT(s.most, 1.5 * s.kEnergy * 0.04) << "no blows";
+    EXPECT_LT(s.most, 1.5 * s.kEnergy * 0.04) << "no impacts";
     const dfm_body_measure m = test::measure(s.body);
     for (size_t k = 0; k < 3; ++k) EXPECT_NEAR(m.contact_impulse[k], -s.impulse[k], 1e-12 * s.impulse[2]);
   }
@@ -426,7 +426,7 @@ TEST(ToolCut, CoupledBlade_PaysTheEnergyOfTheCut_AndIsHeldBack) {
     Tough s(2000, all, "corotational_fem", integrator);
     s.down(0.0, 0.1);
     EXPECT_GT(s.state().pose.position[2] - s.state().device.position[2], 1e-3);
-    EXPECT_LT(s.most, 1.5 * s.kEnergy * 0.04) << "no blows";
+    EXPECT_LT(s.most, 1.5 * s.kEnergy * 0.04) << "no impacts";
     s.down(-0.4, 0.5);
     EXPECT_EQ(parts(s.body), 2u);
     const double cut = s.kEnergy * s.kArea;

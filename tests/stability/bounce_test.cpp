@@ -1,4 +1,4 @@
-// What hits the ground bounces at the defaults, where bodies are implicit between blows (decision 0456).
+// What hits the ground bounces at the defaults, where bodies are implicit between impacts (decision 0456).
 #include <algorithm>
 #include <cstdio>
 #include <string>
@@ -126,7 +126,7 @@ TEST(Bounce, StackThatSettles_IsNotStruck) {
   EXPECT_NE(log_of_stack(0.1).find("struck"), std::string::npos) << "the test would see it";
 }
 
-TEST(Bounce, RestoredWithinABlow_ContinuesWithTheSameBits) {
+TEST(Bounce, RestoredWithinAnImpact_ContinuesWithTheSameBits) {
   const test::Context one, many(3);
   dfm_world w[2] = {0, 0};
   for (int k = 0; k < 2; ++k) {

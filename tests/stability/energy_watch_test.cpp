@@ -146,7 +146,7 @@ TEST(EnergyWatch, StepsOfRandomLength_AddNoEnergy) {
   }
 }
 
-// The bound shortens the sub-steps in a blow, which moves the body from one nearby energy to another: no
+// The bound shortens the sub-steps in an impact, which moves the body from one nearby energy to another: no
 // gain, though nothing damps it.
 TEST(EnergyWatch, UndampedBodyThatBounces_IsNoGain) {
   for (const double step : {1.0 / 60, 1e-3}) {
@@ -160,12 +160,12 @@ TEST(EnergyWatch, UndampedBodyThatBounces_IsNoGain) {
     test::ok(dfm_obstacle_create(w, &d, &floor));
     for (int i = 0; i * step < 2; ++i)
       ASSERT_EQ(dfm_world_step(w, step, nullptr), DFM_OK) << step << ": " << dfm_last_error();
-    EXPECT_GT(test::stats(w).substeps_max, uint32_t(step * 1000)) << "the blow asks for shorter sub-steps";
+    EXPECT_GT(test::stats(w).substeps_max, uint32_t(step * 1000)) << "the impact asks for shorter sub-steps";
     test::ok(dfm_world_destroy(w));
   }
 }
 
-// A blow shortens the sub-steps while contact presses the body: what that changes of the balance does not
+// An impact shortens the sub-steps while contact presses the body: what that changes of the balance does not
 // depend on the impulses of contact, nor on the pieces that the guard has just cut.
 TEST(EnergyWatch, BallThatFallsOnASoftPad_IsNoGain) {
   struct Fall {
@@ -199,9 +199,9 @@ TEST(EnergyWatch, BallThatFallsOnASoftPad_IsNoGain) {
   }
 }
 
-// A light blow strains cells far beyond yield in one sub-step. What flow dissipates there is as much as the
+// A light impact strains cells far beyond yield in one sub-step. What flow dissipates there is as much as the
 // largest energy so far, and is no gain until it is committed.
-TEST(EnergyWatch, BodyThatYieldsUnderABlow_IsNoGain) {
+TEST(EnergyWatch, BodyThatYieldsUnderAnImpact_IsNoGain) {
   const std::string out = test::scratch("energy_watch_yield"), scene = out + "/scene.json";
   test::write_file(scene, R"({"format": "deform-scene", "version": 1,
     "time": {"duration": 0.15, "step": 5e-4},
@@ -216,7 +216,7 @@ TEST(EnergyWatch, BodyThatYieldsUnderABlow_IsNoGain) {
   EXPECT_EQ(r.exit_code, 0) << r.err;
 }
 
-// A blow compresses cells, which stiffen, before sixteen sub-steps are over: then the bound is looked at.
+// An impact compresses cells, which stiffen, before sixteen sub-steps are over: then the bound is looked at.
 TEST(EnergyWatch, SoftBallThatIsThrown_IsNoGain) {
   struct Throw {
     double down;

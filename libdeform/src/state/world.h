@@ -16,7 +16,7 @@
 #include "state/body.h"
 #include "state/energy_book.h"
 #include "state/impulses.h"
-#include "state/integrator_purse.h"
+#include "state/integrator_allowance.h"
 #include "state/meters.h"
 #include "state/overlaps.h"
 #include "state/pair_tables.h"
@@ -150,7 +150,7 @@ struct World {
   WorldBound bound;
   StepSizes sizes;
   EnergyWatch watch;
-  IntegratorPurse purse;
+  IntegratorAllowance allowance;
   IntegratorTimes integrator_times;
   std::atomic<bool> busy{false};  // a call of the API changes it (api/call.h)
 

@@ -13,7 +13,7 @@
 #include "state/obstacle.h"
 #include "state/tool.h"
 #include "state/world.h"
-#include "step/blow.h"
+#include "step/impact.h"
 #include "step/context.h"
 #include "step/stages.h"
 #include "step/step_bound.h"
@@ -469,7 +469,7 @@ dfm_status step_within_budget(World &w, double dt, uint32_t *trouble) {
         if (why < StepStopped::costly) throw;
       }
       return_to_start(w, step);
-      if (why == StepStopped::struck) begin_blow(w, dt);
+      if (why == StepStopped::struck) begin_impact(w, dt);
       else if (why == StepStopped::costly) give_up_implicit(w, step.counting.most_time);
       else take_up_implicit(w);
       b.struck = b.struck || why == StepStopped::struck;

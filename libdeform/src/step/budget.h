@@ -35,7 +35,7 @@ struct Budget {
   double span = 0;             // s, from the start of the step to `end`
   Thrift used = Thrift::none;  // the last entry that this step has used
   double offered = 0;          // s, length of the step if the library has chosen it, else 0
-  bool struck = false;         // the step is repeated because of a blow (step/blow.h)
+  bool struck = false;         // the step is repeated because of an impact (step/impact.h)
   bool kept = false;           // `start` holds the state before this step
   std::vector<unsigned char> start;
   dfm_world_stats stats{};  // before the step

@@ -7,7 +7,7 @@
 #include "plugin/context.h"
 #include "plugin/on_behalf.h"
 #include "step/attach.h"
-#include "step/blow.h"
+#include "step/impact.h"
 #include "step/by_body.h"
 #include "step/change_work.h"
 #include "step/context.h"
@@ -72,7 +72,7 @@ bool find_ends(World &w, StepContext &step, uint32_t *trouble) {
 
 bool stage_commit(World &w, StepContext &step, uint32_t *trouble) {
   if (!step.ended && !find_ends(w, step, trouble)) return false;
-  look_for_blow(w, step);
+  check_for_impact(w, step);
   const SubStep now = sub_step_of(w, step);
   if (step.guard.motion < 1)
     for (const uint32_t i : step.active) {

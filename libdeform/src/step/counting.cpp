@@ -113,9 +113,9 @@ void begin_count(World &w, StepContext &step, double dt) {
   if (!(h > 0 && std::isfinite(h))) return;
   c.on = true;
   c.before = effort(w);
-  if (!w.purse.open) w.purse = {1, 0, kFirst};
+  if (!w.allowance.open) w.allowance = {1, 0, kFirst};
   if (!any(w, Counted::implicit) || !may_be_cut(w, dt, h)) return;
-  c.most_time = chosen_here(w, dt) ? dt + std::clamp(w.purse.credit, 0.0, kMost) : kShareOfAStep * dt;
+  c.most_time = chosen_here(w, dt) ? dt + std::clamp(w.allowance.credit, 0.0, kMost) : kShareOfAStep * dt;
   c.most_touching = kUnitWork * c.most_time / h;
   c.most = c.most_touching * units(w, true);
 }
@@ -142,15 +142,15 @@ double body_effort(const World &w, const StepContext &step) { return effort(w) -
 
 void give_up_implicit(World &w, double time) {
   turn(w, Counted::implicit, Counted::explicitly);
-  IntegratorPurse &purse = w.purse;
-  purse.credit -= time;
-  if (purse.credit > 0) {  // this step cost too much, which says little about the next
-    purse.lost = std::min(purse.lost + time, kMost);
-    purse.credit = std::min(purse.credit, kTry - (purse.lost - time));
+  IntegratorAllowance &allowance = w.allowance;
+  allowance.credit -= time;
+  if (allowance.credit > 0) {  // this step cost too much, which says little about the next
+    allowance.lost = std::min(allowance.lost + time, kMost);
+    allowance.credit = std::min(allowance.credit, kTry - (allowance.lost - time));
     return;
   }
-  purse.credit = 0;
-  purse.tries = std::min(purse.tries + 1, kMostTries);
+  allowance.credit = 0;
+  allowance.tries = std::min(allowance.tries + 1, kMostTries);
 }
 
 bool may_take_up_implicit(const World &w) {
@@ -162,7 +162,7 @@ void take_up_implicit(World &w) {
   for (const auto &b : w.bodies)  // parameters may have changed
     if (is(*b, Counted::explicitly) && !b->model.can(DFM_CAP_STIFFNESS)) b->integrator.counted = Counted::no;
   turn(w, Counted::explicitly, Counted::implicit);
-  w.purse.credit = kFilled;
+  w.allowance.credit = kFilled;
 }
 
 void end_count(World &w, StepContext &step, double dt, double substeps) {
@@ -170,22 +170,22 @@ void end_count(World &w, StepContext &step, double dt, double substeps) {
   if (!c.on) return;
   w.integrator_times.all += dt;
   if (any(w, Counted::implicit)) w.integrator_times.implicit += dt;
-  IntegratorPurse &purse = w.purse;
+  IntegratorAllowance &allowance = w.allowance;
   if (any(w, Counted::implicit)) {
     const double rate = (units(w, true) + c.touching) / explicit_step(w);  // units of explicit time in 1 s
     const double taken = (body_effort(w, step) + c.contact) / kUnitWork + substeps * units(w, false);
     const double saved = dt - (rate > 0 ? taken / rate : 0);
-    purse.credit = std::min(purse.credit + saved, kMost);
-    purse.lost = std::max(0.0, purse.lost - std::max(0.0, saved));
-    if (purse.credit == kMost) purse.tries = 0;
-    if (purse.credit < 0 && c.most > 0) give_up_implicit(w, 0);
+    allowance.credit = std::min(allowance.credit + saved, kMost);
+    allowance.lost = std::max(0.0, allowance.lost - std::max(0.0, saved));
+    if (allowance.credit == kMost) allowance.tries = 0;
+    if (allowance.credit < 0 && c.most > 0) give_up_implicit(w, 0);
     return;
   }
-  purse.credit += kPutBy * dt;
-  if (purse.credit < std::ldexp(kTry, int(purse.tries))) return;
-  const double left = purse.tries > 0 ? kTry : purse.credit;
+  allowance.credit += kPutBy * dt;
+  if (allowance.credit < std::ldexp(kTry, int(allowance.tries))) return;
+  const double left = allowance.tries > 0 ? kTry : allowance.credit;
   take_up_implicit(w);
-  purse.credit = left;
+  allowance.credit = left;
 }
 
 }  // namespace dfm

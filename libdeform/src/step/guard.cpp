@@ -40,12 +40,12 @@ namespace {
 
 constexpr uint32_t kSolves = 4, kCuts = 8, kFractions = 40;
 constexpr double kLeastCut = 0.25;
-constexpr double kHardBlow = 0.08, kSoftBlow = 0.05;  // strain: above the first a sub-step is repeated finer,
-                                                      // until it is below the second
-constexpr double kFinest = 4;                         // sub-steps that an impact makes of one
-constexpr double kLight = 299792458;                  // m/s
-constexpr double kNoWay = 0.02;                       // of the motion of a sub-step: less counts as none
-constexpr double kSlow = 0.01;  // of d_g: what moves by less needs no closer look at how it does
+// Strain: above the first a sub-step is repeated finer, until it is below the second.
+constexpr double kHardImpact = 0.08, kSoftImpact = 0.05;
+constexpr double kFinest = 4;         // sub-steps that an impact makes of one
+constexpr double kLight = 299792458;  // m/s
+constexpr double kNoWay = 0.02;       // of the motion of a sub-step: less counts as none
+constexpr double kSlow = 0.01;        // of d_g: what moves by less needs no closer look at how it does
 // Of an implicit body in contact: edges that it moves a point beyond where its velocity leads, and the share
 // of its energy that the sub-step adds; above both a sub-step is repeated finer.
 constexpr double kTurns = 0.5, kGains = 0.01;
@@ -166,7 +166,7 @@ double turned_over(const World &w, const StepContext &step, const Body &b, uint3
 // energy as far as the trapezoid of the forces is their work; if an edge is strained by s at once, the error
 // is about s^2 of the energy that contact brings, which is too much only if contact brings more than the
 // body has (doc/decisions/0436).
-bool withstands_blows(World &w, StepContext &step) {
+bool withstands_impacts(World &w, StepContext &step) {
   if (step.rows.ndof == 0) return true;
   Guard &g = step.guard;
   double hard = 0, straight = 0;
@@ -180,10 +180,10 @@ bool withstands_blows(World &w, StepContext &step) {
     if (impact.strain > kBoundStrain) bound_is_due(w);
     if (impact.kinetic > step.free_kinetic[i]) hard = std::max(hard, impact.strain);
   }
-  if (!(hard > kHardBlow || straight > kStraight) || step.h != g.planned || g.finer > 1) return true;
+  if (!(hard > kHardImpact || straight > kStraight) || step.h != g.planned || g.finer > 1) return true;
   double parts = 1;
   while (straight > parts * kStraight && 2 * parts <= g.most_finer && parts < kFinestOwn) parts *= 2;
-  while (hard > parts * kSoftBlow && 2 * parts <= g.most_finer && parts < kFinest) parts *= 2;
+  while (hard > parts * kSoftImpact && 2 * parts <= g.most_finer && parts < kFinest) parts *= 2;
   while (parts > 1 && !may_refine(w, step, parts)) parts /= 2;
   if (parts == 1) return true;
   g.finer = parts;
@@ -485,7 +485,7 @@ bool stage_guard(World &w, StepContext &step, uint32_t *trouble) {
     guard_near(step.guard.scene, *step.guard.list, step.guard.memory, step.guard.near, &step.guard.blocks,
                &w.context->tasks);
     safe = find_hits(w, step);
-    if (step.guard.hits.empty()) return withstands_blows(w, step);
+    if (step.guard.hits.empty()) return withstands_impacts(w, step);
     step.guard.acted = true;
     if (w.sleepers > 0 && may_repeat(w, step) && wake_hit(w, step)) {
       step.guard.again = true;
@@ -527,7 +527,7 @@ bool stage_guard(World &w, StepContext &step, uint32_t *trouble) {
     *trouble |= tell_jam(w, step);
     return false;
   }
-  if (!withstands_blows(w, step)) return false;
+  if (!withstands_impacts(w, step)) return false;
   w.stats.guard_lost += (1 - step.guard.motion) * step.h;
   return true;
 }

@@ -50,11 +50,12 @@ struct Guard {
   Array<Kept> kept;
   bool resolving = false;  // a solve that starts from `kept`
 
-  double planned = 0;                 // s, the sub-step before it was shortened
-  double finer = 1, most_finer = 1;   // sub-steps into which a hard blow divides it and each later one; limit
+  double planned = 0;  // s, the sub-step before it was shortened
+  // Sub-steps into which a hard impact divides it and each later one; limit.
+  double finer = 1, most_finer = 1;
   uint32_t pieces = 0;                // cuts of this planned sub-step
   bool acted = false, again = false;  // in this sub-step; it must be repeated
-  bool refines = false;               // then: because of a blow, as the first of `finer` sub-steps
+  bool refines = false;               // then: because of an impact, as the first of `finer` sub-steps
   bool lets_slits = false;            // hits across slits no longer count
   double cut = 1;                     // then: factor on its length
   bool fast = false;                  // then: because a rigid thing goes or turns too far

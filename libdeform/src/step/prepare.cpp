@@ -336,7 +336,7 @@ void choose_integrators(World &w) {
   if (std::none_of(w.bodies.begin(), w.bodies.end(), open)) return;
   if (w.step_count == 0) {
     reopen_integrators(w);
-    w.purse = {};
+    w.allowance = {};
   }
   std::vector<IntegratorOption> options;
   for (const auto &b : w.bodies) options.push_back(option_of(w, *b));

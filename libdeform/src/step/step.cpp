@@ -21,7 +21,7 @@
 #include "state/bounds.h"
 #include "state/world.h"
 #include "step/attach.h"
-#include "step/blow.h"
+#include "step/impact.h"
 #include "step/context.h"
 #include "step/cut_drag.h"
 #include "step/energy_watch.h"
@@ -233,7 +233,7 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
   ++w.step_count;
   w.stats.steps = w.step_count;
   w.stats.time = w.time;
-  if (!goes_on_after_blow(w, dt)) end_count(w, step, dt, done);
+  if (!goes_on_after_impact(w, dt)) end_count(w, step, dt, done);
   return DFM_OK;
 }
 
@@ -277,7 +277,7 @@ bool advance(World &w, StepContext &step, double end, double goal, bool last, ui
   return true;
 }
 
-// After a hard blow (doc/decisions/0436) planned sub-steps are shorter from this one on. So this one is a
+// After a hard impact (doc/decisions/0436) planned sub-steps are shorter from this one on. So this one is a
 // whole sub-step, not a piece.
 void refine(World &w, StepContext &step) {
   Guard &g = step.guard;

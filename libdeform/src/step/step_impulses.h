@@ -1,5 +1,5 @@
 // What contact did between two things over the whole last step: sums and peaks over its sub-steps. The
-// report holds the last sub-step alone, so a blow that begins and ends within a step, or peaks before its
+// report holds the last sub-step alone, so an impact that begins and ends within a step, or peaks before its
 // end, is not in it.
 #pragma once
 #include "state/impulses.h"

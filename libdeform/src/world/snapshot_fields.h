@@ -348,8 +348,8 @@ void fields(Stream &s, W &w, const World &like) {
   s.value("accurate step", w.sizes.accurate, must::not_negative);
   s.value("time of steady steps", w.sizes.steady, must::not_negative);
   s.value("damping of changed steps", w.sizes.damping, must::not_negative);
-  s.value("work put by", w.purse,
-          must::Be{[](const IntegratorPurse &x) { return sound(x); }, "a finite sum"});
+  s.value("work put by", w.allowance,
+          must::Be{[](const IntegratorAllowance &x) { return sound(x); }, "a finite sum"});
   s.must_hold("step size", "sizes that the library chooses", [&] { return sound(w.sizes); });
   s.value("age of the energies", w.watch.age, must::any);
   s.value("credit of the energies", w.watch.credit, must::any);

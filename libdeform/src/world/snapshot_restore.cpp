@@ -242,7 +242,7 @@ void exchange(World &w, Staged &t) noexcept {
   std::swap(w.next_id, t.next_id);
   std::swap(w.hold, t.hold);
   std::swap(w.sizes, t.sizes);
-  std::swap(w.purse, t.purse);
+  std::swap(w.allowance, t.allowance);
   std::swap(w.watch, t.watch);
   w.bound.body = nullptr;
   w.bound.point = 0;

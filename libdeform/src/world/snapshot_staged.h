@@ -70,7 +70,7 @@ struct Staged {
   Hold hold;
   StepSizes sizes;
   EnergyWatch watch;
-  IntegratorPurse purse;
+  IntegratorAllowance allowance;
   dfm_world_stats stats{};
   Gravity gravity;
   dfm_world_def def{};

@@ -29,7 +29,7 @@ SEARCH = {"model": [None, *({"type": name} for name in MODELS)],
           "step": [None, 5e-4, 1e-3, 2e-3, 4e-3, 8e-3, 1 / 60],
           "integrator": [None, "implicit_euler", "tr_bdf2", "symplectic_euler"]}
 BEGIN = [{"model": {"type": name}} for name in MODELS]
-GAP = 2e-5  # m, start distance: settles without a blow
+GAP = 2e-5  # m, start distance: settles without an impact
 
 
 class Entry:

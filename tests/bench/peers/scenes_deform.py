@@ -21,7 +21,7 @@ FEM = {"model": {"type": "corotational_fem"}}
 SETTINGS = {"defaults": {}, "defaults 1 ms": {"step": 1e-3}, "fem": FEM, "fem 1 ms": {**FEM, "step": 1e-3},
             "fem tr_bdf2 4 ms": {**FEM, "step": 4e-3, "integrator": "tr_bdf2"}}
 TICK = 4e-3  # s: the processor's time is counted in ticks; what is shorter counts as one
-GAP = 2e-5  # m, start distance: settles without a blow
+GAP = 2e-5  # m, start distance: settles without an impact
 
 
 class Entry:

@@ -118,8 +118,8 @@ TEST(SelfWatch, SheetThatRollsUpAndUnrolls_IsNearWhereAnyPairIs) {
   EXPECT_LT(list.renewals(), 390u) << "most looks need no new list";
 }
 
-// Speeds that a blow has changed, beyond what there was before the solve.
-TEST(SelfWatch, BlowThatFoldsWithinTheSubStep_IsMet) {
+// Speeds that an impact has changed, beyond what there was before the solve.
+TEST(SelfWatch, ImpactThatFoldsWithinTheSubStep_IsMet) {
   Watched watched;
   auto &[s, rest, list, watch] = watched;
   const uint32_t thrown = 0;

@@ -46,7 +46,7 @@ struct Probed {
     test::ok(dfm_body_get_state(body, inside().p.n, s.x.data(), s.v.data(), nullptr));
     return s;
   }
-  // A blow without a force: the points lead in the next step.
+  // An impact without a force: the points lead in the next step.
   void touch() const {
     const double point[3] = {}, none[3] = {};
     test::ok(dfm_body_apply_impulse(body, point, none));
@@ -105,8 +105,8 @@ TEST_P(LatePoints, SeenAfterEachStepOrNever_AreTheSame) {
 }
 
 // The same body where the points lead in each step, so that all of them are moved. Few modes are so hard that
-// the probe comes to its first contact with blows, each of which sticks or slips by the last digits: without
-// friction none does.
+// the probe comes to its first contact with impacts, each of which sticks or slips by the last digits:
+// without friction none does.
 TEST_P(LatePoints, OfASlidingProbe_AreThoseOfAStepThatMovesAll) {
   std::vector<std::string> more;
   if (!std::strcmp(GetParam(), "modal")) more.push_back("/contact/friction/0/params/mu=0");

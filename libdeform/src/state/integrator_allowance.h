@@ -9,13 +9,13 @@ namespace dfm {
 inline constexpr uint32_t kMostTries = 5;
 
 // Part of snapshots: a restored world continues with it.
-struct IntegratorPurse {
+struct IntegratorAllowance {
   uint32_t open = 0;   // it has been filled for the first time
   uint32_t tries = 0;  // of implicit time that were given up since it has last paid
   double credit = 0;   // s of explicit time
   // s of explicit time: work of single steps that were given up, less what implicit steps have saved since
   double lost = 0;
-  double struck_until = 0;  // s, time until which bodies are explicit because of a blow; 0: none
+  double struck_until = 0;  // s, time until which bodies are explicit because of an impact; 0: none
 };
 // Simulated time by integrator, where the library may change integrators; not in snapshots.
 struct IntegratorTimes {
@@ -23,7 +23,7 @@ struct IntegratorTimes {
   uint64_t changes = 0;
   bool told = false;  // a warning has said that bodies are implicit
 };
-inline bool sound(const IntegratorPurse &p) {
+inline bool sound(const IntegratorAllowance &p) {
   return p.open <= 1 && p.tries <= kMostTries && std::isfinite(p.credit) && p.lost >= 0 &&
          std::isfinite(p.lost) && p.struck_until >= 0 && std::isfinite(p.struck_until);
 }

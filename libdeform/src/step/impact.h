@@ -1,6 +1,6 @@
-// A hard blow on a body that the library has made implicit, in a step whose length the library has chosen:
+// A hard impact on a body that the library has made implicit, in a step whose length the library has chosen:
 // contact takes the velocity of the body in one sub-step, and with it the energy that would throw it back.
-// Such a step is repeated explicitly, and the body stays explicit until the blow is over;
+// Such a step is repeated explicitly, and the body stays explicit until the impact is over;
 // doc/decisions/0456-blows-by-auto.md.
 #pragma once
 
@@ -13,12 +13,12 @@ struct World;
 // others that are no longer than the offered one follow the errors of implicit bodies.
 bool chosen_by_library(const World &w, double dt);
 // Before a sub-step is committed: ends the step if one of its bodies has been struck.
-void look_for_blow(const World &w, const StepContext &step);
-// Begins again from the state before the step, explicitly until the blow is over.
-void begin_blow(World &w, double dt);
-// After a step: whether it belongs to a blow, whose steps are not counted. The last one makes bodies implicit
-// again.
-bool goes_on_after_blow(World &w, double dt);
+void check_for_impact(const World &w, const StepContext &step);
+// Begins again from the state before the step, explicitly until the impact is over.
+void begin_impact(World &w, double dt);
+// After a step: whether it belongs to an impact, whose steps are not counted. The last one makes bodies
+// implicit again.
+bool goes_on_after_impact(World &w, double dt);
 // Ends the present step for that reason.
 [[noreturn]] void end_struck_step();
 

@@ -1,4 +1,4 @@
-#include "step/blow.h"
+#include "step/impact.h"
 
 #include <algorithm>
 #include <cmath>
@@ -18,8 +18,8 @@ namespace {
 // impact takes. At rest the mean velocity stays, and friction on a slope or in a slide changes it by about
 // gravity's part.
 constexpr double kWeights = 2, kWay = 0.05, kLost = 0.5;
-// How long a blow may last, in the explicit steps of the body for each edge along it. A sphere is in contact
-// for 2.3 (c/v)^(1/5) times the time that a wave takes through it (Hertz), at most 9 times for speeds v above
+// How long an impact may last, in the explicit steps of the body for each edge along it. A sphere is in
+// contact for 2.3 (c/v)^(1/5) times the time that a wave takes through it (Hertz), at most 9 times for speeds v above
 // a thousandth of the wave speed c, and an edge takes a wave up to four stable steps.
 constexpr double kEdges = 36;
 constexpr double kSame = 1e-6;  // relative: a step of the announced length
@@ -62,7 +62,7 @@ bool chosen_by_library(const World &w, double dt) {
   return !(std::fabs(dt - w.def.step) <= kSame * w.def.step) && dt <= accurate_step(w.sizes);
 }
 
-void look_for_blow(const World &w, const StepContext &step) {
+void check_for_impact(const World &w, const StepContext &step) {
   const Budget &budget = step.budget;
   if (!step.counting.on || budget.struck || !(budget.offered > 0) || step.rows.n == 0) return;
   for (const uint32_t i : step.active) {
@@ -72,26 +72,26 @@ void look_for_blow(const World &w, const StepContext &step) {
   }
 }
 
-void begin_blow(World &w, double dt) {
+void begin_impact(World &w, double dt) {
   double lasts = 0;
   for (const auto &b : w.bodies)
     if (is_implicit(*b))
       lasts = std::max(lasts, kEdges * extent(*b) / b->surface.median_edge * b->integrator.step);
-  const IntegratorPurse before = w.purse;
+  const IntegratorAllowance before = w.allowance;
   give_up_implicit(w, 0);
-  w.purse = before;
-  w.purse.struck_until = w.time + dt + lasts;
-  w.context->logf(DFM_LOG_INFO, "a body was struck: explicit steps until %g s", w.purse.struck_until);
+  w.allowance = before;
+  w.allowance.struck_until = w.time + dt + lasts;
+  w.context->logf(DFM_LOG_INFO, "a body was struck: explicit steps until %g s", w.allowance.struck_until);
 }
 
-bool goes_on_after_blow(World &w, double dt) {
-  IntegratorPurse now = w.purse;
+bool goes_on_after_impact(World &w, double dt) {
+  IntegratorAllowance now = w.allowance;
   if (!(now.struck_until > 0)) return false;
   w.integrator_times.all += dt;
   if (w.time < now.struck_until) return true;
   take_up_implicit(w);
   now.struck_until = 0;
-  w.purse = now;
+  w.allowance = now;
   return true;
 }
 
