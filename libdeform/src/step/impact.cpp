@@ -19,8 +19,8 @@ namespace {
 // gravity's part.
 constexpr double kWeights = 2, kWay = 0.05, kLost = 0.5;
 // How long an impact may last, in the explicit steps of the body for each edge along it. A sphere is in
-// contact for 2.3 (c/v)^(1/5) times the time that a wave takes through it (Hertz), at most 9 times for speeds v
-// above a thousandth of the wave speed c, and an edge takes a wave up to four stable steps.
+// contact for 2.3 (c/v)^(1/5) times the time that a wave takes through it (Hertz), at most 9 times for speeds
+// v above a thousandth of the wave speed c, and an edge takes a wave up to four stable steps.
 constexpr double kEdges = 36;
 constexpr double kSame = 1e-6;  // relative: a step of the announced length
 
