@@ -89,6 +89,9 @@ void print_table(const std::string &in, const std::string &file, const Filled &f
   std::printf("  seconds           %.2f\n", f.seconds);
   for (const std::string &w : f.warnings) std::printf("  warning: %s\n", shown(w).c_str());
   if (f.surface.warnings[0] == 0 && f.cells.warnings[0] == 0) std::printf("  the surface is clean\n");
+  // The file alone would be drawn, and would touch, with the jagged border of its cells.
+  std::printf("  body of a scene   \"mesh\": %s, \"surface\": {\"mesh\": %s}\n", shown(quoted(file)).c_str(),
+              shown(quoted(in)).c_str());
 }
 
 int fill(const Globals &globals, const std::string &in, const std::string &out, uint32_t cells) {

@@ -267,7 +267,7 @@ void App::set_slider(const std::string &name, double value) {
     show_state(i);
     return;
   }
-  std::string names = "speed, pull";
+  std::string names = replay_ ? "speed, pull, time" : "speed, pull";
   for (Slider &s : stage_->sliders) {
     if (s.name == name) {
       s.apply(value);

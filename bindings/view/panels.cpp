@@ -181,8 +181,11 @@ void App::numbers() {
     text("torque", felt.torque, "mN m");
   }
   cli::Drawing::Legend legend;
-  if (stage_->drawing.legend(legend))
-    ImGui::Text("color: %s, 0 to %.3g %s", legend.title.c_str(), legend.top, legend.unit.c_str());
+  if (stage_->drawing.legend(legend)) {
+    if (legend.top > 0)
+      ImGui::Text("color: %s, 0 to %.3g %s", legend.title.c_str(), legend.top, legend.unit.c_str());
+    else ImGui::Text("color: %s: 0 so far, or the models provide none", legend.title.c_str());
+  }
   // What the machine needs differs from run to run, so that a script's pictures are without it.
   if (!script_) {
     ImGui::Text("%.3f ms a step, %.2f x real time", stage_->simulation.step_ms(), running_ ? real_ : 0);

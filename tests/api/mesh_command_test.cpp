@@ -216,6 +216,14 @@ TEST(MeshCommand, ConvertForeignFormat_ReadsItOrExplainsHow) {
   }
 }
 
+TEST(MeshCommand, Fill_PrintsTheBodyOfAScene) {
+  const std::string ball = folder() + "/to fill.obj", cells = folder() + "/cells.vtu";
+  ASSERT_EQ(test::deform({"mesh", "make", "ball", "--surface", "--out", ball}).exit_code, 0);
+  const auto r = test::deform({"mesh", "fill", ball, "--cells", "300", "--out", cells});
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_TRUE(has(r.out, "\"mesh\": \"" + cells + "\", \"surface\": {\"mesh\": \"" + ball + "\"}")) << r.out;
+}
+
 TEST(MeshCommand, BadInput_ExitsTwoWithOneSentence) {
   test::write_file(folder() + "/flat.vtk",
                    "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 double\n0 0 "

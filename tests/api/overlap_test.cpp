@@ -142,6 +142,20 @@ TEST(Overlap, OfBodyWithEveryShapeOfObstacle_IsFound) {
     }
 }
 
+TEST(Overlap, OfBodyWithAMeshInMillimeters_NamesTheUnits) {
+  for (const double size : {50.0, 0.05}) {
+    test::LoggedContext logged;
+    const dfm_world w = test::make_world(logged.context, {});
+    ball(logged.context, w, "ball", {});
+    const test::Triangles box = test::box_surface({size, size, size}, 1);
+    thing(w, DFM_OBSTACLE_MESH, 0, &box);
+    uint32_t trouble = 0;
+    ASSERT_EQ(dfm_world_step(w, 1e-3, &trouble), DFM_OK) << dfm_last_error();
+    EXPECT_NE(logged.log.find("overlap by"), std::string::npos) << logged.log;
+    EXPECT_EQ(logged.log.find("if a mesh is in millimeters") != std::string::npos, size > 1) << logged.log;
+  }
+}
+
 TEST(Overlap, OfBodyWithPlane_IsLedOutSlowly) {
   test::Context c;
   const dfm_world w = test::make_world(c, {});

@@ -265,6 +265,11 @@ class Tools(Scenery):
         knife.set_cuts([])
         self.assertEqual(knife.cuts, [])
 
+    def test_a_sphere_without_a_radius_has_five_millimeters(self):
+        self.world.add_tool("sphere", position=(0, 0, 1))
+        hit = self.world.ray((0, 0, 2), (0, 0, -1))
+        self.assertAlmostEqual(hit["distance"], 0.995, places=6)
+
     def test_what_is_wrong_is_said(self):
         with self.assertRaisesRegex(deform.ArgumentError, "sphere"):
             self.world.add_tool("spere")

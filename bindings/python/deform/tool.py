@@ -183,15 +183,16 @@ class Tools:
 
     def add_tool(self: Any, shape: str = "sphere", *, name: str | None = None,
                  position: Sequence[float] = (0, 0, 0), rotation: Sequence[float] = (0, 0, 0, 1),
-                 radius: float = 0, half_size: Sequence[float] = (0, 0, 0), half_length: float = 0,
+                 radius: float | None = None, half_size: Sequence[float] = (0, 0, 0), half_length: float = 0,
                  mesh: TriMesh | None = None, opening: float = 0, stiffness: float = 0, damping: float = 0,
                  turn_stiffness: float = 0, turn_damping: float = 0, mass: float = 0.05,
                  inertia: float = 1e-5, late: float = 0, passive: bool = False,
                  material: Material | Mapping[str, Any] | None = None, category: int = 1,
                  collides_with: int = EVERYTHING) -> Tool:
-        """A "sphere" (radius), "capsule" (radius, half_length, along z), "box" or "ellipsoid" (half_size
-        [3]), "mesh", "blade" (half_size [3]: x its thickness, its edge along y at -z), "grasper" or
-        "scissors" (half_size [3] of one jaw, opening rad; radius and half_length of a shaft, 0: none). m.
+        """A "sphere" (radius, 5 mm if it is not given), "capsule" (radius, half_length, along z), "box" or
+        "ellipsoid" (half_size [3]), "mesh", "blade" (half_size [3]: x its thickness, its edge along y at
+        -z), "grasper" or "scissors" (half_size [3] of one jaw, opening rad; radius and half_length of a
+        shaft, which has none by default). m.
 
         stiffness N/m, damping N s/m, turn_stiffness N m/rad, turn_damping N m s/rad: of a spring and damper
         between the pose that is set and the tool, which then has a mass (kg) and an inertia (kg m2); 0: it
@@ -202,6 +203,8 @@ class Tools:
         definition.name = encoded(name)
         definition.pose = pose_of(position, rotation)
         definition.half_size = vector(half_size, "half_size")
+        if radius is None:  # the library's default is for shapes that have one; a shaft is only on request
+            radius = definition.radius if shape in ("sphere", "capsule") else 0
         for key, value in (("radius", radius), ("half_length", half_length), ("opening", opening),
                            ("stiffness", stiffness), ("damping", damping), ("turn_stiffness", turn_stiffness),
                            ("turn_damping", turn_damping), ("mass", mass), ("inertia", inertia),

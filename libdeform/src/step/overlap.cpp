@@ -7,6 +7,7 @@
 #include "contact/reach.h"
 #include "core/error.h"
 #include "dynamics/rigid/rigid_set.h"
+#include "geometry/extent.h"
 #include "plugin/context.h"
 #include "state/world.h"
 #include "step/context.h"
@@ -21,6 +22,7 @@ namespace {
 constexpr uint64_t kReleaseEvery = 16;          // steps: interval at which excluded pairs are tested
 constexpr uint64_t kPiece = uint64_t{1} << 63;  // added to ids in Overlaps::placed by place_piece()
 constexpr size_t kSentences = 8;                // number of pairs that the log names individually
+constexpr double kOtherUnits = 100;             // times the size of a body: an obstacle may be in millimeters
 constexpr double kTellAgain = 2;                // times the depth of parts that the log has told
 
 // Whether the overlap is too deep for contact to resolve. Closed shapes and voxels resolve any depth;
@@ -90,6 +92,24 @@ const Obstacle *obstacle_of_id(const World &w, uint64_t id) {
   return nullptr;
 }
 
+double length_of(const Array<double> &points, size_t stride) {
+  Extent box;
+  for (size_t i = 0; i + 2 < points.size(); i += stride) box.add(load3(&points[i]));
+  return norm(box.hi - box.lo);
+}
+
+// A body of centimeters in a mesh of a hundred times its size that it overlaps: one of the two files is in
+// millimeters.
+std::string hint_of_units(const Body &b, const Obstacle *o) {
+  if (!o || o->points.empty()) return {};
+  const double own = length_of(b.p.x, kStride), its = length_of(o->points, 3);
+  if (!(its > kOtherUnits * own)) return {};
+  return format(
+      "; '%s' is %.3g m across and '%s' %.3g m: if a mesh is in millimeters, multiply its points by "
+      "0.001 (in a scene: \"scale\": 0.001 in its \"pose\")",
+      b.name.c_str(), own, o->name.c_str(), its);
+}
+
 // The name under which the user has made it: a piece has come during the run, and cannot be put elsewhere.
 const std::string &made_name(const Body &b) { return b.piece_of ? b.whole_name : b.name; }
 
@@ -107,7 +127,8 @@ std::string remedy(World &w, OverlapSides &sides, const Overlap &o, bool untangl
                             : first == second
                                 ? format("move '%s' at the start", first.c_str())
                                 : format("move '%s' or '%s' at the start", first.c_str(), second.c_str());
-  return what + "; " + where + (untangled ? "" : ", or set \"untangle\"");
+  return what + "; " + where + (untangled ? "" : ", or set \"untangle\"") +
+         (came ? "" : hint_of_units(a, thing));
 }
 
 void warn(World &w, OverlapSides &sides, const Overlap &o, bool untangled) {
