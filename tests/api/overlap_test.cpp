@@ -148,7 +148,7 @@ TEST(Overlap, OfBodyWithAMeshInMillimeters_NamesTheUnits) {
     const dfm_world w = test::make_world(logged.context, {});
     ball(logged.context, w, "ball", {});
     const test::Triangles box = test::box_surface({size, size, size}, 1);
-    thing(w, DFM_OBSTACLE_MESH, 0, &box);
+    thing(w, DFM_SHAPE_MESH, 0, &box);
     uint32_t trouble = 0;
     ASSERT_EQ(dfm_world_step(w, 1e-3, &trouble), DFM_OK) << dfm_last_error();
     EXPECT_NE(logged.log.find("overlap by"), std::string::npos) << logged.log;
