@@ -1,6 +1,7 @@
 // deform mesh fill SURFACE --out FILE --cells N
 #include <chrono>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
@@ -90,8 +91,11 @@ void print_table(const std::string &in, const std::string &file, const Filled &f
   for (const std::string &w : f.warnings) std::printf("  warning: %s\n", shown(w).c_str());
   if (f.surface.warnings[0] == 0 && f.cells.warnings[0] == 0) std::printf("  the surface is clean\n");
   // The file alone would be drawn, and would touch, with the jagged border of its cells.
-  std::printf("  body of a scene   \"mesh\": %s, \"surface\": {\"mesh\": %s}\n", shown(quoted(file)).c_str(),
-              shown(quoted(in)).c_str());
+  const auto whole = [](const std::string &path) {
+    return shown(quoted(std::filesystem::absolute(path).lexically_normal()));
+  };
+  std::printf("  body of a scene   \"mesh\": %s, \"surface\": {\"mesh\": %s}\n", whole(file).c_str(),
+              whole(in).c_str());
 }
 
 int fill(const Globals &globals, const std::string &in, const std::string &out, uint32_t cells) {

@@ -350,7 +350,9 @@ std::string summary_json(const SceneFile &scene, const RunOptions &options, cons
   out.add("scene", quoted(options.scene))
       .add("steps", std::to_string(run.steps))
       .add("substeps", std::to_string(stats.substeps));
-  out.add("simulated_s", number(run.simulated)).add("wall_s", number(run.wall)).add("cpu_s", number(run.cpu));
+  out.add("simulated_s", number(run.simulated - run.begun))
+      .add("wall_s", number(run.wall))
+      .add("cpu_s", number(run.cpu));
   out.add("ms_per_step", ms.text())
       .add("stages", stages_json(scene, run.steps))
       .add("threads", std::to_string(stats.threads));

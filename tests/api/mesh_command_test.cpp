@@ -217,11 +217,15 @@ TEST(MeshCommand, ConvertForeignFormat_ReadsItOrExplainsHow) {
 }
 
 TEST(MeshCommand, Fill_PrintsTheBodyOfAScene) {
+  const auto here = [](const std::string &path) {
+    return std::filesystem::proximate(path, std::filesystem::current_path()).string();
+  };
   const std::string ball = folder() + "/to fill.obj", cells = folder() + "/cells.vtu";
   ASSERT_EQ(test::deform({"mesh", "make", "ball", "--surface", "--out", ball}).exit_code, 0);
-  const auto r = test::deform({"mesh", "fill", ball, "--cells", "300", "--out", cells});
+  const auto r = test::deform({"mesh", "fill", here(ball), "--cells", "300", "--out", here(cells)});
   EXPECT_EQ(r.exit_code, 0) << r.err;
-  EXPECT_TRUE(has(r.out, "\"mesh\": \"" + cells + "\", \"surface\": {\"mesh\": \"" + ball + "\"}")) << r.out;
+  EXPECT_TRUE(has(r.out, "\"mesh\": \"" + cells + "\", \"surface\": {\"mesh\": \"" + ball + "\"}"))
+      << r.out << cells;
 }
 
 TEST(MeshCommand, BadInput_ExitsTwoWithOneSentence) {

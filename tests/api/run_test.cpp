@@ -356,6 +356,8 @@ TEST(Run, LastStep_LandsOnTheEnd) {
   const Outcome one = run("one", {"--time", "0.001", "--quiet", "--set", "/time/step=5000"});
   EXPECT_EQ(value(one.summary, "steps"), "1");
   EXPECT_NEAR(std::stod(value(one.summary, "simulated_s")), 0.001, 1e-15);
+  const Outcome later = run("later", {"--time", "0.001", "--quiet", "--set", "/time/start=2"});
+  EXPECT_NEAR(std::stod(value(later.summary, "simulated_s")), 0.001, 1e-12);
   const Outcome automatic = run("auto", {"--time", "0.0123", "--quiet", "--set", "/time/step=auto"});
   EXPECT_NEAR(std::stod(value(automatic.summary, "simulated_s")), 0.0123, 1e-12);
 }
