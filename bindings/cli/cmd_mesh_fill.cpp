@@ -24,6 +24,7 @@ struct Filled {
   dfm_tetmesh_info cells = {};
   double volume = 0, mean_share = 0, least_share = 1, seconds = 0;
   std::vector<std::string> warnings;
+  bool imported = false;  // from a format that scenes do not read
 };
 
 double cell_volume(const double *x, const uint32_t *tet) {
@@ -90,6 +91,7 @@ void print_table(const std::string &in, const std::string &file, const Filled &f
   std::printf("  seconds           %.2f\n", f.seconds);
   for (const std::string &w : f.warnings) std::printf("  warning: %s\n", shown(w).c_str());
   if (f.surface.warnings[0] == 0 && f.cells.warnings[0] == 0) std::printf("  the surface is clean\n");
+  if (f.imported) return;
   // The file alone would be drawn, and would touch, with the jagged border of its cells.
   const auto whole = [](const std::string &path) {
     return shown(quoted(std::filesystem::absolute(path).lexically_normal()));
@@ -107,6 +109,7 @@ int fill(const Globals &globals, const std::string &in, const std::string &out, 
     if (!s.context) return fail(dfm_last_error());
     std::string sentence;
     if (!import_surface(in, s, sentence)) return fail(sentence);
+    filled.imported = s.surface != 0;
     if (!s.surface && dfm_trimesh_read(s.context, in.c_str(), &s.surface) < 0) return fail(dfm_last_error());
     if (dfm_tetmesh_fill(s.surface, cells, &s.cells) < 0) return fail(in + ": " + dfm_last_error());
     if (dfm_tetmesh_write(s.cells, out.c_str()) < 0) return fail(dfm_last_error());
