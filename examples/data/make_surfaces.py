@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""Makes organ.obj and rabbit.obj: closed surfaces of our own for scenes that fill them with cells.
+"""Makes organ.obj, rabbit.obj and lobes.stl: closed surfaces of our own for scenes that fill them with cells.
 
 A sphere of even triangles is pulled out to a radius that depends on the direction; then each point moves to
 the middle of its neighbors and back onto the shape, again and again, until the triangles are even there. Run
 in this folder: python3 make_surfaces.py
 """
 import math
+import struct
 
 
 def unit(p):
@@ -69,6 +70,13 @@ def rabbit(d):
     return r + 0.012 * bump(d, (-1, 0, 0.15), 0.25) - 0.008 * bump(d, (0, 0, -1), 0.5)
 
 
+def lobes(d):
+    """Two lobes with a notch between them: flat, so that its edge is thin."""
+    r = 0.075 * (1 + 0.45 * bump(d, (1, -0.2, 0), 0.9) + 0.30 * bump(d, (-1, 0.5, 0), 0.6))
+    r *= 1 - 0.25 * bump(d, (-0.3, -1, 0), 0.5)
+    return r / math.sqrt(1 + 5 * d[2] * d[2])
+
+
 def relaxed(shape, cuts, rounds):
     points, triangles = icosphere(cuts)
     near = [set() for _ in points]
@@ -92,6 +100,17 @@ def write(name, x, triangles):
         out.writelines("f %d %d %d\n" % (a + 1, b + 1, c + 1) for a, b, c in triangles)
 
 
+def write_stl(name, x, triangles):
+    with open(name, "wb") as out:
+        out.write(b"by make_surfaces.py, metres".ljust(80) + struct.pack("<I", len(triangles)))
+        for corners in triangles:
+            a, b, c = (x[i] for i in corners)
+            u, v = ([q - p for p, q in zip(a, other)] for other in (b, c))
+            normal = unit((u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]))
+            out.write(struct.pack("<12fH", *normal, *a, *b, *c, 0))
+
+
 if __name__ == "__main__":
     write("organ.obj", *relaxed(organ, 3, 60))
     write("rabbit.obj", *relaxed(rabbit, 3, 150))
+    write_stl("lobes.stl", *relaxed(lobes, 3, 100))

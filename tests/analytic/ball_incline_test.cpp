@@ -1,6 +1,5 @@
 // Balls on inclines and skidding balls against rigid rolling. A polyhedron loses a little at every edge: 5 %,
-// on about 1,000 facets. Own copies of ../shared/reference/contact/tables/{rolling_incline,skid_to_roll}.csv
-// (solid sphere).
+// on about 1,000 facets. reference/contact/tables/{rolling_incline,skid_to_roll}.csv (solid sphere).
 #include "support.h"
 #include "world.h"
 
@@ -58,17 +57,7 @@ void compare(const Row &row) {
 }  // namespace
 
 TEST(BallOnIncline, RollsOrSlips_AsARigidSphereDoes) {
-  for (const Row &row : {Row{10, 0.3, 1.21677758779, 1.21677758779},
-                         {20, 0.1, 2.43337914503, 2.30459615248},
-                         {20, 0.5, 2.3965840043, 2.3965840043},
-                         {30, 0.1, 4.05542907889, 2.12392730278},
-                         {30, 0.2, 3.50357142857, 3.50357142857}})
-    compare(row);
-}
-
-TEST(BallOnIncline, SharedTable_Matches) {
-  if (test::shared_dir().empty()) GTEST_SKIP() << "../shared/reference is absent";
-  const auto table = test::read_csv(test::shared_dir() + "/reference/contact/tables/rolling_incline.csv");
+  const auto table = test::read_csv(test::reference_dir() + "/contact/tables/rolling_incline.csv");
   int compared = 0;
   for (size_t i = 1; i < table.size(); ++i) {
     const auto &c = table[i];

@@ -1,4 +1,4 @@
-// Rigid limits of ../shared/reference/contact at the tolerances of its README, with stiff `msm` bodies. All
+// Rigid limits of reference/contact at the tolerances of its README, with stiff `msm` bodies. All
 // rows, and the elastic cases with the model's own error, are printed by tests/bench/contact_reference.cpp
 // (doc/reference/contact_reference.md). The spheres' rows and the oblique incline have tests of their own:
 // ball_incline_test.cpp, oblique_test.cpp.
@@ -17,7 +17,7 @@ struct Row {
 
 std::vector<Row> table(const char *name) {
   std::vector<Row> rows;
-  const auto text = test::read_csv(test::shared_dir() + "/reference/contact/tables/" + name + ".csv");
+  const auto text = test::read_csv(test::reference_dir() + "/contact/tables/" + name + ".csv");
   for (size_t i = 1; i < text.size(); ++i) {
     Row row;
     for (const std::string &cell : text[i]) {
@@ -31,14 +31,9 @@ std::vector<Row> table(const char *name) {
   return rows;
 }
 
-bool absent() { return test::shared_dir().empty(); }
-#define NEEDS_TABLES() \
-  if (absent()) GTEST_SKIP() << "../shared/reference is absent"
-
 }  // namespace
 
 TEST(ContactReference, InclineBlock_SlidesAndHoldsAsTheTableSays) {
-  NEEDS_TABLES();
   int slid = 0, held = 0;
   for (const Row &row : table("incline_block")) {  // theta mu slides a v x tan/mu
     const double theta = row.v[0], mu = row.v[1], ratio = row.v[6];
@@ -55,7 +50,6 @@ TEST(ContactReference, InclineBlock_SlidesAndHoldsAsTheTableSays) {
 }
 
 TEST(ContactReference, SlidingStop_TimeAndWayWithinTwoPercent) {
-  NEEDS_TABLES();
   int n = 0;
   for (const Row &row : table("sliding_stop")) {  // v0 mu distance time
     const ref::Slide got = ref::slide(row.v[0], row.v[1], false);
@@ -67,7 +61,6 @@ TEST(ContactReference, SlidingStop_TimeAndWayWithinTwoPercent) {
 }
 
 TEST(ContactReference, Conveyor_SlipTimeAndWayWithinTwoPercent) {
-  NEEDS_TABLES();
   int n = 0;
   for (const Row &row : table("conveyor")) {  // belt mu time distance
     const ref::Slide got = ref::slide(row.v[0], row.v[1], true);
@@ -79,7 +72,6 @@ TEST(ContactReference, Conveyor_SlipTimeAndWayWithinTwoPercent) {
 }
 
 TEST(ContactReference, Toppling_VerdictsMatchOutsideFivePercent) {
-  NEEDS_TABLES();
   int n = 0;
   for (const Row &row : table("incline_toppling")) {  // theta w/h topples
     const double slope = std::tan(row.v[0] * ref::kDegree);
@@ -94,11 +86,9 @@ TEST(ContactReference, Toppling_VerdictsMatchOutsideFivePercent) {
 
 // All angles, coefficients and speeds are run by `make bench`; here one of each body.
 TEST(ContactReference, RoundBodiesOnIncline_RollOrSlipWithinFivePercent) {
-  NEEDS_TABLES();
   int n = 0;
   for (const ref::RoundShape &shape : ref::kRounds)
-    for (const auto &line :
-         test::read_csv(test::shared_dir() + "/reference/contact/tables/rolling_incline.csv")) {
+    for (const auto &line : test::read_csv(test::reference_dir() + "/contact/tables/rolling_incline.csv")) {
       if (line[0] != shape.name) continue;
       const double theta = std::stod(line[1]);
       const double mu = std::stod(line[2]);
@@ -115,7 +105,6 @@ TEST(ContactReference, RoundBodiesOnIncline_RollOrSlipWithinFivePercent) {
 }
 
 TEST(ContactReference, RoundBodiesThrownWithoutSpin_RollWithinFivePercent) {
-  NEEDS_TABLES();
   int n = 0;
   for (const ref::RoundShape &shape : ref::kRounds)
     for (const Row &row : table("skid_to_roll")) {  // v0 mu time speed distance loss
@@ -133,7 +122,6 @@ TEST(ContactReference, RoundBodiesThrownWithoutSpin_RollWithinFivePercent) {
 }
 
 TEST(ContactReference, StickSlip_PeriodAndAmplitudeWithinTwoPercent) {
-  NEEDS_TABLES();
   int n = 0;
   // m k Fs Fk V x_slip x_max x_restick x_min ts tslip period rate
   for (const Row &row : table("stick_slip")) {

@@ -1,6 +1,6 @@
 // A soft block slides on planes and belts: stopping distance, conveyor, friction across a slope. The answers
 // are those of a point mass under Coulomb friction; the block is stiff and damped, so that it differs from
-// one by its shear alone. Source: ../shared/reference/contact (sliding_stop, conveyor, oblique_incline);
+// one by its shear alone. Source: reference/contact (sliding_stop, conveyor, oblique_incline);
 // verification F2, F4.
 #include "world.h"
 

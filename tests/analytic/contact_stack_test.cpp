@@ -1,6 +1,6 @@
 // Three cubes on each other, a little off their grids, so that edges cross edges and no points face points:
 // the normal force of each interface is the weight above it, and the stack stays. Source:
-// ../shared/reference/contact (box_stack); verification F6, F9.
+// reference/contact (box_stack); verification F6, F9.
 #include "world.h"
 
 TEST(Stack, ThreeCubes_InterfacesCarryTheWeightAboveAndRest) {

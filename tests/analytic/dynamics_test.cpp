@@ -1,4 +1,4 @@
-// Motion of finite elements with lumped masses against ../shared/reference/elasticity: the step response and
+// Motion of finite elements with lumped masses against reference/elasticity: the step response and
 // the frequencies of a bar, the swing of a corotational one, and what lumping leaves of the frequencies.
 #include <algorithm>
 #include <cstdlib>
@@ -8,12 +8,7 @@
 
 namespace {
 
-std::string reference(const std::string &name) {
-  return test::shared_dir() + "/reference/elasticity/" + name;
-}
-
-#define SKIP_WITHOUT_SHARED() \
-  if (test::shared_dir().empty()) GTEST_SKIP() << "the shared reference data are absent"
+std::string reference(const std::string &name) { return test::reference_dir() + "/elasticity/" + name; }
 
 struct Bar {
   test::Context context;
@@ -28,7 +23,7 @@ struct Bar {
       int32_t integrator = DFM_INTEGRATOR_AUTO) {
     world = test::make_world(context, {0, 0, gravity}, integrator);
     dfm_tetmesh mesh = 0;
-    test::ok(dfm_tetmesh_read(context, (test::shared_dir() + "/meshes/" + mesh_file).c_str(), &mesh));
+    test::ok(dfm_tetmesh_read(context, (test::mesh_dir() + "/" + mesh_file).c_str(), &mesh));
     dfm_body_def d = dfm_body_def_default();
     test::lend(mesh, d);
     const uint32_t *file_point = nullptr;
@@ -104,7 +99,6 @@ Errors errors_of(const test::BodyOptions &o, double seconds, double h, const std
 
 // Gravity switched on; the reference is the exact sum of modes.
 TEST(Dynamics, LinearBarAfter2Seconds_ApproachesTheSumOfModesInFirstOrder) {
-  SKIP_WITHOUT_SHARED();
   test::BodyOptions o = material("linear_fem", 1e5);
   const Errors plain = errors_of(o, 2, 1e-3, "dyn_linear_damp0_t2.csv");
   EXPECT_LT(plain.coarse, 1.5e-4);
@@ -125,7 +119,6 @@ TEST(Dynamics, LinearBarAfter2Seconds_ApproachesTheSumOfModesInFirstOrder) {
 
 // A swing through a large angle, and a spin at 1,000 rounds per minute; reference: DOP853 to 1e-11.
 TEST(Dynamics, CorotationalBarThatSwingsAndSpins_FollowsTheReference) {
-  SKIP_WITHOUT_SHARED();
   const Errors swing = errors_of(material("corotational_fem", 1e6), 0.3, 2e-4, "dyn_corot_swing_t0.3.csv");
   EXPECT_LT(swing.coarse, 6e-4);
   EXPECT_NEAR(swing.coarse / swing.fine, 2, 0.1);
@@ -171,7 +164,6 @@ Peak peak(std::vector<double> signal, double dt, double guess) {
 
 // Bending about both axes twice, torsion, and along the axis: free vibration of a bar that is thrown.
 TEST(Dynamics, LinearBar_VibratesWithTheFrequenciesOfItsLumpedMass) {
-  SKIP_WITHOUT_SHARED();
   std::vector<double> expected;  // rad2/s2
   for (const auto &row : test::read_csv(reference("tables/modal_p1_eigenvalues_rad2_s2.csv")))
     if (row[0] == "bar_s2" && row[1] == "cantilever" && row[2] == "lumped")

@@ -1,4 +1,4 @@
-// `deform friction` against the trajectories of ../shared/reference/friction: errors within three times those
+// `deform friction` against the trajectories of reference/friction: errors within three times those
 // that the set states for a first-order implicit step, or 2e-3 of a column's largest value at a step of 1e-4
 // s; stick-slip periods; half the step, half the error.
 #include <gtest/gtest.h>
@@ -71,11 +71,11 @@ const Case kCases[] = {
 };
 
 std::string text_of(const Case &c) {
-  return test::read_file(test::shared_dir() + "/reference/friction/" + c.id + ".json");
+  return test::read_file(test::reference_dir() + "/friction/" + c.id + ".json");
 }
-std::string file_of(const Case &c) { return test::shared_dir() + "/reference/friction/" + c.id + ".json"; }
+std::string file_of(const Case &c) { return test::reference_dir() + "/friction/" + c.id + ".json"; }
 Rows reference(const Case &c) {
-  return test::rig::read_rows(test::shared_dir() + "/reference/friction/" + c.id + ".csv");
+  return test::rig::read_rows(test::reference_dir() + "/friction/" + c.id + ".csv");
 }
 bool is(const Case &c, const char *part) { return std::string(c.id).find(part) != std::string::npos; }
 
@@ -121,12 +121,7 @@ std::map<std::string, ColumnError> errors(const Case &c, const Outcome &out, con
 Outcome run(const Case &c, const char *step) { return test::rig::run(file_of(c), {"--step", step}); }
 Outcome run(const Case &c, double step) { return run(c, std::to_string(step).c_str()); }
 
-class FrictionReference : public testing::TestWithParam<Case> {
- protected:
-  void SetUp() override {
-    if (test::shared_dir().empty()) GTEST_SKIP() << "../shared is absent";
-  }
-};
+class FrictionReference : public testing::TestWithParam<Case> {};
 
 }  // namespace
 
@@ -177,7 +172,6 @@ INSTANTIATE_TEST_SUITE_P(Cases, FrictionReference, testing::ValuesIn(kCases),
                          [](const auto &each) { return std::string(each.param.id); });
 
 TEST(FrictionReferenceStickSlip, Periods_AreRightToATenthOfAPercent) {
-  if (test::shared_dir().empty()) GTEST_SKIP() << "../shared is absent";
   for (const char *id : {"stickslip_coulomb_plain", "stickslip_coulomb", "stickslip_karnopp",
                          "stickslip_dahl", "stickslip_lugre", "stickslip_ep"}) {
     const Case c{id};
@@ -194,7 +188,6 @@ TEST(FrictionReferenceStickSlip, Periods_AreRightToATenthOfAPercent) {
 }
 
 TEST(FrictionReferencePath, ClosedForms_OfEveryLawWithBristles) {
-  if (test::shared_dir().empty()) GTEST_SKIP() << "../shared is absent";
   const Case c{"presliding"};
   const Rows ref = reference(c);
   const struct {
@@ -217,7 +210,6 @@ TEST(FrictionReferencePath, ClosedForms_OfEveryLawWithBristles) {
 
 // The exact work of each half cycle of a prescribed motion.
 TEST(FrictionReferenceWork, HalfCycles_MatchTheStatedWork) {
-  if (test::shared_dir().empty()) GTEST_SKIP() << "../shared is absent";
   for (const char *id :
        {"sinvel_V1_dahl", "sinvel_V1_lugre", "sinvel_V1_ep", "sinvel_V2_lugre", "sinvel_V2_ep"}) {
     const Case c{id};
@@ -236,7 +228,6 @@ TEST(FrictionReferenceWork, HalfCycles_MatchTheStatedWork) {
 
 // What cannot be run says so: the other forms of a varying load, tables, laws that we do not ship.
 TEST(FrictionReferenceRefused, CasesThatAreNotRuns_Exit2) {
-  if (test::shared_dir().empty()) GTEST_SKIP() << "../shared is absent";
   const struct {
     const char *id, *word;
   } cases[] = {{"normal_load_lugre_scaled", "projection"},

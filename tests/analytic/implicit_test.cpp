@@ -1,6 +1,6 @@
 // Bodies that move by backward Euler, and their contact by the same matrix: rest, order, energy, momentum,
 // friction. Those of TR-BDF2, which takes backward Euler where bodies touch. Sources:
-// doc/concepts/implicit.md; ../shared/reference/contact (incline_block).
+// doc/concepts/implicit.md; reference/contact (incline_block).
 #include "stack.h"
 
 namespace {

@@ -1,5 +1,5 @@
 // A stiff soft block on a plane under tilted gravity. Rigid-limit answers: frictionless g sin(theta), sliding
-// g (sin - mu cos), holds while tan(theta) <= mu. Source: ../shared/reference/contact (incline_block);
+// g (sin - mu cos), holds while tan(theta) <= mu. Source: reference/contact (incline_block);
 // verification F1, F9.
 #include "world.h"
 

@@ -1,6 +1,6 @@
 // Equilibrium with contact and Coulomb friction (dfm_world_equilibrium): closed forms, the limit of a slope,
 // balance, the order of loads, what finds no rest. Sources: doc/concepts/static.md;
-// ../shared/reference/contact (incline_block, box_stack, squeezed_ball_fe).
+// reference/contact (incline_block, box_stack, squeezed_ball_fe).
 #include "stack.h"
 
 #include "cells.h"
@@ -392,10 +392,8 @@ TEST(StaticContact, SphereInAHeldBlock_IsFoundOnAnyPath) {
 
 // Rows of squeezed_ball_fe, which are a converged linear solution with contact.
 TEST(StaticContact, BallBetweenPlates_TakesTheForceOfTheReference) {
-  if (test::shared_dir().empty()) GTEST_SKIP() << "../shared is absent";
   int rows = 0;
-  for (const auto &row :
-       test::read_csv(test::shared_dir() + "/reference/contact/tables/squeezed_ball_fe.csv")) {
+  for (const auto &row : test::read_csv(test::reference_dir() + "/contact/tables/squeezed_ball_fe.csv")) {
     if (row[0] != "sphere" || row[3] != "1" || row[2] != "0.04") continue;
     ++rows;
     const double nu = std::stod(row[1]), depth = 0.04, young = 1e5, offset = 2e-5;

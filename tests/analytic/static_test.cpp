@@ -1,4 +1,4 @@
-// Equilibria against ../shared/reference/elasticity: nodal fields of linear and corotational tetrahedra,
+// Equilibria against reference/elasticity: nodal fields of linear and corotational tetrahedra,
 // values of the benchmarks, patch tests, orders of convergence, locking.
 #include <algorithm>
 #include <cstdlib>
@@ -19,7 +19,6 @@ struct Field {
 };
 
 TEST(Static, LinearFieldsOfTheReferenceSet_AreReachedTo1em8) {
-  SKIP_WITHOUT_SHARED();
   for (const Field &f : {Field{"lin_bar_s2_tip", "bars/bar_s2.msh", 1e5, 0.3},
                          {"lin_bar_s2_gravz", "bars/bar_s2.msh", 1e8, 0.3},
                          {"lin_bar_s3_tip", "bars/bar_s3.msh", 1e5, 0.3},
@@ -45,7 +44,6 @@ TEST(Static, LinearFieldsOfTheReferenceSet_AreReachedTo1em8) {
 
 // Strain energies of bench_p1.csv, on every mesh that has its loads in the set.
 TEST(Static, Benchmarks_HaveTheStrainEnergyOfTheirTable) {
-  SKIP_WITHOUT_SHARED();
   uint32_t seen = 0;
   for (const auto &row : test::read_csv(reference("tables/bench_p1.csv"))) {
     if (row.size() < 7 || row[5] != "strain_energy") continue;
@@ -61,7 +59,6 @@ TEST(Static, Benchmarks_HaveTheStrainEnergyOfTheirTable) {
 }
 
 TEST(Static, CorotationalFieldsOfTheReferenceSet_AreReachedTo1em6) {
-  SKIP_WITHOUT_SHARED();
   for (const Field &f : {Field{"cor_bar_s2_E5e+06", "bars/bar_s2.msh", 5e6, 0.3},
                          {"cor_bar_s2_E1.25e+06", "bars/bar_s2.msh", 1.25e6, 0.3},
                          {"cor_slender_E8e+07", "bars/slender.vtk", 8e7, 0.3},
@@ -147,15 +144,9 @@ void patch(const char *model, bool turned) {
   EXPECT_NE(picture.find("Name=\"von_mises\""), std::string::npos);
 }
 
-TEST(Static, PatchTest_IsPassedByLinearElasticity) {
-  SKIP_WITHOUT_SHARED();
-  patch("linear_fem", false);
-}
+TEST(Static, PatchTest_IsPassedByLinearElasticity) { patch("linear_fem", false); }
 
-TEST(Static, PatchTestTurned_IsPassedByCorotationalElasticity) {
-  SKIP_WITHOUT_SHARED();
-  patch("corotational_fem", true);
-}
+TEST(Static, PatchTestTurned_IsPassedByCorotationalElasticity) { patch("corotational_fem", true); }
 
 // Quarter of a thick cylinder under pressure inside, one layer between planes that do not move along z.
 struct Cylinder {
@@ -283,7 +274,6 @@ TEST(Static, ThickCylinder_ConvergesWithOrders2And1) {
 
 // Cook's membrane in plane strain at nu 0.4999: linear tetrahedra lock, far from the 19.43 of the corner.
 TEST(Static, CooksMembraneNearlyIncompressible_LocksAsThePageSays) {
-  SKIP_WITHOUT_SHARED();
   Statics s(mesh_path("bench/cook3d_2.msh"), "linear_fem", 1, 0.4999);
   s.apply(reference("fields/cook3d_2_bc.csv"));
   const std::vector<double> rest = s.rest();

@@ -109,9 +109,7 @@ TEST(CcdCommand, BadFiles_AreRefusedWithTheirLine) {
 }
 
 TEST(CcdCommand, ReferenceQueries_NoneMissedNoneLate) {
-  if (test::shared_dir().empty()) GTEST_SKIP() << "../shared is absent";
-  const test::CommandResult r =
-      test::deform({"ccd", test::shared_dir() + "/reference/ccd/queries.csv", "--json"});
+  const test::CommandResult r = test::deform({"ccd", test::reference_dir() + "/ccd/queries.csv", "--json"});
   ASSERT_EQ(r.exit_code, 0) << r.err;
   EXPECT_NE(r.out.find("\"missed\": 0"), std::string::npos) << r.out;
   EXPECT_NE(r.out.find("\"late\": 0"), std::string::npos) << r.out;

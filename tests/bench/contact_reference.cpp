@@ -1,4 +1,4 @@
-// Every row of the tables in ../shared/reference/contact that a soft body can be put to: the rigid limits
+// Every row of the tables in reference/contact that a soft body can be put to: the rigid limits
 // against the tables' tolerances, the elastic cases with the model's own error.
 // libdeform/doc/reference/contact_reference.md holds what it prints.
 //
@@ -18,7 +18,7 @@ using bench::percent;
 using bench::text;
 
 std::vector<std::vector<std::string>> table(const char *name) {
-  auto rows = test::read_csv(test::shared_dir() + "/reference/contact/tables/" + name + ".csv");
+  auto rows = test::read_csv(test::reference_dir() + "/contact/tables/" + name + ".csv");
   rows.erase(rows.begin());
   return rows;
 }
@@ -172,10 +172,6 @@ bool bench::put(const std::string &page, const std::string &name, const std::str
 }
 
 int main(int argc, char **argv) {
-  if (test::shared_dir().empty()) {
-    std::printf("../shared/reference is absent\n");
-    return 0;
-  }
   std::string half, page;
   for (int i = 1; i < argc; ++i) {
     if (std::string(argv[i]) == "--write" && i + 1 < argc) page = argv[++i];

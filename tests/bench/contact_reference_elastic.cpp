@@ -11,7 +11,7 @@ namespace el = test::elastic;
 constexpr double kG = 9.81;
 
 std::vector<std::vector<std::string>> table(const char *name) {
-  auto rows = test::read_csv(test::shared_dir() + "/reference/contact/tables/" + name + ".csv");
+  auto rows = test::read_csv(test::reference_dir() + "/contact/tables/" + name + ".csv");
   rows.erase(rows.begin());
   return rows;
 }

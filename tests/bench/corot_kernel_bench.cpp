@@ -60,7 +60,7 @@ double time_plain(const Mesh &mesh, corot_bound::Kernel kernel) {
 
 int main(int argc, char **argv) {
   bench::Csv table(argc, argv, "mesh,points,cells,isa,pass,ns_per_cell,bytes_per_cell");
-  std::string path = test::shared_dir() + "/meshes/thesis/cyl_fine.msh";
+  std::string path = test::mesh_dir() + "/thesis/cyl_fine.msh";
   for (int n = 1; n + 1 < argc; n += 2)
     if (!std::strcmp(argv[n], "--mesh")) path = argv[n + 1];
   const Mesh mesh = read_msh(path);

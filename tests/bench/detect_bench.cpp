@@ -1,6 +1,5 @@
-// Detection of two crossed fine cylinders (../shared/meshes/thesis/cyl_fine.msh, or one of our own of that
-// size where it is absent), pressed flat against each other: at rest, and with the upper one rolling at 50
-// mm/s. Step 0.25 ms; time per step, one core.
+// Detection of two crossed fine cylinders (meshes/thesis/cyl_fine.msh), pressed flat against each other: at
+// rest, and with the upper one rolling at 50 mm/s. Step 0.25 ms; time per step, one core.
 #include <benchmark/benchmark.h>
 
 #include <chrono>
@@ -23,11 +22,7 @@ constexpr double kStep = 0.25e-3, kRadius = 0.02, kSqueeze = 0.4e-3;
 
 // Axis along y through the origin, radius kRadius.
 test::Mesh fine_cylinder() {
-  const std::string shared = test::shared_dir();
-  const std::string path = shared + "/meshes/thesis/cyl_fine.msh";
-  const bool have = !shared.empty() && std::filesystem::exists(path);
-  const TetMesh tets =
-      have ? read_tet_mesh(Memory::standard(), path) : make_cylinder(Memory::standard(), 0.02, 0.16, 4);
+  const TetMesh tets = read_tet_mesh(Memory::standard(), test::mesh_dir() + "/thesis/cyl_fine.msh");
   const Array<uint32_t> tri = boundary_triangles(tets.tets);
   test::Mesh m;
   m.x.assign(tets.points.begin(), tets.points.end());

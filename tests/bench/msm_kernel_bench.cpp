@@ -319,7 +319,7 @@ void print(const Reporter &r, const std::string &csv, const std::string &commit,
 int main(int argc, char **argv) {
   std::string csv;
   std::string commit = "unknown";
-  std::string path = test::shared_dir() + "/meshes/thesis/cyl_fine.msh";
+  std::string path = test::mesh_dir() + "/thesis/cyl_fine.msh";
   std::string name = "cyl_fine.msh";
   std::string only;
   for (int n = 1; n + 1 < argc; n += 2) {
@@ -332,12 +332,7 @@ int main(int argc, char **argv) {
       name = path.substr(path.rfind('/') + 1);
     }
   }
-  if (std::ifstream(path).good()) {
-    mesh() = read_msh(path);
-  } else {
-    mesh() = kuhn_bar(25, 10, 10, 0.04, 0.2);
-    name = "bar 25x10x10";
-  }
+  mesh() = read_msh(path);
 
   const bound::Kernels *tables[] = {bound::kernels_sse2(), bound::kernels_avx2(), bound::kernels_avx512()};
   const bool able[] = {true, bool(__builtin_cpu_supports("avx2")),

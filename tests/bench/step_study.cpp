@@ -31,8 +31,8 @@ std::vector<Case> cases() {
   for (const char *name : {"rabbit", "organ"})
     meshes.push_back({100000, std::string(DEFORM_SOURCE_DIR "/examples/data/") + name + ".obj"});
   for (const char *name : kThesis) {
-    const std::string path = test::shared_dir() + "/meshes/thesis/" + name + ".msh";
-    if (std::filesystem::exists(path)) meshes.push_back({std::filesystem::file_size(path), path});
+    const std::string path = test::mesh_dir() + "/thesis/" + name + ".msh";
+    meshes.push_back({std::filesystem::file_size(path), path});
   }
   std::sort(meshes.begin(), meshes.end());
   std::vector<Case> out;

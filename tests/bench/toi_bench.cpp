@@ -1,8 +1,8 @@
 // The finders of the time of impact against each other and against the scheme of Zerbato 2010 (4.2):
 // evaluations, time, what they miss, what they find late.
-// 1. Queries: ours through the C API on the exact reference queries, the published ones (both from ../shared)
-//    and random ones; beside them the scheme of Zerbato 2010, 4.2: one bracket [0,1], a change of sign of the
-//    distance, an inside test at the one root.
+// 1. Queries: ours through the C API on the exact reference queries and random ones; beside them the scheme
+//    of Zerbato 2010, 4.2: one bracket [0,1], a change of sign of the distance, an inside test at the root.
+//    --published FOLDER adds the samples of Tight Inclusion (optional: they are not in the repository).
 // 2. Roots: values of the function per root to 1e-12, for (4.7) as printed, for the distance to the plane and
 //    for the cubic.
 // 3. Guard: the whole list of feature pairs of two fine spheres that roll on each other and of two that
@@ -27,6 +27,38 @@ using namespace test;
 constexpr int kRepetitions = 15;
 
 using Sink = bench::Csv;
+
+// The published queries, in a folder with a table of their exact answers. Numerators and denominators are
+// exact as doubles, and so is their quotient.
+std::vector<ToiQuery> published_queries(const std::string &folder) {
+  std::vector<ToiQuery> out;
+  std::string open;
+  std::vector<std::vector<std::string>> rows;
+  const auto number = [](const std::string &s) { return std::strtod(s.c_str(), nullptr); };
+  for (const std::vector<std::string> &label : read_csv(folder + "/exact_labels.csv")) {
+    if (label[0] == "file") continue;
+    if (label[0] != open) {
+      open = label[0];
+      rows = read_csv(folder + "/" + open);
+    }
+    ToiQuery q;
+    q.id = label[0] + ":" + label[1];
+    q.edges = label[2] == "ee";
+    q.hit = label[4] == "1";
+    q.multiplicity = 1;
+    q.toi = q.hit ? number(label[5]) : 0;
+    q.latest = std::nextafter(q.toi, 2.0);
+    const size_t first = 8 * size_t(std::atoi(label[1].c_str()));
+    for (size_t r = 0; r < 8; ++r)
+      for (size_t i = 0; i < 3; ++i)
+        (r < 4 ? q.m[r].p0 : q.m[r - 4].p1)[i] =
+            number(rows[first + r][2 * i]) / number(rows[first + r][2 * i + 1]);
+    for (int k = 1; k < 4; ++k)
+      for (int i = 0; i < 3; ++i) q.extent = std::max(q.extent, std::fabs(q.m[k].p0[i] - q.m[0].p0[i]));
+    out.push_back(q);
+  }
+  return out;
+}
 
 // ---- the functions of Zerbato 2010 ------------------------------------------------------------------------
 
@@ -266,11 +298,10 @@ int main(int argc, char **argv) {
             "set,finder,queries,hits,evaluations,evaluations_max,ns_per_query,missed,false,late,late_by_max");
   std::printf("%-10s %-14s %6s %6s %9s %6s %6s %7s %6s %5s %9s\n", "set", "finder", "number", "hits",
               "values", "most", "ns", "missed", "false", "late", "by");
-  const bool shared = !ccd_folder().empty();
-  if (shared) {
-    queries(sink, "reference", reference_queries(), true);
-    queries(sink, "published", external_queries(), true);
-  }
+  queries(sink, "reference", reference_queries(), true);
+  for (int n = 1; n + 1 < argc; ++n)
+    if (!std::strcmp(argv[n], "--published"))
+      queries(sink, "published", published_queries(argv[n + 1]), true);
   queries(sink, "random", random_queries(), false);
   roots(sink);
   guard(sink);

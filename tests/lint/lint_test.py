@@ -38,6 +38,8 @@ GOOD = {
     "CMakeLists.txt": "# no -ffast-math here\nadd_compile_options(-ffp-contract=off -mno-fma)\n",
     ".ci/run": "#!/bin/sh\n",
     "examples/01_hello.c": HELLO,
+    "examples/scenes/ball.json": '{"format": "deform-scene", "bodies": [{"mesh": "../data/ball.msh"}]}\n',
+    "examples/data/ball.msh": "ball\n",
     "libdeform/include/deform/base.h": HEADER,
     "libdeform/include/deform/deform.h": '#ifndef DEFORM_DEFORM_H\n#define DEFORM_DEFORM_H\n'
                                          '#include "deform/base.h"\n#endif\n',
@@ -110,7 +112,10 @@ BAD = {
         "}\n#define TRY(call) \\\n  if ((call) < 0) return puts(said()), 1\n{")],
     "paths": [("README.md", "see /home/me/deform\n"), ("CMakeLists.txt", "set(X /root/x)\n"),
               ("README.md", "../.lib" + "rary/a\n"),
-              ("examples/01_hello.c", '// "/wo' + 'rk/main"\n')],
+              ("examples/01_hello.c", '// "/wo' + 'rk/main"\n'), ("README.md", "../sha" + "red/meshes\n")],
+    "scenes": [("examples/scenes/ball.json",
+                '={"format": "deform-scene", "bodies": [{"mesh": "%s"}]}\n' % mesh)
+               for mesh in ("../data/gone.msh", "../../../ball.stl", "/ball.msh")],
     "readme": [("examples/01_hello.c", "// more\n"), ("README.md", "=# Title\n"),
                ("examples/01_hello.c", "\n" * 60)],
     "guides": [("libdeform/doc/howto/engine.md", "```c\nint z;\n```\n"),

@@ -1,5 +1,6 @@
 """Rules about the tree: where things lie, what a text file looks like, what never stands in one."""
 import json
+import posixpath
 import re
 
 from tree import CODE, line_of, without_comments
@@ -66,14 +67,26 @@ def text(tree):
 
 
 def paths(tree):
-    """Nothing names a place on somebody's machine."""
-    machine = re.compile(r"(?<![\w./])/(home|root|work|Users|mnt)/|(?<=/)\.lib" r"rary\b|[A-Z]:\\\\")
+    """Nothing names a place on somebody's machine, nor the folder that lies beside some checkouts."""
+    machine = re.compile(r"(?<![\w./])/(home|root|work|Users|mnt)/|(?<=/)\.lib" r"rary\b|[A-Z]:\\\\|"
+                         r"\.\./shared\b")
     for path in tree.paths:
         content = tree.text(path)
         if content is None or path.startswith("tests/lint/"):
             continue
         for match in machine.finditer(content):
             yield path, line_of(content, match.start()), f"names a place on one machine: {match.group(0)}"
+
+
+def scenes(tree):
+    """A shipped scene stands on files of the repository alone."""
+    file = re.compile(r'"([^"\n]+\.(?:msh|mesh|obj|off|ply|stl|vtk|vtu|vtp|csv))"')
+    for path in tree.select("examples/", "bindings/", ext=(".json",)):
+        content = tree.text(path)
+        for match in file.finditer(content) if '"deform-scene"' in content else ():
+            if posixpath.normpath(posixpath.join(posixpath.dirname(path), match.group(1))) not in tree.paths:
+                yield (path, line_of(content, match.start()),
+                       f"names {match.group(1)}, which is not in the repository; ship it, or make it")
 
 
 def readme(tree):
@@ -145,5 +158,5 @@ def presets(tree):
                                        f"present name, or leave it out")
 
 
-RULES = {"layout": layout, "text": text, "paths": paths, "readme": readme, "guides": guides,
+RULES = {"layout": layout, "text": text, "paths": paths, "scenes": scenes, "readme": readme, "guides": guides,
          "presets": presets}

@@ -59,18 +59,11 @@ struct Table {
   size_t size() const { return rows.size(); }  // row 0 holds the names
 };
 
-// False where ../shared is absent: the caller skips.
-inline bool read(const std::string &file, Table &table) {
-  const std::string dir = test::shared_dir();
-  if (dir.empty()) return false;
-  table.rows = test::read_csv(dir + "/reference/friction/" + file);
+// A table of reference/friction.
+inline Table read(const std::string &file) {
+  Table table{test::read_csv(test::reference_dir() + "/friction/" + file)};
   EXPECT_GT(table.size(), 2u) << file;
-  return true;
+  return table;
 }
-
-#define READ_OR_SKIP(table, file) \
-  rig::Table table;               \
-  if (!rig::read(file, table))    \
-  GTEST_SKIP() << "no ../shared beside the repository; the closed forms of this file cover the law"
 
 }  // namespace rig

@@ -16,16 +16,14 @@ void settle(Stepper &b) {
 // Nodes of the rows of the reference's surface.
 std::vector<uint32_t> reference_surface() {
   std::vector<uint32_t> out;
-  const auto nodes =
-      test::read_csv(test::shared_dir() + "/reference/elasticity/tables/condensation_nodes.csv");
+  const auto nodes = test::read_csv(test::reference_dir() + "/elasticity/tables/condensation_nodes.csv");
   for (size_t r = 1; r < nodes.size(); ++r) out.push_back(uint32_t(std::stoul(nodes[r][1])));
   EXPECT_EQ(out.size(), 649u);
   return out;
 }
 
 TEST(Condensed, ClampedBarUnderUnevenLoads_HasTheFullSolution) {
-  if (test::shared_dir().empty()) GTEST_SKIP() << "the shared reference data are absent";
-  const Mesh m = read_msh(test::shared_dir() + "/meshes/bars/bar_s3.msh");
+  const Mesh m = read_msh(test::mesh_dir() + "/bars/bar_s3.msh");
   Host host;
   Stepper b(host, condensed(), m, {{"young", 1e5}, {"modes", 5}}, clamp_of(m));
   ASSERT_EQ(b.status, DFM_OK) << host.logged;
@@ -36,7 +34,7 @@ TEST(Condensed, ClampedBarUnderUnevenLoads_HasTheFullSolution) {
   b.pull({0, 0, -9.81});
   b.set(b.f, corner, b.get(b.f, corner) + Vec{0, 0.01, 0.02});
   settle(b);
-  const auto rows = test::read_csv(test::shared_dir() + "/reference/elasticity/fields/condensation_us.csv");
+  const auto rows = test::read_csv(test::reference_dir() + "/elasticity/fields/condensation_us.csv");
   const std::vector<uint32_t> surface = reference_surface();
   ASSERT_EQ(rows.size(), 650u);
   double worst = 0, most = 0;
@@ -54,8 +52,7 @@ TEST(Condensed, ClampedBarUnderUnevenLoads_HasTheFullSolution) {
 // K' = K_ss - K_si K_ii^-1 K_is is the inverse of the surface's response at rest: its least eigenvalue is one
 // over the largest of that (reference: 0.0169849).
 TEST(Condensed, ResponseOfTheSurface_HasTheEigenvalueOfTheSchurComplement) {
-  if (test::shared_dir().empty()) GTEST_SKIP() << "the shared reference data are absent";
-  const Mesh m = read_msh(test::shared_dir() + "/meshes/bars/bar_s3.msh");
+  const Mesh m = read_msh(test::mesh_dir() + "/bars/bar_s3.msh");
   Host host;
   Stepper b(host, condensed(), m, {{"young", 1e5}, {"modes", 5}}, clamp_of(m));
   ASSERT_EQ(b.status, DFM_OK) << host.logged;

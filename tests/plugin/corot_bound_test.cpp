@@ -59,13 +59,11 @@ TEST(CorotBound, RowSums_BoundTheTrueSpectrumInEveryShape) {
 
 // T3: table critical_time_step.csv, the linear critical step of Verlet, lumped masses.
 TEST(CorotBound, CriticalStep_IsNeitherExceededNorFarAway) {
-  if (test::shared_dir().empty()) GTEST_SKIP() << "no reference tables beside the repository";
-  const auto rows =
-      test::read_csv(test::shared_dir() + "/reference/elasticity/tables/critical_time_step.csv");
+  const auto rows = test::read_csv(test::reference_dir() + "/elasticity/tables/critical_time_step.csv");
   int seen = 0;
   for (size_t n = 1; n < rows.size(); ++n) {
     if (rows[n][1] != "lumped") continue;
-    const Mesh mesh = read_msh(test::shared_dir() + "/meshes/" + rows[n][0]);
+    const Mesh mesh = read_msh(test::mesh_dir() + "/" + rows[n][0]);
     if (mesh.ncell() > 16000) continue;
     const double limit = std::stod(rows[n][3]);
     Host host;

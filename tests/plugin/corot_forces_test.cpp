@@ -207,7 +207,6 @@ TEST(CorotForces, RenumberedPoints_GiveTheSameForces) {
 
 // P V of one cell by the textbook, from the reference's rotation.
 TEST(CorotForces, PatchUnderFiniteRotation_FollowsTheReference) {
-  if (test::shared_dir().empty()) GTEST_SKIP() << "no reference fields beside the repository";
   // Case patch_corotational of cases.json: x = R U X, the stress of the frame turned with it.
   const double r[3][3] = {{0.2332880370152467, -0.809761909396947, -0.5383886531822373},
                           {0.26270256283485277, 0.5855611010893226, -0.7668804081283211},
@@ -217,7 +216,7 @@ TEST(CorotForces, PatchUnderFiniteRotation_FollowsTheReference) {
   const double stress[3][3] = {{32.095469902687064, -8.313435165096466, -79.32838202436128},
                                {63.503627370088864, -16.256511353997457, -67.64700457705985},
                                {111.80357751454922, 23.065065569768162, 9.99127060942904}};
-  std::ifstream in(test::shared_dir() + "/meshes/bench/patch.vtk");
+  std::ifstream in(test::mesh_dir() + "/bench/patch.vtk");
   ASSERT_TRUE(in);
   Mesh mesh;
   std::string word;
@@ -274,9 +273,7 @@ TEST(CorotForces, PatchUnderFiniteRotation_FollowsTheReference) {
 }
 
 TEST(CorotForces, UniaxialStretch_MatchesTheClosedForm) {
-  if (test::shared_dir().empty()) GTEST_SKIP() << "no reference tables beside the repository";
-  const auto rows =
-      test::read_csv(test::shared_dir() + "/reference/elasticity/tables/uniaxial_corotational.csv");
+  const auto rows = test::read_csv(test::reference_dir() + "/elasticity/tables/uniaxial_corotational.csv");
   ASSERT_GT(rows.size(), 10u);
   for (size_t n = 1; n < rows.size(); ++n) {
     const double nu = std::stod(rows[n][0]), stretch = std::stod(rows[n][1]), lateral = std::stod(rows[n][2]);
@@ -496,8 +493,7 @@ TEST(CorotForces, CellFlatAtRest_GivesNoForce) {
 
 // Free body: bar_s1 at 1000 rpm. T5, table dyn_corot_spin (DOP853, rtol 1e-11).
 TEST(CorotForces, SpinningBar_KeepsItsMomentumAndFollowsTheReference) {
-  if (test::shared_dir().empty()) GTEST_SKIP() << "no reference tables beside the repository";
-  const Mesh mesh = read_msh(test::shared_dir() + "/meshes/bars/bar_s1.msh");
+  const Mesh mesh = read_msh(test::mesh_dir() + "/bars/bar_s1.msh");
   Host host;
   Instance b(host, mesh, {{"young", {5e7}}, {"poisson", {0.3}}});
   double total = 0;
@@ -518,7 +514,7 @@ TEST(CorotForces, SpinningBar_KeepsItsMomentumAndFollowsTheReference) {
   EXPECT_NEAR(before[2], 91.62979, 1e-4);
   const double h = 2e-6;
   EXPECT_GT(b.bound(), h);
-  const auto rows = test::read_csv(test::shared_dir() + "/reference/elasticity/tables/dyn_corot_spin.csv");
+  const auto rows = test::read_csv(test::reference_dir() + "/elasticity/tables/dyn_corot_spin.csv");
   double time = 0;
   // leapfrog: velocities half a step behind, so that energies at the rows are of second order
   b.forces();

@@ -15,7 +15,7 @@ struct Case {
 
 std::vector<Case> cases() {
   std::vector<Case> all;
-  const std::string path = test::shared_dir() + "/reference/elasticity/tables/polar_cases.csv";
+  const std::string path = test::reference_dir() + "/elasticity/tables/polar_cases.csv";
   const auto rows = test::read_csv(path);
   for (size_t n = 1; n < rows.size(); ++n) {
     Case c;
@@ -53,7 +53,6 @@ void expect_proper(const double *r, const std::string &what) {
 }
 
 TEST(Polar, ReferenceMatrices_MeetTheirNearestRotation) {
-  if (test::shared_dir().empty()) GTEST_SKIP() << "no reference tables beside the repository";
   const std::vector<Case> all = cases();
   ASSERT_EQ(all.size(), 330u);
   for (const Rotation rotation : {model::rotation::polar_of, model::rotation::nearest})
@@ -68,7 +67,6 @@ TEST(Polar, ReferenceMatrices_MeetTheirNearestRotation) {
 
 // What doc/models/corotational_fem.md says of the other two.
 TEST(Polar, OtherRotations_AreProperAndStandOffAsDocumented) {
-  if (test::shared_dir().empty()) GTEST_SKIP() << "no reference tables beside the repository";
   double by_values = 0, by_columns = 0;
   for (const Case &c : cases()) {
     double r[9];

@@ -404,7 +404,7 @@ TEST_F(Coulomb, None_IsZeroEverywhere) {
   EXPECT_EQ(dfm_law_eval(none, &b.in, &b.out), DFM_DISCARD);
 }
 
-// ---- reference histories, where they lie beside the repository --------------------------------------------
+// ---- reference histories ----------------------------------------------------------------------------------
 
 int column_of(const std::vector<std::string> &header, const std::string &name) {
   for (size_t i = 0; i < header.size(); ++i)
@@ -415,10 +415,7 @@ int column_of(const std::vector<std::string> &header, const std::string &name) {
 struct Reference : Coulomb {
   const Parameters dev{0.15, 0.20, 0.01, 2, 0.4};  // F_C 1.47 N, F_S 1.96 N at 9.8 N
   void compare(const std::string &file, const std::string &force) {
-    const std::string dir = test::shared_dir();
-    if (dir.empty())
-      GTEST_SKIP() << "no ../shared beside the repository; the closed forms above cover the law";
-    const auto rows = test::read_csv(dir + "/reference/friction/" + file);
+    const auto rows = test::read_csv(test::reference_dir() + "/friction/" + file);
     ASSERT_GT(rows.size(), 10u);
     const int v = column_of(rows[0], "v"), f = column_of(rows[0], force);
     ASSERT_TRUE(v >= 0 && f >= 0);

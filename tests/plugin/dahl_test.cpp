@@ -166,7 +166,7 @@ TEST_F(Dahl, HeldStill_KeepsItsBristleToTheBit) {
 }
 
 TEST_F(Dahl, SteadyCurve_MatchesTheReference) {
-  READ_OR_SKIP(t, "curves_steady.csv");
+  const rig::Table t = rig::read("curves_steady.csv");
   for (size_t i = 1; i < t.size(); ++i) {
     const double v = t.at(i, "v");
     if (v == 0) continue;
@@ -177,7 +177,7 @@ TEST_F(Dahl, SteadyCurve_MatchesTheReference) {
 }
 
 TEST_F(Dahl, PreslidingLoops_MatchTheReference) {
-  READ_OR_SKIP(t, "presliding.csv");
+  const rig::Table t = rig::read("presliding.csv");
   for (int a : {1, 2}) {
     Contact k({law.ops, {0.15, 1e4, double(a)}, 2, {0}, {}, false}, 9.8);
     double worst = 0;

@@ -257,7 +257,7 @@ TEST_F(Elastoplastic, FallingNormalForce_CutsTheBristleFirst) {
 // The yield share alpha out of one small step at a held speed: m = w - g dz/dt /(K0 z), as the file's table
 // gives it for both directions of motion.
 TEST_F(Elastoplastic, AlphaMap_MatchesTheReference) {
-  READ_OR_SKIP(t, "curves_alpha.csv");
+  const rig::Table t = rig::read("curves_alpha.csv");
   int compared = 0;
   for (size_t i = 1; i < t.size(); ++i) {
     const double z = t.at(i, "z"), speed = t.at(i, "speed"), level = 1e4 * t.at(i, "z_max");
@@ -280,7 +280,7 @@ TEST_F(Elastoplastic, AlphaMap_MatchesTheReference) {
 }
 
 TEST_F(Elastoplastic, SteadyCurve_MatchesTheReference) {
-  READ_OR_SKIP(t, "curves_steady.csv");
+  const rig::Table t = rig::read("curves_steady.csv");
   for (size_t i = 1; i < t.size(); ++i) {
     const double v = t.at(i, "v");
     if (v == 0) continue;
@@ -292,7 +292,8 @@ TEST_F(Elastoplastic, SteadyCurve_MatchesTheReference) {
 
 TEST_F(Elastoplastic, TurnOfTheSlip_ConvergesToBothReferences) {
   for (const Law &l : {constant, cosine}) {
-    READ_OR_SKIP(t, l.params[11] > 0 ? "vector_turn_ep_cosine.csv" : "vector_turn_ep_associated.csv");
+    const rig::Table t =
+        rig::read(l.params[11] > 0 ? "vector_turn_ep_cosine.csv" : "vector_turn_ep_associated.csv");
     double before = 0;
     for (int parts : {20, 40}) {
       Contact k(l, 9.8);
@@ -317,7 +318,7 @@ TEST_F(Elastoplastic, TurnOfTheSlip_ConvergesToBothReferences) {
 }
 
 TEST_F(Elastoplastic, PreslidingLoops_MatchTheReference) {
-  READ_OR_SKIP(t, "presliding.csv");
+  const rig::Table t = rig::read("presliding.csv");
   Contact k(make({0.15, 0.20, 0.01, 2, 1e4, 0, 0, 0.01, 0, 0.7, 1, 0}), 9.8);
   double worst = 0;
   for (size_t i = 2; i < t.size(); ++i) {

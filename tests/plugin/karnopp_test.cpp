@@ -214,9 +214,7 @@ TEST_F(Karnopp, StickSlipPeriod_IsThatOfTheReference) {
 
 // Mass on a plane driven by bias and sine; the whole history against the event-driven reference.
 TEST_F(Karnopp, GrossSlidingRig_FollowsTheReference) {
-  const std::string dir = test::shared_dir();
-  if (dir.empty()) GTEST_SKIP() << "no ../shared beside the repository; the closed forms above cover the law";
-  const auto rows = test::read_csv(dir + "/reference/friction/rig_gross_karnopp.csv");
+  const auto rows = test::read_csv(test::reference_dir() + "/friction/rig_gross_karnopp.csv");
   ASSERT_EQ(rows[0][1], "x");
   const double fn = 9.8, h = 1e-5;
   const std::vector<double> p{0.15, 0.2, 0.01, 2, 0.4, 1e-3};

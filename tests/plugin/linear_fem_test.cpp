@@ -282,7 +282,6 @@ struct Critical {
 };
 
 TEST(LinearFem, StepBound_IsBelowTheReferenceSetsLargestStep) {
-  if (test::shared_dir().empty()) GTEST_SKIP() << "the shared meshes are absent";
   for (const Critical &c : {Critical{"bars/bar_s2.msh", 0.00285539734971},
                             {"bars/bar_u2.msh", 0.00166214397915},
                             {"thesis/cyl_222.msh", 0.000488981107545},
@@ -290,7 +289,7 @@ TEST(LinearFem, StepBound_IsBelowTheReferenceSetsLargestStep) {
                             {"thesis/cyl_fine.msh", 9.4817391929e-05},
                             {"spheres/sphere_3.msh", 0.000577241445708}}) {
     Host host;
-    Linear b(host, read_msh(test::shared_dir() + "/meshes/" + c.mesh), material(1e5, 0.3));
+    Linear b(host, read_msh(test::mesh_dir() + "/" + c.mesh), material(1e5, 0.3));
     const double ratio = b.bound() / c.step;
     EXPECT_LE(ratio, 1) << c.mesh;
     EXPECT_GE(ratio, 0.55) << c.mesh;

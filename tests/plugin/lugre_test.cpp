@@ -236,7 +236,7 @@ TEST_F(Lugre, FasterChangeOfSpeed_LagsMore) {
 }
 
 TEST_F(Lugre, SteadyCurve_MatchesTheReference) {
-  READ_OR_SKIP(t, "curves_steady.csv");
+  const rig::Table t = rig::read("curves_steady.csv");
   for (size_t i = 1; i < t.size(); ++i) {
     const double v = t.at(i, "v");
     if (v == 0) continue;
@@ -251,7 +251,7 @@ TEST_F(Lugre, SteadyCurve_MatchesTheReference) {
 // halves with it.
 TEST_F(Lugre, CircleAndTurn_ConvergeToTheReference) {
   for (const char *file : {"vector_circle_lugre.csv", "vector_turn_lugre.csv"}) {
-    READ_OR_SKIP(t, file);
+    const rig::Table t = rig::read(file);
     const bool circle = std::string(file).find("circle") != std::string::npos;
     double before = 0;
     for (int parts : {20, 40}) {
@@ -278,7 +278,7 @@ TEST_F(Lugre, CircleAndTurn_ConvergeToTheReference) {
 }
 
 TEST_F(Lugre, VaryingNormalForce_MatchesTheProjectedReference) {
-  READ_OR_SKIP(t, "normal_load_lugre_projected.csv");
+  const rig::Table t = rig::read("normal_load_lugre_projected.csv");
   double before = 0;
   for (int parts : {50, 100}) {
     Contact k(make({0.15, 0.20, 0.01, 2, 1e4, 0, 0, 0.01, 0}), 9.8);
@@ -301,7 +301,7 @@ TEST_F(Lugre, VaryingNormalForce_MatchesTheProjectedReference) {
 }
 
 TEST_F(Lugre, PreslidingLoops_MatchTheReference) {
-  READ_OR_SKIP(t, "presliding.csv");
+  const rig::Table t = rig::read("presliding.csv");
   Contact k(make({0.15, 0.20, 0.01, 2, 1e4, 0, 0, 0.01, 0}), 9.8);
   double worst = 0;
   for (size_t i = 2; i < t.size(); ++i) {

@@ -49,7 +49,7 @@ Dense negative(Dense m) {
 
 std::vector<std::vector<double>> rows_of(const std::string &file) {
   std::vector<std::vector<double>> out;
-  std::ifstream in(test::shared_dir() + "/reference/elasticity/" + file);
+  std::ifstream in(test::reference_dir() + "/elasticity/" + file);
   std::string line, field;
   std::getline(in, line);
   while (std::getline(in, line)) {
@@ -63,8 +63,7 @@ std::vector<std::vector<double>> rows_of(const std::string &file) {
 // The reference set takes F^T F - 1 for the strain: energy and forces are four times those of (F^T F - 1)/2.
 // Its points have one volume and a support of 3 mean distances.
 TEST(Meshless, ReferenceField_HasItsEnergyAndForces) {
-  if (test::shared_dir().empty()) GTEST_SKIP() << "the shared reference tables are absent";
-  Mesh mesh = read_msh(test::shared_dir() + "/meshes/thesis/cyl_222.msh");
+  Mesh mesh = read_msh(test::mesh_dir() + "/thesis/cyl_222.msh");
   mesh.mass.assign(mesh.npoint(), 1e-3);
   EXPECT_NEAR(volume_of(mesh) / 0.00019425767555, 1, 1e-10);
   Given g;

@@ -7,12 +7,7 @@ using namespace stepper_test;
 
 const dfm_type &modal() { return type_of("model_reduced"); }
 
-Mesh shared_mesh(const std::string &name) {
-  return read_msh(test::shared_dir() + "/meshes/" + name + ".msh");
-}
-
-#define SKIP_WITHOUT_SHARED() \
-  if (test::shared_dir().empty()) GTEST_SKIP() << "the shared reference data are absent"
+Mesh mesh_of(const std::string &name) { return read_msh(test::mesh_dir() + "/" + name + ".msh"); }
 
 const double kTurn = 2 * std::acos(-1.0);
 
@@ -26,7 +21,7 @@ std::vector<double> modes_of(const Mesh &m, const Params &p, const std::vector<u
 // Rows mesh, bc, mass, then eigenvalues, of the same elements and lumped masses.
 std::vector<double> reference_eigenvalues(const std::string &mesh, const std::string &bc) {
   for (const auto &row :
-       test::read_csv(test::shared_dir() + "/reference/elasticity/tables/modal_p1_eigenvalues_rad2_s2.csv"))
+       test::read_csv(test::reference_dir() + "/elasticity/tables/modal_p1_eigenvalues_rad2_s2.csv"))
     if (row[0] == mesh && row[1] == bc && row[2] == "lumped") {
       std::vector<double> out;
       for (size_t k = 3; k < row.size(); ++k) out.push_back(std::strtod(row[k].c_str(), nullptr));
@@ -37,11 +32,10 @@ std::vector<double> reference_eigenvalues(const std::string &mesh, const std::st
 }
 
 TEST(Modal, FrequenciesOfBarsAndSpheres_AreThoseOfTheSameElements) {
-  SKIP_WITHOUT_SHARED();
   const std::pair<const char *, const char *> meshes[] = {
       {"bars/bar_s2", "bar_s2"}, {"bars/bar_u3", "bar_u3"}, {"spheres/sphere_3", "sphere_3"}};
   for (const auto &[path, name] : meshes) {
-    const Mesh m = shared_mesh(path);
+    const Mesh m = mesh_of(path);
     for (const bool held : {false, true}) {
       if (held && name[0] == 's') continue;
       const std::vector<double> wanted = reference_eigenvalues(name, held ? "cantilever" : "free");
@@ -56,9 +50,7 @@ TEST(Modal, FrequenciesOfBarsAndSpheres_AreThoseOfTheSameElements) {
 
 // Lamb 1881: five torsional modes k_s a = 2.5011, five spheroidal 2.6462; lumped masses give less.
 TEST(Modal, FrequenciesOfAFreeSphere_KeepTheirMultiplicity) {
-  SKIP_WITHOUT_SHARED();
-  const std::vector<double> hertz =
-      modes_of(shared_mesh("spheres/sphere_4"), {{"young", 1e7}, {"modes", 14}});
+  const std::vector<double> hertz = modes_of(mesh_of("spheres/sphere_4"), {{"young", 1e7}, {"modes", 14}});
   ASSERT_EQ(hertz.size(), 14u);
   EXPECT_LT(hertz[4] / hertz[0], 1.005);
   EXPECT_LT(hertz[9] / hertz[5], 1.005);
@@ -69,8 +61,7 @@ TEST(Modal, FrequenciesOfAFreeSphere_KeepTheirMultiplicity) {
 }
 
 TEST(Modal, FrequenciesOfAFineBar_AreNearTheContinuum) {
-  SKIP_WITHOUT_SHARED();
-  const Mesh m = shared_mesh("bars/bar_u3");
+  const Mesh m = mesh_of("bars/bar_u3");
   const double held[] = {1.611, 1.611, 9.662, 9.662, 14.27}, free[] = {9.934, 9.934, 25.88, 25.88, 28.49};
   const std::vector<double> cantilever = modes_of(m, {{"young", 1e7}, {"modes", 8}}, clamp_of(m));
   const std::vector<double> loose = modes_of(m, {{"young", 1e7}, {"modes", 8}});
@@ -99,9 +90,8 @@ TEST(Modal, DoubleModesOfACube_AreBothFound) {
 // With all modes the step is exact: the clamped bar under sudden gravity (exact modal sum), at 0.05 s each,
 // five periods of the fastest mode.
 TEST(Modal, AllModesOfAClampedBar_EqualTheExactMotion) {
-  SKIP_WITHOUT_SHARED();
-  const Mesh m = shared_mesh("bars/bar_s2");
-  const auto table = test::read_csv(test::shared_dir() + "/reference/elasticity/tables/dyn_linear_step.csv");
+  const Mesh m = mesh_of("bars/bar_s2");
+  const auto table = test::read_csv(test::reference_dir() + "/elasticity/tables/dyn_linear_step.csv");
   for (const int run : {0, 1}) {
     double alpha = 0, beta = 0, worst = 0;
     for (const auto &row : table)
@@ -117,7 +107,7 @@ TEST(Modal, AllModesOfAClampedBar_EqualTheExactMotion) {
     b.dt = 4e-3;
     b.pull({0, 0, -0.2});
     for (int n = 0; n < 500; ++n) b.step();
-    const auto rows = test::read_csv(test::shared_dir() + "/reference/elasticity/fields/dyn_linear_damp" +
+    const auto rows = test::read_csv(test::reference_dir() + "/elasticity/fields/dyn_linear_damp" +
                                      std::to_string(run) + "_t2.csv");
     double most = 0;
     for (size_t r = 1; r < rows.size(); ++r) {

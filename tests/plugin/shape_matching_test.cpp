@@ -60,7 +60,7 @@ struct Cloud {
 };
 std::vector<Cloud> reference_clouds() {
   std::vector<Cloud> out;
-  std::ifstream in(test::shared_dir() + "/reference/elasticity/tables/shape_matching.csv");
+  std::ifstream in(test::reference_dir() + "/elasticity/tables/shape_matching.csv");
   std::string line;
   std::getline(in, line);
   while (std::getline(in, line)) {
@@ -84,7 +84,6 @@ std::vector<Cloud> reference_clouds() {
 
 // Of a cloud on a line no turn about it is nearest: there goals have the rest shape, and that is all.
 TEST(ShapeMatching, GoalsOfTheReferenceClouds_AreReached) {
-  if (test::shared_dir().empty()) GTEST_SKIP() << "the shared reference tables are absent";
   const std::vector<Cloud> clouds = reference_clouds();
   ASSERT_EQ(clouds.size(), 10u);
   for (const Cloud &c : clouds) {

@@ -35,7 +35,6 @@ TEST(AutoStep, HostThatTakesAShareOfIt_ChangesRarelyToo) {
 }
 
 TEST(AutoStep, ThesisCylinderThatSpins_KeepsItsEnergy) {
-  const std::string mesh = test::shared_dir() + "/meshes/thesis/cyl_coarse.msh";
-  if (test::shared_dir().empty()) GTEST_SKIP() << "the shared meshes are not here";
+  const std::string mesh = test::mesh_dir() + "/thesis/cyl_coarse.msh";
   keeps({"cyl_coarse", mesh, "spin", 1}, 8000);
 }

@@ -1,6 +1,6 @@
 // A ball on an incline of 10 degrees: frictionless it slides and does not turn; with friction it rolls, a =
 // 5/7 g sin(theta), and twice the friction changes nothing. Gravity grows within 0.2 s, so that nothing
-// rings. Source: ../shared/reference/contact/tables/rolling_incline.csv.
+// rings. Source: reference/contact/tables/rolling_incline.csv.
 #include "scenes.h"
 
 namespace {

@@ -1,5 +1,6 @@
-// Coarse meshes of others, cut at the defaults: the energy watch must not stop them. The teeth of such a cut
-// leave contacts whose normals oppose each other, with impulses that nearly cancel (doc/decisions/0431).
+// Coarse meshes of a mesh generator, cut at the defaults: the energy watch must not stop them. The teeth of
+// such a cut leave contacts whose normals oppose each other, with impulses that nearly cancel
+// (doc/decisions/0431).
 #include <cmath>
 
 #include "support.h"
@@ -7,12 +8,7 @@
 
 namespace {
 
-std::string mesh_path(const char *name) {
-  const std::string dir = test::shared_dir();
-  return dir.empty() ? dir : dir + "/meshes/external/ipc/tetMeshes_" + name + ".msh";
-}
-
-// A bar of 186 cells and 80 mm on a floor, cut across at 20 ms.
+// A bar of 167 cells and 80 mm on a floor, cut across at 20 ms.
 std::string bar(const std::string &mesh, const char *model, const char *x) {
   return R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.022, "step": 0.001},
     "materials": {"jelly": {"young": 3e4, "damping": {"mass": 2, "stiffness": 2e-3}}},
@@ -29,8 +25,7 @@ std::string bar(const std::string &mesh, const char *model, const char *x) {
 // The first by the work of both sides of the pair of pieces, the others by that of a piece on the floor,
 // which a solve that is not converged takes from the pair of pieces.
 TEST(CutOwnMesh, BarCutByAPlane_IsNotStopped) {
-  const std::string mesh = mesh_path("bar-186");
-  if (mesh.empty()) GTEST_SKIP() << "without ../shared";
+  const std::string mesh = test::mesh_dir() + "/misc/bar_coarse.msh";
   const std::string out = test::scratch("cut_own_mesh");
   const struct {
     const char *model, *x;
@@ -46,8 +41,7 @@ TEST(CutOwnMesh, BarCutByAPlane_IsNotStopped) {
 // A blade comes down through a torus. In its teeth an opening contact and one that opposes it carry impulses
 // of a hundred times the velocities, and the solve is within its tolerance.
 TEST(CutOwnMesh, TorusCutByABlade_IsNotStopped) {
-  const std::string path = mesh_path("torus");
-  if (path.empty()) GTEST_SKIP() << "without ../shared";
+  const std::string path = test::mesh_dir() + "/misc/torus_coarse.msh";
   test::Context context;
   const dfm_world_def wd = dfm_world_def_default();
   dfm_world w = 0;

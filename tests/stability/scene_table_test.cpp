@@ -11,56 +11,56 @@
 namespace {
 
 // Contacts at once that a run has at least, jittered ones included; 0: nothing touches. begins: s, by then
-// there are so many. needs_shared: its meshes lie in ../shared. needs_ode: its rigid bodies are ODE's.
+// there are so many. needs_ode: its rigid bodies are ODE's.
 struct Row {
   const char *scene;
   double least_contacts, begins;
-  bool needs_shared, needs_ode = false;
+  bool needs_ode = false;
 };
 void PrintTo(const Row &row, std::ostream *out) { *out << row.scene; }
 constexpr Row kRows[] = {
-    {"attached", 0, 0, false},
-    {"ball_incline", 3, 0.3, false},
-    {"basin", 8, 0.8, false},
-    {"cheese", 20, 0.6, false},
-    {"changing_models", 12, 0.2, false},
-    {"fill_drop", 30, 0.4, false},
-    {"fill_drop_organs", 20, 0.2, true},
-    {"gravity_anisotropy", 0, 0, false},
-    {"gravity_beams", 0, 0, false},
-    {"grasp", 6, 0.75, false},
-    {"guard_shot", 20, 0.02, false},
-    {"liver", 20, 0.75, false},
-    {"orange", 20, 0.5, false},
-    {"pinched_tube", 8, 0.45, false},
-    {"ode_bed", 30, 0.4, false, true},
-    {"ode_cart", 60, 0.3, false, true},
-    {"ode_chain", 30, 0.2, false, true},
-    {"ode_gripper", 20, 0.5, false, true},
-    {"ode_seesaw", 40, 0.6, false, true},
-    {"pressed_ring", 20, 0.2, false},
-    {"rabbits_slope", 5, 0.6, false},
-    {"probe_block", 2, 0.2, false},
-    {"reduced_models", 30, 0.2, false},
-    {"rigid_on_ball", 10, 0.4, false},
-    {"rigid_on_bed", 5, 0.3, false},
-    {"rigid_pinch", 20, 0.6, false},
-    {"rollback_compare", 15, 0.2, false},
-    {"slope_block", 10, 0.2, false},
-    {"ten_bodies", 60, 0.9, false},
-    {"terrain", 12, 0.6, false},
-    {"torn_dough", 0, 0, false},
-    {"two_cylinders", 12, 0.5, false},
-    {"two_cylinders_coarse", 20, 0.4, false},
-    {"two_cylinders_fine", 40, 0.3, false},
-    {"two_materials", 0, 0, false},
-    {"viscoelastic_bars", 0, 0, false},
+    {"attached", 0, 0},
+    {"ball_incline", 3, 0.3},
+    {"basin", 8, 0.8},
+    {"cheese", 20, 0.6},
+    {"changing_models", 12, 0.2},
+    {"fill_drop", 30, 0.4},
+    {"fill_drop_organs", 20, 0.2},
+    {"gravity_anisotropy", 0, 0},
+    {"gravity_beams", 0, 0},
+    {"grasp", 6, 0.75},
+    {"guard_shot", 20, 0.02},
+    {"liver", 20, 0.75},
+    {"orange", 20, 0.5},
+    {"pinched_tube", 8, 0.45},
+    {"ode_bed", 30, 0.4, true},
+    {"ode_cart", 60, 0.3, true},
+    {"ode_chain", 30, 0.2, true},
+    {"ode_gripper", 20, 0.5, true},
+    {"ode_seesaw", 40, 0.6, true},
+    {"pressed_ring", 20, 0.2},
+    {"rabbits_slope", 5, 0.6},
+    {"probe_block", 2, 0.2},
+    {"reduced_models", 30, 0.2},
+    {"rigid_on_ball", 10, 0.4},
+    {"rigid_on_bed", 5, 0.3},
+    {"rigid_pinch", 20, 0.6},
+    {"rollback_compare", 15, 0.2},
+    {"slope_block", 10, 0.2},
+    {"ten_bodies", 60, 0.9},
+    {"terrain", 12, 0.6},
+    {"torn_dough", 0, 0},
+    {"two_cylinders", 12, 0.5},
+    {"two_cylinders_coarse", 20, 0.4},
+    {"two_cylinders_fine", 40, 0.3},
+    {"two_materials", 0, 0},
+    {"viscoelastic_bars", 0, 0},
 };
 
 const Row &row_of(const std::string &scene) {
   for (const Row &row : kRows)
     if (scene == row.scene) return row;
-  static const Row none{"", -1, 0, false};
+  static const Row none{"", -1, 0};
   return none;
 }
 
@@ -111,7 +111,6 @@ class ContactScene : public testing::TestWithParam<Row> {};
 // The same short run with and without contact: the first is sound, the second must not be.
 TEST_P(ContactScene, WithoutContact_MissesItsCriteria) {
   const Row &row = GetParam();
-  if (row.needs_shared && test::shared_dir().empty()) GTEST_SKIP() << "../shared is absent";
   if (row.needs_ode && !test::kHasOde) GTEST_SKIP() << "built without libdeform_ode";
   std::vector<std::string> arguments = until(row.begins);
   const test::SceneRun with(row.scene, arguments);

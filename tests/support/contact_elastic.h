@@ -1,4 +1,4 @@
-// The elastic cases of ../shared/reference/contact with `msm` bodies: what the model makes of Hertz, Mindlin,
+// The elastic cases of reference/contact with `msm` bodies: what the model makes of Hertz, Mindlin,
 // squeezed bodies, impacts and stacks.
 #pragma once
 #include <algorithm>

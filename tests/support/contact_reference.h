@@ -1,4 +1,4 @@
-// The rigid-limit cases of ../shared/reference/contact, run with stiff `msm` bodies. The test compares some
+// The rigid-limit cases of reference/contact, run with stiff `msm` bodies. The test compares some
 // rows, the bench prints all of them.
 #pragma once
 #include <functional>

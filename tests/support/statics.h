@@ -1,4 +1,4 @@
-// Equilibria of one body, with the shared reference set's meshes and fields.
+// Equilibria of one body, with meshes and fields of the reference set.
 #pragma once
 #include <algorithm>
 #include <cstdlib>
@@ -12,12 +12,9 @@
 namespace test {
 
 inline std::string reference(const std::string &name) {
-  return test::shared_dir() + "/reference/elasticity/" + name;
+  return test::reference_dir() + "/elasticity/" + name;
 }
-inline std::string mesh_path(const std::string &name) { return test::shared_dir() + "/meshes/" + name; }
-
-#define SKIP_WITHOUT_SHARED() \
-  if (test::shared_dir().empty()) GTEST_SKIP() << "the shared reference data are absent"
+inline std::string mesh_path(const std::string &name) { return test::mesh_dir() + "/" + name; }
 
 // Rows of node, then numbers, by node.
 inline std::map<uint32_t, std::vector<double>> by_node(const std::string &path) {

@@ -14,21 +14,6 @@
 #include <gtest/gtest.h>
 
 namespace test {
-namespace {
-
-// Where the shared data are there, nothing has a reason to be left out.
-class SkipsFail : public testing::EmptyTestEventListener {
-  void OnTestEnd(const testing::TestInfo &info) override {
-    if (info.result()->Skipped() && !shared_dir().empty())
-      ADD_FAILURE() << "skipped, although the shared data are present";
-  }
-};
-[[maybe_unused]] const bool listening = [] {
-  testing::UnitTest::GetInstance()->listeners().Append(new SkipsFail);
-  return true;
-}();
-
-}  // namespace
 
 pid_t start(const std::vector<std::string> &argv, const std::string &out, const std::string &err) {
   const pid_t child = fork();
@@ -67,11 +52,8 @@ CommandResult deform(std::vector<std::string> args) {
   return run(args);
 }
 
-std::string shared_dir() {
-  if (const char *dir = std::getenv("DEFORM_SHARED_DIR")) return dir;
-  const std::string beside = std::string(DEFORM_SOURCE_DIR) + "/../shared";
-  return std::filesystem::exists(beside + "/meshes") ? beside : std::string();
-}
+std::string reference_dir() { return DEFORM_BINARY_DIR "/test-data/reference"; }
+std::string mesh_dir() { return DEFORM_BINARY_DIR "/test-data/meshes"; }
 
 // Tests are processes that run side by side, so each has a folder of its own.
 std::string scratch(const std::string &name) {

@@ -22,8 +22,9 @@ CommandResult run(const std::vector<std::string> &argv);
 // The `deform` command of this build.
 CommandResult deform(std::vector<std::string> args);
 
-// ../shared beside the repository: empty where it is absent. DEFORM_SHARED_DIR overrides it.
-std::string shared_dir();
+// The reference set and the meshes of the tests, which CMake unpacks from tests/data.
+std::string reference_dir();
+std::string mesh_dir();
 // A fresh folder below the build tree for one test's files.
 std::string scratch(const std::string &name);
 std::string read_file(const std::string &path);

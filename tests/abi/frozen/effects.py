@@ -7,14 +7,13 @@ PROGRAM takes a few steps of each scene under callgrind (frozen.py: what is coun
 scene can have there are three: with it, with a list of effects that leaves it out, and one whose parameters
 never called for it. Checked, to 0.1 %: off by the list costs what never having had it costs, and gives the
 same state to the bit; the counts are those of effects.csv, where compiler, build type and flags are those
-stored. --update writes effects.csv again. Exit 77: no valgrind.
+stored. --update writes effects.csv again.
 """
 import argparse
 import csv
 import json
 import os
 import pathlib
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -177,9 +176,6 @@ def main():
         parser.add_argument(f"--{name}", required=True)
     parser.add_argument("--update", action="store_true")
     options = parser.parse_args()
-    if not shutil.which("valgrind"):
-        print("effects.py: skipped: there is no valgrind")
-        sys.exit(77)
     built = {"compiler": options.compiler, "build": options.build, "flags": " ".join(options.flags.split())}
     rows, wrong = [], []
     for scene in SCENES:

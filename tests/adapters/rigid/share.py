@@ -7,12 +7,11 @@ share.py bullet64|ode PROGRAM
 PROGRAM is load.cpp. Callgrind counts the instructions of its steps after dfm_world_rigids. The adapter's are
 all of a step but those of the soft bodies (dfm_world_step without the calls of the adapter's host) and those
 of the engine's own stages, each once per step: a stage that the adapter runs a second time counts as the
-adapter's. Exit 77: no valgrind.
+adapter's.
 """
 import collections
 import pathlib
 import re
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -53,9 +52,6 @@ def calls(path):
 
 
 def main():
-    if not shutil.which("valgrind"):
-        print("share.py: skipped: there is no valgrind")
-        sys.exit(77)
     engine, program = sys.argv[1:]
     with tempfile.TemporaryDirectory() as folder:
         out = pathlib.Path(folder) / "part"

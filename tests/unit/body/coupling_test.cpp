@@ -1,5 +1,5 @@
 // N: rows that sum to one, linear fields, and what its transpose does to forces. The reference values of
-// (3.9) and (3.12) come from ../shared/reference/elasticity (phyxels: nodes of a small cylinder).
+// (3.9) and (3.12) come from reference/elasticity (phyxels: nodes of a small cylinder).
 #include "body/coupling.h"
 
 #include <gtest/gtest.h>
@@ -258,10 +258,9 @@ TEST(Thesis, Surface_ShrinksAndTorqueAndPowerAreLost) {
 class Reference : public testing::Test {
  protected:
   Case k;
-  std::string folder;
   std::vector<std::vector<double>> read(const std::string &name) const {
     std::vector<std::vector<double>> rows;
-    for (const auto &line : test::read_csv(folder + "/" + name)) {
+    for (const auto &line : test::read_csv(test::reference_dir() + "/elasticity/" + name)) {
       if (!line.empty() && std::isalpha(line[0][0])) continue;  // the headings
       rows.emplace_back();
       for (const std::string &cell : line) rows.back().push_back(std::stod(cell));
@@ -269,8 +268,6 @@ class Reference : public testing::Test {
     return rows;
   }
   void SetUp() override {
-    if (test::shared_dir().empty()) GTEST_SKIP() << "no shared data beside the repository";
-    folder = test::shared_dir() + "/reference/elasticity";
     for (const auto &row : read("tables/mls_phyxels.csv"))
       k.point.insert(k.point.end(), row.begin() + 1, row.begin() + 4);
     for (const auto &row : read("tables/mls_surfels.csv"))

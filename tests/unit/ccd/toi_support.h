@@ -124,13 +124,9 @@ inline double speed_of(const ToiQuery &q) {
 
 // ---- reference files --------------------------------------------------------------------------------------
 
-inline std::string ccd_folder() {
-  const std::string shared = shared_dir();
-  return shared.empty() ? "" : shared + "/reference/ccd/";
-}
 inline std::vector<ToiQuery> reference_queries() {
   std::vector<ToiQuery> out;
-  const std::vector<std::vector<std::string>> rows = read_csv(ccd_folder() + "queries.csv");
+  const std::vector<std::vector<std::string>> rows = read_csv(reference_dir() + "/ccd/queries.csv");
   const auto number = [](const std::string &s) { return std::strtod(s.c_str(), nullptr); };
   for (const std::vector<std::string> &row : rows) {
     if (row[0] == "id") continue;
@@ -148,37 +144,6 @@ inline std::vector<ToiQuery> reference_queries() {
       for (int k = 0; k < 4; ++k)
         for (int i = 0; i < 3; ++i)
           (end ? q.m[k].p1 : q.m[k].p0)[i] = number(row[13 + 12 * size_t(end) + 3 * size_t(k) + size_t(i)]);
-    out.push_back(q);
-  }
-  return out;
-}
-// Numerators and denominators are exact as doubles, and so is their quotient.
-inline std::vector<ToiQuery> external_queries() {
-  std::vector<ToiQuery> out;
-  const std::string folder = ccd_folder() + "external/";
-  std::string open;
-  std::vector<std::vector<std::string>> rows;
-  const auto number = [](const std::string &s) { return std::strtod(s.c_str(), nullptr); };
-  for (const std::vector<std::string> &label : read_csv(folder + "exact_labels.csv")) {
-    if (label[0] == "file") continue;
-    if (label[0] != open) {
-      open = label[0];
-      rows = read_csv(folder + open);
-    }
-    ToiQuery q;
-    q.id = label[0] + ":" + label[1];
-    q.edges = label[2] == "ee";
-    q.hit = label[4] == "1";
-    q.multiplicity = 1;
-    q.toi = q.hit ? number(label[5]) : 0;
-    q.latest = std::nextafter(q.toi, 2.0);
-    const size_t first = 8 * size_t(std::atoi(label[1].c_str()));
-    for (size_t r = 0; r < 8; ++r)
-      for (size_t i = 0; i < 3; ++i)
-        (r < 4 ? q.m[r].p0 : q.m[r - 4].p1)[i] =
-            number(rows[first + r][2 * i]) / number(rows[first + r][2 * i + 1]);
-    for (int k = 1; k < 4; ++k)
-      for (int i = 0; i < 3; ++i) q.extent = std::max(q.extent, std::fabs(q.m[k].p0[i] - q.m[0].p0[i]));
     out.push_back(q);
   }
   return out;

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <filesystem>
 #include <random>
+#include <set>
 
 #include "fill_support.h"
 #include "mesh/fill_lattice.h"
@@ -371,32 +372,83 @@ TEST(Fill, NothingToFill_IsRefused) {
       << refusal(inside_out, 100);
 }
 
-// Every surface at hand that closes, as read.
-void fills(const std::string &folder, const std::vector<std::string> &endings, uint32_t cells,
-           uint32_t at_least, const std::vector<std::string> &but = {}) {
-  const std::string shared = test::shared_dir();
-  if (shared.empty()) GTEST_SKIP() << "../shared is not there";
-  uint32_t n = 0;
-  for (const std::string &path : test::files_of(shared + "/meshes/" + folder, endings)) {
-    if (std::any_of(but.begin(), but.end(),
-                    [&](const std::string &b) { return path.find(b) != std::string::npos; }))
-      continue;
-    SCOPED_TRACE(path);
-    const TriMesh s = dfm::read_tri_mesh(dfm::Memory::standard(), path);
-    const TetMesh m = fill_surface(s, cells);
-    expect_sound(m);
-    EXPECT_NEAR(m.ntet(), cells, 0.1 * cells);
-    EXPECT_NEAR(material(m), test::enclosed(s), 0.02 * test::enclosed(s));
-    EXPECT_EQ(uncovered(m, s, 50, 1e-7 * std::cbrt(material(m))), 0u);
-    ++n;
-  }
-  EXPECT_GE(n, at_least);
+void expect_fills(const TriMesh &s, uint32_t cells) {
+  const TetMesh m = fill_surface(s, cells);
+  expect_sound(m);
+  EXPECT_NEAR(m.ntet(), cells, 0.1 * cells);
+  EXPECT_NEAR(material(m), test::enclosed(s), 0.02 * test::enclosed(s));
+  EXPECT_EQ(uncovered(m, s, 50, 1e-7 * std::cbrt(material(m))), 0u);
 }
-const std::vector<std::string> kSurfaces{".obj", ".ply", ".stl", ".off"};
 
-TEST(FillShared, ThesisOrgansAndCylinders_Fill) { fills("thesis", kSurfaces, 5000, 4); }
-TEST(FillShared, LiverAndBunny_Fill) { fills("external/sofa", kSurfaces, 3000, 3); }
-TEST(FillShared, SharpShapes_Fill) { fills("external/ipc", kSurfaces, 1000, 6); }
-TEST(FillShared, EveryDialect_Fills) { fills("formats", kSurfaces, 300, 15); }
+// A flat region of triangles, drawn out along z: its outline, inner ones too, becomes walls.
+TriMesh prism(const std::vector<std::array<double, 2>> &region,
+              const std::vector<std::array<uint32_t, 3>> &tris, double depth) {
+  const uint32_t n = uint32_t(region.size());
+  std::vector<Vec3> p;
+  for (const double z : {0.0, depth})
+    for (const auto &x : region) p.push_back({x[0], x[1], z});
+  std::set<std::pair<uint32_t, uint32_t>> edges;
+  std::vector<std::array<uint32_t, 3>> t;
+  for (const auto &[a, b, c] : tris) {
+    t.push_back({a, c, b});
+    t.push_back({n + a, n + b, n + c});
+    edges.insert({{a, b}, {b, c}, {c, a}});
+  }
+  for (const auto &[a, b] : edges) {
+    if (edges.count({b, a})) continue;
+    t.push_back({a, b, n + b});
+    t.push_back({a, n + b, n + a});
+  }
+  return test::surface_of(p, t);
+}
+
+TEST(Fill, SharpShapes_AreFilled) {
+  const struct {
+    const char *name;
+    TriMesh surface;
+    double volume;
+  } shapes[] = {
+      {"spike",
+       test::surface_of({{-.5, -.5, 0}, {.5, -.5, 0}, {.5, .5, 0}, {-.5, .5, 0}, {0, 0, 3}},
+                        {{0, 2, 1}, {0, 3, 2}, {0, 1, 4}, {1, 2, 4}, {2, 3, 4}, {3, 0, 4}}),
+       1},
+      {"wedge", prism({{-.5, 0}, {.5, 0}, {0, 3}}, {{0, 1, 2}}, 2), 3},
+      {"cliff", prism({{-.75, 0}, {.75, 0}, {.5, 1}, {-.5, 1}}, {{0, 1, 2}, {0, 2, 3}}, 1.5), 1.875},
+      {"crack",
+       prism({{-1, -.5}, {0, -.5}, {1, -.5}, {1, .5}, {.4, .5}, {0, 0}, {-.4, .5}, {-1, .5}},
+             {{0, 1, 5}, {0, 5, 6}, {0, 6, 7}, {1, 2, 5}, {2, 4, 5}, {2, 3, 4}}, 4),
+       7.2},
+      {"hole",
+       prism({{-1, -1}, {1, -1}, {1, 1}, {-1, 1}, {-.5, -.5}, {.5, -.5}, {.5, .5}, {-.5, .5}},
+             {{0, 1, 5}, {0, 5, 4}, {1, 2, 6}, {1, 6, 5}, {2, 3, 7}, {2, 7, 6}, {3, 0, 4}, {3, 4, 7}}, 1),
+       3},
+      {"edges within a plane",
+       prism({{-1, -1}, {1, -1}, {1, 1}, {-1, 1}, {.2, .1}}, {{0, 1, 4}, {1, 2, 4}, {2, 3, 4}, {3, 0, 4}}, 1),
+       4}};
+  for (const auto &shape : shapes) {
+    SCOPED_TRACE(shape.name);
+    ASSERT_NEAR(test::enclosed(shape.surface), shape.volume, 1e-12);
+    expect_fills(shape.surface, 1000);
+  }
+}
+
+// Every surface that closes, as read.
+void expect_files_fill(const std::vector<std::string> &files, uint32_t cells, size_t number) {
+  EXPECT_EQ(files.size(), number);
+  for (const std::string &path : files) {
+    SCOPED_TRACE(path);
+    expect_fills(dfm::read_tri_mesh(dfm::Memory::standard(), path), cells);
+  }
+}
+std::vector<std::string> surfaces_of(const std::string &folder) {
+  return test::files_of(test::mesh_dir() + "/" + folder, {".obj", ".ply", ".stl", ".off"});
+}
+
+TEST(FillFiles, ThesisOrgansAndCylinders_Fill) { expect_files_fill(surfaces_of("thesis"), 5000, 4); }
+TEST(FillFiles, OrganAndRabbit_Fill) {
+  const std::string data = DEFORM_SOURCE_DIR "/examples/data/";
+  expect_files_fill({data + "organ.obj", data + "rabbit.obj"}, 3000, 2);
+}
+TEST(FillFiles, EveryDialect_Fills) { expect_files_fill(surfaces_of("formats"), 300, 18); }
 
 }  // namespace

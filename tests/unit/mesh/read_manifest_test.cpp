@@ -1,5 +1,5 @@
-// The shared mesh collection, every file of it: its manifest says how many points, tetrahedra and triangles
-// other programs see, the folders' EXPECTED.csv what must become of a file (read, report, reject, error).
+// Every packed mesh: the manifest says how many points, tetrahedra and triangles other programs see, the
+// folders' EXPECTED.csv what must become of a file (read, report, reject, error).
 // Formats that are not ours are refused with the way to convert them.
 #include <gtest/gtest.h>
 
@@ -40,8 +40,7 @@ std::vector<std::vector<std::string>> rows_of(const std::string &path, size_t co
   return rows;
 }
 
-// | file | points | tets | tris | min q | bytes | source | licence | sha256 | note |, with what EXPECTED.csv
-// of the folder adds.
+// | file | points | tets | tris | min q | note |, with what EXPECTED.csv of the folder adds.
 std::vector<Row> manifest(const std::string &folder) {
   std::map<std::string, Row> expected;
   for (const auto &r : rows_of(folder + "formats/EXPECTED.csv", 8)) {
@@ -64,8 +63,8 @@ std::vector<Row> manifest(const std::string &folder) {
     std::vector<std::string> cell;
     std::istringstream cells(line);
     for (std::string c; std::getline(cells, c, '|');) cell.push_back(trimmed(c));
-    if (cell.size() < 11 || cell[1].find('/') == std::string::npos) continue;
-    Row row{cell[1], cell[10]};
+    if (cell.size() < 7 || cell[1].find('/') == std::string::npos) continue;
+    Row row{cell[1], cell[6]};
     row.points = count_in(cell[2]);
     row.tets = count_in(cell[3]);
     row.tris = count_in(cell[4]);
@@ -78,23 +77,18 @@ std::vector<Row> manifest(const std::string &folder) {
 }
 
 // Formats that are not ours, whatever their note says.
-bool is_foreign(const Row &row, const std::string &folder) {
+bool is_foreign(const Row &row) {
   const std::string end = std::filesystem::path(row.file).extension().string();
   if (end == ".inp" || end == ".node" || end == ".ele" || end == ".face") return true;
   for (const char *name :
        {"vol_msh10_ascii.msh", "vol_msh40_ascii.msh", "box_hex_msh41.msh", "box_tet10_msh41.msh"})
     if (row.name() == name) return true;
-  // MSH 1, of which only some notes speak
-  return test::read_file(folder + row.file).compare(0, 4, "$NOD") == 0;
+  return false;
 }
 
-class SharedMeshes : public testing::Test {
+class PackedMeshes : public testing::Test {
  protected:
-  void SetUp() override {
-    if (test::shared_dir().empty()) GTEST_SKIP() << "the shared mesh collection is not beside the repository";
-    folder = test::shared_dir() + "/meshes/";
-  }
-  std::string folder;
+  const std::string folder = test::mesh_dir() + "/";
 
   // Memory for reading and repair of a file, as tests/unit/mesh/mesh_bounds_test.cpp bounds it.
   size_t cap_of(const std::string &path) const { return 16384 + 64 * std::filesystem::file_size(path); }
@@ -138,7 +132,7 @@ class SharedMeshes : public testing::Test {
 
 }  // namespace
 
-TEST_F(SharedMeshes, EveryFileOfTheManifest_IsReadRepairedOrRefusedAsItSays) {
+TEST_F(PackedMeshes, EveryFileOfTheManifest_IsReadRepairedOrRefusedAsItSays) {
   std::map<std::string, uint32_t> done;
   for (const Row &row : manifest(folder)) {
     SCOPED_TRACE(row.file + ": " + row.must + ", " + row.note);
@@ -148,23 +142,21 @@ TEST_F(SharedMeshes, EveryFileOfTheManifest_IsReadRepairedOrRefusedAsItSays) {
     try {
       RawMesh raw = read_raw(memory.hooks, path);
       const uint32_t points = raw.npoint(), tris = raw.ntri();
-      EXPECT_FALSE(is_foreign(row, folder)) << "a format that is not ours was read";
+      EXPECT_FALSE(is_foreign(row)) << "a format that is not ours was read";
       if (!raw.tets.empty()) {
         const TetMesh mesh = finish_mesh(path, std::move(raw));
-        // all its elements carry one number; others keep the last
-        if (row.tets && row.name() != "6_tetra_bad.msh") expect_tets(row, mesh);
+        expect_tets(row, mesh);
         ++done["tets"];
       } else {
         EXPECT_EQ(row.tets, 0u);
         const TriMesh mesh = finish_surface(path, std::move(raw));
-        // 0 triangles to others, its quadrangles cut to us
-        if (row.name() != "test_quad.vtk") expect_surface(row, points, tris, mesh);
+        expect_surface(row, points, tris, mesh);
         ++done["surface"];
       }
       EXPECT_TRUE(row.must != "error" && row.must != "reject") << "was read";
     } catch (const Error &e) {
       EXPECT_NE(e.sentence.find(row.name()), std::string::npos) << e.sentence;
-      if (is_foreign(row, folder)) {
+      if (is_foreign(row)) {
         EXPECT_EQ(e.status, DFM_E_UNSUPPORTED) << e.sentence;
         const bool converts = e.sentence.find("gmsh -3") != std::string::npos ||
                               e.sentence.find("meshio convert") != std::string::npos;
@@ -178,11 +170,11 @@ TEST_F(SharedMeshes, EveryFileOfTheManifest_IsReadRepairedOrRefusedAsItSays) {
     }
   }
   EXPECT_EQ(done["tets"] + done["surface"] + done["foreign"] + done["refused"], manifest(folder).size());
-  EXPECT_EQ(manifest(folder).size(), 178u);
-  EXPECT_EQ(done["foreign"], 15u);
+  EXPECT_EQ(manifest(folder).size(), 147u);
+  EXPECT_EQ(done["foreign"], 10u);
 }
 
-TEST_F(SharedMeshes, DefectiveMeshes_AreRepairedAndReported) {
+TEST_F(PackedMeshes, DefectiveMeshes_AreRepairedAndReported) {
   const auto read = [&](const char *file) {
     return read_tet_mesh(Memory::standard(), folder + "nasty/" + file);
   };
@@ -207,7 +199,7 @@ TEST_F(SharedMeshes, DefectiveMeshes_AreRepairedAndReported) {
   EXPECT_TRUE(read("large_units.vtk").warnings.empty());
 }
 
-TEST_F(SharedMeshes, ThesisCylinders_HaveTheirPublishedCounts) {
+TEST_F(PackedMeshes, ThesisCylinders_HaveTheirPublishedCounts) {
   const struct {
     const char *file;
     uint32_t points, tets, triangles, edges;
@@ -226,7 +218,7 @@ TEST_F(SharedMeshes, ThesisCylinders_HaveTheirPublishedCounts) {
   }
 }
 
-TEST_F(SharedMeshes, DefectiveSurfaces_AreRepairedAndReported) {
+TEST_F(PackedMeshes, DefectiveSurfaces_AreRepairedAndReported) {
   const auto read = [&](const char *file) {
     return read_tri_mesh(Memory::standard(), folder + "nasty/" + file);
   };
@@ -236,12 +228,4 @@ TEST_F(SharedMeshes, DefectiveSurfaces_AreRepairedAndReported) {
   EXPECT_EQ(tri_mesh_statistics(read("nonmanifold_edge.ply")).nonmanifold_edges, 1u);
   EXPECT_GT(read("degenerate_triangles.off").dropped_tris, 0u);
   EXPECT_EQ(tri_mesh_statistics(read("self_intersecting.stl")).npiece, 2u);
-}
-
-TEST_F(SharedMeshes, FileWithAWrongEnding_IsReadByItsContent) {
-  const TetMesh mesh = read_tet_mesh(Memory::standard(), folder + "external/sofa/Bunny.vtk");
-  EXPECT_EQ(mesh.npoint() + mesh.dropped_points, 1911u);
-  EXPECT_EQ(mesh.ntet(), 5897u);
-  ASSERT_FALSE(mesh.warnings.empty());
-  EXPECT_EQ(mesh.warnings[0], "read as VTU, as its first bytes show, although its name ends in .vtk");
 }

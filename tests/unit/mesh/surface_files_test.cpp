@@ -1,4 +1,4 @@
-// Surfaces of ../shared/meshes: each meets the fate that its note foretells, and the boundary of a body
+// Surfaces of the packed meshes: each meets the fate that its note foretells, and the boundary of a body
 // encloses the body's volume.
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@ using namespace dfm;
 
 namespace {
 
-std::string meshes() { return test::shared_dir().empty() ? "" : test::shared_dir() + "/meshes/"; }
+std::string meshes() { return test::mesh_dir() + "/"; }
 
 struct Fate {
   const char *file;
@@ -22,8 +22,7 @@ struct Fate {
 
 }  // namespace
 
-TEST(SurfaceShared, DefectiveFiles_GiveTheExpectedResults) {
-  if (meshes().empty()) GTEST_SKIP() << "../shared is not here";
+TEST(SurfaceFiles, DefectiveFiles_GiveTheExpectedResults) {
   for (const Fate &f :
        {Fate{"nasty/degenerate_triangles.off", 92, 180, 1, 0, 0, 0, 0.002,
              "2 triangles without area were dropped"},
@@ -54,8 +53,7 @@ TEST(SurfaceShared, DefectiveFiles_GiveTheExpectedResults) {
 }
 
 // The same surface in every format: those of one precision give the same box and volume.
-TEST(SurfaceShared, OneSurfaceInManyFormats_IsOneSurface) {
-  if (meshes().empty()) GTEST_SKIP() << "../shared is not here";
+TEST(SurfaceFiles, OneSurfaceInManyFormats_IsOneSurface) {
   const double volume =
       tri_mesh_statistics(read_tri_mesh(Memory::standard(), meshes() + "formats/surf_plain.obj")).volume;
   EXPECT_GT(volume, 0);
@@ -71,8 +69,7 @@ TEST(SurfaceShared, OneSurfaceInManyFormats_IsOneSurface) {
   EXPECT_GE(n, 16u);
 }
 
-TEST(SurfaceShared, BoundaryOfABody_EnclosesItsVolume) {
-  if (meshes().empty()) GTEST_SKIP() << "../shared is not here";
+TEST(SurfaceFiles, BoundaryOfABody_EnclosesItsVolume) {
   uint32_t n = 0;
   for (const char *folder : {"bars", "misc", "spheres", "formats", "nasty", "bench"})
     for (const std::string &file : test::files_of(meshes() + folder, {".msh", ".vtk", ".vtu", ".mesh"})) {
@@ -94,8 +91,7 @@ TEST(SurfaceShared, BoundaryOfABody_EnclosesItsVolume) {
 
 // The wall of the hole is a piece of its own and faces into the hole: 4/3 pi (0.05^3 - 0.035^3) less what
 // polyhedra cut off.
-TEST(SurfaceShared, HollowBall_HasTwoPiecesAndItsShellsVolume) {
-  if (meshes().empty()) GTEST_SKIP() << "../shared is not here";
+TEST(SurfaceFiles, HollowBall_HasTwoPiecesAndItsShellsVolume) {
   const TriMesh m = read_tri_mesh(Memory::standard(), meshes() + "misc/shell_sphere.msh");
   const TriMeshStatistics s = tri_mesh_statistics(m);
   EXPECT_EQ(s.npiece, 2u);
