@@ -4,7 +4,6 @@
 
 #include <chrono>
 #include <cmath>
-#include <filesystem>
 
 #include "../unit/narrow/detect_scene.h"
 #include "body/obstacle_mesh.h"
