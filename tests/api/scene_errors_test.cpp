@@ -84,6 +84,20 @@ TEST(SceneErrors, TheSceneItself_Runs) {
   EXPECT_EQ(result.exit_code, 0) << result.err;
 }
 
+TEST(SceneErrors, AMeshInPlaceOfTheScene_IsNamedWithTheSceneToWrite) {
+  expect_refused(
+      run({folder() + "/block.msh"}),
+      {"block.msh: this is a mesh (MSH), and a scene is expected",
+       "{\"name\": \"body\", \"mesh\": \"block.msh\"}", "deform mesh info " + folder() + "/block.msh"},
+      "MSH");
+  for (const char *ending : {"stl", "obj", "ply", "off", "vtk", "vtu", "mesh", "step"}) {
+    const std::string file = folder() + "/a ball." + ending;
+    if (std::string(ending) == "step") test::write_file(file, "ISO-10303-21;\n");
+    else test::deform({"mesh", "make", "ball", "--cells", "100", "--quiet", "--out", file});
+    expect_refused(run({file}), {"this is a mesh (", "deform mesh info '" + file + "'"}, ending);
+  }
+}
+
 TEST(SceneErrors, UnknownKeys_NameTheNearest) {
   check({{"/gravty=[0,0,0]", {"/gravty", "did you mean \"gravity\"?"}},
          {"/bodies/0/mesg=\"x\"", {"/bodies/0/mesg", "did you mean \"mesh\"?"}},

@@ -161,7 +161,7 @@ void write_medit(const TetMesh &mesh, const std::string &path) {
   out.commit();
 }
 
-void write_tet_mesh(const TetMesh &mesh, const std::string &path) {
+bool write_tet_mesh(const TetMesh &mesh, const std::string &path) {
   const auto ends = [&](const char *ending) {
     const std::string e(ending);
     const auto same = [](char a, char b) { return a == std::tolower(static_cast<unsigned char>(b)); };
@@ -177,6 +177,7 @@ void write_tet_mesh(const TetMesh &mesh, const std::string &path) {
          "%s: tetrahedra are not written to this file name ending; expected .msh (MSH 4.1), .msh2 (MSH 2.2), "
          ".vtk (legacy VTK), .vtu (VTU) or .mesh (Medit)",
          path.c_str());
+  return mesh.share.empty() || ends(".vtk") || ends(".vtu");
 }
 
 }  // namespace dfm
