@@ -91,8 +91,8 @@ std::string head_of(const SceneFile &scene, size_t bytes) {
   throw Failure(kBadInput, path + ": " + why);
 }
 
-// That it was written with what is loaded here. Which build of it that was does not matter: versions differ where
-// results do, and the hash of the state is compared afterwards.
+// That it was written with what is loaded here. Which build of it that was does not matter: versions differ
+// where results do, and the hash of the state is compared afterwards.
 void check_versions(const SceneFile &scene, const std::string &path, const JsonValue &head) {
   const std::string library = dfm_version(nullptr, nullptr, nullptr);
   if (head.get("library") != library)

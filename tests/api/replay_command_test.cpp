@@ -122,8 +122,8 @@ TEST(Replay, WhatDoesNotFit_IsReportedAndNothingIsLost) {
        "equilibria");
 }
 
-// The model that a body has, the one that it changes to and its law, by version: neither the other plugins that are
-// loaded nor what tells one build of them from another.
+// The model that a body has, the one that it changes to and its law, by version: neither the other plugins
+// that are loaded nor what tells one build of them from another.
 TEST(Replay, SavedState_NamesWhatTheSceneCallsByVersion) {
   const Folder f;
   const std::string state = f.path + "/mid.state";
