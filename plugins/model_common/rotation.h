@@ -189,9 +189,9 @@ inline void gram_schmidt(const double *given, double *r) {
   }
 }
 
-// R = U diag(1, 1, det) V^T of f = U diag(s) V^T by one-sided Jacobi (Hestenes, J. SIAM 6, 1958): turns V make
-// the columns of w = f V orthogonal relative to their lengths, so that small stretches keep their digits. U are
-// the columns of w over their lengths, longest first.
+// R = U diag(1, 1, det) V^T of f = U diag(s) V^T by one-sided Jacobi (Hestenes, J. SIAM 6, 1958): turns V
+// make the columns of w = f V orthogonal relative to their lengths, so that small stretches keep their
+// digits. U are the columns of w over their lengths, longest first.
 inline void by_singular_values(const double *given, double *r) {
   double w[9], v[9], u[9];
   if (!scaled(given, w)) return identity(r);

@@ -110,6 +110,18 @@ TEST(SceneErrors, UnknownKeys_NameTheNearest) {
          {"/obstacles/0/radius=1", {"/obstacles/0/radius", "the shape plane has no \"radius\""}}});
 }
 
+TEST(SceneErrors, StepThatNeedsTooManySubSteps_IsRefusedBeforeTheRun) {
+  expect_refused(run({scene(), "--set", "/materials/gel/young=1e13", "--set",
+                      R"(/time={"duration":0.1,"step":0.1,"integrator":"symplectic_euler"})"}),
+                 {"scene.json: /time/step: a step of 0.1 s needs", "at most 10000 are taken",
+                  "body 'block', whose point", "move by tr_bdf2"},
+                 "step");
+  EXPECT_EQ(
+      run({scene(), "--set", "/materials/gel/young=1e13", "--set", R"(/time={"duration":0.1,"step":0.1})"})
+          .exit_code,
+      0);
+}
+
 TEST(SceneErrors, WrongTypes_NameWhatWasExpected) {
   check({{"/gravity=5", {"/gravity", "expected [x, y, z] in m/s2 or an object with keyframes"}},
          {"/bodies/0/model=msm",

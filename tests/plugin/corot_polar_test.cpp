@@ -66,8 +66,8 @@ TEST(Polar, ReferenceMatrices_MeetTheirNearestRotation) {
     }
 }
 
-// R and stretches 1, s2, s3 along axes that lie anywhere: long and thin cells. Their nearest rotation is R, to
-// the rounding of the matrix over the least sum of two stretches.
+// R and stretches 1, s2, s3 along axes that lie anywhere: long and thin cells. Their nearest rotation is R,
+// to the rounding of the matrix over the least sum of two stretches.
 TEST(Polar, NeedlesInAnyDirection_MeetTheirRotation) {
   std::mt19937 generator(7);
   const auto random = [&] { return double(generator()) * 0x1p-32 - 0.5; };
