@@ -13,8 +13,8 @@ PYTHON ?= $(firstword $(wildcard /usr/bin/python3) python3)
 
 # The doors share build folders: `make -j demo test` runs one after the other. JOBS is for the compilers.
 .NOTPARALLEL:
-.PHONY: help demo test bench soak lint format tidy asan tsan fuzz install clean setup setup-bench setup-fuzz
-.PHONY: view bench-peers deb docs setup-docs setup-peers wheel
+.PHONY: help demo test bench soak lint format tidy asan tsan fuzz install clean
+.PHONY: view bench-peers deb docs wheel setup setup-test setup-bench setup-fuzz setup-docs setup-peers
 
 help:
 	@echo "make demo             two soft cylinders with and without friction: table, picture, out/demo/"
@@ -38,6 +38,8 @@ help:
 
 setup:
 	$(SETUP) doors
+setup-test:
+	$(SETUP) doors readers
 setup-bench:
 	$(SETUP) doors bench
 setup-peers:
@@ -62,7 +64,7 @@ view: setup build/release/build.ninja
 	$(BUILD) release --target deform_viewer
 	@build/release/bin/deform view $(SCENE)
 
-test: setup build/release/build.ninja
+test: setup-test build/release/build.ninja
 	$(BUILD) release
 	@ctest --preset release -j $(JOBS)
 

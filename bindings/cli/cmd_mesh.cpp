@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <filesystem>
 #include <memory>
 
 #include "arguments.h"
@@ -37,6 +38,11 @@ Writes written_by(const std::string &path) {
 
 namespace {
 
+// The name under which a remedy saves a filling: VTU keeps the shares of the cells.
+std::string filling_file(const std::string &out) {
+  return shown_word(std::filesystem::path(out).replace_extension(".vtu").string());
+}
+
 constexpr const char *kIn = "mesh of any format that is read: .msh .vtk .vtu .mesh .obj .ply .stl .off";
 
 bool open(MeshSession &s, const std::string &file, bool as_surface) {
@@ -61,7 +67,7 @@ std::string lost_shares(dfm_tetmesh cells, const std::string &out) {
   const std::string ending = mesh_ending(out);
   if (dfm_tetmesh_share(cells, &share) < 0 || !share || ending == "vtk" || ending == "vtu") return "";
   return "the share of material of each cell, which only .vtk and .vtu store: every cell of ." + ending +
-         " counts whole in mass and stiffness";
+         " counts whole in mass and stiffness; write .vtu";
 }
 
 namespace {
@@ -99,7 +105,7 @@ int convert_file(MeshSession &s, const std::string &in, const std::string &out,
   else if (!open(s, in, false)) return fail(dfm_last_error());
   if (s.surface && written_by(out) == Writes::cells)
     return fail(out + ": ." + mesh_ending(out) + " is written with tetrahedra, and " + in +
-                " is a surface; fill it: deform mesh fill " + in + " --out " + out +
+                " is a surface; fill it: deform mesh fill " + shown_word(in) + " --out " + filling_file(out) +
                 ", or convert it to .obj, .ply, .stl, .off, .vtk or .vtu");
   if (s.cells && written_by(out) == Writes::surface) {
     dfm_tetmesh_info i = {};
@@ -155,7 +161,7 @@ int make(const Globals &globals, const Shape &shape) {
     return fail(shape.out +
                 ": a torus is made as a surface; write .obj, .ply, .stl, .off, .vtk or .vtu, then: deform "
                 "mesh fill SURFACE --out " +
-                shape.out);
+                filling_file(shape.out));
   {
     const Patience patience(told(globals), "making " + shape.out);
     const dfm_status made =

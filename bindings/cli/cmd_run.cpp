@@ -506,6 +506,7 @@ int run_scene(RunOptions options, const Globals &globals, Comparison *comparison
   const std::string planned = planned_json(scene);
   if (const std::string short_of = planned_sentence(planned); !short_of.empty()) warn(short_of);
   if (!globals.quiet && !globals.json) print_choice(planned);
+  check_first_step(scene);
   RunResult result;
   Checks checks;
   results_lie_in(options.out);

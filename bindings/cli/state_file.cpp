@@ -9,6 +9,7 @@
 #include <cstring>
 #include <filesystem>
 #include <map>
+#include <set>
 
 #include "file.h"
 #include "json_text.h"
@@ -17,7 +18,7 @@
 namespace cli {
 namespace {
 
-constexpr uint64_t kMostPlugin = uint64_t{1} << 30, kMostState = uint64_t{1} << 33;  // bytes
+constexpr uint64_t kMostState = uint64_t{1} << 33;  // bytes
 constexpr const char *kFormat = "deform-state", *kVersion = "1";
 constexpr const char *kSnapshot = "dfmsnap";  // how the bytes of dfm_world_snapshot begin
 
@@ -28,37 +29,52 @@ uint64_t hash_of(const std::string &bytes) {
   return hash;
 }
 
-struct Plugin { std::string version, hash; };
-
-// Those that came from files; what is linked into the library is of the library's version.
-std::map<std::string, Plugin> plugins_of(const SceneFile &scene) {
-  std::map<std::string, Plugin> out;
-  std::map<std::string, std::string> hashes;  // of a file, which may hold several types
-  struct Seen {
-    std::map<std::string, Plugin> &out;
-    std::map<std::string, std::string> &files;
-  } seen{out, hashes};
+// Versions of the plugins that are loaded, by id.
+std::map<std::string, std::string> versions(const SceneFile &scene) {
+  std::map<std::string, std::string> out;
   need(dfm_plugin_visit(
       scene.context(),
-      [](void *user, const dfm_type *type, const char *file) {
-        Seen &to = *static_cast<Seen *>(user);
-        if (!file || !*file) return;
-        to.out[type->id] = {type->version ? type->version : "", file};
-        to.files[file];
+      [](void *user, const dfm_type *type, const char *) {
+        (*static_cast<std::map<std::string, std::string> *>(user))[type->id] =
+            type->version ? type->version : "";
       },
-      &seen));
-  for (auto &[file, hash] : hashes) hash = hash_text(hash_of(read_file(file, kMostPlugin, "a plugin")));
-  for (auto &[id, plugin] : out) plugin.hash = hashes[plugin.hash];
+      &out));
+  return out;
+}
+
+// What the world's later steps call: its laws, the models that its bodies have or may change to, the solver.
+std::set<std::string> called(const SceneFile &scene) {
+  JsonValue plan;
+  if (!parse_json(scene.explain(), plan))
+    throw Failure(kBadInput, scene.path() + ": its plan cannot be read");
+  std::set<std::string> out;
+  const auto rows = [](const JsonValue &of, const char *name) {
+    const JsonValue *const found = of.find(name);
+    return found ? found->items : std::vector<JsonValue>();
+  };
+  for (const JsonValue &law : rows(plan, "laws")) out.insert(law.get("name"));
+  for (const JsonValue &body : rows(plan, "bodies")) {
+    out.insert(body.get("model"));
+    for (const JsonValue &change : rows(body, "changes")) out.insert(change.get("name"));
+  }
+  JsonValue solver;
+  if (parse_json(scene.value("/solver/type"), solver)) out.insert(solver.text);
+  return out;
+}
+
+std::vector<std::string> needs_of(const SceneFile &scene) {
+  const std::set<std::string> names = called(scene);
+  std::vector<std::string> out;
+  for (const auto &[id, version] : versions(scene)) {
+    if (!names.count(id) && !names.count(id.substr(id.find_last_of('.') + 1))) continue;
+    JsonObject row;
+    row.add("id", quoted(id)).add("version", quoted(version));
+    out.push_back(row.text());
+  }
   return out;
 }
 
 std::string head_of(const SceneFile &scene, size_t bytes) {
-  std::vector<std::string> plugins;
-  for (const auto &[id, plugin] : plugins_of(scene)) {
-    JsonObject row;
-    row.add("id", quoted(id)).add("version", quoted(plugin.version)).add("hash", quoted(plugin.hash));
-    plugins.push_back(row.text());
-  }
   JsonObject head;
   head.add("format", quoted(kFormat))
       .add("version", kVersion)
@@ -66,7 +82,7 @@ std::string head_of(const SceneFile &scene, size_t bytes) {
       .add("scene", quoted(hash_text(scene_hash(scene))))
       .add("t", number(dfm_world_time(scene.world())))
       .add("state_hash", quoted(hash_text(dfm_world_hash(scene.world()))))
-      .add("plugins", json_array(plugins))
+      .add("plugins", json_array(needs_of(scene)))
       .add("bytes", std::to_string(bytes));
   return head.text() + "\n";
 }
@@ -75,19 +91,22 @@ std::string head_of(const SceneFile &scene, size_t bytes) {
   throw Failure(kBadInput, path + ": " + why);
 }
 
-void check_plugins(const SceneFile &scene, const std::string &path, const JsonValue &head) {
+// That it was written with what is loaded here. Which build of it that was does not matter: versions differ
+// where results do, and the hash of the state is compared afterwards.
+void check_versions(const SceneFile &scene, const std::string &path, const JsonValue &head) {
+  const std::string library = dfm_version(nullptr, nullptr, nullptr);
+  if (head.get("library") != library)
+    refuse(path, "written by version " + head.get("library") + " of the library, and this is " + library +
+                     "; run the scene again, or use that version");
   const JsonValue *const rows = head.find("plugins");
-  const std::map<std::string, Plugin> here = plugins_of(scene);
+  const std::map<std::string, std::string> here = versions(scene);
   for (size_t i = 0; rows && i < rows->items.size(); ++i) {
-    const JsonValue &then = rows->items[i];
-    const auto now = here.find(then.get("id"));
+    const std::string id = rows->items[i].get("id"), then = rows->items[i].get("version");
+    const auto now = here.find(id);
     if (now == here.end()) continue;  // where it is needed the restore says so
-    if (now->second.version != then.get("version"))
-      refuse(path, "written with '" + now->first + "' " + then.get("version") + ", and " +
-                       now->second.version + " is loaded here; run the scene again, or load that plugin");
-    if (now->second.hash != then.get("hash"))
-      refuse(path, "written with another build of '" + now->first + "' " + now->second.version +
-                       " than the one that is loaded here; run the scene again, or load that build");
+    if (now->second != then)
+      refuse(path, "written with '" + id + "' " + then + ", and " + now->second +
+                       " is loaded here; run the scene again, or load that plugin");
   }
 }
 
@@ -173,7 +192,7 @@ void read_state(const SceneFile &scene, const std::string &path) {
         path,
         "belongs to another scene than " + scene.path() +
             " as it is now; give the same scene and --set values (\"output\" and the duration may differ)");
-  check_plugins(scene, path, head);
+  check_versions(scene, path, head);
   const size_t bytes = text.size() - line - 1;
   if (head.get("bytes") != std::to_string(bytes))
     refuse(path, "cut short or damaged: it says that " + head.get("bytes") + " bytes of state follow, " +

@@ -23,8 +23,8 @@ void write_as_scene(const SceneFile &scene, const std::string &path);
 void check_scene_path(const SceneFile &scene, const std::string &path);
 
 // Puts the scene's world into the state of the file. Throws Failure where the file is damaged, of another
-// format or scene, or was written with another build of a plugin that is loaded here; the world is then as
-// before.
+// format or scene, or was written with another version of the library or of a plugin that it needs; the world
+// is then as before.
 void read_state(const SceneFile &scene, const std::string &path);
 
 }  // namespace cli

@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 
+#include "json_text.h"
 #include "messages.h"
 
 namespace cli {
@@ -27,6 +30,32 @@ double next_step(const SceneFile &scene, double start, double now) {
   if (left < step * (1 + (automatic ? 1e-6 : 1e-3)) && (automatic || std::fabs(left - step) > 1e-6 * step))
     step = left;
   return step;
+}
+
+void check_first_step(const SceneFile &scene) {
+  if (scene.value("/time/mode") == "\"static\"") return;
+  JsonValue plan;
+  if (!parse_json(scene.explain(), plan))
+    throw Failure(kBadInput, scene.path() + ": its plan cannot be read");
+  const JsonValue *const bound = plan.find("step"), *const bodies = plan.find("bodies");
+  if (!bound || !bodies) return;
+  const std::string name = bound->get("worst_body");
+  for (const JsonValue &body : bodies->items)
+    if (const JsonValue *const by = body.find("integrator"); body.get("name") == name && by)
+      if (by->get("why").rfind("auto", 0) == 0) return;
+  const double stable = std::strtod(bound->get("stable_s").c_str(), nullptr);  // 0: nothing bounds it
+  const double start = dfm_world_time(scene.world()), step = next_step(scene, start, start);
+  const uint32_t most = dfm_world_def_default().max_substeps;  // scenes have no key for it
+  if (!(stable > 0) || !(std::ceil(step / stable - 1e-9) > most)) return;
+  char text[160];
+  std::snprintf(text, sizeof text,
+                "/time/step: a step of %g s needs %.0f sub-steps of %g s, and at most %u are taken", step,
+                std::ceil(step / stable - 1e-9), stable, most);
+  throw Failure(kBadInput,
+                scene.path() + ": " + text + ": let body '" + name + "', whose point " +
+                    bound->get("worst_point") +
+                    " bounds the step, move by tr_bdf2 or implicit_euler, soften or coarsen it, lower its "
+                    "damping, or take a shorter step");
 }
 
 }  // namespace cli

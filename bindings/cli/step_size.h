@@ -10,5 +10,8 @@ namespace cli {
 double next_step(const SceneFile &scene, double start, double now);
 // The same where no end is near.
 double full_step(const SceneFile &scene);
+// Throws Failure where the first step needs more sub-steps than the library takes, which it would say after
+// the run's folder has been emptied. Bodies whose integrator is chosen by the library move implicitly then.
+void check_first_step(const SceneFile &scene);
 
 }  // namespace cli

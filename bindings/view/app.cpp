@@ -12,6 +12,7 @@
 #include "out_folder.h"
 #include "run.h"
 #include "run_folder.h"
+#include "shown.h"
 #include "state_file.h"
 
 namespace view {
@@ -345,7 +346,7 @@ void App::record() {
   attempt([&] {
     if (stage_->simulation.recording()) {
       const uint32_t n = stage_->simulation.stop_recording();
-      message_ = std::to_string(n) + " states recorded: deform replay " + options_.out;
+      message_ = std::to_string(n) + " states recorded: deform replay " + cli::shown_word(options_.out);
       return;
     }
     cli::make_folder(options_.out);

@@ -189,30 +189,52 @@ inline void gram_schmidt(const double *given, double *r) {
   }
 }
 
-// R = U diag(1, 1, det) V^T of f = U diag(s) V^T: V from the eigenvectors of f^T f, largest first, U from the
-// columns of f V, made orthogonal in that order. The square costs half of the digits of the small stretches.
+// R = U diag(1, 1, det) V^T of f = U diag(s) V^T by one-sided Jacobi (Hestenes, J. SIAM 6, 1958): turns V
+// make the columns of w = f V orthogonal relative to their lengths, so that small stretches keep their
+// digits. U are the columns of w over their lengths, longest first.
 inline void by_singular_values(const double *given, double *r) {
-  double f[9], c[3][3], v[3][3], turned[9], u[9];
-  if (!scaled(given, f)) return identity(r);
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) c[i][j] = (f[i] * f[j] + f[3 + i] * f[3 + j]) + f[6 + i] * f[6 + j];
-  jacobi(c, v);
+  double w[9], v[9], u[9];
+  if (!scaled(given, w)) return identity(r);
+  identity(v);
+  const auto product = [&](int p, int q) {
+    return (w[p] * w[q] + w[3 + p] * w[3 + q]) + w[6 + p] * w[6 + q];
+  };
+  double *const both[2] = {w, v};
+  bool turned = true;
+  for (int sweep = 0; turned && sweep < 30; ++sweep) {
+    turned = false;
+    for (int p = 0; p < 2; ++p)
+      for (int q = p + 1; q < 3; ++q) {
+        const double pp = product(p, p), qq = product(q, q), pq = product(p, q);
+        if (!(pq * pq > 1e-32 * pp * qq)) continue;
+        turned = true;
+        const double theta = (qq - pp) / (2 * pq);
+        const double t = (theta < 0 ? -1 : 1) / (std::fabs(theta) + std::sqrt(theta * theta + 1));
+        const double c = 1 / std::sqrt(t * t + 1), s = t * c;
+        for (double *const m : both)
+          for (int k = 0; k < 9; k += 3) {
+            const double x = m[k + p], y = m[k + q];
+            m[k + p] = c * x - s * y;
+            m[k + q] = s * x + c * y;
+          }
+      }
+  }
   int first = 0, last = 2;
   for (int k = 0; k < 3; ++k) {
-    if (c[k][k] > c[first][first]) first = k;
-    if (c[k][k] <= c[last][last]) last = k;
+    if (product(k, k) > product(first, first)) first = k;
+    if (product(k, k) <= product(last, last)) last = k;
   }
   if (last == first) last = (first + 2) % 3;
-  const int order[2] = {first, 3 - first - last};
-  double axis[3][3];
-  for (int k = 0; k < 2; ++k)
-    for (int i = 0; i < 3; ++i) axis[k][i] = v[i][order[k]];
+  const int order[3] = {first, 3 - first - last, last};
+  double axis[3][3], sorted[9];
+  for (int k = 0; k < 3; ++k)
+    for (int i = 0; i < 3; ++i) {
+      axis[k][i] = v[3 * i + order[k]];
+      sorted[3 * i + k] = w[3 * i + order[k]];
+    }
   for (int i = 0; i < 3; ++i)
     axis[2][i] = axis[0][(i + 1) % 3] * axis[1][(i + 2) % 3] - axis[0][(i + 2) % 3] * axis[1][(i + 1) % 3];
-  for (int i = 0; i < 3; ++i)
-    for (int k = 0; k < 3; ++k)
-      turned[3 * i + k] = (f[3 * i] * axis[k][0] + f[3 * i + 1] * axis[k][1]) + f[3 * i + 2] * axis[k][2];
-  gram_schmidt(turned, u);
+  gram_schmidt(sorted, u);
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j)
       r[3 * i + j] = (u[3 * i] * axis[0][j] + u[3 * i + 1] * axis[1][j]) + u[3 * i + 2] * axis[2][j];

@@ -216,6 +216,14 @@ TEST(MeshCommand, ConvertForeignFormat_ReadsItOrExplainsHow) {
   }
 }
 
+TEST(MeshCommand, SurfaceWithASpaceInItsName_IsFilledByTheCommandThatTheErrorNames) {
+  const std::string ball = folder() + "/a ball.stl";
+  ASSERT_EQ(test::deform({"mesh", "make", "ball", "--quiet", "--out", ball}).exit_code, 0);
+  const std::string cells = folder() + "/a ball.vtu";
+  expect_refused({"mesh", "convert", ball, folder() + "/a ball.msh"},
+                 {"deform mesh fill '" + ball + "' --out '" + cells + "'"});
+}
+
 TEST(MeshCommand, Fill_PrintsTheBodyOfAScene) {
   const auto here = [](const std::string &path) {
     return std::filesystem::proximate(path, std::filesystem::current_path()).string();

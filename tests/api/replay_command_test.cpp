@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <regex>
 
+#include "deform/deform.h"
 #include "support.h"
 
 namespace fs = std::filesystem;
@@ -101,17 +103,38 @@ TEST(Replay, WhatDoesNotFit_IsReportedAndNothingIsLost) {
   changed[kept.size() - 200] ^= 1;
   test::write_file(f.path + "/changed.state", changed);
   says(f.run({"--out", other, "--from", f.path + "/changed.state"}), "changed.state");
-  std::string rebuilt = kept;
-  const size_t at = rebuilt.find("\"hash\"", rebuilt.find("org.deform.msm")) + 9;
-  rebuilt[at] = rebuilt[at] == '0' ? '1' : '0';
-  test::write_file(f.path + "/rebuilt.state", rebuilt);
-  says(f.run({"--out", other, "--from", f.path + "/rebuilt.state"}), "another build of 'org.deform.msm'");
+  const auto with_version = [&](const char *of, const char *name) {
+    std::string text = kept;
+    const size_t at = text.find(of) + std::string(of).size();
+    text.replace(at, text.find('"', at) - at, "9.8.7");
+    test::write_file(f.path + "/" + name, text);
+    return f.run({"--out", other, "--from", f.path + "/" + name});
+  };
+  says(with_version("\"library\": \"", "library.state"),
+       "written by version 9.8.7 of the library, and this is ");
+  says(with_version("\"id\": \"org.deform.lugre\", \"version\": \"", "law.state"),
+       "written with 'org.deform.lugre' 9.8.7, and ");
   says(test::deform({"replay", f.path}), "no recording in this folder");
   says(test::deform({"replay", out, "--set", "/time/step=1e-3"}), "only values under /output");
   EXPECT_EQ(test::read_file(state), kept);
   says(test::deform({"run", f.scene, "--set", "/time/mode=\"static\"", "--set", "/bodies/0/switch=[]",
                      "--out", other, "--save", "0.05", f.path + "/x.state"}),
        "equilibria");
+}
+
+// The model that a body has, the one that it changes to and its law, by version: neither the other plugins
+// that are loaded nor what tells one build of them from another.
+TEST(Replay, SavedState_NamesWhatTheSceneCallsByVersion) {
+  const Folder f;
+  const std::string state = f.path + "/mid.state";
+  ASSERT_EQ(f.run({"--out", f.path + "/run", "--save", "0.02", state}).exit_code, 0);
+  const std::string text = test::read_file(state), head = text.substr(0, text.find('\n'));
+  const std::string version = dfm_version(nullptr, nullptr, nullptr), row = R"(\{"id": "org.deform.)";
+  const std::regex expected(R"(.*"library": ")" + version + R"(".*"plugins": \[)" + row +
+                            R"(corotational_fem", "version": "[0-9.]+"\}, )" + row +
+                            R"(lugre", "version": "[0-9.]+"\}, )" + row +
+                            R"(msm", "version": "[0-9.]+"\}\].*)");
+  EXPECT_TRUE(std::regex_match(head, expected)) << head;
 }
 
 TEST(Replay, StateOfALaterVersion_IsRefused) {

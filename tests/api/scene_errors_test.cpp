@@ -84,6 +84,20 @@ TEST(SceneErrors, TheSceneItself_Runs) {
   EXPECT_EQ(result.exit_code, 0) << result.err;
 }
 
+TEST(SceneErrors, AMeshInPlaceOfTheScene_IsNamedWithTheSceneToWrite) {
+  expect_refused(
+      run({folder() + "/block.msh"}),
+      {"block.msh: this is a mesh (MSH), and a scene is expected",
+       "{\"name\": \"body\", \"mesh\": \"block.msh\"}", "deform mesh info " + folder() + "/block.msh"},
+      "MSH");
+  for (const char *ending : {"stl", "obj", "ply", "off", "vtk", "vtu", "mesh", "step"}) {
+    const std::string file = folder() + "/a ball." + ending;
+    if (std::string(ending) == "step") test::write_file(file, "ISO-10303-21;\n");
+    else test::deform({"mesh", "make", "ball", "--cells", "100", "--quiet", "--out", file});
+    expect_refused(run({file}), {"this is a mesh (", "deform mesh info '" + file + "'"}, ending);
+  }
+}
+
 TEST(SceneErrors, UnknownKeys_NameTheNearest) {
   check({{"/gravty=[0,0,0]", {"/gravty", "did you mean \"gravity\"?"}},
          {"/bodies/0/mesg=\"x\"", {"/bodies/0/mesg", "did you mean \"mesh\"?"}},
@@ -94,6 +108,18 @@ TEST(SceneErrors, UnknownKeys_NameTheNearest) {
          {"/bodies/0/model/params/volum=1", {"/bodies/0/model/params/volum", "volume"}},
          {"/contact/friction/0/params/mu_X=1", {"/contact/friction/0/params/mu_X", "mu_"}},
          {"/obstacles/0/radius=1", {"/obstacles/0/radius", "the shape plane has no \"radius\""}}});
+}
+
+TEST(SceneErrors, StepThatNeedsTooManySubSteps_IsRefusedBeforeTheRun) {
+  expect_refused(run({scene(), "--set", "/materials/gel/young=1e13", "--set",
+                      R"(/time={"duration":0.1,"step":0.1,"integrator":"symplectic_euler"})"}),
+                 {"scene.json: /time/step: a step of 0.1 s needs", "at most 10000 are taken",
+                  "body 'block', whose point", "move by tr_bdf2"},
+                 "step");
+  EXPECT_EQ(
+      run({scene(), "--set", "/materials/gel/young=1e13", "--set", R"(/time={"duration":0.1,"step":0.1})"})
+          .exit_code,
+      0);
 }
 
 TEST(SceneErrors, WrongTypes_NameWhatWasExpected) {

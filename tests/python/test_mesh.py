@@ -55,6 +55,32 @@ class Meshes(unittest.TestCase):
             np.testing.assert_allclose(body.positions, surface.points, atol=1e-9)
             self.assertAlmostEqual(body.measure.mass / (1000 * surface.volume), 1, delta=0.02)
 
+    def test_surface_where_cells_are_needed_names_fill(self):
+        with tempfile.TemporaryDirectory(suffix=" with space") as folder, deform.World() as world:
+            file = str(pathlib.Path(folder) / "ball.stl")
+            deform.TriMesh.make("ball", [0.1], 200).write(file)
+            with self.assertRaisesRegex(deform.Error, r"TetMesh\.fill in Python.*mesh fill '.*ball\.stl' "
+                                                      r"--out '.*ball\.vtu'"):
+                world.add_body(file)
+
+    def test_shares_are_kept_or_missed(self):
+        mesh = deform.TetMesh.fill(deform.TriMesh.make("ball", [0.1], 200), cells=300)
+        with tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder) / "ball.msh"
+            with self.assertLogs("deform", "WARNING") as said:
+                mesh.write(file)
+            self.assertEqual(len(said.output), 1)
+            self.assertRegex(said.output[0], r"ball\.msh does not keep how much.*write \.vtu")
+            with self.assertNoLogs("deform", "WARNING"):
+                mesh.write(file.with_suffix(".vtu"))
+            meshio.write(file.with_suffix(".vtk"), mesh.to_meshio())
+            for again in (deform.TetMesh.read(file.with_suffix(".vtu")),
+                          deform.TetMesh.read(file.with_suffix(".vtk")),
+                          deform.TetMesh.from_meshio(mesh.to_meshio())):
+                np.testing.assert_array_equal(again.share, mesh.share)
+        with self.assertRaisesRegex(deform.ArgumentError, "share must hold"):
+            deform.TetMesh.from_arrays(mesh.points, mesh.tets, mesh.share[:-1])
+
     def test_through_meshio(self):
         mesh = deform.TetMesh.ball(0.1, 300)
         there = mesh.to_meshio()

@@ -166,7 +166,7 @@ class TetMesh(_Mesh):
         return cls(out.value, surface._context)
 
     def write(self, path: Any) -> None:
-        """Writes *.msh, *.msh2, *.vtk, *.vtu or *.mesh."""
+        """Writes *.msh, *.msh2, *.vtk, *.vtu or *.mesh; only VTK and VTU keep the shares of a filled mesh."""
         check(lib.dfm_tetmesh_write(self.handle, encoded(path)))
 
     def _arrays(self) -> tuple[int | None, int | None]:
@@ -228,10 +228,18 @@ class TetMesh(_Mesh):
                                        n.value, 0, triangles.value, group.value)
 
     @classmethod
-    def from_arrays(cls, points: Any, tets: Any) -> TetMesh:
+    def from_arrays(cls, points: Any, tets: Any, share: Any = None) -> TetMesh:
         """points [n,3] m, tets [m,4]; repaired as a file is: cells turned, unused points and doubles
-        dropped."""
+        dropped. share: [m] how much of each cell is material, in (0,1], as TetMesh.share gives it."""
         p, t = points_of(points), cells_of(tets, 4, "tets")
+        data = b""
+        if share is not None:
+            s = np.ascontiguousarray(array_of(share, "share", "a number for each cell"), dtype=">f8")
+            if s.shape != (len(t),) or not ((s > 0) & (s <= 1)).all():
+                raise ArgumentError(f"share must hold {len(t)} numbers, one for each cell, above 0 and up "
+                                    "to 1", "DFM_E_ARG")
+            data = (f"\nCELL_DATA {len(t)}\nSCALARS share double 1\nLOOKUP_TABLE default\n".encode()
+                    + s.tobytes())
         if t.size and int(t.max()) >= len(p):
             raise ArgumentError(f"tets name point {t.max()}, but there are {len(p)} points", "DFM_E_ARG")
         rows = np.empty((len(t), 5), dtype=">i4")
@@ -241,7 +249,8 @@ class TetMesh(_Mesh):
             file.write_bytes(b"# vtk DataFile Version 3.0\narrays\nBINARY\nDATASET UNSTRUCTURED_GRID\n"
                              + f"POINTS {len(p)} double\n".encode() + p.astype(">f8").tobytes()
                              + f"\nCELLS {len(t)} {rows.size}\n".encode() + rows.tobytes()
-                             + f"\nCELL_TYPES {len(t)}\n".encode() + np.full(len(t), 10, ">i4").tobytes())
+                             + f"\nCELL_TYPES {len(t)}\n".encode() + np.full(len(t), 10, ">i4").tobytes()
+                             + data)
             with called(str(file), "from_arrays"):
                 return cls.read(file)
 
@@ -251,16 +260,18 @@ class TetMesh(_Mesh):
         return cls.from_arrays(*_meshio_cells(mesh, "tetra"))
 
     def to_meshio(self) -> Any:
-        """The same as a `meshio.Mesh`."""
+        """The same as a `meshio.Mesh`; shares of material are its cell data `share`."""
         import meshio
-        return meshio.Mesh(np.array(self.points), [("tetra", self.tets.astype(np.int64))])
+        share = self.share
+        return meshio.Mesh(np.array(self.points), [("tetra", self.tets.astype(np.int64))],
+                           cell_data=None if share is None else {"share": [np.array(share)]})
 
     def __repr__(self) -> str:
         info = self.info
         return f"<deform.TetMesh: {info.npoint} points, {info.ntet} tetrahedra, {self.volume:.6g} m3>"
 
 
-def _meshio_cells(mesh: Any, kind: str) -> tuple[np.ndarray, np.ndarray]:
+def _meshio_cells(mesh: Any, kind: str) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
     if not hasattr(mesh, "cells_dict"):
         import meshio
         mesh = meshio.read(mesh)
@@ -269,7 +280,8 @@ def _meshio_cells(mesh: Any, kind: str) -> tuple[np.ndarray, np.ndarray]:
                             f"{', '.join(mesh.cells_dict) or 'none'}", "DFM_E_ARG")
     points = np.zeros((len(mesh.points), 3))
     points[:, :np.shape(mesh.points)[1]] = mesh.points
-    return points, mesh.cells_dict[kind]
+    share = mesh.cell_data_dict.get("share", {}).get(kind)
+    return points, mesh.cells_dict[kind], share
 
 
 class TriMesh(_Mesh):
@@ -328,7 +340,7 @@ class TriMesh(_Mesh):
     @classmethod
     def from_meshio(cls, mesh: Any) -> TriMesh:
         """From a `meshio.Mesh` (or the path of a file that meshio reads): its triangles."""
-        return cls.from_arrays(*_meshio_cells(mesh, "triangle"))
+        return cls.from_arrays(*_meshio_cells(mesh, "triangle")[:2])
 
     def to_meshio(self) -> Any:
         """The same as a `meshio.Mesh`."""

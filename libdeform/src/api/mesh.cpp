@@ -142,6 +142,12 @@ dfm_status dfm_tetmesh_group_points(dfm_tetmesh mesh, uint32_t group, uint32_t *
 dfm_status dfm_tetmesh_write(dfm_tetmesh mesh, const char *path) {
   return as_status([&] {
     need(path, "path");
-    dfm::write_tet_mesh(Object::of(mesh).mesh, path);
+    const Object &object = Object::of(mesh);
+    if (!dfm::write_tet_mesh(object.mesh, path))
+      object.context.logf(
+          DFM_LOG_WARNING,
+          "%s does not keep how much of each cell is material: a body of this file counts every cell "
+          "whole in mass and stiffness; write .vtu or .vtk, which keep it",
+          path);
   });
 }

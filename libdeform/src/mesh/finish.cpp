@@ -6,8 +6,9 @@
 #include <array>
 #include <cfloat>
 #include <cmath>
+#include <filesystem>
 
-#include "core/error.h"
+#include "core/names.h"
 #include "math/vec3.h"
 #include "mesh/faces.h"
 #include "mesh/finish.h"
@@ -252,9 +253,10 @@ TetMesh finish_mesh(const std::string &path, RawMesh &&raw) {
   TetMesh mesh(*raw.memory);
   if (raw.tets.empty() && !raw.tris.empty())
     fail(DFM_E_FORMAT,
-         "%s: no tetrahedra in this file, only a surface of %u triangles; fill it first: deform mesh fill %s "
-         "--out OUT.msh",
-         path.c_str(), raw.ntri(), path.c_str());
+         "%s: no tetrahedra in this file, only a surface of %u triangles; fill it: TetMesh.fill in Python, "
+         "dfm_tetmesh_fill in C, or deform mesh fill %s --out %s",
+         path.c_str(), raw.ntri(), shell_word(path).c_str(),
+         shell_word(std::filesystem::path(path).replace_extension(".vtu").string()).c_str());
   if (raw.tets.empty())
     fail(DFM_E_FORMAT, "%s: no tetrahedra in this file; a body needs a volume mesh or a closed surface",
          path.c_str());

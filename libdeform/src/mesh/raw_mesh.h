@@ -73,6 +73,9 @@ void read_off(Cursor &in, RawMesh &out);
 RawMesh read_raw(const Memory &memory, const std::string &path);
 RawMesh parse_raw(const Memory &memory, const std::string &path, const char *bytes, size_t size);
 
+// What kind of mesh a file is, by its first bytes or the ending of its name ("STL"); empty: none is known.
+std::string mesh_kind(const std::string &path, std::string_view bytes);
+
 // A file of either kind: its cells, or the surface that it holds instead.
 struct AnyMesh {
   std::optional<TetMesh> cells;

@@ -163,6 +163,12 @@ Mesh finish_with_warnings(Mesh (*finish)(const std::string &, RawMesh &&), const
 
 }  // namespace
 
+std::string mesh_kind(const std::string &path, std::string_view bytes) {
+  const Format *const seen = format_by_content(bytes), *const found =
+                                                           seen ? seen : format_by_ending(ending(path));
+  return found ? found->name : "";
+}
+
 RawMesh parse_raw(const Memory &memory, const std::string &path, const char *bytes, size_t size) {
   RawMesh raw(memory);
   // byte order mark, written by some editors

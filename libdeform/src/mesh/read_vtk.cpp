@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <bit>
 #include <cctype>
+#include <utility>
 
 #include "mesh/vtk.h"
 
@@ -382,6 +383,7 @@ class VtkReader {
         read_group_numbers(product(2, tuples));
       else if (name == kVtkGroupName && width == 1 && type == Number::text)
         skip_strings(tuples, &group_names_);
+      else if (name == kVtkGroupName && width == 1 && type == Number::u8) read_group_names(tuples);
       else keep_or_skip(n_cells && width == 1 && tuples == *n_cells, name, type, product(width, tuples));
     }
   }
@@ -390,6 +392,17 @@ class VtkReader {
     begin_data("an array's type");
     const uint64_t m = count(n, 1, Number::i32, "numbers of groups");
     for (uint64_t i = 0; i < m; ++i) group_numbers_.push_back(integer(Number::i32, "a group's number"));
+  }
+
+  void read_group_names(int64_t n) {
+    begin_data("an array's type");
+    const uint64_t m = count(n, 1, Number::u8, "characters of names");
+    std::string name;
+    for (uint64_t i = 0; i < m; ++i) {
+      const int64_t c = integer(Number::u8, "a character of a group's name");
+      if (c) name += static_cast<char>(c);
+      else group_names_.push_back(std::exchange(name, {}));
+    }
   }
 
   void skip_values(Number type, int64_t n) {

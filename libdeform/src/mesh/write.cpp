@@ -43,25 +43,20 @@ Array<double> shares(const TetMesh &mesh) {
   return out;
 }
 
-// Lengths of strings in binary legacy files: the top bits of the first byte give the size of
-// the length.
-void put_string(AtomicFile &out, const std::string &s) {
-  if (s.size() < 64) out.put(static_cast<uint8_t>(0xc0 | s.size()));
-  else out.put(big_endian(static_cast<uint16_t>(0x8000 | std::min<size_t>(s.size(), 0x3fff))));
-  out.write(s.data(), std::min<size_t>(s.size(), 0x3fff));
-}
-
+// Behind the cells, because gmsh expects POINTS first. Names are characters, each name ended by a zero,
+// because meshio refuses a file with strings.
 void put_group_names(AtomicFile &out, const TetMesh &mesh) {
   if (mesh.groups.empty()) return;
-  const std::string n = text(mesh.groups.size());
-  out.write(std::string("FIELD FieldData 2\n") + kVtkGroupNumber + " 2 " + n + " int\n");
+  out.write(std::string("FIELD FieldData 2\n") + kVtkGroupNumber + " 2 " + text(mesh.groups.size()) +
+            " int\n");
+  std::string names;
   for (const MeshGroup &g : mesh.groups) {
     out.put(big_endian(g.dimension));
     out.put(big_endian(g.tag));
+    names += g.name + '\0';
   }
-  out.write(std::string("\n") + kVtkGroupName + " 1 " + n + " string\n");
-  for (const MeshGroup &g : mesh.groups) put_string(out, g.name);
-  out.write("\n");
+  out.write(std::string("\n") + kVtkGroupName + " 1 " + text(names.size()) + " unsigned_char\n" + names +
+            "\n");
 }
 
 void put_cells(AtomicFile &out, const Array<uint32_t> &cells, uint32_t corners) {
@@ -107,7 +102,6 @@ void write_vtk(const TetMesh &mesh, const std::string &path) {
   AtomicFile out(path);
   const uint64_t ntri = mesh.tri_group.size(), ncell = mesh.ntet() + ntri;
   out.write("# vtk DataFile Version 3.0\ntetrahedra\nBINARY\nDATASET UNSTRUCTURED_GRID\n");
-  put_group_names(out, mesh);
   out.write("POINTS " + text(mesh.npoint()) + " double\n");
   for (const double x : mesh.points) out.put(big_endian(x));
   out.write("\nCELLS " + text(ncell) + " " + text(5 * uint64_t(mesh.ntet()) + 4 * ntri) + "\n");
@@ -115,9 +109,11 @@ void write_vtk(const TetMesh &mesh, const std::string &path) {
   put_cells(out, mesh.tris, 3);
   out.write("\nCELL_TYPES " + text(ncell) + "\n");
   for (uint64_t t = 0; t < ncell; ++t) out.put(big_endian(int32_t(t < mesh.ntet() ? 10 : 5)));
+  out.write("\n");
+  put_group_names(out, mesh);
   const Array<uint32_t> groups = group_numbers(mesh);
   const Array<double> share = shares(mesh);
-  if (!groups.empty() || !share.empty()) out.write("\nCELL_DATA " + text(ncell) + "\n");
+  if (!groups.empty() || !share.empty()) out.write("CELL_DATA " + text(ncell) + "\n");
   if (!groups.empty()) {
     out.write(std::string("SCALARS ") + kVtkGroup + " int 1\nLOOKUP_TABLE default\n");
     for (const uint32_t g : groups) out.put(big_endian(g));
@@ -126,8 +122,8 @@ void write_vtk(const TetMesh &mesh, const std::string &path) {
   if (!share.empty()) {
     out.write("SCALARS share double 1\nLOOKUP_TABLE default\n");
     for (const double s : share) out.put(big_endian(s));
+    out.write("\n");
   }
-  out.write("\n");
   out.commit();
 }
 
@@ -161,7 +157,7 @@ void write_medit(const TetMesh &mesh, const std::string &path) {
   out.commit();
 }
 
-void write_tet_mesh(const TetMesh &mesh, const std::string &path) {
+bool write_tet_mesh(const TetMesh &mesh, const std::string &path) {
   const auto ends = [&](const char *ending) {
     const std::string e(ending);
     const auto same = [](char a, char b) { return a == std::tolower(static_cast<unsigned char>(b)); };
@@ -177,6 +173,7 @@ void write_tet_mesh(const TetMesh &mesh, const std::string &path) {
          "%s: tetrahedra are not written to this file name ending; expected .msh (MSH 4.1), .msh2 (MSH 2.2), "
          ".vtk (legacy VTK), .vtu (VTU) or .mesh (Medit)",
          path.c_str());
+  return mesh.share.empty() || ends(".vtk") || ends(".vtu");
 }
 
 }  // namespace dfm

@@ -58,18 +58,19 @@ void put_off(AtomicFile &out, const TriMesh &mesh) {
     out.write("3 " + text(mesh.tris[i]) + " " + text(mesh.tris[i + 1]) + " " + text(mesh.tris[i + 2]) + "\n");
 }
 
+// As text, because gmsh reads no binary doubles, and meshio no binary numbers behind a list.
 void put_ply(AtomicFile &out, const TriMesh &mesh) {
-  out.write("ply\nformat binary_little_endian 1.0\nelement vertex " + text(mesh.npoint()) +
+  const bool grouped = !mesh.groups.empty();
+  out.write("ply\nformat ascii 1.0\nelement vertex " + text(mesh.npoint()) +
             "\nproperty double x\nproperty double y\nproperty double z\nelement face " + text(mesh.ntri()) +
-            "\nproperty list uchar uint vertex_indices\n" +
-            (mesh.groups.empty() ? "" : "property int group\n") + "end_header\n");
-  for (const double x : mesh.points) put_as(out, std::endian::little, x);
+            "\nproperty list uchar uint vertex_indices\n" + (grouped ? "property int group\n" : "") +
+            "end_header\n");
+  put_points(out, mesh, "");
   for (uint32_t t = 0; t < mesh.ntri(); ++t) {
-    out.put(uint8_t(3));
-    for (int k = 0; k < 3; ++k) put_as(out, std::endian::little, mesh.tris[3 * size_t(t) + k]);
-    if (!mesh.groups.empty())
-      put_as(out, std::endian::little,
-             mesh.tri_group[t] == kNoGroup ? 0 : mesh.groups[mesh.tri_group[t]].tag);
+    const uint32_t *c = &mesh.tris[3 * size_t(t)], group = mesh.tri_group[t];
+    out.write("3 " + text(c[0]) + " " + text(c[1]) + " " + text(c[2]));
+    if (grouped) out.write(" " + std::to_string(group == kNoGroup ? 0 : mesh.groups[group].tag));
+    out.write("\n");
   }
 }
 

@@ -7,20 +7,20 @@
 namespace dfm {
 namespace {
 
-// As numbers of characters, each text ended by a zero: what VTK reads as an array of strings.
+// Names as numbers of characters, each name ended by a zero, not of the type String, which meshio refuses.
 std::string names_xml(const std::vector<MeshGroup> &groups) {
   const std::string n = std::to_string(groups.size());
   std::string numbers, letters;
+  size_t nletter = 0;
   for (const MeshGroup &g : groups) {
     numbers += " " + std::to_string(g.dimension) + " " + std::to_string(g.tag);
-    for (const char c : g.name)
-      letters += " " + std::to_string(static_cast<int>(static_cast<signed char>(c)));
-    letters += " 0";
+    for (const char c : g.name + '\0') letters += " " + std::to_string(static_cast<unsigned char>(c));
+    nletter += g.name.size() + 1;
   }
   return std::string("    <FieldData>\n      <DataArray type=\"Int32\" Name=\"") + kVtkGroupNumber +
          "\" NumberOfComponents=\"2\" NumberOfTuples=\"" + n + "\" format=\"ascii\">" + numbers +
-         "</DataArray>\n      <DataArray type=\"String\" Name=\"" + kVtkGroupName + "\" NumberOfTuples=\"" +
-         n + "\" format=\"ascii\">" + letters + "</DataArray>\n    </FieldData>\n";
+         "</DataArray>\n      <DataArray type=\"UInt8\" Name=\"" + kVtkGroupName + "\" NumberOfTuples=\"" +
+         std::to_string(nletter) + "\" format=\"ascii\">" + letters + "</DataArray>\n    </FieldData>\n";
 }
 
 std::string escaped(const char *name) {

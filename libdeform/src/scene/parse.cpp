@@ -7,6 +7,8 @@
 #include <set>
 
 #include "core/file.h"
+#include "core/names.h"
+#include "mesh/raw_mesh.h"
 #include "scene/node.h"
 
 namespace dfm::scene {
@@ -135,9 +137,30 @@ json parse_text(const std::string &text, const std::string &file) {
   }
 }
 
+namespace {
+
+void refuse_mesh(const std::string &path, const std::string &text) {
+  const std::string kind = mesh_kind(path, text);
+  if (kind.empty()) return;
+  const json name = path.substr(path.find_last_of('/') + 1);
+  fail(
+      DFM_E_FORMAT,
+      "%s: this is a mesh (%s), and a scene is expected; write one beside it: {\"format\": \"deform-scene\", "
+      "\"version\": 1, \"time\": {\"duration\": 1}, \"bodies\": [{\"name\": \"body\", \"mesh\": %s}]}, or "
+      "look at "
+      "the mesh: deform mesh info %s",
+      path.c_str(), kind.c_str(), name.dump(-1, ' ', false, json::error_handler_t::replace).c_str(),
+      shell_word(path).c_str());
+}
+
+}  // namespace
+
 json parse_file(const std::string &path) {
   const Array<char> bytes = read_whole_file(Memory::standard(), path, kMaxBytes, "a scene file (JSON)");
-  return parse_text(std::string(bytes.begin(), bytes.end()), path);
+  const std::string text(bytes.begin(), bytes.end());
+  if (const size_t first = text.find_first_not_of(" \t\r\n"); first != text.npos && text[first] != '{')
+    refuse_mesh(path, text);
+  return parse_text(text, path);
 }
 
 namespace {

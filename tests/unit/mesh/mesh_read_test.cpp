@@ -255,6 +255,16 @@ TEST(MeshRead, LongLinesAndCarriageReturns_AreFine) {
   EXPECT_EQ(read_text("long.vtk", text).ntet(), 1u);
 }
 
+// VTK and our writer of old: names as strings, before the points.
+TEST(MeshRead, VtkNamesAsStrings_NameTheGroups) {
+  const TetMesh m = read_text("named.vtk", kVtk + "FIELD FieldData 2\ngroup_number 2 1 int\n3 7\n" +
+                                               "group_name 1 1 string\nsoft part\n" + kFour +
+                                               "CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\nCELL_DATA 1\n" +
+                                               "SCALARS group int 1\nLOOKUP_TABLE default\n7\n");
+  ASSERT_EQ(m.groups.size(), 1u);
+  EXPECT_EQ(m.groups[0].name, "soft part");
+}
+
 TEST(MeshRead, VtkStructure_IsChecked) {
   expect_refusal("v.vtk", "hello\n", DFM_E_FORMAT, {"v.vtk:1", "# vtk DataFile Version", "hello"});
   expect_refusal("v.vtk", "# vtk DataFile Version 9.7\nt\nASCII\n", DFM_E_UNSUPPORTED, {"9.7", "2.0 to 5.1"});
@@ -280,7 +290,9 @@ TEST(MeshRead, VtkStructure_IsChecked) {
   expect_refusal("v.vtk", kVtk + kFour + "CELLS 1 4\n3 0 1 2\nCELL_TYPES 1\n10\n", DFM_E_FORMAT,
                  {"tetrahedron", "3 points"});
   expect_refusal("v.vtk", kVtk + kFour + "CELLS 1 4\n3 0 1 2\nCELL_TYPES 1\n5\n", DFM_E_FORMAT,
-                 {"no tetrahedra"});
+                 {"no tetrahedra", "TetMesh.fill", "deform mesh fill /", "/v.vtk --out /", "/v.vtu"});
+  expect_refusal("a v.vtk", kVtk + kFour + "CELLS 1 4\n3 0 1 2\nCELL_TYPES 1\n5\n", DFM_E_FORMAT,
+                 {"deform mesh fill '/", "/a v.vtk' --out '/", "/a v.vtu'"});
   expect_refusal("v.vtk", kVtk + kFour + "CELLS 2 8\nOFFSETS int\n0 5\nCONNECTIVITY int\n0 1 2 3\n",
                  DFM_E_FORMAT, {"last cell offset"});
   expect_refusal("v.vtk", kVtk + kFour + "CELLS 3 8\nOFFSETS int\n0 5 4\nCONNECTIVITY int\n0 1 2 3\n",

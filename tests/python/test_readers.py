@@ -1,0 +1,197 @@
+"""What the command writes, read by programs of others: meshio, VTK and gmsh. No library of ours is loaded."""
+import importlib.util
+import json
+import os
+import pathlib
+import shutil
+import subprocess
+import tempfile
+import unittest
+
+import meshio
+import numpy as np
+
+SOURCE = pathlib.Path(os.environ["DEFORM_SOURCE"])
+MISSING = [name for name in ("vtk", "gmsh") if importlib.util.find_spec(name) is None]
+CELLS, SURFACES = ("msh", "msh2", "vtk", "vtu", "mesh"), ("obj", "ply", "stl", "off", "vtk", "vtu")
+CUBE = SOURCE / "tests" / "data" / "meshes" / "cube_msh41_ascii.msh"  # groups of cells and triangles
+
+
+def deform(*arguments):
+    return subprocess.run([os.environ["DEFORM_COMMAND"], *map(str, arguments)], check=True, text=True,
+                          capture_output=True).stdout
+
+
+def mesh(path):
+    return json.loads(deform("mesh", "info", "--json", path))
+
+
+def volume(points, cells, corners):
+    """m3 of tetrahedra, or inside of triangles."""
+    x = np.asarray(points, float)[np.asarray(cells).reshape(-1, corners)]
+    if corners == 4:
+        x = x[:, 1:] - x[:, :1]
+    return float(np.linalg.det(x).sum() / 6) if len(x) else 0.0
+
+
+def by_meshio(path):
+    """(points, {type: cells}, cell arrays, field data)"""
+    read = meshio.read(path, file_format="gmsh" if path.suffix == ".msh2" else None)
+    return read.points, read.cells_dict, read.cell_data_dict, read.field_data
+
+
+def by_vtk(path):
+    import vtk
+    from vtk.util.numpy_support import vtk_to_numpy
+    reader = {".vtk": vtk.vtkUnstructuredGridReader, ".vtu": vtk.vtkXMLUnstructuredGridReader,
+              ".obj": vtk.vtkOBJReader, ".ply": vtk.vtkPLYReader, ".stl": vtk.vtkSTLReader}[path.suffix]()
+    said = []
+    for event in ("ErrorEvent", "WarningEvent"):
+        reader.AddObserver(event, lambda *_: said.append(event))
+    reader.SetFileName(str(path))
+    reader.Update()
+    grid = reader.GetOutput()
+    assert not said, f"{path}: {said}"
+    cells = {}
+    for c in range(grid.GetNumberOfCells()):
+        ids = grid.GetCell(c).GetPointIds()
+        kind = {3: "triangle", 4: "tetra"}[ids.GetNumberOfIds()]
+        cells.setdefault(kind, []).append([ids.GetId(k) for k in range(ids.GetNumberOfIds())])
+
+    def arrays(data):
+        return {data.GetArrayName(i): vtk_to_numpy(data.GetArray(i)) for i in range(data.GetNumberOfArrays())}
+    return (vtk_to_numpy(grid.GetPoints().GetData()), cells, arrays(grid.GetCellData()),
+            arrays(grid.GetFieldData()) | arrays(grid.GetPointData()))
+
+
+def by_gmsh(path):
+    """(points, {type: cells}, {(dimension, number): name of a group})"""
+    import gmsh
+    gmsh.initialize()
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.merge(str(path))
+        tags, x, _ = gmsh.model.mesh.getNodes()
+        place = np.zeros(int(max(tags)) + 1, int)
+        place[np.asarray(tags, int)] = np.arange(len(tags))
+        cells = {}
+        for kind, _, nodes in zip(*gmsh.model.mesh.getElements()):
+            corners, name = {2: (3, "triangle"), 4: (4, "tetra"), 15: (1, "point")}[kind]
+            cells[name] = place[np.asarray(nodes, int)].reshape(-1, corners)
+        groups = {(d, n): gmsh.model.getPhysicalName(d, n) for d, n in gmsh.model.getPhysicalGroups()}
+        return np.reshape(x, (-1, 3)), cells, groups
+    finally:
+        gmsh.finalize()
+
+
+@unittest.skipIf(MISSING, f"no {' and '.join(MISSING)} (cmake/deps.txt)")
+class Readers(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.kept = tempfile.TemporaryDirectory(suffix=" with space")
+        cls.folder = pathlib.Path(cls.kept.name)
+        deform("mesh", "make", "ball", "--cells", 300, "--out", cls.folder / "plain.msh")
+        deform("mesh", "make", "ball", "--cells", 300, "--surface", "--out", cls.folder / "skin.off")
+        deform("mesh", "fill", cls.folder / "skin.off", "--cells", 300, "--out", cls.folder / "filled.vtu")
+        (cls.folder / "parts.obj").write_text(
+            "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\ng one side\nf 1 3 2\nf 1 2 4\ng other\nf 2 3 4\nf 1 4 3\n")
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.kept.cleanup()
+
+    def written(self, source, ending):
+        out = self.folder / f"{source.stem}_out.{ending}"
+        deform("mesh", "convert", source, out)
+        return out
+
+    def readers(self, path):
+        """Which of them read a format; gmsh 4.8 has no VTU, OBJ and OFF, and knows MSH by .msh alone."""
+        yield "meshio", by_meshio(path)
+        if path.suffix in (".vtk", ".vtu", ".obj", ".ply", ".stl"):
+            yield "vtk", by_vtk(path)
+        if path.suffix == ".msh2":
+            path = pathlib.Path(shutil.copy(path, path.with_suffix(".22.msh")))
+        if path.suffix in (".msh", ".vtk", ".mesh", ".ply", ".stl"):
+            yield "gmsh", by_gmsh(path)
+
+    def test_cells_in_every_format(self):
+        for source in (self.folder / "plain.msh", self.folder / "filled.vtu", CUBE):
+            ours = mesh(source)
+            for ending in CELLS:
+                for name, (points, cells, *_) in self.readers(self.written(source, ending)):
+                    with self.subTest(source=source.name, ending=ending, reader=name):
+                        tets = cells["tetra"]
+                        self.assertEqual((len(points), len(tets)), (ours["points"], ours["tets"]))
+                        self.assertAlmostEqual(volume(points, tets, 4) / ours["volume"], 1, delta=1e-12)
+
+    def test_surfaces_in_every_format(self):
+        for source in (self.folder / "plain.msh", self.folder / "skin.off", self.folder / "parts.obj"):
+            ours = mesh(self.written(source, "off"))
+            for ending in SURFACES:
+                if source.suffix == ".msh" and ending in CELLS:
+                    continue  # cells are written
+                for name, (points, cells, *_) in self.readers(self.written(source, ending)):
+                    with self.subTest(source=source.name, ending=ending, reader=name):
+                        triangles = cells["triangle"]
+                        self.assertEqual((len(points), len(triangles)), (ours["points"], ours["triangles"]))
+                        self.assertAlmostEqual(volume(points, triangles, 3) / ours["volume"], 1,
+                                               delta=1e-5 if name == "vtk" or ending == "stl" else 1e-12)
+
+    def test_groups_and_shares(self):
+        named = {(2, 7): "skin", (3, 1): "low", (3, 2): "high end"}
+        for ending in ("msh", "msh2", "vtk", "vtu", "mesh"):
+            path = self.written(CUBE, ending)
+            data = by_meshio(path)[2]
+            numbers = data[{"mesh": "medit:ref"}.get(ending, "gmsh:physical" if "msh" in ending else "group")]
+            self.assertEqual([sorted(numbers[kind]) for kind in ("tetra", "triangle")],
+                             [[1] * 3 + [2] * 3, [7] * 12], ending)
+        for ending in ("msh", "msh2"):
+            path = pathlib.Path(shutil.copy(self.written(CUBE, ending), self.folder / "named.msh"))
+            self.assertEqual(by_gmsh(path)[2], named)
+            self.assertEqual({tuple(reversed(number)): name for name, number in by_meshio(path)[3].items()},
+                             {key: name for key, name in named.items()})
+        for ending in ("vtk", "vtu"):
+            for read in (by_meshio, by_vtk):
+                field = read(self.written(CUBE, ending))[3]
+                names = bytes(np.ravel(field["group_name"])).decode().split("\0")
+                numbers = np.reshape(field["group_number"], (-1, 2))
+                self.assertEqual(dict(zip(map(tuple, numbers.tolist()), names)), named, ending)
+            share = [by_meshio(self.folder / "filled.vtu")[2]["share"]["tetra"]]
+            share += [by_vtk(self.written(self.folder / "filled.vtu", ending))[2]["share"]]
+            np.testing.assert_array_equal(*map(np.ravel, share))
+        for ending in ("obj", "ply"):
+            groups = by_meshio(self.written(self.folder / "parts.obj", ending))[2]
+            numbers = [set(np.ravel(values["triangle"])) for values in groups.values()]
+            self.assertEqual([len(group) for group in numbers], [2], ending)
+
+    def test_states_of_a_run(self):
+        scene = {"format": "deform-scene", "version": 1, "time": {"duration": 0.01, "step": 0.005},
+                 "gravity": [0, 0, -10],
+                 "bodies": [{"name": "ball", "mesh": "skin.off", "fill": {"cells": 200},
+                             "model": {"type": "corotational_fem"}},
+                            {"name": "two parts", "mesh": str(CUBE), "pose": {"position": [3, 0, 0]}}],
+                 "output": {"every": 0.005, "states": True}}
+        (self.folder / "scene.json").write_text(json.dumps(scene))
+        deform("run", self.folder / "scene.json", "--quiet", "--out", self.folder / "out", "--save-scene",
+               self.folder / "saved.json")
+        states = sorted((self.folder / "out" / "states").glob("*.vtu"))
+        self.assertEqual(len(states), 4 * 3)
+        for path in states:
+            for read in (by_meshio, by_vtk):
+                points, cells, data, _ = read(path)
+                kind = "triangle" if "_surface_" in path.name else "tetra"
+                self.assertEqual(list(cells), [kind], path.name)
+                self.assertGreater(volume(points, cells[kind], 3 if kind == "triangle" else 4), 0)
+                self.assertEqual({"energy_density", "stress", "von_mises"} <= set(data),
+                                 kind == "tetra" and path.name.startswith("ball"), path.name)
+            arrays = meshio.read(path).point_data | by_vtk(path)[3]
+            self.assertEqual(np.shape(arrays["u"]), (len(points), 3), path.name)
+        saved = list(self.folder.glob("saved*.vtu")) + list(self.folder.glob("saved*/*.vtu"))
+        self.assertTrue(saved)
+        for path in saved:
+            self.assertEqual(len(by_meshio(path)[0]), len(by_vtk(path)[0]))
+
+
+if __name__ == "__main__":
+    unittest.main()
