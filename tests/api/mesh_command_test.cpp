@@ -66,12 +66,14 @@ TEST(MeshCommand, InterruptedWork_EndsAndLeavesTheOldFile) {
     std::filesystem::remove_all(dir);
     std::filesystem::create_directories(dir);
     test::write_file(out, "mine");
-    const pid_t child = test::start(arguments);
+    const pid_t child = test::start(arguments, "/dev/null", dir + ".err");
     std::this_thread::sleep_for(std::chrono::milliseconds(300));
     kill(child, SIGINT);
     int status = 0;
     waitpid(child, &status, 0);
     EXPECT_TRUE(WIFSIGNALED(status) && WTERMSIG(status) == SIGINT) << arguments[2] << ": status " << status;
+    EXPECT_EQ(test::read_file(dir + ".err"),
+              "deform: interrupted before its work was done; no unfinished file is left\n");
     EXPECT_EQ(test::read_file(out), "mine");
     EXPECT_EQ(std::distance(std::filesystem::directory_iterator(dir), {}), 1);
   }
