@@ -51,6 +51,40 @@ TEST(MeshCommand, InfoAsJson_HoldsTheSame) {
     EXPECT_TRUE(has(r.out, word)) << word << " not in\n" << r.out;
 }
 
+// Two cubes, the second moved by half a side, as a surface and as cells; apart they do not cross.
+TEST(MeshCommand, Info_CountsWhereTheSurfaceCrossesItself) {
+  const auto corner = [](int k, double by) {
+    char text[80];
+    std::snprintf(text, sizeof text, "%g %g %g\n", (k & 1) + by, (k >> 1 & 1) + by, (k >> 2) + by);
+    return std::string(text);
+  };
+  const int faces[12][3] = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                            {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+  for (const bool apart : {false, true}) {
+    std::string surface = "OFF\n16 24 0\n";
+    std::string cells =
+        "# vtk DataFile Version 3.0\ntwo\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 8 double\n";
+    for (int k = 0; k < 16; ++k) surface += corner(k % 8, k < 8 ? 0 : apart ? 2 : 0.3);
+    for (int k = 0; k < 24; ++k) {
+      surface += "3";
+      for (const int p : faces[k % 12]) surface += " " + std::to_string(p + (k < 12 ? 0 : 8));
+      surface += "\n";
+    }
+    for (const double by : {0.0, apart ? 2.0 : 0.1})
+      for (const int k : {0, 1, 2, 4}) cells += corner(k, by);
+    cells += "CELLS 2 10\n4 0 1 2 3\n4 4 5 6 7\nCELL_TYPES 2\n10\n10\n";
+    test::write_file(folder() + "/two.off", surface);
+    test::write_file(folder() + "/two.vtk", cells);
+    for (const char *const name : {"/two.off", "/two.vtk"}) {
+      const auto r = test::deform({"mesh", "info", folder() + name});
+      EXPECT_EQ(r.exit_code, 0) << r.err;
+      EXPECT_EQ(has(r.out, "warning: the surface crosses itself in "), !apart) << r.out;
+      const auto json = test::deform({"mesh", "info", "--json", folder() + name});
+      EXPECT_EQ(has(json.out, "\"self_crossings\": 0"), apart) << json.out;
+    }
+  }
+}
+
 // Ctrl-C in work that would take long: the command ends by the signal, and what lay under the name that it
 // was to write is still there, alone.
 TEST(MeshCommand, InterruptedWork_EndsAndLeavesTheOldFile) {
