@@ -131,6 +131,17 @@ TEST(MeshCommand, Make_WritesEachShape) {
     }
 }
 
+// A ball has 20 n^3 cells: 160 are nearest to 100. What is near enough to "about" is not spoken of.
+TEST(MeshCommand, MakeOfAnotherNumberOfCells_SaysSo) {
+  const auto said = [](const char *cells) {
+    const auto r = test::deform({"mesh", "make", "ball", "--cells", cells, "--out", folder() + "/about.vtu"});
+    EXPECT_EQ(r.exit_code, 0) << r.err;
+    return r.err;
+  };
+  EXPECT_TRUE(has(said("100"), "160 tetrahedra are made where 100 were asked for: the lattice of a ball"));
+  EXPECT_EQ(said("500"), "");
+}
+
 TEST(MeshCommand, Convert_ThereAndBackKeepsTheBytes) {
   const std::string a = folder() + "/a.msh", b = folder() + "/b.vtk", c = folder() + "/c.msh";
   ASSERT_EQ(test::deform({"mesh", "make", "ball", "--out", a, "--cells", "300", "--quiet"}).exit_code, 0);
