@@ -106,15 +106,14 @@ class Wheel(unittest.TestCase):
             self.assertIsNone(wheel_backend.release_build())
             build = pathlib.Path(name) / "build" / "release"
             build.mkdir(parents=True)
-            for place, kind, shared, taken in ((name, "Release", "ON", True), ("/moved", "Release", "ON", False),
-                                               (name, "Debug", "ON", False), (name, "Release", "OFF", False)):
+            for place, kind, shared, taken in (
+                    ("/moved", "Release", "ON", False), (name, "Debug", "ON", False),
+                    (name, "Release", "OFF", False), (name, "Release", "ON", True)):
                 (build / "CMakeCache.txt").write_text(
                     f"CMAKE_BUILD_TYPE:STRING={kind}\nCMAKE_HOME_DIRECTORY:INTERNAL={place}\n"
                     f"DEFORM_SHARED:BOOL={shared}\n")
                 self.assertEqual(wheel_backend.release_build(), build if taken else None)
             commands = []
-            (build / "CMakeCache.txt").write_text(
-                f"CMAKE_BUILD_TYPE:STRING=Release\nCMAKE_HOME_DIRECTORY:INTERNAL={name}\nDEFORM_SHARED:BOOL=ON\n")
             with unittest.mock.patch.object(wheel_backend, "_run", lambda *words: commands.append(words)):
                 for settings, used in (({}, build), ({"prebuilt": "no"}, build.parent / "wheel"),
                                        ({"cmake": "-DX=1"}, build.parent / "wheel")):
