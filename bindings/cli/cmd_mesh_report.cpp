@@ -1,8 +1,10 @@
 // Counts, quality, defects, groups and warnings of a mesh, as a table or as JSON.
 #include <algorithm>
+#include <array>
 #include <cstdio>
 
 #include "cmd_mesh.h"
+#include "crossing.h"
 #include "json_text.h"
 
 namespace cli {
@@ -72,7 +74,39 @@ double material_of(dfm_tetmesh mesh, uint32_t ntet) {
   return sum;
 }
 
-bool describe_cells(dfm_tetmesh mesh, Report &r) {
+// Faces that one cell alone has, [n,3] points.
+std::vector<uint32_t> boundary_of(const uint32_t *tets, uint32_t ntet) {
+  std::vector<std::array<uint32_t, 3>> faces;
+  faces.reserve(size_t{4} * ntet);
+  for (const uint32_t *t = tets; t != tets + size_t{4} * ntet; t += 4)
+    for (const auto &[a, b, c] : {std::array{0, 1, 2}, {0, 1, 3}, {0, 2, 3}, {1, 2, 3}}) {
+      faces.push_back({t[a], t[b], t[c]});
+      std::sort(faces.back().begin(), faces.back().end());
+    }
+  std::sort(faces.begin(), faces.end());
+  std::vector<uint32_t> out;
+  for (size_t i = 0, end = 0; i < faces.size(); i = end) {
+    for (end = i + 1; end < faces.size() && faces[end] == faces[i];) ++end;
+    if (end == i + 1) out.insert(out.end(), faces[i].begin(), faces[i].end());
+  }
+  return out;
+}
+
+void report_crossings(Report &r, const double *points, uint32_t npoint, const uint32_t *triangles,
+                      uint32_t ntriangle) {
+  const size_t pairs = crossing::Counter()
+                           .count({{.xyz = points, .n = npoint, .tri = triangles, .ntri = ntriangle}},
+                                  crossing::Touching::allowed)
+                           .within;
+  r.defects.push_back({"self_crossings", uint32_t(std::min<size_t>(pairs, UINT32_MAX))});
+  if (pairs > 0)
+    r.warnings.push_back("the surface crosses itself in " + std::to_string(pairs) +
+                         (pairs == 1 ? " pair" : " pairs") +
+                         " of triangles: the volume counts twice what two parts enclose, and contact with "
+                         "itself begins inside; mend the mesh in the program that made it");
+}
+
+bool describe_cells(dfm_tetmesh mesh, bool crossings, Report &r) {
   dfm_tetmesh_info i = {};
   i.size = sizeof i;
   if (dfm_tetmesh_get_info(mesh, &i) < 0) return false;
@@ -111,13 +145,19 @@ bool describe_cells(dfm_tetmesh mesh, Report &r) {
     r.groups[k].name = names[k];
     dfm_tetmesh_group_points(mesh, k, &r.groups[k].dimension, nullptr, &r.groups[k].count);
   }
+  const double *points = nullptr;
+  const uint32_t *tets = nullptr;
+  if (crossings && dfm_tetmesh_data(mesh, &points, &tets, nullptr) >= 0) {
+    const std::vector<uint32_t> boundary = boundary_of(tets, i.ntet);
+    report_crossings(r, points, i.npoint, boundary.data(), uint32_t(boundary.size() / 3));
+  }
   r.summary = std::to_string(i.npoint) + " points, " + std::to_string(i.ntet) + " tetrahedra, " +
               std::to_string(i.ntriangle) + " surface triangles, least mean ratio " +
               text("%.3g", i.quality_min);
   return true;
 }
 
-bool describe_surface(dfm_trimesh mesh, Report &r) {
+bool describe_surface(dfm_trimesh mesh, bool crossings, Report &r) {
   dfm_trimesh_info i = {};
   i.size = sizeof i;
   if (dfm_trimesh_get_info(mesh, &i) < 0) return false;
@@ -152,6 +192,10 @@ bool describe_surface(dfm_trimesh mesh, Report &r) {
   r.groups.resize(i.ngroup);
   for (uint32_t k = 0; k < i.ngroup; ++k)
     r.groups[k] = {names[k], 2, static_cast<uint32_t>(std::count(group, group + i.ntriangle, k)), true};
+  const double *points = nullptr;
+  const uint32_t *triangles = nullptr;
+  if (crossings && dfm_trimesh_data(mesh, &points, &triangles, nullptr) >= 0)
+    report_crossings(r, points, i.npoint, triangles, i.ntriangle);
   r.summary = std::to_string(i.npoint) + " points, " + std::to_string(i.ntriangle) + " triangles, " +
               (i.closed ? "closed" : std::to_string(i.holes) + " holes") + ", least quality " +
               text("%.3g", i.quality_min);
@@ -234,7 +278,8 @@ std::vector<std::string> lines_of(const char *text) {
 int report_mesh(const Globals &globals, const std::string &file, const MeshSession &session, bool asked,
                 const std::vector<std::string> &notes) {
   Report r;
-  if (!(session.cells ? describe_cells(session.cells, r) : describe_surface(session.surface, r)))
+  if (!(session.cells ? describe_cells(session.cells, asked, r)
+                      : describe_surface(session.surface, asked, r)))
     return fail(dfm_last_error());
   if (globals.json) {
     print_json(file, r, notes);

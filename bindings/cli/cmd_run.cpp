@@ -495,7 +495,7 @@ class Runner {
 
 }  // namespace
 
-int run_scene(RunOptions options, const Globals &globals, Comparison *comparison) {
+void run_scene(RunOptions options, const Globals &globals, Comparison *comparison) {
   if (options.out.empty()) options.out = out_folder(options.scene, "run");
   if (options.time > 0) {  // the scene is read for that long: it reports what comes after its end
     char text[64];
@@ -535,7 +535,13 @@ int run_scene(RunOptions options, const Globals &globals, Comparison *comparison
     throw Failure(kStopped, options.scene + ": " + text + ": " + result.stop_reason +
                                 "; the last good state is in " + options.out + "/states/last_*.vtu");
   }
-  return result.interrupted ? int(kInterrupted) : int(kDone);
+  if (result.interrupted) {
+    char text[160];
+    std::snprintf(text, sizeof text, "interrupted at step %llu, t = %g s",
+                  static_cast<unsigned long long>(result.steps), result.simulated);
+    throw Failure(kInterrupted, options.scene + ": " + text + "; what was recorded until then is in " +
+                                    options.out + ", its last state in states/last_*.vtu");
+  }
 }
 
 void add_run(Command app, Globals &globals, int *exit_code) {
@@ -576,7 +582,8 @@ void add_run(Command app, Globals &globals, int *exit_code) {
     }
     std::stable_sort(options->saves.begin(), options->saves.end(),
                      [](const auto &a, const auto &b) { return a.at < b.at; });
-    *exit_code = run_scene(*options, globals);
+    run_scene(*options, globals);
+    *exit_code = kDone;
   });
 }
 

@@ -1,5 +1,6 @@
 #include "friction_plot.h"
 
+#include <fcntl.h>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -7,6 +8,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <vector>
 
 #include "friction_plot_script.h"
@@ -17,8 +19,10 @@ namespace {
 
 enum class Drawn { yes, no, cannot };  // cannot: no such interpreter, or it has no matplotlib
 
-// isolated: PYTHONHOME and PYTHONPATH may be settings for another interpreter.
-Drawn draw_with(const std::string &python, bool isolated, const std::vector<std::string> &arguments) {
+// isolated: PYTHONHOME and PYTHONPATH may be settings for another interpreter. said: out, what the script
+// prints: why the picture cannot be written.
+Drawn draw_with(const std::string &python, bool isolated, const std::vector<std::string> &arguments,
+                std::string &said) {
   std::vector<std::string> words = {python};
   if (isolated) words.push_back("-E");
   words.insert(words.end(), {"-c", kPlotFriction});
@@ -26,8 +30,23 @@ Drawn draw_with(const std::string &python, bool isolated, const std::vector<std:
   std::vector<char *> argv;
   for (std::string &word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
+  int ends[2];
+  if (pipe2(ends, O_CLOEXEC) != 0) throw Failure(kBadInput, std::string("no pipe: ") + std::strerror(errno));
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_adddup2(&actions, ends[1], STDOUT_FILENO);
   pid_t child = 0;
-  if (posix_spawnp(&child, python.c_str(), nullptr, nullptr, argv.data(), environ) != 0) return Drawn::cannot;
+  const bool begun = posix_spawnp(&child, python.c_str(), &actions, nullptr, argv.data(), environ) == 0;
+  posix_spawn_file_actions_destroy(&actions);
+  close(ends[1]);
+  char part[256];
+  for (ssize_t n = 1; begun && n != 0;) {
+    n = read(ends[0], part, sizeof part);
+    if (n < 0 && errno != EINTR) break;
+    if (n > 0) said.append(part, size_t(n));
+  }
+  close(ends[0]);
+  if (!begun) return Drawn::cannot;
   int status = 0;
   while (waitpid(child, &status, 0) < 0)
     if (errno != EINTR) return Drawn::no;
@@ -42,11 +61,14 @@ bool plot_friction(const std::string &csv, const std::string &picture, const std
                    const std::string &title) {
   const std::vector<std::string> arguments = {csv, picture, kind, title};
   const char *const named = std::getenv("DEFORM_PYTHON");
-  Drawn drawn = draw_with(named ? named : DEFORM_PYTHON, !named, arguments);
-  if (drawn == Drawn::cannot && !named) drawn = draw_with("python3", false, arguments);
+  std::string said;
+  Drawn drawn = draw_with(named ? named : DEFORM_PYTHON, !named, arguments, said);
+  if (drawn == Drawn::cannot && !named) drawn = draw_with("python3", false, arguments, said);
   if (drawn == Drawn::yes) return true;
   std::remove((picture + ".part").c_str());
   if (drawn == Drawn::cannot) return false;
+  if (const std::string why = said.substr(0, said.find('\n')); !why.empty())
+    throw Failure(kBadInput, picture + ": cannot be written: " + why);
   throw Failure(kBadInput, picture + ": matplotlib could not write the plot; its message is above");
 }
 

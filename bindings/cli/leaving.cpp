@@ -29,6 +29,7 @@ constexpr unsigned kGraceInPlugin = 5, kGrace = 30;  // s
 volatile std::sig_atomic_t undecided = 0;
 volatile std::sig_atomic_t waited = 0;  // s since expect_return()
 char folder[1024];
+int terminal = 0;  // standard error is one: it may hold a line of progress
 
 // Everything below may run in a handler of a signal: no memory, no locks, write() alone.
 class Sentence {
@@ -110,6 +111,29 @@ void on_alarm(int) {
   end_now(kInterrupted);
 }
 
+// The command's own work took the signal over where it has something to keep.
+void on_interrupt(int number) {
+  if (undecided) {
+    Sentence s;
+    s << (terminal ? "\r\033[K" : "")
+      << "deform: interrupted before its work was done; no unfinished file is left";
+    s.say();
+  }
+  raise(number);
+}
+
+void catch_interrupts() {
+  terminal = isatty(STDERR_FILENO);
+  for (const int number : {SIGINT, SIGTERM}) {
+    struct sigaction before = {}, action = {};
+    sigaction(number, nullptr, &before);
+    if (before.sa_handler != SIG_DFL) continue;  // whoever started the command ignores it
+    action.sa_handler = on_interrupt;
+    action.sa_flags = static_cast<int>(SA_RESETHAND | SA_NODEFER);
+    sigaction(number, &action, nullptr);
+  }
+}
+
 void catch_crashes() {
   static char room[65536];  // a stack that is full has none left for its handler
   stack_t stack = {};
@@ -133,6 +157,7 @@ void guard_leaving() {
   std::atexit(on_leave);
   std::at_quick_exit(on_leave);
   catch_crashes();
+  catch_interrupts();
 }
 
 int leave(int exit_code) {

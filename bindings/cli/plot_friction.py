@@ -1,6 +1,7 @@
 """Plots the rows of `deform friction`: python3 - ROWS.csv OUT.png KIND TITLE. Exit 3: matplotlib is
-missing."""
+missing; 4: OUT.png cannot be written, standard output says why."""
 import csv
+import io
 import os
 import sys
 
@@ -56,8 +57,15 @@ def main():
         axis.set_visible(False)
     figure.suptitle(title, fontsize=10)
     figure.tight_layout()
-    figure.savefig(out + ".part", format="png")
-    os.replace(out + ".part", out)
+    picture = io.BytesIO()
+    figure.savefig(picture, format="png")
+    try:
+        with open(out + ".part", "wb") as file:
+            file.write(picture.getvalue())
+        os.replace(out + ".part", out)
+    except OSError as error:
+        print(error.strerror)
+        sys.exit(4)
 
 
 main()

@@ -30,8 +30,8 @@ struct RunOptions {
 
 class Comparison;
 // The run of `deform run`, and that of `deform replay`, which compares the state with the recorded one
-// after each step. Returns the exit code.
-int run_scene(RunOptions options, const Globals &globals, Comparison *comparison = nullptr);
+// after each step. Throws Failure where the run stops itself or a signal ends it.
+void run_scene(RunOptions options, const Globals &globals, Comparison *comparison = nullptr);
 
 // Wall time of every step, thinned evenly once there are very many; the longest is kept exactly.
 class StepTimes {

@@ -4,10 +4,12 @@ from a registry, so that `pip install .` works wherever the library builds.
 
 The wheel is for any Python 3 (py3-none-PLATFORM): nothing in it is compiled against an interpreter. Its
 platform is manylinux_2_N where all that it needs from the system is what every Linux of that name has
-(PEP 600): a wheel built without ODE and Bullet, as `pip wheel .` builds it. libpng travels in it.
+(PEP 600): a wheel built without ODE and Bullet, as prebuilt=no builds it. libpng travels in it.
 
 Settings (pip: --config-settings NAME=VALUE):
-  prebuilt  a build folder of this tree whose target deform_command is built; nothing is compiled then
+  prebuilt  a build folder of this tree whose target deform_command is built; nothing is compiled then.
+            Without it build/release is taken and brought up to date, if `make` or the release preset has
+            made it; with "no" the wheel has a build of its own, in build/wheel
   cmake     further arguments for configuring, in one text
 """
 import base64
@@ -107,20 +109,33 @@ def configure(build, settings):
          *shlex.split(settings.get("cmake", "")))
 
 
+def release_build():
+    """build/release where it can be packed: configured in this place, as Release, with a shared library; else
+    None. What is up to date there is not compiled again."""
+    build = ROOT / "build" / "release"
+    cache = build / "CMakeCache.txt"
+    wanted = {f"CMAKE_HOME_DIRECTORY:INTERNAL={ROOT}", "CMAKE_BUILD_TYPE:STRING=Release",
+              "DEFORM_SHARED:BOOL=ON"}
+    return build if cache.exists() and wanted <= set(cache.read_text().splitlines()) else None
+
+
 def _installed(prefix, settings):
     """What the tree installs, beneath prefix."""
     if not shutil.which("cmake"):
         raise SystemExit("deform: there is no cmake; building the library needs CMake 3.22, Ninja or make, a "
                          "C++20 compiler and some headers: `cmake/setup.sh doors` installs them on Debian")
     build = settings.get("prebuilt")
+    release = None if build or "cmake" in settings else release_build()
+    build = None if build == "no" else build
     if build and not (pathlib.Path(build) / "cmake_install.cmake").exists():
         raise SystemExit(f"deform: prebuilt={build} is no build folder of this tree; configure and build it "
                          f"first (cmake --preset release; cmake --build --preset release)")
     if build:
         build = pathlib.Path(build).absolute()
     else:
-        build = ROOT / "build" / "wheel"
-        configure(build, settings)
+        build = release or ROOT / "build" / "wheel"
+        if not release:
+            configure(build, settings)
         _run("cmake", "--build", build, "--target", "deform_command", "--target", "deform_python_native",
              "--parallel", os.environ.get("CMAKE_BUILD_PARALLEL_LEVEL") or len(os.sched_getaffinity(0)))
     _run("cmake", "--install", build, "--strip", "--prefix", prefix)

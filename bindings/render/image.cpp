@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <vector>
 
 #include "render.h"
 
@@ -22,23 +23,28 @@ bool write_png(const std::string &path, const Image &picture, std::string *why_n
   if (picture.width == 0 || picture.height == 0 ||
       picture.rgb.size() != size_t(picture.width) * picture.height * 3)
     return refuse("the picture is empty");
-  const std::string partial = path + ".part" + std::to_string(getpid());
-  std::FILE *file = std::fopen(partial.c_str(), "wb");
-  if (!file) return refuse(std::strerror(errno));
   png_image png{};
   png.version = PNG_IMAGE_VERSION;
   png.width = picture.width;
   png.height = picture.height;
   png.format = PNG_FORMAT_RGB;
-  const bool encoded = png_image_write_to_stdio(&png, file, 0, picture.rgb.data(), 0, nullptr) != 0;
-  const std::string message = encoded ? "" : png.message;
+  // into memory first: libpng says of a write that fails only that it does
+  png_alloc_size_t bytes = PNG_IMAGE_PNG_SIZE_MAX(png);
+  std::vector<unsigned char> encoded(bytes);
+  const bool done =
+      png_image_write_to_memory(&png, encoded.data(), &bytes, 0, picture.rgb.data(), 0, nullptr);
+  const std::string message = png.message;
   png_image_free(&png);
-  errno = 0;
-  const bool closed = std::fclose(file) == 0;
-  if (encoded && closed && std::rename(partial.c_str(), path.c_str()) == 0) return true;
-  const std::string reason = !encoded ? message : std::strerror(errno);
+  if (!done) return refuse(message);
+  const std::string partial = path + ".part" + std::to_string(getpid());
+  std::FILE *file = std::fopen(partial.c_str(), "wb");
+  if (!file) return refuse(std::strerror(errno));
+  int reason = std::fwrite(encoded.data(), 1, bytes, file) == bytes ? 0 : errno;
+  if (std::fclose(file) != 0 && reason == 0) reason = errno;
+  if (reason == 0 && std::rename(partial.c_str(), path.c_str()) == 0) return true;
+  if (reason == 0) reason = errno;
   std::remove(partial.c_str());
-  return refuse(reason);
+  return refuse(std::strerror(reason));
 }
 
 bool read_png(const std::string &path, Image &picture, std::string *why_not) {

@@ -3,14 +3,17 @@
 #include "render/render.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 
 #include <cfenv>
 #include <cmath>
+#include <csignal>
 #include <cstdlib>
 #include <limits>
 #include <map>
 #include <numbers>
+#include <random>
 #include <set>
 #include <thread>
 
@@ -554,6 +557,26 @@ TEST(Png, UnwritablePlace_IsReportedAndNoFileIsWritten) {
   EXPECT_EQ(rmdir((folder + "/taken.png").c_str()), 0);
   EXPECT_EQ(rmdir(folder.c_str()), 0) << "something was left behind";
   EXPECT_FALSE(write_png(folder + "/empty.png", Image{}, &why));
+}
+
+// As on a full disk: libpng alone says "Write Error".
+TEST(Png, WriteThatFails_IsReportedWithItsReason) {
+  const std::string folder = test::scratch("png_full");
+  Image noise = blank(64, 64, 0);
+  std::mt19937 random(1);
+  for (uint8_t &value : noise.rgb) value = uint8_t(random());
+  struct rlimit before{};
+  getrlimit(RLIMIT_FSIZE, &before);
+  const struct rlimit small = {4096, before.rlim_max};
+  const auto handler = signal(SIGXFSZ, SIG_IGN);
+  setrlimit(RLIMIT_FSIZE, &small);
+  std::string why;
+  const bool written = write_png(folder + "/noise.png", noise, &why);
+  setrlimit(RLIMIT_FSIZE, &before);
+  signal(SIGXFSZ, handler);
+  EXPECT_FALSE(written);
+  EXPECT_EQ(why, "cannot write " + folder + "/noise.png: File too large");
+  EXPECT_EQ(rmdir(folder.c_str()), 0) << "something was left behind";
 }
 
 TEST(Text, EverySign_IsItsOwn) {

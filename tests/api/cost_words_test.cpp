@@ -1,6 +1,8 @@
 // What `deform cost` says of its choice.
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include "cost/report.h"
 
 namespace cli::cost {
@@ -67,6 +69,31 @@ TEST(CostWords, ChoiceThatNothingBounds_IsLikelyAndNotApplied) {
   EXPECT_TRUE(has(refusal, "--budget 120 continues from here; that is enough to take \"cells x4\""))
       << refusal;
   EXPECT_TRUE(has(reference_text(study), "NOT CONVERGED")) << reference_text(study);
+}
+
+// Every table that shows errors says what they are against, and whether that may be trusted.
+TEST(CostWords, Reference_IsNamedWithItsBoundAndItsDoubt) {
+  Study study = two_choices(0.01);
+  study.headline = {"tip"};
+  study.limits["tip"].basis = Basis::no_order;
+  study.limits["tip"].error = 0.01;
+  study.limits["tip"].bound = study.reference_bound = 0.3;
+  EXPECT_TRUE(has(reference_text(study), "its own error 1.00 %")) << reference_text(study);
+  EXPECT_TRUE(has(reference_text(study), ", bound 30.0 %; NOT CONVERGED")) << reference_text(study);
+  EXPECT_EQ(short_reference(study), "against \"cells x2\", NOT CONVERGED");
+  study.converged = true;
+  EXPECT_EQ(short_reference(study), "against \"cells x2\"");
+}
+
+// Where explicit time is impossible, all runs damp impacts alike, and their distances prove nothing.
+TEST(CostWords, ReferenceThatDampsImpacts_IsBoundedByNothing) {
+  Study study = two_choices(0.01);
+  study.headline = {"tip"};
+  study.limits["tip"].basis = Basis::damped;
+  study.limits["tip"].error = 0.01;
+  study.limits["tip"].bound = study.reference_bound = std::numeric_limits<double>::infinity();
+  EXPECT_TRUE(has(reference_text(study), "NOT CONVERGED: contacts of implicit time damp impacts"))
+      << reference_text(study);
 }
 
 TEST(CostWords, NoChoice_IsNotApplied) {

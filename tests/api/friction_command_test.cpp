@@ -275,6 +275,9 @@ TEST(FrictionCommand, Plot_WritesAPictureAndNothingElse) {
   EXPECT_FALSE(std::filesystem::exists(picture + ".rows") || std::filesystem::exists(picture + ".part"));
   expect_refused({"friction", file("good.json", push()), "--plot", folder() + "/no/such/place.png"},
                  {"no/such/place.png"});
+  expect_refused({"friction", file("good.json", push()), "--plot", folder() + "/no/such/place.png", "--csv",
+                  folder() + "/kept.csv", "--quiet"},
+                 {"no/such/place.png: cannot be written: No such file or directory"});
 }
 
 // As where a version manager's python3, which has no matplotlib, comes first in PATH, and its settings are in

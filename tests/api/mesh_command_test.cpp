@@ -51,6 +51,40 @@ TEST(MeshCommand, InfoAsJson_HoldsTheSame) {
     EXPECT_TRUE(has(r.out, word)) << word << " not in\n" << r.out;
 }
 
+// Two cubes, the second moved by half a side, as a surface and as cells; apart they do not cross.
+TEST(MeshCommand, Info_CountsWhereTheSurfaceCrossesItself) {
+  const auto corner = [](int k, double by) {
+    char text[80];
+    std::snprintf(text, sizeof text, "%g %g %g\n", (k & 1) + by, (k >> 1 & 1) + by, (k >> 2) + by);
+    return std::string(text);
+  };
+  const int faces[12][3] = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                            {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+  for (const bool apart : {false, true}) {
+    std::string surface = "OFF\n16 24 0\n";
+    std::string cells =
+        "# vtk DataFile Version 3.0\ntwo\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 8 double\n";
+    for (int k = 0; k < 16; ++k) surface += corner(k % 8, k < 8 ? 0 : apart ? 2 : 0.3);
+    for (int k = 0; k < 24; ++k) {
+      surface += "3";
+      for (const int p : faces[k % 12]) surface += " " + std::to_string(p + (k < 12 ? 0 : 8));
+      surface += "\n";
+    }
+    for (const double by : {0.0, apart ? 2.0 : 0.1})
+      for (const int k : {0, 1, 2, 4}) cells += corner(k, by);
+    cells += "CELLS 2 10\n4 0 1 2 3\n4 4 5 6 7\nCELL_TYPES 2\n10\n10\n";
+    test::write_file(folder() + "/two.off", surface);
+    test::write_file(folder() + "/two.vtk", cells);
+    for (const char *const name : {"/two.off", "/two.vtk"}) {
+      const auto r = test::deform({"mesh", "info", folder() + name});
+      EXPECT_EQ(r.exit_code, 0) << r.err;
+      EXPECT_EQ(has(r.out, "warning: the surface crosses itself in "), !apart) << r.out;
+      const auto json = test::deform({"mesh", "info", "--json", folder() + name});
+      EXPECT_EQ(has(json.out, "\"self_crossings\": 0"), apart) << json.out;
+    }
+  }
+}
+
 // Ctrl-C in work that would take long: the command ends by the signal, and what lay under the name that it
 // was to write is still there, alone.
 TEST(MeshCommand, InterruptedWork_EndsAndLeavesTheOldFile) {
@@ -66,12 +100,14 @@ TEST(MeshCommand, InterruptedWork_EndsAndLeavesTheOldFile) {
     std::filesystem::remove_all(dir);
     std::filesystem::create_directories(dir);
     test::write_file(out, "mine");
-    const pid_t child = test::start(arguments);
+    const pid_t child = test::start(arguments, "/dev/null", dir + ".err");
     std::this_thread::sleep_for(std::chrono::milliseconds(300));
     kill(child, SIGINT);
     int status = 0;
     waitpid(child, &status, 0);
     EXPECT_TRUE(WIFSIGNALED(status) && WTERMSIG(status) == SIGINT) << arguments[2] << ": status " << status;
+    EXPECT_EQ(test::read_file(dir + ".err"),
+              "deform: interrupted before its work was done; no unfinished file is left\n");
     EXPECT_EQ(test::read_file(out), "mine");
     EXPECT_EQ(std::distance(std::filesystem::directory_iterator(dir), {}), 1);
   }
@@ -93,6 +129,17 @@ TEST(MeshCommand, Make_WritesEachShape) {
       EXPECT_EQ(made.exit_code, 0) << made.err;
       EXPECT_EQ(test::deform({"mesh", "info", out}).exit_code, 0);
     }
+}
+
+// A ball has 20 n^3 cells: 160 are nearest to 100. What is near enough to "about" is not spoken of.
+TEST(MeshCommand, MakeOfAnotherNumberOfCells_SaysSo) {
+  const auto said = [](const char *cells) {
+    const auto r = test::deform({"mesh", "make", "ball", "--cells", cells, "--out", folder() + "/about.vtu"});
+    EXPECT_EQ(r.exit_code, 0) << r.err;
+    return r.err;
+  };
+  EXPECT_TRUE(has(said("100"), "160 tetrahedra are made where 100 were asked for: the lattice of a ball"));
+  EXPECT_EQ(said("500"), "");
 }
 
 TEST(MeshCommand, Convert_ThereAndBackKeepsTheBytes) {

@@ -4,6 +4,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <filesystem>
@@ -95,7 +96,7 @@ std::string hash_of(const std::string &name, const std::vector<std::string> &arg
 pid_t start(const std::string &out, std::vector<std::string> more) {
   fs::remove_all(out);
   more.insert(more.begin(), {DEFORM_COMMAND, "run", folder() + "/scene.json", "--quiet", "--out", out});
-  return test::start(more);
+  return test::start(more, "/dev/null", out + ".err");
 }
 
 // It ends by the signal as a run that was interrupted, with its last state; returns the summary.
@@ -107,6 +108,13 @@ std::string stop(pid_t child, int signal, const std::string &out) {
   EXPECT_TRUE(fs::exists(out + "/states/last_top.vtu"));
   const std::string summary = test::read_file(out + "/summary.json");
   EXPECT_NE(value(summary, "stopped").find("interrupted"), std::string::npos);
+  const std::string said = test::read_file(out + ".err");
+  EXPECT_NE(said.find("interrupted at step " + value(summary, "steps") + ", t = "), std::string::npos)
+      << said;
+  EXPECT_NE(said.find("; what was recorded until then is in " + out + ", its last state in states/"),
+            std::string::npos)
+      << said;
+  EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 1) << said;
   return summary;
 }
 

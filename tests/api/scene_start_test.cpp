@@ -206,6 +206,31 @@ TEST(SceneStart, ThinSheetOfManyMoreCellsThanAskedFor_IsWarnedOf) {
   EXPECT_EQ(log("[0.4, 0.4, 0.04]", "100").find("not about"), std::string::npos) << "300 are as good as 100";
 }
 
+// In 1/60 s a thing falls 1.4 mm, which is long for a body of 0.1 mm; explicit bodies take sub-steps anyway.
+TEST(SceneStart, BodyThatFallsThroughItsSizeInAStep_IsWarnedOf) {
+  const std::string folder = test::scratch("scene_start_small_" + std::to_string(getpid()));
+  const auto log = [&](const char *radius, const char *time, const char *more = "") {
+    test::write_file(folder + "/scene.json",
+                     std::string(R"({"format": "deform-scene", "version": 1, "time": {"duration": 1, )") +
+                         time + R"(}, "bodies": [{"name": "grain", "mesh": {"make": "ball", "radius": )" +
+                         radius + R"(, "cells": 160}, "pose": {"position": [0, 0, 1]})" + more +
+                         R"(}], "obstacles": [{"name": "floor", "shape": "plane"}]})");
+    const test::CommandResult r = test::deform({"explain", folder + "/scene.json"});
+    EXPECT_EQ(r.exit_code, 0) << r.err;
+    return r.err;
+  };
+  const char *const frame = R"("step": 0.0166666667, "integrator": "implicit_euler")";
+  const std::string said = log("1e-4", frame);
+  EXPECT_NE(said.find("body 'grain' is 0.000"), std::string::npos) << said;
+  EXPECT_NE(said.find("falls 0.00136 m in a step of 0.0167 s"), std::string::npos) << said;
+  for (const std::string &quiet :
+       {log("1e-2", frame), log("1e-4", R"("step": 0.001, "integrator": "implicit_euler")"),
+        log("1e-4", R"("step": 0.0166666667, "integrator": "symplectic_euler")"),
+        log("1e-4", R"("integrator": "implicit_euler")"),
+        log("1e-4", frame, R"(, "fix": [{"box": [[-1, -1, -1], [1, 1, 2]]}])")})
+    EXPECT_EQ(quiet.find("in a step of"), std::string::npos) << quiet;
+}
+
 // A mesh in millimeters that is read as meters, and the same with its scale.
 TEST(SceneStart, OwnWeightAboveHalfTheModulus_IsWarnedOf) {
   const std::string folder = test::scratch("scene_start_weight_" + std::to_string(getpid()));

@@ -20,7 +20,15 @@ class Command(unittest.TestCase):
         self.assertIn("integrator", table.columns)
         self.assertEqual(len(table.column("error")), len(table))
         self.assertTrue(all(row["state"] == "done" for row in table.front))
-        self.assertEqual(len(str(table).splitlines()), 1 + len(table))
+        printed, front = str(table).splitlines(), str(table.front).splitlines()
+        rows = printed.index(next(line for line in printed if line.startswith("label ")))
+        self.assertEqual(len(printed), rows + 1 + len(table))
+        reference = table.report["choices"][table.report["reference"]["choice"]]["label"]
+        for said in printed[1], front[0]:
+            self.assertTrue(said.startswith(f"reference: {reference} ("), said)
+            self.assertIn("; its own error ", said)
+            self.assertEqual("NOT CONVERGED" in said, not table.report["reference"]["converged"], said)
+        self.assertTrue(printed[0].startswith("error of "), printed[0])
         self.assertEqual(table._repr_html_().count("<tr>"), 1 + len(table))
 
     def test_sentences_are_exceptions(self):

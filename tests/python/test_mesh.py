@@ -23,6 +23,12 @@ class Meshes(unittest.TestCase):
                     again = deform.TetMesh.read(path)
                     np.testing.assert_array_equal(again.tets, mesh.tets)
 
+    def test_another_number_of_cells_is_told(self):
+        ball = deform.TetMesh.ball(0.1, cells=100)
+        self.assertIn("160 tetrahedra are made where 100 were asked for", repr(ball))
+        self.assertEqual(len(ball.warnings), 1)
+        self.assertEqual(deform.TetMesh.ball(0.1, cells=500).warnings, [])
+
     def test_from_arrays_repairs(self):
         points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [9, 9, 9]]
         mesh = deform.TetMesh.from_arrays(points, [[0, 2, 1, 3]])

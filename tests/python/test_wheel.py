@@ -9,6 +9,7 @@ import sys
 import tempfile
 import time
 import unittest
+import unittest.mock
 import zipfile
 
 SOURCE = pathlib.Path(os.environ["DEFORM_SOURCE"])
@@ -95,6 +96,32 @@ class Wheel(unittest.TestCase):
             both = [("lib/libb.so", made), (f"lib/{other.name}", other)]
             self.assertIn("manylinux", wheel_backend._tag(both))
             self.assertRegex(wheel_backend._tag(both[:1]), r"^py3-none-linux_\w+$")
+
+    def test_a_release_build_of_this_tree_is_packed(self):
+        sys.path.insert(0, str(SOURCE / "bindings" / "python"))
+        self.addCleanup(sys.path.pop, 0)
+        import wheel_backend
+        with tempfile.TemporaryDirectory() as name, unittest.mock.patch.object(
+                wheel_backend, "ROOT", pathlib.Path(name)):
+            self.assertIsNone(wheel_backend.release_build())
+            build = pathlib.Path(name) / "build" / "release"
+            build.mkdir(parents=True)
+            for place, kind, shared, taken in (
+                    ("/moved", "Release", "ON", False), (name, "Debug", "ON", False),
+                    (name, "Release", "OFF", False), (name, "Release", "ON", True)):
+                (build / "CMakeCache.txt").write_text(
+                    f"CMAKE_BUILD_TYPE:STRING={kind}\nCMAKE_HOME_DIRECTORY:INTERNAL={place}\n"
+                    f"DEFORM_SHARED:BOOL={shared}\n")
+                self.assertEqual(wheel_backend.release_build(), build if taken else None)
+            commands = []
+            with unittest.mock.patch.object(wheel_backend, "_run", lambda *words: commands.append(words)):
+                for settings, used in (({}, build), ({"prebuilt": "no"}, build.parent / "wheel"),
+                                       ({"cmake": "-DX=1"}, build.parent / "wheel")):
+                    commands.clear()
+                    wheel_backend._installed(pathlib.Path(name) / "prefix", settings)
+                    configured = [words for words in commands if "-S" in words]
+                    self.assertEqual(len(configured), int(used != build))
+                    self.assertIn(used, commands[-1])
 
     def test_without_a_build_it_configures_one(self):
         sys.path.insert(0, str(SOURCE / "bindings" / "python"))

@@ -25,12 +25,6 @@ std::string lacks(const Subject &subject, const Offered &model) {
   return "";
 }
 
-std::string seconds(double h) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.6g", h);
-  return text;
-}
-
 class Finder {
  public:
   Finder(const Subject &subject, const std::vector<std::string> &wanted) : s_(subject), wanted_(wanted) {}
@@ -156,7 +150,7 @@ class Finder {
     add(k, "time");
     for (const double part : {0.5, 0.25}) {
       if (s_.stable <= 0) break;
-      k.step = seconds(part * (s_.step > 0 ? std::min(s_.step, s_.stable) : s_.stable));
+      k.step = seconds(part * s_.explicit_step());
       add(k, "time");
     }
     for (const char *integrator : {"implicit_euler", "tr_bdf2"})

@@ -67,6 +67,12 @@ void set_cells(const Subject &subject, const std::string &body, size_t i, const 
 
 }  // namespace
 
+std::string seconds(double h) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.6g", h);
+  return text;
+}
+
 Settings settings_of(const Subject &subject, const Surfaces &surfaces, const Knobs &knobs) {
   Settings out;
   for (size_t i = 0; i < subject.bodies.size(); ++i) {

@@ -20,6 +20,7 @@ using Settings = std::vector<std::pair<std::string, std::string>>;  // pointer, 
 // Surfaces of bodies that are filled again, if the scene gives cells in a file: by body, "" elsewhere.
 using Surfaces = std::vector<std::string>;
 
+std::string seconds(double h);  // a step as JSON text
 Settings settings_of(const Subject &subject, const Surfaces &surfaces, const Knobs &knobs);
 // "corotational_fem, implicit_euler 0.01 s, cells x0.5"; "the scene as it is" where nothing is chosen.
 std::string label_of(const Knobs &knobs);

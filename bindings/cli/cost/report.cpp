@@ -58,7 +58,8 @@ std::string choice_json(const Subject &subject, const Study &study, size_t i) {
 }
 
 const char *word_of(Basis basis) {
-  const char *const words[] = {"order", "slow order", "no order", "no fall", "two meshes", "same mesh"};
+  const char *const words[] = {"order",      "slow order", "no order", "no fall",
+                               "two meshes", "same mesh",  "damped"};
   return words[size_t(basis)];
 }
 
@@ -220,6 +221,7 @@ std::string why_unproven(const Study &study) {
     case Basis::no_order: return "the meshes show no order";
     case Basis::no_fall: return "the differences of the meshes do not fall";
     case Basis::two_meshes: return "two meshes show no order";
+    case Basis::damped: return "contacts of implicit time damp impacts, and explicit time is impossible here";
     default: return "";
   }
 }
@@ -269,6 +271,7 @@ std::string reference_text(const Study &study) {
                     " cpu " + study.cost_unit + ")";
   if (study.check < 0) return out + "; NOT CONVERGED: no second run to check it with fits into the budget";
   out += "; its own error " + percent(study.reference_headline) + " (" + how_known(study) + ")";
+  if (std::isfinite(study.reference_bound)) out += ", bound " + percent(study.reference_bound);
   if (study.converged) return out + ", at most a third of the best error shown";
   if (!std::isfinite(study.reference_bound))
     return out + "; NOT CONVERGED: " + why_unproven(study) + ", so nothing bounds this error";
@@ -356,8 +359,7 @@ std::string refusal_to_apply(const Study &study) {
          doubt_text(study) + "), so nothing is applied; " + next_step(study);
 }
 
-std::string table_text(const Subject &subject, const Study &study) {
-  std::string out = shown(subject.path) + ": what accuracy costs\n";
+std::string error_text(const Subject &subject, const Study &study) {
   std::string names;
   for (size_t i = 0; i < study.headline.size() && i < 6; ++i) {
     names += (names.empty() ? "" : ", ") + study.headline[i];
@@ -365,16 +367,25 @@ std::string table_text(const Subject &subject, const Study &study) {
       names += " (until a cut takes it after " + formatted("%.4g", end->second) + " s)";
   }
   if (study.headline.size() > 6) names += ", ...";
-  out += "error of " + names + (study.headline.size() > 1 ? " (the largest)" : "") +
+  return "error of " + names + (study.headline.size() > 1 ? " (the largest)" : "") +
          (subject.at_rest ? ": of the end, " : ": root mean square over time, ") +
-         "relative to how far the reference moves\n";
+         "relative to how far the reference moves";
+}
+
+std::string short_reference(const Study &study) {
+  return "against \"" + study.rows[size_t(study.reference)].job.label + "\"" +
+         (study.converged ? "" : ", NOT CONVERGED");
+}
+
+std::string table_text(const Subject &subject, const Study &study) {
+  std::string out = shown(subject.path) + ": what accuracy costs\n" + error_text(subject, study) + "\n";
   out += std::string("cost, cpu ") + study.cost_unit + ": seconds of processor time" +
          (subject.at_rest ? " until the equilibrium" : " for a simulated second") +
          "; ~ taken while other runs ran beside\n";
   out += reference_text(study) + "\n";
   list_axes(study, out);
-  out +=
-      "\nfront: nothing cheaper is as accurate (error, cpu " + std::string(study.cost_unit) + ", choice)\n";
+  out += "\nfront: nothing cheaper is as accurate (error " + short_reference(study) + "; cpu " +
+         study.cost_unit + ", choice)\n";
   for (const size_t i : study.front) {
     const Row &row = study.rows[i];
     char line[240];
@@ -441,6 +452,7 @@ std::string json_report(const Subject &subject, const Study &study, const JsonVa
   JsonObject out;
   out.add("format", quoted("deform-cost")).add("version", "1").add("scene", quoted(subject.path));
   out.add("quantities", words_json(study.quantities)).add("headline", words_json(study.headline));
+  out.add("says", words_json({error_text(subject, study), reference_text(study), pick_text(study)}));
   out.add("scales", scales.text()).add("reference", reference_json(study));
   out.add("choices", json_array(choices)).add("front", json_array(front));
   if (study.pick < 0) {

@@ -7,7 +7,7 @@
 namespace cli::cost {
 
 // What the error of the reference is known by.
-enum class Basis { order, slow_order, no_order, no_fall, two_meshes, same_mesh };
+enum class Basis { order, slow_order, no_order, no_fall, two_meshes, same_mesh, damped };
 
 struct Limit {
   double order = std::numeric_limits<double>::quiet_NaN();  // that three meshes show; NaN: they show none

@@ -18,6 +18,7 @@
 namespace cli::cost {
 namespace {
 
+constexpr const char *kExplicit = "symplectic_euler";
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 // Of the budget: all slices, on the processors together; the scene as it is. Of what is left after slices:
 // the reference.
@@ -118,7 +119,7 @@ class Student {
       k.step = step;
       return add({k, {"reference"}});
     };
-    const std::string own, automatic = "\"auto\"", explicit_time = "symplectic_euler";
+    const std::string own, automatic = "\"auto\"", explicit_time = kExplicit;
     if (out_.axes.meshes) {
       const std::string integrator = out_.axes.steps ? explicit_time : own;
       const std::string step = out_.axes.steps ? automatic : own;
@@ -136,23 +137,21 @@ class Student {
       for (const auto &pair : {std::pair(x4, x2), {x2, half}, {half, quarter}, {quarter, eighth}})
         ladder_.push_back(pair);
       if (out_.axes.steps && s_.stable > 0) {
-        char text[40];
-        std::snprintf(text, sizeof text, "%.6g", 0.5 * s_.stable);
-        out_.own_mesh.reference = row(1, explicit_time, text);
+        out_.own_mesh.reference = row(1, explicit_time, seconds(0.5 * s_.stable));
         out_.own_mesh.check = row(1, explicit_time, automatic);
       }
     } else if (out_.axes.steps && s_.stable > 0) {
-      char text[40];
-      std::snprintf(text, sizeof text, "%.6g", 0.5 * s_.stable);
-      const int half = row(1, explicit_time, text), whole = row(1, explicit_time, automatic);
-      ladder_ = {{half, whole}};
+      // no choice has shorter steps than the first
+      const int quarter = row(1, explicit_time, seconds(0.25 * s_.explicit_step())),
+                half = row(1, explicit_time, seconds(0.5 * s_.explicit_step())),
+                stable_half = row(1, explicit_time, seconds(0.5 * s_.stable)),
+                stable = row(1, explicit_time, automatic);
+      ladder_ = {{quarter, half}, {stable_half, stable}};
     }
     if (out_.axes.steps) {
       const double h = std::min(1.0 / 200, s_.duration / 100);
-      char fine[40], finer[40];
-      std::snprintf(fine, sizeof fine, "%.6g", h);
-      std::snprintf(finer, sizeof finer, "%.6g", h / 2);
-      const int twice = row(1, "tr_bdf2", finer), once = row(out_.axes.meshes ? 0.5 : 1, "tr_bdf2", fine);
+      const int twice = row(1, "tr_bdf2", seconds(h / 2)),
+                once = row(out_.axes.meshes ? 0.5 : 1, "tr_bdf2", seconds(h));
       ladder_.push_back({twice, once});
     }
   }
@@ -215,10 +214,26 @@ class Student {
     return state == Outcome::unstable || state == Outcome::refused || state == Outcome::none;
   }
 
+  // Contacts of implicit time damp impacts: such a run would call the rebounds of explicit ones an error.
+  bool damps_impacts(int row) const {
+    const std::string &integrator = out_.rows[size_t(row)].candidate.knobs.integrator;
+    const bool implicit = integrator.empty() ? s_.implicit : integrator != kExplicit;
+    return implicit && s_.contact && out_.axes.steps;
+  }
+
+  // It is the reference only where explicit time is impossible, which no larger budget changes.
+  bool hides_impacts(int row) const {
+    if (!damps_impacts(row)) return false;
+    return std::any_of(ladder_.begin(), ladder_.end(), [&](const auto &pair) {
+      const Outcome &o = out_.rows[size_t(pair.first)].job.outcome;
+      return !damps_impacts(pair.first) && o.state != Outcome::refused && o.state != Outcome::unstable;
+    });
+  }
+
   void choose_pair() {
     for (size_t i = 0; i < ladder_.size(); ++i) {
       const auto [fine, coarse] = ladder_[i];
-      if (failed(fine) || failed(coarse)) continue;
+      if (failed(fine) || failed(coarse) || hides_impacts(fine)) continue;
       const double most = kReferenceShare * runs_.left();
       if (s_.at_rest) runs_.run(jobs_of({fine, coarse}, most), runs_.parallel());
       const auto fits = [&](int row) { return done(row) || predicted(row) <= most; };
@@ -278,26 +293,31 @@ class Student {
       consider(own.reference, own.check, 1 - kAloneShare, "judge model and step on the scene's own mesh");
     for (const auto &[fine, coarse] : ladder_) {
       if (fine == out_.reference && out_.check >= 0) break;  // coarser ones say less
+      if (hides_impacts(fine)) continue;
       consider(fine, coarse, kReferenceShare,
                "take \"" + out_.rows[size_t(fine)].job.label + "\" as the reference");
     }
   }
 
-  // The longest run of the reference's model that came to its end is the best that there is.
+  // The longest run of the reference's model that came to its end is the best that there is, of those that
+  // compute the same effects.
   void fall_back() {
     double most = -1;
     for (size_t i = 0; i < out_.rows.size(); ++i) {
       const Row &row = out_.rows[i];
       const Knobs &k = row.candidate.knobs;
-      const bool physics = same_physics(int(i)) && k.volume.empty() && k.precision != "single";
+      const bool physics = same_physics(int(i)) && k.volume.empty() && k.precision != "single" &&
+                           k.tolerance.empty() && k.method.empty() && !hides_impacts(int(i));
       const double rank = row.job.outcome.cpu + (k.model == out_.axes.reference_model ? 1e9 : 0);
       if (!done(int(i)) || !physics || rank <= most) continue;
       most = rank;
       out_.reference = int(i);
     }
     if (out_.reference >= 0) return;
+    const bool any = std::any_of(out_.rows.begin(), out_.rows.end(),
+                                 [](const Row &row) { return row.job.outcome.state == Outcome::done; });
     for (const Row &row : out_.rows)
-      if (row.job.outcome.state == Outcome::unstable || row.job.outcome.state == Outcome::refused)
+      if (!any && (row.job.outcome.state == Outcome::unstable || row.job.outcome.state == Outcome::refused))
         throw Failure(kBadInput, s_.path + ": no run came to its end; \"" + row.job.label +
                                      "\": " + row.job.outcome.sentence);
     double least = out_.next_budget;
@@ -305,9 +325,11 @@ class Student {
       const double own = predicted(0);
       least = std::isfinite(own) ? own / kOwnShare : 10 * out_.options.budget;
     }
-    char text[160];
+    char text[200];
     std::snprintf(text, sizeof text,
-                  ": no run came to its end within the budget of %.3g s; take --budget %.0f or more",
+                  ": no run%s came to its end within the budget of %.3g s; take --budget "
+                  "%.0f or more",
+                  any ? " that can be the reference (explicit time, in which contacts rebound)" : "",
                   out_.options.budget, std::ceil(least));
     throw Failure(kBadInput, s_.path + text);
   }
@@ -380,6 +402,10 @@ class Student {
         const auto cells = [&](int row) { return out_.rows[size_t(row)].candidate.knobs.cells; };
         if (limit.basis == Basis::same_mesh && cells(out_.reference) != cells(out_.check)) {
           limit.basis = Basis::two_meshes;
+          limit.bound = std::numeric_limits<double>::infinity();
+        }
+        if (damps_impacts(out_.reference)) {
+          limit.basis = Basis::damped;
           limit.bound = std::numeric_limits<double>::infinity();
         }
       }
@@ -458,7 +484,7 @@ class Student {
       if (!member || !row.compared) continue;
       const Knobs &k = row.candidate.knobs;
       double rank = i == 0 ? 0 : -1;
-      if (axis == "time") rank = k.integrator == "symplectic_euler" ? row.job.outcome.steps : 0;
+      if (axis == "time") rank = k.integrator == kExplicit ? row.job.outcome.steps : 0;
       else if (axis == "mesh") rank = row.job.outcome.cells;
       else if (axis == "model") rank = k.model == out_.axes.reference_model ? 1 : 0;
       else if (axis == "contact" && !k.tolerance.empty())

@@ -131,10 +131,31 @@ void read_bodies(const SceneFile &scene, const JsonValue &plan, Subject &out) {
     for (size_t e = 0; effects && e < effects->items.size(); ++e)
       if (effects->items[e].get("works") == "true") body.effects.push_back(effects->items[e].get("name"));
     const JsonValue *const integrator = row ? row->find("integrator") : nullptr;
-    out.implicit |= integrator && integrator->get("used") != "symplectic_euler" &&
-                    integrator->get("used").find("euler") != std::string::npos;
+    const std::string used = integrator ? integrator->get("used") : "";
+    out.implicit |= used == "implicit_euler" || used == "tr_bdf2";
     find_ends(view.handle, out.find("/bodies/" + std::to_string(i) + "/pose"), body);
     out.bodies.push_back(std::move(body));
+  }
+}
+
+double stable_step(const JsonValue &plan) {
+  const JsonValue *const step = plan.find("step");
+  const double h = step ? std::strtod(step->get("stable_s").c_str(), nullptr) : 0;
+  return std::isfinite(h) ? h : 0;
+}
+
+// Nothing bounds the step of implicit bodies: the plan of the same scene in explicit time has what bounds
+// the reference. 0 where the scene cannot be explicit.
+double explicit_step(const Globals &globals, const Subject &subject) {
+  std::vector<std::string> set = {"/time/integrator=symplectic_euler", "/time/step=auto"};
+  if (subject.find("/contact/method")) set.push_back("/contact/method=auto");
+  for (const auto &[pointer, value] : subject.planned) set.push_back(pointer + "=" + value);
+  try {
+    const SceneFile scene(globals, subject.path, set, 0);
+    JsonValue plan;
+    return parse_json(scene.explain(), plan) ? stable_step(plan) : 0;
+  } catch (const Failure &) {
+    return 0;
   }
 }
 
@@ -258,9 +279,7 @@ Subject read_subject(const std::string &path, Globals &globals) {
     throw Failure(kBadInput, path + ": has no deformable body whose cost could be shown");
   if (const JsonValue *const stages = plan.find("stages"))
     for (const JsonValue &stage : stages->items) out.contact |= stage.get("name") == "narrow";
-  if (const JsonValue *const step = plan.find("step"))
-    out.stable = std::strtod(step->get("stable_s").c_str(), nullptr);
-  if (!std::isfinite(out.stable)) out.stable = 0;
+  out.stable = out.implicit ? explicit_step(globals, out) : stable_step(plan);
   const JsonValue *const rules = out.find("/contact/friction");
   out.friction = out.contact && rules && !rules->items.empty();
   std::vector<std::string> files;

@@ -31,7 +31,7 @@ struct Subject {
   // What makes the one of the other: pointers and JSON text, for --set.
   std::vector<std::pair<std::string, std::string>> planned;
   double duration = 0, step = 0, every = 0;  // s; step 0: "auto"
-  double stable = 0;                         // s, explicit, as the scene is; 0: nothing bounds it
+  double stable = 0;                         // s, in explicit time; 0: nothing bounds it
   bool at_rest = false;                      // static: an equilibrium is sought, nothing moves
   bool implicit = false;                     // any body as the scene is
   bool friction = false, contact = false, probes = false;
@@ -39,6 +39,8 @@ struct Subject {
   std::vector<Offered> models, laws;
   uint64_t fingerprint = 0;  // of the scene, the files it names and this build of command and library
 
+  // The scene's step, as long as explicit time is stable.
+  double explicit_step() const { return step > 0 && step < stable ? step : stable; }
   const Offered *model(const std::string &name) const;
   // Value in the scene's own text; null where it is not given.
   const JsonValue *find(const std::string &pointer) const;

@@ -34,11 +34,12 @@ def _shown(value: Any) -> str:
 
 
 class Table(list):
-    """Rows as dicts; prints as a table, and a notebook shows it as one."""
+    """Rows as dicts; prints as a table below its notes, and a notebook shows it as one."""
 
-    def __init__(self, rows: Sequence[dict[str, Any]], columns: Sequence[str]):
+    def __init__(self, rows: Sequence[dict[str, Any]], columns: Sequence[str], notes: Sequence[str] = ()):
         super().__init__(rows)
         self.columns = list(columns)
+        self.notes = list(notes)
 
     def column(self, name: str) -> list[Any]:
         """One column, a value for each row."""
@@ -47,28 +48,31 @@ class Table(list):
     def __str__(self) -> str:
         cells = [self.columns] + [[_shown(row.get(c)) for c in self.columns] for row in self]
         widths = [max(len(line[i]) for line in cells) for i in range(len(self.columns))]
-        return "\n".join("  ".join(c.ljust(w) for c, w in zip(line, widths)).rstrip() for line in cells)
+        return "\n".join([*self.notes] + ["  ".join(c.ljust(w) for c, w in zip(line, widths)).rstrip()
+                                          for line in cells])
 
     def _repr_html_(self) -> str:
         from html import escape
         head = "".join(f"<th>{escape(c)}</th>" for c in self.columns)
         cells = [[f"<td>{escape(_shown(row.get(c)))}</td>" for c in self.columns] for row in self]
         rows = "".join(f"<tr>{''.join(line)}</tr>" for line in cells)
-        return f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
+        notes = "".join(f"<p>{escape(note)}</p>" for note in self.notes)
+        return f"{notes}<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
 
 
 class Cost(Table):
     """What cost() found: a row for each choice (label, model, integrator, step s, cells, law, error,
-    cpu_s_per_s, state).
+    cpu_s_per_s, state), below what the errors are of and the reference that they are against.
 
     front: the choices of which none is both faster and closer; pick: the cheapest one within the target, or
-    None; report: all that cost.json holds."""
+    None; says: the sentences on errors, reference and choice; report: all that cost.json holds."""
 
     def __init__(self, report: dict[str, Any]):
         columns = ["label", "model", "integrator", "step", "cells", "law", "error", "cpu_s_per_s", "state"]
-        super().__init__([{**row, "error": row["headline"]} for row in report["choices"]], columns)
+        self.says = [text.rstrip() for text in report["says"]]
+        super().__init__([{**row, "error": row["headline"]} for row in report["choices"]], columns, self.says)
         self.report = report
-        self.front = Table([self[i] for i in report["front"]], columns)
+        self.front = Table([self[i] for i in report["front"]], columns, self.says[1:2])
         self.pick = None if report["pick"] is None else self[report["pick"]["index"]]
 
 

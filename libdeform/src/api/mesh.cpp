@@ -1,5 +1,6 @@
 #include "deform/mesh.h"
 
+#include <algorithm>
 #include <string>
 
 #include "api/mesh_objects.h"
@@ -9,6 +10,19 @@ using dfm::fail;
 using dfm::as_status;
 using dfm::need;
 using Object = dfm::TetMeshObject;
+
+namespace {
+// "About" so many cells are asked for; who gets others by more than a quarter is told.
+void tell_count(dfm::TetMesh &mesh, const char *kind, uint32_t asked) {
+  constexpr double kAbout = 1.25;
+  const double made = double(mesh.tets.size() / 4);
+  if (std::max(made, double(asked)) > kAbout * std::min(made, double(asked)))
+    mesh.warnings.push_back(
+        dfm::format("%.0f tetrahedra are made where %u were asked for: the lattice of a %s has no number of "
+                    "well-shaped cells nearer to that",
+                    made, asked, kind));
+}
+}  // namespace
 
 dfm_status dfm_tetmesh_read(dfm_context *context, const char *path, dfm_tetmesh *out) {
   return as_status([&] {
@@ -57,13 +71,14 @@ dfm_status dfm_tetmesh_make(dfm_context *context, const char *kind, const double
     need(out, "out");
     const std::string name = kind;
     const dfm::Memory &memory = context->memory;
-    if (name == "cylinder")
-      *out = Object::keep(*context, dfm::make_cylinder(memory, size[0], size[1], cells));
-    else if (name == "beam")
-      *out = Object::keep(*context, dfm::make_beam(memory, size[0], size[1], size[2], cells));
-    else if (name == "ball") *out = Object::keep(*context, dfm::make_ball(memory, size[0], cells));
-    else if (name == "tube")
-      *out = Object::keep(*context, dfm::make_tube(memory, size[0], size[1], size[2], cells));
+    const auto keep = [&](dfm::TetMesh mesh) {
+      tell_count(mesh, kind, cells);
+      *out = Object::keep(*context, std::move(mesh));
+    };
+    if (name == "cylinder") keep(dfm::make_cylinder(memory, size[0], size[1], cells));
+    else if (name == "beam") keep(dfm::make_beam(memory, size[0], size[1], size[2], cells));
+    else if (name == "ball") keep(dfm::make_ball(memory, size[0], cells));
+    else if (name == "tube") keep(dfm::make_tube(memory, size[0], size[1], size[2], cells));
     else fail(DFM_E_ARG, "no generator is called '%s'; expected cylinder, beam, ball or tube", kind);
   });
 }

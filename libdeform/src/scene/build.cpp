@@ -13,6 +13,7 @@
 #include "scene/hand.h"
 #include "scene/jitter.h"
 #include "scene/load.h"
+#include "scene/long_step.h"
 #include "scene/start.h"
 #include "state/obstacle.h"
 #include "state/tool.h"
@@ -53,6 +54,7 @@ class Builder {
     double step = 0;
     check(dfm_world_stable_step(world_, &step, nullptr, nullptr), def_.effects_auto ? "/bodies" : "/effects");
     if (def_.equilibrium) check_static();
+    else if (def_.step > 0) tell_long_step(context_, resolve<World>(Kind::world, world_), def_.step);
     for (Body &b : def_.bodies) check_model(b);
     for (const Cut &c : def_.cuts) plan_cut(c);  // before changes of models, which check them
     for (Body &b : def_.bodies) add_switches(b);
