@@ -92,7 +92,13 @@ def readme(tree):
 
 def guides(tree):
     """A guide with a folder of files beside it shows nothing that does not stand in one of them, to the
-    letter."""
+    letter. Neither does a block below a line that names its example, as (`examples/01_hello.c`):"""
+    for path in tree.select("libdeform/doc/", ext=(".md",)):
+        content = tree.text(path)
+        for block in re.finditer(r"\(`(examples/[\w.]+)`\):\n\n```\w+\n(.*?)^```", content, re.M | re.S):
+            if block[1] not in tree.paths or block[2] not in tree.text(block[1]):
+                yield (path, line_of(content, block.start(2)),
+                       f"this block stands not in {block[1]}; copy it from there")
     for path in tree.select("libdeform/doc/howto/", ext=(".md",)):
         folder = path[:-len(".md")] + "/"
         files = [tree.text(p) for p in tree.paths if p.startswith(folder)]
