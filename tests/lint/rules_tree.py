@@ -77,11 +77,18 @@ def paths(tree):
 
 
 def readme(tree):
-    """The program that README.md shows is the example, to the letter, and short."""
+    """The program that README.md shows is the example, to the letter, and short. Its blocks of code fit into
+    a window of 1440 px (cmake/docs/theme/style.css)."""
     example = "examples/01_hello.c"
     if "README.md" not in tree.paths or example not in tree.paths:
         yield "README.md", 1, f"README.md and {example} must both be there"
         return
+    columns = 106
+    for block in re.finditer(r"^```\w*\n(.*?)^```", tree.text("README.md"), re.M | re.S):
+        for k, line in enumerate(block[1].split("\n")):
+            if len(line) > columns:
+                yield ("README.md", line_of(tree.text("README.md"), block.start(1)) + k,
+                       f"{len(line)} columns of code; a window of 1440 px shows {columns}")
     blocks = re.findall(r"^```c\n(.*?)^```", tree.text("README.md"), re.M | re.S)
     program = tree.text(example)
     if program not in blocks:
