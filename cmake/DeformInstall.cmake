@@ -45,8 +45,18 @@ install(FILES ${PROJECT_SOURCE_DIR}/libdeform/schema/deform-scene.schema.json
 # Plugins to copy and edit, as source.
 file(GLOB deform_templates ${PROJECT_SOURCE_DIR}/plugins/template_*)
 install(DIRECTORY ${deform_templates} DESTINATION ${CMAKE_INSTALL_DATADIR}/deform COMPONENT dev)
-install(FILES ${PROJECT_SOURCE_DIR}/LICENSE ${PROJECT_SOURCE_DIR}/README.md ${PROJECT_SOURCE_DIR}/CHANGELOG.md
-  DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT library)
+install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT library)
+# The pages, in the places that they have in the source tree, so that links between them hold; and what they
+# link to outside of their folder, which abi.installed_tree checks.
+foreach(page README.md CHANGELOG.md CONTRIBUTING.md SECURITY.md tests/README.md tests/abi/kept/README.md
+    tests/bench/friction/README.md tests/bench/results/rest_compression.csv
+    tests/bench/results/scene_models.csv libdeform/include/deform/attach.h
+    libdeform/include/deform/tool.h libdeform/src/world/blade_sweep.h)
+  get_filename_component(folder ${page} DIRECTORY)
+  install(FILES ${PROJECT_SOURCE_DIR}/${page} DESTINATION ${CMAKE_INSTALL_DOCDIR}/${folder} COMPONENT doc)
+endforeach()
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/libdeform/doc DESTINATION ${CMAKE_INSTALL_DOCDIR}/libdeform
+  COMPONENT doc PATTERN __pycache__ EXCLUDE)
 
 # The adapters of rigid engines have exports of their own, so that who does not ask for one
 # (find_package(deform COMPONENTS ode)) needs no engine.

@@ -3,6 +3,7 @@
 #
 #   libdeform0          library and plugins
 #   libdeform-dev       headers, CMake package, deform.pc, templates of plugins
+#   libdeform-doc       the pages
 #   deform              the command
 #   deform-view         the window of `deform view`; where it was built
 #   libdeform-ode       adapter for ODE: library, header, CMake package, .pc
@@ -57,6 +58,9 @@ set(same "(= ${PROJECT_VERSION})")
 deform_package(library libdeform0 "soft bodies with true friction: library and plugins" "" library)
 deform_package(dev libdeform-dev "soft bodies with true friction: headers, CMake package"
   "libdeform0 ${same}" dev)
+deform_package(doc libdeform-doc "soft bodies with true friction: the pages" "" doc)
+set(CPACK_DEBIAN_DOC_PACKAGE_ARCHITECTURE all)
+set(CPACK_DEBIAN_DOC_PACKAGE_SECTION doc)
 set(command_needs "libdeform0 ${same}")
 if(TARGET deform_ode)
   string(APPEND command_needs ", libdeform-ode ${same}")

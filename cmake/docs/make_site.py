@@ -80,6 +80,9 @@ def main():
     build(config)
     # A page that is opened from a folder may load scripts but no data.
     index = json.loads((options.out / "search/search_index.json").read_text())
+    answers = {path[:-len(".md")] + ".html": text for path, text in stage.answers.items()}
+    for entry in index["docs"]:
+        entry["answers"] = answers.get(entry["location"], "")
     (options.out / "search/index.js").write_text("var pages = " + json.dumps(index["docs"]) + ";\n")
     (options.out / "code.css").write_text(HtmlFormatter(style="friendly").get_style_defs(".code"))
     wrong = sorted(broken(options.out))

@@ -50,19 +50,24 @@ def dialect(text):
 
 
 def order(text):
-    """[(section, [(title, target)])] of the reading order."""
-    sections = []
+    """[(section, [(title, target, what it answers)])] of the reading order; a section in groups has
+    (group, [..]) in place of pages."""
+    sections, pages = [], []
     for line in text.split("\n"):
-        heading = re.match(r"## (?:\d+\. )?(.*)", line)
+        heading = re.match(r"(##|###) (?:\d+\. )?(.*)", line)
         if heading:
-            sections.append((heading.group(1), []))
+            pages = []
+            (sections if heading.group(1) == "##" else sections[-1][1]).append((heading.group(2), pages))
         elif sections and line.startswith(("|", "[")):
-            sections[-1][1].extend(re.findall(r"\[([^\]]+)\]\(([^)\s]+)\)", line))
+            answers = line.strip("| ").rpartition(" | ")[2]
+            pages.extend((title, target, answers)
+                         for title, target in re.findall(r"\[([^\]]+)\]\(([^)\s]+)\)", line))
     return sections
 
 
 class Stage:
-    """files: {path in the folder: str or bytes}; nav: the generator's table of contents."""
+    """files: {path in the folder: str or bytes}; nav: the generator's table of contents; answers: {path: the
+    question that the page answers}, by which the search finds it."""
 
     def __init__(self, root):
         self.root = pathlib.Path(root)
@@ -73,6 +78,7 @@ class Stage:
                     for path in sorted((self.root / folder).glob("*.hpp"))}
         python = python_pages(self.root / PYTHON, self.reference)
         self.files = {**self.reference.pages(), **cpp_pages(wrappers, self.reference), **python}
+        self.answers = {}
         self.wanted = [*FRONT, ORDER]
         done = set()
         while self.wanted:
@@ -146,9 +152,15 @@ class Stage:
     def _nav(self, headers, wrappers, python):
         nav = [{"Reading order": ORDER}]
         base = posixpath.dirname(ORDER)
-        for section, pages in order((self.root / ORDER).read_text()):
-            nav.append({section: [{title: self._staged(posixpath.normpath(posixpath.join(base, target)))}
-                                  for title, target in pages]})
+
+        def entry(row):
+            if len(row) == 2:
+                return {row[0]: [entry(inner) for inner in row[1]]}
+            title, target, answers = row
+            path = self._staged(posixpath.normpath(posixpath.join(base, target)))
+            self.answers[path] = answers
+            return {title: path}
+        nav.extend(map(entry, order((self.root / ORDER).read_text())))
         nav.insert(-1, {"Headers": [{"all headers": "api/index.md"},
                                     *({name: "api/" + page(name)} for name in [*headers, *wrappers])]})
         modules = sorted(set(python) - {"api/python.md"})

@@ -76,12 +76,28 @@ def builds_from_a_prefix_with_a_space(prefix, libdir, source, scratch, clean):
         env={**clean, "PKG_CONFIG_PATH": str(spaced / libdir / "pkgconfig")})
 
 
+def pages_lead_somewhere(prefix):
+    """Every link of an installed page, in text, that is no address of the network."""
+    pages = sorted((prefix / "share/doc").rglob("*.md"))
+    dead = []
+    for page in pages:
+        text = re.sub(r"^( *)```.*?^\1```", "", page.read_text(), flags=re.M | re.S)
+        for target in re.findall(r"\]\(([^)\s]+)\)", re.sub(r"`[^`\n]*`", "", text)):
+            to = target.partition("#")[0]
+            if to and not re.match(r"[a-z]+:", to) and not (page.parent / to).exists():
+                dead.append(f"{page.relative_to(prefix)}: {target}")
+    if dead or len(pages) < 100:
+        sys.exit(f"{len(pages)} installed pages; links that lead nowhere (add the files to "
+                 "cmake/DeformInstall.cmake):\n" + "\n".join(dead))
+
+
 def main():
     build, source, scratch, compiler = sys.argv[1:]
     here = pathlib.Path(__file__).resolve().parent / "stranger"
     scratch = without_spaces(scratch)
     clean = clean_environment()
     prefix, libdir = install(build, source, scratch)
+    pages_lead_somewhere(prefix)
 
     run("cmake", "-S", here, "-B", scratch / "cmake", f"-DCMAKE_PREFIX_PATH={prefix}",
         f"-DCMAKE_C_COMPILER={compiler}",

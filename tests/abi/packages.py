@@ -12,12 +12,13 @@ import sys
 from installed_tree import clean_environment, run, without_spaces
 
 NEEDS = {"libdeform0": ["libc6", "libstdc++6"], "libdeform-dev": ["libdeform0 (="],
+         "libdeform-doc": [],
          "deform": ["libdeform0 (="],
          "deform-view": ["deform (=", "libglfw3"], "libdeform-ode": ["libdeform0 (=", "libode8"],
          "libdeform-bullet": ["libdeform0 (=", "libbullet"],
          "python3-deform": ["libdeform0 (=", "deform (=", "python3-numpy"],
          "libdeform-cholmod": ["libdeform0 (=", "libcholmod"]}
-ALWAYS = ["libdeform0", "libdeform-dev", "deform", "python3-deform"]
+ALWAYS = ["libdeform0", "libdeform-dev", "libdeform-doc", "deform", "python3-deform"]
 
 
 def unpack(packages, root):

@@ -52,6 +52,32 @@ TEST(CProgram, Pull_SlidesWhereCoulombSays) {
   EXPECT_GT(now, 3u);
 }
 
+// As the pages on games say: a step that a budget discards is taken in halves, and dropped where even short
+// parts do not fit. The game goes on in each case.
+TEST(CProgram, GameLoop_TakesDiscardedStepsInPartsOrDropsThem) {
+  const struct {
+    const char *work;
+    bool discards, drops;
+  } budgets[] = {{"0", false, false}, {"15000", true, false}, {"500", true, true}};
+  for (const auto &budget : budgets) {
+    const test::CommandResult r = example("06_game_loop", {"1e5", "60", "1", budget.work});
+    ASSERT_EQ(r.exit_code, 0) << r.out << r.err;
+    const std::string line = r.out.substr(r.out.find("\nt ") + 1);
+    double t = 0;
+    int steps = 0;
+    unsigned discarded = 0, dropped = 0;
+    ASSERT_EQ(std::sscanf(line.c_str(), "t %lf s: %d steps", &t, &steps), 2) << r.out;
+    const size_t end = line.find(" asleep, ");
+    ASSERT_NE(end, std::string::npos) << r.out;
+    ASSERT_EQ(std::sscanf(line.c_str() + end, " asleep, %u discarded, %u dropped", &discarded, &dropped), 2)
+        << r.out;
+    EXPECT_EQ(discarded > 0, budget.discards) << line;
+    EXPECT_EQ(dropped > 0, budget.drops) << line;
+    EXPECT_NEAR(t, budget.drops ? 0 : 1, 0.1) << line;
+    EXPECT_EQ(steps, 60) << line;
+  }
+}
+
 TEST(CProgram, Surface_JoinsAndTurnsALooseCube) {
   const test::CommandResult r = example("03_surface", {test::scratch("c_program") + "/cube.obj"});
   ASSERT_EQ(r.exit_code, 0) << r.out << r.err;

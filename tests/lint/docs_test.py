@@ -1,8 +1,11 @@
 #!/usr/bin/env python3
 """What `make docs` gives its generator, which is not needed here: docs_test.py SOURCE"""
+import json
 import pathlib
 import posixpath
 import re
+import shutil
+import subprocess
 import sys
 import unittest
 
@@ -142,10 +145,52 @@ class Site(unittest.TestCase):
     def test_contents_follow_the_reading_order(self):
         sections = [next(iter(entry)) for entry in self.stage.nav]
         self.assertEqual(sections[:3], ["Reading order", "Overview", "First steps"])
-        for entry in self.stage.nav:
-            pages = next(iter(entry.values()))
-            for page in [pages] if isinstance(pages, str) else [next(iter(p.values())) for p in pages]:
-                self.assertIn(page, self.stage.files)
+
+        def check(pages):
+            if isinstance(pages, str):
+                self.assertIn(pages, self.stage.files)
+            else:
+                for entry in pages:
+                    check(next(iter(entry.values())))
+        check(self.stage.nav)
+        reference = next(entry["Reference"] for entry in self.stage.nav if "Reference" in entry)
+        groups = {next(iter(entry)): next(iter(entry.values())) for entry in reference}
+        self.assertIn({"lugre": "libdeform/doc/laws/lugre.md"}, groups["Friction laws"])
+        for name, pages in groups.items():
+            self.assertIsInstance(pages, list, name)
+            self.assertLess(len(pages), 12, name)
+
+    @unittest.skipUnless(shutil.which("node"), "runs the script of the search")
+    def test_search_finds_what_users_type_at_its_page(self):
+        pages, titles = [], {}
+
+        def name(entries):
+            for entry in entries:
+                for title, to in entry.items():
+                    if isinstance(to, str):
+                        titles[to] = title
+                    else:
+                        name(to)
+        name(self.stage.nav)
+        for path, text in self.stage.files.items():
+            if not path.endswith(".md"):
+                continue
+            place = re.sub(r"(README)?\.md$", lambda m: "index.html" if m[1] else ".html", path)
+            parts = re.split(r"^#+ +(.*)$", text, flags=re.M)
+            pages.append({"location": place, "title": titles.get(path, parts[1] if parts[1:] else path),
+                          "text": text, "answers": self.stage.answers.get(path, "")})
+            pages += [{"location": f"{place}#{i}", "title": title, "text": words, "answers": ""}
+                      for i, (title, words) in enumerate(zip(parts[1::2], parts[2::2]))]
+        wanted = {"restart": "concepts/snapshots", "installation": "howto/packages",
+                  "drag mouse": "howto/viewer", "cut": "concepts/cutting", "budget": "concepts/budget",
+                  "snapshots": "concepts/snapshots", "mesh file": "reference/mesh_files"}
+        script = ("let s=require(process.argv[1]), i = JSON.parse(require('fs').readFileSync(0));"
+                  "console.log(JSON.stringify(i.queries.map(q=>s.rank(i.pages, q.split(' '))[0].location)))")
+        said = subprocess.run(["node", "-e", script, str(ROOT / "cmake/docs/theme/search.js")],
+                              input=json.dumps({"pages": pages, "queries": list(wanted)}), text=True,
+                              capture_output=True, check=True).stdout
+        for found, (query, page) in zip(json.loads(said), wanted.items()):
+            self.assertEqual(found.partition("#")[0], f"libdeform/doc/{page}.html", query)
 
 
 if __name__ == "__main__":

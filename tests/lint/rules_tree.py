@@ -90,11 +90,18 @@ def scenes(tree):
 
 
 def readme(tree):
-    """The program that README.md shows is the example, to the letter, and short."""
+    """The program that README.md shows is the example, to the letter, and short. Its blocks of code fit into
+    a window of 1440 px (cmake/docs/theme/style.css)."""
     example = "examples/01_hello.c"
     if "README.md" not in tree.paths or example not in tree.paths:
         yield "README.md", 1, f"README.md and {example} must both be there"
         return
+    columns = 106
+    for block in re.finditer(r"^```\w*\n(.*?)^```", tree.text("README.md"), re.M | re.S):
+        for k, line in enumerate(block[1].split("\n")):
+            if len(line) > columns:
+                yield ("README.md", line_of(tree.text("README.md"), block.start(1)) + k,
+                       f"{len(line)} columns of code; a window of 1440 px shows {columns}")
     blocks = re.findall(r"^```c\n(.*?)^```", tree.text("README.md"), re.M | re.S)
     program = tree.text(example)
     if program not in blocks:
@@ -105,7 +112,13 @@ def readme(tree):
 
 def guides(tree):
     """A guide with a folder of files beside it shows nothing that does not stand in one of them, to the
-    letter."""
+    letter. Neither does a block below a line that names its example, as (`examples/01_hello.c`):"""
+    for path in tree.select("libdeform/doc/", ext=(".md",)):
+        content = tree.text(path)
+        for block in re.finditer(r"\(`(examples/[\w.]+)`\):\n\n```\w+\n(.*?)^```", content, re.M | re.S):
+            if block[1] not in tree.paths or block[2] not in tree.text(block[1]):
+                yield (path, line_of(content, block.start(2)),
+                       f"this block stands not in {block[1]}; copy it from there")
     for path in tree.select("libdeform/doc/howto/", ext=(".md",)):
         folder = path[:-len(".md")] + "/"
         files = [tree.text(p) for p in tree.paths if p.startswith(folder)]
