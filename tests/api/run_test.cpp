@@ -414,19 +414,6 @@ TEST(Run, Profile_NamesTheStages) {
     EXPECT_NE(r.result.out.find(stage), std::string::npos) << stage;
 }
 
-TEST(Run, StepFarTooLong_StopsWithTheLastGoodState) {
-  // A step of 1e6 seconds needs more sub-steps than allowed.
-  const Outcome r = run(
-      "stopped", {"--set", "/time/step=1e6", "--set", "/time/integrator=symplectic_euler", "--time", "1e9"});
-  EXPECT_EQ(r.result.exit_code, 3);
-  EXPECT_NE(r.result.err.find("stopped at step 0"), std::string::npos) << r.result.err;
-  EXPECT_NE(r.result.err.find("body '"), std::string::npos) << r.result.err;
-  EXPECT_NE(r.result.err.find("take a shorter step"), std::string::npos) << "what to do: " << r.result.err;
-  EXPECT_TRUE(fs::exists(r.out + "/states/last_top.vtu"));
-  EXPECT_EQ(value(r.summary, "finite"), "true");
-  EXPECT_NE(value(r.summary, "stopped"), "null");
-}
-
 TEST(Run, ForceBeyondAllBounds_StopsWithTheLastGoodState) {
   const Outcome r = run(
       "diverged", {"--set", "/bodies/1/forces=[{\"box\":[[-1,-1,-1],[1,1,1]],\"total\":[1e300,1e300,0]}]"});
