@@ -21,6 +21,7 @@ from ._signals import watch
 from ._values import array_of, pose_of, real, text, vector, whole
 from .body import EVERYTHING, Body, Obstacle, Rigid, handle_of, held_bits, vector_keys
 from .mesh import TetMesh, TriMesh, cells_of, points_of, surface_of
+from .picture import Shown, Upright
 from .query import Queries
 from .rigid_set import MATERIAL, SHAPES, JointDef, Material, RigidDef
 from .report import Reports
@@ -114,7 +115,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
     """
 
     __slots__ = ("__weakref__", "_asked", "_bits", "_bits_at", "_bodies", "_busy", "_finalize", "_functions",
-                 "_lists", "_owner", "context", "handle", "user")
+                 "_lists", "_owner", "context", "handle", "shown", "user")
     _finalize: Any
     _instead = ("World.snapshot() gives bytes, which restore() of a world with the same contents takes, and "
                 "World.write_scene a file")
@@ -148,6 +149,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
         out = ctypes.c_uint64()
         check(lib.dfm_world_create(context.address, ctypes.byref(definition), ctypes.byref(out)))
         self._begin(context, out.value)
+        self.shown.upright = Upright(0, gravity)
         self._finalize = weakref.finalize(self, _destroy, out.value, context)
 
     def _begin(self, context: Context, handle: int, owner: Any = None) -> None:
@@ -155,6 +157,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
         self.context, self.handle = context, handle
         self._owner = owner
         self.user: Any = None
+        self.shown = Shown()
         self._busy = 0  # the thread that is inside a call
         self._asked = False  # to stop, by a signal
         self._bits = ctypes.c_uint32(0)
@@ -249,6 +252,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
         out = ctypes.c_uint64()
         self.free()
         check(lib.dfm_material_create(self.handle, ctypes.byref(definition), ctypes.byref(out)))
+        self.shown.softest = min(self.shown.softest, definition.young)
         return Material(self, out.value, name)
 
     def _material(self, material: Material | Mapping[str, Any] | None) -> int:
@@ -348,7 +352,9 @@ class World(Queries, Reports, Tools, OfThisProcess):
         with self.alone():
             status = lib.dfm_body_create(self.handle, ctypes.byref(definition), ctypes.byref(out))
         check(status)
-        return self._know(self._body(out.value))
+        body = self._know(self._body(out.value))
+        self.shown.keep(body)
+        return body
 
     def add_obstacle(self, shape: str = "plane", *, name: str | None = None,
                      position: Sequence[float] = (0, 0, 0), rotation: Sequence[float] | None = None,
@@ -601,12 +607,15 @@ class World(Queries, Reports, Tools, OfThisProcess):
         """[3] m/s2 from now on."""
         self.free()
         check(quick.dfm_world_set_gravity(self.handle, vector(gravity, "gravity")))
+        self.shown.upright = Upright(0, gravity)
 
     def set_gravity_keys(self, times: Any, gravity: Any) -> None:
         """Gravity [n,3] m/s2 at times [n] s, linear between them; [] and [] end it."""
         keys = vector_keys(times, gravity if np.size(gravity) else np.empty((0, 3)), "gravity")
         self.free()
         check(quick.dfm_world_set_gravity_keys(self.handle, np.size(times), ctypes.byref(keys)))
+        if np.size(times):
+            self.shown.upright = Upright(times, gravity)
 
     def set_sleep(self, sleep: bool = True) -> None:
         """Lets islands at rest sleep from now on; False: wakes all bodies and keeps them awake."""
@@ -718,12 +727,12 @@ class World(Queries, Reports, Tools, OfThisProcess):
         from .picture import picture
         return picture(self, **options)
 
-    def film(self, color: str = "body", camera: Any = None) -> Any:
+    def film(self, color: str = "body", camera: Any = None, color_range: Any = None) -> Any:
         """A Run that records this world while it is stepped by hand: `film.add()` after a step adds a frame,
-        and a notebook shows it. color: "body", "speed" or "contact"; camera: (eye [3], look_at [3]) m, of
-        its pictures."""
+        and a notebook shows it. color, color_range: as of picture(), the range over all frames if it is not
+        given; camera: (eye [3], look_at [3]) m, of its pictures."""
         from .scene import Run
-        return Run.of(self, color, camera)
+        return Run.of(self, color, camera, color_range)
 
     def _repr_png_(self) -> bytes | None:
         from .picture import png_or_none

@@ -229,7 +229,8 @@ const Table &objects() {
         {"contacts", true},
         {"check", true},
         {"camera", true},
-        {"color", true}}},
+        {"color", true},
+        {"color_range", true}}},
       {"camera", {{"eye", true}, {"look_at", true}}},
   };
   return table;
