@@ -26,8 +26,7 @@ struct Head {
 
 }  // namespace
 
-KeptFrames::KeptFrames(const std::string &folder)
-    : path_(folder + "/frames.kept"), file_(new_file(path_)) {
+KeptFrames::KeptFrames(const std::string &folder) : path_(folder + "/frames.kept"), file_(new_file(path_)) {
   std::remove(path_.c_str());
 }
 

@@ -1,5 +1,5 @@
-// Pictures of a run that may have to be drawn once more, when the range of its values is known: what they show,
-// in a file that has no name and goes with the process.
+// Pictures of a run that may have to be drawn once more, when the range of its values is known: what they
+// show, in a file that has no name and goes with the process.
 #pragma once
 #include <cstdint>
 #include <string>

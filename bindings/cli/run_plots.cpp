@@ -16,7 +16,7 @@
 namespace cli {
 namespace {
 
-constexpr size_t kMost = 6;  // curves of a plot, and probes that have one
+constexpr size_t kMost = 6;                 // curves of a plot, and probes that have one
 constexpr double kWide = 540, kHigh = 270;  // pixels, of a panel
 enum { kEnergy, kPlace, kSpeed, kForce, kProbe };
 

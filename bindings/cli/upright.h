@@ -1,5 +1,5 @@
-// Which way is up in the pictures of a scene: against its gravity, so that slopes made by tilting gravity look
-// like slopes.
+// Which way is up in the pictures of a scene: against its gravity, so that slopes made by tilting gravity
+// look like slopes.
 #pragma once
 #include <array>
 #include <vector>

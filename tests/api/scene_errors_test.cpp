@@ -136,6 +136,8 @@ TEST(SceneErrors, Ranges_AreChecked) {
        {"/contact/max_sweeps=1.5", {"/contact/max_sweeps", "whole number", "1.5"}},
        {"/output/every=0", {"/output/every", "above 0"}},
        {"/output/camera={\"eye\":[1,1,1],\"look_at\":[1,1,1]}", {"/output/camera", "same point"}},
+       {"/bodies/0/place={}", {"/bodies/0/place", "\"on\""}},
+       {"/bodies/0/place={\"on\":\"flor\"}", {"/bodies/0/place/on", "did you mean \"floor\"?"}},
        {"/output={\"color\":\"speed\",\"color_range\":[1,1]}", {"/output/color_range", "second one larger"}},
        {"/output={\"color_range\":[0,1]}", {"/output/color_range", "give \"color\" a quantity"}},
        {"/gravity={\"keyframes\":[{\"t\":1,\"value\":[0,0,0]},{\"t\":1,\"value\":[0,0,0]}]}",

@@ -283,7 +283,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
                  velocity: Sequence[float] = (0, 0, 0), spin: Sequence[float] = (0, 0, 0), fixed: Any = None,
                  surface: TriMesh | str | None = None, coupling: str = "barycentric",
                  fields: Mapping[str, Any] | None = None, integrator: str = "auto", category: int = 1,
-                 collides_with: int = EVERYTHING, scale: float = 1) -> Body:
+                 collides_with: int = EVERYTHING, scale: float = 1, on: Obstacle | None = None) -> Body:
         """A body of a mesh (a TetMesh or the path of its file), or of points [n,3] m and tets [m,4].
 
         model: "msm" (default), "corotational_fem", ...; params: of the model, by key. material: of
@@ -291,7 +291,8 @@ class World(Queries, Reports, Tools, OfThisProcess):
         velocity [3] m/s, spin [3] rad/s. fixed: [n] True for points that are held, or bits 1 x, 2 y, 4 z of
         components that are; or [n,3] True for these. surface: a finer one that hangs on the cells, a TriMesh
         or the path of its file. fields: model parameters that differ by cell, [m] or [m,width] by key. scale:
-        of the points of mesh and surface, 0.001 where they are in millimeters.
+        of the points of mesh and surface, 0.001 where they are in millimeters. on: an obstacle, onto which
+        the body is moved from its position along gravity.
         """
         if isinstance(mesh, (str, bytes)) or hasattr(mesh, "__fspath__"):
             mesh = TetMesh.read(mesh)
@@ -335,6 +336,9 @@ class World(Queries, Reports, Tools, OfThisProcess):
             hung.triangles = st.ctypes.data
             definition.surface = ctypes.addressof(hung)
             keep += [hung, sp, st]
+        if on is not None:
+            from ._place import put_on
+            put_on(self, on, x if surface is None else sp, definition.pose)
         rows = (_abi.dfm_cell_field * max(len(fields or {}), 1))()
         for row, (key, given) in zip(rows, (fields or {}).items()):
             field = np.ascontiguousarray(array_of(given, f"field '{key}'", "a number for each cell"))

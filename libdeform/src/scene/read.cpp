@@ -503,6 +503,13 @@ void read_probes(const Node &scene, Definition &def) {
   }
 }
 
+void check_places(const Node &scene, const Definition &def) {
+  std::vector<std::string> names;
+  for (const Obstacle &o : def.obstacles) names.push_back(o.name);
+  for (const Node &body : scene.items("bodies"))
+    if (body.has("place")) known(body.member("place").at("on"), names, "obstacle");
+}
+
 // Whoever draws reads it with dfm_scene_value.
 void read_color_range(const Node &range, const std::string &color) {
   const std::vector<Node> ends = range.items();
@@ -564,6 +571,7 @@ Definition read_scene(json &tree, const std::string &file, const Types &types) {
   read_materials(scene, def, context);
   def.bodies = read_bodies(scene, context);
   def.obstacles = read_obstacles(scene, context);
+  check_places(scene, def);
   def.rigid = read_rigid(scene, context);
   def.tools = read_tools(scene, context);
   def.cuts = read_cuts(scene, context, def);
