@@ -174,6 +174,8 @@ class View(unittest.TestCase):
         for part in (("canvas", "view"), ("button", "play"), ("input", "at"), ("span", "time")):
             self.assertIn(part, seen)
         self.assertEqual(document.count("</script>"), 1)
+        self.assertNotIn("legend", document)
+        self.assertIn("speed, m/s: 0 <i", webgl.document(dropped()))
 
 
 if __name__ == "__main__":

@@ -112,7 +112,7 @@ def data_of(run: Run) -> dict[str, Any]:
 
 def _legend(run: Run) -> str:
     """What the colors mean, beside the slider."""
-    if run.color not in COLORS:
+    if all(v is None for frame in run.frames for v in frame.values.values()):
         return ""
     (title, unit), (low, high) = COLORS[run.color], run.value_range()
     colors = ",".join(f"rgb({r:.0f},{g:.0f},{b:.0f})" for r, g, b in 255 * color_map(run.color, _COLORS))
