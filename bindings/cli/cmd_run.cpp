@@ -28,6 +28,7 @@
 #include "planned.h"
 #include "progress.h"
 #include "recording.h"
+#include "run_plots.h"
 #include "sensors.h"
 #include "tools.h"
 #include "state_file.h"
@@ -119,6 +120,7 @@ class Runner {
         frame_(frame_interval()),
         comparison_(comparison) {
     if (options.record) recorder_.emplace(scene, options);
+    if (options.plot) plots_ = RunPlots::create(scene);
     if (frame_interval() > 0) frames_ = Frames::create(scene, options.out + "/frames");
   }
 
@@ -134,6 +136,7 @@ class Runner {
     while (!interrupted && !result_.stopped && advance()) outputs(false);
     came_back();
     count_time();
+    if (frames_) finish_frames();
     if (interrupted) {
       result_.interrupted = true;
       result_.stop_reason = "interrupted by a signal";
@@ -147,6 +150,7 @@ class Runner {
       warn("--save " + options_.saves[saved_].path + ": not written, the run ended before its time");
     if (result_.hold_begun) end_hold();
     outputs_.write_nodes();
+    if (plots_) plots_->write(options_.out + "/plots.png");
     if (!options_.save_scene.empty()) write_as_scene(scene_, options_.save_scene);
     result_.impulses = impulses_.json();
     result_.sensors = sensors_.json();
@@ -333,6 +337,7 @@ class Runner {
     attachments_.record();
     tools_.record();
     if (recorder_) recorder_->add();
+    if (plots_) plots_->record();
   }
 
   // The equilibrium under the next share of the loads; false when it has all of them.
@@ -446,6 +451,12 @@ class Runner {
     result_.drawn_by = frames_->drawn_by();
   }
 
+  void finish_frames() {
+    const double begin = wall_seconds();
+    frames_->finish();
+    result_.drawing += wall_seconds() - begin;
+  }
+
   void count_time() {
     result_.wall += wall_seconds() - mark_.wall;
     result_.cpu += cpu_seconds() - mark_.cpu;
@@ -485,6 +496,7 @@ class Runner {
   Schedule record_, frame_;
   std::unique_ptr<Frames> frames_;
   std::optional<Recorder> recorder_;
+  std::unique_ptr<RunPlots> plots_;
   Comparison *comparison_;
   size_t saved_ = 0;                         // of options_.saves, which are in order of time
   static constexpr double kSlowStep = 0.02;  // s; after a longer step the progress is shown at once
@@ -558,6 +570,8 @@ void add_run(Command app, Globals &globals, int *exit_code) {
       .type_name("/json/pointer=value")
       .repeated();
   sub.option("--frames", options->frame_rate, "pictures per simulated second").positive().type_name("FPS");
+  sub.flag("--plot", options->plot,
+           "plots of energy, bodies, contacts and probes over time, to DIR/plots.png");
   sub.flag("--profile", options->profile, "time spent in each stage");
   sub.option("--jitter", options->jitter,
              "small random changes of the start state; the same seed gives the same run")

@@ -3,15 +3,36 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 #include <utility>
 
+#include "json_text.h"
 #include "messages.h"
 
 namespace cli {
 
-Drawing::Drawing(const SceneFile &scene, const std::string &color) : scene_(scene) {
+namespace {
+
+constexpr float kThrough = 0.45f;  // of a contact patch that something hides
+
+// Pa; Young's modulus of the softest material, or that of a body that has none.
+double softest_of(const SceneFile &scene) {
+  double least = HUGE_VAL;
+  JsonValue materials;
+  if (parse_json(scene.value("/materials"), materials))
+    for (const JsonMember &m : materials.members)
+      least = std::min(least, std::strtod(m.value.get("young").c_str(), nullptr));
+  return std::isfinite(least) ? least : dfm_material_def_default().young;
+}
+
+}  // namespace
+
+Drawing::Drawing(const SceneFile &scene, const std::string &color)
+    : scene_(scene), upright_(scene), softest_(softest_of(scene)) {
   for (const BodyView &body : scene.bodies()) make(body, buffers_.emplace_back());
+  for (const Buffers &b : buffers_)
+    for (const double x : b.xyz) reach_ = std::max(reach_, std::fabs(x));
   placed_.resize(scene.obstacles().size());
   set_color(color);
 }
@@ -29,7 +50,13 @@ void Drawing::make(const BodyView &body, Buffers &b) {
 
 void Drawing::set_color(const std::string &color) {
   color_ = color;
-  scale_ = 0;
+  top_ = 0;
+  fixed_.reset();
+  JsonValue range;  // of the scene's own color only
+  if (color == scene_.settings().color && parse_json(scene_.value("/output/color_range"), range) &&
+      range.items.size() == 2)
+    fixed_ = {std::strtof(range.items[0].text.c_str(), nullptr),
+              std::strtof(range.items[1].text.c_str(), nullptr)};
   for (Buffers &b : buffers_) std::fill(b.scalar.begin(), b.scalar.end(), 0.f);
   if (color != "stress") return;
   for (size_t i = 0; i < buffers_.size(); ++i) {
@@ -58,6 +85,13 @@ bool Drawing::fill_values(const BodyView &body, Buffers &b) {
   return true;
 }
 
+// What rounding leaves in a body at rest, with a margin of many digits below all that can be seen: strains of
+// 1e-10, and positions and their change per second that relate to coordinates likewise. It is drawn as zero.
+float Drawing::noise() const {
+  if (color_ == "contact") return 0;  // exactly zero where nothing touches
+  return float(1e-10 * (color_ == "stress" ? softest_ : reach_));
+}
+
 render::Bounds Drawing::place_of_bodies() const {
   render::Bounds out;
   for (const Buffers &b : buffers_)
@@ -66,7 +100,6 @@ render::Bounds Drawing::place_of_bodies() const {
 }
 
 void Drawing::add_bodies(render::Scene &out) {
-  float top = 0;
   scene_.renew_list();
   if (!std::ranges::equal(buffers_, scene_.bodies(), {}, &Buffers::of, &BodyView::handle)) {  // cuts
     std::vector<Buffers> before = std::exchange(buffers_, {});
@@ -90,31 +123,36 @@ void Drawing::add_bodies(render::Scene &out) {
     uint32_t n = 0;
     need(dfm_surface_positions(body.handle, body.nsurfel, buffers_[i].xyz.data(), &n));
     buffers_[i].colored = fill_values(body, buffers_[i]);
-    for (float x : buffers_[i].scalar) top = std::max(top, x);
-  }
-  // The scale of a film only grows, so colors of neighboring frames can be compared.
-  scale_ = std::max(scale_, top);
-  for (size_t i = 0; i < buffers_.size(); ++i) {
-    Buffers &b = buffers_[i];
-    const render::Color own = render::palette(scene_.bodies()[i].number);
-    render::Surface s;
-    s.xyz = b.xyz.data();
-    s.n = uint32_t(b.xyz.size() / 3);
-    s.tri = scene_.bodies()[i].triangles.data();
-    s.ntri = uint32_t(scene_.bodies()[i].triangles.size() / 3);
-    s.rgb[0] = own.r;
-    s.rgb[1] = own.g;
-    s.rgb[2] = own.b;
-    if (b.colored) {
-      // Where nothing touches the body keeps its own color.
-      for (float &x : b.scalar)
-        x = color_ == "contact" && x == 0 ? std::numeric_limits<float>::quiet_NaN()
-            : scale_ > 0                  ? x / scale_
-                                          : 0;
-      s.scalar = b.scalar.data();
+    for (float &x : buffers_[i].scalar) {
+      if (x < noise()) x = 0;
+      top_ = std::max(top_, x);
     }
-    out.surfaces.push_back(s);
   }
+  for (size_t i = 0; i < buffers_.size(); ++i) add_surface(i, out);
+}
+
+void Drawing::add_surface(size_t i, render::Scene &out) {
+  Buffers &b = buffers_[i];
+  const render::Color own = render::palette(scene_.bodies()[i].number);
+  render::Surface s;
+  s.xyz = b.xyz.data();
+  s.n = uint32_t(b.xyz.size() / 3);
+  s.tri = scene_.bodies()[i].triangles.data();
+  s.ntri = uint32_t(scene_.bodies()[i].triangles.size() / 3);
+  s.rgb[0] = own.r;
+  s.rgb[1] = own.g;
+  s.rgb[2] = own.b;
+  if (b.colored) {
+    const auto [low, high] = range();
+    const bool contact = color_ == "contact";  // where nothing touches, the body keeps its own color
+    for (float &x : b.scalar)
+      x = contact && x == 0 ? std::numeric_limits<float>::quiet_NaN()
+          : high > low      ? (x - low) / (high - low)
+                            : 0;
+    s.scalar = b.scalar.data();
+    if (contact) s.through = kThrough;
+  }
+  out.surfaces.push_back(s);
 }
 
 void Drawing::add_obstacles(render::Scene &out) {
@@ -131,7 +169,7 @@ void Drawing::add_obstacles(render::Scene &out) {
     rotate(pose.rotation, up, axis);
     const double *p = pose.position;
     if (o.def.shape == DFM_SHAPE_PLANE) {
-      out.planes.push_back({{p[0], p[1], p[2]}, {axis[0], axis[1], axis[2]}, {}});
+      out.planes.push_back({{p[0], p[1], p[2]}, {axis[0], axis[1], axis[2]}, {}, upright_.tilts()});
     } else if (o.def.shape == DFM_SHAPE_SPHERE) {
       out.spheres.push_back({{p[0], p[1], p[2]}, o.def.radius, {}});
     } else if (o.def.shape == DFM_SHAPE_BOX) {
@@ -172,12 +210,14 @@ void Drawing::add_triangles(const ObstacleView &o, std::vector<double> &placed, 
 void Drawing::fill(render::Scene &out) {
   add_bodies(out);
   add_obstacles(out);
+  upright_.at(dfm_world_time(scene_.world()), out.up);
   if (color_ == "displacement") out.map = render::ColorMap::lagoon;
 }
 
 bool Drawing::legend(Legend &out) const {
+  if (std::ranges::none_of(buffers_, &Buffers::colored)) return false;
   out.map = color_ == "displacement" ? render::ColorMap::lagoon : render::ColorMap::ember;
-  out.top = scale_;
+  out.range = range();
   static const struct {
     const char *color, *title, *unit;
   } kMeanings[] = {{"speed", "speed", "m/s"},

@@ -1,4 +1,5 @@
-// A scene as the renderer takes it: bodies colored as "output"/"color" says, obstacles as they are now.
+// A scene as the renderer takes it: bodies colored as "output"/"color" says, obstacles as they are now, up
+// against gravity.
 #pragma once
 #include <optional>
 #include <string>
@@ -6,6 +7,7 @@
 
 #include "render/render.h"
 #include "surface_stress.h"
+#include "upright.h"
 
 namespace cli {
 
@@ -20,10 +22,15 @@ class Drawing {
   render::Bounds place_of_bodies() const;
   // [n,3] m, of the last fill().
   const std::vector<double> &positions(size_t body) const { return buffers_[body].xyz; }
-  // What the colors mean: false where each body has its own.
+  // The values at the ends of the map, in the unit of the quantity.
+  struct Range { float low = 0, high = 0; };
+  // "output"/"color_range"; where the scene has none, 0 to the largest value so far.
+  Range range() const { return fixed_ ? *fixed_ : Range{0, top_}; }
+  bool range_grows() const { return color_ != "body" && !fixed_; }
+  // What the colors mean: false where each body has its own, as without a model that gives the quantity.
   struct Legend {
     render::ColorMap map = render::ColorMap::ember;
-    double top = 0;
+    Range range;
     std::string title, unit;
   };
   bool legend(Legend &out) const;
@@ -39,15 +46,20 @@ class Drawing {
   // Of a body as it is now; displacements count from here.
   static void make(const BodyView &body, Buffers &b);
   bool fill_values(const BodyView &body, Buffers &b);
+  float noise() const;
+  void add_surface(size_t body, render::Scene &out);
   void add_bodies(render::Scene &out);
   void add_obstacles(render::Scene &out);
   void add_triangles(const ObstacleView &o, std::vector<double> &placed, render::Scene &out) const;
 
   const SceneFile &scene_;
+  Upright upright_;
   std::string color_;
+  std::optional<Range> fixed_;
+  double softest_, reach_ = 0;  // Pa; m, the largest coordinate at the start
   std::vector<Buffers> buffers_;
   std::vector<std::vector<double>> placed_;  // of obstacles of triangles
-  float scale_ = 0;
+  float top_ = 0;                            // of all fills
 };
 
 }  // namespace cli

@@ -15,8 +15,8 @@ std::string read_file(const std::string &path, uint64_t limit, const char *expec
 void write_whole(const std::string &path, const std::string &text);
 
 using File = std::unique_ptr<FILE, int (*)(FILE *)>;
-// A new file to write to as results come. A former file is removed and not written into, so that a
-// link's target stays what it is.
+// A new file to write to as results come, and to read from. A former file is removed and not written into, so
+// that a link's target stays what it is.
 File new_file(const std::string &path);
 [[noreturn]] void cannot_write(const std::string &path);  // for the reason in errno
 

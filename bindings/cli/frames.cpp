@@ -4,11 +4,13 @@
 #include "run_folder.h"
 
 #ifdef DEFORM_HAVE_RENDER
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <optional>
 
 #include "drawing.h"
+#include "kept_frames.h"
 
 namespace cli {
 namespace {
@@ -44,27 +46,50 @@ class OffScreen : public Frames {
     } else if (!scene_.settings().has_camera) {
       camera_ = render::follow(*camera_, distance_, drawing_.place_of_bodies(), double(kWidth) / kHeight);
     }
+    std::copy_n(picture_scene.up, 3, camera_->up);
     picture_scene.extent = extent_;
     picture_scene.camera = camera_;
-    render::Image image;
-    std::string why;
-    if (!renderer_->draw(picture_scene, image, &why))
-      throw Failure(kBadInput, "frame " + std::to_string(drawn_) + ": " + why);
-    annotate(image, t);
-    char name[40];
-    std::snprintf(name, sizeof name, "/frame_%06u.png", drawn_++);
-    if (!render::write_png(folder_ + name, image, &why)) throw Failure(kBadInput, why);
+    write(picture_scene, t, drawn_);
+    if (drawing_.range_grows()) {
+      if (!kept_) kept_.emplace(folder_);
+      kept_->add({t, drawing_.range().high, picture_scene});
+    }
+    ++drawn_;
+  }
+
+  void finish() override {
+    if (!kept_) return;
+    kept_->rewind();
+    const double top = drawing_.range().high;
+    KeptFrame frame;
+    for (uint32_t i = 0; kept_->next(frame); ++i) {
+      if (frame.top == top) continue;
+      kept_->rescale(float(frame.top / top));
+      write(frame.scene, frame.t, i);
+    }
+    kept_.reset();
   }
 
   std::string drawn_by() const override { return renderer_->device(); }
 
  private:
+  void write(const render::Scene &picture_scene, double t, uint32_t number) {
+    render::Image image;
+    std::string why;
+    if (!renderer_->draw(picture_scene, image, &why))
+      throw Failure(kBadInput, "frame " + std::to_string(number) + ": " + why);
+    annotate(image, t);
+    char name[40];
+    std::snprintf(name, sizeof name, "/frame_%06u.png", number);
+    if (!render::write_png(folder_ + name, image, &why)) throw Failure(kBadInput, why);
+  }
+
   void annotate(render::Image &image, double t) const {
     char text[40];
     std::snprintf(text, sizeof text, "t = %.3f s", t);
     render::draw_text(image, 16, 28, 14, text, {0.15f, 0.17f, 0.2f});
     Drawing::Legend l;
-    if (drawing_.legend(l)) render::legend(image, l.map, 0, l.top, l.title, l.unit);
+    if (drawing_.legend(l)) render::legend(image, l.map, l.range.low, l.range.high, l.title, l.unit);
   }
 
   const SceneFile &scene_;
@@ -74,6 +99,7 @@ class OffScreen : public Frames {
   std::optional<render::Bounds> extent_;
   std::optional<render::Camera> camera_;
   double distance_ = 0;  // m, from the camera to its first target
+  std::optional<KeptFrames> kept_;
   uint32_t drawn_ = 0;
 };
 

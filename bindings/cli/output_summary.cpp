@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <map>
 #include <string_view>
 #include <utility>
@@ -439,6 +440,23 @@ void print_contact_share(const SceneFile &scene, const RunResult &run, uint32_t 
       100 * std::min(1.0, contact / run.wall), contacts_max);
 }
 
+// What nothing damps swings as long as the run lasts, which many take for an error.
+void print_undamped(const SceneFile &scene) {
+  if (scene.bodies().empty() || scene.value("/time/mode") == "\"static\"" ||
+      scene.value("/time/integrator") == "\"implicit_euler\"")
+    return;
+  JsonValue materials;
+  parse_json(scene.value("/materials"), materials);
+  for (const JsonMember &m : materials.members)
+    if (const JsonValue *const damping = m.value.find("damping"))
+      for (const char *key : {"mass", "stiffness"})
+        if (std::strtod(damping->get(key).c_str(), nullptr) > 0) return;
+  std::printf(
+      "no material has damping, so bodies may swing for long: \"damping\": {\"mass\": 1, \"stiffness\": "
+      "0.001} "
+      "in a material, for example, lets them come to rest\n");
+}
+
 void print_swaps(const SceneFile &scene, const RunResult &run) {
   constexpr size_t kMost = 20;
   for (size_t i = 0; i < run.swaps.size() && i < kMost; ++i) {
@@ -459,13 +477,14 @@ void print_swaps(const SceneFile &scene, const RunResult &run) {
 
 void print_table(const SceneFile &scene, const RunResult &run, const Checks &checks) {
   const dfm_world_stats stats = world_stats(scene);
-  std::printf("%-16s %9s %8s  %-30s %10s %9s\n", "body", "points", "cells", "center of mass / m", "speed m/s",
-              "volume");
+  // of the fastest point, which moves where the center of mass stands still
+  std::printf("%-16s %9s %8s  %-30s %11s %9s\n", "body", "points", "cells", "center of mass / m",
+              "fastest m/s", "volume");
   for (const BodyView &body : scene.bodies()) {
     const dfm_body_measure m = body_measure(body);
     char com[64];
     std::snprintf(com, sizeof com, "%9.4f %9.4f %9.4f", m.com[0], m.com[1], m.com[2]);
-    std::printf("%-16.16s %9u %8u  %-30s %10.3g %8.2f%%\n", body.name.c_str(), body.npoint, body.ntet, com,
+    std::printf("%-16.16s %9u %8u  %-30s %11.3g %8.2f%%\n", body.name.c_str(), body.npoint, body.ntet, com,
                 m.speed_max, 100 * m.volume / m.rest_volume);
   }
   std::printf("%llu steps, %g s simulated in %.3g s: %.4g steps/s, %.3g x real time\n",
@@ -485,6 +504,7 @@ void print_table(const SceneFile &scene, const RunResult &run, const Checks &che
   if (const AutoShare share = auto_share(plan); share.changes > 0)
     std::printf("integrator auto: implicit for %.3g s of %.3g s (%.0f %%), explicit else; %.0f changes\n",
                 share.implicit, share.steps, 100 * share.implicit / share.steps, share.changes);
+  print_undamped(scene);
   print_contact_share(scene, run, stats.contacts_max);
   print_shattered(scene);
   print_swaps(scene, run);

@@ -16,7 +16,7 @@ struct RunOptions {
   double time = 0;        // 0: the scene's duration
   double frame_rate = 0;  // 0: what the scene says
   std::vector<std::string> set;
-  bool profile = false, check = false;
+  bool profile = false, check = false, plot = false;
   uint64_t jitter = 0;
   struct Save {
     double at;  // s since the start of the scene

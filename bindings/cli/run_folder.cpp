@@ -52,6 +52,7 @@ void refuse_linked_folders(const std::string &folder) {
 // rest is not taken for a complete run. Files that a killed process was writing are removed too.
 void remove_earlier(const std::string &folder) {
   remove_matching(folder, "summary\\.json");
+  remove_matching(folder, "plots\\.png(\\.part[0-9]*(-[0-9]+)?)?");
   remove_matching(folder, "(attachments|bodies|contacts|probes|sensors|tools)\\.csv");
   remove_matching(folder, "(summary\\.json|.*\\.csv)\\.part[0-9]*(-[0-9]+)?");
   remove_matching(folder + "/states",

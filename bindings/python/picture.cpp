@@ -1,8 +1,10 @@
 // Pictures for the Python package: the renderer behind plain C functions that ctypes calls. What is added
 // stays until it is drawn. One thread at a time for each picture; the package sees to that.
+#include <algorithm>
 #include <cstdio>
 #include <cstring>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,6 +19,17 @@ struct Surface {
   std::vector<uint32_t> tri;
   std::vector<float> scalar;
   render::Color color;
+  float through;
+};
+
+// "ember", or "lagoon" where it is 1.
+render::ColorMap map_of(uint32_t map) {
+  return map == 1 ? render::ColorMap::lagoon : render::ColorMap::ember;
+}
+
+struct Legend {
+  double low, high;
+  std::string title, unit;
 };
 
 struct Picture {
@@ -24,6 +37,8 @@ struct Picture {
   std::vector<Surface> surfaces;
   render::Scene scene;
   std::vector<std::pair<std::string, double>> texts;  // and the height of their base line
+  std::optional<Legend> legend;
+  bool tilts = false;
 };
 
 int refuse(const std::string &sentence, char *why, size_t capacity) {
@@ -58,11 +73,36 @@ PICTURE_API void deform_picture_palette(uint32_t i, double *rgb) {
   rgb[2] = color.b;
 }
 
+/** Colors of a map at equal distances. @param map 1: that of displacements; rgb out, [n,3] 0..1 */
+PICTURE_API void deform_picture_map(uint32_t map, uint32_t n, double *rgb) {
+  for (uint32_t i = 0; i < n; ++i) {
+    const render::Color color = render::map_color(map_of(map), float(i) / float(n - 1));
+    const double channels[3] = {color.r, color.g, color.b};
+    std::copy_n(channels, 3, rgb + size_t(3) * i);
+  }
+}
+
+/** @param up [3] unit, against gravity; tilts: it changes during the film that this is a frame of */
+PICTURE_API void deform_picture_upright(void *picture, const double *up, uint32_t tilts) {
+  copy(static_cast<Picture *>(picture)->scene.up, up);
+  static_cast<Picture *>(picture)->tilts = tilts != 0;
+}
+
+/** What the colors of values mean. @param low, high at the ends of the map */
+PICTURE_API void deform_picture_legend(void *picture, uint32_t map, double low, double high,
+                                       const char *title, const char *unit) {
+  Picture &p = *static_cast<Picture *>(picture);
+  p.scene.map = map_of(map);
+  p.legend = {low, high, title, unit};
+}
+
 /** @param xyz [n,3] m; tri [ntri,3]; rgb [3] 0..1; scalar [n] 0..1, NaN: rgb; NULL: rgb everywhere.
- * Copied. */
+ * through: how much of the values is seen through what hides them, 0..1. Copied. */
 PICTURE_API void deform_picture_surface(void *picture, uint32_t n, const double *xyz, uint32_t ntri,
-                                        const uint32_t *tri, const double *rgb, const float *scalar) {
+                                        const uint32_t *tri, const double *rgb, const float *scalar,
+                                        double through) {
   Surface s;
+  s.through = float(through);
   s.xyz.assign(xyz, xyz + size_t(3) * n);
   s.tri.assign(tri, tri + size_t(3) * ntri);
   if (scalar) s.scalar.assign(scalar, scalar + n);
@@ -102,12 +142,13 @@ PICTURE_API void deform_picture_shape(void *picture, uint32_t shape, const doubl
   }
 }
 
-/** @param eye, look_at [3] m, world. Without it the camera finds its place by itself. */
+/** @param eye, look_at [3] m, world. Without it the camera finds its place by itself. After
+ * deform_picture_upright. */
 PICTURE_API void deform_picture_camera(void *picture, const double *eye, const double *look_at) {
   render::Camera camera = {};
   copy(camera.eye, eye);
   copy(camera.look_at, look_at);
-  camera.up[2] = 1;
+  copy(camera.up, static_cast<Picture *>(picture)->scene.up);
   camera.fov_deg = 30;
   static_cast<Picture *>(picture)->scene.camera = camera;
 }
@@ -132,14 +173,20 @@ PICTURE_API int deform_picture_draw(void *handle, uint8_t *rgb, char *why, size_
     surface.rgb[1] = s.color.g;
     surface.rgb[2] = s.color.b;
     if (!s.scalar.empty()) surface.scalar = s.scalar.data();
+    surface.through = s.through;
     picture.scene.surfaces.push_back(surface);
   }
+  for (render::Plane &plane : picture.scene.planes) plane.slab = picture.tilts;
   render::Image image;
   std::string reason;
   const bool drawn = picture.renderer->draw(picture.scene, image, &reason);
   if (drawn)
     for (const auto &[text, y] : picture.texts)
       render::draw_text(image, 16, y, 14, text, {0.15f, 0.17f, 0.2f});
+  if (const auto &l = picture.legend; drawn && l)
+    render::legend(image, picture.scene.map, l->low, l->high, l->title, l->unit);
+  picture.legend.reset();
+  picture.tilts = false;
   picture.scene = {};
   picture.surfaces.clear();
   picture.texts.clear();

@@ -359,7 +359,7 @@ Camera auto_camera(const Scene &scene, double aspect) {
   for (const Plane &p : scene.planes) {
     const double slope = dot(unit(vec(p.normal), up), up);
     if (slope < kRamp) continue;
-    if (slope > kLevel) {
+    if (!p.slab && slope > kLevel) {
       const Vec middle = (vec(extent.lo) + vec(extent.hi)) * 0.5;
       const Vec foot = middle + up * dot(up, vec(p.point) - middle);
       if (norm(foot - middle) < 1.5 * norm(vec(extent.hi) - middle)) shown.add(&foot.x);

@@ -46,17 +46,20 @@ struct Surface {
   // values from here down to 0 run out into rgb: 0.25 makes contact patches without a jagged rim
   float fade = 0;
   bool edges = false;  // triangle edges as thin darker lines
+  // how much of the color of its values is seen through whatever hides them
+  float through = 0;
 };
 
 struct Look {
   float rgb[3] = {0.72f, 0.75f, 0.79f};
   float alpha = 1;  // below 1: seen through, casts no shadow
 };
-// A plane square to Scene::up is drawn as the floor (the highest one seen from above), any other as a tilted
-// slab sized to the scene. A plane whose back faces the camera is left out.
+// A plane square to Scene::up is drawn as the floor (the highest one), any other as a tilted slab sized to
+// the scene. From below, the floor is a veil; another plane whose back faces the camera is left out.
 struct Plane {
   double point[3], normal[3];
   Look look;
+  bool slab = false;  // a slab even while it is level: a table that a film tilts
 };
 struct Box {
   Pose pose;

@@ -1,6 +1,6 @@
 // One picture: everything becomes triangles (geometry.cpp), the shadow maps of the key light and of the sky
-// are drawn, then background, floor, bodies, what is seen through (far to near), lines; four samples a pixel
-// are resolved and read back.
+// are drawn, then background, floor, bodies, values that these hide, what is seen through (far to near),
+// lines; four samples a pixel are resolved and read back.
 #include "render.h"
 
 #include <algorithm>
@@ -64,6 +64,8 @@ struct Frame {
   double extent = 1;  // half the diagonal of what grid and slabs are sized to
 };
 
+constexpr float kVeil = 0.4f;  // of the floor's alpha, from below
+
 double nice(double x) {  // 1, 2 or 5 times a power of ten, not above x
   const double base = std::pow(10, std::floor(std::log10(x))), m = x / base;
   return base * (m >= 5 ? 5 : m >= 2 ? 2 : 1);
@@ -116,11 +118,11 @@ void add_planes(const Scene &scene, Frame &frame, const Bounds &extent) {
   for (const Plane &p : scene.planes) {
     const Vec n = unit(vec(p.normal), frame.up);
     const Vec eye = frame.view.eye + frame.shape.origin;
-    if (dot(n, eye - vec(p.point)) <= 0) continue;
-    if (dot(n, frame.up) > kLevel) {
+    if (!p.slab && dot(n, frame.up) > kLevel) {
       if (!floor || dot(vec(p.point) - vec(floor->point), frame.up) > 0) floor = &p;
       continue;
     }
+    if (dot(n, eye - vec(p.point)) <= 0) continue;
     batch(frame, solid(p.look), [&] {
       const Slab s = slab_of(p, frame.up, room);
       frame.shape.box(s.center, s.axes, p.look.rgb);
@@ -131,7 +133,8 @@ void add_planes(const Scene &scene, Frame &frame, const Bounds &extent) {
   g.present = true;
   // It lies where the line of sight meets it, and reaches far beyond that, wherever the camera has gone.
   const Vec eye = frame.view.eye + frame.shape.origin;
-  const double above = dot(eye - vec(floor->point), frame.up), falls = dot(frame.view.back, frame.up);
+  const double height = dot(eye - vec(floor->point), frame.up), above = std::abs(height);
+  const double falls = std::abs(dot(frame.view.back, frame.up));
   const double way = std::min(above / std::max(falls, 0.05), 20 * frame.extent + above);
   g.radius = std::max(6 * frame.extent, 6 * way);
   g.spacing = nice(0.45 * frame.extent);
@@ -150,7 +153,7 @@ void add_planes(const Scene &scene, Frame &frame, const Bounds &extent) {
   Batch b;
   b.kind = Kind::floor;
   b.shadow = false;
-  b.alpha = floor->look.alpha;
+  b.alpha = floor->look.alpha * (height > 0 ? 1 : kVeil);
   // Looks of obstacles are gray by default; a floor is lighter, so that shadows have room to fall.
   const bool own = !std::equal(floor->look.rgb, floor->look.rgb + 3, Look{}.rgb);
   const float light[3] = {0.90f, 0.905f, 0.915f};
@@ -163,6 +166,24 @@ void add_planes(const Scene &scene, Frame &frame, const Bounds &extent) {
       frame.shape.triangle(p, n, own ? floor->look.rgb : light);
     }
   });
+}
+
+// The triangles with values once more, to be drawn where something hides them.
+void add_values(const Surface &s, Frame &frame) {
+  std::vector<uint32_t> valued;
+  for (size_t t = 0; t < 3 * size_t(s.ntri); t += 3)
+    if (!std::isnan(s.scalar[s.tri[t]]) || !std::isnan(s.scalar[s.tri[t + 1]]) ||
+        !std::isnan(s.scalar[s.tri[t + 2]]))
+      valued.insert(valued.end(), s.tri + t, s.tri + t + 3);
+  Surface part = s;
+  part.tri = valued.data();
+  part.ntri = uint32_t(valued.size() / 3);
+  Batch b;
+  b.kind = Kind::through;
+  b.alpha = s.through;
+  b.fade = s.fade;
+  b.shadow = false;
+  batch(frame, b, [&] { frame.shape.surface(part); });
 }
 
 // Ball around what casts shadows and lies in the box (floors cast none).
@@ -205,6 +226,7 @@ Frame compose(const Scene &scene, double aspect, double pixels_high) {
     b.edges = s.edges;
     b.fade = s.fade;
     batch(frame, b, [&] { frame.shape.surface(s); });
+    if (s.scalar && s.through > 0) add_values(s, frame);
   }
   for (const Box &b : scene.boxes)
     batch(frame, solid(b.look), [&] {
@@ -225,13 +247,19 @@ Frame compose(const Scene &scene, double aspect, double pixels_high) {
     b.on_top = l.on_top;
     batch(frame, b, [&] { frame.shape.ribbons(l, world, pixels_high); });
   }
-  // Floor first (it fades into the background), then what hides, then what is seen through from far to
-  // near, lines last.
-  const auto rank = [](const Batch &b) {
-    return b.kind == Kind::floor ? 0 : b.kind == Kind::plain ? 3 + b.on_top : b.alpha >= 1 ? 1 : 2;
+  // The floor first (it fades into the background; from below it is before everything), then what hides, the
+  // values behind that, then what is seen through from far to near, lines last.
+  const double above = frame.ground.present ? dot(frame.view.eye - frame.ground.center, frame.up) : 0;
+  const auto rank = [above](const Batch &b) {
+    switch (b.kind) {
+      case Kind::floor: return above > 0 ? 0 : 4;
+      case Kind::through: return 2;
+      case Kind::plain: return 5 + b.on_top;
+      default: return b.alpha >= 1 ? 1 : 3;
+    }
   };
   std::stable_sort(frame.batches.begin(), frame.batches.end(), [&](const Batch &a, const Batch &b) {
-    return rank(a) != rank(b) ? rank(a) < rank(b) : rank(a) == 2 && a.depth > b.depth;
+    return rank(a) != rank(b) ? rank(a) < rank(b) : rank(a) == 3 && a.depth > b.depth;
   });
   return frame;
 }
@@ -266,7 +294,7 @@ std::string with(std::string text, const std::string &constant, int number) {
   return text.replace(at, text.find(';', at) - at, std::to_string(number));
 }
 
-constexpr int kKinds = 3;
+constexpr int kKinds = 4;
 
 class GlRenderer final : public WindowRenderer {
  public:
@@ -328,7 +356,8 @@ GlRenderer::~GlRenderer() {
   if (!started_) return;
   Current current(*context_);
   if (!current.ok) return;
-  for (const GLuint p : {main_[0], main_[1], main_[2], depth_, background_}) gl_.DeleteProgram(p);
+  for (const GLuint p : main_) gl_.DeleteProgram(p);
+  for (const GLuint p : {depth_, background_}) gl_.DeleteProgram(p);
   for (const GLuint t : {key_texture_, sky_texture_, map_texture_}) gl_.DeleteTextures(1, &t);
   for (const GLuint f : {shadow_target_, sampled_target_, resolved_target_}) gl_.DeleteFramebuffers(1, &f);
   gl_.DeleteRenderbuffers(3, stores_);
@@ -564,8 +593,8 @@ void GlRenderer::draw_colors(const Frame &frame, const Mat4 &key, const std::vec
   gl_.BlendFunc(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA);
   gl_.Enable(GL_DEPTH_TEST);
   for (const Batch &b : frame.batches) {
-    gl_.DepthFunc(b.on_top ? GL_ALWAYS : GL_LEQUAL);
-    gl_.DepthMask(b.alpha >= 1 && !b.on_top ? GL_TRUE : GL_FALSE);
+    gl_.DepthFunc(b.on_top ? GL_ALWAYS : b.kind == Kind::through ? GL_GREATER : GL_LEQUAL);
+    gl_.DepthMask(b.alpha >= 1 && !b.on_top && b.kind != Kind::through ? GL_TRUE : GL_FALSE);
     use(main_[int(b.kind)]);
     set("edges", int(b.edges));
     set("alpha", double(b.alpha));

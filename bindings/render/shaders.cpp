@@ -35,7 +35,7 @@ centroid in vec3 n;
 flat in vec3 rgb;     // one color a body: interpolation over triangles seen edge-on would round it
 centroid in vec2 scalar;
 centroid in vec3 corner;
-const int kind = 0;          // 0 lit, 1 floor, 2 plain color: a program each
+const int kind = 0;          // 0 lit, 1 floor, 2 plain color, 3 values seen through: a program each
 uniform int edges;
 uniform float fade;          // values below it run out into the plain color
 uniform float alpha;
@@ -110,6 +110,10 @@ void main() {
   // slivers rounds.
   float value = scalar.x / max(scalar.y, 0.01), valued = smoothstep(0.1, 0.9, scalar.y);
   if (fade > 0.0) valued *= smoothstep(0.0, fade, value);
+  if (kind == 3) {
+    result = vec4(texture(map, vec2(value * 256.0 / 257.0 + 0.5 / 257.0, 0.5)).rgb, alpha * valued);
+    return;
+  }
   vec3 base = linear(mix(rgb, texture(map, vec2(value * 256.0 / 257.0 + 0.5 / 257.0, 0.5)).rgb, valued));
   float a = alpha, gloss = 0.16;
   if (kind == 1) {
@@ -117,9 +121,10 @@ void main() {
     float far = length(p - floor_center) / floor_size.y;
     float plain = clamp(1.6 - 4.0 * max(fwidth(x.x), fwidth(x.y)), 0.0, 1.0);
     float odd = mod(floor(x.x) + floor(x.y), 2.0);
-    base *= 1.0 - 0.035 * odd * plain - 0.09 * lines_of(x, 1.2);
+    base *= 1.0 - 0.035 * odd * plain - (gl_FrontFacing ? 0.09 : 0.6) * lines_of(x, 1.2);
     a *= 1.0 - smoothstep(0.12, 1.0, far);
     gloss = 0.0;
+    if (!gl_FrontFacing) { result = vec4(encoded(base), a); return; }  // a veil with lines, seen from below
   }
   if (edges == 1) {
     vec3 w = fwidth(corner), d = corner / max(w, vec3(1e-6));

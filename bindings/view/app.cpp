@@ -98,9 +98,7 @@ App::App(const Options &options, const cli::Globals &globals)
                          "deform view " + std::filesystem::path(path).filename().string(), !script_);
   window_->size(width_, height_);
   if (!script_ || std::getenv("DEFORM_VIEW_SPNAV")) space_mouse_ = SpaceMouse::open(no_space_mouse_);
-  render::Scene picture;
-  stage_->drawing.fill(picture);
-  orbit_.set(first_camera(stage_->scene, picture, height_ > 0 ? aspect() : 1));
+  first_look();
   stage_->plots.sample();
   if (replay_) show_state(0);
   wanted_ = stage_->simulation.time();
@@ -154,6 +152,13 @@ void App::frame() {
   if (script_ && script_->done()) quit_ = true;
 }
 
+void App::first_look() {
+  render::Scene picture;
+  stage_->drawing.fill(picture);
+  orbit_.set_up(render::vec(picture.up));
+  orbit_.set(first_camera(stage_->scene, picture, height_ > 0 ? aspect() : 1));
+}
+
 void App::handle(const Input &in) {
   if (in.kind == Input::key) return key(in.name);
   mouse(in);
@@ -161,6 +166,7 @@ void App::handle(const Input &in) {
 
 void App::key(const std::string &name) {
   message_.clear();
+  if (name != "b") asked_ = false;
   if (name == "space") {
     if (replay_ && !running_ && shown_ + 1 == replay_->states.size()) show_state(0);
     if (!replay_ && !running_ && stage_->simulation.at_end()) stage_->simulation.go_on();
@@ -178,9 +184,7 @@ void App::key(const std::string &name) {
   } else if (name == "r") {
     restart();
   } else if (name == "home") {
-    render::Scene picture;
-    stage_->drawing.fill(picture);
-    orbit_.set(first_camera(stage_->scene, picture, aspect()));
+    first_look();
   } else if (name == "c") {
     static const std::vector<std::string> kColors{"body", "contact", "speed", "displacement", "stress"};
     const auto at = std::find(kColors.begin(), kColors.end(), stage_->drawing.color());
@@ -391,6 +395,7 @@ bool App::draw() {
   render::Scene picture;
   stage_->drawing.fill(picture);
   picture.extent = stage_->extent;
+  orbit_.set_up(render::vec(picture.up));
   picture.camera = orbit_.camera();
   const double size = stage_->size;
   if (show_arrows_ && !replay_) stage_->arrows.fill(stage_->scene, size, *picture.camera, picture);

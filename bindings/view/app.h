@@ -51,7 +51,8 @@ class App {
   void mouse(const Input &input);
   void press(int button);
   bool tool_key(const std::string &name);  // false: no key of tools
-  void lead(double dx, double dy);         // the tool in hand by the mouse
+  void ask_for_probe();
+  void lead(double dx, double dy);  // the tool in hand by the mouse
   void lead_by_space_mouse(double now);
   void lead_deeper(double turns);  // of the wheel, away from the user
   void add_probe();
@@ -67,6 +68,7 @@ class App {
   // Shows the user what the library refuses, instead of ending.
   void attempt(const std::function<void()> &what);
   bool draw();  // false: the window has no size
+  void first_look();
   void panels();
   void controls();
   void files();
@@ -74,6 +76,7 @@ class App {
   void sliders();
   void plots();
   void numbers();
+  void help();
   void shot(const std::string &name);
   double aspect() const { return double(width_) / height_; }
   // The mouse, from -1 (left, bottom) to 1.
@@ -106,6 +109,7 @@ class App {
   double lead_[6] = {};           // from the tool in hand to where it shall go
   double strongest_[2] = {0, 0};  // N, N m, of an arrow of full length
   std::string message_;           // for the user, until the next one
+  bool asked_ = false;            // whether b shall start the scene again; the next key answers
   uint32_t saved_ = 0;            // states
   size_t shown_ = 0;              // state of the recording
 };

@@ -12,9 +12,17 @@ void Orbit::set(const render::Camera &camera) {
   target_ = render::vec(camera.look_at);
   const Vec back = render::vec(camera.eye) - target_;
   distance_ = std::max(render::norm(back), 1e-9);
-  azimuth_ = std::atan2(back.y, back.x);
-  elevation_ = std::asin(std::clamp(back.z / distance_, -1.0, 1.0));
+  azimuth_ = std::atan2(render::dot(back, render::cross(up_, x_)), render::dot(back, x_));
+  elevation_ = std::asin(std::clamp(render::dot(back, up_) / distance_, -1.0, 1.0));
   fov_deg_ = camera.fov_deg;
+}
+
+void Orbit::set_up(const Vec &up) {
+  if (render::norm(up - up_) == 0) return;
+  const render::Camera now = camera();
+  up_ = up;
+  x_ = render::unit(x_ - up * render::dot(x_, up), render::square_to(up));
+  set(now);
 }
 
 void Orbit::turn(double across, double up) {
@@ -31,10 +39,10 @@ void Orbit::shift(double right, double up) {
 void Orbit::zoom(double factor) { distance_ = std::clamp(distance_ * factor, 1e-4, 1e4); }
 
 render::Camera Orbit::camera() const {
-  const Vec back{std::cos(elevation_) * std::cos(azimuth_), std::cos(elevation_) * std::sin(azimuth_),
-                 std::sin(elevation_)};
+  const Vec level = x_ * std::cos(azimuth_) + render::cross(up_, x_) * std::sin(azimuth_);
+  const Vec back = level * std::cos(elevation_) + up_ * std::sin(elevation_);
   const Vec eye = target_ + back * distance_;
-  render::Camera c = {{eye.x, eye.y, eye.z}, {target_.x, target_.y, target_.z}};
+  render::Camera c = {{eye.x, eye.y, eye.z}, {target_.x, target_.y, target_.z}, {up_.x, up_.y, up_.z}};
   c.fov_deg = fov_deg_;
   return c;
 }

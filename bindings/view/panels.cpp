@@ -12,7 +12,9 @@
 namespace view {
 namespace {
 
-constexpr float kWide = 290, kGap = 12, kSlider = 110, kPlot = 270, kHigh = 64, kLine = 16;
+constexpr float kWide = 310, kGap = 12, kPlot = 270, kHigh = 64, kLine = 16;
+constexpr float kSlider = 96, kValue = 112, kLabel = 184;  // where a row's parts end or begin, from the left
+constexpr float kKeys = 104;                               // of the help
 
 // Of a size that is meant for letters of 14 pixels.
 float scaled(float size) { return size * ImGui::GetFontSize() / 14; }
@@ -27,6 +29,41 @@ void pale() {
   style.FrameRounding = 3;
   style.WindowBorderSize = 0;
   style.Colors[ImGuiCol_WindowBg] = {1, 1, 1, 0.78f};
+}
+
+// The number stands beside the handle, which would cover it.
+bool slider(const char *label, float *x, float low, float high, const char *format,
+            ImGuiSliderFlags flags = 0) {
+  char value[32];
+  std::snprintf(value, sizeof value, format, double(*x));
+  ImGui::PushID(label);
+  ImGui::SetNextItemWidth(scaled(kSlider));
+  const bool moved = ImGui::SliderFloat("", x, low, high, "", flags);
+  ImGui::PopID();
+  ImGui::SameLine(scaled(kValue));
+  ImGui::TextUnformatted(value);
+  ImGui::SameLine(scaled(kLabel));
+  ImGui::TextWrapped("%s", label);
+  return moved;
+}
+
+void color_bar(const cli::Drawing::Legend &legend) {
+  constexpr int kParts = 64;
+  ImGui::TextWrapped("%s [%s]", legend.title.c_str(), legend.unit.c_str());
+  const ImVec2 at = ImGui::GetCursorScreenPos(), size = {ImGui::GetContentRegionAvail().x, scaled(10)};
+  ImDrawList *const list = ImGui::GetWindowDrawList();
+  for (int i = 0; i < kParts; ++i) {
+    const render::Color c = render::map_color(legend.map, float(i) / (kParts - 1));
+    list->AddRectFilled({at.x + size.x * float(i) / kParts, at.y},
+                        {at.x + size.x * float(i + 1) / kParts, at.y + size.y},
+                        ImGui::ColorConvertFloat4ToU32({c.r, c.g, c.b, 1}));
+  }
+  ImGui::Dummy(size);
+  char high[32];
+  std::snprintf(high, sizeof high, "%.3g", double(legend.range.high));
+  ImGui::Text("%.3g", double(legend.range.low));
+  ImGui::SameLine(ImGui::GetStyle().WindowPadding.x + size.x - ImGui::CalcTextSize(high).x);
+  ImGui::TextUnformatted(high);
 }
 
 }  // namespace
@@ -54,16 +91,13 @@ void App::controls() {
   ImGui::SameLine();
   if (ImGui::Button("help")) key("h");
   float speed = float(speed_);
-  ImGui::SetNextItemWidth(scaled(kSlider));
-  if (ImGui::SliderFloat("speed", &speed, 0.01f, 4, "%.2f x", ImGuiSliderFlags_Logarithmic)) speed_ = speed;
+  if (slider("speed", &speed, 0.01f, 4, "%.2f x", ImGuiSliderFlags_Logarithmic)) speed_ = speed;
   if (!replay_) return;
-  int at = int(shown_);
-  ImGui::SetNextItemWidth(scaled(kSlider));
-  char label[32];
-  std::snprintf(label, sizeof label, "%.3f s", stage_->simulation.time());
-  if (ImGui::SliderInt("time", &at, 0, int(replay_->states.size()) - 1, label) && size_t(at) != shown_)
+  float state = float(shown_);
+  const float last = float(replay_->states.size() - 1);
+  if (slider("state", &state, 0, last, "%.0f") && size_t(std::lround(state)) != shown_)
     attempt([&] {
-      show_state(size_t(at));
+      show_state(size_t(std::lround(state)));
       wanted_ = stage_->simulation.time();
     });
 }
@@ -78,9 +112,8 @@ void App::files() {
 
 void App::slide(Slider &s) {
   float x = float(s.value);
-  ImGui::SetNextItemWidth(scaled(kSlider));
-  if (ImGui::SliderFloat(s.label.c_str(), &x, float(s.low), float(s.high), s.format,
-                         s.logarithmic ? ImGuiSliderFlags_Logarithmic : 0))
+  if (slider(s.label.c_str(), &x, float(s.low), float(s.high), s.format,
+             s.logarithmic ? ImGuiSliderFlags_Logarithmic : 0))
     attempt([&] {
       s.apply(x);
       s.value = x;
@@ -90,8 +123,7 @@ void App::slide(Slider &s) {
 void App::sliders() {
   ImGui::Separator();
   float stiffness = float(stage_->pull.stiffness);
-  ImGui::SetNextItemWidth(scaled(kSlider));
-  if (ImGui::SliderFloat("pull", &stiffness, 0.1f, 1000, "%.3g x", ImGuiSliderFlags_Logarithmic))
+  if (slider("pull", &stiffness, 0.1f, 1000, "%.3g x", ImGuiSliderFlags_Logarithmic))
     stage_->pull.stiffness = stiffness;
   for (Slider &s : stage_->sliders) slide(s);
 }
@@ -181,11 +213,9 @@ void App::numbers() {
     text("torque", felt.torque, "mN m");
   }
   cli::Drawing::Legend legend;
-  if (stage_->drawing.legend(legend)) {
-    if (legend.top > 0)
-      ImGui::Text("color: %s, 0 to %.3g %s", legend.title.c_str(), legend.top, legend.unit.c_str());
-    else ImGui::Text("color: %s: 0 so far, or the models provide none", legend.title.c_str());
-  }
+  if (stage_->drawing.legend(legend)) color_bar(legend);
+  else if (stage_->drawing.color() != "body")
+    ImGui::TextWrapped("color: stress, which no model here provides");
   // What the machine needs differs from run to run, so that a script's pictures are without it.
   if (!script_) {
     ImGui::Text("%.3f ms a step, %.2f x real time", stage_->simulation.step_ms(), running_ ? real_ : 0);
@@ -198,16 +228,45 @@ void App::numbers() {
   }
   if (!help_) return;
   ImGui::Separator();
-  ImGui::TextUnformatted(
-      "left mouse  pull a body; beside bodies: turn\nright mouse  turn\nmiddle mouse  shift\n"
-      "wheel  nearer, farther\nspace  run or pause\ns  one step\nr  back to the start\n"
-      "c  next coloring\na  arrows of contact forces\np  plots\nt  no panels, for a picture\nf5, f9  save, "
-      "load\nv  begin or end a recording\n"
-      "tab  takes the next tool in hand; so does the mouse\narrows, page up, down  move it; with shift: turn "
-      "it\nj, k  close, open its jaws\nl  lets it go back to its motion\nb  adds a ball as a tool\n"
-      "home  first camera\nh  this help\nq  quit");
-  if (space_mouse_) ImGui::TextUnformatted("6-DOF mouse  leads the tool in hand");
-  else if (!no_space_mouse_.empty()) ImGui::TextUnformatted(no_space_mouse_.c_str());
+  help();
+}
+
+void App::help() {
+  static const char *const kRows[][2] = {
+      {"left mouse", "pulls a body; beside bodies: turns"},
+      {"right mouse", "turns"},
+      {"middle mouse", "shifts"},
+      {"wheel", "nearer, farther"},
+      {"space", "runs or pauses"},
+      {"s", "one step"},
+      {"r", "back to the start"},
+      {"c", "next coloring"},
+      {"a", "arrows of contact forces"},
+      {"p", "plots"},
+      {"t", "no panels, for a picture"},
+      {"f5, f9", "save, load"},
+      {"v", "begins or ends a recording"},
+      {"tab", "takes the next tool in hand; so does the mouse"},
+      {"arrows, page up, page down", "move it; with shift: turn it"},
+      {"j, k", "close, open its jaws"},
+      {"l", "lets it go back to its motion"},
+      {"b", "starts again with a ball as a further tool"},
+      {"home", "first camera"},
+      {"h", "this help"},
+      {"q", "quits"},
+      {"6-DOF mouse", space_mouse_ ? "leads the tool in hand" : no_space_mouse_.c_str()}};
+  if (!ImGui::BeginTable("help", 2)) return;
+  ImGui::TableSetupColumn("key", ImGuiTableColumnFlags_WidthFixed, scaled(kKeys));
+  ImGui::TableSetupColumn("does", ImGuiTableColumnFlags_WidthStretch);
+  for (const auto &[key, does] : kRows) {
+    if (!*does) continue;
+    ImGui::TableNextRow();
+    ImGui::TableNextColumn();
+    ImGui::TextWrapped("%s", key);
+    ImGui::TableNextColumn();
+    ImGui::TextWrapped("%s", does);
+  }
+  ImGui::EndTable();
 }
 
 }  // namespace view

@@ -34,7 +34,7 @@ bool App::tool_key(const std::string &name) {
   if (replay_) return true;
   Grip &grip = stage_->grip;
   if (name == "b") {
-    add_probe();
+    ask_for_probe();
   } else if (name == "tab") {
     attempt([&] { grip.next(); });
     if (grip.count() == 0) message_ = "The scene has no tool: b adds a ball.";
@@ -90,6 +90,13 @@ void App::lead_deeper(double turns) {
   attempt([&] { stage_->grip.move_to(stage_->grip.to() - back * (2 * kMove * stage_->size * turns)); });
 }
 
+// What was simulated is lost by it.
+void App::ask_for_probe() {
+  if (stage_->simulation.time() == 0 || asked_) return add_probe();
+  asked_ = true;
+  message_ = "A ball starts the scene again from 0 s: press b once more, or any other key to go on as it is.";
+}
+
 // The scene with one tool more, from its start: states and recordings are then those of a scene that
 // `deform run` reads.
 void App::add_probe() {
@@ -101,6 +108,7 @@ void App::add_probe() {
     fresh->drawing.set_color(stage_->drawing.color());
     stage_ = std::move(fresh);
     options_ = more;
+    asked_ = false;
     stage_->plots.sample();
     wanted_ = stage_->simulation.time();
     saved_ = 0;

@@ -234,6 +234,42 @@ TEST_P(Pixels, PlaneWhoseBackFacesTheCamera_IsLeftOut) {
   EXPECT_GT(changed(draw(ramp), bare), 1500) << "of 19200";
 }
 
+TEST_P(Pixels, FloorFromBelow_IsAVeil) {
+  const Ball ball(0, 0, 1, 1);
+  Scene below = scene_of({ball.surface(0.9f, 0.1f, 0.1f)}, false);
+  below.camera->eye[2] = -3;
+  const Image without = draw(below);
+  below.planes = {kFloor};
+  const Image veiled = draw(below);
+  EXPECT_GT(changed(veiled, without), 1500) << "of 19200";
+  const uint8_t *const middle = pixel(veiled, kWide / 2, kHigh / 2);
+  EXPECT_GT(middle[0], middle[1] + 20) << "the ball is seen through it";
+}
+
+TEST_P(Pixels, LevelSlab_HasARimWhereTheFloorHasNone) {
+  Scene floor = scene_of({}), slab = floor;
+  slab.planes[0].slab = true;
+  const Image bare = draw(scene_of({}, false)), whole = draw(floor), cut = draw(slab);
+  EXPECT_GT(changed(whole, bare), changed(cut, bare));
+  EXPECT_GT(changed(cut, bare), 500) << "of 19200";
+}
+
+TEST_P(Pixels, HiddenValues_AreSeenThroughAsFarAsAsked) {
+  const Ball front(0, -1, 1, 0.9), behind(0, 2, 2.0 / 3, 0.3);
+  const std::vector<float> values(behind.xyz.size() / 3, 0.5f);
+  Scene s = scene_of({front.surface(0.8f, 0.8f, 0.8f), behind.surface(0.8f, 0.8f, 0.8f)}, false);
+  s.surfaces[1].scalar = values.data();
+  const Image hidden = draw(s);
+  s.surfaces[1].through = 0.5f;
+  const Image seen = draw(s);
+  const uint8_t *const gray = pixel(hidden, kWide / 2, kHigh / 2), *const shown =
+                                                                       pixel(seen, kWide / 2, kHigh / 2);
+  const Color c = map_color(s.map, 0.5f);
+  // through its front and its back
+  EXPECT_NEAR(shown[0], 0.25 * gray[0] + 0.75 * 255 * c.r, 6);
+  EXPECT_NEAR(shown[2], 0.25 * gray[2] + 0.75 * 255 * c.b, 6);
+}
+
 TEST_P(Pixels, SolidShapes_AreDrawnAtTheGivenPose) {
   for (const char shape : {'b', 's', 'c'}) {
     Scene s = scene_of({});

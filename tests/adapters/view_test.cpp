@@ -261,12 +261,15 @@ TEST_F(Viewer, ToolInHand_GoesWhereItIsLedAndBackToItsKeys) {
 // Any scene gets a ball by one key: led into the block it pushes it down, and feels it. A recording that
 // begins with it in hand is replayed.
 TEST_F(Viewer, AddedProbe_PressesAndReportsItsForce) {
-  std::string script = "0.1 key space\n0.3 key space\n0.3 key b\n0.3 shot added.png\n0.35 key space\n";
+  std::string script =
+      "0.1 key space\n0.3 key space\n0.3 key b\n0.3 shot asked.png\n0.32 key b\n0.32 shot added.png\n"
+      "0.35 key space\n";
   for (int i = 0; i < 24; ++i) script += "0.4 key down\n";
   script += "0.4 key v\n1.2 shot pressed.png\n1.2 key v\n";
   const std::vector<std::string> longer{"--set", "/time/duration=5"};
   const test::CommandResult done = view(script, longer);
   ASSERT_EQ(done.exit_code, 0) << done.err;
+  EXPECT_GT(number(done, "asked.png", "t"), 0.1) << "what was simulated is not given up by one key";
   EXPECT_EQ(number(done, "added.png", "t"), 0);
   EXPECT_NEAR(vector(done, "added.png", "at")[2], 0.126, 1e-6);
   const test::CommandResult alone = view("0 key space\n0.8 shot rest.png\n", longer);

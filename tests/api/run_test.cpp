@@ -509,6 +509,48 @@ TEST(Run, FramesByStress_ShowIt) {
   EXPECT_GT(none.size(), 1000u);
 }
 
+// The block falls ever faster: its fastest picture is the last one, and all are of that range.
+TEST(Run, FramesByQuantity_HaveTheRangeOfTheWholeRun) {
+  const std::vector<std::string> drawn{"--frames", "100", "--set", "/output/color=speed", "--time"};
+  const auto picture = [&](const char *name, const char *time, std::vector<std::string> more) {
+    more.insert(more.begin(), drawn.begin(), drawn.end());
+    more.insert(more.begin() + std::ptrdiff_t(drawn.size()), time);
+    const Outcome r = run(name, more);
+    EXPECT_EQ(r.result.exit_code, 0) << r.result.err;
+    EXPECT_FALSE(fs::exists(r.out + "/frames/frames.kept"));
+    const std::string rows = test::read_file(r.out + "/bodies.csv");
+    const std::string last = rows.substr(rows.rfind(",top,"));
+    double at[6] = {};
+    std::sscanf(last.c_str(), ",top,%lf,%lf,%lf,%lf,%lf,%lf", at, at + 1, at + 2, at + 3, at + 4, at + 5);
+    const bool none = r.result.err.find("no pictures") != std::string::npos;
+    return std::pair(none ? "" : test::read_file(r.out + "/frames/frame_000001.png"), -at[5]);
+  };
+  const auto [of_film, fastest] = picture("film", "0.02", {});
+  if (of_film.empty()) GTEST_SKIP() << "no pictures here";
+  const std::string range = "/output/color_range=[0, " + std::to_string(2 * fastest) + "]";
+  char same[64];
+  std::snprintf(same, sizeof same, "/output/color_range=[0, %.17g]", fastest);
+  EXPECT_EQ(picture("fixed", "0.02", {"--set", same}).first, of_film);
+  EXPECT_NE(picture("twice", "0.02", {"--set", range}).first, of_film);
+  EXPECT_NE(picture("half", "0.01", {}).first, of_film);
+}
+
+TEST(Run, Plot_IsDrawnWhereAskedFor) {
+  EXPECT_FALSE(fs::exists(run("no_plot", {"--time", "0.01"}).out + "/plots.png"));
+  const Outcome r = run("plot", {"--time", "0.04", "--plot"});
+  ASSERT_EQ(r.result.exit_code, 0) << r.result.err;
+  if (r.result.err.find("no plots") != std::string::npos) GTEST_SKIP() << r.result.err;
+  EXPECT_EQ(test::read_file(r.out + "/plots.png").substr(1, 3), "PNG");
+}
+
+TEST(Run, Table_NamesTheFastestPointAndWhatLacksDamping) {
+  const Outcome damped = run("damped", {"--time", "0.002"});
+  EXPECT_NE(damped.result.out.find("fastest m/s"), std::string::npos) << damped.result.out;
+  EXPECT_EQ(damped.result.out.find("no material has damping"), std::string::npos) << damped.result.out;
+  const Outcome free = run("undamped", {"--time", "0.002", "--set", "/materials/gel/damping={}"});
+  EXPECT_NE(free.result.out.find("no material has damping"), std::string::npos) << free.result.out;
+}
+
 TEST(Run, Frames_WithoutABackendAreAWarning) {
   setenv("DEFORM_RENDER_BACKEND", "none", 1);
   const Outcome r = run("no_frames", {"--frames", "100", "--time", "0.002"});

@@ -147,22 +147,27 @@ TEST(SceneErrors, WrongTypes_NameWhatWasExpected) {
 }
 
 TEST(SceneErrors, Ranges_AreChecked) {
-  check({{"/time/duration=0", {"/time/duration", "above 0"}},
-         {"/time/step=-1", {"/time/step", "above 0"}},
-         {"/materials/gel/young=0", {"/materials/gel/young", "above 0"}},
-         {"/materials/gel/poisson=0.5", {"/materials/gel/poisson", "0.5"}},
-         {"/materials/gel/density=-1000", {"/materials/gel/density", "above 0"}},
-         {"/materials/gel/damping/mass=-1", {"/materials/gel/damping/mass", "at least 0"}},
-         {"/bodies/0/pose/scale=0", {"/bodies/0/pose/scale", "above 0"}},
-         {"/bodies/0/pose/rotation/axis=[0,0,0]", {"/bodies/0/pose/rotation/axis", "zero"}},
-         {"/obstacles/0/normal=[0,0,0]", {"/obstacles/0/normal", "zero"}},
-         {"/contact/friction/0/params/mu=-0.1", {"/contact/friction/0/params/mu", "number from 0"}},
-         {"/contact/max_sweeps=0", {"/contact/max_sweeps", "whole number from 1 to 1000000, found 0"}},
-         {"/contact/max_sweeps=1.5", {"/contact/max_sweeps", "whole number", "1.5"}},
-         {"/output/every=0", {"/output/every", "above 0"}},
-         {"/output/camera={\"eye\":[1,1,1],\"look_at\":[1,1,1]}", {"/output/camera", "same point"}},
-         {"/gravity={\"keyframes\":[{\"t\":1,\"value\":[0,0,0]},{\"t\":1,\"value\":[0,0,0]}]}",
-          {"/gravity/keyframes/1/t", "must increase"}}});
+  check(
+      {{"/time/duration=0", {"/time/duration", "above 0"}},
+       {"/time/step=-1", {"/time/step", "above 0"}},
+       {"/materials/gel/young=0", {"/materials/gel/young", "above 0"}},
+       {"/materials/gel/poisson=0.5", {"/materials/gel/poisson", "0.5"}},
+       {"/materials/gel/density=-1000", {"/materials/gel/density", "above 0"}},
+       {"/materials/gel/damping/mass=-1", {"/materials/gel/damping/mass", "at least 0"}},
+       {"/bodies/0/pose/scale=0", {"/bodies/0/pose/scale", "above 0"}},
+       {"/bodies/0/pose/rotation/axis=[0,0,0]", {"/bodies/0/pose/rotation/axis", "zero"}},
+       {"/obstacles/0/normal=[0,0,0]", {"/obstacles/0/normal", "zero"}},
+       {"/contact/friction/0/params/mu=-0.1", {"/contact/friction/0/params/mu", "number from 0"}},
+       {"/contact/max_sweeps=0", {"/contact/max_sweeps", "whole number from 1 to 1000000, found 0"}},
+       {"/contact/max_sweeps=1.5", {"/contact/max_sweeps", "whole number", "1.5"}},
+       {"/output/every=0", {"/output/every", "above 0"}},
+       {"/output/camera={\"eye\":[1,1,1],\"look_at\":[1,1,1]}", {"/output/camera", "same point"}},
+       {"/bodies/0/place={}", {"/bodies/0/place", "\"on\""}},
+       {"/bodies/0/place={\"on\":\"flor\"}", {"/bodies/0/place/on", "did you mean \"floor\"?"}},
+       {"/output={\"color\":\"speed\",\"color_range\":[1,1]}", {"/output/color_range", "second one larger"}},
+       {"/output={\"color_range\":[0,1]}", {"/output/color_range", "give \"color\" a quantity"}},
+       {"/gravity={\"keyframes\":[{\"t\":1,\"value\":[0,0,0]},{\"t\":1,\"value\":[0,0,0]}]}",
+        {"/gravity/keyframes/1/t", "must increase"}}});
 }
 
 TEST(SceneErrors, Switches_NameWhatIsMissing) {

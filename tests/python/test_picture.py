@@ -70,6 +70,46 @@ class Pictures(unittest.TestCase):
                     world.picture(**wrong)
         self.assertIsNone(world._repr_png_())
 
+    def test_every_quantity_has_its_colors_and_a_legend(self):
+        with deform.World(integrator="implicit_euler") as world:
+            world.add_obstacle("plane")
+            ball = world.add_body(deform.TetMesh.ball(0.1, 300), position=(0, 0, 0.1005), spin=(0, 0, 3),
+                                  model="corotational_fem", material={"damping_stiffness": 0.002})
+            look = {"size": (320, 240), "label": False}
+            for color in ("displacement", "stress", "contact"):  # at rest: not the glow of rounding
+                np.testing.assert_array_equal(deform.picture.body_values(ball, color), 0)
+            start = ball.positions.copy()
+            world.run(0.1, dt=1 / 120)
+            plain = world.picture(**look).rgb
+            for color in ("speed", "contact", "displacement", "stress"):
+                with self.subTest(color):
+                    colored = world.picture(color=color, **look).rgb
+                    self.assertTrue((colored != plain).any(axis=2)[180:, 200:].mean() > 0.2)  # the legend
+                    other = world.picture(color=color, color_range=(0, 1e9), **look).rgb
+                    self.assertFalse(np.array_equal(colored, other))
+            moved = np.linalg.norm(ball.positions - start, axis=1)
+            np.testing.assert_allclose(deform.picture.body_values(ball, "displacement"), moved)
+            stress = deform.picture.body_values(ball, "stress")
+            self.assertGreater(stress.min(), 0)
+            self.assertLess(stress.max(), np.abs(ball.stress).max() * 3)
+            with self.assertRaisesRegex(deform.ArgumentError, "second value must be larger"):
+                world.picture(color="speed", color_range=(1, 1))
+
+    def test_slope_by_gravity_is_a_slope(self):
+        up = deform.picture.Upright.of_scene({"keyframes": [{"t": 0, "value": [0, 0, 0]},
+                                                           {"t": 1, "value": [3, 0, -4]}]})
+        np.testing.assert_allclose(up.at(0), [-0.6, 0, 0.8])
+        self.assertFalse(up.tilts)
+        self.assertTrue(deform.picture.Upright([0, 1], [[0, 0, -9.8], [1, 0, -9.8]]).tilts)
+        np.testing.assert_array_equal(deform.picture.Upright(0, [0, 0, 0]).at(5), [0, 0, 1])
+        with deform.World() as world:
+            world.add_obstacle("plane")
+            world.add_body(deform.TetMesh.ball(0.1, 300), position=(0, 0, 0.1))
+            camera = {"eye": (0, -1, 0.4), "look_at": (0, 0, 0.1), "size": (160, 120), "label": False}
+            level = world.picture(**camera).rgb
+            world.set_gravity((4, 0, -9))
+            self.assertFalse(np.array_equal(world.picture(**camera).rgb, level))
+
     def test_frames_of_a_run(self):
         run = dropped()
         first, last = run.picture(0, size=(160, 120)), run.picture(-1, size=(160, 120))
@@ -134,6 +174,8 @@ class View(unittest.TestCase):
         for part in (("canvas", "view"), ("button", "play"), ("input", "at"), ("span", "time")):
             self.assertIn(part, seen)
         self.assertEqual(document.count("</script>"), 1)
+        self.assertNotIn("legend", document)
+        self.assertIn("speed, m/s: 0 <i", webgl.document(dropped()))
 
 
 if __name__ == "__main__":

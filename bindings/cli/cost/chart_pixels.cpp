@@ -1,85 +1,12 @@
 #include "chart.h"
-#include "messages.h"
-
-#ifdef DEFORM_HAVE_RENDER
-#include <algorithm>
-#include <cmath>
-
-#include "render/render.h"
-#endif
 
 namespace cli::cost {
 
 #ifdef DEFORM_HAVE_RENDER
-namespace {
-
-// By how far each pixel's middle is from the shape: soft edges without a graphics library.
-class Pixels : public Canvas {
- public:
-  Pixels() {
-    image_.width = uint32_t(kZoom * kChartWidth);
-    image_.height = uint32_t(kZoom * kChartHeight);
-    image_.rgb.assign(size_t(image_.width) * image_.height * 3, 255);
-  }
-  void line(double x0, double y0, double x1, double y1, double width, Ink ink, bool dashed) override {
-    const double length = std::hypot(x1 - x0, y1 - y0), dash = 6, gap = 5;
-    if (!dashed) return stroke(x0, y0, x1, y1, width, ink);
-    for (double s = 0; s < length; s += dash + gap) {
-      const double a = s / length, b = std::min(s + dash, length) / length;
-      stroke(x0 + a * (x1 - x0), y0 + a * (y1 - y0), x0 + b * (x1 - x0), y0 + b * (y1 - y0), width, ink);
-    }
-  }
-  void disc(double x, double y, double radius, Ink ink, const std::string &) override {
-    paint(x - radius, y - radius, x + radius, y + radius, ink,
-          [&](double px, double py) { return radius - std::hypot(px - x, py - y); });
-  }
-  void box(double x, double y, double width, double height, Ink ink) override {
-    paint(x, y, x + width, y + height, ink,
-          [&](double px, double py) { return std::min({px - x, x + width - px, py - y, y + height - py}); });
-  }
-  void text(double x, double y, double size, const std::string &words, Ink ink, double anchor) override {
-    const double height = kZoom * size, wide = render::text_width(height, words);
-    render::draw_text(image_, kZoom * x - anchor * wide, kZoom * y, height, words, {ink.r, ink.g, ink.b});
-  }
-  const render::Image &image() const { return image_; }
-
- private:
-  void stroke(double x0, double y0, double x1, double y1, double width, Ink ink) {
-    const double dx = x1 - x0, dy = y1 - y0, l2 = std::max(dx * dx + dy * dy, 1e-12), r = width / 2;
-    paint(std::min(x0, x1) - r, std::min(y0, y1) - r, std::max(x0, x1) + r, std::max(y0, y1) + r, ink,
-          [&](double px, double py) {
-            const double s = std::clamp(((px - x0) * dx + (py - y0) * dy) / l2, 0.0, 1.0);
-            return r - std::hypot(px - x0 - s * dx, py - y0 - s * dy);
-          });
-  }
-  // inside: how far a point lies within the shape, negative outside
-  template <class Inside>
-  void paint(double x0, double y0, double x1, double y1, Ink ink, Inside inside) {
-    const auto clamped = [](double x, uint32_t most) { return int(std::clamp(x, 0.0, double(most))); };
-    const int left = clamped(kZoom * x0 - 1, image_.width), right = clamped(kZoom * x1 + 2, image_.width);
-    const int top = clamped(kZoom * y0 - 1, image_.height), bottom = clamped(kZoom * y1 + 2, image_.height);
-    const float rgb[3] = {ink.r, ink.g, ink.b};
-    for (int py = top; py < bottom; ++py)
-      for (int px = left; px < right; ++px) {
-        const double depth = kZoom * inside((px + 0.5) / kZoom, (py + 0.5) / kZoom);
-        const float cover = float(std::clamp(depth + 0.5, 0.0, 1.0));
-        uint8_t *const at = &image_.rgb[3 * (size_t(py) * image_.width + size_t(px))];
-        for (int k = 0; k < 3 && cover > 0; ++k)
-          at[k] = uint8_t(std::lround(float(at[k]) + cover * (255 * rgb[k] - float(at[k]))));
-      }
-  }
-
-  static constexpr double kZoom = 1.5;
-  render::Image image_;
-};
-
-}  // namespace
-
 bool draw_file(const Subject &subject, const Study &study, const std::string &path) {
-  Pixels pixels;
+  PixelCanvas pixels(kChartWidth, kChartHeight);
   draw_chart(subject, study, pixels);
-  std::string why;
-  if (!render::write_png(path, pixels.image(), &why)) throw Failure(kBadInput, why);
+  pixels.write(path);
   return true;
 }
 #else

@@ -598,6 +598,7 @@ class Body(_Part):
         """Takes the body out of its world; its contacts end. Arrays keep their last values."""
         self.world.free()
         check(lib.dfm_body_destroy(self.handle))
+        self.world.shown.forget(self.handle)
 
     def to_meshio(self) -> Any:
         """Its present state as a `meshio.Mesh`, with the velocity of each point."""

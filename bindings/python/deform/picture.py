@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import ctypes
+import math
 import os
 import pathlib
 import struct
@@ -22,6 +23,11 @@ _module: Any = None
 _renderers: dict[tuple[int, int], int] = {}
 _MODULE = "libdeform_python.so"
 _LARGEST = 16384  # pixels
+_THROUGH = 0.45   # of a contact patch that something hides
+_ROUNDING = 1e-10  # strains, and displacements for coordinates of 1 m, that are drawn as zero
+# what colors may mean: title and unit
+COLORS = {"speed": ("speed", "m/s"), "contact": ("contact force", "N"), "displacement": ("displacement", "m"),
+          "stress": ("von Mises stress", "Pa")}
 
 
 def _native() -> Any:
@@ -32,10 +38,11 @@ def _native() -> Any:
             raise UnsupportedError(f"{path} is not there: this library was built without the renderer "
                                    f"(cmake -DDEFORM_RENDER=ON)", "DFM_E_UNSUPPORTED")
         module = ctypes.CDLL(str(path))
-        p, u, t = ctypes.c_void_p, ctypes.c_uint32, ctypes.c_char_p
+        p, u, t, d = ctypes.c_void_p, ctypes.c_uint32, ctypes.c_char_p, ctypes.c_double
         for name, result, arguments in (
                 ("create", p, [u, u, p, ctypes.c_size_t]), ("palette", None, [u, p]),
-                ("surface", None, [p, u, p, u, p, p, p]), ("shape", None, [p, u, p, p, p]),
+                ("map", None, [u, u, p]), ("upright", None, [p, p, u]), ("legend", None, [p, u, d, d, t, t]),
+                ("surface", None, [p, u, p, u, p, p, p, d]), ("shape", None, [p, u, p, p, p]),
                 ("camera", None, [p, p, p]), ("text", None, [p, t]),
                 ("draw", ctypes.c_int, [p, p, p, ctypes.c_size_t])):
             function = getattr(module, f"deform_picture_{name}")
@@ -87,6 +94,62 @@ def palette(number: int) -> tuple[float, float, float]:
     return rgb[0], rgb[1], rgb[2]
 
 
+def color_map(color: str, n: int) -> np.ndarray:
+    """The colors of a quantity from its least value to its largest, [n,3] 0..1."""
+    rgb = np.empty((n, 3))
+    _native().deform_picture_map(int(color == "displacement"), n, rgb.ctypes.data)
+    return rgb
+
+
+class Upright:
+    """Which way is up in pictures: against gravity, so that slopes made by tilting it look like slopes.
+    Gravity by keys: times [n] s and values [n,3]."""
+
+    def __init__(self, times: Any, gravity: Any):
+        values = np.reshape(np.asarray(gravity, dtype=np.float64), (-1, 3))
+        some = np.linalg.norm(values, axis=1) > 0
+        self.times, self.values = np.atleast_1d(np.asarray(times, dtype=np.float64))[some], values[some]
+        ways = self.values / np.linalg.norm(self.values, axis=1, keepdims=True)
+        self.tilts = bool(len(ways) and (ways @ ways[0]).min() < 1 - 1e-9)
+
+    @classmethod
+    def of_scene(cls, gravity: Any) -> Upright:
+        """From the value of a scene's key "gravity"."""
+        keys = gravity["keyframes"] if isinstance(gravity, dict) else [{"t": 0, "value": gravity}]
+        return cls([key["t"] for key in keys], [key["value"] for key in keys])
+
+    def at(self, t: float) -> np.ndarray:
+        """[3] unit, at a time of the world in s; z without gravity."""
+        if not len(self.times):
+            return np.array([0.0, 0.0, 1.0])
+        down = np.array([np.interp(t, self.times, self.values[:, k]) for k in range(3)])
+        length = np.linalg.norm(down)
+        return -down / length if length > 0 else np.array([0.0, 0.0, 1.0])
+
+
+class Shown:
+    """What pictures of a world need from its past. softest: Young's modulus of its softest material, Pa."""
+
+    def __init__(self) -> None:
+        self.softest = math.inf
+        self.upright = Upright([], [])
+        self._starts: dict[int, np.ndarray] = {}
+
+    def keep(self, body: Any) -> None:
+        """Displacements of the body count from now."""
+        self._starts[body.handle] = np.array(body.positions)
+
+    def start(self, body: Any) -> np.ndarray:
+        """Where its surface was, [nsurfel,3] m; of one that a cut has changed since, where it is now."""
+        if len(self._starts.get(body.handle, ())) != body.nsurfel:
+            self.keep(body)
+        return self._starts[body.handle]
+
+    def forget(self, handle: int) -> None:
+        """The body is gone."""
+        self._starts.pop(handle, None)
+
+
 class Solid:
     """A shape of an obstacle where it is: kind as DFM_SHAPE_*, pose [7], axis [3], size [3]; or triangles."""
 
@@ -128,8 +191,10 @@ def solids(world: World) -> list[Solid]:
 
 def draw(surfaces: Iterable[tuple[Any, Any, Sequence[float], Any]], obstacles: Iterable[Solid], *,
          size: tuple[int, int] = (960, 720), eye: Any = None, look_at: Any = None,
-         texts: Sequence[str] = ()) -> Picture:
-    """Draws surfaces (points [n,3] m, triangles [m,3], color [3], values [n] 0..1 or None) and obstacles."""
+         texts: Sequence[str] = (), color: str = "body",
+         value_range: tuple[float, float] = (0, 0), upright: Upright | None = None, t: float = 0) -> Picture:
+    """Draws surfaces (points [n,3] m, triangles [m,3], color [3], values [n] 0..1 or None) and obstacles,
+    with a legend of what the values mean."""
     width, height = size
     if not (0 < width <= _LARGEST and 0 < height <= _LARGEST):
         raise ArgumentError(f"a picture of {width} x {height} pixels; 1 to {_LARGEST} each are allowed",
@@ -142,18 +207,24 @@ def draw(surfaces: Iterable[tuple[Any, Any, Sequence[float], Any]], obstacles: I
         if not picture:
             raise UnsupportedError(f"no pictures: {why.value.decode()}", "DFM_E_UNSUPPORTED")
         _renderers[size] = picture
-        for points, triangles, color, values in surfaces:
+        if upright is not None:
+            native.deform_picture_upright(picture, vector(upright.at(t), "up"), upright.tilts)
+        if color in COLORS:
+            title, unit = (word.encode() for word in COLORS[color])
+            native.deform_picture_legend(picture, int(color == "displacement"), *value_range, title, unit)
+        for points, triangles, own, values in surfaces:
             xyz = np.ascontiguousarray(points, dtype=np.float64)
             tri = np.ascontiguousarray(triangles, dtype=np.uint32)
             scalar = None if values is None else np.ascontiguousarray(values, dtype=np.float32)
             native.deform_picture_surface(picture, len(xyz), xyz.ctypes.data, len(tri), tri.ctypes.data,
-                                          vector(color, "color"),
-                                          None if scalar is None else scalar.ctypes.data)
+                                          vector(own, "color"),
+                                          None if scalar is None else scalar.ctypes.data,
+                                          _THROUGH if color == "contact" else 0.0)
         for solid in obstacles:
             if solid.points is not None and solid.triangles is not None:
                 native.deform_picture_surface(picture, len(solid.points), solid.points.ctypes.data,
                                               len(solid.triangles), solid.triangles.ctypes.data,
-                                              vector((0.72, 0.73, 0.75), "color"), None)
+                                              vector((0.72, 0.73, 0.75), "color"), None, 0.0)
             else:
                 native.deform_picture_shape(picture, solid.kind, vector(solid.pose, "pose", 7),
                                             vector(solid.axis, "axis"), vector(solid.size, "size"))
@@ -167,34 +238,91 @@ def draw(surfaces: Iterable[tuple[Any, Any, Sequence[float], Any]], obstacles: I
     return Picture(rgb)
 
 
+def _nearest(body: Any) -> np.ndarray:
+    """The point that is nearest to each surfel, [nsurfel]."""
+    points, surfels = body.points, body.positions
+    rows = max(1, 4_000_000 // max(len(points), 1))
+    squares = (points**2).sum(axis=1)
+    return np.concatenate([(squares - 2 * surfels[i:i + rows] @ points.T).argmin(axis=1)
+                           for i in range(0, len(surfels), rows)] or [np.empty(0, int)])
+
+
+def _von_mises(body: Any) -> np.ndarray:
+    """[nsurfel] Pa: the mean over the cells around the nearest point, by volume."""
+    s = body.stress
+    cell = np.sqrt(0.5 * ((s[:, 0] - s[:, 1])**2 + (s[:, 1] - s[:, 2])**2 + (s[:, 2] - s[:, 0])**2)
+                   + 3 * (s[:, 3:]**2).sum(axis=1))
+    tets, rest = body.tets, body.rest_points
+    a, b, c, d = (rest[tets[:, k]] for k in range(4))
+    volume = np.abs(np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a))
+    total, weight = np.zeros(len(rest)), np.zeros(len(rest))
+    for k in range(4):
+        np.add.at(total, tets[:, k], volume * cell)
+        np.add.at(weight, tets[:, k], volume)
+    near = _nearest(body)
+    return total[near] / weight[near]
+
+
 def body_values(body: Any, color: str) -> np.ndarray | None:
-    """What a surface is colored by, [nsurfel] in its own unit; None: by body."""
+    """What a surface is colored by, [nsurfel] in its own unit; None: by body, also where a model gives no
+    stress. What rounding leaves is zero."""
     if color == "body":
         return None
-    if color in ("speed", "contact"):
-        return np.linalg.norm(body.velocities if color == "speed" else body.forces, axis=1)
-    raise ArgumentError(f"color '{color}' is not known; known: body, speed, contact", "DFM_E_ARG")
+    if color == "contact":  # exactly zero where nothing touches
+        return np.linalg.norm(body.forces, axis=1)
+    shown = body.world.shown
+    start = shown.start(body)
+    noise = _ROUNDING * np.abs(start).max(initial=0)
+    if color == "speed":
+        values = np.linalg.norm(body.velocities, axis=1)
+    elif color == "displacement":
+        values = np.linalg.norm(body.positions - start, axis=1)
+    elif color == "stress":
+        noise = _ROUNDING * min(shown.softest, 1e5)  # that of a body without a material
+        try:
+            values = _von_mises(body)
+        except UnsupportedError:
+            return None
+    else:
+        raise ArgumentError(f"color '{color}' is not known; known: body, {', '.join(COLORS)}", "DFM_E_ARG")
+    return np.where(values < noise, 0, values)
 
 
-def scaled(values: np.ndarray | None, top: float, color: str) -> np.ndarray | None:
+def scaled(values: np.ndarray | None, value_range: tuple[float, float], color: str) -> np.ndarray | None:
     """Values 0..1 for the renderer; where nothing touches a body keeps its own color."""
     if values is None:
         return None
-    out = values / top if top > 0 else np.zeros_like(values)
+    low, high = value_range
+    out = (values - low) / (high - low) if high > low else np.zeros_like(values)
     return np.where(values == 0, np.nan, out) if color == "contact" else out
 
 
+def ends(value_range: Sequence[float] | None, values: Iterable[np.ndarray | None]) -> tuple[float, float]:
+    """The values at the ends of the colors: those given, or 0 and the largest."""
+    if value_range is None:
+        return 0.0, max((float(v.max(initial=0)) for v in values if v is not None), default=0.0)
+    low, high = (float(value) for value in value_range)
+    if not low < high:
+        raise ArgumentError(f"color_range is {low:g} to {high:g}; the second value must be larger",
+                            "DFM_E_ARG")
+    return low, high
+
+
 def picture(world: World, *, size: tuple[int, int] = (960, 720), color: str = "body", eye: Any = None,
-            look_at: Any = None, label: bool = True) -> Picture:
-    """The present state of a world. size: width, height in pixels; color: "body", "speed" or "contact"; eye,
-    look_at: [3] m, the camera (it finds its own place where they are not given)."""
+            look_at: Any = None, label: bool = True, color_range: Sequence[float] | None = None) -> Picture:
+    """The present state of a world. size: width, height in pixels; color: "body", "speed", "contact",
+    "displacement" (since the body was added, or its scene loaded) or "stress" (von Mises); color_range: the
+    values at the ends of the colors, 0 and the largest one if not given; eye, look_at: [3] m, the camera (it
+    finds its own place where they are not given)."""
     bodies = world.bodies
     values = [body_values(b, color) for b in bodies]
-    top = max((float(v.max(initial=0)) for v in values if v is not None), default=0.0)
-    surfaces = [(b.positions, b.triangles, palette(i), scaled(v, top, color))
+    if all(v is None for v in values):
+        color = "body"
+    span = ends(color_range, values)
+    surfaces = [(b.positions, b.triangles, palette(i), scaled(v, span, color))
                 for i, (b, v) in enumerate(zip(bodies, values))]
-    return draw(surfaces, solids(world), size=size, eye=eye, look_at=look_at,
-                texts=[f"t = {world.time:.3f} s"] if label else [])
+    return draw(surfaces, solids(world), size=size, eye=eye, look_at=look_at, color=color, value_range=span,
+                upright=world.shown.upright, t=world.time, texts=[f"t = {world.time:.3f} s"] if label else [])
 
 
 def png_or_none(shown: Any) -> bytes | None:

@@ -15,7 +15,7 @@ from ._arrays import row_type
 from ._context import Context, default_context
 from ._library import ArgumentError, OfThisProcess, check, encoded, lib, quick, read_text, sized
 from ._values import real
-from .picture import Picture, Solid, body_values, draw, palette, scaled, solids
+from .picture import Picture, Solid, Upright, body_values, draw, ends, palette, scaled, solids
 from .query import write_scene
 from .world import Trouble, World
 
@@ -23,8 +23,8 @@ from .world import Trouble, World
 @dataclass(frozen=True)
 class Settings:
     """What a scene says of its run: duration, step (0: the stable one) and every (between records), s;
-    static: a search for equilibria instead of steps in time; color of pictures; camera (eye, look_at), [3] m
-    each, or None."""
+    static: a search for equilibria instead of steps in time; color of pictures, and color_range, the values
+    at its ends, or None; camera (eye, look_at), [3] m each, or None."""
 
     duration: float
     step: float
@@ -32,6 +32,7 @@ class Settings:
     static: bool
     color: str
     camera: tuple[np.ndarray, np.ndarray] | None
+    color_range: tuple[float, float] | None = None
 
 
 def _close(handle: int, _context: Context) -> None:
@@ -65,6 +66,11 @@ class Scene(OfThisProcess):
         check(quick.dfm_scene_world(self.handle, ctypes.byref(world)))
         # each keeps the other: `Scene(path).world` is a world to use
         self.world = World.of_scene(context, world.value, self)
+        self.world.shown.upright = Upright.of_scene(self.value("/gravity"))
+        young = [material["young"] for material in self.value().get("materials", {}).values()]
+        self.world.shown.softest = min(young, default=math.inf)
+        for body in self.world.bodies:
+            self.world.shown.keep(body)
 
     def close(self) -> None:
         """Closes the scene and destroys its world. Twice is allowed."""
@@ -89,7 +95,7 @@ class Scene(OfThisProcess):
         camera = (np.array(out.eye), np.array(out.look_at)) if out.has_camera else None
         time = self.value("/time")
         return Settings(out.duration, out.step, out.every, time.get("mode") == "static",
-                        (out.color or b"body").decode(), camera)
+                        (out.color or b"body").decode(), camera, self.value("/output").get("color_range"))
 
     @property
     def probes(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
@@ -143,8 +149,8 @@ class Run:
     """What a run recorded: `frames`, and at its end `stats` (dfm_world_stats) and `hash`. A notebook shows
     it as a view that can be turned and played (html()); picture(i) draws one frame."""
 
-    def __init__(self, color: str, camera: Any):
-        self.color, self.camera = color, camera
+    def __init__(self, color: str, camera: Any, color_range: Any = None, upright: Upright | None = None):
+        self.color, self.camera, self.color_range, self.upright = color, camera, color_range, upright
         self.frames: list[Frame] = []
         self.triangles: dict[str, np.ndarray] = {}
         self.steps = 0
@@ -154,9 +160,9 @@ class Run:
         self.world: Any = None
 
     @classmethod
-    def of(cls, world: World, color: str = "body", camera: Any = None) -> Run:
+    def of(cls, world: World, color: str = "body", camera: Any = None, color_range: Any = None) -> Run:
         """An empty one for a world that is stepped by hand; add() records a frame (World.film)."""
-        run = cls(color, camera)
+        run = cls(color, camera, color_range, world.shown.upright)
         run.world = world
         run.triangles = {body.name: body.triangles.copy() for body in world.bodies}
         run.add()
@@ -205,19 +211,23 @@ class Run:
 
     def top(self) -> float:
         """The largest value by which anything is colored, of all frames."""
-        return max((float(v.max(initial=0)) for f in self.frames for v in f.values.values() if v is not None),
-                   default=0.0)
+        return ends(None, (v for frame in self.frames for v in frame.values.values()))[1]
+
+    def value_range(self) -> tuple[float, float]:
+        """The values at the ends of the colors: color_range, or 0 and the largest of all frames."""
+        return ends(self.color_range, (v for frame in self.frames for v in frame.values.values()))
 
     def picture(self, frame: int = -1, *, size: tuple[int, int] = (960, 720), eye: Any = None,
                 look_at: Any = None) -> Picture:
         """A frame, drawn; negative numbers count from the end."""
-        shown, top = self.frames[frame], self.top()
+        shown, span = self.frames[frame], self.value_range()
         if eye is None and self.camera is not None:
             eye, look_at = self.camera
         surfaces = [(shown.positions[name], shown.triangles[name], palette(i),
-                     scaled(shown.values[name], top, self.color)) for i, name in enumerate(self.triangles)]
-        return draw(surfaces, shown.obstacles, size=size, eye=eye, look_at=look_at,
-                    texts=[f"t = {shown.t:.3f} s"])
+                     scaled(shown.values[name], span, self.color)) for i, name in enumerate(self.triangles)]
+        color = self.color if any(v is not None for v in shown.values.values()) else "body"
+        return draw(surfaces, shown.obstacles, size=size, eye=eye, look_at=look_at, color=color,
+                    value_range=span, upright=self.upright, t=shown.t, texts=[f"t = {shown.t:.3f} s"])
 
     def html(self, height: int = 480) -> str:
         """The run as one piece of HTML with WebGL in it: no server, no other file, nothing from the
@@ -249,8 +259,8 @@ class _Runner:
         self.next = self.steps = 0
 
     def run(self) -> Run:
-        color = self.settings.color if self.settings.color in ("speed", "contact") else "body"
-        out = self.run_ = Run(color, self.settings.camera)
+        settings = self.settings
+        out = self.run_ = Run(settings.color, settings.camera, settings.color_range, self.world.shown.upright)
         out.world = self.world
         out.triangles = {body.name: body.triangles.copy() for body in self.world.bodies}
         self.record()

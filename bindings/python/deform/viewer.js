@@ -24,20 +24,22 @@
     void main() { world = low + span * place; shown = value; gl_Position = camera * vec4(world, 1.0); }`));
   gl.attachShader(program, shader(gl.FRAGMENT_SHADER, `#version 300 es
     precision highp float; in vec3 world; in float shown; uniform vec3 color, eye; uniform float valued;
+    uniform vec3 map[17];
     out vec4 pixel;
     void main() {
       vec3 n = normalize(cross(dFdx(world), dFdy(world))), to = normalize(eye - world);
       if (dot(n, to) < 0.0) n = -n;
       float light = 0.45 + 0.35 * max(dot(n, normalize(vec3(0.4, -0.5, 0.8))), 0.0) + 0.25 * dot(n, to);
-      vec3 warm = mix(mix(color, vec3(0.95, 0.75, 0.2), min(2.0 * shown, 1.0)), vec3(0.8, 0.1, 0.1),
-                      max(2.0 * shown - 1.0, 0.0));
-      pixel = vec4(light * mix(color, warm, valued), 1.0);
+      float at = 16.0 * max(255.0 * shown - 1.0, 0.0) / 254.0;  // level 0: the body's own color
+      int below = min(int(at), 15);
+      vec3 of = mix(map[below], map[below + 1], at - float(below));
+      pixel = vec4(light * mix(color, of, valued * min(255.0 * shown, 1.0)), 1.0);
     }`));
   gl.linkProgram(program);
   gl.useProgram(program);
   const at = (name) => gl.getUniformLocation(program, name);
   const places = {camera: at("camera"), low: at("low"), span: at("span"), color: at("color"), eye: at("eye"),
-                  valued: at("valued")};
+                  valued: at("valued"), map: at("map")};
   const place = gl.getAttribLocation(program, "place"), value = gl.getAttribLocation(program, "value");
 
   const buffer = (kind, data) => {
@@ -93,6 +95,7 @@
     gl.uniform3fv(places.low, RUN.low);
     gl.uniform1f(places.span, RUN.span);
     gl.uniform3fv(places.eye, view.eye);
+    gl.uniform3fv(places.map, RUN.map);
     for (const s of surfaces) {
       const shown = Math.min(frame, s.frames - 1);
       gl.uniform3fv(places.color, s.color);

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .picture import Solid, palette, turned
+from .picture import COLORS, Solid, color_map, palette, turned
 
 if TYPE_CHECKING:
     from .scene import Run
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 _GRAY = (0.72, 0.73, 0.75)
 _LEVELS = 65535  # positions travel as 16 bits of the box around everything
 _AROUND = 24     # points on a circle
+_COLORS = 17     # of a map, in equal distances
 
 
 def _encoded(array: np.ndarray) -> str:
@@ -88,20 +89,36 @@ def data_of(run: Run) -> dict[str, Any]:
     span = float((everything.max(axis=0) - low).max()) or 1.0
     bodies = surfaces[:len(run.triangles)]
     moving = np.concatenate([points for surface in bodies for points in surface[0]] or [everything])
-    top = run.top()
+    low_value, high_value = run.value_range()
     listed = []
     for frames, triangles, color, values in surfaces:
         points = np.rint((np.stack(frames) - low) / span * _LEVELS).astype("<u2")
         item = {"n": points.shape[1], "frames": points.shape[0], "points": _encoded(points),
                 "triangles": _encoded(triangles.astype("<u4")), "color": list(color)}
         if values is not None:
-            scale = 255 / top if top > 0 else 0.0
-            item["values"] = _encoded(np.rint(np.stack(values) * scale).astype("u1"))
+            # 0: the body's own color
+            stacked = np.stack(values)
+            reach = high_value - low_value
+            share = (stacked - low_value) / reach if reach > 0 else 0 * stacked
+            levels = np.rint(1 + 254 * np.clip(share, 0, 1)).astype("u1")
+            item["values"] = _encoded(np.where(stacked == 0, 0, levels).astype("u1")
+                                      if run.color == "contact" else levels)
         listed.append(item)
     middle = (moving.min(axis=0) + moving.max(axis=0)) / 2
     return {"times": [round(frame.t, 6) for frame in run.frames], "low": low.tolist(), "span": span,
             "middle": middle.tolist(), "size": float(np.linalg.norm(np.ptp(moving, axis=0))) or 1.0,
-            "surfaces": listed}
+            "map": color_map(run.color, _COLORS).ravel().tolist(), "surfaces": listed}
+
+
+def _legend(run: Run) -> str:
+    """What the colors mean, beside the slider."""
+    if all(v is None for frame in run.frames for v in frame.values.values()):
+        return ""
+    (title, unit), (low, high) = COLORS[run.color], run.value_range()
+    colors = ",".join(f"rgb({r:.0f},{g:.0f},{b:.0f})" for r, g, b in 255 * color_map(run.color, _COLORS))
+    bar = ("<i style=\"display:inline-block;width:80px;height:10px;"
+           f"background:linear-gradient(to right,{colors})\"></i>")
+    return f"<span id=\"legend\">{title}, {unit}: {low:.3g} {bar} {high:.3g}</span>"
 
 
 def document(run: Run) -> str:
@@ -114,8 +131,8 @@ def document(run: Run) -> str:
             "#bar{height:34px;display:flex;align-items:center;gap:8px;padding:0 8px}"
             "#at{flex:1}</style></head>"
             "<body><canvas id=\"view\"></canvas><div id=\"bar\"><button id=\"play\">play</button>"
-            "<input id=\"at\" type=\"range\" min=\"0\" value=\"0\"><span id=\"time\"></span></div>"
-            f"<script>const RUN={data};\n{viewer}</script></body></html>")
+            "<input id=\"at\" type=\"range\" min=\"0\" value=\"0\"><span id=\"time\"></span>"
+            f"{_legend(run)}</div><script>const RUN={data};\n{viewer}</script></body></html>")
 
 
 def html(run: Run, height: int = 480) -> str:

@@ -21,6 +21,7 @@ from ._signals import watch
 from ._values import array_of, pose_of, real, text, vector, whole
 from .body import EVERYTHING, Body, Obstacle, Rigid, handle_of, held_bits, vector_keys
 from .mesh import TetMesh, TriMesh, cells_of, points_of, surface_of
+from .picture import Shown, Upright
 from .query import Queries
 from .rigid_set import MATERIAL, SHAPES, JointDef, Material, RigidDef
 from .report import Reports
@@ -114,7 +115,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
     """
 
     __slots__ = ("__weakref__", "_asked", "_bits", "_bits_at", "_bodies", "_busy", "_finalize", "_functions",
-                 "_lists", "_owner", "context", "handle", "user")
+                 "_lists", "_owner", "context", "handle", "shown", "user")
     _finalize: Any
     _instead = ("World.snapshot() gives bytes, which restore() of a world with the same contents takes, and "
                 "World.write_scene a file")
@@ -148,6 +149,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
         out = ctypes.c_uint64()
         check(lib.dfm_world_create(context.address, ctypes.byref(definition), ctypes.byref(out)))
         self._begin(context, out.value)
+        self.shown.upright = Upright(0, gravity)
         self._finalize = weakref.finalize(self, _destroy, out.value, context)
 
     def _begin(self, context: Context, handle: int, owner: Any = None) -> None:
@@ -155,6 +157,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
         self.context, self.handle = context, handle
         self._owner = owner
         self.user: Any = None
+        self.shown = Shown()
         self._busy = 0  # the thread that is inside a call
         self._asked = False  # to stop, by a signal
         self._bits = ctypes.c_uint32(0)
@@ -249,6 +252,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
         out = ctypes.c_uint64()
         self.free()
         check(lib.dfm_material_create(self.handle, ctypes.byref(definition), ctypes.byref(out)))
+        self.shown.softest = min(self.shown.softest, definition.young)
         return Material(self, out.value, name)
 
     def _material(self, material: Material | Mapping[str, Any] | None) -> int:
@@ -279,7 +283,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
                  velocity: Sequence[float] = (0, 0, 0), spin: Sequence[float] = (0, 0, 0), fixed: Any = None,
                  surface: TriMesh | str | None = None, coupling: str = "barycentric",
                  fields: Mapping[str, Any] | None = None, integrator: str = "auto", category: int = 1,
-                 collides_with: int = EVERYTHING, scale: float = 1) -> Body:
+                 collides_with: int = EVERYTHING, scale: float = 1, on: Obstacle | None = None) -> Body:
         """A body of a mesh (a TetMesh or the path of its file), or of points [n,3] m and tets [m,4].
 
         model: "msm" (default), "corotational_fem", ...; params: of the model, by key. material: of
@@ -287,7 +291,8 @@ class World(Queries, Reports, Tools, OfThisProcess):
         velocity [3] m/s, spin [3] rad/s. fixed: [n] True for points that are held, or bits 1 x, 2 y, 4 z of
         components that are; or [n,3] True for these. surface: a finer one that hangs on the cells, a TriMesh
         or the path of its file. fields: model parameters that differ by cell, [m] or [m,width] by key. scale:
-        of the points of mesh and surface, 0.001 where they are in millimeters.
+        of the points of mesh and surface, 0.001 where they are in millimeters. on: an obstacle, onto which
+        the body is moved from its position along gravity.
         """
         if isinstance(mesh, (str, bytes)) or hasattr(mesh, "__fspath__"):
             mesh = TetMesh.read(mesh)
@@ -331,6 +336,9 @@ class World(Queries, Reports, Tools, OfThisProcess):
             hung.triangles = st.ctypes.data
             definition.surface = ctypes.addressof(hung)
             keep += [hung, sp, st]
+        if on is not None:
+            from ._place import put_on
+            put_on(self, on, x if surface is None else sp, definition.pose)
         rows = (_abi.dfm_cell_field * max(len(fields or {}), 1))()
         for row, (key, given) in zip(rows, (fields or {}).items()):
             field = np.ascontiguousarray(array_of(given, f"field '{key}'", "a number for each cell"))
@@ -348,7 +356,9 @@ class World(Queries, Reports, Tools, OfThisProcess):
         with self.alone():
             status = lib.dfm_body_create(self.handle, ctypes.byref(definition), ctypes.byref(out))
         check(status)
-        return self._know(self._body(out.value))
+        body = self._know(self._body(out.value))
+        self.shown.keep(body)
+        return body
 
     def add_obstacle(self, shape: str = "plane", *, name: str | None = None,
                      position: Sequence[float] = (0, 0, 0), rotation: Sequence[float] | None = None,
@@ -601,12 +611,15 @@ class World(Queries, Reports, Tools, OfThisProcess):
         """[3] m/s2 from now on."""
         self.free()
         check(quick.dfm_world_set_gravity(self.handle, vector(gravity, "gravity")))
+        self.shown.upright = Upright(0, gravity)
 
     def set_gravity_keys(self, times: Any, gravity: Any) -> None:
         """Gravity [n,3] m/s2 at times [n] s, linear between them; [] and [] end it."""
         keys = vector_keys(times, gravity if np.size(gravity) else np.empty((0, 3)), "gravity")
         self.free()
         check(quick.dfm_world_set_gravity_keys(self.handle, np.size(times), ctypes.byref(keys)))
+        if np.size(times):
+            self.shown.upright = Upright(times, gravity)
 
     def set_sleep(self, sleep: bool = True) -> None:
         """Lets islands at rest sleep from now on; False: wakes all bodies and keeps them awake."""
@@ -718,12 +731,12 @@ class World(Queries, Reports, Tools, OfThisProcess):
         from .picture import picture
         return picture(self, **options)
 
-    def film(self, color: str = "body", camera: Any = None) -> Any:
+    def film(self, color: str = "body", camera: Any = None, color_range: Any = None) -> Any:
         """A Run that records this world while it is stepped by hand: `film.add()` after a step adds a frame,
-        and a notebook shows it. color: "body", "speed" or "contact"; camera: (eye [3], look_at [3]) m, of
-        its pictures."""
+        and a notebook shows it. color, color_range: as of picture(), the range over all frames if it is not
+        given; camera: (eye [3], look_at [3]) m, of its pictures."""
         from .scene import Run
-        return Run.of(self, color, camera)
+        return Run.of(self, color, camera, color_range)
 
     def _repr_png_(self) -> bytes | None:
         from .picture import png_or_none

@@ -14,6 +14,7 @@
 #include "scene/jitter.h"
 #include "scene/load.h"
 #include "scene/long_step.h"
+#include "scene/place.h"
 #include "scene/start.h"
 #include "state/obstacle.h"
 #include "state/tool.h"
@@ -263,6 +264,7 @@ class Builder {
                                 (mesh.lo[2] + mesh.hi[2]) / 2};
       jitter_.apply(mesh.size, center, b.pose, b.velocity, b.spin);
     }
+    if (!b.on.empty()) put_on(b, mesh);
     d.pose = b.pose;
     std::copy_n(b.velocity, 3, d.velocity);
     std::copy_n(b.spin, 3, d.spin);
@@ -282,6 +284,28 @@ class Builder {
     }
     for (const Probe &p : def_.probes)
       if (p.body == b.name) add_probe(body, p, mesh);
+  }
+
+  // At about the rest distance of contacts above what it lies on, so that it neither overlaps nor falls.
+  void put_on(Body &b, const BodyMesh &mesh) {
+    constexpr double kGap = 1e-4;  // of the body's size
+    Obstacle o = *std::find_if(def_.obstacles.begin(), def_.obstacles.end(),
+                               [&b](const Obstacle &it) { return it.name == b.on; });
+    o.def.name = o.name.c_str();
+    if (o.start) o.def.pose = *o.start;
+    o.def.nkey = o.start ? 0 : uint32_t(o.keys.size());
+    o.def.keys = o.keys.data();
+    std::vector<double> scaled, points = mesh.wears_skin ? mesh.skin.points : mesh.points;
+    if (!o.mesh.empty()) files_.load(o, scaled);
+    const Quat turn = unit_quat(b.pose.rotation);
+    for (size_t i = 0; i < points.size(); i += 3)
+      store3(&points[i], rotate(turn, load3(&points[i])) + load3(b.pose.position));
+    const Vec3 down = load3(def_.gravity);
+    double up[3];
+    store3(up, norm(down) > 0 ? (-1 / norm(down)) * down : Vec3{0, 0, 1});
+    const double lift =
+        with_pointer(b.pointer + "/place", [&] { return lift_onto(context_, o.def, points, up); });
+    for (size_t k = 0; k < 3; ++k) b.pose.position[k] += (lift + kGap * mesh.size) * up[k];
   }
 
   // Also moves held points, which dfm_body_set_state does not move.

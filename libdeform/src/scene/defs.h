@@ -132,6 +132,7 @@ struct Body {
   std::vector<FieldFile> fields;
   Params params;
   dfm_pose pose = {};
+  std::string on;  // the obstacle that it is put on; empty: it stays where its pose has it
   double scale = 1, velocity[3] = {}, spin[3] = {};
   std::vector<Fix> fixes;
   std::vector<Force> forces;

@@ -503,6 +503,22 @@ void read_probes(const Node &scene, Definition &def) {
   }
 }
 
+void check_places(const Node &scene, const Definition &def) {
+  std::vector<std::string> names;
+  for (const Obstacle &o : def.obstacles) names.push_back(o.name);
+  for (const Node &body : scene.items("bodies"))
+    if (body.has("place")) known(body.member("place").at("on"), names, "obstacle");
+}
+
+// Whoever draws reads it with dfm_scene_value.
+void read_color_range(const Node &range, const std::string &color) {
+  const std::vector<Node> ends = range.items();
+  if (ends.size() != 2 || !(ends[0].number() < ends[1].number()))
+    range.fail("expected two numbers, the second one larger, as [0, 2.5]");
+  if (color == "body")
+    range.fail("bodies have colors of their own here; give \"color\" a quantity, such as \"speed\"");
+}
+
 void read_output(const Node &scene, Definition &def) {
   if (!scene.has("output")) scene.value()["output"] = json::object();
   const Node output = scene.member("output");
@@ -521,6 +537,7 @@ void read_output(const Node &scene, Definition &def) {
   def.contacts = output.boolean("contacts", true);
   def.check = output.boolean("check", false);
   def.color = output.word("color", "body", "color");
+  if (output.has("color_range")) read_color_range(output.member("color_range"), def.color);
   if (output.has("camera")) {
     const Node camera = output.member("camera");
     camera.object("camera");
@@ -554,6 +571,7 @@ Definition read_scene(json &tree, const std::string &file, const Types &types) {
   read_materials(scene, def, context);
   def.bodies = read_bodies(scene, context);
   def.obstacles = read_obstacles(scene, context);
+  check_places(scene, def);
   def.rigid = read_rigid(scene, context);
   def.tools = read_tools(scene, context);
   def.cuts = read_cuts(scene, context, def);

@@ -375,6 +375,10 @@ Body read_body(const Node &node, ReadContext &context) {
   if (model.has("params")) b.params = read_params(model.member("params"), type);
   read_precision(model, b.params);
   b.pose = read_pose(node, "pose", &b.scale);
+  if (node.has("place")) {
+    node.member("place").object("place");
+    b.on = node.member("place").at("on").text();
+  }
   node.vector("velocity", b.velocity, 0, 0, 0);
   node.vector("spin", b.spin, 0, 0, 0);
   for (const Node &entry : node.items("fix")) b.fixes.push_back(read_fix(entry));
