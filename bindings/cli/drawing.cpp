@@ -44,7 +44,6 @@ void Drawing::make(const BodyView &body, Buffers &b) {
   b.scalar.assign(body.nsurfel, 0.f);
   uint32_t n = 0;
   need(dfm_surface_positions(body.handle, body.nsurfel, b.xyz.data(), &n));
-  b.start = b.xyz;
   b.stress.reset();
 }
 
@@ -76,8 +75,7 @@ bool Drawing::fill_values(const BodyView &body, Buffers &b) {
   if (color_ == "stress") return b.stress->read(b.scalar);
   if (color_ == "speed") need(dfm_surface_velocities(body.handle, body.nsurfel, b.vectors.data(), &n));
   else if (color_ == "contact") need(dfm_surface_forces(body.handle, body.nsurfel, b.vectors.data(), &n));
-  else
-    for (size_t i = 0; i < b.xyz.size(); ++i) b.vectors[i] = b.xyz[i] - b.start[i];
+  else need(dfm_debug_surface_displacements(body.handle, body.nsurfel, b.vectors.data(), &n));
   for (size_t i = 0; i < b.scalar.size(); ++i) {
     const double *v = &b.vectors[3 * i];
     b.scalar[i] = float(std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]));

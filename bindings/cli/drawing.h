@@ -38,7 +38,7 @@ class Drawing {
  private:
   struct Buffers {
     dfm_body of = 0;
-    std::vector<double> xyz, start, vectors;
+    std::vector<double> xyz, vectors;
     std::vector<float> scalar;
     std::optional<SurfaceStress> stress;
     bool colored = false;

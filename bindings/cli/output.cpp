@@ -165,7 +165,7 @@ void Outputs::write_last() {
   }
 }
 
-// The numbers of the mesh file's nodes and where they are now. Of a filled body they are the first points of
+// The numbers of the mesh file's nodes. Of a filled body they are the first points of
 // the surface that it wears (those of split edges follow); where it wears another one, its own points are
 // numbered in their order.
 FileNodes Outputs::file_nodes(size_t b) const {
@@ -179,7 +179,6 @@ FileNodes Outputs::file_nodes(size_t b) const {
     own.body = body.handle;
     own.name = body.name;
     for (uint32_t i = 0; i < body.npoint; ++i) own.number.push_back(i);
-    own.start = node_positions(own);
     return own;
   }
   const std::string path = (fs::path(scene_.path()).parent_path() / mesh.text).string();
@@ -205,13 +204,12 @@ FileNodes Outputs::file_nodes(size_t b) const {
     out.number.assign(file_point, file_point + body.npoint);
     dfm_tetmesh_destroy(cells);
   }
-  out.start = node_positions(out);
   return out;
 }
 
-// Where the nodes are now, [n,3]: NAN where a cut has taken the node. A cut gives points new numbers, pieces
-// take points along, and of the copies of a point the first one counts.
-std::vector<double> Outputs::node_positions(const FileNodes &nodes) {
+// Displacements of the nodes, [n,3]: NAN where a cut has taken the node. A cut gives points new numbers,
+// pieces take points along, and of the copies of a point the first one counts.
+std::vector<double> Outputs::node_displacements(const FileNodes &nodes) {
   std::vector<double> out(3 * nodes.number.size(), std::numeric_limits<double>::quiet_NaN());
   uint32_t n = 0;
   std::vector<dfm_body> bodies{nodes.body};
@@ -224,18 +222,18 @@ std::vector<double> Outputs::node_positions(const FileNodes &nodes) {
     need(dfm_body_get_info(body, &info));
     if (info.ntet == 0) continue;
     const uint32_t points = nodes.surface ? info.nsurfel : info.npoint;
-    std::vector<double> x(3 * size_t(points));
+    std::vector<double> u(3 * size_t(points));
     std::vector<uint32_t> origins(points);
     if (nodes.surface) {  // such a body is not cut
-      need(dfm_surface_positions(body, points, x.data(), &n));
+      need(dfm_debug_surface_displacements(body, points, u.data(), &n));
       std::iota(origins.begin(), origins.end(), 0u);
     } else {
-      need(dfm_body_get_state(body, points, x.data(), nullptr, &n));
+      need(dfm_debug_displacements(body, points, u.data(), &n));
       need(dfm_body_origins(body, points, origins.data(), 0, nullptr));
     }
     for (size_t i = 0; i < points; ++i)
       if (const size_t to = 3 * size_t(origins[i]); to < out.size() && std::isnan(out[to]))
-        std::copy_n(&x[3 * i], 3, &out[to]);  // points behind them are not in the file
+        std::copy_n(&u[3 * i], 3, &out[to]);  // points behind them are not in the file
   }
   return out;
 }
@@ -244,17 +242,16 @@ void Outputs::write_nodes() {
   if (nodes_.empty()) return;
   make_folder(folder_ + "/nodes");
   for (const FileNodes &nodes : nodes_) {
-    const std::vector<double> now = node_positions(nodes);
+    const std::vector<double> u = node_displacements(nodes);
     std::vector<uint32_t> order(nodes.number.size());
     for (uint32_t i = 0; i < order.size(); ++i) order[i] = i;
     std::sort(order.begin(), order.end(),
               [&](uint32_t i, uint32_t j) { return nodes.number[i] < nodes.number[j]; });
     std::string text = "node,ux,uy,uz\n";
     for (const uint32_t i : order) {
-      if (std::isnan(now[3 * size_t(i)])) continue;
+      if (std::isnan(u[3 * size_t(i)])) continue;
       text += std::to_string(nodes.number[i]);
-      for (int k = 0; k < 3; ++k)
-        text += "," + csv_number(now[3 * size_t(i) + k] - nodes.start[3 * size_t(i) + k]);
+      for (int k = 0; k < 3; ++k) text += "," + csv_number(u[3 * size_t(i) + k]);
       text += "\n";
     }
     write_whole(folder_ + "/nodes/" + nodes.name + ".csv", text);

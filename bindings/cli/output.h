@@ -36,7 +36,6 @@ struct FileNodes {
   std::string name;
   bool surface = false;
   std::vector<uint32_t> number;
-  std::vector<double> start;  // where they were at the start
 };
 
 class Outputs {
@@ -49,7 +48,7 @@ class Outputs {
 
  private:
   FileNodes file_nodes(size_t body) const;
-  static std::vector<double> node_positions(const FileNodes &nodes);
+  static std::vector<double> node_displacements(const FileNodes &nodes);
   void write_body(double t, uint64_t handle, const std::string &name, const dfm_body_measure &m);
   void write_bodies(double t);
   void write_contacts(double t);

@@ -273,6 +273,9 @@ std::vector<Call> body_calls() {
          return dfm_body_query_triangles(h, &s, 0, nullptr, &count);
        }},
       {"body_set_sensor", [](uint64_t h) { return dfm_body_set_sensor(h, false); }},
+      {"debug_displacements", [](uint64_t h) { return dfm_debug_displacements(h, 0, nullptr, &count); }},
+      {"debug_surface_displacements",
+       [](uint64_t h) { return dfm_debug_surface_displacements(h, 0, nullptr, &count); }},
       {"debug_write_body", [](uint64_t h) { return dfm_debug_write_body(h, "/nonexistent/x.vtu"); }},
       {"debug_write_surface", [](uint64_t h) { return dfm_debug_write_surface(h, "/nonexistent/x.vtu"); }},
   };

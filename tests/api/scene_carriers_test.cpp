@@ -384,6 +384,27 @@ TEST(SceneFill, GroupsOfTheSurface_HoldAndLoad) {
   }
 }
 
+// What a cut asks for changes what is seen, by how much is said before the run.
+TEST(SceneFill, BorderOfTheCells_IsToldOfBeforeTheRun) {
+  const std::string border = R"(/bodies/0/surface={"from": "boundary"})";
+  for (const std::vector<std::string> &command :
+       {std::vector<std::string>{"explain", scene()}, {"run", scene(), "--out", folder() + "/border"}}) {
+    std::vector<std::string> arguments = command;
+    arguments.insert(arguments.end(), {"--set", kBox, "--set", kFill});
+    EXPECT_EQ(test::deform(arguments).err.find("is drawn and touches"), std::string::npos);
+    arguments.insert(arguments.end(), {"--set", border});
+    const std::string said = test::deform(arguments).err;
+    for (const char *part : {"body 'column' is drawn and touches with the ", " triangles around its ",
+                             " % more volume, not with the 12 triangles of box.obj"})
+      EXPECT_NE(said.find(part), std::string::npos) << part << " in " << said;
+  }
+  const test::CommandResult cut = test::deform(
+      {"explain", scene(), "--set", kBox, "--set", kFill, "--set",
+       R"(/cuts=[{"body": "column", "t": 0, "shape": "plane", "point": [0, 0, 0.1], "normal": [0, 0, 1]}])"});
+  EXPECT_EQ(cut.exit_code, 2);
+  EXPECT_NE(cut.err.find("steps as large as its "), std::string::npos) << cut.err;
+}
+
 TEST(SceneFill, Probes_LieOnTheFillingCells) {
   Loaded l({kBox, kFill, R"(/probes=[{"name": "corner", "body": "column", "point": [0.1, 0.1, 0.2]}])",
             "/bodies/0/velocity=[1, 0, 0]"});

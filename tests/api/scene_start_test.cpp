@@ -118,6 +118,42 @@ TEST(SceneStart, HeldPoints_StayWhereTheyAre) {
   EXPECT_GT(held, 4u);
 }
 
+TEST(SceneStart, Displacements_AreFromTheRestShapeAtItsPose) {
+  const Opened s(scene(R"({"invert": true})"));
+  ASSERT_EQ(s.status, DFM_OK) << dfm_last_error();
+  const std::vector<double> rest = s.state("rested")[0], x = s.state("other")[0];
+  for (const double u : test::listed(dfm_debug_displacements, s.body("rested"), 3)) ASSERT_EQ(u, 0);
+  const std::vector<double> u = test::listed(dfm_debug_displacements, s.body("other"), 3);
+  ASSERT_EQ(u.size(), x.size());
+  for (size_t i = 0; i < u.size(); ++i) ASSERT_NEAR(u[i], x[i] - rest[i], 1e-15);
+  const std::vector<uint32_t> point = test::listed(dfm_surface_points, s.body("other"), 1);
+  const std::vector<double> surface = test::listed(dfm_debug_surface_displacements, s.body("other"), 3);
+  ASSERT_EQ(surface.size(), 3 * point.size());
+  for (size_t i = 0; i < surface.size(); ++i) ASSERT_EQ(surface[i], u[3 * size_t(point[i / 3]) + i % 3]);
+}
+
+// A table of positions is a state of the body, not its rest: both files say how far it is from there.
+TEST(SceneStart, NodesOfABodyThatStartsFromATable_HaveDisplacementsFromRest) {
+  const std::string folder = test::scratch("scene_start_table_" + std::to_string(getpid()));
+  const std::vector<double> rest = Opened(scene(R"({"invert": false})")).state("rested")[0];
+  std::string table = "node,x,y,z,vx,vy,vz\n";
+  for (size_t i = 0; i < rest.size(); i += 3) {
+    char row[160];
+    std::snprintf(row, sizeof row, "%zu,%.17g,%.17g,%.17g,0,0,0\n", i / 3, rest[i], rest[i + 1],
+                  rest[i + 2] + 0.25);
+    table += row;
+  }
+  test::write_file(folder + "/table.csv", table);
+  test::write_file(folder + "/scene.json", scene(R"({"state": "table.csv"})"));
+  const auto r = test::deform({"run", folder + "/scene.json", "--out", folder + "/out", "--quiet", "--time",
+                               "1e-6", "--set", "/time/step=1e-6", "--set", R"(/output={"nodes": true})"});
+  ASSERT_EQ(r.exit_code, 0) << r.err;
+  const auto rows = test::read_csv(folder + "/out/nodes/other.csv");
+  ASSERT_EQ(rows.size(), 1 + rest.size() / 3);
+  for (size_t i = 1; i < rows.size(); ++i)
+    for (size_t k = 0; k < 3; ++k) ASSERT_NEAR(std::stod(rows[i][1 + k]), k == 2 ? 0.25 : 0, 1e-9);
+}
+
 TEST(SceneStart, Jitter_MovesTheChangedBodyToo) {
   const Opened still(scene(R"({"flatten": "point"})")), moved(scene(R"({"flatten": "point"})"), 3);
   ASSERT_EQ(moved.status, DFM_OK) << dfm_last_error();

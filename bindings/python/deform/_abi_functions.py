@@ -179,6 +179,8 @@ FUNCTIONS = {
     "dfm_toi_evaluations": (u32, []),
     "dfm_debug_write_body": (i32, [u64, text]),
     "dfm_debug_write_surface": (i32, [u64, text]),
+    "dfm_debug_displacements": (i32, [u64, u32, ptr, ptr]),
+    "dfm_debug_surface_displacements": (i32, [u64, u32, ptr, ptr]),
     "dfm_debug_draw": (i32, [u64, u32, ptr, ptr]),
     "dfm_query_shape_default_sized": (None, [u32, ptr]),
     "dfm_query_filter_default_sized": (None, [u32, ptr]),

@@ -13,6 +13,12 @@ extern "C" {
 DFM_API dfm_status dfm_debug_write_body(dfm_body body, const char *path);
 /** Surfels as VTU (point data u, v, force). Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_debug_write_surface(dfm_body body, const char *path);
+/** u of dfm_debug_write_body, [n,3], m: displacements from the rest shape at the body's pose. That is the
+ * pose of creation, until a change to a model without DFM_CAP_ROTATION_INVARIANT (linear_fem) renews it.
+ * Capacity and errors as for dfm_surface_positions. Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_debug_displacements(dfm_body body, uint32_t capacity, double *u, uint32_t *n);
+/** The same of the surfels: u of dfm_debug_write_surface. Threads: Not during step. Since 0.1. */
+DFM_API dfm_status dfm_debug_surface_displacements(dfm_body body, uint32_t capacity, double *u, uint32_t *n);
 
 /** Lines for a debug view: contact normals and friction forces of the last sub-step, swept boxes of
  * the surfaces. */

@@ -345,6 +345,12 @@ class Body : public Handle<dfm_body, struct BodyKind>,
   auto surface_triangles() const { return collect<E, 3>(dfm_surface_triangles, raw_); }
   auto surface_points() const { return collect<E, 1>(dfm_surface_points, raw_); }
 
+  auto displacements(std::span<double> out) const { return fill<E, 3>(dfm_debug_displacements, raw_, out); }
+  auto surface_displacements(std::span<double> out) const {
+    return fill<E, 3>(dfm_debug_surface_displacements, raw_, out);
+  }
+  auto displacements() const { return collect<E, 3>(dfm_debug_displacements, raw_); }
+  auto surface_displacements() const { return collect<E, 3>(dfm_debug_surface_displacements, raw_); }
   auto write(Text path) const { return E::done(dfm_debug_write_body(raw_, path.c_str)); }
   auto write_surface(Text path) const { return E::done(dfm_debug_write_surface(raw_, path.c_str)); }
 };

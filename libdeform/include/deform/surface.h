@@ -42,7 +42,7 @@ typedef struct dfm_vertex_layout {
   uint32_t position; /* 3 floats, m: world, minus origin */
   uint32_t normal;   /* 3 floats: as dfm_surface_normals */
   uint32_t velocity; /* 3 floats, m/s */
-  /* 3 floats, m: from the rest position before pose, as in dfm_debug_write_surface */
+  /* 3 floats, m: from the rest shape at its pose, as dfm_debug_surface_displacements */
   uint32_t displacement;
   /* 1 float, from the loaded contacts of the last sub-step at this surfel, its edges and its triangles:
    * 1 at least one sticks, 0.5 all slide, 0 there is none */

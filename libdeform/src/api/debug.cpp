@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "api/displacement.h"
 #include "api/objects.h"
 #include "mesh/mesh.h"
 #include "world/measure.h"
@@ -31,8 +32,8 @@ dfm_status dfm_debug_write_body(dfm_body body, const char *path) {
     Body &b = body_of(body);
     need(path, "path");
     const std::vector<double> x = packed(b.p.x, b.p.n), v = packed(b.p.v, b.p.n);
-    std::vector<double> u = x, energy, stress, mises;
-    for (size_t i = 0; i < u.size(); ++i) u[i] -= b.p.rest[i];
+    std::vector<double> u(x.size()), energy, stress, mises;
+    for (uint32_t i = 0; i < b.p.n; ++i) store3(&u[size_t(3) * i], displacement(b, i));
     VtuGrid grid;
     grid.npoint = b.p.n;
     grid.ncell = b.ncell();
@@ -66,9 +67,7 @@ dfm_status dfm_debug_write_surface(dfm_body body, const char *path) {
     for (uint32_t s = 0; s < n; ++s) {
       store3(&x[size_t(3) * s], surfel_vector(b, b.p.x, s));
       store3(&v[size_t(3) * s], surfel_vector(b, b.p.v, s));
-      const Vec3 rest = load3(b.surface.identity() ? &b.p.rest[size_t(3) * b.surface.point[s]]
-                                                   : &b.surface.rest[size_t(3) * s]);
-      store3(&u[size_t(3) * s], load3(&x[size_t(3) * s]) - rest);
+      store3(&u[size_t(3) * s], surfel_displacement(b, s));
       if (h > 0) store3(&force[size_t(3) * s], (1 / h) * load3(&b.surfel_impulse[size_t(3) * s]));
     }
     VtuGrid grid;
@@ -80,6 +79,22 @@ dfm_status dfm_debug_write_surface(dfm_body body, const char *path) {
     grid.point_data = {
         {"u", 3, u.data(), nullptr}, {"v", 3, v.data(), nullptr}, {"force", 3, force.data(), nullptr}};
     write_vtu(path, grid);
+  });
+}
+
+dfm_status dfm_debug_displacements(dfm_body body, uint32_t capacity, double *u, uint32_t *n) {
+  return as_status([&] {
+    const Body &b = body_of(body);
+    if (!room(b.p.n, capacity, u, n)) return;
+    for (uint32_t i = 0; i < b.p.n; ++i) store3(u + size_t(3) * i, displacement(b, i));
+  });
+}
+
+dfm_status dfm_debug_surface_displacements(dfm_body body, uint32_t capacity, double *u, uint32_t *n) {
+  return as_status([&] {
+    const Body &b = body_of(body);
+    if (!room(b.surface.nsurfel, capacity, u, n)) return;
+    for (uint32_t s = 0; s < b.surface.nsurfel; ++s) store3(u + size_t(3) * s, surfel_displacement(b, s));
   });
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "api/displacement.h"
 #include "api/objects.h"
 #include "deform/surface.h"
 #include "world/queries.h"
@@ -105,10 +106,7 @@ void put_vertices(Body &b, const dfm_vertex_layout &l, unsigned char *out) {
       put(out, l.normal, normalized(sum));
     }
     if (l.velocity != DFM_VERTEX_NONE) put(out, l.velocity, surfel_vector(b, b.p.v, i));
-    if (l.displacement != DFM_VERTEX_NONE) {
-      const Vec3 rest = load3(s.identity() ? &b.p.rest[size_t(3) * s.point[i]] : &s.rest[size_t(3) * i]);
-      put(out, l.displacement, x(i) - rest);
-    }
+    if (l.displacement != DFM_VERTEX_NONE) put(out, l.displacement, surfel_displacement(b, i));
     if (l.stick != DFM_VERTEX_NONE) std::memcpy(out + l.stick, &none, sizeof none);
   }
 }

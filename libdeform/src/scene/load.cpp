@@ -210,9 +210,26 @@ BodyMesh MeshFiles::load(const Body &b) {
     take_skin(surface(path_of(b.surface.mesh), where), b, where, out);
   } else if (out.filled) {
     take_skin(surface(path, pointer), b, pointer, out);
+    if (!out.wears_skin) tell_of_steps(b, out);
     split_skin(out);
   }
   return out;
+}
+
+// A cut needs the border of the cells as surface, which is not the shape that the file has.
+void MeshFiles::tell_of_steps(const Body &b, const BodyMesh &mesh) const {
+  dfm_tetmesh_info cells = {};
+  cells.size = sizeof cells;
+  check(dfm_tetmesh_get_info(mesh.handle, &cells), b.surface.pointer);
+  double filled = 0;  // cells of the lattice are alike
+  for (uint32_t t = 0; t < cells.ntet; ++t) filled += mesh.share[t];
+  context_->logf(
+      DFM_LOG_WARNING,
+      "body '%s' is drawn and touches with the %u triangles around its %u cells, in steps of about "
+      "%.2g m and with %.0f %% more volume, not with the %u triangles of %s: \"surface\" says "
+      "\"boundary\", as a body that is cut needs it; more cells (\"fill\") make smaller steps",
+      b.name.c_str(), cells.ntriangle, cells.ntet, b.scale * cells.edge_median,
+      100 * (cells.ntet / filled - 1), mesh.skin.ntriangle, b.mesh.c_str());
 }
 
 void MeshFiles::load(Obstacle &o, std::vector<double> &points) {
