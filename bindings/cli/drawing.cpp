@@ -98,6 +98,7 @@ render::Bounds Drawing::place_of_bodies() const {
 }
 
 void Drawing::add_bodies(render::Scene &out) {
+  const float least = noise();
   scene_.renew_list();
   if (!std::ranges::equal(buffers_, scene_.bodies(), {}, &Buffers::of, &BodyView::handle)) {  // cuts
     std::vector<Buffers> before = std::exchange(buffers_, {});
@@ -122,7 +123,7 @@ void Drawing::add_bodies(render::Scene &out) {
     need(dfm_surface_positions(body.handle, body.nsurfel, buffers_[i].xyz.data(), &n));
     buffers_[i].colored = fill_values(body, buffers_[i]);
     for (float &x : buffers_[i].scalar) {
-      if (x < noise()) x = 0;
+      if (x < least) x = 0;
       top_ = std::max(top_, x);
     }
   }

@@ -135,6 +135,17 @@ class View(unittest.TestCase):
             triangles = np.frombuffer(base64.b64decode(surface["triangles"]), "<u4")
             self.assertLess(triangles.max(), surface["n"])
 
+    def test_slope_by_gravity_is_turned_upright(self):
+        with deform.World(gravity=(3, 0, -4)) as world:
+            world.add_obstacle("plane")
+            world.add_body(deform.TetMesh.ball(0.1, 300), position=(0, 0, 0.12), name="ball")
+            data = webgl.data_of(world.film())
+            floor = data["surfaces"][1]
+            points = np.frombuffer(base64.b64decode(floor["points"]), "<u2").reshape(-1, 3) / 65535
+            a, b, c = (data["span"] * points[k] for k in range(3))
+            normal = np.cross(b - a, c - a)
+            np.testing.assert_allclose(abs(normal[2]) / np.linalg.norm(normal), 0.8, atol=1e-3)
+
     def test_solids_are_closed_and_face_outward(self):
         run = dropped()
         volumes = []

@@ -63,19 +63,29 @@ def mesh_of(solid: Solid, reach: float) -> tuple[np.ndarray, np.ndarray]:
     return turned(solid.pose[3:], local) + solid.pose[:3], triangles
 
 
+def _to_z(up: np.ndarray) -> np.ndarray:
+    """The rotation [3,3] that takes a unit vector to z, the viewer's up, by the shortest way."""
+    x, y, z = up
+    if z < -1 + 1e-12:
+        return np.diag([1.0, -1.0, -1.0])
+    across = np.array([[0, 0, -x], [0, 0, -y], [x, y, 0]])
+    return np.eye(3) + across + across @ across / (1 + z)
+
+
 def _surfaces(run: Run) -> list[tuple[list[np.ndarray], np.ndarray, tuple[float, float, float], Any]]:
     """(points of each frame, triangles, color, values of each frame or None)"""
     out: list[Any] = []
+    turns = [_to_z(run.upright.at(frame.t)).T if run.upright else np.eye(3) for frame in run.frames]
     for i, (name, triangles) in enumerate(run.triangles.items()):
         values = [frame.values[name] for frame in run.frames]
-        out.append(([frame.positions[name] for frame in run.frames], triangles, palette(i),
-                    None if values[0] is None else values))
+        points = [frame.positions[name] @ turn for frame, turn in zip(run.frames, turns)]
+        out.append((points, triangles, palette(i), None if values[0] is None else values))
     shown = np.concatenate([points.reshape(-1, 3) for surface in out for points in surface[0]]
                            or [np.zeros((1, 3))])
     reach = 1.5 * float(np.linalg.norm(np.ptp(shown, axis=0))) or 1.0
     for k in range(len(run.frames[0].obstacles)):
         meshes = [mesh_of(frame.obstacles[k], reach) for frame in run.frames]
-        points = [mesh[0] for mesh in meshes]
+        points = [mesh[0] @ turn for mesh, turn in zip(meshes, turns)]
         still = all(np.array_equal(points[0], p) for p in points)
         out.append((points[:1] if still else points, meshes[0][1], _GRAY, None))
     return out
