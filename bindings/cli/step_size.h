@@ -10,5 +10,7 @@ namespace cli {
 double next_step(const SceneFile &scene, double start, double now);
 // The same where no end is near.
 double full_step(const SceneFile &scene);
+// s, no step is longer, whatever integrator moves the bodies.
+double longest_step(const SceneFile &scene);
 
 }  // namespace cli

@@ -390,7 +390,7 @@ class dfm_pair_report(_Structure):
 class dfm_pair_impulse(_Structure):
     _fields_ = [("size", u32), ("reserved", u32), ("a", u64), ("b", u64), ("impulse", f64 * 3),
                 ("normal_impulse", f64), ("peak_normal", f64), ("peak_force", f64), ("point", f64 * 3),
-                ("touching", f64)]
+                ("touching", f64), ("part", f64 * 8)]
 
 
 class dfm_contact_event(_Structure):

@@ -653,7 +653,8 @@ class World(Queries, Reports, Tools, OfThisProcess):
     @property
     def impulses(self) -> np.ndarray:
         """What contact did to each pair over the whole last step, a structured array [n], a view: a, b,
-        impulse [3] N s, normal_impulse N s, peak_normal N, peak_force N, point [3] m, touching s."""
+        impulse [3] N s, normal_impulse N s, peak_normal N, peak_force N, point [3] m, touching s,
+        part [8] N s: normal_impulse by eighths of the step."""
         return self._list("impulses", lambda: Rows(quick.dfm_world_pair_impulses_sized, self.handle,
                                                    _abi.dfm_pair_impulse))
 

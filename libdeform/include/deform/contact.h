@@ -174,6 +174,8 @@ typedef struct dfm_pair_impulse {
   /* m, world: mean of the contact points, weighted by their normal impulses */
   double point[3];
   double touching; /* s of the step during which the pair carried load */
+  /* N s, normal_impulse by eighths of the step, in order; an impulse is spread over its sub-step */
+  double part[8];
 } dfm_pair_impulse;
 /** dfm_world_pair_impulses with rows of any size. @param row_size bytes from one row of out to the next
  * (base.h). Since 0.1.

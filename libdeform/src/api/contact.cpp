@@ -404,6 +404,7 @@ dfm_status dfm_world_pair_impulses_sized(dfm_world world, uint32_t row_size, uin
       r.peak_normal = p.peak_normal;
       r.peak_force = p.peak_force;
       r.touching = p.touching;
+      std::copy_n(p.part, StepImpulses::kParts, r.part);
       rows.add(r);
     }
   });
