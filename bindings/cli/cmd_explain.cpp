@@ -175,6 +175,8 @@ void print_integrators(const JsonValue &plan) {
     if (const std::string n = own->get("substeps"); !n.empty())
       std::printf(" (explicit: %s sub-step%s of %s s in a step, bounded by point %s)", n.c_str(),
                   n == "1" ? "" : "s", own->get("explicit_s").c_str(), own->get("worst_point").c_str());
+    if (const std::string rebound = own->get("rebound"); !rebound.empty())
+      std::printf("; %s", rebound.c_str());
     std::printf("\n");
   }
 }

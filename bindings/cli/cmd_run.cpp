@@ -112,7 +112,7 @@ class Runner {
         progress_(!globals.quiet && !globals.json),
         outputs_(scene, options.out),
         checker_(scene),
-        impulses_(scene),
+        impulses_(scene, peak_window(scene)),
         sensors_(scene, options.out),
         attachments_(scene, options.out),
         tools_(scene, options.out),
@@ -393,7 +393,7 @@ class Runner {
     ++result_.steps;
     trouble_ |= trouble;
     scene_.renew_list();
-    impulses_.add_step();
+    impulses_.add_step(step);
     sensors_.add_step();
     tools_.add_step(step);
     result_.simulated = dfm_world_time(world_);

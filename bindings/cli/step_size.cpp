@@ -19,6 +19,12 @@ double full_step(const SceneFile &scene) {
   return scene.settings().every > 0 ? std::min(step, scene.settings().every) : step;
 }
 
+double longest_step(const SceneFile &scene) {
+  constexpr double most = 1.0 / 30;  // s, of dfm_world_stable_step
+  const double step = scene.settings().step, every = scene.settings().every;
+  return step > 0 ? step : every > 0 ? std::min(most, every) : most;
+}
+
 double next_step(const SceneFile &scene, double start, double now) {
   const double duration = scene.settings().duration, left = start + duration - now;
   const bool automatic = scene.settings().step <= 0;

@@ -13,5 +13,7 @@ double full_step(const SceneFile &scene);
 // Throws Failure where the first step needs more sub-steps than the library takes, which it would say after
 // the run's folder has been emptied. Bodies whose integrator is chosen by the library move implicitly then.
 void check_first_step(const SceneFile &scene);
+// s, no step is longer, whatever integrator moves the bodies.
+double longest_step(const SceneFile &scene);
 
 }  // namespace cli

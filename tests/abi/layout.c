@@ -264,6 +264,7 @@ static const Row rows[] = {
     M(dfm_pair_impulse, peak_force),
     M(dfm_pair_impulse, point),
     M(dfm_pair_impulse, touching),
+    M(dfm_pair_impulse, part),
     S(dfm_contact_event),
     M(dfm_contact_event, size),
     M(dfm_contact_event, kind),

@@ -290,3 +290,21 @@ TEST(FrictionRules, AfterARestore_ContinueAsWithoutIt) {
   };
   EXPECT_EQ(run(false), run(true));
 }
+
+TEST(FrictionRules, RestitutionOutOfRange_IsRefusedAndNeedsItsFlag) {
+  Scene s;
+  dfm_friction_def f{};
+  f.size = sizeof f;
+  f.flags = DFM_FRICTION_RESTITUTION;
+  f.between[0] = f.between[1] = "*";
+  f.law = "coulomb";
+  for (const double e : {-0.1, 1.01, double(NAN)}) {
+    f.restitution = e;
+    EXPECT_EQ(dfm_world_add_friction(s.w, &f), DFM_E_ARG) << e;
+    test::says({"restitution", "from 0 to 1"});
+  }
+  f.restitution = 1;
+  EXPECT_EQ(dfm_world_add_friction(s.w, &f), DFM_OK);
+  f.flags = 2;
+  EXPECT_EQ(dfm_world_add_friction(s.w, &f), DFM_E_ARG) << "a flag that there is not";
+}

@@ -70,6 +70,10 @@ TEST(PairImpulses, OfAnImpactThatEndsWithinTheStep_AreKept) {
   EXPECT_NEAR(list[0].impulse[2], test::measure(t.ball).momentum[2] - before.momentum[2],
               1e-12 * before.mass);
   EXPECT_GT(list[0].peak_normal, 2 * list[0].normal_impulse / 0.1);
+  double sum = 0;
+  for (const double part : list[0].part) sum += part;
+  EXPECT_NEAR(sum, list[0].normal_impulse, 1e-12 * sum);
+  EXPECT_EQ(list[0].part[7], 0) << "it has left";
   test::ok(dfm_world_step(t.world, 1e-3, nullptr));
   EXPECT_TRUE(impulses(t.world).empty());  // of the last step alone
 }

@@ -272,6 +272,25 @@ TEST(WriteScene, WhatASceneCannotSay_IsRefusedOrReported) {
   EXPECT_TRUE(load(made.context, path));
 }
 
+TEST(WriteScene, Restitution_IsWrittenBesideTheLaw) {
+  Made made;
+  dfm_friction_def f{};
+  f.size = sizeof f;
+  f.flags = DFM_FRICTION_RESTITUTION;
+  f.between[0] = f.between[1] = "*";
+  f.law = "coulomb";
+  f.restitution = 0.375;
+  test::ok(dfm_world_add_friction(made.world, &f));
+  const double mu = 0.25;
+  const dfm_param_value row = {"mu", &mu, 1};
+  const dfm_params params = {sizeof params, 1, &row};
+  test::ok(dfm_world_set_friction(made.world, "*", "*", &params));
+  const std::string path = folder_of("restitution") + "/restitution.json";
+  write(made.world, path);
+  EXPECT_NE(test::read_file(path).find("\"restitution\": 0.375"), std::string::npos) << test::read_file(path);
+  EXPECT_TRUE(load(made.context, path));
+}
+
 // Materials without a name, and two of one name, of which one is gone: each body has its own again.
 TEST(WriteScene, Materials_AreThoseOfEachBody) {
   Made made;

@@ -86,6 +86,18 @@ class Arguments(unittest.TestCase):
             world.remove_friction(ball, "floor")
             self.refused("needs a name", lambda: world.add_friction(world.add_material(), "*"))
 
+    def test_restitution_throws_a_stiff_body_back(self):
+        with deform.World(integrator="implicit_euler") as world:
+            ball = world.add_body(deform.TetMesh.ball(0.05, cells=100), material={"young": 1e9},
+                                  position=(0, 0, 0.06), velocity=(0, 0, -2))
+            floor = world.add_obstacle("plane", name="floor")
+            self.refused("restitution is 2; give a number from 0 to 1",
+                         lambda: world.add_friction("*", floor, restitution=2))
+            world.add_friction("*", floor, mu=0, restitution=0.5)
+            for _ in range(3):
+                world.step(1 / 60)
+            self.assertGreater(ball.measure.velocity[2], 0)
+
     def test_material_has_entries_that_something_reads(self):
         mesh = deform.TetMesh.ball(0.1, cells=100)
         with deform.World() as world:

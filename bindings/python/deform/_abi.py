@@ -72,6 +72,7 @@ DFM_TROUBLE_BUDGET = 256
 DFM_TROUBLE_INTERRUPTED = 512
 DFM_OVERLAP_OBSTACLE, DFM_OVERLAP_ASIDE, DFM_OVERLAP_SEPARATED = 1, 2, 4
 DFM_COUPLING_BARYCENTRIC, DFM_COUPLING_MLS, DFM_COUPLING_THESIS = 0, 1, 2
+DFM_FRICTION_RESTITUTION = 1
 DFM_CONTACT_VERTEX_FACE, DFM_CONTACT_EDGE_EDGE, DFM_CONTACT_PRIMITIVE, DFM_CONTACT_RIGID = 0, 1, 2, 3
 DFM_CONTACT_STICKING, DFM_CONTACT_BEGAN, DFM_CONTACT_EDGE_A, DFM_CONTACT_TRIANGLE_A = 1, 2, 4, 8
 DFM_EVENT_BEGIN = 1
@@ -366,7 +367,7 @@ class dfm_body_measure(_Structure):
 
 class dfm_friction_def(_Structure):
     _fields_ = [("size", u32), ("flags", u32), ("between", text * 2), ("law", text),
-                ("params", dfm_params)]
+                ("params", dfm_params), ("restitution", f64)]
 
 
 class dfm_contact(_Structure):
@@ -390,7 +391,7 @@ class dfm_pair_report(_Structure):
 class dfm_pair_impulse(_Structure):
     _fields_ = [("size", u32), ("reserved", u32), ("a", u64), ("b", u64), ("impulse", f64 * 3),
                 ("normal_impulse", f64), ("peak_normal", f64), ("peak_force", f64), ("point", f64 * 3),
-                ("touching", f64)]
+                ("touching", f64), ("part", f64 * 8)]
 
 
 class dfm_contact_event(_Structure):

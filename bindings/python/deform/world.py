@@ -481,11 +481,14 @@ class World(Queries, Reports, Tools, OfThisProcess):
 
     # ---- friction --------------------------------------------------------------------------------------
 
-    def add_friction(self, a: Any = "*", b: Any = "*", law: Any = "coulomb", **params: Any) -> None:
+    def add_friction(self, a: Any = "*", b: Any = "*", law: Any = "coulomb",
+                     restitution: float | None = None, **params: Any) -> None:
         """A law between two sides: a body, an obstacle, a tool or a material, or a text: "*",
         "material=NAME", the name of a body or an obstacle, or "body:GROUP".
 
-        law: a name, or a deform.PythonLaw; params: of the law, by key ("mu" sets mu_C and mu_S)."""
+        law: a name, or a deform.PythonLaw; params: of the law, by key ("mu" sets mu_C and mu_S).
+        restitution: 0 to 1, the least share of the speed of an impact at which the two leave each other,
+        where a sub-step does not resolve it; None: contact adds no speed."""
         name = self.context.use_law(law)
         values = self.context.params("friction", name, params)
         sides = [_side(a), _side(b)]
@@ -493,6 +496,8 @@ class World(Queries, Reports, Tools, OfThisProcess):
         between = (ctypes.c_char_p * 2)(*sides)
         definition.between[:] = (ctypes.c_void_p * 2).from_buffer(between)[:]
         definition.law, definition.params = name.encode(), values.struct
+        if restitution is not None:
+            definition.flags, definition.restitution = _abi.DFM_FRICTION_RESTITUTION, restitution
         self.free()
         check(lib.dfm_world_add_friction(self.handle, ctypes.byref(definition)))
 
@@ -666,7 +671,8 @@ class World(Queries, Reports, Tools, OfThisProcess):
     @property
     def impulses(self) -> np.ndarray:
         """What contact did to each pair over the whole last step, a structured array [n], a view: a, b,
-        impulse [3] N s, normal_impulse N s, peak_normal N, peak_force N, point [3] m, touching s."""
+        impulse [3] N s, normal_impulse N s, peak_normal N, peak_force N, point [3] m, touching s,
+        part [8] N s: normal_impulse by eighths of the step."""
         return self._list("impulses", lambda: Rows(quick.dfm_world_pair_impulses_sized, self.handle,
                                                    _abi.dfm_pair_impulse))
 

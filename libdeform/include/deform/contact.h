@@ -12,11 +12,17 @@ extern "C" {
  * added. "material=NAME" refers to the material of the cell behind a triangle. If no rule matches, the law is
  * "coulomb" with mu_C = mu_S = sqrt(f_a f_b), where f is the material's entry "friction", 0.5 by default. */
 typedef struct dfm_friction_def {
-  uint32_t size, flags;
+  uint32_t size, flags; /* DFM_FRICTION_RESTITUTION */
   const char *between[2];
   const char *law; /* short name or full id */
   dfm_params params;
+  /* with DFM_FRICTION_RESTITUTION, 0 to 1: two that meet faster than 2 |g| h and answer within the sub-step
+   * of h seconds as rigid bodies leave each other at least at this share of that speed. An impact that
+   * sub-steps resolve is left to elasticity. Not between two rigid things */
+  double restitution;
 } dfm_friction_def;
+/** dfm_friction_def.flags: `restitution` is given. Without it contact adds no speed of its own. Since 0.1. */
+enum { DFM_FRICTION_RESTITUTION = 1 };
 /** Adds a rule. It replaces an earlier rule for the same two sides, in either order. A rule that names a body
  * or obstacle is removed when that is destroyed. If the earlier rule has the same law, the call acts as
  * dfm_world_set_friction with all parameters; those that are not given get their defaults.
@@ -174,6 +180,8 @@ typedef struct dfm_pair_impulse {
   /* m, world: mean of the contact points, weighted by their normal impulses */
   double point[3];
   double touching; /* s of the step during which the pair carried load */
+  /* N s, normal_impulse by eighths of the step, in order; an impulse is spread over its sub-step */
+  double part[8];
 } dfm_pair_impulse;
 /** dfm_world_pair_impulses with rows of any size. @param row_size bytes from one row of out to the next
  * (base.h). Since 0.1.

@@ -25,6 +25,7 @@
 #define DEFORM_DEFORM_HPP
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <type_traits>
 #include <vector>
@@ -420,8 +421,13 @@ class World : public Handle<dfm_world, struct WorldKind>, public WorldQueries<E,
     return produce<E, Tool<E>>([&](Tool<E> &t) { return dfm_tool_create(raw_, &def, t.put()); });
   }
   auto add_friction(const dfm_friction_def &def) const { return E::done(dfm_world_add_friction(raw_, &def)); }
-  auto add_friction(Text a, Text b, Text law, const dfm_params &params = {}) const {
+  auto add_friction(Text a, Text b, Text law, const dfm_params &params = {},
+                    std::optional<double> restitution = {}) const {
     dfm_friction_def def = sized<dfm_friction_def>();
+    if (restitution) {
+      def.flags = DFM_FRICTION_RESTITUTION;
+      def.restitution = *restitution;
+    }
     def.between[0] = a.c_str;
     def.between[1] = b.c_str;
     def.law = law.c_str;

@@ -211,10 +211,17 @@ dfm_status dfm_world_add_friction(dfm_world world, const dfm_friction_def *given
     World &w = exclusive(world_of(world));
     need(given, "def");
     const dfm_friction_def def = take_def(given, dfm_friction_def{});
-    check_flags(def, 0, "dfm_friction_def");
+    check_flags(def, DFM_FRICTION_RESTITUTION, "dfm_friction_def");
     need(def.law, "law");
+    double restitution = kNoRestitution;
+    if (def.flags & DFM_FRICTION_RESTITUTION) {
+      restitution = def.restitution;
+      if (!(restitution >= 0 && restitution <= 1))
+        fail(DFM_E_ARG, "restitution is %g; give a number from 0 to 1", restitution);
+    }
     const auto values = values_of(def.params, ("law '" + std::string(def.law) + "'").c_str());
-    add_friction_rule(w, side(w, def.between[0], true), side(w, def.between[1], true), def.law, values);
+    add_friction_rule(w, side(w, def.between[0], true), side(w, def.between[1], true), def.law, values,
+                      restitution);
   });
 }
 
@@ -404,6 +411,7 @@ dfm_status dfm_world_pair_impulses_sized(dfm_world world, uint32_t row_size, uin
       r.peak_normal = p.peak_normal;
       r.peak_force = p.peak_force;
       r.touching = p.touching;
+      std::copy_n(p.part, StepImpulses::kParts, r.part);
       rows.add(r);
     }
   });

@@ -8,7 +8,14 @@ namespace dfm {
 
 struct RigidMotion {
   Vec3 center, velocity, spin;  // m, m/s of the center of mass, rad/s
+  double mass = 0;              // kg
+  Vec3 turns[3];                // 1/(kg m2), columns of the inverse inertia; zero without a spin
   Vec3 at(Vec3 x) const { return velocity + cross(spin, x - center); }
+  // 1/kg, what a unit impulse along n at x changes of the velocity there along n
+  double response(Vec3 x, Vec3 n) const {
+    const Vec3 arm = cross(x - center, n);
+    return 1 / mass + dot(arm, arm.x * turns[0] + arm.y * turns[1] + arm.z * turns[2]);
+  }
 };
 
 // place(i), velocity(i): m, m/s of point i; n > 0. Points on a line have no spin about it.
@@ -36,10 +43,15 @@ RigidMotion rigid_motion(uint32_t n, const double *mass, const Place &place, con
     s[4] -= mass[i] * r.z * r.x;
     s[5] -= mass[i] * r.x * r.y;
   }
+  out.mass = all;
   const Vec3 a{s[0], s[5], s[4]}, c{s[5], s[1], s[3]}, e{s[4], s[3], s[2]};
   const double det = dot(a, cross(c, e));
-  if (det > 0)
-    out.spin = (1 / det) * (momentum.x * cross(c, e) + momentum.y * cross(e, a) + momentum.z * cross(a, c));
+  if (!(det > 0)) return out;
+  const Vec3 ce = cross(c, e), ea = cross(e, a), ac = cross(a, c);
+  out.spin = (1 / det) * (momentum.x * ce + momentum.y * ea + momentum.z * ac);
+  out.turns[0] = (1 / det) * ce;
+  out.turns[1] = (1 / det) * ea;
+  out.turns[2] = (1 / det) * ac;
   return out;
 }
 

@@ -133,6 +133,7 @@ struct ContactRows {
   RowsView view(RowRun contacts) const;
   RowsPart whole();  // all of them; valid until the next call
 
+  Vec3 rigid_diagonal(uint32_t i, Vec3 a) const;  // of W a of a contact: the rigid body's part
   // relative velocity of contact i in its frame (normal, t1, t2); of unknowns like y
   Vec3 velocity(uint32_t i) const { return velocity(i, y.data()); }
   Vec3 velocity(uint32_t i, const double *of) const;
@@ -194,7 +195,6 @@ struct ContactRows {
   }
   void response_apply(const Block &b, uint32_t k, Vec3 p);
   bool stands(const Block &b) const;
-  Vec3 rigid_diagonal(uint32_t i, Vec3 a) const;
   Vec3 diagonal(uint32_t i, Vec3 direction) const;
   void finish_bonds(std::span<const Bond> bonds);
 };

@@ -14,6 +14,8 @@
 
 namespace dfm {
 
+inline constexpr double kNoRestitution = -1;  // none is given
+
 // One law with one set of parameter values.
 struct LawInstance {
   const dfm_type *type = nullptr;
@@ -23,9 +25,10 @@ struct LawInstance {
   void *data = nullptr;                 // result of prepare()
   const dfm_host *host = nullptr;
   uint32_t nstate = 0;
-  std::vector<uint8_t> tangent;  // [nstate] 1: a component of a vector in the tangent plane
-  bool turns = false;            // any
-  bool by_default = false;       // used for pairs without a rule
+  std::vector<uint8_t> tangent;         // [nstate] 1: a component of a vector in the tangent plane
+  bool turns = false;                   // any
+  bool by_default = false;              // used for pairs without a rule
+  double restitution = kNoRestitution;  // 0 to 1, of the pairs that have this law
   // The parameters as the rule gives them; the list of effects may have removed some of them.
   const dfm_type *asked_type = nullptr;
   std::vector<double> asked;

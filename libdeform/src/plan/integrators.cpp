@@ -20,11 +20,15 @@ void add(Cost &cost, const IntegratorOption &b, bool implicit) {
   if (!implicit) cost.substeps = std::max(cost.substeps, b.substeps);
 }
 
-bool stays(const IntegratorOption &b) { return !b.open || b.implicit_work == 0; }
+// A body that alone would be explicit is so beside any others.
+bool stays(const IntegratorOption &b) {
+  return !b.open || b.implicit_work == 0 || !(b.substeps > kCheaper * b.implicit_work);
+}
 
 }  // namespace
 
-// Makes the stiffest bodies implicit, and further ones only if that is cheaper by another factor of four.
+// Of the bodies that alone would be implicit, makes the stiffest ones so where that is cheaper for the world,
+// and further ones only if that is cheaper by another factor of four.
 void choose_integrators(std::vector<IntegratorOption> &bodies) {
   Cost rest;  // bodies whose integrator is fixed
   std::vector<size_t> order;

@@ -1,6 +1,7 @@
-// Chooses which bodies move implicitly, if the host leaves it to the library. All bodies of a world take the
-// same sub-steps, so the choice is made for all of them together: explicit bodies bound the sub-step, and
-// implicit bodies pay for each of these sub-steps (doc/decisions/0170-integrators-by-cost.md).
+// Chooses which bodies move implicitly, if the host leaves it to the library. Only a body that alone would be
+// implicit may be: it damps what explicit bodies keep, so no other body makes it so. All bodies of a world
+// take the same sub-steps: explicit bodies bound the sub-step, and implicit bodies pay for each of these.
+// Where that costs more than moving explicitly, they do (doc/decisions/0170-integrators-by-cost.md).
 #pragma once
 #include <cstdint>
 #include <string>

@@ -632,6 +632,10 @@ class Builder {
     d.between[1] = f.between[1].c_str();
     d.law = f.law.c_str();
     d.params = f.params.view();
+    if (f.restitution) {
+      d.flags = DFM_FRICTION_RESTITUTION;
+      d.restitution = *f.restitution;
+    }
     check(dfm_world_add_friction(world_, &d), f.pointer);
   }
 

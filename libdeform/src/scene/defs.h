@@ -202,6 +202,7 @@ struct Material {
 struct Friction {
   std::string pointer, between[2], law;
   Params params;
+  std::optional<double> restitution;
 };
 
 struct Filter {

@@ -219,7 +219,7 @@ const Table &objects() {
         {"max_sweeps", true},
         {"friction", true},
         {"filter", true}}},
-      {"friction", {{"between", true}, {"law", true}, {"params", true}}},
+      {"friction", {{"between", true}, {"law", true}, {"params", true}, {"restitution", true}}},
       {"filter", {{"between", true}, {"collide", true}}},
       {"probe", {{"name", true}, {"body", true}, {"point", true}}},
       {"output",

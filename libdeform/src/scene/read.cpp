@@ -475,6 +475,11 @@ void read_contact(const Node &scene, Definition &def, const ReadContext &context
     const dfm_type *type = read_type(entry.at("law"), DFM_KIND_FRICTION, context.types);
     f.law = type->id;
     if (entry.has("params")) f.params = read_params(entry.member("params"), type);
+    if (entry.has("restitution")) {
+      const Node e = entry.member("restitution");
+      f.restitution = e.number(kNotNegative);
+      if (*f.restitution > 1) e.fail("expected a number from 0 to 1, found %g", *f.restitution);
+    }
     def.friction.push_back(std::move(f));
   }
   for (const Node &entry : contact.items("filter")) {

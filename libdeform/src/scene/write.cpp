@@ -245,6 +245,7 @@ Written write_friction(SceneWriter &to) {
     entry["law"] = type.id;
     const Written params = params_of(type, law.asked_type ? law.asked : law.params);
     if (!params.empty()) entry["params"] = params;
+    if (law.restitution != kNoRestitution) entry["restitution"] = law.restitution;
     out.push_back(std::move(entry));
   }
   return out;

@@ -6,6 +6,7 @@
 namespace dfm {
 
 struct StepImpulses {
+  static constexpr int kParts = 8;
   struct Pair {
     uint64_t a, b;                   // ids; between two bodies a is the lower one
     Vec3 impulse;                    // N s, on a
@@ -13,11 +14,13 @@ struct StepImpulses {
     double normal;                   // N s, sum of normal impulses
     double touching;                 // s with a nonzero impulse
     double peak_normal, peak_force;  // N, means over the sub-step where they were largest
+    double part[kParts];             // N s, `normal` by equal parts of the step
     Vec3 now;                        // N s, of the present sub-step
     double now_normal;
   };
-  Array<Pair> pairs;  // sorted by (a, b)
-  double idle = 0;    // s of this step in which all bodies slept: forces are those of the report
+  Array<Pair> pairs;             // sorted by (a, b)
+  double start = 0, length = 0;  // s, of the step
+  double idle = 0;               // s of this step in which all bodies slept: forces are those of the report
 };
 
 }  // namespace dfm

@@ -21,7 +21,8 @@ struct IntegratorAllowance {
 struct IntegratorTimes {
   double all = 0, implicit = 0;  // s
   uint64_t changes = 0;
-  bool told = false;  // a warning has said that bodies are implicit
+  bool told = false;       // a warning has said that bodies are implicit
+  bool told_blow = false;  // and one that a body did not rebound
 };
 inline bool sound(const IntegratorAllowance &p) {
   return p.open <= 1 && p.tries <= kMostTries && std::isfinite(p.credit) && p.lost >= 0 &&

@@ -22,7 +22,8 @@ StepContext::StepContext(const Meters &meters)
              stirred);
   use_memory(meters.contacts.memory(), lent, contacts, tolerance.normal, tolerance.tangent, disturbance,
              best_impulse, best_pass, trial_response, tangents, asked_back, owed, match, sharing, aim, stands,
-             ways, renewed, bonds, bond_impulse, chosen, mean, pairs_made, before, goes_on, given.list);
+             ways, renewed, thrown, motions, marked, bonds, bond_impulse, chosen, mean, pairs_made, before,
+             goes_on, given.list);
   state.use(meters.contacts.memory());
   use_memory(meters.detection.memory(), guard.joined, guard.near, guard.hits, guard.speed, guard.change,
              guard.common, guard.kept, guard.blocks.pieces);

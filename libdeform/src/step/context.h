@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "body/rigid_motion.h"
 #include "broad/broad_phase.h"
 #include "contact/areas.h"
 #include "contact/contact_state.h"
@@ -75,6 +76,10 @@ struct StepContext {
   Array<double> disturbance, best_impulse, best_pass, trial_response;
   Array<uint8_t> revised;  // [blocks of rows] the response of the body has changed with its impulses
   Array<double> tangents;
+  // [contacts] m/s, at which sides leave each other at least; empty where no pair has a restitution
+  Array<double> thrown;
+  Array<RigidMotion> motions;  // [bodies] at the start of the sub-step, of those with such contacts
+  Array<uint8_t> marked;       // [bodies] scratch of it
   // both empty where no law holds places (stuck_slip.h)
   Array<double> asked_back;  // [contacts,2] m/s, slip that the solve takes back; of islands that owe
   Array<double> owed;        // [contacts,3] m, slip since the contact sticks

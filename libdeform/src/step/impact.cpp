@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 
 #include "math/vec3.h"
 #include "plugin/context.h"
+#include "state/obstacle.h"
 #include "state/world.h"
 #include "step/context.h"
+#include "step/restitution.h"
 #include "step/turn_integrators.h"
 
 namespace dfm {
@@ -41,34 +44,76 @@ bool touched(const Body &b) {
   return std::ranges::any_of(b.surfel_impulse, [](double p) { return p != 0; });
 }
 
-bool struck(const World &w, const StepContext &step, const Body &b) {
+// speed: m/s, out, at which it comes: of its mean velocity, or the change of that, if it is hit.
+bool struck(const World &w, const StepContext &step, const Body &b, double &speed) {
   const double *const end = b.dynamics->end().v;
-  Vec3 gained;
+  Vec3 gained, came;
   double mass = 0, lost = 0;
   for (uint32_t i = 0; i < b.p.n; ++i) {
     const Vec3 from = load3(&b.p.v[size_t{kStride} * i]), to = load3(&end[size_t{kStride} * i]);
+    came += b.p.mass[i] * from;
     gained += b.p.mass[i] * (to - from);
     lost += 0.5 * b.p.mass[i] * (norm2(from) - norm2(to));
     mass += b.p.mass[i];
   }
   const double change = norm((1 / mass) * gained);
+  speed = std::max(change, norm((1 / mass) * came));
   return change > kWeights * step.h * norm(w.gravity.now) && step.h * change > kWay * b.surface.median_edge &&
          lost > kLost * 0.5 * mass * (change * change);
 }
 
+bool damps(const Body &b) {
+  return !b.model.stepper && !b.slumber.asleep && b.integrator.used != DFM_INTEGRATOR_SYMPLECTIC_EULER;
+}
+
+// Once per world: the body keeps nothing of the speed at which it came.
+void tell_blow(World &w, const StepContext &step, const Body &b, double speed) {
+  const ContactPoint *at = nullptr;  // where it presses most
+  double most = 0;
+  for (uint32_t i = 0; i < step.rows.n; ++i) {
+    const ContactPoint &c = step.contacts[i];
+    const double normal = step.rows.impulse[size_t(3) * i];
+    if ((c.slot_a != b.slot && (c.obstacle || c.slot_b != b.slot)) || !(normal > most)) continue;
+    most = normal;
+    at = &c;
+  }
+  if (!at) return;
+  w.integrator_times.told_blow = true;
+  const std::string &other = at->obstacle           ? w.obstacles[at->slot_b]->name
+                             : at->slot_a != b.slot ? w.bodies[at->slot_a]->name
+                                                    : w.bodies[at->slot_b]->name;
+  w.context->logf(
+      DFM_LOG_WARNING,
+      "body '%s' falls on '%s' at %.3g m/s (t = %.4g s) and will not rebound: %s; give the pair a "
+      "restitution, move the body by symplectic_euler, or take steps much shorter than the impact",
+      b.name.c_str(), other.c_str(), speed, w.time, why_no_rebound(b.integrator.used));
+}
+
 }  // namespace
+
+const char *why_no_rebound(uint32_t integrator) {
+  return integrator == DFM_INTEGRATOR_TR_BDF2
+             ? "tr_bdf2, which is backward Euler in contact, damps an impact that its step does not resolve"
+             : "implicit_euler damps an impact that its step does not resolve";
+}
 
 bool chosen_by_library(const World &w, double dt) {
   return !(std::fabs(dt - w.def.step) <= kSame * w.def.step) && dt <= accurate_step(w.sizes);
 }
 
-void check_for_impact(const World &w, const StepContext &step) {
+void check_for_impact(World &w, const StepContext &step) {
+  if (step.rows.n == 0 || w.prescribed.stands()) return;
   const Budget &budget = step.budget;
-  if (!step.counting.on || budget.struck || !(budget.offered > 0) || step.rows.n == 0) return;
+  const bool may_repeat = step.counting.on && !budget.struck && budget.offered > 0;
   for (const uint32_t i : step.active) {
     const Body &b = *w.bodies[i];
-    if (!is_implicit(b) || !touched(b) || !struck(w, step, b)) continue;
-    if (budget.offered / b.integrator.step <= w.def.max_substeps) end_struck_step();
+    const bool repeats =
+        may_repeat && is_implicit(b) && budget.offered / b.integrator.step <= w.def.max_substeps;
+    if (!repeats && (!damps(b) || w.integrator_times.told_blow)) continue;
+    double speed = 0;
+    if (!touched(b) || !struck(w, step, b, speed) || has_restitution(w, step, b)) continue;
+    if (repeats) end_struck_step();
+    tell_blow(w, step, b, speed);
   }
 }
 

@@ -82,22 +82,25 @@ uint32_t law_of_zones(World &w, uint32_t a, uint32_t zone_a, uint32_t b, uint32_
 }  // namespace
 
 uint32_t add_law(World &w, const char *name, std::span<const dfm_param_value> values,
-                 std::span<const uint8_t> free) {
+                 std::span<const uint8_t> free, double restitution) {
   const dfm_type &type = w.context->registry.find(DFM_KIND_FRICTION, name);
   std::vector<double> packed = pack_params(type, values);
   for (uint32_t i = 0; i < w.laws.size(); ++i)
-    if (w.laws[i]->asked_type == &type && w.laws[i]->asked == packed) return i;
-  auto law = make_law(w, type, std::move(packed));
+    if (w.laws[i]->asked_type == &type && w.laws[i]->asked == packed && w.laws[i]->restitution == restitution)
+      return i;
+  auto law = make_law(w, type, std::move(packed), restitution);
   for (const LeftOut &o : left_out_of(*law)) warn_of(*w.context, o);
   return place_law(w, std::move(law), free);
 }
 
-std::unique_ptr<LawInstance> make_law(const World &w, const dfm_type &type, std::vector<double> asked) {
+std::unique_ptr<LawInstance> make_law(const World &w, const dfm_type &type, std::vector<double> asked,
+                                      double restitution) {
   SelectedLaw made = select_law(w.context->registry, w.context->host, w.selection, type, asked);
   auto law = std::make_unique<LawInstance>(*made.type, w.context->host, std::move(made.values));
   if (law->nstate) need_ability(w, Ability::law_memory, "friction law", made.type->id);
   law->asked_type = &type;
   law->asked = std::move(asked);
+  law->restitution = restitution;
   return law;
 }
 

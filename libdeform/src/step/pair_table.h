@@ -19,9 +19,10 @@ struct World;
 // Index of the law with these values: an existing one, else a new one, at an index that `free` marks or at
 // the end.
 uint32_t add_law(World &w, const char *name, std::span<const dfm_param_value> values,
-                 std::span<const uint8_t> free = {});
+                 std::span<const uint8_t> free = {}, double restitution = kNoRestitution);
 // The same for the requested law without the effects that the list leaves out.
-std::unique_ptr<LawInstance> make_law(const World &w, const dfm_type &type, std::vector<double> asked);
+std::unique_ptr<LawInstance> make_law(const World &w, const dfm_type &type, std::vector<double> asked,
+                                      double restitution);
 uint32_t place_law(World &w, std::unique_ptr<LawInstance> law, std::span<const uint8_t> free);
 
 // What the tables hold for a pair: its law, and of zones that differ the place of their laws in zone_law.

@@ -21,6 +21,7 @@
 #include "step/cut_drag.h"
 #include "step/pair_table.h"
 #include "step/pre_solve.h"
+#include "step/restitution.h"
 #include "step/rigid.h"
 #include "step/solve_islands.h"
 #include "step/stages.h"
@@ -117,6 +118,8 @@ void make_rows(World &w, StepContext &step) {
   step.rows.finish(step.contacts, step.tangents.data(), step.h, step.guard.planned, w.offset, step.bonds,
                    &w.context->tasks);
   run_belts(step);
+  find_throws(w, step);
+  bounce(step);
   reset_owed(w, step);
   std::copy(step.bond_impulse.begin(), step.bond_impulse.end(),
             step.rows.impulse.begin() + std::ptrdiff_t{3} * step.rows.n);
@@ -133,6 +136,7 @@ void finish_rows(World &w, StepContext &step) {
   step.rows.finish(step.contacts, step.tangents.data(), step.h, step.guard.planned, w.offset, step.bonds,
                    &w.context->tasks);
   run_belts(step);
+  bounce(step);
   if (!step.guard.kept.empty()) guard_rates(step);
 }
 
@@ -327,6 +331,16 @@ bool retry_shorter(World &w, StepContext &step, uint32_t *trouble) {
   return false;
 }
 
+// False: the sub-step is to be repeated, up to where a body lands that a restitution throws back.
+bool cut_at_landing(World &w, StepContext &step) {
+  if (step.rigid_again || step.guard.resolving) return true;
+  const double share = lands_at(w, step);
+  if (share == 1 || !may_repeat(w, step)) return true;
+  step.guard.again = true;
+  step.guard.cut = share;
+  return false;
+}
+
 }  // namespace
 
 bool stage_solve(World &w, StepContext &step, uint32_t *trouble) {
@@ -336,6 +350,7 @@ bool stage_solve(World &w, StepContext &step, uint32_t *trouble) {
   step.passes = step.sweeps = 0;
   step.residual = {};
   make_rows(w, step);
+  if (!cut_at_landing(w, step)) return false;
   step.rows.apply_last();
   if (step.rows.all() == 0) {
     w.stats.passes = w.stats.sweeps = 0;

@@ -198,7 +198,7 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
   if (n > 1) *trouble |= DFM_TROUBLE_SUBSTEPS;
   if (w.bound.inverted) *trouble |= DFM_TROUBLE_INVERTED;
 
-  begin_impulses(w.step_impulses);
+  begin_impulses(w.step_impulses, w.time, dt);
   begin_tools(w, dt);
   uint32_t done = 0;
   for (Division rest(w.time, dt, n); !rest.over(); ++done) {

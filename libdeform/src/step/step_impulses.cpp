@@ -32,19 +32,32 @@ void begin(Array<StepImpulses::Pair> &pairs) {
   }
 }
 
-void end(double time, Array<StepImpulses::Pair> &pairs) {
+// Spreads the impulse over the parts of the step from `at` to at + time.
+void share(const StepImpulses &s, double at, double time, StepImpulses::Pair &p) {
+  const double each = s.length / StepImpulses::kParts;
+  double from = 0;  // share of the time before the part
+  for (int k = 0; k < StepImpulses::kParts; ++k) {
+    const bool last = k + 1 == StepImpulses::kParts;
+    const double to = last ? 1 : std::clamp((s.start + (k + 1) * each - at) / time, from, 1.0);
+    p.part[k] += (to - from) * p.now_normal;
+    from = to;
+  }
+}
+
+void end(const StepImpulses &s, double at, double time, Array<StepImpulses::Pair> &pairs) {
   for (StepImpulses::Pair &p : pairs) {
     if (!(p.now_normal > 0)) continue;
     p.impulse += p.now;
     p.normal += p.now_normal;
     p.touching += time;
+    share(s, at, time, p);
     p.peak_normal = std::max(p.peak_normal, p.now_normal / time);
     p.peak_force = std::max(p.peak_force, norm(p.now) / time);
   }
 }
 
-// The report's forces for `time`, s, added to pairs; a peak is the mean over this time.
-void add(const World &w, double time, Array<StepImpulses::Pair> &pairs) {
+// The report's forces for `time`, s, from `at` on, added to pairs; a peak is the mean over this time.
+void add(const World &w, double at, double time, Array<StepImpulses::Pair> &pairs) {
   const double scale = w.report.h > 0 ? time / w.report.h : 0;
   begin(pairs);
   StepImpulses::Pair *pair = nullptr;  // contacts of a pair are adjacent
@@ -62,13 +75,15 @@ void add(const World &w, double time, Array<StepImpulses::Pair> &pairs) {
     pair->now_normal += normal;
     pair->place += normal * load3(c.point);
   }
-  end(time, pairs);
+  end(w.step_impulses, at, time, pairs);
 }
 
 }  // namespace
 
-void begin_impulses(StepImpulses &s) {
+void begin_impulses(StepImpulses &s, double start, double length) {
   s.pairs.clear();
+  s.start = start;
+  s.length = length;
   s.idle = 0;
 }
 
@@ -78,7 +93,7 @@ void reserve_impulses(World &w, size_t contacts, size_t pairs) {
   list.reserve(list.size() + std::min(contacts, most) + pairs);
 }
 
-void add_impulses(World &w) { add(w, w.report.h, w.step_impulses.pairs); }
+void add_impulses(World &w) { add(w, w.time, w.report.h, w.step_impulses.pairs); }
 
 void add_rigid_impulses(World &w) {
   Array<StepImpulses::Pair> &pairs = w.step_impulses.pairs;
@@ -89,12 +104,13 @@ void add_rigid_impulses(World &w) {
     pair.now_normal += c.impulse[0];
     pair.place += c.impulse[0] * c.point;
   }
-  end(w.rigid_report.h, pairs);
+  end(w.step_impulses, w.time, w.rigid_report.h, pairs);
 }
 
 void list_impulses(const World &w, Array<StepImpulses::Pair> &out) {
   out = w.step_impulses.pairs;
-  if (w.step_impulses.idle > 0) add(w, w.step_impulses.idle, out);
+  const StepImpulses &s = w.step_impulses;
+  if (s.idle > 0) add(w, s.start + s.length - s.idle, s.idle, out);
 }
 
 }  // namespace dfm

@@ -8,7 +8,7 @@ namespace dfm {
 
 struct World;
 
-void begin_impulses(StepImpulses &s);
+void begin_impulses(StepImpulses &s, double start, double length);  // s
 // So that these cannot fail: contacts of bodies, pairs of rigid things
 void reserve_impulses(World &w, size_t contacts, size_t pairs);
 void add_impulses(World &w);        // of the sub-step that the report holds

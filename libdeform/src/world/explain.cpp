@@ -8,6 +8,7 @@
 #include "state/material.h"
 #include "state/obstacle.h"
 #include "state/tool.h"
+#include "step/impact.h"
 #include "step/context.h"
 #include "step/energy_watch.h"
 #include "step/method.h"
@@ -53,6 +54,11 @@ std::string integrator(const Body &b) {
   std::string out = std::string("\"integrator\":{\"used\":") + quote(word_of(b)) + ",\"why\":" + quote(why);
   if (step > 0 && std::isfinite(i.step))
     out += format(",\"explicit_s\":%.9g,\"substeps\":%.0f,\"worst_point\":%u", i.step, n, i.point);
+  if (!b.model.stepper && i.used != DFM_INTEGRATOR_SYMPLECTIC_EULER)
+    out +=
+        ",\"rebound\":" + quote(std::string("will not rebound") +
+                                (i.counted == Counted::implicit ? ", unless steps are automatic: " : ": ") +
+                                why_no_rebound(i.used) + "; a restitution of the pair throws it back");
   return out + "}";
 }
 

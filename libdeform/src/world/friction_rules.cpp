@@ -69,10 +69,10 @@ bool bring_the_same(const LawInstance &a, const LawInstance &b) {
 }
 
 // The law of the rule, with other parameter values.
-void put_params(World &w, FrictionRule &rule, std::vector<double> values) {
+void put_params(World &w, FrictionRule &rule, std::vector<double> values, double restitution) {
   forget_pairs(w, 0);
   std::unique_ptr<LawInstance> &law = w.laws[rule.law];
-  auto fresh = make_law(w, *law->asked_type, std::move(values));
+  auto fresh = make_law(w, *law->asked_type, std::move(values), restitution);
   const bool remembers = same_memory(*law, *fresh);
   // the plan names the effects that the parameters call for
   if (!bring_the_same(*law, *fresh)) w.changed = true;
@@ -104,16 +104,16 @@ void move_to_end(World &w, FrictionRule *rule) {
 }  // namespace
 
 void add_friction_rule(World &w, std::string a, std::string b, const char *law,
-                       std::span<const dfm_param_value> given) {
+                       std::span<const dfm_param_value> given, double restitution) {
   FrictionRule rule{{std::move(a), std::move(b)}, 0};
   w.friction.reserve(w.friction.size() + 1);
   FrictionRule *const before = find_rule(w, rule.between);
   const dfm_type &type = w.context->registry.find(DFM_KIND_FRICTION, law);
   if (before && w.laws[before->law]->asked_type == &type) {
-    put_params(w, *before, pack_params(type, given));
+    put_params(w, *before, pack_params(type, given), restitution);
     move_to_end(w, before);
   } else {
-    rule.law = add_law(w, law, given, free_laws(w, before));
+    rule.law = add_law(w, law, given, free_laws(w, before), restitution);
     add_rule(w.friction, std::move(rule));
     w.changed = true;
   }
@@ -126,7 +126,7 @@ void set_friction_rule(World &w, const char *a, const char *b, std::span<const d
   const LawInstance &law = *w.laws[rule.law];
   std::vector<double> values = changed_params(*law.asked_type, given, law.asked);
   if (values == law.asked) return;
-  put_params(w, rule, std::move(values));
+  put_params(w, rule, std::move(values), law.restitution);
   wake_all(w);
   values_changed(w);
 }

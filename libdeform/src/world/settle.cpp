@@ -441,7 +441,7 @@ class Settling {
     w_.stats.time = w_.time;
     w_.step_count = steps_;
     w_.sizes = sizes_;
-    begin_impulses(w_.step_impulses);
+    begin_impulses(w_.step_impulses, w_.time, 0);
     for (dfm_contact_event &event : w_.events) event.t = w_.time;
     w_.events.insert(w_.events.begin(), earlier_.begin(), earlier_.end());
     done_ = true;

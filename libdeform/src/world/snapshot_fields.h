@@ -331,6 +331,8 @@ void fields(Stream &s, W &w, const World &like) {
     s.array("law", id_of(l), kAnyCount, must::any);
     s.must_hold("law", "the name of a law", [&] { return !id_of(l).empty(); });
     s.array("law parameters", l.params, kAnyCount, must::finite);
+    s.value("law's restitution", l.restitution,
+            must::Be{[](double x) { return x == kNoRestitution || (x >= 0 && x <= 1); }, "from 0 to 1"});
   });
   s.value("time", w.time, must::not_negative);
   s.value("steps", w.step_count, must::any);

@@ -59,6 +59,7 @@ std::vector<std::unique_ptr<LawInstance>> make_laws(const SnapshotReader &s, con
     if (!snapshot::in_range(type, l.params))
       s.refuse("law parameters", "values in the range of the law's table");
     laws.push_back(std::make_unique<LawInstance>(type, w.context->host, l.params));
+    laws.back()->restitution = l.restitution;
     for (const auto &own : w.laws)
       if (own->type == &type && own->params == l.params) {
         laws.back()->asked_type = own->asked_type;

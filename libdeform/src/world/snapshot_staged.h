@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "friction/laws.h"
 #include "state/tool.h"
 #include "state/world.h"
 #include "world/body_model.h"
@@ -61,6 +62,7 @@ struct StagedTool { Tool::Cuts cuts; };
 struct StagedLaw {
   std::string id;
   std::vector<double> params;
+  double restitution = kNoRestitution;
 };
 struct Staged {
   double time = 0, offset = 0;

@@ -49,12 +49,19 @@ TEST(Integrators, BesideAnExplicitBodyOfManySubSteps_NoBodyIsImplicit) {
   EXPECT_EQ(chosen({named, body(500)}), (Bools{true, true}));
 }
 
-// Every explicit sub-step of a neighbor is one of the implicit bodies too.
-TEST(Integrators, SoftNeighbor_StaysExplicitWhereItNeedsFewSubSteps) {
+// Implicit time damps: a body that would not take it alone does not because of others.
+TEST(Integrators, SoftNeighbor_StaysExplicit) {
   EXPECT_EQ(chosen({body(1), body(1000)}), (Bools{false, true}));
-  EXPECT_EQ(chosen({body(5), body(1000)}), (Bools{false, true})) << "5 (1 + 50) < 4 (50 + 50)";
-  EXPECT_EQ(chosen({body(150), body(1000)}), (Bools{true, true}));
+  EXPECT_EQ(chosen({body(150), body(1e5)}), (Bools{false, true}));
   EXPECT_EQ(chosen({body(40, dfm::kImplicitWork, 1e6), body(150)}), (Bools{false, false})) << "150 / 40 < 4";
+  EXPECT_EQ(chosen({body(100), body(100), body(100), body(5000), body(100), body(100), body(100), body(100)}),
+            (Bools{false, false, false, true, false, false, false, false}))
+      << "one sliver among eight mats";
+}
+
+// Every explicit sub-step of a neighbor is one of the implicit bodies too.
+TEST(Integrators, ImplicitStepsInSubStepsOfANeighbor_AreTakenWhereTheyCostLess) {
+  EXPECT_EQ(chosen({body(150), body(1000)}), (Bools{false, false})) << "150 (1 + 50) > 1000 (1 + 1) / 4";
 }
 
 }  // namespace

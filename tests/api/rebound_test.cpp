@@ -1,0 +1,83 @@
+// A fall by each integrator, as `deform run` and `deform explain` tell of it: the peak force, and bodies that
+// will not rebound.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include "support.h"
+
+namespace {
+
+// A ball of 1e9 Pa, 60 cells, falls 5 mm at 2 m/s; rule: what the pair has beside its law.
+struct Fall {
+  std::string path = test::scratch("rebound_" + std::to_string(getpid())) + "/";
+  explicit Fall(const std::string &rule, const std::string &time = R"("step": 0.002)") {
+    test::write_file(path + "scene.json", R"({
+      "format": "deform-scene", "version": 1, "time": {"duration": 0.03, )" +
+                                              time + R"(},
+      "materials": {"stiff": {"density": 1000, "young": 1e9, "poisson": 0.3}},
+      "bodies": [{"name": "ball", "mesh": {"make": "ball", "radius": 0.05, "cells": 60}, "material": "stiff",
+                  "pose": {"position": [0, 0, 0.055]}, "velocity": [0, 0, -2]}],
+      "obstacles": [{"name": "floor", "shape": "plane"}],
+      "contact": {"friction": [{"between": ["*", "*"], "law": "none")" +
+                                              rule + R"(}]},
+      "output": {"every": 0.01}})");
+  }
+  struct Run {
+    std::string err, summary;
+    double number(const std::string &key) const {
+      const size_t at = summary.find("\"" + key + "\": ");
+      return at == std::string::npos ? NAN : std::atof(summary.c_str() + at + key.size() + 4);
+    }
+  };
+  Run run(const std::string &integrator) const {
+    const auto r = test::deform({"run", path + "scene.json", "--set",
+                                 "/time/integrator=\"" + integrator + "\"", "--out", path + integrator});
+    EXPECT_EQ(r.exit_code, 0) << r.err;
+    return {r.err, test::read_file(path + integrator + "/summary.json")};
+  }
+  std::string explain(const std::string &integrator) const {
+    return test::deform({"explain", path + "scene.json", "--set", "/time/integrator=\"" + integrator + "\""})
+        .out;
+  }
+};
+
+const std::vector<std::string> kAll = {"symplectic_euler", "implicit_euler", "tr_bdf2", "auto"};
+constexpr const char *kWords = "will not rebound";
+
+}  // namespace
+
+// The largest force of a sub-step differs by a factor of hundreds between them.
+TEST(Rebound, PeakForce_IsThatOfTheFallByEveryIntegrator) {
+  const Fall fall(R"(, "restitution": 0.95)");
+  std::vector<double> peaks;
+  for (const std::string &integrator : kAll) {
+    const Fall::Run r = fall.run(integrator);
+    EXPECT_EQ(r.number("peak_window_s"), 0.005);
+    peaks.push_back(r.number("peak_N"));
+  }
+  for (size_t i = 0; i < kAll.size(); ++i) EXPECT_NEAR(peaks[i], peaks[0], 0.2 * peaks[0]) << kAll[i];
+}
+
+TEST(Rebound, WindowOfThePeak_IsTheLongestStepThatTheSceneAllows) {
+  EXPECT_EQ(Fall("", R"("step": 0.015)").run("implicit_euler").number("peak_window_s"), 0.015);
+  EXPECT_EQ(Fall("", R"("step": "auto")").run("symplectic_euler").number("peak_window_s"), 0.01);
+}
+
+TEST(Rebound, IntegratorThatWillNotRebound_SaysSo) {
+  const Fall fall("", R"("step": 0.016)");
+  for (const std::string &integrator : kAll) {
+    const bool dead = integrator != "symplectic_euler";  // `auto` chooses tr_bdf2
+    const Fall::Run r = fall.run(integrator);
+    EXPECT_EQ(r.summary.find("body 'ball' falls on 'floor'") != std::string::npos, dead)
+        << integrator << r.err;
+    EXPECT_EQ(r.summary.find(kWords) != std::string::npos, dead) << integrator;
+    EXPECT_EQ(fall.explain(integrator).find(kWords) != std::string::npos, dead) << integrator;
+  }
+  const Fall given(R"(, "restitution": 0.5)", R"("step": 0.016)");
+  EXPECT_EQ(given.run("implicit_euler").summary.find(kWords), std::string::npos) << "the pair throws it back";
+}
