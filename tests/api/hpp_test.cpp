@@ -111,6 +111,8 @@ TEST(Hpp, Errors_CarryStatusAndSentenceInBothWays) {
   const auto body = values::World(s.world.get()).find_body("nobody");
   EXPECT_FALSE(body);
   EXPECT_FALSE(*body) << "a failed call gives a handle that refers to nothing";
+  const auto thrown = values::World(s.world.get()).add_friction("ball", "floor", "coulomb", {}, 2);
+  EXPECT_EQ(thrown.status(), DFM_E_ARG) << "a restitution is at most 1";
 }
 
 TEST(Hpp, Files_AreReadAndWrittenWhole) {
