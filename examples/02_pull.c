@@ -42,7 +42,7 @@ int main(void) {
   const double mu = 0.5, plate_size[3] = {0.3, 0.2, 0.05}, block_size[3] = {0.1, 0.1, 0.05};
   const dfm_param_value value = {"mu", &mu, 1};
   const dfm_friction_def friction = {
-      sizeof friction, 0, {"block", "plate"}, "coulomb", {sizeof(dfm_params), 1, &value}};
+      sizeof friction, 0, {"block", "plate"}, "coulomb", {sizeof(dfm_params), 1, &value}, 0};
   const dfm_scale_key rise[2] = {{0.5, 0}, {8.5, 1}}; /* the pull grows from nothing to the weight */
   dfm_body_measure m = {.size = sizeof m};
   dfm_context *context;

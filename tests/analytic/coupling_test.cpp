@@ -278,7 +278,7 @@ TEST(Coupled, SurfaceFile_HoldsTheTrueDisplacement) {
   for (uint32_t i = 0; i < skin.npoint(); ++i) {
     double u[3];
     std::memcpy(u, first + 24 * size_t{i}, sizeof u);
-    for (int k = 0; k < 3; ++k) EXPECT_NEAR(u[k], o.position[size_t(k)], 1e-15);
+    for (int k = 0; k < 3; ++k) EXPECT_NEAR(u[k], 0, 1e-15) << "it rests at its pose";
   }
 }
 

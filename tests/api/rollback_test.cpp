@@ -97,7 +97,7 @@ TEST(RollbackWorld, WhatItCannotDo_IsRefusedWhereItIsMade) {
   const double mu = 0.5;
   const dfm_param_value value{"mu", &mu, 1};
   const dfm_friction_def memory = {
-      sizeof memory, 0, {"*", "*"}, "test.bristle", {sizeof(dfm_params), 1, &value}};
+      sizeof memory, 0, {"*", "*"}, "test.bristle", {sizeof(dfm_params), 1, &value}, 0};
   refused(dfm_world_add_friction(w.world, &memory), "friction law 'test.bristle': a memory");
 
   dfm_world_def sleepy = dfm_world_def_default();

@@ -6,6 +6,7 @@
 
 #include "body/rigid_motion.h"
 #include "dynamics/rigid/rigid_set.h"
+#include "friction/laws.h"
 #include "state/obstacle.h"
 #include "state/world.h"
 #include "step/context.h"
