@@ -15,7 +15,7 @@ constexpr double kFall = 1;
 constexpr double kShort = 0.01;
 
 // m, diagonal of the box around the points; 0 where some are held, so that it does not fall.
-double size_of_free(const Body &b) {
+double size_of_free(const dfm::Body &b) {
   Vec3 lo = load3(b.p.x.data()), hi = lo;
   for (uint32_t i = 0; i < b.p.n; ++i) {
     if (b.p.held[i]) return 0;
