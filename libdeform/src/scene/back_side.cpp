@@ -10,7 +10,7 @@
 namespace dfm::scene {
 namespace {
 
-Vec3 center(const Body &b) {
+Vec3 center(const dfm::Body &b) {
   Vec3 sum{0, 0, 0};
   for (uint32_t i = 0; i < b.p.n; ++i) sum = sum + load3(&b.p.x[size_t{kStride} * i]);
   return (1.0 / b.p.n) * sum;
@@ -18,7 +18,7 @@ Vec3 center(const Body &b) {
 
 // Whether the first triangle that a ray from `from` along `d` meets (both in the obstacle's frame) faces away
 // from its origin.
-bool meets_a_back(const Obstacle &o, Vec3 from, Vec3 d) {
+bool meets_a_back(const dfm::Obstacle &o, Vec3 from, Vec3 d) {
   constexpr double kEdge = 1e-9;  // a ray through a shared edge meets one of its triangles
   double nearest = INFINITY;
   bool back = false;
