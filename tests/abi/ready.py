@@ -50,7 +50,8 @@ def needs(command, source, build):
     file = file[len(source) + 1:]
     if not file.endswith("/shared_object.cpp"):
         flags = [flag for flag in flags if not flag.startswith(LAST_FOLDER)]
-    text = " ".join(sorted(set(flags))).replace(build, "BUILD").replace(source, "SOURCE")
+    # put in order last: where the trees lie must not decide about it
+    text = " ".join(sorted({flag.replace(build, "BUILD").replace(source, "SOURCE") for flag in flags}))
     return file, text, target, depends
 
 

@@ -88,7 +88,7 @@ TEST(SceneErrors, AMeshInPlaceOfTheScene_IsNamedWithTheSceneToWrite) {
   expect_refused(
       run({folder() + "/block.msh"}),
       {"block.msh: this is a mesh (MSH), and a scene is expected",
-       "{\"name\": \"body\", \"mesh\": \"block.msh\"}", "deform mesh info " + folder() + "/block.msh"},
+       "{\"name\": \"body\", \"mesh\": \"block.msh\"}", "deform mesh info ", folder() + "/block.msh"},
       "MSH");
   for (const char *ending : {"stl", "obj", "ply", "off", "vtk", "vtu", "mesh", "step"}) {
     const std::string file = folder() + "/a ball." + ending;

@@ -290,7 +290,7 @@ TEST(MeshRead, VtkStructure_IsChecked) {
   expect_refusal("v.vtk", kVtk + kFour + "CELLS 1 4\n3 0 1 2\nCELL_TYPES 1\n10\n", DFM_E_FORMAT,
                  {"tetrahedron", "3 points"});
   expect_refusal("v.vtk", kVtk + kFour + "CELLS 1 4\n3 0 1 2\nCELL_TYPES 1\n5\n", DFM_E_FORMAT,
-                 {"no tetrahedra", "TetMesh.fill", "deform mesh fill /", "/v.vtk --out /", "/v.vtu"});
+                 {"no tetrahedra", "TetMesh.fill", "deform mesh fill ", "/v.vtk", " --out ", "/v.vtu"});
   expect_refusal("a v.vtk", kVtk + kFour + "CELLS 1 4\n3 0 1 2\nCELL_TYPES 1\n5\n", DFM_E_FORMAT,
                  {"deform mesh fill '/", "/a v.vtk' --out '/", "/a v.vtu'"});
   expect_refusal("v.vtk", kVtk + kFour + "CELLS 2 8\nOFFSETS int\n0 5\nCONNECTIVITY int\n0 1 2 3\n",
