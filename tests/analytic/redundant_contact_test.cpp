@@ -128,7 +128,7 @@ std::vector<dfm_body> five_blocks(Context &context, dfm_world w, BodyOptions o) 
 }  // namespace
 
 // Undamped, of 1 MPa. Before crossings of edges in their flush faces gave way under load, 9 of 10 sub-steps
-// ended at the cap on sweeps (doc/decisions/0416).
+// ended at the cap on sweeps (doc/decisions/contact_problem.md).
 TEST(RedundantStack, FiveExplicitBlocks_FewStepsEndAtTheCap) {
   Context context;
   const dfm_world w = make_world(context, {0, 0, -kG});

@@ -400,8 +400,8 @@ TEST(ToolCut, SidesOfASlitUnderDrag_AreSolved_ImplicitSteps) {
   EXPECT_LT(double(stats.unconverged), 0.3 * double(stats.substeps)) << "else 0.43";
 }
 
-// Nothing holds the cube, and its sides do not touch (decision 0040 says what that does to angular
-// momentum): a slow blade takes it along, a fast one goes through and leaves it some momentum.
+// Nothing holds the cube, and its sides do not touch (decisions on friction memory says what that does to
+// angular momentum): a slow blade takes it along, a fast one goes through and leaves it some momentum.
 TEST(ToolCut, FreeBody_IsDraggedByTheBlade_AndMomentumIsKept) {
   for (const char *model : kModels) {
     Tough slow(0, none, model), fast(0, none, model);

@@ -5,7 +5,7 @@ varied_steps_study.py [--runs N] [--first SEED] [--cost]
 
 Needs the Python package, or PYTHONPATH=bindings/python and DEFORM_LIBRARY=build/release/lib/libdeform.so.
 Prints each run that stops or gains more than 2 %, and at the end their number
-(doc/decisions/0497-steps-of-a-host.md). --cost: instead, sub-steps and processor time of a beam that falls
+(doc/decisions/energy_watch.md). --cost: instead, sub-steps and processor time of a beam that falls
 for 1 s under frames that differ by a share, over those under equal frames.
 """
 import argparse

@@ -142,7 +142,7 @@ BAD = {
                   "=![b](../images/b.png)\n\n`libdeform/doc/images/d.py`\n")],
     "reading_order": [("libdeform/doc/concepts/new.md", "=# New\n"),
                       ("libdeform/doc/decisions/0002-more.md", "=# 0002 More\n"),
-                      ("libdeform/doc/decisions/0001-handles.md", "=# 0001 Other handles\n")],
+                      ("libdeform/doc/decisions/0001-handles.md", "=" + "word " * 1201)],
     "layers": [("libdeform/src/core/error.h", '#include "math/vec3.h"\n'),
                ("libdeform/src/broad/tree.cpp", '#include "narrow/pair.h"\n'),
                ("libdeform/src/broad/tree.cpp", '#include "../core/error.h"\n'),

@@ -8,6 +8,7 @@ from tree import CODE, line_of
 
 PAGES = "libdeform/doc/"
 HISTORY = (PAGES + "decisions/",)  # may name pages that are gone
+SUBJECT_WORDS = 1200  # of a page of decisions
 
 
 def slugs(text):
@@ -54,7 +55,7 @@ def citations(tree):
 
 
 def reading_order(tree):
-    """Every page is in the list of pages, every decision in theirs, under its title."""
+    """Every page is in the list of pages; a page of decisions is a subject of theirs, and short."""
     order = PAGES + "README.md"
     if order not in tree.paths:
         return
@@ -64,12 +65,16 @@ def reading_order(tree):
         if path != order and not path.startswith(PAGES + "decisions/") and path not in listed:
             yield path, 1, f"is not in {order}; say there in a line what it answers"
     index = PAGES + "decisions/README.md"
-    entries = tree.text(index).splitlines() if index in tree.paths else None
+    entries = tree.text(index) if index in tree.paths else None
     for path in tree.select(PAGES + "decisions/", ext=(".md",)):
-        match = re.match(r"# (\d{4}) (.+)", tree.text(path))
-        entry = match and f"- [{match.group(1)}]({posixpath.basename(path)}) {match.group(2)}"
-        if entries is not None and entry and entry not in entries:
-            yield path, 1, f"is not in {index}; add under its subject: {entry}"
+        name = posixpath.basename(path)
+        if path == index or entries is None:
+            continue
+        if f"]({name})" not in entries:
+            yield path, 1, f"is no subject of {index}; change the page of the subject instead"
+        words = len(tree.text(path).split())
+        if words > SUBJECT_WORDS:
+            yield path, 1, f"has {words} words, a subject at most {SUBJECT_WORDS}; drop what no longer holds"
 
 
 def pictures(tree):

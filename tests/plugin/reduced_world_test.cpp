@@ -210,7 +210,7 @@ TEST_P(ReducedWorld, SqueezedFarBeyondSmallStrains_GainsNoEnergy) {
 }
 
 // A beam that lands on its end turns by a radian in a step of 0.1 s, which contact stops in the same step
-// (doc/decisions/0436): it was shorter by cos 1 for a moment, with up to 130 times its energy.
+// (doc/decisions/explicit_time.md): it was shorter by cos 1 for a moment, with up to 130 times its energy.
 TEST_P(ReducedWorld, TurnedInALongStep_GainsNoEnergy) {
   for (const double young : {1e5, 1e6})
     for (const double last : {0.033, 0.05, 0.1})

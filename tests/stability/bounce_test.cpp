@@ -1,4 +1,5 @@
-// What hits the ground bounces at the defaults, where bodies are implicit between impacts (decision 0456).
+// What hits the ground bounces at the defaults, where bodies are implicit between impacts (decisions on
+// implicit time).
 #include <algorithm>
 #include <cstdio>
 #include <string>

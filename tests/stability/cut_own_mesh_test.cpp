@@ -1,6 +1,6 @@
 // Coarse meshes of a mesh generator, cut at the defaults: the energy watch must not stop them. The teeth of
 // such a cut leave contacts whose normals oppose each other, with impulses that nearly cancel
-// (doc/decisions/0431).
+// (doc/decisions/energy_watch.md).
 #include <cmath>
 
 #include "support.h"

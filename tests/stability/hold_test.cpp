@@ -50,7 +50,7 @@ TEST_P(Hold, PulledOnASoftBed_DoesNotCreep) {
 
 // Of nearly redundant contacts some carry nothing, and which is chance. While the areas of their neighbors
 // went by that, each turn took force off the patch and shook the stack, which took the next turn: the top
-// cube walked by 2e-6 to 5e-6 m/s without an end (doc/decisions/0054).
+// cube walked by 2e-6 to 5e-6 m/s without an end (doc/decisions/friction_memory.md).
 TEST_P(Hold, StackOfThreeCubes_ComesToRest) { expect_at_rest({"stack", GetParam(), 3, 1e-3, false}); }
 
 TEST_P(Hold, BlockInAGroove_Rests) {

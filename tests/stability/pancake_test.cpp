@@ -62,7 +62,7 @@ TEST(Pancake, JellyThatFalls_KeepsItsCellsUprightAndComesBack) {
 }
 
 // The rates of strain are zero at the first check of the step bound. The next one must be early: the cube
-// falls in behind its contacts, and its cells stiffen (doc/decisions/0495).
+// falls in behind its contacts, and its cells stiffen (doc/decisions/explicit_time.md).
 TEST(Pancake, JellyPutDown_ExplicitStepsFollowItsStiffness) {
   for (const double collapse : {15.0, 30.0, 60.0}) {
     test::Opened scene = cube_above(0.0012, 0, "symplectic_euler", collapse);

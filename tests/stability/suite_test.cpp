@@ -41,7 +41,8 @@ TEST(SuiteFolder, EveryScene_IsTested) {
 // Redundant contacts of several bodies whose end is solved for: sweeps end at their cap and drift, bodies
 // follow them in turn. That went on until the work of a sub-step was used up, 31,000 sweeps in the mean. Now
 // 3 sub-steps of 18 end at the cap, and 4,616 sweeps are the most, as the cards land. (13 and 2,600 before
-// crossings in flat faces gave way, in twice the time: solves ended at 50 sweeps, doc/decisions/0416.)
+// crossings in flat faces gave way, in twice the time: solves ended at 50 sweeps,
+// doc/decisions/contact_problem.md.)
 TEST(SuiteCardHouse, ImplicitAtADisplaysStep_SolvesAFewDozenTimesPerSubStep) {
   Settings how;
   how.combination = {"corotational_fem", "implicit", 1.0 / 60};

@@ -1,5 +1,5 @@
 // Physics points of one body as a structure of arrays. Points lie 4 doubles apart (the fourth is zero), so
-// that one point is one 256-bit load; the measurement behind it is doc/decisions/0003-point-layout.md.
+// that one point is one 256-bit load; the measurement behind it is doc/decisions/models.md.
 #pragma once
 #include <cstdint>
 

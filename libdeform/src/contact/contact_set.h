@@ -36,7 +36,7 @@ struct ContactPoint {
   double normal[3];  // unit, from b to a
   double distance;   // m, true distance, >= 0; negative: depth below b's surface, for recovery
   double area;       // m2
-  // m, >= 0: how far below the rest distance a load may press this contact (doc/decisions/0416)
+  // m, >= 0: how far below the rest distance a load may press this contact (doc/decisions/contact_problem.md)
   double give;
   double velocity[3];  // m/s of the obstacle where a's closest point is, belt included; 0 for bodies
 };

@@ -36,7 +36,7 @@ static inline double given(double l, const double *yields) {
 // Smooth laws: lambda = h [ft + D (u' - v) + d (fn' - fn)] with u' = u + w_t (lambda - lambda_old): a 2x2
 // system that has a solution because D dissipates. D is not symmetric where the bristle and the slip are not
 // parallel; without that part passes over the laws are no Newton steps and may go round
-// (doc/decisions/0406-slopes-of-laws-are-not-symmetric.md). The law's limit is kept: an elastic bristle that
+// (doc/decisions/friction_memory.md). The law's limit is kept: an elastic bristle that
 // breaks away then slides on the cone at once instead of overshooting it. A contact that stuck when its law
 // was evaluated is kept inside the limit in proportion to the normal impulse; one that slid, inside what
 // the limit can be at all: limit(fn) is concave (a cone and a bounded part), so never above limit max(1, ln /

@@ -256,7 +256,7 @@ constexpr double kStays = 0.32;
 // Compliance of contacts that give way, in units of W_nn. A crossing that gives way then bears a hundredth of
 // what its own response would need, nearly nothing. With 3 it shared the load with the surfels beside it,
 // through a spring as soft as the contacts themselves, and sweeps took twice as many to agree on the shares
-// (doc/decisions/0422).
+// (doc/decisions/contact_problem.md).
 constexpr double kSoft = 100;
 // Surfaces that cross at the start are opened slowly: by this share of d_c per sub-step.
 constexpr double kOpens = 0.1;

@@ -13,7 +13,7 @@
 //   end_state     where it ends with the impulses of the solve; called again after a further solve
 //   commit        the end becomes the present
 //
-// Why contact sees no more of a body: doc/decisions/0085-body-dynamics.md.
+// Why contact sees no more of a body: doc/decisions/structure.md.
 #pragma once
 #include <functional>
 #include <limits>

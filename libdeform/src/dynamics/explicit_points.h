@@ -1,6 +1,6 @@
 // Points that the library moves by symplectic Euler, each with its own mass, under the forces of a model.
 // Where the model gives its forces part by part, the points of a part move as soon as it comes: forces and
-// free motion are one pass (doc/decisions/0442-forces-part-by-part.md).
+// free motion are one pass (doc/decisions/explicit_time.md).
 #pragma once
 #include "dynamics/dynamics.h"
 #include "dynamics/points_kernel.h"

@@ -5,7 +5,7 @@
 //
 // Backward Euler is this with x0, v0 at the start of the sub-step and h its length. TR-BDF2 (Bank et al.
 // 1985, Transient simulation of silicon devices and circuits, section III) is this twice with a part of h and
-// other x0, v0. Contact is solved for with backward Euler alone: doc/decisions/0140-tr-bdf2.md.
+// other x0, v0. Contact is solved for with backward Euler alone: doc/decisions/implicit_time.md.
 //
 // free_motion() solves r(v) = 0 by Newton's method with a line search, with the rest state's factor in place
 // of A (rest_factor.h) or with the last A. Contact uses A^-1, never M^-1: a prediction with A and contact

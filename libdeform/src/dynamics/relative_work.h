@@ -4,10 +4,10 @@
 namespace dfm {
 
 // Work of an implicit sub-step relative to an explicit one of the same body; the second value is for a
-// constant matrix. Source: doc/decisions/0170-integrators-by-cost.md.
+// constant matrix. Source: doc/decisions/implicit_time.md.
 inline constexpr unsigned kImplicitWork = 50, kConstantWork = 20;
 // Multiplications of a triangular solve in the time that an explicit sub-step takes for a point or a cell
-// (doc/decisions/0447-auto-counts-contact.md).
+// (doc/decisions/implicit_time.md).
 inline constexpr double kUnitWork = 25;
 
 // Other work in a sub-step, in units of a point or a cell of springs, from counts of instructions and from

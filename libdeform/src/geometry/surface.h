@@ -69,7 +69,7 @@ struct Surface {
   // Triangles that coincided with others when a cut opened the face between them, and their surfels; `slit`:
   // some coincide with others of this surface. x is set back there by half of the rest distance of contacts:
   // copies of a point in one place would touch along the normals of all faces around them, which no motion
-  // satisfies (doc/decisions/0398).
+  // satisfies (doc/decisions/cutting.md).
   Array<uint32_t> laid, laid_surfel;
   // [laid] bits 0-2: corner k lies at the tip of a slit: the face on the other side has the same surfel; bit
   // 3: it is of a slit

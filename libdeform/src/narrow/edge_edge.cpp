@@ -6,7 +6,7 @@
 //
 // Edges that bore each other in the last sub-step count on, convex or not, within their cones of normals: the
 // load itself presses them flat and a little hollow, and left out there they would lose it, spring back and
-// be hit again, for ever (doc/decisions/0035-edges-that-bear.md). Between hollow edges the lines are further
+// be hit again, for ever (doc/decisions/friction_memory.md). Between hollow edges the lines are further
 // apart than the surfaces, so such a contact keeps nothing away that the others would let come.
 #include <algorithm>
 #include <cmath>
@@ -78,7 +78,8 @@ double rise(const EdgeFaces &faces, Vec3 outward, Vec3 across, double length) {
   return 0.25 * length * std::fabs(turn) * norm(cross(faces.along, across));
 }
 
-// m, how far a crossing yields under load (doc/decisions/0416). Where one of the edges lies in a flat
+// m, how far a crossing yields under load (doc/decisions/contact_problem.md). Where one of the edges lies
+// in a flat
 // face, the distance of the surfaces is linear along the other edge, so that the crossing is no minimum:
 // contacts of surfels and of rims hold the surfaces apart, and the crossing only repeats them. Not so where
 // both edges are rims, nor where it replaces the contact of a surfel. Faces of a cut touch at the rest

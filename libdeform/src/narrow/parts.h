@@ -10,7 +10,7 @@
 // pair is at b exactly while the copies are in one place: nothing has to open after a cut, and no motion
 // opens more than it has to. Copies that have moved apart by more than setting back moves them no longer say
 // on which side of an edge a feature is; from kNearCopies on the distance goes over to d_c, that of two
-// bodies (doc/decisions/0444).
+// bodies (doc/decisions/cutting.md).
 #pragma once
 #include <algorithm>
 #include <cmath>

@@ -20,7 +20,7 @@
 // not slid apart make one contact, along the normal of the faces that were joined at them. The features
 // around them make none, because that contact holds them; from there to where the copies have slid apart,
 // features rest where the material touches, less what is left to the copies (body/self_rest.h,
-// doc/decisions/0427).
+// doc/decisions/cutting.md).
 #include "narrow/self_contact.h"
 
 #include <algorithm>

@@ -30,7 +30,7 @@ struct SelfPairs {
   Array<PairAtRest> of_face, of_edges;
   Array<CopiesNow> copies;
   // [copies] m, by how much they may approach before features around them have to be tested
-  // (doc/decisions/0427)
+  // (doc/decisions/cutting.md)
   Array<double> slack;
   uint64_t renewals = 0;
   double offset = 0;

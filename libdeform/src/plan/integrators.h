@@ -1,7 +1,7 @@
 // Chooses which bodies move implicitly, if the host leaves it to the library. Only a body that alone would be
 // implicit may be: it damps what explicit bodies keep, so no other body makes it so. All bodies of a world
 // take the same sub-steps: explicit bodies bound the sub-step, and implicit bodies pay for each of these.
-// Where that costs more than moving explicitly, they do (doc/decisions/0170-integrators-by-cost.md).
+// Where that costs more than moving explicitly, they do (doc/decisions/implicit_time.md).
 #pragma once
 #include <cstdint>
 #include <string>

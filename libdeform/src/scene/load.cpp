@@ -12,7 +12,7 @@ namespace {
 
 // Cells that may exceed the number in the scene, since so few cost little.
 constexpr uint32_t kCheapCells = 1000;
-// Longest edge of a surface that is filled, over that of its cells (doc/decisions/0391).
+// Longest edge of a surface that is filled, over that of its cells (doc/decisions/meshes_and_labels.md).
 constexpr double kLongestEdge = 2.5;
 
 // m. All cells of a lattice are alike, so the first one is enough.

@@ -1,5 +1,5 @@
 // What implicit steps may cost beyond explicit ones, where the library has chosen them
-// (step/counting.h, doc/decisions/0400-auto-goes-by-counts.md).
+// (step/counting.h, doc/decisions/implicit_time.md).
 #pragma once
 #include <cmath>
 #include <cstdint>

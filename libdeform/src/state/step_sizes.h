@@ -1,5 +1,5 @@
 // The sizes of sub-steps: few different ones, from a short ladder, changed rarely. Why: doc/concepts/step.md,
-// doc/decisions/0041-few-sizes-of-steps.md.
+// doc/decisions/explicit_time.md.
 //
 // Symplectic Euler keeps a nearby energy that depends on the size of the step. Each change of size moves a
 // body from one such energy to another, and near the bound, where the nearby energy of the stiffest mode is
@@ -9,7 +9,7 @@
 //   - steps that the library chooses have 4, 5, 6 or 7 times a power of two seconds;
 //   - the size goes down at once where the bound requires it, and up only after a waiting time (patience)
 //     that doubles each time;
-//   - a host that changes the length of its steps pays with damping: doc/decisions/0497-steps-of-a-host.md.
+//   - a host that changes the length of its steps pays with damping: doc/decisions/energy_watch.md.
 #pragma once
 #include <cstdint>
 #include <string>

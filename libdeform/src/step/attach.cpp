@@ -39,8 +39,8 @@ Vec3 closing(const World &w, const StepContext &step, Vec3 gap) {
 
 // A body that steps itself may have fewer motions than bonds. Some of its motions then hardly move the held
 // points, and rigid bonds would need impulses of a thousand times the weight to correct the last micrometer,
-// which throws the body (doc/decisions/0390). Each rigid bond of such a body therefore gets this share of its
-// surfel's own response as compliance; at rest that is a gap of at most 1e-9 m.
+// which throws the body (doc/decisions/contact_problem.md). Each rigid bond of such a body therefore gets
+// this share of its surfel's own response as compliance; at rest that is a gap of at most 1e-9 m.
 constexpr double kGive = 1e-5;
 
 bool few_motions(const Body &b) { return !b.dynamics->abilities().placed; }

@@ -28,7 +28,7 @@ bool reads_points(const World &w, const Body &b) {
 
 constexpr double kAlong = 0.1;  // of the stable step: a way on which strains change little
 
-// What a host's changes of the step put into bodies (doc/decisions/0497-steps-of-a-host.md).
+// What a host's changes of the step put into bodies (doc/decisions/energy_watch.md).
 void damp_changes_of_size(World &w, const StepContext &step) {
   const double stable = w.bound.step / kBoundShare, c = damping_due(w.sizes, step.guard.planned, stable);
   if (!(c > 0)) return;

@@ -10,7 +10,7 @@
 //
 // Pairs that are not listed are not tested: broad/ covers the motion after the solve too (BroadPhase::cover).
 // Reasons for this order, and for shortening the sub-step of the whole world:
-// doc/decisions/0020-guard-cuts-time.md.
+// doc/decisions/detection_and_guard.md.
 #include "step/guard.h"
 
 #include <algorithm>
@@ -147,8 +147,8 @@ double straight_way(const StepContext &step, const Body &b, uint32_t slot) {
 // over within the sub-step: cells that an early iteration inverts may take on another rotation. Contact does
 // much negative work along the way, and inner forces as much positive work, which no elastic energy pays for.
 // So such an end gains energy, which the scheme cannot do as long as cells turn by little
-// (doc/decisions/0498). Returns the way that it moves a point beyond where its velocity leads, over kTurns
-// edges; 0: it is no such end.
+// (doc/decisions/energy_watch.md). Returns the way that it moves a point beyond where its velocity leads,
+// over kTurns edges; 0: it is no such end.
 double turned_over(const World &w, const StepContext &step, const Body &b, uint32_t slot) {
   if (!b.dynamics->abilities().damps || b.model.stepper || !(step.guard.change[slot] > 0)) return 0;
   const double *const end = b.dynamics->end().v;
@@ -165,7 +165,7 @@ double turned_over(const World &w, const StepContext &step, const Body &b, uint3
 // this sub-step is to be repeated with shorter ones, and later ones are shorter as well. The scheme keeps
 // energy as far as the trapezoid of the forces is their work; if an edge is strained by s at once, the error
 // is about s^2 of the energy that contact brings, which is too much only if contact brings more than the
-// body has (doc/decisions/0436).
+// body has (doc/decisions/explicit_time.md).
 bool withstands_impacts(World &w, StepContext &step) {
   if (step.rows.ndof == 0) return true;
   Guard &g = step.guard;

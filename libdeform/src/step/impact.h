@@ -1,7 +1,7 @@
 // A hard impact on a body that the library has made implicit, in a step whose length the library has chosen:
 // contact takes the velocity of the body in one sub-step, and with it the energy that would throw it back.
 // Such a step is repeated explicitly, and the body stays explicit until the impact is over;
-// doc/decisions/0456-blows-by-auto.md.
+// doc/decisions/implicit_time.md.
 #pragma once
 #include <cstdint>
 

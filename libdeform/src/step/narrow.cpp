@@ -71,7 +71,7 @@ bool turn_over(const StepContext &step, double offset, ContactPoint &c) {
 // Where two surfaces do not cross, no point has passed through one of them. So a point behind a face lies
 // outside: the face looks inward, because its surface is folded through itself. A contact that leads the
 // point through the face works against the guard, and the impulses of both would grow without bound
-// (doc/decisions/0413-depths-that-cannot-be.md).
+// (doc/decisions/contact_problem.md).
 void turn_false_depths(World &w, StepContext &step) {
   if (!w.plan.has(StageRole::guards)) return;
   const auto is_false = [&](const ContactPoint &c) {

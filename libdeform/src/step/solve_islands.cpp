@@ -24,8 +24,8 @@ namespace {
 // point that oscillates under a bristle of share s stretches it by (1 - s) of each way forth and slackens it
 // by (1 + s) of each way back. Both make a held contact creep. Islands with such laws therefore use this
 // share of the normal tolerance while bodies move, and this share of the tangential one at rest
-// (doc/decisions/0028). So do bodies whose end state is solved for: stiff ones sag by less than the normal
-// tolerance in a long step.
+// (doc/decisions/friction_memory.md). So do bodies whose end state is solved for: stiff ones sag by less
+// than the normal tolerance in a long step.
 constexpr double kRememberedShare = 0.05, kRememberedRest = 1e-3;
 
 // The limit of sweeps may leave a solve inexact, but must not let bodies pass through each other. If a normal
@@ -86,7 +86,7 @@ constexpr double kRunsAway = 1e6;
 // sweeps the laws are therefore evaluated again, followed by this many sweeps each time (doc/decisions/0201).
 constexpr uint32_t kPassSweeps = 20;
 // Where the budget does not hold all sweeps, no pass may use up what the others need
-// (doc/decisions/0460-a-budget-never-ends-a-loop.md).
+// (doc/decisions/budgets.md).
 bool is_tight(const World &w, const StepContext &step, const SolveIsland &own) {
   const uint64_t most = uint64_t{kBeyondCap} * w.def.max_sweeps;
   return step.budget.divided && own.batches.remembers() && own.sweeps < most &&
@@ -497,7 +497,7 @@ double share_of_opening(const ContactRows &rows, const RowsPart &part, double sl
 
 // Impulses of contacts that oppose each other are large and nearly cancel, so they do noticeable work even at
 // velocities within the tolerance. An island in which bias velocities do much work must therefore do none
-// beyond it, whether its solve has converged or not (doc/decisions/0431).
+// beyond it, whether its solve has converged or not (doc/decisions/energy_watch.md).
 void solve_island(const World &w, StepContext &step, SolveIsland &own) {
   if (own.bad || own.thrown) return;
   const double gap_margin = normal_at_rest(w, step.h), least = tangent_at_rest(w, step.h);
@@ -535,7 +535,7 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
 
 // The work of a sweep, in multiplications of a triangular solve that take as long. An impulse at a surfel
 // moves all touched surfels of its body: three columns, read four numbers at a time, which wait for memory if
-// the response is larger than a cache (doc/decisions/0447-auto-counts-contact.md).
+// the response is larger than a cache (doc/decisions/implicit_time.md).
 constexpr double kPairWork = 1.5, kFarPairWork = 6;
 constexpr uint32_t kFar = 100;  // surfels: 1 MB
 double work_of_sweep(const ContactRows &rows, const RowsPart &part, bool blocks) {

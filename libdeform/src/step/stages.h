@@ -33,7 +33,7 @@ struct RestoredChoice {
 void prepare(World &w, const RestoredChoice *restored = nullptr);
 // An integrator of second order where the equations are solved: at the steps that implicit time is for,
 // backward Euler damps the oscillation of a body within one period
-// (doc/decisions/0395-auto-is-of-second-order.md).
+// (doc/decisions/implicit_time.md).
 ImplicitOptions implicit_choice(const World &w, const Body &b);
 // After a change of values that no table depends on: loads, motions, gravity, parameters of a model or of
 // a law. The step bound is recomputed, the energy balance restarts, and the next prepare() checks the plan.

@@ -277,8 +277,8 @@ bool advance(World &w, StepContext &step, double end, double goal, bool last, ui
   return true;
 }
 
-// After a hard impact (doc/decisions/0436) planned sub-steps are shorter from this one on. So this one is a
-// whole sub-step, not a piece.
+// After a hard impact (doc/decisions/explicit_time.md) planned sub-steps are shorter from this one on. So
+// this one is a whole sub-step, not a piece.
 void refine(World &w, StepContext &step) {
   Guard &g = step.guard;
   step.budget.to_come = (step.budget.to_come + 1) * uint32_t(g.finer) - 1;

@@ -1,6 +1,6 @@
 // Puts things that are through each other apart before a step is taken: bodies are moved as they are, without
 // turning or bending them, so that no elastic energy and no velocity comes of it; doc/concepts/overlaps.md,
-// doc/decisions/0047-untangled-by-moving.md.
+// doc/decisions/detection_and_guard.md.
 #pragma once
 #include <vector>
 

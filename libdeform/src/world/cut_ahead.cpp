@@ -30,7 +30,8 @@ namespace dfm {
 
 // The pairs of the whole surface that may touch each other, which the first cut of a body needs. They are
 // listed where the body is as it begins to wait; the step that follows the cut finds anew what has moved far
-// since (doc/decisions/0437). Who uses other lists gets the same bits, so no step makes these.
+// since (doc/decisions/detection_and_guard.md). Who uses other lists gets the same bits, so no step makes
+// these.
 struct ListJob : Aside::Job {
   std::shared_ptr<const Body> from;
   Surface surface;
@@ -148,8 +149,8 @@ void open_faces_of(World &w, Body &b) {
 }
 
 // The stable step of the new shapes. Evaluating it takes longer than the exchange, and the next step finds
-// the new pairs of the surfaces, so the step after that one evaluates it (doc/decisions/0496). Where there is
-// no estimate, it is evaluated now, at the positions at which the next step begins.
+// the new pairs of the surfaces, so the step after that one evaluates it (doc/decisions/cutting.md). Where
+// there is no estimate, it is evaluated now, at the positions at which the next step begins.
 void give_bound(World &w, const WorldBound &before, double share, double dt) {
   if (!bound_due(w) || estimate_bound(w, before, share, dt)) return;
   try {

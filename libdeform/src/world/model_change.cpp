@@ -1,6 +1,6 @@
 // A change of model changes no position and no velocity: surface, momentum, angular momentum and kinetic
 // energy stay to the bit. What jumps is the elastic energy, because two models see different energies in one
-// shape; the jump is measured before the change takes effect (doc/decisions/0180-a-swap-moves-nothing.md).
+// shape; the jump is measured before the change takes effect (doc/decisions/models.md).
 #include "world/model_change.h"
 
 #include <algorithm>

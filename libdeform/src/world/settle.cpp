@@ -244,7 +244,7 @@ class Settling {
   // gives way, they turn: the foot of a sphere on a face moves away from the corner that it has pressed down.
   // If its next place overshoots by more than it was off, long steps go to and fro for ever. They converge if
   // the touched points go only a part of the way, 1 / (1 + slowed):
-  // doc/decisions/0491-contacts-that-overshoot.md. overshoot: the factor between the ways of the last two
+  // doc/decisions/implicit_time.md. overshoot: the factor between the ways of the last two
   // steps, if they are opposite.
   void slow_overshoot(One &one, bool whole) {
     one.way_before.swap(one.way);
