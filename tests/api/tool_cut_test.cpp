@@ -390,7 +390,7 @@ TEST(ToolCut, DrivenBlade_BendsTheBody) {
 }
 
 // The sides of the slit lie on each other under the drag, with friction: contacts that hold the same points
-// more than once, whose slips no impulse takes away (decision 0426).
+// more than once, whose slips no impulse takes away (doc/decisions/contact_solver.md).
 TEST(ToolCut, SidesOfASlitUnderDrag_AreSolved_ImplicitSteps) {
   Tough s(0, sides, "corotational_fem", DFM_INTEGRATOR_IMPLICIT_EULER);
   s.down(0.015, 0.2);

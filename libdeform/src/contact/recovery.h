@@ -11,20 +11,11 @@
 
 namespace dfm {
 
-// Whether some contact does more work than it may. Cheap; nearly always false.
+// Whether the present impulses do more work by opening depths than single contacts would. slow: m/s, a bias
+// velocity that is allowed for every contact.
 bool opens_dearly(const ContactRows &rows, const RowsPart &part, double slow);
 
-// J. put_in: l.r over the contacts that open, which bounds their work; allowed: what they may do.
-struct OpeningWork { double put_in = 0, allowed = 0; };
-
-// slow: m/s, a bias velocity that is allowed for every contact.
-OpeningWork opening_work(const ContactRows &rows, const RowsPart &part, double slow);
-
-// The work that the present impulses do by opening depths: the excess over impulses that allow u = 0. Zero or
-// less if nothing opens.
-double work_of_opening(const ContactRows &rows, const RowsPart &part, double put_in);
-
-// Multiplies the bias velocities of the part by this share.
-void slow_opening(ContactRows &rows, const RowsPart &part, double share);
+// Depths of the part no longer open, and its impulses are zero.
+void stop_opening(ContactRows &rows, const RowsPart &part);
 
 }  // namespace dfm

@@ -29,11 +29,13 @@ struct DofSource {
   uint32_t first_node = 0, nnode = 0;    // world-wide surfel numbers of the body
   uint32_t first_point = 0, npoint = 0;  // world-wide phyxel numbers
   const Surface *surface = nullptr;
-  // [npoint,4] 1/kg, Dynamics::diagonal(); null: surfels are the unknowns
+  // [npoint,4] 1/kg, Dynamics::diagonal(), or ImplicitSystem::diagonal_inverse(); null: surfels are the unknowns
   const double *diagonal = nullptr;
   const double *velocity = nullptr;  // without contact: [npoint,4] or, of surfels, surface->v
   // [npoint,4] m, positions of phyxels, of a surface whose surfels are set back from them; else null
   const double *place = nullptr;
+  // 1/kg, estimate of what an implicit body answers as a whole, beside `diagonal`
+  double whole = 0;
 };
 
 // The rigid body that an obstacle is: its number in a group of bodies that answer each other's impulses.
@@ -97,6 +99,7 @@ struct ContactRows {
   };
   Array<BondRow> bond;  // [nbond]
 
+  Array<double> whole_of;  // [sources] DofSource::whole
   // m/s, at most, at which a depth is opened; 0: a tenth of the rest distance per sub-step
   double recovery = 0;
 
@@ -133,6 +136,8 @@ struct ContactRows {
   RowsView view(RowRun contacts) const;
   RowsPart whole();  // all of them; valid until the next call
 
+  // 1/kg: the estimate of what implicit bodies answer as a whole, in wn and wt of this row; 0 without any
+  double whole_answer(uint32_t i) const;
   Vec3 rigid_diagonal(uint32_t i, Vec3 a) const;  // of W a of a contact: the rigid body's part
   // relative velocity of contact i in its frame (normal, t1, t2); of unknowns like y
   Vec3 velocity(uint32_t i) const { return velocity(i, y.data()); }
@@ -144,11 +149,8 @@ struct ContactRows {
   void apply_last();
   // y of a part from the impulses alone: sweeps have left it not finite, or with their rounding
   void restore(const RowsPart &part);
-  // The same for blocks that these contacts alone act on.
-  void restore(std::span<const uint32_t> contacts, std::span<const uint32_t> of_blocks);
-  // G [3 contacts, padded] with velocity = velocity without impulses + G G^T impulse for contacts that act on
-  // these blocks alone, padded: rank rounded up to fours, with zeros. False: they move in more ways than
-  // `most`.
+  // G [3 contacts, padded]: velocities change by G G^T impulse through these blocks. Padded: rank rounded up to
+  // fours, with zeros.
   struct Motions {
     Array<double> g;
     uint32_t rank = 0;
@@ -157,8 +159,7 @@ struct ContactRows {
     Array<double> columns, left;
     Array<size_t> first_column, column_count, first_value;
   };
-  bool motions(std::span<const uint32_t> contacts, std::span<const uint32_t> of_blocks, uint32_t most,
-               Motions &out) const;
+  void motions(std::span<const uint32_t> contacts, std::span<const uint32_t> of_blocks, Motions &out) const;
   // changes y of a rigid group by all impulses that act on it: its response has been renewed
   void push_rigid(const Block &group);
 
