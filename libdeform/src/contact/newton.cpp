@@ -7,6 +7,8 @@
 #include <utility>
 
 #include "body/phyxels.h"
+#include "contact/bonds.h"
+#include "contact/friction_kernel.h"
 
 namespace dfm {
 
@@ -111,16 +113,16 @@ bool ContactNewton::frozen_steps() {
   freeze();
   if (!evaluate(true)) return false;
   const double start = size();
-  for (uint32_t trip = 0; trip < set_.passes && steps_ < set_.steps; ++trip) {
-    if (!find_way(true, 1e-2)) return false;
-    base_.assign(v_.begin(), v_.end());
-    ++steps_;
+  for (uint32_t trip = 0; trip < set_.passes && steps_ < limit_; ++trip) {
     const auto slope = [&] {
       double sum = 0;
       for (size_t k = 0; k < g_.size(); ++k) sum += g_[k] * way_[k];
       return sum;
     };
+    if (!find_way(true, 1e-2)) return false;
     const double first = slope();
+    base_.assign(v_.begin(), v_.end());
+    ++steps_;
     if (!(first < 0)) return evaluate(false);
     // the share of the way at which the slope has nearly gone, between one where it is negative and one where
     // it is not, or where the function is not known
@@ -152,7 +154,7 @@ bool ContactNewton::newton(double tolerance, bool &round) {
   round = false;
   if (!evaluate(false)) return false;
   uint32_t phases = 0;
-  while (error() > tolerance && steps_ < set_.steps) {
+  while (error() > tolerance && steps_ < limit_) {
     bool failed = false;
     if (coupled_step(tolerance, failed)) continue;
     if (!failed && phases++ == set_.rounds) return round = true;
@@ -176,20 +178,6 @@ void ContactNewton::put_rows() {
   each_row(part_.bonds, put);
 }
 
-// Depths whose bias velocities contradict each other no longer open: all of them at rest is an answer then.
-// False: no row has such a bias.
-bool ContactNewton::relieve() {
-  bool any = false;
-  each_row(part_.contacts, [&](uint32_t i) {
-    any = any || rows_->rate[i] < 0;
-    rows_->rate[i] = std::max(rows_->rate[i], 0.0);
-  });
-  if (!any) return false;
-  std::fill(lh_.begin(), lh_.end(), 0.0);
-  set_penalties(set_.penalty);
-  return true;
-}
-
 void ContactNewton::scale_penalties(double by) {
   for (double &rho : rho_) rho *= by;
   for (double &response : response_) response /= by;
@@ -199,7 +187,6 @@ bool ContactNewton::solve(double tolerance, double normal) {
   if (!evaluate(false) || !host_->judge(residual_)) return false;
   double left = std::max(residual_.speed, error()), aim = left;  // m/s
   uint32_t slow = 0, stood = 0;
-  double mark = std::numeric_limits<double>::infinity();  // m/s, normals some passes ago
   Array<double> &before = kept_;
   for (passes_ = 0; passes_ < set_.passes;) {
     ++passes_;
@@ -207,17 +194,20 @@ bool ContactNewton::solve(double tolerance, double normal) {
     const double goal = std::clamp(set_.share * aim, set_.share * tolerance, set_.coarse);
     bool round;
     if (!newton(goal, round)) return false;
-    if (round && steps_ < set_.steps && passes_ < set_.passes) {
+    if (round && steps_ < limit_ && passes_ < set_.passes) {
       scale_penalties(set_.softens);
       slow = 0;
       v_.assign(before.begin(), before.end());
       continue;
     }
     put_rows();
+    for (const Row &r : row_)
+      if (r.kind == Kind::drag) limit_drag(*rows_, r.row);
     if (!host_->judge(residual_)) return false;
     const double off = error(), due = std::max(residual_.relative, off / tolerance);
     found_ = due <= set_.within;
-    if (found_ || steps_ >= set_.steps || !host_->goes_on(products_)) break;
+    if (found_ || steps_ >= limit_) break;
+    if (!host_->goes_on(products_)) return true;
     lh_.assign(l_.begin(), l_.end());
     double moved = 0;
     for (size_t k = 0; k < v_.size(); ++k) moved = std::max(moved, std::fabs(v_[k] - before[k]));
@@ -230,12 +220,6 @@ bool ContactNewton::solve(double tolerance, double normal) {
       if (found_) break;
       scale_penalties(set_.grows);
     }
-    if (passes_ % set_.patience == 0 && residual_.normal > set_.stands * normal) {
-      if (residual_.normal > 0.5 * std::exchange(mark, residual_.normal) && relieve()) {
-        mark = left = aim = std::numeric_limits<double>::infinity();
-        continue;
-      }
-    }
     const double now = std::max(residual_.speed, off);
     aim = stands ? off : now;
     slow = now > 0.5 * left ? slow + 1 : 0;
@@ -245,7 +229,31 @@ bool ContactNewton::solve(double tolerance, double normal) {
     scale_penalties(set_.grows);
   }
   if (found_ && residual_.due > 1) residual_.due = residual_.relative = 1;
-  return true;
+  return found_ || residual_.due <= 1 || !gains(normal) || penalties_alone();
+}
+
+// Whether normal impulses do more work than residuals of this size explain.
+bool ContactNewton::gains(double normal) const {
+  double work = 0, all = 0;
+  for (uint32_t k = 0; k < row_.size(); ++k) {
+    if (row_[k].kind != Kind::contact) continue;
+    const uint32_t i = row_[k].row;
+    const double l = l_[3 * size_t{k}];
+    all += l;
+    work += l * (u_[3 * size_t{k}] + rows_->rate[i] + given(l, &rows_->yields[3 * size_t{i}]));
+  }
+  return work > normal * all;
+}
+
+// Where rows ask for what cannot be, multipliers grow without end. Impulses of the penalties alone resist
+// motion in proportion to it: bodies give way a little, and no contact does work that its law does not allow.
+bool ContactNewton::penalties_alone() {
+  std::fill(lh_.begin(), lh_.end(), 0.0);
+  limit_ = steps_ + set_.steps;
+  for (bool round = true; round && steps_ < limit_; scale_penalties(set_.softens))
+    if (!newton(set_.coarse, round)) return false;
+  put_rows();
+  return host_->judge(residual_);
 }
 
 // What is left of g moves each body as a whole, so that its momentum is that of the impulses.

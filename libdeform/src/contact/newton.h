@@ -47,7 +47,6 @@ struct NewtonSettings {
   double flat = 0.3;           // of the slope, that a line search may leave
   uint32_t trials = 24;        // of a line search
   double within = 0.3;         // of the tolerance, that a solve leaves
-  uint32_t patience = 8;       // passes in which normals have to halve, or bias velocities contradict each other
   double stands = 20;          // of the tolerance, by which normals may miss what velocities no longer follow
 };
 
@@ -142,6 +141,7 @@ class ContactNewton {
   bool found_ = false;
   Residual residual_;
   uint32_t passes_ = 0, steps_ = 0, products_ = 0, factors_ = 0;
+  uint32_t limit_ = 0;  // on steps_
   double work_ = 0;
 
   void number_nodes(std::span<ImplicitSystem *const> systems);
@@ -168,7 +168,8 @@ class ContactNewton {
   void scale_penalties(double by);
   bool coupled_step(double tolerance, bool &failed);
   bool frozen_steps();
-  bool relieve();
+  bool gains(double normal) const;
+  bool penalties_alone();
   void put_rows();
 };
 

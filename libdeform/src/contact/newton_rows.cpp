@@ -25,6 +25,7 @@ void ContactNewton::begin(ContactRows &rows, const RowsPart &part, std::span<Imp
   h_ = h;
   found_ = factored_ = shaped_ = false;
   passes_ = steps_ = products_ = factors_ = 0;
+  limit_ = set_.steps;
   work_ = 0;
   number_nodes(systems);
   list_rows();
@@ -202,6 +203,10 @@ void ContactNewton::set_penalties(double factor) {
     rho_[2 * k] = wn > 0 ? factor / wn : 0;
     rho_[2 * k + 1] = wt > 0 ? factor / wt : 0;
     if (row_[k].kind == Kind::bond) rho_[2 * k] = rho_[2 * k + 1] = std::min(rho_[2 * k], rho_[2 * k + 1]);
+    if (row_[k].kind == Kind::drag) {
+      const double w_along = rows.bond[i - rows.n].w;
+      rho_[2 * k] = w_along > 0 ? factor / w_along : 0;
+    }
     response_[i] = rho_[2 * k + 1] > 0 ? 1 / rho_[2 * k + 1] : 0;
   }
 }
@@ -228,37 +233,13 @@ void ContactNewton::add_transposed(uint32_t k, Vec3 z, double *to) const {
   }
 }
 
-namespace {
-
-// Of a drag (contact/bond.h): the impulse along its way where it would be `now` and the edge would move at
-// `speed` with response w.
-double drag_impulse(const ContactRows::BondRow &b, double w, double now, double speed) {
-  const double free = w * now + speed;
-  if (!(free > 0)) return 0;
-  const double l = std::min(b.most, free / w);
-  if (l * (free - w * l) <= b.due) return l;
-  return 2 * b.due / (free + std::sqrt(std::max(0.0, free * free - 4 * w * b.due)));
-}
-
-// dl/dspeed there, kg: negative where the work that is left holds it.
-double drag_slope(const ContactRows::BondRow &b, double w, double now, double speed) {
-  const double free = w * now + speed;
-  if (!(free > 0)) return 0;
-  const double l = std::min(b.most, free / w);
-  if (l * (free - w * l) <= b.due) return free / w < b.most ? 1 / w : 0;
-  return -drag_impulse(b, w, now, speed) / std::sqrt(std::max(1e-300, free * free - 4 * w * b.due));
-}
-
-}  // namespace
-
 void ContactNewton::evaluate_bond(uint32_t k) {
   const ContactRows::BondRow &b = rows_->bond[row_[k].row - rows_->n];
   const double rho = rho_[2 * size_t{k}];
   const Vec3 u = load3(&u_[3 * size_t{k}]), lh = load3(&lh_[3 * size_t{k}]);
   Vec3 l = lh;
   if (row_[k].kind == Kind::drag) {
-    l = {};
-    if (rho > 0) l = drag_impulse(b, 1 / rho, dot(b.along, lh), -dot(b.along, u)) * b.along;
+    l = std::clamp(dot(b.along, lh) - rho * dot(b.along, u), 0.0, b.most) * b.along;
   } else if (rho > 0) {
     for (int c = 0; c < 3; ++c)
       if (b.inverse[c][c] != 0) l[c] = (lh[c] - rho * (u[c] + b.rate[c])) / (1 + rho * b.soft);
@@ -292,7 +273,7 @@ bool ContactNewton::evaluate(bool frozen) {
     double *const l = &l_[3 * size_t{k}];
     std::copy_n(lh, 3, l);
     if (!(rho > 0)) continue;
-    l[0] = normal_impulse(lh[0], u.x + rows_->rate[i], 1 / rho, &rows_->yields[2 * size_t{i}]);
+    l[0] = normal_impulse(lh[0], u.x + rows_->rate[i], 1 / rho, &rows_->yields[3 * size_t{i}]);
     l[1] = l[2] = 0;
     const bool smooth = s.form[i] == kSmoothLaw;
     s.fn[i] = (frozen && smooth ? frozen_[k] : l[0]) / h_;
@@ -355,17 +336,18 @@ bool ContactNewton::find_slopes(bool frozen) {
         for (int c = 0; c < 3; ++c)
           if (b.inverse[c][c] != 0) G[4 * c] = rho / (1 + rho * b.soft);
       } else {
-        const double grows = drag_slope(b, 1 / rho, dot(b.along, load3(&lh_[3 * size_t{k}])),
-                                        -dot(b.along, load3(&u_[3 * size_t{k}])));
+        const double free = dot(b.along, load3(&lh_[3 * size_t{k}])) - rho * dot(b.along, load3(&u_[3 * size_t{k}]));
+        if (!(free > 0 && free < b.most)) continue;
         for (int r = 0; r < 3; ++r)
-          for (int c = 0; c < 3; ++c) G[3 * r + c] = grows * b.along[r] * b.along[c];
+          for (int c = 0; c < 3; ++c) G[3 * r + c] = rho * b.along[r] * b.along[c];
       }
       continue;
     }
     double normal = 0;
     if (l[0] > 0) {
-      const double *const yields = &rows_->yields[2 * size_t{i}];
-      normal = yields[0] > 0 && yields[0] * l[0] < yields[1] ? 1 / (1 / rho + yields[0]) : rho;
+      const double *const yields = &rows_->yields[3 * size_t{i}];
+      const double gives = yields[0] * (l[0] - yields[2]);
+      normal = gives > 0 && gives < yields[1] ? 1 / (1 / rho + yields[0]) : rho;
       G[0] = normal;
     }
     if (!(rub > 0)) continue;
@@ -421,7 +403,6 @@ bool ContactNewton::find_slopes(bool frozen) {
 // The part of G that is symmetric and has no negative eigenvalue.
 void ContactNewton::symmetric_part(const double *G, double *out) {
   std::fill_n(out, 9, 0.0);
-  if (G[0] + G[4] + G[8] < 0) return;  // of a drag that does the work that is left
   out[0] = G[0];
   if (G[1] != 0 || G[2] != 0) {  // of a bond
     for (int r = 0; r < 3; ++r)

@@ -354,7 +354,7 @@ void ContactRows::finish(std::span<const ContactPoint> contacts, const double *t
   frame.resize(size_t(all()) * 9);
   drive.resize(size_t(all()) * 3);
   rate.resize(n);
-  yields.resize(size_t(n) * 2);
+  yields.resize(size_t(n) * 3);
   wn.resize(all());
   wt.resize(all());
   cross.resize(size_t(n) * 2);
@@ -375,8 +375,9 @@ void ContactRows::finish(std::span<const ContactPoint> contacts, const double *t
     const double body = whole_answer(i);
     wn[i] = dot(normal, w0) + body;
     // min(c l, m) balances the opening speed of a depth `give` at most: no load presses it deeper.
-    yields[2 * size_t(i)] = contacts[i].give > 0 ? kSoft * wn[i] : 0;
-    yields[2 * size_t(i) + 1] = kCloses * contacts[i].give / planned;
+    yields[3 * size_t(i)] = contacts[i].give > 0 ? kSoft * wn[i] : 0;
+    yields[3 * size_t(i) + 1] = kCloses * contacts[i].give / planned;
+    yields[3 * size_t(i) + 2] = 0;
     cross[2 * size_t(i)] = dot(t1, w0);
     cross[2 * size_t(i) + 1] = dot(t2, w0);
     const Vec3 w1 = diagonal(i, t1), w2 = diagonal(i, t2);
@@ -386,6 +387,20 @@ void ContactRows::finish(std::span<const ContactPoint> contacts, const double *t
   each_row_in_blocks(n, tasks, fill);
   if (nbond) finish_bonds(bonds);
   turn_frames();
+}
+
+// Of the impulse that opens the depth of a contact alone: what opening adds to the load of the last sub-step.
+constexpr double kBears = 50;
+
+void ContactRows::soften_openings(std::span<const double> firm, const uint8_t *of_cuts) {
+  for (uint32_t i = 0; i < n; ++i) {
+    const double r = -rate[i];
+    if (!(r > 0) || !(wn[i] > 0) || (!firm.empty() && firm[i] > 0)) continue;
+    double *const yield = &yields[3 * size_t(i)];
+    yield[2] = yield[0] > 0 || (of_cuts && of_cuts[i]) ? 0 : impulse[3 * size_t(i)];
+    yield[0] = std::max(yield[0], wn[i] / kBears);
+    yield[1] = std::max(yield[1], r);
+  }
 }
 
 void ContactRows::turn_frames() {

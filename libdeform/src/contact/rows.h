@@ -78,8 +78,9 @@ struct ContactRows {
   Array<double> frame;
   Array<double> drive;  // [all,3] obstacle velocity in the frame
   Array<double> rate;   // [n] m/s: gap / h; a depth 0.2 gap / h, at least -0.1 d_c / h
-  // [n,2] Of a contact that is compliant under its load l (ContactPoint::give): the softness c, 1/kg, and the
-  // largest effect m, m/s, of min(c l, m), which is added to u_n + rate. 0, 0 for all others.
+  // [n,3] Of a contact that is compliant under its load l (ContactPoint::give, soften_openings()): the softness
+  // c, 1/kg, its largest effect m, m/s, and the load p, N s, from which on it yields: min(c max(l - p, 0), m) is
+  // added to u_n + rate. 0, 0, 0 for all others.
   Array<double> yields;
   Array<double> wn, wt;  // [all] 1/kg: W_nn; largest eigenvalue of W_tt, of a bond the larger of W_yy, W_zz
   // [n,2] 1/kg: W_tn, the slip that a unit normal impulse makes at its own contact
@@ -127,6 +128,12 @@ struct ContactRows {
   // alone.
   void finish(std::span<const ContactPoint> contacts, const double *tangents, double h, double planned,
               double offset, std::span<const Bond> bonds = {}, Tasks *tasks = nullptr);
+  // Rows whose rate is below zero become compliant: a depth opens at -rate against the load of the last
+  // sub-step (impulse) and some times what the contact alone needs, and against no larger load. So u = 0 is
+  // always allowed, and opening adds little energy, also where normals oppose each other: n and -n + e would
+  // open at -rate / |e|. firm: [n] where above zero, the row stays as it is; empty: none does. of_cuts: [n]
+  // whether it opens against no load, since depths of interlocking faces of a cut bear none; null: none.
+  void soften_openings(std::span<const double> firm, const uint8_t *of_cuts);
   void turn_frames();  // once `frame` and `drive` are known, for the kernels; finish() has done it
 
   // Do all unknowns of the part answer their own impulses only? The contacts' loops then run in the kernels.

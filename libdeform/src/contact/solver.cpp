@@ -18,7 +18,7 @@ Pair friction_impulse(const ContactRows &rows, const LawView &law, uint32_t i, d
 
 double normal_impulse(const ContactRows &rows, uint32_t i, double un) {
   return normal_impulse(rows.impulse[size_t(i) * 3], un + rows.rate[i], rows.wn[i],
-                        &rows.yields[size_t(i) * 2]);
+                        &rows.yields[size_t(i) * 3]);
 }
 
 }  // namespace
@@ -186,7 +186,7 @@ namespace {
 double normal_residual(const ContactRows &rows, uint32_t i, Vec3 u) {
   return std::fabs(
       std::min(rows.wn[i] * rows.impulse[size_t(i) * 3],
-               u.x + rows.rate[i] + given(rows.impulse[size_t(i) * 3], &rows.yields[size_t(i) * 2])));
+               u.x + rows.rate[i] + given(rows.impulse[size_t(i) * 3], &rows.yields[size_t(i) * 3])));
 }
 
 double tangent_residual(const ContactRows &rows, uint32_t i, Pair law) {

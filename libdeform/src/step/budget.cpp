@@ -30,7 +30,7 @@ constexpr double kNoPolishAt = 0.25, kFewSweepsAt = 0.5, kNoPiecesAt = 0.75;
 // solves that the guard repeats.
 constexpr double kPolishShare = 0.5, kSolveShare = 0.9;
 // Default limit: this factor times the cost of the planned sub-steps without contact.
-constexpr uint64_t kAutomaticFactor = 1000;
+constexpr uint64_t kAutomaticFactor = 4000;
 constexpr uint64_t kRigidWork = 10;  // of a rigid body, in the automatic limit
 
 struct StepStopped {

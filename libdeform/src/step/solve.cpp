@@ -93,7 +93,8 @@ void make_rows(World &w, StepContext &step) {
   for (size_t i = 0; i < w.bodies.size(); ++i) {  // the present state and the last end may have been swapped
     const Body &b = *w.bodies[i];
     step.sources[i].velocity = b.dynamics->contact_velocity();
-    step.sources[i].whole = step.systems[i] ? kWhole / step.systems[i]->mass() : 0;
+    const double mass = step.systems[i] ? step.systems[i]->mass() : 0;
+    step.sources[i].whole = mass > 0 ? kWhole / mass : 0;
     const bool set_back = b.surface.identity() && (b.surface.slit || b.surface.back > 0);
     step.sources[i].place = set_back ? b.p.x.data() : nullptr;
   }
@@ -119,6 +120,8 @@ void make_rows(World &w, StepContext &step) {
   if (!step.guard.kept.empty()) guard_rates(step);
   if (step.rigid_again) step.rows.impulse.assign(step.best_impulse.begin(), step.best_impulse.end());
   step.solve_islands->find(w, step);
+  // an equilibrium has no velocity that an opening could leave
+  if (!w.prescribed.stands()) step.rows.soften_openings(step.thrown, step.solve_islands->of_cuts());
 }
 
 namespace {
@@ -130,6 +133,8 @@ void finish_rows(World &w, StepContext &step) {
   run_belts(step);
   bounce(step);
   if (!step.guard.kept.empty()) guard_rates(step);
+  // an equilibrium has no velocity that an opening could leave
+  if (!w.prescribed.stands()) step.rows.soften_openings(step.thrown, step.solve_islands->of_cuts());
 }
 
 // Solves again, from the present impulses, until rigid hosts respond as the solve assumed.

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "contact/bonds.h"
-#include "contact/recovery.h"
 #include "dynamics/relative_work.h"
 #include "plugin/context.h"
 #include "state/world.h"
@@ -43,9 +42,17 @@ bool good(const StepContext &step, SolveIsland &own, const Residual &left, doubl
          (left.due <= most && (own.sweeps >= kPolish || spares(step, own.spent, Thrift::polish)));
 }
 
-// Sweeps diverge if the residual exceeds this times the best one: block Gauss-Seidel need not converge in a
-// jam with strong friction.
-constexpr double kRunsAway = 1e6;
+// m/s, the residual of the start, at least.
+double start_residual(const StepContext &step, const SolveIsland &own) {
+  const uint32_t *const sides = step.solve_islands->sides();
+  double most = 0;
+  each_row(own.part.contacts, [&](uint32_t i) {
+    for (const size_t k : {2 * size_t{i}, 2 * size_t{i} + 1})
+      if (sides[k] != kNone) most = std::max(most, step.disturbance[2 * size_t{sides[k]} + 1]);
+  });
+  each_row(own.part.bonds, [&](uint32_t i) { most = std::max(most, norm(bond_residual(step.rows, i))); });
+  return most;
+}
 
 // Bonds are solved to a share of their tolerance, so that the residual of the next sweep comes from contacts.
 constexpr double kBondShare = 0.1;
@@ -129,19 +136,17 @@ void copy_impulses(const RowsPart &part, const Array<double> &from, Array<double
   copy(part.bonds);
 }
 
-// Sweeps of one pass over the laws, with the laws as they were last evaluated. False: they run away.
+// Sweeps of one pass over the laws, with the laws as they were last evaluated. False: not finite.
 bool sweep_pass(const World &w, StepContext &step, SolveIsland &own, uint32_t cap) {
   constexpr double kMost = 0.5;  // of the tolerance
-  double best = std::numeric_limits<double>::infinity();
   own.acceleration.start(step.rows, own.part);
   for (Looks looks;;) {
     sweep_once(w, step, own);
     if (looks.due(own, cap)) {
       const Residual left = inner_residual(step.rows, own.part, step.state, step.h, own.tolerance);
-      if (!(left.due <= kRunsAway * std::max(1.0, best)) || !std::isfinite(left.due)) return false;
+      if (!std::isfinite(left.due)) return false;
       if (good(step, own, left, kMost) || own.sweeps >= cap || spares(step, own.spent, Thrift::sweeps))
         return true;
-      best = std::min(best, left.due);
       looks.note(own.sweeps, left, kMost);
     }
     own.acceleration.follow(step.rows, own.part);
@@ -152,17 +157,24 @@ bool sweep_pass(const World &w, StepContext &step, SolveIsland &own, uint32_t ca
 bool solve_by_sweeps(const World &w, StepContext &step, SolveIsland &own) {
   const uint32_t cap = most_sweeps(w, own);
   copy_impulses(own.part, step.rows.impulse, step.start_impulse);
+  const double start = start_residual(step, own);
+  // block Gauss-Seidel need not converge in a jam with strong friction
+  const auto give_up = [&] {
+    copy_impulses(own.part, step.start_impulse, step.rows.impulse);
+    step.rows.restore(own.part);
+    return false;
+  };
   for (;;) {
     // at least one sweep on a warm start is part of the method
-    if (!sweep_pass(w, step, own, cap)) {
-      copy_impulses(own.part, step.start_impulse, step.rows.impulse);
-      step.rows.restore(own.part);
-      return false;
-    }
+    if (!sweep_pass(w, step, own, cap)) return give_up();
     if (!ask(w, step, own)) return true;
     find_residual(step, own);
-    if (good(step, own, own.residual, 1) || spares(step, own.spent, Thrift::sweeps)) return true;
-    if (own.sweeps >= cap || own.passes > w.def.max_passes) return own.residual.due <= 1;
+    if (good(step, own, own.residual, 1)) return true;
+    const bool ends = spares(step, own.spent, Thrift::sweeps);
+    if (ends || own.sweeps >= cap || own.passes > w.def.max_passes) {
+      if (own.residual.due <= 1) return true;
+      return own.residual.speed <= start ? ends : give_up();
+    }
     if (!ask_slopes(step, own)) return true;
   }
 }
@@ -185,10 +197,6 @@ void solve_by_newton(const World &w, StepContext &step, SolveIsland &own) {
   newton.take();
 }
 
-// Penetration depths are opened at bias velocities that do little work. Where contacts oppose each other the
-// work is large, and the island is solved again without them (contact/recovery.h).
-constexpr double kSlowOpening = 0.03;  // of the rest distance in a sub-step: this is always allowed
-
 void solve_island(const World &w, StepContext &step, SolveIsland &own) {
   if (own.bad || own.thrown) return;
   const double gap_margin = normal_at_rest(w, step.h), least = tangent_at_rest(w, step.h);
@@ -205,14 +213,7 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
   set_tolerance(step.rows, own.part, step.contacts, step.h, bounds, step.solve_islands->sides(),
                 step.disturbance.data(), own.tolerance);
   ask_slip_back(w, step, own);
-  const double slow = kSlowOpening * w.offset / step.guard.planned;
-  for (bool opens = true;; opens = false) {
-    if (own.implicit || !solve_by_sweeps(w, step, own)) solve_by_newton(w, step, own);
-    if (own.bad || own.failed || !opens || !opens_dearly(step.rows, own.part, slow)) return;
-    stop_opening(step.rows, own.part);
-    own.passes = own.sweeps = 0;
-    if (!ask(w, step, own) || !ask_slopes(step, own)) return;
-  }
+  if (own.implicit || !solve_by_sweeps(w, step, own)) solve_by_newton(w, step, own);
 }
 
 // The work of a sweep, in multiplications of a triangular solve that take as long. An impulse at a surfel
