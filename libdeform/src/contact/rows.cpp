@@ -389,15 +389,16 @@ void ContactRows::finish(std::span<const ContactPoint> contacts, const double *t
   turn_frames();
 }
 
-// Of the impulse that opens the depth of a contact alone: what opening adds to the load of the last sub-step.
-constexpr double kBears = 50;
+// Times what a contact alone needs: the load against which its depth opens, and what opening adds to that.
+constexpr double kBears = 3;
 
-void ContactRows::soften_openings(std::span<const double> firm, const uint8_t *of_cuts) {
+void ContactRows::soften_openings(std::span<const double> firm, const double *free) {
   for (uint32_t i = 0; i < n; ++i) {
     const double r = -rate[i];
     if (!(r > 0) || !(wn[i] > 0) || (!firm.empty() && firm[i] > 0)) continue;
+    const double stops = std::max(0.0, -velocity(i, free).x) / wn[i];
     double *const yield = &yields[3 * size_t(i)];
-    yield[2] = yield[0] > 0 || (of_cuts && of_cuts[i]) ? 0 : impulse[3 * size_t(i)];
+    yield[2] = yield[0] > 0 ? 0 : std::min(impulse[3 * size_t(i)], kBears * stops);
     yield[0] = std::max(yield[0], wn[i] / kBears);
     yield[1] = std::max(yield[1], r);
   }

@@ -129,11 +129,12 @@ struct ContactRows {
   void finish(std::span<const ContactPoint> contacts, const double *tangents, double h, double planned,
               double offset, std::span<const Bond> bonds = {}, Tasks *tasks = nullptr);
   // Rows whose rate is below zero become compliant: a depth opens at -rate against the load of the last
-  // sub-step (impulse) and some times what the contact alone needs, and against no larger load. So u = 0 is
-  // always allowed, and opening adds little energy, also where normals oppose each other: n and -n + e would
-  // open at -rate / |e|. firm: [n] where above zero, the row stays as it is; empty: none does. of_cuts: [n]
-  // whether it opens against no load, since depths of interlocking faces of a cut bear none; null: none.
-  void soften_openings(std::span<const double> firm, const uint8_t *of_cuts);
+  // sub-step (impulse), but no more than a few times what stops the contact alone, and some times what opens it
+  // alone; and against no larger load. So u = 0 is always allowed, and opening adds little energy, also where
+  // normals oppose each other: n and -n + e would open at -rate / |e|. Without the limit by the contact alone
+  // their load grows from sub-step to sub-step. firm: [n] where above zero, the row stays as it is; empty: none
+  // does. free: unknowns without impulses.
+  void soften_openings(std::span<const double> firm, const double *free);
   void turn_frames();  // once `frame` and `drive` are known, for the kernels; finish() has done it
 
   // Do all unknowns of the part answer their own impulses only? The contacts' loops then run in the kernels.
