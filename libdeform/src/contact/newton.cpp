@@ -184,6 +184,10 @@ void ContactNewton::scale_penalties(double by) {
 }
 
 bool ContactNewton::solve(double tolerance, double normal) {
+  found_ = false;
+  limit_ = steps_ + set_.steps;
+  set_penalties(set_.penalty);
+  lh_.assign(l_.begin(), l_.end());
   if (!evaluate(false) || !host_->judge(residual_)) return false;
   double left = std::max(residual_.speed, error()), aim = left;  // m/s
   uint32_t slow = 0, stood = 0;

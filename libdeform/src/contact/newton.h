@@ -72,8 +72,9 @@ class ContactNewton {
   // ended. rows.impulse is the start of lh.
   void begin(ContactRows &rows, const RowsPart &part, std::span<ImplicitSystem *const> systems,
              ContactState &state, NewtonHost &host, double h);
-  // tolerance: m/s, of what the motion of the bodies may be off by; normal: of velocities along normals. False: a law or a model has failed;
-  // neither rows nor bodies have a result.
+  // From the present impulses, so that it goes on where rates or limits of the rows have changed. tolerance:
+  // m/s, of what the motion of the bodies may be off by; normal: of velocities along normals. False: a law or a
+  // model has failed; neither rows nor bodies have a result.
   bool solve(double tolerance, double normal);
   // The bodies' velocities become those of the solution.
   void take();

@@ -25,12 +25,10 @@ void ContactNewton::begin(ContactRows &rows, const RowsPart &part, std::span<Imp
   h_ = h;
   found_ = factored_ = shaped_ = false;
   passes_ = steps_ = products_ = factors_ = 0;
-  limit_ = set_.steps;
   work_ = 0;
   number_nodes(systems);
   list_rows();
   set_bias();
-  set_penalties(set_.penalty);
   for (Array<double> *a : {&g_, &kept_, &way_, &minus_}) a->resize(size_t{3} * nodes_);
   base_.resize(v_.size());
   const size_t n = row_.size();

@@ -12,7 +12,7 @@ ContactRows::ContactRows(const Memory &m)
     : kernels_(dense_kernels()),
       loops_(doubles_at_once() >= 4 ? contact_kernels_avx2() : contact_kernels_sse2()) {
   use_memory(m, across_, begin, dof, weight, y, y_free, alone, source, point, block, blocks, response_,
-             given_, frame, drive, rate, yields, wn, wt, cross, impulse, bond, dof_of_point_, dof_of_node_,
+             given_, frame, drive, rate, opens, yields, wn, wt, cross, impulse, bond, dof_of_point_, dof_of_node_,
              place_, rigid, arm, dof_of_group_, every_block_, whole_of);
 }
 
@@ -389,19 +389,36 @@ void ContactRows::finish(std::span<const ContactPoint> contacts, const double *t
   turn_frames();
 }
 
-// Times what a contact alone needs: the load against which its depth opens, and what opening adds to that.
+// Times what a contact alone needs: what opening a depth adds to its load, and the load against which it opens.
 constexpr double kBears = 3;
 
-void ContactRows::soften_openings(std::span<const double> firm, const double *free) {
+void ContactRows::hold_openings(std::span<const double> firm) {
+  opens.assign(n, 0.0);
   for (uint32_t i = 0; i < n; ++i) {
-    const double r = -rate[i];
-    if (!(r > 0) || !(wn[i] > 0) || (!firm.empty() && firm[i] > 0)) continue;
-    const double stops = std::max(0.0, -velocity(i, free).x) / wn[i];
+    const double speed = -rate[i];
+    if (!(speed > 0) || !(wn[i] > 0) || (!firm.empty() && firm[i] > 0)) continue;
     double *const yield = &yields[3 * size_t(i)];
-    yield[2] = yield[0] > 0 ? 0 : std::min(impulse[3 * size_t(i)], kBears * stops);
-    yield[0] = std::max(yield[0], wn[i] / kBears);
-    yield[1] = std::max(yield[1], r);
+    if (yield[0] > 0) {  // a crossing that gives way bears almost nothing while it opens
+      yield[1] = std::max(yield[1], speed);
+      continue;
+    }
+    opens[i] = speed;
+    rate[i] = 0;
   }
+}
+
+double ContactRows::open(const RowsPart &part) {
+  double most = 0;
+  each_row(part.contacts, [&](uint32_t i) {
+    if (!(opens[i] > 0)) return;
+    most = std::max(most, opens[i]);
+    rate[i] = -opens[i];
+    double *const yield = &yields[3 * size_t(i)];
+    yield[0] = wn[i] / kBears;
+    yield[1] = opens[i];
+    yield[2] = std::min(impulse[3 * size_t(i)], kBears * std::max(0.0, -velocity(i, y_free.data()).x) / wn[i]);
+  });
+  return most;
 }
 
 void ContactRows::turn_frames() {

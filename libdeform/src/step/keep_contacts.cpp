@@ -92,7 +92,7 @@ bool keeps_velocity(const StepContext &step, uint32_t i) {
 // oscillate at the tolerance for ever. So a contact that sticks at rest takes over half of a change, and the
 // extra impulse decays (doc/decisions/0326-half-of-a-change-at-rest.md).
 Vec3 next_start(const World &w, const StepContext &step, uint32_t i) {
-  const Vec3 l = load3(&step.rows.impulse[size_t(3) * i]);
+  const Vec3 l = load3(&step.load[size_t(3) * i]);
   const uint32_t m = step.match[i];
   if (step.tolerance.tangent.empty() || m == kNone) return l;
   if (step.tolerance.tangent[i] > tangent_at_rest(w, step.h) || !(l.x > 0) || step.state.mode[i] != 1)

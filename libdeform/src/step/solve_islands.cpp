@@ -162,7 +162,9 @@ bool solve_by_sweeps(const World &w, StepContext &step, SolveIsland &own) {
   const auto give_up = [&] {
     copy_impulses(own.part, step.start_impulse, step.rows.impulse);
     step.rows.restore(own.part);
-    return false;
+    if (!spares(step, own.spent, Thrift::sweeps)) return false;
+    if (ask(w, step, own)) find_residual(step, own);
+    return true;
   };
   for (;;) {
     // at least one sweep on a warm start is part of the method
@@ -187,14 +189,20 @@ double motion_tolerance(const SolveIsland &own) {
 }
 
 void solve_by_newton(const World &w, StepContext &step, SolveIsland &own) {
-  begin_newton(w, step, own);
   ContactNewton &newton = *own.newton;
+  const uint32_t steps = newton.steps();
+  const double work = newton.work();
   own.failed = !newton.solve(motion_tolerance(own), own.tolerance.most_normal);
-  own.sweeps += newton.steps();
-  own.spent.effort += newton.work();
-  if (own.failed) return;
+  own.sweeps += newton.steps() - steps;
+  own.spent.effort += newton.work() - work;
   own.residual = newton.residual();
-  newton.take();
+}
+
+// Whether depths of the island now open, which needs another solve.
+bool opens(const World &w, StepContext &step, SolveIsland &own) {
+  copy_impulses(own.part, step.rows.impulse, step.load);
+  if (spares(step, own.spent, Thrift::sweeps)) return false;
+  return step.rows.open(own.part) > tangent_at_rest(w, step.h);
 }
 
 void solve_island(const World &w, StepContext &step, SolveIsland &own) {
@@ -213,7 +221,16 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
   set_tolerance(step.rows, own.part, step.contacts, step.h, bounds, step.solve_islands->sides(),
                 step.disturbance.data(), own.tolerance);
   ask_slip_back(w, step, own);
-  if (own.implicit || !solve_by_sweeps(w, step, own)) solve_by_newton(w, step, own);
+  bool newton = own.implicit, open = false;
+  do {
+    if (!newton && !solve_by_sweeps(w, step, own)) {
+      begin_newton(w, step, own);
+      newton = true;
+    }
+    if (newton) solve_by_newton(w, step, own);
+    if (own.bad || own.failed) return;
+  } while (!std::exchange(open, true) && opens(w, step, own));
+  if (newton) own.newton->take();
 }
 
 // The work of a sweep, in multiplications of a triangular solve that take as long. An impulse at a surfel
@@ -450,6 +467,7 @@ const SolveIsland *solve_islands(World &w, StepContext &step) {
   step.tolerance.normal.resize(n);
   step.tolerance.tangent.resize(n);
   step.start_impulse.resize(3 * size_t{step.rows.all()});
+  step.load.resize(3 * size_t{step.rows.all()});
   step.disturbance.resize(2 * size_t{step.solve_islands->side_count()});
   const std::span<SolveIsland> all = step.solve_islands->all();
   uint64_t rows = 0;
