@@ -17,7 +17,6 @@ LOOKS_INSIDE = ("tests/unit/", "tests/bench/", "tests/fuzz/", "tests/determinism
 # A third party's name stands in one folder: (who, include, use in the code, folder).
 THIRD_PARTIES = [
     ("Eigen", r"(Eigen|unsupported/Eigen)/", r"\bEigen::", "libdeform/src/math/"),
-    ("Spectra", r"Spectra/", r"\bSpectra::", "libdeform/src/math/"),
     ("nanoflann", r"nanoflann", r"\bnanoflann::", "libdeform/src/mesh/"),
     ("nlohmann JSON", r"nlohmann/", r"\bnlohmann::", "libdeform/src/scene/"),
     ("GL", r"(GL|GLES\d?|EGL|KHR)/", r"\b(egl[A-Z]\w+|OSMesa[A-Z]\w+)\s*\(", "bindings/render/"),

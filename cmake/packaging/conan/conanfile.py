@@ -53,7 +53,6 @@ class Deform(ConanFile):
         if not self.options.system:
             self.requires("eigen/3.4.0", visible=False)
             self.requires("nlohmann_json/3.11.3", visible=False)
-            self.requires("spectra/1.0.1", visible=False)
             self.requires("zlib/[>=1.2.11 <2]")
             if self.options.cli:
                 self.requires("cli11/2.4.2", visible=False)
@@ -61,7 +60,7 @@ class Deform(ConanFile):
     def system_requirements(self):
         if self.options.system:
             cli = ["libcli11-dev"] if self.options.cli else []
-            Apt(self).install(["libeigen3-dev", "nlohmann-json3-dev", "libspectra-dev", "zlib1g-dev", *cli])
+            Apt(self).install(["libeigen3-dev", "nlohmann-json3-dev", "zlib1g-dev", *cli])
 
     def generate(self):
         toolchain = CMakeToolchain(self)
