@@ -48,7 +48,7 @@ if(DEFORM_SANITIZE)
   add_link_options(-fsanitize=${DEFORM_SANITIZE})
   # AddressSanitizer finds what the first three look for as it is accessed. Where bytes are read as numbers,
   # in the readers of files and snapshots, the preset `fuzz` checks alignment. The four are half of what the
-  # sanitizers add to the compiler's work (decisions on structure).
+  # sanitizers add to the compiler's work (doc/decisions/structure.md).
   if(DEFORM_SANITIZE STREQUAL "address,undefined")
     add_compile_options(-fno-sanitize=null,object-size,pointer-overflow,alignment)
   endif()

@@ -19,7 +19,7 @@
 // for: a budget E gathers what sliding dissipates, up to sum (nu_i F_S)^2/(2 K_i), and a step may rise by f'
 // = ft + theta (L t - ft), theta = min(1, E/N), where N >= the elastic energy that this step could gain. A
 // radial return loses energy and the loss is concave in f' along t, so with elastic energy plus E as storage
-// the law is passive with any parameters (decisions on friction memory).
+// the law is passive with any parameters (doc/decisions/friction_memory.md).
 #include <algorithm>
 #include <array>
 #include <utility>

@@ -1,5 +1,5 @@
 // Stiffness of each spring at rest, a product of two (doc/models/msm.md derives both,
-// doc/decisions/models.md and 0065 say why the second):
+// doc/decisions/models.md says why the second):
 //   Van Gelder   sum of E V over the cells around the edge / L0^2: the size of the cells drops out,
 //   directions   a factor of mean 1, multiplied by m.S m in each step, m = n n^T, S the inverse of the body's
 //                mean C = 6 sum w m m^T / sum w, w the volumes around each edge times the factor so far. One

@@ -1,6 +1,6 @@
 // An elastic ball without damping that rings for ever between a floor and a press that has come to rest: what
 // sticks stays where it is, although the solve may leave an error in every sub-step of a body that shakes
-// (doc/decisions/0468-sticking-holds-places.md).
+// (doc/decisions/contact_solver.md).
 #include <deform/scene.h>
 
 #include <fstream>

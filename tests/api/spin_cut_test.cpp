@@ -93,7 +93,7 @@ TEST(SpinCut, MovingBlade_PartsACubeThatTurns) {
 
 // Cuts, copies of points and what follows from them keep angular momentum to rounding. What books.check()
 // allows above is contact between the two sides of the cut: its impulses act at two points that lie a rest
-// distance apart (decisions on friction memory).
+// distance apart (doc/decisions/friction_memory.md).
 TEST(SpinCut, CutsThemselves_KeepAngularMomentumToRounding) {
   for (const char *model : kModels) {
     Spin s(model, 2e4, {2, -3, 1}, 320);

@@ -390,7 +390,7 @@ TEST(ToolCut, DrivenBlade_BendsTheBody) {
 }
 
 // The sides of the slit lie on each other under the drag, with friction: contacts that hold the same points
-// more than once, whose slips no impulse takes away (decision 0426).
+// more than once, whose slips no impulse takes away (doc/decisions/contact_solver.md).
 TEST(ToolCut, SidesOfASlitUnderDrag_AreSolved_ImplicitSteps) {
   Tough s(0, sides, "corotational_fem", DFM_INTEGRATOR_IMPLICIT_EULER);
   s.down(0.015, 0.2);
@@ -400,8 +400,8 @@ TEST(ToolCut, SidesOfASlitUnderDrag_AreSolved_ImplicitSteps) {
   EXPECT_LT(double(stats.unconverged), 0.3 * double(stats.substeps)) << "else 0.43";
 }
 
-// Nothing holds the cube, and its sides do not touch (decisions on friction memory says what that does to
-// angular momentum): a slow blade takes it along, a fast one goes through and leaves it some momentum.
+// Nothing holds the cube, and its sides do not touch (doc/decisions/friction_memory.md says what that does
+// to angular momentum): a slow blade takes it along, a fast one goes through and leaves it some momentum.
 TEST(ToolCut, FreeBody_IsDraggedByTheBlade_AndMomentumIsKept) {
   for (const char *model : kModels) {
     Tough slow(0, none, model), fast(0, none, model);

@@ -53,7 +53,7 @@ def public_headers(tree):
 HOSTS = ("libdeform/src/", "bindings/cli/")
 # For plugins alone: the head of the entry.
 NO_HOST = re.compile(r"DFM_(ABI_OK|CAT_?|EXPORT)$")
-# Members that keep a place in a table, without a type: plugin_draft.h has it (decisions on plugins and abi).
+# Members that keep a place in a table, without a type: plugin_draft.h has it (plugins_and_abi.md).
 SEATS = {"fetch"}
 
 

@@ -1,7 +1,6 @@
 // A plugin and a host of different ages: models whose structs are shorter or longer than those of this
 // library (garbage behind the end must not be read), a struct of the host that is longer than the plugin
-// knows, and one that is shorter than it would like (decisions on plugins and abi). Laws of other ages are
-// in registry_test.
+// knows, and one that is shorter than it would like. Laws of other ages are in registry_test.
 #define DFM_STATIC_PLUGIN ages
 #include <cmath>
 #include <cstddef>

@@ -1,5 +1,5 @@
-// What hits the ground bounces at the defaults, where bodies are implicit between impacts (decisions on
-// implicit time).
+// What hits the ground bounces at the defaults, where bodies are implicit between impacts
+// (doc/decisions/implicit_time.md).
 #include <algorithm>
 #include <cstdio>
 #include <string>

@@ -1,5 +1,5 @@
 // Small and stiff bodies that are left to the library begin implicitly, and go on explicitly where the count
-// of what their steps take says so (decisions on implicit time).
+// of what their steps take says so (doc/decisions/implicit_time.md).
 #include <algorithm>
 #include <cmath>
 
@@ -184,7 +184,7 @@ dfm_world boxes(dfm_context *context) {
 
 }  // namespace
 
-// Decisions on implicit time: explicit time has contacts, too, and each costs as much as 30 to 80 cells.
+// Explicit time has contacts, too, and each costs as much as 30 to 80 cells.
 TEST(Counting, StackOfBoxes_IsImplicit) {
   const test::Context context;
   const dfm_world w = boxes(context);
@@ -200,8 +200,7 @@ TEST(Counting, StackOfBoxes_IsImplicit) {
   EXPECT_GT(by_library.implicit, 0.8 * by_library.all) << by_library.changes << " changes";
 }
 
-// Decisions on implicit time: after the landing the ball vibrates, and each implicit step of 16 ms costs
-// too much.
+// After the landing the ball vibrates, and each implicit step of 16 ms costs too much.
 TEST(Counting, NamedStepsThatAllCostTooMuch_AreSeldomTried) {
   const test::Context context;
   dfm_world_def d = dfm_world_def_default();
@@ -225,7 +224,7 @@ TEST(Counting, NamedStepsThatAllCostTooMuch_AreSeldomTried) {
   EXPECT_LE(told(w).changes, before + 12) << "each try that is given up is two changes";
 }
 
-// Decisions on implicit time.
+// Neither grows with the number of bodies.
 TEST(Counting, OneWarningForAllBodies_AndALineForAllThatChange) {
   test::LoggedContext context;
   cubes(context.context, 60);

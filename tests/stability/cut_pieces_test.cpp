@@ -124,7 +124,7 @@ TEST(CutPieces, BarTornInTwo_IsNotStopped) {
 }
 
 // Explicit pieces in each other's teeth: friction of contacts that hold the same points contradicts itself,
-// and what no impulse removes is accepted (doc/decisions/0445). Without that 406 of 600 sub-steps.
+// and what no impulse removes is accepted. Without that 406 of 600 sub-steps.
 TEST(CutPieces, TubeInPieces_IsSolved) {
   const std::string out = test::scratch("cut_tube");
   test::write_file(out + "/tube.json",

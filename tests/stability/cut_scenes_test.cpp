@@ -55,7 +55,7 @@ TEST(CutScenes, LiverCutHalfWay_KeepsItsLobe) {
   EXPECT_TRUE(run.finite());
   EXPECT_FALSE(run.has("liver.1"));
 }
-// Every step is checked: the lips of its slits cross by less than what counts (decisions on cutting).
+// Every step is checked: the lips of its slits cross by less than what counts (doc/decisions/cutting.md).
 TEST(CutScenes, TornDoughJitteredRuns_FallOnTheTable) {
   for (int seed = 1; seed <= (test::soaks() ? 10 : 3); ++seed) {
     const test::SceneRun run("torn_dough", {"--check", "--jitter", std::to_string(seed)});

@@ -113,7 +113,7 @@ struct Slit {
 }  // namespace
 
 // Without contact beyond half an edge of slip, and of copies of points alone: a sixth of an edge deep.
-// With copies that hold for a tenth of an edge (decisions on cutting): up to 0.026.
+// With copies that hold for a tenth of an edge (doc/decisions/cutting.md): up to 0.026.
 TEST(Slit, ShearedAndPressed_KeepsItsSidesApart) {
   for (const bool rabbit : {false, true})
     for (const char *model : kModels) {

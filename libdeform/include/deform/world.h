@@ -39,7 +39,7 @@ typedef struct dfm_world_def {
   int32_t method, integrator; /* DFM_METHOD_*, DFM_INTEGRATOR_* */
   /* m, rest distance d_c; 0: chosen from the meshes of the world (1e-3 of the median surface edge) */
   double contact_offset;
-  /* m/s, slip that a sticking contact may have; 0: min(1e-6, 0.01 (d_c-d_g)/h); doc/decisions/0004 */
+  /* m/s, slip that a sticking contact may have; 0: min(1e-6, 0.01 (d_c-d_g)/h) (doc/concepts/contact.md) */
   double contact_tolerance;
   /* per sub-step; 50. Up to 20 times as many where these cost little (doc/concepts/contact.md) */
   uint32_t max_sweeps;

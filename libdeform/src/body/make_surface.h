@@ -28,8 +28,7 @@ void wear_coupling(Coupling &&coupling, Surface &surface);
 // are added in its order, so that rows may be cut among threads: gather_rows does surfels [begin,end) of a
 // coupled surface.
 void gather_surface(Surface &surface, const double *x, const double *v);
-// The way by which each surfel of coincident faces is set back, in units of `back`
-// (doc/decisions/cutting.md).
+// The way by which each surfel of coincident faces is set back, in units of `back`.
 // Between two bodies: of length one, in the direction that goes most steeply into the material, seen from
 // that face around it where it does so least; shorter only where the normals hardly lie in one half-space.
 // At a slit: the shortest w with n.w = -1 for each face, in the least-squares sense. At the tip of a slit

@@ -58,8 +58,7 @@ struct SelfRest {
 inline constexpr double kNearCopies = 3;
 // of d_c: as much nearer than the material touches features may come while copies hold them
 inline constexpr double kLeftToCopies = 0.5;
-// m, distance at which features rest that have copies of one point among their corners;
-// doc/decisions/cutting.md.
+// m, distance at which features rest that have copies of one point among their corners.
 //   back   what setting back has added to their distance, so that the material touches at it
 //   apart  of the copies: beyond kNearCopies contact goes over to the rule of two bodies
 inline double rest_beside(double back, double apart, double offset) {

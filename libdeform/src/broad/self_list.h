@@ -6,10 +6,9 @@
 // lists. And features that share a surfel are no pair, because they always touch.
 //
 // If few surfels have moved far, or a cut has changed part of the surface, only pairs with one of those
-// surfels are searched again (doc/decisions/detection_and_guard.md). The lists then refer to positions of
-// different times.
-// They are still complete, because the rule holds for any reference positions: pairs that were near at the
-// reference positions are listed, and displacements are measured from there.
+// surfels are searched again. The lists then refer to positions of different times. They are still complete,
+// because the rule holds for any reference positions: pairs that were near at the reference positions are
+// listed, and displacements are measured from there (doc/decisions/detection_and_guard.md).
 #pragma once
 #include <algorithm>
 #include <cmath>

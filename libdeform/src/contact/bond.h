@@ -15,8 +15,7 @@
 //     0 <= l <= most;   l = most where s > 0, s = 0 where 0 < l < most, s <= 0 where l = 0;   l s <= due
 //
 // which is dry friction that stops a motion, begins none, and does at most the work `due`. Both sides get
-// the impulse at the same point, so that the material is dragged by what the edge feels (decisions on
-// cutting).
+// the impulse at the same point, so that the material is dragged by what the edge feels.
 #pragma once
 #include <cstdint>
 

@@ -4,7 +4,7 @@
 // motion are in its null space. The motion does not determine them, but complementarity does: a loaded
 // contact with a gap must transfer its load to others. A sweep moves such loads by at most u / w, the same in
 // each sweep, so the transfer takes thousands of sweeps, which acceleration cannot predict, because nothing
-// else changes (doc/decisions/0225).
+// else changes (doc/decisions/contact_solver.md).
 //
 // The proximal point method takes the same way in long strides (Rockafellar 1976). With l0 the impulses so
 // far, it solves the contact problem in which each contact is compliant to its change of impulse by 1/rho, in

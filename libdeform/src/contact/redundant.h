@@ -1,6 +1,6 @@
-// Slip that no impulse removes (doc/decisions/0361). If there are more loaded contacts than touched points,
-// their conditions cannot all be met: slightly different normals and inconsistent gaps leave slips, and
-// sweeps keep moving impulses between contacts while velocities no longer change.
+// Slip that no impulse removes. If there are more loaded contacts than touched points, their conditions
+// cannot all be met: slightly different normals and inconsistent gaps leave slips, and sweeps keep moving
+// impulses between contacts while velocities no longer change (doc/decisions/contact_solver.md).
 #pragma once
 #include "contact/contact_state.h"
 #include "contact/rows.h"
@@ -14,7 +14,7 @@ class Redundant {
   // Before the first solve of a sub-step.
   void start() { left_.clear(); }
   // Whether there are more loaded contacts than dofs that they touch; or more between cut faces than ways in
-  // which the points that they hold move against each other (doc/decisions/0426).
+  // which the points that they hold move against each other (doc/decisions/contact_solver.md).
   //   cut  [contacts of all parts] whether both sides have cut faces; null: none have
   bool found(const ContactRows &rows, const RowsPart &part, const uint8_t *cut);
   bool found_at_cuts(const ContactRows &rows, const RowsPart &part, const uint8_t *cut);  // the latter

@@ -67,7 +67,7 @@ class Momentum {
 //   r_n <= normal[i]                      0.01 (d_c - d_g) / h: the gap is then off by less than a hundredth
 //                                         of its margin; less where laws remember
 //   r_t <= max(tangent[i], 1e-3 |slip|)   1e-6 m/s at rest, which bounds the creep of what sticks
-// (doc/decisions/0004-contact-tolerance.md).
+// (doc/decisions/contact_solver.md).
 struct Tolerance {
   double most_normal = 0;
   double bond = 0;                               // of |u + rate + soft l|, all bonds of the part

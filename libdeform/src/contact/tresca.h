@@ -12,7 +12,7 @@
 // matrix: its Hessian is A + J^T K J with K = -dP/du of each contact, which is as sparse as A. Each stride
 // renews the limits from the last normal impulses, so that in the end they are those of the law (Haslinger,
 // Hlavacek and Necas 1996, section 4.4). What results is measured by the residual of the sweeps.
-// doc/decisions/0420-contacts-that-sweeps-stall-on.md
+// doc/decisions/contact_solver.md
 #pragma once
 #include <span>
 

@@ -78,12 +78,11 @@ double rise(const EdgeFaces &faces, Vec3 outward, Vec3 across, double length) {
   return 0.25 * length * std::fabs(turn) * norm(cross(faces.along, across));
 }
 
-// m, how far a crossing yields under load (doc/decisions/contact_problem.md). Where one of the edges lies
-// in a flat
-// face, the distance of the surfaces is linear along the other edge, so that the crossing is no minimum:
-// contacts of surfels and of rims hold the surfaces apart, and the crossing only repeats them. Not so where
-// both edges are rims, nor where it replaces the contact of a surfel. Faces of a cut touch at the rest
-// distance of their surfaces, which were set back, and must not come nearer.
+// m, how far a crossing yields under load. Where one of the edges lies in a flat face, the distance of the
+// surfaces is linear along the other edge, so that the crossing is no minimum: contacts of surfels and of
+// rims hold the surfaces apart, and the crossing only repeats them. Not so where both edges are rims, nor
+// where it replaces the contact of a surfel (doc/decisions/contact_problem.md). Faces of a cut touch at the
+// rest distance of their surfaces, which were set back, and must not come nearer.
 double give(const Surface &sa, const Surface &sb, double rise_a, double rise_b, double offset) {
   if (sa.back > 0 || sb.back > 0) return 0;
   return kGive * offset * std::clamp(2 - std::min(rise_a, rise_b) / offset, 0.0, 1.0);

@@ -88,7 +88,7 @@ bool keeps_velocity(const ContactRows &rows, uint32_t i) {
 // that stops this velocity adds an impulse for it to that of the force, once. If the next sub-step started
 // from the sum, it would give the same velocity with the opposite sign, and so on: a body at rest would
 // oscillate at the tolerance for ever. So a contact that sticks at rest takes over half of a change, and the
-// extra impulse decays (doc/decisions/0326-half-of-a-change-at-rest.md).
+// extra impulse decays (doc/decisions/contact_solver.md).
 Vec3 next_start(const World &w, const StepContext &step, uint32_t i) {
   const Vec3 l = load3(&step.rows.impulse[size_t(3) * i]);
   const uint32_t m = step.match[i];

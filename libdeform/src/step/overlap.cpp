@@ -46,8 +46,7 @@ bool parts_of_one(const World &w, const OverlapPair &p) {
 }
 
 // Parts of what was one body lie on each other where they were one, with the faces of the cut set back by
-// half of the rest distance each (doc/decisions/cutting.md). A depth within that is their normal place, no
-// overlap.
+// half of the rest distance each. A depth within that is their normal place, no overlap.
 bool lie_on_cut(const World &w, const OverlapPair &p, const Crossed &c) {
   return parts_of_one(w, p) && c.depth <= w.offset && !deep(w, p, c);
 }
@@ -59,8 +58,7 @@ std::vector<Overlap> find_overlaps(World &w) {
     return w.overlaps.all || std::binary_search(placed.begin(), placed.end(), id);
   };
   const auto asked = [&](uint64_t id) { return was_placed(id) || was_placed(id | kPiece); };
-  // Sides of a slit that cross when a part comes off keep the contact that they had
-  // (doc/decisions/cutting.md).
+  // Sides of a slit that cross when a part comes off keep the contact that they had.
   const auto kept = [&](const OverlapPair &p, uint64_t a, uint64_t b) {
     return parts_of_one(w, p) && !was_placed(a) && !was_placed(b);
   };

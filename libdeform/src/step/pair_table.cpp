@@ -36,8 +36,7 @@ std::string_view whole_of(const World &w, uint32_t thing) {
   return thing < w.bodies.size() ? std::string_view(w.bodies[thing]->whole_name) : std::string_view();
 }
 
-// No rule: Coulomb's law with the geometric mean of the two materials' coefficients
-// (doc/decisions/friction_memory.md).
+// No rule: Coulomb's law with the geometric mean of the two materials' coefficients.
 uint32_t default_law(World &w, double a, double b) {
   const double mu = std::sqrt(a * b);
   const dfm_param_value values[] = {{"mu_C", &mu, 1}, {"mu_S", &mu, 1}};

@@ -38,7 +38,7 @@ constexpr uint32_t kBeyondCap = 8, kFewSweeps = 8;  // kFewSweeps: at least, on 
 // with momentum, beyond the limit up to kMostBeyond times as many sweeps, while all rows together are swept
 // at most kFreeShare times per unit of the sub-step's work without contact. A residual that does not fall is
 // no reason to stop: it can stay the same for hundreds of sweeps while loads move to other contacts
-// (doc/decisions/0455-sweeps-go-on-by-momentum.md).
+// (doc/decisions/contact_solver.md).
 constexpr uint32_t kAccelerated = 50, kMostBeyond = 20, kLookBeyond = 4;
 constexpr double kFreeShare = 32;
 bool glides(const SolveIsland &own) { return !(own.soft || own.revises || own.batches.remembers()); }
@@ -83,7 +83,7 @@ constexpr double kRunsAway = 1e6;
 // A law with memory is linearized, so the solution is accurate only near the slip at which the law was
 // evaluated. Where nearly redundant normal forces use up all sweeps of the first pass, that slip is the one
 // before contact: the bodies would keep, and be pushed by, friction that no law gives. Beyond the limit of
-// sweeps the laws are therefore evaluated again, followed by this many sweeps each time (doc/decisions/0201).
+// sweeps the laws are therefore evaluated again, followed by this many sweeps each time.
 constexpr uint32_t kPassSweeps = 20;
 // Where the budget does not hold all sweeps, no pass may use up what the others need
 // (doc/decisions/budgets.md).
@@ -173,10 +173,10 @@ void sweep_once(const World &w, StepContext &step, SolveIsland &own, double leav
 }
 
 // For bodies with few degrees of freedom, sweeps redistribute loads too slowly: at the limit of sweeps the
-// solve continues with proximal steps (decision 0225). rho is 1000 over a contact's own response, and less if
-// a step fails with it. The steps of a part cost at most kStridesOverCap times its sweeps up to the limit;
-// the next sub-step continues from there. Bodies that revise their response take no such steps, because large
-// changes of impulses would change the response.
+// solve continues with proximal steps. rho is 1000 over a contact's own response, and less if a step fails
+// with it. The steps of a part cost at most kStridesOverCap times its sweeps up to the limit; the next
+// sub-step continues from there. Bodies that revise their response take no such steps, because large changes
+// of impulses would change the response.
 constexpr uint32_t kMostStrides = 12, kStridesOverCap = 32;
 constexpr double kRho = 1e3, kLeastRho = 10;
 void stride_on(const World &w, StepContext &step, SolveIsland &own, uint32_t part) {
@@ -218,7 +218,7 @@ void stride_on(const World &w, StepContext &step, SolveIsland &own) {
   for (uint32_t part = 0; part < parts; ++part) stride_on(w, step, own, part);
 }
 
-// Nearly redundant contacts of bodies that revise their response (doc/decisions/0360). Normal forces that
+// Nearly redundant contacts of bodies that revise their response. Normal forces that
 // hold a body in more places than it can move in are consistent only to a few 1e-8 m: each sweep takes a
 // little load from a contact that is that far open and gives it to others, until the first has no load, and
 // friction follows. So once the polish is over, contacts whose normal velocity is within kLeave of the
@@ -247,7 +247,7 @@ void settle(const World &w, StepContext &step, SolveIsland &own, double &best) {
 // Whether velocities have stopped changing is checked after every kAskStands sweeps, once the polish is over.
 // Laws with memory are left out, because the remaining slip stretches bristles, and so is static mode, whose
 // contacts must be solved. Bodies that do not revise their response are checked between cut faces only
-// (doc/decisions/0445).
+// (doc/decisions/contact_solver.md).
 constexpr uint32_t kAskStands = 4;
 bool asks_redundant(const World &w, const StepContext &step, SolveIsland &own) {
   const uint8_t *const cut = step.solve_islands->of_cuts();
@@ -301,7 +301,7 @@ bool gives_up(const StepContext &step, const SolveIsland &own) { return own.stuc
 // sweep seldom reduces the residual to less than a quarter, and seldom to less than a half if the sweeps
 // before left more than 0.7 of it; so the residual is computed when it could be small enough at the earliest.
 // After the polish it is computed each time, because the best state is searched for
-// (doc/decisions/0419-islands-by-unknowns.md).
+// (doc/decisions/contact_solver.md).
 class Looks {
  public:
   bool due(const StepContext &step, const SolveIsland &own, uint32_t cap) const {
@@ -403,7 +403,7 @@ bool sweep_until_good(const World &w, StepContext &step, SolveIsland &own) {
 // A solve that did not converge may leave impulses that do work: with much friction in a jam each sweep adds
 // to it. If the contacts of an island do more work than their bias velocities explain, the island is solved
 // again with fixed friction limits, first without friction, which cannot add energy
-// (contact/fixed_limits.h, doc/decisions/0425-contact-does-no-work-of-its-own.md). most: of the work that the
+// (contact/fixed_limits.h, doc/decisions/contact_solver.md). most: of the work that the
 // impulses would do without a response.
 constexpr double kExcess = 0.1;
 constexpr uint32_t kFixedSweeps = 8;  // without friction, and as many with friction
@@ -486,7 +486,7 @@ void solve_passes(const World &w, StepContext &step, SolveIsland &own) {
 // Penetration depths are opened at bias velocities that do little work. Where contacts oppose each other the
 // work is large, and the island is solved again from zero impulses with lower bias velocities: first so low
 // that the work, which grows with their square, should be what is allowed; then with none, which adds no
-// energy (contact/recovery.h, doc/decisions/0411-opening-depths-does-little-work.md).
+// energy (contact/recovery.h, doc/decisions/contact_solver.md).
 constexpr double kSlowOpening = 0.03;  // of the rest distance in a sub-step: this is always allowed
 double share_of_opening(const ContactRows &rows, const RowsPart &part, double slow) {
   const OpeningWork opening = opening_work(rows, part, slow);

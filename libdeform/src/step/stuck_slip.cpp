@@ -18,7 +18,7 @@
 //     a(e) / T = kShare E / T, at most r / 2,   and   kShare (e - E) / T, at most r / 5.
 //
 // Bodies can follow E whatever the number of contacts, and nothing elastic opposes it. What begins to stick
-// owes E (doc/decisions/0468-sticking-holds-places.md).
+// owes E (doc/decisions/contact_solver.md).
 #include "step/stuck_slip.h"
 
 #include <algorithm>

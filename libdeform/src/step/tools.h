@@ -9,7 +9,7 @@ struct Obstacle;
 struct World;
 
 void check_tool_ways(const World &w, double dt);  // throws Error where one would move too fast
-// Is the obstacle a part with which a tool cuts this body? The two do not touch (decisions on cutting).
+// Is the obstacle a part with which a tool cuts this body? The two do not touch (doc/decisions/cutting.md).
 bool passes_through(const World &w, const Body &b, const Obstacle &o);
 void begin_tools(World &w, double dt);
 void end_tools(World &w, double dt);

@@ -2,7 +2,7 @@
 // faces follow: each cell takes the side of the blade on which its center lies when the edge passes it, and
 // keeps it; a face opens if the sides of its two cells differ. Around each edge of the mesh the number of
 // faces that open is then even, however the body moves. If each face tested by itself whether the blade has
-// crossed it, two faces tested in different steps could disagree (decisions on cutting).
+// crossed it, two faces tested in different steps could disagree (doc/decisions/cutting.md).
 //
 //                forward
 //       . |  .      ^        ahead: may still change sides

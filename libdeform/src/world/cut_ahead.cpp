@@ -30,8 +30,7 @@ namespace dfm {
 
 // The pairs of the whole surface that may touch each other, which the first cut of a body needs. They are
 // listed where the body is as it begins to wait; the step that follows the cut finds anew what has moved far
-// since (doc/decisions/detection_and_guard.md). Who uses other lists gets the same bits, so no step makes
-// these.
+// since. Who uses other lists gets the same bits, so no step makes these.
 struct ListJob : Aside::Job {
   std::shared_ptr<const Body> from;
   Surface surface;

@@ -2,7 +2,7 @@
 // F^T, weighted by their rest volumes. Where sqrt(largest eigenvalue) - 1 exceeds the strain at which the
 // material tears, the point is split by the plane normal to that eigenvector: the faces between cells on
 // different sides of it open. So each split adds a copy of a point, on any mesh, and no cell is divided
-// (decisions on cutting).
+// (doc/decisions/cutting.md).
 #include "world/tear.h"
 
 #include <algorithm>

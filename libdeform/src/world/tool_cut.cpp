@@ -1,5 +1,5 @@
 // A blade opens faces along its edge (world/blade_sweep.h), in the direction of the edge only. A blade that
-// does not move or moves back cuts nothing, and what touches its side stays whole (decisions on cutting).
+// does not move or moves back cuts nothing, and what touches its side stays whole (doc/decisions/cutting.md).
 #include "world/tool_cut.h"
 
 #include <algorithm>
