@@ -1,6 +1,7 @@
 // More surfels than points carry the body, and laws that are no projection: forces of single contacts are not
 // unique, their sum is. Before laws were asked again beyond the cap on sweeps, such a block turned round
-// instead of stopping and walked on at 7 mm/s, pushed by friction that no law gives (doc/decisions/0201).
+// instead of stopping and walked on at 7 mm/s, pushed by friction that no law gives
+// (doc/decisions/contact_solver.md).
 #include "coupled.h"
 #include "hold.h"
 
@@ -55,7 +56,7 @@ INSTANTIATE_TEST_SUITE_P(Laws, Redundant, testing::Values("dahl", "lugre", "elas
 
 // Beams of 40 modes on a slope that friction holds: 60 contacts hold 46 motions. Sweeps handed loads from
 // contact to contact too slowly, ended at their cap in every step, and the beam crept by 4e-6 m/s at 1/60 s
-// (doc/decisions/0225). Two beams are two parts; one alone has the same motion.
+// (doc/decisions/contact_solver.md). Two beams are two parts; one alone has the same motion.
 TEST(RedundantModes, BeamsOnASlope_Stay) {
   for (const double step : {1.0 / 60, 0.004}) {
     Context context;
@@ -85,9 +86,8 @@ TEST(RedundantModes, BeamsOnASlope_Stay) {
 }
 
 // Three blocks of 400 cells, turned against each other, land on each other and on a slope that holds them:
-// about 200 contacts that the blocks can move at in 350 ways. Before nearly redundant contacts kept their
-// normal impulses, 22 of these 25 steps ended at the cap on sweeps (doc/decisions/0360), and 9 before slips
-// that no impulse removes were told from others (doc/decisions/0361).
+// about 200 contacts that the blocks can move at in 350 ways. By sweeps alone 22 of these 25 steps ended at
+// their cap (doc/decisions/contact_solver.md).
 TEST(RedundantStack, TurnedBlocks_LandWithinTheTolerance) {
   for (const int32_t integrator : {DFM_INTEGRATOR_IMPLICIT_EULER, DFM_INTEGRATOR_TR_BDF2}) {
     Context context;

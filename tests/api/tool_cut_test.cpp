@@ -390,7 +390,7 @@ TEST(ToolCut, DrivenBlade_BendsTheBody) {
 }
 
 // The sides of the slit lie on each other under the drag, with friction: contacts that hold the same points
-// more than once, whose slips no impulse takes away (decision 0426).
+// more than once, whose slips no impulse takes away (doc/decisions/contact_solver.md).
 TEST(ToolCut, SidesOfASlitUnderDrag_AreSolved_ImplicitSteps) {
   Tough s(0, sides, "corotational_fem", DFM_INTEGRATOR_IMPLICIT_EULER);
   s.down(0.015, 0.2);
@@ -437,7 +437,8 @@ TEST(ToolCut, CoupledBlade_PaysTheEnergyOfTheCut_AndIsHeldBack) {
     Tough straight(2000, all, "corotational_fem", integrator, 5e9);
     straight.down(0.0, 0.1);
     straight.down(-0.4, 0.5);
-    EXPECT_NEAR(straight.work, cut, 1e-8 * cut);
+    // the limit of a drag follows from the velocity, which a solve leaves to its tolerance
+    EXPECT_NEAR(straight.work, cut, 1e-6 * cut);
     Tough free(2000, none, "corotational_fem", integrator);
     test::ok(dfm_world_filter_pair(free.w, "cube", "cube", false));
     free.down(0.0, 0.1);

@@ -123,8 +123,8 @@ TEST(CutPieces, BarTornInTwo_IsNotStopped) {
   EXPECT_EQ(r.exit_code, 0) << r.err;
 }
 
-// Explicit pieces in each other's teeth: friction of contacts that hold the same points contradicts itself,
-// and what no impulse removes is accepted (doc/decisions/0445). Without that 406 of 600 sub-steps.
+// Explicit pieces in each other's teeth: friction of contacts that hold the same points contradicts itself.
+// By sweeps alone 406 of 600 sub-steps did not converge (doc/decisions/contact_solver.md).
 TEST(CutPieces, TubeInPieces_IsSolved) {
   const std::string out = test::scratch("cut_tube");
   test::write_file(out + "/tube.json",

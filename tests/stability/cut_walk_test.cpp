@@ -16,7 +16,8 @@ TEST(CutWalk, RandomCuts_KeepMassMomentumContactsAndVolumes) {
   }
   EXPECT_GT(cuts, 1000u);
   for (const uint64_t n : {contacts, pieces, tears, undone}) EXPECT_GT(n, 5u);
-  // Without fixed limits in jams (doc/decisions/0425) two of these worlds reach 155 and 137,156 m/s.
+  // Where jams ended by sweeps alone (doc/decisions/contact_solver.md) two of these worlds reached 155 and
+  // 137,156 m/s.
   EXPECT_EQ(fast, 0u);
 }
 
@@ -31,7 +32,7 @@ TEST(CutWalk, JammedPieces_AreNotThrown) {
 
 // A crumb reached 12 to 48 km/s where a hit had turned a contact, whose friction stayed without its normal
 // impulse, and up to 2,430 m/s where contacts that oppose each other opened their depths
-// (doc/decisions/0411).
+// (doc/decisions/contact_solver.md).
 TEST(CutWalk, CrumbsBetweenTeeth_AreNotThrown) {
   for (const uint64_t seed : {202123u, 200171u, 203186u, 200117u, 200176u}) {
     const test::cutting::Walked r = test::cutting::walk_cuts(seed, 60);

@@ -1,5 +1,5 @@
 // A gasket pressed between two plates: one implicit body on which hundreds of contacts bear, whose points all
-// answer each other. Sweeps of contact do not agree on its loads (doc/decisions/0420).
+// answer each other. Sweeps of contact do not agree on its loads (doc/decisions/contact_solver.md).
 #include <fstream>
 
 #include "scenes.h"
