@@ -4,6 +4,8 @@ PREFIX ?= /usr/local
 SCENE ?= examples/scenes/two_cylinders.json
 # How many compilers or tests run at a time; a compiler needs half a gigabyte of memory.
 JOBS ?= $(shell nproc)
+# A folder of contact problems in Siconos' text format or FCLIB's HDF5
+CONTACT_PROBLEMS ?=
 # What bench-peers runs: all or quick
 PEERS ?= all
 SETUP = @cmake/fresh.sh && cmake/setup.sh
@@ -14,13 +16,15 @@ PYTHON ?= $(firstword $(wildcard /usr/bin/python3) python3)
 # The doors share build folders: `make -j demo test` runs one after the other. JOBS is for the compilers.
 .NOTPARALLEL:
 .PHONY: help demo test bench soak lint format tidy asan tsan fuzz install clean
-.PHONY: view bench-peers deb docs wheel setup setup-test setup-bench setup-fuzz setup-docs setup-peers
+.PHONY: view bench-contact bench-peers deb docs wheel
+.PHONY: setup setup-test setup-bench setup-fuzz setup-docs setup-peers
 
 help:
 	@echo "make demo             two soft cylinders with and without friction: table, picture, out/demo/"
 	@echo "make view [SCENE=..]  the same scene in a window"
 	@echo "make test             the whole test suite"
 	@echo "make bench            the figures: kernels and full steps"
+	@echo "make bench-contact    contact problems of others (FCLIB, Siconos): CONTACT_PROBLEMS=folder"
 	@echo "make bench-peers      beside MuJoCo, Bullet and Jolt: speed at equal error, build/peers/"
 	@echo "                      PEERS=quick: coarse scenes and the sliding block only, some minutes"
 	@echo "make soak             jittered starts, suite, combinations, holds, first scenes: hours; can stop"
@@ -84,6 +88,10 @@ asan tsan: %: setup build/%/build.ninja
 bench: setup-bench build/bench/build.ninja
 	$(BUILD) bench
 	$(BUILD) bench --target run_bench
+
+bench-contact: setup-bench build/bench/build.ninja
+	$(BUILD) bench --target contact_problems
+	build/bench/bin/contact_problems "$(CONTACT_PROBLEMS)"
 
 bench-peers: setup-peers build/release/build.ninja
 	$(BUILD) release --target deform_command

@@ -228,7 +228,6 @@ class Runner {
 
   std::string unsolved() const {
     const dfm_world_stats stats = world_stats(scene_);
-    const std::string sweeps = scene_.value("/contact/max_sweeps");
     // the solve of a sub-step that ends the run counts, the sub-step does not
     const uint64_t substeps = std::max(stats.substeps, stats.unconverged);
     char share[160];
@@ -237,14 +236,15 @@ class Runner {
                   static_cast<unsigned long long>(substeps),
                   100 * double(stats.unconverged) / double(substeps), stats.residual_max);
     const std::string said =
-        std::string("the contact solve stopped at its limit of sweeps ") + share +
+        std::string("the contact solve did not converge ") + share +
         ": forces of contact and friction are inexact there, and what should hold may creep; ";
     if (any_cut())
       return said +
-             "where teeth of a cut or torn body jam, more sweeps and shorter steps do not help: give its "
-             "material stiffness damping, or more of it";
-    return said + "raise \"max_sweeps\" of \"contact\" (" + (sweeps.empty() ? "50" : sweeps) +
-           "), take a shorter step, add damping to the material, or lower the ratio of masses or stiffnesses";
+             "where teeth of a cut or torn body jam, shorter steps do not help: give its material stiffness "
+             "damping, or more of it";
+    return said +
+           "raise \"max_work\" of \"time\" if the scene has one, take a shorter step, or add damping to the "
+           "material";
   }
 
   // A load that the material bears inverts few cells, where the mesh is coarse for it; one that it does not

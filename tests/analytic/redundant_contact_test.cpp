@@ -1,6 +1,7 @@
 // More surfels than points carry the body, and laws that are no projection: forces of single contacts are not
 // unique, their sum is. Before laws were asked again beyond the cap on sweeps, such a block turned round
-// instead of stopping and walked on at 7 mm/s, pushed by friction that no law gives.
+// instead of stopping and walked on at 7 mm/s, pushed by friction that no law gives
+// (doc/decisions/contact_solver.md).
 #include "coupled.h"
 #include "hold.h"
 
@@ -85,9 +86,8 @@ TEST(RedundantModes, BeamsOnASlope_Stay) {
 }
 
 // Three blocks of 400 cells, turned against each other, land on each other and on a slope that holds them:
-// about 200 contacts that the blocks can move at in 350 ways. Before nearly redundant contacts kept their
-// normal impulses, 22 of these 25 steps ended at the cap on sweeps, and 9 before slips
-// that no impulse removes were told from others (doc/decisions/contact_solver.md).
+// about 200 contacts that the blocks can move at in 350 ways. By sweeps alone 22 of these 25 steps ended at
+// their cap (doc/decisions/contact_solver.md).
 TEST(RedundantStack, TurnedBlocks_LandWithinTheTolerance) {
   for (const int32_t integrator : {DFM_INTEGRATOR_IMPLICIT_EULER, DFM_INTEGRATOR_TR_BDF2}) {
     Context context;
@@ -128,7 +128,7 @@ std::vector<dfm_body> five_blocks(Context &context, dfm_world w, BodyOptions o) 
 }  // namespace
 
 // Undamped, of 1 MPa. Before crossings of edges in their flush faces gave way under load, 9 of 10 sub-steps
-// ended at the cap on sweeps (doc/decisions/contact_problem.md).
+// ended at the cap on sweeps.
 TEST(RedundantStack, FiveExplicitBlocks_FewStepsEndAtTheCap) {
   Context context;
   const dfm_world w = make_world(context, {0, 0, -kG});

@@ -209,7 +209,9 @@ TEST(TrBdf2, CubeThatLands_MovesByBackwardEulerAndGainsNoEnergy) {
           EXPECT_EQ(dfm_world_hash(one.world), dfm_world_hash(other.world)) << what;
         }
         const dfm_body_measure m = test::measure(one.cube);
-        EXPECT_LE(m.kinetic + m.elastic, last * (1 + 1e-6)) << what;
+        // at the end the energy is that of velocities within the tolerance of contact
+        constexpr double kTolerance = 1e-6;  // m/s
+        EXPECT_LE(m.kinetic + m.elastic, last * (1 + 1e-6) + 0.5 * m.mass * kTolerance * kTolerance) << what;
         last = m.kinetic + m.elastic;
       }
       EXPECT_GT(test::measure(one.cube).momentum[2], -1e-6) << what;

@@ -437,7 +437,8 @@ TEST(ToolCut, CoupledBlade_PaysTheEnergyOfTheCut_AndIsHeldBack) {
     Tough straight(2000, all, "corotational_fem", integrator, 5e9);
     straight.down(0.0, 0.1);
     straight.down(-0.4, 0.5);
-    EXPECT_NEAR(straight.work, cut, 1e-8 * cut);
+    // the limit of a drag follows from the velocity, which a solve leaves to its tolerance
+    EXPECT_NEAR(straight.work, cut, 1e-6 * cut);
     Tough free(2000, none, "corotational_fem", integrator);
     test::ok(dfm_world_filter_pair(free.w, "cube", "cube", false));
     free.down(0.0, 0.1);

@@ -80,7 +80,8 @@ void expect_bounce(double young, const char *model) {
   EXPECT_GT(fine.up, 0.75 * fine.down);
   EXPECT_GT(now.up, 0.9 * fine.up);
   EXPECT_LT(now.up, fine.down);
-  EXPECT_LT(now.all - now.implicit, 0.07) << "explicit in the impact only";
+  // where contact costs implicit steps more than explicit ones take, those go on a little longer
+  EXPECT_LT(now.all - now.implicit, 0.15) << "explicit in the impact";
 }
 
 }  // namespace
@@ -93,9 +94,9 @@ TEST(Bounce, FiniteElements_AtTheDefaults) {
   for (const double young : {1e6, 5e6, 2e7}) expect_bounce(young, "corotational_fem");
 }
 
-// Steps that the user names are taken as they are.
-TEST(Bounce, NamedStep_IsNotRepeated) {
-  const Bounce b = bounce(2e7, "msm", 0.016);
+// An integrator that the user names stays, and damps the impact.
+TEST(Bounce, NamedIntegrator_IsNotStruck) {
+  const Bounce b = bounce(2e7, "msm", 0.016, DFM_INTEGRATOR_TR_BDF2);
   EXPECT_LT(b.up, 0.4 * b.down);
 }
 
@@ -136,7 +137,7 @@ TEST(Bounce, RestoredWithinAnImpact_ContinuesWithTheSameBits) {
     drop(k == 0 ? one : many, w[k], 2e7, "msm");
   }
   const auto to = [](dfm_world world, double t) {
-    while (dfm_world_time(world) < t) step(world, std::min(offered(world), 0.02));
+    while (dfm_world_time(world) < t) step(world, std::min(offered(world), 0.002));
     return dfm_world_hash(world);
   };
   const auto implicit = [&] {

@@ -1,4 +1,4 @@
-// Pieces of a rough cut rest where they touched as one body (doc/decisions/cutting.md): a cut sets nothing in
+// Pieces of a rough cut rest where they touched as one body: a cut sets nothing in
 // motion.
 #include <algorithm>
 #include <cmath>
@@ -123,8 +123,8 @@ TEST(CutPieces, BarTornInTwo_IsNotStopped) {
   EXPECT_EQ(r.exit_code, 0) << r.err;
 }
 
-// Explicit pieces in each other's teeth: friction of contacts that hold the same points contradicts itself,
-// and what no impulse removes is accepted. Without that 406 of 600 sub-steps.
+// Explicit pieces in each other's teeth: friction of contacts that hold the same points contradicts itself.
+// By sweeps alone 406 of 600 sub-steps did not converge (doc/decisions/contact_solver.md).
 TEST(CutPieces, TubeInPieces_IsSolved) {
   const std::string out = test::scratch("cut_tube");
   test::write_file(out + "/tube.json",
@@ -166,7 +166,7 @@ unsigned long crossings(const std::string &name, const std::string &scene) {
 
 // A first scene at the defaults (tests/bench/first_scenes, seed 140): two halves of a bar of jelly that falls
 // on a floor. Where least squares set bent teeth of the cut back through each other, the guard was off for
-// both halves (doc/decisions/cutting.md): 28 pairs.
+// both halves: 28 pairs.
 TEST(CutPieces, JellyCutInTwo_NothingPassesThrough) {
   EXPECT_EQ(crossings("cut_jelly", R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.5},
     "materials": {"jelly": {"density": 1000, "young": 1000, "poisson": 0.45, "damping": {"mass": 0.5}}},
@@ -179,7 +179,7 @@ TEST(CutPieces, JellyCutInTwo_NothingPassesThrough) {
 }
 
 // A bar of dough is pulled until it tears at both ends. Splinters that hang in the teeth of an end were parts
-// of the middle, whose contact with that end was off as a whole (doc/decisions/cutting.md): 164 pairs.
+// of the middle, whose contact with that end was off as a whole: 164 pairs.
 TEST(CutPieces, SplintersOfATornBar_StayWithTheEndTheyHangOn) {
   EXPECT_EQ(crossings("torn_bar", R"({"format": "deform-scene", "version": 1,
     "time": {"duration": 0.9, "step": 0.0005},
@@ -210,7 +210,7 @@ void put_where_it_is(dfm_body b) {
 }  // namespace
 
 // Sides of a slit that cross when a part comes off are a result of contact: the pair keeps it. A piece that a
-// host puts there would be thrown out (doc/decisions/cutting.md).
+// host puts there would be thrown out.
 TEST(CutPieces, CrossedWhenTheyPart_KeepContactUnlessPlaced) {
   const Ball ball("corotational_fem", 0);
   cut(ball.b, plane(0, 0.005, DFM_CUT_SPLIT));

@@ -39,11 +39,11 @@ typedef struct dfm_world_def {
   int32_t method, integrator; /* DFM_METHOD_*, DFM_INTEGRATOR_* */
   /* m, rest distance d_c; 0: chosen from the meshes of the world (1e-3 of the median surface edge) */
   double contact_offset;
-  /* m/s, slip that a sticking contact may have; 0: min(1e-6, 0.01 (d_c-d_g)/h) (doc/concepts/contact.md) */
+  /* m/s, slip that a sticking contact may have; 0: min(1e-6, 0.01 (d_c-d_g)/h); doc/concepts/contact.md */
   double contact_tolerance;
-  /* per sub-step; 50. Up to 20 times as many where these cost little (doc/concepts/contact.md) */
+  /* of explicit islands, before Newton's method goes on; 50, and 4 times as many from 100 contacts on */
   uint32_t max_sweeps;
-  uint32_t max_passes;   /* outer passes per sub-step; 20 */
+  uint32_t max_passes;   /* outer passes of these sweeps; 20 */
   uint32_t max_substeps; /* a step that needs more returns DFM_DISCARD; 10000 */
   /* 1: islands of bodies at rest sleep until something reaches them (doc/concepts/sleeping.md); default 0 */
   uint32_t sleep;
@@ -119,7 +119,7 @@ enum {
   /* dt is above the stable step: sub-steps were taken or, with DFM_DISCARD, more than max_substeps would be
    * needed. Use a softer material, a coarser mesh or a shorter step, or accept the cost */
   DFM_TROUBLE_SUBSTEPS = 1,
-  DFM_TROUBLE_UNCONVERGED = 2, /* the contact solve stopped at max_sweeps: raise it, or lower mass ratios */
+  DFM_TROUBLE_UNCONVERGED = 2, /* no answer to contact was found: contacts exclude each other, or max_work */
   /* a plugin or a load produced a NaN or a velocity above the speed of light: the last good sub-step is kept
    * (DFM_E_DIVERGED) */
   DFM_TROUBLE_NONFINITE = 4,

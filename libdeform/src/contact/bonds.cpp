@@ -29,19 +29,23 @@ void each_bond(const RowsPart &part, F &&f) {
 // in closed form: what stops the edge, the limit, or what does the work that is left (due),
 //
 //     l (s - w l) = due with the speed s without it,   l = 2 due / (s + sqrt(s^2 - 4 w due))
-double drag_of(const ContactRows &rows, uint32_t row) {
+struct Drag {
+  double impulse, limit;
+};
+Drag drag_of(const ContactRows &rows, uint32_t row) {
   const ContactRows::BondRow &b = rows.bond[row - rows.n];
   const double now = dot(b.along, load3(&rows.impulse[size_t{3} * row]));
   const double speed = b.w * now - dot(b.along, rows.velocity(row));
-  if (!(speed > 0)) return 0;
+  if (!(speed > 0)) return {0, b.most};
   const double l = b.w > 0 ? std::min(b.most, speed / b.w) : b.most;
-  if (l * (speed - b.w * l) <= b.due) return l;
-  return 2 * b.due / (speed + std::sqrt(std::max(0.0, speed * speed - 4 * b.w * b.due)));
+  if (l * (speed - b.w * l) <= b.due) return {l, b.most};
+  const double paid = 2 * b.due / (speed + std::sqrt(std::max(0.0, speed * speed - 4 * b.w * b.due)));
+  return {paid, paid};
 }
 
 void solve_drag(ContactRows &rows, uint32_t row) {
   double *const l = &rows.impulse[size_t{3} * row];
-  const Vec3 next = drag_of(rows, row) * rows.bond[row - rows.n].along, change = next - load3(l);
+  const Vec3 next = drag_of(rows, row).impulse * rows.bond[row - rows.n].along, change = next - load3(l);
   if (change.x == 0 && change.y == 0 && change.z == 0) return;
   rows.apply(row, change);
   store3(l, next);
@@ -117,8 +121,12 @@ void solve_one(ContactRows &rows, uint32_t row) {
 Vec3 bond_residual(const ContactRows &rows, uint32_t row) {
   const ContactRows::BondRow &b = rows.bond[row - rows.n];
   const Vec3 l = load3(&rows.impulse[size_t{3} * row]);
-  if (b.drags()) return b.w * (drag_of(rows, row) * b.along - l);
+  if (b.drags()) return b.w * (drag_of(rows, row).impulse * b.along - l);
   return counted(b, rows.velocity(row) + b.rate + b.soft * l);
+}
+
+void limit_drag(ContactRows &rows, uint32_t row) {
+  rows.bond[row - rows.n].most = drag_of(rows, row).limit;
 }
 
 namespace {

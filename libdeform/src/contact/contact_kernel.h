@@ -28,7 +28,7 @@ struct RowsView {
   const double *frame, *drive;  // [n,9], [n,3] plus one vector, which is ignored
   const double *across;         // [n,9] the frame transposed, and a vector more
   const double *rate, *wn, *wt, *cross;
-  const double *yields;  // [n,2] softness and its largest effect
+  const double *yields;  // [n,3] softness, its largest effect, the load from which on it acts
 };
 // Of ContactState.
 struct LawView {

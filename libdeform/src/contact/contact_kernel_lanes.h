@@ -72,7 +72,7 @@ void sweep(const RowsView &rows, const LawView &law, double h, double *y, double
     if (!(wn > 0)) continue;  // both sides are held: impulses have no effect
     double *const l = impulse + 3 * size_t(i);
     const Four u = velocity(rows, y, i);
-    const double ln = normal_impulse(l[0], get(u, 0) + rows.rate[i], wn, rows.yields + 2 * size_t(i)),
+    const double ln = normal_impulse(l[0], get(u, 0) + rows.rate[i], wn, rows.yields + 3 * size_t(i)),
                  d = ln - l[0];
     if (ln == 0 && l[0] == 0 && l[1] == 0 && l[2] == 0) continue;
     Pair t{0, 0};
@@ -97,7 +97,7 @@ Residual residual(const RowsView &rows, const LawView &law, const ToleranceView 
     if (!(wn > 0)) continue;
     const double *const l = impulse + 3 * size_t(i);
     const Four u = velocity(rows, y, i);
-    const double open = get(u, 0) + rows.rate[i] + given(l[0], rows.yields + 2 * size_t(i)),
+    const double open = get(u, 0) + rows.rate[i] + given(l[0], rows.yields + 3 * size_t(i)),
                  closed = wn * l[0];
     const double normal = __builtin_fabs(open < closed ? open : closed);
     poison += 0.0 * ((get(u, 0) + get(u, 1)) + (get(u, 2) + l[0]));

@@ -9,16 +9,18 @@ struct Pair { double a, b; };
 
 static inline double larger(double a, double b) { return a < b ? b : a; }  // as std::max, also of a NaN
 
-// The normal impulse l of a contact: 0 <= l complementary to u_n + rate + min(c l, m) >= 0, with yields = (c,
-// m). For the present l and k = u_n + rate, the new l is a root of k + wn (l' - l) + min(c l', m): the larger
-// of the roots with either term, because both increase with l'.
+// The normal impulse l of a contact: 0 <= l complementary to u_n + rate + min(c max(l - p, 0), m) >= 0, with
+// yields = (c, m, p). For the present l and k = u_n + rate, the new l is a root of
+// k + wn (l' - l) + min(c max(l' - p, 0), m).
 static inline double normal_impulse(double l, double k, double wn, const double *yields) {
-  if (yields[0] == 0) return larger(0.0, l - k / wn);
-  return larger(0.0, larger(l - (k + yields[0] * l) / (wn + yields[0]), l - (k + yields[1]) / wn));
+  const double firm = l - k / wn;
+  if (yields[0] == 0) return larger(0.0, firm);
+  const double soft = l - (k + yields[0] * (l - yields[2])) / (wn + yields[0]);
+  return larger(0.0, larger(l - (k + yields[1]) / wn, firm < soft ? firm : soft));
 }
 // m/s, by which the load presses the contact in.
 static inline double given(double l, const double *yields) {
-  const double all = yields[0] * l;
+  const double all = yields[0] * larger(0.0, l - yields[2]);
   return all < yields[1] ? all : yields[1];
 }
 

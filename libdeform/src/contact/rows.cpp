@@ -12,8 +12,8 @@ ContactRows::ContactRows(const Memory &m)
     : kernels_(dense_kernels()),
       loops_(doubles_at_once() >= 4 ? contact_kernels_avx2() : contact_kernels_sse2()) {
   use_memory(m, across_, begin, dof, weight, y, y_free, alone, source, point, block, blocks, response_,
-             given_, frame, drive, rate, yields, wn, wt, cross, impulse, bond, dof_of_point_, dof_of_node_,
-             place_, rigid, arm, dof_of_group_, every_block_);
+             given_, frame, drive, rate, opens, yields, wn, wt, cross, impulse, bond, dof_of_point_, dof_of_node_,
+             place_, rigid, arm, dof_of_group_, every_block_, whole_of);
 }
 
 // Of the dofs from `first` on.
@@ -93,6 +93,8 @@ void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const 
   block.clear();
   blocks.clear();
   response_.clear();
+  whole_of.clear();
+  for (const DofSource &s : sources) whole_of.push_back(s.whole);
   ndof = 0;
 
   auto source_of = [&](uint32_t node) {
@@ -220,6 +222,16 @@ Vec3 ContactRows::rigid_diagonal(uint32_t i, Vec3 a) const {
   return load3(v) + dfm::cross(load3(v + 3), r);
 }
 
+// 1/kg: what the implicit bodies of contact i answer as a whole; their nodes have the rest.
+double ContactRows::whole_answer(uint32_t i) const {
+  double sum = 0;
+  for (uint32_t j = begin[i], last = kNone; j < begin[i + 1]; ++j) {
+    const uint32_t d = dof[j], s = block[d] == kNone ? source[d] : kNone;
+    if (s != kNone && s != std::exchange(last, s)) sum += whole_of[s];
+  }
+  return sum;
+}
+
 // a^T W a for a unit world direction a, as a vector so that mixed terms come out too: returns (W a).
 Vec3 ContactRows::diagonal(uint32_t i, Vec3 a) const {
   Vec3 sum;
@@ -317,6 +329,8 @@ void ContactRows::finish_bonds(std::span<const Bond> bonds) {
       along[c] = 1;
       w[c] = diagonal(i, along);
     }
+    const double body = whole_answer(i);
+    for (int c = 0; c < 3; ++c) w[c][c] += body;
     wn[i] = w[0].x;
     wt[i] = std::max(w[1].y, w[2].z);
     BondRow &row = bond[k];
@@ -340,7 +354,7 @@ void ContactRows::finish(std::span<const ContactPoint> contacts, const double *t
   frame.resize(size_t(all()) * 9);
   drive.resize(size_t(all()) * 3);
   rate.resize(n);
-  yields.resize(size_t(n) * 2);
+  yields.resize(size_t(n) * 3);
   wn.resize(all());
   wt.resize(all());
   cross.resize(size_t(n) * 2);
@@ -358,19 +372,53 @@ void ContactRows::finish(std::span<const ContactPoint> contacts, const double *t
     store3(&drive[size_t(i) * 3], {dot(normal, v), dot(t1, v), dot(t2, v)});
     rate[i] = bias_velocity(contacts[i].distance, offset, h, planned, most);
     const Vec3 w0 = diagonal(i, normal);
-    wn[i] = dot(normal, w0);
+    const double body = whole_answer(i);
+    wn[i] = dot(normal, w0) + body;
     // min(c l, m) balances the opening speed of a depth `give` at most: no load presses it deeper.
-    yields[2 * size_t(i)] = contacts[i].give > 0 ? kSoft * wn[i] : 0;
-    yields[2 * size_t(i) + 1] = kCloses * contacts[i].give / planned;
+    yields[3 * size_t(i)] = contacts[i].give > 0 ? kSoft * wn[i] : 0;
+    yields[3 * size_t(i) + 1] = kCloses * contacts[i].give / planned;
+    yields[3 * size_t(i) + 2] = 0;
     cross[2 * size_t(i)] = dot(t1, w0);
     cross[2 * size_t(i) + 1] = dot(t2, w0);
     const Vec3 w1 = diagonal(i, t1), w2 = diagonal(i, t2);
     const double a = dot(t1, w1), c = dot(t2, w2), b = dot(t1, w2);
-    wt[i] = 0.5 * (a + c) + std::sqrt(0.25 * (a - c) * (a - c) + b * b);
+    wt[i] = 0.5 * (a + c) + std::sqrt(0.25 * (a - c) * (a - c) + b * b) + body;
   };
   each_row_in_blocks(n, tasks, fill);
   if (nbond) finish_bonds(bonds);
   turn_frames();
+}
+
+// Times what a contact alone needs: what opening a depth adds to its load, and the load against which it opens.
+constexpr double kBears = 3;
+
+void ContactRows::hold_openings(std::span<const double> firm) {
+  opens.assign(n, 0.0);
+  for (uint32_t i = 0; i < n; ++i) {
+    const double speed = -rate[i];
+    if (!(speed > 0) || !(wn[i] > 0) || (!firm.empty() && firm[i] > 0)) continue;
+    double *const yield = &yields[3 * size_t(i)];
+    if (yield[0] > 0) {  // a crossing that gives way bears almost nothing while it opens
+      yield[1] = std::max(yield[1], speed);
+      continue;
+    }
+    opens[i] = speed;
+    rate[i] = 0;
+  }
+}
+
+double ContactRows::open(const RowsPart &part) {
+  double most = 0;
+  each_row(part.contacts, [&](uint32_t i) {
+    if (!(opens[i] > 0)) return;
+    most = std::max(most, opens[i]);
+    rate[i] = -opens[i];
+    double *const yield = &yields[3 * size_t(i)];
+    yield[0] = wn[i] / kBears;
+    yield[1] = opens[i];
+    yield[2] = std::min(impulse[3 * size_t(i)], kBears * std::max(0.0, -velocity(i, y_free.data()).x) / wn[i]);
+  });
+  return most;
 }
 
 void ContactRows::turn_frames() {
@@ -442,17 +490,6 @@ void ContactRows::apply(uint32_t i, Vec3 q) {
   }
 }
 
-void ContactRows::restore(std::span<const uint32_t> contacts, std::span<const uint32_t> of_blocks) {
-  for (const uint32_t number : of_blocks) {
-    const size_t first = size_t(4) * blocks[number].first;
-    std::copy_n(&y_free[first], size_t(4) * blocks[number].count, &y[first]);
-  }
-  for (const uint32_t i : contacts) {
-    const Vec3 l = load3(&impulse[size_t(i) * 3]);
-    if (l.x != 0 || l.y != 0 || l.z != 0) apply(i, l);
-  }
-}
-
 void ContactRows::push_rigid(const Block &b) {
   for (uint32_t i = 0; i < all(); ++i) {
     if (rigid[i] == kNone || rigid[i] < b.first || rigid[i] >= b.first + b.count) continue;
@@ -472,8 +509,8 @@ constexpr double kRounding = 1e-13;
 
 // Each block's response is R = L L^T, by Cholesky's method that takes the largest diagonal next (Higham 1990)
 // and stops where nothing is left: the columns of L are motions that answer unit impulses.
-bool ContactRows::motions(std::span<const uint32_t> contacts, std::span<const uint32_t> of_blocks,
-                          uint32_t most, Motions &out) const {
+void ContactRows::motions(std::span<const uint32_t> contacts, std::span<const uint32_t> of_blocks,
+                          Motions &out) const {
   Array<double> &g = out.g, &columns = out.columns, &left = out.left;
   Array<size_t> &first_column = out.first_column, &column_count = out.column_count,
                 &first_value = out.first_value;
@@ -492,7 +529,7 @@ bool ContactRows::motions(std::span<const uint32_t> contacts, std::span<const ui
     for (size_t own = 0; own < size; ++own) {
       const size_t pivot = size_t(std::max_element(left.begin(), left.end()) - left.begin());
       if (!(left[pivot] > kRounding * top)) break;
-      if (++found > most) return false;
+      ++found;
       const size_t at = columns.size();
       columns.resize(at + size);
       const double *const before = &columns[start];
@@ -517,6 +554,7 @@ bool ContactRows::motions(std::span<const uint32_t> contacts, std::span<const ui
     // what each motion of its block makes of the contact's velocity
     const auto put = [&](uint32_t d, auto &&change) {
       const uint32_t number = block[d];
+      if (number == kNone) return;
       const Block &b = blocks[number];
       for (size_t c = 0; c < column_count[number]; ++c) {
         const size_t at = first_value[number] + c * 3 * b.count + size_t(3) * (d - b.first);
@@ -532,7 +570,6 @@ bool ContactRows::motions(std::span<const uint32_t> contacts, std::span<const ui
         return -(load3(at) + dfm::cross(load3(at + 3), load3(&arm[size_t(3) * i])));
       });
   }
-  return true;
 }
 
 }  // namespace dfm

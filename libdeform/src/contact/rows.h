@@ -29,11 +29,13 @@ struct DofSource {
   uint32_t first_node = 0, nnode = 0;    // world-wide surfel numbers of the body
   uint32_t first_point = 0, npoint = 0;  // world-wide phyxel numbers
   const Surface *surface = nullptr;
-  // [npoint,4] 1/kg, Dynamics::diagonal(); null: surfels are the unknowns
+  // [npoint,4] 1/kg, Dynamics::diagonal(), or ImplicitSystem::diagonal_inverse(); null: surfels are the unknowns
   const double *diagonal = nullptr;
   const double *velocity = nullptr;  // without contact: [npoint,4] or, of surfels, surface->v
   // [npoint,4] m, positions of phyxels, of a surface whose surfels are set back from them; else null
   const double *place = nullptr;
+  // 1/kg, estimate of what an implicit body answers as a whole, beside `diagonal`
+  double whole = 0;
 };
 
 // The rigid body that an obstacle is: its number in a group of bodies that answer each other's impulses.
@@ -76,8 +78,10 @@ struct ContactRows {
   Array<double> frame;
   Array<double> drive;  // [all,3] obstacle velocity in the frame
   Array<double> rate;   // [n] m/s: gap / h; a depth 0.2 gap / h, at least -0.1 d_c / h
-  // [n,2] Of a contact that is compliant under its load l (ContactPoint::give): the softness c, 1/kg, and the
-  // largest effect m, m/s, of min(c l, m), which is added to u_n + rate. 0, 0 for all others.
+  Array<double> opens;  // [n] m/s, -rate of depths that hold_openings() holds; else 0
+  // [n,3] Of a contact that is compliant under its load l (ContactPoint::give, open()): the softness
+  // c, 1/kg, its largest effect m, m/s, and the load p, N s, from which on it yields: min(c max(l - p, 0), m) is
+  // added to u_n + rate. 0, 0, 0 for all others.
   Array<double> yields;
   Array<double> wn, wt;  // [all] 1/kg: W_nn; largest eigenvalue of W_tt, of a bond the larger of W_yy, W_zz
   // [n,2] 1/kg: W_tn, the slip that a unit normal impulse makes at its own contact
@@ -97,6 +101,7 @@ struct ContactRows {
   };
   Array<BondRow> bond;  // [nbond]
 
+  Array<double> whole_of;  // [sources] DofSource::whole
   // m/s, at most, at which a depth is opened; 0: a tenth of the rest distance per sub-step
   double recovery = 0;
 
@@ -124,6 +129,13 @@ struct ContactRows {
   // alone.
   void finish(std::span<const ContactPoint> contacts, const double *tangents, double h, double planned,
               double offset, std::span<const Bond> bonds = {}, Tasks *tasks = nullptr);
+  // Depths open once the contacts bear their loads. After hold_openings() they get no deeper. open() then lets
+  // those of a part open at their rates, against the loads that they bear at that time and some times what the
+  // contact alone needs, and against no larger load: where normals oppose each other, n and -n + e would open
+  // at -rate / |e|. So u = 0 is always allowed. Loads for the next sub-step are those before opening, or they
+  // would grow where depths cannot open. firm: [n] where above zero, the row stays as it is; empty: none does.
+  void hold_openings(std::span<const double> firm);
+  double open(const RowsPart &part);  // m/s, the largest rate
   void turn_frames();  // once `frame` and `drive` are known, for the kernels; finish() has done it
 
   // Do all unknowns of the part answer their own impulses only? The contacts' loops then run in the kernels.
@@ -133,6 +145,8 @@ struct ContactRows {
   RowsView view(RowRun contacts) const;
   RowsPart whole();  // all of them; valid until the next call
 
+  // 1/kg: the estimate of what implicit bodies answer as a whole, in wn and wt of this row; 0 without any
+  double whole_answer(uint32_t i) const;
   Vec3 rigid_diagonal(uint32_t i, Vec3 a) const;  // of W a of a contact: the rigid body's part
   // relative velocity of contact i in its frame (normal, t1, t2); of unknowns like y
   Vec3 velocity(uint32_t i) const { return velocity(i, y.data()); }
@@ -144,11 +158,8 @@ struct ContactRows {
   void apply_last();
   // y of a part from the impulses alone: sweeps have left it not finite, or with their rounding
   void restore(const RowsPart &part);
-  // The same for blocks that these contacts alone act on.
-  void restore(std::span<const uint32_t> contacts, std::span<const uint32_t> of_blocks);
-  // G [3 contacts, padded] with velocity = velocity without impulses + G G^T impulse for contacts that act on
-  // these blocks alone, padded: rank rounded up to fours, with zeros. False: they move in more ways than
-  // `most`.
+  // G [3 contacts, padded]: velocities change by G G^T impulse through these blocks. Padded: rank rounded up to
+  // fours, with zeros.
   struct Motions {
     Array<double> g;
     uint32_t rank = 0;
@@ -157,8 +168,7 @@ struct ContactRows {
     Array<double> columns, left;
     Array<size_t> first_column, column_count, first_value;
   };
-  bool motions(std::span<const uint32_t> contacts, std::span<const uint32_t> of_blocks, uint32_t most,
-               Motions &out) const;
+  void motions(std::span<const uint32_t> contacts, std::span<const uint32_t> of_blocks, Motions &out) const;
   // changes y of a rigid group by all impulses that act on it: its response has been renewed
   void push_rigid(const Block &group);
 

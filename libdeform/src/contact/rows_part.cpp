@@ -19,7 +19,7 @@ RowsView ContactRows::view(RowRun r) const {
           wn.data() + i,
           wt.data() + i,
           cross.data() + 2 * i,
-          yields.data() + 2 * i};
+          yields.data() + 3 * i};
 }
 
 bool ContactRows::stands(const Block &b) const {

@@ -18,7 +18,7 @@ Pair friction_impulse(const ContactRows &rows, const LawView &law, uint32_t i, d
 
 double normal_impulse(const ContactRows &rows, uint32_t i, double un) {
   return normal_impulse(rows.impulse[size_t(i) * 3], un + rows.rate[i], rows.wn[i],
-                        &rows.yields[size_t(i) * 2]);
+                        &rows.yields[size_t(i) * 3]);
 }
 
 }  // namespace
@@ -49,16 +49,13 @@ void linearize(const ContactRows &rows, const RowsPart &part, double h, ContactS
 
 namespace {
 
-// As the kernel, where impulses at one dof change others. kLeaves: with `leave`.
-template <bool kLeaves>
-void sweep_answers(ContactRows &rows, const RowsPart &part, const LawView &law, double h, double leave) {
+// As the kernel, where impulses at one dof change others.
+void sweep_answers(ContactRows &rows, const RowsPart &part, const LawView &law, double h) {
   each_row(part.contacts, [&](uint32_t i) {
     if (!(rows.wn[i] > 0)) return;  // both sides are held: nothing an impulse could change
     double *const l = &rows.impulse[size_t(i) * 3];
     const Vec3 u = rows.velocity(i);
-    const bool stays =
-        kLeaves && std::fabs(u.x + rows.rate[i] + given(l[0], &rows.yields[size_t(i) * 2])) <= leave;
-    const double ln = stays ? l[0] : normal_impulse(rows, i, u.x), d = ln - l[0];
+    const double ln = normal_impulse(rows, i, u.x), d = ln - l[0];
     if (ln == 0 && l[0] == 0 && l[1] == 0 && l[2] == 0) return;
     Pair t{0, 0};
     if (ln > 0 && rows.wt[i] > 0)
@@ -74,13 +71,12 @@ void sweep_answers(ContactRows &rows, const RowsPart &part, const LawView &law, 
 
 }  // namespace
 
-void sweep(ContactRows &rows, const RowsPart &part, const ContactState &law, double h, double leave) {
-  if (part.alone && !(leave > 0))
+void sweep(ContactRows &rows, const RowsPart &part, const ContactState &law, double h) {
+  if (part.alone)
     for (const RowRun &run : part.contacts)
       rows.kernels().sweep(rows.view(run), law.view(run.first), h, rows.y.data(),
                            rows.impulse.data() + size_t(3) * run.first);
-  else if (leave > 0) sweep_answers<true>(rows, part, law.view(), h, leave);
-  else sweep_answers<false>(rows, part, law.view(), h, 0);
+  else sweep_answers(rows, part, law.view(), h);
 }
 
 namespace {
@@ -147,7 +143,7 @@ void Acceleration::start(const ContactRows &rows, const RowsPart &part) {
   take_impulses(rows, part, from_.data());
 }
 
-void Acceleration::follow(ContactRows &rows, const RowsPart &part, bool leaps) {
+void Acceleration::follow(ContactRows &rows, const RowsPart &part) {
   const ContactKernels &loops = rows.kernels();
   take_impulses(rows, part, now_.data());
   std::fill(now_.begin() + std::ptrdiff_t{3} * part.all(), now_.end(), 0.0);
@@ -178,39 +174,10 @@ void Acceleration::follow(ContactRows &rows, const RowsPart &part, bool leaps) {
   first_ = false;
   last_ = size;
 
-  if (leaps && count_ > 0 && least_combination(count_, gram_, y, gamma)) {
+  if (count_ > 0 && least_combination(count_, gram_, y, gamma)) {
     loops.combine(n_, count_, gamma, dg_.data(), now_.data());
     leap(rows, part, now_.data());
   }
-  take_impulses(rows, part, from_.data());
-}
-
-Momentum::Momentum(const Memory &m) { use_memory(m, from_, last_, now_); }
-
-void Momentum::start(const ContactRows &rows, const RowsPart &part) {
-  age_ = 0;
-  for (Array<double> *a : {&from_, &last_, &now_}) a->resize(size_t(3) * part.all());
-  take_impulses(rows, part, from_.data());
-  last_.assign(from_.begin(), from_.end());
-}
-
-void Momentum::follow(ContactRows &rows, const RowsPart &part) {
-  take_impulses(rows, part, now_.data());
-  double along = 0;
-  uint32_t k = 0;
-  const auto add = [&](uint32_t i) {
-    for (const double w : {rows.wn[i], rows.wt[i], rows.wt[i]}) {
-      along += w * (now_[k] - from_[k]) * (now_[k] - last_[k]);
-      ++k;
-    }
-  };
-  each_row(part.contacts, add);
-  each_row(part.bonds, add);
-  age_ = along < 0 ? 1 : age_ + 1;
-  // the step beyond the result, in the place of the result before
-  for (k = 0; k < now_.size(); ++k) last_[k] = double(age_ - 1) / double(age_ + 2) * (now_[k] - last_[k]);
-  leap(rows, part, last_.data());
-  last_.swap(now_);
   take_impulses(rows, part, from_.data());
 }
 
@@ -219,7 +186,7 @@ namespace {
 double normal_residual(const ContactRows &rows, uint32_t i, Vec3 u) {
   return std::fabs(
       std::min(rows.wn[i] * rows.impulse[size_t(i) * 3],
-               u.x + rows.rate[i] + given(rows.impulse[size_t(i) * 3], &rows.yields[size_t(i) * 2])));
+               u.x + rows.rate[i] + given(rows.impulse[size_t(i) * 3], &rows.yields[size_t(i) * 3])));
 }
 
 double tangent_residual(const ContactRows &rows, uint32_t i, Pair law) {
@@ -248,13 +215,11 @@ Residual with_bonds(const ContactRows &rows, const RowsPart &part, const Toleran
   return r;
 }
 
-// each(f): f(i) for all contacts i.
-template <class Each>
-Residual residual(const ContactRows &rows, const LawView &law, double h, const Tolerance &tolerance,
-                  Each &&each) {
+Residual residual(const ContactRows &rows, const RowsPart &part, const LawView &law, double h,
+                  const Tolerance &tolerance) {
   Residual r;
   double poison = 0;
-  each([&](uint32_t i) {
+  each_row(part.contacts, [&](uint32_t i) {
     if (!(rows.wn[i] > 0)) return;
     const double *const l = &rows.impulse[size_t(i) * 3];
     const Vec3 u = rows.velocity(i);
@@ -293,15 +258,8 @@ Residual inner_residual(const ContactRows &rows, const RowsPart &part, const Con
                         rows.view(run), law.view(run.first),
                         {tolerance.normal + run.first, tolerance.tangent + run.first, tolerance.most_normal},
                         h, rows.y.data(), rows.impulse.data() + size_t(3) * run.first));
-  else r = residual(rows, law.view(), h, tolerance, [&](auto &&f) { each_row(part.contacts, f); });
+  else r = residual(rows, part, law.view(), h, tolerance);
   return part.nbond ? with_bonds(rows, part, tolerance, r) : r;
-}
-
-Residual inner_residual(const ContactRows &rows, const ContactState &law, double h,
-                        const Tolerance &tolerance, std::span<const uint32_t> contacts) {
-  return residual(rows, law.view(), h, tolerance, [&](auto &&f) {
-    for (const uint32_t i : contacts) f(i);
-  });
 }
 
 // At the state at which a law was evaluated, the sweeps have its value.

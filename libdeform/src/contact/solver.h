@@ -18,10 +18,8 @@ void set_trial(const ContactRows &rows, const RowsPart &part, double h, const do
 void linearize(const ContactRows &rows, const RowsPart &part, double h, ContactState &state);
 
 // One sweep in contact order. Every contact first gets its normal impulse, then its friction impulse with
-// that new normal impulse. leave: m/s, >= 0; a contact whose u_n + gap/h is no further from zero keeps its
-// normal impulse. Where points answer their own impulses only, leave has no effect. Bonds are solved behind
-// it (bonds.h).
-void sweep(ContactRows &rows, const RowsPart &part, const ContactState &law, double h, double leave = 0);
+// that new normal impulse. Bonds are solved behind it (bonds.h).
+void sweep(ContactRows &rows, const RowsPart &part, const ContactState &law, double h);
 
 // Anderson acceleration of the sweeps (Walker and Ni 2011, type II). A sweep is a fixed-point map G; where
 // contacts are nearly redundant (vertex-face beside edge-edge, two bodies' grids on each other) it converges
@@ -33,8 +31,7 @@ class Acceleration {
  public:
   explicit Acceleration(const Memory &memory);
   void start(const ContactRows &rows, const RowsPart &part);  // before the first sweep of a pass
-  // After a sweep that another one follows. leaps: false: the next sweep starts where this one has ended.
-  void follow(ContactRows &rows, const RowsPart &part, bool leaps = true);
+  void follow(ContactRows &rows, const RowsPart &part);  // after a sweep that another one follows
 
  private:
   static constexpr uint32_t kWindow = kAndersonWindow;
@@ -46,21 +43,6 @@ class Acceleration {
   Array<double> f_, g_, now_;  // [n] of the last sweep, f in the metric; scratch
   Array<double> df_, dg_;      // [window,n] differences of successive f and g
   double gram_[kWindow][kWindow] = {};
-};
-
-// Momentum of the sweeps (Nesterov 1983), for what moves by the same step in every sweep: Anderson's method
-// sees no difference there that it could use. The next sweep starts beyond the last result, by (k - 1) / (k +
-// 2) of the last step; k restarts where the sweep turns back (O'Donoghue and Candes 2015, section 3.2).
-class Momentum {
- public:
-  explicit Momentum(const Memory &memory);
-  void start(const ContactRows &rows, const RowsPart &part);
-  void follow(ContactRows &rows, const RowsPart &part);  // after a sweep that another one follows
-
- private:
-  uint32_t age_ = 0;
-  // [3 rows of the part] where the sweep started, the result before, scratch
-  Array<double> from_, last_, now_;
 };
 
 // Of the residuals (contact_kernel.h): a contact is good where both stay within what they may be off by:
@@ -77,9 +59,6 @@ struct ToleranceBounds { double tangent, normal, most_normal; };  // m/s: at res
 // of the linearized laws
 Residual inner_residual(const ContactRows &rows, const RowsPart &part, const ContactState &law, double h,
                         const Tolerance &tolerance);
-// the same of some contacts
-Residual inner_residual(const ContactRows &rows, const ContactState &law, double h,
-                        const Tolerance &tolerance, std::span<const uint32_t> contacts);
 // with the laws evaluated at this state
 Residual true_residual(const ContactRows &rows, const RowsPart &part, const ContactState &answer, double h,
                        const Tolerance &tolerance);

@@ -7,9 +7,8 @@
 //   free_motion   the mean velocity over the sub-step without contact
 //   take_contact  contacts are known: is the free motion one that goes with them?
 //   diagonal      what an impulse changes of that velocity, where points do not answer each other's impulses;
-//   response      else, between the touched surfels
-//   revise        the impulses of a solve are known: where both of these are not what they were assumed to
-//                 be there, they are computed again, and the solve continues
+//   response      else, between the touched surfels; or
+//   system        the equations of motion of its points, which the solve of contact solves together with it
 //   end_state     where it ends with the impulses of the solve; called again after a further solve
 //   commit        the end becomes the present
 //
@@ -26,7 +25,7 @@
 
 namespace dfm {
 
-struct Backing;
+class ImplicitSystem;
 class Tasks;
 
 struct SubStep {
@@ -47,17 +46,6 @@ using AddRowSums = std::function<void(double *stiffness, double *damping)>;
 
 // [n,4] m/s: velocities of the points at the end of the sub-step, and their means over it.
 struct EndState { const double *v, *mean; };
-
-// What revise() has changed.
-enum class Revision {
-  none,
-  velocity,
-  response,  // and velocity
-  diverged,  // no solution was found: the sub-step is too long
-  failed     // the model cannot
-};
-
-enum class Backs { never, later, now };
 
 // Options of implicit points.
 struct ImplicitOptions {
@@ -83,7 +71,6 @@ struct Abilities {
   bool forces = false;    // add_forces() does something
   bool springs = false;   // loads may depend on the state: bound() takes their row sums
   bool placed = false;    // single points may be moved
-  bool revises = false;   // revise() does something
   bool accurate = false;  // accurate_step() is known
   bool energy = false;    // the energy that its scheme conserves is known (step/energy_watch.h)
   bool damps = false;     // its scheme conserves no energy: it dissipates
@@ -130,17 +117,8 @@ class Dynamics {
   // If diagonal() is null: the response of n distinct surfels to impulses at them, [3n,3n] 1/kg: one column
   // per unit impulse; symmetric up to rounding. Returns false if the model fails.
   virtual bool response(const SubStep &, uint32_t, const uint32_t *, double *) { return false; }
-  // Whether response() is known where contacts press back (body/backing.h): later: after the next revise(),
-  // which then changes the response. If now: back() says by how much they do, backed_response() gives the
-  // change of their velocities [n,3] by impulses [n,3]. Both return false if they fail.
-  virtual Backs backs() { return Backs::never; }
-  virtual bool back(const Backing &) { return false; }
-  virtual bool backed_response(const Backing &, const double * /*impulse*/, double * /*change*/) {
-    return false;
-  }
-  // Takes the impulses at the surfels [nsurfel,3]; point_velocity() and response() then return the new
-  // values.
-  virtual Revision revise(const SubStep &, const double *, bool /*last*/) { return Revision::none; }
+  // The equations of motion, of points that move implicitly: then both of these are null.
+  virtual ImplicitSystem *system() { return nullptr; }
   // [npoint,4] m/s without contact; null: free_motion() has written those of the surfels, surface.v.
   virtual const double *point_velocity() const { return nullptr; }
   virtual const double *contact_velocity() const;  // of the unknowns: [npoint,4], or [nsurfel,4]

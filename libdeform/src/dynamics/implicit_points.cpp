@@ -26,17 +26,8 @@ constexpr double kRounding = 2 * std::numeric_limits<double>::epsilon();
 constexpr double kContracts = 0.5;
 // The factor of the rest state may fail to do so this often in a sub-step.
 constexpr uint32_t kPatience = 4;
-// Largest number of corrections of one solve, the share of `allowed_error` that may remain then, and the
-// ratio to the least correction at which the iteration counts as diverged.
-constexpr uint32_t kRevisions = 20;
-constexpr double kTolerated = 100, kDiverges = 100;
-// What such a rest may displace in a sub-step, over the median edge of the surface: its strain is energy.
-constexpr double kDisplaced = 0.02;
-// An end that moves by more than this times the last correction has new impulses: the history of corrections
-// does not apply there.
-constexpr double kElsewhere = 3;
 // Of effort: forces in the time of a stiffness, and multiplications in that of an entry of a response.
-constexpr double kStiffnessForces = 10, kCopies = 4;
+constexpr double kStiffnessForces = 10;
 constexpr uint32_t kCuts = 8;  // of a correction that leads too far
 // What a sub-step may err by, over the median edge of the surface; how much longer the next one may be.
 constexpr double kErrs = 0.005, kGrows = 2;
@@ -49,12 +40,6 @@ constexpr double kAhead = 1 / (kMiddle * (2 - kMiddle));
 // Error coefficient, times h^3 times the third derivative (Hosea and Shampine 1996, Analysis and
 // implementation of TR-BDF2, section 2).
 constexpr double kError = (3 * kMiddle * kMiddle - 4 * kMiddle + 2) / (12 * (2 - kMiddle));
-
-double largest_change(const Array<double> &a, const Array<double> &b) {
-  double most = 0;
-  for (size_t k = 0; k < a.size(); ++k) most = std::max(most, std::fabs(a[k] - b[k]));
-  return most;
-}
 
 double largest(const Array<double> &a) {
   double most = 0;
@@ -72,10 +57,9 @@ ImplicitPoints::ImplicitPoints(const Memory &memory, Phyxels &points, Surface &s
       memory_(memory),
       ways_(memory) {
   use_memory(memory, stage_x_, stage_v_, middle_, load_before_);
-  use_memory(memory, x_, v_, before_, residual_, push_, change_, springs_, dampers_, scale_, weight_, held_,
-             column_, points_, between_, backed_base_);
+  use_memory(memory, x_, v_, residual_, push_, change_, springs_, dampers_, scale_, weight_, held_, alone_);
   x_.assign(size_t{kStride} * points.n, 0.0);
-  v_ = before_ = x_;
+  v_ = alone_ = x_;
   if (options_.second_order) stage_x_ = stage_v_ = middle_ = load_before_ = x_;
   for (Array<double> *a : {&residual_, &push_, &change_, &scale_, &weight_})
     a->assign(size_t{3} * points.n, 0.0);
@@ -117,12 +101,12 @@ bool ImplicitPoints::bound(double, const AddRowSums &outside, StepBound &out) {
 
 // Writes the model's forces at the positions that the velocities v [npoint,4] lead to into f. commits: also
 // its next state.
-bool ImplicitPoints::ask(const SubStep &now, const double *v, bool commits) {
+bool ImplicitPoints::ask(const double *v, bool commits) {
   for (size_t j = 0; j < x_.size(); ++j) {
     v_[j] = v[j];
     x_[j] = stage_.x[j] + stage_.h * v[j];
   }
-  dfm_kin k = kin(now.time + stage_.elapsed, stage_.elapsed, commits);
+  dfm_kin k = kin(stage_.time + stage_.elapsed, stage_.elapsed, commits);
   k.x = x_.data();
   k.v = v_.data();
   return ask_here(k, stage_.share);
@@ -138,18 +122,18 @@ bool ImplicitPoints::ask_here(const dfm_kin &k, double share) {
          DFM_OK;
 }
 
-// r(v) - push.
-bool ImplicitPoints::residual_at(const SubStep &now, const double *v, const double *push) {
-  if (!ask(now, v, false)) return false;
+bool ImplicitPoints::residual_at(const double *v) { return residual(v, residual_.data()); }
+
+bool ImplicitPoints::residual(const double *v, double *r) {
+  if (!ask(v, false)) return false;
   double poison = 0;
   for (uint32_t i = 0; i < p_.n; ++i)
     for (uint32_t c = 0; c < 3; ++c) {
       const size_t at = size_t{kStride} * i + c, own = size_t{3} * i + c;
       const double force = p_.f[at] + p_.mass[i] * stage_.gravity[int(c)];
-      const double given = push ? push[own] : 0;
       const double change = v[at] - stage_.v[at];
-      residual_[own] = p_.moves(at) ? inertia(i, stage_.h) * change - stage_.h * force - given : 0;
-      poison += 0.0 * residual_[own];
+      r[own] = p_.moves(at) ? inertia(i, stage_.h) * change - stage_.h * force : 0;
+      poison += 0.0 * r[own];
     }
   return poison == 0;
 }
@@ -166,23 +150,12 @@ bool ImplicitPoints::take_rest() {
   return true;
 }
 
-// Computes A at the state of the last force evaluation.
-bool ImplicitPoints::linearize(const SubStep &now) {
-  const bool known =
-      stiffness_.constant() && factor_h_ == stage_.h && held_ == p_.held && factor_params_ == model_.params;
-  if (known) return true;
-  factor_h_ = 0;
-  by_rest_ = false;
-  try {
-    if (!exact_) exact_ = new_solver();
-  } catch (const std::bad_alloc &) {  // on any thread that moves this body
-    return false;
-  }
-  dfm_kin k = kin(now.time + stage_.elapsed, stage_.elapsed);
+// A at the state of the last force evaluation, into the blocks of the stiffness.
+bool ImplicitPoints::assemble() {
+  dfm_kin k = kin(stage_.time + stage_.elapsed, stage_.elapsed);
   k.x = x_.data();
   k.v = v_.data();
-  effort_ += kStiffnessForces * forces_ + exact_->factor_work();
-  fresh_ = !stiffness_.constant();
+  effort_ += kStiffnessForces * forces_;
   if (!stiffness_.evaluate(model_, k, -stage_.h * stage_.h, -stage_.h)) return false;
   stiffness_.each_own([&](uint32_t i, double *block) {
     for (size_t c = 0; c < 3; ++c) {
@@ -193,14 +166,36 @@ bool ImplicitPoints::linearize(const SubStep &now) {
       weight_[3 * size_t{i} + c] = held ? 0 : diagonal;
     }
   });
-  Array<double> &blocks = stiffness_.blocks();
-  base_known_ = backs_;
-  if (backs_) std::copy(blocks.begin(), blocks.end(), backed_base_.begin());
-  hold_components(stiffness_.pattern(), p_.held.data(), blocks.data());
+  hold_components(stiffness_.pattern(), p_.held.data(), stiffness_.blocks().data());
+  return true;
+}
+
+bool ImplicitPoints::matrix(const uint32_t *at, double *blk) {
+  if (!assemble()) return false;
+  const Array<double> &blocks = stiffness_.blocks();
+  for (uint32_t b = 0; b < stiffness_.pattern().nb; ++b)
+    for (size_t k = 0; k < 9; ++k) blk[9 * size_t{at[b]} + k] += blocks[9 * size_t{b} + k];
+  return true;
+}
+
+// A factor of A at the state of the last force evaluation.
+bool ImplicitPoints::linearize() {
+  const bool known =
+      stiffness_.constant() && factor_h_ == stage_.h && held_ == p_.held && factor_params_ == model_.params;
+  if (known) return true;
+  factor_h_ = 0;
+  by_rest_ = false;
+  try {
+    if (!exact_) exact_ = new_solver();
+  } catch (const std::bad_alloc &) {  // on any thread that moves this body
+    return false;
+  }
+  effort_ += exact_->factor_work();
+  if (!assemble()) return false;
   // a constant matrix must not depend on the positions at the time when it was made
   if (stiffness_.constant()) exact_->place(p_.rest.data(), 3);
   else exact_->place(x_.data(), kStride);
-  if (!exact_->factor(blocks.data())) return false;
+  if (!exact_->factor(stiffness_.blocks().data())) return false;
   factor_h_ = stage_.h;
   held_ = p_.held;
   if (stiffness_.constant()) factor_params_ = model_.params;
@@ -219,24 +214,6 @@ bool ImplicitPoints::solve(const Array<double> &b, Array<double> &x) {
   return solved;
 }
 
-// The entries of A^-1 between points; zero for held components.
-bool ImplicitPoints::restricted(uint32_t count, const uint32_t *points, double *w) {
-  SolveInfo info;
-  effort_ += kCopies * 9.0 * count * count;
-  if (!by_rest_ && std::exchange(fresh_, false)) effort_ += exact_->restricted_work(count, points);
-  if (by_rest_ ? !rest_->restricted(count, points, w)
-               : !exact_->restricted(count, points, options_.tolerance, w, info))
-    return false;
-  const size_t wide = size_t{3} * count;
-  for (uint32_t k = 0; k < count; ++k)
-    for (size_t c = 0; c < 3; ++c) {
-      if (p_.moves(size_t{kStride} * points[k] + c)) continue;
-      const size_t at = size_t{3} * k + c;
-      for (size_t other = 0; other < wide; ++other) w[at * wide + other] = w[other * wide + at] = 0;
-    }
-  return true;
-}
-
 // Whether the factor of the rest state is still good enough, if it left this share of the residual.
 bool ImplicitPoints::patient(double left) { return by_rest_ && (left <= kContracts || ++slow_ <= kPatience); }
 
@@ -250,25 +227,22 @@ double ImplicitPoints::allowed_error(const Array<double> &v, double share) const
 }
 
 // Moves from v, whose residual is known, along change_. The residual is then that of the new v.
-bool ImplicitPoints::search(const SubStep &now, Array<double> &v) {
+bool ImplicitPoints::search(Array<double> &v) {
   return search_line(
       -product(residual_, change_), kCuts, [&](double share) { add(v, share); },
       [&](double &slope) {
-        const bool known = residual_at(now, v.data(), nullptr);
+        const bool known = residual_at(v.data());
         slope = -product(residual_, change_);
         return known;
       });
 }
 
 // Starts from the velocities at the start of the sub-step.
-bool ImplicitPoints::start(const SubStep &now) {
-  stage_ = {now.h, now.h, p_.x.data(), p_.v.data(), 1, now.gravity};
+bool ImplicitPoints::begin_stage(const SubStep &now) {
+  stage_ = {now.h, now.h, now.time, p_.x.data(), p_.v.data(), 1, now.gravity};
   p_.v_free = p_.v;
-  error_ = 0;
-  least_error_ = HUGE_VAL;
-  revisions_ = 0;
-  ended_ = backs_ = base_known_ = base_due_ = false;
-  return residual_at(now, p_.v_free.data(), nullptr);
+  solved_ = false;
+  return residual_at(p_.v_free.data());
 }
 
 double ImplicitPoints::largest_diagonal() const { return largest(weight_); }
@@ -280,8 +254,9 @@ double ImplicitPoints::own_stiffness(uint32_t point) const {
 }
 
 bool ImplicitPoints::take_first_way(const SubStep &now) {
-  if (!start(now) || !linearize(now) || !solve_way(residual_)) return false;
+  if (!begin_stage(now) || !linearize() || !solve_way(residual_)) return false;
   add(p_.v_free, 1);
+  see_diagonal();
   return true;
 }
 
@@ -289,18 +264,18 @@ bool ImplicitPoints::take_first_way(const SubStep &now) {
 // while the residual decreases fast enough, then a factor of A itself; Anderson acceleration makes up for the
 // inexact matrix. v: start, whose residual is known, and result. Returns false if the model fails, or a stage
 // of TR-BDF2 is not solved.
-bool ImplicitPoints::newton(const SubStep &now, Array<double> &v) {
+bool ImplicitPoints::newton(Array<double> &v) {
   ways_.start(change_.size());
   bool fresh = !take_rest();
   for (uint32_t k = 0; k < options_.newton; ++k) {
     if (fresh) {
-      if (!linearize(now)) return false;
+      if (!linearize()) return false;
       ways_.start(change_.size());
     }
     if (!solve_way(residual_)) return false;
     const double step = largest(change_), before = scaled_square(residual_);
     accelerate(v);
-    if (!search(now, v)) return false;
+    if (!search(v)) return false;
     if (stiffness_.constant()) return true;
     const double left = before > 0 ? std::sqrt(scaled_square(residual_) / before) : 0;
     if (step * std::min(1.0, left) <= allowed_error(v, staged_ ? kStagedShare : kShare)) return true;
@@ -311,7 +286,8 @@ bool ImplicitPoints::newton(const SubStep &now, Array<double> &v) {
 
 bool ImplicitPoints::free_motion(const SubStep &now, double &kinetic) {
   staged_ = staged_ && two_stages(now);
-  if (!staged_ && (!start(now) || !newton(now, p_.v_free))) return false;
+  if (!staged_ && (!begin_stage(now) || !newton(p_.v_free))) return false;
+  see_diagonal();
   kinetic = 0;
   bool good = true;
   for (uint32_t i = 0; i < p_.n; ++i) {
@@ -338,6 +314,7 @@ bool ImplicitPoints::two_stages(const SubStep &now) {
   const Vec3 change = now.gravity - now.gravity_before;
   stage_ = {part,
             kMiddle * now.h,
+            now.time,
             stage_x_.data(),
             stage_v_.data(),
             kMiddle,
@@ -364,7 +341,7 @@ void ImplicitPoints::begin(bool touched) {
 }
 
 bool ImplicitPoints::solve_stage(const SubStep &now, Array<double> &v) {
-  return residual_at(now, v.data(), nullptr) && newton(now, v) &&
+  return residual_at(v.data()) && newton(v) &&
          std::all_of(v.begin(), v.end(), [&](double value) { return std::fabs(value) <= now.fastest; });
 }
 
@@ -395,60 +372,19 @@ double ImplicitPoints::scaled_square(const Array<double> &r) const {
   return sum;
 }
 
-// W = N_c A^-1 N_c^T of the touched surfels.
-bool ImplicitPoints::response(const SubStep &, uint32_t n, const uint32_t *surfel, double *answers) {
-  column_.assign(p_.n, kNone);
-  points_.clear();
-  for (uint32_t s = 0; s < n; ++s)
-    surface_.each_phyxel(surfel[s], [&](uint32_t p, double) {
-      if (column_[p] != kNone) return;
-      column_[p] = static_cast<uint32_t>(points_.size());
-      points_.push_back(p);
-    });
-  const uint32_t m = static_cast<uint32_t>(points_.size());
-  if (surface_.identity()) return restricted(m, points_.data(), answers);
-  between_.resize(size_t{9} * m * m);
-  if (!restricted(m, points_.data(), between_.data())) return false;
-  std::fill_n(answers, size_t{9} * n * n, 0.0);
-  for (uint32_t s = 0; s < n; ++s)
-    for (uint32_t t = 0; t < n; ++t)
-      surface_.each_phyxel(surfel[s], [&](uint32_t p, double ws) {
-        surface_.each_phyxel(surfel[t], [&](uint32_t q, double wt) {
-          for (size_t a = 0; a < 3; ++a)
-            for (size_t b = 0; b < 3; ++b)
-              answers[(3 * size_t{t} + b) * 3 * n + 3 * size_t{s} + a] +=
-                  ws * wt * between_[(3 * size_t{column_[p]} + a) * 3 * m + 3 * size_t{column_[q]} + b];
-        });
-      });
-  return true;
-}
-
-// The factor of the rest state is not that of a sparse matrix, so A itself is factored.
-Backs ImplicitPoints::backs() {
-  if (!abilities().revises || !(rest_ || exact_->direct())) return Backs::never;
-  try {
-    if (!backed_) {
-      std::unique_ptr<LinearSolver> solver = new_solver();
-      if (!solver->direct()) return Backs::never;
-      backed_ = std::make_unique<BackedMatrix>(memory_, stiffness_.pattern(), std::move(solver));
-    }
-    backed_base_.resize(stiffness_.blocks().size());
-  } catch (const std::bad_alloc &) {  // on any thread that moves this body
-    return Backs::never;
+// What contact needs before it has seen A: estimates.
+void ImplicitPoints::see_diagonal() {
+  moving_ = 0;
+  for (uint32_t i = 0; i < p_.n; ++i) {
+    if (p_.moves(size_t{kStride} * i) || p_.moves(size_t{kStride} * i + 1) || p_.moves(size_t{kStride} * i + 2))
+      moving_ += p_.mass[i];
+    for (size_t c = 0; c < 3; ++c) alone_[size_t{kStride} * i + c] = scale_[size_t{3} * i + c];
   }
-  backs_ = true;
-  base_due_ = by_rest_ || !base_known_;
-  return base_due_ ? Backs::later : Backs::now;
 }
 
-bool ImplicitPoints::back(const Backing &contacts) {
-  effort_ += backed_->factor_work();
-  return backed_->factor(backed_base_.data(), p_.held.data(), surface_, contacts);
-}
-
-bool ImplicitPoints::backed_response(const Backing &contacts, const double *impulse, double *change) {
-  effort_ += backed_->solve_work();
-  return backed_->solve(p_.held.data(), surface_, contacts, impulse, change);
+void ImplicitPoints::take(const double *v) {
+  std::copy_n(v, p_.v_end.size(), p_.v_end.begin());
+  solved_ = true;
 }
 
 void ImplicitPoints::spread_impulses(const double *surfel_impulse, double scale, Array<double> &to) const {
@@ -462,76 +398,11 @@ void ImplicitPoints::spread_impulses(const double *surfel_impulse, double scale,
   }
 }
 
-// v_end = v_free + A^-1 push.
-bool ImplicitPoints::linear_end(const double *surfel_impulse) {
-  std::fill(change_.begin(), change_.end(), 0.0);
-  if (surfel_impulse) spread_impulses(surfel_impulse, 1, change_);
-  if (ended_ && change_ == push_) return true;
-  push_.swap(change_);
-  p_.v_end = p_.v_free;
-  if (surfel_impulse) {
-    if (!solve(push_, change_)) return false;
-    add(p_.v_end, 1);
-  }
-  return ended_ = true;
-}
-
-Revision ImplicitPoints::revise(const SubStep &now, const double *surfel_impulse, bool last) {
-  if (!abilities().revises) return Revision::none;
-  const double before = error_;
-  before_.swap(p_.v_end);
-  ended_ = false;
-  if (!linear_end(surfel_impulse)) return Revision::failed;
-  const bool known = residual_at(now, p_.v_end.data(), push_.data());
-  if (known && !solve_way(residual_)) return Revision::failed;
-  error_ = known ? largest(change_) : HUGE_VAL;
-  // without forces there is no correction; without an earlier revision there is no state to return halfway to
-  if (!known && !(before > 0 && before < HUGE_VAL)) return Revision::diverged;
-  const double allowed = allowed_error(p_.v_end, kShare);
-  const bool due = std::exchange(base_due_, false);
-  const double tolerated = std::min(kTolerated * allowed, kDisplaced * surface_.median_edge / now.h);
-  if (!due && (error_ <= allowed || ((last || revisions_ >= kRevisions) && error_ <= tolerated))) {
-    revisions_ = 0;
-    error_ = 0;
-    least_error_ = HUGE_VAL;
-    return Revision::none;
-  }
-  // The error is compared with the displacement of the end, because new impulses move it too.
-  const double moved = before > 0 ? largest_change(p_.v_end, before_) : HUGE_VAL;
-  if (moved > kElsewhere * corrected_) {
-    ways_.start(change_.size());
-    least_error_ = HUGE_VAL;
-    slow_ = 0;
-  }
-  if (++revisions_ > kRevisions || (error_ > moved && !(error_ <= kDiverges * least_error_)))
-    return Revision::diverged;
-  least_error_ = std::min(least_error_, error_);
-  // The first correction uses the present matrix, and so does each one that follows a correction which halved
-  // the error.
-  Array<double> &v = p_.v_free;
-  ended_ = false;
-  if (!due && (error_ <= kContracts * moved || (error_ <= kDiverges * moved && patient(error_ / moved)))) {
-    accelerate(v);
-    corrected_ = largest(change_);
-    add(v, 1);
-    return Revision::velocity;
-  }
-  // A correction that leads away from the solution is halved.
-  const double share = error_ <= moved ? 1 : 0.5;
-  for (size_t j = 0; j < v.size(); ++j) v[j] = before_[j] + share * (p_.v_end[j] - before_[j]);
-  if (!residual_at(now, v.data(), nullptr) || !linearize(now) || !solve_way(residual_))
-    return Revision::failed;
-  add(v, 1);
-  corrected_ = largest(change_);
-  ways_.start(change_.size());
-  return Revision::response;
-}
-
 // If the model has a state, forces are evaluated once more, which writes its next value.
-bool ImplicitPoints::end_state(const SubStep &now, const double *surfel_impulse, bool touched) {
-  if (!staged_ && !linear_end(touched ? surfel_impulse : nullptr)) return false;
+bool ImplicitPoints::end_state(const SubStep &now, const double *, bool touched) {
+  if (!staged_ && !(touched && solved_)) p_.v_end = p_.v_free;
   const Array<double> &v = p_.v_end;
-  if (!model_.state.empty() && !ask(now, v.data(), true)) return false;
+  if (!model_.state.empty() && !ask(v.data(), true)) return false;
   double poison = 0;
   for (size_t j = 0; j < v.size(); ++j) {
     poison += 0.0 * v[j];

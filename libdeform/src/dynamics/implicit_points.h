@@ -8,17 +8,14 @@
 // other x0, v0. Contact is solved for with backward Euler alone: doc/decisions/implicit_time.md.
 //
 // free_motion() solves r(v) = 0 by Newton's method with a line search, with the rest state's factor in place
-// of A (rest_factor.h) or with the last A. Contact uses A^-1, never M^-1: a prediction with A and contact
-// with M^-1 would displace bodies at rest by h^2 p / m per point. revise() evaluates the true residual at the
-// state that contact has found and continues from there, so that forces and contacts hold at the same state,
-// the end of the sub-step. Every linear solve conserves linear momentum to its tolerance: the forces of a
-// model and the rows of its stiffness sum to zero, and the factor of the rest state treats rigid motions
-// separately. Source: Baraff and Witkin 1998, Large steps in cloth simulation, section 3.
+// of A (rest_factor.h) or with the last A. With contact the solve of contact finds v and p together
+// (contact/newton.h), so that forces and contacts hold at the same state, the end of the sub-step. Linear
+// momentum is conserved to the tolerance: the forces of a model and the rows of its stiffness sum to zero. Source: Baraff and Witkin 1998, Large steps in cloth simulation, section 3.
 #pragma once
 #include <memory>
 #include <utility>
 
-#include "dynamics/backed_matrix.h"
+#include "body/implicit_system.h"
 #include "dynamics/dynamics.h"
 #include "dynamics/relative_work.h"
 #include "dynamics/rest_factor.h"
@@ -28,7 +25,7 @@
 
 namespace dfm {
 
-class ImplicitPoints : public Dynamics {
+class ImplicitPoints : public Dynamics, public ImplicitSystem {
  public:
   ImplicitPoints(const Memory &memory, Phyxels &points, Surface &surface, ModelInstance &model,
                  const ImplicitOptions &options);
@@ -36,7 +33,6 @@ class ImplicitPoints : public Dynamics {
   Abilities abilities() const override {
     return {.springs = true,
             .placed = true,
-            .revises = options_.newton > 1 && !stiffness_.constant(),
             .accurate = true,
             .damps = true,
             .parts = options_.second_order};
@@ -53,17 +49,23 @@ class ImplicitPoints : public Dynamics {
   bool take_contact() override { return !std::exchange(staged_, false); }
   bool free_motion(const SubStep &now, double &kinetic) override;
   const double *point_velocity() const override { return p_.v_free.data(); }
-  bool response(const SubStep &now, uint32_t n, const uint32_t *surfel, double *answers) override;
-  Backs backs() override;
-  bool back(const Backing &contacts) override;
-  bool backed_response(const Backing &contacts, const double *impulse, double *change) override;
-  Revision revise(const SubStep &now, const double *surfel_impulse, bool last) override;
+  const double *contact_velocity() const override { return p_.v_free.data(); }
+  ImplicitSystem *system() override { return this; }
   bool end_state(const SubStep &now, const double *surfel_impulse, bool touched) override;
   EndState end() const override { return {p_.v_end.data(), mean()}; }
   void bound_ends(double &speed, double &change) const override;
   double accurate_step(const SubStep &now) const override;
-  bool end_forces(const SubStep &now) override { return !staged_ && ask(now, p_.v_end.data(), false); }
+  bool end_forces(const SubStep &) override { return !staged_ && ask(p_.v_end.data(), false); }
   void commit(const SubStep &now, double fraction) override;
+
+  BlockPattern pattern() const override { return stiffness_.pattern(); }
+  double mass() const override { return moving_; }
+  const double *start() const override { return p_.v.data(); }
+  const double *places() const override { return p_.x.data(); }
+  const double *diagonal_inverse() const override { return alone_.data(); }
+  bool residual(const double *v, double *r) override;
+  bool matrix(const uint32_t *at, double *blk) override;
+  void take(const double *v) override;
 
  protected:
   ImplicitOptions options_;
@@ -83,18 +85,13 @@ class ImplicitPoints : public Dynamics {
   Memory memory_;
   std::unique_ptr<RestFactor> rest_;      // null if the solver is not direct, or only one solve is allowed
   std::unique_ptr<LinearSolver> exact_;   // of A itself; null until it is needed
-  std::unique_ptr<BackedMatrix> backed_;  // null until contacts press back
-  Array<double> backed_base_;             // [nb,9] kg, the A of exact_ with held components as others
-  // In this sub-step: contacts are to press back; backed_base_ is known; the next revision makes it.
-  bool backs_ = false, base_known_ = false, base_due_ = false;
   bool by_rest_ = false;  // which of the two represents A
-  bool fresh_ = false;    // the factor of exact_ is of this sub-step, and no response has been made of it
   uint32_t slow_ = 0;     // iterations with rest_ that did not halve the residual
   Anderson ways_;
-  // The present stage: its h (s); its times as shares of the sub-step; x0, v0 ([npoint,4] m, m/s). Loads and
+  // The present stage: its h (s); s since the start of the sub-step, and its start; x0, v0 ([npoint,4] m, m/s). Loads and
   // gravity are interpolated linearly between start and end.
   struct Stage {
-    double h, elapsed;
+    double h, elapsed, time;
     const double *x, *v;
     double share;
     Vec3 gravity;
@@ -105,45 +102,39 @@ class ImplicitPoints : public Dynamics {
   Array<double> middle_;             // [npoint,4] m/s, the end of its first stage
   Array<double> load_before_;        // [npoint,4] N, at the start of the sub-step
   Array<double> x_, v_;              // [npoint,4] m, m/s: state of the last force evaluation
-  Array<double> before_;             // [npoint,4] m/s, the end before the last revision
   Array<double> residual_;           // [npoint,3] N s
   Array<double> push_, change_;      // [npoint,3] N s of contact; m/s, a solution
   Array<double> springs_, dampers_;  // [npoint] N/m, N s/m of loads
   Array<double> weight_, scale_;     // [npoint,3] kg, diagonal of A; 1/kg, its inverse; zero where held
   Array<uint8_t> held_;              // [npoint] as in the present factor
-  // [npoint] index among the points on which touched surfels depend; these points
-  Array<uint32_t> column_, points_;
-  Array<double> between_;              // [3m,3m] 1/kg, response between these points
+  Array<double> alone_;                // [npoint,4] scale_
+  double moving_ = 0;                  // kg, of points that are not held
   double factor_h_ = 0;                // s, of the present factor; 0: none
   std::vector<double> factor_params_;  // of the model at that time, if its stiffness is constant
-  double error_ = 0;                   // m/s, the correction that the last revision found; 0: none yet
-  double least_error_ = 0;             // m/s, of all revisions in the sub-step
-  double corrected_ = 0;               // m/s, the last correction
-  uint32_t revisions_ = 0;             // since one found nothing to change
-  bool ended_ = false;                 // v_end is v_free and what push_ makes of it
+  bool solved_ = false;                // v_end is the solution of a contact solve
   double forces_ = 0, effort_ = 0;     // multiplications: of an evaluation of forces; so far
 
   std::unique_ptr<LinearSolver> new_solver() const;
-  bool start(const SubStep &now);
+  bool begin_stage(const SubStep &now);
   const double *mean() const { return staged_ ? p_.v_free.data() : p_.v_end.data(); }
-  bool ask(const SubStep &now, const double *v, bool commits);
+  bool ask(const double *v, bool commits);
   bool ask_here(const dfm_kin &k, double share);
-  bool newton(const SubStep &now, Array<double> &v);
+  bool newton(Array<double> &v);
   bool two_stages(const SubStep &now);
   bool solve_stage(const SubStep &now, Array<double> &v);
-  bool residual_at(const SubStep &now, const double *v, const double *push);
+  bool residual_at(const double *v);
   bool take_rest();
-  bool linearize(const SubStep &now);
+  void see_diagonal();
+  bool assemble();
+  bool linearize();
   bool patient(double left);
-  bool restricted(uint32_t count, const uint32_t *points, double *w);
   double inertia(uint32_t point, double h) const {  // kg
     return softness_.empty() ? p_.mass[point] : p_.mass[point] + h * h * softness_[point];
   }
   bool solve_way(const Array<double> &r);
   void accelerate(const Array<double> &v);
   void add(Array<double> &v, double share) const;
-  bool search(const SubStep &now, Array<double> &v);
-  bool linear_end(const double *surfel_impulse);
+  bool search(Array<double> &v);
   double scaled_square(const Array<double> &r) const;
   double allowed_error(const Array<double> &v, double share) const;
 };

@@ -10,7 +10,6 @@
 namespace dfm {
 namespace {
 
-constexpr uint32_t kRigid = 6;  // motions
 // determinant of an inertia over the cube of its mean: below it the points are on a line
 constexpr double kOnALine = 1e-9;
 
@@ -19,18 +18,12 @@ Vec3 times_transposed(const double *m, Vec3 a) {
           m[2] * a.x + m[5] * a.y + m[8] * a.z};
 }
 
-Vec3 axis(uint32_t k) { return {double(k == 0), double(k == 1), double(k == 2)}; }
-
-// Displacement of a point at this arm by the rigid motion k.
-Vec3 rigid_column(uint32_t k, Vec3 arm) { return k < 3 ? axis(k) : cross(axis(k - 3), arm); }
-
 }  // namespace
 
 RestFactor::RestFactor(const Memory &memory, const Phyxels &points, ModelInstance &model,
                        ModelStiffness &stiffness, std::unique_ptr<LinearSolver> solver)
     : p_(points), model_(model), stiffness_(stiffness), solver_(std::move(solver)) {
-  use_memory(memory, rest_, state_, stiff_, damp_, diagonal_, turned_, b_, y_, arm_, moved_, asked_);
-  use_memory(memory, left_, right_, held_);
+  use_memory(memory, rest_, state_, stiff_, damp_, diagonal_, turned_, b_, y_, arm_, held_);
   turns_ = !stiffness_.constant();
   rest_ = p_.x;
   if (rests_unplaced(*model_.type))
@@ -145,7 +138,6 @@ void RestFactor::find_rigid(const double *x) {
 
 void RestFactor::turn(const double *x) {
   if (turns_) find_turns(x);
-  moved_.clear();
   if (turns_ && loose_) find_rigid(x);
 }
 
@@ -187,97 +179,6 @@ bool RestFactor::solve(const double *b, double *x) {
   const Motion more{given.speed - found.speed, given.spin - found.spin};
   for (uint32_t i = 0; i < p_.n; ++i) store3(x + size_t{3} * i, load3(x + size_t{3} * i) + rigid_at(more, i));
   return true;
-}
-
-// G A0^-1 G^T M U
-bool RestFactor::find_moved() {
-  const size_t rows = size_t{3} * p_.n;
-  asked_.resize(kRigid * rows);
-  moved_.resize(kRigid * rows);
-  for (uint32_t k = 0; k < kRigid; ++k)
-    for (uint32_t i = 0; i < p_.n; ++i)
-      store3(&asked_[k * rows + size_t{3} * i],
-             times_transposed(&turned_[size_t{9} * i],
-                              p_.mass[i] * rigid_column(k, load3(&arm_[size_t{3} * i]))));
-  SolveInfo info;
-  if (!solver_->solve(kRigid, asked_.data(), moved_.data(), 0, info)) return false;
-  for (uint32_t k = 0; k < kRigid; ++k)
-    for (uint32_t i = 0; i < p_.n; ++i) {
-      double *const at = &moved_[k * rows + size_t{3} * i];
-      store3(at, times3(&turned_[size_t{9} * i], load3(at)));
-    }
-  return true;
-}
-
-// T^T B T + U H U^T - B with B = G A0^-1 G^T, H = (U^T M U)^-1, Z = B M U and N = (M U)^T Z is
-// -(L R^T + R L^T) with L = U H and R = Z - U (H N + 1) / 2.
-bool RestFactor::add_rigid(uint32_t count, const uint32_t *points, double *w) {
-  if (moved_.empty() && !find_moved()) return false;
-  const size_t rows = size_t{3} * p_.n;
-  double y[kRigid][kRigid];  // (H N + 1) / 2
-  for (uint32_t k = 0; k < kRigid; ++k) {
-    Vec3 impulse, moment;
-    for (uint32_t i = 0; i < p_.n; ++i) {
-      const Vec3 own = p_.mass[i] * load3(&moved_[k * rows + size_t{3} * i]);
-      impulse += own;
-      moment += cross(load3(&arm_[size_t{3} * i]), own);
-    }
-    const Motion m = motion_of(impulse, moment);
-    for (uint32_t r = 0; r < kRigid; ++r)
-      y[r][k] = 0.5 * ((r < 3 ? m.speed[int(r)] : m.spin[int(r) - 3]) + (r == k));
-  }
-  left_.resize(size_t{3} * kRigid * count);
-  right_.resize(left_.size());
-  for (uint32_t i = 0; i < count; ++i) {
-    const Vec3 arm = load3(&arm_[size_t{3} * points[i]]);
-    Vec3 u[kRigid];
-    for (uint32_t k = 0; k < kRigid; ++k) u[k] = rigid_column(k, arm);
-    for (uint32_t k = 0; k < kRigid; ++k) {
-      Vec3 l, r = load3(&moved_[k * rows + size_t{3} * points[i]]);
-      if (k < 3) l = (1 / rigid_.mass) * u[k];
-      else
-        for (uint32_t j = 0; j < 3; ++j) l += rigid_.inverse[3 * j + (k - 3)] * u[3 + j];
-      for (uint32_t j = 0; j < kRigid; ++j) r -= y[j][k] * u[j];
-      for (uint32_t c = 0; c < 3; ++c) {
-        left_[(size_t{3} * i + c) * kRigid + k] = l[int(c)];
-        right_[(size_t{3} * i + c) * kRigid + k] = r[int(c)];
-      }
-    }
-  }
-  const size_t wide = size_t{3} * count;
-  for (size_t r = 0; r < wide; ++r)
-    for (size_t c = 0; c <= r; ++c) {
-      double sum = 0;
-      for (size_t k = 0; k < kRigid; ++k)
-        sum +=
-            left_[r * kRigid + k] * right_[c * kRigid + k] + right_[r * kRigid + k] * left_[c * kRigid + k];
-      w[c * wide + r] = w[r * wide + c] -= sum;
-    }
-  return true;
-}
-
-bool RestFactor::restricted(uint32_t count, const uint32_t *points, double *w) {
-  SolveInfo info;
-  if (!solver_->restricted(count, points, 0, w, info)) return false;
-  if (!turns_) return true;
-  const size_t wide = size_t{3} * count;
-  for (uint32_t i = 0; i < count; ++i)
-    for (uint32_t j = 0; j <= i; ++j) {
-      const double *const left = &turned_[size_t{9} * points[i]], *const right =
-                                                                      &turned_[size_t{9} * points[j]];
-      double *const block = w + 3 * i * wide + 3 * size_t{j};
-      double half[9];
-      for (size_t r = 0; r < 3; ++r) store3(half + 3 * r, times3(right, load3(block + r * wide)));
-      for (size_t r = 0; r < 3; ++r)
-        for (size_t c = 0; c < 3; ++c) {
-          if (i == j && c > r) continue;
-          const double value =
-              (left[3 * r] * half[c] + left[3 * r + 1] * half[3 + c]) + left[3 * r + 2] * half[6 + c];
-          block[r * wide + c] = value;
-          w[(3 * size_t{j} + c) * wide + 3 * i + r] = value;
-        }
-    }
-  return !loose_ || add_rigid(count, points, w);
 }
 
 }  // namespace dfm

@@ -31,8 +31,7 @@ class RestFactor {
   // Rotates to the present positions, [npoint,4] m.
   void turn(const double *x);
 
-  bool solve(const double *b, double *x);                              // [npoint,3]
-  bool restricted(uint32_t count, const uint32_t *points, double *w);  // as LinearSolver::restricted
+  bool solve(const double *b, double *x);                      // [npoint,3]
   double solve_work() const { return solver_->solve_work(); }          // as LinearSolver::solve_work
   const Array<double> &diagonal() const { return diagonal_; }          // [npoint,3] kg, 0 where held
 
@@ -60,17 +59,12 @@ class RestFactor {
   };
   Rigid rigid_ = {};
   Array<double> arm_;    // [npoint,3] m, from the center
-  Array<double> moved_;  // [6,npoint,3], G A0^-1 G^T M U, and its inputs
-  Array<double> asked_;
-  Array<double> left_, right_;  // scratch of restricted: [count,3,6]
 
   bool ask_model();
   struct Motion { Vec3 speed, spin; };
   Motion motion_of(Vec3 impulse, Vec3 moment) const;
   void find_turns(const double *x);
   void find_rigid(const double *x);
-  bool find_moved();
-  bool add_rigid(uint32_t count, const uint32_t *points, double *w);
 };
 
 }  // namespace dfm

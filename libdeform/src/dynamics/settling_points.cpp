@@ -9,11 +9,10 @@ SettlingPoints::SettlingPoints(const Memory &memory, Phyxels &points, Surface &s
                                const ImplicitOptions &options, const std::vector<double> &softness,
                                double error)
     : ImplicitPoints(memory, points, surface, model, options), error_allowed_(error) {
-  use_memory(memory, softness_, last_, next_, guess_, surfels_, load_, impulse_, taken_, springs_of_loads_,
+  use_memory(memory, softness_, last_, next_, guess_, load_, impulse_, taken_, springs_of_loads_,
              own_);
   for (Array<double> *a : {&last_, &next_, &impulse_, &taken_}) a->assign(size_t{3} * points.n, 0.0);
   guess_.assign(size_t{kStride} * points.n, 0.0);
-  surfels_.assign(size_t{kStride} * surface.nsurfel, 0.0);
   softness_.assign(softness.begin(), softness.end());
   springs_of_loads_ = softness_;
   own_.assign(points.n, 0.0);
@@ -69,22 +68,7 @@ bool SettlingPoints::free_motion(const SubStep &now, double &) {
       p_.v_free[at] -= taken_[size_t{3} * i + c];
       poison += 0.0 * p_.v_free[at];
     }
-  gather();
   return poison == 0;
-}
-
-void SettlingPoints::gather() {
-  for (uint32_t s = 0; s < surface_.nsurfel; ++s) {
-    Vec3 v;
-    surface_.each_phyxel(s, [&](uint32_t p, double w) { v += w * load3(&p_.v_free[size_t{kStride} * p]); });
-    store3(&surfels_[size_t{kStride} * s], v);
-  }
-}
-
-Revision SettlingPoints::revise(const SubStep &now, const double *surfel_impulse, bool last) {
-  const Revision found = ImplicitPoints::revise(now, surfel_impulse, last);
-  if (found == Revision::velocity || found == Revision::response) gather();
-  return found;
 }
 
 bool SettlingPoints::end_state(const SubStep &now, const double *surfel_impulse, bool touched) {

@@ -36,8 +36,7 @@ class SettlingPoints : public ImplicitPoints {
   bool free_motion(const SubStep &now, double &kinetic) override;
   // with the last contact forces: used to find contacts
   const double *point_velocity() const override { return guess_.data(); }
-  const double *contact_velocity() const override { return surfels_.data(); }  // without
-  Revision revise(const SubStep &now, const double *surfel_impulse, bool last) override;
+  const double *start() const override { return guess_.data(); }
   bool end_state(const SubStep &now, const double *surfel_impulse, bool touched) override;
   double accurate_step(const SubStep &) const override { return std::numeric_limits<double>::infinity(); }
   void commit(const SubStep &now, double fraction) override;
@@ -49,12 +48,9 @@ class SettlingPoints : public ImplicitPoints {
   Array<double> springs_of_loads_, own_;
   Array<double> last_, next_;  // [npoint,3] N, contact forces of the last step and at the end of this one
   Array<double> guess_;        // [npoint,4] m/s
-  Array<double> surfels_;      // [nsurfel,4] m/s without contact
   Array<double> load_;         // [npoint,4] N, loads alone
   // [npoint,3] N s, m/s: the last contact forces, and their effect on velocities
   Array<double> impulse_, taken_;
-
-  void gather();
 };
 
 }  // namespace dfm

@@ -30,7 +30,7 @@ constexpr double kNoPolishAt = 0.25, kFewSweepsAt = 0.5, kNoPiecesAt = 0.75;
 // solves that the guard repeats.
 constexpr double kPolishShare = 0.5, kSolveShare = 0.9;
 // Default limit: this factor times the cost of the planned sub-steps without contact.
-constexpr uint64_t kAutomaticFactor = 1000;
+constexpr uint64_t kAutomaticFactor = 4000;
 constexpr uint64_t kRigidWork = 10;  // of a rigid body, in the automatic limit
 
 struct StepStopped {
@@ -312,7 +312,7 @@ void plan_work(World &w, StepContext &step, uint32_t substeps) {
   b.limit = w.def.max_work
                 ? w.def.max_work
                 : kAutomaticFactor * substeps * (body_work(w, step) + surface_work(w, step) + rigid);
-  b.divided = w.def.max_work && !step.bodies_revise;
+  b.divided = w.def.max_work;
   if (substeps * sure_work(w, step) > b.limit) throw StepStopped{StepStopped::least};
 }
 
@@ -346,7 +346,6 @@ void share_work(const World &w, StepContext &step) {
   if (!b.divided) {
     b.polish_end = uint64_t(kNoPolishAt * double(b.limit));
     b.solve_end = uint64_t(kFewSweepsAt * double(b.limit));
-    b.bare_end = b.limit;
     return;
   }
   const auto left_by = [&](uint64_t kept) { return b.limit > b.work + kept ? b.limit - b.work - kept : 0; };
@@ -355,7 +354,6 @@ void share_work(const World &w, StepContext &step) {
   const double share = double(left) / double(1 + follow);
   b.polish_end = b.work + uint64_t(kPolishShare * share);
   b.solve_end = b.work + uint64_t(kSolveShare * share);
-  b.bare_end = b.work + left_by(follow * bare_work(w, step) + checks(w, step, kBareChecks));
 }
 
 bool may_repeat(const World &w, StepContext &step) {
@@ -396,16 +394,6 @@ bool spares(const StepContext &step, Spent &spent, Thrift what) {
     return false;
   spent.used = std::max(spent.used, what);
   return true;
-}
-
-bool fits(const Spent &spent, uint64_t before, uint64_t units, uint64_t end) {
-  return before + (spent.work + units) * spent.all / spent.own <= end;
-}
-bool holds(const StepContext &step, const Spent &spent, uint64_t units) {
-  return fits(spent, step.budget.work, units, step.budget.solve_end);
-}
-bool holds_barely(const StepContext &step, const Spent &spent, uint64_t units) {
-  return fits(spent, step.budget.work, units, step.budget.bare_end);
 }
 
 void charge(World &w, StepContext &step, const Spent &spent) {

@@ -22,14 +22,12 @@ struct Budget {
   uint64_t aside = 0;
   uint64_t least = 0;  // units that it needs with as many contacts as the last sub-step
   // Whether the limit is divided: each sub-step has its share, beside what the others need. The default limit
-  // is not, because it ends steps that would not end; nor is one of bodies that revise, because nobody knows
-  // how many solves these need.
+  // is not, because it ends steps that would not end.
   bool divided = false;
   uint32_t to_come = 0;  // planned sub-steps after the present one
   uint64_t rows = 0;     // of the present sub-step's contacts; of the last one until they are known
   // units of the present step at which the present contact solve goes without polish, and ends
   uint64_t polish_end = 0, solve_end = 0;
-  uint64_t bare_end = 0;  // beyond it the rest of the step finds less than it cannot go without
   // s of the steady clock at which the time of the step is used up; 0: no limit
   double end = 0;
   double span = 0;             // s, from the start of the step to `end`
@@ -70,10 +68,6 @@ struct Spent {
 // Adds units. Throws if the step must end here, as charge() will for the spent units.
 void spend(const World &w, const StepContext &step, Spent &spent, uint64_t units);
 bool spares(const StepContext &step, Spent &spent, Thrift what);
-// Whether the share of the solve holds so many units more.
-bool holds(const StepContext &step, const Spent &spent, uint64_t units);
-// Whether the step holds them at all.
-bool holds_barely(const StepContext &step, const Spent &spent, uint64_t units);
 void charge(World &w, StepContext &step, const Spent &spent);  // after all islands, by the stepping thread
 // Units of one pass over the bodies that are awake: points and cells; surfels.
 uint64_t body_work(const World &w, const StepContext &step);

@@ -26,6 +26,7 @@
 
 namespace dfm {
 
+class ImplicitSystem;
 struct SelfBody;
 class SolveIslands;
 class ToolTouch;
@@ -51,6 +52,7 @@ struct StepContext {
   std::vector<RigidPlace> rigid_places;  // by obstacle slot; empty without rigid bodies
   std::vector<uint32_t> rigid_groups;    // bodies per group, all sets
   std::vector<DofSource> sources;
+  std::vector<ImplicitSystem *> systems;  // by body slot; null: not implicit
   std::vector<std::unique_ptr<SelfBody>> self_bodies;  // in id order; those that may touch themselves
 
   // motion
@@ -65,6 +67,7 @@ struct StepContext {
   NarrowBlocks narrow;
 
   // contact <-> friction
+  const Memory &contact_memory;
   ContactRows rows;
   Array<Bond> bonds;
   Array<double> bond_impulse;  // [bonds,3] N s, initial values of the next solve of this sub-step
@@ -73,8 +76,8 @@ struct StepContext {
   struct { Array<double> normal, tangent; } tolerance;  // [contacts] of all islands
   Residual residual;                                    // the worst of all islands
   uint32_t passes = 0, sweeps = 0;                      // of the island with the most
-  Array<double> disturbance, best_impulse, best_pass, trial_response;
-  Array<uint8_t> revised;  // [blocks of rows] the response of the body has changed with its impulses
+  Array<double> disturbance, best_impulse, start_impulse;
+  Array<double> load;  // [rows,3] N s, before depths open: what the next sub-step starts from
   Array<double> tangents;
   // [contacts] m/s, at which sides leave each other at least; empty where no pair has a restitution
   Array<double> thrown;
@@ -86,7 +89,6 @@ struct StepContext {
   // [contacts] index of the contact in the store of the last sub-step, or kNone
   Array<uint32_t> match;
   Array<uint32_t> block_surfels;  // responses of bodies whose points answer each other
-  bool bodies_revise = false;     // some body revises its response after the solve
   bool bodies_part = false;       // the motion of some body depends on whether there are contacts
   struct Chosen {
     uint32_t law;
@@ -96,7 +98,6 @@ struct StepContext {
   Array<Chosen> chosen;              // [contacts] by the host (PreSolve); empty without a callback
   Array<uint8_t> near;               // [bodies] had contacts in the last sub-step
   Array<uint8_t> touching;           // [bodies] touch something, between steps
-  const Body *unsettled = nullptr;   // a body without a solution for its contacts
   std::unique_ptr<ToolTouch> tools;  // with each other
   // a rigid host has revised its response, and the solve continues from its last impulses
   bool rigid_again = false;

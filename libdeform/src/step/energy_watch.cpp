@@ -181,9 +181,11 @@ void book_contact(World &w, StepContext &step) {
     if (!b.dynamics->abilities().energy) {
       const EndState ends = b.dynamics->end();
       const double *const way = steps_itself(b) ? ends.mean : ends.v;
-      b.surface.each_phyxel(step.rows.point[d], [&](uint32_t point, double weight) {
-        for (size_t k = 0; k < 3; ++k) mean[k] += weight * way[size_t(point) * kStride + k];
-      });
+      if (step.rows.block[d] == kNone) std::copy_n(way + size_t{kStride} * step.rows.point[d], 3, mean);
+      else
+        b.surface.each_phyxel(step.rows.point[d], [&](uint32_t point, double weight) {
+          for (size_t k = 0; k < 3; ++k) mean[k] += weight * way[size_t(point) * kStride + k];
+        });
       continue;
     }
     const size_t at = size_t(step.rows.point[d]) * kStride;

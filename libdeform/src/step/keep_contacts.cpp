@@ -75,11 +75,13 @@ void list_crossings(World &w, StepContext &step) {
 namespace {
 
 // Whether all bodies of the contact keep the velocity of the solve. Bodies that step themselves may damp it
-// within a sub-step.
-bool keeps_velocity(const ContactRows &rows, uint32_t i) {
+// within a sub-step; of implicit ones, what an impulse adds is no velocity.
+bool keeps_velocity(const StepContext &step, uint32_t i) {
+  const ContactRows &rows = step.rows;
   for (uint32_t j = rows.begin[i]; j < rows.begin[i + 1]; ++j) {
-    const uint32_t block = rows.block[rows.dof[j]];
-    if (block != kNone && rows.blocks[block].group == kNone) return false;
+    const uint32_t d = rows.dof[j], block = rows.block[d];
+    if (block == kNone ? step.systems[rows.source[d]] != nullptr : rows.blocks[block].group == kNone)
+      return false;
   }
   return true;
 }
@@ -90,13 +92,13 @@ bool keeps_velocity(const ContactRows &rows, uint32_t i) {
 // oscillate at the tolerance for ever. So a contact that sticks at rest takes over half of a change, and the
 // extra impulse decays (doc/decisions/contact_solver.md).
 Vec3 next_start(const World &w, const StepContext &step, uint32_t i) {
-  const Vec3 l = load3(&step.rows.impulse[size_t(3) * i]);
+  const Vec3 l = load3(&step.load[size_t(3) * i]);
   const uint32_t m = step.match[i];
   if (step.tolerance.tangent.empty() || m == kNone) return l;
   if (step.tolerance.tangent[i] > tangent_at_rest(w, step.h) || !(l.x > 0) || step.state.mode[i] != 1)
     return l;
   const Vec3 before = (step.h / w.store.h) * load3(&w.store.impulse[size_t(3) * m]);
-  return before.x > 0 && keeps_velocity(step.rows, i) ? 0.5 * (before + l) : l;
+  return before.x > 0 && keeps_velocity(step, i) ? 0.5 * (before + l) : l;
 }
 
 // Stores contact i for the next sub-step and for the report.

@@ -10,6 +10,7 @@
 #include <tuple>
 #include <utility>
 
+#include "body/implicit_system.h"
 #include "body/obstacle_mesh.h"
 #include "core/error.h"
 #include "dynamics/relative_work.h"
@@ -98,18 +99,21 @@ void look_at_plan(World &w, StepContext &step) {
 void view_bodies(World &w, StepContext &step, SceneFacts &facts) {
   step.body_views.clear();
   step.sources.clear();
-  step.bodies_revise = step.bodies_part = false;
+  step.systems.clear();
+  step.bodies_part = false;
   uint32_t node = 0, point = 0;
   for (uint32_t i = 0; i < w.bodies.size(); ++i) {
     Body &b = *w.bodies[i];
     b.slot = i;
     facts.self_stepping += !b.dynamics->abilities().forces;
-    step.bodies_revise = step.bodies_revise || b.dynamics->abilities().revises;
     step.bodies_part = step.bodies_part || b.dynamics->abilities().parts;
     const Surface &s = b.surface;
     step.body_views.push_back({i, node, b.category, b.collides_with, b.id, &s});
-    step.sources.push_back(
-        {node, s.nsurfel, point, b.p.n, &s, b.dynamics->diagonal(), b.dynamics->contact_velocity()});
+    ImplicitSystem *const system = b.dynamics->system();
+    step.systems.push_back(system);
+    step.sources.push_back({node, s.nsurfel, point, b.p.n, &s,
+                            system ? system->diagonal_inverse() : b.dynamics->diagonal(),
+                            b.dynamics->contact_velocity()});
     if (!s.identity()) {
       ++facts.coupled;
       facts.coupled_surfels += s.nsurfel;

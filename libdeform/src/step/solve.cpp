@@ -12,6 +12,7 @@
 
 #include "body/make_surface.h"
 #include "contact/solver.h"
+#include "body/implicit_system.h"
 #include "core/error.h"
 #include "plugin/context.h"
 #include "state/world.h"
@@ -50,19 +51,9 @@ void fill_responses(World &w, StepContext &step) {
   }
 }
 
+// What a solid body answers at its surface, over the response of its mass: 2.5 at a ball.
+constexpr double kWhole = 2.5;
 constexpr uint32_t kMostRevisions = 6;  // of the responses of rigid hosts, within a sub-step
-// Revisions of bodies with the last impulses before the first solve: a few, because the solve moves bodies
-// that do not rest anyway. And the largest number of further solves, once no body has anything to revise, of
-// islands that the limit of sweeps has ended.
-constexpr uint32_t kWarmRevisions = 4, kMostAgain = 6;
-// A solve that ends at its limit of sweeps, or continues beyond it with momentum, leaves impulses that drift,
-// and bodies follow them: one after the other they revise their response, without any error that falls. After
-// this many such solves a body is accepted if its error is within its tolerance.
-constexpr uint32_t kMostCapped = 20;
-// The same for contacts that sweeps stall on (contact/tresca.h), which leave a tenth of their tolerance.
-// Bodies that are held only by them respond by more than their accuracy requires. That error falls by a
-// factor of hundreds in most of these solves, and no further after this many.
-constexpr uint32_t kMostStalled = 6;
 // A sub-step in which the forces and contacts of a body do not agree is repeated with half its length, down
 // to this share of the planned one.
 constexpr double kLeastPiece = 1.0 / 256;
@@ -102,6 +93,8 @@ void make_rows(World &w, StepContext &step) {
   for (size_t i = 0; i < w.bodies.size(); ++i) {  // the present state and the last end may have been swapped
     const Body &b = *w.bodies[i];
     step.sources[i].velocity = b.dynamics->contact_velocity();
+    const double mass = step.systems[i] ? step.systems[i]->mass() : 0;
+    step.sources[i].whole = mass > 0 ? kWhole / mass : 0;
     const bool set_back = b.surface.identity() && (b.surface.slit || b.surface.back > 0);
     step.sources[i].place = set_back ? b.p.x.data() : nullptr;
   }
@@ -127,6 +120,8 @@ void make_rows(World &w, StepContext &step) {
   if (!step.guard.kept.empty()) guard_rates(step);
   if (step.rigid_again) step.rows.impulse.assign(step.best_impulse.begin(), step.best_impulse.end());
   step.solve_islands->find(w, step);
+  // an equilibrium has no velocity that an opening could leave
+  if (!w.prescribed.stands()) step.rows.hold_openings(step.thrown);
 }
 
 namespace {
@@ -138,150 +133,28 @@ void finish_rows(World &w, StepContext &step) {
   run_belts(step);
   bounce(step);
   if (!step.guard.kept.empty()) guard_rates(step);
+  // an equilibrium has no velocity that an opening could leave
+  if (!w.prescribed.stands()) step.rows.hold_openings(step.thrown);
 }
 
-// Takes the body's velocities without contact again.
-void take_velocities(Body &b, StepContext &step, const ContactRows::Block &block) {
-  gather_surface(b.surface, b.p.x.data(), b.dynamics->point_velocity());
-  for (uint32_t k = 0; k < block.count; ++k)
-    std::copy_n(b.dynamics->contact_velocity() + size_t{kStride} * step.rows.point[block.first + k], kStride,
-                &step.rows.y_free[size_t{kStride} * (block.first + k)]);
-}
-
-// Revises the bodies of an island whose forces are not linear in the velocity: the new response to the
-// present impulses replaces the old one; the impulses stay. responses: whether the response matrix of a body
-// has changed.
-Revised revise_bodies(World &w, StepContext &step, const SolveIsland &own, bool last, bool &responses) {
-  Revised out = Revised::nothing;
-  for (const uint32_t number : own.part.blocks) {
-    const ContactRows::Block &block = step.rows.blocks[number];
-    if (block.group != kNone) continue;
-    Body &b = *w.bodies[block.source];
-    const Revision found = b.dynamics->revise(sub_step_of(w, step), b.surfel_impulse.data(), last);
-    if (found == Revision::failed) {
-      set_last_error(format("step %llu, body '%s': model '%s' could not answer at the state that contact "
-                            "leads to; take a smaller step or change the model",
-                            static_cast<unsigned long long>(w.step_count), b.name.c_str(), b.model.type->id)
-                         .c_str());
-      return Revised::failed;
-    }
-    if (found == Revision::diverged) {
-      step.unsettled = &b;
-      return Revised::diverged;
-    }
-    if (found == Revision::none) continue;
-    out = Revised::something;
-    take_velocities(b, step, block);
-    if (found != Revision::response) continue;
-    responses = true;
-    fill_response(w, step, block);
-  }
-  return out;
-}
-
-// Back to the free motion, if no state was found for the last impulses: they need not be consistent any more.
-void forget_revisions(World &w, StepContext &step, const SolveIsland &own) {
-  for (const uint32_t number : own.part.blocks) {
-    const ContactRows::Block &block = step.rows.blocks[number];
-    if (block.group != kNone) continue;
-    Body &b = *w.bodies[block.source];
-    double kinetic = 0;
-    if (!b.dynamics->abilities().revises || !b.dynamics->free_motion(sub_step_of(w, step), kinetic)) continue;
-    take_velocities(b, step, block);
-    fill_response(w, step, block);
-  }
-}
-
-// Revises the bodies of the open islands, each island by itself; own.revised holds the result. warm: with the
-// impulses of the last sub-step.
-void revise_islands(World &w, StepContext &step, bool warm) {
-  const std::span<SolveIsland> all = step.solve_islands->all();
-  bool any = false, responses = false;
-  for (SolveIsland &own : all) {
-    any = any || (own.open && own.revises);
-    if (own.open && !own.revises) own.revised = Revised::nothing;
-  }
-  if (!any) return;
-  give_impulses(step);
-  for (SolveIsland &own : all) {
-    if (!own.open || !own.revises) continue;
-    own.revised = revise_bodies(w, step, own,
-                                !warm && own.capped >= (own.stalls ? kMostStalled : kMostCapped), responses);
-    if (own.revised == Revised::nothing || own.revised == Revised::something) continue;
-    if (!warm) return;
-    forget_revisions(w, step, own);
-    responses = true;
-  }
-  if (responses) finish_rows(w, step);
-  for (const SolveIsland &own : all)
-    if (own.open && own.revised != Revised::nothing) step.rows.restore(own.part);
-}
-
-// The first revisions use the impulses of the last sub-step. A body at rest is nearly linear around the state
-// in which these hold it. Linearized around its free motion, the first solve would let it fall and make
-// friction with memory slide, and the sweeps would not reverse that.
-void revise_warm(World &w, StepContext &step) {
-  const std::span<SolveIsland> all = step.solve_islands->all();
-  for (SolveIsland &own : all) own.open = own.revises;
-  for (uint32_t k = 0; k < kWarmRevisions; ++k) {
-    revise_islands(w, step, true);
-    bool more = false;
-    for (SolveIsland &own : all) {
-      own.open = own.open && own.revised == Revised::something;
-      more = more || own.open;
-    }
-    if (!more) break;
-  }
-}
-
-// Solves again, from the present impulses, until rigid hosts and bodies respond as the solve assumed. An
-// island is done once none of its bodies has anything to revise.
-const SolveIsland *solve_revised(World &w, StepContext &step, Revised &revised) {
+// Solves again, from the present impulses, until rigid hosts respond as the solve assumed.
+const SolveIsland *solve_revised(World &w, StepContext &step) {
   const std::span<SolveIsland> all = step.solve_islands->all();
   for (SolveIsland &own : all) {
-    own.all_passes = own.all_sweeps = own.again = own.capped = 0;
-    own.redundant.start();
-    own.stalls = own.stuck = false;
-    own.backs = true;
+    own.all_passes = own.all_sweeps = 0;
+    own.open = true;
   }
-  if (step.bodies_revise) revise_warm(w, step);
-  for (SolveIsland &own : all) own.open = true;
-  for (uint32_t hosts = 0;;) {
+  for (uint32_t hosts = 0;; ++hosts) {
     const SolveIsland *const bad = solve_islands(w, step);
     for (SolveIsland &own : all) {
       if (!own.open) continue;
       own.all_passes += own.passes;
       own.all_sweeps += own.sweeps;
     }
-    if (bad) return bad;
-    for (const SolveIsland &own : all)
-      if (own.open && own.stuck && may_shorten(step)) {
-        step.unsettled = w.bodies[step.rows.blocks[own.part.blocks[0]].source].get();
-        revised = Revised::diverged;
-        return nullptr;
-      }
     // a motor has reached its limit, or no longer does
-    if (hosts < kMostRevisions && !step.rows.rigid.empty() && revise_rigids(w, step)) {
-      finish_rows(w, step);
-      ++hosts;
-      for (SolveIsland &own : all) own.open = own.open || own.rigid;
-      continue;
-    }
-    for (SolveIsland &own : all)
-      if (own.open) own.capped += own.stalls || own.sweeps >= w.def.max_sweeps || own.residual.due > 1;
-    revise_islands(w, step, false);
-    bool more = false;
-    for (SolveIsland &own : all) {
-      if (!own.open) continue;
-      if (own.revised == Revised::diverged || own.revised == Revised::failed) {
-        revised = own.revised;
-        return nullptr;
-      }
-      own.open = own.revised == Revised::something ||
-                 (own.revises && own.residual.due > 1 && own.again++ < kMostAgain);
-      more = more || own.open;
-    }
-    if (!more) return nullptr;
+    if (bad || hosts == kMostRevisions || step.rows.rigid.empty() || !revise_rigids(w, step)) return bad;
+    finish_rows(w, step);
+    for (SolveIsland &own : all) own.open = own.rigid;
   }
 }
 
@@ -317,7 +190,7 @@ bool contacts_taken(World &w, StepContext &step) {
 }
 
 // In a shorter sub-step a body moves less far from where its forces are known.
-bool retry_shorter(World &w, StepContext &step, uint32_t *trouble) {
+bool retry_shorter(World &w, StepContext &step, const SolveIsland &own, uint32_t *trouble) {
   if (may_shorten(step)) {
     step.guard.again = true;
     step.guard.cut = 0.5;
@@ -325,7 +198,7 @@ bool retry_shorter(World &w, StepContext &step, uint32_t *trouble) {
   }
   set_last_error(format("step %llu, body '%s': no state was found in which its forces and contacts agree, "
                         "not even in a sub-step of %g s; take a smaller step, or lower the stiffness",
-                        static_cast<unsigned long long>(w.step_count), step.unsettled->name.c_str(), step.h)
+                        static_cast<unsigned long long>(w.step_count), w.bodies[own.implicit_body]->name.c_str(), step.h)
                      .c_str());
   *trouble |= DFM_TROUBLE_NONFINITE;
   return false;
@@ -359,14 +232,10 @@ bool stage_solve(World &w, StepContext &step, uint32_t *trouble) {
     return true;
   }
   share_work(w, step);
-  Revised revised = Revised::nothing;
-  const SolveIsland *const bad = solve_revised(w, step, revised);
+  const SolveIsland *const bad = solve_revised(w, step);
   add_up(step);
-  if (revised == Revised::diverged) return retry_shorter(w, step, trouble);
-  if (revised == Revised::failed) {
-    *trouble |= DFM_TROUBLE_PLUGIN;
-    return false;
-  }
+  for (const SolveIsland &own : step.solve_islands->all())
+    if (own.failed && !own.bad) return retry_shorter(w, step, own, trouble);
   double poison = 0;
   for (double l : step.rows.impulse) poison += 0.0 * l;
   if (bad || poison != 0) {

@@ -10,10 +10,8 @@
 #include <span>
 #include <vector>
 
-#include "contact/proximal.h"
-#include "contact/redundant.h"
+#include "contact/newton.h"
 #include "contact/solver.h"
-#include "contact/tresca.h"
 #include "friction/laws.h"
 #include "step/budget.h"
 #include "step/islands.h"
@@ -23,59 +21,56 @@ namespace dfm {
 struct StepContext;
 struct World;
 
-// How the bodies of an island have changed their response after a solve (solve.cpp).
-enum class Revised { nothing, something, diverged, failed };
+struct SolveIsland;
+
+// What Newton's method asks of an island.
+class IslandLaws final : public NewtonHost {
+ public:
+  void begin(const World &w, StepContext &step, SolveIsland &own) {
+    w_ = &w;
+    step_ = &step;
+    own_ = &own;
+    charged_ = 0;
+  }
+  bool answer(const double *response) override;
+  bool slopes() override;
+  bool judge(Residual &residual) override;
+  bool goes_on(uint32_t products) override;
+
+ private:
+  const World *w_ = nullptr;
+  StepContext *step_ = nullptr;
+  SolveIsland *own_ = nullptr;
+  uint32_t charged_ = 0;  // products
+};
 
 struct SolveIsland {
   RowsPart part;
-  bool revises = false;  // some body of it revises its response after a solve
-  bool rigid = false;    // some body of it is of a rigid host
-  bool soft = false;     // points of some body of it respond to each other's impulses
-  double effort = 0;     // of a sweep (Spent)
+  bool implicit = false;       // some body of it moves implicitly
+  uint32_t implicit_body = 0;  // slot of one of these
+  bool rigid = false;     // some body of it is of a rigid host
+  bool soft = false;      // points of some body of it respond to each other's impulses
+  double effort = 0;      // of a sweep (Spent)
   LawBatches batches;
   Acceleration acceleration;
-  Momentum momentum;
-  Proximal proximal;
-  Redundant redundant;
-  Tresca tresca;
+  std::unique_ptr<ContactNewton> newton;  // null until it is needed
+  IslandLaws laws;
   Tolerance tolerance;
   Array<double> scratch;  // of solve_bonds()
-  Array<double> limit;    // [contacts of the part] N s, fixed limits of friction
   // of the last solve
   Residual residual;
   uint32_t passes = 0, sweeps = 0;
-  bool slowed = false;     // its bias velocities have been lowered
-  bool stalls = false;     // in this sub-step sweeps reached their limit, and Tresca did not fail
-  bool waits = false;      // for the response that Tresca needs
-  bool backs = true;       // Tresca may be tried
-  bool stuck = false;      // it was tried, and found no result
-  bool owes = false;       // contacts of it owe slip (stuck_slip.h)
-  bool common = false;     // laws use the response of all contacts together
-  uint32_t asked = 0;      // passes beyond the limit of sweeps with the present response
-  double affordable = -1;  // sweeps beyond the limit; < 0: not known yet
-  // of the last two passes (Residual::due)
-  double due, due_before;
-  double best_due;  // of all passes; its impulses are in StepContext::best_pass
+  bool failed = false;  // no velocities were found: a model cannot tell its forces
+  bool owes = false;    // contacts of it owe slip (stuck_slip.h)
   Spent spent;
   const LawInstance *bad = nullptr;  // the law that has failed
   std::exception_ptr thrown;
   // of all solves of the sub-step
   bool open = true;  // it is to be solved
-  Revised revised = Revised::something;
-  uint32_t all_passes = 0, all_sweeps = 0, again = 0, capped = 0;
+  uint32_t all_passes = 0, all_sweeps = 0;
 
-  explicit SolveIsland(const Memory &m)
-      : batches(m), acceleration(m), momentum(m), proximal(m), redundant(m), tresca(m) {
-    use_memory(m, scratch, limit);
-    start();
-  }
-  // Begins with the first pass.
-  void start() {
-    passes = sweeps = asked = 0;
-    common = false;
-    affordable = -1;
-    due = due_before = best_due = std::numeric_limits<double>::infinity();
-  }
+  explicit SolveIsland(const Memory &m) : batches(m), acceleration(m) { use_memory(m, scratch); }
+  void start() { passes = sweeps = 0; }  // begins with the first pass
 };
 
 class SolveIslands {
@@ -117,7 +112,7 @@ class SolveIslands {
   Array<uint32_t> block_, begin_;
   std::vector<SolveIsland> islands_;  // those of this sub-step come first, and stay for later ones
   uint32_t count_ = 0;
-  void join(const ContactRows &rows);
+  void join(const ContactRows &rows, std::span<ImplicitSystem *const> systems);
   void number_sides(size_t bodies, size_t of_contacts);
   void find_cuts(const World &w, const StepContext &step);
   size_t find_pairs(const StepContext &step);  // returns how many are of contacts

@@ -117,11 +117,10 @@ void reset_owed(const World &w, StepContext &step) {
   step.owed.assign(3 * n, 0.0);
 }
 
-// Bodies that revise, and cut faces, have contacts with slips that no impulse removes, which the solve allows
-// (contact/redundant.h): these would be owed for ever.
+// Newton's method has its multipliers for that.
 void ask_slip_back(const World &w, StepContext &step, SolveIsland &own) {
   own.owes = false;
-  if (own.revises || step.owed.empty()) return;
+  if (own.implicit || step.owed.empty()) return;
   double *const owed = step.owed.data(), *const asked = step.asked_back.data();
   bool owes = false;
   each_row(own.part.contacts, [&](uint32_t i) {
@@ -174,7 +173,7 @@ void find_owed(const World &w, StepContext &step) {
   ContactState &s = step.state;
   const uint8_t *const cut = step.solve_islands->of_cuts();
   for (const SolveIsland &own : step.solve_islands->all()) {
-    if (own.revises) continue;
+    if (own.implicit) continue;
     each_row(own.part.contacts, [&](uint32_t i) {
       double &v1 = s.vt[i], &v2 = s.vt[s.stride + i];
       double *const e = &step.owed[3 * size_t{i}];

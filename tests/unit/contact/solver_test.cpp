@@ -39,7 +39,7 @@ struct Groove {
     rows.frame = {s, 0, s, s, 0, -s, 0, 1, 0, -s, 0, s, -s, 0, -s, 0, -1, 0};
     rows.drive.assign(6, 0);
     rows.rate.assign(2, 0);
-    rows.yields.assign(4, 0);
+    rows.yields.assign(6, 0);
     rows.wn.assign(2, 1);
     rows.wt.assign(2, 1);
     rows.cross.assign(4, 0);
@@ -143,7 +143,7 @@ TEST(Solver, OnePointThatLeaves_GetsNoForce) {
 TEST(Solver, OnePointThatMeetsAContactThatGives_KeepsWhatItGives) {
   for (const double most : {0.0, 0.3, 0.7, 0.8, 2.0}) {
     Problem p({4}, 0.6, {{1 / 1.75, 0, 0}});
-    p.rows.yields = {3 * 1.75, most};
+    p.rows.yields = {3 * 1.75, most, 0};
     p.pass(1);
     const double left = std::min(0.75, most);
     EXPECT_NEAR(p.impulse(0).x, (1 - left) / 1.75, 1e-15) << most;

@@ -104,12 +104,10 @@ TEST_P(LatePoints, SeenAfterEachStepOrNever_AreTheSame) {
   EXPECT_EQ(dfm_world_hash(a.world), dfm_world_hash(b.world));
 }
 
-// The same body where the points lead in each step, so that all of them are moved. Few modes are so hard that
-// the probe comes to its first contact with impacts, each of which sticks or slips by the last digits:
-// without friction none does.
+// The same body where the points lead in each step, so that all of them are moved. The probe comes to its first
+// contact with impacts, each of which sticks or slips by the last digits: without friction none does.
 TEST_P(LatePoints, OfASlidingProbe_AreThoseOfAStepThatMovesAll) {
-  std::vector<std::string> more;
-  if (!std::strcmp(GetParam(), "modal")) more.push_back("/contact/friction/0/params/mu=0");
+  const std::vector<std::string> more{"/contact/friction/0/params/mu=0"};
   const Probed late(GetParam(), more), whole(GetParam(), more);
   for (int n = 0; n < 300; ++n) {
     test::run(late.world, 1e-3, 1e-3);

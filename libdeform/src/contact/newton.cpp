@@ -1,0 +1,280 @@
+// The method of contact/newton.h: outer passes, Newton steps, line search.
+#include "contact/newton.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "body/phyxels.h"
+#include "contact/bonds.h"
+#include "contact/friction_kernel.h"
+
+namespace dfm {
+
+// m/s: what g would change of the velocities of points by themselves, of bodies as a whole, and, through the
+// motions of blocks, of contacts.
+double ContactNewton::error() const {
+  double most = 0;
+  for (size_t k = 0; k < size_t{3} * points_; ++k) most = std::max(most, std::fabs(inverse_[k] * g_[k]));
+  for (uint32_t k = 0; k < row_.size() && points_ < nodes_; ++k) {
+    Vec3 u;
+    for (uint32_t e = entry_[k]; e < entry_[k + 1]; ++e)
+      if (node_[e] >= points_) u += entry_times(e, &g_[3 * size_t{node_[e]}]);
+    most = std::max(most, norm(u));
+  }
+  for (const Body &b : bodies_) {
+    Vec3 sum;
+    for (uint32_t k = b.first; k < b.first + b.count; ++k)
+      for (int c = 0; c < 3; ++c)
+        if (inverse_[3 * size_t{k} + size_t(c)] > 0) sum[c] += g_[3 * size_t{k} + size_t(c)];
+    most = std::max(most, norm(sum) / b.system->mass());
+  }
+  return most;
+}
+
+double ContactNewton::size() const {
+  double sum = 0;
+  for (size_t k = 0; k < g_.size(); ++k) sum += inverse_[k] * (g_[k] * g_[k]);
+  return std::sqrt(sum);
+}
+
+// v = base + share way
+void ContactNewton::move(double share) {
+  for (uint32_t k = 0; k < nodes_; ++k)
+    for (size_t c = 0; c < 3; ++c)
+      v_[size_t{kStride} * k + c] = base_[size_t{kStride} * k + c] + share * way_[3 * size_t{k} + c];
+}
+
+// out = (A + J' G J) in
+void ContactNewton::multiply(const double *in, double *out, bool symmetric) const {
+  std::fill_n(out, size_t{3} * nodes_, 0.0);
+  for (uint32_t b = 0; b < pattern_.nb; ++b) {
+    const uint32_t i = pattern_.ij[2 * size_t{b}], j = pattern_.ij[2 * size_t{b} + 1];
+    const double *const a = &matrix_[9 * size_t{b}], *const x = in + 3 * size_t{j};
+    double *const y = out + 3 * size_t{i};
+    for (size_t r = 0; r < 3; ++r) y[r] += a[3 * r] * x[0] + a[3 * r + 1] * x[1] + a[3 * r + 2] * x[2];
+    if (i == j) continue;
+    const double *const z = in + 3 * size_t{i};
+    double *const to = out + 3 * size_t{j};
+    for (size_t c = 0; c < 3; ++c) to[c] += a[c] * z[0] + a[3 + c] * z[1] + a[6 + c] * z[2];
+  }
+  for (uint32_t k = 0; k < row_.size(); ++k) {
+    const double *G = &slope_[9 * size_t{k}];
+    double s[9];
+    if (symmetric) {
+      symmetric_part(G, s);
+      G = s;
+    }
+    const Vec3 u = times(k, in, 3);
+    add_transposed(k, {dot(load3(G), u), dot(load3(G + 3), u), dot(load3(G + 6), u)}, out);
+  }
+}
+
+// way = -(A + J'GJ)^-1 g to this relative residual, with the last factor while it is good enough.
+bool ContactNewton::find_way(bool symmetric, double tolerance) {
+  if (!find_slopes(symmetric) || !set_matrix()) return false;
+  for (size_t k = 0; k < g_.size(); ++k) minus_[k] = inverse_[k] > 0 ? -g_[k] : 0;
+  const auto by = [&](const double *in, double *out) { multiply(in, out, symmetric); };
+  const auto precondition = [&](const double *in, double *out) {
+    SolveInfo info;
+    factor_.solve(1, in, out, 0, info);
+  };
+  for (bool fresh : {false, true}) {
+    if (!fresh && !factored_) continue;
+    if (fresh && !refactor()) return false;
+    const Gmres::Result found = gmres_.run(g_.size(), minus_.data(), way_.data(), tolerance,
+                                           fresh ? set_.products : set_.kept, by, precondition);
+    products_ += found.iterations;
+    work_ += found.iterations * (factor_.solve_work() + 18.0 * pattern_.nb);
+    if (fresh || found.left <= tolerance) break;
+  }
+  return true;
+}
+
+// A step with the coupled derivative. False: it does not lower g enough; v is where it was.
+bool ContactNewton::coupled_step(double tolerance, bool &failed) {
+  const double before = size(), left = error();
+  failed = !find_way(false, std::clamp(set_.share * tolerance / left, 1e-8, 1e-2));
+  if (failed) return false;
+  base_.assign(v_.begin(), v_.end());
+  ++steps_;
+  for (const double share : {1.0, 0.5}) {
+    move(share);
+    if (evaluate(false) && size() <= (1 - set_.falls * share) * before) return true;
+  }
+  v_.swap(base_);
+  failed = !evaluate(false);
+  return false;
+}
+
+// Steps on the convex function with frozen limits of friction, until its gradient has fallen to a tenth.
+bool ContactNewton::frozen_steps() {
+  freeze();
+  if (!evaluate(true)) return false;
+  const double start = size();
+  for (uint32_t trip = 0; trip < set_.passes && steps_ < limit_; ++trip) {
+    const auto slope = [&] {
+      double sum = 0;
+      for (size_t k = 0; k < g_.size(); ++k) sum += g_[k] * way_[k];
+      return sum;
+    };
+    if (!find_way(true, 1e-2)) return false;
+    const double first = slope();
+    base_.assign(v_.begin(), v_.end());
+    ++steps_;
+    if (!(first < 0)) return evaluate(false);
+    // the share of the way at which the slope has nearly gone, between one where it is negative and one where
+    // it is not, or where the function is not known
+    double low = 0, high = 0, at_low = first, at_high = 0, share = 1;
+    for (uint32_t trial = 0; trial < set_.trials; ++trial) {
+      move(share);
+      const bool known = evaluate(true);
+      const double now = known ? slope() : std::numeric_limits<double>::infinity();
+      if (known && now <= -set_.flat * first && (share == 1 || now >= set_.flat * first)) break;
+      if (now > 0) {
+        high = share;
+        at_high = now;
+      } else {
+        low = share;
+        at_low = now;
+      }
+      const double ratio = std::isfinite(at_high) ? at_low / (at_low - at_high) : 0.5;
+      share = low + std::clamp(trial % 3 == 2 ? 0.5 : ratio, 0.05, 0.95) * (high - low);
+    }
+    if (!(size() > set_.share * start)) break;
+  }
+  return evaluate(false);
+}
+
+// v with g = 0 for the present multipliers, up to a tolerance in m/s. round: coupled and frozen steps undo
+// each other. With strong friction g may have no zero that they reach; it has one where rho is small, since A
+// then outweighs what is not symmetric.
+bool ContactNewton::newton(double tolerance, bool &round) {
+  round = false;
+  if (!evaluate(false)) return false;
+  uint32_t phases = 0;
+  while (error() > tolerance && steps_ < limit_) {
+    bool failed = false;
+    if (coupled_step(tolerance, failed)) continue;
+    if (!failed && phases++ == set_.rounds) return round = true;
+    if (failed || !frozen_steps()) return false;
+  }
+  return true;
+}
+
+// The rows get the present impulses and velocities.
+void ContactNewton::put_rows() {
+  ContactRows &rows = *rows_;
+  for (size_t k = 0; k < row_.size(); ++k) std::copy_n(&l_[3 * k], 3, &rows.impulse[size_t{3} * row_[k].row]);
+  rows.restore(part_);
+  const auto put = [&](uint32_t i) {
+    for (uint32_t j = rows.begin[i]; j < rows.begin[i + 1]; ++j) {
+      const uint32_t d = rows.dof[j], node = node_of_dof_[d];
+      if (node != kNone) std::copy_n(&v_[size_t{kStride} * node], 3, &rows.y[size_t{kStride} * d]);
+    }
+  };
+  each_row(part_.contacts, put);
+  each_row(part_.bonds, put);
+}
+
+void ContactNewton::scale_penalties(double by) {
+  for (double &rho : rho_) rho *= by;
+  for (double &response : response_) response /= by;
+}
+
+bool ContactNewton::solve(double tolerance, double normal) {
+  found_ = false;
+  limit_ = steps_ + set_.steps;
+  set_penalties(set_.penalty);
+  lh_.assign(l_.begin(), l_.end());
+  if (!evaluate(false) || !host_->judge(residual_)) return false;
+  double left = std::max(residual_.speed, error()), aim = left;  // m/s
+  uint32_t slow = 0, stood = 0;
+  Array<double> &before = kept_;
+  for (passes_ = 0; passes_ < set_.passes;) {
+    ++passes_;
+    before.assign(v_.begin(), v_.end());
+    const double goal = std::clamp(set_.share * aim, set_.share * tolerance, set_.coarse);
+    bool round;
+    if (!newton(goal, round)) return false;
+    if (round && steps_ < limit_ && passes_ < set_.passes) {
+      scale_penalties(set_.softens);
+      slow = 0;
+      v_.assign(before.begin(), before.end());
+      continue;
+    }
+    put_rows();
+    for (const Row &r : row_)
+      if (r.kind == Kind::drag) limit_drag(*rows_, r.row);
+    if (!host_->judge(residual_)) return false;
+    const double off = error(), due = std::max(residual_.relative, off / tolerance);
+    found_ = due <= set_.within;
+    if (found_ || steps_ >= limit_) break;
+    if (!host_->goes_on(products_)) return true;
+    lh_.assign(l_.begin(), l_.end());
+    double moved = 0;
+    for (size_t k = 0; k < v_.size(); ++k) moved = std::max(moved, std::fabs(v_[k] - before[k]));
+    // Rows that contradict each other: multipliers change without end, velocities do not, however large the
+    // penalties are. Those of nearly parallel rows change slowly, too.
+    const bool still = passes_ > 3 && moved <= set_.share * tolerance;
+    const bool stands = still && residual_.normal <= set_.stands * normal;
+    if (still && off <= tolerance) {
+      found_ = stood++ >= set_.firm && stands;
+      if (found_) break;
+      scale_penalties(set_.grows);
+    }
+    const double now = std::max(residual_.speed, off);
+    aim = stands ? off : now;
+    slow = now > 0.5 * left ? slow + 1 : 0;
+    left = now;
+    if (slow < 3) continue;
+    slow = 0;
+    scale_penalties(set_.grows);
+  }
+  if (found_ && residual_.due > 1) residual_.due = residual_.relative = 1;
+  return found_ || residual_.due <= 1 || !gains(normal) || penalties_alone();
+}
+
+// Whether normal impulses do more work than residuals of this size explain.
+bool ContactNewton::gains(double normal) const {
+  double work = 0, all = 0;
+  for (uint32_t k = 0; k < row_.size(); ++k) {
+    if (row_[k].kind != Kind::contact) continue;
+    const uint32_t i = row_[k].row;
+    const double l = l_[3 * size_t{k}];
+    all += l;
+    work += l * (u_[3 * size_t{k}] + rows_->rate[i] + given(l, &rows_->yields[3 * size_t{i}]));
+  }
+  return work > normal * all;
+}
+
+// Where rows ask for what cannot be, multipliers grow without end. Impulses of the penalties alone resist
+// motion in proportion to it: bodies give way a little, and no contact does work that its law does not allow.
+bool ContactNewton::penalties_alone() {
+  std::fill(lh_.begin(), lh_.end(), 0.0);
+  limit_ = steps_ + set_.steps;
+  for (bool round = true; round && steps_ < limit_; scale_penalties(set_.softens))
+    if (!newton(set_.coarse, round)) return false;
+  put_rows();
+  return host_->judge(residual_);
+}
+
+// What is left of g moves each body as a whole, so that its momentum is that of the impulses.
+void ContactNewton::take() {
+  for (const Body &b : bodies_) {
+    Vec3 sum, free;
+    for (uint32_t k = b.first; k < b.first + b.count; ++k)
+      for (int c = 0; c < 3; ++c) {
+        free[c] += inverse_[3 * size_t{k} + size_t(c)] > 0;
+        sum[c] += g_[3 * size_t{k} + size_t(c)];
+      }
+    for (int c = 0; c < 3; ++c)
+      if (free[c] == b.count)
+        for (uint32_t k = b.first; k < b.first + b.count; ++k)
+          v_[size_t{kStride} * k + size_t(c)] -= sum[c] / b.system->mass();
+    b.system->take(&v_[size_t{kStride} * b.first]);
+  }
+}
+
+}  // namespace dfm

@@ -1,0 +1,534 @@
+// The problem of contact/newton.h: its unknowns, its rows, their impulses and derivatives, its matrix.
+#include <algorithm>
+#include <cmath>
+
+#include "body/phyxels.h"
+#include "contact/friction_kernel.h"
+#include "contact/newton.h"
+
+namespace dfm {
+
+ContactNewton::ContactNewton(const Memory &m) : memory_(m), factor_(m), gmres_(m) {
+  use_memory(m, node_of_dof_, dof_of_node_, row_, index_, entry_, node_, jac_, bias_, heavy_, v_, base_, g_,
+             kept_, way_, minus_, inverse_, u_, l_, lh_, rho_, response_, slope_, frozen_, keys_, pairs_, at_,
+             own_, spot_, blocks_, matrix_, places_);
+  use_memory(m, motions_.g, motions_.columns, motions_.left, motions_.first_column, motions_.column_count,
+             motions_.first_value);
+}
+
+void ContactNewton::begin(ContactRows &rows, const RowsPart &part, std::span<ImplicitSystem *const> systems,
+                          ContactState &state, NewtonHost &host, double h) {
+  rows_ = &rows;
+  part_ = part;
+  state_ = &state;
+  host_ = &host;
+  h_ = h;
+  found_ = factored_ = shaped_ = false;
+  passes_ = steps_ = products_ = factors_ = 0;
+  work_ = 0;
+  number_nodes(systems);
+  list_rows();
+  set_bias();
+  for (Array<double> *a : {&g_, &kept_, &way_, &minus_}) a->resize(size_t{3} * nodes_);
+  base_.resize(v_.size());
+  const size_t n = row_.size();
+  u_.resize(3 * n);
+  l_.resize(3 * n);
+  lh_.resize(3 * n);
+  slope_.resize(9 * n);
+  frozen_.resize(n);
+  for (size_t k = 0; k < n; ++k) std::copy_n(&rows.impulse[size_t{3} * row_[k].row], 3, &lh_[3 * k]);
+  l_.assign(lh_.begin(), lh_.end());
+  put_rows();
+}
+
+// Points of implicit bodies, single points, motions of blocks. v_ is where the solve starts.
+void ContactNewton::number_nodes(std::span<ImplicitSystem *const> systems) {
+  const ContactRows &rows = *rows_;
+  bodies_.clear();
+  dof_of_node_.clear();
+  heavy_.clear();
+  node_of_dof_.resize(rows.ndof);
+  nodes_ = 0;
+  const auto each_dof = [&](auto &&f) {
+    const auto of_row = [&](uint32_t i) {
+      for (uint32_t j = rows.begin[i]; j < rows.begin[i + 1]; ++j) f(rows.dof[j]);
+    };
+    each_row(part_.contacts, of_row);
+    each_row(part_.bonds, of_row);
+  };
+  const auto system_of = [&](uint32_t d) -> ImplicitSystem * {
+    return rows.block[d] == kNone ? systems[rows.source[d]] : nullptr;
+  };
+  each_dof([&](uint32_t d) {
+    node_of_dof_[d] = kNone;
+    ImplicitSystem *const system = system_of(d);
+    if (!system || std::any_of(bodies_.begin(), bodies_.end(), [&](auto &b) { return b.system == system; }))
+      return;
+    bodies_.push_back({system, rows.source[d], 0, system->pattern().n, 0});
+  });
+  std::sort(bodies_.begin(), bodies_.end(), [](auto &a, auto &b) { return a.source < b.source; });
+  v_.clear();
+  inverse_.clear();
+  for (Body &b : bodies_) {
+    b.first = nodes_;
+    nodes_ += b.count;
+    const double *const start = b.system->start(), *const diagonal = b.system->diagonal_inverse();
+    v_.insert(v_.end(), start, start + size_t{kStride} * b.count);
+    for (uint32_t k = 0; k < b.count; ++k) inverse_.insert(inverse_.end(), diagonal + kStride * k, diagonal + kStride * k + 3);
+  }
+  dof_of_node_.assign(nodes_, kNone);
+  heavy_.assign(size_t{kStride} * nodes_, 0.0);
+  each_dof([&](uint32_t d) {
+    if (rows.block[d] != kNone || node_of_dof_[d] != kNone) return;
+    if (systems[rows.source[d]]) {
+      const auto b = std::find_if(bodies_.begin(), bodies_.end(),
+                                  [&](auto &body) { return body.source == rows.source[d]; });
+      node_of_dof_[d] = b->first + rows.point[d];
+      return;
+    }
+    node_of_dof_[d] = nodes_++;
+    dof_of_node_.push_back(d);
+    for (size_t c = 0; c < kStride; ++c) {
+      const double alone = c < 3 ? rows.alone[size_t{kStride} * d + c] : 0;
+      v_.push_back(c < 3 ? rows.y[size_t{kStride} * d + c] : 0);
+      heavy_.push_back(alone > 0 ? 1 / alone : 0);
+      if (c < 3) inverse_.push_back(alone);
+    }
+  });
+  points_ = nodes_;
+  // blocks: their motions, from where the impulses of the start have brought them
+  index_.clear();
+  each_row(part_.contacts, [&](uint32_t i) { index_.push_back(i); });
+  each_row(part_.bonds, [&](uint32_t i) { index_.push_back(i); });
+  motions_.rank = 0;
+  if (!part_.blocks.empty()) rows.motions(index_, part_.blocks, motions_);
+  nodes_ += (motions_.rank + 2) / 3;
+  v_.resize(size_t{kStride} * nodes_, 0.0);
+  heavy_.resize(size_t{kStride} * nodes_, 0.0);
+  inverse_.resize(size_t{3} * nodes_, 1.0);
+  dof_of_node_.resize(nodes_, kNone);
+  // where a node lies decides about the order of elimination only
+  places_.assign(size_t{3} * nodes_, 0.0);
+  for (const Body &b : bodies_)
+    for (uint32_t k = 0; k < b.count; ++k)
+      std::copy_n(b.system->places() + size_t{kStride} * k, 3, &places_[3 * size_t{b.first + k}]);
+}
+
+void ContactNewton::list_rows() {
+  const ContactRows &rows = *rows_;
+  row_.clear();
+  entry_.assign(1, 0);
+  node_.clear();
+  jac_.clear();
+  const size_t width = (size_t{motions_.rank} + 3) & ~size_t{3};
+  const auto add = [&](uint32_t i, Kind kind) {
+    const size_t k = row_.size();
+    row_.push_back({i, kind});
+    const double *const f = &rows.frame[size_t{9} * i];
+    for (uint32_t j = rows.begin[i]; j < rows.begin[i + 1]; ++j) {
+      const uint32_t node = node_of_dof_[rows.dof[j]];
+      if (node == kNone) continue;
+      node_.push_back(node);
+      for (size_t r = 0; r < 3; ++r)
+        for (size_t c = 0; c < 3; ++c)
+          jac_.push_back(inverse_[3 * size_t{node} + c] > 0 ? rows.weight[j] * f[3 * r + c] : 0);
+    }
+    const double *const g = motions_.rank ? &motions_.g[3 * k * width] : nullptr;
+    for (uint32_t q = 0; points_ + q < nodes_; ++q) {
+      double part[9];
+      bool any = false;
+      for (size_t r = 0; r < 3; ++r)
+        for (size_t c = 0; c < 3; ++c) {
+          const size_t column = 3 * size_t{q} + c;
+          part[3 * r + c] = column < motions_.rank ? g[r * width + column] : 0;
+          any = any || part[3 * r + c] != 0;
+        }
+      if (!any) continue;
+      node_.push_back(points_ + q);
+      jac_.insert(jac_.end(), part, part + 9);
+    }
+    entry_.push_back(static_cast<uint32_t>(node_.size()));
+  };
+  each_row(part_.contacts, [&](uint32_t i) { add(i, Kind::contact); });
+  each_row(part_.bonds, [&](uint32_t i) { add(i, rows.bond[i - rows.n].drags() ? Kind::drag : Kind::bond); });
+}
+
+// Velocity of each row without what the nodes contribute: rows.y has those of blocks without impulses.
+void ContactNewton::set_bias() {
+  ContactRows &rows = *rows_;
+  bias_.resize(3 * row_.size());
+  const auto clear = [&](uint32_t i) {
+    for (uint32_t j = rows.begin[i]; j < rows.begin[i + 1]; ++j)
+      if (rows.block[rows.dof[j]] == kNone) std::fill_n(&rows.y[size_t{kStride} * rows.dof[j]], 3, 0.0);
+  };
+  each_row(part_.contacts, clear);
+  each_row(part_.bonds, clear);
+  for (const uint32_t number : part_.blocks) {
+    const size_t first = size_t{kStride} * rows.blocks[number].first;
+    std::copy_n(&rows.y_free[first], size_t{kStride} * rows.blocks[number].count, &rows.y[first]);
+  }
+  for (size_t k = 0; k < row_.size(); ++k) {
+    const uint32_t i = row_[k].row;
+    Vec3 u = rows.velocity(i);
+    const double *const f = &rows.frame[size_t{9} * i];
+    for (uint32_t j = rows.begin[i]; j < rows.begin[i + 1]; ++j) {
+      const uint32_t node = node_of_dof_[rows.dof[j]];
+      if (node == kNone) continue;
+      for (int c = 0; c < 3; ++c)  // a component that is held moves as it is told
+        if (inverse_[3 * size_t{node} + size_t(c)] == 0)
+          u += (rows.weight[j] * v_[size_t{kStride} * node + size_t(c)]) * Vec3{f[c], f[3 + c], f[6 + c]};
+    }
+    store3(&bias_[3 * k], u);
+    // motions of blocks as the start impulses have made them
+    for (uint32_t e = entry_[k]; e < entry_[k + 1]; ++e) {
+      if (node_[e] < points_) continue;
+      const double *const j = &jac_[size_t{9} * e], *const l = &rows.impulse[size_t{3} * i];
+      double *const q = &v_[size_t{kStride} * node_[e]];
+      for (size_t c = 0; c < 3; ++c) q[c] += j[c] * l[0] + j[3 + c] * l[1] + j[6 + c] * l[2];
+    }
+  }
+}
+
+void ContactNewton::set_penalties(double factor) {
+  const ContactRows &rows = *rows_;
+  rho_.resize(2 * row_.size());
+  response_.resize(rows.all());
+  for (size_t k = 0; k < row_.size(); ++k) {
+    // over what the nodes answer by themselves, which is stiffer than the bodies are
+    const uint32_t i = row_[k].row;
+    const double whole = rows.whole_answer(i), wn = rows.wn[i] - whole, wt = rows.wt[i] - whole;
+    rho_[2 * k] = wn > 0 ? factor / wn : 0;
+    rho_[2 * k + 1] = wt > 0 ? factor / wt : 0;
+    if (row_[k].kind == Kind::bond) rho_[2 * k] = rho_[2 * k + 1] = std::min(rho_[2 * k], rho_[2 * k + 1]);
+    if (row_[k].kind == Kind::drag) {
+      const double w_along = rows.bond[i - rows.n].w;
+      rho_[2 * k] = w_along > 0 ? factor / w_along : 0;
+    }
+    response_[i] = rho_[2 * k + 1] > 0 ? 1 / rho_[2 * k + 1] : 0;
+  }
+}
+
+Vec3 ContactNewton::entry_times(uint32_t e, const double *x) const {
+  const double *const j = &jac_[size_t{9} * e];
+  return {j[0] * x[0] + j[1] * x[1] + j[2] * x[2], j[3] * x[0] + j[4] * x[1] + j[5] * x[2],
+          j[6] * x[0] + j[7] * x[1] + j[8] * x[2]};
+}
+
+Vec3 ContactNewton::times(uint32_t k, const double *x, size_t stride) const {
+  Vec3 u;
+  for (uint32_t e = entry_[k]; e < entry_[k + 1]; ++e) u += entry_times(e, x + stride * node_[e]);
+  return u;
+}
+
+void ContactNewton::add_transposed(uint32_t k, Vec3 z, double *to) const {
+  for (uint32_t e = entry_[k]; e < entry_[k + 1]; ++e) {
+    const double *const j = &jac_[size_t{9} * e];
+    double *const at = to + size_t{3} * node_[e];
+    at[0] += j[0] * z.x + j[3] * z.y + j[6] * z.z;
+    at[1] += j[1] * z.x + j[4] * z.y + j[7] * z.z;
+    at[2] += j[2] * z.x + j[5] * z.y + j[8] * z.z;
+  }
+}
+
+void ContactNewton::evaluate_bond(uint32_t k) {
+  const ContactRows::BondRow &b = rows_->bond[row_[k].row - rows_->n];
+  const double rho = rho_[2 * size_t{k}];
+  const Vec3 u = load3(&u_[3 * size_t{k}]), lh = load3(&lh_[3 * size_t{k}]);
+  Vec3 l = lh;
+  if (row_[k].kind == Kind::drag) {
+    l = std::clamp(dot(b.along, lh) - rho * dot(b.along, u), 0.0, b.most) * b.along;
+  } else if (rho > 0) {
+    for (int c = 0; c < 3; ++c)
+      if (b.inverse[c][c] != 0) l[c] = (lh[c] - rho * (u[c] + b.rate[c])) / (1 + rho * b.soft);
+  }
+  store3(&l_[3 * size_t{k}], l);
+}
+
+// g, u, l at v. frozen: with the limits of friction of freeze(). False: a model or a law cannot tell.
+bool ContactNewton::evaluate(bool frozen) {
+  ContactState &s = *state_;
+  const size_t stride = s.stride;
+  for (const Body &b : bodies_)
+    if (!b.system->residual(&v_[size_t{kStride} * b.first], &g_[size_t{3} * b.first])) return false;
+  for (uint32_t k = bodies_.empty() ? 0 : bodies_.back().first + bodies_.back().count; k < points_; ++k)
+    for (size_t c = 0; c < 3; ++c)
+      g_[3 * size_t{k} + c] = heavy_[size_t{kStride} * k + c] *
+                              (v_[size_t{kStride} * k + c] - rows_->y_free[size_t{kStride} * dof_of_node_[k] + c]);
+  for (uint32_t k = points_; k < nodes_; ++k)
+    for (size_t c = 0; c < 3; ++c) g_[3 * size_t{k} + c] = v_[size_t{kStride} * k + c];
+  bool laws = false;
+  for (uint32_t k = 0; k < row_.size(); ++k) {
+    const Vec3 u = times(k, v_.data(), kStride) + load3(&bias_[3 * size_t{k}]);
+    store3(&u_[3 * size_t{k}], u);
+    if (row_[k].kind != Kind::contact) {
+      evaluate_bond(k);
+      continue;
+    }
+    const uint32_t i = row_[k].row;
+    const double rho = rho_[2 * size_t{k}], rub = rho_[2 * size_t{k} + 1];
+    const double *const lh = &lh_[3 * size_t{k}];
+    double *const l = &l_[3 * size_t{k}];
+    std::copy_n(lh, 3, l);
+    if (!(rho > 0)) continue;
+    l[0] = normal_impulse(lh[0], u.x + rows_->rate[i], 1 / rho, &rows_->yields[3 * size_t{i}]);
+    l[1] = l[2] = 0;
+    const bool smooth = s.form[i] == kSmoothLaw;
+    s.fn[i] = (frozen && smooth ? frozen_[k] : l[0]) / h_;
+    s.vt[i] = s.slip[i] = u.y;
+    s.vt[stride + i] = s.slip[stride + i] = u.z;
+    s.ft_stop[i] = (lh[1] - rub * u.y) / h_;
+    s.ft_stop[stride + i] = (lh[2] - rub * u.z) / h_;
+    laws = laws || (s.form[i] != kNoFriction && s.fn[i] > 0 && !(frozen && !smooth));
+  }
+  if (laws && !host_->answer(response_.data())) return false;
+  for (uint32_t k = 0; k < row_.size(); ++k) {
+    double *const l = &l_[3 * size_t{k}];
+    if (row_[k].kind == Kind::contact) {
+      const uint32_t i = row_[k].row;
+      const double rub = rho_[2 * size_t{k} + 1];
+      if (rub > 0 && s.fn[i] > 0 && s.form[i] == kSmoothLaw) {
+        l[1] = h_ * s.ft[i];
+        l[2] = h_ * s.ft[stride + i];
+      } else if (rub > 0 && s.form[i] == kSetValuedLaw && (frozen ? frozen_[k] > 0 : l[0] > 0)) {
+        const double radius = frozen ? frozen_[k] : h_ * s.limit[i];
+        const double a = h_ * s.ft_stop[i], b = h_ * s.ft_stop[stride + i], all = std::sqrt(a * a + b * b);
+        const double share = all > radius ? radius / all : 1;
+        l[1] = share * a;
+        l[2] = share * b;
+      }
+    }
+    if (l[0] != 0 || l[1] != 0 || l[2] != 0) add_transposed(k, -load3(l), g_.data());
+  }
+  double poison = 0;
+  for (const double value : g_) poison += 0.0 * value;
+  return poison == 0;
+}
+
+// Limits of friction as they are at the present impulses.
+void ContactNewton::freeze() {
+  const ContactState &s = *state_;
+  for (uint32_t k = 0; k < row_.size(); ++k) {
+    const uint32_t i = row_[k].row;
+    if (row_[k].kind != Kind::contact) continue;
+    const double l = l_[3 * size_t{k}];
+    frozen_[k] = s.form[i] == kSetValuedLaw ? (l > 0 ? h_ * s.limit[i] : 0) : l;
+  }
+}
+
+// G = -dl/du of all rows at the last evaluate().
+bool ContactNewton::find_slopes(bool frozen) {
+  ContactState &s = *state_;
+  const size_t n = s.stride;
+  if (!host_->slopes()) return false;
+  std::fill(slope_.begin(), slope_.end(), 0.0);
+  for (uint32_t k = 0; k < row_.size(); ++k) {
+    const uint32_t i = row_[k].row;
+    double *const G = &slope_[9 * size_t{k}];
+    const double rho = rho_[2 * size_t{k}], rub = rho_[2 * size_t{k} + 1];
+    const double *const l = &l_[3 * size_t{k}];
+    if (!(rho > 0)) continue;
+    if (row_[k].kind != Kind::contact) {
+      const ContactRows::BondRow &b = rows_->bond[i - rows_->n];
+      if (row_[k].kind == Kind::bond) {
+        for (int c = 0; c < 3; ++c)
+          if (b.inverse[c][c] != 0) G[4 * c] = rho / (1 + rho * b.soft);
+      } else {
+        const double free = dot(b.along, load3(&lh_[3 * size_t{k}])) - rho * dot(b.along, load3(&u_[3 * size_t{k}]));
+        if (!(free > 0 && free < b.most)) continue;
+        for (int r = 0; r < 3; ++r)
+          for (int c = 0; c < 3; ++c) G[3 * r + c] = rho * b.along[r] * b.along[c];
+      }
+      continue;
+    }
+    double normal = 0;
+    if (l[0] > 0) {
+      const double *const yields = &rows_->yields[3 * size_t{i}];
+      const double gives = yields[0] * (l[0] - yields[2]);
+      normal = gives > 0 && gives < yields[1] ? 1 / (1 / rho + yields[0]) : rho;
+      G[0] = normal;
+    }
+    if (!(rub > 0)) continue;
+    if (s.form[i] == kSmoothLaw && s.fn[i] > 0) {
+      const Slope d = dissipative_slope(s, i);
+      const double t = h_ / rub;
+      const double m11 = 1 - t * d.a, m22 = 1 - t * d.d, m12 = -t * d.b, m21 = -t * d.c,
+                   det = m11 * m22 - m12 * m21;
+      // X = (I - D/rho)^-1; G_tt = -X D, G_tn = X (dft/dfn) G_nn
+      const double x11 = m22 / det, x12 = -m12 / det, x21 = -m21 / det, x22 = m11 / det;
+      G[4] = -h_ * (x11 * d.a + x12 * d.c);
+      G[5] = -h_ * (x11 * d.b + x12 * d.d);
+      G[7] = -h_ * (x21 * d.a + x22 * d.c);
+      G[8] = -h_ * (x21 * d.b + x22 * d.d);
+      if (!frozen) {
+        G[3] = normal * (x11 * s.dft_dfn[i] + x12 * s.dft_dfn[n + i]);
+        G[6] = normal * (x21 * s.dft_dfn[i] + x22 * s.dft_dfn[n + i]);
+      }
+    } else if (s.form[i] == kSetValuedLaw) {
+      const double radius = frozen ? frozen_[k] : l[0] > 0 ? h_ * s.limit[i] : 0;
+      if (!(radius > 0)) continue;
+      const double a = h_ * s.ft_stop[i], b = h_ * s.ft_stop[n + i], all = std::sqrt(a * a + b * b);
+      if (all <= radius) {
+        G[4] = G[8] = rub;
+        continue;
+      }
+      const double t1 = a / all, t2 = b / all, across = rub * radius / all;
+      G[4] = across * t2 * t2;
+      G[5] = G[7] = -across * t1 * t2;
+      G[8] = across * t1 * t1;
+      if (frozen) continue;
+      const double grows =
+          s.mode[i] == 2 ? std::sqrt(s.dft_dfn[i] * s.dft_dfn[i] + s.dft_dfn[n + i] * s.dft_dfn[n + i])
+                         : radius / l[0];
+      G[3] = grows * normal * t1;
+      G[6] = grows * normal * t2;
+      // the limit grows with the speed of a viscous law
+      const double v1 = s.vt[i], v2 = s.vt[n + i], speed = std::sqrt(v1 * v1 + v2 * v2);
+      if (!(speed > 0) || s.mode[i] != 2) continue;
+      const double e1 = v1 / speed, e2 = v2 / speed;
+      const double viscous =
+          std::max(0.0, -(e1 * (s.dft_dvt[i] * e1 + s.dft_dvt[n + i] * e2) +
+                          e2 * (s.dft_dvt[2 * n + i] * e1 + s.dft_dvt[3 * n + i] * e2)));
+      G[4] -= h_ * viscous * t1 * e1;
+      G[5] -= h_ * viscous * t1 * e2;
+      G[7] -= h_ * viscous * t2 * e1;
+      G[8] -= h_ * viscous * t2 * e2;
+    }
+  }
+  return true;
+}
+
+// The part of G that is symmetric and has no negative eigenvalue.
+void ContactNewton::symmetric_part(const double *G, double *out) {
+  std::fill_n(out, 9, 0.0);
+  out[0] = G[0];
+  if (G[1] != 0 || G[2] != 0) {  // of a bond
+    for (int r = 0; r < 3; ++r)
+      for (int c = 0; c < 3; ++c) out[3 * r + c] = 0.5 * (G[3 * r + c] + G[3 * c + r]);
+    return;
+  }
+  const double a = G[4], c = G[8], b = 0.5 * (G[5] + G[7]);
+  const double mean = 0.5 * (a + c), dev = 0.5 * (a - c), spread = std::sqrt(dev * dev + b * b);
+  const double top = mean + spread, bottom = mean - spread;
+  if (bottom >= 0) {
+    out[4] = a;
+    out[5] = out[7] = b;
+    out[8] = c;
+  } else if (top > 0) {  // top p p', p p' = (S - bottom I)/(top - bottom)
+    const double scale = top / (top - bottom);
+    out[4] = scale * (a - bottom);
+    out[5] = out[7] = scale * b;
+    out[8] = scale * (c - bottom);
+  }
+}
+
+// The pattern of A + J' G J, which holds until begin().
+void ContactNewton::shape() {
+  keys_.clear();
+  for (const Body &b : bodies_) {
+    const BlockPattern p = b.system->pattern();
+    for (uint32_t k = 0; k < p.nb; ++k)
+      keys_.push_back(uint64_t{b.first + p.ij[2 * size_t{k}]} << 32 | (b.first + p.ij[2 * size_t{k} + 1]));
+  }
+  for (uint32_t k = 0; k < nodes_; ++k) keys_.push_back(uint64_t{k} << 32 | k);
+  const auto key = [&](uint32_t e, uint32_t f) {
+    const uint32_t i = std::min(node_[e], node_[f]), j = std::max(node_[e], node_[f]);
+    return uint64_t{i} << 32 | j;
+  };
+  const auto each_pair = [&](auto &&f) {
+    for (size_t k = 0; k < row_.size(); ++k)
+      for (uint32_t a = entry_[k]; a < entry_[k + 1]; ++a)
+        for (uint32_t b = a; b < entry_[k + 1]; ++b) f(key(a, b));
+  };
+  each_pair([&](uint64_t value) { keys_.push_back(value); });
+  std::sort(keys_.begin(), keys_.end());
+  keys_.erase(std::unique(keys_.begin(), keys_.end()), keys_.end());
+  const auto place = [&](uint64_t value) {
+    return uint32_t(std::lower_bound(keys_.begin(), keys_.end(), value) - keys_.begin());
+  };
+  pairs_.clear();
+  for (const uint64_t value : keys_) {
+    pairs_.push_back(uint32_t(value >> 32));
+    pairs_.push_back(uint32_t(value));
+  }
+  pattern_ = {nodes_, static_cast<uint32_t>(keys_.size()), pairs_.data()};
+  at_.clear();
+  for (Body &b : bodies_) {
+    const BlockPattern p = b.system->pattern();
+    b.pattern = at_.size();
+    for (uint32_t k = 0; k < p.nb; ++k)
+      at_.push_back(
+          place(uint64_t{b.first + p.ij[2 * size_t{k}]} << 32 | (b.first + p.ij[2 * size_t{k} + 1])));
+  }
+  own_.resize(nodes_);
+  for (uint32_t k = 0; k < nodes_; ++k) own_[k] = place(uint64_t{k} << 32 | k);
+  spot_.clear();
+  each_pair([&](uint64_t value) { spot_.push_back(place(value)); });
+  blocks_.resize(size_t{9} * pattern_.nb);
+  matrix_.resize(size_t{9} * pattern_.nb);
+  shaped_ = true;
+}
+
+// A at the present state, and the inverse of its diagonal.
+bool ContactNewton::set_matrix() {
+  if (!shaped_) shape();
+  std::fill(matrix_.begin(), matrix_.end(), 0.0);
+  for (const Body &b : bodies_)
+    if (!b.system->matrix(&at_[b.pattern], matrix_.data())) return false;
+  const uint32_t single = bodies_.empty() ? 0 : bodies_.back().first + bodies_.back().count;
+  for (uint32_t k = single; k < nodes_; ++k)
+    for (size_t c = 0; c < 3; ++c) {
+      const double heavy = heavy_[size_t{kStride} * k + c];
+      matrix_[9 * size_t{own_[k]} + 4 * c] = k < points_ && heavy > 0 ? heavy : 1;
+    }
+  for (uint32_t k = 0; k < single; ++k)
+    for (size_t c = 0; c < 3; ++c) {
+      double &inverse = inverse_[3 * size_t{k} + c];
+      if (inverse > 0) inverse = 1 / matrix_[9 * size_t{own_[k]} + 4 * c];
+    }
+  return true;
+}
+
+namespace {
+constexpr uint32_t kDissected = 1000;  // nodes, from which the order by nested dissection has the sparser factor
+}  // namespace
+
+bool ContactNewton::refactor() {
+  std::copy(matrix_.begin(), matrix_.end(), blocks_.begin());
+  size_t spot = 0;
+  for (size_t k = 0; k < row_.size(); ++k) {
+    double s[9];
+    symmetric_part(&slope_[9 * k], s);
+    const bool any = s[0] != 0 || s[4] != 0 || s[8] != 0;
+    for (uint32_t a = entry_[k]; a < entry_[k + 1]; ++a) {
+      const double *const ja = &jac_[size_t{9} * a];
+      double sa[9];  // S J_a
+      for (int r = 0; r < 3; ++r)
+        for (int c = 0; c < 3; ++c)
+          sa[3 * r + c] = s[3 * r] * ja[c] + s[3 * r + 1] * ja[3 + c] + s[3 * r + 2] * ja[6 + c];
+      for (uint32_t b = a; b < entry_[k + 1]; ++b, ++spot) {
+        if (!any) continue;
+        const double *const jb = &jac_[size_t{9} * b];
+        double *const to = &blocks_[9 * size_t{spot_[spot]}];
+        // rows of the block: the lower node
+        const bool swap = node_[b] < node_[a];
+        for (int r = 0; r < 3; ++r)
+          for (int c = 0; c < 3; ++c) {
+            // (J_b' S J_a)[r,c]
+            const double value = jb[r] * sa[c] + jb[3 + r] * sa[3 + c] + jb[6 + r] * sa[6 + c];
+            if (swap) to[3 * r + c] += value;
+            else to[3 * c + r] += value;
+          }
+      }
+    }
+  }
+  if (!factored_) {
+    if (nodes_ < kDissected) factor_.analyse(pattern_);
+    else factor_.analyse(pattern_, places_.data());
+  }
+  ++factors_;
+  work_ += factor_.factor_work();
+  return factored_ = factor_.factor(blocks_.data());
+}
+
+}  // namespace dfm
