@@ -354,6 +354,7 @@ void ContactRows::finish(std::span<const ContactPoint> contacts, const double *t
   frame.resize(size_t(all()) * 9);
   drive.resize(size_t(all()) * 3);
   rate.resize(n);
+  opens.assign(n, 0.0);
   yields.resize(size_t(n) * 3);
   wn.resize(all());
   wt.resize(all());
@@ -392,33 +393,34 @@ void ContactRows::finish(std::span<const ContactPoint> contacts, const double *t
 // Times what a contact alone needs: what opening a depth adds to its load, and the load against which it opens.
 constexpr double kBears = 3;
 
-void ContactRows::hold_openings(std::span<const double> firm) {
-  opens.assign(n, 0.0);
-  for (uint32_t i = 0; i < n; ++i) {
-    const double speed = -rate[i];
-    if (!(speed > 0) || !(wn[i] > 0) || (!firm.empty() && firm[i] > 0)) continue;
+void ContactRows::hold_openings(const RowsPart &part, std::span<const double> firm, double slow) {
+  each_row(part.contacts, [&](uint32_t i) {
     double *const yield = &yields[3 * size_t(i)];
+    if (opens[i] > 0) std::fill_n(yield, 3, 0.0);  // a solve before has let it open
+    const double speed = std::max(opens[i], -rate[i]);
+    opens[i] = 0;
+    if (!(speed > slow) || !(wn[i] > 0) || (!firm.empty() && firm[i] > 0)) return;
     if (yield[0] > 0) {  // a crossing that gives way bears almost nothing while it opens
       yield[1] = std::max(yield[1], speed);
-      continue;
+      return;
     }
     opens[i] = speed;
-    rate[i] = 0;
-  }
+    rate[i] = -slow;
+  });
 }
 
-double ContactRows::open(const RowsPart &part) {
-  double most = 0;
+bool ContactRows::open(const RowsPart &part) {
+  bool any = false;
   each_row(part.contacts, [&](uint32_t i) {
     if (!(opens[i] > 0)) return;
-    most = std::max(most, opens[i]);
+    any = true;
     rate[i] = -opens[i];
     double *const yield = &yields[3 * size_t(i)];
     yield[0] = wn[i] / kBears;
     yield[1] = opens[i];
     yield[2] = std::min(impulse[3 * size_t(i)], kBears * std::max(0.0, -velocity(i, y_free.data()).x) / wn[i]);
   });
-  return most;
+  return any;
 }
 
 void ContactRows::turn_frames() {

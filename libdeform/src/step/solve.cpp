@@ -120,8 +120,6 @@ void make_rows(World &w, StepContext &step) {
   if (!step.guard.kept.empty()) guard_rates(step);
   if (step.rigid_again) step.rows.impulse.assign(step.best_impulse.begin(), step.best_impulse.end());
   step.solve_islands->find(w, step);
-  // an equilibrium has no velocity that an opening could leave
-  if (!w.prescribed.stands()) step.rows.hold_openings(step.thrown);
 }
 
 namespace {
@@ -133,8 +131,6 @@ void finish_rows(World &w, StepContext &step) {
   run_belts(step);
   bounce(step);
   if (!step.guard.kept.empty()) guard_rates(step);
-  // an equilibrium has no velocity that an opening could leave
-  if (!w.prescribed.stands()) step.rows.hold_openings(step.thrown);
 }
 
 // Solves again, from the present impulses, until rigid hosts respond as the solve assumed.

@@ -119,8 +119,19 @@ void begin_newton(const World &w, StepContext &step, SolveIsland &own) {
   own.newton->begin(step.rows, own.part, step.systems, step.state, own.laws, step.h);
 }
 
+// m/s, what normals may be off by.
+double normal_tolerance(const World &w, const StepContext &step, const SolveIsland &own) {
+  // static mode: no later sub-step corrects what this solve leaves
+  if (w.prescribed.stands()) return tangent_at_rest(w, step.h);
+  return (own.batches.remembers() ? kRememberedShare : 1) * normal_at_rest(w, step.h);
+}
+
 // Evaluates the laws at the warm start, and finds the disturbance that it leaves at each body.
 void start_island(const World &w, StepContext &step, SolveIsland &own) {
+  // slower ones are within what the solve leaves; an equilibrium has no velocity that they could leave
+  step.rows.hold_openings(own.part, step.thrown,
+                          w.prescribed.stands() ? std::numeric_limits<double>::infinity()
+                                                : normal_tolerance(w, step, own));
   if (own.implicit) begin_newton(w, step, own);
   if (ask(w, step, own) && ask_slopes(step, own))
     find_disturbance(step.rows, own.part, step.state, step.h, step.solve_islands->sides(),
@@ -202,22 +213,15 @@ void solve_by_newton(const World &w, StepContext &step, SolveIsland &own) {
 bool opens(const World &w, StepContext &step, SolveIsland &own) {
   copy_impulses(own.part, step.rows.impulse, step.load);
   if (spares(step, own.spent, Thrift::sweeps)) return false;
-  return step.rows.open(own.part) > tangent_at_rest(w, step.h);
+  return step.rows.open(own.part);
 }
 
 void solve_island(const World &w, StepContext &step, SolveIsland &own) {
   if (own.bad || own.thrown) return;
-  const double gap_margin = normal_at_rest(w, step.h), least = tangent_at_rest(w, step.h);
-  const bool memory = own.batches.remembers();
-  // static mode: no later sub-step corrects what this solve leaves
-  const ToleranceBounds bounds =
-      w.prescribed.stands()
-          ? ToleranceBounds{least, least, least}
-          : ToleranceBounds{least,
-                            own.implicit ? least
-                            : memory     ? kRememberedRest * least
-                                         : gap_margin,
-                            memory ? kRememberedShare * gap_margin : gap_margin};
+  const double normal = normal_tolerance(w, step, own), least = tangent_at_rest(w, step.h);
+  const bool stands = w.prescribed.stands(), memory = own.batches.remembers();
+  const ToleranceBounds bounds{
+      least, own.implicit || stands ? least : memory ? kRememberedRest * least : normal, normal};
   set_tolerance(step.rows, own.part, step.contacts, step.h, bounds, step.solve_islands->sides(),
                 step.disturbance.data(), own.tolerance);
   ask_slip_back(w, step, own);
