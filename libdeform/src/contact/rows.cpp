@@ -12,7 +12,7 @@ ContactRows::ContactRows(const Memory &m)
     : kernels_(dense_kernels()),
       loops_(doubles_at_once() >= 4 ? contact_kernels_avx2() : contact_kernels_sse2()) {
   use_memory(m, across_, begin, dof, weight, y, y_free, alone, source, point, block, blocks, response_,
-             given_, frame, drive, rate, opens, yields, wn, wt, cross, impulse, bond, dof_of_point_, dof_of_node_,
+             given_, frame, drive, rate, borne, yields, wn, wt, cross, impulse, bond, dof_of_point_, dof_of_node_,
              place_, rigid, arm, dof_of_group_, every_block_, whole_of);
 }
 
@@ -354,7 +354,6 @@ void ContactRows::finish(std::span<const ContactPoint> contacts, const double *t
   frame.resize(size_t(all()) * 9);
   drive.resize(size_t(all()) * 3);
   rate.resize(n);
-  opens.assign(n, 0.0);
   yields.resize(size_t(n) * 3);
   wn.resize(all());
   wt.resize(all());
@@ -390,37 +389,30 @@ void ContactRows::finish(std::span<const ContactPoint> contacts, const double *t
   turn_frames();
 }
 
-// Times what a contact alone needs: what opening a depth adds to its load, and the load against which it opens.
+// Times what a contact alone needs to open: the largest load that a depth opens against.
 constexpr double kBears = 3;
 
-void ContactRows::hold_openings(const RowsPart &part, std::span<const double> firm, double slow) {
-  each_row(part.contacts, [&](uint32_t i) {
+void ContactRows::soften_openings(std::span<const double> firm) {
+  for (uint32_t i = 0; i < n; ++i) {
+    const double speed = -rate[i];
+    if (!(speed > 0) || !(wn[i] > 0) || (!firm.empty() && firm[i] > 0)) continue;
     double *const yield = &yields[3 * size_t(i)];
-    if (opens[i] > 0) std::fill_n(yield, 3, 0.0);  // a solve before has let it open
-    const double speed = std::max(opens[i], -rate[i]);
-    opens[i] = 0;
-    if (!(speed > slow) || !(wn[i] > 0) || (!firm.empty() && firm[i] > 0)) return;
-    if (yield[0] > 0) {  // a crossing that gives way bears almost nothing while it opens
+    // a crossing that gives way bears almost nothing while it opens
+    if (yield[0] > 0) {
       yield[1] = std::max(yield[1], speed);
-      return;
+      continue;
     }
-    opens[i] = speed;
-    rate[i] = -slow;
-  });
+    yield[0] = wn[i] / kBears;
+    yield[1] = speed;
+    yield[2] = borne[i];
+  }
 }
 
-bool ContactRows::open(const RowsPart &part) {
-  bool any = false;
-  each_row(part.contacts, [&](uint32_t i) {
-    if (!(opens[i] > 0)) return;
-    any = true;
-    rate[i] = -opens[i];
-    double *const yield = &yields[3 * size_t(i)];
-    yield[0] = wn[i] / kBears;
-    yield[1] = opens[i];
-    yield[2] = std::min(impulse[3 * size_t(i)], kBears * std::max(0.0, -velocity(i, y_free.data()).x) / wn[i]);
-  });
-  return any;
+double ContactRows::load_without_opening(uint32_t i) const {
+  const double l = impulse[3 * size_t(i)], *const yield = &yields[3 * size_t(i)];
+  if (!(yield[2] > 0)) return l;
+  const double most = yield[1] / yield[0], by = std::clamp(l - yield[2], 0.0, most);
+  return l - by * by / most;
 }
 
 void ContactRows::turn_frames() {

@@ -78,8 +78,8 @@ struct ContactRows {
   Array<double> frame;
   Array<double> drive;  // [all,3] obstacle velocity in the frame
   Array<double> rate;   // [n] m/s: gap / h; a depth 0.2 gap / h, at least -0.1 d_c / h
-  Array<double> opens;  // [n] m/s, the rates of depths that hold_openings() holds; else 0
-  // [n,3] Of a contact that is compliant under its load l (ContactPoint::give, open()): the softness
+  Array<double> borne;  // [n] N s, normal impulses at the start of the sub-step
+  // [n,3] Of a contact that is compliant under its load l (ContactPoint::give, soften_openings()): the softness
   // c, 1/kg, its largest effect m, m/s, and the load p, N s, from which on it yields: min(c max(l - p, 0), m) is
   // added to u_n + rate. 0, 0, 0 for all others.
   Array<double> yields;
@@ -129,14 +129,14 @@ struct ContactRows {
   // alone.
   void finish(std::span<const ContactPoint> contacts, const double *tangents, double h, double planned,
               double offset, std::span<const Bond> bonds = {}, Tasks *tasks = nullptr);
-  // Depths open once the contacts of a part bear their loads. After hold_openings() they open no faster than
-  // `slow`, m/s. open() then lets them open at their rates, against the loads that they bear at that time and
-  // some times what the contact alone needs, and against no larger load: where normals oppose each other, n and
-  // -n + e would open at -rate / |e|. So u = 0 is always allowed. Loads for the next sub-step are those before
-  // opening, or they would grow where depths cannot open. firm: [n] where above zero, the row stays as it is;
-  // empty: none does.
-  void hold_openings(const RowsPart &part, std::span<const double> firm, double slow);
-  bool open(const RowsPart &part);  // false: there is nothing to open
+  // Depths open at their rates against the loads that they bore and some times what opening needs of the contact
+  // alone, and against no larger load: where normals oppose each other, n and -n + e would open at
+  // -rate / |e|. So u = 0 is always allowed. firm: [n] where above zero, the row stays as it is; empty: none
+  // does.
+  void soften_openings(std::span<const double> firm);
+  // N s, the normal impulse less what a depth that does not open has added to its load: the next sub-step would
+  // push against it with as much again, and loads of depths that exclude each other would grow for ever.
+  double load_without_opening(uint32_t i) const;
   void turn_frames();  // once `frame` and `drive` are known, for the kernels; finish() has done it
 
   // Do all unknowns of the part answer their own impulses only? The contacts' loops then run in the kernels.

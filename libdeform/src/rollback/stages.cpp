@@ -266,7 +266,6 @@ void keep_friction(World &w, StepContext &step) {
       store3(to, load3(to) + c.weight[k] * force);
     }
   }
-  step.load.assign(step.rows.impulse.begin(), step.rows.impulse.end());
 }
 
 }  // namespace

@@ -22,7 +22,7 @@ StepContext::StepContext(const Meters &meters)
   use_memory(meters.steps.memory(), driven, free_kinetic, looks, block_surfels, near, touching, active, woken,
              stirred);
   use_memory(meters.contacts.memory(), lent, contacts, tolerance.normal, tolerance.tangent, disturbance,
-             best_impulse, start_impulse, load, tangents, asked_back, owed, match, sharing, aim, stands,
+             best_impulse, start_impulse, tangents, asked_back, owed, match, sharing, aim, stands,
              ways, renewed, thrown, motions, marked, bonds, bond_impulse, chosen, mean, pairs_made, before,
              goes_on, given.list);
   state.use(meters.contacts.memory());

@@ -92,7 +92,8 @@ bool keeps_velocity(const StepContext &step, uint32_t i) {
 // oscillate at the tolerance for ever. So a contact that sticks at rest takes over half of a change, and the
 // extra impulse decays (doc/decisions/contact_solver.md).
 Vec3 next_start(const World &w, const StepContext &step, uint32_t i) {
-  const Vec3 l = load3(&step.load[size_t(3) * i]);
+  Vec3 l = load3(&step.rows.impulse[size_t(3) * i]);
+  l.x = step.rows.load_without_opening(i);
   const uint32_t m = step.match[i];
   if (step.tolerance.tangent.empty() || m == kNone) return l;
   if (step.tolerance.tangent[i] > tangent_at_rest(w, step.h) || !(l.x > 0) || step.state.mode[i] != 1)

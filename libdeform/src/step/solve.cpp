@@ -105,6 +105,8 @@ void make_rows(World &w, StepContext &step) {
   step.match.resize(n);
   warm_start(w.store, step.contacts, step.h, step.rows.impulse, step.state, step.tangents.data(),
              step.match.data(), &w.context->tasks);
+  step.rows.borne.resize(n);
+  for (uint32_t i = 0; i < n; ++i) step.rows.borne[i] = step.rows.impulse[size_t(3) * i];
   share_areas(w, step);
   fit_bristles(w, step);
   step.rows.recovery = w.def.recovery_speed;
@@ -120,6 +122,8 @@ void make_rows(World &w, StepContext &step) {
   if (!step.guard.kept.empty()) guard_rates(step);
   if (step.rigid_again) step.rows.impulse.assign(step.best_impulse.begin(), step.best_impulse.end());
   step.solve_islands->find(w, step);
+  // an equilibrium has no velocity that an opening could leave
+  if (!w.prescribed.stands()) step.rows.soften_openings(step.thrown);
 }
 
 namespace {
@@ -131,6 +135,7 @@ void finish_rows(World &w, StepContext &step) {
   run_belts(step);
   bounce(step);
   if (!step.guard.kept.empty()) guard_rates(step);
+  if (!w.prescribed.stands()) step.rows.soften_openings(step.thrown);
 }
 
 // Solves again, from the present impulses, until rigid hosts respond as the solve assumed.

@@ -128,10 +128,6 @@ double normal_tolerance(const World &w, const StepContext &step, const SolveIsla
 
 // Evaluates the laws at the warm start, and finds the disturbance that it leaves at each body.
 void start_island(const World &w, StepContext &step, SolveIsland &own) {
-  // slower ones are within what the solve leaves; an equilibrium has no velocity that they could leave
-  step.rows.hold_openings(own.part, step.thrown,
-                          w.prescribed.stands() ? std::numeric_limits<double>::infinity()
-                                                : normal_tolerance(w, step, own));
   if (own.implicit) begin_newton(w, step, own);
   if (ask(w, step, own) && ask_slopes(step, own))
     find_disturbance(step.rows, own.part, step.state, step.h, step.solve_islands->sides(),
@@ -209,13 +205,6 @@ void solve_by_newton(const World &w, StepContext &step, SolveIsland &own) {
   own.residual = newton.residual();
 }
 
-// Whether depths of the island now open, which needs another solve.
-bool opens(const World &w, StepContext &step, SolveIsland &own) {
-  copy_impulses(own.part, step.rows.impulse, step.load);
-  if (spares(step, own.spent, Thrift::sweeps)) return false;
-  return step.rows.open(own.part);
-}
-
 void solve_island(const World &w, StepContext &step, SolveIsland &own) {
   if (own.bad || own.thrown) return;
   const double normal = normal_tolerance(w, step, own), least = tangent_at_rest(w, step.h);
@@ -225,15 +214,13 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
   set_tolerance(step.rows, own.part, step.contacts, step.h, bounds, step.solve_islands->sides(),
                 step.disturbance.data(), own.tolerance);
   ask_slip_back(w, step, own);
-  bool newton = own.implicit, open = false;
-  do {
-    if (!newton && !solve_by_sweeps(w, step, own)) {
-      begin_newton(w, step, own);
-      newton = true;
-    }
-    if (newton) solve_by_newton(w, step, own);
-    if (own.bad || own.failed) return;
-  } while (!std::exchange(open, true) && opens(w, step, own));
+  bool newton = own.implicit;
+  if (!newton && !solve_by_sweeps(w, step, own)) {
+    begin_newton(w, step, own);
+    newton = true;
+  }
+  if (newton) solve_by_newton(w, step, own);
+  if (own.bad || own.failed) return;
   if (newton) own.newton->take();
 }
 
@@ -471,7 +458,6 @@ const SolveIsland *solve_islands(World &w, StepContext &step) {
   step.tolerance.normal.resize(n);
   step.tolerance.tangent.resize(n);
   step.start_impulse.resize(3 * size_t{step.rows.all()});
-  step.load.resize(3 * size_t{step.rows.all()});
   step.disturbance.resize(2 * size_t{step.solve_islands->side_count()});
   const std::span<SolveIsland> all = step.solve_islands->all();
   uint64_t rows = 0;
