@@ -103,7 +103,7 @@ TEST(FrictionRules, WhatIsNotGiven_KeepsItsValue) {
 
 TEST(FrictionRules, ABristle_StaysWhereItsStiffnessChanges) {
   Scene s;
-  ASSERT_EQ(s.add("*", "*", 0.5, "test.bristle"), DFM_OK);
+  ASSERT_EQ(s.add("*", "*", 1, "test.bristle"), DFM_OK);
   s.run(3000);
   const double z = s.bristle(), force = s.friction();
   ASSERT_GT(z, 0);
@@ -112,7 +112,7 @@ TEST(FrictionRules, ABristle_StaysWhereItsStiffnessChanges) {
   s.run(1);
   EXPECT_NEAR(s.bristle(), z, 0.03 * z) << "a displacement in m";
   EXPECT_NEAR(s.friction(), 1.5 * force, 0.05 * std::fabs(force)) << "its force follows the stiffness";
-  ASSERT_EQ(s.add("*", "*", 0.45, "test.bristle"), DFM_OK)
+  ASSERT_EQ(s.add("*", "*", 0.9, "test.bristle"), DFM_OK)
       << "given again, with another coefficient and the stiffness of the table";
   s.run(1);
   EXPECT_NEAR(s.bristle(), z, 0.05 * z);

@@ -437,8 +437,8 @@ TEST(ToolCut, CoupledBlade_PaysTheEnergyOfTheCut_AndIsHeldBack) {
     Tough straight(2000, all, "corotational_fem", integrator, 5e9);
     straight.down(0.0, 0.1);
     straight.down(-0.4, 0.5);
-    // the limit of a drag follows from the velocity, which a solve leaves to its tolerance
-    EXPECT_NEAR(straight.work, cut, 1e-6 * cut);
+    // the limit of a drag follows from the velocity, 0.5 m/s, which a solve knows to its tolerance, 1e-6 m/s
+    EXPECT_NEAR(straight.work, cut, 2e-6 * cut);
     Tough free(2000, none, "corotational_fem", integrator);
     test::ok(dfm_world_filter_pair(free.w, "cube", "cube", false));
     free.down(0.0, 0.1);

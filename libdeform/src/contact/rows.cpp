@@ -389,9 +389,6 @@ void ContactRows::finish(std::span<const ContactPoint> contacts, const double *t
   turn_frames();
 }
 
-// Times what a contact alone needs to open: the largest load that a depth opens against.
-constexpr double kBears = 3;
-
 void ContactRows::soften_openings(std::span<const double> firm) {
   for (uint32_t i = 0; i < n; ++i) {
     const double speed = -rate[i];
@@ -402,7 +399,7 @@ void ContactRows::soften_openings(std::span<const double> firm) {
       yield[1] = std::max(yield[1], speed);
       continue;
     }
-    yield[0] = wn[i] / kBears;
+    yield[0] = wn[i];
     yield[1] = speed;
     yield[2] = borne[i];
   }

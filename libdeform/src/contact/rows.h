@@ -129,10 +129,9 @@ struct ContactRows {
   // alone.
   void finish(std::span<const ContactPoint> contacts, const double *tangents, double h, double planned,
               double offset, std::span<const Bond> bonds = {}, Tasks *tasks = nullptr);
-  // Depths open at their rates against the loads that they bore and some times what opening needs of the contact
-  // alone, and against no larger load: where normals oppose each other, n and -n + e would open at
-  // -rate / |e|. So u = 0 is always allowed. firm: [n] where above zero, the row stays as it is; empty: none
-  // does.
+  // Depths open against the loads that they bore and what opening needs of the contact alone, and against no
+  // larger load: where normals oppose each other, n and -n + e would open at -rate / |e|. So u = 0 is always
+  // allowed. firm: [n] where above zero, the row stays as it is; empty: none does.
   void soften_openings(std::span<const double> firm);
   // N s, the normal impulse less what a depth that does not open has added to its load: the next sub-step would
   // push against it with as much again, and loads of depths that exclude each other would grow for ever.

@@ -1,5 +1,6 @@
 // Sleep: an island at rest takes no part in sub-steps until something reaches it (doc/concepts/sleeping.md).
 #pragma once
+#include "core/memory.h"
 #include "math/vec3.h"
 
 namespace dfm {
@@ -12,6 +13,18 @@ struct Slumber {
   double since = 0;  // s, when it fell asleep
   double h = 0;      // s, the sub-step of its last contact impulses
   Vec3 force;        // N, of its contacts, while asleep
+};
+
+// What waking has changed within a sub-step: if that fails, the bodies sleep as before.
+struct Roused {
+  struct Was {
+    uint32_t slot;
+    Slumber slumber;
+    Vec3 impulse;  // N s, of contacts since creation
+  };
+  Array<Was> bodies;
+  Array<double> dwell;  // s, [contacts of the store]
+  Array<Vec3> total;    // N s, [attachments]
 };
 
 }  // namespace dfm

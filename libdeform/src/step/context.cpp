@@ -20,7 +20,7 @@ StepContext::StepContext(const Meters &meters)
       last_report(meters.contacts.memory()),
       islands(meters.steps.memory()) {
   use_memory(meters.steps.memory(), driven, free_kinetic, looks, block_surfels, near, touching, active, woken,
-             stirred);
+             stirred, roused.bodies, roused.dwell, roused.total);
   use_memory(meters.contacts.memory(), lent, contacts, tolerance.normal, tolerance.tangent, disturbance,
              best_impulse, start_impulse, tangents, asked_back, owed, match, sharing, aim, stands,
              ways, renewed, thrown, motions, marked, bonds, bond_impulse, chosen, mean, pairs_made, before,

@@ -130,6 +130,7 @@ struct StepContext {
   Islands islands;
   // slots of active bodies, ascending; slots woken in this sub-step
   Array<uint32_t> active, woken;
+  Roused roused;
   Array<uint8_t> stirred;  // [island]
 
   explicit StepContext(const Meters &meters);

@@ -113,6 +113,13 @@ void reserve_sleep(World &w, StepContext &step, uint32_t n) {
 
 void rouse(World &w, std::span<const uint32_t> slots) {
   StepContext &step = *w.steps;
+  Roused &before = step.roused;
+  before.bodies.reserve(before.bodies.size() + slots.size());
+  if (before.bodies.empty()) {
+    before.dwell.assign(w.store.dwell.begin(), w.store.dwell.end());
+    before.total.clear();
+    for (const Attachment &a : w.attachments) before.total.push_back(a.total);
+  }
   // Adds the elapsed time to contacts that sleep: their age, and their total impulse.
   for (uint32_t m = 0; m < w.store.n; ++m) {
     const uint32_t a = slot_of(w, w.store.id_a[m]);
@@ -122,6 +129,7 @@ void rouse(World &w, std::span<const uint32_t> slots) {
   }
   for (const uint32_t i : slots) {
     Body &b = *w.bodies[i];
+    before.bodies.push_back({i, b.slumber, b.contact_impulse});
     if (b.slumber.asleep) {
       b.contact_impulse += (w.time - b.slumber.since) * b.slumber.force;
       for (Attachment &a : w.attachments)
@@ -131,6 +139,19 @@ void rouse(World &w, std::span<const uint32_t> slots) {
     b.slumber = {};
   }
   if (!w.changed) gather_active(w);  // otherwise prepare(w) does it, since its views are out of date
+}
+
+void undo_waking(World &w, StepContext &step) {
+  Roused &before = step.roused;
+  if (before.bodies.empty()) return;
+  for (auto was = before.bodies.rbegin(); was != before.bodies.rend(); ++was) {
+    w.bodies[was->slot]->slumber = was->slumber;
+    w.bodies[was->slot]->contact_impulse = was->impulse;
+  }
+  std::copy(before.dwell.begin(), before.dwell.end(), w.store.dwell.begin());
+  for (size_t k = 0; k < w.attachments.size(); ++k) w.attachments[k].total = before.total[k];
+  before.bodies.clear();
+  gather_active(w);
 }
 
 // Wakes the whole island, by its contacts at the time when it fell asleep.

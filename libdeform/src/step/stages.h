@@ -118,6 +118,7 @@ void gather_active(World &w);
 void reserve_sleep(World &w, StepContext &step, uint32_t n);
 void wake(World &w, Body &b);  // and its island
 void wake_all(World &w);
+void undo_waking(World &w, StepContext &step);  // of the sub-step, which has failed
 void wake_touching(World &w, uint64_t obstacle);
 bool all_idle(const World &w, const StepContext &step);
 bool sleeps(const World &w, const StepContext &step, uint32_t m);  // a contact of the store

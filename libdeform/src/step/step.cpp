@@ -291,6 +291,12 @@ void refine(World &w, StepContext &step) {
 bool piece(World &w, StepContext &step, uint32_t *trouble) {
   const uint32_t before = *trouble;
   const uint64_t unconverged = w.stats.unconverged;
+  struct Undo {
+    World &w;
+    StepContext &step;
+    ~Undo() { undo_waking(w, step); }
+  } undo{w, step};
+  step.roused.bodies.clear();
   step.guard.acted = false;
   begin_bodies(w, step);
   bool fast = false;
@@ -309,6 +315,7 @@ bool piece(World &w, StepContext &step, uint32_t *trouble) {
   if (fast || step.guard.piece > 0) step.guard.piece = 2 * step.h;
   w.stats.guard_steps += step.guard.acted;
   step.guard.memory.keep();
+  step.roused.bodies.clear();
   return true;
 }
 

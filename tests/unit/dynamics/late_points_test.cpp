@@ -118,9 +118,11 @@ TEST_P(LatePoints, OfASlidingProbe_AreThoseOfAStepThatMovesAll) {
   EXPECT_LT(apart(late, whole), 1e-8);
 }
 
-// What a step cannot do near the surface alone: held points that move, a load on some points.
+// What a step cannot do near the surface alone: held points that move, a load on some points. Without friction,
+// as above.
 TEST_P(LatePoints, OfABodyThatIsMovedOrLoaded_AreThoseOfAStepThatMovesAll) {
-  const Probed late(GetParam()), whole(GetParam());
+  const std::vector<std::string> more{"/contact/friction/0/params/mu=0"};
+  const Probed late(GetParam(), more), whole(GetParam(), more);
   std::vector<uint32_t> held, top{late.inside().surface.point[late.inside().surface.nsurfel / 2]};
   for (uint32_t i = 0; i < late.inside().p.n; ++i)
     if (late.inside().p.held[i]) held.push_back(i);
@@ -145,7 +147,7 @@ TEST_P(LatePoints, OfABodyThatIsMovedOrLoaded_AreThoseOfAStepThatMovesAll) {
     whole.touch();
     test::run(whole.world, 1e-3, 1e-3);
   }
-  EXPECT_LT(apart(late, whole), 1e-8);
+  EXPECT_LT(apart(late, whole), 1e-6) << "hundredths of the rest distance, which solves leave";
 }
 
 TEST_P(LatePoints, AfterAnImpulseOfTheHost_MoveAccordingly) {
