@@ -51,9 +51,8 @@ void print_idle(const JsonValue &plan) {
   for (size_t i = 0; bodies && i < bodies->items.size(); ++i) {
     const JsonValue *idle = bodies->items[i].find("idle");
     for (size_t k = 0; idle && k < idle->items.size(); ++k)
-      std::printf("  %-20s  %s has no effect, or another one than it names: %s\n",
-                  bodies->items[i].get("name").c_str(), idle->items[k].get("name").c_str(),
-                  idle->items[k].get("why").c_str());
+      std::printf("  %-20s  %s does not do what its name says: %s\n", bodies->items[i].get("name").c_str(),
+                  idle->items[k].get("name").c_str(), idle->items[k].get("why").c_str());
   }
 }
 

@@ -6,6 +6,16 @@
 // (the page has A_i and k_ij where extra coordinates count) with positive weights w, chosen once so that the
 // rows are even: they come from a few steps toward the Perron vector of the row-sum operator. Every w gives a
 // bound, a good one gives nearly the true step (0.95 of it on a free mesh, 0.6 for w = 1).
+//
+// Cells beyond Qm, whose volume counts as V t, t = u^(3/2) (5 - 3 u)/2 with u = Qm/Q. F maps the regular unit
+// cell to the cell, n = |F|: Q = 2 n^2, V = det F/(6 sqrt 2); corner displacements change F by at most sqrt 2
+// times their norm. |cof F| <= n^2/sqrt 3, |det F| <= n^3/(3 sqrt 3), |d2 det F| <= 2 n/sqrt 3. With
+// m = Qm/2 = u n^2 the gradient of D = t det F is t cof F - c F, c = 15/2 u^(3/2) (1 - u) det F/n^2, and
+// cof F : F = 3 det F gives, with k = 15/2 u^(3/2) (1 - u) and 6 t - k = u^(3/2) (15 - 3 u)/2 > 0,
+//   |dD|^2 = t^2 |cof F|^2 - (det F)^2/n^2 k (6 t - k) <= t^2 n^4/3 = m^2/3 u (5 - 3 u)^2/4 <= 1.544 m^2/3.
+// With d2t/d(n^2)^2 = 15/4 u^(3/2) (5 - 7 u)/2/n^4,
+//   |d2D| <= sqrt(m/3) u [ (5 - 3 u) + 35/2 (1 - u) + 5/2 |5 - 7 u| ] <= 8.06 sqrt(m/3).
+// By the positions: |d(V t)|^2 <= 1.544 Qm^2/432, |d2(V t)| <= 0.776 sqrt(Qm).
 #include <algorithm>
 
 #include "msm_body.h"

@@ -182,6 +182,9 @@ TEST(DefSizes, UnknownFlags_AreRefused) {
   friction.law = "coulomb";
   EXPECT_EQ(dfm_world_add_friction(made, &friction), DFM_E_ARG);
   test::says({"dfm_friction_def", "0x8"});
+  friction.size = 0;  // there is no default function to start from
+  EXPECT_EQ(dfm_world_add_friction(made, &friction), DFM_E_ARG);
+  test::says({"size is 0", "sizeof"});
 }
 
 // What a newer program asks for and this library does not know is not passed over in silence.

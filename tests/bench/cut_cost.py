@@ -81,30 +81,24 @@ def measure(shape, cells, model):
 
 PAGE = """# What a cut costs
 
-The body is a block of the model `msm`, 0.12 x 0.12 x 0.05 m, 5 kPa, held below, with steps of 1 ms. One tool
-of each shape moves 3 cm down into it (scissors close in it). `tests/bench/cut_cost.py` measures and writes
-this page; the rows are in `tests/bench/results/cut_cost.csv`.
+A block of the model `msm`, 0.12 x 0.12 x 0.05 m, 5 kPa, is held below; steps take 1 ms. One tool of each
+shape moves 3 cm down into it (scissors close in it). `tests/bench/cut_cost.py` measures and writes this page;
+the rows are in `tests/bench/results/cut_cost.csv`. {machine}, {compiler}, commit {commit}, **load of the
+machine {load}**: only factors of the processor times are significant, not percents. Median time of a step
+that cuts, and of one without a cut:
 
-{machine}, {compiler}, commit {commit}, **load of the machine {load}**. Times are processor times of the
-thread; on the loaded machine only factors are significant, not percents.
-
-| points | cells | tool | cut | in steps | plain step | step that cuts | largest | extra per face or cell |
-|---|---|---|---|---|---|---|---|---|
+| tool | {head} |
+|---|{rule}
 {rows}
 
-- "Plain step" is the median before the first cut. "Extra" is the time of the steps from the first cut to one
-  after the last, less that of as many plain steps, per opened face or removed cell. It includes the self
-  contact that a body has after a cut.
-- **The time of a cut depends on the size of the body, not on the tool, and hardly on the size of the cut**:
-  {per_cell:.1f} us per cell of the whole body, since a cut rebuilds the body
-  ([cutting]({concepts}/cutting.md#cost)). Cut much in few steps, or use few cells.
-- A cut fits into a step of 1 ms only in a body of less than about {room:.0f} cells.
+**The time of a cut depends on the size of the body, not on the tool, and hardly on the size of the cut**:
+{per_cell:.1f} us per cell of the whole body, since a cut rebuilds the body
+([cutting]({concepts}/cutting.md#cost)). Cut much in few steps, or use few cells. A cut fits into a step of
+1 ms only in a body of less than about {room:.0f} cells.
 
-**The source** (Zerbato 2010, tables 7.1 and 7.2) gives 0.91 and 0.92, 0.74 and 0.70, 0.90 and 0.94 ms for a
-step of its two shaders, on a graphics card, on bodies of 113,085, 39,740 and 106,278 cells. A cut there sets
-bits of a mask of springs, without a new surface, and leaves the volume terms of cut cells
-([corrections](zerbato.md)). The machine was different, so only proportions can be compared. Here a plain step
-of {most:,} cells takes {plain} on one core.
+Zerbato (2010, tables 7.1 and 7.2) gives 0.7 to 0.9 ms for a step on a graphics card with 40,000 to 113,000
+cells. A cut there sets bits of a mask of springs, without a new surface, and leaves the volume terms of cut
+cells ([corrections](zerbato.md)).
 """
 
 
@@ -112,17 +106,19 @@ def page(out, file):
     with out.open() as rows:
         rows = list(csv.DictReader(rows))
     rows = [row for row in rows if row["commit"] == rows[-1]["commit"]]
-    lines = [f"| {int(r['points']):,} | {int(r['cells']):,} | {r['shape']} | {r['cut']} {r['what']} | "
-             f"{r['steps_that_cut']} | "
-             f"{float(r['plain_ms']):.2f} ms | {float(r['cut_ms']):.1f} ms | "
-             f"{float(r['cut_most_ms']):.1f} ms | "
-             f"{float(r['extra_us']) / 1e3:.2f} ms |" for r in rows]
+    sizes = sorted({int(r["cells"]) for r in rows})
+    named = {"no cut": ("plain_ms", lambda r: True)}
+    for shape in dict.fromkeys(r["shape"] for r in rows):
+        named[shape] = ("cut_ms", lambda r, shape=shape: r["shape"] == shape)
+    lines = []
+    for name, (column, chosen) in named.items():
+        times = [np.median([float(r[column]) for r in rows if int(r["cells"]) == n and chosen(r)])
+                 for n in sizes]
+        lines.append(f"| {name} | " + " | ".join(f"{time:.2g} ms" for time in times) + " |")
     per_cell = float(np.median([1e3 * float(r["cut_ms"]) / int(r["cells"]) for r in rows]))
-    most = max(int(r["cells"]) for r in rows)
-    plain = float(np.median([float(r["plain_ms"]) for r in rows if int(r["cells"]) == most]))
     file.write_text(PAGE.format(rows="\n".join(lines), per_cell=per_cell, room=1e3 / per_cell,
-                                concepts="../concepts", plain=f"{plain:.1f} ms", most=most,
-                                load=max(int(r["load"]) for r in rows),
+                                head=" | ".join(f"{n:,} cells" for n in sizes), rule="---|" * len(sizes),
+                                concepts="../concepts", load=max(int(r["load"]) for r in rows),
                                 **{key: rows[-1][key] for key in ("machine", "compiler", "commit")}))
 
 

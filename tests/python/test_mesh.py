@@ -65,8 +65,8 @@ class Meshes(unittest.TestCase):
         with tempfile.TemporaryDirectory(suffix=" with space") as folder, deform.World() as world:
             file = str(pathlib.Path(folder) / "ball.stl")
             deform.TriMesh.make("ball", [0.1], 200).write(file)
-            with self.assertRaisesRegex(deform.Error, r"TetMesh\.fill in Python.*mesh fill '.*ball\.stl' "
-                                                      r"--out '.*ball\.vtu'"):
+            with self.assertRaisesRegex(deform.Error, r"TetMesh\.fill and surface= .* Python.*"
+                                                      r"mesh fill '.*ball\.stl' --out '.*ball\.vtu'"):
                 world.add_body(file)
 
     def test_shares_are_kept_or_missed(self):

@@ -95,6 +95,22 @@ class Pictures(unittest.TestCase):
             with self.assertRaisesRegex(deform.ArgumentError, "second value must be larger"):
                 world.picture(color="speed", color_range=(1, 1))
 
+    def test_displacement_is_from_the_rest_shape_after_a_cut_and_in_a_scene_of_a_moved_world(self):
+        with tempfile.TemporaryDirectory() as folder, deform.World() as world:
+            bar = world.add_body(deform.TetMesh.beam([0.4, 0.1, 0.1], 100), position=(0, 0, 1), name="bar",
+                                 rotation=(0, 0, 0.6, 0.8), model="corotational_fem")
+            world.run(0.1, dt=0.01)
+            fallen = 1.05 - bar.measure.com[2]
+            world.write_scene(f"{folder}/later.json")
+            bar.cut("plane", point=bar.measure.com, normal=(0.28, 0.96, 0))
+            self.assertGreater(bar.measure.mass, 0)
+            later = deform.Scene(f"{folder}/later.json")
+            for body in (bar, later.world.bodies[0]):
+                shown = deform.picture.body_values(body, "displacement")
+                np.testing.assert_allclose(shown, fallen, rtol=1e-6)
+                np.testing.assert_allclose(body.displacements[:, 2], -fallen, rtol=1e-6)
+            later.close()
+
     def test_slope_by_gravity_is_a_slope(self):
         up = deform.picture.Upright.of_scene({"keyframes": [{"t": 0, "value": [0, 0, 0]},
                                                            {"t": 1, "value": [3, 0, -4]}]})

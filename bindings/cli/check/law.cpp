@@ -13,14 +13,12 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-uint32_t width_of_state(const dfm_friction &law, const double *params) {
+std::vector<dfm_slot> slots_with(const dfm_friction &law, const double *params) {
   const Kept kept("state");
   const auto own = slot_rows(law.state ? law.state(params) : nullptr);
   if (law.state && !own)
     broken("its function state names no slots for parameters that check accepts; return constant tables");
-  uint32_t n = 0;
-  for (const dfm_slot &s : own ? *own : slot_rows(law.slots, law.nslot, law.slot_size)) n += s.width;
-  return n;
+  return own ? *own : slot_rows(law.slots, law.nslot, law.slot_size);
 }
 
 }  // namespace
@@ -70,7 +68,8 @@ std::vector<double> lively_params(const Subject &subject) {
 }
 
 Law::Law(const Subject &s, std::vector<double> values)
-    : subject(s), ops(law_of(s)), params(std::move(values)), nstate(width_of_state(ops, params.data())) {
+    : subject(s), ops(law_of(s)), params(std::move(values)), slots(slots_with(ops, params.data())) {
+  for (const dfm_slot &slot : slots) nstate += slot.width;
   const Kept kept("prepare");
   if (ops.prepare && ops.prepare(&s.plugin->host().table(), params.data(), &data) != DFM_OK)
     broken("prepare refuses parameters that check accepts; refuse them in check");
@@ -203,6 +202,20 @@ bool Lanes::same(uint32_t i, const Lanes &other, uint32_t k) const {
   return equal(out_ft, other.out_ft, 2) && equal(out_state, other.out_state, law.nstate) &&
          equal(limit, other.limit, 1) && equal(stored, other.stored, 1) && mode[i] == other.mode[k] &&
          (!out.dft_dvt || (equal(dv, other.dv, 4) && equal(dn, other.dn, 2)));
+}
+
+void Lanes::turn_state(uint32_t i, uint32_t k, double angle) {
+  const double c = std::cos(angle), s = std::sin(angle);
+  double *row = state;
+  for (const dfm_slot &slot : law.slots) {
+    for (uint32_t a = 0; a < slot.width; ++a) row[a * size_t(stride) + i] = row[a * size_t(stride) + k];
+    if (slot.kind == DFM_SLOT_TANGENT && slot.width == 2) {
+      const double x = row[k], y = row[stride + k];
+      row[i] = x * c - y * s;
+      row[stride + i] = x * s + y * c;
+    }
+    row += slot.width * size_t(stride);
+  }
 }
 
 std::vector<double> decades(double from, double to, int per_decade) {

@@ -29,6 +29,7 @@ struct Law {
   const dfm_friction &ops;
   std::vector<double> params;
   void *data = nullptr;
+  std::vector<dfm_slot> slots;
   uint32_t nstate = 0;
 };
 
@@ -48,6 +49,8 @@ struct Lanes {
   // A lane's inputs from another batch, and whether its outputs are those of another lane, bit by bit.
   void take(uint32_t i, const Lanes &from, uint32_t k);
   bool same(uint32_t i, const Lanes &other, uint32_t k) const;
+  // The state of lane k in lane i, with its tangent pairs turned.
+  void turn_state(uint32_t i, uint32_t k, double angle);
 
   const Law &law;
   uint32_t n, stride;

@@ -275,7 +275,8 @@ class FencedBody {
     body_.subject.plugin->host().give_back_scratch();
     if (!trouble.empty())
       broken(
-          "at stride %u %s %s; loop to the number of points, step by dfm_kin.stride, and write only outputs",
+          "at stride %u %s %s; loop to the number of points, step by dfm_kin.stride, write only outputs, and "
+          "copy what it needs of the mesh in create",
           body_.stride, name, trouble.c_str());
     must_be_good(name, status);
     for (const auto &[what, array] : outputs_) spoilt(name, *array, what);
@@ -321,6 +322,49 @@ class FencedBody {
   std::vector<double> told_;
 };
 
+// Arrays that a function adds to hold what others have added: that must still be in them.
+template <class F>
+void must_add(const Body &body, const char *name, const char *array, size_t n, const F &call) {
+  Numbers alone(n, 0.0);
+  body.must(name, [&] { return call(alone.data()); });
+  const double most = largest(alone), there = most > 0 ? most : 1;
+  Numbers sum(n, there);
+  body.must(name, [&] { return call(sum.data()); });
+  for (size_t i = 0; i < n; ++i)
+    if (!(std::fabs(sum[i] - there - alone[i]) <= 1e-9 * there))
+      broken(
+          "number %zu of %s is %g after %s, and was %g before, where %s adds %g; add to what %s holds and do "
+          "not replace it",
+          i, array, sum[i], name, there, name, alone[i], array);
+}
+
+void keeps_what_others_added(Body &body) {
+  const dfm_model &ops = body.ops;
+  void *const self = body.self;
+  const dfm_kin k = body.kin();
+  const size_t n = body.points();
+  if (ops.add_forces)
+    must_add(body, "add_forces", "f", body.x.size(), [&](double *f) { return ops.add_forces(self, &k, f); });
+  if (body.can(DFM_CAP_STIFFNESS)) {
+    uint32_t nb = 0;
+    body.must("pattern", [&] { return ops.pattern(self, &nb, nullptr); });
+    must_add(body, "stiffness", "blk", 9 * size_t(nb),
+             [&](double *blk) { return ops.stiffness(self, &k, 1, 1, blk); });
+  }
+  if (!ops.bound) return;
+  double dt = 1e300;
+  std::vector<double> other(n, 0.0);
+  must_add(body, "bound", "ksum", n,
+           [&](double *ksum) { return ops.bound(self, &k, ksum, other.data(), &dt); });
+  must_add(body, "bound", "csum", n,
+           [&](double *csum) { return ops.bound(self, &k, other.data(), csum, &dt); });
+  const double least = 1e-30;
+  dt = least;
+  body.must("bound", [&] { return ops.bound(self, &k, other.data(), other.data(), &dt); });
+  if (!(dt <= least))
+    broken("bound sets *dt, which was %g s, to %g s; let it only fall: *dt = min(*dt, own limit)", least, dt);
+}
+
 }  // namespace
 
 std::string model_stays_in_its_arrays(const Subject &subject) {
@@ -340,6 +384,10 @@ std::string model_stays_in_its_arrays(const Subject &subject) {
               "read three numbers for each point",
               with(variant).c_str(), stride);
       }
+    Random random(subject.seed);
+    Body body(subject, small_block(), variant);
+    body.shake(0.01 * kCube, 0.01, random);
+    keeps_what_others_added(body);
   });
 }
 

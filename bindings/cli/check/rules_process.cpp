@@ -190,8 +190,11 @@ void asks_fenced(const Law &law, Lanes &lanes, Fenced::Place place) {
   const std::string trouble = Fenced::guard([&] { status = law.ops.eval(&batch.in(), &batch.out()); });
   law.subject.plugin->host().give_back_scratch();
   if (!trouble.empty())
-    broken("in a batch of %u contacts (stride %u) eval %s; loop to in->n and step columns by in->stride",
-           lanes.n, lanes.stride, trouble.c_str());
+    broken(
+        "in a batch of %u contacts (stride %u) eval %s; loop to in->n, step columns by in->stride, and "
+        "declare "
+        "the inputs (needs), parameters and state slots that it uses",
+        lanes.n, lanes.stride, trouble.c_str());
   if (status != DFM_OK)
     broken("eval returns %s for finite input; return finite values for every finite input",
            dfm_status_name(status));

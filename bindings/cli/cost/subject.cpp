@@ -58,15 +58,18 @@ std::array<double, 4> inverse_rotation(const JsonValue *pose) {
   return q;
 }
 
-// Two points of the surface that lie far from each other: the farthest one from the center of mass, and
-// the farthest one from it. They replace probes where the scene has none.
+// Two points of the surface that lie far from each other at rest: the farthest one from the middle, and the
+// farthest one from it, in the frame of the mesh. They replace probes where the scene has none. The body may
+// have been moved since (a start, "place"), so its rest shape is found from the displacements.
 void find_ends(dfm_body body, const JsonValue *pose, SubjectBody &out) {
-  uint32_t n = 0;
+  uint32_t n = 0, npoint = 0;
   need(dfm_surface_positions(body, 0, nullptr, &n));
-  std::vector<double> x(3 * size_t(n));
+  std::vector<double> x(3 * size_t(n)), moved(x.size());
   need(dfm_surface_positions(body, n, x.data(), &n));
   if (n == 0) return;
+  need(dfm_debug_surface_displacements(body, n, moved.data(), &n));
   double from[3] = {0, 0, 0}, lo[3], hi[3];
+  for (size_t i = 0; i < x.size(); ++i) x[i] -= moved[i];
   for (size_t k = 0; k < 3; ++k) lo[k] = hi[k] = x[k];
   for (size_t i = 0; i < x.size(); ++i) {
     from[i % 3] += x[i] / n;
@@ -75,11 +78,14 @@ void find_ends(dfm_body body, const JsonValue *pose, SubjectBody &out) {
   }
   out.size = std::sqrt((hi[0] - lo[0]) * (hi[0] - lo[0]) + (hi[1] - lo[1]) * (hi[1] - lo[1]) +
                        (hi[2] - lo[2]) * (hi[2] - lo[2]));
+  // one point of the cells, in the frame of the mesh and placed
+  need(dfm_body_get_state(body, 0, nullptr, nullptr, &npoint));
+  std::vector<double> rest(3 * size_t(npoint)), placed(rest.size());
+  need(dfm_body_get_rest(body, npoint, rest.data(), 0, nullptr));
+  need(dfm_body_get_state(body, npoint, placed.data(), nullptr, &npoint));
+  moved.resize(placed.size());
+  need(dfm_debug_displacements(body, npoint, moved.data(), &npoint));
   const std::array<double, 4> back = inverse_rotation(pose);
-  double at[3] = {0, 0, 0};
-  const JsonValue *position = pose ? pose->find("position") : nullptr;
-  for (size_t k = 0; k < 3 && position && position->items.size() == 3; ++k)
-    at[k] = std::strtod(position->items[k].text.c_str(), nullptr);
   for (int end = 0; end < 2; ++end) {
     size_t best = 0;
     double most = -1;
@@ -91,13 +97,13 @@ void find_ends(dfm_body body, const JsonValue *pose, SubjectBody &out) {
         best = i;
       }
     }
-    double placed[3], rest[3];
+    double arm[3], turned[3];
     for (size_t k = 0; k < 3; ++k) {
       from[k] = x[best + k];
-      placed[k] = from[k] - at[k];
+      arm[k] = from[k] - (placed[k] - moved[k]);
     }
-    rotate(back.data(), placed, rest);
-    out.ends.push_back({rest[0], rest[1], rest[2]});
+    rotate(back.data(), arm, turned);
+    out.ends.push_back({rest[0] + turned[0], rest[1] + turned[1], rest[2] + turned[2]});
   }
 }
 

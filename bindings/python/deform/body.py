@@ -186,6 +186,11 @@ class Body(_Part):
         return self._surface("positions", quick.dfm_surface_positions)
 
     @property
+    def displacements(self) -> np.ndarray:
+        """Of the surface points from the rest shape at the body's pose, [nsurfel,3] m; a view."""
+        return self._surface("displacements", quick.dfm_debug_surface_displacements)
+
+    @property
     def velocities(self) -> np.ndarray:
         """Of the surface points, [nsurfel,3] m/s; a view."""
         return self._surface("velocities", quick.dfm_surface_velocities)
@@ -598,7 +603,6 @@ class Body(_Part):
         """Takes the body out of its world; its contacts end. Arrays keep their last values."""
         self.world.free()
         check(lib.dfm_body_destroy(self.handle))
-        self.world.shown.forget(self.handle)
 
     def to_meshio(self) -> Any:
         """Its present state as a `meshio.Mesh`, with the velocity of each point."""

@@ -159,7 +159,8 @@ class TetMesh(_Mesh):
 
     @classmethod
     def fill(cls, surface: TriMesh | Any, cells: int = 5000) -> TetMesh:
-        """Tetrahedra inside of a closed surface, given as a TriMesh or the path of its file."""
+        """Tetrahedra inside of a closed surface, given as a TriMesh or the path of its file. They reach out
+        of the surface: give it to add_body too (surface=), which otherwise takes their jagged border."""
         if not isinstance(surface, TriMesh):
             surface = TriMesh.read(surface)
         out = ctypes.c_uint64()

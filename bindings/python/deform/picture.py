@@ -133,21 +133,6 @@ class Shown:
     def __init__(self) -> None:
         self.softest = math.inf
         self.upright = Upright([], [])
-        self._starts: dict[int, np.ndarray] = {}
-
-    def keep(self, body: Any) -> None:
-        """Displacements of the body count from now."""
-        self._starts[body.handle] = np.array(body.positions)
-
-    def start(self, body: Any) -> np.ndarray:
-        """Where its surface was, [nsurfel,3] m; of one that a cut has changed since, where it is now."""
-        if len(self._starts.get(body.handle, ())) != body.nsurfel:
-            self.keep(body)
-        return self._starts[body.handle]
-
-    def forget(self, handle: int) -> None:
-        """The body is gone."""
-        self._starts.pop(handle, None)
 
 
 class Solid:
@@ -270,15 +255,13 @@ def body_values(body: Any, color: str) -> np.ndarray | None:
         return None
     if color == "contact":  # exactly zero where nothing touches
         return np.linalg.norm(body.forces, axis=1)
-    shown = body.world.shown
-    start = shown.start(body)
-    noise = _ROUNDING * np.abs(start).max(initial=0)
+    noise = _ROUNDING * np.abs(body.positions).max(initial=0)
     if color == "speed":
         values = np.linalg.norm(body.velocities, axis=1)
     elif color == "displacement":
-        values = np.linalg.norm(body.positions - start, axis=1)
+        values = np.linalg.norm(body.displacements, axis=1)
     elif color == "stress":
-        noise = _ROUNDING * min(shown.softest, 1e5)  # that of a body without a material
+        noise = _ROUNDING * min(body.world.shown.softest, 1e5)  # that of a body without a material
         try:
             values = _von_mises(body)
         except UnsupportedError:
@@ -311,7 +294,7 @@ def ends(value_range: Sequence[float] | None, values: Iterable[np.ndarray | None
 def picture(world: World, *, size: tuple[int, int] = (960, 720), color: str = "body", eye: Any = None,
             look_at: Any = None, label: bool = True, color_range: Sequence[float] | None = None) -> Picture:
     """The present state of a world. size: width, height in pixels; color: "body", "speed", "contact",
-    "displacement" (since the body was added, or its scene loaded) or "stress" (von Mises); color_range: the
+    "displacement" (from the rest shape at its pose) or "stress" (von Mises); color_range: the
     values at the ends of the colors, 0 and the largest one if not given; eye, look_at: [3] m, the camera (it
     finds its own place where they are not given)."""
     bodies = world.bodies

@@ -69,8 +69,6 @@ class Scene(OfThisProcess):
         self.world.shown.upright = Upright.of_scene(self.value("/gravity"))
         young = [material["young"] for material in self.value().get("materials", {}).values()]
         self.world.shown.softest = min(young, default=math.inf)
-        for body in self.world.bodies:
-            self.world.shown.keep(body)
 
     def close(self) -> None:
         """Closes the scene and destroys its world. Twice is allowed."""

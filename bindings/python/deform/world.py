@@ -356,9 +356,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
         with self.alone():
             status = lib.dfm_body_create(self.handle, ctypes.byref(definition), ctypes.byref(out))
         check(status)
-        body = self._know(self._body(out.value))
-        self.shown.keep(body)
-        return body
+        return self._know(self._body(out.value))
 
     def add_obstacle(self, shape: str = "plane", *, name: str | None = None,
                      position: Sequence[float] = (0, 0, 0), rotation: Sequence[float] | None = None,

@@ -32,7 +32,9 @@ T take_known(const T *given, const T &defaults) {
   T def = defaults;
   if (!given) return def;
   if (given->size < 2 * sizeof(uint32_t) || given->size > kMostDef)
-    fail(DFM_E_ARG, "a def's size is %u; start from its _default() function", given->size);
+    fail(DFM_E_ARG,
+         "a def's size is %u; start from its _default() function, or set size to sizeof where it has none",
+         given->size);
   std::memcpy(static_cast<void *>(&def), given, given->size < sizeof(T) ? given->size : sizeof(T));
   def.size = sizeof(T);
   return def;

@@ -295,9 +295,9 @@ void refuse_unfit(const TriMesh &surface, const FillSurface &s, uint32_t cells) 
   const double whole = s.area + s.opening_area;
   if (s.opening_area > kOpening * whole)
     fail(DFM_E_FORMAT,
-         "the surface is open: %u opening%s of %.3g m2 in all, %.0f %% of the closed surface, the widest "
-         "%.3g m across (the whole surface: %.3g m); only openings of up to %.0f %% are closed "
-         "automatically: close the surface, or give a mesh with tetrahedra",
+         "the surface is open: %u opening%s of %.3g m2 in all, %.0f %% of the closed surface, the box of the "
+         "widest with a diagonal of %.3g m (the whole surface: %.3g m); only openings of up to %.0f %% are "
+         "closed automatically: close the surface, or give a mesh with tetrahedra",
          s.openings, s.openings == 1 ? "" : "s", s.opening_area * s.size * s.size,
          100 * s.opening_area / whole, s.opening_width * s.size, s.size, 100 * kOpening);
   const double needed = expected_half_pitch(s, cells), least = least_half_pitch(s);
@@ -320,7 +320,7 @@ void tell(const FillSurface &s, const Filling &f, double half_pitch, uint32_t ce
   if (!s.closed)
     out.warnings.push_back(
         format("the surface has %u opening%s (or triangles that face the wrong way) of %.3g m2 in all, %.2g "
-               "%% of its area, the widest %.3g m across; the filling closes them",
+               "%% of its area, the box of the widest with a diagonal of %.3g m; the filling closes them",
                s.openings, s.openings == 1 ? "" : "s", s.opening_area * s.size * s.size,
                100 * s.opening_area / (s.area + s.opening_area), s.opening_width * s.size));
   if (s.closed && !settled)

@@ -253,8 +253,9 @@ TetMesh finish_mesh(const std::string &path, RawMesh &&raw) {
   TetMesh mesh(*raw.memory);
   if (raw.tets.empty() && !raw.tris.empty())
     fail(DFM_E_FORMAT,
-         "%s: no tetrahedra in this file, only a surface of %u triangles; fill it: TetMesh.fill in Python, "
-         "dfm_tetmesh_fill in C, or deform mesh fill %s --out %s",
+         "%s: no tetrahedra in this file, only a surface of %u triangles; fill it, and give it to the body "
+         "as its surface: TetMesh.fill and surface= of add_body in Python, dfm_tetmesh_fill and "
+         "dfm_body_def.surface in C, or deform mesh fill %s --out %s",
          path.c_str(), raw.ntri(), shell_word(path).c_str(),
          shell_word(std::filesystem::path(path).replace_extension(".vtu").string()).c_str());
   if (raw.tets.empty())

@@ -496,7 +496,9 @@ void write_scene(World &w, const std::string &path, const WriteOptions &options,
   print(write_root(to), "", text);
   if (notes > 0 && !options.partial) {
     const std::string more = notes > 1 ? format(" (and %u more like it)", notes - 1) : "";
-    fail(DFM_E_UNSUPPORTED, "%s is not written: %s%s; with DFM_SCENE_PARTIAL the scene is written without it",
+    fail(DFM_E_UNSUPPORTED,
+         "%s is not written: %s%s; with DFM_SCENE_PARTIAL (partial=True in Python) the scene is written "
+         "without it",
          path.c_str(), to.first.c_str(), more.c_str());
   }
   for (const SceneWriter::File &f : to.files) f.write(beside(path, f.name));

@@ -1,12 +1,15 @@
 #!/usr/bin/env python3
 """The benchmark's rows side by side, as a table of Markdown: table.py FILE.csv [--page PAGE], rows as run.py
-writes them. A value outside its band is in bold. With --page the table takes the place of what stands
-between the lines `<!-- table -->` and `<!-- end of table -->`."""
+writes them. A value outside its band is in bold. With --page two tables take the place of what stands
+between the lines `<!-- table -->` and `<!-- end of table -->`: the engines where every one runs, without the
+configurations of LEFT_OUT, and the laws of deform where their verdicts differ."""
 import argparse
 import csv
 import sys
 
 BEGIN, END = "<!-- table -->\n", "<!-- end of table -->\n"
+LAWS = ("coulomb", "karnopp", "dahl", "lugre", "elastoplastic", "gms")
+LEFT_OUT = (*LAWS[1:], "recommended", "hard 4 ms", "explicit 4 ms", "implicit 4 ms")
 
 
 def shown(row):
@@ -49,6 +52,18 @@ def table(rows):
     return "\n".join(lines) + "\n"
 
 
+def tables(rows):
+    """The two tables of the page."""
+    partial = {row["case"] for row in rows if row["configuration"] == "none"}
+    laws = [row for row in rows if row["configuration"] in LAWS]
+    verdicts = {}
+    for row in laws:
+        verdicts.setdefault(row["case"], set()).add(row["verdict"])
+    return "%s\nThe laws of deform where they differ:\n\n%s" % (
+        table([row for row in rows if row["configuration"] not in LEFT_OUT and row["case"] not in partial]),
+        table([row for row in laws if len(verdicts[row["case"]]) > 1]))
+
+
 def into_page(path, text, marks=(BEGIN, END)):
     with open(path) as f:
         page = f.read()
@@ -66,7 +81,7 @@ def main():
     given = parser.parse_args()
     rows = [row for name in given.files for row in csv.DictReader(open(name))]
     if given.page:
-        into_page(given.page, table(rows))
+        into_page(given.page, tables(rows))
     else:
         print(table(rows), end="")
 

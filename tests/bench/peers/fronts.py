@@ -1,14 +1,13 @@
 #!/usr/bin/env python3
-"""Speed at equal error and error at equal speed, from rows of run_scenes.py.
+"""Speed at equal error, from rows of run_scenes.py.
 
   fronts.py FILE.csv [--page PAGE] [--runs PAGE] [--pictures FOLDER]
 
 The error of a run is the largest of its quantities': percent of what is expected; um/s where 0 is expected.
 The table of --page: the least processor time per simulated second with which each engine stays within an
-error, over its meshes and settings. Those of --runs: the least error that each has within a processor time,
-and every run. They take the place of what stands between the marks `<!-- scenes -->` and `<!-- end of
-scenes -->`; without a page they are printed. A picture per scene has all runs. What an engine was calibrated
-with does not count: the coarse beam of Jolt.
+error, over its meshes and settings. That of --runs: the settings found by search. They take the place of what
+stands between the marks `<!-- scenes -->` and `<!-- end of scenes -->`; without a page they are printed. A
+picture per scene has all runs. What an engine was calibrated with does not count: the coarse beam of Jolt.
 """
 import argparse
 import csv
@@ -28,7 +27,6 @@ QUESTIONS = [("beam", ("sag",), "%", (30, 10, 3)), ("beam", ("sag", "period"), "
              ("stack", ("creep_um_per_s",), "um/s", (1000, 100)), ("gripper", ("rise",), "%", (2, 1)),
              ("gripper", ("rise", "creep_um_per_s"), "% and um/s", (2, 1))]
 CALIBRATED = ("beam", 400)  # scenes_jolt.py
-BUDGETS = (0.03, 0.1, 0.3, 1, 3, 10)
 
 
 def error(row):
@@ -62,7 +60,7 @@ def name_of(case, quantities):
     return "%s: %s" % (case, ", ".join(plain.get(q, q) for q in quantities))
 
 
-def bold_least(cells, level=1):
+def bold_least(cells, level):
     """Cells (value or None, text): the least in bold, and what is within a factor `level` of it."""
     least = min((v for v, _ in cells if v is not None), default=None)
     return ["**%s**" % t if v is not None and v <= level * least else t for v, t in cells]
@@ -94,70 +92,15 @@ def least_time(rows):
     return text
 
 
-def least_error(rows):
-    engines, cannot, head = heads(rows)
-    text = "Least error within a processor time:\n\n| question | s per simulated s " + head
-    for case, quantities, unit, _ in QUESTIONS:
-        if len(quantities) > 1 and "creep_um_per_s" in quantities:
-            continue
-        found = runs(rows, case, quantities)
-        for budget in BUDGETS:
-            cells = []
-            for engine in engines:
-                good = [r for r in found if r[0] == engine and r[3] <= budget and math.isfinite(r[4])]
-                if good:
-                    r = min(good, key=lambda x: x[4])
-                    shown = "%.2g" % r[4] if r[4] >= 1e-3 else "0"
-                    cells.append((round(r[4], 3), "%s %s" % (shown, unit)))
-                else:
-                    cells.append((None, "cannot" if (engine, case) in cannot else "-"))
-            if any(v is not None for v, _ in cells):
-                text += "| %s | %g | %s |\n" % (name_of(case, quantities), budget,
-                                               " | ".join(bold_least(cells)))
-    return text
-
-
-def shown(row):
-    """What was measured, bold outside its band; a motion without oscillation has no period."""
-    if row["verdict"] not in ("pass", "fail"):
-        return speed.table.shown(row)
-    value = float(row["measured"])
-    nothing = row["expected"] == "0" and abs(value) < 1e-3
-    text = "none" if math.isinf(value) else "0" if nothing else "%.3g" % value
-    return text if row["verdict"] == "pass" else "**%s**" % text
-
-
-def all_runs(rows):
-    """Every run: cost and what it measured, bold outside the band."""
-    by, order = {}, {}
-    for row in rows:
-        if row["configuration"] == "none":
-            continue
-        by.setdefault((row["case"], row["parameters"], row["engine"], row["configuration"]), []).append(row)
-        order.setdefault(row["case"], {}).update({row["quantity"]: row} if row["quantity"] else {})
-    text = "Every run; bold outside the band:\n"
-    for case, quantities in order.items():
-        text += "\n| %s | cells | s per s | %s |\n|%s\n" % (
-            case, " | ".join(quantities), "---|" * (3 + len(quantities)))
-        text += "| *to be* | | | %s |\n" % " | ".join(
-            "%.4g to %.4g" % (float(r["low"]), float(r["high"])) for r in quantities.values())
-        for (name, parameters, engine, configuration), told in by.items():
-            if name != case:
-                continue
-            cells = []
-            for quantity in quantities:
-                row = next((r for r in told if r["quantity"] in (quantity, "")), None)
-                cells.append(shown(row) if row else "-")
-            text += "| %s, %s | %s | %s | %s |\n" % (engine, configuration, parameters.split("=")[1],
-                                                    told[0]["cost"], " | ".join(cells))
-    return text
-
-
 def settings_found(rows):
-    text = "Settings found by search:\n\n| scene | cells | engine | settings |\n|---|---|---|---|\n"
-    lines = ["| %s | %s | %s | %s |\n" % (r["case"], r["parameters"].split("=")[1], r["engine"], r["note"])
-             for r in rows if r["configuration"] == FOUND and r["quantity"]]
-    return text + "".join(dict.fromkeys(lines))
+    text = "| scene | cells | engine | settings |\n|---|---|---|---|\n"
+    cells = {}
+    for r in rows:
+        if r["configuration"] == FOUND and r["quantity"]:
+            found = cells.setdefault((r["case"], r["engine"], r["note"]), {})
+            found[r["parameters"].split("=")[1]] = None
+    return text + "".join("| %s | %s | %s | %s |\n" % (case, ", ".join(found), engine, note)
+                          for (case, engine, note), found in cells.items())
 
 
 def pictures(rows, folder):
@@ -202,13 +145,13 @@ def main():
         rows = list(csv.DictReader(f))
     if given.pictures:
         pictures(rows, given.pictures)
-    short, long_ = least_time(rows), "\n".join([least_error(rows), all_runs(rows), settings_found(rows)])
+    times, found = least_time(rows), settings_found(rows)
     if given.page:
-        speed.table.into_page(given.page, short, (BEGIN, END))
+        speed.table.into_page(given.page, times, (BEGIN, END))
     if given.runs:
-        speed.table.into_page(given.runs, long_, (BEGIN, END))
+        speed.table.into_page(given.runs, found, (BEGIN, END))
     if not given.page and not given.runs:
-        print(short + "\n" + long_, end="")
+        print(times + "\n" + found, end="")
 
 
 if __name__ == "__main__":

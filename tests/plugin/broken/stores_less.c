@@ -1,0 +1,10 @@
+/* F03: reports less energy as stored than its bristle gives back. */
+#include "base.h"
+
+static void stores_less(struct lane *l) {
+  sound(l);
+  l->stored *= 0.4;
+}
+
+#define LANE stores_less
+#include "law.h"
