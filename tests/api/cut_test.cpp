@@ -65,8 +65,8 @@ TEST(Cut, SplitBlade_LosesNothingAndLetsTheHalvesPart) {
     steps(s.w, 100);
     const dfm_body_measure later = test::measure(s.b);
     for (int k = 0; k < 3; ++k) EXPECT_NEAR(later.momentum[k], before.momentum[k], 1e-11);
-    // The centers of the halves are 5 cm apart. Without friction they go straight on, while the halves turn by
-    // 0.1 s of a spin of (2, -3) / s across the line between them.
+    // The centers of the halves are 5 cm apart. Without friction they go straight on, while the halves turn
+    // by 0.1 s of a spin of (2, -3) / s across the line between them.
     const double away = 0.05 * (1 - std::cos(0.1 * std::hypot(2, 3)));
     const State end(s.b);
     const std::vector<double> &x = end.x;

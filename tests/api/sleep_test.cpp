@@ -93,7 +93,8 @@ TEST(Sleep, OfAStack_ComesToBothAtOnceAndNothingDiffersBefore) {
     if (test::stats(s.world).asleep) break;
     steps(never.world, 1);
     for (size_t k = 0; k < 3; ++k)
-      ASSERT_EQ(positions(s.bodies()[k]), positions(never.bodies()[k])) << k << ' ' << dfm_world_time(s.world);
+      ASSERT_EQ(positions(s.bodies()[k]), positions(never.bodies()[k]))
+          << k << ' ' << dfm_world_time(s.world);
   }
   EXPECT_GE(dfm_world_time(s.world), 0.5);
   EXPECT_EQ(test::stats(never.world).asleep, 0u);

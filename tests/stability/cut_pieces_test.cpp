@@ -256,7 +256,8 @@ TEST(CutPieces, SplintersThatJam_EndNoRun) {
   for (const char *young : {"1e5", "1.0001e5", "1.0002e5"})
     EXPECT_LE(crossings("torn_jam", std::string(R"({"format": "deform-scene", "version": 1,
       "time": {"duration": 1, "step": 0.001},
-      "materials": {"dough": {"density": 1000, "young": )") + young + R"(, "tear": 0.5}},
+      "materials": {"dough": {"density": 1000, "young": )") +
+                                        young + R"(, "tear": 0.5}},
       "bodies": [{"name": "dough", "mesh": {"make": "beam", "size": [0.2, 0.05, 0.04], "cells": 1000},
         "material": "dough", "pose": {"position": [-0.1, -0.025, 0.2]}, "separate": {"least_cells": 8},
         "fix": [{"box": [[-0.001, -1, -1], [0.001, 1, 1]]},

@@ -20,8 +20,8 @@ class ImplicitSystem {
   virtual const double *diagonal_inverse() const = 0;
   // Writes r [n,3]; zero where a component is held. False: the model cannot tell it at v.
   virtual bool residual(const double *v, double *r) = 0;
-  // Adds A, at the v of the last residual(), to blk[at[b]] [9] for block b of the pattern; rows and columns of
-  // held components are those of the identity. False: the model fails.
+  // Adds A, at the v of the last residual(), to blk[at[b]] [9] for block b of the pattern; rows and columns
+  // of held components are those of the identity. False: the model fails.
   virtual bool matrix(const uint32_t *at, double *blk) = 0;
   virtual void take(const double *v) = 0;  // the solution
 };

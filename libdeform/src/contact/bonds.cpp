@@ -29,9 +29,7 @@ void each_bond(const RowsPart &part, F &&f) {
 // in closed form: what stops the edge, the limit, or what does the work that is left (due),
 //
 //     l (s - w l) = due with the speed s without it,   l = 2 due / (s + sqrt(s^2 - 4 w due))
-struct Drag {
-  double impulse, limit;
-};
+struct Drag { double impulse, limit; };
 Drag drag_of(const ContactRows &rows, uint32_t row) {
   const ContactRows::BondRow &b = rows.bond[row - rows.n];
   const double now = dot(b.along, load3(&rows.impulse[size_t{3} * row]));
@@ -125,9 +123,7 @@ Vec3 bond_residual(const ContactRows &rows, uint32_t row) {
   return counted(b, rows.velocity(row) + b.rate + b.soft * l);
 }
 
-void limit_drag(ContactRows &rows, uint32_t row) {
-  rows.bond[row - rows.n].most = drag_of(rows, row).limit;
-}
+void limit_drag(ContactRows &rows, uint32_t row) { rows.bond[row - rows.n].most = drag_of(rows, row).limit; }
 
 namespace {
 

@@ -6,12 +6,12 @@
 // r: the equations of motion of the bodies; v: [nodes,4] velocities over the sub-step. A node is a point that
 // moves by itself, a point of an implicit body, or three motions of a body that is known by its response.
 //
-//   outer pass    with multipliers lh and penalties rho (kg):  v with g = 0 for l_i(v) = P_i(lh_i - rho_i u_i),
+//   outer pass    with multipliers lh and penalties rho (kg): v with g = 0, l_i(v) = P_i(lh_i - rho_i u_i),
 //                 then lh <- l(v). The normal part of P is the positive part, the friction part the law at
 //                 the normal impulse of this pass and the slip u + (l - lh)/rho.
-//   Newton step   (A + J'GJ) d = -g, G = -dl/du, by GMRES with the last factor of A + J' sym(G) J. It is taken
-//                 where it makes g smaller. Where it does not, limits of friction are frozen: g is then the
-//                 gradient of a convex function, and steps with a line search lower that.
+//   Newton step   (A + J'GJ) d = -g, G = -dl/du, by GMRES with the last factor of A + J' sym(G) J. It is
+//                 taken where it makes g smaller. Where it does not, limits of friction are frozen: g is then
+//                 the gradient of a convex function, and steps with a line search lower that.
 //
 // Impulses of redundant contacts are not unique, velocities are: passes end by velocities. A contact that
 // sticks keeps lh, so that it acts as a spring of stiffness rho/h^2 with memory and does not creep, whatever
@@ -32,22 +32,22 @@ namespace dfm {
 
 // Nominal values hold for all scenes that were tried; the comment says what a change trades.
 struct NewtonSettings {
-  double penalty = 10;         // rho w: larger, fewer passes with more Newton steps each
-  double grows = 3;            // of rho after three passes in a row that leave more than half
-  double softens = 0.1;        // of rho, where Newton steps of a pass go round
-  uint32_t rounds = 4;         // frozen phases of a pass after which they do
-  uint32_t firm = 6;           // times that rho grows before rows count as contradicting each other
-  uint32_t passes = 100;       // the limit on outer passes
-  uint32_t steps = 600;        // the limit on Newton steps: what a solve may cost
-  uint32_t kept = 12;          // products for which a kept factor is worth more than a new one
-  uint32_t products = 40;      // the limit on products of one Newton step
-  double share = 0.1;          // of the tolerance of a pass that Newton steps leave; of g that a frozen one does
-  double coarse = 1e-2;        // m/s, that the Newton steps of a pass leave at most
-  double falls = 0.2;          // of |g|, that a full step has to take away
-  double flat = 0.3;           // of the slope, that a line search may leave
-  uint32_t trials = 24;        // of a line search
-  double within = 0.3;         // of the tolerance, that a solve leaves
-  double stands = 20;          // of the tolerance, by which normals may miss what velocities no longer follow
+  double penalty = 10;     // rho w: larger, fewer passes with more Newton steps each
+  double grows = 3;        // of rho after three passes in a row that leave more than half
+  double softens = 0.1;    // of rho, where Newton steps of a pass go round
+  uint32_t rounds = 4;     // frozen phases of a pass after which they do
+  uint32_t firm = 6;       // times that rho grows before rows count as contradicting each other
+  uint32_t passes = 100;   // the limit on outer passes
+  uint32_t steps = 600;    // the limit on Newton steps: what a solve may cost
+  uint32_t kept = 12;      // products for which a kept factor is worth more than a new one
+  uint32_t products = 40;  // the limit on products of one Newton step
+  double share = 0.1;      // of the tolerance of a pass that Newton steps leave; of g that a frozen one does
+  double coarse = 1e-2;    // m/s, that the Newton steps of a pass leave at most
+  double falls = 0.2;      // of |g|, that a full step has to take away
+  double flat = 0.3;       // of the slope, that a line search may leave
+  uint32_t trials = 24;    // of a line search
+  double within = 0.3;     // of the tolerance, that a solve leaves
+  double stands = 20;      // of the tolerance, by which normals may miss what velocities no longer follow
 };
 
 // What the solve asks of the laws and of the one who knows the tolerances.
@@ -68,13 +68,13 @@ class ContactNewton {
  public:
   explicit ContactNewton(const Memory &memory);
 
-  // systems: by source; null: not an implicit body. mass: of one. Rows and host stay valid until the solve has
-  // ended. rows.impulse is the start of lh.
+  // systems: by source; null: not an implicit body. mass: of one. Rows and host stay valid until the solve
+  // has ended. rows.impulse is the start of lh.
   void begin(ContactRows &rows, const RowsPart &part, std::span<ImplicitSystem *const> systems,
              ContactState &state, NewtonHost &host, double h);
   // From the present impulses, so that it goes on where rates or limits of the rows have changed. tolerance:
-  // m/s, of what the motion of the bodies may be off by; normal: of velocities along normals. False: a law or a
-  // model has failed; neither rows nor bodies have a result.
+  // m/s, of what the motion of the bodies may be off by; normal: of velocities along normals. False: a law
+  // or a model has failed; neither rows nor bodies have a result.
   bool solve(double tolerance, double normal);
   // The bodies' velocities become those of the solution.
   void take();
@@ -111,30 +111,30 @@ class ContactNewton {
   Array<uint32_t> dof_of_node_;      // of single points; kNone
   ContactRows::Motions motions_;
   Array<Row> row_;
-  Array<uint32_t> index_;            // rows of the part, for motions()
-  Array<uint32_t> entry_;            // [row_+1] into node_, jac_
+  Array<uint32_t> index_;  // rows of the part, for motions()
+  Array<uint32_t> entry_;  // [row_+1] into node_, jac_
   Array<uint32_t> node_;
-  Array<double> jac_;                // [entries,9] rows: the contact's axes
-  Array<double> bias_;               // [row_,3] m/s
-  Array<double> heavy_;              // [points,4] kg, of single points; zero where held
+  Array<double> jac_;    // [entries,9] rows: the contact's axes
+  Array<double> bias_;   // [row_,3] m/s
+  Array<double> heavy_;  // [points,4] kg, of single points; zero where held
   // present state
-  Array<double> v_, base_;           // [nodes,4]
+  Array<double> v_, base_;                // [nodes,4]
   Array<double> g_, kept_, way_, minus_;  // [nodes,3]
-  Array<double> inverse_;            // [nodes,3] of A's diagonal; zero where held
-  Array<double> u_, l_, lh_;         // [row_,3]
-  Array<double> rho_;                // [row_,2]
-  Array<double> response_;           // [rows] 1/rho_t, by row
-  Array<double> slope_;              // [row_,9] G, row-major
-  Array<double> frozen_;             // [row_] limit of friction, N s, or the normal impulse of a smooth law
+  Array<double> inverse_;                 // [nodes,3] of A's diagonal; zero where held
+  Array<double> u_, l_, lh_;              // [row_,3]
+  Array<double> rho_;                     // [row_,2]
+  Array<double> response_;                // [rows] 1/rho_t, by row
+  Array<double> slope_;                   // [row_,9] G, row-major
+  Array<double> frozen_;  // [row_] limit of friction, N s, or the normal impulse of a smooth law
   // matrix
   BlockPattern pattern_;
   Array<uint64_t> keys_;
-  Array<uint32_t> pairs_;            // [nb,2]
-  Array<uint32_t> at_;               // blocks of the bodies' patterns among them
-  Array<uint32_t> own_;              // [nodes] diagonal block
-  Array<uint32_t> spot_;             // of each pair of entries of each row
-  Array<double> places_;             // [nodes,3] m
-  Array<double> blocks_, matrix_;    // [nb,9] A + J' sym(G) J; A
+  Array<uint32_t> pairs_;          // [nb,2]
+  Array<uint32_t> at_;             // blocks of the bodies' patterns among them
+  Array<uint32_t> own_;            // [nodes] diagonal block
+  Array<uint32_t> spot_;           // of each pair of entries of each row
+  Array<double> places_;           // [nodes,3] m
+  Array<double> blocks_, matrix_;  // [nb,9] A + J' sym(G) J; A
   LdltSolver factor_;
   bool factored_ = false, shaped_ = false;
   Gmres gmres_;
@@ -163,8 +163,8 @@ class ContactNewton {
   bool find_way(bool symmetric, double tolerance);
   void multiply(const double *in, double *out, bool symmetric) const;
   void move(double share);
-  double error() const;    // m/s, largest of inverse g
-  double size() const;     // of g, in the metric of the inverse diagonal
+  double error() const;  // m/s, largest of inverse g
+  double size() const;   // of g, in the metric of the inverse diagonal
   bool newton(double tolerance, bool &round);
   void scale_penalties(double by);
   bool coupled_step(double tolerance, bool &failed);

@@ -75,7 +75,8 @@ void ContactNewton::number_nodes(std::span<ImplicitSystem *const> systems) {
     nodes_ += b.count;
     const double *const start = b.system->start(), *const diagonal = b.system->diagonal_inverse();
     v_.insert(v_.end(), start, start + size_t{kStride} * b.count);
-    for (uint32_t k = 0; k < b.count; ++k) inverse_.insert(inverse_.end(), diagonal + kStride * k, diagonal + kStride * k + 3);
+    for (uint32_t k = 0; k < b.count; ++k)
+      inverse_.insert(inverse_.end(), diagonal + kStride * k, diagonal + kStride * k + 3);
   }
   dof_of_node_.assign(nodes_, kNone);
   heavy_.assign(size_t{kStride} * nodes_, 0.0);
@@ -253,8 +254,9 @@ bool ContactNewton::evaluate(bool frozen) {
     if (!b.system->residual(&v_[size_t{kStride} * b.first], &g_[size_t{3} * b.first])) return false;
   for (uint32_t k = bodies_.empty() ? 0 : bodies_.back().first + bodies_.back().count; k < points_; ++k)
     for (size_t c = 0; c < 3; ++c)
-      g_[3 * size_t{k} + c] = heavy_[size_t{kStride} * k + c] *
-                              (v_[size_t{kStride} * k + c] - rows_->y_free[size_t{kStride} * dof_of_node_[k] + c]);
+      g_[3 * size_t{k} + c] =
+          heavy_[size_t{kStride} * k + c] *
+          (v_[size_t{kStride} * k + c] - rows_->y_free[size_t{kStride} * dof_of_node_[k] + c]);
   for (uint32_t k = points_; k < nodes_; ++k)
     for (size_t c = 0; c < 3; ++c) g_[3 * size_t{k} + c] = v_[size_t{kStride} * k + c];
   bool laws = false;
@@ -334,7 +336,8 @@ bool ContactNewton::find_slopes(bool frozen) {
         for (int c = 0; c < 3; ++c)
           if (b.inverse[c][c] != 0) G[4 * c] = rho / (1 + rho * b.soft);
       } else {
-        const double free = dot(b.along, load3(&lh_[3 * size_t{k}])) - rho * dot(b.along, load3(&u_[3 * size_t{k}]));
+        const double free =
+            dot(b.along, load3(&lh_[3 * size_t{k}])) - rho * dot(b.along, load3(&u_[3 * size_t{k}]));
         if (!(free > 0 && free < b.most)) continue;
         for (int r = 0; r < 3; ++r)
           for (int c = 0; c < 3; ++c) G[3 * r + c] = rho * b.along[r] * b.along[c];
@@ -377,18 +380,17 @@ bool ContactNewton::find_slopes(bool frozen) {
       G[5] = G[7] = -across * t1 * t2;
       G[8] = across * t1 * t1;
       if (frozen) continue;
-      const double grows =
-          s.mode[i] == 2 ? std::sqrt(s.dft_dfn[i] * s.dft_dfn[i] + s.dft_dfn[n + i] * s.dft_dfn[n + i])
-                         : radius / l[0];
+      const double grows = s.mode[i] == 2
+                               ? std::sqrt(s.dft_dfn[i] * s.dft_dfn[i] + s.dft_dfn[n + i] * s.dft_dfn[n + i])
+                               : radius / l[0];
       G[3] = grows * normal * t1;
       G[6] = grows * normal * t2;
       // the limit grows with the speed of a viscous law
       const double v1 = s.vt[i], v2 = s.vt[n + i], speed = std::sqrt(v1 * v1 + v2 * v2);
       if (!(speed > 0) || s.mode[i] != 2) continue;
       const double e1 = v1 / speed, e2 = v2 / speed;
-      const double viscous =
-          std::max(0.0, -(e1 * (s.dft_dvt[i] * e1 + s.dft_dvt[n + i] * e2) +
-                          e2 * (s.dft_dvt[2 * n + i] * e1 + s.dft_dvt[3 * n + i] * e2)));
+      const double viscous = std::max(0.0, -(e1 * (s.dft_dvt[i] * e1 + s.dft_dvt[n + i] * e2) +
+                                             e2 * (s.dft_dvt[2 * n + i] * e1 + s.dft_dvt[3 * n + i] * e2)));
       G[4] -= h_ * viscous * t1 * e1;
       G[5] -= h_ * viscous * t1 * e2;
       G[7] -= h_ * viscous * t2 * e1;
@@ -490,7 +492,8 @@ bool ContactNewton::set_matrix() {
 }
 
 namespace {
-constexpr uint32_t kDissected = 1000;  // nodes, from which the order by nested dissection has the sparser factor
+constexpr uint32_t kDissected =
+    1000;  // nodes, from which the order by nested dissection has the sparser factor
 }  // namespace
 
 bool ContactNewton::refactor() {

@@ -12,8 +12,8 @@ ContactRows::ContactRows(const Memory &m)
     : kernels_(dense_kernels()),
       loops_(doubles_at_once() >= 4 ? contact_kernels_avx2() : contact_kernels_sse2()) {
   use_memory(m, across_, begin, dof, weight, y, y_free, alone, source, point, block, blocks, response_,
-             given_, frame, drive, rate, borne, yields, wn, wt, cross, impulse, bond, dof_of_point_, dof_of_node_,
-             place_, rigid, arm, dof_of_group_, every_block_, whole_of);
+             given_, frame, drive, rate, borne, yields, wn, wt, cross, impulse, bond, dof_of_point_,
+             dof_of_node_, place_, rigid, arm, dof_of_group_, every_block_, whole_of);
 }
 
 // Of the dofs from `first` on.

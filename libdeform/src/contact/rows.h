@@ -29,7 +29,8 @@ struct DofSource {
   uint32_t first_node = 0, nnode = 0;    // world-wide surfel numbers of the body
   uint32_t first_point = 0, npoint = 0;  // world-wide phyxel numbers
   const Surface *surface = nullptr;
-  // [npoint,4] 1/kg, Dynamics::diagonal(), or ImplicitSystem::diagonal_inverse(); null: surfels are the unknowns
+  // [npoint,4] 1/kg, Dynamics::diagonal(), or ImplicitSystem::diagonal_inverse(); null: surfels are the
+  // unknowns
   const double *diagonal = nullptr;
   const double *velocity = nullptr;  // without contact: [npoint,4] or, of surfels, surface->v
   // [npoint,4] m, positions of phyxels, of a surface whose surfels are set back from them; else null
@@ -79,9 +80,9 @@ struct ContactRows {
   Array<double> drive;  // [all,3] obstacle velocity in the frame
   Array<double> rate;   // [n] m/s: gap / h; a depth 0.2 gap / h, at least -0.1 d_c / h
   Array<double> borne;  // [n] N s, normal impulses at the start of the sub-step
-  // [n,3] Of a contact that is compliant under its load l (ContactPoint::give, soften_openings()): the softness
-  // c, 1/kg, its largest effect m, m/s, and the load p, N s, from which on it yields: min(c max(l - p, 0), m) is
-  // added to u_n + rate. 0, 0, 0 for all others.
+  // [n,3] Of a contact that is compliant under its load l (ContactPoint::give, soften_openings()): the
+  // softness c, 1/kg, its largest effect m, m/s, and the load p, N s, from which on it yields: min(c max(l -
+  // p, 0), m) is added to u_n + rate. 0, 0, 0 for all others.
   Array<double> yields;
   Array<double> wn, wt;  // [all] 1/kg: W_nn; largest eigenvalue of W_tt, of a bond the larger of W_yy, W_zz
   // [n,2] 1/kg: W_tn, the slip that a unit normal impulse makes at its own contact
@@ -133,8 +134,9 @@ struct ContactRows {
   // larger load: where normals oppose each other, n and -n + e would open at -rate / |e|. So u = 0 is always
   // allowed. firm: [n] where above zero, the row stays as it is; empty: none does.
   void soften_openings(std::span<const double> firm);
-  // N s, the normal impulse less what a depth that does not open has added to its load: the next sub-step would
-  // push against it with as much again, and loads of depths that exclude each other would grow for ever.
+  // N s, the normal impulse less what a depth that does not open has added to its load: the next sub-step
+  // would push against it with as much again, and loads of depths that exclude each other would grow for
+  // ever.
   double load_without_opening(uint32_t i) const;
   void turn_frames();  // once `frame` and `drive` are known, for the kernels; finish() has done it
 
@@ -158,8 +160,8 @@ struct ContactRows {
   void apply_last();
   // y of a part from the impulses alone: sweeps have left it not finite, or with their rounding
   void restore(const RowsPart &part);
-  // G [3 contacts, padded]: velocities change by G G^T impulse through these blocks. Padded: rank rounded up to
-  // fours, with zeros.
+  // G [3 contacts, padded]: velocities change by G G^T impulse through these blocks. Padded: rank rounded up
+  // to fours, with zeros.
   struct Motions {
     Array<double> g;
     uint32_t rank = 0;

@@ -31,7 +31,7 @@ class Acceleration {
  public:
   explicit Acceleration(const Memory &memory);
   void start(const ContactRows &rows, const RowsPart &part);  // before the first sweep of a pass
-  void follow(ContactRows &rows, const RowsPart &part);  // after a sweep that another one follows
+  void follow(ContactRows &rows, const RowsPart &part);       // after a sweep that another one follows
 
  private:
   static constexpr uint32_t kWindow = kAndersonWindow;

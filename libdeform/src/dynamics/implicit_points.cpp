@@ -376,7 +376,8 @@ double ImplicitPoints::scaled_square(const Array<double> &r) const {
 void ImplicitPoints::see_diagonal() {
   moving_ = 0;
   for (uint32_t i = 0; i < p_.n; ++i) {
-    if (p_.moves(size_t{kStride} * i) || p_.moves(size_t{kStride} * i + 1) || p_.moves(size_t{kStride} * i + 2))
+    if (p_.moves(size_t{kStride} * i) || p_.moves(size_t{kStride} * i + 1) ||
+        p_.moves(size_t{kStride} * i + 2))
       moving_ += p_.mass[i];
     for (size_t c = 0; c < 3; ++c) alone_[size_t{kStride} * i + c] = scale_[size_t{3} * i + c];
   }

@@ -10,7 +10,8 @@
 // free_motion() solves r(v) = 0 by Newton's method with a line search, with the rest state's factor in place
 // of A (rest_factor.h) or with the last A. With contact the solve of contact finds v and p together
 // (contact/newton.h), so that forces and contacts hold at the same state, the end of the sub-step. Linear
-// momentum is conserved to the tolerance: the forces of a model and the rows of its stiffness sum to zero. Source: Baraff and Witkin 1998, Large steps in cloth simulation, section 3.
+// momentum is conserved to the tolerance: the forces of a model and the rows of its stiffness sum to zero.
+// Source: Baraff and Witkin 1998, Large steps in cloth simulation, section 3.
 #pragma once
 #include <memory>
 #include <utility>
@@ -31,11 +32,7 @@ class ImplicitPoints : public Dynamics, public ImplicitSystem {
                  const ImplicitOptions &options);
 
   Abilities abilities() const override {
-    return {.springs = true,
-            .placed = true,
-            .accurate = true,
-            .damps = true,
-            .parts = options_.second_order};
+    return {.springs = true, .placed = true, .accurate = true, .damps = true, .parts = options_.second_order};
   }
   uint32_t claims() const override {
     return DFM_CAP_STIFFNESS | (stiffness_.constant() ? uint32_t{DFM_CAP_CONSTANT_STIFFNESS} : 0);
@@ -83,13 +80,13 @@ class ImplicitPoints : public Dynamics, public ImplicitSystem {
  private:
   ModelStiffness stiffness_;
   Memory memory_;
-  std::unique_ptr<RestFactor> rest_;      // null if the solver is not direct, or only one solve is allowed
-  std::unique_ptr<LinearSolver> exact_;   // of A itself; null until it is needed
-  bool by_rest_ = false;  // which of the two represents A
-  uint32_t slow_ = 0;     // iterations with rest_ that did not halve the residual
+  std::unique_ptr<RestFactor> rest_;     // null if the solver is not direct, or only one solve is allowed
+  std::unique_ptr<LinearSolver> exact_;  // of A itself; null until it is needed
+  bool by_rest_ = false;                 // which of the two represents A
+  uint32_t slow_ = 0;                    // iterations with rest_ that did not halve the residual
   Anderson ways_;
-  // The present stage: its h (s); s since the start of the sub-step, and its start; x0, v0 ([npoint,4] m, m/s). Loads and
-  // gravity are interpolated linearly between start and end.
+  // The present stage: its h (s); s since the start of the sub-step, and its start; x0, v0 ([npoint,4] m,
+  // m/s). Loads and gravity are interpolated linearly between start and end.
   struct Stage {
     double h, elapsed, time;
     const double *x, *v;
@@ -97,16 +94,16 @@ class ImplicitPoints : public Dynamics, public ImplicitSystem {
     Vec3 gravity;
   };
   Stage stage_{};
-  bool staged_ = false;              // this sub-step uses TR-BDF2
-  Array<double> stage_x_, stage_v_;  // [npoint,4] m, m/s: x0, v0 of its stages
-  Array<double> middle_;             // [npoint,4] m/s, the end of its first stage
-  Array<double> load_before_;        // [npoint,4] N, at the start of the sub-step
-  Array<double> x_, v_;              // [npoint,4] m, m/s: state of the last force evaluation
-  Array<double> residual_;           // [npoint,3] N s
-  Array<double> push_, change_;      // [npoint,3] N s of contact; m/s, a solution
-  Array<double> springs_, dampers_;  // [npoint] N/m, N s/m of loads
-  Array<double> weight_, scale_;     // [npoint,3] kg, diagonal of A; 1/kg, its inverse; zero where held
-  Array<uint8_t> held_;              // [npoint] as in the present factor
+  bool staged_ = false;                // this sub-step uses TR-BDF2
+  Array<double> stage_x_, stage_v_;    // [npoint,4] m, m/s: x0, v0 of its stages
+  Array<double> middle_;               // [npoint,4] m/s, the end of its first stage
+  Array<double> load_before_;          // [npoint,4] N, at the start of the sub-step
+  Array<double> x_, v_;                // [npoint,4] m, m/s: state of the last force evaluation
+  Array<double> residual_;             // [npoint,3] N s
+  Array<double> push_, change_;        // [npoint,3] N s of contact; m/s, a solution
+  Array<double> springs_, dampers_;    // [npoint] N/m, N s/m of loads
+  Array<double> weight_, scale_;       // [npoint,3] kg, diagonal of A; 1/kg, its inverse; zero where held
+  Array<uint8_t> held_;                // [npoint] as in the present factor
   Array<double> alone_;                // [npoint,4] scale_
   double moving_ = 0;                  // kg, of points that are not held
   double factor_h_ = 0;                // s, of the present factor; 0: none

@@ -32,8 +32,8 @@ class RestFactor {
   void turn(const double *x);
 
   bool solve(const double *b, double *x);                      // [npoint,3]
-  double solve_work() const { return solver_->solve_work(); }          // as LinearSolver::solve_work
-  const Array<double> &diagonal() const { return diagonal_; }          // [npoint,3] kg, 0 where held
+  double solve_work() const { return solver_->solve_work(); }  // as LinearSolver::solve_work
+  const Array<double> &diagonal() const { return diagonal_; }  // [npoint,3] kg, 0 where held
 
  private:
   const Phyxels &p_;
@@ -58,7 +58,7 @@ class RestFactor {
     double inverse[9];  // 1/(kg m2), of the inertia about the center
   };
   Rigid rigid_ = {};
-  Array<double> arm_;    // [npoint,3] m, from the center
+  Array<double> arm_;  // [npoint,3] m, from the center
 
   bool ask_model();
   struct Motion { Vec3 speed, spin; };

@@ -9,8 +9,7 @@ SettlingPoints::SettlingPoints(const Memory &memory, Phyxels &points, Surface &s
                                const ImplicitOptions &options, const std::vector<double> &softness,
                                double error)
     : ImplicitPoints(memory, points, surface, model, options), error_allowed_(error) {
-  use_memory(memory, softness_, last_, next_, guess_, load_, impulse_, taken_, springs_of_loads_,
-             own_);
+  use_memory(memory, softness_, last_, next_, guess_, load_, impulse_, taken_, springs_of_loads_, own_);
   for (Array<double> *a : {&last_, &next_, &impulse_, &taken_}) a->assign(size_t{3} * points.n, 0.0);
   guess_.assign(size_t{kStride} * points.n, 0.0);
   softness_.assign(softness.begin(), softness.end());

@@ -52,7 +52,7 @@ struct StepContext {
   std::vector<RigidPlace> rigid_places;  // by obstacle slot; empty without rigid bodies
   std::vector<uint32_t> rigid_groups;    // bodies per group, all sets
   std::vector<DofSource> sources;
-  std::vector<ImplicitSystem *> systems;  // by body slot; null: not implicit
+  std::vector<ImplicitSystem *> systems;               // by body slot; null: not implicit
   std::vector<std::unique_ptr<SelfBody>> self_bodies;  // in id order; those that may touch themselves
 
   // motion

@@ -199,7 +199,8 @@ bool retry_shorter(World &w, StepContext &step, const SolveIsland &own, uint32_t
   }
   set_last_error(format("step %llu, body '%s': no state was found in which its forces and contacts agree, "
                         "not even in a sub-step of %g s; take a smaller step, or lower the stiffness",
-                        static_cast<unsigned long long>(w.step_count), w.bodies[own.implicit_body]->name.c_str(), step.h)
+                        static_cast<unsigned long long>(w.step_count),
+                        w.bodies[own.implicit_body]->name.c_str(), step.h)
                      .c_str());
   *trouble |= DFM_TROUBLE_NONFINITE;
   return false;

@@ -26,8 +26,8 @@ namespace {
 constexpr double kRememberedShare = 0.05, kRememberedRest = 1e-3;
 
 // Sweeps come first where points answer their own impulses only. Newton's method takes over where these do
-// not converge: a small problem after the limit of sweeps, one of many contacts, whose matrix is dearer, after
-// a multiple of it.
+// not converge: a small problem after the limit of sweeps, one of many contacts, whose matrix is dearer,
+// after a multiple of it.
 constexpr uint32_t kMany = 100, kManySweeps = 4;
 uint32_t most_sweeps(const World &w, const SolveIsland &own) {
   return w.def.max_sweeps * (own.part.n < kMany ? 1 : kManySweeps);
@@ -209,8 +209,11 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
   if (own.bad || own.thrown) return;
   const double normal = normal_tolerance(w, step, own), least = tangent_at_rest(w, step.h);
   const bool stands = w.prescribed.stands(), memory = own.batches.remembers();
-  const ToleranceBounds bounds{
-      least, own.implicit || stands ? least : memory ? kRememberedRest * least : normal, normal};
+  const ToleranceBounds bounds{least,
+                               own.implicit || stands ? least
+                               : memory               ? kRememberedRest * least
+                                                      : normal,
+                               normal};
   set_tolerance(step.rows, own.part, step.contacts, step.h, bounds, step.solve_islands->sides(),
                 step.disturbance.data(), own.tolerance);
   ask_slip_back(w, step, own);
@@ -244,7 +247,8 @@ double work_of_sweep(const ContactRows &rows, const RowsPart &part, bool blocks)
 }  // namespace
 
 bool IslandLaws::answer(const double *response) {
-  own_->bad = own_->batches.answer(step_->h, response, 0.1 * tangent_at_rest(*w_, step_->h), 1e-3, step_->state);
+  own_->bad =
+      own_->batches.answer(step_->h, response, 0.1 * tangent_at_rest(*w_, step_->h), 1e-3, step_->state);
   return !own_->bad;
 }
 

@@ -104,8 +104,8 @@ TEST_P(LatePoints, SeenAfterEachStepOrNever_AreTheSame) {
   EXPECT_EQ(dfm_world_hash(a.world), dfm_world_hash(b.world));
 }
 
-// The same body where the points lead in each step, so that all of them are moved. The probe comes to its first
-// contact with impacts, each of which sticks or slips by the last digits: without friction none does.
+// The same body where the points lead in each step, so that all of them are moved. The probe comes to its
+// first contact with impacts, each of which sticks or slips by the last digits: without friction none does.
 TEST_P(LatePoints, OfASlidingProbe_AreThoseOfAStepThatMovesAll) {
   const std::vector<std::string> more{"/contact/friction/0/params/mu=0"};
   const Probed late(GetParam(), more), whole(GetParam(), more);
@@ -118,8 +118,8 @@ TEST_P(LatePoints, OfASlidingProbe_AreThoseOfAStepThatMovesAll) {
   EXPECT_LT(apart(late, whole), 1e-8);
 }
 
-// What a step cannot do near the surface alone: held points that move, a load on some points. Without friction,
-// as above.
+// What a step cannot do near the surface alone: held points that move, a load on some points. Without
+// friction, as above.
 TEST_P(LatePoints, OfABodyThatIsMovedOrLoaded_AreThoseOfAStepThatMovesAll) {
   const std::vector<std::string> more{"/contact/friction/0/params/mu=0"};
   const Probed late(GetParam(), more), whole(GetParam(), more);
