@@ -104,7 +104,7 @@ bool passes(const Obstacle &a, const Obstacle &b) {
 
 }  // namespace
 
-ToolTouch::ToolTouch(const Memory &m) : batches_(m), next_(m), next_report_(m) {
+ToolTouch::ToolTouch(const Memory &m) : islands_(m), batches_(m), next_(m), next_report_(m) {
   use_memory(m, start_, tangents_, match_, points_, response_, best_);
   state_.use(m);
 }

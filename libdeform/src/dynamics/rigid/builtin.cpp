@@ -16,6 +16,7 @@
 // State beyond pose and velocity: per joint the motor's speed, its limit and what it did last.
 #include <algorithm>
 
+#include "core/disjoint_sets.h"
 #include "core/error.h"
 #include "dynamics/rigid/host.h"
 #include "dynamics/rigid/joints.h"
@@ -118,21 +119,13 @@ Builtin::Builtin(const dfm_rigid_set_def &set, uint32_t *group) {
   for (uint32_t i = 0; i < set.njoint; ++i) joints_.push_back(make_joint(set.joints[i], bodies));
   // Bodies that joints tie together, still ones apart: what hangs on a wall on both of its sides is two
   // groups. The lowest number represents a group.
-  std::vector<uint32_t> root(n);
-  for (uint32_t i = 0; i < n; ++i) root[i] = i;
-  auto find = [&](uint32_t i) {
-    while (root[i] != i) i = root[i];
-    return i;
-  };
+  DisjointSets tied(Memory::standard(), n);
   for (const RigidJoint &j : joints_)
-    if (j.b != DFM_RIGID_WORLD && !bodies[j.a].fixed && !bodies[j.b].fixed) {
-      const uint32_t a = find(j.a), b = find(j.b);
-      root[std::max(a, b)] = std::min(a, b);
-    }
+    if (j.b != DFM_RIGID_WORLD && !bodies[j.a].fixed && !bodies[j.b].fixed) tied.join(j.a, j.b);
   group_.assign(n, DFM_RIGID_STILL);
   for (uint32_t i = 0; i < n; ++i) {
     if (bodies[i].fixed) continue;
-    const uint32_t r = find(i);
+    const uint32_t r = tied.root(i);
     if (r == i) {
       group_[i] = static_cast<uint32_t>(groups_.size());
       groups_.emplace_back();
