@@ -46,12 +46,7 @@ dfm_status dfm_obstacle_get_pose(dfm_obstacle obstacle, dfm_pose *out) {
   return as_status([&] {
     const Obstacle &o = obstacle_of(obstacle);
     need(out, "out");
-    store3(out->position, o.pose.position);
-    const Quat q = o.pose.rotation;
-    out->rotation[0] = q.x;
-    out->rotation[1] = q.y;
-    out->rotation[2] = q.z;
-    out->rotation[3] = q.w;
+    store_pose(*out, o.pose);
   });
 }
 

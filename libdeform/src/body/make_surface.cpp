@@ -8,6 +8,7 @@
 #include <initializer_list>
 #include <span>
 
+#include "core/disjoint_sets.h"
 #include "geometry/closest.h"
 #include "math/vec3.h"
 
@@ -74,27 +75,16 @@ void find_edges(Surface &out) {
     }
 }
 
-uint32_t root(Array<uint32_t> &parent, uint32_t i) {
-  while (parent[i] != i) i = parent[i] = parent[parent[i]];
-  return i;
-}
-
 // Patches are numbered in the order of their lowest triangles.
 void find_patches(const Array<Vec3> &normal, Surface &out) {
-  Array<uint32_t> parent(out.ntri, 0u, out.tri.get_allocator());
-  for (uint32_t t = 0; t < out.ntri; ++t) parent[t] = t;
+  DisjointSets patches(*out.tri.get_allocator().memory, out.ntri);
   for (uint32_t e = 0; e < out.nedge; ++e) {
     const uint32_t s = out.edge_tri[2 * e], t = out.edge_tri[2 * e + 1];
     if (s == kNone || t == kNone || dot(normal[s], normal[t]) < kPatchCosine) continue;
-    const uint32_t rs = root(parent, s), rt = root(parent, t);
-    parent[std::max(rs, rt)] = std::min(rs, rt);
+    patches.join(s, t);
   }
-  out.patch.assign(out.ntri, 0);
-  uint32_t count = 0;
-  for (uint32_t t = 0; t < out.ntri; ++t) {
-    const uint32_t r = root(parent, t);
-    out.patch[t] = r == t ? count++ : out.patch[r];
-  }
+  patches.number();
+  out.patch = std::move(patches.of);
 }
 
 void find_fans(Surface &out) {

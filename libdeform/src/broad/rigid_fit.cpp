@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "math/turn.h"
+
 namespace dfm {
 namespace {
 
@@ -50,10 +52,7 @@ double RigidReference::displaced(const Surface &s) {
   const auto place = [&](uint32_t i) { return rotate(turn_, load3(&x_[4 * size_t{i}]) - center_); };
   const auto off = [&](uint32_t i) { return load3(&s.x[4 * size_t{i}]) - now - place(i); };
   const Vec3 half = 0.5 * fit(s.nsurfel, place, off).theta;
-  const double q[4] = {half.x, half.y, half.z, 1};
-  turn_ = unit_quat(q) * turn_;
-  const double unit[4] = {turn_.x, turn_.y, turn_.z, turn_.w};
-  turn_ = unit_quat(unit);
+  turn_ = unit(unit({half.x, half.y, half.z, 1}) * turn_);
   double most = 0;
   for (uint32_t i = 0; i < s.nsurfel; ++i) most = std::max(most, norm2(off(i)));
   return std::sqrt(most);

@@ -1,6 +1,7 @@
-// Rotations: interpolation, exponential map and its inverse, and the mean spin of a rigid body over a step
-// that conserves angular momentum. Uses + - * / sqrt only.
+// Rotations and poses: interpolation, exponential map and its inverse, and the mean spin of a rigid body over a
+// step that conserves angular momentum. Uses + - * / sqrt only.
 #pragma once
+#include "deform/math.h"
 #include "math/trig.h"
 #include "math/vec3.h"
 
@@ -11,6 +12,33 @@ inline Quat unit(Quat q) {
   return {q.x / n, q.y / n, q.z / n, q.w / n};
 }
 inline Quat conjugate(Quat q) { return {-q.x, -q.y, -q.z, q.w}; }
+inline Quat load_quat(const double *q) { return {q[0], q[1], q[2], q[3]}; }
+inline void store_quat(double *to, Quat q) {
+  to[0] = q.x;
+  to[1] = q.y;
+  to[2] = q.z;
+  to[3] = q.w;
+}
+
+struct Pose {
+  Vec3 position;
+  Quat rotation;
+};
+inline Vec3 place(const Pose &pose, Vec3 x) { return rotate(pose.rotation, x) + pose.position; }
+inline Pose operator*(const Pose &a, const Pose &b) {
+  return {place(a, b.position), a.rotation * b.rotation};
+}
+inline Pose to_pose(const dfm_pose &p) { return {load3(p.position), unit_quat(p.rotation)}; }
+// Of a dfm_pose or a dfm_rigid_state, with the rotation as it is.
+template <class State>
+Pose load_pose(const State &s) {
+  return {load3(s.position), load_quat(s.rotation)};
+}
+template <class State>
+void store_pose(State &to, const Pose &p) {
+  store3(to.position, p.position);
+  store_quat(to.rotation, p.rotation);
+}
 
 // The quaternion of a rotation matrix (row-major), from its largest component, which avoids cancellation
 // (Shepperd 1978).

@@ -2,23 +2,10 @@
 
 #include <algorithm>
 
+#include "core/disjoint_sets.h"
+
 namespace dfm {
 namespace {
-
-uint32_t root(Array<uint32_t> &parent, uint32_t i) {
-  while (parent[i] != i) i = parent[i] = parent[parent[i]];
-  return i;
-}
-void join(Array<uint32_t> &parent, uint32_t i, uint32_t j) {
-  const uint32_t a = root(parent, i), b = root(parent, j);
-  parent[std::max(a, b)] = std::min(a, b);
-}
-
-Array<uint32_t> own_parents(const Memory &memory, size_t n) {
-  Array<uint32_t> parent(n, 0u, HookAllocator<uint32_t>(memory));
-  for (size_t i = 0; i < n; ++i) parent[i] = uint32_t(i);
-  return parent;
-}
 
 uint32_t corner_of(const uint32_t *tets, uint32_t cell, uint32_t point) {
   const uint32_t *const c = tets + size_t{4} * cell;
@@ -27,10 +14,10 @@ uint32_t corner_of(const uint32_t *tets, uint32_t cell, uint32_t point) {
 
 // Corners of cells {cell, corner} that are copies of one point: joined across faces that are not open.
 // split [npoint] out: 1: an open face has it.
-Array<uint32_t> join_corners(const Memory &memory, uint32_t npoint, uint32_t ntet, const uint32_t *tets,
-                             const Array<uint8_t> &removed, const Array<uint64_t> &open,
-                             const Array<uint32_t> &inner, Array<uint8_t> &split) {
-  Array<uint32_t> parent = own_parents(memory, size_t{4} * ntet);
+DisjointSets join_corners(const Memory &memory, uint32_t npoint, uint32_t ntet, const uint32_t *tets,
+                          const Array<uint8_t> &removed, const Array<uint64_t> &open,
+                          const Array<uint32_t> &inner, Array<uint8_t> &split) {
+  DisjointSets corners(memory, 4 * ntet);
   split.assign(npoint, 0);
   const auto join_across = [&](uint32_t a, uint32_t b) {
     if (removed[a] || removed[b]) return;
@@ -39,13 +26,13 @@ Array<uint32_t> join_corners(const Memory &memory, uint32_t npoint, uint32_t nte
       const uint32_t point = tets[size_t{4} * a + size_t(k)], other = corner_of(tets, b, point);
       if (other == 4 * b + 4) continue;  // the corner of a that is not in the face
       if (opened) split[point] = 1;
-      else join(parent, 4 * a + uint32_t(k), other);
+      else corners.join(4 * a + uint32_t(k), other);
     }
   };
   if (inner.empty()) each_inner_face(memory, ntet, tets, join_across);
   else
     for (size_t f = 0; f < inner.size(); f += 2) join_across(inner[f], inner[f + 1]);
-  return parent;
+  return corners;
 }
 
 }  // namespace
@@ -72,9 +59,9 @@ CutMesh make_cut_mesh(const Memory &memory, uint32_t npoint, uint32_t ntet, cons
   const HookAllocator<uint32_t> a(memory);
   Array<uint32_t> number(npoint, UINT32_MAX, a), copy(a);
   Array<uint8_t> split{HookAllocator<uint8_t>(memory)};
-  Array<uint32_t> parent(a);
+  DisjointSets corners(memory);
   if (!open.empty()) {
-    parent = join_corners(memory, npoint, ntet, tets, removed, open, inner, split);
+    corners = join_corners(memory, npoint, ntet, tets, removed, open, inner, split);
     copy.assign(size_t{4} * ntet, UINT32_MAX);
   }
   for (uint32_t t = 0; t < ntet; ++t) {
@@ -95,7 +82,7 @@ CutMesh make_cut_mesh(const Memory &memory, uint32_t npoint, uint32_t ntet, cons
         out.tets.push_back(number[p]);
         continue;
       }
-      uint32_t &mine = copy[root(parent, 4 * t + k)];
+      uint32_t &mine = copy[corners.root(4 * t + k)];
       if (mine == UINT32_MAX) {
         mine = number[p];
         if (taken[p]) {
@@ -112,13 +99,13 @@ CutMesh make_cut_mesh(const Memory &memory, uint32_t npoint, uint32_t ntet, cons
 Array<uint32_t> parts_of_cells(const Memory &memory, uint32_t npoint, uint32_t ntet, const uint32_t *tets,
                                uint32_t &n) {
   const HookAllocator<uint32_t> a(memory);
-  Array<uint32_t> parent = own_parents(memory, npoint);
+  DisjointSets points(memory, npoint);
   for (size_t t = 0; t < size_t{4} * ntet; t += 4)
-    for (size_t k = 1; k < 4; ++k) join(parent, tets[t], tets[t + k]);
+    for (size_t k = 1; k < 4; ++k) points.join(tets[t], tets[t + k]);
   Array<uint32_t> number(npoint, UINT32_MAX, a), out(ntet, 0u, a);
   n = 0;
   for (uint32_t t = 0; t < ntet; ++t) {
-    uint32_t &mine = number[root(parent, tets[size_t{4} * t])];
+    uint32_t &mine = number[points.root(tets[size_t{4} * t])];
     if (mine == UINT32_MAX) mine = n++;
     out[t] = mine;
   }

@@ -16,6 +16,7 @@
 #include <cfloat>
 #include <cmath>
 
+#include "core/disjoint_sets.h"
 #include "core/error.h"
 #include "mesh/fill_lattice.h"
 #include "mesh/tri_mesh.h"
@@ -186,21 +187,13 @@ void number_points(const Memory &memory, Filling &f) {
 // Removes pieces without material: sheets without thickness, and isolated triangles. Returns their number of
 // cells.
 uint32_t drop_empty_pieces(const Memory &memory, Filling &f) {
-  Array<uint32_t> parent(f.sites.size(), HookAllocator<uint32_t>(memory));
-  for (uint32_t i = 0; i < parent.size(); ++i) parent[i] = i;
-  const auto root = [&](uint32_t i) {
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-  };
-  for (size_t i = 0; i < f.tets.size(); ++i) {
-    const uint32_t a = root(f.tets[i]), b = root(f.tets[i / 4 * 4]);
-    parent[std::max(a, b)] = std::min(a, b);
-  }
+  DisjointSets pieces(memory, uint32_t(f.sites.size()));
+  for (size_t i = 0; i < f.tets.size(); ++i) pieces.join(f.tets[i], f.tets[i / 4 * 4]);
   Array<double> material(f.sites.size(), 0.0, HookAllocator<double>(memory));
-  for (size_t c = 0; c < f.size(); ++c) material[root(f.tets[4 * c])] += f.share[c];
+  for (size_t c = 0; c < f.size(); ++c) material[pieces.root(f.tets[4 * c])] += f.share[c];
   size_t kept = 0;
   for (size_t c = 0; c < f.size(); ++c)
-    if (material[root(f.tets[4 * c])] > 0) {
+    if (material[pieces.root(f.tets[4 * c])] > 0) {
       f.keys[kept] = f.keys[c];
       f.share[kept] = f.share[c];
       f.loose[kept] = f.loose[c];

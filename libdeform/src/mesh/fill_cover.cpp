@@ -7,6 +7,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/disjoint_sets.h"
 #include "mesh/fill_lattice.h"
 
 namespace dfm {
@@ -176,25 +177,17 @@ void FillSurface::measure_openings() {
   edges.resize(kept);
   closed = edges.empty();
   if (closed) return;
-  Array<uint32_t> parent(points.size() / 3, HookAllocator<uint32_t>(memory));
-  for (uint32_t i = 0; i < parent.size(); ++i) parent[i] = i;
-  const auto root = [&](uint32_t i) {
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-  };
-  for (const Edge &e : edges) {
-    const uint32_t a = root(e.a), b = root(e.b);
-    parent[std::max(a, b)] = std::min(a, b);
-  }
+  DisjointSets loops(memory, uint32_t(points.size() / 3));
+  for (const Edge &e : edges) loops.join(e.a, e.b);
   std::sort(edges.begin(), edges.end(), [&](const Edge &e, const Edge &f) {
-    const uint32_t p = root(e.a), q = root(f.a);
+    const uint32_t p = loops.root(e.a), q = loops.root(f.a);
     return p != q ? p < q : e.a != f.a ? e.a < f.a : e.b < f.b;
   });
   for (size_t i = 0, j; i < edges.size(); i = j) {
-    const uint32_t loop = root(edges[i].a);
+    const uint32_t loop = loops.root(edges[i].a);
     const Vec3 origin = load3(&points[3 * size_t(loop)]);
     Vec3 patch, lo = origin, hi = origin;
-    for (j = i; j < edges.size() && root(edges[j].a) == loop; ++j) {
+    for (j = i; j < edges.size() && loops.root(edges[j].a) == loop; ++j) {
       const Vec3 a = load3(&points[3 * size_t(edges[j].a)]), b = load3(&points[3 * size_t(edges[j].b)]);
       patch += (0.5 * edges[j].way) * cross(a - origin, b - origin);
       for (int k = 0; k < 3; ++k) {

@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/disjoint_sets.h"
 #include "math/vec3.h"
 #include "mesh/finish.h"
 #include "mesh/topology_tri.h"
@@ -151,29 +152,22 @@ class Orienter {
       }
     }
     std::stable_sort(rims.begin(), rims.end(), [](const Rim &a, const Rim &b) { return a.patch < b.patch; });
-    Array<uint32_t> parent(points_.size() / 3, HookAllocator<uint32_t>(memory_));
+    DisjointSets loops(memory_, uint32_t(points_.size() / 3));
     for (size_t i = 0, j = 0; i < rims.size(); i = j) {
       while (j < rims.size() && rims[j].patch == rims[i].patch) ++j;
-      add_fans(&rims[i], &rims[i] + (j - i), parent);
+      add_fans(&rims[i], &rims[i] + (j - i), loops);
     }
   }
 
   // One fan per loop (boundary edges joined by points) from the mean of its points.
-  void add_fans(const Rim *begin, const Rim *end, Array<uint32_t> &parent) {
-    const auto root = [&](uint32_t p) {
-      while (parent[p] != p) p = parent[p] = parent[parent[p]];
-      return p;
-    };
-    for (const Rim *r = begin; r < end; ++r) {
-      parent[r->from] = r->from;
-      parent[r->to] = r->to;
+  void add_fans(const Rim *begin, const Rim *end, DisjointSets &loops) {
+    for (const Rim *r = begin; r < end; ++r) {  // not joined by a patch before
+      loops.of[r->from] = r->from;
+      loops.of[r->to] = r->to;
     }
-    for (const Rim *r = begin; r < end; ++r) {
-      const uint32_t a = root(r->from), b = root(r->to);
-      parent[std::max(a, b)] = std::min(a, b);
-    }
+    for (const Rim *r = begin; r < end; ++r) loops.join(r->from, r->to);
     std::vector<std::pair<uint32_t, const Rim *>> by_loop;
-    for (const Rim *r = begin; r < end; ++r) by_loop.emplace_back(root(r->from), r);
+    for (const Rim *r = begin; r < end; ++r) by_loop.emplace_back(loops.root(r->from), r);
     std::sort(by_loop.begin(), by_loop.end());
     std::vector<Corners> &fans = patches_[begin->patch].fans;
     for (size_t i = 0, j = 0; i < by_loop.size(); i = j) {

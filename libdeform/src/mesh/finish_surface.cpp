@@ -10,6 +10,7 @@
 #include <cmath>
 #include <unordered_map>
 
+#include "core/disjoint_sets.h"
 #include "core/error.h"
 #include "math/vec3.h"
 #include "mesh/faces.h"
@@ -298,10 +299,8 @@ uint32_t split_beside_flat(RawMesh &raw) {
 // A sheet that is doubled everywhere keeps one side.
 class Walls {
  public:
-  Walls(const RawMesh &raw, const Array<uint8_t> &drop, const Array<uint8_t> &twice) : parent_(count(raw)) {
-    for (uint32_t t = 0; t < parent_.size(); ++t) parent_[t] = t;
-    wall_.assign(parent_.size(), 0);
-    not_wall_ = wall_;
+  Walls(const RawMesh &raw, const Array<uint8_t> &drop, const Array<uint8_t> &twice)
+      : patches_(*raw.memory, count(raw)), wall_(count(raw)), not_wall_(count(raw)) {
     const Array<TriEdge> edges = sorted_edges(*raw.memory, count(raw), raw.tris.data());
     for (int pass = 0; pass < 2; ++pass)  // patches first, then what their rims say
       for (size_t i = 0, j = 0; i < edges.size(); i = j) {
@@ -311,19 +310,16 @@ class Walls {
           if (drop[t]) continue;
           if (!twice[t]) ++others;
           else if (first == kNoGroup) first = t;
-          else if (pass == 0) parent_[std::max(root(first), root(t))] = std::min(root(first), root(t));
+          else if (pass == 0) patches_.join(first, t);
         }
-        if (pass == 1 && first != kNoGroup && others > 0) (others % 2 ? not_wall_ : wall_)[root(first)] = 1;
+        if (pass == 1 && first != kNoGroup && others > 0)
+          (others % 2 ? not_wall_ : wall_)[patches_.root(first)] = 1;
       }
   }
-  bool is_wall(uint32_t t) { return wall_[root(t)] && !not_wall_[root(t)]; }
+  bool is_wall(uint32_t t) { return wall_[patches_.root(t)] && !not_wall_[patches_.root(t)]; }
 
  private:
-  uint32_t root(uint32_t t) {
-    while (parent_[t] != t) t = parent_[t] = parent_[parent_[t]];
-    return t;
-  }
-  std::vector<uint32_t> parent_;
+  DisjointSets patches_;
   std::vector<uint8_t> wall_, not_wall_;
 };
 

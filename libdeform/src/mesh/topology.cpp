@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/disjoint_sets.h"
 #include "math/vec3.h"
 #include "mesh/faces.h"
 #include "mesh/mesh.h"
@@ -130,23 +131,12 @@ uint32_t count_duplicate_points(const TetMesh &mesh) {
   return n;
 }
 
-// Pieces: points joined by cells; union by index with path halving.
+// Pieces: points joined by cells.
 uint32_t count_pieces(const TetMesh &mesh) {
-  Array<uint32_t> parent(mesh.npoint(), HookAllocator<uint32_t>(*mesh.memory));
-  for (uint32_t i = 0; i < parent.size(); ++i) parent[i] = i;
-  const auto root = [&](uint32_t i) {
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-  };
+  DisjointSets sets(*mesh.memory, mesh.npoint());
   uint32_t pieces = mesh.npoint();
   for (uint32_t t = 0; t < mesh.ntet(); ++t)
-    for (int k = 1; k < 4; ++k) {
-      const uint32_t a = root(mesh.tets[4 * size_t(t)]), b = root(mesh.tets[4 * size_t(t) + k]);
-      if (a != b) {
-        parent[std::max(a, b)] = std::min(a, b);
-        --pieces;
-      }
-    }
+    for (int k = 1; k < 4; ++k) pieces -= sets.join(mesh.tets[4 * size_t(t)], mesh.tets[4 * size_t(t) + k]);
   return pieces;
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/disjoint_sets.h"
 #include "math/vec3.h"
 #include "mesh/tri_mesh.h"
 
@@ -50,34 +51,13 @@ double triangle_quality(const double *points, const uint32_t *tri) {
 
 namespace {
 
-// Union by index with path halving.
-struct Sets {
-  Array<uint32_t> parent;
-  uint32_t count;
-  Sets(const Memory &memory, uint32_t n) : parent(n, HookAllocator<uint32_t>(memory)), count(n) {
-    for (uint32_t i = 0; i < n; ++i) parent[i] = i;
-  }
-  uint32_t root(uint32_t i) {
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-  }
-  void join(uint32_t a, uint32_t b) {
-    a = root(a);
-    b = root(b);
-    if (a != b) {
-      parent[std::max(a, b)] = std::min(a, b);
-      --count;
-    }
-  }
-};
-
 uint32_t count_pieces(const TriMesh &mesh) {
-  Sets sets(*mesh.memory, mesh.npoint());
+  DisjointSets sets(*mesh.memory, mesh.npoint());
   for (size_t t = 0; t < mesh.tris.size(); t += 3) {
     sets.join(mesh.tris[t], mesh.tris[t + 1]);
     sets.join(mesh.tris[t], mesh.tris[t + 2]);
   }
-  return sets.count;
+  return sets.number();
 }
 
 // Boundary loops: from each end of an open edge around that point, through the triangles between, to the
@@ -90,7 +70,7 @@ uint32_t count_holes(const TriMesh &mesh, const Array<uint32_t> &twin) {
       number[h] = uint32_t(open.size());
       open.push_back(h);
     }
-  Sets sets(*mesh.memory, uint32_t(open.size()));
+  DisjointSets sets(*mesh.memory, uint32_t(open.size()));
   for (const uint32_t start : open)
     for (const uint32_t point : {mesh.tris[start], mesh.tris[next_half_edge(start)]}) {
       uint32_t h = start;
@@ -104,7 +84,7 @@ uint32_t count_holes(const TriMesh &mesh, const Array<uint32_t> &twin) {
       } while (h != start);
       if (twin[h] == kOpenEdge) sets.join(number[start], number[h]);
     }
-  return sets.count;
+  return sets.number();
 }
 
 }  // namespace

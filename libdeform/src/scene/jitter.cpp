@@ -19,17 +19,12 @@ void Jitter::apply(double size, const double center[3], dfm_pose &pose, double v
   for (double &a : axis) a = symmetric();
   const double angle = 0.5 * symmetric();
   if (axis[0] == 0 && axis[1] == 0 && axis[2] == 0) axis[2] = 1;
-  const Quaternion turn = rotation(axis, angle);
-  const Quaternion old{pose.rotation[0], pose.rotation[1], pose.rotation[2], pose.rotation[3]};
-  const Quaternion turned = multiply(turn, old);
+  const Quat old = load_quat(pose.rotation), turned = rotation(axis, angle) * old;
   double before[3], after[3];
   rotate(old, center, before);
   rotate(turned, center, after);
   for (int i = 0; i < 3; ++i) pose.position[i] += before[i] - after[i] + shift[i];
-  pose.rotation[0] = turned.x;
-  pose.rotation[1] = turned.y;
-  pose.rotation[2] = turned.z;
-  pose.rotation[3] = turned.w;
+  store_quat(pose.rotation, turned);
   const double faster = 1 + 0.01 * symmetric(), spinning = 1 + 0.01 * symmetric();
   symmetric();  // reserved for another quantity, so that adding one does not change existing results
   for (int i = 0; i < 3; ++i) {

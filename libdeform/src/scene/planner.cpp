@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "math/turn.h"
 #include "scene/load.h"
-#include "scene/rotation.h"
 
 namespace dfm::scene {
 namespace {
@@ -24,20 +24,13 @@ struct Box {
   }
 };
 
-Quaternion quaternion(const dfm_pose &pose) {
-  const double *q = pose.rotation;
-  if (q[0] == 0 && q[1] == 0 && q[2] == 0 && q[3] == 0) return {};
-  return {q[0], q[1], q[2], q[3]};
-}
-
 // The box around a box that is placed.
 Box place(const double lo[3], const double hi[3], const dfm_pose &pose) {
   Box out;
   for (int corner = 0; corner < 8; ++corner) {
-    const double p[3] = {corner & 1 ? hi[0] : lo[0], corner & 2 ? hi[1] : lo[1], corner & 4 ? hi[2] : lo[2]};
+    const Vec3 p{corner & 1 ? hi[0] : lo[0], corner & 2 ? hi[1] : lo[1], corner & 4 ? hi[2] : lo[2]};
     double q[3];
-    rotate(quaternion(pose), p, q);
-    for (int k = 0; k < 3; ++k) q[k] += pose.position[k];
+    store3(q, dfm::place(to_pose(pose), p));
     out.add(q);
   }
   return out;
@@ -45,10 +38,8 @@ Box place(const double lo[3], const double hi[3], const dfm_pose &pose) {
 
 // m, how far a box may fall along `down` until it meets a plane; infinite: never.
 double fall_to_plane(const Box &box, const double down[3], const dfm_pose &plane) {
-  const double z[3] = {0, 0, 1};
-  double n[3];
-  rotate(quaternion(plane), z, n);
-  const double toward = -(down[0] * n[0] + down[1] * n[1] + down[2] * n[2]);
+  const Vec3 n = rotate(unit_quat(plane.rotation), {0, 0, 1});
+  const double toward = -dot(load3(down), n);
   double least = HUGE_VAL;
   for (int corner = 0; corner < 8; ++corner) {
     double above = 0;

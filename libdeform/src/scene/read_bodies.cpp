@@ -25,7 +25,7 @@ void read_quaternion(const Node &rotation, double out[4]) {
 }
 
 void read_rotation(const Node &holder, double out[4]) {
-  Quaternion q;
+  Quat q;
   if (holder.has("rotation")) {
     const Node node = holder.member("rotation");
     node.object("rotation");
@@ -36,10 +36,7 @@ void read_rotation(const Node &holder, double out[4]) {
       node.at("axis").fail("the axis of a rotation cannot be zero");
     q = rotation(axis, node.at("angle_deg").number());
   }
-  out[0] = q.x;
-  out[1] = q.y;
-  out[2] = q.z;
-  out[3] = q.w;
+  store_quat(out, q);
 }
 
 }  // namespace
@@ -97,7 +94,7 @@ Selection read_selection(const Node &entry) {
 
 // A key that leaves out position or rotation keeps that of `base`. `turn`: what every rotation is applied to
 // (a plane's normal).
-std::vector<dfm_pose_key> read_keys(const Node &motion, const dfm_pose &base, const Quaternion &turn) {
+std::vector<dfm_pose_key> read_keys(const Node &motion, const dfm_pose &base, Quat turn) {
   std::vector<dfm_pose_key> keys;
   const std::vector<Node> nodes = motion.items("keyframes");
   for (size_t i = 0; i < nodes.size(); ++i) {
@@ -108,18 +105,14 @@ std::vector<dfm_pose_key> read_keys(const Node &motion, const dfm_pose &base, co
     if (nodes[i].has("rotation")) {
       double q[4];
       read_rotation(nodes[i], q);
-      const Quaternion turned = multiply({q[0], q[1], q[2], q[3]}, turn);
-      key.pose.rotation[0] = turned.x;
-      key.pose.rotation[1] = turned.y;
-      key.pose.rotation[2] = turned.z;
-      key.pose.rotation[3] = turned.w;
+      store_quat(key.pose.rotation, load_quat(q) * turn);
     }
     keys.push_back(key);
   }
   return keys;
 }
 
-Motion read_motion(const Node &motion, const dfm_pose &base, const Quaternion &turn) {
+Motion read_motion(const Node &motion, const dfm_pose &base, Quat turn) {
   Motion out;
   motion.object("motion");
   if (!motion.has("keyframes") && !motion.has("sine"))
@@ -148,7 +141,7 @@ Fix read_fix(const Node &entry) {
   fix.where = read_selection(entry);
   fix.axes = read_axes(entry);
   const dfm_pose still = {{0, 0, 0}, {0, 0, 0, 1}};
-  if (entry.has("motion")) fix.motion = read_motion(entry.member("motion"), still, Quaternion{});
+  if (entry.has("motion")) fix.motion = read_motion(entry.member("motion"), still, Quat{});
   return fix;
 }
 
@@ -441,7 +434,7 @@ void read_solid(const Node &node, const std::string &shape, uint32_t &number, do
 
 namespace {
 
-Quaternion read_plane(const Node &node, dfm_obstacle_def &def) {
+Quat read_plane(const Node &node, dfm_obstacle_def &def) {
   double normal[3];
   if (node.has("pose") && node.has("point"))
     node.member("point").fail("a plane is placed by \"point\" or by \"pose\", not by both");
@@ -449,13 +442,8 @@ Quaternion read_plane(const Node &node, dfm_obstacle_def &def) {
   node.vector("normal", normal, 0, 0, 1);
   if (normal[0] == 0 && normal[1] == 0 && normal[2] == 0)
     node.at("normal").fail("the normal of a plane cannot be zero");
-  const Quaternion turn = rotation_to(normal);
-  const double *q = def.pose.rotation;
-  const Quaternion turned = multiply({q[0], q[1], q[2], q[3]}, turn);
-  def.pose.rotation[0] = turned.x;
-  def.pose.rotation[1] = turned.y;
-  def.pose.rotation[2] = turned.z;
-  def.pose.rotation[3] = turned.w;
+  const Quat turn = rotation_to(normal);
+  store_quat(def.pose.rotation, load_quat(def.pose.rotation) * turn);
   return turn;
 }
 
@@ -476,7 +464,7 @@ Obstacle read_obstacle(const Node &node, ReadContext &context) {
     node.member("pose").at("scale").fail("a %s has its own size; \"scale\" is for the shapes mesh and voxels",
                                          shape.c_str());
   o.def.pose = read_pose(node, "obstacle_pose", of_triangles ? &o.scale : nullptr);
-  Quaternion turn;
+  Quat turn;
   if (shape == "plane") {
     o.def.shape = DFM_SHAPE_PLANE;
     turn = read_plane(node, o.def);
@@ -515,7 +503,7 @@ std::vector<Body> read_bodies(const Node &scene, ReadContext &context) {
 }
 
 std::vector<dfm_pose_key> read_keys(const Node &motion, const dfm_pose &base) {
-  return read_keys(motion, base, Quaternion{});
+  return read_keys(motion, base, Quat{});
 }
 
 std::vector<Obstacle> read_obstacles(const Node &scene, ReadContext &context) {

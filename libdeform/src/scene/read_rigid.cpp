@@ -1,6 +1,7 @@
 // "rigid": bodies of a rigid host with their joints.
 #include <algorithm>
 
+#include "math/turn.h"
 #include "scene/read.h"
 
 namespace dfm::scene {
@@ -38,8 +39,7 @@ RigidBody read_rigid_body(const Node &node, ReadContext &context) {
   if (b.def.fixed) start.fail("a fixed body stays where it is; remove \"start\" or \"fixed\"");
   const dfm_pose pose = read_placed(start, b.def.pose);
   dfm_rigid_state state{};
-  std::copy_n(pose.position, 3, state.position);
-  std::copy_n(pose.rotation, 4, state.rotation);
+  store_pose(state, load_pose(pose));
   start.vector("velocity", state.velocity, b.def.velocity[0], b.def.velocity[1], b.def.velocity[2]);
   start.vector("spin", state.spin, b.def.spin[0], b.def.spin[1], b.def.spin[2]);
   b.start = state;

@@ -48,14 +48,9 @@ void sine_cosine_deg(double degrees, double *s, double *c) {
   }
 }
 
-Quaternion unit(Quaternion q) {
-  const double n = std::sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w);
-  return {q.x / n, q.y / n, q.z / n, q.w / n};
-}
-
 }  // namespace
 
-Quaternion rotation(const double axis[3], double angle_deg) {
+Quat rotation(const double axis[3], double angle_deg) {
   double s, c;
   sine_cosine_deg(angle_deg / 2, &s, &c);
   // Scaled first: the square of a tiny or huge axis would leave the range of double.
@@ -67,7 +62,7 @@ Quaternion rotation(const double axis[3], double angle_deg) {
   return {s * x / n, s * y / n, s * z / n, c};
 }
 
-Quaternion rotation_to(const double direction[3]) {
+Quat rotation_to(const double direction[3]) {
   const double scale =
       std::fmax(std::fabs(direction[0]), std::fmax(std::fabs(direction[1]), std::fabs(direction[2])));
   double d[3] = {direction[0] / scale, direction[1] / scale, direction[2] / scale};
@@ -79,12 +74,7 @@ Quaternion rotation_to(const double direction[3]) {
   return unit({-d[1], d[0], 0, d[2] < 0 ? across / (1 - d[2]) : 1 + d[2]});
 }
 
-Quaternion multiply(const Quaternion &a, const Quaternion &b) {
-  return {a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y, a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x,
-          a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w, a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z};
-}
-
-void rotate(const Quaternion &q, const double v[3], double out[3]) {
+void rotate(Quat q, const double v[3], double out[3]) {
   const double u[3] = {q.y * v[2] - q.z * v[1] + q.w * v[0], q.z * v[0] - q.x * v[2] + q.w * v[1],
                        q.x * v[1] - q.y * v[0] + q.w * v[2]};
   const double r[3] = {v[0] + 2 * (q.y * u[2] - q.z * u[1]), v[1] + 2 * (q.z * u[0] - q.x * u[2]),

@@ -1,16 +1,15 @@
-// Unit quaternions (x, y, z, w) of a scene: from an axis and an angle in degrees, and the few products that
-// placing needs.
+// Rotations of a scene, from an axis and an angle in degrees or from a direction.
 #pragma once
-namespace dfm::scene {
+#include "math/turn.h"
 
-struct Quaternion { double x = 0, y = 0, z = 0, w = 1; };
+namespace dfm::scene {
 
 // axis need not be unit, but not zero. Multiples of 90 degrees come out to the last bit, and the same on
 // every machine: libm's sine is not used, since its last bit depends on the processor and the start state
 // decides the state hash.
-Quaternion rotation(const double axis[3], double angle_deg);
-Quaternion rotation_to(const double direction[3]);  // the shortest turn of (0,0,1) onto a direction
-Quaternion multiply(const Quaternion &a, const Quaternion &b);
-void rotate(const Quaternion &q, const double v[3], double out[3]);
+Quat rotation(const double axis[3], double angle_deg);
+Quat rotation_to(const double direction[3]);  // the shortest turn of (0,0,1) onto a direction
+// Start states have the rounding of this order of operations, which is not that of dfm::rotate.
+void rotate(Quat q, const double v[3], double out[3]);
 
 }  // namespace dfm::scene

@@ -13,7 +13,7 @@ namespace dfm::scene {
 std::vector<double> start_positions(const Start &start, const BodyMesh &mesh, const dfm_pose &pose) {
   std::vector<double> x(mesh.points);
   Jitter random(start.seed);
-  const Quaternion turn{pose.rotation[0], pose.rotation[1], pose.rotation[2], pose.rotation[3]};
+  const Quat turn = load_quat(pose.rotation);
   for (size_t i = 0; i < x.size(); i += 3) {
     for (size_t k = 0; k < 3; ++k) {
       const double center = (mesh.lo[k] + mesh.hi[k]) / 2, half = (mesh.hi[k] - mesh.lo[k]) / 2;

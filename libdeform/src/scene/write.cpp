@@ -41,6 +41,10 @@ Written pose_of(const dfm_pose &pose) {
   return out;
 }
 
+Written key_of(const dfm_pose_key &k) {
+  return {{"t", k.t}, {"position", vector_of(k.pose.position)}, {"rotation", rotation_of(k.pose.rotation)}};
+}
+
 bool moves(const dfm_sine &s) { return s.amplitude[0] != 0 || s.amplitude[1] != 0 || s.amplitude[2] != 0; }
 
 Written sine_of(const dfm_sine &s, bool scalar) {

@@ -68,6 +68,7 @@ Written vector_of(const double *v);
 inline Written vector_of(Vec3 v) { return {v.x, v.y, v.z}; }
 Written rotation_of(const double *q);   // x y z w
 Written pose_of(const dfm_pose &pose);  // null: at the origin, not turned
+Written key_of(const dfm_pose_key &key);
 Written sine_of(const dfm_sine &sine, bool scalar);
 bool moves(const dfm_sine &sine);
 // Parameters by key, those that are not at the table's default.

@@ -208,17 +208,14 @@ void write_switches(SceneWriter &to, const Body &b, Written &out) {
 // ---- present state ----------------------------------------------------------------------------------------
 
 Vec3 made_at(const Body &b, uint32_t point) {
-  const Quat &q = b.origin.frame.rotation;
-  const double turn[4] = {q.x, q.y, q.z, q.w};
-  return place({b.origin.frame.position, unit_quat(turn)}, load3(&b.p.rest[3 * size_t{point}]));
+  dfm_pose frame{};
+  store_pose(frame, b.origin.frame);
+  return place(to_pose(frame), load3(&b.p.rest[3 * size_t{point}]));
 }
 
 void write_state(SceneWriter &to, const Body &b, Written &out) {
-  const Pose &frame = b.origin.frame;
   dfm_pose pose{};
-  store3(pose.position, frame.position);
-  const double turn[4] = {frame.rotation.x, frame.rotation.y, frame.rotation.z, frame.rotation.w};
-  std::copy_n(turn, 4, pose.rotation);
+  store_pose(pose, b.origin.frame);
   if (Written made = pose_of(pose); !made.is_null()) out["pose"] = std::move(made);
   bool rests = true;
   for (uint32_t i = 0; i < b.p.n && rests; ++i) {
@@ -277,13 +274,7 @@ void write_held(SceneWriter &to, const Body &b, Written &out) {
   write_fix(b, still, nullptr, out);
   for (const HeldMotion &m : b.motions) {
     Written motion;
-    for (const dfm_pose_key &k : m.keys) {
-      Written key;
-      key["t"] = k.t;
-      key["position"] = vector_of(k.pose.position);
-      key["rotation"] = rotation_of(k.pose.rotation);
-      motion["keyframes"].push_back(std::move(key));
-    }
+    for (const dfm_pose_key &k : m.keys) motion["keyframes"].push_back(key_of(k));
     if (moves(m.sine) || m.keys.empty()) motion["sine"] = sine_of(m.sine, false);
     write_fix(b, m.points, motion, out);
     double away = 0;

@@ -8,9 +8,7 @@ namespace {
 
 void write_place(const CutShape &s, Written &out) {
   dfm_pose pose{};
-  store3(pose.position, s.position);
-  const double q[] = {s.rotation.x, s.rotation.y, s.rotation.z, s.rotation.w};
-  std::copy_n(q, 4, pose.rotation);
+  store_pose(pose, {s.position, s.rotation});
   if (Written w = pose_of(pose); !w.is_null()) out["pose"] = std::move(w);
 }
 

@@ -41,23 +41,9 @@ void write_triangles(SceneWriter &to, const Obstacle &o, Written &out) {
   if (o.def.shape == DFM_SHAPE_VOXELS && o.def.cells) out["cells"] = o.def.cells;
 }
 
-dfm_pose pose_now(const Pose &p) {
-  dfm_pose out{};
-  store3(out.position, p.position);
-  const double q[4] = {p.rotation.x, p.rotation.y, p.rotation.z, p.rotation.w};
-  std::copy_n(q, 4, out.rotation);
-  return out;
-}
-
 void write_motion(const Obstacle &o, Written &out) {
   Written motion;
-  for (const dfm_pose_key &k : o.keys) {
-    Written key;
-    key["t"] = k.t;
-    key["position"] = vector_of(k.pose.position);
-    key["rotation"] = rotation_of(k.pose.rotation);
-    motion["keyframes"].push_back(std::move(key));
-  }
+  for (const dfm_pose_key &k : o.keys) motion["keyframes"].push_back(key_of(k));
   if (moves(o.def.sine)) motion["sine"] = sine_of(o.def.sine, false);
   out["motion"] = std::move(motion);
 }
@@ -76,7 +62,8 @@ Written write_obstacle(SceneWriter &to, const Obstacle &o) {
   if (o.moves()) {
     write_motion(o, out);
   } else if (const Pose made = to_pose(o.def.pose); !same_bits(&made, &o.pose, sizeof made)) {
-    const dfm_pose now = pose_now(o.pose);
+    dfm_pose now{};
+    store_pose(now, o.pose);
     out["start"] = {{"position", vector_of(now.position)}, {"rotation", rotation_of(now.rotation)}};
   }
   if (o.has_target)

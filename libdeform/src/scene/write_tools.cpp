@@ -31,14 +31,6 @@ double degrees_of(double radians) {
   return near;
 }
 
-dfm_pose standing(const ToolPlace &p) {
-  dfm_pose out{};
-  store3(out.position, p.position);
-  const double q[] = {p.rotation.x, p.rotation.y, p.rotation.z, p.rotation.w};
-  std::copy_n(q, 4, out.rotation);
-  return out;
-}
-
 void write_sizes(SceneWriter &to, const Tool &t, Written &out) {
   const dfm_tool_def &d = t.def;
   out["shape"] = shape_word(d.shape);
@@ -59,14 +51,12 @@ void write_sizes(SceneWriter &to, const Tool &t, Written &out) {
 
 void write_motion(const Tool &t, const ToolValues &v, Written &out) {
   // keys go on from where they are; without keys the tool does not move
-  const ToolPlace now = t.motion.coupled() ? load_place(v.device) : place_of(t.set->state[0]);
-  if (const Written pose = pose_of(v.keyed != 0 ? t.def.pose : standing(now)); !pose.is_null())
-    out["pose"] = pose;
+  dfm_pose at = t.def.pose;
+  if (v.keyed == 0) store_pose(at, t.motion.coupled() ? load_place(v.device) : load_pose(t.set->state[0]));
+  if (const Written pose = pose_of(at); !pose.is_null()) out["pose"] = pose;
   if (v.keyed == 0) return;
   Written &keys = out["motion"]["keyframes"] = Written::array();
-  for (const dfm_pose_key &k : t.keys)
-    keys.push_back(
-        {{"t", k.t}, {"position", vector_of(k.pose.position)}, {"rotation", rotation_of(k.pose.rotation)}});
+  for (const dfm_pose_key &k : t.keys) keys.push_back(key_of(k));
 }
 
 void write_opening(const Tool &t, const ToolValues &v, Written &out) {

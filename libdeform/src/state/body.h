@@ -92,7 +92,32 @@ struct Squeezed {
   bool told = false;
 };
 
-struct Body {
+// Points and cells of a body, and what depends on them. A cut exchanges it for another (world/body_shape.h).
+struct Discretization {
+  Phyxels p;
+  Array<uint32_t> tets, edges;
+  Array<uint32_t> inner;  // [n,2] cells on both sides of inner faces; empty: no blade has come near yet
+  Surface surface;
+  SurfaceZones zones;
+  CutRecord cut;
+  // a new number after each cut: what is derived from points, cells or surface is out of date
+  uint64_t shape = 0;
+  Array<double> share;           // [ntet] how much of each cell is material; empty: all
+  Array<double> surfel_impulse;  // [nsurfel,3] N s of the last sub-step
+  Array<double> anchor;          // [n,4] m, positions at the start of its calm; empty if sleep is off
+  Makeup makeup;
+  double mass = 0, rest_volume = 0;
+  std::vector<Load> loads;
+  std::vector<Spring> springs;
+  std::vector<HeldMotion> motions;
+  // instances for future changes; they keep what they computed from the mesh
+  std::vector<SpareModel> spares;
+  std::vector<BladeTrack> blades;       // of the last cuts
+  std::unique_ptr<SearchTree> search;   // rays and closest points
+  std::unique_ptr<SelfRest> self_rest;  // made with a cut; null: made when it is needed
+};
+
+struct Body : Discretization {
   World *world = nullptr;
   uint64_t id = 0, handle = 0;
   uint32_t slot = 0;
@@ -102,49 +127,31 @@ struct Body {
   bool tears = false;   // a material of its cells tears at a limited strain
   void *user = nullptr;
 
-  Phyxels p;
   uint64_t x_version = 1;  // increases whenever p.x may have changed
-  Array<uint32_t> tets, edges;
-  Array<uint32_t> inner;  // [n,2] cells on both sides of inner faces; empty: no blade has come near yet
   uint32_t ncell() const { return static_cast<uint32_t>(tets.size() / 4); }
-  Surface surface;
-  SurfaceZones zones;
-  CutRecord cut;
-  // a new number after each cut: what is derived from points, cells or surface is out of date
-  uint64_t shape = 0;
   bool emptied = false;    // a cut has removed all cells; the body is in World::emptied
   uint64_t piece_of = 0;   // id of the body, made by the host, of which this one is a piece; 0: none
   std::string whole_name;  // name of that body; its rules of friction and contact apply to this piece too
   bool undone = false;     // a piece that a restore has removed; it is in World::undone
   SeparateRule separate;
   std::vector<PlannedCut> planned_cuts;  // by time
-  std::vector<BladeTrack> blades;        // of the last cuts
   CutsAhead ahead;
   int32_t coupling = kNoCoupling;  // DFM_COUPLING_* of a surface of its own
   double support = 0;              // of that coupling, as in the def
   ModelInstance model;
   std::unique_ptr<Dynamics> dynamics;  // how it moves
   Integrator integrator;
-  Makeup makeup;
   ModelOrigin origin;
   Withheld withheld;
   std::vector<Switch> switches;  // future changes, by time
   std::vector<SwitchRule> rule;  // one or none
-  // instances for future changes; they keep what they computed from the mesh
-  std::vector<SpareModel> spares;
-  uint64_t first_model = 0;  // hash of the model's inputs when the world took its first step
-  double mass = 0, rest_volume = 0;
-  Array<double> share;  // [ntet] how much of each cell is material; empty: all
+  uint64_t first_model = 0;      // hash of the model's inputs when the world took its first step
   std::vector<CellField> fields;
   std::vector<Unused> unused;
-  std::vector<Load> loads;
-  std::vector<Spring> springs;
-  std::vector<HeldMotion> motions;
   uint32_t next_load = 1;  // number of the next load or spring
   Vec3 contact_impulse;    // N s since creation
   EnergyBook energy;
   ChangeBook changes;
-  Array<double> surfel_impulse;  // [nsurfel,3] N s of the last sub-step
   // [n,4] values that the contact method keeps for each point; empty if it keeps none
   Array<double> method_values;
   // as last computed; valid while asleep
@@ -156,10 +163,6 @@ struct Body {
   } bound;
   Squeezed squeezed;
   Slumber slumber;
-  // [n,4] m, positions at the start of its calm; empty if sleep is off
-  Array<double> anchor;
-  std::unique_ptr<SearchTree> search;   // rays and closest points
-  std::unique_ptr<SelfRest> self_rest;  // made with a cut; null: made when it is needed
   // until prepare() has seen it: the surface before the last cut, and where its features are now
   std::unique_ptr<FormerSurface> former_surface;
 

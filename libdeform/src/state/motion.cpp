@@ -41,10 +41,8 @@ bool all_finite(const double *p, int n) {
 
 }  // namespace
 
-Pose to_pose(const dfm_pose &p) { return {load3(p.position), unit_quat(p.rotation)}; }
-
 Vec3 spin_between(Quat a, Quat b, double h) {
-  Quat d = b * Quat{-a.x, -a.y, -a.z, a.w};
+  Quat d = b * conjugate(a);
   if (d.w < 0) d = {-d.x, -d.y, -d.z, -d.w};
   // Half-angle by five halvings, then sin x = x to rounding order: angle = 2 * 2^5 * 2 asin(...) ~ series.
   const Quat one{};

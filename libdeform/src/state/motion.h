@@ -2,17 +2,9 @@
 #pragma once
 #include <vector>
 
-#include "deform/math.h"
-#include "math/vec3.h"
+#include "math/turn.h"
 
 namespace dfm {
-
-struct Pose {
-  Vec3 position;
-  Quat rotation;
-};
-Pose to_pose(const dfm_pose &p);
-inline Vec3 place(const Pose &pose, Vec3 x) { return rotate(pose.rotation, x) + pose.position; }
 
 // Keys at rising times, joined linearly (rotations by slerp along the shorter arc); constant before the first
 // and after the last.

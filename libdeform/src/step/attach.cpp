@@ -109,11 +109,7 @@ Vec3 place_velocity(const Obstacle &o, Vec3 x, const StepContext &step) {
   return load3(v) + cross(load3(v + 3), arm) + (0.5 * step.h) * second + (step.h * step.h / 6) * third;
 }
 
-Pose attached_frame(const Obstacle &o) {
-  if (!o.rigid) return o.pose;
-  const dfm_rigid_state &s = o.rigid->state[o.rigid_body];
-  return {load3(s.position), {s.rotation[0], s.rotation[1], s.rotation[2], s.rotation[3]}};
-}
+Pose attached_frame(const Obstacle &o) { return o.rigid ? load_pose(o.rigid->state[o.rigid_body]) : o.pose; }
 
 Vec3 attached_place(const World &w, const Attachment &a, size_t i) {
   if (a.obstacle)

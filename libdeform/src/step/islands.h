@@ -1,28 +1,20 @@
 // Islands: sets of things that touch each other, directly or through others. Sleep, and other decisions for
 // groups of touching bodies, depend on all members of an island and on nothing outside. Built on demand.
 #pragma once
-#include <cstdint>
-
-#include "core/memory.h"
+#include "core/disjoint_sets.h"
 
 namespace dfm {
 
 // Things are numbers 0..n-1 (body slots, then other kinds if needed). Call start(), join() any pairs,
-// finish(); then the columns are valid. Order is that of the lowest number in each island, whatever the order
-// of the pairs.
-struct Islands {
+// finish(); then the columns are valid, and `of` has the island of each thing. Order is that of the lowest
+// number in each island, whatever the order of the pairs.
+struct Islands : DisjointSets {
   uint32_t count = 0;
-  Array<uint32_t> of;             // [n] island of each thing
   Array<uint32_t> begin, member;  // [count+1], [n] things by island, ascending
 
   explicit Islands(const Memory &memory);
   void reserve(uint32_t n);  // start() with as many allocates nothing
-  void start(uint32_t n);
-  void join(uint32_t a, uint32_t b);
   void finish();
-
- private:
-  uint32_t root(uint32_t a);
 };
 
 }  // namespace dfm

@@ -18,10 +18,6 @@
 namespace dfm {
 namespace {
 
-Quat rotation_of(const dfm_rigid_state &s) {
-  return {s.rotation[0], s.rotation[1], s.rotation[2], s.rotation[3]};
-}
-
 // said: sentences() before the call of the host. Includes the host's reason if it has given one.
 bool host_failed(const World &w, const RigidSet &set, const HostFault &fault, uint64_t said,
                  uint32_t *trouble) {
@@ -65,14 +61,13 @@ Obstacle &rigid_obstacle(World &w, uint64_t id) {
 }
 
 Pose shape_pose(const Obstacle &o, const dfm_rigid_state &s) {
-  const Pose body{load3(s.position), rotation_of(s)};
-  return o.added ? Pose{place(body, o.local.position), body.rotation * o.local.rotation} : body;
+  return o.added ? load_pose(s) * o.local : load_pose(s);
 }
 
 // Mean velocity of a shape's origin for this motion of its body, as ObstacleView::velocity_at.
 Vec3 shape_velocity(const Obstacle &o, const dfm_rigid_state &start, Vec3 velocity, Vec3 spin, double h) {
   if (!o.added) return velocity;
-  const Vec3 arm = rotate(rotation_of(start), o.local.position), turn = load3(start.spin);
+  const Vec3 arm = rotate(load_quat(start.rotation), o.local.position), turn = load3(start.spin);
   const Vec3 first = cross(turn, arm), second = cross(turn, first), third = cross(turn, second);
   return velocity + cross(spin, arm) + (0.5 * h) * second + (h * h / 6) * third;
 }
@@ -272,7 +267,8 @@ dfm_body_measure measure_rigid(const RigidSet &set, uint32_t i) {
   m.size = sizeof m;
   m.mass = d.mass;
   m.volume = m.rest_volume = solid_volume(d);
-  const Vec3 v = load3(s.velocity), w = load3(s.spin), L = in_axes(rotation_of(s), load3(d.inertia), w);
+  const Vec3 v = load3(s.velocity), w = load3(s.spin),
+             L = in_axes(load_quat(s.rotation), load3(d.inertia), w);
   store3(m.com, load3(s.position));
   store3(m.velocity, v);
   store3(m.momentum, d.mass * v);
@@ -296,11 +292,7 @@ void set_rigid_state(Obstacle &o, const dfm_rigid_state &given) {
   check_place(*o.world, "rigid body", o.name.c_str(), largest_coordinate(given.position, 1, 3));
   dfm_rigid_state &s = set.state[o.rigid_body];
   s = given;
-  const Quat q = unit_quat(given.rotation);
-  s.rotation[0] = q.x;
-  s.rotation[1] = q.y;
-  s.rotation[2] = q.z;
-  s.rotation[3] = q.w;
+  store_quat(s.rotation, unit_quat(given.rotation));
   for (auto &shape : o.world->obstacles)
     if (shape->rigid == &set && shape->rigid_body == o.rigid_body) shape->pose = shape_pose(*shape, s);
   ++o.world->placements;

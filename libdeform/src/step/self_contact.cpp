@@ -16,6 +16,7 @@
 
 #include "body/make_surface.h"
 #include "ccd/toi_guard_motion.h"
+#include "core/disjoint_sets.h"
 #include "geometry/pierce.h"
 #include "plugin/registry.h"
 #include "state/world.h"
@@ -62,11 +63,6 @@ SelfBody *self_body(StepContext &step, uint32_t slot) {
 
 using Corners = std::array<uint32_t, 3>;
 
-uint32_t root(Array<uint32_t> &parent, uint32_t i) {
-  while (parent[i] != i) i = parent[i] = parent[parent[i]];
-  return i;
-}
-
 // OpenedSurface::side. twin [ntri]: the triangle on the other side of the open face, or kNone.
 // Where two open faces meet at an edge that they have not split, four triangles do: around the edge one ends
 // where the next begins, and no face meets its own other side.
@@ -75,8 +71,7 @@ void find_sides(const Surface &s, const Array<uint32_t> &twin, Array<uint32_t> &
   for (uint32_t h = 0; h < 3 * s.ntri; ++h)
     if (twin[h / 3] != kNone) of_edge.push_back({s.tri_edge[h], h});
   std::sort(of_edge.begin(), of_edge.end());
-  Array<uint32_t> parent(s.ntri, 0u, side.get_allocator());
-  for (uint32_t t = 0; t < s.ntri; ++t) parent[t] = t;
+  DisjointSets sides(*side.get_allocator().memory, s.ntri);
   const auto forward = [&](uint32_t h) { return s.tri[h] < s.tri[h - h % 3 + (h + 1) % 3]; };
   for (size_t i = 0, j = 0; i < of_edge.size(); i = j) {
     for (j = i; j < of_edge.size() && of_edge[j].first == of_edge[i].first;) ++j;
@@ -84,14 +79,12 @@ void find_sides(const Surface &s, const Array<uint32_t> &twin, Array<uint32_t> &
     for (size_t k = i; k < j; ++k)
       for (size_t l = i; l < k; ++l) {
         const uint32_t a = of_edge[k].second, b = of_edge[l].second;
-        if (forward(a) == forward(b) || twin[a / 3] == b / 3) continue;
-        const uint32_t ra = root(parent, a / 3), rb = root(parent, b / 3);
-        parent[std::max(ra, rb)] = std::min(ra, rb);
+        if (forward(a) != forward(b) && twin[a / 3] != b / 3) sides.join(a / 3, b / 3);
       }
   }
   side.assign(s.ntri, kNone);
   for (uint32_t t = 0; t < s.ntri; ++t)
-    if (twin[t] != kNone) side[t] = root(parent, t);
+    if (twin[t] != kNone) side[t] = sides.root(t);
 }
 
 // OpenedSurface::copies.

@@ -10,9 +10,6 @@ namespace {
 
 constexpr double kJaw = 1e4;  // N/m, of a jaw at its tip
 
-Quat rotation_of(const dfm_rigid_state &s) {
-  return {s.rotation[0], s.rotation[1], s.rotation[2], s.rotation[3]};
-}
 void add(Vec3 p, double *to) { store3(to, load3(to) + p); }
 
 }  // namespace
@@ -20,7 +17,7 @@ void add(Vec3 p, double *to) { store3(to, load3(to) + p); }
 // The hinge is the origin of part 0, about its y.
 void ToolTouch::list_jaws(Moved &m) const {
   const dfm_rigid_state &frame = m.set->state[0];
-  const Vec3 axis = rotate(rotation_of(frame), {0, 1, 0});
+  const Vec3 axis = rotate(load_quat(frame.rotation), {0, 1, 0});
   for (uint32_t i = 1; i < m.set->defs.size(); ++i) {
     const Vec3 arm = load3(m.set->state[i].position) - load3(frame.position);
     const double length = 2 * m.set->defs[i].half_size[2];
@@ -39,9 +36,9 @@ void ToolTouch::straighten(Moved &m) const {
     double *const v = &m.free[6 * size_t{jaw.part}];
     const Vec3 spin = load3(&m.free[3]), arm = load3(m.set->state[jaw.part].position) - load3(frame.position);
     // about the hinge, as seen from the frame
-    const Quat own = rotation_of(m.set->state[jaw.part]), to = turned(own, h_ * load3(v + 3));
-    const Quat seen = conjugate(turned(rotation_of(frame), h_ * spin)) * to,
-               before = conjugate(rotation_of(frame)) * own;
+    const Quat own = load_quat(m.set->state[jaw.part].rotation), to = turned(own, h_ * load3(v + 3));
+    const Quat seen = conjugate(turned(load_quat(frame.rotation), h_ * spin)) * to,
+               before = conjugate(load_quat(frame.rotation)) * own;
     const double rate = (1 / h_) * rotation_vector(seen * conjugate(before)).y;
     const Vec3 carried = m.responds ? h_ * cross(spin, arm) : rotate(turned(Quat{}, h_ * spin), arm) - arm;
     store3(v, load3(&m.free[0]) + (1 / h_) * carried + rate * jaw.lever);
@@ -56,14 +53,12 @@ void ToolTouch::turn_jaws() {
       if (jaw.moment == 0) continue;
       const dfm_rigid_state &frame = m.set->next[0];
       dfm_rigid_state &s = m.set->next[jaw.part];
-      const Vec3 axis = rotate(rotation_of(frame), {0, 1, 0});
+      const Vec3 axis = rotate(load_quat(frame.rotation), {0, 1, 0});
       const double rate = jaw.give * jaw.moment;
       const Quat by = turned(Quat{}, h_ * rate * axis);
       const Vec3 arm = load3(s.position) - load3(frame.position), now = rotate(by, arm);
       store3(s.position, load3(frame.position) + now);
-      const Quat q = by * rotation_of(s);
-      const double values[] = {q.x, q.y, q.z, q.w};
-      std::copy(values, values + 4, s.rotation);
+      store_quat(s.rotation, by * load_quat(s.rotation));
       add((1 / h_) * (now - arm), s.velocity);
       add(rate * axis, s.spin);
     }

@@ -70,10 +70,9 @@ bool ToolTouch::belong_together(const World &w, const Obstacle &a, const Obstacl
   if (!one_group && !at_still) return false;
   const auto created = [&](const Obstacle &o) {
     ObstacleView v = w.steps->obstacle_views[o.slot];
-    const dfm_pose &p = set.defs[o.rigid_body].pose;
-    const Pose body{load3(p.position), unit_quat(p.rotation)};
-    v.position = o.added ? place(body, o.local.position) : body.position;
-    v.rotation = o.added ? body.rotation * o.local.rotation : body.rotation;
+    const Pose body = to_pose(set.defs[o.rigid_body].pose), own = o.added ? body * o.local : body;
+    v.position = own.position;
+    v.rotation = own.rotation;
     return v;
   };
   const ObstacleView va = created(a), vb = created(b);
@@ -117,10 +116,8 @@ double ToolTouch::answer_without_joints(const Side &side, Vec3 along) const {
   const Moved &m = sides_[side.tool];
   if (!m.set || m.set->of_tool || !gives_way(*m.set, side.part)) return 0;
   const dfm_rigid_def &d = m.set->defs[side.part];
-  const dfm_rigid_state &s = m.set->state[side.part];
   const Vec3 turn = cross(side.arm, along), inverse{1 / d.inertia[0], 1 / d.inertia[1], 1 / d.inertia[2]};
-  const Quat q{s.rotation[0], s.rotation[1], s.rotation[2], s.rotation[3]};
-  return 1 / d.mass + dot(turn, in_axes(q, inverse, turn));
+  return 1 / d.mass + dot(turn, in_axes(load_quat(m.set->state[side.part].rotation), inverse, turn));
 }
 
 bool ToolTouch::jointed(const Side &side) const {
@@ -151,8 +148,7 @@ bool ToolTouch::is_driven(const Side &side, Vec3 along) const {
     if (!j.motor || set.group[body] != set.group[side.part]) return false;
     const dfm_pose &was = set.defs[body].pose;
     const dfm_rigid_state &s = set.state[body];
-    const Quat turn =
-        Quat{s.rotation[0], s.rotation[1], s.rotation[2], s.rotation[3]} * conjugate(unit_quat(was.rotation));
+    const Quat turn = load_quat(s.rotation) * conjugate(unit_quat(was.rotation));
     const Vec3 axis = rotate(turn, normalized(load3(j.axis)));
     if (j.type == DFM_JOINT_SLIDER) return std::fabs(dot(axis, along)) > kDriven;
     const Vec3 arm = at - load3(s.position) - rotate(turn, load3(j.anchor) - load3(was.position));

@@ -45,7 +45,6 @@ std::array<uint32_t, 2> ToolTouch::movers_of(const Side &side) {
     fresh.tool = side.tool;
     fresh.group = group;
     fresh.jaw = jaw;
-    fresh.island = static_cast<uint32_t>(motions_.size());
     fresh.size = jaw == kNone ? 6 : 1;
     if (jaw == kNone && m.jointed[group]) {
       find_basis(m, group);
@@ -58,8 +57,9 @@ std::array<uint32_t, 2> ToolTouch::movers_of(const Side &side) {
       fresh.center = load3(m.set->state[first].position);
       fresh.part = first;
     }
+    islands_.of.push_back(static_cast<uint32_t>(motions_.size()));
     motions_.push_back(fresh);
-    return fresh.island;
+    return islands_.of.back();
   };
   const uint32_t g = m.set ? m.set->group[side.part] : DFM_RIGID_STILL;
   if (m.responds && g != DFM_RIGID_STILL && m.first[g] != kNone) out[0] = find(g, kNone);
@@ -68,14 +68,10 @@ std::array<uint32_t, 2> ToolTouch::movers_of(const Side &side) {
   return out;
 }
 
-uint32_t ToolTouch::island_of(uint32_t motion) {
-  while (motions_[motion].island != motion) motion = motions_[motion].island;
-  return motion;
-}
-
 // How the places of the rows move with what moves them.
 void ToolTouch::list_motions() {
   motions_.clear();
+  islands_.start(0);
   levers_.clear();
   lever_values_.clear();
   first_lever_.clear();
@@ -109,10 +105,8 @@ void ToolTouch::list_motions() {
             to[0] = sign * (dot(jaw.lever, axes[k]) + dot(jaw.axis, cross(side->arm, axes[k])));
           }
         }
-        const uint32_t root = island_of(mover);
-        if (joined == kNone) joined = root;
-        motions_[std::max(joined, root)].island = std::min(joined, root);
-        joined = std::min(joined, root);
+        if (joined == kNone) joined = mover;
+        islands_.join(joined, mover);
       }
     }
   }
@@ -133,7 +127,7 @@ void ToolTouch::order_motions(uint32_t island) {
   std::vector<uint32_t> &order = newton_.order;
   order.clear();
   for (uint32_t i = 0; i < motions_.size(); ++i)
-    if (island_of(i) == island) {
+    if (islands_.root(i) == island) {
       motions_[i].at = order.size();
       order.push_back(i);
     }
@@ -144,7 +138,7 @@ void ToolTouch::order_motions(uint32_t island) {
     for (uint32_t i = first_lever_[r]; i < first_lever_[r + 1]; ++i)
       for (uint32_t j = first_lever_[r]; j < first_lever_[r + 1]; ++j) {
         const uint32_t a = levers_[i].motion, b = levers_[j].motion;
-        if (island_of(a) == island) joined[motions_[a].at * n + motions_[b].at] = 1;
+        if (islands_.root(a) == island) joined[motions_[a].at * n + motions_[b].at] = 1;
       }
   for (size_t done = 0; done < n; ++done) {
     size_t best = done, fewest = n + 1;
@@ -191,7 +185,7 @@ bool ToolTouch::number_unknowns(uint32_t island) {
 // M: of a free thing the inverse of its response, of a jaw one over what it gives. False: not invertible.
 bool ToolTouch::set_masses(uint32_t island) {
   for (const Motion &m : motions_) {
-    if (island_of(static_cast<uint32_t>(&m - motions_.data())) != island) continue;
+    if (islands_.root(static_cast<uint32_t>(&m - motions_.data())) != island) continue;
     const Moved &side = sides_[m.tool];
     if (m.jaw != kNone) {
       newton_.mass[6 * m.at] = 1 / side.jaws[m.jaw].give;
@@ -219,7 +213,7 @@ bool ToolTouch::set_masses(uint32_t island) {
 void ToolTouch::start_rows(uint32_t island) {
   newton_.rows.clear();
   for (uint32_t i = 0; i < rows_.size(); ++i) {
-    if (first_lever_[i + 1] == first_lever_[i] || island_of(levers_[first_lever_[i]].motion) != island)
+    if (first_lever_[i + 1] == first_lever_[i] || islands_.root(levers_[first_lever_[i]].motion) != island)
       continue;
     const Row &row = rows_[i];
     NewtonRow l{};
@@ -555,11 +549,12 @@ void ToolTouch::leap(double done) {
   list_motions();
   bool any = false;
   for (uint32_t i = 0; i < motions_.size(); ++i)
-    if (island_of(i) == i) any |= newton(i, done);
+    if (islands_.root(i) == i) any |= newton(i, done);
   if (!any) return;
   push_all();
   for (uint32_t i = 0; i < rows_.size(); ++i)
-    if (first_lever_[i + 1] > first_lever_[i] && motions_[island_of(levers_[first_lever_[i]].motion)].solved)
+    if (first_lever_[i + 1] > first_lever_[i] &&
+        motions_[islands_.root(levers_[first_lever_[i]].motion)].solved)
       follow_arc(rows_[i]);
 }
 

@@ -62,9 +62,6 @@ bool without_corners(const Obstacle &o) { return o.def.shape == DFM_SHAPE_PLANE 
 
 PairSide names_of(const Obstacle &o) { return {o.name, o.zone.group, o.zone.material}; }
 
-Quat rotation_of(const dfm_rigid_state &s) {
-  return {s.rotation[0], s.rotation[1], s.rotation[2], s.rotation[3]};
-}
 // The normal of two edges, from q to p, if both edges are left along it. It follows from the two directions
 // alone, so it stays the same for edges that have passed each other.
 bool between(const ToolShape::Edge &p, const ToolShape::Edge &q, Vec3 apart, Vec3 &n) {
@@ -104,7 +101,7 @@ bool passes(const Obstacle &a, const Obstacle &b) {
 
 }  // namespace
 
-ToolTouch::ToolTouch(const Memory &m) : batches_(m), next_(m), next_report_(m) {
+ToolTouch::ToolTouch(const Memory &m) : islands_(m), batches_(m), next_(m), next_report_(m) {
   use_memory(m, start_, tangents_, match_, points_, response_, best_);
   state_.use(m);
 }
@@ -283,7 +280,7 @@ double ToolTouch::follow_spin() {
         add(change, &m.turn[at - 3]);
         most = std::max(most, norm(change));
       }
-      const Quat turned = rotation_of(m.set->next[i]) * conjugate(rotation_of(m.set->state[i]));
+      const Quat turned = load_quat(m.set->next[i].rotation) * conjugate(load_quat(m.set->state[i].rotation));
       const Vec3 taken = load3(&m.base[at]) + load3(&m.change[at]);
       const Vec3 change = (1 / h_) * nearest_turn(rotation_vector(turned), h_ * taken) - taken;
       add(change, &m.base[at]);

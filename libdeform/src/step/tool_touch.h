@@ -30,6 +30,7 @@
 
 #include "contact/contact_set.h"
 #include "contact/store.h"
+#include "core/disjoint_sets.h"
 #include "friction/laws.h"
 #include "math/vec3.h"
 #include "state/rigid_report.h"
@@ -199,7 +200,7 @@ class ToolTouch {
   // tool_newton.cpp
   struct Motion {
     size_t tool, at, size;  // at: first of its unknowns
-    uint32_t group, jaw, part, island;
+    uint32_t group, jaw, part;
     Vec3 center;
     bool solved;   // of an island
     bool jointed;  // its unknowns are those of the basis of its group
@@ -220,7 +221,6 @@ class ToolTouch {
     return &lever_values_[lever.values + (3 + c) * motions_[lever.motion].size];
   }
   std::array<uint32_t, 2> movers_of(const Side &side);
-  uint32_t island_of(uint32_t motion);
   void list_motions();
   std::array<double, 2> rub_at(uint32_t i, double yields, const double last[3], double normal, double u1,
                                double u2) const;
@@ -326,6 +326,7 @@ class ToolTouch {
   std::vector<Row> rows_;
   std::vector<Hit> hits_;
   std::vector<Motion> motions_;
+  DisjointSets islands_;  // of motions that rows connect
   std::vector<Lever> levers_;
   std::vector<double> lever_values_;
   std::vector<uint32_t> first_lever_;  // [rows+1]

@@ -18,15 +18,10 @@ namespace {
 constexpr double kSteep = 10;
 constexpr double kForgiven = 1;  // s
 
-Pose pose_of(const ToolPlace &p) { return {p.position, p.rotation}; }
-
 // Of the step that begins: where it leads, by keys or by what was said.
 ToolValues aimed(const Tool &tool, double end) {
   ToolValues v = tool.values();
-  if (v.keyed != 0) {
-    const Pose p = pose_at(tool.keys, end);
-    store_place(v.target, {p.position, p.rotation});
-  }
+  if (v.keyed != 0) store_place(v.target, pose_at(tool.keys, end));
   if (v.opening_keyed != 0) v.target_opening = scale_at(tool.opening_keys, end);
   return v;
 }
@@ -35,8 +30,8 @@ ToolValues aimed(const Tool &tool, double end) {
 struct ToolForce { Vec3 force, torque; };
 struct Way { Vec3 path, turn; };
 Way way_of(const Tool &tool, const ToolValues &v) {
-  const ToolPlace from = tool.motion.coupled() ? load_place(v.device) : place_of(tool.set->state[0]);
-  const ToolPlace to = load_place(v.target);
+  const Pose from = tool.motion.coupled() ? load_place(v.device) : load_pose(tool.set->state[0]);
+  const Pose to = load_place(v.target);
   return {to.position - from.position, rotation_vector(to.rotation * conjugate(from.rotation))};
 }
 
@@ -70,9 +65,8 @@ void check_tool_ways(const World &w, double dt) {
     const ToolValues v = aimed(*t, w.time + dt);
     for (auto &o : w.obstacles) {
       if (o->rigid != t->set) continue;
-      const ToolPlace end =
-          part_place(t->motion.parts[o->rigid_body], load_place(v.target), v.target_opening);
-      check_way(w, *o, pose_of(place_of(t->set->state[o->rigid_body])), pose_of(end), dt);
+      const Pose end = part_place(t->motion.parts[o->rigid_body], load_place(v.target), v.target_opening);
+      check_way(w, *o, load_pose(t->set->state[o->rigid_body]), end, dt);
     }
   }
 }
@@ -99,7 +93,7 @@ void begin_tools(World &w, double dt) {
     v.goal = w.time + dt;
     v.time = 0;
     std::fill(v.contact, v.contact + 6, 0.0);
-    store3(v.about, place_of(t->set->state[0]).position);
+    store3(v.about, load_pose(t->set->state[0]).position);
     std::fill(v.coupling, v.coupling + 6, 0.0);
     t->store(v);
   }

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 
+#include "core/disjoint_sets.h"
 #include "core/error.h"
 #include "plugin/context.h"
 #include "state/spring.h"
@@ -32,8 +32,8 @@ struct Way {
 
 class Untangler {
  public:
-  explicit Untangler(World &w) : w_(w), sides_(w), shift_(w.bodies.size()), group_(w.bodies.size()) {
-    std::iota(group_.begin(), group_.end(), 0u);
+  explicit Untangler(World &w)
+      : w_(w), sides_(w), shift_(w.bodies.size()), groups_(w.memory(), uint32_t(w.bodies.size())) {
     for (auto &b : w.bodies) {
       const bool held = std::any_of(b->p.held.begin(), b->p.held.end(), [](uint8_t h) { return h != 0; });
       // what is attached to it would draw it back to where it was
@@ -90,11 +90,6 @@ class Untangler {
     return out;
   }
 
-  uint32_t root(uint32_t i) const {
-    while (group_[i] != i) i = group_[i];
-    return i;
-  }
-
   void shift(uint32_t i, Vec3 by) {
     if (norm2(by) == 0) return;
     shift_[i] += by;
@@ -111,7 +106,7 @@ class Untangler {
     if (!p.obstacle) {
       const double ma = w_.bodies[p.a]->mass, mb = w_.bodies[p.b]->mass;
       share = !movable_[p.a] ? 0 : !movable_[p.b] ? 1 : mb / (ma + mb);
-      group_[root(std::max(root(p.a), root(p.b)))] = std::min(root(p.a), root(p.b));
+      groups_.join(p.a, p.b);
     }
     shift(p.a, (share * way.length) * way.direction);
     if (!p.obstacle) shift(p.b, ((share - 1) * way.length) * way.direction);
@@ -198,11 +193,11 @@ class Untangler {
   void put_back(const std::vector<OverlapPair> &pairs) {
     std::vector<uint8_t> stuck(w_.bodies.size(), 0);
     for (const OverlapPair &p : pairs) {
-      stuck[root(p.a)] = 1;
-      if (!p.obstacle) stuck[root(p.b)] = 1;
+      stuck[groups_.root(p.a)] = 1;
+      if (!p.obstacle) stuck[groups_.root(p.b)] = 1;
     }
     for (uint32_t i = 0; i < w_.bodies.size(); ++i)
-      if (stuck[root(i)]) {
+      if (stuck[groups_.root(i)]) {
         sides_.body(i).shift(-shift_[i]);
         shift_[i] = {};
       }
@@ -249,7 +244,7 @@ class Untangler {
   OverlapSides sides_;
   std::vector<uint8_t> movable_;
   std::vector<Vec3> shift_;
-  std::vector<uint32_t> group_;  // bodies that have had to do with each other, as a forest
+  DisjointSets groups_;  // bodies that have had to do with each other
   double clearance_ = 0;
 };
 

@@ -132,27 +132,7 @@ std::unique_ptr<BodyShape> put(Body &b, std::unique_ptr<BodyShape> shape, Finish
 }  // namespace
 
 void exchange(Body &b, BodyShape &other) noexcept {
-  std::swap(b.p, other.p);
-  b.tets.swap(other.tets);
-  b.edges.swap(other.edges);
-  b.inner.swap(other.inner);
-  std::swap(b.surface, other.surface);
-  std::swap(b.zones, other.zones);
-  std::swap(b.cut, other.cut);
-  std::swap(b.shape, other.shape);
-  b.share.swap(other.share);
-  b.surfel_impulse.swap(other.surfel_impulse);
-  b.anchor.swap(other.anchor);
-  std::swap(b.makeup, other.makeup);
-  std::swap(b.mass, other.mass);
-  std::swap(b.rest_volume, other.rest_volume);
-  b.loads.swap(other.loads);
-  b.springs.swap(other.springs);
-  b.motions.swap(other.motions);
-  b.spares.swap(other.spares);
-  b.blades.swap(other.blades);
-  b.search.swap(other.search);
-  b.self_rest.swap(other.self_rest);
+  std::swap<Discretization>(b, other);
   exchange(b, other.model);
   ++b.x_version;
 }

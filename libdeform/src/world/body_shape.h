@@ -1,5 +1,5 @@
-// All data of a body that depend on its set of points and cells. A cut, and a restore across a cut, make a
-// new shape and exchange it with that of the body, so that a cut is complete or has no effect.
+// A cut, and a restore across a cut, make a new shape and exchange it with that of the body, so that a cut is
+// complete or has no effect.
 #pragma once
 #include "body/feature_map.h"
 #include "body/self_rest.h"
@@ -10,25 +10,7 @@
 
 namespace dfm {
 
-struct BodyShape {
-  Phyxels p;
-  Array<uint32_t> tets, edges, inner;
-  Surface surface;
-  SurfaceZones zones;
-  CutRecord cut;
-  uint64_t shape = 0;
-  Array<double> share, surfel_impulse, anchor;
-  Makeup makeup;
-  double mass = 0, rest_volume = 0;
-  std::vector<Load> loads;
-  std::vector<Spring> springs;
-  std::vector<HeldMotion> motions;
-  std::vector<SpareModel> spares;
-  std::vector<BladeTrack> blades;
-  std::unique_ptr<SearchTree> search;
-  std::unique_ptr<SelfRest> self_rest;
-  BodyModel model;
-};
+struct BodyShape : Discretization { BodyModel model; };
 
 void exchange(Body &b, BodyShape &other) noexcept;
 

@@ -174,9 +174,7 @@ Obstacle &add_rigid_shape(Obstacle &body, const dfm_obstacle_def &def) {
   o.rigid_body = number;
   o.added = true;
   o.local = o.pose;
-  const dfm_rigid_state &s = set.state[number];
-  const Quat q{s.rotation[0], s.rotation[1], s.rotation[2], s.rotation[3]};
-  o.pose = {rotate(q, o.local.position) + load3(s.position), q * o.local.rotation};
+  o.pose = load_pose(set.state[number]) * o.local;
   return o;
 }
 
@@ -191,11 +189,7 @@ void create_rigids(World &w, const char *host, const dfm_rigid_set_def &def, uin
     dfm_rigid_def d = def.bodies[i];
     names.push_back(d.name ? d.name : "rigid" + std::to_string(w.next_id + i));
     check_body(d, names.back().c_str());
-    const Quat q = unit_quat(d.pose.rotation);
-    d.pose.rotation[0] = q.x;
-    d.pose.rotation[1] = q.y;
-    d.pose.rotation[2] = q.z;
-    d.pose.rotation[3] = q.w;
+    store_quat(d.pose.rotation, unit_quat(d.pose.rotation));
     set.defs.push_back(d);
   }
   for (uint32_t i = 0; i < def.nbody; ++i) set.defs[i].name = names[i].c_str();
@@ -225,8 +219,7 @@ void create_rigids(World &w, const char *host, const dfm_rigid_set_def &def, uin
       o.rigid_body = i;
       d.name = o.name.c_str();
       dfm_rigid_state &s = set.state[i];
-      std::copy(d.pose.position, d.pose.position + 3, s.position);
-      std::copy(d.pose.rotation, d.pose.rotation + 4, s.rotation);
+      store_pose(s, load_pose(d.pose));
       std::copy(d.velocity, d.velocity + 3, s.velocity);
       std::copy(d.spin, d.spin + 3, s.spin);
     }

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "core/disjoint_sets.h"
 #include "core/error.h"
 #include "core/handle.h"
 #include "mesh/cut_mesh.h"
@@ -66,21 +67,16 @@ std::vector<Opened> opened_between(const Body &b, const Array<uint32_t> &part) {
 // smallest distance on. What lies in the teeth of a part would otherwise be of another body than they are: it
 // would cross them, and contact of the two whole bodies would be off until they are apart.
 void lead_crumbs(const Body &b, const SeparateRule &rule, size_t heaviest, Parts &parts) {
-  std::vector<uint32_t> set(parts.n);
-  for (uint32_t i = 0; i < parts.n; ++i) set[i] = i;
-  const auto first = [&](uint32_t i) {
-    while (set[i] != i) i = set[i] = set[set[i]];
-    return i;
-  };
+  DisjointSets sets(b.world->memory(), parts.n);
   const auto leads = [&](uint32_t i) { return i == heaviest || parts.cells[i] >= rule.least; };
   for (const Opened &face : opened_between(b, parts.of)) {
-    const uint32_t i = first(face.a), j = first(face.b);
+    const uint32_t i = sets.root(face.a), j = sets.root(face.b);
     if (i == j || (leads(i) && leads(j))) continue;
-    if (leads(i) || (!leads(j) && i < j)) set[j] = i;
-    else set[i] = j;
+    if (leads(i) || (!leads(j) && i < j)) sets.of[j] = i;
+    else sets.of[i] = j;
   }
   for (uint32_t i = 0; i < parts.n; ++i)
-    if (leads(first(i))) parts.to[i] = parts.to[first(i)];
+    if (leads(sets.root(i))) parts.to[i] = parts.to[sets.root(i)];
 }
 
 Parts parts_of(const Body &b, const SeparateRule &rule) {

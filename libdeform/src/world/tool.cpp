@@ -126,13 +126,9 @@ std::vector<dfm_rigid_def> parts_of(const dfm_tool_def &d, const std::string &na
     out.push_back(frame);
     out.back().shape = DFM_SHAPE_BOX;
   }
-  const ToolPlace at{load3(d.pose.position), unit_quat(d.pose.rotation)};
+  const Pose at = to_pose(d.pose);
   for (size_t i = 0; i < out.size(); ++i) {
-    const ToolPlace part = part_place(motion.parts[i], at, d.opening);
-    store3(out[i].pose.position, part.position);
-    const Quat q = part.rotation;
-    const double rotation[] = {q.x, q.y, q.z, q.w};
-    std::copy(rotation, rotation + 4, out[i].pose.rotation);
+    store_pose(out[i].pose, part_place(motion.parts[i], at, d.opening));
     out[i].name = names[i].c_str();
   }
   return out;
@@ -174,7 +170,7 @@ void add_shapes(const dfm_tool_def &d, const std::string &name, Obstacle &frame)
   add_rigid_shape(frame, shape);
 }
 
-void start_at(Tool &t, const ToolPlace &place) {
+void start_at(Tool &t, const Pose &place) {
   ToolValues v = t.values();
   store_place(v.device, place);
   store_place(v.target, place);
@@ -205,12 +201,7 @@ Tool &create_tool(World &w, const dfm_tool_def &def) {
   check_keys(t.keys, name);
   check_keys(t.opening_keys, name);
   for (const dfm_scale_key &k : t.opening_keys) check_opening(k.value, name);
-  if (!t.keys.empty()) {
-    const Pose p = pose_at(t.keys, w.time);
-    store3(t.def.pose.position, p.position);
-    const double rotation[] = {p.rotation.x, p.rotation.y, p.rotation.z, p.rotation.w};
-    std::copy(rotation, rotation + 4, t.def.pose.rotation);
-  }
+  if (!t.keys.empty()) store_pose(t.def.pose, pose_at(t.keys, w.time));
   if (!t.opening_keys.empty()) t.def.opening = scale_at(t.opening_keys, w.time);
   t.motion.stiffness = def.stiffness;
   t.motion.damping = def.damping;
@@ -235,7 +226,7 @@ Tool &create_tool(World &w, const dfm_tool_def &def) {
     destroy_rigids(*t.set);
     throw;
   }
-  start_at(t, {load3(t.def.pose.position), unit_quat(t.def.pose.rotation)});
+  start_at(t, to_pose(t.def.pose));
   ToolValues v = t.values();
   v.opening = v.target_opening = t.def.opening;
   v.keyed = t.keys.empty() ? 0 : 1;
@@ -263,7 +254,7 @@ void set_tool_pose(Tool &t, const dfm_pose &pose, const double *velocity) {
   if (velocity && !finite(velocity, 6))
     fail(DFM_E_ARG, "tool '%s': the given velocity is not finite", t.name.c_str());
   ToolValues v = t.values();
-  store_place(v.target, {load3(pose.position), unit_quat(pose.rotation)});
+  store_place(v.target, to_pose(pose));
   v.keyed = 0;
   v.measured = velocity ? kToolMeasuredNext : 0;
   if (velocity) std::copy(velocity, velocity + 6, v.target_velocity);
@@ -305,32 +296,21 @@ void keys_at(const Tool &t, double time, dfm_pose &pose, double &opening) {
   if (!std::isfinite(time))
     fail(DFM_E_ARG, "tool '%s': the time at which its keys are asked for is not finite", t.name.c_str());
   const ToolValues v = t.values();
-  ToolPlace place = load_place(v.target);
-  if (!t.keys.empty()) {
-    const Pose p = pose_at(t.keys, time);
-    place = {p.position, p.rotation};
-  }
-  double values[7];
-  store_place(values, place);
-  std::copy(values, values + 3, pose.position);
-  std::copy(values + 3, values + 7, pose.rotation);
+  store_pose(pose, t.keys.empty() ? load_place(v.target) : pose_at(t.keys, time));
   opening = t.opening_keys.empty() ? v.target_opening : scale_at(t.opening_keys, time);
 }
 
 void teleport_tool(Tool &t, const dfm_pose &pose) {
   checked(t, pose);
   World &w = *t.world;
-  const ToolPlace place{load3(pose.position), unit_quat(pose.rotation)};
+  const Pose place = to_pose(pose);
   start_at(t, place);
   ToolValues v = t.values();
   v.keyed = 0;
   t.store(v);
   for (size_t i = 0; i < t.motion.parts.size(); ++i) {
-    const ToolPlace part = part_place(t.motion.parts[i], place, v.opening);
     dfm_rigid_state s{};
-    store3(s.position, part.position);
-    const double rotation[] = {part.rotation.x, part.rotation.y, part.rotation.z, part.rotation.w};
-    std::copy(rotation, rotation + 4, s.rotation);
+    store_pose(s, part_place(t.motion.parts[i], place, v.opening));
     set_rigid_state(rigid_obstacle(w, t.set->obstacle[i]), s);
   }
   for (auto &o : w.obstacles)
@@ -344,15 +324,11 @@ dfm_tool_state tool_state(const Tool &t) {
   dfm_tool_state out{};
   out.size = sizeof out;
   out.nkeys = v.keyed != 0;
-  std::copy(s.position, s.position + 3, out.pose.position);
-  std::copy(s.rotation, s.rotation + 4, out.pose.rotation);
+  store_pose(out.pose, load_pose(s));
   std::copy(s.velocity, s.velocity + 3, out.velocity);
   std::copy(s.spin, s.spin + 3, out.spin);
   out.device = out.pose;
-  if (t.motion.coupled()) {
-    std::copy(v.device, v.device + 3, out.device.position);
-    std::copy(v.device + 3, v.device + 7, out.device.rotation);
-  }
+  if (t.motion.coupled()) store_pose(out.device, load_place(v.device));
   out.opening = v.opening;
   out.time = v.time;
   out.work = v.work;
@@ -362,7 +338,7 @@ dfm_tool_state tool_state(const Tool &t) {
 
 void tool_force(const Tool &t, double force[3], double torque[3]) {
   const ToolValues v = t.values();
-  const ToolPlace now = place_of(t.set->state[0]);
+  const Pose now = load_pose(t.set->state[0]);
   const double per = v.time > 0 ? 1 / v.time : 0;
   const Vec3 p = per * load3(v.contact);
   const Vec3 moment = per * load3(v.contact + 3) - cross(now.position - load3(v.about), p);
@@ -374,7 +350,7 @@ void tool_force(const Tool &t, double force[3], double torque[3]) {
 // the translation and of the rotation are two separate couplings without lever arm.
 void tool_feedback(const Tool &t, double force[3], double torque[3]) {
   const ToolValues v = t.values();
-  const Quat frame = t.motion.coupled() ? load_place(v.device).rotation : place_of(t.set->state[0]).rotation;
+  const Quat frame = t.motion.coupled() ? load_place(v.device).rotation : load_pose(t.set->state[0]).rotation;
   store3(force, rotate_back(frame, load3(v.given)));
   store3(torque, rotate_back(frame, load3(v.given + 3)));
 }

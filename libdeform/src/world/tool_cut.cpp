@@ -59,7 +59,7 @@ struct Edge {
   Vec3 forward[2];
   Edge(const Tool &t, size_t part) {
     const Plate plate = plate_of(t, part);
-    const ToolPlace places[2] = {t.cuts.from[part], place_of(t.set->state[part])};
+    const Pose places[2] = {t.cuts.from[part], load_pose(t.set->state[part])};
     for (size_t i = 0; i < 2; ++i) {
       const auto at = [&](Vec3 x) { return places[i].position + rotate(places[i].rotation, x); };
       for (size_t k = 0; k < 2; ++k) blade.corner[i ? 3 - k : k] = at(plate.edge[k]);
@@ -92,7 +92,7 @@ class Opening {
   }
   // After they have opened: the tool owes it at the points that these corners have now, as much at each. What
   // is due at a point within the body would have to wait, so those at the surface come first.
-  void charge(const Body &b, const ToolPlace &place, BladeTrack &to) const {
+  void charge(const Body &b, const Pose &place, BladeTrack &to) const {
     const auto &surface = b.surface.point;
     for (const Part &part : parts_) {
       std::vector<uint32_t> points, outside;
@@ -130,7 +130,7 @@ class Opening {
 // Points that the edge has been drawn back from are not at it any more, nor are those that it has left by a
 // jump: paying takes an edge one edge length on, and the wait for a point to come to the surface two.
 constexpr double kBack = 2, kJumped = 8;  // median edges
-void forget_far(const Body &b, const Edge &edge, const ToolPlace &place, BladeTrack &track) {
+void forget_far(const Body &b, const Edge &edge, const Pose &place, BladeTrack &track) {
   if (track.dues.empty()) return;
   const Vec3 *const c = edge.blade.corner;
   const Vec3 along = normalized(c[2] - c[3]);
@@ -168,7 +168,7 @@ void split(const Tool &t, Body &b, uint32_t &n) {
     }
     BladeTrack &track = sweep.keep(b);
     track.part = id;
-    const ToolPlace place = place_of(t.set->state[part]);
+    const Pose place = load_pose(t.set->state[part]);
     forget_far(b, edge, place, track);
     opening.charge(b, place, track);
   }
@@ -182,7 +182,7 @@ struct Solid {
 };
 
 // On the way from one place to the next; `at`: where it is within the part.
-Solid solid_of(const Tool &t, const ToolPlace &from, const ToolPlace &to) {
+Solid solid_of(const Tool &t, const Pose &from, const Pose &to) {
   Solid out;
   CutShape &s = out.shape;
   s.rotation = to.rotation;
@@ -211,16 +211,16 @@ Solid solid_of(const Tool &t, const ToolPlace &from, const ToolPlace &to) {
 std::vector<Solid> solids_of(const Tool &t) {
   std::vector<Solid> out;
   for (size_t part = t.first_cutting_part(); part < t.motion.parts.size(); ++part) {
-    const ToolPlace from = t.cuts.from[part], to = place_of(t.set->state[part]);
+    const Pose from = t.cuts.from[part], to = load_pose(t.set->state[part]);
     double places = norm(rotation_vector(to.rotation * conjugate(from.rotation))) / kTurn;
     if (t.def.shape == DFM_TOOL_CAPSULE)
       places = std::max(places, norm(to.position - from.position) / (0.5 * t.def.radius));
     const int n = int(std::clamp(std::ceil(places), 1.0, double(kMostPlaces)));
-    ToolPlace last = from;
+    Pose last = from;
     for (int k = 1; k <= n; ++k) {
       const double share = double(k) / n;
-      const ToolPlace next{from.position + share * (to.position - from.position),
-                           slerp(from.rotation, to.rotation, share)};
+      const Pose next{from.position + share * (to.position - from.position),
+                      slerp(from.rotation, to.rotation, share)};
       out.push_back(solid_of(t, last, next));
       last = next;
     }
@@ -307,7 +307,7 @@ bool cut_by_any(const Body &b) {
 void begin_cuts(World &w) {
   for (auto &t : w.tools)
     for (size_t part = 0; part < t->cuts.from.size(); ++part)
-      t->cuts.from[part] = place_of(t->set->state[part]);
+      t->cuts.from[part] = load_pose(t->set->state[part]);
 }
 
 void cut_by_tools(World &w, double dt) {

@@ -11,6 +11,7 @@
 #include "support.h"
 
 using namespace dfm::scene;
+using dfm::Quat;
 
 namespace {
 
@@ -93,7 +94,7 @@ TEST(Rotation, AnyAngle_AgreesWithTheMathLibrary) {
   const double axis[3] = {0.3, -0.4, 1.2}, n = 1.3;
   constexpr double kHalfTurn = 1e-15;  // the reference rounds an angle of up to pi to 4.4e-16
   for (double angle = -1000; angle < 1000; angle += 7.3) {
-    const Quaternion q = rotation(axis, angle);
+    const Quat q = rotation(axis, angle);
     const double half = std::remainder(angle / 2, 360.0) * M_PI / 180;
     EXPECT_NEAR(q.w, std::cos(half), kHalfTurn) << angle;
     EXPECT_NEAR(q.x, std::sin(half) * axis[0] / n, kHalfTurn) << angle;
@@ -125,7 +126,7 @@ TEST(Jitter, StaysWithinItsBounds_AndFollowsTheSeed) {
     dfm_pose pose = {{1, 2, 3}, {0, 0, 0, 1}};
     double v[3] = {1, -2, 0}, spin[3] = {0, 0, 4};
     jitter.apply(2.0, center, pose, v, spin);
-    const Quaternion q{pose.rotation[0], pose.rotation[1], pose.rotation[2], pose.rotation[3]};
+    const Quat q = dfm::load_quat(pose.rotation);
     double moved[3];
     rotate(q, center, moved);
     for (int k = 0; k < 3; ++k)

@@ -16,6 +16,7 @@
 // State beyond pose and velocity: per joint the motor's speed, its limit and what it did last.
 #include <algorithm>
 
+#include "core/disjoint_sets.h"
 #include "core/error.h"
 #include "dynamics/rigid/host.h"
 #include "dynamics/rigid/joints.h"
@@ -31,10 +32,6 @@ constexpr uint32_t kMostSteps = 12;   // toward joints that are kept
 constexpr double kLeastRate = 1e-11;  // m/s and rad/s: what a joint may move apart at
 constexpr double kFar = 0.25;         // rad in a sub-step, of a body without its joints
 constexpr size_t kMotor = 3;          // values of extra per joint: speed, limit, effort of the last sub-step
-
-Quat rotation_of(const dfm_rigid_state &s) {
-  return {s.rotation[0], s.rotation[1], s.rotation[2], s.rotation[3]};
-}
 
 // What a motor does in a sub-step.
 enum class Drive : uint8_t { off, holds, pushes, pulls };
@@ -118,21 +115,13 @@ Builtin::Builtin(const dfm_rigid_set_def &set, uint32_t *group) {
   for (uint32_t i = 0; i < set.njoint; ++i) joints_.push_back(make_joint(set.joints[i], bodies));
   // Bodies that joints tie together, still ones apart: what hangs on a wall on both of its sides is two
   // groups. The lowest number represents a group.
-  std::vector<uint32_t> root(n);
-  for (uint32_t i = 0; i < n; ++i) root[i] = i;
-  auto find = [&](uint32_t i) {
-    while (root[i] != i) i = root[i];
-    return i;
-  };
+  DisjointSets tied(Memory::standard(), n);
   for (const RigidJoint &j : joints_)
-    if (j.b != DFM_RIGID_WORLD && !bodies[j.a].fixed && !bodies[j.b].fixed) {
-      const uint32_t a = find(j.a), b = find(j.b);
-      root[std::max(a, b)] = std::min(a, b);
-    }
+    if (j.b != DFM_RIGID_WORLD && !bodies[j.a].fixed && !bodies[j.b].fixed) tied.join(j.a, j.b);
   group_.assign(n, DFM_RIGID_STILL);
   for (uint32_t i = 0; i < n; ++i) {
     if (bodies[i].fixed) continue;
-    const uint32_t r = find(i);
+    const uint32_t r = tied.root(i);
     if (r == i) {
       group_[i] = static_cast<uint32_t>(groups_.size());
       groups_.emplace_back();
@@ -153,7 +142,7 @@ Builtin::Builtin(const dfm_rigid_set_def &set, uint32_t *group) {
 void Builtin::free_motion(const dfm_rigid_step &step, const Group &g) {
   for (const uint32_t i : g.parts) {
     const dfm_rigid_state &s = step.state[i];
-    const Quat q = rotation_of(s);
+    const Quat q = load_quat(s.rotation);
     momentum_[i] = in_axes(q, parts_[i].moments, load3(s.spin));
     store3(&free_[6 * size_t{i}], load3(s.velocity) + step.h * load3(step.gravity));
     store3(&free_[6 * size_t{i} + 3], free_spin(q, parts_[i].inverse_moments, momentum_[i], step.h));
@@ -204,8 +193,8 @@ void Builtin::start_from(const dfm_rigid_step &step, const Group &g, const doubl
     add(row.b, row.lb, row.ab);
   }
   for (const uint32_t i : g.parts)
-    store3(&base_[6 * size_t{i} + 3],
-           free_spin(rotation_of(step.state[i]), parts_[i].inverse_moments, base_momentum_[i], step.h));
+    store3(&base_[6 * size_t{i} + 3], free_spin(load_quat(step.state[i].rotation), parts_[i].inverse_moments,
+                                                base_momentum_[i], step.h));
 }
 
 // end_ and end_momentum_ with the rows' impulses x. target_: by how much more their rates must change.
@@ -227,16 +216,12 @@ double Builtin::move_by(const dfm_rigid_step &step, const Group &g, std::span<co
     add(r.b, r.lb, r.ab);
   }
   for (const uint32_t i : g.parts) {
-    const Quat q = rotation_of(step.state[i]);
+    const Quat q = load_quat(step.state[i].rotation);
     const Vec3 w = free_spin(q, parts_[i].inverse_moments, end_momentum_[i], step.h);
     store3(&end_[6 * size_t{i} + 3], w);
     dfm_rigid_state &to = moved_[i];
     store3(to.position, load3(step.state[i].position) + step.h * load3(&end_[6 * size_t{i}]));
-    const Quat turn = turned(q, step.h * w);
-    to.rotation[0] = turn.x;
-    to.rotation[1] = turn.y;
-    to.rotation[2] = turn.z;
-    to.rotation[3] = turn.w;
+    store_quat(to.rotation, turned(q, step.h * w));
   }
   scratch_rows_.clear();
   for (const uint32_t j : g.joints) hold_rows(joints_[j], moved_, scratch_rows_);
@@ -267,7 +252,7 @@ void Builtin::solve(const dfm_rigid_step &step, const Group &g, const double *im
     // without its joints is not linear in them, and ends on joints that are a whole turn off.
     for (const uint32_t i : g.parts)
       store3(&base_[6 * size_t{i} + 3],
-             in_axes(rotation_of(step.state[i]), parts_[i].inverse_moments, base_momentum_[i]));
+             in_axes(load_quat(step.state[i].rotation), parts_[i].inverse_moments, base_momentum_[i]));
   }
   best_.resize(g.rows.size());
   for (size_t k = 0; k < g.rows.size(); ++k)
@@ -368,7 +353,7 @@ void Builtin::respond(const dfm_rigid_step &step, uint32_t group, double *matrix
     e[k] = 1;
     double *const own = &v[6 * size_t{part}];
     if (c % 6 < 3) store3(own, parts_[part].inverse_mass * e);
-    else store3(own + 3, in_axes(rotation_of(step.state[part]), parts_[part].inverse_moments, e));
+    else store3(own + 3, in_axes(load_quat(step.state[part].rotation), parts_[part].inverse_moments, e));
     hold(step, g, v);
     for (size_t r = 0; r < width; ++r) matrix[r * width + c] = v[6 * size_t{g.parts[r / 6]} + r % 6];
   }
@@ -398,11 +383,7 @@ void Builtin::correct(const Group &g, std::span<dfm_rigid_state> state) {
     for (const uint32_t i : g.parts) {
       dfm_rigid_state &s = state[i];
       store3(s.position, load3(s.position) + load3(&shift[6 * size_t{i}]));
-      const Quat q = turned(rotation_of(s), load3(&shift[6 * size_t{i} + 3]));
-      s.rotation[0] = q.x;
-      s.rotation[1] = q.y;
-      s.rotation[2] = q.z;
-      s.rotation[3] = q.w;
+      store_quat(s.rotation, turned(load_quat(s.rotation), load3(&shift[6 * size_t{i} + 3])));
     }
   }
 }
@@ -421,7 +402,7 @@ void Builtin::commit(const dfm_rigid_step &step, const double *impulse, dfm_rigi
       dfm_rigid_state &s = state[i];
       s = moved_[i];
       store3(s.velocity, load3(&end_[6 * size_t{i}]));
-      store3(s.spin, in_axes(rotation_of(s), parts_[i].inverse_moments, end_momentum_[i]));
+      store3(s.spin, in_axes(load_quat(s.rotation), parts_[i].inverse_moments, end_momentum_[i]));
     }
     if (!g.joints.empty()) correct(g, {state, parts_.size()});
   }

@@ -5,18 +5,9 @@
 namespace dfm {
 namespace {
 
-Quat rotation_of(const dfm_rigid_state &s) {
-  return {s.rotation[0], s.rotation[1], s.rotation[2], s.rotation[3]};
-}
-
-// Present position and axes of one side of a joint.
-struct Side {
-  Vec3 center;
-  Quat turn;
-};
-Side side(uint32_t part, std::span<const dfm_rigid_state> state) {
-  if (part == DFM_RIGID_WORLD) return {};
-  return {load3(state[part].position), rotation_of(state[part])};
+// Present pose of one side of a joint.
+Pose side(uint32_t part, std::span<const dfm_rigid_state> state) {
+  return part == DFM_RIGID_WORLD ? Pose{} : load_pose(state[part]);
 }
 
 // share of a row's diagonal that remains after elimination by earlier rows
@@ -38,7 +29,7 @@ JointRow spin_row(const RigidJoint &j, Vec3 t, double error) { return {j.a, j.b,
 // M^-1 J^T of one side.
 void response(Vec3 l, Vec3 a, const RigidPart &part, const dfm_rigid_state &state, Vec3 &dv, Vec3 &dw) {
   dv = part.inverse_mass * l;
-  dw = in_axes(rotation_of(state), part.inverse_moments, a);
+  dw = in_axes(load_quat(state.rotation), part.inverse_moments, a);
 }
 
 }  // namespace
@@ -48,56 +39,53 @@ RigidJoint make_joint(const dfm_joint_def &def, std::span<const dfm_rigid_def> b
   j.type = def.type;
   j.a = def.body;
   j.b = def.with;
-  auto stand = [&](uint32_t part) -> Side {
-    if (part == DFM_RIGID_WORLD) return {};
-    return {load3(bodies[part].pose.position), unit_quat(bodies[part].pose.rotation)};
-  };
-  const Side a = stand(j.a), b = stand(j.b);
+  auto stand = [&](uint32_t part) { return part == DFM_RIGID_WORLD ? Pose{} : to_pose(bodies[part].pose); };
+  const Pose a = stand(j.a), b = stand(j.b);
   const Vec3 anchor = load3(def.anchor), axis = j.can_drive() ? normalized(load3(def.axis)) : Vec3{0, 0, 1};
   const Vec3 side = any_tangent(axis);
-  j.anchor_a = rotate_back(a.turn, anchor - a.center);
-  j.anchor_b = rotate_back(b.turn, anchor - b.center);
-  j.axis_a = rotate_back(a.turn, axis);
-  j.axis_b = rotate_back(b.turn, axis);
-  j.side_b[0] = rotate_back(b.turn, side);
-  j.side_b[1] = rotate_back(b.turn, cross(axis, side));
-  j.turn = conjugate(b.turn) * a.turn;
+  j.anchor_a = rotate_back(a.rotation, anchor - a.position);
+  j.anchor_b = rotate_back(b.rotation, anchor - b.position);
+  j.axis_a = rotate_back(a.rotation, axis);
+  j.axis_b = rotate_back(b.rotation, axis);
+  j.side_b[0] = rotate_back(b.rotation, side);
+  j.side_b[1] = rotate_back(b.rotation, cross(axis, side));
+  j.turn = conjugate(b.rotation) * a.rotation;
   return j;
 }
 
 void hold_rows(const RigidJoint &j, std::span<const dfm_rigid_state> state, std::vector<JointRow> &out) {
-  const Side a = side(j.a, state), b = side(j.b, state);
-  const Vec3 arm_a = rotate(a.turn, j.anchor_a), arm_b = rotate(b.turn, j.anchor_b);
-  const Vec3 apart = a.center + arm_a - (b.center + arm_b);
+  const Pose a = side(j.a, state), b = side(j.b, state);
+  const Vec3 arm_a = rotate(a.rotation, j.anchor_a), arm_b = rotate(b.rotation, j.anchor_b);
+  const Vec3 apart = a.position + arm_a - (b.position + arm_b);
   if (j.type == DFM_JOINT_SLIDER) {
     // Sides and axis belong to b, so the force acts on b where a's anchor is.
     for (const Vec3 &s : j.side_b) {
-      const Vec3 t = rotate(b.turn, s);
+      const Vec3 t = rotate(b.rotation, s);
       out.push_back(point_row(j, arm_a, arm_b + apart, t, dot(apart, t)));
     }
   } else {
     for (int k = 0; k < 3; ++k) out.push_back(point_row(j, arm_a, arm_b, unit_vector(k), apart[k]));
   }
   if (j.type == DFM_JOINT_HINGE) {
-    const Vec3 n = rotate(a.turn, j.axis_a);
+    const Vec3 n = rotate(a.rotation, j.axis_a);
     for (const Vec3 &s : j.side_b) {
-      const Vec3 t = rotate(b.turn, s);
+      const Vec3 t = rotate(b.rotation, s);
       out.push_back(spin_row(j, cross(n, t), dot(n, t)));  // d/dt (n . t) = (w_a - w_b) . (n x t)
     }
   } else if (j.type != DFM_JOINT_BALL) {
-    const Vec3 off = rotation_vector(a.turn * conjugate(b.turn * j.turn));
+    const Vec3 off = rotation_vector(a.rotation * conjugate(b.rotation * j.turn));
     for (int k = 0; k < 3; ++k) out.push_back(spin_row(j, unit_vector(k), off[k]));
   }
 }
 
 JointRow drive_row(const RigidJoint &j, std::span<const dfm_rigid_state> state) {
-  const Side a = side(j.a, state), b = side(j.b, state);
-  const Vec3 axis = rotate(b.turn, j.axis_b);
+  const Pose a = side(j.a, state), b = side(j.b, state);
+  const Vec3 axis = rotate(b.rotation, j.axis_b);
   if (j.type == DFM_JOINT_HINGE)
-    return spin_row(j, axis, dot(rotation_vector(a.turn * conjugate(b.turn * j.turn)), axis));
-  const Vec3 arm_a = rotate(a.turn, j.anchor_a);
-  const Vec3 arm_b = rotate(b.turn, j.anchor_b);
-  const Vec3 apart = a.center + arm_a - (b.center + arm_b);
+    return spin_row(j, axis, dot(rotation_vector(a.rotation * conjugate(b.rotation * j.turn)), axis));
+  const Vec3 arm_a = rotate(a.rotation, j.anchor_a);
+  const Vec3 arm_b = rotate(b.rotation, j.anchor_b);
+  const Vec3 apart = a.position + arm_a - (b.position + arm_b);
   return point_row(j, arm_a, arm_b + apart, axis, dot(apart, axis));
 }
 

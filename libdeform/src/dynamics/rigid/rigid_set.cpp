@@ -10,10 +10,6 @@ namespace {
 
 constexpr size_t kStateValues = sizeof(dfm_rigid_state) / sizeof(double);
 
-Quat rotation_of(const dfm_rigid_state &s) {
-  return {s.rotation[0], s.rotation[1], s.rotation[2], s.rotation[3]};
-}
-
 }  // namespace
 
 void need_memory(dfm_status status) {
@@ -93,12 +89,8 @@ void RigidSet::commit(const SubStep &now, double fraction) {
   for (uint32_t i = 0; fraction < 1 && i < defs.size(); ++i) {
     const dfm_rigid_state &from = state[i];
     dfm_rigid_state &to = next[i];
-    const Quat q = slerp(rotation_of(from), rotation_of(to), fraction);
     store3(to.position, load3(from.position) + fraction * (load3(to.position) - load3(from.position)));
-    to.rotation[0] = q.x;
-    to.rotation[1] = q.y;
-    to.rotation[2] = q.z;
-    to.rotation[3] = q.w;
+    store_quat(to.rotation, slerp(load_quat(from.rotation), load_quat(to.rotation), fraction));
   }
   state.swap(next);
   extra.swap(next_extra);

@@ -42,12 +42,12 @@ class ToolHost {
 
   struct Ways {
     ToolValues values;
-    ToolPlace start, device;  // device: at the end of the sub-step
-    double opening;           // then
+    Pose start, device;  // device: at the end of the sub-step
+    double opening;      // then
   };
   Ways ways(const dfm_rigid_step &step) const;
   Frame move(const dfm_rigid_step &step, const Ways &w, Vec3 p, Vec3 turn) const;
-  ToolPlace end_of(const dfm_rigid_step &step, const Ways &w, const Frame &mean) const;
+  Pose end_of(const dfm_rigid_step &step, const Ways &w, const Frame &mean) const;
   double mobility(double h) const {
     return motion_.coupled() ? 1 / (motion_.mass + h * motion_.damping + h * h * motion_.stiffness) : 0;
   }
@@ -64,9 +64,9 @@ class ToolHost {
 // The remaining motion, of which a sub-step takes its share. A tool that is not coupled starts from its
 // present pose, because the guard may have stopped it early.
 ToolHost::Ways ToolHost::ways(const dfm_rigid_step &step) const {
-  Ways w{tool_values(step.extra), place_of(step.state[0]), {}, 0};
-  const ToolPlace from = motion_.coupled() ? load_place(w.values.device) : w.start;
-  const ToolPlace to = load_place(w.values.target);
+  Ways w{tool_values(step.extra), load_pose(step.state[0]), {}, 0};
+  const Pose from = motion_.coupled() ? load_place(w.values.device) : w.start;
+  const Pose to = load_place(w.values.target);
   const double left = w.values.goal - step.t, share = left > 0 ? step.h / left : 1;
   if (share >= kWhole) {
     w.device = to;
@@ -84,7 +84,7 @@ Frame ToolHost::move(const dfm_rigid_step &step, const Ways &w, Vec3 p, Vec3 tur
   const Vec3 way = w.device.position - w.start.position;
   const Vec3 turned_by = rotation_vector(w.device.rotation * conjugate(w.start.rotation));
   if (!motion_.coupled()) return {(1 / h) * way, (1 / h) * turned_by};
-  const ToolPlace device = load_place(w.values.device);
+  const Pose device = load_place(w.values.device);
   Vec3 velocity = (1 / h) * (w.device.position - device.position);
   Vec3 spin = (1 / h) * rotation_vector(w.device.rotation * conjugate(device.rotation));
   if (w.values.measured == kToolMeasured) {
@@ -98,7 +98,7 @@ Frame ToolHost::move(const dfm_rigid_step &step, const Ways &w, Vec3 p, Vec3 tur
                               h * (motion_.turn_stiffness * turned_by + motion_.turn_damping * spin) + turn)};
 }
 
-ToolPlace ToolHost::end_of(const dfm_rigid_step &step, const Ways &w, const Frame &mean) const {
+Pose ToolHost::end_of(const dfm_rigid_step &step, const Ways &w, const Frame &mean) const {
   if (!motion_.coupled()) return w.device;
   return {w.start.position + step.h * mean.velocity, turned(w.start.rotation, step.h * mean.spin)};
 }
@@ -106,9 +106,9 @@ ToolPlace ToolHost::end_of(const dfm_rigid_step &step, const Ways &w, const Fram
 // Mean velocities of the parts from their end poses: parts that rotate with the frame move along an arc.
 void ToolHost::predict(const dfm_rigid_step &step, double *velocity) const {
   const Ways w = ways(step);
-  const ToolPlace end = end_of(step, w, move(step, w, {}, {}));
+  const Pose end = end_of(step, w, move(step, w, {}, {}));
   for (size_t i = 0; i < motion_.parts.size(); ++i) {
-    const ToolPlace from = place_of(step.state[i]), to = part_place(motion_.parts[i], end, w.opening);
+    const Pose from = load_pose(step.state[i]), to = part_place(motion_.parts[i], end, w.opening);
     store3(velocity + 6 * i, (1 / step.h) * (to.position - from.position));
     store3(velocity + 6 * i + 3, (1 / step.h) * rotation_vector(to.rotation * conjugate(from.rotation)));
   }
@@ -142,9 +142,9 @@ void ToolHost::commit(const dfm_rigid_step &step, const double *impulse, dfm_rig
     turn += load3(impulse + 6 * i + 3) + cross(arm(step, i), q);
   }
   const Frame mean = move(step, w, p, turn);
-  const ToolPlace end = end_of(step, w, mean);
+  const Pose end = end_of(step, w, mean);
   ToolValues v = w.values;
-  const ToolPlace device = motion_.coupled() ? load_place(v.device) : w.start;
+  const Pose device = motion_.coupled() ? load_place(v.device) : w.start;
   const Vec3 way = w.device.position - device.position;
   const Vec3 turned_by = rotation_vector(w.device.rotation * conjugate(device.rotation));
   // The reaction on the tool is the impulse that it received minus the part that moves it; without a coupling
@@ -168,13 +168,9 @@ void ToolHost::commit(const dfm_rigid_step &step, const double *impulse, dfm_rig
   if (late())  // sub-steps do not change them
     std::memcpy(extra + kToolValues, step.extra + kToolValues, kToolPastValues * sizeof(double));
   for (size_t i = 0; i < motion_.parts.size(); ++i) {
-    const ToolPlace from = place_of(step.state[i]), to = part_place(motion_.parts[i], end, w.opening);
+    const Pose from = load_pose(step.state[i]), to = part_place(motion_.parts[i], end, w.opening);
     dfm_rigid_state &s = state[i];
-    store3(s.position, to.position);
-    s.rotation[0] = to.rotation.x;
-    s.rotation[1] = to.rotation.y;
-    s.rotation[2] = to.rotation.z;
-    s.rotation[3] = to.rotation.w;
+    store_pose(s, to);
     store3(s.velocity, (1 / step.h) * (to.position - from.position));
     store3(s.spin, (1 / step.h) * rotation_vector(to.rotation * conjugate(from.rotation)));
   }
@@ -223,21 +219,15 @@ ToolValues tool_values(const double *extra) {
 }
 void store_values(const ToolValues &v, double *extra) { std::memcpy(extra, &v, sizeof v); }
 
-ToolPlace load_place(const double *p) { return {load3(p), {p[3], p[4], p[5], p[6]}}; }
-void store_place(double *p, const ToolPlace &place) {
+Pose load_place(const double *p) { return {load3(p), load_quat(p + 3)}; }
+void store_place(double *p, const Pose &place) {
   store3(p, place.position);
-  p[3] = place.rotation.x;
-  p[4] = place.rotation.y;
-  p[5] = place.rotation.z;
-  p[6] = place.rotation.w;
+  store_quat(p + 3, place.rotation);
 }
-ToolPlace place_of(const dfm_rigid_state &s) {
-  return {load3(s.position), {s.rotation[0], s.rotation[1], s.rotation[2], s.rotation[3]}};
-}
-ToolPlace part_place(const ToolMotion::Part &part, const ToolPlace &tool, double opening) {
-  Quat rotation = tool.rotation;
-  if (part.turns != 0) rotation = rotation * turned(Quat{}, {0, part.turns * opening, 0});
-  return {tool.position + rotate(rotation, part.at.position), rotation * part.at.rotation};
+Pose part_place(const ToolMotion::Part &part, const Pose &tool, double opening) {
+  Pose frame = tool;
+  if (part.turns != 0) frame.rotation = frame.rotation * turned(Quat{}, {0, part.turns * opening, 0});
+  return frame * part.at;
 }
 
 const dfm_rigid_host &tool_host() {

@@ -4,22 +4,17 @@
 #include <vector>
 
 #include "deform/rigid.h"
-#include "math/vec3.h"
+#include "math/turn.h"
 
 namespace dfm {
 
 // Reserved name: no other host may use it, and dfm_rigid_create does not accept it.
 inline constexpr char kToolHost[] = "tools";
 
-struct ToolPlace {
-  Vec3 position;
-  Quat rotation;
-};
-
 // The constant data of a tool.
 struct ToolMotion {
   struct Part {
-    ToolPlace at;  // in the tool's frame, at opening 0
+    Pose at;       // in the tool's frame, at opening 0
     double turns;  // about y through the origin, in openings: jaws +-1/2
   };
   std::vector<Part> parts;
@@ -63,11 +58,10 @@ inline constexpr size_t kToolPastValues = kToolPast * sizeof(ToolGiven) / sizeof
 ToolValues tool_values(const double *extra);
 void store_values(const ToolValues &values, double *extra);
 
-ToolPlace load_place(const double *p);  // m and quaternion
-void store_place(double *p, const ToolPlace &place);
-ToolPlace place_of(const dfm_rigid_state &state);
+Pose load_place(const double *p);  // m and quaternion
+void store_place(double *p, const Pose &place);
 // The place of a part for this pose of the tool's frame and this opening.
-ToolPlace part_place(const ToolMotion::Part &part, const ToolPlace &tool, double opening);
+Pose part_place(const ToolMotion::Part &part, const Pose &tool, double opening);
 
 const dfm_rigid_host &tool_host();  // its create takes a ToolMotion as the set's data
 
