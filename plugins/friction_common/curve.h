@@ -3,7 +3,22 @@
 #pragma once
 #include "lanes.h"
 
+// A law with this curve begins with these parameters; check() is their rule.
+#define CURVE_ROWS                                                                                    \
+  dfm::plugin::param("mu_C", "kinetic friction coefficient", "1", 0, 100, 0.5, DFM_PARAM_RUNTIME),    \
+      dfm::plugin::param("mu_S", "static friction coefficient", "1", 0, 100, 0.5, DFM_PARAM_RUNTIME), \
+      dfm::plugin::param("v_s", "Stribeck speed", "m/s", 1e-9, 1e3, 0.01,                             \
+                         DFM_PARAM_RUNTIME | DFM_PARAM_LOG_SCALE),                                    \
+      dfm::plugin::param("delta", "Stribeck exponent", "1", 0.1, 10, 2, DFM_PARAM_RUNTIME)
+
 namespace lanes {
+
+inline dfm_status check(const double *p, char *why, size_t cap) {
+  if (p[1] >= p[0]) return DFM_OK;
+  std::snprintf(why, cap, "mu_S (%g) must not be below mu_C (%g); give both, or \"mu\" for mu_C = mu_S", p[1],
+                p[0]);
+  return DFM_E_ARG;
+}
 
 // dfm_pow for a base in (0, 1e300) and an exponent in [0.1, 10]: the same operations without its branches, so
 // the same bits in every lane.

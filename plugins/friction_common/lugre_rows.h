@@ -10,11 +10,7 @@ enum { kMuC, kMuS, kVs, kDelta, kSigma0, kSigma1, kForm, kVd, kSigma2, kShared }
 constexpr const char *kForms[] = {"passive", "constant", "falling", nullptr};
 
 #define LUGRE_ROWS                                                                                           \
-  dfm::plugin::param("mu_C", "kinetic friction coefficient", "1", 0, 100, 0.5, DFM_PARAM_RUNTIME),           \
-      dfm::plugin::param("mu_S", "static friction coefficient", "1", 0, 100, 0.5, DFM_PARAM_RUNTIME),        \
-      dfm::plugin::param("v_s", "Stribeck speed", "m/s", 1e-9, 1e3, 0.01,                                    \
-                         DFM_PARAM_RUNTIME | DFM_PARAM_LOG_SCALE),                                           \
-      dfm::plugin::param("delta", "Stribeck exponent", "1", 0.1, 10, 2, DFM_PARAM_RUNTIME),                  \
+  CURVE_ROWS,                                                                                                \
       dfm::plugin::param("sigma0", "bristle stiffness per area", "N/m^3", 1, 1e15, 1e8,                      \
                          DFM_PARAM_RUNTIME | DFM_PARAM_LOG_SCALE),                                           \
       dfm::plugin::param("sigma1", "bristle damping per area", "N s/m^3", 0, 1e12, 1e5, DFM_PARAM_RUNTIME),  \
@@ -27,13 +23,6 @@ constexpr const char *kForms[] = {"passive", "constant", "falling", nullptr};
 inline bristle::Batch batch(const double *p) {
   return {0,      p[kMuC],   p[kMuS], p[kVs], p[kDelta], p[kSigma0], p[kSigma1], static_cast<int>(p[kForm]),
           p[kVd], p[kSigma2]};
-}
-
-inline dfm_status check(const double *p, char *why, size_t cap) {
-  if (p[kMuS] >= p[kMuC]) return DFM_OK;
-  std::snprintf(why, cap, "mu_S (%g) must not be below mu_C (%g); give both, or \"mu\" for mu_C = mu_S",
-                p[kMuS], p[kMuC]);
-  return DFM_E_ARG;
 }
 
 constexpr int32_t kWarning = 2;  // DFM_LOG_WARNING of base.h, which plugins do not include

@@ -20,11 +20,7 @@ namespace stribeck {
 
 enum { kMuC, kMuS, kVs, kDelta, kSigma2, kShared };  // every law of the family begins with these parameters
 constexpr dfm_param kRows[kShared] = {
-    dfm::plugin::param("mu_C", "kinetic friction coefficient", "1", 0, 100, 0.5, DFM_PARAM_RUNTIME),
-    dfm::plugin::param("mu_S", "static friction coefficient", "1", 0, 100, 0.5, DFM_PARAM_RUNTIME),
-    dfm::plugin::param("v_s", "Stribeck speed", "m/s", 1e-9, 1e3, 0.01,
-                       DFM_PARAM_RUNTIME | DFM_PARAM_LOG_SCALE),
-    dfm::plugin::param("delta", "Stribeck exponent", "1", 0.1, 10, 2, DFM_PARAM_RUNTIME),
+    CURVE_ROWS,
     dfm::plugin::param("sigma2", "viscous friction per area", "N s/m^3", 0, 1e12, 0, DFM_PARAM_RUNTIME),
 };
 
@@ -227,18 +223,11 @@ struct Run {
   }
 };
 
-inline dfm_status check(const double *p, char *why, size_t cap) {
-  if (p[kMuS] >= p[kMuC]) return DFM_OK;
-  std::snprintf(why, cap, "mu_S (%g) must not be below mu_C (%g); give both, or \"mu\" for mu_C = mu_S",
-                p[kMuS], p[kMuC]);
-  return DFM_E_ARG;
-}
-
 constexpr uint32_t kNeeds = DFM_NEED_FN | DFM_NEED_VT | DFM_NEED_FT_STOP | DFM_NEED_AREA;
 constexpr uint32_t kFlags = DFM_FRIC_SET_VALUED | DFM_FRIC_ISOTROPIC | DFM_FRIC_PASSIVE | DFM_FRIC_JACOBIAN;
 
 constexpr dfm_friction ops(dfm::plugin::Eval eval) {
-  dfm_friction f = dfm::plugin::friction(kNeeds, kFlags, eval, check);
+  dfm_friction f = dfm::plugin::friction(kNeeds, kFlags, eval, lanes::check);
   f.without = without::level<kMuC, kMuS, kSigma2>;
   return f;
 }

@@ -245,7 +245,7 @@ struct Elastoplastic : bristle::Run<Elastoplastic> {
     }
     return true;
   }
-  static constexpr auto check = lugre::check;
+  static constexpr auto check = lanes::check;
   // The flow is 1 + (rho - 1)^i beyond the cone, which a falling level leaves at rho = mu_S/mu_C: with i > 1
   // that is more than LuGre's rho above 2.
   static dfm_status prepare(const dfm_host *host, const double *params, void **data) {

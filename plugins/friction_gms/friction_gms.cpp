@@ -35,11 +35,7 @@ using lanes::within;
 constexpr uint32_t kMost = 16, kUsual = 4;  // elements
 enum { kMuC, kMuS, kVs, kDelta, kSigma2, kC, kK, kNu = kK + kMost };
 constexpr dfm_param kRows[] = {
-    dfm::plugin::param("mu_C", "kinetic friction coefficient", "1", 0, 100, 0.5, DFM_PARAM_RUNTIME),
-    dfm::plugin::param("mu_S", "static friction coefficient", "1", 0, 100, 0.5, DFM_PARAM_RUNTIME),
-    dfm::plugin::param("v_s", "Stribeck speed", "m/s", 1e-9, 1e3, 0.01,
-                       DFM_PARAM_RUNTIME | DFM_PARAM_LOG_SCALE),
-    dfm::plugin::param("delta", "Stribeck exponent", "1", 0.1, 10, 2, DFM_PARAM_RUNTIME),
+    CURVE_ROWS,
     dfm::plugin::param("sigma2", "viscous friction per area", "N s/m^3", 0, 1e12, 0, DFM_PARAM_RUNTIME),
     dfm::plugin::param("C", "rate at which slipping elements approach their level, per area", "N/(s m^2)", 0,
                        1e15, 1e5, DFM_PARAM_RUNTIME),
@@ -308,11 +304,7 @@ struct Gms {
 dfm_status check(const double *p, char *why, size_t cap) {
   const double *const k = p + kK, *const nu = p + kNu;
   const uint32_t nk = given(k), nnu = given(nu), n = elements(p);
-  if (p[kMuS] < p[kMuC]) {
-    std::snprintf(why, cap, "mu_S (%g) must not be below mu_C (%g); give both, or \"mu\" for mu_C = mu_S",
-                  p[kMuS], p[kMuC]);
-    return DFM_E_ARG;
-  }
+  if (const dfm_status s = lanes::check(p, why, cap); s != DFM_OK) return s;
   if (nk > 0 && nnu > 0 && nk != nnu) {
     std::snprintf(why, cap,
                   "k has %u value%s and nu has %u (zeros at the end do not count); give as many of each, one "

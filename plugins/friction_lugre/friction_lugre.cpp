@@ -16,7 +16,7 @@ struct Lugre : bristle::Run<Lugre> {
   DEFORM_PASS static bristle::Batch batch(const double *p) { return lugre::batch(p); }
   static constexpr bool kFlat = false;
   DEFORM_PASS static bool flow(const double *, const bristle::Batch &, bristle::Block &) { return false; }
-  static constexpr auto check = lugre::check;
+  static constexpr auto check = lanes::check;
   static constexpr auto prepare = lugre::prepare;
   static constexpr auto release = lugre::release;
 };

@@ -14,8 +14,11 @@ template <class T>
 class Buffer {
  public:
   Buffer() = default;
-  Buffer(const Buffer &) = delete;
-  Buffer &operator=(const Buffer &) = delete;
+  Buffer(Buffer &&other) noexcept { swap(other); }
+  Buffer &operator=(Buffer &&other) noexcept {
+    swap(other);
+    return *this;
+  }
   ~Buffer() { drop(); }
   void drop() {
     if (data_) host_->release(host_->ctx, data_, size_ * sizeof(T), 64);
@@ -24,6 +27,10 @@ class Buffer {
   void create(const dfm_host *host, size_t n) {
     create_raw(host, n);
     std::memset(static_cast<void *>(data_), 0, size_ * sizeof(T));
+  }
+  void create_copy(const dfm_host *host, const T *from, size_t n) {
+    create(host, n);
+    if (n) std::memcpy(data_, from, n * sizeof(T));
   }
   // Not cleared.
   void create_raw(const dfm_host *host, size_t n) {

@@ -28,19 +28,16 @@ void Body::take_mesh(const dfm_mesh &m) {
   npoint = m.npoint;
   ncell = m.ncell;
   nedge = m.nedge;
-  mass.create(host, npoint);
+  mass.create_copy(host, m.mass, npoint);
   weight.create(host, npoint);
   rest_rows.create(host, npoint);
   damp_rows.create(host, npoint);
   volume.create(host, ncell);
-  cells.create(host, 4 * size_t(ncell));
-  edges.create(host, 2 * size_t(nedge));
+  cells.create_copy(host, m.cells, 4 * size_t(ncell));
+  edges.create_copy(host, m.edges, 2 * size_t(nedge));
   height_inverse.create(host, 4 * size_t(ncell));
   twist_share.create(host, 4 * size_t(ncell));
   place_of.create(host, ncell);
-  std::copy(m.mass, m.mass + npoint, mass.data());
-  std::copy(m.cells, m.cells + 4 * size_t(ncell), cells.data());
-  std::copy(m.edges, m.edges + 2 * size_t(nedge), edges.data());
   for (uint32_t c = 0; c < ncell; ++c) {
     uint32_t *q = cells.data() + 4 * size_t(c);
     std::sort(q, q + 4);

@@ -53,20 +53,16 @@ void Body::take_mesh(const dfm_mesh &m) {
   npoint = m.npoint;
   ncell = m.ncell;
   nedge = m.nedge;
-  rest.create(host, 3 * size_t(npoint));
-  mass.create(host, npoint);
-  cells.create(host, 4 * size_t(ncell));
-  edges.create(host, 2 * size_t(nedge));
+  rest.create_copy(host, m.rest, 3 * size_t(npoint));
+  mass.create_copy(host, m.mass, npoint);
+  cells.create_copy(host, m.cells, 4 * size_t(ncell));
+  edges.create_copy(host, m.edges, 2 * size_t(nedge));
   cell_edge.create(host, 6 * size_t(ncell));
   block.create(host, 9 * size_t(nedge));
   drag.create(host, npoint);
   volume.create(host, npoint);
   ksum.create(host, npoint);
   csum.create(host, npoint);
-  std::copy(m.rest, m.rest + 3 * size_t(npoint), rest.data());
-  std::copy(m.mass, m.mass + npoint, mass.data());
-  std::copy(m.cells, m.cells + 4 * size_t(ncell), cells.data());
-  std::copy(m.edges, m.edges + 2 * size_t(nedge), edges.data());
   for (size_t c = 0; c < ncell; ++c)
     model::find_edges(edges.data(), nedge, cells.data() + 4 * c, cell_edge.data() + 6 * c);
 }

@@ -160,13 +160,10 @@ void Body::create(const dfm_host *h, const dfm_mesh &m) {
 }
 
 void Body::take_mesh(const dfm_mesh &m) {
-  rest.create(host, 3 * size_t(npoint));
-  mass.create(host, npoint);
-  cells.create(host, 4 * size_t(ncell));
+  rest.create_copy(host, m.rest, 3 * size_t(npoint));
+  mass.create_copy(host, m.mass, npoint);
+  cells.create_copy(host, m.cells, 4 * size_t(ncell));
   cell_volume.create(host, ncell);
-  std::copy(m.rest, m.rest + 3 * size_t(npoint), rest.data());
-  std::copy(m.mass, m.mass + npoint, mass.data());
-  std::copy(m.cells, m.cells + 4 * size_t(ncell), cells.data());
   for (size_t c = 0; c < ncell; ++c) {
     const auto x = [&](size_t a) { return rest.data() + 3 * size_t(cells[4 * c + a]); };
     model::Tetrahedron t;

@@ -69,24 +69,6 @@ struct Single {
     for (Buffer<float> *each : {&stiffness, &rest, &tilt, &damp}) each->create(h, rays);
     for (Buffer<float> *each : {&bulk, &volume6, &collapse, &limit}) each->create(h, ncell);
   }
-  void swap(Single &o) {
-    block.swap(o.block);
-    above.swap(o.above);
-    std::swap(rays, o.rays);
-    std::swap(ncell, o.ncell);
-    cells.swap(o.cells);
-    number.swap(o.number);
-    edge.swap(o.edge);
-    cell.swap(o.cell);
-    stiffness.swap(o.stiffness);
-    rest.swap(o.rest);
-    tilt.swap(o.tilt);
-    damp.swap(o.damp);
-    bulk.swap(o.bulk);
-    volume6.swap(o.volume6);
-    collapse.swap(o.collapse);
-    limit.swap(o.limit);
-  }
 };
 
 struct Call;

@@ -13,24 +13,20 @@ void Body::take_mesh(const dfm_mesh &m) {
   npoint = m.npoint;
   ncell = m.ncell;
   nedge = m.nedge;
-  mass.create(host, npoint);
+  mass.create_copy(host, m.mass, npoint);
   shape.create(host, nedge);
   edge_volume.create(host, nedge);
   edge_length.create(host, nedge);
   edge_energy.create(host, nedge);
-  rest_point.create(host, 3 * size_t(npoint));
+  rest_point.create_copy(host, m.rest, 3 * size_t(npoint));
   weight.create(host, npoint);
   spring_sum.create(host, npoint);
   coupled.create(host, npoint);
   rest_rows.create(host, npoint);
-  edges.create(host, 2 * size_t(nedge));
-  cells.create(host, 4 * size_t(ncell));
+  edges.create_copy(host, m.edges, 2 * size_t(nedge));
+  cells.create_copy(host, m.cells, 4 * size_t(ncell));
   cell_edge.create(host, 6 * size_t(ncell));
   cell_volume6.create(host, ncell);
-  std::copy(m.mass, m.mass + npoint, mass.data());
-  std::copy(m.rest, m.rest + 3 * size_t(npoint), rest_point.data());
-  std::copy(m.edges, m.edges + 2 * size_t(nedge), edges.data());
-  std::copy(m.cells, m.cells + 4 * size_t(ncell), cells.data());
   for (uint32_t e = 0; e < nedge; ++e)
     edge_length[e] =
         length_of(m.rest + 3 * size_t(edges[2 * size_t(e)]), m.rest + 3 * size_t(edges[2 * size_t(e) + 1]));

@@ -74,7 +74,7 @@ void Body::prepare_single() {
     });
     out.groups = uint32_t(group - first);
   }
-  single.swap(made);
+  std::swap(single, made);
   fill_single();
 }
 

@@ -40,14 +40,11 @@ void Body::apply_params(const double *values) {
 void Body::take_surface(const dfm_mesh &m) {
   nsurfel_ = m.nsurfel;
   const uint32_t entries = nsurfel_ ? m.row[nsurfel_] : 0;
-  row_.create(host, size_t(nsurfel_) + 1);
-  col_.create(host, entries);
-  weight_.create(host, entries);
+  row_.create_copy(host, m.row, nsurfel_ ? size_t(nsurfel_) + 1 : 0);
+  col_.create_copy(host, m.col, entries);
+  weight_.create_copy(host, m.weight, entries);
   surface_.create(host, 3 * size_t(nsurfel_) * modes_.count);
   if (!nsurfel_) return;
-  std::copy(m.row, m.row + nsurfel_ + 1, row_.data());
-  std::copy(m.col, m.col + entries, col_.data());
-  std::copy(m.weight, m.weight + entries, weight_.data());
   for (size_t s = 0; s < nsurfel_; ++s)
     own_points_ = own_points_ && row_[s + 1] == row_[s] + 1 && weight_[row_[s]] == 1;
   for (size_t s = 0; s < nsurfel_; ++s)

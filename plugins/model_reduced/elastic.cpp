@@ -109,14 +109,11 @@ void Elastic::take(const dfm_mesh &m, const char *id) {
   poisson_ = m.params[kPoisson];
   model::take_fields(host_, id, kParams, kParamCount, m, field_, [](uint32_t, double) { return true; });
   rest.create(host_, 3 * size_t(npoint));
-  mass.create(host_, npoint);
+  mass.create_copy(host_, m.mass, npoint);
   held.create(host_, npoint);
   work_.create(host_, 3 * size_t(npoint));
-  cells_.create(host_, 4 * size_t(ncell));
-  edges_.create(host_, 2 * size_t(m.nedge));
-  std::copy(m.mass, m.mass + npoint, mass.data());
-  std::copy(m.cells, m.cells + 4 * size_t(ncell), cells_.data());
-  std::copy(m.edges, m.edges + 2 * size_t(m.nedge), edges_.data());
+  cells_.create_copy(host_, m.cells, 4 * size_t(ncell));
+  edges_.create_copy(host_, m.edges, 2 * size_t(m.nedge));
   turns = true;
   for (uint32_t i = 0; i < npoint; ++i) {
     if (!(mass[i] > 0)) throw "a point has no mass; every point must belong to a cell";

@@ -69,8 +69,7 @@ void Body::create(const dfm_host *h, const dfm_mesh &m) {
 }
 
 void Body::take_mesh(const dfm_mesh &m) {
-  rest.create(host, 3 * size_t(npoint));
-  std::copy(m.rest, m.rest + 3 * size_t(npoint), rest.data());
+  rest.create_copy(host, m.rest, 3 * size_t(npoint));
   weight.create(host, npoint);
   inverse.create(host, 3 * size_t(npoint));
   for (size_t i = 0; i < npoint; ++i) {
@@ -79,14 +78,9 @@ void Body::take_mesh(const dfm_mesh &m) {
     weight[i] = held == 7 ? kHeavy * m.mass[i] : m.mass[i];
     for (size_t a = 0; a < 3; ++a) inverse[3 * i + a] = held >> a & 1 ? 0 : 1 / m.mass[i];
   }
-  row.create(host, size_t(nsurfel) + 1);
-  if (nsurfel) std::copy(m.row, m.row + nsurfel + 1, row.data());
-  col.create(host, row[nsurfel]);
-  coupling.create(host, row[nsurfel]);
-  if (nsurfel) {
-    std::copy(m.col, m.col + row[nsurfel], col.data());
-    std::copy(m.weight, m.weight + row[nsurfel], coupling.data());
-  }
+  row.create_copy(host, m.row, nsurfel ? size_t(nsurfel) + 1 : 0);
+  col.create_copy(host, m.col, row[nsurfel]);
+  coupling.create_copy(host, m.weight, row[nsurfel]);
 }
 
 void Body::make_clusters() {

@@ -111,19 +111,7 @@ std::string same_bits(const Subject &subject) {
     broken(
         "the same series of batches gave other bits the second time, so it keeps data between calls; keep "
         "the data in a state slot");
-  const std::string number = std::to_string(subject.index), seed = std::to_string(subject.seed);
-  const Answer other =
-      in_fresh_process(subject.command, {"plugin", "check", subject.file, "--digest", number, "--seed", seed},
-                       {0.5 * subject.limit});
-  const std::string mine = text("%016llx", static_cast<unsigned long long>(here));
-  if (!other.spoke)
-    broken("in a second process it %s; let the law depend on its inputs only", other.ending.c_str());
-  if (other.verdict.detail != mine)
-    broken(
-        "the same batches give %s here and %s in another process; compute from the inputs only, not from "
-        "addresses, time or uninitialized memory",
-        mine.c_str(), other.verdict.detail.c_str());
-  return "digest " + mine;
+  return same_elsewhere(subject, here, "law", "batches");
 }
 
 std::string bad_lane_stays(const Subject &subject) {

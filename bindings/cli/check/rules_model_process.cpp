@@ -423,19 +423,7 @@ std::string model_same_bits(const Subject &subject) {
     compare(elsewhere, "in another instance of the same body", "set everything in create, and share nothing");
   });
   stage("a second process is asked for the same steps");
-  const std::string mine = text("%016llx", static_cast<unsigned long long>(digest_of_model(subject)));
-  const std::string number = std::to_string(subject.index), seed = std::to_string(subject.seed);
-  const Answer other =
-      in_fresh_process(subject.command, {"plugin", "check", subject.file, "--digest", number, "--seed", seed},
-                       {0.5 * subject.limit});
-  if (!other.spoke)
-    broken("in a second process it %s; let the model depend on its inputs only", other.ending.c_str());
-  if (other.verdict.detail != mine)
-    broken(
-        "the same steps give %s here and %s in another process; compute from the inputs only, not from "
-        "addresses, time or uninitialized memory",
-        mine.c_str(), other.verdict.detail.c_str());
-  return "digest " + mine;
+  return same_elsewhere(subject, digest_of_model(subject), "model", "steps");
 }
 
 std::string bad_point_returns(const Subject &subject) {

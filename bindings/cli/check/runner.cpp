@@ -191,6 +191,22 @@ Answer in_fresh_process(const std::string &command, std::vector<std::string> arg
   return in_own_process(become, limits);
 }
 
+std::string same_elsewhere(const Subject &subject, uint64_t digest, const char *kind, const char *input) {
+  const std::string number = std::to_string(subject.index), seed = std::to_string(subject.seed);
+  const Answer other =
+      in_fresh_process(subject.command, {"plugin", "check", subject.file, "--digest", number, "--seed", seed},
+                       {0.5 * subject.limit});
+  const std::string mine = text("%016llx", static_cast<unsigned long long>(digest));
+  if (!other.spoke)
+    broken("in a second process it %s; let the %s depend on its inputs only", other.ending.c_str(), kind);
+  if (other.verdict.detail != mine)
+    broken(
+        "the same %s give %s here and %s in another process; compute from the inputs only, not from "
+        "addresses, time or uninitialized memory",
+        input, mine.c_str(), other.verdict.detail.c_str());
+  return "digest " + mine;
+}
+
 namespace {
 
 void open_pipe(int ends[2]) {

@@ -33,6 +33,8 @@ Answer in_own_process(const std::function<void()> &work, const Limits &limits);
 // The same in a fresh image of this program, with other addresses; the arguments say what to do,
 // --report-to is added.
 Answer in_fresh_process(const std::string &command, std::vector<std::string> arguments, const Limits &limits);
+// The digest, if a fresh process finds the same; else throws Broken. kind: "law"; input: "batches".
+std::string same_elsewhere(const Subject &subject, uint64_t digest, const char *kind, const char *input);
 // The child's last word.
 void answer(const Verdict &verdict);
 

@@ -15,8 +15,7 @@ void dfm_attach_def_default_sized(uint32_t size, dfm_attach_def *out) {
 
 dfm_status dfm_body_attach(dfm_body body, const dfm_attach_def *def, uint32_t *attachment) {
   return as_status([&] {
-    Body &b = body_of(body);
-    exclusive(*b.world);
+    Body &b = exclusive(body_of(body));
     need(def, "def");
     const dfm_attach_def own = take_def(def, dfm_attach_def_default());
     check_flags(own, DFM_ATTACH_TOUCH, "dfm_attach_def");
@@ -28,11 +27,7 @@ dfm_status dfm_body_attach(dfm_body body, const dfm_attach_def *def, uint32_t *a
 }
 
 dfm_status dfm_body_detach(dfm_body body, uint32_t attachment) {
-  return as_status([&] {
-    Body &b = body_of(body);
-    exclusive(*b.world);
-    detach(b, attachment);
-  });
+  return as_status([&] { detach(exclusive(body_of(body)), attachment); });
 }
 
 dfm_status dfm_body_attachments(dfm_body body, uint32_t capacity, uint32_t *out, uint32_t *n) {
@@ -47,9 +42,5 @@ dfm_status dfm_body_attachments(dfm_body body, uint32_t capacity, uint32_t *out,
 }
 
 dfm_status dfm_body_get_attachment(dfm_body body, uint32_t attachment, dfm_attachment *out) {
-  return as_status([&] {
-    const Body &b = body_of(body);
-    settled(*b.world);
-    give(out, attachment_report(b, attachment));
-  });
+  return as_status([&] { give(out, attachment_report(settled(body_of(body)), attachment)); });
 }

@@ -8,6 +8,7 @@
 #include "plugin/context.h"
 
 using dfm::fail;
+using dfm::require;
 using dfm::as_status;
 using dfm::exclusive;
 using dfm::used;
@@ -26,11 +27,6 @@ dfm_context_def checked(const dfm_context_def *given) {
   if (def.threads > 1024)
     fail(DFM_E_ARG, "threads is %u, at most 1024 expected (0: one per processor)", def.threads);
   return def;
-}
-
-dfm_context &require(dfm_context *context) {
-  if (!context) fail(DFM_E_ARG, "the context is NULL; create one with dfm_context_create");
-  return *context;
 }
 
 }  // namespace

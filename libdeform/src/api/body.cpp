@@ -171,8 +171,7 @@ dfm_status dfm_body_set_user(dfm_body body, void *user) {
 
 dfm_status dfm_body_set_filter(dfm_body body, uint32_t category, uint32_t collides_with) {
   return as_status([&] {
-    Body &b = body_of(body);
-    exclusive(*b.world);
+    Body &b = exclusive(body_of(body));
     b.category = category;
     b.collides_with = collides_with;
     disturb(b);
@@ -194,8 +193,7 @@ dfm_status dfm_body_get_state(dfm_body body, uint32_t capacity, double *x, doubl
 
 dfm_status dfm_body_set_state(dfm_body body, uint32_t n, const double *x, const double *v) {
   return as_status([&] {
-    Body &b = body_of(body);
-    exclusive(*b.world);
+    Body &b = exclusive(body_of(body));
     if (n != b.p.n) fail(DFM_E_ARG, "body '%s' has %u points, %u were given", b.name.c_str(), b.p.n, n);
     for (size_t i = 0; i < size_t(3) * n; ++i)
       if ((x && !std::isfinite(x[i])) || (v && !std::isfinite(v[i])))
@@ -235,8 +233,7 @@ dfm_status dfm_body_get_rest(dfm_body body, uint32_t capacity_points, double *x,
 
 dfm_status dfm_body_hold(dfm_body body, uint32_t n, const uint32_t *points, uint8_t axes) {
   return as_status([&] {
-    Body &b = body_of(body);
-    exclusive(*b.world);
+    Body &b = exclusive(body_of(body));
     check_points(b, n, points);
     if (axes > 7) fail(DFM_E_ARG, "axes is %u; it is a sum of 1 (x), 2 (y) and 4 (z)", unsigned(axes));
     if (b.model.stepper)
@@ -257,8 +254,7 @@ dfm_status dfm_body_hold(dfm_body body, uint32_t n, const uint32_t *points, uint
 dfm_status dfm_body_move_held(dfm_body body, uint32_t n, const uint32_t *points, uint32_t nkey,
                               const dfm_pose_key *keys, const dfm_sine *sine) {
   return as_status([&] {
-    Body &b = body_of(body);
-    exclusive(*b.world);
+    Body &b = exclusive(body_of(body));
     check_points(b, n, points);
     check_motion(b, nkey, keys, sine);
     if (nkey == 0 && !sine) fail(DFM_E_ARG, "body '%s': a motion needs keys or a sine", b.name.c_str());
@@ -286,8 +282,7 @@ dfm_status dfm_body_move_held(dfm_body body, uint32_t n, const uint32_t *points,
 dfm_status dfm_body_add_load(dfm_body body, uint32_t n, const uint32_t *points, const double *force,
                              uint32_t nkey, const dfm_scale_key *keys, const dfm_sine *sine, uint32_t *load) {
   return as_status([&] {
-    Body &b = body_of(body);
-    exclusive(*b.world);
+    Body &b = exclusive(body_of(body));
     check_points(b, n, points);
     check_motion(b, nkey, keys, sine);
     if (n) need(force, "force");
@@ -309,8 +304,7 @@ dfm_status dfm_body_add_load(dfm_body body, uint32_t n, const uint32_t *points, 
 
 dfm_status dfm_body_remove_load(dfm_body body, uint32_t load) {
   return as_status([&] {
-    Body &b = body_of(body);
-    exclusive(*b.world);
+    Body &b = exclusive(body_of(body));
     if (std::erase_if(b.loads, [&](const Load &l) { return l.number == load; }) == 0)
       fail(DFM_E_ARG, "body '%s' has no load %u", b.name.c_str(), load);
     sum_loads(b);
@@ -319,8 +313,7 @@ dfm_status dfm_body_remove_load(dfm_body body, uint32_t load) {
 
 dfm_status dfm_body_add_spring(dfm_body body, const dfm_spring_def *def, uint32_t *spring) {
   return as_status([&] {
-    Body &b = body_of(body);
-    exclusive(*b.world);
+    Body &b = exclusive(body_of(body));
     b.springs.push_back(make_spring(
         b,
         take_def(def, dfm_spring_def{sizeof(dfm_spring_def), 0, nullptr, nullptr, {}, nullptr, 0, 0, 0, 0})));
@@ -332,8 +325,7 @@ dfm_status dfm_body_add_spring(dfm_body body, const dfm_spring_def *def, uint32_
 
 dfm_status dfm_body_set_spring_target(dfm_body body, uint32_t spring, const double to[3]) {
   return as_status([&] {
-    Body &b = body_of(body);
-    exclusive(*b.world);
+    Body &b = exclusive(body_of(body));
     need(to, "to");
     Spring &s = spring_of(b, spring);
     if (!std::isfinite(to[0]) || !std::isfinite(to[1]) || !std::isfinite(to[2]))
@@ -354,8 +346,7 @@ dfm_status dfm_body_get_spring_force(dfm_body body, uint32_t spring, double forc
 
 dfm_status dfm_body_remove_spring(dfm_body body, uint32_t spring) {
   return as_status([&] {
-    Body &b = body_of(body);
-    exclusive(*b.world);
+    Body &b = exclusive(body_of(body));
     b.springs.erase(b.springs.begin() + (&spring_of(b, spring) - b.springs.data()));
     springs_changed(b);
   });
@@ -363,8 +354,7 @@ dfm_status dfm_body_remove_spring(dfm_body body, uint32_t spring) {
 
 dfm_status dfm_body_apply_impulse(dfm_body body, const double point[3], const double impulse[3]) {
   return as_status([&] {
-    Body &b = body_of(body);
-    exclusive(*b.world);
+    Body &b = exclusive(body_of(body));
     need(point, "point");
     need(impulse, "impulse");
     for (int k = 0; k < 3; ++k)
@@ -383,8 +373,7 @@ dfm_status dfm_body_apply_impulse(dfm_body body, const double point[3], const do
 
 dfm_status dfm_body_set_params(dfm_body body, const dfm_params *params) {
   return as_status([&] {
-    Body &b = body_of(body);
-    exclusive(*b.world);
+    Body &b = exclusive(body_of(body));
     need(params, "params");
     const HostWork work(b);
     set_model_params(b, *params);

@@ -8,16 +8,6 @@ using namespace dfm;
 
 namespace {
 
-// Of a body or obstacle of this world; 0 for 0.
-uint64_t id_of(const World &w, uint64_t handle, const char *name) {
-  if (handle == 0) return 0;
-  for (auto &b : w.bodies)
-    if (b->handle == handle) return b->id;
-  for (auto &o : w.obstacles)
-    if (o->handle == handle) return o->id;
-  fail(DFM_E_HANDLE, "'%s' is not a body or obstacle of this world", name);
-}
-
 // The tables are rebuilt before the next step, with the pairs that may touch now.
 void ask_pairs_again(World &w) {
   w.overlaps.all = true;
@@ -38,7 +28,7 @@ dfm_status dfm_world_set_may_touch(dfm_world world, dfm_may_touch_fn may_touch, 
 dfm_status dfm_world_ask_again(dfm_world world, uint64_t a, uint64_t b) {
   return as_status([&] {
     World &w = exclusive(world_of(world));
-    uint64_t first = id_of(w, a, "a"), second = id_of(w, b, "b");
+    uint64_t first = a ? id_of(w, a, "a") : 0, second = b ? id_of(w, b, "b") : 0;
     if (first == 0) std::swap(first, second);
     std::erase_if(w.may_touch.answers, [&](const PairAnswer &p) {
       const auto has = [&](uint64_t id) { return id == 0 || p.a == id || p.b == id; };

@@ -188,15 +188,6 @@ void add_rigid_pairs(const World &w, std::vector<PairRow> &pairs) {
   }
 }
 
-// Body or obstacle of this world.
-uint64_t id_of(const World &w, uint64_t handle, const char *what) {
-  for (auto &b : w.bodies)
-    if (b->handle == handle) return b->id;
-  for (auto &o : w.obstacles)
-    if (o->handle == handle) return o->id;
-  fail(DFM_E_HANDLE, "'%s' is not a body or obstacle of this world", what);
-}
-
 // The values of a def; `what` names them in the error if they are missing.
 std::span<const dfm_param_value> values_of(const dfm_params &params, const char *what) {
   if (params.n && !params.values)

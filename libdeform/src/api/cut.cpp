@@ -95,8 +95,7 @@ void dfm_cut_def_default_sized(uint32_t size, dfm_cut_def *out) {
 
 dfm_status dfm_body_cut(dfm_body body, const dfm_cut_def *def, dfm_cut_info *out) {
   return as_status([&] {
-    Body &b = body_of(body);
-    exclusive(*b.world);
+    Body &b = exclusive(body_of(body));
     need(def, "def");
     const dfm_cut_def own = take_def(def, dfm_cut_def_default());
     check_flags(own, 0, "dfm_cut_def");
@@ -108,8 +107,7 @@ dfm_status dfm_body_cut(dfm_body body, const dfm_cut_def *def, dfm_cut_info *out
 
 dfm_status dfm_body_plan_cut(dfm_body body, double t, const dfm_cut_def *def) {
   return as_status([&] {
-    Body &b = body_of(body);
-    exclusive(*b.world);
+    Body &b = exclusive(body_of(body));
     if (!def) return plan_no_cuts(b);
     const double now = b.world->time;
     if (!(t >= now - kRounding * now && std::isfinite(t)))
@@ -126,8 +124,7 @@ dfm_status dfm_body_plan_cut(dfm_body body, double t, const dfm_cut_def *def) {
 
 dfm_status dfm_body_remove_cells(dfm_body body, uint32_t n, const uint32_t *cells, dfm_cut_info *out) {
   return as_status([&] {
-    Body &b = body_of(body);
-    exclusive(*b.world);
+    Body &b = exclusive(body_of(body));
     if (n) need(cells, "cells");
     Array<uint8_t> removed(b.ncell(), 0, HookAllocator<uint8_t>(b.world->memory()));
     for (uint32_t i = 0; i < n; ++i) {
@@ -163,8 +160,7 @@ void dfm_separate_def_default_sized(uint32_t size, dfm_separate_def *out) {
 
 dfm_status dfm_body_separate(dfm_body body, const dfm_separate_def *def, dfm_cut_info *out) {
   return as_status([&] {
-    Body &b = body_of(body);
-    exclusive(*b.world);
+    Body &b = exclusive(body_of(body));
     const SeparateRule rule = rule_of(b, def);
     CutReport report;
     separate(b, rule, report);
@@ -174,8 +170,7 @@ dfm_status dfm_body_separate(dfm_body body, const dfm_separate_def *def, dfm_cut
 
 dfm_status dfm_body_set_separate(dfm_body body, const dfm_separate_def *def) {
   return as_status([&] {
-    Body &b = body_of(body);
-    exclusive(*b.world);
+    Body &b = exclusive(body_of(body));
     SeparateRule rule = def ? rule_of(b, def) : SeparateRule{};
     if (rule.on) check_may_cut(b, b.model);
     rule.waits = rule.on && b.separate.waits;
@@ -184,11 +179,7 @@ dfm_status dfm_body_set_separate(dfm_body body, const dfm_separate_def *def) {
 }
 
 dfm_status dfm_body_set_cut_delay(dfm_body body, double delay) {
-  return as_status([&] {
-    Body &b = body_of(body);
-    exclusive(*b.world);
-    set_cut_delay(b, delay);
-  });
+  return as_status([&] { set_cut_delay(exclusive(body_of(body)), delay); });
 }
 
 dfm_status dfm_body_cut_delay(dfm_body body, double *delay, uint32_t *waiting) {

@@ -26,8 +26,7 @@ void tell_count(dfm::TetMesh &mesh, const char *kind, uint32_t asked) {
 
 dfm_status dfm_tetmesh_read(dfm_context *context, const char *path, dfm_tetmesh *out) {
   return as_status([&] {
-    need(context, "context");
-    dfm::used(*context);
+    dfm::used(dfm::require(context));
     need(path, "path");
     need(out, "out");
     dfm::TetMesh mesh = dfm::read_tet_mesh(context->memory, path);
@@ -38,8 +37,7 @@ dfm_status dfm_tetmesh_read(dfm_context *context, const char *path, dfm_tetmesh 
 
 dfm_status dfm_mesh_file_kind(dfm_context *context, const char *path, uint32_t *kind) {
   return as_status([&] {
-    need(context, "context");
-    dfm::used(*context);
+    dfm::used(dfm::require(context));
     need(path, "path");
     need(kind, "kind");
     *kind = dfm::has_cells(path, dfm::read_raw(context->memory, path)) ? DFM_MESH_TETS : DFM_MESH_SURFACE;
@@ -48,8 +46,7 @@ dfm_status dfm_mesh_file_kind(dfm_context *context, const char *path, uint32_t *
 
 dfm_status dfm_mesh_read(dfm_context *context, const char *path, dfm_tetmesh *cells, dfm_trimesh *surface) {
   return as_status([&] {
-    need(context, "context");
-    dfm::used(*context);
+    dfm::used(dfm::require(context));
     need(path, "path");
     need(cells, "cells");
     need(surface, "surface");
@@ -64,8 +61,7 @@ dfm_status dfm_mesh_read(dfm_context *context, const char *path, dfm_tetmesh *ce
 dfm_status dfm_tetmesh_make(dfm_context *context, const char *kind, const double size[3], uint32_t cells,
                             dfm_tetmesh *out) {
   return as_status([&] {
-    need(context, "context");
-    dfm::used(*context);
+    dfm::used(dfm::require(context));
     need(kind, "kind");
     need(size, "size");
     need(out, "out");

@@ -92,8 +92,7 @@ dfm_status dfm_body_set_model(dfm_body body, const char *type, const dfm_params 
 
 dfm_status dfm_body_set_switches(dfm_body body, uint32_t n, const dfm_switch *switches) {
   return as_status([&] {
-    Body &b = body_of(body);
-    exclusive(*b.world);
+    Body &b = exclusive(body_of(body));
     if (n) need(switches, "switches");
     std::vector<Switch> made;
     const char *const from = "start from dfm_switch_default()";
@@ -126,8 +125,7 @@ void dfm_switch_rule_default_sized(uint32_t size, dfm_switch_rule *out) {
 
 dfm_status dfm_body_set_switch_rule(dfm_body body, const dfm_switch_rule *rule) {
   return as_status([&] {
-    Body &b = body_of(body);
-    exclusive(*b.world);
+    Body &b = exclusive(body_of(body));
     std::vector<SwitchRule> made;
     if (rule) made.push_back(make_rule(b, take_def(rule, dfm_switch_rule_default())));
     rehearse(b, b.switches, made, false);
@@ -137,8 +135,7 @@ dfm_status dfm_body_set_switch_rule(dfm_body body, const dfm_switch_rule *rule) 
 
 dfm_status dfm_body_set_interest(dfm_body body, const double point[3]) {
   return as_status([&] {
-    Body &b = body_of(body);
-    exclusive(*b.world);
+    Body &b = exclusive(body_of(body));
     need(point, "point");
     for (int k = 0; k < 3; ++k)
       if (!std::isfinite(point[k])) fail(DFM_E_ARG, "body '%s': the point is not finite", b.name.c_str());

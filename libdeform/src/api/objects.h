@@ -51,18 +51,6 @@ inline World &whole(World &w) {
   for (auto &b : w.bodies) b->dynamics->see_points();
   return w;
 }
-// The handle of the one with this name among those for which counts() is true. what: "tool", for the error.
-template <class All, class Counts>
-uint64_t find_named(const All &all, const char *what, const char *name, Counts counts) {
-  std::vector<std::string> names;
-  for (const auto &x : all) {
-    if (!counts(*x)) continue;
-    if (x->name == name) return x->handle;
-    names.push_back(x->name);
-  }
-  fail(DFM_E_ARG, "there is no %s '%s'%s", what, name, did_you_mean(name, names, '\'').c_str());
-}
-
 inline Obstacle &obstacle_of(dfm_obstacle h) { return part_of<Obstacle>(Kind::obstacle, h); }
 inline Material &material_of(dfm_material h) { return part_of<Material>(Kind::material, h); }
 
@@ -77,6 +65,23 @@ inline World &exclusive(World &w) {
 inline World &settled(World &w) {
   if (w.busy) Call::refuse("world");
   return w;
+}
+
+// The same for a body, an obstacle or a tool, of its world.
+template <class Part>
+Part &exclusive(Part &part) {
+  exclusive(*part.world);
+  return part;
+}
+template <class Part>
+Part &settled(Part &part) {
+  settled(*part.world);
+  return part;
+}
+
+inline dfm_context &require(dfm_context *context) {
+  if (!context) fail(DFM_E_ARG, "the context is NULL; create one with dfm_context_create");
+  return *context;
 }
 
 // For calls that create something in a context.
@@ -95,6 +100,32 @@ inline dfm_context &exclusive(dfm_context &context) {
 
 inline void need(const void *p, const char *name) {
   if (!p) fail(DFM_E_ARG, "argument '%s' is NULL", name);
+}
+
+// The handle of the one with this name among those for which counts() is true. what: "tool", for the error.
+template <class All, class Counts>
+void find_named(const All &all, const char *what, const char *name, uint64_t *out, Counts counts) {
+  need(name, "name");
+  need(out, "out");
+  std::vector<std::string> names;
+  for (const auto &x : all) {
+    if (!counts(*x)) continue;
+    if (x->name == name) {
+      *out = x->handle;
+      return;
+    }
+    names.push_back(x->name);
+  }
+  fail(DFM_E_ARG, "there is no %s '%s'%s", what, name, did_you_mean(name, names, '\'').c_str());
+}
+
+// Body or obstacle of this world.
+inline uint64_t id_of(const World &w, uint64_t handle, const char *what) {
+  for (auto &b : w.bodies)
+    if (b->handle == handle) return b->id;
+  for (auto &o : w.obstacles)
+    if (o->handle == handle) return o->id;
+  fail(DFM_E_HANDLE, "'%s' is not a body or obstacle of this world", what);
 }
 
 // The two-call convention: writes the count always, the data if there is room. Returns true if the data

@@ -33,8 +33,7 @@ dfm_status dfm_obstacle_create(dfm_world world, const dfm_obstacle_def *def, dfm
 
 dfm_status dfm_obstacle_destroy(dfm_obstacle obstacle) {
   return as_status([&] {
-    Obstacle &o = obstacle_of(obstacle);
-    exclusive(*o.world);
+    Obstacle &o = exclusive(obstacle_of(obstacle));
     if (o.rigid && !o.added)
       fail(DFM_E_STATE, "'%s' is a rigid body; remove it with dfm_rigid_destroy, which removes its whole set",
            o.name.c_str());
@@ -58,8 +57,7 @@ namespace {
 
 // Checks the pose that a host gives to an obstacle.
 Obstacle &movable(dfm_obstacle obstacle, const dfm_pose *pose) {
-  Obstacle &o = obstacle_of(obstacle);
-  exclusive(*o.world);
+  Obstacle &o = exclusive(obstacle_of(obstacle));
   need(pose, "pose");
   if (o.rigid) fail(DFM_E_STATE, "'%s' is a rigid body; move it with dfm_rigid_set_state", o.name.c_str());
   for (int i = 0; i < 4; ++i)
@@ -98,34 +96,25 @@ dfm_status dfm_obstacle_teleport(dfm_obstacle obstacle, const dfm_pose *pose) {
 
 dfm_status dfm_obstacle_set_velocity_surface(dfm_obstacle obstacle, const double velocity[3]) {
   return as_status([&] {
-    Obstacle &o = obstacle_of(obstacle);
-    exclusive(*o.world);
+    Obstacle &o = exclusive(obstacle_of(obstacle));
     need(velocity, "velocity");
     set_belt(o, load3(velocity));
   });
 }
 
 dfm_status dfm_obstacle_set_filter(dfm_obstacle obstacle, uint32_t category, uint32_t collides_with) {
-  return as_status([&] {
-    Obstacle &o = obstacle_of(obstacle);
-    exclusive(*o.world);
-    set_filter(o, category, collides_with);
-  });
+  return as_status([&] { set_filter(exclusive(obstacle_of(obstacle)), category, collides_with); });
 }
 
 dfm_status dfm_obstacle_set_material(dfm_obstacle obstacle, dfm_material material) {
   return as_status([&] {
-    Obstacle &o = obstacle_of(obstacle);
-    exclusive(*o.world);
+    Obstacle &o = exclusive(obstacle_of(obstacle));
     set_material(o, material ? &material_of(material) : nullptr);
   });
 }
 
 dfm_status dfm_world_find_obstacle(dfm_world world, const char *name, dfm_obstacle *out) {
   return as_status([&] {
-    World &w = world_of(world);
-    need(name, "name");
-    need(out, "out");
-    *out = find_named(w.obstacles, "obstacle", name, [](const Obstacle &) { return true; });
+    find_named(world_of(world).obstacles, "obstacle", name, out, [](const Obstacle &) { return true; });
   });
 }

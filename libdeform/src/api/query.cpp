@@ -192,8 +192,7 @@ dfm_status dfm_world_query_aabb(dfm_world world, const dfm_aabb *box, const dfm_
 dfm_status dfm_body_query_triangles(dfm_body body, const dfm_query_shape *shape, uint32_t capacity,
                                     uint32_t *triangles, uint32_t *n) {
   return as_status([&] {
-    Body &b = shown_body_of(body);
-    settled(*b.world);
+    Body &b = settled(shown_body_of(body));
     const Convex asked = taken_shape(shape);
     need_room(triangles, capacity);
     const uint32_t count = triangles_touched(search(b), asked, capacity, triangles);

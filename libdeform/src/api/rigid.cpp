@@ -73,16 +73,14 @@ dfm_status dfm_rigid_create(dfm_world world, const char *host, const dfm_rigid_s
 
 dfm_status dfm_rigid_destroy(dfm_rigid rigid) {
   return as_status([&] {
-    Obstacle &o = free_rigid_of(rigid, "dfm_tool_destroy removes it");
-    exclusive(*o.world);
+    Obstacle &o = exclusive(free_rigid_of(rigid, "dfm_tool_destroy removes it"));
     destroy_rigids(*o.rigid);
   });
 }
 
 dfm_status dfm_rigid_add_shape(dfm_rigid rigid, const dfm_obstacle_def *def, dfm_obstacle *out) {
   return as_status([&] {
-    Obstacle &o = rigid_of(rigid);
-    exclusive(*o.world);
+    Obstacle &o = exclusive(rigid_of(rigid));
     need(def, "def");
     need(out, "out");
     *out = add_rigid_shape(o, take_def(def, dfm_obstacle_def_default())).handle;
@@ -114,10 +112,8 @@ dfm_status dfm_world_rigid_states(dfm_world world, uint32_t capacity, dfm_rigid 
 
 dfm_status dfm_world_find_rigid(dfm_world world, const char *name, dfm_rigid *out) {
   return as_status([&] {
-    World &w = world_of(world);
-    need(name, "name");
-    need(out, "out");
-    *out = find_named(w.obstacles, "rigid body", name, [](const Obstacle &o) { return o.rigid && !o.added; });
+    find_named(world_of(world).obstacles, "rigid body", name, out,
+               [](const Obstacle &o) { return o.rigid && !o.added; });
   });
 }
 
@@ -170,8 +166,7 @@ dfm_status dfm_rigid_contact_wrench(dfm_rigid rigid, double force[3], double mom
 
 dfm_status dfm_rigid_set_motor(dfm_rigid rigid, uint32_t joint, double velocity, double max) {
   return as_status([&] {
-    Obstacle &o = rigid_of(rigid);
-    exclusive(*o.world);
+    Obstacle &o = exclusive(rigid_of(rigid));
     set_rigid_motor(*o.rigid, joint, velocity, max);
   });
 }

@@ -38,11 +38,7 @@ dfm_status dfm_tool_create(dfm_world world, const dfm_tool_def *def, dfm_tool *o
 }
 
 dfm_status dfm_tool_destroy(dfm_tool tool) {
-  return as_status([&] {
-    Tool &t = tool_of(tool);
-    exclusive(*t.world);
-    destroy_tool(t);
-  });
+  return as_status([&] { destroy_tool(exclusive(tool_of(tool))); });
 }
 
 dfm_status dfm_world_tools(dfm_world world, uint32_t capacity, dfm_tool *out, uint32_t *n) {
@@ -54,12 +50,8 @@ dfm_status dfm_world_tools(dfm_world world, uint32_t capacity, dfm_tool *out, ui
 }
 
 dfm_status dfm_world_find_tool(dfm_world world, const char *name, dfm_tool *out) {
-  return as_status([&] {
-    World &w = world_of(world);
-    need(name, "name");
-    need(out, "out");
-    *out = find_named(w.tools, "tool", name, [](const Tool &) { return true; });
-  });
+  return as_status(
+      [&] { find_named(world_of(world).tools, "tool", name, out, [](const Tool &) { return true; }); });
 }
 
 dfm_status dfm_tool_get_def(dfm_tool tool, dfm_tool_def *out) {
@@ -76,33 +68,23 @@ dfm_status dfm_tool_parts(dfm_tool tool, uint32_t capacity, dfm_rigid *out, uint
 
 dfm_status dfm_tool_set_pose(dfm_tool tool, const dfm_pose *pose, const double velocity[6]) {
   return as_status([&] {
-    Tool &t = tool_of(tool);
-    exclusive(*t.world);
+    Tool &t = exclusive(tool_of(tool));
     need(pose, "pose");
     set_tool_pose(t, *pose, velocity);
   });
 }
 
 dfm_status dfm_tool_set_opening(dfm_tool tool, double angle) {
-  return as_status([&] {
-    Tool &t = tool_of(tool);
-    exclusive(*t.world);
-    set_tool_opening(t, angle);
-  });
+  return as_status([&] { set_tool_opening(exclusive(tool_of(tool)), angle); });
 }
 
 dfm_status dfm_tool_follow_keys(dfm_tool tool) {
-  return as_status([&] {
-    Tool &t = tool_of(tool);
-    exclusive(*t.world);
-    follow_keys(t);
-  });
+  return as_status([&] { follow_keys(exclusive(tool_of(tool))); });
 }
 
 dfm_status dfm_tool_keys_at(dfm_tool tool, double t, dfm_pose *pose, double *opening) {
   return as_status([&] {
-    const Tool &own = tool_of(tool);
-    settled(*own.world);
+    const Tool &own = settled(tool_of(tool));
     dfm_pose at{};
     double angle = 0;
     keys_at(own, t, at, angle);
@@ -113,8 +95,7 @@ dfm_status dfm_tool_keys_at(dfm_tool tool, double t, dfm_pose *pose, double *ope
 
 dfm_status dfm_tool_teleport(dfm_tool tool, const dfm_pose *pose) {
   return as_status([&] {
-    Tool &t = tool_of(tool);
-    exclusive(*t.world);
+    Tool &t = exclusive(tool_of(tool));
     need(pose, "pose");
     teleport_tool(t, *pose);
   });
@@ -122,8 +103,7 @@ dfm_status dfm_tool_teleport(dfm_tool tool, const dfm_pose *pose) {
 
 dfm_status dfm_tool_force(dfm_tool tool, double force[3], double torque[3]) {
   return as_status([&] {
-    const Tool &t = tool_of(tool);
-    settled(*t.world);
+    const Tool &t = settled(tool_of(tool));
     need(force, "force");
     need(torque, "torque");
     tool_force(t, force, torque);
@@ -132,8 +112,7 @@ dfm_status dfm_tool_force(dfm_tool tool, double force[3], double torque[3]) {
 
 dfm_status dfm_tool_feedback(dfm_tool tool, double force[3], double torque[3]) {
   return as_status([&] {
-    const Tool &t = tool_of(tool);
-    settled(*t.world);
+    const Tool &t = settled(tool_of(tool));
     need(force, "force");
     need(torque, "torque");
     tool_feedback(t, force, torque);
@@ -141,18 +120,13 @@ dfm_status dfm_tool_feedback(dfm_tool tool, double force[3], double torque[3]) {
 }
 
 dfm_status dfm_tool_get_state(dfm_tool tool, dfm_tool_state *out) {
-  return as_status([&] {
-    const Tool &t = tool_of(tool);
-    settled(*t.world);
-    give(out, tool_state(t));
-  });
+  return as_status([&] { give(out, tool_state(settled(tool_of(tool)))); });
 }
 
 dfm_status dfm_tool_grab(dfm_tool tool, dfm_body body, double reach, double release, uint32_t capacity,
                          uint32_t *attachment, uint32_t *n) {
   return as_status([&] {
-    Tool &t = tool_of(tool);
-    exclusive(*t.world);
+    Tool &t = exclusive(tool_of(tool));
     need(attachment, "attachment");
     need(n, "n");
     const std::vector<uint32_t> made = grab(t, body_of(body), reach, release, capacity);
@@ -163,8 +137,7 @@ dfm_status dfm_tool_grab(dfm_tool tool, dfm_body body, double reach, double rele
 
 dfm_status dfm_tool_set_cuts(dfm_tool tool, uint32_t how, uint32_t most, uint32_t n, const dfm_body *bodies) {
   return as_status([&] {
-    Tool &t = tool_of(tool);
-    exclusive(*t.world);
+    Tool &t = exclusive(tool_of(tool));
     if (n) need(bodies, "bodies");
     std::vector<Body *> list;
     for (uint32_t i = 0; i < n; ++i) list.push_back(&body_of(bodies[i]));
@@ -188,8 +161,7 @@ dfm_status dfm_tool_cuts(dfm_tool tool, uint32_t *how, uint32_t *most, uint32_t 
 
 dfm_status dfm_tool_set_device(dfm_tool tool, const dfm_device *device) {
   return as_status([&] {
-    Tool &t = tool_of(tool);
-    exclusive(*t.world);
+    Tool &t = exclusive(tool_of(tool));
     if (!device) return set_device(t, nullptr);
     const dfm_device own = take_known(device, dfm_device{});
     refuse_unknown(device);

@@ -11,8 +11,7 @@ using Object = dfm::TriMeshObject;
 
 dfm_status dfm_trimesh_read(dfm_context *context, const char *path, dfm_trimesh *out) {
   return as_status([&] {
-    need(context, "context");
-    dfm::used(*context);
+    dfm::used(dfm::require(context));
     need(path, "path");
     need(out, "out");
     dfm::TriMesh mesh = dfm::read_tri_mesh(context->memory, path);
@@ -24,8 +23,7 @@ dfm_status dfm_trimesh_read(dfm_context *context, const char *path, dfm_trimesh 
 dfm_status dfm_trimesh_create(dfm_context *context, uint32_t npoint, const double *points, uint32_t ntriangle,
                               const uint32_t *triangles, dfm_trimesh *out) {
   return as_status([&] {
-    need(context, "context");
-    dfm::used(*context);
+    dfm::used(dfm::require(context));
     need(points, "points");
     need(triangles, "triangles");
     need(out, "out");
@@ -45,8 +43,7 @@ dfm_status dfm_trimesh_create(dfm_context *context, uint32_t npoint, const doubl
 dfm_status dfm_trimesh_make(dfm_context *context, const char *kind, const double size[3], uint32_t triangles,
                             dfm_trimesh *out) {
   return as_status([&] {
-    need(context, "context");
-    dfm::used(*context);
+    dfm::used(dfm::require(context));
     need(kind, "kind");
     need(size, "size");
     need(out, "out");

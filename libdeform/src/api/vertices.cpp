@@ -116,8 +116,7 @@ void put_vertices(Body &b, const dfm_vertex_layout &l, unsigned char *out) {
 dfm_status dfm_surface_vertices(dfm_body body, const dfm_vertex_layout *layout, size_t bytes, void *out,
                                 uint32_t *n) {
   return as_status([&] {
-    Body &b = shown_body_of(body);
-    settled(*b.world);
+    Body &b = settled(shown_body_of(body));
     const dfm_vertex_layout l = take_def(layout, dfm_vertex_layout_default());
     const uint32_t end = check_layout(l), count = b.surface.nsurfel;
     if (n) *n = count;

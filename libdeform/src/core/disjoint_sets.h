@@ -1,5 +1,5 @@
-// Disjoint sets of the numbers 0..n-1 (union-find). The root of a set is its lowest number, whatever the order
-// of the joins, so that numbering sets needs no sort.
+// Disjoint sets of the numbers 0..n-1 (union-find). The root of a set is its lowest number whatever the order
+// of joins, so numbering needs no sort.
 #pragma once
 #include <algorithm>
 #include <cstdint>

@@ -1,5 +1,5 @@
-// Rotations and poses: interpolation, exponential map and its inverse, and the mean spin of a rigid body over a
-// step that conserves angular momentum. Uses + - * / sqrt only.
+// Rotations and poses: interpolation, exponential map and its inverse, and the mean spin of a rigid body
+// that conserves angular momentum over a step. Uses + - * / sqrt only.
 #pragma once
 #include "deform/math.h"
 #include "math/trig.h"

@@ -1,7 +1,6 @@
 #include "world/body_zones.h"
 
 #include <algorithm>
-#include <array>
 #include <cstring>
 #include <optional>
 
@@ -9,41 +8,15 @@
 #include "core/error.h"
 #include "mesh/mesh.h"
 #include "state/world.h"
+#include "world/triangle_list.h"
 
 namespace dfm {
 namespace {
 
-using Corners = std::array<uint32_t, 3>;
-
-Corners sorted(const uint32_t *c) {
-  Corners out{c[0], c[1], c[2]};
-  std::sort(out.begin(), out.end());
-  return out;
+// Of a surface, by points as they are numbered in the def.
+TriangleList triangles_of(const Surface &s) {
+  return {s.ntri, [&](size_t k) { return s.identity() ? s.point[s.tri[k]] : s.tri[k]; }};
 }
-
-// Finds triangles of the surface by their points, numbered as in the def.
-class TriangleIndex {
- public:
-  explicit TriangleIndex(const Surface &s) {
-    for (uint32_t t = 0; t < s.ntri; ++t) {
-      Corners c{};
-      for (size_t k = 0; k < 3; ++k) {
-        const uint32_t surfel = s.tri[size_t{3} * t + k];
-        c[k] = s.identity() ? s.point[surfel] : surfel;
-      }
-      entries_.push_back({sorted(c.data()), t});
-    }
-    std::sort(entries_.begin(), entries_.end());
-  }
-  uint32_t find(const uint32_t *corners) const {  // kNone: not on the surface
-    const Corners key = sorted(corners);
-    const auto at = std::lower_bound(entries_.begin(), entries_.end(), std::pair(key, 0u));
-    return at != entries_.end() && at->first == key ? at->second : kNone;
-  }
-
- private:
-  std::vector<std::pair<Corners, uint32_t>> entries_;
-};
 
 void check_groups(const dfm_surface_groups &g, const Body &b, uint32_t npoint) {
   const char *const name = b.name.c_str();
@@ -80,9 +53,10 @@ std::vector<uint32_t> triangle_groups(const Body &b, const dfm_body_def &def) {
     std::copy(g.group, g.group + g.ntriangle, out.begin());
     return out;
   }
-  const TriangleIndex index(b.surface);
+  const TriangleList index = triangles_of(b.surface);
   for (uint32_t t = 0; t < g.ntriangle; ++t) {
-    const uint32_t at = index.find(g.triangles + size_t{3} * t);
+    const uint32_t *const c = g.triangles + size_t{3} * t;
+    const uint32_t at = index.find(sorted(c[0], c[1], c[2]));
     if (at != kNone && out[at] == kNone) out[at] = g.group[t];
   }
   return out;
@@ -95,11 +69,12 @@ std::vector<uint32_t> triangle_materials(const Body &b, const dfm_body_def &def,
   std::vector<uint32_t> out(b.surface.ntri, 0);
   if (materials.of.empty()) return out;
   if (!def.surface) {
-    const TriangleIndex index(b.surface);
+    const TriangleList index = triangles_of(b.surface);
     for (uint32_t t = 0; t < def.ntet; ++t)
       for (const auto &face : kTetFace) {
-        const uint32_t *const c = def.tets + size_t{4} * t, corners[3] = {c[face[0]], c[face[1]], c[face[2]]};
-        if (const uint32_t at = index.find(corners); at != kNone) out[at] = materials.of[t];
+        const uint32_t *const c = def.tets + size_t{4} * t;
+        const uint32_t at = index.find(sorted(c[face[0]], c[face[1]], c[face[2]]));
+        if (at != kNone) out[at] = materials.of[t];
       }
     return out;
   }
