@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "body/make_surface.h"
 #include "core/error.h"
 #include "plugin/context.h"
 
@@ -12,8 +13,6 @@ namespace {
 
 // Cells that may exceed the number in the scene, since so few cost little.
 constexpr uint32_t kCheapCells = 1000;
-// Longest edge of a surface that is filled, over that of its cells (doc/decisions/meshes_and_labels.md).
-constexpr double kLongestEdge = 2.5;
 // m; a body that is longer is asked for the unit of its file.
 constexpr double kLongestBody = 10;
 
