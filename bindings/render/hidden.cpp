@@ -6,10 +6,10 @@
 namespace render {
 namespace {
 
-constexpr size_t kPlaces = 64;                 // of a surface, at which the line of sight is asked
+constexpr size_t kPlaces = 64;                    // of a surface, at which the line of sight is asked
 constexpr double kSome = 0.7, kNearlyAll = 0.95;  // shares of them
-constexpr float kLeft = 0.3f;                  // of a solid that hides a body completely
-constexpr double kBefore = 0.999;              // of the way: what a place touches does not hide it
+constexpr float kLeft = 0.3f;                     // of a solid that hides a body completely
+constexpr double kBefore = 0.999;                 // of the way: what a place touches does not hide it
 
 // Between the segments a + s d and b + t e, 0 <= s, t <= 1.
 double distance(const Vec &a, const Vec &d, const Vec &b, const Vec &e) {
