@@ -27,6 +27,9 @@ int report_mesh(const Globals &globals, const std::string &file, const MeshSessi
 
 // Where `out` cannot hold how much of each cell is material, and the mesh knows it: the sentence about it.
 std::string lost_shares(dfm_tetmesh cells, const std::string &out);
+// A mesh that is longer than most bodies: what to do if its file, which names no unit, is in millimeters.
+// Else empty.
+std::string unit_hint(const double lo[3], const double hi[3]);
 std::vector<std::string> lines_of(const char *text);  // what the library's infos hold as one text
 // whether a terminal hears how long it takes
 inline bool told(const Globals &globals) { return !globals.quiet && !globals.json; }

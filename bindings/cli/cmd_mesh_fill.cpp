@@ -116,6 +116,9 @@ int fill(const Globals &globals, const std::string &in, const std::string &out, 
   }
   filled.seconds = seconds_since(begin);
   if (!measure(s.surface, s.cells, filled)) return fail(dfm_last_error());
+  if (const std::string hint = unit_hint(filled.surface.lo, filled.surface.hi);
+      !filled.imported && !hint.empty())
+    filled.warnings.push_back(hint);
   if (const std::string lost = lost_shares(s.cells, out); !lost.empty())
     filled.warnings.push_back("not kept: " + lost);
   if (globals.json) print_json(in, out, cells, filled);

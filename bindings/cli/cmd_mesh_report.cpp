@@ -36,7 +36,7 @@ struct Report {
 };
 
 std::string text(const char *format, double x) {
-  char line[64];
+  char line[200];
   std::snprintf(line, sizeof line, format, x);
   return line;
 }
@@ -264,6 +264,15 @@ void print_table(const std::string &file, const Report &r) {
 
 }  // namespace
 
+std::string unit_hint(const double lo[3], const double hi[3]) {
+  const double longest = std::max({hi[0] - lo[0], hi[1] - lo[1], hi[2] - lo[2]});
+  if (longest <= 10) return "";
+  return text(
+      "it is %.3g m long: if the file is in millimeters, give its body \"pose\": {\"scale\": 0.001} "
+      "in a scene, or scale=0.001 in Python",
+      longest);
+}
+
 std::vector<std::string> lines_of(const char *text) {
   std::vector<std::string> out;
   for (const char *c = text; *c;) {
@@ -281,6 +290,7 @@ int report_mesh(const Globals &globals, const std::string &file, const MeshSessi
   if (!(session.cells ? describe_cells(session.cells, asked, r)
                       : describe_surface(session.surface, asked, r)))
     return fail(dfm_last_error());
+  if (const std::string hint = unit_hint(r.lo, r.hi); asked && !hint.empty()) r.warnings.push_back(hint);
   if (globals.json) {
     print_json(file, r, notes);
   } else if (asked) {

@@ -49,8 +49,10 @@ class Filler {
       take(*row_of(type_, "sigma0"), *p);
     kappa();
     sigma1_form();
-    // A case that states no curve means that the level falls at once.
-    if (const dfm_param *row = row_of(type_, "v_s"); row && !given("v_s")) put("v_s", {row->min});
+    // A case that states no curve means that the level falls at once. What a law of somebody else means by
+    // its v_s is not known.
+    if (const dfm_param *row = row_of(type_, "v_s"); row && shipped(type_) && !given("v_s"))
+      put("v_s", {row->min});
     for (const char *key : {"mu_C", "sigma0"})
       if (shipped(type_) && row_of(type_, key) && !given(key) && !given("mu"))
         throw Failure(kBadInput,

@@ -12,6 +12,7 @@
 
 #include "geometry.h"
 #include "gl.h"
+#include "hidden.h"
 #include "shaders.h"
 
 namespace render {
@@ -99,10 +100,10 @@ void batch(Frame &frame, Batch b, F add) {
   frame.batches.push_back(b);
 }
 
-Batch solid(const Look &look) {
+Batch solid(const Look &look, float shown = 1) {
   Batch b;
-  b.alpha = std::clamp(look.alpha, 0.f, 1.f);
-  b.shadow = b.alpha >= 1;
+  b.alpha = std::clamp(look.alpha, 0.f, 1.f) * shown;
+  b.shadow = look.alpha >= 1;
   return b;
 }
 
@@ -228,14 +229,17 @@ Frame compose(const Scene &scene, double aspect, double pixels_high) {
     batch(frame, b, [&] { frame.shape.surface(s); });
     if (s.scalar && s.through > 0) add_values(s, frame);
   }
+  const Hidden hidden(scene, frame.view.eye + middle);
   for (const Box &b : scene.boxes)
-    batch(frame, solid(b.look), [&] {
+    batch(frame, solid(b.look, hidden.shown(b)), [&] {
       Vec axes[3];
       axes_of(b, axes);
       frame.shape.box(vec(b.pose.position), axes, b.look.rgb);
     });
-  for (const Sphere &s : scene.spheres) batch(frame, solid(s.look), [&] { frame.shape.sphere(s); });
-  for (const Capsule &c : scene.capsules) batch(frame, solid(c.look), [&] { frame.shape.capsule(c); });
+  for (const Sphere &s : scene.spheres)
+    batch(frame, solid(s.look, hidden.shown(s)), [&] { frame.shape.sphere(s); });
+  for (const Capsule &c : scene.capsules)
+    batch(frame, solid(c.look, hidden.shown(c)), [&] { frame.shape.capsule(c); });
   add_planes(scene, frame, extent);
   fit_casters(frame, now.empty() ? extent : now);
   View world = frame.view;

@@ -270,6 +270,24 @@ TEST_P(Pixels, HiddenValues_AreSeenThroughAsFarAsAsked) {
   EXPECT_NEAR(shown[2], 0.25 * gray[2] + 0.75 * 255 * c.b, 6);
 }
 
+TEST_P(Pixels, SolidThatHidesABody_IsSeenThroughAndNoOther) {
+  const Ball ball(0, 0, 1, 0.6);
+  const auto behind = [&](double x, char shape) {
+    Scene s = scene_of({ball.surface(0.9f, 0.1f, 0.1f)}, false);
+    const double y = -3, z = 1.5, half = 0.7;
+    if (shape == 'b') s.boxes = {{{{x, y, z}, {}}, {half, 0.05, half}, {}}};
+    if (shape == 's') s.spheres = {{{x, y, z}, half, {}}};
+    if (shape == 'c') s.capsules = {{{x, y, z - 1}, {x, y, z + 1}, half, {}}};
+    const Image p = draw(s);
+    const uint8_t *const at = pixel(p, kWide / 2, kHigh / 2);
+    return at[0] - at[1];
+  };
+  for (const char shape : {'b', 's', 'c'}) {
+    EXPECT_GT(behind(0, shape), 40) << shape;
+    EXPECT_LT(behind(0.65, shape), 10) << shape << ": half of the ball is seen beside it";
+  }
+}
+
 TEST_P(Pixels, SolidShapes_AreDrawnAtTheGivenPose) {
   for (const char shape : {'b', 's', 'c'}) {
     Scene s = scene_of({});

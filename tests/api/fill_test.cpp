@@ -1,6 +1,7 @@
 // Filling through the public door and the command: shares, warnings, refusals.
 #include <cmath>
 
+#include "logged_context.h"
 #include "support.h"
 #include "world.h"
 
@@ -35,6 +36,46 @@ TEST(TetmeshFill, Torus_SharesSumUpToItsVolume) {
   for (uint32_t t = 0; t < info.ntet; ++t) sum += share[t] * info.volume / info.ntet;
   EXPECT_NEAR(sum, skin.volume, 1e-9 * skin.volume);
   EXPECT_GT(info.volume, 1.1 * skin.volume);
+}
+
+// Twelve triangles around many cells: only a scene splits them.
+TEST(TetmeshFill, BodyWithTrianglesMuchLargerThanItsCells_IsToldToSplitThem) {
+  const auto told = [](uint32_t triangles) {
+    test::LoggedContext context;
+    const double size[3] = {0.2, 0.2, 0.2};
+    dfm_trimesh surface = 0;
+    dfm_tetmesh mesh = 0;
+    test::ok(dfm_trimesh_make(context.context, "beam", size, triangles, &surface));
+    test::ok(dfm_tetmesh_fill(surface, 1500, &mesh));
+    dfm_tetmesh_info cells{};
+    cells.size = sizeof cells;
+    dfm_trimesh_info skin{};
+    skin.size = sizeof skin;
+    dfm_surface_def worn{};
+    worn.size = sizeof worn;
+    dfm_body_def body = dfm_body_def_default();
+    test::ok(dfm_tetmesh_get_info(mesh, &cells));
+    test::ok(dfm_trimesh_get_info(surface, &skin));
+    test::ok(dfm_tetmesh_data(mesh, &body.points, &body.tets, nullptr));
+    test::ok(dfm_tetmesh_share(mesh, &body.cell_share));
+    test::ok(dfm_trimesh_data(surface, &worn.points, &worn.triangles, nullptr));
+    body.npoint = cells.npoint;
+    body.ntet = cells.ntet;
+    worn.npoint = skin.npoint;
+    worn.ntriangle = skin.ntriangle;
+    body.surface = &worn;
+    const dfm_world_def def = dfm_world_def_default();
+    dfm_world world = 0;
+    dfm_body made = 0;
+    test::ok(dfm_world_create(context.context, &def, &world));
+    test::ok(dfm_body_create(world, &body, &made));
+    return context.log;
+  };
+  const std::string coarse = told(12);
+  EXPECT_NE(coarse.find("its surface has edges of up to 0.283 m"), std::string::npos) << coarse;
+  EXPECT_NE(coarse.find("split edges longer than"), std::string::npos) << coarse;
+  const std::string fine = told(1000);
+  EXPECT_EQ(fine.find("split edges"), std::string::npos) << fine;
 }
 
 TEST(TetmeshFill, MeshThatWasNotFilled_HasNoShare) {

@@ -178,6 +178,18 @@ TEST(FrictionCommand, ThirdPartyLaw_RunsByPathAndItsMissingKeysAreNamed) {
   for (size_t i = 1; i < z.size(); ++i) ASSERT_NEAR(f[i], 1e4 * z[i], 1e-12);
 }
 
+TEST(FrictionCommand, ThirdPartyLawWithoutASpeedInTheCase_KeepsItsOwn) {
+  const auto loop = [](const std::string &params) {
+    return file("own_speed.json", R"({"law": "coulomb", "normal_force": 10, "T": 1, "dt": 0.125,
+ "params": {)" + params + R"(}, "input": {"kind": "sine_velocity", "V": 0.1, "freq": 1}})");
+  };
+  const auto largest = [&](const std::string &params) {
+    return test::rig::run(loop(params), {"--law", tiny("tiny_smooth")}).figure("F_max");
+  };
+  EXPECT_NEAR(largest("\"mu\": 0.5"), 2.5, 1e-3);
+  EXPECT_NEAR(largest("\"mu\": 0.5, \"v_s\": 0.3"), 1.25, 1e-3);
+}
+
 TEST(FrictionCommand, StrangeKeyForOurLaw_IsNamedWithTheNearest) {
   const test::CommandResult r = test::deform(
       {"friction", file("strange.json", push("\"F_S\": 1.5", "\"F_S\": 1.5, \"sigma_2\": 0.4"))});

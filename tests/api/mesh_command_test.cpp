@@ -194,6 +194,21 @@ TEST(MeshCommand, InfoOfASurface_ReportsHolesGroupsAndRepairs) {
     EXPECT_TRUE(has(json.out, word)) << word << " not in\n" << json.out;
 }
 
+// A file of triangles names no unit: a part of 68 mm is read as one of 68 m.
+TEST(MeshCommand, MeshOfManyMeters_IsAskedForMillimeters) {
+  const std::string large = folder() + "/millimeters.stl", small = folder() + "/meters.stl";
+  for (const auto &[file, radius] : {std::pair{large, "34"}, {small, "0.034"}})
+    ASSERT_EQ(
+        test::deform({"mesh", "make", "ball", "--surface", "--radius", radius, "--out", file}).exit_code, 0);
+  const std::string hint = "if the file is in millimeters, ", cells = folder() + "/millimeters.vtu";
+  const auto told = test::deform({"mesh", "info", large});
+  EXPECT_TRUE(has(told.out, "warning: it is 67.7 m long: " + hint)) << told.out;
+  const auto filled = test::deform({"mesh", "fill", large, "--cells", "300", "--out", cells});
+  EXPECT_TRUE(has(filled.out, "warning: it is 67.7 m long: " + hint)) << filled.out;
+  EXPECT_FALSE(has(test::deform({"mesh", "info", small}).out, hint));
+  EXPECT_FALSE(has(test::deform({"mesh", "fill", small, "--cells", "300", "--out", cells}).out, hint));
+}
+
 TEST(MeshCommand, ConvertCellsToASurface_WritesAndReportsTheBoundary) {
   const std::string ball = folder() + "/body.msh", skin = folder() + "/skin.stl";
   ASSERT_EQ(test::deform({"mesh", "make", "ball", "--out", ball, "--cells", "160", "--quiet"}).exit_code, 0);

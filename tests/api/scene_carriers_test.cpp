@@ -340,6 +340,24 @@ TEST(SceneFill, CellsBySize_AndByDefault) {
       << silent.err;
 }
 
+// box.obj is 0.2 m high.
+TEST(SceneFill, FileOfManyMeters_IsAskedForMillimetersUnlessTheSceneSaysItsScale) {
+  std::string large = kBoxObj;
+  for (size_t at = 0; (at = large.find("0.", at)) != std::string::npos;)
+    large.replace(at, 3, large.substr(at + 2, 1) + "00");
+  test::write_file(folder() + "/millimeters.obj", large);
+  const auto told = [](const std::string &mesh, const std::string &pose) {
+    return test::deform({"explain", scene(), "--set", "/bodies/0/mesh=" + mesh, "--set", kFill, "--set",
+                         "/bodies/0/pose=" + pose})
+        .err;
+  };
+  const std::string hint = ": if millimeters.obj is in millimeters, set \"scale\": 0.001 in its \"pose\"";
+  EXPECT_NE(told("millimeters.obj", "{}").find(hint), std::string::npos) << told("millimeters.obj", "{}");
+  for (const char *scale : {"{\"scale\": 0.001}", "{\"scale\": 1}"})
+    EXPECT_EQ(told("millimeters.obj", scale).find("millimeters,"), std::string::npos) << scale;
+  EXPECT_EQ(told("box.obj", "{}").find("millimeters"), std::string::npos);
+}
+
 TEST(SceneFill, SurfacesMayBeOthers) {
   const Loaded boundary({kBox, kFill, R"(/bodies/0/surface={"from": "boundary"})"}),
       mls({kBox, kFill, R"(/bodies/0/surface={"coupling": "mls", "support": 2.5})"}),

@@ -109,7 +109,9 @@ INSTANTIATE_TEST_SUITE_P(
     Plugin, BrokenLaw,
     testing::Values(
         Case{"second_symbol", "V01", "broken_helper"}, Case{"wrong_abi", "V02", "draft 7"},
-        Case{"deaf_to_abi", "V02", "cannot know"}, Case{"no_source", "V03", "\"source\""},
+        Case{"deaf_to_abi", "V02", "cannot know"}, Case{"rows_nowhere", "V02", "row 1 of nparam 2"},
+        Case{"row_too_many", "V03", "row 3 of nparam 3"},
+        Case{"rows_of_another_size", "V03", "row 2 of nparam 2"}, Case{"no_source", "V03", "\"source\""},
         Case{"without_eval", "V03", "set dfm_friction.eval"}, Case{"fills_reserved", "V03", "9 in reserved"},
         Case{"misspelt_promise", "V03", "\"stiction\""},
         Case{"refuses_its_defaults", "V04", "must be above 0.9"},
@@ -200,7 +202,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 TEST(BrokenLaw, EveryBrokenLaw_IsInTheTable) {
   std::vector<std::string> known{
-      "sound",        "sound_rate_and_state", "model_sound",    "model_sound_stepper",
+      "sound",        "sound_rate_and_state", "model_sound",    "model_sound_stepper", "no_force_at_speed",
       "hangs_always", "crashes_always",       "sleeps_for_ever"};
   for (int s = 0; s < testing::UnitTest::GetInstance()->total_test_suite_count(); ++s)
     for (int t = 0; t < testing::UnitTest::GetInstance()->GetTestSuite(s)->total_test_count(); ++t) {
@@ -253,13 +255,28 @@ TEST(BrokenLaw, ThatAlwaysCrashes_EndsAfterTwoRulesAndTheOneThatSaysWhere) {
   EXPECT_NE(r.out.find("two rules crashed or did not return"), std::string::npos) << r.out;
 }
 
+// NaN from a speed on is no wrong sign: the sentence names the speed.
+TEST(BrokenLaw, ForceThatIsNotFiniteAtSpeed_IsToldWithTheSpeed) {
+  const test::CommandResult r =
+      check(broken("no_force_at_speed"), {"--only", "F03", "--only", "F12", "--only", "F16"});
+  EXPECT_EQ(rules_that("FAIL", r.out), (std::vector<std::string>{"F03", "F12", "F16"})) << r.out;
+  for (const char *id : {"F12", "F16"})
+    EXPECT_NE(sentence(id, r.out).find("the force is not finite"), std::string::npos) << r.out;
+  EXPECT_NE(sentence("F03", r.out).find("not finite at a slip of 1.78 m/s"), std::string::npos) << r.out;
+  const std::string bounded = sentence("F12", r.out);
+  std::smatch speed;
+  ASSERT_TRUE(std::regex_search(bounded, speed, std::regex(R"(not finite .* at a slip of (\S+) m/s)")))
+      << r.out;
+  EXPECT_GT(std::stod(speed[1]), 1) << r.out;
+}
+
 // A function that is missing is named once; what would call it is not run.
 TEST(BrokenLaw, WithoutEval_IsToldSoInOneSentence) {
   const test::CommandResult r = check(broken("without_eval"));
   EXPECT_EQ(rules_that("FAIL", r.out), std::vector<std::string>{"V03"}) << r.out;
   EXPECT_EQ(r.out.find("SIG"), std::string::npos) << r.out;
   EXPECT_LE(std::count(r.out.begin(), r.out.end(), '\n'), 9) << r.out;
-  EXPECT_NE(r.out.find("  the other rules are skipped: functions are missing (V03 says which)\n"),
+  EXPECT_NE(r.out.find("  the other rules are skipped: it cannot be used (V03 says why)\n"),
             std::string::npos)
       << r.out;
   // V03 says which, even where another rule was asked for

@@ -162,6 +162,11 @@ class Arguments(unittest.TestCase):
                      lambda: body(fields={"young": np.ones(7)})),
                     ("surface is a deform.TriMesh or the path of its file, not a ndarray",
                      lambda: body(surface=np.zeros((3, 3)))),
+                    ("surface is a deform.TriMesh or the path of its file, not a ndarray",
+                     lambda: deform.TetMesh.fill(np.zeros((3, 3)))),
+                    (r"size is 1; expected a list of numbers in m: \[x, y, z\]",
+                     lambda: deform.TetMesh.beam(1)),
+                    (r"size is \[1, 1, 1, 1\]; expected", lambda: deform.TetMesh.beam([1, 1, 1, 1])),
                     ("mesh of an obstacle is a deform.TriMesh .*, not a TetMesh",
                      lambda: world.add_obstacle("mesh", mesh=mesh)),
                     ("restore takes the bytes .*, not a str", lambda: world.restore("saved")),
@@ -289,6 +294,8 @@ class Arguments(unittest.TestCase):
                 world.step(1e-3)
                 world.restore(buffer)
                 self.assertEqual(world.hash, start)
+            with self.assertRaisesRegex(deform.FormatError, r"3 bytes .* snapshot, .*World\.snapshot\(\)"):
+                world.restore(b"abc")
             self.assertEqual(pickle.loads(pickle.dumps(ball.positions)).shape, ball.positions.shape)
 
     def test_mesh_says_what_makes_one(self):

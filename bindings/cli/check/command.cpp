@@ -26,7 +26,7 @@ struct Line {
 };
 struct TypeName {
   uint32_t kind;
-  bool complete;  // has the functions that every use of it calls
+  bool usable;  // its parameters can be read, and it has the functions that every use of it calls
   std::string id;
 };
 struct Report {
@@ -36,7 +36,7 @@ struct Report {
 };
 
 const char *const kNotLoaded = "it does not load (V02 says why)";
-const char *const kIncomplete = "functions are missing (V03 says which)";
+const char *const kUnusable = "it cannot be used (V03 says why)";
 const char *const kEnded = "two rules crashed or did not return; fix them first";
 
 // The rules of a file that call the functions of its types.
@@ -87,15 +87,14 @@ std::string digest_text(const Request &request) {
                                                                                    : digest(subject)));
 }
 
-// "1 1 org.example.law" by lines: what the file offers, kind, whether it is complete, id.
+// "1 1 org.example.law" by lines: what the file offers, kind, whether it can be used, id.
 std::string listed(const std::string &file) {
   std::string out;
   try {
     const Plugin plugin(file);
     for (uint32_t i = 0; i < plugin.types().size(); ++i)
       out += std::to_string(plugin.types()[i]->kind) +
-             (missing_function(*plugin.types()[i]).empty() ? " 1 " : " 0 ") + name_of(*plugin.types()[i], i) +
-             "\n";
+             (unusable(*plugin.types()[i]).empty() ? " 1 " : " 0 ") + name_of(*plugin.types()[i], i) + "\n";
   } catch (const Broken &) {}
   return out;
 }
@@ -163,8 +162,9 @@ void print_line(const Line &l, bool quiet) {
   std::fflush(stdout);
 }
 
-// What stops one rule stops most of them: a missing function, which V03 names, and an eval that crashes or
-// does not come back, which two rules have seen. The other rules are then skipped, and one line says why.
+// What stops one rule stops most of them: a missing function or a parameter table that cannot be read, which
+// V03 names, and an eval that crashes or does not come back, which two rules have seen. The other rules are
+// then skipped, and one line says why.
 class Rules {
  public:
   Rules(const Globals &globals, const Request &request, const std::vector<const Rule *> &wanted)
@@ -172,27 +172,26 @@ class Rules {
   Report run() {
     if (!globals_.json) std::printf("%s\n", request_.file.c_str());
     list_types();
-    const bool complete = std::all_of(report_.types.begin(), report_.types.end(),
-                                      [](const TypeName &type) { return type.complete; });
+    const bool usable = std::all_of(report_.types.begin(), report_.types.end(),
+                                    [](const TypeName &type) { return type.usable; });
     for (const Rule *rule : wanted_)
-      if (!rule->by_type)
-        one(report_.file, *rule, -1, !complete && uses_types(*rule) ? kIncomplete : nullptr);
+      if (!rule->by_type) one(report_.file, *rule, -1, !usable && uses_types(*rule) ? kUnusable : nullptr);
       else if (report_.types.empty()) add(report_.file, {rule, {Result::skip, kNotLoaded}, 0});
     say_skipped(kNotLoaded);
     // Rules that cannot run because there is no law are left out: the rule that reports the reason runs
-    // beside them. So are those that a missing function stops.
+    // beside them. So are those of a type that cannot be used.
     if (report_.types.empty() && !wants("V02")) one(report_.file, *find_rule("V02"), -1);
     for (size_t t = 0; t < report_.types.size(); ++t) {
       const TypeName &type = report_.types[t];
       report_.by_type.emplace_back();
       if (!globals_.json) std::printf("%s %s\n", kind_name(type.kind), type.id.c_str());
       const Rule *const names = find_rule("V03");
-      if (!type.complete && !wants("V03")) one(report_.by_type.back(), *names, static_cast<int>(t));
+      if (!type.usable && !wants("V03")) one(report_.by_type.back(), *names, static_cast<int>(t));
       for (const Rule *rule : wanted_)
         if (rule->by_type && asked_of(*rule, type.kind))
           one(report_.by_type.back(), *rule, static_cast<int>(t),
-              type.complete || rule == names ? nullptr : kIncomplete);
-      say_skipped(kIncomplete);
+              type.usable || rule == names ? nullptr : kUnusable);
+      say_skipped(kUnusable);
       if (!globals_.json && type.kind == DFM_KIND_SOLVER)
         std::printf("  rules for solvers are not available yet\n");
     }
@@ -236,7 +235,7 @@ class Rules {
     to.push_back(std::move(line));
     const Verdict &verdict = to.back().verdict;
     if (verdict.result == Result::skip)
-      for (const char *why : {kNotLoaded, kIncomplete, kEnded})
+      for (const char *why : {kNotLoaded, kUnusable, kEnded})
         if (verdict.detail == why) {
           skipped_.insert(why);
           return;

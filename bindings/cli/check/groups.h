@@ -10,8 +10,9 @@ std::string variable_at(const std::string &file, uint64_t address);
 std::string exports_one_symbol(const Subject &);
 std::string refuses_unknown_abi(const Subject &);
 std::string metadata_complete(const Subject &);
-// A function that every use of the type calls and that is missing, as the sentence of V03; empty: none.
-std::string missing_function(const dfm_type &type);
+// Why nothing can use the type, as the sentence of V03: a parameter row that cannot be read, or a function
+// that every use of it calls and that is missing. Empty: none.
+std::string unusable(const dfm_type &type);
 std::string parameters_sane(const Subject &);
 // rules_process.cpp: what it does to the process it runs in
 std::string spelt(const std::string &name);  // a function as its author wrote it

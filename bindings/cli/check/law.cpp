@@ -148,6 +148,21 @@ void Lanes::must(double dt) {
         dfm_status_name(status), dt);
 }
 
+std::string Lanes::inputs(uint32_t i) const {
+  std::string said;
+  if (law.needs(DFM_NEED_VT)) said += text(" at a slip of %.3g m/s", std::hypot(vt[i], vt[stride + i]));
+  if (law.needs(DFM_NEED_FN))
+    said += text("%s a normal force of %.3g N", said.empty() ? " at" : " and", fn[i]);
+  return said;
+}
+
+void Lanes::must_be_finite() const {
+  for (uint32_t i = 0; i < n; ++i)
+    if (!std::isfinite(ft(i)))
+      broken("the force is not finite%s in a step of %g s; return a finite force for every finite slip",
+             inputs(i).c_str(), in.dt);
+}
+
 void Lanes::commit() {
   std::copy_n(out_state, size_t(law.nstate) * stride, state);
   for (uint32_t i = 0; i < n; ++i) dwell[i] = mode[i] == 1 ? dwell[i] + in.dt : 0;

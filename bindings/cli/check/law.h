@@ -39,13 +39,15 @@ struct Lanes {
   Lanes(const Law &law, uint32_t n, uint32_t gap = 0);  // gap: lanes between n rounded to 8 and the stride
   Lanes(const Lanes &) = delete;
   Lanes &operator=(const Lanes &) = delete;
-  dfm_status ask(double dt);  // evaluates; the state stays
-  void must(double dt);       // the same, and Broken where the law does not return DFM_OK
-  void commit();              // the trial state becomes the state
+  dfm_status ask(double dt);    // evaluates; the state stays
+  void must(double dt);         // the same, and Broken where the law does not return DFM_OK
+  void must_be_finite() const;  // the force; else Broken, with the inputs of the lane
+  void commit();                // the trial state becomes the state
   // trial slip; with FT_STOP a stopping force far beyond any level, against it
   void slip(uint32_t i, double x, double y);
-  double ft(uint32_t i) const;  // norm
-  void spoil_padding();         // NaN in the input lanes beyond n
+  double ft(uint32_t i) const;           // norm
+  std::string inputs(uint32_t i) const;  // for a sentence: " at a slip of .."
+  void spoil_padding();                  // NaN in the input lanes beyond n
   // A lane's inputs from another batch, and whether its outputs are those of another lane, bit by bit.
   void take(uint32_t i, const Lanes &from, uint32_t k);
   bool same(uint32_t i, const Lanes &other, uint32_t k) const;

@@ -149,8 +149,12 @@ void Plugin::copy_type(const void *from, uint32_t number) {
   if (type.params && type.nparam <= 4096 && width >= offsetof(dfm_param, names) && width <= 65536)
     for (uint32_t i = 0; i < type.nparam; ++i) {
       dfm_param row{};
-      std::memcpy(&row, reinterpret_cast<const char *>(type.params) + size_t(i) * width,
-                  std::min<size_t>(width, sizeof row));
+      const char *const at = reinterpret_cast<const char *>(type.params) + size_t(i) * width;
+      const std::string fault =
+          Fenced::guard([&] { std::memcpy(&row, at, std::min<size_t>(width, sizeof row)); });
+      if (!fault.empty())
+        broken("type #%u: row %u of nparam %u of its parameter table lies outside its memory; %s", number,
+               i + 1, type.nparam, kSizeOfTable);
       copy->rows.push_back(row);
     }
   if (copy->rows.size() != type.nparam)

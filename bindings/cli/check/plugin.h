@@ -33,6 +33,10 @@ class Host {
   std::string said_;
 };
 
+// What mends a table of parameters that is read where it has no rows.
+inline constexpr const char *kSizeOfTable =
+    "set nparam to its number of rows and param_size to sizeof(dfm_param)";
+
 class Plugin {
  public:
   // throws Broken where it cannot be opened, refuses, or speaks another ABI

@@ -96,6 +96,7 @@ void stays_on_the_line(const Law &law, const Scales &s) {
       const double w = s.length() / h * (step < 20 ? 0.05 : step < 40 ? 1 : 20) * (step % 13 == 12 ? -1 : 1);
       for (uint32_t i = 0; i < b.n; ++i) b.slip(i, w * kWays[i][0], w * kWays[i][1]);
       b.must(h);
+      b.must_be_finite();
       b.commit();
       for (uint32_t i = 0; i < b.n; ++i) {
         const double across = b.out_ft[b.stride + i] * kWays[i][0] - b.out_ft[i] * kWays[i][1];

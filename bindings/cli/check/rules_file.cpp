@@ -17,6 +17,7 @@
 #include "check/law.h"
 #include "check/model.h"
 #include "check/runner.h"
+#include "check/watch.h"
 #include "deform/plugin_draft.h"
 #include "file.h"
 #include "messages.h"
@@ -347,9 +348,44 @@ void tables_sound(const Subject &subject) {
         "it compares");
 }
 
+bool is_text(const char *text) {
+  constexpr size_t kLongest = 4096;
+  size_t n = 0;
+  for (; n < kLongest && text[n]; ++n)
+    if (std::iscntrl(static_cast<unsigned char>(text[n])) &&
+        !std::isspace(static_cast<unsigned char>(text[n])))
+      return false;
+  return n < kLongest;
+}
+
+// What the members of the row point to is text. It is not where nparam or param_size is wrong.
+bool readable(const dfm_param &row) {
+  bool all = false;
+  const std::string fault = Fenced::guard([&] {
+    for (const char *text : {row.key, row.label, row.unit})
+      if (text && !is_text(text)) return;
+    if (row.flags & DFM_PARAM_ENUM)
+      for (uint32_t k = 0; row.names && k < 4096 && row.names[k]; ++k)
+        if (!is_text(row.names[k])) return;
+    all = true;
+  });
+  return all && fault.empty();
+}
+
+std::string unreadable_row(const dfm_type &type) {
+  for (uint32_t i = 0; i < type.nparam; ++i) {
+    const bool is_row = readable(type.params[i]);
+    if (is_row && type.params[i].key && *type.params[i].key) continue;
+    return text("row %u of nparam %u of its parameter table %s; %s", i + 1, type.nparam,
+                is_row ? "has no key" : "holds no readable key, label and unit", kSizeOfTable);
+  }
+  return "";
+}
+
 }  // namespace
 
-std::string missing_function(const dfm_type &type) {
+std::string unusable(const dfm_type &type) {
+  if (const std::string row = unreadable_row(type); !row.empty()) return row;
   if (type.kind == DFM_KIND_FRICTION) {
     return static_cast<const dfm_friction *>(type.ops)->eval
                ? ""
@@ -381,7 +417,7 @@ std::string missing_function(const dfm_type &type) {
 
 std::string metadata_complete(const Subject &subject) {
   const dfm_type &type = *subject.type;
-  if (const std::string lacks = missing_function(type); !lacks.empty()) broken("%s", lacks.c_str());
+  if (const std::string why = unusable(type); !why.empty()) broken("%s", why.c_str());
   const struct {
     const char *key, *text, *remedy;
   } fields[] = {{"name", type.name, "the name that lists show"},
@@ -423,12 +459,10 @@ namespace {
 
 void row_sane(const dfm_type &type, uint32_t i) {
   const dfm_param &row = type.params[i];
-  const std::string key = row.key ? row.key : "";
+  const std::string key = row.key;
   const char *k = key.c_str();
-  if (key.empty()) broken("row %u of the parameter table has no key; give it one", i);
   for (uint32_t j = 0; j < i; ++j)
-    if (type.params[j].key && key == type.params[j].key)
-      broken("parameter \"%s\" is listed twice; rename one", k);
+    if (key == type.params[j].key) broken("parameter \"%s\" is listed twice; rename one", k);
   if (!row.label || !*row.label || !row.unit || !*row.unit)
     broken("parameter \"%s\" lacks a label or a unit; the unit of a pure number is \"1\"", k);
   if (!std::isfinite(row.min) || !std::isfinite(row.max) || !(row.min <= row.def && row.def <= row.max))

@@ -102,6 +102,18 @@ std::string turns_with_frame(const Subject &subject) {
 
 namespace {
 
+// A new contact at every speed, the slowest first: the first at which the force is not finite is named.
+void finite_at_every_speed(const Law &law, const Scales &s) {
+  const std::vector<double> speeds = decades(1e-6, 100, 4);
+  Lanes b(law, static_cast<uint32_t>(speeds.size()));
+  press(b, s.fn);
+  for (uint32_t i = 0; i < b.n; ++i) b.slip(i, speeds[i], 0);
+  for (const double h : {1e-5, 1e-3, 1.0 / 60}) {
+    b.must(h);
+    b.must_be_finite();
+  }
+}
+
 // Loops of slip: to and fro, round, and eight-shaped; the work of the last of three turns.
 void loops_dissipate(const Law &law, const Scales &s) {
   constexpr int kPoints = 240;
@@ -121,6 +133,7 @@ void loops_dissipate(const Law &law, const Scales &s) {
           b.slip(i, dx / h, (i % kinds == 0 ? 0 : i % kinds == 1 ? round : eight) / h);
         }
         b.must(h);
+        b.must_be_finite();
         b.commit();
         for (uint32_t i = 0; turn == 2 && i < n; ++i) {
           // slip() pushes with far more than the law holds, so a law that stops a contact anyway did not let
@@ -165,6 +178,7 @@ void gives_back_no_more(const Law &law, const Scales &s, Random &random) {
       }
     }
     b.must(h);
+    b.must_be_finite();
     b.commit();
     for (uint32_t i = 0; i < kRuns; ++i) {
       // a law that holds (FT_STOP, mode 1) has no slip in this step
@@ -198,6 +212,7 @@ std::string dissipates(const Subject &subject) {
   const Law law(subject, lively_params(subject));
   if (!law.needs(DFM_NEED_VT)) skip("the law does not use the slip (no DFM_NEED_VT)");
   const Scales s = scales_of(law);
+  finite_at_every_speed(law, s);
   loops_dissipate(law, s);
   if (!law.has(DFM_FRIC_PASSIVE)) return "loops alone: the law is not flagged DFM_FRIC_PASSIVE";
   Random random(subject.seed);
@@ -347,9 +362,12 @@ std::string bounded_at_every_step(const Subject &subject) {
         double sum = 0;
         for (uint32_t c = 0; c < law.nstate; ++c) sum += std::fabs(b.state[size_t(c) * b.stride + i]);
         peak = std::max(peak, b.ft(i));
-        if (!std::isfinite(b.ft(i)) || !std::isfinite(sum))
-          broken("at steps of %g s force or state is not finite after %d steps; update the state implicitly",
-                 h, k + 1);
+        const bool finite = std::isfinite(b.ft(i));
+        if (!finite || !std::isfinite(sum))
+          broken("at steps of %g s the %s is not finite after %d steps%s; %s", h, finite ? "state" : "force",
+                 k + 1, b.inputs(i).c_str(),
+                 std::isfinite(sum) ? "return a finite force for every finite slip"
+                                    : "update the state implicitly");
         if (b.mode[i] > 2) broken("it writes mode %u; the host knows 0 open, 1 stick and 2 slip", b.mode[i]);
         if (!(b.limit[i] >= 0))
           broken("it writes a limit of %g N; write +inf for a force without a limit, and 0 for no force",

@@ -12,7 +12,7 @@ import numpy as np
 from . import _abi
 from ._context import Context, called, default_context
 from ._library import ArgumentError, OfThisProcess, check, encoded, lib, quick, sized
-from ._values import array_of, real, whole
+from ._values import KindError, array_of, real, whole
 
 
 def points_of(points: Any, what: str = "points") -> np.ndarray:
@@ -59,7 +59,14 @@ def _borrowed(keeper: Any, address: int | None, shape: tuple[int, ...], kind: An
 
 
 def _size(values: Sequence[float]) -> Any:
-    numbers = [real(value, "a size of the mesh") for value in values]
+    try:
+        given = list(values)
+    except TypeError:
+        given = []
+    if not 1 <= len(given) <= 3:
+        raise KindError(f"size is {values!r}; expected a list of numbers in m: [x, y, z] of a beam, or those "
+                        "that TriMesh.make names for its kind", "DFM_E_ARG")
+    numbers = [real(value, "a size of the mesh") for value in given]
     return (ctypes.c_double * 3)(*numbers, *([0.0] * (3 - len(numbers))))
 
 
@@ -161,8 +168,7 @@ class TetMesh(_Mesh):
     def fill(cls, surface: TriMesh | Any, cells: int = 5000) -> TetMesh:
         """Tetrahedra inside of a closed surface, given as a TriMesh or the path of its file. They reach out
         of the surface: give it to add_body too (surface=), which otherwise takes their jagged border."""
-        if not isinstance(surface, TriMesh):
-            surface = TriMesh.read(surface)
+        surface = surface_of(surface, "surface")
         out = ctypes.c_uint64()
         check(lib.dfm_tetmesh_fill(surface.handle, whole(cells, "cells", 1), ctypes.byref(out)))
         return cls(out.value, surface._context)

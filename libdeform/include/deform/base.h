@@ -38,8 +38,8 @@ DFM_API const char *dfm_version(int *major, int *minor, int *patch);
 /** Name of a status value, e.g. "DFM_E_ARG". Static storage. Threads: Any thread. Since 0.1. */
 DFM_API const char *dfm_status_name(dfm_status s);
 
-/** One sentence about the last call on this thread that returned a negative status: what was wrong, where,
- * what to do. Empty if no call has failed. Valid until the next failing call on this thread.
+/** One sentence about the last call on this thread that returned a negative status or, dfm_law_eval apart,
+ * DFM_DISCARD: what was wrong, where, what to do. Empty before the first. Valid until the next such call.
  * Threads: Any thread. Since 0.1. */
 DFM_API const char *dfm_last_error(void);
 

@@ -20,6 +20,11 @@ namespace dfm {
 void make_surface(const Memory &memory, uint32_t npoint, const double *rest, const uint32_t *boundary_tris,
                   uint32_t ntri, Surface &out);
 
+// Longest edge of the surface of a filled body, over the longest of its cells: contact with a plane acts at
+// the points of the surface, and a body that rests on few of its cells crushes them
+// (doc/decisions/meshes_and_labels.md).
+constexpr double kLongestEdge = 2.5;
+
 // Couples `surface`, built on its own points (all of them used, so that surfel s is point s), to phyxels. The
 // next gather computes x as N times the phyxels.
 void wear_coupling(Coupling &&coupling, Surface &surface);

@@ -255,12 +255,13 @@ struct Disc {  // triangular lattice in rings
   }
 };
 
-// Tries every number of rings, with the layers that give the number of cells and with those that give
-// near-equal edges.
+// Tries every number of rings, with the layers that give the number of cells, with those that give near-equal
+// edges, and with the nearest to the first that keep edges within 2:1.
 void choose_rings(double radius, double length, uint32_t cells, uint32_t *rings, uint32_t *layers) {
   double best = HUGE_VAL;
-  for (uint32_t n = 1; n == 1 || 18.0 * n * n <= std::max(4.0 * cells, 2e5); ++n)
-    for (const double wanted : {cells / (18.0 * n * n), length * n / radius}) {
+  for (uint32_t n = 1; n == 1 || 18.0 * n * n <= std::max(4.0 * cells, 2e5); ++n) {
+    const double asked = cells / (18.0 * n * n), even = length * n / radius;
+    for (const double wanted : {asked, even, std::clamp(asked, even / 2, 2 * even)}) {
       if (wanted > kMostCells / (18.0 * n * n)) continue;
       const uint32_t m = rounded(wanted);
       const double s = choice_score(apart(length / m, radius / n), 18.0 * n * n * m, cells);
@@ -270,6 +271,7 @@ void choose_rings(double radius, double length, uint32_t cells, uint32_t *rings,
         *layers = m;
       }
     }
+  }
   check_choice("cylinder", best < HUGE_VAL ? 18.0 * *rings * *rings * *layers : HUGE_VAL, cells);
 }
 

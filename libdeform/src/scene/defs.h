@@ -134,6 +134,7 @@ struct Body {
   dfm_pose pose = {};
   std::string on;  // the obstacle that it is put on; empty: it stays where its pose has it
   double scale = 1, velocity[3] = {}, spin[3] = {};
+  bool has_scale = false;  // the scene says it
   std::vector<Fix> fixes;
   std::vector<Force> forces;
   std::vector<Spring> springs;

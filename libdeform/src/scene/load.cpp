@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "body/make_surface.h"
 #include "core/error.h"
 #include "plugin/context.h"
 
@@ -12,8 +13,8 @@ namespace {
 
 // Cells that may exceed the number in the scene, since so few cost little.
 constexpr uint32_t kCheapCells = 1000;
-// Longest edge of a surface that is filled, over that of its cells (doc/decisions/meshes_and_labels.md).
-constexpr double kLongestEdge = 2.5;
+// m; a body that is longer is asked for the unit of its file.
+constexpr double kLongestBody = 10;
 
 // m. All cells of a lattice are alike, so the first one is enough.
 double longest_edge(const BodyMesh &mesh) {
@@ -213,7 +214,19 @@ BodyMesh MeshFiles::load(const Body &b) {
     if (!out.wears_skin) tell_of_steps(b, out);
     split_skin(out);
   }
+  if (out.filled && !b.has_scale) tell_of_unit(b, out);
   return out;
+}
+
+// Files of triangles name no unit, and most programs that write them count in millimeters.
+void MeshFiles::tell_of_unit(const Body &b, const BodyMesh &mesh) const {
+  double longest = 0;
+  for (int k = 0; k < 3; ++k) longest = std::max(longest, mesh.hi[k] - mesh.lo[k]);
+  if (longest > kLongestBody)
+    context_->logf(DFM_LOG_WARNING,
+                   "body '%s' is %.3g m long: if %s is in millimeters, set \"scale\": 0.001 in its \"pose\" "
+                   "(1 if it is in meters)",
+                   b.name.c_str(), longest, b.mesh.c_str());
 }
 
 // A cut needs the border of the cells as surface, which is not the shape that the file has.

@@ -367,6 +367,7 @@ Body read_body(const Node &node, ReadContext &context) {
   b.integrator = integrator_of(node);
   if (model.has("params")) b.params = read_params(model.member("params"), type);
   read_precision(model, b.params);
+  b.has_scale = node.has("pose") && node.member("pose").has("scale");  // reading fills in the default
   b.pose = read_pose(node, "pose", &b.scale);
   if (node.has("place")) {
     node.member("place").object("place");

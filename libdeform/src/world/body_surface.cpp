@@ -107,6 +107,25 @@ void couple(Body &b, const dfm_surface_def &def) {
   wear_coupling(std::move(c), b.surface);
 }
 
+// A scene splits them; here the triangles are the caller's.
+void tell_of_long_edges(const Body &b) {
+  double cells = 0, longest = 0;
+  for (size_t e = 0; e < b.edges.size(); e += 2)
+    cells = std::max(
+        cells, norm(load3(&b.p.rest[size_t{3} * b.edges[e]]) - load3(&b.p.rest[size_t{3} * b.edges[e + 1]])));
+  const Surface &s = b.surface;
+  for (size_t e = 0; e < s.edge.size(); e += 2)
+    longest =
+        std::max(longest, norm(load3(&s.x[size_t{4} * s.edge[e]]) - load3(&s.x[size_t{4} * s.edge[e + 1]])));
+  if (longest > kLongestEdge * (1 + 1e-6) * cells)
+    b.world->context->logf(
+        DFM_LOG_WARNING,
+        "body '%s': its surface has edges of up to %.3g m, and the cells that fill it of up "
+        "to %.3g m, so it will sink into what it touches; split edges longer than %.3g m, "
+        "or let a scene fill the body",
+        b.name.c_str(), longest, cells, kLongestEdge * cells);
+}
+
 }  // namespace
 
 void make_body_surface(Body &b, const dfm_surface_def *def) {
@@ -115,6 +134,7 @@ void make_body_surface(Body &b, const dfm_surface_def *def) {
     check_surface(*def, b.name.c_str());
     make_surface(m, def->npoint, def->points, def->triangles, def->ntriangle, b.surface);
     check_outward(b.surface, b.name.c_str());
+    if (!b.share.empty()) tell_of_long_edges(b);
     couple(b, *def);
   } else {
     const Array<uint32_t> boundary = boundary_triangles(m, b.ncell(), b.tets.data());

@@ -28,7 +28,10 @@ uint64_t check_head(const unsigned char *data, size_t bytes) {
   SnapshotHead head{};
   std::memcpy(&head, data, std::min(bytes, sizeof head));
   if (bytes < sizeof head.magic || std::memcmp(head.magic, kSnapshotMagic, sizeof head.magic - 1) != 0)
-    fail(DFM_E_FORMAT, "these %zu bytes are not a snapshot; take one with dfm_world_snapshot", bytes);
+    fail(
+        DFM_E_FORMAT,
+        "these %zu bytes are not a snapshot, expected those of dfm_world_snapshot (Python: World.snapshot())",
+        bytes);
   if (bytes < sizeof head)
     fail(DFM_E_FORMAT, "the snapshot is cut short: %zu bytes, the header alone has %zu; nothing was restored",
          bytes, sizeof head);

@@ -1,7 +1,7 @@
 /* The rest of a broken law: eval, tables and entry. Hooks, each a macro with a sound default: EFFECTS and
  * FLAGS what it promises, LANE the update of one contact, BEFORE_EVAL a statement at the head of eval,
- * AFTER_LANE one after each contact, STEP the step it uses, EVAL, CHECK, SLOTS, SOURCE; with OWN_ENTRY it
- * brings its entry. */
+ * AFTER_LANE one after each contact, STEP the step it uses, EVAL, CHECK, SLOTS, SOURCE, ROWS, NPARAM and
+ * PARAM_SIZE of its parameter table; with OWN_ENTRY it brings its entry. */
 #include "base.h"
 
 #ifndef SOURCE
@@ -30,6 +30,15 @@
 #endif
 #ifndef EVAL
 #define EVAL eval
+#endif
+#ifndef ROWS
+#define ROWS rows
+#endif
+#ifndef NPARAM
+#define NPARAM 2
+#endif
+#ifndef PARAM_SIZE
+#define PARAM_SIZE sizeof(dfm_param)
 #endif
 #ifndef SLOTS
 #define SLOTS {DFM_PER_CONTACT, 2, DFM_SLOT_TANGENT, 0}
@@ -69,7 +78,7 @@ static dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
   return DFM_OK;
 }
 
-static const dfm_param rows[] = {
+static const dfm_param rows[NPARAM] = {
     {"mu", "friction coefficient", "1", 0.0, 10.0, 0.5, DFM_PARAM_RUNTIME, 1, NULL},
     {"sigma0", "bristle stiffness per area", "N/m^3", 1.0, 1e12, 1e8, DFM_PARAM_LOG_SCALE, 1, NULL}};
 static const dfm_slot slots[] = {SLOTS};
@@ -94,9 +103,9 @@ static const dfm_type type = {sizeof(dfm_type),
                               "1.0",
                               "MIT",
                               SOURCE,
-                              rows,
-                              2,
-                              sizeof(dfm_param),
+                              ROWS,
+                              NPARAM,
+                              PARAM_SIZE,
                               effects,
                               &ops};
 static const dfm_type *const types[] = {&type};

@@ -105,6 +105,14 @@ TEST(MeshGenerate, Cylinders_AreValidAndInscribed) {
     }
 }
 
+// One ring has 18 cells a layer and two have 72: between them layers of other heights count.
+TEST(MeshGenerate, SlenderCylinders_HaveAboutTheNumberOfCellsAskedFor) {
+  for (uint32_t cells = 200; cells < 1500; cells += 7) {
+    const double made = make_cylinder(standard(), 0.05, 0.3, cells).ntet();
+    EXPECT_LT(std::max(made / cells, cells / made), 1.42) << cells;
+  }
+}
+
 TEST(MeshGenerate, Balls_AreValidAndTheirSurfaceLiesOnTheSphere) {
   double last_gap = 1;
   for (const uint32_t cells : {1u, 160u, 1000u, 5000u, 20000u}) {
