@@ -162,6 +162,19 @@ unsigned long crossings(const std::string &name, const std::string &scene) {
   return at == std::string::npos ? ~0ul : std::stoul(summary.substr(at + key.size()));
 }
 
+// A bar of dough of so many cells that its ends pull apart by 0.1 m/s until it tears.
+std::string pulled_bar(const char *time, const char *material, int cells) {
+  return std::string(R"({"format": "deform-scene", "version": 1, "time": )") + time +
+         R"(, "materials": {"dough": )" + material +
+         R"(}, "bodies": [{"name": "dough", "mesh": {"make": "beam", "size": [0.2, 0.05, 0.04], "cells": )" +
+         std::to_string(cells) + R"(},
+      "material": "dough", "pose": {"position": [-0.1, -0.025, 0.2]}, "separate": {"least_cells": 8},
+      "fix": [{"box": [[-0.001, -1, -1], [0.001, 1, 1]]},
+              {"box": [[0.199, -1, -1], [0.201, 1, 1]], "motion": {"keyframes": [
+                {"t": 0, "position": [0, 0, 0]}, {"t": 1, "position": [0.1, 0, 0]}]}}]}],
+    "obstacles": [{"name": "floor", "shape": "plane"}]})";
+}
+
 }  // namespace
 
 // A first scene at the defaults (tests/bench/first_scenes, seed 140): two halves of a bar of jelly that falls
@@ -181,16 +194,10 @@ TEST(CutPieces, JellyCutInTwo_NothingPassesThrough) {
 // A bar of dough is pulled until it tears at both ends. Splinters that hang in the teeth of an end were parts
 // of the middle, whose contact with that end was off as a whole: 164 pairs.
 TEST(CutPieces, SplintersOfATornBar_StayWithTheEndTheyHangOn) {
-  EXPECT_EQ(crossings("torn_bar", R"({"format": "deform-scene", "version": 1,
-    "time": {"duration": 0.9, "step": 0.0005},
-    "materials": {"dough": {"density": 1000, "young": 1e4, "tear": 0.5, "damping": {"stiffness": 0.003}}},
-    "bodies": [{"name": "dough", "mesh": {"make": "beam", "size": [0.2, 0.05, 0.04], "cells": 1000},
-      "material": "dough", "pose": {"position": [-0.1, -0.025, 0.2]}, "separate": {"least_cells": 8},
-      "fix": [{"box": [[-0.001, -1, -1], [0.001, 1, 1]]},
-              {"box": [[0.199, -1, -1], [0.201, 1, 1]], "motion": {"keyframes": [
-                {"t": 0, "position": [0, 0, 0]}, {"t": 1, "position": [0.1, 0, 0]}]}}]}],
-    "obstacles": [{"name": "floor", "shape": "plane"}]})"),
-            0u);
+  const std::string scene =
+      pulled_bar(R"({"duration": 0.9, "step": 0.0005})",
+                 R"({"density": 1000, "young": 1e4, "tear": 0.5, "damping": {"stiffness": 0.003}})", 1000);
+  EXPECT_EQ(crossings("torn_bar", scene), 0u);
 }
 
 namespace {
@@ -238,31 +245,17 @@ TEST(CutPieces, CrossedWhenTheyPart_KeepContactUnlessPlaced) {
 // Sides of a slit cross before the part comes off at 0.33 s. Contact of the two pieces was off from there on:
 // 46 pairs.
 TEST(CutPieces, SidesOfASlitThatCrossed_ComeApartAsPieces) {
-  EXPECT_EQ(crossings("torn_slit", R"({"format": "deform-scene", "version": 1,
-    "time": {"duration": 0.5, "step": 0.01},
-    "materials": {"dough": {"density": 1000, "young": 3e4, "tear": 0.2}},
-    "bodies": [{"name": "dough", "mesh": {"make": "beam", "size": [0.2, 0.05, 0.04], "cells": 500},
-      "material": "dough", "pose": {"position": [-0.1, -0.025, 0.2]}, "separate": {"least_cells": 8},
-      "fix": [{"box": [[-0.001, -1, -1], [0.001, 1, 1]]},
-              {"box": [[0.199, -1, -1], [0.201, 1, 1]], "motion": {"keyframes": [
-                {"t": 0, "position": [0, 0, 0]}, {"t": 1, "position": [0.1, 0, 0]}]}}]}],
-    "obstacles": [{"name": "floor", "shape": "plane"}]})"),
-            0u);
+  const std::string scene = pulled_bar(R"({"duration": 0.5, "step": 0.01})",
+                                       R"({"density": 1000, "young": 3e4, "tear": 0.2})", 500);
+  EXPECT_EQ(crossings("torn_slit", scene), 0u);
 }
 
 // Splinters that leave each other no way ended the run at 0.995 s ("squeezed until nothing can move"), though
 // nothing closes on them. They come off with two pairs of triangles in each other.
 TEST(CutPieces, SplintersThatJam_EndNoRun) {
-  for (const char *young : {"1e5", "1.0001e5", "1.0002e5"})
-    EXPECT_LE(crossings("torn_jam", std::string(R"({"format": "deform-scene", "version": 1,
-      "time": {"duration": 1, "step": 0.001},
-      "materials": {"dough": {"density": 1000, "young": )") +
-                                        young + R"(, "tear": 0.5}},
-      "bodies": [{"name": "dough", "mesh": {"make": "beam", "size": [0.2, 0.05, 0.04], "cells": 1000},
-        "material": "dough", "pose": {"position": [-0.1, -0.025, 0.2]}, "separate": {"least_cells": 8},
-        "fix": [{"box": [[-0.001, -1, -1], [0.001, 1, 1]]},
-                {"box": [[0.199, -1, -1], [0.201, 1, 1]], "motion": {"keyframes": [
-                  {"t": 0, "position": [0, 0, 0]}, {"t": 1, "position": [0.1, 0, 0]}]}}]}],
-      "obstacles": [{"name": "floor", "shape": "plane"}]})"),
+  for (const std::string young : {"1e5", "1.0001e5", "1.0002e5"}) {
+    const std::string dough = R"({"density": 1000, "tear": 0.5, "young": )" + young + "}";
+    EXPECT_LE(crossings("torn_jam", pulled_bar(R"({"duration": 1, "step": 0.001})", dough.c_str(), 1000)),
               2u);
+  }
 }

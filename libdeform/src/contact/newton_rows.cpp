@@ -302,9 +302,9 @@ bool ContactNewton::evaluate(bool frozen) {
     }
     if (l[0] != 0 || l[1] != 0 || l[2] != 0) add_transposed(k, -load3(l), g_.data());
   }
-  double poison = 0;
-  for (const double value : g_) poison += 0.0 * value;
-  return poison == 0;
+  double sum = 0;  // NaN if any value is not finite
+  for (const double value : g_) sum += 0.0 * value;
+  return sum == 0;
 }
 
 // Limits of friction as they are at the present impulses.
@@ -492,8 +492,8 @@ bool ContactNewton::set_matrix() {
 }
 
 namespace {
-constexpr uint32_t kDissected =
-    1000;  // nodes, from which the order by nested dissection has the sparser factor
+// Nodes, from which the order by nested dissection has the sparser factor.
+constexpr uint32_t kDissected = 1000;
 }  // namespace
 
 bool ContactNewton::refactor() {

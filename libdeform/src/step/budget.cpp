@@ -66,9 +66,8 @@ bool requested(uint64_t world) noexcept {
 
 double used_time(const Budget &b) { return b.end > 0 ? 1 - (b.end - now()) / b.span : 0; }
 
-// What a contact solve should have at least, per row: the laws at the warm start, 8 sweeps, 16 that hold the
-// work of an unconverged solve back, the laws at the result, and at the best one. Of the present solve, the
-// end. And the barest one, with one sweep and two that hold its work back.
+// Units per row, where a sweep is one and the laws at a state are four: what a contact solve should have at
+// least, what the end of the present one is given, and the least of any.
 constexpr uint64_t kFairSolve = 36, kEndOfSolve = 24, kBareSolve = 12;
 // What the guard should have: the check of the way, and one of the safe part of it, without which nothing
 // moves. The barest sub-step has the first alone.
