@@ -98,7 +98,6 @@ class ContactNewton {
     Kind kind;
   };
   NewtonSettings set_;
-  const Memory &memory_;
   ContactRows *rows_ = nullptr;
   RowsPart part_;
   ContactState *state_ = nullptr;

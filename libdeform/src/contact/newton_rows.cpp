@@ -8,7 +8,7 @@
 
 namespace dfm {
 
-ContactNewton::ContactNewton(const Memory &m) : memory_(m), factor_(m), gmres_(m) {
+ContactNewton::ContactNewton(const Memory &m) : factor_(m), gmres_(m) {
   use_memory(m, node_of_dof_, dof_of_node_, row_, index_, entry_, node_, jac_, bias_, heavy_, v_, base_, g_,
              kept_, way_, minus_, inverse_, u_, l_, lh_, rho_, response_, slope_, frozen_, keys_, pairs_, at_,
              own_, spot_, blocks_, matrix_, places_);
