@@ -39,6 +39,7 @@ TEST(CProgram, Hello_PrintsBallsThatPressOnTheFloorAndOnEachOther) {
   EXPECT_GT(on_floor, 0) << r.out;
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(CProgram, Pull_SlidesWhereCoulombSays) {
   const test::CommandResult r = example("02_pull");
   ASSERT_EQ(r.exit_code, 0) << r.out << r.err;

@@ -430,6 +430,7 @@ struct Grasp {
 }  // namespace
 
 // Whatever the law is: enough friction lifts and turns the strip, too little lets it slip out.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Tool, AGrasper_HoldsByFrictionAlone) {
   for (const char *law : {"coulomb", "lugre"})
     for (const double mu : {0.6, 0.02}) {
