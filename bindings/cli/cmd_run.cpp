@@ -598,6 +598,8 @@ void add_run(Command app, Globals &globals, int *exit_code) {
       .type_name("N");
   sub.flag("--record", options->record, "keep every recorded state, for `deform replay`");
   sub.calls([=, &globals] {
+    if (options->every > 0 && options->problems.empty())
+      throw Failure(kBadInput, "--contact-problems-every needs --contact-problems DIR");
     for (const auto &[at, path] : *saves) {
       if (!(at >= 0) || !std::isfinite(at))
         throw Failure(kBadInput, "--save: expected a finite time of 0 s or more, found " + number(at));

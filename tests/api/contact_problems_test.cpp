@@ -69,6 +69,13 @@ TEST(ContactProblems, ToleranceThatNoSolveReaches_LeavesUnsolvedProblems) {
   for (const std::string &name : strict) EXPECT_TRUE(name.ends_with("-unsolved.contact")) << name;
 }
 
+TEST(ContactProblems, EveryWithoutAFolder_IsRefused) {
+  const Folder f;
+  const test::CommandResult r = test::deform({"run", f.scene, "--contact-problems-every", "3"});
+  EXPECT_EQ(r.exit_code, 2);
+  EXPECT_NE(r.err.find("needs --contact-problems DIR"), std::string::npos) << r.err;
+}
+
 TEST(ContactProblems, FolderThatIsNotThere_EndsTheWritingAndNotTheStep) {
   const test::Context c;
   const dfm_world w = test::make_world(c);
