@@ -89,9 +89,9 @@ bench: setup-bench build/bench/build.ninja
 	$(BUILD) bench
 	$(BUILD) bench --target run_bench
 
-bench-contact: setup-bench build/bench/build.ninja
-	$(BUILD) bench --target contact_problems
-	build/bench/bin/contact_problems "$(CONTACT_PROBLEMS)"
+bench-contact: setup build/release/build.ninja
+	$(BUILD) release --target deform_command --target deform_contact
+	build/release/bin/deform contact "$(CONTACT_PROBLEMS)"
 
 bench-peers: setup-peers build/release/build.ninja
 	$(BUILD) release --target deform_command

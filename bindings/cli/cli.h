@@ -39,5 +39,6 @@ void add_ccd(Command app, Globals &globals, int *exit_code);
 void add_friction(Command app, Globals &globals, int *exit_code);
 void add_cost(Command app, Globals &globals, int *exit_code);
 void add_view(Command app, Globals &globals, int *exit_code);
+void add_contact(Command app, Globals &globals, int *exit_code);
 
 }  // namespace cli

@@ -127,6 +127,10 @@ class Runner {
   void run() {
     result_.start = dfm_world_time(world_);
     check_saves();
+    if (!options_.problems.empty()) {
+      make_folder(options_.problems);
+      need(dfm_debug_contact_problems(world_, options_.problems.c_str(), options_.every));
+    }
     if (!options_.from.empty()) go_on_from(options_.from);
     result_.begun = result_.simulated = dfm_world_time(world_);
     count_overlaps();
@@ -592,8 +596,15 @@ void add_run(Command app, Globals &globals, int *exit_code) {
   sub.option("--from", options->from,
              "continue from a state that --save or --record wrote, to the end of the scene or of --time")
       .type_name("FILE");
+  sub.option("--contact-problems", options->problems,
+             "write contact problems that were not solved to DIR, for `deform contact`")
+      .type_name("DIR");
+  sub.option("--contact-problems-every", options->every, "beside them every N-th contact problem")
+      .type_name("N");
   sub.flag("--record", options->record, "keep every recorded state, for `deform replay`");
   sub.calls([=, &globals] {
+    if (options->every > 0 && options->problems.empty())
+      throw Failure(kBadInput, "--contact-problems-every needs --contact-problems DIR");
     for (const auto &[at, path] : *saves) {
       if (!(at >= 0) || !std::isfinite(at))
         throw Failure(kBadInput, "--save: expected a finite time of 0 s or more, found " + number(at));

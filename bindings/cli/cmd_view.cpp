@@ -1,15 +1,9 @@
 // deform view SCENE.json: starts deform-view, the program with the window, which lies beside the command.
-#include <unistd.h>
-
-#include <cerrno>
-#include <cstring>
-#include <filesystem>
 #include <memory>
 
 #include "arguments.h"
+#include "become.h"
 #include "messages.h"
-
-namespace fs = std::filesystem;
 
 namespace cli {
 namespace {
@@ -23,13 +17,7 @@ struct ViewOptions {
 [[noreturn]] void become_viewer(const ViewOptions &options, const Globals &globals) {
   if (options.scene.empty() && options.replay.empty())
     throw Failure(kBadInput, "view: SCENE is required, or --replay DIR (see: deform view --help)");
-  std::error_code unused;
-  const std::string program = fs::read_symlink("/proc/self/exe", unused).parent_path() / "deform-view";
-  if (access(program.c_str(), X_OK) != 0)
-    throw Failure(kBadInput,
-                  "view: there is no " + program +
-                      "; with Debian's libglfw3-dev and libimgui-dev installed, `make view` builds it");
-  std::vector<std::string> words{program};
+  std::vector<std::string> words;
   const auto add = [&](const char *name, const std::string &value) {
     if (value.empty()) return;
     words.push_back(name);
@@ -46,11 +34,8 @@ struct ViewOptions {
   add("--threads", std::to_string(globals.threads));
   add("--quiet", globals.quiet ? "1" : "");
   add("--json", globals.json ? "1" : "");
-  std::vector<char *> argv;
-  for (std::string &word : words) argv.push_back(word.data());
-  argv.push_back(nullptr);
-  execv(program.c_str(), argv.data());
-  throw Failure(kBadInput, "view: " + program + " cannot be started: " + std::strerror(errno));
+  become("view", "deform-view", words,
+         "with Debian's libglfw3-dev and libimgui-dev installed, `make view` builds it");
 }
 
 }  // namespace

@@ -138,6 +138,7 @@ int run(int argc, char **argv) {
   cli::add_friction(top, cli::globals, &exit_code);
   cli::add_cost(top, cli::globals, &exit_code);
   cli::add_view(top, cli::globals, &exit_code);
+  cli::add_contact(top, cli::globals, &exit_code);
   cli::add_montage(top, &exit_code);
   cli::add_common(&app);
   try {

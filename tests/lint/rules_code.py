@@ -12,7 +12,7 @@ LEVELS = [["core"], ["math"], ["geometry"], ["mesh", "plugin"], ["body"], ["dyna
 RANK = {folder: rank for rank, folders in enumerate(LEVELS) for folder in folders}
 # api/ holds one thin file per public header, and scene.h is one of them.
 ALLOWED_BESIDE = {("api", "scene")}
-LOOKS_INSIDE = ("tests/unit/", "tests/bench/", "tests/fuzz/", "tests/determinism/")
+LOOKS_INSIDE = ("tests/unit/", "tests/bench/", "tests/fuzz/", "tests/determinism/", "bindings/tools/")
 
 # A third party's name stands in one folder: (who, include, use in the code, folder).
 THIRD_PARTIES = [
@@ -25,6 +25,7 @@ THIRD_PARTIES = [
     ("Dear ImGui", r"(backends/)?imgui", r"\bImGui::", "bindings/view/"),
     ("CLI11", r"CLI/", r"\bCLI::", "bindings/cli/"),
     ("spdlog", r"spdlog/", r"\bspdlog::", "bindings/cli/"),
+    ("HDF5", r"hdf5\.h", r"\bH5[A-Z]\w+\s*\(", "bindings/tools/"),
     ("ODE", r"ode/", r"\bd(World|Body|Geom|Space)Create\w*\s*\(", "bindings/ode/"),
     ("Bullet", r"(bullet/|bt[A-Z]\w+\.h|BulletDynamics|LinearMath/)", r"\bbt[A-Z]\w+", "bindings/bullet/"),
 ]

@@ -14,9 +14,10 @@ BELOW = {
     "libdeform/src": {"core", "math", "geometry", "mesh", "plugin", "body", "dynamics", "contact", "friction",
                       "broad", "narrow", "ccd", "plan", "state", "step", "world", "rollback", "scene", "api"},
     "libdeform/doc": {"README.md", "concepts", "reference", "models", "laws", "howto", "decisions", "images"},
-    "bindings": {"CMakeLists.txt", "cli", "render", "rigid_host", "ode", "bullet", "python", "view"},
+    "bindings": {"CMakeLists.txt", "cli", "render", "rigid_host", "ode", "bullet", "python", "tools", "view"},
     "tests": {"CMakeLists.txt", "README.md", "support", "data", "unit", "analytic", "stability", "api",
-              "plugin", "determinism", "adapters", "fuzz", "lint", "bench", "abi", "render", "python"},
+              "plugin", "determinism", "adapters", "fuzz", "lint", "bench", "abi", "render", "python",
+              "contact_problems"},
 }
 PLUGIN_FOLDER = re.compile(r"plugins/(CMakeLists\.txt|(model|friction|solver|template)_[a-z0-9_]+)$")
 MAX_LINES = 800

@@ -182,6 +182,7 @@ FUNCTIONS = {
     "dfm_debug_displacements": (i32, [u64, u32, ptr, ptr]),
     "dfm_debug_surface_displacements": (i32, [u64, u32, ptr, ptr]),
     "dfm_debug_draw": (i32, [u64, u32, ptr, ptr]),
+    "dfm_debug_contact_problems": (i32, [u64, text, u32]),
     "dfm_query_shape_default_sized": (None, [u32, ptr]),
     "dfm_query_filter_default_sized": (None, [u32, ptr]),
     "dfm_world_query_ray": (i32, [u64, ptr, ptr, f64, ptr, ptr]),

@@ -5,6 +5,8 @@
 #include "api/displacement.h"
 #include "api/objects.h"
 #include "mesh/mesh.h"
+#include "step/capture.h"
+#include "step/context.h"
 #include "world/measure.h"
 #include "world/queries.h"
 
@@ -140,5 +142,12 @@ dfm_status dfm_debug_draw(dfm_world world, uint32_t what, dfm_draw_line_fn line,
           draw(p, q, 0x808080);
         }
     }
+  });
+}
+
+dfm_status dfm_debug_contact_problems(dfm_world world, const char *folder, uint32_t every) {
+  return as_status([&] {
+    World &w = exclusive(world_of(world));
+    w.steps->capture = folder ? std::make_unique<Capture>(Capture{folder, every}) : nullptr;
   });
 }

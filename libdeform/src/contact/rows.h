@@ -175,6 +175,7 @@ struct ContactRows {
   void push_rigid(const Block &group);
 
  private:
+  friend struct ContactProblem;  // keeps them in a file
   // this sub-step's dof of a phyxel, of a surfel of a self-stepping body; kNone
   Array<uint32_t> dof_of_point_, dof_of_node_;
   bool points_free_ = false;  // all of dof_of_point_ are kNone

@@ -1,5 +1,6 @@
 #include "step/context.h"
 
+#include "step/capture.h"
 #include "step/self_contact.h"
 #include "step/solve_islands.h"
 #include "step/tool_touch.h"

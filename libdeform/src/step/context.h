@@ -29,6 +29,7 @@ class ImplicitSystem;
 struct SelfBody;
 class SolveIslands;
 class ToolTouch;
+struct Capture;
 
 struct StageTime {
   double seconds = 0;
@@ -73,6 +74,7 @@ struct StepContext {
   Array<double> bond_impulse;  // [bonds,3] N s, initial values of the next solve of this sub-step
   ContactState state;
   std::unique_ptr<SolveIslands> solve_islands;
+  std::unique_ptr<Capture> capture;                     // null: no problems are written
   struct { Array<double> normal, tangent; } tolerance;  // [contacts] of all islands
   Residual residual;                                    // the worst of all islands
   uint32_t passes = 0, sweeps = 0;                      // of the island with the most

@@ -9,6 +9,7 @@
 #include "contact/bonds.h"
 #include "plugin/context.h"
 #include "state/world.h"
+#include "step/capture.h"
 #include "step/context.h"
 #include "step/stuck_slip.h"
 #include "step/tolerance.h"
@@ -213,6 +214,7 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
   set_tolerance(step.rows, own.part, step.contacts, step.h, bounds, step.solve_islands->sides(),
                 step.disturbance.data(), own.tolerance);
   ask_slip_back(w, step, own);
+  if (step.capture) own.problem = take_problem(w, step, own);
   bool newton = own.implicit;
   if (!newton && !solve_by_sweeps(w, step, own)) {
     begin_newton(w, step, own);
@@ -479,6 +481,7 @@ const SolveIsland *solve_islands(World &w, StepContext &step) {
   }
   for (const SolveIsland &own : all)
     if (own.open) charge(w, step, own.spent);
+  if (step.capture) write_problems(w, step);
   const SolveIsland *bad = nullptr;
   for (const SolveIsland &own : all) {
     if (!own.open) continue;

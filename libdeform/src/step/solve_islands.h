@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "contact/newton.h"
+#include "contact/problem.h"
 #include "contact/solver.h"
 #include "friction/laws.h"
 #include "step/budget.h"
@@ -63,6 +64,7 @@ struct SolveIsland {
   Spent spent;
   const LawInstance *bad = nullptr;  // the law that has failed
   std::exception_ptr thrown;
+  std::unique_ptr<ContactProblem> problem;  // as it was given to the solve, of a capture
   // of all solves of the sub-step
   bool open = true;  // it is to be solved
   uint32_t all_passes = 0, all_sweeps = 0;

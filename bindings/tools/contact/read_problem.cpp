@@ -1,12 +1,13 @@
-#include "contact_files.h"
+#include "read_problem.h"
 
 #include <hdf5.h>
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <stdexcept>
 
-namespace test {
+namespace contact {
 namespace {
 
 struct Entries {
@@ -30,12 +31,12 @@ struct GlobalProblem {
 [[noreturn]] void refuse(const std::string &why) { throw std::runtime_error(why); }
 
 // Three rows per contact out of two.
-ContactProblem padded(const Entries &W, const std::vector<double> &q, std::vector<double> mu, size_t dim) {
+LocalProblem padded(const Entries &W, const std::vector<double> &q, std::vector<double> mu, size_t dim) {
   const size_t n = mu.size();
   if (dim != 2 && dim != 3) refuse("rolling friction (dimension " + std::to_string(dim) + ")");
   if (W.rows != dim * n || W.columns != W.rows || q.size() != W.rows) refuse("sizes do not fit each other");
-  ContactProblem out;
-  out.W = Dense(3 * n, 3 * n);
+  LocalProblem out;
+  out.W = Matrix(3 * n, 3 * n);
   out.q.assign(3 * n, 0.0);
   const auto place = [&](size_t k) { return k / dim * 3 + k % dim; };
   for (size_t r = 0; r < W.rows; ++r) out.q[place(r)] = q[r];
@@ -45,7 +46,7 @@ ContactProblem padded(const Entries &W, const std::vector<double> &q, std::vecto
 }
 
 // L of M = L L', in the lower triangle.
-void factor(Dense &l) {
+void factor(Matrix &l) {
   for (size_t k = 0; k < l.rows; ++k)
     for (size_t r = k; r < l.rows; ++r) {
       double sum = l(r, k);
@@ -58,7 +59,7 @@ void factor(Dense &l) {
 // The part of M that is coupled, and what it adds to W and q: H' M^-1 H and H' M^-1 f.
 void condense(const std::vector<size_t> &own, const std::vector<std::vector<Entries::One>> &m,
               const std::vector<std::vector<Entries::One>> &h, const std::vector<double> &f,
-              std::vector<size_t> &place, Dense &W, std::vector<double> &q) {
+              std::vector<size_t> &place, Matrix &W, std::vector<double> &q) {
   const size_t n = own.size();
   std::vector<size_t> columns;
   for (size_t k = 0; k < n; ++k) {
@@ -68,7 +69,7 @@ void condense(const std::vector<size_t> &own, const std::vector<std::vector<Entr
   std::sort(columns.begin(), columns.end());
   columns.erase(std::unique(columns.begin(), columns.end()), columns.end());
   if (columns.empty()) return;
-  Dense l(n, n), x(n, columns.size() + 1);  // L; L^-1 (H, f)
+  Matrix l(n, n), x(n, columns.size() + 1);  // L; L^-1 (H, f)
   for (size_t k = 0; k < n; ++k) {
     for (const Entries::One &e : m[own[k]]) l(k, place[e.column]) += e.value;
     for (const Entries::One &e : h[own[k]])
@@ -89,14 +90,14 @@ void condense(const std::vector<size_t> &own, const std::vector<std::vector<Entr
     }
 }
 
-ContactProblem condensed(const GlobalProblem &g, size_t dim) {
+LocalProblem condensed(const GlobalProblem &g, size_t dim) {
   const size_t n = g.M.rows, rows = g.w.size();
   if (g.M.columns != n || g.H.rows != n || g.H.columns != rows || g.f.size() != n)
     refuse("sizes do not fit each other");
   std::vector<std::vector<Entries::One>> m(n), h(n);
   for (const Entries::One &e : g.M.list) m[e.row].push_back(e);
   for (const Entries::One &e : g.H.list) h[e.row].push_back(e);
-  Dense W(rows, rows);
+  Matrix W(rows, rows);
   std::vector<double> q = g.w;
   std::vector<size_t> place(n);
   std::vector<char> seen(n);
@@ -115,9 +116,7 @@ ContactProblem condensed(const GlobalProblem &g, size_t dim) {
   Entries all{rows, rows, {}};
   for (size_t r = 0; r < rows; ++r)
     for (size_t c = 0; c < rows; ++c) all.add(r, c, W(r, c));
-  ContactProblem out = padded(all, q, g.mu, dim);
-  out.unknowns = n;
-  return out;
+  return padded(all, q, g.mu, dim);
 }
 
 // Numbers of a text, one after the other.
@@ -144,7 +143,7 @@ class Text {
     for (size_t &x : out) x = count();
     return out;
   }
-  // Dense by columns, or blocks by rows, each by columns.
+  // Matrix by columns, or blocks by rows, each by columns.
   Entries matrix() {
     const size_t storage = count(), rows = count(), columns = count();
     Entries out{rows, columns, {}};
@@ -175,7 +174,7 @@ class Text {
   std::ifstream in_;
 };
 
-ContactProblem read_text(const std::string &path, bool global) {
+LocalProblem read_text(const std::string &path, bool global) {
   Text in(path);
   const size_t dim = in.count(), n = in.count();
   const Entries first = in.matrix();
@@ -194,7 +193,7 @@ ContactProblem read_text(const std::string &path, bool global) {
 
 class Hdf5 {
  public:
-  explicit Hdf5(const std::string &path) : file_(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT)) {
+  explicit Hdf5(hid_t file) : file_(file) {
     if (file_ < 0) refuse("HDF5 cannot open it");
   }
   Hdf5(const Hdf5 &) = delete;
@@ -213,6 +212,16 @@ class Hdf5 {
     return out;
   }
   size_t count(const std::string &name) const { return size_t(numbers(name).at(0)); }
+  void group(const std::string &name) const {
+    const hid_t made = H5Gcreate2(file_, name.c_str(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+    if (made < 0 || H5Gclose(made) < 0) refuse("HDF5 cannot write " + name);
+  }
+  void write(const std::string &name, const std::vector<int> &values) const {
+    write(name, values.size(), values.data(), H5T_NATIVE_INT);
+  }
+  void write(const std::string &name, const std::vector<double> &values) const {
+    write(name, values.size(), values.data(), H5T_NATIVE_DOUBLE);
+  }
   // nz: the number of triplets, -1: columns, -2: rows
   Entries matrix(const std::string &name) const {
     Entries out{count(name + "/m"), count(name + "/n"), {}};
@@ -233,11 +242,19 @@ class Hdf5 {
 
  private:
   hid_t file_;
+  void write(const std::string &name, hsize_t n, const void *values, hid_t type) const {
+    const hid_t space = H5Screate_simple(1, &n, nullptr);
+    const hid_t set = H5Dcreate2(file_, name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+    const herr_t status = set < 0 ? -1 : H5Dwrite(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values);
+    H5Sclose(space);
+    if (set >= 0) H5Dclose(set);
+    if (status < 0) refuse("HDF5 cannot write " + name);
+  }
 };
 
-ContactProblem read_hdf5(const std::string &path) {
+LocalProblem read_hdf5(const std::string &path) {
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
-  const Hdf5 in(path);
+  const Hdf5 in(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT));
   if (in.has("fclib_local")) {
     const std::string at = "fclib_local/";
     if (in.has(at + "V")) refuse("equality constraints");
@@ -256,16 +273,41 @@ ContactProblem read_hdf5(const std::string &path) {
   return condensed(g, in.count(at + "spacedim"));
 }
 
-bool ends_with(const std::string &s, const std::string &end) {
-  return s.size() >= end.size() && s.compare(s.size() - end.size(), end.size(), end) == 0;
-}
-
 }  // namespace
 
-ContactProblem read_contact_problem(const std::string &path) {
-  if (ends_with(path, ".hdf5")) return read_hdf5(path);
+LocalProblem read_local_problem(const std::string &path) {
+  if (path.ends_with(".hdf5")) return read_hdf5(path);
   const std::string name = path.substr(path.rfind('/') + 1);
-  return read_text(path, name.rfind("GFC3D", 0) == 0 && name.find("condensed") == std::string::npos);
+  return read_text(path, name.starts_with("GFC3D") && name.find("condensed") == std::string::npos);
 }
 
-}  // namespace test
+// By columns.
+void write_local_problem(const std::string &path, const LocalProblem &problem) {
+  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+  const Matrix &W = problem.W;
+  std::vector<int> begin{0}, row;
+  std::vector<double> value;
+  for (size_t c = 0; c < W.columns; ++c) {
+    for (size_t r = 0; r < W.rows; ++r) {
+      if (W(r, c) == 0) continue;
+      row.push_back(int(r));
+      value.push_back(W(r, c));
+    }
+    begin.push_back(int(row.size()));
+  }
+  const Hdf5 out(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT));
+  for (const char *name : {"/fclib_local", "/fclib_local/W", "/fclib_local/vectors"}) out.group(name);
+  out.write("/fclib_local/spacedim", std::vector<int>{3});
+  const std::string at = "/fclib_local/W/";
+  out.write(at + "nzmax", std::vector<int>{int(row.size())});
+  out.write(at + "m", std::vector<int>{int(W.rows)});
+  out.write(at + "n", std::vector<int>{int(W.columns)});
+  out.write(at + "nz", std::vector<int>{-1});
+  out.write(at + "p", begin);
+  out.write(at + "i", row);
+  out.write(at + "x", value);
+  out.write("/fclib_local/vectors/q", problem.q);
+  out.write("/fclib_local/vectors/mu", problem.mu);
+}
+
+}  // namespace contact

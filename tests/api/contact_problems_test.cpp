@@ -1,0 +1,86 @@
+// `deform run --contact-problems`: which problems are written, and that writing them changes nothing.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "deform/deform.h"
+#include "support.h"
+#include "world.h"
+
+namespace fs = std::filesystem;
+
+namespace {
+
+// Two blocks on each other, one of them implicit, with a law that remembers.
+const char *kScene = R"({
+  "format": "deform-scene", "version": 1,
+  "time": {"duration": 0.05, "step": 0.001},
+  "materials": {"gel": {"density": 1000, "young": 50000, "poisson": 0.3}},
+  "bodies": [
+    {"name": "low", "mesh": {"make": "beam", "size": [0.1, 0.1, 0.1], "cells": 60}, "material": "gel",
+     "pose": {"position": [0, 0, 0.0001]}, "model": {"type": "corotational_fem"},
+     "integrator": "implicit_euler"},
+    {"name": "high", "mesh": {"make": "beam", "size": [0.1, 0.1, 0.1], "cells": 60}, "material": "gel",
+     "pose": {"position": [0.01, 0.02, 0.1004]}, "model": {"type": "msm"}}],
+  "obstacles": [{"name": "floor", "shape": "plane", "normal": [0, 0, 1]}],
+  "contact": {"friction": [{"between": ["*", "*"], "law": "coulomb"},
+                           {"between": ["low", "floor"], "law": "lugre"}]}
+})";
+
+struct Folder {
+  std::string path = test::scratch("contact_problems"), scene = path + "/scene.json";
+  Folder() { test::write_file(scene, kScene); }
+  // The state at the end.
+  std::string run(std::vector<std::string> more) const {
+    more.insert(more.begin(), {"run", scene, "--quiet", "--out", path + "/out"});
+    const test::CommandResult r = test::deform(more);
+    EXPECT_EQ(r.exit_code, 0) << r.err;
+    const std::string text = test::read_file(path + "/out/summary.json");
+    return text.substr(text.find("\"state_hash\""), 33);
+  }
+  std::vector<std::string> problems(const std::string &in) const {
+    std::vector<std::string> names;
+    for (const auto &file : fs::directory_iterator(path + "/" + in))
+      names.push_back(file.path().filename().string());
+    std::sort(names.begin(), names.end());
+    return names;
+  }
+};
+
+}  // namespace
+
+TEST(ContactProblems, EveryThirdAndUnsolvedOnes_AreWrittenAndTheRunHasTheSameBits) {
+  const Folder f;
+  const std::string hash = f.run({});
+  EXPECT_EQ(f.run({"--contact-problems", f.path + "/every", "--contact-problems-every", "3"}), hash);
+  const std::vector<std::string> every = f.problems("every");
+  EXPECT_GE(every.size(), 10u);
+  for (const std::string &name : every) EXPECT_TRUE(name.ends_with(".contact")) << name;
+  EXPECT_EQ(f.run({"--contact-problems", f.path + "/unsolved"}), hash);
+  EXPECT_EQ(f.problems("unsolved").size(), 0u);
+}
+
+TEST(ContactProblems, ToleranceThatNoSolveReaches_LeavesUnsolvedProblems) {
+  const Folder f;
+  f.run({"--set", "/contact/tolerance=1e-40", "--time", "0.03", "--contact-problems", f.path + "/strict"});
+  const std::vector<std::string> strict = f.problems("strict");
+  EXPECT_GE(strict.size(), 1u);
+  for (const std::string &name : strict) EXPECT_TRUE(name.ends_with("-unsolved.contact")) << name;
+}
+
+TEST(ContactProblems, EveryWithoutAFolder_IsRefused) {
+  const Folder f;
+  const test::CommandResult r = test::deform({"run", f.scene, "--contact-problems-every", "3"});
+  EXPECT_EQ(r.exit_code, 2);
+  EXPECT_NE(r.err.find("needs --contact-problems DIR"), std::string::npos) << r.err;
+}
+
+TEST(ContactProblems, FolderThatIsNotThere_EndsTheWritingAndNotTheStep) {
+  const test::Context c;
+  const dfm_world w = test::make_world(c);
+  test::add_plane(w, "floor");
+  test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 60, {});
+  test::ok(dfm_debug_contact_problems(w, "/nonexistent/folder", 1));
+  test::run(w, 0.005, 1e-3);
+}
