@@ -1,5 +1,5 @@
 // The one hash that is recorded: that of ten small bodies in a box, the same number for gcc and clang, with
-// and without optimization, on every processor. A change of the method changes it; the commit says why.
+// optimization or without, on every processor. A change of the method changes it; the commit says why.
 // Between builds all scenes are compared: `PROGRAM --hashes` prints a line for each.
 #include <cstring>
 

@@ -72,7 +72,7 @@ struct Staged {
   Hold hold;
   StepSizes sizes;
   EnergyWatch watch;
-  IntegratorAllowance allowance;
+  double struck_until = 0;
   dfm_world_stats stats{};
   Gravity gravity;
   dfm_world_def def{};
