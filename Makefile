@@ -27,7 +27,7 @@ help:
 	@echo "make bench-contact    contact problems of others (FCLIB, Siconos): CONTACT_PROBLEMS=folder"
 	@echo "make bench-peers      beside MuJoCo, Bullet and Jolt: speed at equal error, build/peers/"
 	@echo "                      PEERS=quick: coarse scenes and the sliding block only, some minutes"
-	@echo "make soak             jittered starts, suite, combinations, holds, first scenes: hours; can stop"
+	@echo "make soak             long tests, jitter, combinations, first scenes: hours; can stop"
 	@echo "make lint             layout, includes, headers, text"
 	@echo "make format           clang-format on all C and C++ files, one version everywhere"
 	@echo "make tidy             clang-tidy on the library, where it is installed"
@@ -100,7 +100,7 @@ bench-peers: setup-peers build/release/build.ninja
 # Rows that are in the table already are not run again.
 soak: setup-bench build/bench/build.ninja build/release/build.ninja
 	$(BUILD) release
-	DEFORM_SOAK=1 nice -n 19 ctest --preset release -j $(JOBS) -L stability -R Jittered
+	DEFORM_SOAK=1 nice -n 19 ctest --test-dir build/release -j $(JOBS) --output-on-failure -L 'soak|stability'
 	DEFORM_SOAK=1 nice -n 19 ctest --preset release -R '^python\.cut_scenes$$'
 	$(BUILD) bench --target hold_soak suite_soak cover_soak cut_soak
 	nice -n 19 build/bench/bin/cover_soak tests/bench/results/cover_soak.csv

@@ -60,4 +60,5 @@ TEST(BallIncline, TooLittleFriction_DoesNotRoll) {
               0.005 * kSlide);
 }
 
+// soak: long, and a jittered run of what another test runs
 TEST(BallIncline, JitteredRuns_AllRoll) { test::expect_jittered("ball_incline", 1, 10, {}, 3, rolls); }

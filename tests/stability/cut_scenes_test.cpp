@@ -27,13 +27,16 @@ constexpr const char *kHalfWay = "/tools/1/motion/keyframes/2/position=[0.015, 0
 
 }  // namespace
 
+// soak: long; python.cut_scenes cuts with jittered paths
 TEST(CutScenes, OrangeJitteredRuns_FallIntoThreeSlices) {
   test::expect_jittered("orange", 1, 10, {"--time", "0.6"}, 20, in_three);
 }
+// soak: long; python.cut_scenes cuts with jittered paths
 TEST(CutScenes, CheeseJitteredRuns_LoseTwoSlices) {
   test::expect_jittered("cheese", 1, 10, {}, 20, both_slide);
 }
 // Held by friction alone.
+// soak: long; python.cut_scenes cuts with jittered paths
 TEST(CutScenes, LiverJitteredRuns_LobeIsPulled) {
   test::expect_jittered("liver", 1, 10, {"--time", "0.9"}, 20, [](const test::SceneRun &run) {
     const std::vector<test::BodyRow> rows = run.rows("liver");
@@ -42,6 +45,7 @@ TEST(CutScenes, LiverJitteredRuns_LobeIsPulled) {
   });
 }
 // Just cut, the two faces lie on each other to micrometers, which the count of crossings sees.
+// soak: long; python.cut_scenes cuts with jittered paths
 TEST(CutScenes, LiverCutJitteredRuns_LobeIsCarriedAway) {
   for (int seed = 1; seed <= (test::soaks() ? 10 : 3); ++seed) {
     const test::SceneRun run("liver", {"--time", "1.4", "--jitter", std::to_string(seed)});
@@ -50,12 +54,14 @@ TEST(CutScenes, LiverCutJitteredRuns_LobeIsCarriedAway) {
     EXPECT_TRUE(carried(run)) << "seed " << seed;
   }
 }
+// soak: long; python.cut_scenes cuts all the way
 TEST(CutScenes, LiverCutHalfWay_KeepsItsLobe) {
   const test::SceneRun run("liver", {"--time", "1.1", "--set", kHalfWay});
   EXPECT_TRUE(run.finite());
   EXPECT_FALSE(run.has("liver.1"));
 }
 // Every step is checked: the lips of its slits cross by less than what counts (doc/decisions/cutting.md).
+// soak: long; python.cut_scenes cuts with jittered paths
 TEST(CutScenes, TornDoughJitteredRuns_FallOnTheTable) {
   for (int seed = 1; seed <= (test::soaks() ? 10 : 3); ++seed) {
     const test::SceneRun run("torn_dough", {"--check", "--jitter", std::to_string(seed)});

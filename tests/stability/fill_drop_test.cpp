@@ -41,6 +41,7 @@ TEST(FillDrop, BodiesThatMayPass_Cross) {
       << "the crossing check must see what contact is told to ignore";
 }
 
+// soak: long, and a jittered run of what another test runs
 TEST(FillDrop, JitteredRuns_DoNotCross) {
   test::expect_jittered("fill_drop", 1, 10, kLanding, 30, in_the_corner);
 }
@@ -53,6 +54,7 @@ bool not_folded(const test::SceneRun &run) {
          run.last("rabbit").com[2] > 0;
 }
 
+// soak: long, and a jittered run of what another test runs
 TEST(FillDropOrgans, JitteredRuns_DoNotCrossThemselves) {
   test::expect_jittered("fill_drop_organs", 1, 10, kEars, 30, not_folded);
 }

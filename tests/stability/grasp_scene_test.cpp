@@ -11,6 +11,7 @@ bool lifted(const test::SceneRun &run) {
 
 }  // namespace
 
+// soak: long, and a jittered run of what another test runs
 TEST(Grasp, JitteredRuns_AllLift) {
   test::expect_jittered("grasp", 1, 10, {"--time", "1.6"}, 6, lifted);
   EXPECT_FALSE(

@@ -71,6 +71,7 @@ TEST_P(Hold, PulledBackAndForth_DriftsByTheLawsFormulaOrNotAtAll) {
 }
 
 // Implicit bodies at the step of a frame and at 1 ms.
+// soak(dahl|lugre|elastoplastic|gms): long; cover_test has each law with each integrator
 TEST_P(Hold, ImplicitBodies_DoNotCreep) {
   const auto held = [](const char *scene, double level, double step, const char *model) {
     const Result r =
@@ -93,6 +94,7 @@ TEST_P(Hold, ImplicitBodies_DoNotCreep) {
 
 // At a step far below what the bodies ask for, the solve's noise has the least time to die away between
 // two sub-steps.
+// soak: long; Hold.PulledOnASoftBed has the usual steps
 TEST(HoldBound, OnASoftBedInShortSteps_HoldsTheSame) {
   for (const char *law : {"lugre", "elastoplastic"}) expect_held({"soft", law, 0.5, 5e-5, false});
 }

@@ -137,6 +137,7 @@ TEST(OdeCart, Driven_ComesAsFarAsWithTheBuiltinHost) {
   if (!test::kHasOde) GTEST_SKIP() << kNotBuilt;
   expect_as_builtin("ode", "ode_cart", lasting(1), {"chassis", "tyre_front_left"}, 0.5);
 }
+// soak: long, and a jittered run of what another test runs
 TEST(OdeCart, JitteredRuns_AllDriveUpTheBump) {
   if (!test::kHasOde) GTEST_SKIP() << kNotBuilt;
   test::expect_jittered("ode_cart", 1, 10, lasting(0.5), 60, drives);

@@ -51,6 +51,7 @@ Fallen fall(double collapse) {
 
 }  // namespace
 
+// soak: long; the test below has the same cube, put down
 TEST(Pancake, JellyThatFalls_KeepsItsCellsUprightAndComesBack) {
   const Fallen with = fall(30);
   EXPECT_EQ(with.inverted, 0u);

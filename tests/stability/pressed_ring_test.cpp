@@ -37,6 +37,7 @@ TEST(PressedRing, WithoutTheEffect_Crosses) {
   EXPECT_EQ(run.number("intersections_max"), run.number("intersections_self_max"));
 }
 
+// soak: long, and a jittered run of what another test runs
 TEST(PressedRing, JitteredRuns_DoNotCross) {
   test::expect_jittered("pressed_ring", 1, 10, kPressed, 20, walls_meet);
 }

@@ -45,6 +45,7 @@ TEST(RigidOnBall, Box_IsCarried) {
       "rigid_on_ball", {"--set", R"(/contact/filter=[{"between": ["ball", "box"], "collide": false}])"});
   EXPECT_FALSE(carried(apart));
 }
+// soak: long, and a jittered run of what another test runs
 TEST(RigidOnBall, JitteredRuns_AllCarry) { test::expect_jittered("rigid_on_ball", 1, 10, {}, 10, carried); }
 
 TEST(RigidOnBed, Box_LandsAndRests) {
@@ -66,4 +67,5 @@ TEST(RigidPinch, WithoutFrictionOrForce_NothingIsLifted) {
   EXPECT_FALSE(lifted(test::SceneRun("rigid_pinch", {"--set", test::kFrictionless})));
   EXPECT_FALSE(lifted(test::SceneRun("rigid_pinch", {"--set", "/rigid/bodies/1/joints/0/motor/max=20"})));
 }
+// soak: long, and a jittered run of what another test runs
 TEST(RigidPinch, JitteredRuns_AllLift) { test::expect_jittered("rigid_pinch", 1, 10, {}, 20, lifted); }

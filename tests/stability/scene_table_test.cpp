@@ -152,6 +152,7 @@ TEST(ProbeBlock, JitteredRuns_AreDraggedByTheProbe) {
   test::expect_jittered("probe_block", 1, 10, {}, row_of("probe_block").least_contacts, dragged);
   EXPECT_FALSE(dragged(test::SceneRun("probe_block", {"--set", test::kFrictionless})));
 }
+// soak: long, and a jittered run of what another test runs
 TEST(RabbitsSlope, JitteredRuns_DoNotCross) {
   test::expect_jittered("rabbits_slope", 1, 10, {}, row_of("rabbits_slope").least_contacts,
                         [](const test::SceneRun &run) { return run.number("guard_steps") > 0; });
@@ -162,6 +163,7 @@ TEST(TwoCylinders, CoarsePairJitteredRuns_DoNotCross) {
   test::expect_jittered("two_cylinders_coarse", 1, 10, until(0.4),
                         row_of("two_cylinders_coarse").least_contacts, on_top);
 }
+// soak: long, and a jittered run of what another test runs
 TEST(TwoCylinders, FinePairJitteredRuns_DoNotCross) {
   test::expect_jittered("two_cylinders_fine", 1, 10, until(0.3), row_of("two_cylinders_fine").least_contacts,
                         on_top);

@@ -72,4 +72,5 @@ TEST(Basin, AsTriangles_HoldsTheBallInTheSamePlace) {
   EXPECT_TRUE(in_the_basin(together));
 }
 
+// soak: long, and a jittered run of what another test runs
 TEST(Basin, JitteredRuns_StayInside) { test::expect_jittered("basin", 1, 10, kShort, 8, in_the_basin); }

@@ -41,6 +41,7 @@ TEST(TenBodies, TwoKindsThatMayPass_Cross) {
 
 // Over the landing, where bodies hit hardest, checked every 10 ms.
 const std::vector<std::string> kLanding = {"--time", "0.9", "--set", "/output/every=0.01"};
+// soak: long, and a jittered run of what another test runs
 TEST(TenBodies, JitteredRuns_DoNotCross) {
   test::expect_jittered("ten_bodies", 1, 10, kLanding, 60, inside_the_box);
 }

@@ -32,6 +32,7 @@ TEST(TwoCylinders, WithoutFriction_UpperSlidesOffAndFalls) {
 }
 
 // At 1.8 s the frictionless one has long left.
+// soak: long, and a jittered run of what another test runs
 TEST(TwoCylinders, JitteredRuns_AllStay) {
   test::expect_jittered("two_cylinders", 1, 10, {"--time", "1.8", "--set", "/output/every=0.01"}, 12, stays);
 }
