@@ -174,6 +174,10 @@ class Runner {
       out.push_back(std::to_string(stats.cheapened) +
                     " steps came near their limit of work or time (max_work, max_time), so some refinements "
                     "of the contact solve were left out");
+    if (stats.shortened > 0)
+      out.push_back(std::to_string(stats.shortened) +
+                    " steps ended early, since their limit of work or time (max_work, max_time) was used up: "
+                    "the run took more steps");
     if (stats.unconverged > 0 && !often_unsolved()) out.push_back(unsolved());
     if (stats.limited_max > 0)
       out.push_back("up to " + std::to_string(stats.limited_max) +
@@ -393,9 +397,10 @@ class Runner {
     ++result_.steps;
     trouble_ |= trouble;
     scene_.renew_list();
-    impulses_.add_step(step);
+    const double passed = dfm_world_time(world_) - result_.simulated;
+    impulses_.add_step(passed);
     sensors_.add_step();
-    tools_.add_step(step);
+    tools_.add_step(passed);
     result_.simulated = dfm_world_time(world_);
     return true;
   }

@@ -343,7 +343,7 @@ std::string summary_json(const SceneFile &scene, const RunOptions &options, cons
       .add("lost_s", number(stats.guard_lost));
   budget.add("work_max", std::to_string(stats.work_max))
       .add("cheapened", std::to_string(stats.cheapened))
-      .add("discarded", std::to_string(stats.discarded));
+      .add("shortened", std::to_string(stats.shortened));
   contacts.add("max", std::to_string(stats.contacts_max)).add("mean", number(run.contacts_mean));
   out.add("format", "\"deform-summary\"")
       .add("version", "1")

@@ -87,6 +87,7 @@ TEST(AttachScene, ClampsOfATensileTest_ReportTheForce) {
 }
 
 // Most of a fine surface on coarse cells is held: more bonds than the cells' points have motions.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(AttachScene, FineSurfaceOnCoarseCells_IsHeldExactly) {
   const Opened s(R"({"format": "deform-scene", "version": 1, "time": {"duration": 1, "step": 0.002},
     "bodies": [{"name": "rabbit", "mesh": ")" DEFORM_SOURCE_DIR
@@ -234,6 +235,7 @@ TEST(AttachScene, PointsOfASpringInOrOnAnObstacle_Yield) {
 }
 
 // It would be drawn back to where it was.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(AttachScene, UntangledBodyThatIsAttached_StaysAndIsTold) {
   std::string text = held_bar(0.12, "", "");
   text.insert(text.find("\"materials\""), R"("contact": {"untangle": true}, )");

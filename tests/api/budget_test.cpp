@@ -1,4 +1,4 @@
-// What a step may cost: discarded as a whole, cheapened in a known order, stopped from outside.
+// What a step may cost: cheapened in a known order, ended early, stopped from outside.
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -59,12 +59,6 @@ struct Seen {
   }
 };
 
-uint64_t told_least() {
-  const std::string told = dfm_last_error();
-  const size_t at = told.find("at least ");
-  return at == std::string::npos ? 0 : std::stoull(told.substr(at + 9));
-}
-
 // With much friction: solves do not converge.
 dfm_world sheets_that_hit(const test::Context &c, const char *law, double speed, dfm_body *bodies) {
   dfm_world_def d = dfm_world_def_default();
@@ -86,41 +80,38 @@ dfm_world sheets_that_hit(const test::Context &c, const char *law, double speed,
 
 }  // namespace
 
-// A budget below the least work of a step is told before anything has changed; then the step is taken in
-// full, and all goes on as if nothing had been tried.
-TEST(Budget, BelowTheLeastWork_IsToldAndLeavesTheStateAsBefore) {
-  Busy tried, plain;
-  for (int i = 0; i < 60; ++i) {
-    uint32_t trouble = 0;
-    test::ok(dfm_world_step(plain.world, kStep, &trouble));
-    const uint64_t work = test::stats(plain.world).work;
-    EXPECT_GT(work, 0u);
-    EXPECT_FALSE(trouble & DFM_TROUBLE_BUDGET);
-    const Seen before(tried.world);
-    tried.set_work(std::max<uint64_t>(1, work / 4));
-    ASSERT_EQ(dfm_world_step(tried.world, kStep, &trouble), DFM_DISCARD) << i;
-    EXPECT_EQ(trouble, uint32_t(DFM_TROUBLE_BUDGET));
-    EXPECT_TRUE(before == Seen(tried.world)) << i;
-    EXPECT_NE(std::string(dfm_last_error()).find("max_work"), std::string::npos);
-    const uint64_t least = told_least();
-    EXPECT_GT(least, work / 4);
-    // what the step takes is enough for it, though a budget may simplify it
-    const std::string start = test::snapshot(tried.world);
-    tried.set_work(work);
-    test::ok(dfm_world_step(tried.world, kStep, nullptr));
-    EXPECT_LE(test::stats(tried.world).work, work);
-    test::ok(dfm_world_restore(tried.world, start.data(), start.size()));
-    tried.set_work(UINT64_MAX);
-    test::ok(dfm_world_step(tried.world, kStep, nullptr));
-    ASSERT_EQ(dfm_world_hash(tried.world), dfm_world_hash(plain.world)) << "step " << i;
+// Whatever the budget: the world goes on, by what fits, and reaches the end in more steps.
+TEST(Budget, BelowTheLeastWork_StillAdvances) {
+  for (const uint64_t share : {2, 4, 1000000}) {
+    Busy tried, plain;
+    int steps = 0;
+    for (int i = 0; i < 60; ++i) {
+      test::ok(dfm_world_step(plain.world, kStep, nullptr));
+      const uint64_t work = test::stats(plain.world).work;
+      tried.set_work(std::max<uint64_t>(1, work / share));
+      const double end = dfm_world_time(plain.world);
+      while (dfm_world_time(tried.world) < end * (1 - 1e-9)) {
+        const double before = dfm_world_time(tried.world);
+        uint32_t trouble = 0;
+        ASSERT_EQ(dfm_world_step(tried.world, end - before, &trouble), DFM_OK) << dfm_last_error();
+        ASSERT_GT(dfm_world_time(tried.world), before);
+        if (dfm_world_time(tried.world) < end * (1 - 1e-9)) {
+          EXPECT_TRUE(trouble & DFM_TROUBLE_BUDGET);
+        }
+        ++steps;
+      }
+    }
+    const dfm_world_stats s = test::stats(tried.world);
+    std::printf("1/%g of the work: %d steps for 60, %g shortened, %g unconverged of %g\n", double(share),
+                steps, double(s.shortened), double(s.unconverged), double(s.substeps));
+    EXPECT_GT(s.shortened, 0u);
+    EXPECT_EQ(s.discarded, 0u);
+    EXPECT_LT(s.energy_gain, 0.01 * s.energy_max);
   }
-  const dfm_world_stats s = test::stats(tried.world);
-  EXPECT_GE(s.work_max, test::stats(plain.world).work_max);
-  EXPECT_GT(test::stats(plain.world).contacts_max, 4u);
 }
 
-// Implicit bodies have no step bound that a sentence could name.
-TEST(Budget, OfImplicitBodies_IsToldWithoutAStepBound) {
+// Implicit bodies take a whole step at once, whatever it costs.
+TEST(Budget, OfImplicitBodies_TakesASubStep) {
   test::Context context;
   const dfm_world w = test::make_world(context, {0, 0, -9.81}, DFM_INTEGRATOR_IMPLICIT_EULER);
   test::add_plane(w, "floor");
@@ -130,34 +121,23 @@ TEST(Budget, OfImplicitBodies_IsToldWithoutAStepBound) {
   test::make_body(context, w, "beam", {0.1, 0.1, 0.05}, 60, o);
   for (const uint64_t units : {1, 1000, 2000, 4000}) {
     test::ok(dfm_world_set_budget(w, 0, units));
-    const std::string start = test::snapshot(w);
-    if (dfm_world_step(w, kStep, nullptr) != DFM_OK) {
-      const std::string told = dfm_last_error();
-      EXPECT_NE(told.find("max_work"), std::string::npos) << told;
-      EXPECT_EQ(told.find('?'), std::string::npos) << told;
-      EXPECT_EQ(told.find("step bound"), std::string::npos) << told;
-    } else {
-      EXPECT_GT(units, 1u);
-    }
-    test::ok(dfm_world_restore(w, start.data(), start.size()));
+    const double before = dfm_world_time(w);
+    test::ok(dfm_world_step(w, kStep, nullptr));
+    EXPECT_GT(dfm_world_time(w), before + 1e-3 * kStep) << units;
   }
 }
 
-// Twice the least work of all sub-steps, with 12 units for each contact, or more: solves that would need more
-// and ways that cross cost accuracy, never the step, and no step takes more.
-TEST(Budget, OfSolvesThatItEnds_IsKeptAndRefusesNoStep) {
+// Solves that would need more and ways that cross cost accuracy first, then sub-steps; no step takes more.
+TEST(Budget, OfSolvesThatItEnds_IsKept) {
   test::Context c;
   for (const char *law : {"coulomb", "lugre"}) {
     constexpr int kSteps = 40;
     constexpr double h = 2e-4;
     dfm_body bodies[2];
     const dfm_world free = sheets_that_hit(c, law, 30, bodies);
-    test::ok(dfm_world_set_budget(free, 0, 1));
-    EXPECT_EQ(dfm_world_step(free, h, nullptr), DFM_DISCARD);
-    uint64_t least = told_least();
     test::ok(dfm_world_set_budget(free, 0, UINT64_MAX));
     test::ok(dfm_world_step(free, h, nullptr));
-    least = least / test::stats(free).last_substeps;
+    uint64_t least = test::stats(free).work / test::stats(free).last_substeps;
     for (int i = 1; i < kSteps; ++i) test::ok(dfm_world_step(free, h, nullptr));
     const dfm_world_stats whole = test::stats(free);
     EXPECT_EQ(whole.unconverged, 0u);
@@ -173,14 +153,12 @@ TEST(Budget, OfSolvesThatItEnds_IsKeptAndRefusesNoStep) {
         ASSERT_LE(test::stats(w).work, budget) << law << more << " step " << i;
       }
       const dfm_world_stats s = test::stats(w);
-      EXPECT_EQ(s.discarded, 0u);
       if (more < 3) {
         EXPECT_GT(s.cheapened, 0u);
-        EXPECT_GT(s.unconverged, 0u);
       }
-      std::printf("  %g units: %g at most, %g simplified, %g unconverged, %u sub-steps, %g s lost\n",
-                  double(budget), double(s.work_max), double(s.cheapened), double(s.unconverged),
-                  s.substeps_max, s.guard_lost);
+      std::printf("  %g units: %g at most, %g simplified, %g ended early, %g unconverged, %g s lost\n",
+                  double(budget), double(s.work_max), double(s.cheapened), double(s.shortened),
+                  double(s.unconverged), s.guard_lost);
     }
   }
 }
@@ -220,6 +198,7 @@ TEST(Budget, WhereTheStableStepIsNew_LeavesLessForContact) {
 
 // Sheets that hit at 100 m/s: sweeps beyond the usual cap and the guard's pieces are there to be left out.
 // Three times the speed of their waves: the energy watch, which would end some of these steps, is off.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Budget, ThatCheapensAStep_IsReportedAndIsTheSameWithAnyThreads) {
   uint64_t hash[2];
   for (const uint32_t threads : {1u, 4u}) {
@@ -250,32 +229,31 @@ TEST(Budget, ThatCheapensAStep_IsReportedAndIsTheSameWithAnyThreads) {
       test::ok(dfm_world_restore(thrifty, before.data(), before.size()));
       test::ok(dfm_world_set_budget(thrifty, 0, whole * 3 / 4));
       uint32_t trouble = 0;
-      const dfm_status s = dfm_world_step(thrifty, 5e-4, &trouble);
-      EXPECT_TRUE(trouble & DFM_TROUBLE_BUDGET) << i;
-      cheap += s == DFM_OK;
+      test::ok(dfm_world_step(thrifty, 5e-4, &trouble));
+      cheap += (trouble & DFM_TROUBLE_BUDGET) != 0;
       test::ok(dfm_world_set_budget(thrifty, 0, UINT64_MAX));
-      if (s == DFM_DISCARD) test::ok(dfm_world_step(thrifty, 5e-4, nullptr));
     }
     EXPECT_GT(cheap, 0u);
-    EXPECT_EQ(test::stats(thrifty).discarded, 4 - cheap);
-    EXPECT_GE(test::stats(thrifty).cheapened, cheap);
+    EXPECT_GE(test::stats(thrifty).cheapened + test::stats(thrifty).shortened, cheap);
     hash[threads > 1] = dfm_world_hash(thrifty);
   }
   EXPECT_EQ(hash[0], hash[1]);
 }
 
-TEST(Budget, OfTooLittleTime_DiscardsTheStep) {
+TEST(Budget, OfTooLittleTime_EndsTheStepEarly) {
   Busy b;
-  const Seen before(b.world);
   b.set_work(0, 1e-9);
   uint32_t trouble = 0;
-  EXPECT_EQ(dfm_world_step(b.world, kStep, &trouble), DFM_DISCARD);
-  EXPECT_EQ(trouble, uint32_t(DFM_TROUBLE_BUDGET));
-  EXPECT_NE(std::string(dfm_last_error()).find("max_time"), std::string::npos);
-  EXPECT_TRUE(before == Seen(b.world));
-  EXPECT_EQ(test::stats(b.world).discarded, 1u);
+  test::ok(dfm_world_step(b.world, kStep, &trouble));
+  EXPECT_TRUE(trouble & DFM_TROUBLE_BUDGET);
+  EXPECT_GT(dfm_world_time(b.world), 0);
+  EXPECT_LT(dfm_world_time(b.world), 0.9 * kStep);
+  EXPECT_EQ(test::stats(b.world).shortened, 1u);
+  EXPECT_EQ(test::stats(b.world).steps, 1u);
   b.set_work(0);
-  test::ok(dfm_world_step(b.world, kStep, nullptr));
+  trouble = 0;
+  test::ok(dfm_world_step(b.world, kStep, &trouble));
+  EXPECT_FALSE(trouble & DFM_TROUBLE_BUDGET);
   EXPECT_EQ(dfm_world_set_budget(b.world, -1, 0), DFM_E_ARG);
 }
 
@@ -301,10 +279,9 @@ TEST(Budget, OfTimeForChainsThatHitAFloor_EndsTheStepSoon) {
       test::ok(dfm_rigid_set_state(chain[i], &state));
     }
   }
-  dfm_status status = DFM_OK;
   const auto step = [&] {  // s of this process: others may have the processor
     const std::clock_t from = std::clock();
-    status = dfm_world_step(w, 1.0 / 60, nullptr);
+    test::ok(dfm_world_step(w, 1.0 / 60, nullptr));
     return double(std::clock() - from) / CLOCKS_PER_SEC;
   };
   const double free = step();  // the budget is a share of what this machine takes
@@ -317,11 +294,9 @@ TEST(Budget, OfTimeForChainsThatHitAFloor_EndsTheStepSoon) {
   ASSERT_GE(whole, 20 * free);
   test::ok(dfm_world_restore(w, before.data(), before.size()));
   test::ok(dfm_world_set_budget(w, whole / 8, UINT64_MAX));
-  const uint64_t hash = dfm_world_hash(w);
-  const double discarded = step();
-  ASSERT_EQ(status, DFM_DISCARD);
-  EXPECT_EQ(dfm_world_hash(w), hash);
-  EXPECT_LT(discarded, 0.5 * whole);
+  const double now = dfm_world_time(w);
+  EXPECT_LT(step(), 0.5 * whole);
+  EXPECT_GT(dfm_world_time(w), now);
 }
 
 TEST(Interrupt, BetweenSteps_StopsTheNextOneOnce) {

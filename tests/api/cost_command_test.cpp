@@ -136,6 +136,7 @@ std::vector<std::array<double, 4>> path(const std::string &folder) {
 
 }  // namespace
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Cost, Report_HoldsToSchemaAndOrdersTheFront) {
   const Study s = study("report", bar(R"("duration": 0.2, "step": 0.001)"),
                         {"--axes", "model,time,mesh,contact", "--budget", "300", "--target", "0.1"});
@@ -252,6 +253,7 @@ TEST(Cost, SecondCall_RunsNothingAndReportsTheSame) {
     EXPECT_EQ(cli::json_text(*report.find(same)), cli::json_text(*s.report.find(same))) << same;
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Cost, Apply_WritesASceneThatMeetsTheTarget) {
   const double target = 0.3;
   const Study s = study("apply", bar(R"("duration": 0.2, "step": 0.0002)"),
@@ -417,6 +419,7 @@ TEST(Cost, SceneThatBeginsMovedAway_IsStudied) {
 }
 
 // Nothing moves: the end state is compared, and the time of the equilibrium is the cost.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Cost, StaticScene_IsStudiedWithoutTime) {
   const Study s = study("static", bar(R"("duration": 1, "mode": "static")"),
                         {"--axes", "model,time,mesh", "--budget", "300", "--target", "0.3"});

@@ -85,6 +85,7 @@ TEST(Cut, SplitBlade_LosesNothingAndLetsTheHalvesPart) {
 
 // A cube on the floor, cut level: the upper part rests on the lower one, along faces that lie on each other
 // at rest.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Cut, CutFaces_CarryTheWeightAboveThem) {
   for (const char *model : kModels) {
     const CubeOnFloor scene(model, 5e4);

@@ -222,6 +222,7 @@ void check_report(F ask, uint32_t first, const char *name) {
   SCOPED_TRACE(name);
   uint32_t grown = 0;
   if constexpr (requires(T t) { t.cookie; }) grown = sizeof(T::cookie);
+  if constexpr (requires(T t) { t.shortened; }) grown = sizeof(T::shortened);
   EXPECT_EQ(first + grown, sizeof(T))
       << "it has grown: this number stays, and the line above takes the new size";
   for (const uint32_t asked : {0u, 8u, first - 8, first, uint32_t(sizeof(T)) + 32}) {

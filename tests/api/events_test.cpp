@@ -172,6 +172,7 @@ TEST(Events, NotRead_AreKeptUntilTheyAre) {
   EXPECT_EQ(n, 0u);
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Report, OfABodyAtRest_CarriesItsWeight) {
   test::Context c;
   const test::Stack s = test::make_stack(c);

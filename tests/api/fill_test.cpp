@@ -18,6 +18,7 @@ struct Filled {
 
 }  // namespace
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(TetmeshFill, Torus_SharesSumUpToItsVolume) {
   Filled f("torus", {0.1, 0.03, 0}, 4000);
   test::ok(dfm_tetmesh_fill(f.surface, 2000, &f.mesh));

@@ -17,6 +17,7 @@ std::string script(const char *name) {
 
 }  // namespace
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(FrictionBenchmark, OurSlides_AreMeasuredJudgedAndNotRunTwice) {
   const std::string out = test::scratch("friction_benchmark") + "/rows.csv";
   std::remove(out.c_str());

@@ -210,6 +210,7 @@ TEST(FrictionRules, WithoutMemory_NothingIsChanged) {
   EXPECT_NE(state(), before);
 }
 
+// unsanitized: so many calls take minutes there
 TEST(FrictionRules, OnSliders_TakeTheSameMemoryForAnHour) {
   Scene s;
   ASSERT_EQ(s.add("*", "*", 0.5, "test.bristle"), DFM_OK);

@@ -109,6 +109,7 @@ TEST(PairImpulses, SumAndPeak_AreThoseOfTheSameTimeInManySteps) {
 }
 
 // Before it falls asleep, in the frame in which it does, and while it sleeps.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(PairImpulses, OfAStackAtRest_AreItsWeight_AlsoWhileItSleeps) {
   test::Context context;
   test::Stack s = test::make_stack(context, 1e-5);

@@ -480,6 +480,7 @@ TEST(CutScene, CutsThatMeetNothingOrComeTooLate_AreWarnedOf) {
   EXPECT_NE(unmade.find("/cuts/0/t"), std::string::npos) << unmade;
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(CutScene, HowTo_CutsTwoSlices) {
   const test::CommandResult r =
       test::deform({"run", std::string(DEFORM_SOURCE_DIR) + "/libdeform/doc/howto/cut/planes.json", "--check",
@@ -584,6 +585,7 @@ TEST(CutScene, BodyWithoutCells_TheRunGoesOn) {
 }
 
 // Recorded and replayed, and continued from states before, between and after the cuts: the same bits.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(CutScene, RunThatCuts_IsReplayedAndContinuedToTheBit) {
   const std::string dir = folder(), path = dir + "/a scene.json";
   const std::string second =

@@ -144,6 +144,7 @@ TEST_F(PlannerScene, WhatCannotBePlanned_IsReportedInOneSentence) {
                  {"/bodies/0/model/params", "name it in"});
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST_F(PlannerScene, Calibrate_WritesWhatScenesTake) {
   const test::CommandResult r = test::deform({"calibrate", "--model", "modal", "--quiet"});
   ASSERT_EQ(r.exit_code, 0) << r.err;

@@ -56,15 +56,19 @@ void walk(const std::string &name, const std::vector<std::string> &args, int run
 
 }  // namespace
 
+// unsanitized: the sanitizer's own operator new must come first
 TEST(RefusedCommand, RunOfAScene_EndsWithASentence) {
   walk("run", {"run", DEFORM_SOURCE_DIR "/examples/scenes/slope_block.json", "--time", "0.002", "--quiet"},
        500);
 }
+// unsanitized: the sanitizer's own operator new must come first
 TEST(RefusedCommand, RunOfRigidBodies_EndsWithASentence) {
   walk("rigid", {"run", DEFORM_SOURCE_DIR "/examples/scenes/rigid_on_bed.json", "--time", "0.002", "--quiet"},
        200);
 }
+// unsanitized: the sanitizer's own operator new must come first
 TEST(RefusedCommand, Explain_EndsWithASentence) {
   walk("explain", {"explain", DEFORM_SOURCE_DIR "/examples/scenes/two_cylinders_coarse.json"}, 200);
 }
+// unsanitized: the sanitizer's own operator new must come first
 TEST(RefusedCommand, PluginList_EndsWithASentence) { walk("list", {"plugin", "list"}, 150); }

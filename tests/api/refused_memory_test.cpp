@@ -193,6 +193,7 @@ void walk_all(const Build &build, int least) {
 
 }  // namespace
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(RefusedMemory, InAStepWithSelfContact_LeavesTheWorldAsItWas) { walk_all(self_contact, 40); }
 TEST(RefusedMemory, InAStepWithSelfContactOnAuto_LeavesTheWorldAsItWas) { walk_all(self_auto, 40); }
 TEST(RefusedMemory, InAStepThatFallsAsleepAndWakes_LeavesTheWorldAsItWas) { walk_all(sleepers, 40); }

@@ -42,6 +42,7 @@ struct Folder {
 
 }  // namespace
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Replay, RunContinuedFromASavedState_EndsWithTheBitsOfOneThatNeverStopped) {
   const Folder f;
   // before the contact, in it, and after the change of model
@@ -56,6 +57,7 @@ TEST(Replay, RunContinuedFromASavedState_EndsWithTheBitsOfOneThatNeverStopped) {
   }
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Replay, RecordedRun_PassesThroughTheSameBitsInEveryState) {
   const Folder f;
   const std::string out = f.path + "/run";

@@ -106,6 +106,7 @@ double moved(const dfm_rigid_state &a, const dfm_rigid_state &b) {
 }  // namespace
 
 // Dropped from 2 cm, all of them lie on every kind of floor and stay where they are.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(RigidTouch, WhatLies_DoesNotCreep) {
   for (const char *floor : kFloors)
     for (const char *thing : kThings)
@@ -230,6 +231,7 @@ TEST(RigidTouch, WhatMoves_TakesItAlong) {
 }
 
 // A tower of five, and it stays; both momenta of two boxes that meet in the air.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(RigidTouch, ATower_Stands) {
   for (const double dt : kStep) {
     SCOPED_TRACE(dt);
@@ -325,6 +327,7 @@ TEST(RigidTouch, Tumbling_StaysInside) {
 }
 
 // Twelve things of three kinds fall on a heap between walls: none goes through the floor or a wall.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(RigidTouch, AHeap_StaysBetweenItsWalls) {
   for (const double dt : {1.0 / 60}) {
     SCOPED_TRACE(dt);
@@ -388,6 +391,7 @@ TEST(RigidTouch, WhatAHingeConnects_StaysOnAFloor) {
 
 // Thrown with a fast spin onto a plane at 60 Hz: a corner goes along its arc, and none is deep in the plane.
 // Energy is compared where free flight keeps it: not at 200 rad/s, 3 rad in a sub-step.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(RigidTouch, FastSpin_LeavesNothingInTheFloor) {
   const double dt = 1.0 / 60;
   for (const double spin : {40.0, 200.0})
@@ -446,6 +450,7 @@ TEST(RigidTouch, VoxelsOnAPlane_AreTold) {
 }
 
 // Twenty boxes that fall on a heap: no step has more energy than the one before, from the fall to rest.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(RigidTouch, AHeapOfBoxes_MakesNoEnergy) {
   const double dt = 1.0 / 60;
   test::Context context;
@@ -480,6 +485,7 @@ TEST(RigidTouch, AHeapOfBoxes_MakesNoEnergy) {
 
 // Twenty boxes that fall into a shaft of six times their size jam, turn and carry each other: no corner goes
 // into a wall or the floor, and no step makes energy.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(RigidTouch, BoxesInAShaft_StayInside) {
   const double half = 0.15;
   test::Context context;

@@ -368,6 +368,7 @@ TEST(Wake, ByAnObstacleOnKeys_ComesWhenItReachesTheBody) {
 
 // A ball dropped on a stack that sleeps, beside the same one awake all along: within half of d_c
 // after the impact.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Wake, ByAFallingBody_GivesTheMotionWithoutSleep) {
   std::vector<double> lower[2], ball[2];
   double d_c = 0;
@@ -397,6 +398,7 @@ TEST(Wake, ByAFallingBody_GivesTheMotionWithoutSleep) {
 
 // A block on a slope of 24 degrees, mu 0.5, woken ten times: no contact slips, and its shape comes to
 // rest to rounding.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Wake, TenTimesOnASlope_DoesNotCreep) {
   const double a = 24 * 3.14159265358979323846 / 180;
   const test::Context c;

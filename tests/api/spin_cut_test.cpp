@@ -67,6 +67,7 @@ struct Books {
 }  // namespace
 
 // Teeth that jam may bear loads that cancel each other, at points a rest distance apart.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(SpinCut, MovingBlade_PartsACubeThatTurns) {
   int kept = 0;
   for (const char *model : kModels)
@@ -123,6 +124,7 @@ TEST(SpinCut, CutsThemselves_KeepAngularMomentumToRounding) {
   }
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(SpinCut, ToolWithAnEdge_PartsACubeThatTurns) {
   int kept = 0;
   for (const char *model : kModels) {

@@ -59,6 +59,7 @@ void friction(Scene &s, double mu, const char *a = "block", const char *b = "flo
 
 }  // namespace
 
+// unsanitized: so many calls take minutes there
 TEST(Superseded, MotionsOfHeldPoints_TakeTheSameMemoryAfterAMillionCalls) {
   Scene s;
   const uint32_t points[] = {0, 1, 2};
@@ -72,6 +73,7 @@ TEST(Superseded, MotionsOfHeldPoints_TakeTheSameMemoryAfterAMillionCalls) {
   EXPECT_EQ(s.bytes(), bytes);
 }
 
+// unsanitized: so many calls take minutes there
 TEST(Superseded, FrictionAndFilters_TakeTheSameMemoryAfterAMillionCalls) {
   Scene s;
   const auto set = [&](int i) {

@@ -233,6 +233,7 @@ TEST(ModelOfABody, WhatItLogs_NamesTheBody) {
 
 // A ball that nothing damps rolls in a model of small rotations, which makes it swell, and touches with one
 // that sees that as strain: each bounce would put in more than the last one.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(SwitchRule, BackAndForth_PumpsNoEnergyIntoAnUndampedBall) {
   for (const double spin : {0.0, 5.0}) {
     test::LoggedContext logged;
@@ -274,6 +275,7 @@ TEST(SwitchRule, BackAndForth_PumpsNoEnergyIntoAnUndampedBall) {
 }
 
 // What a body has lost since pays for what changes have put in: under its weight it may change for ever.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(SetModel, BackAndForthOfADampedBody_Continues) {
   for (const int32_t integrator : {DFM_INTEGRATOR_SYMPLECTIC_EULER, DFM_INTEGRATOR_IMPLICIT_EULER}) {
     test::Context c;

@@ -30,6 +30,7 @@ TEST(TearScene, BarBetweenJaws_FallsWhereItTearsAndHangsWhereItDoesNot) {
 }
 
 // Pieces are bodies that the scene does not name: tables, states and the summary have them all the same.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(TearScene, PiecesOfAnOrange_AreInTheTablesAndStates) {
   const std::string out = test::scratch("pieces of an orange " + std::to_string(getpid()));
   const test::CommandResult r =
@@ -46,6 +47,7 @@ TEST(TearScene, PiecesOfAnOrange_AreInTheTablesAndStates) {
 }
 
 // Where they were one, a piece and its body lie on each other, which is no overlap.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(TearScene, PartsOfALiver_AreNotReportedAsOverlapping) {
   const std::string out = test::scratch("parts of a liver " + std::to_string(getpid()));
   const test::CommandResult r = test::deform(
@@ -99,6 +101,7 @@ TEST(TearScene, PiecesOfABallThatShatters_AreToldOnceAndNotToBeMoved) {
   EXPECT_NE(r.out.find("\"least_cells\" above 1 with \"crumbs\": \"remove\""), std::string::npos) << r.out;
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(TearScene, TornBodyThatCrossesItself_IsAdvisedToSeparate) {
   const std::string log = shattered("torn ball", "0.06", "").err;
   EXPECT_NE(log.find("a surface crosses itself"), std::string::npos) << log;
@@ -106,6 +109,7 @@ TEST(TearScene, TornBodyThatCrossesItself_IsAdvisedToSeparate) {
 }
 
 // The same of a rough cut in a scene that separates: what is left to be done is another mesh.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(TearScene, CutBodyThatCrossesItself_IsNotAdvisedToSeparateWhereItDoes) {
   const std::string out = test::scratch("rough cut " + std::to_string(getpid()));
   const std::string mesh = R"(/bodies/0/mesh={"make": "ball", "radius": 0.04, "cells": 2500})";

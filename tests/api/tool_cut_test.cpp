@@ -369,6 +369,7 @@ TEST(ToolCut, DrivenBlade_FeelsTheEnergyOfTheCut) {
 }
 
 // The sides are held: the body bends under the blade, and the work beyond that of the cut goes into it.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(ToolCut, DrivenBlade_BendsTheBody) {
   for (const char *model : kModels) {
     Tough s(0, sides, model);
@@ -391,6 +392,7 @@ TEST(ToolCut, DrivenBlade_BendsTheBody) {
 
 // The sides of the slit lie on each other under the drag, with friction: contacts that hold the same points
 // more than once, whose slips no impulse takes away (doc/decisions/contact_solver.md).
+// unsanitized: too slow there; shorter tests run the same code
 TEST(ToolCut, SidesOfASlitUnderDrag_AreSolved_ImplicitSteps) {
   Tough s(0, sides, "corotational_fem", DFM_INTEGRATOR_IMPLICIT_EULER);
   s.down(0.015, 0.2);

@@ -92,6 +92,7 @@ double crept(const Held &a, const Held &b) {
 }  // namespace
 
 // It closes on a thing that lies on a table, lifts it by 10 cm, and holds it for 5 s.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(ToolLift, ByFrictionAlone_NothingCreeps) {
   for (const Thing &thing : {kCube, kMesh, kBall, kNeedle, kRod})
     for (const double dt : {1e-3, 1.0 / 60}) {
@@ -123,6 +124,7 @@ TEST(ToolLift, ByFrictionAlone_NothingCreeps) {
 }
 
 // The laws of the pair, with their memory.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(ToolLift, ByEveryLaw_NothingCreeps) {
   for (const char *law : {"coulomb", "karnopp", "dahl", "lugre", "elastoplastic", "gms"}) {
     SCOPED_TRACE(law);
@@ -226,6 +228,7 @@ TEST(ToolLift, ALawWithMemory_IsASpring) {
 
 // A finger presses a free brick on a soft block: what the finger feels the block gets, and the brick stays
 // between.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(ToolLift, ABrickBetweenAToolAndASoftBlock_HandsTheForceOn) {
   test::Context context;
   const dfm_world w = test::make_world(context, {0, 0, 0});

@@ -127,6 +127,7 @@ double energy(dfm_tool t) {
 
 // A device goes 1 cm into the floor. The tool stops at its surface, the hand feels the spring, and nothing
 // creeps.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(ToolObstacle, PressedDown_EachShapeStopsOnEachFloor) {
   for (const char *const floor : kFloors)
     for (const Shape &shape : kShapes)
@@ -191,6 +192,7 @@ TEST(ToolObstacle, AJitteringDevice_MakesNoEnergy) {
 }
 
 // Drawn aside, the tool slides under mu N; within the cone it stays where it is.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(ToolObstacle, DrawnAside_FrictionIsThatOfThePair) {
   for (const char *const floor : {"plane", "box", "mesh", "sheet"})
     for (const Shape &shape : kShapes) {
@@ -285,6 +287,7 @@ TEST(ToolObstacle, Snapshot_GoesOnToTheSameBits) {
 }
 
 // A soft block between the tool and the floor, and the tool beside it on the floor: both bear.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(ToolObstacle, ABlockBeside_BearsItsShare) {
   test::Context context;
   const dfm_world w = test::make_world(context, {0, 0, 0});

@@ -112,6 +112,7 @@ TEST(ToolRub, TheRuleOfThePair_Counts) {
 
 // A grasper closes on a needle that another hand leads, and pulls at with less than the grip bears. It
 // carries the needle along, and nothing but friction does it.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(ToolRub, AGrasper_HoldsAnotherTool) {
   test::Context context;
   const dfm_world w = test::make_world(context, {0, 0, 0});

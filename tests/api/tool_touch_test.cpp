@@ -87,6 +87,7 @@ TEST(ToolTouch, TwoCoupledBalls_ShareTheWay) {
 
 // Tools of every shape, pressed at each other askew while one turns: both momenta are kept, and no tool
 // goes through the other.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(ToolTouch, BothMomenta_AreKept) {
   for (const uint32_t first : kShapes)
     for (const uint32_t second : kShapes)
@@ -118,6 +119,7 @@ TEST(ToolTouch, BothMomenta_AreKept) {
 
 // Undamped springs throw tools at each other for a second: the energy of both never rises once the hands
 // rest. Not of jaws, whose springs hold energy, too.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(ToolTouch, Energy_NeverRises) {
   for (const uint32_t shape : std::span(kShapes).first(6))
     for (const double dt : {2e-4, 2e-3}) {

@@ -347,9 +347,9 @@ int main(int argc, char **argv) {
       (unsigned long long)found.work[found.work.size() * 999 / 1000], (unsigned long long)found.work.back(),
       found.last.passes_max, found.last.sweeps_max, (unsigned long long)found.last.unconverged);
   std::printf(
-      "    steps simplified %llu, discarded %llu; guard: solves %llu, cuts %llu, motion lost %.3g ms; "
+      "    steps simplified %llu, shortened %llu; guard: solves %llu, cuts %llu, motion lost %.3g ms; "
       "largest gain of energy %.3g J, most energy %.3g J\n",
-      (unsigned long long)found.last.cheapened, (unsigned long long)found.last.discarded,
+      (unsigned long long)found.last.cheapened, (unsigned long long)found.last.shortened,
       (unsigned long long)found.last.guard_solves, (unsigned long long)found.last.guard_cuts,
       1e3 * found.last.guard_lost, found.last.energy_gain, found.last.energy_max);
   if (std::any_of(found.cut.begin(), found.cut.end(), [](uint8_t k) { return k != 0; })) {

@@ -52,6 +52,7 @@ TEST_P(Determinism, OneToEightThreads_GiveTheSameHash) {
   for (const uint32_t threads : counts) EXPECT_EQ(scenes::run(scene, threads), one) << threads << " threads";
 }
 
+// unsanitized(implicit_.*_(skins|ten|ball)|(second_order|modal)_ten|(condensed|fine)_ball|ten_in_a_box): slow
 TEST_P(Determinism, AHostThatCutsAndShuffles_GivesTheSameHash) {
   RudeHost host;
   dfm_context_def def = dfm_context_def_default();
@@ -119,6 +120,7 @@ TEST_P(Determinism, ForgottenCandidateLists_DoNotShow) {
 }
 
 // Two worlds of one context may step at the same time, each on its own thread.
+// unsanitized(implicit_.*_(skins|ten|ball)|(second_order|modal)_ten|(condensed|fine)_ball|ten_in_a_box): slow
 TEST_P(Determinism, WorldsThatStepAtTheSameTime_DoNotDisturbEachOther) {
   scenes::Scene few = GetParam();
   few.steps = 60;

@@ -44,6 +44,7 @@ struct World {
 
 // At rest on a slope the bristles carry the tangential weight: sum sigma0 A z = m g sin(theta), and with all
 // of the base touching the mean deflection is m g sin(theta) / (sigma0 area of the base), whatever the mesh.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Bristle, AtRestOnASlope_DeflectsByWeightOverStiffnessTimesArea) {
   for (uint32_t cells : {100u, 600u}) {
     World w(0.2, 2e6, cells, 30);
@@ -65,6 +66,7 @@ TEST(Bristle, AtRestOnASlope_DeflectsByWeightOverStiffnessTimesArea) {
 }
 
 // No stiffness limit on the step: bristles are a compliance that is solved implicitly.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Bristle, FromSoftToNearlyRigid_HoldsAtTheSameStep) {
   for (double sigma0 : {1e6, 1e8, 1e9, 1e10, 1e12}) {
     World w(0.2, sigma0, 200, 30);

@@ -87,6 +87,7 @@ std::ostream &operator<<(std::ostream &out, const Case &c) { return out << c.law
 
 class BrokenLaw : public testing::TestWithParam<Case> {};
 
+// unsanitized: its rules have limits of time; other tests run them
 TEST_P(BrokenLaw, FailsItsRuleOnly) {
   const test::CommandResult r = check(broken(GetParam().law));
   EXPECT_EQ(r.exit_code, 1) << r.out << r.err;
@@ -234,6 +235,7 @@ TEST(BrokenLaw, CorrectTemplates_PassEveryRule) {
 }
 
 // A law that never answers costs two rules, not all of them.
+// unsanitized: its rules have limits of time; other tests run them
 TEST(BrokenLaw, ThatAlwaysHangs_EndsAfterTwoRulesThatDidNotComeBack) {
   const test::CommandResult r = check(broken("hangs_always"));
   EXPECT_EQ(r.exit_code, 1) << r.out;
@@ -246,6 +248,7 @@ TEST(BrokenLaw, ThatAlwaysHangs_EndsAfterTwoRulesThatDidNotComeBack) {
 }
 
 // Nor does a law that always crashes fill the screen with signals.
+// unsanitized: its rules have limits of time; other tests run them
 TEST(BrokenLaw, ThatAlwaysCrashes_EndsAfterTwoRulesAndTheOneThatSaysWhere) {
   const test::CommandResult r = check(broken("crashes_always"));
   EXPECT_EQ(r.exit_code, 1) << r.out;
@@ -256,6 +259,7 @@ TEST(BrokenLaw, ThatAlwaysCrashes_EndsAfterTwoRulesAndTheOneThatSaysWhere) {
 }
 
 // NaN from a speed on is no wrong sign: the sentence names the speed.
+// unsanitized: its rules have limits of time; other tests run them
 TEST(BrokenLaw, ForceThatIsNotFiniteAtSpeed_IsToldWithTheSpeed) {
   const test::CommandResult r =
       check(broken("no_force_at_speed"), {"--only", "F03", "--only", "F12", "--only", "F16"});
@@ -271,6 +275,7 @@ TEST(BrokenLaw, ForceThatIsNotFiniteAtSpeed_IsToldWithTheSpeed) {
 }
 
 // A function that is missing is named once; what would call it is not run.
+// unsanitized: its rules have limits of time; other tests run them
 TEST(BrokenLaw, WithoutEval_IsToldSoInOneSentence) {
   const test::CommandResult r = check(broken("without_eval"));
   EXPECT_EQ(rules_that("FAIL", r.out), std::vector<std::string>{"V03"}) << r.out;
@@ -287,6 +292,7 @@ TEST(BrokenLaw, WithoutEval_IsToldSoInOneSentence) {
 
 // The force of such a law changes by the same amount with each tenfold slip, so F17 must not compare
 // forces at times at which the slip goes through zero.
+// unsanitized: its rules have limits of time; other tests run them
 TEST(BrokenLaw, LogarithmOfTheSlip_ConvergesWithTheStep) {
   const test::CommandResult r = check(broken("sound_rate_and_state"));
   EXPECT_EQ(r.exit_code, 0) << r.out;
@@ -294,6 +300,7 @@ TEST(BrokenLaw, LogarithmOfTheSlip_ConvergesWithTheStep) {
 }
 
 // The sentence says in which slip and when.
+// unsanitized: its rules have limits of time; other tests run them
 TEST(BrokenLaw, ThatDependsOnTheStep_IsToldWhereMost) {
   const test::CommandResult r = check(broken("depends_on_the_step"), {"--only", "F17"});
   const std::string why = sentence("F17", r.out);
@@ -303,6 +310,7 @@ TEST(BrokenLaw, ThatDependsOnTheStep_IsToldWhereMost) {
 
 // What waits uses no processor time, so it is not that which ends it; the line of the rule before is
 // there meanwhile.
+// unsanitized: its rules have limits of time; other tests run them
 TEST(BrokenLaw, ThatWaitsForEver_IsEndedWhileResultsArePrintedAsTheyCome) {
   FILE *command = popen(("'" + std::string(DEFORM_COMMAND) + "' plugin check '" + broken("sleeps_for_ever") +
                          "' --only V01 --only F01")
@@ -360,6 +368,7 @@ TEST(PluginCheck, TemplatesOfModels_KeepEveryRuleAndAreNotShipped) {
   EXPECT_FALSE(std::filesystem::exists(shipped("template_model")));
 }
 
+// unsanitized: its rules have limits of time; other tests run them
 TEST(PluginCheck, AnotherSeed_FindsNothingInTheShippedLaws) {
   for (const char *seed : {"2", "77"})
     for (const char *law : {"friction_coulomb", "friction_karnopp"})
@@ -439,6 +448,7 @@ TEST(PluginCheck, FileThatDoesNotLoad_SkipsTheOtherRulesInOneLine) {
       << r.out;
 }
 
+// unsanitized: its rules have limits of time; other tests run them
 TEST(PluginCheck, InThisProcess_GivesTheSameVerdicts) {
   for (const char *law : {"sound", "allocates", "writes_past_the_end", "wrong_sign"}) {
     const test::CommandResult apart = check(broken(law)), here = check(broken(law), {"--in-process"});

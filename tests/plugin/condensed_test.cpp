@@ -51,6 +51,7 @@ TEST(Condensed, ClampedBarUnderUnevenLoads_HasTheFullSolution) {
 
 // K' = K_ss - K_si K_ii^-1 K_is is the inverse of the surface's response at rest: its least eigenvalue is one
 // over the largest of that (reference: 0.0169849).
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Condensed, ResponseOfTheSurface_HasTheEigenvalueOfTheSchurComplement) {
   const Mesh m = read_msh(test::mesh_dir() + "/bars/bar_s3.msh");
   Host host;

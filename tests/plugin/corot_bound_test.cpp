@@ -6,6 +6,7 @@
 namespace corot_test {
 namespace {
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(CorotBound, RowSums_BoundTheTrueSpectrumInEveryShape) {
   const Mesh mesh = kuhn_bar(4, 2, 2, 0.1, 0.2);
   Fields uneven;
@@ -58,6 +59,7 @@ TEST(CorotBound, RowSums_BoundTheTrueSpectrumInEveryShape) {
 }
 
 // T3: table critical_time_step.csv, the linear critical step of Verlet, lumped masses.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(CorotBound, CriticalStep_IsNeitherExceededNorFarAway) {
   const auto rows = test::read_csv(test::reference_dir() + "/elasticity/tables/critical_time_step.csv");
   int seen = 0;

@@ -100,6 +100,7 @@ TEST(CorotDeterminism, Compiler_NeverShowsInAResult) {
   EXPECT_EQ(fnv(results(host, nullptr, mesh, all_kinds()[12])), 12094118107865437454ull);
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(CorotDeterminism, CutOfTheWorkAndStride_NeverShowInAResult) {
   for (const Params &p : all_kinds()) {
     Host host;

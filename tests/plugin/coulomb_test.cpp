@@ -370,6 +370,7 @@ TEST_F(Coulomb, ThrownBlock_StopsWhereTheEnergyIsSpent) {
 
 // A mass pulled through a spring at constant speed: the closed form of the stick-slip cycle
 // between two levels.
+// unsanitized: too slow there; shorter tests run the same code
 TEST_F(Coulomb, StickSlipPeriod_MatchesTheClosedForm) {
   const double k = 2, pull = 0.1, fc = 1, fs = 1.5, w = std::sqrt(k), df = fs - fc, h = 1e-4;
   const double expected = 2 / w * (kPi - std::atan(df * w / (k * pull))) + 2 * df / (k * pull);  // 7.6113 s

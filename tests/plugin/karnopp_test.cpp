@@ -197,6 +197,7 @@ TEST_F(Karnopp, ThrownBlock_EndsAtExactlyZeroAndStaysThere) {
 
 // The spring-driven mass of doc/laws/formulas.md: with the band of 1e-4 m/s the period is 6.5173 s, where the
 // law without a band has 6.5123 s.
+// unsanitized: too slow there; shorter tests run the same code
 TEST_F(Karnopp, StickSlipPeriod_IsThatOfTheReference) {
   const std::vector<double> p{1, 1.5, 1e-3, 2, 0.4, 1e-4};
   const double k = 2, pull = 0.1, h = 2e-5;
@@ -213,6 +214,7 @@ TEST_F(Karnopp, StickSlipPeriod_IsThatOfTheReference) {
 }
 
 // Mass on a plane driven by bias and sine; the whole history against the event-driven reference.
+// unsanitized: too slow there; shorter tests run the same code
 TEST_F(Karnopp, GrossSlidingRig_FollowsTheReference) {
   const auto rows = test::read_csv(test::reference_dir() + "/friction/rig_gross_karnopp.csv");
   ASSERT_EQ(rows[0][1], "x");

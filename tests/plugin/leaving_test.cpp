@@ -96,6 +96,7 @@ TEST_F(Leaving, FileThatExitsWhenItIsLoaded_IsNamed) {
 
 // A signal that asks for an end is waited for while the law does not come back, and then the process ends by
 // itself; a second signal ends it at once.
+// unsanitized: its rules have limits of time; other tests run them
 TEST_F(Leaving, LawThatHangs_EndsSomeTimeAfterASignalAndAtOnceAfterASecond) {
   for (const bool twice : {false, true}) {
     test::write_file(dir + "/scene.json", scene_with(twice ? 8 : 7));

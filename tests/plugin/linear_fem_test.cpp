@@ -200,6 +200,7 @@ TEST(LinearFem, ParametersWhileRunning_AreThoseOfANewBody) {
   EXPECT_EQ(std::memcmp(a.f, b.f, 4 * a.size() * sizeof(double)), 0);
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(LinearFem, AnyCutOfTheWork_GivesTheSameBits) {
   Host whole, cut;
   const Mesh mesh = kuhn_bar(16, 12, 12, 0.01, 0.2);
@@ -281,6 +282,7 @@ struct Critical {
   double step;
 };
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(LinearFem, StepBound_IsBelowTheReferenceSetsLargestStep) {
   for (const Critical &c : {Critical{"bars/bar_s2.msh", 0.00285539734971},
                             {"bars/bar_u2.msh", 0.00166214397915},

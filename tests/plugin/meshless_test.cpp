@@ -301,6 +301,7 @@ TEST(Meshless, FreeVibrationAtTheBound_StaysBounded) {
 }
 
 // By the largest eigenvalue of M^-1 K, which power iteration finds from below.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Meshless, StepBound_IsBelowTheTrueOneAndNotFarBelow) {
   for (double poisson : {0.0, 0.3, 0.45})
     for (double hourglass : {0.0, 0.1, 1.0}) {
@@ -397,6 +398,7 @@ TEST(Meshless, FieldsByCell_AreMeansAroundThePoints) {
     EXPECT_LT(norm(a.get(a.f, i) - b.get(b.f, i)), 1e-12 * a.largest_force());
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Meshless, AnyCutOfTheWork_GivesTheSameBits) {
   Host whole, cut;
   const Mesh mesh = kuhn_bar(15, 12, 11, 0.01, 0.2);

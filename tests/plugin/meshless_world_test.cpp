@@ -17,6 +17,7 @@ constexpr int32_t kIntegrators[] = {DFM_INTEGRATOR_SYMPLECTIC_EULER, DFM_INTEGRA
 
 }  // namespace
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(MeshlessWorld, DroppedBlock_RestsAndWeighsWhatItWeighs) {
   for (const int32_t integrator : kIntegrators) {
     World w("coulomb", integrator, {0, 0, -9.81}, 0.05);
@@ -28,6 +29,7 @@ TEST(MeshlessWorld, DroppedBlock_RestsAndWeighsWhatItWeighs) {
   }
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(MeshlessWorld, SlopeBelowTheLimit_HoldsUnderEveryLawWithStiction) {
   for (const char *law : {"coulomb", "karnopp", "elastoplastic", "gms"}) {
     World w(law, DFM_INTEGRATOR_IMPLICIT_EULER, tilted(0.2));
@@ -80,6 +82,7 @@ TEST(MeshlessWorld, SnapshotInContact_ContinuesWithTheSameBits) {
 }
 
 // Points of the lattice that fills a surface, which hangs on them.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(MeshlessWorld, DemoScenes_MeetTheirCriteria) {
   test::expect_sound_demo("slope_block", "meshless", 0.4, 0);
   for (const char *scene : {"ball_incline", "two_materials", "fill_drop"})

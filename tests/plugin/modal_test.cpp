@@ -31,6 +31,7 @@ std::vector<double> reference_eigenvalues(const std::string &mesh, const std::st
   return {};
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Modal, FrequenciesOfBarsAndSpheres_AreThoseOfTheSameElements) {
   const std::pair<const char *, const char *> meshes[] = {
       {"bars/bar_s2", "bar_s2"}, {"bars/bar_u3", "bar_u3"}, {"spheres/sphere_3", "sphere_3"}};
@@ -49,6 +50,7 @@ TEST(Modal, FrequenciesOfBarsAndSpheres_AreThoseOfTheSameElements) {
 }
 
 // Lamb 1881: five torsional modes k_s a = 2.5011, five spheroidal 2.6462; lumped masses give less.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Modal, FrequenciesOfAFreeSphere_KeepTheirMultiplicity) {
   const std::vector<double> hertz = modes_of(mesh_of("spheres/sphere_4"), {{"young", 1e7}, {"modes", 14}});
   ASSERT_EQ(hertz.size(), 14u);
@@ -60,6 +62,7 @@ TEST(Modal, FrequenciesOfAFreeSphere_KeepTheirMultiplicity) {
   EXPECT_NEAR(hertz[5] / 522.383, 1, 0.03);
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Modal, FrequenciesOfAFineBar_AreNearTheContinuum) {
   const Mesh m = mesh_of("bars/bar_u3");
   const double held[] = {1.611, 1.611, 9.662, 9.662, 14.27}, free[] = {9.934, 9.934, 25.88, 25.88, 28.49};
@@ -74,6 +77,7 @@ TEST(Modal, FrequenciesOfAFineBar_AreNearTheContinuum) {
 
 // The cube's cells turn into each other about its diagonal: eigenvalues are double to the last digits, where
 // Lanczos's method sees one vector. It finds the same modes as a dense solver.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Modal, DoubleModesOfACube_AreBothFound) {
   const Mesh m = kuhn_bar(5, 5, 5, 0.02);
   const std::vector<double> few = modes_of(m, {{"modes", 24}}), all = modes_of(m, {{"modes", 300}});
@@ -89,6 +93,7 @@ TEST(Modal, DoubleModesOfACube_AreBothFound) {
 
 // With all modes the step is exact: the clamped bar under sudden gravity (exact modal sum), at 0.05 s each,
 // five periods of the fastest mode.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Modal, AllModesOfAClampedBar_EqualTheExactMotion) {
   const Mesh m = mesh_of("bars/bar_s2");
   const auto table = test::read_csv(test::reference_dir() + "/elasticity/tables/dyn_linear_step.csv");

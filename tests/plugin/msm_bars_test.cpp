@@ -147,6 +147,7 @@ std::vector<Mesh> family(char letter) {
 
 constexpr double kYoung = 2e4;
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(MsmBars, RegularLattice_HasYoungsModulusWhateverItsSize) {
   for (uint32_t n : {1, 2, 4}) {
     const Mesh mesh = kuhn_bar(10 * n, n, n, 0.1 / n);
@@ -156,6 +157,7 @@ TEST(MsmBars, RegularLattice_HasYoungsModulusWhateverItsSize) {
 }
 
 // Three materials: springs alone, and the volume term that makes the Poisson ratio 0.3 and 0.45.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(MsmBars, HangingBar_StretchesWithinTenPercentOfTheFinest) {
   for (char letter : {'s', 'u'}) {
     const std::vector<Mesh> meshes = family(letter);
@@ -183,6 +185,7 @@ TEST(MsmBars, HangingBar_StretchesWithinTenPercentOfTheFinest) {
 
 // u1 has most of its edges in its surface, along the bar: across it stays a quarter too soft (a third with
 // Van Gelder's factor alone).
+// unsanitized: too slow there; shorter tests run the same code
 TEST(MsmBars, FreeMesh_IsOneMaterialInEveryDirection) {
   const std::vector<Mesh> meshes = family('u');
   for (int n = 0; n < 4; ++n) {
@@ -202,6 +205,7 @@ TEST(MsmBars, FreeMesh_IsOneMaterialInEveryDirection) {
 
 // Printed for doc/models/msm.md; linear tetrahedra sag -78, -49, -21, -6 % of the slender beam on s1..s4.
 // Finer is softer.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(MsmBars, Cantilever_SagGrowsTowardsTheBeamUnderRefinement) {
   for (char letter : {'s', 'u'}) {
     double last = 0;
@@ -235,6 +239,7 @@ Bar::Pull affine(double g, bool form_a) {
   return {sum / (c11 + c12), (c11 - c12) * sum / (c11 * c33 - c13 * c13)};  // here: along, across
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(MsmBars, SlopeAlongOneAxis_SoftensAsTheAffineNetworkOnAFreeMesh) {
   const Mesh mesh = read_msh(test::mesh_dir() + "/bars/bar_u3.msh");
   for (bool form_a : {false, true}) {
@@ -264,6 +269,7 @@ TEST(MsmBars, SlopeAlongOneAxis_SoftensAsTheAffineNetworkOnAFreeMesh) {
 // kV 1 x 1 on top of springs scaled by s: by the Sherman-Morrison formula a lattice whose axes are alike
 // answers to a unit stress along one of them with the strains 1/s - q and -nu/s - q, in 1/E, where b = 1 - 2
 // nu and q = (b/s)^2 / (1/r + 3 b/s).
+// unsanitized: too slow there; shorter tests run the same code
 TEST(MsmBars, VolumeTerm_AddsItsModulusToTheLatticeInClosedForm) {
   const Mesh mesh = kuhn_bar(20, 2, 2, 0.05);
   const Bar::Pull springs = Bar(mesh, {kYoung, 0.45, 0, 0, 0}).pull(0);
@@ -284,6 +290,7 @@ TEST(MsmBars, VolumeTerm_AddsItsModulusToTheLatticeInClosedForm) {
 
 // One cell already has the largest det C that its six edges can have: its springs are Van Gelder's, k = young
 // V / L0^2, to rounding.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(MsmBars, SingleCell_HasVanGeldersStiffness) {
   const Mesh mesh = irregular_tet();
   Host host;
@@ -309,6 +316,7 @@ TEST(MsmBars, SingleCell_HasVanGeldersStiffness) {
 }
 
 // A mesh with many edges one way, turned: the springs follow.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(MsmBars, TurnedMesh_HasTheSameForcesTurned) {
   Mesh mesh = kuhn_bar(6, 2, 2, 0.1, 0.2), turned = mesh;
   const Vec axis = (1 / std::sqrt(14.0)) * Vec{1, 2, 3};

@@ -21,6 +21,7 @@ Params collapsing(double poisson) {
   return p;
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(MsmBound, RowSums_BoundTheTrueSpectrumInEveryShape) {
   const Mesh mesh = kuhn_bar(4, 2, 2, 0.1, 0.2);
   Fields uneven;
@@ -80,6 +81,7 @@ TEST(MsmBound, RegularCell_LiesBetweenItsSpectrumAndThePlainRowSum) {
   for (int i = 0; i < 4; ++i) EXPECT_NEAR(ksum[i], 6 * k, 1e-6 * k);
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(MsmBound, FreeVibration_IsBoundedAtTheBoundAndGrowsAtTwiceTheTrueLimit) {
   for (const Params &p : {Params{1e5, 0.3, 0, 0, 0}, Params{1e5, 0.3, 0.002, 0, 0},
                           Params{1e5, 0.45, 0, 0, 1}, Params{1e5, 0.45, 0.002, 1, 1}, tilted(0, 0, 2, false),

@@ -276,6 +276,7 @@ double growth(const Params &p, double share, int steps, double time_over_step) {
   return most / first;
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(MsmDamper, StepBound_HoldsForEveryRelaxationTimeAndIsNoWasteForLongOnes) {
   for (int damper : {kMaxwell, kSls})
     for (double damping : {0.0, 0.002}) {

@@ -140,6 +140,7 @@ TEST(MsmDeterminism, CutAndOrderOfParallelFor_NeverShow) {
 }
 
 // 105,456 cells: adding up the blocks is cut as well, several blocks per piece
+// unsanitized: too slow there; shorter tests run the same code
 TEST(MsmDeterminism, CutOfAVeryLargeBody_NeverShows) {
   const Params p = {2e5, 0.4, 0.003, 0.5, 1.5};
   const Mesh mesh = kuhn_bar(26, 26, 26, 0.05, 0.2);

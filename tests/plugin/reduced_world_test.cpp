@@ -74,6 +74,7 @@ TEST_P(ReducedWorld, WithAnyLaw_HoldsOnASlopeOrKeepsTogether) {
 }
 
 // The seam meets the other kind of body: a soft ball on top.
+// unsanitized: too slow there; shorter tests run the same code
 TEST_P(ReducedWorld, UnderASoftBall_CarriesBothWeights) {
   World w(GetParam(), "coulomb", 0.5, {0, 0, -9.81}, 1e-4, 1, 1e6);
   test::expect_block_carries_ball(w.context, w.world, w.body, 1.5);
@@ -108,6 +109,7 @@ TEST_P(ReducedWorld, HeldLater_IsRefused) {
 }
 
 // Neither modes that the spin drives nor a rotation from one axis to another gain energy.
+// unsanitized: too slow there; shorter tests run the same code
 TEST_P(ReducedWorld, FreeSpinningPlate_KeepsItsEnergy) {
   const struct {
     double young;
@@ -144,6 +146,7 @@ TEST_P(ReducedWorld, FreeSpinningPlate_KeepsItsEnergy) {
 }
 
 // About each principal axis and a generic one, over as many steps as leave nothing to chance.
+// unsanitized: too slow there; shorter tests run the same code
 TEST_P(ReducedWorld, FreeSpinningPlate_StaysBoundedForTenThousandSteps) {
   const struct {
     double young, step, low, high;
@@ -182,6 +185,7 @@ TEST_P(ReducedWorld, FreeSpinningPlate_StaysBoundedForTenThousandSteps) {
 // The error is the model's own reason.
 // Far beyond small strains, where these models are wrong, no energy comes of it: a soft heavy ball is
 // squeezed to a fraction of its volume, from a height and spinning.
+// unsanitized: too slow there; shorter tests run the same code
 TEST_P(ReducedWorld, SqueezedFarBeyondSmallStrains_GainsNoEnergy) {
   for (const double young : {2e4, 5e3})
     for (const double spin : {0.0, 3.0}) {

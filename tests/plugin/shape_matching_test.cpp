@@ -359,6 +359,7 @@ void spoil(Stepper &b, Start how, unsigned seed) {
   }
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(ShapeMatching, BodyDeformedInAnyWay_Recovers) {
   const Mesh mesh = kuhn_bar(4, 2, 2, 0.1, 0.2);
   for (const Values &kind : all_kinds())

@@ -25,6 +25,7 @@ std::string explained(dfm_world w) {
 
 }  // namespace
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(ShapeMatchingWorld, DroppedBlock_RestsAndWeighsWhatItWeighs) {
   for (double step : {1e-3, 1.0 / 60}) {
     World w(block("coulomb", {0, 0, -9.81}, 0.2));
@@ -37,6 +38,7 @@ TEST(ShapeMatchingWorld, DroppedBlock_RestsAndWeighsWhatItWeighs) {
   }
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(ShapeMatchingWorld, SlopeBelowTheLimit_HoldsUnderEveryLawWithStiction) {
   for (const char *law : {"coulomb", "karnopp", "elastoplastic", "gms"}) {
     World w(block(law, tilted(0.2)));
@@ -143,6 +145,7 @@ TEST(ShapeMatchingWorld, HoldOfALivingBody_IsRefusedInOneSentence) {
 }
 
 // A slope that tilts, a ball rolling down, two tubes, with the model alone named.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(ShapeMatchingWorld, DemoScenes_MeetTheirCriteria) {
   for (const char *scene : {"slope_block", "ball_incline", "two_cylinders", "two_materials"})
     test::expect_sound_demo(scene, "shape_matching", 0.5, 2e-3);

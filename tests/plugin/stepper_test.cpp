@@ -142,6 +142,7 @@ struct World {
 
 }  // namespace
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Stepper, DroppedOnAFloor_RestsAtTheOffsetAndCarriesItsWeight) {
   World w(0.5, {0, 0, -9.81}, 0.01);
   test::run(w.world, 1.0, 1e-3);

@@ -312,7 +312,7 @@ class dfm_world_stats(_Structure):
                 ("guard_solves", u64), ("guard_cuts", u64), ("guard_lost", f64), ("rigid_again", u64),
                 ("work", u64), ("work_max", u64), ("cheapened", u64), ("discarded", u64),
                 ("limited_max", u32), ("self_max", u32), ("energy_start", f64), ("energy_max", f64),
-                ("energy_gain", f64)]
+                ("energy_gain", f64), ("shortened", u64)]
 
 
 class dfm_memory(_Structure):

@@ -133,8 +133,8 @@ enum {
   /* a body, or the contact of a pair, gained energy without a cause (status DFM_E_DIVERGED): take a shorter
    * step, or add stiffness damping */
   DFM_TROUBLE_ENERGY = 64,
-  /* the step was simplified or, with DFM_DISCARD, abandoned because of max_time or max_work: take a shorter
-   * step, or reduce the impact */
+  /* the step was simplified because of max_time or max_work, or ended before dt with the time that they held
+   * (dfm_world_time tells): take a shorter step, or accept slower motion */
   DFM_TROUBLE_BUDGET = 256,
   DFM_TROUBLE_INTERRUPTED = 512 /* DFM_DISCARD because of dfm_world_interrupt */
 };
@@ -143,8 +143,9 @@ enum {
  * @param dt       s, at least 1e-9 times (1 + distance of a body from the origin in meters): below that the
  *                 rounding of positions dominates
  * @param trouble  out, DFM_TROUBLE_* bits; may be NULL
- * @return DFM_OK; DFM_DISCARD too many sub-steps, budget used up (max_time, max_work), or
- * dfm_world_interrupt: nothing has changed except scheduled changes of model (model.h);
+ * @return DFM_OK, also where the budget (max_time, max_work) was used up before dt: at least one sub-step was
+ * taken, dfm_world_time tells how far; DFM_DISCARD too many sub-steps, or dfm_world_interrupt: nothing has
+ * changed except scheduled changes of model (model.h);
  *         DFM_E_DIVERGED a sub-step failed (a value is not finite, a plugin failed, energy appeared without a
  *         cause): the world stays at its last good sub-step, and can step again once the cause is removed;
  *         DFM_E_NOMEM likewise; DFM_E_FATAL a plugin gave no step bound; DFM_E_UNSUPPORTED a scheduled change
@@ -305,9 +306,9 @@ typedef struct dfm_world_stats {
   double guard_lost; /* s since creation: motion removed because neither was enough */
   /* contact solves repeated for a rigid host (DFM_RIGID_AGAIN), since creation */
   uint64_t rigid_again;
-  /* units of the last step, also if it was discarded; maximum since creation (doc/concepts/budget.md) */
+  /* units of the last step, also if it was interrupted; maximum since creation (doc/concepts/budget.md) */
   uint64_t work, work_max;
-  /* steps simplified because of their budget; steps abandoned because of it or by dfm_world_interrupt */
+  /* steps simplified because of their budget; steps abandoned because of dfm_world_interrupt */
   uint64_t cheapened, discarded;
   /* largest number at one time, since creation: cells so distorted that their model limited their stiffness;
    * bodies whose self contact was on */
@@ -317,6 +318,8 @@ typedef struct dfm_world_stats {
   double energy_start, energy_max;
   /* J, the largest gain beyond the work of loads, motions and contact */
   double energy_gain;
+  /* steps that ended before their end because their budget was used up, since creation */
+  uint64_t shortened;
 } dfm_world_stats;
 /** @return DFM_OK; DFM_E_HANDLE. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_get_stats(dfm_world world, dfm_world_stats *out);

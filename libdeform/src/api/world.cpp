@@ -277,11 +277,13 @@ dfm_status dfm_world_step(dfm_world world, double dt, uint32_t *trouble) {
     make_switches(w, dt);
     read_devices(w, w.time + dt);
     begin_cuts(w);
+    const double before = w.time;
     const dfm_status s = step_within_budget(w, dt, &bits);
+    const double passed = w.time - before;
     if (trouble) *trouble = bits;
     if (s == DFM_OK) separate_what_waits(w);
-    if (s == DFM_OK) cut_by_tools(w, dt);
-    if (s == DFM_OK) make_planned_cuts(w, dt);
+    if (s == DFM_OK) cut_by_tools(w, passed);
+    if (s == DFM_OK) make_planned_cuts(w, passed);
     if (s == DFM_OK) tear_bodies(w);
     if (s == DFM_OK) look_at_sensors(w, true);
     if (s == DFM_OK) write_devices(w);

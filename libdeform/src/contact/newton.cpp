@@ -86,7 +86,6 @@ bool ContactNewton::find_way(bool symmetric, double tolerance) {
     const Gmres::Result found = gmres_.run(g_.size(), minus_.data(), way_.data(), tolerance,
                                            fresh ? set_.products : set_.kept, by, precondition);
     products_ += found.iterations;
-    work_ += found.iterations * (factor_.solve_work() + 18.0 * pattern_.nb);
     if (fresh || found.left <= tolerance) break;
   }
   return true;

@@ -83,7 +83,6 @@ class ContactNewton {
   uint32_t steps() const { return steps_; }
   uint32_t products() const { return products_; }
   uint32_t factors() const { return factors_; }
-  double work() const { return work_; }  // multiplications
 
  private:
   struct Body {
@@ -141,7 +140,6 @@ class ContactNewton {
   Residual residual_;
   uint32_t passes_ = 0, steps_ = 0, products_ = 0, factors_ = 0;
   uint32_t limit_ = 0;  // on steps_
-  double work_ = 0;
 
   void number_nodes(std::span<ImplicitSystem *const> systems);
   void list_rows();

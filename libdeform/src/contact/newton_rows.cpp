@@ -25,7 +25,6 @@ void ContactNewton::begin(ContactRows &rows, const RowsPart &part, std::span<Imp
   h_ = h;
   found_ = factored_ = shaped_ = false;
   passes_ = steps_ = products_ = factors_ = 0;
-  work_ = 0;
   number_nodes(systems);
   list_rows();
   set_bias();
@@ -530,7 +529,6 @@ bool ContactNewton::refactor() {
     else factor_.analyse(pattern_, places_.data());
   }
   ++factors_;
-  work_ += factor_.factor_work();
   return factored_ = factor_.factor(blocks_.data());
 }
 

@@ -89,10 +89,6 @@ class Dynamics {
   // work of a sub-step relative to an explicit one: a rough number for the budget of a step
   virtual uint32_t relative_work() const { return 1; }
 
-  // Multiplications so far, roughly: differences are counts of what sub-steps have done. They depend on the
-  // states that it came through, not on what it still knows of earlier ones. 0: not counted.
-  virtual double effort() const { return 0; }
-
   // False: the model gives none.
   virtual bool bound(double time, const AddRowSums &outside, StepBound &out) = 0;
   // 1/s, of the edge that stretches fastest; 0 if the bound does not depend on the shape

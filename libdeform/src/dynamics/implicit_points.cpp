@@ -26,8 +26,6 @@ constexpr double kRounding = 2 * std::numeric_limits<double>::epsilon();
 constexpr double kContracts = 0.5;
 // The factor of the rest state may fail to do so this often in a sub-step.
 constexpr uint32_t kPatience = 4;
-// Of effort: forces in the time of a stiffness, and multiplications in that of an entry of a response.
-constexpr double kStiffnessForces = 10;
 constexpr uint32_t kCuts = 8;  // of a correction that leads too far
 // What a sub-step may err by, over the median edge of the surface; how much longer the next one may be.
 constexpr double kErrs = 0.005, kGrows = 2;
@@ -65,8 +63,6 @@ ImplicitPoints::ImplicitPoints(const Memory &memory, Phyxels &points, Surface &s
     a->assign(size_t{3} * points.n, 0.0);
   held_.assign(points.n, 0);
   stiffness_.create(model, points.n);
-  // points and edges, about as many as points and cells
-  forces_ = kUnitWork * units_of_a_cell(model.type->id) * stiffness_.pattern().nb;
   if (options_.second_order && options_.newton == 1 && !stiffness_.constant())
     fail(DFM_E_UNSUPPORTED,
          "the integrator tr_bdf2 needs more than one Newton iteration with model '%s'; choose "
@@ -114,7 +110,6 @@ bool ImplicitPoints::ask(const double *v, bool commits) {
 
 // share: position between the loads at the start of the sub-step (0) and those at its end (1).
 bool ImplicitPoints::ask_here(const dfm_kin &k, double share) {
-  effort_ += forces_;
   if (share == 1) std::copy(p_.load.begin(), p_.load.end(), p_.f.begin());
   else
     for (size_t j = 0; j < x_.size(); ++j) p_.f[j] = load_before_[j] + share * (p_.load[j] - load_before_[j]);
@@ -155,7 +150,6 @@ bool ImplicitPoints::assemble() {
   dfm_kin k = kin(stage_.time + stage_.elapsed, stage_.elapsed);
   k.x = x_.data();
   k.v = v_.data();
-  effort_ += kStiffnessForces * forces_;
   if (!stiffness_.evaluate(model_, k, -stage_.h * stage_.h, -stage_.h)) return false;
   stiffness_.each_own([&](uint32_t i, double *block) {
     for (size_t c = 0; c < 3; ++c) {
@@ -190,7 +184,6 @@ bool ImplicitPoints::linearize() {
   } catch (const std::bad_alloc &) {  // on any thread that moves this body
     return false;
   }
-  effort_ += exact_->factor_work();
   if (!assemble()) return false;
   // a constant matrix must not depend on the positions at the time when it was made
   if (stiffness_.constant()) exact_->place(p_.rest.data(), 3);
@@ -203,15 +196,10 @@ bool ImplicitPoints::linearize() {
 }
 
 bool ImplicitPoints::solve(const Array<double> &b, Array<double> &x) {
-  if (by_rest_) {
-    effort_ += rest_->solve_work();
-    return rest_->solve(b.data(), x.data());
-  }
+  if (by_rest_) return rest_->solve(b.data(), x.data());
   SolveInfo info;
   std::fill(x.begin(), x.end(), 0.0);
-  const bool solved = exact_->solve(1, b.data(), x.data(), options_.tolerance, info);
-  effort_ += exact_->solve_work() * std::max(1u, info.iterations);
-  return solved;
+  return exact_->solve(1, b.data(), x.data(), options_.tolerance, info);
 }
 
 // Whether the factor of the rest state is still good enough, if it left this share of the residual.

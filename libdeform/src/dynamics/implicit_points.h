@@ -39,7 +39,6 @@ class ImplicitPoints : public Dynamics, public ImplicitSystem {
   }
   // of a stage; measured: 30 at 700 points, 60 at 4,300
   uint32_t relative_work() const override { return (options_.second_order ? 2 : 1) * kImplicitWork; }
-  double effort() const override { return effort_; }
   bool bound(double time, const AddRowSums &outside, StepBound &out) override;
   void begin(bool touched) override;
   void loads_before() override { load_before_ = p_.load; }
@@ -109,7 +108,6 @@ class ImplicitPoints : public Dynamics, public ImplicitSystem {
   double factor_h_ = 0;                // s, of the present factor; 0: none
   std::vector<double> factor_params_;  // of the model at that time, if its stiffness is constant
   bool solved_ = false;                // v_end is the solution of a contact solve
-  double forces_ = 0, effort_ = 0;     // multiplications: of an evaluation of forces; so far
 
   std::unique_ptr<LinearSolver> new_solver() const;
   bool begin_stage(const SubStep &now);

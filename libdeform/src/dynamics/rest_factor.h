@@ -32,7 +32,6 @@ class RestFactor {
   void turn(const double *x);
 
   bool solve(const double *b, double *x);                      // [npoint,3]
-  double solve_work() const { return solver_->solve_work(); }  // as LinearSolver::solve_work
   const Array<double> &diagonal() const { return diagonal_; }  // [npoint,3] kg, 0 where held
 
  private:

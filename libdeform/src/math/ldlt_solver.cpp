@@ -11,9 +11,6 @@ namespace dfm {
 
 namespace {
 
-// Multiplications of dense panels in the time of one of a triangular solve, which waits for memory.
-constexpr double kDense = 6;
-
 // Pivots below this share of the diagonal are rounding: the matrix is singular in double precision.
 constexpr double kPivot = 64 * std::numeric_limits<double>::epsilon();
 constexpr uint32_t kBlock = 24;         // columns of a panel that are factored at a time
@@ -80,11 +77,6 @@ void LdltSolver::find_places(const BlockPattern &pattern) {
   right_.resize(pack);
   value_.resize(nodes_.value_begin[ns]);
   below_.reserve(ns);
-  factor_work_ = 0;
-  for (uint32_t s = 0; s < ns; ++s) {
-    const double high = 3.0 * nodes_.height(s), low = 3.0 * nodes_.below(s);
-    factor_work_ += (high * high * high - low * low * low) / (6 * kDense);
-  }
   stack_.resize(nodes_.stack);
   for (Array<double> *v : {&pivot_, &inverse_, &root_, &floor_}) v->assign(3 * size_t{n_}, 0.0);
   column_.assign(n_, Supernodes::kNone);
@@ -358,21 +350,6 @@ void LdltSolver::learn() {
     double *const tiles = &product_[size_t{p} * (p + 1) / 2 * kLanes * kLanes];
     for (uint32_t q = 0; q <= p; ++q) gram(p, q, tiles + size_t{q} * kLanes * kLanes);
   });
-}
-
-// A column of Y has values in the supernodes from its point to the root. They take a substitution with the
-// panel of each, and a product with all columns that have values there, by the lower triangle.
-double LdltSolver::restricted_work(uint32_t nsel, const uint32_t *sel) {
-  below_.assign(nodes_.count(), 0);
-  for (uint32_t k = 0; k < nsel; ++k)
-    for (uint32_t s = nodes_.owner[nodes_.place[sel[k]]]; s != Supernodes::kNone; s = nodes_.parent[s])
-      ++below_[s];
-  double sum = 0;
-  for (uint32_t s = 0; s < nodes_.count(); ++s) {
-    const double columns = 3.0 * below_[s], wide = 3.0 * nodes_.width(s), low = 3.0 * nodes_.below(s);
-    sum += columns * wide * (0.5 * wide + low + 0.5 * columns);
-  }
-  return sum / kDense;
 }
 
 // W = S P^T L^-T D^-1 L^-1 P S^T = Y^T Y with Y = D^-1/2 L^-1 P S^T: forward substitution is enough. It is

@@ -20,9 +20,6 @@ class LdltSolver final : public LinearSolver {
   bool factor(const double *blk) override;
   bool solve(uint32_t nrhs, const double *b, double *x, double tolerance, SolveInfo &info) override;
   bool restricted(uint32_t nsel, const uint32_t *sel, double tolerance, double *w, SolveInfo &info) override;
-  double factor_work() const override { return factor_work_; }
-  double solve_work() const override { return 2 * double(value_.size()); }
-  double restricted_work(uint32_t nsel, const uint32_t *sel) override;
   void forget_restricted();  // frees the cache of restricted(), which is for points that recur
   size_t factor_doubles() const { return value_.size(); }  // entries of L that are stored
 
@@ -49,7 +46,6 @@ class LdltSolver final : public LinearSolver {
   Supernodes nodes_;
   uint32_t n_ = 0;
   bool ready_ = false;
-  double factor_work_ = 0;
   // Blocks of A by the supernode of their column: index of the block, place of its first value in the panel,
   // and whether it goes there transposed.
   struct Entry { uint32_t block, at, transposed; };

@@ -31,12 +31,6 @@ class LinearSolver {
   // respond to forces on each other.
   virtual bool restricted(uint32_t nsel, const uint32_t *sel, double tolerance, double *w,
                           SolveInfo &info) = 0;
-  // Multiplications of a factor() and of a right-hand side (or of one of its iterations), by the pattern
-  // alone; those of dense panels, which take less time, as fewer. 0: not known.
-  virtual double factor_work() const { return 0; }
-  virtual double solve_work() const { return 0; }
-  // Multiplications of the first restricted() after a factor(), by the solver's structure; 0: not known.
-  virtual double restricted_work(uint32_t, const uint32_t *) { return 0; }
 };
 
 // restricted() for a solver that can only solve: one right-hand side per column, several at a time.

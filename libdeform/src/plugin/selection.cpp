@@ -15,7 +15,7 @@ namespace dfm {
 namespace {
 
 // Laws that replace others. Of those without memory `coulomb` takes fewer instructions than `karnopp` on the
-// frozen scenes with contact (tests/abi/frozen/effects.csv).
+// frozen scenes with contact (tests/abi/frozen/effects.py).
 constexpr char kNoFriction[] = "none", kCheapest[] = "coulomb";
 constexpr char kStiction[] = "stiction";
 

@@ -54,15 +54,15 @@ inline constexpr int32_t kNoCoupling = -1;
 
 // By which integrator a body moves. step: s, the longest explicit sub-step of the body as its model was made;
 // infinite: none, or not computed.
-// counted: the library has chosen implicit time, and how the body moves now by the count of what steps take.
-enum class Counted : uint32_t { no, implicit, explicitly };
+// chosen: what the library has chosen where it was left to it. struck: implicit time, but explicit until an
+// impact is over (step/impact.h).
+enum class Chosen : uint32_t { no, explicitly, implicit, struck };
 struct Integrator {
   uint32_t used = DFM_INTEGRATOR_SYMPLECTIC_EULER;
-  bool open = false;    // prepare() is to choose it
-  bool chosen = false;  // and has chosen it
+  bool open = false;  // prepare() is to choose it
+  Chosen chosen = Chosen::no;
   double step = std::numeric_limits<double>::infinity();
   uint32_t point = 0;  // that bounds it
-  Counted counted = Counted::no;
 };
 
 // What the list of effects has left out of a model: the values as they were given, all rows end to end

@@ -16,7 +16,6 @@
 #include "state/body.h"
 #include "state/energy_book.h"
 #include "state/impulses.h"
-#include "state/integrator_allowance.h"
 #include "state/meters.h"
 #include "state/overlaps.h"
 #include "state/pair_tables.h"
@@ -90,6 +89,14 @@ struct Sensed {
 };
 
 // A measurement of creep (dfm_world_hold_begin).
+// Simulated time by integrator, where the library chooses implicit time; not in snapshots.
+struct IntegratorTimes {
+  double all = 0, implicit = 0;  // s
+  uint64_t changes = 0;
+  bool told = false;       // a warning has said that bodies are implicit
+  bool told_blow = false;  // and one that a body did not rebound
+};
+
 struct Hold {
   bool on = false;
   double start = 0;  // s
@@ -150,7 +157,7 @@ struct World {
   WorldBound bound;
   StepSizes sizes;
   EnergyWatch watch;
-  IntegratorAllowance allowance;
+  double struck_until = 0;  // s, until which bodies are explicit because of an impact; 0: none
   IntegratorTimes integrator_times;
   std::atomic<bool> busy{false};  // a call of the API changes it (api/call.h)
 

@@ -13,12 +13,10 @@
 #include "state/obstacle.h"
 #include "state/tool.h"
 #include "state/world.h"
-#include "step/impact.h"
 #include "step/context.h"
 #include "step/stages.h"
 #include "step/step_bound.h"
 #include "step/tool_touch.h"
-#include "step/turn_integrators.h"
 
 namespace dfm {
 namespace {
@@ -33,9 +31,7 @@ constexpr double kPolishShare = 0.5, kSolveShare = 0.9;
 constexpr uint64_t kAutomaticFactor = 4000;
 constexpr uint64_t kRigidWork = 10;  // of a rigid body, in the automatic limit
 
-struct StepStopped {
-  enum Why { work, least, time, asked, costly, too_fine, struck } why;
-};
+struct StepInterrupted {};
 
 // Worlds that were requested to stop. A signal may arrive while a lock is held, so no lock is used; 0: free.
 constexpr size_t kMostRequests = 64;
@@ -89,8 +85,6 @@ uint64_t fair_work(const World &w, const StepContext &step) {
 uint64_t bare_work(const World &w, const StepContext &step) {
   return sub_step_work(w, step, kBareChecks, kBareSolve);
 }
-// No sub-step takes less, whatever becomes of its contacts.
-uint64_t sure_work(const World &w, const StepContext &step) { return sub_step_work(w, step, kBareChecks, 0); }
 
 uint64_t pieces_to_come(const StepContext &step) {
   return uint64_t{step.budget.to_come} + (step.h < step.rest);
@@ -252,38 +246,6 @@ void return_to_start(World &w, StepContext &step) {
   step.guard.forget();
 }
 
-void tell(const World &w, const StepContext &step, StepStopped::Why why, double dt) {
-  const unsigned long long number = w.step_count;
-  if (why == StepStopped::asked)
-    return set_last_error(
-        format("step %llu was interrupted; the state is as before the step", number).c_str());
-  // none where all bodies move implicitly, or step themselves
-  const char *const body = w.bound.body ? w.bound.body->name.c_str() : nullptr;
-  if (why == StepStopped::time)
-    return set_last_error(format("step %llu: %g s of simulated time took longer than max_time (%g s); the "
-                                 "state is as before it; take a shorter step, or give it more time",
-                                 number, dt, w.def.max_time)
-                              .c_str());
-  if (why == StepStopped::least)
-    return set_last_error(
-        format("step %llu: %g s of simulated time need at least %llu units of work, and "
-               "max_work is %llu; raise it, take a shorter step, or %s; the state is as before the step",
-               number, dt, static_cast<unsigned long long>(step.budget.least),
-               static_cast<unsigned long long>(step.budget.limit),
-               body ? format("coarsen or soften body '%s', whose step bound is the smallest", body).c_str()
-                    : "coarsen the bodies")
-            .c_str());
-  set_last_error(
-      format("step %llu: %g s of simulated time need more than %llu units of work (max_work), in "
-             "contact%s; the state is as before it; take a shorter step, reduce the speed of the "
-             "impact, or raise max_work, to at least about %llu",
-             number, dt, static_cast<unsigned long long>(step.budget.limit),
-             body ? format(" or in body '%s', whose step bound is the smallest", body).c_str() : "",
-             static_cast<unsigned long long>(
-                 std::max(step.budget.least, step.budget.limit + step.budget.limit / 10)))
-          .c_str());
-}
-
 }  // namespace
 
 uint64_t body_work(const World &w, const StepContext &step) {
@@ -307,19 +269,21 @@ void plan_work(World &w, StepContext &step, uint32_t substeps) {
   for (const auto &set : w.rigid_sets) rigid += kRigidWork * set->defs.size();
   Budget &b = step.budget;
   b.rows = w.store.n;
-  b.least = substeps * bare_work(w, step);
   b.limit = w.def.max_work
                 ? w.def.max_work
                 : kAutomaticFactor * substeps * (body_work(w, step) + surface_work(w, step) + rigid);
   b.divided = w.def.max_work;
-  if (substeps * sure_work(w, step) > b.limit) throw StepStopped{StepStopped::least};
 }
 
-void plan_more_work(const World &w, StepContext &step, uint32_t done, uint32_t more) {
+bool is_used_up(const StepContext &step) {
+  const Budget &b = step.budget;
+  return (b.limit && b.work > b.limit) || (b.end > 0 && now() > b.end);
+}
+
+bool ends_here(const World &w, StepContext &step) {
   Budget &b = step.budget;
-  const uint64_t each = bare_work(w, step);
-  b.least = (done + more) * each;
-  if (b.least <= b.limit) b.limit = std::max(b.limit, b.work + more * each);
+  b.ended = is_used_up(step) || (b.divided && b.work + b.aside + bare_work(w, step) > b.limit);
+  return b.ended;
 }
 
 // Whoever asks for the stable step between two steps has it evaluated there; that changes no later result.
@@ -328,29 +292,24 @@ void allow_for_bound(const World &w, StepContext &step) {
 }
 
 void charge(World &w, StepContext &step, uint64_t units) {
-  Budget &b = step.budget;
-  b.work += units;
-  if (b.limit && b.work > b.limit) throw StepStopped{StepStopped::work};
-  if (b.end > 0 && now() > b.end) throw StepStopped{StepStopped::time};
-  if (waiting.load(std::memory_order_relaxed) != 0 && take_request(w.handle))
-    throw StepStopped{StepStopped::asked};
-  if (const Counting &c = step.counting; c.most > 0 && costs_too_much(c, c.contact + body_effort(w, step)))
-    throw StepStopped{StepStopped::costly};
+  step.budget.work += units;
+  if (waiting.load(std::memory_order_relaxed) != 0 && take_request(w.handle)) throw StepInterrupted{};
 }
 
 void share_work(const World &w, StepContext &step) {
   Budget &b = step.budget;
   b.rows = step.rows.all();
-  const uint64_t follow = pieces_to_come(step);
   if (!b.divided) {
     b.polish_end = uint64_t(kNoPolishAt * double(b.limit));
     b.solve_end = uint64_t(kFewSweepsAt * double(b.limit));
     return;
   }
   const auto left_by = [&](uint64_t kept) { return b.limit > b.work + kept ? b.limit - b.work - kept : 0; };
-  const uint64_t left =
-      left_by(b.aside + follow * fair_work(w, step) + checks(w, step, kFairChecks) + kEndOfSolve * b.rows);
-  const double share = double(left) / double(1 + follow);
+  const uint64_t own = b.aside + checks(w, step, kFairChecks) + kEndOfSolve * b.rows;
+  // a budget that does not hold all sub-steps ends the step before its end
+  const uint64_t fair = fair_work(w, step), follow = std::min(pieces_to_come(step), left_by(own) / fair);
+  const double left = double(left_by(own + follow * fair));
+  const double share = std::max(left / double(1 + follow), std::min(left, double(kFairSolve * b.rows)));
   b.polish_end = b.work + uint64_t(kPolishShare * share);
   b.solve_end = b.work + uint64_t(kSolveShare * share);
 }
@@ -374,15 +333,9 @@ bool may_check(const World &w, StepContext &step) {
   return !step.budget.divided || holds(step, pieces_to_come(step) * fair_work(w, step) + checks(w, step, 1));
 }
 
-void spend(const World &w, const StepContext &step, Spent &spent, uint64_t units) {
-  const Budget &b = step.budget;
+void spend(const World &w, const StepContext &, Spent &spent, uint64_t units) {
   spent.work += units;
-  if (b.limit && b.work + spent.work > b.limit) throw StepStopped{StepStopped::work};
-  if (b.end > 0 && now() > b.end) throw StepStopped{StepStopped::time};
-  if (requested(w.handle)) throw StepStopped{StepStopped::asked};
-  const Counting &c = step.counting;
-  if (costs_too_much(c, c.contact + c.bodies + spent.effort * double(spent.all) / double(spent.own)))
-    throw StepStopped{StepStopped::costly};
+  if (requested(w.handle)) throw StepInterrupted{};
 }
 
 bool spares(const StepContext &step, Spent &spent, Thrift what) {
@@ -397,12 +350,8 @@ bool spares(const StepContext &step, Spent &spent, Thrift what) {
 
 void charge(World &w, StepContext &step, const Spent &spent) {
   step.budget.used = std::max(step.budget.used, spent.used);
-  step.counting.contact += spent.effort;
   charge(w, step, spent.work);
 }
-
-void end_explicit_step() { throw StepStopped{StepStopped::too_fine}; }
-void end_struck_step() { throw StepStopped{StepStopped::struck}; }
 
 void keep_start(World &w, StepContext &step) {
   Budget &b = step.budget;
@@ -434,8 +383,7 @@ dfm_status step_within_budget(World &w, double dt, uint32_t *trouble) {
   StepContext &step = *w.steps;
   Budget &b = step.budget;
   b.work = b.limit = b.aside = 0;
-  b.kept = b.struck = false;
-  b.offered = chosen_by_library(w, dt) ? dt : 0;
+  b.kept = b.ended = false;
   b.used = Thrift::none;
   b.stats = w.stats;
   b.span = w.def.max_time;
@@ -445,41 +393,19 @@ dfm_status step_within_budget(World &w, double dt, uint32_t *trouble) {
   changed_at_once(to, w);
   dfm_status status = DFM_DISCARD;
   const Tasks::Step awake(w.context->tasks);
-  const uint32_t before = *trouble;
-  const auto run = [&] {
-    for (;;) {
-      StepStopped::Why why = StepStopped::costly;
-      try {
-        return run_step(w, step, dt, trouble);
-      } catch (const StepStopped &stopped) {
-        why = stopped.why;
-        if (why < StepStopped::costly) throw;
-      }
-      return_to_start(w, step);
-      if (why == StepStopped::struck) begin_impact(w, dt);
-      else if (why == StepStopped::costly) give_up_implicit(w, step.counting.most_time);
-      else take_up_implicit(w);
-      b.struck = b.struck || why == StepStopped::struck;
-      b.kept = false;
-      b.start.clear();
-      Keep again{b.start};
-      changed_at_once(again, w);
-      b.work = b.limit = b.aside = 0;
-      *trouble = before;
-    }
-  };
   try {
-    status = run();
-  } catch (const StepStopped &stopped) {
+    status = run_step(w, step, dt, trouble);
+  } catch (const StepInterrupted &) {
     return_to_start(w, step);
-    tell(w, step, stopped.why, dt);
-    *trouble = stopped.why == StepStopped::asked ? DFM_TROUBLE_INTERRUPTED : DFM_TROUBLE_BUDGET;
+    set_last_error(format("step %llu was interrupted; the state is as before the step",
+                          static_cast<unsigned long long>(w.step_count))
+                       .c_str());
+    *trouble = DFM_TROUBLE_INTERRUPTED;
     ++w.stats.discarded;
   }
-  if (b.used != Thrift::none) {
-    *trouble |= DFM_TROUBLE_BUDGET;
-    ++w.stats.cheapened;
-  }
+  if (b.ended) ++w.stats.shortened;
+  if (b.used != Thrift::none) ++w.stats.cheapened;
+  if (b.ended || b.used != Thrift::none) *trouble |= DFM_TROUBLE_BUDGET;
   if (w.events.size() > kMostEvents)
     w.events.erase(w.events.begin(), w.events.end() - kMostEvents + kEventsAtOnce);
   w.stats.work = b.work;

@@ -1,6 +1,6 @@
-// The limit on the cost of a step, and how it is enforced; doc/concepts/budget.md. Work is counted in units
-// that depend on the state alone (points, cells, swept contacts), so that a step is simplified or discarded
-// by its count on every machine, with any number of threads.
+// The limit on the cost of a step, and how it is kept; doc/concepts/budget.md. Work is counted in units that
+// depend on the state alone (points, cells, swept contacts), so that a step is simplified or shortened by its
+// count on every machine, with any number of threads.
 #pragma once
 #include <cstdint>
 #include <vector>
@@ -20,7 +20,6 @@ struct Budget {
   uint64_t work = 0, limit = 0;  // units of the present step; limit 0: not planned yet
   // Units that the step takes beside them, from what is free: that of the stable step.
   uint64_t aside = 0;
-  uint64_t least = 0;  // units that it needs with as many contacts as the last sub-step
   // Whether the limit is divided: each sub-step has its share, beside what the others need. The default limit
   // is not, because it ends steps that would not end.
   bool divided = false;
@@ -32,28 +31,27 @@ struct Budget {
   double end = 0;
   double span = 0;             // s, from the start of the step to `end`
   Thrift used = Thrift::none;  // the last entry that this step has used
-  double offered = 0;          // s, length of the step if the library has chosen it, else 0
-  bool struck = false;         // the step is repeated because of an impact (step/impact.h)
+  bool ended = false;          // the step ends before its end: the budget is used up
   bool kept = false;           // `start` holds the state before this step
   std::vector<unsigned char> start;
   dfm_world_stats stats{};  // before the step
 };
 
-// One step within its budget. Returns the results of run_step(), or DFM_DISCARD if the budget is used up
-// or a stop was requested; the state is then that before the step.
+// One step within its budget: at least one sub-step of it, or one piece of that (Budget::ended). Returns the
+// results of run_step(), or DFM_DISCARD if a stop was requested; the state is then that before the step.
 dfm_status step_within_budget(World &w, double dt, uint32_t *trouble);
 
-// Called by run_step(): the step will have this number of sub-steps. Throws if the limit is the host's and
-// does not hold them even without contacts.
+// Called by run_step(): the step will have this number of sub-steps.
 void plan_work(World &w, StepContext &step, uint32_t substeps);
-// The step needs more sub-steps than planned to stay stable: `done` and `more`. If the limit would have held
-// all of them, what others have used of it does not end the step.
-void plan_more_work(const World &w, StepContext &step, uint32_t done, uint32_t more);
+// Whether the step has used its budget: what may end within a sub-step, ends.
+bool is_used_up(const StepContext &step);
+// After a sub-step or a piece of one: whether the step ends here, because the budget does not hold another.
+bool ends_here(const World &w, StepContext &step);
 // At the start of each sub-step.
 void allow_for_bound(const World &w, StepContext &step);
 // Before a contact solve: its share of what the rest of the step does not need.
 void share_work(const World &w, StepContext &step);
-// Adds units and throws if the step must end here. Called by the stepping thread only, never while threads of
+// Adds units, and throws if a stop was requested. Called by the stepping thread only, never while threads of
 // a stage run.
 void charge(World &w, StepContext &step, uint64_t units);
 // The work of one island of the contact solve, on any thread. An island knows the work before all islands,
@@ -63,9 +61,8 @@ struct Spent {
   uint64_t work = 0;
   uint64_t all = 1, own = 1;  // rows of all islands, of this one
   Thrift used = Thrift::none;
-  double effort = 0;  // multiplications of sweeps over bodies whose points answer each other
 };
-// Adds units. Throws if the step must end here, as charge() will for the spent units.
+// Adds units. Throws if a stop was requested, as charge() will.
 void spend(const World &w, const StepContext &step, Spent &spent, uint64_t units);
 bool spares(const StepContext &step, Spent &spent, Thrift what);
 void charge(World &w, StepContext &step, const Spent &spent);  // after all islands, by the stepping thread

@@ -72,7 +72,8 @@ bool find_ends(World &w, StepContext &step, uint32_t *trouble) {
 
 bool stage_commit(World &w, StepContext &step, uint32_t *trouble) {
   if (!step.ended && !find_ends(w, step, trouble)) return false;
-  check_for_impact(w, step);
+  step.struck = is_struck(w, step);
+  if (step.struck) return false;
   const SubStep now = sub_step_of(w, step);
   if (step.guard.motion < 1)
     for (const uint32_t i : step.active) {

@@ -16,7 +16,6 @@
 #include "narrow/narrow_phase.h"
 #include "state/world.h"
 #include "step/budget.h"
-#include "step/counting.h"
 #include "step/energy_watch.h"
 #include "step/guard.h"
 #include "step/islands.h"
@@ -40,7 +39,8 @@ struct StepContext {
   // s: length of the sub-step; from its start to the end of the step, and of the planned sub-step
   double h = 0, left = 0, rest = 0;
   Budget budget;
-  Counting counting;
+  double offered = 0;                  // s, length of the step if the library has chosen it, else 0
+  bool struck = false;                 // the sub-step is to be repeated explicitly (step/impact.h)
   std::vector<StageTime> stage_times;  // by row of the method's table
 
   // prepare(): the world's entities as the stages see them

@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "math/vec3.h"
 #include "plugin/context.h"
@@ -10,7 +13,7 @@
 #include "state/world.h"
 #include "step/context.h"
 #include "step/restitution.h"
-#include "step/turn_integrators.h"
+#include "step/stages.h"
 
 namespace dfm {
 namespace {
@@ -27,7 +30,7 @@ constexpr double kWeights = 2, kWay = 0.05, kLost = 0.5;
 constexpr double kEdges = 36;
 constexpr double kSame = 1e-6;  // relative: a step of the announced length
 
-bool is_implicit(const Body &b) { return b.integrator.counted == Counted::implicit && !b.slumber.asleep; }
+bool is_implicit(const Body &b) { return b.integrator.chosen == Chosen::implicit && !b.slumber.asleep; }
 
 // m, of its bounding box
 double extent(const Body &b) {
@@ -89,6 +92,29 @@ void tell_blow(World &w, const StepContext &step, const Body &b, double speed) {
       b.name.c_str(), other.c_str(), speed, w.time, why_no_rebound(b.integrator.used));
 }
 
+// Changes the integrator of all bodies of this choice, or of none. Returns how many.
+size_t turn(World &w, Chosen from, Chosen to) {
+  std::vector<std::pair<Body *, std::unique_ptr<Dynamics>>> made;
+  for (const auto &b : w.bodies) {
+    if (b->integrator.chosen != from) continue;
+    const ImplicitOptions implicit = implicit_choice(w, *b);
+    made.emplace_back(b.get(), make_dynamics(w.meters.dynamics.memory(), b->p, b->surface, b->model, b->edges,
+                                             to == Chosen::implicit ? &implicit : nullptr));
+  }
+  for (auto &[b, dynamics] : made) {
+    b->dynamics.swap(dynamics);
+    b->integrator.chosen = to;
+    b->integrator.used =
+        to == Chosen::struck ? uint32_t{DFM_INTEGRATOR_SYMPLECTIC_EULER} : implicit_integrator(w, *b);
+    b->bound.known = false;
+  }
+  if (made.empty()) return 0;
+  ++w.integrator_times.changes;
+  w.changed = true;
+  w.sizes = {};  // another bound, and other errors
+  return made.size();
+}
+
 }  // namespace
 
 const char *why_no_rebound(uint32_t integrator) {
@@ -101,43 +127,47 @@ bool chosen_by_library(const World &w, double dt) {
   return !(std::fabs(dt - w.def.step) <= kSame * w.def.step) && dt <= accurate_step(w.sizes);
 }
 
-void check_for_impact(World &w, const StepContext &step) {
-  if (step.rows.n == 0 || w.prescribed.stands()) return;
-  const Budget &budget = step.budget;
-  const bool may_repeat = step.counting.on && !budget.struck && budget.offered > 0;
+bool is_struck(World &w, const StepContext &step) {
+  if (step.rows.n == 0 || w.prescribed.stands()) return false;
   for (const uint32_t i : step.active) {
     const Body &b = *w.bodies[i];
     const bool repeats =
-        may_repeat && is_implicit(b) && budget.offered / b.integrator.step <= w.def.max_substeps;
+        step.offered > 0 && is_implicit(b) && step.offered / b.integrator.step <= w.def.max_substeps;
     if (!repeats && (!damps(b) || w.integrator_times.told_blow)) continue;
     double speed = 0;
     if (!touched(b) || !struck(w, step, b, speed) || has_restitution(w, step, b)) continue;
-    if (repeats) end_struck_step();
+    if (repeats) return true;
     tell_blow(w, step, b, speed);
   }
+  return false;
 }
 
-void begin_impact(World &w, double dt) {
+void begin_impact(World &w) {
   double lasts = 0;
   for (const auto &b : w.bodies)
     if (is_implicit(*b))
       lasts = std::max(lasts, kEdges * extent(*b) / b->surface.median_edge * b->integrator.step);
-  const IntegratorAllowance before = w.allowance;
-  give_up_implicit(w, 0);
-  w.allowance = before;
-  w.allowance.struck_until = w.time + dt + lasts;
-  w.context->logf(DFM_LOG_INFO, "a body was struck: explicit steps until %g s", w.allowance.struck_until);
+  turn(w, Chosen::implicit, Chosen::struck);
+  w.struck_until = w.time + lasts;
+  w.context->logf(DFM_LOG_INFO, "a body was struck: explicit steps until %g s", w.struck_until);
 }
 
-bool goes_on_after_impact(World &w, double dt) {
-  IntegratorAllowance now = w.allowance;
-  if (!(now.struck_until > 0)) return false;
-  w.integrator_times.all += dt;
-  if (w.time < now.struck_until) return true;
-  take_up_implicit(w);
-  now.struck_until = 0;
-  w.allowance = now;
-  return true;
+bool end_impact(World &w) {
+  w.struck_until = 0;
+  for (const auto &b : w.bodies)  // parameters may have changed
+    if (b->integrator.chosen == Chosen::struck && !b->model.can(DFM_CAP_STIFFNESS))
+      b->integrator.chosen = Chosen::explicitly;
+  return turn(w, Chosen::struck, Chosen::implicit) > 0;
+}
+
+void follow_impact(World &w, double dt) {
+  const auto any = [&](Chosen what) {
+    return std::ranges::any_of(w.bodies, [&](const auto &b) { return b->integrator.chosen == what; });
+  };
+  const bool implicit = any(Chosen::implicit);
+  if (implicit || any(Chosen::struck)) w.integrator_times.all += dt;
+  if (implicit) w.integrator_times.implicit += dt;
+  if (w.struck_until > 0 && !(w.time < w.struck_until)) end_impact(w);
 }
 
 }  // namespace dfm

@@ -2,7 +2,6 @@
 // entities for the stages.
 #include "state/world.h"
 #include "step/context.h"
-#include "step/counting.h"
 #include "step/method.h"
 #include "step/stages.h"
 
@@ -400,10 +399,14 @@ IntegratorOption option_of(const World &w, const Body &b) {
   if (!b.model.stepper && b.model.can(DFM_CAP_STIFFNESS))
     o.implicit_work = b.model.can(DFM_CAP_CONSTANT_STIFFNESS) ? kConstantWork : kImplicitWork;
   o.open = b.integrator.open;
-  // those that are explicit by count become implicit again together with all others
-  o.implicit =
-      b.integrator.used != DFM_INTEGRATOR_SYMPLECTIC_EULER || b.integrator.counted == Counted::explicitly;
+  o.implicit = b.integrator.used != DFM_INTEGRATOR_SYMPLECTIC_EULER || b.integrator.chosen == Chosen::struck;
   return o;
+}
+
+// "body 'first' is", "body 'first' and 4 more are"
+std::string names_of(const std::string &first, size_t count) {
+  if (count == 1) return format("body '%s' is", first.c_str());
+  return format("body '%s' and %zu more are", first.c_str(), count - 1);
 }
 
 // Of bodies that have come since the last step and leave it to the library. Before the first step it is one
@@ -413,16 +416,13 @@ void choose_integrators(World &w) {
   if (std::none_of(w.bodies.begin(), w.bodies.end(), open)) return;
   if (w.step_count == 0) {
     reopen_integrators(w);
-    w.allowance = {};
+    w.struck_until = 0;
   }
   std::vector<IntegratorOption> options;
   for (const auto &b : w.bodies) options.push_back(option_of(w, *b));
   choose_integrators(options);
-  // Where bodies are explicit by count, one that comes later is so, too, and goes back with them: explicit
-  // for good, it would cut their implicit steps into its sub-steps.
-  const bool by_count = std::ranges::any_of(w.bodies, [](const auto &b) {
-    return !b->integrator.open && b->integrator.counted == Counted::explicitly;
-  });
+  // A body that comes while others are explicit because of an impact is so, too, and goes back with them.
+  const bool struck = w.struck_until > 0;
   // One warning for all bodies of a scheme, and none for those that come later: a game makes many.
   struct Told {
     const Body *first = nullptr;
@@ -433,14 +433,12 @@ void choose_integrators(World &w) {
     Body &b = *w.bodies[i];
     if (!b.integrator.open) continue;
     const bool was = b.integrator.used != DFM_INTEGRATOR_SYMPLECTIC_EULER;
-    const bool now = options[i].implicit && !by_count;
+    const bool now = options[i].implicit && !struck;
     if (now != was) {
       const ImplicitOptions chosen = implicit_choice(w, b);
       b.dynamics = make_dynamics(w.meters.dynamics.memory(), b.p, b.surface, b.model, b.edges,
                                  now ? &chosen : nullptr);
-      b.integrator.used = !now                  ? DFM_INTEGRATOR_SYMPLECTIC_EULER
-                          : chosen.second_order ? DFM_INTEGRATOR_TR_BDF2
-                                                : DFM_INTEGRATOR_IMPLICIT_EULER;
+      b.integrator.used = now ? implicit_integrator(w, b) : uint32_t{DFM_INTEGRATOR_SYMPLECTIC_EULER};
       if (now) {
         Told &own = told[chosen.second_order];
         if (!own.first) own.first = &b;
@@ -452,10 +450,9 @@ void choose_integrators(World &w) {
       }
     }
     b.integrator.open = false;
-    b.integrator.chosen = true;
-    b.integrator.counted = !options[i].implicit ? Counted::no
-                           : by_count           ? Counted::explicitly
-                                                : Counted::implicit;
+    b.integrator.chosen = !options[i].implicit ? Chosen::explicitly
+                          : struck             ? Chosen::struck
+                                               : Chosen::implicit;
   }
   if (w.integrator_times.told) return;
   for (const bool second_order : {true, false}) {
@@ -464,9 +461,8 @@ void choose_integrators(World &w) {
     w.integrator_times.told = true;
     w.context->logf(
         DFM_LOG_WARNING,
-        "%s integrated by %s, which damps %s, as long as that takes less work than explicit "
-        "integration by %.0f sub-steps of %.3g s per step; set the integrator of a body to choose "
-        "one",
+        "%s integrated by %s, which damps %s, since explicit integration would take %.0f sub-steps of %.3g s "
+        "per step; set the integrator of a body to choose one",
         names_of(own.first->name, own.count).c_str(), second_order ? "tr_bdf2" : "implicit_euler",
         second_order ? "contacts and unresolved vibrations" : "motion", std::ceil(own.substeps), own.step);
   }
@@ -524,8 +520,19 @@ double choose_offset(const World &w) {
 
 }  // namespace
 
+ImplicitOptions implicit_choice(const World &w, const Body &b) {
+  ImplicitOptions out = w.implicit;
+  out.second_order = out.newton != 1 || b.model.can(DFM_CAP_CONSTANT_STIFFNESS);
+  return out;
+}
+
+uint32_t implicit_integrator(const World &w, const Body &b) {
+  return implicit_choice(w, b).second_order ? DFM_INTEGRATOR_TR_BDF2 : DFM_INTEGRATOR_IMPLICIT_EULER;
+}
+
 void reopen_integrators(World &w) {
-  for (const auto &b : w.bodies) b->integrator.open = b->integrator.open || b->integrator.chosen;
+  for (const auto &b : w.bodies)
+    b->integrator.open = b->integrator.open || b->integrator.chosen != Chosen::no;
 }
 
 void values_changed(World &w) {

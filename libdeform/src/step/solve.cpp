@@ -217,7 +217,6 @@ bool cut_at_landing(World &w, StepContext &step) {
 bool stage_solve(World &w, StepContext &step, uint32_t *trouble) {
   ask_pre_solve(w, step);
   if (!contacts_taken(w, step)) return false;
-  count_contacts(w, step);
   step.passes = step.sweeps = 0;
   step.residual = {};
   make_rows(w, step);

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "contact/bonds.h"
-#include "dynamics/relative_work.h"
 #include "plugin/context.h"
 #include "state/world.h"
 #include "step/context.h"
@@ -57,7 +56,6 @@ double start_residual(const StepContext &step, const SolveIsland &own) {
 // Bonds are solved to a share of their tolerance, so that the residual of the next sweep comes from contacts.
 constexpr double kBondShare = 0.1;
 void sweep_once(const World &w, StepContext &step, SolveIsland &own) {
-  own.spent.effort += own.effort;
   spend(w, step, own.spent, own.part.all());
   sweep(step.rows, own.part, step.state, step.h);
   ++own.sweeps;
@@ -198,10 +196,8 @@ double motion_tolerance(const SolveIsland &own) {
 void solve_by_newton(const World &w, StepContext &step, SolveIsland &own) {
   ContactNewton &newton = *own.newton;
   const uint32_t steps = newton.steps();
-  const double work = newton.work();
   own.failed = !newton.solve(motion_tolerance(own), own.tolerance.most_normal);
   own.sweeps += newton.steps() - steps;
-  own.spent.effort += newton.work() - work;
   own.residual = newton.residual();
 }
 
@@ -225,23 +221,6 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
   if (newton) solve_by_newton(w, step, own);
   if (own.bad || own.failed) return;
   if (newton) own.newton->take();
-}
-
-// The work of a sweep, in multiplications of a triangular solve that take as long. An impulse at a surfel
-// moves all touched surfels of its body: three columns, read four numbers at a time, which wait for memory if
-// the response is larger than a cache.
-constexpr double kPairWork = 1.5, kFarPairWork = 6;
-constexpr uint32_t kFar = 100;  // surfels: 1 MB
-double work_of_sweep(const ContactRows &rows, const RowsPart &part, bool blocks) {
-  double sum = kUnitWork * (blocks ? kSweptBlockUnits : kSweptUnits) * part.all();
-  if (!blocks) return sum;
-  each_row(part.contacts, [&](uint32_t i) {
-    for (uint32_t j = rows.begin[i]; j < rows.begin[i + 1]; ++j) {
-      const uint32_t block = rows.block[rows.dof[j]], count = block == kNone ? 0 : rows.blocks[block].count;
-      sum += (count > kFar ? kFarPairWork : kPairWork) * count;
-    }
-  });
-  return sum;
 }
 
 }  // namespace
@@ -436,12 +415,8 @@ void SolveIslands::prepare(const World &w, StepContext &step) {
     SolveIsland &own = islands_[k];
     order_[k] = k;
     own.part.blocks = slice(block_, k);
-    own.rigid = own.soft = own.implicit = false;
-    for (const uint32_t b : own.part.blocks) {
-      const bool rigid = blocks[b].group != kNone;
-      own.soft = own.soft || !rigid;
-      own.rigid = own.rigid || rigid;
-    }
+    own.rigid = own.implicit = false;
+    for (const uint32_t b : own.part.blocks) own.rigid = own.rigid || blocks[b].group != kNone;
     const auto moves_implicit = [&](uint32_t i) {
       for (uint32_t j = step.rows.begin[i]; j < step.rows.begin[i + 1]; ++j) {
         const uint32_t d = step.rows.dof[j];
@@ -452,7 +427,6 @@ void SolveIslands::prepare(const World &w, StepContext &step) {
     };
     each_row(own.part.contacts, moves_implicit);
     each_row(own.part.bonds, moves_implicit);
-    own.effort = work_of_sweep(step.rows, own.part, own.soft);
     own.batches.gather(w.pairs.laws, own.part.contacts, step.state);
   }
 }
@@ -471,7 +445,7 @@ const SolveIsland *solve_islands(World &w, StepContext &step) {
     own.part.alone = step.rows.is_alone(own.part);
     own.start();
     own.failed = false;
-    own.spent = {0, 0, own.part.all(), Thrift::none, 0};
+    own.spent = {0, 0, own.part.all(), Thrift::none};
     own.residual = {};
     own.bad = nullptr;
     own.thrown = nullptr;
@@ -480,7 +454,6 @@ const SolveIsland *solve_islands(World &w, StepContext &step) {
   }
   for (SolveIsland &own : all) own.spent.all = rows;
   const std::span<const uint32_t> order = step.solve_islands->by_size();
-  if (step.counting.most > 0) step.counting.bodies = body_effort(w, step);
   // one job for both, unless islands share a body: then its tolerances follow from all of them
   const bool shared = step.solve_islands->shares_sides();
   const auto run = [&](bool starts, bool solves) {

@@ -48,8 +48,6 @@ struct SolveIsland {
   bool implicit = false;       // some body of it moves implicitly
   uint32_t implicit_body = 0;  // slot of one of these
   bool rigid = false;          // some body of it is of a rigid host
-  bool soft = false;           // points of some body of it respond to each other's impulses
-  double effort = 0;           // of a sweep (Spent)
   LawBatches batches;
   Acceleration acceleration;
   std::unique_ptr<ContactNewton> newton;  // null until it is needed

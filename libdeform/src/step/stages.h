@@ -33,6 +33,7 @@ void prepare(World &w, const RestoredChoice *restored = nullptr);
 // backward Euler damps the oscillation of a body within one period
 // (doc/decisions/implicit_time.md).
 ImplicitOptions implicit_choice(const World &w, const Body &b);
+uint32_t implicit_integrator(const World &w, const Body &b);  // DFM_INTEGRATOR_*, of that
 // After a change of values that no table depends on: loads, motions, gravity, parameters of a model or of
 // a law. The step bound is recomputed, the energy balance restarts, and the next prepare() checks the plan.
 void values_changed(World &w);

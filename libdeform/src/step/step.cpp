@@ -2,6 +2,7 @@
 //
 //   bound                            if it is due: sizes of the sub-steps (step_bound.cpp, step_sizes.cpp)
 //   sub-steps                        run_step(): equal ones, more of them if the bound has fallen
+//                                    until the budget is used up; explicit from an impact on (impact.cpp)
 //     pieces                         advance(), piece(): shorter where the guard requires it
 //       stages                       sub_step(): all rows of the method's table that the plan has
 //                                    chosen, or none
@@ -33,7 +34,6 @@
 #include "step/step_bound.h"
 #include "step/step_impulses.h"
 #include "step/tools.h"
-#include "step/turn_integrators.h"
 
 namespace dfm {
 namespace {
@@ -131,9 +131,8 @@ namespace {
 // Sub-steps that a step of dt needs, at the present bound (infinite if there is none).
 double least_sub_steps(const World &w, double dt) { return std::ceil(dt / w.bound.step - 1e-9); }
 
-// The step needs more than max_substeps, and nothing has moved yet. Bodies may become implicit instead.
+// The step needs more than max_substeps, and nothing has moved yet.
 dfm_status refuse_step(World &w, double dt, uint32_t *trouble) {
-  if (may_take_up_implicit(w)) end_explicit_step();
   const Body *const b = w.bound.body;
   const bool implicit = b && !b->model.stepper && b->model.can(DFM_CAP_STIFFNESS);
   set_last_error(
@@ -148,7 +147,6 @@ dfm_status refuse_step(World &w, double dt, uint32_t *trouble) {
 }
 // The bound has fallen so far within the step that the rest of it needs too many.
 dfm_status refuse_rest(World &w, double goal) {
-  if (may_take_up_implicit(w)) end_explicit_step();
   set_last_error(format("step %llu: the shape of body '%s' has changed so much that the rest of the "
                         "step needs %g sub-steps of %g s (max_substeps %u); take a shorter step",
                         static_cast<unsigned long long>(w.step_count),
@@ -156,6 +154,12 @@ dfm_status refuse_rest(World &w, double goal) {
                         std::ceil((goal - w.time) / w.bound.step), w.bound.step, w.def.max_substeps)
                      .c_str());
   return DFM_E_DIVERGED;
+}
+
+// Where a body has become explicit or implicit within the step, and before it.
+void prepare_bound(World &w) {
+  prepare(w);
+  update_bound(w);
 }
 
 // The rest of a step, from `from` to `goal`, in `n` equal sub-steps, of which the first `taken` are done.
@@ -181,6 +185,7 @@ struct Division {
 }  // namespace
 
 dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
+  step.offered = chosen_by_library(w, dt) ? dt : 0;
   drop_released(w);
   prepare(w);
   check_target_speeds(w, dt);
@@ -188,29 +193,33 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
   release_overlaps(w);
   if (!std::exchange(w.overlaps.told, true)) *trouble |= DFM_TROUBLE_OVERLAP;
   if (bound_due(w)) update_bound(w);
+  if (!(least_sub_steps(w, dt) <= w.def.max_substeps) && end_impact(w)) prepare_bound(w);
   if (!(least_sub_steps(w, dt) <= w.def.max_substeps)) return refuse_step(w, dt, trouble);
   const double size_before = w.sizes.cut.size;
   const uint32_t n =
       static_cast<uint32_t>(std::min<double>(w.def.max_substeps, choose_pieces(w.sizes, dt, w.bound.step)));
   w.watch.size_before = differ(w.sizes.cut.size, size_before) ? size_before : 0;
   plan_work(w, step, n);
-  begin_count(w, step, dt);
   if (n > 1) *trouble |= DFM_TROUBLE_SUBSTEPS;
   if (w.bound.inverted) *trouble |= DFM_TROUBLE_INVERTED;
 
   begin_impulses(w.step_impulses, w.time, dt);
   begin_tools(w, dt);
+  const double start = w.time;
   uint32_t done = 0;
-  for (Division rest(w.time, dt, n); !rest.over(); ++done) {
+  for (Division rest(w.time, dt, n); !rest.over();) {
     if (bound_due(w)) {
       update_bound(w);
       if (w.bound.inverted) *trouble |= DFM_TROUBLE_INVERTED;
-      const double more = rest.left() * cut_finer(w.sizes, rest.size(), w.bound.step);
+      double more = rest.left() * cut_finer(w.sizes, rest.size(), w.bound.step);
+      if (!(done + more <= w.def.max_substeps) && end_impact(w)) {
+        prepare_bound(w);
+        more = rest.left() * cut_finer(w.sizes, rest.size(), w.bound.step);
+      }
       if (!(done + more <= w.def.max_substeps)) return refuse_rest(w, rest.goal);
       if (more > rest.left()) {
         if (!(w.watch.size_before > 0)) w.watch.size_before = rest.size();
         rest.again(w.time, static_cast<uint32_t>(more));
-        plan_more_work(w, step, done, rest.n);
         *trouble |= DFM_TROUBLE_SUBSTEPS;
       }
     }
@@ -218,8 +227,17 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
     step.budget.to_come = rest.left() - 1;
     step.guard.most_finer = double(w.def.max_substeps - done) / rest.left();
     const double from = w.time;
-    if (!advance(w, step, rest.next(), rest.goal, rest.last(), trouble)) return DFM_E_DIVERGED;
+    if (!advance(w, step, rest.next(), rest.goal, rest.last(), trouble)) {
+      if (!step.struck) return DFM_E_DIVERGED;
+      begin_impact(w);
+      prepare_bound(w);
+      rest.again(w.time, uint32_t(choose_pieces(w.sizes, rest.goal - w.time, w.bound.step)));
+      *trouble |= DFM_TROUBLE_SUBSTEPS;
+      continue;
+    }
+    ++done;
     pass(w.sizes, w.time - from);
+    if (step.budget.ended) break;
     ++rest.taken;
     if (step.guard.finer > 1) {  // after a hard impact: this sub-step was a finer one, too
       rest.again(w.time, (rest.left() + 1) * static_cast<uint32_t>(step.guard.finer) - 1);
@@ -229,11 +247,12 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
   w.stats.last_substeps = done;
   w.stats.substeps_max = std::max(w.stats.substeps_max, done);
   drop_released(w);
-  end_tools(w, dt);
+  w.step_impulses.length = w.time - start;
+  end_tools(w, w.time - start);
   ++w.step_count;
   w.stats.steps = w.step_count;
   w.stats.time = w.time;
-  if (!goes_on_after_impact(w, dt)) end_count(w, step, dt, done);
+  follow_impact(w, w.time - start);
   return DFM_OK;
 }
 
@@ -273,7 +292,9 @@ bool advance(World &w, StepContext &step, double end, double goal, bool last, ui
     w.time = whole ? end : w.time + step.h;
     ++w.stats.substeps;
     ++w.bound.age;
+    if (ends_here(w, step) && !(whole && last)) return true;
   }
+  step.budget.ended = false;
   return true;
 }
 
@@ -301,13 +322,14 @@ bool piece(World &w, StepContext &step, uint32_t *trouble) {
   begin_bodies(w, step);
   bool fast = false;
   while (!sub_step(w, step, trouble)) {
-    if (!step.guard.again) return false;
+    if (!step.guard.again && !step.struck) return false;
+    *trouble = before;
+    w.stats.unconverged = unconverged;
+    if (step.struck) return false;
     fast |= step.guard.fast;
     if (step.guard.refines) refine(w, step);
     step.h *= step.guard.cut;
     keep_start(w, step);
-    *trouble = before;
-    w.stats.unconverged = unconverged;
     view_obstacles(w, step);
   }
   // A piece that was shortened for a fast rigid body is likely to be followed by another one: the next piece
@@ -331,7 +353,7 @@ bool sub_step(World &w, StepContext &step, uint32_t *trouble) {
   } undo{w, step};
   step.driven.clear();
   step.guard.start();
-  step.ended = false;
+  step.ended = step.struck = false;
   step.budget.rows = w.store.n;
   const uint64_t damping = w.sizes.damping > 0 ? 2 : 0;  // evaluations of the forces
   charge(w, step, (1 + damping) * body_work(w, step) + surface_work(w, step));

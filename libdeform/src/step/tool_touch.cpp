@@ -587,7 +587,8 @@ void ToolTouch::solve(World &w, StepContext &step) {
   uint32_t revisions = 0;
   for (uint32_t pass = 0; pass < kMostPasses; ++pass) {
     double changed = 0;
-    charge(w, step, 0);  // a pass takes long where joints connect many bodies
+    charge(w, step, 0);
+    if (pass > 0 && is_used_up(step)) return;  // a pass takes long where joints connect many bodies
     if (pass > 0 && revisions < kMostRevisions && (decide_motors() || press_harder())) {
       ++revisions;
       pass = 0;

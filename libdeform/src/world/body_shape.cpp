@@ -88,8 +88,7 @@ void make_skin(const Memory &m, const CutMesh &mesh, bool inner, BodyShape &out)
 void keep_integrator(Body &b, const Integrator &was) {
   b.integrator.chosen = was.chosen;
   b.integrator.open = was.open;
-  b.integrator.counted = was.counted;
-  if (was.counted == Counted::implicit) b.integrator.step = was.step;
+  if (was.chosen == Chosen::implicit) b.integrator.step = was.step;
 }
 
 void keep_params(Body &b, const Former &before) {

@@ -43,9 +43,8 @@ std::string integrator(const Body &b) {
   const double step = b.world->def.step, n = std::max(1.0, std::ceil(step / i.step));
   std::string why;
   if (b.model.stepper) why = "the model steps itself";
-  else if (!i.chosen) why = "named, or the world's";
-  else if (i.counted == Counted::explicitly)
-    why = "auto: implicit steps have cost more, by count; they are tried again later";
+  else if (i.chosen == Chosen::no) why = "named, or the world's";
+  else if (i.chosen == Chosen::struck) why = "auto: implicit, but explicit until an impact is over";
   else if (i.used != DFM_INTEGRATOR_SYMPLECTIC_EULER)
     why = "auto: explicit time costs more than four times as much";
   else if (!b.model.can(DFM_CAP_STIFFNESS))
@@ -55,10 +54,9 @@ std::string integrator(const Body &b) {
   if (step > 0 && std::isfinite(i.step))
     out += format(",\"explicit_s\":%.9g,\"substeps\":%.0f,\"worst_point\":%u", i.step, n, i.point);
   if (!b.model.stepper && i.used != DFM_INTEGRATOR_SYMPLECTIC_EULER)
-    out +=
-        ",\"rebound\":" + quote(std::string("will not rebound") +
-                                (i.counted == Counted::implicit ? ", unless steps are automatic: " : ": ") +
-                                why_no_rebound(i.used) + "; a restitution of the pair throws it back");
+    out += ",\"rebound\":" + quote(std::string("will not rebound") +
+                                   (i.chosen == Chosen::implicit ? ", unless steps are automatic: " : ": ") +
+                                   why_no_rebound(i.used) + "; a restitution of the pair throws it back");
   return out + "}";
 }
 

@@ -95,7 +95,7 @@ struct Staged {
   Hold hold;
   StepSizes sizes;
   EnergyWatch watch;
-  IntegratorAllowance allowance;
+  double struck_until = 0;
   dfm_world_stats stats{};
   Gravity gravity;
   dfm_world_def def{};
@@ -310,8 +310,8 @@ void model_fields(Stream &s, B &b, const Body &like) {
   s.array("model's held", b.origin.held, like.origin.held.size(), must::at_most(7));
   s.value("integrator used", b.integrator.used,
           must::Be{[](uint32_t x) { return x - 1 < DFM_INTEGRATOR_TR_BDF2; }, "an integrator"});
-  s.value("integrator by count", b.integrator.counted,
-          must::Be{[](Counted x) { return x <= Counted::explicitly; }, "no, implicit or explicit"});
+  s.value("chosen integrator", b.integrator.chosen,
+          must::Be{[](Chosen x) { return x <= Chosen::struck; }, "no, explicit, implicit or struck"});
   s.value("explicit sub-step", b.integrator.step,
           must::Be{[](double x) { return x > 0; }, "a time above zero"});
   const bool alike = made_alike(b, like);
@@ -491,8 +491,7 @@ void fields(Stream &s, W &w, const World &like) {
   s.value("accurate step", w.sizes.accurate, must::not_negative);
   s.value("time of steady steps", w.sizes.steady, must::not_negative);
   s.value("damping of changed steps", w.sizes.damping, must::not_negative);
-  s.value("work put by", w.allowance,
-          must::Be{[](const IntegratorAllowance &x) { return sound(x); }, "a finite sum"});
+  s.value("end of an impact", w.struck_until, must::not_negative);
   s.must_hold("step size", "sizes that the library chooses", [&] { return sound(w.sizes); });
   s.value("age of the energies", w.watch.age, must::any);
   s.value("credit of the energies", w.watch.credit, must::any);

@@ -94,8 +94,7 @@ void make_models(const SnapshotReader &s, World &w, Staged &t) {
              e.what());
       }
       Integrator &moves = other.made->integrator;
-      moves.counted = other.integrator.counted;
-      moves.chosen = moves.counted != Counted::no;
+      moves.chosen = other.integrator.chosen;
       moves.step = other.integrator.step;
       ModelInstance &made = other.made->instance;
       if (made.state.size() != other.model.state.size()) s.refuse("model state", "as many as the model has");
@@ -103,9 +102,12 @@ void make_models(const SnapshotReader &s, World &w, Staged &t) {
         s.refuse("model parameters", "values in the range of the model's table");
       made.state.swap(other.model.state);
     } else {
-      const bool counted = other.integrator.counted != Counted::no;
-      other.integrator.open = !counted && b.integrator.open;
-      other.integrator.chosen = counted || b.integrator.chosen;
+      // of a snapshot from before the choice, what is known of the body's own remains
+      const Integrator &own = b.integrator;
+      if (other.integrator.chosen == Chosen::no) {
+        other.integrator.open = own.open;
+        other.integrator.chosen = own.chosen == Chosen::struck ? Chosen::explicitly : own.chosen;
+      }
     }
     const Dynamics &moves = other.made ? *other.made->dynamics : *b.dynamics;
     if (!other.springs.empty() && !moves.abilities().springs)
@@ -170,7 +172,6 @@ void exchange(World &w, Staged &t) noexcept {
       b.model.params.swap(other.model.params);
       std::swap(b.integrator.open, other.integrator.open);
       std::swap(b.integrator.chosen, other.integrator.chosen);
-      std::swap(b.integrator.counted, other.integrator.counted);
       std::swap(b.integrator.step, other.integrator.step);
     }
     b.switches.swap(other.switches);
@@ -246,7 +247,7 @@ void exchange(World &w, Staged &t) noexcept {
   std::swap(w.next_id, t.next_id);
   std::swap(w.hold, t.hold);
   std::swap(w.sizes, t.sizes);
-  std::swap(w.allowance, t.allowance);
+  std::swap(w.struck_until, t.struck_until);
   std::swap(w.watch, t.watch);
   w.bound.body = nullptr;
   w.bound.point = 0;

@@ -26,6 +26,7 @@ TEST(OdePrograms, Gripper_LiftsTheBallAndHoldsIt) {
   EXPECT_LT(slip, 1);
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(OdePrograms, Cart_DrivesOverTheBumpAndStandsOnItsTires) {
   const test::CommandResult r = example("cart");
   ASSERT_EQ(r.exit_code, 0) << r.out << r.err;

@@ -93,6 +93,7 @@ TEST_P(LatePoints, StepWithContact_LeavesInnerPointsAlone) {
   for (const double x : w.state().x) ASSERT_TRUE(std::isfinite(x));
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST_P(LatePoints, SeenAfterEachStepOrNever_AreTheSame) {
   const Probed a(GetParam()), b(GetParam());
   for (int n = 0; n < 200; ++n) {
@@ -106,6 +107,7 @@ TEST_P(LatePoints, SeenAfterEachStepOrNever_AreTheSame) {
 
 // The same body where the points lead in each step, so that all of them are moved. The probe comes to its
 // first contact with impacts, each of which sticks or slips by the last digits: without friction none does.
+// unsanitized: too slow there; shorter tests run the same code
 TEST_P(LatePoints, OfASlidingProbe_AreThoseOfAStepThatMovesAll) {
   const std::vector<std::string> more{"/contact/friction/0/params/mu=0"};
   const Probed late(GetParam(), more), whole(GetParam(), more);

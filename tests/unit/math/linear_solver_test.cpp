@@ -340,17 +340,4 @@ TEST(Ldlt, ResponseOfPoints_IsTheSameBitsWhateverWasRequestedBefore) {
   EXPECT_EQ(asked(kept, wanted), asked(fresh, wanted));
 }
 
-// Four points that are all joined are one panel of 12 columns: each column of a response takes a substitution
-// (12^2 / 2 multiplications), each two of them a product (12). Dense loops count a sixth.
-TEST(Ldlt, WorkOfAResponse_IsThatOfSubstitutionsAndProducts) {
-  std::vector<uint32_t> ij;
-  for (uint32_t i = 0; i < 4; ++i)
-    for (uint32_t j = i; j < 4; ++j) ij.insert(ij.end(), {i, j});
-  dfm::LdltSolver solver(dfm::Memory::standard());
-  solver.analyse({4, uint32_t(ij.size() / 2), ij.data()});
-  const uint32_t points[] = {2, 0, 1, 3};
-  EXPECT_DOUBLE_EQ(solver.restricted_work(4, points), (12 * 12 * 12 / 2 + 12 * 12 / 2 * 12) / 6.0);
-  EXPECT_DOUBLE_EQ(solver.restricted_work(1, points), (3 * 12 * 12 / 2 + 3 * 3 / 2.0 * 12) / 6.0);
-}
-
 }  // namespace

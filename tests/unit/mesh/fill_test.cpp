@@ -91,6 +91,7 @@ std::vector<Case> clean() {
   return out;
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Fill, CleanSurface_SharesSumUpToTheEnclosedVolume) {
   for (const Case &c : clean()) {
     SCOPED_TRACE(c.name);
@@ -124,6 +125,7 @@ TEST(Fill, PartsThinnerThanHalfACell_AreNamed) {
   EXPECT_LT(part, 70);
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Fill, SampledShares_AgreeWithTheVolumeBeforeTheyAreMadeTo) {
   for (const Case &c : clean()) {
     SCOPED_TRACE(c.name);
@@ -188,6 +190,7 @@ TEST(Fill, ShareOfACellCutByAPlane_WithinItsStatedError) {
   EXPECT_LT(worst, 0.04);
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Fill, CleanSurface_LiesWithinTheCells) {
   for (const Case &c : clean()) {
     SCOPED_TRACE(c.name);
@@ -213,6 +216,7 @@ TEST(Fill, AlignedBox_KeepsNoCellsThatItOnlyTouches) {
   EXPECT_EQ(cover.kept, 9u * 64 + 6u * 4 * 16);
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Fill, WantedNumber_IsMetWithinTenPercent) {
   for (const Case &c : clean())
     for (const uint32_t wanted : {300u, 2000u}) {
@@ -224,6 +228,7 @@ TEST(Fill, WantedNumber_IsMetWithinTenPercent) {
 
 // A cut cell carries its material as if it filled it evenly, so a body is a little too wide: by 0.6 % of its
 // inertia at 20,000 cells.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Fill, Ball_MassCenterAndInertiaWithinOnePercent) {
   const double r = 0.5;
   const TriMesh s = test::sphere_surface(r, 6, {0.3, -0.2, 0.1});
@@ -444,6 +449,7 @@ std::vector<std::string> surfaces_of(const std::string &folder) {
   return test::files_of(test::mesh_dir() + "/" + folder, {".obj", ".ply", ".stl", ".off"});
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(FillFiles, ThesisOrgansAndCylinders_Fill) { expect_files_fill(surfaces_of("thesis"), 5000, 4); }
 TEST(FillFiles, OrganAndRabbit_Fill) {
   const std::string data = DEFORM_SOURCE_DIR "/examples/data/";

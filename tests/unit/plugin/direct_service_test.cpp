@@ -34,6 +34,7 @@ TEST(DirectService, OtherIds_AreUnknown) {
   EXPECT_TRUE(service(c).solver->flags & DFM_SOLVER_DIRECT);
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(DirectService, SolutionsAndPartOfTheInverse_EqualDense) {
   const test::Grid g = test::grid(9, 4, 5, 0.05);
   const size_t m = 3 * size_t{g.n};

@@ -217,6 +217,7 @@ TEST(Changes, OfARuleThatMovesBehindItsEquals_MakeTheTables) {
 }
 
 // An hour of a slider that is read 55 times a second.
+// unsanitized: so many calls take minutes there
 TEST(Changes, OfACoefficientForAnHour_MakeNothing) {
   Running r;
   r.step();
