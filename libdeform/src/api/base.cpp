@@ -1,7 +1,6 @@
 #include "deform/base.h"
 
 #include <algorithm>
-#include <cstring>
 
 #include "api/objects.h"
 #include "core/file.h"

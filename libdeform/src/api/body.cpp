@@ -6,15 +6,14 @@
 #include "state/bounds.h"
 #include "state/held.h"
 #include "state/spring.h"
-#include "step/context.h"
 #include "step/energy_watch.h"
 #include "step/method.h"
 #include "step/stages.h"
 #include "world/change_energy.h"
 #include "world/create.h"
 #include "world/measure.h"
-#include "world/own_weight.h"
 #include "world/queries.h"
+#include "world/rest_loads.h"
 
 using namespace dfm;
 
@@ -290,8 +289,8 @@ dfm_status dfm_body_add_load(dfm_body body, uint32_t n, const uint32_t *points, 
     l.number = b.next_load;
     l.points.assign(points, points + n);
     l.force.assign(force, force + size_t(3) * n);
-    for (double f : l.force)
-      if (!std::isfinite(f)) fail(DFM_E_ARG, "body '%s': a load is not finite", b.name.c_str());
+    if (!all_finite(l.force.data(), l.force.size()))
+      fail(DFM_E_ARG, "body '%s': a load is not finite", b.name.c_str());
     if (nkey) l.keys.assign(keys, keys + nkey);
     check_keys(l.keys, b.name.c_str());
     if (sine) l.sine = *sine;
@@ -328,8 +327,7 @@ dfm_status dfm_body_set_spring_target(dfm_body body, uint32_t spring, const doub
     Body &b = exclusive(body_of(body));
     need(to, "to");
     Spring &s = spring_of(b, spring);
-    if (!std::isfinite(to[0]) || !std::isfinite(to[1]) || !std::isfinite(to[2]))
-      fail(DFM_E_ARG, "body '%s': a spring's end must be finite", b.name.c_str());
+    if (!all_finite(to, 3)) fail(DFM_E_ARG, "body '%s': a spring's end must be finite", b.name.c_str());
     s.to = load3(to);
     s.keys.clear();
     disturb(b);
@@ -357,9 +355,8 @@ dfm_status dfm_body_apply_impulse(dfm_body body, const double point[3], const do
     Body &b = exclusive(body_of(body));
     need(point, "point");
     need(impulse, "impulse");
-    for (int k = 0; k < 3; ++k)
-      if (!std::isfinite(point[k]) || !std::isfinite(impulse[k]))
-        fail(DFM_E_ARG, "body '%s': point and impulse must be finite", b.name.c_str());
+    if (!all_finite(point, 3) || !all_finite(impulse, 3))
+      fail(DFM_E_ARG, "body '%s': point and impulse must be finite", b.name.c_str());
     const TriangleNearPoint near = closest_on_body(b, load3(point));
     disturb(b);
     const HostWork work(b);

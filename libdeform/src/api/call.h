@@ -19,7 +19,6 @@ class Call {
     if (counted_) counted_->fetch_sub(1, std::memory_order_release);
   }
   Call(const Call &) = delete;
-  Call &operator=(const Call &) = delete;
 
   // The innermost call. Only inside as_status().
   static Call &now() { return *innermost_; }

@@ -8,7 +8,6 @@
 #include "friction/laws.h"
 #include "friction/pair_rules.h"
 #include "state/obstacle.h"
-#include "step/context.h"
 #include "step/stages.h"
 #include "step/step_impulses.h"
 #include "world/friction_rules.h"
@@ -355,9 +354,7 @@ dfm_status dfm_world_pair_wrench(dfm_world world, uint64_t a, uint64_t b, const 
   return as_status([&] {
     const World &w = settled(world_of(world));
     need(point, "point");
-    for (int k = 0; k < 3; ++k)
-      if (!std::isfinite(point[k]))
-        fail(DFM_E_ARG, "the point about which the moment is taken is not finite");
+    if (!all_finite(point, 3)) fail(DFM_E_ARG, "the point about which the moment is taken is not finite");
     const uint64_t ia = id_of(w, a, "a"), ib = id_of(w, b, "b");
     const Vec3 about = load3(point);
     Vec3 sum, turn;

@@ -15,10 +15,6 @@ namespace {
 
 constexpr double kRounding = 1e-9;  // of the time of a world, which is a sum of steps
 
-bool finite(const double *x, size_t n) {
-  return std::all_of(x, x + n, [](double value) { return std::isfinite(value); });
-}
-
 CutShape shape_of(const Body &b, const dfm_cut_def &def) {
   const char *const name = b.name.c_str();
   if (def.shape > DFM_CUT_PLANE)
@@ -35,8 +31,8 @@ CutShape shape_of(const Body &b, const dfm_cut_def &def) {
          "body '%s': DFM_CUT_SPLIT opens faces along a blade or a plane; take the shape DFM_CUT_BLADE or "
          "DFM_CUT_PLANE, or remove cells by DFM_CUT_REMOVE",
          name);
-  if (!finite(def.pose.position, 3) || !finite(def.pose.rotation, 4) || !finite(def.motion, 3) ||
-      !finite(def.blade, 12))
+  if (!all_finite(def.pose.position, 3) || !all_finite(def.pose.rotation, 4) || !all_finite(def.motion, 3) ||
+      !all_finite(def.blade, 12))
     fail(DFM_E_ARG, "body '%s': pose, motion and blade of a cut must be finite", name);
   CutShape s;
   s.kind = CutKind(def.shape);

@@ -2,7 +2,6 @@
 
 #include <cmath>
 
-#include "api/displacement.h"
 #include "api/objects.h"
 #include "mesh/mesh.h"
 #include "step/capture.h"

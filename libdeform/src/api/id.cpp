@@ -2,7 +2,6 @@
 
 #include "core/handle.h"
 #include "state/obstacle.h"
-#include "state/world.h"
 
 using namespace dfm;
 

@@ -11,7 +11,6 @@
 #include "plugin/call.h"
 #include "plugin/context.h"
 #include "plugin/params.h"
-#include "step/context.h"
 #include "step/stages.h"
 
 namespace dfm {
@@ -38,7 +37,6 @@ struct Prepared {
     });
   }
   Prepared(const Prepared &) = delete;
-  Prepared &operator=(const Prepared &) = delete;
 };
 
 struct Law {

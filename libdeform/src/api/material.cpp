@@ -1,6 +1,5 @@
 #include "deform/material.h"
 
-#include <algorithm>
 #include <cmath>
 #include <cstring>
 

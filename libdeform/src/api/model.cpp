@@ -64,8 +64,7 @@ SwitchRule make_rule(const Body &b, const dfm_switch_rule &r) {
   out.hysteresis = r.hysteresis;
   out.wait = r.wait;
   if (!r.near_by.type) return out;
-  for (const double x : r.point)
-    if (!std::isfinite(x)) fail(DFM_E_ARG, "body '%s': the point of a rule is not finite", name);
+  if (!all_finite(r.point, 3)) fail(DFM_E_ARG, "body '%s': the point of a rule is not finite", name);
   if (!(r.distance > 0 && std::isfinite(r.distance)))
     fail(DFM_E_ARG, "body '%s': the distance of a rule is %g m; it must be positive and finite", name,
          r.distance);
@@ -137,8 +136,7 @@ dfm_status dfm_body_set_interest(dfm_body body, const double point[3]) {
   return as_status([&] {
     Body &b = exclusive(body_of(body));
     need(point, "point");
-    for (int k = 0; k < 3; ++k)
-      if (!std::isfinite(point[k])) fail(DFM_E_ARG, "body '%s': the point is not finite", b.name.c_str());
+    if (!all_finite(point, 3)) fail(DFM_E_ARG, "body '%s': the point is not finite", b.name.c_str());
     if (b.rule.empty() || b.rule[0].near.type.empty())
       fail(DFM_E_ARG, "body '%s' has no rule that depends on a point; call dfm_body_set_switch_rule first",
            b.name.c_str());

@@ -4,7 +4,6 @@
 
 #include "api/objects.h"
 #include "state/bounds.h"
-#include "step/context.h"
 #include "step/method.h"
 #include "step/stages.h"
 #include "world/create.h"

@@ -57,8 +57,7 @@ Convex taken_shape(const dfm_query_shape *given) {
   const dfm_query_shape def = take_def(given, dfm_query_shape_default());
   Convex c;
   c.position = finite(def.pose.position, "shape.pose.position");
-  for (const double q : def.pose.rotation)
-    if (!std::isfinite(q)) fail(DFM_E_ARG, "the shape's rotation is not finite");
+  if (!all_finite(def.pose.rotation, 4)) fail(DFM_E_ARG, "the shape's rotation is not finite");
   c.rotation = unit_quat(def.pose.rotation);
   c.turned = c.rotation.w != 1;
   c.radius = size_of(def.radius, "radius");

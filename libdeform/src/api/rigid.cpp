@@ -2,7 +2,6 @@
 
 #include "api/objects.h"
 #include "state/obstacle.h"
-#include "step/context.h"
 #include "step/rigid.h"
 #include "step/stages.h"
 

@@ -81,8 +81,7 @@ dfm_status dfm_world_closest(dfm_world world, const double point[3], double max_
   return as_status([&] {
     World &w = world_of(world);
     need(point, "point");
-    for (int k = 0; k < 3; ++k)
-      if (!std::isfinite(point[k])) fail(DFM_E_ARG, "the point is not finite");
+    if (!all_finite(point, 3)) fail(DFM_E_ARG, "the point is not finite");
     if (!(max_distance > 0)) fail(DFM_E_ARG, "max_distance is %g m; it must be positive", max_distance);
     give(hit, closest_surface(w, load3(point), max_distance));
   });

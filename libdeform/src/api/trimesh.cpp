@@ -49,16 +49,12 @@ dfm_status dfm_trimesh_make(dfm_context *context, const char *kind, const double
     need(out, "out");
     const std::string name = kind;
     const dfm::Memory &memory = context->memory;
-    if (name == "cylinder")
-      *out = Object::keep(*context, dfm::make_cylinder_surface(memory, size[0], size[1], triangles));
-    else if (name == "beam")
-      *out = Object::keep(*context, dfm::make_beam_surface(memory, size[0], size[1], size[2], triangles));
-    else if (name == "ball")
-      *out = Object::keep(*context, dfm::make_ball_surface(memory, size[0], triangles));
-    else if (name == "tube")
-      *out = Object::keep(*context, dfm::make_tube_surface(memory, size[0], size[1], size[2], triangles));
-    else if (name == "torus")
-      *out = Object::keep(*context, dfm::make_torus_surface(memory, size[0], size[1], triangles));
+    const auto keep = [&](dfm::TriMesh &&mesh) { *out = Object::keep(*context, std::move(mesh)); };
+    if (name == "cylinder") keep(dfm::make_cylinder_surface(memory, size[0], size[1], triangles));
+    else if (name == "beam") keep(dfm::make_beam_surface(memory, size[0], size[1], size[2], triangles));
+    else if (name == "ball") keep(dfm::make_ball_surface(memory, size[0], triangles));
+    else if (name == "tube") keep(dfm::make_tube_surface(memory, size[0], size[1], size[2], triangles));
+    else if (name == "torus") keep(dfm::make_torus_surface(memory, size[0], size[1], triangles));
     else
       fail(DFM_E_ARG, "no surface generator is called '%s'; expected cylinder, beam, ball, tube or torus",
            kind);

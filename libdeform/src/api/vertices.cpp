@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstring>
 
-#include "api/displacement.h"
 #include "api/objects.h"
 #include "deform/surface.h"
 #include "world/queries.h"
@@ -50,8 +49,7 @@ uint32_t check_layout(const dfm_vertex_layout &l) {
         fail(DFM_E_ARG, "layout: %s and %s share bytes", m.name, other.name);
     end = std::max(end, m.at + m.bytes);
   }
-  for (const double o : l.origin)
-    if (!std::isfinite(o)) fail(DFM_E_ARG, "layout: the origin is not finite");
+  if (!all_finite(l.origin, 3)) fail(DFM_E_ARG, "layout: the origin is not finite");
   return end;
 }
 

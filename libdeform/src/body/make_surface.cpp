@@ -101,28 +101,14 @@ void find_fans(Surface &out) {
 
 void make_surface(const Memory &memory, uint32_t npoint, const double *rest, const uint32_t *boundary_tris,
                   uint32_t ntri, Surface &out) {
-  const HookAllocator<uint32_t> a(memory);
-  out.tri = Array<uint32_t>(a);
-  out.edge = Array<uint32_t>(a);
-  out.edge_tri = Array<uint32_t>(a);
-  out.tri_edge = Array<uint32_t>(a);
-  out.tri_owns = Array<uint32_t>(a);
-  out.patch = Array<uint32_t>(a);
-  for (auto &names : out.name) names = Array<uint32_t>(a);
-  out.point = Array<uint32_t>(a);
-  out.row = Array<uint32_t>(a);
-  out.col = Array<uint32_t>(a);
-  out.weight = Array<double>(a);
-  out.fan_begin = Array<uint32_t>(a);
-  out.fan = Array<uint32_t>(a);
-  out.rest = Array<double>(a);
-  out.x = Array<double>(a);
-  out.v = Array<double>(a);
+  use_memory(memory, out.tri, out.edge, out.edge_tri, out.tri_edge, out.tri_owns, out.patch, out.point,
+             out.row, out.col, out.weight, out.fan_begin, out.fan, out.rest, out.x, out.v);
+  for (auto &names : out.name) use_memory(memory, names);
   number_surfels(npoint, boundary_tris, ntri, out);
   find_edges(out);
 
   const auto at = [&](uint32_t surfel) { return load3(rest + size_t{3} * out.point[surfel]); };
-  Array<Vec3> normal(ntri, Vec3{}, a);
+  Array<Vec3> normal(ntri, Vec3{}, HookAllocator<Vec3>(memory));
   for (uint32_t t = 0; t < ntri; ++t) {
     const uint32_t *c = &out.tri[3 * t];
     normal[t] = normalized(cross(at(c[1]) - at(c[0]), at(c[2]) - at(c[0])));
@@ -130,7 +116,7 @@ void make_surface(const Memory &memory, uint32_t npoint, const double *rest, con
   find_patches(normal, out);
   find_fans(out);
 
-  Array<double> length(a);
+  Array<double> length{HookAllocator<double>(memory)};
   for (uint32_t e = 0; e < out.nedge; ++e)
     length.push_back(norm(at(out.edge[2 * e + 1]) - at(out.edge[2 * e])));
   if (!length.empty()) {

@@ -86,20 +86,9 @@ bool finite_positions(const Surface &s) {
 
 }  // namespace
 
-BroadPhase::BroadPhase(const Memory &memory)
-    : memory_(memory),
-      bodies_(HookAllocator<Body>(memory_)),
-      things_(HookAllocator<Thing>(memory_)),
-      segments_(HookAllocator<Segment>(memory_)),
-      next_segments_(HookAllocator<Segment>(memory_)),
-      candidates_(HookAllocator<Candidate>(memory_)),
-      next_(HookAllocator<Candidate>(memory_)),
-      fresh_(HookAllocator<uint64_t>(memory_)),
-      order_(HookAllocator<uint32_t>(memory_)),
-      pairs_(HookAllocator<Pair>(memory_)),
-      parts_(HookAllocator<Part>(memory_)),
-      lists_(HookAllocator<List>(memory_)),
-      stack_(HookAllocator<PairOfTriangles>(memory_)) {
+BroadPhase::BroadPhase(const Memory &memory) : memory_(memory) {
+  use_memory(memory_, bodies_, things_, segments_, next_segments_, candidates_, next_, fresh_, order_, pairs_,
+             parts_, lists_, stack_);
   found_.emplace_back(memory_);
 }
 
@@ -120,7 +109,6 @@ void BroadPhase::clear() {
 
 bool BroadPhase::update(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
                         const PairFilter &filter, double h, double offset, Tasks *tasks) {
-  ++stats_.updates;
   match(bodies, obstacles, filter);
   if (!find_dirty(bodies, obstacles, h, offset, tasks)) return false;
   renew(bodies, obstacles, filter, h, offset, tasks);
@@ -565,7 +553,6 @@ void BroadPhase::assemble() {
     return l.id_b != r.id_b ? l.id_b < r.id_b : l.kind < r.kind;
   });
   next_.clear();
-  stats_.pairs = 0;
   for (Segment &s : next_segments_) {
     const uint32_t begin = uint32_t(next_.size());
     const uint32_t slot_a = bodies_[s.a].slot;
@@ -578,7 +565,6 @@ void BroadPhase::assemble() {
     }
     s.begin = begin;
     s.fresh = false;
-    stats_.pairs += s.kind == 0 && (s.obstacle || s.id_a < s.id_b);
   }
   candidates_.swap(next_);
   segments_.swap(next_segments_);

@@ -68,11 +68,9 @@ class BroadPhase {
   void clear();
 
   struct Stats {
-    uint64_t updates = 0;   // calls
-    uint64_t renewals = 0;  // calls that rebuilt lists
+    uint64_t renewals = 0;  // calls of update() that rebuilt lists
     uint64_t refits = 0;    // trees whose boxes were refitted
     uint64_t rebuilds = 0;  // trees built from nothing
-    uint64_t pairs = 0;     // present body pairs and body-obstacle pairs with lists
   };
   const Stats &stats() const { return stats_; }
 

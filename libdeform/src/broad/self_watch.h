@@ -26,7 +26,6 @@
 // sub-steps compare one number with the slack of all pairs at the last full check, which decreases by no more
 // than the relative motion of the surfels since.
 #pragma once
-#include <cmath>
 #include <functional>
 
 #include "broad/self_list.h"

@@ -13,8 +13,6 @@
 #include <compare>
 #include <cstdint>
 
-#include "core/memory.h"
-
 namespace dfm {
 
 enum ContactKind : uint8_t { kVertexFace = 0, kEdgeEdge = 1, kPrimitive = 2 };

@@ -18,7 +18,6 @@
 // is left of the residual. Sources: Alart and Curnier 1991 (Newton for mixed formulations of frictional
 // contact), Rockafellar 1976 (augmented Lagrangians and the proximal point algorithm).
 #pragma once
-#include <memory>
 #include <span>
 
 #include "body/implicit_system.h"

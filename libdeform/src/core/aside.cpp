@@ -13,7 +13,6 @@
 #endif
 
 #include "core/float_env.h"
-#include "core/forks.h"
 #include "core/tasks.h"
 
 namespace dfm {

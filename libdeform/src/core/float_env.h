@@ -95,7 +95,6 @@ class UsualFloatEnv {
     if (other_) outer_.apply();
   }
   UsualFloatEnv(const UsualFloatEnv &) = delete;
-  UsualFloatEnv &operator=(const UsualFloatEnv &) = delete;
 
  private:
   const FloatEnv outer_;

@@ -2,7 +2,6 @@
 // increases when its object is destroyed, so old handles no longer match. Kinds are checked too.
 #pragma once
 #include <cstdint>
-#include <memory>
 
 namespace dfm {
 

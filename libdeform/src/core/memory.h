@@ -21,7 +21,6 @@ class Meter {
  public:
   explicit Meter(const Memory &under) : under_(under), memory_{this, take, give_back} {}
   Meter(const Meter &) = delete;
-  Meter &operator=(const Meter &) = delete;
   const Memory &memory() const { return memory_; }
   uint64_t bytes() const { return bytes_.load(std::memory_order_relaxed); }
 

@@ -1,5 +1,9 @@
 #include "core/tasks.h"
 
+#if defined(__unix__)
+#include <pthread.h>
+#endif
+
 #include <algorithm>
 #include <atomic>
 #include <chrono>
@@ -9,7 +13,6 @@
 #include <vector>
 
 #include "core/float_env.h"
-#include "core/forks.h"
 
 namespace dfm {
 namespace {
@@ -35,6 +38,15 @@ void run_host_block(void *task, uint32_t begin, uint32_t end) {
 }
 
 }  // namespace
+
+uint32_t forks() noexcept {
+  static std::atomic<uint32_t> count{0};
+#if defined(__unix__)
+  [[maybe_unused]] static const int once =
+      pthread_atfork(nullptr, nullptr, [] { count.fetch_add(1, std::memory_order_relaxed); });
+#endif
+  return count.load(std::memory_order_relaxed);
+}
 
 // Waits for `ready` without sleeping, until `most` has passed: waking a thread takes 50 microseconds, as long
 // as the work of a small body. After a short time it yields now and then, so that other threads of its core

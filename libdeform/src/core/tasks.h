@@ -40,7 +40,6 @@ class Tasks {
     Alone();
     ~Alone();
     Alone(const Alone &) = delete;
-    Alone &operator=(const Alone &) = delete;
 
    private:
     const bool outer_;
@@ -64,5 +63,10 @@ class Tasks {
   HostFor host_for_;
   void *host_user_;
 };
+
+// How many forks lie between the process that asked first and this one; 0 where the system tells none. A
+// child of fork() has the memory of its parent and one thread. Whoever owns threads compares the count with
+// that of the time when they were started: in a child they are not there, to be called or to be waited for.
+uint32_t forks() noexcept;
 
 }  // namespace dfm

@@ -81,7 +81,6 @@ class Dynamics {
  public:
   Dynamics(Phyxels &points, Surface &surface, ModelInstance &model);
   Dynamics(const Dynamics &) = delete;
-  Dynamics &operator=(const Dynamics &) = delete;
   virtual ~Dynamics() = default;
 
   virtual Abilities abilities() const = 0;

@@ -60,15 +60,9 @@ LawInstance::~LawInstance() {
     });
 }
 
-LawBatches::LawBatches(const Memory &m)
-    : order_(HookAllocator<uint32_t>(m)),
-      in_(HookAllocator<double>(m)),
-      out_(HookAllocator<double>(m)),
-      moved_(HookAllocator<double>(m)),
-      answer_(HookAllocator<double>(m)),
-      mode_(HookAllocator<uint8_t>(m)),
-      local_(HookAllocator<Local>(m)),
-      asked_(HookAllocator<uint32_t>(m)) {}
+LawBatches::LawBatches(const Memory &m) {
+  use_memory(m, order_, in_, out_, moved_, answer_, mode_, local_, asked_);
+}
 
 void LawBatches::gather(const std::vector<LawInstance *> &laws, std::span<const RowRun> contacts,
                         ContactState &state) {

@@ -2,7 +2,6 @@
 // per law, evaluated by the plugin, checked, and scattered back to the columns of the contacts.
 #pragma once
 #include <span>
-#include <string>
 #include <vector>
 
 #include "contact/contact_state.h"

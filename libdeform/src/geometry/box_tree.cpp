@@ -32,12 +32,7 @@ Box triangle_box(const uint32_t *corner, const double *x) {
 
 }  // namespace
 
-BoxTree::BoxTree(const Memory &memory)
-    : node_(HookAllocator<Node>(memory)),
-      box_(HookAllocator<Box>(memory)),
-      tri_box_(HookAllocator<Box>(memory)),
-      tri_(HookAllocator<uint32_t>(memory)),
-      centroid_(HookAllocator<Centroid>(memory)) {}
+BoxTree::BoxTree(const Memory &memory) { use_memory(memory, node_, box_, tri_box_, tri_, centroid_); }
 
 // Allocates all memory first: if an allocation fails, the tree is unchanged, with matching nodes and boxes.
 void BoxTree::build(std::span<const uint32_t> corners, const double *x) {

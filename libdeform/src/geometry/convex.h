@@ -4,7 +4,6 @@
 // patch that stays flat (a rigid mesh's) needs neither.
 #pragma once
 #include <algorithm>
-#include <cmath>
 
 #include "geometry/surface.h"
 #include "math/vec3.h"

@@ -1,8 +1,5 @@
 #include "geometry/convex_search.h"
 
-#include <algorithm>
-#include <cmath>
-
 namespace dfm {
 namespace {
 

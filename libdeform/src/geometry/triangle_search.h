@@ -2,7 +2,6 @@
 // nearest first, and skipped only if no triangle in them can be better, so results are those of a test of
 // every triangle; of equal triangles the lowest number.
 #pragma once
-#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <span>

@@ -109,10 +109,8 @@ void add_signs(uint32_t nx, uint32_t ny, uint32_t nz, double step, const Distanc
 }  // namespace
 
 VoxelGrid::VoxelGrid(const Memory &memory, const double *points, uint32_t ntri, const uint32_t *tris,
-                     uint32_t cells)
-    : brick_(HookAllocator<uint32_t>(memory)),
-      value_(HookAllocator<float>(memory)),
-      coarse_(HookAllocator<float>(memory)) {
+                     uint32_t cells) {
+  use_memory(memory, brick_, value_, coarse_);
   low_ = high_ = load3(points + 3 * size_t{tris[0]});
   for (size_t i = 0; i < 3 * size_t{ntri}; ++i)
     for (int k = 0; k < 3; ++k) {

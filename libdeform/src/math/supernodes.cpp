@@ -1,10 +1,9 @@
+#include "math/nested_dissection.h"
 #include "math/supernodes.h"
 
 #include <algorithm>
 #include <numeric>
 #include <vector>
-
-#include "math/minimum_degree.h"
 
 namespace dfm {
 

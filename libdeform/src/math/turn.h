@@ -1,6 +1,9 @@
 // Rotations and poses: interpolation, exponential map and its inverse, and the mean spin of a rigid body
 // that conserves angular momentum over a step. Uses + - * / sqrt only.
 #pragma once
+#include <algorithm>
+#include <cmath>
+
 #include "deform/math.h"
 #include "math/trig.h"
 #include "math/vec3.h"
@@ -112,6 +115,21 @@ inline Vec3 mean_spin(Quat q, Vec3 inverse_moments, Vec3 L, double h) {
     if (norm2(change) <= 1e-31 * norm2(w)) break;
   }
   return w;
+}
+
+// As mean_spin(); where that turns by more than half a radian, what leads to the end of parts of a tenth,
+// one after the other: over a radian its fixed point does not converge, and its energy is anything up to
+// L^2 / 2 of the least moment.
+inline Vec3 free_spin(Quat q, Vec3 inverse_moments, Vec3 L, double h) {
+  constexpr double kWhole = 0.5, kPart = 0.1;  // rad
+  constexpr double kMostParts = 4096;
+  const bool round = inverse_moments.x == inverse_moments.y && inverse_moments.y == inverse_moments.z;
+  const double turn = h * norm(in_axes(q, inverse_moments, L));
+  if (round || !(turn > kWhole)) return mean_spin(q, inverse_moments, L, h);
+  const double parts = std::min(std::ceil(turn / kPart), kMostParts), part = h / parts;
+  Quat at = q;
+  for (double k = 0; k < parts; ++k) at = turned(at, part * mean_spin(at, inverse_moments, L, part));
+  return (1 / h) * rotation_vector(at * conjugate(q));
 }
 
 }  // namespace dfm

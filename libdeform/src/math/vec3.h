@@ -1,6 +1,7 @@
 // Vectors of three doubles and their operations. No FMA, no reordering: every build gives the same bits.
 #pragma once
 #include <cmath>
+#include <cstddef>
 
 namespace dfm {
 
@@ -10,6 +11,11 @@ struct Vec3 {
   double operator[](int i) const { return (&x)[i]; }
 };
 
+inline bool all_finite(const double *x, size_t n) {
+  double poison = 0;
+  for (size_t i = 0; i < n; ++i) poison += 0.0 * x[i];
+  return poison == 0;
+}
 inline Vec3 load3(const double *p) { return {p[0], p[1], p[2]}; }
 inline void store3(double *p, Vec3 a) {
   p[0] = a.x;

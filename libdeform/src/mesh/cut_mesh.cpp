@@ -37,10 +37,7 @@ DisjointSets join_corners(const Memory &memory, uint32_t npoint, uint32_t ntet, 
 
 }  // namespace
 
-CutMesh::CutMesh(const Memory &memory)
-    : tets(HookAllocator<uint32_t>(memory)),
-      point(HookAllocator<uint32_t>(memory)),
-      cell(HookAllocator<uint32_t>(memory)) {}
+CutMesh::CutMesh(const Memory &memory) { use_memory(memory, tets, point, cell); }
 
 Array<uint32_t> inner_faces(const Array<TetFace> &faces) {
   Array<uint32_t> out{HookAllocator<uint32_t>(faces.get_allocator())};

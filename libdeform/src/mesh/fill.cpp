@@ -110,12 +110,7 @@ Lattice choose_lattice(const FillSurface &surface, uint32_t cells) {
 // ---- the shares -------------------------------------------------------------------------------------------
 
 struct Filling {
-  explicit Filling(const Memory &memory)
-      : keys(HookAllocator<Site>(memory)),
-        share(HookAllocator<double>(memory)),
-        loose(HookAllocator<double>(memory)),
-        tets(HookAllocator<uint32_t>(memory)),
-        sites(HookAllocator<Site>(memory)) {}
+  explicit Filling(const Memory &memory) { use_memory(memory, keys, share, loose, tets, sites); }
   Array<Site> keys;  // cells in the order of their keys
   Array<double> share, loose;
   Array<uint32_t> tets;

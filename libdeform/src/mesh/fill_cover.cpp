@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/disjoint_sets.h"
+#include "math/extent.h"
 #include "mesh/fill_lattice.h"
 
 namespace dfm {
@@ -16,16 +17,12 @@ namespace {
 constexpr double kSettled = 0.25;  // a winding number farther than this from 1/2 is decided
 
 Vec3 middle_of(const TriMesh &surface, double *size, double *reach) {
-  double lo[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, hi[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
-  for (const uint32_t p : surface.tris)
-    for (int k = 0; k < 3; ++k) {
-      const double x = surface.points[3 * size_t(p) + k];
-      lo[k] = std::min(lo[k], x);
-      hi[k] = std::max(hi[k], x);
-    }
+  Extent box;
+  for (const uint32_t p : surface.tris) box.add(load3(&surface.points[3 * size_t{p}]));
+  const Vec3 lo = box.lo, hi = box.hi;
   *reach = 0;
   for (int k = 0; k < 3; ++k) *reach = std::max({*reach, std::fabs(lo[k]), std::fabs(hi[k])});
-  const double longest = std::max({hi[0] - lo[0], hi[1] - lo[1], hi[2] - lo[2]});
+  const double longest = box.longest();
   if (!(longest > 0)) {
     *size = 0;
     return Vec3{};

@@ -167,12 +167,8 @@ void add_warnings(TetMesh &mesh, uint32_t crowded) {
   if (crowded)
     warn(format("%u face%s shared by more than two cells; the cells there overlap", crowded,
                 crowded == 1 ? " is" : "s are"));
-  if (mesh.dropped_cells)
-    warn(format("%u duplicate cell%s %s dropped", mesh.dropped_cells, plural(mesh.dropped_cells),
-                was_were(mesh.dropped_cells)));
-  if (mesh.dropped_points)
-    warn(format("%u point%s that no tetrahedron uses %s dropped", mesh.dropped_points,
-                plural(mesh.dropped_points), was_were(mesh.dropped_points)));
+  add_count(mesh.warnings, mesh.dropped_cells, "duplicate cell", "", "dropped");
+  add_count(mesh.warnings, mesh.dropped_points, "point", " that no tetrahedron uses", "dropped");
   if (s.duplicate_points)
     warn(format("%u point%s %s exactly at another point's place; cells that meet there are not joined",
                 s.duplicate_points, plural(s.duplicate_points), s.duplicate_points == 1 ? "lies" : "lie"));

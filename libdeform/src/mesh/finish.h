@@ -1,7 +1,9 @@
 // Shared by the repair of tetrahedral meshes and of surfaces.
 #pragma once
 #include <string>
+#include <vector>
 
+#include "core/error.h"
 #include "mesh/raw_mesh.h"
 
 namespace dfm {
@@ -20,6 +22,11 @@ std::string coarse_coordinates(const double lo[3], const double hi[3], double ed
 inline const char *plural(uint32_t n) { return n == 1 ? "" : "s"; }
 inline const char *is_are(uint32_t n) { return n == 1 ? "is" : "are"; }
 inline const char *was_were(uint32_t n) { return n == 1 ? "was" : "were"; }
+// "2 points on open edges were dropped"; nothing for none.
+inline void add_count(std::vector<std::string> &warnings, uint32_t n, const char *what, const char *which,
+                      const char *done) {
+  if (n) warnings.push_back(format("%u %s%s%s %s %s", n, what, plural(n), which, was_were(n), done));
+}
 
 // Turns triangles so that neighbors agree across every edge of two triangles, solid pieces face outward and
 // the inner surface of a hollow one into its hole. Returns the number of reoriented triangles; `twisted`

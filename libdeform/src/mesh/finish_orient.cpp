@@ -12,6 +12,7 @@
 #include <cmath>
 
 #include "core/disjoint_sets.h"
+#include "math/extent.h"
 #include "math/vec3.h"
 #include "mesh/finish.h"
 #include "mesh/topology_tri.h"
@@ -25,27 +26,19 @@ constexpr double kOnTriangle = 1e-10;  // triple product of the unit vectors to 
 constexpr double kFourPi = 12.566370614359172954;
 
 struct Corners { Vec3 a, b, c; };
-struct Box {
-  Vec3 lo{HUGE_VAL, HUGE_VAL, HUGE_VAL}, hi{-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
-  void add(Vec3 p) {
-    for (int k = 0; k < 3; ++k) {
-      lo[k] = std::min(lo[k], p[k]);
-      hi[k] = std::max(hi[k], p[k]);
-    }
-  }
-  bool holds(const Box &o) const {
-    for (int k = 0; k < 3; ++k)
-      if (o.lo[k] < lo[k] || o.hi[k] > hi[k]) return false;
-    return true;
-  }
-};
+
+bool holds(const Extent &box, const Extent &o) {
+  for (int k = 0; k < 3; ++k)
+    if (o.lo[k] < box.lo[k] || o.hi[k] > box.hi[k]) return false;
+  return true;
+}
 
 struct Patch {
   uint32_t begin = 0, end = 0;  // in order_
   uint32_t turned = 0;          // against the file, before its side is chosen
   bool two_sided = true, solid = false;
   double volume6 = 0, area2 = 0, fan_area2 = 0;
-  Box box;
+  Extent box;
   std::vector<Corners> fans;  // over its openings, facing like the patch
   uint32_t depth = 0;
 };
@@ -73,11 +66,10 @@ class Orienter {
         flip_(ntri_, 0, HookAllocator<uint8_t>(memory)),
         patch_of_(ntri_, UINT32_MAX, HookAllocator<uint32_t>(memory)),
         order_(HookAllocator<uint32_t>(memory)) {
-    Box box;
+    Extent box;
     for (size_t p = 0; p < points.size(); p += 3) box.add(load3(&points[p]));
     origin_ = box.lo;
-    const Vec3 size = box.hi - box.lo;
-    scale_ = 1 / std::max({size.x, size.y, size.z});
+    scale_ = 1 / box.longest();
   }
 
   uint32_t run(uint32_t *twisted) {
@@ -250,7 +242,7 @@ class Orienter {
     for (uint32_t i = 0; i < patches_.size(); ++i)
       if (patches_[i].solid) order.push_back(i);
     std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
-      const Box &x = patches_[a].box, &y = patches_[b].box;
+      const Extent &x = patches_[a].box, &y = patches_[b].box;
       return x.lo.x != y.lo.x ? x.lo.x < y.lo.x : x.hi.x != y.hi.x ? x.hi.x > y.hi.x : a < b;
     });
     for (const uint32_t i : order) {
@@ -258,7 +250,7 @@ class Orienter {
       std::erase_if(open, [&](uint32_t j) { return patches_[j].box.hi.x < p.box.lo.x; });
       std::vector<Vec3> points;
       for (const uint32_t j : open) {
-        if (!patches_[j].box.holds(p.box)) continue;
+        if (!holds(patches_[j].box, p.box)) continue;
         if (points.empty()) points = samples(p);
         p.depth += inside(points, patches_[j]);
       }

@@ -399,26 +399,16 @@ void take_groups(RawMesh &raw, TriMesh &mesh) {
 void add_warnings(TriMesh &mesh, const Repairs &done) {
   const auto warn = [&](const std::string &text) { mesh.warnings.push_back(text); };
   const TriMeshStatistics s = tri_mesh_statistics(mesh);
-  if (const uint32_t exact = mesh.merged_points - done.rim)
-    warn(format("%u point%s %s merged with another at exactly the same place", exact, plural(exact),
-                was_were(exact)));
-  if (done.rim)
-    warn(format("%u point%s on open edges %s merged with another that differs by rounding only", done.rim,
-                plural(done.rim), was_were(done.rim)));
-  if (done.split)
-    warn(format("%u triangle%s without area %s taken up by splitting the neighbor", done.split,
-                plural(done.split), was_were(done.split)));
-  if (done.flat)
-    warn(format("%u triangle%s without area %s dropped", done.flat, plural(done.flat), was_were(done.flat)));
-  if (done.doubles)
-    warn(format("%u duplicate triangle%s %s dropped", done.doubles, plural(done.doubles),
-                was_were(done.doubles)));
-  if (done.walls)
-    warn(format("%u pair%s of triangles where two pieces touch %s dropped, so the pieces are one", done.walls,
-                plural(done.walls), was_were(done.walls)));
-  if (mesh.dropped_points)
-    warn(format("%u point%s that no triangle uses %s dropped", mesh.dropped_points,
-                plural(mesh.dropped_points), was_were(mesh.dropped_points)));
+  add_count(mesh.warnings, mesh.merged_points - done.rim, "point", "",
+            "merged with another at exactly the same place");
+  add_count(mesh.warnings, done.rim, "point", " on open edges",
+            "merged with another that differs by rounding only");
+  add_count(mesh.warnings, done.split, "triangle", " without area", "taken up by splitting the neighbor");
+  add_count(mesh.warnings, done.flat, "triangle", " without area", "dropped");
+  add_count(mesh.warnings, done.doubles, "duplicate triangle", "", "dropped");
+  add_count(mesh.warnings, done.walls, "pair", " of triangles where two pieces touch",
+            "dropped, so the pieces are one");
+  add_count(mesh.warnings, mesh.dropped_points, "point", " that no triangle uses", "dropped");
   if (mesh.turned)
     warn(format("%u of %u triangles faced the wrong way and %s turned", mesh.turned, s.ntri,
                 was_were(mesh.turned)));

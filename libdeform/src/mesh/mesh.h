@@ -19,16 +19,9 @@ struct MeshGroup {
 };
 
 struct TetMesh {
-  explicit TetMesh(const Memory &m = Memory::standard())
-      : memory(&m),
-        points(HookAllocator<double>(m)),
-        tets(HookAllocator<uint32_t>(m)),
-        tet_group(HookAllocator<uint32_t>(m)),
-        tris(HookAllocator<uint32_t>(m)),
-        tri_group(HookAllocator<uint32_t>(m)),
-        file_point(HookAllocator<uint32_t>(m)),
-        file_cell(HookAllocator<uint32_t>(m)),
-        share(HookAllocator<double>(m)) {}
+  explicit TetMesh(const Memory &m = Memory::standard()) : memory(&m) {
+    use_memory(m, points, tets, tet_group, tris, tri_group, file_point, file_cell, share);
+  }
   const Memory *memory;
   Array<double> points;       // [npoint,3], m
   Array<uint32_t> tets;       // [ntet,4], every volume positive

@@ -13,14 +13,9 @@
 namespace dfm {
 
 struct RawMesh {
-  explicit RawMesh(const Memory &m)
-      : memory(&m),
-        points(HookAllocator<double>(m)),
-        tets(HookAllocator<uint32_t>(m)),
-        tet_group(HookAllocator<uint32_t>(m)),
-        tet_share(HookAllocator<double>(m)),
-        tris(HookAllocator<uint32_t>(m)),
-        tri_group(HookAllocator<uint32_t>(m)) {}
+  explicit RawMesh(const Memory &m) : memory(&m) {
+    use_memory(m, points, tets, tet_group, tet_share, tris, tri_group);
+  }
   const Memory *memory;
   Array<double> points;
   Array<uint32_t> tets;       // 0-based positions of points in the file

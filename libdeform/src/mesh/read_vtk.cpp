@@ -36,15 +36,9 @@ Number number_type(const Cursor &in, std::string_view name) {
 
 class VtkReader {
  public:
-  VtkReader(Cursor &in, RawMesh &out)
-      : in_(in),
-        out_(out),
-        sink_(out),
-        cells_(HookAllocator<uint32_t>(*out.memory)),
-        start_(HookAllocator<uint32_t>(*out.memory)),
-        types_(HookAllocator<uint8_t>(*out.memory)),
-        labels_(HookAllocator<int32_t>(*out.memory)),
-        shares_(HookAllocator<double>(*out.memory)) {}
+  VtkReader(Cursor &in, RawMesh &out) : in_(in), out_(out), sink_(out) {
+    use_memory(*out.memory, cells_, start_, types_, labels_, shares_);
+  }
 
   void run() {
     header();

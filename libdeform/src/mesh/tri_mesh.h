@@ -6,12 +6,9 @@
 namespace dfm {
 
 struct TriMesh {
-  explicit TriMesh(const Memory &m = Memory::standard())
-      : memory(&m),
-        points(HookAllocator<double>(m)),
-        tris(HookAllocator<uint32_t>(m)),
-        tri_group(HookAllocator<uint32_t>(m)),
-        file_point(HookAllocator<uint32_t>(m)) {}
+  explicit TriMesh(const Memory &m = Memory::standard()) : memory(&m) {
+    use_memory(m, points, tris, tri_group, file_point);
+  }
   const Memory *memory;
   Array<double> points;       // [npoint,3], m
   Array<uint32_t> tris;       // [ntri,3], neighbors agree; closed pieces face outward

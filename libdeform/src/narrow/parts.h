@@ -13,7 +13,6 @@
 // bodies (doc/decisions/cutting.md).
 #pragma once
 #include <algorithm>
-#include <cmath>
 #include <span>
 
 #include "body/self_rest.h"

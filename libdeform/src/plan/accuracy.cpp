@@ -410,7 +410,7 @@ Meets what_it_meets(const BodyRegime &b) {
 // (4.730); a block that is as long as thick moves along its length (pi c / L, or half of it where held).
 Estimate estimate(const BodyRegime &b, double duration) {
   Estimate e;
-  const double c = e.wave_speed = std::sqrt(b.young / b.density);
+  const double c = std::sqrt(b.young / b.density);  // m/s, of waves
   const double slender = b.length / b.thickness, gyration = b.thickness / std::sqrt(12.0);
   const double root = b.held ? 1.875 : 4.730;
   const double bending = root * root * gyration * c / (b.length * b.length);

@@ -92,8 +92,7 @@ struct Wish {
 
 // Numbers that determine the behavior of one body.
 struct Estimate {
-  double wave_speed = 0;  // m/s
-  double frequency = 0;   // rad/s of the lowest mode
+  double frequency = 0;  // rad/s of the lowest mode
   double strain = 0, rotation = 0;
   double sag = 0;    // m, of the shape
   double lasts = 0;  // s, until damping has ended the motion

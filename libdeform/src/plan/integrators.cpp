@@ -1,7 +1,6 @@
 #include "plan/integrators.h"
 
 #include <algorithm>
-#include <numeric>
 
 namespace dfm {
 namespace {

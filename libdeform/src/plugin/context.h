@@ -80,7 +80,6 @@ class TraceZone {
   }
   ~TraceZone() { context_.trace_end(zone_); }
   TraceZone(const TraceZone &) = delete;
-  TraceZone &operator=(const TraceZone &) = delete;
 
  private:
   const dfm_context &context_;

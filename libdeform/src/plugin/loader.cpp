@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <climits>
 #include <clocale>
 #include <cstdio>
 #include <cstdlib>
@@ -80,7 +79,6 @@ class Visit {
         boundary_(file.c_str(), "load") {}
   ~Visit() { put_back(); }
   Visit(const Visit &) = delete;
-  Visit &operator=(const Visit &) = delete;
   // Says so, too, where something was changed.
   void end() {
     char sentence[1024];

@@ -15,7 +15,6 @@ class Loader {
   Loader(Registry &registry, const dfm_host &host) : registry_(registry), host_(host) {}
   ~Loader();  // shuts the plugins down and closes them, last loaded first
   Loader(const Loader &) = delete;
-  Loader &operator=(const Loader &) = delete;
 
   // Returns true if the file was loaded now, false if it was loaded before (also under another name). Throws
   // DFM_E_IO, DFM_E_UNSUPPORTED or DFM_E_STATE with the reason.

@@ -10,7 +10,6 @@ class PluginSolver final : public LinearSolver {
   PluginSolver(const dfm_type &type, const dfm_host &host, const Memory &memory);
   ~PluginSolver() override;
   PluginSolver(const PluginSolver &) = delete;
-  PluginSolver &operator=(const PluginSolver &) = delete;
 
   const char *name() const override { return type_.id; }
   bool direct() const override;

@@ -17,7 +17,6 @@ class ScratchArena {
   explicit ScratchArena(const Memory &memory) : memory_(memory) {}
   ~ScratchArena();
   ScratchArena(const ScratchArena &) = delete;
-  ScratchArena &operator=(const ScratchArena &) = delete;
 
   void *take(size_t bytes) noexcept;  // 64-byte aligned; nullptr if there is no memory
   size_t mark() const { return used_; }

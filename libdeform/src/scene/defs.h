@@ -2,7 +2,6 @@
 // public API.
 #pragma once
 #include <cstdint>
-#include <map>
 #include <optional>
 #include <string>
 #include <vector>

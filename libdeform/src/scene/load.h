@@ -18,7 +18,6 @@ class MeshFiles {
   MeshFiles(dfm_context *context, const Definition &def) : context_(context), def_(def) {}
   ~MeshFiles();
   MeshFiles(const MeshFiles &) = delete;
-  MeshFiles &operator=(const MeshFiles &) = delete;
 
   std::string path_of(const std::string &path) const;  // relative to the scene file
   // Cells, surface and groups of a body, scaled. Borrows from this object.

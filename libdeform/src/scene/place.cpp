@@ -6,7 +6,6 @@
 #include "core/error.h"
 #include "deform/query.h"
 #include "deform/world.h"
-#include "math/turn.h"
 #include "math/vec3.h"
 
 namespace dfm::scene {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "math/extent.h"
 #include "math/turn.h"
 #include "scene/load.h"
 
@@ -14,30 +15,17 @@ constexpr double kDefaultTolerance = 1e-6, kLeastTolerance = 1e-9;  // m/s
 
 double length(const double v[3]) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
 
-struct Box {
-  double lo[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, hi[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
-  void add(const double p[3]) {
-    for (int k = 0; k < 3; ++k) {
-      lo[k] = std::min(lo[k], p[k]);
-      hi[k] = std::max(hi[k], p[k]);
-    }
-  }
-};
-
 // The box around a box that is placed.
-Box place(const double lo[3], const double hi[3], const dfm_pose &pose) {
-  Box out;
-  for (int corner = 0; corner < 8; ++corner) {
-    const Vec3 p{corner & 1 ? hi[0] : lo[0], corner & 2 ? hi[1] : lo[1], corner & 4 ? hi[2] : lo[2]};
-    double q[3];
-    store3(q, dfm::place(to_pose(pose), p));
-    out.add(q);
-  }
+Extent place(Vec3 lo, Vec3 hi, const dfm_pose &pose) {
+  Extent out;
+  for (int corner = 0; corner < 8; ++corner)
+    out.add(dfm::place(to_pose(pose),
+                       {corner & 1 ? hi.x : lo.x, corner & 2 ? hi.y : lo.y, corner & 4 ? hi.z : lo.z}));
   return out;
 }
 
 // m, how far a box may fall along `down` until it meets a plane; infinite: never.
-double fall_to_plane(const Box &box, const double down[3], const dfm_pose &plane) {
+double fall_to_plane(const Extent &box, const double down[3], const dfm_pose &plane) {
   const Vec3 n = rotate(unit_quat(plane.rotation), {0, 0, 1});
   const double toward = -dot(load3(down), n);
   double least = HUGE_VAL;
@@ -52,7 +40,7 @@ double fall_to_plane(const Box &box, const double down[3], const dfm_pose &plane
 }
 
 // The same distance to a box: along the axis closest to `down`, where the two overlap seen along it.
-double fall_to_box(const Box &box, const double down[3], const Box &other) {
+double fall_to_box(const Extent &box, const double down[3], const Extent &other) {
   int axis = 0;
   for (int k = 1; k < 3; ++k)
     if (std::fabs(down[k]) > std::fabs(down[axis])) axis = k;
@@ -74,7 +62,7 @@ double flat_width(double a, double b, double c) {
   return std::max(std::min(a, b), std::min(std::max(a, b), c));
 }
 // m, depth by which a round thing at this place enters a box; 0: none.
-double depth_in(const Box &box, const double center[3], double radius) {
+double depth_in(const Extent &box, const double center[3], double radius) {
   double outside = 0, inside = HUGE_VAL;
   for (int k = 0; k < 3; ++k) {
     const double beyond = std::max(box.lo[k] - center[k], center[k] - box.hi[k]);
@@ -84,24 +72,22 @@ double depth_in(const Box &box, const double center[3], double radius) {
   return std::max(0.0, radius + (inside > 0 ? inside : -std::sqrt(outside)));
 }
 
-Box box_of(const Obstacle &o, const std::vector<double> &scaled) {
-  double lo[3], hi[3];
+Extent box_of(const Obstacle &o, const std::vector<double> &scaled) {
+  Extent own;
   const double r = o.def.radius;
   for (int k = 0; k < 3; ++k) {
     const double half = o.def.shape == DFM_SHAPE_BOX                 ? o.def.half_size[k]
                         : o.def.shape == DFM_SHAPE_CAPSULE && k == 2 ? r + o.def.half_length
                                                                      : r;
-    lo[k] = -half;
-    hi[k] = half;
+    own.lo[k] = -half;
+    own.hi[k] = half;
   }
   if (o.def.npoint) {
     const double *points = scaled.empty() ? o.def.points : scaled.data();
-    Box own;
-    for (uint32_t i = 0; i < o.def.npoint; ++i) own.add(points + 3 * size_t(i));
-    std::copy_n(own.lo, 3, lo);
-    std::copy_n(own.hi, 3, hi);
+    own = {};
+    for (uint32_t i = 0; i < o.def.npoint; ++i) own.add(load3(points + 3 * size_t{i}));
   }
-  return place(lo, hi, o.def.pose);
+  return place(own.lo, own.hi, o.def.pose);
 }
 
 std::string short_id(const std::string &id) {
@@ -120,7 +106,7 @@ class Reader {
   std::vector<BodyRegime> run(const Measured &measured) {
     for (const Body &b : def_.bodies) meshes_.push_back(files_.load(b));
     for (size_t i = 0; i < meshes_.size(); ++i)
-      boxes_.push_back(place(meshes_[i].lo, meshes_[i].hi, def_.bodies[i].pose));
+      boxes_.push_back(place(load3(meshes_[i].lo), load3(meshes_[i].hi), def_.bodies[i].pose));
     std::vector<BodyRegime> out;
     for (size_t i = 0; i < meshes_.size(); ++i) out.push_back(regime(i, measured));
     return out;
@@ -157,7 +143,7 @@ class Reader {
     }
     Obstacle straight = o;
     straight.def.pose = {};
-    const Box box = box_of(straight, scaled);
+    const Extent box = box_of(straight, scaled);
     return flat_width(box.hi[0] - box.lo[0], box.hi[1] - box.lo[1], box.hi[2] - box.lo[2]);
   }
 
@@ -279,7 +265,7 @@ class Reader {
   MeshFiles files_;
   double g_ = 0, down_[3] = {};
   std::vector<BodyMesh> meshes_;
-  std::vector<Box> boxes_;
+  std::vector<Extent> boxes_;
 };
 
 json way_json(const Way &way, const Definition &def) {

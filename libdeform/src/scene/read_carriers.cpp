@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "core/names.h"
-#include "scene/keys.h"
 #include "scene/read.h"
 
 namespace dfm::scene {

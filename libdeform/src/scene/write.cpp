@@ -1,7 +1,6 @@
 #include "scene/write.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdarg>
 #include <cstring>
 #include <filesystem>

@@ -1,7 +1,6 @@
 // Writes a soft body as part of a scene: its rest mesh (in separate files), its present positions and
 // velocities, and what is prescribed for it.
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <map>

@@ -1,8 +1,6 @@
 // Obstacles and rigid bodies as a scene says them.
 #include <algorithm>
-#include <cmath>
 
-#include "core/error.h"
 #include "dynamics/rigid/rigid_set.h"
 #include "mesh/tri_mesh.h"
 #include "scene/write.h"

@@ -5,7 +5,6 @@
 
 #include "body/feature_map.h"
 #include "body/self_rest.h"
-#include "state/cuts_ahead.h"
 #include "state/search_tree.h"
 #include "state/world.h"
 

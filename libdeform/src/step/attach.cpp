@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "core/error.h"
 #include "deform/attach.h"
 #include "state/obstacle.h"
 #include "state/world.h"

@@ -20,7 +20,6 @@
 #include "state/world.h"
 #include "step/context.h"
 #include "step/move_obstacles.h"
-#include "step/stages.h"
 
 namespace dfm {
 namespace {

@@ -4,7 +4,6 @@
 
 #include "state/material.h"
 #include "state/obstacle.h"
-#include "state/tool.h"
 #include "state/world.h"
 #include "step/attach.h"
 #include "step/context.h"

@@ -6,7 +6,6 @@
 #include <cstdint>
 
 #include "math/vec3.h"
-#include "state/energy_book.h"
 
 namespace dfm {
 

@@ -7,7 +7,6 @@
 #include "plugin/context.h"
 #include "plugin/on_behalf.h"
 #include "state/bounds.h"
-#include "state/obstacle.h"
 #include "step/by_body.h"
 #include "step/context.h"
 #include "step/first_failure.h"

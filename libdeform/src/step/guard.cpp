@@ -24,7 +24,6 @@
 #include "geometry/obstacle_shape.h"
 #include "geometry/pierce.h"
 #include "math/turn.h"
-#include "narrow/detail.h"
 #include "plugin/context.h"
 #include "state/obstacle.h"
 #include "state/world.h"

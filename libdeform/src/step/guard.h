@@ -4,7 +4,6 @@
 #include <vector>
 
 #include "ccd/toi_guard.h"
-#include "contact/contact_set.h"
 
 namespace dfm {
 

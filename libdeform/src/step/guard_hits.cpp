@@ -14,7 +14,6 @@
 #include "step/guard.h"
 #include "step/pre_solve.h"
 #include "step/self_contact.h"
-#include "step/stages.h"
 
 namespace dfm {
 namespace {

@@ -1,19 +1,16 @@
 #include "step/overlap.h"
 
 #include <algorithm>
-#include <memory>
 
 #include "body/obstacle_mesh.h"
 #include "contact/reach.h"
 #include "core/error.h"
 #include "dynamics/rigid/rigid_set.h"
-#include "geometry/extent.h"
+#include "math/extent.h"
 #include "plugin/context.h"
 #include "state/world.h"
-#include "step/context.h"
 #include "step/held_in.h"
 #include "step/overlap_sides.h"
-#include "step/stages.h"
 #include "step/untangle.h"
 
 namespace dfm {

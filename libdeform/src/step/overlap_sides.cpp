@@ -6,7 +6,6 @@
 #include <cmath>
 #include <limits>
 
-#include "body/make_surface.h"
 #include "body/obstacle_mesh.h"
 #include "geometry/closest.h"
 #include "geometry/voxel_grid.h"

@@ -11,7 +11,6 @@
 #include "step/context.h"
 #include "step/energy_watch.h"
 #include "step/held_in.h"
-#include "step/pair_table.h"
 #include "step/solve_islands.h"
 #include "step/stages.h"
 

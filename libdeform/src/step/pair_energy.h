@@ -9,7 +9,6 @@ namespace dfm {
 
 struct StepContext;
 struct World;
-struct Body;
 struct PairWork;
 
 // The ids of two sides, a body first; of two bodies the lower one. They touch by surfels of either of them,

@@ -13,7 +13,6 @@
 #include "state/world.h"
 #include "step/context.h"
 #include "step/pair_table.h"
-#include "step/stages.h"
 
 namespace dfm {
 namespace {

@@ -6,8 +6,11 @@
 #include "step/stages.h"
 
 #include <algorithm>
+#include <bit>
+#include <map>
 #include <tuple>
 #include <utility>
+#include <vector>
 
 #include "body/implicit_system.h"
 #include "body/obstacle_mesh.h"
@@ -23,7 +26,6 @@
 #include "step/cut_drag.h"
 #include "step/energy_watch.h"
 #include "step/overlap.h"
-#include "step/pair_kinds.h"
 #include "step/pair_table.h"
 #include "step/rigid.h"
 #include "step/self_contact.h"
@@ -32,6 +34,78 @@
 
 namespace dfm {
 namespace {
+
+// Kinds of things (bodies, obstacles) that no rule of friction or contact tells apart: the same patterns
+// match them, by name, group and material, and their zones have the same coefficients. Rules are then asked
+// once for two kinds, and not for each pair: a body that shatters has hundreds of pieces, all of one or two
+// kinds, and the tables of pairs are made again after each cut and each separation.
+class PairKinds {
+ public:
+  explicit PairKinds(const World &w);
+
+  struct Pair {
+    const FilterRule *filter;  // nullptr: no rule names the pair
+    PairLaw law;               // of the first pair of these kinds that may touch; kept by the caller
+  };
+  // Things a (a body) and b: bodies by slot, then obstacles. Valid until the next call.
+  Pair &of(uint32_t a, uint32_t b);
+
+ private:
+  const World &w_;
+  std::vector<uint32_t> kind_;  // by thing
+  uint32_t n_ = 0;              // of kinds
+  std::vector<uint32_t> at_;    // [n_,n_] index into pairs_; kNone: not asked yet
+  std::vector<Pair> pairs_;
+};
+
+// As whole things, and by zone. Text that a side refers to lives in the world.
+PairSide side_of(const World &w, uint32_t thing) {
+  const size_t nb = w.bodies.size();
+  if (thing >= nb) return {w.obstacles[thing - nb]->name, {}, w.obstacles[thing - nb]->material};
+  const Body &b = *w.bodies[thing];
+  return {b.name, {}, b.material, b.whole_name};
+}
+
+// What each pattern of the rules weighs at this side.
+template <class Rule>
+void weigh(const std::vector<Rule> &rules, const PairSide &side, std::vector<uint64_t> &key) {
+  for (const Rule &r : rules)
+    for (const std::string &pattern : r.between) key.push_back(uint64_t(pattern_weight(pattern, side)));
+}
+
+std::vector<uint64_t> key_of(const World &w, uint32_t thing) {
+  std::vector<uint64_t> key;
+  const PairSide side = side_of(w, thing);
+  weigh(w.filters, side, key);
+  const auto add = [&](const SurfaceZones::Zone &zone) {
+    key.push_back(std::bit_cast<uint64_t>(zone.friction));
+    weigh(w.friction, {side.name, zone.group, zone.material, side.whole}, key);
+  };
+  const size_t nb = w.bodies.size();
+  if (thing < nb)
+    for (const SurfaceZones::Zone &zone : w.bodies[thing]->zones.list) add(zone);
+  else add(w.obstacles[thing - nb]->zone);
+  return key;
+}
+
+PairKinds::PairKinds(const World &w) : w_(w) {
+  std::map<std::vector<uint64_t>, uint32_t> known;
+  for (uint32_t thing = 0; thing < w.bodies.size() + w.obstacles.size(); ++thing) {
+    const auto [at, fresh] = known.try_emplace(key_of(w, thing), n_);
+    n_ += fresh;
+    kind_.push_back(at->second);
+  }
+  at_.assign(size_t{n_} * n_, kNone);
+}
+
+PairKinds::Pair &PairKinds::of(uint32_t a, uint32_t b) {
+  uint32_t &at = at_[size_t{kind_[a]} * n_ + kind_[b]];
+  if (at == kNone) {
+    at = uint32_t(pairs_.size());
+    pairs_.push_back({best_rule(w_.filters, side_of(w_, a), side_of(w_, b)), {}});
+  }
+  return pairs_[at];
+}
 
 // Rest distance d_c: 1e-3 of the median surface edge, at least 64 rounding units of the largest coordinate,
 // at most 0.1 of the thinnest part: of the least mean thickness and of the shortest median edge.

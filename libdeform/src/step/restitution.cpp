@@ -1,7 +1,6 @@
 #include "step/restitution.h"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "body/rigid_motion.h"

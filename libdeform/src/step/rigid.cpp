@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <new>
 
 #include "body/obstacle_mesh.h"
 #include "core/error.h"

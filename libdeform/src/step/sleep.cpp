@@ -18,13 +18,11 @@
 #include "state/sleep.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 #include "body/make_surface.h"
 #include "contact/reach.h"
 #include "dynamics/rigid/rigid_set.h"
-#include "narrow/narrow_phase.h"
 #include "state/obstacle.h"
 #include "state/world.h"
 #include "step/context.h"

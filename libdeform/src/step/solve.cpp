@@ -6,11 +6,8 @@
 //            residual of the true laws below tolerance: done
 //            sweep the linearized laws until their own residual is below tolerance
 #include <algorithm>
-#include <cmath>
-#include <limits>
 #include <utility>
 
-#include "body/make_surface.h"
 #include "contact/solver.h"
 #include "body/implicit_system.h"
 #include "core/error.h"
@@ -27,7 +24,6 @@
 #include "step/solve_islands.h"
 #include "step/stages.h"
 #include "step/stuck_slip.h"
-#include "step/tolerance.h"
 
 namespace dfm {
 namespace {

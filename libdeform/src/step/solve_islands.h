@@ -6,7 +6,6 @@
 // islands.
 #pragma once
 #include <exception>
-#include <limits>
 #include <span>
 #include <vector>
 

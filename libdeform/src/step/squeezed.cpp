@@ -1,7 +1,6 @@
 #include "step/squeezed.h"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "math/elementary.h"
@@ -11,7 +10,7 @@
 namespace dfm {
 namespace {
 
-// Of Young's modulus: where a body loses half of its height (world/own_weight.cpp).
+// Of Young's modulus: where a body loses half of its height (world/rest_loads.cpp).
 constexpr double kFlat = 0.5;
 // A body under a uniform pressure p loses the share p/E of its height: a tenth at this modulus over p.
 constexpr double kHolds = 10;

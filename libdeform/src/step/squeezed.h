@@ -1,5 +1,5 @@
 // Tells of bodies that what touches them presses flat: a heavy body on a soft one. Own weight alone is told
-// when a body is made (world/own_weight.h).
+// when a body is made (world/rest_loads.h).
 #pragma once
 
 namespace dfm {

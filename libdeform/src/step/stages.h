@@ -4,14 +4,12 @@
 #pragma once
 #include <cstdint>
 #include <functional>
-#include <memory>
 #include <span>
 
 #include "broad/broad_phase.h"
 #include "deform/world.h"
 #include "dynamics/dynamics.h"
 #include "math/vec3.h"
-#include "plan/plan.h"
 #include "state/world_bound.h"
 
 namespace dfm {

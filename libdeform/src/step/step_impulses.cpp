@@ -5,8 +5,6 @@
 
 #include "state/obstacle.h"
 #include "state/world.h"
-#include "step/context.h"
-#include "step/stages.h"
 
 namespace dfm {
 namespace {

@@ -14,7 +14,6 @@
 #include "state/obstacle.h"
 #include "state/world.h"
 #include "step/context.h"
-#include "step/rigid.h"
 #include "step/tool_touch.h"
 
 namespace dfm {

@@ -15,7 +15,6 @@
 #include "dynamics/rigid/rigid_set.h"
 #include "math/dense_lu.h"
 #include "math/turn.h"
-#include "state/world.h"
 #include "step/tool_touch.h"
 
 namespace dfm {

@@ -10,7 +10,6 @@
 #include <cmath>
 
 #include "contact/friction_kernel.h"
-#include "core/error.h"
 #include "core/hash.h"
 #include "state/world.h"
 #include "step/context.h"

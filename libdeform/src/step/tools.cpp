@@ -7,7 +7,6 @@
 #include "state/obstacle.h"
 #include "state/tool.h"
 #include "state/world.h"
-#include "step/rigid.h"
 
 namespace dfm {
 namespace {

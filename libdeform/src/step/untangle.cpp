@@ -9,7 +9,6 @@
 #include "plugin/context.h"
 #include "state/spring.h"
 #include "state/world.h"
-#include "step/context.h"
 #include "step/energy_watch.h"
 #include "step/overlap_sides.h"
 #include "step/stages.h"

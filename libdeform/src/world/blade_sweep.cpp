@@ -17,8 +17,8 @@
 #include <cmath>
 #include <cstring>
 
-#include "geometry/extent.h"
 #include "math/elementary.h"
+#include "math/extent.h"
 #include "mesh/cut_mesh.h"
 #include "state/material.h"
 #include "state/world.h"

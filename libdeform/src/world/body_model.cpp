@@ -11,7 +11,6 @@
 #include "plugin/context.h"
 #include "plugin/on_behalf.h"
 #include "plugin/params.h"
-#include "plugin/registry.h"
 #include "state/world.h"
 #include "step/method.h"
 #include "step/step_bound.h"

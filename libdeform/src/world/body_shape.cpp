@@ -1,7 +1,6 @@
 #include "world/body_shape.h"
 
 #include <algorithm>
-#include <array>
 
 #include "body/make_surface.h"
 #include "core/error.h"
@@ -11,8 +10,6 @@
 #include "state/search_tree.h"
 #include "state/world.h"
 #include "step/self_contact.h"
-#include "world/blade_sweep.h"
-#include "world/body_zones.h"
 #include "world/carry_state.h"
 #include "world/feature_names.h"
 

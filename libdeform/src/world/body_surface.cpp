@@ -144,11 +144,9 @@ void make_body_surface(Body &b, const dfm_surface_def *def) {
   gather_surface(b.surface, b.p.x.data(), b.p.v.data());
 }
 
-MeshCoupling::MeshCoupling(const Memory &memory, const Surface &surface)
-    : surface_(surface),
-      row_(HookAllocator<uint32_t>(memory)),
-      col_(HookAllocator<uint32_t>(memory)),
-      weight_(HookAllocator<double>(memory)) {
+MeshCoupling::MeshCoupling(const Memory &memory, const Surface &surface) : surface_(surface) {
+  use_memory(memory, row_, col_, weight_);
+
   if (!surface.identity()) return;
   col_ = surface.point;
   weight_.assign(surface.nsurfel, 1.0);

@@ -1,8 +1,6 @@
 #include "world/body_zones.h"
 
 #include <algorithm>
-#include <cstring>
-#include <optional>
 
 #include "body/coupling_rows.h"
 #include "core/error.h"

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "core/error.h"
-#include "state/world.h"
 #include "step/change_work.h"
 #include "world/measure.h"
 

@@ -21,7 +21,6 @@ class HostWork {
  public:
   explicit HostWork(Body &b);
   HostWork(const HostWork &) = delete;
-  HostWork &operator=(const HostWork &) = delete;
   ~HostWork();
 
  private:

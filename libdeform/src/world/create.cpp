@@ -34,12 +34,6 @@
 namespace dfm {
 namespace {
 
-bool finite(const double *p, size_t n) {
-  for (size_t i = 0; i < n; ++i)
-    if (!std::isfinite(p[i])) return false;
-  return true;
-}
-
 void check_name(World &w, const std::string &name, const char *kind) {
   if (name.empty() || name == "*" || name.rfind("material=", 0) == 0)
     fail(DFM_E_ARG, "%s name '%s' is reserved; choose another", kind, name.c_str());
@@ -52,7 +46,7 @@ void check_mesh(const dfm_body_def &def, const std::string &name) {
     fail(DFM_E_ARG, "body '%s' has %u points and %u tetrahedra; it needs at least 4 points and 1 tetrahedron",
          name.c_str(), def.npoint, def.ntet);
   for (uint32_t i = 0; i < def.npoint; ++i)
-    if (!finite(def.points + size_t(3) * i, 3))
+    if (!all_finite(def.points + size_t(3) * i, 3))
       fail(DFM_E_ARG, "body '%s': point %u is not finite", name.c_str(), i);
   std::vector<uint8_t> used(def.npoint);
   for (uint32_t t = 0; t < def.ntet; ++t) {
@@ -158,8 +152,8 @@ Body &create_body(World &w, const dfm_body_def &def) {
   b.name = def.name ? def.name : "body" + std::to_string(w.next_id);
   check_name(w, b.name, "body");
   check_mesh(def, b.name);
-  if (!finite(def.pose.position, 3) || !finite(def.pose.rotation, 4) || !finite(def.velocity, 3) ||
-      !finite(def.spin, 3))
+  if (!all_finite(def.pose.position, 3) || !all_finite(def.pose.rotation, 4) ||
+      !all_finite(def.velocity, 3) || !all_finite(def.spin, 3))
     fail(DFM_E_ARG, "body '%s': pose, velocity and spin must be finite", b.name.c_str());
   Material plain;
   plain.def = dfm_material_def_default();
@@ -213,7 +207,7 @@ void take_triangles(Obstacle &o, const dfm_obstacle_def &def) {
          "triangle",
          name, def.npoint, def.ntriangle);
   for (uint32_t i = 0; i < def.npoint; ++i)
-    if (!finite(def.points + size_t(3) * i, 3))
+    if (!all_finite(def.points + size_t(3) * i, 3))
       fail(DFM_E_ARG, "obstacle '%s': point %u is not finite", name, i);
   for (uint32_t t = 0; t < def.ntriangle; ++t) {
     const uint32_t *const c = def.triangles + size_t(3) * t;
@@ -287,8 +281,9 @@ Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def) {
     fail(DFM_E_ARG,
          "obstacle '%s': shape %u is unknown; use DFM_SHAPE_PLANE, SPHERE, BOX, CAPSULE, MESH or VOXELS",
          name, def.shape);
-  if (!finite(def.pose.position, 3) || !finite(def.pose.rotation, 4) || !finite(def.velocity_surface, 3) ||
-      !finite(def.sine.amplitude, 3) || !finite(&def.sine.frequency, 1) || !finite(&def.sine.phase, 1))
+  if (!all_finite(def.pose.position, 3) || !all_finite(def.pose.rotation, 4) ||
+      !all_finite(def.velocity_surface, 3) || !all_finite(def.sine.amplitude, 3) ||
+      !all_finite(&def.sine.frequency, 1) || !all_finite(&def.sine.phase, 1))
     fail(DFM_E_ARG, "obstacle '%s': pose, sine and velocity_surface must be finite", name);
   if ((def.shape == DFM_SHAPE_SPHERE || def.shape == DFM_SHAPE_CAPSULE) &&
       !(def.radius > 0 && std::isfinite(def.radius)))

@@ -8,9 +8,8 @@
 #include <utility>
 
 #include "core/error.h"
-#include "geometry/extent.h"
+#include "math/extent.h"
 #include "mesh/cut_mesh.h"
-#include "mesh/mesh.h"
 #include "plugin/on_behalf.h"
 #include "state/material.h"
 #include "state/world.h"

@@ -7,7 +7,6 @@
 
 #include "core/error.h"
 #include "dynamics/equilibrium.h"
-#include "dynamics/rigid/rigid_set.h"
 #include "state/obstacle.h"
 #include "state/world.h"
 #include "step/energy_watch.h"
@@ -25,9 +24,6 @@ constexpr uint32_t kHalvings = 6;
 // Limit on alternations between relaxation and equilibrium, which depend on each other.
 constexpr uint32_t kRelaxations = 4;
 
-// Time and share of the loads.
-struct Station { double time, share; };
-
 class Search {
  public:
   Search(World &w, const dfm_equilibrium_def &def, dfm_equilibrium_info &info)
@@ -38,7 +34,6 @@ class Search {
     keep();
   }
   Search(const Search &) = delete;
-  Search &operator=(const Search &) = delete;
   ~Search() {
     if (!done_) put_back(first_);
     set_gravity_now(w_);
@@ -50,7 +45,7 @@ class Search {
     Station at = start_;
     for (uint32_t k = 1; k <= load_steps; ++k) {
       const double done = double(k) / load_steps;
-      const Station to = k == load_steps ? end_ : between(done);
+      const Station to = k == load_steps ? end_ : between(start_, end_, done);
       go(at, to, 0);
       at = to;
     }
@@ -74,11 +69,6 @@ class Search {
   One make(Body &b, const ImplicitOptions &options) const {
     return {&b, std::make_unique<Equilibrium>(w_.memory(), b.p, b.model, options),
             std::make_unique<AtRest>(w_.memory(), b.p, b.model), softness_of(b), is_free(b)};
-  }
-
-  Station between(double part) const {
-    return {start_.time + part * (end_.time - start_.time),
-            start_.share + part * (end_.share - start_.share)};
   }
 
   void keep() {

@@ -10,8 +10,6 @@
 #include "plugin/params.h"
 #include "state/obstacle.h"
 #include "state/world.h"
-#include "step/context.h"
-#include "step/method.h"
 #include "step/pair_energy.h"
 #include "step/pair_table.h"
 #include "step/stages.h"

@@ -7,7 +7,6 @@
 
 namespace dfm {
 
-struct FrictionRule;
 struct World;
 
 // Adds a rule for two sides and removes an older one for the same sides; if that one has the same kind of

@@ -9,6 +9,7 @@
 
 #include "body/make_surface.h"
 #include "core/error.h"
+#include "math/extent.h"
 #include "math/polar.h"
 #include "math/turn.h"
 #include "plugin/context.h"
@@ -130,16 +131,9 @@ Pose frame_of(const Body &b) {
 // ---- checks of the new model ------------------------------------------------------------------
 
 double size_of(const Body &b) {
-  double size = 0;
-  for (size_t k = 0; k < 3; ++k) {
-    double least = HUGE_VAL, most = -HUGE_VAL;
-    for (size_t i = 0; i < b.p.n; ++i) {
-      least = std::min(least, b.p.rest[3 * i + k]);
-      most = std::max(most, b.p.rest[3 * i + k]);
-    }
-    size = std::max(size, most - least);
-  }
-  return size;
+  Extent box;
+  for (size_t i = 0; i < b.p.n; ++i) box.add(load3(&b.p.rest[3 * i]));
+  return box.longest();
 }
 
 // A model that steps itself may represent only some shapes. A sub-step that is too short for any motion, with

@@ -9,7 +9,6 @@
 // stays near the limit, does not change back and forth. Sleeping bodies do not change, because a change would
 // wake them.
 #include <algorithm>
-#include <cmath>
 
 #include "state/world.h"
 #include "step/context.h"

@@ -20,6 +20,14 @@ double ray_obstacle(Obstacle &ob, Vec3 origin, Vec3 unit_direction, double limit
 
 // N times a column of the phyxels
 Vec3 surfel_vector(const Body &b, const Array<double> &phyxel_column, uint32_t surfel);
+// Displacements from the rest shape at the body's pose.
+inline Vec3 displacement(const Body &b, uint32_t point) {
+  return load3(&b.p.x[kStride * size_t{point}]) - place(b.origin.frame, load3(&b.p.rest[size_t{3} * point]));
+}
+inline Vec3 surfel_displacement(const Body &b, uint32_t s) {
+  if (b.surface.identity()) return displacement(b, b.surface.point[s]);
+  return surfel_vector(b, b.p.x, s) - place(b.origin.frame, load3(&b.surface.rest[size_t{3} * s]));
+}
 // [nsurfel,3], area-weighted
 void surface_normals(const Body &b, double *out);
 // Several threads may query at once. The first query after positions have changed refits the trees

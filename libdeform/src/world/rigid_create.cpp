@@ -13,9 +13,6 @@
 namespace dfm {
 namespace {
 
-bool finite(const double *p, size_t n) {
-  return std::all_of(p, p + n, [](double x) { return std::isfinite(x); });
-}
 bool zero(const double *p) { return p[0] == 0 && p[1] == 0 && p[2] == 0; }
 
 // Shape, pose and material are checked when the obstacle is created.
@@ -28,10 +25,10 @@ void check_body(dfm_rigid_def &d, const char *name) {
          name, d.shape);
   if (d.shape == DFM_SHAPE_NONE && !d.fixed && zero(d.inertia))
     fail(DFM_E_ARG, "rigid body '%s' has no shape to take its inertia from; give all three moments", name);
-  if (!finite(d.pose.position, 3) || !finite(d.pose.rotation, 4) || !finite(d.velocity, 3) ||
-      !finite(d.spin, 3))
+  if (!all_finite(d.pose.position, 3) || !all_finite(d.pose.rotation, 4) || !all_finite(d.velocity, 3) ||
+      !all_finite(d.spin, 3))
     fail(DFM_E_ARG, "rigid body '%s': pose, velocity and spin must be finite", name);
-  if (!finite(d.half_size, 3) || !finite(&d.radius, 1) || !finite(&d.half_length, 1))
+  if (!all_finite(d.half_size, 3) || !all_finite(&d.radius, 1) || !all_finite(&d.half_length, 1))
     fail(DFM_E_ARG, "rigid body '%s': half_size, radius and half_length must be finite", name);
   check_velocity("rigid body", name, load3(d.velocity), load3(d.spin), 1);
   if (d.fixed) {
@@ -71,7 +68,7 @@ void check_joint(const dfm_joint_def &j, uint32_t number, const std::vector<dfm_
   if (j.body == j.with) fail(DFM_E_ARG, "joint %u ties rigid body '%s' to itself", number, name);
   if (bodies[j.body].fixed && (j.with == DFM_RIGID_WORLD || bodies[j.with].fixed))
     fail(DFM_E_ARG, "joint %u of rigid body '%s' ties two things that never move", number, name);
-  if (!finite(j.anchor, 3) || !finite(j.axis, 3))
+  if (!all_finite(j.anchor, 3) || !all_finite(j.axis, 3))
     fail(DFM_E_ARG, "joint %u of rigid body '%s': anchor and axis must be finite", number, name);
   const bool drives = j.type == DFM_JOINT_HINGE || j.type == DFM_JOINT_SLIDER;
   if (drives && zero(j.axis)) fail(DFM_E_ARG, "joint %u of rigid body '%s': its axis is zero", number, name);

@@ -6,7 +6,6 @@
 #include <algorithm>
 
 #include "core/disjoint_sets.h"
-#include "core/error.h"
 #include "core/handle.h"
 #include "mesh/cut_mesh.h"
 #include "plugin/context.h"

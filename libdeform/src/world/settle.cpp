@@ -15,6 +15,7 @@
 #include "core/error.h"
 #include "dynamics/at_rest.h"
 #include "dynamics/settling_points.h"
+#include "math/extent.h"
 #include "state/bounds.h"
 #include "state/obstacle.h"
 #include "state/world.h"
@@ -53,8 +54,6 @@ constexpr double kOvershoots = 0.5, kSpeedsUp = 0.5, kMostOvershoot = 2;
 constexpr double kMostSlowed = 1e3;
 constexpr double kAway = 10;  // of its size: a body in contact that has moved so far keeps sliding
 
-struct Station { double time, share; };
-
 class Settling {
  public:
   Settling(World &w, const dfm_equilibrium_def &def, dfm_equilibrium_info &info)
@@ -80,7 +79,6 @@ class Settling {
     w.changed = true;
   }
   Settling(const Settling &) = delete;
-  Settling &operator=(const Settling &) = delete;
   ~Settling() {
     exchange();
     w_.def.sleep = def_.sleep;
@@ -104,7 +102,7 @@ class Settling {
   void run(uint32_t load_steps) {
     prepare(w_);
     for (uint32_t k = 1; k <= load_steps; ++k) {
-      reach(k == load_steps ? end_ : between(double(k) / load_steps));
+      reach(k == load_steps ? end_ : between(start_, end_, double(k) / load_steps));
       ++info_.load_steps;
     }
     keep();
@@ -149,25 +147,13 @@ class Settling {
   }
 
   static double size_of(const Body &b) {
-    double size = 0;
-    for (size_t k = 0; k < 3; ++k) {
-      double least = HUGE_VAL, most = -HUGE_VAL;
-      for (size_t i = 0; i < b.p.n; ++i) {
-        least = std::min(least, b.p.x[kStride * i + k]);
-        most = std::max(most, b.p.x[kStride * i + k]);
-      }
-      size = std::max(size, most - least);
-    }
-    return size;
+    Extent box;
+    for (size_t i = 0; i < b.p.n; ++i) box.add(load3(&b.p.x[kStride * i]));
+    return box.longest();
   }
 
   void exchange() {
     for (One &one : bodies_) one.body->dynamics.swap(one.other);
-  }
-
-  Station between(double part) const {
-    return {start_.time + part * (end_.time - start_.time),
-            start_.share + part * (end_.share - start_.share)};
   }
 
   void reach(const Station &to) {

@@ -47,7 +47,6 @@ class SnapshotShapes {
   // Throws Error; then the world is unchanged.
   SnapshotShapes(World &w, std::vector<CutRow> &rows);
   SnapshotShapes(const SnapshotShapes &) = delete;
-  SnapshotShapes &operator=(const SnapshotShapes &) = delete;
   ~SnapshotShapes();
   void keep() noexcept { undo_.clear(); }
 

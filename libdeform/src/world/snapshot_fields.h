@@ -13,21 +13,162 @@
 #include <memory>
 #include <numeric>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "core/error.h"
+#include "deform/world.h"
 #include "dynamics/rigid/rigid_set.h"
 #include "friction/laws.h"
 #include "plugin/params.h"
+#include "state/model_choice.h"
 #include "state/obstacle.h"
+#include "state/tool.h"
 #include "state/world.h"
 #include "step/method.h"
+#include "world/body_model.h"
 #include "world/snapshot_cuts.h"
-#include "world/snapshot_models.h"
-#include "world/snapshot_staged.h"
 #include "world/snapshot_stream.h"
 #include "world/snapshot_things.h"
+
+namespace dfm {
+
+// ---- contents, read in full before the world changes (snapshot_restore.cpp) ----
+
+// Members have the names of those in World, Body and Obstacle, so that the lists of fields work for both.
+struct StagedBody {
+  struct {
+    Array<double> x, v, load;
+    Array<uint8_t> held;
+  } p;
+  struct {
+    std::string id;
+    Array<double> state;
+    std::vector<double> params;
+  } model;
+  ModelOrigin origin;
+  Integrator integrator;
+  std::vector<Switch> switches;
+  std::vector<SwitchRule> rule;
+  uint64_t first_model = 0;
+  std::unique_ptr<BodyModel> made;  // if the body has another model than in the snapshot
+  Vec3 contact_impulse;
+  EnergyBook energy;
+  ChangeBook changes;
+  std::vector<Load> loads;
+  std::vector<Spring> springs;
+  std::vector<HeldMotion> motions;
+  uint32_t next_load = 1, category = 1, collides_with = ~0u;
+  SeparateRule separate;
+  std::vector<PlannedCut> planned_cuts;
+  std::vector<BladeTrack> blades;
+  CutsAhead ahead;
+  Slumber slumber;
+  Array<double> surfel_impulse, anchor, method_values;
+};
+struct StagedObstacle {
+  Pose pose, target;
+  bool has_target = false;
+  std::vector<dfm_pose_key> keys;
+  dfm_obstacle_def def{};
+  std::string material;
+  struct {
+    std::string material;
+    double friction = kDefaultFriction;
+  } zone;
+};
+struct StagedRigids {
+  Array<dfm_rigid_state> state;
+  Array<double> extra, total;
+  double last_h = 0;
+};
+struct StagedTool { Tool::Cuts cuts; };
+struct StagedLaw {
+  std::string id;
+  std::vector<double> params;
+  double restitution = kNoRestitution;
+};
+struct Staged {
+  double time = 0, offset = 0;
+  uint64_t step_count = 0, next_id = 0;
+  uint32_t sleepers = 0;
+  WorldBound bound;
+  Hold hold;
+  StepSizes sizes;
+  EnergyWatch watch;
+  double struck_until = 0;
+  dfm_world_stats stats{};
+  Gravity gravity;
+  dfm_world_def def{};
+  std::vector<StagedBody> bodies;
+  std::vector<StagedObstacle> obstacles;
+  std::vector<StagedRigids> rigid_sets;
+  std::vector<StagedTool> tools;
+  std::vector<StagedLaw> laws;
+  std::vector<FrictionRule> friction;
+  std::vector<FilterRule> filters;
+  std::vector<Attachment> attachments;
+  ContactStore store, tool_store;
+  struct { std::vector<PairAside> aside; } overlaps;
+  std::vector<PairWork> work;
+  Report report;
+  RigidReport rigid_report;               // pairs that touch alone
+  std::vector<dfm_contact_event> events;  // none
+  std::vector<Swap> swaps;                // none
+  explicit Staged(const World &w)
+      : store(w.meters.contacts.memory()),
+        tool_store(w.meters.contacts.memory()),
+        report(w.meters.contacts.memory()),
+        rigid_report(w.meters.contacts.memory()) {
+    const Memory &m = w.memory();
+    def.method = w.def.method;
+    bodies.resize(w.bodies.size());
+    obstacles.resize(w.obstacles.size());
+    rigid_sets.resize(w.rigid_sets.size());
+    tools.resize(w.tools.size());
+    for (StagedBody &b : bodies)
+      use_memory(m, b.p.x, b.p.v, b.p.load, b.p.held, b.model.state, b.surfel_impulse, b.anchor,
+                 b.method_values);
+    for (StagedRigids &r : rigid_sets) use_memory(m, r.state, r.extra, r.total);
+  }
+};
+
+// ---- future models of a body ----
+
+template <class Stream, class P>
+void param_fields(Stream &s, P &params) {
+  s.array("model's keys", params.keys, kAnyCount, must::any);
+  s.array("model's widths", params.widths, kAnyCount, must::any);
+  s.array("model's values", params.values, kAnyCount, must::finite);
+  s.must_hold("model's keys", "as many as there are values for", [&] { return params.sound(); });
+}
+
+template <class Stream, class C>
+void choice_fields(Stream &s, const char *name, C &c) {
+  s.array(name, c.type, kAnyCount, must::any);
+  param_fields(s, c.params);
+  s.value(name, c.integrator, must::at_most(kSameIntegrator));
+  s.value(name, c.max_jump, must::Be{[](double j) { return j > 0; }, "an energy above zero"});
+}
+
+template <class Stream, class B>
+void switch_fields(Stream &s, B &b) {
+  s.list("models to come", b.switches, [&](auto &x) {
+    s.value("model to come", x.t, must::finite);
+    choice_fields(s, "model to come", x.to);
+  });
+  s.list("rules of models", b.rule, [&](auto &r) {
+    for (auto *c : {&r.touching, &r.near, &r.far}) choice_fields(s, "rule of models", *c);
+    s.value("rule's point", r.point, must::finite);
+    for (auto *x : {&r.distance, &r.hysteresis, &r.wait, &r.called})
+      s.value("rule's value", *x, must::not_negative);
+    s.value("rule's refusal", r.refused, must::finite);
+    s.value("rule's level", r.level, must::at_most(uint32_t(SwitchLevel::undecided)));
+  });
+  s.must_hold("rules of models", "one rule at most, with a model for far",
+              [&] { return b.rule.empty() || (b.rule.size() == 1 && !b.rule[0].far.type.empty()); });
+}
+
+}  // namespace dfm
 
 namespace dfm::snapshot {
 

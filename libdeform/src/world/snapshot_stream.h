@@ -58,11 +58,7 @@ template <class Is>
 Be(Is, const char *, bool) -> Be<Is>;
 
 inline bool all_finite(double x) { return std::isfinite(x); }
-inline bool all_finite(const double *x, size_t n) {
-  double poison = 0;
-  for (size_t i = 0; i < n; ++i) poison += 0.0 * x[i];
-  return poison == 0;
-}
+using dfm::all_finite;
 inline bool all_finite(const Vec3 &v) { return all_finite(&v.x, 3); }
 template <size_t n>
 bool all_finite(const double (&x)[n]) {

@@ -1,17 +1,14 @@
 #include "world/snapshot_structure.h"
 
 #include <algorithm>
-#include <cstring>
 
 #include "core/hash.h"
 #include "dynamics/rigid/rigid_set.h"
 #include "state/obstacle.h"
 #include "state/tool.h"
 #include "state/world.h"
-#include "step/context.h"
 #include "step/method.h"
 #include "step/self_contact.h"
-#include "step/stages.h"
 #include "world/snapshot_cuts.h"
 
 namespace dfm {

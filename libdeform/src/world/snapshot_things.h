@@ -50,7 +50,6 @@ class SnapshotIds {
   // Throws Error, which names the thing that is missing, too many or different; then the world is unchanged.
   SnapshotIds(World &w, const ThingRows &rows);
   SnapshotIds(const SnapshotIds &) = delete;
-  SnapshotIds &operator=(const SnapshotIds &) = delete;
   ~SnapshotIds();
   void keep() noexcept;
 

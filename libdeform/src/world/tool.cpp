@@ -13,7 +13,6 @@
 #include "step/rigid.h"
 #include "step/stages.h"
 #include "world/attach.h"
-#include "world/create.h"
 #include "world/find.h"
 #include "world/queries.h"
 
@@ -24,9 +23,6 @@ constexpr double kWidest = 3;         // rad, of an opening
 constexpr double kLatest = 0.1;       // s, of a device
 constexpr uint32_t kRefinements = 2;  // of an ellipsoid: 320 triangles
 
-bool finite(const double *p, size_t n) {
-  return std::all_of(p, p + n, [](double x) { return std::isfinite(x); });
-}
 bool jawed(const dfm_tool_def &d) { return d.shape == DFM_TOOL_GRASPER || d.shape == DFM_TOOL_SCISSORS; }
 
 void check_opening(double angle, const char *name) {
@@ -84,7 +80,7 @@ void check_def(const dfm_tool_def &d, const char *name) {
          "tool '%s': shape %u is unknown; use DFM_TOOL_SPHERE, CAPSULE, BOX, MESH, GRASPER, SCISSORS, "
          "ELLIPSOID or BLADE",
          name, d.shape);
-  if (!finite(d.pose.position, 3) || !finite(d.pose.rotation, 4))
+  if (!all_finite(d.pose.position, 3) || !all_finite(d.pose.rotation, 4))
     fail(DFM_E_ARG, "tool '%s': its pose must be finite", name);
   check_sizes(d, name);
   check_coupling(d, name);
@@ -180,7 +176,7 @@ void start_at(Tool &t, const Pose &place) {
 }
 
 Tool &checked(Tool &t, const dfm_pose &pose) {
-  if (!finite(pose.position, 3) || !finite(pose.rotation, 4))
+  if (!all_finite(pose.position, 3) || !all_finite(pose.rotation, 4))
     fail(DFM_E_ARG, "tool '%s': the given pose is not finite", t.name.c_str());
   check_place(*t.world, "tool", t.name.c_str(), largest_coordinate(pose.position, 1, 3));
   return t;
@@ -251,7 +247,7 @@ void destroy_tool(Tool &t) {
 
 void set_tool_pose(Tool &t, const dfm_pose &pose, const double *velocity) {
   checked(t, pose);
-  if (velocity && !finite(velocity, 6))
+  if (velocity && !all_finite(velocity, 6))
     fail(DFM_E_ARG, "tool '%s': the given velocity is not finite", t.name.c_str());
   ToolValues v = t.values();
   store_place(v.target, to_pose(pose));
@@ -420,7 +416,7 @@ void read_devices(World &w, double end) {
     fresh.push_back(status == DFM_OK);
     if (status == DFM_OK) {
       checked(*t, s.pose);
-      if ((s.flags & DFM_DEVICE_VELOCITY) && !finite(s.velocity, 6))
+      if ((s.flags & DFM_DEVICE_VELOCITY) && !all_finite(s.velocity, 6))
         fail(DFM_E_ARG, "the device of tool '%s' gives a velocity that is not finite", t->name.c_str());
       if (s.flags & DFM_DEVICE_OPENING) check_opening(s.opening, t->name.c_str());
     }

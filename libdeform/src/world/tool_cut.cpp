@@ -8,10 +8,8 @@
 #include <vector>
 
 #include "core/error.h"
-#include "geometry/closest.h"
-#include "geometry/extent.h"
+#include "math/extent.h"
 #include "math/turn.h"
-#include "mesh/cut_mesh.h"
 #include "state/obstacle.h"
 #include "state/tool.h"
 #include "state/world.h"

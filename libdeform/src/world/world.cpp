@@ -2,24 +2,13 @@
 #include "state/world.h"
 #include "step/context.h"
 #include "step/method.h"
-#include "step/stages.h"
-
-#include <algorithm>
 
 #include "core/aside.h"
-#include "core/error.h"
-#include "dynamics/rigid/rigid_set.h"
-#include "friction/laws.h"
-#include "friction/pair_rules.h"
 #include "plugin/context.h"
-#include "state/bounds.h"
 #include "state/material.h"
 #include "state/obstacle.h"
 #include "state/tool.h"
-#include "step/energy_watch.h"
-#include "step/overlap.h"
 #include "step/pair_table.h"
-#include "step/rigid.h"
 
 namespace dfm {
 

@@ -7,7 +7,6 @@
 
 #include "dense.h"
 #include "dynamics/rigid/host.h"
-#include "math/free_spin.h"
 #include "math/turn.h"
 #include "near.h"
 #include "rigid.h"

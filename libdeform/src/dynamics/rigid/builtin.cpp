@@ -20,7 +20,6 @@
 #include "core/error.h"
 #include "dynamics/rigid/host.h"
 #include "dynamics/rigid/joints.h"
-#include "math/free_spin.h"
 #include "math/turn.h"
 
 namespace dfm {

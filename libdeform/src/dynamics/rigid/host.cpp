@@ -1,6 +1,5 @@
 #include "dynamics/rigid/host.h"
 
-#include <cstring>
 #include <map>
 #include <mutex>
 

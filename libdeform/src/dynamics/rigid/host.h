@@ -1,7 +1,6 @@
 // Rigid hosts by name: those of dfm_rigid_host_register(), and the builtin one.
 #pragma once
 #include <string>
-#include <vector>
 
 #include "deform/rigid.h"
 

@@ -4,6 +4,7 @@
 #include <new>
 
 #include "math/turn.h"
+#include "math/vec3.h"
 
 namespace dfm {
 namespace {
@@ -16,13 +17,8 @@ void need_memory(dfm_status status) {
   if (status == DFM_E_NOMEM) throw std::bad_alloc();
 }
 
-bool finite_values(const double *p, size_t n) {
-  double poison = 0;
-  for (size_t i = 0; i < n; ++i) poison += 0.0 * p[i];
-  return poison == 0;
-}
 bool finite_values(std::span<const dfm_rigid_state> states) {
-  return finite_values(reinterpret_cast<const double *>(states.data()), kStateValues * states.size());
+  return all_finite(reinterpret_cast<const double *>(states.data()), kStateValues * states.size());
 }
 
 RigidSet::RigidSet(World &w, const Memory &m, const std::string &name)
@@ -49,8 +45,7 @@ HostFault RigidSet::free_motion() {
   std::fill(velocity.begin(), velocity.end(), 0.0);
   const dfm_status status = host.predict(self, &step, velocity.data());
   if (status != DFM_OK) return {status, "gave no velocities"};
-  if (!finite_values(velocity.data(), velocity.size()))
-    return {DFM_OK, "gave velocities that are not finite"};
+  if (!all_finite(velocity.data(), velocity.size())) return {DFM_OK, "gave velocities that are not finite"};
   return {};
 }
 
@@ -58,7 +53,7 @@ bool RigidSet::respond(uint32_t of_group, uint32_t bodies, double *matrix) {
   const size_t width = 6 * size_t{bodies};
   const dfm_status status = host.respond(self, &step, of_group, matrix);
   need_memory(status);
-  return status == DFM_OK && finite_values(matrix, width * width);
+  return status == DFM_OK && all_finite(matrix, width * width);
 }
 
 bool RigidSet::revise(bool &changed) {
@@ -66,7 +61,7 @@ bool RigidSet::revise(bool &changed) {
   const dfm_status status = host.revise(self, &step, impulse.data(), revised.data(), &any);
   need_memory(status);
   changed = any != 0;
-  return status == DFM_OK && finite_values(revised.data(), revised.size());
+  return status == DFM_OK && all_finite(revised.data(), revised.size());
 }
 
 HostFault RigidSet::take_impulses() {
@@ -80,7 +75,7 @@ HostFault RigidSet::end_state(bool &again) {
   again = status == DFM_RIGID_AGAIN;
   for (uint32_t i = 0; i < defs.size(); ++i)
     if (group[i] == DFM_RIGID_STILL) next[i] = state[i];
-  if (!finite_values(next) || !finite_values(next_extra.data(), next_extra.size()))
+  if (!finite_values(next) || !all_finite(next_extra.data(), next_extra.size()))
     return {DFM_OK, "ended its step with something not finite"};
   return {};
 }

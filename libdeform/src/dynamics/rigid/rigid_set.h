@@ -23,7 +23,6 @@ struct HostFault {
 };
 
 void need_memory(dfm_status status);  // throws std::bad_alloc if the host had no memory
-bool finite_values(const double *p, size_t n);
 bool finite_values(std::span<const dfm_rigid_state> states);
 
 struct RigidSet {

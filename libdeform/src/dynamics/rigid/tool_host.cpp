@@ -14,7 +14,6 @@
 #include <algorithm>
 #include <cstring>
 #include <new>
-#include <vector>
 
 #include "core/error.h"
 #include "math/turn.h"

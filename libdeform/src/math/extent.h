@@ -15,6 +15,11 @@ struct Extent {
       hi[k] = std::max(hi[k], x[k]);
     }
   }
+  // Along an axis; 0 without points.
+  double longest() const {
+    const Vec3 size = hi - lo;
+    return std::max({0.0, size.x, size.y, size.z});
+  }
   void grow(Vec3 by) {
     lo = lo - by;
     hi = hi + by;
