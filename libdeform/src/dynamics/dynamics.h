@@ -89,8 +89,11 @@ class Dynamics {
   // work of a sub-step relative to an explicit one: a rough number for the budget of a step
   virtual uint32_t relative_work() const { return 1; }
 
-  // False: the model gives none.
-  virtual bool bound(double time, const AddRowSums &outside, StepBound &out) = 0;
+  // What the largest eigenvalue of the stiffness at rest has of its bound by row sums, measured now; 1: all,
+  // or not known.
+  virtual double spectral_share() { return 1; }
+  // share: spectral_share() of the model as it was made. False: the model gives none.
+  virtual bool bound(double time, double share, const AddRowSums &outside, StepBound &out) = 0;
   // 1/s, of the edge that stretches fastest; 0 if the bound does not depend on the shape
   virtual double strain_rate() const { return 0; }
   // touched: the last sub-step ended with contacts. Called once for a sub-step and its repetitions.

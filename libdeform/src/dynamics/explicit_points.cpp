@@ -6,11 +6,15 @@
 
 #include "body/rigid_motion.h"
 #include "dynamics/symplectic_euler.h"
+#include "math/lanczos.h"
 
 namespace dfm {
 namespace {
 constexpr uint32_t kAhead = 48;   // points: as long as memory takes to answer
 constexpr double kNotGiven = -1;  // J, of a part: no kinetic energy is that
+constexpr double kWay = 1e-4;     // of the shortest edge: a difference of forces is that of their derivatives
+// Strain of an edge from which on nothing of the spectrum at rest counts.
+constexpr double kUnlikeRest = 0.5;
 }  // namespace
 
 ExplicitPoints::ExplicitPoints(const Memory &memory, Phyxels &points, Surface &surface, ModelInstance &model,
@@ -30,15 +34,75 @@ ExplicitPoints::ExplicitPoints(const Memory &memory, Phyxels &points, Surface &s
   part_kinetic_.resize(parts);
 }
 
-bool ExplicitPoints::bound(double time, const AddRowSums &outside, StepBound &out) {
-  const dfm_model &ops = *model_.ops;
-  if (!ops.bound) return true;
+bool ExplicitPoints::row_sums(const dfm_kin &k, double &cell) {
   std::fill(stiffness_.begin(), stiffness_.end(), 0.0);
   std::fill(damping_.begin(), damping_.end(), 0.0);
+  const auto ask = [&] {
+    return model_.ops->bound(model_.self, &k, stiffness_.data(), damping_.data(), &cell);
+  };
+  return model_.call("bound", ask) == DFM_OK;
+}
+
+// Row sums of a mesh are up to twice the largest eigenvalue of its stiffness, which is found by products:
+// differences of the forces. What a state adds to the forces is not in them.
+double ExplicitPoints::spectral_share() {
+  if (!model_.ops->bound || !model_.state.empty() || edges_.empty()) return 1;
+  const size_t n = size_t{3} * p_.n;
+  double shortest = std::numeric_limits<double>::infinity();
+  for (size_t e = 0; e < edges_.size(); e += 2) {
+    const double *const a = &p_.rest[size_t{3} * edges_[e]], *const b = &p_.rest[size_t{3} * edges_[e + 1]];
+    shortest = std::min(shortest, norm(load3(a) - load3(b)));
+  }
+  std::vector<double> x(p_.x.size()), still(p_.x.size()), f(p_.x.size()), way(n), at_rest(n);
+  dfm_kin k = kin(0, 0);
+  k.x = x.data();
+  k.v = still.data();
+  const auto forces = [&](double size, double *out) {
+    for (size_t i = 0; i < n; ++i) x[kStride * (i / 3) + i % 3] = p_.rest[i] + size * way[i];
+    std::fill(f.begin(), f.end(), 0.0);
+    if (model_.add_forces(k, f.data()) != DFM_OK) return false;
+    for (size_t i = 0; i < n; ++i) out[i] = f[kStride * (i / 3) + i % 3];
+    return true;
+  };
+  double cell = 0, most = 0;
+  if (!forces(0, at_rest.data()) || !row_sums(k, cell)) return 1;
+  for (uint32_t i = 0; i < p_.n; ++i) most = std::max(most, stiffness_[i] / p_.mass[i]);
+  const double found = largest_eigenvalue(n, [&](const std::vector<double> &u, std::vector<double> &out) {
+    double widest = 0;
+    for (size_t i = 0; i < n; ++i) {
+      way[i] = u[i] / std::sqrt(p_.mass[i / 3]);
+      widest = std::max(widest, std::fabs(way[i]));
+    }
+    const double size = kWay * shortest / widest;
+    if (!forces(size, out.data())) return false;
+    for (size_t i = 0; i < n; ++i) out[i] = (at_rest[i] - out[i]) / (size * std::sqrt(p_.mass[i / 3]));
+    return true;
+  });
+  return found > 0 && found < most ? found / most : 1;
+}
+
+// Of the edges, against their lengths at rest.
+double ExplicitPoints::largest_strain() const {
+  double most = 0;
+  for (size_t e = 0; e < edges_.size(); e += 2) {
+    const uint32_t i = edges_[e], j = edges_[e + 1];
+    const double rest = norm2(load3(&p_.rest[size_t{3} * i]) - load3(&p_.rest[size_t{3} * j]));
+    const double now = norm2(load3(&p_.x[size_t{kStride} * i]) - load3(&p_.x[size_t{kStride} * j]));
+    most = std::max(most, std::fabs(std::sqrt(now / rest) - 1));
+  }
+  return most;
+}
+
+// The share that was measured at rest is less and less true as the shape leaves it. Damping stays by row
+// sums: near its own bound a mode changes its sign in each sub-step, and contact keeps it going.
+bool ExplicitPoints::bound(double time, double share, const AddRowSums &outside, StepBound &out) {
+  if (!model_.ops->bound) return true;
   double cell = std::numeric_limits<double>::infinity();
-  const dfm_kin k = kin(time, 0);
-  const auto ask = [&] { return ops.bound(model_.self, &k, stiffness_.data(), damping_.data(), &cell); };
-  if (model_.call("bound", ask) != DFM_OK) return false;
+  if (!row_sums(kin(time, 0), cell)) return false;
+  if (share < 1) {
+    const double now = share + (1 - share) * std::min(1.0, largest_strain() / kUnlikeRest);
+    for (double &sum : stiffness_) sum *= now;
+  }
   outside(stiffness_.data(), damping_.data());
   out.step = std::min(cell, stable_step(p_, stiffness_.data(), damping_.data(), &out.point));
   // Limits of 4 m / (c + sqrt(c^2 + 4 m k)): without damping, without stiffness.

@@ -15,7 +15,8 @@ class ExplicitPoints : public Dynamics {
   Abilities abilities() const override {
     return {.forces = true, .springs = true, .placed = true, .energy = true};
   }
-  bool bound(double time, const AddRowSums &outside, StepBound &out) override;
+  double spectral_share() override;
+  bool bound(double time, double share, const AddRowSums &outside, StepBound &out) override;
   double strain_rate() const override;
   bool add_forces(const SubStep &now, bool keep) override;
   bool free_motion(const SubStep &now, double &kinetic) override;
@@ -46,6 +47,8 @@ class ExplicitPoints : public Dynamics {
   Array<size_t> reached_;  // places in v_free
   Array<double> before_;   // [reached,3] m/s
 
+  bool row_sums(const dfm_kin &k, double &cell);
+  double largest_strain() const;
   bool find_forces(const SubStep &now);  // in points().f
   // N, that leads to this velocity without contact
   double force_of(size_t at, double free, const SubStep &now) const;

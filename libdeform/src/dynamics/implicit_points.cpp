@@ -87,7 +87,7 @@ std::unique_ptr<LinearSolver> ImplicitPoints::new_solver() const {
 }
 
 // The scheme is stable at any step. The stiffness of load springs is that at the start of the sub-step.
-bool ImplicitPoints::bound(double, const AddRowSums &outside, StepBound &out) {
+bool ImplicitPoints::bound(double, double, const AddRowSums &outside, StepBound &out) {
   springs_.assign(p_.n, 0.0);
   dampers_.assign(p_.n, 0.0);
   outside(springs_.data(), dampers_.data());

@@ -39,7 +39,7 @@ class ImplicitPoints : public Dynamics, public ImplicitSystem {
   }
   // of a stage; measured: 30 at 700 points, 60 at 4,300
   uint32_t relative_work() const override { return (options_.second_order ? 2 : 1) * kImplicitWork; }
-  bool bound(double time, const AddRowSums &outside, StepBound &out) override;
+  bool bound(double time, double share, const AddRowSums &outside, StepBound &out) override;
   void begin(bool touched) override;
   void loads_before() override { load_before_ = p_.load; }
   bool take_contact() override { return !std::exchange(staged_, false); }

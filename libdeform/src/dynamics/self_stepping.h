@@ -14,7 +14,7 @@ class SelfStepping : public Dynamics {
   SelfStepping(const Memory &memory, Phyxels &points, Surface &surface, ModelInstance &model);
 
   Abilities abilities() const override { return {}; }
-  bool bound(double, const AddRowSums &, StepBound &) override { return true; }
+  bool bound(double, double, const AddRowSums &, StepBound &) override { return true; }
   bool free_motion(const SubStep &now, double &kinetic) override;
   bool response(const SubStep &now, uint32_t n, const uint32_t *surfel, double *answers) override;
   bool end_state(const SubStep &now, const double *surfel_impulse, bool touched) override;

@@ -40,7 +40,7 @@ void SettlingPoints::slow_touched(double times) {
 }
 
 // The scheme is stable at any step, also with loads that depend on positions.
-bool SettlingPoints::bound(double, const AddRowSums &, StepBound &out) {
+bool SettlingPoints::bound(double, double, const AddRowSums &, StepBound &out) {
   out = {};
   return true;
 }

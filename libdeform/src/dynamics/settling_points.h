@@ -32,7 +32,7 @@ class SettlingPoints : public ImplicitPoints {
     a.damps = false;  // its steps are not steps in time
     return a;
   }
-  bool bound(double time, const AddRowSums &outside, StepBound &out) override;
+  bool bound(double time, double share, const AddRowSums &outside, StepBound &out) override;
   bool free_motion(const SubStep &now, double &kinetic) override;
   // with the last contact forces: used to find contacts
   const double *point_velocity() const override { return guess_.data(); }

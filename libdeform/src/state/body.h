@@ -63,6 +63,9 @@ struct Integrator {
   Chosen chosen = Chosen::no;
   double step = std::numeric_limits<double>::infinity();
   uint32_t point = 0;  // that bounds it
+  // What the spectrum at rest has of the bound by row sums, with these parameters; 1: not measured, or the
+  // body has been cut: faces that jam gain energy at longer sub-steps.
+  double share = 1;
 };
 
 // What the list of effects has left out of a model: the values as they were given, all rows end to end

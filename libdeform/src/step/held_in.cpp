@@ -10,6 +10,7 @@
 #include "state/tool.h"
 #include "state/world.h"
 #include "step/attach.h"
+#include "step/context.h"
 #include "step/stages.h"
 
 namespace dfm {
@@ -57,8 +58,10 @@ std::string tell_held_in(const World &w, const HeldIn &held, uint32_t b) {
 std::string tell_held_at(World &w, uint32_t a, uint32_t b) {
   if (w.attachments.empty()) return {};
   OverlapSides sides(w);
-  // a contact bears at the rest distance, and what is pressed on it may lag by as much
-  const HeldIn held = held_in(w, sides, {a, b, true}, -2 * w.offset);
+  // a contact bears at the rest distance, and what is pressed on it may lag by as much, and by a sub-step
+  double way = 0;
+  for (const ObstacleView &v : w.steps->obstacle_views) way = std::max(way, w.steps->h * norm(v.velocity));
+  const HeldIn held = held_in(w, sides, {a, b, true}, -2 * w.offset - way);
   return held.by ? tell_held_in(w, held, b) : std::string();
 }
 

@@ -42,7 +42,7 @@ bool ask_bound(const World &w, Body &b) {
   const auto springs = [&b](double *stiffness, double *damping) {
     for (const Spring &spring : b.springs) add_spring_bound(spring, stiffness, damping);
   };
-  return b.dynamics->bound(w.time, springs, b.bound.found);
+  return b.dynamics->bound(w.time, b.integrator.share, springs, b.bound.found);
 }
 
 // Who sleeps keeps what it had.

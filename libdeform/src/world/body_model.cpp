@@ -80,7 +80,7 @@ std::optional<ImplicitOptions> implicit_of(const World &w, const std::string &na
 // The longest explicit sub-step of the body, for the choice of the integrator.
 void ask_explicit_bound(const World &w, double time, Dynamics &dynamics, Integrator &out) {
   StepBound bound;
-  if (w.def.step == 0 || !dynamics.bound(time, [](double *, double *) {}, bound)) return;
+  if (w.def.step == 0 || !dynamics.bound(time, out.share, [](double *, double *) {}, bound)) return;
   out.step = kBoundShare * bound.step;
   out.point = bound.point;
 }
@@ -216,7 +216,10 @@ void make_model(World &w, Body &b, const dfm_type &type, std::vector<double> val
   } lent(b.model, out.instance);
   out.dynamics = make_dynamics(w.meters.dynamics.memory(), b.p, b.surface, b.model, b.edges,
                                implicit ? &*implicit : nullptr);
-  if (!implicit) ask_explicit_bound(w, w.time, *out.dynamics, out.integrator);
+  if (!implicit) {
+    if (b.shape == 0) out.integrator.share = out.dynamics->spectral_share();
+    ask_explicit_bound(w, w.time, *out.dynamics, out.integrator);
+  }
   if (!out.dynamics->abilities().placed) need_ability(w, Ability::self_stepping, "body", b.name);
 }
 

@@ -243,7 +243,7 @@ std::string reason(const World &w) {
   const double share = w.bound.step / bound.step;
   const std::string stiffness = seconds(share * bound.by_stiffness);
   const std::string damping = seconds(share * bound.by_damping);
-  return "0.9 of the proven bound: " +
+  return "0.9 of the bound: " +
          (bound.by_damping < bound.by_stiffness
               ? "damping bounds it (alone it allows " + damping + ", stiffness alone " + stiffness +
                     "); lower the damping of this body or of its springs"

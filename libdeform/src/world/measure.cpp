@@ -183,6 +183,7 @@ void set_model_params(Body &b, const dfm_params &params) {
   b.withheld.by_cell.resize(type.nparam);
   const bool cells = std::count(b.withheld.by_cell.begin(), b.withheld.by_cell.end(), 1) > 0;
   b.withheld.asked = asked == values && !cells ? std::vector<double>() : asked;
+  if (b.integrator.share < 1) b.integrator.share = b.dynamics->spectral_share();
   values_changed(*b.world);
   if (before.changed()) b.world->changed = true;  // the plan names the effects that parameters call for
 }

@@ -262,7 +262,7 @@ ModelOrigin origin_for(const Body &b, const dfm_type &type, const ModelChoice &t
 double stable_with(Body &b, BodyModel &made) {
   StepBound bound;
   exchange(b, made);
-  const bool known = b.dynamics->bound(b.world->time, [](double *, double *) {}, bound);
+  const bool known = b.dynamics->bound(b.world->time, b.integrator.share, [](double *, double *) {}, bound);
   exchange(b, made);
   return known ? kBoundShare * bound.step : -1;
 }

@@ -312,6 +312,8 @@ void model_fields(Stream &s, B &b, const Body &like) {
           must::Be{[](uint32_t x) { return x - 1 < DFM_INTEGRATOR_TR_BDF2; }, "an integrator"});
   s.value("chosen integrator", b.integrator.chosen,
           must::Be{[](Chosen x) { return x <= Chosen::struck; }, "no, explicit, implicit or struck"});
+  s.value("spectral share", b.integrator.share,
+          must::Be{[](double x) { return x > 0 && x <= 1; }, "a share above zero"});
   s.value("explicit sub-step", b.integrator.step,
           must::Be{[](double x) { return x > 0; }, "a time above zero"});
   const bool alike = made_alike(b, like);
