@@ -439,7 +439,8 @@ TEST(Run, Interrupt_WritesTheLastStateAndTheSummary) {
 // A single step of thousands of sub-steps: the signal does not wait for its end.
 TEST(Run, TerminateInsideAStep_WritesTheStateBeforeIt) {
   const std::string out = folder() + "/terminated";
-  const pid_t child = start(out, {"--time", "2", "--set", "/time/step=2", "--set", "/time/max_work=1e18"});
+  const pid_t child = start(out, {"--time", "6", "--set", "/time/step=6", "--set", "/time/max_work=1e18",
+                                  "--set", "/time/integrator=symplectic_euler"});
   for (int i = 0; i < 1000 && !fs::exists(out + "/bodies.csv"); ++i)
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   std::this_thread::sleep_for(std::chrono::milliseconds(20));
