@@ -110,7 +110,7 @@ int main(int argc, char **argv) {
     if (display < shown + 1 && display < seconds) continue;
     TRY(dfm_world_get_stats(world, &stats));
     printf(
-        "t %4.1f s: %3d steps of %u sub-steps, %6.2f ms each, longest %6.2f ms; %2d impacts, peak %6.1f N; "
+        "t %5.2f s: %3d steps of %u sub-steps, %6.2f ms each, longest %6.2f ms; %2d impacts, peak %6.1f N; "
         "%u asleep, %llu shortened\n",
         dfm_world_time(world), steps, stats.last_substeps, steps ? spent / steps : 0.0, longest, sounds,
         loudest, stats.asleep, (unsigned long long)stats.shortened);

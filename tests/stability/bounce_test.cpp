@@ -128,6 +128,50 @@ TEST(Bounce, StackThatSettles_IsNotStruck) {
   EXPECT_NE(log_of_stack(0.1).find("struck"), std::string::npos) << "the test would see it";
 }
 
+// Also in a step that an impact has made explicit.
+TEST(Bounce, InterruptedInAnImpact_IsAsBeforeTheStep) {
+  struct Stop {
+    dfm_world world = 0;
+    int at = -1, met = 0;
+    static void pre_solve(void *user, dfm_contact_choice *) {
+      Stop &s = *static_cast<Stop *>(user);
+      if (s.met++ == s.at) test::ok(dfm_world_interrupt(s.world));
+    }
+  };
+  const test::Context one, other;
+  Stop plain, tried;
+  for (Stop *s : {&plain, &tried}) {
+    const dfm_world_def d = scene();
+    dfm_context *const c = s == &plain ? one : other;
+    test::ok(dfm_world_create(c, &d, &s->world));
+    drop(c, s->world, 2e7, "msm");
+    test::ok(dfm_world_set_pre_solve(s->world, &Stop::pre_solve, s));
+  }
+  int stopped = 0;
+  bool struck = false;
+  while (dfm_world_time(plain.world) < 0.32 && !testing::Test::HasFatalFailure()) {
+    const double h = std::min(offered(plain.world), 0.02);
+    EXPECT_EQ(std::min(offered(tried.world), 0.02), h);
+    plain.met = 0;
+    step(plain.world, h);
+    if (plain.met > 0) {  // at its last contact
+      const std::string before = test::snapshot(tried.world);
+      tried.met = 0;
+      tried.at = plain.met - 1;
+      ASSERT_EQ(dfm_world_step(tried.world, h, nullptr), DFM_DISCARD);
+      EXPECT_EQ(test::snapshot(tried.world).size(), before.size());
+      tried.at = -1;
+      ++stopped;
+    }
+    step(tried.world, h);
+    ASSERT_EQ(dfm_world_hash(tried.world), dfm_world_hash(plain.world)) << dfm_world_time(plain.world);
+    const std::string told = test::written(dfm_world_explain, tried.world);
+    struck = struck || told.find("until an impact is over") != std::string::npos;
+  }
+  EXPECT_GT(stopped, 0);
+  EXPECT_TRUE(struck);
+}
+
 TEST(Bounce, RestoredWithinAnImpact_ContinuesWithTheSameBits) {
   const test::Context one, many(3);
   dfm_world w[2] = {0, 0};

@@ -12,7 +12,7 @@ namespace dfm {
 namespace {
 constexpr uint32_t kAhead = 48;   // points: as long as memory takes to answer
 constexpr double kNotGiven = -1;  // J, of a part: no kinetic energy is that
-constexpr double kWay = 1e-4;     // of the shortest edge: a difference of forces is that of their derivatives
+constexpr double kMoved = 1e-4;   // of the shortest edge: a difference of forces is that of their derivatives
 // Strain of an edge from which on nothing of the spectrum at rest counts.
 constexpr double kUnlikeRest = 0.5;
 }  // namespace
@@ -53,12 +53,12 @@ double ExplicitPoints::spectral_share() {
     const double *const a = &p_.rest[size_t{3} * edges_[e]], *const b = &p_.rest[size_t{3} * edges_[e + 1]];
     shortest = std::min(shortest, norm(load3(a) - load3(b)));
   }
-  std::vector<double> x(p_.x.size()), still(p_.x.size()), f(p_.x.size()), way(n), at_rest(n);
+  std::vector<double> x(p_.x.size()), still(p_.x.size()), f(p_.x.size()), moved(n), at_rest(n);
   dfm_kin k = kin(0, 0);
   k.x = x.data();
   k.v = still.data();
   const auto forces = [&](double size, double *out) {
-    for (size_t i = 0; i < n; ++i) x[kStride * (i / 3) + i % 3] = p_.rest[i] + size * way[i];
+    for (size_t i = 0; i < n; ++i) x[kStride * (i / 3) + i % 3] = p_.rest[i] + size * moved[i];
     std::fill(f.begin(), f.end(), 0.0);
     if (model_.add_forces(k, f.data()) != DFM_OK) return false;
     for (size_t i = 0; i < n; ++i) out[i] = f[kStride * (i / 3) + i % 3];
@@ -70,10 +70,10 @@ double ExplicitPoints::spectral_share() {
   const double found = largest_eigenvalue(n, [&](const std::vector<double> &u, std::vector<double> &out) {
     double widest = 0;
     for (size_t i = 0; i < n; ++i) {
-      way[i] = u[i] / std::sqrt(p_.mass[i / 3]);
-      widest = std::max(widest, std::fabs(way[i]));
+      moved[i] = u[i] / std::sqrt(p_.mass[i / 3]);
+      widest = std::max(widest, std::fabs(moved[i]));
     }
-    const double size = kWay * shortest / widest;
+    const double size = kMoved * shortest / widest;
     if (!forces(size, out.data())) return false;
     for (size_t i = 0; i < n; ++i) out[i] = (at_rest[i] - out[i]) / (size * std::sqrt(p_.mass[i / 3]));
     return true;

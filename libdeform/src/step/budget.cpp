@@ -14,6 +14,7 @@
 #include "state/tool.h"
 #include "state/world.h"
 #include "step/context.h"
+#include "step/impact.h"
 #include "step/stages.h"
 #include "step/step_bound.h"
 #include "step/tool_touch.h"
@@ -393,9 +394,11 @@ dfm_status step_within_budget(World &w, double dt, uint32_t *trouble) {
   changed_at_once(to, w);
   dfm_status status = DFM_DISCARD;
   const Tasks::Step awake(w.context->tasks);
+  const bool struck = w.struck_until > 0;
   try {
     status = run_step(w, step, dt, trouble);
   } catch (const StepInterrupted &) {
+    if (w.struck_until > 0 && !struck) end_impact(w);  // it began in this step
     return_to_start(w, step);
     set_last_error(format("step %llu was interrupted; the state is as before the step",
                           static_cast<unsigned long long>(w.step_count))

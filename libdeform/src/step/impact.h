@@ -21,7 +21,8 @@ const char *why_no_rebound(uint32_t integrator);
 // Makes the implicit bodies of the library's choice explicit until the impact is over. The world must be
 // prepared again.
 void begin_impact(World &w);
-// Makes them implicit again, before that if the explicit bound needs it. False: there are none.
+// Makes them implicit again: when it is over, or sooner where explicit time needs too many sub-steps. False:
+// there are none.
 bool end_impact(World &w);
 // After each step.
 void follow_impact(World &w, double dt);
