@@ -99,13 +99,14 @@ TEST(BristleContact, PulledOverEdgesOfTheOtherMesh_KeepsOneDeflectionPerPoint) {
 
 // On a soft plate points of both sides come and go. A point of the block has one contact each, with no more
 // deflection than its way; what is carried is what the contacts' areas and deflections say, and no area is
-// owned twice: the sum stays that of the block's face.
+// owned twice: the sum stays that of the block's face. In longer sub-steps a point that slides over an edge
+// of the soft plate may be free for one, which drops its bristle (doc/decisions/friction_memory.md).
 TEST(BristleContact, PulledOverASoftMesh_NoAreaIsOwnedTwice) {
   Rig r(Below::soft, 3000, 24, {3, 0, -9.81});
   const double x0 = measure(r.block).com[0], area = kWide * kWide;
   std::vector<int> seen;
   for (int k = 0; k < 10; ++k) {
-    run(r.world, 0.05, 1e-3);
+    run(r.world, 0.05, 5e-5);
     const double x = measure(r.block).com[0] - x0;
     double sum = 0;
     seen.assign(500, 0);

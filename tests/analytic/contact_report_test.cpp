@@ -158,7 +158,7 @@ TEST(Report, FrictionWork_IsTheEnergyThatSlidingLoses) {
   // into its own damping and into the step, p W p / 2 each time, which falls with the step.
   double missing[2];
   for (int half = 0; half < 2; ++half) {
-    const double h = half ? 2.5e-4 : 5e-4;
+    const double h = half ? 1e-4 : 2e-4;
     test::Context context;
     const dfm_world world = test::make_world(context);
     test::BodyOptions o;

@@ -17,7 +17,7 @@ TEST(RestingStack, MostSubSteps_TakeOneSweep) {
   test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 400, o);
   o.position = {0.013, 0.007, 0.1003};
   test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 400, o);
-  for (int k = 0; k < 400; ++k) test::ok(dfm_world_step(w, 1e-3, nullptr));
+  for (int k = 0; k < 600; ++k) test::ok(dfm_world_step(w, 1e-3, nullptr));
   uint32_t once = 0, all = 0;
   for (int k = 0; k < 400; ++k) {
     test::ok(dfm_world_step(w, 1e-3, nullptr));

@@ -69,8 +69,8 @@ class ShippedScene : public testing::TestWithParam<const char *> {};
 
 // Each scene but two that take long and those of ODE (adapters/ode/write_scene_test.cpp).
 // Before the first step the two worlds have the same hash, and so they have after ten; in the middle of a
-// run a snapshot makes them so, and without one they stay together as far as contacts remember. Models that
-// move a body as a whole need the snapshot.
+// run a snapshot makes them so, and without one they stay together as far as contacts and dampers remember.
+// Models that move a body as a whole need the snapshot.
 TEST_P(ShippedScene, WrittenAndLoaded_IsTheSameWorld) {
   test::Context context;
   const std::string name = GetParam(), folder = folder_of(name);
@@ -82,7 +82,7 @@ TEST_P(ShippedScene, WrittenAndLoaded_IsTheSameWorld) {
   EXPECT_EQ(dfm_world_hash(again), dfm_world_hash(world));
   double h = 0;
   test::ok(dfm_world_stable_step(world, &h, nullptr, nullptr));
-  h = std::min(h, 2.5e-4);
+  h = std::min(h, 1e-4);
   steps(world, 10, h);
   steps(again, 10, h);
   EXPECT_EQ(dfm_world_hash(again), dfm_world_hash(world));

@@ -63,7 +63,8 @@ TEST(CutPieces, InFreeFall_MoveAsTheWholeBody) {
       EXPECT_NEAR(cut.kinetic(), whole.kinetic(), 1e-12 * whole.kinetic()) << model << " " << i;
     }
     EXPECT_EQ(test::stats(cut.w).unconverged, 0u) << model;
-    EXPECT_EQ(test::stats(cut.w).substeps, test::stats(whole.w).substeps) << model;
+    // after a cut the bound is that of row sums (doc/concepts/step.md)
+    EXPECT_LE(test::stats(cut.w).substeps, 1.5 * double(test::stats(whole.w).substeps)) << model;
   }
 }
 

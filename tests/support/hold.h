@@ -172,8 +172,10 @@ struct Scene {
     ok(dfm_body_hold(b, uint32_t(low.size()), low.data(), 7));
   }
   void pad(const Case &c) {
-    if (c.scene == "soft") bed(c);
-    else add_plane(world, "floor");
+    if (c.scene == "soft") {
+      bed(c);
+      settle = 3;
+    } else add_plane(world, "floor");
     BodyOptions o = soft(2e5);
     o.name = "pad";
     o.position = {-0.05, -0.05, 2e-5};

@@ -4,6 +4,11 @@
 
 namespace dfm {
 
+void settle_dampers(Phyxels &p) {
+  if (p.dampers.lag > 0) p.dampers.v.assign(p.v.begin(), p.v.end());
+  else p.dampers.v.clear();
+}
+
 double tet_volume(const double *x, uint32_t stride, const uint32_t t[4]) {
   const auto at = [&](int k) { return load3(x + size_t(t[k]) * stride); };
   return tet_volume(at(0), at(1), at(2), at(3));

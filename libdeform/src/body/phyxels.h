@@ -10,6 +10,13 @@ namespace dfm {
 
 inline constexpr uint32_t kStride = 4;
 
+// What the dampers of a model see of v in explicit sub-steps: a low pass of it. So their forces are those of
+// springs that yield, which bound a sub-step as stiffness does (doc/concepts/step.md#dampers).
+struct Dampers {
+  double lag = 0;   // s; 0: they see v
+  Array<double> v;  // [n,4] m/s; empty without a lag
+};
+
 struct Phyxels {
   uint32_t n = 0;
   Array<double> rest;          // [n,3] m, before pose
@@ -23,6 +30,7 @@ struct Phyxels {
   double least_mass = 0;       // kg
   Array<double> inv_mass;      // [n,4] 1/kg, zero where a component is held
   Array<uint8_t> held;         // [n] bits 1 x, 2 y, 4 z
+  Dampers dampers;
 
   bool moves(size_t component) const { return inv_mass[component] > 0; }  // of [n,4]: not held
 };
@@ -33,6 +41,7 @@ struct LumpedMass { double volume, mass; };
 LumpedMass lump_mass(uint32_t npoint, const double *rest, uint32_t ntet, const uint32_t *tets, double density,
                      const double *cell_density, const double *share, double *mass);
 void update_inverse_mass(Phyxels &p);  // and least_mass
+void settle_dampers(Phyxels &p);       // as if v had been the same for long
 
 double tet_volume(const double *x, uint32_t stride, const uint32_t tet[4]);
 

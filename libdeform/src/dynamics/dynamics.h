@@ -38,8 +38,14 @@ struct SubStep {
 struct StepBound {
   double step = std::numeric_limits<double>::infinity();  // s; infinite: no bound
   uint32_t point = 0;                                     // that determines the bound
-  // s, bounds by stiffness alone and by damping alone at that point
+  // s, bounds by stiffness alone and by damping alone at that point; lagged: without that of the dampers
   double by_stiffness = step, by_damping = step;
+  bool lagged = false;  // dampers with a lag count as stiffness in `step`
+};
+// How long explicit sub-steps may be, measured as a model is made.
+struct ExplicitTime {
+  double share = 1;  // what the largest eigenvalue at rest has of its bound by row sums; 1: all, or not known
+  double lag = 0;    // s, with which the dampers best see the velocity; 0: none
 };
 // Adds row sums of stiffness (N/m) and damping (N s/m) of loads outside the model.
 using AddRowSums = std::function<void(double *stiffness, double *damping)>;
@@ -89,10 +95,9 @@ class Dynamics {
   // work of a sub-step relative to an explicit one: a rough number for the budget of a step
   virtual uint32_t relative_work() const { return 1; }
 
-  // What the largest eigenvalue of the stiffness at rest has of its bound by row sums, measured now; 1: all,
-  // or not known.
-  virtual double spectral_share() { return 1; }
-  // share: spectral_share() of the model as it was made. False: the model gives none.
+  // spectrum: share is wanted, too. The lag is points().dampers.lag from the next bound() on.
+  virtual ExplicitTime measure(bool /*spectrum*/) { return {}; }
+  // share: that of the model as it was made. False: the model gives none.
   virtual bool bound(double time, double share, const AddRowSums &outside, StepBound &out) = 0;
   // 1/s, of the edge that stretches fastest; 0 if the bound does not depend on the shape
   virtual double strain_rate() const { return 0; }
@@ -142,6 +147,8 @@ class Dynamics {
   // points().f is that of the last add_forces(), whether it was kept or not: but for rounding, and for held
   // components. After end_state(), before commit(). Returns false if the model fails.
   virtual bool see_forces(const SubStep &) { return true; }
+  // J, stored in dampers that see the velocity with a lag
+  virtual double damper_energy(double /*time*/) { return 0; }
   // fraction: share of the displacement that is taken; velocities are those of the end.
   virtual void commit(const SubStep &now, double fraction) = 0;
   // After commit(): takes c M^-1 K v from the velocities, c in s2, K the stiffness of the model, which is

@@ -15,6 +15,10 @@ constexpr double kNotGiven = -1;  // J, of a part: no kinetic energy is that
 constexpr double kMoved = 1e-4;   // of the shortest edge: a difference of forces is that of their derivatives
 // Strain of an edge from which on nothing of the spectrum at rest counts.
 constexpr double kUnlikeRest = 0.5;
+// Dampers with a lag are at most so stiff, relative to the springs beside them: half the step that these
+// allow. A mode at the body's own frequency loses so much of its damping, and is so much faster, at most.
+constexpr double kStiffening = 3, kError = 0.02;
+constexpr double kNoDrag = 1e-6;  // of row sums of damping: rounding
 }  // namespace
 
 ExplicitPoints::ExplicitPoints(const Memory &memory, Phyxels &points, Surface &surface, ModelInstance &model,
@@ -24,7 +28,7 @@ ExplicitPoints::ExplicitPoints(const Memory &memory, Phyxels &points, Surface &s
       loops_(points_kernels()),
       stiffness_(points.n, 0.0, HookAllocator<double>(memory)),
       damping_(points.n, 0.0, HookAllocator<double>(memory)) {
-  use_memory(memory, part_kinetic_, reached_, before_);
+  use_memory(memory, part_kinetic_, reached_, before_, lagged_, drag_, load_);
   uint32_t parts = 0;  // after a failure: none, and forces come for all points at once
   if (model.part_forces)
     model.call("parts", [&] {
@@ -43,42 +47,156 @@ bool ExplicitPoints::row_sums(const dfm_kin &k, double &cell) {
   return model_.call("bound", ask) == DFM_OK;
 }
 
-// Row sums of a mesh are up to twice the largest eigenvalue of its stiffness, which is found by products:
-// differences of the forces. What a state adds to the forces is not in them.
-double ExplicitPoints::spectral_share() {
-  if (!model_.ops->bound || !model_.state.empty() || edges_.empty()) return 1;
-  const size_t n = size_t{3} * p_.n;
-  double shortest = std::numeric_limits<double>::infinity();
-  for (size_t e = 0; e < edges_.size(); e += 2) {
-    const double *const a = &p_.rest[size_t{3} * edges_[e]], *const b = &p_.rest[size_t{3} * edges_[e + 1]];
-    shortest = std::min(shortest, norm(load3(a) - load3(b)));
+// The points at rest, displaced and moving, for forces that are measured there.
+struct ExplicitPoints::Trial {
+  std::vector<double> x, v, f;  // [npoint,4]
+  dfm_kin kin;
+  explicit Trial(const ExplicitPoints &of) : x(of.p_.x.size()), v(x), f(x), kin(of.kin(0, 0)) {
+    v.assign(x.size(), 0.0);
+    for (size_t i = 0; i < of.p_.rest.size(); ++i) x[kStride * (i / 3) + i % 3] = of.p_.rest[i];
+    kin.x = x.data();
+    kin.v = v.data();
   }
-  std::vector<double> x(p_.x.size()), still(p_.x.size()), f(p_.x.size()), moved(n), at_rest(n);
-  dfm_kin k = kin(0, 0);
-  k.x = x.data();
-  k.v = still.data();
-  const auto forces = [&](double size, double *out) {
-    for (size_t i = 0; i < n; ++i) x[kStride * (i / 3) + i % 3] = p_.rest[i] + size * moved[i];
+  bool forces(const ModelInstance &model) {
     std::fill(f.begin(), f.end(), 0.0);
-    if (model_.add_forces(k, f.data()) != DFM_OK) return false;
-    for (size_t i = 0; i < n; ++i) out[i] = f[kStride * (i / 3) + i % 3];
-    return true;
-  };
-  double cell = 0, most = 0;
-  if (!forces(0, at_rest.data()) || !row_sums(k, cell)) return 1;
-  for (uint32_t i = 0; i < p_.n; ++i) most = std::max(most, stiffness_[i] / p_.mass[i]);
+    return model.add_forces(kin, f.data()) == DFM_OK;
+  }
+};
+
+// Drag is what dampers give to a uniform velocity: it sees no lag. It follows from the parameters.
+bool ExplicitPoints::find_drag() {
+  if (drag_of_ == model_.params) return true;
+  Trial rest(*this);
+  double cell = 0;
+  if (!row_sums(rest.kin, cell) || !rest.forces(model_)) return false;
+  const std::vector<double> still = rest.f;
+  for (size_t at = 0; at < rest.v.size(); at += kStride) rest.v[at] = 1;
+  if (!rest.forces(model_)) return false;
+  drag_.resize(p_.n);
+  bool any = false;
+  for (uint32_t i = 0; i < p_.n; ++i) {
+    drag_[i] = std::max(0.0, still[size_t{kStride} * i] - rest.f[size_t{kStride} * i]);
+    any |= drag_[i] > kNoDrag * damping_[i];
+  }
+  if (!any) drag_.clear();
+  drag_of_ = model_.params;
+  return true;
+}
+
+// Dampers c with a lag count as springs c / lag.
+void ExplicitPoints::lag_rows(double lag) {
+  lagged_.resize(p_.n);
+  for (uint32_t i = 0; i < p_.n; ++i) {
+    lagged_[i] = std::max(0.0, damping_[i] - drag(i)) / lag;
+    damping_[i] = drag(i);
+  }
+}
+
+// 1/s: the slowest motion in which the body strains the same everywhere, by Rayleigh's quotient of forces.
+// Its slowest modes are as slow or slower. < 0: the model fails.
+double ExplicitPoints::own_frequency(Trial &rest, double edge) {
+  if (!rest.forces(model_)) return -1;
+  const std::vector<double> at_rest = rest.f, x = rest.x;
+  Vec3 center;
+  double mass = 0, slowest = std::numeric_limits<double>::infinity(), widest = 0;
+  for (uint32_t i = 0; i < p_.n; ++i) {
+    mass += p_.mass[i];
+    center += p_.mass[i] * load3(&x[size_t{kStride} * i]);
+  }
+  center = (1 / mass) * center;
+  for (uint32_t i = 0; i < p_.n; ++i)
+    widest = std::max(widest, norm2(load3(&x[size_t{kStride} * i]) - center));
+  const double size = kMoved * edge / std::sqrt(widest);
+  for (int row = 0; row < 3; ++row)
+    for (int col = 0; col <= row; ++col) {
+      double work = 0, moved = 0;
+      const auto way = [&](uint32_t i) {
+        const Vec3 from = load3(&x[size_t{kStride} * i]) - center;
+        Vec3 u;
+        u[row] += size * from[col];
+        if (col != row) u[col] += size * from[row];
+        return u;
+      };
+      for (uint32_t i = 0; i < p_.n; ++i)
+        store3(&rest.x[size_t{kStride} * i], load3(&x[size_t{kStride} * i]) + way(i));
+      if (!rest.forces(model_)) return -1;
+      for (uint32_t i = 0; i < p_.n; ++i) {
+        const size_t at = size_t{kStride} * i;
+        work += dot(way(i), load3(&at_rest[at]) - load3(&rest.f[at]));
+        moved += p_.mass[i] * norm2(way(i));
+      }
+      if (work > 0) slowest = std::min(slowest, work / moved);
+    }
+  rest.x = x;
+  return std::sqrt(slowest);
+}
+
+// A lag pays where dampers alone bound the sub-step more than what it makes of them.
+double ExplicitPoints::find_lag(Trial &rest, double edge) {
+  double cell = 0, ratio = 0;  // s, of damping to stiffness
+  const double frequency = find_drag() ? own_frequency(rest, edge) : -1;
+  if (!(frequency >= 0) || !row_sums(rest.kin, cell)) return 0;
+  for (uint32_t i = 0; i < p_.n; ++i)
+    if (stiffness_[i] > 0) ratio = std::max(ratio, (damping_[i] - drag(i)) / stiffness_[i]);
+  if (!(ratio > 0)) return 0;
+  const double lag = std::min(
+      {ratio / kStiffening, std::sqrt(kError) / frequency, 2 * kError / (ratio * frequency * frequency)});
+  uint32_t point = 0;
+  const double without = stable_step(p_, stiffness_.data(), damping_.data(), &point);
+  lag_rows(lag);
+  for (uint32_t i = 0; i < p_.n; ++i) stiffness_[i] += lagged_[i];
+  return stable_step(p_, stiffness_.data(), damping_.data(), &point) > without ? lag : 0;
+}
+
+// Row sums of a mesh are up to twice the largest eigenvalue of its stiffness, which is found by products:
+// differences of the forces, those of dampers with a lag included. What a state adds to them is not in them.
+double ExplicitPoints::find_share(Trial &rest, double lag, double edge) {
+  const size_t n = size_t{3} * p_.n;
+  double most = 0, cell = 0;
+  if (!row_sums(rest.kin, cell) || !rest.forces(model_)) return 1;
+  if (lag > 0) lag_rows(lag);
+  for (uint32_t i = 0; i < p_.n; ++i)
+    most = std::max(most, (stiffness_[i] + (lag > 0 ? lagged_[i] : 0)) / p_.mass[i]);
+  const std::vector<double> at_rest = rest.f;
   const double found = largest_eigenvalue(n, [&](const std::vector<double> &u, std::vector<double> &out) {
     double widest = 0;
-    for (size_t i = 0; i < n; ++i) {
-      moved[i] = u[i] / std::sqrt(p_.mass[i / 3]);
-      widest = std::max(widest, std::fabs(moved[i]));
-    }
-    const double size = kMoved * shortest / widest;
-    if (!forces(size, out.data())) return false;
-    for (size_t i = 0; i < n; ++i) out[i] = (at_rest[i] - out[i]) / (size * std::sqrt(p_.mass[i / 3]));
+    for (size_t i = 0; i < n; ++i) widest = std::max(widest, std::fabs(u[i] / std::sqrt(p_.mass[i / 3])));
+    const double size = kMoved * edge / widest;
+    const auto each = [&](auto &&act) {
+      for (size_t i = 0; i < n; ++i) act(i, kStride * (i / 3) + i % 3, std::sqrt(p_.mass[i / 3]));
+    };
+    each([&](size_t i, size_t at, double root) {
+      rest.x[at] = p_.rest[i] + size * u[i] / root;
+      if (lag > 0) rest.v[at] = size * u[i] / root / lag;
+    });
+    if (!rest.forces(model_)) return false;
+    each([&](size_t i, size_t at, double root) {
+      const double dragged = lag > 0 ? drag(uint32_t(i / 3)) * rest.v[at] : 0;
+      out[i] = (at_rest[at] - rest.f[at] - dragged) / (size * root);
+    });
     return true;
   });
   return found > 0 && found < most ? found / most : 1;
+}
+
+ExplicitTime ExplicitPoints::measure(bool spectrum) {
+  ExplicitTime out;
+  if (!model_.ops->bound || edges_.empty()) return out;
+  double edge = std::numeric_limits<double>::infinity();  // m, the shortest
+  for (size_t e = 0; e < edges_.size(); e += 2) {
+    const double *const a = &p_.rest[size_t{3} * edges_[e]], *const b = &p_.rest[size_t{3} * edges_[e + 1]];
+    edge = std::min(edge, norm(load3(a) - load3(b)));
+  }
+  Trial rest(*this);
+  out.lag = find_lag(rest, edge);
+  if (spectrum && model_.state.empty()) out.share = find_share(rest, out.lag, edge);
+  return out;
+}
+
+dfm_kin ExplicitPoints::seen(double time, double h, bool trial) const {
+  dfm_kin k = kin(time, h, trial);
+  if (!p_.dampers.v.empty()) k.v = p_.dampers.v.data();
+  return k;
 }
 
 // Of the edges, against their lengths at rest.
@@ -93,22 +211,27 @@ double ExplicitPoints::largest_strain() const {
   return most;
 }
 
-// The share that was measured at rest is less and less true as the shape leaves it. Damping stays by row
-// sums: near its own bound a mode changes its sign in each sub-step, and contact keeps it going.
+// The share that was measured at rest is less and less true as the shape leaves it. Damping without a lag
+// stays by row sums: near its own bound a mode changes its sign in each sub-step, and contact keeps it going.
 bool ExplicitPoints::bound(double time, double share, const AddRowSums &outside, StepBound &out) {
   if (!model_.ops->bound) return true;
   double cell = std::numeric_limits<double>::infinity();
-  if (!row_sums(kin(time, 0), cell)) return false;
-  if (share < 1) {
-    const double now = share + (1 - share) * std::min(1.0, largest_strain() / kUnlikeRest);
-    for (double &sum : stiffness_) sum *= now;
+  if (!row_sums(seen(time, 0), cell)) return false;
+  const double now = share < 1 ? share + (1 - share) * std::min(1.0, largest_strain() / kUnlikeRest) : 1;
+  out.lagged = p_.dampers.lag > 0;
+  if (out.lagged) {
+    if (!find_drag()) return false;
+    lag_rows(p_.dampers.lag);
   }
+  for (double &sum : stiffness_) sum *= now;
   outside(stiffness_.data(), damping_.data());
+  for (uint32_t i = 0; out.lagged && i < p_.n; ++i) stiffness_[i] += now * lagged_[i];
   out.step = std::min(cell, stable_step(p_, stiffness_.data(), damping_.data(), &out.point));
   // Limits of 4 m / (c + sqrt(c^2 + 4 m k)): without damping, without stiffness.
   if (out.point < p_.n) {
     const double m = p_.mass[out.point];
-    out.by_stiffness = 2 * std::sqrt(m / stiffness_[out.point]);
+    const double dampers = out.lagged ? now * lagged_[out.point] : 0;
+    out.by_stiffness = 2 * std::sqrt(m / (stiffness_[out.point] - dampers));
     out.by_damping = 2 * m / damping_[out.point];
   }
   return true;
@@ -125,9 +248,23 @@ bool ExplicitPoints::add_forces(const SubStep &now, bool keep) {
   return moved_ ? move_parts(now) : find_forces(now);
 }
 
+// Drag sees the velocity itself: what it lacks in the forces of the model is a load.
+// Null: the model fails.
+const double *ExplicitPoints::loads() {
+  if (p_.dampers.v.empty()) return p_.load.data();
+  if (!find_drag()) return nullptr;
+  if (drag_.empty()) return p_.load.data();
+  load_.resize(p_.load.size());
+  for (size_t at = 0; at < load_.size(); ++at)
+    load_[at] = p_.load[at] - drag_[at / kStride] * (p_.v[at] - p_.dampers.v[at]);
+  return load_.data();
+}
+
 bool ExplicitPoints::find_forces(const SubStep &now) {
-  std::copy(p_.load.begin(), p_.load.end(), p_.f.begin());
-  const dfm_kin k = kin(now.time, now.h, true);
+  const double *const load = loads();
+  if (!load) return false;
+  std::copy_n(load, p_.f.size(), p_.f.begin());
+  const dfm_kin k = seen(now.time, now.h, true);
   return model_.add_forces(k, p_.f.data()) == DFM_OK;
 }
 
@@ -136,12 +273,14 @@ bool ExplicitPoints::move_parts(const SubStep &now) {
   FreeMotion motion = free_motion_of(p_, gravity, now.h);
   if (part_kinetic_.size() > 1) motion.ahead = kAhead;  // one part lies in the cache
   std::fill(part_kinetic_.begin(), part_kinetic_.end(), kNotGiven);
+  const double *const load = loads();
+  if (!load) return false;
   const auto move = [&](uint32_t part, uint32_t n, const uint32_t *point, const double *f) {
     if (part >= part_kinetic_.size()) return;
-    part_kinetic_[part] = loops_.predict_part(motion, n, point, p_.load.data(), f);
+    part_kinetic_[part] = loops_.predict_part(motion, n, point, load, f);
   };
   // A model that leaves out a part has failed.
-  return model_.add_part_forces(kin(now.time, now.h, true), move) == DFM_OK &&
+  return model_.add_part_forces(seen(now.time, now.h, true), move) == DFM_OK &&
          std::find(part_kinetic_.begin(), part_kinetic_.end(), kNotGiven) == part_kinetic_.end();
 }
 
@@ -217,6 +356,31 @@ void ExplicitPoints::commit(const SubStep &now, double fraction) {
   p_.x.swap(p_.x_end);
   p_.v.swap(in_place_ ? p_.v_free : p_.v_end);
   model_.commit_state();
+  // The trapezoid: the dampers keep the energy w.C w lag / 2 exactly, less w.C w h of the mean w.
+  const double part = 2 * now.h / (now.h + 2 * p_.dampers.lag);
+  for (size_t at = 0; at < p_.dampers.v.size(); ++at)
+    p_.dampers.v[at] += part * (p_.v[at] - p_.dampers.v[at]);
+}
+
+// From the forces at w and at -w. v_end is free until the end of the sub-step is known.
+double ExplicitPoints::damper_energy(double time) {
+  Array<double> &w = p_.dampers.v, &f = p_.v_end;
+  if (w.empty() || !find_drag()) return 0;
+  dfm_kin k = kin(time, 0);
+  k.v = w.data();
+  const auto turn = [](Array<double> &a) {
+    for (double &x : a) x = -x;
+  };
+  std::fill(f.begin(), f.end(), 0.0);
+  bool known = model_.add_forces(k, f.data()) == DFM_OK;
+  turn(f);
+  turn(w);
+  known = known && model_.add_forces(k, f.data()) == DFM_OK;
+  turn(w);
+  double sum = 0;
+  for (size_t at = 0; known && at < w.size(); ++at)
+    sum += w[at] * (0.5 * f[at] - drag(uint32_t(at / kStride)) * w[at]);
+  return 0.5 * p_.dampers.lag * sum;
 }
 
 // K v = (f(x - e v) - f(x + e v)) / 2 e, v the velocity less the rigid motion: that strains nothing, but in a

@@ -15,7 +15,7 @@ class ExplicitPoints : public Dynamics {
   Abilities abilities() const override {
     return {.forces = true, .springs = true, .placed = true, .energy = true};
   }
-  double spectral_share() override;
+  ExplicitTime measure(bool spectrum) override;
   bool bound(double time, double share, const AddRowSums &outside, StepBound &out) override;
   double strain_rate() const override;
   bool add_forces(const SubStep &now, bool keep) override;
@@ -30,6 +30,7 @@ class ExplicitPoints : public Dynamics {
     const double *const v = in_place_ ? p_.v_free.data() : p_.v_end.data();
     return {v, v};
   }
+  double damper_energy(double time) override;
   void commit(const SubStep &now, double fraction) override;
   void damp(double time, double c, double ahead) override;
 
@@ -37,6 +38,10 @@ class ExplicitPoints : public Dynamics {
   const Array<uint32_t> &edges_;
   const PointsKernels &loops_;
   Array<double> stiffness_, damping_;  // [npoint] row sums: N/m, N s/m
+  Array<double> lagged_;               // [npoint] N/m, row sums of what the lag makes of dampers
+  Array<double> drag_;                 // [npoint] N s/m, which sees no lag; empty: there is none
+  std::vector<double> drag_of_;        // the parameters that it was found with
+  Array<double> load_;                 // [npoint,4] N, with the drag that the model's forces lack
   // [part] J, of the free motion; empty where the model gives its forces for all points at once
   Array<double> part_kinetic_;
   bool moved_ = false;  // in this sub-step points have moved part by part, and their forces are not kept
@@ -48,6 +53,15 @@ class ExplicitPoints : public Dynamics {
   Array<double> before_;   // [reached,3] m/s
 
   bool row_sums(const dfm_kin &k, double &cell);
+  struct Trial;
+  bool find_drag();
+  void lag_rows(double lag);
+  double own_frequency(Trial &rest, double edge);
+  double find_lag(Trial &rest, double edge);
+  double find_share(Trial &rest, double lag, double edge);
+  double drag(uint32_t point) const { return drag_.empty() ? 0 : drag_[point]; }
+  dfm_kin seen(double time, double h, bool trial = false) const;  // with the velocity that dampers see
+  const double *loads();
   double largest_strain() const;
   bool find_forces(const SubStep &now);  // in points().f
   // N, that leads to this velocity without contact

@@ -160,6 +160,7 @@ void changing(Stream &s, World &w) {
   for (auto &b : w.bodies) {
     s.array(b->p.x);
     s.array(b->p.v);
+    s.array(b->p.dampers.v);
     s.array(b->model.state);
     s.array(b->surfel_impulse);
     s.array(b->method_values);

@@ -143,6 +143,7 @@ bool look(World &w, const StepContext &step, Body &b, EnergyLook &out) {
   const OnBehalf speaks(b.name);
   const auto ask = [&] { return b.model.ops->energy(b.model.self, &kin, &elastic); };
   if (!hides(b) && b.model.call("energy", ask) != DFM_OK) return false;
+  elastic += b.dynamics->damper_energy(w.time);
   // the call came between its prediction and its commit, which may share memory with the result
   double again = 0;
   if (steps_itself(b) && (!hides(b) || b.dynamics->late()) &&

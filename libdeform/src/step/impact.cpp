@@ -107,6 +107,7 @@ size_t turn(World &w, Chosen from, Chosen to) {
     b->integrator.used =
         to == Chosen::struck ? uint32_t{DFM_INTEGRATOR_SYMPLECTIC_EULER} : implicit_integrator(w, *b);
     b->bound.known = false;
+    settle_dampers(b->p);
   }
   if (made.empty()) return 0;
   ++w.integrator_times.changes;

@@ -85,6 +85,18 @@ void ask_explicit_bound(const World &w, double time, Dynamics &dynamics, Integra
   out.point = bound.point;
 }
 
+}  // namespace
+
+void measure_explicit(Body &b, Dynamics &dynamics, Integrator &out) {
+  const ExplicitTime found = dynamics.measure(b.shape == 0);
+  out.share = found.share;
+  const bool had = b.p.dampers.lag > 0;
+  b.p.dampers.lag = found.lag;
+  if (had != (found.lag > 0)) settle_dampers(b.p);
+}
+
+namespace {
+
 // [n,3] rest positions transformed by the frame, for a model whose forces do not rotate with the body; empty
 // for other models.
 std::vector<double> rest_for(const dfm_type &type, const Body &b, const Pose &frame) {
@@ -206,18 +218,24 @@ void make_model(World &w, Body &b, const dfm_type &type, std::vector<double> val
   const auto implicit = implicit_of(w, b.name, integrator, out.integrator);
   const OnBehalf speaks(b.name);
   make_selected(w, b, type, std::move(values), out);
-  // the dynamics of a body refer to its own instance, which is the new one by now
+  // the dynamics of a body refer to its own instance and points, which are the new ones by now
   struct Lent {
-    ModelInstance &a, &b;
-    Lent(ModelInstance &x, ModelInstance &y) : a(x), b(y) { a.swap(b); }
+    Body &b;
+    BodyModel &made;
+    Lent(Body &x, BodyModel &y) : b(x), made(y) { exchange_own(); }
     Lent(const Lent &) = delete;
     Lent &operator=(const Lent &) = delete;
-    ~Lent() { a.swap(b); }
-  } lent(b.model, out.instance);
+    ~Lent() { exchange_own(); }
+    void exchange_own() {
+      b.model.swap(made.instance);
+      std::swap(b.p.dampers, made.dampers);
+    }
+  } lent(b, out);
+  use_memory(w.meters.dynamics.memory(), b.p.dampers.v);
   out.dynamics = make_dynamics(w.meters.dynamics.memory(), b.p, b.surface, b.model, b.edges,
                                implicit ? &*implicit : nullptr);
   if (!implicit) {
-    if (b.shape == 0) out.integrator.share = out.dynamics->spectral_share();
+    measure_explicit(b, *out.dynamics, out.integrator);
     ask_explicit_bound(w, w.time, *out.dynamics, out.integrator);
   }
   if (!out.dynamics->abilities().placed) need_ability(w, Ability::self_stepping, "body", b.name);
@@ -310,6 +328,7 @@ void exchange(Body &b, BodyModel &other) noexcept {
   std::swap(b.withheld, other.withheld);
   std::swap(b.origin, other.origin);
   std::swap(b.integrator, other.integrator);
+  std::swap(b.p.dampers, other.dampers);
   b.bound.known = false;
 }
 

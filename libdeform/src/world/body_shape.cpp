@@ -103,8 +103,10 @@ void keep_params(Body &b, const Former &before) {
 // Makes the present model of the body for its present mesh.
 void make_model_again(Body &b, const Former &before, ModelOrigin origin) {
   const Integrator was = before.integrator;
+  Dampers kept = b.p.dampers;
   exchange(b, *make_body_model(*b.world, b, *before.model.type, std::move(origin),
                                static_cast<int32_t>(was.used)));
+  std::swap(b.p.dampers, kept);
   keep_integrator(b, was);
   keep_params(b, before);
 }
@@ -130,6 +132,7 @@ std::unique_ptr<BodyShape> put(Body &b, std::unique_ptr<BodyShape> shape, Finish
 void exchange(Body &b, BodyShape &other) noexcept {
   std::swap<Discretization>(b, other);
   exchange(b, other.model);
+  std::swap(b.p.dampers, other.model.dampers);  // they stay with the points
   ++b.x_version;
 }
 
@@ -212,6 +215,9 @@ void take_points(const Memory &m, const Shape &from, const CutMesh &mesh, const 
                  Array<double> &surfel_impulse) {
   take_rows(from.p.x, mesh.point, kStride, p.x);
   take_rows(from.p.v, mesh.point, kStride, p.v);
+  p.dampers.lag = from.p.dampers.lag;
+  use_memory(m, p.dampers.v);
+  if (!from.p.dampers.v.empty()) take_rows(from.p.dampers.v, mesh.point, kStride, p.dampers.v);
   take_rows(from.p.held, mesh.point, 1, p.held);
   if (!from.anchor.empty()) take_rows(from.anchor, mesh.point, kStride, anchor);
   for (const BladeTrack &t : from.blades) {
@@ -281,6 +287,7 @@ std::unique_ptr<MadeShape> make_shape(const Body &b, CutMesh &&mesh, Array<uint6
   weigh(like);
   exchange(like, *make_body_instance(w, like, *b.model.type, std::move(origin)));
   like.integrator.used = b.integrator.used;
+  like.p.dampers.lag = b.p.dampers.lag;
   if (due) {
     give_dynamics(w, like, due);
     like.dynamics.reset();  // it refers to this body

@@ -49,7 +49,10 @@ class Search {
       go(at, to, 0);
       at = to;
     }
-    for (auto &b : w_.bodies) std::fill(b->p.v.begin(), b->p.v.end(), 0.0);
+    for (auto &b : w_.bodies) {
+      std::fill(b->p.v.begin(), b->p.v.end(), 0.0);
+      settle_dampers(b->p);
+    }
     done_ = true;
   }
 

@@ -243,6 +243,9 @@ std::string reason(const World &w) {
   const double share = w.bound.step / bound.step;
   const std::string stiffness = seconds(share * bound.by_stiffness);
   const std::string damping = seconds(share * bound.by_damping);
+  if (bound.lagged)
+    return "0.9 of the bound: stiffness and the lag of the dampers bound it (without damping " + stiffness +
+           "); soften or coarsen this body, or lower its damping" + cut;
   return "0.9 of the bound: " +
          (bound.by_damping < bound.by_stiffness
               ? "damping bounds it (alone it allows " + damping + ", stiffness alone " + stiffness +

@@ -10,6 +10,7 @@
 #include "plugin/tables.h"
 #include "state/world.h"
 #include "step/stages.h"
+#include "world/body_model.h"
 
 namespace dfm {
 
@@ -183,7 +184,7 @@ void set_model_params(Body &b, const dfm_params &params) {
   b.withheld.by_cell.resize(type.nparam);
   const bool cells = std::count(b.withheld.by_cell.begin(), b.withheld.by_cell.end(), 1) > 0;
   b.withheld.asked = asked == values && !cells ? std::vector<double>() : asked;
-  if (b.integrator.share < 1) b.integrator.share = b.dynamics->spectral_share();
+  if (b.dynamics->diagonal()) measure_explicit(b, *b.dynamics, b.integrator);
   values_changed(*b.world);
   if (before.changed()) b.world->changed = true;  // the plan names the effects that parameters call for
 }

@@ -278,6 +278,7 @@ class Settling {
   void stand_still() {
     for (auto &b : w_.bodies) {
       std::fill(b->p.v.begin(), b->p.v.end(), 0.0);
+      settle_dampers(b->p);
       b->dynamics->points_changed();
     }
   }

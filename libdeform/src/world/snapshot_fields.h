@@ -39,6 +39,7 @@ struct StagedBody {
   struct {
     Array<double> x, v, load;
     Array<uint8_t> held;
+    Dampers dampers;
   } p;
   struct {
     std::string id;
@@ -126,8 +127,8 @@ struct Staged {
     rigid_sets.resize(w.rigid_sets.size());
     tools.resize(w.tools.size());
     for (StagedBody &b : bodies)
-      use_memory(m, b.p.x, b.p.v, b.p.load, b.p.held, b.model.state, b.surfel_impulse, b.anchor,
-                 b.method_values);
+      use_memory(m, b.p.x, b.p.v, b.p.dampers.v, b.p.load, b.p.held, b.model.state, b.surfel_impulse,
+                 b.anchor, b.method_values);
     for (StagedRigids &r : rigid_sets) use_memory(m, r.state, r.extra, r.total);
   }
 };
@@ -314,6 +315,9 @@ void model_fields(Stream &s, B &b, const Body &like) {
           must::Be{[](Chosen x) { return x <= Chosen::struck; }, "no, explicit, implicit or struck"});
   s.value("spectral share", b.integrator.share,
           must::Be{[](double x) { return x > 0 && x <= 1; }, "a share above zero"});
+  s.value("lag of dampers", b.p.dampers.lag,
+          must::Be{[](double x) { return x >= 0 && std::isfinite(x); }, "a time"});
+  s.array("velocity of dampers", b.p.dampers.v, b.p.dampers.lag > 0 ? like.p.x.size() : 0, must::finite);
   s.value("explicit sub-step", b.integrator.step,
           must::Be{[](double x) { return x > 0; }, "a time above zero"});
   const bool alike = made_alike(b, like);

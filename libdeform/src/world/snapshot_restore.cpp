@@ -97,6 +97,7 @@ void make_models(const SnapshotReader &s, World &w, Staged &t) {
       moves.chosen = other.integrator.chosen;
       moves.step = other.integrator.step;
       moves.share = other.integrator.share;
+      std::swap(other.made->dampers, other.p.dampers);
       ModelInstance &made = other.made->instance;
       if (made.state.size() != other.model.state.size()) s.refuse("model state", "as many as the model has");
       if (made.params.size() != other.model.params.size() || !snapshot::in_range(type, other.model.params))
@@ -175,6 +176,7 @@ void exchange(World &w, Staged &t) noexcept {
       std::swap(b.integrator.chosen, other.integrator.chosen);
       std::swap(b.integrator.step, other.integrator.step);
       std::swap(b.integrator.share, other.integrator.share);
+      std::swap(b.p.dampers, other.p.dampers);
     }
     b.switches.swap(other.switches);
     b.rule.swap(other.rule);

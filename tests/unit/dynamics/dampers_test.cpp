@@ -1,0 +1,192 @@
+// Dampers that see the velocity with a lag: the damping that they give, the energy that they keep, and what
+// has no lag.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "../world/inside.h"
+#include "support.h"
+#include "world.h"
+
+namespace {
+
+struct Bar {
+  test::Context context;
+  dfm_world world = test::make_world(context, {0, 0, 0});
+  dfm_body handle = 0;
+  dfm::Body *body = nullptr;
+  Bar(const std::string &model, double damping, double drag = 0, uint32_t cells = 3000) {
+    test::BodyOptions o;
+    o.model = model;
+    o.damping_stiffness = damping;
+    o.damping_mass = drag;
+    handle = test::make_body(context, world, "beam", {0.2, 0.04, 0.04}, cells, o);
+    body = test::inside(world).bodies[0].get();
+  }
+  void without_lag() const {
+    body->p.dampers.lag = 0;
+    body->p.dampers.v.clear();
+    body->bound.known = false;
+  }
+  double stable() const {
+    double h = 0;
+    test::ok(dfm_world_stable_step(world, &h, nullptr, nullptr));
+    return h;
+  }
+  // A stretch of all of it, 1/s.
+  void stretch(double rate) const {
+    dfm::Phyxels &p = body->p;
+    for (size_t i = 0; i < p.n; ++i) p.v[4 * i] = rate * (p.x[4 * i] - 0.1);
+    dfm::settle_dampers(p);
+  }
+  double momentum() const {  // along the stretch, kg m2/s
+    double sum = 0;
+    for (size_t i = 0; i < body->p.n; ++i)
+      sum += body->p.mass[i] * body->p.v[4 * i] * (body->p.rest[3 * i] - 0.1);
+    return sum;
+  }
+  // The peaks of one swing: s, kg m2/s.
+  std::vector<std::pair<double, double>> peaks_of(double h) const {
+    stretch(0.05);
+    std::vector<std::pair<double, double>> peaks;  // s, kg m2/s
+    double last[3] = {momentum(), 0, 0};
+    for (uint32_t n = 1; peaks.size() < 3 && n < 100000; ++n) {
+      test::ok(dfm_world_step(world, h, nullptr));
+      last[2] = last[1];
+      last[1] = last[0];
+      last[0] = momentum();
+      if (n < 3) continue;
+      const double a = last[2], b = last[1], c = last[0];  // a parabola through three
+      if ((b - a) * (c - b) >= 0) continue;
+      const double at = 0.5 * (a - c) / (a - 2 * b + c);
+      peaks.emplace_back((n - 1 + at) * h, b - 0.25 * (a - c) * at);
+    }
+    EXPECT_EQ(peaks.size(), 3u);
+    return peaks;
+  }
+};
+using Peaks = std::vector<std::pair<double, double>>;
+double decrement(const Peaks &p) { return std::log(p[0].second / p[2].second); }
+double period(const Peaks &p) { return p[2].first - p[0].first; }
+
+constexpr const char *kModels[] = {"msm", "corotational_fem", "linear_fem", "meshless"};
+
+// Damping and period of the first stretch within 2 %, in sub-steps that are at least four times as long: with
+// a lag those that stiffness allows; without, as short as damping asks for.
+TEST(Dampers, WithALag_TheFirstModeIsDampedAsByRayleigh) {
+  for (const char *model : kModels) {
+    const Bar lagged(model, 3e-3), direct(model, 3e-3);
+    direct.without_lag();
+    const double h = lagged.stable();
+    const double shorter = direct.stable();
+    const Peaks with = lagged.peaks_of(h), without = direct.peaks_of(shorter);
+    std::printf("%s: sub-step %.2g s for %.2g, decrement %.3f for %.3f, period %.4f s for %.4f\n", model, h,
+                shorter, decrement(with), decrement(without), period(with), period(without));
+    EXPECT_GT(h, 4 * shorter) << model;
+    EXPECT_NEAR(decrement(with), decrement(without), 0.02 * decrement(without)) << model;
+    EXPECT_NEAR(period(with), period(without), 0.02 * period(without)) << model;
+  }
+}
+
+// Kinetic and elastic energy as the scheme keeps them, and what is stored in the dampers, only fall, whatever
+// moves, at the longest sub-step.
+TEST(Dampers, WithALag_EnergyOnlyFalls) {
+  for (const char *model : {"linear_fem", "corotational_fem"}) {
+    const Bar bar(model, 3e-3, 2, 200);
+    dfm::Body &b = *bar.body;
+    // cells that turn within a sub-step gain some of that
+    const double rounding = std::string(model) == "linear_fem" ? 1e-13 : 1e-6;
+    std::mt19937 random(7);
+    const double h = bar.stable();
+    for (size_t i = 0; i < b.p.v.size(); ++i)
+      if (i % 4 < 3) b.p.v[i] = 1e-2 * (double(random()) / 2147483648.0 - 1);
+    const auto energy = [&] {
+      const dfm::SubStep now{0, h, {}, HUGE_VAL, {}};
+      double kept = 0, kinetic = 0;
+      EXPECT_TRUE(b.dynamics->add_forces(now, true) && b.dynamics->free_motion(now, kinetic));
+      const dfm_kin k = b.dynamics->kin(0, 0);
+      test::ok(b.model.ops->energy(b.model.self, &k, &kept));
+      for (size_t at = 0; at < b.p.v.size(); ++at)
+        kept += 0.5 * b.p.mass[at / 4] * b.p.v[at] * b.p.v_free[at];
+      return kept + b.dynamics->damper_energy(0);
+    };
+    double last = energy(), first = last, stored = 0;
+    for (int n = 0; n < 300; ++n) {
+      test::ok(dfm_world_step(bar.world, h, nullptr));
+      const double now = energy();
+      EXPECT_LE(now, last + rounding * first) << model << ", " << n;
+      stored = std::max(stored, b.dynamics->damper_energy(0));
+      last = now;
+    }
+    EXPECT_LT(last, 0.5 * first);
+    EXPECT_GT(stored, 1e-2 * first);
+  }
+}
+
+// Drag sees no lag: a body that falls through it is as fast as one without other dampers, bit for bit but for
+// rounding.
+TEST(Dampers, Drag_SeesNoLag) {
+  const auto fall = [](double damping) {
+    const Bar bar("msm", damping, 40, 200);
+    EXPECT_EQ(bar.body->p.dampers.lag > 0, damping > 0);
+    test::set_velocity(bar.handle, {1, -2, 3});
+    for (int n = 0; n < 200; ++n) test::ok(dfm_world_step(bar.world, 1e-4, nullptr));
+    return std::vector<double>(bar.body->p.v.begin(), bar.body->p.v.end());
+  };
+  const std::vector<double> with = fall(5e-3), without = fall(0);
+  for (size_t i = 0; i < with.size(); ++i) EXPECT_NEAR(with[i], without[i], 1e-12) << i;
+  EXPECT_NEAR(without[0], std::pow(1 - 40 * 1e-4, 200), 1e-9);
+}
+
+// A spin strains nothing: angular momentum stays, and the lag gives it no damping.
+TEST(Dampers, ASpin_KeepsItsMomentum) {
+  const Bar bar("corotational_fem", 3e-3, 0, 200);
+  dfm::Phyxels &p = bar.body->p;
+  for (size_t i = 0; i < p.n; ++i) {
+    p.v[4 * i] = -6 * (p.x[4 * i + 1] - 0.02);
+    p.v[4 * i + 1] = 6 * (p.x[4 * i] - 0.1);
+  }
+  dfm::settle_dampers(p);
+  const auto spin = [&] {
+    double sum = 0;
+    for (size_t i = 0; i < p.n; ++i)
+      sum += p.mass[i] * ((p.x[4 * i] - 0.1) * p.v[4 * i + 1] - (p.x[4 * i + 1] - 0.02) * p.v[4 * i]);
+    return sum;
+  };
+  const double before = spin();
+  const double h = bar.stable();
+  for (int n = 0; n < 2000; ++n) test::ok(dfm_world_step(bar.world, h, nullptr));
+  EXPECT_NEAR(spin(), before, 1e-9 * before);
+}
+
+// The lag follows a damping that changes during the run, and a restore brings back both.
+TEST(Dampers, DampingThatChanges_AndARestore) {
+  const Bar bar("corotational_fem", 0, 5, 200);
+  const double more = 4e-3;
+  const dfm_param_value value{"damping_stiffness", &more, 1};
+  const dfm_params params{sizeof(dfm_params), 1, &value};
+  bar.stretch(0.5);
+  const auto run = [&] {
+    for (int n = 0; n < 50; ++n) test::ok(dfm_world_step(bar.world, 5e-4, nullptr));
+    return test::snapshot(bar.world);
+  };
+  const std::string before = test::snapshot(bar.world);
+  EXPECT_EQ(bar.body->p.dampers.lag, 0);
+  const std::string without = run();
+  test::ok(dfm_body_set_params(bar.handle, &params));
+  EXPECT_GT(bar.body->p.dampers.lag, 0);
+  EXPECT_EQ(bar.body->p.dampers.v.size(), bar.body->p.v.size());
+  const std::string middle = test::snapshot(bar.world);
+  const std::string with = run();
+  test::ok(dfm_world_restore(bar.world, before.data(), before.size()));
+  EXPECT_EQ(bar.body->p.dampers.lag, 0);
+  EXPECT_EQ(run(), without);
+  test::ok(dfm_world_restore(bar.world, middle.data(), middle.size()));
+  EXPECT_EQ(run(), with);
+}
+
+}  // namespace
