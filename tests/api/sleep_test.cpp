@@ -70,13 +70,13 @@ struct Rest {
     o.damping_mass = 20;
     o.volume = 1;
     o.name = "lower";
-    o.position = {0, 0, 4e-5};
+    o.position = {0, 0, 1e-4};
     lower = test::make_body(context, world, "beam", {0.1, 0.1, 0.1}, 60, o);
     o.name = "upper";
-    o.position = {0.013, 0.007, 0.1 + 8e-5};
+    o.position = {0.013, 0.007, 0.1 + 2e-4};
     upper = test::make_body(context, world, "beam", {0.1, 0.1, 0.1}, 60, o);
     o.name = "far";
-    o.position = {1, 0, 4e-5};
+    o.position = {1, 0, 1e-4};
     far = test::make_body(context, world, "beam", {0.1, 0.1, 0.1}, 60, o);
   }
   std::vector<dfm_body> bodies() const { return {lower, upper, far}; }

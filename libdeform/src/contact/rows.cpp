@@ -12,8 +12,8 @@ ContactRows::ContactRows(const Memory &m)
     : kernels_(dense_kernels()),
       loops_(doubles_at_once() >= 4 ? contact_kernels_avx2() : contact_kernels_sse2()) {
   use_memory(m, across_, begin, dof, weight, y, y_free, alone, source, point, block, blocks, response_,
-             given_, frame, drive, rate, borne, yields, wn, wt, cross, impulse, bond, dof_of_point_,
-             dof_of_node_, place_, rigid, arm, dof_of_group_, every_block_, whole_of);
+             given_, frame, drive, rate, borne, start_depth, yields, wn, wt, cross, impulse, bond,
+             dof_of_point_, dof_of_node_, place_, rigid, arm, dof_of_group_, every_block_, whole_of);
 }
 
 // Of the dofs from `first` on.
@@ -370,7 +370,8 @@ void ContactRows::finish(std::span<const ContactPoint> contacts, const double *t
     store3(f + 6, t2);
     const Vec3 v = load3(contacts[i].velocity);
     store3(&drive[size_t(i) * 3], {dot(normal, v), dot(t1, v), dot(t2, v)});
-    rate[i] = bias_velocity(contacts[i].distance, offset, h, planned, most);
+    const double from = start_depth.empty() ? 0 : start_depth[i];
+    rate[i] = bias_velocity(contacts[i].distance + from, offset, h, planned, most);
     const Vec3 w0 = diagonal(i, normal);
     const double body = whole_answer(i);
     wn[i] = dot(normal, w0) + body;

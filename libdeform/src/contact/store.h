@@ -45,6 +45,7 @@ struct ContactStore {
   Array<double> dwell, area;      // s in contact, m2
   // m2, area in the next sub-step (contact/renewal.h); empty where no law counts by area
   Array<double> due;
+  Array<double> start_depth;      // m, of what a pair was found with, less what has opened since
   Array<double> owed;             // [n,3] m, slip to be taken back (step/stuck_slip.h)
   Array<double> path;             // [n,2] m, net slip since hold_begin, in the frame
   Array<uint8_t> touching, held;  // held: touched and stuck in every sub-step since hold_begin
@@ -73,6 +74,7 @@ void each_column(F &&f, Store &...c) {
   f(ColumnOf<V::not_negative>{{"dwell", 1}}, c.dwell...);
   f(ColumnOf<V::not_negative>{{"contact area", 1}}, c.area...);
   f(ColumnOf<V::not_negative>{{"area due", kOwnLength, true}}, c.due...);
+  f(ColumnOf<V::not_negative>{{"start depth", 1}}, c.start_depth...);
   f(ColumnOf<V::finite>{{"slip owed", 3}}, c.owed...);
   f(ColumnOf<V::finite>{{"hold path", 2}}, c.path...);
   f(ColumnOf<V::flag>{{"touching", 1}}, c.touching...);

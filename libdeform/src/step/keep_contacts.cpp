@@ -128,6 +128,7 @@ void keep_contact(World &w, StepContext &step, uint32_t i) {
     to.bristle[size_t(S) * i + s] = s < own ? step.state.bristle_out[size_t(s) * step.state.stride + i] : 0;
   to.dwell[i] = now ? step.state.dwell[i] + step.h : 0;
   to.area[i] = step.state.area[i];
+  to.start_depth[i] = step.rows.start_depth[i];
   const double v1 = step.state.vt[i], v2 = step.state.vt[step.state.stride + i];
   // A hold counts from hold_begin on: contacts that stick in the first sub-step after it and in every one
   // since.

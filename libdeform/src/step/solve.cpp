@@ -21,6 +21,7 @@
 #include "step/pre_solve.h"
 #include "step/restitution.h"
 #include "step/rigid.h"
+#include "state/obstacle.h"
 #include "step/solve_islands.h"
 #include "step/stages.h"
 #include "step/stuck_slip.h"
@@ -55,6 +56,37 @@ constexpr uint32_t kMostRevisions = 6;  // of the responses of rigid hosts, with
 constexpr double kLeastPiece = 1.0 / 256;
 
 }  // namespace
+
+// m/s, at which a depth opens that a pair was found with.
+constexpr double kSettles = 8e-4;
+
+// m, what was left of the depth that the pair was found with; `most` if it is found now.
+double left_of_pair(const ContactStore &store, uint64_t a, uint64_t b, double most) {
+  double left = -1;
+  for (uint32_t i = 0; i < store.n; ++i)
+    if (store.id_a[i] == a && store.id_b[i] == b) left = std::max(left, store.start_depth[i]);
+  return left < 0 ? most : left;
+}
+
+// Of bodies that are set on each other, or by up to d_c into each other. No motion has made this depth, so
+// it opens by a speed, whatever the sub-step: a share per sub-step would throw what is stiff. Faces of a cut
+// have distances of their own.
+void find_start_depths(World &w, StepContext &step) {
+  const double opened = step.h * (w.def.recovery_speed > 0 ? w.def.recovery_speed : kSettles);
+  const auto whole = [](const Body &b) { return b.piece_of ? b.piece_of : b.id; };
+  step.rows.start_depth.resize(step.contacts.size());
+  for (uint32_t i = 0; i < step.contacts.size(); ++i) {
+    const ContactPoint &c = step.contacts[i];
+    const Body &a = *w.bodies[c.slot_a], *const b = c.obstacle ? nullptr : w.bodies[c.slot_b].get();
+    const double depth = w.offset - c.distance;
+    const uint32_t m = step.match[i];
+    double left = 0;
+    if (m != kNone) left = w.store.start_depth[m];
+    else if (depth > 0 && !(b && whole(a) == whole(*b)))
+      left = left_of_pair(w.store, a.id, b ? b->id : w.obstacles[c.slot_b]->id, 2 * w.offset + opened);
+    step.rows.start_depth[i] = std::max(0.0, std::min(left - opened, depth));
+  }
+}
 
 bool may_shorten(const StepContext &step) { return step.h > kLeastPiece * step.guard.planned; }
 
@@ -103,6 +135,7 @@ void make_rows(World &w, StepContext &step) {
              step.match.data(), &w.context->tasks);
   step.rows.borne.resize(n);
   for (uint32_t i = 0; i < n; ++i) step.rows.borne[i] = step.rows.impulse[size_t(3) * i];
+  find_start_depths(w, step);
   share_areas(w, step);
   fit_bristles(w, step);
   step.rows.recovery = w.def.recovery_speed;

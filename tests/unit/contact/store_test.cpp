@@ -117,12 +117,12 @@ dfm_world two_boxes(dfm_context *c, bool sleepy, bool beside) {
   o.young = 2e5;
   o.damping_stiffness = 2e-3;
   o.damping_mass = 20;
-  o.position = {0, 0, 4e-5};
+  o.position = {0, 0, 1e-4};
   test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 10, o);
   o.position = {0.02, 0.03, 0.1009};
   o.velocity = {0, 0, -1};
   if (beside) {
-    o.position = {0, 1, 4e-5};
+    o.position = {0, 1, 1e-4};
     o.velocity = {2, 0, 0};
   }
   test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 10, o);
@@ -247,7 +247,12 @@ TEST(Store, OfSleepers_StaysAsItIsBesideContactsThatMove) {
   for (int i = 0; i < 20; ++i) {
     test::run(w, kStep, kStep);
     ASSERT_EQ(world.sleepers, 1u);
-    EXPECT_EQ(rows(), before) << i;
+    const auto now = rows();
+    ASSERT_EQ(now.size(), before.size());
+    // impulses belong to the length of a sub-step, which is a part of the step up to rounding
+    for (const auto &[key, row] : before)
+      for (size_t k = 0; k < row.size(); ++k)
+        EXPECT_NEAR(now.at(key).at(k), row[k], 1e-14 * std::fabs(row[k])) << i << ", " << k;
     expect_whole(world.store);
   }
   EXPECT_NE(dfm_world_hash(w), hash) << "the other one moves";
