@@ -16,12 +16,13 @@ PYTHON ?= $(firstword $(wildcard /usr/bin/python3) python3)
 # The doors share build folders: `make -j demo test` runs one after the other. JOBS is for the compilers.
 .NOTPARALLEL:
 .PHONY: help demo test bench soak lint format tidy asan tsan fuzz install clean
-.PHONY: view bench-contact bench-peers deb docs wheel
+.PHONY: view tools bench-contact bench-peers deb docs wheel
 .PHONY: setup setup-test setup-bench setup-fuzz setup-docs setup-peers
 
 help:
 	@echo "make demo             two soft cylinders with and without friction: table, picture, out/demo/"
 	@echo "make view [SCENE=..]  the same scene in a window"
+	@echo "make tools            what the demo leaves out: plugin check, cost, calibrate, friction, scans"
 	@echo "make test             the whole test suite"
 	@echo "make bench            the figures: kernels and full steps"
 	@echo "make bench-contact    contact problems of others (FCLIB, Siconos): CONTACT_PROBLEMS=folder"
@@ -67,6 +68,9 @@ demo: setup build/release/build.ninja
 view: setup build/release/build.ninja
 	$(BUILD) release --target deform_viewer
 	@build/release/bin/deform view $(SCENE)
+
+tools: setup build/release/build.ninja
+	$(BUILD) release --target deform_tools
 
 test: setup-test build/release/build.ninja
 	$(BUILD) release
@@ -114,17 +118,17 @@ fuzz: setup-fuzz build/fuzz/build.ninja
 	$(BUILD) fuzz --target run_fuzz
 
 install: setup build/release/build.ninja
-	$(BUILD) release --target deform_viewer
+	$(BUILD) release --target deform_viewer deform_tools
 	@cmake --install build/release --strip --prefix "$$(realpath -m -- "$(PREFIX)")"
 
 wheel: setup build/release/build.ninja
-	$(BUILD) release --target deform_command deform_python_native
+	$(BUILD) release --target deform_tools deform_python_native
 	@mkdir -p build/dist && cd bindings/python && $(PYTHON) -B -c "import wheel_backend as b; print( \
 	  b.build_wheel('$(CURDIR)/build/dist', {'prebuilt': '$(CURDIR)/build/release'}))"
 
 # Debian packages of the release build.
 deb: setup build/release/build.ninja
-	$(BUILD) release --target deform_viewer deform_python_native
+	$(BUILD) release --target deform_viewer deform_tools deform_python_native
 	@cpack --config build/release/CPackConfig.cmake -B build/release/packages
 	@rm -rf build/release/packages/_CPack_Packages && ls build/release/packages/*.deb
 

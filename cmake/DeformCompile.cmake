@@ -117,7 +117,7 @@ function(deform_unity_groups folder)
     endif()
   endforeach()
   set(root ${PROJECT_SOURCE_DIR})
-  set(seen libdeform/src libdeform/include bindings bindings/cli tests/support)
+  set(seen libdeform/src libdeform/include bindings bindings/cli bindings/tools tests/support)
   list(TRANSFORM seen PREPEND ${root}/)
   list(JOIN seen ":" seen)
   execute_process(COMMAND ${DEFORM_PYTHON} -B ${root}/cmake/unity_groups.py 18

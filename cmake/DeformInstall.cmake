@@ -17,10 +17,14 @@ if(TARGET deform_cli)
   if(NOT deform_bin_to_lib STREQUAL "../lib")
     list(APPEND deform_cli_rpath "$ORIGIN/../lib")   # where the build tree has it
   endif()
-  set_target_properties(deform_cli PROPERTIES INSTALL_RPATH "${deform_cli_rpath}" BUILD_WITH_INSTALL_RPATH ON)
+  set_target_properties(deform_cli ${deform_tools} PROPERTIES INSTALL_RPATH "${deform_cli_rpath}"
+    BUILD_WITH_INSTALL_RPATH ON)
   install(TARGETS deform_cli RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT command)
 endif()
-# Where it was built: `make install` and `make deb` build it, `make demo` may not.
+# What follows where it was built: `make install` and `make deb` build it, `make demo` may not.
+if(deform_tools)
+  install(TARGETS ${deform_tools} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT command OPTIONAL)
+endif()
 if(TARGET deform_view)
   set_target_properties(deform_view PROPERTIES INSTALL_RPATH "${deform_cli_rpath}"
     BUILD_WITH_INSTALL_RPATH ON)

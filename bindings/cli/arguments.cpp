@@ -103,5 +103,8 @@ bool Command::given(const std::string &name) const { return app_->count(name) > 
 void Command::needs_subcommand() { app_->require_subcommand(1); }
 void Command::hide() { app_->group(""); }
 void Command::calls(std::function<void()> function) { app_->callback(std::move(function)); }
+void Command::calls_at_once(std::function<void()> function) {
+  app_->preparse_callback([function = std::move(function)](size_t) { function(); });
+}
 
 }  // namespace cli

@@ -36,7 +36,7 @@ class Argument {
 class Command {
  public:
   explicit Command(CLI::App *app) : app_(app) {}
-  Command command(const std::string &name, const std::string &about);
+  Command command(const std::string &name, const std::string &about = {});
   // A name without dashes is one of a word by its place. The value keeps what it has where the option is not
   // given; it lives until the command line has been read.
   Argument option(const std::string &name, std::string &value, const std::string &about = {});
@@ -53,6 +53,8 @@ class Command {
   void needs_subcommand();
   void hide();  // from the help
   void calls(std::function<void()> function);
+  // As soon as the subcommand's name is read, and before anything that stands behind it.
+  void calls_at_once(std::function<void()> function);
 
  private:
   CLI::App *app_;

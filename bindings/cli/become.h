@@ -5,9 +5,44 @@
 
 namespace cli {
 
+class Command;
+struct Globals;
+
+std::string beside(const std::string &name);  // the path of a program in the folder of this one
+
 // Becomes the program `name`, with these words behind its own, or throws; missing: what to do where it is not
 // there.
 [[noreturn]] void become(const std::string &subcommand, const std::string &name,
                          const std::vector<std::string> &words, const std::string &missing);
+
+// A subcommand whose command line its program reads, by the same rules (bindings/tools).
+struct Program {
+  const char *name, *file, *about;
+  const char *missing = "`make demo` leaves it out, `make tools` builds it";
+};
+void add_program(Command parent, const Globals &globals, const Program &program);
+
+inline constexpr Program kCalibrate = {
+    "calibrate", "deform-cost", "measures costs and errors of the models on this machine, for the planner"};
+inline constexpr Program kCost = {
+    "cost", "deform-cost",
+    "what accuracy costs on a scene: models, steps, meshes, contact against a fine reference"};
+inline constexpr Program kFriction = {
+    "friction", "deform-friction",
+    "runs a friction law on a rig: a driven mass, a prescribed slip, a spring, ramps"};
+inline constexpr Program kCheck = {
+    "check", "deform-check",
+    "checks a plugin by rules, each in a separate process; exit code 1 if one is broken"
+#ifndef DEFORM_HAVE_CHECK
+    ,
+    "it opens plugin files, and this command was built to load none (DEFORM_PLUGINS_STATIC)"
+#endif
+};
+inline constexpr Program kFromLabels = {
+    "from-labels", "deform-labels",
+    "a segmented scan (a volume of labels) as closed surfaces, bodies, obstacles and a scene"};
+inline constexpr Program kPhantom = {
+    "phantom", "deform-labels",
+    "a volume of labels made from ellipsoids and cylinders, with the volumes that these have"};
 
 }  // namespace cli

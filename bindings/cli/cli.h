@@ -1,6 +1,7 @@
 // The `deform` command: one cmd_*.cpp per subcommand, each on the public API only.
 #pragma once
 #include <string>
+#include <vector>
 
 #include "deform/deform.h"
 
@@ -16,6 +17,7 @@ struct Globals {
   bool quiet = false;
   bool json = false;
   unsigned threads = 1;
+  std::vector<std::string> words;  // of the command line, behind the program's name
 };
 
 // The command line's own; what is logged follows them.
@@ -31,14 +33,15 @@ dfm_context *make_context(const Globals &globals);
 void add_run(Command app, Globals &globals, int *exit_code);
 void add_replay(Command app, Globals &globals, int *exit_code);
 void add_explain(Command app, Globals &globals, int *exit_code);
-void add_calibrate(Command app, Globals &globals, int *exit_code);
 void add_mesh(Command app, Globals &globals, int *exit_code);
 void add_plugin(Command app, Globals &globals, int *exit_code);
-void add_plugin_check(Command plugin, Globals &globals, int *exit_code);
 void add_ccd(Command app, Globals &globals, int *exit_code);
-void add_friction(Command app, Globals &globals, int *exit_code);
-void add_cost(Command app, Globals &globals, int *exit_code);
 void add_view(Command app, Globals &globals, int *exit_code);
 void add_contact(Command app, Globals &globals, int *exit_code);
+void add_montage(Command app, Globals &globals, int *exit_code);  // for `make demo`; not listed in --help
+
+// Reads the command line by the subcommands that `add` adds and calls the one that is meant; all of main().
+using AddCommands = void(Command, Globals &, int *);
+int command_line(int argc, char **argv, AddCommands *add);
 
 }  // namespace cli

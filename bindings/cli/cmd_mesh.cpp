@@ -8,16 +8,10 @@
 #include <memory>
 
 #include "arguments.h"
+#include "become.h"
 #include "progress.h"
 
 namespace cli {
-
-MeshSession::MeshSession(const Globals &globals) {
-  dfm_context_def def = dfm_context_def_default();
-  def.threads = globals.threads;
-  def.log = [](void *, int32_t, const char *) {};
-  if (dfm_context_create(&def, &context) < 0) context = nullptr;
-}
 
 std::string mesh_ending(const std::string &path) {
   const size_t slash = path.find_last_of('/'), dot = path.find_last_of('.');
@@ -237,7 +231,8 @@ void add_mesh(Command app, Globals &globals, int *exit_code) {
   convert_command.calls([=, &globals] { *exit_code = convert(globals, *first, *second); });
 
   add_mesh_fill(mesh, globals, exit_code);
-  add_mesh_labels(mesh, globals, exit_code);
+  add_program(mesh, globals, kFromLabels);
+  add_program(mesh, globals, kPhantom);
 }
 
 }  // namespace cli

@@ -14,7 +14,12 @@ struct MeshSession {
   dfm_context *context = nullptr;
   dfm_tetmesh cells = 0;
   dfm_trimesh surface = 0;
-  explicit MeshSession(const Globals &globals);
+  explicit MeshSession(const Globals &globals) {
+    dfm_context_def def = dfm_context_def_default();
+    def.threads = globals.threads;
+    def.log = [](void *, int32_t, const char *) {};
+    if (dfm_context_create(&def, &context) < 0) context = nullptr;
+  }
   ~MeshSession() { dfm_context_destroy(context); }
   MeshSession(const MeshSession &) = delete;
   MeshSession &operator=(const MeshSession &) = delete;
@@ -45,6 +50,5 @@ std::string mesh_ending(const std::string &path);  // lower case, without the do
 bool import_surface(const std::string &path, MeshSession &session, std::string &sentence);
 
 void add_mesh_fill(Command mesh, Globals &globals, int *exit_code);
-void add_mesh_labels(Command mesh, Globals &globals, int *exit_code);
 
 }  // namespace cli

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "arguments.h"
+#include "become.h"
 #include "cli.h"
 #include "json_text.h"
 #include "messages.h"
@@ -235,7 +236,7 @@ void add_plugin(Command app, Globals &globals, int *exit_code) {
   info_command.option("ID", *id, "short name, full id, or path of a plugin file").required();
   info_command.calls([=, &globals] { *exit_code = info(globals, *id); });
 
-  add_plugin_check(plugin, globals, exit_code);
+  add_program(plugin, globals, kCheck);
 }
 
 }  // namespace cli

@@ -46,6 +46,4 @@ std::string did_you_mean(const std::string &word, const std::vector<std::string>
 // Exit code of a run that a signal ended in order, as shells give it for SIGINT.
 enum { kInterrupted = 130 };
 
-void add_montage(Command app, int *exit_code);  // pictures in rows, for `make demo`; not listed in --help
-
 }  // namespace cli

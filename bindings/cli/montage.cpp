@@ -49,7 +49,7 @@ int montage(const Options &) { return fail("montage: this deform was built witho
 
 }  // namespace
 
-void add_montage(Command app, int *exit_code) {
+void add_montage(Command app, Globals &, int *exit_code) {
   auto options = std::make_shared<Options>();
   Command sub = app.command("montage", "pictures in labeled rows");
   sub.hide();

@@ -7,7 +7,7 @@ platform is manylinux_2_N where all that it needs from the system is what every 
 (PEP 600): a wheel built without ODE and Bullet, as prebuilt=no builds it. libpng travels in it.
 
 Settings (pip: --config-settings NAME=VALUE):
-  prebuilt  a build folder of this tree whose target deform_command is built; nothing is compiled then.
+  prebuilt  a build folder of this tree whose target deform_tools is built; nothing is compiled then.
             Without it build/release is taken and brought up to date, if `make` or the release preset has
             made it; with "no" the wheel has a build of its own, in build/wheel
   cmake     further arguments for configuring, in one text
@@ -136,7 +136,7 @@ def _installed(prefix, settings):
         build = release or ROOT / "build" / "wheel"
         if not release:
             configure(build, settings)
-        _run("cmake", "--build", build, "--target", "deform_command", "--target", "deform_python_native",
+        _run("cmake", "--build", build, "--target", "deform_tools", "--target", "deform_python_native",
              "--parallel", os.environ.get("CMAKE_BUILD_PARALLEL_LEVEL") or len(os.sched_getaffinity(0)))
     _run("cmake", "--install", build, "--strip", "--prefix", prefix)
     _run("cmake", "--install", build, "--strip", "--prefix", prefix, "--component", "python")
@@ -150,7 +150,9 @@ def native_files(prefix):
             inside = path.relative_to(libdir).as_posix()
             if path.is_file() and LIBRARIES.fullmatch(inside):
                 yield f"lib/{inside}", path
-    yield "bin/deform", prefix / "bin" / "deform"
+    for path in sorted((prefix / "bin").glob("deform*")):
+        if path.name != "deform-view":  # which needs a window's libraries
+            yield f"bin/{path.name}", path
     for folder in ("share/deform", "include/deform"):
         for path in sorted((prefix / folder).rglob("*")):
             if path.is_file():

@@ -15,6 +15,10 @@ import sys
 import tempfile
 
 
+# Subcommands that are programs of their own.
+PROGRAMS = [("plugin", "check"), ("cost",), ("calibrate",), ("friction",), ("mesh", "from-labels")]
+
+
 def run(*argv, env=None):
     """Runs and returns stdout; prints everything and ends the test where it fails."""
     done = subprocess.run([str(a) for a in argv], capture_output=True, text=True, env=env)
@@ -130,6 +134,9 @@ def main():
             sys.exit(f"{command} plugin list does not show {plugin}")
     if f"{build}/lib" in listed:  # the scratch prefix itself lies in the build folder
         sys.exit(f"the installed command found plugins of the build tree in {build}")
+    run(command, "plugin", "check", slab, "--only", "V02", env=clean)
+    for words in PROGRAMS:
+        run(command, *words, "--help", env=clean)
     asks_for_a_component_that_is_not_there(prefix, scratch, clean)
     builds_from_a_prefix_with_a_space(prefix, libdir, source, scratch, clean)
 

@@ -9,7 +9,7 @@ import pathlib
 import shutil
 import sys
 
-from installed_tree import clean_environment, run, without_spaces
+from installed_tree import PROGRAMS, clean_environment, run, without_spaces
 
 NEEDS = {"libdeform0": ["libc6", "libstdc++6"], "libdeform-dev": ["libdeform0 (="],
          "libdeform-doc": [],
@@ -68,6 +68,8 @@ def main():
     run(scratch / "cmake" / "host", next((scratch / "cmake").glob("slab.*")), env=clean)
     if str(prefix) not in run(prefix / "bin" / "deform", "plugin", "list", env=clean):
         sys.exit("the command of the package found other plugins than the package's")
+    for words in PROGRAMS:
+        run(prefix / "bin" / "deform", *words, "--help", env=clean)
     said = run(python, "-c", "import deform\nwith deform.World() as w:\n  w.add_obstacle('plane')\n"
                "  b = w.add_body(deform.TetMesh.ball(0.1, cells=100), position=(0, 0, 0.15))\n"
                "  w.run(0.01, dt=1e-3)\n  print(deform.__file__, b.measure.com[2])",

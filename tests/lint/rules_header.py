@@ -49,8 +49,8 @@ def public_headers(tree):
                 yield umbrella, 1, f"does not include deform/{name}"
 
 
-# Where what a plugin offers is called: the library, and the command with its validator.
-HOSTS = ("libdeform/src/", "bindings/cli/")
+# Where what a plugin offers is called: the library, the command and its validator.
+HOSTS = ("libdeform/src/", "bindings/cli/", "bindings/tools/")
 # For plugins alone: the head of the entry.
 NO_HOST = re.compile(r"DFM_(ABI_OK|CAT_?|EXPORT)$")
 # Members that keep a place in a table, without a type: plugin_draft.h has it (plugins_and_abi.md).

@@ -70,8 +70,8 @@ class Wheel(unittest.TestCase):
             self.assertIn(re.search(r"-([\d.]+)-py3", wheel.name).group(1), version)
             with zipfile.ZipFile(wheel) as zipped:
                 files = zipped.namelist()
-            for needed in ("deform/py.typed", "deform/native/lib/libdeform.so.0",
-                           "deform/native/include/deform/plugin.h"):
+            for needed in ("deform/py.typed", "deform/native/bin/deform-cost",
+                           "deform/native/lib/libdeform.so.0", "deform/native/include/deform/plugin.h"):
                 self.assertIn(needed, files)
 
     def test_tag_names_the_oldest_system_that_has_what_is_asked_for(self):
@@ -136,7 +136,7 @@ class Wheel(unittest.TestCase):
                 self.assertIn(entry, cache.replace(":UNINITIALIZED=", ":PATH="))
             targets = subprocess.run(["cmake", "--build", build, "--target", "help"], check=True,
                                      capture_output=True, text=True).stdout
-            for target in ("deform_command", "deform_python_native"):
+            for target in ("deform_tools", "deform_python_native"):
                 self.assertIn(target, targets)
             with self.assertRaisesRegex(SystemExit, "is no build folder of this tree"):
                 wheel_backend.build_wheel(name, {"prebuilt": name})

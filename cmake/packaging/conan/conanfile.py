@@ -76,7 +76,7 @@ class Deform(ConanFile):
     def build(self):
         cmake = CMake(self)
         cmake.configure()
-        cmake.build(target="deform_command")
+        cmake.build(target="deform_tools")
 
     def package(self):
         CMake(self).install()

@@ -1,8 +1,10 @@
-// deform mesh from-labels VOLUME --out DIR | phantom KIND --out FILE
+// deform-labels, which `deform mesh from-labels VOLUME --out DIR` and `deform mesh phantom KIND --out FILE`
+// start.
 #include <cstdio>
 #include <memory>
 
 #include "arguments.h"
+#include "become.h"
 #include "cmd_mesh.h"
 #include "file.h"
 #include "json_text.h"
@@ -163,13 +165,10 @@ struct Given {
   double voxel = 4;
 };
 
-}  // namespace
-
-void add_mesh_labels(Command mesh, Globals &globals, int *exit_code) {
+void add_commands(Command app, Globals &globals, int *exit_code) {
+  Command mesh = app.command("mesh");
   const auto given = std::make_shared<Given>();
-  Command command =
-      mesh.command("from-labels",
-                   "a segmented scan (a volume of labels) as closed surfaces, bodies, obstacles and a scene");
+  Command command = mesh.command(kFromLabels.name, kFromLabels.about);
   command
       .option("VOLUME", given->options.volume, ".nrrd, .nhdr, .mha or .mhd with one whole number per voxel")
       .required();
@@ -216,8 +215,7 @@ void add_mesh_labels(Command mesh, Globals &globals, int *exit_code) {
     *exit_code = from_labels(globals, o);
   });
 
-  Command phantom_command = mesh.command(
-      "phantom", "a volume of labels made from ellipsoids and cylinders, with the volumes that these have");
+  Command phantom_command = mesh.command(kPhantom.name, kPhantom.about);
   phantom_command.option("KIND", given->kind, "abdomen, or nodule: a block of gel with a ball in it")
       .required();
   phantom_command.option("--out", given->out, "file to write, .nrrd").required().type_name("FILE");
@@ -226,4 +224,7 @@ void add_mesh_labels(Command mesh, Globals &globals, int *exit_code) {
       [=, &globals] { *exit_code = phantom(globals, given->kind, given->voxel, given->out); });
 }
 
+}  // namespace
 }  // namespace cli
+
+int main(int argc, char **argv) { return cli::command_line(argc, argv, cli::add_commands); }

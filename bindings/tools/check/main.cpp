@@ -1,4 +1,4 @@
-// deform plugin check FILE: the command line of the validator (check/).
+// deform-check, which `deform plugin check` starts: the command line of the validator.
 #include <cstring>
 #include <filesystem>
 #include <memory>
@@ -6,15 +6,11 @@
 #include <utility>
 
 #include "arguments.h"
-#include "cli.h"
-#ifdef DEFORM_HAVE_CHECK
+#include "become.h"
 #include "check/command.h"
-#endif
+#include "cli.h"
 
 namespace cli {
-
-#ifdef DEFORM_HAVE_CHECK
-
 namespace {
 
 // The file of a plugin that is found by its short name or full id; the same text where it is none of them.
@@ -35,11 +31,8 @@ std::string file_of(const std::string &text, const Globals &globals) {
   return named.second;
 }
 
-}  // namespace
-
-void add_plugin_check(Command plugin, Globals &globals, int *exit_code) {
-  Command sub = plugin.command(
-      "check", "checks a plugin by rules, each in a separate process; exit code 1 if one is broken");
+void add_check(Command app, Globals &globals, int *exit_code) {
+  Command sub = app.command("plugin").command(kCheck.name, kCheck.about);
   auto request = std::make_shared<check::Request>();
   sub.option("FILE", request->file, "plugin file, or short name or full id of a plugin that is found")
       .required();
@@ -61,20 +54,7 @@ void add_plugin_check(Command plugin, Globals &globals, int *exit_code) {
   });
 }
 
-#else
-
-void add_plugin_check(Command plugin, Globals &, int *exit_code) {
-  Command sub = plugin.command("check", "checks a plugin by rules (not in this build, which loads no files)");
-  auto file = std::make_shared<std::string>();
-  sub.option("FILE", *file, "plugin file").required();
-  sub.calls([=] {
-    *exit_code = fail(
-        "\"plugin check\" opens plugin files, and this command was built to load none "
-        "(DEFORM_PLUGINS_STATIC); check " +
-        *file + " with a usual build");
-  });
-}
-
-#endif
-
+}  // namespace
 }  // namespace cli
+
+int main(int argc, char **argv) { return cli::command_line(argc, argv, cli::add_check); }

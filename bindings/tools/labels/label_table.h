@@ -1,6 +1,6 @@
 // What becomes of each label: a small JSON file, or defaults.
 #pragma once
-#include "../json_text.h"
+#include "json_text.h"
 #include "label_volume.h"
 
 namespace labels {

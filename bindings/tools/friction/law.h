@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "cli.h"
-#include "friction_case.h"
+#include "case.h"
 #include "slots.h"
 
 namespace cli {

@@ -1,4 +1,4 @@
-// deform friction CASE.json: a friction law on a rig.
+// deform-friction, which `deform friction CASE.json` starts: a friction law on a rig.
 #include <unistd.h>
 
 #include <cmath>
@@ -9,12 +9,13 @@
 #include <vector>
 
 #include "arguments.h"
+#include "become.h"
+#include "cli.h"
 #include "file.h"
-#include "friction_plot.h"
-#include "friction_rig.h"
+#include "plot.h"
+#include "rig.h"
 #include "json_text.h"
 #include "messages.h"
-#include "run.h"
 
 namespace cli {
 namespace {
@@ -136,12 +137,9 @@ int friction(const FrictionOptions &options, const Globals &globals) {
   return kStopped;
 }
 
-}  // namespace
-
 void add_friction(Command app, Globals &globals, int *exit_code) {
   const auto options = std::make_shared<FrictionOptions>();
-  Command sub = app.command(
-      "friction", "runs a friction law on a rig: a driven mass, a prescribed slip, a spring, ramps");
+  Command sub = app.command(kFriction.name, kFriction.about);
   sub.option("CASE", options->file,
              "JSON with law, params, input, output_times (libdeform/doc/reference/friction_rig.md)")
       .required();
@@ -153,4 +151,7 @@ void add_friction(Command app, Globals &globals, int *exit_code) {
   sub.calls([=, &globals] { *exit_code = friction(*options, globals); });
 }
 
+}  // namespace
 }  // namespace cli
+
+int main(int argc, char **argv) { return cli::command_line(argc, argv, cli::add_friction); }

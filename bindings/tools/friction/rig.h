@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "friction_case.h"
-#include "friction_law.h"
+#include "case.h"
+#include "law.h"
 #include "progress.h"
 
 namespace cli {

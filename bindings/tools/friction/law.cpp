@@ -1,4 +1,4 @@
-#include "friction_law.h"
+#include "law.h"
 
 #include <algorithm>
 #include <cmath>

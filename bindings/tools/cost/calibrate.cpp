@@ -1,3 +1,5 @@
+#include "calibrate.h"
+
 // deform calibrate: what the loaded models cost on this machine, and what they leave out, for the planner.
 #include <algorithm>
 #include <cmath>
@@ -9,6 +11,7 @@
 #include <utility>
 
 #include "arguments.h"
+#include "become.h"
 #include "costs_file.h"
 #include "file.h"
 #include "json_text.h"
@@ -473,8 +476,7 @@ void add_calibrate(Command app, Globals &globals, int *exit_code) {
     std::vector<std::string> models;
   };
   auto options = std::make_shared<Options>();
-  Command sub =
-      app.command("calibrate", "measures costs and errors of the models on this machine, for the planner");
+  Command sub = app.command(kCalibrate.name, kCalibrate.about);
   sub.option("--out", options->out,
              "file to write (default: $XDG_CONFIG_HOME/deform/costs.json, which the command then takes "
              "for every scene with an accuracy or a budget)")

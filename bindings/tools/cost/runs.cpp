@@ -17,6 +17,7 @@
 #include <thread>
 #include <utility>
 
+#include "become.h"
 #include "cli.h"
 #include "file.h"
 #include "messages.h"
@@ -32,14 +33,6 @@ constexpr double kMemoryShare = 0.25;  // of the machine's memory, for runs that
 volatile std::sig_atomic_t interrupted = 0;
 
 void on_signal(int) { interrupted = 1; }
-
-std::string command_path() {
-  char path[4096];
-  const ssize_t n = readlink("/proc/self/exe", path, sizeof path - 1);
-  if (n <= 0)
-    throw Failure(kBadInput, "/proc/self/exe cannot be read: the command does not know where it lies");
-  return std::string(path, size_t(n));
-}
 
 double number_in(const JsonValue &object, const char *key) {
   return std::strtod(object.get(key).c_str(), nullptr);
@@ -191,7 +184,7 @@ void Runs::start(Job &job, Child &out) {
   }
   make_folder(job.folder);
   std::remove((job.folder + "/outcome.json").c_str());
-  std::vector<std::string> words = {command_path(), "run", subject_.path, "--out", job.folder, "--quiet"};
+  std::vector<std::string> words = {beside("deform"), "run", subject_.path, "--out", job.folder, "--quiet"};
   for (const auto *const settings : {&subject_.planned, &std::as_const(job.set)})
     for (const auto &[pointer, value] : *settings) {
       words.push_back("--set");

@@ -1,4 +1,4 @@
-#include "friction_plot.h"
+#include "plot.h"
 
 #include <fcntl.h>
 #include <spawn.h>
@@ -11,7 +11,7 @@
 #include <cstring>
 #include <vector>
 
-#include "friction_plot_script.h"
+#include "plot_script.h"
 #include "messages.h"
 
 namespace cli {

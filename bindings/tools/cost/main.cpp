@@ -1,4 +1,5 @@
-// deform cost SCENE: what accuracy costs on this scene.
+// deform-cost, which `deform cost SCENE` and `deform calibrate` start: what accuracy costs on this scene, and
+// what models cost on this machine.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -6,6 +7,8 @@
 #include <thread>
 
 #include "arguments.h"
+#include "become.h"
+#include "calibrate.h"
 #include "cost/chart.h"
 #include "cost/meshes.h"
 #include "cost/page.h"
@@ -74,12 +77,10 @@ int cost_of(CostOptions options, Globals &globals) {
   return kDone;
 }
 
-}  // namespace
-
-void add_cost(Command app, Globals &globals, int *exit_code) {
+void add_commands(Command app, Globals &globals, int *exit_code) {
+  add_calibrate(app, globals, exit_code);
   auto options = std::make_shared<CostOptions>();
-  Command sub = app.command(
-      "cost", "what accuracy costs on a scene: models, steps, meshes, contact against a fine reference");
+  Command sub = app.command(kCost.name, kCost.about);
   sub.option("SCENE", options->scene, "scene file (JSON)").required();
   sub.option("--budget", options->study.budget,
              "time limit in seconds for all runs in DIR; a later call with a larger limit continues there")
@@ -112,4 +113,7 @@ void add_cost(Command app, Globals &globals, int *exit_code) {
   });
 }
 
+}  // namespace
 }  // namespace cli
+
+int main(int argc, char **argv) { return cli::command_line(argc, argv, cli::add_commands); }

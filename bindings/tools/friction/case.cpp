@@ -1,4 +1,4 @@
-#include "friction_case.h"
+#include "case.h"
 
 #include <algorithm>
 #include <cmath>

@@ -3,7 +3,7 @@
 // stable. That is first order, as the laws' own updates are (doc/laws/formulas.md (8)); a mass under a law
 // that does not jump at rest is taken to second order by extrapolation. Where the motion is prescribed the
 // law is given its mean over the step and left to its own order.
-#include "friction_rig.h"
+#include "rig.h"
 
 #include <algorithm>
 #include <cmath>

@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "become.h"
 #include "file.h"
 #include "messages.h"
 #include "scene_file.h"
@@ -297,7 +298,7 @@ Subject read_subject(const std::string &path, Globals &globals) {
   Dl_info library = {};
   if (dladdr(reinterpret_cast<void *>(&dfm_scene_open), &library) != 0 && library.dli_fname)
     hash.add_file(library.dli_fname);
-  hash.add_file("/proc/self/exe").add(dfm_version(nullptr, nullptr, nullptr));
+  hash.add_file(beside("deform")).add(dfm_version(nullptr, nullptr, nullptr));
   for (const std::string &file : files) hash.add_file(file);
   for (const auto &[pointer, value] : out.planned) hash.add(pointer).add(value);
   out.fingerprint = hash.value();
