@@ -24,6 +24,8 @@ void add_program(Command parent, const Globals &globals, const Program &program)
 
 inline constexpr Program kCalibrate = {
     "calibrate", "deform-cost", "measures costs and errors of the models on this machine, for the planner"};
+inline constexpr Program kCcd = {"ccd", "deform-ccd",
+                                 "times of impact of point-triangle and edge-edge queries"};
 inline constexpr Program kCost = {
     "cost", "deform-cost",
     "what accuracy costs on a scene: models, steps, meshes, contact against a fine reference"};

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "arguments.h"
+#include "become.h"
 #include "effect_costs.h"
 #include "json_text.h"
 #include "messages.h"
@@ -205,14 +206,15 @@ void print_fields(const JsonValue &plan) {
   }
 }
 
-int explain(const Options &options, Globals &globals) {
+int explain(const Options &options, Globals &globals, MeasureEffects *measure) {
+  if (options.costs && !measure) become("explain --costs", kCost.file, globals.words, kCost.missing);
   SceneFile scene(globals, options.scene, options.set, 0);
   const std::string text = scene.explain();
   JsonValue plan;
   if (!parse_json(text, plan))
     throw Failure(kBadInput, "the library's plan is not JSON: " + text.substr(0, 200));
   std::vector<EffectCost> costs;
-  if (options.costs) costs = measure_effects(globals, scene, options.set, plan);
+  if (options.costs) costs = measure(globals, scene, options.set, plan);
   const std::string planned = planned_json(scene);
   if (globals.json) {
     const std::string more = (options.costs ? ",\"costs\":" + costs_json(costs) : "") +
@@ -262,6 +264,10 @@ int explain(const Options &options, Globals &globals) {
 }  // namespace
 
 void add_explain(Command app, Globals &globals, int *exit_code) {
+  add_explain(app, globals, exit_code, nullptr);
+}
+
+void add_explain(Command app, Globals &globals, int *exit_code, MeasureEffects *measure) {
   auto options = std::make_shared<Options>();
   Command sub = app.command("explain", "the plan: effects, stages that run, stages left out and why");
   sub.option("SCENE", options->scene, "scene file (JSON)").required();
@@ -270,7 +276,7 @@ void add_explain(Command app, Globals &globals, int *exit_code) {
       .repeated();
   sub.flag("--costs", options->costs,
            "also measure, by steps with and without it, what each effect of a body costs here");
-  sub.calls([=, &globals] { *exit_code = explain(*options, globals); });
+  sub.calls([=, &globals] { *exit_code = explain(*options, globals, measure); });
 }
 
 }  // namespace cli

@@ -7,6 +7,7 @@
 
 namespace cli {
 
+class Command;
 struct JsonValue;
 
 // Processor time of a step with the effect less that of one without it, s: the median over pairs, and the
@@ -22,8 +23,11 @@ struct EffectCost {
 };
 
 // Of every effect that is at work and that a parameter switches off; plan: what scene.explain() says.
-std::vector<EffectCost> measure_effects(Globals &globals, SceneFile &scene,
-                                        const std::vector<std::string> &set, const JsonValue &plan);
+using MeasureEffects = std::vector<EffectCost>(Globals &globals, SceneFile &scene,
+                                               const std::vector<std::string> &set, const JsonValue &plan);
+MeasureEffects measure_effects;  // of deform-cost
+// `deform explain`. measure: for --costs; null: the command becomes deform-cost there.
+void add_explain(Command app, Globals &globals, int *exit_code, MeasureEffects *measure);
 
 // [{"body", "effect", "us_per_step", "low", "high", "share", "steps", "pairs"} or {.., "why_not"}]
 std::string costs_json(const std::vector<EffectCost> &costs);

@@ -11,7 +11,7 @@ int main(int argc, char **argv) {
     cli::add_program(top, globals, cli::kCalibrate);
     cli::add_mesh(top, globals, exit_code);
     cli::add_plugin(top, globals, exit_code);
-    cli::add_ccd(top, globals, exit_code);
+    cli::add_program(top, globals, cli::kCcd);
     cli::add_program(top, globals, cli::kFriction);
     cli::add_program(top, globals, cli::kCost);
     cli::add_view(top, globals, exit_code);

@@ -9,9 +9,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const std::vector<std::vector<std::string>> kTools = {{"plugin", "check"},     {"cost"},
-                                                      {"calibrate"},           {"friction"},
-                                                      {"mesh", "from-labels"}, {"mesh", "phantom"}};
+const std::vector<std::vector<std::string>> kTools = {
+    {"plugin", "check"},     {"cost"},           {"ccd"}, {"calibrate"}, {"friction"},
+    {"mesh", "from-labels"}, {"mesh", "phantom"}};
 
 }  // namespace
 

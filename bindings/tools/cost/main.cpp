@@ -1,5 +1,5 @@
-// deform-cost, which `deform cost SCENE` and `deform calibrate` start: what accuracy costs on this scene, and
-// what models cost on this machine.
+// deform-cost, which `deform cost SCENE`, `deform explain SCENE --costs` and `deform calibrate` start: what
+// accuracy and effects cost on this scene, and models on this machine.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -14,6 +14,7 @@
 #include "cost/page.h"
 #include "cost/patch.h"
 #include "cost/report.h"
+#include "effect_costs.h"
 #include "file.h"
 #include "messages.h"
 #include "out_folder.h"
@@ -79,6 +80,7 @@ int cost_of(CostOptions options, Globals &globals) {
 
 void add_commands(Command app, Globals &globals, int *exit_code) {
   add_calibrate(app, globals, exit_code);
+  add_explain(app, globals, exit_code, measure_effects);
   auto options = std::make_shared<CostOptions>();
   Command sub = app.command(kCost.name, kCost.about);
   sub.option("SCENE", options->scene, "scene file (JSON)").required();

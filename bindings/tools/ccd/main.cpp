@@ -1,4 +1,5 @@
-// deform ccd QUERIES.csv: times of impact of the point-triangle and edge-edge queries of a file.
+// deform-ccd, which `deform ccd QUERIES.csv` starts: times of impact of the point-triangle and edge-edge
+// queries of a file.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -9,10 +10,10 @@
 #include <vector>
 
 #include "arguments.h"
+#include "become.h"
 #include "file.h"
 #include "json_text.h"
 #include "messages.h"
-#include "run.h"
 
 namespace cli {
 namespace {
@@ -230,11 +231,9 @@ int ccd(const CcdOptions &options, const Globals &globals) {
   return kDone;
 }
 
-}  // namespace
-
 void add_ccd(Command app, Globals &globals, int *exit_code) {
   const auto options = std::make_shared<CcdOptions>();
-  Command sub = app.command("ccd", "times of impact of point-triangle and edge-edge queries");
+  Command sub = app.command(kCcd.name, kCcd.about);
   sub.option("QUERIES", options->file,
              "CSV with the columns id, kind (vf or ee), p0_t0_x to p3_t1_z; hit and toi_hi are compared with")
       .required();
@@ -248,4 +247,7 @@ void add_ccd(Command app, Globals &globals, int *exit_code) {
   sub.calls([=, &globals] { *exit_code = ccd(*options, globals); });
 }
 
+}  // namespace
 }  // namespace cli
+
+int main(int argc, char **argv) { return cli::command_line(argc, argv, cli::add_ccd); }
