@@ -15,7 +15,7 @@ std::string beside(const std::string &name);  // the path of a program in the fo
 [[noreturn]] void become(const std::string &subcommand, const std::string &name,
                          const std::vector<std::string> &words, const std::string &missing);
 
-// A subcommand whose command line its program reads, by the same rules (bindings/tools).
+// A subcommand whose command line its program reads, by the same rules (bindings/tools, bindings/view).
 struct Program {
   const char *name, *file, *about;
   const char *missing = "`make demo` leaves it out, `make tools` builds it";
@@ -46,5 +46,8 @@ inline constexpr Program kFromLabels = {
 inline constexpr Program kPhantom = {
     "phantom", "deform-labels",
     "a volume of labels made from ellipsoids and cylinders, with the volumes that these have"};
+inline constexpr Program kView = {
+    "view", "deform-view", "a window on a scene, with mouse, sliders and plots",
+    "with Debian's libglfw3-dev and libimgui-dev installed, `make view` builds it"};
 
 }  // namespace cli

@@ -35,7 +35,6 @@ void add_replay(Command app, Globals &globals, int *exit_code);
 void add_explain(Command app, Globals &globals, int *exit_code);
 void add_mesh(Command app, Globals &globals, int *exit_code);
 void add_plugin(Command app, Globals &globals, int *exit_code);
-void add_view(Command app, Globals &globals, int *exit_code);
 void add_contact(Command app, Globals &globals, int *exit_code);
 void add_montage(Command app, Globals &globals, int *exit_code);  // for `make demo`; not listed in --help
 

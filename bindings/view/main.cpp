@@ -1,14 +1,12 @@
-// deform-view: the program behind `deform view`, which checks the words and hands them over as pairs
-// `--name value`.
+// deform-view, which `deform view` starts: a window on a scene.
 #include <cstdio>
-#include <cstdlib>
-#include <exception>
-#include <new>
+#include <memory>
 
 #include "app.h"
-#include "leaving.h"
+#include "arguments.h"
+#include "become.h"
+#include "cli.h"
 #include "messages.h"
-#include "recording.h"
 
 namespace view {
 namespace {
@@ -21,43 +19,34 @@ void read_size(const std::string &text, Options &out) {
                        "--size " + text + ": expected WIDTHxHEIGHT, each 64 to 8192, such as 1280x720");
 }
 
-int run(int argc, char **argv) {
-  Options options;
-  cli::Globals &globals = cli::session_globals();
-  if (argc % 2 == 0) return cli::fail("deform-view is started by `deform view`; see: deform view --help");
-  for (int i = 1; i + 1 < argc; i += 2) {
-    const std::string name = argv[i], value = argv[i + 1];
-    if (name == "--scene") options.scene = value;
-    else if (name == "--replay") options.replay = value;
-    else if (name == "--script") options.script = value;
-    else if (name == "--from") options.from = value;
-    else if (name == "--out") options.out = value;
-    else if (name == "--detail") options.detail = value;
-    else if (name == "--set") options.set.push_back(value);
-    else if (name == "--size") read_size(value, options);
-    else if (name == "--threads") globals.threads = unsigned(std::strtoul(value.c_str(), nullptr, 10));
-    else if (name == "--quiet") globals.quiet = true;
-    else if (name == "--json") globals.json = true;
-    else return cli::fail("deform-view is started by `deform view`; see: deform view --help");
-  }
-  App(options, globals).run();
-  return cli::kDone;
+void add_view(cli::Command app, cli::Globals &globals, int *) {
+  const auto options = std::make_shared<Options>();
+  const auto size = std::make_shared<std::string>();
+  cli::Command sub = app.command(cli::kView.name, cli::kView.about);
+  sub.option("SCENE", options->scene, "scene file (JSON); not needed with --replay");
+  sub.option("--replay", options->replay, "show the states that `deform run --record` kept").type_name("DIR");
+  sub.option("--script", options->script, "no hands: lines `t key|drag|slider|shot ARGS`").type_name("FILE");
+  sub.option("--from", options->from, "begin with a state that `deform run --save` or the viewer wrote")
+      .type_name("FILE");
+  sub.option("--out", options->out, "folder for pictures, states and recordings (out/SCENE_view)")
+      .type_name("DIR");
+  sub.option("--set", options->set, "change a value of the scene")
+      .type_name("/json/pointer=value")
+      .repeated();
+  sub.option("--size", *size, "of the window in pixels (1280x720)").type_name("WxH");
+  sub.option("--detail", options->detail,
+             "light: full or fast (fast where OpenGL runs on the processor, else full)")
+      .one_of({"full", "fast"});
+  sub.calls([=, &globals] {
+    if (options->scene.empty() && options->replay.empty())
+      throw cli::Failure(cli::kBadInput,
+                         "view: SCENE is required, or --replay DIR (see: deform view --help)");
+    if (!size->empty()) read_size(*size, *options);
+    App(*options, globals).run();
+  });
 }
 
 }  // namespace
 }  // namespace view
 
-int main(int argc, char **argv) {
-  cli::guard_leaving();
-  try {
-    return cli::leave(view::run(argc, argv));
-  } catch (const cli::Failure &failure) {
-    cli::fail(failure.what());
-    return cli::leave(failure.exit_code);
-  } catch (const std::bad_alloc &) {
-    std::fputs("deform: out of memory\n", stderr);
-  } catch (const std::exception &error) {
-    std::fprintf(stderr, "deform: %s\n", error.what());
-  }
-  return cli::leave(cli::kBadInput);
-}
+int main(int argc, char **argv) { return cli::command_line(argc, argv, view::add_view); }
