@@ -8,20 +8,11 @@
 namespace cli {
 namespace {
 
-std::vector<double> numbers(const JsonValue &line, const char *key) {
-  std::vector<double> out;
-  if (const JsonValue *const list = line.find(key))
-    for (const JsonValue &item : list->items) out.push_back(std::strtod(item.text.c_str(), nullptr));
-  return out;
-}
-
 std::vector<double> vector(const JsonValue &line, const char *key) {
-  std::vector<double> out = numbers(line, key);
+  std::vector<double> out = line.numbers(key);
   if (out.size() != 3) throw Failure(kBadInput, std::string("expected three numbers under \"") + key + "\"");
   return out;
 }
-
-double scalar(const JsonValue &line, const char *key) { return std::strtod(line.get(key).c_str(), nullptr); }
 
 void cross(const double a[3], const double b[3], double out[3]) {
   for (int k = 0; k < 3; ++k) out[k] = a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
@@ -56,7 +47,7 @@ const BodyView &ByHand::body(const JsonValue &line) const {
 }
 
 void ByHand::pull(const JsonValue &line) {
-  const std::vector<double> points = numbers(line, "points"), weights = numbers(line, "weights");
+  const std::vector<double> points = line.numbers("points"), weights = line.numbers("weights");
   const std::vector<double> to = vector(line, "to");
   if (weights.size() != points.size()) throw Failure(kBadInput, "a pull needs one weight for each point");
   const std::vector<uint32_t> places(points.begin(), points.end());
@@ -66,8 +57,8 @@ void ByHand::pull(const JsonValue &line) {
   def.points = places.data();
   def.weights = weights.data();
   for (int i = 0; i < 3; ++i) def.to[i] = to[size_t(i)];
-  def.stiffness = scalar(line, "stiffness");
-  def.damping = scalar(line, "damping");
+  def.stiffness = line.scalar("stiffness");
+  def.damping = line.scalar("damping");
   const dfm_body of = body(line).handle;
   need(dfm_body_add_spring(of, &def, &spring_));
   body_ = of;
@@ -76,8 +67,8 @@ void ByHand::pull(const JsonValue &line) {
 void ByHand::drag(const JsonValue &line) {
   Drag d;
   d.to = vector(line, "to");
-  d.stiffness = scalar(line, "stiffness");
-  d.damping = scalar(line, "damping");
+  d.stiffness = line.scalar("stiffness");
+  d.damping = line.scalar("damping");
   d.rigid = line.find("rigid") != nullptr;
   dfm_body_measure m = {};
   m.size = sizeof m;
@@ -89,8 +80,8 @@ void ByHand::drag(const JsonValue &line) {
     need(dfm_rigid_get_measure(d.thing, &m));
   } else {
     const BodyView &of = body(line);
-    const std::vector<double> corners = numbers(line, "corners");
-    d.weights = numbers(line, "weights");
+    const std::vector<double> corners = line.numbers("corners");
+    d.weights = line.numbers("weights");
     if (corners.size() != 3 || d.weights.size() != 3)
       throw Failure(kBadInput, "a drag needs three corners and one weight for each");
     for (const double c : corners) {
@@ -157,7 +148,7 @@ void ByHand::before_step(double h) {
 
 void ByHand::act(const JsonValue &line) {
   const std::string what = line.get("do");
-  const double value = scalar(line, "value");
+  const double value = line.scalar("value");
   const std::string key = line.get("key");
   const dfm_param_value row = {key.c_str(), &value, 1};
   const dfm_params params = {sizeof(dfm_params), 1, &row};
@@ -188,7 +179,7 @@ void ByHand::act(const JsonValue &line) {
   } else if (what == "param") {
     need(dfm_body_set_params(body(line).handle, &params));
   } else if (what == "step") {
-    step_ = scalar(line, "length");
+    step_ = line.scalar("length");
   } else {
     throw Failure(kBadInput, "\"" + what + "\" is nothing that a hand does here");
   }

@@ -23,11 +23,9 @@ struct Options {
 
 void print_list(const JsonValue &plan, const char *key, const char *title,
                 const std::vector<std::string> &columns) {
-  const JsonValue *list = plan.find(key);
   std::printf("%s\n", title);
-  if (!list || list->items.empty()) std::printf("  none\n");
-  for (size_t i = 0; list && i < list->items.size(); ++i) {
-    const JsonValue &row = list->items[i];
+  if (plan.list(key).empty()) std::printf("  none\n");
+  for (const JsonValue &row : plan.list(key)) {
     std::printf("  %-20s", row.get("name").c_str());
     for (const std::string &column : columns)
       if (const std::string text = row.get(column); !text.empty())
@@ -38,56 +36,42 @@ void print_list(const JsonValue &plan, const char *key, const char *title,
 
 // What parameters call for, and the list of effects does not have.
 void print_left_out(const JsonValue &plan) {
-  const JsonValue *list = plan.find("left_out");
-  for (size_t i = 0; list && i < list->items.size(); ++i) {
-    const JsonValue &row = list->items[i];
+  for (const JsonValue &row : plan.list("left_out"))
     std::printf("  %-20s  off: not in the list of effects; %s calls for it: %s\n", row.get("name").c_str(),
                 row.get("of").c_str(), row.get("by").c_str());
-  }
 }
 
 // Parameters that do nothing, or something else than they name.
 void print_idle(const JsonValue &plan) {
-  const JsonValue *bodies = plan.find("bodies");
-  for (size_t i = 0; bodies && i < bodies->items.size(); ++i) {
-    const JsonValue *idle = bodies->items[i].find("idle");
-    for (size_t k = 0; idle && k < idle->items.size(); ++k)
-      std::printf("  %-20s  %s does not do what its name says: %s\n", bodies->items[i].get("name").c_str(),
-                  idle->items[k].get("name").c_str(), idle->items[k].get("why").c_str());
-  }
+  for (const JsonValue &body : plan.list("bodies"))
+    for (const JsonValue &parameter : body.list("idle"))
+      std::printf("  %-20s  %s does not do what its name says: %s\n", body.get("name").c_str(),
+                  parameter.get("name").c_str(), parameter.get("why").c_str());
 }
 
 // What models found when they made their bodies: how many modes, how much they hold.
 void print_facts(const JsonValue &plan) {
-  const JsonValue *bodies = plan.find("bodies");
-  for (size_t i = 0; bodies && i < bodies->items.size(); ++i) {
-    const JsonValue *facts = bodies->items[i].find("facts");
-    for (size_t k = 0; facts && k < facts->items.size(); ++k) {
-      const JsonValue &f = facts->items[k];
+  for (const JsonValue &body : plan.list("bodies")) {
+    for (const JsonValue &f : body.list("facts")) {
       const std::string unit = f.get("unit") == "1" ? "" : " " + f.get("unit");
-      std::printf("  %-20s  %s: %.4g%s  (%s)\n", bodies->items[i].get("name").c_str(), f.get("key").c_str(),
-                  std::strtod(f.get("value").c_str(), nullptr), unit.c_str(), f.get("label").c_str());
+      std::printf("  %-20s  %s: %.4g%s  (%s)\n", body.get("name").c_str(), f.get("key").c_str(),
+                  f.scalar("value"), unit.c_str(), f.get("label").c_str());
     }
   }
 }
 
 // Bodies whose energy is not compared with the work done on them.
 void print_unwatched(const JsonValue &plan) {
-  const JsonValue *bodies = plan.find("bodies");
-  for (size_t i = 0; bodies && i < bodies->items.size(); ++i)
-    if (const std::string why = bodies->items[i].get("unwatched"); !why.empty())
-      std::printf("  %-20s  not seen by the energy watch: %s\n", bodies->items[i].get("name").c_str(),
-                  why.c_str());
+  for (const JsonValue &body : plan.list("bodies"))
+    if (const std::string why = body.get("unwatched"); !why.empty())
+      std::printf("  %-20s  not seen by the energy watch: %s\n", body.get("name").c_str(), why.c_str());
 }
 
 // Models that bodies are to have later.
 void print_changes(const JsonValue &plan) {
-  const JsonValue *bodies = plan.find("bodies");
-  for (size_t i = 0; bodies && i < bodies->items.size(); ++i) {
-    const JsonValue *changes = bodies->items[i].find("changes");
-    for (size_t k = 0; changes && k < changes->items.size(); ++k) {
-      const JsonValue &c = changes->items[k];
-      std::printf("  %-20s  changes to %s  %s", bodies->items[i].get("name").c_str(), c.get("name").c_str(),
+  for (const JsonValue &body : plan.list("bodies")) {
+    for (const JsonValue &c : body.list("changes")) {
+      std::printf("  %-20s  changes to %s  %s", body.get("name").c_str(), c.get("name").c_str(),
                   c.get("when").c_str());
       if (const std::string own = c.get("integrator"); !own.empty())
         std::printf(", moved by %s", own.c_str());
@@ -104,15 +88,11 @@ void print_changes(const JsonValue &plan) {
 
 // Does one of them bound the step?
 void print_attachments(const JsonValue &plan) {
-  const JsonValue *bodies = plan.find("bodies");
-  for (size_t i = 0; bodies && i < bodies->items.size(); ++i) {
-    const JsonValue *list = bodies->items[i].find("attached");
-    for (size_t k = 0; list && k < list->items.size(); ++k) {
-      const JsonValue &a = list->items[k];
-      const bool spring = std::strtod(a.get("stiffness").c_str(), nullptr) > 0 ||
-                          std::strtod(a.get("damping").c_str(), nullptr) > 0;
-      const bool releases = std::strtod(a.get("release").c_str(), nullptr) > 0;
-      std::printf("  %-20s  attached to %s by %s surfels, %s%s\n", bodies->items[i].get("name").c_str(),
+  for (const JsonValue &body : plan.list("bodies")) {
+    for (const JsonValue &a : body.list("attached")) {
+      const bool spring = a.scalar("stiffness") > 0 || a.scalar("damping") > 0;
+      const bool releases = a.scalar("release") > 0;
+      std::printf("  %-20s  attached to %s by %s surfels, %s%s\n", body.get("name").c_str(),
                   a.get("to").c_str(), a.get("surfels").c_str(),
                   spring ? ("with " + a.get("stiffness") + " N/m").c_str() : "rigid",
                   releases ? (", released above " + a.get("release") + " N").c_str() : "");
@@ -121,15 +101,11 @@ void print_attachments(const JsonValue &plan) {
 }
 
 void print_cuts(const JsonValue &plan) {
-  const JsonValue *bodies = plan.find("bodies");
-  for (size_t i = 0; bodies && i < bodies->items.size(); ++i) {
-    const JsonValue &b = bodies->items[i];
-    const JsonValue *const list = b.find("cuts");
+  for (const JsonValue &b : plan.list("bodies")) {
     const std::string tears = b.get("tears_beyond");
     const bool may_tear = !tears.empty() && tears != "null";
     bool each_step = may_tear;
-    for (size_t k = 0; list && k < list->items.size(); ++k) {
-      const JsonValue &c = list->items[k];
+    for (const JsonValue &c : b.list("cuts")) {
       std::string most = c.get("most") == "0" ? "" : ", " + c.get("most");
       if (c.find("at")) {
         if (!most.empty()) most += " at most";
@@ -155,22 +131,18 @@ void print_cuts(const JsonValue &plan) {
 }
 
 bool changes_bound(const JsonValue &plan) {
-  const JsonValue *bodies = plan.find("bodies");
-  for (size_t i = 0; bodies && i < bodies->items.size(); ++i) {
-    const JsonValue *changes = bodies->items[i].find("changes");
-    for (size_t k = 0; changes && k < changes->items.size(); ++k)
-      if (std::strtod(changes->items[k].get("stable_s").c_str(), nullptr) > 0) return true;
-  }
+  for (const JsonValue &body : plan.list("bodies"))
+    for (const JsonValue &change : body.list("changes"))
+      if (change.scalar("stable_s") > 0) return true;
   return false;
 }
 
 // Which integrator moves each body, and how many explicit sub-steps would be in a step.
 void print_integrators(const JsonValue &plan) {
-  const JsonValue *bodies = plan.find("bodies");
-  for (size_t i = 0; bodies && i < bodies->items.size(); ++i) {
-    const JsonValue *own = bodies->items[i].find("integrator");
+  for (const JsonValue &body : plan.list("bodies")) {
+    const JsonValue *own = body.find("integrator");
     if (!own) continue;
-    std::printf("  %-20s  moves by: %s  %s", bodies->items[i].get("name").c_str(), own->get("used").c_str(),
+    std::printf("  %-20s  moves by: %s  %s", body.get("name").c_str(), own->get("used").c_str(),
                 own->get("why").c_str());
     if (const std::string n = own->get("substeps"); !n.empty())
       std::printf(" (explicit: %s sub-step%s of %s s in a step, bounded by point %s)", n.c_str(),
@@ -183,27 +155,20 @@ void print_integrators(const JsonValue &plan) {
 
 // Bodies whose forces are asked for in single precision.
 void print_precision(const JsonValue &plan) {
-  const JsonValue *bodies = plan.find("bodies");
-  for (size_t i = 0; bodies && i < bodies->items.size(); ++i) {
-    const JsonValue *own = bodies->items[i].find("precision");
+  for (const JsonValue &body : plan.list("bodies")) {
+    const JsonValue *own = body.find("precision");
     if (own && own->get("why") != "the default")
-      std::printf("  %-20s  forces in %s precision: %s\n", bodies->items[i].get("name").c_str(),
-                  own->get("used").c_str(), own->get("why").c_str());
+      std::printf("  %-20s  forces in %s precision: %s\n", body.get("name").c_str(), own->get("used").c_str(),
+                  own->get("why").c_str());
   }
 }
 
 // What differs from cell to cell, and who says so.
 void print_fields(const JsonValue &plan) {
-  const JsonValue *bodies = plan.find("bodies");
-  for (size_t i = 0; bodies && i < bodies->items.size(); ++i) {
-    const JsonValue &body = bodies->items[i];
-    const JsonValue *fields = body.find("fields");
-    for (size_t k = 0; fields && k < fields->items.size(); ++k) {
-      const JsonValue &f = fields->items[k];
+  for (const JsonValue &body : plan.list("bodies"))
+    for (const JsonValue &f : body.list("fields"))
       std::printf("  %-20s  %s by cell, from %s: %s to %s\n", body.get("name").c_str(), f.get("name").c_str(),
                   f.get("from").c_str(), f.get("min").c_str(), f.get("max").c_str());
-    }
-  }
 }
 
 int explain(const Options &options, Globals &globals, MeasureEffects *measure) {
@@ -252,7 +217,7 @@ int explain(const Options &options, Globals &globals, MeasureEffects *measure) {
       std::printf(", bounded by point %s of \"%s\"", step->get("worst_point").c_str(), body.c_str());
     if (const std::string reason = step->get("reason"); !reason.empty()) std::printf(": %s", reason.c_str());
     std::printf("\n");
-    const double stable = std::strtod(step->get("stable_s").c_str(), nullptr), asked = scene.settings().step;
+    const double stable = step->scalar("stable_s"), asked = scene.settings().step;
     if (asked > 0 && stable > 0)
       std::printf("  the scene asks for %g s: %s%g sub-step%s each\n", asked,
                   asked > stable ? "at least " : "", std::ceil(asked / stable - 1e-9),

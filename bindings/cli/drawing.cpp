@@ -21,8 +21,7 @@ double softest_of(const SceneFile &scene) {
   double least = HUGE_VAL;
   JsonValue materials;
   if (parse_json(scene.value("/materials"), materials))
-    for (const JsonMember &m : materials.members)
-      least = std::min(least, std::strtod(m.value.get("young").c_str(), nullptr));
+    for (const JsonMember &m : materials.members) least = std::min(least, m.value.scalar("young"));
   return std::isfinite(least) ? least : dfm_material_def_default().young;
 }
 

@@ -9,9 +9,8 @@ namespace {
 
 std::string switches_text(const JsonValue &effect, const char *which) {
   std::string out;
-  const JsonValue *const switches = effect.find("switches");
-  for (size_t i = 0; switches && i < switches->items.size(); ++i)
-    out += (i ? ", " : "") + switches->items[i].get("key") + " " + switches->items[i].get(which);
+  for (const JsonValue &s : effect.list("switches"))
+    out += (out.empty() ? "" : ", ") + s.get("key") + " " + s.get(which);
   return out;
 }
 
@@ -29,15 +28,11 @@ void print_cost(const EffectCost &c) {
 
 // The effects of each law: used, idle, or its own.
 void print_laws(const JsonValue &plan) {
-  const JsonValue *const laws = plan.find("laws");
-  if (laws && !laws->items.empty()) std::printf("effects of each law\n");
-  for (size_t l = 0; laws && l < laws->items.size(); ++l) {
-    const JsonValue &law = laws->items[l];
+  if (!plan.list("laws").empty()) std::printf("effects of each law\n");
+  for (const JsonValue &law : plan.list("laws")) {
     const std::string name = law.get("name"), asked = law.get("asked");
     if (asked != name) std::printf("  %-20s  in place of %s\n", name.c_str(), asked.c_str());
-    const JsonValue *const effects = law.find("effects");
-    for (size_t e = 0; effects && e < effects->items.size(); ++e) {
-      const JsonValue &effect = effects->items[e];
+    for (const JsonValue &effect : law.list("effects")) {
       const bool works = effect.get("works") == "true";
       const char *const word = effect.get("used") == "true" ? "used" : works ? "on, not asked for" : "idle";
       std::printf("  %-20s  %-18s  %s%s\n", name.c_str(), effect.get("name").c_str(), word,
@@ -75,16 +70,13 @@ std::string costs_json(const std::vector<EffectCost> &costs) {
 }
 
 void print_effects(const JsonValue &plan, const std::vector<EffectCost> *costs) {
-  const JsonValue *const bodies = plan.find("bodies");
   print_laws(plan);
   bool measurable = false;
   std::printf("effects of each body%s\n",
               costs ? ", and the processor time that each adds to a step, by pairs with and without it" : "");
-  for (size_t b = 0; bodies && b < bodies->items.size(); ++b) {
-    const std::string body = bodies->items[b].get("name");
-    const JsonValue *const effects = bodies->items[b].find("effects");
-    for (size_t e = 0; effects && e < effects->items.size(); ++e) {
-      const JsonValue &effect = effects->items[e];
+  for (const JsonValue &b : plan.list("bodies")) {
+    const std::string body = b.get("name");
+    for (const JsonValue &effect : b.list("effects")) {
       const std::string name = effect.get("name"), off = switches_text(effect, "off");
       const bool works = effect.get("works") == "true";
       const char *const word = effect.get("used") == "true" ? "used" : works ? "on, not asked for" : "idle";

@@ -37,9 +37,7 @@ double length(const double v[3]) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + 
 double share_of(double way, double speed, double h) { return way > speed * h ? speed * h / way : 1; }
 
 std::vector<double> numbers(const JsonValue &line, const char *key, size_t n) {
-  std::vector<double> out;
-  if (const JsonValue *const list = line.find(key))
-    for (const JsonValue &item : list->items) out.push_back(std::strtod(item.text.c_str(), nullptr));
+  std::vector<double> out = line.numbers(key);
   if (out.size() != n)
     throw Failure(kBadInput, "expected " + std::to_string(n) + " numbers under \"" + key + "\"");
   return out;
@@ -72,8 +70,8 @@ void HeldTools::lead(const JsonValue &line) {
   Held &h = held(line.get("tool"));
   std::copy_n(to.data(), 3, h.to.position);
   std::copy_n(rotation.data(), 4, h.to.rotation);
-  h.opening = std::strtod(line.get("opening").c_str(), nullptr);
-  h.speed = std::strtod(line.get("speed").c_str(), nullptr);
+  h.opening = line.scalar("opening");
+  h.speed = line.scalar("speed");
   h.returns = false;
   h.line = line;
 }
@@ -81,7 +79,7 @@ void HeldTools::lead(const JsonValue &line) {
 void HeldTools::let(const JsonValue &line) {
   Held &h = held(line.get("tool"));
   h.returns = true;
-  h.speed = std::strtod(line.get("speed").c_str(), nullptr);
+  h.speed = line.scalar("speed");
   h.line = line;
 }
 

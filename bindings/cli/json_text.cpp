@@ -89,6 +89,20 @@ std::string JsonValue::get(const std::string &key) const {
   return v && v->kind != JsonValue::null ? v->text : std::string();
 }
 
+double JsonValue::scalar(const std::string &key) const { return std::strtod(get(key).c_str(), nullptr); }
+
+std::vector<double> JsonValue::numbers(const std::string &key) const {
+  std::vector<double> out;
+  for (const JsonValue &item : list(key)) out.push_back(std::strtod(item.text.c_str(), nullptr));
+  return out;
+}
+
+const std::vector<JsonValue> &JsonValue::list(const std::string &key) const {
+  static const std::vector<JsonValue> none;
+  const JsonValue *v = find(key);
+  return v ? v->items : none;
+}
+
 namespace {
 
 class Reader {

@@ -30,7 +30,10 @@ struct JsonValue {
   std::vector<JsonValue> items;
   std::vector<JsonMember> members;
   const JsonValue *find(const std::string &key) const;
-  std::string get(const std::string &key) const;  // text of a member, "" where absent
+  std::string get(const std::string &key) const;                     // text of a member, "" where absent
+  double scalar(const std::string &key) const;                       // 0 where absent
+  const std::vector<JsonValue> &list(const std::string &key) const;  // items of a member, none where absent
+  std::vector<double> numbers(const std::string &key) const;
 };
 struct JsonMember {
   std::string name;

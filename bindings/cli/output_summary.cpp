@@ -60,10 +60,9 @@ dfm_body_measure rigid_measure(const RigidView &rigid) {
 void add_unwatched(const SceneFile &scene, RunResult &run) {
   JsonValue plan;
   parse_json(scene.explain(), plan);
-  const JsonValue *const bodies = plan.find("bodies");
-  for (size_t i = 0; bodies && i < bodies->items.size(); ++i)
-    if (const std::string why = bodies->items[i].get("unwatched"); !why.empty())
-      run.unwatched.emplace(bodies->items[i].get("name"), why);
+  for (const JsonValue &body : plan.list("bodies"))
+    if (const std::string why = body.get("unwatched"); !why.empty())
+      run.unwatched.emplace(body.get("name"), why);
 }
 
 Checker::Checker(const SceneFile &scene) : scene_(scene), positions_(scene.bodies().size()) {
@@ -204,8 +203,7 @@ std::string stages_json(const SceneFile &scene, uint64_t steps) {
 
 std::string names_json(const JsonValue &plan, const char *key) {
   std::vector<std::string> names;
-  if (const JsonValue *list = plan.find(key))
-    for (const JsonValue &row : list->items) names.push_back(quoted(row.get("name")));
+  for (const JsonValue &row : plan.list(key)) names.push_back(quoted(row.get("name")));
   return json_array(names);
 }
 
@@ -226,12 +224,10 @@ std::string plugins_json(const SceneFile &scene) {
 
 // "facts" of a body in the library's plan, by key; "" if its model has none.
 std::string facts_json(const JsonValue &plan, const std::string &body) {
-  const JsonValue *const bodies = plan.find("bodies");
-  for (size_t b = 0; bodies && b < bodies->items.size(); ++b) {
-    const JsonValue *const facts = bodies->items[b].find("facts");
-    if (bodies->items[b].get("name") != body || !facts || facts->items.empty()) continue;
+  for (const JsonValue &b : plan.list("bodies")) {
+    if (b.get("name") != body || b.list("facts").empty()) continue;
     JsonObject out;
-    for (const JsonValue &f : facts->items) out.add(f.get("key"), f.get("value"));
+    for (const JsonValue &f : b.list("facts")) out.add(f.get("key"), f.get("value"));
     return out.text();
   }
   return "";
@@ -294,10 +290,9 @@ AutoShare auto_share(const JsonValue &plan) {
   AutoShare out;
   const JsonValue *const own = plan.find("auto");
   if (!own || !own->find("steps_s")) return out;
-  const auto value = [&](const char *key) { return std::strtod(own->get(key).c_str(), nullptr); };
-  out.steps = value("steps_s");
-  out.implicit = value("implicit_s");
-  out.changes = value("changes");
+  out.steps = own->scalar("steps_s");
+  out.implicit = own->scalar("implicit_s");
+  out.changes = own->scalar("changes");
   return out;
 }
 
@@ -450,7 +445,7 @@ void print_undamped(const SceneFile &scene) {
   for (const JsonMember &m : materials.members)
     if (const JsonValue *const damping = m.value.find("damping"))
       for (const char *key : {"mass", "stiffness"})
-        if (std::strtod(damping->get(key).c_str(), nullptr) > 0) return;
+        if (damping->scalar(key) > 0) return;
   std::printf(
       "no material has damping, so bodies may swing for long: \"damping\": {\"mass\": 1, \"stiffness\": "
       "0.001} "

@@ -11,26 +11,24 @@ namespace {
 
 std::string percent(const JsonValue &row, const char *key) {
   char text[32];
-  const double share = 100 * std::strtod(row.get(key).c_str(), nullptr);
+  const double share = 100 * row.scalar(key);
   std::snprintf(text, sizeof text, share < 99.5 ? "%.2g %%" : "%.0f %%", share);
   return text;
 }
-double value(const JsonValue &row, const char *key) { return std::strtod(row.get(key).c_str(), nullptr); }
 
 void print_way(const JsonValue &way, const char *begin) {
-  const JsonValue *const bodies = way.find("bodies");
+  const std::vector<JsonValue> &bodies = way.list("bodies");
   std::string models;
-  for (size_t i = 0; bodies && i < bodies->items.size() && i < 4; ++i)
-    models += (i ? ", " : "") + bodies->items[i].get("model");
-  if (bodies && bodies->items.size() > 4) models += ", ...";
-  const std::string scheme = bodies && !bodies->items.empty() ? bodies->items[0].get("integrator") : "";
+  for (size_t i = 0; i < bodies.size() && i < 4; ++i) models += (i ? ", " : "") + bodies[i].get("model");
+  if (bodies.size() > 4) models += ", ...";
+  const std::string scheme = bodies.empty() ? "" : bodies[0].get("integrator");
   char step[32] = "auto", each[32] = "1/60 s";
-  const double h = value(way, "step");
+  const double h = way.scalar("step");
   if (h > 0) std::snprintf(step, sizeof step, "%.3g ms", 1e3 * h);
-  if (std::fabs(h - value(way, "frame_s")) < 1e-6 * h) std::snprintf(each, sizeof each, "step");
+  if (std::fabs(h - way.scalar("frame_s")) < 1e-6 * h) std::snprintf(each, sizeof each, "step");
   std::printf("%s%-38s  %-16s  step %-9s  error %-8s  %.3g s of processor per second, %.3g ms per %s\n",
               begin, models.c_str(), scheme.c_str(), step, percent(way, "error").c_str(),
-              value(way, "cpu_s_per_s"), value(way, "ms_per_step"), each);
+              way.scalar("cpu_s_per_s"), way.scalar("ms_per_step"), each);
 }
 
 }  // namespace
@@ -45,22 +43,17 @@ void print_planned(const std::string &json) {
   if (json.empty() || !parse_json(json, plan)) return;
   std::printf("planner (predicted, not measured; deform cost measures)\n  by costs of: %s\n",
               plan.get("costs").c_str());
-  const JsonValue *const assumed = plan.find("assumed"), *const set = plan.find("set"),
-                         *const way = plan.find("predicted"), *const ways = plan.find("considered");
-  for (size_t i = 0; assumed && i < assumed->items.size(); ++i)
-    std::printf("  assumed: %s\n", assumed->items[i].text.c_str());
-  for (size_t i = 0; ways && i < ways->items.size(); ++i) print_way(ways->items[i], "  possible: ");
+  const JsonValue *const set = plan.find("set"), *const way = plan.find("predicted");
+  for (const JsonValue &assumed : plan.list("assumed")) std::printf("  assumed: %s\n", assumed.text.c_str());
+  for (const JsonValue &other : plan.list("considered")) print_way(other, "  possible: ");
   if (way) {
     print_way(*way, plan.get("meets") == "true" ? "  chosen:   " : "  nearest:  ");
     if (const std::string missed = plan.get("missed"); !missed.empty())
       std::printf("  missed:   %s; deform cost measures what each costs\n", missed.c_str());
-    const JsonValue *const bodies = way->find("bodies");
-    for (size_t i = 0; bodies && i < bodies->items.size(); ++i) {
-      const JsonValue &b = bodies->items[i];
+    for (const JsonValue &b : way->list("bodies"))
       std::printf("  %-20s  %s: error of the model %s, of time %s, of the mesh %s\n", b.get("name").c_str(),
                   b.get("model").c_str(), percent(b, "model_error").c_str(), percent(b, "time_error").c_str(),
                   percent(b, "mesh_error").c_str());
-    }
   }
   for (size_t i = 0; set && i < set->members.size(); ++i)
     std::printf("  to fix it in the scene: --set %s=%s\n", set->members[i].name.c_str(),

@@ -74,8 +74,7 @@ Recording read_recording(const std::string &run) {
   Recording out;
   out.scene = text.get("scene");
   out.jitter = std::strtoull(text.get("jitter").c_str(), nullptr, 10);
-  if (const JsonValue *const set = text.find("set"))
-    for (const JsonValue &s : set->items) out.set.push_back(s.text);
+  for (const JsonValue &s : text.list("set")) out.set.push_back(s.text);
   std::istringstream rows(read_file(index, kMostIndex, "a recording's states.csv"));
   std::string row;
   for (std::getline(rows, row); std::getline(rows, row);) {
@@ -90,7 +89,7 @@ Recording read_recording(const std::string &run) {
     while (std::getline(lines, row)) {
       RecordedAct act;
       if (!parse_json(row, act.line)) throw Failure(kBadInput, acts + ": damaged; record the run again");
-      act.t = std::strtod(act.line.get("t").c_str(), nullptr);
+      act.t = act.line.scalar("t");
       out.acts.push_back(std::move(act));
     }
   }

@@ -48,14 +48,10 @@ std::set<std::string> called(const SceneFile &scene) {
   if (!parse_json(scene.explain(), plan))
     throw Failure(kBadInput, scene.path() + ": its plan cannot be read");
   std::set<std::string> out;
-  const auto rows = [](const JsonValue &of, const char *name) {
-    const JsonValue *const found = of.find(name);
-    return found ? found->items : std::vector<JsonValue>();
-  };
-  for (const JsonValue &law : rows(plan, "laws")) out.insert(law.get("name"));
-  for (const JsonValue &body : rows(plan, "bodies")) {
+  for (const JsonValue &law : plan.list("laws")) out.insert(law.get("name"));
+  for (const JsonValue &body : plan.list("bodies")) {
     out.insert(body.get("model"));
-    for (const JsonValue &change : rows(body, "changes")) out.insert(change.get("name"));
+    for (const JsonValue &change : body.list("changes")) out.insert(change.get("name"));
   }
   JsonValue solver;
   if (parse_json(scene.value("/solver/type"), solver)) out.insert(solver.text);
@@ -98,10 +94,9 @@ void check_versions(const SceneFile &scene, const std::string &path, const JsonV
   if (head.get("library") != library)
     refuse(path, "written by version " + head.get("library") + " of the library, and this is " + library +
                      "; run the scene again, or use that version");
-  const JsonValue *const rows = head.find("plugins");
   const std::map<std::string, std::string> here = versions(scene);
-  for (size_t i = 0; rows && i < rows->items.size(); ++i) {
-    const std::string id = rows->items[i].get("id"), then = rows->items[i].get("version");
+  for (const JsonValue &row : head.list("plugins")) {
+    const std::string id = row.get("id"), then = row.get("version");
     const auto now = here.find(id);
     if (now == here.end()) continue;  // where it is needed the restore says so
     if (now->second != then)

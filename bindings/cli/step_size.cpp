@@ -49,7 +49,7 @@ void check_first_step(const SceneFile &scene) {
   for (const JsonValue &body : bodies->items)
     if (const JsonValue *const by = body.find("integrator"); body.get("name") == name && by)
       if (by->get("why").rfind("auto", 0) == 0) return;
-  const double stable = std::strtod(bound->get("stable_s").c_str(), nullptr);  // 0: nothing bounds it
+  const double stable = bound->scalar("stable_s");  // 0: nothing bounds it
   const double start = dfm_world_time(scene.world()), step = next_step(scene, start, start);
   const uint32_t most = dfm_world_def_default().max_substeps;  // scenes have no key for it
   if (!(stable > 0) || !(std::ceil(step / stable - 1e-9) > most)) return;

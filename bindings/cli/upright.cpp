@@ -28,7 +28,7 @@ Upright::Upright(const SceneFile &scene) {
   if (const JsonValue *const keys = gravity.find("keyframes")) {
     for (const JsonValue &key : keys->items)
       if (const JsonValue *const value = key.find("value"))
-        keys_.push_back({std::strtod(key.get("t").c_str(), nullptr), vector_of(*value)});
+        keys_.push_back({key.scalar("t"), vector_of(*value)});
   } else {
     keys_.push_back({0, vector_of(gravity)});
   }

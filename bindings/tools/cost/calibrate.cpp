@@ -85,7 +85,7 @@ class Bar {
     const bool good = parse_json(text.substr(0, text.find('\0')), plan);
     const JsonValue *const step = good ? plan.find("step") : nullptr;
     if (!step) throw Failure(kBadInput, "the plan of a bar has no step");
-    return std::strtod(step->get("stable_s").c_str(), nullptr) / kUsed;
+    return step->scalar("stable_s") / kUsed;
   }
   // s, in which a pressure wave goes by the size that the planner takes for that of cells
   double wave_time() const {

@@ -55,19 +55,24 @@ class Course {
 };
 
 bool works(const JsonValue &plan, const std::string &body, const std::string &effect) {
-  const JsonValue *const bodies = plan.find("bodies");
-  for (size_t b = 0; bodies && b < bodies->items.size(); ++b) {
-    const JsonValue *const effects = bodies->items[b].find("effects");
-    for (size_t e = 0; effects && bodies->items[b].get("name") == body && e < effects->items.size(); ++e)
-      if (effects->items[e].get("name") == effect) return effects->items[e].get("works") == "true";
-  }
+  for (const JsonValue &b : plan.list("bodies"))
+    for (const JsonValue &e : b.list("effects"))
+      if (b.get("name") == body && e.get("name") == effect) return e.get("works") == "true";
   return false;
 }
 
+std::vector<std::string> names_of(const JsonValue &plan, const char *list) {
+  std::vector<std::string> out;
+  for (const JsonValue &row : plan.list(list)) out.push_back(row.get("name"));
+  return out;
+}
+
+bool is_in(const std::vector<std::string> &names, const std::string &name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
 bool planned(const JsonValue &plan, const std::string &effect) {
-  const JsonValue *const list = plan.find("effects");
-  const auto same = [&](const JsonValue &e) { return e.get("name") == effect; };
-  return list && std::any_of(list->items.begin(), list->items.end(), same);
+  return is_in(names_of(plan, "effects"), effect);
 }
 
 std::string text_of(const JsonValue &value) {
@@ -176,17 +181,6 @@ std::string params_of(const SceneFile &scene, const std::string &body) {
   }
 }
 
-std::vector<std::string> names_of(const JsonValue &plan, const char *list) {
-  std::vector<std::string> out;
-  const JsonValue *const rows = plan.find(list);
-  for (size_t i = 0; rows && i < rows->items.size(); ++i) out.push_back(rows->items[i].get("name"));
-  return out;
-}
-
-bool is_in(const std::vector<std::string> &names, const std::string &name) {
-  return std::find(names.begin(), names.end(), name) != names.end();
-}
-
 // The plan's effects as a list that leaves some out.
 std::string list_without(const JsonValue &plan, const std::vector<std::string> &gone) {
   std::vector<std::string> names;
@@ -200,18 +194,15 @@ bool is_listed(const SceneFile &scene) { return scene.value("/effects").rfind('[
 // What bodies or laws of the plan bring.
 std::vector<std::string> brought(const JsonValue &plan, const char *by) {
   std::vector<std::string> out;
-  const JsonValue *const things = plan.find(by);
-  for (size_t i = 0; things && i < things->items.size(); ++i)
-    for (std::string &name : names_of(things->items[i], "effects")) out.push_back(std::move(name));
+  for (const JsonValue &thing : plan.list(by))
+    for (std::string &name : names_of(thing, "effects")) out.push_back(std::move(name));
   return out;
 }
 
 bool law_has(const JsonValue &plan, const std::string &effect) {
-  const JsonValue *const laws = plan.find("laws");
-  for (size_t l = 0; laws && l < laws->items.size(); ++l)
-    if (const JsonValue *const effects = laws->items[l].find("effects"))
-      for (const JsonValue &e : effects->items)
-        if (e.get("name") == effect && e.get("works") == "true") return true;
+  for (const JsonValue &law : plan.list("laws"))
+    for (const JsonValue &e : law.list("effects"))
+      if (e.get("name") == effect && e.get("works") == "true") return true;
   return false;
 }
 
@@ -227,22 +218,19 @@ std::vector<EffectCost> measure_effects(Globals &globals, SceneFile &scene,
   const Patience patience(!globals.quiet && !globals.json, "measuring effects");
   const Quiet quiet(globals);
   Meter meter(globals, scene, set);
-  const JsonValue *const bodies = plan.find("bodies");
-  for (size_t b = 0; bodies && b < bodies->items.size(); ++b) {
-    const std::string body = bodies->items[b].get("name");
-    const JsonValue *const effects = bodies->items[b].find("effects");
-    for (size_t e = 0; effects && e < effects->items.size(); ++e) {
-      const JsonValue &effect = effects->items[e];
+  for (const JsonValue &b : plan.list("bodies")) {
+    const std::string body = b.get("name");
+    for (const JsonValue &effect : b.list("effects")) {
       const std::string name = effect.get("name");
-      const JsonValue *const switches = effect.find("switches");
-      if (effect.get("works") != "true" || !switches || switches->items.empty()) continue;
+      const std::vector<JsonValue> &switches = effect.list("switches");
+      if (effect.get("works") != "true" || switches.empty()) continue;
       Off off;
       if (is_listed(scene)) {
         off.set.push_back(list_without(plan, {name}));
       } else {
-        for (const JsonValue &s : switches->items) {
+        for (const JsonValue &s : switches) {
           off.params.push_back(params_of(scene, body) + s.get("key") + "=" + text_of(*s.find("off")));
-          off.values.emplace_back(s.get("key"), std::strtod(s.get("off_value").c_str(), nullptr));
+          off.values.emplace_back(s.get("key"), s.scalar("off_value"));
         }
       }
       out.push_back(

@@ -34,10 +34,6 @@ volatile std::sig_atomic_t interrupted = 0;
 
 void on_signal(int) { interrupted = 1; }
 
-double number_in(const JsonValue &object, const char *key) {
-  return std::strtod(object.get(key).c_str(), nullptr);
-}
-
 bool read_json(const std::string &path, JsonValue &out) {
   std::error_code error;
   if (!fs::exists(path, error)) return false;
@@ -117,7 +113,7 @@ Runs::Runs(const Subject &subject, const std::string &out, unsigned parallel, do
   JsonValue spent;
   if (read_json(out_ + "/runs/spent.json", spent) &&
       spent.get("fingerprint") == std::to_string(subject.fingerprint))
-    spent_before_ = number_in(spent, "seconds");
+    spent_before_ = spent.scalar("seconds");
   struct sigaction action = {};
   action.sa_handler = on_signal;
   action.sa_flags = static_cast<int>(SA_RESETHAND);
@@ -150,15 +146,15 @@ void Runs::prepare(Job &job, const std::string &kind) const {
   JsonValue kept;
   if (!read_json(job.folder + "/outcome.json", kept)) return;
   Outcome &o = job.outcome;
-  o.state = Outcome::State(int(number_in(kept, "state")));
+  o.state = Outcome::State(int(kept.scalar("state")));
   o.sentence = kept.get("sentence");
-  o.cpu = number_in(kept, "cpu_s");
-  o.simulated = number_in(kept, "simulated_s");
-  o.took = number_in(kept, "took_s");
-  o.made = number_in(kept, "made_s");
-  o.limit = number_in(kept, "limit_s");
-  o.steps = number_in(kept, "steps");
-  o.cells = number_in(kept, "cells");
+  o.cpu = kept.scalar("cpu_s");
+  o.simulated = kept.scalar("simulated_s");
+  o.took = kept.scalar("took_s");
+  o.made = kept.scalar("made_s");
+  o.limit = kept.scalar("limit_s");
+  o.steps = kept.scalar("steps");
+  o.cells = kept.scalar("cells");
   o.kept = true;
 }
 
@@ -262,11 +258,11 @@ void Runs::take_result(Child &child, int status) {
   const int code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   JsonValue summary;
   const bool whole = read_json(job.folder + "/summary.json", summary);
-  o.cpu = number_in(summary, "cpu_s");
-  o.simulated = number_in(summary, "simulated_s");
-  o.steps = number_in(summary, "steps");
+  o.cpu = summary.scalar("cpu_s");
+  o.simulated = summary.scalar("simulated_s");
+  o.steps = summary.scalar("steps");
   if (const JsonValue *const bodies = summary.find("bodies"))
-    for (const JsonMember &body : bodies->members) o.cells += number_in(body.value, "cells");
+    for (const JsonMember &body : bodies->members) o.cells += body.value.scalar("cells");
   o.sentence = last_sentence(job.folder + "/stderr.txt", subject_);
   if (code == kDone && whole && summary.get("finite") == "true") {
     o.state = Outcome::done;

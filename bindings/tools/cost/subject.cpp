@@ -53,7 +53,7 @@ std::array<double, 4> inverse_rotation(const JsonValue *pose) {
   for (size_t k = 0; k < 3; ++k) a[k] = std::strtod(axis->items[k].text.c_str(), nullptr);
   for (const double x : a) n += x * x;
   if (!(n > 0)) return q;
-  const double half = std::strtod(rotation->get("angle_deg").c_str(), nullptr) * std::acos(-1.0) / 360;
+  const double half = rotation->scalar("angle_deg") * std::acos(-1.0) / 360;
   for (size_t k = 0; k < 3; ++k) q[k] = -std::sin(half) * a[k] / std::sqrt(n);
   q[3] = std::cos(half);
   return q;
@@ -147,7 +147,7 @@ void read_bodies(const SceneFile &scene, const JsonValue &plan, Subject &out) {
 
 double stable_step(const JsonValue &plan) {
   const JsonValue *const step = plan.find("step");
-  const double h = step ? std::strtod(step->get("stable_s").c_str(), nullptr) : 0;
+  const double h = step ? step->scalar("stable_s") : 0;
   return std::isfinite(h) ? h : 0;
 }
 
@@ -284,8 +284,7 @@ Subject read_subject(const std::string &path, Globals &globals) {
   read_bodies(scene, plan, out);
   if (out.bodies.empty())
     throw Failure(kBadInput, path + ": has no deformable body whose cost could be shown");
-  if (const JsonValue *const stages = plan.find("stages"))
-    for (const JsonValue &stage : stages->items) out.contact |= stage.get("name") == "narrow";
+  for (const JsonValue &stage : plan.list("stages")) out.contact |= stage.get("name") == "narrow";
   out.stable = out.implicit ? explicit_step(globals, out) : stable_step(plan);
   const JsonValue *const rules = out.find("/contact/friction");
   out.friction = out.contact && rules && !rules->items.empty();

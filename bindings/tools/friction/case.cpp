@@ -252,9 +252,8 @@ class CaseReader {
     if (c.drive != Drive::loaded) return;
     const std::string form = input_->get("form");
     bool excess = false;
-    if (const JsonValue *columns = root_.find("columns"))
-      for (const JsonValue &column : columns->items)
-        excess |= column.get("name") == "cone_excess" || column.text == "cone_excess";
+    for (const JsonValue &column : root_.list("columns"))
+      excess |= column.get("name") == "cone_excess" || column.text == "cone_excess";
     if (excess || (!form.empty() && form.find("a_open") == std::string::npos))
       refuse("/input",
              "asks for a normal force without projection on the friction cone; only the projected form, Fn = "

@@ -563,8 +563,7 @@ class Maker {
   // Ours, then those of the table.
   static void add_list(JsonObject &out, const char *key, std::vector<std::string> ours,
                        const JsonValue &more) {
-    if (const JsonValue *own = more.find(key))
-      for (const JsonValue &a : own->items) ours.push_back(cli::json_text(a));
+    for (const JsonValue &a : more.list(key)) ours.push_back(cli::json_text(a));
     if (!ours.empty()) out.add(key, cli::json_array(ours));
   }
   static std::string rounded(double x) {
