@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdio>
+#include <filesystem>
 
 #include "support.h"
 
@@ -38,6 +39,15 @@ TEST(PluginCommand, ListAsJson_IsOneObject) {
   EXPECT_TRUE(has(r.out, "\"types\": [") && has(r.out, "\"id\": \"org.deform.coulomb\"") &&
               has(r.out, "\"passed\": ["))
       << r.out;
+}
+
+// A plugin that is made by the guide lies in a folder of its name.
+TEST(PluginCommand, CheckByName_PassesOverAFolderOfThatName) {
+  const std::string dir = test::scratch("check_by_name");
+  std::filesystem::create_directories(dir + "/coulomb");
+  const auto r =
+      test::run({"/usr/bin/env", "-C", dir, DEFORM_COMMAND, "plugin", "check", "coulomb", "--only", "V03"});
+  EXPECT_EQ(r.exit_code, 0) << r.err;
 }
 
 TEST(PluginCommand, Info_ShowsTheParameterTable) {

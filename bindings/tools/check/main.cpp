@@ -340,7 +340,8 @@ int run(const Globals &globals, const Request &request) {
 // The file of a plugin that is found by its short name or full id; the same text where it is none of them.
 std::string file_of(const std::string &text, const Globals &globals) {
   std::error_code error;
-  if (std::filesystem::exists(text, error) || text.find('/') != std::string::npos) return text;
+  const std::filesystem::file_status here = std::filesystem::status(text, error);
+  if ((exists(here) && !is_directory(here)) || text.find('/') != std::string::npos) return text;
   const std::unique_ptr<dfm_context, decltype(&dfm_context_destroy)> context(make_context(globals),
                                                                              dfm_context_destroy);
   std::pair<std::string, std::string> named{text, text};
