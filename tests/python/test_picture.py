@@ -9,6 +9,7 @@ import re
 import struct
 import tempfile
 import unittest
+from unittest import mock
 import zlib
 
 import numpy as np
@@ -94,6 +95,11 @@ class Pictures(unittest.TestCase):
             self.assertLess(stress.max(), np.abs(ball.stress).max() * 3)
             with self.assertRaisesRegex(deform.ArgumentError, "second value must be larger"):
                 world.picture(color="speed", color_range=(1, 1))
+
+    def test_without_its_module_says_what_builds_it(self):
+        with mock.patch.multiple(deform.picture, _module=None, _MODULE="libdeform_gone.so"):
+            with self.assertRaisesRegex(deform.UnsupportedError, "gone.so, .* is not there: `make wheel`"):
+                deform.picture._native()
 
     def test_displacement_is_from_the_rest_shape_after_a_cut_and_in_a_scene_of_a_moved_world(self):
         with tempfile.TemporaryDirectory() as folder, deform.World() as world:

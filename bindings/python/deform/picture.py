@@ -35,8 +35,9 @@ def _native() -> Any:
     if _module is None:
         path = PATH.resolve().parent / _MODULE
         if not path.exists():
-            raise UnsupportedError(f"{path} is not there: this library was built without the renderer "
-                                   f"(cmake -DDEFORM_RENDER=ON)", "DFM_E_UNSUPPORTED")
+            raise UnsupportedError(f"{path}, which draws pictures, is not there: `make wheel` and "
+                                   f"`make test` build it, unless CMake was given -DDEFORM_RENDER=OFF",
+                                   "DFM_E_UNSUPPORTED")
         module = ctypes.CDLL(str(path))
         p, u, t, d = ctypes.c_void_p, ctypes.c_uint32, ctypes.c_char_p, ctypes.c_double
         for name, result, arguments in (
