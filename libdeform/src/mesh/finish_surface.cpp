@@ -22,7 +22,7 @@ namespace {
 
 constexpr int kSplitRounds = 16;  // a flat triangle next to a flat one waits for the next round
 
-struct Repairs { uint32_t rim = 0, split = 0, flat = 0, doubles = 0, walls = 0, twisted = 0; };
+struct Repairs { uint32_t same = 0, rim = 0, split = 0, flat = 0, doubles = 0, walls = 0, twisted = 0; };
 using Corners3 = std::array<uint32_t, 3>;
 
 uint32_t count(const RawMesh &raw) { return uint32_t(raw.tris.size() / 3); }
@@ -399,8 +399,7 @@ void take_groups(RawMesh &raw, TriMesh &mesh) {
 void add_warnings(TriMesh &mesh, const Repairs &done) {
   const auto warn = [&](const std::string &text) { mesh.warnings.push_back(text); };
   const TriMeshStatistics s = tri_mesh_statistics(mesh);
-  add_count(mesh.warnings, mesh.merged_points - done.rim, "point", "",
-            "merged with another at exactly the same place");
+  add_count(mesh.warnings, done.same, "point", "", "merged with another at exactly the same place");
   add_count(mesh.warnings, done.rim, "point", " on open edges",
             "merged with another that differs by rounding only");
   add_count(mesh.warnings, done.split, "triangle", " without area", "taken up by splitting the neighbor");
@@ -439,6 +438,7 @@ TriMesh finish_surface(const std::string &path, RawMesh &&raw) {
   raw.tri_group.resize(count(raw), kNoGroup);
   Repairs done;
   mesh.merged_points = merge_points(raw);
+  if (!raw.own_corners) done.same = mesh.merged_points;
   if (raw.tets.empty()) mesh.merged_points += done.rim = Rims(raw).merge();
   const uint32_t inner = raw.tets.empty() ? 0 : take_boundary(raw);
 

@@ -24,6 +24,7 @@ struct RawMesh {
   Array<double> tet_share;
   Array<uint32_t> tris;           // polygons are cut into triangles by the readers
   Array<uint32_t> tri_group;      // index into groups, kNoGroup without
+  bool own_corners = false;       // the format gives each triangle points of its own
   std::vector<MeshGroup> groups;  // points: of elements below dimension 3 only, in file order, with repeats
   std::vector<std::string> warnings;  // one sentence each, printed before those of repair
   uint32_t npoint() const { return static_cast<uint32_t>(points.size() / 3); }

@@ -13,7 +13,7 @@ constexpr size_t kHead = 84, kEach = 50;
 
 class StlReader {
  public:
-  StlReader(Cursor &in, RawMesh &out) : in_(in), out_(out) {}
+  StlReader(Cursor &in, RawMesh &out) : in_(in), out_(out) { out_.own_corners = true; }
 
   void run() {
     const size_t size = in_.left();
