@@ -87,6 +87,11 @@ TEST(Rebound, IntegratorThatWillNotRebound_SaysSo) {
     EXPECT_EQ(r.summary.find(kWords) != std::string::npos, dead) << integrator;
     EXPECT_EQ(fall.explain(integrator).find(kWords) != std::string::npos, integrator != "symplectic_euler");
   }
+  for (const auto &[integrator, remedies] : {std::pair{"implicit_euler", "a restitution of the pair"},
+                                             {"auto", "automatic steps, or with a restitution of the pair"}})
+    EXPECT_NE(fall.explain(integrator).find(std::string("; it does with ") + remedies + "\n"),
+              std::string::npos)
+        << fall.explain(integrator);
   const Fall given(R"(, "restitution": 0.5)", R"("step": 0.016)");
   EXPECT_EQ(given.run("implicit_euler").summary.find(kWords), std::string::npos) << "the pair throws it back";
 }

@@ -54,9 +54,10 @@ std::string integrator(const Body &b) {
   if (step > 0 && std::isfinite(i.step))
     out += format(",\"explicit_s\":%.9g,\"substeps\":%.0f,\"worst_point\":%u", i.step, n, i.point);
   if (!b.model.stepper && i.used != DFM_INTEGRATOR_SYMPLECTIC_EULER)
-    out += ",\"rebound\":" + quote(std::string("will not rebound") +
-                                   (i.chosen == Chosen::implicit ? ", unless steps are automatic: " : ": ") +
-                                   why_no_rebound(i.used) + "; a restitution of the pair throws it back");
+    out += ",\"rebound\":" +
+           quote(std::string("will not rebound: ") + why_no_rebound(i.used) + "; it does with " +
+                 (i.chosen == Chosen::implicit ? "automatic steps, or with " : "") +
+                 "a restitution of the pair");
   return out + "}";
 }
 
