@@ -96,8 +96,9 @@ void print_table(const std::string &in, const std::string &file, const Filled &f
   const auto whole = [](const std::string &path) {
     return shown(quoted(std::filesystem::absolute(path).lexically_normal()));
   };
-  std::printf("  body of a scene   \"mesh\": %s, \"surface\": {\"mesh\": %s}\n", whole(file).c_str(),
-              whole(in).c_str());
+  std::printf("  body of a scene   \"mesh\": %s, \"surface\": {\"mesh\": %s}%s\n", whole(file).c_str(),
+              whole(in).c_str(),
+              unit_hint(f.surface.lo, f.surface.hi).empty() ? "" : ", \"pose\": {\"scale\": 0.001}");
 }
 
 int fill(const Globals &globals, const std::string &in, const std::string &out, uint32_t cells) {

@@ -205,6 +205,7 @@ TEST(MeshCommand, MeshOfManyMeters_IsAskedForMillimeters) {
   EXPECT_TRUE(has(told.out, "warning: it is 67.7 m long: " + hint)) << told.out;
   const auto filled = test::deform({"mesh", "fill", large, "--cells", "300", "--out", cells});
   EXPECT_TRUE(has(filled.out, "warning: it is 67.7 m long: " + hint)) << filled.out;
+  EXPECT_TRUE(has(filled.out, "}, \"pose\": {\"scale\": 0.001}\n")) << filled.out;
   EXPECT_FALSE(has(test::deform({"mesh", "info", small}).out, hint));
   EXPECT_FALSE(has(test::deform({"mesh", "fill", small, "--cells", "300", "--out", cells}).out, hint));
 }
