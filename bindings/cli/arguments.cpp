@@ -62,38 +62,19 @@ Command Command::command(const std::string &name, const std::string &about) {
   return Command(app_->add_subcommand(name, about));
 }
 
-Argument Command::option(const std::string &name, std::string &value, const std::string &about) {
+template <class Value>
+Argument Command::option(const std::string &name, Value &value, const std::string &about) {
   return Argument(app_->add_option(name, value, about));
 }
-
-Argument Command::option(const std::string &name, double &value, const std::string &about) {
-  return Argument(app_->add_option(name, value, about));
-}
-
-Argument Command::option(const std::string &name, int &value, const std::string &about) {
-  return Argument(app_->add_option(name, value, about));
-}
-
-Argument Command::option(const std::string &name, uint32_t &value, const std::string &about) {
-  return Argument(app_->add_option(name, value, about));
-}
-
-Argument Command::option(const std::string &name, uint64_t &value, const std::string &about) {
-  return Argument(app_->add_option(name, value, about));
-}
-
-Argument Command::option(const std::string &name, std::vector<std::string> &value, const std::string &about) {
-  return Argument(app_->add_option(name, value, about));
-}
-
-Argument Command::option(const std::string &name, std::vector<double> &value, const std::string &about) {
-  return Argument(app_->add_option(name, value, about));
-}
-
-Argument Command::option(const std::string &name, std::vector<std::pair<double, std::string>> &value,
-                         const std::string &about) {
-  return Argument(app_->add_option(name, value, about));
-}
+template Argument Command::option(const std::string &, std::string &, const std::string &);
+template Argument Command::option(const std::string &, double &, const std::string &);
+template Argument Command::option(const std::string &, int &, const std::string &);
+template Argument Command::option(const std::string &, uint32_t &, const std::string &);
+template Argument Command::option(const std::string &, uint64_t &, const std::string &);
+template Argument Command::option(const std::string &, std::vector<std::string> &, const std::string &);
+template Argument Command::option(const std::string &, std::vector<double> &, const std::string &);
+template Argument Command::option(const std::string &, std::vector<std::pair<double, std::string>> &,
+                                  const std::string &);
 
 void Command::flag(const std::string &name, bool &value, const std::string &about) {
   app_->add_flag(name, value, about);

@@ -39,15 +39,8 @@ class Command {
   Command command(const std::string &name, const std::string &about = {});
   // A name without dashes is one of a word by its place. The value keeps what it has where the option is not
   // given; it lives until the command line has been read.
-  Argument option(const std::string &name, std::string &value, const std::string &about = {});
-  Argument option(const std::string &name, double &value, const std::string &about = {});
-  Argument option(const std::string &name, int &value, const std::string &about = {});
-  Argument option(const std::string &name, uint32_t &value, const std::string &about = {});
-  Argument option(const std::string &name, uint64_t &value, const std::string &about = {});
-  Argument option(const std::string &name, std::vector<std::string> &value, const std::string &about = {});
-  Argument option(const std::string &name, std::vector<double> &value, const std::string &about = {});
-  Argument option(const std::string &name, std::vector<std::pair<double, std::string>> &value,
-                  const std::string &about = {});
+  template <class Value>  // those of arguments.cpp
+  Argument option(const std::string &name, Value &value, const std::string &about = {});
   void flag(const std::string &name, bool &value, const std::string &about);
   bool given(const std::string &name) const;
   void needs_subcommand();

@@ -12,6 +12,7 @@
 #include <stdexcept>
 
 #include "core/file.h"
+#include "json_text.h"
 #include "solve.h"
 
 namespace fs = std::filesystem;
@@ -97,15 +98,6 @@ std::string number(double x) {
   return std::isfinite(x) ? text : "null";
 }
 
-std::string escaped(const std::string &s) {
-  std::string out;
-  for (const char c : s) {
-    if (c == '"' || c == '\\') out += '\\';
-    out += static_cast<unsigned char>(c) < ' ' ? '?' : c;
-  }
-  return out;
-}
-
 class Run {
  public:
   explicit Run(const Options &options) : options_(options) {
@@ -184,10 +176,10 @@ class Run {
     const uint32_t size = 3 * (r.contacts + r.bonds);
     if (options_.json) {
       std::printf(
-          "%s\n  {\"file\": \"%s\", \"contacts\": %u, \"attachments\": %u, \"rank\": %u, \"implicit\": %s, "
+          "%s\n  {\"file\": %s, \"contacts\": %u, \"attachments\": %u, \"rank\": %u, \"implicit\": %s, "
           "\"solved\": %s, \"runs\": %u, \"passes\": %u, \"steps\": %u, \"products\": %u, \"factors\": %u, "
           "\"error\": %s, \"speed\": %s, \"seconds\": %s}",
-          lines_++ ? "," : "", escaped(path).c_str(), r.contacts, r.bonds, r.rank,
+          lines_++ ? "," : "", cli::quoted(path).c_str(), r.contacts, r.bonds, r.rank,
           r.implicit ? "true" : "false", r.solved ? "true" : "false", r.runs, r.passes, r.steps, r.products,
           r.factors, number(r.error).c_str(), number(r.speed).c_str(), number(r.seconds).c_str());
       return;
