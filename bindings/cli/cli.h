@@ -32,7 +32,6 @@ dfm_context *make_context(const Globals &globals);
 // Each adds its subcommand; the callback stores its exit code in *exit_code.
 void add_run(Command app, Globals &globals, int *exit_code);
 void add_replay(Command app, Globals &globals, int *exit_code);
-void add_explain(Command app, Globals &globals, int *exit_code);
 void add_mesh(Command app, Globals &globals, int *exit_code);
 void add_plugin(Command app, Globals &globals, int *exit_code);
 void add_contact(Command app, Globals &globals, int *exit_code);

@@ -228,10 +228,6 @@ int explain(const Options &options, Globals &globals, MeasureEffects *measure) {
 
 }  // namespace
 
-void add_explain(Command app, Globals &globals, int *exit_code) {
-  add_explain(app, globals, exit_code, nullptr);
-}
-
 void add_explain(Command app, Globals &globals, int *exit_code, MeasureEffects *measure) {
   auto options = std::make_shared<Options>();
   Command sub = app.command("explain", "the plan: effects, stages that run, stages left out and why");
