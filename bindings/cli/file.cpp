@@ -29,7 +29,7 @@ void cannot_write(const std::string &path) {
 
 File new_file(const std::string &path) {
   if (unlink(path.c_str()) != 0 && errno != ENOENT) cannot_write(path);
-  const int fd = open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
+  const int fd = ::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
   FILE *file = fd < 0 ? nullptr : fdopen(fd, "w+b");
   if (!file) cannot_write(path);
   return File(file, std::fclose);

@@ -15,7 +15,6 @@ const std::vector<std::vector<std::string>> kTools = {
 
 }  // namespace
 
-// `make demo` makes the command alone.
 TEST(ToolsCommand, WithoutTheProgram_SaysWhichIsMissingAndWhatToDo) {
   const fs::path folder = test::scratch("tools_command"), command = folder / "bin" / "deform";
   fs::create_directories(folder / "bin");
