@@ -25,11 +25,11 @@ enum {
   DFM_INTEGRATOR_TR_BDF2 = 3
 };
 
-/* dfm_world_def.flags: switches off the guard against crossing (concepts/guard.md), to study its effect */
+/* dfm_world_def.flags: switches off the guard against crossing (doc/concepts/guard.md), to see its effect */
 enum {
   DFM_WORLD_UNGUARDED = 1,
   /* things that overlap when they are created or placed are moved apart before the next step
-   * (concepts/overlaps.md) */
+   * (doc/concepts/overlaps.md) */
   DFM_WORLD_UNTANGLE = 2
 };
 enum { DFM_SELF_OFF = 0, DFM_SELF_ON = 1, DFM_SELF_AUTO = 2 }; /* dfm_world_def.self_contact */
