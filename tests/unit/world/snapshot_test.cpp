@@ -33,7 +33,7 @@ dfm_world build(dfm_context *c) {
   o.damping_stiffness = 2e-3;
   o.damping_mass = 20;
   o.name = "sleeper";
-  o.position = {2, 0, 4e-5};
+  o.position = {2, 0, 1e-4};
   test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 10, o);
   o.name = "lower";
   o.position = {0, 0, 4e-5};
