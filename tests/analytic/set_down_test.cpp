@@ -64,8 +64,7 @@ TEST(SetDown, OnASoftBody_BothStay) {
   double fastest = 0;
   for (int k = 0; k < 100; ++k) {
     ok(dfm_world_step(world, 1e-3, nullptr));
-    for (const dfm_body b : {lower, upper})
-      fastest = std::max(fastest, std::fabs(measure(b).velocity[2]));
+    for (const dfm_body b : {lower, upper}) fastest = std::max(fastest, std::fabs(measure(b).velocity[2]));
   }
   EXPECT_LT(fastest, 5 * kMost) << "two gaps open at once, and edges come to bear";
 }

@@ -22,6 +22,7 @@
 #include "body/phyxels.h"
 #include "dynamics/model.h"
 #include "geometry/surface.h"
+#include "math/turn.h"
 
 namespace dfm {
 
@@ -96,7 +97,8 @@ class Dynamics {
   virtual uint32_t relative_work() const { return 1; }
 
   // spectrum: share is wanted, too. The lag is points().dampers.lag from the next bound() on.
-  virtual ExplicitTime measure(bool /*spectrum*/) { return {}; }
+  // placed: of the rest positions that the model was made with.
+  virtual ExplicitTime measure(const Pose & /*placed*/, bool /*spectrum*/) { return {}; }
   // share: that of the model as it was made. False: the model gives none.
   virtual bool bound(double time, double share, const AddRowSums &outside, StepBound &out) = 0;
   // 1/s, of the edge that stretches fastest; 0 if the bound does not depend on the shape

@@ -51,9 +51,10 @@ bool ExplicitPoints::row_sums(const dfm_kin &k, double &cell) {
 struct ExplicitPoints::Trial {
   std::vector<double> x, v, f;  // [npoint,4]
   dfm_kin kin;
-  explicit Trial(const ExplicitPoints &of) : x(of.p_.x.size()), v(x), f(x), kin(of.kin(0, 0)) {
-    v.assign(x.size(), 0.0);
-    for (size_t i = 0; i < of.p_.rest.size(); ++i) x[kStride * (i / 3) + i % 3] = of.p_.rest[i];
+  explicit Trial(const ExplicitPoints &of, const Pose &placed = {})
+      : x(of.p_.x.size()), v(x), f(x), kin(of.kin(0, 0)) {
+    for (uint32_t i = 0; i < of.p_.n; ++i)
+      store3(&x[size_t{kStride} * i], place(placed, load3(&of.p_.rest[size_t{3} * i])));
     kin.x = x.data();
     kin.v = v.data();
   }
@@ -134,6 +135,7 @@ double ExplicitPoints::own_frequency(Trial &rest, double edge) {
 // A lag pays where dampers alone bound the sub-step more than what it makes of them.
 double ExplicitPoints::find_lag(Trial &rest, double edge) {
   double cell = 0, ratio = 0;  // s, of damping to stiffness
+  if (!row_sums(rest.kin, cell) || *std::max_element(damping_.begin(), damping_.end()) <= 0) return 0;
   const double frequency = find_drag() ? own_frequency(rest, edge) : -1;
   if (!(frequency >= 0) || !row_sums(rest.kin, cell)) return 0;
   for (uint32_t i = 0; i < p_.n; ++i)
@@ -157,7 +159,7 @@ double ExplicitPoints::find_share(Trial &rest, double lag, double edge) {
   if (lag > 0) lag_rows(lag);
   for (uint32_t i = 0; i < p_.n; ++i)
     most = std::max(most, (stiffness_[i] + (lag > 0 ? lagged_[i] : 0)) / p_.mass[i]);
-  const std::vector<double> at_rest = rest.f;
+  const std::vector<double> at_rest = rest.f, x = rest.x;
   const double found = largest_eigenvalue(n, [&](const std::vector<double> &u, std::vector<double> &out) {
     double widest = 0;
     for (size_t i = 0; i < n; ++i) widest = std::max(widest, std::fabs(u[i] / std::sqrt(p_.mass[i / 3])));
@@ -166,7 +168,7 @@ double ExplicitPoints::find_share(Trial &rest, double lag, double edge) {
       for (size_t i = 0; i < n; ++i) act(i, kStride * (i / 3) + i % 3, std::sqrt(p_.mass[i / 3]));
     };
     each([&](size_t i, size_t at, double root) {
-      rest.x[at] = p_.rest[i] + size * u[i] / root;
+      rest.x[at] = x[at] + size * u[i] / root;
       if (lag > 0) rest.v[at] = size * u[i] / root / lag;
     });
     if (!rest.forces(model_)) return false;
@@ -179,7 +181,7 @@ double ExplicitPoints::find_share(Trial &rest, double lag, double edge) {
   return found > 0 && found < most ? found / most : 1;
 }
 
-ExplicitTime ExplicitPoints::measure(bool spectrum) {
+ExplicitTime ExplicitPoints::measure(const Pose &placed, bool spectrum) {
   ExplicitTime out;
   if (!model_.ops->bound || edges_.empty()) return out;
   double edge = std::numeric_limits<double>::infinity();  // m, the shortest
@@ -187,7 +189,7 @@ ExplicitTime ExplicitPoints::measure(bool spectrum) {
     const double *const a = &p_.rest[size_t{3} * edges_[e]], *const b = &p_.rest[size_t{3} * edges_[e + 1]];
     edge = std::min(edge, norm(load3(a) - load3(b)));
   }
-  Trial rest(*this);
+  Trial rest(*this, placed);
   out.lag = find_lag(rest, edge);
   if (spectrum && model_.state.empty()) out.share = find_share(rest, out.lag, edge);
   return out;
@@ -357,7 +359,7 @@ void ExplicitPoints::commit(const SubStep &now, double fraction) {
   p_.v.swap(in_place_ ? p_.v_free : p_.v_end);
   model_.commit_state();
   // The trapezoid: the dampers keep the energy w.C w lag / 2 exactly, less w.C w h of the mean w.
-  const double part = 2 * now.h / (now.h + 2 * p_.dampers.lag);
+  const double h = fraction * now.h, part = 2 * h / (h + 2 * p_.dampers.lag);
   for (size_t at = 0; at < p_.dampers.v.size(); ++at)
     p_.dampers.v[at] += part * (p_.v[at] - p_.dampers.v[at]);
 }

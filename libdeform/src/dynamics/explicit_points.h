@@ -2,6 +2,9 @@
 // Where the model gives its forces part by part, the points of a part move as soon as it comes: forces and
 // free motion are one pass (doc/decisions/explicit_time.md).
 #pragma once
+#include <optional>
+#include <vector>
+
 #include "dynamics/dynamics.h"
 #include "dynamics/points_kernel.h"
 
@@ -15,7 +18,7 @@ class ExplicitPoints : public Dynamics {
   Abilities abilities() const override {
     return {.forces = true, .springs = true, .placed = true, .energy = true};
   }
-  ExplicitTime measure(bool spectrum) override;
+  ExplicitTime measure(const Pose &placed, bool spectrum) override;
   bool bound(double time, double share, const AddRowSums &outside, StepBound &out) override;
   double strain_rate() const override;
   bool add_forces(const SubStep &now, bool keep) override;
@@ -37,11 +40,11 @@ class ExplicitPoints : public Dynamics {
  private:
   const Array<uint32_t> &edges_;
   const PointsKernels &loops_;
-  Array<double> stiffness_, damping_;  // [npoint] row sums: N/m, N s/m
-  Array<double> lagged_;               // [npoint] N/m, row sums of what the lag makes of dampers
-  Array<double> drag_;                 // [npoint] N s/m, which sees no lag; empty: there is none
-  std::vector<double> drag_of_;        // the parameters that it was found with
-  Array<double> load_;                 // [npoint,4] N, with the drag that the model's forces lack
+  Array<double> stiffness_, damping_;           // [npoint] row sums: N/m, N s/m
+  Array<double> lagged_;                        // [npoint] N/m, row sums of what the lag makes of dampers
+  Array<double> drag_;                          // [npoint] N s/m, which sees no lag; empty: there is none
+  std::optional<std::vector<double>> drag_of_;  // the parameters that it was found with
+  Array<double> load_;                          // [npoint,4] N, with the drag that the model's forces lack
   // [part] J, of the free motion; empty where the model gives its forces for all points at once
   Array<double> part_kinetic_;
   bool moved_ = false;  // in this sub-step points have moved part by part, and their forces are not kept

@@ -64,7 +64,8 @@ constexpr double kSettles = 8e-4;
 double left_of_pair(const ContactStore &store, uint64_t a, uint64_t b, double most) {
   double left = -1;
   for (uint32_t i = 0; i < store.n; ++i)
-    if (store.id_a[i] == a && store.id_b[i] == b) left = std::max(left, store.start_depth[i]);
+    if ((store.id_a[i] == a && store.id_b[i] == b) || (store.id_a[i] == b && store.id_b[i] == a))
+      left = std::max(left, store.start_depth[i]);
   return left < 0 ? most : left;
 }
 
@@ -74,7 +75,8 @@ double left_of_pair(const ContactStore &store, uint64_t a, uint64_t b, double mo
 void find_start_depths(World &w, StepContext &step) {
   const double opened = step.h * (w.def.recovery_speed > 0 ? w.def.recovery_speed : kSettles);
   const auto whole = [](const Body &b) { return b.piece_of ? b.piece_of : b.id; };
-  step.rows.start_depth.resize(step.contacts.size());
+  step.rows.start_depth.assign(step.contacts.size(), 0.0);
+  if (w.prescribed.stands()) return;  // an equilibrium has no speed to open by
   for (uint32_t i = 0; i < step.contacts.size(); ++i) {
     const ContactPoint &c = step.contacts[i];
     const Body &a = *w.bodies[c.slot_a], *const b = c.obstacle ? nullptr : w.bodies[c.slot_b].get();

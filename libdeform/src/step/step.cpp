@@ -214,7 +214,9 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
       double more = rest.left() * cut_finer(w.sizes, rest.size(), w.bound.step);
       if (!(done + more <= w.def.max_substeps) && end_impact(w)) {
         prepare_bound(w);
-        more = rest.left() * cut_finer(w.sizes, rest.size(), w.bound.step);
+        step.offered = 0;  // an impact that is too dear is not begun again
+        rest.again(w.time, uint32_t(choose_pieces(w.sizes, rest.goal - w.time, w.bound.step)));
+        more = rest.left();
       }
       if (!(done + more <= w.def.max_substeps)) return refuse_rest(w, rest.goal);
       if (more > rest.left()) {

@@ -87,8 +87,9 @@ void ask_explicit_bound(const World &w, double time, Dynamics &dynamics, Integra
 
 }  // namespace
 
-void measure_explicit(Body &b, Dynamics &dynamics, Integrator &out) {
-  const ExplicitTime found = dynamics.measure(b.shape == 0);
+void measure_explicit(Body &b, Dynamics &dynamics, Integrator &out, const ModelOrigin &origin) {
+  const Pose placed = rests_unplaced(*b.model.type) ? Pose{} : origin.frame;
+  const ExplicitTime found = dynamics.measure(placed, b.shape == 0);
   out.share = found.share;
   const bool had = b.p.dampers.lag > 0;
   b.p.dampers.lag = found.lag;
@@ -235,7 +236,7 @@ void make_model(World &w, Body &b, const dfm_type &type, std::vector<double> val
   out.dynamics = make_dynamics(w.meters.dynamics.memory(), b.p, b.surface, b.model, b.edges,
                                implicit ? &*implicit : nullptr);
   if (!implicit) {
-    measure_explicit(b, *out.dynamics, out.integrator);
+    measure_explicit(b, *out.dynamics, out.integrator, out.origin);
     ask_explicit_bound(w, w.time, *out.dynamics, out.integrator);
   }
   if (!out.dynamics->abilities().placed) need_ability(w, Ability::self_stepping, "body", b.name);

@@ -28,8 +28,8 @@ std::unique_ptr<BodyModel> make_body_model(World &w, Body &b, const dfm_type &ty
 // s, and the longest explicit sub-step at its present state then; null: not that.
 std::unique_ptr<BodyModel> make_body_instance(World &w, Body &b, const dfm_type &type, ModelOrigin origin);
 void give_dynamics(World &w, Body &b, const double *bound_at);
-// How long its explicit sub-steps may be, with its present parameters.
-void measure_explicit(Body &b, Dynamics &dynamics, Integrator &out);
+// How long its explicit sub-steps may be, with its present parameters and the model's origin.
+void measure_explicit(Body &b, Dynamics &dynamics, Integrator &out, const ModelOrigin &origin);
 // Logs a message if an integrator is named for a body whose model steps itself.
 void warn_of_own_steps(const World &w, const std::string &body, const ModelInstance &model,
                        int32_t integrator);

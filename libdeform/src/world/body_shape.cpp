@@ -358,6 +358,7 @@ std::unique_ptr<Body> structure_of(const Body &b) {
   out->makeup = copy(b.makeup);
   out->origin = b.origin;
   out->integrator = b.integrator;
+  out->p.dampers.lag = b.p.dampers.lag;
   out->model.type = b.model.type;
   return out;
 }

@@ -184,9 +184,10 @@ void set_model_params(Body &b, const dfm_params &params) {
   b.withheld.by_cell.resize(type.nparam);
   const bool cells = std::count(b.withheld.by_cell.begin(), b.withheld.by_cell.end(), 1) > 0;
   b.withheld.asked = asked == values && !cells ? std::vector<double>() : asked;
-  if (b.dynamics->diagonal()) measure_explicit(b, *b.dynamics, b.integrator);
   values_changed(*b.world);
   if (before.changed()) b.world->changed = true;  // the plan names the effects that parameters call for
+  b.integrator.share = 1;                         // what holds if it cannot be measured
+  if (b.dynamics->diagonal()) measure_explicit(b, *b.dynamics, b.integrator, b.origin);
 }
 
 }  // namespace dfm

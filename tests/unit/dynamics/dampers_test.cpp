@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "../world/inside.h"
+#include "obstacle.h"
 #include "support.h"
 #include "world.h"
 
@@ -161,6 +162,45 @@ TEST(Dampers, ASpin_KeepsItsMomentum) {
   const double h = bar.stable();
   for (int n = 0; n < 2000; ++n) test::ok(dfm_world_step(bar.world, h, nullptr));
   EXPECT_NEAR(spin(), before, 1e-9 * before);
+}
+
+// The strain that bounds the lag is the same however the body lies, also for a model that does not turn.
+TEST(Dampers, ATurnedBody_HasTheSameSubStep) {
+  for (const char *model : {"linear_fem", "corotational_fem"}) {
+    double h[2];
+    for (int turned = 0; turned < 2; ++turned) {
+      const test::Context context;
+      const dfm_world world = test::make_world(context, {0, 0, 0});
+      test::BodyOptions o;
+      o.model = model;
+      o.damping_stiffness = 12e-3;
+      if (turned) o.rotation = {0, 0, std::sin(0.6), std::cos(0.6)};
+      test::make_body(context, world, "beam", {0.2, 0.04, 0.04}, 300, o);
+      test::ok(dfm_world_stable_step(world, &h[turned], nullptr, nullptr));
+    }
+    EXPECT_NEAR(h[1], h[0], 1e-6 * h[0]) << model;
+  }
+}
+
+// An impact that explicit sub-steps would take too long for stays implicit: the step does not fail.
+TEST(Dampers, AnImpactThatIsTooDear_StaysImplicit) {
+  for (const double young : {3e7, 3.5e7}) {
+    const test::Context context;
+    dfm_world_def def = dfm_world_def_default();
+    def.step = 1.0 / 60;
+    dfm_world world = 0;
+    test::ok(dfm_world_create(context, &def, &world));
+    test::add_plane(world, "floor");
+    test::BodyOptions o;
+    o.model = "corotational_fem";
+    o.young = young;
+    o.damping_stiffness = 3e-3;
+    o.position = {0, 0, 0.01};
+    o.velocity = {0, 0, -2};
+    test::make_body(context, world, "beam", {0.2, 0.04, 0.04}, 300, o);
+    for (int k = 0; k < 8; ++k)
+      EXPECT_EQ(dfm_world_step(world, 1.0 / 120, nullptr), DFM_OK) << dfm_last_error();
+  }
 }
 
 // The lag follows a damping that changes during the run, and a restore brings back both.
