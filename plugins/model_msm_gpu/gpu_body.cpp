@@ -1,6 +1,7 @@
 #include "gpu_body.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 
 #include "../model_common/edges.h"
@@ -14,6 +15,7 @@ namespace {
 constexpr double kShortestEdge = 1e-6, kLongestEdge = 1e4;
 constexpr int kWeightSteps = 20;  // of the power method, as those of msm
 constexpr double kMostSteps = 1e6;
+constexpr uint32_t kGrain = 4096;  // points: waking a worker costs more than fewer save
 
 double square_between(const double *x, const double *y) {
   const double d[3] = {y[0] - x[0], y[1] - x[1], y[2] - x[2]};
@@ -169,13 +171,23 @@ void Body::bound(const dfm_kin &, double *ksum, double *csum) const {
   }
 }
 
-bool Body::take_points(const dfm_kin &k) {
-  bool moved = false;
-  const auto put = [&](double &to, double from) {
-    moved |= std::bit_cast<uint64_t>(to) != std::bit_cast<uint64_t>(from);
-    to = from;
+template <class F>
+void Body::each_point(const F &f) const {
+  const auto some = [](void *user, uint32_t begin, uint32_t end) {
+    const F &each = *static_cast<const F *>(user);
+    for (size_t i = begin; i < end; ++i) each(i);
   };
-  for (size_t i = 0; i < npoint_; ++i) {
+  host->parallel_for(host->ctx, npoint_, kGrain, some, const_cast<F *>(&f));
+}
+
+bool Body::take_points(const dfm_kin &k) {
+  std::atomic<bool> moved = false;
+  each_point([&](size_t i) {
+    bool differ = false;
+    const auto put = [&](double &to, double from) {
+      differ |= std::bit_cast<uint64_t>(to) != std::bit_cast<uint64_t>(from);
+      to = from;
+    };
     const double *const x = k.x + i * k.stride, *const v = k.v + i * k.stride;
     dvec4 &place = stepper_->place[i], &speed = stepper_->speed[i];
     put(place.x, x[0]);
@@ -184,19 +196,21 @@ bool Body::take_points(const dfm_kin &k) {
     put(speed.x, v[0]);
     put(speed.y, v[1]);
     put(speed.z, v[2]);
-  }
+    if (differ) moved.store(true, std::memory_order_relaxed);
+  });
   return moved;
 }
 
 bool Body::take_loads(const double *f, uint32_t stride) {
-  bool changed = false;
-  for (size_t i = 0; i < npoint_; ++i) {
+  std::atomic<bool> changed = false;
+  each_point([&](size_t i) {
     const double *const of = f + i * stride, per = inverse_mass_[i];
     const dvec4 now{of[0] * per, of[1] * per, of[2] * per, params_[kDampingMass]};
     dvec4 &load = stepper_->load[i];
-    changed |= !(now.x == load.x && now.y == load.y && now.z == load.z && now.w == load.w);
+    if (now.x == load.x && now.y == load.y && now.z == load.z && now.w == load.w) return;
     load = now;
-  }
+    changed.store(true, std::memory_order_relaxed);
+  });
   return changed;
 }
 
@@ -267,18 +281,18 @@ void Body::diagonal(uint32_t n, const uint32_t *surfel, double *w) const {
 
 void Body::commit(const dfm_kin &k, const double *p_s, double *x, double *v) {
   for (uint32_t s = 0; s < nsurfel_; ++s) add_impulse(s, p_s + 3 * size_t(s));
-  for (uint32_t i = 0; i < npoint_; ++i) {
+  each_point([&](size_t i) {
     const dvec4 &place = stepper_->place[i], &speed = stepper_->speed[i];
     const double end[3] = {place.x, place.y, place.z}, fast[3] = {speed.x, speed.y, speed.z};
-    double *const p = &impulse_[3 * size_t(i)];
+    double *const p = &impulse_[3 * i];
     for (size_t a = 0; a < k.stride; ++a) {
-      const size_t at = size_t(i) * k.stride + a;
-      const double change = a < 3 ? free_inverse_mass(i, int(a)) * p[a] : 0;
+      const size_t at = i * k.stride + a;
+      const double change = a < 3 ? free_inverse_mass(uint32_t(i), int(a)) * p[a] : 0;
       x[at] = a < 3 ? end[a] + h_ * change : 0;
       v[at] = a < 3 ? fast[a] + change : 0;
     }
     std::fill_n(p, 3, 0.0);
-  }
+  });
 }
 
 double Body::energy(const dfm_kin &k) const {

@@ -61,6 +61,8 @@ class Body {
   void find_rows();
   bool take_points(const dfm_kin &k);
   bool take_loads(const double *f, uint32_t stride);
+  template <class F>
+  void each_point(const F &f) const;  // f(point), on the host's workers
   void add_impulse(uint32_t surfel, const double *p);
   double free_inverse_mass(uint32_t point, int axis) const {
     return held_[point] >> axis & 1 ? 0 : inverse_mass_[point];

@@ -1,5 +1,6 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
 // The device's side of spring_step.glsl: one invocation per point.
 layout(local_size_x = 64) in;
 layout(std430, binding = 0) readonly buffer Places { dvec4 place[]; };
@@ -22,6 +23,7 @@ layout(push_constant) uniform Now {
 #define NEXT_PLACE(i, value) next_place[i] = value
 #define NEXT_SPEED(i, value) next_speed[i] = value
 #define STEP step
+#define UNROLLED [[unroll]]
 #define DAMPING damping
 #include "spring_step.glsl"
 void main() {

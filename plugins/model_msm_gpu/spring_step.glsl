@@ -16,28 +16,34 @@ void move_point(uint i) {
   precise double fx = double(0.0f);
   precise double fy = fx;
   precise double fz = fx;
-  for (uint n = 0u; n < row.y; ++n) {
-    const uvec4 spring = SPRING(row.x + 32u * n);   // other end, k, L0^2
-    const dvec4 y = PLACE(spring.x);
-    precise double dx = y.x - x.x;
-    precise double dy = y.y - x.y;
-    precise double dz = y.z - x.z;
-    precise double square = (dx * dx + dy * dy) + dz * dz;
-    precise double rest = packDouble2x32(uvec2(spring.z, spring.w));
-    precise float k = uintBitsToFloat(spring.y);
-    precise float now = float(square);
-    precise float both = now + sqrt(now * float(rest));   // L (L + L0)
-    precise float factor = k * (float(square - rest) / both);
-    if (DAMPING > 0.0f) {
-      const dvec4 w = SPEED(spring.x);
-      precise double rate = ((w.x - v.x) * dx + (w.y - v.y) * dy) + (w.z - v.z) * dz;
-      factor += (DAMPING * k) * (float(rate) / now);
+  // Four at a time, so that a device waits once for four springs and once for their other ends. Behind a
+  // point's last spring lie others', which are read and not used.
+  for (uint n = 0u; n < row.y; n += 4u) {
+    uvec4 spring[4];   // other end, k, L0^2
+    dvec4 y[4];
+    dvec4 w[4];
+    UNROLLED for (uint k = 0u; k < 4u; ++k) spring[k] = SPRING(row.x + 32u * (n + k));
+    UNROLLED for (uint k = 0u; k < 4u; ++k) y[k] = PLACE(spring[k].x);
+    UNROLLED for (uint k = 0u; k < 4u; ++k) w[k] = DAMPING > 0.0f ? SPEED(spring[k].x) : v;
+    UNROLLED for (uint k = 0u; k < 4u; ++k) {
+      precise double dx = y[k].x - x.x;
+      precise double dy = y[k].y - x.y;
+      precise double dz = y[k].z - x.z;
+      precise double square = (dx * dx + dy * dy) + dz * dz;
+      precise double rest = packDouble2x32(uvec2(spring[k].z, spring[k].w));
+      precise float stiffness = uintBitsToFloat(spring[k].y);
+      precise float now = float(square);
+      precise float both = now + sqrt(now * float(rest));   // L (L + L0)
+      precise double rate = ((w[k].x - v.x) * dx + (w[k].y - v.y) * dy) + (w[k].z - v.z) * dz;
+      precise float factor =
+          stiffness * (float(square - rest) / both) + (DAMPING * stiffness) * (float(rate) / now);
+      if (n + k < row.y && now > 1e-20f) {   // two points at one place: no direction, no force
+        precise double scale = double(factor);
+        fx += scale * dx;
+        fy += scale * dy;
+        fz += scale * dz;
+      }
     }
-    // two points at one place: no direction, no force
-    precise double scale = now > 1e-20f ? double(factor) : double(0.0f);
-    fx += scale * dx;
-    fy += scale * dy;
-    fz += scale * dz;
   }
   const uint held = uint(v.w);
   precise double vx = v.x + STEP * ((fx * x.w + load.x) - load.w * v.x);

@@ -23,6 +23,7 @@ struct Points {
   float damping;
 
 #define precise
+#define UNROLLED
 #define PLACE(i) place[i]
 #define SPEED(i) speed[i]
 #define LOAD(i) loads[i]
@@ -57,6 +58,7 @@ void Springs::lay_out(const dfm_host *host, uint32_t points, uint32_t nedge, con
     }
     nspring += size_t(kSide) * most;
   }
+  nspring += size_t(3) * kSide;  // the kernel reads on to a multiple of four
   if (nspring > kNone) throw "the body has more springs than a number of 32 bits counts";
   spring.create(host, nspring);
   edge.create(host, nspring);

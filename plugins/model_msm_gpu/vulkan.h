@@ -23,8 +23,10 @@
   X(GetDeviceQueue)                                                                                         \
   X(DeviceWaitIdle)                                                                                         \
   X(QueueSubmit)                                                                                            \
-  X(CreateBuffer) X(DestroyBuffer) X(GetBufferMemoryRequirements) X(BindBufferMemory) X(AllocateMemory)     \
-      X(FreeMemory) X(MapMemory) X(CreateShaderModule) X(DestroyShaderModule) X(CreateDescriptorSetLayout)  \
+  X(CreateBuffer)                                                                                           \
+  X(DestroyBuffer)                                                                                          \
+  X(GetBufferMemoryRequirements) X(BindBufferMemory) X(AllocateMemory) X(FreeMemory) X(MapMemory)           \
+      X(CreateShaderModule) X(DestroyShaderModule) X(CreateDescriptorSetLayout)                             \
           X(DestroyDescriptorSetLayout) X(CreatePipelineLayout) X(DestroyPipelineLayout)                    \
               X(CreateComputePipelines) X(DestroyPipeline) X(CreateDescriptorPool) X(DestroyDescriptorPool) \
                   X(AllocateDescriptorSets) X(UpdateDescriptorSets) X(CreateCommandPool)                    \

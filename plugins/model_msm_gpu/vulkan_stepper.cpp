@@ -1,7 +1,6 @@
 #include "vulkan_stepper.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cstring>
 #include <utility>
 
@@ -235,33 +234,6 @@ const char *VulkanStepper::run(uint32_t n, double h, float damping, bool moved, 
     now_ = (now_ + some) % 2;
   }
   return nullptr;
-}
-
-double VulkanStepper::copy_time(size_t size, uint32_t n) {
-  Array from, to;
-  double found = 0;
-  try {
-    make(from, size, false);
-    make(to, size, false);
-    begin(once_);
-    const VkBufferCopy all{0, 0, size};
-    for (uint32_t k = 0; k < n; ++k) {
-      vulkan_->CmdCopyBuffer(once_, from.buffer, to.buffer, 1, &all);
-      order(once_, kCopy, kCopy);
-    }
-    vulkan_->EndCommandBuffer(once_);
-    must(finish(once_), "a copy");
-    const auto begun = std::chrono::steady_clock::now();
-    must(finish(once_), "a copy");
-    found = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count() / n;
-  } catch (...) {
-    drop(from);
-    drop(to);
-    throw;
-  }
-  drop(from);
-  drop(to);
-  return found;
 }
 
 }  // namespace msm_gpu

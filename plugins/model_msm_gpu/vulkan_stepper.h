@@ -12,8 +12,6 @@ class VulkanStepper : public Stepper {
   ~VulkanStepper() override;
   void take(const Springs &springs) override;
   const char *run(uint32_t n, double h, float damping, bool moved, bool loaded) override;
-  // s, of one of n copies of `bytes` from device memory to device memory: what a kernel is compared with
-  double copy_time(size_t bytes, uint32_t n);
 
  private:
   struct Array {
