@@ -12,6 +12,17 @@ constexpr VkPipelineStageFlags kCopy = VK_PIPELINE_STAGE_TRANSFER_BIT,
                                kCompute = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT,
                                kProcessor = VK_PIPELINE_STAGE_HOST_BIT;
 
+VkAccessFlags writes_of(VkPipelineStageFlags stages) {
+  return (stages & kCopy ? VK_ACCESS_TRANSFER_WRITE_BIT : 0) |
+         (stages & kCompute ? VK_ACCESS_SHADER_WRITE_BIT : 0) |
+         (stages & kProcessor ? VK_ACCESS_HOST_WRITE_BIT : 0);
+}
+VkAccessFlags reads_of(VkPipelineStageFlags stages) {
+  return (stages & kCopy ? VK_ACCESS_TRANSFER_READ_BIT : 0) |
+         (stages & kCompute ? VK_ACCESS_SHADER_READ_BIT : 0) |
+         (stages & kProcessor ? VK_ACCESS_HOST_READ_BIT : 0);
+}
+
 void must(VkResult result, const char *what) {
   if (result == VK_SUCCESS) return;
   throw std::string(what) + " failed on the device (VkResult " + std::to_string(int(result)) +
@@ -147,8 +158,8 @@ void VulkanStepper::order(VkCommandBuffer commands, VkPipelineStageFlags before,
                           VkPipelineStageFlags after) const {
   VkMemoryBarrier barrier{};
   barrier.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER;
-  barrier.srcAccessMask = VK_ACCESS_MEMORY_WRITE_BIT;
-  barrier.dstAccessMask = VK_ACCESS_MEMORY_READ_BIT | VK_ACCESS_MEMORY_WRITE_BIT;
+  barrier.srcAccessMask = writes_of(before);
+  barrier.dstAccessMask = reads_of(after) | writes_of(after);
   vulkan_->CmdPipelineBarrier(commands, before, after, 0, 1, &barrier, 0, nullptr, 0, nullptr);
 }
 
