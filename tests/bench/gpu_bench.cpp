@@ -1,7 +1,7 @@
 // Springs times sub-steps per second of the model msm_gpu, beside what the same kernel does on points without
 // springs, which is to copy their places and velocities:
-//   lattice   points of a cube, each with springs to its 26 neighbors: sub-steps in submissions of one (with
-//             and without the copies of a step with contact) and of 1,000
+//   lattice   points of a cube, each with springs to its 26 neighbors: many sub-steps in one submission; one
+//             and its end back; one with points and loads on the way there, too, as in contact
 //   body      steps of a body of tetrahedra through the model's own functions, arrays of the host included
 // The bytes of a sub-step count each array once: what other points' places and velocities cost beyond that is
 // up to the cache. `gpu_bench --device software` takes a software driver, --most N bodies of up to N springs.
@@ -172,8 +172,8 @@ void lattice(uint32_t side, const std::shared_ptr<Vulkan> &vulkan, double copy, 
                      1e6 * step, rate, speed, copy, off);
     };
     row("many sub-steps", l.nspring() > 1000000 ? 100 : 1000, false, false);
-    row("one and back", 1, false, false);
-    row("there, one and back", 1, true, true);
+    row("back", 1, false, false);
+    row("there and back", 1, true, true);
   }
 }
 
