@@ -15,7 +15,7 @@ namespace {
 constexpr double kShortestEdge = 1e-6, kLongestEdge = 1e4;
 constexpr int kWeightSteps = 20;  // of the power method, as those of msm
 constexpr double kMostSteps = 1e6;
-constexpr uint32_t kGrain = 4096;  // points: waking a worker costs more than fewer save
+constexpr uint32_t kGrain = 4096;  // points, springs: waking a worker costs more than fewer save
 
 double square_between(const double *x, const double *y) {
   const double d[3] = {y[0] - x[0], y[1] - x[1], y[2] - x[2]};
@@ -95,6 +95,7 @@ void Body::take_springs(const dfm_mesh &m) {
   }
   model::find_directions(nedge_, edges_.data(), m.rest, length.data(), volume.data(), modulus.data());
   for (uint32_t e = 0; e < nedge_; ++e) share_[e] *= modulus[e];
+  block_energy_.create(host, nedge_ / kGrain + 1);
   springs_.lay_out(host, npoint_, nedge_, edges_.data());
 }
 
@@ -249,13 +250,11 @@ dfm_status Body::predict(const dfm_kin &k, const double *f, double *u_s) {
 
 // An impulse changes the velocity of its points, and moves them by that over the step: the scheme of one
 // sub-step.
-void Body::add_impulse(uint32_t surfel, const double *p) {
-  for (uint32_t e = surfel_row_[surfel]; e < surfel_row_[surfel + 1]; ++e)
-    for (size_t a = 0; a < 3; ++a) impulse_[3 * size_t(surfel_point_[e]) + a] += surfel_weight_[e] * p[a];
-}
-
 void Body::respond(uint32_t n, const uint32_t *surfel, const double *p, double *du) {
-  for (uint32_t k = 0; k < n; ++k) add_impulse(surfel[k], p + 3 * size_t(k));
+  for (uint32_t k = 0; k < n; ++k)
+    for (uint32_t e = surfel_row_[surfel[k]]; e < surfel_row_[surfel[k] + 1]; ++e)
+      for (size_t a = 0; a < 3; ++a)
+        impulse_[3 * size_t(surfel_point_[e]) + a] += surfel_weight_[e] * p[3 * size_t(k) + a];
   for (uint32_t k = 0; k < n; ++k)
     for (int a = 0; a < 3; ++a) {
       double sum = 0;
@@ -280,26 +279,49 @@ void Body::diagonal(uint32_t n, const uint32_t *surfel, double *w) const {
 }
 
 void Body::commit(const dfm_kin &k, const double *p_s, double *x, double *v) {
-  for (uint32_t s = 0; s < nsurfel_; ++s) add_impulse(s, p_s + 3 * size_t(s));
   each_point([&](size_t i) {
     const dvec4 &place = stepper_->place[i], &speed = stepper_->speed[i];
     const double end[3] = {place.x, place.y, place.z}, fast[3] = {speed.x, speed.y, speed.z};
-    double *const p = &impulse_[3 * i];
     for (size_t a = 0; a < k.stride; ++a) {
-      const size_t at = i * k.stride + a;
-      const double change = a < 3 ? free_inverse_mass(uint32_t(i), int(a)) * p[a] : 0;
-      x[at] = a < 3 ? end[a] + h_ * change : 0;
-      v[at] = a < 3 ? fast[a] + change : 0;
+      x[i * k.stride + a] = a < 3 ? end[a] : 0;
+      v[i * k.stride + a] = a < 3 ? fast[a] : 0;
     }
-    std::fill_n(p, 3, 0.0);
   });
+  for (size_t s = 0; s < nsurfel_; ++s) {
+    const double *const p = p_s + 3 * s;
+    if (p[0] == 0 && p[1] == 0 && p[2] == 0) continue;
+    for (uint32_t e = surfel_row_[s]; e < surfel_row_[s + 1]; ++e)
+      for (size_t a = 0; a < 3; ++a) {
+        const size_t at = size_t(surfel_point_[e]) * k.stride + a;
+        const double change = free_inverse_mass(surfel_point_[e], int(a)) * (surfel_weight_[e] * p[a]);
+        x[at] += h_ * change;
+        v[at] += change;
+      }
+  }
 }
 
-double Body::energy(const dfm_kin &k) const {
+// Sums of blocks of springs, in the order of the blocks.
+double Body::energy(const dfm_kin &k) {
+  struct Call {
+    Body *body;
+    const dfm_kin *k;
+  } call{this, &k};
+  const auto blocks = [](void *user, uint32_t begin, uint32_t end) {
+    const Call &of = *static_cast<const Call *>(user);
+    for (uint32_t at = begin; at < end; at += kGrain)
+      of.body->block_energy_[at / kGrain] = of.body->energy_of(*of.k, at, std::min(at + kGrain, end));
+  };
+  host->parallel_for(host->ctx, nedge_, kGrain, blocks, &call);
   double sum = 0;
-  for (uint32_t e = 0; e < nedge_; ++e) {
-    const double square = square_between(k.x + size_t(edges_[2 * size_t(e)]) * k.stride,
-                                         k.x + size_t(edges_[2 * size_t(e) + 1]) * k.stride);
+  for (uint32_t at = 0; at < nedge_; at += kGrain) sum += block_energy_[at / kGrain];
+  return sum;
+}
+
+double Body::energy_of(const dfm_kin &k, uint32_t begin, uint32_t end) const {
+  double sum = 0;
+  for (size_t e = begin; e < end; ++e) {
+    const double square =
+        square_between(k.x + size_t(edges_[2 * e]) * k.stride, k.x + size_t(edges_[2 * e + 1]) * k.stride);
     const double stretch = std::sqrt(square) - std::sqrt(rest_square_[e]);
     sum += 0.5 * stiffness_[e] * (stretch * stretch);
   }

@@ -33,7 +33,7 @@ class Body {
   void diagonal(uint32_t n, const uint32_t *surfel, double *w) const;
   void commit(const dfm_kin &k, const double *p_s, double *x, double *v);
   void bound(const dfm_kin &k, double *ksum, double *csum) const;
-  double energy(const dfm_kin &k) const;
+  double energy(const dfm_kin &k);
   static constexpr uint32_t kFactCount = 2;
   const dfm_fact *facts() const { return facts_; }
 
@@ -48,7 +48,8 @@ class Body {
   Buffer<uint8_t> held_;
   Buffer<uint32_t> surfel_row_, surfel_point_;  // coupling
   Buffer<double> surfel_weight_;
-  Buffer<double> impulse_;  // [npoint,3] N s, zero between calls
+  Buffer<double> impulse_;       // [npoint,3] N s, zero between calls
+  Buffer<double> block_energy_;  // J
   Springs springs_;
   std::unique_ptr<Stepper> stepper_;
   bool by_cell_ = false;
@@ -62,8 +63,8 @@ class Body {
   bool take_points(const dfm_kin &k);
   bool take_loads(const double *f, uint32_t stride);
   template <class F>
-  void each_point(const F &f) const;  // f(point), on the host's workers
-  void add_impulse(uint32_t surfel, const double *p);
+  void each_point(const F &f) const;                                       // f(point), on the host's workers
+  double energy_of(const dfm_kin &k, uint32_t begin, uint32_t end) const;  // of springs
   double free_inverse_mass(uint32_t point, int axis) const {
     return held_[point] >> axis & 1 ? 0 : inverse_mass_[point];
   }

@@ -11,30 +11,21 @@
 #include "../model_common/entry.h"
 
 // The functions that are used, by what hands them out.
-#define MSM_GPU_OF_INSTANCE(X)              \
-  X(DestroyInstance)                        \
-  X(EnumeratePhysicalDevices)               \
-  X(GetPhysicalDeviceProperties)            \
-  X(GetPhysicalDeviceFeatures)              \
-  X(GetPhysicalDeviceQueueFamilyProperties) \
-  X(GetPhysicalDeviceMemoryProperties) X(CreateDevice) X(GetDeviceProcAddr)
-#define MSM_GPU_OF_DEVICE(X)                                                                                 \
-  X(DestroyDevice)                                                                                           \
-  X(GetDeviceQueue)                                                                                          \
-  X(DeviceWaitIdle)                                                                                          \
-  X(QueueSubmit)                                                                                             \
-  X(CreateBuffer)                                                                                            \
-  X(DestroyBuffer)                                                                                           \
-  X(GetBufferMemoryRequirements)                                                                             \
-  X(BindBufferMemory) X(AllocateMemory) X(FreeMemory) X(MapMemory) X(CreateShaderModule)                     \
-      X(DestroyShaderModule) X(CreateDescriptorSetLayout) X(DestroyDescriptorSetLayout)                      \
-          X(CreatePipelineLayout) X(DestroyPipelineLayout) X(CreateComputePipelines) X(DestroyPipeline)      \
-              X(CreateDescriptorPool) X(DestroyDescriptorPool) X(AllocateDescriptorSets)                     \
-                  X(UpdateDescriptorSets) X(CreateCommandPool) X(DestroyCommandPool)                         \
-                      X(AllocateCommandBuffers) X(BeginCommandBuffer) X(EndCommandBuffer) X(CmdBindPipeline) \
-                          X(CmdBindDescriptorSets) X(CmdPushConstants) X(CmdDispatch) X(CmdPipelineBarrier)  \
-                              X(CmdCopyBuffer) X(CreateFence) X(DestroyFence) X(ResetFences)                 \
-                                  X(WaitForFences)
+// clang-format off
+#define MSM_GPU_OF_INSTANCE(X) \
+  X(DestroyInstance) X(EnumeratePhysicalDevices) X(GetPhysicalDeviceProperties) X(GetPhysicalDeviceFeatures) \
+  X(GetPhysicalDeviceQueueFamilyProperties) X(GetPhysicalDeviceMemoryProperties) X(CreateDevice) \
+  X(GetDeviceProcAddr)
+#define MSM_GPU_OF_DEVICE(X) \
+  X(DestroyDevice) X(GetDeviceQueue) X(DeviceWaitIdle) X(QueueSubmit) X(CreateBuffer) X(DestroyBuffer) \
+  X(GetBufferMemoryRequirements) X(BindBufferMemory) X(AllocateMemory) X(FreeMemory) X(MapMemory) \
+  X(CreateShaderModule) X(DestroyShaderModule) X(CreateDescriptorSetLayout) X(DestroyDescriptorSetLayout) \
+  X(CreatePipelineLayout) X(DestroyPipelineLayout) X(CreateComputePipelines) X(DestroyPipeline) \
+  X(CreateDescriptorPool) X(DestroyDescriptorPool) X(AllocateDescriptorSets) X(UpdateDescriptorSets) \
+  X(CreateCommandPool) X(DestroyCommandPool) X(AllocateCommandBuffers) X(BeginCommandBuffer) \
+  X(EndCommandBuffer) X(CmdBindPipeline) X(CmdBindDescriptorSets) X(CmdPushConstants) X(CmdDispatch) \
+  X(CmdPipelineBarrier) X(CmdCopyBuffer) X(CreateFence) X(DestroyFence) X(ResetFences) X(WaitForFences)
+// clang-format on
 
 namespace msm_gpu {
 

@@ -224,6 +224,7 @@ bool contacts_taken(World &w, StepContext &step) {
 // False: the sub-step is too long for contact of a body that steps itself. It is repeated as the first of
 // shorter ones, of which the bound, asked for again, then keeps the size.
 bool short_enough(World &w, StepContext &step) {
+  if (!any_bounds_contact(w)) return true;
   double longest = std::numeric_limits<double>::infinity(), parts = 1;
   const auto look = [&](uint32_t slot) {
     if (slot != kNone && !w.bodies[slot]->slumber.asleep)
@@ -236,7 +237,9 @@ bool short_enough(World &w, StepContext &step) {
   for (const Attachment &a : w.attachments)
     for (const uint64_t id : {a.body, a.to})
       if (!a.released) look(slot_of(w, id));
-  while (step.h > parts * longest) parts *= 2;
+  for (uint32_t slot = 0; slot < w.bodies.size(); ++slot)
+    if (has_dues(*w.bodies[slot])) look(slot);
+  while (longest > 0 && step.h > parts * longest) parts *= 2;  // zero: the step's own check refuses it
   if (parts == 1) return true;
   Guard &g = step.guard;
   bound_is_due(w);

@@ -50,6 +50,7 @@ bool ask_bound(const World &w, Body &b) {
 
 // By the stored contacts, so that a restored world has the same bound.
 void find_near(World &w) {
+  if (!any_bounds_contact(w)) return;
   for (auto &b : w.bodies) b->bound.near = false;
   const auto mark = [&](uint64_t id) {
     if (const uint32_t i = slot_of(w, id); i != kNone) w.bodies[i]->bound.near = true;
@@ -127,6 +128,10 @@ double strain_of_fall(const World &w, const Body &b, double n) {
 }
 
 }  // namespace
+
+bool any_bounds_contact(const World &w) {
+  return std::ranges::any_of(w.bodies, [](const auto &b) { return b->model.stepper && b->model.ops->bound; });
+}
 
 bool gravity_exceeds_bound(const World &w, const Body &b) {
   return w.bound.age + 1 < kBoundEvery && b.dynamics->diagonal() && std::isfinite(w.bound.step) &&
