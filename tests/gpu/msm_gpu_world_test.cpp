@@ -13,8 +13,8 @@ struct World {
   dfm_world world;
   dfm_body body = 0;
   World(const char *model, double device, const char *law, double mu, std::array<double, 3> gravity, double z,
-        double young = 2e5)
-      : context(1) {
+        double young = 2e5, uint32_t threads = 1)
+      : context(threads) {
     world = test::make_world(context, gravity);
     const double size[3] = {0.1, 0.1, 0.1};
     dfm_tetmesh mesh = 0;
@@ -141,6 +141,24 @@ TEST(MsmGpuWorld, SavedInContact_ContinuesWithTheSameBits) {
   test::ok(dfm_world_restore(b->world, saved.data(), saved.size()));
   test::run(b->world, 0.1, 2e-3);
   EXPECT_EQ(dfm_world_hash(a->world), dfm_world_hash(b->world));
+}
+
+// Two bodies, one on the other, submit from two threads at once.
+TEST(MsmGpuWorld, OnTwoWorkers_HasTheSameBits) {
+  if (device() == kReference) GTEST_SKIP() << "no driver";
+  uint64_t hash[2];
+  for (const uint32_t threads : {1u, 2u}) {
+    World w("msm_gpu", device(), "coulomb", 0.5, {0, 0, -9.81}, 1e-3, 2e5, threads);
+    test::BodyOptions o;
+    o.name = "upper";
+    o.model = "msm_gpu";
+    o.position = {0.02, 0.01, 0.103};
+    test::make_body(w.context, w.world, "beam", {0.1, 0.1, 0.1}, 100, o);
+    test::run(w.world, 0.1, 2e-3);
+    EXPECT_GT(normal_force(w.world), 0);
+    hash[threads - 1] = dfm_world_hash(w.world);
+  }
+  EXPECT_EQ(hash[0], hash[1]);
 }
 
 // A card may round a square root and a quotient otherwise.
