@@ -155,7 +155,7 @@ TEST(MsmGpuWorld, OnTwoWorkers_HasTheSameBits) {
     o.position = {0.02, 0.01, 0.103};
     test::make_body(w.context, w.world, "beam", {0.1, 0.1, 0.1}, 100, o);
     test::run(w.world, 0.1, 2e-3);
-    EXPECT_GT(normal_force(w.world), 0);
+    EXPECT_GT(test::stats(w.world).contacts, 0u);
     hash[threads - 1] = dfm_world_hash(w.world);
   }
   EXPECT_EQ(hash[0], hash[1]);
@@ -172,7 +172,7 @@ TEST(MsmGpuWorld, OnASoftwareDriverAndOnTheProcessor_HasTheSameBits) {
 
 TEST(MsmGpuWorld, UnderASoftBall_CarriesBothWeights) {
   World w("msm_gpu", device(), "coulomb", 0.5, {0, 0, -9.81}, 1e-4, 1e6);
-  test::expect_block_carries_ball(w.context, w.world, w.body, 1.5);
+  test::expect_block_carries_ball(w.context, w.world, w.body, 2.5);
 }
 
 const char *const kScene =
