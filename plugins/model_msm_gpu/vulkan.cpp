@@ -92,6 +92,7 @@ VkPhysicalDevice Vulkan::choose(Wanted wanted) {
     best = one;
     best_rank = rank;
     name = about.deviceName;
+    software = rank == kSoftware;
     limits = about.limits;
   }
   if (best) return best;

@@ -48,6 +48,7 @@ class Vulkan {
   Vulkan(const Vulkan &) = delete;
 
   std::string name;
+  bool software = false;  // its driver computes on the processor
   VkPhysicalDeviceLimits limits{};
   VkDevice device = VK_NULL_HANDLE;
   uint32_t family = 0;

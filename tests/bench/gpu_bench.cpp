@@ -4,7 +4,8 @@
 //             and its end back; one with points and loads on the way there, too, as in contact
 //   body      steps of a body of tetrahedra through the model's own functions, arrays of the host included
 // The bytes of a sub-step count each array once: what other points' places and velocities cost beyond that is
-// up to the cache. `gpu_bench --device software` takes a software driver, --most N bodies of up to N springs.
+// up to the cache. `gpu_bench --device software` takes a software driver, --most N bodies of up to N springs
+// (2e4 on a software driver).
 // --csv FILE --commit ID appends the figures.
 #include <chrono>
 #include <cstdlib>
@@ -272,7 +273,7 @@ int main(int argc, char **argv) {
   bench::Csv out(argc, argv,
                  "device,what,springs,points,damping,substeps,us_per_substep,springs_per_s,gb_per_s,"
                  "copy_gb_per_s,off_m");
-  double most = 1.1e7;
+  double most = 0;
   Choice choice = kAuto;
   for (int n = 1; n + 1 < argc; n += 2) {
     if (!std::strcmp(argv[n], "--most")) most = std::atof(argv[n + 1]);
@@ -280,6 +281,7 @@ int main(int argc, char **argv) {
   }
   try {
     const auto vulkan = std::make_shared<Vulkan>(Wanted(choice));
+    if (!(most > 0)) most = vulkan->software ? 2e4 : 1.1e7;
     const double copy = bandwidth(vulkan, most > 1e6 ? 8000000 : 100000);
     std::printf("%s: points without springs move %.1f GB/s, read and written\n", vulkan->name.c_str(), copy);
     for (const uint32_t side : {10u, 21u, 23u, 43u, 92u})
@@ -287,8 +289,7 @@ int main(int argc, char **argv) {
     for (const uint32_t side : {11u, 26u, 52u})
       if (7.0 * side * side * side < most) body(side, choice, vulkan->name, copy, out);
   } catch (const std::string &why) {
-    std::fprintf(stderr, "%s\n", why.c_str());
-    return 1;
+    std::printf("no figures: %s\n", why.c_str());
   }
   return 0;
 }
