@@ -184,7 +184,6 @@ struct Body : model::Blocks<Block> {
  private:
   double scale = 1;  // of shape
   void take_mesh(const dfm_mesh &m);
-  void find_directions();
   struct Layout;
   void build_blocks();
   void order_springs(Layout &l) const;

@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "../model_common/edges.h"
+#include "../model_common/spring_directions.h"
 #include "msm_body.h"
 
 namespace msm {
@@ -47,7 +48,9 @@ void Body::take_mesh(const dfm_mesh &m) {
     model::find_edges_by_rows(edges.data(), row_of_edges.data(), q, e);
     for (int n = 0; n < 6; ++n) edge_volume[e[n]] += volume;
   }
-  find_directions();
+  per_modulus.create(host, nedge);
+  model::find_directions(nedge, edges.data(), rest_point.data(), edge_length.data(), edge_volume.data(),
+                         per_modulus.data());
 }
 
 struct Body::Layout : Order {

@@ -22,7 +22,7 @@ void Body::take_fields(const dfm_mesh &m) {
   model::take_fields(host, kId, kParams, kParamCount, m, field, fits);
 }
 
-// Every cell gives each of its edges E V, times what msm_stiffness.cpp finds. What all cells share (Young's
+// Every cell gives each of its edges E V, times what spring_directions.h finds. What all cells share (Young's
 // modulus, the volume term's correction, a branch) stays outside.
 void Body::find_shapes() {
   const bool scaled = !field[kVolume].empty() || !field[kPoisson].empty(), stiff = !field[kYoung].empty();

@@ -16,7 +16,7 @@ BELOW = {
     "libdeform/doc": {"README.md", "concepts", "reference", "models", "laws", "howto", "decisions", "images"},
     "bindings": {"CMakeLists.txt", "cli", "render", "rigid_host", "ode", "bullet", "python", "tools", "view"},
     "tests": {"CMakeLists.txt", "README.md", "support", "data", "unit", "analytic", "stability", "api",
-              "plugin", "determinism", "adapters", "fuzz", "lint", "bench", "abi", "render", "python",
+              "plugin", "gpu", "determinism", "adapters", "fuzz", "lint", "bench", "abi", "render", "python",
               "contact_problems"},
 }
 PLUGIN_FOLDER = re.compile(r"plugins/(CMakeLists\.txt|(model|friction|solver|template)_[a-z0-9_]+)$")

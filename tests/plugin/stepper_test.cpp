@@ -77,8 +77,20 @@ dfm_status diagonal(void *self, const dfm_kin *, uint32_t n, const uint32_t *, d
   for (uint32_t i = 0; i < 9 * n; ++i) w[i] = i % 9 == 0 || i % 9 == 4 || i % 9 == 8 ? 1 / t.total : 0;
   return DFM_OK;
 }
+// The longest stable step is 1 ms.
+bool bounded = false;
+double longest_touched = 0, longest_free = 0;
+dfm_status bound(void *self, const dfm_kin *, double *ksum, double *, double *) {
+  const Toy &t = *static_cast<Toy *>(self);
+  for (uint32_t i = 0; bounded && i < t.npoint; ++i) ksum[i] += 4e6 * t.mass[i];
+  return DFM_OK;
+}
+
 dfm_status commit(void *self, const dfm_kin *k, const double *p, double *x, double *v) {
   const Toy &t = *static_cast<Toy *>(self);
+  const bool touched = std::any_of(p, p + 3 * size_t(t.nsurfel), [](double a) { return a != 0; });
+  double &longest = touched ? longest_touched : longest_free;
+  longest = std::max(longest, k->dt);
   for (int c = 0; c < 3; ++c) {
     double sum = 0;
     for (uint32_t s = 0; s < t.nsurfel; ++s) sum += p[3 * s + c];
@@ -111,6 +123,7 @@ extern "C" const dfm_plugin *dfm_plugin_entry_toy_stepper(const dfm_host *host, 
   ops.cells = DFM_CELL_TET;
   ops.create = create;
   ops.destroy = destroy;
+  ops.bound = bound;
   ops.extension = extension;
   static const char *const effects[] = {nullptr};
   static const dfm_type type = dfm::plugin::type(DFM_KIND_MODEL, "test.toy_stepper", "translating toy", "1",
@@ -152,6 +165,39 @@ TEST(Stepper, DroppedOnAFloor_RestsAtTheOffsetAndCarriesItsWeight) {
   uint32_t n = 0;
   ASSERT_EQ(dfm_world_pairs(w.world, 1, &pair, &n), DFM_OK) << dfm_last_error();
   EXPECT_NEAR(pair.normal, m.mass * 9.81, 1e-3 * m.mass * 9.81);
+}
+
+// A body that names a bound takes a long step alone and short ones in contact, also where it lands within a
+// step; saved in contact, it goes on alike.
+TEST(Stepper, WithABoundOfItsOwn_KeepsToItInContactOnly) {
+  bounded = true;
+  World w(0.5, {0.3, 0, -9.81}, 0.05), again(0.5, {0.3, 0, -9.81}, 0.05);
+  longest_touched = longest_free = 0;
+  test::run(w.world, 0.06, 0.01);
+  EXPECT_EQ(longest_touched, 0);
+  EXPECT_NEAR(longest_free, 0.01, 1e-12);
+  EXPECT_EQ(test::stats(w.world).substeps_max, 1u);
+  longest_free = 0;
+  test::run(w.world, 0.2, 0.01);
+  EXPECT_GT(longest_touched, 0.4e-3);
+  EXPECT_LE(longest_touched, 1e-3);
+  EXPECT_NEAR(test::stats(w.world).stable_step, 0.9e-3, 1e-12);
+  const std::string saved = test::snapshot(w.world);
+  test::run(again.world, 0.05, 0.01);
+  test::ok(dfm_world_restore(again.world, saved.data(), saved.size()));
+  for (const World *each : {&w, &again}) test::run(each->world, 0.1, 0.01);
+  EXPECT_EQ(dfm_world_hash(w.world), dfm_world_hash(again.world));
+  EXPECT_LT(test::measure(w.body).speed_max, 1e-9);
+  EXPECT_LE(longest_touched, 1e-3);
+  bounded = false;
+}
+
+// Without rows the function bounds nothing.
+TEST(Stepper, WithoutABound_TakesAnyStepInContact) {
+  World w(0.5, {0, 0, -9.81}, 1e-4);
+  longest_touched = 0;
+  test::run(w.world, 0.2, 0.01);
+  EXPECT_NEAR(longest_touched, 0.01, 1e-12);
 }
 
 // All right-hand sides of a sub-step are asked in one call, with the same bits as one by one.

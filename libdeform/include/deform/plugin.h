@@ -230,7 +230,7 @@ typedef struct dfm_model {           /* self is void*: one shared struct tag wou
 /* Self-stepping model, extension "dfm.stepper/1". Contact, friction, report and pictures see surfels only.
  * Velocities here are means over the step: (x_s(t+dt) - x_s(t)) / dt. The functions of this table and of
  * those below are required unless marked (optional): a model without them returns NULL for the id of the
- * table. */
+ * table. A touched body takes no step beyond dfm_model.bound, if the model sets it. */
 typedef struct dfm_stepper {
   uint32_t size, reserved; /* reserved: 0, here and in the tables below */
   /* [step] without contact. f_ext [npoint,stride] N: gravity, loads, springs. u_s [nsurfel,3]. Held

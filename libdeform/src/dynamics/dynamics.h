@@ -101,6 +101,8 @@ class Dynamics {
   virtual ExplicitTime measure(const Pose & /*placed*/, bool /*spectrum*/) { return {}; }
   // share: that of the model as it was made. False: the model gives none.
   virtual bool bound(double time, double share, const AddRowSums &outside, StepBound &out) = 0;
+  // s, the longest sub-step with contacts, at the last bound; infinite: any.
+  virtual double contact_step() { return std::numeric_limits<double>::infinity(); }
   // 1/s, of the edge that stretches fastest; 0 if the bound does not depend on the shape
   virtual double strain_rate() const { return 0; }
   // touched: the last sub-step ended with contacts. Called once for a sub-step and its repetitions.

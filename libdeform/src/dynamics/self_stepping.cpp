@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
+
+#include "dynamics/symplectic_euler.h"
 
 namespace dfm {
 
@@ -10,7 +13,7 @@ SelfStepping::SelfStepping(const Memory &memory, Phyxels &points, Surface &surfa
     : Dynamics(points, surface, model),
       mean_(size_t(kStride) * points.n, 0.0, HookAllocator<double>(memory)),
       surfels_(size_t(3) * surface.nsurfel, 0.0, HookAllocator<double>(memory)) {
-  use_memory(memory, unit_, near_);
+  use_memory(memory, unit_, near_, stiffness_, damping_);
   if (!model.late) return;
   std::vector<uint8_t> near(points.n, 0);
   for (uint32_t s = 0; s < surface.nsurfel; ++s)
@@ -27,6 +30,31 @@ void SelfStepping::each_moved(F &&f) const {
   }
   for (const uint32_t i : near_)
     for (size_t j = size_t(i) * kStride; j < size_t(i + 1) * kStride; ++j) f(j);
+}
+
+// A model that divides its steps itself takes impulses at the end of a step only. If it names a bound,
+// contact needs steps within that.
+bool SelfStepping::bound(double time, double, const AddRowSums &outside, StepBound &out) {
+  contact_step_ = std::numeric_limits<double>::infinity();
+  if (!model_.ops->bound) return true;
+  stiffness_.assign(p_.n, 0.0);
+  damping_.assign(p_.n, 0.0);
+  const dfm_kin k = kin(time, 0);
+  double cell = *contact_step_;
+  const auto ask = [&] {
+    return model_.ops->bound(model_.self, &k, stiffness_.data(), damping_.data(), &cell);
+  };
+  if (model_.call("bound", ask) != DFM_OK) return false;
+  outside(stiffness_.data(), damping_.data());
+  out.step = std::min(cell, stable_step(p_, stiffness_.data(), damping_.data(), &out.point));
+  contact_step_ = out.step;
+  return true;
+}
+
+double SelfStepping::contact_step() {
+  StepBound found;
+  if (!contact_step_) bound(0, 1, [](double *, double *) {}, found);
+  return *contact_step_;
 }
 
 // Loads and gravity are external forces of the model, which returns the mean velocities of the surfels. The

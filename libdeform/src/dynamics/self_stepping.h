@@ -4,6 +4,7 @@
 #pragma once
 #include <atomic>
 #include <mutex>
+#include <optional>
 
 #include "dynamics/dynamics.h"
 
@@ -14,7 +15,8 @@ class SelfStepping : public Dynamics {
   SelfStepping(const Memory &memory, Phyxels &points, Surface &surface, ModelInstance &model);
 
   Abilities abilities() const override { return {}; }
-  bool bound(double, double, const AddRowSums &, StepBound &) override { return true; }
+  bool bound(double time, double share, const AddRowSums &outside, StepBound &out) override;
+  double contact_step() override;
   bool free_motion(const SubStep &now, double &kinetic) override;
   bool response(const SubStep &now, uint32_t n, const uint32_t *surfel, double *answers) override;
   bool end_state(const SubStep &now, const double *surfel_impulse, bool touched) override;
@@ -31,7 +33,9 @@ class SelfStepping : public Dynamics {
   Array<double> mean_;     // [npoint,4] m/s
   Array<double> surfels_;  // [nsurfel,3] m/s as the model writes them; N s, zero, where nothing touches
   Array<double> unit_;     // [3n,n,3] N s: unit impulses at the touched surfels
-  Array<uint32_t> near_;   // late points: those that every sub-step moves
+  Array<double> stiffness_, damping_;   // row sums, of a model that names a bound
+  std::optional<double> contact_step_;  // s; empty: not asked for yet
+  Array<uint32_t> near_;                // late points: those that every sub-step moves
   std::atomic<bool> unseen_ = false;
   std::mutex seeing_;
 

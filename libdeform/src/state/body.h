@@ -159,7 +159,7 @@ struct Body : Discretization {
   Array<double> method_values;
   // as last computed; valid while asleep
   struct {
-    bool known = false;
+    bool known = false, near = false;  // near: it has contacts or attachments
     StepBound found;
     uint32_t inverted = 0;
     double strain_rate = 0;  // 1/s, of the edge that stretches fastest

@@ -6,6 +6,7 @@
 //            residual of the true laws below tolerance: done
 //            sweep the linearized laws until their own residual is below tolerance
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "contact/solver.h"
@@ -24,6 +25,7 @@
 #include "state/obstacle.h"
 #include "step/solve_islands.h"
 #include "step/stages.h"
+#include "step/step_bound.h"
 #include "step/stuck_slip.h"
 
 namespace dfm {
@@ -221,6 +223,37 @@ bool contacts_taken(World &w, StepContext &step) {
   return all;
 }
 
+// False: the sub-step is too long for contact of a body that steps itself. It is repeated as the first of
+// shorter ones, of which the bound, asked for again, then keeps the size.
+bool short_enough(World &w, StepContext &step) {
+  if (!any_bounds_contact(w)) return true;
+  double longest = std::numeric_limits<double>::infinity(), parts = 1;
+  const auto look = [&](uint32_t slot) {
+    if (slot != kNone && !w.bodies[slot]->slumber.asleep)
+      longest = std::min(longest, w.bodies[slot]->dynamics->contact_step());
+  };
+  for (const ContactPoint &c : step.contacts) {
+    look(c.slot_a);
+    if (!c.obstacle) look(c.slot_b);
+  }
+  for (const Attachment &a : w.attachments)
+    for (const uint64_t id : {a.body, a.to})
+      if (!a.released) look(slot_of(w, id));
+  for (uint32_t slot = 0; slot < w.bodies.size(); ++slot)
+    if (has_dues(*w.bodies[slot])) look(slot);
+  while (longest > 0 && step.h > parts * longest) parts *= 2;  // zero: the step's own check refuses it
+  if (parts == 1) return true;
+  Guard &g = step.guard;
+  bound_is_due(w);
+  if (step.h == g.planned && g.finer == 1) {
+    g.finer = parts;
+    g.refines = true;
+  }
+  g.cut = 1 / parts;
+  g.again = true;
+  return false;
+}
+
 // In a shorter sub-step a body moves less far from where its forces are known.
 bool retry_shorter(World &w, StepContext &step, const SolveIsland &own, uint32_t *trouble) {
   if (may_shorten(step)) {
@@ -251,7 +284,7 @@ bool cut_at_landing(World &w, StepContext &step) {
 
 bool stage_solve(World &w, StepContext &step, uint32_t *trouble) {
   ask_pre_solve(w, step);
-  if (!contacts_taken(w, step)) return false;
+  if (!contacts_taken(w, step) || !short_enough(w, step)) return false;
   step.passes = step.sweeps = 0;
   step.residual = {};
   make_rows(w, step);

@@ -12,6 +12,7 @@
 #include "state/world.h"
 #include "step/first_failure.h"
 #include "step/squeezed.h"
+#include "step/stages.h"
 
 namespace dfm {
 namespace {
@@ -42,7 +43,23 @@ bool ask_bound(const World &w, Body &b) {
   const auto springs = [&b](double *stiffness, double *damping) {
     for (const Spring &spring : b.springs) add_spring_bound(spring, stiffness, damping);
   };
-  return b.dynamics->bound(w.time, b.integrator.share, springs, b.bound.found);
+  if (!b.dynamics->bound(w.time, b.integrator.share, springs, b.bound.found)) return false;
+  if (b.model.stepper && !b.bound.near) b.bound.found = {};  // alone it takes any step
+  return true;
+}
+
+// By the stored contacts, so that a restored world has the same bound.
+void find_near(World &w) {
+  if (!any_bounds_contact(w)) return;
+  for (auto &b : w.bodies) b->bound.near = false;
+  const auto mark = [&](uint64_t id) {
+    if (const uint32_t i = slot_of(w, id); i != kNone) w.bodies[i]->bound.near = true;
+  };
+  for (uint32_t m = 0; m < w.store.n; ++m)
+    for (const uint64_t id : {w.store.id_a[m], w.store.id_b[m]}) mark(id);
+  for (const Attachment &a : w.attachments)
+    for (const uint64_t id : {a.body, a.to})
+      if (!a.released) mark(id);
 }
 
 // Who sleeps keeps what it had.
@@ -112,6 +129,10 @@ double strain_of_fall(const World &w, const Body &b, double n) {
 
 }  // namespace
 
+bool any_bounds_contact(const World &w) {
+  return std::ranges::any_of(w.bodies, [](const auto &b) { return b->model.stepper && b->model.ops->bound; });
+}
+
 bool gravity_exceeds_bound(const World &w, const Body &b) {
   return w.bound.age + 1 < kBoundEvery && b.dynamics->diagonal() && std::isfinite(w.bound.step) &&
          strain_of_fall(w, b, kBoundEvery - w.bound.age) > kBoundStrain;
@@ -140,6 +161,7 @@ void update_bound(World &w) {
   w.bound.body = nullptr;
   w.bound.point = 0;
   uint32_t limited = 0;
+  find_near(w);
   ask_each(w, [&w](Body &b) { return ask_bound(w, b); });
   for (auto &b : w.bodies) {
     limited += b->model.limited_cells();

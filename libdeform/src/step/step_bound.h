@@ -12,6 +12,8 @@ inline constexpr double kBoundShare = 0.9;  // of the bound, that is used
 // Strain of an edge, from a bound to the next one, that the rest of the bound pays for.
 inline constexpr double kBoundStrain = 0.05;
 
+// Does any body step itself and name a bound for its contacts?
+bool any_bounds_contact(const World &w);
 bool bound_due(const World &w);     // does the next sub-step look whether it still holds?
 bool bound_is_new(const World &w);  // has it looked since the last sub-step?
 void bound_is_due(World &w);        // the next one does

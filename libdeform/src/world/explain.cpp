@@ -42,7 +42,9 @@ std::string integrator(const Body &b) {
   const auto &i = b.integrator;
   const double step = b.world->def.step, n = std::max(1.0, std::ceil(step / i.step));
   std::string why;
-  if (b.model.stepper) why = "the model steps itself";
+  if (b.model.stepper)
+    why = std::isfinite(i.step) ? "the model steps itself, and in contact within its bound"
+                                : "the model steps itself";
   else if (i.chosen == Chosen::no) why = "named, or the world's";
   else if (i.chosen == Chosen::struck) why = "auto: implicit, but explicit until an impact is over";
   else if (i.used != DFM_INTEGRATOR_SYMPLECTIC_EULER)

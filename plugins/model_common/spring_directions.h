@@ -17,12 +17,13 @@
 // factor is at most 3. A spring of a direction that a stretched mesh has too much of would vanish: the factor
 // is at least 1/8, so that no point loses its hold. The next step gives back what the limits take:
 // otherwise each step would soften the whole body.
+#pragma once
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
 
-#include "msm_body.h"
-
-namespace msm {
-namespace {
+namespace model {
+namespace directions {
 
 constexpr int kN = 6;
 // Below this share of the mean pivot the edges all but leave out a strain (points in a plane):
@@ -33,9 +34,10 @@ constexpr int kMostSteps = 8;
 // A mesh is stretched where, after one step, springs of m.S m < kStiff hold more than the share kStretched of
 // sum w (stretched cylinders: 0.07 to 0.09, others below 0.01). Steps end where no m.S m is above kSoftest.
 constexpr double kStiff = 0.7, kStretched = 0.04, kSoftest = 1.02;
+constexpr double kShortestSquared = 1e-200;  // m2: two points at one place
 
 // Components of n n^T such that the dot product of two is that of the tensors.
-void dyad_of(const double *a, const double *b, double length, double *m) {
+inline void dyad_of(const double *a, const double *b, double length, double *m) {
   const double n[3] = {(b[0] - a[0]) / length, (b[1] - a[1]) / length, (b[2] - a[2]) / length};
   const double root2 = __builtin_sqrt(2.0);
   m[0] = n[0] * n[0];
@@ -47,7 +49,7 @@ void dyad_of(const double *a, const double *b, double length, double *m) {
 }
 
 // C = l l^T in place, lower triangle; false where C is not safely positive.
-bool factor(double (*c)[kN]) {
+inline bool factor(double (*c)[kN]) {
   for (int i = 0; i < kN; ++i)
     for (int j = 0; j <= i; ++j) {
       double sum = c[i][j];
@@ -58,7 +60,7 @@ bool factor(double (*c)[kN]) {
   return true;
 }
 
-double inverse_form(const double (*l)[kN], const double *m) {
+inline double inverse_form(const double (*l)[kN], const double *m) {
   double y[kN], sum = 0;
   for (int i = 0; i < kN; ++i) {
     y[i] = m[i];
@@ -69,16 +71,19 @@ double inverse_form(const double (*l)[kN], const double *m) {
   return sum;
 }
 
-}  // namespace
+}  // namespace directions
 
-void Body::find_directions() {
-  per_modulus.create(host, nedge);
+// per_modulus [nedge] = stiffness over the sum of E V around the edge. rest [npoint,3] m; edge_length m,
+// edge_volume m3, the sum over the cells around it.
+inline void find_directions(uint32_t nedge, const uint32_t *edges, const double *rest,
+                            const double *edge_length, const double *edge_volume, double *per_modulus) {
+  using namespace directions;
   double m[kN];
   const auto directed = [&](uint32_t e) {  // two points at one place: no direction, no spring
     const bool yes = edge_length[e] * edge_length[e] > kShortestSquared;
     if (yes)
-      dyad_of(rest_point.data() + 3 * size_t(edges[2 * size_t(e)]),
-              rest_point.data() + 3 * size_t(edges[2 * size_t(e) + 1]), edge_length[e], m);
+      dyad_of(rest + 3 * size_t(edges[2 * size_t(e)]), rest + 3 * size_t(edges[2 * size_t(e) + 1]),
+              edge_length[e], m);
     return yes;
   };
   for (uint32_t e = 0; e < nedge; ++e) per_modulus[e] = directed(e);  // the factor, until the end
@@ -112,4 +117,4 @@ void Body::find_directions() {
     if (directed(e)) per_modulus[e] /= edge_length[e] * edge_length[e];
 }
 
-}  // namespace msm
+}  // namespace model

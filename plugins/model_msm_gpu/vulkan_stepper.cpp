@@ -1,0 +1,250 @@
+#include "vulkan_stepper.h"
+
+#include <algorithm>
+#include <cstring>
+#include <utility>
+
+namespace msm_gpu {
+namespace {
+
+constexpr uint32_t kGroup = 64;  // points, as in spring_step.comp
+constexpr VkPipelineStageFlags kCopy = VK_PIPELINE_STAGE_TRANSFER_BIT,
+                               kCompute = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT,
+                               kProcessor = VK_PIPELINE_STAGE_HOST_BIT;
+
+VkAccessFlags writes_of(VkPipelineStageFlags stages) {
+  return (stages & kCopy ? VK_ACCESS_TRANSFER_WRITE_BIT : 0) |
+         (stages & kCompute ? VK_ACCESS_SHADER_WRITE_BIT : 0) |
+         (stages & kProcessor ? VK_ACCESS_HOST_WRITE_BIT : 0);
+}
+VkAccessFlags reads_of(VkPipelineStageFlags stages) {
+  return (stages & kCopy ? VK_ACCESS_TRANSFER_READ_BIT : 0) |
+         (stages & kCompute ? VK_ACCESS_SHADER_READ_BIT : 0) |
+         (stages & kProcessor ? VK_ACCESS_HOST_READ_BIT : 0);
+}
+
+void must(VkResult result, const char *what) {
+  if (result == VK_SUCCESS) return;
+  throw std::string(what) + " failed on the device (VkResult " + std::to_string(int(result)) +
+      "); take a smaller body, or set device to reference";
+}
+
+}  // namespace
+
+VulkanStepper::VulkanStepper(std::shared_ptr<Vulkan> vulkan, uint32_t npoint)
+    : vulkan_(std::move(vulkan)), npoint_(npoint) {
+  try {
+    open();
+  } catch (...) {
+    close();
+    throw;
+  }
+}
+
+VulkanStepper::~VulkanStepper() { close(); }
+
+void VulkanStepper::open() {
+  const Vulkan &vk = *vulkan_;
+  if ((npoint_ + kGroup - 1) / kGroup > vk.limits.maxComputeWorkGroupCount[0])
+    throw "the body has more points than the device " + vk.name + " takes in one call; take a coarser mesh";
+  for (Array *array : {&place_[0], &place_[1], &speed_[0], &speed_[1], &load_}) make(*array, bytes(), false);
+  make(row_, sizeof(uvec2) * npoint_, false);
+  make(shared_, 3 * bytes(), true);
+  place = static_cast<dvec4 *>(shared_.mapped);
+  speed = place + npoint_;
+  load = speed + npoint_;
+  std::memset(static_cast<void *>(place), 0, 3 * bytes());
+  const VkDescriptorPoolSize size{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 2 * kBindings};
+  VkDescriptorPoolCreateInfo sets{};
+  sets.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO;
+  sets.maxSets = 2;
+  sets.poolSizeCount = 1;
+  sets.pPoolSizes = &size;
+  must(vk.CreateDescriptorPool(vk.device, &sets, nullptr, &sets_), "vkCreateDescriptorPool");
+  const VkDescriptorSetLayout both[2] = {vk.set_layout, vk.set_layout};
+  VkDescriptorSetAllocateInfo take_sets{};
+  take_sets.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO;
+  take_sets.descriptorPool = sets_;
+  take_sets.descriptorSetCount = 2;
+  take_sets.pSetLayouts = both;
+  must(vk.AllocateDescriptorSets(vk.device, &take_sets, set_), "vkAllocateDescriptorSets");
+  VkCommandPoolCreateInfo pool{};
+  pool.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO;
+  pool.flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT;
+  pool.queueFamilyIndex = vk.family;
+  must(vk.CreateCommandPool(vk.device, &pool, nullptr, &pool_), "vkCreateCommandPool");
+  VkCommandBuffer all[kBatches + 1];
+  VkCommandBufferAllocateInfo commands{};
+  commands.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO;
+  commands.commandPool = pool_;
+  commands.level = VK_COMMAND_BUFFER_LEVEL_PRIMARY;
+  commands.commandBufferCount = kBatches + 1;
+  must(vk.AllocateCommandBuffers(vk.device, &commands, all), "vkAllocateCommandBuffers");
+  std::copy(all, all + kBatches, commands_);
+  once_ = all[kBatches];
+  VkFenceCreateInfo fence{};
+  fence.sType = VK_STRUCTURE_TYPE_FENCE_CREATE_INFO;
+  must(vk.CreateFence(vk.device, &fence, nullptr, &done_), "vkCreateFence");
+}
+
+void VulkanStepper::close() {
+  const Vulkan &vk = *vulkan_;
+  vk.DeviceWaitIdle(vk.device);
+  vk.DestroyFence(vk.device, done_, nullptr);
+  vk.DestroyCommandPool(vk.device, pool_, nullptr);
+  vk.DestroyDescriptorPool(vk.device, sets_, nullptr);
+  for (Array *array : {&place_[0], &place_[1], &speed_[0], &speed_[1], &load_, &row_, &spring_, &shared_})
+    drop(*array);
+}
+
+void VulkanStepper::make(Array &array, size_t size, bool mapped) {
+  const Vulkan &vk = *vulkan_;
+  if (size > vk.limits.maxStorageBufferRange)
+    throw "an array of the body takes " + std::to_string(size >> 20) + " MiB, and the device " + vk.name +
+        " reads " + std::to_string(vk.limits.maxStorageBufferRange >> 20) + "; take a coarser mesh";
+  VkBufferCreateInfo info{};
+  info.sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO;
+  info.size = size;
+  info.usage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT |
+               VK_BUFFER_USAGE_TRANSFER_DST_BIT;
+  must(vk.CreateBuffer(vk.device, &info, nullptr, &array.buffer), "vkCreateBuffer");
+  VkMemoryRequirements needs;
+  vk.GetBufferMemoryRequirements(vk.device, array.buffer, &needs);
+  VkMemoryAllocateInfo memory{};
+  memory.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO;
+  memory.allocationSize = needs.size;
+  memory.memoryTypeIndex = vk.memory_type(needs.memoryTypeBits, mapped);
+  must(vk.AllocateMemory(vk.device, &memory, nullptr, &array.memory), "vkAllocateMemory");
+  must(vk.BindBufferMemory(vk.device, array.buffer, array.memory, 0), "vkBindBufferMemory");
+  if (mapped) must(vk.MapMemory(vk.device, array.memory, 0, VK_WHOLE_SIZE, 0, &array.mapped), "vkMapMemory");
+}
+
+void VulkanStepper::drop(Array &array) {
+  vulkan_->DestroyBuffer(vulkan_->device, array.buffer, nullptr);
+  vulkan_->FreeMemory(vulkan_->device, array.memory, nullptr);
+  array = {};
+}
+
+// Set 0 reads the first of two arrays and writes the second, set 1 the reverse.
+void VulkanStepper::describe() {
+  const Vulkan &vk = *vulkan_;
+  for (uint32_t s = 0; s < 2; ++s) {
+    const VkBuffer buffers[kBindings] = {place_[s].buffer,    speed_[s].buffer, load_.buffer,
+                                         row_.buffer,         spring_.buffer,   place_[1 - s].buffer,
+                                         speed_[1 - s].buffer};
+    VkDescriptorBufferInfo whole[kBindings];
+    VkWriteDescriptorSet writes[kBindings];
+    for (uint32_t b = 0; b < kBindings; ++b) {
+      whole[b] = {buffers[b], 0, VK_WHOLE_SIZE};
+      writes[b] = {};
+      writes[b].sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
+      writes[b].dstSet = set_[s];
+      writes[b].dstBinding = b;
+      writes[b].descriptorCount = 1;
+      writes[b].descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
+      writes[b].pBufferInfo = &whole[b];
+    }
+    vk.UpdateDescriptorSets(vk.device, kBindings, writes, 0, nullptr);
+  }
+}
+
+void VulkanStepper::begin(VkCommandBuffer commands) const {
+  VkCommandBufferBeginInfo info{};
+  info.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
+  vulkan_->BeginCommandBuffer(commands, &info);
+}
+
+void VulkanStepper::order(VkCommandBuffer commands, VkPipelineStageFlags before,
+                          VkPipelineStageFlags after) const {
+  VkMemoryBarrier barrier{};
+  barrier.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER;
+  barrier.srcAccessMask = writes_of(before);
+  barrier.dstAccessMask = reads_of(after) | writes_of(after);
+  vulkan_->CmdPipelineBarrier(commands, before, after, 0, 1, &barrier, 0, nullptr, 0, nullptr);
+}
+
+VkResult VulkanStepper::finish(VkCommandBuffer commands) {
+  const Vulkan &vk = *vulkan_;
+  VkResult result = vk.ResetFences(vk.device, 1, &done_);
+  if (result == VK_SUCCESS) result = vulkan_->submit(commands, done_);
+  return result == VK_SUCCESS ? vk.WaitForFences(vk.device, 1, &done_, VK_TRUE, ~uint64_t{0}) : result;
+}
+
+void VulkanStepper::upload(const Array &to, const void *from, size_t size) {
+  Array staging;
+  try {
+    make(staging, size, true);
+    std::memcpy(staging.mapped, from, size);
+    begin(once_);
+    const VkBufferCopy all{0, 0, size};
+    vulkan_->CmdCopyBuffer(once_, staging.buffer, to.buffer, 1, &all);
+    vulkan_->EndCommandBuffer(once_);
+    must(finish(once_), "a copy of the springs");
+  } catch (...) {
+    drop(staging);
+    throw;
+  }
+  drop(staging);
+}
+
+void VulkanStepper::take(const Springs &springs) {
+  if (!spring_.buffer) {
+    make(spring_, sizeof(uvec4) * std::max<size_t>(springs.nspring, 1), false);
+    describe();
+  }
+  upload(row_, springs.row.data(), sizeof(uvec2) * npoint_);
+  if (springs.nspring) upload(spring_, springs.spring.data(), sizeof(uvec4) * springs.nspring);
+}
+
+void VulkanStepper::record(VkCommandBuffer commands, const Batch &batch) const {
+  const Vulkan &vk = *vulkan_;
+  const auto copy = [&](const Array &from, size_t at, const Array &to, size_t to_at) {
+    const VkBufferCopy part{at, to_at, bytes()};
+    vk.CmdCopyBuffer(commands, from.buffer, to.buffer, 1, &part);
+  };
+  begin(commands);
+  order(commands, kCompute | kCopy | kProcessor, kCompute | kCopy);
+  if (batch.moved) {
+    copy(shared_, 0, place_[batch.from], 0);
+    copy(shared_, bytes(), speed_[batch.from], 0);
+  }
+  if (batch.loaded) copy(shared_, 2 * bytes(), load_, 0);
+  if (batch.moved || batch.loaded) order(commands, kCopy, kCompute);
+  vk.CmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, vk.pipeline);
+  const Constants constants{batch.h, npoint_, batch.damping};
+  vk.CmdPushConstants(commands, vk.layout, VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof constants, &constants);
+  for (uint32_t k = 0; k < batch.n; ++k) {
+    if (k > 0) order(commands, kCompute, kCompute);
+    vk.CmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, vk.layout, 0, 1,
+                             &set_[(batch.from + k) % 2], 0, nullptr);
+    vk.CmdDispatch(commands, (npoint_ + kGroup - 1) / kGroup, 1, 1);
+  }
+  if (batch.seen) {
+    const uint32_t end = (batch.from + batch.n) % 2;
+    order(commands, kCompute, kCopy);
+    copy(place_[end], 0, shared_, 0);
+    copy(speed_[end], 0, shared_, bytes());
+    order(commands, kCopy, kProcessor);
+  }
+  vk.EndCommandBuffer(commands);
+}
+
+// What was recorded is used again where it is the same, as it is from step to step.
+const char *VulkanStepper::run(uint32_t n, double h, float damping, bool moved, bool loaded) {
+  for (uint32_t taken = 0; taken < n;) {
+    const uint32_t some = std::min(n - taken, kMostSteps);
+    const Batch batch{some, now_, moved && !taken, loaded && !taken, taken + some == n, h, damping};
+    const uint32_t slot = batch.from + 2 * batch.moved + 4 * batch.loaded + 8 * batch.seen;
+    if (!(recorded_[slot] == batch)) {
+      record(commands_[slot], batch);
+      recorded_[slot] = batch;
+    }
+    if (finish(commands_[slot]) != VK_SUCCESS)
+      return "the device was lost, or its driver failed; restart the program, or set device to reference";
+    taken += some;
+    now_ = (now_ + some) % 2;
+  }
+  return nullptr;
+}
+
+}  // namespace msm_gpu

@@ -1,0 +1,295 @@
+// Springs times sub-steps per second of the model msm_gpu, beside what the same kernel does on points without
+// springs, which is to copy their places and velocities:
+//   lattice   points of a cube, each with springs to its 26 neighbors: many sub-steps in one submission; one
+//             and its end back; one with points and loads on the way there, too, as in contact
+//   body      steps of a body of tetrahedra through the model's own functions, arrays of the host included
+// The bytes of a sub-step count each array once: what other points' places and velocities cost beyond that is
+// up to the cache. `gpu_bench --device software` takes a software driver, --most N bodies of up to N springs
+// (2e4 on a software driver).
+// --csv FILE --commit ID appends the figures.
+#include <chrono>
+#include <cstdlib>
+#include <functional>
+#include <map>
+#include <random>
+#include <vector>
+
+#include "machine.h"
+#include "model_msm_gpu/gpu_body.h"
+#include "model_msm_gpu/vulkan_stepper.h"
+
+namespace {
+
+using namespace msm_gpu;
+
+dfm_host services() {
+  dfm_host h{};
+  h.size = sizeof h;
+  h.abi = DFM_ABI;
+  h.alloc = [](void *, size_t bytes, size_t align) {
+    return std::aligned_alloc(align, (bytes + align - 1) / align * align);
+  };
+  h.release = [](void *, void *p, size_t, size_t) { std::free(p); };
+  h.log = [](void *, int32_t level, uint32_t, const char *text) {
+    if (level > 1) std::fprintf(stderr, "%s\n", text);
+  };
+  h.parallel_for = [](void *, uint32_t n, uint32_t, void (*fn)(void *, uint32_t, uint32_t), void *user) {
+    fn(user, 0, n);
+  };
+  return h;
+}
+const dfm_host host = services();
+
+double seconds(const std::function<void()> &act) {
+  const auto begun = std::chrono::steady_clock::now();
+  act();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+}
+
+// s, of one call: the median of seven timings of as many calls as take a tenth of a second.
+double time_of(const std::function<void()> &act) {
+  act();
+  const double once = seconds(act);
+  const int n = int(std::max(1.0, std::min(0.1 / once, 1000.0)));
+  std::vector<double> each;
+  for (int k = 0; k < 7; ++k)
+    each.push_back(seconds([&] {
+                     for (int i = 0; i < n; ++i) act();
+                   }) /
+                   n);
+  std::nth_element(each.begin(), each.begin() + 3, each.end());
+  return each[3];
+}
+
+struct Lattice {
+  std::vector<double> x, stiffness, square;
+  std::vector<uint32_t> edges;
+  Springs springs;
+  uint32_t npoint() const { return uint32_t(x.size() / 3); }
+  size_t nspring() const { return stiffness.size(); }
+
+  explicit Lattice(uint32_t side) {
+    std::mt19937 random(1);
+    std::uniform_real_distribution<double> u(-0.1, 0.1);
+    for (uint32_t i = 0; i < side; ++i)
+      for (uint32_t j = 0; j < side; ++j)
+        for (uint32_t k = 0; k < side; ++k)
+          for (const uint32_t a : {i, j, k}) x.push_back(0.01 * (a + u(random)));
+    const auto id = [&](int i, int j, int k) { return uint32_t((i * int(side) + j) * int(side) + k); };
+    const auto inside = [&](int a) { return a >= 0 && a < int(side); };
+    for (int i = 0; i < int(side); ++i)
+      for (int j = 0; j < int(side); ++j)
+        for (int k = 0; k < int(side); ++k)
+          for (int d = 14; d < 27; ++d) {  // half of the 26: those behind the point
+            const int to[3] = {i + d / 9 - 1, j + d / 3 % 3 - 1, k + d % 3 - 1};
+            if (!inside(to[0]) || !inside(to[1]) || !inside(to[2])) continue;
+            const uint32_t a = id(i, j, k), b = id(to[0], to[1], to[2]);
+            edges.insert(edges.end(), {a, b});
+            double sum = 0;
+            for (int c = 0; c < 3; ++c) sum += (x[3 * b + c] - x[3 * a + c]) * (x[3 * b + c] - x[3 * a + c]);
+            square.push_back(sum);
+            stiffness.push_back(100);
+          }
+    springs.lay_out(&host, npoint(), uint32_t(nspring()), edges.data());
+    springs.fill(stiffness.data(), square.data());
+  }
+
+  void start(Stepper &s) const {
+    std::mt19937 random(2);
+    std::uniform_real_distribution<double> u(-1, 1);
+    for (uint32_t i = 0; i < npoint(); ++i) {
+      const auto near = [&](int a) { return x[3 * size_t(i) + size_t(a)] + 2e-4 * u(random); };
+      s.place[i] = {near(0), near(1), near(2), 1000};
+      s.speed[i] = {0.1 * u(random), 0.1 * u(random), 0.1 * u(random), 0};
+      s.load[i] = {0, 0, -9.81, 0.1};
+    }
+  }
+};
+
+constexpr double kOfSpring = sizeof(uvec4), kOfPoint = sizeof(uvec2) + 5 * sizeof(dvec4);  // bytes
+
+double gigabytes(size_t both_ends, size_t points) {
+  return 1e-9 * (kOfSpring * double(both_ends) + kOfPoint * double(points));
+}
+
+constexpr double kStep = 1e-4;  // s, stable on the lattice
+
+// m, how far a point of the device is from that of the reference after some sub-steps, at most.
+double difference(const Lattice &l, VulkanStepper &device, float damping) {
+  Reference processor(&host, l.npoint());
+  processor.take(l.springs);
+  const uint32_t n = l.nspring() > 1000000 ? 4 : 100;
+  double most = 0;
+  for (Stepper *s : {static_cast<Stepper *>(&device), static_cast<Stepper *>(&processor)}) {
+    l.start(*s);
+    if (const char *why = s->run(n, kStep, damping, true, true)) std::printf("%s\n", why);
+  }
+  for (uint32_t i = 0; i < l.npoint(); ++i) {
+    const dvec4 &a = device.place[i], &b = processor.place[i];
+    const double off = std::max({std::fabs(a.x - b.x), std::fabs(a.y - b.y), std::fabs(a.z - b.z)});
+    most = off >= most ? off : off == off ? most : HUGE_VAL;
+  }
+  return most;
+}
+
+// GB/s, read and written.
+double bandwidth(const std::shared_ptr<Vulkan> &vulkan, uint32_t points) {
+  points = uint32_t(std::min<size_t>(points, vulkan->limits.maxStorageBufferRange / sizeof(dvec4)));
+  Springs none;
+  none.lay_out(&host, points, 0, nullptr);
+  VulkanStepper s(vulkan, points);
+  s.take(none);
+  for (uint32_t i = 0; i < points; ++i) {
+    s.place[i] = {0.1 * i, 0.2, 0.3, 1};
+    s.speed[i] = {1, 2, 3 + 0.1 * i, 0};
+    s.load[i] = {0, 0, -9.81, 0};
+  }
+  s.run(1, kStep, 0, true, true);
+  // the difference of two lengths leaves out the copy back
+  const double few = time_of([&] { s.run(100, kStep, 0, false, false); });
+  const double many = time_of([&] { s.run(300, kStep, 0, false, false); });
+  return gigabytes(0, points) * 200 / (many - few);
+}
+
+void lattice(uint32_t side, const std::shared_ptr<Vulkan> &vulkan, double copy, bench::Csv &out) {
+  const Lattice l(side);
+  VulkanStepper s(vulkan, l.npoint());
+  s.take(l.springs);
+  for (const float damping : {0.0f, 1e-4f}) {
+    const double off = difference(l, s, damping);
+    const auto row = [&](const char *what, uint32_t n, bool moved, bool loaded) {
+      l.start(s);
+      s.run(1, kStep, damping, true, true);
+      const double step = time_of([&] { s.run(n, kStep, damping, moved, loaded); }) / n;
+      const double rate = double(l.nspring()) / step, speed = gigabytes(2 * l.nspring(), l.npoint()) / step;
+      std::printf(
+          "%-20s %8zu springs %7u points %s %9.3f us a sub-step, %8.3g springs/s, %6.1f GB/s, "
+          "%3.0f %% of a copy, %.2g m off\n",
+          what, l.nspring(), l.npoint(), damping > 0 ? "damped" : "      ", 1e6 * step, rate, speed,
+          100 * speed / copy, off);
+      if (out.csv)
+        std::fprintf(out.csv, "%s,%s,lattice: %s,%zu,%u,%g,%u,%.4f,%.4g,%.1f,%.1f,%.3g\n", out.head.c_str(),
+                     bench::quoted(vulkan->name).c_str(), what, l.nspring(), l.npoint(), double(damping), n,
+                     1e6 * step, rate, speed, copy, off);
+    };
+    row("many sub-steps", l.nspring() > 1000000 ? 100 : 1000, false, false);
+    row("back", 1, false, false);
+    row("there and back", 1, true, true);
+  }
+}
+
+// A cube of side^3 cubes of six tetrahedra.
+void body(uint32_t side, Choice choice, const std::string &name, double copy, bench::Csv &out) {
+  std::vector<double> x, mass;
+  std::vector<uint32_t> cells;
+  const auto id = [&](uint32_t i, uint32_t j, uint32_t k) { return (i * (side + 1) + j) * (side + 1) + k; };
+  for (uint32_t i = 0; i <= side; ++i)
+    for (uint32_t j = 0; j <= side; ++j)
+      for (uint32_t k = 0; k <= side; ++k)
+        for (const uint32_t a : {i, j, k}) x.push_back(0.01 * a);
+  const uint32_t n = uint32_t(x.size() / 3);
+  mass.assign(n, 0);
+  std::vector<uint64_t> pairs;
+  for (uint32_t i = 0; i < side; ++i)
+    for (uint32_t j = 0; j < side; ++j)
+      for (uint32_t k = 0; k < side; ++k) {
+        int axes[3] = {0, 1, 2};
+        do {
+          uint32_t q[3] = {i, j, k}, four[4] = {id(i, j, k)};
+          for (int c = 0; c < 3; ++c) {
+            ++q[axes[c]];
+            four[c + 1] = id(q[0], q[1], q[2]);
+          }
+          cells.insert(cells.end(), four, four + 4);
+          for (int a = 0; a < 4; ++a) {
+            mass[four[a]] += 1000 * 1e-6 / 24;
+            for (int b = a + 1; b < 4; ++b) pairs.push_back(uint64_t{four[a]} << 32 | four[b]);
+          }
+        } while (std::next_permutation(axes, axes + 3));
+      }
+  std::sort(pairs.begin(), pairs.end());
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  std::vector<uint32_t> edges, rows, points;
+  for (const uint64_t p : pairs) edges.insert(edges.end(), {uint32_t(p >> 32), uint32_t(p)});
+  for (uint32_t i = 0; i < n; ++i) {  // surfels: the points of the boundary
+    bool outside = false;
+    for (int a = 0; a < 3; ++a) outside |= x[3 * i + a] < 1e-9 || x[3 * i + a] > 0.01 * side - 1e-9;
+    if (outside) points.push_back(i);
+  }
+  for (uint32_t s = 0; s <= points.size(); ++s) rows.push_back(s);
+  const std::vector<double> weights(points.size(), 1.0);
+  const double params[kParamCount] = {1e5, 1e-4, 0, double(choice)};
+  dfm_mesh m{};
+  m.size = sizeof m;
+  m.npoint = n;
+  m.ncell = uint32_t(cells.size() / 4);
+  m.cell = DFM_CELL_TET;
+  m.rest = x.data();
+  m.cells = cells.data();
+  m.mass = mass.data();
+  m.params = params;
+  m.nedge = uint32_t(pairs.size());
+  m.edges = edges.data();
+  m.nsurfel = uint32_t(points.size());
+  m.row = rows.data();
+  m.col = points.data();
+  m.weight = weights.data();
+  Body b;
+  const double made = seconds([&] { b.create(&host, m); });
+  std::vector<double> at(4 * size_t(n)), v(at), f(at), x_end(at), v_end(at), u(3 * points.size()), p(u);
+  for (uint32_t i = 0; i < n; ++i) {
+    std::copy_n(&x[3 * size_t(i)], 3, &at[4 * size_t(i)]);
+    f[4 * size_t(i) + 2] = -9.81 * mass[i];
+  }
+  const double longest = b.facts()[0].value;
+  for (const uint32_t steps : {1u, 10u, 100u}) {
+    dfm_kin k{};
+    k.size = sizeof k;
+    k.stride = 4;
+    k.dt = longest * steps;
+    const double step = time_of([&] {
+      k.x = at.data();
+      k.v = v.data();
+      b.predict(k, f.data(), u.data());
+      b.commit(k, p.data(), x_end.data(), v_end.data());
+      at.swap(x_end);
+      v.swap(v_end);
+    });
+    const double rate = double(pairs.size()) * steps / step;
+    std::printf(
+        "body %4u sub-steps    %8zu springs %7u points %9.1f us a step, %.3g sub-steps/s, created "
+        "in %.2g s\n",
+        steps, pairs.size(), n, 1e6 * step, steps / step, made);
+    if (out.csv)
+      std::fprintf(out.csv, "%s,%s,body,%zu,%u,%g,%u,%.4f,%.4g,%.1f,%.1f,\n", out.head.c_str(),
+                   bench::quoted(name).c_str(), pairs.size(), n, params[kDampingStiffness], steps,
+                   1e6 * step / steps, rate, gigabytes(2 * pairs.size(), n) * steps / step, copy);
+  }
+}
+
+}  // namespace
+
+int main(int argc, char **argv) {
+  bench::Csv out(argc, argv,
+                 "device,what,springs,points,damping,substeps,us_per_substep,springs_per_s,gb_per_s,"
+                 "copy_gb_per_s,off_m");
+  double most = 0;
+  Choice choice = kAuto;
+  for (int n = 1; n + 1 < argc; n += 2) {
+    if (!std::strcmp(argv[n], "--most")) most = std::atof(argv[n + 1]);
+    if (!std::strcmp(argv[n], "--device") && !std::strcmp(argv[n + 1], "software")) choice = kSoftware;
+  }
+  try {
+    const auto vulkan = std::make_shared<Vulkan>(Wanted(choice));
+    if (!(most > 0)) most = vulkan->software ? 2e4 : 1.1e7;
+    const double copy = bandwidth(vulkan, most > 1e6 ? 8000000 : 100000);
+    std::printf("%s: points without springs move %.1f GB/s, read and written\n", vulkan->name.c_str(), copy);
+    for (const uint32_t side : {10u, 21u, 23u, 43u, 92u})
+      if (13.0 * side * side * side < most) lattice(side, vulkan, copy, out);
+    for (const uint32_t side : {11u, 26u, 52u})
+      if (7.0 * side * side * side < most) body(side, choice, vulkan->name, copy, out);
+  } catch (const std::string &why) {
+    std::printf("no figures: %s\n", why.c_str());
+  }
+  return 0;
+}

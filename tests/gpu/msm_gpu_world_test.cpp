@@ -1,0 +1,230 @@
+// Bodies of the model msm_gpu in a world: contact and friction of the library, sub-steps, snapshots, the
+// command.
+#include <filesystem>
+
+#include "support.h"
+#include "under_ball.h"
+#include "world.h"
+
+namespace {
+
+struct World {
+  test::Context context;
+  dfm_world world;
+  dfm_body body = 0;
+  World(const char *model, double device, const char *law, double mu, std::array<double, 3> gravity, double z,
+        double young = 2e5, uint32_t threads = 1)
+      : context(threads) {
+    world = test::make_world(context, gravity);
+    const double size[3] = {0.1, 0.1, 0.1};
+    dfm_tetmesh mesh = 0;
+    test::ok(dfm_tetmesh_make(context, "beam", size, 200, &mesh));
+    dfm_body_def d = dfm_body_def_default();
+    d.name = "block";
+    d.model = model;
+    test::lend(mesh, d);
+    test::BodyOptions o;
+    o.young = young;
+    o.damping_stiffness = 1e-3;
+    d.material = test::make_material(world, o);
+    const double zero = 0;
+    const dfm_param_value gpu[] = {{"device", &device, 1}},
+                          msm[] = {{"volume", &zero, 1}, {"collapse", &zero, 1}};
+    if (std::string(model) == "msm") d.model_params = {sizeof(dfm_params), 2, msm};
+    else d.model_params = {sizeof(dfm_params), 1, gpu};
+    d.pose.position[2] = z;
+    test::ok(dfm_body_create(world, &d, &body));
+    test::ok(dfm_tetmesh_destroy(mesh));
+    test::add_plane(world, "floor");
+    test::set_friction(world, mu, law);
+  }
+  ~World() { dfm_world_destroy(world); }
+  dfm_body_measure now() const { return test::measure(body); }
+};
+
+constexpr double kSoftware = 2, kReference = 3;  // of the parameter "device"
+
+bool is_there(double which) {
+  test::Context context(1);
+  const dfm_world w = test::make_world(context);
+  test::Tet tet;
+  const dfm_param_value row{"device", &which, 1};
+  tet.def.model = "msm_gpu";
+  tet.def.model_params = {sizeof(dfm_params), 1, &row};
+  const dfm_material_def md = dfm_material_def_default();
+  test::ok(dfm_material_create(w, &md, &tet.def.material));
+  dfm_body body = 0;
+  const bool made = dfm_body_create(w, &tet.def, &body) == DFM_OK;
+  dfm_world_destroy(w);
+  return made;
+}
+
+// "auto", a software driver at least; without one the processor.
+double device() {
+  static const double found = is_there(0) ? 0 : kReference;
+  return found;
+}
+
+double normal_force(dfm_world world) {
+  dfm_pair_report pair{};
+  uint32_t n = 0;
+  EXPECT_EQ(dfm_world_pairs(world, 1, &pair, &n), DFM_OK) << dfm_last_error();
+  return n ? pair.normal : 0;
+}
+
+TEST(MsmGpuWorld, BlockDropped_ComesToRestAsWithMsm) {
+  World gpu("msm_gpu", device(), "coulomb", 0.5, {0, 0, -9.81}, 0.03);
+  World msm("msm", 0, "coulomb", 0.5, {0, 0, -9.81}, 0.03);
+  for (const World *w : {&gpu, &msm}) test::run(w->world, 1.5, 2e-3);
+  const dfm_body_measure m = gpu.now();
+  EXPECT_LT(m.speed_max, 1e-6);
+  EXPECT_NEAR(normal_force(gpu.world), m.mass * 9.81, 1e-3 * m.mass * 9.81);
+  EXPECT_NEAR(m.com[2], msm.now().com[2], 1e-5);
+  EXPECT_LT(m.com[2], 0.04995);  // it sags
+}
+
+// The rest does not depend on the step that the host takes, though a longer one is divided for contact.
+TEST(MsmGpuWorld, SagOnAFloor_IsTheSameAtAnyStep) {
+  double height[2];
+  int n = 0;
+  for (const double h : {5e-4, 1.0 / 60}) {
+    World w("msm_gpu", device(), "none", 0, {0, 0, -9.81}, 1e-3);
+    test::run(w.world, 1.5, h);
+    height[n++] = w.now().com[2];
+  }
+  EXPECT_NEAR(height[0], height[1], 1e-7);
+}
+
+TEST(MsmGpuWorld, InFlight_TakesOneSubStepAndOnTheFloorThoseOfItsBound) {
+  World w("msm_gpu", device(), "coulomb", 0.5, {0, 0, -9.81}, 0.2);
+  test::run(w.world, 0.1, 0.01);
+  EXPECT_EQ(test::stats(w.world).substeps_max, 1u);
+  test::run(w.world, 3, 0.01);
+  const dfm_world_stats s = test::stats(w.world);
+  EXPECT_GT(s.contacts, 0u);
+  EXPECT_GE(s.last_substeps * s.stable_step, 0.01 * (1 - 1e-9));
+}
+
+TEST(MsmGpuWorld, OnASlope_HoldsWithAnyLawAndCreepsLessThanItsBound) {
+  for (const char *law : {"coulomb", "karnopp", "dahl", "lugre", "elastoplastic", "gms"}) {
+    World w("msm_gpu", device(), law, 0.6, {9.81 * std::sin(0.3), 0, -9.81 * std::cos(0.3)}, 1e-4);
+    test::run(w.world, 1.0, 2e-3);
+    const dfm_body_measure before = w.now();
+    test::run(w.world, 1.0, 2e-3);
+    const dfm_body_measure m = w.now();
+    EXPECT_NEAR(normal_force(w.world), m.mass * 9.81 * std::cos(0.3), 0.01 * m.mass * 9.81) << law;
+    EXPECT_LT(std::hypot(m.com[0] - before.com[0], m.com[1] - before.com[1]), 1e-6) << law;
+  }
+}
+
+TEST(MsmGpuWorld, OnASlope_SlidesWithCoulombsAcceleration) {
+  const double theta = 0.5, mu = 0.3;
+  World w("msm_gpu", device(), "coulomb", mu, {9.81 * std::sin(theta), 0, -9.81 * std::cos(theta)}, 1e-4,
+          1e6);
+  test::run(w.world, 0.2, 1e-3);
+  const double before = w.now().velocity[0];
+  test::run(w.world, 0.4, 1e-3);
+  EXPECT_NEAR((w.now().velocity[0] - before) / 0.4, 9.81 * (std::sin(theta) - mu * std::cos(theta)), 0.01);
+}
+
+TEST(MsmGpuWorld, SavedInContact_ContinuesWithTheSameBits) {
+  const auto make = [] {
+    return std::make_unique<World>("msm_gpu", device(), "lugre", 0.5, std::array<double, 3>{1, 0, -9.81},
+                                   0.01);
+  };
+  const auto a = make(), b = make();
+  test::run(a->world, 0.1, 2e-3);
+  ASSERT_GT(normal_force(a->world), 0);
+  const std::string saved = test::snapshot(a->world);
+  test::run(a->world, 0.1, 2e-3);
+  test::run(b->world, 0.03, 2e-3);
+  test::ok(dfm_world_restore(b->world, saved.data(), saved.size()));
+  test::run(b->world, 0.1, 2e-3);
+  EXPECT_EQ(dfm_world_hash(a->world), dfm_world_hash(b->world));
+}
+
+// Two bodies, one on the other, submit from two threads at once.
+TEST(MsmGpuWorld, OnTwoWorkers_HasTheSameBits) {
+  if (device() == kReference) GTEST_SKIP() << "no driver";
+  uint64_t hash[2];
+  for (const uint32_t threads : {1u, 2u}) {
+    World w("msm_gpu", device(), "coulomb", 0.5, {0, 0, -9.81}, 1e-3, 2e5, threads);
+    test::BodyOptions o;
+    o.name = "upper";
+    o.model = "msm_gpu";
+    o.position = {0.02, 0.01, 0.103};
+    test::make_body(w.context, w.world, "beam", {0.1, 0.1, 0.1}, 100, o);
+    test::run(w.world, 0.1, 2e-3);
+    EXPECT_GT(test::stats(w.world).contacts, 0u);
+    hash[threads - 1] = dfm_world_hash(w.world);
+  }
+  EXPECT_EQ(hash[0], hash[1]);
+}
+
+// A card may round a square root and a quotient otherwise.
+TEST(MsmGpuWorld, OnASoftwareDriverAndOnTheProcessor_HasTheSameBits) {
+  if (!is_there(kSoftware)) GTEST_SKIP() << "no such driver";
+  World a("msm_gpu", kSoftware, "lugre", 0.5, {1, 0, -9.81}, 0.01);
+  World b("msm_gpu", kReference, "lugre", 0.5, {1, 0, -9.81}, 0.01);
+  for (const World *w : {&a, &b}) test::run(w->world, 0.3, 2e-3);
+  EXPECT_EQ(dfm_world_hash(a.world), dfm_world_hash(b.world));
+}
+
+TEST(MsmGpuWorld, UnderASoftBall_CarriesBothWeights) {
+  World w("msm_gpu", device(), "coulomb", 0.5, {0, 0, -9.81}, 1e-4, 1e6);
+  test::expect_block_carries_ball(w.context, w.world, w.body, 2.5);
+}
+
+const char *const kScene =
+    R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.01, "step": 0.001},
+ "materials": {"soft": {"density": 1000, "young": 1e5}},
+ "bodies": [{"name": "cube", "mesh": {"make": "beam", "size": [0.1, 0.1, 0.1], "cells": 50},
+   "material": "soft", "model": {"type": "msm_gpu"DEVICE}}]})";
+
+test::CommandResult run_scene(const std::string &device, bool driver) {
+  const std::string folder = test::scratch("msm_gpu"), file = folder + "/scene.json";
+  std::string scene = kScene;
+  const size_t at = scene.find("DEVICE");
+  scene.replace(at, 6, device.empty() ? "" : ", \"params\": {\"device\": \"" + device + "\"}");
+  test::write_file(file, scene);
+  std::vector<std::string> argv = {"/usr/bin/env"};
+  if (!driver) argv.insert(argv.end(), {"VK_ICD_FILENAMES=/nowhere.json", "VK_DRIVER_FILES=/nowhere.json"});
+  argv.insert(argv.end(), {DEFORM_COMMAND, "run", file, "--out", folder + "/out"});
+  return test::run(argv);
+}
+
+TEST(MsmGpuCommand, WithoutADriver_SaysWhatToInstallAndTheReferenceStillRuns) {
+  const test::CommandResult none = run_scene("", false), processor = run_scene("reference", false);
+  EXPECT_NE(none.exit_code, 0);
+  EXPECT_NE(none.err.find("set device to reference"), std::string::npos) << none.err;
+  EXPECT_NE(none.err.find("mesa-vulkan-drivers"), std::string::npos) << none.err;
+  EXPECT_EQ(processor.exit_code, 0) << processor.err;
+}
+
+// A machine that must have a card fails without one.
+TEST(MsmGpuCommand, Hardware_IsNoSoftwareDriver) {
+  const test::CommandResult r = run_scene("hardware", true);
+  if (r.exit_code != 0) {
+    EXPECT_NE(r.err.find("no graphics card"), std::string::npos) << r.err;
+  }
+}
+
+// V09 counts 144 bytes that Mesa 22.3.6 leaves at each vkEnumeratePhysicalDevices of a new instance.
+TEST(MsmGpuCommand, PluginCheck_FindsNothingOfOurs) {
+  if (device() == kReference) GTEST_SKIP() << "no driver: the defaults of the model are refused";
+  const test::CommandResult r =
+      test::deform({"plugin", "check", std::string(DEFORM_PLUGIN_DIR) + "/model_msm_gpu.so"});
+  std::istringstream lines(r.out);
+  int passed = 0;
+  for (std::string line, id, result; std::getline(lines, line);) {
+    std::istringstream words(line);
+    words >> id >> result;
+    passed += result == "pass";
+    if (result == "FAIL") {
+      EXPECT_EQ(id, "V09") << r.out;
+    }
+  }
+  EXPECT_GE(passed, 19) << r.out;
+}
+
+}  // namespace
