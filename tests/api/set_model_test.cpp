@@ -455,6 +455,9 @@ TEST(SetModel, AnyModelFromAnyOther_TakesABlockOverInContact) {
         if (type->kind == DFM_KIND_MODEL) static_cast<std::vector<std::string> *>(user)->push_back(type->id);
       },
       &models));
+#ifdef __SANITIZE_ADDRESS__
+  std::erase(models, "org.deform.msm_gpu");  // Mesa's driver leaves 128 bytes behind and is unloaded
+#endif
   ASSERT_GE(models.size(), 3u);
   for (const std::string &from : models)
     for (const std::string &to : models) {
