@@ -105,6 +105,7 @@ double ExplicitPoints::own_frequency(Trial &rest, double edge) {
     center += p_.mass[i] * load3(&x[size_t{kStride} * i]);
   }
   center = (1 / mass) * center;
+  const double middle[3] = {center.x, center.y, center.z};
   for (uint32_t i = 0; i < p_.n; ++i)
     widest = std::max(widest, norm2(load3(&x[size_t{kStride} * i]) - center));
   const double size = kMoved * edge / std::sqrt(widest);
@@ -112,11 +113,11 @@ double ExplicitPoints::own_frequency(Trial &rest, double edge) {
     for (int col = 0; col <= row; ++col) {
       double work = 0, moved = 0;
       const auto way = [&](uint32_t i) {
-        const Vec3 from = load3(&x[size_t{kStride} * i]) - center;
-        Vec3 u;
-        u[row] += size * from[col];
-        if (col != row) u[col] += size * from[row];
-        return u;
+        const double *const from = &x[size_t{kStride} * i];
+        double u[3] = {};
+        u[row] += size * (from[col] - middle[col]);
+        if (col != row) u[col] += size * (from[row] - middle[row]);
+        return load3(u);
       };
       for (uint32_t i = 0; i < p_.n; ++i)
         store3(&rest.x[size_t{kStride} * i], load3(&x[size_t{kStride} * i]) + way(i));
