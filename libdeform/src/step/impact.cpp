@@ -132,9 +132,8 @@ bool is_struck(World &w, const StepContext &step) {
   if (step.rows.n == 0 || w.prescribed.stands()) return false;
   for (const uint32_t i : step.active) {
     const Body &b = *w.bodies[i];
-    // sub-steps that may vary are at most twice as many (state/step_sizes.h)
     const bool repeats =
-        step.offered > 0 && is_implicit(b) && 2 * step.offered / b.integrator.step <= w.def.max_substeps;
+        step.offered > 0 && is_implicit(b) && step.offered / b.integrator.step <= w.def.max_substeps;
     if (!repeats && (!damps(b) || w.integrator_times.told_blow)) continue;
     double speed = 0;
     if (!touched(b) || !struck(w, step, b, speed) || has_restitution(w, step, b)) continue;

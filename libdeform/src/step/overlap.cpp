@@ -14,6 +14,8 @@
 #include "step/untangle.h"
 
 namespace dfm {
+
+uint64_t made_id(const Body &b) { return b.piece_of ? b.piece_of : b.id; }
 namespace {
 
 constexpr uint64_t kReleaseEvery = 16;          // steps: interval at which excluded pairs are tested
@@ -36,10 +38,8 @@ uint64_t other_id(const World &w, const OverlapPair &p) {
   return p.obstacle ? w.obstacles[p.b]->id : w.bodies[p.b]->id;
 }
 
-uint64_t whole_of(const Body &b) { return b.piece_of ? b.piece_of : b.id; }
-
 bool parts_of_one(const World &w, const OverlapPair &p) {
-  return !p.obstacle && whole_of(*w.bodies[p.a]) == whole_of(*w.bodies[p.b]);
+  return !p.obstacle && made_id(*w.bodies[p.a]) == made_id(*w.bodies[p.b]);
 }
 
 // Parts of what was one body lie on each other where they were one, with the faces of the cut set back by
@@ -69,7 +69,7 @@ std::vector<Overlap> find_overlaps(World &w) {
     out.push_back({a, b, p.obstacle, c.crossings, c.enclosed, c.depth, deep(w, p, c) && !kept(p, a, b)});
     // after a restore all counts as placed, and nobody has moved anything
     if (kept(p, a, b) || (parts_of_one(w, p) && w.overlaps.look_only))
-      out.back().whole = whole_of(*w.bodies[p.a]);
+      out.back().whole = made_id(*w.bodies[p.a]);
   };
   for (uint32_t i = 0; i < w.bodies.size(); ++i) {
     for (uint32_t j = i + 1; j < w.bodies.size(); ++j) look({i, j, false});

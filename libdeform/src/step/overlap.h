@@ -7,8 +7,10 @@
 
 namespace dfm {
 
+struct Body;
 struct World;
 
+uint64_t made_id(const Body &b);  // id of the body that it is a piece of, or its own
 // At the end of prepare(): the pending search, with its warnings. Deep overlaps are excluded from contact.
 void settle_overlaps(World &w);
 // The next search covers a piece that a separation has made. How it lies in the other parts of its body is

@@ -13,16 +13,17 @@
 #include "body/implicit_system.h"
 #include "core/error.h"
 #include "plugin/context.h"
+#include "state/obstacle.h"
 #include "state/world.h"
 #include "step/attach.h"
 #include "step/bristles.h"
 #include "step/context.h"
 #include "step/cut_drag.h"
+#include "step/overlap.h"
 #include "step/pair_table.h"
 #include "step/pre_solve.h"
 #include "step/restitution.h"
 #include "step/rigid.h"
-#include "state/obstacle.h"
 #include "step/solve_islands.h"
 #include "step/stages.h"
 #include "step/step_bound.h"
@@ -57,8 +58,6 @@ constexpr uint32_t kMostRevisions = 6;  // of the responses of rigid hosts, with
 // to this share of the planned one.
 constexpr double kLeastPiece = 1.0 / 256;
 
-}  // namespace
-
 // m/s, at which a depth opens that a pair was found with.
 constexpr double kSettles = 8e-4;
 
@@ -76,7 +75,6 @@ double left_of_pair(const ContactStore &store, uint64_t a, uint64_t b, double mo
 // have distances of their own.
 void find_start_depths(World &w, StepContext &step) {
   const double opened = step.h * (w.def.recovery_speed > 0 ? w.def.recovery_speed : kSettles);
-  const auto whole = [](const Body &b) { return b.piece_of ? b.piece_of : b.id; };
   step.rows.start_depth.assign(step.contacts.size(), 0.0);
   if (w.prescribed.stands()) return;  // an equilibrium has no speed to open by
   for (uint32_t i = 0; i < step.contacts.size(); ++i) {
@@ -86,11 +84,13 @@ void find_start_depths(World &w, StepContext &step) {
     const uint32_t m = step.match[i];
     double left = 0;
     if (m != kNone) left = w.store.start_depth[m];
-    else if (depth > 0 && !(b && whole(a) == whole(*b)))
+    else if (depth > 0 && !(b && made_id(a) == made_id(*b)))
       left = left_of_pair(w.store, a.id, b ? b->id : w.obstacles[c.slot_b]->id, 2 * w.offset + opened);
     step.rows.start_depth[i] = std::max(0.0, std::min(left - opened, depth));
   }
 }
+
+}  // namespace
 
 bool may_shorten(const StepContext &step) { return step.h > kLeastPiece * step.guard.planned; }
 
