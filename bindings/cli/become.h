@@ -46,6 +46,9 @@ inline constexpr Program kFromLabels = {
 inline constexpr Program kPhantom = {
     "phantom", "deform-labels",
     "a volume of labels made from ellipsoids and cylinders, with the volumes that these have"};
+inline constexpr Program kRollback = {
+    "rollback", "deform-rollback",
+    "runs a scene by the collision solution of Zerbato (2010), for comparison"};
 inline constexpr Program kView = {
     "view", "deform-view", "a window on a scene, with mouse, sliders and plots",
     "with Debian's libglfw3-dev and libimgui-dev installed, `make view` builds it"};

@@ -388,7 +388,9 @@ class Runner {
     const double begin = wall_seconds();
     uint32_t trouble = 0;
     stepping = world_;
-    const dfm_status status = interrupted ? DFM_DISCARD : dfm_world_step(world_, step, &trouble);
+    const dfm_status status = interrupted     ? DFM_DISCARD
+                              : options_.step ? options_.step(world_, step, &trouble)
+                                              : dfm_world_step(world_, step, &trouble);
     stepping = 0;
     last_step_ = wall_seconds() - begin;
     result_.times.add(last_step_);
@@ -565,27 +567,27 @@ void run_scene(RunOptions options, const Globals &globals, Comparison *compariso
   }
 }
 
+void add_run_options(Command sub, RunOptions &options) {
+  sub.option("SCENE", options.scene, "scene file (JSON)").required();
+  sub.option("--out", options.out,
+             "folder for the results (out/SCENE; of a FOLDER/scene.json out/FOLDER_run)")
+      .type_name("DIR");
+  sub.option("--time", options.time, "seconds to simulate, instead of the scene's").positive().type_name("T");
+  sub.option("--set", options.set, "change a value of the scene").type_name("/json/pointer=value").repeated();
+  sub.option("--frames", options.frame_rate, "pictures per simulated second").positive().type_name("FPS");
+  sub.flag("--plot", options.plot,
+           "plots of energy, bodies, contacts and probes over time, to DIR/plots.png");
+  sub.flag("--profile", options.profile, "time spent in each stage");
+  sub.option("--jitter", options.jitter,
+             "small random changes of the start state; the same seed gives the same run")
+      .type_name("SEED");
+  sub.flag("--check", options.check, "count crossing triangles in every step, not only in recorded states");
+}
+
 void add_run(Command app, Globals &globals, int *exit_code) {
   auto options = std::make_shared<RunOptions>();
   Command sub = app.command("run", "simulates a scene and writes figures and pictures");
-  sub.option("SCENE", options->scene, "scene file (JSON)").required();
-  sub.option("--out", options->out,
-             "folder for the results (out/SCENE; of a FOLDER/scene.json out/FOLDER_run)")
-      .type_name("DIR");
-  sub.option("--time", options->time, "seconds to simulate, instead of the scene's")
-      .positive()
-      .type_name("T");
-  sub.option("--set", options->set, "change a value of the scene")
-      .type_name("/json/pointer=value")
-      .repeated();
-  sub.option("--frames", options->frame_rate, "pictures per simulated second").positive().type_name("FPS");
-  sub.flag("--plot", options->plot,
-           "plots of energy, bodies, contacts and probes over time, to DIR/plots.png");
-  sub.flag("--profile", options->profile, "time spent in each stage");
-  sub.option("--jitter", options->jitter,
-             "small random changes of the start state; the same seed gives the same run")
-      .type_name("SEED");
-  sub.flag("--check", options->check, "count crossing triangles in every step, not only in recorded states");
+  add_run_options(sub, *options);
   auto saves = std::make_shared<std::vector<std::pair<double, std::string>>>();
   sub.option("--save", *saves,
              "write the state of the first step at or after time T to FILE; may be repeated")

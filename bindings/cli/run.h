@@ -1,6 +1,7 @@
 // What the parts of `deform run` share: options, and what a run has measured so far.
 #pragma once
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <array>
 #include <string>
@@ -10,6 +11,8 @@
 #include "scene_file.h"
 
 namespace cli {
+
+class Command;
 
 struct RunOptions {
   std::string scene, out;
@@ -28,7 +31,10 @@ struct RunOptions {
   std::string problems;    // folder for contact problems; empty: none are written
   uint32_t every = 0;      // of them that is written, beside the unsolved ones; 0: none
   std::string save_scene;  // where the world of the end is written as a scene; empty: nowhere
+  // in place of dfm_world_step(), where another program steps; empty: none does
+  std::function<dfm_status(dfm_world, double, uint32_t *)> step;
 };
+void add_run_options(Command sub, RunOptions &options);  // those that any such program has
 
 class Comparison;
 // The run of `deform run`, and that of `deform replay`, which compares the state with the recorded one

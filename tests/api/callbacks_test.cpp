@@ -399,15 +399,9 @@ TEST(PreSolve, CallsIntoTheWorld_AreRefused) {
   EXPECT_EQ(attack.refused, 4 * attack.asked);
 }
 
-TEST(PreSolve, InARollbackWorld_IsRefused) {
+TEST(PreSolve, OfNoWorld_IsRefused) {
   test::Context c;
-  dfm_world_def d = dfm_world_def_default();
-  d.method = DFM_METHOD_ROLLBACK;
-  dfm_world w = 0;
-  test::ok(dfm_world_create(c, &d, &w));
-  EXPECT_EQ(dfm_world_set_pre_solve(w, &Choice::pre_solve, nullptr), DFM_E_UNSUPPORTED);
-  test::says({"ROLLBACK"});
-  test::ok(dfm_world_set_pre_solve(w, nullptr, nullptr));
+  const dfm_world w = test::make_world(c);
   EXPECT_EQ(dfm_world_set_pre_solve(77, nullptr, nullptr), DFM_E_HANDLE);
   EXPECT_EQ(dfm_world_set_may_touch(77, nullptr, nullptr), DFM_E_HANDLE);
   EXPECT_EQ(dfm_world_ask_again(w, 99, 0), DFM_E_HANDLE);

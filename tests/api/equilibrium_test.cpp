@@ -180,18 +180,6 @@ TEST(Equilibrium, WhatItCannotDo_IsRefusedByName) {
   def = dfm_equilibrium_def_default();
   def.time = NAN;
   EXPECT_EQ(bar.find(def), DFM_E_ARG);
-  dfm_world_def d = dfm_world_def_default();
-  d.method = DFM_METHOD_ROLLBACK;
-  dfm_world rollback = 0;
-  test::ok(dfm_world_create(bar.context, &d, &rollback));
-  test::add_plane(rollback, "floor", {0, 0, -1});
-  test::BodyOptions o;
-  o.model = "msm";
-  test::make_body(bar.context, rollback, "beam", {0.1, 0.1, 0.1}, 20, o);
-  def = dfm_equilibrium_def_default();
-  EXPECT_EQ(dfm_world_equilibrium(rollback, &def, nullptr), DFM_E_UNSUPPORTED);
-  test::says({"contact method", "rollback"});
-  dfm_world_destroy(rollback);
 }
 
 // A scene with "mode": "static": growing loads, nodes of the end, rows on the way.
@@ -254,18 +242,13 @@ TEST(Equilibrium, StaticSceneThatCannotBe_IsRefusedWhenItIsRead) {
   const std::string folder = test::scratch("static_refused");
   const char *const rigid = R"(, "rigid": {"host": "builtin", "bodies": [{"name": "stone", "shape": "sphere",
     "radius": 0.1, "mass": 1, "pose": {"position": [0, 0, 1]}}]})";
-  const std::pair<const char *, const char *> cases[] = {
-      {rigid, "moving rigid bodies"},
-      {R"(, "contact": {"method": "rollback"})", "does not support the contact method rollback"}};
-  for (const auto &[more, word] : cases) {
-    const test::CommandResult r =
-        test::deform({"run", block_scene(folder, more), "--out", folder + "/out", "--quiet"});
-    EXPECT_EQ(r.exit_code, 2) << r.err;
-    for (const char *part : {"/time/mode: ", word})
-      EXPECT_NE(r.err.find(part), std::string::npos) << part << ": " << r.err;
-    EXPECT_EQ(std::count(r.err.begin(), r.err.end(), '\n'), 1) << r.err;
-    EXPECT_FALSE(std::filesystem::exists(folder + "/out"));
-  }
+  const test::CommandResult r =
+      test::deform({"run", block_scene(folder, rigid), "--out", folder + "/out", "--quiet"});
+  EXPECT_EQ(r.exit_code, 2) << r.err;
+  for (const char *part : {"/time/mode: ", "moving rigid bodies"})
+    EXPECT_NE(r.err.find(part), std::string::npos) << part << ": " << r.err;
+  EXPECT_EQ(std::count(r.err.begin(), r.err.end(), '\n'), 1) << r.err;
+  EXPECT_FALSE(std::filesystem::exists(folder + "/out"));
 }
 
 TEST(Equilibrium, ModelThatRefusesABody_IsReportedInOneSentence) {

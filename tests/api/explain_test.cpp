@@ -142,7 +142,6 @@ TEST(Explain, IntegratorNamed_Stays) {
   EXPECT_EQ(moves(path, {step, "/time/integrator=symplectic_euler"}).bone.find("symplectic_euler  named"),
             0u);
   EXPECT_EQ(moves(path, {step, "/contact/method=velocity"}).bone.find("symplectic_euler  named"), 0u);
-  EXPECT_EQ(moves(path, {step, "/contact/method=rollback"}).bone.find("symplectic_euler  named"), 0u);
   EXPECT_EQ(moves(path, {step, "/contact/method=implicit"}).gel.find("implicit_euler  named"), 0u);
 }
 

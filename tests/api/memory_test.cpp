@@ -145,39 +145,6 @@ TEST(Memory, ASettledStepOnTrianglesAndVoxels_AllocatesNothing) {
 }
 
 // A surface of its own hangs, touches and is spread anew in every sub-step.
-// The roll-back is there to compare; it keeps the rule all the same.
-TEST(Memory, ASettledRollbackStep_AllocatesNothing) {
-  Hooks hooks;
-  const dfm_context_def def = hooks.def();
-  dfm_context *c = nullptr;
-  ASSERT_EQ(dfm_context_create(&def, &c), DFM_OK) << dfm_last_error();
-  {
-    dfm_world_def d = dfm_world_def_default();
-    d.method = DFM_METHOD_ROLLBACK;
-    dfm_world w = 0;
-    ASSERT_EQ(dfm_world_create(c, &d, &w), DFM_OK) << dfm_last_error();
-    test::add_plane(w, "floor");
-    test::BodyOptions o;
-    o.young = 2e5;
-    o.damping_stiffness = 2e-3;
-    o.position = {0, 0, 1e-4};
-    test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 60, o);
-    o.position = {0.013, 0.007, 0.1003};
-    test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 60, o);
-    for (int i = 0; i < 1000; ++i) ASSERT_EQ(dfm_world_step(w, 1e-3, nullptr), DFM_OK) << dfm_last_error();
-    ASSERT_EQ(test::pairs(w).size(), 2u);
-    test::events(w);
-    const Calls before{hooks};
-    dfm_status bad = DFM_OK;
-    for (int i = 0; i < 500; ++i)
-      if (const dfm_status status = dfm_world_step(w, 1e-3, nullptr); status != DFM_OK) bad = status;
-    EXPECT_EQ(bad, DFM_OK) << dfm_last_error();
-    before.expect_none();
-  }
-  dfm_context_destroy(c);
-  EXPECT_EQ(hooks.live_bytes, 0);
-}
-
 TEST(Memory, ASettledCoupledStep_AllocatesNothing) {
   Hooks hooks;
   const dfm_context_def def = hooks.def();

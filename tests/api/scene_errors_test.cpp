@@ -228,6 +228,7 @@ TEST(SceneErrors, Names_AreUniqueAndKnown) {
          {"/bodies/0/mesh=\"missing.msh\"", {"/bodies/0/mesh", "missing.msh"}},
          {"/bodies/0/model/type=\"corotational\"", {"/bodies/0/model/type", "corotational_fem", "msm"}},
          {"/contact/friction/0/law=\"dalh\"", {"/contact/friction/0/law", "coulomb", "none"}},
+         {"/contact/method=\"rollback\"", {"/contact/method", "remove", "deform rollback"}},
          {"/effects=[\"cutting\"]", {"/effects", "cutting"}}});
 }
 

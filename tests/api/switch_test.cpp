@@ -50,18 +50,6 @@ const std::string kRuleToModal = R"("switch": {"far": "modal", "touching": "coro
 
 }  // namespace
 
-TEST(SwitchOfAScene, ThatTheContactMethodExcludes_IsRefusedAsItIsRead) {
-  const std::string contact = R"(, "contact": {"method": ")";
-  for (const std::string &change : {kToModal, kRuleToModal})
-    expect_refused(scene(kStep, change, contact + R"(rollback"})"),
-                   {"/bodies/0/switch", "org.deform.modal", "rollback", "use the method velocity"});
-  for (const char *method : {"rollback", "velocity"})
-    expect_refused(
-        scene(kStep, R"("switch": [{"t": 0.005, "type": "corotational_fem", "integrator": "tr_bdf2"}])",
-              contact + method + R"("})"),
-        {"/bodies/0/switch", "'block'", "at 0.005 s", "tr_bdf2", method, "use the method auto"});
-}
-
 TEST(SwitchOfAScene, ThatSpringsExclude_IsRefusedAsItIsRead) {
   const std::string spring = R"(, "springs": [{"point": [0, 0, 0], "to": [0, 0, 0], "stiffness": 10}])";
   for (const std::string &change : {kToModal, kRuleToModal})

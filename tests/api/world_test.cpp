@@ -403,8 +403,11 @@ TEST(Arguments, OfContextAndWorld_AreChecked) {
   wd.max_sweeps = 0;
   EXPECT_EQ(dfm_world_create(good, &wd, &w), DFM_E_ARG);
   wd = dfm_world_def_default();
-  wd.method = 7;
-  EXPECT_EQ(dfm_world_create(good, &wd, &w), DFM_E_UNSUPPORTED);
+  for (const int32_t method : {7, -1, int32_t{DFM_METHOD_ROLLBACK}}) {
+    wd.method = method;
+    EXPECT_EQ(dfm_world_create(good, &wd, &w), DFM_E_UNSUPPORTED);
+  }
+  says({"deform rollback"});
   const char *const effects[] = {"magic", nullptr};
   wd = dfm_world_def_default();
   wd.effects = effects;

@@ -1,5 +1,5 @@
-// Effect of the roll-back on sliding, bouncing, momentum and normal force, beside the velocity method, at two
-// steps. libdeform/doc/concepts/rollback.md holds what it prints.
+// Effect of the roll-back on sliding, bouncing, momentum and normal force, beside the library's step, at two
+// lengths of it. libdeform/doc/concepts/rollback.md holds what it prints.
 #include <cstdio>
 
 #include "rollback_cases.h"
@@ -9,9 +9,9 @@ namespace {
 namespace rb = test::rollback;
 struct Method {
   const char *name;
-  int32_t id;
+  rb::By id;
 };
-constexpr Method kMethods[] = {{"velocity", DFM_METHOD_VELOCITY}, {"rollback", DFM_METHOD_ROLLBACK}};
+constexpr Method kMethods[] = {{"library", rb::By::library}, {"rollback", rb::By::rollback}};
 
 void incline(const Method &m, double h) {
   for (const auto &[theta, mu] : {std::pair{30.0, 0.0}, {30.0, 0.3}}) {

@@ -177,30 +177,6 @@ inline dfm_world woken(dfm_context *c) {
   return w;
 }
 
-// The roll-back: a block and a ball thrown onto another block, all frozen where they touch.
-inline dfm_world rolled_back(dfm_context *c) {
-  dfm_world_def d = dfm_world_def_default();
-  d.method = DFM_METHOD_ROLLBACK;
-  dfm_world w = 0;
-  test::ok(dfm_world_create(c, &d, &w));
-  test::add_plane(w, "floor");
-  test::set_friction(w, 0.4);
-  test::BodyOptions o;
-  o.young = 1e5;
-  o.damping_stiffness = 1e-3;
-  o.position = {0, 0, 2e-4};
-  o.velocity = {0.3, 0, 0};
-  test::make_body(c, w, "beam", {0.1, 0.1, 0.06}, 100, o);
-  o.position = {0.02, -0.13, 0.001};
-  o.velocity = {0.1, 0.8, 0};
-  test::make_body(c, w, "beam", {0.1, 0.1, 0.06}, 100, o);
-  o.position = {0.06, 0.045, 0.11};
-  o.velocity = {0.2, 0.1, -1};
-  o.spin = {3, 1, 0};
-  test::make_body(c, w, "ball", {0.04, 0, 0}, 100, o);
-  return w;
-}
-
 // A hook is thrown on the floor while its legs are pressed together: they meet, slide on each
 // other and stick.
 inline dfm_world folded(dfm_context *c) {
@@ -311,7 +287,6 @@ inline const Scene all[] = {{"ball_on_floor", [](dfm_context *c) { return ball_o
                             {"coupled_pair", [](dfm_context *c) { return coupled_pair(c); }, 80},
                             {"dale", dale, 100},
                             {"woken", woken, 220},
-                            {"rolled_back", rolled_back, 120},
                             {"folded", folded, 120},
                             {"remembered", remembered, 70},
                             {"implicit_msm_ball", msm<ball_on_floor>, 40},

@@ -12,7 +12,7 @@ BELOW = {
     "libdeform": {"CMakeLists.txt", "include", "src", "schema", "doc"},
     "libdeform/include": {"deform"},
     "libdeform/src": {"core", "math", "geometry", "mesh", "plugin", "body", "dynamics", "contact", "friction",
-                      "broad", "narrow", "ccd", "plan", "state", "step", "world", "rollback", "scene", "api"},
+                      "broad", "narrow", "ccd", "plan", "state", "step", "world", "scene", "api"},
     "libdeform/doc": {"README.md", "concepts", "reference", "models", "laws", "howto", "decisions", "images"},
     "bindings": {"CMakeLists.txt", "cli", "render", "rigid_host", "ode", "bullet", "python", "tools", "view"},
     "tests": {"CMakeLists.txt", "README.md", "support", "data", "unit", "analytic", "stability", "api",

@@ -240,29 +240,6 @@ TEST(Stepper, WithASurfaceOfItsOwn_RestsOnItsSurfels) {
   EXPECT_NEAR(m.com[2], 0.05 + 2e-5, 1e-9) << "d_c: a thousandth of the surface's median edge, 0.02 m";
 }
 
-// Nobody but itself can move its vertices, back to a time of impact neither.
-TEST(Stepper, InAWorldThatRollsBack_IsRefused) {
-  test::Context context;
-  test::ok(dfm_plugin_register_static(context, dfm_plugin_entry_toy_stepper, "toy_stepper"));
-  dfm_world_def def = dfm_world_def_default();
-  def.method = DFM_METHOD_ROLLBACK;
-  dfm_world world = 0;
-  test::ok(dfm_world_create(context, &def, &world));
-  const double point[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
-  const uint32_t cell[] = {0, 1, 2, 3};
-  dfm_body_def d = dfm_body_def_default();
-  d.name = "toy";
-  d.model = "toy_stepper";
-  d.npoint = 4;
-  d.ntet = 1;
-  d.points = point;
-  d.tets = cell;
-  dfm_body body = 0;
-  EXPECT_EQ(dfm_body_create(world, &d, &body), DFM_E_UNSUPPORTED);
-  EXPECT_NE(std::string(dfm_last_error()).find("body 'toy': a model that steps itself"), std::string::npos)
-      << dfm_last_error();
-}
-
 TEST(Stepper, OnASlope_SlidesWithCoulombsAcceleration) {
   const double theta = 0.5, mu = 0.3;
   World w(mu, {9.81 * std::sin(theta), 0, -9.81 * std::cos(theta)}, 1e-4);

@@ -1,11 +1,9 @@
 // A block thrown along a floor, a ball that bounces without friction, two balls that collide: closed
-// forms that hold for the contact method in use, and Zerbato's roll-back as the mutation that fails
-// every one of them.
+// forms that hold for `deform run`, and `deform rollback`, Zerbato's scheme, as the mutation that fails every
+// one of them.
 #include "scenes.h"
 
 namespace {
-
-const std::vector<std::string> kRollback = {"--set", "/contact/method=\"rollback\""};
 
 // Each from where and how it starts, which jitter changes.
 bool slides(const test::SceneRun &run) {  // v^2 / (2 mu g), 0.2446 m for 1.2 m/s
@@ -26,16 +24,16 @@ bool collides(const test::SceneRun &run) {  // masses are alike
 
 }  // namespace
 
-TEST(RollbackCompare, VelocityMethod_MeetsTheClosedForms) {
+TEST(RollbackCompare, Run_MeetsTheClosedForms) {
   const test::SceneRun run("rollback_compare", {});
-  run.expect_sound(15, "velocity");
+  run.expect_sound(15, "run");
   EXPECT_TRUE(slides(run));
   EXPECT_TRUE(bounces(run));
   EXPECT_TRUE(collides(run));
 }
 
 TEST(RollbackCompare, Rollback_FailsEachOfThem) {
-  const test::SceneRun run("rollback_compare", kRollback);
+  const test::SceneRun run("rollback_compare", {}, "rollback");
   run.expect_sound(15, "rollback");
   EXPECT_FALSE(slides(run));
   EXPECT_FALSE(bounces(run));

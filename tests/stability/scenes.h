@@ -40,11 +40,11 @@ struct BodyRow { double t, com[3], velocity[3], spin_momentum[3], kinetic, volum
 
 class SceneRun {
  public:
-  SceneRun(const std::string &scene, std::vector<std::string> arguments) {
+  SceneRun(const std::string &scene, std::vector<std::string> arguments, const std::string &command = "run") {
     static int counter = 0;
     out_ = scratch("scenes_" + std::to_string(getpid())) + "/" + scene + "_" + std::to_string(counter++);
     arguments.insert(arguments.begin(),
-                     {"run", std::string(DEFORM_SOURCE_DIR) + "/examples/scenes/" + scene + ".json",
+                     {command, std::string(DEFORM_SOURCE_DIR) + "/examples/scenes/" + scene + ".json",
                       "--quiet", "--out", out_});
     const CommandResult result = deform(arguments);
     EXPECT_EQ(result.exit_code, 0) << scene << ": " << result.err;

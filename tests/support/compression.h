@@ -22,7 +22,7 @@ constexpr uint32_t kCells = 60;
 
 struct Case {
   std::string scene, model;
-  int32_t integrator, method;
+  int32_t integrator;
   double step, young;
   size_t blocks() const { return scene == "plane" ? 1 : 2; }
 };
@@ -134,7 +134,6 @@ inline Result run_case(const Case &c) {
   dfm_world_def d = dfm_world_def_default();
   d.gravity[2] = -kG;
   d.integrator = c.integrator;
-  d.method = c.method;
   d.contact_offset = kOffset;
   dfm_world w = 0;
   ok(dfm_world_create(context, &d, &w));

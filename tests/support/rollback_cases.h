@@ -1,6 +1,7 @@
-// The same scenes under both contact methods: what the roll-back does to sliding, bouncing, momentum and
-// force. Tests and rollback_bench share them.
+// The same scenes by the library's step and by the roll-back: what that does to sliding, bouncing, momentum
+// and force. Tests and rollback_bench share them.
 #pragma once
+#include "rollback/scheme.h"
 #include "stack.h"
 
 namespace test::rollback {
@@ -8,26 +9,26 @@ namespace test::rollback {
 inline constexpr double kG = 9.81, kDegree = 3.14159265358979323846 / 180;
 using Vector = std::array<double, 3>;
 
-inline dfm_world make_world(dfm_context *c, int32_t method, Vector gravity) {
-  dfm_world_def d = dfm_world_def_default();
-  d.method = method;
-  std::copy(gravity.begin(), gravity.end(), d.gravity);
-  dfm_world w = 0;
-  ok(dfm_world_create(c, &d, &w));
-  return w;
-}
+enum class By { library, rollback };
 
 struct World {
   Context context;
   dfm_world world;
-  World(int32_t method, Vector gravity, double mu, uint32_t threads = 1)
-      : context(threads), world(make_world(context, method, gravity)) {
+  By by;
+  dfm::rollback::Scheme scheme;
+  World(By how, Vector gravity, double mu, uint32_t threads = 1)
+      : context(threads), world(make_world(context, gravity)), by(how) {
     if (mu > 0) set_friction(world, mu);
     else set_friction(world, 0, "none");
   }
   ~World() { dfm_world_destroy(world); }
   World(const World &) = delete;
   World &operator=(const World &) = delete;
+
+  void run(double seconds, double h) {
+    if (by == By::library) return test::run(world, seconds, h);
+    for (long i = std::lround(seconds / h); i > 0; --i) ok(scheme.step(world, h, nullptr));
+  }
 
   // A cube of 0.1 m and 1 kg.
   dfm_body block(const char *name, Vector position, Vector velocity = {}, uint32_t cells = 96,
@@ -72,16 +73,16 @@ inline double normal_sum(dfm_world w) {
 // A block on a plane tilted by theta: mean acceleration along it and way over the last 0.3 s of 0.4 s; normal
 // force as reported and as the momentum says, over that of the weight.
 struct Slide { double acceleration, way, reported, felt; };
-inline Slide incline(int32_t method, double theta_deg, double mu, double h) {
-  World w(method, {kG * std::sin(theta_deg * kDegree), 0, -kG * std::cos(theta_deg * kDegree)}, mu);
+inline Slide incline(By by, double theta_deg, double mu, double h) {
+  World w(by, {kG * std::sin(theta_deg * kDegree), 0, -kG * std::cos(theta_deg * kDegree)}, mu);
   add_plane(w.world, "floor");
   const dfm_body b = w.block("block", {0, 0, 2e-5});
-  run(w.world, 0.1, h);
+  w.run(0.1, h);
   const dfm_body_measure from = measure(b);
   const long n = std::lround(0.3 / h);
   double reported = 0;
   for (long i = 0; i < n; ++i) {
-    run(w.world, h, h);
+    w.run(h, h);
     reported += normal_sum(w.world) / double(n);
   }
   const dfm_body_measure to = measure(b);
@@ -92,14 +93,14 @@ inline Slide incline(int32_t method, double theta_deg, double mu, double h) {
 
 // A block thrown along a floor: way until it is slower than 1 % of the throw, time of that.
 struct Throw { double way, time; };
-inline Throw thrown(int32_t method, double speed, double mu, double h) {
-  World w(method, {0, 0, -kG}, mu);
+inline Throw thrown(By by, double speed, double mu, double h) {
+  World w(by, {0, 0, -kG}, mu);
   add_plane(w.world, "floor");
   const dfm_body b = w.block("block", {0, 0, 2e-5}, {speed, 0, 0});
   const double from = measure(b).com[0];
   double t = 0;
   while (t < 2 && std::fabs(measure(b).velocity[0]) > 0.01 * speed) {
-    run(w.world, h, h);
+    w.run(h, h);
     t += h;
   }
   return {measure(b).com[0] - from, t};
@@ -111,15 +112,15 @@ struct Bounce {
   Vector velocity;
   double energy, time, reported;
 };
-inline Bounce bounce(int32_t method, Vector velocity, double mu, double h) {
-  World w(method, {0, 0, 0}, mu);
+inline Bounce bounce(By by, Vector velocity, double mu, double h) {
+  World w(by, {0, 0, 0}, mu);
   add_plane(w.world, "floor");
   const dfm_body b = w.ball("ball", {0, 0, 0.13}, velocity);
   const double before = energy({b});
   double t = 0, reported = 0;
   bool met = false;
   for (; t < 1; t += h) {
-    run(w.world, h, h);
+    w.run(h, h);
     reported += h * normal_sum(w.world);
     const bool now = stats(w.world).contacts > 0;
     met = met || now;
@@ -135,28 +136,28 @@ inline Bounce bounce(int32_t method, Vector velocity, double mu, double h) {
 // Two blocks, one at rest, the other flying at it, face to face: what is left of momentum and energy once
 // they part (or after 0.3 s).
 struct Collision { double momentum, energy, first, second; };
-inline Collision collision(int32_t method, double speed, double h) {
-  World w(method, {0, 0, 0}, 0.3);
+inline Collision collision(By by, double speed, double h) {
+  World w(by, {0, 0, 0}, 0.3);
   const std::vector<dfm_body> b = {w.block("flying", {-0.11, 0.004, 0.003}, {speed, 0, 0}),
                                    w.block("resting", {0, 0, 0})};
   const double p = momentum(b)[0], e = energy(b);
-  run(w.world, 0.3, h);
+  w.run(0.3, h);
   return {momentum(b)[0] / p, energy(b) / e, measure(b[0]).velocity[0], measure(b[1]).velocity[0]};
 }
 
 // A block on a block on a floor, at rest: what the floor carries and what the lower block carries, over the
 // weight above; as reported and as felt.
 struct Stacked { double floor_reported, floor_felt, middle_reported, middle_felt; };
-inline Stacked stacked(int32_t method, double h) {
-  World w(method, {0, 0, -kG}, 0.5);
+inline Stacked stacked(By by, double h) {
+  World w(by, {0, 0, -kG}, 0.5);
   const dfm_obstacle floor = add_plane(w.world, "floor");
   const dfm_body lower = w.block("lower", {0, 0, 4e-5}), upper = w.block("upper", {0.004, 0.003, 0.10008});
-  run(w.world, 1, h);
+  w.run(1, h);
   const dfm_body_measure l = measure(lower), u = measure(upper);
   const long n = std::lround(0.2 / h);
   Stacked s{};
   for (long i = 0; i < n; ++i) {
-    run(w.world, h, h);
+    w.run(h, h);
     for (const dfm_pair_report &p : pairs(w.world))
       (p.b == floor ? s.floor_reported : s.middle_reported) += p.normal / double(n);
   }

@@ -309,10 +309,7 @@ inline std::vector<std::string> assignments(const Settings &how, const std::vect
       if (directed[b] && c.model != "msm") out.push_back(body + "/anisotropy/params={}");
     }
   if (c.integrator == "explicit") out.push_back("/time/integrator=symplectic_euler");
-  if (c.integrator == "implicit") {
-    out.push_back("/time/integrator=implicit_euler");
-    out.push_back("/contact/method=implicit");
-  }
+  if (c.integrator == "implicit") out.push_back("/time/integrator=implicit_euler");
   out.insert(out.end(), how.set.begin(), how.set.end());
   return out;
 }

@@ -28,7 +28,7 @@ from .report import Reports
 from .tool import Tools
 
 _LOG = logging.getLogger("deform")
-METHODS = {"auto": 0, "velocity": 1, "implicit": 2, "rollback": 3}
+METHODS = {"auto": 0, "velocity": 1, "implicit": 2}  # for one version: the integrator decides
 INTEGRATORS = {"auto": 0, "symplectic_euler": 1, "implicit_euler": 2, "tr_bdf2": 3}
 SELF_CONTACT = {"off": 0, "on": 1, "auto": 2}
 COUPLINGS = {"barycentric": 0, "mls": 1}

@@ -194,13 +194,6 @@ class Finder {
       k.tolerance = tolerance;
       add(k, "contact");
     }
-    k.tolerance.clear();
-    for (const char *method : {"velocity", "rollback"}) {
-      if (s_.implicit || s_.word("/contact/method", "auto") == method) continue;
-      if (s_.word("/contact/method", "auto") == "auto" && std::string(method) == "velocity") continue;
-      k.method = method;
-      add(k, "contact");
-    }
   }
 
   void laws() {

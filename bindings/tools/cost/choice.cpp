@@ -80,14 +80,8 @@ Settings settings_of(const Subject &subject, const Surfaces &surfaces, const Kno
     set_model(subject, body, i, knobs, out);
     if (knobs.cells != 1) set_cells(subject, body, i, surfaces[i], knobs.cells, out);
   }
-  if (!knobs.integrator.empty()) {
-    out.emplace_back("/time/integrator", quoted(knobs.integrator));
-    // a method that the scene names goes with the integrator that it names
-    if (knobs.method.empty() && subject.find("/contact/method"))
-      out.emplace_back("/contact/method", quoted("auto"));
-  }
+  if (!knobs.integrator.empty()) out.emplace_back("/time/integrator", quoted(knobs.integrator));
   if (!knobs.step.empty()) out.emplace_back("/time/step", knobs.step);
-  if (!knobs.method.empty()) out.emplace_back("/contact/method", quoted(knobs.method));
   if (!knobs.tolerance.empty()) out.emplace_back("/contact/tolerance", knobs.tolerance);
   if (!knobs.self.empty()) out.emplace_back("/contact/self", knobs.self);
   if (!knobs.guard.empty()) out.emplace_back("/contact/guard", knobs.guard);
@@ -121,7 +115,6 @@ std::string label_of(const Knobs &knobs) {
     std::snprintf(text, sizeof text, "cells x%.3g", knobs.cells);
     add(text);
   }
-  if (!knobs.method.empty()) add("method " + knobs.method);
   if (!knobs.tolerance.empty()) add("tolerance " + knobs.tolerance + " m/s");
   if (!knobs.law.empty()) add("law " + knobs.law);
   if (!knobs.self.empty()) add("self " + knobs.self);

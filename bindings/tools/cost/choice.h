@@ -10,7 +10,7 @@ namespace cli::cost {
 
 // What may be chosen. A word that is empty leaves the scene as it is; others are JSON text.
 struct Knobs {
-  std::string model, integrator, step, method, tolerance, law, self, guard, volume, precision;
+  std::string model, integrator, step, tolerance, law, self, guard, volume, precision;
   double cells = 1;  // times the scene's
   bool operator==(const Knobs &) const = default;
 };

@@ -38,7 +38,7 @@ std::string choice_json(const Subject &subject, const Study &study, size_t i) {
   const char *const states[] = {"not run", "done", "unstable", "refused", "cut"};
   JsonObject out;
   out.add("model", quoted(d.model)).add("integrator", quoted(d.integrator)).add("step", number(d.step));
-  out.add("cells", number(o.cells)).add("method", quoted(d.method)).add("law", quoted(d.law));
+  out.add("cells", number(o.cells)).add("law", quoted(d.law));
   out.add("precision", quoted(d.precision)).add("error", error_json(row.error));
   out.add("cpu_s_per_s", row.cpu_per_s > 0 ? number(row.cpu_per_s) : "null");
   out.add("unstable", o.state == Outcome::unstable ? "true" : "false");
@@ -191,7 +191,6 @@ Described describe(const Subject &subject, const Row &row) {
   const JsonValue *const step = subject.find("/time/step");
   d.step_asked = !k.step.empty() ? k.step : step ? step->text : "auto";
   d.step = o.steps > 0 ? o.simulated / o.steps : 0;
-  d.method = k.method.empty() ? subject.word("/contact/method", "auto") : k.method;
   d.law = k.law.empty() ? laws_of(subject) : k.law;
   d.precision = k.precision.empty() ? precision_of(subject) : k.precision;
   return d;
@@ -415,8 +414,7 @@ std::string table_text(const Subject &subject, const Study &study) {
 }
 
 std::string csv_text(const Subject &subject, const Study &study) {
-  std::string out =
-      "index,label,axes,model,integrator,step,cells,method,law,precision,cpu_s_per_s,state,headline";
+  std::string out = "index,label,axes,model,integrator,step,cells,law,precision,cpu_s_per_s,state,headline";
   for (const std::string &name : study.quantities) out += "," + name;
   out += "\n";
   const auto cell = [](double x) { return std::isfinite(x) ? number(x) : std::string(); };
@@ -427,9 +425,8 @@ std::string csv_text(const Subject &subject, const Study &study) {
     std::string axes;
     for (const std::string &axis : row.candidate.axes) axes += (axes.empty() ? "" : "+") + axis;
     out += std::to_string(i) + ",\"" + row.job.label + "\"," + axes + "," + d.model + "," + d.integrator +
-           "," + cell(d.step) + "," + cell(row.job.outcome.cells) + "," + d.method + "," + d.law + "," +
-           d.precision + "," + cell(row.cpu_per_s) + "," + states[row.job.outcome.state] + "," +
-           cell(row.headline);
+           "," + cell(d.step) + "," + cell(row.job.outcome.cells) + "," + d.law + "," + d.precision + "," +
+           cell(row.cpu_per_s) + "," + states[row.job.outcome.state] + "," + cell(row.headline);
     for (const std::string &name : study.quantities) {
       const auto found = row.error.find(name);
       out += "," + (found == row.error.end() ? "" : cell(found->second));

@@ -307,7 +307,7 @@ class Student {
       const Row &row = out_.rows[i];
       const Knobs &k = row.candidate.knobs;
       const bool physics = same_physics(int(i)) && k.volume.empty() && k.precision != "single" &&
-                           k.tolerance.empty() && k.method.empty() && !hides_impacts(int(i));
+                           k.tolerance.empty() && !hides_impacts(int(i));
       const double rank = row.job.outcome.cpu + (k.model == out_.axes.reference_model ? 1e9 : 0);
       if (!done(int(i)) || !physics || rank <= most) continue;
       most = rank;

@@ -155,7 +155,6 @@ double stable_step(const JsonValue &plan) {
 // the reference. 0 where the scene cannot be explicit.
 double explicit_step(const Globals &globals, const Subject &subject) {
   std::vector<std::string> set = {"/time/integrator=symplectic_euler", "/time/step=auto"};
-  if (subject.find("/contact/method")) set.push_back("/contact/method=auto");
   for (const auto &[pointer, value] : subject.planned) set.push_back(pointer + "=" + value);
   try {
     const SceneFile scene(globals, subject.path, set, 0);

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""The same throw, bounce and collision under both contact methods: rollback.png and the figures in it, from
-the scene rollback_compare.
+"""The same throw, bounce and collision by `deform run` and by `deform rollback`: rollback.png and the figures
+in it, from the scene rollback_compare.
 
 rollback.py DEFORM_COMMAND [OUT.png]
 """
@@ -18,14 +18,12 @@ import matplotlib.pyplot as plt
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 SCENE = ROOT / "examples/scenes/rollback_compare.json"
-COLORS = {"velocity": "#2f6db3", "rollback": "#c8553d"}
+COLORS = {"run": "#2f6db3", "rollback": "#c8553d"}
 TIMES = (0.1, 0.2, 0.4)  # s, of the frames
 
 
-def run(command, method, out):
-    call = [command, "run", str(SCENE), "--quiet", "--out", str(out), "--frames", "10", "--set",
-            f'/contact/method="{method}"']
-    subprocess.run(call, check=True)
+def run(command, word, out):
+    subprocess.run([command, word, str(SCENE), "--quiet", "--out", str(out), "--frames", "10"], check=True)
     with open(out / "bodies.csv", newline="") as file:
         rows = list(csv.DictReader(file))
     names = list(dict.fromkeys(r["body"] for r in rows))
@@ -41,18 +39,18 @@ def main():
     figure, axes = plt.subplots(3, 3, figsize=(10.2, 8.6), dpi=100,
                                 gridspec_kw={"height_ratios": (1, 1, 0.85)})
     with tempfile.TemporaryDirectory() as folder:
-        for row, method in enumerate(COLORS):
-            series, frames = run(sys.argv[1], method, pathlib.Path(folder) / method)
+        for row, word in enumerate(COLORS):
+            series, frames = run(sys.argv[1], word, pathlib.Path(folder) / word)
             for axis, frame, t in zip(axes[row], frames, TIMES):
                 axis.imshow(frame)
                 axis.axis("off")
-                axis.set_title(f"{method}, t = {t} s", color=COLORS[method], fontsize=9)
-            style = {"color": COLORS[method], "label": method}
+                axis.set_title(f"{word}, t = {t} s", color=COLORS[word], fontsize=9)
+            style = {"color": COLORS[word], "label": word}
             thrown, ball, flying, struck = (series[n] for n in ("thrown", "bouncing", "flying", "struck"))
             axes[2][0].plot(thrown["t"], thrown["vel_x"], **style)
             axes[2][1].plot(ball["t"], ball["vel_x"], **style)
             axes[2][2].plot(flying["t"], flying["vel_x"] + struck["vel_x"], **style)
-            print(f"{method}: block went {thrown['com_x'][-1] - thrown['com_x'][0]:.4f} m; ball leaves at "
+            print(f"{word}: block went {thrown['com_x'][-1] - thrown['com_x'][0]:.4f} m; ball leaves at "
                   f"{ball['vel_x'][-1]:.4f} m/s along the floor; "
                   f"flying {flying['vel_x'][-1]:.4f}, struck {struck['vel_x'][-1]:.4f} m/s")
     t = np.linspace(0, 0.5, 201)

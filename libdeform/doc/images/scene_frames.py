@@ -28,7 +28,7 @@ FIST = (*EXPLICIT, '/obstacles/1={"name": "fist", "shape": "sphere", "radius": 0
 FINE_RING = ('/bodies/0/mesh={"make": "tube", "radius": 0.045, "inner": 0.03, "length": 0.06,'
              ' "cells": 4000}',)
 SCRAMBLE = ('/bodies/0/start={"scramble": 1}', '/bodies/0/model={"type": "corotational_fem"}',
-            "/time/integrator=implicit_euler", "/contact/method=implicit", "/time/step=0.016666666666666666")
+            "/time/integrator=implicit_euler", "/time/step=0.016666666666666666")
 # picture: rows of (label, [(scene, what is set, time in s)]); edge to edge where the label is None
 PICTURES = {
     "scenes.png": [

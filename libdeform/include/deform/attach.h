@@ -44,8 +44,8 @@ static inline dfm_attach_def dfm_attach_def_default(void) {
  * dfm_world_def.recovery_speed; a spring pulls in proportion to its gap.
  * @param attachment  out, its number among the body's attachments, loads and springs; may be NULL
  * @return DFM_OK; DFM_E_ARG no surfel is selected, a number or group does not exist, a value is negative or
- * not finite, or `to` is the body itself; DFM_E_HANDLE `to` is not of this world;
- * DFM_E_UNSUPPORTED the contact method is ROLLBACK; DFM_E_NOMEM. Threads: Not during step. Since 0.1. */
+ * not finite, or `to` is the body itself; DFM_E_HANDLE `to` is not of this world; DFM_E_NOMEM.
+ * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_attach(dfm_body body, const dfm_attach_def *def, uint32_t *attachment);
 /** Ends an attachment. The two can touch from now on; if they overlap, they are treated as overlapping at the
  * start (dfm_world_overlaps). @return DFM_OK; DFM_E_ARG no such attachment; DFM_E_HANDLE. Threads: Not during

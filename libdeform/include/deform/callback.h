@@ -64,8 +64,7 @@ typedef void (*dfm_pre_solve_fn)(void *user, dfm_contact_choice *contact);
  * contacts of sleeping bodies.
  * @param pre_solve  NULL: removes the function
  * @param user       its first argument
- * @return DFM_OK; DFM_E_UNSUPPORTED the world's method is ROLLBACK; DFM_E_HANDLE; DFM_E_BUSY. Threads: Not
- * during step. Since 0.1. */
+ * @return DFM_OK; DFM_E_HANDLE; DFM_E_BUSY. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_set_pre_solve(dfm_world world, dfm_pre_solve_fn pre_solve, void *user);
 #ifdef __cplusplus
 }

@@ -64,8 +64,8 @@ typedef struct dfm_cut_info {
  * before the cut undoes it.
  * @param out  may be NULL; set its size, or 0
  * @return DFM_OK, also where the shape meets nothing; DFM_E_ARG a size, a corner or `how`; DFM_E_UNSUPPORTED
- * the model needs all of its cells (each but msm and corotational_fem), the body has a surface of its own,
- * or the contact method is ROLLBACK; DFM_E_NOMEM. After an error nothing has changed.
+ * the model needs all of its cells (each but msm and corotational_fem), or the body has a surface of its own;
+ * DFM_E_NOMEM. After an error nothing has changed.
  * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_cut(dfm_body body, const dfm_cut_def *def, dfm_cut_info *out);
 /** Plans a cut as dfm_body_cut makes it, at the end of the first step that ends at t or later. It cuts pieces

@@ -8,6 +8,7 @@
 #include "deform/contact.h"
 #include "deform/cut.h"
 #include "deform/debug.h"
+#include "deform/deprecated.h"
 #include "deform/id.h"
 #include "deform/law.h"
 #include "deform/material.h"

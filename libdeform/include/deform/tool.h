@@ -76,8 +76,8 @@ static inline dfm_tool_def dfm_tool_def_default(void) {
   dfm_tool_def_default_sized((uint32_t)sizeof out, &out);
   return out;
 }
-/** Makes a tool. @return DFM_OK; DFM_E_ARG (which entry, why); DFM_E_UNSUPPORTED the contact method is
- * ROLLBACK; DFM_E_NOMEM; DFM_E_HANDLE. Threads: Not during step. Since 0.1. */
+/** Makes a tool. @return DFM_OK; DFM_E_ARG (which entry, why); DFM_E_NOMEM; DFM_E_HANDLE.
+ * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_tool_create(dfm_world world, const dfm_tool_def *def, dfm_tool *out);
 /** Removes it with its parts; their contacts and attachments end with events. @return DFM_OK; DFM_E_HANDLE.
  * Threads: Not during step. Since 0.1. */
@@ -175,8 +175,8 @@ DFM_API dfm_status dfm_tool_get_state(dfm_tool tool, dfm_tool_state *out);
  * @param capacity of attachment; as many as the tool has parts is always enough
  * @param attachment out, [n] numbers among the body's attachments, one for each part that holds something
  * @param n        out; 0 where nothing is in reach
- * @return DFM_OK; DFM_E_ARG, also where capacity is too small, and then nothing is held; DFM_E_HANDLE;
- * DFM_E_UNSUPPORTED the contact method is ROLLBACK. Threads: Not during step. Since 0.1. */
+ * @return DFM_OK; DFM_E_ARG, also where capacity is too small, and then nothing is held; DFM_E_HANDLE.
+ * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_tool_grab(dfm_tool tool, dfm_body body, double reach, double release,
                                  uint32_t capacity, uint32_t *attachment, uint32_t *n);
 

@@ -7,17 +7,11 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-/* Contact method. VELOCITY uses the inverse masses of the points (for SYMPLECTIC_EULER), IMPLICIT the inverse
- * of the matrix of the implicit step (for IMPLICIT_EULER and TR_BDF2), AUTO the one that fits the
- * integrator. ROLLBACK is the scheme of Zerbato (2010, 4.2), for comparison only: it stops sliding contacts
- * and loses momentum (doc/concepts/rollback.md); features that it lacks are refused with DFM_E_UNSUPPORTED
- * when they are created. Since 0.1. */
-enum { DFM_METHOD_AUTO = 0, DFM_METHOD_VELOCITY = 1, DFM_METHOD_IMPLICIT = 2, DFM_METHOD_ROLLBACK = 3 };
-/* AUTO is SYMPLECTIC_EULER, or IMPLICIT_EULER if the method is IMPLICIT. If dfm_world_def.step is set, AUTO
- * chooses for each body, before its first step, the cheaper one of SYMPLECTIC_EULER and TR_BDF2
- * (IMPLICIT_EULER if newton_iterations is 1). IMPLICIT_EULER and TR_BDF2 need models that provide their
- * stiffness, and are stable at every step (doc/concepts/implicit.md). TR_BDF2 is of second order and damps
- * little; a body that touches moves by IMPLICIT_EULER. */
+/* AUTO is SYMPLECTIC_EULER. If dfm_world_def.step is set, AUTO chooses for each body, before its first step,
+ * the cheaper one of SYMPLECTIC_EULER and TR_BDF2 (IMPLICIT_EULER if newton_iterations is 1). IMPLICIT_EULER
+ * and TR_BDF2 need models that provide their stiffness, and are stable at every step
+ * (doc/concepts/implicit.md). TR_BDF2 is of second order and damps little; a body that touches moves by
+ * IMPLICIT_EULER. */
 enum {
   DFM_INTEGRATOR_AUTO = 0,
   DFM_INTEGRATOR_SYMPLECTIC_EULER = 1,
@@ -35,8 +29,9 @@ enum {
 enum { DFM_SELF_OFF = 0, DFM_SELF_ON = 1, DFM_SELF_AUTO = 2 }; /* dfm_world_def.self_contact */
 typedef struct dfm_world_def {
   uint32_t size, flags;
-  double gravity[3];          /* m/s2 */
-  int32_t method, integrator; /* DFM_METHOD_*, DFM_INTEGRATOR_* */
+  double gravity[3];  /* m/s2 */
+  int32_t method;     /* 0; other values: deform/deprecated.h */
+  int32_t integrator; /* DFM_INTEGRATOR_* */
   /* m, rest distance d_c; 0: chosen from the meshes of the world (1e-3 of the median surface edge) */
   double contact_offset;
   /* m/s, slip that a sticking contact may have; 0: min(1e-6, 0.01 (d_c-d_g)/h); doc/concepts/contact.md */
@@ -187,8 +182,8 @@ static inline dfm_equilibrium_def dfm_equilibrium_def_default(void) {
  * @param def   NULL: the default
  * @param info  out; may be NULL
  * @return DFM_OK; DFM_E_DIVERGED no equilibrium was found: a body without support has loads that do not
- * sum to zero, slides on, or falls; DFM_E_UNSUPPORTED a model without stiffness, rigid bodies, contact in a
- * world whose method is ROLLBACK; DFM_DISCARD interrupted; DFM_E_ARG; DFM_E_NOMEM; DFM_E_HANDLE; DFM_E_BUSY.
+ * sum to zero, slides on, or falls; DFM_E_UNSUPPORTED a model without stiffness, or rigid bodies;
+ * DFM_DISCARD interrupted; DFM_E_ARG; DFM_E_NOMEM; DFM_E_HANDLE; DFM_E_BUSY.
  * On failure nothing has changed except scheduled changes of model (model.h).
  * Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_equilibrium(dfm_world world, const dfm_equilibrium_def *def,

@@ -7,7 +7,6 @@
 #include "state/held.h"
 #include "state/spring.h"
 #include "step/energy_watch.h"
-#include "step/method.h"
 #include "step/stages.h"
 #include "world/change_energy.h"
 #include "world/create.h"
@@ -259,7 +258,6 @@ dfm_status dfm_body_move_held(dfm_body body, uint32_t n, const uint32_t *points,
     check_motion(b, nkey, keys, sine);
     if (nkey == 0 && !sine) fail(DFM_E_ARG, "body '%s': a motion needs keys or a sine", b.name.c_str());
     if (n == 0) fail(DFM_E_ARG, "body '%s': a motion needs points", b.name.c_str());
-    need_ability(*b.world, Ability::held_motion, "body", b.name);
     HeldMotion m;
     m.points.assign(points, points + n);
     if (nkey) m.keys.assign(keys, keys + nkey);

@@ -41,10 +41,6 @@ dfm_status dfm_world_ask_again(dfm_world world, uint64_t a, uint64_t b) {
 dfm_status dfm_world_set_pre_solve(dfm_world world, dfm_pre_solve_fn pre_solve, void *user) {
   return as_status([&] {
     World &w = exclusive(world_of(world));
-    if (pre_solve && w.def.method == DFM_METHOD_ROLLBACK)
-      fail(DFM_E_UNSUPPORTED,
-           "the contact method ROLLBACK cannot call a pre-solve function, since it does not solve single "
-           "contacts; use DFM_METHOD_AUTO");
     w.pre_solve = {pre_solve, user};
     wake_all(w);
   });

@@ -4,7 +4,6 @@
 
 #include "api/objects.h"
 #include "state/bounds.h"
-#include "step/method.h"
 #include "step/stages.h"
 #include "world/create.h"
 #include "world/obstacle_change.h"
@@ -71,7 +70,6 @@ Obstacle &movable(dfm_obstacle obstacle, const dfm_pose *pose) {
 dfm_status dfm_obstacle_move_to(dfm_obstacle obstacle, const dfm_pose *pose) {
   return as_status([&] {
     Obstacle &o = movable(obstacle, pose);
-    need_ability(*o.world, Ability::obstacle_motion, "obstacle", o.name);
     o.keys.clear();
     o.def.sine = {};
     o.target = to_pose(*pose);

@@ -4,12 +4,11 @@
 #include <cmath>
 
 #include "api/objects.h"
+#include "deform/deprecated.h"
 #include "plugin/context.h"
-#include "rollback/rollback.h"
 #include "state/obstacle.h"
 #include "state/tool.h"
 #include "step/context.h"
-#include "step/method.h"
 #include "step/stages.h"
 #include "step/step_bound.h"
 #include "world/create.h"
@@ -67,20 +66,19 @@ double shortest_step(const World &w, double dt) {
   return kShortestStep * reach;
 }
 
-const ContactMethod &method_of(int32_t number) {
-  switch (number) {
-    case DFM_METHOD_AUTO:
-    case DFM_METHOD_VELOCITY:
-    case DFM_METHOD_IMPLICIT: return velocity_method();  // with another response operator
-    case DFM_METHOD_ROLLBACK: return rollback::method();
-  }
-  fail(DFM_E_UNSUPPORTED,
-       "contact method %d is not available; use DFM_METHOD_AUTO, DFM_METHOD_VELOCITY, DFM_METHOD_IMPLICIT "
-       "or (to compare) DFM_METHOD_ROLLBACK",
-       number);
+// For one version (deform/deprecated.h): an integrator that is given says more.
+void take_method(dfm_world_def &d) {
+  if (d.method == DFM_METHOD_ROLLBACK)
+    fail(DFM_E_UNSUPPORTED,
+         "the contact method rollback is a program of its own now: run the scene by `deform rollback`");
+  if (d.method < DFM_METHOD_AUTO || d.method > DFM_METHOD_ROLLBACK)
+    fail(DFM_E_UNSUPPORTED, "method is %d; leave it 0, and choose an integrator", d.method);
+  if (d.integrator == DFM_INTEGRATOR_AUTO && d.method != DFM_METHOD_AUTO)
+    d.integrator =
+        d.method == DFM_METHOD_IMPLICIT ? DFM_INTEGRATOR_IMPLICIT_EULER : DFM_INTEGRATOR_SYMPLECTIC_EULER;
+  d.method = DFM_METHOD_AUTO;
 }
 
-// Contact uses the operator of the integrator: with another one bodies would rest at wrong positions.
 void choose_integrator(World &w) {
   const dfm_world_def &d = w.def;
   if (d.integrator < DFM_INTEGRATOR_AUTO || d.integrator > DFM_INTEGRATOR_TR_BDF2)
@@ -90,21 +88,7 @@ void choose_integrator(World &w) {
          d.integrator);
   if (!(d.step >= 0 && std::isfinite(d.step)))
     fail(DFM_E_ARG, "step is %g; give the length of the steps in s, or 0 (unknown)", d.step);
-  if (d.integrator == DFM_INTEGRATOR_AUTO && d.method == DFM_METHOD_IMPLICIT)
-    w.def.integrator = DFM_INTEGRATOR_IMPLICIT_EULER;
-  if (d.integrator == DFM_INTEGRATOR_AUTO && (d.step == 0 || d.method != DFM_METHOD_AUTO))
-    w.def.integrator = DFM_INTEGRATOR_SYMPLECTIC_EULER;
-  const bool implicit =
-      d.integrator != DFM_INTEGRATOR_AUTO && d.integrator != DFM_INTEGRATOR_SYMPLECTIC_EULER;
-  if (!implicit && d.method == DFM_METHOD_IMPLICIT)
-    fail(DFM_E_UNSUPPORTED,
-         "contact method implicit belongs to the integrators implicit_euler and tr_bdf2; choose one of "
-         "these, or the contact method velocity for symplectic_euler");
-  if (implicit && (d.method == DFM_METHOD_VELOCITY || d.method == DFM_METHOD_ROLLBACK))
-    fail(DFM_E_UNSUPPORTED,
-         "contact method %s takes the inverse masses of points, which with the integrator "
-         "%s puts bodies at rest in the wrong place; choose the contact method implicit or auto",
-         d.method == DFM_METHOD_VELOCITY ? "velocity" : "rollback", integrator_name(d.integrator));
+  if (d.integrator == DFM_INTEGRATOR_AUTO && d.step == 0) w.def.integrator = DFM_INTEGRATOR_SYMPLECTIC_EULER;
   if (!(d.solver_tolerance >= 0 && d.solver_tolerance < 1))
     fail(DFM_E_ARG, "solver_tolerance is %g; it must be 0 (the default) or a relative residual below 1",
          d.solver_tolerance);
@@ -138,7 +122,7 @@ void select_effects(World &w) {
     fail(DFM_E_ARG,
          "effect 'guard' is asked for, but DFM_WORLD_UNGUARDED (contact.guard false) leaves it out; remove "
          "one of the two");
-  if (!w.selection.wants(kGuard) && !unguarded && guards(*w.method)) {
+  if (!w.selection.wants(kGuard) && !unguarded) {
     w.def.flags |= DFM_WORLD_UNGUARDED;
     w.left_out.push_back({kGuard, "contact", "contact.guard"});
   }
@@ -204,8 +188,7 @@ dfm_status dfm_world_create(dfm_context *context, const dfm_world_def *def, dfm_
              "sleep_speed (m/s) and sleep_time (s) must be positive and finite; the defaults are 0.01 and "
              "0.5, found %g",
              value);
-    use_method(*w, method_of(w->def.method));
-    if (w->def.sleep) need_ability(*w, Ability::sleep);
+    take_method(w->def);
     choose_integrator(*w);
     select_effects(*w);
     prepare(*w);
@@ -260,7 +243,6 @@ dfm_status dfm_world_set_gravity_keys(dfm_world world, uint32_t n, const dfm_vec
 dfm_status dfm_world_set_sleep(dfm_world world, bool sleep) {
   return as_status([&] {
     World &w = whole(exclusive(world_of(world)));
-    if (sleep) need_ability(w, Ability::sleep);
     wake_all(w);
     w.def.sleep = sleep;
     w.changed = true;
@@ -483,7 +465,7 @@ dfm_status dfm_world_profile_sized(dfm_world world, uint32_t row_size, uint32_t 
     for (size_t i = 0; i < w.plan.stages.size(); ++i) {
       const size_t row = w.plan.stages[i].row;
       const StageTime &time = w.steps->stage_times[row];
-      rows.add({w.method->table[row].name, time.seconds, time.calls});
+      rows.add({stage_table()[row].name, time.seconds, time.calls});
     }
   });
 }

@@ -1,6 +1,6 @@
 // The plan: which stages a sub-step runs, and for which effects, derived from the contents of the scene. A
 // stage that is not needed is not in the list, so it costs no instruction; `deform explain` prints both lists
-// with reasons. The order of the stages is that of the contact method's table (step/method.h).
+// with reasons. The order of the stages is that of the table (step/step.cpp).
 #pragma once
 #include <cstddef>
 #include <string>

@@ -152,7 +152,6 @@ class Builder {
   void create_world() {
     dfm_world_def w = dfm_world_def_default();
     std::copy_n(def_.gravity, 3, w.gravity);
-    w.method = def_.method;
     w.integrator = def_.integrator;
     if (!def_.equilibrium) w.step = std::min(def_.step > 0 ? def_.step : kFrame, def_.duration);
     w.solver = def_.solver.c_str();

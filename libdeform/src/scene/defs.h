@@ -228,7 +228,7 @@ struct Definition {
   std::string file, folder;
   double gravity[3] = {0, 0, -9.81};
   std::vector<dfm_vector_key> gravity_keys;
-  int32_t method = DFM_METHOD_AUTO, integrator = DFM_INTEGRATOR_AUTO;
+  int32_t integrator = DFM_INTEGRATOR_AUTO;
   double offset = 0, tolerance = 0, max_time = 0, max_work = 0, recovery_speed = 0, obstacle_speed = 0,
          energy_watch = dfm_world_def_default().energy_watch;
   std::string solver = "auto";  // of the implicit step

@@ -434,11 +434,12 @@ void read_contact(const Node &scene, Definition &def, const ReadContext &context
   if (!scene.has("contact")) scene.value()["contact"] = json::object();
   const Node contact = scene.member("contact");
   contact.object("contact");
-  const std::string method = contact.word("method", "auto", "method");
-  def.method = method == "velocity"   ? DFM_METHOD_VELOCITY
-               : method == "implicit" ? DFM_METHOD_IMPLICIT
-               : method == "rollback" ? DFM_METHOD_ROLLBACK
-                                      : DFM_METHOD_AUTO;
+  const std::string method = contact.word("method", "auto", "method");  // for one version
+  if (method == "rollback")
+    contact.member("method").fail(
+        "\"rollback\" is a program of its own now: remove \"method\" and run `deform rollback`");
+  if (method != "auto" && def.integrator == DFM_INTEGRATOR_AUTO)
+    def.integrator = method == "implicit" ? DFM_INTEGRATOR_IMPLICIT_EULER : DFM_INTEGRATOR_SYMPLECTIC_EULER;
   def.sleep = contact.boolean("sleep", false);
   const bool self_given = contact.has("self");
   const bool listed = std::find(def.effects.begin(), def.effects.end(), "self_contact") != def.effects.end();

@@ -300,11 +300,6 @@ Written write_filters(SceneWriter &to) {
 Written write_contact(SceneWriter &to) {
   const dfm_world_def &d = to.w.def, usual = dfm_world_def_default();
   Written out;
-  static const std::pair<int32_t, const char *> methods[] = {{DFM_METHOD_VELOCITY, "velocity"},
-                                                             {DFM_METHOD_IMPLICIT, "implicit"},
-                                                             {DFM_METHOD_ROLLBACK, "rollback"}};
-  for (const auto &[method, word] : methods)
-    if (d.method == method) out["method"] = word;
   if (d.self_contact == DFM_SELF_ON) out["self"] = true;
   if (d.self_contact == DFM_SELF_AUTO) out["self"] = "auto";
   if (d.flags & DFM_WORLD_UNTANGLE) out["untangle"] = true;

@@ -155,8 +155,6 @@ struct Body : Discretization {
   Vec3 contact_impulse;    // N s since creation
   EnergyBook energy;
   ChangeBook changes;
-  // [n,4] values that the contact method keeps for each point; empty if it keeps none
-  Array<double> method_values;
   // as last computed; valid while asleep
   struct {
     bool known = false, near = false;  // near: it has contacts or attachments

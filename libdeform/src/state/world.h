@@ -26,7 +26,6 @@
 namespace dfm {
 
 class Aside;
-struct ContactMethod;
 struct LawInstance;
 struct Material;
 struct Obstacle;
@@ -148,8 +147,7 @@ struct World {
   bool revalued = false;  // values_changed(): tables stay valid, the plan is checked
   Plan plan;
   PairTables pairs;
-  double offset = 0;                      // d_c, m
-  const ContactMethod *method = nullptr;  // its table of stages, and what it cannot do (step/method.h)
+  double offset = 0;  // d_c, m
 
   // Time.
   double time = 0;  // s

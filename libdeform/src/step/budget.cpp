@@ -163,7 +163,6 @@ void changing(Stream &s, World &w) {
     s.array(b->p.dampers.v);
     s.array(b->model.state);
     s.array(b->surfel_impulse);
-    s.array(b->method_values);
     s.array(b->anchor);
     s.value(b->contact_impulse);
     s.value(b->energy);

@@ -8,7 +8,8 @@
 namespace dfm {
 
 StepContext::StepContext(const Meters &meters)
-    : broad(meters.detection.memory()),
+    : stage_times(stage_table().size()),
+      broad(meters.detection.memory()),
       narrow(meters.detection.memory()),
       contact_memory(meters.contacts.memory()),
       rows(meters.contacts.memory()),

@@ -19,7 +19,6 @@
 #include "step/energy_watch.h"
 #include "step/guard.h"
 #include "step/islands.h"
-#include "step/method.h"
 #include "step/pair_energy.h"
 #include "step/stages.h"
 
@@ -42,7 +41,7 @@ struct StepContext {
   Budget budget;
   double offered = 0;                  // s, length of the step if the library has chosen it, else 0
   bool struck = false;                 // the sub-step is to be repeated explicitly (step/impact.h)
-  std::vector<StageTime> stage_times;  // by row of the method's table
+  std::vector<StageTime> stage_times;  // by row of the table
 
   // prepare(): the world's entities as the stages see them
   SceneFacts facts;  // what the plan was made from
@@ -112,7 +111,6 @@ struct StepContext {
   Array<uint8_t> stands;  // [contacts] is loaded, and keeps its area
   Array<Renewal::Way> ways;
   Array<double> renewed;
-  std::unique_ptr<MethodBuffers> method;  // of stages of the contact method only
 
   // distribute, guard
   std::vector<ImpulseSink> sinks;

@@ -37,11 +37,7 @@ constexpr double kNoLimit = 1e300;  // J, of a base: its energy may be anything
 // An implicit sub-step costs that much more, so the same share of the time allows as many more checks.
 constexpr uint32_t kAges = 32;
 
-// The work of impulses is booked; a contact method that acts on bodies in another way leaves nothing to
-// balance the energy with.
-bool watching(const World &w) {
-  return w.def.energy_watch > 0 && w.plan.has(StageRole::gives_impulses) == w.plan.touches();
-}
+bool watching(const World &w) { return w.def.energy_watch > 0; }
 bool steps_itself(const Body &b) { return b.model.stepper.has_value(); }
 // By backward Euler, or by the model itself: the balance is that of the true energy, and what is done counts
 // at the end of the sub-step.
@@ -325,8 +321,7 @@ double gain_at_end(const World &w, const StepContext &step, const Body &b) {
 }
 
 const char *unwatched(const World &w, const Body &b) {
-  if (!(w.def.energy_watch > 0)) return "energy_watch is 0";
-  if (!watching(w)) return "the contact method gives no impulses to book";
+  if (!watching(w)) return "energy_watch is 0";
   if (!watched(b)) return "its model gives no energy, or not with these parameters";
   if (steps_itself(b)) return unbooked(w, b) ? "its held points move, and its model steps itself" : "";
   return unbooked(w, b) ? "tr_bdf2 takes loads, held points or gravity that vary along the sub-step" : "";

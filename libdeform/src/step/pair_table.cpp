@@ -96,7 +96,6 @@ std::unique_ptr<LawInstance> make_law(const World &w, const dfm_type &type, std:
                                       double restitution) {
   SelectedLaw made = select_law(w.context->registry, w.context->host, w.selection, type, asked);
   auto law = std::make_unique<LawInstance>(*made.type, w.context->host, std::move(made.values));
-  if (law->nstate) need_ability(w, Ability::law_memory, "friction law", made.type->id);
   law->asked_type = &type;
   law->asked = std::move(asked);
   law->restitution = restitution;

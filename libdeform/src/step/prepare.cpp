@@ -2,7 +2,6 @@
 // entities for the stages.
 #include "state/world.h"
 #include "step/context.h"
-#include "step/method.h"
 #include "step/stages.h"
 
 #include <algorithm>
@@ -162,7 +161,7 @@ void look_at_plan(World &w, StepContext &step) {
   if (now != Prescribed{old.gravity_keys, old.loads_vary, old.held_move, old.obstacles_move}) {
     SceneFacts facts = old;
     put(now, facts);
-    w.plan = make_plan(w.method->table, facts);
+    w.plan = make_plan(facts);
     put(now, step.facts);
     ++step.made.plans;
   }
@@ -504,11 +503,10 @@ void choose_plan(World &w, StepContext &step, SceneFacts &facts, const SceneFact
     facts.offered.push_back({kSelfContact, "contact"});
     if (!touch) facts.offered.push_back({kFriction, "contact"});
   }
-  if (guards(*w.method) && !facts.unguarded && (touch || (facts.bodies && facts.effects_listed)))
+  if (!facts.unguarded && (touch || (facts.bodies && facts.effects_listed)))
     facts.offered.push_back({kGuard, "contact"});
-  if (facts.self_bodies) need_ability(w, Ability::self_contact);
   if (same(facts, planned)) return;
-  w.plan = make_plan(w.method->table, facts);
+  w.plan = make_plan(facts);
   ++step.made.plans;
 }
 

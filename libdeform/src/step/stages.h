@@ -1,15 +1,16 @@
-// The stages of a sub-step, and shared functions. The table of the contact method has their order
-// (step/method.h). Return false if the sub-step failed; `trouble` and dfm_last_error() give the reason, and
-// nothing of it has been committed.
+// The stages of a sub-step, and shared functions. The table has their order (step/step.cpp). Return false if
+// the sub-step failed; `trouble` and dfm_last_error() give the reason, and nothing of it has been committed.
 #pragma once
 #include <cstdint>
 #include <functional>
 #include <span>
+#include <string>
 
 #include "broad/broad_phase.h"
 #include "deform/world.h"
 #include "dynamics/dynamics.h"
 #include "math/vec3.h"
+#include "plan/plan.h"
 #include "state/world_bound.h"
 
 namespace dfm {
@@ -18,6 +19,17 @@ struct Body;
 struct LawInstance;
 struct StepContext;
 struct World;
+
+// A row of the table of stages, which is in the order of a sub-step.
+struct Stage {
+  const char *name;
+  bool (*run)(World &w, StepContext &step, uint32_t *trouble);
+  std::string (*cost)(const World &w);           // what its cost grows with
+  StageChoice (*when)(const SceneFacts &facts);  // whether it runs, and why
+  StageRole role = StageRole::none;
+};
+std::span<const Stage> stage_table();
+Plan make_plan(const SceneFacts &facts);  // throws Error if nothing provides a requested effect
 
 // Choices that prepare() would make again but a restored world keeps, because they were made at an earlier
 // state.

@@ -4,8 +4,8 @@
 //   sub-steps                        run_step(): equal ones, more of them if the bound has fallen
 //                                    until the budget is used up; explicit from an impact on (impact.cpp)
 //     pieces                         advance(), piece(): shorter where the guard requires it
-//       stages                       sub_step(): all rows of the method's table that the plan has
-//                                    chosen, or none
+//       stages                       sub_step(): all rows of the table that the plan has chosen,
+//                                    or none
 //         waking                     narrow runs model to broad again for bodies that it has woken
 //                                    (narrow.cpp)
 //         a rigid host's revision    solve again if a motor reaches its limit, or if a host requests it in
@@ -26,7 +26,6 @@
 #include "step/context.h"
 #include "step/cut_drag.h"
 #include "step/energy_watch.h"
-#include "step/method.h"
 #include "step/move_obstacles.h"
 #include "step/overlap.h"
 #include "step/stage_costs.h"
@@ -54,14 +53,12 @@ constexpr Stage kTable[] = {
     {"commit", stage_commit, cost::points, when::commit},
     {"sleep", row::sleep, cost::awake, when::sleep},
 };
-constexpr ContactMethod kVelocity{"velocity", kTable};
 
 using Clock = std::chrono::steady_clock;
 
-// Runs a row of the method's table, with timing and tracing. since: in, end of the row before; out, of this
-// one.
+// Runs a row of the table, with timing and tracing. since: in, end of the row before; out, of this one.
 bool run(size_t row, World &w, StepContext &step, uint32_t *trouble, Clock::time_point &since) {
-  const Stage &stage = w.method->table[row];
+  const Stage &stage = kTable[row];
   struct Timer {
     const Stage &stage;
     World &w;
@@ -86,7 +83,18 @@ bool sub_step(World &w, StepContext &step, uint32_t *trouble);
 
 }  // namespace
 
-const ContactMethod &velocity_method() { return kVelocity; }
+std::span<const Stage> stage_table() { return kTable; }
+
+Plan make_plan(const SceneFacts &facts) {
+  Plan plan;
+  plan_effects(facts, plan);
+  for (size_t row = 0; row < std::size(kTable); ++row) {
+    StageChoice choice = kTable[row].when(facts);
+    if (choice.runs) plan.stages.push_back({row, kTable[row].role, std::move(choice.why)});
+    else if (!choice.why.empty()) plan.absent.push_back({kTable[row].name, std::move(choice.why)});
+  }
+  return plan;
+}
 
 namespace row {
 

@@ -8,7 +8,6 @@
 #include "state/world.h"
 #include "step/attach.h"
 #include "step/energy_watch.h"
-#include "step/method.h"
 #include "step/stages.h"
 #include "world/queries.h"
 
@@ -147,7 +146,6 @@ const Attachment &attachment_of(const Body &b, uint32_t number) {
 
 uint32_t attach(Body &b, const dfm_attach_def &def, Body *other, const Obstacle *obstacle) {
   World &w = *b.world;
-  need_ability(w, Ability::attachments, "body", b.name);
   check_values(b, def);
   if (other == &b) fail(DFM_E_ARG, "body '%s' cannot be attached to itself", b.name.c_str());
   if ((other ? other->world : obstacle->world) != &w)

@@ -12,7 +12,6 @@
 #include "plugin/on_behalf.h"
 #include "plugin/params.h"
 #include "state/world.h"
-#include "step/method.h"
 #include "step/step_bound.h"
 #include "world/body_surface.h"
 #include "world/create.h"
@@ -66,11 +65,6 @@ std::optional<ImplicitOptions> implicit_of(const World &w, const std::string &na
   const int32_t which = asked == DFM_INTEGRATOR_AUTO ? w.def.integrator : asked;
   out.open = which == DFM_INTEGRATOR_AUTO;
   if (out.open || which == DFM_INTEGRATOR_SYMPLECTIC_EULER) return std::nullopt;
-  if (w.def.method == DFM_METHOD_VELOCITY || w.def.method == DFM_METHOD_ROLLBACK)
-    fail(DFM_E_UNSUPPORTED,
-         "body '%s': the integrator %s cannot be in a world whose contact method is %s, which takes "
-         "inverse masses; use the method auto or implicit",
-         name.c_str(), integrator_name(which), w.method->name);
   ImplicitOptions options = w.implicit;
   options.second_order = which == DFM_INTEGRATOR_TR_BDF2;
   out.used = static_cast<uint32_t>(which);
@@ -239,7 +233,6 @@ void make_model(World &w, Body &b, const dfm_type &type, std::vector<double> val
     measure_explicit(b, *out.dynamics, out.integrator, out.origin);
     ask_explicit_bound(w, w.time, *out.dynamics, out.integrator);
   }
-  if (!out.dynamics->abilities().placed) need_ability(w, Ability::self_stepping, "body", b.name);
 }
 
 }  // namespace

@@ -18,7 +18,6 @@
 #include "state/search_tree.h"
 #include "step/attach.h"
 #include "step/context.h"
-#include "step/method.h"
 #include "step/stages.h"
 #include "step/tool_touch.h"
 #include "world/body_effects.h"
@@ -182,8 +181,6 @@ Body &create_body(World &w, const dfm_body_def &def) {
   b.surfel_impulse = zeros(w.memory(), size_t(3) * b.surface.nsurfel);
 
   take_model(w, b, def, materials);
-  if (!b.surface.identity()) need_ability(w, Ability::own_surface, "body", b.name);
-  if (w.method->point_values) b.method_values = zeros(w.memory(), size_t(kStride) * b.p.n);
   b.tears = may_tear(b);
   if (b.tears) check_may_cut(b, b.model);
 
@@ -319,8 +316,6 @@ Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def) {
   o.pose = o.pose_at_time(w.time);
   check_motion_speed(w, o);
   check_velocity("obstacle", name, load3(def.velocity_surface));
-  if (o.def.shape == DFM_SHAPE_VOXELS) need_ability(w, Ability::voxels, "obstacle", o.name);
-  if (o.moves()) need_ability(w, Ability::obstacle_motion, "obstacle", o.name);
   w.obstacles.reserve(w.obstacles.size() + 1);
   w.overlaps.place(w.next_id);
   o.id = w.next_id;

@@ -13,7 +13,6 @@
 #include "plugin/on_behalf.h"
 #include "state/material.h"
 #include "state/world.h"
-#include "step/method.h"
 #include "step/stages.h"
 #include "world/blade_sweep.h"
 #include "world/body_shape.h"
@@ -207,11 +206,6 @@ void check_may_cut(const Body &b, const ModelInstance &model) {
          "touches: "
          "steps as large as its %u cells in place of %u triangles",
          name, b.ncell(), b.surface.ntri);
-  if (b.world->method->point_values)
-    fail(DFM_E_UNSUPPORTED,
-         "body '%s' can be neither cut nor torn: the contact method %s keeps values of its points; take "
-         "another",
-         name, b.world->method->name);
   if (!topology_of(model))
     fail(DFM_E_UNSUPPORTED,
          "body '%s' can be neither cut nor torn: model '%s' needs all of its cells; take msm or "

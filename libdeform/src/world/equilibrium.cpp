@@ -10,7 +10,6 @@
 #include "state/obstacle.h"
 #include "state/world.h"
 #include "step/energy_watch.h"
-#include "step/method.h"
 #include "step/stages.h"
 #include "world/change_energy.h"
 #include "world/rest_loads.h"
@@ -182,9 +181,6 @@ void check_equilibrium(const World &w) {
            "body '%s': model '%s' steps itself and gives no stiffness, which an equilibrium needs; choose "
            "another model",
            b->name.c_str(), b->model.type->id);
-  if (w.plan.touches() && w.method != &velocity_method())
-    fail(DFM_E_UNSUPPORTED, "static mode does not support the contact method %s; use the method auto",
-         w.method->name);
 }
 
 void find_equilibrium(World &w, const dfm_equilibrium_def &def, dfm_equilibrium_info &info) {

@@ -11,7 +11,6 @@
 #include "step/impact.h"
 #include "step/context.h"
 #include "step/energy_watch.h"
-#include "step/method.h"
 #include "world/body_effects.h"
 #include "world/create.h"
 #include "world/idle.h"
@@ -271,7 +270,7 @@ std::string explain(const World &w) {
   out += "]," + left_out(w) + "," + laws(w) + ",\"stages\":[";
   for (size_t i = 0; i < w.plan.stages.size(); ++i) {
     const PlannedStage &s = w.plan.stages[i];
-    const Stage &stage = w.method->table[s.row];
+    const Stage &stage = stage_table()[s.row];
     out += (i ? "," : "") + ("{\"name\":" + quote(stage.name) + ",\"why\":" + quote(s.why));
     out += ",\"cost\":" + quote(stage.cost(w)) + "}";
   }

@@ -13,7 +13,7 @@ ModelChoice choose_model(const Body &b, const char *type, const dfm_params &para
 void change_model(Body &b, const ModelChoice &to, Swap &swap);
 // Whether the body has the model of this choice with the same inputs.
 bool is_made_so(const Body &b, const ModelChoice &c);
-// Makes the models of future changes to detect errors now that do not depend on the state: contact method,
+// Makes the models of future changes to detect errors now that do not depend on the state:
 // integrator, springs, cells that a model rejects, effects (if the world has its plan). The instances are
 // kept as spares of the body. at_rest: equilibria will be computed. Results are kept with each change. Throws
 // Error.

@@ -6,7 +6,6 @@
 #include "state/bounds.h"
 #include "state/obstacle.h"
 #include "state/world.h"
-#include "step/method.h"
 #include "step/rigid.h"
 #include "world/create.h"
 
@@ -176,7 +175,6 @@ Obstacle &add_rigid_shape(Obstacle &body, const dfm_obstacle_def &def) {
 }
 
 void create_rigids(World &w, const char *host, const dfm_rigid_set_def &def, uint64_t *out) {
-  need_ability(w, Ability::rigid_bodies);
   if (!def.nbody || !def.bodies) fail(DFM_E_ARG, "a set of rigid bodies needs at least one body");
   if (def.njoint && !def.joints) fail(DFM_E_ARG, "%u joints are announced, but joints is NULL", def.njoint);
   auto owned = std::make_unique<RigidSet>(w, w.memory(), host ? host : "builtin");

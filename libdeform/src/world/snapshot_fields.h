@@ -24,7 +24,6 @@
 #include "state/obstacle.h"
 #include "state/tool.h"
 #include "state/world.h"
-#include "step/method.h"
 #include "world/body_model.h"
 #include "world/snapshot_cuts.h"
 #include "world/snapshot_stream.h"
@@ -64,7 +63,7 @@ struct StagedBody {
   std::vector<BladeTrack> blades;
   CutsAhead ahead;
   Slumber slumber;
-  Array<double> surfel_impulse, anchor, method_values;
+  Array<double> surfel_impulse, anchor;
 };
 struct StagedObstacle {
   Pose pose, target;
@@ -121,14 +120,13 @@ struct Staged {
         report(w.meters.contacts.memory()),
         rigid_report(w.meters.contacts.memory()) {
     const Memory &m = w.memory();
-    def.method = w.def.method;
     bodies.resize(w.bodies.size());
     obstacles.resize(w.obstacles.size());
     rigid_sets.resize(w.rigid_sets.size());
     tools.resize(w.tools.size());
     for (StagedBody &b : bodies)
       use_memory(m, b.p.x, b.p.v, b.p.dampers.v, b.p.load, b.p.held, b.model.state, b.surfel_impulse,
-                 b.anchor, b.method_values);
+                 b.anchor);
     for (StagedRigids &r : rigid_sets) use_memory(m, r.state, r.extra, r.total);
   }
 };
@@ -404,8 +402,6 @@ void body_fields(Stream &s, W &w, B &b, const Body &like) {
   });
   if (b.slumber.asleep) s.array("surfel impulse", b.surfel_impulse, like.surfel_impulse.size(), must::finite);
   if (w.def.sleep) s.array("anchor", b.anchor, like.p.x.size(), must::finite);
-  if (const char *const name = like.world->method->point_values)
-    s.array(name, b.method_values, like.method_values.size(), must::finite);
   prescribed_fields(s, b, like);
   s.where("", "");
 }
@@ -517,8 +513,6 @@ void fields(Stream &s, W &w, const World &like) {
   s.must_hold("gravity keys", "finite keys at rising times", [&] { return rise(w.gravity.keys); });
   s.value("sleep", w.def.sleep, must::flag);
   s.value("sleepers", w.sleepers, must::any);
-  s.must_hold("sleep", "no sleep with this contact method",
-              [&] { return !w.def.sleep || !lacks(*like.method, Ability::sleep); });
   size_t at = 0;
   s.members("bodies", w.bodies, like.bodies.size(),
             [&](auto &entry) { body_fields(s, w, object(entry), *like.bodies[at++]); });

@@ -200,7 +200,6 @@ void exchange(World &w, Staged &t) noexcept {
     std::swap(b.slumber, other.slumber);
     b.bound.known = false;
     b.anchor.swap(other.anchor);
-    b.method_values.swap(other.method_values);
     if (!other.surfel_impulse.empty()) b.surfel_impulse.swap(other.surfel_impulse);
     if (b.slumber.asleep) gather_surface(b.surface, b.p.x.data(), b.p.v.data());
     update_inverse_mass(b.p);
@@ -269,7 +268,7 @@ void world_restore(World &w, const void *data, size_t bytes) {
   SnapshotIds ids(w, things);
   if (structure != rest_of_structure(w))
     fail(DFM_E_FORMAT,
-         "the snapshot belongs to another world: sets of rigid bodies, tools, contact method or self contact "
+         "the snapshot belongs to another world: sets of rigid bodies, tools or self contact "
          "differ; create them as they were when it was taken; nothing was restored");
   std::vector<CutRow> cuts;
   cut_fields(s, cuts);

@@ -7,7 +7,6 @@
 #include "state/obstacle.h"
 #include "state/tool.h"
 #include "state/world.h"
-#include "step/method.h"
 #include "step/self_contact.h"
 #include "world/snapshot_cuts.h"
 
@@ -126,7 +125,6 @@ uint64_t rest_of_structure(const World &w) {
     h.add(t->keys.data(), t->keys.size() * sizeof(dfm_pose_key));
     h.add(t->opening_keys.data(), t->opening_keys.size() * sizeof(dfm_scale_key));
   }
-  if (w.method->point_values) h.add(w.def.method);
   if (const uint8_t asked = asks_self_contact(w)) h.add(asked);
   return h.value;
 }

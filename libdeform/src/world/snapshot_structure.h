@@ -12,7 +12,7 @@ struct World;
 // Of one of them, without its id and name.
 uint64_t make_of(const Body &b);
 uint64_t make_of(const Obstacle &o);
-// Of the rest: sets of rigid bodies, tools, contact method and self contact.
+// Of the rest: sets of rigid bodies, tools and self contact.
 uint64_t rest_of_structure(const World &w);
 // Of all, with ids and names: for a world that was written as a scene and read again.
 uint64_t snapshot_structure(const World &w);

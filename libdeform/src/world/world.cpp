@@ -1,7 +1,6 @@
 // Derived data of the world between steps: names, pair tables, offset, plan.
 #include "state/world.h"
 #include "step/context.h"
-#include "step/method.h"
 
 #include "core/aside.h"
 #include "plugin/context.h"
@@ -22,7 +21,6 @@ World::World(dfm_context *c)
       rigid_report(meters.contacts.memory()) {
   use_memory(meters.contacts.memory(), step_impulses.pairs);
   stats.size = sizeof stats;
-  use_method(*this, velocity_method());
 }
 
 World::~World() = default;

@@ -23,7 +23,6 @@ uint64_t world_hash(const World &w) {
           if (column.hashed) h.add(values.data(), values.size() * sizeof(values[0]));
         },
         *store);
-  for (auto &b : w.bodies) h.add(b->method_values.data(), b->method_values.size() * sizeof(double));
   if (w.def.sleep)
     for (auto &b : w.bodies) {
       h.add(b->slumber.asleep);

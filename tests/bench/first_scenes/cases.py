@@ -515,7 +515,7 @@ def switches(rng):
     """Effects that a person tries: self contact, sleep, a change of model, accuracy, a limit of time."""
     s = pick(rng, drop, rigid_on_soft, press, side_by_side)(rng)
     c = s.doc.setdefault("contact", {})
-    what = pick(rng, "self", "self_auto", "sleep", "switch", "implicit", "tr", "rollback", "guard",
+    what = pick(rng, "self", "self_auto", "sleep", "switch", "implicit", "tr", "guard",
                 "accuracy", "budget", "effects", "wind", "spin")
     if what == "self":
         c["self"] = True
@@ -533,9 +533,6 @@ def switches(rng):
     elif what == "tr":
         s.doc["time"]["integrator"] = "tr_bdf2"
         s.doc["time"]["step"] = pick(rng, 1 / 60, 0.01, 0.002)
-    elif what == "rollback":
-        s.doc["contact"] = {"method": "rollback"}  # which takes neither laws with memory nor rigid bodies
-        s.doc.pop("rigid", None)
     elif what == "guard":
         c["guard"] = False
     elif what == "accuracy":

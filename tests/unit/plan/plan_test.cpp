@@ -2,16 +2,12 @@
 #include <gtest/gtest.h>
 
 #include "core/error.h"
-#include "rollback/rollback.h"
-#include "step/method.h"
+#include "step/stages.h"
 
 namespace {
 
-using dfm::ContactMethod;
 using dfm::StageRole;
 using Names = std::vector<std::string>;
-
-const ContactMethod &velocity() { return dfm::velocity_method(); }
 
 dfm::SceneFacts two_bodies() {
   dfm::SceneFacts f;
@@ -20,15 +16,14 @@ dfm::SceneFacts two_bodies() {
   return f;
 }
 
-Names stages(const dfm::SceneFacts &f, const ContactMethod &method = velocity()) {
+Names stages(const dfm::SceneFacts &f) {
   Names out;
-  for (const auto &s : dfm::make_plan(method.table, f).stages) out.push_back(method.table[s.row].name);
+  for (const auto &s : dfm::make_plan(f).stages) out.push_back(dfm::stage_table()[s.row].name);
   return out;
 }
 
-std::string why_not(const dfm::SceneFacts &f, const std::string &name,
-                    const ContactMethod &method = velocity()) {
-  for (const auto &s : dfm::make_plan(method.table, f).absent)
+std::string why_not(const dfm::SceneFacts &f, const std::string &name) {
+  for (const auto &s : dfm::make_plan(f).absent)
     if (s.name == name) return s.why;
   return {};
 }
@@ -42,7 +37,7 @@ TEST(Plan, OfBodiesThatTouch_HasTheStagesOfContactInOrder) {
   const Names want = {"model",      "predict", "broad", "narrow", "contact+friction",
                       "distribute", "guard",   "commit"};
   EXPECT_EQ(stages(two_bodies()), want);
-  EXPECT_TRUE(dfm::make_plan(velocity().table, two_bodies()).touches());
+  EXPECT_TRUE(dfm::make_plan(two_bodies()).touches());
 }
 
 TEST(Plan, OfOneBody_HasNothingOfContact) {
@@ -63,17 +58,6 @@ TEST(Plan, OfABodyThatTouchesItselfAlone_LooksForNoPairs) {
   EXPECT_EQ(why_not(f, "broad"), "no pair may touch");
 }
 
-TEST(Plan, OfRollback_HasItsStagesInPlaceOfTheSolve) {
-  const ContactMethod &rollback = dfm::rollback::method();
-  const Names want = {"model", "predict", "lagged friction", "broad", "rollback", "commit"};
-  EXPECT_EQ(stages(two_bodies(), rollback), want);
-  for (const char *replaced : {"narrow", "contact+friction", "distribute", "guard"})
-    EXPECT_EQ(why_not(two_bodies(), replaced, rollback), "contact.method is rollback") << replaced;
-  const dfm::Plan plan = dfm::make_plan(rollback.table, two_bodies());
-  EXPECT_TRUE(plan.touches());
-  EXPECT_FALSE(plan.has(StageRole::gives_impulses));
-}
-
 TEST(Plan, OfRigidBodies_EndsThemBeforeImpulsesAreDistributed) {
   dfm::SceneFacts f = two_bodies();
   f.rigid_bodies = 3;
@@ -90,7 +74,7 @@ TEST(Plan, OfWhatIsPrescribed_NamesWhatMoves) {
   EXPECT_EQ(why_not(f, "motion"), "nothing is prescribed over time");
   f.loads_vary = true;
   f.obstacles_move = true;
-  const dfm::Plan plan = dfm::make_plan(velocity().table, f);
+  const dfm::Plan plan = dfm::make_plan(f);
   ASSERT_EQ(stages(f)[0], "motion");
   EXPECT_EQ(plan.stages[0].why, "loads vary, obstacles move");
 }
@@ -107,9 +91,9 @@ TEST(Plan, OfCoupledSurfaces_GathersThemWhereTheyMayTouch) {
 
 TEST(Plan, OfAnUnguardedWorld_HasNoGuard) {
   dfm::SceneFacts f = two_bodies();
-  EXPECT_TRUE(dfm::make_plan(velocity().table, f).has(StageRole::guards));
+  EXPECT_TRUE(dfm::make_plan(f).has(StageRole::guards));
   f.unguarded = true;
-  EXPECT_FALSE(dfm::make_plan(velocity().table, f).has(StageRole::guards));
+  EXPECT_FALSE(dfm::make_plan(f).has(StageRole::guards));
   EXPECT_NE(why_not(f, "guard").find("contact.guard"), std::string::npos);
 }
 
@@ -137,12 +121,12 @@ TEST(Plan, OfAnyFacts_HasTheOrderOfTheTable) {
     f.gravity_keys = bit(8);
     f.sleep = bit(9);
     f.unguarded = bit(10);
-    const dfm::Plan plan = dfm::make_plan(velocity().table, f);
+    const dfm::Plan plan = dfm::make_plan(f);
     for (size_t k = 0; k < plan.stages.size(); ++k) {
       if (k > 0) {
         ASSERT_LT(plan.stages[k - 1].row, plan.stages[k].row);
       }
-      const std::string name = velocity().table[plan.stages[k].row].name;
+      const std::string name = dfm::stage_table()[plan.stages[k].row].name;
       for (const auto &absent : plan.absent) ASSERT_NE(absent.name, name);
     }
     const bool touches = f.body_pairs || f.obstacle_pairs || f.self_bodies;
@@ -152,34 +136,12 @@ TEST(Plan, OfAnyFacts_HasTheOrderOfTheTable) {
   }
 }
 
-// A row without a function says why a stage is not there. What the method cannot do is refused where it is
-// made, and with what is left no such row is ever planned.
-TEST(Plan, OfRollback_RunsNoRowWithoutAFunction) {
-  const ContactMethod &rollback = dfm::rollback::method();
-  using dfm::Ability;
-  for (const Ability a : {Ability::own_surface, Ability::rigid_bodies, Ability::sleep, Ability::self_contact})
-    EXPECT_TRUE(dfm::lacks(rollback, a));
-  for (uint32_t bits = 0; bits < 1u << 4; ++bits) {
-    dfm::SceneFacts f;
-    f.bodies = 2;
-    f.body_pairs = bits & 1;
-    f.obstacles = bits >> 1 & 1;
-    f.obstacle_pairs = bits >> 1 & 1;
-    f.loads_vary = bits >> 2 & 1;
-    f.unguarded = bits >> 3 & 1;
-    for (const auto &s : dfm::make_plan(rollback.table, f).stages) {
-      EXPECT_NE(rollback.table[s.row].run, nullptr) << rollback.table[s.row].name;
-      EXPECT_NE(rollback.table[s.row].cost, nullptr) << rollback.table[s.row].name;
-    }
-  }
-}
-
 // An effect of the content is there without being asked for; one that is asked for needs somebody who
 // provides it.
 TEST(PlanEffects, OfTheContent_NameTheirProviders) {
   dfm::SceneFacts f = two_bodies();
   f.offered = {{"volume", "model.a"}, {"stiction", "law.b"}, {"volume", "model.c"}};
-  const dfm::Plan plan = dfm::make_plan(velocity().table, f);
+  const dfm::Plan plan = dfm::make_plan(f);
   ASSERT_EQ(plan.effects.size(), 2u);
   EXPECT_EQ(plan.effects[0].name, "stiction");
   EXPECT_EQ(plan.effects[1].name, "volume");
@@ -190,7 +152,7 @@ TEST(PlanEffects, OfTheContent_NameTheirProviders) {
 TEST(PlanEffects, ThatNoPluginProvides_AreRefusedWithPossibleProviders) {
   const auto refusal = [](const dfm::SceneFacts &f) {
     try {
-      dfm::make_plan(velocity().table, f);
+      dfm::make_plan(f);
     } catch (const dfm::Error &e) {
       return std::string(e.what());
     }
@@ -223,7 +185,7 @@ TEST(PlanEffects, ThatFold_CallForSelfContact) {
   f.self = true;
   EXPECT_EQ(dfm::self_asked_by(f), "contact.self");
   f.self_bodies = 1;
-  const dfm::Plan plan = dfm::make_plan(velocity().table, f);
+  const dfm::Plan plan = dfm::make_plan(f);
   ASSERT_EQ(plan.effects.size(), 2u);
   EXPECT_EQ(plan.effects[1].name, dfm::kSelfContact);
   EXPECT_EQ(plan.effects[1].asked_by, "contact.self");

@@ -89,11 +89,11 @@ TEST(Rollback, BodiesThrownAtEveryShape_StayOutside) {
   for (const Case &shape : cases()) {
     test::Context context;
     dfm_world_def wd = dfm_world_def_default();
-    wd.method = DFM_METHOD_ROLLBACK;
     wd.contact_offset = kOffset;
     wd.gravity[2] = 0;
     dfm_world w = 0;
     test::ok(dfm_world_create(context, &wd, &w));
+    dfm::rollback::Scheme scheme;
     test::set_friction(w, 0, "none");  // of the last throw would act on the next
     shape.add(w);
     const double rest[] = {kSize,  kSize, kSize,  kSize,  -kSize, -kSize,
@@ -132,7 +132,7 @@ TEST(Rollback, BodiesThrownAtEveryShape_StayOutside) {
         }
       if (nearest(x, shape.distance) < 2 * kOffset) continue;
       test::ok(dfm_body_set_state(body, 4, x, v));
-      test::ok(dfm_world_step(w, 1, nullptr));
+      test::ok(scheme.step(w, 1, nullptr));
       double end[12];
       for (int k = 0; k < 12; ++k) end[k] = x[k] + v[k];
       const bool would = nearest(end, shape.distance) == 0;

@@ -21,9 +21,9 @@ struct Tet {
 struct Scene {
   test::Context context;
   dfm_world world = 0;
+  dfm::rollback::Scheme scheme;
   Scene(Vector gravity, double mu) {
     dfm_world_def d = dfm_world_def_default();
-    d.method = DFM_METHOD_ROLLBACK;
     d.contact_offset = kOffset;
     std::copy(gravity.begin(), gravity.end(), d.gravity);
     test::ok(dfm_world_create(context, &d, &world));
@@ -60,7 +60,7 @@ struct Scene {
   }
   void step(double h) {
     uint32_t trouble = 0;
-    ASSERT_EQ(dfm_world_step(world, h, &trouble), DFM_OK) << dfm_last_error();
+    ASSERT_EQ(scheme.step(world, h, &trouble), DFM_OK) << dfm_last_error();
     EXPECT_EQ(trouble, 0u);
   }
 };

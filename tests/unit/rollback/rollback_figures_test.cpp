@@ -1,4 +1,4 @@
-// What the roll-back does to sliding, momentum and force, beside the velocity method: the figures of
+// What the roll-back does to sliding, momentum and force, beside the library's step: the figures of
 // doc/concepts/rollback.md (rollback_bench prints them in full). These are errors of the scheme, not of its
 // implementation: the tests of (4.5) in doc/reference/zerbato.md, which it has to fail.
 #include "rollback_cases.h"
@@ -6,15 +6,15 @@
 namespace {
 
 namespace rb = test::rollback;
-constexpr int32_t kVelocity = DFM_METHOD_VELOCITY, kRollback = DFM_METHOD_ROLLBACK;
+constexpr rb::By kLibrary = rb::By::library, kRollback = rb::By::rollback;
 constexpr double kStep = 1e-3;
 
 }  // namespace
 
 // A frictionless block on 30 degrees: g sin 30 = 4.905 m/s2.
 TEST(Rollback, FrictionlessSlope_Freezes) {
-  const rb::Slide v = rb::incline(kVelocity, 30, 0, kStep), r = rb::incline(kRollback, 30, 0, kStep);
-  std::printf("acceleration %.4f by velocity, %.4f by rollback; way %.3e and %.3e m\n", v.acceleration,
+  const rb::Slide v = rb::incline(kLibrary, 30, 0, kStep), r = rb::incline(kRollback, 30, 0, kStep);
+  std::printf("acceleration %.4f by the library, %.4f by rollback; way %.3e and %.3e m\n", v.acceleration,
               r.acceleration, v.way, r.way);
   EXPECT_NEAR(v.acceleration, rb::kG * 0.5, 0.01);
   EXPECT_LT(std::fabs(r.way), 1e-5);
@@ -29,15 +29,15 @@ TEST(Rollback, WayOfASlidingBlock_DoesNotDependOnFriction) {
   std::printf("way %.4f m at mu 0.3, %.4f m at 0.6; exact %.4f and %.4f\n", way[0], way[1],
               1 / (0.6 * rb::kG), 1 / (1.2 * rb::kG));
   EXPECT_NEAR(way[1], way[0], 0.02 * way[0]);
-  EXPECT_NEAR(rb::thrown(kVelocity, 1, 0.3, kStep).way, 1 / (0.6 * rb::kG), 2e-3);
-  EXPECT_NEAR(rb::thrown(kVelocity, 1, 0.6, kStep).way, 1 / (1.2 * rb::kG), 2e-3);
+  EXPECT_NEAR(rb::thrown(kLibrary, 1, 0.3, kStep).way, 1 / (0.6 * rb::kG), 2e-3);
+  EXPECT_NEAR(rb::thrown(kLibrary, 1, 0.6, kStep).way, 1 / (1.2 * rb::kG), 2e-3);
 }
 
 // Frictionless and oblique: the speed along the floor must stay.
 TEST(Rollback, ObliqueBounce_LosesSpeedAlongTheFloor) {
-  const rb::Bounce v = rb::bounce(kVelocity, {1, 0, -1}, 0, kStep);
+  const rb::Bounce v = rb::bounce(kLibrary, {1, 0, -1}, 0, kStep);
   const rb::Bounce r = rb::bounce(kRollback, {1, 0, -1}, 0, kStep);
-  std::printf("speed along the floor after the bounce %.4f by velocity, %.4f by rollback\n", v.velocity[0],
+  std::printf("speed along the floor after the bounce %.4f by the library, %.4f by rollback\n", v.velocity[0],
               r.velocity[0]);
   EXPECT_NEAR(v.velocity[0], 1, 1e-9);
   EXPECT_LT(r.velocity[0], 0.7);
@@ -46,11 +46,11 @@ TEST(Rollback, ObliqueBounce_LosesSpeedAlongTheFloor) {
 
 // An isolated pair: what is flying at a body at rest bounces off it as off a wall. Smaller steps do not help.
 TEST(Rollback, Collision_LosesAllMomentumAndMore) {
-  const rb::Collision v = rb::collision(kVelocity, 1, kStep);
+  const rb::Collision v = rb::collision(kLibrary, 1, kStep);
   EXPECT_NEAR(v.momentum, 1, 1e-12);
   for (const double h : {kStep, kStep / 4}) {
     const rb::Collision r = rb::collision(kRollback, 1, h);
-    std::printf("h %g: momentum left %.4f of what was (velocity %.12f), struck body at %.2e m/s\n", h,
+    std::printf("h %g: momentum left %.4f of what was (library %.12f), struck body at %.2e m/s\n", h,
                 r.momentum, v.momentum, r.second);
     EXPECT_LT(r.momentum, -0.2);
     EXPECT_LT(std::fabs(r.second), 1e-3);
@@ -60,8 +60,8 @@ TEST(Rollback, Collision_LosesAllMomentumAndMore) {
 // A block on a block: what is frozen in between hangs in the air and hides the weight above it from
 // what is below.
 TEST(Rollback, NormalForceUnderAStack_Vanishes) {
-  const rb::Stacked v = rb::stacked(kVelocity, kStep), r = rb::stacked(kRollback, kStep);
-  std::printf("floor carries %.4f of the weight by velocity, %.4f by rollback, whose bodies feel %.4f\n",
+  const rb::Stacked v = rb::stacked(kLibrary, kStep), r = rb::stacked(kRollback, kStep);
+  std::printf("floor carries %.4f of the weight by the library, %.4f by rollback, whose bodies feel %.4f\n",
               v.floor_reported, r.floor_reported, r.floor_felt);
   EXPECT_NEAR(v.floor_reported, 1, 2e-3);
   EXPECT_NEAR(v.middle_reported, 1, 2e-3);

@@ -13,10 +13,13 @@
 // Why this ends, and in a state without contact: vertices of one island follow the true motion up to one
 // time, before any of their hits; pairs that go unequal fractions have been tested with just that motion; and
 // each round that finds a hit leaves fewer islands.
-#include "rollback/stages.h"
+#include "rollback/scheme.h"
 
 #include <algorithm>
+#include <chrono>
+#include <cmath>
 
+#include "api/objects.h"
 #include "body/make_surface.h"
 #include "core/error.h"
 #include "friction/laws.h"
@@ -25,61 +28,47 @@
 #include "rollback/impact_time.h"
 #include "state/world.h"
 #include "step/context.h"
+#include "step/islands.h"
 #include "step/solve_islands.h"
 #include "step/stages.h"
+#include "step/step_bound.h"
+#include "step/step_impulses.h"
+#include "world/sensors.h"
 
 namespace dfm::rollback {
 
+struct Buffers {
+  Islands islands{Memory::standard()};      // of surfels, world-wide numbers
+  std::vector<ImpactHit> hits;              // by candidate
+  std::vector<uint8_t> joins;               // by candidate: ties its vertices together
+  std::vector<uint32_t> joined;             // those candidates, in the order in which they were found
+  std::vector<double> fraction;             // by surfel, of its way
+  std::vector<double> time;                 // by island
+  std::vector<uint8_t> met;                 // by surfel: a contact of a point has it
+  std::vector<const double *> fractions;    // by body slot, into fraction
+  std::vector<std::vector<double>> lagged;  // by body slot: [n,4] N, friction for the next sub-step
+};
+
 namespace {
 
-struct Buffers : MethodBuffers {
-  Islands islands;                        // of surfels, world-wide numbers
-  Array<ImpactHit> hits;                  // by candidate
-  Array<uint8_t> joins;                   // by candidate: ties its vertices together
-  Array<uint32_t> joined;                 // those candidates, in the order in which they were found
-  Array<double> fraction;                 // by surfel, of its way
-  Array<double> time;                     // by island
-  Array<uint8_t> met;                     // by surfel: a contact of a point has it
-  std::vector<const double *> fractions;  // by body slot, into fraction
-  explicit Buffers(const Memory &m) : islands(m) { use_memory(m, hits, joins, joined, fraction, time, met); }
-};
-Buffers &buffers(StepContext &step) { return static_cast<Buffers &>(*step.method); }
-
-// [n,4] N, friction for the next sub-step.
-Array<double> &lagged(Body &b) { return b.method_values; }
-const Array<double> &lagged(const Body &b) { return b.method_values; }
-
-}  // namespace
-
-std::unique_ptr<MethodBuffers> make_buffers(const Memory &memory) {
-  return std::make_unique<Buffers>(memory);
-}
-
-void stage_lagged(World &w, StepContext &step) {
+// v_free += h M^-1 (friction forces that the last sub-step found)
+void add_lagged(World &w, StepContext &step, const Buffers &r) {
   for (const auto &b : w.bodies) {
     Phyxels &p = b->p;
-    const Array<double> &force = lagged(*b);
-    bool any = false;
+    const std::vector<double> &force = r.lagged[b->slot];
+    if (std::ranges::all_of(force, [](double f) { return f == 0; })) continue;
     const double *const diagonal = b->dynamics->diagonal();
-    for (size_t i = 0; i < p.v_free.size(); ++i)
-      if (force[i] != 0) {
-        any = true;
-        p.v_free[i] += step.h * (diagonal[i] * force[i]);
-      }
-    if (!any) continue;
+    for (size_t i = 0; i < p.v_free.size(); ++i) p.v_free[i] += step.h * (diagonal[i] * force[i]);
     b->dynamics->free_changed();
     gather_surface(b->surface, p.x.data(), p.v_free.data());
   }
 }
 
-namespace {
-
 constexpr uint32_t kGrain = 64;
 
 // The first time of every candidate that `wanted`, each into its own place.
 template <class Wanted>
-void ask(World &w, StepContext &step, std::span<const double *const> fraction, Wanted &&wanted) {
-  Buffers &r = buffers(step);
+void ask(World &w, StepContext &step, Buffers &r, std::span<const double *const> fraction, Wanted &&wanted) {
   const Array<Candidate> &list = step.broad.candidates();
   const ImpactQuery query(step.body_views, step.obstacle_views, step.h, w.offset);
   w.context->tasks.parallel_for(static_cast<uint32_t>(list.size()), kGrain,
@@ -103,8 +92,7 @@ bool take_new(Buffers &r) {
 }
 
 // One time per island. `own`: as many of `joined` as have hit on the true motion; the others only tie.
-void set_fractions(StepContext &step, const ImpactQuery &query, size_t own) {
-  Buffers &r = buffers(step);
+void set_fractions(StepContext &step, Buffers &r, const ImpactQuery &query, size_t own) {
   const uint32_t n = static_cast<uint32_t>(r.fraction.size());
   r.islands.start(n);
   uint32_t node[4];
@@ -123,19 +111,18 @@ void set_fractions(StepContext &step, const ImpactQuery &query, size_t own) {
 }
 
 // Fractions of all surfels: every pair that would touch on the ways that they leave is tied.
-void find_islands(World &w, StepContext &step) {
-  Buffers &r = buffers(step);
+void find_islands(World &w, StepContext &step, Buffers &r) {
   const Array<Candidate> &list = step.broad.candidates();
   const ImpactQuery query(step.body_views, step.obstacle_views, step.h, w.offset);
   r.hits.resize(list.size());
   r.joins.assign(list.size(), 0);
   r.joined.clear();
-  ask(w, step, {}, [](const ImpactQuery &, uint32_t) { return true; });
+  ask(w, step, r, {}, [](const ImpactQuery &, uint32_t) { return true; });
   if (!take_new(r)) return;
   const size_t own = r.joined.size();
   do {
-    set_fractions(step, query, own);
-    ask(w, step, r.fractions, [&](const ImpactQuery &q, uint32_t i) {
+    set_fractions(step, r, query, own);
+    ask(w, step, r, r.fractions, [&](const ImpactQuery &q, uint32_t i) {
       if (r.joins[i]) return false;
       uint32_t node[4];
       const uint32_t n = q.nodes(list[i], node);
@@ -147,8 +134,7 @@ void find_islands(World &w, StepContext &step) {
 
 // Colliding points: of each vertex with one other side the earliest hit. A pair of edges counts only where
 // none of its ends is such a point: Zerbato (2010) has no edges, and what both have would push twice.
-void find_points(World &w, StepContext &step) {
-  Buffers &r = buffers(step);
+void find_points(World &w, StepContext &step, Buffers &r) {
   const Array<Candidate> &list = step.broad.candidates();
   const ImpactQuery query(step.body_views, step.obstacle_views, step.h, w.offset);
   const auto edges = [&](const Candidate &c) { return c.kind == 1; };
@@ -189,7 +175,7 @@ const Body &body_of_node(const World &w, const StepContext &step, uint32_t node,
 
 // The arguments of the laws: slip on the predicted way, normal force and the force that would end the
 // slip from all forces but friction.
-void set_forces(World &w, StepContext &step) {
+void set_forces(World &w, StepContext &step, const Buffers &r) {
   for (uint32_t i = 0; i < step.rows.n; ++i) {
     const ContactPoint &c = step.contacts[i];
     Vec3 pull;  // of the lagged friction on the relative velocity, m/s
@@ -197,7 +183,7 @@ void set_forces(World &w, StepContext &step) {
       uint32_t s;
       const Body &b = body_of_node(w, step, c.node[k], s);
       const size_t at = size_t{b.surface.point[s]} * kStride;
-      const double *const force = &lagged(b)[at];
+      const double *const force = &r.lagged[b.slot][at];
       for (int j = 0; j < 3; ++j)
         pull[j] += c.weight[k] * (step.h * (b.dynamics->diagonal()[at + size_t(j)] * force[j]));
     }
@@ -215,17 +201,17 @@ void set_forces(World &w, StepContext &step) {
 
 // (4.5) for velocities and, by the commit, for positions; the momentum that this and the lagged friction
 // change goes into the books.
-void roll_back(World &w, StepContext &step) {
+void roll_back(World &w, StepContext &step, const Buffers &r) {
   for (size_t i = 0; i < step.body_views.size(); ++i) {
     Body &b = *w.bodies[step.body_views[i].slot];
-    const double *const fraction = buffers(step).fractions[i];
+    const double *const fraction = r.fractions[i];
     b.dynamics->free_changed();
     for (uint32_t s = 0; s < b.surface.nsurfel; ++s) {
       const size_t at = size_t{b.surface.point[s]} * kStride;
       const Vec3 before = load3(&b.p.v_free[at]);
       const Vec3 after = fraction[s] < 1 ? velocity_after(before, fraction[s]) : before;
       const Vec3 lost = b.p.mass[b.surface.point[s]] * (after - before);
-      store3(&b.surfel_impulse[3 * size_t{s}], step.h * load3(&lagged(b)[at]) + lost);
+      store3(&b.surfel_impulse[3 * size_t{s}], step.h * load3(&r.lagged[b.slot][at]) + lost);
       store3(&b.p.v_free[at], after);
     }
   }
@@ -249,8 +235,8 @@ void set_slip(World &w, StepContext &step) {
 
 // (5.27)-(5.30): friction on the points of both sides, by their weights at the common place; for the
 // next sub-step.
-void keep_friction(World &w, StepContext &step) {
-  for (const auto &b : w.bodies) std::fill(lagged(*b).begin(), lagged(*b).end(), 0.0);
+void keep_friction(World &w, StepContext &step, Buffers &r) {
+  for (std::vector<double> &force : r.lagged) std::ranges::fill(force, 0.0);
   for (uint32_t i = 0; i < step.rows.n; ++i) {
     const ContactPoint &c = step.contacts[i];
     const double *const f = &step.rows.frame[size_t(i) * 9];
@@ -262,27 +248,24 @@ void keep_friction(World &w, StepContext &step) {
     for (uint32_t k = 0; k < c.nnode; ++k) {
       uint32_t s;
       const Body &b = body_of_node(w, step, c.node[k], s);
-      double *const to = &lagged(*w.bodies[b.slot])[size_t{b.surface.point[s]} * kStride];
+      double *const to = &r.lagged[b.slot][size_t{b.surface.point[s]} * kStride];
       store3(to, load3(to) + c.weight[k] * force);
     }
   }
 }
 
-}  // namespace
-
-bool stage_rollback(World &w, StepContext &step, uint32_t *trouble) {
+bool solve(World &w, StepContext &step, Buffers &r, uint32_t *trouble) {
   step.passes = step.sweeps = 0;
   step.residual = {};
   uint32_t nnode = 0;
   for (const BodyView &v : step.body_views) nnode = std::max(nnode, v.first_node + v.surface->nsurfel);
-  Buffers &r = buffers(step);
   r.fraction.assign(nnode, 1.0);
   r.fractions.clear();
   for (const BodyView &v : step.body_views) r.fractions.push_back(&r.fraction[v.first_node]);
-  find_islands(w, step);
-  find_points(w, step);
+  find_islands(w, step, r);
+  find_points(w, step, r);
   make_rows(w, step);
-  set_forces(w, step);
+  set_forces(w, step, r);
   for (SolveIsland &island : step.solve_islands->all())
     if (const LawInstance *bad = island.batches.evaluate(step.h, step.state)) {
       *trouble |= tell_failed_solve(w, step, bad, island.batches.failed());
@@ -293,10 +276,118 @@ bool stage_rollback(World &w, StepContext &step, uint32_t *trouble) {
   w.stats.residual = 0;
   w.stats.passes_max = std::max(w.stats.passes_max, w.stats.passes);
   reserve_contacts(w, step);
-  roll_back(w, step);  // nothing fails from here on
+  roll_back(w, step, r);  // nothing fails from here on
   set_slip(w, step);
-  keep_friction(w, step);
+  keep_friction(w, step, r);
   return true;
+}
+
+// The stages of the library's step, as planned, but for what the scheme puts in place of some. As there: all
+// of them, or none.
+bool sub_step(World &w, StepContext &step, Buffers &r, uint32_t *trouble) {
+  step.driven.clear();
+  step.guard.start();
+  step.guard.planned = step.h;
+  step.ended = step.struck = false;
+  for (const PlannedStage &planned : w.plan.stages) {
+    const auto start = std::chrono::steady_clock::now();
+    const bool solves = planned.role == StageRole::solves;
+    if (planned.role == StageRole::lists_pairs) add_lagged(w, step, r);
+    if (!(solves ? solve(w, step, r, trouble) : stage_table()[planned.row].run(w, step, trouble)))
+      return false;
+    StageTime &time = step.stage_times[planned.row];
+    time.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    ++time.calls;
+  }
+  return true;
+}
+
+const char *lacking(const Body &b) {
+  return !b.dynamics->abilities().placed          ? "a model that steps itself"
+         : b.dynamics->system()                   ? "an implicit integrator"
+         : !b.surface.identity()                  ? "a surface of its own"
+         : !b.motions.empty()                     ? "a motion of held points"
+         : b.tears || !b.planned_cuts.empty()     ? "cuts"
+         : !b.switches.empty() || !b.rule.empty() ? "changes of its model"
+                                                  : nullptr;
+}
+const char *lacking(const Obstacle &o) {
+  return o.def.shape == DFM_SHAPE_VOXELS ? "voxels" : o.moves() || o.has_target ? "a motion" : nullptr;
+}
+const char *lacking(const World &w) {
+  const auto remembers = [](const auto &law) { return law->nstate > 0; };
+  return !w.rigid_sets.empty()                    ? "rigid bodies"
+         : !w.attachments.empty()                 ? "attachments"
+         : w.def.sleep                            ? "sleep"
+         : w.steps->facts.self_bodies > 0         ? "self contact"
+         : std::ranges::any_of(w.laws, remembers) ? "a friction law with memory"
+                                                  : nullptr;
+}
+
+// Throws Error if the world has what the scheme lacks.
+void check(const World &w) {
+  const auto refuse = [](const char *what, const std::string &whose) {
+    if (what)
+      fail(DFM_E_UNSUPPORTED, "%s%s: beyond the scheme of Zerbato (2010); use `deform run`", whose.c_str(),
+           what);
+  };
+  refuse(lacking(w), "");
+  for (const auto &b : w.bodies) refuse(lacking(*b), "body '" + b->name + "': ");
+  for (const auto &o : w.obstacles) refuse(lacking(*o), "obstacle '" + o->name + "': ");
+}
+
+// What the roll-back replaces leaves the plan.
+void take_over(World &w, Buffers &r) {
+  w.def.energy_watch = 0;  // which balances impulses
+  prepare(w);
+  check(w);
+  std::erase_if(w.plan.stages, [](const PlannedStage &s) {
+    return s.role == StageRole::finds_contacts || s.role == StageRole::gives_impulses ||
+           s.role == StageRole::guards;
+  });
+  r.lagged.resize(w.bodies.size());
+  for (const auto &b : w.bodies) r.lagged[b->slot].resize(size_t{kStride} * b->p.n);
+}
+
+}  // namespace
+
+Scheme::Scheme() : buffers_(std::make_unique<Buffers>()) {}
+Scheme::~Scheme() = default;
+
+dfm_status Scheme::step(dfm_world world, double dt, uint32_t *trouble) {
+  return as_status([&]() -> dfm_status {
+    World &w = exclusive(world_of(world));
+    StepContext &step = *w.steps;
+    take_over(w, *buffers_);
+    if (bound_due(w)) update_bound(w);
+    uint32_t bits = 0, done = 0;
+    const double start = w.time, goal = start + dt;
+    begin_impulses(w.step_impulses, start, dt);
+    for (double left = choose_pieces(w.sizes, dt, w.bound.step); left > 0; --left) {
+      if (bound_due(w)) {
+        update_bound(w);
+        left *= cut_finer(w.sizes, (goal - w.time) / left, w.bound.step);
+      }
+      if (!(done + left <= w.def.max_substeps))
+        fail(DFM_E_DIVERGED, "a step of %g s needs %g sub-steps of %g s; take a shorter one", dt, done + left,
+             w.bound.step);
+      step.h = step.left = step.rest = (goal - w.time) / left;
+      const bool ends = sub_step(w, step, *buffers_, &bits);
+      if (trouble) *trouble = bits;
+      if (!ends) return DFM_E_DIVERGED;
+      w.time = left > 1 ? w.time + step.h : goal;
+      ++w.stats.substeps;
+      ++w.bound.age;
+      pass(w.sizes, step.h);
+      ++done;
+    }
+    w.stats.last_substeps = done;
+    w.stats.substeps_max = std::max(w.stats.substeps_max, done);
+    w.stats.steps = ++w.step_count;
+    w.stats.time = w.time;
+    look_at_sensors(w, true);
+    return DFM_OK;
+  });
 }
 
 }  // namespace dfm::rollback

@@ -34,7 +34,7 @@ size_t crossings(const std::vector<Body> &bodies) {
 TEST(Rollback, TenBodiesThrownTogether_NeverCross) {
   uint32_t most = 0;
   for (int seed = 0; seed < 2; ++seed) {
-    test::rollback::World w(DFM_METHOD_ROLLBACK, {0, 0, -9.81}, 0.3);
+    test::rollback::World w(test::rollback::By::rollback, {0, 0, -9.81}, 0.3);
     const double s = std::sqrt(0.5);
     test::add_plane(w.world, "floor");
     test::add_plane(w.world, "west", {-0.08, 0, 0}, {0, s, 0, s});
@@ -57,7 +57,7 @@ TEST(Rollback, TenBodiesThrownTogether_NeverCross) {
     }
     ASSERT_EQ(crossings(bodies), 0u) << "a start without crossing";
     for (int i = 0; i < 60; ++i) {
-      test::run(w.world, 2e-3, 1e-3);
+      w.run(2e-3, 1e-3);
       most = std::max(most, test::stats(w.world).contacts);
       ASSERT_EQ(crossings(bodies), 0u) << "seed " << seed << ", after " << 2 * (i + 1) << " ms";
     }
